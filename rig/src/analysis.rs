@@ -1,0 +1,295 @@
+//! Figures from a recording.
+
+use crate::trace::{Recording, Row, Switch};
+use serde::Serialize;
+use serde_json::{Map, Value};
+use tractive::modulation::Mode;
+use tractive_tablegen::MachineFolder;
+
+/// A scenario's figures, each with its unit in its name.
+#[derive(Clone, Debug, Default)]
+pub struct Figures(Map<String, Value>);
+
+impl Figures {
+    /// Adds a figure.
+    pub fn set(&mut self, name: &str, value: impl Serialize) {
+        self.0.insert(name.to_owned(), serde_json::to_value(value).unwrap_or(Value::Null));
+    }
+
+    /// A figure by name.
+    pub fn get(&self, name: &str) -> Option<&Value> {
+        self.0.get(name)
+    }
+
+    /// All figures.
+    pub fn values(&self) -> &Map<String, Value> {
+        &self.0
+    }
+}
+
+/// What every scenario reports.
+pub fn common(recording: &Recording) -> Figures {
+    let mut figures = Figures::default();
+    let rows = &recording.rows;
+    figures.set("simulated_s", rows.last().map_or(0.0, |row| row.t_s));
+    figures.set("fault", recording.trip().map_or("", |trip| trip.fault.name()));
+    if let Some(trip) = recording.trip() {
+        figures.set("fault_value", trip.value);
+        figures.set("fault_limit", trip.limit);
+    }
+    figures.set("peak_current_a", rows.iter().map(Row::peak_current_a).fold(0.0, f64::max));
+    figures.set("most_turn_ons_in_100_ms", most_turn_ons(recording, 0.1));
+    figures
+}
+
+/// The rows from `from_s` (included) to `to_s` (excluded).
+pub fn window(recording: &Recording, from_s: f64, to_s: f64) -> &[Row] {
+    let rows = &recording.rows;
+    let first = rows.partition_point(|row| row.t_s < from_s - 1e-9);
+    let last = rows.partition_point(|row| row.t_s < to_s - 1e-9);
+    &rows[first..last.max(first)]
+}
+
+fn mean(rows: &[Row], value: impl Fn(&Row) -> f64) -> f64 {
+    rows.iter().map(value).sum::<f64>() / rows.len().max(1) as f64
+}
+
+/// The largest number of times that any one device turns on in any window of this length.
+pub fn most_turn_ons(recording: &Recording, length_s: f64) -> usize {
+    let length = (length_s / recording.tick_s).round() as u64;
+    (0..6)
+        .map(|gate| {
+            let ons: Vec<_> = recording
+                .edges
+                .iter()
+                .filter(|edge| edge.on && edge.gate == gate)
+                .map(|edge| edge.tick)
+                .collect();
+            let mut first = 0;
+            let mut most = 0;
+            for (last, tick) in ons.iter().enumerate() {
+                while tick - ons[first] > length {
+                    first += 1;
+                }
+                most = most.max(last + 1 - first);
+            }
+            most
+        })
+        .max()
+        .unwrap_or(0)
+}
+
+/// A step of the demand.
+#[derive(Clone, Copy, Debug)]
+pub struct Step {
+    /// When, in s.
+    pub at_s: f64,
+    /// Torque before, in N·m.
+    pub from_nm: f64,
+    /// Torque after, in N·m.
+    pub to_nm: f64,
+    /// Until when the torque holds, in s.
+    pub until_s: f64,
+}
+
+/// What a step did. Torque is averaged over one carrier period (1/900 s, centred).
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct StepResponse {
+    /// Torque before, in N·m.
+    pub from_nm: f64,
+    /// Torque after, in N·m.
+    pub to_nm: f64,
+    /// From the step to 90 % of it, in ms.
+    pub t90_ms: f64,
+    /// Beyond the final mean, as a share of the step, in percent.
+    pub overshoot_percent: f64,
+    /// Until the torque stays within 5 % of the step about the final mean, in ms.
+    pub settling_5_percent_ms: f64,
+    /// The same with 2 %.
+    pub settling_2_percent_ms: f64,
+    /// Mean of the last 40 ms less the demand, in N·m.
+    pub final_error_nm: f64,
+}
+
+/// Measures a step.
+pub fn step_response(recording: &Recording, step: &Step) -> StepResponse {
+    let torque = carrier_averaged(recording, step.at_s, step.until_s);
+    let final_mean = mean(window(recording, step.until_s - 0.04, step.until_s), |row| row.te_nm);
+    let size = step.to_nm - step.from_nm;
+    let start = final_mean - size;
+    let progress = |torque_nm: f64| (torque_nm - start) / size;
+    let reached = torque.iter().find(|(_, value)| progress(*value) >= 0.9);
+    let settled = |band: f64| {
+        let last_outside = torque.iter().rev().find(|(_, value)| (progress(*value) - 1.0).abs() > band);
+        last_outside.map_or(0.0, |(t_s, _)| (t_s - step.at_s) * 1e3)
+    };
+    let highest = torque.iter().map(|(_, value)| progress(*value)).fold(0.0, f64::max);
+    StepResponse {
+        from_nm: step.from_nm,
+        to_nm: step.to_nm,
+        t90_ms: reached.map_or(f64::INFINITY, |(t_s, _)| (t_s - step.at_s) * 1e3),
+        overshoot_percent: (highest - 1.0) * 100.0,
+        settling_5_percent_ms: settled(0.05),
+        settling_2_percent_ms: settled(0.02),
+        final_error_nm: final_mean - step.to_nm,
+    }
+}
+
+/// Torque averaged over one carrier period around each row of the window.
+fn carrier_averaged(recording: &Recording, from_s: f64, to_s: f64) -> Vec<(f64, f64)> {
+    const HALF_WIDTH_S: f64 = 0.5 / 900.0;
+    let rows = &recording.rows;
+    let step_s = if rows.len() > 1 { rows[1].t_s - rows[0].t_s } else { HALF_WIDTH_S };
+    let reach = (HALF_WIDTH_S / step_s).round() as usize;
+    let first = rows.partition_point(|row| row.t_s < from_s);
+    let last = rows.partition_point(|row| row.t_s < to_s - HALF_WIDTH_S);
+    (first..last)
+        .map(|k| {
+            let around = &rows[k.saturating_sub(reach)..(k + reach + 1).min(rows.len())];
+            (rows[k].t_s, mean(around, |row| row.te_nm))
+        })
+        .collect()
+}
+
+/// What a switch of mode did to the current.
+#[derive(Clone, Debug, Serialize)]
+pub struct SwitchFigures {
+    /// When, in s.
+    pub t_s: f64,
+    /// The mode that ended.
+    pub from: &'static str,
+    /// The mode that began.
+    pub to: &'static str,
+    /// Mechanical speed, in r/min.
+    pub speed_rpm: f64,
+    /// Pulse angle, in degrees; absent where the old carrier was not locked.
+    pub pulse_angle_deg: Option<f64>,
+    /// Largest |phase current| from 2 ms before to 30 ms after, in A.
+    pub peak_current_a: f64,
+    /// Larger of the largest |phase current| 100 to 20 ms before and 60 to 140 ms after, in A.
+    pub steady_current_a: f64,
+    /// By how much the first exceeds the second, in percent.
+    pub excess_percent: f64,
+    /// Torque beyond the steady ripple band of the same windows, from 2 ms before to 30 ms after, in N·m.
+    pub torque_excursion_nm: f64,
+}
+
+/// Every switch between pulsing modes in the recording.
+pub fn mode_switches(recording: &Recording) -> Vec<SwitchFigures> {
+    recording
+        .switches
+        .iter()
+        .filter(|switch| is_counted(switch))
+        .map(|switch| at_switch(recording, switch))
+        .collect()
+}
+
+fn is_counted(switch: &Switch) -> bool {
+    switch.t_s > 0.0 && switch.from != Mode::Off && switch.to != Mode::Off
+}
+
+fn at_switch(recording: &Recording, switch: &Switch) -> SwitchFigures {
+    let peak = |from_s: f64, to_s: f64| {
+        let rows = window(recording, switch.t_s + from_s, switch.t_s + to_s);
+        rows.iter().map(Row::peak_current_a).fold(0.0, f64::max)
+    };
+    let error = |row: &Row| row.te_nm - row.te_ref_nm;
+    let extent = |from_s: f64, to_s: f64| {
+        let rows = window(recording, switch.t_s + from_s, switch.t_s + to_s);
+        let low = rows.iter().map(error).fold(f64::INFINITY, f64::min);
+        (low, rows.iter().map(error).fold(f64::NEG_INFINITY, f64::max))
+    };
+    let steady = peak(-0.1, -0.02).max(peak(0.06, 0.14));
+    let now = peak(-0.002, 0.03);
+    let (before, after, during) = (extent(-0.1, -0.02), extent(0.06, 0.14), extent(-0.002, 0.03));
+    let band = (before.0.min(after.0), before.1.max(after.1));
+    SwitchFigures {
+        t_s: switch.t_s,
+        from: switch.from.name(),
+        to: switch.to.name(),
+        speed_rpm: switch.speed_rpm,
+        pulse_angle_deg: switch.pulse_angle_deg,
+        peak_current_a: now,
+        steady_current_a: steady,
+        excess_percent: (now / steady - 1.0) * 100.0,
+        torque_excursion_nm: (band.0 - during.0).max(during.1 - band.1).max(0.0),
+    }
+}
+
+/// How long each mode was in use, in s, in order of first use.
+#[derive(Clone, Debug, Serialize)]
+pub struct ModeUse {
+    /// The mode.
+    pub mode: &'static str,
+    /// First instant, in s.
+    pub first_s: f64,
+    /// Total, in s.
+    pub total_s: f64,
+}
+
+/// The use of the modes.
+pub fn modes(recording: &Recording) -> Vec<ModeUse> {
+    let mut uses: Vec<ModeUse> = Vec::new();
+    for pair in recording.rows.windows(2) {
+        let name = pair[0].mode.name();
+        let length_s = pair[1].t_s - pair[0].t_s;
+        match uses.iter_mut().find(|found| found.mode == name) {
+            Some(found) => found.total_s += length_s,
+            None => uses.push(ModeUse { mode: name, first_s: pair[0].t_s, total_s: length_s }),
+        }
+    }
+    uses
+}
+
+/// A steady operating point, averaged.
+#[derive(Clone, Debug, Serialize)]
+pub struct SteadyPoint {
+    /// Mechanical speed, in r/min.
+    pub speed_rpm: f64,
+    /// Torque demanded, in N·m.
+    pub demand_nm: f64,
+    /// Mean air-gap torque, in N·m.
+    pub torque_nm: f64,
+    /// Its error, in percent of the demand.
+    pub torque_error_percent: f64,
+    /// Phase current, rms, in A.
+    pub current_rms_a: f64,
+    /// Peak to peak torque ripple, in N·m.
+    pub torque_ripple_nm: f64,
+    /// Shaft power over electrical power, with the machine folder's speed-dependent loss, in percent.
+    pub efficiency_percent: f64,
+    /// Mode in use at the end.
+    pub mode: &'static str,
+}
+
+/// Averages over a window, shortened to whole turns of the stator field.
+pub fn steady_point(
+    recording: &Recording,
+    (from_s, to_s): (f64, f64),
+    demand_nm: f64,
+    machine: &MachineFolder,
+) -> SteadyPoint {
+    let parameters = &machine.parameters;
+    let speed_rpm = window(recording, from_s, to_s).last().map_or(0.0, |row| row.speed_rpm);
+    let turn_s = 60.0 / (speed_rpm.abs().max(1.0) * f64::from(parameters.pole_pairs));
+    let turns = ((to_s - from_s) / turn_s).floor().max(1.0);
+    let rows = window(recording, to_s - turns * turn_s, to_s);
+    let torque_nm = mean(rows, |row| row.te_nm);
+    let current_squared = mean(rows, |row| row.id_a * row.id_a + row.iq_a * row.iq_a);
+    let omega = speed_rpm * core::f64::consts::TAU / 60.0;
+    let air_gap_w = torque_nm * omega;
+    let copper_w = 1.5 * parameters.stator_resistance_ohm * current_squared;
+    let shaft_w = air_gap_w - parameters.speed_loss_w(speed_rpm);
+    let low = rows.iter().map(|row| row.te_nm).fold(f64::INFINITY, f64::min);
+    let high = rows.iter().map(|row| row.te_nm).fold(f64::NEG_INFINITY, f64::max);
+    SteadyPoint {
+        speed_rpm,
+        demand_nm,
+        torque_nm,
+        torque_error_percent: (torque_nm / demand_nm - 1.0) * 100.0,
+        current_rms_a: (current_squared / 2.0).sqrt(),
+        torque_ripple_nm: high - low,
+        efficiency_percent: shaft_w / (air_gap_w + copper_w) * 100.0,
+        mode: rows.last().map_or("off", |row| row.mode.name()),
+    }
+}

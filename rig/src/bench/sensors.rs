@@ -1,0 +1,78 @@
+//! What the firmware's converters see of the machine.
+
+use crate::plant::Plant;
+use rand::SeedableRng;
+use rand::rngs::StdRng;
+use rand_distr::{Distribution, Normal};
+use tractive::control::Measurements;
+use tractive::frames::{Abc, Angle};
+
+/// Imperfections of inverter and sensors, all zero or `None` by default.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Flaws {
+    /// Resolution of the current converters, in bits, over ± `adc_full_scale_a`.
+    pub adc_bits: Option<u32>,
+    /// Range of the current converters, in A.
+    pub adc_full_scale_a: f64,
+    /// Noise on each current sample, rms, in A.
+    pub noise_a: f64,
+    /// Amplitude (V) and frequency (Hz) of the DC link's ripple.
+    pub udc_ripple: Option<(f64, f64)>,
+    /// Constant error of the angle sensor, electrical, in degrees.
+    pub angle_error_deg: f64,
+    /// Seed of the noise.
+    pub seed: u64,
+}
+
+/// Sensors, and the stiff DC link behind the inverter.
+pub struct Sensors {
+    udc_v: f64,
+    flaws: Flaws,
+    random: StdRng,
+}
+
+impl Sensors {
+    /// Sensors on a link of this voltage.
+    pub fn new(udc_v: f64, flaws: Flaws) -> Self {
+        Self { udc_v, flaws, random: StdRng::seed_from_u64(flaws.seed) }
+    }
+
+    /// The link's true voltage, in V.
+    pub fn udc_v(&self, t_s: f64) -> f64 {
+        let ripple = self
+            .flaws
+            .udc_ripple
+            .map_or(0.0, |(amplitude_v, hz)| amplitude_v * (core::f64::consts::TAU * hz * t_s).sin());
+        self.udc_v + ripple
+    }
+
+    /// The phase currents as converted now.
+    pub fn currents(&mut self, plant: &Plant) -> Abc {
+        let [a, b, c] = plant.currents_abc().map(|current| self.convert(current) as f32);
+        Abc { a, b, c }
+    }
+
+    /// All that control measures.
+    pub fn measure(&mut self, plant: &Plant, t_s: f64) -> Measurements {
+        let turns = plant.angle_turns() + self.flaws.angle_error_deg / 360.0;
+        Measurements {
+            currents_a: self.currents(plant),
+            udc_v: self.udc_v(t_s) as f32,
+            angle: Angle((turns.rem_euclid(1.0) * 4_294_967_296.0).round() as u64 as u32),
+        }
+    }
+
+    fn convert(&mut self, current_a: f64) -> f64 {
+        let mut value = current_a;
+        if self.flaws.noise_a > 0.0
+            && let Ok(noise) = Normal::new(0.0, self.flaws.noise_a)
+        {
+            value += noise.sample(&mut self.random);
+        }
+        if let Some(bits) = self.flaws.adc_bits {
+            let step = 2.0 * self.flaws.adc_full_scale_a / f64::from(bits).exp2();
+            value = (value / step).round() * step;
+        }
+        value
+    }
+}

@@ -1,0 +1,207 @@
+//! The rig's command line.
+
+use anyhow::{Context, Result};
+use clap::{Parser, Subcommand, ValueEnum};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::time::Instant;
+use tractive_rig::analysis::Figures;
+use tractive_rig::machine::Machine;
+use tractive_rig::options::{RunOptions, not_negative, positive};
+use tractive_rig::report::{self, Page};
+use tractive_rig::scenario::{self, Scenario};
+use tractive_rig::trace::{self, Recording};
+use tractive_rig::{pattern, points};
+
+#[derive(Parser)]
+#[command(name = "tractive-rig", about = "Plays the motor to the drive, and shows what happened", version)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Runs a scenario and writes its files.
+    Run {
+        /// load-steps, sweep or characteristic.
+        #[arg(default_value = "sweep")]
+        scenario: String,
+        #[command(flatten)]
+        options: Box<RunOptions>,
+    },
+    /// Operating points: IN.csv has torque_nm,speed_rpm,udc_v; OUT.csv adds id_a,iq_a,region.
+    Points {
+        /// Points wanted.
+        input: PathBuf,
+        /// Points found.
+        output: PathBuf,
+        /// A folder of tables/, or the path of any machine folder.
+        #[arg(long, default_value = "pmasynrm-180kw")]
+        machine: String,
+    },
+    /// The modulator's pulses in steady state.
+    Pattern(PatternOptions),
+}
+
+#[derive(clap::Args)]
+struct PatternOptions {
+    /// Mode.
+    #[arg(long, value_enum)]
+    mode: ModeName,
+    /// Fundamental, peak phase, in V.
+    #[arg(long, value_parser = not_negative)]
+    u: f64,
+    /// DC link, in V.
+    #[arg(long, value_parser = positive)]
+    udc: f64,
+    /// Stator frequency, in Hz.
+    #[arg(long, value_parser = positive)]
+    f1: f64,
+    /// Fundamental periods.
+    #[arg(long, default_value_t = 1)]
+    cycles: u32,
+    /// The file to write: t_s,leg,level.
+    #[arg(long)]
+    out: PathBuf,
+    /// Dead time, in µs.
+    #[arg(long, default_value_t = 0.0, value_parser = not_negative)]
+    dead_time_us: f64,
+    /// Shortest pulse, in µs.
+    #[arg(long, default_value_t = 0.0, value_parser = not_negative)]
+    min_pulse_us: f64,
+    /// A folder of tables/, or the path of any machine folder.
+    #[arg(long, default_value = "pmasynrm-180kw")]
+    machine: String,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum ModeName {
+    Async,
+    Sync15,
+    Sync12,
+    Mid7,
+    Mid3,
+    Square,
+}
+
+impl From<ModeName> for tractive::modulation::Mode {
+    fn from(name: ModeName) -> Self {
+        match name {
+            ModeName::Async => Self::Async,
+            ModeName::Sync15 => Self::Sync15,
+            ModeName::Sync12 => Self::Sync12,
+            ModeName::Mid7 => Self::Mid7,
+            ModeName::Mid3 => Self::Mid3,
+            ModeName::Square => Self::Square,
+        }
+    }
+}
+
+fn main() -> ExitCode {
+    match command(Cli::parse().command) {
+        Ok(code) => code,
+        Err(error) => {
+            // One line: what was wrong, and where.
+            eprintln!("{error:#}");
+            ExitCode::from(2)
+        }
+    }
+}
+
+fn command(command: Command) -> Result<ExitCode> {
+    match command {
+        Command::Run { scenario, options } => run(&scenario, &options),
+        Command::Points { input, output, machine } => {
+            points::run(&input, &output, &Machine::load(&machine)?)?;
+            Ok(ExitCode::SUCCESS)
+        }
+        Command::Pattern(options) => {
+            let machine = Machine::load(&options.machine)?;
+            let wanted = pattern::Wanted {
+                mode: options.mode.into(),
+                voltage_v: options.u,
+                udc_v: options.udc,
+                f1_hz: options.f1,
+                cycles: options.cycles,
+                dead_time_us: options.dead_time_us,
+                min_pulse_us: options.min_pulse_us,
+                max_switching_hz: machine.tables.ratings.max_switching_hz,
+            };
+            pattern::write(&wanted, &options.out)?;
+            Ok(ExitCode::SUCCESS)
+        }
+    }
+}
+
+fn run(name: &str, options: &RunOptions) -> Result<ExitCode> {
+    let scenario = scenario::find(name)?;
+    let machine = Machine::load(&options.machine)?;
+    let out = options.out.clone().unwrap_or_else(|| Path::new("target/tractive").join(name));
+    std::fs::create_dir_all(&out).with_context(|| format!("--out {}", out.display()))?;
+    let began = Instant::now();
+    let recording = scenario::drive(scenario.as_ref(), options, &machine)?;
+    let wall_s = began.elapsed().as_secs_f64();
+    let figures = scenario.figures(&recording, options, &machine);
+    recording.write_trace(&out.join("trace.csv"))?;
+    recording.write_edges(&out.join("edges.csv"))?;
+    let summary = summary(scenario.as_ref(), options, &figures, &machine);
+    trace::write_text(&out.join("summary.json"), &(serde_json::to_string_pretty(&summary)? + "\n"))?;
+    trace::write_text(&out.join("report.html"), &page(scenario.as_ref(), options, &recording, &figures)?)?;
+    if options.json {
+        println!("{}", serde_json::to_string(&summary)?);
+    } else {
+        print(&figures);
+        let ratio = recording.rows.last().map_or(0.0, |row| row.t_s) / wall_s;
+        println!("simulated {ratio:.1} times as fast as real time ({})", options.on.name());
+        println!("report: {}", out.join("report.html").display());
+    }
+    let tripped = recording.trip().is_some();
+    if let Some(trip) = recording.trip() {
+        eprintln!("fault {}: {} (limit {})", trip.fault.name(), trip.value, trip.limit);
+    }
+    Ok(if tripped { ExitCode::from(1) } else { ExitCode::SUCCESS })
+}
+
+fn summary(
+    scenario: &dyn Scenario,
+    options: &RunOptions,
+    figures: &Figures,
+    machine: &Machine,
+) -> serde_json::Value {
+    serde_json::json!({
+        "scenario": scenario.name(),
+        "version": env!("CARGO_PKG_VERSION"),
+        "machine": machine.tables.name,
+        "on": options.on.name(),
+        "options": options,
+        "figures": figures.values(),
+    })
+}
+
+fn page(
+    scenario: &dyn Scenario,
+    options: &RunOptions,
+    recording: &Recording,
+    figures: &Figures,
+) -> Result<String> {
+    let mut page = Page::new(&format!("{}: {}", scenario.name(), scenario.figure()));
+    scenario.plots(recording, &mut page);
+    page.finish(&format!("tractive {}, run on {}", env!("CARGO_PKG_VERSION"), options.on.name()), figures)
+}
+
+fn print(figures: &Figures) {
+    for (name, value) in figures.values() {
+        match value {
+            serde_json::Value::Array(rows) => {
+                println!("{name}:");
+                for row in rows.iter().filter_map(serde_json::Value::as_object) {
+                    let cells: Vec<_> =
+                        row.iter().map(|(key, value)| format!("{key} {}", report::cell(value))).collect();
+                    println!("  {}", cells.join("  "));
+                }
+            }
+            other => println!("{name} {}", report::cell(other)),
+        }
+    }
+}

@@ -1,0 +1,159 @@
+//! Options that all runs share.
+
+use crate::bench::Flaws;
+use clap::{Args, ValueEnum};
+use serde::Serialize;
+use std::path::PathBuf;
+use std::str::FromStr;
+
+/// Where the drive runs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum On {
+    /// The image, in QEMU.
+    Qemu,
+    /// The same code, on the host.
+    Host,
+}
+
+impl On {
+    /// As on the command line.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Qemu => "qemu",
+            Self::Host => "host",
+        }
+    }
+}
+
+/// A DC-link ripple, written `V@HZ`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Ripple {
+    /// Amplitude, in V.
+    pub amplitude_v: f64,
+    /// Frequency, in Hz.
+    pub frequency_hz: f64,
+}
+
+impl FromStr for Ripple {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let parse = || {
+            let (volts, hertz) = text.split_once('@')?;
+            let ripple = Self { amplitude_v: volts.parse().ok()?, frequency_hz: hertz.parse().ok()? };
+            (ripple.amplitude_v >= 0.0 && ripple.frequency_hz > 0.0).then_some(ripple)
+        };
+        parse().ok_or_else(|| "must be V@HZ, for instance 30@300".to_owned())
+    }
+}
+
+/// A finite number that is not negative.
+pub fn not_negative(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value.is_finite() && value >= 0.0 => Ok(value),
+        _ => Err("must be a number of at least 0".to_owned()),
+    }
+}
+
+/// A finite number above zero.
+pub fn positive(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value.is_finite() && value > 0.0 => Ok(value),
+        _ => Err("must be a number above 0".to_owned()),
+    }
+}
+
+/// Any finite number.
+pub fn finite(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value.is_finite() => Ok(value),
+        _ => Err("must be a finite number".to_owned()),
+    }
+}
+
+/// Options of a run.
+#[derive(Clone, Debug, Args, Serialize)]
+pub struct RunOptions {
+    /// Where the drive runs.
+    #[arg(long, value_enum, default_value = "host")]
+    pub on: On,
+    /// Folder for the files; default target/tractive/SCENARIO.
+    #[serde(skip)]
+    #[arg(long)]
+    pub out: Option<PathBuf>,
+    /// A folder of tables/, or the path of any machine folder.
+    #[arg(long, default_value = "pmasynrm-180kw")]
+    pub machine: String,
+    /// Step of trace.csv, in s.
+    #[arg(long, default_value = "50e-6", value_parser = positive)]
+    pub dt: f64,
+    /// Seed of the noise.
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// Print the summary as JSON.
+    #[serde(skip)]
+    #[arg(long)]
+    pub json: bool,
+    /// DC-link voltage, in V; default the machine's nominal one.
+    #[arg(long, value_parser = positive)]
+    pub udc: Option<f64>,
+    /// Dead time, in µs.
+    #[arg(long, default_value_t = 0.0, value_parser = not_negative)]
+    pub dead_time_us: f64,
+    /// Shortest pulse, in µs.
+    #[arg(long, default_value_t = 10.0, value_parser = not_negative)]
+    pub min_pulse_us: f64,
+    /// Resolution of the current converters, in bits.
+    #[arg(long, value_parser = clap::value_parser!(u32).range(4..=24))]
+    pub adc_bits: Option<u32>,
+    /// Current noise, rms, in A.
+    #[arg(long, default_value_t = 0.0, value_parser = not_negative)]
+    pub noise_a: f64,
+    /// DC-link ripple, V@HZ.
+    #[arg(long)]
+    pub udc_ripple: Option<Ripple>,
+    /// By how much the machine's true flux exceeds the map, in percent.
+    #[arg(long, default_value_t = 0.0, value_parser = finite, allow_negative_numbers = true)]
+    pub map_error: f64,
+    /// By how much the machine's true stator resistance exceeds the rating, in percent.
+    #[arg(long, default_value_t = 0.0, value_parser = finite, allow_negative_numbers = true)]
+    pub rs_error: f64,
+    /// Error of the angle sensor, electrical, in degrees.
+    #[arg(long, default_value_t = 0.0, value_parser = finite, allow_negative_numbers = true)]
+    pub angle_error: f64,
+    /// The firmware's image (for --on qemu).
+    #[serde(skip)]
+    #[arg(long, env = "TRACTIVE_IMAGE")]
+    pub image: Option<PathBuf>,
+    /// The emulator (for --on qemu).
+    #[serde(skip)]
+    #[arg(long, env = "TRACTIVE_QEMU", default_value = "qemu-system-arm")]
+    pub qemu: PathBuf,
+    /// sweep: add the way back.
+    #[arg(long)]
+    pub down: bool,
+    /// sweep: brake instead of pulling.
+    #[arg(long)]
+    pub brake: bool,
+    /// sweep: share of the full torque.
+    #[arg(long, default_value_t = 1.0, value_parser = finite, allow_negative_numbers = true)]
+    pub torque_scale: f64,
+    /// sweep: last speed, in r/min.
+    #[arg(long, default_value_t = 2000.0, value_parser = finite, allow_negative_numbers = true)]
+    pub to: f64,
+}
+
+impl RunOptions {
+    /// The sensors' imperfections; the converters' range is the trip level and a quarter more.
+    pub fn flaws(&self, trip_current_a: f64) -> Flaws {
+        Flaws {
+            adc_bits: self.adc_bits,
+            adc_full_scale_a: 1.25 * trip_current_a,
+            noise_a: self.noise_a,
+            udc_ripple: self.udc_ripple.map(|ripple| (ripple.amplitude_v, ripple.frequency_hz)),
+            angle_error_deg: self.angle_error,
+            seed: self.seed,
+        }
+    }
+}

@@ -1,0 +1,103 @@
+//! `cargo rig pattern`: the modulator's own pulses in steady state.
+
+use crate::bench::Inverter;
+use crate::plant::Leg;
+use crate::run::CLOCK;
+use crate::trace;
+use anyhow::{Result, bail};
+use std::path::Path;
+use tractive::frames::Angle;
+use tractive::modulation::{Devices, Mode, Modulator, Reference, Schedule, depth_limit};
+use tractive::time::Instant;
+
+/// What to make.
+#[derive(Clone, Copy, Debug)]
+pub struct Wanted {
+    /// Mode.
+    pub mode: Mode,
+    /// Fundamental, peak phase, in V.
+    pub voltage_v: f64,
+    /// DC link, in V.
+    pub udc_v: f64,
+    /// Stator frequency, in Hz.
+    pub f1_hz: f64,
+    /// Number of fundamental periods.
+    pub cycles: u32,
+    /// Dead time, in µs.
+    pub dead_time_us: f64,
+    /// Shortest pulse, in µs.
+    pub min_pulse_us: f64,
+    /// Highest switching frequency, in Hz.
+    pub max_switching_hz: f32,
+}
+
+/// An upper device that changes: time in s, leg 0 ..= 2, on.
+pub type LegEdge = (f64, usize, bool);
+
+/// The upper devices' changes over whole fundamental periods, and at their beginning their levels.
+pub fn edges(wanted: &Wanted) -> Result<Vec<LegEdge>> {
+    let tick_s = f64::from(CLOCK.ticks_per_s).recip();
+    let ticks = |microseconds: f64| (microseconds * 1e-6 / tick_s).round() as u32;
+    let devices =
+        Devices::new(ticks(wanted.min_pulse_us), ticks(wanted.dead_time_us), wanted.max_switching_hz, &CLOCK);
+    let rate = (wanted.f1_hz * tick_s * 4_294_967_296.0) as f32;
+    let six_step_v = wanted.udc_v * core::f64::consts::FRAC_2_PI;
+    let most = f64::from(depth_limit(wanted.mode, rate, &devices)) * six_step_v;
+    if wanted.mode != Mode::Square && wanted.voltage_v > most * 1.000_001 {
+        bail!("--u {}: mode {} gives at most {most:.3} V here", wanted.voltage_v, wanted.mode.name());
+    }
+    let mut modulator = Modulator::new(devices, Schedule::fixed(wanted.mode, &CLOCK));
+    let cycle = (1.0 / (wanted.f1_hz * tick_s)).round() as u64;
+    // One fundamental to lock on, then from the next zero of the pulse angle.
+    let (begin, end) = (2 * cycle, (2 + u64::from(wanted.cycles)) * cycle);
+    let mut inverter: Option<Inverter> = None;
+    let mut start = 0_u64;
+    let mut levels = Vec::new();
+    let mut last = [None; 3];
+    while start <= end {
+        let turned = (f64::from(rate) * start as f64).rem_euclid(4_294_967_296.0);
+        let reference = Reference {
+            voltage_v: wanted.voltage_v as f32,
+            angle: Angle(turned as u64 as u32) - Angle::DEG_90,
+            rate,
+            at: Instant(start as u32),
+            udc_v: wanted.udc_v as f32,
+            depth: (wanted.voltage_v / six_step_v) as f32,
+        };
+        let half = modulator.step(Instant(start as u32), Some(&reference));
+        let gates = inverter.get_or_insert_with(|| Inverter::new(devices.dead_time_ticks.into(), half));
+        gates.begin(half, start);
+        let mut now = start;
+        start = gates.half_end();
+        loop {
+            for (leg, state) in gates.legs().into_iter().enumerate() {
+                let on = state == Leg::Upper;
+                if now >= begin && now <= end && last[leg] != Some(on) {
+                    levels.push(((now - begin) as f64 * tick_s, leg, on));
+                    last[leg] = Some(on);
+                }
+            }
+            match gates.next_event() {
+                Some(event) if event < start => {
+                    now = event;
+                    gates.act(event);
+                }
+                _ => break,
+            }
+        }
+        // The first row of each leg is its level at the very beginning.
+        if now < begin {
+            last = [None; 3];
+        }
+    }
+    Ok(levels)
+}
+
+/// Writes the pattern as `t_s,leg,level`.
+pub fn write(wanted: &Wanted, out: &Path) -> Result<()> {
+    let mut text = String::from("t_s,leg,level\n");
+    for (t_s, leg, on) in edges(wanted)? {
+        text += &format!("{:.9},{},{}\n", t_s, ["u", "v", "w"][leg], u8::from(on));
+    }
+    trace::write_text(out, &text)
+}

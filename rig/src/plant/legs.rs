@@ -1,0 +1,57 @@
+//! A leg, and what its diodes do while both gates are off.
+
+use tractive_tablegen::SmoothMap;
+
+/// State of an inverter leg.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Leg {
+    /// Upper device on.
+    Upper,
+    /// Lower device on.
+    Lower,
+    /// Both off: current finds its way through the diodes.
+    Open,
+}
+
+/// The diodes of an open leg: current out of the leg (positive) flows through the lower one, current into it through
+/// the upper one. In between, for currents below half a percent of the machine's largest, the leg's voltage follows the current
+/// linearly, as with a small snubber; so a machine whose EMF stays below the link carries no more than that.
+#[derive(Clone, Copy, Debug)]
+pub struct Clamp {
+    small_current_a: f64,
+    least_inductance_h: f64,
+}
+
+/// Current, as a share of the largest, at which a diode conducts fully.
+const SMALL_SHARE: f64 = 0.005;
+/// Step near the linear zone, as a share of its time constant; Runge–Kutta is stable up to 2.7.
+const STIFF_SHARE: f64 = 0.8;
+
+impl Clamp {
+    /// For a machine.
+    pub fn new(max_current_a: f64, map: &SmoothMap, flux_scale: f64) -> Self {
+        let samples =
+            (0..=20).flat_map(|r| (0..=20).map(move |c| (f64::from(r) / 20.0, f64::from(c) / 20.0)));
+        let least = samples
+            .map(|(x, y)| map.at(-max_current_a * x, max_current_a * y))
+            .map(|flux| flux.ldd_h.min(flux.lqq_h))
+            .fold(f64::INFINITY, f64::min);
+        Self { small_current_a: SMALL_SHARE * max_current_a, least_inductance_h: least * flux_scale }
+    }
+
+    /// Voltage of an open leg from the link's midpoint, in V.
+    pub fn voltage(&self, current_a: f64, udc_v: f64) -> f64 {
+        -0.5 * udc_v * (current_a / self.small_current_a).clamp(-1.0, 1.0)
+    }
+
+    /// Longest step while legs are open, in s: short near the linear zone.
+    pub fn step_s(&self, udc_v: f64, currents_a: [f64; 3], legs: &[Leg; 3]) -> f64 {
+        let open = currents_a.iter().zip(legs).filter(|(_, leg)| **leg == Leg::Open);
+        let nearest = open.map(|(current, _)| current.abs()).fold(f64::INFINITY, f64::min);
+        let slope_ohm = 0.5 * udc_v / self.small_current_a;
+        let stiff = STIFF_SHARE * self.least_inductance_h / slope_ohm;
+        // No current moves faster than the whole link across the least inductance.
+        let away = (nearest - self.small_current_a) * self.least_inductance_h / (1.5 * udc_v);
+        away.clamp(stiff, super::LONGEST_STEP_S.max(stiff))
+    }
+}

@@ -1,0 +1,234 @@
+//! The plant: a saturated machine behind three inverter legs, in f64.
+//!
+//! Stator equation in the rotor frame, with the smooth flux map's incremental inductances:
+//! `L(i) di/dt = u − R i − jω ψ(i)`. Amplitude-invariant, peak, electrical; d along the magnet flux; currents positive into the
+//! machine. The legs' voltages count from the link's midpoint.
+
+mod legs;
+mod speed;
+
+pub use legs::Leg;
+pub use speed::SpeedSource;
+
+use core::f64::consts::TAU;
+use legs::Clamp;
+use tractive_tablegen::{FluxPoint, MachineFolder, SmoothMap};
+
+/// How the true machine differs from its folder.
+#[derive(Clone, Copy, Debug)]
+pub struct PlantSettings {
+    /// True flux linkage over the map's.
+    pub flux_scale: f64,
+    /// True stator resistance over the rating.
+    pub resistance_scale: f64,
+}
+
+impl Default for PlantSettings {
+    fn default() -> Self {
+        Self { flux_scale: 1.0, resistance_scale: 1.0 }
+    }
+}
+
+/// Energies since the beginning, in J.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Energies {
+    /// Taken from the link.
+    pub electrical_j: f64,
+    /// Turned into heat in the stator.
+    pub copper_j: f64,
+    /// Given to the rotor by the air-gap torque.
+    pub mechanical_j: f64,
+}
+
+/// Longest integration step, in s: a tenth of a radian at 400 Hz leaves Runge–Kutta's error near 1e-7.
+const LONGEST_STEP_S: f64 = 40e-6;
+
+/// Machine and legs.
+pub struct Plant {
+    map: SmoothMap,
+    settings: PlantSettings,
+    pole_pairs: f64,
+    resistance_ohm: f64,
+    clamp: Clamp,
+    speed: SpeedSource,
+    time_s: f64,
+    id_a: f64,
+    iq_a: f64,
+    /// Electrical angle, 0 ≤ x < 1 turn.
+    angle_turns: f64,
+    /// Mechanical, in rad/s.
+    speed_rad_s: f64,
+    energies: Energies,
+}
+
+/// What is integrated: id, iq, energies.
+type State = [f64; 5];
+
+impl Plant {
+    /// At rest electrically, angle zero, turning as the speed source says.
+    pub fn new(machine: &MachineFolder, speed: SpeedSource, settings: &PlantSettings) -> Self {
+        let parameters = &machine.parameters;
+        let map = SmoothMap::new(&machine.map);
+        let clamp = Clamp::new(parameters.max_current_a, &map, settings.flux_scale);
+        let speed_rad_s = match &speed {
+            SpeedSource::Profile(points) => speed::profile_speed(points, 0.0),
+            SpeedSource::Inertia { .. } => 0.0,
+        };
+        Self {
+            map,
+            settings: *settings,
+            pole_pairs: f64::from(parameters.pole_pairs),
+            resistance_ohm: parameters.stator_resistance_ohm * settings.resistance_scale,
+            clamp,
+            speed,
+            time_s: 0.0,
+            id_a: 0.0,
+            iq_a: 0.0,
+            angle_turns: 0.0,
+            speed_rad_s,
+            energies: Energies::default(),
+        }
+    }
+
+    /// Sets the currents, in A.
+    pub fn set_currents(&mut self, id_a: f64, iq_a: f64) {
+        (self.id_a, self.iq_a) = (id_a, iq_a);
+    }
+
+    /// Currents in the rotor frame, in A.
+    pub fn currents_dq(&self) -> (f64, f64) {
+        (self.id_a, self.iq_a)
+    }
+
+    /// Phase currents, in A.
+    pub fn currents_abc(&self) -> [f64; 3] {
+        let (sin, cos) = (self.angle_turns * TAU).sin_cos();
+        phases(self.id_a * cos - self.iq_a * sin, self.id_a * sin + self.iq_a * cos)
+    }
+
+    /// Air-gap torque, in N·m.
+    pub fn torque_nm(&self) -> f64 {
+        let flux = self.flux(self.id_a, self.iq_a);
+        1.5 * self.pole_pairs * (flux.psi_d_wb * self.iq_a - flux.psi_q_wb * self.id_a)
+    }
+
+    /// Electrical rotor angle, in turns, 0 ≤ x < 1.
+    pub fn angle_turns(&self) -> f64 {
+        self.angle_turns
+    }
+
+    /// Mechanical speed, in r/min.
+    pub fn speed_rpm(&self) -> f64 {
+        self.speed_rad_s * 60.0 / TAU
+    }
+
+    /// Energies since the beginning.
+    pub fn energies(&self) -> Energies {
+        self.energies
+    }
+
+    /// Lets time pass with the legs unchanged.
+    pub fn advance(&mut self, legs: [Leg; 3], udc_v: f64, dt_s: f64) {
+        let open = legs.contains(&Leg::Open);
+        let mut left = dt_s;
+        while left > 0.0 {
+            let longest =
+                if open { self.clamp.step_s(udc_v, self.currents_abc(), &legs) } else { LONGEST_STEP_S };
+            let steps = (left / longest).ceil().max(1.0);
+            let step = if open { left.min(longest) } else { left / steps };
+            self.step(legs, udc_v, step);
+            left = if steps <= 1.0 { 0.0 } else { left - step };
+        }
+    }
+
+    fn flux(&self, id_a: f64, iq_a: f64) -> FluxPoint {
+        let scale = self.settings.flux_scale;
+        let flux = self.map.at(id_a, iq_a);
+        FluxPoint {
+            psi_d_wb: flux.psi_d_wb * scale,
+            psi_q_wb: flux.psi_q_wb * scale,
+            ldd_h: flux.ldd_h * scale,
+            ldq_h: flux.ldq_h * scale,
+            lqd_h: flux.lqd_h * scale,
+            lqq_h: flux.lqq_h * scale,
+        }
+    }
+
+    /// Runge–Kutta, fourth order. The frame turns during the step; the speed changes linearly at most.
+    fn step(&mut self, legs: [Leg; 3], udc_v: f64, dt_s: f64) {
+        let acceleration = match &self.speed {
+            SpeedSource::Profile(points) => {
+                (speed::profile_speed(points, self.time_s + dt_s) - speed::profile_speed(points, self.time_s))
+                    / dt_s
+            }
+            SpeedSource::Inertia { inertia_kg_m2, load_nm } => (self.torque_nm() - load_nm) / inertia_kg_m2,
+        };
+        let omega = |t: f64| self.pole_pairs * (self.speed_rad_s + acceleration * t);
+        let turned = |t: f64| self.pole_pairs * (self.speed_rad_s + 0.5 * acceleration * t) * t;
+        let (sin0, cos0) = (self.angle_turns * TAU).sin_cos();
+        let (sin_half, cos_half) = turned(0.5 * dt_s).sin_cos();
+        let (sin1, cos1) = (sin0 * cos_half + cos0 * sin_half, cos0 * cos_half - sin0 * sin_half);
+        let (sin_whole, cos_whole) = turned(dt_s).sin_cos();
+        let (sin2, cos2) = (sin0 * cos_whole + cos0 * sin_whole, cos0 * cos_whole - sin0 * sin_whole);
+        let y0: State = [self.id_a, self.iq_a, 0.0, 0.0, 0.0];
+        let slope = |y: &State, sin: f64, cos: f64, t: f64| self.slope(y, legs, udc_v, (sin, cos), omega(t));
+        let k1 = slope(&y0, sin0, cos0, 0.0);
+        let k2 = slope(&along(&y0, &k1, 0.5 * dt_s), sin1, cos1, 0.5 * dt_s);
+        let k3 = slope(&along(&y0, &k2, 0.5 * dt_s), sin1, cos1, 0.5 * dt_s);
+        let k4 = slope(&along(&y0, &k3, dt_s), sin2, cos2, dt_s);
+        let mut y = y0;
+        for (index, value) in y.iter_mut().enumerate() {
+            *value += dt_s / 6.0 * (k1[index] + 2.0 * (k2[index] + k3[index]) + k4[index]);
+        }
+        [self.id_a, self.iq_a, _, _, _] = y;
+        self.energies.electrical_j += y[2];
+        self.energies.copper_j += y[3];
+        self.energies.mechanical_j += y[4];
+        self.angle_turns = (self.angle_turns + turned(dt_s) / TAU).rem_euclid(1.0);
+        self.time_s += dt_s;
+        self.speed_rad_s = match &self.speed {
+            SpeedSource::Profile(points) => speed::profile_speed(points, self.time_s),
+            SpeedSource::Inertia { .. } => self.speed_rad_s + acceleration * dt_s,
+        };
+    }
+
+    fn slope(&self, y: &State, legs: [Leg; 3], udc_v: f64, (sin, cos): (f64, f64), omega: f64) -> State {
+        let (id, iq) = (y[0], y[1]);
+        let currents = phases(id * cos - iq * sin, id * sin + iq * cos);
+        let mut volts = [0.0; 3];
+        for ((volt, leg), current) in volts.iter_mut().zip(legs).zip(currents) {
+            *volt = match leg {
+                Leg::Upper => 0.5 * udc_v,
+                Leg::Lower => -0.5 * udc_v,
+                Leg::Open => self.clamp.voltage(current, udc_v),
+            };
+        }
+        let [a, b, c] = volts;
+        let (alpha, beta) = ((2.0 * a - b - c) / 3.0, (b - c) / 3.0_f64.sqrt());
+        let (ud, uq) = (alpha * cos + beta * sin, beta * cos - alpha * sin);
+        let flux = self.flux(id, iq);
+        let vd = ud - self.resistance_ohm * id + omega * flux.psi_q_wb;
+        let vq = uq - self.resistance_ohm * iq - omega * flux.psi_d_wb;
+        let det = flux.ldd_h * flux.lqq_h - flux.ldq_h * flux.lqd_h;
+        [
+            (flux.lqq_h * vd - flux.ldq_h * vq) / det,
+            (flux.ldd_h * vq - flux.lqd_h * vd) / det,
+            1.5 * (ud * id + uq * iq),
+            1.5 * self.resistance_ohm * (id * id + iq * iq),
+            1.5 * omega * (flux.psi_d_wb * iq - flux.psi_q_wb * id),
+        ]
+    }
+}
+
+fn along(y: &State, slope: &State, dt_s: f64) -> State {
+    let mut out = *y;
+    for (value, rate) in out.iter_mut().zip(slope) {
+        *value += dt_s * rate;
+    }
+    out
+}
+
+fn phases(alpha: f64, beta: f64) -> [f64; 3] {
+    let (x, y) = (-0.5 * alpha, 0.5 * 3.0_f64.sqrt() * beta);
+    [alpha, x + y, x - y]
+}

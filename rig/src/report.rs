@@ -1,0 +1,223 @@
+//! The scenario's page: one self-contained HTML file, its plots drawn as SVG.
+
+use crate::analysis::Figures;
+use crate::bench::GATES;
+use crate::trace::{Recording, Row};
+use anyhow::{Result, anyhow};
+use plotters::prelude::*;
+use serde_json::Value;
+use std::fmt::Write as _;
+
+/// Size of a plot, in pixels.
+const SIZE: (u32, u32) = (1000, 280);
+/// Points per curve; denser data is shown by its extremes.
+const POINTS: usize = 1500;
+const COLOURS: [RGBColor; 4] =
+    [RGBColor(31, 119, 180), RGBColor(214, 39, 40), RGBColor(44, 160, 44), RGBColor(148, 103, 189)];
+
+/// A curve of a recording: its name and what it shows.
+pub type Curve<'a> = (&'a str, fn(&Row) -> f64);
+
+/// A page under construction.
+pub struct Page {
+    title: String,
+    body: String,
+    error: Option<anyhow::Error>,
+}
+
+impl Page {
+    /// A page with the figure that it answers as its title.
+    pub fn new(title: &str) -> Self {
+        Self { title: title.to_owned(), body: String::new(), error: None }
+    }
+
+    /// Curves over the whole recording.
+    pub fn plot(&mut self, title: &str, unit: &str, recording: &Recording, curves: &[Curve]) {
+        let end_s = recording.rows.last().map_or(1.0, |row| row.t_s);
+        self.plot_window(title, unit, recording, (0.0, end_s), curves);
+    }
+
+    /// Curves over a part of the recording.
+    pub fn plot_window(
+        &mut self,
+        title: &str,
+        unit: &str,
+        recording: &Recording,
+        window: (f64, f64),
+        curves: &[Curve],
+    ) {
+        let rows = crate::analysis::window(recording, window.0, window.1);
+        let series = curves
+            .iter()
+            .map(|(name, value)| {
+                let points: Vec<_> = rows.iter().map(|row| (row.t_s, value(row))).collect();
+                (*name, thinned(&points))
+            })
+            .collect::<Vec<_>>();
+        self.draw(title, unit, &series);
+    }
+
+    /// Line voltage between phases u and v from the gates' edges, over a part of the recording.
+    pub fn line_voltage(&mut self, title: &str, recording: &Recording, window: (f64, f64)) {
+        let udc_v = recording.rows.first().map_or(0.0, |row| row.udc_v);
+        let mut on = [false; GATES.len()];
+        let mut points = Vec::new();
+        let mut last = 0.0;
+        for edge in &recording.edges {
+            let t_s = recording.seconds(edge.tick);
+            on[usize::from(edge.gate)] = edge.on;
+            let level = udc_v * (f64::from(u8::from(on[0])) - f64::from(u8::from(on[2])));
+            if t_s >= window.0 && t_s <= window.1 {
+                points.extend([(t_s, last), (t_s, level)]);
+            }
+            last = level;
+        }
+        self.draw(title, "V", &[("u-v", points)]);
+    }
+
+    /// The whole page.
+    pub fn finish(self, subtitle: &str, figures: &Figures) -> Result<String> {
+        if let Some(error) = self.error {
+            return Err(error);
+        }
+        let mut page = String::new();
+        write!(
+            page,
+            "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>{title}</title><style>\
+             body{{font-family:sans-serif;max-width:1040px;margin:2em auto;padding:0 1em}}\
+             table{{border-collapse:collapse;font-size:90%}}td,th{{border:1px solid #ccc;padding:2px 8px;text-align:right}}\
+             h2{{font-size:105%;margin:1.4em 0 0}}svg{{max-width:100%;height:auto}}</style></head><body>\
+             <h1>{title}</h1><p>{subtitle}</p>{body}<h2>Figures</h2>{tables}</body></html>\n",
+            title = escape(&self.title),
+            subtitle = escape(subtitle),
+            body = self.body,
+            tables = tables(figures),
+        )?;
+        Ok(page)
+    }
+
+    fn draw(&mut self, title: &str, unit: &str, series: &[(&str, Vec<(f64, f64)>)]) {
+        match chart(unit, series) {
+            Ok(svg) => {
+                let _ = write!(self.body, "<h2>{}</h2>{}{svg}", escape(title), legend(series));
+            }
+            Err(error) => self.error = Some(error),
+        }
+    }
+}
+
+fn chart(unit: &str, series: &[(&str, Vec<(f64, f64)>)]) -> Result<String> {
+    let points = || series.iter().flat_map(|(_, points)| points.iter());
+    let (mut x, mut y) = ((f64::INFINITY, f64::NEG_INFINITY), (0.0_f64, 0.0_f64));
+    for (t_s, value) in points() {
+        x = (x.0.min(*t_s), x.1.max(*t_s));
+        y = (y.0.min(*value), y.1.max(*value));
+    }
+    if !(x.1 > x.0) {
+        x = (0.0, 1.0);
+    }
+    let room = 0.05 * (y.1 - y.0).max(1e-9);
+    let mut svg = String::new();
+    {
+        let area = SVGBackend::with_string(&mut svg, SIZE).into_drawing_area();
+        let failed = |error: &dyn std::fmt::Display| anyhow!("plot: {error}");
+        let mut chart = ChartBuilder::on(&area)
+            .margin(8)
+            .x_label_area_size(34)
+            .y_label_area_size(64)
+            .build_cartesian_2d(x.0..x.1, y.0 - room..y.1 + room)
+            .map_err(|error| failed(&error))?;
+        chart
+            .configure_mesh()
+            .x_desc("time in s")
+            .y_desc(unit)
+            .light_line_style(TRANSPARENT)
+            .draw()
+            .map_err(|error| failed(&error))?;
+        for ((_, points), colour) in series.iter().zip(COLOURS) {
+            chart
+                .draw_series(LineSeries::new(points.iter().copied(), &colour))
+                .map_err(|error| failed(&error))?;
+        }
+        area.present().map_err(|error| failed(&error))?;
+    }
+    Ok(svg)
+}
+
+fn legend(series: &[(&str, Vec<(f64, f64)>)]) -> String {
+    let mut text = String::new();
+    if series.len() > 1 {
+        for ((name, _), colour) in series.iter().zip(COLOURS) {
+            let _ = write!(
+                text,
+                " <span style=\"color:rgb({},{},{})\">■ {}</span>",
+                colour.0,
+                colour.1,
+                colour.2,
+                escape(name)
+            );
+        }
+    }
+    text
+}
+
+/// No more than about [`POINTS`] points: of each stretch the lowest and the highest, in their order.
+fn thinned(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
+    if points.len() <= POINTS {
+        return points.to_vec();
+    }
+    let stretch = points.len().div_ceil(POINTS / 2);
+    points
+        .chunks(stretch)
+        .flat_map(|part| {
+            let by_value = |a: &usize, b: &usize| part[*a].1.total_cmp(&part[*b].1);
+            let low = (0..part.len()).min_by(by_value).unwrap_or(0);
+            let high = (0..part.len()).max_by(by_value).unwrap_or(0);
+            [part[low.min(high)], part[low.max(high)]]
+        })
+        .collect()
+}
+
+fn tables(figures: &Figures) -> String {
+    let mut scalars = String::from("<table>");
+    let mut lists = String::new();
+    for (name, value) in figures.values() {
+        match value {
+            Value::Array(rows) => {
+                let _ = write!(lists, "<h2>{}</h2>{}", escape(name), table(rows));
+            }
+            _ => {
+                let _ = write!(scalars, "<tr><th>{}</th><td>{}</td></tr>", escape(name), cell(value));
+            }
+        }
+    }
+    scalars + "</table>" + &lists
+}
+
+fn table(rows: &[Value]) -> String {
+    let mut text = String::from("<table>");
+    for (index, row) in rows.iter().enumerate() {
+        let Value::Object(fields) = row else { continue };
+        if index == 0 {
+            let heads: String = fields.keys().map(|key| format!("<th>{}</th>", escape(key))).collect();
+            let _ = write!(text, "<tr>{heads}</tr>");
+        }
+        let cells: String = fields.values().map(|value| format!("<td>{}</td>", cell(value))).collect();
+        let _ = write!(text, "<tr>{cells}</tr>");
+    }
+    text + "</table>"
+}
+
+/// A figure as people read it: four significant decimals, not seventeen.
+pub fn cell(value: &Value) -> String {
+    match value {
+        Value::Number(number) if number.is_f64() => format!("{:.4}", number.as_f64().unwrap_or(f64::NAN)),
+        Value::String(text) => escape(text),
+        Value::Null => "–".to_owned(),
+        other => other.to_string(),
+    }
+}
+
+fn escape(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
+}

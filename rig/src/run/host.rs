@@ -1,0 +1,90 @@
+//! The drive on the host: the firmware's own tasks, called in the order in which their interrupts would come.
+
+use super::Progress;
+use crate::bench::{Bench, BenchError};
+use crate::trace::Recording;
+use tractive::board::{ControlPort, PwmPort, Sample};
+use tractive::control::{Demand, Measurements};
+use tractive::drive::Report;
+use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
+use tractive::frames::{Abc, Angle};
+use tractive::machine::Tables;
+use tractive::modulation::CarrierPeriod;
+use tractive::protection::SafeState;
+use tractive::time::Instant;
+
+/// The bench behind a board's ports; the first error ends the run.
+struct Port<'a> {
+    bench: &'a mut Bench,
+    error: Option<BenchError>,
+}
+
+impl ControlPort for Port<'_> {
+    fn sample(&mut self, now: Instant) -> Sample {
+        self.bench.control_sample(now).unwrap_or_else(|error| {
+            self.error = Some(error);
+            let measured = Measurements { currents_a: Abc::default(), udc_v: 0.0, angle: Angle::ZERO };
+            Sample { measured, demand: Demand::default(), enable: false }
+        })
+    }
+
+    fn enter(&mut self, safe: SafeState, now: Instant) {
+        self.bench.enter(now, safe);
+    }
+
+    fn overrun_ticks(&mut self, _now: Instant) -> u32 {
+        0
+    }
+
+    fn report(&mut self, now: Instant, report: &Report) {
+        self.bench.control_report(now, *report);
+    }
+}
+
+impl PwmPort for Port<'_> {
+    fn sample(&mut self, now: Instant) -> Abc {
+        self.bench.pwm_sample(now).unwrap_or_else(|error| {
+            self.error = Some(error);
+            Abc::default()
+        })
+    }
+
+    fn play(&mut self, now: Instant, next: &CarrierPeriod) {
+        self.bench.play(now, *next);
+    }
+
+    fn enter(&mut self, safe: SafeState, now: Instant) {
+        self.bench.enter(now, safe);
+    }
+}
+
+/// Runs until the recording is complete.
+pub fn run_on_host(
+    name: &str,
+    mut bench: Bench,
+    tables: &'static Tables,
+    settings: Settings,
+) -> Result<Recording, BenchError> {
+    let shared = Shared::new();
+    let mut control_at = Instant(settings.clock.control_ticks);
+    let mut pwm_at = Instant(settings.devices.shortest_half_ticks);
+    let mut control = ControlTask::new(tables, settings, control_at);
+    let mut pwm = PwmTask::new(tables, settings, pwm_at);
+    let mut progress = Progress::new(name);
+    while !bench.is_done() {
+        let mut port = Port { bench: &mut bench, error: None };
+        // At equal instants the PWM interrupt comes first: it has the higher priority.
+        if control_at.reached(pwm_at) {
+            pwm.run(&mut port, &shared);
+            pwm_at = pwm.next_call();
+        } else {
+            control.run(&mut port, &shared);
+            control_at = control.next_call();
+        }
+        if let Some(error) = port.error {
+            return Err(error);
+        }
+        progress.show(&bench);
+    }
+    Ok(super::record(bench))
+}

@@ -1,0 +1,100 @@
+//! Torque accuracy, efficiency and current at the characteristic points: the paper's figure 10.
+
+use super::{Plan, Scenario};
+use crate::analysis::{self, Figures};
+use crate::machine::Machine;
+use crate::options::RunOptions;
+use crate::report::Page;
+use crate::trace::Recording;
+use tractive::control::Demand;
+
+/// The points one after another in one run: ramp, settle, measure.
+pub struct Characteristic;
+
+/// Speed in r/min and torque in N·m.
+const POINTS: [(f64, f64); 7] = [
+    (200.0, 1235.0),
+    (500.0, 1235.0),
+    (1000.0, 1235.0),
+    (1500.0, 1235.0),
+    (1905.0, 1235.0),
+    (2000.0, 859.4),
+    (2000.0, 1174.6),
+];
+const SLOPE_RPM_S: f64 = 1000.0;
+const SETTLE_S: f64 = 0.6;
+const MEASURE_S: f64 = 0.3;
+
+/// A point's times in the run.
+struct Slot {
+    speed_rpm: f64,
+    torque_nm: f64,
+    begins_s: f64,
+    steady_s: f64,
+    ends_s: f64,
+}
+
+fn slots() -> Vec<Slot> {
+    let (mut t_s, mut last_rpm) = (0.0, POINTS[0].0);
+    POINTS
+        .iter()
+        .map(|&(speed_rpm, torque_nm)| {
+            let begins_s = t_s;
+            let steady_s = begins_s + (speed_rpm - last_rpm).abs() / SLOPE_RPM_S;
+            let ends_s = steady_s + SETTLE_S + MEASURE_S;
+            (t_s, last_rpm) = (ends_s, speed_rpm);
+            Slot { speed_rpm, torque_nm, begins_s, steady_s, ends_s }
+        })
+        .collect()
+}
+
+impl Scenario for Characteristic {
+    fn name(&self) -> &'static str {
+        "characteristic"
+    }
+
+    fn figure(&self) -> &'static str {
+        "figure 10: torque accuracy and efficiency at the characteristic points"
+    }
+
+    fn plan(&self, _options: &RunOptions, _machine: &Machine) -> Plan {
+        let slots = slots();
+        let speed =
+            slots.iter().flat_map(|slot| [(slot.steady_s, slot.speed_rpm), (slot.ends_s, slot.speed_rpm)]);
+        let speed = speed.collect();
+        let duration_s = slots.last().map_or(0.0, |slot| slot.ends_s);
+        let operator = move |t_s: f64| {
+            let slot = slots.iter().rev().find(|slot| t_s >= slot.begins_s);
+            let torque_nm = slot.map_or(0.0, |slot| slot.torque_nm as f32);
+            (Demand { torque_nm, slew_limited: true }, true)
+        };
+        Plan { duration_s, speed, operator: Box::new(operator) }
+    }
+
+    fn figures(&self, recording: &Recording, _options: &RunOptions, machine: &Machine) -> Figures {
+        let points = slots().into_iter().map(|slot| {
+            let window = (slot.ends_s - MEASURE_S, slot.ends_s);
+            analysis::steady_point(recording, window, slot.torque_nm, &machine.folder)
+        });
+        let points: Vec<_> = points.collect();
+        let mut figures = analysis::common(recording);
+        figures.set("points", points);
+        figures
+    }
+
+    fn plots(&self, recording: &Recording, page: &mut Page) {
+        page.plot(
+            "Torque",
+            "N·m",
+            recording,
+            &[("torque", |row| row.te_nm), ("demand", |row| row.te_ref_nm)],
+        );
+        page.plot("Speed", "r/min", recording, &[("speed", |row| row.speed_rpm)]);
+        page.plot("Phase current u", "A", recording, &[("ia", |row| row.ia_a)]);
+        for slot in slots() {
+            let window = (slot.ends_s - 0.04, slot.ends_s);
+            let title = format!("{} r/min, {} N·m: phase current u", slot.speed_rpm, slot.torque_nm);
+            page.plot_window(&title, "A", recording, window, &[("ia", |row| row.ia_a)]);
+        }
+    }
+}

@@ -1,0 +1,77 @@
+//! Load steps at 200 r/min: the paper's figure 8.
+
+use super::{Plan, Scenario};
+use crate::analysis::{self, Figures};
+use crate::machine::Machine;
+use crate::options::RunOptions;
+use crate::report::Page;
+use crate::trace::Recording;
+use tractive::control::Demand;
+
+/// 0 → 200 → … → 1,235 N·m and back, 100 ms each.
+pub struct LoadSteps;
+
+const SPEED_RPM: f64 = 200.0;
+const STEP_S: f64 = 0.1;
+const LEVELS_NM: [f64; 13] =
+    [0.0, 200.0, 400.0, 600.0, 800.0, 1000.0, 1235.0, 1000.0, 800.0, 600.0, 400.0, 200.0, 0.0];
+
+fn level_nm(t_s: f64) -> f64 {
+    let index = (t_s / STEP_S).max(0.0) as usize;
+    LEVELS_NM[index.min(LEVELS_NM.len() - 1)]
+}
+
+impl Scenario for LoadSteps {
+    fn name(&self) -> &'static str {
+        "load-steps"
+    }
+
+    fn figure(&self) -> &'static str {
+        "figure 8: load steps at 200 r/min"
+    }
+
+    fn plan(&self, _options: &RunOptions, _machine: &Machine) -> Plan {
+        Plan {
+            duration_s: STEP_S * LEVELS_NM.len() as f64,
+            speed: vec![(0.0, SPEED_RPM)],
+            operator: Box::new(|t_s: f64| {
+                (Demand { torque_nm: level_nm(t_s + 1e-9) as f32, slew_limited: false }, true)
+            }),
+        }
+    }
+
+    fn figures(&self, recording: &Recording, _options: &RunOptions, _machine: &Machine) -> Figures {
+        let steps = (1..LEVELS_NM.len()).map(|index| analysis::Step {
+            at_s: index as f64 * STEP_S,
+            from_nm: LEVELS_NM[index - 1],
+            to_nm: LEVELS_NM[index],
+            until_s: (index + 1) as f64 * STEP_S,
+        });
+        let mut figures = analysis::common(recording);
+        figures.set("steps", steps.map(|step| analysis::step_response(recording, &step)).collect::<Vec<_>>());
+        figures
+    }
+
+    fn plots(&self, recording: &Recording, page: &mut Page) {
+        page.plot("DC-link voltage", "V", recording, &[("udc", |row| row.udc_v)]);
+        page.line_voltage("Line voltage u-v", recording, (0.0, 0.3));
+        page.plot("Phase current u", "A", recording, &[("ia", |row| row.ia_a)]);
+        page.plot(
+            "Torque",
+            "N·m",
+            recording,
+            &[("torque", |row| row.te_nm), ("demand", |row| row.te_ref_nm)],
+        );
+        page.plot(
+            "Currents, rotor frame",
+            "A",
+            recording,
+            &[
+                ("id", |row| row.id_a),
+                ("iq", |row| row.iq_a),
+                ("id*", |row| row.id_ref_a),
+                ("iq*", |row| row.iq_ref_a),
+            ],
+        );
+    }
+}

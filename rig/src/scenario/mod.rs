@@ -1,0 +1,118 @@
+//! What is driven, and what is to be seen.
+
+mod characteristic;
+mod load_steps;
+mod sweep;
+
+use crate::analysis::Figures;
+use crate::bench::{self, Bench, Operator};
+use crate::machine::Machine;
+use crate::options::{On, RunOptions};
+use crate::plant::{Plant, PlantSettings, SpeedSource};
+use crate::report::Page;
+use crate::run::{self, CLOCK, Emulator};
+use crate::trace::Recording;
+use anyhow::{Context, Result, bail};
+use tractive::control::Gains;
+use tractive::drive::traction::Settings;
+use tractive::link::Setup;
+use tractive::modulation::Devices;
+
+/// Time in which the drive settles before the recording begins, in s.
+const LEAD_S: f64 = 0.1;
+
+/// A scenario's inputs.
+pub struct Plan {
+    /// Length of the recording, in s.
+    pub duration_s: f64,
+    /// Prescribed speed: (time in s, r/min), straight lines between; before the first the first.
+    pub speed: Vec<(f64, f64)>,
+    /// The operator.
+    pub operator: Box<dyn Operator + Send>,
+}
+
+/// A scenario.
+pub trait Scenario {
+    /// Its name on the command line.
+    fn name(&self) -> &'static str;
+    /// The paper's figure that it answers.
+    fn figure(&self) -> &'static str;
+    /// What is driven.
+    fn plan(&self, options: &RunOptions, machine: &Machine) -> Plan;
+    /// The figures to report.
+    fn figures(&self, recording: &Recording, options: &RunOptions, machine: &Machine) -> Figures;
+    /// The plots to draw.
+    fn plots(&self, recording: &Recording, page: &mut Page);
+}
+
+/// Every scenario.
+pub fn all() -> [Box<dyn Scenario>; 3] {
+    [Box::new(load_steps::LoadSteps), Box::new(sweep::Sweep), Box::new(characteristic::Characteristic)]
+}
+
+/// The scenario of that name.
+pub fn find(name: &str) -> Result<Box<dyn Scenario>> {
+    let names: Vec<_> = all().iter().map(|scenario| scenario.name()).collect();
+    all()
+        .into_iter()
+        .find(|scenario| scenario.name() == name)
+        .with_context(|| format!("scenario {name}: must be one of {}", names.join(", ")))
+}
+
+/// Drives a scenario.
+pub fn drive(scenario: &dyn Scenario, options: &RunOptions, machine: &Machine) -> Result<Recording> {
+    let plan = scenario.plan(options, machine);
+    let ticks = |microseconds: f64| (microseconds * 1e-6 * f64::from(CLOCK.ticks_per_s)).round() as u32;
+    let setup =
+        Setup { min_pulse_ticks: ticks(options.min_pulse_us), dead_time_ticks: ticks(options.dead_time_us) };
+    let devices = Devices::new(
+        setup.min_pulse_ticks,
+        setup.dead_time_ticks,
+        machine.tables.ratings.max_switching_hz,
+        &CLOCK,
+    );
+    let parameters = &machine.folder.parameters;
+    let bench = Bench::new(
+        plant(&plan, options, machine),
+        plan.operator,
+        &bench::Settings {
+            clock: CLOCK,
+            first_half_ticks: devices.shortest_half_ticks,
+            dead_time_ticks: setup.dead_time_ticks,
+            lead_s: LEAD_S,
+            duration_s: plan.duration_s,
+            trace_step_s: options.dt,
+            udc_v: options.udc.unwrap_or(parameters.dc_link_nominal_v),
+            flaws: options.flaws(parameters.trip_current_a),
+        },
+    );
+    match options.on {
+        On::Host => {
+            let settings = Settings { clock: CLOCK, devices, gains: Gains::DEFAULT };
+            Ok(run::run_on_host(scenario.name(), bench, machine.tables, settings)?)
+        }
+        On::Qemu => {
+            let Some(image) = options.image.clone() else {
+                bail!("--on qemu needs --image; `cargo xtask run` builds it and hands it over");
+            };
+            run::run_in_qemu(
+                scenario.name(),
+                bench,
+                setup,
+                &Emulator { program: options.qemu.clone(), image },
+            )
+        }
+    }
+}
+
+fn plant(plan: &Plan, options: &RunOptions, machine: &Machine) -> Plant {
+    let speed = plan.speed.iter().map(|(t_s, rpm)| (t_s + LEAD_S, *rpm)).collect();
+    Plant::new(
+        &machine.folder,
+        SpeedSource::profile(speed),
+        &PlantSettings {
+            flux_scale: 1.0 + options.map_error / 100.0,
+            resistance_scale: 1.0 + options.rs_error / 100.0,
+        },
+    )
+}

@@ -1,0 +1,89 @@
+//! Full torque from standstill through every mode: the paper's figure 9.
+
+use super::{Plan, Scenario};
+use crate::analysis::{self, Figures};
+use crate::machine::Machine;
+use crate::options::RunOptions;
+use crate::report::Page;
+use crate::trace::Recording;
+use tractive::control::Demand;
+
+/// 0 → 2,000 r/min in 8 s and 1 s hold, at the torque envelope.
+pub struct Sweep;
+
+const SLOPE_RPM_S: f64 = 250.0;
+const HOLD_S: f64 = 1.0;
+
+impl Scenario for Sweep {
+    fn name(&self) -> &'static str {
+        "sweep"
+    }
+
+    fn figure(&self) -> &'static str {
+        "figure 9: sweep at full torque, and its changes of pulse pattern"
+    }
+
+    fn plan(&self, options: &RunOptions, machine: &Machine) -> Plan {
+        let ramp_s = options.to.abs() / SLOPE_RPM_S;
+        let mut speed = vec![(0.0, 0.0), (ramp_s, options.to)];
+        let mut duration_s = ramp_s + HOLD_S;
+        if options.down {
+            speed.extend([(duration_s, options.to), (duration_s + ramp_s, 0.0)]);
+            duration_s += ramp_s;
+        }
+        let direction = if options.brake { -1.0 } else { 1.0 } * options.to.signum();
+        let torque_nm = machine.folder.parameters.max_torque_nm * options.torque_scale * direction;
+        let operator = move |t_s: f64| {
+            let torque_nm = if t_s < 0.0 { 0.0 } else { torque_nm as f32 };
+            (Demand { torque_nm, slew_limited: true }, true)
+        };
+        Plan { duration_s, speed, operator: Box::new(operator) }
+    }
+
+    fn figures(&self, recording: &Recording, _options: &RunOptions, _machine: &Machine) -> Figures {
+        let mut figures = analysis::common(recording);
+        figures.set("mode_switches", analysis::mode_switches(recording));
+        figures.set("modes", analysis::modes(recording));
+        figures
+    }
+
+    fn plots(&self, recording: &Recording, page: &mut Page) {
+        page.plot(
+            "Torque",
+            "N·m",
+            recording,
+            &[("torque", |row| row.te_nm), ("demand", |row| row.te_ref_nm)],
+        );
+        page.plot("Phase current u", "A", recording, &[("ia", |row| row.ia_a)]);
+        page.plot("Commanded fundamental", "V", recording, &[("u", |row| row.u_v)]);
+        page.plot(
+            "Mode (0 off, 1 async, 2 sync 15, 3 sync 12, 4 mid 7, 5 mid 3, 6 square)",
+            "",
+            recording,
+            &[("mode", |row| f64::from(row.mode as u8))],
+        );
+        page.plot(
+            "Currents, rotor frame",
+            "A",
+            recording,
+            &[
+                ("id", |row| row.id_a),
+                ("iq", |row| row.iq_a),
+                ("id*", |row| row.id_ref_a),
+                ("iq*", |row| row.iq_ref_a),
+            ],
+        );
+        for switch in recording.switches.iter().filter(|switch| switch.t_s > 0.0) {
+            let title = format!("Figure 9: {} → {}", switch.from.name(), switch.to.name());
+            let window = (switch.t_s - 0.03, switch.t_s + 0.04);
+            page.line_voltage(&format!("{title}, line voltage u-v"), recording, window);
+            page.plot_window(
+                &format!("{title}, phase current u"),
+                "A",
+                recording,
+                window,
+                &[("ia", |row| row.ia_a)],
+            );
+        }
+    }
+}

@@ -1,0 +1,195 @@
+//! What a run leaves behind: trace, edges, switches of mode. Files are written whole or not at all.
+
+use crate::bench::{Edge, GATES, Tick};
+use anyhow::{Context, Result};
+use std::io::Write;
+use std::path::Path;
+use tractive::modulation::Mode;
+use tractive::protection::Trip;
+
+/// One line of trace.csv: the plant's true values, and control's intentions at that instant.
+#[derive(Clone, Copy, Debug)]
+pub struct Row {
+    /// Time from the recording's beginning, in s.
+    pub t_s: f64,
+    /// Mechanical speed, in r/min.
+    pub speed_rpm: f64,
+    /// Torque demand after envelope, slew and limits, in N·m.
+    pub te_ref_nm: f64,
+    /// Air-gap torque, in N·m.
+    pub te_nm: f64,
+    /// Current reference, d, in A.
+    pub id_ref_a: f64,
+    /// Current reference, q, in A.
+    pub iq_ref_a: f64,
+    /// Current, d, in A.
+    pub id_a: f64,
+    /// Current, q, in A.
+    pub iq_a: f64,
+    /// Phase current a, in A.
+    pub ia_a: f64,
+    /// Phase current b, in A.
+    pub ib_a: f64,
+    /// Phase current c, in A.
+    pub ic_a: f64,
+    /// Commanded fundamental, peak phase, in V.
+    pub u_v: f64,
+    /// DC-link voltage, in V.
+    pub udc_v: f64,
+    /// Stator frequency as control knows it, in Hz.
+    pub f1_hz: f64,
+    /// Mode of the running carrier.
+    pub mode: Mode,
+    /// The latched fault.
+    pub trip: Option<Trip>,
+}
+
+impl Row {
+    /// Largest magnitude of the three phase currents, in A.
+    pub fn peak_current_a(&self) -> f64 {
+        self.ia_a.abs().max(self.ib_a.abs()).max(self.ic_a.abs())
+    }
+}
+
+/// A change of mode.
+#[derive(Clone, Copy, Debug)]
+pub struct Switch {
+    /// When the new mode's first half began, in s.
+    pub t_s: f64,
+    /// The mode that ended.
+    pub from: Mode,
+    /// The mode that began.
+    pub to: Mode,
+    /// Pulse angle of the switch, in degrees; `None` where the old carrier was not locked.
+    pub pulse_angle_deg: Option<f64>,
+    /// Mechanical speed, in r/min.
+    pub speed_rpm: f64,
+}
+
+/// A whole run.
+pub struct Recording {
+    /// Rows of the trace.
+    pub rows: Vec<Row>,
+    /// Changes of mode.
+    pub switches: Vec<Switch>,
+    /// Gate edges; ticks count from the run's beginning.
+    pub edges: Vec<Edge>,
+    /// Tick at which the recording begins.
+    pub lead: Tick,
+    /// Length of a tick, in s.
+    pub tick_s: f64,
+}
+
+impl Recording {
+    /// Time of a tick from the recording's beginning, in s.
+    pub fn seconds(&self, tick: Tick) -> f64 {
+        (tick as f64 - self.lead as f64) * self.tick_s
+    }
+
+    /// The first fault, if the drive tripped.
+    pub fn trip(&self) -> Option<Trip> {
+        self.rows.iter().find_map(|row| row.trip)
+    }
+
+    /// Writes trace.csv.
+    pub fn write_trace(&self, path: &Path) -> Result<()> {
+        write_whole(path, |out| {
+            out.write_record([
+                "t_s",
+                "speed_rpm",
+                "te_ref_nm",
+                "te_nm",
+                "id_ref_a",
+                "iq_ref_a",
+                "id_a",
+                "iq_a",
+                "ia_a",
+                "ib_a",
+                "ic_a",
+                "u_v",
+                "udc_v",
+                "f1_hz",
+                "mode",
+                "fault",
+            ])?;
+            for row in &self.rows {
+                out.serialize((
+                    (
+                        short_time(row.t_s),
+                        row.speed_rpm as f32,
+                        row.te_ref_nm as f32,
+                        row.te_nm as f32,
+                        row.id_ref_a as f32,
+                        row.iq_ref_a as f32,
+                        row.id_a as f32,
+                        row.iq_a as f32,
+                    ),
+                    (
+                        row.ia_a as f32,
+                        row.ib_a as f32,
+                        row.ic_a as f32,
+                        row.u_v as f32,
+                        row.udc_v as f32,
+                        row.f1_hz as f32,
+                        row.mode.name(),
+                        row.trip.map_or("", |trip| trip.fault.name()),
+                    ),
+                ))?;
+            }
+            Ok(())
+        })
+    }
+
+    /// Writes edges.csv: edges within the recording, and at its beginning the gates that are on.
+    pub fn write_edges(&self, path: &Path) -> Result<()> {
+        write_whole(path, |out| {
+            out.write_record(["t_s", "gate", "level"])?;
+            for edge in &self.edges {
+                if edge.tick >= self.lead {
+                    out.serialize((
+                        short_time(self.seconds(edge.tick)),
+                        GATES[usize::from(edge.gate)],
+                        u8::from(edge.on),
+                    ))?;
+                }
+            }
+            Ok(())
+        })
+    }
+}
+
+/// A time rounded to a nanosecond, so that it prints short; ticks are 40 ns.
+fn short_time(t_s: f64) -> f64 {
+    (t_s * 1e9).round() / 1e9
+}
+
+/// Writes a CSV beside its place and moves it there when it is complete.
+fn write_whole(
+    path: &Path,
+    fill: impl FnOnce(&mut csv::Writer<std::io::BufWriter<&std::fs::File>>) -> Result<()>,
+) -> Result<()> {
+    let folder = path.parent().unwrap_or(Path::new("."));
+    let file = tempfile::NamedTempFile::new_in(folder).with_context(|| format!("{}", folder.display()))?;
+    {
+        let mut out = csv::Writer::from_writer(std::io::BufWriter::with_capacity(1 << 16, file.as_file()));
+        fill(&mut out)?;
+        out.flush()?;
+    }
+    publish(file, path)
+}
+
+/// Writes a text file whole or not at all.
+pub fn write_text(path: &Path, text: &str) -> Result<()> {
+    let folder = path.parent().unwrap_or(Path::new("."));
+    let mut file =
+        tempfile::NamedTempFile::new_in(folder).with_context(|| format!("{}", folder.display()))?;
+    file.write_all(text.as_bytes())?;
+    publish(file, path)
+}
+
+fn publish(file: tempfile::NamedTempFile, path: &Path) -> Result<()> {
+    use std::os::unix::fs::PermissionsExt;
+    file.as_file().set_permissions(std::fs::Permissions::from_mode(0o644))?;
+    file.persist(path).with_context(|| format!("{}", path.display()))?;
+    Ok(())
+}

@@ -1,0 +1,44 @@
+//! What a board gives the drive. The boards themselves, one file each, exist only on the target.
+
+#[cfg(target_os = "none")]
+pub mod qemu;
+
+use crate::control::{Demand, Measurements};
+use crate::drive::Report;
+use crate::frames::Abc;
+use crate::modulation::CarrierPeriod;
+use crate::protection::SafeState;
+use crate::time::Instant;
+
+/// A control sample: what the converters hold, and what the operator wants.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sample {
+    /// Currents, DC-link voltage and angle at the control timer's nominal instant.
+    pub measured: Measurements,
+    /// The torque demand.
+    pub demand: Demand,
+    /// Whether the gates may be on.
+    pub enable: bool,
+}
+
+/// What the control interrupt needs of a board.
+pub trait ControlPort {
+    /// The conversions that the control timer triggered at `now`.
+    fn sample(&mut self, now: Instant) -> Sample;
+    /// Puts the gates into the safe state at once, whatever the modulator plays.
+    fn enter(&mut self, safe: SafeState, now: Instant);
+    /// By how many ticks the interrupt, begun nominally at `now`, has outlived its period; 0 when in time.
+    fn overrun_ticks(&mut self, now: Instant) -> u32;
+    /// What the control task did, for whoever watches.
+    fn report(&mut self, now: Instant, report: &Report);
+}
+
+/// What the PWM interrupt needs of a board.
+pub trait PwmPort {
+    /// Phase currents, sampled at the carrier boundary `now`.
+    fn sample(&mut self, now: Instant) -> Abc;
+    /// Loads the shadow registers: `next` takes over when the half that begins `now` ends.
+    fn play(&mut self, now: Instant, next: &CarrierPeriod);
+    /// Puts the gates into the safe state at once, whatever is played.
+    fn enter(&mut self, safe: SafeState, now: Instant);
+}

@@ -1,0 +1,235 @@
+//! The emulated board: QEMU's `mps2-an386`, a Cortex-M4F at a deterministic instruction rate, with the rig at the other
+//! end of three semihosting files.
+//!
+//! * Control timer: CMSDK timer 0. Its count gives the age of the running control period.
+//! * PWM timer: CMSDK dual timer, 32 bits; BGLOAD is its shadow register: what is written takes over at the next zero.
+//! * Both count 40 ns ticks, and a period is the load + 1 ticks. The PWM timer is started first, so at equal nominal
+//!   instants its interrupt is pending first; it also has the higher priority.
+#![allow(unsafe_code)]
+
+use super::{ControlPort, PwmPort, Sample};
+use crate::drive::Report;
+use crate::frames::Abc;
+use crate::link::{self, BLOCK_BYTES, Block, Request, Setup};
+use crate::modulation::CarrierPeriod;
+use crate::protection::SafeState;
+use crate::time::{Clock, Instant};
+use core::sync::atomic::{AtomicU32, Ordering};
+use cortex_m::peripheral::NVIC;
+use cortex_m_semihosting::{debug, syscall};
+
+/// 25 MHz ticks; control at 10 kHz.
+pub const CLOCK: Clock = Clock::new(25_000_000, 2_500);
+
+const CONTROL_TIMER: usize = 0x4000_0000;
+const PWM_TIMER: usize = 0x4000_2000;
+
+/// The interrupts this image uses, by their numbers on the board.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u16)]
+#[allow(
+    non_camel_case_types,
+    clippy::upper_case_acronyms,
+    reason = "names of interrupts, as vendors write them"
+)]
+pub enum Interrupt {
+    /// CMSDK timer 0: control.
+    TIMER0 = 8,
+    /// CMSDK dual timer: PWM.
+    DUALTIMER = 10,
+}
+
+// SAFETY: the numbers are the board's, and no two variants share one.
+unsafe impl cortex_m::interrupt::InterruptNumber for Interrupt {
+    fn number(self) -> u16 {
+        self as u16
+    }
+}
+
+/// An entry of the vector table.
+#[repr(C)]
+pub union Vector {
+    handler: unsafe extern "C" fn(),
+    reserved: usize,
+}
+
+unsafe extern "C" {
+    fn TIMER0();
+    fn DUALTIMER();
+}
+
+/// The vector table's device part.
+#[unsafe(link_section = ".vector_table.interrupts")]
+#[unsafe(no_mangle)]
+pub static __INTERRUPTS: [Vector; 11] = {
+    const NONE: Vector = Vector { reserved: 0 };
+    let mut table = [NONE; 11];
+    table[Interrupt::TIMER0 as usize] = Vector { handler: TIMER0 };
+    table[Interrupt::DUALTIMER as usize] = Vector { handler: DUALTIMER };
+    table
+};
+
+/// File handles of the link: requests, answers to control, answers to PWM.
+static FILES: [AtomicU32; 3] = [const { AtomicU32::new(0) }; 3];
+const REQUESTS: usize = 0;
+const CONTROL_ANSWERS: usize = 1;
+const PWM_ANSWERS: usize = 2;
+
+fn write_register(address: usize, value: u32) {
+    // SAFETY: called with the addresses of timer registers of this board, which are always mapped and word-wide.
+    unsafe { core::ptr::write_volatile(address as *mut u32, value) }
+}
+
+fn read_register(address: usize) -> u32 {
+    // SAFETY: as in `write_register`; reading these registers has no side effect.
+    unsafe { core::ptr::read_volatile(address as *const u32) }
+}
+
+/// Opens the link and fetches the set-up. Call once, before [`start`].
+pub fn connect() -> Setup {
+    const READ: usize = 1;
+    const WRITE: usize = 5;
+    for (file, (name, mode)) in
+        FILES.iter().zip([(c"requests", WRITE), (c"control-answers", READ), (c"pwm-answers", READ)])
+    {
+        // SAFETY: SYS_OPEN reads a NUL-terminated name of the given length, which lives for the program.
+        let handle = unsafe { syscall!(OPEN, name.as_ptr(), mode, name.count_bytes()) };
+        if handle == usize::MAX {
+            stop(false);
+        }
+        file.store(handle as u32, Ordering::Relaxed);
+    }
+    send(Request::Hello);
+    link::setup_from_block(&receive(CONTROL_ANSWERS))
+}
+
+/// Starts both timers; the first PWM interrupt comes after `first_half_ticks`, the first control interrupt after one
+/// control period.
+pub fn start(first_half_ticks: u32) {
+    const ENABLE_PERIODIC_INTERRUPT_32_BIT: u32 = 0b1110_0010;
+    const ENABLE_INTERRUPT: u32 = 0b1001;
+    // SAFETY: the only use of the core peripherals, before any interrupt is unmasked.
+    let mut core = unsafe { cortex_m::Peripherals::steal() };
+    // SAFETY: priorities are changed while both interrupts are masked; no code relies on a priority ceiling. After that
+    // both may come: their handlers share nothing but the cells.
+    unsafe {
+        core.NVIC.set_priority(Interrupt::DUALTIMER, 0x40);
+        core.NVIC.set_priority(Interrupt::TIMER0, 0x80);
+        NVIC::unmask(Interrupt::DUALTIMER);
+        NVIC::unmask(Interrupt::TIMER0);
+    }
+    write_register(PWM_TIMER, first_half_ticks - 1);
+    write_register(CONTROL_TIMER + 8, CLOCK.control_ticks - 1);
+    write_register(PWM_TIMER + 8, ENABLE_PERIODIC_INTERRUPT_32_BIT);
+    write_register(CONTROL_TIMER, ENABLE_INTERRUPT);
+}
+
+/// Waits for a while, in instructions that do nothing. Not `wfi`: with `sleep=off` QEMU 7.2 skips timer periods while the
+/// processor sleeps. Not a short loop: leaving a translated block costs more than a thousand idle instructions.
+pub fn idle() {
+    // SAFETY: the instructions read and write nothing.
+    unsafe { core::arch::asm!(".rept 500", "nop", ".endr", options(nomem, nostack, preserves_flags)) }
+}
+
+/// Ends the emulation.
+pub fn stop(success: bool) -> ! {
+    debug::exit(if success { debug::EXIT_SUCCESS } else { debug::EXIT_FAILURE });
+    loop {
+        cortex_m::asm::wfi();
+    }
+}
+
+/// Gates off, whatever state the program is in, then the end: for panics and HardFaults.
+pub fn die() -> ! {
+    send(Request::Dead);
+    stop(false)
+}
+
+fn file(index: usize) -> usize {
+    match FILES.get(index) {
+        Some(handle) => handle.load(Ordering::Relaxed) as usize,
+        None => 0,
+    }
+}
+
+fn send(request: Request) {
+    let bytes = request.to_block();
+    // SAFETY: SYS_WRITE reads exactly the block, which outlives the call.
+    let missing = unsafe { syscall!(WRITE, file(REQUESTS), bytes.as_ptr(), BLOCK_BYTES) };
+    if missing != 0 {
+        stop(false);
+    }
+}
+
+fn receive(answers: usize) -> Block {
+    let mut block: Block = [0; link::BLOCK_WORDS];
+    // SAFETY: SYS_READ writes at most the block's bytes, and the block is ours until it returns.
+    let missing = unsafe { syscall!(READ, file(answers), block.as_mut_ptr(), BLOCK_BYTES) };
+    if missing != 0 {
+        stop(false);
+    }
+    block
+}
+
+/// The control interrupt's side of the board.
+pub struct Control;
+
+/// The PWM interrupt's side of the board.
+pub struct Pwm;
+
+impl Control {
+    /// Acknowledges the timer's interrupt.
+    pub fn acknowledge(&mut self) {
+        write_register(CONTROL_TIMER + 0xC, 1);
+    }
+}
+
+impl Pwm {
+    /// Acknowledges the timer's interrupt.
+    pub fn acknowledge(&mut self) {
+        write_register(PWM_TIMER + 0xC, 1);
+    }
+}
+
+impl ControlPort for Control {
+    fn sample(&mut self, now: Instant) -> Sample {
+        send(Request::ControlSample(now));
+        let (sample, end) = link::sample_from_block(&receive(CONTROL_ANSWERS));
+        if end {
+            stop(true);
+        }
+        sample
+    }
+
+    fn enter(&mut self, safe: SafeState, now: Instant) {
+        send(Request::Enter(now, safe));
+    }
+
+    fn overrun_ticks(&mut self, _now: Instant) -> u32 {
+        // The interrupt was acknowledged on entry: if it is pending again, the period is over.
+        if read_register(CONTROL_TIMER + 0xC) & 1 == 0 {
+            return 0;
+        }
+        CLOCK.control_ticks.saturating_sub(read_register(CONTROL_TIMER + 4)).max(1)
+    }
+
+    fn report(&mut self, now: Instant, report: &Report) {
+        send(Request::ControlReport(now, *report));
+    }
+}
+
+impl PwmPort for Pwm {
+    fn sample(&mut self, now: Instant) -> Abc {
+        send(Request::PwmSample(now));
+        link::currents_from_block(&receive(PWM_ANSWERS))
+    }
+
+    fn play(&mut self, now: Instant, next: &CarrierPeriod) {
+        write_register(PWM_TIMER + 0x18, next.period_ticks.saturating_sub(1));
+        send(Request::Play(now, *next));
+    }
+
+    fn enter(&mut self, safe: SafeState, now: Instant) {
+        send(Request::Enter(now, safe));
+    }
+}

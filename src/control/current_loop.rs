@@ -1,0 +1,113 @@
+//! The decoupled current loop, in flux linkage.
+//!
+//! Written in flux, the stator equation `dψ/dt = u − R i − jωψ` is linear however the machine saturates; the maps turn
+//! current into flux and back. Proportional part: the flux error predicted for the boundary where the voltage begins
+//! to act. Decoupling: `jωψ`. Integral part: [`super::disturbance`].
+
+use super::{Committed, Measurements, flux_linkage};
+use crate::frames::{Angle, Dq};
+use crate::machine::Tables;
+
+/// What of a voltage command the modulator's mode can follow.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Follows {
+    /// The mean of every carrier half: triangular carriers.
+    Mean,
+    /// The fundamental, with a pattern's delay: middle 60°.
+    Fundamental,
+    /// The angle alone: square wave.
+    Angle,
+}
+
+/// Gains of the loop.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Gains {
+    /// Share of the predicted flux error that one carrier half removes, 0 ..= 1, for triangular carriers.
+    pub carrier: f32,
+    /// Bandwidth for middle-60° patterns, in rad/s.
+    pub pattern_rad_s: f32,
+    /// Damping of the flux error in square wave, as a share of the stator frequency.
+    pub square_damping: f32,
+    /// Share of an unexplained voltage that one carrier half moves into the integral part.
+    pub observer: f32,
+}
+
+impl Gains {
+    /// Gains that suit carrier halves of 0.2 to 0.8 ms.
+    pub const DEFAULT: Self =
+        Self { carrier: 0.6, pattern_rad_s: 350.0, square_damping: 0.5, observer: 0.02 };
+}
+
+pub struct Input<'a> {
+    pub measured: &'a Measurements,
+    pub current_reference: Dq,
+    pub omega: f32,
+    pub committed: &'a Committed,
+    pub disturbance: Dq,
+    pub resistance: f32,
+    pub voltage_limit_v: f32,
+}
+
+/// The voltage for the carrier half that begins at the horizon, limited, in V, in the rotor frame that turns with it.
+pub fn step(input: &Input, gains: &Gains, tables: &Tables) -> Dq {
+    let reference = flux_linkage(tables, input.current_reference);
+    let predicted = predicted_flux(input, tables);
+    let drop = input.current_reference * input.resistance - input.disturbance;
+    let interval_s = input.committed.interval_s;
+    match input.committed.follows {
+        Follows::Mean => {
+            let x = 0.5 * input.omega * interval_s;
+            let half_turn = Angle::from_radians(x).sin_cos();
+            // Voltages that hold for a half move the flux along chords, so at the boundaries it stands outside the
+            // circle of its fundamental by x/sin x.
+            let error = predicted - reference * (1.0 + x * x * (1.0 / 6.0));
+            // Flux from ψ + e at the start of the half to ψ + (1 − g) e at its end, both in the rotor frame that
+            // turns by 2x meanwhile, seen from the frame in the middle of the half.
+            let remaining = 1.0 - gains.carrier;
+            let chord = reference.j() * (2.0 * x)
+                + error * ((remaining - 1.0) * half_turn.cos)
+                + error.j() * ((remaining + 1.0) * half_turn.sin);
+            shortened(chord * (1.0 / interval_s) + drop, input.voltage_limit_v)
+        }
+        Follows::Fundamental => {
+            let error = predicted - reference;
+            let feed_forward = reference.j() * input.omega + drop;
+            shortened(feed_forward - error * gains.pattern_rad_s, input.voltage_limit_v)
+        }
+        Follows::Angle => {
+            let error = predicted - reference;
+            let feed_forward = reference.j() * input.omega + drop;
+            let wanted = feed_forward - error * (gains.square_damping * input.omega.abs());
+            lengthened(wanted, input.voltage_limit_v)
+        }
+    }
+}
+
+/// Flux linkage at the horizon less the pattern's ripple, in the rotor frame there.
+fn predicted_flux(input: &Input, tables: &Tables) -> Dq {
+    let measured = input.measured;
+    let committed = input.committed;
+    let frame = measured.angle.sin_cos();
+    let current = measured.currents_a.clarke().park(frame);
+    let flux = flux_linkage(tables, current);
+    let turned = input.omega * committed.horizon_s;
+    let Some(volt_seconds) = committed.volt_seconds else {
+        return flux;
+    };
+    let middle = (measured.angle + Angle::from_radians(0.5 * turned)).sin_cos();
+    let end = (measured.angle + Angle::from_radians(turned)).sin_cos();
+    let drop = (input.disturbance - current * input.resistance) * committed.horizon_s;
+    let at_horizon = flux.unpark(frame) + volt_seconds + drop.unpark(middle) - committed.ripple_wb;
+    at_horizon.park(end)
+}
+
+/// The vector, no longer than `limit_v`, its direction kept.
+fn shortened(voltage: Dq, limit_v: f32) -> Dq {
+    if voltage.squared() > limit_v * limit_v { lengthened(voltage, limit_v) } else { voltage }
+}
+
+/// The vector's direction with a given length; the zero vector stays.
+fn lengthened(voltage: Dq, length_v: f32) -> Dq {
+    let length = voltage.length();
+    if length > 0.0 { voltage * (length_v / length) } else { voltage }
+}

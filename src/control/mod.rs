@@ -1,0 +1,201 @@
+//! WHICH voltage: the control law, a pure step per control period.
+//!
+//! Torque demand → envelope and slew → current reference (MTPA in two passes, or field weakening) → decoupled
+//! current loop in flux linkage → voltage limit. The loop acts on the flux *predicted* for the boundary at which the
+//! new voltage begins to act, because everything until then is already committed to the modulator.
+//!
+//! Saturation has one order: the demand is limited to what current and voltage allow, the loop's output is limited
+//! to what the mode can give, and the integral part looks only at voltages that really acted, so it cannot wind up.
+
+#![forbid(unsafe_code)]
+
+mod current_loop;
+mod demand;
+mod disturbance;
+mod mtpa;
+mod reference;
+mod speed;
+
+use crate::frames::{Abc, AlphaBeta, Angle, Dq};
+use crate::machine::Tables;
+use crate::time::Clock;
+
+pub use current_loop::{Follows, Gains};
+pub use demand::Demand;
+pub use mtpa::mtpa;
+pub use reference::{OperatingPoint, Region, VoltageLimit, operating_point, six_step_v};
+
+/// The machine's flux linkage at a current, in Wb.
+#[inline]
+pub fn flux_linkage(tables: &Tables, current: Dq) -> Dq {
+    let [psi_d, psi_q] = tables.flux.at(current.d, current.q.abs());
+    Dq { d: psi_d, q: if current.q < 0.0 { -psi_q } else { psi_q } }
+}
+
+/// Air-gap torque of a flux linkage and a current, in N·m: `1.5 n_p (psi_d i_q − psi_q i_d)`.
+#[inline]
+pub fn torque_nm(tables: &Tables, flux: Dq, current: Dq) -> f32 {
+    1.5 * tables.ratings.pole_pairs * (flux.d * current.q - flux.q * current.d)
+}
+
+/// What is measured at one instant.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Measurements {
+    /// Phase currents, positive into the machine, in A.
+    pub currents_a: Abc,
+    /// DC-link voltage, in V.
+    pub udc_v: f32,
+    /// Rotor angle, electrical.
+    pub angle: Angle,
+}
+
+/// What the modulator has already committed itself to, seen from the sample.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Committed {
+    /// From the sample to the boundary where the next voltage begins to act, in s.
+    pub horizon_s: f32,
+    /// Volt-seconds until then, in V·s; `None` while the gates are off.
+    pub volt_seconds: Option<AlphaBeta>,
+    /// Ripple flux of the running pattern at that boundary, in Wb.
+    pub ripple_wb: AlphaBeta,
+    /// Expected length of the carrier half that begins there, in s, greater than zero.
+    pub interval_s: f32,
+    /// What of the command the modulator's mode can follow.
+    pub follows: Follows,
+    /// Largest fundamental of the mode as a share of six-step.
+    pub depth_limit: f32,
+}
+
+/// A carrier boundary that has passed since the last step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Boundary {
+    /// Phase currents sampled there, in A.
+    pub currents_a: Abc,
+    /// Time from the boundary to the present sample, in s, not negative.
+    pub age_s: f32,
+    /// Volt-seconds of the carrier half that ended there, in V·s; `None` when the gates were off in it.
+    pub volt_seconds: Option<AlphaBeta>,
+    /// Length of that half, in s, greater than zero.
+    pub length_s: f32,
+}
+
+/// The voltage to make from now on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct VoltageVector {
+    /// Fundamental, peak phase, in V.
+    pub voltage_v: f32,
+    /// Angle of the vector at the sample, as if it acted there already; it turns with `omega`.
+    pub angle: Angle,
+    /// Electrical angular speed, in rad/s, signed.
+    pub omega: f32,
+    /// Fundamental that the MTPA point asks for at this speed, as a share of six-step.
+    pub depth: f32,
+}
+
+/// A step's result.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Output {
+    /// The voltage.
+    pub voltage: VoltageVector,
+    /// Torque demand after envelope and slew, in N·m.
+    pub torque_nm: f32,
+    /// Current reference and where it comes from.
+    pub point: OperatingPoint,
+}
+
+/// The control law's state between two steps.
+#[derive(Clone, Copy, Debug)]
+pub struct Controller {
+    speed: speed::SpeedTracker,
+    demand: demand::Shaper,
+    disturbance: disturbance::Observer,
+}
+
+impl Controller {
+    /// At rest, with nothing known of the machine's angle.
+    pub const fn new() -> Self {
+        Self {
+            speed: speed::SpeedTracker::new(),
+            demand: demand::Shaper::new(),
+            disturbance: disturbance::Observer::new(),
+        }
+    }
+
+    /// Follows the angle; call once per control period, before [`Controller::step`] and also while the gates are off.
+    /// Returns the electrical angular speed, in rad/s.
+    pub fn track(&mut self, angle: Angle, clock: &Clock) -> f32 {
+        self.speed.step(angle, clock.control_s())
+    }
+
+    /// Whether the speed has been followed long enough to be used.
+    pub fn speed_is_known(&self) -> bool {
+        self.speed.is_settled()
+    }
+
+    /// Electrical angular speed, in rad/s, signed.
+    pub fn omega(&self) -> f32 {
+        self.speed.omega()
+    }
+
+    /// Forgets demand and disturbance, as the gates are off.
+    pub fn idle(&mut self) {
+        self.demand = demand::Shaper::new();
+        self.disturbance = disturbance::Observer::new();
+    }
+
+    /// One control period: the voltage for the carrier half that begins at the horizon.
+    pub fn step(
+        &mut self,
+        measured: &Measurements,
+        demand: &Demand,
+        committed: &Committed,
+        boundary: Option<&Boundary>,
+        gains: &Gains,
+        clock: &Clock,
+        tables: &Tables,
+    ) -> Output {
+        let omega = self.speed.omega();
+        let torque_nm = self.demand.step(demand, omega, clock.control_s(), &tables.ratings);
+        let limit = VoltageLimit {
+            udc_v: measured.udc_v,
+            depth: committed.depth_limit,
+            filled: committed.follows == Follows::Angle,
+        };
+        let point = operating_point(torque_nm, omega, &limit, tables);
+        let resistance = tables.ratings.stator_resistance_ohm;
+        if let Some(boundary) = boundary {
+            let angle = measured.angle - Angle::from_radians(omega * boundary.age_s);
+            self.disturbance.step(boundary, angle, omega, gains, tables);
+        }
+        let disturbance = self.disturbance.voltage();
+        let voltage = current_loop::step(
+            &current_loop::Input {
+                measured,
+                current_reference: point.current,
+                omega,
+                committed,
+                disturbance,
+                resistance,
+                voltage_limit_v: committed.depth_limit * six_step_v(measured.udc_v),
+            },
+            gains,
+            tables,
+        );
+        Output {
+            voltage: VoltageVector {
+                voltage_v: voltage.length(),
+                angle: measured.angle + voltage.angle(),
+                omega,
+                depth: point.depth,
+            },
+            torque_nm: point.torque_nm,
+            point,
+        }
+    }
+}
+
+impl Default for Controller {
+    fn default() -> Self {
+        Self::new()
+    }
+}

@@ -1,0 +1,30 @@
+//! MTPA by the paper's two passes: equations (7)–(13) with the errata.
+
+use crate::frames::{Dq, sqrt};
+use crate::machine::Tables;
+
+/// The current of least magnitude for a torque in N·m (either sign, |T| within the machine's largest), in A.
+///
+/// The first pass reads ψ_f and L_q − L_d at the start point that the tables give for this torque, the second one at the
+/// result of the first. What the start points and trims hold is decided offline.
+pub fn mtpa(torque_nm: f32, tables: &Tables) -> Dq {
+    let torque = torque_nm.abs();
+    let [d_start, q_start, d_trim, q_trim] = tables.mtpa.start.at(torque);
+    let mut current = Dq { d: d_start, q: q_start };
+    for _ in 0..2 {
+        current = pass(torque, current, tables);
+    }
+    let current = current + Dq { d: d_trim, q: q_trim };
+    Dq { d: current.d, q: if torque_nm < 0.0 { -current.q } else { current.q } }
+}
+
+/// One look-up of the parameters and of the universal curve, for T ≥ 0.
+fn pass(torque: f32, at: Dq, tables: &Tables) -> Dq {
+    let [psi_f, saliency] = tables.mtpa.parameters.at(at.d, at.q);
+    let torque_per_flux = torque / (1.5 * tables.ratings.pole_pairs);
+    // t_en = T/t_eb with t_eb = 1.5 n_p psi_f i_b (9) and i_b = psi_f/(L_q − L_d) (10).
+    let root = sqrt(torque_per_flux * saliency) / psi_f;
+    let [share] = tables.mtpa.universal.at(root / (1.0 + root));
+    let d = -(psi_f / saliency) * root * share;
+    Dq { d, q: torque_per_flux / (psi_f - saliency * d) }
+}

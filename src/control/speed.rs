@@ -1,0 +1,47 @@
+//! Speed from the angle: a second-order tracking loop.
+
+use crate::frames::Angle;
+
+/// Natural frequency of the loop, in rad/s; critically damped.
+const NATURAL_RAD_S: f32 = 500.0;
+/// Control periods until the estimate is used.
+const SETTLING_STEPS: u32 = 200;
+
+#[derive(Clone, Copy, Debug)]
+pub struct SpeedTracker {
+    angle: Angle,
+    omega: f32,
+    steps: u32,
+}
+
+impl SpeedTracker {
+    pub const fn new() -> Self {
+        Self { angle: Angle::ZERO, omega: 0.0, steps: 0 }
+    }
+
+    /// The angle measured now; returns the electrical angular speed in rad/s.
+    pub fn step(&mut self, measured: Angle, period_s: f32) -> f32 {
+        if self.steps == 0 {
+            self.angle = measured;
+        } else if self.steps == 1 {
+            // The second sample gives the first idea of the speed, so that a turning machine is caught at once.
+            self.omega = (measured - self.angle).signed_radians() / period_s;
+            self.angle = measured;
+        } else {
+            let predicted = self.angle + Angle::from_radians(self.omega * period_s);
+            let error = (measured - predicted).signed_radians();
+            self.omega += NATURAL_RAD_S * NATURAL_RAD_S * period_s * error;
+            self.angle = predicted + Angle::from_radians(2.0 * NATURAL_RAD_S * period_s * error);
+        }
+        self.steps = self.steps.saturating_add(1);
+        self.omega
+    }
+
+    pub fn omega(&self) -> f32 {
+        self.omega
+    }
+
+    pub fn is_settled(&self) -> bool {
+        self.steps >= SETTLING_STEPS
+    }
+}

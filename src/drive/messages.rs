@@ -1,0 +1,213 @@
+//! What travels between the interrupts, and what control reports.
+
+use crate::cell::Words;
+use crate::frames::{Abc, Angle};
+use crate::modulation::{CarrierPeriod, Mode, Reference};
+use crate::protection::{Fault, SafeState, Trip};
+use crate::time::Instant;
+
+/// What control wants of the gates.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Gates {
+    /// Pulses.
+    Pulse,
+    /// All off.
+    Off,
+}
+
+/// From control to the modulator.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct VoltageCommand {
+    /// The fundamental; its `at` is the sample's instant.
+    pub reference: Reference,
+    /// From when on the command may be used: a fixed time after its sample, whenever the task really finished.
+    pub valid_from: Instant,
+    /// Whether to make pulses at all.
+    pub gates: Gates,
+}
+
+impl Words<8> for VoltageCommand {
+    fn to_words(self) -> [u32; 8] {
+        let reference = self.reference;
+        [
+            reference.voltage_v.to_bits(),
+            reference.angle.0,
+            reference.rate.to_bits(),
+            reference.at.0,
+            reference.udc_v.to_bits(),
+            reference.depth.to_bits(),
+            self.valid_from.0,
+            u32::from(self.gates == Gates::Pulse),
+        ]
+    }
+
+    fn from_words(words: [u32; 8]) -> Self {
+        let [voltage, angle, rate, at, udc, depth, valid_from, gates] = words;
+        Self {
+            reference: Reference {
+                voltage_v: f32::from_bits(voltage),
+                angle: Angle(angle),
+                rate: f32::from_bits(rate),
+                at: Instant(at),
+                udc_v: f32::from_bits(udc),
+                depth: f32::from_bits(depth),
+            },
+            valid_from: Instant(valid_from),
+            gates: if gates == 1 { Gates::Pulse } else { Gates::Off },
+        }
+    }
+}
+
+/// From the modulator to control: three consecutive carrier halves and the samples at their boundaries, so that control
+/// can look at the state of affairs at its own sample even if the PWM interrupt came in between.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Applied {
+    /// Instant at which `running` began.
+    pub at: Instant,
+    /// The half before `running`.
+    pub before: CarrierPeriod,
+    /// The half that began at `at`.
+    pub running: CarrierPeriod,
+    /// The half that follows, already committed.
+    pub next: CarrierPeriod,
+    /// Phase currents at `at`, in A.
+    pub currents_a: Abc,
+    /// Phase currents at the boundary before, in A.
+    pub currents_before_a: Abc,
+    /// Whether the modulator sees the machine in the mirror (turning backward).
+    pub mirrored: bool,
+    /// A fault that the PWM interrupt found.
+    pub trip: Option<Trip>,
+}
+
+impl Words<27> for Applied {
+    fn to_words(self) -> [u32; 27] {
+        let mut words = [0; 27];
+        let halves = [self.before, self.running, self.next];
+        let currents = [self.currents_a, self.currents_before_a];
+        let content = core::iter::once(self.at.0)
+            .chain(halves.into_iter().flat_map(half_to_words))
+            .chain(currents.into_iter().flat_map(|i| [i.a.to_bits(), i.b.to_bits(), i.c.to_bits()]))
+            .chain(core::iter::once(u32::from(self.mirrored)))
+            .chain(trip_to_words(self.trip));
+        for (word, value) in words.iter_mut().zip(content) {
+            *word = value;
+        }
+        words
+    }
+
+    fn from_words(words: [u32; 27]) -> Self {
+        let [at, b0, b1, b2, b3, b4, r0, r1, r2, r3, r4, n0, n1, n2, n3, n4, rest @ ..] = words;
+        let [ia, ib, ic, ja, jb, jc, mirrored, trip @ ..] = rest;
+        Self {
+            at: Instant(at),
+            before: half_from_words([b0, b1, b2, b3, b4]),
+            running: half_from_words([r0, r1, r2, r3, r4]),
+            next: half_from_words([n0, n1, n2, n3, n4]),
+            currents_a: currents_from_words([ia, ib, ic]),
+            currents_before_a: currents_from_words([ja, jb, jc]),
+            mirrored: mirrored != 0,
+            trip: trip_from_words(trip),
+        }
+    }
+}
+
+/// A carrier half as five words: period, three compares, and levels, mode and number packed.
+pub fn half_to_words(half: CarrierPeriod) -> [u32; 5] {
+    let [u, v, w] = half.compare_ticks;
+    let [lu, lv, lw] = half.start_levels.map(u32::from);
+    let packed = lu | lv << 1 | lw << 2 | (half.mode as u32) << 8 | u32::from(half.half) << 16;
+    [half.period_ticks, u, v, w, packed]
+}
+
+/// The inverse of [`half_to_words`].
+pub fn half_from_words(words: [u32; 5]) -> CarrierPeriod {
+    let [period_ticks, u, v, w, packed] = words;
+    CarrierPeriod {
+        period_ticks,
+        compare_ticks: [u, v, w],
+        start_levels: [packed & 1 != 0, packed & 2 != 0, packed & 4 != 0],
+        mode: Mode::from_code(packed >> 8 & 0xFF),
+        half: (packed >> 16) as u8,
+    }
+}
+
+fn currents_from_words(words: [u32; 3]) -> Abc {
+    let [a, b, c] = words;
+    Abc { a: f32::from_bits(a), b: f32::from_bits(b), c: f32::from_bits(c) }
+}
+
+/// A latched fault as four words: fault and safe state, value, limit, instant; zeros for none.
+pub fn trip_to_words(trip: Option<Trip>) -> [u32; 4] {
+    match trip {
+        None => [0; 4],
+        Some(trip) => [
+            trip.fault as u32 | (trip.safe as u32) << 8,
+            trip.value.to_bits(),
+            trip.limit.to_bits(),
+            trip.at.0,
+        ],
+    }
+}
+
+/// The inverse of [`trip_to_words`].
+pub fn trip_from_words(words: [u32; 4]) -> Option<Trip> {
+    let [code, value, limit, at] = words;
+    Some(Trip {
+        fault: Fault::from_code(code & 0xFF)?,
+        value: f32::from_bits(value),
+        limit: f32::from_bits(limit),
+        at: Instant(at),
+        safe: if code >> 8 == SafeState::ShortCircuit as u32 {
+            SafeState::ShortCircuit
+        } else {
+            SafeState::GatesOff
+        },
+    })
+}
+
+/// What the control task did in one period, for traces and telemetry.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Report {
+    /// Torque demand after envelope, slew and voltage limit, in N·m.
+    pub torque_nm: f32,
+    /// Current reference, d axis, in A.
+    pub id_a: f32,
+    /// Current reference, q axis, in A.
+    pub iq_a: f32,
+    /// Commanded fundamental, peak phase, in V.
+    pub voltage_v: f32,
+    /// Stator frequency, in Hz, negative backward.
+    pub frequency_hz: f32,
+    /// The latched fault, if any.
+    pub trip: Option<Trip>,
+}
+
+impl Words<9> for Report {
+    fn to_words(self) -> [u32; 9] {
+        let [code, value, limit, at] = trip_to_words(self.trip);
+        [
+            self.torque_nm.to_bits(),
+            self.id_a.to_bits(),
+            self.iq_a.to_bits(),
+            self.voltage_v.to_bits(),
+            self.frequency_hz.to_bits(),
+            code,
+            value,
+            limit,
+            at,
+        ]
+    }
+
+    fn from_words(words: [u32; 9]) -> Self {
+        let [torque, id, iq, voltage, frequency, trip @ ..] = words;
+        Self {
+            torque_nm: f32::from_bits(torque),
+            id_a: f32::from_bits(id),
+            iq_a: f32::from_bits(iq),
+            voltage_v: f32::from_bits(voltage),
+            frequency_hz: f32::from_bits(frequency),
+            trip: trip_from_words(trip),
+        }
+    }
+}

@@ -1,0 +1,9 @@
+//! The systems: control, pulses, cells and protection put together. What the two interrupts call, on any board and
+//! on the host.
+
+#![forbid(unsafe_code)]
+
+mod messages;
+pub mod traction;
+
+pub use messages::{Applied, Gates, Report, VoltageCommand, half_from_words, half_to_words};

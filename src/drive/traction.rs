@@ -1,0 +1,390 @@
+//! The PMaSynRM drive: one control task, one PWM task, two cells.
+//!
+//! Logical execution time: a command sampled at one control instant may be used from the next one on, and each task
+//! looks at the other's words by their instants, not by their arrival. So where one interrupt lands in the other
+//! changes nothing, and the same inputs give the same pulses on every board and on the host.
+
+use super::messages::{Applied, Gates, Report, VoltageCommand};
+use crate::board::{ControlPort, PwmPort, Sample};
+use crate::cell::{Downlink, Uplink};
+use crate::control::{Boundary, Committed, Controller, Follows, Gains};
+use crate::frames::{Abc, AlphaBeta};
+use crate::machine::Tables;
+use crate::modulation::{
+    CarrierPeriod, Devices, Mode, Modulator, Reference, Schedule, depth_limit, ripple_flux,
+};
+use crate::protection::{self, Fault, FrozenWatch, Trip, Violation};
+use crate::time::{Clock, Instant};
+
+/// Angle units (2⁻³² turn) in one radian.
+const UNITS_PER_RADIAN: f32 = 4_294_967_296.0 / core::f32::consts::TAU;
+
+/// Control periods after which a command is too old to make pulses from.
+const STALE_PERIODS: i32 = 5;
+
+/// Share of a mode's largest fundamental that the operating point may use where the voltage must also regulate.
+const REGULATION_ROOM: f32 = 0.995;
+
+/// What both tasks are built with.
+#[derive(Clone, Copy, Debug)]
+pub struct Settings {
+    /// The timers' clock.
+    pub clock: Clock,
+    /// The inverter's devices.
+    pub devices: Devices,
+    /// The current loop's gains.
+    pub gains: Gains,
+}
+
+/// The cells between the two interrupts.
+pub struct Shared {
+    command: Downlink<VoltageCommand, 8>,
+    applied: Uplink<Applied, 27>,
+}
+
+impl Shared {
+    /// Empty cells.
+    #[cfg(not(loom))]
+    pub const fn new() -> Self {
+        Self { command: Downlink::new(), applied: Uplink::new() }
+    }
+}
+
+/// The control interrupt's task.
+pub struct ControlTask {
+    tables: &'static Tables,
+    settings: Settings,
+    controller: Controller,
+    watch: FrozenWatch,
+    /// Nominal instant of the next call.
+    now: Instant,
+    /// Instant of the newest carrier boundary that was used.
+    boundary: Option<Instant>,
+    /// The last commanded fundamental, in V.
+    voltage_v: f32,
+    trip: Option<Trip>,
+}
+
+impl ControlTask {
+    /// A task whose first call is the control timer's first interrupt, at `first`.
+    pub const fn new(tables: &'static Tables, settings: Settings, first: Instant) -> Self {
+        Self {
+            tables,
+            settings,
+            controller: Controller::new(),
+            watch: FrozenWatch::new(),
+            now: first,
+            boundary: None,
+            voltage_v: 0.0,
+            trip: None,
+        }
+    }
+
+    /// The control timer's interrupt. Deadline: one control period after its nominal instant; a missed one is a fault.
+    pub fn run(&mut self, port: &mut impl ControlPort, shared: &Shared) {
+        let now = self.now;
+        self.now = now.after(self.settings.clock.control_ticks);
+        let sample = port.sample(now);
+        let before = self.controller.omega();
+        let omega = self.controller.track(sample.measured.angle, &self.settings.clock);
+        let applied = shared.applied.read().map(|applied| as_of(&applied, now));
+        self.adopt_trip(applied.as_ref().and_then(|applied| applied.trip));
+        self.check(
+            protection::check_measurements(&sample.measured, omega, &self.tables.ratings),
+            &sample,
+            port,
+        );
+        let pulsing = self.trip.is_none() && sample.enable && self.controller.speed_is_known();
+        let mut report = Report { frequency_hz: omega / core::f32::consts::TAU, ..Report::default() };
+        let mut command = VoltageCommand {
+            reference: Reference {
+                voltage_v: 0.0,
+                angle: sample.measured.angle,
+                rate: self.rate(omega),
+                at: now,
+                udc_v: sample.measured.udc_v,
+                depth: 0.0,
+            },
+            valid_from: self.now,
+            gates: Gates::Off,
+        };
+        if pulsing {
+            let frozen = self.watch.check(
+                &sample.measured,
+                before,
+                self.settings.clock.control_s(),
+                &self.tables.ratings,
+            );
+            self.check(frozen, &sample, port);
+            self.pulse(&sample, applied.as_ref(), omega, &mut command, &mut report);
+        } else {
+            self.controller.idle();
+            self.watch = FrozenWatch::new();
+            self.boundary = None;
+            self.voltage_v = 0.0;
+        }
+        let finite = command.reference.voltage_v.is_finite() && command.reference.rate.is_finite();
+        self.check(
+            (!finite).then_some((Fault::NotFinite, command.reference.voltage_v, f32::MAX)),
+            &sample,
+            port,
+        );
+        let late = port.overrun_ticks(now);
+        let late_s = self.settings.clock.seconds(late as i32);
+        self.check((late > 0).then_some((Fault::ControlDeadline, late_s, 0.0)), &sample, port);
+        if self.trip.is_some() {
+            command.gates = Gates::Off;
+        }
+        shared.command.publish(command);
+        report.trip = self.trip;
+        port.report(now, &report);
+    }
+
+    /// Nominal instant of the next call.
+    pub fn next_call(&self) -> Instant {
+        self.now
+    }
+
+    /// The latched fault.
+    pub fn trip(&self) -> Option<Trip> {
+        self.trip
+    }
+
+    /// Control law and its surroundings, while pulses are made.
+    fn pulse(
+        &mut self,
+        sample: &Sample,
+        applied: Option<&Applied>,
+        omega: f32,
+        command: &mut VoltageCommand,
+        report: &mut Report,
+    ) {
+        let now = command.reference.at;
+        let committed = self.committed(applied, now, omega, sample.measured.udc_v);
+        let boundary = self.new_boundary(applied, now, sample.measured.udc_v);
+        let output = self.controller.step(
+            &sample.measured,
+            &sample.demand,
+            &committed,
+            boundary.as_ref(),
+            &self.settings.gains,
+            &self.settings.clock,
+            self.tables,
+        );
+        self.voltage_v = output.voltage.voltage_v;
+        command.reference.voltage_v = output.voltage.voltage_v;
+        command.reference.angle = output.voltage.angle;
+        command.reference.depth = output.voltage.depth;
+        command.gates = Gates::Pulse;
+        report.torque_nm = output.torque_nm;
+        report.id_a = output.point.current.d;
+        report.iq_a = output.point.current.q;
+        report.voltage_v = output.voltage.voltage_v;
+    }
+
+    /// Angle units per tick of an electrical speed in rad/s.
+    fn rate(&self, omega: f32) -> f32 {
+        omega * (UNITS_PER_RADIAN * self.settings.clock.tick_s)
+    }
+
+    /// What the modulator will do until a command of this period can act.
+    fn committed(&self, applied: Option<&Applied>, now: Instant, omega: f32, udc_v: f32) -> Committed {
+        let clock = &self.settings.clock;
+        let Some(applied) = applied else {
+            let interval_s = clock.seconds(self.settings.devices.shortest_half_ticks as i32);
+            return Committed {
+                horizon_s: 0.0,
+                volt_seconds: None,
+                ripple_wb: AlphaBeta::default(),
+                interval_s,
+                follows: Follows::Mean,
+                depth_limit: depth_limit(Mode::Async, 0.0, &self.settings.devices),
+            };
+        };
+        let (running, next) = (&applied.running, &applied.next);
+        let elapsed = now.since(applied.at).max(0) as u32;
+        let off = running.mode == Mode::Off || next.mode == Mode::Off;
+        let left = running.period_ticks.saturating_sub(elapsed) + next.period_ticks;
+        let volt_seconds = volt_seconds(running, elapsed, udc_v, clock) + volt_seconds(next, 0, udc_v, clock);
+        let mut ripple_wb =
+            ripple_flux(next.mode, u32::from(next.half) + 1, self.voltage_v, udc_v, omega.abs());
+        if applied.mirrored {
+            ripple_wb.beta = -ripple_wb.beta;
+        }
+        let largest = depth_limit(next.mode, self.rate(omega), &self.settings.devices);
+        Committed {
+            horizon_s: clock.seconds(left as i32),
+            volt_seconds: (!off).then_some(volt_seconds),
+            ripple_wb,
+            interval_s: clock.seconds(next.period_ticks as i32),
+            follows: match next.mode {
+                Mode::Mid7 | Mode::Mid3 => Follows::Fundamental,
+                Mode::Square => Follows::Angle,
+                _ => Follows::Mean,
+            },
+            depth_limit: if next.mode == Mode::Square { largest } else { REGULATION_ROOM * largest },
+        }
+    }
+
+    /// The newest boundary, once.
+    fn new_boundary(&mut self, applied: Option<&Applied>, now: Instant, udc_v: f32) -> Option<Boundary> {
+        let applied = applied?;
+        if self.boundary == Some(applied.at) {
+            return None;
+        }
+        let consecutive = self.boundary == Some(applied.at.before(applied.before.period_ticks));
+        self.boundary = Some(applied.at);
+        let clock = &self.settings.clock;
+        let pulsed = consecutive && applied.before.mode != Mode::Off;
+        Some(Boundary {
+            currents_a: applied.currents_a,
+            age_s: clock.seconds(now.since(applied.at)),
+            volt_seconds: pulsed.then(|| volt_seconds(&applied.before, 0, udc_v, clock)),
+            length_s: clock.seconds(applied.before.period_ticks as i32),
+        })
+    }
+
+    fn check(&mut self, violation: Option<Violation>, sample: &Sample, port: &mut impl ControlPort) {
+        let (Some((fault, value, limit)), None) = (violation, self.trip) else {
+            return;
+        };
+        let at = self.now.before(self.settings.clock.control_ticks);
+        let safe =
+            protection::safe_state(self.controller.omega(), sample.measured.udc_v, &self.tables.ratings);
+        port.enter(safe, at);
+        self.trip = Some(Trip { fault, value, limit, at, safe });
+    }
+
+    fn adopt_trip(&mut self, trip: Option<Trip>) {
+        if self.trip.is_none() {
+            self.trip = trip;
+        }
+    }
+}
+
+/// The modulator's words as they stood at `now`, if the PWM interrupt has come since.
+fn as_of(applied: &Applied, now: Instant) -> Applied {
+    if now.reached(applied.at) {
+        return *applied;
+    }
+    Applied {
+        at: applied.at.before(applied.before.period_ticks),
+        // Not known any more; its length, zero, makes it no neighbour of any boundary.
+        before: CarrierPeriod::default(),
+        running: applied.before,
+        next: applied.running,
+        currents_a: applied.currents_before_a,
+        trip: applied.trip.filter(|trip| now.reached(trip.at)),
+        ..*applied
+    }
+}
+
+/// Volt-seconds of a half from `from` ticks after its start to its end, in V·s.
+fn volt_seconds(half: &CarrierPeriod, from: u32, udc_v: f32, clock: &Clock) -> AlphaBeta {
+    let [a, b, c] = half.on_ticks(from).map(|ticks| ticks as f32);
+    Abc { a, b, c }.clarke() * (udc_v * clock.tick_s)
+}
+
+/// The PWM interrupt's task.
+pub struct PwmTask {
+    tables: &'static Tables,
+    settings: Settings,
+    modulator: Modulator,
+    /// Nominal instant of the next call: the boundary where `next` begins.
+    now: Instant,
+    running: CarrierPeriod,
+    next: CarrierPeriod,
+    currents_a: Abc,
+    trip: Option<Trip>,
+}
+
+impl PwmTask {
+    /// A task whose first call is at `first`, with all gates off until then and for one half more.
+    pub const fn new(tables: &'static Tables, settings: Settings, first: Instant) -> Self {
+        Self::with_schedule(tables, settings, first, Schedule::new(&settings.clock))
+    }
+
+    /// The same with a schedule of one's own.
+    pub const fn with_schedule(
+        tables: &'static Tables,
+        settings: Settings,
+        first: Instant,
+        schedule: Schedule,
+    ) -> Self {
+        let off = CarrierPeriod::off(settings.devices.shortest_half_ticks);
+        Self {
+            tables,
+            settings,
+            modulator: Modulator::new(settings.devices, schedule),
+            now: first,
+            running: off,
+            next: off,
+            currents_a: Abc { a: 0.0, b: 0.0, c: 0.0 },
+            trip: None,
+        }
+    }
+
+    /// The PWM timer's interrupt, at a carrier boundary. Deadline: the next boundary, where the shadow registers take over.
+    pub fn run(&mut self, port: &mut impl PwmPort, shared: &Shared) {
+        let now = self.now;
+        let before = core::mem::replace(&mut self.running, self.next);
+        let currents_before_a = core::mem::replace(&mut self.currents_a, port.sample(now));
+        let command = shared.command.newest(|command| now.reached(command.valid_from));
+        self.check(&command, port);
+        let reference = match &command {
+            Some(command) if command.gates == Gates::Pulse && self.trip.is_none() => Some(&command.reference),
+            _ => None,
+        };
+        let start = now.after(self.running.period_ticks);
+        self.next = self.modulator.step(start, reference);
+        self.now = start;
+        port.play(now, &self.next);
+        shared.applied.publish(Applied {
+            at: now,
+            before,
+            running: self.running,
+            next: self.next,
+            currents_a: self.currents_a,
+            currents_before_a,
+            mirrored: self.modulator.is_mirrored(),
+            trip: self.trip,
+        });
+    }
+
+    /// Nominal instant of the next call.
+    pub fn next_call(&self) -> Instant {
+        self.now
+    }
+
+    /// The latched fault.
+    pub fn trip(&self) -> Option<Trip> {
+        self.trip
+    }
+
+    fn check(&mut self, command: &Option<VoltageCommand>, port: &mut impl PwmPort) {
+        if self.trip.is_some() {
+            return;
+        }
+        let violation = protection::check_currents(&self.currents_a, &self.tables.ratings)
+            .or_else(|| command.as_ref().and_then(|command| self.stale(command)));
+        let Some((fault, value, limit)) = violation else {
+            return;
+        };
+        let (rate, udc_v) = match command {
+            Some(command) => (command.reference.rate, command.reference.udc_v),
+            None => (0.0, self.tables.ratings.dc_link_nominal_v),
+        };
+        let omega = rate * self.settings.clock.ticks_per_s / UNITS_PER_RADIAN;
+        let safe = protection::safe_state(omega, udc_v, &self.tables.ratings);
+        port.enter(safe, self.now);
+        self.trip = Some(Trip { fault, value, limit, at: self.now, safe });
+    }
+
+    fn stale(&self, command: &VoltageCommand) -> Option<Violation> {
+        let clock = &self.settings.clock;
+        let age = self.now.since(command.reference.at);
+        let limit = STALE_PERIODS * clock.control_ticks as i32;
+        let stale = command.gates == Gates::Pulse && !(0..=limit).contains(&age);
+        stale.then(|| (Fault::StaleCommand, clock.seconds(age), clock.seconds(limit)))
+    }
+}

@@ -1,0 +1,340 @@
+//! Angles and reference frames.
+//!
+//! Amplitude-invariant transforms: a balanced set of phase quantities with peak `x` is a space vector of length `x`.
+//! All angles are electrical. [`Angle`] is a 32-bit fraction of a turn, so it wraps by itself and loses no
+//! precision however long the drive runs.
+
+#![forbid(unsafe_code)]
+
+use core::ops::{Add, Mul, Neg, Sub};
+
+/// √3.
+pub const SQRT_3: f32 = 1.732_050_8;
+/// Angle units in one turn, 2³².
+const UNITS_PER_TURN: f32 = 4_294_967_296.0;
+
+/// An angle, or a difference of two, as a fraction of a turn in units of 2⁻³² turn.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Angle(pub u32);
+
+/// Sine and cosine of one angle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SinCos {
+    /// Sine.
+    pub sin: f32,
+    /// Cosine.
+    pub cos: f32,
+}
+
+impl Angle {
+    /// The zero angle.
+    pub const ZERO: Self = Self(0);
+    /// 30°, rounded to the nearest unit.
+    pub const DEG_30: Self = Self(357_913_941);
+    /// 90°.
+    pub const DEG_90: Self = Self(1 << 30);
+    /// 120°, rounded to the nearest unit.
+    pub const DEG_120: Self = Self(1_431_655_765);
+
+    /// From a number of turns, any sign, |turns| < 2²⁴; NaN gives zero.
+    #[inline]
+    pub fn from_turns(turns: f32) -> Self {
+        let fraction = turns - (turns as i32) as f32;
+        // Half units, because a fraction in (−1, 1) of 2³² overflows an i32.
+        Self((((fraction * (UNITS_PER_TURN / 2.0)) as i32) as u32) << 1)
+    }
+
+    /// From radians, any sign, |radians| < 10⁸.
+    #[inline]
+    pub fn from_radians(radians: f32) -> Self {
+        Self::from_turns(radians * core::f32::consts::FRAC_1_PI * 0.5)
+    }
+
+    /// The angle of the vector (`x`, `y`); error below 3e-7 rad. The zero vector gives zero.
+    #[inline]
+    pub fn of_vector(x: f32, y: f32) -> Self {
+        let (ax, ay) = (x.abs(), y.abs());
+        let steep = ay > ax;
+        let (large, small) = if steep { (ay, ax) } else { (ax, ay) };
+        if large == 0.0 {
+            return Self::ZERO;
+        }
+        let mut radians = octant_atan(small, large);
+        if steep {
+            radians = core::f32::consts::FRAC_PI_2 - radians;
+        }
+        if x < 0.0 {
+            radians = core::f32::consts::PI - radians;
+        }
+        if y < 0.0 {
+            radians = -radians;
+        }
+        Self::from_radians(radians)
+    }
+
+    /// In turns, 0 ≤ turns < 1 (rounding may give 1).
+    #[inline]
+    pub fn turns(self) -> f32 {
+        self.0 as f32 / UNITS_PER_TURN
+    }
+
+    /// As a signed difference in radians, −π ≤ x < π.
+    #[inline]
+    pub fn signed_radians(self) -> f32 {
+        self.signed() as f32 * (core::f32::consts::PI / (UNITS_PER_TURN / 2.0))
+    }
+
+    /// As a signed difference in units of 2⁻³² turn: the short way round.
+    #[inline]
+    pub fn signed(self) -> i32 {
+        self.0 as i32
+    }
+
+    /// Sine and cosine, absolute error below 1.5e-7 (a polynomial on ±45°, no table, no branch on data).
+    #[inline]
+    pub fn sin_cos(self) -> SinCos {
+        let quadrant = self.0.wrapping_add(1 << 29) >> 30;
+        let rest = self.0.wrapping_sub(quadrant << 30) as i32 as f32;
+        let x = rest * (core::f32::consts::PI / (UNITS_PER_TURN / 2.0));
+        let z = x * x;
+        let s = x + x * z * (-1.666_665_5e-1 + z * (8.332_161e-3 - z * 1.951_529_6e-4));
+        let c = 1.0 - 0.5 * z + z * z * (4.166_664_6e-2 + z * (-1.388_731_6e-3 + z * 2.443_315_7e-5));
+        let (s, c) = if quadrant & 1 == 0 { (s, c) } else { (c, -s) };
+        if quadrant & 2 == 0 { SinCos { sin: s, cos: c } } else { SinCos { sin: -s, cos: -c } }
+    }
+}
+
+/// atan(small / large) for 0 ≤ small ≤ large, large > 0, in radians.
+#[inline]
+fn octant_atan(small: f32, large: f32) -> f32 {
+    const TAN_PI_8: f32 = 0.414_213_57;
+    let (offset, x) = if small > TAN_PI_8 * large {
+        (core::f32::consts::FRAC_PI_4, (small - large) / (small + large))
+    } else {
+        (0.0, small / large)
+    };
+    let z = x * x;
+    let series = ((8.053_744_6e-2 * z - 1.387_768_6e-1) * z + 1.997_771_1e-1) * z - 3.333_295e-1;
+    offset + x + x * z * series
+}
+
+impl Add for Angle {
+    type Output = Self;
+    #[inline]
+    fn add(self, other: Self) -> Self {
+        Self(self.0.wrapping_add(other.0))
+    }
+}
+
+impl Sub for Angle {
+    type Output = Self;
+    #[inline]
+    fn sub(self, other: Self) -> Self {
+        Self(self.0.wrapping_sub(other.0))
+    }
+}
+
+impl Neg for Angle {
+    type Output = Self;
+    #[inline]
+    fn neg(self) -> Self {
+        Self(self.0.wrapping_neg())
+    }
+}
+
+/// Square root, correctly rounded, of a number that is not negative; a negative number gives zero.
+#[inline]
+pub fn sqrt(x: f32) -> f32 {
+    if x > 0.0 { libm::sqrtf(x) } else { 0.0 }
+}
+
+/// `x` held between `low` and `high`; NaN stays NaN. (`f32::clamp` panics on a bad range; this cannot.)
+#[inline]
+pub fn limit(x: f32, low: f32, high: f32) -> f32 {
+    if x < low {
+        low
+    } else if x > high {
+        high
+    } else {
+        x
+    }
+}
+
+/// Three phase quantities.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Abc {
+    /// Phase a (u).
+    pub a: f32,
+    /// Phase b (v).
+    pub b: f32,
+    /// Phase c (w).
+    pub c: f32,
+}
+
+/// A space vector in the stationary frame; alpha along phase a.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct AlphaBeta {
+    /// Along phase a.
+    pub alpha: f32,
+    /// 90° ahead of phase a.
+    pub beta: f32,
+}
+
+/// A space vector in the rotor frame; d along the magnet flux.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Dq {
+    /// Direct axis.
+    pub d: f32,
+    /// Quadrature axis, 90° ahead of d.
+    pub q: f32,
+}
+
+impl Abc {
+    /// Clarke transform, amplitude-invariant, from all three phases (a common offset drops out).
+    #[inline]
+    pub fn clarke(self) -> AlphaBeta {
+        AlphaBeta {
+            alpha: (2.0 * self.a - self.b - self.c) * (1.0 / 3.0),
+            beta: (self.b - self.c) * (1.0 / SQRT_3),
+        }
+    }
+
+    /// The largest magnitude of the three.
+    #[inline]
+    pub fn peak(self) -> f32 {
+        let (a, b, c) = (self.a.abs(), self.b.abs(), self.c.abs());
+        let ab = if a > b { a } else { b };
+        if ab > c { ab } else { c }
+    }
+}
+
+impl AlphaBeta {
+    /// Into the frame that stands at the angle of `frame` (Park).
+    #[inline]
+    pub fn park(self, frame: SinCos) -> Dq {
+        Dq {
+            d: self.alpha * frame.cos + self.beta * frame.sin,
+            q: self.beta * frame.cos - self.alpha * frame.sin,
+        }
+    }
+
+    /// Inverse Clarke.
+    #[inline]
+    pub fn abc(self) -> Abc {
+        let (x, y) = (-0.5 * self.alpha, 0.5 * SQRT_3 * self.beta);
+        Abc { a: self.alpha, b: x + y, c: x - y }
+    }
+}
+
+impl Dq {
+    /// Out of the frame that stands at the angle of `frame` (inverse Park).
+    #[inline]
+    pub fn unpark(self, frame: SinCos) -> AlphaBeta {
+        AlphaBeta {
+            alpha: self.d * frame.cos - self.q * frame.sin,
+            beta: self.q * frame.cos + self.d * frame.sin,
+        }
+    }
+
+    /// Turned by 90°: multiplication by j.
+    #[inline]
+    pub fn j(self) -> Self {
+        Self { d: -self.q, q: self.d }
+    }
+
+    /// Squared length.
+    #[inline]
+    pub fn squared(self) -> f32 {
+        self.d * self.d + self.q * self.q
+    }
+
+    /// Length.
+    #[inline]
+    pub fn length(self) -> f32 {
+        sqrt(self.squared())
+    }
+
+    /// Scalar product.
+    #[inline]
+    pub fn dot(self, other: Self) -> f32 {
+        self.d * other.d + self.q * other.q
+    }
+
+    /// The angle of the vector in its frame.
+    #[inline]
+    pub fn angle(self) -> Angle {
+        Angle::of_vector(self.d, self.q)
+    }
+}
+
+macro_rules! vector_arithmetic {
+    ($type:ident, $x:ident, $y:ident) => {
+        impl Add for $type {
+            type Output = Self;
+            #[inline]
+            fn add(self, other: Self) -> Self {
+                Self { $x: self.$x + other.$x, $y: self.$y + other.$y }
+            }
+        }
+        impl Sub for $type {
+            type Output = Self;
+            #[inline]
+            fn sub(self, other: Self) -> Self {
+                Self { $x: self.$x - other.$x, $y: self.$y - other.$y }
+            }
+        }
+        impl Mul<f32> for $type {
+            type Output = Self;
+            #[inline]
+            fn mul(self, scale: f32) -> Self {
+                Self { $x: self.$x * scale, $y: self.$y * scale }
+            }
+        }
+    };
+}
+vector_arithmetic!(AlphaBeta, alpha, beta);
+vector_arithmetic!(Dq, d, q);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sine_and_cosine_keep_their_documented_error() {
+        for k in 0..100_000_u32 {
+            let angle = Angle(k.wrapping_mul(42_949));
+            let exact = f64::from(angle.0) / 4_294_967_296.0 * core::f64::consts::TAU;
+            let got = angle.sin_cos();
+            assert!((f64::from(got.sin) - exact.sin()).abs() < 1.5e-7, "{angle:?}");
+            assert!((f64::from(got.cos) - exact.cos()).abs() < 1.5e-7, "{angle:?}");
+        }
+    }
+
+    #[test]
+    fn the_angle_of_a_vector_keeps_its_documented_error() {
+        for k in 0..10_000_u32 {
+            let exact = (f64::from(k) / 10_000.0 - 0.5) * core::f64::consts::TAU;
+            let got = Angle::of_vector((700.0 * exact.cos()) as f32, (700.0 * exact.sin()) as f32);
+            let error = got - Angle((exact / core::f64::consts::TAU * 4_294_967_296.0) as i64 as u32);
+            assert!(error.signed_radians().abs() < 5e-7, "{exact} {got:?}");
+        }
+        assert_eq!(Angle::of_vector(0.0, 0.0), Angle::ZERO);
+    }
+
+    #[test]
+    fn turns_wrap_both_ways() {
+        assert_eq!(Angle::from_turns(1.25), Angle::DEG_90);
+        assert_eq!(Angle::from_turns(-0.75), Angle::DEG_90);
+        assert_eq!(Angle::from_turns(f32::NAN), Angle::ZERO);
+    }
+
+    #[test]
+    fn park_and_back_is_the_same_vector() {
+        let frame = Angle::from_turns(0.137).sin_cos();
+        let vector = Abc { a: 3.0, b: -5.0, c: 2.0 }.clarke();
+        let back = vector.park(frame).unpark(frame);
+        assert!((back.alpha - vector.alpha).abs() < 1e-5 && (back.beta - vector.beta).abs() < 1e-5);
+        let abc = vector.abc();
+        assert!((abc.b + 5.0).abs() < 1e-5 && (abc.c - 2.0).abs() < 1e-5);
+    }
+}

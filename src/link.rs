@@ -1,0 +1,156 @@
+//! The words that a board in an emulator exchanges with the rig: fixed blocks of 16 words, little-endian.
+//!
+//! The firmware asks, the rig answers, at no virtual time. Requests of both interrupts share one stream, because each
+//! block is written whole; answers come on one stream per interrupt, because one interrupt may ask while the other
+//! still waits. Instants are the timers' nominal ones, never arrival times.
+
+#![forbid(unsafe_code)]
+
+use crate::board::Sample;
+use crate::cell::Words;
+use crate::control::{Demand, Measurements};
+use crate::drive::{Report, half_from_words, half_to_words};
+use crate::frames::{Abc, Angle};
+use crate::modulation::CarrierPeriod;
+use crate::protection::SafeState;
+use crate::time::Instant;
+
+/// Words in a block.
+pub const BLOCK_WORDS: usize = 16;
+/// Bytes in a block.
+pub const BLOCK_BYTES: usize = BLOCK_WORDS * 4;
+/// One block.
+pub type Block = [u32; BLOCK_WORDS];
+
+/// What the timers run on and what the inverter is; the rig tells it before anything starts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Setup {
+    /// Shortest pulse of a device, in ticks.
+    pub min_pulse_ticks: u32,
+    /// Dead time, in ticks.
+    pub dead_time_ticks: u32,
+}
+
+/// From the firmware to the rig.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Request {
+    /// The image has booted and wants its [`Setup`].
+    Hello,
+    /// The control timer's conversions.
+    ControlSample(Instant),
+    /// The end of a control interrupt.
+    ControlReport(Instant, Report),
+    /// Phase currents at a carrier boundary.
+    PwmSample(Instant),
+    /// Shadow registers: the half that follows the one that begins at the instant.
+    Play(Instant, CarrierPeriod),
+    /// Gates into the safe state; `true` from the control interrupt.
+    Enter(Instant, SafeState),
+    /// The processor has stopped in a panic or a HardFault, gates off.
+    Dead,
+}
+
+impl Request {
+    /// As a block.
+    pub fn to_block(self) -> Block {
+        let mut block = [0; BLOCK_WORDS];
+        let (tag, at, payload): (u32, Instant, &[u32]) = match &self {
+            Self::Hello => (1, Instant(0), &[]),
+            Self::ControlSample(at) => (2, *at, &[]),
+            Self::ControlReport(at, report) => (3, *at, &report.to_words()),
+            Self::PwmSample(at) => (4, *at, &[]),
+            Self::Play(at, half) => (5, *at, &half_to_words(*half)),
+            Self::Enter(at, safe) => (6, *at, &[*safe as u32]),
+            Self::Dead => (7, Instant(0), &[]),
+        };
+        let words = [tag, at.0].into_iter().chain(payload.iter().copied());
+        for (slot, word) in block.iter_mut().zip(words) {
+            *slot = word;
+        }
+        block
+    }
+
+    /// From a block; `None` if it is none of ours.
+    pub fn from_block(block: &Block) -> Option<Self> {
+        let [tag, at, payload @ ..] = *block;
+        let at = Instant(at);
+        Some(match tag {
+            1 => Self::Hello,
+            2 => Self::ControlSample(at),
+            3 => {
+                let [a, b, c, d, e, f, g, h, i, ..] = payload;
+                Self::ControlReport(at, Report::from_words([a, b, c, d, e, f, g, h, i]))
+            }
+            4 => Self::PwmSample(at),
+            5 => {
+                let [a, b, c, d, e, ..] = payload;
+                Self::Play(at, half_from_words([a, b, c, d, e]))
+            }
+            6 => {
+                let [safe, ..] = payload;
+                let short = safe == SafeState::ShortCircuit as u32;
+                Self::Enter(at, if short { SafeState::ShortCircuit } else { SafeState::GatesOff })
+            }
+            7 => Self::Dead,
+            _ => return None,
+        })
+    }
+}
+
+/// The answer to [`Request::Hello`].
+pub fn setup_to_block(setup: Setup) -> Block {
+    let mut block = [0; BLOCK_WORDS];
+    (block[0], block[1]) = (setup.min_pulse_ticks, setup.dead_time_ticks);
+    block
+}
+
+/// The inverse of [`setup_to_block`].
+pub fn setup_from_block(block: &Block) -> Setup {
+    let [min_pulse_ticks, dead_time_ticks, ..] = *block;
+    Setup { min_pulse_ticks, dead_time_ticks }
+}
+
+/// The answer to [`Request::ControlSample`]; `stop` ends the run.
+pub fn sample_to_block(sample: &Sample, stop: bool) -> Block {
+    let measured = &sample.measured;
+    let flags = u32::from(sample.enable) | u32::from(sample.demand.slew_limited) << 1 | u32::from(stop) << 2;
+    let [a, b, c] = currents_to_words(measured.currents_a);
+    let torque = sample.demand.torque_nm.to_bits();
+    [a, b, c, measured.udc_v.to_bits(), measured.angle.0, torque, flags, 0, 0, 0, 0, 0, 0, 0, 0, 0]
+}
+
+/// The inverse of [`sample_to_block`].
+pub fn sample_from_block(block: &Block) -> (Sample, bool) {
+    let [a, b, c, udc, angle, torque, flags, ..] = *block;
+    let sample = Sample {
+        measured: Measurements {
+            currents_a: currents_from_words(a, b, c),
+            udc_v: f32::from_bits(udc),
+            angle: Angle(angle),
+        },
+        demand: Demand { torque_nm: f32::from_bits(torque), slew_limited: flags & 2 != 0 },
+        enable: flags & 1 != 0,
+    };
+    (sample, flags & 4 != 0)
+}
+
+/// The answer to [`Request::PwmSample`].
+pub fn currents_to_block(currents_a: Abc) -> Block {
+    let mut block = [0; BLOCK_WORDS];
+    [block[0], block[1], block[2]] = currents_to_words(currents_a);
+    block
+}
+
+/// The inverse of [`currents_to_block`].
+pub fn currents_from_block(block: &Block) -> Abc {
+    let [a, b, c, ..] = *block;
+    currents_from_words(a, b, c)
+}
+
+fn currents_to_words(currents_a: Abc) -> [u32; 3] {
+    [currents_a.a.to_bits(), currents_a.b.to_bits(), currents_a.c.to_bits()]
+}
+
+fn currents_from_words(a: u32, b: u32, c: u32) -> Abc {
+    Abc { a: f32::from_bits(a), b: f32::from_bits(b), c: f32::from_bits(c) }
+}

@@ -1,0 +1,91 @@
+//! The machine as the control task knows it: ratings, and tables made offline by `tractive-tablegen`.
+//!
+//! The target code takes `&Tables` and does not care who made them: `build.rs` writes the machine folder
+//! chosen at build time out as read-only data ([`BUILT_IN`]); the rig builds them at run time from any folder.
+//!
+//! Convention: d along the magnet flux, amplitude-invariant peak values, electrical angles,
+//! `Te = 1.5 n_p (psi_d i_q − psi_q i_d)`.
+
+#![forbid(unsafe_code)]
+
+mod lookup;
+
+pub use lookup::{Curve, Grid};
+
+/// Scalars of a machine folder. SI units, peak values of phase quantities.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ratings {
+    /// Pole pairs, n_p.
+    pub pole_pairs: f32,
+    /// Stator resistance of one phase, in ohm.
+    pub stator_resistance_ohm: f32,
+    /// Largest torque, in N·m, at any speed.
+    pub max_torque_nm: f32,
+    /// Largest mechanical power, in W: the torque envelope above the base speed.
+    pub max_power_w: f32,
+    /// Largest current space vector, peak, in A.
+    pub max_current_a: f32,
+    /// Largest mechanical speed, in rad/s.
+    pub max_speed_rad_s: f32,
+    /// Magnet flux linkage psi_d(0, 0), in Wb; 0 for a machine without magnets.
+    pub magnet_flux_wb: f32,
+    /// Lowest DC-link voltage of normal operation, in V.
+    pub dc_link_min_v: f32,
+    /// Nominal DC-link voltage, in V.
+    pub dc_link_nominal_v: f32,
+    /// Highest DC-link voltage of normal operation, in V.
+    pub dc_link_max_v: f32,
+    /// Highest switching frequency of any device, in Hz.
+    pub max_switching_hz: f32,
+    /// Phase current that trips the drive, in A (instantaneous).
+    pub trip_current_a: f32,
+    /// DC-link voltage above which the drive trips, in V.
+    pub trip_dc_over_v: f32,
+    /// DC-link voltage below which the drive trips, in V.
+    pub trip_dc_under_v: f32,
+    /// Mechanical speed above which the drive trips, in rad/s.
+    pub trip_speed_rad_s: f32,
+    /// Slew rate of the torque demand, in N·m/s.
+    pub torque_slew_nm_s: f32,
+}
+
+/// MTPA tables: the paper's universal curve, the parameters it is fed with, and where its first pass starts.
+#[derive(Clone, Copy, Debug)]
+pub struct Mtpa {
+    /// The universal curve i_dn = f(t_en) of equation (12), over `x = s/(1+s)` with `s = √|t_en|`,
+    /// `x` in 0..=1: the nodes hold `−i_dn/s` (0 at `x = 0`, 1 at `x = 1`), so the whole half-axis of t_en fits.
+    pub universal: Curve<1>,
+    /// `[psi_f (Wb), L_q − L_d (H)]` over (i_d, |i_q|): the only combination that equations (7)–(13) need.
+    /// Both are kept positive by the generator, also for a machine without magnets or without saliency.
+    pub parameters: Grid<2>,
+    /// `[i_d start, i_q start, i_d trim, i_q trim]`, in A, over |T| in N·m (0 ..= largest torque): the
+    /// point where the first pass reads `parameters`, and what is added to the second pass' result.
+    pub start: Curve<4>,
+}
+
+/// Field-weakening tables: the constant-torque curves cut with circles of constant flux linkage.
+#[derive(Clone, Copy, Debug)]
+pub struct Weakening {
+    /// `[i_d, i_q]`, in A, over (|psi| in Wb, s) with `s = 1 − √(1 − |T|/T_circle(psi))`, `s` in 0..=1.
+    pub currents: Grid<2>,
+    /// `[T_circle, T_limit]`, in N·m, over |psi|: the most torque on that circle, and the most torque
+    /// on it or inside it, both within the current limit.
+    pub torque: Curve<2>,
+}
+
+/// Everything the control task knows of a machine.
+#[derive(Clone, Copy, Debug)]
+pub struct Tables {
+    /// Name of the machine folder's `name` key.
+    pub name: &'static str,
+    /// Ratings and limits.
+    pub ratings: Ratings,
+    /// `[psi_d, psi_q]`, in Wb, over (i_d, |i_q|), in A; the map is even in i_q (psi_q odd).
+    pub flux: Grid<2>,
+    /// MTPA.
+    pub mtpa: Mtpa,
+    /// Field weakening.
+    pub weakening: Weakening,
+}
+
+include!(concat!(env!("OUT_DIR"), "/machine_tables.rs"));

@@ -1,0 +1,79 @@
+//! The PMaSynRM firmware: two interrupts and an idle loop, nothing else.
+#![cfg_attr(target_os = "none", no_std, no_main)]
+
+/// The image runs on a board; on the host there is nothing to do but to say so.
+#[cfg(not(target_os = "none"))]
+fn main() {
+    println!("This is the firmware. `cargo xtask run` builds it for its board and runs it in QEMU.");
+}
+
+#[cfg(target_os = "none")]
+mod firmware {
+    use core::sync::atomic::{AtomicU32, Ordering};
+    use cortex_m_rt::{entry, exception, interrupt};
+    use tractive::board::qemu::{self, CLOCK, Interrupt as interrupt};
+    use tractive::control::Gains;
+    use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
+    use tractive::machine::BUILT_IN;
+    use tractive::modulation::Devices;
+    use tractive::time::Instant;
+
+    static SHARED: Shared = Shared::new();
+    static MIN_PULSE_TICKS: AtomicU32 = AtomicU32::new(0);
+    static DEAD_TIME_TICKS: AtomicU32 = AtomicU32::new(0);
+
+    fn settings() -> Settings {
+        Settings {
+            clock: CLOCK,
+            devices: Devices::new(
+                MIN_PULSE_TICKS.load(Ordering::Relaxed),
+                DEAD_TIME_TICKS.load(Ordering::Relaxed),
+                BUILT_IN.ratings.max_switching_hz,
+                &CLOCK,
+            ),
+            gains: Gains::DEFAULT,
+        }
+    }
+
+    #[entry]
+    fn main() -> ! {
+        let setup = qemu::connect();
+        MIN_PULSE_TICKS.store(setup.min_pulse_ticks, Ordering::Relaxed);
+        DEAD_TIME_TICKS.store(setup.dead_time_ticks, Ordering::Relaxed);
+        qemu::start(settings().devices.shortest_half_ticks);
+        loop {
+            qemu::idle();
+        }
+    }
+
+    /// Deadline: the next control interrupt. Missed: fault `control_deadline`, gates into the safe state.
+    #[interrupt]
+    fn TIMER0() {
+        static mut TASK: Option<ControlTask> = None;
+        let mut board = qemu::Control;
+        board.acknowledge();
+        let first = Instant(CLOCK.control_ticks);
+        TASK.get_or_insert_with(|| ControlTask::new(&BUILT_IN, settings(), first)).run(&mut board, &SHARED);
+    }
+
+    /// Deadline: the next carrier boundary, where the shadow registers take over.
+    #[interrupt]
+    fn DUALTIMER() {
+        static mut TASK: Option<PwmTask> = None;
+        let mut board = qemu::Pwm;
+        board.acknowledge();
+        let settings = settings();
+        let first = Instant(settings.devices.shortest_half_ticks);
+        TASK.get_or_insert_with(|| PwmTask::new(&BUILT_IN, settings, first)).run(&mut board, &SHARED);
+    }
+
+    #[exception]
+    unsafe fn HardFault(_frame: &cortex_m_rt::ExceptionFrame) -> ! {
+        qemu::die()
+    }
+
+    #[panic_handler]
+    fn panic(_info: &core::panic::PanicInfo) -> ! {
+        qemu::die()
+    }
+}

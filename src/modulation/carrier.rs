@@ -1,0 +1,82 @@
+//! The modes with a triangular carrier: SPWM with the min-max zero sequence, sampled twice per carrier.
+//!
+//! Even halves rise from the valley (all upper devices on) to the peak (all off), odd halves fall. The
+//! reference is sampled in the middle of its half, where the mean of a turning vector over the half stands.
+
+use super::{CarrierPeriod, Devices, Reference};
+use crate::frames::{Abc, AlphaBeta, Angle, limit};
+use crate::time::Instant;
+
+/// A half of the asynchronous carrier.
+pub fn asynchronous(half: u32, start: Instant, seen: &Reference, devices: &Devices) -> CarrierPeriod {
+    synchronous(half, start, devices.shortest_half_ticks, seen, devices)
+}
+
+/// A half of a given length, wherever it lies in the turn.
+pub fn synchronous(
+    half: u32,
+    start: Instant,
+    period_ticks: u32,
+    seen: &Reference,
+    devices: &Devices,
+) -> CarrierPeriod {
+    let middle = seen.angle_at(start.after(period_ticks / 2));
+    let shares = on_shares(seen.voltage_v, middle, seen.udc_v);
+    let rising = half & 1 == 0;
+    let mut out = CarrierPeriod { period_ticks, start_levels: [rising; 3], ..CarrierPeriod::default() };
+    for (compare, share) in out.compare_ticks.iter_mut().zip([shares.a, shares.b, shares.c]) {
+        let on = whole_pulse(share, period_ticks, devices.min_pulse_ticks);
+        *compare = if rising { on } else { period_ticks - on };
+    }
+    out
+}
+
+/// The share of the half for which each upper device is on, 0 ..= 1, with the min-max zero sequence.
+fn on_shares(voltage_v: f32, angle: Angle, udc_v: f32) -> Abc {
+    let direction = angle.sin_cos();
+    let scale = voltage_v / udc_v;
+    let phase = AlphaBeta { alpha: scale * direction.cos, beta: scale * direction.sin }.abc();
+    let high = max(phase.a, max(phase.b, phase.c));
+    let low = -max(-phase.a, max(-phase.b, -phase.c));
+    let centre = 0.5 - 0.5 * (high + low);
+    Abc { a: phase.a + centre, b: phase.b + centre, c: phase.c + centre }
+}
+
+fn max(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
+}
+
+/// The on-time in ticks. A pulse spans two halves, so a half may hold half the shortest pulse; what is shorter is
+/// left out or filled up, whichever is nearer.
+fn whole_pulse(share: f32, period_ticks: u32, min_pulse_ticks: u32) -> u32 {
+    let on = (limit(share, 0.0, 1.0) * period_ticks as f32 + 0.5) as u32;
+    let shortest = min_pulse_ticks.div_ceil(2);
+    if on < shortest {
+        if on * 2 < shortest { 0 } else { shortest.min(period_ticks) }
+    } else if period_ticks - on.min(period_ticks) < shortest {
+        let pause = period_ticks - on.min(period_ticks);
+        if pause * 2 < shortest { period_ticks } else { period_ticks.saturating_sub(shortest) }
+    } else {
+        on.min(period_ticks)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_pulse_is_whole_or_not_there() {
+        for on in 0..=1000_u32 {
+            let got = whole_pulse(on as f32 / 1000.0, 1000, 100);
+            assert!(got == 0 || got == 1000 || (50..=950).contains(&got), "{on} -> {got}");
+            assert!(got.abs_diff(on) <= 25, "{on} -> {got}");
+        }
+    }
+
+    #[test]
+    fn the_zero_sequence_centres_the_three_phases() {
+        let shares = on_shares(866.0, Angle::DEG_30, 1500.0);
+        assert!((shares.a - 1.0).abs() < 1e-3 && shares.c.abs() < 1e-3, "{shares:?}");
+    }
+}

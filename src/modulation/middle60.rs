@@ -1,0 +1,111 @@
+//! Middle-60° modulation and the square wave.
+//!
+//! In each sector of 60° of the pulse angle one phase alone may switch, the one in the middle of its half wave
+//! (order b, a, c, b, a, c from 0°). Each carrier holds one notch of that phase in its middle, of width β; while
+//! it lasts all three phases are at one level and the voltage is zero. A notch spans both halves of its carrier,
+//! and each half sets its own part anew.
+
+use super::{CarrierPeriod, Devices, Mode, Reference};
+use crate::frames::limit;
+
+/// 4 sin 70° + 2 of equation (17): three notches at 70°, 90°, 110°.
+const SEVEN_PULSE_SUM: f32 = 5.758_770_5;
+/// Two of equation (15): one notch at 90°.
+const THREE_PULSE_SUM: f32 = 2.0;
+/// Carrier halves in a sector of 60°, and their width in rad.
+const fn halves_per_sector(mode: Mode) -> u32 {
+    mode.carriers() / 3
+}
+
+/// Loss of the fundamental, as a share of six-step, per sin(β/2).
+pub fn notch_sum(mode: Mode) -> f32 {
+    if matches!(mode, Mode::Mid7) { SEVEN_PULSE_SUM } else { THREE_PULSE_SUM }
+}
+
+/// β/2 in rad for a fundamental of `voltage_v` (peak phase) on a link of `udc_v`: equations (16) and (17), which
+/// are one: `sin(β/2) = (1 − π u/(2 udc)) / sum`. A voltage beyond six-step gives 0.
+pub fn half_notch_rad(mode: Mode, voltage_v: f32, udc_v: f32) -> f32 {
+    let depth = core::f32::consts::FRAC_PI_2 * voltage_v / udc_v;
+    asin_up_to_30_degrees(limit((1.0 - depth) / notch_sum(mode), 0.0, 0.5))
+}
+
+/// asin on 0 ..= 0.5, error below 2e-7 rad (the notch is at most 60° wide, its half 30°).
+fn asin_up_to_30_degrees(x: f32) -> f32 {
+    let z = x * x;
+    let series = ((((4.216_32e-2 * z + 2.418_131_1e-2) * z + 4.547_002_7e-2) * z + 7.495_300_3e-2) * z
+        + 1.666_675_2e-1)
+        * z;
+    x + x * series
+}
+
+/// The levels without a notch in sector `sector` of 60°, and the phase that may switch there.
+fn sector_levels(sector: u32) -> ([bool; 3], usize) {
+    match sector {
+        0 => ([true, false, true], 1),
+        1 => ([true, false, false], 0),
+        2 => ([true, true, false], 2),
+        3 => ([false, true, false], 1),
+        4 => ([false, true, true], 0),
+        _ => ([false, false, true], 2),
+    }
+}
+
+/// A half of a middle-60° carrier, `period_ticks` long.
+pub fn half(mode: Mode, half: u32, period_ticks: u32, seen: &Reference, devices: &Devices) -> CarrierPeriod {
+    let per_sector = halves_per_sector(mode);
+    let (mut levels, switching) = sector_levels(half / per_sector);
+    let half_width_rad = core::f32::consts::FRAC_PI_3 / per_sector as f32;
+    let share = half_notch_rad(mode, seen.voltage_v, seen.udc_v) / half_width_rad;
+    let notch = whole_notch(share, period_ticks, devices.min_pulse_ticks);
+    let mut compare_ticks = [u32::MAX; 3];
+    let opening = half & 1 == 0;
+    if let (Some(compare), Some(level)) = (compare_ticks.get_mut(switching), levels.get_mut(switching)) {
+        if opening {
+            *compare = period_ticks - notch;
+        } else {
+            *compare = notch;
+            *level = !*level;
+        }
+    }
+    CarrierPeriod { period_ticks, compare_ticks, start_levels: levels, ..CarrierPeriod::default() }
+}
+
+/// The notch's part in this half, in ticks: never shorter than half the shortest pulse (the schedule leaves the
+/// mode before that matters), and leaving as much between two notches.
+fn whole_notch(share: f32, period_ticks: u32, min_pulse_ticks: u32) -> u32 {
+    let shortest = min_pulse_ticks.div_ceil(2).min(period_ticks / 2);
+    let notch = (limit(share, 0.0, 1.0) * period_ticks as f32 + 0.5) as u32;
+    notch.max(shortest).min(period_ticks - shortest)
+}
+
+/// A half of the square wave: the sector's levels, no notch.
+pub fn square(half: u32, period_ticks: u32) -> CarrierPeriod {
+    let (start_levels, _) = sector_levels(half / halves_per_sector(Mode::Square));
+    CarrierPeriod { period_ticks, compare_ticks: [u32::MAX; 3], start_levels, ..CarrierPeriod::default() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_arc_sine_keeps_its_documented_error() {
+        for k in 0..=5000 {
+            let x = k as f32 / 10_000.0;
+            let error = f64::from(asin_up_to_30_degrees(x)) - f64::from(x).asin();
+            assert!(error.abs() < 2e-7, "{x} {error}");
+        }
+    }
+
+    #[test]
+    fn notches_follow_equations_16_and_17() {
+        let beta3 = 2.0 * half_notch_rad(Mode::Mid3, 700.0, 1500.0);
+        let exact3 = 2.0 * (0.5 - core::f64::consts::PI * 700.0 / 6000.0).asin();
+        assert!((f64::from(beta3) - exact3).abs() < 1e-6);
+        let beta7 = 2.0 * half_notch_rad(Mode::Mid7, 700.0, 1500.0);
+        let sum = 4.0 * 70_f64.to_radians().sin() + 2.0;
+        let exact7 = 2.0 * ((1.0 - core::f64::consts::PI * 700.0 / 3000.0) / sum).asin();
+        assert!((f64::from(beta7) - exact7).abs() < 1e-6);
+        assert_eq!(half_notch_rad(Mode::Mid3, 2000.0, 1500.0), 0.0);
+    }
+}

@@ -1,0 +1,288 @@
+//! WHICH pulses: the modulator of a two-level inverter.
+//!
+//! Every mode is one carrier with one compare value a phase. The PWM interrupt comes once per carrier half and
+//! describes the half after the running one, as a timer's shadow registers take it: its length, each phase's level at
+//! its start, and the instant at which that level toggles. In the synchronous modes the halves are locked to
+//! the pulse angle (voltage angle + 90°: phase a's reference is the sine of it): the length of each half takes the
+//! carrier to its next boundary angle, so phase errors vanish within a half and nothing accumulates.
+//!
+//! Backward rotation is forward rotation seen in a mirror: the angle changes sign, phases b and c change places.
+
+#![forbid(unsafe_code)]
+
+mod carrier;
+mod middle60;
+mod ripple;
+mod schedule;
+
+use crate::frames::Angle;
+use crate::time::{Clock, Instant};
+
+pub use ripple::ripple_flux;
+pub use schedule::{Schedule, depth_limit};
+
+/// How the pulses are made.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Mode {
+    /// All gates off.
+    #[default]
+    Off,
+    /// Asynchronous SPWM with zero sequence at the highest switching frequency.
+    Async,
+    /// Synchronous, 15 carriers per turn.
+    Sync15,
+    /// Synchronous, 12 carriers per turn.
+    Sync12,
+    /// Middle 60°, 7 pulses: 18 carriers per turn with one notch each.
+    Mid7,
+    /// Middle 60°, 3 pulses: 6 carriers per turn with one notch each.
+    Mid3,
+    /// Square wave: 6 carriers per turn without a notch.
+    Square,
+}
+
+impl Mode {
+    /// Every mode, in the order of its discriminant.
+    pub const ALL: [Self; 7] =
+        [Self::Off, Self::Async, Self::Sync15, Self::Sync12, Self::Mid7, Self::Mid3, Self::Square];
+
+    /// The mode with this discriminant; `Off` for any other number.
+    pub fn from_code(code: u32) -> Self {
+        match Self::ALL.get(code as usize) {
+            Some(mode) => *mode,
+            None => Self::Off,
+        }
+    }
+
+    /// The name in traces and on the command line.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Off => "off",
+            Self::Async => "async",
+            Self::Sync15 => "sync15",
+            Self::Sync12 => "sync12",
+            Self::Mid7 => "mid7",
+            Self::Mid3 => "mid3",
+            Self::Square => "square",
+        }
+    }
+
+    /// Carriers per turn of the pulse angle; 0 where the carrier is not locked to it.
+    pub const fn carriers(self) -> u32 {
+        match self {
+            Self::Off | Self::Async => 0,
+            Self::Sync15 => 15,
+            Self::Sync12 => 12,
+            Self::Mid7 => 18,
+            Self::Mid3 | Self::Square => 6,
+        }
+    }
+
+    /// Whether the mean voltage of each carrier half follows the command: the modes with a triangular carrier.
+    pub const fn is_carrier(self) -> bool {
+        matches!(self, Self::Async | Self::Sync15 | Self::Sync12)
+    }
+}
+
+/// The pulse angle of boundary number `half` of `2 * carriers` halves a turn, rounded to the nearest angle unit.
+fn boundary(half: u32, carriers: u32) -> Angle {
+    let halves = u64::from(carriers.max(1)) * 2;
+    Angle((((u64::from(half) << 32) + halves / 2) / halves) as u32)
+}
+
+/// One interval between two PWM interrupts: one half of a carrier.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct CarrierPeriod {
+    /// Length, in ticks.
+    pub period_ticks: u32,
+    /// Instant after the start at which each phase's level toggles, in ticks; at or beyond `period_ticks`: never.
+    pub compare_ticks: [u32; 3],
+    /// Level at the start of each phase (true: upper device on). Without meaning in [`Mode::Off`].
+    pub start_levels: [bool; 3],
+    /// The mode that made it.
+    pub mode: Mode,
+    /// Number of the half within the turn, for locked modes (in the mirrored turn when turning backward); otherwise
+    /// 0 for the rising and 1 for the falling carrier.
+    pub half: u8,
+}
+
+impl CarrierPeriod {
+    /// All gates off for this long.
+    pub const fn off(period_ticks: u32) -> Self {
+        Self {
+            period_ticks,
+            compare_ticks: [u32::MAX; 3],
+            start_levels: [false; 3],
+            mode: Mode::Off,
+            half: 0,
+        }
+    }
+
+    /// For how many ticks each phase is at the upper level, from `from` ticks after the start to the end.
+    pub fn on_ticks(&self, from: u32) -> [u32; 3] {
+        let mut on = [0; 3];
+        let phases = on.iter_mut().zip(self.compare_ticks).zip(self.start_levels);
+        for ((ticks, compare), level) in phases {
+            let toggle = compare.min(self.period_ticks).max(from);
+            let (before, after) = (toggle.saturating_sub(from), self.period_ticks.saturating_sub(toggle));
+            *ticks = if level { before } else { after };
+        }
+        on
+    }
+
+    /// The boundary's pulse angle at the end of this half, in the mirrored turn when turning backward; `None` for a
+    /// carrier that is not locked.
+    pub fn end_angle(&self) -> Option<Angle> {
+        match self.mode.carriers() {
+            0 => None,
+            carriers => Some(boundary(u32::from(self.half) + 1, carriers)),
+        }
+    }
+}
+
+/// What the modulator is asked for: a fundamental that turns on by itself from one control period to the next.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Reference {
+    /// Fundamental phase voltage, peak, in V.
+    pub voltage_v: f32,
+    /// Angle of the voltage vector at `at`.
+    pub angle: Angle,
+    /// Angle units (2⁻³² turn) per tick by which it turns; negative backward.
+    pub rate: f32,
+    /// The instant of `angle`.
+    pub at: Instant,
+    /// DC-link voltage, in V, greater than zero.
+    pub udc_v: f32,
+    /// Fundamental that the operating point asks for, as a share of the six-step voltage 2 udc/π: chooses the mode.
+    pub depth: f32,
+}
+
+impl Reference {
+    /// The voltage angle at an instant, extrapolated at constant rate.
+    fn angle_at(&self, instant: Instant) -> Angle {
+        let turned = self.rate * instant.since(self.at) as f32;
+        self.angle + Angle(turned as i32 as u32)
+    }
+
+    /// The same fundamental in the mirror: turning forward.
+    fn mirrored(self) -> Self {
+        Self { angle: -self.angle, rate: -self.rate, ..self }
+    }
+}
+
+/// What the inverter's devices ask of every pulse.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Devices {
+    /// Shortest pulse or pause of a device, in ticks, dead time included.
+    pub min_pulse_ticks: u32,
+    /// Dead time between the two devices of a leg, in ticks; the hardware inserts it.
+    pub dead_time_ticks: u32,
+    /// Length of the shortest carrier half, in ticks: half a period of the highest switching frequency.
+    pub shortest_half_ticks: u32,
+}
+
+impl Devices {
+    /// From times in ticks and the highest switching frequency in Hz.
+    pub const fn new(
+        min_pulse_ticks: u32,
+        dead_time_ticks: u32,
+        max_switching_hz: f32,
+        clock: &Clock,
+    ) -> Self {
+        // One tick more than the quotient's whole part: never above the highest frequency.
+        let half = (clock.ticks_per_s / (2.0 * max_switching_hz)) as u32 + 1;
+        Self { min_pulse_ticks, dead_time_ticks, shortest_half_ticks: half }
+    }
+}
+
+/// The modulator's state.
+#[derive(Clone, Copy, Debug)]
+pub struct Modulator {
+    devices: Devices,
+    schedule: Schedule,
+    mode: Mode,
+    /// Number of the half that comes next, in the numbering of [`CarrierPeriod::half`].
+    next_half: u32,
+    mirrored: bool,
+}
+
+/// A locked half may be at most this much shorter or longer than nominal while it catches up with its angle.
+const SHORTEST: f32 = 0.5;
+const LONGEST: f32 = 2.0;
+
+impl Modulator {
+    /// A modulator at rest: its first half is `Off`.
+    pub const fn new(devices: Devices, schedule: Schedule) -> Self {
+        Self { devices, schedule, mode: Mode::Off, next_half: 0, mirrored: false }
+    }
+
+    /// Whether the machine is seen in the mirror, because it turns backward.
+    pub const fn is_mirrored(&self) -> bool {
+        self.mirrored
+    }
+
+    /// The half carrier that begins at `start`; `None` as reference: all gates off.
+    pub fn step(&mut self, start: Instant, reference: Option<&Reference>) -> CarrierPeriod {
+        let Some(reference) = reference else {
+            self.mode = Mode::Off;
+            return CarrierPeriod::off(self.devices.shortest_half_ticks);
+        };
+        self.turn_mirror(reference.rate);
+        let seen = if self.mirrored { reference.mirrored() } else { *reference };
+        let pulse = seen.angle_at(start) + Angle::DEG_90;
+        self.choose_mode(start, pulse, &seen);
+        let mut half = if self.mode == Mode::Async {
+            carrier::asynchronous(self.next_half, start, &seen, &self.devices)
+        } else {
+            self.locked(start, pulse, &seen)
+        };
+        half.mode = self.mode;
+        half.half = self.next_half as u8;
+        let halves = if self.mode == Mode::Async { 2 } else { self.mode.carriers() * 2 };
+        self.next_half = if self.next_half + 1 >= halves { 0 } else { self.next_half + 1 };
+        if self.mirrored {
+            half.compare_ticks.swap(1, 2);
+            half.start_levels.swap(1, 2);
+        }
+        half
+    }
+
+    /// The mirror follows the sign of rotation, but only where the carrier is not locked to the angle.
+    fn turn_mirror(&mut self, rate: f32) {
+        if matches!(self.mode, Mode::Off | Mode::Async) {
+            self.mirrored = rate < 0.0;
+        }
+    }
+
+    fn choose_mode(&mut self, start: Instant, pulse: Angle, seen: &Reference) {
+        let wanted = self.schedule.wanted(start, self.mode, seen, &self.devices);
+        if wanted == self.mode || !schedule::may_switch(self.mode, wanted, self.next_half) {
+            return;
+        }
+        self.next_half = schedule::first_half(self.mode, wanted, self.next_half, pulse);
+        self.mode = wanted;
+        self.schedule.switched(start);
+    }
+
+    /// One half of a carrier that is locked to the pulse angle.
+    fn locked(&self, start: Instant, pulse: Angle, seen: &Reference) -> CarrierPeriod {
+        let carriers = self.mode.carriers();
+        let end = boundary(self.next_half + 1, carriers);
+        let nominal = boundary(1, carriers).0 as f32 / seen.rate;
+        let wanted = (end - pulse).signed() as f32 / seen.rate;
+        let period = crate::frames::limit(wanted, SHORTEST * nominal, LONGEST * nominal);
+        // Slower than the async mode's range there is nothing to lock to: the length stays that of a stopped carrier.
+        let longest = self.devices.shortest_half_ticks * 4;
+        let period_ticks = ((period + 0.5) as u32).clamp(1, longest);
+        match self.mode {
+            Mode::Sync15 | Mode::Sync12 => {
+                carrier::synchronous(self.next_half, start, period_ticks, seen, &self.devices)
+            }
+            Mode::Mid7 | Mode::Mid3 => {
+                middle60::half(self.mode, self.next_half, period_ticks, seen, &self.devices)
+            }
+            _ => middle60::square(self.next_half, period_ticks),
+        }
+    }
+}

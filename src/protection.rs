@@ -1,0 +1,209 @@
+//! Faults, limits, and the safe state.
+//!
+//! A fault is named, latched with the value and the limit that it broke, and puts the gates into the safe state in the
+//! very interrupt that finds it.
+
+#![forbid(unsafe_code)]
+
+use crate::control::Measurements;
+use crate::frames::{Abc, SQRT_3};
+use crate::machine::Ratings;
+use crate::time::Instant;
+
+/// Why the drive tripped.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Fault {
+    /// A phase current above its trip level, in A.
+    Overcurrent = 1,
+    /// DC link above its trip level, in V.
+    DcOvervoltage,
+    /// DC link below its trip level, in V.
+    DcUndervoltage,
+    /// Rotor faster than its trip level, in mechanical rad/s.
+    Overspeed,
+    /// The three phase currents do not add up to zero, in A.
+    PhaseSum,
+    /// A measurement or a result is NaN or infinite.
+    NotFinite,
+    /// Measurements repeat themselves to the last bit although current flows or the rotor turns, in control periods.
+    Frozen,
+    /// The control interrupt ended after its period, in s.
+    ControlDeadline,
+    /// The newest voltage command is too old, in s.
+    StaleCommand,
+}
+
+impl Fault {
+    const ALL: [Self; 9] = [
+        Self::Overcurrent,
+        Self::DcOvervoltage,
+        Self::DcUndervoltage,
+        Self::Overspeed,
+        Self::PhaseSum,
+        Self::NotFinite,
+        Self::Frozen,
+        Self::ControlDeadline,
+        Self::StaleCommand,
+    ];
+
+    /// The fault with this code; `None` for 0 or an unknown number.
+    pub fn from_code(code: u32) -> Option<Self> {
+        Self::ALL.get((code as usize).wrapping_sub(1)).copied()
+    }
+
+    /// The name in traces.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Overcurrent => "overcurrent",
+            Self::DcOvervoltage => "dc_overvoltage",
+            Self::DcUndervoltage => "dc_undervoltage",
+            Self::Overspeed => "overspeed",
+            Self::PhaseSum => "phase_sum",
+            Self::NotFinite => "not_finite",
+            Self::Frozen => "frozen",
+            Self::ControlDeadline => "control_deadline",
+            Self::StaleCommand => "stale_command",
+        }
+    }
+}
+
+/// A fault with its circumstances.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Trip {
+    /// What happened.
+    pub fault: Fault,
+    /// The value that broke the limit, in the fault's unit.
+    pub value: f32,
+    /// The limit, in the same unit.
+    pub limit: f32,
+    /// When it was measured.
+    pub at: Instant,
+    /// What was done with the gates.
+    pub safe: SafeState,
+}
+
+/// The inverter's two safe states.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum SafeState {
+    /// All gates off.
+    GatesOff,
+    /// The three lower devices on: the machine's short-circuit current stays inside its limit, and its EMF does not
+    /// reach the link through the diodes.
+    ShortCircuit,
+}
+
+/// Margin below the speed where the diodes begin to rectify.
+const RECTIFYING_MARGIN: f32 = 0.9;
+
+/// The safe state for an electrical angular speed in rad/s: gates off below `0.9 udc/(√3 ψ_f)`, short circuit above. What is not
+/// finite counts as slow, because a short circuit at speed zero would be safe as well, but open gates need no gate supply.
+pub fn safe_state(omega: f32, udc_v: f32, ratings: &Ratings) -> SafeState {
+    if omega.abs() * SQRT_3 * ratings.magnet_flux_wb > RECTIFYING_MARGIN * udc_v {
+        SafeState::ShortCircuit
+    } else {
+        SafeState::GatesOff
+    }
+}
+
+/// Share of the largest current that the sum of the phases may reach.
+const PHASE_SUM_SHARE: f32 = 0.1;
+
+/// The first limit that a fault breaks, with its value: (fault, value, limit).
+pub type Violation = (Fault, f32, f32);
+
+/// Phase currents alone, as both interrupts sample them.
+pub fn check_currents(currents_a: &Abc, ratings: &Ratings) -> Option<Violation> {
+    let sum = currents_a.a + currents_a.b + currents_a.c;
+    if !sum.is_finite() {
+        return Some((Fault::NotFinite, sum, f32::MAX));
+    }
+    let peak = currents_a.peak();
+    if peak > ratings.trip_current_a {
+        return Some((Fault::Overcurrent, peak, ratings.trip_current_a));
+    }
+    let sum_limit = PHASE_SUM_SHARE * ratings.max_current_a;
+    if sum.abs() > sum_limit {
+        return Some((Fault::PhaseSum, sum, sum_limit));
+    }
+    None
+}
+
+/// Everything the control interrupt measures; `omega` electrical, in rad/s.
+pub fn check_measurements(measured: &Measurements, omega: f32, ratings: &Ratings) -> Option<Violation> {
+    let udc = measured.udc_v;
+    if !udc.is_finite() {
+        return Some((Fault::NotFinite, udc, f32::MAX));
+    }
+    if let Some(violation) = check_currents(&measured.currents_a, ratings) {
+        return Some(violation);
+    }
+    if udc > ratings.trip_dc_over_v {
+        return Some((Fault::DcOvervoltage, udc, ratings.trip_dc_over_v));
+    }
+    if udc < ratings.trip_dc_under_v {
+        return Some((Fault::DcUndervoltage, udc, ratings.trip_dc_under_v));
+    }
+    let mechanical = omega.abs() / ratings.pole_pairs;
+    if mechanical > ratings.trip_speed_rad_s {
+        return Some((Fault::Overspeed, mechanical, ratings.trip_speed_rad_s));
+    }
+    None
+}
+
+/// Control periods for which a measurement may repeat to the last bit.
+const FROZEN_PERIODS: u32 = 20;
+/// Share of the largest current above which a current that never changes is suspicious.
+const FROZEN_CURRENT_SHARE: f32 = 0.05;
+/// Angle units that the rotor must have turned, by its last known speed, before an unmoving angle is suspicious.
+const FROZEN_TURN_RAD: f32 = 0.2;
+
+/// Looks for measurements that no longer move.
+#[derive(Clone, Copy, Debug)]
+pub struct FrozenWatch {
+    last: Option<Measurements>,
+    currents_for: u32,
+    angle_for: u32,
+    turned_rad: f32,
+}
+
+impl FrozenWatch {
+    /// Nothing seen yet.
+    pub const fn new() -> Self {
+        Self { last: None, currents_for: 0, angle_for: 0, turned_rad: 0.0 }
+    }
+
+    /// One control period; `omega` is the electrical speed before this sample, in rad/s. Call it while pulses are made.
+    pub fn check(
+        &mut self,
+        measured: &Measurements,
+        omega: f32,
+        period_s: f32,
+        ratings: &Ratings,
+    ) -> Option<Violation> {
+        let last = self.last.replace(*measured)?;
+        let flowing = measured.currents_a.peak() > FROZEN_CURRENT_SHARE * ratings.max_current_a;
+        let same_currents = last.currents_a == measured.currents_a;
+        self.currents_for = if flowing && same_currents { self.currents_for + 1 } else { 0 };
+        if last.angle == measured.angle {
+            self.angle_for += 1;
+            self.turned_rad += omega.abs() * period_s;
+        } else {
+            self.angle_for = 0;
+            self.turned_rad = 0.0;
+        }
+        let frozen_angle = self.turned_rad > FROZEN_TURN_RAD;
+        let periods = if frozen_angle { self.angle_for } else { self.currents_for };
+        if frozen_angle || self.currents_for >= FROZEN_PERIODS {
+            return Some((Fault::Frozen, periods as f32, FROZEN_PERIODS as f32));
+        }
+        None
+    }
+}
+
+impl Default for FrozenWatch {
+    fn default() -> Self {
+        Self::new()
+    }
+}

@@ -1,0 +1,64 @@
+//! Time in whole ticks of the timers' clock. Instants wrap; differences of instants less than half the range
+//! apart (86 s at 25 MHz) do not.
+
+#![forbid(unsafe_code)]
+
+/// An instant, in ticks of the timers' clock, modulo 2³².
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Instant(pub u32);
+
+impl Instant {
+    /// This instant plus a number of ticks.
+    #[inline]
+    pub fn after(self, ticks: u32) -> Self {
+        Self(self.0.wrapping_add(ticks))
+    }
+
+    /// This instant minus a number of ticks.
+    #[inline]
+    pub fn before(self, ticks: u32) -> Self {
+        Self(self.0.wrapping_sub(ticks))
+    }
+
+    /// Ticks from `earlier` to this instant; negative when `earlier` is later.
+    #[inline]
+    pub fn since(self, earlier: Self) -> i32 {
+        self.0.wrapping_sub(earlier.0) as i32
+    }
+
+    /// Whether this instant is `other` or later.
+    #[inline]
+    pub fn reached(self, other: Self) -> bool {
+        self.since(other) >= 0
+    }
+}
+
+/// The clock both timers count, and the control timer's period on it.
+#[derive(Clone, Copy, Debug)]
+pub struct Clock {
+    /// Length of one tick, in s.
+    pub tick_s: f32,
+    /// Ticks per second, in Hz.
+    pub ticks_per_s: f32,
+    /// Period of the control timer, in ticks.
+    pub control_ticks: u32,
+}
+
+impl Clock {
+    /// A clock of `hz` ticks per second with control at every `control_ticks`.
+    pub const fn new(hz: u32, control_ticks: u32) -> Self {
+        Self { tick_s: 1.0 / hz as f32, ticks_per_s: hz as f32, control_ticks }
+    }
+
+    /// A number of ticks, in s.
+    #[inline]
+    pub fn seconds(&self, ticks: i32) -> f32 {
+        ticks as f32 * self.tick_s
+    }
+
+    /// The control timer's period, in s.
+    #[inline]
+    pub fn control_s(&self) -> f32 {
+        self.seconds(self.control_ticks as i32)
+    }
+}

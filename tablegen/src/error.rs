@@ -1,0 +1,23 @@
+//! What is wrong with a machine folder, in one line.
+
+use std::path::{Path, PathBuf};
+
+/// A refusal: file, line, field, value, and what is allowed.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("{}{}: {problem}", file.display(), line.map_or(String::new(), |line| format!(":{line}")))]
+pub struct InputError {
+    /// The file.
+    pub file: PathBuf,
+    /// The line, from 1, where there is one.
+    pub line: Option<u64>,
+    /// Field, value and what is allowed.
+    pub problem: String,
+}
+
+impl InputError {
+    pub(crate) fn new(file: &Path, line: Option<u64>, problem: impl Into<String>) -> Self {
+        // One line, whatever a parser's message looks like.
+        let problem = problem.into().split_whitespace().collect::<Vec<_>>().join(" ");
+        Self { file: file.to_owned(), line, problem }
+    }
+}

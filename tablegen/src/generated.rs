@@ -1,0 +1,271 @@
+//! The tables, as numbers.
+
+use crate::weakening::circle;
+use crate::{FluxMap, InputError, MachineFolder, Optimum, Parameters, SmoothMap};
+
+/// An even axis: first value, step, number of nodes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Axis {
+    /// Value of the first node.
+    pub first: f32,
+    /// Nodes per unit.
+    pub inverse_step: f32,
+    /// Number of nodes.
+    pub count: usize,
+}
+
+impl Axis {
+    fn new(first: f64, last: f64, count: usize) -> Self {
+        Self { first: first as f32, inverse_step: ((count - 1) as f64 / (last - first)) as f32, count }
+    }
+}
+
+/// The scalars of the target's `Ratings`, in its units; the fields mean what they mean there.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[allow(missing_docs, reason = "documented at the target's `Ratings`, field by field")]
+pub struct RatingsF32 {
+    pub pole_pairs: f32,
+    pub stator_resistance_ohm: f32,
+    pub max_torque_nm: f32,
+    pub max_power_w: f32,
+    pub max_current_a: f32,
+    pub max_speed_rad_s: f32,
+    pub magnet_flux_wb: f32,
+    pub dc_link_min_v: f32,
+    pub dc_link_nominal_v: f32,
+    pub dc_link_max_v: f32,
+    pub max_switching_hz: f32,
+    pub trip_current_a: f32,
+    pub trip_dc_over_v: f32,
+    pub trip_dc_under_v: f32,
+    pub trip_speed_rad_s: f32,
+    pub torque_slew_nm_s: f32,
+}
+
+/// All tables of a machine; see the target's `machine` module for their meaning.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Generated {
+    /// Name of the machine.
+    pub name: String,
+    /// Ratings.
+    pub ratings: RatingsF32,
+    /// Axes of the flux and parameter grids: id, |iq|, in A.
+    pub current_axes: (Axis, Axis),
+    /// `[psi_d, psi_q]`, in Wb, row-major.
+    pub flux: Vec<[f32; 2]>,
+    /// `[psi_f, L_q − L_d]`, in Wb and H, row-major.
+    pub parameters: Vec<[f32; 2]>,
+    /// `−i_dn/s` over `s/(1+s)`.
+    pub universal: Vec<[f32; 1]>,
+    /// Axis of `start`: |T|, in N·m.
+    pub torque_axis: Axis,
+    /// `[id, iq, id trim, iq trim]`, in A.
+    pub start: Vec<[f32; 4]>,
+    /// Axes of `weakening`: |psi| in Wb, s.
+    pub weakening_axes: (Axis, Axis),
+    /// `[id, iq]`, in A, row-major.
+    pub weakening: Vec<[f32; 2]>,
+    /// `[T_circle, T_limit]`, in N·m, over |psi|.
+    pub weakening_torque: Vec<[f32; 2]>,
+}
+
+/// Nodes of the universal curve.
+const UNIVERSAL_NODES: usize = 65;
+/// Nodes of the torque axis: 10 N·m apart for the reference machine.
+const TORQUE_NODES: usize = 125;
+/// Nodes of the weakening tables.
+const PSI_NODES: usize = 81;
+const SHARE_NODES: usize = 33;
+/// Least magnet flux and saliency of the MTPA parameters, as shares of flux and inductance at full torque.
+const REGULAR_SHARE: f64 = 0.02;
+
+impl Generated {
+    /// Makes the tables.
+    ///
+    /// # Errors
+    /// None that [`MachineFolder::read`] has not refused already; kept for maps whose optimum cannot be tabulated.
+    pub fn new(machine: &MachineFolder) -> Result<Self, InputError> {
+        let MachineFolder { parameters, map } = machine;
+        let smooth = SmoothMap::new(map);
+        let optimum = Optimum::new(&smooth, parameters);
+        let half = Half::new(map);
+        let top = optimum.least_current(parameters.max_torque_nm);
+        let top_flux = smooth.at(top.0, top.1);
+        let regular = Regular {
+            psi_f_wb: REGULAR_SHARE * top_flux.psi_d_wb.hypot(top_flux.psi_q_wb),
+            saliency_h: REGULAR_SHARE * top_flux.psi_q_wb.abs() / top.1.abs().max(1e-9),
+        };
+        let grid = ParameterGrid::new(&half, &smooth, &regular);
+        let universal = universal();
+        let factor = 1.5 * f64::from(parameters.pole_pairs);
+        let start = (0..TORQUE_NODES)
+            .map(|k| {
+                let torque = parameters.max_torque_nm * k as f64 / (TORQUE_NODES - 1) as f64;
+                let best = optimum.least_current(torque);
+                let passed = grid.two_passes(torque / factor, best, &universal);
+                [best.0, best.1, best.0 - passed.0, best.1 - passed.1].map(|value| value as f32)
+            })
+            .collect();
+        let (weakening_axes, weakening, weakening_torque) =
+            weakening(machine, &smooth, top_flux.psi_d_wb.hypot(top_flux.psi_q_wb));
+        Ok(Self {
+            name: parameters.name.clone(),
+            ratings: ratings(parameters, smooth.at(0.0, 0.0).psi_d_wb),
+            current_axes: (
+                Axis::new(map.id_a[0], map.id_a[map.id_a.len() - 1], map.id_a.len()),
+                Axis::new(0.0, half.iq_a[half.iq_a.len() - 1], half.iq_a.len()),
+            ),
+            flux: half.nodes.iter().map(|(d, q)| [*d as f32, *q as f32]).collect(),
+            parameters: grid.nodes.iter().map(|(psi, saliency)| [*psi as f32, *saliency as f32]).collect(),
+            universal: universal.iter().map(|value| [*value as f32]).collect(),
+            torque_axis: Axis::new(0.0, parameters.max_torque_nm, TORQUE_NODES),
+            start,
+            weakening_axes,
+            weakening,
+            weakening_torque,
+        })
+    }
+}
+
+/// The half of the map with iq ≥ 0.
+struct Half {
+    id_a: Vec<f64>,
+    iq_a: Vec<f64>,
+    nodes: Vec<(f64, f64)>,
+}
+
+impl Half {
+    fn new(map: &FluxMap) -> Self {
+        let columns = map.iq_a.len();
+        let centre = columns / 2;
+        let nodes = (0..map.id_a.len())
+            .flat_map(|r| (centre..columns).map(move |c| r * columns + c))
+            .map(|k| (map.psi_d_wb[k], map.psi_q_wb[k]))
+            .collect();
+        Self { id_a: map.id_a.clone(), iq_a: map.iq_a[centre..].to_vec(), nodes }
+    }
+}
+
+/// Least values of the parameters, so that nothing divides by zero.
+struct Regular {
+    psi_f_wb: f64,
+    saliency_h: f64,
+}
+
+/// ψ_f(iq) = ψd(0, iq) and L_q − L_d over the grid.
+struct ParameterGrid {
+    id_a: Vec<f64>,
+    iq_a: Vec<f64>,
+    nodes: Vec<(f64, f64)>,
+}
+
+impl ParameterGrid {
+    fn new(half: &Half, smooth: &SmoothMap, regular: &Regular) -> Self {
+        let (mut nodes, columns) = (Vec::with_capacity(half.nodes.len()), half.iq_a.len());
+        for (r, id) in half.id_a.iter().enumerate() {
+            for (c, iq) in half.iq_a.iter().enumerate() {
+                let (psi_d, psi_q) = half.nodes[r * columns + c];
+                let here = smooth.at(*id, *iq);
+                let psi_f = smooth.at(0.0, *iq).psi_d_wb;
+                let ld = if *id == 0.0 { here.ldd_h } else { (psi_d - psi_f) / id };
+                let lq = if *iq == 0.0 { here.lqq_h } else { psi_q / iq };
+                nodes.push((psi_f.max(regular.psi_f_wb), (lq - ld).max(regular.saliency_h)));
+            }
+        }
+        Self { id_a: half.id_a.clone(), iq_a: half.iq_a.clone(), nodes }
+    }
+
+    fn bilinear(&self, id: f64, iq: f64) -> (f64, f64) {
+        let place = |axis: &[f64], value: f64| {
+            let position = (value - axis[0]) / (axis[1] - axis[0]);
+            let cell = (position.max(0.0) as usize).min(axis.len() - 2);
+            (cell, position - cell as f64)
+        };
+        let ((r, x), (c, y)) = (place(&self.id_a, id), place(&self.iq_a, iq));
+        let node = |dr: usize, dc: usize| self.nodes[(r + dr) * self.iq_a.len() + c + dc];
+        let mix = |part: fn((f64, f64)) -> f64| {
+            let (a, b, d, e) = (part(node(0, 0)), part(node(0, 1)), part(node(1, 0)), part(node(1, 1)));
+            (a + (b - a) * y) * (1.0 - x) + (d + (e - d) * y) * x
+        };
+        (mix(|node| node.0), mix(|node| node.1))
+    }
+
+    /// What the firmware does, without trims: two passes from `start` for `torque / (1.5 n_p)`.
+    fn two_passes(&self, torque_per_factor: f64, start: (f64, f64), universal: &[f64]) -> (f64, f64) {
+        let mut current = start;
+        for _ in 0..2 {
+            let (psi_f, saliency) = self.bilinear(current.0, current.1);
+            let root = (torque_per_factor * saliency).sqrt() / psi_f;
+            let position = root / (1.0 + root) * (universal.len() - 1) as f64;
+            let cell = (position as usize).min(universal.len() - 2);
+            let share = universal[cell] + (universal[cell + 1] - universal[cell]) * (position - cell as f64);
+            let id = -(psi_f / saliency) * root * share;
+            current = (id, torque_per_factor / (psi_f - saliency * id));
+        }
+        current
+    }
+}
+
+/// `−i_dn/s` with `s⁴ = t_en² = i_dn (i_dn − 1)³`, over `x = s/(1+s)`.
+fn universal() -> Vec<f64> {
+    (0..UNIVERSAL_NODES)
+        .map(|k| {
+            let x = k as f64 / (UNIVERSAL_NODES - 1) as f64;
+            if k == 0 || k == UNIVERSAL_NODES - 1 {
+                return x;
+            }
+            let s = x / (1.0 - x);
+            // With i = −i_dn: i (1 + i)³ = s⁴, and i < s.
+            let (mut low, mut high) = (0.0, s);
+            for _ in 0..200 {
+                let i = 0.5 * (low + high);
+                if i * (1.0 + i).powi(3) < s.powi(4) { low = i } else { high = i }
+            }
+            0.5 * (low + high) / s
+        })
+        .collect()
+}
+
+type WeakeningTables = ((Axis, Axis), Vec<[f32; 2]>, Vec<[f32; 2]>);
+
+fn weakening(machine: &MachineFolder, smooth: &SmoothMap, top_flux_wb: f64) -> WeakeningTables {
+    let parameters = &machine.parameters;
+    let max_omega =
+        parameters.max_speed_rpm * std::f64::consts::TAU / 60.0 * f64::from(parameters.pole_pairs);
+    // Below what the lowest link gives at the highest speed, and above what full torque needs.
+    let low = 0.8 * std::f64::consts::FRAC_2_PI * parameters.dc_link_min_v / max_omega;
+    let high = (1.15 * top_flux_wb).max(1.5 * low);
+    let last = (SHARE_NODES - 1) as f64;
+    let shares: Vec<_> = (0..SHARE_NODES).map(|k| 1.0 - (1.0 - k as f64 / last).powi(2)).collect();
+    let (mut currents, mut torque, mut most) = (Vec::new(), Vec::new(), 0.0_f64);
+    for k in 0..PSI_NODES {
+        let psi = low + (high - low) * k as f64 / (PSI_NODES - 1) as f64;
+        let circle = circle(psi, &shares, smooth, &machine.map, parameters);
+        most = most.max(circle.torque_nm);
+        currents.extend(circle.currents_a.iter().map(|(id, iq)| [*id as f32, *iq as f32]));
+        torque.push([circle.torque_nm as f32, most as f32]);
+    }
+    ((Axis::new(low, high, PSI_NODES), Axis::new(0.0, 1.0, SHARE_NODES)), currents, torque)
+}
+
+fn ratings(parameters: &Parameters, magnet_flux_wb: f64) -> RatingsF32 {
+    let rad_s = std::f64::consts::TAU / 60.0;
+    RatingsF32 {
+        pole_pairs: parameters.pole_pairs as f32,
+        stator_resistance_ohm: parameters.stator_resistance_ohm as f32,
+        max_torque_nm: parameters.max_torque_nm as f32,
+        max_power_w: parameters.max_power_w as f32,
+        max_current_a: parameters.max_current_a as f32,
+        max_speed_rad_s: (parameters.max_speed_rpm * rad_s) as f32,
+        magnet_flux_wb: magnet_flux_wb.max(0.0) as f32,
+        dc_link_min_v: parameters.dc_link_min_v as f32,
+        dc_link_nominal_v: parameters.dc_link_nominal_v as f32,
+        dc_link_max_v: parameters.dc_link_max_v as f32,
+        max_switching_hz: parameters.max_switching_hz as f32,
+        trip_current_a: parameters.trip_current_a as f32,
+        trip_dc_over_v: parameters.trip_dc_over_v as f32,
+        trip_dc_under_v: parameters.trip_dc_under_v as f32,
+        trip_speed_rad_s: (parameters.trip_speed_rpm * rad_s) as f32,
+        torque_slew_nm_s: parameters.torque_slew_nm_per_s as f32,
+    }
+}

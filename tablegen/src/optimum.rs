@@ -1,0 +1,75 @@
+//! The true optimum on the smooth map: the least current for a torque.
+
+use crate::{Parameters, SmoothMap};
+
+/// Searches on the smooth map.
+pub struct Optimum<'a> {
+    map: &'a SmoothMap,
+    factor: f64,
+    max_current_a: f64,
+}
+
+/// Golden-section steps: 0.618⁶⁰ of the interval is below 1e-12 of it.
+const SECTIONS: u32 = 60;
+/// Bisections.
+const HALVINGS: u32 = 80;
+
+impl<'a> Optimum<'a> {
+    /// For a machine.
+    pub fn new(map: &'a SmoothMap, parameters: &Parameters) -> Self {
+        Self { map, factor: 1.5 * f64::from(parameters.pole_pairs), max_current_a: parameters.max_current_a }
+    }
+
+    /// Air-gap torque at a current, in N·m.
+    pub fn torque_nm(&self, id_a: f64, iq_a: f64) -> f64 {
+        let at = self.map.at(id_a, iq_a);
+        self.factor * (at.psi_d_wb * iq_a - at.psi_q_wb * id_a)
+    }
+
+    /// The most torque of a current magnitude, and its angle from the q axis towards −d, in rad.
+    fn at_magnitude(&self, current_a: f64) -> (f64, f64) {
+        let torque = |angle: f64| self.torque_nm(-current_a * angle.sin(), current_a * angle.cos());
+        // The optimum may lie slightly on the other side of the q axis for a machine with L_d > L_q.
+        let angle = largest(-0.5, std::f64::consts::FRAC_PI_2, torque);
+        (torque(angle), angle)
+    }
+
+    /// The most torque within the largest current, in N·m.
+    pub fn most_torque_nm(&self) -> f64 {
+        self.at_magnitude(self.max_current_a).0
+    }
+
+    /// The least current (id, iq), in A, for a torque in N·m from 0 to [`Optimum::most_torque_nm`].
+    pub fn least_current(&self, torque_nm: f64) -> (f64, f64) {
+        if torque_nm <= 0.0 {
+            return (0.0, 0.0);
+        }
+        let (mut low, mut high) = (0.0, 1.05 * self.max_current_a);
+        for _ in 0..HALVINGS {
+            let middle = 0.5 * (low + high);
+            if self.at_magnitude(middle).0 < torque_nm { low = middle } else { high = middle }
+        }
+        let (_, angle) = self.at_magnitude(high);
+        (-high * angle.sin(), high * angle.cos())
+    }
+}
+
+/// Where a function of one hump is largest.
+fn largest(low: f64, high: f64, value: impl Fn(f64) -> f64) -> f64 {
+    const RATIO: f64 = 0.618_033_988_749_894_9;
+    let (mut a, mut b) = (low, high);
+    let (mut x, mut y) = (b - RATIO * (b - a), a + RATIO * (b - a));
+    let (mut fx, mut fy) = (value(x), value(y));
+    for _ in 0..SECTIONS {
+        if fx > fy {
+            (b, y, fy) = (y, x, fx);
+            x = b - RATIO * (b - a);
+            fx = value(x);
+        } else {
+            (a, x, fx) = (x, y, fy);
+            y = a + RATIO * (b - a);
+            fy = value(y);
+        }
+    }
+    0.5 * (a + b)
+}

@@ -1,0 +1,265 @@
+//! `machine.toml`: ratings, limits, losses.
+
+use crate::InputError;
+use std::collections::BTreeMap;
+use std::path::Path;
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+/// The keys of `machine.toml`, with defaults filled in. SI units; currents and voltages of phases are peak values.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Parameters {
+    /// Name of the machine.
+    pub name: String,
+    /// Pole pairs.
+    pub pole_pairs: u32,
+    /// Stator resistance of a phase, in ohm.
+    pub stator_resistance_ohm: f64,
+    /// Largest torque, in N·m.
+    pub max_torque_nm: f64,
+    /// Largest mechanical power, in W.
+    pub max_power_w: f64,
+    /// Largest current, peak, in A.
+    pub max_current_a: f64,
+    /// Largest speed, in r/min.
+    pub max_speed_rpm: f64,
+    /// Rated torque, in N·m.
+    pub rated_torque_nm: f64,
+    /// Rated speed, in r/min.
+    pub rated_speed_rpm: f64,
+    /// Lowest DC-link voltage in normal operation, in V.
+    pub dc_link_min_v: f64,
+    /// Nominal DC-link voltage, in V.
+    pub dc_link_nominal_v: f64,
+    /// Highest DC-link voltage in normal operation, in V.
+    pub dc_link_max_v: f64,
+    /// Highest switching frequency of a device, in Hz.
+    pub max_switching_hz: f64,
+    /// Phase current that trips the drive, in A; default 1.3 × `max_current_a`.
+    pub trip_current_a: f64,
+    /// DC-link voltage above which the drive trips, in V; default 1.15 × `dc_link_max_v`.
+    pub trip_dc_over_v: f64,
+    /// DC-link voltage below which the drive trips, in V; default 0.85 × `dc_link_min_v`.
+    pub trip_dc_under_v: f64,
+    /// Speed above which the drive trips, in r/min; default 1.1 × `max_speed_rpm`.
+    pub trip_speed_rpm: f64,
+    /// Slew rate of the torque demand, in N·m/s; default `max_torque_nm` in 0.1 s.
+    pub torque_slew_nm_per_s: f64,
+    /// Inertia of the rotor and what it drives, in kg·m²; default 1.
+    pub rotor_inertia_kg_m2: f64,
+    /// Iron and mechanical loss at rated speed, in W; default 0.
+    pub loss_rated_w: f64,
+    /// Share of that loss that grows with the square of speed, 0 ..= 1; the rest is linear. Default 0.6.
+    pub loss_quadratic_fraction: f64,
+    lines: BTreeMap<String, u64>,
+}
+
+impl Parameters {
+    /// Iron and mechanical loss at a speed, in W: `P = P_rated (f (n/n_rated)² + (1 − f) n/n_rated)`.
+    pub fn speed_loss_w(&self, speed_rpm: f64) -> f64 {
+        let relative = speed_rpm.abs() / self.rated_speed_rpm;
+        let quadratic = self.loss_quadratic_fraction;
+        self.loss_rated_w * (quadratic * relative * relative + (1.0 - quadratic) * relative)
+    }
+
+    /// Reads and checks the file.
+    ///
+    /// # Errors
+    /// Names the line, the key, its value and what is allowed.
+    pub fn read(file: &Path) -> Result<Self, InputError> {
+        let text = std::fs::read_to_string(file)
+            .map_err(|error| InputError::new(file, None, format!("cannot be read: {error}")))?;
+        let table = DeTable::parse(&text).map_err(|error| {
+            let line = error.span().map(|span| line_at(&text, span.start));
+            InputError::new(file, line, format!("not TOML: {}", error.message()))
+        })?;
+        let mut keys = Keys::new(file, &text, table.into_inner())?;
+        let parameters = keys.parameters()?;
+        parameters.check(file)?;
+        Ok(parameters)
+    }
+
+    /// The line of a key, if the file has it.
+    pub(crate) fn line_of(&self, key: &str) -> Option<u64> {
+        self.lines.get(key).copied()
+    }
+
+    /// Limits that contradict each other.
+    fn check(&self, file: &Path) -> Result<(), InputError> {
+        let rated_power_w = self.rated_torque_nm * self.rated_speed_rpm * std::f64::consts::TAU / 60.0;
+        let full_power_w = self.max_torque_nm * self.max_speed_rpm * std::f64::consts::TAU / 60.0;
+        let orders = [
+            ("rated_torque_nm", self.rated_torque_nm, "max_torque_nm", self.max_torque_nm, true),
+            ("rated_speed_rpm", self.rated_speed_rpm, "max_speed_rpm", self.max_speed_rpm, true),
+            ("dc_link_min_v", self.dc_link_min_v, "dc_link_nominal_v", self.dc_link_nominal_v, true),
+            ("dc_link_nominal_v", self.dc_link_nominal_v, "dc_link_max_v", self.dc_link_max_v, true),
+            ("dc_link_max_v", self.dc_link_max_v, "trip_dc_over_v", self.trip_dc_over_v, false),
+            ("trip_dc_under_v", self.trip_dc_under_v, "dc_link_min_v", self.dc_link_min_v, false),
+            ("max_current_a", self.max_current_a, "trip_current_a", self.trip_current_a, false),
+            ("max_speed_rpm", self.max_speed_rpm, "trip_speed_rpm", self.trip_speed_rpm, false),
+            // 1 % because ratings are rounded.
+            (
+                "power of rated_torque_nm at rated_speed_rpm",
+                rated_power_w,
+                "max_power_w",
+                self.max_power_w * 1.01,
+                true,
+            ),
+            (
+                "max_power_w",
+                self.max_power_w,
+                "power of max_torque_nm at max_speed_rpm",
+                full_power_w * 1.01,
+                true,
+            ),
+        ];
+        for (low_name, low, high_name, high, may_be_equal) in orders {
+            if low > high || (low == high && !may_be_equal) {
+                let relation = if may_be_equal { "at most" } else { "below" };
+                let line = self.line_of(low_name).or_else(|| self.line_of(high_name));
+                return Err(InputError::new(
+                    file,
+                    line,
+                    format!("{low_name}: {low}: must be {relation} {high_name}, {high}"),
+                ));
+            }
+        }
+        Ok(())
+    }
+}
+
+const REQUIRED: [&str; 13] = [
+    "name",
+    "pole_pairs",
+    "stator_resistance_ohm",
+    "max_torque_nm",
+    "max_power_w",
+    "max_current_a",
+    "max_speed_rpm",
+    "rated_torque_nm",
+    "rated_speed_rpm",
+    "dc_link_min_v",
+    "dc_link_nominal_v",
+    "dc_link_max_v",
+    "max_switching_hz",
+];
+const OPTIONAL: [&str; 8] = [
+    "trip_current_a",
+    "trip_dc_over_v",
+    "trip_dc_under_v",
+    "trip_speed_rpm",
+    "torque_slew_nm_per_s",
+    "rotor_inertia_kg_m2",
+    "loss_rated_w",
+    "loss_quadratic_fraction",
+];
+
+/// The file's keys with their lines.
+struct Keys<'a> {
+    file: &'a Path,
+    values: BTreeMap<String, (DeValue<'a>, u64)>,
+}
+
+impl<'a> Keys<'a> {
+    fn new(file: &'a Path, text: &str, table: DeTable<'a>) -> Result<Self, InputError> {
+        let mut values = BTreeMap::new();
+        for (key, value) in table {
+            let line = line_at(text, Spanned::span(&key).start);
+            let name = key.into_inner().into_owned();
+            if !REQUIRED.contains(&name.as_str()) && !OPTIONAL.contains(&name.as_str()) {
+                return Err(InputError::new(file, Some(line), unknown(&name)));
+            }
+            values.insert(name, (value.into_inner(), line));
+        }
+        match REQUIRED.iter().find(|key| !values.contains_key(**key)) {
+            Some(key) => Err(InputError::new(file, None, format!("{key}: missing: must be given"))),
+            None => Ok(Self { file, values }),
+        }
+    }
+
+    fn refuse(&self, key: &str, value: &str, allowed: &str) -> InputError {
+        let line = self.values.get(key).map(|(_, line)| *line);
+        InputError::new(self.file, line, format!("{key}: {value}: must be {allowed}"))
+    }
+
+    /// A number in a range; `default` where the key is absent.
+    fn number(
+        &self,
+        key: &str,
+        range: std::ops::RangeInclusive<f64>,
+        default: f64,
+    ) -> Result<f64, InputError> {
+        let Some((value, _)) = self.values.get(key) else {
+            return Ok(default);
+        };
+        let allowed = format!("a number from {} to {}", range.start(), range.end());
+        let text = match value {
+            DeValue::Float(number) => number.as_str(),
+            DeValue::Integer(number) => number.as_str(),
+            other => return Err(self.refuse(key, other.type_str(), &allowed)),
+        };
+        let number: f64 = text.replace('_', "").parse().map_err(|_| self.refuse(key, text, &allowed))?;
+        // A range holds neither NaN nor infinity.
+        if range.contains(&number) { Ok(number) } else { Err(self.refuse(key, text, &allowed)) }
+    }
+
+    fn parameters(&mut self) -> Result<Parameters, InputError> {
+        let name = match self.values.get("name") {
+            Some((DeValue::String(name), _)) if !name.trim().is_empty() => name.to_string(),
+            Some((other, _)) => {
+                return Err(self.refuse("name", other.type_str(), "a text that is not empty"));
+            }
+            None => String::new(),
+        };
+        let pole_pairs = self.number("pole_pairs", 1.0..=100.0, 0.0)?;
+        if pole_pairs.fract() != 0.0 {
+            return Err(self.refuse("pole_pairs", &pole_pairs.to_string(), "a whole number from 1 to 100"));
+        }
+        let above_zero = |key: &str, most: f64, default: f64| self.number(key, 1e-9..=most, default);
+        let max_current_a = above_zero("max_current_a", 1e5, 0.0)?;
+        let max_speed_rpm = above_zero("max_speed_rpm", 1e6, 0.0)?;
+        let max_torque_nm = above_zero("max_torque_nm", 1e7, 0.0)?;
+        let dc_link_min_v = above_zero("dc_link_min_v", 1e5, 0.0)?;
+        let dc_link_max_v = above_zero("dc_link_max_v", 1e5, 0.0)?;
+        Ok(Parameters {
+            name,
+            pole_pairs: pole_pairs as u32,
+            stator_resistance_ohm: self.number("stator_resistance_ohm", 0.0..=1e3, 0.0)?,
+            max_torque_nm,
+            max_power_w: above_zero("max_power_w", 1e9, 0.0)?,
+            max_current_a,
+            max_speed_rpm,
+            rated_torque_nm: above_zero("rated_torque_nm", 1e7, 0.0)?,
+            rated_speed_rpm: above_zero("rated_speed_rpm", 1e6, 0.0)?,
+            dc_link_min_v,
+            dc_link_nominal_v: above_zero("dc_link_nominal_v", 1e5, 0.0)?,
+            dc_link_max_v,
+            max_switching_hz: self.number("max_switching_hz", 50.0..=100e3, 0.0)?,
+            trip_current_a: above_zero("trip_current_a", 1e6, 1.3 * max_current_a)?,
+            trip_dc_over_v: above_zero("trip_dc_over_v", 1e6, 1.15 * dc_link_max_v)?,
+            trip_dc_under_v: self.number("trip_dc_under_v", 0.0..=1e6, 0.85 * dc_link_min_v)?,
+            trip_speed_rpm: above_zero("trip_speed_rpm", 1e7, 1.1 * max_speed_rpm)?,
+            torque_slew_nm_per_s: above_zero("torque_slew_nm_per_s", 1e9, 10.0 * max_torque_nm)?,
+            rotor_inertia_kg_m2: above_zero("rotor_inertia_kg_m2", 1e7, 1.0)?,
+            loss_rated_w: self.number("loss_rated_w", 0.0..=1e8, 0.0)?,
+            loss_quadratic_fraction: self.number("loss_quadratic_fraction", 0.0..=1.0, 0.6)?,
+            lines: self.values.iter().map(|(key, (_, line))| (key.clone(), *line)).collect(),
+        })
+    }
+}
+
+/// Tells an unknown key, and which one was probably meant: the same words with another unit.
+fn unknown(name: &str) -> String {
+    let stem = |key: &str| key.split('_').take(2).collect::<Vec<_>>().join("_");
+    let meant = REQUIRED.iter().chain(&OPTIONAL).find(|known| stem(known) == stem(name));
+    match meant {
+        Some(known) => format!("{name}: wrong unit or spelling: must be {known}"),
+        None => {
+            format!("{name}: unknown key: must be one of {}, {}", REQUIRED.join(", "), OPTIONAL.join(", "))
+        }
+    }
+}
+
+fn line_at(text: &str, offset: usize) -> u64 {
+    1 + text.as_bytes()[..offset.min(text.len())].iter().filter(|byte| **byte == b'\n').count() as u64
+}

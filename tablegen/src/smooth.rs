@@ -1,0 +1,193 @@
+//! The smooth flux map between the nodes.
+
+use crate::map::FluxMap;
+
+/// Flux linkage at a current, with its Jacobian.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct FluxPoint {
+    /// Flux linkage, d axis, in Wb.
+    pub psi_d_wb: f64,
+    /// Flux linkage, q axis, in Wb.
+    pub psi_q_wb: f64,
+    /// ∂ψd/∂id, in H.
+    pub ldd_h: f64,
+    /// ∂ψd/∂iq, in H.
+    pub ldq_h: f64,
+    /// ∂ψq/∂id, in H.
+    pub lqd_h: f64,
+    /// ∂ψq/∂iq, in H.
+    pub lqq_h: f64,
+}
+
+/// A bicubic spline (not-a-knot) through the nodes of a flux map; beyond the grid it goes on linearly.
+#[derive(Clone, Debug)]
+pub struct SmoothMap {
+    first_d: f64,
+    first_q: f64,
+    step_d: f64,
+    step_q: f64,
+    cells_d: usize,
+    cells_q: usize,
+    cells: Vec<[[f64; 16]; 2]>,
+}
+
+impl SmoothMap {
+    /// The spline of a map, mirrored to both signs of iq.
+    pub fn new(map: &FluxMap) -> Self {
+        let (rows, columns) = (map.id_a.len(), map.iq_a.len());
+        let (step_d, step_q) = (map.id_a[1] - map.id_a[0], map.iq_a[1] - map.iq_a[0]);
+        let surfaces = [&map.psi_d_wb, &map.psi_q_wb].map(|nodes| Surface::new(nodes, rows, columns));
+        let mut cells = Vec::with_capacity((rows - 1) * (columns - 1));
+        for r in 0..rows - 1 {
+            for c in 0..columns - 1 {
+                cells.push([surfaces[0].cell(r, c), surfaces[1].cell(r, c)]);
+            }
+        }
+        Self {
+            first_d: map.id_a[0],
+            first_q: map.iq_a[0],
+            step_d,
+            step_q,
+            cells_d: rows - 1,
+            cells_q: columns - 1,
+            cells,
+        }
+    }
+
+    /// Flux linkage and Jacobian at a current in A.
+    pub fn at(&self, id_a: f64, iq_a: f64) -> FluxPoint {
+        let (r, x, beyond_d) = place((id_a - self.first_d) / self.step_d, self.cells_d);
+        let (c, y, beyond_q) = place((iq_a - self.first_q) / self.step_q, self.cells_q);
+        let [d, q] = &self.cells[r * self.cells_q + c];
+        let (psi_d, dd, dq) = evaluate(d, x, y);
+        let (psi_q, qd, qq) = evaluate(q, x, y);
+        FluxPoint {
+            psi_d_wb: psi_d + dd * beyond_d + dq * beyond_q,
+            psi_q_wb: psi_q + qd * beyond_d + qq * beyond_q,
+            ldd_h: dd / self.step_d,
+            ldq_h: dq / self.step_q,
+            lqd_h: qd / self.step_d,
+            lqq_h: qq / self.step_q,
+        }
+    }
+
+    /// The current with a given flux linkage in Wb, by Newton from `start`; `None` if it does not converge.
+    pub fn inverse(&self, psi_d_wb: f64, psi_q_wb: f64, start: (f64, f64)) -> Option<(f64, f64)> {
+        let (mut id, mut iq) = start;
+        for _ in 0..60 {
+            let at = self.at(id, iq);
+            let (ed, eq) = (psi_d_wb - at.psi_d_wb, psi_q_wb - at.psi_q_wb);
+            if ed.abs().max(eq.abs()) < 1e-12 {
+                return Some((id, iq));
+            }
+            let det = at.ldd_h * at.lqq_h - at.ldq_h * at.lqd_h;
+            let (dd, dq) = ((at.lqq_h * ed - at.ldq_h * eq) / det, (at.ldd_h * eq - at.lqd_h * ed) / det);
+            // A long step crosses the knee of saturation; shorter ones find it.
+            let longest = 4.0 * self.step_d.max(self.step_q);
+            let scale = (longest / dd.hypot(dq)).min(1.0);
+            (id, iq) = (id + scale * dd, iq + scale * dq);
+        }
+        None
+    }
+}
+
+/// Cell, fraction within it, and how far beyond the grid, in cells.
+fn place(position: f64, cells: usize) -> (usize, f64, f64) {
+    let inside = position.clamp(0.0, cells as f64);
+    let cell = (inside as usize).min(cells - 1);
+    (cell, inside - cell as f64, position - inside)
+}
+
+/// Value and both derivatives (per cell) of a bicubic polynomial.
+fn evaluate(k: &[f64; 16], x: f64, y: f64) -> (f64, f64, f64) {
+    let row = |i: usize| {
+        let (a, b, c, d) = (k[4 * i], k[4 * i + 1], k[4 * i + 2], k[4 * i + 3]);
+        (a + y * (b + y * (c + y * d)), b + y * (2.0 * c + 3.0 * y * d))
+    };
+    let ((a, ay), (b, by), (c, cy), (d, dy)) = (row(0), row(1), row(2), row(3));
+    (a + x * (b + x * (c + x * d)), b + x * (2.0 * c + 3.0 * x * d), ay + x * (by + x * (cy + x * dy)))
+}
+
+/// Node values and derivatives, per cell, of one surface.
+struct Surface {
+    columns: usize,
+    value: Vec<f64>,
+    by_row: Vec<f64>,
+    by_column: Vec<f64>,
+    mixed: Vec<f64>,
+}
+
+impl Surface {
+    fn new(nodes: &[f64], rows: usize, columns: usize) -> Self {
+        let along_columns = |values: &[f64]| values.chunks(columns).flat_map(derivatives).collect::<Vec<_>>();
+        let along_rows = |values: &[f64]| {
+            let mut out = vec![0.0; values.len()];
+            for c in 0..columns {
+                let column: Vec<_> = (0..rows).map(|r| values[r * columns + c]).collect();
+                for (r, slope) in derivatives(&column).into_iter().enumerate() {
+                    out[r * columns + c] = slope;
+                }
+            }
+            out
+        };
+        let by_column = along_columns(nodes);
+        Self {
+            columns,
+            value: nodes.to_vec(),
+            by_row: along_rows(nodes),
+            mixed: along_rows(&by_column),
+            by_column,
+        }
+    }
+
+    /// Coefficients k[4 i + j] of x^i y^j.
+    fn cell(&self, r: usize, c: usize) -> [f64; 16] {
+        let corner = |values: &[f64], dr: usize, dc: usize| values[(r + dr) * self.columns + c + dc];
+        let hermite = |p0: f64, p1: f64, m0: f64, m1: f64| {
+            [p0, m0, 3.0 * (p1 - p0) - 2.0 * m0 - m1, 2.0 * (p0 - p1) + m0 + m1]
+        };
+        let along_y = |value: &[f64], slope: &[f64], dr: usize| {
+            hermite(corner(value, dr, 0), corner(value, dr, 1), corner(slope, dr, 0), corner(slope, dr, 1))
+        };
+        let (p0, p1) = (along_y(&self.value, &self.by_column, 0), along_y(&self.value, &self.by_column, 1));
+        let (m0, m1) = (along_y(&self.by_row, &self.mixed, 0), along_y(&self.by_row, &self.mixed, 1));
+        let mut k = [0.0; 16];
+        for j in 0..4 {
+            for (i, coefficient) in hermite(p0[j], p1[j], m0[j], m1[j]).into_iter().enumerate() {
+                k[4 * i + j] = coefficient;
+            }
+        }
+        k
+    }
+}
+
+/// Slopes per cell of the not-a-knot cubic spline through evenly spaced values.
+fn derivatives(values: &[f64]) -> Vec<f64> {
+    let n = values.len();
+    if n < 4 {
+        return (0..n)
+            .map(|k| {
+                let (low, high) = (k.saturating_sub(1), (k + 1).min(n - 1));
+                (values[high] - values[low]) / (high - low) as f64
+            })
+            .collect();
+    }
+    let (mut lower, mut diagonal, mut upper) = (vec![1.0; n], vec![4.0; n], vec![1.0; n]);
+    let mut right: Vec<_> = (0..n)
+        .map(|k| if k == 0 || k == n - 1 { 0.0 } else { 3.0 * (values[k + 1] - values[k - 1]) })
+        .collect();
+    (diagonal[0], upper[0]) = (1.0, 2.0);
+    right[0] = 0.5 * (-5.0 * values[0] + 4.0 * values[1] + values[2]);
+    (lower[n - 1], diagonal[n - 1]) = (2.0, 1.0);
+    right[n - 1] = 0.5 * (5.0 * values[n - 1] - 4.0 * values[n - 2] - values[n - 3]);
+    for k in 1..n {
+        let factor = lower[k] / diagonal[k - 1];
+        diagonal[k] -= factor * upper[k - 1];
+        right[k] -= factor * right[k - 1];
+    }
+    right[n - 1] /= diagonal[n - 1];
+    for k in (0..n - 1).rev() {
+        right[k] = (right[k] - upper[k] * right[k + 1]) / diagonal[k];
+    }
+    right
+}
