@@ -207,9 +207,11 @@ pub struct Modulator {
     mirrored: bool,
 }
 
-/// A locked half may be at most this much shorter or longer than nominal while it catches up with its angle.
-const SHORTEST: f32 = 0.5;
-const LONGEST: f32 = 2.0;
+/// How much shorter or longer than nominal a locked half may be while it catches up with its angle. A triangular
+/// carrier's voltage has the right angle wherever its carrier stands, so it may take its time, and its ripple stays
+/// small; a pattern's angle is that of its boundaries.
+const CARRIER_STRETCH: (f32, f32) = (0.85, 1.15);
+const PATTERN_STRETCH: (f32, f32) = (0.5, 2.0);
 
 impl Modulator {
     /// A modulator at rest: its first half is `Off`.
@@ -271,10 +273,11 @@ impl Modulator {
         let end = boundary(self.next_half + 1, carriers);
         let nominal = boundary(1, carriers).0 as f32 / seen.rate;
         let wanted = (end - pulse).signed() as f32 / seen.rate;
-        let period = crate::frames::limit(wanted, SHORTEST * nominal, LONGEST * nominal);
+        let (shortest, longest) = if self.mode.is_carrier() { CARRIER_STRETCH } else { PATTERN_STRETCH };
+        let period = crate::frames::limit(wanted, shortest * nominal, longest * nominal);
         // Slower than the async mode's range there is nothing to lock to: the length stays that of a stopped carrier.
         let longest = self.devices.shortest_half_ticks * 4;
-        let period_ticks = ((period + 0.5) as u32).clamp(1, longest);
+        let period_ticks = ((period + 0.5) as u32).min(longest).max(1);
         match self.mode {
             Mode::Sync15 | Mode::Sync12 => {
                 carrier::synchronous(self.next_half, start, period_ticks, seen, &self.devices)
