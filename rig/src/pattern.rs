@@ -52,18 +52,9 @@ pub fn edges(wanted: &Wanted) -> Result<Vec<LegEdge>> {
     let (begin, end) = (2 * cycle, (2 + u64::from(wanted.cycles)) * cycle);
     let mut inverter: Option<Inverter> = None;
     let mut start = 0_u64;
-    let mut levels = Vec::new();
-    let mut last = [None; 3];
+    let mut changes: Vec<(u64, usize, bool)> = Vec::new();
     while start <= end {
-        let turned = (f64::from(rate) * start as f64).rem_euclid(4_294_967_296.0);
-        let reference = Reference {
-            voltage_v: wanted.voltage_v as f32,
-            angle: Angle(turned as u64 as u32) - Angle::DEG_90,
-            rate,
-            at: Instant(start as u32),
-            udc_v: wanted.udc_v as f32,
-            depth: (wanted.voltage_v / six_step_v) as f32,
-        };
+        let reference = reference(wanted, rate, start);
         let half = modulator.step(Instant(start as u32), Some(&reference));
         let gates = inverter.get_or_insert_with(|| Inverter::new(devices.dead_time_ticks.into(), half));
         gates.begin(half, start);
@@ -71,11 +62,7 @@ pub fn edges(wanted: &Wanted) -> Result<Vec<LegEdge>> {
         start = gates.half_end();
         loop {
             for (leg, state) in gates.legs().into_iter().enumerate() {
-                let on = state == Leg::Upper;
-                if now >= begin && now <= end && last[leg] != Some(on) {
-                    levels.push(((now - begin) as f64 * tick_s, leg, on));
-                    last[leg] = Some(on);
-                }
+                changes.push((now, leg, state == Leg::Upper));
             }
             match gates.next_event() {
                 Some(event) if event < start => {
@@ -85,12 +72,37 @@ pub fn edges(wanted: &Wanted) -> Result<Vec<LegEdge>> {
                 _ => break,
             }
         }
-        // The first row of each leg is its level at the very beginning.
-        if now < begin {
-            last = [None; 3];
+    }
+    Ok(seen_from(begin, end, &changes, tick_s))
+}
+
+/// The reference at a tick, for a steadily turning fundamental whose pulse angle is zero at tick zero.
+fn reference(wanted: &Wanted, rate: f32, tick: u64) -> Reference {
+    let turned = (f64::from(rate) * tick as f64).rem_euclid(4_294_967_296.0);
+    Reference {
+        voltage_v: wanted.voltage_v as f32,
+        angle: Angle(turned as u64 as u32) - Angle::DEG_90,
+        rate,
+        at: Instant(tick as u32),
+        udc_v: wanted.udc_v as f32,
+        depth: 0.0,
+    }
+}
+
+/// Levels at `begin`, then every change until `end`.
+fn seen_from(begin: u64, end: u64, changes: &[(u64, usize, bool)], tick_s: f64) -> Vec<LegEdge> {
+    let mut levels = [false; 3];
+    for (_, leg, on) in changes.iter().filter(|(tick, _, _)| *tick <= begin) {
+        levels[*leg] = *on;
+    }
+    let mut seen: Vec<_> = levels.iter().enumerate().map(|(leg, on)| (0.0, leg, *on)).collect();
+    for (tick, leg, on) in changes.iter().filter(|(tick, _, _)| (begin + 1..=end).contains(tick)) {
+        if levels[*leg] != *on {
+            levels[*leg] = *on;
+            seen.push(((tick - begin) as f64 * tick_s, *leg, *on));
         }
     }
-    Ok(levels)
+    seen
 }
 
 /// Writes the pattern as `t_s,leg,level`.

@@ -75,7 +75,7 @@ const UNIVERSAL_NODES: usize = 65;
 const TORQUE_NODES: usize = 125;
 /// Nodes of the weakening tables.
 const PSI_NODES: usize = 81;
-const SHARE_NODES: usize = 33;
+const SHARE_NODES: usize = 65;
 /// Least magnet flux and saliency of the MTPA parameters, as shares of flux and inductance at full torque.
 const REGULAR_SHARE: f64 = 0.02;
 

@@ -18,6 +18,7 @@ const ANGLE_STEPS: usize = 720;
 struct Point {
     id: f64,
     iq: f64,
+    angle: f64,
     torque: f64,
 }
 
@@ -56,50 +57,66 @@ pub fn circle(
 /// Stands for no torque where something divides by it.
 const TINY_TORQUE_NM: f64 = 1e-3;
 
-/// The part of the circle where torque rises with load angle, within the current limit.
+/// The part of the circle where torque rises from nothing to its most, within the current limit.
+///
+/// On a circle wider than the magnet's flux the smallest load angles need id > 0, where reluctance torque is negative; so
+/// the whole circle is searched first, and the arc is what leads up to its summit.
 fn rising_arc(psi_wb: f64, map: &SmoothMap, optimum: &Optimum, max_current_a: f64) -> Vec<Point> {
-    let mut arc: Vec<Point> = Vec::new();
-    let mut start = map.inverse(psi_wb, 0.0, (0.0, 0.0));
-    let mut angle = 0.0;
-    let mut step = std::f64::consts::PI / ANGLE_STEPS as f64;
-    let mut limit = std::f64::consts::PI;
-    // Whole steps first; past the summit or the current limit, halves of them, towards it.
-    while step > 1e-9 && angle <= limit {
-        let Some(from) = start else { break };
-        let found = map.inverse(psi_wb * angle.cos(), psi_wb * angle.sin(), from);
-        let point = found.map(|(id, iq)| Point { id, iq, torque: optimum.torque_nm(id, iq) });
-        let last = arc.last().map_or(f64::NEG_INFINITY, |last| last.torque);
-        match point {
-            Some(point) if point.id.hypot(point.iq) > max_current_a && arc.is_empty() => {
-                // The arc may enter the limit later.
-                start = Some((point.id, point.iq));
-                angle += step;
-            }
-            Some(point) if point.torque >= last && point.id.hypot(point.iq) <= max_current_a => {
-                start = Some((point.id, point.iq));
-                arc.push(point);
-                angle += step;
-            }
-            _ => {
-                limit = angle;
-                angle -= step;
-                step *= 0.5;
-                angle += step;
-            }
+    let mut scanned: Vec<Point> = Vec::new();
+    let mut from = (0.0, 0.0);
+    for k in 0..=ANGLE_STEPS {
+        let Some(point) = at_angle(psi_wb, STEP_RAD * k as f64, from, map, optimum) else { continue };
+        from = (point.id, point.iq);
+        scanned.push(point);
+    }
+    let within = |point: &Point| point.id.hypot(point.iq) <= max_current_a;
+    let by_torque = |a: &(usize, &Point), b: &(usize, &Point)| a.1.torque.total_cmp(&b.1.torque);
+    let inside = scanned.iter().enumerate().filter(|(_, point)| within(point));
+    let Some((top, _)) = inside.max_by(by_torque) else {
+        return Vec::new();
+    };
+    let mut first = top;
+    while first > 0 && scanned[first].torque > 0.0 && scanned[first - 1].torque < scanned[first].torque {
+        first -= 1;
+    }
+    let mut arc = scanned[first..=top].to_vec();
+    arc.push(summit(psi_wb, arc[arc.len() - 1], map, optimum, within));
+    arc
+}
+
+/// Width of a search step, in rad.
+const STEP_RAD: f64 = std::f64::consts::PI / ANGLE_STEPS as f64;
+
+fn at_angle(psi_wb: f64, angle: f64, from: (f64, f64), map: &SmoothMap, optimum: &Optimum) -> Option<Point> {
+    let (id, iq) = map.inverse(psi_wb * angle.cos(), psi_wb * angle.sin(), from)?;
+    Some(Point { id, iq, angle, torque: optimum.torque_nm(id, iq) })
+}
+
+/// The summit, or where the current limit cuts the way to it: ever smaller steps from the best point scanned.
+fn summit(
+    psi_wb: f64,
+    best: Point,
+    map: &SmoothMap,
+    optimum: &Optimum,
+    within: impl Fn(&Point) -> bool,
+) -> Point {
+    let (mut best, mut step) = (best, STEP_RAD);
+    while step > 1e-9 {
+        let tries =
+            [step, -step].map(|by| at_angle(psi_wb, best.angle + by, (best.id, best.iq), map, optimum));
+        match tries.into_iter().flatten().find(|point| within(point) && point.torque > best.torque) {
+            Some(better) => best = better,
+            None => step *= 0.5,
         }
     }
-    arc
+    best
 }
 
 /// The point of a torque on the arc: between the two neighbours, by bisection of the load angle.
 fn on_arc(arc: &[Point], wanted_nm: f64, psi_wb: f64, map: &SmoothMap, optimum: &Optimum) -> (f64, f64) {
     let upper = arc.partition_point(|point| point.torque < wanted_nm).min(arc.len() - 1);
     let (a, b) = (arc[upper.saturating_sub(1)], arc[upper]);
-    let load_angle = |point: &Point| {
-        let at = map.at(point.id, point.iq);
-        at.psi_q_wb.atan2(at.psi_d_wb)
-    };
-    let (mut low, mut high) = (load_angle(&a), load_angle(&b));
+    let (mut low, mut high) = (a.angle, b.angle);
     let mut best = (b.id, b.iq);
     for _ in 0..50 {
         let middle = 0.5 * (low + high);

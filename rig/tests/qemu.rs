@@ -1,0 +1,67 @@
+//! The image in QEMU against the same code on the host, byte for byte. Needs TRACTIVE_IMAGE (and TRACTIVE_QEMU);
+//! `cargo xtask test` sets them, so these tests are ignored otherwise.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+fn run(scenario: &str, on: &str, out: &Path) -> (i32, String) {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_tractive-rig"));
+    command.arg("run").args(scenario.split(' ')).args(["--on", on, "--out"]).arg(out);
+    let output = command.output().unwrap();
+    (output.status.code().unwrap_or(-1), String::from_utf8_lossy(&output.stderr).into_owned())
+}
+
+/// Both runs end alike and leave the same files.
+fn same(scenario: &str, code: i32) {
+    assert!(std::env::var_os("TRACTIVE_IMAGE").is_some(), "TRACTIVE_IMAGE must name the image");
+    let folder = tempfile::tempdir().unwrap();
+    let outs: Vec<PathBuf> = ["host", "qemu"].iter().map(|on| folder.path().join(on)).collect();
+    for (on, out) in ["host", "qemu"].iter().zip(&outs) {
+        let (got, errors) = run(scenario, on, out);
+        assert_eq!(got, code, "{scenario} on {on}: {errors}");
+    }
+    for file in ["trace.csv", "edges.csv"] {
+        let [host, qemu] = [&outs[0], &outs[1]].map(|out| std::fs::read(out.join(file)).unwrap());
+        assert!(host.len() > 20 && host == qemu, "{scenario}: {file} differs");
+    }
+}
+
+#[test]
+#[ignore = "needs the image and QEMU"]
+fn load_steps_are_the_same() {
+    same("load-steps", 0);
+}
+
+#[test]
+#[ignore = "needs the image and QEMU"]
+fn the_sweep_and_its_way_back_are_the_same() {
+    same("sweep --down", 0);
+}
+
+#[test]
+#[ignore = "needs the image and QEMU"]
+fn braking_is_the_same() {
+    same("sweep --brake --to 2300", 0);
+}
+
+#[test]
+#[ignore = "needs the image and QEMU"]
+fn the_characteristic_is_the_same() {
+    same("characteristic", 0);
+}
+
+#[test]
+#[ignore = "needs the image and QEMU"]
+fn flaws_are_the_same() {
+    same(
+        "sweep --dead-time-us 5 --adc-bits 12 --noise-a 0.5 --udc-ripple 30@300 --rs-error 50 --angle-error 1",
+        0,
+    );
+}
+
+#[test]
+#[ignore = "needs the image and QEMU"]
+fn a_trip_is_the_same() {
+    same("sweep --udc 2200", 1);
+    same("sweep --to 6900", 1);
+}

@@ -1,0 +1,149 @@
+//! The scenarios on the host, held against their bounds.
+
+use clap::Parser;
+use tractive::modulation::Mode;
+use tractive_rig::analysis::{self, StepResponse, SwitchFigures};
+use tractive_rig::machine::Machine;
+use tractive_rig::options::RunOptions;
+use tractive_rig::scenario;
+use tractive_rig::trace::Recording;
+
+#[derive(Parser)]
+struct Line {
+    scenario: String,
+    #[command(flatten)]
+    options: RunOptions,
+}
+
+/// Runs a scenario as on the command line; its figures and what was recorded.
+fn run(line: &str) -> (analysis::Figures, Recording) {
+    let line = Line::parse_from(std::iter::once("test").chain(line.split(' ')));
+    let machine = Machine::load(&line.options.machine).unwrap();
+    let scenario = scenario::find(&line.scenario).unwrap();
+    let recording = scenario::drive(scenario.as_ref(), &line.options, &machine).unwrap();
+    assert!(recording.trip().is_none(), "{:?}", recording.trip());
+    (scenario.figures(&recording, &line.options, &machine), recording)
+}
+
+/// The modes in order of use, without repetition.
+fn order_of_modes(recording: &Recording) -> Vec<&'static str> {
+    let mut order: Vec<_> = recording.rows.iter().map(|row| row.mode.name()).collect();
+    order.dedup();
+    order
+}
+
+/// Legal angles, switching frequency, and current at every switch.
+fn check_switches(line: &str, recording: &Recording) {
+    assert!(analysis::most_turn_ons(recording, 0.1) <= 91);
+    let inside = recording.switches.iter().filter(|switch| switch.t_s > 0.0);
+    for switch in inside.filter(|switch| switch.from.carriers() > 0) {
+        let angle = switch.pulse_angle_deg.unwrap();
+        let common =
+            if switch.to == Mode::Async { switch.from.carriers() } else { gcd(switch.from, switch.to) };
+        let grid = 360.0 / f64::from(common);
+        let off = (angle / grid - (angle / grid).round()).abs() * grid;
+        assert!(off < 1e-6, "{line}: {:?} -> {:?} at {angle}°", switch.from, switch.to);
+    }
+    for SwitchFigures { from, to, excess_percent, .. } in analysis::mode_switches(recording) {
+        println!("{line}: {from} -> {to}: {excess_percent:.2} %");
+        assert!(excess_percent < 8.0, "{line}: {from} -> {to}: {excess_percent} %");
+    }
+}
+
+fn gcd(a: Mode, b: Mode) -> u32 {
+    (1..=18).rev().find(|n| a.carriers().is_multiple_of(*n) && b.carriers().is_multiple_of(*n)).unwrap()
+}
+
+const UP: [&str; 6] = ["async", "sync15", "sync12", "mid7", "mid3", "square"];
+
+#[test]
+fn the_sweep_goes_through_all_modes_and_back() {
+    let (_, recording) = run("sweep --down");
+    let back = UP.iter().rev().skip(1);
+    let wanted: Vec<_> = UP.iter().chain(back).copied().collect();
+    assert_eq!(order_of_modes(&recording), wanted);
+    check_switches("sweep --down", &recording);
+    let top = analysis::window(&recording, 8.5, 9.0);
+    let torque = top.iter().map(|row| row.te_nm).sum::<f64>() / top.len() as f64;
+    assert!((torque / 1176.4 - 1.0).abs() < 0.01, "246.4 kW at 2,000 r/min: {torque} N·m");
+}
+
+#[test]
+fn braking_and_backward_rotation_do_the_same() {
+    for line in [
+        "sweep --brake --to 2300",
+        "sweep --to -2000",
+        "sweep --brake --to -2300",
+        "sweep --torque-scale 0.5 --down",
+    ] {
+        let (_, recording) = run(line);
+        if !line.contains("scale") {
+            assert_eq!(order_of_modes(&recording), UP, "{line}");
+        }
+        check_switches(line, &recording);
+    }
+}
+
+#[test]
+fn backward_is_the_mirror_image_of_forward() {
+    let (forward, backward) = (run("sweep").1, run("sweep --to -2000").1);
+    for (a, b) in forward.rows.iter().zip(&backward.rows).step_by(997) {
+        assert!((a.te_nm + b.te_nm).abs() < 15.0, "{} {} {}", a.t_s, a.te_nm, b.te_nm);
+        assert_eq!(a.mode, b.mode, "{}", a.t_s);
+    }
+}
+
+#[test]
+fn load_steps_are_quick_and_do_not_overshoot() {
+    let (figures, _) = run("load-steps");
+    let steps = figures.get("steps").unwrap().as_array().unwrap();
+    assert_eq!(steps.len(), 12);
+    for step in steps {
+        let figure = |name: &str| step.get(name).unwrap().as_f64().unwrap();
+        assert!(figure("settling_5_percent_ms") < 10.0, "{step}");
+        assert!(figure("overshoot_percent") < 5.0, "{step}");
+        assert!(figure("final_error_nm").abs() < 5.0, "{step}");
+    }
+    let _: fn(&StepResponse) -> f64 = |response| response.t90_ms;
+}
+
+#[test]
+fn torque_is_exact_at_the_characteristic_points() {
+    let (figures, _) = run("characteristic");
+    let points = figures.get("points").unwrap().as_array().unwrap();
+    assert_eq!(points.len(), 7);
+    for point in points {
+        let figure = |name: &str| point.get(name).unwrap().as_f64().unwrap();
+        println!("{} r/min: {:.3} %", figure("speed_rpm"), figure("torque_error_percent"));
+        assert!(figure("torque_error_percent").abs() < 1.0, "{point}");
+        assert!(figure("current_rms_a") < 165.0, "{point}");
+    }
+}
+
+#[test]
+fn a_link_out_of_range_trips_at_once_and_by_name() {
+    for (line, name) in [("sweep --udc 2200", "dc_overvoltage"), ("sweep --udc 700", "dc_undervoltage")] {
+        let line = Line::parse_from(std::iter::once("test").chain(line.split(' ')));
+        let machine = Machine::load(&line.options.machine).unwrap();
+        let scenario = scenario::find(&line.scenario).unwrap();
+        let recording = scenario::drive(scenario.as_ref(), &line.options, &machine).unwrap();
+        assert_eq!(recording.trip().unwrap().fault.name(), name);
+        assert!(recording.rows.iter().all(|row| row.mode == Mode::Off));
+        assert!(recording.edges.is_empty(), "no gate ever moves");
+    }
+}
+
+#[test]
+fn overspeed_trips_into_the_short_circuit() {
+    let line = Line::parse_from("test sweep --to 6900".split(' '));
+    let machine = Machine::load(&line.options.machine).unwrap();
+    let scenario = scenario::find(&line.scenario).unwrap();
+    let recording = scenario::drive(scenario.as_ref(), &line.options, &machine).unwrap();
+    let trip = recording.trip().unwrap();
+    assert_eq!(trip.fault.name(), "overspeed");
+    assert!((trip.value - trip.limit).abs() < 0.1, "{trip:?}");
+    let last = recording.rows.last().unwrap();
+    // Short-circuit current of the map at high speed, and the torque of its losses.
+    let current = last.id_a.hypot(last.iq_a);
+    assert!((current - 193.0).abs() < 3.0, "{current} A");
+}
