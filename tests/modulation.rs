@@ -1,0 +1,122 @@
+//! The modulator under arbitrary references: whatever it is asked for, its pulses are legal.
+
+use proptest::prelude::*;
+use tractive::frames::Angle;
+use tractive::modulation::{CarrierPeriod, Devices, Mode, Modulator, Reference, Schedule};
+use tractive::time::{Clock, Instant};
+
+const CLOCK: Clock = Clock::new(25_000_000, 2_500);
+const MIN_PULSE: u32 = 250;
+
+fn devices() -> Devices {
+    Devices::new(MIN_PULSE, 0, 900.0, &CLOCK)
+}
+
+/// Angle units per tick of a frequency.
+fn rate(hz: f32) -> f32 {
+    hz * 4_294_967_296.0 / 25e6
+}
+
+/// Steps through halves with references drawn by the test.
+fn play(references: &[(f32, f32, f32)]) -> Vec<CarrierPeriod> {
+    let mut modulator = Modulator::new(devices(), Schedule::new(&CLOCK));
+    let (mut now, mut angle) = (Instant(u32::MAX - 1_000_000), Angle::ZERO);
+    let mut halves = Vec::new();
+    for (depth, hz, udc_v) in references {
+        for _ in 0..40 {
+            let reference = Reference {
+                voltage_v: depth * udc_v * 0.6366,
+                angle,
+                rate: rate(*hz),
+                at: now,
+                udc_v: *udc_v,
+                depth: *depth,
+            };
+            let half = modulator.step(now, Some(&reference));
+            now = now.after(half.period_ticks);
+            angle = angle + Angle((rate(*hz) * half.period_ticks as f32) as i32 as u32);
+            halves.push(half);
+        }
+    }
+    halves
+}
+
+proptest! {
+    #[test]
+    fn pulses_are_legal(references in prop::collection::vec((0.0..1.6_f32, -420.0..420.0_f32, 700.0..2000.0_f32), 1..12)) {
+        let halves = play(&references);
+        for half in &halves {
+            prop_assert!(half.period_ticks >= 1 && half.period_ticks <= 4 * devices().shortest_half_ticks);
+            prop_assert!(half.mode != Mode::Off);
+            let ons = half.on_ticks(0);
+            for phase in 0..3 {
+                prop_assert!(ons[phase] <= half.period_ticks);
+                // A pulse that does not span the half's border is whole or has half its length at least.
+                let (compare, period) = (half.compare_ticks[phase], half.period_ticks);
+                if compare < period && compare > 0 {
+                    prop_assert!(compare >= MIN_PULSE / 2 || period < MIN_PULSE, "{half:?}");
+                    prop_assert!(period - compare >= MIN_PULSE / 2 || period < MIN_PULSE, "{half:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn nonsense_makes_no_endless_half(voltage in any::<f32>(), rate in any::<f32>(), udc in any::<f32>(), depth in any::<f32>()) {
+        let mut modulator = Modulator::new(devices(), Schedule::new(&CLOCK));
+        let reference = Reference { voltage_v: voltage, angle: Angle(77), rate, at: Instant(0), udc_v: udc, depth };
+        for k in 0..10 {
+            let half = modulator.step(Instant(k * 10_000), Some(&reference));
+            prop_assert!(half.period_ticks >= 1 && half.period_ticks <= 4 * devices().shortest_half_ticks);
+        }
+    }
+
+    #[test]
+    fn on_time_is_what_levels_say(period in 1..20_000_u32, compare in 0..30_000_u32, level: bool, from in 0..20_000_u32) {
+        let half = CarrierPeriod {
+            period_ticks: period,
+            compare_ticks: [compare; 3],
+            start_levels: [level; 3],
+            ..CarrierPeriod::default()
+        };
+        let brute = (from..period).filter(|tick| level ^ (*tick >= compare)).count();
+        prop_assert_eq!(half.on_ticks(from)[0] as usize, brute);
+    }
+
+    #[test]
+    fn words_come_back_as_they_went(period: u32, compare: [u32; 3], levels: [bool; 3], mode in 0..7_u32, half in 0..60_u8) {
+        let sent = CarrierPeriod { period_ticks: period, compare_ticks: compare, start_levels: levels, mode: Mode::from_code(mode), half };
+        prop_assert_eq!(tractive::drive::half_from_words(tractive::drive::half_to_words(sent)), sent);
+    }
+}
+
+#[test]
+fn mean_voltage_of_every_carrier_half_is_the_reference() {
+    for (mode, hz) in [(Mode::Async, 20.0), (Mode::Sync15, 50.0), (Mode::Sync12, 70.0)] {
+        let mut modulator =
+            Modulator::new(Devices { min_pulse_ticks: 0, ..devices() }, Schedule::fixed(mode, &CLOCK));
+        let mut now = Instant(0);
+        for _ in 0..200 {
+            let turned = (f64::from(rate(hz)) * f64::from(now.0)) as u64 as u32;
+            let reference = Reference {
+                voltage_v: 600.0,
+                angle: Angle(turned),
+                rate: rate(hz),
+                at: now,
+                udc_v: 1500.0,
+                depth: 0.6,
+            };
+            let half = modulator.step(now, Some(&reference));
+            let [a, b, c] = half.on_ticks(0).map(|on| f64::from(on) * 1500.0 / f64::from(half.period_ticks));
+            let (alpha, beta) = ((2.0 * a - b - c) / 3.0, (b - c) / 3_f64.sqrt());
+            let middle = (f64::from(turned) / 4_294_967_296.0
+                + f64::from(hz) * f64::from(half.period_ticks) / 50e6)
+                * std::f64::consts::TAU;
+            assert!(
+                (alpha - 600.0 * middle.cos()).abs() < 0.3 && (beta - 600.0 * middle.sin()).abs() < 0.3,
+                "{mode:?}"
+            );
+            now = now.after(half.period_ticks);
+        }
+    }
+}

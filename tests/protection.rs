@@ -1,0 +1,248 @@
+//! Every fault, by name, with value and limit, and the gates in the safe state in the same interrupt.
+
+use tractive::board::{ControlPort, PwmPort, Sample};
+use tractive::control::{Demand, Gains, Measurements};
+use tractive::drive::Report;
+use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
+use tractive::frames::{Abc, Angle, Dq};
+use tractive::machine::BUILT_IN;
+use tractive::modulation::{CarrierPeriod, Devices, Mode};
+use tractive::protection::{Fault, SafeState, Trip};
+use tractive::time::{Clock, Instant};
+
+const CLOCK: Clock = Clock::new(25_000_000, 2_500);
+
+/// A machine that turns steadily and carries a steady current, with what a test does to its measurements.
+struct Fake {
+    omega: f32,
+    current: Dq,
+    udc_v: f32,
+    spoil: fn(&mut Sample),
+    spoil_from: u32,
+    overrun: u32,
+    control_entered: Option<(SafeState, u32)>,
+    pwm_entered: Option<(SafeState, u32)>,
+    played: CarrierPeriod,
+    report: Report,
+    pwm_currents: Option<Abc>,
+}
+
+impl Fake {
+    fn turning(omega: f32) -> Self {
+        Self {
+            omega,
+            current: Dq { d: -30.0, q: 40.0 },
+            udc_v: 1500.0,
+            spoil: |_| {},
+            spoil_from: 0,
+            overrun: 0,
+            control_entered: None,
+            pwm_entered: None,
+            played: CarrierPeriod::default(),
+            report: Report::default(),
+            pwm_currents: None,
+        }
+    }
+
+    fn angle(&self, now: Instant) -> Angle {
+        let turns = f64::from(self.omega) * f64::from(now.0) / 25e6 / std::f64::consts::TAU;
+        Angle((turns.rem_euclid(1.0) * 4_294_967_296.0) as u64 as u32)
+    }
+
+    fn currents(&self, now: Instant) -> Abc {
+        // A little ripple, as every inverter makes.
+        let ripple = (now.0 % 7919) as f32 * 1e-4;
+        (self.current + Dq { d: ripple, q: -ripple }).unpark(self.angle(now).sin_cos()).abc()
+    }
+}
+
+impl ControlPort for Fake {
+    fn sample(&mut self, now: Instant) -> Sample {
+        let mut sample = Sample {
+            measured: Measurements {
+                currents_a: self.currents(now),
+                udc_v: self.udc_v,
+                angle: self.angle(now),
+            },
+            demand: Demand { torque_nm: 200.0, slew_limited: false },
+            enable: true,
+        };
+        if now.0 >= self.spoil_from {
+            (self.spoil)(&mut sample);
+        }
+        sample
+    }
+
+    fn enter(&mut self, safe: SafeState, now: Instant) {
+        self.control_entered = Some((safe, now.0));
+    }
+
+    fn overrun_ticks(&mut self, now: Instant) -> u32 {
+        if now.0 >= self.spoil_from { self.overrun } else { 0 }
+    }
+
+    fn report(&mut self, _now: Instant, report: &Report) {
+        self.report = *report;
+    }
+}
+
+impl PwmPort for Fake {
+    fn sample(&mut self, now: Instant) -> Abc {
+        match self.pwm_currents {
+            Some(currents) if now.0 >= self.spoil_from => currents,
+            _ => self.currents(now),
+        }
+    }
+
+    fn play(&mut self, _now: Instant, next: &CarrierPeriod) {
+        self.played = *next;
+    }
+
+    fn enter(&mut self, safe: SafeState, now: Instant) {
+        self.pwm_entered = Some((safe, now.0));
+    }
+}
+
+/// Both interrupts in their order until `end`; control is lost from `control_until` on.
+fn drive(fake: &mut Fake, end: u32, control_until: u32) -> Option<Trip> {
+    let devices = Devices::new(250, 0, 900.0, &CLOCK);
+    let settings = Settings { clock: CLOCK, devices, gains: Gains::DEFAULT };
+    let shared = Shared::new();
+    let mut control = ControlTask::new(&BUILT_IN, settings, Instant(2_500));
+    let mut pwm = PwmTask::new(&BUILT_IN, settings, Instant(devices.shortest_half_ticks));
+    loop {
+        let (control_at, pwm_at) = (control.next_call(), pwm.next_call());
+        let control_lives = control_at.0 < control_until;
+        if control_lives && !control_at.reached(pwm_at) {
+            if control_at.0 > end {
+                break;
+            }
+            control.run(fake, &shared);
+        } else {
+            if pwm_at.0 > end {
+                break;
+            }
+            pwm.run(fake, &shared);
+        }
+    }
+    control.trip().or(pwm.trip())
+}
+
+const SETTLED: u32 = 2_000_000;
+const END: u32 = 3_000_000;
+
+fn healthy(omega: f32) {
+    let mut fake = Fake::turning(omega);
+    assert_eq!(drive(&mut fake, END, u32::MAX), None);
+    assert_ne!(fake.played.mode, Mode::Off, "pulses are made");
+}
+
+#[test]
+fn a_healthy_drive_does_not_trip() {
+    for omega in [0.0, 84.0, -84.0, 400.0, 800.0, -800.0, 2500.0] {
+        healthy(omega);
+    }
+}
+
+/// Spoils the measurements of a healthy drive; the control interrupt must find it.
+fn found_by_control(fault: Fault, periods: u32, spoil: fn(&mut Sample)) -> Trip {
+    let mut fake = Fake { spoil, spoil_from: SETTLED, ..Fake::turning(400.0) };
+    let trip = drive(&mut fake, END, u32::MAX).unwrap_or_else(|| panic!("{fault:?} was not found"));
+    assert_eq!(trip.fault, fault);
+    assert!(trip.at.0 >= SETTLED && trip.at.0 < SETTLED + periods * 2_500 + 2_500, "{trip:?}");
+    assert_eq!(fake.control_entered, Some((trip.safe, trip.at.0)), "gates in the same interrupt");
+    assert_eq!(fake.played.mode, Mode::Off, "and no pulses any more");
+    assert_eq!(fake.report.trip.map(|trip| (trip.fault, trip.at)), Some((trip.fault, trip.at)), "latched");
+    trip
+}
+
+#[test]
+fn overcurrent_is_found_in_one_period() {
+    let trip = found_by_control(Fault::Overcurrent, 1, |sample| {
+        sample.measured.currents_a = Abc { a: 320.0, b: -160.0, c: -160.0 };
+    });
+    assert_eq!((trip.value, trip.limit), (320.0, BUILT_IN.ratings.trip_current_a));
+    assert_eq!(trip.safe, SafeState::GatesOff);
+}
+
+#[test]
+fn the_link_is_watched() {
+    let over = found_by_control(Fault::DcOvervoltage, 1, |sample| sample.measured.udc_v = 2200.0);
+    assert_eq!((over.value, over.limit), (2200.0, BUILT_IN.ratings.trip_dc_over_v));
+    found_by_control(Fault::DcUndervoltage, 1, |sample| sample.measured.udc_v = 700.0);
+}
+
+#[test]
+fn what_is_not_finite_is_a_fault() {
+    found_by_control(Fault::NotFinite, 1, |sample| sample.measured.udc_v = f32::NAN);
+    found_by_control(Fault::NotFinite, 1, |sample| sample.measured.udc_v = f32::INFINITY);
+    found_by_control(Fault::NotFinite, 1, |sample| sample.measured.currents_a.b = f32::NAN);
+    found_by_control(Fault::NotFinite, 1, |sample| sample.measured.currents_a.c = f32::NEG_INFINITY);
+    found_by_control(Fault::NotFinite, 1, |sample| sample.demand.torque_nm = f32::NAN);
+}
+
+#[test]
+fn phases_must_add_up() {
+    found_by_control(Fault::PhaseSum, 1, |sample| sample.measured.currents_a.a += 30.0);
+}
+
+#[test]
+fn frozen_measurements_are_found() {
+    found_by_control(Fault::Frozen, 21, |sample| {
+        sample.measured.currents_a = Abc { a: 50.0, b: -20.0, c: -30.0 };
+    });
+    found_by_control(Fault::Frozen, 12, |sample| sample.measured.angle = Angle(12345));
+}
+
+#[test]
+fn a_late_control_interrupt_is_found() {
+    let mut fake = Fake { overrun: 40, spoil_from: SETTLED, ..Fake::turning(400.0) };
+    let trip = drive(&mut fake, END, u32::MAX).unwrap();
+    assert_eq!(trip.fault, Fault::ControlDeadline);
+    assert!((trip.value - 1.6e-6).abs() < 1e-9, "{trip:?}");
+    assert_eq!(fake.control_entered, Some((trip.safe, trip.at.0)));
+}
+
+#[test]
+fn a_lost_control_interrupt_is_found_by_the_other_one() {
+    let mut fake = Fake::turning(400.0);
+    let trip = drive(&mut fake, END, SETTLED).unwrap();
+    assert_eq!(trip.fault, Fault::StaleCommand);
+    assert_eq!(fake.pwm_entered, Some((trip.safe, trip.at.0)), "gates in the same interrupt");
+    assert!(trip.value > trip.limit && trip.limit == 5e-4, "{trip:?}");
+    assert!(trip.at.0 < SETTLED + 12_500 + 14_000, "{trip:?}");
+    assert_eq!(fake.played.mode, Mode::Off);
+}
+
+#[test]
+fn the_pwm_interrupt_finds_overcurrent_too() {
+    let spoilt = Abc { a: -320.0, b: 160.0, c: 160.0 };
+    let mut fake = Fake { pwm_currents: Some(spoilt), spoil_from: SETTLED, ..Fake::turning(400.0) };
+    let trip = drive(&mut fake, END, u32::MAX).unwrap();
+    assert_eq!((trip.fault, trip.value), (Fault::Overcurrent, 320.0));
+    assert_eq!(fake.pwm_entered, Some((trip.safe, trip.at.0)));
+    assert_eq!(fake.report.trip, Some(trip), "control knows");
+}
+
+#[test]
+fn overspeed_is_found_and_short_circuits() {
+    let fast = BUILT_IN.ratings.trip_speed_rad_s * BUILT_IN.ratings.pole_pairs * 1.01;
+    let mut fake = Fake::turning(fast);
+    let trip = drive(&mut fake, END, u32::MAX).unwrap();
+    assert_eq!((trip.fault, trip.safe), (Fault::Overspeed, SafeState::ShortCircuit));
+}
+
+#[test]
+fn the_safe_state_follows_the_emf() {
+    // 0.9 · 1500 V / (√3 · 0.448 Wb) = 1,738 rad/s electrical.
+    for (omega, safe) in [
+        (1700.0, SafeState::GatesOff),
+        (-1700.0, SafeState::GatesOff),
+        (1780.0, SafeState::ShortCircuit),
+        (-1780.0, SafeState::ShortCircuit),
+    ] {
+        assert_eq!(tractive::protection::safe_state(omega, 1500.0, &BUILT_IN.ratings), safe, "{omega}");
+    }
+    // On a lower link the diodes rectify earlier.
+    assert_eq!(tractive::protection::safe_state(1300.0, 1000.0, &BUILT_IN.ratings), SafeState::ShortCircuit);
+}
