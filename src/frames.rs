@@ -142,10 +142,10 @@ impl Neg for Angle {
     }
 }
 
-/// Square root, correctly rounded, of a number that is not negative; a negative number gives zero.
+/// Square root, correctly rounded; a negative number gives zero, NaN stays NaN.
 #[inline]
 pub fn sqrt(x: f32) -> f32 {
-    if x > 0.0 { libm::sqrtf(x) } else { 0.0 }
+    if x < 0.0 { 0.0 } else { libm::sqrtf(x) }
 }
 
 /// `x` held between `low` and `high`; NaN stays NaN. (`f32::clamp` panics on a bad range; this cannot.)

@@ -183,7 +183,8 @@ pub struct Devices {
 }
 
 impl Devices {
-    /// From times in ticks and the highest switching frequency in Hz.
+    /// From times in ticks and the highest switching frequency in Hz. A half lasts two control periods at least, so
+    /// that each has a command of its own: beyond a quarter of the control rate the devices switch less than they could.
     pub const fn new(
         min_pulse_ticks: u32,
         dead_time_ticks: u32,
@@ -192,7 +193,12 @@ impl Devices {
     ) -> Self {
         // One tick more than the quotient's whole part: never above the highest frequency.
         let half = (clock.ticks_per_s / (2.0 * max_switching_hz)) as u32 + 1;
-        Self { min_pulse_ticks, dead_time_ticks, shortest_half_ticks: half }
+        let commanded = 2 * clock.control_ticks;
+        Self {
+            min_pulse_ticks,
+            dead_time_ticks,
+            shortest_half_ticks: if half > commanded { half } else { commanded },
+        }
     }
 }
 

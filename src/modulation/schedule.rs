@@ -8,28 +8,31 @@ use super::{Devices, Mode, Reference, middle60::notch_sum};
 use crate::frames::Angle;
 use crate::time::{Clock, Instant};
 
-/// A border between a mode and the next one up.
+/// A border between a mode and the next one up. Frequencies are shares of the highest switching frequency.
 #[derive(Clone, Copy, Debug)]
 struct Border {
     above: Mode,
-    up_hz: f32,
-    down_hz: f32,
-    up_depth: f32,
-    down_depth: f32,
+    up_share: f32,
+    down_share: f32,
+    /// Depths for going up and coming down; `None` where depth alone does not matter.
+    depths: Option<(f32, f32)>,
 }
 
-const fn border(above: Mode, hz: (f32, f32), depth: (f32, f32)) -> Border {
-    Border { above, up_hz: hz.0, down_hz: hz.1, up_depth: depth.0, down_depth: depth.1 }
+/// A border given in Hz for devices of 900 Hz.
+const fn border(above: Mode, hz: (f32, f32), depths: Option<(f32, f32)>) -> Border {
+    Border { above, up_share: hz.0 / 900.0, down_share: hz.1 / 900.0, depths }
 }
 
-/// Carrier modes end at udc/√3 = 0.907 of six-step. The frequencies lie a little below what 900 Hz allows (60,
-/// 75, 128.6, 300 Hz), so that waiting for a legal angle on the steepest ramp stays within it.
+/// Carrier modes end at udc/√3 = 0.907 of six-step. The frequencies lie a little below what the devices allow (for
+/// 900 Hz: 60, 75, 128.6, 300 Hz), so that waiting for a legal angle on the steepest ramp stays within it. Depth alone does not
+/// end the asynchronous mode: at a low frequency a pattern of few pulses would leave more ripple than the tenth of voltage is
+/// worth that it adds.
 const BORDERS: [Border; 5] = [
-    border(Mode::Sync15, (40.0, 38.0), (0.88, 0.84)),
-    border(Mode::Sync12, (59.5, 57.0), (0.88, 0.84)),
-    border(Mode::Mid7, (74.5, 72.0), (0.88, 0.84)),
-    border(Mode::Mid3, (126.0, 121.0), (0.913, 0.885)),
-    border(Mode::Square, (297.0, 290.0), (0.985, 0.968)),
+    border(Mode::Sync15, (40.0, 38.0), None),
+    border(Mode::Sync12, (59.5, 57.0), Some((0.88, 0.84))),
+    border(Mode::Mid7, (74.5, 72.0), Some((0.88, 0.84))),
+    border(Mode::Mid3, (126.0, 121.0), Some((0.913, 0.885))),
+    border(Mode::Square, (297.0, 290.0), Some((0.985, 0.968))),
 ];
 
 /// Room kept between a mode's largest depth and the border above it, and the hysteresis kept below a border that
@@ -46,18 +49,12 @@ pub struct Schedule {
     fixed: Option<Mode>,
     last_switch: Option<Instant>,
     dwell_ticks: i32,
-    hz_per_rate: f32,
 }
 
 impl Schedule {
     /// By frequency and modulation depth.
     pub const fn new(clock: &Clock) -> Self {
-        Self {
-            fixed: None,
-            last_switch: None,
-            dwell_ticks: (DWELL_S * clock.ticks_per_s) as i32,
-            hz_per_rate: clock.ticks_per_s / 4_294_967_296.0,
-        }
+        Self { fixed: None, last_switch: None, dwell_ticks: (DWELL_S * clock.ticks_per_s) as i32 }
     }
 
     /// Always the same mode, wherever its pulses lead.
@@ -83,15 +80,22 @@ impl Schedule {
         if dwelling {
             return mode;
         }
-        let hz = seen.rate * self.hz_per_rate;
+        let switching_turns = 2.0 * devices.shortest_half_ticks as f32;
+        let share = seen.rate * switching_turns * (1.0 / 4_294_967_296.0);
         let mut best = Mode::Async;
         for (index, border) in BORDERS.iter().enumerate() {
             let below = Mode::from_code(index as u32 + Mode::Async as u32);
-            let (up_depth, down_depth) = border_depths(border, below, seen, devices);
             let here = rank(mode) > index;
-            let (hz_limit, depth_limit) =
-                if here { (border.down_hz, down_depth) } else { (border.up_hz, up_depth) };
-            if hz >= hz_limit || seen.depth >= depth_limit {
+            let fast = share >= if here { border.down_share } else { border.up_share };
+            let deep = match border.depths {
+                None => false,
+                Some(_) if best == Mode::Async => false,
+                Some(depths) => {
+                    let (up, down) = lowered(depths, depth_limit(below, seen.rate, devices) - DEPTH_ROOM);
+                    seen.depth >= if here { down } else { up }
+                }
+            };
+            if fast || deep {
                 best = border.above;
             }
         }
@@ -109,14 +113,9 @@ fn rank(mode: Mode) -> usize {
     (mode as usize).saturating_sub(Mode::Async as usize)
 }
 
-/// The border's depths, lowered where the mode below cannot reach them because of the shortest pulse.
-fn border_depths(border: &Border, below: Mode, seen: &Reference, devices: &Devices) -> (f32, f32) {
-    let reach = depth_limit(below, seen.rate, devices) - DEPTH_ROOM;
-    if reach < border.up_depth {
-        (reach, reach - DEPTH_HYSTERESIS)
-    } else {
-        (border.up_depth, border.down_depth)
-    }
+/// A border's depths, lowered where the mode below does not reach them because of the shortest pulse.
+fn lowered((up, down): (f32, f32), reach: f32) -> (f32, f32) {
+    if reach < up { (reach, reach - DEPTH_HYSTERESIS) } else { (up, down) }
 }
 
 /// The largest fundamental of a mode as a share of six-step 2 udc/π, with `rate` in angle units per tick: udc/√3 for

@@ -1,46 +1,122 @@
-//! Building the rig and the image.
+//! How cargo is called: the image for the board, the rig for this machine.
 
-use crate::process::must;
-use crate::root;
-use crate::setup::{self, TARGET};
-use anyhow::{Context, Result};
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Command, Stdio};
 
-/// Builds the rig; its program.
-pub fn rig() -> Result<PathBuf> {
-    must(cargo().args(["build", "--quiet", "--release", "--package", "tractive-rig"]))?;
-    Ok(target_folder().join("release/tractive-rig"))
+use anyhow::{Context, Result, bail};
+
+use crate::process;
+use crate::setup::Toolchain;
+
+/// What the image runs on.
+pub const TARGET: &str = "thumbv7em-none-eabihf";
+
+/// The repository's root.
+pub fn root() -> &'static Path {
+    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
+    here.parent().unwrap_or(here)
 }
 
-/// Builds the firmware's image for a machine; its ELF file.
-pub fn image(machine: Option<&str>) -> Result<PathBuf> {
-    let toolchain = setup::toolchain()?;
-    let mut command = toolchain.cargo("build");
-    command.current_dir(root());
-    command.args(["--quiet", "--profile", "firmware", "--package", "tractive", "--bin", "tractive"]);
-    if let Some(machine) = machine {
-        // The build script runs in the repository's root; a path is the user's own.
-        let path = Path::new(machine);
-        let named = root().join("tables").join(machine).is_dir();
-        let meant = if path.is_dir() && !named { path.canonicalize()? } else { path.to_owned() };
-        command.env("TRACTIVE_MACHINE", meant);
-    }
-    must(&mut command).context("the image does not build")?;
-    Ok(target_folder().join(TARGET).join("firmware/tractive"))
-}
-
-/// Cargo, in the repository's root.
+/// Cargo as this program was started by it, in the repository's root.
 pub fn cargo() -> Command {
     let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
     command.current_dir(root());
     command
 }
 
-/// Where cargo puts what it builds.
-pub fn target_folder() -> PathBuf {
-    match std::env::var_os("CARGO_TARGET_DIR") {
-        Some(folder) => root().join(folder),
-        None => root().join("target"),
+/// The arguments that build the image, after the toolchain's own.
+pub fn image_args() -> [&'static str; 9] {
+    ["build", "--profile", "firmware", "--target", TARGET, "--package", "tractive", "--bin", "tractive"]
+}
+
+/// Builds the firmware's image, with the tables of `machine` if one is named (a name or an absolute path).
+pub fn image(toolchain: &Toolchain, machine: Option<&OsString>) -> Result<PathBuf> {
+    let mut command = toolchain.cargo(&image_args());
+    match machine {
+        Some(machine) => command.env("TRACTIVE_MACHINE", machine),
+        None => command.env_remove("TRACTIVE_MACHINE"),
+    };
+    executable(&mut command, "tractive", machine.is_some()).context("the image was not built")
+}
+
+/// Builds the rig's program.
+pub fn rig() -> Result<PathBuf> {
+    let mut command = cargo();
+    command.args(["build", "--release", "--package", "tractive-rig", "--bin", "tractive-rig"]);
+    executable(&mut command, "tractive-rig", false).context("the rig was not built")
+}
+
+/// Runs a `cargo build` and returns where it says the executable is. `own_data` means that the user's data goes into
+/// the build: then what the build script says about it stands alone, without cargo's frame around it.
+fn executable(command: &mut Command, name: &str, own_data: bool) -> Result<PathBuf> {
+    command.arg("--message-format=json-render-diagnostics").stdin(Stdio::null()).stdout(Stdio::piped());
+    command.stderr(if own_data { Stdio::piped() } else { Stdio::inherit() });
+    let child = command.spawn().with_context(|| process::cannot_start(command))?;
+    let output = child.wait_with_output()?;
+    if !output.status.success() {
+        let said = String::from_utf8_lossy(&output.stderr);
+        match complaint(&said) {
+            Some(reason) => bail!("{reason}"),
+            None => eprint!("{said}"),
+        }
+        bail!("cargo failed ({})", output.status);
+    }
+    let messages = String::from_utf8_lossy(&output.stdout);
+    artifact(&messages, name).with_context(|| format!("cargo names no executable `{name}`"))
+}
+
+/// The executable of that name in cargo's messages.
+fn artifact(messages: &str, name: &str) -> Option<PathBuf> {
+    let messages = messages.lines().filter_map(|line| serde_json::from_str::<serde_json::Value>(line).ok());
+    messages
+        .filter(|message| message["reason"] == "compiler-artifact" && message["target"]["name"] == name)
+        .filter_map(|message| message["executable"].as_str().map(PathBuf::from))
+        .next_back()
+}
+
+/// What a failed build script said, on one line: its standard error, else its `cargo::error`s.
+fn complaint(cargo_said: &str) -> Option<String> {
+    if !cargo_said.contains("failed to run custom build command") {
+        return None;
+    }
+    let printed = cargo_said.lines().skip_while(|line| line.trim() != "--- stderr").skip(1);
+    let printed: Vec<_> = printed.map(str::trim).take_while(|line| !line.is_empty()).collect();
+    let declared = cargo_said.lines().filter_map(|line| line.strip_prefix("error: ")?.split_once(": "));
+    let declared: Vec<_> = declared.filter(|(from, _)| from.contains('@')).map(|(_, what)| what).collect();
+    let said = if printed.is_empty() { declared } else { printed };
+    (!said.is_empty()).then(|| said.join("; ").trim_start_matches("error: ").to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_executable_is_the_one_cargo_names() {
+        let messages = concat!(
+            r#"{"reason":"compiler-artifact","target":{"name":"tractive"},"executable":null}"#,
+            "\nnot json\n",
+            r#"{"reason":"compiler-artifact","target":{"name":"tractive"},"executable":"/t/firmware/tractive"}"#,
+            "\n",
+            r#"{"reason":"compiler-artifact","target":{"name":"other"},"executable":"/t/other"}"#,
+            "\n",
+            r#"{"reason":"build-finished","success":true}"#,
+        );
+        assert_eq!(artifact(messages, "tractive"), Some(PathBuf::from("/t/firmware/tractive")));
+        assert_eq!(artifact(messages, "absent"), None);
+    }
+
+    #[test]
+    fn a_build_scripts_own_words_stand_alone() {
+        let said = "   Compiling tractive v0.1.0 (/x)\n\
+            error: failed to run custom build command for `tractive v0.1.0 (/x)`\n\nCaused by:\n  \
+            process didn't exit successfully: `/x/build-script-build` (exit status: 1)\n  --- stdout\n  \
+            cargo:rerun-if-changed=y\n\n  --- stderr\n  flux_map.csv:3: psi_d_wb = `x`, a number is expected\n";
+        assert_eq!(complaint(said).unwrap(), "flux_map.csv:3: psi_d_wb = `x`, a number is expected");
+        let said = "error: tractive@0.1.0: machine.toml: pole_pairs = 0, at least 1 is expected\n\
+            error: failed to run custom build command for `tractive v0.1.0 (/x)`\n";
+        assert_eq!(complaint(said).unwrap(), "machine.toml: pole_pairs = 0, at least 1 is expected");
+        assert_eq!(complaint("error: could not compile `tractive` (bin) due to 1 previous error"), None);
     }
 }

@@ -1,35 +1,62 @@
 //! Running other programs.
 
-use anyhow::{Context, Result, bail};
-use std::process::Command;
+use std::ffi::OsStr;
+use std::path::PathBuf;
+use std::process::{Command, Stdio};
 
-/// Runs a program that must succeed.
-pub fn must(command: &mut Command) -> Result<()> {
-    match exit_code(command)? {
-        0 => Ok(()),
-        code => bail!("{} ended with {code}", shown(command)),
+use anyhow::{Context, Result};
+
+/// Runs it with this process's own input and output; whether it succeeded.
+pub fn succeeds(command: &mut Command) -> Result<bool> {
+    Ok(command.status().with_context(|| cannot_start(command))?.success())
+}
+
+/// Runs it silently; `false` also when it cannot be started.
+pub fn quietly(command: &mut Command) -> bool {
+    let silent = command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
+    silent.status().is_ok_and(|status| status.success())
+}
+
+/// What it prints, trimmed; `None` if it fails or cannot be started.
+pub fn output_of(command: &mut Command) -> Option<String> {
+    let output = command.stdin(Stdio::null()).stderr(Stdio::null()).output().ok()?;
+    let text = output.status.success().then_some(output.stdout)?;
+    Some(String::from_utf8_lossy(&text).trim().to_owned())
+}
+
+/// The message for a program that does not start.
+pub fn cannot_start(command: &Command) -> String {
+    format!("cannot start {}", command.get_program().to_string_lossy())
+}
+
+/// Where a program stands on the PATH.
+pub fn find(program: &str) -> Option<PathBuf> {
+    find_in(program, &std::env::var_os("PATH")?)
+}
+
+fn find_in(program: &str, path: &OsStr) -> Option<PathBuf> {
+    let name = format!("{program}{}", std::env::consts::EXE_SUFFIX);
+    std::env::split_paths(path).map(|folder| folder.join(&name)).find(|file| file.is_file())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_program_is_found_where_the_path_leads() {
+        let test = std::env::current_exe().unwrap();
+        let name = test.file_stem().unwrap().to_str().unwrap();
+        let folder = test.parent().unwrap();
+        assert_eq!(find_in(name, folder.as_os_str()), Some(test.clone()));
+        assert_eq!(find_in("no-such-program", folder.as_os_str()), None);
     }
-}
 
-/// Runs a program; its exit code (1 when a signal ended it).
-pub fn exit_code(command: &mut Command) -> Result<u8> {
-    let status = command.status().with_context(|| format!("cannot start {}", shown(command)))?;
-    Ok(status.code().and_then(|code| u8::try_from(code).ok()).unwrap_or(1))
-}
-
-/// Whether a program can be started and succeeds, in silence.
-pub fn succeeds(command: &mut Command) -> bool {
-    command.output().is_ok_and(|output| output.status.success())
-}
-
-/// What a program prints, if it succeeds.
-pub fn output(command: &mut Command) -> Option<String> {
-    let output = command.output().ok().filter(|output| output.status.success())?;
-    String::from_utf8(output.stdout).ok()
-}
-
-/// The command as one would type it.
-pub fn shown(command: &Command) -> String {
-    let words = std::iter::once(command.get_program()).chain(command.get_args());
-    words.map(|word| word.to_string_lossy().into_owned()).collect::<Vec<_>>().join(" ")
+    #[test]
+    fn what_cannot_start_is_a_failure_not_a_panic() {
+        assert!(!quietly(&mut Command::new("no-such-program")));
+        assert_eq!(output_of(&mut Command::new("no-such-program")), None);
+        let error = succeeds(&mut Command::new("no-such-program")).unwrap_err();
+        assert_eq!(error.to_string(), "cannot start no-such-program");
+    }
 }

@@ -1,147 +1,260 @@
-//! What must be there before anything is built: each step only when it is missing, and said in one line.
+//! What has to be installed: the target, QEMU, the lints. Each step only when something is missing, each telling so.
 
-use crate::process::{must, output, shown, succeeds};
-use anyhow::{Context, Result, bail};
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// The target of the images.
-pub const TARGET: &str = "thumbv7em-none-eabihf";
-const QEMU: &str = "qemu-system-arm";
-const MACHINE: &str = "mps2-an386";
+use anyhow::{Result, bail};
 
-/// How to build for the target.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Toolchain {
-    /// The toolchain that runs this, with the target's standard library.
-    Own,
-    /// Debian's `rustc-web`, `cargo-web` and `rust-web-src`, which build the core library themselves and link with
-    /// this linker.
-    Debian {
-        /// Path of `rust-lld`.
-        linker: PathBuf,
-    },
+use crate::build::{TARGET, root};
+use crate::process::{find, output_of, quietly};
+
+/// The emulated board.
+const QEMU_MACHINE: &str = "mps2-an386";
+/// Debian's own Rust, new enough where rustup's target cannot be had.
+const DEBIAN_PACKAGES: [&str; 3] = ["rustc-web", "cargo-web", "rust-web-src"];
+const DEBIAN_CARGO: &str = "/usr/bin/cargo";
+const DEBIAN_RUSTC: &str = "/usr/bin/rustc";
+
+/// How cargo is called for the board's target.
+#[derive(Debug, PartialEq, Eq)]
+pub struct Toolchain {
+    cargo: OsString,
+    /// Behind the subcommand.
+    extra_args: Vec<OsString>,
+    env: Vec<(&'static str, OsString)>,
+    /// Clippy knows the target.
+    pub has_clippy: bool,
 }
 
 impl Toolchain {
-    /// `cargo VERB` for the target.
-    pub fn cargo(&self, verb: &str) -> Command {
-        match self {
-            Self::Own => {
-                let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
-                command.args([verb, "--target", TARGET]);
-                command
+    /// The toolchain in use, with the target's precompiled library.
+    fn installed() -> Self {
+        let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+        Self { cargo, extra_args: Vec::new(), env: Vec::new(), has_clippy: true }
+    }
+
+    /// Debian's toolchain, which builds the library for the target from its source.
+    fn debian(linker: &Path) -> Self {
+        Self {
+            cargo: DEBIAN_CARGO.into(),
+            extra_args: vec![
+                "-Zbuild-std=core".into(),
+                "--target-dir".into(),
+                root().join("target/debian").into(),
+            ],
+            env: vec![
+                ("RUSTC_BOOTSTRAP", "1".into()),
+                ("RUSTC", DEBIAN_RUSTC.into()),
+                ("CARGO_TARGET_THUMBV7EM_NONE_EABIHF_LINKER", linker.into()),
+            ],
+            has_clippy: false,
+        }
+    }
+
+    /// A cargo command for the target, in the repository's root.
+    pub fn cargo(&self, args: &[&str]) -> Command {
+        let mut command = Command::new(&self.cargo);
+        command.current_dir(root()).args(args).args(&self.extra_args);
+        command.envs(self.env.iter().map(|(name, value)| (name, value)));
+        command
+    }
+}
+
+/// The set-up, which remembers what it has already done.
+#[derive(Debug, Default)]
+pub struct Setup {
+    apt_updated: bool,
+}
+
+impl Setup {
+    /// A toolchain that builds the image.
+    pub fn toolchain(&mut self) -> Result<Toolchain> {
+        if has_target() {
+            return Ok(Toolchain::installed());
+        }
+        if find("rustup").is_some() {
+            tell(&format!("adding the target {TARGET} with rustup"));
+            if quietly(Command::new("rustup").args(["target", "add", TARGET])) && has_target() {
+                return Ok(Toolchain::installed());
             }
-            Self::Debian { linker } => {
-                let mut command = Command::new("/usr/bin/cargo");
-                command.args([verb, "--target", TARGET, "-Zbuild-std=core"]);
-                command.env("RUSTC_BOOTSTRAP", "1").env("RUSTC", "/usr/bin/rustc");
-                command.env("CARGO_TARGET_THUMBV7EM_NONE_EABIHF_LINKER", linker);
-                command.env_remove("RUSTUP_TOOLCHAIN").env_remove("CARGO");
-                command
-            }
+            tell(&format!("rustup cannot add {TARGET}; Debian's toolchain is tried instead"));
+        }
+        if !debian_is_usable() {
+            self.apt_install(&DEBIAN_PACKAGES);
+        }
+        if !debian_is_usable() {
+            bail!("no Rust toolchain for {TARGET}; install it with: rustup target add {TARGET}");
+        }
+        if find_linker().is_none() {
+            self.apt_install(&["lld"]);
+        }
+        match find_linker() {
+            Some(linker) => Ok(Toolchain::debian(&linker)),
+            None => bail!("no linker for {TARGET}; {}", how_to_install("lld", "lld")),
+        }
+    }
+
+    /// QEMU with the emulated board.
+    pub fn qemu(&mut self) -> Result<PathBuf> {
+        const PROGRAM: &str = "qemu-system-arm";
+        if find(PROGRAM).is_none() {
+            self.apt_install(&[PROGRAM]);
+        }
+        let Some(qemu) = find(PROGRAM) else {
+            bail!("{PROGRAM} is missing; {}", how_to_install(PROGRAM, "qemu"));
+        };
+        let machines = output_of(Command::new(&qemu).args(["-M", "help"])).unwrap_or_default();
+        if !lists_machine(&machines) {
+            bail!("{} has no machine {QEMU_MACHINE}; a newer QEMU is needed", qemu.display());
+        }
+        Ok(qemu)
+    }
+
+    /// A component of the toolchain that cargo calls as a subcommand (`fmt`, `clippy`).
+    pub fn component(&mut self, subcommand: &str, component: &str) -> bool {
+        let usable = || quietly(crate::build::cargo().args([subcommand, "--version"]));
+        if usable() {
+            return true;
+        }
+        if find("rustup").is_none() {
+            return false;
+        }
+        tell(&format!("adding {component} with rustup"));
+        quietly(Command::new("rustup").args(["component", "add", component])) && usable()
+    }
+
+    /// Installs packages with apt-get where that is there and allowed; whoever calls looks whether it helped.
+    fn apt_install(&mut self, packages: &[&str]) {
+        if find("apt-get").is_none() || !may_install() {
+            return;
+        }
+        if !self.apt_updated {
+            tell("updating the list of packages (apt-get update)");
+            quietly(&mut privileged(&["apt-get", "update"]));
+            self.apt_updated = true;
+        }
+        tell(&format!("installing {} (apt-get install)", packages.join(" ")));
+        let mut args = vec!["env", "DEBIAN_FRONTEND=noninteractive", "apt-get", "install", "--yes"];
+        args.push("--no-install-recommends");
+        args.extend(packages);
+        if !quietly(&mut privileged(&args)) {
+            tell(&format!("apt-get could not install {}", packages.join(" ")));
         }
     }
 }
 
-/// A toolchain for the target.
-pub fn toolchain() -> Result<Toolchain> {
-    let installed = output(Command::new("rustup").args(["target", "list", "--installed"]));
-    if installed.is_some_and(|list| list.lines().any(|line| line == TARGET)) || own_core_library() {
-        return Ok(Toolchain::Own);
-    }
-    let mut add = Command::new("rustup");
-    add.args(["target", "add", TARGET]);
-    println!("set-up: the target {TARGET} is missing: {}", shown(&add));
-    if must(&mut add).is_ok() {
-        return Ok(Toolchain::Own);
-    }
-    println!("set-up: that failed; Debian's toolchain builds for it as well");
-    let linker = own_linker().context("rust-lld is not in this toolchain's folders")?;
-    if !Path::new("/usr/bin/cargo").exists() || !Path::new("/usr/bin/rustc").exists() {
-        install(&["rustc-web", "cargo-web", "rust-web-src"])?;
-    }
-    Ok(Toolchain::Debian { linker })
+fn tell(what: &str) {
+    eprintln!("set-up: {what}");
 }
 
-/// The folder of this toolchain.
-fn sysroot() -> Option<PathBuf> {
-    output(Command::new("rustc").args(["--print", "sysroot"])).map(|path| PathBuf::from(path.trim()))
+fn is_root() -> bool {
+    output_of(Command::new("id").arg("-u")).as_deref() == Some("0")
 }
 
-/// Whether the toolchain has the target's library, whoever installed it.
-fn own_core_library() -> bool {
-    sysroot().is_some_and(|root| root.join("lib/rustlib").join(TARGET).join("lib").is_dir())
+fn may_install() -> bool {
+    is_root() || (find("sudo").is_some() && quietly(Command::new("sudo").args(["-n", "true"])))
 }
 
-fn own_linker() -> Option<PathBuf> {
-    let libraries = sysroot()?.join("lib/rustlib");
-    let hosts = std::fs::read_dir(libraries).ok()?;
-    hosts.flatten().map(|host| host.path().join("bin/rust-lld")).find(|path| path.exists())
+fn privileged(args: &[&str]) -> Command {
+    let prefix: &[&str] = if is_root() { &[] } else { &["sudo", "-n"] };
+    let mut words = prefix.iter().chain(args);
+    let mut command = Command::new(words.next().unwrap_or(&"true"));
+    command.args(words);
+    command
 }
 
-/// QEMU, installed where that is allowed.
-pub fn qemu() -> Result<PathBuf> {
-    if !usable(QEMU) {
-        println!("set-up: {QEMU} is missing");
-        install(&["qemu-system-arm"])?;
-        if !usable(QEMU) {
-            bail!("{QEMU} is there but does not know the machine {MACHINE}: must be QEMU 7 or later");
-        }
+/// The target's library is there, whoever installed it.
+fn has_target() -> bool {
+    let folder = output_of(Command::new("rustc").current_dir(root()).args([
+        "--print",
+        "target-libdir",
+        "--target",
+        TARGET,
+    ]));
+    let entries = folder.and_then(|folder| std::fs::read_dir(folder).ok()).into_iter().flatten().flatten();
+    entries.into_iter().any(|entry| entry.file_name().to_string_lossy().starts_with("libcore-"))
+}
+
+fn debian_is_usable() -> bool {
+    let version = output_of(Command::new(DEBIAN_RUSTC).arg("--version")).unwrap_or_default();
+    let sysroot = output_of(Command::new(DEBIAN_RUSTC).args(["--print", "sysroot"])).unwrap_or_default();
+    let source = Path::new(&sysroot).join("lib/rustlib/src/rust/library/core");
+    let cargo = output_of(Command::new(DEBIAN_CARGO).arg("--version")).unwrap_or_default();
+    let minor = minor_version(env!("CARGO_PKG_RUST_VERSION"));
+    source.is_dir() && [version, cargo].iter().all(|found| minor_version(found) >= minor)
+}
+
+/// 96 of `rustc 1.96.0 (…)` and of `1.96`; `None` is less than all.
+fn minor_version(text: &str) -> Option<u32> {
+    let number = text.split_whitespace().find_map(|word| word.strip_prefix("1."))?;
+    number.split(|c: char| !c.is_ascii_digit()).next()?.parse().ok()
+}
+
+/// A linker for the target: rustup's own, or LLVM's.
+fn find_linker() -> Option<PathBuf> {
+    let sysroot = output_of(Command::new("rustc").current_dir(root()).args(["--print", "sysroot"]));
+    let hosts = sysroot.and_then(|sysroot| std::fs::read_dir(Path::new(&sysroot).join("lib/rustlib")).ok());
+    let bundled = hosts.into_iter().flatten().flatten().map(|host| host.path().join("bin/rust-lld"));
+    bundled.into_iter().find(|file| file.is_file()).or_else(|| find("rust-lld")).or_else(|| find("ld.lld"))
+}
+
+/// The command to type, by the package manager that is there.
+fn how_to_install(debian: &str, elsewhere: &str) -> String {
+    let known = [
+        ("apt-get", format!("sudo apt-get update && sudo apt-get install --yes {debian}")),
+        ("dnf", format!("sudo dnf install --assumeyes {debian}")),
+        ("pacman", format!("sudo pacman -S --needed {debian}")),
+        ("brew", format!("brew install {elsewhere}")),
+    ];
+    let found = known.into_iter().find(|(manager, _)| find(manager).is_some());
+    match found {
+        Some((_, command)) => format!("install it with: {command}"),
+        None => format!("install {debian} and put it on the PATH"),
     }
-    Ok(PathBuf::from(QEMU))
 }
 
-fn usable(program: &str) -> bool {
-    output(Command::new(program).args(["-M", "help"])).is_some_and(|list| list.contains(MACHINE))
+fn lists_machine(help: &str) -> bool {
+    help.lines().any(|line| line.split_whitespace().next() == Some(QEMU_MACHINE))
 }
 
-/// Installs packages with apt where this user may; otherwise says what to type.
-fn install(packages: &[&str]) -> Result<()> {
-    let typed = hint(packages);
-    if !succeeds(Command::new("apt-get").arg("--version")) {
-        bail!("please install it and try again: {typed}");
-    }
-    let root = output(Command::new("id").arg("-u")).is_some_and(|id| id.trim() == "0");
-    let prefix: &[&str] = if root {
-        &["apt-get"]
-    } else if succeeds(Command::new("sudo").args(["-n", "true"])) {
-        &["sudo", "-n", "apt-get"]
-    } else {
-        bail!("please install it and try again: {typed}");
-    };
-    let apt = |arguments: &[&str]| {
-        let mut command = Command::new(prefix[0]);
-        command.args(&prefix[1..]).args(arguments).env("DEBIAN_FRONTEND", "noninteractive");
-        println!("set-up: {}", shown(&command));
-        must(command.stdout(std::process::Stdio::null()))
-    };
-    let install = [&["install", "-y", "--no-install-recommends"], packages].concat();
-    let installed = apt(&["update"]).and_then(|()| apt(&install));
-    installed.with_context(|| format!("please install it and try again: {typed}"))
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
 
-/// The command for the package manager that is present.
-fn hint(packages: &[&str]) -> String {
-    let managers =
-        [("apt-get", "sudo apt-get install"), ("dnf", "sudo dnf install"), ("pacman", "sudo pacman -S")];
-    for (program, typed) in managers {
-        if succeeds(Command::new(program).arg("--version")) {
-            return format!("{typed} {}", packages.join(" "));
-        }
+    #[test]
+    fn versions_compare_by_their_minor_number() {
+        assert_eq!(minor_version("rustc 1.96.0 (ac68faa20 2026-01-01)"), Some(96));
+        assert_eq!(minor_version("cargo 1.85.1-nightly"), Some(85));
+        assert_eq!(minor_version("1.88"), Some(88));
+        assert!(minor_version("") < minor_version("1.88"));
     }
-    if succeeds(Command::new("brew").arg("--version")) {
-        return "brew install qemu".to_owned();
-    }
-    format!("the packages {}", packages.join(" "))
-}
 
-/// rustfmt or clippy; whether it can be had.
-pub fn component(name: &str) -> bool {
-    let program = if name == "rustfmt" { "fmt" } else { name };
-    if succeeds(Command::new("cargo").args([program, "--version"])) {
-        return true;
+    #[test]
+    fn the_board_must_be_listed_by_its_own_name() {
+        let help =
+            "Supported machines are:\nmps2-an385  ARM MPS2\nmps2-an386           ARM MPS2 with AN386\n";
+        assert!(lists_machine(help));
+        assert!(!lists_machine("mps2-an3860  another"));
+        assert!(!lists_machine(""));
     }
-    println!("set-up: rustup component add {name}");
-    must(Command::new("rustup").args(["component", "add", name])).is_ok()
+
+    #[test]
+    fn debians_toolchain_brings_its_linker_and_builds_the_library() {
+        let toolchain = Toolchain::debian(Path::new("/x/rust-lld"));
+        let command = toolchain.cargo(&["build", "--target", TARGET]);
+        let args: Vec<_> = command.get_args().collect();
+        assert_eq!(args[..4], ["build", "--target", TARGET, "-Zbuild-std=core"]);
+        let env: Vec<_> =
+            command.get_envs().filter_map(|(name, value)| Some((name.to_str()?, value?))).collect();
+        assert!(env.contains(&("CARGO_TARGET_THUMBV7EM_NONE_EABIHF_LINKER", "/x/rust-lld".as_ref())));
+        assert!(env.contains(&("RUSTC_BOOTSTRAP", "1".as_ref())));
+        assert!(!toolchain.has_clippy);
+    }
+
+    #[test]
+    fn the_linker_variable_names_the_target() {
+        let variable = format!("CARGO_TARGET_{}_LINKER", TARGET.to_uppercase().replace('-', "_"));
+        assert_eq!(Toolchain::debian(Path::new("l")).env[2].0, variable);
+    }
 }

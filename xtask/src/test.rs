@@ -1,141 +1,128 @@
-//! `cargo xtask test`: every test, one step after another, and a table of how they ended.
+//! `cargo xtask test`: every check in order, then a table and a count.
 
-use crate::build::{self, cargo, target_folder};
-use crate::process::must;
-use crate::setup::{self, TARGET};
-use crate::{image, root};
-use anyhow::{Result, bail};
-use std::time::Instant;
+use std::process::Command;
+use std::time::{Duration, Instant};
 
-type Step = (&'static str, fn() -> Result<()>);
+use anyhow::Result;
+use clap::ValueEnum;
 
-const STEPS: [Step; 9] = [
-    ("format", format),
-    ("clippy", clippy),
-    ("clippy-target", clippy_target),
-    ("docs", docs),
-    ("host", host),
-    ("loom", loom),
-    ("image", check_image),
-    ("machines", machines),
-    ("qemu", qemu),
-];
+use crate::build::{TARGET, cargo};
+use crate::cli::TestArgs;
+use crate::process::succeeds;
+use crate::setup::Setup;
+use crate::{build, image};
 
-/// Prints the names of the steps.
-pub fn list() {
-    for (name, _) in STEPS {
-        println!("{name}");
+/// The steps, in their order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Step {
+    /// The format of the sources
+    Fmt,
+    /// Lints on the host
+    ClippyHost,
+    /// Lints on the target
+    ClippyTarget,
+    /// The documentation builds without a warning
+    Doc,
+    /// Tests on the host, of every crate
+    Host,
+    /// The lock-free cells under every interleaving
+    Loom,
+    /// The image builds
+    Image,
+    /// No panic within an interrupt's reach, no double precision
+    ImageCheck,
+    /// The image builds for every folder of tables/
+    Machines,
+    /// The image in QEMU
+    Qemu,
+}
+
+/// How a step ended.
+#[derive(Clone, Debug, PartialEq, Eq)]
+enum Outcome {
+    Passed,
+    Failed,
+    /// Why it could not be done.
+    Skipped(String),
+}
+
+impl From<bool> for Outcome {
+    fn from(good: bool) -> Self {
+        if good { Self::Passed } else { Self::Failed }
     }
 }
 
-/// Runs the steps, all or those named.
-pub fn run(only: &[String]) -> Result<u8> {
-    if let Some(unknown) = only.iter().find(|name| STEPS.iter().all(|(known, _)| known != name)) {
-        bail!("--only {unknown}: must be one of {}", STEPS.map(|(name, _)| name).join(", "));
-    }
-    let mut results = Vec::new();
-    for (name, step) in
-        STEPS.iter().filter(|(name, _)| only.is_empty() || only.iter().any(|wanted| wanted == name))
-    {
-        println!("== {name}");
-        let began = Instant::now();
-        let outcome = step();
-        if let Err(error) = &outcome {
-            println!("{name}: {error:#}");
+/// The command.
+pub fn run(args: &TestArgs) -> Result<u8> {
+    let chosen = |step: &&Step| args.only.is_empty() || args.only.contains(step);
+    let steps: Vec<Step> = Step::value_variants().iter().filter(chosen).copied().collect();
+    if args.list {
+        for step in steps {
+            println!("{:<14} {}", name(step), about(step));
         }
-        results.push((name, outcome.is_ok(), began.elapsed().as_secs_f64()));
+        return Ok(0);
     }
-    println!();
-    for (name, passed, seconds) in &results {
-        println!("{name:16} {:6} {seconds:7.1} s", if *passed { "passed" } else { "FAILED" });
+    let mut setup = Setup::default();
+    let mut done = Vec::new();
+    for step in steps {
+        println!("\n== {}: {}", name(step), about(step));
+        let start = Instant::now();
+        let outcome = perform(step, &mut setup).unwrap_or_else(|error| {
+            eprintln!("error: {error:#}");
+            Outcome::Failed
+        });
+        if let Outcome::Skipped(reason) = &outcome {
+            println!("skipped: {reason}");
+        }
+        done.push((step, outcome, start.elapsed()));
     }
-    let passed = results.iter().filter(|(_, passed, _)| *passed).count();
-    let failed = results.len() - passed;
-    println!("{passed} passed, {failed} failed");
-    Ok(u8::from(failed > 0))
+    print!("{}", summary(&done));
+    Ok(u8::from(done.iter().any(|(_, outcome, _)| *outcome == Outcome::Failed)))
 }
 
-fn format() -> Result<()> {
-    if !setup::component("rustfmt") {
-        println!("rustfmt cannot be had here: not checked");
-        return Ok(());
-    }
-    must(cargo().args(["fmt", "--all", "--check"]))
-}
-
-fn clippy() -> Result<()> {
-    if !setup::component("clippy") {
-        println!("clippy cannot be had here: not checked");
-        return Ok(());
-    }
-    must(cargo().args([
-        "clippy",
-        "--quiet",
-        "--release",
-        "--workspace",
-        "--all-targets",
-        "--",
-        "-D",
-        "warnings",
-    ]))
-}
-
-fn clippy_target() -> Result<()> {
-    let toolchain = setup::toolchain()?;
-    if !setup::component("clippy") || toolchain != setup::Toolchain::Own {
-        println!("clippy for {TARGET} cannot be had here: not checked");
-        return Ok(());
-    }
-    let mut command = toolchain.cargo("clippy");
-    command.current_dir(root()).args([
-        "--quiet",
-        "--package",
-        "tractive",
-        "--lib",
-        "--bins",
-        "--",
-        "-D",
-        "warnings",
-    ]);
-    must(&mut command)
-}
-
-fn docs() -> Result<()> {
-    must(cargo().args(["doc", "--quiet", "--workspace", "--no-deps"]).env("RUSTDOCFLAGS", "-D warnings"))
-}
-
-fn host() -> Result<()> {
-    must(cargo().args(["test", "--quiet", "--release", "--workspace"]))
-}
-
-fn loom() -> Result<()> {
-    must(
-        cargo()
-            .args(["test", "--quiet", "--release", "--package", "tractive", "--test", "loom_cells"])
-            .env("RUSTFLAGS", "--cfg loom")
-            .env("CARGO_TARGET_DIR", target_folder().join("loom")),
-    )
-}
-
-fn check_image() -> Result<()> {
-    image::check(&build::image(None)?)
-}
-
-/// The image builds for another machine's folder too.
-fn machines() -> Result<()> {
-    let folder = root().join("tables/ipm-linear-5kw");
-    build::image(Some(&folder.to_string_lossy()))?;
-    // The default machine's image is the one that the next steps take.
-    build::image(None).map(|_| ())
-}
-
-fn qemu() -> Result<()> {
-    let (qemu, image) = (setup::qemu()?, build::image(None)?);
-    must(
-        cargo()
-            .args([
+fn perform(step: Step, setup: &mut Setup) -> Result<Outcome> {
+    let good = match step {
+        Step::Fmt if !setup.component("fmt", "rustfmt") => return Ok(no_component("rustfmt")),
+        Step::Fmt => succeeds(cargo().args(["fmt", "--all", "--", "--check"]))?,
+        Step::ClippyHost if !setup.component("clippy", "clippy") => return Ok(no_component("clippy")),
+        Step::ClippyHost => lint(&mut cargo(), &["--workspace", "--all-targets"])?,
+        Step::ClippyTarget if !setup.component("clippy", "clippy") => return Ok(no_component("clippy")),
+        Step::ClippyTarget => {
+            if !setup.toolchain()?.has_clippy {
+                return Ok(Outcome::Skipped(format!("clippy needs rustup's target {TARGET}")));
+            }
+            lint(&mut cargo(), &["--target", TARGET, "--package", "tractive", "--lib", "--bins"])?
+        }
+        Step::Doc => {
+            succeeds(cargo().env("RUSTDOCFLAGS", "-D warnings").args(["doc", "--no-deps", "--workspace"]))?
+        }
+        Step::Host => succeeds(cargo().args(["test", "--workspace", "--release"]))?,
+        Step::Loom => {
+            let mut command = cargo();
+            command.env("RUSTFLAGS", "--cfg loom").args(["test", "--release", "--package", "tractive"]);
+            command.args(["--test", "loom_cells", "--target-dir", "target/loom"]);
+            succeeds(&mut command)?
+        }
+        Step::Image => {
+            println!("{}", build::image(&setup.toolchain()?, None)?.display());
+            true
+        }
+        Step::ImageCheck => image::check(&build::image(&setup.toolchain()?, None)?)?,
+        Step::Machines => {
+            let toolchain = setup.toolchain()?;
+            for machine in crate::run::machine_names(build::root()) {
+                build::image(&toolchain, Some(&machine.clone().into()))?;
+                println!("{machine}");
+            }
+            true
+        }
+        Step::Qemu => {
+            let qemu = setup.qemu()?;
+            let image = build::image(&setup.toolchain()?, None)?;
+            let mut command = cargo();
+            command.env("TRACTIVE_IMAGE", image).env("TRACTIVE_QEMU", qemu);
+            command.args([
                 "test",
-                "--quiet",
                 "--release",
                 "--package",
                 "tractive-rig",
@@ -143,8 +130,68 @@ fn qemu() -> Result<()> {
                 "qemu",
                 "--",
                 "--ignored",
-            ])
-            .env("TRACTIVE_QEMU", qemu)
-            .env("TRACTIVE_IMAGE", image),
-    )
+            ]);
+            succeeds(&mut command)?
+        }
+    };
+    Ok(good.into())
+}
+
+fn lint(command: &mut Command, what: &[&str]) -> Result<bool> {
+    succeeds(command.arg("clippy").args(what).args(["--", "--deny", "warnings"]))
+}
+
+fn no_component(component: &str) -> Outcome {
+    Outcome::Skipped(format!("{component} is not installed and cannot be added"))
+}
+
+fn name(step: Step) -> String {
+    step.to_possible_value().map(|value| value.get_name().to_owned()).unwrap_or_default()
+}
+
+fn about(step: Step) -> String {
+    step.to_possible_value().and_then(|value| Some(value.get_help()?.to_string())).unwrap_or_default()
+}
+
+fn summary(done: &[(Step, Outcome, Duration)]) -> String {
+    let mut text = format!("\n{:<14} {:<8} {:>8}\n", "step", "result", "seconds");
+    for (step, outcome, took) in done {
+        let (result, note) = match outcome {
+            Outcome::Passed => ("passed", String::new()),
+            Outcome::Failed => ("FAILED", String::new()),
+            Outcome::Skipped(reason) => ("skipped", format!("  {reason}")),
+        };
+        text += &format!("{:<14} {result:<8} {:>8.1}{note}\n", name(*step), took.as_secs_f64());
+    }
+    let count = |wanted: Outcome| done.iter().filter(|(_, outcome, _)| *outcome == wanted).count();
+    text + &format!("\n{} passed, {} failed\n", count(Outcome::Passed), count(Outcome::Failed))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_summary_ends_with_the_count_alone_on_its_line() {
+        let second = Duration::from_millis(1_250);
+        let done = [
+            (Step::Fmt, Outcome::Passed, second),
+            (Step::ClippyTarget, Outcome::Skipped("no clippy".to_owned()), second),
+            (Step::ImageCheck, Outcome::Failed, second),
+            (Step::Qemu, Outcome::Passed, second),
+        ];
+        let text = summary(&done);
+        let lines: Vec<_> = text.lines().collect();
+        assert_eq!(lines.last(), Some(&"2 passed, 1 failed"));
+        assert_eq!(lines[1], "step           result    seconds");
+        assert_eq!(lines[3], "clippy-target  skipped       1.2  no clippy");
+        assert_eq!(lines[4], "image-check    FAILED        1.2");
+    }
+
+    #[test]
+    fn every_step_has_a_name_and_says_what_it_is() {
+        for step in Step::value_variants() {
+            assert!(!name(*step).is_empty() && !about(*step).is_empty());
+        }
+    }
 }

@@ -1,0 +1,104 @@
+//! What may be typed.
+
+use clap::{Args, Parser, Subcommand};
+
+use crate::test::Step;
+
+/// The chores of `tractive`.
+#[derive(Debug, Parser)]
+#[command(name = "cargo xtask", bin_name = "cargo xtask", version)]
+pub struct Cli {
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Set up what is missing, build, run a scenario
+    #[command(
+        override_usage = "cargo xtask run [SCENARIO] [--on qemu|host] [--out DIR] [--machine NAME|PATH] [OPTIONS]",
+        after_help = RUN_HELP
+    )]
+    Run(RunArgs),
+    /// Set up what is missing, run every check
+    Test(TestArgs),
+    /// Build the image and print what is in it
+    Image(ImageArgs),
+    /// Instructions per interrupt against their budgets (not available yet)
+    Timing(TimingArgs),
+    /// Build a board's image and flash it (not available yet)
+    Flash(FlashArgs),
+}
+
+const RUN_HELP: &str = "\
+  SCENARIO               what to run [default: sweep]
+  --on qemu|host         the firmware's image in QEMU, or its code on this machine [default: qemu]
+  --out DIR              where the files go [default: target/tractive/SCENARIO]
+  --machine NAME|PATH    a folder of tables/, or any folder with the same two files
+
+Every other option goes to the rig as it is: `cargo rig run --help` lists them.";
+
+#[derive(Args, Debug)]
+pub struct RunArgs {
+    // Read by `run::Request::parse`: what this program does not know is the rig's, wherever it stands.
+    #[arg(hide = true, trailing_var_arg = true, allow_hyphen_values = true)]
+    pub words: Vec<String>,
+}
+
+#[derive(Args, Debug)]
+pub struct TestArgs {
+    /// Only this step (may be repeated)
+    #[arg(long, value_enum, value_name = "STEP")]
+    pub only: Vec<Step>,
+    /// Name the steps and do nothing
+    #[arg(long)]
+    pub list: bool,
+}
+
+#[derive(Args, Debug)]
+pub struct ImageArgs {
+    /// As one JSON object
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[derive(Args, Debug)]
+pub struct TimingArgs {
+    /// As one JSON object
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[derive(Args, Debug)]
+pub struct FlashArgs {
+    /// The board
+    #[arg(long)]
+    pub board: Option<String>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_definition_is_sound() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn unknown_options_of_run_are_kept() {
+        let cli = Cli::try_parse_from(["xtask", "run", "--down", "--dt", "1e-4", "--on", "host"]).unwrap();
+        let Command::Run(args) = cli.command else { panic!("not run") };
+        assert_eq!(args.words, ["--down", "--dt", "1e-4", "--on", "host"]);
+    }
+
+    #[test]
+    fn test_takes_steps_by_name_and_refuses_others() {
+        let cli = Cli::try_parse_from(["xtask", "test", "--only", "fmt", "--only", "image-check"]).unwrap();
+        let Command::Test(args) = cli.command else { panic!("not test") };
+        assert_eq!(args.only, [Step::Fmt, Step::ImageCheck]);
+        let error = Cli::try_parse_from(["xtask", "test", "--only", "nonsense"]).unwrap_err();
+        assert_eq!(error.exit_code(), 2);
+    }
+}

@@ -1,0 +1,174 @@
+//! Which function may call which. Direct branches are decoded; where a function holds another one's address (put
+//! together by MOVW and MOVT, or as a literal) it is taken to call it; a function that branches through a register
+//! may besides go to any function whose address stands in the data.
+
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
+
+use crate::elf::Image;
+use crate::thumb::{Flow, decode};
+
+/// The calls of an image, by the addresses of its functions.
+#[derive(Debug, Default)]
+pub struct CallGraph {
+    calls: BTreeMap<u32, BTreeSet<u32>>,
+    /// Branches to where no function is: (function, address).
+    pub astray: Vec<(u32, u32)>,
+}
+
+impl CallGraph {
+    /// Reads every function of the image.
+    pub fn new(image: &Image) -> Self {
+        let in_data: BTreeSet<u32> =
+            image.data_words.iter().filter_map(|word| pointed_function(image, *word)).collect();
+        let mut graph = Self::default();
+        for (&start, function) in &image.functions {
+            let mut walk =
+                Walk { image, goes_to: BTreeSet::new(), holds: BTreeSet::new(), is_indirect: false };
+            walk.read(start, start.saturating_add(function.size));
+            let mut calls = walk.holds;
+            for target in walk.goes_to {
+                match image.function_at(target) {
+                    Some(function) => _ = calls.insert(function),
+                    None => graph.astray.push((start, target)),
+                }
+            }
+            if walk.is_indirect {
+                calls.extend(&in_data);
+            }
+            calls.remove(&start);
+            graph.calls.insert(start, calls);
+        }
+        graph
+    }
+
+    /// The shortest way from each function that can be reached from `start` back to it, by predecessor.
+    pub fn reach(&self, start: u32) -> BTreeMap<u32, Option<u32>> {
+        let mut came_from = BTreeMap::from([(start, None)]);
+        let mut queue = VecDeque::from([start]);
+        while let Some(caller) = queue.pop_front() {
+            for &callee in self.calls.get(&caller).into_iter().flatten() {
+                came_from.entry(callee).or_insert_with(|| {
+                    queue.push_back(callee);
+                    Some(caller)
+                });
+            }
+        }
+        came_from
+    }
+}
+
+/// The function a word points to, as a function pointer does: at its start, with the Thumb bit.
+fn pointed_function(image: &Image, word: u32) -> Option<u32> {
+    let start = word & !1;
+    (word & 1 == 1 && image.functions.contains_key(&start)).then_some(start)
+}
+
+struct Walk<'a> {
+    image: &'a Image,
+    goes_to: BTreeSet<u32>,
+    holds: BTreeSet<u32>,
+    is_indirect: bool,
+}
+
+impl Walk<'_> {
+    fn read(&mut self, start: u32, end: u32) {
+        let mut low_halves = [None; 16];
+        let mut at = start;
+        while at < end {
+            let Some(first) = self.image.half_word(at) else { return };
+            let is_code = self.image.mapping.range(..=at).next_back().is_none_or(|(_, is_code)| *is_code);
+            let second = self.image.half_word(at.wrapping_add(2)).unwrap_or(0);
+            if !is_code {
+                if at.is_multiple_of(4) {
+                    self.hold(u32::from(second) << 16 | u32::from(first));
+                }
+                at += 2;
+                continue;
+            }
+            let (flow, length) = decode(at, first, second);
+            match flow {
+                Flow::To(target) => _ = self.goes_to.insert(target),
+                Flow::Indirect => self.is_indirect = true,
+                Flow::Low { register, half } => low_halves[usize::from(register & 15)] = Some(half),
+                Flow::High { register, half } => {
+                    if let Some(low) = low_halves[usize::from(register & 15)] {
+                        self.hold(u32::from(half) << 16 | u32::from(low));
+                    }
+                }
+                Flow::Other => {}
+            }
+            at += length;
+        }
+    }
+
+    fn hold(&mut self, word: u32) {
+        self.holds.extend(pointed_function(self.image, word));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::elf::tests::small_elf;
+
+    fn graph(image: &Image, from: u32) -> Vec<u32> {
+        CallGraph::new(image).reach(from).into_keys().collect()
+    }
+
+    fn image(functions: &[(&str, u32, &[u16])]) -> Image {
+        Image::parse(&small_elf(0x100, functions)).unwrap()
+    }
+
+    #[test]
+    fn direct_calls_are_followed() {
+        // 0x100: bl 0x110, bx lr; 0x110: b.w 0x120; 0x130 stands alone.
+        let image = image(&[
+            ("a", 0x100, &[0xF000, 0xF806, 0x4770]),
+            ("b", 0x110, &[0xF000, 0xB806]),
+            ("c", 0x120, &[0x4770]),
+            ("d", 0x130, &[0x4770]),
+        ]);
+        assert_eq!(graph(&image, 0x100), [0x100, 0x110, 0x120]);
+        assert_eq!(graph(&image, 0x130), [0x130]);
+    }
+
+    #[test]
+    fn an_address_in_halves_or_as_a_literal_is_a_call() {
+        // movw r0, #0x121; movt r0, #0; blx r0.
+        let mut image = image(&[
+            ("a", 0x100, &[0xF240, 0x1021, 0xF2C0, 0x0000, 0x4780]),
+            ("literal", 0x110, &[0x4800, 0x4780, 0x0121, 0x0000]),
+            ("c", 0x120, &[0x4770]),
+        ]);
+        image.mapping = BTreeMap::from([(0x100, true), (0x114, false), (0x120, true)]);
+        assert_eq!(graph(&image, 0x100), [0x100, 0x120]);
+        assert_eq!(graph(&image, 0x110), [0x110, 0x120]);
+    }
+
+    #[test]
+    fn an_indirect_branch_may_go_to_any_function_in_the_data() {
+        let mut image = image(&[
+            ("indirect", 0x100, &[0x4718]),
+            ("direct", 0x110, &[0x4770]),
+            ("virtual", 0x120, &[0x4770]),
+        ]);
+        image.data_words.insert(0x121);
+        assert_eq!(graph(&image, 0x100), [0x100, 0x120]);
+        assert_eq!(graph(&image, 0x110), [0x110]);
+    }
+
+    #[test]
+    fn literals_are_not_taken_for_instructions() {
+        // The literal reads as `bl 0x110` if it is decoded.
+        let mut image = image(&[("a", 0x100, &[0x4770, 0xBF00, 0xF000, 0xF804]), ("b", 0x110, &[0x4770])]);
+        assert_eq!(graph(&image, 0x100), [0x100, 0x110]);
+        image.mapping = BTreeMap::from([(0x100, true), (0x104, false), (0x110, true)]);
+        assert_eq!(graph(&image, 0x100), [0x100]);
+    }
+
+    #[test]
+    fn a_branch_into_nowhere_is_kept() {
+        let image = image(&[("a", 0x100, &[0xF000, 0xF810, 0x4770])]);
+        assert_eq!(CallGraph::new(&image).astray, [(0x100, 0x124)]);
+    }
+}

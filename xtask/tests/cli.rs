@@ -1,0 +1,40 @@
+//! What the program answers to what is typed, as far as that needs no build.
+
+use std::process::{Command, Output};
+
+fn xtask(args: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_xtask")).args(args).output().expect("the program starts")
+}
+
+#[test]
+fn bad_usage_exits_with_2_and_says_why() {
+    for (args, why) in [
+        (&["nonsense"][..], "nonsense"),
+        (&[], "Usage"),
+        (&["run", "--on", "moon"], "--on moon: qemu or host is allowed"),
+        (&["run", "--machine", "no-such-machine"], "--machine no-such-machine"),
+        (&["run", "a/b"], "scenario `a/b`"),
+        (&["test", "--only", "nonsense"], "nonsense"),
+        (&["image", "--nonsense"], "--nonsense"),
+        (&["timing", "--json"], "not available yet"),
+        (&["flash", "--board", "any"], "not available yet"),
+    ] {
+        let output = xtask(args);
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{args:?}: {said}");
+        assert!(said.contains(why), "{args:?}: {said}");
+        assert!(output.stdout.is_empty(), "{args:?}");
+    }
+}
+
+#[test]
+fn help_and_the_list_of_steps_need_nothing() {
+    for args in [&["--help"][..], &["run", "--help"], &["run", "sweep", "--help"], &["test", "--help"]] {
+        let output = xtask(args);
+        assert_eq!(output.status.code(), Some(0), "{args:?}");
+        assert!(String::from_utf8_lossy(&output.stdout).contains("Usage: cargo xtask"), "{args:?}");
+    }
+    let list = xtask(&["test", "--list"]);
+    assert_eq!(list.status.code(), Some(0));
+    assert!(String::from_utf8_lossy(&list.stdout).lines().any(|line| line.starts_with("image-check ")));
+}
