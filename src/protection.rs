@@ -5,7 +5,7 @@
 
 #![forbid(unsafe_code)]
 
-use crate::control::Measurements;
+use crate::control::{Demand, Measurements};
 use crate::frames::{Abc, SQRT_3};
 use crate::machine::Ratings;
 use crate::time::Instant;
@@ -150,6 +150,12 @@ pub fn check_measurements(measured: &Measurements, omega: f32, ratings: &Ratings
         return Some((Fault::Overspeed, mechanical, ratings.trip_speed_rad_s));
     }
     None
+}
+
+/// The operator's demand: any finite number is a demand, which the envelope limits.
+pub fn check_demand(demand: &Demand) -> Option<Violation> {
+    let torque = demand.torque_nm;
+    if torque.is_finite() { None } else { Some((Fault::NotFinite, torque, f32::MAX)) }
 }
 
 /// Control periods for which a measurement may repeat to the last bit.

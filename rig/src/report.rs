@@ -113,7 +113,7 @@ fn chart(unit: &str, series: &[(&str, Vec<(f64, f64)>)]) -> Result<String> {
         x = (x.0.min(*t_s), x.1.max(*t_s));
         y = (y.0.min(*value), y.1.max(*value));
     }
-    if !(x.1 > x.0) {
+    if x.1.is_nan() || x.1 <= x.0 {
         x = (0.0, 1.0);
     }
     let room = 0.05 * (y.1 - y.0).max(1e-9);

@@ -79,6 +79,30 @@ pub struct Boundary {
     pub length_s: f32,
 }
 
+/// What a step works on.
+#[derive(Clone, Copy, Debug)]
+pub struct Input<'a> {
+    /// The present sample.
+    pub measured: &'a Measurements,
+    /// The operator's demand.
+    pub demand: &'a Demand,
+    /// What the modulator will do meanwhile.
+    pub committed: &'a Committed,
+    /// The carrier boundary that has passed since the last step, if one has.
+    pub boundary: Option<&'a Boundary>,
+}
+
+/// What the control law is built with.
+#[derive(Clone, Copy, Debug)]
+pub struct Law<'a> {
+    /// Gains of the current loop.
+    pub gains: &'a Gains,
+    /// The timers' clock.
+    pub clock: &'a Clock,
+    /// The machine.
+    pub tables: &'a Tables,
+}
+
 /// The voltage to make from now on.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VoltageVector {
@@ -144,16 +168,9 @@ impl Controller {
     }
 
     /// One control period: the voltage for the carrier half that begins at the horizon.
-    pub fn step(
-        &mut self,
-        measured: &Measurements,
-        demand: &Demand,
-        committed: &Committed,
-        boundary: Option<&Boundary>,
-        gains: &Gains,
-        clock: &Clock,
-        tables: &Tables,
-    ) -> Output {
+    pub fn step(&mut self, input: &Input, law: &Law) -> Output {
+        let Input { measured, demand, committed, boundary } = *input;
+        let Law { gains, clock, tables } = *law;
         let omega = self.speed.omega();
         let torque_nm = self.demand.step(demand, omega, clock.control_s(), &tables.ratings);
         let limit = VoltageLimit {

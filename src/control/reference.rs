@@ -107,7 +107,7 @@ fn flux_limit(
         return None;
     }
     let psi = sqrt(left) / speed;
-    Some(if psi < largest { psi } else { largest })
+    Some(if psi > largest { largest } else { psi })
 }
 
 /// The point on the circle of flux linkage `psi`, for either sign of torque.
@@ -116,7 +116,7 @@ fn weakened(torque_nm: f32, psi: f32, tables: &Tables) -> OperatingPoint {
     let torque = torque_nm.abs();
     let limited = torque > most;
     let torque = if limited { most } else { torque };
-    let share = if torque < circle { torque / circle } else { 1.0 };
+    let share = if torque > circle { 1.0 } else { torque / circle };
     let [d, q] = tables.weakening.currents.at(psi, 1.0 - sqrt(1.0 - share));
     let negative = torque_nm < 0.0;
     OperatingPoint {

@@ -7,7 +7,7 @@
 use super::messages::{Applied, Gates, Report, VoltageCommand};
 use crate::board::{ControlPort, PwmPort, Sample};
 use crate::cell::{Downlink, Uplink};
-use crate::control::{Boundary, Committed, Controller, Follows, Gains};
+use crate::control::{Boundary, Committed, Controller, Follows, Gains, Input, Law};
 use crate::frames::{Abc, AlphaBeta};
 use crate::machine::Tables;
 use crate::modulation::{
@@ -47,6 +47,13 @@ impl Shared {
     #[cfg(not(loom))]
     pub const fn new() -> Self {
         Self { command: Downlink::new(), applied: Uplink::new() }
+    }
+}
+
+#[cfg(not(loom))]
+impl Default for Shared {
+    fn default() -> Self {
+        Self::new()
     }
 }
 
@@ -94,6 +101,7 @@ impl ControlTask {
             &sample,
             port,
         );
+        self.check(protection::check_demand(&sample.demand), &sample, port);
         let pulsing = self.trip.is_none() && sample.enable && self.controller.speed_is_known();
         let mut report = Report { frequency_hz: omega / core::f32::consts::TAU, ..Report::default() };
         let mut command = VoltageCommand {
@@ -162,15 +170,14 @@ impl ControlTask {
         let now = command.reference.at;
         let committed = self.committed(applied, now, omega, sample.measured.udc_v);
         let boundary = self.new_boundary(applied, now, sample.measured.udc_v);
-        let output = self.controller.step(
-            &sample.measured,
-            &sample.demand,
-            &committed,
-            boundary.as_ref(),
-            &self.settings.gains,
-            &self.settings.clock,
-            self.tables,
-        );
+        let input = Input {
+            measured: &sample.measured,
+            demand: &sample.demand,
+            committed: &committed,
+            boundary: boundary.as_ref(),
+        };
+        let Settings { gains, clock, .. } = &self.settings;
+        let output = self.controller.step(&input, &Law { gains, clock, tables: self.tables });
         self.voltage_v = output.voltage.voltage_v;
         command.reference.voltage_v = output.voltage.voltage_v;
         command.reference.angle = output.voltage.angle;

@@ -9,10 +9,10 @@ use super::{CarrierPeriod, Devices, Mode, Reference};
 use crate::frames::limit;
 
 /// 4 sin 70° + 2 of equation (17): three notches at 70°, 90°, 110°.
-const SEVEN_PULSE_SUM: f32 = 5.758_770_5;
+const SEVEN_PULSE_SUM: f32 = 5.758_77;
 /// Two of equation (15): one notch at 90°.
 const THREE_PULSE_SUM: f32 = 2.0;
-/// Carrier halves in a sector of 60°, and their width in rad.
+/// Carrier halves in a sector of 60°.
 const fn halves_per_sector(mode: Mode) -> u32 {
     mode.carriers() / 3
 }
@@ -32,7 +32,7 @@ pub fn half_notch_rad(mode: Mode, voltage_v: f32, udc_v: f32) -> f32 {
 /// asin on 0 ..= 0.5, error below 2e-7 rad (the notch is at most 60° wide, its half 30°).
 fn asin_up_to_30_degrees(x: f32) -> f32 {
     let z = x * x;
-    let series = ((((4.216_32e-2 * z + 2.418_131_1e-2) * z + 4.547_002_7e-2) * z + 7.495_300_3e-2) * z
+    let series = ((((4.216_32e-2 * z + 2.418_131e-2) * z + 4.547_002_7e-2) * z + 7.495_300_3e-2) * z
         + 1.666_675_2e-1)
         * z;
     x + x * series
