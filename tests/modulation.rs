@@ -25,7 +25,7 @@ fn play(references: &[(f32, f32, f32)]) -> Vec<CarrierPeriod> {
     for (depth, hz, udc_v) in references {
         for _ in 0..40 {
             let reference = Reference {
-                voltage_v: depth * udc_v * 0.6366,
+                voltage_v: depth * udc_v * std::f32::consts::FRAC_2_PI,
                 angle,
                 rate: rate(*hz),
                 at: now,
@@ -49,10 +49,10 @@ proptest! {
             prop_assert!(half.period_ticks >= 1 && half.period_ticks <= 4 * devices().shortest_half_ticks);
             prop_assert!(half.mode != Mode::Off);
             let ons = half.on_ticks(0);
-            for phase in 0..3 {
-                prop_assert!(ons[phase] <= half.period_ticks);
+            for (on, compare) in ons.into_iter().zip(half.compare_ticks) {
+                prop_assert!(on <= half.period_ticks);
                 // A pulse that does not span the half's border is whole or has half its length at least.
-                let (compare, period) = (half.compare_ticks[phase], half.period_ticks);
+                let period = half.period_ticks;
                 if compare < period && compare > 0 {
                     prop_assert!(compare >= MIN_PULSE / 2 || period < MIN_PULSE, "{half:?}");
                     prop_assert!(period - compare >= MIN_PULSE / 2 || period < MIN_PULSE, "{half:?}");

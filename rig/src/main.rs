@@ -147,6 +147,7 @@ fn run(name: &str, options: &RunOptions) -> Result<ExitCode> {
     recording.write_edges(&out.join("edges.csv"))?;
     let summary = summary(scenario.as_ref(), options, &figures, &machine);
     trace::write_text(&out.join("summary.json"), &(serde_json::to_string_pretty(&summary)? + "\n"))?;
+    trace::write_text(&out.join("overview.svg"), &report::overview(&recording)?)?;
     trace::write_text(&out.join("report.html"), &page(scenario.as_ref(), options, &recording, &figures)?)?;
     if options.json {
         println!("{}", serde_json::to_string(&summary)?);

@@ -48,6 +48,7 @@ impl Scenario for Sweep {
     }
 
     fn plots(&self, recording: &Recording, page: &mut Page) {
+        page.overview(recording);
         page.plot(
             "Torque",
             "N·m",
