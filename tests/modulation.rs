@@ -27,6 +27,7 @@ fn play(references: &[(f32, f32, f32)]) -> Vec<CarrierPeriod> {
             let reference = Reference {
                 voltage_v: depth * udc_v * std::f32::consts::FRAC_2_PI,
                 angle,
+                carrier_angle: angle,
                 rate: rate(*hz),
                 at: now,
                 udc_v: *udc_v,
@@ -64,7 +65,7 @@ proptest! {
     #[test]
     fn nonsense_makes_no_endless_half(voltage in any::<f32>(), rate in any::<f32>(), udc in any::<f32>(), depth in any::<f32>()) {
         let mut modulator = Modulator::new(devices(), Schedule::new(&CLOCK));
-        let reference = Reference { voltage_v: voltage, angle: Angle(77), rate, at: Instant(0), udc_v: udc, depth };
+        let reference = Reference { voltage_v: voltage, angle: Angle(77), carrier_angle: Angle(77), rate, at: Instant(0), udc_v: udc, depth };
         for k in 0..10 {
             let half = modulator.step(Instant(k * 10_000), Some(&reference));
             prop_assert!(half.period_ticks >= 1 && half.period_ticks <= 4 * devices().shortest_half_ticks);
@@ -85,7 +86,7 @@ proptest! {
 
     #[test]
     fn words_come_back_as_they_went(period: u32, compare: [u32; 3], levels: [bool; 3], mode in 0..7_u32, half in 0..60_u8) {
-        let sent = CarrierPeriod { period_ticks: period, compare_ticks: compare, start_levels: levels, mode: Mode::from_code(mode), half };
+        let sent = CarrierPeriod { period_ticks: period, compare_ticks: compare, start_levels: levels, mode: Mode::from_code(mode), half, ahead: [Mode::from_code(mode), Mode::Mid3] };
         prop_assert_eq!(tractive::drive::half_from_words(tractive::drive::half_to_words(sent)), sent);
     }
 }
@@ -101,6 +102,7 @@ fn mean_voltage_of_every_carrier_half_is_the_reference() {
             let reference = Reference {
                 voltage_v: 600.0,
                 angle: Angle(turned),
+                carrier_angle: Angle(turned),
                 rate: rate(hz),
                 at: now,
                 udc_v: 1500.0,

@@ -82,6 +82,7 @@ fn reference(wanted: &Wanted, rate: f32, tick: u64) -> Reference {
     Reference {
         voltage_v: wanted.voltage_v as f32,
         angle: Angle(turned as u64 as u32) - Angle::DEG_90,
+        carrier_angle: Angle(turned as u64 as u32) - Angle::DEG_90,
         rate,
         at: Instant(tick as u32),
         udc_v: wanted.udc_v as f32,

@@ -48,39 +48,58 @@ pub struct Input<'a> {
     pub voltage_limit_v: f32,
 }
 
-/// The voltage for the carrier half that begins at the horizon, limited, in V, in the rotor frame that turns with it.
-pub fn step(input: &Input, gains: &Gains, tables: &Tables) -> Dq {
+/// Voltages for the carrier half that begins at the horizon, in V, in the rotor frame that turns with it.
+pub struct Output {
+    /// To be made; limited.
+    pub voltage: Dq,
+    /// Of the operating point alone; limited likewise.
+    pub steady: Dq,
+}
+
+/// One step of the loop.
+pub fn step(input: &Input, gains: &Gains, tables: &Tables) -> Output {
     let reference = flux_linkage(tables, input.current_reference);
     let predicted = predicted_flux(input, tables);
     let drop = input.current_reference * input.resistance - input.disturbance;
-    let interval_s = input.committed.interval_s;
+    let steady = reference.j() * input.omega + drop;
+    let limit = input.voltage_limit_v;
     match input.committed.follows {
         Follows::Mean => {
-            let x = 0.5 * input.omega * interval_s;
-            let half_turn = Angle::from_radians(x).sin_cos();
-            // Voltages that hold for a half move the flux along chords, so at the boundaries it stands outside the
-            // circle of its fundamental by x/sin x.
-            let error = predicted - reference * (1.0 + x * x * (1.0 / 6.0));
-            // Flux from ψ + e at the start of the half to ψ + (1 − g) e at its end, both in the rotor frame that
-            // turns by 2x meanwhile, seen from the frame in the middle of the half.
-            let remaining = 1.0 - gains.carrier;
-            let chord = reference.j() * (2.0 * x)
-                + error * ((remaining - 1.0) * half_turn.cos)
-                + error.j() * ((remaining + 1.0) * half_turn.sin);
-            shortened(chord * (1.0 / interval_s) + drop, input.voltage_limit_v)
+            let regulated = mean_voltage(input, reference, predicted, gains) + drop;
+            Output { voltage: shortened(regulated, limit), steady: shortened(steady, limit) }
         }
         Follows::Fundamental => {
-            let error = predicted - reference;
-            let feed_forward = reference.j() * input.omega + drop;
-            shortened(feed_forward - error * gains.pattern_rad_s, input.voltage_limit_v)
+            let regulated = steady - (predicted - reference) * gains.pattern_rad_s;
+            Output { voltage: shortened(regulated, limit), steady: shortened(steady, limit) }
         }
         Follows::Angle => {
-            let error = predicted - reference;
-            let feed_forward = reference.j() * input.omega + drop;
-            let wanted = feed_forward - error * (gains.square_damping * input.omega.abs());
-            lengthened(wanted, input.voltage_limit_v)
+            let damping = gains.square_damping * input.omega.abs();
+            let regulated = steady - (predicted - reference) * damping;
+            Output { voltage: lengthened(regulated, limit), steady: lengthened(steady, limit) }
         }
     }
+}
+
+/// The mean voltage of a carrier half that moves the flux from where it is predicted to where it should be, without the
+/// resistive drop.
+///
+/// Voltages that hold for a half move the flux along chords, so at the boundaries it stands outside the circle of its
+/// fundamental by x/sin x. The error e goes to (1 − g) e at the half's end, both in the rotor frame that turns by 2x
+/// meanwhile; all is seen from the frame in the middle of the half. Where a pattern gives way to another, the flux is
+/// led from the ripple of the one to the ripple of the other.
+fn mean_voltage(input: &Input, reference: Dq, predicted: Dq, gains: &Gains) -> Dq {
+    let committed = input.committed;
+    let x = 0.5 * input.omega * committed.interval_s;
+    let half_turn = Angle::from_radians(x).sin_cos();
+    let error = predicted - reference * (1.0 + x * x * (1.0 / 6.0));
+    let remaining = 1.0 - gains.carrier;
+    let chord = reference.j() * (2.0 * x)
+        + error * ((remaining - 1.0) * half_turn.cos)
+        + error.j() * ((remaining + 1.0) * half_turn.sin);
+    let middle = Angle::from_radians(input.omega * committed.horizon_s + x);
+    let steering =
+        (committed.ripple_after_wb - committed.ripple_wb).park((input.measured.angle + middle).sin_cos());
+    (chord + steering) * (1.0 / committed.interval_s)
 }
 
 /// Flux linkage at the horizon less the pattern's ripple, in the rotor frame there.

@@ -56,8 +56,10 @@ pub struct Committed {
     pub horizon_s: f32,
     /// Volt-seconds until then, in V·s; `None` while the gates are off.
     pub volt_seconds: Option<AlphaBeta>,
-    /// Ripple flux of the running pattern at that boundary, in Wb.
+    /// Ripple flux of the pattern at that boundary, in Wb.
     pub ripple_wb: AlphaBeta,
+    /// Ripple flux that is wanted at the end of the half that begins there, in Wb: the next pattern's, if it is to begin.
+    pub ripple_after_wb: AlphaBeta,
     /// Expected length of the carrier half that begins there, in s, greater than zero.
     pub interval_s: f32,
     /// What of the command the modulator's mode can follow.
@@ -110,6 +112,11 @@ pub struct VoltageVector {
     pub voltage_v: f32,
     /// Angle of the vector at the sample, as if it acted there already; it turns with `omega`.
     pub angle: Angle,
+    /// Likewise the angle that a locked carrier keeps to: that of the steady fundamental where pulses can regulate
+    /// without it, the vector's own where the angle is what regulates.
+    pub carrier_angle: Angle,
+    /// Fundamental of the operating point without regulation, peak phase, in V.
+    pub steady_v: f32,
     /// Electrical angular speed, in rad/s, signed.
     pub omega: f32,
     /// Fundamental that the MTPA point asks for at this speed, as a share of six-step.
@@ -198,10 +205,15 @@ impl Controller {
             gains,
             tables,
         );
+        let current_loop::Output { voltage, steady } = voltage;
+        let regulates_by_pulses = committed.follows == Follows::Mean;
+        let carrier = if regulates_by_pulses { steady } else { voltage };
         Output {
             voltage: VoltageVector {
                 voltage_v: voltage.length(),
                 angle: measured.angle + voltage.angle(),
+                carrier_angle: measured.angle + carrier.angle(),
+                steady_v: steady.length(),
                 omega,
                 depth: point.depth,
             },

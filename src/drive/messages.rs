@@ -26,12 +26,13 @@ pub struct VoltageCommand {
     pub gates: Gates,
 }
 
-impl Words<8> for VoltageCommand {
-    fn to_words(self) -> [u32; 8] {
+impl Words<9> for VoltageCommand {
+    fn to_words(self) -> [u32; 9] {
         let reference = self.reference;
         [
             reference.voltage_v.to_bits(),
             reference.angle.0,
+            reference.carrier_angle.0,
             reference.rate.to_bits(),
             reference.at.0,
             reference.udc_v.to_bits(),
@@ -41,12 +42,13 @@ impl Words<8> for VoltageCommand {
         ]
     }
 
-    fn from_words(words: [u32; 8]) -> Self {
-        let [voltage, angle, rate, at, udc, depth, valid_from, gates] = words;
+    fn from_words(words: [u32; 9]) -> Self {
+        let [voltage, angle, carrier_angle, rate, at, udc, depth, valid_from, gates] = words;
         Self {
             reference: Reference {
                 voltage_v: f32::from_bits(voltage),
                 angle: Angle(angle),
+                carrier_angle: Angle(carrier_angle),
                 rate: f32::from_bits(rate),
                 at: Instant(at),
                 udc_v: f32::from_bits(udc),
@@ -112,11 +114,13 @@ impl Words<27> for Applied {
     }
 }
 
-/// A carrier half as five words: period, three compares, and levels, mode and number packed.
+/// A carrier half as five words: period, three compares, and levels, modes and number packed.
 pub fn half_to_words(half: CarrierPeriod) -> [u32; 5] {
     let [u, v, w] = half.compare_ticks;
     let [lu, lv, lw] = half.start_levels.map(u32::from);
+    let [first, second] = half.ahead.map(|mode| mode as u32);
     let packed = lu | lv << 1 | lw << 2 | (half.mode as u32) << 8 | u32::from(half.half) << 16;
+    let packed = packed | first << 24 | second << 28;
     [half.period_ticks, u, v, w, packed]
 }
 
@@ -129,6 +133,7 @@ pub fn half_from_words(words: [u32; 5]) -> CarrierPeriod {
         start_levels: [packed & 1 != 0, packed & 2 != 0, packed & 4 != 0],
         mode: Mode::from_code(packed >> 8 & 0xFF),
         half: (packed >> 16) as u8,
+        ahead: [Mode::from_code(packed >> 24 & 0xF), Mode::from_code(packed >> 28)],
     }
 }
 

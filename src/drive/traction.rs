@@ -8,10 +8,10 @@ use super::messages::{Applied, Gates, Report, VoltageCommand};
 use crate::board::{ControlPort, PwmPort, Sample};
 use crate::cell::{Downlink, Uplink};
 use crate::control::{Boundary, Committed, Controller, Follows, Gains, Input, Law};
-use crate::frames::{Abc, AlphaBeta};
+use crate::frames::{Abc, AlphaBeta, Angle};
 use crate::machine::Tables;
 use crate::modulation::{
-    CarrierPeriod, Devices, Mode, Modulator, Reference, Schedule, depth_limit, ripple_flux,
+    CarrierPeriod, Devices, Mode, Modulator, Reference, Schedule, depth_limit, first_half, ripple_flux,
 };
 use crate::protection::{self, Fault, FrozenWatch, Trip, Violation};
 use crate::time::{Clock, Instant};
@@ -38,7 +38,7 @@ pub struct Settings {
 
 /// The cells between the two interrupts.
 pub struct Shared {
-    command: Downlink<VoltageCommand, 8>,
+    command: Downlink<VoltageCommand, 9>,
     applied: Uplink<Applied, 27>,
 }
 
@@ -67,8 +67,8 @@ pub struct ControlTask {
     now: Instant,
     /// Instant of the newest carrier boundary that was used.
     boundary: Option<Instant>,
-    /// The last commanded fundamental, in V.
-    voltage_v: f32,
+    /// The fundamental of the last operating point, in V.
+    steady_v: f32,
     trip: Option<Trip>,
 }
 
@@ -82,7 +82,7 @@ impl ControlTask {
             watch: FrozenWatch::new(),
             now: first,
             boundary: None,
-            voltage_v: 0.0,
+            steady_v: 0.0,
             trip: None,
         }
     }
@@ -108,6 +108,7 @@ impl ControlTask {
             reference: Reference {
                 voltage_v: 0.0,
                 angle: sample.measured.angle,
+                carrier_angle: sample.measured.angle,
                 rate: self.rate(omega),
                 at: now,
                 udc_v: sample.measured.udc_v,
@@ -129,7 +130,7 @@ impl ControlTask {
             self.controller.idle();
             self.watch = FrozenWatch::new();
             self.boundary = None;
-            self.voltage_v = 0.0;
+            self.steady_v = 0.0;
         }
         let finite = command.reference.voltage_v.is_finite() && command.reference.rate.is_finite();
         self.check(
@@ -178,9 +179,10 @@ impl ControlTask {
         };
         let Settings { gains, clock, .. } = &self.settings;
         let output = self.controller.step(&input, &Law { gains, clock, tables: self.tables });
-        self.voltage_v = output.voltage.voltage_v;
+        self.steady_v = output.voltage.steady_v;
         command.reference.voltage_v = output.voltage.voltage_v;
         command.reference.angle = output.voltage.angle;
+        command.reference.carrier_angle = output.voltage.carrier_angle;
         command.reference.depth = output.voltage.depth;
         command.gates = Gates::Pulse;
         report.torque_nm = output.torque_nm;
@@ -203,6 +205,7 @@ impl ControlTask {
                 horizon_s: 0.0,
                 volt_seconds: None,
                 ripple_wb: AlphaBeta::default(),
+                ripple_after_wb: AlphaBeta::default(),
                 interval_s,
                 follows: Follows::Mean,
                 depth_limit: depth_limit(Mode::Async, 0.0, &self.settings.devices),
@@ -213,24 +216,42 @@ impl ControlTask {
         let off = running.mode == Mode::Off || next.mode == Mode::Off;
         let left = running.period_ticks.saturating_sub(elapsed) + next.period_ticks;
         let volt_seconds = volt_seconds(running, elapsed, udc_v, clock) + volt_seconds(next, 0, udc_v, clock);
-        let mut ripple_wb =
-            ripple_flux(next.mode, u32::from(next.half) + 1, self.voltage_v, udc_v, omega.abs());
-        if applied.mirrored {
-            ripple_wb.beta = -ripple_wb.beta;
-        }
-        let largest = depth_limit(next.mode, self.rate(omega), &self.settings.devices);
+        let [decided, _] = next.ahead;
+        let largest = depth_limit(decided, self.rate(omega), &self.settings.devices);
+        let (ripple_wb, ripple_after_wb) = self.ripple(next, omega.abs(), udc_v, applied.mirrored);
         Committed {
             horizon_s: clock.seconds(left as i32),
             volt_seconds: (!off).then_some(volt_seconds),
             ripple_wb,
-            interval_s: clock.seconds(next.period_ticks as i32),
-            follows: match next.mode {
+            ripple_after_wb,
+            interval_s: match decided.carriers() {
+                0 => clock.seconds(self.settings.devices.shortest_half_ticks as i32),
+                carriers => core::f32::consts::PI / (carriers as f32 * omega.abs()),
+            },
+            follows: match decided {
                 Mode::Mid7 | Mode::Mid3 => Follows::Fundamental,
                 Mode::Square => Follows::Angle,
                 _ => Follows::Mean,
             },
-            depth_limit: if next.mode == Mode::Square { largest } else { REGULATION_ROOM * largest },
+            depth_limit: if decided == Mode::Square { largest } else { REGULATION_ROOM * largest },
         }
+    }
+
+    /// Ripple flux at the end of the committed half `next`, and the one wanted at the end of the half after it. Where a
+    /// pattern begins at the first of these, its own ripple is expected; where a carrier begins, what the old pattern leaves.
+    fn ripple(&self, next: &CarrierPeriod, omega: f32, udc_v: f32, mirrored: bool) -> (AlphaBeta, AlphaBeta) {
+        let [decided, after] = next.ahead;
+        let end = u32::from(next.half) + 1;
+        let number = |from: Mode, to: Mode, half: u32| {
+            if from == to { half } else { first_half(from, to, half, Angle::ZERO) }
+        };
+        let at = |mode: Mode, half: u32| {
+            let ripple = ripple_flux(mode, half, self.steady_v, udc_v, omega);
+            AlphaBeta { beta: if mirrored { -ripple.beta } else { ripple.beta }, ..ripple }
+        };
+        let begins = number(next.mode, decided, end);
+        let pattern = if decided.is_carrier() { at(next.mode, end) } else { at(decided, begins) };
+        (pattern, at(after, number(decided, after, begins + 1)))
     }
 
     /// The newest boundary, once.

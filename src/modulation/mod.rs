@@ -19,7 +19,7 @@ use crate::frames::Angle;
 use crate::time::{Clock, Instant};
 
 pub use ripple::ripple_flux;
-pub use schedule::{Schedule, depth_limit};
+pub use schedule::{Schedule, depth_limit, first_half};
 
 /// How the pulses are made.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -105,6 +105,8 @@ pub struct CarrierPeriod {
     /// Number of the half within the turn, for locked modes (in the mirrored turn when turning backward); otherwise
     /// 0 for the rising and 1 for the falling carrier.
     pub half: u8,
+    /// Modes of the two halves that follow, as far as they are decided.
+    pub ahead: [Mode; 2],
 }
 
 impl CarrierPeriod {
@@ -116,6 +118,7 @@ impl CarrierPeriod {
             start_levels: [false; 3],
             mode: Mode::Off,
             half: 0,
+            ahead: [Mode::Off; 2],
         }
     }
 
@@ -148,6 +151,8 @@ pub struct Reference {
     pub voltage_v: f32,
     /// Angle of the voltage vector at `at`.
     pub angle: Angle,
+    /// Angle of the vector to which a locked carrier keeps, at `at`: without what regulation adds for one half only.
+    pub carrier_angle: Angle,
     /// Angle units (2⁻³² turn) per tick by which it turns; negative backward.
     pub rate: f32,
     /// The instant of `angle`.
@@ -161,13 +166,21 @@ pub struct Reference {
 impl Reference {
     /// The voltage angle at an instant, extrapolated at constant rate.
     fn angle_at(&self, instant: Instant) -> Angle {
-        let turned = self.rate * instant.since(self.at) as f32;
-        self.angle + Angle(turned as i32 as u32)
+        self.angle + self.turned(instant)
+    }
+
+    /// The pulse angle at an instant: that of the carrier's vector and 90°.
+    fn pulse_at(&self, instant: Instant) -> Angle {
+        self.carrier_angle + self.turned(instant) + Angle::DEG_90
+    }
+
+    fn turned(&self, instant: Instant) -> Angle {
+        Angle((self.rate * instant.since(self.at) as f32) as i32 as u32)
     }
 
     /// The same fundamental in the mirror: turning forward.
     fn mirrored(self) -> Self {
-        Self { angle: -self.angle, rate: -self.rate, ..self }
+        Self { angle: -self.angle, carrier_angle: -self.carrier_angle, rate: -self.rate, ..self }
     }
 }
 
@@ -211,7 +224,19 @@ pub struct Modulator {
     /// Number of the half that comes next, in the numbering of [`CarrierPeriod::half`].
     next_half: u32,
     mirrored: bool,
+    plan: Option<Plan>,
 }
+
+/// A switch between locked modes that has been announced.
+#[derive(Clone, Copy, Debug)]
+struct Plan {
+    to: Mode,
+    /// Number, in the present mode, of the half that is the new mode's first.
+    at: u32,
+}
+
+/// Halves by which a switch between locked modes is announced.
+const AHEAD: u32 = 2;
 
 /// How much shorter or longer than nominal a locked half may be while it catches up with its angle. A triangular
 /// carrier's voltage has the right angle wherever its carrier stands, so it may take its time, and its ripple stays
@@ -222,7 +247,7 @@ const PATTERN_STRETCH: (f32, f32) = (0.5, 2.0);
 impl Modulator {
     /// A modulator at rest: its first half is `Off`.
     pub const fn new(devices: Devices, schedule: Schedule) -> Self {
-        Self { devices, schedule, mode: Mode::Off, next_half: 0, mirrored: false }
+        Self { devices, schedule, mode: Mode::Off, next_half: 0, mirrored: false, plan: None }
     }
 
     /// Whether the machine is seen in the mirror, because it turns backward.
@@ -234,11 +259,12 @@ impl Modulator {
     pub fn step(&mut self, start: Instant, reference: Option<&Reference>) -> CarrierPeriod {
         let Some(reference) = reference else {
             self.mode = Mode::Off;
+            self.plan = None;
             return CarrierPeriod::off(self.devices.shortest_half_ticks);
         };
         self.turn_mirror(reference.rate);
         let seen = if self.mirrored { reference.mirrored() } else { *reference };
-        let pulse = seen.angle_at(start) + Angle::DEG_90;
+        let pulse = seen.pulse_at(start);
         self.choose_mode(start, pulse, &seen);
         let mut half = if self.mode == Mode::Async {
             carrier::asynchronous(self.next_half, start, &seen, &self.devices)
@@ -247,6 +273,7 @@ impl Modulator {
         };
         half.mode = self.mode;
         half.half = self.next_half as u8;
+        half.ahead = self.ahead(self.next_half);
         let halves = if self.mode == Mode::Async { 2 } else { self.mode.carriers() * 2 };
         self.next_half = if self.next_half + 1 >= halves { 0 } else { self.next_half + 1 };
         if self.mirrored {
@@ -263,14 +290,44 @@ impl Modulator {
         }
     }
 
+    /// The mode of the half that begins at `start`. Between locked modes a switch is announced two halves ahead, so that
+    /// control can lead the flux to where the new pattern begins.
     fn choose_mode(&mut self, start: Instant, pulse: Angle, seen: &Reference) {
-        let wanted = self.schedule.wanted(start, self.mode, seen, &self.devices);
-        if wanted == self.mode || !schedule::may_switch(self.mode, wanted, self.next_half) {
+        if let Some(plan) = self.plan {
+            if plan.at == self.next_half {
+                self.switch_to(start, plan.to, pulse);
+            }
             return;
         }
-        self.next_half = schedule::first_half(self.mode, wanted, self.next_half, pulse);
-        self.mode = wanted;
+        let wanted = self.schedule.wanted(start, self.mode, seen, &self.devices);
+        if wanted == self.mode {
+            return;
+        }
+        if self.mode.carriers() > 0 && wanted.carriers() > 0 {
+            let at = (self.next_half + AHEAD) % (self.mode.carriers() * 2);
+            if schedule::may_switch(self.mode, wanted, at) {
+                self.plan = Some(Plan { to: wanted, at });
+            }
+        } else if schedule::may_switch(self.mode, wanted, self.next_half) {
+            self.switch_to(start, wanted, pulse);
+        }
+    }
+
+    fn switch_to(&mut self, start: Instant, mode: Mode, pulse: Angle) {
+        self.next_half = first_half(self.mode, mode, self.next_half, pulse);
+        self.mode = mode;
+        self.plan = None;
         self.schedule.switched(start);
+    }
+
+    /// Modes of the two halves that follow half number `half` of the present mode.
+    fn ahead(&self, half: u32) -> [Mode; 2] {
+        let Some(plan) = self.plan else {
+            return [self.mode; 2];
+        };
+        let halves = self.mode.carriers() * 2;
+        let left = (plan.at + halves - half) % halves;
+        [if left <= 1 { plan.to } else { self.mode }, if left <= AHEAD { plan.to } else { self.mode }]
     }
 
     /// One half of a carrier that is locked to the pulse angle.
