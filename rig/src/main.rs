@@ -186,7 +186,7 @@ fn page(
     recording: &Recording,
     figures: &Figures,
 ) -> Result<String> {
-    let mut page = Page::new(&format!("{}: {}", scenario.name(), scenario.figure()));
+    let mut page = Page::new(scenario.name(), scenario.figure());
     scenario.plots(recording, &mut page);
     page.finish(&format!("tractive {}, run on {}", env!("CARGO_PKG_VERSION"), options.on.name()), figures)
 }

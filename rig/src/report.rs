@@ -89,14 +89,21 @@ fn draw_panel(
 /// A page under construction.
 pub struct Page {
     title: String,
+    figure: String,
     body: String,
     error: Option<anyhow::Error>,
 }
 
 impl Page {
-    /// A page with the figure that it answers as its title.
-    pub fn new(title: &str) -> Self {
-        Self { title: title.to_owned(), body: String::new(), error: None }
+    /// A page whose plots answer a figure of the paper, such as "figure 8: load steps".
+    pub fn new(scenario: &str, figure: &str) -> Self {
+        let number = figure.split(':').next().unwrap_or(figure);
+        Self {
+            title: format!("{scenario}: {figure}"),
+            figure: format!("The paper's {number}"),
+            body: String::new(),
+            error: None,
+        }
     }
 
     /// Curves over the whole recording.
@@ -175,7 +182,8 @@ impl Page {
     fn draw(&mut self, title: &str, unit: &str, series: &[(&str, Vec<(f64, f64)>)]) {
         match chart(unit, series) {
             Ok(svg) => {
-                let _ = write!(self.body, "<h2>{}</h2>{}{svg}", escape(title), legend(series));
+                let heading = format!("{} · {title}", self.figure);
+                let _ = write!(self.body, "<h2>{}</h2>{}{svg}", escape(&heading), legend(series));
             }
             Err(error) => self.error = Some(error),
         }

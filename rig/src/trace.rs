@@ -140,7 +140,7 @@ impl Recording {
         })
     }
 
-    /// Writes edges.csv: edges within the recording, and at its beginning the gates that are on.
+    /// Writes edges.csv: edges within the recording.
     pub fn write_edges(&self, path: &Path) -> Result<()> {
         write_whole(path, |out| {
             out.write_record(["t_s", "gate", "level"])?;

@@ -274,8 +274,7 @@ impl Modulator {
         half.mode = self.mode;
         half.half = self.next_half as u8;
         half.ahead = self.ahead(self.next_half);
-        let halves = if self.mode == Mode::Async { 2 } else { self.mode.carriers() * 2 };
-        self.next_half = if self.next_half + 1 >= halves { 0 } else { self.next_half + 1 };
+        self.next_half = self.half_after(self.next_half, 1);
         if self.mirrored {
             half.compare_ticks.swap(1, 2);
             half.start_levels.swap(1, 2);
@@ -304,7 +303,7 @@ impl Modulator {
             return;
         }
         if self.mode.carriers() > 0 && wanted.carriers() > 0 {
-            let at = (self.next_half + AHEAD) % (self.mode.carriers() * 2);
+            let at = self.half_after(self.next_half, AHEAD);
             if schedule::may_switch(self.mode, wanted, at) {
                 self.plan = Some(Plan { to: wanted, at });
             }
@@ -325,9 +324,23 @@ impl Modulator {
         let Some(plan) = self.plan else {
             return [self.mode; 2];
         };
-        let halves = self.mode.carriers() * 2;
-        let left = (plan.at + halves - half) % halves;
-        [if left <= 1 { plan.to } else { self.mode }, if left <= AHEAD { plan.to } else { self.mode }]
+        let next = plan.at == self.half_after(half, 1);
+        let next_but_one = next || plan.at == self.half_after(half, AHEAD);
+        [if next { plan.to } else { self.mode }, if next_but_one { plan.to } else { self.mode }]
+    }
+
+    /// The number of the half that comes `later` halves (fewer than a turn) after number `half`.
+    const fn half_after(&self, half: u32, later: u32) -> u32 {
+        let (sum, turn) = (half + later, self.halves());
+        if sum >= turn { sum - turn } else { sum }
+    }
+
+    /// Halves after which the numbering begins anew: a turn of a locked carrier, a period of a free one.
+    const fn halves(&self) -> u32 {
+        match self.mode.carriers() {
+            0 => 2,
+            carriers => carriers * 2,
+        }
     }
 
     /// One half of a carrier that is locked to the pulse angle.

@@ -88,21 +88,21 @@ impl Generated {
         let MachineFolder { parameters, map } = machine;
         let smooth = SmoothMap::new(map);
         let optimum = Optimum::new(&smooth, parameters);
-        let half = Half::new(map);
+        let grid = CurrentGrid::new(map);
         let top = optimum.least_current(parameters.max_torque_nm);
         let top_flux = smooth.at(top.0, top.1);
         let regular = Regular {
             psi_f_wb: REGULAR_SHARE * top_flux.psi_d_wb.hypot(top_flux.psi_q_wb),
             saliency_h: REGULAR_SHARE * top_flux.psi_q_wb.abs() / top.1.abs().max(1e-9),
         };
-        let grid = ParameterGrid::new(&half, &smooth, &regular);
+        let mtpa = ParameterGrid::new(&grid, &smooth, &regular);
         let universal = universal();
         let factor = 1.5 * f64::from(parameters.pole_pairs);
         let start = (0..TORQUE_NODES)
             .map(|k| {
                 let torque = parameters.max_torque_nm * k as f64 / (TORQUE_NODES - 1) as f64;
                 let best = optimum.least_current(torque);
-                let passed = grid.two_passes(torque / factor, best, &universal);
+                let passed = mtpa.two_passes(torque / factor, best, &universal);
                 [best.0, best.1, best.0 - passed.0, best.1 - passed.1].map(|value| value as f32)
             })
             .collect();
@@ -111,12 +111,9 @@ impl Generated {
         Ok(Self {
             name: parameters.name.clone(),
             ratings: ratings(parameters, smooth.at(0.0, 0.0).psi_d_wb),
-            current_axes: (
-                Axis::new(map.id_a[0], map.id_a[map.id_a.len() - 1], map.id_a.len()),
-                Axis::new(0.0, half.iq_a[half.iq_a.len() - 1], half.iq_a.len()),
-            ),
-            flux: half.nodes.iter().map(|(d, q)| [*d as f32, *q as f32]).collect(),
-            parameters: grid.nodes.iter().map(|(psi, saliency)| [*psi as f32, *saliency as f32]).collect(),
+            current_axes: (axis_of(&grid.id_a), axis_of(&grid.iq_a)),
+            flux: grid.flux(&smooth),
+            parameters: mtpa.nodes.iter().map(|(psi, saliency)| [*psi as f32, *saliency as f32]).collect(),
             universal: universal.iter().map(|value| [*value as f32]).collect(),
             torque_axis: Axis::new(0.0, parameters.max_torque_nm, TORQUE_NODES),
             start,
@@ -127,23 +124,48 @@ impl Generated {
     }
 }
 
-/// The half of the map with iq ≥ 0.
-struct Half {
+/// The grid of the target's current tables: the folder's own for iq ≥ 0, unless that is too coarse to be read
+/// bilinearly or too fine to be stored; then it has another even step, and values from the smooth map.
+struct CurrentGrid {
     id_a: Vec<f64>,
     iq_a: Vec<f64>,
-    nodes: Vec<(f64, f64)>,
 }
 
-impl Half {
+impl CurrentGrid {
     fn new(map: &FluxMap) -> Self {
-        let columns = map.iq_a.len();
-        let centre = columns / 2;
-        let nodes = (0..map.id_a.len())
-            .flat_map(|r| (centre..columns).map(move |c| r * columns + c))
-            .map(|k| (map.psi_d_wb[k], map.psi_q_wb[k]))
-            .collect();
-        Self { id_a: map.id_a.clone(), iq_a: map.iq_a[centre..].to_vec(), nodes }
+        let last = map.iq_a.len() - 1;
+        // A grid of both signs may pass 0 between two nodes; its half then has a slightly smaller step.
+        let half = map.iq_a.len() / 2;
+        Self {
+            id_a: even_axis(map.id_a[0], map.id_a[map.id_a.len() - 1], intervals(map.id_a.len() - 1)),
+            iq_a: even_axis(0.0, map.iq_a[last], intervals(half)),
+        }
     }
+
+    fn flux(&self, smooth: &SmoothMap) -> Vec<[f32; 2]> {
+        let nodes = self.id_a.iter().flat_map(|id| self.iq_a.iter().map(|iq| smooth.at(*id, *iq)));
+        nodes.map(|at| [at.psi_d_wb as f32, at.psi_q_wb as f32]).collect()
+    }
+}
+
+/// Bounds of the number of cells along a current axis.
+const CELLS: std::ops::RangeInclusive<usize> = 20..=64;
+
+/// Cells along an axis: the folder's number, or the nearest multiple or fraction of it within bounds.
+fn intervals(own: usize) -> usize {
+    if own < *CELLS.start() {
+        own * CELLS.start().div_ceil(own)
+    } else {
+        own.div_ceil(own.div_ceil(*CELLS.end()))
+    }
+}
+
+fn even_axis(first: f64, last: f64, cells: usize) -> Vec<f64> {
+    (0..=cells).map(|k| first + (last - first) * k as f64 / cells as f64).collect()
+}
+
+fn axis_of(values: &[f64]) -> Axis {
+    Axis::new(values[0], values[values.len() - 1], values.len())
 }
 
 /// Least values of the parameters, so that nothing divides by zero.
@@ -160,19 +182,20 @@ struct ParameterGrid {
 }
 
 impl ParameterGrid {
-    fn new(half: &Half, smooth: &SmoothMap, regular: &Regular) -> Self {
-        let (mut nodes, columns) = (Vec::with_capacity(half.nodes.len()), half.iq_a.len());
-        for (r, id) in half.id_a.iter().enumerate() {
-            for (c, iq) in half.iq_a.iter().enumerate() {
-                let (psi_d, psi_q) = half.nodes[r * columns + c];
-                let here = smooth.at(*id, *iq);
-                let psi_f = smooth.at(0.0, *iq).psi_d_wb;
-                let ld = if *id == 0.0 { here.ldd_h } else { (psi_d - psi_f) / id };
-                let lq = if *iq == 0.0 { here.lqq_h } else { psi_q / iq };
+    fn new(grid: &CurrentGrid, smooth: &SmoothMap, regular: &Regular) -> Self {
+        let step_d = grid.id_a[1] - grid.id_a[0];
+        let mut nodes = Vec::with_capacity(grid.id_a.len() * grid.iq_a.len());
+        for &id in &grid.id_a {
+            for &iq in &grid.iq_a {
+                let here = smooth.at(id, iq);
+                let psi_f = smooth.at(0.0, iq).psi_d_wb;
+                // The static inductances' limits on the axes are the incremental ones.
+                let ld = if id.abs() < 1e-6 * step_d { here.ldd_h } else { (here.psi_d_wb - psi_f) / id };
+                let lq = if iq == 0.0 { here.lqq_h } else { here.psi_q_wb / iq };
                 nodes.push((psi_f.max(regular.psi_f_wb), (lq - ld).max(regular.saliency_h)));
             }
         }
-        Self { id_a: half.id_a.clone(), iq_a: half.iq_a.clone(), nodes }
+        Self { id_a: grid.id_a.clone(), iq_a: grid.iq_a.clone(), nodes }
     }
 
     fn bilinear(&self, id: f64, iq: f64) -> (f64, f64) {

@@ -45,19 +45,27 @@ impl MachineFolder {
         Ok(machine)
     }
 
-    /// The largest torque must be within reach of the largest current.
+    /// The largest torque must be within reach of the largest current, and its best point on the map.
     fn check_torque(&self, file: &Path) -> Result<(), InputError> {
         let parameters = &self.parameters;
         let smooth = SmoothMap::new(&self.map);
-        let reach = Optimum::new(&smooth, parameters).most_torque_nm();
+        let optimum = Optimum::new(&smooth, parameters);
+        let reach = optimum.most_torque_nm();
+        let refuse = |allowed: String| {
+            let problem = format!("max_torque_nm: {}: must be {allowed}", parameters.max_torque_nm);
+            Err(InputError::new(file, parameters.line_of("max_torque_nm"), problem))
+        };
         if parameters.max_torque_nm > reach {
-            return Err(InputError::new(
-                file,
-                parameters.line_of("max_torque_nm"),
-                format!(
-                    "max_torque_nm: {}: must be at most {reach:.1}, what the flux map gives at max_current_a {}",
-                    parameters.max_torque_nm, parameters.max_current_a
-                ),
+            return refuse(format!(
+                "at most {reach:.1}, what the flux map gives at max_current_a {}",
+                parameters.max_current_a
+            ));
+        }
+        let (id, iq) = optimum.least_current(parameters.max_torque_nm);
+        let last = self.map.id_a[self.map.id_a.len() - 1];
+        if id > last {
+            return refuse(format!(
+                "reachable with least current at id up to {last}, not at id {id:.1}, iq {iq:.1}: d must lie along the magnets, or along the higher reluctance"
             ));
         }
         Ok(())

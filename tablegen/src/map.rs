@@ -17,8 +17,11 @@ pub struct FluxMap {
 }
 
 const COLUMNS: [&str; 4] = ["id_a", "iq_a", "psi_d_wb", "psi_q_wb"];
+/// Largest current and flux linkage of any machine that this controller could drive.
+const LARGEST_CURRENT_A: f64 = 1e5;
+const LARGEST_FLUX_WB: f64 = 1e3;
 /// Deviation from an even grid that is rounding, as a share of the step.
-const STEP_TOLERANCE: f64 = 1e-6;
+const STEP_TOLERANCE: f64 = 1e-3;
 /// Deviation from ψd even, ψq odd in iq that is measurement, as a share of the largest flux.
 const SYMMETRY_TOLERANCE: f64 = 0.01;
 /// Deviation between ∂ψd/∂iq and ∂ψq/∂id that is measurement, as a share of the largest self inductance.
@@ -46,8 +49,10 @@ impl FluxMap {
         check_monotone(&nodes, iq_a.len(), file)?;
         let whole =
             if iq_a[0] < 0.0 { check_even(&nodes, &iq_a, file)? } else { mirror(&nodes, &iq_a, file)? };
-        check_reciprocity(&whole, &nodes, file)?;
-        Ok(Self { id_a, ..whole })
+        let map = Self { id_a, ..whole };
+        map.check_reciprocity(&nodes, file)?;
+        map.check_invertible(&nodes, file)?;
+        Ok(map)
     }
 
     /// The grid must cover currents up to `max_current_a`.
@@ -72,28 +77,40 @@ impl FluxMap {
 
 fn read_nodes(file: &Path) -> Result<Vec<Node>, InputError> {
     let refuse = |line: Option<u64>, problem: String| InputError::new(file, line, problem);
+    let text = std::fs::read(file).map_err(|error| refuse(None, format!("cannot be read: {error}")))?;
+    let line_of = |position: &csv::Position| line_of(&text, position);
     let mut reader = csv::ReaderBuilder::new()
         .comment(Some(b'#'))
         .trim(csv::Trim::All)
-        .from_path(file)
-        .map_err(|error| refuse(None, format!("cannot be read: {error}")))?;
+        .flexible(true)
+        .from_reader(text.as_slice());
     let headers = reader.headers().map_err(|error| refuse(None, error.to_string()))?;
     if headers.iter().ne(COLUMNS) {
-        let line = headers.position().map(csv::Position::line);
+        let line = headers.position().map(line_of);
         let found = headers.iter().collect::<Vec<_>>().join(",");
         return Err(refuse(line, format!("header: {found}: must be {}", COLUMNS.join(","))));
     }
     let mut nodes = Vec::new();
     for record in reader.records() {
         let record = record.map_err(|error| {
-            let line = error.position().map(csv::Position::line);
-            refuse(line, format!("{error}: must be four numbers"))
+            let line = error.position().map(line_of);
+            refuse(line, format!("{}: {error}: must be four numbers", COLUMNS.join(",")))
         })?;
-        let line = record.position().map_or(0, csv::Position::line);
+        let line = record.position().map_or(0, line_of);
+        if record.len() != COLUMNS.len() {
+            let found = record.iter().collect::<Vec<_>>().join(",");
+            let problem = format!("{}: {found}: must be four numbers", COLUMNS.join(","));
+            return Err(refuse(Some(line), problem));
+        }
         let mut values = [0.0; 4];
         for ((value, field), column) in values.iter_mut().zip(&record).zip(COLUMNS) {
+            let largest = if column.ends_with("_a") { LARGEST_CURRENT_A } else { LARGEST_FLUX_WB };
             *value = match field.parse::<f64>() {
-                Ok(number) if number.is_finite() => number,
+                Ok(number) if number.is_finite() && number.abs() <= largest => number,
+                Ok(number) if number.is_finite() => {
+                    let problem = format!("{column}: {field}: must be from {} to {largest}", -largest);
+                    return Err(refuse(Some(line), problem));
+                }
                 _ => return Err(refuse(Some(line), format!("{column}: {field}: must be a finite number"))),
             };
         }
@@ -101,6 +118,14 @@ fn read_nodes(file: &Path) -> Result<Vec<Node>, InputError> {
         nodes.push(Node { line, id, iq, psi_d, psi_q });
     }
     Ok(nodes)
+}
+
+/// The line of the record that the reader begins to look for at a position: it counts from before the comments and empty
+/// lines that it skips.
+fn line_of(text: &[u8], position: &csv::Position) -> u64 {
+    let rest = text.get(position.byte() as usize..).unwrap_or_default();
+    let skipped = |line: &&[u8]| line.first().is_none_or(|first| *first == b'#' || *first == b'\r');
+    position.line() + rest.split(|byte| *byte == b'\n').take_while(skipped).count() as u64
 }
 
 /// The grid's axes: the distinct values, evenly spaced.
@@ -114,13 +139,16 @@ fn axes(nodes: &[Node], file: &Path) -> Result<(Vec<f64>, Vec<f64>), InputError>
             return Err(InputError::new(file, None, format!("{name}: {count} values: must be at least 4")));
         }
         let last = values.len() - 1;
-        let step = (values[last].0 - values[0].0) / last as f64;
-        for (k, (found, line)) in values.iter().enumerate() {
-            let even = values[0].0 + step * k as f64;
-            if (found - even).abs() > STEP_TOLERANCE * step {
-                let problem = format!("{name}: {found}: must be {even}, on an even grid of step {step}");
-                return Err(InputError::new(file, Some(*line), problem));
-            }
+        let mean = (values[last].0 - values[0].0) / last as f64;
+        let off = |k: usize, step: f64| (values[k].0 - values[0].0 - step * k as f64).abs();
+        if (0..=last).any(|k| off(k, mean) > STEP_TOLERANCE * mean) {
+            // The first that leaves the first step is the one to look at.
+            let step = values[1].0 - values[0].0;
+            let odd = (2..=last).find(|k| off(*k, step) > STEP_TOLERANCE * step).unwrap_or(last);
+            let (found, line) = values[odd];
+            let even = values[0].0 + step * odd as f64;
+            let problem = format!("{name}: {found}: must be {even}, on an even grid of step {step}");
+            return Err(InputError::new(file, Some(line), problem));
         }
         Ok(values.into_iter().map(|(value, _)| value).collect::<Vec<_>>())
     };
@@ -245,41 +273,83 @@ fn mirror(nodes: &[Node], iq: &[f64], file: &Path) -> Result<FluxMap, InputError
     Ok(FluxMap { id_a: Vec::new(), iq_a: negative.chain(iq.iter().copied()).collect(), psi_d_wb, psi_q_wb })
 }
 
-/// ∂ψd/∂iq = ∂ψq/∂id: a machine that stores energy and gives it back. Checked on every cell by the circulation of
-/// ψ around it.
-fn check_reciprocity(map: &FluxMap, nodes: &[Node], file: &Path) -> Result<(), InputError> {
-    let columns = map.iq_a.len();
-    let rows = map.psi_d_wb.len() / columns;
-    let step_d = (nodes[nodes.len() - 1].id - nodes[0].id) / (rows - 1) as f64;
-    let step_q = map.iq_a[1] - map.iq_a[0];
-    let node = |r: usize, c: usize| (map.psi_d_wb[r * columns + c], map.psi_q_wb[r * columns + c]);
-    let mut self_h: f64 = 0.0;
-    let mut worst = (0.0, 0, 0, 0.0, 0.0);
-    for r in 0..rows - 1 {
-        for c in 0..columns - 1 {
-            let (a, b, d, e) = (node(r, c), node(r, c + 1), node(r + 1, c), node(r + 1, c + 1));
-            self_h = self_h.max((d.0 - a.0) / step_d).max((b.1 - a.1) / step_q);
-            let ldq = 0.5 * ((b.0 - a.0) + (e.0 - d.0)) / step_q;
-            let lqd = 0.5 * ((d.1 - a.1) + (e.1 - b.1)) / step_d;
-            if (ldq - lqd).abs() > worst.0 {
-                worst = ((ldq - lqd).abs(), r, c, ldq, lqd);
+/// Mean incremental inductances of a cell, in H, and the current of its first corner.
+struct Cell {
+    id: f64,
+    iq: f64,
+    ldd: f64,
+    ldq: f64,
+    lqd: f64,
+    lqq: f64,
+}
+
+impl FluxMap {
+    fn cells(&self) -> impl Iterator<Item = Cell> + '_ {
+        let (rows, columns) = (self.id_a.len(), self.iq_a.len());
+        let (step_d, step_q) = (self.id_a[1] - self.id_a[0], self.iq_a[1] - self.iq_a[0]);
+        let all = (0..rows - 1).flat_map(move |r| (0..columns - 1).map(move |c| (r, c)));
+        all.map(move |(r, c)| {
+            let corner = |values: &[f64], dr: usize, dc: usize| values[(r + dr) * columns + c + dc];
+            let along_d = |values: &[f64]| {
+                0.5 * (corner(values, 1, 0) - corner(values, 0, 0) + corner(values, 1, 1)
+                    - corner(values, 0, 1))
+                    / step_d
+            };
+            let along_q = |values: &[f64]| {
+                0.5 * (corner(values, 0, 1) - corner(values, 0, 0) + corner(values, 1, 1)
+                    - corner(values, 1, 0))
+                    / step_q
+            };
+            Cell {
+                id: self.id_a[r],
+                iq: self.iq_a[c],
+                ldd: along_d(&self.psi_d_wb),
+                ldq: along_q(&self.psi_d_wb),
+                lqd: along_d(&self.psi_q_wb),
+                lqq: along_q(&self.psi_q_wb),
             }
+        })
+    }
+
+    /// ∂ψd/∂iq = ∂ψq/∂id: a machine stores energy and gives it back. With the means over a cell this says that ψ does
+    /// not circulate around it.
+    fn check_reciprocity(&self, nodes: &[Node], file: &Path) -> Result<(), InputError> {
+        let self_h = self.cells().map(|cell| cell.ldd.max(cell.lqq)).fold(0.0, f64::max);
+        let tolerance = RECIPROCITY_TOLERANCE * self_h;
+        let gap = |cell: &Cell| (cell.ldq - cell.lqd).abs();
+        let worst = self.cells().max_by(|a, b| gap(a).total_cmp(&gap(b)));
+        match worst {
+            Some(cell) if gap(&cell) > tolerance => Err(InputError::new(
+                file,
+                line_at(nodes, &cell),
+                format!(
+                    "psi_d_wb,psi_q_wb: dpsi_d/diq {:.3e} H and dpsi_q/did {:.3e} H from id {}, iq {} on: must agree within {tolerance:.3e} H",
+                    cell.ldq, cell.lqd, cell.id, cell.iq
+                ),
+            )),
+            _ => Ok(()),
         }
     }
-    let (gap, r, c, ldq, lqd) = worst;
-    if gap <= RECIPROCITY_TOLERANCE * self_h {
-        return Ok(());
+
+    /// Ldd Lqq > Ldq Lqd: one current for one flux linkage.
+    fn check_invertible(&self, nodes: &[Node], file: &Path) -> Result<(), InputError> {
+        match self.cells().find(|cell| cell.ldd * cell.lqq <= cell.ldq * cell.lqd) {
+            Some(cell) => Err(InputError::new(
+                file,
+                line_at(nodes, &cell),
+                format!(
+                    "psi_d_wb,psi_q_wb: cross inductances {:.3e} H and {:.3e} H from id {}, iq {} on: their product must be below that of the self inductances {:.3e} H and {:.3e} H",
+                    cell.ldq, cell.lqd, cell.id, cell.iq, cell.ldd, cell.lqq
+                ),
+            )),
+            None => Ok(()),
+        }
     }
-    let (id, iq) = (nodes[0].id + step_d * r as f64, map.iq_a[c]);
-    let at = nodes
-        .iter()
-        .find(|node| (node.id - id).abs() < 0.5 * step_d && (node.iq - iq.abs()).abs() < 0.5 * step_q);
-    Err(InputError::new(
-        file,
-        at.map(|node| node.line),
-        format!(
-            "psi_d_wb,psi_q_wb: near id {id}, iq {iq}: dpsi_d/diq {ldq:.3e} H and dpsi_q/did {lqd:.3e} H: must agree within {:.3e} H",
-            RECIPROCITY_TOLERANCE * self_h
-        ),
-    ))
+}
+
+/// The line of a cell's first corner, or of its mirror image.
+fn line_at(nodes: &[Node], cell: &Cell) -> Option<u64> {
+    let own = nodes.iter().find(|node| (node.id, node.iq) == (cell.id, cell.iq));
+    let image = || nodes.iter().find(|node| (node.id, node.iq) == (cell.id, -cell.iq));
+    own.or_else(image).map(|node| node.line)
 }

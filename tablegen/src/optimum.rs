@@ -29,8 +29,8 @@ impl<'a> Optimum<'a> {
     /// The most torque of a current magnitude, and its angle from the q axis towards −d, in rad.
     fn at_magnitude(&self, current_a: f64) -> (f64, f64) {
         let torque = |angle: f64| self.torque_nm(-current_a * angle.sin(), current_a * angle.cos());
-        // The optimum may lie slightly on the other side of the q axis for a machine with L_d > L_q.
-        let angle = largest(-0.5, std::f64::consts::FRAC_PI_2, torque);
+        // The optimum lies on the other side of the q axis for a machine with L_d > L_q.
+        let angle = largest(-std::f64::consts::FRAC_PI_4, std::f64::consts::FRAC_PI_2, torque);
         (torque(angle), angle)
     }
 

@@ -73,7 +73,7 @@ impl Parameters {
             let line = error.span().map(|span| line_at(&text, span.start));
             InputError::new(file, line, format!("not TOML: {}", error.message()))
         })?;
-        let mut keys = Keys::new(file, &text, table.into_inner())?;
+        let keys = Keys::new(file, &text, table.into_inner())?;
         let parameters = keys.parameters()?;
         parameters.check(file)?;
         Ok(parameters)
@@ -157,11 +157,18 @@ const OPTIONAL: [&str; 8] = [
 /// The file's keys with their lines.
 struct Keys<'a> {
     file: &'a Path,
-    values: BTreeMap<String, (DeValue<'a>, u64)>,
+    values: BTreeMap<String, Value<'a>>,
+}
+
+/// A key's value, as parsed and as written.
+struct Value<'a> {
+    parsed: DeValue<'a>,
+    written: &'a str,
+    line: u64,
 }
 
 impl<'a> Keys<'a> {
-    fn new(file: &'a Path, text: &str, table: DeTable<'a>) -> Result<Self, InputError> {
+    fn new(file: &'a Path, text: &'a str, table: DeTable<'a>) -> Result<Self, InputError> {
         let mut values = BTreeMap::new();
         for (key, value) in table {
             let line = line_at(text, Spanned::span(&key).start);
@@ -169,7 +176,8 @@ impl<'a> Keys<'a> {
             if !REQUIRED.contains(&name.as_str()) && !OPTIONAL.contains(&name.as_str()) {
                 return Err(InputError::new(file, Some(line), unknown(&name)));
             }
-            values.insert(name, (value.into_inner(), line));
+            let written = &text[value.span()];
+            values.insert(name, Value { parsed: value.into_inner(), written, line });
         }
         match REQUIRED.iter().find(|key| !values.contains_key(**key)) {
             Some(key) => Err(InputError::new(file, None, format!("{key}: missing: must be given"))),
@@ -177,9 +185,10 @@ impl<'a> Keys<'a> {
         }
     }
 
-    fn refuse(&self, key: &str, value: &str, allowed: &str) -> InputError {
-        let line = self.values.get(key).map(|(_, line)| *line);
-        InputError::new(self.file, line, format!("{key}: {value}: must be {allowed}"))
+    fn refuse(&self, key: &str, allowed: &str) -> InputError {
+        let (line, written) =
+            self.values.get(key).map_or((None, ""), |value| (Some(value.line), value.written));
+        InputError::new(self.file, line, format!("{key}: {written}: must be {allowed}"))
     }
 
     /// A number in a range; `default` where the key is absent.
@@ -189,33 +198,38 @@ impl<'a> Keys<'a> {
         range: std::ops::RangeInclusive<f64>,
         default: f64,
     ) -> Result<f64, InputError> {
-        let Some((value, _)) = self.values.get(key) else {
+        let Some(value) = self.values.get(key) else {
             return Ok(default);
         };
-        let allowed = format!("a number from {} to {}", range.start(), range.end());
-        let text = match value {
-            DeValue::Float(number) => number.as_str(),
-            DeValue::Integer(number) => number.as_str(),
-            other => return Err(self.refuse(key, other.type_str(), &allowed)),
+        let number = match &value.parsed {
+            DeValue::Float(number) => number.as_str().replace('_', "").parse().ok(),
+            DeValue::Integer(number) if number.radix() == 10 => number.as_str().replace('_', "").parse().ok(),
+            _ => None,
         };
-        let number: f64 = text.replace('_', "").parse().map_err(|_| self.refuse(key, text, &allowed))?;
-        // A range holds neither NaN nor infinity.
-        if range.contains(&number) { Ok(number) } else { Err(self.refuse(key, text, &allowed)) }
+        match number {
+            // A range holds neither NaN nor infinity.
+            Some(number) if range.contains(&number) => Ok(number),
+            _ => {
+                let allowed = if *range.start() == ABOVE_ZERO {
+                    format!("a number above 0, up to {}", range.end())
+                } else {
+                    format!("a number from {} to {}", range.start(), range.end())
+                };
+                Err(self.refuse(key, &allowed))
+            }
+        }
     }
 
-    fn parameters(&mut self) -> Result<Parameters, InputError> {
+    fn parameters(&self) -> Result<Parameters, InputError> {
         let name = match self.values.get("name") {
-            Some((DeValue::String(name), _)) if !name.trim().is_empty() => name.to_string(),
-            Some((other, _)) => {
-                return Err(self.refuse("name", other.type_str(), "a text that is not empty"));
-            }
-            None => String::new(),
+            Some(Value { parsed: DeValue::String(name), .. }) if !name.trim().is_empty() => name.to_string(),
+            _ => return Err(self.refuse("name", "a text in quotes that is not empty")),
         };
         let pole_pairs = self.number("pole_pairs", 1.0..=100.0, 0.0)?;
         if pole_pairs.fract() != 0.0 {
-            return Err(self.refuse("pole_pairs", &pole_pairs.to_string(), "a whole number from 1 to 100"));
+            return Err(self.refuse("pole_pairs", "a whole number from 1 to 100"));
         }
-        let above_zero = |key: &str, most: f64, default: f64| self.number(key, 1e-9..=most, default);
+        let above_zero = |key: &str, most: f64, default: f64| self.number(key, ABOVE_ZERO..=most, default);
         let max_current_a = above_zero("max_current_a", 1e5, 0.0)?;
         let max_speed_rpm = above_zero("max_speed_rpm", 1e6, 0.0)?;
         let max_torque_nm = above_zero("max_torque_nm", 1e7, 0.0)?;
@@ -243,21 +257,50 @@ impl<'a> Keys<'a> {
             rotor_inertia_kg_m2: above_zero("rotor_inertia_kg_m2", 1e7, 1.0)?,
             loss_rated_w: self.number("loss_rated_w", 0.0..=1e8, 0.0)?,
             loss_quadratic_fraction: self.number("loss_quadratic_fraction", 0.0..=1.0, 0.6)?,
-            lines: self.values.iter().map(|(key, (_, line))| (key.clone(), *line)).collect(),
+            lines: self.values.iter().map(|(key, value)| (key.clone(), value.line)).collect(),
         })
     }
 }
 
-/// Tells an unknown key, and which one was probably meant: the same words with another unit.
+/// Tells an unknown key, and which one was probably meant: the same quantity in another unit, or a slip of the pen.
 fn unknown(name: &str) -> String {
-    let stem = |key: &str| key.split('_').take(2).collect::<Vec<_>>().join("_");
-    let meant = REQUIRED.iter().chain(&OPTIONAL).find(|known| stem(known) == stem(name));
-    match meant {
-        Some(known) => format!("{name}: wrong unit or spelling: must be {known}"),
-        None => {
-            format!("{name}: unknown key: must be one of {}, {}", REQUIRED.join(", "), OPTIONAL.join(", "))
+    let known = || REQUIRED.iter().chain(&OPTIONAL);
+    let quantity = |key: &str| UNITS.iter().find_map(|unit| key.strip_suffix(unit).map(str::to_owned));
+    let in_other_unit = |key: &&&str| {
+        quantity(key).is_some_and(|stem| {
+            name.strip_prefix(&stem).is_some_and(|unit| unit.is_empty() || unit.starts_with('_'))
+        })
+    };
+    if let Some(meant) = known().find(in_other_unit) {
+        return format!("{name}: wrong unit: must be {meant}");
+    }
+    let nearest = known().min_by_key(|key| slips(name, key));
+    match nearest {
+        Some(meant) if slips(name, meant) <= 3 => format!("{name}: unknown key: must probably be {meant}"),
+        _ => format!("{name}: unknown key: must be one of {}, {}", REQUIRED.join(", "), OPTIONAL.join(", ")),
+    }
+}
+
+/// The least number that counts as above 0.
+const ABOVE_ZERO: f64 = 1e-9;
+
+/// Unit suffixes of the known keys, longest first.
+const UNITS: [&str; 10] =
+    ["_nm_per_s", "_kg_m2", "_ohm", "_rpm", "_nm", "_hz", "_fraction", "_w", "_a", "_v"];
+
+/// Letters to insert, remove or change that turn one word into the other (Levenshtein).
+fn slips(a: &str, b: &str) -> usize {
+    let mut row: Vec<usize> = (0..=b.len()).collect();
+    for (i, x) in a.bytes().enumerate() {
+        let mut diagonal = row[0];
+        row[0] = i + 1;
+        for (j, y) in b.bytes().enumerate() {
+            let changed = diagonal + usize::from(x != y);
+            diagonal = row[j + 1];
+            row[j + 1] = changed.min(diagonal + 1).min(row[j] + 1);
         }
     }
+    row[b.len()]
 }
 
 fn line_at(text: &str, offset: usize) -> u64 {

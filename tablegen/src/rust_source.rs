@@ -18,7 +18,8 @@ impl Generated {
         array(&mut out, "WEAKENING_TORQUE", &self.weakening_torque);
         let universal_axis = Axis { first: 0.0, inverse_step: (self.universal.len() - 1) as f32, count: 0 };
         // The struct's own debug form is its literal, under the target's name.
-        let ratings = format!("{:?}", self.ratings).replacen("RatingsF32", "Ratings", 1);
+        let ratings = format!("{:#?}", self.ratings).replacen("RatingsF32", "Ratings", 1);
+        let ratings = ratings.replace('\n', "\n    ");
         let _ = write!(
             out,
             "/// The machine of the folder that was chosen at build time.\n\
@@ -43,7 +44,7 @@ fn array<const N: usize>(out: &mut String, name: &str, nodes: &[[f32; N]]) {
         "#[allow(clippy::excessive_precision, clippy::unreadable_literal)]\nstatic {name}: [[f32; {N}]; {}] = [\n",
         nodes.len()
     );
-    for line in nodes.chunks(4) {
+    for line in nodes.chunks((8 / N).min(4)) {
         let text: Vec<_> = line.iter().map(|node| format!("{node:?}")).collect();
         let _ = writeln!(out, "    {},", text.join(", "));
     }
@@ -56,7 +57,9 @@ fn curve(name: &str, axis: &Axis) -> String {
 
 fn grid(name: &str, rows: &Axis, columns: &Axis) -> String {
     format!(
-        "Grid {{ first_row: {:?}, inverse_row_step: {:?}, rows: {}, first_column: {:?}, inverse_column_step: {:?}, columns: {}, nodes: &{name} }}",
+        "Grid {{\n            first_row: {:?},\n            inverse_row_step: {:?},\n            rows: {},\n            \
+         first_column: {:?},\n            inverse_column_step: {:?},\n            columns: {},\n            \
+         nodes: &{name},\n        }}",
         rows.first, rows.inverse_step, rows.count, columns.first, columns.inverse_step, columns.count
     )
 }

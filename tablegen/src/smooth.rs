@@ -19,7 +19,7 @@ pub struct FluxPoint {
     pub lqq_h: f64,
 }
 
-/// A bicubic spline (not-a-knot) through the nodes of a flux map; beyond the grid it goes on linearly.
+/// A bicubic spline (not-a-knot) through the nodes of a flux map; beyond the grid it goes on along its tangent.
 #[derive(Clone, Debug)]
 pub struct SmoothMap {
     first_d: f64,
@@ -35,7 +35,9 @@ impl SmoothMap {
     /// The spline of a map, mirrored to both signs of iq.
     pub fn new(map: &FluxMap) -> Self {
         let (rows, columns) = (map.id_a.len(), map.iq_a.len());
-        let (step_d, step_q) = (map.id_a[1] - map.id_a[0], map.iq_a[1] - map.iq_a[0]);
+        // Over the whole axis, so that a step that was rounded in the file does not add up.
+        let step = |axis: &[f64]| (axis[axis.len() - 1] - axis[0]) / (axis.len() - 1) as f64;
+        let (step_d, step_q) = (step(&map.id_a), step(&map.iq_a));
         let surfaces = [&map.psi_d_wb, &map.psi_q_wb].map(|nodes| Surface::new(nodes, rows, columns));
         let mut cells = Vec::with_capacity((rows - 1) * (columns - 1));
         for r in 0..rows - 1 {
@@ -58,16 +60,21 @@ impl SmoothMap {
     pub fn at(&self, id_a: f64, iq_a: f64) -> FluxPoint {
         let (r, x, beyond_d) = place((id_a - self.first_d) / self.step_d, self.cells_d);
         let (c, y, beyond_q) = place((iq_a - self.first_q) / self.step_q, self.cells_q);
-        let [d, q] = &self.cells[r * self.cells_q + c];
-        let (psi_d, dd, dq) = evaluate(d, x, y);
-        let (psi_q, qd, qq) = evaluate(q, x, y);
+        let [d, q] = self.cells[r * self.cells_q + c].each_ref().map(|k| {
+            let inside = Value::of(k, x, y);
+            if beyond_d == 0.0 && beyond_q == 0.0 {
+                inside
+            } else {
+                inside.beyond(k, (x, y), (beyond_d, beyond_q))
+            }
+        });
         FluxPoint {
-            psi_d_wb: psi_d + dd * beyond_d + dq * beyond_q,
-            psi_q_wb: psi_q + qd * beyond_d + qq * beyond_q,
-            ldd_h: dd / self.step_d,
-            ldq_h: dq / self.step_q,
-            lqd_h: qd / self.step_d,
-            lqq_h: qq / self.step_q,
+            psi_d_wb: d.value,
+            psi_q_wb: q.value,
+            ldd_h: d.by_x / self.step_d,
+            ldq_h: d.by_y / self.step_q,
+            lqd_h: q.by_x / self.step_d,
+            lqq_h: q.by_y / self.step_q,
         }
     }
 
@@ -77,7 +84,7 @@ impl SmoothMap {
         for _ in 0..60 {
             let at = self.at(id, iq);
             let (ed, eq) = (psi_d_wb - at.psi_d_wb, psi_q_wb - at.psi_q_wb);
-            if ed.abs().max(eq.abs()) < 1e-12 {
+            if ed.abs() < 1e-12 && eq.abs() < 1e-12 {
                 return Some((id, iq));
             }
             let det = at.ldd_h * at.lqq_h - at.ldq_h * at.lqd_h;
@@ -98,14 +105,39 @@ fn place(position: f64, cells: usize) -> (usize, f64, f64) {
     (cell, inside - cell as f64, position - inside)
 }
 
-/// Value and both derivatives (per cell) of a bicubic polynomial.
-fn evaluate(k: &[f64; 16], x: f64, y: f64) -> (f64, f64, f64) {
-    let row = |i: usize| {
-        let (a, b, c, d) = (k[4 * i], k[4 * i + 1], k[4 * i + 2], k[4 * i + 3]);
-        (a + y * (b + y * (c + y * d)), b + y * (2.0 * c + 3.0 * y * d))
-    };
-    let ((a, ay), (b, by), (c, cy), (d, dy)) = (row(0), row(1), row(2), row(3));
-    (a + x * (b + x * (c + x * d)), b + x * (2.0 * c + 3.0 * x * d), ay + x * (by + x * (cy + x * dy)))
+/// A surface's value and slopes, per cell.
+#[derive(Clone, Copy)]
+struct Value {
+    value: f64,
+    by_x: f64,
+    by_y: f64,
+}
+
+impl Value {
+    /// Of a bicubic polynomial.
+    fn of(k: &[f64; 16], x: f64, y: f64) -> Self {
+        let row = |i: usize| {
+            let (a, b, c, d) = (k[4 * i], k[4 * i + 1], k[4 * i + 2], k[4 * i + 3]);
+            (a + y * (b + y * (c + y * d)), b + y * (2.0 * c + 3.0 * y * d))
+        };
+        let ((a, ay), (b, by), (c, cy), (d, dy)) = (row(0), row(1), row(2), row(3));
+        Self {
+            value: a + x * (b + x * (c + x * d)),
+            by_x: b + x * (2.0 * c + 3.0 * x * d),
+            by_y: ay + x * (by + x * (cy + x * dy)),
+        }
+    }
+
+    /// Outside the grid: the edge's tangent, which turns as the edge does; so the slopes are those of the value there too.
+    fn beyond(self, k: &[f64; 16], (x, y): (f64, f64), (beyond_x, beyond_y): (f64, f64)) -> Self {
+        let row = |i: usize| k[4 * i + 1] + y * (2.0 * k[4 * i + 2] + 3.0 * y * k[4 * i + 3]);
+        let mixed = row(1) + x * (2.0 * row(2) + 3.0 * x * row(3));
+        Self {
+            value: self.value + self.by_x * beyond_x + self.by_y * beyond_y + mixed * beyond_x * beyond_y,
+            by_x: self.by_x + mixed * beyond_y,
+            by_y: self.by_y + mixed * beyond_x,
+        }
+    }
 }
 
 /// Node values and derivatives, per cell, of one surface.

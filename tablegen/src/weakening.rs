@@ -43,7 +43,12 @@ pub fn circle(
         .iter()
         .map(|share| {
             let wanted = share * torque_nm;
-            let (id, iq) = on_arc(&arc, wanted, psi_wb, map, &optimum);
+            let (id, iq) = if wanted < arc[0].torque {
+                // The circle enters the current limit with more torque than that; inside it there is less.
+                at_id(arc[0].id, wanted, &optimum, parameters.max_current_a)
+            } else {
+                on_arc(&arc, wanted, psi_wb, map, &optimum)
+            };
             if id > highest_id {
                 at_id(highest_id, wanted, &optimum, parameters.max_current_a)
             } else {
@@ -76,7 +81,11 @@ fn rising_arc(psi_wb: f64, map: &SmoothMap, optimum: &Optimum, max_current_a: f6
         return Vec::new();
     };
     let mut first = top;
-    while first > 0 && scanned[first].torque > 0.0 && scanned[first - 1].torque < scanned[first].torque {
+    while first > 0
+        && scanned[first].torque > 0.0
+        && within(&scanned[first - 1])
+        && scanned[first - 1].torque < scanned[first].torque
+    {
         first -= 1;
     }
     let mut arc = scanned[first..=top].to_vec();

@@ -61,7 +61,7 @@ pub struct Plant {
     energies: Energies,
 }
 
-/// What is integrated: id, iq, energies.
+/// What is integrated: id, iq, electrical energy, copper loss, the torque's impulse.
 type State = [f64; 5];
 
 impl Plant {
@@ -183,13 +183,17 @@ impl Plant {
         [self.id_a, self.iq_a, _, _, _] = y;
         self.energies.electrical_j += y[2];
         self.energies.copper_j += y[3];
-        self.energies.mechanical_j += y[4];
-        self.angle_turns = (self.angle_turns + turned(dt_s) / TAU).rem_euclid(1.0);
         self.time_s += dt_s;
+        let speed_before = self.speed_rad_s;
         self.speed_rad_s = match &self.speed {
             SpeedSource::Profile(points) => speed::profile_speed(points, self.time_s),
-            SpeedSource::Inertia { .. } => self.speed_rad_s + acceleration * dt_s,
+            SpeedSource::Inertia { inertia_kg_m2, load_nm } => {
+                speed_before + (y[4] - load_nm * dt_s) / inertia_kg_m2
+            }
         };
+        let mean_speed = 0.5 * (speed_before + self.speed_rad_s);
+        self.energies.mechanical_j += y[4] * mean_speed;
+        self.angle_turns = (self.angle_turns + self.pole_pairs * mean_speed * dt_s / TAU).rem_euclid(1.0);
     }
 
     fn slope(&self, y: &State, legs: [Leg; 3], udc_v: f64, (sin, cos): (f64, f64), omega: f64) -> State {
@@ -215,7 +219,7 @@ impl Plant {
             (flux.ldd_h * vq - flux.lqd_h * vd) / det,
             1.5 * (ud * id + uq * iq),
             1.5 * self.resistance_ohm * (id * id + iq * iq),
-            1.5 * omega * (flux.psi_d_wb * iq - flux.psi_q_wb * id),
+            1.5 * self.pole_pairs * (flux.psi_d_wb * iq - flux.psi_q_wb * id),
         ]
     }
 }

@@ -75,7 +75,7 @@ impl Scenario for Sweep {
             ],
         );
         for switch in recording.switches.iter().filter(|switch| switch.t_s > 0.0) {
-            let title = format!("Figure 9: {} → {}", switch.from.name(), switch.to.name());
+            let title = format!("{} → {}", switch.from.name(), switch.to.name());
             let window = (switch.t_s - 0.03, switch.t_s + 0.04);
             page.line_voltage(&format!("{title}, line voltage u-v"), recording, window);
             page.plot_window(

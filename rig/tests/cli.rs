@@ -1,0 +1,116 @@
+//! The command line: what it refuses, and what it leaves behind.
+
+use std::process::{Command, Output};
+
+fn rig(line: &str) -> Output {
+    let root = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
+    Command::new(env!("CARGO_BIN_EXE_tractive-rig"))
+        .current_dir(root)
+        .args(line.split_whitespace())
+        .output()
+        .unwrap()
+}
+
+/// Exit code 2, and one line that holds these words.
+fn refused(line: &str, words: &[&str]) {
+    let output = rig(line);
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{line}: {errors}");
+    for word in words {
+        assert!(errors.contains(word), "{line}: no {word} in: {errors}");
+    }
+}
+
+/// The same, and nothing but that line.
+fn refused_in_one_line(line: &str, words: &[&str]) {
+    refused(line, words);
+    assert_eq!(String::from_utf8_lossy(&rig(line).stderr).trim().lines().count(), 1, "{line}");
+}
+
+#[test]
+fn bad_usage_is_refused() {
+    refused_in_one_line("run nonsense", &["nonsense", "load-steps, sweep, characteristic"]);
+    refused_in_one_line("run sweep --machine nowhere", &["nowhere", "must be"]);
+    refused("run sweep --udc-ripple 30", &["30", "V@HZ"]);
+    refused("run sweep --dt -1", &["-1"]);
+    refused("run sweep --dt nan", &["nan"]);
+    refused("run sweep --noise-a inf", &["inf"]);
+    refused("run sweep --adc-bits 99", &["99"]);
+    refused("pattern --mode mid9 --u 1 --udc 2 --f1 3 --out x", &["mid9"]);
+}
+
+#[test]
+fn a_pattern_beyond_its_mode_is_refused_and_leaves_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("p.csv");
+    let line = |mode: &str, u: f64| {
+        format!("pattern --mode {mode} --u {u} --udc 1500 --f1 50 --out {}", out.display())
+    };
+    refused_in_one_line(&line("sync15", 900.0), &["900", "sync15", "at most 866"]);
+    assert!(!out.exists());
+    assert_eq!(rig(&line("sync15", 800.0)).status.code(), Some(0));
+    assert!(std::fs::read_to_string(&out).unwrap().starts_with("t_s,leg,level\n0.000000000,u,"));
+}
+
+#[test]
+fn points_come_back_with_their_regions() {
+    let folder = tempfile::tempdir().unwrap();
+    let (input, output) = (folder.path().join("in.csv"), folder.path().join("out.csv"));
+    let line = format!("points {} {}", input.display(), output.display());
+    std::fs::write(&input, "torque_nm,speed_rpm,udc_v\n1235,1000,1500\n392,6000,1500\n1235,6000,1500\n")
+        .unwrap();
+    assert_eq!(rig(&line).status.code(), Some(0));
+    let text = std::fs::read_to_string(&output).unwrap();
+    let regions: Vec<_> = text.lines().skip(1).map(|line| line.rsplit(',').next().unwrap()).collect();
+    assert_eq!(regions, ["mtpa", "fw", "limit"], "{text}");
+    std::fs::remove_file(&output).unwrap();
+    for (bad, words) in [
+        ("torque_nm,speed_rpm\n1,2\n", ["udc_v", ":1:"]),
+        ("torque_nm,speed_rpm,udc_v\n1,2,3\n1,nan,3\n", [":3:", "speed_rpm"]),
+        ("torque_nm,speed_rpm,udc_v\n1,2,0\n", [":2:", "udc_v"]),
+        ("torque_nm,speed_rpm,udc_v\n1,x,3\n", [":2:", "must be"]),
+    ] {
+        std::fs::write(&input, bad).unwrap();
+        refused_in_one_line(&line, &words);
+        assert!(!output.exists(), "{bad}");
+    }
+}
+
+#[test]
+fn a_run_leaves_whole_files_with_the_columns_promised() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("deep/er");
+    let output = rig(&format!("run sweep --to 100 --dt 1e-4 --json --out {}", out.display()));
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    let printed: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let written: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(out.join("summary.json")).unwrap()).unwrap();
+    assert_eq!(printed, written);
+    assert_eq!(written["machine"], "pmasynrm-180kw");
+    let trace = std::fs::read_to_string(out.join("trace.csv")).unwrap();
+    let mut lines = trace.lines();
+    assert_eq!(
+        lines.next(),
+        Some(
+            "t_s,speed_rpm,te_ref_nm,te_nm,id_ref_a,iq_ref_a,id_a,iq_a,ia_a,ib_a,ic_a,u_v,udc_v,f1_hz,mode,fault"
+        )
+    );
+    assert_eq!(lines.count(), 14_001, "1.4 s at 0.1 ms, both ends");
+    assert!(std::fs::read_to_string(out.join("edges.csv")).unwrap().starts_with("t_s,gate,level\n"));
+    let page = std::fs::read_to_string(out.join("report.html")).unwrap();
+    assert!(page.contains("igure 9") && !page.contains("http://www.example") && !page.contains("src="));
+    let others = std::fs::read_dir(&out).unwrap().count();
+    assert_eq!(others, 5, "no temporary file is left");
+}
+
+#[test]
+fn a_trip_is_exit_code_1_with_its_name_value_and_limit() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = rig(&format!("run sweep --to 100 --udc 2200 --out {}", folder.path().display()));
+    assert_eq!(output.status.code(), Some(1));
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(
+        errors.contains("dc_overvoltage") && errors.contains("2200") && errors.contains("2070"),
+        "{errors}"
+    );
+}

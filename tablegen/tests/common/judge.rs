@@ -1,0 +1,137 @@
+//! Reads generated tables as the target does, in f32, and judges them on the smooth map.
+#![allow(dead_code)] // each test file uses its part
+
+use tractive_tablegen::{Axis, Generated, MachineFolder, Optimum, SmoothMap};
+
+/// A machine and its tables.
+pub struct Judge {
+    pub machine: MachineFolder,
+    pub map: SmoothMap,
+    pub tables: Generated,
+}
+
+/// The largest deviations found.
+#[derive(Debug, Default)]
+pub struct Worst {
+    /// Torque, as a share of what was asked for, where that is at least a quarter of the largest torque.
+    pub torque: f64,
+    /// Torque, as a share of the largest torque, anywhere.
+    pub torque_of_largest: f64,
+    /// Current above the optimum (MTPA), flux linkage off its circle (weakening); for at least 2 % of the largest torque.
+    pub other: f64,
+    /// Largest current, in A.
+    pub current_a: f64,
+}
+
+fn cell(axis: &Axis, value: f32) -> (usize, f32) {
+    let position = (value - axis.first) * axis.inverse_step;
+    let index = (position.max(0.0) as usize).min(axis.count - 2);
+    (index, position - index as f32)
+}
+
+fn mix<const N: usize>(a: [f32; N], b: [f32; N], share: f32) -> [f32; N] {
+    std::array::from_fn(|k| a[k] + (b[k] - a[k]) * share)
+}
+
+fn curve<const N: usize>(axis: &Axis, nodes: &[[f32; N]], x: f32) -> [f32; N] {
+    let (k, share) = cell(axis, x);
+    mix(nodes[k], nodes[k + 1], share)
+}
+
+fn grid<const N: usize>(axes: &(Axis, Axis), nodes: &[[f32; N]], row: f32, column: f32) -> [f32; N] {
+    let ((r, x), (c, y)) = (cell(&axes.0, row), cell(&axes.1, column));
+    let at = |dr: usize, dc: usize| nodes[(r + dr) * axes.1.count + c + dc];
+    mix(mix(at(0, 0), at(0, 1), y), mix(at(1, 0), at(1, 1), y), x)
+}
+
+impl Judge {
+    pub fn new(machine: MachineFolder) -> Self {
+        let map = SmoothMap::new(&machine.map);
+        let tables = Generated::new(&machine).unwrap();
+        Self { machine, map, tables }
+    }
+
+    fn torque_nm(&self, [id, iq]: [f32; 2]) -> f64 {
+        Optimum::new(&self.map, &self.machine.parameters).torque_nm(id.into(), iq.into())
+    }
+
+    /// The target's two passes.
+    pub fn two_passes(&self, torque: f32) -> [f32; 2] {
+        let tables = &self.tables;
+        let universal = Axis {
+            first: 0.0,
+            inverse_step: (tables.universal.len() - 1) as f32,
+            count: tables.universal.len(),
+        };
+        let [mut id, mut iq, id_trim, iq_trim] = curve(&tables.torque_axis, &tables.start, torque);
+        let per_flux = torque / (1.5 * tables.ratings.pole_pairs);
+        for _ in 0..2 {
+            let [psi_f, saliency] = grid(&tables.current_axes, &tables.parameters, id, iq);
+            let s = (per_flux * saliency).sqrt() / psi_f;
+            let [share] = curve(&universal, &tables.universal, s / (1.0 + s));
+            id = -(psi_f / saliency) * s * share;
+            iq = per_flux / (psi_f - saliency * id);
+        }
+        [id + id_trim, iq + iq_trim]
+    }
+
+    /// MTPA over the whole range of torque.
+    pub fn mtpa(&self) -> Worst {
+        let optimum = Optimum::new(&self.map, &self.machine.parameters);
+        let largest = self.machine.parameters.max_torque_nm;
+        let mut worst = Worst::default();
+        for step in 1..=700 {
+            let torque = largest * f64::from(step) / 700.0;
+            let [id, iq] = self.two_passes(torque as f32);
+            let error = (self.torque_nm([id, iq]) - torque).abs();
+            let current = f64::from(id).hypot(iq.into());
+            worst.torque_of_largest = worst.torque_of_largest.max(error / largest);
+            worst.current_a = worst.current_a.max(current);
+            if torque >= 0.02 * largest {
+                let (best_d, best_q) = optimum.least_current(torque);
+                worst.torque = worst.torque.max(if torque < 0.25 * largest { 0.0 } else { error / torque });
+                worst.other = worst.other.max(current / best_d.hypot(best_q) - 1.0);
+            }
+        }
+        worst
+    }
+
+    /// Weakening over all circles and torques whose currents have id ≤ 0; above it, only square wave goes.
+    pub fn weakening(&self) -> Worst {
+        let (tables, largest) = (&self.tables, self.machine.parameters.max_torque_nm);
+        let psi_axis = &tables.weakening_axes.0;
+        let mut worst = Worst::default();
+        for row in 0..=8 * (psi_axis.count - 1) {
+            let psi = psi_axis.first + row as f32 / (8.0 * psi_axis.inverse_step);
+            let [circle, limit] = curve(psi_axis, &tables.weakening_torque, psi);
+            // No current within the limit has as little flux linkage as a row that gives nothing.
+            let (k, _) = cell(psi_axis, psi);
+            if tables.weakening_torque[k][0] < 0.01 {
+                continue;
+            }
+            for step in 1..=80 {
+                let torque = limit * step as f32 / 80.0;
+                if torque > circle {
+                    continue;
+                }
+                let s = 1.0 - (1.0 - torque / circle).sqrt();
+                let [id, iq] = grid(&tables.weakening_axes, &tables.weakening, psi, s);
+                worst.current_a = worst.current_a.max(f64::from(id).hypot(iq.into()));
+                if id > 0.0 {
+                    continue;
+                }
+                let error = (self.torque_nm([id, iq]) - f64::from(torque)).abs();
+                worst.torque_of_largest = worst.torque_of_largest.max(error / largest);
+                if f64::from(torque) >= 0.25 * largest {
+                    worst.torque = worst.torque.max(error / f64::from(torque));
+                }
+                if f64::from(torque) >= 0.02 * largest {
+                    let at = self.map.at(id.into(), iq.into());
+                    let off = at.psi_d_wb.hypot(at.psi_q_wb) / f64::from(psi) - 1.0;
+                    worst.other = worst.other.max(off.abs());
+                }
+            }
+        }
+        worst
+    }
+}

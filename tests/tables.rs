@@ -1,0 +1,177 @@
+//! The tables built into the firmware, judged on the smooth flux map: torque, current, flux linkage.
+#![allow(missing_docs)]
+
+use std::path::Path;
+use tractive::machine::{BUILT_IN, Tables};
+use tractive_tablegen::{Generated, MachineFolder, SmoothMap};
+
+/// The machine that is built in, in f64.
+struct Judge {
+    folder: MachineFolder,
+    map: SmoothMap,
+}
+
+impl Judge {
+    fn new() -> Self {
+        let folder = MachineFolder::read(&folder()).unwrap();
+        let map = SmoothMap::new(&folder.map);
+        Self { folder, map }
+    }
+
+    fn torque_nm(&self, id: f64, iq: f64) -> f64 {
+        let at = self.map.at(id, iq);
+        1.5 * f64::from(self.folder.parameters.pole_pairs) * (at.psi_d_wb * iq - at.psi_q_wb * id)
+    }
+
+    /// iq that gives a torque at an id; `None` where the current limit comes first.
+    fn iq_for(&self, torque_nm: f64, id: f64) -> Option<f64> {
+        let (mut low, mut high) = (0.0, self.folder.parameters.max_current_a);
+        if self.torque_nm(id, high) < torque_nm {
+            return None;
+        }
+        for _ in 0..60 {
+            let middle = 0.5 * (low + high);
+            if self.torque_nm(id, middle) < torque_nm { low = middle } else { high = middle }
+        }
+        Some(high)
+    }
+
+    /// Least current for a torque: every id of a fine raster.
+    fn least_current_a(&self, torque_nm: f64) -> f64 {
+        let raster = (0..=1000).map(|k| -0.001 * f64::from(k) * self.folder.parameters.max_current_a);
+        raster
+            .filter_map(|id| self.iq_for(torque_nm, id).map(|iq| id.hypot(iq)))
+            .fold(f64::INFINITY, f64::min)
+    }
+}
+
+fn folder() -> std::path::PathBuf {
+    // The same choice as the build script's.
+    let machine = option_env!("TRACTIVE_MACHINE").unwrap_or("pmasynrm-180kw");
+    let named = Path::new(env!("CARGO_MANIFEST_DIR")).join("tables").join(machine);
+    if named.is_dir() { named } else { machine.into() }
+}
+
+/// The firmware's two passes, equations (7) to (13), on the target's own types.
+fn two_passes(torque: f32, tables: &Tables) -> (f32, f32) {
+    let [mut id, mut iq, id_trim, iq_trim] = tables.mtpa.start.at(torque);
+    let per_flux = torque / (1.5 * tables.ratings.pole_pairs);
+    for _ in 0..2 {
+        let [psi_f, saliency] = tables.mtpa.parameters.at(id, iq);
+        let s = (per_flux * saliency).sqrt() / psi_f;
+        let [share] = tables.mtpa.universal.at(s / (1.0 + s));
+        id = -(psi_f / saliency) * s * share;
+        iq = per_flux / (psi_f - saliency * id);
+    }
+    (id + id_trim, iq + iq_trim)
+}
+
+#[test]
+fn two_passes_give_the_torque_with_the_least_current() {
+    let judge = Judge::new();
+    let (mut worst_torque, mut worst_share, mut worst_excess) = (0.0_f64, 0.0_f64, f64::MIN);
+    let largest = judge.folder.parameters.max_torque_nm;
+    for step in 1..=200 {
+        // From 2 % on: 25 to 1,235 N·m.
+        let torque = largest * (0.02 + 0.98 * f64::from(step) / 200.0);
+        let (id, iq) = two_passes(torque as f32, &BUILT_IN);
+        let error = (judge.torque_nm(id.into(), iq.into()) - torque).abs();
+        worst_torque = worst_torque.max(error / (0.003 * torque).max(0.5));
+        worst_share = worst_share.max(error / torque);
+        let excess = f64::from(id).hypot(iq.into()) / judge.least_current_a(torque) - 1.0;
+        worst_excess = worst_excess.max(excess);
+    }
+    println!("torque: worst {:.3} %, {worst_torque:.3} of the bound", 100.0 * worst_share);
+    println!("current: worst {:.4} % above the optimum", 100.0 * worst_excess);
+    assert!(worst_torque < 1.0, "torque {worst_torque} of the bound, 0.3 % or 0.5 N·m");
+    assert!(worst_excess < 5e-4, "current {worst_excess} above the optimum");
+}
+
+/// Shares of the largest torque: below the first, only the absolute bound holds for torque; below the second, none for
+/// flux linkage.
+const TORQUE_FLOOR: f64 = 0.25;
+const FLUX_FLOOR: f64 = 0.02;
+
+/// All circles and torques whose currents have id ≤ 0. Above it lies only square wave at small torque, with more voltage than
+/// the torque needs; there the currents end at the map's edge and the flux linkage is what it is.
+#[test]
+fn weakening_keeps_torque_flux_and_the_current_limit() {
+    let judge = Judge::new();
+    let weakening = &BUILT_IN.weakening;
+    let largest = f64::from(BUILT_IN.ratings.max_torque_nm);
+    let (low, high) = (weakening.torque.first, weakening.torque.last());
+    let (mut share, mut absolute, mut flux, mut current) = (0.0_f64, 0.0_f64, 0.0_f64, 0.0_f64);
+    for row in 0..=640 {
+        let psi = low + (high - low) * row as f32 / 640.0;
+        let [circle, limit] = weakening.torque.at(psi);
+        for step in 1..=100 {
+            let torque = limit * step as f32 / 100.0;
+            if torque > circle {
+                continue;
+            }
+            let [id, iq] = weakening.currents.at(psi, 1.0 - (1.0 - torque / circle).sqrt());
+            current = current.max(f64::from(id).hypot(iq.into()));
+            if id > 0.0 {
+                continue;
+            }
+            let error = (judge.torque_nm(id.into(), iq.into()) - f64::from(torque)).abs();
+            let at = judge.map.at(id.into(), iq.into());
+            let off = (at.psi_d_wb.hypot(at.psi_q_wb) / f64::from(psi) - 1.0).abs();
+            absolute = absolute.max(error);
+            if f64::from(torque) >= TORQUE_FLOOR * largest {
+                share = share.max(error / f64::from(torque));
+            }
+            if f64::from(torque) >= FLUX_FLOOR * largest {
+                flux = flux.max(off);
+            }
+        }
+    }
+    println!(
+        "torque: worst {:.3} %, {absolute:.2} N·m; flux linkage: worst {:.3} %",
+        100.0 * share,
+        100.0 * flux
+    );
+    println!("current: most {current:.3} A of {}", BUILT_IN.ratings.max_current_a);
+    assert!(share < 0.003 && absolute < 1e-3 * largest, "torque {share}, {absolute} N·m");
+    assert!(flux < 0.003, "flux linkage {flux}");
+    assert!(current < 1.0001 * f64::from(BUILT_IN.ratings.max_current_a), "current {current} A");
+}
+
+/// More torque on the smooth map than the table's limit, on or inside a circle, must not be there to find.
+#[test]
+fn the_limit_is_all_the_torque_there_is() {
+    let judge = Judge::new();
+    let torque_table = &BUILT_IN.weakening.torque;
+    let (low, high) = (torque_table.first, torque_table.last());
+    let most_current = judge.folder.parameters.max_current_a;
+    let step = most_current / 467.0;
+    let raster: Vec<(f64, f64)> = (0..=467)
+        .flat_map(|d| (0..=467).map(move |q| (step * f64::from(d) - most_current, step * f64::from(q))))
+        .filter(|(id, iq)| id.hypot(*iq) <= most_current)
+        .map(|(id, iq)| {
+            let at = judge.map.at(id, iq);
+            (at.psi_d_wb.hypot(at.psi_q_wb), judge.torque_nm(id, iq))
+        })
+        .collect();
+    let (mut above, mut below) = (0.0_f64, 0.0_f64);
+    for row in 0..=120 {
+        let psi = low + (high - low) * row as f32 / 120.0;
+        let [_, limit] = torque_table.at(psi);
+        let inside = raster.iter().filter(|(flux, _)| *flux <= f64::from(psi));
+        let found = inside.map(|(_, torque)| *torque).fold(0.0, f64::max);
+        above = above.max(found / f64::from(limit) - 1.0);
+        below = below.max(1.0 - found / f64::from(limit));
+    }
+    println!("limit: at most {:.3} % less than a raster finds, {:.3} % more", 100.0 * above, 100.0 * below);
+    assert!(above < 2e-3, "the raster finds {above} more");
+    // The raster misses the circle's edge by as much as its cells are wide, 0.5 A; that is most on the smallest circle.
+    assert!(below < 0.03, "the raster finds {below} less");
+}
+
+#[test]
+fn the_built_in_tables_are_what_the_folder_gives_byte_for_byte() {
+    let text = || Generated::new(&MachineFolder::read(&folder()).unwrap()).unwrap().rust_source();
+    let first = text();
+    assert!(first == text());
+    assert!(first == include_str!(concat!(env!("OUT_DIR"), "/machine_tables.rs")));
+}
