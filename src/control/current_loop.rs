@@ -35,7 +35,7 @@ pub struct Gains {
 impl Gains {
     /// Gains that suit carrier halves of 0.2 to 0.8 ms.
     pub const DEFAULT: Self =
-        Self { carrier: 0.6, pattern_rad_s: 350.0, square_damping: 0.5, observer: 0.02 };
+        Self { carrier: 0.75, pattern_rad_s: 350.0, square_damping: 0.5, observer: 0.02 };
 }
 
 pub struct Input<'a> {

@@ -9,7 +9,27 @@ use crate::time::Instant;
 
 /// A half of the asynchronous carrier.
 pub fn asynchronous(half: u32, start: Instant, seen: &Reference, devices: &Devices) -> CarrierPeriod {
-    synchronous(half, start, devices.shortest_half_ticks, seen, devices)
+    synchronous(half, start, devices.shortest_half_ticks, Zeros::Even, seen, devices)
+}
+
+/// How a half divides its zero vectors between its start and its end.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Zeros {
+    /// Evenly.
+    Even,
+    /// Most at the start: in the last half before a pattern, so that the flux goes more or less straight to where the pattern
+    /// begins, not far beyond and back.
+    Early,
+}
+
+impl Zeros {
+    /// Share of the zero vectors at the start. The early one is a compromise: motoring wants more, braking less.
+    const fn at_start(self) -> f32 {
+        match self {
+            Self::Even => 0.5,
+            Self::Early => 0.8,
+        }
+    }
 }
 
 /// A half of a given length, wherever it lies in the turn.
@@ -17,12 +37,15 @@ pub fn synchronous(
     half: u32,
     start: Instant,
     period_ticks: u32,
+    zeros: Zeros,
     seen: &Reference,
     devices: &Devices,
 ) -> CarrierPeriod {
     let middle = seen.angle_at(start.after(period_ticks / 2));
-    let shares = on_shares(seen.voltage_v, middle, seen.udc_v);
     let rising = half & 1 == 0;
+    // A rising half starts with all upper devices on.
+    let all_on = if rising { zeros.at_start() } else { 1.0 - zeros.at_start() };
+    let shares = on_shares(seen.voltage_v, middle, seen.udc_v, all_on);
     let mut out = CarrierPeriod { period_ticks, start_levels: [rising; 3], ..CarrierPeriod::default() };
     for (compare, share) in out.compare_ticks.iter_mut().zip([shares.a, shares.b, shares.c]) {
         let on = whole_pulse(share, period_ticks, devices.min_pulse_ticks);
@@ -31,14 +54,15 @@ pub fn synchronous(
     out
 }
 
-/// The share of the half for which each upper device is on, 0 ..= 1, with the min-max zero sequence.
-fn on_shares(voltage_v: f32, angle: Angle, udc_v: f32) -> Abc {
+/// The share of the half for which each upper device is on, 0 ..= 1, with a share `all_on` of the zero vectors made by all
+/// three of them: a half is the min-max zero sequence.
+fn on_shares(voltage_v: f32, angle: Angle, udc_v: f32, all_on: f32) -> Abc {
     let direction = angle.sin_cos();
     let scale = voltage_v / udc_v;
     let phase = AlphaBeta { alpha: scale * direction.cos, beta: scale * direction.sin }.abc();
     let high = max(phase.a, max(phase.b, phase.c));
     let low = -max(-phase.a, max(-phase.b, -phase.c));
-    let centre = 0.5 - 0.5 * (high + low);
+    let centre = all_on * (1.0 - high) - (1.0 - all_on) * low;
     Abc { a: phase.a + centre, b: phase.b + centre, c: phase.c + centre }
 }
 

@@ -18,6 +18,7 @@ mod schedule;
 use crate::frames::Angle;
 use crate::time::{Clock, Instant};
 
+use carrier::Zeros;
 pub use ripple::ripple_flux;
 pub use schedule::{Schedule, depth_limit, first_half};
 
@@ -343,6 +344,14 @@ impl Modulator {
         }
     }
 
+    /// Where the zero vectors of the next half belong.
+    fn zeros(&self) -> Zeros {
+        match self.ahead(self.next_half) {
+            [next, _] if !next.is_carrier() => Zeros::Early,
+            _ => Zeros::Even,
+        }
+    }
+
     /// One half of a carrier that is locked to the pulse angle.
     fn locked(&self, start: Instant, pulse: Angle, seen: &Reference) -> CarrierPeriod {
         let carriers = self.mode.carriers();
@@ -356,7 +365,7 @@ impl Modulator {
         let period_ticks = ((period + 0.5) as u32).min(longest).max(1);
         match self.mode {
             Mode::Sync15 | Mode::Sync12 => {
-                carrier::synchronous(self.next_half, start, period_ticks, seen, &self.devices)
+                carrier::synchronous(self.next_half, start, period_ticks, self.zeros(), seen, &self.devices)
             }
             Mode::Mid7 | Mode::Mid3 => {
                 middle60::half(self.mode, self.next_half, period_ticks, seen, &self.devices)
