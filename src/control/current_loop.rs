@@ -69,11 +69,12 @@ pub fn step(input: &Input, gains: &Gains, tables: &Tables) -> Output {
             Output { voltage: shortened(regulated, limit), steady: shortened(steady, limit) }
         }
         Follows::Fundamental => {
-            let regulated = steady - (predicted - reference) * gains.pattern_rad_s;
+            let gain = if input.committed.settled { gains.pattern_rad_s } else { 0.0 };
+            let regulated = steady - (predicted - reference) * gain;
             Output { voltage: shortened(regulated, limit), steady: shortened(steady, limit) }
         }
         Follows::Angle => {
-            let damping = gains.square_damping * input.omega.abs();
+            let damping = if input.committed.settled { gains.square_damping * input.omega.abs() } else { 0.0 };
             let regulated = steady - (predicted - reference) * damping;
             Output { voltage: lengthened(regulated, limit), steady: lengthened(steady, limit) }
         }

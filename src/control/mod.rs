@@ -66,6 +66,8 @@ pub struct Committed {
     pub follows: Follows,
     /// Largest fundamental of the mode as a share of six-step.
     pub depth_limit: f32,
+    /// Whether the pattern's flux is where it will stay; not while a switch between two of them is still going on.
+    pub settled: bool,
 }
 
 /// A carrier boundary that has passed since the last step.

@@ -22,8 +22,11 @@ const UNITS_PER_RADIAN: f32 = 4_294_967_296.0 / core::f32::consts::TAU;
 /// Control periods after which a command is too old to make pulses from.
 const STALE_PERIODS: i32 = 5;
 
+/// Halves after which a switch to square wave has echoed.
+const ECHO_HALVES: u32 = 4;
+
 /// Share of a mode's largest fundamental that the operating point may use where the voltage must also regulate.
-const REGULATION_ROOM: f32 = 0.995;
+const REGULATION_ROOM: f32 = 0.999;
 
 /// What both tasks are built with.
 #[derive(Clone, Copy, Debug)]
@@ -69,6 +72,8 @@ pub struct ControlTask {
     boundary: Option<Instant>,
     /// The fundamental of the last operating point, in V.
     steady_v: f32,
+    /// Mode that the newest command was made for, and the carrier boundaries since it has been that.
+    decided: (Mode, u32),
     trip: Option<Trip>,
 }
 
@@ -83,6 +88,7 @@ impl ControlTask {
             now: first,
             boundary: None,
             steady_v: 0.0,
+            decided: (Mode::Off, 0),
             trip: None,
         }
     }
@@ -171,6 +177,13 @@ impl ControlTask {
         let now = command.reference.at;
         let committed = self.committed(applied, now, omega, sample.measured.udc_v);
         let boundary = self.new_boundary(applied, now, sample.measured.udc_v);
+        let decided = applied.map_or(Mode::Off, |applied| applied.next.ahead[0]);
+        if decided != self.decided.0 {
+            self.decided = (decided, 0);
+        } else if boundary.is_some() {
+            self.decided.1 = self.decided.1.saturating_add(1);
+        }
+        let committed = Committed { settled: self.decided.1 >= ECHO_HALVES, ..committed };
         let input = Input {
             measured: &sample.measured,
             demand: &sample.demand,
@@ -209,6 +222,7 @@ impl ControlTask {
                 interval_s,
                 follows: Follows::Mean,
                 depth_limit: depth_limit(Mode::Async, 0.0, &self.settings.devices),
+                settled: true,
             };
         };
         let (running, next) = (&applied.running, &applied.next);
@@ -234,6 +248,7 @@ impl ControlTask {
                 _ => Follows::Mean,
             },
             depth_limit: if decided == Mode::Square { largest } else { REGULATION_ROOM * largest },
+            settled: true,
         }
     }
 

@@ -5,7 +5,7 @@
 //! it lasts all three phases are at one level and the voltage is zero. A notch spans both halves of its carrier,
 //! and each half sets its own part anew.
 
-use super::{CarrierPeriod, Devices, Mode, Reference};
+use super::{CarrierPeriod, Devices, Mode};
 use crate::frames::limit;
 
 /// 4 sin 70° + 2 of equation (17): three notches at 70°, 90°, 110°.
@@ -50,13 +50,21 @@ fn sector_levels(sector: u32) -> ([bool; 3], usize) {
     }
 }
 
-/// A half of a middle-60° carrier, `period_ticks` long.
-pub fn half(mode: Mode, half: u32, period_ticks: u32, seen: &Reference, devices: &Devices) -> CarrierPeriod {
+/// A half of a middle-60° carrier, `period_ticks` long, with notches of half-width `half_notch_rad` if it were as long as
+/// `nominal_ticks`; what it is longer or shorter, the notch is.
+pub fn half(
+    mode: Mode,
+    half: u32,
+    (period_ticks, nominal_ticks): (u32, f32),
+    half_notch_rad: f32,
+    devices: &Devices,
+) -> CarrierPeriod {
     let per_sector = halves_per_sector(mode);
     let (mut levels, switching) = sector_levels(half / per_sector);
     let half_width_rad = core::f32::consts::FRAC_PI_3 / per_sector as f32;
-    let share = half_notch_rad(mode, seen.voltage_v, seen.udc_v) / half_width_rad;
-    let notch = whole_notch(share, period_ticks, devices.min_pulse_ticks);
+    let share = half_notch_rad / half_width_rad;
+    let wanted = limit(share, 0.0, 1.0) * nominal_ticks + (period_ticks as f32 - nominal_ticks);
+    let notch = whole_notch(wanted, period_ticks, devices.min_pulse_ticks);
     let mut compare_ticks = [u32::MAX; 3];
     let opening = half & 1 == 0;
     if let (Some(compare), Some(level)) = (compare_ticks.get_mut(switching), levels.get_mut(switching)) {
@@ -72,9 +80,9 @@ pub fn half(mode: Mode, half: u32, period_ticks: u32, seen: &Reference, devices:
 
 /// The notch's part in this half, in ticks: never shorter than half the shortest pulse (the schedule leaves the
 /// mode before that matters), and leaving as much between two notches.
-fn whole_notch(share: f32, period_ticks: u32, min_pulse_ticks: u32) -> u32 {
+fn whole_notch(wanted_ticks: f32, period_ticks: u32, min_pulse_ticks: u32) -> u32 {
     let shortest = min_pulse_ticks.div_ceil(2).min(period_ticks / 2);
-    let notch = (limit(share, 0.0, 1.0) * period_ticks as f32 + 0.5) as u32;
+    let notch = (wanted_ticks + 0.5) as u32;
     notch.max(shortest).min(period_ticks - shortest)
 }
 

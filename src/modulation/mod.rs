@@ -226,7 +226,25 @@ pub struct Modulator {
     next_half: u32,
     mirrored: bool,
     plan: Option<Plan>,
+    echo: Option<Echo>,
+    /// Fundamental of the last notched half, peak phase, in V.
+    notched_v: f32,
 }
+
+/// One sector of the mode that has just ended, played as the second one of the new mode.
+///
+/// In each sector of 60° the flux goes along one edge of a hexagon: a long one in square wave, a shorter one with a notch. With edges
+/// short, short | long, short, long, long the hexagon grows about its centre; with short, short | long, long it would
+/// be left off its centre, by a flux that turns in the machine until it has decayed. Likewise the other way.
+#[derive(Clone, Copy, Debug)]
+struct Echo {
+    of: Mode,
+    /// The sector's first half.
+    at: u32,
+}
+
+/// Halves in a sector of 60° of the modes that echo.
+const SECTOR_HALVES: u32 = 2;
 
 /// A switch between locked modes that has been announced.
 #[derive(Clone, Copy, Debug)]
@@ -248,7 +266,7 @@ const PATTERN_STRETCH: (f32, f32) = (0.5, 2.0);
 impl Modulator {
     /// A modulator at rest: its first half is `Off`.
     pub const fn new(devices: Devices, schedule: Schedule) -> Self {
-        Self { devices, schedule, mode: Mode::Off, next_half: 0, mirrored: false, plan: None }
+        Self { devices, schedule, mode: Mode::Off, next_half: 0, mirrored: false, plan: None, echo: None, notched_v: 0.0 }
     }
 
     /// Whether the machine is seen in the mirror, because it turns backward.
@@ -261,6 +279,7 @@ impl Modulator {
         let Some(reference) = reference else {
             self.mode = Mode::Off;
             self.plan = None;
+            self.echo = None;
             return CarrierPeriod::off(self.devices.shortest_half_ticks);
         };
         self.turn_mirror(reference.rate);
@@ -276,6 +295,9 @@ impl Modulator {
         half.half = self.next_half as u8;
         half.ahead = self.ahead(self.next_half);
         self.next_half = self.half_after(self.next_half, 1);
+        if self.echo.is_some_and(|echo| self.half_after(echo.at, SECTOR_HALVES) == self.next_half) {
+            self.echo = None;
+        }
         if self.mirrored {
             half.compare_ticks.swap(1, 2);
             half.start_levels.swap(1, 2);
@@ -314,9 +336,16 @@ impl Modulator {
     }
 
     fn switch_to(&mut self, start: Instant, mode: Mode, pulse: Angle) {
-        self.next_half = first_half(self.mode, mode, self.next_half, pulse);
+        let from = self.mode;
+        self.next_half = first_half(from, mode, self.next_half, pulse);
         self.mode = mode;
         self.plan = None;
+        self.echo = match (from, mode) {
+            (Mode::Mid3, Mode::Square) | (Mode::Square, Mode::Mid3) => {
+                Some(Echo { of: from, at: self.half_after(self.next_half, SECTOR_HALVES) })
+            }
+            _ => None,
+        };
         self.schedule.switched(start);
     }
 
@@ -353,24 +382,42 @@ impl Modulator {
     }
 
     /// One half of a carrier that is locked to the pulse angle.
-    fn locked(&self, start: Instant, pulse: Angle, seen: &Reference) -> CarrierPeriod {
+    fn locked(&mut self, start: Instant, pulse: Angle, seen: &Reference) -> CarrierPeriod {
         let carriers = self.mode.carriers();
         let end = boundary(self.next_half + 1, carriers);
         let nominal = boundary(1, carriers).0 as f32 / seen.rate;
         let wanted = (end - pulse).signed() as f32 / seen.rate;
         let (shortest, longest) = if self.mode.is_carrier() { CARRIER_STRETCH } else { PATTERN_STRETCH };
-        let period = crate::frames::limit(wanted, shortest * nominal, longest * nominal);
+        let played = self.played();
+        let keeps_length = self.echo.is_some() && played == Mode::Square;
+        let period =
+            if keeps_length { nominal } else { crate::frames::limit(wanted, shortest * nominal, longest * nominal) };
         // Slower than the async mode's range there is nothing to lock to: the length stays that of a stopped carrier.
         let longest = self.devices.shortest_half_ticks * 4;
         let period_ticks = ((period + 0.5) as u32).min(longest).max(1);
-        match self.mode {
+        match played {
             Mode::Sync15 | Mode::Sync12 => {
                 carrier::synchronous(self.next_half, start, period_ticks, self.zeros(), seen, &self.devices)
             }
-            Mode::Mid7 | Mode::Mid3 => {
-                middle60::half(self.mode, self.next_half, period_ticks, seen, &self.devices)
+            Mode::Square => middle60::square(self.next_half, period_ticks),
+            notched => {
+                if self.mode != Mode::Square {
+                    self.notched_v = seen.voltage_v;
+                }
+                let notch = middle60::half_notch_rad(notched, self.notched_v, seen.udc_v);
+                // While the hexagon changes its size, what a half is longer than its angle is zero voltage: that turns the
+                // pattern without moving the hexagon.
+                let nominal_ticks = if self.echo.is_some() { nominal } else { period_ticks as f32 };
+                middle60::half(notched, self.next_half, (period_ticks, nominal_ticks), notch, &self.devices)
             }
-            _ => middle60::square(self.next_half, period_ticks),
+        }
+    }
+
+    /// The mode in whose way the next half is made.
+    fn played(&self) -> Mode {
+        match self.echo {
+            Some(echo) if echo.at == self.next_half || self.half_after(echo.at, 1) == self.next_half => echo.of,
+            _ => self.mode,
         }
     }
 }

@@ -32,7 +32,7 @@ const BORDERS: [Border; 5] = [
     border(Mode::Sync12, (59.5, 57.0), Some((0.88, 0.84))),
     border(Mode::Mid7, (74.5, 72.0), Some((0.88, 0.84))),
     border(Mode::Mid3, (126.0, 121.0), Some((0.913, 0.885))),
-    border(Mode::Square, (297.0, 290.0), Some((0.985, 0.968))),
+    border(Mode::Square, (297.0, 290.0), Some((0.990, 0.978))),
 ];
 
 /// Room kept between a mode's largest depth and the border above it, and the hysteresis kept below a border that
