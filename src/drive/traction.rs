@@ -22,9 +22,6 @@ const UNITS_PER_RADIAN: f32 = 4_294_967_296.0 / core::f32::consts::TAU;
 /// Control periods after which a command is too old to make pulses from.
 const STALE_PERIODS: i32 = 5;
 
-/// Halves after which a switch to square wave has echoed.
-const ECHO_HALVES: u32 = 4;
-
 /// Share of a mode's largest fundamental that the operating point may use where the voltage must also regulate.
 const REGULATION_ROOM: f32 = 0.999;
 
@@ -72,8 +69,8 @@ pub struct ControlTask {
     boundary: Option<Instant>,
     /// The fundamental of the last operating point, in V.
     steady_v: f32,
-    /// Mode that the newest command was made for, and the carrier boundaries since it has been that.
-    decided: (Mode, u32),
+    /// Mode that the newest command was made for, and the halves for which its flux hexagon still changes its size.
+    unsettled: (Mode, u32),
     trip: Option<Trip>,
 }
 
@@ -88,7 +85,7 @@ impl ControlTask {
             now: first,
             boundary: None,
             steady_v: 0.0,
-            decided: (Mode::Off, 0),
+            unsettled: (Mode::Off, 0),
             trip: None,
         }
     }
@@ -178,12 +175,7 @@ impl ControlTask {
         let committed = self.committed(applied, now, omega, sample.measured.udc_v);
         let boundary = self.new_boundary(applied, now, sample.measured.udc_v);
         let decided = applied.map_or(Mode::Off, |applied| applied.next.ahead[0]);
-        if decided != self.decided.0 {
-            self.decided = (decided, 0);
-        } else if boundary.is_some() {
-            self.decided.1 = self.decided.1.saturating_add(1);
-        }
-        let committed = Committed { settled: self.decided.1 >= ECHO_HALVES, ..committed };
+        let committed = Committed { settled: self.is_settled(decided, boundary.is_some()), ..committed };
         let input = Input {
             measured: &sample.measured,
             demand: &sample.demand,
@@ -202,6 +194,18 @@ impl ControlTask {
         report.id_a = output.point.current.d;
         report.iq_a = output.point.current.q;
         report.voltage_v = output.voltage.voltage_v;
+    }
+
+    /// Whether two sectors have passed since one pattern gave way to another: so long the flux hexagon changes its size.
+    fn is_settled(&mut self, decided: Mode, boundary_passed: bool) -> bool {
+        let (mode, halves) = &mut self.unsettled;
+        if decided != *mode {
+            *halves = if decided.is_pattern() && mode.is_pattern() { 2 * decided.sector_halves() } else { 0 };
+            *mode = decided;
+        } else if boundary_passed {
+            *halves = halves.saturating_sub(1);
+        }
+        *halves == 0
     }
 
     /// Angle units per tick of an electrical speed in rad/s.

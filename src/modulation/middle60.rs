@@ -12,11 +12,6 @@ use crate::frames::limit;
 const SEVEN_PULSE_SUM: f32 = 5.758_77;
 /// Two of equation (15): one notch at 90°.
 const THREE_PULSE_SUM: f32 = 2.0;
-/// Carrier halves in a sector of 60°.
-const fn halves_per_sector(mode: Mode) -> u32 {
-    mode.carriers() / 3
-}
-
 /// Loss of the fundamental, as a share of six-step, per sin(β/2).
 pub fn notch_sum(mode: Mode) -> f32 {
     if matches!(mode, Mode::Mid7) { SEVEN_PULSE_SUM } else { THREE_PULSE_SUM }
@@ -50,24 +45,25 @@ fn sector_levels(sector: u32) -> ([bool; 3], usize) {
     }
 }
 
-/// A half of a middle-60° carrier, `period_ticks` long, with notches of half-width `half_notch_rad` if it were as long as
-/// `nominal_ticks`; what it is longer or shorter, the notch is.
+/// A half of a pattern's carrier, `period_ticks` long, with notches of half-width `half_notch_rad` if it were as long as
+/// `nominal_ticks`; what it is longer or shorter, the notch is. No notch at all makes square wave.
 pub fn half(
     mode: Mode,
     half: u32,
     (period_ticks, nominal_ticks): (u32, f32),
-    half_notch_rad: f32,
+    half_notch_rad: Option<f32>,
     devices: &Devices,
 ) -> CarrierPeriod {
-    let per_sector = halves_per_sector(mode);
+    let per_sector = mode.sector_halves().max(1);
     let (mut levels, switching) = sector_levels(half / per_sector);
-    let half_width_rad = core::f32::consts::FRAC_PI_3 / per_sector as f32;
-    let share = half_notch_rad / half_width_rad;
-    let wanted = limit(share, 0.0, 1.0) * nominal_ticks + (period_ticks as f32 - nominal_ticks);
-    let notch = whole_notch(wanted, period_ticks, devices.min_pulse_ticks);
     let mut compare_ticks = [u32::MAX; 3];
-    let opening = half & 1 == 0;
-    if let (Some(compare), Some(level)) = (compare_ticks.get_mut(switching), levels.get_mut(switching)) {
+    if let (Some(compare), Some(level), Some(half_notch_rad)) =
+        (compare_ticks.get_mut(switching), levels.get_mut(switching), half_notch_rad)
+    {
+        let share = half_notch_rad * per_sector as f32 / core::f32::consts::FRAC_PI_3;
+        let wanted = limit(share, 0.0, 1.0) * nominal_ticks + (period_ticks as f32 - nominal_ticks);
+        let notch = whole_notch(wanted, period_ticks, devices.min_pulse_ticks);
+        let opening = half & 1 == 0;
         if opening {
             *compare = period_ticks - notch;
         } else {
@@ -84,12 +80,6 @@ fn whole_notch(wanted_ticks: f32, period_ticks: u32, min_pulse_ticks: u32) -> u3
     let shortest = min_pulse_ticks.div_ceil(2).min(period_ticks / 2);
     let notch = (wanted_ticks + 0.5) as u32;
     notch.max(shortest).min(period_ticks - shortest)
-}
-
-/// A half of the square wave: the sector's levels, no notch.
-pub fn square(half: u32, period_ticks: u32) -> CarrierPeriod {
-    let (start_levels, _) = sector_levels(half / halves_per_sector(Mode::Square));
-    CarrierPeriod { period_ticks, compare_ticks: [u32::MAX; 3], start_levels, ..CarrierPeriod::default() }
 }
 
 #[cfg(test)]

@@ -15,7 +15,7 @@ mod middle60;
 mod ripple;
 mod schedule;
 
-use crate::frames::Angle;
+use crate::frames::{Angle, limit};
 use crate::time::{Clock, Instant};
 
 use carrier::Zeros;
@@ -78,6 +78,21 @@ impl Mode {
             Self::Mid7 => 18,
             Self::Mid3 | Self::Square => 6,
         }
+    }
+
+    /// Whether it is a pattern of whole edges of a flux hexagon: middle 60° or square wave.
+    pub const fn is_pattern(self) -> bool {
+        matches!(self, Self::Mid7 | Self::Mid3 | Self::Square)
+    }
+
+    /// Halves in a sector of 60° of a pattern.
+    pub const fn sector_halves(self) -> u32 {
+        self.carriers() / 3
+    }
+
+    /// Carriers in a sector of 60° of a pattern, each with a notch or with room for one.
+    const fn notches(self) -> u32 {
+        self.carriers() / 6
     }
 
     /// Whether the mean voltage of each carrier half follows the command: the modes with a triangular carrier.
@@ -227,24 +242,22 @@ pub struct Modulator {
     mirrored: bool,
     plan: Option<Plan>,
     echo: Option<Echo>,
-    /// Fundamental of the last notched half, peak phase, in V.
-    notched_v: f32,
+    /// Half the zero voltage of the present pattern's sectors, as an angle in rad.
+    zero_rad: f32,
 }
 
-/// One sector of the mode that has just ended, played as the second one of the new mode.
+/// The second sector of a new pattern, made with as much zero voltage as the old pattern had.
 ///
-/// In each sector of 60° the flux goes along one edge of a hexagon: a long one in square wave, a shorter one with a notch. With edges
+/// In each sector of 60° the flux goes along one edge of a hexagon, the shorter the more notches take from it. With edges
 /// short, short | long, short, long, long the hexagon grows about its centre; with short, short | long, long it would
 /// be left off its centre, by a flux that turns in the machine until it has decayed. Likewise the other way.
 #[derive(Clone, Copy, Debug)]
 struct Echo {
-    of: Mode,
     /// The sector's first half.
     at: u32,
+    /// Half the zero voltage of a sector of the old pattern, as an angle in rad.
+    zero_rad: f32,
 }
-
-/// Halves in a sector of 60° of the modes that echo.
-const SECTOR_HALVES: u32 = 2;
 
 /// A switch between locked modes that has been announced.
 #[derive(Clone, Copy, Debug)]
@@ -266,7 +279,7 @@ const PATTERN_STRETCH: (f32, f32) = (0.5, 2.0);
 impl Modulator {
     /// A modulator at rest: its first half is `Off`.
     pub const fn new(devices: Devices, schedule: Schedule) -> Self {
-        Self { devices, schedule, mode: Mode::Off, next_half: 0, mirrored: false, plan: None, echo: None, notched_v: 0.0 }
+        Self { devices, schedule, mode: Mode::Off, next_half: 0, mirrored: false, plan: None, echo: None, zero_rad: 0.0 }
     }
 
     /// Whether the machine is seen in the mirror, because it turns backward.
@@ -295,7 +308,8 @@ impl Modulator {
         half.half = self.next_half as u8;
         half.ahead = self.ahead(self.next_half);
         self.next_half = self.half_after(self.next_half, 1);
-        if self.echo.is_some_and(|echo| self.half_after(echo.at, SECTOR_HALVES) == self.next_half) {
+        let sector = self.mode.sector_halves();
+        if self.echo.is_some_and(|echo| self.half_after(echo.at, sector) == self.next_half) {
             self.echo = None;
         }
         if self.mirrored {
@@ -340,12 +354,10 @@ impl Modulator {
         self.next_half = first_half(from, mode, self.next_half, pulse);
         self.mode = mode;
         self.plan = None;
-        self.echo = match (from, mode) {
-            (Mode::Mid3, Mode::Square) | (Mode::Square, Mode::Mid3) => {
-                Some(Echo { of: from, at: self.half_after(self.next_half, SECTOR_HALVES) })
-            }
-            _ => None,
-        };
+        self.echo = (from.is_pattern() && mode.is_pattern()).then(|| Echo {
+            at: self.half_after(self.next_half, mode.sector_halves()),
+            zero_rad: self.zero_rad,
+        });
         self.schedule.switched(start);
     }
 
@@ -387,37 +399,41 @@ impl Modulator {
         let end = boundary(self.next_half + 1, carriers);
         let nominal = boundary(1, carriers).0 as f32 / seen.rate;
         let wanted = (end - pulse).signed() as f32 / seen.rate;
-        let (shortest, longest) = if self.mode.is_carrier() { CARRIER_STRETCH } else { PATTERN_STRETCH };
-        let played = self.played();
-        let keeps_length = self.echo.is_some() && played == Mode::Square;
-        let period =
-            if keeps_length { nominal } else { crate::frames::limit(wanted, shortest * nominal, longest * nominal) };
-        // Slower than the async mode's range there is nothing to lock to: the length stays that of a stopped carrier.
-        let longest = self.devices.shortest_half_ticks * 4;
-        let period_ticks = ((period + 0.5) as u32).min(longest).max(1);
-        match played {
-            Mode::Sync15 | Mode::Sync12 => {
-                carrier::synchronous(self.next_half, start, period_ticks, self.zeros(), seen, &self.devices)
-            }
-            Mode::Square => middle60::square(self.next_half, period_ticks),
-            notched => {
-                if self.mode != Mode::Square {
-                    self.notched_v = seen.voltage_v;
-                }
-                let notch = middle60::half_notch_rad(notched, self.notched_v, seen.udc_v);
-                // While the hexagon changes its size, what a half is longer than its angle is zero voltage: that turns the
-                // pattern without moving the hexagon.
-                let nominal_ticks = if self.echo.is_some() { nominal } else { period_ticks as f32 };
-                middle60::half(notched, self.next_half, (period_ticks, nominal_ticks), notch, &self.devices)
-            }
+        if self.mode.is_carrier() {
+            let (shortest, longest) = CARRIER_STRETCH;
+            let period_ticks = self.whole_ticks(limit(wanted, shortest * nominal, longest * nominal));
+            let zeros = self.zeros();
+            return carrier::synchronous(self.next_half, start, period_ticks, zeros, seen, &self.devices);
         }
+        let notches = self.mode.notches() as f32;
+        let own_notch = (self.mode != Mode::Square)
+            .then(|| middle60::half_notch_rad(self.mode, seen.voltage_v, seen.udc_v));
+        self.zero_rad = own_notch.map_or(0.0, |notch| notch * notches);
+        let notch = match self.echoed_zero_rad() {
+            None => own_notch,
+            Some(zero_rad) => (zero_rad > 0.0).then_some(zero_rad / notches),
+        };
+        // While the hexagon changes its size, what a half is longer than its angle is zero voltage: that turns the
+        // pattern without moving the hexagon. Where there is no notch, the length stays.
+        let (shortest, longest) = match (self.echo, notch) {
+            (Some(_), None) => (1.0, 1.0),
+            _ => PATTERN_STRETCH,
+        };
+        let period_ticks = self.whole_ticks(limit(wanted, shortest * nominal, longest * nominal));
+        let nominal_ticks = if self.echo.is_some() { nominal } else { period_ticks as f32 };
+        middle60::half(self.mode, self.next_half, (period_ticks, nominal_ticks), notch, &self.devices)
     }
 
-    /// The mode in whose way the next half is made.
-    fn played(&self) -> Mode {
-        match self.echo {
-            Some(echo) if echo.at == self.next_half || self.half_after(echo.at, 1) == self.next_half => echo.of,
-            _ => self.mode,
-        }
+    /// A length in whole ticks. Slower than the async mode's range there is nothing to lock to: the length stays that
+    /// of a stopped carrier.
+    fn whole_ticks(&self, period: f32) -> u32 {
+        ((period + 0.5) as u32).min(self.devices.shortest_half_ticks * 4).max(1)
+    }
+
+    /// The zero voltage of the next half if it echoes.
+    fn echoed_zero_rad(&self) -> Option<f32> {
+        let echo = self.echo?;
+        let into = self.half_after(self.next_half, self.halves() - echo.at);
+        (into < self.mode.sector_halves()).then_some(echo.zero_rad)
     }
 }
