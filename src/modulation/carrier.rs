@@ -20,6 +20,9 @@ pub enum Zeros {
     /// Most at the start: in the last half before a pattern, so that the flux goes more or less straight to where the pattern
     /// begins, not far beyond and back.
     Early,
+    /// Most at the end: in the first half after a pattern, which leaves the flux at its farthest; braking, zero voltage would
+    /// lead it farther still.
+    Late,
 }
 
 impl Zeros {
@@ -28,6 +31,7 @@ impl Zeros {
         match self {
             Self::Even => 0.5,
             Self::Early => 0.8,
+            Self::Late => 0.1,
         }
     }
 }

@@ -242,6 +242,8 @@ pub struct Modulator {
     mirrored: bool,
     plan: Option<Plan>,
     echo: Option<Echo>,
+    /// Whether the half before was a pattern's and the next one is a carrier's.
+    after_pattern: bool,
     /// Half the zero voltage of the present pattern's sectors, as an angle in rad.
     zero_rad: f32,
 }
@@ -279,7 +281,7 @@ const PATTERN_STRETCH: (f32, f32) = (0.5, 2.0);
 impl Modulator {
     /// A modulator at rest: its first half is `Off`.
     pub const fn new(devices: Devices, schedule: Schedule) -> Self {
-        Self { devices, schedule, mode: Mode::Off, next_half: 0, mirrored: false, plan: None, echo: None, zero_rad: 0.0 }
+        Self { devices, schedule, mode: Mode::Off, next_half: 0, mirrored: false, plan: None, echo: None, after_pattern: false, zero_rad: 0.0 }
     }
 
     /// Whether the machine is seen in the mirror, because it turns backward.
@@ -308,6 +310,7 @@ impl Modulator {
         half.half = self.next_half as u8;
         half.ahead = self.ahead(self.next_half);
         self.next_half = self.half_after(self.next_half, 1);
+        self.after_pattern = false;
         let sector = self.mode.sector_halves();
         if self.echo.is_some_and(|echo| self.half_after(echo.at, sector) == self.next_half) {
             self.echo = None;
@@ -354,6 +357,7 @@ impl Modulator {
         self.next_half = first_half(from, mode, self.next_half, pulse);
         self.mode = mode;
         self.plan = None;
+        self.after_pattern = from.is_pattern() && mode.is_carrier();
         self.echo = (from.is_pattern() && mode.is_pattern()).then(|| Echo {
             at: self.half_after(self.next_half, mode.sector_halves()),
             zero_rad: self.zero_rad,
@@ -389,6 +393,7 @@ impl Modulator {
     fn zeros(&self) -> Zeros {
         match self.ahead(self.next_half) {
             [next, _] if !next.is_carrier() => Zeros::Early,
+            _ if self.after_pattern => Zeros::Late,
             _ => Zeros::Even,
         }
     }
