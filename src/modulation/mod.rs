@@ -275,7 +275,7 @@ const AHEAD: u32 = 2;
 /// How much shorter or longer than nominal a locked half may be while it catches up with its angle. A triangular
 /// carrier's voltage has the right angle wherever its carrier stands, so it may take its time, and its ripple stays
 /// small; a pattern's angle is that of its boundaries.
-const CARRIER_STRETCH: (f32, f32) = (0.85, 1.15);
+const CARRIER_STRETCH: (f32, f32) = (0.95, 1.05);
 const PATTERN_STRETCH: (f32, f32) = (0.5, 2.0);
 
 impl Modulator {
