@@ -4,8 +4,8 @@
 //! current into flux and back. Proportional part: the flux error predicted for the boundary where the voltage begins
 //! to act. Decoupling: `jωψ`. Integral part: [`super::disturbance`].
 
-use super::{Committed, Measurements, flux_linkage};
-use crate::frames::{Angle, Dq};
+use super::{Committed, flux_linkage};
+use crate::frames::{Angle, Dq, SinCos};
 use crate::machine::Tables;
 
 /// What of a voltage command the modulator's mode can follow.
@@ -39,7 +39,12 @@ impl Gains {
 }
 
 pub struct Input<'a> {
-    pub measured: &'a Measurements,
+    /// Rotor angle at the sample, and its direction.
+    pub angle: Angle,
+    pub frame: SinCos,
+    /// Measured current and the flux linkage that belongs to it.
+    pub current: Dq,
+    pub flux: Dq,
     pub current_reference: Dq,
     pub omega: f32,
     pub committed: &'a Committed,
@@ -59,7 +64,7 @@ pub struct Output {
 /// One step of the loop.
 pub fn step(input: &Input, gains: &Gains, tables: &Tables) -> Output {
     let reference = flux_linkage(tables, input.current_reference);
-    let predicted = predicted_flux(input, tables);
+    let predicted = predicted_flux(input);
     let drop = input.current_reference * input.resistance - input.disturbance;
     let steady = reference.j() * input.omega + drop;
     let limit = input.voltage_limit_v;
@@ -99,25 +104,21 @@ fn mean_voltage(input: &Input, reference: Dq, predicted: Dq, gains: &Gains) -> D
         + error.j() * ((remaining + 1.0) * half_turn.sin);
     let middle = Angle::from_radians(input.omega * committed.horizon_s + x);
     let steering =
-        (committed.ripple_after_wb - committed.ripple_wb).park((input.measured.angle + middle).sin_cos());
+        (committed.ripple_after_wb - committed.ripple_wb).park((input.angle + middle).sin_cos());
     (chord + steering) * (1.0 / committed.interval_s)
 }
 
 /// Flux linkage at the horizon less the pattern's ripple, in the rotor frame there.
-fn predicted_flux(input: &Input, tables: &Tables) -> Dq {
-    let measured = input.measured;
+fn predicted_flux(input: &Input) -> Dq {
     let committed = input.committed;
-    let frame = measured.angle.sin_cos();
-    let current = measured.currents_a.clarke().park(frame);
-    let flux = flux_linkage(tables, current);
     let turned = input.omega * committed.horizon_s;
     let Some(volt_seconds) = committed.volt_seconds else {
-        return flux;
+        return input.flux;
     };
-    let middle = (measured.angle + Angle::from_radians(0.5 * turned)).sin_cos();
-    let end = (measured.angle + Angle::from_radians(turned)).sin_cos();
-    let drop = (input.disturbance - current * input.resistance) * committed.horizon_s;
-    let at_horizon = flux.unpark(frame) + volt_seconds + drop.unpark(middle) - committed.ripple_wb;
+    let middle = (input.angle + Angle::from_radians(0.5 * turned)).sin_cos();
+    let end = (input.angle + Angle::from_radians(turned)).sin_cos();
+    let drop = (input.disturbance - input.current * input.resistance) * committed.horizon_s;
+    let at_horizon = input.flux.unpark(input.frame) + volt_seconds + drop.unpark(middle) - committed.ripple_wb;
     at_horizon.park(end)
 }
 

@@ -15,6 +15,7 @@ mod disturbance;
 mod mtpa;
 mod reference;
 mod speed;
+mod torque_trim;
 
 use crate::frames::{Abc, AlphaBeta, Angle, Dq};
 use crate::machine::Tables;
@@ -142,6 +143,7 @@ pub struct Controller {
     speed: speed::SpeedTracker,
     demand: demand::Shaper,
     disturbance: disturbance::Observer,
+    trim: torque_trim::TorqueTrim,
 }
 
 impl Controller {
@@ -151,6 +153,7 @@ impl Controller {
             speed: speed::SpeedTracker::new(),
             demand: demand::Shaper::new(),
             disturbance: disturbance::Observer::new(),
+            trim: torque_trim::TorqueTrim::new(),
         }
     }
 
@@ -174,6 +177,7 @@ impl Controller {
     pub fn idle(&mut self) {
         self.demand = demand::Shaper::new();
         self.disturbance = disturbance::Observer::new();
+        self.trim = torque_trim::TorqueTrim::new();
     }
 
     /// One control period: the voltage for the carrier half that begins at the horizon.
@@ -187,7 +191,18 @@ impl Controller {
             depth: committed.depth_limit,
             filled: committed.follows == Follows::Angle,
         };
-        let point = operating_point(torque_nm, omega, &limit, tables);
+        let point = operating_point(self.trim.apply(torque_nm), omega, &limit, tables);
+        let frame = measured.angle.sin_cos();
+        let current = measured.currents_a.clarke().park(frame);
+        let flux = flux_linkage(tables, current);
+        let limited = point.region == Region::Limit;
+        self.trim.step(&torque_trim::Input {
+            demand_nm: torque_nm,
+            measured_nm: self::torque_nm(tables, flux, current),
+            limited,
+            largest_nm: tables.ratings.max_torque_nm,
+            period_s: clock.control_s(),
+        });
         let resistance = tables.ratings.stator_resistance_ohm;
         if let Some(boundary) = boundary {
             let angle = measured.angle - Angle::from_radians(omega * boundary.age_s);
@@ -196,7 +211,10 @@ impl Controller {
         let disturbance = self.disturbance.voltage();
         let voltage = current_loop::step(
             &current_loop::Input {
-                measured,
+                angle: measured.angle,
+                frame,
+                current,
+                flux,
                 current_reference: point.current,
                 omega,
                 committed,
@@ -219,7 +237,7 @@ impl Controller {
                 omega,
                 depth: point.depth,
             },
-            torque_nm: point.torque_nm,
+            torque_nm: if limited { point.torque_nm } else { torque_nm },
             point,
         }
     }

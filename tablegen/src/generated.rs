@@ -73,6 +73,8 @@ pub struct Generated {
 const UNIVERSAL_NODES: usize = 65;
 /// Nodes of the torque axis: 10 N·m apart for the reference machine.
 const TORQUE_NODES: usize = 125;
+/// Reach of the torque axis over the largest torque, where current allows: room for a trim.
+const TORQUE_ROOM: f64 = 1.06;
 /// Nodes of the weakening tables.
 const PSI_NODES: usize = 81;
 const SHARE_NODES: usize = 65;
@@ -98,9 +100,10 @@ impl Generated {
         let mtpa = ParameterGrid::new(&grid, &smooth, &regular);
         let universal = universal();
         let factor = 1.5 * f64::from(parameters.pole_pairs);
+        let last_torque = (TORQUE_ROOM * parameters.max_torque_nm).min(optimum.most_torque_nm());
         let start = (0..TORQUE_NODES)
             .map(|k| {
-                let torque = parameters.max_torque_nm * k as f64 / (TORQUE_NODES - 1) as f64;
+                let torque = last_torque * k as f64 / (TORQUE_NODES - 1) as f64;
                 let best = optimum.least_current(torque);
                 let passed = mtpa.two_passes(torque / factor, best, &universal);
                 [best.0, best.1, best.0 - passed.0, best.1 - passed.1].map(|value| value as f32)
@@ -115,7 +118,7 @@ impl Generated {
             flux: grid.flux(&smooth),
             parameters: mtpa.nodes.iter().map(|(psi, saliency)| [*psi as f32, *saliency as f32]).collect(),
             universal: universal.iter().map(|value| [*value as f32]).collect(),
-            torque_axis: Axis::new(0.0, parameters.max_torque_nm, TORQUE_NODES),
+            torque_axis: Axis::new(0.0, last_torque, TORQUE_NODES),
             start,
             weakening_axes,
             weakening,
