@@ -67,6 +67,8 @@ pub struct Committed {
     pub follows: Follows,
     /// Largest fundamental of the mode as a share of six-step.
     pub depth_limit: f32,
+    /// Whether the fundamental is to be that large, whatever the torque needs.
+    pub filled: bool,
     /// Whether the pattern's flux is where it will stay; not while a switch between two of them is still going on.
     pub settled: bool,
 }
@@ -189,7 +191,7 @@ impl Controller {
         let limit = VoltageLimit {
             udc_v: measured.udc_v,
             depth: committed.depth_limit,
-            filled: committed.follows == Follows::Angle,
+            filled: committed.filled,
         };
         let point = operating_point(self.trim.apply(torque_nm), omega, &limit, tables);
         let frame = measured.angle.sin_cos();

@@ -7,7 +7,7 @@
 use crate::frames::limit;
 
 /// Bandwidth, in rad/s: the torque ripple at six times the stator frequency must not come through.
-const BANDWIDTH_RAD_S: f32 = 20.0;
+const BANDWIDTH_RAD_S: f32 = 60.0;
 /// Largest trim, as a share of the demand.
 const MOST: f32 = 0.06;
 /// Torque below which the trim is no longer relative, as a share of the largest.

@@ -22,6 +22,9 @@ const UNITS_PER_RADIAN: f32 = 4_294_967_296.0 / core::f32::consts::TAU;
 /// Control periods after which a command is too old to make pulses from.
 const STALE_PERIODS: i32 = 5;
 
+/// How fast the voltage glides from square wave to what the torque needs, in shares of six-step per second.
+const GLIDE_PER_S: f32 = 1.0;
+
 /// Share of a mode's largest fundamental that the operating point may use where the voltage must also regulate.
 const REGULATION_ROOM: f32 = 0.999;
 
@@ -69,6 +72,10 @@ pub struct ControlTask {
     boundary: Option<Instant>,
     /// The fundamental of the last operating point, in V.
     steady_v: f32,
+    /// Fundamental that the last operating point would have without a limit, as a share of six-step.
+    depth: f32,
+    /// Fundamental to which the voltage has glided after square wave, as a share of six-step; 0 otherwise.
+    filled_to: f32,
     /// Mode that the newest command was made for, and the halves for which its flux hexagon still changes its size.
     unsettled: (Mode, u32),
     trip: Option<Trip>,
@@ -85,6 +92,8 @@ impl ControlTask {
             now: first,
             boundary: None,
             steady_v: 0.0,
+            depth: 0.0,
+            filled_to: 0.0,
             unsettled: (Mode::Off, 0),
             trip: None,
         }
@@ -185,6 +194,7 @@ impl ControlTask {
         let Settings { gains, clock, .. } = &self.settings;
         let output = self.controller.step(&input, &Law { gains, clock, tables: self.tables });
         self.steady_v = output.voltage.steady_v;
+        self.depth = output.voltage.depth;
         command.reference.voltage_v = output.voltage.voltage_v;
         command.reference.angle = output.voltage.angle;
         command.reference.carrier_angle = output.voltage.carrier_angle;
@@ -196,11 +206,29 @@ impl ControlTask {
         report.voltage_v = output.voltage.voltage_v;
     }
 
-    /// Whether two sectors have passed since one pattern gave way to another: so long the flux hexagon changes its size.
+    /// The largest fundamental as a share of six-step, and whether it is to be used whatever the torque needs: in square wave, and
+    /// after it for as long as the voltage glides from there to what the torque needs.
+    fn fill(&mut self, decided: Mode, largest: f32) -> (f32, bool) {
+        if decided == Mode::Square {
+            self.filled_to = 1.0;
+            return (largest, true);
+        }
+        self.filled_to -= GLIDE_PER_S * self.settings.clock.control_s();
+        if !decided.is_pattern() || self.filled_to < self.depth {
+            self.filled_to = 0.0;
+            return (largest, false);
+        }
+        (if self.filled_to < largest { self.filled_to } else { largest }, true)
+    }
+
+    /// Whether two sectors have passed since the square wave gave way to a pattern or the other way round: so long the flux
+    /// hexagon is off its centre, on its way to another size.
     fn is_settled(&mut self, decided: Mode, boundary_passed: bool) -> bool {
         let (mode, halves) = &mut self.unsettled;
         if decided != *mode {
-            *halves = if decided.is_pattern() && mode.is_pattern() { 2 * decided.sector_halves() } else { 0 };
+            let echoes = (decided == Mode::Square && mode.is_pattern())
+                || (*mode == Mode::Square && decided.is_pattern());
+            *halves = if echoes { 2 * decided.sector_halves() } else { 0 };
             *mode = decided;
         } else if boundary_passed {
             *halves = halves.saturating_sub(1);
@@ -214,8 +242,8 @@ impl ControlTask {
     }
 
     /// What the modulator will do until a command of this period can act.
-    fn committed(&self, applied: Option<&Applied>, now: Instant, omega: f32, udc_v: f32) -> Committed {
-        let clock = &self.settings.clock;
+    fn committed(&mut self, applied: Option<&Applied>, now: Instant, omega: f32, udc_v: f32) -> Committed {
+        let clock = self.settings.clock;
         let Some(applied) = applied else {
             let interval_s = clock.seconds(self.settings.devices.shortest_half_ticks as i32);
             return Committed {
@@ -226,6 +254,7 @@ impl ControlTask {
                 interval_s,
                 follows: Follows::Mean,
                 depth_limit: depth_limit(Mode::Async, 0.0, &self.settings.devices),
+                filled: false,
                 settled: true,
             };
         };
@@ -233,9 +262,11 @@ impl ControlTask {
         let elapsed = now.since(applied.at).max(0) as u32;
         let off = running.mode == Mode::Off || next.mode == Mode::Off;
         let left = running.period_ticks.saturating_sub(elapsed) + next.period_ticks;
-        let volt_seconds = volt_seconds(running, elapsed, udc_v, clock) + volt_seconds(next, 0, udc_v, clock);
+        let volt_seconds = volt_seconds(running, elapsed, udc_v, &clock) + volt_seconds(next, 0, udc_v, &clock);
         let [decided, _] = next.ahead;
         let largest = depth_limit(decided, self.rate(omega), &self.settings.devices);
+        let largest = if decided == Mode::Square { largest } else { REGULATION_ROOM * largest };
+        let (depth_limit, filled) = self.fill(decided, largest);
         let (ripple_wb, ripple_after_wb) = self.ripple(next, omega.abs(), udc_v, applied.mirrored);
         Committed {
             horizon_s: clock.seconds(left as i32),
@@ -251,7 +282,8 @@ impl ControlTask {
                 Mode::Square => Follows::Angle,
                 _ => Follows::Mean,
             },
-            depth_limit: if decided == Mode::Square { largest } else { REGULATION_ROOM * largest },
+            depth_limit,
+            filled,
             settled: true,
         }
     }

@@ -241,25 +241,33 @@ pub struct Modulator {
     next_half: u32,
     mirrored: bool,
     plan: Option<Plan>,
-    echo: Option<Echo>,
+    growth: Option<Growth>,
     /// Whether the half before was a pattern's and the next one is a carrier's.
     after_pattern: bool,
     /// Half the zero voltage of the present pattern's sectors, as an angle in rad.
     zero_rad: f32,
 }
 
-/// The second sector of a new pattern, made with as much zero voltage as the old pattern had.
+/// A new pattern growing out of an old one.
 ///
-/// In each sector of 60° the flux goes along one edge of a hexagon, the shorter the more notches take from it. With edges
-/// short, short | long, short, long, long the hexagon grows about its centre; with short, short | long, long it would
-/// be left off its centre, by a flux that turns in the machine until it has decayed. Likewise the other way.
+/// In each sector of 60° the flux goes along one edge of a hexagon, the shorter the more zero voltage there is in the sector. If
+/// the edges changed their length at once, the hexagon would be left off its centre, by a flux that turns in the machine
+/// until it has decayed. Every change of length moves the centre towards the corner where it happens; so changes of three
+/// corners 120° apart, or of one corner, its neighbour back, and the next one, leave it where it is.
 #[derive(Clone, Copy, Debug)]
-struct Echo {
-    /// The sector's first half.
-    at: u32,
+struct Growth {
     /// Half the zero voltage of a sector of the old pattern, as an angle in rad.
-    zero_rad: f32,
+    old_zero_rad: f32,
+    /// How much of the way to the new zero voltage each sector has gone; from the last on all of it.
+    shares: &'static [f32],
+    /// Halves since the switch.
+    halves: u32,
 }
+
+/// Between notched patterns.
+const BY_THIRDS: &[f32] = &[1.0 / 3.0, 1.0 / 3.0, 2.0 / 3.0, 2.0 / 3.0];
+/// To and from square wave, where a notch cannot be arbitrarily narrow: the second sector echoes the old pattern.
+const WITH_ECHO: &[f32] = &[1.0, 0.0];
 
 /// A switch between locked modes that has been announced.
 #[derive(Clone, Copy, Debug)]
@@ -281,7 +289,7 @@ const PATTERN_STRETCH: (f32, f32) = (0.5, 2.0);
 impl Modulator {
     /// A modulator at rest: its first half is `Off`.
     pub const fn new(devices: Devices, schedule: Schedule) -> Self {
-        Self { devices, schedule, mode: Mode::Off, next_half: 0, mirrored: false, plan: None, echo: None, after_pattern: false, zero_rad: 0.0 }
+        Self { devices, schedule, mode: Mode::Off, next_half: 0, mirrored: false, plan: None, growth: None, after_pattern: false, zero_rad: 0.0 }
     }
 
     /// Whether the machine is seen in the mirror, because it turns backward.
@@ -294,7 +302,7 @@ impl Modulator {
         let Some(reference) = reference else {
             self.mode = Mode::Off;
             self.plan = None;
-            self.echo = None;
+            self.growth = None;
             return CarrierPeriod::off(self.devices.shortest_half_ticks);
         };
         self.turn_mirror(reference.rate);
@@ -311,10 +319,7 @@ impl Modulator {
         half.ahead = self.ahead(self.next_half);
         self.next_half = self.half_after(self.next_half, 1);
         self.after_pattern = false;
-        let sector = self.mode.sector_halves();
-        if self.echo.is_some_and(|echo| self.half_after(echo.at, sector) == self.next_half) {
-            self.echo = None;
-        }
+        self.grow();
         if self.mirrored {
             half.compare_ticks.swap(1, 2);
             half.start_levels.swap(1, 2);
@@ -358,9 +363,10 @@ impl Modulator {
         self.mode = mode;
         self.plan = None;
         self.after_pattern = from.is_pattern() && mode.is_carrier();
-        self.echo = (from.is_pattern() && mode.is_pattern()).then(|| Echo {
-            at: self.half_after(self.next_half, mode.sector_halves()),
-            zero_rad: self.zero_rad,
+        self.growth = (from.is_pattern() && mode.is_pattern()).then_some(Growth {
+            old_zero_rad: self.zero_rad,
+            shares: if from == Mode::Square || mode == Mode::Square { WITH_ECHO } else { BY_THIRDS },
+            halves: 0,
         });
         self.schedule.switched(start);
     }
@@ -411,34 +417,49 @@ impl Modulator {
             return carrier::synchronous(self.next_half, start, period_ticks, zeros, seen, &self.devices);
         }
         let notches = self.mode.notches() as f32;
-        let own_notch = (self.mode != Mode::Square)
-            .then(|| middle60::half_notch_rad(self.mode, seen.voltage_v, seen.udc_v));
-        self.zero_rad = own_notch.map_or(0.0, |notch| notch * notches);
-        let notch = match self.echoed_zero_rad() {
-            None => own_notch,
-            Some(zero_rad) => (zero_rad > 0.0).then_some(zero_rad / notches),
+        let own_rad = if self.mode == Mode::Square {
+            0.0
+        } else {
+            middle60::half_notch_rad(self.mode, seen.voltage_v, seen.udc_v) * notches
         };
+        self.zero_rad = own_rad;
+        let (zero_rad, has_notch) = match self.growth_share() {
+            None => (own_rad, self.mode != Mode::Square),
+            Some((old_rad, share)) => {
+                let zero_rad = old_rad + share * (own_rad - old_rad);
+                (zero_rad, zero_rad > 0.0)
+            }
+        };
+        let notch = has_notch.then_some(zero_rad / notches);
         // While the hexagon changes its size, what a half is longer than its angle is zero voltage: that turns the
         // pattern without moving the hexagon. Where there is no notch, the length stays.
-        let (shortest, longest) = match (self.echo, notch) {
-            (Some(_), None) => (1.0, 1.0),
-            _ => PATTERN_STRETCH,
-        };
+        let growing = self.growth.is_some();
+        let (shortest, longest) = if growing && !has_notch { (1.0, 1.0) } else { PATTERN_STRETCH };
         let period_ticks = self.whole_ticks(limit(wanted, shortest * nominal, longest * nominal));
-        let nominal_ticks = if self.echo.is_some() { nominal } else { period_ticks as f32 };
+        let nominal_ticks = if growing { nominal } else { period_ticks as f32 };
         middle60::half(self.mode, self.next_half, (period_ticks, nominal_ticks), notch, &self.devices)
+    }
+
+    /// The old pattern's zero voltage and the share of the way from there, while one pattern grows out of another.
+    fn growth_share(&self) -> Option<(f32, f32)> {
+        let growth = self.growth?;
+        let sector = growth.halves.checked_div(self.mode.sector_halves())?;
+        growth.shares.get(sector as usize).map(|share| (growth.old_zero_rad, *share))
+    }
+
+    /// One half more has been made.
+    fn grow(&mut self) {
+        if let Some(growth) = &mut self.growth {
+            growth.halves += 1;
+        }
+        if self.growth_share().is_none() {
+            self.growth = None;
+        }
     }
 
     /// A length in whole ticks. Slower than the async mode's range there is nothing to lock to: the length stays that
     /// of a stopped carrier.
     fn whole_ticks(&self, period: f32) -> u32 {
         ((period + 0.5) as u32).min(self.devices.shortest_half_ticks * 4).max(1)
-    }
-
-    /// The zero voltage of the next half if it echoes.
-    fn echoed_zero_rad(&self) -> Option<f32> {
-        let echo = self.echo?;
-        let into = self.half_after(self.next_half, self.halves() - echo.at);
-        (into < self.mode.sector_halves()).then_some(echo.zero_rad)
     }
 }
