@@ -113,7 +113,7 @@ pub struct StepResponse {
 
 /// Measures a step.
 pub fn step_response(recording: &Recording, step: &Step) -> StepResponse {
-    let torque = carrier_averaged(recording, step.at_s, step.until_s);
+    let torque = carrier_averaged(recording, step.at_s, step.until_s, |row| row.te_nm);
     let final_mean = mean(window(recording, step.until_s - 0.04, step.until_s), |row| row.te_nm);
     let size = step.to_nm - step.from_nm;
     let start = final_mean - size;
@@ -135,8 +135,13 @@ pub fn step_response(recording: &Recording, step: &Step) -> StepResponse {
     }
 }
 
-/// Torque averaged over one carrier period around each row of the window.
-fn carrier_averaged(recording: &Recording, from_s: f64, to_s: f64) -> Vec<(f64, f64)> {
+/// A quantity averaged over one carrier period (1/900 s) around each row of the window.
+fn carrier_averaged(
+    recording: &Recording,
+    from_s: f64,
+    to_s: f64,
+    value: impl Fn(&Row) -> f64,
+) -> Vec<(f64, f64)> {
     const HALF_WIDTH_S: f64 = 0.5 / 900.0;
     let rows = &recording.rows;
     let step_s = if rows.len() > 1 { rows[1].t_s - rows[0].t_s } else { HALF_WIDTH_S };
@@ -146,7 +151,7 @@ fn carrier_averaged(recording: &Recording, from_s: f64, to_s: f64) -> Vec<(f64, 
     (first..last)
         .map(|k| {
             let around = &rows[k.saturating_sub(reach)..(k + reach + 1).min(rows.len())];
-            (rows[k].t_s, mean(around, |row| row.te_nm))
+            (rows[k].t_s, mean(around, &value))
         })
         .collect()
 }
@@ -170,8 +175,10 @@ pub struct SwitchFigures {
     pub steady_current_a: f64,
     /// By how much the first exceeds the second, in percent.
     pub excess_percent: f64,
-    /// Torque beyond the steady ripple band of the same windows, from 2 ms before to 30 ms after, in N·m.
+    /// Carrier-averaged torque beyond its steady band of the same windows, from 2 ms before to 30 ms after, in N·m.
     pub torque_excursion_nm: f64,
+    /// The same for the instantaneous torque.
+    pub instantaneous_torque_excursion_nm: f64,
 }
 
 /// Every switch between pulsing modes in the recording.
@@ -193,16 +200,18 @@ fn at_switch(recording: &Recording, switch: &Switch) -> SwitchFigures {
         let rows = window(recording, switch.t_s + from_s, switch.t_s + to_s);
         rows.iter().map(Row::peak_current_a).fold(0.0, f64::max)
     };
-    let error = |row: &Row| row.te_nm - row.te_ref_nm;
-    let extent = |from_s: f64, to_s: f64| {
-        let rows = window(recording, switch.t_s + from_s, switch.t_s + to_s);
-        let low = rows.iter().map(error).fold(f64::INFINITY, f64::min);
-        (low, rows.iter().map(error).fold(f64::NEG_INFINITY, f64::max))
-    };
     let steady = peak(-0.1, -0.02).max(peak(0.06, 0.14));
     let now = peak(-0.002, 0.03);
-    let (before, after, during) = (extent(-0.1, -0.02), extent(0.06, 0.14), extent(-0.002, 0.03));
-    let band = (before.0.min(after.0), before.1.max(after.1));
+    let instantaneous = |from_s: f64, to_s: f64| {
+        let rows = window(recording, switch.t_s + from_s, switch.t_s + to_s);
+        rows.iter().map(|row| row.te_nm - row.te_ref_nm).collect()
+    };
+    let averaged = |from_s: f64, to_s: f64| {
+        carrier_averaged(recording, switch.t_s + from_s, switch.t_s + to_s, |row| row.te_nm - row.te_ref_nm)
+            .into_iter()
+            .map(|(_, error)| error)
+            .collect()
+    };
     SwitchFigures {
         t_s: switch.t_s,
         from: switch.from.name(),
@@ -212,8 +221,21 @@ fn at_switch(recording: &Recording, switch: &Switch) -> SwitchFigures {
         peak_current_a: now,
         steady_current_a: steady,
         excess_percent: (now / steady - 1.0) * 100.0,
-        torque_excursion_nm: (band.0 - during.0).max(during.1 - band.1).max(0.0),
+        torque_excursion_nm: excursion(averaged),
+        instantaneous_torque_excursion_nm: excursion(instantaneous),
     }
+}
+
+/// How far a torque error at a switch goes beyond its steady band before and after.
+fn excursion(error_nm: impl Fn(f64, f64) -> Vec<f64>) -> f64 {
+    let extent = |from_s: f64, to_s: f64| {
+        let errors = error_nm(from_s, to_s);
+        let low = errors.iter().copied().fold(f64::INFINITY, f64::min);
+        (low, errors.iter().copied().fold(f64::NEG_INFINITY, f64::max))
+    };
+    let (before, after, during) = (extent(-0.1, -0.02), extent(0.06, 0.14), extent(-0.002, 0.03));
+    let (low, high) = (before.0.min(after.0), before.1.max(after.1));
+    (low - during.0).max(during.1 - high).max(0.0)
 }
 
 /// How long each mode was in use, in s, in order of first use.
