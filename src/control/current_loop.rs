@@ -79,7 +79,8 @@ pub fn step(input: &Input, gains: &Gains, tables: &Tables) -> Output {
             Output { voltage: shortened(regulated, limit), steady: shortened(steady, limit) }
         }
         Follows::Angle => {
-            let damping = if input.committed.settled { gains.square_damping * input.omega.abs() } else { 0.0 };
+            let damping =
+                if input.committed.settled { gains.square_damping * input.omega.abs() } else { 0.0 };
             let regulated = steady - (predicted - reference) * damping;
             Output { voltage: lengthened(regulated, limit), steady: lengthened(steady, limit) }
         }
@@ -103,8 +104,7 @@ fn mean_voltage(input: &Input, reference: Dq, predicted: Dq, gains: &Gains) -> D
         + error * ((remaining - 1.0) * half_turn.cos)
         + error.j() * ((remaining + 1.0) * half_turn.sin);
     let middle = Angle::from_radians(input.omega * committed.horizon_s + x);
-    let steering =
-        (committed.ripple_after_wb - committed.ripple_wb).park((input.angle + middle).sin_cos());
+    let steering = (committed.ripple_after_wb - committed.ripple_wb).park((input.angle + middle).sin_cos());
     (chord + steering) * (1.0 / committed.interval_s)
 }
 
@@ -118,7 +118,8 @@ fn predicted_flux(input: &Input) -> Dq {
     let middle = (input.angle + Angle::from_radians(0.5 * turned)).sin_cos();
     let end = (input.angle + Angle::from_radians(turned)).sin_cos();
     let drop = (input.disturbance - input.current * input.resistance) * committed.horizon_s;
-    let at_horizon = input.flux.unpark(input.frame) + volt_seconds + drop.unpark(middle) - committed.ripple_wb;
+    let at_horizon =
+        input.flux.unpark(input.frame) + volt_seconds + drop.unpark(middle) - committed.ripple_wb;
     at_horizon.park(end)
 }
 

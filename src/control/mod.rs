@@ -188,12 +188,10 @@ impl Controller {
         let Law { gains, clock, tables } = *law;
         let omega = self.speed.omega();
         let torque_nm = self.demand.step(demand, omega, clock.control_s(), &tables.ratings);
-        let limit = VoltageLimit {
-            udc_v: measured.udc_v,
-            depth: committed.depth_limit,
-            filled: committed.filled,
-        };
-        let point = operating_point(self.trim.apply(torque_nm), omega, &limit, tables);
+        let limit =
+            VoltageLimit { udc_v: measured.udc_v, depth: committed.depth_limit, filled: committed.filled };
+        let point =
+            operating_point(self.trim.apply(torque_nm, tables.ratings.max_torque_nm), omega, &limit, tables);
         let frame = measured.angle.sin_cos();
         let current = measured.currents_a.clarke().park(frame);
         let flux = flux_linkage(tables, current);

@@ -10,8 +10,8 @@ use crate::frames::limit;
 const BANDWIDTH_RAD_S: f32 = 60.0;
 /// Largest trim, as a share of the demand.
 const MOST: f32 = 0.06;
-/// Torque below which the trim is no longer relative, as a share of the largest.
-const SMALL_TORQUE: f32 = 0.1;
+/// Share of the largest torque below which the trim no longer shrinks with the demand.
+const CONSTANT_BELOW: f32 = 0.4;
 /// Rate of change of the demand that counts as a change, as a share of the largest torque, in 1/s.
 const STEADY_RATE: f32 = 1.0;
 /// Time after a change of the demand in which the current loop is still at work, in s.
@@ -19,6 +19,7 @@ const HOLD_S: f32 = 0.01;
 
 #[derive(Clone, Copy, Debug)]
 pub struct TorqueTrim {
+    /// Trim over [`scale`].
     share: f32,
     last_demand_nm: f32,
     hold_s: f32,
@@ -42,8 +43,10 @@ impl TorqueTrim {
     }
 
     /// The demand with its trim, in N·m.
-    pub fn apply(&self, demand_nm: f32) -> f32 {
-        demand_nm * (1.0 + self.share)
+    pub fn apply(&self, demand_nm: f32, largest_nm: f32) -> f32 {
+        let most = MOST * demand_nm.abs();
+        let trim = limit(self.share * scale(demand_nm, largest_nm), -most, most);
+        if demand_nm < 0.0 { demand_nm - trim } else { demand_nm + trim }
     }
 
     pub fn step(&mut self, input: &Input) {
@@ -54,13 +57,16 @@ impl TorqueTrim {
         } else if self.hold_s > 0.0 {
             self.hold_s -= input.period_s;
         } else {
-            let magnitude = input.demand_nm.abs();
-            let small = SMALL_TORQUE * input.largest_nm;
-            let per_torque = 1.0 / if magnitude > small { magnitude } else { small };
             let missing = input.demand_nm - input.measured_nm;
             let missing = if input.demand_nm < 0.0 { -missing } else { missing };
-            let step = BANDWIDTH_RAD_S * input.period_s * missing * per_torque;
+            let step = BANDWIDTH_RAD_S * input.period_s * missing / scale(input.demand_nm, input.largest_nm);
             self.share = limit(self.share + step, -MOST, MOST);
         }
     }
+}
+
+/// Torque to which the trim is in proportion, in N·m, greater than zero.
+fn scale(demand_nm: f32, largest_nm: f32) -> f32 {
+    let (magnitude, least) = (demand_nm.abs(), CONSTANT_BELOW * largest_nm);
+    if magnitude > least { magnitude } else { least }
 }

@@ -262,7 +262,8 @@ impl ControlTask {
         let elapsed = now.since(applied.at).max(0) as u32;
         let off = running.mode == Mode::Off || next.mode == Mode::Off;
         let left = running.period_ticks.saturating_sub(elapsed) + next.period_ticks;
-        let volt_seconds = volt_seconds(running, elapsed, udc_v, &clock) + volt_seconds(next, 0, udc_v, &clock);
+        let volt_seconds =
+            volt_seconds(running, elapsed, udc_v, &clock) + volt_seconds(next, 0, udc_v, &clock);
         let [decided, _] = next.ahead;
         let largest = depth_limit(decided, self.rate(omega), &self.settings.devices);
         let largest = if decided == Mode::Square { largest } else { REGULATION_ROOM * largest };

@@ -289,7 +289,17 @@ const PATTERN_STRETCH: (f32, f32) = (0.5, 2.0);
 impl Modulator {
     /// A modulator at rest: its first half is `Off`.
     pub const fn new(devices: Devices, schedule: Schedule) -> Self {
-        Self { devices, schedule, mode: Mode::Off, next_half: 0, mirrored: false, plan: None, growth: None, after_pattern: false, zero_rad: 0.0 }
+        Self {
+            devices,
+            schedule,
+            mode: Mode::Off,
+            next_half: 0,
+            mirrored: false,
+            plan: None,
+            growth: None,
+            after_pattern: false,
+            zero_rad: 0.0,
+        }
     }
 
     /// Whether the machine is seen in the mirror, because it turns backward.
