@@ -1,0 +1,95 @@
+//! The nine gates of a carrier period, as a timer plays them.
+
+use super::Applied;
+use super::shoot_through::Edges;
+
+/// The gates' names, in the order of [`Period::gates`].
+pub const GATES: [&str; 9] = ["UH", "VH", "WH", "UM", "VM", "WM", "UL", "VL", "WL"];
+
+/// A gate in one carrier period. It is on except in one pause of the rising half, 0 ≤ `off_from` ≤ `off_to` ≤ 1/2, and
+/// that pause's mirror image in the falling half, 1 − `off_to` … 1 − `off_from`.
+///
+/// For an up-down counter these are two compare values: off while it counts between them, either way. The end of a pause
+/// that lies at 0 or 1/2 is no edge: there the pause meets its mirror image.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GatePattern {
+    /// Beginning of the pause, in periods.
+    pub off_from: f32,
+    /// End of the pause, in periods; the same as its beginning where the gate is never off.
+    pub off_to: f32,
+}
+
+impl GatePattern {
+    /// Whether the gate is on just after t = 0.
+    #[inline]
+    pub fn starts_on(&self) -> bool {
+        self.off_from > 0.0 || self.off_to <= 0.0
+    }
+
+    /// The toggles in the period, sorted, each at 0 < t < 1, in periods: none, two or four.
+    pub fn toggles(&self) -> impl Iterator<Item = f32> + use<> {
+        let paused = self.off_from < self.off_to;
+        let from = (paused && self.off_from > 0.0).then_some(self.off_from);
+        let to = (paused && self.off_to < 0.5).then_some(self.off_to);
+        [from, to, to.map(|t| 1.0 - t), from.map(|t| 1.0 - t)].into_iter().flatten()
+    }
+
+    /// In ticks of a carrier half with `half_ticks` (1 ..= 2²²), each end to the nearest. Rounding keeps order, and what was at
+    /// the same instant stays so: legal legs stay legal.
+    #[inline]
+    pub fn ticks(&self, half_ticks: u32) -> GateTicks {
+        let scale = 2.0 * half_ticks as f32;
+        let round = |instant: f32| (instant * scale + 0.5) as u32;
+        GateTicks { off_from: round(self.off_from), off_to: round(self.off_to) }
+    }
+}
+
+/// A gate's pause in ticks since the half's beginning; see [`GatePattern`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct GateTicks {
+    /// Beginning of the pause.
+    pub off_from: u32,
+    /// End of the pause; the same as its beginning where the gate is never off.
+    pub off_to: u32,
+}
+
+/// The gates of one carrier period, and what they give.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Period {
+    /// UH VH WH UM VM WM UL VL WL.
+    pub gates: [GatePattern; 9],
+    /// What the motors have.
+    pub applied: Applied,
+}
+
+impl Period {
+    #[inline]
+    pub(super) fn new(upper: &Edges, lower: &Edges, applied: Applied) -> Self {
+        let [(mu_off, l_u), (mv_off, l_v), (mw_off, l_w)] = lower.legs();
+        let [(mu_on, h_u), (mv_on, h_v), (mw_on, h_w)] = upper.legs();
+        let high = |(from, to)| GatePattern { off_from: from, off_to: to };
+        let middle = |from, to| GatePattern { off_from: from, off_to: to };
+        // From the boundary outward is backward in time here.
+        let low = |(to, from)| GatePattern { off_from: from, off_to: to };
+        Self {
+            gates: [
+                high(h_u),
+                high(h_v),
+                high(h_w),
+                middle(mu_off, mu_on),
+                middle(mv_off, mv_on),
+                middle(mw_off, mw_on),
+                low(l_u),
+                low(l_v),
+                low(l_w),
+            ],
+            applied,
+        }
+    }
+
+    /// Every gate's pause in ticks of a carrier half with `half_ticks` (1 ..= 2²²); see [`GatePattern::ticks`].
+    #[inline]
+    pub fn ticks(&self, half_ticks: u32) -> [GateTicks; 9] {
+        self.gates.map(|gate| gate.ticks(half_ticks))
+    }
+}
