@@ -21,17 +21,24 @@ pub struct GatePattern {
 
 impl GatePattern {
     /// Whether the gate is on just after t = 0.
-    #[inline]
     pub fn starts_on(&self) -> bool {
-        self.off_from > 0.0 || self.off_to <= 0.0
+        self.pause().is_none_or(|(from, _)| from > 0.0)
     }
 
-    /// The toggles in the period, sorted, each at 0 < t < 1, in periods: none, two or four.
+    /// The toggles in the period, sorted, each at 0 < t < 1, in periods: none, two or four. On a grid of 2⁻²⁴, where the
+    /// mirror image is exact.
     pub fn toggles(&self) -> impl Iterator<Item = f32> + use<> {
-        let paused = self.off_from < self.off_to;
-        let from = (paused && self.off_from > 0.0).then_some(self.off_from);
-        let to = (paused && self.off_to < 0.5).then_some(self.off_to);
+        let pause = self.pause();
+        let from = pause.and_then(|(from, _)| (from > 0.0).then_some(from));
+        let to = pause.and_then(|(_, to)| (to < 0.5).then_some(to));
         [from, to, to.map(|t| 1.0 - t), from.map(|t| 1.0 - t)].into_iter().flatten()
+    }
+
+    /// The pause on that grid, if the gate has one.
+    fn pause(&self) -> Option<(f32, f32)> {
+        let grid = |instant: f32| (instant + 0.5) - 0.5;
+        let (from, to) = (grid(self.off_from), grid(self.off_to));
+        (from < to).then_some((from, to))
     }
 
     /// In ticks of a carrier half with `half_ticks` (1 ..= 2²²), each end to the nearest. Rounding keeps order, and what was at
@@ -51,6 +58,14 @@ pub struct GateTicks {
     pub off_from: u32,
     /// End of the pause; the same as its beginning where the gate is never off.
     pub off_to: u32,
+}
+
+impl GateTicks {
+    /// Whether the gate is on in the tick that begins `tick` ticks after the rising half.
+    #[inline]
+    pub const fn is_on(&self, tick: u32) -> bool {
+        tick < self.off_from || tick >= self.off_to
+    }
 }
 
 /// The gates of one carrier period, and what they give.
