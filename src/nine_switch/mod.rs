@@ -117,12 +117,12 @@ pub fn step(request: &Request) -> Result<Period, Refused> {
 
 /// NaN fails every comparison, so it is refused as well.
 fn check(request: &Request) -> Result<(), Refused> {
-    let is_depth = |depth: f32| depth >= 0.0 && depth <= f32::MAX;
+    let is_depth = |depth: f32| (0.0..=f32::MAX).contains(&depth);
     if !is_depth(request.upper.depth) {
         Err(Refused::UpperDepth)
     } else if !is_depth(request.lower.depth) {
         Err(Refused::LowerDepth)
-    } else if !(request.shoot_through >= 0.0 && request.shoot_through <= 1.0) {
+    } else if !(0.0..=1.0).contains(&request.shoot_through) {
         Err(Refused::ShootThrough)
     } else {
         Ok(())
