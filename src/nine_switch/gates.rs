@@ -1,7 +1,9 @@
 //! The nine gates of a carrier period, as a timer plays them.
 
 use super::Applied;
+use super::shares::Shares;
 use super::shoot_through::Edges;
+use super::vectors::Leg;
 
 /// The gates' names, in the order of [`Period::gates`].
 pub const GATES: [&str; 9] = ["UH", "VH", "WH", "UM", "VM", "WM", "UL", "VL", "WL"];
@@ -79,27 +81,28 @@ pub struct Period {
 
 impl Period {
     #[inline]
-    pub(super) fn new(upper: &Edges, lower: &Edges, applied: Applied) -> Self {
-        let [(mu_off, l_u), (mv_off, l_v), (mw_off, l_w)] = lower.legs();
-        let [(mu_on, h_u), (mv_on, h_v), (mw_on, h_w)] = upper.legs();
-        let high = |(from, to)| GatePattern { off_from: from, off_to: to };
-        let middle = |from, to| GatePattern { off_from: from, off_to: to };
-        // From the boundary outward is backward in time here.
-        let low = |(to, from)| GatePattern { off_from: from, off_to: to };
-        Self {
-            gates: [
-                high(h_u),
-                high(h_v),
-                high(h_w),
-                middle(mu_off, mu_on),
-                middle(mv_off, mv_on),
-                middle(mw_off, mw_on),
-                low(l_u),
-                low(l_v),
-                low(l_w),
-            ],
-            applied,
-        }
+    pub(super) fn new(shares: &Shares, upper: Edges, lower: Edges, orders: [[Leg; 3]; 2]) -> Self {
+        let boundary = shares.boundary;
+        let never = GatePattern { off_from: 0.0, off_to: 0.0 };
+        let mut high = [GatePattern { off_to: 0.5, ..never }; 3];
+        let (mut middle, mut low) = ([never; 3], [never; 3]);
+        // The upper motor's smallest phase steps first after the boundary, the lower motor's largest last before it.
+        let [[far, between, near], order] = orders;
+        high[near as usize].off_from = boundary + upper.near.0;
+        high[between as usize].off_from = boundary + upper.middle;
+        high[far as usize] = GatePattern { off_from: boundary + upper.far.0, off_to: boundary + upper.again };
+        middle[near as usize].off_to = boundary + upper.near.1;
+        middle[between as usize].off_to = boundary + upper.middle;
+        middle[far as usize].off_to = boundary + upper.far.1;
+        let [near, between, far] = order;
+        low[near as usize].off_to = boundary - lower.near.0;
+        low[between as usize].off_to = boundary - lower.middle;
+        low[far as usize] = GatePattern { off_from: boundary - lower.again, off_to: boundary - lower.far.0 };
+        middle[near as usize].off_from = boundary - lower.near.1;
+        middle[between as usize].off_from = boundary - lower.middle;
+        middle[far as usize].off_from = boundary - lower.far.1;
+        let ([h_u, h_v, h_w], [m_u, m_v, m_w], [l_u, l_v, l_w]) = (high, middle, low);
+        Self { gates: [h_u, h_v, h_w, m_u, m_v, m_w, l_u, l_v, l_w], applied: shares.applied }
     }
 
     /// Every gate's pause in ticks of a carrier half with `half_ticks` (1 ..= 2²²); see [`GatePattern::ticks`].

@@ -44,8 +44,8 @@ pub use gates::{GATES, GatePattern, GateTicks, Period};
 pub use sequence::Scheme;
 pub use vectors::{Leg, LegState};
 
-use sequence::{Sequence, Sides};
-use vectors::Phases;
+use sequence::Sequence;
+use vectors::Direction;
 
 /// The mean voltage one motor is to have.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -104,15 +104,19 @@ pub enum Refused {
 /// The gates of one carrier period, with the shoot-through at the sides of the zero vectors, one leg at a time.
 pub fn step(request: &Request) -> Result<Period, Refused> {
     check(request)?;
-    let duty = request.shoot_through;
-    let sequence = Sequence::of(request);
-    let (upper, lower) = (Phases::of(request.upper.angle), Phases::of(request.lower.angle));
-    let (applied, boundary) = shares::divide(request, sequence.boundary, upper.span(), lower.span());
-    let upper = Sides::UPPER.place(&upper, applied.upper_depth, sequence.upper, boundary);
-    let lower = Sides::LOWER.place(&lower, applied.lower_depth, sequence.lower, boundary);
-    let upper = shoot_through::insert(&upper, &Sides::UPPER, sequence.upper, sequence.site, duty);
-    let lower = shoot_through::insert(&lower, &Sides::LOWER, sequence.lower, sequence.site, duty);
-    Ok(Period::new(&upper, &lower, applied))
+    let (upper, lower) = (Direction::of(request.upper.angle), Direction::of(request.lower.angle));
+    let sequence = Sequence::of(request.scheme, &upper, &lower);
+    let shares = shares::divide(request, sequence.slides, &upper, &lower);
+    let edges = |share, inner, span, gap| {
+        let steps = sequence::steps(share, inner, span, gap);
+        shoot_through::insert(&steps, request.shoot_through, share, inner, sequence.central)
+    };
+    // Next to the boundary the upper motor's smallest phase steps, and the lower motor's largest.
+    let upper_gap = shares.upper_span - shares.applied.upper_depth * upper.upper_gap;
+    let lower_gap = shares.applied.lower_depth * lower.upper_gap;
+    let upper_edges = edges(0.5 - shares.boundary, sequence.upper_inner, shares.upper_span, upper_gap);
+    let lower_edges = edges(shares.boundary, sequence.lower_inner, shares.lower_span, lower_gap);
+    Ok(Period::new(&shares, upper_edges, lower_edges, [upper.order, lower.order]))
 }
 
 /// NaN fails every comparison, so it is refused as well.

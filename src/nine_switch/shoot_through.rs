@@ -13,54 +13,32 @@
 //!
 //! One exception: a motor without voltage has no step at the period's end in RS and ZVO, so M makes a pulse there.
 
-use super::sequence::{Compare, Sides, Site, Zeros};
-use super::vectors::Leg;
+use super::sequence::Steps;
 
-/// A motor's edges in the rising half, in periods.
+/// A motor's edges in the rising half, each as a distance from the boundary, in periods.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Edges {
-    compare: Compare,
-    /// M's edge in the near leg.
-    near_middle: f32,
-    /// The edge of the far leg's own gate, H or L.
-    far_own: f32,
-    /// Where that gate's pause ends on the side of the turn's end.
-    far_end: f32,
-    /// The same of the other legs.
-    end: f32,
+    /// Of the leg next to the boundary: its own gate's (H or L) and M's.
+    pub near: (f32, f32),
+    /// Of the leg between, both gates'.
+    pub middle: f32,
+    /// Of the leg next to the end: its own gate's and M's.
+    pub far: (f32, f32),
+    /// Where the far leg's own gate turns on again: the share's end unless the shoot-through is central.
+    pub again: f32,
 }
 
-/// Adds a motor's part of the shoot-through `duty` (0 ..= 1 of the period) to its compare instants.
+/// Adds a motor's part of the shoot-through `duty` (0 ..= 1) to its steps in a share that lasts `share` periods.
 #[inline]
-pub(super) fn insert(compare: &Compare, sides: &Sides, zeros: Zeros, site: Site, duty: f32) -> Edges {
-    let whole = 0.25 * duty * sides.outward;
-    let inner = whole * zeros.inner_part();
-    let outer = whole - inner;
-    let (far_own, far_end) = match site {
-        Site::Sides => (compare.far.1 + outer, sides.end),
-        Site::Centre => (compare.far.1, sides.end - outer),
-    };
-    Edges { compare: *compare, near_middle: compare.near.1 - inner, far_own, far_end, end: sides.end }
-}
-
-impl Edges {
-    /// The instant of the leg's M, given its compare instant.
-    #[inline]
-    fn middle(&self, leg: Leg, instant: f32) -> f32 {
-        if leg == self.compare.near.0 { self.near_middle } else { instant }
-    }
-
-    /// Begin and end of the pause of the leg's own gate (H or L), from the boundary outward.
-    #[inline]
-    fn own(&self, leg: Leg, instant: f32) -> (f32, f32) {
-        if leg == self.compare.far.0 { (self.far_own, self.far_end) } else { (instant, self.end) }
-    }
-
-    /// For the legs U, V, W: M's edge, and the pause of the motor's own gate from the boundary outward.
-    #[inline]
-    pub fn legs(&self) -> [(f32, (f32, f32)); 3] {
-        let [u, v, w] = self.compare.instants;
-        [(Leg::U, u), (Leg::V, v), (Leg::W, w)]
-            .map(|(leg, instant)| (self.middle(leg, instant), self.own(leg, instant)))
+pub(super) fn insert(steps: &Steps, duty: f32, share: f32, inner: f32, central: bool) -> Edges {
+    let part = 0.25 * duty;
+    let inside = part * inner;
+    let outside = part - inside;
+    let (later, again) = if central { (0.0, share - outside) } else { (outside, share) };
+    Edges {
+        near: (steps.near, steps.near - inside),
+        middle: steps.middle,
+        far: (steps.far + later, steps.far),
+        again,
     }
 }

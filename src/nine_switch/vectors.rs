@@ -4,7 +4,7 @@
 //! one nothing; V7 ..= V12 = (−1 1 1) (−1 −1 1) (1 −1 1) (1 −1 −1) (1 1 −1) (−1 1 −1) the other way round; V13 = (1 1 1),
 //! V14 = (0 0 0) and V15 = (−1 −1 −1) are zero for both.
 
-use crate::frames::{AlphaBeta, Angle};
+use crate::frames::Angle;
 
 /// A leg of the inverter, and the phase of both motors that it feeds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -52,31 +52,53 @@ impl LegState {
     }
 }
 
-/// A unit vector's three phases and their order.
+/// A voltage vector's direction: its sector, and the dwell times in it at depth 1.
+///
+/// With a the angle in sector k, V_k acts for T1 = (√3/2) m T sin(60° − a), V_{k+1} for T2 = (√3/2) m T sin a. Counted from the
+/// sector's middle, a = 30° + φ, both come from one sine and one cosine:
+///
+/// ```text
+/// (T1 + T2)/2 = (√3/4) m T cos φ     T1/2 = (T1 + T2)/4 − (3/8) m T sin φ
+/// ```
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Phases {
-    /// cos θ, cos(θ − 120°), cos(θ + 120°).
-    pub values: [f32; 3],
-    pub largest: (Leg, f32),
-    /// Never the leg that is the largest.
-    pub smallest: (Leg, f32),
+pub(super) struct Direction {
+    /// The legs of the largest, the middle and the smallest phase.
+    pub order: [Leg; 3],
+    /// Largest less smallest phase as a time in the rising half: (T1 + T2)/2 at depth 1, in periods; 3/8 ..= √3/4.
+    pub span: f32,
+    /// Largest less middle phase in the same way; from 0 to the span.
+    pub upper_gap: f32,
+    /// The angle lies in [−30°, 30°), [90°, 150°) or [210°, 270°): a phase is at its positive peak.
+    pub peak: bool,
 }
 
-impl Phases {
+/// The order of the phases in sectors I to VI.
+const ORDER: [[Leg; 3]; 6] = {
+    use Leg::{U, V, W};
+    [[U, V, W], [V, U, W], [V, W, U], [W, V, U], [W, U, V], [U, W, V]]
+};
+
+impl Direction {
     #[inline]
     pub fn of(angle: Angle) -> Self {
-        let direction = angle.sin_cos();
-        let phases = AlphaBeta { alpha: direction.cos, beta: direction.sin }.abc();
-        let (u, v, w) = ((Leg::U, phases.a), (Leg::V, phases.b), (Leg::W, phases.c));
-        let (large, small) = if u.1 >= v.1 { (u, v) } else { (v, u) };
-        let largest = if large.1 >= w.1 { large } else { w };
-        let smallest = if small.1 < w.1 { small } else { w };
-        Self { values: [phases.a, phases.b, phases.c], largest, smallest }
-    }
-
-    /// Largest less smallest phase, 1.5 ..= √3.
-    #[inline]
-    pub fn span(&self) -> f32 {
-        self.largest.1 - self.smallest.1
+        // 60° is no whole number of units: one more, so that what is rounded down to a border counts as beyond it.
+        let sectors = u64::from(angle.0.wrapping_add(1)) * 6;
+        let (sector, within) = ((sectors >> 32) as u32, sectors as u32);
+        // φ as a share of 30°, −1 ..= 1.
+        let x = (within ^ (1 << 31)) as i32 as f32 * (1.0 / 2_147_483_648.0);
+        let z = x * x;
+        // (3/8) sin φ and (√3/4) cos φ, error below 3e-8, for a 30° that lacks 6e-7 of itself: so rounding makes no gap
+        // negative.
+        let sine = x * (0.196_349_41 + z * (-8.971_258e-3 + z * 1.217_830_7e-4));
+        let span = 0.433_012_7 + z * (-5.935_636e-2 + z * (1.355_997_4e-3 - z * 1.227_165_5e-5));
+        let odd = sector & 1 != 0;
+        let upper_gap = 0.5 * span + if odd { sine } else { -sine };
+        let order = match ORDER.get(sector as usize) {
+            Some(order) => *order,
+            None => [Leg::U, Leg::V, Leg::W],
+        };
+        // The second half of an odd-numbered sector belongs to the next peak, and so on.
+        let peak = odd == (within >> 31 != 0);
+        Self { order, span, upper_gap, peak }
     }
 }
