@@ -1,9 +1,7 @@
 //! The nine gates of a carrier period, as a timer plays them.
 
 use super::Applied;
-use super::shares::Shares;
-use super::shoot_through::Edges;
-use super::vectors::Leg;
+use super::shoot_through::LegEdges;
 
 /// The gates' names, in the order of [`Period::gates`].
 pub const GATES: [&str; 9] = ["UH", "VH", "WH", "UM", "VM", "WM", "UL", "VL", "WL"];
@@ -73,39 +71,39 @@ impl GateTicks {
 /// The gates of one carrier period, and what they give.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Period {
-    /// UH VH WH UM VM WM UL VL WL.
+    /// In the order of [`GATES`].
     pub gates: [GatePattern; 9],
     /// What the motors have.
     pub applied: Applied,
 }
 
 impl Period {
+    /// From the edges of the legs U, V, W.
     #[inline]
-    pub(super) fn new(shares: &Shares, upper: Edges, lower: Edges, orders: [[Leg; 3]; 2]) -> Self {
-        let boundary = shares.boundary;
-        let never = GatePattern { off_from: 0.0, off_to: 0.0 };
-        let mut high = [GatePattern { off_to: 0.5, ..never }; 3];
-        let (mut middle, mut low) = ([never; 3], [never; 3]);
-        // The upper motor's smallest phase steps first after the boundary, the lower motor's largest last before it.
-        let [[far, between, near], order] = orders;
-        high[near as usize].off_from = boundary + upper.near.0;
-        high[between as usize].off_from = boundary + upper.middle;
-        high[far as usize] = GatePattern { off_from: boundary + upper.far.0, off_to: boundary + upper.again };
-        middle[near as usize].off_to = boundary + upper.near.1;
-        middle[between as usize].off_to = boundary + upper.middle;
-        middle[far as usize].off_to = boundary + upper.far.1;
-        let [near, between, far] = order;
-        low[near as usize].off_to = boundary - lower.near.0;
-        low[between as usize].off_to = boundary - lower.middle;
-        low[far as usize] = GatePattern { off_from: boundary - lower.again, off_to: boundary - lower.far.0 };
-        middle[near as usize].off_from = boundary - lower.near.1;
-        middle[between as usize].off_from = boundary - lower.middle;
-        middle[far as usize].off_from = boundary - lower.far.1;
-        let ([h_u, h_v, h_w], [m_u, m_v, m_w], [l_u, l_v, l_w]) = (high, middle, low);
-        Self { gates: [h_u, h_v, h_w, m_u, m_v, m_w, l_u, l_v, l_w], applied: shares.applied }
+    pub(super) fn new(upper: [LegEdges; 3], lower: [LegEdges; 3], applied: Applied) -> Self {
+        let high = |upper: LegEdges| GatePattern { off_from: upper.own, off_to: upper.again };
+        let low = |lower: LegEdges| GatePattern { off_from: lower.again, off_to: lower.own };
+        let middle =
+            |lower: LegEdges, upper: LegEdges| GatePattern { off_from: lower.middle, off_to: upper.middle };
+        let ([uu, uv, uw], [lu, lv, lw]) = (upper, lower);
+        Self {
+            gates: [
+                high(uu),
+                high(uv),
+                high(uw),
+                middle(lu, uu),
+                middle(lv, uv),
+                middle(lw, uw),
+                low(lu),
+                low(lv),
+                low(lw),
+            ],
+            applied,
+        }
     }
 
-    /// Every gate's pause in ticks of a carrier half with `half_ticks` (1 ..= 2²²); see [`GatePattern::ticks`].
+    /// Every gate's pause, in the order of [`GATES`], in ticks of a carrier half with `half_ticks` (1 ..= 2²²); see
+    /// [`GatePattern::ticks`].
     #[inline]
     pub fn ticks(&self, half_ticks: u32) -> [GateTicks; 9] {
         self.gates.map(|gate| gate.ticks(half_ticks))

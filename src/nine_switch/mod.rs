@@ -4,7 +4,7 @@
 //! Three legs of three switches in series, H, M and L; the upper motor hangs on the H–M nodes, the lower motor
 //! on the M–L nodes ([`LegState`]). One triangular carrier a period T, valley at t = 0 in the centre of V15, peak at T/2 in
 //! the centre of V14. The two motors share the time: the lower one has what lies around the valley, the upper one what
-//! lies around the peak, and between the two boundaries at T/4 and 3T/4 nobody else's turn is touched.
+//! lies around the peak. They meet at T/4 and 3T/4, or at a boundary that slides.
 //!
 //! The period is its own mirror image, so half of it says everything, and in a half every leg makes at most two steps:
 //! −1 → 1 at the lower motor's compare instant l, 1 → 0 at the upper motor's u. With p the phase's share of the unit vector
@@ -42,9 +42,11 @@ use crate::frames::Angle;
 
 pub use gates::{GATES, GatePattern, GateTicks, Period};
 pub use sequence::Scheme;
-pub use vectors::{Leg, LegState};
+pub use vectors::LegState;
 
 use sequence::Sequence;
+use shares::Share;
+use shoot_through::Shoot;
 use vectors::Direction;
 
 /// The mean voltage one motor is to have.
@@ -101,22 +103,27 @@ pub enum Refused {
     ShootThrough,
 }
 
-/// The gates of one carrier period, with the shoot-through at the sides of the zero vectors, one leg at a time.
+/// The gates of one carrier period. Voltages and shoot-through are exact within 1e-6 U_in and 1e-6 T.
+///
+/// Fails on a value that is not finite or outside its range, and says which.
+#[inline]
 pub fn step(request: &Request) -> Result<Period, Refused> {
     check(request)?;
     let (upper, lower) = (Direction::of(request.upper.angle), Direction::of(request.lower.angle));
     let sequence = Sequence::of(request.scheme, &upper, &lower);
     let shares = shares::divide(request, sequence.slides, &upper, &lower);
-    let edges = |share, inner, span, gap| {
-        let steps = sequence::steps(share, inner, span, gap);
-        shoot_through::insert(&steps, request.shoot_through, share, inner, sequence.central)
+    let duty = request.shoot_through;
+    let edges = |share: &Share, inner, gap| {
+        let steps = sequence::steps(share, inner, gap);
+        Shoot::new(duty, inner, sequence.central).insert(&steps, share)
     };
     // Next to the boundary the upper motor's smallest phase steps, and the lower motor's largest.
-    let upper_gap = shares.upper_span - shares.applied.upper_depth * upper.upper_gap;
-    let lower_gap = shares.applied.lower_depth * lower.upper_gap;
-    let upper_edges = edges(0.5 - shares.boundary, sequence.upper_inner, shares.upper_span, upper_gap);
-    let lower_edges = edges(shares.boundary, sequence.lower_inner, shares.lower_span, lower_gap);
-    Ok(Period::new(&shares, upper_edges, lower_edges, [upper.order, lower.order]))
+    let gap = shares.upper.span - shares.applied.upper_depth * upper.high_gap;
+    let [near, between, far] = edges(&shares.upper, sequence.upper_inner, gap);
+    let upper_legs = upper.by_leg([far, between, near]);
+    let gap = shares.applied.lower_depth * lower.high_gap;
+    let lower_legs = lower.by_leg(edges(&shares.lower, sequence.lower_inner, gap));
+    Ok(Period::new(upper_legs, lower_legs, shares.applied))
 }
 
 /// NaN fails every comparison, so it is refused as well.

@@ -9,6 +9,7 @@
 //! | RTHD | V15 V8 V7 V2 V1 V14 | all to V14 and V15 |
 //! | ZVO | each motor as RTHD or as RS | by the half-sector of its angle |
 
+use super::shares::Share;
 use super::vectors::Direction;
 
 /// Where the zero vectors and the shoot-through lie. Toggles a period in brackets, with shoot-through or without.
@@ -77,23 +78,24 @@ impl Sequence {
 }
 
 /// A motor's steps in the rising half, each as a distance from the boundary, in periods: from 0 to the share's length,
-/// `near` ≤ `middle` ≤ `far`.
+/// `near` ≤ `between` ≤ `far`.
 ///
-/// The upper motor's legs step 1 → 0, from the boundary to the peak; the lower motor's, looked at backward from
-/// the boundary to the valley, 1 → −1.
+/// The upper motor's legs step 1 → 0 on the way from the boundary to the peak; the lower motor's, looked at backward, 1 → −1
+/// on the way from the boundary to the valley.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Steps {
     pub near: f32,
-    pub middle: f32,
+    pub between: f32,
     pub far: f32,
 }
 
-/// The steps in a share of the half that lasts `share` periods, `inner` of its zero time being next to the boundary.
-/// `span` ≤ `share` is the active time, `gap` that of the vector next to the boundary.
+/// The steps in a share, with the part `inner` of its zero time next to the boundary; `gap`, in periods, is the time of the
+/// active vector next to it.
 #[inline]
-pub(super) fn steps(share: f32, inner: f32, span: f32, gap: f32) -> Steps {
-    // Exactly 0 without an inner zero vector, and without an outer one `far` is exactly the share: no step next to
-    // the boundary or the end becomes two.
-    let near = inner * (share - span);
-    Steps { near, middle: near + gap, far: near + span }
+pub(super) fn steps(share: &Share, inner: f32, gap: f32) -> Steps {
+    let length = share.outward * (share.end - share.boundary);
+    // Exactly 0 without an inner zero vector; and without an outer one `far` is exactly the share's length. So no step at the
+    // boundary or at the end becomes two.
+    let near = inner * (length - share.span);
+    Steps { near, between: near + gap, far: near + share.span }
 }

@@ -7,15 +7,24 @@ use super::{Applied, Request};
 /// into the other. A voltage less by four times this (two shares' worth, and rounding) is not reported as limited.
 const ROUNDING: f32 = 1.0 / 8_388_608.0;
 
-/// The two shares of the rising half, and what is in them.
+/// One motor's part of the rising half.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Share {
+    /// Where it meets the other motor's, in periods, 0 ..= 1/2.
+    pub boundary: f32,
+    /// Its other end: 1/2, the peak, for the upper motor; 0, the valley, for the lower one.
+    pub end: f32,
+    /// Direction from the boundary to the end, 1 or −1.
+    pub outward: f32,
+    /// Active time in it, in periods: (T1 + T2)/2 or (T3 + T4)/2.
+    pub span: f32,
+}
+
+/// Both motors' parts.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Shares {
-    /// The end of the lower motor's share and the beginning of the upper one's, in periods, 0 ..= 1/2.
-    pub boundary: f32,
-    /// Active time of the upper motor in the half, in periods: (T1 + T2)/2.
-    pub upper_span: f32,
-    /// The same of the lower motor: (T3 + T4)/2.
-    pub lower_span: f32,
+    pub upper: Share,
+    pub lower: Share,
     pub applied: Applied,
 }
 
@@ -36,8 +45,11 @@ pub(super) fn divide(request: &Request, slides: bool, upper: &Direction, lower: 
     let (upper_span, lower_span) = (upper_depth * upper.span, lower_depth * lower.span);
     // T0/4 + (T3 + T4)/2.
     let boundary = if slides { 0.25 + 0.5 * (lower_span - upper_span) } else { 0.25 };
-    let applied = Applied { upper_depth, lower_depth, upper_limited, lower_limited };
-    Shares { boundary, upper_span, lower_span, applied }
+    Shares {
+        upper: Share { boundary, end: 0.5, outward: 1.0, span: upper_span },
+        lower: Share { boundary, end: 0.0, outward: -1.0, span: lower_span },
+        applied: Applied { upper_depth, lower_depth, upper_limited, lower_limited },
+    }
 }
 
 /// The depth that fits into the room, and whether that is less.

@@ -6,17 +6,6 @@
 
 use crate::frames::Angle;
 
-/// A leg of the inverter, and the phase of both motors that it feeds.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Leg {
-    /// Phase a.
-    U,
-    /// Phase b.
-    V,
-    /// Phase c.
-    W,
-}
-
 /// What the three switches of a leg make of its two nodes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LegState {
@@ -62,21 +51,15 @@ impl LegState {
 /// ```
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Direction {
-    /// The legs of the largest, the middle and the smallest phase.
-    pub order: [Leg; 3],
+    /// The sector less one, 0 ..= 5.
+    sector: u32,
     /// Largest less smallest phase as a time in the rising half: (T1 + T2)/2 at depth 1, in periods; 3/8 ..= √3/4.
     pub span: f32,
     /// Largest less middle phase in the same way; from 0 to the span.
-    pub upper_gap: f32,
+    pub high_gap: f32,
     /// The angle lies in [−30°, 30°), [90°, 150°) or [210°, 270°): a phase is at its positive peak.
     pub peak: bool,
 }
-
-/// The order of the phases in sectors I to VI.
-const ORDER: [[Leg; 3]; 6] = {
-    use Leg::{U, V, W};
-    [[U, V, W], [V, U, W], [V, W, U], [W, V, U], [W, U, V], [U, W, V]]
-};
 
 impl Direction {
     #[inline]
@@ -92,13 +75,22 @@ impl Direction {
         let sine = x * (0.196_349_41 + z * (-8.971_258e-3 + z * 1.217_830_7e-4));
         let span = 0.433_012_7 + z * (-5.935_636e-2 + z * (1.355_997_4e-3 - z * 1.227_165_5e-5));
         let odd = sector & 1 != 0;
-        let upper_gap = 0.5 * span + if odd { sine } else { -sine };
-        let order = match ORDER.get(sector as usize) {
-            Some(order) => *order,
-            None => [Leg::U, Leg::V, Leg::W],
-        };
+        let high_gap = 0.5 * span + if odd { sine } else { -sine };
         // The second half of an odd-numbered sector belongs to the next peak, and so on.
         let peak = odd == (within >> 31 != 0);
-        Self { order, span, upper_gap, peak }
+        Self { sector, span, high_gap, peak }
+    }
+
+    /// For the legs U, V, W, what is given for those of the largest, the middle and the smallest phase.
+    #[inline]
+    pub fn by_leg<T>(&self, [largest, middle, smallest]: [T; 3]) -> [T; 3] {
+        match self.sector {
+            0 => [largest, middle, smallest],
+            1 => [middle, largest, smallest],
+            2 => [smallest, largest, middle],
+            3 => [smallest, middle, largest],
+            4 => [middle, smallest, largest],
+            _ => [largest, smallest, middle],
+        }
     }
 }
