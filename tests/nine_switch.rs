@@ -369,7 +369,40 @@ fn each_motor_has_its_turn() {
     }
 }
 
-/// Twice the room of one motor, D and both depths at the worst angles.
+#[test]
+fn zero_time_and_shoot_through_are_divided_as_the_scheme_says() {
+    for (scheme, inner, junctions) in [(Scheme::S, 0.5, 8), (Scheme::Rs, 1.0, 4), (Scheme::Rthd, 0.0, 4)] {
+        let mut draw = Draw(scheme as u64 + 41);
+        for _ in 0..CASES / 4 {
+            let request = draw.within(scheme, 0.99);
+            let spans = [request.upper, request.lower].map(|m| span(degrees(m)) * f64::from(m.depth));
+            // Zero time of both motors: half the period each, less the half span.
+            let zeros = spans.map(|span| 0.5 - 0.5 * span);
+            let seen = without_shoot_through(&request);
+            let time = |state| {
+                let those = seen.stretches.iter().filter(|s| s.legs == [state; 3]);
+                those.map(|s| s.length).sum::<f64>()
+            };
+            for (got, wanted) in [
+                (time(0), zeros[0] * (1.0 - inner)),
+                (time(-1), zeros[1] * (1.0 - inner)),
+                (time(1), (zeros[0] + zeros[1]) * inner),
+            ] {
+                assert!((got - wanted).abs() < 1e-6, "{got} for {wanted}: {request:?}");
+            }
+            let each = f64::from(request.shoot_through) / f64::from(junctions);
+            let seen = look(&step(&request).unwrap()).unwrap();
+            let shorted: Vec<f64> =
+                seen.stretches.iter().filter(|s| s.legs.contains(&2)).map(|s| s.length).collect();
+            if each > 0.0 && shortest(request.upper).min(shortest(request.lower)) > 1e-6 {
+                assert_eq!(shorted.len(), junctions as usize, "{request:?}");
+                assert!(shorted.iter().all(|length| (length - each).abs() < 5e-7), "{shorted:?} {request:?}");
+            }
+        }
+    }
+}
+
+/// The gates for these depths at the worst angles.
 fn worst(scheme: Scheme, duty: f64, depth1: f64, depth2: f64) -> Period {
     let request = Request {
         scheme,
