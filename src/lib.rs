@@ -1,6 +1,7 @@
 //! `tractive`: the controller of a railway traction inverter.
 //!
-//! A timer interrupt decides WHICH voltage ([`control`]), a PWM interrupt decides WHICH pulses ([`modulation`]),
+//! A timer interrupt decides WHICH voltage ([`control`]), a PWM interrupt decides WHICH pulses ([`modulation`] for two-level
+//! inverters, [`nine_switch`] for the one that feeds two motors),
 //! lock-free cells carry the few words between them ([`cell`]), a board knows the hardware ([`board`]), and a rig on the
 //! host plays the motor. [`drive`] puts them together: its tasks are what the two interrupts call, on any board and
 //! on the host. [`machine`] holds the tables made offline, [`protection`] the faults and the safe state.
@@ -27,5 +28,6 @@ pub mod frames;
 pub mod link;
 pub mod machine;
 pub mod modulation;
+pub mod nine_switch;
 pub mod protection;
 pub mod time;

@@ -7,7 +7,9 @@
 
 pub mod analysis;
 pub mod bench;
+pub mod columns;
 pub mod machine;
+pub mod nine_switch;
 pub mod options;
 pub mod pattern;
 pub mod plant;

@@ -11,7 +11,7 @@ use tractive_rig::options::{RunOptions, not_negative, positive};
 use tractive_rig::report::{self, Page};
 use tractive_rig::scenario::{self, Scenario};
 use tractive_rig::trace::{self, Recording};
-use tractive_rig::{pattern, points};
+use tractive_rig::{nine_switch, pattern, points};
 
 #[derive(Parser)]
 #[command(name = "tractive-rig", about = "Plays the motor to the drive, and shows what happened", version)]
@@ -42,6 +42,15 @@ enum Command {
     },
     /// The modulator's pulses in steady state.
     Pattern(PatternOptions),
+    /// The nine-switch modulator's gates for one carrier period (T = 1): IN.csv has scheme,theta1_deg,m1,theta2_deg,m2,d_sh;
+    /// OUT.csv adds for each gate UH ... WL its level just after t = 0 (X_init) and its toggle instants (X_edges, with ; between),
+    /// feasible (1 or 0; then the gates are those of what fits), m1_applied and m2_applied.
+    NineSwitch {
+        /// Requests: scheme s, rs, rthd, zvo, rthd-central or rthd-slide; angles in degrees; m = 2|V|/U_in; d_sh from 0 to 1.
+        input: PathBuf,
+        /// Gates.
+        output: PathBuf,
+    },
 }
 
 #[derive(clap::Args)]
@@ -114,6 +123,10 @@ fn command(command: Command) -> Result<ExitCode> {
         Command::Run { scenario, options } => run(&scenario, &options),
         Command::Points { input, output, machine } => {
             points::run(&input, &output, &Machine::load(&machine)?)?;
+            Ok(ExitCode::SUCCESS)
+        }
+        Command::NineSwitch { input, output } => {
+            nine_switch::run(&input, &output)?;
             Ok(ExitCode::SUCCESS)
         }
         Command::Pattern(options) => {

@@ -1,16 +1,16 @@
 //! `cargo rig points`: operating points by the firmware's own code.
 
+use crate::columns::Columns;
 use crate::machine::Machine;
 use crate::trace;
-use anyhow::{Context, Result, bail};
+use anyhow::Result;
 use rayon::prelude::*;
-use serde::Deserialize;
 use std::path::Path;
 use tractive::control::{VoltageLimit, operating_point};
 
 const COLUMNS: [&str; 3] = ["torque_nm", "speed_rpm", "udc_v"];
 
-#[derive(Clone, Copy, Debug, Deserialize)]
+#[derive(Clone, Copy, Debug)]
 struct Wanted {
     torque_nm: f64,
     speed_rpm: f64,
@@ -42,31 +42,13 @@ pub fn run(input: &Path, output: &Path, machine: &Machine) -> Result<()> {
 }
 
 fn read(input: &Path) -> Result<Vec<Wanted>> {
-    let name = input.display();
-    let mut reader = csv::ReaderBuilder::new()
-        .comment(Some(b'#'))
-        .trim(csv::Trim::All)
-        .from_path(input)
-        .with_context(|| format!("{name}: cannot be read"))?;
-    let headers = reader.headers().with_context(|| format!("{name}"))?.clone();
-    for column in COLUMNS {
-        if !headers.iter().any(|header| header == column) {
-            bail!("{name}:1: {headers:?}: the column {column} is missing; must be {}", COLUMNS.join(","));
-        }
-    }
-    let mut points = Vec::new();
-    for record in reader.records() {
-        let record = record.with_context(|| format!("{name}"))?;
-        let line = record.position().map_or(0, csv::Position::line);
-        let point: Wanted = record
-            .deserialize(Some(&headers))
-            .with_context(|| format!("{name}:{line}: must be three numbers"))?;
-        for (column, value) in COLUMNS.iter().zip([point.torque_nm, point.speed_rpm, point.udc_v]) {
-            if !value.is_finite() || (*column == "udc_v" && value <= 0.0) {
-                bail!("{name}:{line}: {column}: {value}: must be finite, and a voltage above 0");
-            }
-        }
-        points.push(point);
-    }
-    Ok(points)
+    let columns = Columns::read(input, COLUMNS)?;
+    let points = columns.rows().map(|[torque, speed, udc]| {
+        Ok(Wanted {
+            torque_nm: torque.number("a finite number", |_| true)?,
+            speed_rpm: speed.number("a finite number", |_| true)?,
+            udc_v: udc.number("a finite number above 0", |volts| volts > 0.0)?,
+        })
+    });
+    points.collect()
 }

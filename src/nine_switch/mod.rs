@@ -1,0 +1,141 @@
+//! WHICH pulses, nine switches: one inverter that feeds two motors, and short-circuits its legs on purpose to boost
+//! its Z-source link.
+//!
+//! Three legs of three switches in series, H, M and L; the upper motor hangs on the H–M nodes, the lower motor
+//! on the M–L nodes ([`LegState`]). One triangular carrier a period T, valley at t = 0 in the centre of V15, peak at T/2 in
+//! the centre of V14. The two motors share the time: the lower one has what lies around the valley, the upper one what
+//! lies around the peak. They meet at T/4 and 3T/4, or at a boundary that slides.
+//!
+//! The period is its own mirror image, so half of it says everything, and in a half every leg makes at most two steps:
+//! −1 → 1 at the lower motor's compare instant l, 1 → 0 at the upper motor's u. With p the phase's share of the unit vector
+//! (cos θ, cos(θ − 120°), cos(θ + 120°)), both are, in periods,
+//!
+//! ```text
+//! l = c₂ + m₂ p₂/4     u = c₁ + m₁ p₁/4     0 ≤ l ≤ b ≤ u ≤ 1/2
+//! ```
+//!
+//! The mean voltages are then (m/2) U_in at θ, whatever the offsets c are: these place the zero vectors, and that is all
+//! in which the schemes differ ([`Scheme`]). So H is off in [u, 1/2], L in [0, l] and M in [l, u]: one pause a gate and
+//! half ([`GatePattern`]). Shoot-through moves one end of one pause at each border of a zero vector.
+//!
+//! # What cannot be
+//! The shoot-through duty is kept first, for it feeds the link both motors live on. Then each motor's voltage is scaled, at its
+//! angle, to what its share of the period leaves: span ≤ 1 − D, where the span is m (p_max − p_min), √3 m at worst.
+//! With the sliding boundary a motor may also use what the other leaves, and always has 1 − D. [`Applied`] says what was
+//! given and who was limited. A request that is not finite or not in its range is refused by name ([`Refused`]).
+//!
+//! # Dead time
+//! The pulses are ideal. Where two gates of a leg toggle at the same instant, the one that turns on has to wait for the
+//! dead time, in hardware: M after H and H after M (1 ↔ 0), L after M and M after L (−1 ↔ 1), L after H and H after L
+//! (−1 ↔ 0, with M on). Else all three conduct for a moment. At a border with shoot-through nothing has to wait:
+//! there all three are to conduct.
+
+#![forbid(unsafe_code)]
+
+mod gates;
+mod sequence;
+mod shares;
+mod shoot_through;
+mod vectors;
+
+use crate::frames::Angle;
+
+pub use gates::{GATES, GatePattern, GateTicks, Period};
+pub use sequence::Scheme;
+pub use vectors::LegState;
+
+use sequence::Sequence;
+use shares::Share;
+use shoot_through::Shoot;
+use vectors::Direction;
+
+/// The mean voltage one motor is to have.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct MotorVoltage {
+    /// Angle of the voltage vector.
+    pub angle: Angle,
+    /// Modulation depth m = 2 |V| / U_in, with |V| the peak phase voltage and U_in the link voltage outside
+    /// shoot-through; 0 or more.
+    pub depth: f32,
+}
+
+/// What the modulator is asked for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Request {
+    /// Where the zero vectors and the shoot-through lie.
+    pub scheme: Scheme,
+    /// The motor at the H–M nodes.
+    pub upper: MotorVoltage,
+    /// The motor at the M–L nodes.
+    pub lower: MotorVoltage,
+    /// Shoot-through duty D: the share of the period in which a leg is shorted, 0 ..= 1.
+    pub shoot_through: f32,
+}
+
+/// What the pulses give.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Applied {
+    /// The upper motor's modulation depth.
+    pub upper_depth: f32,
+    /// The lower motor's modulation depth.
+    pub lower_depth: f32,
+    /// The upper motor has less than it asked for.
+    pub upper_limited: bool,
+    /// The lower motor has less than it asked for.
+    pub lower_limited: bool,
+}
+
+impl Applied {
+    /// Both motors have what they asked for.
+    pub const fn feasible(&self) -> bool {
+        !self.upper_limited && !self.lower_limited
+    }
+}
+
+/// A request without meaning: the value that is not finite, or outside its range.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Refused {
+    /// The upper motor's depth; must be finite, 0 or more.
+    UpperDepth,
+    /// The lower motor's depth; must be finite, 0 or more.
+    LowerDepth,
+    /// The shoot-through duty; must lie in 0 ..= 1.
+    ShootThrough,
+}
+
+/// The gates of one carrier period. Voltages and shoot-through are exact within 1e-6 U_in and 1e-6 T.
+///
+/// Fails on a value that is not finite or outside its range, and says which.
+#[inline]
+pub fn step(request: &Request) -> Result<Period, Refused> {
+    check(request)?;
+    let (upper, lower) = (Direction::of(request.upper.angle), Direction::of(request.lower.angle));
+    let sequence = Sequence::of(request.scheme, &upper, &lower);
+    let shares = shares::divide(request, sequence.slides, &upper, &lower);
+    let duty = request.shoot_through;
+    let edges = |share: &Share, inner, gap| {
+        let steps = sequence::steps(share, inner, gap);
+        Shoot::new(duty, inner, sequence.central).insert(&steps, share)
+    };
+    // Next to the boundary the upper motor's smallest phase steps, and the lower motor's largest.
+    let gap = shares.upper.span - shares.applied.upper_depth * upper.high_gap;
+    let [near, between, far] = edges(&shares.upper, sequence.upper_inner, gap);
+    let upper_legs = upper.by_leg([far, between, near]);
+    let gap = shares.applied.lower_depth * lower.high_gap;
+    let lower_legs = lower.by_leg(edges(&shares.lower, sequence.lower_inner, gap));
+    Ok(Period::new(upper_legs, lower_legs, shares.applied))
+}
+
+/// NaN fails every comparison, so it is refused as well.
+fn check(request: &Request) -> Result<(), Refused> {
+    let is_depth = |depth: f32| (0.0..=f32::MAX).contains(&depth);
+    if !is_depth(request.upper.depth) {
+        Err(Refused::UpperDepth)
+    } else if !is_depth(request.lower.depth) {
+        Err(Refused::LowerDepth)
+    } else if !(0.0..=1.0).contains(&request.shoot_through) {
+        Err(Refused::ShootThrough)
+    } else {
+        Ok(())
+    }
+}
