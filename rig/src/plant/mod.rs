@@ -1,18 +1,23 @@
-//! The plant: a saturated machine behind three inverter legs, in f64.
+//! The plant: a saturated machine behind three inverter legs, in f64; [`zs9`] is the one with two machines.
 //!
 //! Stator equation in the rotor frame, with the smooth flux map's incremental inductances:
 //! `L(i) di/dt = u − R i − jω ψ(i)`. Amplitude-invariant, peak, electrical; d along the magnet flux; currents positive into the
 //! machine. The legs' voltages count from the link's midpoint.
 
 mod legs;
+mod rotor;
 mod speed;
+mod stator;
+pub mod zs9;
 
 pub use legs::Leg;
+pub use rotor::{Rotor, Turning};
 pub use speed::SpeedSource;
+pub use stator::{Stator, StatorSlopes};
 
 use core::f64::consts::TAU;
 use legs::Clamp;
-use tractive_tablegen::{FluxPoint, MachineFolder, SmoothMap};
+use tractive_tablegen::{MachineFolder, SmoothMap};
 
 /// How the true machine differs from its folder.
 #[derive(Clone, Copy, Debug)]
@@ -45,19 +50,11 @@ const LONGEST_STEP_S: f64 = 40e-6;
 
 /// Machine and legs.
 pub struct Plant {
-    map: SmoothMap,
-    settings: PlantSettings,
-    pole_pairs: f64,
-    resistance_ohm: f64,
+    stator: Stator,
+    rotor: Rotor,
     clamp: Clamp,
-    speed: SpeedSource,
-    time_s: f64,
     id_a: f64,
     iq_a: f64,
-    /// Electrical angle, 0 ≤ x < 1 turn.
-    angle_turns: f64,
-    /// Mechanical, in rad/s.
-    speed_rad_s: f64,
     energies: Energies,
 }
 
@@ -67,25 +64,14 @@ type State = [f64; 5];
 impl Plant {
     /// At rest electrically, angle zero, turning as the speed source says.
     pub fn new(machine: &MachineFolder, speed: SpeedSource, settings: &PlantSettings) -> Self {
-        let parameters = &machine.parameters;
+        let stator = Stator::new(machine, settings);
         let map = SmoothMap::new(&machine.map);
-        let clamp = Clamp::new(parameters.max_current_a, &map, settings.flux_scale);
-        let speed_rad_s = match &speed {
-            SpeedSource::Profile(points) => speed::profile_speed(points, 0.0),
-            SpeedSource::Inertia { .. } => 0.0,
-        };
         Self {
-            map,
-            settings: *settings,
-            pole_pairs: f64::from(parameters.pole_pairs),
-            resistance_ohm: parameters.stator_resistance_ohm * settings.resistance_scale,
-            clamp,
-            speed,
-            time_s: 0.0,
+            rotor: Rotor::new(speed, stator.pole_pairs()),
+            stator,
+            clamp: Clamp::new(machine.parameters.max_current_a, &map, settings.flux_scale),
             id_a: 0.0,
             iq_a: 0.0,
-            angle_turns: 0.0,
-            speed_rad_s,
             energies: Energies::default(),
         }
     }
@@ -102,24 +88,23 @@ impl Plant {
 
     /// Phase currents, in A.
     pub fn currents_abc(&self) -> [f64; 3] {
-        let (sin, cos) = (self.angle_turns * TAU).sin_cos();
+        let (sin, cos) = (self.rotor.angle_turns() * TAU).sin_cos();
         phases(self.id_a * cos - self.iq_a * sin, self.id_a * sin + self.iq_a * cos)
     }
 
     /// Air-gap torque, in N·m.
     pub fn torque_nm(&self) -> f64 {
-        let flux = self.flux(self.id_a, self.iq_a);
-        1.5 * self.pole_pairs * (flux.psi_d_wb * self.iq_a - flux.psi_q_wb * self.id_a)
+        self.stator.torque_nm(self.id_a, self.iq_a)
     }
 
     /// Electrical rotor angle, in turns, 0 ≤ x < 1.
     pub fn angle_turns(&self) -> f64 {
-        self.angle_turns
+        self.rotor.angle_turns()
     }
 
     /// Mechanical speed, in r/min.
     pub fn speed_rpm(&self) -> f64 {
-        self.speed_rad_s * 60.0 / TAU
+        self.rotor.speed_rpm()
     }
 
     /// Energies since the beginning.
@@ -141,37 +126,17 @@ impl Plant {
         }
     }
 
-    fn flux(&self, id_a: f64, iq_a: f64) -> FluxPoint {
-        let scale = self.settings.flux_scale;
-        let flux = self.map.at(id_a, iq_a);
-        FluxPoint {
-            psi_d_wb: flux.psi_d_wb * scale,
-            psi_q_wb: flux.psi_q_wb * scale,
-            ldd_h: flux.ldd_h * scale,
-            ldq_h: flux.ldq_h * scale,
-            lqd_h: flux.lqd_h * scale,
-            lqq_h: flux.lqq_h * scale,
-        }
-    }
-
     /// Runge–Kutta, fourth order. The frame turns during the step; the speed changes linearly at most.
     fn step(&mut self, legs: [Leg; 3], udc_v: f64, dt_s: f64) {
-        let acceleration = match &self.speed {
-            SpeedSource::Profile(points) => {
-                (speed::profile_speed(points, self.time_s + dt_s) - speed::profile_speed(points, self.time_s))
-                    / dt_s
-            }
-            SpeedSource::Inertia { inertia_kg_m2, load_nm } => (self.torque_nm() - load_nm) / inertia_kg_m2,
-        };
-        let omega = |t: f64| self.pole_pairs * (self.speed_rad_s + acceleration * t);
-        let turned = |t: f64| self.pole_pairs * (self.speed_rad_s + 0.5 * acceleration * t) * t;
-        let (sin0, cos0) = (self.angle_turns * TAU).sin_cos();
-        let (sin_half, cos_half) = turned(0.5 * dt_s).sin_cos();
+        let turning = self.rotor.turning(|| self.torque_nm(), dt_s);
+        let (sin0, cos0) = (self.rotor.angle_turns() * TAU).sin_cos();
+        let (sin_half, cos_half) = turning.turned(0.5 * dt_s).sin_cos();
         let (sin1, cos1) = (sin0 * cos_half + cos0 * sin_half, cos0 * cos_half - sin0 * sin_half);
-        let (sin_whole, cos_whole) = turned(dt_s).sin_cos();
+        let (sin_whole, cos_whole) = turning.turned(dt_s).sin_cos();
         let (sin2, cos2) = (sin0 * cos_whole + cos0 * sin_whole, cos0 * cos_whole - sin0 * sin_whole);
         let y0: State = [self.id_a, self.iq_a, 0.0, 0.0, 0.0];
-        let slope = |y: &State, sin: f64, cos: f64, t: f64| self.slope(y, legs, udc_v, (sin, cos), omega(t));
+        let slope =
+            |y: &State, sin: f64, cos: f64, t: f64| self.slope(y, legs, udc_v, (sin, cos), turning.omega(t));
         let k1 = slope(&y0, sin0, cos0, 0.0);
         let k2 = slope(&along(&y0, &k1, 0.5 * dt_s), sin1, cos1, 0.5 * dt_s);
         let k3 = slope(&along(&y0, &k2, 0.5 * dt_s), sin1, cos1, 0.5 * dt_s);
@@ -183,17 +148,7 @@ impl Plant {
         [self.id_a, self.iq_a, _, _, _] = y;
         self.energies.electrical_j += y[2];
         self.energies.copper_j += y[3];
-        self.time_s += dt_s;
-        let speed_before = self.speed_rad_s;
-        self.speed_rad_s = match &self.speed {
-            SpeedSource::Profile(points) => speed::profile_speed(points, self.time_s),
-            SpeedSource::Inertia { inertia_kg_m2, load_nm } => {
-                speed_before + (y[4] - load_nm * dt_s) / inertia_kg_m2
-            }
-        };
-        let mean_speed = 0.5 * (speed_before + self.speed_rad_s);
-        self.energies.mechanical_j += y[4] * mean_speed;
-        self.angle_turns = (self.angle_turns + self.pole_pairs * mean_speed * dt_s / TAU).rem_euclid(1.0);
+        self.energies.mechanical_j += self.rotor.finish(y[4], dt_s);
     }
 
     fn slope(&self, y: &State, legs: [Leg; 3], udc_v: f64, (sin, cos): (f64, f64), omega: f64) -> State {
@@ -210,17 +165,9 @@ impl Plant {
         let [a, b, c] = volts;
         let (alpha, beta) = ((2.0 * a - b - c) / 3.0, (b - c) / 3.0_f64.sqrt());
         let (ud, uq) = (alpha * cos + beta * sin, beta * cos - alpha * sin);
-        let flux = self.flux(id, iq);
-        let vd = ud - self.resistance_ohm * id + omega * flux.psi_q_wb;
-        let vq = uq - self.resistance_ohm * iq - omega * flux.psi_d_wb;
-        let det = flux.ldd_h * flux.lqq_h - flux.ldq_h * flux.lqd_h;
-        [
-            (flux.lqq_h * vd - flux.ldq_h * vq) / det,
-            (flux.ldd_h * vq - flux.lqd_h * vd) / det,
-            1.5 * (ud * id + uq * iq),
-            1.5 * self.resistance_ohm * (id * id + iq * iq),
-            1.5 * self.pole_pairs * (flux.psi_d_wb * iq - flux.psi_q_wb * id),
-        ]
+        let StatorSlopes { id_a_s, iq_a_s, electrical_w, copper_w, torque_nm } =
+            self.stator.slopes((id, iq), (ud, uq), omega);
+        [id_a_s, iq_a_s, electrical_w, copper_w, torque_nm]
     }
 }
 

@@ -1,0 +1,101 @@
+//! A rotor: angle, speed, and what turns it.
+
+use super::speed::{SpeedSource, profile_speed};
+use core::f64::consts::TAU;
+
+/// A rotor with its pole pairs. Its speed changes linearly during a step.
+#[derive(Clone, Debug)]
+pub struct Rotor {
+    source: SpeedSource,
+    pole_pairs: f64,
+    time_s: f64,
+    /// Electrical angle, 0 ≤ x < 1 turn.
+    angle_turns: f64,
+    /// Mechanical, in rad/s.
+    speed_rad_s: f64,
+}
+
+impl Rotor {
+    /// At angle zero; turning as the profile says, or at rest.
+    pub fn new(source: SpeedSource, pole_pairs: f64) -> Self {
+        let speed_rad_s = match &source {
+            SpeedSource::Profile(points) => profile_speed(points, 0.0),
+            SpeedSource::Inertia { .. } => 0.0,
+        };
+        Self { source, pole_pairs, time_s: 0.0, angle_turns: 0.0, speed_rad_s }
+    }
+
+    /// Electrical rotor angle, in turns, 0 ≤ x < 1.
+    pub fn angle_turns(&self) -> f64 {
+        self.angle_turns
+    }
+
+    /// Mechanical speed, in r/min.
+    pub fn speed_rpm(&self) -> f64 {
+        self.speed_rad_s * 60.0 / TAU
+    }
+
+    /// Lets a free rotor turn at a speed in r/min; a prescribed speed stays as it is.
+    pub fn set_speed_rpm(&mut self, speed_rpm: f64) {
+        if matches!(self.source, SpeedSource::Inertia { .. }) {
+            self.speed_rad_s = speed_rpm * TAU / 60.0;
+        }
+    }
+
+    /// Loads a free rotor with a torque against forward rotation, in N·m; a prescribed speed stays as it is.
+    pub fn set_load_nm(&mut self, torque_nm: f64) {
+        if let SpeedSource::Inertia { load_nm, .. } = &mut self.source {
+            *load_nm = torque_nm;
+        }
+    }
+
+    /// The step that begins now and lasts `dt_s`, with an air-gap torque that is asked for only where it counts.
+    #[inline]
+    pub fn turning(&self, torque_nm: impl FnOnce() -> f64, dt_s: f64) -> Turning {
+        let acceleration = match &self.source {
+            SpeedSource::Profile(points) => {
+                (profile_speed(points, self.time_s + dt_s) - profile_speed(points, self.time_s)) / dt_s
+            }
+            SpeedSource::Inertia { inertia_kg_m2, load_nm } => (torque_nm() - load_nm) / inertia_kg_m2,
+        };
+        Turning { pole_pairs: self.pole_pairs, speed_rad_s: self.speed_rad_s, acceleration }
+    }
+
+    /// Ends a step in which the air-gap torque gave an impulse, in N·m·s. Returns the work done on the rotor, in J.
+    #[inline]
+    pub fn finish(&mut self, impulse_nm_s: f64, dt_s: f64) -> f64 {
+        self.time_s += dt_s;
+        let speed_before = self.speed_rad_s;
+        self.speed_rad_s = match &self.source {
+            SpeedSource::Profile(points) => profile_speed(points, self.time_s),
+            SpeedSource::Inertia { inertia_kg_m2, load_nm } => {
+                speed_before + (impulse_nm_s - load_nm * dt_s) / inertia_kg_m2
+            }
+        };
+        let mean_speed = 0.5 * (speed_before + self.speed_rad_s);
+        self.angle_turns = (self.angle_turns + self.pole_pairs * mean_speed * dt_s / TAU).rem_euclid(1.0);
+        impulse_nm_s * mean_speed
+    }
+}
+
+/// A rotor's motion within a step.
+#[derive(Clone, Copy, Debug)]
+pub struct Turning {
+    pole_pairs: f64,
+    speed_rad_s: f64,
+    acceleration: f64,
+}
+
+impl Turning {
+    /// Electrical speed a time after the step's beginning, in rad/s.
+    #[inline]
+    pub fn omega(&self, t_s: f64) -> f64 {
+        self.pole_pairs * (self.speed_rad_s + self.acceleration * t_s)
+    }
+
+    /// Electrical angle turned by since the step's beginning, in rad.
+    #[inline]
+    pub fn turned(&self, t_s: f64) -> f64 {
+        self.pole_pairs * (self.speed_rad_s + 0.5 * self.acceleration * t_s) * t_s
+    }
+}

@@ -1,0 +1,139 @@
+//! A machine's stator equation in the rotor frame.
+
+use super::PlantSettings;
+use tractive_tablegen::{FluxMap, FluxPoint, MachineFolder, SmoothMap};
+
+/// Stator of a machine: `L(i) di/dt = u − R i − jω ψ(i)`, with the incremental inductances of the flux map.
+#[derive(Clone, Debug)]
+pub struct Stator {
+    flux: Flux,
+    scale: f64,
+    pole_pairs: f64,
+    resistance_ohm: f64,
+}
+
+/// Flux linkage over current.
+#[derive(Clone, Debug)]
+enum Flux {
+    /// A saturated machine: splines through the nodes.
+    Smooth(SmoothMap),
+    /// A linear one, which needs no search for a cell: `ψ_d = ψ_f + L_d i_d`, `ψ_q = L_q i_q`.
+    Linear { magnet_wb: f64, ld_h: f64, lq_h: f64 },
+}
+
+/// What changes in a stator at one instant.
+#[derive(Clone, Copy, Debug)]
+pub struct StatorSlopes {
+    /// di_d/dt, in A/s.
+    pub id_a_s: f64,
+    /// di_q/dt, in A/s.
+    pub iq_a_s: f64,
+    /// Electrical power into the machine, in W: `1.5 (u_d i_d + u_q i_q)`.
+    pub electrical_w: f64,
+    /// Copper loss, in W: `1.5 R |i|²`.
+    pub copper_w: f64,
+    /// Air-gap torque, in N·m: `1.5 n_p (ψ_d i_q − ψ_q i_d)`.
+    pub torque_nm: f64,
+}
+
+/// Deviation from a plane that is rounding in the file, as a share of the largest flux linkage.
+const LINEAR_TOLERANCE: f64 = 1e-7;
+/// Pieces of the way from zero current along which the field's energy is added up.
+const FIELD_PIECES: u32 = 500;
+
+impl Stator {
+    /// For a machine that differs from its folder as the settings say.
+    pub fn new(machine: &MachineFolder, settings: &PlantSettings) -> Self {
+        let parameters = &machine.parameters;
+        Self {
+            flux: linear(&machine.map).unwrap_or_else(|| Flux::Smooth(SmoothMap::new(&machine.map))),
+            scale: settings.flux_scale,
+            pole_pairs: f64::from(parameters.pole_pairs),
+            resistance_ohm: parameters.stator_resistance_ohm * settings.resistance_scale,
+        }
+    }
+
+    /// Pole pairs.
+    pub fn pole_pairs(&self) -> f64 {
+        self.pole_pairs
+    }
+
+    /// Flux linkage and its Jacobian at a current in A.
+    #[inline]
+    pub fn flux(&self, id_a: f64, iq_a: f64) -> FluxPoint {
+        let scale = self.scale;
+        let flux = match &self.flux {
+            Flux::Smooth(map) => map.at(id_a, iq_a),
+            Flux::Linear { magnet_wb, ld_h, lq_h } => FluxPoint {
+                psi_d_wb: magnet_wb + ld_h * id_a,
+                psi_q_wb: lq_h * iq_a,
+                ldd_h: *ld_h,
+                ldq_h: 0.0,
+                lqd_h: 0.0,
+                lqq_h: *lq_h,
+            },
+        };
+        FluxPoint {
+            psi_d_wb: flux.psi_d_wb * scale,
+            psi_q_wb: flux.psi_q_wb * scale,
+            ldd_h: flux.ldd_h * scale,
+            ldq_h: flux.ldq_h * scale,
+            lqd_h: flux.lqd_h * scale,
+            lqq_h: flux.lqq_h * scale,
+        }
+    }
+
+    /// Air-gap torque at a current, in N·m.
+    pub fn torque_nm(&self, id_a: f64, iq_a: f64) -> f64 {
+        let flux = self.flux(id_a, iq_a);
+        1.5 * self.pole_pairs * (flux.psi_d_wb * iq_a - flux.psi_q_wb * id_a)
+    }
+
+    /// The stator equation at a current in A, under a voltage in V, both in the rotor frame, which turns with the
+    /// electrical speed `omega` in rad/s.
+    #[inline]
+    pub fn slopes(&self, (id, iq): (f64, f64), (ud, uq): (f64, f64), omega: f64) -> StatorSlopes {
+        let flux = self.flux(id, iq);
+        let vd = ud - self.resistance_ohm * id + omega * flux.psi_q_wb;
+        let vq = uq - self.resistance_ohm * iq - omega * flux.psi_d_wb;
+        let det = flux.ldd_h * flux.lqq_h - flux.ldq_h * flux.lqd_h;
+        StatorSlopes {
+            id_a_s: (flux.lqq_h * vd - flux.ldq_h * vq) / det,
+            iq_a_s: (flux.ldd_h * vq - flux.lqd_h * vd) / det,
+            electrical_w: 1.5 * (ud * id + uq * iq),
+            copper_w: 1.5 * self.resistance_ohm * (id * id + iq * iq),
+            torque_nm: 1.5 * self.pole_pairs * (flux.psi_d_wb * iq - flux.psi_q_wb * id),
+        }
+    }
+
+    /// Energy of the field at a current, above that at no current, in J: `1.5 ∫ i·dψ` along a straight line from zero.
+    pub fn field_j(&self, id_a: f64, iq_a: f64) -> f64 {
+        // i·dψ = x iᵀ L(x i) i dx, by the middles of the pieces.
+        let pieces = if matches!(self.flux, Flux::Linear { .. }) { 1 } else { FIELD_PIECES };
+        let sum: f64 = (0..pieces)
+            .map(|k| {
+                let x = (f64::from(k) + 0.5) / f64::from(pieces);
+                let at = self.flux(id_a * x, iq_a * x);
+                x * (id_a * (at.ldd_h * id_a + at.ldq_h * iq_a) + iq_a * (at.lqd_h * id_a + at.lqq_h * iq_a))
+            })
+            .sum();
+        1.5 * sum / f64::from(pieces)
+    }
+}
+
+/// The flux of a map that is a plane in every node.
+fn linear(map: &FluxMap) -> Option<Flux> {
+    let (rows, columns) = (map.id_a.len(), map.iq_a.len());
+    let last = rows * columns - 1;
+    let ld_h = (map.psi_d_wb[last] - map.psi_d_wb[0]) / (map.id_a[rows - 1] - map.id_a[0]);
+    let lq_h = (map.psi_q_wb[last] - map.psi_q_wb[0]) / (map.iq_a[columns - 1] - map.iq_a[0]);
+    let magnet_wb = map.psi_d_wb[0] - ld_h * map.id_a[0];
+    let largest = map.psi_d_wb.iter().chain(&map.psi_q_wb).fold(0.0_f64, |most, psi| most.max(psi.abs()));
+    let near = |a: f64, b: f64| (a - b).abs() <= LINEAR_TOLERANCE * largest;
+    let nodes = map.id_a.iter().flat_map(|id| map.iq_a.iter().map(move |iq| (id, iq)));
+    let fluxes = map.psi_d_wb.iter().zip(&map.psi_q_wb);
+    let plane = nodes
+        .zip(fluxes)
+        .all(|((id, iq), (psi_d, psi_q))| near(magnet_wb + ld_h * id, *psi_d) && near(lq_h * iq, *psi_q));
+    plane.then_some(Flux::Linear { magnet_wb, ld_h, lq_h })
+}
