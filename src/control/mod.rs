@@ -150,7 +150,13 @@ pub struct Controller {
     demand: demand::Shaper,
     disturbance: disturbance::Observer,
     trim: torque_trim::TorqueTrim,
+    /// DC-link voltage without its ripple, in V; `None` before the first step.
+    link_v: Option<f32>,
 }
+
+/// Bandwidth at which operating point and mode follow the DC link, in rad/s: a rectifier's ripple must neither shake the one nor
+/// toggle the other. What the modulator divides by is the link as it is.
+const LINK_RAD_S: f32 = 100.0;
 
 impl Controller {
     /// At rest, with nothing known of the machine's angle.
@@ -160,6 +166,7 @@ impl Controller {
             demand: demand::Shaper::new(),
             disturbance: disturbance::Observer::new(),
             trim: torque_trim::TorqueTrim::new(),
+            link_v: None,
         }
     }
 
@@ -184,6 +191,7 @@ impl Controller {
         self.demand = demand::Shaper::new();
         self.disturbance = disturbance::Observer::new();
         self.trim = torque_trim::TorqueTrim::new();
+        self.link_v = None;
     }
 
     /// One control period: the voltage for the carrier half that begins at the horizon.
@@ -192,8 +200,10 @@ impl Controller {
         let Law { gains, clock, tables } = *law;
         let omega = self.speed.omega();
         let torque_nm = self.demand.step(demand, omega, clock.control_s(), &tables.ratings);
-        let limit =
-            VoltageLimit { udc_v: measured.udc_v, depth: committed.depth_limit, filled: committed.filled };
+        let before = self.link_v.unwrap_or(measured.udc_v);
+        let link_v = before + LINK_RAD_S * clock.control_s() * (measured.udc_v - before);
+        self.link_v = Some(link_v);
+        let limit = VoltageLimit { udc_v: link_v, depth: committed.depth_limit, filled: committed.filled };
         let point =
             operating_point(self.trim.apply(torque_nm, tables.ratings.max_torque_nm), omega, &limit, tables);
         let frame = measured.angle.sin_cos();
