@@ -11,6 +11,7 @@
 #![forbid(unsafe_code)]
 
 mod carrier;
+mod dead_time;
 mod middle60;
 mod ripple;
 mod schedule;
@@ -19,6 +20,7 @@ use crate::frames::{Angle, limit};
 use crate::time::{Clock, Instant};
 
 use carrier::Zeros;
+pub use dead_time::compensated;
 pub use ripple::ripple_flux;
 pub use schedule::{Schedule, depth_limit, first_half};
 
