@@ -139,6 +139,12 @@ pub struct RunOptions {
     /// sweep: share of the full torque.
     #[arg(long, default_value_t = 1.0, value_parser = finite, allow_negative_numbers = true)]
     pub torque_scale: f64,
+    /// steady, mode-borders, reversal: speed, in r/min.
+    #[arg(long, value_parser = finite, allow_negative_numbers = true)]
+    pub speed: Option<f64>,
+    /// steady: torque, in N·m.
+    #[arg(long, value_parser = finite, allow_negative_numbers = true)]
+    pub torque: Option<f64>,
     /// sweep: last speed, in r/min.
     #[arg(long, default_value_t = 2000.0, value_parser = finite, allow_negative_numbers = true)]
     pub to: f64,

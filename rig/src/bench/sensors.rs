@@ -27,14 +27,15 @@ pub struct Flaws {
 /// Sensors, and the stiff DC link behind the inverter.
 pub struct Sensors {
     udc_v: f64,
+    link_steps: Vec<(f64, f64)>,
     flaws: Flaws,
     random: StdRng,
 }
 
 impl Sensors {
-    /// Sensors on a link of this voltage.
-    pub fn new(udc_v: f64, flaws: Flaws) -> Self {
-        Self { udc_v, flaws, random: StdRng::seed_from_u64(flaws.seed) }
+    /// Sensors on a link of this voltage, which changes at these times (in s) to these values.
+    pub fn new(udc_v: f64, link_steps: Vec<(f64, f64)>, flaws: Flaws) -> Self {
+        Self { udc_v, link_steps, flaws, random: StdRng::seed_from_u64(flaws.seed) }
     }
 
     /// The link's true voltage, in V.
@@ -43,7 +44,8 @@ impl Sensors {
             .flaws
             .udc_ripple
             .map_or(0.0, |(amplitude_v, hz)| amplitude_v * (core::f64::consts::TAU * hz * t_s).sin());
-        self.udc_v + ripple
+        let passed = self.link_steps.iter().rev().find(|(at_s, _)| t_s >= *at_s);
+        passed.map_or(self.udc_v, |(_, udc_v)| *udc_v) + ripple
     }
 
     /// The phase currents as converted now.

@@ -68,7 +68,7 @@ impl Scenario for Characteristic {
             let torque_nm = slot.map_or(0.0, |slot| slot.torque_nm as f32);
             (Demand { torque_nm, slew_limited: true }, true)
         };
-        Plan { duration_s, speed, operator: Box::new(operator) }
+        Plan { duration_s, speed, link: Vec::new(), operator: Box::new(operator) }
     }
 
     fn figures(&self, recording: &Recording, _options: &RunOptions, machine: &Machine) -> Figures {

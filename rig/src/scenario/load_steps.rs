@@ -34,6 +34,7 @@ impl Scenario for LoadSteps {
         Plan {
             duration_s: STEP_S * LEVELS_NM.len() as f64,
             speed: vec![(0.0, SPEED_RPM)],
+            link: Vec::new(),
             operator: Box::new(|t_s: f64| {
                 (Demand { torque_nm: level_nm(t_s + 1e-9) as f32, slew_limited: false }, true)
             }),

@@ -1,7 +1,13 @@
 //! What is driven, and what is to be seen.
 
 mod characteristic;
+mod link_steps;
 mod load_steps;
+mod mode_borders;
+mod restart;
+mod reversal;
+mod script;
+mod steady;
 mod sweep;
 
 use crate::analysis::Figures;
@@ -27,6 +33,8 @@ pub struct Plan {
     pub duration_s: f64,
     /// Prescribed speed: (time in s, r/min), straight lines between; before the first the first.
     pub speed: Vec<(f64, f64)>,
+    /// DC-link voltages: (time in s, V), each from its time on; the run's own before the first.
+    pub link: Vec<(f64, f64)>,
     /// The operator.
     pub operator: Box<dyn Operator + Send>,
 }
@@ -46,8 +54,17 @@ pub trait Scenario {
 }
 
 /// Every scenario.
-pub fn all() -> [Box<dyn Scenario>; 3] {
-    [Box::new(load_steps::LoadSteps), Box::new(sweep::Sweep), Box::new(characteristic::Characteristic)]
+pub fn all() -> Vec<Box<dyn Scenario>> {
+    vec![
+        Box::new(load_steps::LoadSteps),
+        Box::new(sweep::Sweep),
+        Box::new(characteristic::Characteristic),
+        Box::new(steady::Steady),
+        Box::new(mode_borders::ModeBorders),
+        Box::new(reversal::Reversal),
+        Box::new(restart::Restart),
+        Box::new(link_steps::LinkSteps),
+    ]
 }
 
 /// The scenario of that name.
@@ -72,8 +89,9 @@ pub fn drive(scenario: &dyn Scenario, options: &RunOptions, machine: &Machine) -
         &CLOCK,
     );
     let parameters = &machine.folder.parameters;
+    let plant = plant(&plan, options, machine);
     let bench = Bench::new(
-        plant(&plan, options, machine),
+        plant,
         plan.operator,
         &bench::Settings {
             clock: CLOCK,
@@ -83,6 +101,7 @@ pub fn drive(scenario: &dyn Scenario, options: &RunOptions, machine: &Machine) -
             duration_s: plan.duration_s,
             trace_step_s: options.dt,
             udc_v: options.udc.unwrap_or(parameters.dc_link_nominal_v),
+            link_steps: plan.link,
             flaws: options.flaws(parameters.trip_current_a),
         },
     );

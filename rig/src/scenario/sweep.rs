@@ -37,7 +37,7 @@ impl Scenario for Sweep {
             let torque_nm = if t_s < 0.0 { 0.0 } else { torque_nm as f32 };
             (Demand { torque_nm, slew_limited: true }, true)
         };
-        Plan { duration_s, speed, operator: Box::new(operator) }
+        Plan { duration_s, speed, link: Vec::new(), operator: Box::new(operator) }
     }
 
     fn figures(&self, recording: &Recording, _options: &RunOptions, _machine: &Machine) -> Figures {
