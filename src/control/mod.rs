@@ -199,20 +199,28 @@ impl Controller {
         let Input { measured, demand, committed, boundary } = *input;
         let Law { gains, clock, tables } = *law;
         let omega = self.speed.omega();
-        let torque_nm = self.demand.step(demand, omega, clock.control_s(), &tables.ratings);
+        let frame = measured.angle.sin_cos();
+        let current = measured.currents_a.clarke().park(frame);
+        let flux = flux_linkage(tables, current);
+        let measured_nm = self::torque_nm(tables, flux, current);
+        let shaping = demand::Input {
+            demand,
+            omega,
+            flowing_nm: measured_nm,
+            can_step: committed.follows == Follows::Mean,
+            period_s: clock.control_s(),
+        };
+        let torque_nm = self.demand.step(&shaping, &tables.ratings);
         let before = self.link_v.unwrap_or(measured.udc_v);
         let link_v = before + LINK_RAD_S * clock.control_s() * (measured.udc_v - before);
         self.link_v = Some(link_v);
         let limit = VoltageLimit { udc_v: link_v, depth: committed.depth_limit, filled: committed.filled };
         let point =
             operating_point(self.trim.apply(torque_nm, tables.ratings.max_torque_nm), omega, &limit, tables);
-        let frame = measured.angle.sin_cos();
-        let current = measured.currents_a.clarke().park(frame);
-        let flux = flux_linkage(tables, current);
         let limited = point.region == Region::Limit;
         self.trim.step(&torque_trim::Input {
             demand_nm: torque_nm,
-            measured_nm: self::torque_nm(tables, flux, current),
+            measured_nm,
             limited,
             largest_nm: tables.ratings.max_torque_nm,
             period_s: clock.control_s(),
@@ -251,10 +259,15 @@ impl Controller {
                 omega,
                 depth: point.depth,
             },
-            torque_nm: if limited { point.torque_nm } else { torque_nm },
+            torque_nm: if limited { nearer_zero(point.torque_nm, torque_nm) } else { torque_nm },
             point,
         }
     }
+}
+
+/// Of two torques of the same sign the smaller one.
+fn nearer_zero(a: f32, b: f32) -> f32 {
+    if a.abs() < b.abs() { a } else { b }
 }
 
 impl Default for Controller {

@@ -415,12 +415,14 @@ impl PwmTask {
         let currents_before_a = core::mem::replace(&mut self.currents_a, port.sample(now));
         let command = shared.command.newest(|command| now.reached(command.valid_from));
         self.check(&command, port);
-        let reference = match &command {
-            Some(command) if command.gates == Gates::Pulse && self.trip.is_none() => Some(&command.reference),
-            _ => None,
-        };
         let start = now.after(self.running.period_ticks);
-        self.next = self.modulator.step(start, reference);
+        let pulsing = self.trip.is_none();
+        self.next = match &command {
+            Some(command) if command.gates == Gates::Pulse && pulsing => {
+                self.modulator.step(start, Some(&command.reference))
+            }
+            resting => self.modulator.rest(start, resting.as_ref().map(|command| &command.reference)),
+        };
         self.now = start;
         let expected = self.expected_currents(currents_before_a);
         let small_a = SMALL_CURRENT_SHARE * self.tables.ratings.max_current_a;
