@@ -14,7 +14,7 @@ pub struct Demand {
 
 /// Rate at which patterns of few pulses can follow a step, as a share of the largest torque, in 1/s: the flux hexagon has to be
 /// turned against the rotor, and faster it would be thrown off its centre.
-const PATTERN_RATE: f32 = 40.0;
+const PATTERN_RATE: f32 = 20.0;
 
 #[derive(Clone, Copy, Debug)]
 pub struct Shaper {

@@ -152,11 +152,17 @@ pub struct Controller {
     trim: torque_trim::TorqueTrim,
     /// DC-link voltage without its ripple, in V; `None` before the first step.
     link_v: Option<f32>,
+    /// Depth for the choice of mode; `None` before the first step.
+    depth: Option<f32>,
 }
 
 /// Bandwidth at which operating point and mode follow the DC link, in rad/s: a rectifier's ripple must neither shake the one nor
 /// toggle the other. What the modulator divides by is the link as it is.
 const LINK_RAD_S: f32 = 100.0;
+
+/// Bandwidth at which the mode follows the modulation depth that the torque needs, in rad/s: a reversal of torque passes
+/// through little depth too quickly to be worth two switches.
+const DEPTH_RAD_S: f32 = 30.0;
 
 impl Controller {
     /// At rest, with nothing known of the machine's angle.
@@ -167,6 +173,7 @@ impl Controller {
             disturbance: disturbance::Observer::new(),
             trim: torque_trim::TorqueTrim::new(),
             link_v: None,
+            depth: None,
         }
     }
 
@@ -192,6 +199,7 @@ impl Controller {
         self.disturbance = disturbance::Observer::new();
         self.trim = torque_trim::TorqueTrim::new();
         self.link_v = None;
+        self.depth = None;
     }
 
     /// One control period: the voltage for the carrier half that begins at the horizon.
@@ -248,6 +256,11 @@ impl Controller {
             tables,
         );
         let current_loop::Output { voltage, steady } = voltage;
+        let depth = match self.depth {
+            Some(before) => before + DEPTH_RAD_S * clock.control_s() * (point.depth - before),
+            None => point.depth,
+        };
+        self.depth = Some(depth);
         let regulates_by_pulses = committed.follows == Follows::Mean;
         let carrier = if regulates_by_pulses { steady } else { voltage };
         Output {
@@ -257,7 +270,7 @@ impl Controller {
                 carrier_angle: measured.angle + carrier.angle(),
                 steady_v: steady.length(),
                 omega,
-                depth: point.depth,
+                depth,
             },
             torque_nm: if limited { nearer_zero(point.torque_nm, torque_nm) } else { torque_nm },
             point,
