@@ -39,19 +39,36 @@ impl Clamp {
         Self { small_current_a: SMALL_SHARE * max_current_a, least_inductance_h: least * flux_scale }
     }
 
+    /// For two machines on one leg: the smaller current, the smaller inductance.
+    pub fn of_both(self, other: &Self) -> Self {
+        Self {
+            small_current_a: self.small_current_a.min(other.small_current_a),
+            least_inductance_h: self.least_inductance_h.min(other.least_inductance_h),
+        }
+    }
+
     /// Voltage of an open leg from the link's midpoint, in V.
     pub fn voltage(&self, current_a: f64, udc_v: f64) -> f64 {
         -0.5 * udc_v * (current_a / self.small_current_a).clamp(-1.0, 1.0)
     }
 
+    /// Likewise as a share of the link, 0 ..= 1 from the negative rail.
+    pub fn share(&self, current_a: f64) -> f64 {
+        0.5 - 0.5 * (current_a / self.small_current_a).clamp(-1.0, 1.0)
+    }
+
     /// Longest step while legs are open, in s: short near the linear zone.
     pub fn step_s(&self, udc_v: f64, currents_a: [f64; 3], legs: &[Leg; 3]) -> f64 {
         let open = currents_a.iter().zip(legs).filter(|(_, leg)| **leg == Leg::Open);
-        let nearest = open.map(|(current, _)| current.abs()).fold(f64::INFINITY, f64::min);
+        self.step_near_s(udc_v, open.map(|(current, _)| current.abs()).fold(f64::INFINITY, f64::min))
+    }
+
+    /// Longest step while the current that is nearest to zero is `nearest_a`, in s.
+    pub fn step_near_s(&self, udc_v: f64, nearest_a: f64) -> f64 {
         let slope_ohm = 0.5 * udc_v / self.small_current_a;
         let stiff = STIFF_SHARE * self.least_inductance_h / slope_ohm;
         // No current moves faster than the whole link across the least inductance.
-        let away = (nearest - self.small_current_a) * self.least_inductance_h / (1.5 * udc_v);
+        let away = (nearest_a - self.small_current_a) * self.least_inductance_h / (1.5 * udc_v);
         away.clamp(stiff, super::LONGEST_STEP_S.max(stiff))
     }
 }

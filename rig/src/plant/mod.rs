@@ -1,4 +1,4 @@
-//! The plant: a saturated machine behind three inverter legs, in f64.
+//! The plant: a saturated machine behind three inverter legs, in f64; [`zs9`] is the one with two machines.
 //!
 //! Stator equation in the rotor frame, with the smooth flux map's incremental inductances:
 //! `L(i) di/dt = u − R i − jω ψ(i)`. Amplitude-invariant, peak, electrical; d along the magnet flux; currents positive into the
@@ -8,6 +8,7 @@ mod legs;
 mod rotor;
 mod speed;
 mod stator;
+pub mod zs9;
 
 pub use legs::Leg;
 pub use rotor::{Rotor, Turning};

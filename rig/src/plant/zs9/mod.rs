@@ -1,0 +1,238 @@
+//! The ZS9's plant: source, Z-network, nine-switch bridge, two motors, in f64.
+//!
+//! ```text
+//!  U_dc ── source switch ── Z-network ── bridge: H ─┬─ M ─┬─ L, three legs
+//!                                            upper motor  lower motor
+//! ```
+//!
+//! Ideal switches, no dead time: the bridge needs none, because a shorted leg is a state of its own. Between two edges of the
+//! gates network and motors are integrated together, as one set of equations. Outside shoot-through the bridge draws
+//! `i_in = 1.5 Σ (s·i)` at `U_in = v1 + v2 − U_dc`, s being the terminals' shares of the link as a vector, and a motor sees
+//! `u = U_in s`; so what leaves the network enters the motors, also while the diodes of a bridge without gates decide on s.
+//! In shoot-through the source is apart, and `U_in = 0`.
+//!
+//! Valid while `v1 + v2 > U_dc`: a network charged to less than half the source would be charged through the bridge's diodes.
+
+mod bridge;
+mod diode;
+mod means;
+mod motor;
+mod network;
+mod step;
+mod vector;
+
+pub use bridge::{IllegalState, LegGates};
+pub use means::{Means, MotorMeans};
+pub use motor::{Motor, MotorEnergies};
+pub use network::{NetworkState, ZNetwork};
+pub use vector::Vector;
+
+use super::legs::Clamp;
+use super::{LONGEST_STEP_S, PlantSettings, SpeedSource};
+use bridge::Bridge;
+use core::f64::consts::TAU;
+use means::{Adder, Observed};
+use tractive_tablegen::{MachineFolder, SmoothMap};
+
+/// What connects the source with the network.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Source {
+    /// A switch for both directions, on outside shoot-through.
+    #[default]
+    Bidirectional,
+    /// A diode: no current back into the source.
+    Diode,
+}
+
+/// What the plant is built with.
+#[derive(Clone, Copy, Debug)]
+pub struct Zs9Settings {
+    /// The network.
+    pub network: ZNetwork,
+    /// What connects the source with it.
+    pub source: Source,
+    /// Source voltage U_dc, in V, above 0.
+    pub source_v: f64,
+    /// How the true machines differ from their folders: the upper motor, the lower one.
+    pub motors: [PlantSettings; 2],
+}
+
+impl Default for Zs9Settings {
+    fn default() -> Self {
+        Self {
+            network: ZNetwork::ZS9,
+            source: Source::Bidirectional,
+            source_v: 400.0,
+            motors: [PlantSettings::default(); 2],
+        }
+    }
+}
+
+/// Energies since the beginning, in J, apart from the motors' own ([`Motor::energies`]).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Zs9Energies {
+    /// Taken from the source.
+    pub source_j: f64,
+    /// Turned into heat in the inductors.
+    pub inductors_j: f64,
+}
+
+/// Source, network, bridge, motors.
+#[derive(Clone, Debug)]
+pub struct Zs9Plant {
+    network: ZNetwork,
+    source: Source,
+    source_v: f64,
+    clamp: Clamp,
+    network_state: NetworkState,
+    motors: [Motor; 2],
+    /// Of the motors' angles.
+    sin_cos: [(f64, f64); 2],
+    time_s: f64,
+    energies: Zs9Energies,
+    means: Adder,
+}
+
+impl Zs9Plant {
+    /// The upper motor and the lower one, both without current and at angle zero, turning as their speed sources say; the
+    /// capacitors charged to the source's voltage, no current in the inductors.
+    pub fn new(machines: [&MachineFolder; 2], speeds: [SpeedSource; 2], settings: &Zs9Settings) -> Self {
+        let [clamp, other] = [0, 1].map(|k| {
+            let map = SmoothMap::new(&machines[k].map);
+            Clamp::new(machines[k].parameters.max_current_a, &map, settings.motors[k].flux_scale)
+        });
+        let [upper, lower] = speeds;
+        let motors = [
+            Motor::new(machines[0], upper, &settings.motors[0]),
+            Motor::new(machines[1], lower, &settings.motors[1]),
+        ];
+        Self {
+            network: settings.network,
+            source: settings.source,
+            source_v: settings.source_v,
+            clamp: clamp.of_both(&other),
+            network_state: NetworkState::even(0.0, settings.source_v),
+            sin_cos: motors.each_ref().map(|motor| (motor.angle_turns() * TAU).sin_cos()),
+            motors,
+            time_s: 0.0,
+            energies: Zs9Energies::default(),
+            means: Adder::default(),
+        }
+    }
+
+    /// Lets time pass with the gates of the legs u, v, w unchanged.
+    ///
+    /// # Errors
+    /// Names the first leg whose gates are illegal; nothing has happened then.
+    pub fn advance(&mut self, gates: [LegGates; 3], dt_s: f64) -> Result<(), IllegalState> {
+        let bridge = Bridge::of(gates, self.time_s)?;
+        let mut left = dt_s;
+        while left > 0.0 {
+            let longest = if bridge == Bridge::Off { self.open_step_s() } else { LONGEST_STEP_S };
+            // Even pieces, as long as nothing else shortens them.
+            let step = if bridge == Bridge::Off { left.min(longest) } else { left / (left / longest).ceil() };
+            let taken = self.step(&bridge, step);
+            left = if taken >= left { 0.0 } else { left - taken };
+        }
+        Ok(())
+    }
+
+    /// Time since the beginning, in s.
+    pub fn time_s(&self) -> f64 {
+        self.time_s
+    }
+
+    /// The upper motor and the lower one.
+    pub fn motors(&self) -> &[Motor; 2] {
+        &self.motors
+    }
+
+    /// The motors, to set loads, currents and speeds.
+    pub fn motors_mut(&mut self) -> &mut [Motor; 2] {
+        &mut self.motors
+    }
+
+    /// Inductor currents and capacitor voltages.
+    pub fn network(&self) -> NetworkState {
+        self.network_state
+    }
+
+    /// Sets inductor currents and capacitor voltages.
+    pub fn set_network(&mut self, state: NetworkState) {
+        self.network_state = state;
+    }
+
+    /// Source voltage U_dc, in V.
+    pub fn source_v(&self) -> f64 {
+        self.source_v
+    }
+
+    /// Sets the source voltage, in V, above 0.
+    pub fn set_source_v(&mut self, source_v: f64) {
+        self.source_v = source_v;
+    }
+
+    /// `U_in = v1 + v2 − U_dc`: the link's voltage outside shoot-through, in V.
+    pub fn link_v(&self) -> f64 {
+        let [v1, v2] = self.network_state.capacitors_v;
+        v1 + v2 - self.source_v
+    }
+
+    /// Energies since the beginning.
+    pub fn energies(&self) -> Zs9Energies {
+        self.energies
+    }
+
+    /// Energy stored in the network and in the motors' fields, in J.
+    pub fn stored_j(&self) -> f64 {
+        self.network.stored_j(&self.network_state) + self.motors.iter().map(Motor::field_j).sum::<f64>()
+    }
+
+    /// What the energies leave unexplained since a time when `stored_j` was stored, in J, all energies counted from zero:
+    /// `source − inductors − Σ (copper + mechanical) − change of what is stored`.
+    pub fn residual_j(&self, stored_j: f64) -> f64 {
+        let used = |motor: &Motor| motor.energies().copper_j + motor.energies().mechanical_j;
+        self.energies.source_j
+            - self.energies.inductors_j
+            - self.motors.iter().map(used).sum::<f64>()
+            - (self.stored_j() - stored_j)
+    }
+
+    /// Mean values since this was last called; `None` if no time has passed.
+    pub fn take_means(&mut self) -> Option<Means> {
+        std::mem::take(&mut self.means).means(self.source_v)
+    }
+
+    fn observed(&self) -> Observed {
+        let [upper, lower] = [0, 1].map(|k| {
+            let motor = &self.motors[k];
+            let [a, b, c] = Vector::from_rotor((motor.id_a, motor.iq_a), self.sin_cos[k]).phases();
+            [a, b, c, motor.id_a, motor.iq_a, motor.speed_rpm()]
+        });
+        let [a, b, c, d, q, n] = upper;
+        let [e, f, g, x, y, m] = lower;
+        [
+            a,
+            b,
+            c,
+            d,
+            q,
+            n,
+            e,
+            f,
+            g,
+            x,
+            y,
+            m,
+            self.network_state.inductor_a(),
+            self.network_state.capacitor_v(),
+        ]
+    }
+
+    /// Longest step while all gates are off, in s: short near a current at which a diode begins or ends to conduct.
+    fn open_step_s(&self) -> f64 {
+        let [upper, lower] = self.motors.each_ref().map(Motor::currents_abc);
+        let near = upper.iter().zip(&lower).map(|(u, l)| u.abs().min(l.abs()).min((u + l).abs()));
+        self.clamp.step_near_s(self.link_v().abs(), near.fold(f64::INFINITY, f64::min))
+    }
+}

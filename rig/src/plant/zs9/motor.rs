@@ -1,0 +1,91 @@
+//! One of the two motors.
+
+use super::Vector;
+use crate::plant::{PlantSettings, Rotor, SpeedSource, Stator};
+use core::f64::consts::TAU;
+use tractive_tablegen::MachineFolder;
+
+/// A motor: stator, rotor, currents.
+#[derive(Clone, Debug)]
+pub struct Motor {
+    pub(super) stator: Stator,
+    pub(super) rotor: Rotor,
+    pub(super) id_a: f64,
+    pub(super) iq_a: f64,
+    pub(super) energies: MotorEnergies,
+}
+
+/// A motor's energies since the beginning, in J.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct MotorEnergies {
+    /// Taken from the bridge.
+    pub electrical_j: f64,
+    /// Turned into heat in the stator.
+    pub copper_j: f64,
+    /// Given to the rotor by the air-gap torque.
+    pub mechanical_j: f64,
+}
+
+impl Motor {
+    /// Without current, angle zero, turning as the speed source says.
+    pub(super) fn new(machine: &MachineFolder, speed: SpeedSource, settings: &PlantSettings) -> Self {
+        let stator = Stator::new(machine, settings);
+        let rotor = Rotor::new(speed, stator.pole_pairs());
+        Self { stator, rotor, id_a: 0.0, iq_a: 0.0, energies: MotorEnergies::default() }
+    }
+
+    /// Sets the currents, in A.
+    pub fn set_currents(&mut self, id_a: f64, iq_a: f64) {
+        (self.id_a, self.iq_a) = (id_a, iq_a);
+    }
+
+    /// Lets a free rotor turn at a speed in r/min; a prescribed speed stays as it is.
+    pub fn set_speed_rpm(&mut self, speed_rpm: f64) {
+        self.rotor.set_speed_rpm(speed_rpm);
+    }
+
+    /// Loads a free rotor with a torque against forward rotation, in N·m; a prescribed speed stays as it is.
+    pub fn set_load_nm(&mut self, load_nm: f64) {
+        self.rotor.set_load_nm(load_nm);
+    }
+
+    /// Currents in the rotor frame, in A.
+    pub fn currents_dq(&self) -> (f64, f64) {
+        (self.id_a, self.iq_a)
+    }
+
+    /// Phase currents, positive into the motor, in A.
+    pub fn currents_abc(&self) -> [f64; 3] {
+        Vector::from_rotor((self.id_a, self.iq_a), (self.rotor.angle_turns() * TAU).sin_cos()).phases()
+    }
+
+    /// Air-gap torque, in N·m.
+    pub fn torque_nm(&self) -> f64 {
+        self.stator.torque_nm(self.id_a, self.iq_a)
+    }
+
+    /// Electrical rotor angle, in turns, 0 ≤ x < 1.
+    pub fn angle_turns(&self) -> f64 {
+        self.rotor.angle_turns()
+    }
+
+    /// Mechanical speed, in r/min.
+    pub fn speed_rpm(&self) -> f64 {
+        self.rotor.speed_rpm()
+    }
+
+    /// Energies since the beginning.
+    pub fn energies(&self) -> MotorEnergies {
+        self.energies
+    }
+
+    /// Energy of the field, in J.
+    pub fn field_j(&self) -> f64 {
+        self.stator.field_j(self.id_a, self.iq_a)
+    }
+
+    /// Its stator.
+    pub fn stator(&self) -> &Stator {
+        &self.stator
+    }
+}

@@ -1,0 +1,270 @@
+//! One Runge–Kutta step of network and motors together.
+
+use super::bridge::{Bridge, freewheeling};
+use super::network::NetworkState;
+use super::{Vector, Zs9Plant};
+use crate::plant::{StatorSlopes, Turning};
+use core::f64::consts::TAU;
+
+/// What feeds the network on the source's side.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Feed {
+    /// The source: `u_s = U_dc`.
+    Source,
+    /// Nothing, while the bridge is a short, by its gates or by its diodes: `u_s = v1 + v2`.
+    Short,
+    /// Nothing, while the bridge takes all of the inductors' current: u_s is what keeps `i1 + i2 = i_in`.
+    Blocked,
+}
+
+/// id and iq of the upper motor, of the lower one; i1, i2; v1, v2.
+type State = [f64; 8];
+/// For the upper motor, then for the lower one: electrical energy, copper loss, the torque's impulse. Then energy from
+/// the source, loss of the inductors.
+type Sums = [f64; 8];
+
+/// A motor's rotor frame at an instant.
+#[derive(Clone, Copy)]
+struct Frame {
+    sin_cos: (f64, f64),
+    omega: f64,
+    /// The terminals' shares of the link, in this frame.
+    share: (f64, f64),
+}
+
+/// A step that may yet be taken.
+pub struct Trial {
+    dt_s: f64,
+    state: State,
+    sums: Sums,
+    end: [Frame; 2],
+}
+
+impl Zs9Plant {
+    fn state(&self) -> State {
+        let [upper, lower] = &self.motors;
+        let ([i1, i2], [v1, v2]) = (self.network_state.inductors_a, self.network_state.capacitors_v);
+        [upper.id_a, upper.iq_a, lower.id_a, lower.iq_a, i1, i2, v1, v2]
+    }
+
+    /// Runge–Kutta, fourth order. The frames turn during the step; the speeds change linearly at most.
+    pub(super) fn try_step(&self, bridge: &Bridge, feed: Feed, dt_s: f64) -> Trial {
+        let turning = self.motors.each_ref().map(|motor| motor.rotor.turning(|| motor.torque_nm(), dt_s));
+        let begin = self.sin_cos;
+        let after = |t: f64| [0, 1].map(|k| turned(begin[k], turning[k].turned(t)));
+        let half = 0.5 * dt_s;
+        let (middle, end) = (after(half), after(dt_s));
+        let (f0, f1, f2) = (
+            frames(bridge, begin, &turning, 0.0),
+            frames(bridge, middle, &turning, half),
+            frames(bridge, end, &turning, dt_s),
+        );
+        let y0 = self.state();
+        let (k1, s1) = self.rates(&y0, &f0, bridge, feed);
+        let (k2, s2) = self.rates(&along(&y0, &k1, half), &f1, bridge, feed);
+        let (k3, s3) = self.rates(&along(&y0, &k2, half), &f1, bridge, feed);
+        let (k4, s4) = self.rates(&along(&y0, &k3, dt_s), &f2, bridge, feed);
+        let mut state = y0;
+        let mut sums = [0.0; 8];
+        for k in 0..8 {
+            state[k] += dt_s / 6.0 * (k1[k] + 2.0 * (k2[k] + k3[k]) + k4[k]);
+            sums[k] = dt_s / 6.0 * (s1[k] + 2.0 * (s2[k] + s3[k]) + s4[k]);
+        }
+        Trial { dt_s, state, sums, end: f2 }
+    }
+
+    /// Takes the step.
+    pub(super) fn take(&mut self, trial: &Trial) {
+        let Trial { dt_s, state, sums, .. } = *trial;
+        let before = self.observed();
+        for (k, motor) in self.motors.iter_mut().enumerate() {
+            (motor.id_a, motor.iq_a) = (state[2 * k], state[2 * k + 1]);
+            motor.energies.electrical_j += sums[3 * k];
+            motor.energies.copper_j += sums[3 * k + 1];
+            motor.energies.mechanical_j += motor.rotor.finish(sums[3 * k + 2], dt_s);
+            self.sin_cos[k] = (motor.rotor.angle_turns() * TAU).sin_cos();
+        }
+        self.network_state =
+            NetworkState { inductors_a: [state[4], state[5]], capacitors_v: [state[6], state[7]] };
+        self.energies.source_j += sums[6];
+        self.energies.inductors_j += sums[7];
+        self.time_s += dt_s;
+        let impulses = [sums[2], sums[5]];
+        self.means.add(dt_s, &before, &self.observed(), impulses);
+    }
+
+    /// How far the inductors' current is above what the bridge's gates ask for, in A: the source gives it, or, below zero,
+    /// the bridge's diodes take up the difference.
+    pub(super) fn excess_a(&self, bridge: &Bridge) -> f64 {
+        let y = self.state();
+        let still = self.still(bridge);
+        y[4] + y[5] - self.demand(&y, &self.shares(&y, &still, bridge))
+    }
+
+    /// That excess after a step.
+    pub(super) fn excess_after(&self, bridge: &Bridge, trial: &Trial) -> f64 {
+        let y = &trial.state;
+        y[4] + y[5] - self.demand(y, &self.shares(y, &trial.end, bridge))
+    }
+
+    /// The link voltage at which that excess stays as it is, in V, as a share of the link's voltage under the source.
+    pub(super) fn holding_share(&self, bridge: &Bridge) -> f64 {
+        let y = self.state();
+        let still = self.still(bridge);
+        let shares = self.shares(&y, &still, bridge);
+        let capacitors_v = y[6] + y[7];
+        (capacitors_v - self.holding_feed_v(&y, &still, &shares)) / (capacitors_v - self.source_v)
+    }
+
+    /// The frames now.
+    fn still(&self, bridge: &Bridge) -> [Frame; 2] {
+        let turning = self.motors.each_ref().map(|motor| motor.rotor.turning(|| 0.0, 1.0));
+        frames(bridge, self.sin_cos, &turning, 0.0)
+    }
+
+    #[inline]
+    fn rates(&self, y: &State, frames: &[Frame; 2], bridge: &Bridge, feed: Feed) -> (State, Sums) {
+        let shares = self.shares(y, frames, bridge);
+        let network = NetworkState { inductors_a: [y[4], y[5]], capacitors_v: [y[6], y[7]] };
+        let (capacitors_v, inductors_a) = (y[6] + y[7], y[4] + y[5]);
+        let (feed_v, bridge_a) = match feed {
+            Feed::Source => (self.source_v, self.demand(y, &shares)),
+            Feed::Short => (capacitors_v, inductors_a),
+            Feed::Blocked => (self.holding_feed_v(y, frames, &shares), inductors_a),
+        };
+        let link_v = capacitors_v - feed_v;
+        let [upper, lower] = [0, 1].map(|k| self.motor_slopes(k, y, frames, &shares, link_v));
+        let slopes = self.network.slopes(&network, feed_v, bridge_a);
+        let ([di1, di2], [dv1, dv2]) = (slopes.inductors_a, slopes.capacitors_v);
+        (
+            [upper.id_a_s, upper.iq_a_s, lower.id_a_s, lower.iq_a_s, di1, di2, dv1, dv2],
+            [
+                upper.electrical_w,
+                upper.copper_w,
+                upper.torque_nm,
+                lower.electrical_w,
+                lower.copper_w,
+                lower.torque_nm,
+                feed_v * (inductors_a - bridge_a),
+                self.network.loss_w(&network),
+            ],
+        )
+    }
+
+    #[inline]
+    fn motor_slopes(
+        &self,
+        k: usize,
+        y: &State,
+        frames: &[Frame; 2],
+        shares: &Shares,
+        link_v: f64,
+    ) -> StatorSlopes {
+        let (d, q) = shares[k];
+        let stator = &self.motors[k].stator;
+        stator.slopes((y[2 * k], y[2 * k + 1]), (link_v * d, link_v * q), frames[k].omega)
+    }
+
+    /// The terminals' shares of the link, in the rotor frames.
+    #[inline]
+    fn shares(&self, y: &State, frames: &[Frame; 2], bridge: &Bridge) -> Shares {
+        if *bridge != Bridge::Off {
+            return [frames[0].share, frames[1].share];
+        }
+        let [upper, lower] =
+            [0, 1].map(|k| Vector::from_rotor((y[2 * k], y[2 * k + 1]), frames[k].sin_cos).phases());
+        let stationary = freewheeling(&self.clamp, upper, lower);
+        [0, 1].map(|k| stationary[k].to_rotor(frames[k].sin_cos))
+    }
+
+    /// What the motors draw from the link, in A: `1.5 (s·i)` of both.
+    #[inline]
+    fn demand(&self, y: &State, shares: &Shares) -> f64 {
+        let [(d1, q1), (d2, q2)] = *shares;
+        1.5 * (d1 * y[0] + q1 * y[1] + d2 * y[2] + q2 * y[3])
+    }
+
+    /// The voltage on the source's side that keeps `i1 + i2` equal to what the motors draw, in V.
+    ///
+    /// The motors' draw changes at a rate `a + b U_in`, the inductors' sum at `(2 u_s − v1 − v2 − r (i1 + i2))/L`, and
+    /// `U_in = v1 + v2 − u_s`.
+    fn holding_feed_v(&self, y: &State, frames: &[Frame; 2], shares: &Shares) -> f64 {
+        let draw_rate = |link_v: f64| -> f64 {
+            (0..2)
+                .map(|k| {
+                    let slopes = self.motor_slopes(k, y, frames, shares, link_v);
+                    let ((d, q), omega) = (shares[k], frames[k].omega);
+                    // The shares stand still while the frame turns.
+                    1.5 * (d * (slopes.id_a_s - omega * y[2 * k + 1])
+                        + q * (slopes.iq_a_s + omega * y[2 * k]))
+                })
+                .sum()
+        };
+        let a = draw_rate(0.0);
+        let b = draw_rate(1.0) - a;
+        let (capacitors_v, inductors_a) = (y[6] + y[7], y[4] + y[5]);
+        let inductance = self.network.inductance_h;
+        (capacitors_v + self.network.resistance_ohm * inductors_a + inductance * (a + b * capacitors_v))
+            / (2.0 + inductance * b)
+    }
+}
+
+/// The terminals' shares of the link for both motors, d and q.
+type Shares = [(f64, f64); 2];
+
+/// Both frames a time after the step's beginning.
+#[inline]
+fn frames(bridge: &Bridge, sin_cos: [(f64, f64); 2], turning: &[Turning; 2], t_s: f64) -> [Frame; 2] {
+    let stationary = match bridge {
+        Bridge::Driven(shares) => *shares,
+        Bridge::Short | Bridge::Off => [Vector::default(); 2],
+    };
+    [0, 1].map(|k| Frame {
+        sin_cos: sin_cos[k],
+        omega: turning[k].omega(t_s),
+        share: stationary[k].to_rotor(sin_cos[k]),
+    })
+}
+
+#[inline]
+fn along(y: &State, slope: &State, dt_s: f64) -> State {
+    let mut out = *y;
+    for (value, rate) in out.iter_mut().zip(slope) {
+        *value += dt_s * rate;
+    }
+    out
+}
+
+/// Sine and cosine after turning by an angle in rad.
+#[inline]
+fn turned((sin, cos): (f64, f64), by: f64) -> (f64, f64) {
+    let (s, c) = small_sin_cos(by);
+    (sin * c + cos * s, cos * c - sin * s)
+}
+
+/// Sine and cosine; for the small angle of a step by a series that is exact to rounding.
+#[inline]
+fn small_sin_cos(x: f64) -> (f64, f64) {
+    const SMALL: f64 = 0.05;
+    if x.abs() > SMALL {
+        return x.sin_cos();
+    }
+    let z = x * x;
+    let sin = x * (1.0 - z / 6.0 * (1.0 - z / 20.0 * (1.0 - z / 42.0)));
+    let cos = 1.0 - z / 2.0 * (1.0 - z / 12.0 * (1.0 - z / 30.0 * (1.0 - z / 56.0)));
+    (sin, cos)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::small_sin_cos;
+
+    #[test]
+    fn small_angles_are_exact_to_rounding() {
+        for k in -100..=100 {
+            let x = f64::from(k) * 6e-4;
+            let (sin, cos) = small_sin_cos(x);
+            assert!((sin - x.sin()).abs() < 1e-17 && (cos - x.cos()).abs() < 2e-16, "{x}");
+        }
+    }
+}
