@@ -15,6 +15,7 @@ mod disturbance;
 mod mtpa;
 mod reference;
 mod speed;
+mod z_source;
 
 use crate::frames::{Abc, AlphaBeta, Angle, Dq};
 use crate::machine::Tables;
@@ -24,6 +25,9 @@ pub use current_loop::{Follows, Gains};
 pub use demand::Demand;
 pub use mtpa::mtpa;
 pub use reference::{OperatingPoint, Region, VoltageLimit, operating_point, six_step_v};
+pub use z_source::{
+    Limited, ZSource, ZSourceDesign, ZSourceError, ZSourceGains, ZSourceInput, ZSourceOutput,
+};
 
 /// The machine's flux linkage at a current, in Wb.
 #[inline]
