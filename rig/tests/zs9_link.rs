@@ -55,11 +55,13 @@ impl Network {
         2.0 * self.state.capacitor_v() - SOURCE_V
     }
 
-    /// Half a period of shoot-through in each half of the period.
+    /// Half of the shoot-through around a quarter of the period, half around three quarters. So the pattern is symmetric
+    /// about the samples, and they see the current's mean.
     fn period(&mut self, duty: f64) {
         for _ in 0..2 {
+            self.advance(false, duty, 0.25 * (1.0 - duty) * PERIOD_S);
             self.advance(true, duty, 0.5 * duty * PERIOD_S);
-            self.advance(false, duty, 0.5 * (1.0 - duty) * PERIOD_S);
+            self.advance(false, duty, 0.25 * (1.0 - duty) * PERIOD_S);
         }
     }
 

@@ -94,3 +94,195 @@ fn an_illegal_state_is_refused_and_nothing_happens() {
     assert_eq!((refused.leg, refused.gates, refused.time_s), ('w', lonely, plant.time_s()));
     assert_eq!(before, (plant.time_s(), plant.network(), plant.motors()[0].currents_dq()));
 }
+
+#[test]
+fn with_all_gates_off_the_load_gives_its_energy_back() {
+    let mut plant = plant_at([0.0; 2], &Zs9Settings::default());
+    for (motor, current) in plant.motors_mut().iter_mut().zip([(40.0, 60.0), (-30.0, 50.0)]) {
+        motor.set_currents(current.0, current.1);
+    }
+    let (stored, field) = (plant.stored_j(), plant.motors().iter().map(|motor| motor.field_j()).sum::<f64>());
+    for _ in 0..30 {
+        plant.advance([LegGates::OFF; 3], PERIOD_S).unwrap();
+    }
+    let left =
+        plant.motors().iter().flat_map(|motor| motor.currents_abc()).fold(0.0_f64, |m, i| m.max(i.abs()));
+    // The link takes it in; the network gives it to the source.
+    let given: f64 = plant.motors().iter().map(|motor| -motor.energies().electrical_j).sum();
+    let residual = plant.residual_j(stored);
+    println!(
+        "{field:.3} J in the fields, {given:.3} J given back, {left:.2} A left, residual {residual:.1e} J"
+    );
+    assert!(left < 1.0 && given > 0.95 * field && given < field, "{left} A, {given} J of {field} J");
+    assert!(residual.abs() < 1e-6 * field, "{residual} J");
+    for _ in 0..2000 {
+        plant.advance([LegGates::OFF; 3], PERIOD_S).unwrap();
+    }
+    assert!(plant.energies().source_j < -0.8 * given, "{:?}", plant.energies());
+}
+
+#[test]
+fn with_all_gates_off_nothing_flows_below_the_link_and_something_above() {
+    let flowing = |rpm: [f64; 2]| {
+        let mut plant = plant_at(rpm, &Zs9Settings::default());
+        for _ in 0..2000 {
+            plant.advance([LegGates::OFF; 3], PERIOD_S).unwrap();
+        }
+        let peak =
+            |k: usize| plant.motors()[k].currents_abc().into_iter().fold(0.0_f64, |m, i| m.max(i.abs()));
+        ([peak(0), peak(1)], plant.energies().source_j)
+    };
+    // Line EMF of a motor at its highest speed: 359 V, below 400 V.
+    let (below, _) = flowing([1500.0, 0.0]);
+    let (above, source_j) = flowing([0.0, 2500.0]);
+    // Through the middle diodes the motors are in series; together they exceed the link.
+    let (together, together_j) = flowing([1500.0, -1500.0]);
+    println!(
+        "{below:.2?} A below; {above:.2?} A above, {source_j:.0} J; {together:.2?} A together, {together_j:.0} J"
+    );
+    assert!(below.iter().all(|peak| *peak < 1.5), "{below:?}");
+    assert!(above[1] > 10.0 && source_j < -10.0, "{above:?} {source_j}");
+    assert!(together.iter().all(|peak| *peak > 5.0) && together_j < -10.0, "{together:?} {together_j}");
+}
+
+#[test]
+fn finer_calls_change_nothing() {
+    let run = |pieces: u32| {
+        let mut plant = plant_at([1300.0, -900.0], &Zs9Settings::default());
+        plant.set_network(NetworkState::even(20.0, capacitor_v(0.2, 20.0)));
+        let link_v = plant.link_v();
+        let currents = [(-40.0, 30.0), (-20.0, -45.0)];
+        let depths = [0, 1].map(|k| depth_for(currents[k], [1300.0, -900.0][k], link_v));
+        for (motor, (id, iq)) in plant.motors_mut().iter_mut().zip(currents) {
+            motor.set_currents(id, iq);
+        }
+        for k in 0..500 {
+            let turns = f64::from(k) * PERIOD_S * 4.0 / 60.0 * TAU;
+            let at = |motor: usize, rpm: f64| {
+                let (d, q) = depths[motor];
+                (d.hypot(q), q.atan2(d) + turns * rpm)
+            };
+            for (gates, share) in zs9::pattern(at(0, 1300.0), at(1, -900.0), 0.2) {
+                for _ in 0..pieces {
+                    plant.advance(gates, share * PERIOD_S / f64::from(pieces)).unwrap();
+                }
+            }
+        }
+        let [upper, lower] = plant.motors().each_ref().map(|motor| motor.currents_dq());
+        [upper.0, upper.1, lower.0, lower.1, plant.network().capacitor_v(), plant.network().inductor_a()]
+    };
+    let (coarse, fine) = (run(1), run(8));
+    let worst = coarse.iter().zip(fine).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    println!("{coarse:.3?}, worst difference {worst:.1e}");
+    // A ten-millionth of the voltage; it shrinks with the fourth power of the pieces.
+    assert!(worst < 1e-4, "{coarse:?} {fine:?}");
+}
+
+#[test]
+fn a_saturated_machine_keeps_its_energy_too() {
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../tables/pmasynrm-180kw");
+    let saturated = tractive_tablegen::MachineFolder::read(&folder).unwrap();
+    let speeds = [600.0, -300.0].map(zs9::turning);
+    let mut plant = Zs9Plant::new([&saturated, &machine()], speeds, &Zs9Settings::default());
+    plant.set_network(NetworkState::even(0.0, capacitor_v(0.15, 0.0)));
+    let stored = plant.stored_j();
+    for _ in 0..2000 {
+        period(&mut plant, [(-0.28, 0.2), (-0.01, -0.14)], 0.15).unwrap();
+    }
+    let (residual, upper) = (plant.residual_j(stored), plant.motors()[0].energies());
+    println!("{upper:?}, {:?}, residual {residual:.1e} J", plant.motors()[0].currents_dq());
+    assert!(upper.mechanical_j.abs() > 100.0 && residual.abs() < 1e-4 * upper.mechanical_j.abs());
+}
+
+#[test]
+fn means_are_those_of_the_span() {
+    let rpm = [800.0, 500.0];
+    let mut plant = plant_at(rpm, &Zs9Settings::default());
+    assert_eq!(plant.take_means(), None);
+    plant.set_network(NetworkState::even(10.0, 530.0));
+    for motor in plant.motors_mut() {
+        motor.set_currents(-10.0, 30.0);
+    }
+    let mut sums = [0.0; 3];
+    const PIECES: u32 = 2000;
+    for _ in 0..PIECES {
+        plant.advance([LegGates::ONE, LegGates::ONE, LegGates::ZERO], 20e-6 / f64::from(PIECES)).unwrap();
+        let motor = &plant.motors()[0];
+        sums[0] += motor.currents_abc()[1];
+        sums[1] += motor.currents_dq().1;
+        sums[2] += plant.link_v();
+    }
+    let mut at_once = plant_at(rpm, &Zs9Settings::default());
+    at_once.set_network(NetworkState::even(10.0, 530.0));
+    for motor in at_once.motors_mut() {
+        motor.set_currents(-10.0, 30.0);
+    }
+    at_once.advance([LegGates::ONE, LegGates::ONE, LegGates::ZERO], 20e-6).unwrap();
+    let means = at_once.take_means().unwrap();
+    let motor = means.motors[0];
+    for (mean, sum) in [motor.phases_a[1], motor.iq_a, means.link_v].into_iter().zip(sums) {
+        // The sum is over the pieces' ends.
+        assert!((mean - sum / f64::from(PIECES)).abs() < 2e-3, "{mean} {sum}");
+    }
+    let worked = at_once.motors()[0].energies().mechanical_j;
+    assert!((motor.torque_nm * motor.speed_rpm * TAU / 60.0 * 20e-6 / worked - 1.0).abs() < 1e-9);
+    assert_eq!(at_once.take_means(), None);
+}
+
+#[test]
+fn it_is_faster_than_real_time() {
+    let free = SpeedSource::Inertia { inertia_kg_m2: 6.0, load_nm: 20.0 };
+    let machine = machine();
+    let mut plant = Zs9Plant::new([&machine, &machine], [free.clone(), free], &Zs9Settings::default());
+    plant.set_network(NetworkState::even(0.0, capacitor_v(0.2, 0.0)));
+    for motor in plant.motors_mut() {
+        motor.set_speed_rpm(600.0);
+    }
+    let link_v = plant.link_v();
+    let depths = depth_for((-10.0, 30.0), 600.0, link_v);
+    let began = std::time::Instant::now();
+    let (mut intervals, simulated_s) = (0, 1.0);
+    for k in 0..(simulated_s / PERIOD_S) as u32 {
+        let angle = depths.1.atan2(depths.0) + 600.0 / 60.0 * 4.0 * TAU * PERIOD_S * f64::from(k);
+        let at = (depths.0.hypot(depths.1), angle);
+        // Eight states, each in five pieces: 40 intervals, as many as the richest pattern has.
+        for (gates, share) in zs9::pattern(at, at, 0.2) {
+            for _ in 0..5 {
+                plant.advance(gates, share * PERIOD_S / 5.0).unwrap();
+                intervals += 1;
+            }
+        }
+        plant.take_means();
+    }
+    let wall_s = began.elapsed().as_secs_f64();
+    println!(
+        "{:.1} times as fast as real time, {:.0} ns an interval",
+        simulated_s / wall_s,
+        wall_s / f64::from(intervals) * 1e9
+    );
+    // Only an optimised build is meant to be fast; and the rest of a scenario needs its time too.
+    assert!(cfg!(debug_assertions) || wall_s < 0.5 * simulated_s, "{wall_s} s for {simulated_s} s");
+}
+
+#[test]
+fn unevenness_of_the_network_rings_by_itself() {
+    // L dΔi/dt = Δv − r Δi, C dΔv/dt = −Δi, in shoot-through and outside.
+    let mut plant = plant_at([400.0; 2], &Zs9Settings::default());
+    plant.set_network(NetworkState { inductors_a: [3.0, 1.0], capacitors_v: [560.0, 500.0] });
+    let stored = plant.stored_j();
+    let decay = 0.5_f64 * 0.01 / 0.5e-3;
+    let omega = f64::sqrt(1.0 / (0.5e-3 * 500e-6) - decay * decay);
+    let mut worst = 0.0_f64;
+    for _ in 0..200 {
+        period(&mut plant, [(0.05, 0.1), (0.0, 0.15)], 0.2).unwrap();
+        let t = plant.time_s();
+        // Δv̇(0) = −Δi/C.
+        let (sin, cos) = (omega * t).sin_cos();
+        let expected = (-decay * t).exp() * (60.0 * cos + (60.0 * decay - 2.0 / 500e-6) / omega * sin);
+        let [v1, v2] = plant.network().capacitors_v;
+        worst = worst.max((v1 - v2 - expected).abs());
+    }
+    let residual = plant.residual_j(stored) / plant.energies().source_j;
+    println!("off by {worst:.1e} V, residual {residual:.1e}");
+    assert!(worst < 1e-3 && residual.abs() < 1e-6, "{worst} V, {residual}");
+}

@@ -97,6 +97,9 @@ impl Bridge {
 /// negative rail, current into it goes to the positive one; where the upper motor takes current, or the lower one gives it, the
 /// middle diode joins the two terminals and their sum decides. Around zero current each share goes over linearly, as
 /// [`Clamp`] has it. The link carries the shares times the currents, so no energy is lost.
+///
+/// The middle diodes put the motors in series: current flows where the EMFs of both together exceed the link, although neither
+/// does alone.
 pub fn freewheeling(clamp: &Clamp, upper_a: [f64; 3], lower_a: [f64; 3]) -> [Vector; 2] {
     let mut shares = [[0.0; 3]; 2];
     for leg in 0..3 {

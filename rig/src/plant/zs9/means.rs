@@ -1,5 +1,7 @@
 //! Mean values over a span, for traces.
 
+use super::Vector;
+
 /// Mean values over a span.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Means {
@@ -28,29 +30,48 @@ pub struct MotorMeans {
     pub torque_nm: f64,
 }
 
-/// A motor's part of [`Observed`].
-const OF_MOTOR: usize = 6;
-/// Values at an instant. Of each motor: three phase currents, d, q, speed; then inductor current and capacitor voltage.
-pub type Observed = [f64; 2 * OF_MOTOR + 2];
+/// A motor at an instant.
+#[derive(Clone, Copy, Debug)]
+pub struct Seen {
+    /// Current, in A.
+    pub vector: Vector,
+    /// Speed, in r/min.
+    pub speed_rpm: f64,
+}
 
-/// Adds up values between two reports: straight lines between a step's ends, the torque by its impulse.
+/// Adds up values between two reports.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Adder {
     span_s: f64,
-    sums: Observed,
+    /// d and q currents of both motors, both inductors' currents, both capacitors' voltages, times time.
+    areas: [f64; 8],
     impulses_nm_s: [f64; 2],
+    vectors: [Vector; 2],
+    speeds: [f64; 2],
 }
 
 impl Adder {
-    /// A step.
+    /// A step: its integrals of states and torques; phase currents and speeds go along straight lines.
     #[inline]
-    pub fn add(&mut self, dt_s: f64, before: &Observed, after: &Observed, impulses_nm_s: [f64; 2]) {
+    pub fn add(
+        &mut self,
+        dt_s: f64,
+        area: &[f64; 8],
+        impulses: [f64; 2],
+        before: &[Seen; 2],
+        after: &[Seen; 2],
+    ) {
         self.span_s += dt_s;
-        for ((sum, a), b) in self.sums.iter_mut().zip(before).zip(after) {
-            *sum += 0.5 * dt_s * (a + b);
+        for (sum, part) in self.areas.iter_mut().zip(area) {
+            *sum += part;
         }
-        for (sum, impulse) in self.impulses_nm_s.iter_mut().zip(impulses_nm_s) {
-            *sum += impulse;
+        let half_s = 0.5 * dt_s;
+        for k in 0..2 {
+            let (a, b) = (&before[k], &after[k]);
+            self.impulses_nm_s[k] += impulses[k];
+            self.vectors[k].alpha += half_s * (a.vector.alpha + b.vector.alpha);
+            self.vectors[k].beta += half_s * (a.vector.beta + b.vector.beta);
+            self.speeds[k] += half_s * (a.speed_rpm + b.speed_rpm);
         }
     }
 
@@ -59,18 +80,16 @@ impl Adder {
         if self.span_s <= 0.0 {
             return None;
         }
-        let mean = self.sums.map(|sum| sum / self.span_s);
-        let motor = |k: usize| {
-            let at = OF_MOTOR * k;
-            MotorMeans {
-                phases_a: [mean[at], mean[at + 1], mean[at + 2]],
-                id_a: mean[at + 3],
-                iq_a: mean[at + 4],
-                speed_rpm: mean[at + 5],
-                torque_nm: self.impulses_nm_s[k] / self.span_s,
-            }
+        let over_span = |sum: f64| sum / self.span_s;
+        let mean = self.areas.map(over_span);
+        let motor = |k: usize| MotorMeans {
+            phases_a: self.vectors[k].phases().map(over_span),
+            id_a: mean[2 * k],
+            iq_a: mean[2 * k + 1],
+            speed_rpm: over_span(self.speeds[k]),
+            torque_nm: over_span(self.impulses_nm_s[k]),
         };
-        let [inductor_a, capacitor_v] = [mean[2 * OF_MOTOR], mean[2 * OF_MOTOR + 1]];
+        let [inductor_a, capacitor_v] = [0.5 * (mean[4] + mean[5]), 0.5 * (mean[6] + mean[7])];
         let link_v = 2.0 * capacitor_v - source_v;
         Some(Means { motors: [motor(0), motor(1)], inductor_a, capacitor_v, link_v })
     }

@@ -31,7 +31,7 @@ use super::legs::Clamp;
 use super::{LONGEST_STEP_S, PlantSettings, SpeedSource};
 use bridge::Bridge;
 use core::f64::consts::TAU;
-use means::{Adder, Observed};
+use means::Adder;
 use tractive_tablegen::{MachineFolder, SmoothMap};
 
 /// What connects the source with the network.
@@ -201,32 +201,6 @@ impl Zs9Plant {
     /// Mean values since this was last called; `None` if no time has passed.
     pub fn take_means(&mut self) -> Option<Means> {
         std::mem::take(&mut self.means).means(self.source_v)
-    }
-
-    fn observed(&self) -> Observed {
-        let [upper, lower] = [0, 1].map(|k| {
-            let motor = &self.motors[k];
-            let [a, b, c] = Vector::from_rotor((motor.id_a, motor.iq_a), self.sin_cos[k]).phases();
-            [a, b, c, motor.id_a, motor.iq_a, motor.speed_rpm()]
-        });
-        let [a, b, c, d, q, n] = upper;
-        let [e, f, g, x, y, m] = lower;
-        [
-            a,
-            b,
-            c,
-            d,
-            q,
-            n,
-            e,
-            f,
-            g,
-            x,
-            y,
-            m,
-            self.network_state.inductor_a(),
-            self.network_state.capacitor_v(),
-        ]
     }
 
     /// Longest step while all gates are off, in s: short near a current at which a diode begins or ends to conduct.

@@ -1,6 +1,7 @@
 //! One Runge–Kutta step of network and motors together.
 
 use super::bridge::{Bridge, freewheeling};
+use super::means::Seen;
 use super::network::NetworkState;
 use super::{Vector, Zs9Plant};
 use crate::plant::{StatorSlopes, Turning};
@@ -37,6 +38,8 @@ pub struct Trial {
     dt_s: f64,
     state: State,
     sums: Sums,
+    /// The state's integral over the step.
+    area: State,
     end: [Frame; 2],
 }
 
@@ -65,18 +68,19 @@ impl Zs9Plant {
         let (k3, s3) = self.rates(&along(&y0, &k2, half), &f1, bridge, feed);
         let (k4, s4) = self.rates(&along(&y0, &k3, dt_s), &f2, bridge, feed);
         let mut state = y0;
-        let mut sums = [0.0; 8];
+        let (mut sums, mut area) = ([0.0; 8], [0.0; 8]);
         for k in 0..8 {
+            area[k] = dt_s * (y0[k] + dt_s / 6.0 * (k1[k] + k2[k] + k3[k]));
             state[k] += dt_s / 6.0 * (k1[k] + 2.0 * (k2[k] + k3[k]) + k4[k]);
             sums[k] = dt_s / 6.0 * (s1[k] + 2.0 * (s2[k] + s3[k]) + s4[k]);
         }
-        Trial { dt_s, state, sums, end: f2 }
+        Trial { dt_s, state, sums, area, end: f2 }
     }
 
     /// Takes the step.
     pub(super) fn take(&mut self, trial: &Trial) {
-        let Trial { dt_s, state, sums, .. } = *trial;
-        let before = self.observed();
+        let Trial { dt_s, state, sums, area, .. } = *trial;
+        let before = self.seen();
         for (k, motor) in self.motors.iter_mut().enumerate() {
             (motor.id_a, motor.iq_a) = (state[2 * k], state[2 * k + 1]);
             motor.energies.electrical_j += sums[3 * k];
@@ -89,8 +93,16 @@ impl Zs9Plant {
         self.energies.source_j += sums[6];
         self.energies.inductors_j += sums[7];
         self.time_s += dt_s;
-        let impulses = [sums[2], sums[5]];
-        self.means.add(dt_s, &before, &self.observed(), impulses);
+        self.means.add(dt_s, &area, [sums[2], sums[5]], &before, &self.seen());
+    }
+
+    /// What the means take from a step's ends.
+    fn seen(&self) -> [Seen; 2] {
+        [0, 1].map(|k| {
+            let motor = &self.motors[k];
+            let vector = Vector::from_rotor((motor.id_a, motor.iq_a), self.sin_cos[k]);
+            Seen { vector, speed_rpm: motor.rotor.speed_rpm() }
+        })
     }
 
     /// How far the inductors' current is above what the bridge's gates ask for, in A: the source gives it, or, below zero,
