@@ -141,4 +141,26 @@ mod tests {
         }
         assert_eq!(Bridge::of([L::SHOOT_THROUGH, L::ONE, L::ZERO], 0.0), Ok(Bridge::Short));
     }
+
+    #[test]
+    fn open_legs_follow_their_currents() {
+        let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../tables/ipm-zs9");
+        let machine = tractive_tablegen::MachineFolder::read(&folder).unwrap();
+        let clamp = Clamp::new(85.0, &tractive_tablegen::SmoothMap::new(&machine.map), 1.0);
+        // Currents out of a leg to the upper and to the lower motor; then whether the terminals are positive. With i > 0 to
+        // the upper motor or i < 0 to the lower one the middle diode joins them.
+        let legs = [
+            (10.0, 10.0, [0.0, 0.0]),
+            (-10.0, 10.0, [1.0, 0.0]),
+            (-10.0, -10.0, [1.0, 1.0]),
+            (10.0, -4.0, [0.0, 0.0]),
+            (4.0, -10.0, [1.0, 1.0]),
+        ];
+        for (upper, lower, terminals) in legs {
+            let shares = freewheeling(&clamp, [upper, 0.0, 0.0], [lower, 0.0, 0.0]);
+            // The other legs carry nothing and stand in the middle.
+            let expected = terminals.map(|share| Vector::clarke([share, 0.5, 0.5]));
+            assert_eq!(shares, expected, "{upper} {lower}");
+        }
+    }
 }
