@@ -286,8 +286,6 @@ fn unevenness_of_the_network_rings_by_itself() {
     println!("off by {worst:.1e} V, residual {residual:.1e}");
     assert!(worst < 1e-3 && residual.abs() < 1e-6, "{worst} V, {residual}");
 }
-<<<<<<< HEAD
-=======
 
 #[test]
 fn the_folder_weakens_the_field_where_the_inverter_runs_out_of_voltage() {
@@ -311,4 +309,3 @@ fn the_folder_weakens_the_field_where_the_inverter_runs_out_of_voltage() {
         assert!((six_step_v / available_v - 1.0).abs() < 1e-3, "{six_step_v} {available_v}");
     }
 }
->>>>>>> a6f800b102baf549bf61268e87bf99d983c30a5d

@@ -12,10 +12,6 @@ pub struct Demand {
     pub slew_limited: bool,
 }
 
-/// Rate at which patterns of few pulses can follow a step, as a share of the largest torque, in 1/s: the flux hexagon has to be
-/// turned against the rotor, and faster it would be thrown off its centre.
-const PATTERN_RATE: f32 = 20.0;
-
 #[derive(Clone, Copy, Debug)]
 pub struct Shaper {
     /// `None` until pulses are made.
@@ -48,12 +44,13 @@ impl Shaper {
             None if input.can_step => 0.0,
             None => input.flowing_nm,
         };
-        let step = |rate: f32| rate * input.period_s;
-        let toward = |step: f32| limit(wanted, last - step, last + step);
-        let shaped = match (input.demand.slew_limited, input.can_step) {
-            (true, _) => toward(step(ratings.torque_slew_nm_s)),
-            (false, false) => toward(step(PATTERN_RATE * ratings.max_torque_nm)),
-            (false, true) => wanted,
+        // A pattern of few pulses cannot follow a step: its flux hexagon has to be turned against the rotor, and faster it would be
+        // thrown off its centre.
+        let shaped = if input.demand.slew_limited || !input.can_step {
+            let step = ratings.torque_slew_nm_s * input.period_s;
+            limit(wanted, last - step, last + step)
+        } else {
+            wanted
         };
         let shaped = limit(shaped, -largest, largest);
         self.torque_nm = Some(shaped);

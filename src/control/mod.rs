@@ -12,6 +12,7 @@
 mod current_loop;
 mod demand;
 mod disturbance;
+mod flux_path;
 mod mtpa;
 mod reference;
 mod speed;
@@ -152,17 +153,12 @@ pub struct Controller {
     trim: torque_trim::TorqueTrim,
     /// DC-link voltage without its ripple, in V; `None` before the first step.
     link_v: Option<f32>,
-    /// Depth for the choice of mode; `None` before the first step.
-    depth: Option<f32>,
+    path: flux_path::FluxPath,
 }
 
 /// Bandwidth at which operating point and mode follow the DC link, in rad/s: a rectifier's ripple must neither shake the one nor
 /// toggle the other. What the modulator divides by is the link as it is.
 const LINK_RAD_S: f32 = 100.0;
-
-/// Bandwidth at which the mode follows the modulation depth that the torque needs, in rad/s: a reversal of torque passes
-/// through little depth too quickly to be worth two switches.
-const DEPTH_RAD_S: f32 = 30.0;
 
 impl Controller {
     /// At rest, with nothing known of the machine's angle.
@@ -173,7 +169,7 @@ impl Controller {
             disturbance: disturbance::Observer::new(),
             trim: torque_trim::TorqueTrim::new(),
             link_v: None,
-            depth: None,
+            path: flux_path::FluxPath::new(),
         }
     }
 
@@ -199,7 +195,7 @@ impl Controller {
         self.disturbance = disturbance::Observer::new();
         self.trim = torque_trim::TorqueTrim::new();
         self.link_v = None;
-        self.depth = None;
+        self.path = flux_path::FluxPath::new();
     }
 
     /// One control period: the voltage for the carrier half that begins at the horizon.
@@ -239,6 +235,8 @@ impl Controller {
             self.disturbance.step(boundary, angle, omega, gains, tables);
         }
         let disturbance = self.disturbance.voltage();
+        let target = flux_linkage(tables, point.current);
+        let reference = self.path.step(target, shaping.can_step, clock.control_s());
         let voltage = current_loop::step(
             &current_loop::Input {
                 angle: measured.angle,
@@ -246,6 +244,7 @@ impl Controller {
                 current,
                 flux,
                 current_reference: point.current,
+                reference,
                 omega,
                 committed,
                 disturbance,
@@ -253,14 +252,8 @@ impl Controller {
                 voltage_limit_v: committed.depth_limit * six_step_v(measured.udc_v),
             },
             gains,
-            tables,
         );
         let current_loop::Output { voltage, steady } = voltage;
-        let depth = match self.depth {
-            Some(before) => before + DEPTH_RAD_S * clock.control_s() * (point.depth - before),
-            None => point.depth,
-        };
-        self.depth = Some(depth);
         let regulates_by_pulses = committed.follows == Follows::Mean;
         let carrier = if regulates_by_pulses { steady } else { voltage };
         Output {
@@ -270,7 +263,7 @@ impl Controller {
                 carrier_angle: measured.angle + carrier.angle(),
                 steady_v: steady.length(),
                 omega,
-                depth,
+                depth: point.depth,
             },
             torque_nm: if limited { nearer_zero(point.torque_nm, torque_nm) } else { torque_nm },
             point,

@@ -24,7 +24,7 @@ const UNITS_PER_RADIAN: f32 = 4_294_967_296.0 / core::f32::consts::TAU;
 const STALE_PERIODS: i32 = 5;
 
 /// How fast the voltage glides from square wave to what the torque needs, in shares of six-step per second.
-const GLIDE_PER_S: f32 = 1.0;
+const GLIDE_PER_S: f32 = 12.0;
 
 /// Phase current, as a share of the largest, whose sign may change within a half.
 const SMALL_CURRENT_SHARE: f32 = 0.01;
