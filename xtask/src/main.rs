@@ -27,6 +27,7 @@ mod run;
 mod setup;
 mod test;
 mod thumb;
+mod timing;
 
 use std::process::ExitCode;
 
@@ -37,7 +38,7 @@ fn main() -> ExitCode {
         cli::Command::Run(args) => run::run(&args.words),
         cli::Command::Test(args) => test::run(&args),
         cli::Command::Image(args) => image::run(&args),
-        cli::Command::Timing(_) => Ok(not_available("timing")),
+        cli::Command::Timing(args) => timing::run(&args),
         cli::Command::Flash(_) => Ok(not_available("flash")),
     };
     match result {
