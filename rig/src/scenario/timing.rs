@@ -17,6 +17,8 @@ const SPEEDS_RPM: [f64; 6] = [150.0, 750.0, 1000.0, 1450.0, 1800.0, 2200.0];
 /// From one speed to the next, and at each, in s.
 const RAMP_S: f64 = 0.03;
 const HOLD_S: f64 = 0.03;
+/// What is left of the run behind the fault, in s.
+const AFTER_FAULT_S: f64 = 0.002;
 const LEAD_S: f64 = 0.01;
 
 impl Scenario for Timing {
@@ -46,7 +48,12 @@ impl Scenario for Timing {
                 true,
             )
         };
-        Plan { lead_s: LEAD_S, duration_s: t_s.min(fault_s + RAMP_S), speed, operator: Box::new(operator) }
+        Plan {
+            lead_s: LEAD_S,
+            duration_s: t_s.min(fault_s + AFTER_FAULT_S),
+            speed,
+            operator: Box::new(operator),
+        }
     }
 
     fn figures(&self, recording: &Recording, _options: &RunOptions, _machine: &Machine) -> Figures {

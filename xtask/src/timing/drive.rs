@@ -8,7 +8,8 @@ use std::process::{Command, Stdio};
 use anyhow::{Context, Result, bail};
 
 use super::log::{ARGUMENTS, event};
-use super::meter::{Call, Hits, Meter};
+use super::meter::{Call, Meter};
+use super::tally::Tally;
 use crate::elf::Image;
 use crate::process;
 
@@ -29,7 +30,8 @@ pub struct Bench {
 #[derive(Debug, Default)]
 pub struct Drive {
     pub calls: Vec<Call>,
-    pub hits: Hits,
+    pub hits: Tally,
+    pub behind: Tally,
     pub stack_bytes: i32,
     /// Interrupt, mode and stator frequency, in the order in which the rig served them.
     pub modes: Vec<(String, String, f64)>,
@@ -90,8 +92,8 @@ impl Bench {
             line.clear();
         }
         outcome?;
-        let Meter { calls, hits, stack_bytes, .. } = meter;
-        Ok(Drive { calls, hits, stack_bytes, modes: Vec::new() })
+        let Meter { calls, hits, behind, stack_bytes, .. } = meter;
+        Ok(Drive { calls, hits, behind, stack_bytes, modes: Vec::new() })
     }
 }
 

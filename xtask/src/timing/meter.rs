@@ -6,6 +6,7 @@ use anyhow::{Result, bail};
 
 use super::cost::{self, ENTRY_AND_RETURN, EXCEPTION_FRAME, REFILL};
 use super::log::Event;
+use super::tally::Tally;
 use crate::elf::Image;
 use crate::thumb::{Flow, decode};
 
@@ -24,9 +25,6 @@ pub struct Call {
     pub depth: usize,
 }
 
-/// How often each address was executed in each exception's handler.
-pub type Hits = HashMap<(u32, u32), u64>;
-
 /// Follows the log.
 pub struct Meter<'a> {
     image: &'a Image,
@@ -39,8 +37,10 @@ pub struct Meter<'a> {
     known: HashMap<u32, Instruction>,
     /// Every interrupt that has returned, in the order of their returns.
     pub calls: Vec<Call>,
-    /// Where the instructions went.
-    pub hits: Hits,
+    /// How often each address was executed.
+    pub hits: Tally,
+    /// What was executed behind each call, by its return address.
+    pub behind: Tally,
     /// Bytes of stack below the idle loop's, at most.
     pub stack_bytes: i32,
 }
@@ -77,7 +77,8 @@ impl<'a> Meter<'a> {
             announced: None,
             known: HashMap::new(),
             calls: Vec::new(),
-            hits: Hits::new(),
+            hits: Tally::default(),
+            behind: Tally::default(),
             stack_bytes: 0,
         }
     }
@@ -145,7 +146,10 @@ impl<'a> Meter<'a> {
         handler.call.cycles += instruction.cycles;
         handler.stack -= instruction.stack_move;
         self.stack_bytes = self.stack_bytes.max(handler.stack);
-        *self.hits.entry((handler.call.exception, address)).or_default() += 1;
+        self.hits.add(handler.call.exception, address);
+        for (back, _) in &handler.within {
+            self.behind.add(handler.call.exception, *back);
+        }
         for waited in self.pending.values_mut() {
             *waited += 1;
         }
@@ -195,7 +199,7 @@ mod tests {
     }
 
     /// Feeds lines as the emulator writes them, shortened to what differs.
-    fn measure(log: &str) -> Result<(Vec<Call>, Hits, i32)> {
+    fn measure(log: &str) -> Result<(Vec<Call>, Tally, i32)> {
         let image = image();
         let link = BTreeSet::from([0x120]);
         let mut meter = Meter::new(&image, &link);
@@ -218,8 +222,8 @@ mod tests {
         let (calls, hits, stack) = measure("p24 e24 100 102 110 106 120 10a r24").unwrap();
         assert_eq!((calls.len(), calls[0].exception, calls[0].instructions), (1, 24, 5));
         assert_eq!((calls[0].latency, calls[0].depth), (0, 1));
-        assert_eq!(hits[&(24, 0x110)], 1);
-        assert!(!hits.contains_key(&(24, 0x120)));
+        let executed: Vec<_> = hits.of(24).map(|(address, _)| address).collect();
+        assert_eq!(executed, [0x100, 0x102, 0x106, 0x10A, 0x110]);
         assert_eq!(stack, EXCEPTION_FRAME + 8);
         // push 3, bl 1, bx 1, bl 1, pop 3; refills after bl, bx, bl, the link's return.
         assert_eq!(calls[0].cycles, ENTRY_AND_RETURN + 9 + 4 * REFILL);

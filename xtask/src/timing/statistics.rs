@@ -10,13 +10,17 @@ use super::meter::Call;
 /// The interrupts by the numbers of their exceptions on the emulated board: sixteen more than the interrupt's.
 pub const INTERRUPTS: [(&str, u32); 2] = [("control", 16 + 8), ("pwm", 16 + 10)];
 
+const CONTROL_HZ: f64 = 10_000.0;
+/// The STM32G474's clock.
+const PROCESSOR_HZ: f64 = 170e6;
+
 /// Smallest, mean and largest of something.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Spread {
     pub min: u32,
     pub max: u32,
-    sum: u64,
-    count: u64,
+    pub sum: u64,
+    pub count: u64,
 }
 
 impl Default for Spread {
@@ -45,6 +49,14 @@ pub struct Row {
     pub cycles: Spread,
     pub latency: Spread,
     pub depth: usize,
+}
+
+/// Share of the processor, in percent.
+#[derive(Clone, Copy, Debug)]
+pub struct Load {
+    pub mean: f64,
+    /// If every interrupt took as long as the longest one.
+    pub max: f64,
 }
 
 /// By mode and interrupt.
@@ -78,11 +90,38 @@ impl Statistics {
         Ok(())
     }
 
+    /// One interrupt in one mode, if it was seen there.
+    pub fn row(&self, mode: &str, interrupt: &str) -> Option<&Row> {
+        self.rows.get(&(mode.to_owned(), interrupt.to_owned()))
+    }
+
+    /// Share of the processor that both interrupts take in a mode.
+    pub fn load(&self, mode: &str) -> Option<Load> {
+        let (control, pwm) = (self.row(mode, "control")?, self.row(mode, "pwm")?);
+        let pwm_hertz = CONTROL_HZ * pwm.cycles.count as f64 / control.cycles.count as f64;
+        let percent =
+            |control: f64, pwm: f64| 100.0 * (control * CONTROL_HZ + pwm * pwm_hertz) / PROCESSOR_HZ;
+        Some(Load {
+            mean: percent(control.cycles.mean(), pwm.cycles.mean()),
+            max: percent(control.cycles.max.into(), pwm.cycles.max.into()),
+        })
+    }
+
+    /// The dearest mode's largest load, in percent.
+    pub fn worst_load(&self) -> f64 {
+        let modes = self.rows.keys().map(|(mode, _)| mode).filter(|mode| *mode != "off");
+        modes.filter_map(|mode| self.load(mode)).map(|load| load.max).fold(0.0, f64::max)
+    }
+
+    /// Over everything that was counted; entries and returns are among the cycles.
+    pub fn cycles_per_instruction(&self) -> f64 {
+        let sum = |of: fn(&Row) -> &Spread| self.rows.values().map(|row| of(row).sum).sum::<u64>() as f64;
+        sum(|row| &row.cycles) / sum(|row| &row.instructions).max(1.0)
+    }
+
     /// The rows of one interrupt over all modes in which pulses are made.
-    pub fn of<'a>(&'a self, interrupt: &'a str) -> impl Iterator<Item = (&'a str, &'a Row)> {
-        self.rows
-            .iter()
-            .filter(move |((mode, name), _)| name == interrupt && mode != "off")
-            .map(|((mode, _), row)| (mode.as_str(), row))
+    pub fn of<'a>(&'a self, interrupt: &'a str) -> impl Iterator<Item = &'a Row> {
+        let pulsing = self.rows.iter().filter(move |((mode, name), _)| name == interrupt && mode != "off");
+        pulsing.map(|(_, row)| row)
     }
 }
