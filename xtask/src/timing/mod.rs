@@ -6,8 +6,9 @@
 //! the rig knows its mode. All of it is deterministic: two runs give the same numbers.
 //!
 //! [`drive`] runs the rig, [`log`] reads a line, [`meter`] assigns instructions to interrupts, [`cost`] prices them,
-//! [`statistics`] and [`tally`] sum them up, [`profile`] says whose they are, [`budget`] judges, [`report`] tells.
+//! [`statistics`] and [`tally`] sum them up, [`blocks`] counts building blocks by themselves, [`profile`] says whose they are, [`budget`] judges, [`report`] tells.
 
+mod blocks;
 mod budget;
 mod cost;
 mod drive;
@@ -24,6 +25,7 @@ use crate::cli::TimingArgs;
 use crate::elf::Sizes;
 use crate::setup::Setup;
 use crate::{build, image};
+use blocks::Block;
 use drive::{Bench, Drive};
 use profile::Profile;
 use report::Report;
@@ -44,7 +46,9 @@ const CONTROL_S: f64 = 1e-4;
 pub fn run(args: &TimingArgs) -> Result<u8> {
     let mut setup = Setup::default();
     let qemu = setup.qemu()?;
-    let path = build::image(&setup.toolchain()?, None)?;
+    let toolchain = setup.toolchain()?;
+    let path = build::image(&toolchain, None)?;
+    let blocks = blocks::measure(&toolchain, &qemu)?;
     let bench = Bench { rig: build::rig()?, qemu, image: image::read(&path)?, path };
     let mut sum = Sum::default();
     let mut switch_s = None;
@@ -63,8 +67,8 @@ pub fn run(args: &TimingArgs) -> Result<u8> {
     let statistics = &sum.statistics;
     let budgets = build::root().join("budgets.toml");
     let text = std::fs::read_to_string(&budgets).with_context(|| budgets.display().to_string())?;
-    let judged = budget::judge(&text, &values(statistics, &bench.image.sizes))?;
-    let report = Report { statistics, sizes: &bench.image.sizes, judged: &judged };
+    let judged = budget::judge(&text, &values(statistics, &blocks, &bench.image.sizes))?;
+    let report = Report { statistics, blocks: &blocks, sizes: &bench.image.sizes, judged: &judged };
     if args.json {
         println!("{}", report.json());
     } else {
@@ -124,7 +128,7 @@ fn first_switch_s(drive: &Drive) -> Option<f64> {
 }
 
 /// What has a budget.
-fn values(statistics: &Statistics, sizes: &Sizes) -> Vec<(&'static str, f64)> {
+fn values(statistics: &Statistics, blocks: &[Block], sizes: &Sizes) -> Vec<(&'static str, f64)> {
     let worst = |interrupt: &str, of: fn(&statistics::Row) -> f64| {
         statistics.of(interrupt).map(of).fold(0.0, f64::max)
     };
@@ -136,6 +140,7 @@ fn values(statistics: &Statistics, sizes: &Sizes) -> Vec<(&'static str, f64)> {
         ("pmasynrm.pwm-latency-max", worst("pwm", |row| row.latency.max.into())),
         ("pmasynrm.load-percent", statistics.worst_load()),
         ("pmasynrm.stack-bytes", statistics.stack_bytes.into()),
+        ("pmasynrm.core-tick", report::core_tick(blocks).map_or(f64::NAN, f64::from)),
         ("image.code-bytes", sizes.code as f64),
         ("image.table-bytes", sizes.tables as f64),
         ("image.ram-bytes", sizes.ram as f64),

@@ -2,6 +2,7 @@
 
 use serde_json::{Value, json};
 
+use super::blocks::Block;
 use super::budget::Judged;
 use super::statistics::{Row, Statistics};
 use crate::elf::Sizes;
@@ -13,8 +14,14 @@ const INTERRUPTS: [&str; 2] = ["control", "pwm"];
 /// What was measured and judged.
 pub struct Report<'a> {
     pub statistics: &'a Statistics,
+    pub blocks: &'a [Block],
     pub sizes: &'a Sizes,
     pub judged: &'a [Judged],
+}
+
+/// Instructions of our own core tick.
+pub fn core_tick(blocks: &[Block]) -> Option<u32> {
+    blocks.iter().find(|block| block.name == "core_tick/tractive").map(|block| block.max)
 }
 
 impl Report<'_> {
@@ -44,6 +51,15 @@ impl Report<'_> {
                 Some(json!({ "system": "pmasynrm", "mode": mode, "mean_percent": load.mean, "max_percent": load.max }))
             })
             .collect();
+        let blocks: Vec<Value> = self
+            .blocks
+            .iter()
+            .map(|block| {
+                json!({
+                    "name": block.name, "instructions": block.max, "mean": block.mean, "max_error": block.max_error,
+                })
+            })
+            .collect();
         let budgets: Vec<Value> = self
             .judged
             .iter()
@@ -59,6 +75,8 @@ impl Report<'_> {
             "load_at_170_mhz": load,
             "cycles_per_instruction": self.statistics.cycles_per_instruction(),
             "max_stator_frequency_hz": self.statistics.hertz,
+            "core_tick": { "instructions": core_tick(self.blocks) },
+            "blocks": blocks,
             "image": {
                 "code_bytes": self.sizes.code, "table_bytes": self.sizes.tables, "ram_bytes": self.sizes.ram,
                 "stack_bytes": self.statistics.stack_bytes, "stack_left_bytes": self.sizes.stack,
@@ -100,6 +118,11 @@ impl Report<'_> {
             if let Some(load) = self.statistics.load(mode) {
                 text += &format!("{mode:<8} {:>10.1} % {:>10.1} %\n", load.mean, load.max);
             }
+        }
+        text += &format!("\n{:<24} {:>6} {:>8} {:>10}\n", "block", "max", "mean", "error");
+        for block in self.blocks {
+            let error = block.max_error.map_or_else(String::new, |error| format!("{error:.1e}"));
+            text += &format!("{:<24} {:>6} {:>8.1} {error:>10}\n", block.name, block.max, block.mean);
         }
         text += &format!("\n{:<30} {:>9} {:>9} {:>9}\n", "budget", "value", "target", "ceiling");
         for judged in self.judged {
@@ -143,7 +166,9 @@ mod tests {
         let statistics = statistics();
         let sizes = Sizes { code: 1, tables: 2, rodata: 3, ram: 4, stack: 5 };
         let judged = judge("[a]\nb = { target = 1 }", &[("a.b", 2.0)]).unwrap();
-        let report = Report { statistics: &statistics, sizes: &sizes, judged: &judged };
+        let block =
+            Block { name: "core_tick/tractive".to_owned(), max: 120, mean: 110.0, max_error: Some(1e-7) };
+        let report = Report { statistics: &statistics, blocks: &[block], sizes: &sizes, judged: &judged };
         let json = report.json();
         let row = &json["interrupts"][0];
         assert_eq!(
@@ -152,6 +177,9 @@ mod tests {
         );
         assert_eq!((&row["min"], &row["mean"], &row["max"]), (&json!(10), &json!(15.0), &json!(20)));
         assert_eq!(json["interrupts"][1]["name"], "pwm");
+        assert_eq!(json["core_tick"]["instructions"], 120);
+        let block = &json["blocks"][0];
+        assert_eq!((&block["instructions"], &block["max_error"]), (&json!(120), &json!(1e-7)));
         let image = &json["image"];
         assert_eq!([&image["code_bytes"], &image["table_bytes"], &image["ram_bytes"]], [1, 2, 4]);
         assert_eq!(image["stack_bytes"], 640);
