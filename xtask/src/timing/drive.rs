@@ -1,9 +1,10 @@
 //! Drives the image in the emulator and follows its log while it runs.
 
 use std::fs::{File, OpenOptions};
-use std::io::{BufRead, BufReader, Write};
+use std::io::{BufRead, BufReader, Read, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
+use std::time::Duration;
 
 use anyhow::{Context, Result, bail};
 
@@ -80,7 +81,7 @@ impl Bench {
         let link = self.image.functions.iter();
         let link = link.filter(|(_, function)| is_link(&function.names)).map(|(start, _)| *start).collect();
         let mut meter = Meter::new(&self.image, &link);
-        let mut log = BufReader::with_capacity(1 << 20, log);
+        let mut log = BufReader::with_capacity(1 << 20, Unhurried(log));
         let (mut line, mut outcome) = (Vec::new(), Ok(()));
         while log.read_until(b'\n', &mut line)? > 0 {
             if line.starts_with(END) {
@@ -94,6 +95,16 @@ impl Bench {
         outcome?;
         let Meter { calls, hits, behind, stack_bytes, .. } = meter;
         Ok(Drive { calls, hits, behind, stack_bytes, modes: Vec::new() })
+    }
+}
+
+/// Lets the emulator write for a while before it reads: otherwise each of them wakes the other for every line.
+struct Unhurried(File);
+
+impl Read for Unhurried {
+    fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
+        std::thread::sleep(Duration::from_millis(2));
+        self.0.read(buffer)
     }
 }
 
@@ -116,6 +127,8 @@ fn fifo(path: &Path) -> Result<(File, File)> {
     mknodat(CWD, path, FileType::Fifo, Mode::RUSR | Mode::WUSR, 0)
         .with_context(|| format!("cannot make the FIFO {}", path.display()))?;
     let both = OpenOptions::new().read(true).write(true).open(path)?;
+    // As much as the system allows without privileges; a smaller one only takes longer.
+    let _ = rustix::pipe::fcntl_setpipe_size(&both, 1 << 20);
     let writer = both.try_clone()?;
     Ok((both, writer))
 }
