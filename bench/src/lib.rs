@@ -60,3 +60,45 @@ pub fn input(n: u32) -> Input {
         positive: 1000.0 * share * share,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Largest absolute error over all inputs.
+    fn error(name: &str) -> f64 {
+        let block = blocks::ALL.into_iter().find(|block| block.name == name).unwrap();
+        let exact = block.exact.unwrap();
+        let errors = (0..INPUTS).map(input).flat_map(|input| {
+            let mut output = [0.0; 2];
+            (block.run)(&input, &mut output);
+            let exact = exact(&input);
+            (0..2).map(move |k| (f64::from(output[k]) - exact[k]).abs())
+        });
+        errors.fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn our_blocks_are_as_exact_as_they_say() {
+        assert!(error("sin_cos/tractive") < 1.5e-7);
+        assert!(error("atan2/tractive") < 1e-6);
+        // Half a unit in the last place of 31.6.
+        assert!(error("sqrt/tractive") < 1e-6);
+        assert!(error("lookup_2d/tractive") < 1e-6);
+    }
+
+    #[test]
+    fn the_others_get_what_they_expect() {
+        for block in blocks::ALL.into_iter().filter(|block| block.exact.is_some()) {
+            let bound = if block.name.starts_with("sqrt") { 2.0 } else { 5e-3 };
+            assert!(error(block.name) < bound, "{}", block.name);
+        }
+    }
+
+    #[test]
+    fn no_two_blocks_share_a_name() {
+        for (k, block) in blocks::ALL.iter().enumerate() {
+            assert!(blocks::ALL.iter().skip(k + 1).all(|other| other.name != block.name));
+        }
+    }
+}
