@@ -144,6 +144,9 @@ pub struct RunOptions {
     /// timing: the demand is not finite from this time on, in s.
     #[arg(long, value_parser = not_negative, hide = true)]
     pub fault_at: Option<f64>,
+    /// timing: control is told the same currents again and again from this time on, in s.
+    #[arg(long, value_parser = not_negative, hide = true)]
+    pub freeze_at: Option<f64>,
     /// sweep: add the way back.
     #[arg(long)]
     pub down: bool,
@@ -167,6 +170,7 @@ impl RunOptions {
             noise_a: self.noise_a,
             udc_ripple: self.udc_ripple.map(|ripple| (ripple.amplitude_v, ripple.frequency_hz)),
             angle_error_deg: self.angle_error,
+            freeze_at_s: self.freeze_at,
             seed: self.seed,
         }
     }

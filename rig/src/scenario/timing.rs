@@ -18,7 +18,7 @@ const SPEEDS_RPM: [f64; 6] = [150.0, 750.0, 1000.0, 1450.0, 1800.0, 2200.0];
 const RAMP_S: f64 = 0.03;
 const HOLD_S: f64 = 0.03;
 /// What is left of the run behind the fault, in s.
-const AFTER_FAULT_S: f64 = 0.002;
+const AFTER_FAULT_S: f64 = 0.005;
 const LEAD_S: f64 = 0.01;
 
 impl Scenario for Timing {
@@ -48,12 +48,9 @@ impl Scenario for Timing {
                 true,
             )
         };
-        Plan {
-            lead_s: LEAD_S,
-            duration_s: t_s.min(fault_s + AFTER_FAULT_S),
-            speed,
-            operator: Box::new(operator),
-        }
+        let freeze_s = options.freeze_at.unwrap_or(f64::INFINITY);
+        let duration_s = t_s.min(fault_s.min(freeze_s) + AFTER_FAULT_S);
+        Plan { lead_s: LEAD_S, duration_s, speed, operator: Box::new(operator) }
     }
 
     fn figures(&self, recording: &Recording, _options: &RunOptions, _machine: &Machine) -> Figures {

@@ -36,11 +36,14 @@ use tally::Tally;
 const DRIVES: [&str; 2] = ["--to=6000", "--to=-6000 --brake"];
 /// Then short ones: the PWM timer starts this much later against the control timer, in µs. Halves of the asynchronous
 /// carrier last five control periods and five ninths, so they meet nine phases, 11 µs apart; these fall between.
+/// A demand that is no number ends them.
 const PHASES_US: [f64; 3] = [3.0, 6.0, 9.0];
 const SHORT_S: f64 = 0.02;
 /// From the run's beginning to the scenario's, in control periods.
 const LEAD_PERIODS: usize = 100;
 const CONTROL_S: f64 = 1e-4;
+/// From the first frozen sample to the fault, in control periods.
+const FROZEN_PERIODS: f64 = 19.0;
 
 /// The command.
 pub fn run(args: &TimingArgs) -> Result<u8> {
@@ -60,9 +63,11 @@ pub fn run(args: &TimingArgs) -> Result<u8> {
     for phase_us in PHASES_US {
         sum.add(&bench, &format!("--to=6000 --pwm-delay-us={phase_us} --fault-at={SHORT_S}"))?;
     }
-    // A switch of mode, a fault and full torque at the limit of the current, all in one tick.
+    // A switch of mode, a fault and full torque at the limit of the current, all in one tick. Frozen currents are found
+    // after a number of periods, and of all faults they cost the most: the whole control law is executed besides.
     let switch_s = switch_s.context("the drive never switched its mode")?;
-    sum.add(&bench, &format!("--to=6000 --fault-at={switch_s}"))?;
+    let freeze_s = switch_s - FROZEN_PERIODS * CONTROL_S;
+    sum.add(&bench, &format!("--to=6000 --freeze-at={freeze_s:.6}"))?;
 
     let statistics = &sum.statistics;
     let budgets = build::root().join("budgets.toml");
