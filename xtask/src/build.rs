@@ -40,6 +40,14 @@ pub fn image(toolchain: &Toolchain, machine: Option<&OsString>) -> Result<PathBu
     executable(&mut command, "tractive", machine.is_some()).context("the image was not built")
 }
 
+/// Builds the image of the building blocks.
+pub fn bench(toolchain: &Toolchain) -> Result<PathBuf> {
+    let name = "tractive-bench";
+    let args = ["build", "--profile", "firmware", "--target", TARGET, "--package", name, "--bin", name];
+    executable(toolchain.cargo(&args).env_remove("TRACTIVE_MACHINE"), name, false)
+        .context("the bench was not built")
+}
+
 /// Builds the rig's program.
 pub fn rig() -> Result<PathBuf> {
     let mut command = cargo();

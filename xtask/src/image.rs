@@ -36,7 +36,8 @@ pub fn check(path: &Path) -> Result<bool> {
     Ok(findings.is_empty())
 }
 
-fn read(path: &Path) -> Result<Image> {
+/// Reads an image.
+pub fn read(path: &Path) -> Result<Image> {
     let bytes = std::fs::read(path).with_context(|| path.display().to_string())?;
     Image::parse(&bytes).with_context(|| path.display().to_string())
 }

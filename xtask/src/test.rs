@@ -7,7 +7,7 @@ use anyhow::Result;
 use clap::ValueEnum;
 
 use crate::build::{TARGET, cargo};
-use crate::cli::TestArgs;
+use crate::cli::{TestArgs, TimingArgs};
 use crate::process::succeeds;
 use crate::setup::Setup;
 use crate::{build, image};
@@ -35,6 +35,8 @@ pub enum Step {
     Machines,
     /// The image in QEMU
     Qemu,
+    /// The interrupts within their budgets
+    Timing,
 }
 
 /// How a step ended.
@@ -133,6 +135,7 @@ fn perform(step: Step, setup: &mut Setup) -> Result<Outcome> {
             ]);
             succeeds(&mut command)?
         }
+        Step::Timing => crate::timing::run(&TimingArgs::default())? == 0,
     };
     Ok(good.into())
 }

@@ -20,6 +20,8 @@ pub struct Flaws {
     pub udc_ripple: Option<(f64, f64)>,
     /// Constant error of the angle sensor, electrical, in degrees.
     pub angle_error_deg: f64,
+    /// From this time on control is told the same currents again and again, in s.
+    pub freeze_at_s: Option<f64>,
     /// Seed of the noise.
     pub seed: u64,
 }
@@ -30,12 +32,14 @@ pub struct Sensors {
     link_steps: Vec<(f64, f64)>,
     flaws: Flaws,
     random: StdRng,
+    /// What control was told last.
+    told_a: Abc,
 }
 
 impl Sensors {
     /// Sensors on a link of this voltage, which changes at these times (in s) to these values.
     pub fn new(udc_v: f64, link_steps: Vec<(f64, f64)>, flaws: Flaws) -> Self {
-        Self { udc_v, link_steps, flaws, random: StdRng::seed_from_u64(flaws.seed) }
+        Self { udc_v, link_steps, flaws, random: StdRng::seed_from_u64(flaws.seed), told_a: Abc::default() }
     }
 
     /// The link's true voltage, in V.
@@ -57,8 +61,11 @@ impl Sensors {
     /// All that control measures.
     pub fn measure(&mut self, plant: &Plant, t_s: f64) -> Measurements {
         let turns = plant.angle_turns() + self.flaws.angle_error_deg / 360.0;
+        if self.flaws.freeze_at_s.is_none_or(|freeze_s| t_s < freeze_s) {
+            self.told_a = self.currents(plant);
+        }
         Measurements {
-            currents_a: self.currents(plant),
+            currents_a: self.told_a,
             udc_v: self.udc_v(t_s) as f32,
             angle: Angle((turns.rem_euclid(1.0) * 4_294_967_296.0).round() as u64 as u32),
         }

@@ -11,7 +11,9 @@ use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
+use tractive::drive::Report;
 use tractive::link::{self, BLOCK_BYTES, BLOCK_WORDS, Block, Request, Setup};
+use tractive::modulation::Mode;
 
 /// Which emulator runs which image.
 #[derive(Clone, Debug)]
@@ -20,6 +22,10 @@ pub struct Emulator {
     pub program: PathBuf,
     /// The firmware's ELF file.
     pub image: PathBuf,
+    /// Further arguments.
+    pub arguments: Vec<String>,
+    /// Where the mode of every interrupt is written, a line `control,MODE` or `pwm,MODE` each.
+    pub calls: Option<PathBuf>,
 }
 
 /// Two to this many nanoseconds of virtual time per instruction: 8 ns, 125 MIPS, nearest to the real part.
@@ -34,9 +40,13 @@ pub fn run_in_qemu(name: &str, mut bench: Bench, setup: Setup, emulator: &Emulat
     let folder = tempfile::tempdir().context("no temporary folder for the link")?;
     let mut link = Link::open(folder.path())?;
     let watch = Watch::start(spawn(emulator, folder.path())?, link.requests_writer()?);
+    let mut calls = Calls::default();
     let mut progress = Progress::new(name);
-    let outcome = serve(&mut link, &mut bench, setup, &watch.blocks, &mut progress);
+    let outcome = serve(&mut link, &mut bench, setup, &watch.blocks, &mut calls, &mut progress);
     let log = watch.finish(outcome.is_ok());
+    if let Some(path) = &emulator.calls {
+        std::fs::write(path, &calls.lines).with_context(|| path.display().to_string())?;
+    }
     outcome.with_context(|| if log.is_empty() { "QEMU".to_owned() } else { format!("QEMU said: {log}") })?;
     Ok(super::record(bench))
 }
@@ -46,6 +56,7 @@ fn serve(
     bench: &mut Bench,
     setup: Setup,
     blocks: &AtomicU64,
+    calls: &mut Calls,
     progress: &mut Progress,
 ) -> Result<()> {
     loop {
@@ -67,16 +78,43 @@ fn serve(
                     return Ok(());
                 }
             }
-            Request::ControlReport(at, report) => bench.control_report(at, report),
+            Request::ControlReport(at, report) => {
+                calls.control(&report);
+                bench.control_report(at, report);
+            }
             Request::PwmSample(at) => {
                 let currents = bench.pwm_sample(at)?;
                 link.pwm.write_all(&bytes(&link::currents_to_block(currents)))?;
             }
-            Request::Play(at, half) => bench.play(at, half),
+            Request::Play(at, half) => {
+                calls.pwm(half.mode);
+                bench.play(at, half);
+            }
             Request::Enter(at, safe) => bench.enter(at, safe),
             Request::Dead => bail!("the firmware stopped in a panic or a HardFault, gates off"),
         }
         progress.show(bench);
+    }
+}
+
+/// What every interrupt was about, in the order in which they ended.
+#[derive(Default)]
+struct Calls {
+    /// Of the newest half.
+    mode: Mode,
+    lines: String,
+}
+
+impl Calls {
+    /// A control interrupt: the mode that it works for, and the stator frequency.
+    fn control(&mut self, report: &Report) {
+        self.lines += &format!("control,{},{}\n", self.mode.name(), report.frequency_hz);
+    }
+
+    /// A PWM interrupt, which made a half of this mode.
+    fn pwm(&mut self, mode: Mode) {
+        self.mode = mode;
+        self.lines += &format!("pwm,{},\n", mode.name());
     }
 }
 
@@ -135,6 +173,7 @@ fn spawn(emulator: &Emulator, folder: &Path) -> Result<Child> {
         .args(["-icount", &format!("shift={NANOSECONDS_SHIFT},align=off,sleep=off")])
         .args(["-semihosting-config", "enable=on,target=native", "-kernel"])
         .arg(image)
+        .args(&emulator.arguments)
         .current_dir(folder)
         .stdin(Stdio::null())
         .stdout(Stdio::null())

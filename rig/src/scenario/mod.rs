@@ -9,6 +9,7 @@ mod reversal;
 mod script;
 mod steady;
 mod sweep;
+mod timing;
 
 use crate::analysis::Figures;
 use crate::bench::{self, Bench, Operator};
@@ -24,11 +25,13 @@ use tractive::drive::traction::Settings;
 use tractive::link::Setup;
 use tractive::modulation::Devices;
 
-/// Time in which the drive settles before the recording begins, in s.
+/// The usual lead, in s.
 const LEAD_S: f64 = 0.1;
 
 /// A scenario's inputs.
 pub struct Plan {
+    /// Time in which the drive settles before the recording begins, in s.
+    pub lead_s: f64,
     /// Length of the recording, in s.
     pub duration_s: f64,
     /// Prescribed speed: (time in s, r/min), straight lines between; before the first the first.
@@ -64,6 +67,7 @@ pub fn all() -> Vec<Box<dyn Scenario>> {
         Box::new(reversal::Reversal),
         Box::new(restart::Restart),
         Box::new(link_steps::LinkSteps),
+        Box::new(timing::Timing),
     ]
 }
 
@@ -80,8 +84,11 @@ pub fn find(name: &str) -> Result<Box<dyn Scenario>> {
 pub fn drive(scenario: &dyn Scenario, options: &RunOptions, machine: &Machine) -> Result<Recording> {
     let plan = scenario.plan(options, machine);
     let ticks = |microseconds: f64| (microseconds * 1e-6 * f64::from(CLOCK.ticks_per_s)).round() as u32;
-    let setup =
-        Setup { min_pulse_ticks: ticks(options.min_pulse_us), dead_time_ticks: ticks(options.dead_time_us) };
+    let setup = Setup {
+        min_pulse_ticks: ticks(options.min_pulse_us),
+        dead_time_ticks: ticks(options.dead_time_us),
+        pwm_delay_ticks: ticks(options.pwm_delay_us),
+    };
     let devices = Devices::new(
         setup.min_pulse_ticks,
         setup.dead_time_ticks,
@@ -90,14 +97,15 @@ pub fn drive(scenario: &dyn Scenario, options: &RunOptions, machine: &Machine) -
     );
     let parameters = &machine.folder.parameters;
     let plant = plant(&plan, options, machine);
+    let first_half_ticks = devices.shortest_half_ticks + setup.pwm_delay_ticks;
     let bench = Bench::new(
         plant,
         plan.operator,
         &bench::Settings {
             clock: CLOCK,
-            first_half_ticks: devices.shortest_half_ticks,
+            first_half_ticks,
             dead_time_ticks: setup.dead_time_ticks,
-            lead_s: LEAD_S,
+            lead_s: plan.lead_s,
             duration_s: plan.duration_s,
             trace_step_s: options.dt,
             udc_v: options.udc.unwrap_or(parameters.dc_link_nominal_v),
@@ -108,7 +116,7 @@ pub fn drive(scenario: &dyn Scenario, options: &RunOptions, machine: &Machine) -
     match options.on {
         On::Host => {
             let settings = Settings { clock: CLOCK, devices, gains: Gains::DEFAULT };
-            Ok(run::run_on_host(scenario.name(), bench, machine.tables, settings)?)
+            Ok(run::run_on_host(scenario.name(), bench, machine.tables, settings, first_half_ticks)?)
         }
         On::Qemu => {
             let Some(image) = options.image.clone() else {
@@ -118,14 +126,19 @@ pub fn drive(scenario: &dyn Scenario, options: &RunOptions, machine: &Machine) -
                 scenario.name(),
                 bench,
                 setup,
-                &Emulator { program: options.qemu.clone(), image },
+                &Emulator {
+                    program: options.qemu.clone(),
+                    image,
+                    arguments: options.qemu_arg.clone(),
+                    calls: options.calls.clone(),
+                },
             )
         }
     }
 }
 
 fn plant(plan: &Plan, options: &RunOptions, machine: &Machine) -> Plant {
-    let speed = plan.speed.iter().map(|(t_s, rpm)| (t_s + LEAD_S, *rpm)).collect();
+    let speed = plan.speed.iter().map(|(t_s, rpm)| (t_s + plan.lead_s, *rpm)).collect();
     Plant::new(
         &machine.folder,
         SpeedSource::profile(speed),

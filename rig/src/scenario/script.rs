@@ -1,6 +1,6 @@
 //! A run written down as what happens when.
 
-use super::Plan;
+use super::{LEAD_S, Plan};
 use tractive::control::Demand;
 
 /// Time before the first event, in s.
@@ -37,6 +37,6 @@ impl Script {
             let torque_nm = held(&torque, t_s, 0.0) as f32;
             (Demand { torque_nm, slew_limited }, held(&enable, t_s, true))
         };
-        Plan { duration_s, speed, link, operator: Box::new(operator) }
+        Plan { lead_s: LEAD_S, duration_s, speed, link, operator: Box::new(operator) }
     }
 }
