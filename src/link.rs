@@ -80,8 +80,8 @@ impl Request {
             1 => Self::Hello,
             2 => Self::ControlSample(at),
             3 => {
-                let [a, b, c, d, e, f, g, h, i, ..] = payload;
-                Self::ControlReport(at, Report::from_words([a, b, c, d, e, f, g, h, i]))
+                let [a, b, c, d, e, f, g, h, i, j, ..] = payload;
+                Self::ControlReport(at, Report::from_words([a, b, c, d, e, f, g, h, i, j]))
             }
             4 => Self::PwmSample(at),
             5 => {

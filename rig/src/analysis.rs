@@ -38,6 +38,8 @@ pub fn common(recording: &Recording) -> Figures {
         figures.set("fault_limit", trip.limit);
     }
     figures.set("peak_current_a", rows.iter().map(Row::peak_current_a).fold(0.0, f64::max));
+    let told: Vec<_> = rows.iter().map(|row| row.map_error).filter(|share| *share != 0.0).collect();
+    figures.set("map_error_estimate_percent", 100.0 * told.iter().sum::<f64>() / told.len().max(1) as f64);
     figures.set("most_turn_ons_in_100_ms", most_turn_ons(recording, 0.1));
     figures
 }

@@ -38,6 +38,8 @@ pub struct Row {
     pub udc_v: f64,
     /// Stator frequency as control knows it, in Hz.
     pub f1_hz: f64,
+    /// Control's estimate of how much the machine's flux linkage exceeds the map's, as a share.
+    pub map_error: f64,
     /// Mode of the running carrier.
     pub mode: Mode,
     /// The latched fault.

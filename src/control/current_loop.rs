@@ -49,7 +49,9 @@ pub struct Input<'a> {
     pub reference: Dq,
     pub omega: f32,
     pub committed: &'a Committed,
+    /// Disturbance in the half that begins at the horizon, and on the way there.
     pub disturbance: Dq,
+    pub disturbance_until_then: Dq,
     pub resistance: f32,
     pub voltage_limit_v: f32,
 }
@@ -118,7 +120,7 @@ fn predicted_flux(input: &Input) -> Dq {
     };
     let middle = (input.angle + Angle::from_radians(0.5 * turned)).sin_cos();
     let end = (input.angle + Angle::from_radians(turned)).sin_cos();
-    let drop = (input.disturbance - input.current * input.resistance) * committed.horizon_s;
+    let drop = (input.disturbance_until_then - input.current * input.resistance) * committed.horizon_s;
     let at_horizon =
         input.flux.unpark(input.frame) + volt_seconds + drop.unpark(middle) - committed.ripple_wb;
     at_horizon.park(end)

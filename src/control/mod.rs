@@ -13,6 +13,7 @@ mod current_loop;
 mod demand;
 mod disturbance;
 mod flux_path;
+mod map_error;
 mod mtpa;
 mod reference;
 mod speed;
@@ -142,6 +143,8 @@ pub struct Output {
     pub torque_nm: f32,
     /// Current reference and where it comes from.
     pub point: OperatingPoint,
+    /// By how much the machine's flux linkage seems to exceed the map's, as a share; 0 where it turns too slowly to tell.
+    pub map_error: f32,
 }
 
 /// The control law's state between two steps.
@@ -154,11 +157,15 @@ pub struct Controller {
     /// DC-link voltage without its ripple, in V; `None` before the first step.
     link_v: Option<f32>,
     path: flux_path::FluxPath,
+    map_error: map_error::MapError,
 }
 
 /// Bandwidth at which operating point and mode follow the DC link, in rad/s: a rectifier's ripple must neither shake the one nor
 /// toggle the other. What the modulator divides by is the link as it is.
 const LINK_RAD_S: f32 = 100.0;
+
+/// Six times the stator frequency is followed while it turns less than this in a carrier half, in rad.
+const SIXTH_TURN_RAD: f32 = 1.0;
 
 impl Controller {
     /// At rest, with nothing known of the machine's angle.
@@ -170,6 +177,7 @@ impl Controller {
             trim: torque_trim::TorqueTrim::new(),
             link_v: None,
             path: flux_path::FluxPath::new(),
+            map_error: map_error::MapError::new(),
         }
     }
 
@@ -206,7 +214,7 @@ impl Controller {
         let frame = measured.angle.sin_cos();
         let current = measured.currents_a.clarke().park(frame);
         let flux = flux_linkage(tables, current);
-        let measured_nm = self::torque_nm(tables, flux, current);
+        let measured_nm = self::torque_nm(tables, flux, current) * self.map_error.scale();
         let shaping = demand::Input {
             demand,
             omega,
@@ -218,9 +226,12 @@ impl Controller {
         let before = self.link_v.unwrap_or(measured.udc_v);
         let link_v = before + LINK_RAD_S * clock.control_s() * (measured.udc_v - before);
         self.link_v = Some(link_v);
-        let limit = VoltageLimit { udc_v: link_v, depth: committed.depth_limit, filled: committed.filled };
-        let point =
-            operating_point(self.trim.apply(torque_nm, tables.ratings.max_torque_nm), omega, &limit, tables);
+        let scale = self.map_error.scale();
+        let limit =
+            VoltageLimit { udc_v: link_v / scale, depth: committed.depth_limit, filled: committed.filled };
+        let trimmed_nm = self.trim.apply(torque_nm, tables.ratings.max_torque_nm);
+        let point = operating_point(trimmed_nm / scale, omega, &limit, tables);
+        let point = OperatingPoint { torque_nm: point.torque_nm * scale, ..point };
         let limited = point.region == Region::Limit;
         self.trim.step(&torque_trim::Input {
             demand_nm: torque_nm,
@@ -232,9 +243,13 @@ impl Controller {
         let resistance = tables.ratings.stator_resistance_ohm;
         if let Some(boundary) = boundary {
             let angle = measured.angle - Angle::from_radians(omega * boundary.age_s);
-            self.disturbance.step(boundary, angle, omega, gains, tables);
+            let sixth =
+                committed.follows == Follows::Mean && 6.0 * omega.abs() * boundary.length_s < SIXTH_TURN_RAD;
+            self.disturbance.step(&disturbance::Input { boundary, angle, omega, sixth }, gains, tables);
         }
-        let disturbance = self.disturbance.voltage();
+        let ahead = |seconds: f32| measured.angle + Angle::from_radians(omega * seconds);
+        let disturbance = self.disturbance.voltage(ahead(committed.horizon_s + 0.5 * committed.interval_s));
+        let until_then = self.disturbance.voltage(ahead(0.5 * committed.horizon_s));
         let target = flux_linkage(tables, point.current);
         let reference = self.path.step(target, shaping.can_step, clock.control_s());
         let voltage = current_loop::step(
@@ -248,12 +263,14 @@ impl Controller {
                 omega,
                 committed,
                 disturbance,
+                disturbance_until_then: until_then,
                 resistance,
                 voltage_limit_v: committed.depth_limit * six_step_v(measured.udc_v),
             },
             gains,
         );
         let current_loop::Output { voltage, steady } = voltage;
+        self.map_error.step(self.disturbance.mean(), target, omega, clock.control_s());
         let regulates_by_pulses = committed.follows == Follows::Mean;
         let carrier = if regulates_by_pulses { steady } else { voltage };
         Output {
@@ -265,6 +282,7 @@ impl Controller {
                 omega,
                 depth: point.depth,
             },
+            map_error: self.map_error.share(),
             torque_nm: if limited { nearer_zero(point.torque_nm, torque_nm) } else { torque_nm },
             point,
         }

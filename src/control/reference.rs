@@ -61,9 +61,17 @@ pub fn six_step_v(udc_v: f32) -> f32 {
 
 /// The current for a torque in N·m at an electrical angular speed in rad/s.
 pub fn operating_point(torque_nm: f32, omega: f32, limit: &VoltageLimit, tables: &Tables) -> OperatingPoint {
+    // The torque axis ends where the current does.
+    let most = tables.mtpa.start.last();
+    let wanted_nm = torque_nm;
+    let torque_nm = crate::frames::limit(wanted_nm, -most, most);
+    let region = if torque_nm == wanted_nm { Region::Mtpa } else { Region::Limit };
     let best = mtpa(torque_nm, tables);
     let depth = steady_voltage(best, omega, tables) / six_step_v(limit.udc_v);
-    let unweakened = OperatingPoint { current: best, torque_nm, region: Region::Mtpa, depth };
+    let unweakened = OperatingPoint { current: best, torque_nm, region, depth };
+    if depth <= limit.depth && !limit.filled {
+        return unweakened;
+    }
     let Some(psi) = flux_limit(torque_nm, best.squared(), omega, limit, tables) else {
         return unweakened;
     };

@@ -187,12 +187,14 @@ pub struct Report {
     pub voltage_v: f32,
     /// Stator frequency, in Hz, negative backward.
     pub frequency_hz: f32,
+    /// By how much the machine's flux linkage seems to exceed the map's, as a share; 0 where it turns too slowly to tell.
+    pub map_error: f32,
     /// The latched fault, if any.
     pub trip: Option<Trip>,
 }
 
-impl Words<9> for Report {
-    fn to_words(self) -> [u32; 9] {
+impl Words<10> for Report {
+    fn to_words(self) -> [u32; 10] {
         let [code, value, limit, at] = trip_to_words(self.trip);
         [
             self.torque_nm.to_bits(),
@@ -200,6 +202,7 @@ impl Words<9> for Report {
             self.iq_a.to_bits(),
             self.voltage_v.to_bits(),
             self.frequency_hz.to_bits(),
+            self.map_error.to_bits(),
             code,
             value,
             limit,
@@ -207,14 +210,15 @@ impl Words<9> for Report {
         ]
     }
 
-    fn from_words(words: [u32; 9]) -> Self {
-        let [torque, id, iq, voltage, frequency, trip @ ..] = words;
+    fn from_words(words: [u32; 10]) -> Self {
+        let [torque, id, iq, voltage, frequency, map_error, trip @ ..] = words;
         Self {
             torque_nm: f32::from_bits(torque),
             id_a: f32::from_bits(id),
             iq_a: f32::from_bits(iq),
             voltage_v: f32::from_bits(voltage),
             frequency_hz: f32::from_bits(frequency),
+            map_error: f32::from_bits(map_error),
             trip: trip_from_words(trip),
         }
     }

@@ -27,7 +27,7 @@ const STALE_PERIODS: i32 = 5;
 const GLIDE_PER_S: f32 = 12.0;
 
 /// Phase current, as a share of the largest, whose sign may change within a half.
-const SMALL_CURRENT_SHARE: f32 = 0.01;
+const SMALL_CURRENT_SHARE: f32 = 0.05;
 
 /// Share of a mode's largest fundamental that the operating point may use where the voltage must also regulate.
 const REGULATION_ROOM: f32 = 0.999;
@@ -208,6 +208,7 @@ impl ControlTask {
         report.id_a = output.point.current.d;
         report.iq_a = output.point.current.q;
         report.voltage_v = output.voltage.voltage_v;
+        report.map_error = output.map_error;
     }
 
     /// The largest fundamental as a share of six-step, and whether it is to be used whatever the torque needs: in square wave, and

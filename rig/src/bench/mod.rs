@@ -304,6 +304,7 @@ impl Bench {
                 u_v: report.voltage_v.into(),
                 udc_v: self.sensors.udc_v(t_s),
                 f1_hz: report.frequency_hz.into(),
+                map_error: report.map_error.into(),
                 mode,
                 trip: report.trip,
             });

@@ -86,7 +86,8 @@ pub fn drive(scenario: &dyn Scenario, options: &RunOptions, machine: &Machine) -
     let ticks = |microseconds: f64| (microseconds * 1e-6 * f64::from(CLOCK.ticks_per_s)).round() as u32;
     let setup = Setup {
         min_pulse_ticks: ticks(options.min_pulse_us),
-        dead_time_ticks: ticks(options.dead_time_us),
+        // What the firmware compensates.
+        dead_time_ticks: if options.uncompensated { 0 } else { ticks(options.dead_time_us) },
         pwm_delay_ticks: ticks(options.pwm_delay_us),
     };
     let devices = Devices::new(
@@ -104,7 +105,7 @@ pub fn drive(scenario: &dyn Scenario, options: &RunOptions, machine: &Machine) -
         &bench::Settings {
             clock: CLOCK,
             first_half_ticks,
-            dead_time_ticks: setup.dead_time_ticks,
+            dead_time_ticks: ticks(options.dead_time_us),
             lead_s: plan.lead_s,
             duration_s: plan.duration_s,
             trace_step_s: options.dt,

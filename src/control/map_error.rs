@@ -1,0 +1,55 @@
+//! How wrong the flux map is, and what is made of it.
+//!
+//! If the machine's flux linkage is (1 + ε) times the map's, −ε jωψ of the EMF stays unexplained. The estimate is reported;
+//! beyond what a wrong resistance can feign, the operating point takes it into account: such a machine needs for a torque the
+//! current that the map gives for T/(1 + ε), and the voltage that it gives on a link of udc/(1 + ε).
+
+use crate::frames::{Dq, limit};
+
+/// Electrical speed from which the disturbance tells something of the map, in rad/s: the EMF is then well above the resistive
+/// drop.
+const FROM_RAD_S: f32 = 200.0;
+/// Bandwidth of the estimate, in rad/s.
+const BANDWIDTH_RAD_S: f32 = 5.0;
+/// Error that is left alone: half as much resistance again looks like up to 3 %.
+const LEFT_ALONE: f32 = 0.03;
+/// Largest correction.
+const MOST: f32 = 0.15;
+
+#[derive(Clone, Copy, Debug)]
+pub struct MapError {
+    share: f32,
+}
+
+impl MapError {
+    pub const fn new() -> Self {
+        Self { share: 0.0 }
+    }
+
+    /// ε, as far as it is known.
+    pub fn share(&self) -> f32 {
+        self.share
+    }
+
+    /// 1 + ε, as far as it is believed.
+    pub fn scale(&self) -> f32 {
+        let sure = if self.share > LEFT_ALONE {
+            self.share - LEFT_ALONE
+        } else if self.share < -LEFT_ALONE {
+            self.share + LEFT_ALONE
+        } else {
+            0.0
+        };
+        1.0 + limit(sure, -MOST, MOST)
+    }
+
+    /// One control period, with the mean disturbance in V and the flux linkage aimed at in Wb.
+    pub fn step(&mut self, disturbance: Dq, flux: Dq, omega: f32, period_s: f32) {
+        if omega.abs() < FROM_RAD_S {
+            return;
+        }
+        let emf = flux.j();
+        let seen = -(disturbance.d * emf.d + disturbance.q * emf.q) / (omega * flux.squared());
+        self.share += BANDWIDTH_RAD_S * period_s * (seen - self.share);
+    }
+}
