@@ -1,6 +1,8 @@
 //! Figures from a recording.
 
+use crate::options::RunOptions;
 use crate::trace::{Recording, Row, Switch};
+use crate::verdict::{Verdict, bound, worst};
 use serde::Serialize;
 use serde_json::{Map, Value};
 use tractive::modulation::Mode;
@@ -394,4 +396,45 @@ pub fn catch(recording: &Recording, at_s: f64, max_current_a: f64) -> Catch {
         share_of_largest: catching_current_a / max_current_a,
         catching_torque_nm: rows.iter().map(|row| row.te_nm.abs()).fold(0.0, f64::max),
     }
+}
+
+/// What is wanted of every switch of mode.
+pub fn switch_verdicts(
+    switches: &[SwitchFigures],
+    recording: &Recording,
+    options: &RunOptions,
+) -> Vec<Verdict> {
+    let excess = worst(switches.iter().map(|switch| switch.excess_percent));
+    let torque_nm = worst(switches.iter().map(|switch| switch.torque_excursion_nm));
+    let shortest_s = switches.windows(2).map(|pair| pair[1].t_s - pair[0].t_s).fold(f64::INFINITY, f64::min);
+    vec![
+        Verdict::at_most(
+            "current over the larger steady envelope in %",
+            excess,
+            bound(options, 1.5, 3.0),
+            "3.3 at 12 to 7, 2.35 at 3 to square",
+        ),
+        Verdict::at_most(
+            "torque beyond the steady band in N·m",
+            torque_nm,
+            bound(options, 25.0, f64::INFINITY),
+            "31 up, 71 braking",
+        ),
+        Verdict::at_most("switches per 0.1 s", 0.1 / shortest_s, 1.0, "41 in a sweep with raw samples"),
+        Verdict::at_most("turn-ons in 100 ms", most_turn_ons(recording, 0.1) as f64, 91.0, "900 Hz"),
+    ]
+}
+
+/// Largest error of the mean torque in square wave at speeds above `from_rpm`, over tenths of a second, in percent.
+pub fn square_torque_error_percent(recording: &Recording, from_rpm: f64) -> f64 {
+    const WINDOW_S: f64 = 0.1;
+    let end_s = recording.rows.last().map_or(0.0, |row| row.t_s);
+    let windows = (0..(end_s / WINDOW_S) as usize)
+        .map(|k| window(recording, k as f64 * WINDOW_S, (k + 1) as f64 * WINDOW_S));
+    let square = windows
+        .filter(|rows| rows.iter().all(|row| row.mode == Mode::Square && row.speed_rpm.abs() > from_rpm));
+    worst(
+        square
+            .map(|rows| (mean(rows, |row| row.te_nm) / mean(rows, |row| row.te_ref_nm) - 1.0).abs() * 100.0),
+    )
 }

@@ -72,6 +72,11 @@ impl Distortion {
         }
     }
 
+    /// A harmonic in percent of the fundamental; 0 for orders that are not analysed.
+    pub fn share_percent(&self, order: u32) -> f64 {
+        self.shares.iter().find(|(own, _)| *own == order).map_or(0.0, |(_, percent)| *percent)
+    }
+
     /// The harmonics, for reports.
     pub fn harmonics(&self) -> Vec<Harmonic> {
         self.shares

@@ -11,7 +11,7 @@ use tractive_rig::options::{RunOptions, not_negative, positive};
 use tractive_rig::report::{self, Page};
 use tractive_rig::scenario::{self, Scenario};
 use tractive_rig::trace::{self, Recording};
-use tractive_rig::{nine_switch, pattern, points};
+use tractive_rig::{figures, nine_switch, pattern, points};
 
 #[derive(Parser)]
 #[command(name = "tractive-rig", about = "Plays the motor to the drive, and shows what happened", version)]
@@ -161,7 +161,10 @@ fn run(name: &str, options: &RunOptions) -> Result<ExitCode> {
     let summary = summary(scenario.as_ref(), options, &figures, &machine);
     trace::write_text(&out.join("summary.json"), &(serde_json::to_string_pretty(&summary)? + "\n"))?;
     trace::write_text(&out.join("overview.svg"), &report::overview(&recording)?)?;
-    trace::write_text(&out.join("report.html"), &page(scenario.as_ref(), options, &recording, &figures)?)?;
+    trace::write_text(
+        &out.join("report.html"),
+        &page(scenario.as_ref(), options, &recording, &machine, &figures)?,
+    )?;
     if options.json {
         println!("{}", serde_json::to_string(&summary)?);
     } else {
@@ -197,11 +200,15 @@ fn page(
     scenario: &dyn Scenario,
     options: &RunOptions,
     recording: &Recording,
-    figures: &Figures,
+    machine: &Machine,
+    measured: &Figures,
 ) -> Result<String> {
     let mut page = Page::new(scenario.name(), scenario.figure());
     scenario.plots(recording, &mut page);
-    page.finish(&format!("tractive {}, run on {}", env!("CARGO_PKG_VERSION"), options.on.name()), figures)
+    if scenario.name() == "characteristic" {
+        figures::draw(&mut page, machine);
+    }
+    page.finish(&format!("tractive {}, run on {}", env!("CARGO_PKG_VERSION"), options.on.name()), measured)
 }
 
 fn print(figures: &Figures) {

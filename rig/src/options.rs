@@ -171,6 +171,12 @@ pub struct RunOptions {
 }
 
 impl RunOptions {
+    /// Whether inverter, sensors and machine are as control believes them to be.
+    pub fn is_ideal(&self) -> bool {
+        let flaws = [self.dead_time_us, self.noise_a, self.map_error, self.rs_error, self.angle_error];
+        flaws.iter().all(|flaw| *flaw == 0.0) && self.adc_bits.is_none() && self.udc_ripple.is_none()
+    }
+
     /// The sensors' imperfections; the converters' range is the trip level and a quarter more.
     pub fn flaws(&self, trip_current_a: f64) -> Flaws {
         Flaws {

@@ -12,8 +12,14 @@ use std::fmt::Write as _;
 const SIZE: (u32, u32) = (1000, 280);
 /// Points per curve; denser data is shown by its extremes.
 const POINTS: usize = 1500;
-const COLOURS: [RGBColor; 4] =
-    [RGBColor(31, 119, 180), RGBColor(214, 39, 40), RGBColor(44, 160, 44), RGBColor(148, 103, 189)];
+const COLOURS: [RGBColor; 6] = [
+    RGBColor(31, 119, 180),
+    RGBColor(214, 39, 40),
+    RGBColor(44, 160, 44),
+    RGBColor(148, 103, 189),
+    RGBColor(255, 127, 14),
+    RGBColor(23, 190, 207),
+];
 
 /// A curve of a recording: its name and what it shows.
 pub type Curve<'a> = (&'a str, fn(&Row) -> f64);
@@ -179,18 +185,34 @@ impl Page {
         Ok(page)
     }
 
+    /// Curves over anything, beside a figure of the paper; `axes` are the labels of x and y.
+    pub fn draw_xy(
+        &mut self,
+        figure: &str,
+        title: &str,
+        axes: (&str, &str),
+        series: &[(String, Vec<(f64, f64)>)],
+    ) {
+        let series: Vec<_> = series.iter().map(|(name, points)| (name.as_str(), points.clone())).collect();
+        self.add(&format!("The paper's {figure} · {title}"), axes, &series);
+    }
+
     fn draw(&mut self, title: &str, unit: &str, series: &[(&str, Vec<(f64, f64)>)]) {
-        match chart(unit, series) {
+        let heading = format!("{} · {title}", self.figure);
+        self.add(&heading, ("time in s", unit), series);
+    }
+
+    fn add(&mut self, heading: &str, axes: (&str, &str), series: &[(&str, Vec<(f64, f64)>)]) {
+        match chart(axes, series) {
             Ok(svg) => {
-                let heading = format!("{} · {title}", self.figure);
-                let _ = write!(self.body, "<h2>{}</h2>{}{svg}", escape(&heading), legend(series));
+                let _ = write!(self.body, "<h2>{}</h2>{}{svg}", escape(heading), legend(series));
             }
             Err(error) => self.error = Some(error),
         }
     }
 }
 
-fn chart(unit: &str, series: &[(&str, Vec<(f64, f64)>)]) -> Result<String> {
+fn chart((x_label, y_label): (&str, &str), series: &[(&str, Vec<(f64, f64)>)]) -> Result<String> {
     let points = || series.iter().flat_map(|(_, points)| points.iter());
     let (mut x, mut y) = ((f64::INFINITY, f64::NEG_INFINITY), (0.0_f64, 0.0_f64));
     for (t_s, value) in points() {
@@ -213,8 +235,8 @@ fn chart(unit: &str, series: &[(&str, Vec<(f64, f64)>)]) -> Result<String> {
             .map_err(|error| failed(&error))?;
         chart
             .configure_mesh()
-            .x_desc("time in s")
-            .y_desc(unit)
+            .x_desc(x_label)
+            .y_desc(y_label)
             .light_line_style(TRANSPARENT)
             .draw()
             .map_err(|error| failed(&error))?;

@@ -52,16 +52,21 @@ impl TorqueTrim {
     pub fn step(&mut self, input: &Input) {
         let change = (input.demand_nm - self.last_demand_nm).abs();
         self.last_demand_nm = input.demand_nm;
-        if change > STEADY_RATE * input.largest_nm * input.period_s || input.limited {
+        if change > STEADY_RATE * input.largest_nm * input.period_s {
             self.hold_s = HOLD_S;
-        } else if self.hold_s > 0.0 {
-            self.hold_s -= input.period_s;
-        } else {
-            let missing = input.demand_nm - input.measured_nm;
-            let missing = if input.demand_nm < 0.0 { -missing } else { missing };
-            let step = BANDWIDTH_RAD_S * input.period_s * missing / scale(input.demand_nm, input.largest_nm);
-            self.share = limit(self.share + step, -MOST, MOST);
+            return;
         }
+        if self.hold_s > 0.0 {
+            self.hold_s -= input.period_s;
+            return;
+        }
+        let missing = input.demand_nm - input.measured_nm;
+        let missing = if input.demand_nm < 0.0 { -missing } else { missing };
+        if input.limited && missing > 0.0 {
+            return;
+        }
+        let step = BANDWIDTH_RAD_S * input.period_s * missing / scale(input.demand_nm, input.largest_nm);
+        self.share = limit(self.share + step, -MOST, MOST);
     }
 }
 

@@ -6,6 +6,7 @@ use crate::machine::Machine;
 use crate::options::RunOptions;
 use crate::report::Page;
 use crate::trace::Recording;
+use crate::verdict::{Verdict, bound, worst};
 use tractive::control::Demand;
 
 /// The points one after another in one run: ramp, settle, measure.
@@ -71,13 +72,23 @@ impl Scenario for Characteristic {
         Plan { lead_s: LEAD_S, duration_s, speed, link: Vec::new(), operator: Box::new(operator) }
     }
 
-    fn figures(&self, recording: &Recording, _options: &RunOptions, machine: &Machine) -> Figures {
+    fn figures(&self, recording: &Recording, options: &RunOptions, machine: &Machine) -> Figures {
         let points = slots().into_iter().map(|slot| {
             let window = (slot.ends_s - MEASURE_S, slot.ends_s);
             analysis::steady_point(recording, window, slot.torque_nm, &machine.folder)
         });
         let points: Vec<_> = points.collect();
         let mut figures = analysis::common(recording);
+        let error = worst(points.iter().map(|point| point.torque_error_percent.abs()));
+        figures.set(
+            "verdicts",
+            vec![Verdict::at_most(
+                "mean torque error in %",
+                error,
+                bound(options, 0.3, 1.5),
+                "0.4; the paper 5",
+            )],
+        );
         figures.set("points", points);
         figures
     }

@@ -1,11 +1,12 @@
 //! Load steps at 200 r/min: the paper's figure 8.
 
 use super::{LEAD_S, Plan, Scenario};
-use crate::analysis::{self, Figures};
+use crate::analysis::{self, Figures, StepResponse};
 use crate::machine::Machine;
 use crate::options::RunOptions;
 use crate::report::Page;
 use crate::trace::Recording;
+use crate::verdict::{Verdict, worst};
 use tractive::control::Demand;
 
 /// 0 → 200 → … → 1,235 N·m and back, 100 ms each.
@@ -49,8 +50,10 @@ impl Scenario for LoadSteps {
             to_nm: LEVELS_NM[index],
             until_s: (index + 1) as f64 * STEP_S,
         });
+        let steps: Vec<_> = steps.map(|step| analysis::step_response(recording, &step)).collect();
         let mut figures = analysis::common(recording);
-        figures.set("steps", steps.map(|step| analysis::step_response(recording, &step)).collect::<Vec<_>>());
+        figures.set("verdicts", verdicts(&steps));
+        figures.set("steps", steps);
         figures
     }
 
@@ -76,4 +79,21 @@ impl Scenario for LoadSteps {
             ],
         );
     }
+}
+
+fn verdicts(steps: &[StepResponse]) -> Vec<Verdict> {
+    let most = |value: fn(&StepResponse) -> f64| worst(steps.iter().map(value));
+    // 0.3 % of the command or 2 N·m, whichever is more, counts as one.
+    let error = |step: &StepResponse| step.final_error_nm.abs() / (0.003 * step.to_nm).max(2.0);
+    vec![
+        Verdict::at_most("t90 in ms", most(|step| step.t90_ms), 2.5, "3.0 to 3.6; the paper about 2"),
+        Verdict::at_most("overshoot in % of the step", most(|step| step.overshoot_percent), 2.0, "1.7"),
+        Verdict::at_most(
+            "settled within 2 % in ms",
+            most(|step| step.settling_2_percent_ms),
+            5.0,
+            "5 % in 4.2 ms",
+        ),
+        Verdict::at_most("final mean over 0.3 % or 2 N·m", most(error), 1.0, "0.02 to 0.4 %"),
+    ]
 }

@@ -38,9 +38,12 @@ impl Scenario for ModeBorders {
         .plan()
     }
 
-    fn figures(&self, recording: &Recording, _options: &RunOptions, _machine: &Machine) -> Figures {
+    fn figures(&self, recording: &Recording, options: &RunOptions, _machine: &Machine) -> Figures {
         let mut figures = analysis::common(recording);
-        figures.set("mode_switches", analysis::mode_switches(recording));
+        let switches = analysis::mode_switches(recording);
+        let verdicts = analysis::switch_verdicts(&switches, recording, options);
+        figures.set("verdicts", verdicts);
+        figures.set("mode_switches", switches);
         figures.set("modes", analysis::modes(recording));
         figures
     }

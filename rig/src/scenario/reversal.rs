@@ -7,6 +7,7 @@ use crate::machine::Machine;
 use crate::options::RunOptions;
 use crate::report::Page;
 use crate::trace::Recording;
+use crate::verdict::{Verdict, worst};
 
 /// At `--speed`: full power, full braking power, nothing, full power; each for 0.4 s, in steps.
 pub struct Reversal;
@@ -48,6 +49,15 @@ impl Scenario for Reversal {
         });
         let (steps, holds): (Vec<_>, Vec<_>) = (steps.collect(), holds.collect());
         let mut figures = analysis::common(recording);
+        figures.set(
+            "verdicts",
+            vec![Verdict::at_most(
+                "peak current over the larger steady peak",
+                worst(steps.iter().map(|step| step.peak_ratio)),
+                1.15,
+                "–",
+            )],
+        );
         figures.set("transitions", steps);
         figures.set("points", holds);
         figures

@@ -3,11 +3,13 @@
 use super::script::Script;
 use super::{Plan, Scenario};
 use crate::analysis::{self, Figures};
+use crate::bound::{self, Beside};
+use crate::distortion::{self, Distortion};
 use crate::machine::Machine;
 use crate::options::RunOptions;
 use crate::report::Page;
 use crate::trace::Recording;
-use crate::{bound, distortion};
+use crate::verdict::Verdict;
 
 /// `--speed` and `--torque`.
 pub struct Steady;
@@ -50,7 +52,13 @@ impl Scenario for Steady {
         let measured = distortion::of_recording(recording, window, &machine.folder);
         figures.set("point", vec![steady]);
         figures.set("harmonics", measured.harmonics());
-        figures.set("distortion", vec![bound::beside(&measured, recording, window, options, machine)]);
+        let beside = bound::beside(&measured, recording, window, options, machine);
+        let mut verdicts = verdicts(beside.as_ref());
+        if options.dead_time_us > 0.0 {
+            verdicts.extend(dead_time_verdicts(&measured));
+        }
+        figures.set("verdicts", verdicts);
+        figures.set("distortion", vec![beside]);
         figures
     }
 
@@ -66,4 +74,29 @@ impl Scenario for Steady {
             &[("torque", |row| row.te_nm), ("demand", |row| row.te_ref_nm)],
         );
     }
+}
+
+fn verdicts(beside: Option<&Beside>) -> Vec<Verdict> {
+    let Some(beside) = beside else {
+        return Vec::new();
+    };
+    let peak_to_peak = beside.ripple_peak_to_peak_excess_percent;
+    vec![
+        Verdict::at_most("current THD over its bound in %", beside.thd_excess_percent, 2.0, "–"),
+        Verdict::at_most("rms torque ripple over its bound in %", beside.ripple_rms_excess_percent, 2.0, "1"),
+        Verdict::at_most("peak-to-peak torque over its bound in %", peak_to_peak, 8.0, "8"),
+    ]
+}
+
+/// What the dead time leaves of the harmonics that it makes.
+fn dead_time_verdicts(measured: &Distortion) -> [Verdict; 2] {
+    [5, 7].map(|order| {
+        let share = measured.share_percent(order);
+        Verdict::at_most(
+            &format!("harmonic {order} in % of the fundamental"),
+            share,
+            0.5,
+            "1.9 uncompensated",
+        )
+    })
 }

@@ -6,6 +6,7 @@ use crate::machine::Machine;
 use crate::options::RunOptions;
 use crate::report::Page;
 use crate::trace::Recording;
+use crate::verdict::{Verdict, bound};
 use tractive::control::Demand;
 
 /// 0 → 2,000 r/min in 8 s and 1 s hold, at the torque envelope.
@@ -13,6 +14,8 @@ pub struct Sweep;
 
 const SLOPE_RPM_S: f64 = 250.0;
 const HOLD_S: f64 = 1.0;
+/// Speed from which square wave is judged: well past its border.
+const SQUARE_FROM_RPM: f64 = 1950.0;
 
 impl Scenario for Sweep {
     fn name(&self) -> &'static str {
@@ -40,9 +43,19 @@ impl Scenario for Sweep {
         Plan { lead_s: LEAD_S, duration_s, speed, link: Vec::new(), operator: Box::new(operator) }
     }
 
-    fn figures(&self, recording: &Recording, _options: &RunOptions, _machine: &Machine) -> Figures {
+    fn figures(&self, recording: &Recording, options: &RunOptions, _machine: &Machine) -> Figures {
         let mut figures = analysis::common(recording);
-        figures.set("mode_switches", analysis::mode_switches(recording));
+        let switches = analysis::mode_switches(recording);
+        let mut verdicts = analysis::switch_verdicts(&switches, recording, options);
+        let error = analysis::square_torque_error_percent(recording, SQUARE_FROM_RPM);
+        verdicts.push(Verdict::at_most(
+            "mean torque error in square wave in %",
+            error,
+            bound(options, 0.5, 1.5),
+            "0.5; 14 to 33 with an id trim",
+        ));
+        figures.set("verdicts", verdicts);
+        figures.set("mode_switches", switches);
         figures.set("modes", analysis::modes(recording));
         figures
     }

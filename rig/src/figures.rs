@@ -1,0 +1,148 @@
+//! The paper's figures of the machine and of the modes, drawn from our own tables and pulses.
+
+use crate::machine::Machine;
+use crate::pattern::{self, Wanted};
+use crate::report::Page;
+use tractive::control::{VoltageLimit, mtpa, operating_point};
+use tractive::modulation::Mode;
+use tractive_tablegen::SmoothMap;
+
+type Series = Vec<(String, Vec<(f64, f64)>)>;
+
+/// Figures 1, 3, 4, 6 and 7 beside ours.
+pub fn draw(page: &mut Page, machine: &Machine) {
+    page.draw_xy(
+        "figure 1",
+        "currents of MTPA and of full power in weakening",
+        ("id in A", "iq in A"),
+        &loci(machine),
+    );
+    page.draw_xy(
+        "figure 3",
+        "Ld over id, for several iq",
+        ("id in A", "Ld in mH"),
+        &inductances(machine, true),
+    );
+    page.draw_xy(
+        "figure 4",
+        "Lq over iq, for several id",
+        ("iq in A", "Lq in mH"),
+        &inductances(machine, false),
+    );
+    page.draw_xy(
+        "figure 6",
+        "the modes: pulses per fundamental period over frequency, going up at full torque",
+        ("stator frequency in Hz", "turn-ons per period"),
+        &strategy(),
+    );
+    for (mode, f1_hz, share) in [(Mode::Mid7, 90.0, 0.7), (Mode::Mid3, 120.0, 0.9)] {
+        let title =
+            format!("middle 60°, {}: legs u, v, w at {:.0} % of six-step", mode.name(), 100.0 * share);
+        page.draw_xy(
+            "figure 7",
+            &title,
+            ("pulse angle in degrees", "level"),
+            &legs(machine, mode, f1_hz, share),
+        );
+    }
+}
+
+/// MTPA over torque, and full power over speed.
+fn loci(machine: &Machine) -> Series {
+    let ratings = &machine.tables.ratings;
+    let parameters = &machine.folder.parameters;
+    let mtpa_points = (0..=100).map(|k| {
+        let current = mtpa(ratings.max_torque_nm * k as f32 / 100.0, machine.tables);
+        (f64::from(current.d), f64::from(current.q))
+    });
+    let weakening = (0..=100).map(|k| {
+        let speed_rad_s = ratings.max_speed_rad_s * (0.3 + 0.7 * k as f32 / 100.0);
+        let torque_nm = (ratings.max_power_w / speed_rad_s).min(ratings.max_torque_nm);
+        let limit = VoltageLimit { udc_v: parameters.dc_link_nominal_v as f32, depth: 1.0, filled: false };
+        let point = operating_point(torque_nm, speed_rad_s * ratings.pole_pairs, &limit, machine.tables);
+        (f64::from(point.current.d), f64::from(point.current.q))
+    });
+    let largest = parameters.max_current_a;
+    let circle = (0..=90).map(|degrees| {
+        let (sin, cos) = f64::from(degrees).to_radians().sin_cos();
+        (-largest * sin, largest * cos)
+    });
+    vec![
+        ("MTPA".to_owned(), mtpa_points.collect()),
+        ("full power".to_owned(), weakening.collect()),
+        ("current limit".to_owned(), circle.collect()),
+    ]
+}
+
+/// Static inductances from the smooth map.
+fn inductances(machine: &Machine, d_axis: bool) -> Series {
+    let map = SmoothMap::new(&machine.folder.map);
+    let largest = machine.folder.parameters.max_current_a;
+    [0.05, 0.35, 0.65, 0.95]
+        .iter()
+        .map(|share| {
+            let points = (2..=50).map(|k| {
+                let x = largest * f64::from(k) / 50.0;
+                if d_axis {
+                    let iq = share * largest;
+                    let at = map.at(-x, iq);
+                    (-x, 1e3 * (map.at(0.0, iq).psi_d_wb - at.psi_d_wb) / x)
+                } else {
+                    (x, 1e3 * map.at(-share * largest, x).psi_q_wb / x)
+                }
+            });
+            let (name, value) = if d_axis { ("iq", share * largest) } else { ("id", -share * largest) };
+            (format!("{name} = {value:.0} A"), points.collect())
+        })
+        .collect()
+}
+
+/// Turn-ons a period of each mode in its range at full torque; the asynchronous carrier's fall with frequency.
+fn strategy() -> Series {
+    let ranges = [
+        (Mode::Sync15, 40.0, 59.5, 15.0),
+        (Mode::Sync12, 59.5, 74.5, 12.0),
+        (Mode::Mid7, 74.5, 116.0, 7.0),
+        (Mode::Mid3, 116.0, 126.0, 3.0),
+        (Mode::Square, 126.0, 200.0, 1.0),
+    ];
+    let free = (10..=40).map(|hz| (f64::from(hz), 900.0 / f64::from(hz)));
+    let mut series = vec![("async".to_owned(), free.collect())];
+    series.extend(
+        ranges.map(|(mode, from, to, pulses)| (mode.name().to_owned(), vec![(from, pulses), (to, pulses)])),
+    );
+    series
+}
+
+/// The three legs over a period, one above the other.
+fn legs(machine: &Machine, mode: Mode, f1_hz: f64, share: f64) -> Series {
+    let udc_v = machine.folder.parameters.dc_link_nominal_v;
+    let wanted = Wanted {
+        mode,
+        voltage_v: share * udc_v * core::f64::consts::FRAC_2_PI,
+        udc_v,
+        f1_hz,
+        cycles: 1,
+        dead_time_us: 0.0,
+        min_pulse_us: 10.0,
+        max_switching_hz: machine.tables.ratings.max_switching_hz,
+    };
+    let edges = pattern::edges(&wanted).unwrap_or_default();
+    (0..3)
+        .map(|leg| {
+            let base = 1.5 * (2 - leg) as f64;
+            let mut points: Vec<(f64, f64)> = Vec::new();
+            for (t_s, _, on) in edges.iter().filter(|(_, which, _)| *which == leg) {
+                let degrees = 360.0 * f1_hz * t_s;
+                if let Some((_, last)) = points.last().copied() {
+                    points.push((degrees, last));
+                }
+                points.push((degrees, base + f64::from(u8::from(*on))));
+            }
+            if let Some((_, last)) = points.last().copied() {
+                points.push((360.0, last));
+            }
+            (["u", "v", "w"][leg].to_owned(), points)
+        })
+        .collect()
+}
