@@ -420,7 +420,13 @@ pub fn switch_verdicts(
             bound(options, 25.0, f64::INFINITY),
             "31 up, 71 braking",
         ),
-        Verdict::at_most("switches per 0.1 s", 0.1 / shortest_s, 1.0, "41 in a sweep with raw samples"),
+        // Hunting is a switch as soon as the dwell time allows it; twice that is none.
+        Verdict::at_most(
+            "hunting: 60 ms over the shortest time between switches",
+            0.06 / shortest_s,
+            1.0,
+            "41 switches in a sweep",
+        ),
         Verdict::at_most("turn-ons in 100 ms", most_turn_ons(recording, 0.1) as f64, 91.0, "900 Hz"),
     ]
 }

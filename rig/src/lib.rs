@@ -12,6 +12,7 @@ pub mod columns;
 pub mod distortion;
 pub mod figures;
 pub mod machine;
+pub mod mtpa_methods;
 pub mod nine_switch;
 pub mod options;
 pub mod pattern;

@@ -26,7 +26,7 @@ use crate::time::Clock;
 
 pub use current_loop::{Follows, Gains};
 pub use demand::Demand;
-pub use mtpa::mtpa;
+pub use mtpa::{mtpa, mtpa_passes};
 pub use reference::{OperatingPoint, Region, VoltageLimit, operating_point, six_step_v};
 pub use z_source::{
     Limited, ZSource, ZSourceDesign, ZSourceError, ZSourceGains, ZSourceInput, ZSourceOutput,

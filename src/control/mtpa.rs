@@ -10,12 +10,19 @@ use crate::machine::Tables;
 pub fn mtpa(torque_nm: f32, tables: &Tables) -> Dq {
     let torque = torque_nm.abs();
     let [d_start, q_start, d_trim, q_trim] = tables.mtpa.start.at(torque);
-    let mut current = Dq { d: d_start, q: q_start };
-    for _ in 0..2 {
-        current = pass(torque, current, tables);
-    }
-    let current = current + Dq { d: d_trim, q: q_trim };
+    let start = Dq { d: d_start, q: q_start };
+    let current = mtpa_passes::<2>(torque, start, tables) + Dq { d: d_trim, q: q_trim };
     Dq { d: current.d, q: if torque_nm < 0.0 { -current.q } else { current.q } }
+}
+
+/// `PASSES` of the paper's passes for a torque of at least zero, in N·m, the first with the parameters at `start`, in A. The
+/// paper starts with those of zero current.
+pub fn mtpa_passes<const PASSES: usize>(torque_nm: f32, start: Dq, tables: &Tables) -> Dq {
+    let mut current = start;
+    for _ in 0..PASSES {
+        current = pass(torque_nm, current, tables);
+    }
+    current
 }
 
 /// One look-up of the parameters and of the universal curve, for T ≥ 0.

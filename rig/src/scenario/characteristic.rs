@@ -3,6 +3,7 @@
 use super::{LEAD_S, Plan, Scenario};
 use crate::analysis::{self, Figures};
 use crate::machine::Machine;
+use crate::mtpa_methods;
 use crate::options::RunOptions;
 use crate::report::Page;
 use crate::trace::Recording;
@@ -90,6 +91,7 @@ impl Scenario for Characteristic {
             )],
         );
         figures.set("points", points);
+        figures.set("mtpa_methods", mtpa_methods::compare(machine));
         figures
     }
 

@@ -1,0 +1,53 @@
+//! The paper's MTPA beside ours, judged on the smooth flux map.
+
+use crate::machine::Machine;
+use serde::Serialize;
+use tractive::control::{mtpa, mtpa_passes};
+use tractive::frames::Dq;
+use tractive_tablegen::{Optimum, SmoothMap};
+
+/// What a method gives for a torque.
+#[derive(Clone, Debug, Serialize)]
+pub struct MethodFigures {
+    /// The method.
+    pub method: &'static str,
+    /// Torque wanted, in N·m.
+    pub torque_nm: f64,
+    /// Torque delivered less that, in percent.
+    pub torque_error_percent: f64,
+    /// Current above the least that gives the delivered torque, in percent.
+    pub excess_current_percent: f64,
+}
+
+/// Torques as shares of the largest: 200, 600, 859 and 1,235 N·m of the reference machine.
+const SHARES: [f64; 4] = [200.0 / 1235.0, 600.0 / 1235.0, 859.0 / 1235.0, 1.0];
+
+/// One pass and two passes from zero current, and two passes as our tables start and trim them.
+pub fn compare(machine: &Machine) -> Vec<MethodFigures> {
+    let tables = machine.tables;
+    let map = SmoothMap::new(&machine.folder.map);
+    let optimum = Optimum::new(&map, &machine.folder.parameters);
+    let zero = Dq::default();
+    let mut figures = Vec::new();
+    for share in SHARES {
+        let torque_nm = share * machine.folder.parameters.max_torque_nm;
+        let wanted = torque_nm as f32;
+        let methods = [
+            ("one pass from L(0, 0)", mtpa_passes::<1>(wanted, zero, tables)),
+            ("two passes from L(0, 0), the paper's", mtpa_passes::<2>(wanted, zero, tables)),
+            ("two passes, ours", mtpa(wanted, tables)),
+        ];
+        figures.extend(methods.map(|(method, current)| {
+            let (id, iq) = (f64::from(current.d), f64::from(current.q));
+            let delivered_nm = optimum.torque_nm(id, iq);
+            let least = optimum.least_current(delivered_nm);
+            MethodFigures {
+                method,
+                torque_nm,
+                torque_error_percent: (delivered_nm / torque_nm - 1.0) * 100.0,
+                excess_current_percent: (id.hypot(iq) / least.0.hypot(least.1) - 1.0) * 100.0,
+            }
+        }));
+    }
+    figures
+}
