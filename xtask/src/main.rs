@@ -5,13 +5,14 @@
 //! | `run [SCENARIO] [--on qemu\|host] [--out DIR] …` | sets up what is missing, builds, hands over to the rig |
 //! | `test [--only STEP]… [--list]` | sets up what is missing, runs every check, ends with a table and a count |
 //! | `image [--json]` | builds the image and says what is in it |
-//! | `timing`, `flash` | not available yet |
+//! | `flash [--board NAME] [--log]` | builds a board's image and flashes it with probe-rs |
+//! | `timing` | not available yet |
 //!
 //! Results go to standard output, what the command does on the way to standard error. Exit codes: 0 done; 1 it ran
 //! and something failed; 2 it could not run (bad usage, bad input, something missing), with the reason on a line.
 //!
 //! The modules: [`cli`] is what may be typed, [`setup`] what has to be installed, [`build`] how cargo is called,
-//! [`run`], [`mod@test`] and [`image`] the commands. An image is read by [`elf`], its instructions by [`thumb`]; [`graph`]
+//! [`run`], [`mod@test`], [`image`] and [`flash`] the commands. An image is read by [`elf`], its instructions by [`thumb`]; [`graph`]
 //! says which function calls which and [`check`] refuses what an image must not hold.
 
 #![forbid(unsafe_code)]
@@ -20,6 +21,7 @@ mod build;
 mod check;
 mod cli;
 mod elf;
+mod flash;
 mod graph;
 mod image;
 mod process;
@@ -38,7 +40,7 @@ fn main() -> ExitCode {
         cli::Command::Test(args) => test::run(&args),
         cli::Command::Image(args) => image::run(&args),
         cli::Command::Timing(_) => Ok(not_available("timing")),
-        cli::Command::Flash(_) => Ok(not_available("flash")),
+        cli::Command::Flash(args) => flash::run(&args),
     };
     match result {
         Ok(code) => ExitCode::from(code),
