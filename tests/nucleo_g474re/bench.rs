@@ -62,8 +62,8 @@ pub struct Bench {
     pub now: u64,
     /// What the converters see: codes by channel.
     pub codes: [u16; 19],
-    /// The fault line or a comparator is active.
-    pub fault: bool,
+    /// A break input of TIM1, of TIM8, is active.
+    pub fault: [bool; 2],
     /// The clock, or a converter, does not come up.
     pub broken: bool,
     status: [u32; 2],
@@ -105,7 +105,7 @@ impl Bench {
             legs: [Leg::default(); 3],
             now: 0,
             codes: [2_048; 19],
-            fault: false,
+            fault: [false; 2],
             broken: false,
             status: [0; 2],
             shadows: [Shadow::default(); 2],
@@ -144,7 +144,7 @@ impl Bench {
                     self.trigger();
                 }
             }
-            if events & 1 << 7 != 0 || (self.fault && timer.bdtr().read().bke(0)) {
+            if events & 1 << 7 != 0 || (self.fault[index] && timer.bdtr().read().bke(0)) {
                 timer.bdtr().modify(|w| w.set_moe(false));
                 self.status[index] |= 1 << 7;
             }

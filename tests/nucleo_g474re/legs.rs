@@ -169,10 +169,10 @@ fn a_break_needs_no_software_and_stays() {
     rig.interrupt(&on);
     rig.run(500);
     assert_ne!(rig.gates(), ALL_OFF);
-    rig.bench.fault = true;
+    rig.bench.fault = [true; 2];
     rig.bench.tick();
     assert_eq!(rig.gates(), ALL_OFF);
-    rig.bench.fault = false;
+    rig.bench.fault = [false; 2];
     for _ in 0..5 {
         rig.interrupt(&on);
         rig.run(500);
@@ -181,6 +181,22 @@ fn a_break_needs_no_software_and_stays() {
     rig.pwm.enter(SafeState::ShortCircuit, NOW);
     rig.run(500);
     assert_eq!(rig.gates(), ALL_OFF, "a break is stronger than a short circuit");
+}
+
+#[test]
+fn a_break_of_one_timer_stops_the_other_within_a_half() {
+    for timer in [0, 1] {
+        let mut rig = Rig::new();
+        let on = half(2_000, [true, false, true], STEADY);
+        rig.interrupt(&on);
+        rig.interrupt(&on);
+        rig.run(500);
+        rig.bench.fault[timer] = true;
+        rig.bench.tick();
+        rig.bench.fault[timer] = false;
+        rig.interrupt(&on);
+        assert_eq!(rig.gates(), ALL_OFF);
+    }
 }
 
 #[test]
@@ -239,6 +255,18 @@ fn an_answer_that_comes_after_its_half_turns_the_gates_off() {
 }
 
 #[test]
+fn a_latched_break_leaves_the_main_output_alone() {
+    let rig = Rig::new();
+    let legs = rig.bench.registers.legs;
+    legs.tim8.sr().write(|w| w.set_bif(0, true));
+    legs.switch_on();
+    legs.short_circuit();
+    // Before the hardware has its turn: not even for a moment.
+    assert!(!legs.is_on());
+    assert!(!legs.tim1.bdtr().read().moe() && !legs.tim8.bdtr().read().moe());
+}
+
+#[test]
 fn reload_is_the_last_count() {
     assert_eq!([1, 2, 11_806, 65_535].map(reload), [0, 1, 11_805, 65_534]);
 }
@@ -284,9 +312,9 @@ proptest! {
                     tripped |= safe == SafeState::GatesOff;
                 }
                 Call::Break => {
-                    rig.bench.fault = true;
+                    rig.bench.fault = [true; 2];
                     rig.bench.settle();
-                    rig.bench.fault = false;
+                    rig.bench.fault = [false; 2];
                     tripped = true;
                 }
                 Call::Wait(ticks) => rig.run(ticks),

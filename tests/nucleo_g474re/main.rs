@@ -1,6 +1,7 @@
 //! The NUCLEO-G474RE's registers: the board's own functions against blocks of memory, with a model of the timers behind.
 
 mod bench;
+mod drive;
 mod legs;
 mod pins;
 mod ports;

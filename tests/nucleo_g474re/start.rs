@@ -170,11 +170,12 @@ fn each_comparator_watches_one_sign_of_one_current() {
 #[test]
 fn what_is_not_in_order_is_told_and_leaves_the_gates_off() {
     type Spoil = fn(&mut Bench);
-    let cases: [(Spoil, StartError); 4] = [
+    let cases: [(Spoil, StartError); 5] = [
+        (|bench| bench.registers.rcc.csr().write(|w| w.set_iwdgrstf(true)), StartError::WatchdogReset),
         (|bench| bench.broken = true, StartError::FlashLatency),
         (|bench| bench.codes[14] = 3_000, StartError::CurrentSensor { code: 3_000 }),
         (|bench| bench.codes[2] = 0, StartError::CurrentSensor { code: 0 }),
-        (|bench| bench.fault = true, StartError::BreakInput),
+        (|bench| bench.fault[1] = true, StartError::BreakInput),
     ];
     for (spoil, error) in cases {
         let mut bench = Bench::new();

@@ -98,7 +98,10 @@ fn perform(step: Step, setup: &mut Setup) -> Result<Outcome> {
             lint(&mut cargo(), &what)? && lint(&mut cargo(), &nucleo)?
         }
         Step::Doc => {
-            succeeds(cargo().env("RUSTDOCFLAGS", "-D warnings").args(["doc", "--no-deps", "--workspace"]))?
+            let boards = format!("tractive/{}", Board::NucleoG474re.feature());
+            let mut command = cargo();
+            command.env("RUSTDOCFLAGS", "-D warnings");
+            succeeds(command.args(["doc", "--no-deps", "--workspace", "--features", &boards]))?
         }
         Step::Host => succeeds(cargo().args(["test", "--workspace", "--release"]))?,
         Step::Loom => {

@@ -25,6 +25,8 @@ pub struct Timeout;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(target_os = "none", derive(defmt::Format))]
 pub enum StartError {
+    /// The watchdog has reset the chip. The drive does not start again by itself: the next reset, by hand, starts it.
+    WatchdogReset,
     /// The flash memory did not take the wait states.
     FlashLatency,
     /// The crystal does not oscillate.
@@ -90,7 +92,8 @@ pub type Step = fn(&mut Start) -> Result<(), StartError>;
 
 /// The steps in their order. The PWM timers are locked into their safe configuration before any gate pin is theirs,
 /// and break inputs and comparators watch before that; nothing counts until [`run`].
-pub const STEPS: [(&str, Step); 10] = [
+pub const STEPS: [(&str, Step); 11] = [
+    ("reset cause", |start| watchdog::refuse_after_bite(start.registers)),
     ("clock tree", |start| clock::configure(start.registers, start.wait)),
     ("peripheral clocks", |start| {
         clock::enable_peripherals(start.registers);

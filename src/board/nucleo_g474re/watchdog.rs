@@ -20,6 +20,13 @@ pub fn start(registers: &Registers, wait: &mut dyn Wait) -> Result<(), StartErro
     Ok(())
 }
 
+/// An error if the watchdog was the last to reset the chip; told once.
+pub fn refuse_after_bite(registers: &Registers) -> Result<(), StartError> {
+    let bitten = registers.rcc.csr().read().iwdgrstf();
+    registers.rcc.csr().modify(|w| w.set_rmvf(true));
+    if bitten { Err(StartError::WatchdogReset) } else { Ok(()) }
+}
+
 fn feed(registers: &Registers) {
     registers.iwdg.kr().write(|w| w.set_key(iwdg::vals::Key::RESET));
 }
