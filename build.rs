@@ -9,8 +9,20 @@ use tractive_tablegen::{Generated, MachineFolder};
 /// The machine that is built in when `TRACTIVE_MACHINE` names no other.
 const DEFAULT_MACHINE: &str = "pmasynrm-180kw";
 
-/// Interrupt handlers that a firmware may define; the others end in cortex-m-rt's default handler.
-const HANDLERS: [&str; 2] = ["TIMER0", "DUALTIMER"];
+/// What the linker needs to know of a board.
+struct Board {
+    /// The file in `memory/`, which the root's `memory.x` includes under the name `board-memory.x`: the linker takes the root's
+    /// file, whatever the board.
+    memory: &'static str,
+    /// Interrupt handlers that a firmware may define; the others end in cortex-m-rt's default handler.
+    handlers: [&'static str; 2],
+    scripts: &'static [&'static str],
+}
+
+/// QEMU's, unless a feature names another.
+const QEMU: Board = Board { memory: "mps2-an386.x", handlers: ["TIMER0", "DUALTIMER"], scripts: &["link.x"] };
+const NUCLEO_G474RE: Board =
+    Board { memory: "nucleo-g474re.x", handlers: ["TIM1_UP_TIM16", "TIM3"], scripts: &["link.x", "defmt.x"] };
 
 fn main() -> ExitCode {
     match generate() {
@@ -35,14 +47,18 @@ fn generate() -> Result<(), String> {
     let source = tables.map_err(|error| error.to_string())?.rust_source();
     write(&out.join("machine_tables.rs"), &source)?;
     if variable("CARGO_CFG_TARGET_OS")? == "none" {
-        let memory = root.join("memory.x");
+        let nucleo = env::var_os("CARGO_FEATURE_BOARD_NUCLEO_G474RE").is_some();
+        let board = if nucleo { NUCLEO_G474RE } else { QEMU };
+        let memory = root.join("memory").join(board.memory);
         println!("cargo:rerun-if-changed={}", memory.display());
-        write(&out.join("memory.x"), &fs::read_to_string(&memory).map_err(|error| error.to_string())?)?;
+        write(&out.join("board-memory.x"), &fs::read_to_string(&memory).map_err(|error| error.to_string())?)?;
         let handlers: String =
-            HANDLERS.iter().map(|name| format!("PROVIDE({name} = DefaultHandler);\n")).collect();
+            board.handlers.iter().map(|name| format!("PROVIDE({name} = DefaultHandler);\n")).collect();
         write(&out.join("device.x"), &handlers)?;
         println!("cargo:rustc-link-search={}", out.display());
-        println!("cargo:rustc-link-arg-bins=-Tlink.x");
+        for script in board.scripts {
+            println!("cargo:rustc-link-arg-bins=-T{script}");
+        }
     }
     Ok(())
 }

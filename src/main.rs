@@ -7,7 +7,11 @@ fn main() {
     println!("This is the firmware. `cargo xtask run` builds it for its board and runs it in QEMU.");
 }
 
-#[cfg(target_os = "none")]
+#[cfg(all(target_os = "none", feature = "board-nucleo-g474re"))]
+#[path = "firmware/nucleo_g474re.rs"]
+mod firmware;
+
+#[cfg(all(target_os = "none", not(feature = "board-nucleo-g474re")))]
 mod firmware {
     use core::sync::atomic::{AtomicU32, Ordering};
     use cortex_m_rt::{entry, exception, interrupt};

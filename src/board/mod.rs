@@ -1,7 +1,10 @@
-//! What a board gives the drive. The boards themselves, one file each, exist only on the target.
+//! What a board gives the drive. The boards themselves, one file or folder each: QEMU's exists only on the target, where no
+//! feature names another; that of a feature exists on the host too, for the tests of its registers.
 
 pub mod fpu;
-#[cfg(target_os = "none")]
+#[cfg(feature = "board-nucleo-g474re")]
+pub mod nucleo_g474re;
+#[cfg(all(target_os = "none", not(feature = "board-nucleo-g474re")))]
 pub mod qemu;
 
 use crate::control::{Demand, Measurements};

@@ -5,12 +5,43 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use anyhow::{Context, Result, bail};
+use clap::ValueEnum;
 
 use crate::process;
 use crate::setup::Toolchain;
 
 /// What the image runs on.
 pub const TARGET: &str = "thumbv7em-none-eabihf";
+
+/// The boards of real hardware, by their feature `board-NAME`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Board {
+    /// ST's NUCLEO-G474RE
+    NucleoG474re,
+}
+
+impl Board {
+    /// The feature of the firmware's crate.
+    pub const fn feature(self) -> &'static str {
+        match self {
+            Self::NucleoG474re => "board-nucleo-g474re",
+        }
+    }
+
+    /// Where its flash memory begins, and with it the image.
+    pub const fn flash_origin(self) -> u32 {
+        match self {
+            Self::NucleoG474re => 0x0800_0000,
+        }
+    }
+
+    /// What probe-rs calls the chip.
+    pub const fn chip(self) -> &'static str {
+        match self {
+            Self::NucleoG474re => "STM32G474RETx",
+        }
+    }
+}
 
 /// The repository's root.
 pub fn root() -> &'static Path {
@@ -46,6 +77,13 @@ pub fn bench(toolchain: &Toolchain) -> Result<PathBuf> {
     let args = ["build", "--profile", "firmware", "--target", TARGET, "--package", name, "--bin", name];
     executable(toolchain.cargo(&args).env_remove("TRACTIVE_MACHINE"), name, false)
         .context("the bench was not built")
+}
+
+/// Builds the firmware's image for a board of real hardware.
+pub fn board_image(toolchain: &Toolchain, board: Board) -> Result<PathBuf> {
+    let mut command = toolchain.cargo(&image_args());
+    command.args(["--features", board.feature()]).env_remove("TRACTIVE_MACHINE");
+    executable(&mut command, "tractive", false).context("the image was not built")
 }
 
 /// Builds the rig's program.

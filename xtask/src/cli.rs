@@ -2,6 +2,7 @@
 
 use clap::{Args, Parser, Subcommand};
 
+use crate::build::Board;
 use crate::test::Step;
 
 /// The chores of `tractive`.
@@ -26,7 +27,7 @@ pub enum Command {
     Image(ImageArgs),
     /// Instructions per interrupt against their budgets
     Timing(TimingArgs),
-    /// Build a board's image and flash it (not available yet)
+    /// Build a board's image and flash it with probe-rs
     Flash(FlashArgs),
 }
 
@@ -75,8 +76,11 @@ pub struct TimingArgs {
 #[derive(Args, Debug)]
 pub struct FlashArgs {
     /// The board
+    #[arg(long, value_enum, default_value = "nucleo-g474re")]
+    pub board: Board,
+    /// Stay and print the firmware's log
     #[arg(long)]
-    pub board: Option<String>,
+    pub log: bool,
 }
 
 #[cfg(test)]
@@ -94,6 +98,18 @@ mod tests {
         let cli = Cli::try_parse_from(["xtask", "run", "--down", "--dt", "1e-4", "--on", "host"]).unwrap();
         let Command::Run(args) = cli.command else { panic!("not run") };
         assert_eq!(args.words, ["--down", "--dt", "1e-4", "--on", "host"]);
+    }
+
+    #[test]
+    fn flash_takes_a_board_by_name_and_refuses_others() {
+        for words in [&["xtask", "flash"][..], &["xtask", "flash", "--board", "nucleo-g474re"]] {
+            let Command::Flash(args) = Cli::try_parse_from(words).unwrap().command else {
+                panic!("not flash")
+            };
+            assert_eq!(args.board, Board::NucleoG474re);
+        }
+        let error = Cli::try_parse_from(["xtask", "flash", "--board", "arduino"]).unwrap_err();
+        assert_eq!(error.exit_code(), 2);
     }
 
     #[test]

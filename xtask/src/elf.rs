@@ -42,6 +42,8 @@ pub struct Image {
     pub mapping: BTreeMap<u32, bool>,
     /// Name and address of what the vector table leads to, but for the reset.
     pub handlers: Vec<(String, u32)>,
+    /// Where the vector table lies.
+    pub origin: u32,
     /// Every aligned word of the data sections.
     pub data_words: BTreeSet<u32>,
     pub sizes: Sizes,
@@ -152,6 +154,7 @@ impl Image {
     fn read_handlers(&mut self, file: &object::File) -> Result<()> {
         let table =
             file.section_by_name(".vector_table").context("the image has no section .vector_table")?;
+        self.origin = address(table.address())?;
         // Word 0 is the stack pointer, word 1 the reset; a reserved entry holds 0.
         for (index, word) in words(table.data()?).enumerate().skip(2).filter(|(_, word)| *word != 0) {
             self.handlers.push((handler_name(index), word & !1));

@@ -5,6 +5,7 @@ use std::path::Path;
 use anyhow::{Context, Result};
 use serde_json::json;
 
+use crate::build::Board;
 use crate::cli::ImageArgs;
 use crate::elf::{Image, Sizes};
 use crate::setup::Setup;
@@ -34,6 +35,15 @@ pub fn check(path: &Path) -> Result<bool> {
         println!("{functions} functions, {handlers} handlers: no panic within reach, no double precision");
     }
     Ok(findings.is_empty())
+}
+
+/// The same for a board of real hardware, whose image must also lie where its flash memory is.
+pub fn check_board(path: &Path, board: Board) -> Result<bool> {
+    let (origin, wanted) = (read(path)?.origin, board.flash_origin());
+    if origin != wanted {
+        println!("the image begins at {origin:#x}, the board's flash memory at {wanted:#x}");
+    }
+    Ok(check(path)? && origin == wanted)
 }
 
 /// Reads an image.

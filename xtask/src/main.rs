@@ -6,13 +6,13 @@
 //! | `test [--only STEP]… [--list]` | sets up what is missing, runs every check, ends with a table and a count |
 //! | `image [--json]` | builds the image and says what is in it |
 //! | `timing [--json] [--profile [N]]` | instructions per interrupt against `budgets.toml` |
-//! | `flash` | not available yet |
+//! | `flash [--board NAME] [--log]` | builds a board's image and flashes it with probe-rs |
 //!
 //! Results go to standard output, what the command does on the way to standard error. Exit codes: 0 done; 1 it ran
 //! and something failed; 2 it could not run (bad usage, bad input, something missing), with the reason on a line.
 //!
 //! The modules: [`cli`] is what may be typed, [`setup`] what has to be installed, [`build`] how cargo is called,
-//! [`run`], [`mod@test`], [`image`] and [`timing`] the commands. An image is read by [`elf`], its instructions by [`thumb`]; [`graph`]
+//! [`run`], [`mod@test`], [`image`], [`timing`] and [`flash`] the commands. An image is read by [`elf`], its instructions by [`thumb`]; [`graph`]
 //! says which function calls which and [`check`] refuses what an image must not hold.
 
 #![forbid(unsafe_code)]
@@ -21,6 +21,7 @@ mod build;
 mod check;
 mod cli;
 mod elf;
+mod flash;
 mod graph;
 mod image;
 mod process;
@@ -40,7 +41,7 @@ fn main() -> ExitCode {
         cli::Command::Test(args) => test::run(&args),
         cli::Command::Image(args) => image::run(&args),
         cli::Command::Timing(args) => timing::run(&args),
-        cli::Command::Flash(_) => Ok(not_available("flash")),
+        cli::Command::Flash(args) => flash::run(&args),
     };
     match result {
         Ok(code) => ExitCode::from(code),
@@ -49,9 +50,4 @@ fn main() -> ExitCode {
             ExitCode::from(2)
         }
     }
-}
-
-fn not_available(command: &str) -> u8 {
-    eprintln!("error: `cargo xtask {command}` is not available yet");
-    2
 }

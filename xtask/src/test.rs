@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use anyhow::Result;
 use clap::ValueEnum;
 
-use crate::build::{TARGET, cargo};
+use crate::build::{Board, TARGET, cargo};
 use crate::cli::{TestArgs, TimingArgs};
 use crate::process::succeeds;
 use crate::setup::Setup;
@@ -31,6 +31,8 @@ pub enum Step {
     Image,
     /// No panic within an interrupt's reach, no double precision
     ImageCheck,
+    /// The NUCLEO-G474RE's image builds, with no panic within an interrupt's reach and no double precision
+    NucleoImage,
     /// The image builds for every folder of tables/
     Machines,
     /// The image in QEMU
@@ -93,10 +95,15 @@ fn perform(step: Step, setup: &mut Setup) -> Result<Outcome> {
             if !setup.toolchain()?.has_clippy {
                 return Ok(Outcome::Skipped(format!("clippy needs rustup's target {TARGET}")));
             }
-            lint(&mut cargo(), &["--target", TARGET, "--package", "tractive", "--lib", "--bins"])?
+            let what = ["--target", TARGET, "--package", "tractive", "--lib", "--bins"];
+            let nucleo = [&what[..], &["--features", Board::NucleoG474re.feature()]].concat();
+            lint(&mut cargo(), &what)? && lint(&mut cargo(), &nucleo)?
         }
         Step::Doc => {
-            succeeds(cargo().env("RUSTDOCFLAGS", "-D warnings").args(["doc", "--no-deps", "--workspace"]))?
+            let boards = format!("tractive/{}", Board::NucleoG474re.feature());
+            let mut command = cargo();
+            command.env("RUSTDOCFLAGS", "-D warnings");
+            succeeds(command.args(["doc", "--no-deps", "--workspace", "--features", &boards]))?
         }
         Step::Host => succeeds(cargo().args(["test", "--workspace", "--release"]))?,
         Step::Loom => {
@@ -110,6 +117,10 @@ fn perform(step: Step, setup: &mut Setup) -> Result<Outcome> {
             true
         }
         Step::ImageCheck => image::check(&build::image(&setup.toolchain()?, None)?)?,
+        Step::NucleoImage => {
+            let board = Board::NucleoG474re;
+            image::check_board(&build::board_image(&setup.toolchain()?, board)?, board)?
+        }
         Step::Machines => {
             let toolchain = setup.toolchain()?;
             for machine in crate::run::machine_names(build::root()) {

@@ -17,7 +17,7 @@ fn bad_usage_exits_with_2_and_says_why() {
         (&["test", "--only", "nonsense"], "nonsense"),
         (&["image", "--nonsense"], "--nonsense"),
         (&["timing", "--json", "--profile"], "cannot be used with"),
-        (&["flash", "--board", "any"], "not available yet"),
+        (&["flash", "--board", "any"], "nucleo-g474re"),
     ] {
         let output = xtask(args);
         let said = String::from_utf8_lossy(&output.stderr);
@@ -25,6 +25,16 @@ fn bad_usage_exits_with_2_and_says_why() {
         assert!(said.contains(why), "{args:?}: {said}");
         assert!(output.stdout.is_empty(), "{args:?}");
     }
+}
+
+#[test]
+fn flash_without_probe_rs_says_how_to_install_it() {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_xtask"));
+    let output = command.arg("flash").env("PATH", "").output().expect("the program starts");
+    assert_eq!(output.status.code(), Some(2));
+    let said = String::from_utf8_lossy(&output.stderr);
+    let wanted = "error: probe-rs is missing; install it with: cargo install probe-rs-tools --locked";
+    assert_eq!(said.trim_end(), wanted);
 }
 
 #[test]

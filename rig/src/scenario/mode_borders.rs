@@ -8,12 +8,12 @@ use crate::options::RunOptions;
 use crate::report::Page;
 use crate::trace::Recording;
 
-/// Torque up to the envelope and back at `--speed`, in steps that the slew limit smooths.
+/// Torque up to the envelope and back at `--speed`, slowly: small steps that the slew limit smooths.
 pub struct ModeBorders;
 
 const SPEED_RPM: f64 = 1860.0;
-const LEVELS: usize = 20;
-const LEVEL_S: f64 = 0.1;
+const LEVELS: usize = 200;
+const LEVEL_S: f64 = 0.01;
 
 impl Scenario for ModeBorders {
     fn name(&self) -> &'static str {

@@ -1,0 +1,116 @@
+//! What only the chip has: the vector table, the interrupt controller, waiting, the log.
+#![allow(unsafe_code)]
+
+use super::operator::Operator;
+use super::power_stage::CORE_HZ;
+use super::registers::Registers;
+use super::start::{self, Found, Plan, StartError, Timeout, Wait};
+use super::watchdog::Pulse;
+use crate::drive::Report;
+use cortex_m::peripheral::NVIC;
+use defmt_rtt as _;
+pub use stm32_metapac::Interrupt;
+
+/// The drive's operator.
+pub static OPERATOR: Operator = Operator::new();
+
+/// What the interrupts tell the watchdog.
+pub static PULSE: Pulse = Pulse::new();
+
+unsafe extern "C" {
+    fn TIM1_UP_TIM16();
+    fn TIM3();
+    fn DefaultHandler();
+}
+
+/// The vector table's device part. Every entry leads somewhere; those never unmasked to the default handler.
+#[unsafe(link_section = ".vector_table.interrupts")]
+#[unsafe(no_mangle)]
+pub static __INTERRUPTS: [unsafe extern "C" fn(); 102] = {
+    let mut table: [unsafe extern "C" fn(); 102] = [DefaultHandler; 102];
+    table[Interrupt::TIM1_UP_TIM16 as usize] = TIM1_UP_TIM16;
+    table[Interrupt::TIM3 as usize] = TIM3;
+    table
+};
+
+struct Unlocked;
+critical_section::set_impl!(Unlocked);
+
+// SAFETY: only the log takes critical sections, and only the idle loop logs: there is never a second one to keep out. So
+// nothing is masked, and no interrupt is ever late for a message.
+unsafe impl critical_section::Impl for Unlocked {
+    unsafe fn acquire() -> critical_section::RawRestoreState {}
+    unsafe fn release(_: critical_section::RawRestoreState) {}
+}
+
+/// Waits by counting cycles.
+struct Cycles;
+
+impl Wait for Cycles {
+    fn until(&mut self, done: &mut dyn FnMut() -> bool) -> Result<(), Timeout> {
+        // 100 ms and more: the crystal takes a few.
+        for _ in 0..10_000 {
+            if done() {
+                return Ok(());
+            }
+            self.microseconds(10);
+        }
+        Err(Timeout)
+    }
+
+    fn microseconds(&mut self, us: u32) {
+        cortex_m::asm::delay(us.saturating_mul(CORE_HZ / 1_000_000));
+    }
+}
+
+/// Configures everything, gates off. Call it once.
+pub fn prepare(plan: Plan) -> Result<Found, StartError> {
+    let found = start::prepare(&Registers::CHIP, &mut Cycles, plan);
+    if let Err(error) = &found {
+        defmt::error!("no start: {}", error);
+    }
+    found
+}
+
+/// Starts both timers and unmasks their interrupts: PWM preempts control.
+pub fn run() {
+    // SAFETY: the only use of the core peripherals, before any interrupt is unmasked.
+    let mut core = unsafe { cortex_m::Peripherals::steal() };
+    // SAFETY: priorities are changed while both interrupts are masked; no code relies on a priority ceiling. After that
+    // both may come: their handlers share nothing but cells and registers that each writes as the modules say.
+    unsafe {
+        core.NVIC.set_priority(Interrupt::TIM1_UP_TIM16, 0x40);
+        core.NVIC.set_priority(Interrupt::TIM3, 0x80);
+        NVIC::unmask(Interrupt::TIM1_UP_TIM16);
+        NVIC::unmask(Interrupt::TIM3);
+    }
+    start::run(&Registers::CHIP);
+    defmt::info!("running");
+}
+
+/// The idle loop, forever: feeds the watchdog, tells what has changed.
+pub fn idle() -> ! {
+    let (mut told, mut broken) = (None, false);
+    loop {
+        PULSE.feed_if_both_ran(&Registers::CHIP);
+        if !broken && Registers::CHIP.legs.is_tripped() {
+            broken = true;
+            defmt::error!("gates off by a break: hardware, or the fault that follows");
+        }
+        let trip = OPERATOR.report().and_then(|report: Report| report.trip);
+        if told.is_none()
+            && let Some(trip) = trip
+        {
+            defmt::error!("fault {}: {} beyond {}", trip.fault.name(), trip.value, trip.limit);
+            told = Some(trip);
+        }
+    }
+}
+
+/// Gates off for good, whatever state the program is in, then nothing more; the watchdog resets the chip if it runs.
+pub fn die() -> ! {
+    Registers::CHIP.legs.trip();
+    loop {
+        cortex_m::asm::nop();
+    }
+}

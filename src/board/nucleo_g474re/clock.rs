@@ -1,0 +1,78 @@
+//! The clock tree: 170 MHz for the core, both buses and all timers, from the 24 MHz crystal.
+
+use super::registers::Registers;
+use super::start::{StartError, Wait};
+use stm32_metapac::{flash, rcc};
+
+/// 24 MHz / 6 · 85 / 2 = 170 MHz, with the wait states and the core voltage that this needs. If the crystal stops later, the clock
+/// security system breaks the PWM timers in hardware.
+pub fn configure(registers: &Registers, wait: &mut dyn Wait) -> Result<(), StartError> {
+    let Registers { rcc, pwr, flash, .. } = *registers;
+    rcc.apb1enr1().modify(|w| w.set_pwren(true));
+    // Boost: range 1 without it ends at 150 MHz. The bit's name says normal mode.
+    pwr.cr5().modify(|w| w.set_r1mode(false));
+    flash.acr().modify(|w| {
+        w.set_latency(flash::vals::Latency::WS4);
+        w.set_prften(true);
+        w.set_icen(true);
+        w.set_dcen(true);
+    });
+    wait.until(&mut || flash.acr().read().latency() == flash::vals::Latency::WS4)
+        .or(Err(StartError::FlashLatency))?;
+    rcc.cr().modify(|w| w.set_hseon(true));
+    wait.until(&mut || rcc.cr().read().hserdy()).or(Err(StartError::Crystal))?;
+    rcc.pllcfgr().write(|w| {
+        w.set_pllsrc(rcc::vals::Pllsrc::HSE);
+        w.set_pllm(rcc::vals::Pllm::DIV6);
+        w.set_plln(rcc::vals::Plln::MUL85);
+        w.set_pllr(rcc::vals::Pllr::DIV2);
+        w.set_pllren(true);
+    });
+    rcc.cr().modify(|w| w.set_pllon(true));
+    wait.until(&mut || rcc.cr().read().pllrdy()).or(Err(StartError::Pll))?;
+    // Above 150 MHz the buses have to pass through half the frequency for a microsecond.
+    rcc.cfgr().write(|w| {
+        w.set_hpre(rcc::vals::Hpre::DIV2);
+        w.set_sw(rcc::vals::Sw::PLL1_R);
+    });
+    wait.until(&mut || rcc.cfgr().read().sws() == rcc::vals::Sw::PLL1_R).or(Err(StartError::ClockSwitch))?;
+    wait.microseconds(1);
+    rcc.cfgr().modify(|w| w.set_hpre(rcc::vals::Hpre::DIV1));
+    rcc.cr().modify(|w| w.set_csson(true));
+    Ok(())
+}
+
+/// Clocks of the peripherals; timers and processor stop together under a debugger, and stopped PWM timers have their
+/// outputs off. A locked-up processor or a bad memory word breaks them too.
+pub fn enable_peripherals(registers: &Registers) {
+    let Registers { rcc, syscfg, dbgmcu, .. } = *registers;
+    rcc.ahb2enr().modify(|w| {
+        w.set_gpioaen(true);
+        w.set_gpioben(true);
+        w.set_gpiocen(true);
+        w.set_adc12en(true);
+        w.set_dac3en(true);
+        w.set_dac4en(true);
+    });
+    rcc.apb1enr1().modify(|w| {
+        w.set_tim3en(true);
+        w.set_tim4en(true);
+    });
+    rcc.apb2enr().modify(|w| {
+        w.set_syscfgen(true);
+        w.set_tim1en(true);
+        w.set_tim8en(true);
+    });
+    dbgmcu.apb2fzr().modify(|w| {
+        w.set_tim1(true);
+        w.set_tim8(true);
+    });
+    dbgmcu.apb1lfzr().modify(|w| {
+        w.set_tim3(true);
+        w.set_iwdg(true);
+    });
+    syscfg.cfgr2().modify(|w| {
+        w.set_cll(true);
+        w.set_eccl(true);
+    });
+}

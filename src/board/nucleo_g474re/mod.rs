@@ -1,0 +1,53 @@
+//! ST's NUCLEO-G474RE (STM32G474RE, Cortex-M4F at 170 MHz), registers only.
+//!
+//! * PWM timer: TIM1 with TIM8 in step, one period a carrier half; [`legs`] says how a half is played and which registers
+//!   are shadowed, [`half`] how it becomes compare values, [`dead_time`] how the dead time is coded.
+//! * Control timer: TIM3, started by TIM1's first update, so that both count from one instant.
+//! * Both timers' clocks are 170 MHz divided by [`PRESCALER`]: 16 bits then hold the longest half.
+//! * Converters: ADC1 at the control timer's update, ADC2 at the PWM timer's ([`sampling`]). Position: an encoder on
+//!   TIM4, or whatever implements [`Position`].
+//! * Break inputs and comparators turn the gates off without clock and software ([`comparators`]); the watchdog
+//!   does when an interrupt stops coming ([`watchdog`]).
+//! * [`pins`] is the wiring, [`power_stage`] the scales, [`mod@start`] the order of the start.
+//!
+//! Everything here but `chip` takes its registers as values, so tests on the host run it against blocks of memory.
+
+pub mod clock;
+pub mod comparators;
+pub mod control_timer;
+pub mod dead_time;
+pub mod half;
+pub mod legs;
+pub mod operator;
+pub mod pins;
+mod ports;
+pub mod position;
+pub mod power_stage;
+pub mod registers;
+pub mod sampling;
+pub mod start;
+pub mod watchdog;
+
+#[cfg(target_os = "none")]
+mod chip;
+
+#[cfg(target_os = "none")]
+pub use chip::*;
+pub use ports::{Control, Pwm};
+pub use position::Position;
+
+use crate::time::Clock;
+use power_stage::CORE_HZ;
+
+/// Cycles of the undivided clock in a tick of both timers.
+pub const PRESCALER: u16 = 8;
+
+/// Control interrupts per second, in Hz.
+const CONTROL_HZ: u32 = 10_000;
+
+/// 21.25 MHz ticks; control at 10 kHz.
+pub const CLOCK: Clock = {
+    let ticks_per_s = CORE_HZ / PRESCALER as u32;
+    assert!(ticks_per_s * PRESCALER as u32 == CORE_HZ && ticks_per_s.is_multiple_of(CONTROL_HZ));
+    Clock::new(ticks_per_s, ticks_per_s / CONTROL_HZ)
+};

@@ -1,0 +1,155 @@
+//! The two interrupts' sides of the board.
+
+use super::control_timer::ControlTimer;
+use super::half::HalfRegisters;
+use super::operator::Operator;
+use super::pins;
+use super::position::Position;
+use super::registers::Registers;
+use super::sampling::{Sampler, Zeros, currents_a};
+use super::start::{control_sampler, pwm_sampler};
+use crate::board::{ControlPort, PwmPort, Sample};
+use crate::control::Measurements;
+use crate::drive::Report;
+use crate::frames::{Abc, Angle};
+use crate::modulation::{CarrierPeriod, Mode};
+use crate::protection::SafeState;
+use crate::time::Instant;
+
+/// The control interrupt's side.
+pub struct Control<'a, P> {
+    registers: Registers,
+    timer: ControlTimer,
+    sampler: Sampler,
+    zeros: Zeros,
+    position: P,
+    /// The last known angle.
+    angle: Angle,
+    operator: &'a Operator,
+}
+
+impl<'a, P: Position> Control<'a, P> {
+    /// With the zeros that the start measured.
+    pub const fn new(registers: Registers, zeros: Zeros, position: P, operator: &'a Operator) -> Self {
+        Self {
+            registers,
+            timer: ControlTimer(registers.tim3),
+            sampler: control_sampler(&registers),
+            zeros,
+            position,
+            angle: Angle::ZERO,
+            operator,
+        }
+    }
+
+    /// First thing in the interrupt.
+    #[inline]
+    pub fn acknowledge(&mut self) {
+        self.timer.acknowledge();
+    }
+}
+
+impl<P: Position> ControlPort for Control<'_, P> {
+    /// Position first: it is read, not sampled, and moves on while the conversions end.
+    fn sample(&mut self, _now: Instant) -> Sample {
+        let angle = self.position.angle();
+        if let Some(angle) = angle {
+            self.angle = angle;
+        }
+        let codes = self.sampler.read();
+        let udc_v = match codes {
+            Some([_, _, _, udc]) => udc.udc_v(),
+            None => f32::NAN,
+        };
+        let healthy = angle.is_some() && !self.registers.legs.is_tripped();
+        Sample {
+            measured: Measurements { currents_a: currents_a(codes, &self.zeros), udc_v, angle: self.angle },
+            demand: self.operator.demand(),
+            enable: healthy && pins::is_enabled(&self.registers),
+        }
+    }
+
+    fn enter(&mut self, safe: SafeState, _now: Instant) {
+        enter(&self.registers, safe);
+    }
+
+    fn overrun_ticks(&mut self, _now: Instant) -> u32 {
+        self.timer.overrun_ticks()
+    }
+
+    fn report(&mut self, _now: Instant, report: &Report) {
+        self.operator.tell(report);
+    }
+}
+
+/// The PWM interrupt's side.
+pub struct Pwm {
+    registers: Registers,
+    sampler: Sampler,
+    zeros: Zeros,
+    /// Whether the half that comes next has pulses.
+    pulses: bool,
+    /// The levels on which the legs stand at its end.
+    levels: [bool; 3],
+}
+
+impl Pwm {
+    /// At rest, with the zeros that the start measured.
+    pub const fn new(registers: Registers, zeros: Zeros) -> Self {
+        let sampler = pwm_sampler(&registers);
+        Self { registers, sampler, zeros, pulses: false, levels: [false; 3] }
+    }
+
+    /// First thing in the interrupt.
+    #[inline]
+    pub fn acknowledge(&mut self) {
+        self.registers.legs.acknowledge();
+    }
+
+    /// Second thing: the half that was preloaded last has just begun. Levels and toggles are the timers' own doing; only the
+    /// outputs as a whole are switched on in a first half with pulses and off after the last.
+    #[inline]
+    pub fn begin_half(&mut self) {
+        let legs = &self.registers.legs;
+        if legs.is_tripped() {
+            // A break of one timer alone stops the other.
+            legs.trip();
+        } else if self.pulses {
+            if !legs.is_on() {
+                legs.switch_on();
+            }
+        } else {
+            legs.switch_off();
+        }
+    }
+}
+
+impl PwmPort for Pwm {
+    fn sample(&mut self, _now: Instant) -> Abc {
+        currents_a(self.sampler.read(), &self.zeros)
+    }
+
+    /// An interrupt that ends after its half has left the timers a mixture of two halves: the gates go off for good.
+    fn play(&mut self, _now: Instant, next: &CarrierPeriod) {
+        let half = HalfRegisters::new(next, self.levels);
+        let legs = &self.registers.legs;
+        legs.play(&half);
+        if legs.is_late() {
+            legs.trip();
+        }
+        self.pulses = next.mode != Mode::Off;
+        self.levels = half.end_levels();
+    }
+
+    fn enter(&mut self, safe: SafeState, _now: Instant) {
+        enter(&self.registers, safe);
+    }
+}
+
+#[inline]
+fn enter(registers: &Registers, safe: SafeState) {
+    match safe {
+        SafeState::GatesOff => registers.legs.trip(),
+        SafeState::ShortCircuit => registers.legs.short_circuit(),
+    }
+}

@@ -1,0 +1,105 @@
+//! The PMaSynRM firmware on the NUCLEO-G474RE.
+
+use core::sync::atomic::{AtomicU32, Ordering};
+use cortex_m_rt::{entry, exception, interrupt};
+use tractive::board::nucleo_g474re::position::Encoder;
+use tractive::board::nucleo_g474re::power_stage::{AdcCode, POWER_STAGE, cycles_to_ticks, ns_to_cycles};
+use tractive::board::nucleo_g474re::registers::Registers;
+use tractive::board::nucleo_g474re::sampling::Zeros;
+use tractive::board::nucleo_g474re::start::Plan;
+use tractive::board::nucleo_g474re::{
+    self as board, CLOCK, Control, Interrupt as interrupt, OPERATOR, PRESCALER, PULSE, Pwm,
+};
+use tractive::control::Gains;
+use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
+use tractive::machine::BUILT_IN;
+use tractive::modulation::Devices;
+use tractive::time::Instant;
+
+static SHARED: Shared = Shared::new();
+/// What the start measured, written before the interrupts are unmasked.
+static CONTROL_ZEROS: [AtomicU32; 3] = [const { AtomicU32::new(0) }; 3];
+static PWM_ZEROS: [AtomicU32; 3] = [const { AtomicU32::new(0) }; 3];
+
+fn settings() -> Settings {
+    let ticks = |ns| cycles_to_ticks(ns_to_cycles(ns), PRESCALER);
+    Settings {
+        clock: CLOCK,
+        devices: Devices::new(
+            ticks(POWER_STAGE.min_pulse_ns),
+            ticks(POWER_STAGE.dead_time_ns),
+            BUILT_IN.ratings.max_switching_hz,
+            &CLOCK,
+        ),
+        gains: Gains::DEFAULT,
+    }
+}
+
+fn keep(cells: &[AtomicU32; 3], zeros: Zeros) {
+    for (cell, zero) in cells.iter().zip(zeros) {
+        cell.store(u32::from(zero.0), Ordering::Relaxed);
+    }
+}
+
+fn kept(cells: &[AtomicU32; 3]) -> Zeros {
+    cells.each_ref().map(|cell| AdcCode(cell.load(Ordering::Relaxed) as u16))
+}
+
+#[entry]
+fn main() -> ! {
+    if let Ok(found) = board::prepare(Plan { shortest_half_ticks: settings().devices.shortest_half_ticks }) {
+        keep(&CONTROL_ZEROS, found.control_zeros);
+        keep(&PWM_ZEROS, found.pwm_zeros);
+        board::run();
+    }
+    board::idle()
+}
+
+/// Deadline: the next control interrupt. Missed: fault `control_deadline`, gates into the safe state.
+#[interrupt]
+fn TIM3() {
+    static mut BOARD: Option<Control<'static, Encoder>> = None;
+    static mut TASK: Option<ControlTask> = None;
+    let board = BOARD.get_or_insert_with(|| {
+        let registers = Registers::CHIP;
+        let encoder = Encoder::new(registers.tim4, &POWER_STAGE, BUILT_IN.ratings.pole_pairs as u32);
+        Control::new(registers, kept(&CONTROL_ZEROS), encoder, &OPERATOR)
+    });
+    board.acknowledge();
+    let first = Instant(CLOCK.control_ticks);
+    TASK.get_or_insert_with(|| ControlTask::new(&BUILT_IN, settings(), first)).run(board, &SHARED);
+    PULSE.control_ran();
+}
+
+/// Deadline: the next carrier boundary, where the shadow registers take over. Missed: a break, gates off for good.
+#[interrupt]
+fn TIM1_UP_TIM16() {
+    static mut BOARD: Option<Pwm> = None;
+    static mut TASK: Option<PwmTask> = None;
+    let board = BOARD.get_or_insert_with(|| Pwm::new(Registers::CHIP, kept(&PWM_ZEROS)));
+    board.acknowledge();
+    board.begin_half();
+    let task = TASK.get_or_insert_with(|| {
+        let settings = settings();
+        let first = Instant(settings.devices.shortest_half_ticks);
+        PwmTask::new(&BUILT_IN, settings, first)
+    });
+    task.run(board, &SHARED);
+    PULSE.pwm_ran();
+}
+
+#[exception]
+unsafe fn HardFault(_frame: &cortex_m_rt::ExceptionFrame) -> ! {
+    board::die()
+}
+
+/// Any other exception or interrupt: there is none that the drive survives (the clock security system's among them).
+#[exception]
+unsafe fn DefaultHandler(_number: i16) -> ! {
+    board::die()
+}
+
+#[panic_handler]
+fn panic(_info: &core::panic::PanicInfo) -> ! {
+    board::die()
+}

@@ -1,0 +1,59 @@
+//! The drive's own two tasks on the board in memory.
+
+use crate::bench::Bench;
+use crate::{devices, plan};
+use tractive::board::nucleo_g474re::operator::Operator;
+use tractive::board::nucleo_g474re::position::Encoder;
+use tractive::board::nucleo_g474re::power_stage::{AdcCode, POWER_STAGE};
+use tractive::board::nucleo_g474re::{CLOCK, Control, Pwm};
+use tractive::control::Gains;
+use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
+use tractive::machine::BUILT_IN;
+use tractive::time::Instant;
+
+/// Ticks from one encoder count to the next at 200 r/min.
+const TICKS_PER_COUNT: u64 = 1_556;
+
+#[test]
+fn the_drive_pulses_a_turning_machine_through_the_registers() {
+    let mut bench = Bench::started(plan());
+    bench.codes[6] = (1_500.0 / POWER_STAGE.udc_v_per_code) as u16;
+    let registers = bench.registers;
+    let (shared, operator) = (Shared::new(), Operator::new());
+    let settings = Settings { clock: CLOCK, devices: devices(), gains: Gains::DEFAULT };
+    let zeros = [AdcCode(2_048); 3];
+    let encoder = Encoder::new(registers.tim4, &POWER_STAGE, 4);
+    let mut control = Control::new(registers, zeros, encoder, &operator);
+    let mut pwm = Pwm::new(registers, zeros);
+    let first_half = Instant(plan().shortest_half_ticks);
+    let mut control_task = ControlTask::new(&BUILT_IN, settings, Instant(CLOCK.control_ticks));
+    let mut pwm_task = PwmTask::new(&BUILT_IN, settings, first_half);
+    registers.tim4.sr().write(|w| w.set_idxif(true));
+    // SAFETY: IDR is word 4 of the port's block of memory; bit 2 is the enable input.
+    unsafe { registers.gpioc.as_ptr().cast::<u32>().add(4).write_volatile(1 << 2) };
+    let (mut changes, mut gates) = (0, bench.legs.map(|leg| leg.gates()));
+    for tick in 1..=700_000_u64 {
+        if bench.tick() {
+            assert_eq!(pwm_task.next_call(), Instant(tick as u32), "the timer keeps the drive's time");
+            pwm.acknowledge();
+            bench.settle();
+            pwm.begin_half();
+            bench.finish_sequence(registers.adc2);
+            pwm_task.run(&mut pwm, &shared);
+        }
+        if tick.is_multiple_of(u64::from(CLOCK.control_ticks)) {
+            registers.tim4.cnt().write(|w| w.set_cnt((tick / TICKS_PER_COUNT % 4_096) as u16));
+            bench.finish_sequence(registers.adc1);
+            control_task.run(&mut control, &shared);
+        }
+        bench.settle();
+        let now = bench.legs.map(|leg| leg.gates());
+        changes += u32::from(now != gates);
+        gates = now;
+    }
+    assert_eq!(operator.report().unwrap().trip, None);
+    assert_eq!(pwm_task.trip(), None);
+    // 20 ms pass until the speed is known, 13 ms remain: 23 halves, in each of which three legs toggle once, one device going
+    // off and, the dead time later, the other on.
+    assert!((100..=23 * 6 + 6).contains(&changes), "{changes}");
+}

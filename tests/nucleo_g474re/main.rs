@@ -1,0 +1,29 @@
+//! The NUCLEO-G474RE's registers: the board's own functions against blocks of memory, with a model of the timers behind.
+
+mod bench;
+mod drive;
+mod legs;
+mod pins;
+mod ports;
+mod start;
+
+use tractive::board::nucleo_g474re::CLOCK;
+use tractive::board::nucleo_g474re::power_stage::{POWER_STAGE, cycles_to_ticks, ns_to_cycles};
+use tractive::board::nucleo_g474re::start::Plan;
+use tractive::machine::BUILT_IN;
+use tractive::modulation::Devices;
+
+/// The carrier of the machine that is built in.
+fn devices() -> Devices {
+    let ticks = |ns| cycles_to_ticks(ns_to_cycles(ns), tractive::board::nucleo_g474re::PRESCALER);
+    Devices::new(
+        ticks(POWER_STAGE.min_pulse_ns),
+        ticks(POWER_STAGE.dead_time_ns),
+        BUILT_IN.ratings.max_switching_hz,
+        &CLOCK,
+    )
+}
+
+fn plan() -> Plan {
+    Plan { shortest_half_ticks: devices().shortest_half_ticks }
+}

@@ -1,0 +1,146 @@
+//! What the interrupts see of the board.
+
+use crate::bench::Bench;
+use crate::plan;
+use stm32_metapac::gpio::regs::Idr;
+use tractive::board::nucleo_g474re::operator::Operator;
+use tractive::board::nucleo_g474re::position::{Encoder, Position};
+use tractive::board::nucleo_g474re::power_stage::{AdcCode, POWER_STAGE};
+use tractive::board::nucleo_g474re::sampling::Zeros;
+use tractive::board::nucleo_g474re::watchdog::Pulse;
+use tractive::board::nucleo_g474re::{Control, Pwm};
+use tractive::board::{ControlPort, PwmPort};
+use tractive::drive::Report;
+use tractive::frames::Angle;
+use tractive::protection::SafeState;
+use tractive::time::Instant;
+
+const NOW: Instant = Instant(0);
+const ZEROS: Zeros = [AdcCode(2_048), AdcCode(2_050), AdcCode(2_040)];
+
+/// Writes a register that only the hardware writes.
+fn write_input(port: stm32_metapac::gpio::Gpio, levels: u32) {
+    // SAFETY: IDR is word 4 of the port's block of memory.
+    unsafe { port.as_ptr().cast::<Idr>().add(4).write_volatile(Idr(levels)) };
+}
+
+#[test]
+fn a_sample_has_currents_link_voltage_and_angle_in_si_units() {
+    let mut bench = Bench::started(plan());
+    let registers = bench.registers;
+    let operator = Operator::new();
+    let mut control =
+        Control::new(registers, ZEROS, Encoder::new(registers.tim4, &POWER_STAGE, 4), &operator);
+    (bench.codes[2], bench.codes[7], bench.codes[14], bench.codes[6]) =
+        (2_048 + 512, 2_050 - 256, 2_040 - 256, 2_457);
+    bench.finish_sequence(registers.adc1);
+    registers.tim4.cnt().write(|w| w.set_cnt(256));
+    registers.tim4.sr().write(|w| w.set_idxif(true));
+    write_input(registers.gpioc, 1 << 2);
+    operator.ask(120.0);
+    let sample = control.sample(NOW);
+    let currents = sample.measured.currents_a;
+    assert_eq!((currents.a, currents.b, currents.c), (125.0, -62.5, -62.5));
+    assert!((sample.measured.udc_v - 1_500.0).abs() < 0.5);
+    // A sixteenth of a turn of the shaft, four pole pairs.
+    assert_eq!(sample.measured.angle, Angle(1 << 30));
+    assert!(sample.enable && sample.demand.slew_limited);
+    assert_eq!(sample.demand.torque_nm, 120.0);
+}
+
+#[test]
+fn the_gates_wait_for_the_index_the_enable_input_and_quiet_break_inputs() {
+    for (index, enable, trip) in [(false, true, false), (true, false, false), (true, true, true)] {
+        let mut bench = Bench::started(plan());
+        let registers = bench.registers;
+        let operator = Operator::new();
+        let encoder = Encoder::new(registers.tim4, &POWER_STAGE, 4);
+        let mut control = Control::new(registers, ZEROS, encoder, &operator);
+        registers.tim4.sr().write(|w| w.set_idxif(index));
+        write_input(registers.gpioc, u32::from(enable) << 2);
+        if trip {
+            control.enter(SafeState::GatesOff, NOW);
+            bench.settle();
+        }
+        bench.finish_sequence(registers.adc1);
+        assert!(!control.sample(NOW).enable);
+    }
+}
+
+#[test]
+fn a_converter_that_is_silent_gives_no_number() {
+    let bench = Bench::started(plan());
+    let registers = bench.registers;
+    // Acknowledged and nothing new.
+    registers.adc2.isr().write(|_| ());
+    let currents = Pwm::new(registers, ZEROS).sample(NOW);
+    assert!(currents.a.is_nan() && currents.b.is_nan() && currents.c.is_nan());
+}
+
+#[test]
+fn an_absolute_sensor_takes_the_encoders_place() {
+    struct Resolver;
+    impl Position for Resolver {
+        fn angle(&mut self) -> Option<Angle> {
+            Some(Angle::DEG_90)
+        }
+    }
+    let bench = Bench::started(plan());
+    let operator = Operator::new();
+    let mut control = Control::new(bench.registers, ZEROS, Resolver, &operator);
+    bench.finish_sequence(bench.registers.adc1);
+    assert_eq!(control.sample(NOW).measured.angle, Angle::DEG_90);
+}
+
+#[test]
+fn an_overrun_is_counted_from_the_next_period() {
+    let bench = Bench::started(plan());
+    let registers = bench.registers;
+    let operator = Operator::new();
+    let encoder = Encoder::new(registers.tim4, &POWER_STAGE, 4);
+    let mut control = Control::new(registers, ZEROS, encoder, &operator);
+    registers.tim3.sr().write(|_| ());
+    registers.tim3.cnt().write(|w| w.set_cnt(77));
+    assert_eq!(control.overrun_ticks(NOW), 0);
+    registers.tim3.sr().write(|w| w.set_uif(true));
+    assert_eq!(control.overrun_ticks(NOW), 77);
+    registers.tim3.cnt().write(|w| w.set_cnt(0));
+    assert_eq!(control.overrun_ticks(NOW), 1);
+}
+
+#[test]
+fn the_watchdog_is_fed_only_when_both_interrupts_ran() {
+    let registers = Bench::started(plan()).registers;
+    // SAFETY: KR is word 0 of the watchdog's block of memory.
+    let fed = || unsafe { registers.iwdg.as_ptr().cast::<u32>().replace(0) == 0xAAAA };
+    assert!(fed(), "at its start");
+    let pulse = Pulse::new();
+    for (control, pwm, food) in [
+        (false, false, false),
+        (true, false, false),
+        (true, false, false),
+        (false, true, true),
+        (false, true, false),
+    ] {
+        if control {
+            pulse.control_ran();
+        }
+        if pwm {
+            pulse.pwm_ran();
+        }
+        pulse.feed_if_both_ran(&registers);
+        assert_eq!(fed(), food, "{control} {pwm}");
+    }
+}
+
+#[test]
+fn the_idle_loop_hears_what_control_did() {
+    let bench = Bench::started(plan());
+    let registers = bench.registers;
+    let operator = Operator::new();
+    assert!(operator.report().is_none());
+    let encoder = Encoder::new(registers.tim4, &POWER_STAGE, 4);
+    let report = Report { torque_nm: 7.0, ..Report::default() };
+    Control::new(registers, ZEROS, encoder, &operator).report(NOW, &report);
+    assert_eq!(operator.report(), Some(report));
+}
