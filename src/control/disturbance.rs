@@ -18,6 +18,7 @@ pub struct Observer {
     /// Amplitudes that turn with and against six times the rotor angle, in V.
     with_sixth: Dq,
     against_sixth: Dq,
+    follows_sixth: bool,
 }
 
 /// A boundary, and where the rotor was.
@@ -34,7 +35,7 @@ pub struct Input<'a> {
 impl Observer {
     pub const fn new() -> Self {
         const ZERO: Dq = Dq { d: 0.0, q: 0.0 };
-        Self { last_flux: None, mean: ZERO, with_sixth: ZERO, against_sixth: ZERO }
+        Self { last_flux: None, mean: ZERO, with_sixth: ZERO, against_sixth: ZERO, follows_sixth: false }
     }
 
     /// The mean disturbance, in V, rotor frame: flux rises by it although nobody asked.
@@ -44,6 +45,9 @@ impl Observer {
 
     /// The disturbance with the rotor at an angle, in V.
     pub fn voltage(&self, angle: Angle) -> Dq {
+        if !self.follows_sixth {
+            return self.mean;
+        }
         let sixth = sixth(angle);
         self.mean + turned(self.with_sixth, sixth) + turned(self.against_sixth, back(sixth))
     }
@@ -64,6 +68,7 @@ impl Observer {
     }
 
     fn learn(&mut self, voltage: Dq, angle: Angle, follow_sixth: bool, gain: f32) {
+        self.follows_sixth = follow_sixth;
         if !follow_sixth {
             self.with_sixth = Dq::default();
             self.against_sixth = Dq::default();
