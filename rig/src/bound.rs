@@ -91,7 +91,8 @@ fn ideal(rows: &[crate::trace::Row], options: &RunOptions, machine: &Machine) ->
     let (psi_d, psi_q) = (mean(&|row| flux(row).psi_d_wb), mean(&|row| flux(row).psi_q_wb));
     let (id, iq) = (mean(&|row| row.id_a), mirror * mean(&|row| row.iq_a));
     let resistance = parameters.stator_resistance_ohm;
-    let voltage_v = (resistance * id - omega * psi_q).hypot(resistance * iq + omega * psi_d);
+    let (ud, uq) = (resistance * id - omega * psi_q, resistance * iq + omega * psi_d);
+    let voltage_v = ud.hypot(uq);
     let wanted = Wanted {
         mode: last.mode,
         voltage_v: if last.mode == Mode::Square {
@@ -107,12 +108,12 @@ fn ideal(rows: &[crate::trace::Row], options: &RunOptions, machine: &Machine) ->
         max_switching_hz: machine.tables.ratings.max_switching_hz,
     };
     let ripple = Ripple::of(&wanted)?;
-    let load = psi_q.atan2(psi_d);
+    let voltage_angle = uq.atan2(ud);
     let mut samples = Samples { angle: Vec::new(), current_a: Vec::new(), torque_nm: Vec::new() };
     let mut current = (id, iq);
     for (alpha, beta, angle) in ripple.points {
-        // The rotor stands behind the fundamental of the flux by the load angle.
-        let rotor = angle - load;
+        // The rotor stands behind the voltage by the voltage's angle in its frame.
+        let rotor = angle - voltage_angle;
         let (sin, cos) = rotor.sin_cos();
         let (d, q) = (psi_d + alpha * cos + beta * sin, psi_q + beta * cos - alpha * sin);
         current = map.inverse(d, q, current)?;
@@ -123,7 +124,7 @@ fn ideal(rows: &[crate::trace::Row], options: &RunOptions, machine: &Machine) ->
     Some(samples)
 }
 
-/// A pattern's ripple flux, evenly sampled: (α, β) in Wb, and the angle of the fundamental flux in rad.
+/// A pattern's ripple flux, evenly sampled: (α, β) in Wb, and the angle of the fundamental voltage in rad.
 struct Ripple {
     points: Vec<(f64, f64, f64)>,
 }
@@ -171,7 +172,8 @@ impl Ripple {
         let points = flux.iter().enumerate().map(|(k, (alpha, beta))| {
             let angle = omega * k as f64 * dt_s + phase;
             let (s, c) = angle.sin_cos();
-            (alpha - mean.0 - size * c, beta - mean.1 - size * s, angle)
+            // The integral of a turning vector lags it by a quarter of a turn.
+            (alpha - mean.0 - size * c, beta - mean.1 - size * s, angle + 0.25 * TAU)
         });
         Some(Self { points: points.collect() })
     }

@@ -100,10 +100,24 @@ fn a_coasting_machine_is_caught_at_any_speed_in_the_mode_that_it_needs() {
 
 #[test]
 fn distortion_is_what_pulses_and_inductances_allow() {
-    for point in ["1000 --torque 1235", "1050 --torque 1235", "1500 --torque 1235", "1800 --torque 1235"] {
-        keeps_its_bounds(&format!("steady --speed {point}"));
-    }
-    for point in ["2000 --torque 859.4", "2000 --torque 1174.6", "4000 --torque 588"] {
+    let points = [
+        "200 --torque 1235",
+        "200 --torque 100",
+        "500 --torque 1235",
+        "700 --torque 1235",
+        "700 --torque -1235",
+        "1000 --torque 1235",
+        "1050 --torque 1235",
+        "1500 --torque 1235",
+        "-1500 --torque 1235",
+        "1800 --torque 1235",
+        "2000 --torque 859.4",
+        "2000 --torque 600",
+        "2000 --torque 1174.6",
+        "4000 --torque 588",
+        "6000 --torque 392",
+    ];
+    for point in points {
         keeps_its_bounds(&format!("steady --speed {point}"));
     }
 }
