@@ -179,10 +179,11 @@ pub struct SwitchFigures {
     pub steady_current_a: f64,
     /// By how much the first exceeds the second, in percent.
     pub excess_percent: f64,
-    /// Carrier-averaged torque beyond its steady band of the same windows, from 2 ms before to 30 ms after, in N·m.
+    /// Torque beyond the steady ripple band of the same windows, from 2 ms before to 30 ms after, in N·m.
     pub torque_excursion_nm: f64,
-    /// The same for the instantaneous torque.
-    pub instantaneous_torque_excursion_nm: f64,
+    /// The same for torque averaged over 1/900 s. That is not a whole number of ripple periods in every mode, so where the ripple
+    /// changes its shape this shows more than there is.
+    pub averaged_torque_excursion_nm: f64,
 }
 
 /// Every switch between pulsing modes in the recording.
@@ -225,8 +226,8 @@ fn at_switch(recording: &Recording, switch: &Switch) -> SwitchFigures {
         peak_current_a: now,
         steady_current_a: steady,
         excess_percent: (now / steady - 1.0) * 100.0,
-        torque_excursion_nm: excursion(averaged),
-        instantaneous_torque_excursion_nm: excursion(instantaneous),
+        torque_excursion_nm: excursion(instantaneous),
+        averaged_torque_excursion_nm: excursion(averaged),
     }
 }
 
@@ -415,7 +416,7 @@ pub fn switch_verdicts(
             "3.3 at 12 to 7, 2.35 at 3 to square",
         ),
         Verdict::at_most(
-            "torque beyond the steady band in N·m",
+            "torque beyond the steady ripple band in N·m",
             torque_nm,
             bound(options, 25.0, f64::INFINITY),
             "31 up, 71 braking",

@@ -75,6 +75,8 @@ pub struct Committed {
     pub depth_limit: f32,
     /// Whether the fundamental is to be that large, whatever the torque needs.
     pub filled: bool,
+    /// Flux ripple of the pattern, as a share of the fundamental flux, greater than zero.
+    pub ripple_share: f32,
     /// Whether the pattern's flux is where it will stay; not while a switch between two of them is still going on.
     pub settled: bool,
 }
@@ -229,7 +231,7 @@ impl Controller {
         let scale = self.map_error.scale();
         let limit =
             VoltageLimit { udc_v: link_v / scale, depth: committed.depth_limit, filled: committed.filled };
-        let trimmed_nm = self.trim.apply(torque_nm, tables.ratings.max_torque_nm);
+        let trimmed_nm = self.trim.apply(torque_nm, committed.ripple_share, tables.ratings.max_torque_nm);
         let point = operating_point(trimmed_nm / scale, omega, &limit, tables);
         let point = OperatingPoint { torque_nm: point.torque_nm * scale, ..point };
         let limited = point.region == Region::Limit;
@@ -237,6 +239,7 @@ impl Controller {
             demand_nm: torque_nm,
             measured_nm,
             limited,
+            ripple_share: committed.ripple_share,
             largest_nm: tables.ratings.max_torque_nm,
             period_s: clock.control_s(),
         });

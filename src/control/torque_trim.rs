@@ -1,8 +1,9 @@
 //! The slow trim of mean torque.
 //!
 //! The current loop holds the fundamental of the flux. In a saturated machine the ripple around it changes the mean torque by up
-//! to some percent, most in the patterns of few pulses. The torque of the measured currents tells; what is missing on
-//! average is added to the demand, as a share of it.
+//! to some percent, most in the patterns of few pulses: in proportion to the square of the ripple, as the curvature of torque over
+//! flux does it. The torque of the measured currents tells; what is missing on average is added to the demand. What was
+//! learned under one pattern so holds for the next one.
 
 use crate::frames::limit;
 
@@ -19,8 +20,8 @@ const HOLD_S: f32 = 0.01;
 
 #[derive(Clone, Copy, Debug)]
 pub struct TorqueTrim {
-    /// Trim over [`scale`].
-    share: f32,
+    /// Trim over [`scale`] and over the square of the ripple's share.
+    curvature: f32,
     last_demand_nm: f32,
     hold_s: f32,
 }
@@ -33,19 +34,22 @@ pub struct Input {
     pub measured_nm: f32,
     /// Whether more torque is not to be had.
     pub limited: bool,
+    /// Flux ripple over fundamental flux, greater than zero.
+    pub ripple_share: f32,
     pub largest_nm: f32,
     pub period_s: f32,
 }
 
 impl TorqueTrim {
     pub const fn new() -> Self {
-        Self { share: 0.0, last_demand_nm: 0.0, hold_s: HOLD_S }
+        Self { curvature: 0.0, last_demand_nm: 0.0, hold_s: HOLD_S }
     }
 
     /// The demand with its trim, in N·m.
-    pub fn apply(&self, demand_nm: f32, largest_nm: f32) -> f32 {
+    pub fn apply(&self, demand_nm: f32, ripple_share: f32, largest_nm: f32) -> f32 {
         let most = MOST * demand_nm.abs();
-        let trim = limit(self.share * scale(demand_nm, largest_nm), -most, most);
+        let trim =
+            limit(self.curvature * ripple_share * ripple_share * scale(demand_nm, largest_nm), -most, most);
         if demand_nm < 0.0 { demand_nm - trim } else { demand_nm + trim }
     }
 
@@ -66,7 +70,8 @@ impl TorqueTrim {
             return;
         }
         let step = BANDWIDTH_RAD_S * input.period_s * missing / scale(input.demand_nm, input.largest_nm);
-        self.share = limit(self.share + step, -MOST, MOST);
+        let square = input.ripple_share * input.ripple_share;
+        self.curvature = limit(self.curvature * square + step, -MOST, MOST) / square;
     }
 }
 

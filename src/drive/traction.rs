@@ -12,7 +12,7 @@ use crate::frames::{Abc, AlphaBeta, Angle};
 use crate::machine::Tables;
 use crate::modulation::{
     CarrierPeriod, Devices, Mode, Modulator, Reference, Schedule, compensated, depth_limit, first_half,
-    ripple_flux,
+    ripple_flux, ripple_share,
 };
 use crate::protection::{self, Fault, FrozenWatch, Trip, Violation};
 use crate::time::{Clock, Instant};
@@ -260,6 +260,7 @@ impl ControlTask {
                 follows: Follows::Mean,
                 depth_limit: depth_limit(Mode::Async, 0.0, &self.settings.devices),
                 filled: false,
+                ripple_share: ripple_share(Mode::Async, 0.0),
                 settled: true,
             };
         };
@@ -290,6 +291,7 @@ impl ControlTask {
             },
             depth_limit,
             filled,
+            ripple_share: ripple_share(decided, self.depth),
             settled: true,
         }
     }

@@ -21,7 +21,7 @@ use crate::time::{Clock, Instant};
 
 use carrier::Zeros;
 pub use dead_time::compensated;
-pub use ripple::ripple_flux;
+pub use ripple::{ripple_flux, ripple_share};
 pub use schedule::{Schedule, depth_limit, first_half};
 
 /// How the pulses are made.

@@ -33,3 +33,16 @@ pub fn ripple_flux(mode: Mode, half: u32, voltage_v: f32, udc_v: f32, omega: f32
 
 /// 60° in angle units, rounded to the nearest.
 const SECTOR: u32 = 715_827_883;
+
+/// The flux ripple of a mode as a share of the fundamental flux (its weighted distortion), for a fundamental of `depth` of
+/// six-step: within a tenth of what the pulses have. The carriers count as one, that of 12 carriers a turn.
+pub fn ripple_share(mode: Mode, depth: f32) -> f32 {
+    const SQUARE: f32 = 0.046_4;
+    let missing = if depth < 1.0 { 1.0 - depth } else { 0.0 };
+    match mode {
+        Mode::Square => SQUARE,
+        Mode::Mid3 => SQUARE + 0.49 * missing * missing,
+        Mode::Mid7 => SQUARE + 0.02 * missing,
+        _ => 0.045_3,
+    }
+}

@@ -14,6 +14,8 @@ pub struct ModeBorders;
 const SPEED_RPM: f64 = 1860.0;
 const LEVELS: usize = 200;
 const LEVEL_S: f64 = 0.01;
+/// At the envelope, in s.
+const HOLD_S: f64 = 0.6;
 
 impl Scenario for ModeBorders {
     fn name(&self) -> &'static str {
@@ -26,13 +28,16 @@ impl Scenario for ModeBorders {
 
     fn plan(&self, options: &RunOptions, machine: &Machine) -> Plan {
         let most = machine.folder.parameters.max_torque_nm;
-        let share = |level: usize| 1.0 - (level as f64 / LEVELS as f64 - 1.0).abs();
-        let torque = (0..=2 * LEVELS).map(|k| (BEGIN_S + k as f64 * LEVEL_S, most * share(k)));
+        let share = |level: usize| level as f64 / LEVELS as f64;
+        let up = (0..=LEVELS).map(|k| (BEGIN_S + k as f64 * LEVEL_S, most * share(k)));
+        let down_s = BEGIN_S + LEVELS as f64 * LEVEL_S + HOLD_S;
+        let down = (0..=LEVELS).map(|k| (down_s + k as f64 * LEVEL_S, most * share(LEVELS - k)));
+        let torque = up.chain(down);
         Script {
             speed: vec![(0.0, options.speed.unwrap_or(SPEED_RPM))],
             torque: torque.collect(),
             slew_limited: true,
-            duration_s: BEGIN_S + (2 * LEVELS + 2) as f64 * LEVEL_S,
+            duration_s: down_s + (LEVELS + 20) as f64 * LEVEL_S,
             ..Script::default()
         }
         .plan()
