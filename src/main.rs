@@ -71,7 +71,8 @@ mod firmware {
         board.acknowledge();
         let settings = settings();
         let first = Instant(FIRST_HALF_TICKS.load(Ordering::Relaxed));
-        TASK.get_or_insert_with(|| PwmTask::new(&BUILT_IN, settings, first)).run(&mut board, &SHARED);
+        let task = || PwmTask::new(&BUILT_IN, settings, first).after_halves_of(first.0);
+        TASK.get_or_insert_with(task).run(&mut board, &SHARED);
     }
 
     #[exception]

@@ -64,6 +64,10 @@ pub struct Output {
     pub steady: Dq,
 }
 
+/// What a carrier gives at most, in the corners of its hexagon, over what it gives in every direction: 2/√3. Transients may
+/// use it; beyond the hexagon's edges the modulator's phases saturate, and the prediction sees that they did.
+const TRANSIENT_REACH: f32 = 1.154_7;
+
 /// One step of the loop.
 pub fn step(input: &Input, gains: &Gains) -> Output {
     let reference = input.reference;
@@ -74,7 +78,10 @@ pub fn step(input: &Input, gains: &Gains) -> Output {
     match input.committed.follows {
         Follows::Mean => {
             let regulated = mean_voltage(input, reference, predicted, gains) + drop;
-            Output { voltage: shortened(regulated, limit), steady: shortened(steady, limit) }
+            Output {
+                voltage: shortened(regulated, limit * TRANSIENT_REACH),
+                steady: shortened(steady, limit),
+            }
         }
         Follows::Fundamental => {
             let gain = if input.committed.settled { gains.pattern_rad_s } else { 0.0 };

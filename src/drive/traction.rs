@@ -411,6 +411,13 @@ impl PwmTask {
         }
     }
 
+    /// The same for a timer whose first two halves, before the first one of the modulator's, have another length.
+    pub const fn after_halves_of(mut self, ticks: u32) -> Self {
+        self.running = CarrierPeriod::off(ticks);
+        self.next = CarrierPeriod::off(ticks);
+        self
+    }
+
     /// The PWM timer's interrupt, at a carrier boundary. Deadline: the next boundary, where the shadow registers take over.
     pub fn run(&mut self, port: &mut impl PwmPort, shared: &Shared) {
         let now = self.now;

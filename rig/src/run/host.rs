@@ -70,7 +70,7 @@ pub fn run_on_host(
     let mut control_at = Instant(settings.clock.control_ticks);
     let mut pwm_at = Instant(first_half_ticks);
     let mut control = ControlTask::new(tables, settings, control_at);
-    let mut pwm = PwmTask::new(tables, settings, pwm_at);
+    let mut pwm = PwmTask::new(tables, settings, pwm_at).after_halves_of(first_half_ticks);
     let mut progress = Progress::new(name);
     while !bench.is_done() {
         let mut port = Port { bench: &mut bench, error: None };

@@ -81,7 +81,8 @@ impl Scenario for LoadSteps {
     }
 }
 
-fn verdicts(steps: &[StepResponse]) -> Vec<Verdict> {
+/// What is wanted of every step.
+pub fn verdicts(steps: &[StepResponse]) -> Vec<Verdict> {
     let most = |value: fn(&StepResponse) -> f64| worst(steps.iter().map(value));
     // 0.3 % of the command or 2 N·m, whichever is more, counts as one.
     let error = |step: &StepResponse| step.final_error_nm.abs() / (0.003 * step.to_nm).max(2.0);

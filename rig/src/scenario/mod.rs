@@ -1,6 +1,7 @@
 //! What is driven, and what is to be seen.
 
 mod characteristic;
+mod full_step;
 mod link_steps;
 mod load_steps;
 mod mode_borders;
@@ -62,6 +63,7 @@ pub fn all() -> Vec<Box<dyn Scenario>> {
         Box::new(load_steps::LoadSteps),
         Box::new(sweep::Sweep),
         Box::new(characteristic::Characteristic),
+        Box::new(full_step::FullStep),
         Box::new(steady::Steady),
         Box::new(mode_borders::ModeBorders),
         Box::new(reversal::Reversal),

@@ -1,0 +1,58 @@
+//! Full torque in one step, and back.
+
+use super::load_steps::verdicts;
+use super::script::{BEGIN_S, Script};
+use super::{Plan, Scenario};
+use crate::analysis::{self, Figures};
+use crate::machine::Machine;
+use crate::options::RunOptions;
+use crate::report::Page;
+use crate::trace::Recording;
+
+/// 0 → full torque → 0 at `--speed`.
+pub struct FullStep;
+
+const SPEED_RPM: f64 = 200.0;
+const HOLD_S: f64 = 0.1;
+
+impl Scenario for FullStep {
+    fn name(&self) -> &'static str {
+        "full-step"
+    }
+
+    fn figure(&self) -> &'static str {
+        "figure 8: load steps, here all of them in one"
+    }
+
+    fn plan(&self, options: &RunOptions, machine: &Machine) -> Plan {
+        Script {
+            speed: vec![(0.0, options.speed.unwrap_or(SPEED_RPM))],
+            torque: vec![(BEGIN_S, machine.folder.parameters.max_torque_nm), (BEGIN_S + HOLD_S, 0.0)],
+            duration_s: BEGIN_S + 2.0 * HOLD_S,
+            ..Script::default()
+        }
+        .plan()
+    }
+
+    fn figures(&self, recording: &Recording, _options: &RunOptions, machine: &Machine) -> Figures {
+        let most = machine.folder.parameters.max_torque_nm;
+        let steps = [(BEGIN_S, 0.0, most), (BEGIN_S + HOLD_S, most, 0.0)].map(|(at_s, from_nm, to_nm)| {
+            let step = analysis::Step { at_s, from_nm, to_nm, until_s: at_s + HOLD_S };
+            analysis::step_response(recording, &step)
+        });
+        let mut figures = analysis::common(recording);
+        figures.set("verdicts", verdicts(&steps));
+        figures.set("steps", steps);
+        figures
+    }
+
+    fn plots(&self, recording: &Recording, page: &mut Page) {
+        page.plot("Phase current u", "A", recording, &[("ia", |row| row.ia_a)]);
+        page.plot(
+            "Torque",
+            "N·m",
+            recording,
+            &[("torque", |row| row.te_nm), ("demand", |row| row.te_ref_nm)],
+        );
+    }
+}
