@@ -15,6 +15,7 @@ mod disturbance;
 mod mtpa;
 mod reference;
 mod speed;
+mod speed_loop;
 mod torque_trim;
 mod z_source;
 
@@ -26,6 +27,7 @@ pub use current_loop::{Follows, Gains};
 pub use demand::Demand;
 pub use mtpa::mtpa;
 pub use reference::{OperatingPoint, Region, VoltageLimit, operating_point, six_step_v};
+pub use speed_loop::{SpeedDesign, SpeedInput, SpeedLoop};
 pub use z_source::{
     Limited, ZSource, ZSourceDesign, ZSourceError, ZSourceGains, ZSourceInput, ZSourceOutput,
 };
@@ -71,6 +73,8 @@ pub struct Committed {
     pub follows: Follows,
     /// Largest fundamental of the mode as a share of six-step.
     pub depth_limit: f32,
+    /// Share of that which the operating point may use; what is left is for regulation.
+    pub steady_share: f32,
     /// Whether the fundamental is to be that large, whatever the torque needs.
     pub filled: bool,
     /// Whether the pattern's flux is where it will stay; not while a switch between two of them is still going on.
@@ -155,8 +159,17 @@ pub struct Controller {
 impl Controller {
     /// At rest, with nothing known of the machine's angle.
     pub const fn new() -> Self {
+        Self::with_tracker(speed::SpeedTracker::new())
+    }
+
+    /// The same with a speed tracker of this natural frequency, in rad/s.
+    pub const fn with_tracking(natural_rad_s: f32) -> Self {
+        Self::with_tracker(speed::SpeedTracker::with_natural(natural_rad_s))
+    }
+
+    const fn with_tracker(speed: speed::SpeedTracker) -> Self {
         Self {
-            speed: speed::SpeedTracker::new(),
+            speed,
             demand: demand::Shaper::new(),
             disturbance: disturbance::Observer::new(),
             trim: torque_trim::TorqueTrim::new(),
@@ -167,6 +180,11 @@ impl Controller {
     /// Returns the electrical angular speed, in rad/s.
     pub fn track(&mut self, angle: Angle, clock: &Clock) -> f32 {
         self.speed.step(angle, clock.control_s())
+    }
+
+    /// By how much a measured angle, in rad, is off what the speed makes of the one before.
+    pub fn surprise_rad(&self, angle: Angle, clock: &Clock) -> f32 {
+        (angle - self.speed.predicted(clock.control_s())).signed_radians()
     }
 
     /// Whether the speed has been followed long enough to be used.
@@ -192,8 +210,8 @@ impl Controller {
         let Law { gains, clock, tables } = *law;
         let omega = self.speed.omega();
         let torque_nm = self.demand.step(demand, omega, clock.control_s(), &tables.ratings);
-        let limit =
-            VoltageLimit { udc_v: measured.udc_v, depth: committed.depth_limit, filled: committed.filled };
+        let depth = committed.depth_limit * committed.steady_share;
+        let limit = VoltageLimit { udc_v: measured.udc_v, depth, filled: committed.filled };
         let point =
             operating_point(self.trim.apply(torque_nm, tables.ratings.max_torque_nm), omega, &limit, tables);
         let frame = measured.angle.sin_cos();
