@@ -179,8 +179,19 @@ impl Page {
         Ok(page)
     }
 
+    /// Curves under a heading of their own, over time or anything else; over time dense data is shown by its extremes.
+    pub fn curves(&mut self, heading: &str, x: &str, unit: &str, series: &[(&str, Vec<(f64, f64)>)]) {
+        let series: Vec<_> = series.iter().map(|(name, points)| (*name, thinned(points))).collect();
+        match chart(x, unit, &series) {
+            Ok(svg) => {
+                let _ = write!(self.body, "<h2>{}</h2>{}{svg}", escape(heading), legend(&series));
+            }
+            Err(error) => self.error = Some(error),
+        }
+    }
+
     fn draw(&mut self, title: &str, unit: &str, series: &[(&str, Vec<(f64, f64)>)]) {
-        match chart(unit, series) {
+        match chart("time in s", unit, series) {
             Ok(svg) => {
                 let heading = format!("{} · {title}", self.figure);
                 let _ = write!(self.body, "<h2>{}</h2>{}{svg}", escape(&heading), legend(series));
@@ -190,7 +201,7 @@ impl Page {
     }
 }
 
-fn chart(unit: &str, series: &[(&str, Vec<(f64, f64)>)]) -> Result<String> {
+fn chart(x_title: &str, unit: &str, series: &[(&str, Vec<(f64, f64)>)]) -> Result<String> {
     let points = || series.iter().flat_map(|(_, points)| points.iter());
     let (mut x, mut y) = ((f64::INFINITY, f64::NEG_INFINITY), (0.0_f64, 0.0_f64));
     for (t_s, value) in points() {
@@ -213,7 +224,7 @@ fn chart(unit: &str, series: &[(&str, Vec<(f64, f64)>)]) -> Result<String> {
             .map_err(|error| failed(&error))?;
         chart
             .configure_mesh()
-            .x_desc("time in s")
+            .x_desc(x_title)
             .y_desc(unit)
             .light_line_style(TRANSPARENT)
             .draw()

@@ -76,7 +76,7 @@ fn serve(
             Request::Enter(at, safe) => bench.enter(at, safe),
             Request::Dead => bail!("the firmware stopped in a panic or a HardFault, gates off"),
         }
-        progress.show(bench);
+        progress.show(bench.progress());
     }
 }
 

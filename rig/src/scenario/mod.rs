@@ -52,7 +52,10 @@ pub fn all() -> [Box<dyn Scenario>; 3] {
 
 /// The scenario of that name.
 pub fn find(name: &str) -> Result<Box<dyn Scenario>> {
-    let names: Vec<_> = all().iter().map(|scenario| scenario.name()).collect();
+    let own = all();
+    let zs9 = crate::zs9::scenario::all();
+    let names = own.iter().map(|scenario| scenario.name()).chain(zs9.iter().map(|scenario| scenario.name()));
+    let names: Vec<_> = names.collect();
     all()
         .into_iter()
         .find(|scenario| scenario.name() == name)
@@ -81,7 +84,7 @@ pub fn drive(scenario: &dyn Scenario, options: &RunOptions, machine: &Machine) -
             dead_time_ticks: setup.dead_time_ticks,
             lead_s: LEAD_S,
             duration_s: plan.duration_s,
-            trace_step_s: options.dt,
+            trace_step_s: options.dt_s(),
             udc_v: options.udc.unwrap_or(parameters.dc_link_nominal_v),
             flaws: options.flaws(parameters.trip_current_a),
         },
