@@ -6,7 +6,7 @@ use crate::control::{
     Boundary, Committed, Controller, Demand, Follows, Input, Law, Measurements, Region, SpeedInput, SpeedLoop,
 };
 use crate::drive::traction::UNITS_PER_RADIAN;
-use crate::frames::{AlphaBeta, Angle, Dq};
+use crate::frames::{AlphaBeta, Angle};
 use crate::machine::Tables;
 use crate::protection::{self, Fault, FrozenWatch, Violation};
 
@@ -14,7 +14,10 @@ use crate::protection::{self, Fault, FrozenWatch, Violation};
 const TRACKING_RAD_S: f32 = 4000.0;
 /// How far an angle may be off what the speed tells, in electrical rad: half a turn a period would still look like rest.
 pub const SURPRISE_RAD: f32 = 0.5;
-/// Share of the largest voltage that the operating point may use; the rest regulates.
+/// What the loop may ask for, as a share of the largest voltage that is to be had at every angle. The modulator gives what its
+/// hexagon has at the angle, up to 1.155, and tells.
+const LOOP_SHARE: f32 = 1.15;
+/// Share of the largest voltage at every angle that the operating point may use; the rest regulates.
 const STEADY_SHARE: f32 = 0.98;
 
 /// Control of one motor.
@@ -41,7 +44,7 @@ pub struct AxisOutput {
     pub command: MotorCommand,
     pub torque_nm: f32,
     pub weakening: bool,
-    /// Electrical power of the operating point, in W.
+    /// Electrical power drawn now, in W.
     pub power_w: f32,
 }
 
@@ -118,8 +121,8 @@ impl Axis {
             ripple_after_wb: AlphaBeta::default(),
             interval_s: period_s,
             follows: Follows::Mean,
-            depth_limit: 1.0,
-            steady_share: STEADY_SHARE,
+            depth_limit: LOOP_SHARE,
+            steady_share: STEADY_SHARE / LOOP_SHARE,
             filled: false,
             settled: true,
         };
@@ -140,7 +143,7 @@ impl Axis {
             },
             torque_nm: output.torque_nm,
             weakening: output.point.region != Region::Mtpa,
-            power_w: power_w(output.torque_nm, omega, output.point.current, tables),
+            power_w: power_w(input),
         }
     }
 
@@ -175,10 +178,13 @@ impl Axis {
     }
 }
 
-/// Electrical power of an operating point, in W: `T ω_m + 1.5 R i²`.
-fn power_w(torque_nm: f32, omega: f32, current: Dq, tables: &Tables) -> f32 {
-    let ratings = &tables.ratings;
-    torque_nm * omega / ratings.pole_pairs + 1.5 * ratings.stator_resistance_ohm * current.squared()
+/// The power of the voltage that begins to act now, as the modulator really gives it, at the measured current, in W.
+fn power_w(input: &AxisInput) -> f32 {
+    let Some(MotorShare { depth, angle }) = input.applied else {
+        return 0.0;
+    };
+    let current = input.measured.currents_a.clarke().park(angle.sin_cos());
+    0.75 * depth * input.link_v * current.d
 }
 
 /// Phase currents and speed of one motor.
