@@ -243,8 +243,11 @@ impl Bench {
         }
         let steps = (to - self.now) as f64;
         let [uh, vh, wh, um, vm, wm, ul, vl, wl] = self.levels;
-        let gates = [(uh, um, ul), (vh, vm, vl), (wh, wm, wl)]
-            .map(|(high, middle, low)| LegGates { high, middle, low });
+        let gates = [(uh, um, ul), (vh, vm, vl), (wh, wm, wl)].map(|(high, middle, low)| LegGates {
+            high,
+            middle,
+            low,
+        });
         self.plant.advance(gates, steps * self.step_s)?;
         for (gate, on) in self.levels.into_iter().enumerate() {
             let latch = if on { &mut self.feedback.on } else { &mut self.feedback.off };

@@ -34,10 +34,7 @@ pub fn drive(scenario: &dyn Scenario, options: &RunOptions) -> Result<Outcome> {
     let mut given = serde_json::to_value(options)?;
     if let Some(given) = given.as_object_mut() {
         given.insert("machine".to_owned(), machine.tables.name.into());
-        given.insert(
-            "dt".to_owned(),
-            options.dt.unwrap_or_else(|| scenario.trace_step_s(options)).into(),
-        );
+        given.insert("dt".to_owned(), options.dt.unwrap_or_else(|| scenario.trace_step_s(options)).into());
         if let serde_json::Value::Object(own) = serde_json::to_value(&options.zs9)? {
             given.extend(own);
         }

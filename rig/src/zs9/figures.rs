@@ -132,5 +132,9 @@ pub fn over_speed(
 
 fn heading(figure: &str, title: &str) -> String {
     let number = figure.starts_with(|c: char| c.is_ascii_digit());
-    if number { format!("The paper's figure {figure} · {title}") } else { format!("The paper's {figure} · {title}") }
+    if number {
+        format!("The paper's figure {figure} · {title}")
+    } else {
+        format!("The paper's {figure} · {title}")
+    }
 }

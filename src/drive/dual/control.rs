@@ -193,7 +193,9 @@ impl ControlTask {
                 command.duty = output.duty;
                 report.inductor_ref_a = output.inductor_ref_a;
             }
-            Err(ZSourceError::NotFinite) => self.check(Some((Fault::NotFinite, link.power_w, f32::MAX)), port),
+            Err(ZSourceError::NotFinite) => {
+                self.check(Some((Fault::NotFinite, link.power_w, f32::MAX)), port)
+            }
             Err(ZSourceError::NoSource(volts)) => {
                 self.check(Some((Fault::SourceUndervoltage, volts, 0.0)), port);
             }

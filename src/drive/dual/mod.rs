@@ -58,12 +58,14 @@ impl Settings {
     /// The ZS9's, with a carrier period in ticks.
     pub const fn new(clock: Clock, carrier_ticks: u32) -> Self {
         let period_s = clock.control_ticks as f32 * clock.tick_s;
-        let link = ZSourceDesign { period_s, ..ZSourceDesign::ZS9 };
+        // Quicker than by itself: with the motors' power fed forward the loops only have to catch what is left. Phase margins 52°
+        // and about 50°; a load step then moves the link by half as much as with 600 and 80 Hz.
+        let link = ZSourceDesign { period_s, inner_hz: 700.0, outer_hz: 150.0, ..ZSourceDesign::ZS9 };
         Self {
             clock,
             carrier_ticks,
             gains: Gains { carrier: 0.6, observer: 0.02, ..Gains::DEFAULT },
-            speed: SpeedDesign { inertia_kg_m2: 0.1, natural_rad_s: 350.0, period_s },
+            speed: SpeedDesign { inertia_kg_m2: 0.1, natural_rad_s: 280.0, period_s },
             link,
             link_gains: link.gains(),
             limits: LinkLimits { source_min_v: 280.0, capacitor_max_v: 720.0, duty_max: link.duty_max },

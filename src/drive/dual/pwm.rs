@@ -29,13 +29,7 @@ impl PwmTask {
     /// A task whose first call is at the first peak, half a carrier period after the start, gates off until the second valley.
     pub const fn new(tables: &'static Tables, settings: Settings) -> Self {
         let off = PlayedPeriod::off(settings.half_steps());
-        Self {
-            tables,
-            settings,
-            now: Instant(settings.first_peak_ticks()),
-            periods: [off; 2],
-            trip: None,
-        }
+        Self { tables, settings, now: Instant(settings.first_peak_ticks()), periods: [off; 2], trip: None }
     }
 
     /// The PWM timer's interrupt, at the carrier's peak. Deadline: the next valley, where the shadow registers take over.
@@ -49,7 +43,8 @@ impl PwmTask {
         self.check(violation, port);
         let mut next = PlayedPeriod::off(self.settings.half_steps());
         let mut given = None;
-        if let Some(command) = command.filter(|command| command.gates == Gates::Pulse && self.trip.is_none()) {
+        if let Some(command) = command.filter(|command| command.gates == Gates::Pulse && self.trip.is_none())
+        {
             let request = self.request(&command, &sample);
             match nine_switch::step(&request) {
                 Ok(period) => {

@@ -3,9 +3,7 @@
 use crate::run::Progress;
 use crate::zs9::bench::{Bench, BenchError};
 use crate::zs9::trace::Recording;
-use tractive::board::{
-    DualControlPort, DualPwmPort, DualSample, MotorDemand, PlayedPeriod, PowerSample,
-};
+use tractive::board::{DualControlPort, DualPwmPort, DualSample, MotorDemand, PlayedPeriod, PowerSample};
 use tractive::drive::dual::{ControlTask, DualReport, PwmTask, Settings, Shared};
 use tractive::frames::Abc;
 use tractive::machine::Tables;

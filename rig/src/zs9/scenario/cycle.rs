@@ -26,6 +26,9 @@ const INERTIA_KG_M2: f64 = 6.0;
 const LEAD_S: f64 = 0.2;
 const DURATION_S: f64 = 36.5;
 
+/// The torque needs time to go, in which the speed still falls: half of `T/slew · T/J`, here with 4,000 N·m/s.
+const STOPPING_RPM: f64 = 2.9;
+
 /// What a motor is at.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Phase {
@@ -47,7 +50,7 @@ fn orders(phase: &mut Phase, t_s: f64, rpm: f64) -> (f64, f64) {
         Phase::Before if t_s >= -1e-9 => Phase::Accelerates,
         Phase::Accelerates if rpm >= HIGH_RPM => Phase::Cruises(t_s + CRUISE_S),
         Phase::Cruises(until_s) if t_s >= until_s => Phase::Brakes,
-        Phase::Brakes if rpm <= LOW_RPM => Phase::Done,
+        Phase::Brakes if rpm <= LOW_RPM + STOPPING_RPM => Phase::Done,
         same => same,
     };
     match phase {
@@ -79,8 +82,9 @@ impl Scenario for Cycle {
         let mut phases = [Phase::Before; 2];
         let operator = move |t_s: f64, speeds: SeenMotors| {
             let [one, two] = [0, 1].map(|k| orders(&mut phases[k], t_s, speeds[k]));
-            let torque =
-                |torque_nm: f64| MotorDemand::Torque(Demand { torque_nm: torque_nm as f32, slew_limited: true });
+            let torque = |torque_nm: f64| {
+                MotorDemand::Torque(Demand { torque_nm: torque_nm as f32, slew_limited: true })
+            };
             Orders { demands: [torque(one.0), torque(two.0)], loads_nm: [one.1, two.1], enable: true }
         };
         Plan {
@@ -157,7 +161,9 @@ impl Scenario for Cycle {
             &[("id", |row| row.motors[0].id_a), ("iq", |row| row.motors[0].iq_a)],
         );
         plot(page, "29, 35", "phase voltage, peak", "V", &[("motor 1", |row| row.motors[0].voltage_v)]);
-        figures::over_speed(page, "36", "torque over speed", "N·m", recording, |row| row.motors[0].torque_nm);
+        figures::over_speed(page, "36", "torque over speed", "N·m", recording, |row| {
+            row.motors[0].torque_nm
+        });
         figures::over_speed(page, "36", "phase voltage over speed", "V", recording, |row| {
             row.motors[0].voltage_v
         });

@@ -78,7 +78,10 @@ pub fn find(name: &str) -> Option<Box<dyn Scenario>> {
 /// Drives a scenario.
 pub fn drive(scenario: &dyn Scenario, options: &RunOptions, machine: &Machine) -> Result<Recording> {
     if options.dead_time_us > 0.0 {
-        bail!("--dead-time-us {}: must be 0: a shorted leg is a state of the ZS9's bridge", options.dead_time_us);
+        bail!(
+            "--dead-time-us {}: must be 0: a shorted leg is a state of the ZS9's bridge",
+            options.dead_time_us
+        );
     }
     let bench = bench(scenario, options, machine)?;
     let settings = settings::drive(CLOCK, options.zs9.carrier_hz);

@@ -56,7 +56,8 @@ impl Scenario for Steady {
         let mut figures = figures::common(recording, options);
         for (k, name) in ["thd1_percent", "thd2_percent"].into_iter().enumerate() {
             let cycles = SPEEDS_RPM[k] / 60.0 * POLE_PAIRS * DURATION_S;
-            figures.set(name, figures::thd_percent(recording, cycles.round(), |row| row.motors[k].phases_a[0]));
+            figures
+                .set(name, figures::thd_percent(recording, cycles.round(), |row| row.motors[k].phases_a[0]));
         }
         for (k, name) in ["torque1_nm", "torque2_nm"].into_iter().enumerate() {
             figures.set(name, figures::mean(&recording.rows, |row| row.motors[k].torque_nm));
