@@ -7,6 +7,10 @@
 //!   instants its interrupt is pending first; it also has the higher priority.
 #![allow(unsafe_code)]
 
+mod dual;
+
+pub use dual::{connect_dual, die_dual, start_dual};
+
 use super::{ControlPort, PwmPort, Sample};
 use crate::drive::Report;
 use crate::frames::Abc;
@@ -87,6 +91,12 @@ fn read_register(address: usize) -> u32 {
 
 /// Opens the link and fetches the set-up. Call once, before [`start`].
 pub fn connect() -> Setup {
+    open_files();
+    send(&Request::Hello.to_block());
+    link::setup_from_block(&receive(CONTROL_ANSWERS))
+}
+
+fn open_files() {
     const READ: usize = 1;
     const WRITE: usize = 5;
     for (file, (name, mode)) in
@@ -99,15 +109,18 @@ pub fn connect() -> Setup {
         }
         file.store(handle as u32, Ordering::Relaxed);
     }
-    send(Request::Hello);
-    link::setup_from_block(&receive(CONTROL_ANSWERS))
 }
 
 /// Starts both timers; the first PWM interrupt comes after `first_half_ticks`, the first control interrupt after one
 /// control period.
 pub fn start(first_half_ticks: u32) {
-    const ENABLE_PERIODIC_INTERRUPT_32_BIT: u32 = 0b1110_0010;
-    const ENABLE_INTERRUPT: u32 = 0b1001;
+    enable_interrupts();
+    write_register(PWM_TIMER, first_half_ticks - 1);
+    write_register(CONTROL_TIMER + 8, CLOCK.control_ticks - 1);
+    start_timers();
+}
+
+fn enable_interrupts() {
     // SAFETY: the only use of the core peripherals, before any interrupt is unmasked.
     let mut core = unsafe { cortex_m::Peripherals::steal() };
     // SAFETY: priorities are changed while both interrupts are masked; no code relies on a priority ceiling. After that
@@ -118,8 +131,11 @@ pub fn start(first_half_ticks: u32) {
         NVIC::unmask(Interrupt::DUALTIMER);
         NVIC::unmask(Interrupt::TIMER0);
     }
-    write_register(PWM_TIMER, first_half_ticks - 1);
-    write_register(CONTROL_TIMER + 8, CLOCK.control_ticks - 1);
+}
+
+fn start_timers() {
+    const ENABLE_PERIODIC_INTERRUPT_32_BIT: u32 = 0b1110_0010;
+    const ENABLE_INTERRUPT: u32 = 0b1001;
     write_register(PWM_TIMER + 8, ENABLE_PERIODIC_INTERRUPT_32_BIT);
     write_register(CONTROL_TIMER, ENABLE_INTERRUPT);
 }
@@ -141,7 +157,7 @@ pub fn stop(success: bool) -> ! {
 
 /// Gates off, whatever state the program is in, then the end: for panics and HardFaults.
 pub fn die() -> ! {
-    send(Request::Dead);
+    send(&Request::Dead.to_block());
     stop(false)
 }
 
@@ -152,10 +168,9 @@ fn file(index: usize) -> usize {
     }
 }
 
-fn send(request: Request) {
-    let bytes = request.to_block();
+fn send(block: &Block) {
     // SAFETY: SYS_WRITE reads exactly the block, which outlives the call.
-    let missing = unsafe { syscall!(WRITE, file(REQUESTS), bytes.as_ptr(), BLOCK_BYTES) };
+    let missing = unsafe { syscall!(WRITE, file(REQUESTS), block.as_ptr(), BLOCK_BYTES) };
     if missing != 0 {
         stop(false);
     }
@@ -193,7 +208,7 @@ impl Pwm {
 
 impl ControlPort for Control {
     fn sample(&mut self, now: Instant) -> Sample {
-        send(Request::ControlSample(now));
+        send(&Request::ControlSample(now).to_block());
         let (sample, end) = link::sample_from_block(&receive(CONTROL_ANSWERS));
         if end {
             stop(true);
@@ -202,7 +217,7 @@ impl ControlPort for Control {
     }
 
     fn enter(&mut self, safe: SafeState, now: Instant) {
-        send(Request::Enter(now, safe));
+        send(&Request::Enter(now, safe).to_block());
     }
 
     fn overrun_ticks(&mut self, _now: Instant) -> u32 {
@@ -214,22 +229,22 @@ impl ControlPort for Control {
     }
 
     fn report(&mut self, now: Instant, report: &Report) {
-        send(Request::ControlReport(now, *report));
+        send(&Request::ControlReport(now, *report).to_block());
     }
 }
 
 impl PwmPort for Pwm {
     fn sample(&mut self, now: Instant) -> Abc {
-        send(Request::PwmSample(now));
+        send(&Request::PwmSample(now).to_block());
         link::currents_from_block(&receive(PWM_ANSWERS))
     }
 
     fn play(&mut self, now: Instant, next: &CarrierPeriod) {
         write_register(PWM_TIMER + 0x18, next.period_ticks.saturating_sub(1));
-        send(Request::Play(now, *next));
+        send(&Request::Play(now, *next).to_block());
     }
 
     fn enter(&mut self, safe: SafeState, now: Instant) {
-        send(Request::Enter(now, safe));
+        send(&Request::Enter(now, safe).to_block());
     }
 }

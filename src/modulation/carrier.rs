@@ -104,7 +104,7 @@ mod tests {
 
     #[test]
     fn the_zero_sequence_centres_the_three_phases() {
-        let shares = on_shares(866.0, Angle::DEG_30, 1500.0);
+        let shares = on_shares(866.0, Angle::DEG_30, 1500.0, 0.5);
         assert!((shares.a - 1.0).abs() < 1e-3 && shares.c.abs() < 1e-3, "{shares:?}");
     }
 }
