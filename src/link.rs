@@ -36,6 +36,8 @@ pub struct Setup {
     pub min_pulse_ticks: u32,
     /// Dead time, in ticks.
     pub dead_time_ticks: u32,
+    /// By how much the PWM timer's first half is longer than the shortest one, in ticks.
+    pub pwm_delay_ticks: u32,
 }
 
 /// From the firmware to the rig.
@@ -107,14 +109,14 @@ impl Request {
 /// The answer to [`Request::Hello`].
 pub fn setup_to_block(setup: Setup) -> Block {
     let mut block = [0; BLOCK_WORDS];
-    (block[0], block[1]) = (setup.min_pulse_ticks, setup.dead_time_ticks);
+    [block[0], block[1], block[2]] = [setup.min_pulse_ticks, setup.dead_time_ticks, setup.pwm_delay_ticks];
     block
 }
 
 /// The inverse of [`setup_to_block`].
 pub fn setup_from_block(block: &Block) -> Setup {
-    let [min_pulse_ticks, dead_time_ticks, ..] = *block;
-    Setup { min_pulse_ticks, dead_time_ticks }
+    let [min_pulse_ticks, dead_time_ticks, pwm_delay_ticks, ..] = *block;
+    Setup { min_pulse_ticks, dead_time_ticks, pwm_delay_ticks }
 }
 
 /// The answer to [`Request::ControlSample`]; `stop` ends the run.

@@ -21,6 +21,7 @@ mod firmware {
     static SHARED: Shared = Shared::new();
     static MIN_PULSE_TICKS: AtomicU32 = AtomicU32::new(0);
     static DEAD_TIME_TICKS: AtomicU32 = AtomicU32::new(0);
+    static FIRST_HALF_TICKS: AtomicU32 = AtomicU32::new(0);
 
     fn settings() -> Settings {
         Settings {
@@ -40,7 +41,9 @@ mod firmware {
         let setup = qemu::connect();
         MIN_PULSE_TICKS.store(setup.min_pulse_ticks, Ordering::Relaxed);
         DEAD_TIME_TICKS.store(setup.dead_time_ticks, Ordering::Relaxed);
-        qemu::start(settings().devices.shortest_half_ticks);
+        let first_half_ticks = settings().devices.shortest_half_ticks.saturating_add(setup.pwm_delay_ticks);
+        FIRST_HALF_TICKS.store(first_half_ticks, Ordering::Relaxed);
+        qemu::start(first_half_ticks);
         loop {
             qemu::idle();
         }
@@ -63,7 +66,7 @@ mod firmware {
         let mut board = qemu::Pwm;
         board.acknowledge();
         let settings = settings();
-        let first = Instant(settings.devices.shortest_half_ticks);
+        let first = Instant(FIRST_HALF_TICKS.load(Ordering::Relaxed));
         TASK.get_or_insert_with(|| PwmTask::new(&BUILT_IN, settings, first)).run(&mut board, &SHARED);
     }
 

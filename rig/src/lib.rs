@@ -7,7 +7,9 @@
 
 pub mod analysis;
 pub mod bench;
+pub mod bound;
 pub mod columns;
+pub mod distortion;
 pub mod machine;
 pub mod nine_switch;
 pub mod options;

@@ -1,6 +1,7 @@
 //! Options that all runs share.
 
 use crate::bench::Flaws;
+use crate::run::Emulator;
 use crate::zs9::inject::Injection;
 use clap::{Args, ValueEnum};
 use serde::Serialize;
@@ -132,16 +133,39 @@ pub struct RunOptions {
     #[serde(skip)]
     #[arg(long, env = "TRACTIVE_QEMU", default_value = "qemu-system-arm")]
     pub qemu: PathBuf,
+    /// A further argument for the emulator (may be repeated).
+    #[serde(skip)]
+    #[arg(long, value_name = "ARG", allow_hyphen_values = true, hide = true)]
+    pub qemu_arg: Vec<String>,
+    /// With --on qemu: a file for the mode of every interrupt, in their order.
+    #[serde(skip)]
+    #[arg(long, value_name = "FILE", hide = true)]
+    pub calls: Option<PathBuf>,
+    /// By how much the PWM timer starts later, in µs.
+    #[arg(long, default_value_t = 0.0, value_parser = not_negative, hide = true)]
+    pub pwm_delay_us: f64,
+    /// timing: the demand is not finite from this time on, in s.
+    #[arg(long, value_parser = not_negative, hide = true)]
+    pub fault_at: Option<f64>,
+    /// timing: control is told the same currents again and again from this time on, in s.
+    #[arg(long, value_parser = not_negative, hide = true)]
+    pub freeze_at: Option<f64>,
     /// sweep: add the way back.
     #[arg(long)]
     pub down: bool,
-    /// sweep: brake instead of pulling.
+    /// sweep, timing: brake instead of pulling.
     #[arg(long)]
     pub brake: bool,
-    /// sweep: share of the full torque.
+    /// sweep, timing: share of the full torque.
     #[arg(long, default_value_t = 1.0, value_parser = finite, allow_negative_numbers = true)]
     pub torque_scale: f64,
-    /// sweep: last speed, in r/min.
+    /// steady, mode-borders, reversal: speed, in r/min.
+    #[arg(long, value_parser = finite, allow_negative_numbers = true)]
+    pub speed: Option<f64>,
+    /// steady: torque, in N·m.
+    #[arg(long, value_parser = finite, allow_negative_numbers = true)]
+    pub torque: Option<f64>,
+    /// sweep, timing: last speed, in r/min.
     #[arg(long, default_value_t = 2000.0, value_parser = finite, allow_negative_numbers = true)]
     pub to: f64,
     /// What only the ZS9's scenarios know.
@@ -196,6 +220,22 @@ fn carrier_hz(text: &str) -> Result<u32, String> {
 }
 
 impl RunOptions {
+    /// The emulator with the image that was handed over.
+    ///
+    /// # Errors
+    /// Without an image.
+    pub fn emulator(&self) -> anyhow::Result<Emulator> {
+        let Some(image) = self.image.clone() else {
+            anyhow::bail!("--on qemu needs --image; `cargo xtask run` builds it and hands it over");
+        };
+        Ok(Emulator {
+            program: self.qemu.clone(),
+            image,
+            arguments: self.qemu_arg.clone(),
+            calls: self.calls.clone(),
+        })
+    }
+
     /// The machine, or the first system's.
     pub fn machine(&self) -> &str {
         self.machine.as_deref().unwrap_or("pmasynrm-180kw")
@@ -214,6 +254,7 @@ impl RunOptions {
             noise_a: self.noise_a,
             udc_ripple: self.udc_ripple.map(|ripple| (ripple.amplitude_v, ripple.frequency_hz)),
             angle_error_deg: self.angle_error,
+            freeze_at_s: self.freeze_at,
             seed: self.seed,
         }
     }

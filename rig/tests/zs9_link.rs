@@ -3,7 +3,7 @@
 mod zs9;
 
 use tractive::control::{ZSource, ZSourceDesign, ZSourceGains, ZSourceInput};
-use tractive_rig::plant::zs9::{NetworkState, Source, ZNetwork, Zs9Plant, Zs9Settings};
+use tractive_rig::plant::zs9::{LegGates, NetworkState, Source, ZNetwork, Zs9Plant, Zs9Settings};
 use zs9::{PERIOD_S, SOURCE_V, period, plant_at, regulated};
 
 const DESIGN: ZSourceDesign = ZSourceDesign::ZS9;
@@ -262,6 +262,32 @@ fn a_diode_in_place_of_the_switch_lets_the_link_run_away_at_low_speed() {
         let residual = plant.residual_j(stored_j) / plant.energies().source_j;
         assert!(residual.abs() < 1e-4, "{residual}");
     }
+}
+
+#[test]
+fn behind_a_diode_the_bridge_gets_no_more_than_the_inductors_have() {
+    let mut plant = plant_at([0.0; 2], &Zs9Settings { source: Source::Diode, ..Zs9Settings::default() });
+    plant.set_network(NetworkState::even(5.0, 533.0));
+    let [upper, _] = plant.motors_mut();
+    upper.set_currents(40.0, 0.0);
+    // V1 asks for phase u's 40 A; the inductors have 10 A. Until they have 40 A, the bridge's diodes short the link.
+    let gates = [LegGates::ONE, LegGates::ZERO, LegGates::ZERO];
+    plant.advance(gates, 12e-6).unwrap();
+    let electrical_j = plant.motors()[0].energies().electrical_j;
+    let rising_a = plant.network().inductor_a();
+    assert!((rising_a - (5.0 + 533.0 / 0.5e-3 * 12e-6)).abs() < 0.1, "{rising_a} A");
+    assert_eq!(electrical_j, 0.0);
+    // Then they have what it asks for, neither more nor less, at a link voltage that keeps it so.
+    for _ in 0..20 {
+        plant.advance(gates, 5e-6).unwrap();
+    }
+    let (drawn_a, had_a) = (plant.motors()[0].currents_abc()[0], 2.0 * plant.network().inductor_a());
+    println!(
+        "{drawn_a:.3} A drawn, {had_a:.3} A in the inductors, {} J from the source",
+        plant.energies().source_j
+    );
+    assert!(drawn_a > 42.0 && (drawn_a - had_a).abs() < 1e-5, "{drawn_a} A, {had_a} A");
+    assert!(plant.energies().source_j.abs() < 1e-12, "{:?}", plant.energies());
 }
 
 #[test]

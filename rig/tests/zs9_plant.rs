@@ -286,3 +286,26 @@ fn unevenness_of_the_network_rings_by_itself() {
     println!("off by {worst:.1e} V, residual {residual:.1e}");
     assert!(worst < 1e-3 && residual.abs() < 1e-6, "{worst} V, {residual}");
 }
+
+#[test]
+fn the_folder_weakens_the_field_where_the_inverter_runs_out_of_voltage() {
+    use tractive::control::{Region, VoltageLimit, operating_point};
+    let tables = tractive_rig::machine::Machine::load("ipm-zs9").unwrap().tables;
+    let ratings = &tables.ratings;
+    // U_c of 400 V and 533 V: base speed at 120 N·m is 677 and 906 r/min.
+    for (link_v, base_rpm) in [(ratings.dc_link_min_v, 677.0), (ratings.dc_link_nominal_v, 906.0)] {
+        let limit = VoltageLimit { udc_v: link_v, depth: 1.0, filled: false };
+        let region = |rpm: f32| operating_point(120.0, rpm * 4.0 * 0.104_72, &limit, tables).region;
+        let from = (500_u16..1100).find(|rpm| region(f32::from(*rpm)) != Region::Mtpa).unwrap();
+        println!("{link_v} V: weakened from {from} r/min");
+        assert!((f32::from(from) - base_rpm).abs() < 0.015 * base_rpm, "{from}");
+    }
+    // The equivalent of U_c/(2 √3) in six-step.
+    let capacitor_v = [400.0, 533.333, 600.0_f32];
+    let links_v = [ratings.dc_link_min_v, ratings.dc_link_nominal_v, ratings.dc_link_max_v];
+    for (link_v, capacitor_v) in links_v.into_iter().zip(capacitor_v) {
+        let (six_step_v, available_v) =
+            (tractive::control::six_step_v(link_v), capacitor_v / 12.0_f32.sqrt());
+        assert!((six_step_v / available_v - 1.0).abs() < 1e-3, "{six_step_v} {available_v}");
+    }
+}

@@ -8,19 +8,19 @@
 #![allow(unsafe_code)]
 
 mod dual;
+mod exchange;
 
 pub use dual::{connect_dual, die_dual, start_dual};
 
 use super::{ControlPort, PwmPort, Sample};
 use crate::drive::Report;
 use crate::frames::Abc;
-use crate::link::{self, BLOCK_BYTES, Block, Request, Setup};
+use crate::link::Setup;
 use crate::modulation::CarrierPeriod;
 use crate::protection::SafeState;
 use crate::time::{Clock, Instant};
-use core::sync::atomic::{AtomicU32, Ordering};
 use cortex_m::peripheral::NVIC;
-use cortex_m_semihosting::{debug, syscall};
+use cortex_m_semihosting::debug;
 
 /// 25 MHz ticks; control at 10 kHz.
 pub const CLOCK: Clock = Clock::new(25_000_000, 2_500);
@@ -73,12 +73,6 @@ pub static __INTERRUPTS: [Vector; 11] = {
     table
 };
 
-/// File handles of the link: requests, answers to control, answers to PWM.
-static FILES: [AtomicU32; 3] = [const { AtomicU32::new(0) }; 3];
-const REQUESTS: usize = 0;
-const CONTROL_ANSWERS: usize = 1;
-const PWM_ANSWERS: usize = 2;
-
 fn write_register(address: usize, value: u32) {
     // SAFETY: called with the addresses of timer registers of this board, which are always mapped and word-wide.
     unsafe { core::ptr::write_volatile(address as *mut u32, value) }
@@ -91,24 +85,7 @@ fn read_register(address: usize) -> u32 {
 
 /// Opens the link and fetches the set-up. Call once, before [`start`].
 pub fn connect() -> Setup {
-    open_files();
-    send(&Request::Hello.to_block());
-    link::setup_from_block(&receive(CONTROL_ANSWERS))
-}
-
-fn open_files() {
-    const READ: usize = 1;
-    const WRITE: usize = 5;
-    for (file, (name, mode)) in
-        FILES.iter().zip([(c"requests", WRITE), (c"control-answers", READ), (c"pwm-answers", READ)])
-    {
-        // SAFETY: SYS_OPEN reads a NUL-terminated name of the given length, which lives for the program.
-        let handle = unsafe { syscall!(OPEN, name.as_ptr(), mode, name.count_bytes()) };
-        if handle == usize::MAX {
-            stop(false);
-        }
-        file.store(handle as u32, Ordering::Relaxed);
-    }
+    exchange::open()
 }
 
 /// Starts both timers; the first PWM interrupt comes after `first_half_ticks`, the first control interrupt after one
@@ -157,33 +134,8 @@ pub fn stop(success: bool) -> ! {
 
 /// Gates off, whatever state the program is in, then the end: for panics and HardFaults.
 pub fn die() -> ! {
-    send(&Request::Dead.to_block());
+    exchange::dead();
     stop(false)
-}
-
-fn file(index: usize) -> usize {
-    match FILES.get(index) {
-        Some(handle) => handle.load(Ordering::Relaxed) as usize,
-        None => 0,
-    }
-}
-
-fn send(block: &Block) {
-    // SAFETY: SYS_WRITE reads exactly the block, which outlives the call.
-    let missing = unsafe { syscall!(WRITE, file(REQUESTS), block.as_ptr(), BLOCK_BYTES) };
-    if missing != 0 {
-        stop(false);
-    }
-}
-
-fn receive(answers: usize) -> Block {
-    let mut block: Block = [0; link::BLOCK_WORDS];
-    // SAFETY: SYS_READ writes at most the block's bytes, and the block is ours until it returns.
-    let missing = unsafe { syscall!(READ, file(answers), block.as_mut_ptr(), BLOCK_BYTES) };
-    if missing != 0 {
-        stop(false);
-    }
-    block
 }
 
 /// The control interrupt's side of the board.
@@ -208,16 +160,11 @@ impl Pwm {
 
 impl ControlPort for Control {
     fn sample(&mut self, now: Instant) -> Sample {
-        send(&Request::ControlSample(now).to_block());
-        let (sample, end) = link::sample_from_block(&receive(CONTROL_ANSWERS));
-        if end {
-            stop(true);
-        }
-        sample
+        exchange::control_sample(now)
     }
 
     fn enter(&mut self, safe: SafeState, now: Instant) {
-        send(&Request::Enter(now, safe).to_block());
+        exchange::enter(safe, now);
     }
 
     fn overrun_ticks(&mut self, _now: Instant) -> u32 {
@@ -229,22 +176,21 @@ impl ControlPort for Control {
     }
 
     fn report(&mut self, now: Instant, report: &Report) {
-        send(&Request::ControlReport(now, *report).to_block());
+        exchange::report(now, report);
     }
 }
 
 impl PwmPort for Pwm {
     fn sample(&mut self, now: Instant) -> Abc {
-        send(&Request::PwmSample(now).to_block());
-        link::currents_from_block(&receive(PWM_ANSWERS))
+        exchange::pwm_sample(now)
     }
 
     fn play(&mut self, now: Instant, next: &CarrierPeriod) {
         write_register(PWM_TIMER + 0x18, next.period_ticks.saturating_sub(1));
-        send(&Request::Play(now, *next).to_block());
+        exchange::play(now, next);
     }
 
     fn enter(&mut self, safe: SafeState, now: Instant) {
-        send(&Request::Enter(now, safe).to_block());
+        exchange::enter(safe, now);
     }
 }

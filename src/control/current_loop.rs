@@ -4,9 +4,8 @@
 //! current into flux and back. Proportional part: the flux error predicted for the boundary where the voltage begins
 //! to act. Decoupling: `jωψ`. Integral part: [`super::disturbance`].
 
-use super::{Committed, flux_linkage};
+use super::Committed;
 use crate::frames::{Angle, Dq, SinCos};
-use crate::machine::Tables;
 
 /// What of a voltage command the modulator's mode can follow.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -46,6 +45,8 @@ pub struct Input<'a> {
     pub current: Dq,
     pub flux: Dq,
     pub current_reference: Dq,
+    /// Flux linkage of that reference, as [`super::flux_path`] leads there.
+    pub reference: Dq,
     pub omega: f32,
     pub committed: &'a Committed,
     pub disturbance: Dq,
@@ -62,8 +63,8 @@ pub struct Output {
 }
 
 /// One step of the loop.
-pub fn step(input: &Input, gains: &Gains, tables: &Tables) -> Output {
-    let reference = flux_linkage(tables, input.current_reference);
+pub fn step(input: &Input, gains: &Gains) -> Output {
+    let reference = input.reference;
     let predicted = predicted_flux(input);
     let drop = input.current_reference * input.resistance - input.disturbance;
     let steady = reference.j() * input.omega + drop;

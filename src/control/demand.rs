@@ -14,26 +14,47 @@ pub struct Demand {
 
 #[derive(Clone, Copy, Debug)]
 pub struct Shaper {
-    torque_nm: f32,
+    /// `None` until pulses are made.
+    torque_nm: Option<f32>,
+}
+
+/// What shapes a demand.
+pub struct Input<'a> {
+    pub demand: &'a Demand,
+    /// Electrical angular speed, in rad/s.
+    pub omega: f32,
+    /// Torque that flows already, in N·m: where a machine that is caught while turning begins.
+    pub flowing_nm: f32,
+    /// Whether a carrier follows, which can step.
+    pub can_step: bool,
+    pub period_s: f32,
 }
 
 impl Shaper {
     pub const fn new() -> Self {
-        Self { torque_nm: 0.0 }
+        Self { torque_nm: None }
     }
 
-    /// The shaped demand, in N·m, at an electrical angular speed in rad/s.
-    pub fn step(&mut self, demand: &Demand, omega: f32, period_s: f32, ratings: &Ratings) -> f32 {
-        let largest = envelope_nm(omega, ratings);
-        let wanted = limit(demand.torque_nm, -largest, largest);
-        let step = ratings.torque_slew_nm_s * period_s;
-        self.torque_nm = if demand.slew_limited {
-            let slewed = limit(wanted, self.torque_nm - step, self.torque_nm + step);
-            limit(slewed, -largest, largest)
+    /// The shaped demand, in N·m.
+    pub fn step(&mut self, input: &Input, ratings: &Ratings) -> f32 {
+        let largest = envelope_nm(input.omega, ratings);
+        let wanted = limit(input.demand.torque_nm, -largest, largest);
+        let last = match self.torque_nm {
+            Some(last) => last,
+            None if input.can_step => 0.0,
+            None => input.flowing_nm,
+        };
+        // A pattern of few pulses cannot follow a step: its flux hexagon has to be turned against the rotor, and faster it would be
+        // thrown off its centre.
+        let shaped = if input.demand.slew_limited || !input.can_step {
+            let step = ratings.torque_slew_nm_s * input.period_s;
+            limit(wanted, last - step, last + step)
         } else {
             wanted
         };
-        self.torque_nm
+        let shaped = limit(shaped, -largest, largest);
+        self.torque_nm = Some(shaped);
+        shaped
     }
 }
 

@@ -12,6 +12,7 @@
 mod current_loop;
 mod demand;
 mod disturbance;
+mod flux_path;
 mod mtpa;
 mod reference;
 mod speed;
@@ -154,7 +155,14 @@ pub struct Controller {
     demand: demand::Shaper,
     disturbance: disturbance::Observer,
     trim: torque_trim::TorqueTrim,
+    /// DC-link voltage without its ripple, in V; `None` before the first step.
+    link_v: Option<f32>,
+    path: flux_path::FluxPath,
 }
+
+/// Bandwidth at which operating point and mode follow the DC link, in rad/s: a rectifier's ripple must neither shake the one nor
+/// toggle the other. What the modulator divides by is the link as it is.
+const LINK_RAD_S: f32 = 100.0;
 
 impl Controller {
     /// At rest, with nothing known of the machine's angle.
@@ -173,6 +181,8 @@ impl Controller {
             demand: demand::Shaper::new(),
             disturbance: disturbance::Observer::new(),
             trim: torque_trim::TorqueTrim::new(),
+            link_v: None,
+            path: flux_path::FluxPath::new(),
         }
     }
 
@@ -202,6 +212,8 @@ impl Controller {
         self.demand = demand::Shaper::new();
         self.disturbance = disturbance::Observer::new();
         self.trim = torque_trim::TorqueTrim::new();
+        self.link_v = None;
+        self.path = flux_path::FluxPath::new();
     }
 
     /// One control period: the voltage for the carrier half that begins at the horizon.
@@ -209,18 +221,29 @@ impl Controller {
         let Input { measured, demand, committed, boundary } = *input;
         let Law { gains, clock, tables } = *law;
         let omega = self.speed.omega();
-        let torque_nm = self.demand.step(demand, omega, clock.control_s(), &tables.ratings);
-        let depth = committed.depth_limit * committed.steady_share;
-        let limit = VoltageLimit { udc_v: measured.udc_v, depth, filled: committed.filled };
-        let point =
-            operating_point(self.trim.apply(torque_nm, tables.ratings.max_torque_nm), omega, &limit, tables);
         let frame = measured.angle.sin_cos();
         let current = measured.currents_a.clarke().park(frame);
         let flux = flux_linkage(tables, current);
+        let measured_nm = self::torque_nm(tables, flux, current);
+        let shaping = demand::Input {
+            demand,
+            omega,
+            flowing_nm: measured_nm,
+            can_step: committed.follows == Follows::Mean,
+            period_s: clock.control_s(),
+        };
+        let torque_nm = self.demand.step(&shaping, &tables.ratings);
+        let before = self.link_v.unwrap_or(measured.udc_v);
+        let link_v = before + LINK_RAD_S * clock.control_s() * (measured.udc_v - before);
+        self.link_v = Some(link_v);
+        let depth = committed.depth_limit * committed.steady_share;
+        let limit = VoltageLimit { udc_v: link_v, depth, filled: committed.filled };
+        let point =
+            operating_point(self.trim.apply(torque_nm, tables.ratings.max_torque_nm), omega, &limit, tables);
         let limited = point.region == Region::Limit;
         self.trim.step(&torque_trim::Input {
             demand_nm: torque_nm,
-            measured_nm: self::torque_nm(tables, flux, current),
+            measured_nm,
             limited,
             largest_nm: tables.ratings.max_torque_nm,
             period_s: clock.control_s(),
@@ -231,6 +254,8 @@ impl Controller {
             self.disturbance.step(boundary, angle, omega, gains, tables);
         }
         let disturbance = self.disturbance.voltage();
+        let target = flux_linkage(tables, point.current);
+        let reference = self.path.step(target, shaping.can_step, clock.control_s());
         let voltage = current_loop::step(
             &current_loop::Input {
                 angle: measured.angle,
@@ -238,6 +263,7 @@ impl Controller {
                 current,
                 flux,
                 current_reference: point.current,
+                reference,
                 omega,
                 committed,
                 disturbance,
@@ -245,7 +271,6 @@ impl Controller {
                 voltage_limit_v: committed.depth_limit * six_step_v(measured.udc_v),
             },
             gains,
-            tables,
         );
         let current_loop::Output { voltage, steady } = voltage;
         let regulates_by_pulses = committed.follows == Follows::Mean;
@@ -259,10 +284,15 @@ impl Controller {
                 omega,
                 depth: point.depth,
             },
-            torque_nm: if limited { point.torque_nm } else { torque_nm },
+            torque_nm: if limited { nearer_zero(point.torque_nm, torque_nm) } else { torque_nm },
             point,
         }
     }
+}
+
+/// Of two torques of the same sign the smaller one.
+fn nearer_zero(a: f32, b: f32) -> f32 {
+    if a.abs() < b.abs() { a } else { b }
 }
 
 impl Default for Controller {

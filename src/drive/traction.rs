@@ -11,7 +11,8 @@ use crate::control::{Boundary, Committed, Controller, Follows, Gains, Input, Law
 use crate::frames::{Abc, AlphaBeta, Angle};
 use crate::machine::Tables;
 use crate::modulation::{
-    CarrierPeriod, Devices, Mode, Modulator, Reference, Schedule, depth_limit, first_half, ripple_flux,
+    CarrierPeriod, Devices, Mode, Modulator, Reference, Schedule, compensated, depth_limit, first_half,
+    ripple_flux,
 };
 use crate::protection::{self, Fault, FrozenWatch, Trip, Violation};
 use crate::time::{Clock, Instant};
@@ -23,7 +24,10 @@ pub(super) const UNITS_PER_RADIAN: f32 = 4_294_967_296.0 / core::f32::consts::TA
 const STALE_PERIODS: i32 = 5;
 
 /// How fast the voltage glides from square wave to what the torque needs, in shares of six-step per second.
-const GLIDE_PER_S: f32 = 1.0;
+const GLIDE_PER_S: f32 = 12.0;
+
+/// Phase current, as a share of the largest, whose sign may change within a half.
+const SMALL_CURRENT_SHARE: f32 = 0.01;
 
 /// Share of a mode's largest fundamental that the operating point may use where the voltage must also regulate.
 const REGULATION_ROOM: f32 = 0.999;
@@ -413,14 +417,18 @@ impl PwmTask {
         let currents_before_a = core::mem::replace(&mut self.currents_a, port.sample(now));
         let command = shared.command.newest(|command| now.reached(command.valid_from));
         self.check(&command, port);
-        let reference = match &command {
-            Some(command) if command.gates == Gates::Pulse && self.trip.is_none() => Some(&command.reference),
-            _ => None,
-        };
         let start = now.after(self.running.period_ticks);
-        self.next = self.modulator.step(start, reference);
+        let pulsing = self.trip.is_none();
+        self.next = match &command {
+            Some(command) if command.gates == Gates::Pulse && pulsing => {
+                self.modulator.step(start, Some(&command.reference))
+            }
+            resting => self.modulator.rest(start, resting.as_ref().map(|command| &command.reference)),
+        };
         self.now = start;
-        port.play(now, &self.next);
+        let expected = self.expected_currents(currents_before_a);
+        let small_a = SMALL_CURRENT_SHARE * self.tables.ratings.max_current_a;
+        port.play(now, &compensated(&self.next, &expected, small_a, &self.settings.devices));
         shared.applied.publish(Applied {
             at: now,
             before,
@@ -431,6 +439,15 @@ impl PwmTask {
             mirrored: self.modulator.is_mirrored(),
             trip: self.trip,
         });
+    }
+
+    /// Phase currents in the middle of the next half, from the boundaries at both ends of the half before the running one.
+    fn expected_currents(&self, before: Abc) -> Abc {
+        /// From the last boundary to the middle of the next half, in halves.
+        const AHEAD: f32 = 1.5;
+        let ahead = |now: f32, before: f32| now + AHEAD * (now - before);
+        let now = self.currents_a;
+        Abc { a: ahead(now.a, before.a), b: ahead(now.b, before.b), c: ahead(now.c, before.c) }
     }
 
     /// Nominal instant of the next call.

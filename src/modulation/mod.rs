@@ -11,6 +11,7 @@
 #![forbid(unsafe_code)]
 
 mod carrier;
+mod dead_time;
 mod middle60;
 mod ripple;
 mod schedule;
@@ -19,6 +20,7 @@ use crate::frames::{Angle, limit};
 use crate::time::{Clock, Instant};
 
 use carrier::Zeros;
+pub use dead_time::compensated;
 pub use ripple::ripple_flux;
 pub use schedule::{Schedule, depth_limit, first_half};
 
@@ -310,10 +312,7 @@ impl Modulator {
     /// The half carrier that begins at `start`; `None` as reference: all gates off.
     pub fn step(&mut self, start: Instant, reference: Option<&Reference>) -> CarrierPeriod {
         let Some(reference) = reference else {
-            self.mode = Mode::Off;
-            self.plan = None;
-            self.growth = None;
-            return CarrierPeriod::off(self.devices.shortest_half_ticks);
+            return self.rest(start, None);
         };
         self.turn_mirror(reference.rate);
         let seen = if self.mirrored { reference.mirrored() } else { *reference };
@@ -333,6 +332,19 @@ impl Modulator {
         if self.mirrored {
             half.compare_ticks.swap(1, 2);
             half.start_levels.swap(1, 2);
+        }
+        half
+    }
+
+    /// All gates off; where a reference is known, with the mode that it would begin with announced.
+    pub fn rest(&mut self, start: Instant, reference: Option<&Reference>) -> CarrierPeriod {
+        self.mode = Mode::Off;
+        self.plan = None;
+        self.growth = None;
+        let mut half = CarrierPeriod::off(self.devices.shortest_half_ticks);
+        if let Some(reference) = reference {
+            let seen = if reference.rate < 0.0 { reference.mirrored() } else { *reference };
+            half.ahead = [self.schedule.wanted(start, Mode::Off, &seen, &self.devices); 2];
         }
         half
     }

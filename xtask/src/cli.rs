@@ -24,7 +24,7 @@ pub enum Command {
     Test(TestArgs),
     /// Build the image and print what is in it
     Image(ImageArgs),
-    /// Instructions per interrupt against their budgets (not available yet)
+    /// Instructions per interrupt against their budgets
     Timing(TimingArgs),
     /// Build a board's image and flash it (not available yet)
     Flash(FlashArgs),
@@ -62,11 +62,14 @@ pub struct ImageArgs {
     pub json: bool,
 }
 
-#[derive(Args, Debug)]
+#[derive(Args, Debug, Default)]
 pub struct TimingArgs {
     /// As one JSON object
     #[arg(long)]
     pub json: bool,
+    /// Say where the instructions go: this many functions of each interrupt
+    #[arg(long, value_name = "FUNCTIONS", num_args = 0..=1, default_missing_value = "20", conflicts_with = "json")]
+    pub profile: Option<usize>,
 }
 
 #[derive(Args, Debug)]

@@ -12,7 +12,7 @@ use crate::{build, check};
 
 /// The command.
 pub fn run(args: &ImageArgs) -> Result<u8> {
-    let path = build::image(&Setup::default().toolchain()?, None)?;
+    let path = build::image(&Setup::default().toolchain()?, build::System::Traction, None)?;
     let sizes = read(&path)?.sizes;
     if args.json {
         println!("{}", as_json(&sizes));
@@ -36,7 +36,8 @@ pub fn check(path: &Path) -> Result<bool> {
     Ok(findings.is_empty())
 }
 
-fn read(path: &Path) -> Result<Image> {
+/// Reads an image.
+pub fn read(path: &Path) -> Result<Image> {
     let bytes = std::fs::read(path).with_context(|| path.display().to_string())?;
     Image::parse(&bytes).with_context(|| path.display().to_string())
 }

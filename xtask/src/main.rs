@@ -5,13 +5,14 @@
 //! | `run [SCENARIO] [--on qemu\|host] [--out DIR] …` | sets up what is missing, builds, hands over to the rig |
 //! | `test [--only STEP]… [--list]` | sets up what is missing, runs every check, ends with a table and a count |
 //! | `image [--json]` | builds the image and says what is in it |
-//! | `timing`, `flash` | not available yet |
+//! | `timing [--json] [--profile [N]]` | instructions per interrupt against `budgets.toml` |
+//! | `flash` | not available yet |
 //!
 //! Results go to standard output, what the command does on the way to standard error. Exit codes: 0 done; 1 it ran
 //! and something failed; 2 it could not run (bad usage, bad input, something missing), with the reason on a line.
 //!
 //! The modules: [`cli`] is what may be typed, [`setup`] what has to be installed, [`build`] how cargo is called,
-//! [`run`], [`mod@test`] and [`image`] the commands. An image is read by [`elf`], its instructions by [`thumb`]; [`graph`]
+//! [`run`], [`mod@test`], [`image`] and [`timing`] the commands. An image is read by [`elf`], its instructions by [`thumb`]; [`graph`]
 //! says which function calls which and [`check`] refuses what an image must not hold.
 
 #![forbid(unsafe_code)]
@@ -27,6 +28,7 @@ mod run;
 mod setup;
 mod test;
 mod thumb;
+mod timing;
 
 use std::process::ExitCode;
 
@@ -37,7 +39,7 @@ fn main() -> ExitCode {
         cli::Command::Run(args) => run::run(&args.words),
         cli::Command::Test(args) => test::run(&args),
         cli::Command::Image(args) => image::run(&args),
-        cli::Command::Timing(_) => Ok(not_available("timing")),
+        cli::Command::Timing(args) => timing::run(&args),
         cli::Command::Flash(_) => Ok(not_available("flash")),
     };
     match result {

@@ -6,8 +6,8 @@ use std::time::{Duration, Instant};
 use anyhow::Result;
 use clap::ValueEnum;
 
-use crate::build::{TARGET, cargo};
-use crate::cli::TestArgs;
+use crate::build::{System, TARGET, cargo};
+use crate::cli::{TestArgs, TimingArgs};
 use crate::process::succeeds;
 use crate::setup::Setup;
 use crate::{build, image};
@@ -35,6 +35,8 @@ pub enum Step {
     Machines,
     /// The image in QEMU
     Qemu,
+    /// The interrupts within their budgets
+    Timing,
 }
 
 /// How a step ended.
@@ -104,23 +106,34 @@ fn perform(step: Step, setup: &mut Setup) -> Result<Outcome> {
             succeeds(&mut command)?
         }
         Step::Image => {
-            println!("{}", build::image(&setup.toolchain()?, None)?.display());
+            for system in System::ALL {
+                println!("{}", build::image(&setup.toolchain()?, system, None)?.display());
+            }
             true
         }
-        Step::ImageCheck => image::check(&build::image(&setup.toolchain()?, None)?)?,
+        Step::ImageCheck => {
+            let mut good = true;
+            for system in System::ALL {
+                println!("{}:", system.image());
+                good &= image::check(&build::image(&setup.toolchain()?, system, None)?)?;
+            }
+            good
+        }
         Step::Machines => {
             let toolchain = setup.toolchain()?;
             for machine in crate::run::machine_names(build::root()) {
-                build::image(&toolchain, Some(&machine.clone().into()))?;
+                build::image(&toolchain, System::Traction, Some(&machine.clone().into()))?;
                 println!("{machine}");
             }
             true
         }
         Step::Qemu => {
             let qemu = setup.qemu()?;
-            let image = build::image(&setup.toolchain()?, None)?;
+            let toolchain = setup.toolchain()?;
             let mut command = cargo();
-            command.env("TRACTIVE_IMAGE", image).env("TRACTIVE_QEMU", qemu);
+            command.env("TRACTIVE_QEMU", qemu);
+            command.env("TRACTIVE_IMAGE", build::image(&toolchain, System::Traction, None)?);
+            command.env("TRACTIVE_ZS9_IMAGE", build::image(&toolchain, System::Zs9, None)?);
             command.args([
                 "test",
                 "--release",
@@ -133,6 +146,7 @@ fn perform(step: Step, setup: &mut Setup) -> Result<Outcome> {
             ]);
             succeeds(&mut command)?
         }
+        Step::Timing => crate::timing::run(&TimingArgs::default())? == 0,
     };
     Ok(good.into())
 }

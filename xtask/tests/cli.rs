@@ -16,7 +16,7 @@ fn bad_usage_exits_with_2_and_says_why() {
         (&["run", "a/b"], "scenario `a/b`"),
         (&["test", "--only", "nonsense"], "nonsense"),
         (&["image", "--nonsense"], "--nonsense"),
-        (&["timing", "--json"], "not available yet"),
+        (&["timing", "--json", "--profile"], "cannot be used with"),
         (&["flash", "--board", "any"], "not available yet"),
     ] {
         let output = xtask(args);

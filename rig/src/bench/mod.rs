@@ -76,6 +76,8 @@ pub struct Settings {
     pub trace_step_s: f64,
     /// DC-link voltage, in V.
     pub udc_v: f64,
+    /// Other DC-link voltages: (time from the recording's beginning in s, V), each from its time on.
+    pub link_steps: Vec<(f64, f64)>,
     /// Imperfections of the sensors.
     pub flaws: Flaws,
 }
@@ -114,7 +116,7 @@ impl Bench {
         Self {
             plant,
             inverter: Inverter::new(settings.dead_time_ticks.into(), first),
-            sensors: Sensors::new(settings.udc_v, settings.flaws),
+            sensors: Sensors::new(settings.udc_v, settings.link_steps.clone(), settings.flaws),
             operator,
             clock: settings.clock,
             tick_s,

@@ -20,6 +20,8 @@ pub struct Flaws {
     pub udc_ripple: Option<(f64, f64)>,
     /// Constant error of the angle sensor, electrical, in degrees.
     pub angle_error_deg: f64,
+    /// From this time on control is told the same currents again and again, in s.
+    pub freeze_at_s: Option<f64>,
     /// Seed of the noise.
     pub seed: u64,
 }
@@ -66,18 +68,22 @@ impl Converter {
 /// Sensors, and the stiff DC link behind the inverter.
 pub struct Sensors {
     udc_v: f64,
+    link_steps: Vec<(f64, f64)>,
     converter: Converter,
+    /// What control was told last.
+    told_a: Abc,
 }
 
 impl Sensors {
-    /// Sensors on a link of this voltage.
-    pub fn new(udc_v: f64, flaws: Flaws) -> Self {
-        Self { udc_v, converter: Converter::new(flaws) }
+    /// Sensors on a link of this voltage, which changes at these times (in s) to these values.
+    pub fn new(udc_v: f64, link_steps: Vec<(f64, f64)>, flaws: Flaws) -> Self {
+        Self { udc_v, link_steps, converter: Converter::new(flaws), told_a: Abc::default() }
     }
 
     /// The link's true voltage, in V.
     pub fn udc_v(&self, t_s: f64) -> f64 {
-        self.udc_v + self.converter.ripple_v(t_s)
+        let passed = self.link_steps.iter().rev().find(|(at_s, _)| t_s >= *at_s);
+        passed.map_or(self.udc_v, |(_, udc_v)| *udc_v) + self.converter.ripple_v(t_s)
     }
 
     /// The phase currents as converted now.
@@ -89,8 +95,11 @@ impl Sensors {
     /// All that control measures.
     pub fn measure(&mut self, plant: &Plant, t_s: f64) -> Measurements {
         let turns = plant.angle_turns() + self.converter.flaws.angle_error_deg / 360.0;
+        if self.converter.flaws.freeze_at_s.is_none_or(|freeze_s| t_s < freeze_s) {
+            self.told_a = self.currents(plant);
+        }
         Measurements {
-            currents_a: self.currents(plant),
+            currents_a: self.told_a,
             udc_v: self.udc_v(t_s) as f32,
             angle: Angle((turns.rem_euclid(1.0) * 4_294_967_296.0).round() as u64 as u32),
         }

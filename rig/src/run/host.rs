@@ -64,10 +64,11 @@ pub fn run_on_host(
     mut bench: Bench,
     tables: &'static Tables,
     settings: Settings,
+    first_half_ticks: u32,
 ) -> Result<Recording, BenchError> {
     let shared = Shared::new();
     let mut control_at = Instant(settings.clock.control_ticks);
-    let mut pwm_at = Instant(settings.devices.shortest_half_ticks);
+    let mut pwm_at = Instant(first_half_ticks);
     let mut control = ControlTask::new(tables, settings, control_at);
     let mut pwm = PwmTask::new(tables, settings, pwm_at);
     let mut progress = Progress::new(name);

@@ -1,10 +1,13 @@
 //! Runs the drive against a bench, on the host or in QEMU.
 
+mod emulator;
 mod host;
 mod qemu;
 
+pub use emulator::Emulator;
+pub(crate) use emulator::emulate;
 pub use host::run_on_host;
-pub use qemu::{Emulator, run_in_qemu};
+pub use qemu::run_in_qemu;
 
 use crate::bench::Bench;
 use crate::trace::Recording;

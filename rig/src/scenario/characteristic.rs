@@ -1,6 +1,6 @@
 //! Torque accuracy, efficiency and current at the characteristic points: the paper's figure 10.
 
-use super::{Plan, Scenario};
+use super::{LEAD_S, Plan, Scenario};
 use crate::analysis::{self, Figures};
 use crate::machine::Machine;
 use crate::options::RunOptions;
@@ -68,7 +68,7 @@ impl Scenario for Characteristic {
             let torque_nm = slot.map_or(0.0, |slot| slot.torque_nm as f32);
             (Demand { torque_nm, slew_limited: true }, true)
         };
-        Plan { duration_s, speed, operator: Box::new(operator) }
+        Plan { lead_s: LEAD_S, duration_s, speed, link: Vec::new(), operator: Box::new(operator) }
     }
 
     fn figures(&self, recording: &Recording, _options: &RunOptions, machine: &Machine) -> Figures {

@@ -1,6 +1,6 @@
 //! Load steps at 200 r/min: the paper's figure 8.
 
-use super::{Plan, Scenario};
+use super::{LEAD_S, Plan, Scenario};
 use crate::analysis::{self, Figures};
 use crate::machine::Machine;
 use crate::options::RunOptions;
@@ -32,8 +32,10 @@ impl Scenario for LoadSteps {
 
     fn plan(&self, _options: &RunOptions, _machine: &Machine) -> Plan {
         Plan {
+            lead_s: LEAD_S,
             duration_s: STEP_S * LEVELS_NM.len() as f64,
             speed: vec![(0.0, SPEED_RPM)],
+            link: Vec::new(),
             operator: Box::new(|t_s: f64| {
                 (Demand { torque_nm: level_nm(t_s + 1e-9) as f32, slew_limited: false }, true)
             }),

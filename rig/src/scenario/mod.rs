@@ -1,8 +1,15 @@
 //! What is driven, and what is to be seen.
 
 mod characteristic;
+mod link_steps;
 mod load_steps;
+mod mode_borders;
+mod restart;
+mod reversal;
+mod script;
+mod steady;
 mod sweep;
+mod timing;
 
 use crate::analysis::Figures;
 use crate::bench::{self, Bench, Operator};
@@ -10,23 +17,27 @@ use crate::machine::Machine;
 use crate::options::{On, RunOptions};
 use crate::plant::{Plant, PlantSettings, SpeedSource};
 use crate::report::Page;
-use crate::run::{self, CLOCK, Emulator};
+use crate::run::{self, CLOCK};
 use crate::trace::Recording;
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result};
 use tractive::control::Gains;
 use tractive::drive::traction::Settings;
 use tractive::link::Setup;
 use tractive::modulation::Devices;
 
-/// Time in which the drive settles before the recording begins, in s.
+/// The usual lead, in s.
 const LEAD_S: f64 = 0.1;
 
 /// A scenario's inputs.
 pub struct Plan {
+    /// Time in which the drive settles before the recording begins, in s.
+    pub lead_s: f64,
     /// Length of the recording, in s.
     pub duration_s: f64,
     /// Prescribed speed: (time in s, r/min), straight lines between; before the first the first.
     pub speed: Vec<(f64, f64)>,
+    /// DC-link voltages: (time in s, V), each from its time on; the run's own before the first.
+    pub link: Vec<(f64, f64)>,
     /// The operator.
     pub operator: Box<dyn Operator + Send>,
 }
@@ -46,8 +57,18 @@ pub trait Scenario {
 }
 
 /// Every scenario.
-pub fn all() -> [Box<dyn Scenario>; 3] {
-    [Box::new(load_steps::LoadSteps), Box::new(sweep::Sweep), Box::new(characteristic::Characteristic)]
+pub fn all() -> Vec<Box<dyn Scenario>> {
+    vec![
+        Box::new(load_steps::LoadSteps),
+        Box::new(sweep::Sweep),
+        Box::new(characteristic::Characteristic),
+        Box::new(steady::Steady),
+        Box::new(mode_borders::ModeBorders),
+        Box::new(reversal::Reversal),
+        Box::new(restart::Restart),
+        Box::new(link_steps::LinkSteps),
+        Box::new(timing::Timing),
+    ]
 }
 
 /// The scenario of that name.
@@ -66,8 +87,11 @@ pub fn find(name: &str) -> Result<Box<dyn Scenario>> {
 pub fn drive(scenario: &dyn Scenario, options: &RunOptions, machine: &Machine) -> Result<Recording> {
     let plan = scenario.plan(options, machine);
     let ticks = |microseconds: f64| (microseconds * 1e-6 * f64::from(CLOCK.ticks_per_s)).round() as u32;
-    let setup =
-        Setup { min_pulse_ticks: ticks(options.min_pulse_us), dead_time_ticks: ticks(options.dead_time_us) };
+    let setup = Setup {
+        min_pulse_ticks: ticks(options.min_pulse_us),
+        dead_time_ticks: ticks(options.dead_time_us),
+        pwm_delay_ticks: ticks(options.pwm_delay_us),
+    };
     let devices = Devices::new(
         setup.min_pulse_ticks,
         setup.dead_time_ticks,
@@ -75,41 +99,34 @@ pub fn drive(scenario: &dyn Scenario, options: &RunOptions, machine: &Machine) -
         &CLOCK,
     );
     let parameters = &machine.folder.parameters;
+    let plant = plant(&plan, options, machine);
+    let first_half_ticks = devices.shortest_half_ticks + setup.pwm_delay_ticks;
     let bench = Bench::new(
-        plant(&plan, options, machine),
+        plant,
         plan.operator,
         &bench::Settings {
             clock: CLOCK,
-            first_half_ticks: devices.shortest_half_ticks,
+            first_half_ticks,
             dead_time_ticks: setup.dead_time_ticks,
-            lead_s: LEAD_S,
+            lead_s: plan.lead_s,
             duration_s: plan.duration_s,
             trace_step_s: options.dt_s(),
             udc_v: options.udc.unwrap_or(parameters.dc_link_nominal_v),
+            link_steps: plan.link,
             flaws: options.flaws(parameters.trip_current_a),
         },
     );
     match options.on {
         On::Host => {
             let settings = Settings { clock: CLOCK, devices, gains: Gains::DEFAULT };
-            Ok(run::run_on_host(scenario.name(), bench, machine.tables, settings)?)
+            Ok(run::run_on_host(scenario.name(), bench, machine.tables, settings, first_half_ticks)?)
         }
-        On::Qemu => {
-            let Some(image) = options.image.clone() else {
-                bail!("--on qemu needs --image; `cargo xtask run` builds it and hands it over");
-            };
-            run::run_in_qemu(
-                scenario.name(),
-                bench,
-                setup,
-                &Emulator { program: options.qemu.clone(), image },
-            )
-        }
+        On::Qemu => run::run_in_qemu(scenario.name(), bench, setup, &options.emulator()?),
     }
 }
 
 fn plant(plan: &Plan, options: &RunOptions, machine: &Machine) -> Plant {
-    let speed = plan.speed.iter().map(|(t_s, rpm)| (t_s + LEAD_S, *rpm)).collect();
+    let speed = plan.speed.iter().map(|(t_s, rpm)| (t_s + plan.lead_s, *rpm)).collect();
     Plant::new(
         &machine.folder,
         SpeedSource::profile(speed),

@@ -1,6 +1,6 @@
 //! Full torque from standstill through every mode: the paper's figure 9.
 
-use super::{Plan, Scenario};
+use super::{LEAD_S, Plan, Scenario};
 use crate::analysis::{self, Figures};
 use crate::machine::Machine;
 use crate::options::RunOptions;
@@ -37,7 +37,7 @@ impl Scenario for Sweep {
             let torque_nm = if t_s < 0.0 { 0.0 } else { torque_nm as f32 };
             (Demand { torque_nm, slew_limited: true }, true)
         };
-        Plan { duration_s, speed, operator: Box::new(operator) }
+        Plan { lead_s: LEAD_S, duration_s, speed, link: Vec::new(), operator: Box::new(operator) }
     }
 
     fn figures(&self, recording: &Recording, _options: &RunOptions, _machine: &Machine) -> Figures {

@@ -3,19 +3,17 @@
 //! The PWM timer comes at the carrier's peaks, the control timer at its valleys.
 
 use super::{
-    CLOCK, CONTROL_ANSWERS, CONTROL_TIMER, Control, PWM_ANSWERS, PWM_TIMER, Pwm, enable_interrupts,
-    open_files, read_register, receive, send, start_timers, stop, write_register,
+    CLOCK, CONTROL_TIMER, Control, PWM_TIMER, Pwm, enable_interrupts, exchange, read_register, start_timers,
+    stop, write_register,
 };
 use crate::board::{DualControlPort, DualPwmPort, DualSample, PlayedPeriod, PowerSample};
 use crate::drive::dual::{DualReport, Settings};
-use crate::link::{self, DualRequest, DualSetup};
+use crate::link::DualSetup;
 use crate::time::Instant;
 
 /// Opens the link and fetches the set-up. Call once, before [`start_dual`].
 pub fn connect_dual() -> DualSetup {
-    open_files();
-    send(&DualRequest::Hello.to_block());
-    link::dual_setup_from_block(&receive(CONTROL_ANSWERS))
+    exchange::open_dual()
 }
 
 /// Starts both timers: the first PWM interrupt comes at the first peak, the first control interrupt after one control period.
@@ -30,16 +28,11 @@ pub fn start_dual(settings: &Settings) {
 
 impl DualControlPort for Control {
     fn sample(&mut self, now: Instant) -> DualSample {
-        send(&DualRequest::ControlSample(now).to_block());
-        let (sample, end) = link::dual_sample_from_block(&receive(CONTROL_ANSWERS));
-        if end {
-            stop(true);
-        }
-        sample
+        exchange::sample_dual(now)
     }
 
     fn gates_off(&mut self, now: Instant) {
-        send(&DualRequest::GatesOff(now).to_block());
+        exchange::gates_off(now);
     }
 
     fn overrun_ticks(&mut self, _now: Instant, deadline_ticks: u32) -> u32 {
@@ -51,27 +44,26 @@ impl DualControlPort for Control {
     }
 
     fn report(&mut self, now: Instant, report: &DualReport) {
-        send(&DualRequest::ControlReport(now, *report).to_block());
+        exchange::report_dual(now, report);
     }
 }
 
 impl DualPwmPort for Pwm {
     fn sample(&mut self, now: Instant) -> PowerSample {
-        send(&DualRequest::PowerSample(now).to_block());
-        link::power_from_block(&receive(PWM_ANSWERS))
+        exchange::power_sample(now)
     }
 
     fn play(&mut self, now: Instant, next: &PlayedPeriod) {
-        send(&DualRequest::Play(now, *next).to_block());
+        exchange::play_dual(now, next);
     }
 
     fn gates_off(&mut self, now: Instant) {
-        send(&DualRequest::GatesOff(now).to_block());
+        exchange::gates_off(now);
     }
 }
 
 /// Gates off, whatever state the program is in, then the end: for panics and HardFaults.
 pub fn die_dual() -> ! {
-    send(&DualRequest::Dead.to_block());
+    exchange::dead_dual();
     stop(false)
 }

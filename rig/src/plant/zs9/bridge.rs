@@ -129,10 +129,10 @@ mod tests {
     #[test]
     fn active_vectors_are_those_of_the_table() {
         use LegGates as L;
-        let (sqrt3, third) = (3.0_f64.sqrt(), 1.0 / 3.0);
+        let sixty = Vector { alpha: 1.0 / 3.0, beta: 1.0 / 3.0_f64.sqrt() };
         // V2: 2/3 of the link at 60° for the upper motor; V8: likewise for the lower one; V13 to V15: nothing.
-        let v2 = Bridge::Driven([Vector { alpha: third, beta: third * sqrt3 }, Vector::default()]);
-        let v8 = Bridge::Driven([Vector::default(), Vector { alpha: third, beta: third * sqrt3 }]);
+        let v2 = Bridge::Driven([sixty, Vector::default()]);
+        let v8 = Bridge::Driven([Vector::default(), sixty]);
         let nothing = Bridge::Driven([Vector::default(); 2]);
         assert_eq!(Bridge::of([L::ONE, L::ONE, L::ZERO], 0.0), Ok(v2));
         assert_eq!(Bridge::of([L::MINUS_ONE, L::MINUS_ONE, L::ONE], 0.0), Ok(v8));
@@ -140,5 +140,27 @@ mod tests {
             assert_eq!(Bridge::of([zero; 3], 0.0), Ok(nothing));
         }
         assert_eq!(Bridge::of([L::SHOOT_THROUGH, L::ONE, L::ZERO], 0.0), Ok(Bridge::Short));
+    }
+
+    #[test]
+    fn open_legs_follow_their_currents() {
+        let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../tables/ipm-zs9");
+        let machine = tractive_tablegen::MachineFolder::read(&folder).unwrap();
+        let clamp = Clamp::new(85.0, &tractive_tablegen::SmoothMap::new(&machine.map), 1.0);
+        // Currents out of a leg to the upper and to the lower motor; then whether the terminals are positive. With i > 0 to
+        // the upper motor or i < 0 to the lower one the middle diode joins them.
+        let legs = [
+            (10.0, 10.0, [0.0, 0.0]),
+            (-10.0, 10.0, [1.0, 0.0]),
+            (-10.0, -10.0, [1.0, 1.0]),
+            (10.0, -4.0, [0.0, 0.0]),
+            (4.0, -10.0, [1.0, 1.0]),
+        ];
+        for (upper, lower, terminals) in legs {
+            let shares = freewheeling(&clamp, [upper, 0.0, 0.0], [lower, 0.0, 0.0]);
+            // The other legs carry nothing and stand in the middle.
+            let expected = terminals.map(|share| Vector::clarke([share, 0.5, 0.5]));
+            assert_eq!(shares, expected, "{upper} {lower}");
+        }
     }
 }

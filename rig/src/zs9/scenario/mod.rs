@@ -18,6 +18,7 @@ use crate::report::Page;
 use crate::run::CLOCK;
 use anyhow::{Context, Result, bail};
 use core::f64::consts::TAU;
+use tractive::link::DualSetup;
 
 pub use steady::SPEEDS_RPM as STEADY_SPEEDS_RPM;
 
@@ -87,7 +88,10 @@ pub fn drive(scenario: &dyn Scenario, options: &RunOptions, machine: &Machine) -
     let settings = settings::drive(CLOCK, options.zs9.carrier_hz);
     match options.on {
         On::Host => Ok(run::run_on_host(scenario.name(), bench, machine.tables, settings)?),
-        On::Qemu => bail!("--on qemu: not available for the ZS9 yet"),
+        On::Qemu => {
+            let setup = DualSetup { carrier_ticks: settings.carrier_ticks };
+            run::run_in_qemu(scenario.name(), bench, setup, &options.emulator()?)
+        }
     }
 }
 

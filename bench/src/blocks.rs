@@ -1,0 +1,148 @@
+//! The blocks, each in a function of its name (`sin_cos/idsp` in `sin_cos_idsp`). None is inlined: what stands between a block's first instruction and its return is what is counted.
+
+use crate::{Block, Input, Output, exact};
+use fixed::types::I16F16;
+use micromath::F32Ext;
+use tractive::control::{flux_linkage, mtpa};
+use tractive::frames::{self, Abc, Angle, Dq};
+use tractive::machine::BUILT_IN;
+
+/// Every block; of those with the same word before the stroke the first is ours.
+pub const ALL: [Block; 16] = [
+    Block { name: "sin_cos/tractive", run: sin_cos_tractive, exact: Some(exact::sin_cos) },
+    Block { name: "sin_cos/idsp", run: sin_cos_idsp, exact: Some(exact::sin_cos) },
+    Block { name: "sin_cos/micromath", run: sin_cos_micromath, exact: Some(exact::sin_cos) },
+    Block { name: "sin_cos/libm", run: sin_cos_libm, exact: Some(exact::sin_cos) },
+    Block { name: "atan2/tractive", run: atan2_tractive, exact: Some(exact::direction) },
+    Block { name: "atan2/idsp", run: atan2_idsp, exact: Some(exact::direction) },
+    Block { name: "atan2/micromath", run: atan2_micromath, exact: Some(exact::direction) },
+    Block { name: "atan2/libm", run: atan2_libm, exact: Some(exact::direction) },
+    Block { name: "sqrt/tractive", run: sqrt_tractive, exact: Some(exact::root) },
+    Block { name: "sqrt/micromath", run: sqrt_micromath, exact: Some(exact::root) },
+    Block { name: "sqrt/libm", run: sqrt_libm, exact: Some(exact::root) },
+    Block { name: "lookup_2d/tractive", run: lookup_2d_tractive, exact: Some(exact::flux) },
+    Block { name: "clarke_park/tractive", run: clarke_park_tractive, exact: None },
+    Block { name: "mtpa/tractive", run: mtpa_tractive, exact: None },
+    Block { name: "core_tick/tractive", run: core_tick_tractive, exact: None },
+    Block { name: "core_tick/foc", run: core_tick_foc, exact: None },
+];
+
+#[inline(never)]
+fn sin_cos_tractive(input: &Input, output: &mut Output) {
+    let result = Angle(input.turn).sin_cos();
+    *output = [result.sin, result.cos];
+}
+
+#[inline(never)]
+fn sin_cos_idsp(input: &Input, output: &mut Output) {
+    const SCALE: f32 = 1.0 / 2_147_483_648.0;
+    let (cos, sin) = idsp::cossin(input.turn.cast_signed());
+    *output = [sin as f32 * SCALE, cos as f32 * SCALE];
+}
+
+#[inline(never)]
+fn sin_cos_micromath(input: &Input, output: &mut Output) {
+    let (sin, cos) = F32Ext::sin_cos(input.radians);
+    *output = [sin, cos];
+}
+
+#[inline(never)]
+fn sin_cos_libm(input: &Input, output: &mut Output) {
+    let (sin, cos) = libm::sincosf(input.radians);
+    *output = [sin, cos];
+}
+
+#[inline(never)]
+fn atan2_tractive(input: &Input, output: &mut Output) {
+    let [x, y] = input.vector;
+    *output = [Angle::of_vector(x, y).signed_radians(), 0.0];
+}
+
+#[inline(never)]
+fn atan2_idsp(input: &Input, output: &mut Output) {
+    let [x, y] = input.integers;
+    let angle = idsp::atan2(y, x);
+    *output = [angle as f32 * (core::f32::consts::PI / 2_147_483_648.0), 0.0];
+}
+
+#[inline(never)]
+fn atan2_micromath(input: &Input, output: &mut Output) {
+    let [x, y] = input.vector;
+    *output = [F32Ext::atan2(y, x), 0.0];
+}
+
+#[inline(never)]
+fn atan2_libm(input: &Input, output: &mut Output) {
+    let [x, y] = input.vector;
+    *output = [libm::atan2f(y, x), 0.0];
+}
+
+#[inline(never)]
+fn sqrt_tractive(input: &Input, output: &mut Output) {
+    *output = [frames::sqrt(input.positive), 0.0];
+}
+
+#[inline(never)]
+fn sqrt_micromath(input: &Input, output: &mut Output) {
+    *output = [F32Ext::sqrt(input.positive), 0.0];
+}
+
+#[inline(never)]
+fn sqrt_libm(input: &Input, output: &mut Output) {
+    *output = [libm::sqrtf(input.positive), 0.0];
+}
+
+#[inline(never)]
+fn lookup_2d_tractive(input: &Input, output: &mut Output) {
+    let [d, q] = input.current_a;
+    let flux = flux_linkage(&BUILT_IN, Dq { d, q });
+    *output = [flux.d, flux.q];
+}
+
+#[inline(never)]
+fn clarke_park_tractive(input: &Input, output: &mut Output) {
+    let current = currents(input).clarke().park(Angle(input.turn).sin_cos());
+    *output = [current.d, current.q];
+}
+
+#[inline(never)]
+fn mtpa_tractive(input: &Input, output: &mut Output) {
+    let point = mtpa(input.positive, &BUILT_IN);
+    *output = [point.d, point.q];
+}
+
+/// What every field-oriented controller does in a tick, in this drive's way: Clarke, Park, current to flux by the map, the
+/// flux error with its integral part, decoupling, back to the stator, three phases.
+#[inline(never)]
+fn core_tick_tractive(input: &Input, output: &mut Output) {
+    const GAIN: f32 = 900.0;
+    const INTEGRAL_GAIN: f32 = 20.0;
+    const RESISTANCE: f32 = 0.1;
+    let frame = Angle(input.turn).sin_cos();
+    let current = currents(input).clarke().park(frame);
+    let flux = flux_linkage(&BUILT_IN, current);
+    let [d, q] = input.vector;
+    let error = Dq { d, q } - flux;
+    let integral = Dq { d: output[0], q: output[1] } + error * INTEGRAL_GAIN;
+    let voltage = error * GAIN + integral + flux.j() * input.radians + current * RESISTANCE;
+    let phases = voltage.unpark(frame).abc();
+    *output = [phases.a, phases.b];
+}
+
+/// The same of the crate `foc`, in fixed point: no map, no decoupling, compare values by space vectors.
+#[inline(never)]
+fn core_tick_foc(input: &Input, output: &mut Output) {
+    use foc::{Foc, pid::PIController, pwm::SpaceVector};
+    let number = |x: f32| I16F16::from_bits((x * 65_536.0) as i32);
+    let controller = || PIController::new(I16F16::ONE, I16F16::ONE);
+    let mut foc = Foc::<SpaceVector, 4096>::new(controller(), controller());
+    let Abc { a, b, .. } = currents(input);
+    let angle = number(input.radians);
+    let compare = foc.update([number(a), number(b)], angle, I16F16::ONE, I16F16::DELTA);
+    *output = [f32::from(compare[0]), f32::from(compare[1])];
+}
+
+fn currents(input: &Input) -> Abc {
+    let [a, b] = input.vector;
+    Abc { a, b, c: -a - b }
+}

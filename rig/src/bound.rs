@@ -1,0 +1,178 @@
+//! What the pulses and the machine's inductances allow: distortion and torque ripple of the modulator's own pattern on the
+//! machine, with no control at all.
+//!
+//! The pattern's volt-seconds are the stationary flux, exactly; less mean and fundamental they are its ripple. Put around the
+//! mean flux linkage of the operating point and turned into current by the map, they give the least that any control could
+//! reach with these pulses.
+
+use crate::analysis;
+use crate::distortion::{Distortion, Samples};
+use crate::machine::Machine;
+use crate::options::RunOptions;
+use crate::pattern::{self, Wanted};
+use crate::trace::Recording;
+use core::f64::consts::TAU;
+use serde::Serialize;
+use tractive::modulation::Mode;
+use tractive_tablegen::SmoothMap;
+
+/// A measured distortion beside its bound.
+#[derive(Clone, Debug, Serialize)]
+pub struct Beside {
+    /// Mode.
+    pub mode: &'static str,
+    /// Current distortion, in percent.
+    pub thd_percent: f64,
+    /// The bound on it.
+    pub thd_bound_percent: f64,
+    /// Excess over the bound, in percent of it.
+    pub thd_excess_percent: f64,
+    /// Torque ripple, rms, in N·m.
+    pub ripple_rms_nm: f64,
+    /// The bound on it.
+    pub ripple_rms_bound_nm: f64,
+    /// Excess over the bound, in percent of it.
+    pub ripple_rms_excess_percent: f64,
+    /// Torque ripple, peak to peak, in N·m.
+    pub ripple_peak_to_peak_nm: f64,
+    /// The bound on it.
+    pub ripple_peak_to_peak_bound_nm: f64,
+    /// Excess over the bound, in percent of it.
+    pub ripple_peak_to_peak_excess_percent: f64,
+}
+
+/// The bound of the operating point that a window of a recording holds.
+pub fn beside(
+    measured: &Distortion,
+    recording: &Recording,
+    window: (f64, f64),
+    options: &RunOptions,
+    machine: &Machine,
+) -> Option<Beside> {
+    let rows = analysis::window(recording, window.0, window.1);
+    let mode = rows.last()?.mode;
+    let bound = Distortion::of(&ideal(rows, options, machine)?);
+    let excess = |value: f64, bound: f64| (value / bound - 1.0) * 100.0;
+    Some(Beside {
+        mode: mode.name(),
+        thd_percent: measured.thd_percent,
+        thd_bound_percent: bound.thd_percent,
+        thd_excess_percent: excess(measured.thd_percent, bound.thd_percent),
+        ripple_rms_nm: measured.torque_rms_nm,
+        ripple_rms_bound_nm: bound.torque_rms_nm,
+        ripple_rms_excess_percent: excess(measured.torque_rms_nm, bound.torque_rms_nm),
+        ripple_peak_to_peak_nm: measured.torque_peak_to_peak_nm,
+        ripple_peak_to_peak_bound_nm: bound.torque_peak_to_peak_nm,
+        ripple_peak_to_peak_excess_percent: excess(
+            measured.torque_peak_to_peak_nm,
+            bound.torque_peak_to_peak_nm,
+        ),
+    })
+}
+
+/// Fundamental periods of a pattern: the asynchronous carrier repeats only after several.
+const fn cycles(mode: Mode) -> u32 {
+    if matches!(mode, Mode::Async) { 20 } else { 1 }
+}
+
+/// The ideal samples at the operating point of these rows.
+fn ideal(rows: &[crate::trace::Row], options: &RunOptions, machine: &Machine) -> Option<Samples> {
+    let last = rows.last()?;
+    let parameters = &machine.folder.parameters;
+    let map = SmoothMap::new(&machine.folder.map);
+    let pole_pairs = f64::from(parameters.pole_pairs);
+    let f1_hz = (last.speed_rpm * pole_pairs / 60.0).abs();
+    let omega = TAU * f1_hz;
+    // Backward rotation is forward rotation seen in a mirror.
+    let mirror = last.speed_rpm.signum();
+    let count = rows.len() as f64;
+    let mean = |value: &dyn Fn(&crate::trace::Row) -> f64| rows.iter().map(value).sum::<f64>() / count;
+    let flux = |row: &crate::trace::Row| map.at(row.id_a, mirror * row.iq_a);
+    let (psi_d, psi_q) = (mean(&|row| flux(row).psi_d_wb), mean(&|row| flux(row).psi_q_wb));
+    let (id, iq) = (mean(&|row| row.id_a), mirror * mean(&|row| row.iq_a));
+    let resistance = parameters.stator_resistance_ohm;
+    let voltage_v = (resistance * id - omega * psi_q).hypot(resistance * iq + omega * psi_d);
+    let wanted = Wanted {
+        mode: last.mode,
+        voltage_v: if last.mode == Mode::Square {
+            last.udc_v * core::f64::consts::FRAC_2_PI
+        } else {
+            voltage_v
+        },
+        udc_v: last.udc_v,
+        f1_hz,
+        cycles: cycles(last.mode),
+        dead_time_us: 0.0,
+        min_pulse_us: options.min_pulse_us,
+        max_switching_hz: machine.tables.ratings.max_switching_hz,
+    };
+    let ripple = Ripple::of(&wanted)?;
+    let load = psi_q.atan2(psi_d);
+    let mut samples = Samples { angle: Vec::new(), current_a: Vec::new(), torque_nm: Vec::new() };
+    let mut current = (id, iq);
+    for (alpha, beta, angle) in ripple.points {
+        // The rotor stands behind the fundamental of the flux by the load angle.
+        let rotor = angle - load;
+        let (sin, cos) = rotor.sin_cos();
+        let (d, q) = (psi_d + alpha * cos + beta * sin, psi_q + beta * cos - alpha * sin);
+        current = map.inverse(d, q, current)?;
+        samples.angle.push(angle);
+        samples.current_a.push(current.0 * cos - current.1 * sin);
+        samples.torque_nm.push(mirror * 1.5 * pole_pairs * (d * current.1 - q * current.0));
+    }
+    Some(samples)
+}
+
+/// A pattern's ripple flux, evenly sampled: (α, β) in Wb, and the angle of the fundamental flux in rad.
+struct Ripple {
+    points: Vec<(f64, f64, f64)>,
+}
+
+/// Samples a fundamental period.
+const PER_CYCLE: usize = 1440;
+
+impl Ripple {
+    fn of(wanted: &Wanted) -> Option<Self> {
+        let edges = pattern::edges(wanted).ok()?;
+        let period_s = f64::from(wanted.cycles) / wanted.f1_hz;
+        let samples = PER_CYCLE * wanted.cycles as usize;
+        let dt_s = period_s / samples as f64;
+        let (mut levels, mut next) = ([false; 3], 0);
+        let (mut now_s, mut alpha, mut beta) = (0.0, 0.0, 0.0);
+        let mut flux = Vec::with_capacity(samples);
+        for k in 0..samples {
+            let until_s = k as f64 * dt_s;
+            while now_s < until_s || edges.get(next).is_some_and(|(at_s, ..)| *at_s <= until_s) {
+                let edge = edges.get(next).filter(|(at_s, ..)| *at_s <= until_s);
+                let to_s = edge.map_or(until_s, |(at_s, ..)| *at_s);
+                let [a, b, c] = levels.map(|on| if on { wanted.udc_v } else { 0.0 });
+                alpha += (to_s - now_s) * (2.0 * a - b - c) / 3.0;
+                beta += (to_s - now_s) * (b - c) / 3.0_f64.sqrt();
+                now_s = to_s;
+                if let Some((_, leg, on)) = edge {
+                    levels[*leg] = *on;
+                    next += 1;
+                }
+            }
+            flux.push((alpha, beta));
+        }
+        let count = samples as f64;
+        let omega = TAU * wanted.f1_hz;
+        let mean =
+            flux.iter().fold((0.0, 0.0), |sum, value| (sum.0 + value.0 / count, sum.1 + value.1 / count));
+        // The fundamental: what turns forward once a period.
+        let (mut cos, mut sin) = (0.0, 0.0);
+        for (k, (alpha, beta)) in flux.iter().enumerate() {
+            let (s, c) = (omega * k as f64 * dt_s).sin_cos();
+            cos += (alpha * c + beta * s) / count;
+            sin += (beta * c - alpha * s) / count;
+        }
+        let (size, phase) = (cos.hypot(sin), sin.atan2(cos));
+        let points = flux.iter().enumerate().map(|(k, (alpha, beta))| {
+            let angle = omega * k as f64 * dt_s + phase;
+            let (s, c) = angle.sin_cos();
+            (alpha - mean.0 - size * c, beta - mean.1 - size * s, angle)
+        });
+        Some(Self { points: points.collect() })
+    }
+}

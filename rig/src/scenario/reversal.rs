@@ -1,0 +1,75 @@
+//! Full power reversed in one step in square wave, released in deep weakening, and applied again.
+
+use super::script::{BEGIN_S, Script};
+use super::{Plan, Scenario};
+use crate::analysis::{self, Figures};
+use crate::machine::Machine;
+use crate::options::RunOptions;
+use crate::report::Page;
+use crate::trace::Recording;
+
+/// At `--speed`: full power, full braking power, nothing, full power; each for 0.4 s, in steps.
+pub struct Reversal;
+
+const SPEED_RPM: f64 = 4000.0;
+const HOLD_S: f64 = 0.4;
+const SHARES: [f64; 4] = [1.0, -1.0, 0.0, 1.0];
+
+impl Scenario for Reversal {
+    fn name(&self) -> &'static str {
+        "reversal"
+    }
+
+    fn figure(&self) -> &'static str {
+        "figure 9d: square wave, here with its torque reversed"
+    }
+
+    fn plan(&self, options: &RunOptions, machine: &Machine) -> Plan {
+        // The envelope makes full power of full torque.
+        let most = machine.folder.parameters.max_torque_nm;
+        let torque = SHARES.iter().enumerate().map(|(k, share)| (BEGIN_S + k as f64 * HOLD_S, share * most));
+        Script {
+            speed: vec![(0.0, options.speed.unwrap_or(SPEED_RPM))],
+            torque: torque.collect(),
+            duration_s: BEGIN_S + SHARES.len() as f64 * HOLD_S,
+            ..Script::default()
+        }
+        .plan()
+    }
+
+    fn figures(&self, recording: &Recording, _options: &RunOptions, machine: &Machine) -> Figures {
+        let at = |k: usize| BEGIN_S + k as f64 * HOLD_S;
+        let steps = (0..SHARES.len()).map(|k| analysis::transition(recording, at(k), at(k + 1)));
+        let holds = (0..SHARES.len()).filter(|k| SHARES[*k] != 0.0).map(|k| {
+            let window = (at(k + 1) - 0.5 * HOLD_S, at(k + 1));
+            let demand_nm =
+                analysis::window(recording, window.0, window.1).last().map_or(0.0, |row| row.te_ref_nm);
+            analysis::steady_point(recording, window, demand_nm, &machine.folder)
+        });
+        let (steps, holds): (Vec<_>, Vec<_>) = (steps.collect(), holds.collect());
+        let mut figures = analysis::common(recording);
+        figures.set("transitions", steps);
+        figures.set("points", holds);
+        figures
+    }
+
+    fn plots(&self, recording: &Recording, page: &mut Page) {
+        page.overview(recording);
+        page.plot(
+            "Currents, rotor frame",
+            "A",
+            recording,
+            &[
+                ("id", |row| row.id_a),
+                ("iq", |row| row.iq_a),
+                ("id*", |row| row.id_ref_a),
+                ("iq*", |row| row.iq_ref_a),
+            ],
+        );
+        for k in 0..SHARES.len() {
+            let at_s = BEGIN_S + k as f64 * HOLD_S;
+            let title = format!("phase current u at {at_s:.1} s");
+            page.plot_window(&title, "A", recording, (at_s - 0.01, at_s + 0.05), &[("ia", |row| row.ia_a)]);
+        }
+    }
+}

@@ -1,0 +1,69 @@
+//! One operating point in steady state: distortion and torque ripple beside what the pulses allow.
+
+use super::script::Script;
+use super::{Plan, Scenario};
+use crate::analysis::{self, Figures};
+use crate::machine::Machine;
+use crate::options::RunOptions;
+use crate::report::Page;
+use crate::trace::Recording;
+use crate::{bound, distortion};
+
+/// `--speed` and `--torque`.
+pub struct Steady;
+
+const SPEED_RPM: f64 = 1000.0;
+const SETTLE_S: f64 = 0.6;
+const MEASURE_S: f64 = 0.5;
+
+fn point(options: &RunOptions, machine: &Machine) -> (f64, f64) {
+    let torque_nm = options.torque.unwrap_or(machine.folder.parameters.max_torque_nm);
+    (options.speed.unwrap_or(SPEED_RPM), torque_nm)
+}
+
+impl Scenario for Steady {
+    fn name(&self) -> &'static str {
+        "steady"
+    }
+
+    fn figure(&self) -> &'static str {
+        "figures 6 and 7: current and spectrum of the mode in steady state"
+    }
+
+    fn plan(&self, options: &RunOptions, machine: &Machine) -> Plan {
+        let (speed_rpm, torque_nm) = point(options, machine);
+        Script {
+            speed: vec![(0.0, speed_rpm)],
+            torque: vec![(0.0, torque_nm)],
+            slew_limited: true,
+            duration_s: SETTLE_S + MEASURE_S,
+            ..Script::default()
+        }
+        .plan()
+    }
+
+    fn figures(&self, recording: &Recording, options: &RunOptions, machine: &Machine) -> Figures {
+        let (_, torque_nm) = point(options, machine);
+        let window = (SETTLE_S, SETTLE_S + MEASURE_S);
+        let mut figures = analysis::common(recording);
+        let steady = analysis::steady_point(recording, window, torque_nm, &machine.folder);
+        let measured = distortion::of_recording(recording, window, &machine.folder);
+        figures.set("point", vec![steady]);
+        figures.set("harmonics", measured.harmonics());
+        figures.set("distortion", vec![bound::beside(&measured, recording, window, options, machine)]);
+        figures
+    }
+
+    fn plots(&self, recording: &Recording, page: &mut Page) {
+        let window = (SETTLE_S, SETTLE_S + 0.04);
+        page.line_voltage("line voltage u-v", recording, window);
+        page.plot_window("phase current u", "A", recording, window, &[("ia", |row| row.ia_a)]);
+        page.plot_window(
+            "torque",
+            "N·m",
+            recording,
+            window,
+            &[("torque", |row| row.te_nm), ("demand", |row| row.te_ref_nm)],
+        );
+    }
+}

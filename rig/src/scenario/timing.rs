@@ -1,0 +1,65 @@
+//! A short drive through every mode and up to the highest speed, for `cargo xtask timing`: every instruction of the
+//! interrupts is logged there, so a second of it takes the emulator ten.
+
+use super::{Plan, Scenario};
+use crate::analysis::{self, Figures};
+use crate::machine::Machine;
+use crate::options::RunOptions;
+use crate::report::Page;
+use crate::trace::Recording;
+use tractive::control::Demand;
+
+/// Full torque at a speed in the middle of each mode's range, then at `--to`.
+pub struct Timing;
+
+/// Speeds where async, sync 15, sync 12, middle 7, middle 3 and square are used, in r/min.
+const SPEEDS_RPM: [f64; 6] = [150.0, 750.0, 1000.0, 1450.0, 1800.0, 2200.0];
+/// From one speed to the next, and at each, in s.
+const RAMP_S: f64 = 0.03;
+const HOLD_S: f64 = 0.03;
+/// What is left of the run behind the fault, in s.
+const AFTER_FAULT_S: f64 = 0.005;
+const LEAD_S: f64 = 0.01;
+
+impl Scenario for Timing {
+    fn name(&self) -> &'static str {
+        "timing"
+    }
+
+    fn figure(&self) -> &'static str {
+        "no figure: every mode in half a second, for `cargo xtask timing`"
+    }
+
+    fn plan(&self, options: &RunOptions, machine: &Machine) -> Plan {
+        let turn = options.to.signum();
+        let speeds = SPEEDS_RPM.iter().map(|rpm| rpm * turn).chain([options.to]);
+        let (mut speed, mut t_s) = (Vec::new(), 0.0);
+        for rpm in speeds {
+            speed.extend([(t_s, rpm), (t_s + HOLD_S, rpm)]);
+            t_s += HOLD_S + RAMP_S;
+        }
+        let direction = if options.brake { -turn } else { turn };
+        let torque_nm = (machine.folder.parameters.max_torque_nm * options.torque_scale * direction) as f32;
+        let fault_s = options.fault_at.unwrap_or(f64::INFINITY);
+        let operator = move |t_s: f64| {
+            let torque_nm = if t_s < 0.0 { 0.0 } else { torque_nm };
+            (
+                Demand { torque_nm: if t_s < fault_s { torque_nm } else { f32::NAN }, slew_limited: false },
+                true,
+            )
+        };
+        let freeze_s = options.freeze_at.unwrap_or(f64::INFINITY);
+        let duration_s = t_s.min(fault_s.min(freeze_s) + AFTER_FAULT_S);
+        Plan { lead_s: LEAD_S, duration_s, speed, link: Vec::new(), operator: Box::new(operator) }
+    }
+
+    fn figures(&self, recording: &Recording, _options: &RunOptions, _machine: &Machine) -> Figures {
+        let mut figures = analysis::common(recording);
+        figures.set("modes", analysis::modes(recording));
+        figures
+    }
+
+    fn plots(&self, recording: &Recording, page: &mut Page) {
+        page.overview(recording);
+    }
+}

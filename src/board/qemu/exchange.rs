@@ -1,0 +1,113 @@
+//! The exchange with the rig, over three semihosting files. A real board has nothing of this: `cargo xtask timing` knows
+//! these functions by their module and does not count them, so they stay out of line and take what they tell by reference.
+
+mod dual;
+
+pub use dual::{dead_dual, gates_off, open_dual, play_dual, power_sample, report_dual, sample_dual};
+
+use super::stop;
+use crate::board::Sample;
+use crate::drive::Report;
+use crate::frames::Abc;
+use crate::link::{self, BLOCK_BYTES, Block, Request, Setup};
+use crate::modulation::CarrierPeriod;
+use crate::protection::SafeState;
+use crate::time::Instant;
+use core::sync::atomic::{AtomicU32, Ordering};
+use cortex_m_semihosting::syscall;
+
+/// File handles of the link: requests, answers to control, answers to PWM.
+static FILES: [AtomicU32; 3] = [const { AtomicU32::new(0) }; 3];
+const REQUESTS: usize = 0;
+const CONTROL_ANSWERS: usize = 1;
+const PWM_ANSWERS: usize = 2;
+
+/// Opens the files and fetches the set-up.
+#[inline(never)]
+pub fn open() -> Setup {
+    open_files();
+    send(&Request::Hello.to_block());
+    link::setup_from_block(&receive(CONTROL_ANSWERS))
+}
+
+fn open_files() {
+    const READ: usize = 1;
+    const WRITE: usize = 5;
+    for (file, (name, mode)) in
+        FILES.iter().zip([(c"requests", WRITE), (c"control-answers", READ), (c"pwm-answers", READ)])
+    {
+        // SAFETY: SYS_OPEN reads a NUL-terminated name of the given length, which lives for the program.
+        let handle = unsafe { syscall!(OPEN, name.as_ptr(), mode, name.count_bytes()) };
+        if handle == usize::MAX {
+            stop(false);
+        }
+        file.store(handle as u32, Ordering::Relaxed);
+    }
+}
+
+/// The control timer's conversions; ends the emulation when the rig says so.
+#[inline(never)]
+pub fn control_sample(now: Instant) -> Sample {
+    send(&Request::ControlSample(now).to_block());
+    let (sample, end) = link::sample_from_block(&receive(CONTROL_ANSWERS));
+    if end {
+        stop(true);
+    }
+    sample
+}
+
+/// Phase currents at a carrier boundary.
+#[inline(never)]
+pub fn pwm_sample(now: Instant) -> Abc {
+    send(&Request::PwmSample(now).to_block());
+    link::currents_from_block(&receive(PWM_ANSWERS))
+}
+
+/// What was loaded into the shadow registers.
+#[inline(never)]
+pub fn play(now: Instant, next: &CarrierPeriod) {
+    send(&Request::Play(now, *next).to_block());
+}
+
+/// The end of a control interrupt.
+#[inline(never)]
+pub fn report(now: Instant, report: &Report) {
+    send(&Request::ControlReport(now, *report).to_block());
+}
+
+/// An order to enter the safe state.
+#[inline(never)]
+pub fn enter(safe: SafeState, now: Instant) {
+    send(&Request::Enter(now, safe).to_block());
+}
+
+/// The processor stops, gates off.
+#[inline(never)]
+pub fn dead() {
+    send(&Request::Dead.to_block());
+}
+
+fn file(index: usize) -> usize {
+    match FILES.get(index) {
+        Some(handle) => handle.load(Ordering::Relaxed) as usize,
+        None => 0,
+    }
+}
+
+fn send(block: &Block) {
+    // SAFETY: SYS_WRITE reads exactly the block, which outlives the call.
+    let missing = unsafe { syscall!(WRITE, file(REQUESTS), block.as_ptr(), BLOCK_BYTES) };
+    if missing != 0 {
+        stop(false);
+    }
+}
+
+fn receive(answers: usize) -> Block {
+    let mut block: Block = [0; link::BLOCK_WORDS];
+    // SAFETY: SYS_READ writes at most the block's bytes, and the block is ours until it returns.
+    let missing = unsafe { syscall!(READ, file(answers), block.as_mut_ptr(), BLOCK_BYTES) };
+    if missing != 0 {
+        stop(false);
+    }
+    block
+}

@@ -1,0 +1,43 @@
+//! The way of the flux reference while a pattern of few pulses follows.
+//!
+//! On a circle of constant flux linkage a small change of torque can be a large change of load angle: near no torque, with more
+//! flux than the magnets', the two signs of torque lie some 70° apart. A pattern turns its flux hexagon against the rotor a
+//! few degrees a sector; a reference that jumps would throw it off its centre.
+
+use crate::frames::Dq;
+
+/// Rate at which the reference turns at most, in rad/s, against the rotor.
+const TURN_RAD_S: f32 = 120.0;
+
+#[derive(Clone, Copy, Debug)]
+pub struct FluxPath {
+    last: Option<Dq>,
+}
+
+impl FluxPath {
+    pub const fn new() -> Self {
+        Self { last: None }
+    }
+
+    /// The reference on its way to `target`; at once there where a carrier follows (`can_step`).
+    pub fn step(&mut self, target: Dq, can_step: bool, period_s: f32) -> Dq {
+        let size = target.length();
+        let reference = match self.last {
+            Some(last) if !can_step => {
+                let (change, most) = (target - last, TURN_RAD_S * period_s * size);
+                let length = change.length();
+                if length > most {
+                    let moved = last + change * (most / length);
+                    // On the circle of the target, not on the chord.
+                    let moved_size = moved.length();
+                    if moved_size > 0.0 { moved * (size / moved_size) } else { target }
+                } else {
+                    target
+                }
+            }
+            _ => target,
+        };
+        self.last = Some(reference);
+        reference
+    }
+}

@@ -1,0 +1,50 @@
+//! Dead-time compensation.
+//!
+//! While both devices of a leg are off, its current chooses the level: out of the leg (positive) it flows through the lower
+//! diode, into the leg through the upper one. So a rising edge comes late by the dead time when the current is positive, a
+//! falling one when it is negative, and the other edges come at once. Those that would come late are commanded earlier.
+
+use super::{CarrierPeriod, Devices};
+use crate::frames::{Abc, limit};
+
+/// The half as the timer must play it so that the legs do what `half` says; `currents_a` are the phase currents that are
+/// expected in it. Currents below `small_a` may have either sign by their ripple: they count in proportion. Edges at the half's
+/// very start belong to the half before and cannot come earlier.
+pub fn compensated(half: &CarrierPeriod, currents_a: &Abc, small_a: f32, devices: &Devices) -> CarrierPeriod {
+    let mut played = *half;
+    let dead_ticks = devices.dead_time_ticks as f32;
+    let phases = played.compare_ticks.iter_mut().zip(half.start_levels);
+    for ((compare, start_level), current) in phases.zip([currents_a.a, currents_a.b, currents_a.c]) {
+        let against = if start_level { -current } else { current };
+        if *compare < half.period_ticks {
+            let late = dead_ticks * limit(against / small_a, 0.0, 1.0);
+            *compare = compare.saturating_sub((late + 0.5) as u32);
+        }
+    }
+    played
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const DEVICES: Devices =
+        Devices { min_pulse_ticks: 250, dead_time_ticks: 125, shortest_half_ticks: 10_000 };
+
+    fn played(start_levels: [bool; 3], currents: [f32; 3]) -> [u32; 3] {
+        let compare_ticks = [5_000, 60, u32::MAX];
+        let half =
+            CarrierPeriod { period_ticks: 10_000, compare_ticks, start_levels, ..CarrierPeriod::default() };
+        let [a, b, c] = currents;
+        compensated(&half, &Abc { a, b, c }, 2.0, &DEVICES).compare_ticks
+    }
+
+    #[test]
+    fn edges_that_the_current_delays_are_commanded_earlier() {
+        assert_eq!(played([false; 3], [10.0, 10.0, 10.0]), [4_875, 0, u32::MAX]);
+        assert_eq!(played([false; 3], [-10.0, -10.0, -10.0]), [5_000, 60, u32::MAX]);
+        assert_eq!(played([true; 3], [10.0, 10.0, 10.0]), [5_000, 60, u32::MAX]);
+        assert_eq!(played([true; 3], [-10.0, -10.0, -10.0]), [4_875, 0, u32::MAX]);
+        assert_eq!(played([false; 3], [1.0, 0.0, 0.0]), [4_937, 60, u32::MAX]);
+    }
+}

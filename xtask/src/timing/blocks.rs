@@ -1,0 +1,136 @@
+//! The building blocks in the bench's image: instructions from the emulator, errors from the host.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+use anyhow::{Context, Result, bail};
+
+use super::log::{Event, event};
+use crate::build::{self, cargo};
+use crate::elf::Image;
+use crate::setup::Toolchain;
+use crate::thumb::decode;
+use crate::{image, process};
+
+/// A building block.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Block {
+    /// What it does and who makes it, as `sqrt/libm`.
+    pub name: String,
+    /// Instructions on the dearest input.
+    pub max: u32,
+    pub mean: f64,
+    /// Largest absolute error; nothing where there is nothing to compare with.
+    pub max_error: Option<f64>,
+}
+
+/// Builds the bench for the board and for the host, runs both.
+pub fn measure(toolchain: &Toolchain, qemu: &Path) -> Result<Vec<Block>> {
+    let path = build::bench(toolchain)?;
+    let image = image::read(&path)?;
+    let counts = counts(&image, &run(qemu, &path)?);
+    let mut host = cargo();
+    host.args(["run", "--quiet", "--release", "--package", "tractive-bench"]);
+    let errors = process::output_of(&mut host).context("the bench does not run on this machine")?;
+    errors.lines().map(|line| block(line, &counts)).collect()
+}
+
+/// Runs the image with its instructions logged; the log.
+fn run(qemu: &Path, path: &Path) -> Result<Vec<u8>> {
+    let mut command = Command::new(qemu);
+    command.args([
+        "-M",
+        "mps2-an386",
+        "-cpu",
+        "cortex-m4",
+        "-nographic",
+        "-monitor",
+        "none",
+        "-serial",
+        "null",
+    ]);
+    command.args([
+        "-icount",
+        "shift=3,align=off,sleep=off",
+        "-semihosting-config",
+        "enable=on,target=native",
+    ]);
+    // Without -D the log goes to the standard error.
+    command.args(super::log::ARGUMENTS).arg("-kernel").arg(path).stdin(Stdio::null());
+    let output = command.output().with_context(|| process::cannot_start(&command))?;
+    if !output.status.success() {
+        bail!("the bench failed in the emulator ({})", output.status);
+    }
+    Ok(output.stderr)
+}
+
+/// Instructions of each call of each function `tractive_bench::blocks::…`, from its first instruction to its return.
+fn counts(image: &Image, log: &[u8]) -> BTreeMap<String, Vec<u32>> {
+    let named = image.functions.iter().filter_map(|(start, function)| {
+        let name = function.names.iter().find_map(|name| name.strip_prefix("tractive_bench::blocks::"))?;
+        Some((*start, name.to_owned()))
+    });
+    let blocks: BTreeMap<u32, String> = named.collect();
+    let mut counts = BTreeMap::<String, Vec<u32>>::new();
+    // Where the running block returns to, and how far it is.
+    let mut running: Option<(&String, u32, u32)> = None;
+    let mut last = 0;
+    for line in log.split(|byte| *byte == b'\n') {
+        let Some(Event::Step(address)) = event(line) else { continue };
+        running = match running {
+            Some((name, back, count)) if address == back => {
+                counts.entry(name.clone()).or_default().push(count);
+                None
+            }
+            Some((name, back, count)) => Some((name, back, count + 1)),
+            None => blocks.get(&address).map(|name| (name, behind(image, last), 1)),
+        };
+        last = address;
+    }
+    counts
+}
+
+/// The address behind the instruction at this one.
+fn behind(image: &Image, address: u32) -> u32 {
+    let half = |at| image.half_word(at).unwrap_or(0);
+    address + decode(address, half(address), half(address + 2)).1
+}
+
+/// One of the host's lines, `name,error`, with its counts.
+fn block(line: &str, counts: &BTreeMap<String, Vec<u32>>) -> Result<Block> {
+    let (name, error) = line.split_once(',').with_context(|| format!("the bench says `{line}`"))?;
+    let of = counts.get(&name.replace('/', "_")).with_context(|| format!("{name} was never called"))?;
+    let max = of.iter().copied().max().unwrap_or(0);
+    let mean = of.iter().copied().map(f64::from).sum::<f64>() / of.len() as f64;
+    Ok(Block { name: name.to_owned(), max, mean, max_error: error.parse().ok() })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::elf::tests::small_elf;
+
+    #[test]
+    fn a_blocks_calls_are_counted_apart() {
+        // main: blx r0, blx r0; the block: bl helper or not, bx lr.
+        let image = small_elf(
+            0x100,
+            &[
+                ("main", 0x100, &[0x4780, 0x4780]),
+                ("tractive_bench::blocks::sqrt_libm", 0x110, &[0xF000, 0xF806, 0x4770]),
+                ("helper", 0x120, &[0x4770]),
+            ],
+        );
+        let image = Image::parse(&image).unwrap();
+        let steps = [0x100, 0x110, 0x120, 0x114, 0x102, 0x110, 0x114, 0x104];
+        let log: String =
+            steps.iter().map(|at| format!("Trace 0: 0x7f [00800400/{at:08x}/0/0] x\n")).collect();
+        let counts = counts(&image, log.as_bytes());
+        assert_eq!(counts["sqrt_libm"], [3, 2]);
+        let expected = Block { name: "sqrt/libm".to_owned(), max: 3, mean: 2.5, max_error: Some(1e-7) };
+        assert_eq!(block("sqrt/libm,1e-7", &counts).unwrap(), expected);
+        assert_eq!(block("sqrt/libm,", &counts).unwrap().max_error, None);
+        assert!(block("sqrt/other,", &counts).is_err());
+    }
+}

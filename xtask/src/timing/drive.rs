@@ -1,0 +1,171 @@
+//! Drives the image in the emulator and follows its log while it runs.
+
+use std::fs::{File, OpenOptions};
+use std::io::{BufRead, BufReader, Read, Write};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::time::Duration;
+
+use anyhow::{Context, Result, bail};
+
+use super::log::{ARGUMENTS, event};
+use super::meter::{Call, Meter};
+use super::tally::Tally;
+use crate::elf::Image;
+use crate::process;
+
+/// Modules whose functions are the link to the rig.
+const LINK: [&str; 2] = ["tractive::board::qemu::exchange::", "tractive::link::"];
+/// Ends the log when the emulator has.
+const END: &[u8] = b"end of the log";
+
+/// What it takes to drive.
+pub struct Bench {
+    pub rig: PathBuf,
+    pub qemu: PathBuf,
+    pub path: PathBuf,
+    pub image: Image,
+}
+
+/// What one drive gave.
+#[derive(Debug, Default)]
+pub struct Drive {
+    pub calls: Vec<Call>,
+    pub hits: Tally,
+    pub behind: Tally,
+    pub stack_bytes: i32,
+    /// Interrupt, mode and stator frequency, in the order in which the rig served them.
+    pub modes: Vec<(String, String, f64)>,
+}
+
+impl Bench {
+    /// Runs the rig's scenario `timing` with these options.
+    pub fn drive(&self, options: &[&str]) -> Result<Drive> {
+        let folder = std::env::temp_dir().join(format!("tractive-timing-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
+        let outcome = self.drive_in(&folder, options);
+        let _ = std::fs::remove_dir_all(&folder);
+        outcome
+    }
+
+    fn drive_in(&self, folder: &Path, options: &[&str]) -> Result<Drive> {
+        let (log, modes) = (folder.join("log"), folder.join("calls"));
+        let (reader, mut end) = fifo(&log)?;
+        let mut rig = Command::new(&self.rig);
+        rig.args(["run", "timing", "--on", "qemu", "--dt", "1e-3", "--out"]).arg(folder.join("out"));
+        rig.arg("--image").arg(&self.path).arg("--qemu").arg(&self.qemu).arg("--calls").arg(&modes);
+        let (filter, log) = (filter(&self.image), log.to_string_lossy().into_owned());
+        for argument in ARGUMENTS.into_iter().chain(["-dfilter", &filter, "-D", &log]) {
+            rig.arg(format!("--qemu-arg={argument}"));
+        }
+        rig.args(options).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped());
+        let child = rig.spawn().with_context(|| process::cannot_start(&rig))?;
+        let waiter = std::thread::spawn(move || {
+            let output = child.wait_with_output();
+            let _ = end.write_all(&[b"\n", END, b"\n"].concat());
+            output
+        });
+        let drive = self.follow(reader);
+        let Ok(output) = waiter.join() else { bail!("the rig could not be waited for") };
+        let output = output?;
+        // 1: the drive tripped, which some runs are for.
+        if !matches!(output.status.code(), Some(0 | 1)) {
+            bail!("the rig failed: {}", String::from_utf8_lossy(&output.stderr).trim());
+        }
+        let text = std::fs::read_to_string(&modes).with_context(|| modes.display().to_string())?;
+        Ok(Drive { modes: read_modes(&text)?, ..drive? })
+    }
+
+    /// Reads to the end whatever happens, so that nobody waits for a reader.
+    fn follow(&self, log: File) -> Result<Drive> {
+        let link = self.image.functions.iter();
+        let link = link.filter(|(_, function)| is_link(&function.names)).map(|(start, _)| *start).collect();
+        let mut meter = Meter::new(&self.image, &link);
+        let mut log = BufReader::with_capacity(1 << 20, Unhurried(log));
+        let (mut line, mut outcome) = (Vec::new(), Ok(()));
+        while log.read_until(b'\n', &mut line)? > 0 {
+            if line.starts_with(END) {
+                break;
+            }
+            if let (Some(event), Ok(())) = (event(&line), &outcome) {
+                outcome = meter.take(event);
+            }
+            line.clear();
+        }
+        outcome?;
+        let Meter { calls, hits, behind, stack_bytes, .. } = meter;
+        Ok(Drive { calls, hits, behind, stack_bytes, modes: Vec::new() })
+    }
+}
+
+/// Lets the emulator write for a while before it reads: otherwise each of them wakes the other for every line.
+struct Unhurried(File);
+
+impl Read for Unhurried {
+    fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
+        std::thread::sleep(Duration::from_millis(2));
+        self.0.read(buffer)
+    }
+}
+
+fn is_link(names: &[String]) -> bool {
+    names.iter().any(|name| LINK.iter().any(|module| name.contains(module)))
+}
+
+/// The addresses to log: all but the idle loop, which is most of the time, and the link.
+fn filter(image: &Image) -> String {
+    let skipped = |names: &[String]| is_link(names) || names.iter().any(|name| name.ends_with("main"));
+    let logged = image.functions.iter().filter(|(_, function)| !skipped(&function.names));
+    let ranges: Vec<_> =
+        logged.map(|(start, function)| format!("{start:#x}+{:#x}", function.size.max(1))).collect();
+    ranges.join(",")
+}
+
+/// A FIFO's reading end, and a writing end that keeps it open.
+fn fifo(path: &Path) -> Result<(File, File)> {
+    use rustix::fs::{CWD, FileType, Mode, mknodat};
+    mknodat(CWD, path, FileType::Fifo, Mode::RUSR | Mode::WUSR, 0)
+        .with_context(|| format!("cannot make the FIFO {}", path.display()))?;
+    let both = OpenOptions::new().read(true).write(true).open(path)?;
+    // As much as the system allows without privileges; a smaller one only takes longer.
+    let _ = rustix::pipe::fcntl_setpipe_size(&both, 1 << 20);
+    let writer = both.try_clone()?;
+    Ok((both, writer))
+}
+
+fn read_modes(text: &str) -> Result<Vec<(String, String, f64)>> {
+    let mut modes = Vec::new();
+    for line in text.lines() {
+        let [interrupt, mode, hertz] = line.split(',').collect::<Vec<_>>()[..] else {
+            bail!("the rig's list of interrupts holds `{line}`");
+        };
+        modes.push((interrupt.to_owned(), mode.to_owned(), hertz.parse().unwrap_or(0.0)));
+    }
+    Ok(modes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::elf::tests::small_elf;
+
+    #[test]
+    fn neither_the_idle_loop_nor_the_link_is_logged() {
+        let functions: [(&str, u32, &[u16]); 4] = [
+            ("TIMER0", 0x100, &[0x4770]),
+            ("main", 0x110, &[0x4770]),
+            ("tractive::board::qemu::exchange::play", 0x120, &[0x4770]),
+            ("memcpy", 0x130, &[0x4770, 0xBF00]),
+        ];
+        let image = Image::parse(&small_elf(0x100, &functions)).unwrap();
+        assert_eq!(filter(&image), "0x100+0x2,0x130+0x4");
+    }
+
+    #[test]
+    fn the_rigs_list_is_read() {
+        let modes = read_modes("control,async,12.5\npwm,square,\n").unwrap();
+        assert_eq!(modes[0], ("control".to_owned(), "async".to_owned(), 12.5));
+        assert_eq!(modes[1], ("pwm".to_owned(), "square".to_owned(), 0.0));
+        assert!(read_modes("control").is_err());
+    }
+}

@@ -1,0 +1,260 @@
+//! From the emulator's log to the interrupts: which instruction belongs to which handler.
+
+use std::collections::{BTreeMap, BTreeSet, HashMap};
+
+use anyhow::{Result, bail};
+
+use super::cost::{self, ENTRY_AND_RETURN, EXCEPTION_FRAME, REFILL};
+use super::log::Event;
+use super::tally::Tally;
+use crate::elf::Image;
+use crate::thumb::{Flow, decode};
+
+/// One interrupt, from the first instruction of its handler to its return.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Call {
+    /// Number of the exception.
+    pub exception: u32,
+    /// Instructions, without the link and without what other handlers executed meanwhile.
+    pub instructions: u32,
+    /// Cycles that these take at most.
+    pub cycles: u32,
+    /// Instructions from pending to entry.
+    pub latency: u32,
+    /// Handlers that were active with it.
+    pub depth: usize,
+}
+
+/// Follows the log.
+pub struct Meter<'a> {
+    image: &'a Image,
+    /// Starts of the functions that are not counted.
+    link: &'a BTreeSet<u32>,
+    active: Vec<Handler>,
+    /// Instructions since the exception became pending.
+    pending: BTreeMap<u32, u32>,
+    announced: Option<u32>,
+    known: HashMap<u32, Instruction>,
+    /// Every interrupt that has returned, in the order of their returns.
+    pub calls: Vec<Call>,
+    /// How often each address was executed.
+    pub hits: Tally,
+    /// What was executed behind each call, by its return address.
+    pub behind: Tally,
+    /// Bytes of stack below the idle loop's, at most.
+    pub stack_bytes: i32,
+}
+
+#[derive(Clone, Copy)]
+struct Instruction {
+    flow: Flow,
+    length: u32,
+    links: bool,
+    cycles: u32,
+    stack_move: i32,
+}
+
+/// A handler on its way.
+struct Handler {
+    call: Call,
+    /// Return address and stack of the functions it is in.
+    within: Vec<(u32, i32)>,
+    stack: i32,
+    /// In the link, until this address.
+    resumes: Option<u32>,
+    /// Where the next instruction stands unless the last one branched.
+    next: Option<u32>,
+}
+
+impl<'a> Meter<'a> {
+    /// A meter for an image; functions that start at `link` are not counted.
+    pub fn new(image: &'a Image, link: &'a BTreeSet<u32>) -> Self {
+        Self {
+            image,
+            link,
+            active: Vec::new(),
+            pending: BTreeMap::new(),
+            announced: None,
+            known: HashMap::new(),
+            calls: Vec::new(),
+            hits: Tally::default(),
+            behind: Tally::default(),
+            stack_bytes: 0,
+        }
+    }
+
+    /// Takes the next event.
+    pub fn take(&mut self, event: Event) -> Result<()> {
+        match self.announced.take() {
+            Some(address) if event != Event::Withdrawn => self.step(address),
+            _ => {}
+        }
+        match event {
+            Event::Step(address) => self.announced = Some(address),
+            Event::Withdrawn => {}
+            Event::Pending(exception) => _ = self.pending.entry(exception).or_insert(0),
+            Event::Entered(exception) => self.enter(exception),
+            Event::Returned(exception) => self.leave(exception)?,
+        }
+        Ok(())
+    }
+
+    fn enter(&mut self, exception: u32) {
+        let stack = self.active.last().map_or(0, |handler| handler.stack) + EXCEPTION_FRAME;
+        let call = Call {
+            exception,
+            latency: self.pending.remove(&exception).unwrap_or(0),
+            cycles: ENTRY_AND_RETURN,
+            ..Call::default()
+        };
+        self.active.push(Handler { call, within: Vec::new(), stack, resumes: None, next: None });
+        let depth = self.active.len();
+        for handler in &mut self.active {
+            handler.call.depth = handler.call.depth.max(depth);
+        }
+    }
+
+    fn leave(&mut self, exception: u32) -> Result<()> {
+        match self.active.pop() {
+            Some(handler) if handler.call.exception == exception => self.calls.push(handler.call),
+            Some(handler) => bail!("exception {exception} returns within {}", handler.call.exception),
+            None => bail!("exception {exception} returns and was never entered"),
+        }
+        Ok(())
+    }
+
+    fn step(&mut self, address: u32) {
+        let Some(handler) = self.active.last_mut() else { return };
+        if let Some(resumes) = handler.resumes {
+            if resumes != address {
+                return;
+            }
+            handler.resumes = None;
+        }
+        if let Some((back, stack)) = handler.within.last().copied()
+            && back == address
+        {
+            handler.within.pop();
+            handler.stack = stack;
+        }
+        let instruction = *self.known.entry(address).or_insert_with(|| read(self.image, address));
+        if handler.next.is_some_and(|next| next != address) {
+            handler.call.cycles += REFILL;
+        }
+        handler.next = Some(address + instruction.length);
+        handler.call.instructions += 1;
+        handler.call.cycles += instruction.cycles;
+        handler.stack -= instruction.stack_move;
+        self.stack_bytes = self.stack_bytes.max(handler.stack);
+        self.hits.add(handler.call.exception, address);
+        for (back, _) in &handler.within {
+            self.behind.add(handler.call.exception, *back);
+        }
+        for waited in self.pending.values_mut() {
+            *waited += 1;
+        }
+        let Flow::To(target) = instruction.flow else { return };
+        let back = address + instruction.length;
+        if self.link.contains(&target) {
+            // There and back. Without a link the caller's caller is where it goes on, or nobody.
+            let callers = handler.within.last().map_or(u32::MAX, |(back, _)| *back);
+            handler.resumes = Some(if instruction.links { back } else { callers });
+            handler.call.cycles += 2 * REFILL;
+        } else if instruction.links {
+            handler.within.push((back, handler.stack));
+        }
+    }
+}
+
+fn read(image: &Image, address: u32) -> Instruction {
+    let first = image.half_word(address).unwrap_or(0);
+    let second = image.half_word(address + 2).unwrap_or(0);
+    let (flow, length) = decode(address, first, second);
+    // BL, the only direct branch that keeps the way back.
+    let links = length == 4 && first >> 11 == 0b11110 && second >> 14 == 0b11 && second >> 12 & 1 == 1;
+    Instruction {
+        flow,
+        length,
+        links,
+        cycles: cost::cycles(first, second),
+        stack_move: cost::stack_move(first, second),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::elf::tests::small_elf;
+    use crate::timing::log::event;
+
+    /// handler: push {r4, lr}, bl helper, bl link, pop {r4, pc}; helper: bx lr; link: bx lr; other: nop, bx lr.
+    fn image() -> Image {
+        let functions: [(&str, u32, &[u16]); 4] = [
+            ("handler", 0x100, &[0xB510, 0xF000, 0xF805, 0xF000, 0xF80B, 0xBD10]),
+            ("helper", 0x110, &[0x4770]),
+            ("link", 0x120, &[0x4770]),
+            ("other", 0x130, &[0xBF00, 0x4770]),
+        ];
+        Image::parse(&small_elf(0x100, &functions)).unwrap()
+    }
+
+    /// Feeds lines as the emulator writes them, shortened to what differs.
+    fn measure(log: &str) -> Result<(Vec<Call>, Tally, i32)> {
+        let image = image();
+        let link = BTreeSet::from([0x120]);
+        let mut meter = Meter::new(&image, &link);
+        for word in log.split_whitespace() {
+            let (kind, number) = word.split_at(1);
+            let line = match kind {
+                "p" => format!("nvic_set_pending NVIC set pending irq {number} (enabled: 1 priority 128)"),
+                "e" => format!("nvic_acknowledge_irq NVIC acknowledge IRQ: {number} now active (prio 128)"),
+                "r" => format!("nvic_complete_irq NVIC complete IRQ {number} (secure 0)"),
+                "s" => "Stopped execution of TB chain before 0x7f [0] x".to_owned(),
+                _ => format!("Trace 0: 0x7f5604007100 [00800408/00000{word}/00000010/ff020201] x"),
+            };
+            meter.take(event(line.as_bytes()).unwrap())?;
+        }
+        Ok((meter.calls, meter.hits, meter.stack_bytes))
+    }
+
+    #[test]
+    fn helpers_count_and_the_link_does_not() {
+        let (calls, hits, stack) = measure("p24 e24 100 102 110 106 120 10a r24").unwrap();
+        assert_eq!((calls.len(), calls[0].exception, calls[0].instructions), (1, 24, 5));
+        assert_eq!((calls[0].latency, calls[0].depth), (0, 1));
+        let executed: Vec<_> = hits.of(24).map(|(address, _)| address).collect();
+        assert_eq!(executed, [0x100, 0x102, 0x106, 0x10A, 0x110]);
+        assert_eq!(stack, EXCEPTION_FRAME + 8);
+        // push 3, bl 1, bx 1, bl 1, pop 3; refills after bl, bx, bl, the link's return.
+        assert_eq!(calls[0].cycles, ENTRY_AND_RETURN + 9 + 4 * REFILL);
+    }
+
+    #[test]
+    fn what_a_higher_interrupt_executes_is_its_own() {
+        let (calls, _, stack) = measure("e24 100 102 p26 e26 130 132 r26 110 106 10a r24").unwrap();
+        let counted: Vec<_> = calls.iter().map(|call| (call.exception, call.instructions)).collect();
+        assert_eq!(counted, [(26, 2), (24, 5)]);
+        assert_eq!(calls[1].depth, 2);
+        assert_eq!(stack, 2 * EXCEPTION_FRAME + 8);
+    }
+
+    #[test]
+    fn who_waits_for_a_handler_waits_its_instructions() {
+        let (calls, _, _) = measure("p26 e26 130 p24 132 r26 e24 100 r24").unwrap();
+        assert_eq!((calls[0].latency, calls[1].latency), (0, 1));
+    }
+
+    #[test]
+    fn a_withdrawn_instruction_counts_once() {
+        let (calls, _, _) = measure("e24 100 s 100 102 110 106 10a r24").unwrap();
+        assert_eq!(calls[0].instructions, 5);
+    }
+
+    #[test]
+    fn a_log_that_makes_no_sense_is_refused() {
+        assert!(measure("r24").is_err());
+        assert!(measure("e24 100 r26").is_err());
+        let (calls, _, _) = measure("100 130").unwrap();
+        assert!(calls.is_empty());
+    }
+}

@@ -1,0 +1,127 @@
+//! What all drives together say about each interrupt in each mode.
+
+use std::collections::BTreeMap;
+
+use anyhow::{Result, bail};
+
+use super::drive::Drive;
+use super::meter::Call;
+
+/// The interrupts by the numbers of their exceptions on the emulated board: sixteen more than the interrupt's.
+pub const INTERRUPTS: [(&str, u32); 2] = [("control", 16 + 8), ("pwm", 16 + 10)];
+
+const CONTROL_HZ: f64 = 10_000.0;
+/// The STM32G474's clock.
+const PROCESSOR_HZ: f64 = 170e6;
+
+/// Smallest, mean and largest of something.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Spread {
+    pub min: u32,
+    pub max: u32,
+    pub sum: u64,
+    pub count: u64,
+}
+
+impl Default for Spread {
+    fn default() -> Self {
+        Self { min: u32::MAX, max: 0, sum: 0, count: 0 }
+    }
+}
+
+impl Spread {
+    fn add(&mut self, value: u32) {
+        (self.min, self.max) = (self.min.min(value), self.max.max(value));
+        self.sum += u64::from(value);
+        self.count += 1;
+    }
+
+    /// 0 of nothing.
+    pub fn mean(&self) -> f64 {
+        if self.count == 0 { 0.0 } else { self.sum as f64 / self.count as f64 }
+    }
+}
+
+/// One interrupt in one mode.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Row {
+    pub instructions: Spread,
+    pub cycles: Spread,
+    pub latency: Spread,
+    pub depth: usize,
+}
+
+/// Share of the processor, in percent.
+#[derive(Clone, Copy, Debug)]
+pub struct Load {
+    pub mean: f64,
+    /// If every interrupt took as long as the longest one.
+    pub max: f64,
+}
+
+/// By mode and interrupt.
+#[derive(Clone, Debug, Default)]
+pub struct Statistics {
+    pub rows: BTreeMap<(String, String), Row>,
+    /// Largest stator frequency, in Hz.
+    pub hertz: f64,
+    pub stack_bytes: i32,
+}
+
+impl Statistics {
+    /// Adds a drive: the n-th interrupt of a kind in the log is the n-th that the rig served.
+    pub fn add(&mut self, drive: &Drive) -> Result<()> {
+        for (name, exception) in INTERRUPTS {
+            let calls: Vec<&Call> = drive.calls.iter().filter(|call| call.exception == exception).collect();
+            let served: Vec<_> = drive.modes.iter().filter(|(interrupt, ..)| interrupt == name).collect();
+            if calls.len() != served.len() || calls.is_empty() {
+                bail!("the log holds {} {name} interrupts, the rig served {}", calls.len(), served.len());
+            }
+            for (call, (_, mode, hertz)) in calls.into_iter().zip(served) {
+                let row = self.rows.entry((mode.clone(), name.to_owned())).or_default();
+                row.instructions.add(call.instructions);
+                row.cycles.add(call.cycles);
+                row.latency.add(call.latency);
+                row.depth = row.depth.max(call.depth);
+                self.hertz = self.hertz.max(hertz.abs());
+            }
+        }
+        self.stack_bytes = self.stack_bytes.max(drive.stack_bytes);
+        Ok(())
+    }
+
+    /// One interrupt in one mode, if it was seen there.
+    pub fn row(&self, mode: &str, interrupt: &str) -> Option<&Row> {
+        self.rows.get(&(mode.to_owned(), interrupt.to_owned()))
+    }
+
+    /// Share of the processor that both interrupts take in a mode.
+    pub fn load(&self, mode: &str) -> Option<Load> {
+        let (control, pwm) = (self.row(mode, "control")?, self.row(mode, "pwm")?);
+        let pwm_hertz = CONTROL_HZ * pwm.cycles.count as f64 / control.cycles.count as f64;
+        let percent =
+            |control: f64, pwm: f64| 100.0 * (control * CONTROL_HZ + pwm * pwm_hertz) / PROCESSOR_HZ;
+        Some(Load {
+            mean: percent(control.cycles.mean(), pwm.cycles.mean()),
+            max: percent(control.cycles.max.into(), pwm.cycles.max.into()),
+        })
+    }
+
+    /// The dearest mode's largest load, in percent.
+    pub fn worst_load(&self) -> f64 {
+        let modes = self.rows.keys().map(|(mode, _)| mode).filter(|mode| *mode != "off");
+        modes.filter_map(|mode| self.load(mode)).map(|load| load.max).fold(0.0, f64::max)
+    }
+
+    /// Over everything that was counted; entries and returns are among the cycles.
+    pub fn cycles_per_instruction(&self) -> f64 {
+        let sum = |of: fn(&Row) -> &Spread| self.rows.values().map(|row| of(row).sum).sum::<u64>() as f64;
+        sum(|row| &row.cycles) / sum(|row| &row.instructions).max(1.0)
+    }
+
+    /// The rows of one interrupt over all modes in which pulses are made.
+    pub fn of<'a>(&'a self, interrupt: &'a str) -> impl Iterator<Item = &'a Row> {
+        let pulsing = self.rows.iter().filter(move |((mode, name), _)| name == interrupt && mode != "off");
+        pulsing.map(|(_, row)| row)
+    }
+}
