@@ -38,7 +38,8 @@ pub enum Fault {
     CapacitorOvervoltage,
     /// ZS9: a shoot-through duty outside what the network is made for.
     DutyRange,
-    /// ZS9: the upper motor's angle is lost, or far off what its speed tells, in rad.
+    /// ZS9: the upper motor's angle is far off what its speed tells, or stands still while it should turn, in electrical rad; or
+    /// its sensor says so itself: then the value is 1 and the limit 0.
     SensorLost1,
     /// ZS9: the same of the lower motor.
     SensorLost2,
@@ -252,6 +253,11 @@ impl FrozenWatch {
     /// Nothing seen yet.
     pub const fn new() -> Self {
         Self { last: None, currents_for: 0, angle_for: 0, turned_rad: 0.0 }
+    }
+
+    /// What the rotor should have turned while its angle stood still, and how much of that is a fault, in electrical rad.
+    pub fn turned_rad(&self) -> (f32, f32) {
+        (self.turned_rad, FROZEN_TURN_RAD)
     }
 
     /// The angle of the last period.

@@ -34,7 +34,7 @@ mod firmware {
         }
     }
 
-    /// Deadline: half a control period. Missed: fault `control_deadline`, all gates off.
+    /// Deadline: the last peak before the next control interrupt. Missed: fault `control_deadline`, all gates off.
     #[interrupt]
     fn TIMER0() {
         static mut TASK: Option<ControlTask> = None;

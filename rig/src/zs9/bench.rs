@@ -19,9 +19,9 @@ use tractive::time::{Clock, Instant};
 /// Compare steps since the run's beginning.
 pub type Steps = u64;
 
-/// How long after its nominal instant the control interrupt's order to turn the gates off reaches them, in ticks (50 µs):
-/// its deadline.
-const CONTROL_OFF_TICKS: u32 = 1250;
+/// How long after its nominal instant the control interrupt's order to turn the gates off reaches them, in ticks (75 µs): its
+/// latest deadline.
+const CONTROL_OFF_TICKS: u32 = 1875;
 /// The same for the PWM interrupt (25 µs), as a bound on its length.
 const PWM_OFF_TICKS: u32 = 625;
 

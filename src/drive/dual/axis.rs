@@ -25,6 +25,8 @@ pub struct Axis {
     controller: Controller,
     speed_loop: SpeedLoop,
     watch: FrozenWatch,
+    /// Electrical speed while the angle last moved, in rad/s: the tracker soon believes a sensor that stands still.
+    moving: f32,
     /// Volt-seconds of the period that began at the last sample, per volt of link, in s; and the link's voltage there.
     acting: Option<(AlphaBeta, f32)>,
 }
@@ -54,6 +56,7 @@ impl Axis {
             controller: Controller::with_tracking(TRACKING_RAD_S),
             speed_loop: SpeedLoop::new(),
             watch: FrozenWatch::new(),
+            moving: 0.0,
             acting: None,
         }
     }
@@ -93,11 +96,14 @@ impl Axis {
         settings: &Settings,
         tables: &Tables,
     ) -> Option<Violation> {
-        let last = self.watch.last_angle();
+        let stands = self.watch.last_angle() == Some(measured.angle);
+        if !stands {
+            self.moving = self.omega();
+        }
         let period_s = settings.clock.control_s();
-        let violation = self.watch.check(measured, self.omega(), period_s, &tables.ratings)?;
-        let (_, periods, limit) = violation;
-        if last == Some(measured.angle) { Some((lost, periods, limit)) } else { Some(violation) }
+        let violation = self.watch.check(measured, self.moving, period_s, &tables.ratings)?;
+        let (turned_rad, limit_rad) = self.watch.turned_rad();
+        if stands { Some((lost, turned_rad, limit_rad)) } else { Some(violation) }
     }
 
     /// One control period.

@@ -45,11 +45,11 @@ impl ControlTask {
         }
     }
 
-    /// The control timer's interrupt, at a valley of the carrier. Deadline: half a control period after its nominal instant, when
-    /// the command must be there; a missed one is a fault.
+    /// The control timer's interrupt, at a valley of the carrier. Deadline: [`Settings::deadline_ticks`] after its nominal instant,
+    /// when the command must be there; a missed one is a fault.
     pub fn run(&mut self, port: &mut impl DualControlPort, shared: &Shared) {
         let now = self.now;
-        let deadline_ticks = self.settings.clock.control_ticks / 2;
+        let deadline_ticks = self.settings.deadline_ticks();
         self.now = now.after(self.settings.clock.control_ticks);
         // First of all: the next peak writes it again.
         let applied = shared.applied.read().filter(|applied| now.reached(applied.at));
@@ -110,7 +110,10 @@ impl ControlTask {
                     *angle = measured;
                     axis.track(measured, &self.settings)
                 }
-                None => Some(f32::MAX),
+                None => {
+                    violation = violation.or(Some((fault, 1.0, 0.0)));
+                    None
+                }
             };
             violation = violation.or(off_rad.map(|rad| (fault, rad, axis::SURPRISE_RAD)));
         }

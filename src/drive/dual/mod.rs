@@ -7,8 +7,8 @@
 //!    │            │            │ which is played here ───│
 //! ```
 //!
-//! Logical execution time: control samples at a valley of the carrier, and its command may be used half a control period later,
-//! by the PWM interrupt at the peak, which loads the carrier period that begins at the next valley. So a voltage acts one
+//! Logical execution time: control samples at a valley of the carrier, and its command may be used from the last peak before the
+//! next sample on: there the PWM interrupt loads the carrier period that begins at the next valley. So a voltage acts one
 //! period after its sample, and lasts one. Both interrupts look at each other's words by their instants. At 20 kHz a control
 //! period holds two carrier periods: each command is played twice, the vectors turned on.
 //!
@@ -75,6 +75,11 @@ impl Settings {
     /// Instant of the first PWM interrupt, in ticks: the first peak.
     pub const fn first_peak_ticks(&self) -> u32 {
         self.carrier_ticks / 2
+    }
+
+    /// From a control sample to when its command may be used, in ticks: the last peak before the next sample.
+    pub const fn deadline_ticks(&self) -> u32 {
+        self.clock.control_ticks.saturating_sub(self.carrier_ticks / 2)
     }
 
     /// Compare steps of a carrier half.
