@@ -180,9 +180,12 @@ impl Drive {
     }
 }
 
+/// What a test does to a sample, and the fault that it should be.
+type Case<T> = (fn(&mut T), Fault);
+
 #[test]
 fn what_is_sampled_wrong_trips_by_name() {
-    let cases: [(fn(&mut DualSample), Fault); 19] = [
+    let cases: [Case<DualSample>; 19] = [
         (|sample| sample.source_v = 200.0, Fault::SourceUndervoltage),
         (|sample| sample.source_v = f32::NAN, Fault::NotFinite),
         (|sample| sample.capacitor_v = 721.0, Fault::CapacitorOvervoltage),
@@ -218,7 +221,7 @@ fn what_is_sampled_wrong_trips_by_name() {
 
 #[test]
 fn the_pwm_interrupt_finds_what_is_quick() {
-    let cases: [(fn(&mut PowerSample), Fault); 7] = [
+    let cases: [Case<PowerSample>; 7] = [
         (|sample| sample.currents_a[0].b = 150.0, Fault::Overcurrent),
         (|sample| sample.currents_a[1].a = f32::NAN, Fault::NotFinite),
         (|sample| sample.source_v = 0.0, Fault::SourceUndervoltage),

@@ -131,10 +131,10 @@ pub fn over_speed(
 }
 
 fn heading(figure: &str, title: &str) -> String {
-    let number = figure.starts_with(|c: char| c.is_ascii_digit());
-    if number {
-        format!("The paper's figure {figure} · {title}")
-    } else {
-        format!("The paper's {figure} · {title}")
-    }
+    let kind = match figure {
+        _ if !figure.starts_with(|c: char| c.is_ascii_digit()) => "",
+        _ if figure.contains([' ', '–']) => "figures ",
+        _ => "figure ",
+    };
+    format!("The paper's {kind}{figure} · {title}")
 }

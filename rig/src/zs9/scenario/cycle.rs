@@ -136,31 +136,31 @@ impl Scenario for Cycle {
         let plot = |page: &mut Page, figure, title, unit, curves: &[figures::Curve]| {
             figures::plot(page, figure, title, unit, recording, all, curves);
         };
-        plot(page, "24, 30", "link voltage U_in", "V", &[("U_in", |row| row.link_v)]);
-        plot(page, "25, 31", "capacitor voltage", "V", &[("U_c", |row| row.capacitor_v)]);
-        plot(page, "26, 32", "inductor current", "A", &[("i_L", |row| row.inductor_a)]);
+        plot(page, "24 and 30", "link voltage U_in", "V", &[("U_in", |row| row.link_v)]);
+        plot(page, "25 and 31", "capacitor voltage", "V", &[("U_c", |row| row.capacitor_v)]);
+        plot(page, "26 and 32", "inductor current", "A", &[("i_L", |row| row.inductor_a)]);
         plot(
             page,
-            "27, 33",
+            "27 and 33",
             "torque",
             "N·m",
             &[("motor 1", |row| row.motors[0].torque_nm), ("motor 2", |row| row.motors[1].torque_nm)],
         );
         plot(
             page,
-            "28, 34",
+            "28 and 34",
             "speed",
             "r/min",
             &[("motor 1", |row| row.motors[0].speed_rpm), ("motor 2", |row| row.motors[1].speed_rpm)],
         );
         plot(
             page,
-            "29, 35",
+            "29 and 35",
             "d and q currents of motor 1",
             "A",
             &[("id", |row| row.motors[0].id_a), ("iq", |row| row.motors[0].iq_a)],
         );
-        plot(page, "29, 35", "phase voltage, peak", "V", &[("motor 1", |row| row.motors[0].voltage_v)]);
+        plot(page, "29 and 35", "phase voltage, peak", "V", &[("motor 1", |row| row.motors[0].voltage_v)]);
         figures::over_speed(page, "36", "torque over speed", "N·m", recording, |row| {
             row.motors[0].torque_nm
         });

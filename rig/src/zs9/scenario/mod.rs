@@ -16,7 +16,7 @@ use crate::plant::zs9::{NetworkState, Zs9Plant, Zs9Settings};
 use crate::plant::{PlantSettings, SpeedSource};
 use crate::report::Page;
 use crate::run::CLOCK;
-use anyhow::{Context, Result, bail};
+use anyhow::{Result, bail};
 use core::f64::consts::TAU;
 use tractive::link::DualSetup;
 
@@ -127,9 +127,9 @@ fn bench(scenario: &dyn Scenario, options: &RunOptions, machine: &Machine) -> Re
         injection: options.zs9.inject,
         edges: scenario.edges(options),
     };
-    let shortest_s = f64::from(CLOCK.tick_s);
-    if trace_step_s < shortest_s {
-        return Err(anyhow::anyhow!("must be at least {shortest_s}")).context(format!("--dt {trace_step_s}"));
+    let (shortest_s, longest_s) = (CLOCK.tick_s, plan.duration_s);
+    if trace_step_s < f64::from(shortest_s) || trace_step_s > longest_s {
+        bail!("--dt {trace_step_s}: must be a number from {shortest_s} to {longest_s}");
     }
     Ok(Bench::new(plant, plan.operator, settings))
 }
