@@ -145,7 +145,7 @@ impl Neg for Angle {
 /// Square root, correctly rounded; a negative number gives zero, NaN stays NaN.
 #[inline]
 pub fn sqrt(x: f32) -> f32 {
-    if x < 0.0 { 0.0 } else { libm::sqrtf(x) }
+    if x < 0.0 { 0.0 } else { crate::board::fpu::sqrt(x) }
 }
 
 /// `x` held between `low` and `high`; NaN stays NaN. (`f32::clamp` panics on a bad range; this cannot.)

@@ -104,6 +104,9 @@ pub struct RunOptions {
     /// Dead time, in µs.
     #[arg(long, default_value_t = 0.0, value_parser = not_negative)]
     pub dead_time_us: f64,
+    /// Leave the dead time uncompensated.
+    #[arg(long)]
+    pub uncompensated: bool,
     /// Shortest pulse, in µs.
     #[arg(long, default_value_t = 10.0, value_parser = not_negative)]
     pub min_pulse_us: f64,

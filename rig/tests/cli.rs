@@ -29,7 +29,7 @@ fn refused_in_one_line(line: &str, words: &[&str]) {
 
 #[test]
 fn bad_usage_is_refused() {
-    refused_in_one_line("run nonsense", &["nonsense", "load-steps, sweep, characteristic, timing"]);
+    refused_in_one_line("run nonsense", &["nonsense", "load-steps, sweep, characteristic, steady"]);
     refused_in_one_line("run sweep --machine nowhere", &["nowhere", "must be"]);
     refused("run sweep --udc-ripple 30", &["30", "V@HZ"]);
     refused("run sweep --dt -1", &["-1"]);

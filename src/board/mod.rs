@@ -1,5 +1,6 @@
 //! What a board gives the drive. The boards themselves, one file each, exist only on the target.
 
+pub mod fpu;
 #[cfg(target_os = "none")]
 pub mod qemu;
 

@@ -84,18 +84,17 @@ pub struct Applied {
 
 impl Words<27> for Applied {
     fn to_words(self) -> [u32; 27] {
-        let mut words = [0; 27];
-        let halves = [self.before, self.running, self.next];
-        let currents = [self.currents_a, self.currents_before_a];
-        let content = core::iter::once(self.at.0)
-            .chain(halves.into_iter().flat_map(half_to_words))
-            .chain(currents.into_iter().flat_map(|i| [i.a.to_bits(), i.b.to_bits(), i.c.to_bits()]))
-            .chain(core::iter::once(u32::from(self.mirrored)))
-            .chain(trip_to_words(self.trip));
-        for (word, value) in words.iter_mut().zip(content) {
-            *word = value;
-        }
-        words
+        let [b0, b1, b2, b3, b4] = half_to_words(self.before);
+        let [r0, r1, r2, r3, r4] = half_to_words(self.running);
+        let [n0, n1, n2, n3, n4] = half_to_words(self.next);
+        let [ia, ib, ic] = currents_to_words(self.currents_a);
+        let [ja, jb, jc] = currents_to_words(self.currents_before_a);
+        let [t0, t1, t2, t3] = trip_to_words(self.trip);
+        let (at, mirrored) = (self.at.0, u32::from(self.mirrored));
+        [
+            at, b0, b1, b2, b3, b4, r0, r1, r2, r3, r4, n0, n1, n2, n3, n4, ia, ib, ic, ja, jb, jc, mirrored,
+            t0, t1, t2, t3,
+        ]
     }
 
     fn from_words(words: [u32; 27]) -> Self {
@@ -135,6 +134,10 @@ pub fn half_from_words(words: [u32; 5]) -> CarrierPeriod {
         half: (packed >> 16) as u8,
         ahead: [Mode::from_code(packed >> 24 & 0xF), Mode::from_code(packed >> 28)],
     }
+}
+
+fn currents_to_words(currents: Abc) -> [u32; 3] {
+    [currents.a.to_bits(), currents.b.to_bits(), currents.c.to_bits()]
 }
 
 fn currents_from_words(words: [u32; 3]) -> Abc {

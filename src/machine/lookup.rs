@@ -39,12 +39,13 @@ fn cell(position: f32, count: usize) -> (usize, f32) {
     (index, position - index as f32)
 }
 
-/// A node, or NaN where the table is shorter than it says: NaN ends in a named fault, not in a panic.
+/// Two neighbouring nodes and what lies between them; NaN where the table is shorter than it says: NaN ends in a named fault, not
+/// in a panic.
 #[inline(always)]
-fn node<const N: usize>(nodes: &[[f32; N]], index: usize) -> [f32; N] {
-    match nodes.get(index) {
-        Some(values) => *values,
-        None => [f32::NAN; N],
+fn between<const N: usize>(nodes: &[[f32; N]], index: usize, fraction: f32) -> [f32; N] {
+    match nodes.get(index..) {
+        Some([low, high, ..]) => lerp(*low, *high, fraction),
+        _ => [f32::NAN; N],
     }
 }
 
@@ -62,7 +63,7 @@ impl<const N: usize> Curve<N> {
     #[inline]
     pub fn at(&self, x: f32) -> [f32; N] {
         let (k, fraction) = cell((x - self.first) * self.inverse_step, self.nodes.len());
-        lerp(node(self.nodes, k), node(self.nodes, k + 1), fraction)
+        between(self.nodes, k, fraction)
     }
 
     /// Axis value of the last node.
@@ -82,8 +83,8 @@ impl<const N: usize> Grid<N> {
         let low = r * self.columns + c;
         let high = low + self.columns;
         lerp(
-            lerp(node(self.nodes, low), node(self.nodes, low + 1), column_fraction),
-            lerp(node(self.nodes, high), node(self.nodes, high + 1), column_fraction),
+            between(self.nodes, low, column_fraction),
+            between(self.nodes, high, column_fraction),
             row_fraction,
         )
     }

@@ -105,8 +105,11 @@ impl Mode {
 
 /// The pulse angle of boundary number `half` of `2 * carriers` halves a turn, rounded to the nearest angle unit.
 fn boundary(half: u32, carriers: u32) -> Angle {
-    let halves = u64::from(carriers.max(1)) * 2;
-    Angle((((u64::from(half) << 32) + halves / 2) / halves) as u32)
+    let halves = carriers.max(1) * 2;
+    // 2³² = quotient · halves + rest, without numbers of 64 bits.
+    let quotient = u32::MAX / halves;
+    let rest = u32::MAX - quotient * halves + 1;
+    Angle((half * quotient).wrapping_add((half * rest + halves / 2) / halves))
 }
 
 /// One interval between two PWM interrupts: one half of a carrier.
