@@ -100,8 +100,7 @@ pub struct Bench {
     off_at: Option<Steps>,
     feedback: GateFeedback,
     orders: Orders,
-    samples: VecDeque<DualSample>,
-    sampled: VecDeque<Steps>,
+    samples: VecDeque<(Steps, DualSample)>,
     next_sample: Steps,
     reports: VecDeque<(Steps, DualReport)>,
     report: DualReport,
@@ -140,7 +139,6 @@ impl Bench {
             off_at: None,
             feedback: GateFeedback::default(),
             samples: VecDeque::new(),
-            sampled: VecDeque::new(),
             next_sample: control,
             reports: VecDeque::new(),
             report: DualReport::default(),
@@ -172,8 +170,8 @@ impl Bench {
     pub fn control_sample(&mut self, instant: Instant) -> Result<DualSample, BenchError> {
         let at = self.widen(instant);
         self.advance(at)?;
-        match (self.samples.pop_front(), self.sampled.pop_front()) {
-            (Some(sample), Some(sampled)) if sampled == at => Ok(sample),
+        match self.samples.pop_front() {
+            Some((sampled, sample)) if sampled == at => Ok(sample),
             _ => Err(BenchError::NoSample(at)),
         }
     }
@@ -336,8 +334,8 @@ impl Bench {
         for (motor, load_nm) in self.plant.motors_mut().iter_mut().zip(self.orders.loads_nm) {
             motor.set_load_nm(load_nm);
         }
-        let ripple_v = Converter::new(self.settings.flaws).ripple_v(t_s);
-        let source_v = self.spoiler.source_v(t_s, self.nominal_source_v + ripple_v);
+        let supply_v = self.nominal_source_v + self.sensors.ripple_v(t_s);
+        let source_v = self.spoiler.source_v(t_s, supply_v);
         self.plant.set_source_v(source_v);
         let network = self.plant.network();
         let mut sample = DualSample {
@@ -352,8 +350,7 @@ impl Bench {
             enable: self.orders.enable,
         };
         self.spoiler.control(t_s, &mut sample);
-        self.samples.push_back(sample);
-        self.sampled.push_back(self.now);
+        self.samples.push_back((self.now, sample));
         self.show_reports();
         Ok(())
     }

@@ -16,6 +16,11 @@ impl Sensors {
         Self { converter }
     }
 
+    /// Ripple of the source at an instant, in V.
+    pub fn ripple_v(&self, t_s: f64) -> f64 {
+        self.converter.ripple_v(t_s)
+    }
+
     /// Phase currents of both motors, in A.
     pub fn currents(&mut self, plant: &Zs9Plant) -> [Abc; 2] {
         plant.motors().each_ref().map(|motor| {

@@ -5,7 +5,7 @@ use crate::analysis::Figures;
 use crate::options::RunOptions;
 use crate::report::Page;
 use crate::zs9::figures;
-use crate::zs9::trace::Recording;
+use crate::zs9::trace::{Recording, Row};
 use crate::zs9::{Orders, SeenMotors};
 use tractive::board::MotorDemand;
 
@@ -56,11 +56,10 @@ impl Scenario for LoadStep {
             (figures::window(recording, 0.3, STEP_S), figures::window(recording, STEP_S, DURATION_S));
         let speed1 = figures::mean(steady, |row| row.motors[0].speed_rpm);
         let torque1 = figures::mean(steady, |row| row.motors[0].torque_nm);
-        let motor1 =
-            |what: &dyn Fn(&crate::zs9::trace::Row) -> f64| figures::largest(after, |row| what(row).abs());
+        let motor1 = |what: &dyn Fn(&Row) -> f64| figures::largest(after, |row| what(row).abs());
         figures.set("motor1_torque_deviation_nm", motor1(&|row| row.motors[0].torque_nm - torque1));
         figures.set("motor1_speed_deviation_rpm", motor1(&|row| row.motors[0].speed_rpm - speed1));
-        let off = |row: &crate::zs9::trace::Row| (row.motors[1].speed_rpm - SPEED_RPM).abs();
+        let off = |row: &Row| (row.motors[1].speed_rpm - SPEED_RPM).abs();
         figures.set("motor2_speed_deviation_rpm", figures::largest(after, off));
         let outside = after.iter().rev().find(|row| off(row) > 0.002 * SPEED_RPM);
         let step_s = figures::step_s(recording);

@@ -5,7 +5,7 @@ use crate::analysis::Figures;
 use crate::options::RunOptions;
 use crate::report::Page;
 use crate::zs9::figures;
-use crate::zs9::trace::Recording;
+use crate::zs9::trace::{Recording, Row};
 use crate::zs9::{Orders, SeenMotors};
 use tractive::board::MotorDemand;
 
@@ -58,7 +58,7 @@ impl Scenario for Reverse {
         let reverses = !options.zs9.no_reverse;
         let half_s = 0.5 * figures::step_s(recording);
         let error = |k: usize| {
-            let off = |row: &crate::zs9::trace::Row| {
+            let off = |row: &Row| {
                 let wanted = wanted_rpm(row.t_s + half_s, reverses)[k];
                 (row.motors[k].speed_rpm - wanted).powi(2)
             };
