@@ -3,7 +3,7 @@
 use super::{DualApplied, DualCommand, MotorShare, Settings, Shared};
 use crate::board::{DualPwmPort, GateFeedback, PlayedPeriod, PowerSample};
 use crate::drive::Gates;
-use crate::frames::Angle;
+use crate::frames::{Angle, limit};
 use crate::machine::Tables;
 use crate::nine_switch::{self, GateTicks, MotorVoltage, Period, Refused, Request};
 use crate::protection::{self, Fault, SafeState, Trip, Violation};
@@ -11,6 +11,8 @@ use crate::time::Instant;
 
 /// Control periods after which a command is too old to make pulses from.
 const STALE_PERIODS: i32 = 5;
+/// How far the link is believed to move in a carrier period, in V; more is an error of the measurement.
+const MOST_MOVED_V: f32 = 10.0;
 /// Least link voltage that is divided by, in V.
 const LEAST_LINK_V: f32 = 50.0;
 
@@ -23,13 +25,22 @@ pub struct PwmTask {
     /// The period that was played before, and the one that is played.
     periods: [PlayedPeriod; 2],
     trip: Option<Trip>,
+    /// Link voltage at the last peak, in V.
+    last_link_v: Option<f32>,
 }
 
 impl PwmTask {
     /// A task whose first call is at the first peak, half a carrier period after the start, gates off until the second valley.
     pub const fn new(tables: &'static Tables, settings: Settings) -> Self {
         let off = PlayedPeriod::off(settings.half_steps());
-        Self { tables, settings, now: Instant(settings.first_peak_ticks()), periods: [off; 2], trip: None }
+        Self {
+            tables,
+            settings,
+            now: Instant(settings.first_peak_ticks()),
+            periods: [off; 2],
+            trip: None,
+            last_link_v: None,
+        }
     }
 
     /// The PWM timer's interrupt, at the carrier's peak. Deadline: the next valley, where the shadow registers take over.
@@ -54,6 +65,7 @@ impl PwmTask {
                 Err(refused) => self.check(Some(refusal(refused, &request)), port),
             }
         }
+        self.last_link_v = Some(link_v(&sample));
         self.periods = [running, next];
         port.play(now, &next);
         shared.applied.publish(DualApplied { at: now, next: given, trip: self.trip });
@@ -69,9 +81,12 @@ impl PwmTask {
         self.trip
     }
 
-    /// The command at the middle of the period that begins at the next valley, by the link as it is now.
+    /// The command at the middle of the period that begins at the next valley, by the link as it will be there if it goes on.
     fn request(&self, command: &DualCommand, sample: &PowerSample) -> Request {
-        let link_v = 2.0 * sample.capacitor_v - sample.source_v;
+        let link_v = link_v(sample);
+        // As far ahead as the last peak is back lies the middle of the period that is made here.
+        let moved_v = limit(link_v - self.last_link_v.unwrap_or(link_v), -MOST_MOVED_V, MOST_MOVED_V);
+        let link_v = link_v + moved_v;
         let link_v = if link_v > LEAST_LINK_V { link_v } else { LEAST_LINK_V };
         let ahead = self.now.since(command.at) as f32;
         let [upper, lower] = command.motors.map(|motor| MotorVoltage {
@@ -140,6 +155,11 @@ impl PlayedPeriod {
     pub const fn off(half_steps: u32) -> Self {
         Self { gates: [GateTicks { off_from: 0, off_to: half_steps }; 9] }
     }
+}
+
+/// Link voltage outside shoot-through, in V.
+fn link_v(sample: &PowerSample) -> f32 {
+    2.0 * sample.capacitor_v - sample.source_v
 }
 
 fn is_ever_on(gate: &GateTicks, half_steps: u32) -> bool {
