@@ -180,8 +180,8 @@ pub struct RunOptions {
 /// Options of the ZS9's scenarios.
 #[derive(Clone, Debug, Args, Serialize)]
 pub struct Zs9Options {
-    /// zs9-load-step: by how much motor 2's load steps, in N·m.
-    #[arg(long, default_value_t = 40.0, value_parser = finite, allow_negative_numbers = true)]
+    /// zs9-load-step: by how much motor 2's load steps, in N·m, −500 to 500.
+    #[arg(long, default_value_t = 40.0, value_parser = load_step, allow_negative_numbers = true)]
     pub step: f64,
     /// zs9-reverse: motor 2 keeps its direction, for comparison.
     #[arg(long)]
@@ -213,6 +213,13 @@ fn scheme(text: &str) -> Result<Scheme, String> {
 
 fn scheme_name<S: serde::Serializer>(scheme: &Scheme, serializer: S) -> Result<S::Ok, S::Error> {
     serializer.serialize_str(scheme.name())
+}
+
+fn load_step(text: &str) -> Result<f64, String> {
+    match finite(text) {
+        Ok(step) if step.abs() <= 500.0 => Ok(step),
+        _ => Err("must be a number from -500 to 500".to_owned()),
+    }
 }
 
 fn carrier_hz(text: &str) -> Result<u32, String> {

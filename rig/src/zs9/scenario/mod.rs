@@ -25,6 +25,9 @@ pub use steady::SPEEDS_RPM as STEADY_SPEEDS_RPM;
 /// Source voltage, in V.
 pub const SOURCE_V: f64 = 400.0;
 
+/// Largest source and link voltage that is simulated, in V: the drive trips long before.
+const LARGEST_V: f64 = 1200.0;
+
 /// A scenario's inputs.
 pub struct Plan {
     /// Before the recording, in s: the drive starts and settles.
@@ -104,8 +107,11 @@ fn bench(scenario: &dyn Scenario, options: &RunOptions, machine: &Machine) -> Re
     };
     let source_v = options.udc.unwrap_or(SOURCE_V);
     let link_ref_v = options.zs9.uin;
-    if link_ref_v < source_v {
-        bail!("--uin {link_ref_v}: must be at least the source's {source_v} V");
+    if source_v > LARGEST_V {
+        bail!("--udc {source_v}: must be at most {LARGEST_V} V");
+    }
+    if !(source_v..=LARGEST_V).contains(&link_ref_v) {
+        bail!("--uin {link_ref_v}: must be from the source's {source_v} V to {LARGEST_V} V");
     }
     let plant_settings = Zs9Settings { source_v, motors: [motor; 2], ..Zs9Settings::default() };
     let folders = [&machine.folder; 2];
