@@ -6,8 +6,11 @@ use std::process::ExitCode;
 use std::{env, fs};
 use tractive_tablegen::{Generated, MachineFolder};
 
-/// The machine that is built in when `TRACTIVE_MACHINE` names no other.
-const DEFAULT_MACHINE: &str = "pmasynrm-180kw";
+/// For each system: the variable that names its machine, the machine when it names none, the file of its tables.
+const MACHINES: [(&str, &str, &str); 2] = [
+    ("TRACTIVE_MACHINE", "pmasynrm-180kw", "machine_tables.rs"),
+    ("TRACTIVE_ZS9_MACHINE", "ipm-zs9", "zs9_tables.rs"),
+];
 
 /// What the linker needs to know of a board.
 struct Board {
@@ -38,14 +41,16 @@ fn generate() -> Result<(), String> {
     let variable = |name: &str| env::var(name).map_err(|error| format!("{name}: {error}"));
     let root = PathBuf::from(variable("CARGO_MANIFEST_DIR")?);
     let out = PathBuf::from(variable("OUT_DIR")?);
-    let machine = env::var("TRACTIVE_MACHINE").unwrap_or_else(|_| DEFAULT_MACHINE.to_owned());
-    let named = root.join("tables").join(&machine);
-    let folder = if named.is_dir() { named } else { PathBuf::from(&machine) };
-    println!("cargo:rerun-if-env-changed=TRACTIVE_MACHINE");
-    println!("cargo:rerun-if-changed={}", folder.display());
-    let tables = MachineFolder::read(&folder).and_then(|machine| Generated::new(&machine));
-    let source = tables.map_err(|error| error.to_string())?.rust_source();
-    write(&out.join("machine_tables.rs"), &source)?;
+    for (name, default, file) in MACHINES {
+        let machine = env::var(name).unwrap_or_else(|_| default.to_owned());
+        let named = root.join("tables").join(&machine);
+        let folder = if named.is_dir() { named } else { PathBuf::from(&machine) };
+        println!("cargo:rerun-if-env-changed={name}");
+        println!("cargo:rerun-if-changed={}", folder.display());
+        let tables = MachineFolder::read(&folder).and_then(|machine| Generated::new(&machine));
+        let source = tables.map_err(|error| error.to_string())?.rust_source();
+        write(&out.join(file), &source)?;
+    }
     if variable("CARGO_CFG_TARGET_OS")? == "none" {
         let nucleo = env::var_os("CARGO_FEATURE_BOARD_NUCLEO_G474RE").is_some();
         let board = if nucleo { NUCLEO_G474RE } else { QEMU };

@@ -6,6 +6,8 @@
 
 #![forbid(unsafe_code)]
 
+mod dual;
+
 use crate::board::Sample;
 use crate::cell::Words;
 use crate::control::{Demand, Measurements};
@@ -14,6 +16,11 @@ use crate::frames::{Abc, Angle};
 use crate::modulation::CarrierPeriod;
 use crate::protection::SafeState;
 use crate::time::Instant;
+
+pub use dual::{
+    DualRequest, DualSetup, dual_sample_from_block, dual_sample_to_block, dual_setup_from_block,
+    dual_setup_to_block, power_from_block, power_to_block,
+};
 
 /// Words in a block.
 pub const BLOCK_WORDS: usize = 16;

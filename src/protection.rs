@@ -6,7 +6,7 @@
 #![forbid(unsafe_code)]
 
 use crate::control::{Demand, Measurements};
-use crate::frames::{Abc, SQRT_3};
+use crate::frames::{Abc, Angle, SQRT_3};
 use crate::machine::Ratings;
 use crate::time::Instant;
 
@@ -32,10 +32,24 @@ pub enum Fault {
     ControlDeadline,
     /// The newest voltage command is too old, in s.
     StaleCommand,
+    /// ZS9: the source is shorted or too low, in V.
+    SourceUndervoltage,
+    /// ZS9: a capacitor of the network above its trip level, in V.
+    CapacitorOvervoltage,
+    /// ZS9: a shoot-through duty outside what the network is made for.
+    DutyRange,
+    /// ZS9: the upper motor's angle is far off what its speed tells, or stands still while it should turn, in electrical rad; or
+    /// its sensor says so itself: then the value is 1 and the limit 0.
+    SensorLost1,
+    /// ZS9: the same of the lower motor.
+    SensorLost2,
+    /// ZS9: gates did not do what they were told; the value has a bit for each, in the order of
+    /// [`crate::nine_switch::GATES`].
+    LegStuck,
 }
 
 impl Fault {
-    const ALL: [Self; 9] = [
+    const ALL: [Self; 15] = [
         Self::Overcurrent,
         Self::DcOvervoltage,
         Self::DcUndervoltage,
@@ -45,6 +59,12 @@ impl Fault {
         Self::Frozen,
         Self::ControlDeadline,
         Self::StaleCommand,
+        Self::SourceUndervoltage,
+        Self::CapacitorOvervoltage,
+        Self::DutyRange,
+        Self::SensorLost1,
+        Self::SensorLost2,
+        Self::LegStuck,
     ];
 
     /// The fault with this code; `None` for 0 or an unknown number.
@@ -64,6 +84,12 @@ impl Fault {
             Self::Frozen => "frozen",
             Self::ControlDeadline => "control_deadline",
             Self::StaleCommand => "stale_command",
+            Self::SourceUndervoltage => "source_undervoltage",
+            Self::CapacitorOvervoltage => "capacitor_overvoltage",
+            Self::DutyRange => "duty_range",
+            Self::SensorLost1 => "sensor_lost_1",
+            Self::SensorLost2 => "sensor_lost_2",
+            Self::LegStuck => "leg_stuck",
         }
     }
 }
@@ -145,17 +171,66 @@ pub fn check_measurements(measured: &Measurements, omega: f32, ratings: &Ratings
     if udc < ratings.trip_dc_under_v {
         return Some((Fault::DcUndervoltage, udc, ratings.trip_dc_under_v));
     }
-    let mechanical = omega.abs() / ratings.pole_pairs;
-    if mechanical > ratings.trip_speed_rad_s {
-        return Some((Fault::Overspeed, mechanical, ratings.trip_speed_rad_s));
-    }
-    None
+    check_speed(omega, ratings)
 }
 
 /// The operator's demand: any finite number is a demand, which the envelope limits.
 pub fn check_demand(demand: &Demand) -> Option<Violation> {
     let torque = demand.torque_nm;
     if torque.is_finite() { None } else { Some((Fault::NotFinite, torque, f32::MAX)) }
+}
+
+/// The ZS9's limits besides those of its motors.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LinkLimits {
+    /// Source voltage below which the drive trips, in V.
+    pub source_min_v: f32,
+    /// Capacitor voltage above which it trips, in V.
+    pub capacitor_max_v: f32,
+    /// Largest shoot-through duty, 0 ..= 0.5.
+    pub duty_max: f32,
+}
+
+impl LinkLimits {
+    /// The duty that a link voltage needs, `(1 − U_dc/U_in)/2`, if it is outside the range.
+    pub fn check_link_reference(&self, link_v: f32, source_v: f32) -> Option<Violation> {
+        if !link_v.is_finite() {
+            return Some((Fault::NotFinite, link_v, f32::MAX));
+        }
+        let duty = if link_v > source_v { 0.5 - 0.5 * source_v / link_v } else { 0.0 };
+        self.check_duty(duty)
+    }
+
+    /// A duty that is commanded.
+    pub fn check_duty(&self, duty: f32) -> Option<Violation> {
+        // Not a number is outside as well.
+        let inside = (0.0..=self.duty_max).contains(&duty);
+        (!inside).then_some((Fault::DutyRange, duty, self.duty_max))
+    }
+
+    /// Source and capacitors.
+    pub fn check_link(&self, source_v: f32, capacitor_v: f32) -> Option<Violation> {
+        if !(source_v + capacitor_v).is_finite() {
+            return Some((Fault::NotFinite, source_v + capacitor_v, f32::MAX));
+        }
+        if source_v < self.source_min_v {
+            return Some((Fault::SourceUndervoltage, source_v, self.source_min_v));
+        }
+        if capacitor_v > self.capacitor_max_v {
+            return Some((Fault::CapacitorOvervoltage, capacitor_v, self.capacitor_max_v));
+        }
+        None
+    }
+}
+
+/// Mechanical overspeed, for an electrical speed in rad/s.
+pub fn check_speed(omega: f32, ratings: &Ratings) -> Option<Violation> {
+    let mechanical = omega.abs() / ratings.pole_pairs;
+    (mechanical > ratings.trip_speed_rad_s).then_some((
+        Fault::Overspeed,
+        mechanical,
+        ratings.trip_speed_rad_s,
+    ))
 }
 
 /// Control periods for which a measurement may repeat to the last bit.
@@ -178,6 +253,16 @@ impl FrozenWatch {
     /// Nothing seen yet.
     pub const fn new() -> Self {
         Self { last: None, currents_for: 0, angle_for: 0, turned_rad: 0.0 }
+    }
+
+    /// What the rotor should have turned while its angle stood still, and how much of that is a fault, in electrical rad.
+    pub fn turned_rad(&self) -> (f32, f32) {
+        (self.turned_rad, FROZEN_TURN_RAD)
+    }
+
+    /// The angle of the last period.
+    pub fn last_angle(&self) -> Option<Angle> {
+        self.last.map(|last| last.angle)
     }
 
     /// One control period; `omega` is the electrical speed before this sample, in rad/s. Call it while pulses are made.

@@ -23,3 +23,4 @@ pub mod run;
 pub mod scenario;
 pub mod trace;
 pub mod verdict;
+pub mod zs9;

@@ -11,7 +11,7 @@ use tractive_rig::options::{RunOptions, not_negative, positive};
 use tractive_rig::report::{self, Page};
 use tractive_rig::scenario::{self, Scenario};
 use tractive_rig::trace::{self, Recording};
-use tractive_rig::{figures, nine_switch, pattern, points};
+use tractive_rig::{figures, nine_switch, pattern, points, zs9};
 
 #[derive(Parser)]
 #[command(name = "tractive-rig", about = "Plays the motor to the drive, and shows what happened", version)]
@@ -24,7 +24,7 @@ struct Cli {
 enum Command {
     /// Runs a scenario and writes its files.
     Run {
-        /// load-steps, sweep or characteristic.
+        /// load-steps, sweep, characteristic, zs9-load-step, zs9-reverse, zs9-cycle or zs9-steady.
         #[arg(default_value = "sweep")]
         scenario: String,
         #[command(flatten)]
@@ -148,10 +148,18 @@ fn command(command: Command) -> Result<ExitCode> {
 }
 
 fn run(name: &str, options: &RunOptions) -> Result<ExitCode> {
+    if let Some(scenario) = zs9::scenario::find(name) {
+        return run_zs9(scenario.as_ref(), options);
+    }
     let scenario = scenario::find(name)?;
-    let machine = Machine::load(&options.machine)?;
-    let out = options.out.clone().unwrap_or_else(|| Path::new("target/tractive").join(name));
-    std::fs::create_dir_all(&out).with_context(|| format!("--out {}", out.display()))?;
+    // The summary shows what was used, not that nothing was said.
+    let options = &RunOptions {
+        machine: Some(options.machine().to_owned()),
+        dt: Some(options.dt_s()),
+        ..options.clone()
+    };
+    let machine = Machine::load(options.machine())?;
+    let out = out(name, options)?;
     let began = Instant::now();
     let recording = scenario::drive(scenario.as_ref(), options, &machine)?;
     let wall_s = began.elapsed().as_secs_f64();
@@ -178,6 +186,34 @@ fn run(name: &str, options: &RunOptions) -> Result<ExitCode> {
         eprintln!("fault {}: {} (limit {})", trip.fault.name(), trip.value, trip.limit);
     }
     Ok(if tripped { ExitCode::from(1) } else { ExitCode::SUCCESS })
+}
+
+/// The folder for the files, made.
+fn out(name: &str, options: &RunOptions) -> Result<PathBuf> {
+    let out = options.out.clone().unwrap_or_else(|| Path::new("target/tractive").join(name));
+    std::fs::create_dir_all(&out).with_context(|| format!("--out {}", out.display()))?;
+    Ok(out)
+}
+
+fn run_zs9(scenario: &dyn zs9::scenario::Scenario, options: &RunOptions) -> Result<ExitCode> {
+    let out = out(scenario.name(), options)?;
+    let began = Instant::now();
+    let outcome = zs9::command::drive(scenario, options)?;
+    let wall_s = began.elapsed().as_secs_f64();
+    zs9::command::write(scenario, options, &outcome, &out)?;
+    if options.json {
+        println!("{}", serde_json::to_string(&outcome.summary)?);
+    } else {
+        print(&outcome.figures);
+        let ratio = outcome.recording.rows.last().map_or(0.0, |row| row.t_s) / wall_s;
+        println!("simulated {ratio:.1} times as fast as real time ({})", options.on.name());
+        println!("report: {}", out.join("report.html").display());
+    }
+    if let Some(trip) = outcome.recording.trip() {
+        eprintln!("fault {}: {} (limit {})", trip.fault.name(), trip.value, trip.limit);
+        return Ok(ExitCode::from(1));
+    }
+    Ok(ExitCode::SUCCESS)
 }
 
 fn summary(

@@ -1,10 +1,13 @@
 //! Options that all runs share.
 
 use crate::bench::Flaws;
+use crate::run::Emulator;
+use crate::zs9::inject::Injection;
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 use std::path::PathBuf;
 use std::str::FromStr;
+use tractive::nine_switch::Scheme;
 
 /// Where the drive runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
@@ -82,12 +85,12 @@ pub struct RunOptions {
     #[serde(skip)]
     #[arg(long)]
     pub out: Option<PathBuf>,
-    /// A folder of tables/, or the path of any machine folder.
-    #[arg(long, default_value = "pmasynrm-180kw")]
-    pub machine: String,
-    /// Step of trace.csv, in s.
-    #[arg(long, default_value = "50e-6", value_parser = positive)]
-    pub dt: f64,
+    /// A folder of tables/, or the path of any machine folder; default pmasynrm-180kw, of the ZS9's scenarios ipm-zs9.
+    #[arg(long)]
+    pub machine: Option<String>,
+    /// Step of trace.csv, in s; default 50e-6, of the ZS9's scenarios one carrier period, of zs9-cycle 1e-3.
+    #[arg(long, value_parser = positive)]
+    pub dt: Option<f64>,
     /// Seed of the noise.
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
@@ -168,6 +171,62 @@ pub struct RunOptions {
     /// sweep, timing: last speed, in r/min.
     #[arg(long, default_value_t = 2000.0, value_parser = finite, allow_negative_numbers = true)]
     pub to: f64,
+    /// What only the ZS9's scenarios know.
+    #[serde(skip)]
+    #[command(flatten)]
+    pub zs9: Zs9Options,
+}
+
+/// Options of the ZS9's scenarios.
+#[derive(Clone, Debug, Args, Serialize)]
+pub struct Zs9Options {
+    /// zs9-load-step: by how much motor 2's load steps, in N·m, −500 to 500.
+    #[arg(long, default_value_t = 40.0, value_parser = load_step, allow_negative_numbers = true)]
+    pub step: f64,
+    /// zs9-reverse: motor 2 keeps its direction, for comparison.
+    #[arg(long)]
+    pub no_reverse: bool,
+    /// zs9-cycle: write edges.csv.
+    #[serde(skip)]
+    #[arg(long)]
+    pub edges: bool,
+    /// ZS9: carrier frequency, in Hz, 10000 or 20000.
+    #[arg(long, default_value_t = 10_000, value_parser = carrier_hz)]
+    pub carrier_hz: u32,
+    /// ZS9: link voltage outside shoot-through, in V: 667 is a shoot-through duty of 0.2, 800 of 0.25.
+    #[arg(long, default_value_t = 667.0, value_parser = positive)]
+    pub uin: f64,
+    /// ZS9: where the zero vectors lie: s, rs, rthd, zvo, rthd-central or rthd-slide.
+    #[serde(serialize_with = "scheme_name")]
+    #[arg(long, default_value = "rthd", value_parser = scheme)]
+    pub scheme: Scheme,
+    /// ZS9: something that goes wrong, NAME@SECONDS: source-short, source-low, source-high, sensor-lost-1, sensor-lost-2,
+    /// sensor-frozen-1, sensor-frozen-2, sensor-jump-2, overcurrent, not-finite, leg-stuck-on, leg-stuck-off.
+    #[arg(long)]
+    pub inject: Option<Injection>,
+}
+
+fn scheme(text: &str) -> Result<Scheme, String> {
+    let found = Scheme::ALL.into_iter().find(|scheme| scheme.name() == text);
+    found.ok_or_else(|| format!("must be one of {}", Scheme::ALL.map(Scheme::name).join(", ")))
+}
+
+fn scheme_name<S: serde::Serializer>(scheme: &Scheme, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(scheme.name())
+}
+
+fn load_step(text: &str) -> Result<f64, String> {
+    match finite(text) {
+        Ok(step) if step.abs() <= 500.0 => Ok(step),
+        _ => Err("must be a number from -500 to 500".to_owned()),
+    }
+}
+
+fn carrier_hz(text: &str) -> Result<u32, String> {
+    match text.parse() {
+        Ok(hz @ (10_000 | 20_000)) => Ok(hz),
+        _ => Err("must be 10000 or 20000".to_owned()),
+    }
 }
 
 impl RunOptions {
@@ -175,6 +234,32 @@ impl RunOptions {
     pub fn is_ideal(&self) -> bool {
         let flaws = [self.dead_time_us, self.noise_a, self.map_error, self.rs_error, self.angle_error];
         flaws.iter().all(|flaw| *flaw == 0.0) && self.adc_bits.is_none() && self.udc_ripple.is_none()
+    }
+
+    /// The emulator with the image that was handed over.
+    ///
+    /// # Errors
+    /// Without an image.
+    pub fn emulator(&self) -> anyhow::Result<Emulator> {
+        let Some(image) = self.image.clone() else {
+            anyhow::bail!("--on qemu needs --image; `cargo xtask run` builds it and hands it over");
+        };
+        Ok(Emulator {
+            program: self.qemu.clone(),
+            image,
+            arguments: self.qemu_arg.clone(),
+            calls: self.calls.clone(),
+        })
+    }
+
+    /// The machine, or the first system's.
+    pub fn machine(&self) -> &str {
+        self.machine.as_deref().unwrap_or("pmasynrm-180kw")
+    }
+
+    /// Step of the trace, in s, or the first system's.
+    pub fn dt_s(&self) -> f64 {
+        self.dt.unwrap_or(50e-6)
     }
 
     /// The sensors' imperfections; the converters' range is the trip level and a quarter more.

@@ -197,6 +197,12 @@ impl Page {
         self.add(&format!("The paper's {figure} · {title}"), axes, &series);
     }
 
+    /// Curves under a heading of their own, over time or anything else; over time dense data is shown by its extremes.
+    pub fn curves(&mut self, heading: &str, x: &str, unit: &str, series: &[(&str, Vec<(f64, f64)>)]) {
+        let series: Vec<_> = series.iter().map(|(name, points)| (*name, thinned(points))).collect();
+        self.add(heading, (x, unit), &series);
+    }
+
     fn draw(&mut self, title: &str, unit: &str, series: &[(&str, Vec<(f64, f64)>)]) {
         let heading = format!("{} · {title}", self.figure);
         self.add(&heading, ("time in s", unit), series);

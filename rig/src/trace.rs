@@ -166,7 +166,7 @@ fn short_time(t_s: f64) -> f64 {
 }
 
 /// Writes a CSV beside its place and moves it there when it is complete.
-fn write_whole(
+pub(crate) fn write_whole(
     path: &Path,
     fill: impl FnOnce(&mut csv::Writer<std::io::BufWriter<&std::fs::File>>) -> Result<()>,
 ) -> Result<()> {

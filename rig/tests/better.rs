@@ -17,7 +17,7 @@ struct Line {
 /// Runs a scenario as on the command line, without a fault.
 fn run(line: &str) -> Figures {
     let parsed = Line::parse_from(std::iter::once("test").chain(line.split(' ')));
-    let machine = Machine::load(&parsed.options.machine).unwrap();
+    let machine = Machine::load(parsed.options.machine()).unwrap();
     let scenario = scenario::find(&parsed.scenario).unwrap();
     let recording = scenario::drive(scenario.as_ref(), &parsed.options, &machine).unwrap();
     assert!(recording.trip().is_none(), "{line}: {:?}", recording.trip());

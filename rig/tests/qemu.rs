@@ -1,4 +1,4 @@
-//! The image in QEMU against the same code on the host, byte for byte. Needs TRACTIVE_IMAGE (and TRACTIVE_QEMU);
+//! The images in QEMU against the same code on the host, byte for byte. Needs TRACTIVE_IMAGE, TRACTIVE_ZS9_IMAGE (and TRACTIVE_QEMU);
 //! `cargo xtask test` sets them, so these tests are ignored otherwise.
 
 use std::path::{Path, PathBuf};
@@ -6,6 +6,11 @@ use std::process::Command;
 
 fn run(scenario: &str, on: &str, out: &Path) -> (i32, String) {
     let mut command = Command::new(env!("CARGO_BIN_EXE_tractive-rig"));
+    if scenario.starts_with("zs9-")
+        && let Some(image) = std::env::var_os("TRACTIVE_ZS9_IMAGE")
+    {
+        command.env("TRACTIVE_IMAGE", image);
+    }
     command.arg("run").args(scenario.split(' ')).args(["--on", on, "--out"]).arg(out);
     let output = command.output().unwrap();
     (output.status.code().unwrap_or(-1), String::from_utf8_lossy(&output.stderr).into_owned())
@@ -20,7 +25,8 @@ fn same(scenario: &str, code: i32) {
         let (got, errors) = run(scenario, on, out);
         assert_eq!(got, code, "{scenario} on {on}: {errors}");
     }
-    for file in ["trace.csv", "edges.csv"] {
+    let files: &[&str] = if scenario == "zs9-cycle" { &["trace.csv"] } else { &["trace.csv", "edges.csv"] };
+    for file in files {
         let [host, qemu] = [&outs[0], &outs[1]].map(|out| std::fs::read(out.join(file)).unwrap());
         assert!(host.starts_with(b"t_s,"), "{scenario}: {file} has no header");
         assert!(host == qemu, "{scenario}: {file} differs");
@@ -65,4 +71,32 @@ fn flaws_are_the_same() {
 fn a_trip_is_the_same() {
     same("sweep --udc 2200", 1);
     same("sweep --to 6900", 1);
+}
+
+#[test]
+#[ignore = "needs the image and QEMU"]
+fn both_motors_load_step_is_the_same() {
+    same("zs9-load-step", 0);
+    same("zs9-load-step --carrier-hz 20000 --uin 800 --scheme s", 0);
+}
+
+#[test]
+#[ignore = "needs the image and QEMU"]
+fn both_motors_reversal_is_the_same() {
+    same("zs9-reverse --scheme zvo --adc-bits 12 --noise-a 0.3", 0);
+}
+
+#[test]
+#[ignore = "needs the image and QEMU"]
+fn both_motors_cycle_is_the_same() {
+    same("zs9-cycle", 0);
+}
+
+#[test]
+#[ignore = "needs the image and QEMU"]
+fn both_motors_trips_are_the_same() {
+    same("zs9-load-step --inject leg-stuck-on@0.1", 1);
+    same("zs9-load-step --inject sensor-frozen-2@0.1", 1);
+    same("zs9-load-step --inject overcurrent@0.1", 1);
+    same("zs9-load-step --carrier-hz 20000 --inject source-short@0.1", 1);
 }

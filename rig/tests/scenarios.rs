@@ -18,7 +18,7 @@ struct Line {
 /// Runs a scenario as on the command line; its figures and what was recorded.
 fn run(line: &str) -> (analysis::Figures, Recording) {
     let line = Line::parse_from(std::iter::once("test").chain(line.split(' ')));
-    let machine = Machine::load(&line.options.machine).unwrap();
+    let machine = Machine::load(line.options.machine()).unwrap();
     let scenario = scenario::find(&line.scenario).unwrap();
     let recording = scenario::drive(scenario.as_ref(), &line.options, &machine).unwrap();
     assert!(recording.trip().is_none(), "{:?}", recording.trip());
@@ -124,7 +124,7 @@ fn torque_is_exact_at_the_characteristic_points() {
 fn a_link_out_of_range_trips_at_once_and_by_name() {
     for (line, name) in [("sweep --udc 2200", "dc_overvoltage"), ("sweep --udc 700", "dc_undervoltage")] {
         let line = Line::parse_from(std::iter::once("test").chain(line.split(' ')));
-        let machine = Machine::load(&line.options.machine).unwrap();
+        let machine = Machine::load(line.options.machine()).unwrap();
         let scenario = scenario::find(&line.scenario).unwrap();
         let recording = scenario::drive(scenario.as_ref(), &line.options, &machine).unwrap();
         assert_eq!(recording.trip().unwrap().fault.name(), name);
@@ -136,7 +136,7 @@ fn a_link_out_of_range_trips_at_once_and_by_name() {
 #[test]
 fn overspeed_trips_into_the_short_circuit() {
     let line = Line::parse_from("test sweep --to 6900".split(' '));
-    let machine = Machine::load(&line.options.machine).unwrap();
+    let machine = Machine::load(line.options.machine()).unwrap();
     let scenario = scenario::find(&line.scenario).unwrap();
     let recording = scenario::drive(scenario.as_ref(), &line.options, &machine).unwrap();
     let trip = recording.trip().unwrap();

@@ -7,12 +7,18 @@ pub mod nucleo_g474re;
 #[cfg(all(target_os = "none", not(feature = "board-nucleo-g474re")))]
 pub mod qemu;
 
+mod dual;
+
 use crate::control::{Demand, Measurements};
 use crate::drive::Report;
 use crate::frames::Abc;
 use crate::modulation::CarrierPeriod;
 use crate::protection::SafeState;
 use crate::time::Instant;
+
+pub use dual::{
+    DualControlPort, DualPwmPort, DualSample, GateFeedback, MotorDemand, PlayedPeriod, PowerSample,
+};
 
 /// A control sample: what the converters hold, and what the operator wants.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -7,7 +7,10 @@
 //!   instants its interrupt is pending first; it also has the higher priority.
 #![allow(unsafe_code)]
 
+mod dual;
 mod exchange;
+
+pub use dual::{connect_dual, die_dual, start_dual};
 
 use super::{ControlPort, PwmPort, Sample};
 use crate::drive::Report;
@@ -88,8 +91,13 @@ pub fn connect() -> Setup {
 /// Starts both timers; the first PWM interrupt comes after `first_half_ticks`, the first control interrupt after one
 /// control period.
 pub fn start(first_half_ticks: u32) {
-    const ENABLE_PERIODIC_INTERRUPT_32_BIT: u32 = 0b1110_0010;
-    const ENABLE_INTERRUPT: u32 = 0b1001;
+    enable_interrupts();
+    write_register(PWM_TIMER, first_half_ticks - 1);
+    write_register(CONTROL_TIMER + 8, CLOCK.control_ticks - 1);
+    start_timers();
+}
+
+fn enable_interrupts() {
     // SAFETY: the only use of the core peripherals, before any interrupt is unmasked.
     let mut core = unsafe { cortex_m::Peripherals::steal() };
     // SAFETY: priorities are changed while both interrupts are masked; no code relies on a priority ceiling. After that
@@ -100,8 +108,11 @@ pub fn start(first_half_ticks: u32) {
         NVIC::unmask(Interrupt::DUALTIMER);
         NVIC::unmask(Interrupt::TIMER0);
     }
-    write_register(PWM_TIMER, first_half_ticks - 1);
-    write_register(CONTROL_TIMER + 8, CLOCK.control_ticks - 1);
+}
+
+fn start_timers() {
+    const ENABLE_PERIODIC_INTERRUPT_32_BIT: u32 = 0b1110_0010;
+    const ENABLE_INTERRUPT: u32 = 0b1001;
     write_register(PWM_TIMER + 8, ENABLE_PERIODIC_INTERRUPT_32_BIT);
     write_register(CONTROL_TIMER, ENABLE_INTERRUPT);
 }

@@ -17,6 +17,7 @@ mod map_error;
 mod mtpa;
 mod reference;
 mod speed;
+mod speed_loop;
 mod torque_trim;
 mod z_source;
 
@@ -28,6 +29,7 @@ pub use current_loop::{Follows, Gains};
 pub use demand::Demand;
 pub use mtpa::{mtpa, mtpa_passes};
 pub use reference::{OperatingPoint, Region, VoltageLimit, operating_point, six_step_v};
+pub use speed_loop::{SpeedDesign, SpeedInput, SpeedLoop};
 pub use z_source::{
     Limited, ZSource, ZSourceDesign, ZSourceError, ZSourceGains, ZSourceInput, ZSourceOutput,
 };
@@ -73,6 +75,8 @@ pub struct Committed {
     pub follows: Follows,
     /// Largest fundamental of the mode as a share of six-step.
     pub depth_limit: f32,
+    /// Share of that which the operating point may use; what is left is for regulation.
+    pub steady_share: f32,
     /// Whether the fundamental is to be that large, whatever the torque needs.
     pub filled: bool,
     /// Flux ripple of the pattern, as a share of the fundamental flux, greater than zero.
@@ -172,8 +176,17 @@ const SIXTH_TURN_RAD: f32 = 1.0;
 impl Controller {
     /// At rest, with nothing known of the machine's angle.
     pub const fn new() -> Self {
+        Self::with_tracker(speed::SpeedTracker::new())
+    }
+
+    /// The same with a speed tracker of this natural frequency, in rad/s.
+    pub const fn with_tracking(natural_rad_s: f32) -> Self {
+        Self::with_tracker(speed::SpeedTracker::with_natural(natural_rad_s))
+    }
+
+    const fn with_tracker(speed: speed::SpeedTracker) -> Self {
         Self {
-            speed: speed::SpeedTracker::new(),
+            speed,
             demand: demand::Shaper::new(),
             disturbance: disturbance::Observer::new(),
             trim: torque_trim::TorqueTrim::new(),
@@ -187,6 +200,11 @@ impl Controller {
     /// Returns the electrical angular speed, in rad/s.
     pub fn track(&mut self, angle: Angle, clock: &Clock) -> f32 {
         self.speed.step(angle, clock.control_s())
+    }
+
+    /// By how much a measured angle, in rad, is off what the speed makes of the one before.
+    pub fn surprise_rad(&self, angle: Angle, clock: &Clock) -> f32 {
+        (angle - self.speed.predicted(clock.control_s())).signed_radians()
     }
 
     /// Whether the speed has been followed long enough to be used.
@@ -229,8 +247,8 @@ impl Controller {
         let link_v = before + LINK_RAD_S * clock.control_s() * (measured.udc_v - before);
         self.link_v = Some(link_v);
         let scale = self.map_error.scale();
-        let limit =
-            VoltageLimit { udc_v: link_v / scale, depth: committed.depth_limit, filled: committed.filled };
+        let depth = committed.depth_limit * committed.steady_share;
+        let limit = VoltageLimit { udc_v: link_v / scale, depth, filled: committed.filled };
         let trimmed_nm = self.trim.apply(torque_nm, committed.ripple_share, tables.ratings.max_torque_nm);
         let point = operating_point(trimmed_nm / scale, omega, &limit, tables);
         let point = OperatingPoint { torque_nm: point.torque_nm * scale, ..point };

@@ -2,7 +2,7 @@
 
 use crate::frames::Angle;
 
-/// Natural frequency of the loop, in rad/s; critically damped.
+/// Natural frequency of the loop unless another is wanted, in rad/s; critically damped.
 const NATURAL_RAD_S: f32 = 500.0;
 /// Control periods until the estimate is used.
 const SETTLING_STEPS: u32 = 200;
@@ -12,11 +12,22 @@ pub struct SpeedTracker {
     angle: Angle,
     omega: f32,
     steps: u32,
+    natural_rad_s: f32,
 }
 
 impl SpeedTracker {
     pub const fn new() -> Self {
-        Self { angle: Angle::ZERO, omega: 0.0, steps: 0 }
+        Self::with_natural(NATURAL_RAD_S)
+    }
+
+    /// With another natural frequency, in rad/s; well below the sampling rate.
+    pub const fn with_natural(natural_rad_s: f32) -> Self {
+        Self { angle: Angle::ZERO, omega: 0.0, steps: 0, natural_rad_s }
+    }
+
+    /// The angle that the next sample should show.
+    pub fn predicted(&self, period_s: f32) -> Angle {
+        self.angle + Angle::from_radians(self.omega * period_s)
     }
 
     /// The angle measured now; returns the electrical angular speed in rad/s.
@@ -28,10 +39,10 @@ impl SpeedTracker {
             self.omega = (measured - self.angle).signed_radians() / period_s;
             self.angle = measured;
         } else {
-            let predicted = self.angle + Angle::from_radians(self.omega * period_s);
+            let predicted = self.predicted(period_s);
             let error = (measured - predicted).signed_radians();
-            self.omega += NATURAL_RAD_S * NATURAL_RAD_S * period_s * error;
-            self.angle = predicted + Angle::from_radians(2.0 * NATURAL_RAD_S * period_s * error);
+            self.omega += self.natural_rad_s * self.natural_rad_s * period_s * error;
+            self.angle = predicted + Angle::from_radians(2.0 * self.natural_rad_s * period_s * error);
         }
         self.steps = self.steps.saturating_add(1);
         self.omega

@@ -3,7 +3,10 @@
 
 #![forbid(unsafe_code)]
 
+pub mod dual;
 mod messages;
 pub mod traction;
 
-pub use messages::{Applied, Gates, Report, VoltageCommand, half_from_words, half_to_words};
+pub use messages::{
+    Applied, Gates, Report, VoltageCommand, half_from_words, half_to_words, trip_from_words, trip_to_words,
+};

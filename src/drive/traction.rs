@@ -18,7 +18,7 @@ use crate::protection::{self, Fault, FrozenWatch, Trip, Violation};
 use crate::time::{Clock, Instant};
 
 /// Angle units (2⁻³² turn) in one radian.
-const UNITS_PER_RADIAN: f32 = 4_294_967_296.0 / core::f32::consts::TAU;
+pub(super) const UNITS_PER_RADIAN: f32 = 4_294_967_296.0 / core::f32::consts::TAU;
 
 /// Control periods after which a command is too old to make pulses from.
 const STALE_PERIODS: i32 = 5;
@@ -259,6 +259,7 @@ impl ControlTask {
                 interval_s,
                 follows: Follows::Mean,
                 depth_limit: depth_limit(Mode::Async, 0.0, &self.settings.devices),
+                steady_share: 1.0,
                 filled: false,
                 ripple_share: ripple_share(Mode::Async, 0.0),
                 settled: true,
@@ -290,6 +291,7 @@ impl ControlTask {
                 _ => Follows::Mean,
             },
             depth_limit,
+            steady_share: 1.0,
             filled,
             ripple_share: ripple_share(decided, self.depth),
             settled: true,

@@ -89,3 +89,10 @@ pub struct Tables {
 }
 
 include!(concat!(env!("OUT_DIR"), "/machine_tables.rs"));
+
+/// The machine that drives the ZS9, both motors alike.
+pub mod zs9 {
+    use super::{Curve, Grid, Mtpa, Ratings, Tables, Weakening};
+
+    include!(concat!(env!("OUT_DIR"), "/zs9_tables.rs"));
+}

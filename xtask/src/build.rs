@@ -56,19 +56,51 @@ pub fn cargo() -> Command {
     command
 }
 
-/// The arguments that build the image, after the toolchain's own.
-pub fn image_args() -> [&'static str; 9] {
-    ["build", "--profile", "firmware", "--target", TARGET, "--package", "tractive", "--bin", "tractive"]
+/// The systems, each with an image of its own.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum System {
+    /// The PMaSynRM behind a two-level inverter.
+    Traction,
+    /// Two motors behind a Z-source nine-switch inverter.
+    Zs9,
 }
 
-/// Builds the firmware's image, with the tables of `machine` if one is named (a name or an absolute path).
-pub fn image(toolchain: &Toolchain, machine: Option<&OsString>) -> Result<PathBuf> {
-    let mut command = toolchain.cargo(&image_args());
-    match machine {
-        Some(machine) => command.env("TRACTIVE_MACHINE", machine),
-        None => command.env_remove("TRACTIVE_MACHINE"),
-    };
-    executable(&mut command, "tractive", machine.is_some()).context("the image was not built")
+impl System {
+    /// All of them.
+    pub const ALL: [Self; 2] = [Self::Traction, Self::Zs9];
+
+    /// The system that a scenario drives.
+    pub fn of_scenario(scenario: &str) -> Self {
+        if scenario.starts_with("zs9-") { Self::Zs9 } else { Self::Traction }
+    }
+
+    /// The image's name.
+    pub const fn image(self) -> &'static str {
+        match self {
+            Self::Traction => "tractive",
+            Self::Zs9 => "zs9",
+        }
+    }
+
+    /// The variable that names the machine to the build script.
+    const fn machine_variable(self) -> &'static str {
+        match self {
+            Self::Traction => "TRACTIVE_MACHINE",
+            Self::Zs9 => "TRACTIVE_ZS9_MACHINE",
+        }
+    }
+}
+
+/// Builds a system's image, with the tables of `machine` if one is named (a name or an absolute path).
+pub fn image(toolchain: &Toolchain, system: System, machine: Option<&OsString>) -> Result<PathBuf> {
+    let name = system.image();
+    let args = ["build", "--profile", "firmware", "--target", TARGET, "--package", "tractive", "--bin", name];
+    let mut command = toolchain.cargo(&args);
+    for other in System::ALL {
+        command.env_remove(other.machine_variable());
+    }
+    command.envs(machine.map(|machine| (system.machine_variable(), machine)));
+    executable(&mut command, name, machine.is_some()).context("the image was not built")
 }
 
 /// Builds the image of the building blocks.
@@ -81,7 +113,9 @@ pub fn bench(toolchain: &Toolchain) -> Result<PathBuf> {
 
 /// Builds the firmware's image for a board of real hardware.
 pub fn board_image(toolchain: &Toolchain, board: Board) -> Result<PathBuf> {
-    let mut command = toolchain.cargo(&image_args());
+    let args =
+        ["build", "--profile", "firmware", "--target", TARGET, "--package", "tractive", "--bin", "tractive"];
+    let mut command = toolchain.cargo(&args);
     command.args(["--features", board.feature()]).env_remove("TRACTIVE_MACHINE");
     executable(&mut command, "tractive", false).context("the image was not built")
 }

@@ -13,7 +13,7 @@ use crate::{build, check};
 
 /// The command.
 pub fn run(args: &ImageArgs) -> Result<u8> {
-    let path = build::image(&Setup::default().toolchain()?, None)?;
+    let path = build::image(&Setup::default().toolchain()?, build::System::Traction, None)?;
     let sizes = read(&path)?.sizes;
     if args.json {
         println!("{}", as_json(&sizes));

@@ -7,6 +7,7 @@ use std::process::Command;
 use anyhow::{Context, Result, bail};
 use clap::CommandFactory;
 
+use crate::build::System;
 use crate::setup::Setup;
 use crate::{build, cli, process};
 
@@ -120,7 +121,11 @@ pub fn run(words: &[String]) -> Result<u8> {
             qemu = Some(setup.qemu()?);
         }
         if !request.has("--image") {
-            image = Some(build::image(&setup.toolchain()?, machine.as_ref())?);
+            image = Some(build::image(
+                &setup.toolchain()?,
+                System::of_scenario(&request.scenario),
+                machine.as_ref(),
+            )?);
         }
     }
     let mut rig = Command::new(build::rig()?);

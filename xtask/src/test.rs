@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use anyhow::Result;
 use clap::ValueEnum;
 
-use crate::build::{Board, TARGET, cargo};
+use crate::build::{Board, System, TARGET, cargo};
 use crate::cli::{TestArgs, TimingArgs};
 use crate::process::succeeds;
 use crate::setup::Setup;
@@ -113,10 +113,19 @@ fn perform(step: Step, setup: &mut Setup) -> Result<Outcome> {
             succeeds(&mut command)?
         }
         Step::Image => {
-            println!("{}", build::image(&setup.toolchain()?, None)?.display());
+            for system in System::ALL {
+                println!("{}", build::image(&setup.toolchain()?, system, None)?.display());
+            }
             true
         }
-        Step::ImageCheck => image::check(&build::image(&setup.toolchain()?, None)?)?,
+        Step::ImageCheck => {
+            let mut good = true;
+            for system in System::ALL {
+                println!("{}:", system.image());
+                good &= image::check(&build::image(&setup.toolchain()?, system, None)?)?;
+            }
+            good
+        }
         Step::NucleoImage => {
             let board = Board::NucleoG474re;
             image::check_board(&build::board_image(&setup.toolchain()?, board)?, board)?
@@ -124,16 +133,18 @@ fn perform(step: Step, setup: &mut Setup) -> Result<Outcome> {
         Step::Machines => {
             let toolchain = setup.toolchain()?;
             for machine in crate::run::machine_names(build::root()) {
-                build::image(&toolchain, Some(&machine.clone().into()))?;
+                build::image(&toolchain, System::Traction, Some(&machine.clone().into()))?;
                 println!("{machine}");
             }
             true
         }
         Step::Qemu => {
             let qemu = setup.qemu()?;
-            let image = build::image(&setup.toolchain()?, None)?;
+            let toolchain = setup.toolchain()?;
             let mut command = cargo();
-            command.env("TRACTIVE_IMAGE", image).env("TRACTIVE_QEMU", qemu);
+            command.env("TRACTIVE_QEMU", qemu);
+            command.env("TRACTIVE_IMAGE", build::image(&toolchain, System::Traction, None)?);
+            command.env("TRACTIVE_ZS9_IMAGE", build::image(&toolchain, System::Zs9, None)?);
             command.args([
                 "test",
                 "--release",

@@ -9,7 +9,7 @@ mod inverter;
 mod sensors;
 
 pub use inverter::{Edge, GATES, Inverter};
-pub use sensors::{Flaws, Sensors};
+pub use sensors::{Converter, Flaws, Sensors};
 
 use crate::plant::Plant;
 use crate::trace::{Row, Switch};

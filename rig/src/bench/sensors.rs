@@ -26,52 +26,31 @@ pub struct Flaws {
     pub seed: u64,
 }
 
-/// Sensors, and the stiff DC link behind the inverter.
-pub struct Sensors {
-    udc_v: f64,
-    link_steps: Vec<(f64, f64)>,
+/// The current converters: noise, then steps.
+pub struct Converter {
     flaws: Flaws,
     random: StdRng,
-    /// What control was told last.
-    told_a: Abc,
 }
 
-impl Sensors {
-    /// Sensors on a link of this voltage, which changes at these times (in s) to these values.
-    pub fn new(udc_v: f64, link_steps: Vec<(f64, f64)>, flaws: Flaws) -> Self {
-        Self { udc_v, link_steps, flaws, random: StdRng::seed_from_u64(flaws.seed), told_a: Abc::default() }
+impl Converter {
+    /// Converters with these flaws.
+    pub fn new(flaws: Flaws) -> Self {
+        Self { flaws, random: StdRng::seed_from_u64(flaws.seed) }
     }
 
-    /// The link's true voltage, in V.
-    pub fn udc_v(&self, t_s: f64) -> f64 {
-        let ripple = self
-            .flaws
-            .udc_ripple
-            .map_or(0.0, |(amplitude_v, hz)| amplitude_v * (core::f64::consts::TAU * hz * t_s).sin());
-        let passed = self.link_steps.iter().rev().find(|(at_s, _)| t_s >= *at_s);
-        passed.map_or(self.udc_v, |(_, udc_v)| *udc_v) + ripple
+    /// What is wrong with them.
+    pub fn flaws(&self) -> &Flaws {
+        &self.flaws
     }
 
-    /// The phase currents as converted now.
-    pub fn currents(&mut self, plant: &Plant) -> Abc {
-        let [a, b, c] = plant.currents_abc().map(|current| self.convert(current) as f32);
-        Abc { a, b, c }
+    /// Ripple of the supply at an instant, in V.
+    pub fn ripple_v(&self, t_s: f64) -> f64 {
+        let ripple = self.flaws.udc_ripple;
+        ripple.map_or(0.0, |(amplitude_v, hz)| amplitude_v * (core::f64::consts::TAU * hz * t_s).sin())
     }
 
-    /// All that control measures.
-    pub fn measure(&mut self, plant: &Plant, t_s: f64) -> Measurements {
-        let turns = plant.angle_turns() + self.flaws.angle_error_deg / 360.0;
-        if self.flaws.freeze_at_s.is_none_or(|freeze_s| t_s < freeze_s) {
-            self.told_a = self.currents(plant);
-        }
-        Measurements {
-            currents_a: self.told_a,
-            udc_v: self.udc_v(t_s) as f32,
-            angle: Angle((turns.rem_euclid(1.0) * 4_294_967_296.0).round() as u64 as u32),
-        }
-    }
-
-    fn convert(&mut self, current_a: f64) -> f64 {
+    /// A current as converted now, in A.
+    pub fn convert(&mut self, current_a: f64) -> f64 {
         let mut value = current_a;
         if self.flaws.noise_a > 0.0
             && let Ok(noise) = Normal::new(0.0, self.flaws.noise_a)
@@ -83,5 +62,46 @@ impl Sensors {
             value = (value / step).round() * step;
         }
         value
+    }
+}
+
+/// Sensors, and the stiff DC link behind the inverter.
+pub struct Sensors {
+    udc_v: f64,
+    link_steps: Vec<(f64, f64)>,
+    converter: Converter,
+    /// What control was told last.
+    told_a: Abc,
+}
+
+impl Sensors {
+    /// Sensors on a link of this voltage, which changes at these times (in s) to these values.
+    pub fn new(udc_v: f64, link_steps: Vec<(f64, f64)>, flaws: Flaws) -> Self {
+        Self { udc_v, link_steps, converter: Converter::new(flaws), told_a: Abc::default() }
+    }
+
+    /// The link's true voltage, in V.
+    pub fn udc_v(&self, t_s: f64) -> f64 {
+        let passed = self.link_steps.iter().rev().find(|(at_s, _)| t_s >= *at_s);
+        passed.map_or(self.udc_v, |(_, udc_v)| *udc_v) + self.converter.ripple_v(t_s)
+    }
+
+    /// The phase currents as converted now.
+    pub fn currents(&mut self, plant: &Plant) -> Abc {
+        let [a, b, c] = plant.currents_abc().map(|current| self.converter.convert(current) as f32);
+        Abc { a, b, c }
+    }
+
+    /// All that control measures.
+    pub fn measure(&mut self, plant: &Plant, t_s: f64) -> Measurements {
+        let turns = plant.angle_turns() + self.converter.flaws.angle_error_deg / 360.0;
+        if self.converter.flaws.freeze_at_s.is_none_or(|freeze_s| t_s < freeze_s) {
+            self.told_a = self.currents(plant);
+        }
+        Measurements {
+            currents_a: self.told_a,
+            udc_v: self.udc_v(t_s) as f32,
+            angle: Angle((turns.rem_euclid(1.0) * 4_294_967_296.0).round() as u64 as u32),
+        }
     }
 }

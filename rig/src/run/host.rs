@@ -85,7 +85,7 @@ pub fn run_on_host(
         if let Some(error) = port.error {
             return Err(error);
         }
-        progress.show(&bench);
+        progress.show(bench.progress());
     }
     Ok(super::record(bench))
 }

@@ -1,10 +1,13 @@
 //! Runs the drive against a bench, on the host or in QEMU.
 
+mod emulator;
 mod host;
 mod qemu;
 
+pub use emulator::Emulator;
+pub(crate) use emulator::emulate;
 pub use host::run_on_host;
-pub use qemu::{Emulator, run_in_qemu};
+pub use qemu::run_in_qemu;
 
 use crate::bench::Bench;
 use crate::trace::Recording;
@@ -20,7 +23,7 @@ fn record(bench: Bench) -> Recording {
 }
 
 /// A bar on a terminal; in a pipe indicatif draws none.
-struct Progress {
+pub(crate) struct Progress {
     bar: ProgressBar,
     calls: u32,
 }
@@ -28,7 +31,7 @@ struct Progress {
 impl Progress {
     const STEPS: u64 = 1000;
 
-    fn new(name: &str) -> Self {
+    pub(crate) fn new(name: &str) -> Self {
         let bar = ProgressBar::new(Self::STEPS).with_message(name.to_owned());
         if let Ok(style) =
             ProgressStyle::with_template("{msg:16} [{bar:40}] {percent:>3} % {elapsed} (left {eta})")
@@ -38,10 +41,10 @@ impl Progress {
         Self { bar, calls: 0 }
     }
 
-    fn show(&mut self, bench: &Bench) {
+    pub(crate) fn show(&mut self, done: f64) {
         self.calls = self.calls.wrapping_add(1);
         if self.calls.is_multiple_of(256) {
-            self.bar.set_position((bench.progress() * Self::STEPS as f64) as u64);
+            self.bar.set_position((done * Self::STEPS as f64) as u64);
         }
     }
 }

@@ -18,9 +18,9 @@ use crate::machine::Machine;
 use crate::options::{On, RunOptions};
 use crate::plant::{Plant, PlantSettings, SpeedSource};
 use crate::report::Page;
-use crate::run::{self, CLOCK, Emulator};
+use crate::run::{self, CLOCK};
 use crate::trace::Recording;
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result};
 use tractive::control::Gains;
 use tractive::drive::traction::Settings;
 use tractive::link::Setup;
@@ -75,7 +75,10 @@ pub fn all() -> Vec<Box<dyn Scenario>> {
 
 /// The scenario of that name.
 pub fn find(name: &str) -> Result<Box<dyn Scenario>> {
-    let names: Vec<_> = all().iter().map(|scenario| scenario.name()).collect();
+    let own = all();
+    let zs9 = crate::zs9::scenario::all();
+    let names = own.iter().map(|scenario| scenario.name()).chain(zs9.iter().map(|scenario| scenario.name()));
+    let names: Vec<_> = names.collect();
     all()
         .into_iter()
         .find(|scenario| scenario.name() == name)
@@ -110,7 +113,7 @@ pub fn drive(scenario: &dyn Scenario, options: &RunOptions, machine: &Machine) -
             dead_time_ticks: ticks(options.dead_time_us),
             lead_s: plan.lead_s,
             duration_s: plan.duration_s,
-            trace_step_s: options.dt,
+            trace_step_s: options.dt_s(),
             udc_v: options.udc.unwrap_or(parameters.dc_link_nominal_v),
             link_steps: plan.link,
             flaws: options.flaws(parameters.trip_current_a),
@@ -121,22 +124,7 @@ pub fn drive(scenario: &dyn Scenario, options: &RunOptions, machine: &Machine) -
             let settings = Settings { clock: CLOCK, devices, gains: Gains::DEFAULT };
             Ok(run::run_on_host(scenario.name(), bench, machine.tables, settings, first_half_ticks)?)
         }
-        On::Qemu => {
-            let Some(image) = options.image.clone() else {
-                bail!("--on qemu needs --image; `cargo xtask run` builds it and hands it over");
-            };
-            run::run_in_qemu(
-                scenario.name(),
-                bench,
-                setup,
-                &Emulator {
-                    program: options.qemu.clone(),
-                    image,
-                    arguments: options.qemu_arg.clone(),
-                    calls: options.calls.clone(),
-                },
-            )
-        }
+        On::Qemu => run::run_in_qemu(scenario.name(), bench, setup, &options.emulator()?),
     }
 }
 

@@ -1,6 +1,10 @@
 //! The exchange with the rig, over three semihosting files. A real board has nothing of this: `cargo xtask timing` knows
 //! these functions by their module and does not count them, so they stay out of line and take what they tell by reference.
 
+mod dual;
+
+pub use dual::{dead_dual, gates_off, open_dual, play_dual, power_sample, report_dual, sample_dual};
+
 use super::stop;
 use crate::board::Sample;
 use crate::drive::Report;
@@ -21,6 +25,12 @@ const PWM_ANSWERS: usize = 2;
 /// Opens the files and fetches the set-up.
 #[inline(never)]
 pub fn open() -> Setup {
+    open_files();
+    send(&Request::Hello.to_block());
+    link::setup_from_block(&receive(CONTROL_ANSWERS))
+}
+
+fn open_files() {
     const READ: usize = 1;
     const WRITE: usize = 5;
     for (file, (name, mode)) in
@@ -33,14 +43,12 @@ pub fn open() -> Setup {
         }
         file.store(handle as u32, Ordering::Relaxed);
     }
-    send(Request::Hello);
-    link::setup_from_block(&receive(CONTROL_ANSWERS))
 }
 
 /// The control timer's conversions; ends the emulation when the rig says so.
 #[inline(never)]
 pub fn control_sample(now: Instant) -> Sample {
-    send(Request::ControlSample(now));
+    send(&Request::ControlSample(now).to_block());
     let (sample, end) = link::sample_from_block(&receive(CONTROL_ANSWERS));
     if end {
         stop(true);
@@ -51,32 +59,32 @@ pub fn control_sample(now: Instant) -> Sample {
 /// Phase currents at a carrier boundary.
 #[inline(never)]
 pub fn pwm_sample(now: Instant) -> Abc {
-    send(Request::PwmSample(now));
+    send(&Request::PwmSample(now).to_block());
     link::currents_from_block(&receive(PWM_ANSWERS))
 }
 
 /// What was loaded into the shadow registers.
 #[inline(never)]
 pub fn play(now: Instant, next: &CarrierPeriod) {
-    send(Request::Play(now, *next));
+    send(&Request::Play(now, *next).to_block());
 }
 
 /// The end of a control interrupt.
 #[inline(never)]
 pub fn report(now: Instant, report: &Report) {
-    send(Request::ControlReport(now, *report));
+    send(&Request::ControlReport(now, *report).to_block());
 }
 
 /// An order to enter the safe state.
 #[inline(never)]
 pub fn enter(safe: SafeState, now: Instant) {
-    send(Request::Enter(now, safe));
+    send(&Request::Enter(now, safe).to_block());
 }
 
 /// The processor stops, gates off.
 #[inline(never)]
 pub fn dead() {
-    send(Request::Dead);
+    send(&Request::Dead.to_block());
 }
 
 fn file(index: usize) -> usize {
@@ -86,10 +94,9 @@ fn file(index: usize) -> usize {
     }
 }
 
-fn send(request: Request) {
-    let bytes = request.to_block();
+fn send(block: &Block) {
     // SAFETY: SYS_WRITE reads exactly the block, which outlives the call.
-    let missing = unsafe { syscall!(WRITE, file(REQUESTS), bytes.as_ptr(), BLOCK_BYTES) };
+    let missing = unsafe { syscall!(WRITE, file(REQUESTS), block.as_ptr(), BLOCK_BYTES) };
     if missing != 0 {
         stop(false);
     }

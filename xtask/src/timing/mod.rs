@@ -50,7 +50,7 @@ pub fn run(args: &TimingArgs) -> Result<u8> {
     let mut setup = Setup::default();
     let qemu = setup.qemu()?;
     let toolchain = setup.toolchain()?;
-    let path = build::image(&toolchain, None)?;
+    let path = build::image(&toolchain, build::System::Traction, None)?;
     let blocks = blocks::measure(&toolchain, &qemu)?;
     let bench = Bench { rig: build::rig()?, qemu, image: image::read(&path)?, path };
     let mut sum = Sum::default();

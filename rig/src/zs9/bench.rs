@@ -1,0 +1,409 @@
+//! The ZS9's bench: plant, gates and sensors in the timers' time, sampled and recorded.
+//!
+//! Time is counted in compare steps of the firmware's timers, so both sides agree on every edge. As on the first
+//! system's bench nothing runs ahead of what is decided, and what an interrupt orders takes effect at a fixed delay after
+//! its nominal instant.
+
+use super::inject::{Injection, Spoiler};
+use super::operator::{Operator, Orders};
+use super::sensors::Sensors;
+use super::trace::{Edge, MotorRow, Row};
+use crate::bench::{Converter, Flaws};
+use crate::plant::zs9::{IllegalState, LegGates, Zs9Plant};
+use std::collections::VecDeque;
+use tractive::board::{DualSample, GateFeedback, PlayedPeriod, PowerSample};
+use tractive::drive::dual::{COMPARE_STEPS, DualReport};
+use tractive::nine_switch::Scheme;
+use tractive::time::{Clock, Instant};
+
+/// Compare steps since the run's beginning.
+pub type Steps = u64;
+
+/// How long after its nominal instant the control interrupt's order to turn the gates off reaches them, in ticks (75 µs): its
+/// latest deadline.
+const CONTROL_OFF_TICKS: u32 = 1875;
+/// The same for the PWM interrupt (25 µs), as a bound on its length.
+const PWM_OFF_TICKS: u32 = 625;
+
+/// Why the bench cannot go on.
+#[derive(Debug, thiserror::Error)]
+pub enum BenchError {
+    /// A carrier period ended and nothing follows.
+    #[error("at {0:.6} s the carrier period ended and no next one had been loaded")]
+    NothingToPlay(f64),
+    /// A sample was asked for that is not there.
+    #[error("the control sample of step {0} was asked for and is not there")]
+    NoSample(Steps),
+    /// Control fell behind.
+    #[error("at {0:.6} s the control interrupt has not reported within its period")]
+    ControlLate(f64),
+    /// The gates asked for what the bridge must not have.
+    #[error(transparent)]
+    Illegal(#[from] IllegalState),
+}
+
+/// Fixed properties of a bench.
+#[derive(Clone, Copy, Debug)]
+pub struct BenchSettings {
+    /// The firmware's clock.
+    pub clock: Clock,
+    /// Carrier period, in ticks.
+    pub carrier_ticks: u32,
+    /// Before the recording, in s.
+    pub lead_s: f64,
+    /// Length of the recording, in s.
+    pub duration_s: f64,
+    /// Step of the trace, in s.
+    pub trace_step_s: f64,
+    /// Link voltage wanted, in V.
+    pub link_ref_v: f64,
+    /// Where the zero vectors lie.
+    pub scheme: Scheme,
+    /// Imperfections of the sensors and of the source.
+    pub flaws: Flaws,
+    /// What goes wrong.
+    pub injection: Option<Injection>,
+    /// Whether edges are kept.
+    pub edges: bool,
+}
+
+/// What is summed up over a step of the trace, each value times its time, in steps.
+#[derive(Clone, Copy, Debug, Default)]
+struct Sums {
+    steps: f64,
+    torque_refs: [f64; 2],
+    loads: [f64; 2],
+    source_v: f64,
+    shorted: f64,
+}
+
+/// Plant, gates, sensors and recorder.
+pub struct Bench {
+    plant: Zs9Plant,
+    operator: Box<dyn Operator + Send>,
+    settings: BenchSettings,
+    sensors: Sensors,
+    spoiler: Spoiler,
+    nominal_source_v: f64,
+    step_s: f64,
+    now: Steps,
+    lead: Steps,
+    rows_wanted: usize,
+    /// Beginning of the carrier period that is played, and its length.
+    begun: Steps,
+    period: Steps,
+    next: Option<PlayedPeriod>,
+    /// Toggles of the running period that are still to come, the last one first.
+    toggles: Vec<(Steps, u8)>,
+    levels: [bool; 9],
+    off: bool,
+    off_at: Option<Steps>,
+    feedback: GateFeedback,
+    orders: Orders,
+    samples: VecDeque<(Steps, DualSample)>,
+    next_sample: Steps,
+    reports: VecDeque<(Steps, DualReport)>,
+    report: DualReport,
+    next_row: Steps,
+    sums: Sums,
+    rows: Vec<Row>,
+    edges: Vec<Edge>,
+}
+
+impl Bench {
+    /// A bench at its first instant, gates off.
+    pub fn new(plant: Zs9Plant, mut operator: Box<dyn Operator + Send>, settings: BenchSettings) -> Self {
+        let step_s = f64::from(settings.clock.ticks_per_s).recip() / f64::from(COMPARE_STEPS);
+        let steps = |seconds: f64| (seconds / step_s).round() as Steps;
+        let lead = steps(settings.lead_s);
+        let rows_wanted = (settings.duration_s / settings.trace_step_s).round() as usize;
+        let speeds = plant.motors().each_ref().map(|motor| motor.speed_rpm());
+        let control = Steps::from(settings.clock.control_ticks * COMPARE_STEPS);
+        Self {
+            orders: operator.orders(-settings.lead_s, speeds),
+            nominal_source_v: plant.source_v(),
+            plant,
+            operator,
+            sensors: Sensors::new(Converter::new(settings.flaws)),
+            spoiler: Spoiler::new(settings.injection),
+            step_s,
+            now: 0,
+            lead,
+            rows_wanted,
+            begun: 0,
+            period: Steps::from(settings.carrier_ticks * COMPARE_STEPS),
+            next: Some(PlayedPeriod::off(settings.carrier_ticks / 2 * COMPARE_STEPS)),
+            toggles: Vec::with_capacity(36),
+            levels: [false; 9],
+            off: false,
+            off_at: None,
+            feedback: GateFeedback::default(),
+            samples: VecDeque::new(),
+            next_sample: control,
+            reports: VecDeque::new(),
+            report: DualReport::default(),
+            next_row: lead,
+            sums: Sums::default(),
+            rows: Vec::with_capacity(rows_wanted),
+            edges: Vec::new(),
+            settings,
+        }
+    }
+
+    /// Whether the recording is complete.
+    pub fn is_done(&self) -> bool {
+        self.rows.len() >= self.rows_wanted
+    }
+
+    /// Share of the run that is done, 0 ..= 1.
+    pub fn progress(&self) -> f64 {
+        let end_s = self.settings.lead_s + self.settings.duration_s;
+        (self.now as f64 * self.step_s / end_s).min(1.0)
+    }
+
+    /// What was recorded: the rows of the trace, and the edges.
+    pub fn into_recording(self) -> (Vec<Row>, Vec<Edge>) {
+        (self.rows, self.edges)
+    }
+
+    /// The conversions that the control timer triggered at `instant`.
+    pub fn control_sample(&mut self, instant: Instant) -> Result<DualSample, BenchError> {
+        let at = self.widen(instant);
+        self.advance(at)?;
+        match self.samples.pop_front() {
+            Some((sampled, sample)) if sampled == at => Ok(sample),
+            _ => Err(BenchError::NoSample(at)),
+        }
+    }
+
+    /// The control interrupt's report; it shows in the trace when the command takes effect.
+    pub fn control_report(&mut self, instant: Instant, report: DualReport) {
+        let control = Steps::from(self.settings.clock.control_ticks * COMPARE_STEPS);
+        self.reports.push_back((self.widen(instant) + control, report));
+    }
+
+    /// What the PWM interrupt converts at the peak `instant`.
+    pub fn power_sample(&mut self, instant: Instant) -> Result<PowerSample, BenchError> {
+        let at = self.widen(instant);
+        self.advance(at)?;
+        let feedback = std::mem::take(&mut self.feedback);
+        let mut sample = self.sensors.power(&self.plant, feedback);
+        self.spoiler.power(self.seconds(at), &mut sample);
+        Ok(sample)
+    }
+
+    /// The period to play from the next valley on.
+    pub fn play(&mut self, next: PlayedPeriod) {
+        self.next = Some(next);
+    }
+
+    /// An interrupt at `instant` turns all gates off.
+    pub fn gates_off(&mut self, instant: Instant) {
+        let is_control = instant.0.is_multiple_of(self.settings.clock.control_ticks);
+        let delay = if is_control { CONTROL_OFF_TICKS } else { PWM_OFF_TICKS };
+        let at = self.widen(instant) + Steps::from(delay * COMPARE_STEPS);
+        self.off_at = Some(self.off_at.map_or(at, |earlier| earlier.min(at)));
+    }
+
+    /// The step of an instant near to now.
+    fn widen(&self, instant: Instant) -> Steps {
+        let ticks = self.now / Steps::from(COMPARE_STEPS);
+        let ahead = i64::from(instant.since(Instant(ticks as u32)));
+        ticks.saturating_add_signed(ahead) * Steps::from(COMPARE_STEPS)
+    }
+
+    fn seconds(&self, at: Steps) -> f64 {
+        (at as f64 - self.lead as f64) * self.step_s
+    }
+
+    /// Runs to `to`, doing on the way all that is due, and at `to` itself too.
+    fn advance(&mut self, to: Steps) -> Result<(), BenchError> {
+        if self.now == 0 && self.next.is_some() {
+            self.begin_period()?;
+        }
+        while self.now < to {
+            let mut due = to.min(self.begun + self.period).min(self.next_sample).min(self.next_row);
+            if let Some((toggle, _)) = self.toggles.last() {
+                due = due.min(*toggle);
+            }
+            if let Some(off_at) = self.off_at {
+                due = due.min(off_at.max(self.now));
+            }
+            self.integrate(due)?;
+            self.act()?;
+        }
+        Ok(())
+    }
+
+    fn integrate(&mut self, to: Steps) -> Result<(), BenchError> {
+        if to <= self.now {
+            return Ok(());
+        }
+        let steps = (to - self.now) as f64;
+        let [uh, vh, wh, um, vm, wm, ul, vl, wl] = self.levels;
+        let gates = [(uh, um, ul), (vh, vm, vl), (wh, wm, wl)].map(|(high, middle, low)| LegGates {
+            high,
+            middle,
+            low,
+        });
+        self.plant.advance(gates, steps * self.step_s)?;
+        for (gate, on) in self.levels.into_iter().enumerate() {
+            let latch = if on { &mut self.feedback.on } else { &mut self.feedback.off };
+            *latch |= 1 << gate;
+        }
+        let sums = &mut self.sums;
+        sums.steps += steps;
+        sums.source_v += steps * self.plant.source_v();
+        for k in 0..2 {
+            sums.torque_refs[k] += steps * f64::from(self.report.torque_nm[k]);
+            sums.loads[k] += steps * self.orders.loads_nm[k];
+        }
+        if gates.contains(&LegGates::SHOOT_THROUGH) {
+            sums.shorted += steps;
+        }
+        self.now = to;
+        Ok(())
+    }
+
+    fn act(&mut self) -> Result<(), BenchError> {
+        if self.off_at.is_some_and(|at| at <= self.now) {
+            self.off_at = None;
+            self.off = true;
+            self.toggles.clear();
+            (0..9).for_each(|gate| self.set(gate, false));
+        }
+        while let Some((at, gate)) = self.toggles.last().copied()
+            && at <= self.now
+        {
+            self.toggles.pop();
+            self.set(gate, !self.levels[usize::from(gate)]);
+        }
+        if self.now == self.begun + self.period {
+            self.begun = self.now;
+            self.begin_period()?;
+        }
+        if self.now == self.next_row {
+            self.record();
+        }
+        if self.now == self.next_sample {
+            self.take_sample()?;
+        }
+        Ok(())
+    }
+
+    /// The next period takes over at a valley.
+    fn begin_period(&mut self) -> Result<(), BenchError> {
+        let period = self.next.take().ok_or(BenchError::NothingToPlay(self.seconds(self.now)))?;
+        self.toggles.clear();
+        if self.off {
+            return Ok(());
+        }
+        let half = self.period / 2;
+        for (gate, pause) in (0_u8..).zip(&period.gates) {
+            let (from, to) = (Steps::from(pause.off_from), Steps::from(pause.off_to));
+            let paused = from < to;
+            self.set(gate, !(paused && from == 0));
+            let ends = [(from, paused && from > 0), (to, paused && to < half)];
+            for (at, _) in ends.into_iter().filter(|(_, counts)| *counts) {
+                self.toggles.push((self.begun + at, gate));
+                self.toggles.push((self.begun + self.period - at, gate));
+            }
+        }
+        self.toggles.sort_unstable_by_key(|(at, gate)| (std::cmp::Reverse(*at), *gate));
+        Ok(())
+    }
+
+    fn set(&mut self, gate: u8, on: bool) {
+        let level = &mut self.levels[usize::from(gate)];
+        if *level != on {
+            *level = on;
+            if self.settings.edges && self.now >= self.lead {
+                self.edges.push(Edge { t_s: self.seconds(self.now), gate, on });
+            }
+        }
+    }
+
+    fn take_sample(&mut self) -> Result<(), BenchError> {
+        if self.samples.len() > 1 {
+            return Err(BenchError::ControlLate(self.seconds(self.now)));
+        }
+        self.next_sample = self.now + Steps::from(self.settings.clock.control_ticks * COMPARE_STEPS);
+        let t_s = self.seconds(self.now);
+        let speeds = self.plant.motors().each_ref().map(|motor| motor.speed_rpm());
+        self.orders = self.operator.orders(t_s, speeds);
+        for (motor, load_nm) in self.plant.motors_mut().iter_mut().zip(self.orders.loads_nm) {
+            motor.set_load_nm(load_nm);
+        }
+        let supply_v = self.nominal_source_v + self.sensors.ripple_v(t_s);
+        let source_v = self.spoiler.source_v(t_s, supply_v);
+        self.plant.set_source_v(source_v);
+        let network = self.plant.network();
+        let mut sample = DualSample {
+            currents_a: self.sensors.currents(&self.plant),
+            angles: self.plant.motors().each_ref().map(|motor| Some(self.sensors.angle(motor))),
+            capacitor_v: network.capacitor_v() as f32,
+            inductor_a: network.inductor_a() as f32,
+            source_v: source_v as f32,
+            demands: self.orders.demands,
+            link_ref_v: self.settings.link_ref_v as f32,
+            scheme: self.settings.scheme,
+            enable: self.orders.enable,
+        };
+        self.spoiler.control(t_s, &mut sample);
+        self.samples.push_back((self.now, sample));
+        self.show_reports();
+        Ok(())
+    }
+
+    /// Reports whose commands have taken effect.
+    fn show_reports(&mut self) {
+        while let Some((effective, report)) = self.reports.front()
+            && *effective <= self.now
+        {
+            self.report = *report;
+            self.reports.pop_front();
+        }
+    }
+
+    /// Ends the row that ends now, if one has begun.
+    fn record(&mut self) {
+        let sums = std::mem::take(&mut self.sums);
+        let means = self.plant.take_means();
+        if self.now > self.lead
+            && !self.is_done()
+            && let Some(means) = means
+        {
+            let motors = [0, 1].map(|k| {
+                let motor = &means.motors[k];
+                MotorRow {
+                    speed_rpm: motor.speed_rpm,
+                    torque_ref_nm: sums.torque_refs[k] / sums.steps,
+                    torque_nm: motor.torque_nm,
+                    id_a: motor.id_a,
+                    iq_a: motor.iq_a,
+                    phases_a: motor.phases_a,
+                    load_nm: sums.loads[k] / sums.steps,
+                    voltage_v: self.report.voltage_v[k].into(),
+                    weakening: self.report.weakening[k],
+                }
+            });
+            self.rows.push(Row {
+                t_s: self.rows.len() as f64 * self.settings.trace_step_s,
+                motors,
+                link_v: means.link_v,
+                capacitor_v: means.capacitor_v,
+                inductor_a: means.inductor_a,
+                source_v: sums.source_v / sums.steps,
+                duty: sums.shorted / sums.steps,
+                scheme: self.report.scheme,
+                trip: self.report.trip,
+                source_j: self.plant.energies().source_j,
+                kinetic_speed_rpm: self.plant.motors().each_ref().map(|motor| motor.speed_rpm()),
+                explained_j: self.plant.energies().source_j - self.plant.residual_j(0.0),
+            });
+        }
+        let end_s = (self.rows.len() + 1) as f64 * self.settings.trace_step_s;
+        self.next_row = self.lead + ((end_s / self.step_s).round() as Steps).max(self.now + 1 - self.lead);
+        self.show_reports();
+    }
+}

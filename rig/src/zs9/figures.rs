@@ -1,0 +1,140 @@
+//! Figures and plots from a recording of the ZS9.
+
+use super::trace::{Recording, Row};
+use crate::analysis::Figures;
+use crate::options::RunOptions;
+use crate::report::Page;
+use core::f64::consts::TAU;
+
+/// A curve: its name and what it shows.
+pub type Curve<'a> = (&'a str, fn(&Row) -> f64);
+
+/// What every scenario reports.
+pub fn common(recording: &Recording, _options: &RunOptions) -> Figures {
+    let mut figures = Figures::default();
+    let rows = &recording.rows;
+    figures.set("simulated_s", rows.last().map_or(0.0, |row| row.t_s + step_s(recording)));
+    figures.set("fault", recording.trip().map_or("", |trip| trip.fault.name()));
+    if let Some(trip) = recording.trip() {
+        figures.set("fault_value", trip.value);
+        figures.set("fault_limit", trip.limit);
+    }
+    let peak = |row: &Row| {
+        let phases = row.motors.iter().flat_map(|motor| motor.phases_a);
+        phases.fold(0.0, |most: f64, current| most.max(current.abs()))
+    };
+    figures.set("peak_current_a", largest(rows, peak));
+    figures
+}
+
+/// The link's range in some rows.
+pub fn link(figures: &mut Figures, rows: &[Row], options: &RunOptions) {
+    let wanted_v = options.zs9.uin;
+    let high = largest(rows, |row| row.link_v - wanted_v);
+    let low = -largest(rows, |row| wanted_v - row.link_v);
+    figures.set("link_above_v", high);
+    figures.set("link_below_v", low);
+    figures.set("link_deviation_percent", high.max(-low) / wanted_v * 100.0);
+    figures.set("mean_duty", mean(rows, |row| row.duty));
+}
+
+/// Step of the trace, in s.
+pub fn step_s(recording: &Recording) -> f64 {
+    match recording.rows.as_slice() {
+        [first, second, ..] => second.t_s - first.t_s,
+        _ => 0.0,
+    }
+}
+
+/// The rows from `from_s` (included) to `to_s` (excluded).
+pub fn window(recording: &Recording, from_s: f64, to_s: f64) -> &[Row] {
+    let rows = &recording.rows;
+    let first = rows.partition_point(|row| row.t_s < from_s - 1e-9);
+    let last = rows.partition_point(|row| row.t_s < to_s - 1e-9);
+    &rows[first..last.max(first)]
+}
+
+/// Mean over rows.
+pub fn mean(rows: &[Row], value: impl Fn(&Row) -> f64) -> f64 {
+    rows.iter().map(value).sum::<f64>() / rows.len().max(1) as f64
+}
+
+/// Largest value over rows.
+pub fn largest(rows: &[Row], value: impl Fn(&Row) -> f64) -> f64 {
+    rows.iter().map(value).fold(f64::NEG_INFINITY, f64::max)
+}
+
+/// Total harmonic distortion, in percent of the fundamental, over a whole number of its periods.
+pub fn thd_percent(recording: &Recording, cycles: f64, value: impl Fn(&Row) -> f64) -> f64 {
+    let rows = &recording.rows;
+    let count = rows.len() as f64;
+    let (mut cos, mut sin, mut squares) = (0.0, 0.0, 0.0);
+    let constant = mean(rows, &value);
+    for (k, row) in rows.iter().enumerate() {
+        let (s, c) = (TAU * cycles * (k as f64 + 0.5) / count).sin_cos();
+        let x = value(row) - constant;
+        cos += x * c;
+        sin += x * s;
+        squares += x * x;
+    }
+    let fundamental = 2.0 / (count * count) * (cos * cos + sin * sin);
+    (squares / count / fundamental - 1.0).max(0.0).sqrt() * 100.0
+}
+
+/// Curves over time.
+pub fn plot(
+    page: &mut Page,
+    figure: &str,
+    title: &str,
+    unit: &str,
+    recording: &Recording,
+    (from_s, to_s): (f64, f64),
+    curves: &[Curve],
+) {
+    let rows = window(recording, from_s, to_s);
+    let points = |value: fn(&Row) -> f64| rows.iter().map(|row| (row.t_s, value(row))).collect();
+    let series: Vec<_> = curves.iter().map(|(name, value)| (*name, points(*value))).collect();
+    page.curves(&heading(figure, title), "time in s", unit, &series);
+}
+
+/// Both motors' phase currents.
+pub fn phases(page: &mut Page, figure: &str, recording: &Recording, window: (f64, f64)) {
+    for (title, curves) in [
+        ("phase currents of motor 1", phase_curves::<0>()),
+        ("phase currents of motor 2", phase_curves::<1>()),
+    ] {
+        plot(page, figure, title, "A", recording, window, &curves);
+    }
+}
+
+fn phase_curves<const K: usize>() -> [Curve<'static>; 3] {
+    [
+        ("a", |row| row.motors[K].phases_a[0]),
+        ("b", |row| row.motors[K].phases_a[1]),
+        ("c", |row| row.motors[K].phases_a[2]),
+    ]
+}
+
+/// A curve of motor 1 over its speed.
+pub fn over_speed(
+    page: &mut Page,
+    figure: &str,
+    title: &str,
+    unit: &str,
+    recording: &Recording,
+    value: fn(&Row) -> f64,
+) {
+    let every = recording.rows.len().div_ceil(1500).max(1);
+    let rows = recording.rows.iter().step_by(every);
+    let points: Vec<_> = rows.map(|row| (row.motors[0].speed_rpm, value(row))).collect();
+    page.curves(&heading(figure, title), "speed in r/min", unit, &[("motor 1", points)]);
+}
+
+fn heading(figure: &str, title: &str) -> String {
+    let kind = match figure {
+        _ if !figure.starts_with(|c: char| c.is_ascii_digit()) => "",
+        _ if figure.contains([' ', '–']) => "figures ",
+        _ => "figure ",
+    };
+    format!("The paper's {kind}{figure} · {title}")
+}

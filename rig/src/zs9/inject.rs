@@ -1,0 +1,139 @@
+//! Things that go wrong on purpose.
+
+use std::str::FromStr;
+use tractive::board::{DualSample, PowerSample};
+
+/// What goes wrong.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Kind {
+    /// The source is shorted.
+    SourceShort,
+    /// The source falls to 250 V.
+    SourceLow,
+    /// The source jumps to 900 V and charges the capacitors.
+    SourceHigh,
+    /// The upper motor's sensor reports that it has lost the rotor.
+    SensorLost1,
+    /// The lower motor's.
+    SensorLost2,
+    /// The upper motor's angle stands still.
+    SensorFrozen1,
+    /// The lower motor's.
+    SensorFrozen2,
+    /// The lower motor's angle jumps by 90 degrees.
+    SensorJump2,
+    /// A phase current reads three times its size.
+    Overcurrent,
+    /// A phase current reads as not a number.
+    NotFinite,
+    /// The leg v, middle gate: is never seen off.
+    LegStuckOn,
+    /// The leg w, upper gate: is never seen on.
+    LegStuckOff,
+}
+
+const NAMES: [(&str, Kind); 12] = [
+    ("source-short", Kind::SourceShort),
+    ("source-low", Kind::SourceLow),
+    ("source-high", Kind::SourceHigh),
+    ("sensor-lost-1", Kind::SensorLost1),
+    ("sensor-lost-2", Kind::SensorLost2),
+    ("sensor-frozen-1", Kind::SensorFrozen1),
+    ("sensor-frozen-2", Kind::SensorFrozen2),
+    ("sensor-jump-2", Kind::SensorJump2),
+    ("overcurrent", Kind::Overcurrent),
+    ("not-finite", Kind::NotFinite),
+    ("leg-stuck-on", Kind::LegStuckOn),
+    ("leg-stuck-off", Kind::LegStuckOff),
+];
+
+/// What goes wrong, and when: written `NAME@S`.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct Injection {
+    /// What.
+    pub kind: Kind,
+    /// From this instant of the recording on, in s.
+    pub at_s: f64,
+}
+
+impl FromStr for Injection {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let parse = || {
+            let (name, at) = text.split_once('@')?;
+            let (_, kind) = NAMES.into_iter().find(|(known, _)| *known == name)?;
+            let at_s = at.parse::<f64>().ok().filter(|at_s| at_s.is_finite())?;
+            Some(Self { kind, at_s })
+        };
+        let names = NAMES.map(|(name, _)| name).join(", ");
+        parse().ok_or_else(|| format!("must be NAME@SECONDS, NAME one of {names}"))
+    }
+}
+
+/// Holds what a fault does to the samples.
+#[derive(Clone, Debug, Default)]
+pub struct Spoiler {
+    injection: Option<Injection>,
+    before: Option<DualSample>,
+}
+
+impl Spoiler {
+    /// Spoils from the injection's instant on.
+    pub fn new(injection: Option<Injection>) -> Self {
+        Self { injection, before: None }
+    }
+
+    fn kind(&self, t_s: f64) -> Option<Kind> {
+        self.injection.filter(|injection| t_s >= injection.at_s - 1e-9).map(|injection| injection.kind)
+    }
+
+    /// The source's true voltage, in V.
+    pub fn source_v(&self, t_s: f64, source_v: f64) -> f64 {
+        match self.kind(t_s) {
+            Some(Kind::SourceShort) => 1.0,
+            Some(Kind::SourceLow) => 250.0,
+            Some(Kind::SourceHigh) => 900.0,
+            _ => source_v,
+        }
+    }
+
+    /// What control sees.
+    pub fn control(&mut self, t_s: f64, sample: &mut DualSample) {
+        let before = self.before.replace(*sample).unwrap_or(*sample);
+        let [first, second] = &mut sample.angles;
+        match self.kind(t_s) {
+            Some(Kind::SensorLost1) => *first = None,
+            Some(Kind::SensorLost2) => *second = None,
+            Some(Kind::SensorFrozen1) => {
+                *first = before.angles[0];
+                self.before = Some(*sample);
+            }
+            Some(Kind::SensorFrozen2) => {
+                *second = before.angles[1];
+                self.before = Some(*sample);
+            }
+            Some(Kind::SensorJump2) => {
+                if let Some(angle) = second {
+                    angle.0 = angle.0.wrapping_add(1 << 30);
+                }
+            }
+            Some(Kind::NotFinite) => sample.currents_a[1].b = f32::NAN,
+            _ => {}
+        }
+    }
+
+    /// What the PWM interrupt sees.
+    pub fn power(&self, t_s: f64, sample: &mut PowerSample) {
+        match self.kind(t_s) {
+            Some(Kind::Overcurrent) => {
+                let current = &mut sample.currents_a[0].a;
+                *current = 200.0_f32.copysign(*current);
+            }
+            Some(Kind::LegStuckOn) => sample.gates.off &= !(1 << 4),
+            Some(Kind::LegStuckOff) => sample.gates.on &= !(1 << 2),
+            _ => {}
+        }
+    }
+}

@@ -1,0 +1,29 @@
+//! What the operator and the loads do.
+
+use tractive::board::MotorDemand;
+
+/// Orders for one control period. Motors in the order upper, lower.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Orders {
+    /// What the motors are to do.
+    pub demands: [MotorDemand; 2],
+    /// Load torques against forward rotation, in N·m.
+    pub loads_nm: [f64; 2],
+    /// Whether the gates may be on.
+    pub enable: bool,
+}
+
+/// The motors' true speeds, in r/min.
+pub type SeenMotors = [f64; 2];
+
+/// Says every control period what is wanted.
+pub trait Operator {
+    /// Orders at `t_s` seconds after the recording begins (negative before).
+    fn orders(&mut self, t_s: f64, speeds_rpm: SeenMotors) -> Orders;
+}
+
+impl<F: FnMut(f64, SeenMotors) -> Orders> Operator for F {
+    fn orders(&mut self, t_s: f64, speeds_rpm: SeenMotors) -> Orders {
+        self(t_s, speeds_rpm)
+    }
+}

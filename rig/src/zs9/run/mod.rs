@@ -1,0 +1,7 @@
+//! Runs the ZS9's drive against its bench.
+
+mod host;
+mod qemu;
+
+pub use host::run_on_host;
+pub use qemu::run_in_qemu;

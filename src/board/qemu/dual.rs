@@ -1,0 +1,69 @@
+//! The emulated board for the ZS9. The nine gates' compare registers are words on the link: the emulator has none.
+//!
+//! The PWM timer comes at the carrier's peaks, the control timer at its valleys.
+
+use super::{
+    CLOCK, CONTROL_TIMER, Control, PWM_TIMER, Pwm, enable_interrupts, exchange, read_register, start_timers,
+    stop, write_register,
+};
+use crate::board::{DualControlPort, DualPwmPort, DualSample, PlayedPeriod, PowerSample};
+use crate::drive::dual::{DualReport, Settings};
+use crate::link::DualSetup;
+use crate::time::Instant;
+
+/// Opens the link and fetches the set-up. Call once, before [`start_dual`].
+pub fn connect_dual() -> DualSetup {
+    exchange::open_dual()
+}
+
+/// Starts both timers: the first PWM interrupt comes at the first peak, the first control interrupt after one control period.
+pub fn start_dual(settings: &Settings) {
+    enable_interrupts();
+    write_register(PWM_TIMER, settings.first_peak_ticks().saturating_sub(1));
+    write_register(CONTROL_TIMER + 8, CLOCK.control_ticks - 1);
+    start_timers();
+    // The shadow register takes over at the first peak.
+    write_register(PWM_TIMER + 0x18, settings.carrier_ticks.saturating_sub(1));
+}
+
+impl DualControlPort for Control {
+    fn sample(&mut self, now: Instant) -> DualSample {
+        exchange::sample_dual(now)
+    }
+
+    fn gates_off(&mut self, now: Instant) {
+        exchange::gates_off(now);
+    }
+
+    fn overrun_ticks(&mut self, _now: Instant, deadline_ticks: u32) -> u32 {
+        let age = CLOCK.control_ticks.saturating_sub(read_register(CONTROL_TIMER + 4));
+        // The interrupt was acknowledged on entry: if it is pending again, the period is over.
+        let pending = read_register(CONTROL_TIMER + 0xC) & 1 != 0;
+        let age = if pending { age + CLOCK.control_ticks } else { age };
+        age.saturating_sub(deadline_ticks)
+    }
+
+    fn report(&mut self, now: Instant, report: &DualReport) {
+        exchange::report_dual(now, report);
+    }
+}
+
+impl DualPwmPort for Pwm {
+    fn sample(&mut self, now: Instant) -> PowerSample {
+        exchange::power_sample(now)
+    }
+
+    fn play(&mut self, now: Instant, next: &PlayedPeriod) {
+        exchange::play_dual(now, next);
+    }
+
+    fn gates_off(&mut self, now: Instant) {
+        exchange::gates_off(now);
+    }
+}
+
+/// Gates off, whatever state the program is in, then the end: for panics and HardFaults.
+pub fn die_dual() -> ! {
+    exchange::dead_dual();
+    stop(false)
+}

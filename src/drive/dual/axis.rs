@@ -1,0 +1,202 @@
+//! One of the two motors in the control task: the same control law as the PMaSynRM's, with its own tables.
+
+use super::{MotorCommand, MotorShare, Settings};
+use crate::board::MotorDemand;
+use crate::control::{
+    Boundary, Committed, Controller, Demand, Follows, Input, Law, Measurements, Region, SpeedInput, SpeedLoop,
+};
+use crate::drive::traction::UNITS_PER_RADIAN;
+use crate::frames::{AlphaBeta, Angle};
+use crate::machine::Tables;
+use crate::protection::{self, Fault, FrozenWatch, Violation};
+
+/// Natural frequency of the speed tracker, in rad/s: the speed loop's phase needs it quick.
+const TRACKING_RAD_S: f32 = 4000.0;
+/// How far an angle may be off what the speed tells, in electrical rad: half a turn a period would still look like rest.
+pub const SURPRISE_RAD: f32 = 0.5;
+/// What the loop may ask for, as a share of the largest voltage that is to be had at every angle. The modulator gives what its
+/// hexagon has at the angle, up to 1.155, and tells.
+const LOOP_SHARE: f32 = 1.15;
+/// Share of the largest voltage at every angle that the operating point may use; the rest regulates.
+const STEADY_SHARE: f32 = 0.98;
+
+/// Control of one motor.
+pub struct Axis {
+    controller: Controller,
+    speed_loop: SpeedLoop,
+    watch: FrozenWatch,
+    /// Electrical speed while the angle last moved, in rad/s: the tracker soon believes a sensor that stands still.
+    moving: f32,
+    /// Volt-seconds of the period that began at the last sample, per volt of link, in s; and the link's voltage there.
+    acting: Option<(AlphaBeta, f32)>,
+}
+
+/// What a motor's step works on.
+pub struct AxisInput<'a> {
+    pub measured: &'a Measurements,
+    pub demand: &'a MotorDemand,
+    /// What the modulator has committed for the carrier period that begins at the sample.
+    pub applied: Option<MotorShare>,
+    /// Measured link voltage outside shoot-through, in V.
+    pub link_v: f32,
+}
+
+/// A motor's step.
+pub struct AxisOutput {
+    pub command: MotorCommand,
+    pub torque_nm: f32,
+    pub weakening: bool,
+    /// Electrical power drawn now, in W.
+    pub power_w: f32,
+}
+
+impl Axis {
+    pub const fn new() -> Self {
+        Self {
+            controller: Controller::with_tracking(TRACKING_RAD_S),
+            speed_loop: SpeedLoop::new(),
+            watch: FrozenWatch::new(),
+            moving: 0.0,
+            acting: None,
+        }
+    }
+
+    /// Follows the angle. Says by how much, in rad, it is off where that is too much.
+    pub fn track(&mut self, angle: Angle, settings: &Settings) -> Option<f32> {
+        let surprise = self.controller.surprise_rad(angle, &settings.clock);
+        let lost = self.controller.speed_is_known() && surprise.abs() > SURPRISE_RAD;
+        if !lost {
+            self.controller.track(angle, &settings.clock);
+        }
+        lost.then_some(surprise)
+    }
+
+    /// Electrical speed, in rad/s.
+    pub fn omega(&self) -> f32 {
+        self.controller.omega()
+    }
+
+    pub fn speed_is_known(&self) -> bool {
+        self.controller.speed_is_known()
+    }
+
+    /// While the gates are off.
+    pub fn idle(&mut self) {
+        self.controller.idle();
+        self.speed_loop = SpeedLoop::new();
+        self.watch = FrozenWatch::new();
+        self.acting = None;
+    }
+
+    /// Measurements that no longer move; `lost` is the fault when it is the angle.
+    pub fn check_frozen(
+        &mut self,
+        measured: &Measurements,
+        lost: Fault,
+        settings: &Settings,
+        tables: &Tables,
+    ) -> Option<Violation> {
+        let stands = self.watch.last_angle() == Some(measured.angle);
+        if !stands {
+            self.moving = self.omega();
+        }
+        let period_s = settings.clock.control_s();
+        let violation = self.watch.check(measured, self.moving, period_s, &tables.ratings)?;
+        let (turned_rad, limit_rad) = self.watch.turned_rad();
+        if stands { Some((lost, turned_rad, limit_rad)) } else { Some(violation) }
+    }
+
+    /// One control period.
+    pub fn step(&mut self, input: &AxisInput, settings: &Settings, tables: &Tables) -> AxisOutput {
+        let omega = self.controller.omega();
+        let period_s = settings.clock.control_s();
+        let share = input.applied.map(|share| self.volt_seconds_share(&share, settings));
+        let before = core::mem::replace(&mut self.acting, share.map(|share| (share, input.link_v)));
+        let boundary = Boundary {
+            currents_a: input.measured.currents_a,
+            age_s: 0.0,
+            // The link moves along a straight line in between.
+            volt_seconds: before.map(|(share, link_v)| share * (0.5 * (link_v + input.link_v))),
+            length_s: period_s,
+        };
+        let committed = Committed {
+            horizon_s: period_s,
+            volt_seconds: share.map(|share| share * input.link_v),
+            // A period is its own mirror image, so at its ends the ripple is nothing.
+            ripple_wb: AlphaBeta::default(),
+            ripple_after_wb: AlphaBeta::default(),
+            interval_s: period_s,
+            follows: Follows::Mean,
+            depth_limit: LOOP_SHARE,
+            steady_share: STEADY_SHARE / LOOP_SHARE,
+            filled: false,
+            // Linear motors: torque does not depend on the ripple.
+            ripple_share: 1.0,
+            settled: true,
+        };
+        let demand = self.demand(input.demand, omega, settings, tables);
+        let law = Law { gains: &settings.gains, clock: &settings.clock, tables };
+        let control = Input {
+            measured: input.measured,
+            demand: &demand,
+            committed: &committed,
+            boundary: Some(&boundary),
+        };
+        let output = self.controller.step(&control, &law);
+        AxisOutput {
+            command: MotorCommand {
+                voltage_v: output.voltage.voltage_v,
+                angle: output.voltage.angle,
+                rate: omega * (UNITS_PER_RADIAN * settings.clock.tick_s),
+            },
+            torque_nm: output.torque_nm,
+            weakening: output.point.region != Region::Mtpa,
+            power_w: power_w(input),
+        }
+    }
+
+    /// The torque that is asked for, by the operator or by the speed loop.
+    fn demand(&mut self, demand: &MotorDemand, omega: f32, settings: &Settings, tables: &Tables) -> Demand {
+        match demand {
+            MotorDemand::Torque(demand) => *demand,
+            MotorDemand::Speed(wanted_rad_s) => {
+                let input = SpeedInput {
+                    wanted_rad_s: *wanted_rad_s,
+                    measured_rad_s: omega / tables.ratings.pole_pairs,
+                    largest_nm: tables.ratings.max_torque_nm,
+                };
+                let torque_nm = self.speed_loop.step(&input, &settings.speed);
+                Demand { torque_nm, slew_limited: false }
+            }
+        }
+    }
+
+    /// Volt-seconds of a control period per volt of link, in s: its carrier periods, the first of which is known, each turned
+    /// on by one carrier period.
+    fn volt_seconds_share(&self, share: &MotorShare, settings: &Settings) -> AlphaBeta {
+        let carrier_s = settings.clock.seconds(settings.carrier_ticks as i32);
+        let turn = Angle::from_radians(self.controller.omega() * carrier_s);
+        let (mut sum, mut angle) = (AlphaBeta::default(), share.angle);
+        for _ in 0..settings.carriers_per_control() {
+            let direction = angle.sin_cos();
+            sum = sum + AlphaBeta { alpha: direction.cos, beta: direction.sin };
+            angle = angle + turn;
+        }
+        sum * (0.5 * share.depth * carrier_s)
+    }
+}
+
+/// The power of the voltage that begins to act now, as the modulator really gives it, at the measured current, in W.
+fn power_w(input: &AxisInput) -> f32 {
+    let Some(MotorShare { depth, angle }) = input.applied else {
+        return 0.0;
+    };
+    let current = input.measured.currents_a.clarke().park(angle.sin_cos());
+    0.75 * depth * input.link_v * current.d
+}
+
+/// Phase currents and speed of one motor.
+pub fn check(measured: &Measurements, omega: f32, tables: &Tables) -> Option<Violation> {
+    protection::check_currents(&measured.currents_a, &tables.ratings)
+        .or_else(|| protection::check_speed(omega, &tables.ratings))
+}

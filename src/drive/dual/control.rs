@@ -1,0 +1,234 @@
+//! The control interrupt's task.
+
+use super::axis::{self, Axis, AxisInput, AxisOutput};
+use super::{DualCommand, DualReport, MotorCommand, MotorShare, Settings, Shared};
+use crate::board::{DualControlPort, DualSample, MotorDemand};
+use crate::control::{Measurements, ZSource, ZSourceError, ZSourceInput};
+use crate::drive::Gates;
+use crate::frames::{Angle, SQRT_3};
+use crate::machine::Tables;
+use crate::protection::{self, Fault, SafeState, Trip, Violation};
+use crate::time::Instant;
+use core::f32::consts::{FRAC_PI_4, TAU};
+
+/// Corner of the filter on the voltage limit, in Hz: fed by the link as it is, the limit would make it oscillate.
+const LIMIT_FILTER_HZ: f32 = 10.0;
+/// A motor has at most U_c/(2√3). The link of a two-level inverter whose six-step fundamental is as large, as a share of U_c.
+const TWO_LEVEL_SHARE: f32 = FRAC_PI_4 / SQRT_3;
+/// What a lost sensor is called, by motor.
+const SENSOR_LOST: [Fault; 2] = [Fault::SensorLost1, Fault::SensorLost2];
+
+/// The ZS9's control task.
+pub struct ControlTask {
+    tables: &'static Tables,
+    settings: Settings,
+    axes: [Axis; 2],
+    link: ZSource,
+    /// Capacitor voltage behind the filter, in V; `None` before the first sample.
+    filtered_v: Option<f32>,
+    /// Nominal instant of the next call.
+    now: Instant,
+    trip: Option<Trip>,
+}
+
+impl ControlTask {
+    /// A task whose first call is the control timer's first interrupt, one control period after the start.
+    pub const fn new(tables: &'static Tables, settings: Settings) -> Self {
+        Self {
+            tables,
+            settings,
+            axes: [Axis::new(), Axis::new()],
+            link: ZSource::new(),
+            filtered_v: None,
+            now: Instant(settings.clock.control_ticks),
+            trip: None,
+        }
+    }
+
+    /// The control timer's interrupt, at a valley of the carrier. Deadline: [`Settings::deadline_ticks`] after its nominal instant,
+    /// when the command must be there; a missed one is a fault.
+    pub fn run(&mut self, port: &mut impl DualControlPort, shared: &Shared) {
+        let now = self.now;
+        let deadline_ticks = self.settings.deadline_ticks();
+        self.now = now.after(self.settings.clock.control_ticks);
+        // First of all: the next peak writes it again.
+        let applied = shared.applied.read().filter(|applied| now.reached(applied.at));
+        let sample = port.sample(now);
+        if self.trip.is_none() {
+            self.trip = applied.and_then(|applied| applied.trip);
+        }
+        let angles = self.track(&sample, port);
+        let measured = self.measured(&sample, angles);
+        self.check_measurements(&sample, &measured, port);
+        let known = self.axes.iter().all(Axis::speed_is_known);
+        let mut report = DualReport { scheme: sample.scheme, ..DualReport::default() };
+        let mut command = DualCommand {
+            motors: [MotorCommand::default(); 2],
+            at: now,
+            valid_from: now.after(deadline_ticks),
+            duty: 0.0,
+            scheme: sample.scheme,
+            gates: Gates::Off,
+        };
+        if self.trip.is_none() && sample.enable && known {
+            self.check_frozen(&measured, port);
+            let next = applied.and_then(|applied| applied.next);
+            self.pulse(&sample, &measured, next, &mut command, &mut report, port);
+        } else {
+            self.axes.iter_mut().for_each(Axis::idle);
+            self.link = ZSource::new();
+        }
+        let late = port.overrun_ticks(now, deadline_ticks);
+        let late_s = self.settings.clock.seconds(late as i32);
+        self.check((late > 0).then_some((Fault::ControlDeadline, late_s, 0.0)), port);
+        if self.trip.is_some() {
+            command.gates = Gates::Off;
+        }
+        shared.command.publish(command);
+        report.trip = self.trip;
+        port.report(now, &report);
+    }
+
+    /// Nominal instant of the next call.
+    pub fn next_call(&self) -> Instant {
+        self.now
+    }
+
+    /// The latched fault.
+    pub fn trip(&self) -> Option<Trip> {
+        self.trip
+    }
+
+    /// Follows both rotors.
+    fn track(&mut self, sample: &DualSample, port: &mut impl DualControlPort) -> [Angle; 2] {
+        let mut angles = [Angle::ZERO; 2];
+        let mut violation = None;
+        let motors = self.axes.iter_mut().zip(&mut angles).zip(sample.angles).zip(SENSOR_LOST);
+        for (((axis, angle), measured), fault) in motors {
+            let off_rad = match measured {
+                Some(measured) => {
+                    *angle = measured;
+                    axis.track(measured, &self.settings)
+                }
+                None => {
+                    violation = violation.or(Some((fault, 1.0, 0.0)));
+                    None
+                }
+            };
+            violation = violation.or(off_rad.map(|rad| (fault, rad, axis::SURPRISE_RAD)));
+        }
+        self.check(violation, port);
+        angles
+    }
+
+    /// What the control law takes for measurements: the link as a two-level inverter's that can give as much.
+    fn measured(&mut self, sample: &DualSample, [first, second]: [Angle; 2]) -> [Measurements; 2] {
+        let before_v = self.filtered_v.unwrap_or(sample.capacitor_v);
+        let share = TAU * LIMIT_FILTER_HZ * self.settings.clock.control_s();
+        let filtered_v = before_v + share * (sample.capacitor_v - before_v);
+        // What is not finite trips, and must not stay.
+        self.filtered_v = filtered_v.is_finite().then_some(filtered_v);
+        let udc_v = TWO_LEVEL_SHARE * filtered_v;
+        let [upper, lower] = sample.currents_a;
+        [
+            Measurements { currents_a: upper, udc_v, angle: first },
+            Measurements { currents_a: lower, udc_v, angle: second },
+        ]
+    }
+
+    fn check_measurements(
+        &mut self,
+        sample: &DualSample,
+        measured: &[Measurements; 2],
+        port: &mut impl DualControlPort,
+    ) {
+        let limits = &self.settings.limits;
+        let mut violation = limits
+            .check_link(sample.source_v, sample.capacitor_v)
+            .or_else(|| limits.check_link_reference(sample.link_ref_v, sample.source_v));
+        for ((axis, measured), demand) in self.axes.iter().zip(measured).zip(&sample.demands) {
+            violation = violation
+                .or_else(|| axis::check(measured, axis.omega(), self.tables))
+                .or_else(|| check_demand(demand));
+        }
+        self.check(violation, port);
+    }
+
+    fn check_frozen(&mut self, measured: &[Measurements; 2], port: &mut impl DualControlPort) {
+        let mut violation = None;
+        for ((axis, measured), lost) in self.axes.iter_mut().zip(measured).zip(SENSOR_LOST) {
+            let found = axis.check_frozen(measured, lost, &self.settings, self.tables);
+            violation = violation.or(found);
+        }
+        self.check(violation, port);
+    }
+
+    /// Control laws of motors and link, while pulses are made.
+    fn pulse(
+        &mut self,
+        sample: &DualSample,
+        measured: &[Measurements; 2],
+        applied: Option<[MotorShare; 2]>,
+        command: &mut DualCommand,
+        report: &mut DualReport,
+        port: &mut impl DualControlPort,
+    ) {
+        let link_v = 2.0 * sample.capacitor_v - sample.source_v;
+        let [first, second] = &mut self.axes;
+        let ([m1, m2], [d1, d2]) = (measured, &sample.demands);
+        let (a1, a2) = applied.map_or((None, None), |[a1, a2]| (Some(a1), Some(a2)));
+        let (settings, tables) = (&self.settings, self.tables);
+        let step = |axis: &mut Axis, measured, demand, applied| {
+            axis.step(&AxisInput { measured, demand, applied, link_v }, settings, tables)
+        };
+        let motors = [step(first, m1, d1, a1), step(second, m2, d2, a2)];
+        let [o1, o2] = &motors;
+        let link = ZSourceInput {
+            capacitor_v: sample.capacitor_v,
+            inductor_a: sample.inductor_a,
+            source_v: sample.source_v,
+            power_w: o1.power_w + o2.power_w,
+            link_ref_v: sample.link_ref_v,
+            duty_room: 1.0,
+        };
+        match self.link.step(&link, &self.settings.link, &self.settings.link_gains) {
+            Ok(output) => {
+                command.duty = output.duty;
+                report.inductor_ref_a = output.inductor_ref_a;
+            }
+            Err(ZSourceError::NotFinite) => {
+                self.check(Some((Fault::NotFinite, link.power_w, f32::MAX)), port)
+            }
+            Err(ZSourceError::NoSource(volts)) => {
+                self.check(Some((Fault::SourceUndervoltage, volts, 0.0)), port);
+            }
+        }
+        let odd = motors.iter().map(|motor| motor.command.voltage_v + motor.command.rate);
+        let odd = odd.fold(None, |found, sum| found.or((!sum.is_finite()).then_some(sum)));
+        self.check(odd.map(|sum| (Fault::NotFinite, sum, f32::MAX)), port);
+        command.motors = motors.each_ref().map(|motor: &AxisOutput| motor.command);
+        command.gates = Gates::Pulse;
+        report.torque_nm = [o1.torque_nm, o2.torque_nm];
+        report.voltage_v = [o1.command.voltage_v, o2.command.voltage_v];
+        report.weakening = [o1.weakening, o2.weakening];
+        report.duty = command.duty;
+    }
+
+    fn check(&mut self, violation: Option<Violation>, port: &mut impl DualControlPort) {
+        let (Some((fault, value, limit)), None) = (violation, self.trip) else {
+            return;
+        };
+        let at = self.now.before(self.settings.clock.control_ticks);
+        port.gates_off(at);
+        self.trip = Some(Trip { fault, value, limit, at, safe: SafeState::GatesOff });
+    }
+}
+
+/// Any finite number is a demand, which the envelope limits.
+fn check_demand(demand: &MotorDemand) -> Option<Violation> {
+    match demand {
+        MotorDemand::Torque(demand) => protection::check_demand(demand),
+        MotorDemand::Speed(speed) if speed.is_finite() => None,
+        MotorDemand::Speed(speed) => Some((Fault::NotFinite, *speed, f32::MAX)),
+    }
+}

@@ -1,0 +1,168 @@
+//! What travels between the ZS9's interrupts, and what control reports.
+
+use crate::cell::Words;
+use crate::drive::{Gates, trip_from_words, trip_to_words};
+use crate::frames::Angle;
+use crate::nine_switch::Scheme;
+use crate::protection::Trip;
+use crate::time::Instant;
+
+/// One motor's voltage, from control to the modulator.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct MotorCommand {
+    /// Peak phase voltage, in V.
+    pub voltage_v: f32,
+    /// Angle of the vector at the sample.
+    pub angle: Angle,
+    /// How fast it turns, in angle units (2⁻³² turn) per tick.
+    pub rate: f32,
+}
+
+/// From control to the modulator. Motors in the order upper, lower.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DualCommand {
+    /// Voltages.
+    pub motors: [MotorCommand; 2],
+    /// Instant of the sample.
+    pub at: Instant,
+    /// From when on the command may be used: a fixed time after its sample, whenever the task really finished.
+    pub valid_from: Instant,
+    /// Shoot-through duty.
+    pub duty: f32,
+    /// Where the zero vectors lie.
+    pub scheme: Scheme,
+    /// Whether to make pulses at all.
+    pub gates: Gates,
+}
+
+impl Words<10> for DualCommand {
+    fn to_words(self) -> [u32; 10] {
+        let [upper, lower] = self.motors;
+        [
+            upper.voltage_v.to_bits(),
+            upper.angle.0,
+            upper.rate.to_bits(),
+            lower.voltage_v.to_bits(),
+            lower.angle.0,
+            lower.rate.to_bits(),
+            self.at.0,
+            self.valid_from.0,
+            self.duty.to_bits(),
+            u32::from(self.gates == Gates::Pulse) | (self.scheme as u32) << 8,
+        ]
+    }
+
+    fn from_words(words: [u32; 10]) -> Self {
+        let [v1, a1, r1, v2, a2, r2, at, valid_from, duty, flags] = words;
+        let motor = |voltage, angle, rate| MotorCommand {
+            voltage_v: f32::from_bits(voltage),
+            angle: Angle(angle),
+            rate: f32::from_bits(rate),
+        };
+        Self {
+            motors: [motor(v1, a1, r1), motor(v2, a2, r2)],
+            at: Instant(at),
+            valid_from: Instant(valid_from),
+            duty: f32::from_bits(duty),
+            scheme: scheme_from_code(flags >> 8),
+            gates: if flags & 1 == 1 { Gates::Pulse } else { Gates::Off },
+        }
+    }
+}
+
+/// The scheme with this discriminant; the default one for an unknown number.
+pub fn scheme_from_code(code: u32) -> Scheme {
+    Scheme::ALL.get(code as usize).copied().unwrap_or_default()
+}
+
+/// The mean voltage that one motor has in a period, as a share of the link.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct MotorShare {
+    /// Modulation depth, 2 |V|/U_in.
+    pub depth: f32,
+    /// Angle of the vector.
+    pub angle: Angle,
+}
+
+/// From the modulator to control: what the period gives that begins at the next valley.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DualApplied {
+    /// Instant of the interrupt, a peak of the carrier.
+    pub at: Instant,
+    /// The motors' voltages; `None` while the gates are off.
+    pub next: Option<[MotorShare; 2]>,
+    /// A fault that the PWM interrupt found.
+    pub trip: Option<Trip>,
+}
+
+impl Words<10> for DualApplied {
+    fn to_words(self) -> [u32; 10] {
+        let [upper, lower] = self.next.unwrap_or_default();
+        let [code, value, limit, at] = trip_to_words(self.trip);
+        [
+            self.at.0,
+            u32::from(self.next.is_some()),
+            upper.depth.to_bits(),
+            upper.angle.0,
+            lower.depth.to_bits(),
+            lower.angle.0,
+            code,
+            value,
+            limit,
+            at,
+        ]
+    }
+
+    fn from_words(words: [u32; 10]) -> Self {
+        let [at, pulsing, d1, a1, d2, a2, trip @ ..] = words;
+        let share = |depth, angle| MotorShare { depth: f32::from_bits(depth), angle: Angle(angle) };
+        Self {
+            at: Instant(at),
+            next: (pulsing == 1).then_some([share(d1, a1), share(d2, a2)]),
+            trip: trip_from_words(trip),
+        }
+    }
+}
+
+/// What the ZS9's control task did in one period, for traces and telemetry.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct DualReport {
+    /// Torque references after all limits, in N·m: upper motor, lower motor.
+    pub torque_nm: [f32; 2],
+    /// Commanded peak phase voltages, in V.
+    pub voltage_v: [f32; 2],
+    /// Whether each motor is on its voltage limit.
+    pub weakening: [bool; 2],
+    /// Shoot-through duty.
+    pub duty: f32,
+    /// Inductor current that is led to, in A.
+    pub inductor_ref_a: f32,
+    /// Where the zero vectors lie.
+    pub scheme: Scheme,
+    /// The latched fault, if any.
+    pub trip: Option<Trip>,
+}
+
+impl Words<11> for DualReport {
+    fn to_words(self) -> [u32; 11] {
+        let [t1, t2] = self.torque_nm.map(f32::to_bits);
+        let [v1, v2] = self.voltage_v.map(f32::to_bits);
+        let [w1, w2] = self.weakening.map(u32::from);
+        let [code, value, limit, at] = trip_to_words(self.trip);
+        let flags = w1 | w2 << 1 | (self.scheme as u32) << 8;
+        [t1, t2, v1, v2, flags, self.duty.to_bits(), self.inductor_ref_a.to_bits(), code, value, limit, at]
+    }
+
+    fn from_words(words: [u32; 11]) -> Self {
+        let [t1, t2, v1, v2, flags, duty, inductor, trip @ ..] = words;
+        Self {
+            torque_nm: [f32::from_bits(t1), f32::from_bits(t2)],
+            voltage_v: [f32::from_bits(v1), f32::from_bits(v2)],
+            weakening: [flags & 1 != 0, flags & 2 != 0],
+            duty: f32::from_bits(duty),
+            inductor_ref_a: f32::from_bits(inductor),
+            scheme: scheme_from_code(flags >> 8),
+            trip: trip_from_words(trip),
+        }
+    }
+}

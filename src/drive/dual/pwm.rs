@@ -1,0 +1,187 @@
+//! The PWM interrupt's task.
+
+use super::{DualApplied, DualCommand, MotorShare, Settings, Shared};
+use crate::board::{DualPwmPort, GateFeedback, PlayedPeriod, PowerSample};
+use crate::drive::Gates;
+use crate::frames::{Angle, limit};
+use crate::machine::Tables;
+use crate::nine_switch::{self, GateTicks, MotorVoltage, Period, Refused, Request};
+use crate::protection::{self, Fault, SafeState, Trip, Violation};
+use crate::time::Instant;
+
+/// Control periods after which a command is too old to make pulses from.
+const STALE_PERIODS: i32 = 5;
+/// How far the link is believed to move in a carrier period, in V; more is an error of the measurement.
+const MOST_MOVED_V: f32 = 10.0;
+/// Least link voltage that is divided by, in V.
+const LEAST_LINK_V: f32 = 50.0;
+
+/// The ZS9's PWM task.
+pub struct PwmTask {
+    tables: &'static Tables,
+    settings: Settings,
+    /// Nominal instant of the next call: a peak.
+    now: Instant,
+    /// The period that was played before, and the one that is played.
+    periods: [PlayedPeriod; 2],
+    trip: Option<Trip>,
+    /// Link voltage at the last peak, in V.
+    last_link_v: Option<f32>,
+}
+
+impl PwmTask {
+    /// A task whose first call is at the first peak, half a carrier period after the start, gates off until the second valley.
+    pub const fn new(tables: &'static Tables, settings: Settings) -> Self {
+        let off = PlayedPeriod::off(settings.half_steps());
+        Self {
+            tables,
+            settings,
+            now: Instant(settings.first_peak_ticks()),
+            periods: [off; 2],
+            trip: None,
+            last_link_v: None,
+        }
+    }
+
+    /// The PWM timer's interrupt, at the carrier's peak. Deadline: the next valley, where the shadow registers take over.
+    pub fn run(&mut self, port: &mut impl DualPwmPort, shared: &Shared) {
+        let now = self.now;
+        self.now = now.after(self.settings.carrier_ticks);
+        let [before, running] = self.periods;
+        let sample = port.sample(now);
+        let command = shared.command.newest(|command| now.reached(command.valid_from));
+        let violation = self.violation(&sample, command.as_ref(), &before, &running);
+        self.check(violation, port);
+        let mut next = PlayedPeriod::off(self.settings.half_steps());
+        let mut given = None;
+        if let Some(command) = command.filter(|command| command.gates == Gates::Pulse && self.trip.is_none())
+        {
+            let request = self.request(&command, &sample);
+            match nine_switch::step(&request) {
+                Ok(period) => {
+                    next.gates = period.ticks(self.settings.half_steps());
+                    given = Some(shares(&request, &period));
+                }
+                Err(refused) => self.check(Some(refusal(refused, &request)), port),
+            }
+        }
+        self.last_link_v = Some(link_v(&sample));
+        self.periods = [running, next];
+        port.play(now, &next);
+        shared.applied.publish(DualApplied { at: now, next: given, trip: self.trip });
+    }
+
+    /// Nominal instant of the next call.
+    pub fn next_call(&self) -> Instant {
+        self.now
+    }
+
+    /// The latched fault.
+    pub fn trip(&self) -> Option<Trip> {
+        self.trip
+    }
+
+    /// The command at the middle of the period that begins at the next valley, by the link as it will be there if it goes on.
+    fn request(&self, command: &DualCommand, sample: &PowerSample) -> Request {
+        let link_v = link_v(sample);
+        // As far ahead as the last peak is back lies the middle of the period that is made here.
+        let moved_v = limit(link_v - self.last_link_v.unwrap_or(link_v), -MOST_MOVED_V, MOST_MOVED_V);
+        let link_v = link_v + moved_v;
+        let link_v = if link_v > LEAST_LINK_V { link_v } else { LEAST_LINK_V };
+        let ahead = self.now.since(command.at) as f32;
+        let [upper, lower] = command.motors.map(|motor| MotorVoltage {
+            angle: motor.angle + Angle((motor.rate * ahead) as i32 as u32),
+            depth: 2.0 * motor.voltage_v / link_v,
+        });
+        Request { scheme: command.scheme, upper, lower, shoot_through: command.duty }
+    }
+
+    fn violation(
+        &self,
+        sample: &PowerSample,
+        command: Option<&DualCommand>,
+        before: &PlayedPeriod,
+        running: &PlayedPeriod,
+    ) -> Option<Violation> {
+        let limits = &self.settings.limits;
+        let [upper, lower] = &sample.currents_a;
+        protection::check_currents(upper, &self.tables.ratings)
+            .or_else(|| protection::check_currents(lower, &self.tables.ratings))
+            .or_else(|| limits.check_link(sample.source_v, sample.capacitor_v))
+            .or_else(|| {
+                let command = command.filter(|command| command.gates == Gates::Pulse)?;
+                // Only while pulses are wanted: control may have turned the gates off meanwhile.
+                self.stuck(&sample.gates, before, running)
+                    .or_else(|| self.stale(command))
+                    .or_else(|| limits.check_duty(command.duty))
+            })
+    }
+
+    /// Gates that were not seen as they should be since the last peak: in the falling half of the one period and the rising
+    /// half of the other.
+    fn stuck(&self, seen: &GateFeedback, before: &PlayedPeriod, running: &PlayedPeriod) -> Option<Violation> {
+        let half = self.settings.half_steps();
+        let (mut wrong, mut bit) = (0_u16, 1_u16);
+        for (before, running) in before.gates.iter().zip(&running.gates) {
+            let should_on = is_ever_on(before, half) || is_ever_on(running, half);
+            let should_off = is_ever_off(before) || is_ever_off(running);
+            if (seen.on & bit != 0) != should_on || (seen.off & bit != 0) != should_off {
+                wrong |= bit;
+            }
+            bit <<= 1;
+        }
+        (wrong != 0).then_some((Fault::LegStuck, f32::from(wrong), 0.0))
+    }
+
+    fn stale(&self, command: &DualCommand) -> Option<Violation> {
+        let clock = &self.settings.clock;
+        let age = self.now.before(self.settings.carrier_ticks).since(command.at);
+        let limit = STALE_PERIODS * clock.control_ticks as i32;
+        (!(0..=limit).contains(&age)).then(|| (Fault::StaleCommand, clock.seconds(age), clock.seconds(limit)))
+    }
+
+    fn check(&mut self, violation: Option<Violation>, port: &mut impl DualPwmPort) {
+        let (Some((fault, value, limit)), None) = (violation, self.trip) else {
+            return;
+        };
+        let at = self.now.before(self.settings.carrier_ticks);
+        port.gates_off(at);
+        self.trip = Some(Trip { fault, value, limit, at, safe: SafeState::GatesOff });
+    }
+}
+
+impl PlayedPeriod {
+    /// All nine gates off, with this number of compare steps in a half.
+    pub const fn off(half_steps: u32) -> Self {
+        Self { gates: [GateTicks { off_from: 0, off_to: half_steps }; 9] }
+    }
+}
+
+/// Link voltage outside shoot-through, in V.
+fn link_v(sample: &PowerSample) -> f32 {
+    2.0 * sample.capacitor_v - sample.source_v
+}
+
+fn is_ever_on(gate: &GateTicks, half_steps: u32) -> bool {
+    gate.off_from > 0 || gate.off_to < half_steps
+}
+
+fn is_ever_off(gate: &GateTicks) -> bool {
+    gate.off_from < gate.off_to
+}
+
+fn shares(request: &Request, period: &Period) -> [MotorShare; 2] {
+    let applied = &period.applied;
+    [
+        MotorShare { depth: applied.upper_depth, angle: request.upper.angle },
+        MotorShare { depth: applied.lower_depth, angle: request.lower.angle },
+    ]
+}
+
+fn refusal(refused: Refused, request: &Request) -> Violation {
+    match refused {
+        Refused::UpperDepth => (Fault::NotFinite, request.upper.depth, f32::MAX),
+        Refused::LowerDepth => (Fault::NotFinite, request.lower.depth, f32::MAX),
+        Refused::ShootThrough => (Fault::DutyRange, request.shoot_through, 1.0),
+    }
+}

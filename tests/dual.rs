@@ -1,0 +1,376 @@
+//! The ZS9's two tasks by themselves: faults, words, and what they play when the measurements make no sense.
+
+use tractive::board::{
+    DualControlPort, DualPwmPort, DualSample, GateFeedback, MotorDemand, PlayedPeriod, PowerSample,
+};
+use tractive::cell::Words;
+use tractive::control::Demand;
+use tractive::drive::Gates;
+use tractive::drive::dual::{
+    ControlTask, DualApplied, DualCommand, DualReport, MotorCommand, MotorShare, PwmTask, Settings, Shared,
+};
+use tractive::frames::{Abc, Angle, Dq};
+use tractive::machine::zs9::BUILT_IN;
+use tractive::nine_switch::{LegState, Scheme};
+use tractive::protection::{Fault, SafeState, Trip};
+use tractive::time::{Clock, Instant};
+
+const CLOCK: Clock = Clock::new(25_000_000, 2_500);
+const CARRIER_TICKS: u32 = 2_500;
+const SETTINGS: Settings = Settings::new(CLOCK, CARRIER_TICKS);
+/// Electrical, in rad/s: 600 r/min.
+const OMEGA: f32 = 251.3;
+
+/// Two motors that turn steadily and carry a steady current, with what a test does to the samples.
+struct Fake {
+    spoil: fn(&mut DualSample),
+    spoil_power: fn(&mut PowerSample),
+    overrun: u32,
+    off_at: Option<Instant>,
+    running: PlayedPeriod,
+    next: PlayedPeriod,
+    before: PlayedPeriod,
+    report: DualReport,
+}
+
+impl Fake {
+    fn new() -> Self {
+        let off = PlayedPeriod::off(SETTINGS.half_steps());
+        Self {
+            spoil: |_| {},
+            spoil_power: |_| {},
+            overrun: 0,
+            off_at: None,
+            running: off,
+            next: off,
+            before: off,
+            report: DualReport::default(),
+        }
+    }
+
+    fn angle(now: Instant) -> Angle {
+        Angle(
+            (f64::from(OMEGA) * f64::from(now.0) / 25e6 / std::f64::consts::TAU * 4_294_967_296.0) as u64
+                as u32,
+        )
+    }
+
+    fn currents(now: Instant) -> [Abc; 2] {
+        let ripple = (now.0 % 7919) as f32 * 1e-4;
+        let current = Dq { d: -5.0 + ripple, q: 25.0 };
+        [current.unpark(Self::angle(now).sin_cos()).abc(); 2]
+    }
+
+    /// What the latches hold at a peak.
+    fn feedback(&self) -> GateFeedback {
+        let half = SETTINGS.half_steps();
+        let mut seen = GateFeedback::default();
+        for period in [&self.before, &self.running] {
+            for (bit, gate) in period.gates.iter().enumerate() {
+                seen.on |= u16::from(gate.off_from > 0 || gate.off_to < half) << bit;
+                seen.off |= u16::from(gate.off_from < gate.off_to) << bit;
+            }
+        }
+        seen
+    }
+}
+
+impl DualControlPort for Fake {
+    fn sample(&mut self, now: Instant) -> DualSample {
+        let mut sample = DualSample {
+            currents_a: Self::currents(now),
+            angles: [Some(Self::angle(now)); 2],
+            capacitor_v: 533.5,
+            inductor_a: 20.0,
+            source_v: 400.0,
+            demands: [MotorDemand::Torque(Demand { torque_nm: 50.0, slew_limited: true }); 2],
+            link_ref_v: 667.0,
+            scheme: Scheme::Rthd,
+            enable: true,
+        };
+        (self.spoil)(&mut sample);
+        sample
+    }
+
+    fn gates_off(&mut self, now: Instant) {
+        self.off_at = self.off_at.or(Some(now));
+    }
+
+    fn overrun_ticks(&mut self, _now: Instant, _deadline_ticks: u32) -> u32 {
+        self.overrun
+    }
+
+    fn report(&mut self, _now: Instant, report: &DualReport) {
+        self.report = *report;
+    }
+}
+
+impl DualPwmPort for Fake {
+    fn sample(&mut self, now: Instant) -> PowerSample {
+        let mut sample = PowerSample {
+            currents_a: Self::currents(now),
+            capacitor_v: 533.5,
+            source_v: 400.0,
+            gates: self.feedback(),
+        };
+        (self.spoil_power)(&mut sample);
+        sample
+    }
+
+    fn play(&mut self, _now: Instant, next: &PlayedPeriod) {
+        self.before = self.running;
+        self.running = *next;
+        self.next = *next;
+    }
+
+    fn gates_off(&mut self, now: Instant) {
+        self.off_at = self.off_at.or(Some(now));
+    }
+}
+
+struct Drive {
+    fake: Fake,
+    shared: Shared,
+    control: ControlTask,
+    pwm: PwmTask,
+}
+
+impl Drive {
+    /// Pulses, for a while.
+    fn pulsing() -> Self {
+        let mut drive = Self {
+            fake: Fake::new(),
+            shared: Shared::new(),
+            control: ControlTask::new(&BUILT_IN, SETTINGS),
+            pwm: PwmTask::new(&BUILT_IN, SETTINGS),
+        };
+        drive.run(600);
+        assert_eq!((drive.fake.report.trip, drive.pwm.trip()), (None, None));
+        assert!(!drive.is_off(), "pulses are made");
+        drive
+    }
+
+    fn run(&mut self, periods: u32) {
+        for _ in 0..periods {
+            self.pwm.run(&mut self.fake, &self.shared);
+            self.control.run(&mut self.fake, &self.shared);
+        }
+    }
+
+    fn is_off(&self) -> bool {
+        self.fake.next == PlayedPeriod::off(SETTINGS.half_steps())
+    }
+
+    /// Runs on until the trip, which must be in the first interrupt that can see its cause.
+    fn trips(&mut self, fault: Fault) -> Trip {
+        let now = self.control.next_call();
+        self.run(3);
+        let trip = self.fake.report.trip.unwrap_or_else(|| panic!("no trip: {fault:?}"));
+        assert_eq!((trip.fault, trip.safe), (fault, SafeState::GatesOff));
+        assert_eq!(self.fake.off_at, Some(trip.at), "gates off in the interrupt that found it");
+        assert!(trip.at.since(now).unsigned_abs() <= CARRIER_TICKS, "{trip:?} {now:?}");
+        assert!(self.is_off(), "and never on again");
+        self.fake.spoil = |_| {};
+        self.fake.spoil_power = |_| {};
+        self.run(20);
+        let after = self.fake.report.trip.map(|trip| (trip.fault, trip.at));
+        assert_eq!(after, Some((trip.fault, trip.at)), "latched");
+        assert!(self.is_off());
+        trip
+    }
+}
+
+/// What a test does to a sample, and the fault that it should be.
+type Case<T> = (fn(&mut T), Fault);
+
+#[test]
+fn what_is_sampled_wrong_trips_by_name() {
+    let cases: [Case<DualSample>; 19] = [
+        (|sample| sample.source_v = 200.0, Fault::SourceUndervoltage),
+        (|sample| sample.source_v = f32::NAN, Fault::NotFinite),
+        (|sample| sample.capacitor_v = 721.0, Fault::CapacitorOvervoltage),
+        (|sample| sample.capacitor_v = f32::NAN, Fault::NotFinite),
+        (|sample| sample.capacitor_v = f32::INFINITY, Fault::NotFinite),
+        (|sample| sample.inductor_a = f32::NAN, Fault::NotFinite),
+        (|sample| sample.currents_a[0].a = 150.0, Fault::Overcurrent),
+        (|sample| sample.currents_a[1].c = -150.0, Fault::Overcurrent),
+        (|sample| sample.currents_a[1].c += 12.0, Fault::PhaseSum),
+        (|sample| sample.currents_a[0].b = f32::NAN, Fault::NotFinite),
+        (|sample| sample.angles[0] = None, Fault::SensorLost1),
+        (|sample| sample.angles[1] = None, Fault::SensorLost2),
+        (|sample| sample.angles[0] = Some(Angle(0)), Fault::SensorLost1),
+        (|sample| sample.link_ref_v = 1020.0, Fault::DutyRange),
+        (|sample| sample.link_ref_v = f32::NAN, Fault::NotFinite),
+        (|sample| sample.demands[0] = MotorDemand::Speed(f32::NAN), Fault::NotFinite),
+        (|sample| sample.demands[1] = MotorDemand::Speed(f32::INFINITY), Fault::NotFinite),
+        (
+            |sample| {
+                sample.demands[1] = MotorDemand::Torque(Demand { torque_nm: f32::NAN, slew_limited: false });
+            },
+            Fault::NotFinite,
+        ),
+        (|sample| sample.source_v = -400.0, Fault::SourceUndervoltage),
+    ];
+    for (spoil, fault) in cases {
+        let mut drive = Drive::pulsing();
+        drive.fake.spoil = spoil;
+        let trip = drive.trips(fault);
+        println!("{}: {} (limit {})", fault.name(), trip.value, trip.limit);
+    }
+}
+
+#[test]
+fn the_pwm_interrupt_finds_what_is_quick() {
+    let cases: [Case<PowerSample>; 7] = [
+        (|sample| sample.currents_a[0].b = 150.0, Fault::Overcurrent),
+        (|sample| sample.currents_a[1].a = f32::NAN, Fault::NotFinite),
+        (|sample| sample.source_v = 0.0, Fault::SourceUndervoltage),
+        (|sample| sample.capacitor_v = 800.0, Fault::CapacitorOvervoltage),
+        (|sample| sample.capacitor_v = f32::NAN, Fault::NotFinite),
+        (|sample| sample.gates.on &= !1, Fault::LegStuck),
+        (|sample| sample.gates.off &= !(1 << 8), Fault::LegStuck),
+    ];
+    for (spoil, fault) in cases {
+        let mut drive = Drive::pulsing();
+        drive.fake.spoil_power = spoil;
+        let trip = drive.trips(fault);
+        assert!(trip.at.0 % CARRIER_TICKS == CARRIER_TICKS / 2, "at a peak: {trip:?}");
+    }
+}
+
+#[test]
+fn each_stuck_gate_is_told() {
+    for gate in 0..9 {
+        let mut drive = Drive::pulsing();
+        drive.fake.spoil_power = [
+            |sample: &mut PowerSample| sample.gates.on ^= 1,
+            |sample: &mut PowerSample| sample.gates.on ^= 1 << 1,
+            |sample: &mut PowerSample| sample.gates.on ^= 1 << 2,
+            |sample: &mut PowerSample| sample.gates.on ^= 1 << 3,
+            |sample: &mut PowerSample| sample.gates.on ^= 1 << 4,
+            |sample: &mut PowerSample| sample.gates.on ^= 1 << 5,
+            |sample: &mut PowerSample| sample.gates.off ^= 1 << 6,
+            |sample: &mut PowerSample| sample.gates.off ^= 1 << 7,
+            |sample: &mut PowerSample| sample.gates.off ^= 1 << 8,
+        ][gate];
+        assert_eq!(drive.trips(Fault::LegStuck).value, (1_u32 << gate) as f32);
+    }
+}
+
+#[test]
+fn a_late_control_interrupt_trips() {
+    let mut drive = Drive::pulsing();
+    drive.fake.overrun = 25;
+    let trip = drive.trips(Fault::ControlDeadline);
+    assert!((trip.value - 1e-6).abs() < 1e-9, "{trip:?}");
+}
+
+#[test]
+fn without_control_the_pwm_interrupt_stops() {
+    let mut drive = Drive::pulsing();
+    for _ in 0..10 {
+        drive.pwm.run(&mut drive.fake, &drive.shared);
+    }
+    let trip = drive.pwm.trip().unwrap();
+    assert_eq!(trip.fault, Fault::StaleCommand);
+    assert!(trip.value > trip.limit && drive.is_off(), "{trip:?}");
+    assert_eq!(drive.fake.off_at, Some(trip.at));
+}
+
+#[test]
+fn disabled_it_makes_no_pulses_and_no_fault() {
+    let mut drive = Drive::pulsing();
+    drive.fake.spoil = |sample| sample.enable = false;
+    drive.run(3);
+    assert!(drive.is_off() && drive.fake.report.trip.is_none());
+    drive.fake.spoil = |_| {};
+    drive.run(3);
+    assert!(!drive.is_off() && drive.fake.report.trip.is_none());
+}
+
+/// A generator of words, good enough to look everywhere.
+struct Dice(u64);
+
+impl Dice {
+    fn word(&mut self) -> u32 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 32) as u32
+    }
+}
+
+thread_local! {
+    static DICE: std::cell::RefCell<Dice> = const { std::cell::RefCell::new(Dice(1)) };
+}
+
+fn any() -> u32 {
+    DICE.with_borrow_mut(Dice::word)
+}
+
+#[test]
+fn whatever_is_sampled_the_gates_are_legal() {
+    let half = SETTINGS.half_steps();
+    for seed in 0..200 {
+        DICE.set(Dice(seed));
+        let mut drive = Drive::pulsing();
+        // One value a period is any bit pattern at all.
+        drive.fake.spoil = |sample| {
+            let value = f32::from_bits(any());
+            match any() % 8 {
+                0 => sample.capacitor_v = value,
+                1 => sample.inductor_a = value,
+                2 => sample.source_v = value,
+                3 => sample.link_ref_v = value,
+                4 => sample.demands[0] = MotorDemand::Speed(value),
+                5 => {
+                    sample.demands[1] = MotorDemand::Torque(Demand { torque_nm: value, slew_limited: false })
+                }
+                6 => sample.angles[0] = Some(Angle(any())),
+                _ => sample.currents_a[1].a = value,
+            }
+        };
+        for _ in 0..10 {
+            drive.run(1);
+            if drive.is_off() {
+                continue;
+            }
+            let gates = &drive.fake.next.gates;
+            for step in (0..half).step_by(97) {
+                for leg in 0..3 {
+                    let [high, middle, low] = [0, 3, 6].map(|row| gates[row + leg].is_on(step));
+                    assert!(LegState::of_gates(high, middle, low).is_some(), "{seed}: {high} {middle} {low}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn messages_arrive_as_they_were_sent() {
+    let trip =
+        Trip { fault: Fault::LegStuck, value: 16.0, limit: 0.0, at: Instant(77), safe: SafeState::GatesOff };
+    let motor = MotorCommand { voltage_v: 140.0, angle: Angle(5), rate: -7.5 };
+    let command = DualCommand {
+        motors: [motor, MotorCommand { voltage_v: 1.0, ..motor }],
+        at: Instant(9),
+        valid_from: Instant(10),
+        duty: 0.2,
+        scheme: Scheme::RthdSlide,
+        gates: Gates::Pulse,
+    };
+    assert_eq!(DualCommand::from_words(command.to_words()), command);
+    let share = MotorShare { depth: 0.4, angle: Angle(6) };
+    for next in [None, Some([share, MotorShare { depth: 0.3, ..share }])] {
+        let applied = DualApplied { at: Instant(3), next, trip: Some(trip) };
+        assert_eq!(DualApplied::from_words(applied.to_words()), applied);
+    }
+    let report = DualReport {
+        torque_nm: [1.0, 2.0],
+        voltage_v: [3.0, 4.0],
+        weakening: [true, false],
+        duty: 0.25,
+        inductor_ref_a: -4.0,
+        scheme: Scheme::S,
+        trip: Some(trip),
+    };
+    assert_eq!(DualReport::from_words(report.to_words()), report);
+}
