@@ -9,7 +9,10 @@ fn main() {
     );
 }
 
-#[cfg(target_os = "none")]
+#[cfg(all(target_os = "none", feature = "board-nucleo-g474re"))]
+compile_error!("the ZS9 has no board but QEMU's yet: build it without the feature board-nucleo-g474re");
+
+#[cfg(all(target_os = "none", not(feature = "board-nucleo-g474re")))]
 mod firmware {
     use core::sync::atomic::{AtomicU32, Ordering};
     use cortex_m_rt::{entry, exception, interrupt};

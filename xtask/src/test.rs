@@ -96,7 +96,10 @@ fn perform(step: Step, setup: &mut Setup) -> Result<Outcome> {
                 return Ok(Outcome::Skipped(format!("clippy needs rustup's target {TARGET}")));
             }
             let what = ["--target", TARGET, "--package", "tractive", "--lib", "--bins"];
-            let nucleo = [&what[..], &["--features", Board::NucleoG474re.feature()]].concat();
+            // The ZS9's firmware has no board but QEMU's.
+            let features = Board::NucleoG474re.feature();
+            let nucleo = ["--target", TARGET, "--package", "tractive", "--lib", "--bin", "tractive"];
+            let nucleo = [&nucleo[..], &["--features", features]].concat();
             lint(&mut cargo(), &what)? && lint(&mut cargo(), &nucleo)?
         }
         Step::Doc => {
