@@ -5,6 +5,7 @@ pub mod command;
 pub mod figures;
 pub mod inject;
 mod operator;
+mod patterns;
 pub mod run;
 pub mod scenario;
 mod sensors;

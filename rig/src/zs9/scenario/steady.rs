@@ -6,6 +6,7 @@ use crate::options::RunOptions;
 use crate::plant::SpeedSource;
 use crate::report::Page;
 use crate::zs9::figures;
+use crate::zs9::patterns;
 use crate::zs9::trace::Recording;
 use crate::zs9::{Orders, SeenMotors};
 use tractive::board::MotorDemand;
@@ -70,6 +71,7 @@ impl Scenario for Steady {
     }
 
     fn plots(&self, recording: &Recording, page: &mut Page) {
+        patterns::draw(page);
         figures::phases(page, "table 1", recording, (0.0, 0.05));
         let window = (0.0, 0.001);
         let curves: &[figures::Curve] = &[("i_L", |row| row.inductor_a)];
