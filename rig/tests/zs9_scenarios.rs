@@ -198,6 +198,46 @@ fn flaws_of_the_sensors_do_not_stop_the_drive() {
     assert!(back_ms < 50.0, "{back_ms} ms");
 }
 
+/// Dead time where two gates of a leg exchange, none where a leg is shorted on purpose; the diodes choose the state meanwhile.
+#[test]
+fn dead_time_is_kept_and_stops_nothing() {
+    const DEAD_TIME_S: f64 = 2e-6;
+    for scheme in ["s", "rs", "rthd", "zvo"] {
+        let outcome = run(&format!("zs9-steady --dead-time-us 2 --scheme {scheme}"));
+        assert!(outcome.recording.trip().is_none(), "{scheme}: {:?}", outcome.recording.trip());
+        for (torque, thd) in [("torque1_nm", "thd1_percent"), ("torque2_nm", "thd2_percent")] {
+            let (torque, thd) = (figure(&outcome, torque), figure(&outcome, thd));
+            println!("{scheme}: {torque} N·m, {thd} %");
+            assert!((torque / 60.0 - 1.0).abs() < 0.04 && thd < 3.5, "{scheme}: {torque} N·m, {thd} %");
+        }
+        assert!(exchanges_that_wait(&outcome.recording, DEAD_TIME_S) > 100, "{scheme}");
+    }
+}
+
+/// Counts the edges after which two gates of a leg are on and one is off, and holds each against the dead time since that one
+/// turned off.
+fn exchanges_that_wait(recording: &Recording, dead_time_s: f64) -> usize {
+    let mut exchanges = 0;
+    for leg in 0..3 {
+        let (mut on, mut off_at_s) = ([None; 3], [None; 3]);
+        for edge in recording.edges.iter().filter(|edge| edge.gate % 3 == leg) {
+            let gate = usize::from(edge.gate / 3);
+            on[gate] = Some(edge.on);
+            if !edge.on {
+                off_at_s[gate] = Some(edge.t_s);
+                continue;
+            }
+            let off = (0..3).filter(|gate| on[*gate] == Some(false)).collect::<Vec<_>>();
+            if let ([off], true) = (off.as_slice(), on.iter().all(Option::is_some)) {
+                let wait_s = edge.t_s - off_at_s[*off].unwrap();
+                assert!(wait_s > dead_time_s - 2e-9, "leg {leg}, gate {gate} waits {wait_s} s");
+                exchanges += 1;
+            }
+        }
+    }
+    exchanges
+}
+
 #[test]
 fn the_trace_has_its_columns_and_is_written_whole() {
     let folder = tempfile::tempdir().unwrap();

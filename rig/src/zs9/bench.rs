@@ -65,6 +65,8 @@ pub struct BenchSettings {
     pub injection: Option<Injection>,
     /// Whether edges are kept.
     pub edges: bool,
+    /// Time for which a gate that turns on where another one of its leg turns off has to wait, in s.
+    pub dead_time_s: f64,
 }
 
 /// What is summed up over a step of the trace, each value times its time, in steps.
@@ -95,7 +97,11 @@ pub struct Bench {
     next: Option<PlayedPeriod>,
     /// Toggles of the running period that are still to come, the last one first.
     toggles: Vec<(Steps, u8)>,
+    /// What the gates are ordered to be, what they are, and when those that wait for the dead time turn on.
+    ordered: [bool; 9],
     levels: [bool; 9],
+    turn_on: [Option<Steps>; 9],
+    dead_time: Steps,
     off: bool,
     off_at: Option<Steps>,
     feedback: GateFeedback,
@@ -134,7 +140,10 @@ impl Bench {
             period: Steps::from(settings.carrier_ticks * COMPARE_STEPS),
             next: Some(PlayedPeriod::off(settings.carrier_ticks / 2 * COMPARE_STEPS)),
             toggles: Vec::with_capacity(36),
+            ordered: [false; 9],
             levels: [false; 9],
+            turn_on: [None; 9],
+            dead_time: steps(settings.dead_time_s),
             off: false,
             off_at: None,
             feedback: GateFeedback::default(),
@@ -229,6 +238,9 @@ impl Bench {
             if let Some(off_at) = self.off_at {
                 due = due.min(off_at.max(self.now));
             }
+            if let Some(turn_on) = self.turn_on.iter().flatten().min() {
+                due = due.min(*turn_on);
+            }
             self.integrate(due)?;
             self.act()?;
         }
@@ -246,7 +258,7 @@ impl Bench {
             middle,
             low,
         });
-        self.plant.advance(gates, steps * self.step_s)?;
+        self.plant.advance(self.as_diodes_have_it(gates), steps * self.step_s)?;
         for (gate, on) in self.levels.into_iter().enumerate() {
             let latch = if on { &mut self.feedback.on } else { &mut self.feedback.off };
             *latch |= 1 << gate;
@@ -270,13 +282,21 @@ impl Bench {
             self.off_at = None;
             self.off = true;
             self.toggles.clear();
-            (0..9).for_each(|gate| self.set(gate, false));
+            self.order([false; 9]);
         }
+        let mut ordered = self.ordered;
         while let Some((at, gate)) = self.toggles.last().copied()
             && at <= self.now
         {
             self.toggles.pop();
-            self.set(gate, !self.levels[usize::from(gate)]);
+            ordered[usize::from(gate)] ^= true;
+        }
+        self.order(ordered);
+        for gate in 0..9 {
+            if self.turn_on[usize::from(gate)].is_some_and(|at| at <= self.now) {
+                self.turn_on[usize::from(gate)] = None;
+                self.set(gate, true);
+            }
         }
         if self.now == self.begun + self.period {
             self.begun = self.now;
@@ -299,10 +319,11 @@ impl Bench {
             return Ok(());
         }
         let half = self.period / 2;
+        let mut ordered = self.ordered;
         for (gate, pause) in (0_u8..).zip(&period.gates) {
             let (from, to) = (Steps::from(pause.off_from), Steps::from(pause.off_to));
             let paused = from < to;
-            self.set(gate, !(paused && from == 0));
+            ordered[usize::from(gate)] = !(paused && from == 0);
             let ends = [(from, paused && from > 0), (to, paused && to < half)];
             for (at, _) in ends.into_iter().filter(|(_, counts)| *counts) {
                 self.toggles.push((self.begun + at, gate));
@@ -310,7 +331,67 @@ impl Bench {
             }
         }
         self.toggles.sort_unstable_by_key(|(at, gate)| (std::cmp::Reverse(*at), *gate));
+        self.order(ordered);
         Ok(())
+    }
+
+    /// New orders to the gates. One that turns on where another one of its leg turns off waits for the dead time; one that
+    /// turns on alone shorts its leg on purpose, at once.
+    fn order(&mut self, ordered: [bool; 9]) {
+        if ordered == self.ordered {
+            return;
+        }
+        for leg in 0..3_u8 {
+            let gates = [leg, leg + 3, leg + 6];
+            let changes = |gate: u8, to: bool| {
+                ordered[usize::from(gate)] == to && self.ordered[usize::from(gate)] != to
+            };
+            let turns_off = gates.map(|gate| changes(gate, false));
+            let turns_on = gates.map(|gate| changes(gate, true));
+            let waits = self.dead_time > 0 && turns_off.contains(&true);
+            for (gate, _) in gates.into_iter().zip(turns_off).filter(|(_, turns)| *turns) {
+                self.turn_on[usize::from(gate)] = None;
+                self.set(gate, false);
+                // Whoever waits already waits for this one too.
+                for other in gates.map(usize::from) {
+                    self.turn_on[other] = self.turn_on[other].map(|_| self.now + self.dead_time);
+                }
+            }
+            for (gate, _) in gates.into_iter().zip(turns_on).filter(|(_, turns)| *turns) {
+                if waits {
+                    self.turn_on[usize::from(gate)] = Some(self.now + self.dead_time);
+                } else {
+                    self.set(gate, true);
+                }
+            }
+        }
+        self.ordered = ordered;
+    }
+
+    /// The legs with the states that the diodes give those which wait for a gate: the current of a node that is not tied to a rail
+    /// chooses it. Out of the node it flows through a diode from below, into it through one from above.
+    fn as_diodes_have_it(&self, gates: [LegGates; 3]) -> [LegGates; 3] {
+        if self.dead_time == 0 || self.off {
+            return gates;
+        }
+        let [upper, lower] = self.plant.motors().each_ref().map(|motor| motor.currents_abc());
+        core::array::from_fn(|leg| {
+            let choose =
+                |current_a: f64, out: LegGates, into: LegGates| if current_a > 0.0 { out } else { into };
+            match (gates[leg].high, gates[leg].middle, gates[leg].low) {
+                (false, false, true) => choose(upper[leg], LegGates::ZERO, LegGates::ONE),
+                (true, false, false) => choose(lower[leg], LegGates::ONE, LegGates::MINUS_ONE),
+                (false, true, false) => choose(upper[leg] + lower[leg], LegGates::ZERO, LegGates::MINUS_ONE),
+                // Two exchanges within a dead time: both nodes are free; where their currents pull them together, the sum chooses.
+                (false, false, false) if upper[leg] <= 0.0 => {
+                    choose(lower[leg], LegGates::ONE, LegGates::MINUS_ONE)
+                }
+                (false, false, false) => {
+                    choose(upper[leg] + lower[leg].min(0.0), LegGates::ZERO, LegGates::MINUS_ONE)
+                }
+                _ => gates[leg],
+            }
+        })
     }
 
     fn set(&mut self, gate: u8, on: bool) {

@@ -39,7 +39,7 @@ pub fn drive(scenario: &dyn Scenario, options: &RunOptions) -> Result<Outcome> {
             given.extend(own);
         }
         // Options of the first system alone.
-        for name in ["down", "brake", "torque_scale", "to", "min_pulse_us", "dead_time_us"] {
+        for name in ["down", "brake", "torque_scale", "to", "min_pulse_us"] {
             given.remove(name);
         }
     }

@@ -1,6 +1,6 @@
 //! The PWM interrupt's task.
 
-use super::{DualApplied, DualCommand, MotorShare, Settings, Shared};
+use super::{COMPARE_STEPS, DualApplied, DualCommand, MotorShare, Settings, Shared};
 use crate::board::{DualPwmPort, GateFeedback, PlayedPeriod, PowerSample};
 use crate::drive::Gates;
 use crate::frames::{Angle, limit};
@@ -8,6 +8,9 @@ use crate::machine::Tables;
 use crate::nine_switch::{self, GateTicks, MotorVoltage, Period, Refused, Request};
 use crate::protection::{self, Fault, SafeState, Trip, Violation};
 use crate::time::Instant;
+
+/// Longest dead time that the gates' hardware may insert, in s.
+const DEAD_TIME_S: f32 = 5e-6;
 
 /// Control periods after which a command is too old to make pulses from.
 const STALE_PERIODS: i32 = 5;
@@ -118,14 +121,18 @@ impl PwmTask {
     }
 
     /// Gates that were not seen as they should be since the last peak: in the falling half of the one period and the rising
-    /// half of the other.
+    /// half of the other. A gate that is to be on for no longer than a dead time may stay off.
     fn stuck(&self, seen: &GateFeedback, before: &PlayedPeriod, running: &PlayedPeriod) -> Option<Violation> {
         let half = self.settings.half_steps();
+        let shortest = (DEAD_TIME_S * self.settings.clock.ticks_per_s) as u32 * COMPARE_STEPS;
         let (mut wrong, mut bit) = (0_u16, 1_u16);
         for (before, running) in before.gates.iter().zip(&running.gates) {
-            let should_on = is_ever_on(before, half) || is_ever_on(running, half);
+            let (on_before, on_running) = (on_steps(before, half), on_steps(running, half));
+            let must_be_on = on_before > shortest || on_running > shortest;
+            let may_be_on = on_before > 0 || on_running > 0;
             let should_off = is_ever_off(before) || is_ever_off(running);
-            if (seen.on & bit != 0) != should_on || (seen.off & bit != 0) != should_off {
+            let (on, off) = (seen.on & bit != 0, seen.off & bit != 0);
+            if (must_be_on && !on) || (on && !may_be_on) || off != should_off {
                 wrong |= bit;
             }
             bit <<= 1;
@@ -162,8 +169,9 @@ fn link_v(sample: &PowerSample) -> f32 {
     2.0 * sample.capacitor_v - sample.source_v
 }
 
-fn is_ever_on(gate: &GateTicks, half_steps: u32) -> bool {
-    gate.off_from > 0 || gate.off_to < half_steps
+/// Compare steps of a half in which a gate is on.
+fn on_steps(gate: &GateTicks, half_steps: u32) -> u32 {
+    half_steps.saturating_sub(gate.off_to.saturating_sub(gate.off_from))
 }
 
 fn is_ever_off(gate: &GateTicks) -> bool {

@@ -81,12 +81,6 @@ pub fn find(name: &str) -> Option<Box<dyn Scenario>> {
 
 /// Drives a scenario.
 pub fn drive(scenario: &dyn Scenario, options: &RunOptions, machine: &Machine) -> Result<Recording> {
-    if options.dead_time_us > 0.0 {
-        bail!(
-            "--dead-time-us {}: must be 0: a shorted leg is a state of the ZS9's bridge",
-            options.dead_time_us
-        );
-    }
     let bench = bench(scenario, options, machine)?;
     let settings = settings::drive(CLOCK, options.zs9.carrier_hz);
     match options.on {
@@ -132,6 +126,7 @@ fn bench(scenario: &dyn Scenario, options: &RunOptions, machine: &Machine) -> Re
         flaws: options.flaws(parameters.trip_current_a),
         injection: options.zs9.inject,
         edges: scenario.edges(options),
+        dead_time_s: options.dead_time_us * 1e-6,
     };
     let (shortest_s, longest_s) = (CLOCK.tick_s, plan.duration_s);
     if trace_step_s < f64::from(shortest_s) || trace_step_s > longest_s {
