@@ -94,9 +94,7 @@ fn motor_1_holds_while_motor_2_reverses() {
 
 #[test]
 fn the_cycle_goes_up_and_back_and_returns_energy() {
-    let began = std::time::Instant::now();
     let outcome = run("zs9-cycle");
-    let wall_s = began.elapsed().as_secs_f64();
     let recording = &outcome.recording;
     assert!(recording.trip().is_none(), "{:?}", recording.trip());
     println!("{}", serde_json::to_string_pretty(outcome.figures.values()).unwrap());
@@ -115,8 +113,6 @@ fn the_cycle_goes_up_and_back_and_returns_energy() {
     assert!(figure(&outcome, "returned_percent") >= 75.0);
     assert!(figure(&outcome, "power_residual_percent") < 0.1);
     assert!(figure(&outcome, "link_deviation_percent") < 0.5);
-    // Under load by other tests it may be slower than alone.
-    assert!(wall_s < figure(&outcome, "simulated_s"), "{wall_s} s");
 }
 
 #[test]
