@@ -24,6 +24,8 @@ pub struct VoltageCommand {
     pub valid_from: Instant,
     /// Whether to make pulses at all.
     pub gates: Gates,
+    /// Whether it is for the half that is already committed, not for the one after it.
+    pub revises: bool,
 }
 
 impl Words<9> for VoltageCommand {
@@ -38,12 +40,12 @@ impl Words<9> for VoltageCommand {
             reference.udc_v.to_bits(),
             reference.depth.to_bits(),
             self.valid_from.0,
-            u32::from(self.gates == Gates::Pulse),
+            u32::from(self.gates == Gates::Pulse) | u32::from(self.revises) << 1,
         ]
     }
 
     fn from_words(words: [u32; 9]) -> Self {
-        let [voltage, angle, carrier_angle, rate, at, udc, depth, valid_from, gates] = words;
+        let [voltage, angle, carrier_angle, rate, at, udc, depth, valid_from, flags] = words;
         Self {
             reference: Reference {
                 voltage_v: f32::from_bits(voltage),
@@ -55,7 +57,8 @@ impl Words<9> for VoltageCommand {
                 depth: f32::from_bits(depth),
             },
             valid_from: Instant(valid_from),
-            gates: if gates == 1 { Gates::Pulse } else { Gates::Off },
+            gates: if flags & 1 != 0 { Gates::Pulse } else { Gates::Off },
+            revises: flags & 2 != 0,
         }
     }
 }
@@ -80,6 +83,23 @@ pub struct Applied {
     pub mirrored: bool,
     /// A fault that the PWM interrupt found.
     pub trip: Option<Trip>,
+}
+
+impl Applied {
+    /// Gates off, in halves of one length, the present one from `at` on.
+    pub const fn at_rest(at: Instant, off: CarrierPeriod) -> Self {
+        let currents_a = Abc { a: 0.0, b: 0.0, c: 0.0 };
+        Self {
+            at,
+            before: off,
+            running: off,
+            next: off,
+            currents_a,
+            currents_before_a: currents_a,
+            mirrored: false,
+            trip: None,
+        }
+    }
 }
 
 impl Words<27> for Applied {

@@ -79,6 +79,9 @@ pub fn run_on_host(
             pwm.run(&mut port, &shared);
             pwm_at = pwm.next_call();
         } else {
+            if control.wants_revision() {
+                pwm.revise(&mut port, &shared);
+            }
             control.run(&mut port, &shared);
             control_at = control.next_call();
         }
