@@ -323,31 +323,3 @@ proptest! {
         }
     }
 }
-
-#[test]
-fn a_half_that_is_played_anew_starts_from_where_the_running_one_ends() {
-    let halves = halves_of_all_modes(1.0);
-    let free: Vec<_> = halves.windows(3).filter(|three| three.iter().all(CarrierPeriod::is_free)).collect();
-    assert!(free.len() > 10);
-    for three in free {
-        let [before, running, next] = three else { unreachable!() };
-        let gates = |revised: &[&CarrierPeriod]| {
-            let mut rig = Rig::new();
-            rig.interrupt(before);
-            rig.interrupt(running);
-            for half in revised {
-                rig.pwm.play(NOW, half);
-                rig.bench.settle();
-            }
-            rig.interrupt(before);
-            (0..next.period_ticks)
-                .map(|_| {
-                    rig.bench.tick();
-                    rig.gates()
-                })
-                .collect::<Vec<_>>()
-        };
-        let other = CarrierPeriod { compare_ticks: [next.period_ticks / 3; 3], ..*next };
-        assert_eq!(gates(&[next]), gates(&[&other, next]));
-    }
-}

@@ -89,16 +89,15 @@ pub struct Pwm {
     zeros: Zeros,
     /// Whether the half that comes next has pulses.
     pulses: bool,
-    /// The levels on which the legs stand at the end of the running half, and of the next one.
+    /// The levels on which the legs stand at its end.
     levels: [bool; 3],
-    next_levels: [bool; 3],
 }
 
 impl Pwm {
     /// At rest, with the zeros that the start measured.
     pub const fn new(registers: Registers, zeros: Zeros) -> Self {
         let sampler = pwm_sampler(&registers);
-        Self { registers, sampler, zeros, pulses: false, levels: [false; 3], next_levels: [false; 3] }
+        Self { registers, sampler, zeros, pulses: false, levels: [false; 3] }
     }
 
     /// First thing in the interrupt: whether it is a carrier boundary's. If not, control wants a revision, and there is nothing to
@@ -118,7 +117,6 @@ impl Pwm {
     /// outputs as a whole are switched on in a first half with pulses and off after the last.
     #[inline]
     pub fn begin_half(&mut self) {
-        self.levels = self.next_levels;
         let legs = &self.registers.legs;
         if legs.is_tripped() {
             // A break of one timer alone stops the other.
@@ -147,7 +145,7 @@ impl PwmPort for Pwm {
             legs.trip();
         }
         self.pulses = next.mode != Mode::Off;
-        self.next_levels = half.end_levels();
+        self.levels = half.end_levels();
     }
 
     fn enter(&mut self, safe: SafeState, _now: Instant) {
