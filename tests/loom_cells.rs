@@ -3,7 +3,7 @@
 
 use loom::sync::Arc;
 use loom::thread;
-use tractive::cell::{Downlink, Uplink, Words};
+use tractive::cell::{Downlink, Trail, Uplink, Words};
 
 /// Two words that belong together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -43,6 +43,41 @@ fn an_uplink_is_never_torn() {
         let read = thread.join().unwrap();
         assert!([None, Some(Message::number(1)), Some(Message::number(2))].contains(&read), "{read:?}");
         assert_eq!(cell.read(), Some(Message::number(2)));
+    });
+}
+
+/// The newest two records' words, of which both are the record's number.
+fn newest_two(trail: &Trail<2>) -> Option<[[u32; 2]; 2]> {
+    trail.read(|[one, two, ..]| [one, two].map(|record| [record.word::<0>(), record.word::<1>()]))
+}
+
+#[test]
+fn a_trail_is_never_torn_by_the_next_record() {
+    loom::model(|| {
+        let trail = Arc::new(Trail::<2>::new());
+        trail.publish([1; 2]);
+        let reader = Arc::clone(&trail);
+        let thread = thread::spawn(move || newest_two(&reader));
+        trail.publish([2; 2]);
+        trail.publish([3; 2]);
+        let read = thread.join().unwrap();
+        let whole = [None, Some([[1; 2], [0; 2]]), Some([[2; 2], [1; 2]]), Some([[3; 2], [2; 2]])];
+        assert!(whole.contains(&read), "{read:?}");
+        assert_eq!(newest_two(&trail), Some([[3; 2], [2; 2]]));
+    });
+}
+
+#[test]
+fn a_trail_is_never_torn_by_a_revision() {
+    loom::model(|| {
+        let trail = Arc::new(Trail::<2>::new());
+        trail.publish([1; 2]);
+        let reader = Arc::clone(&trail);
+        let thread = thread::spawn(move || newest_two(&reader));
+        trail.revise([9; 2]);
+        let read = thread.join().unwrap();
+        assert!([None, Some([[1; 2], [0; 2]]), Some([[9; 2], [0; 2]])].contains(&read), "{read:?}");
+        assert_eq!(newest_two(&trail), Some([[9; 2], [0; 2]]));
     });
 }
 
