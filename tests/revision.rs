@@ -125,11 +125,11 @@ fn a_revised_half_has_the_newer_voltage_and_is_told_to_control() {
     let committed = drive.played.0.last().unwrap().1;
     drive.publish(700.0, 3 * half_ticks() + 2_500, true);
     let revised = drive.revise().unwrap();
-    assert_eq!(
-        (revised.period_ticks, revised.start_levels),
-        (committed.period_ticks, committed.start_levels)
-    );
-    assert_ne!(revised.compare_ticks, committed.compare_ticks);
+    assert_ne!(revised, committed);
+    // What the boundary would have made of the same reference, had it known it.
+    let mut knowing = Pulsing::at_two_boundaries();
+    knowing.publish_of(3 * half_ticks(), 700.0, 3 * half_ticks() - 1, false);
+    assert_eq!(revised, knowing.run());
     let applied = drive.shared.applied.read().unwrap();
     assert_eq!((applied.next, applied.at), (revised, Instant(3 * half_ticks())));
     // What control is told of the running half is what was played last.
