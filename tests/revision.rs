@@ -72,23 +72,39 @@ struct Pulsing {
 
 impl Pulsing {
     fn new() -> Self {
+        let mut pulsing = Self::at_two_boundaries();
+        pulsing.publish(100.0, 3 * half_ticks() - 2_500, false);
+        pulsing.run();
+        pulsing
+    }
+
+    fn at_two_boundaries() -> Self {
         let first = Instant(half_ticks());
         let mut pulsing = Self {
             pwm: PwmTask::new(&BUILT_IN, settings(), first),
             shared: Shared::new(),
             played: Played::default(),
         };
-        for boundary in 1..=3 {
+        for boundary in 1..=2 {
             pulsing.publish(100.0, boundary * half_ticks() - 2_500, false);
-            pulsing.pwm.run(&mut pulsing.played, &pulsing.shared);
+            pulsing.run();
         }
         pulsing
     }
 
-    /// Publishes a command that is valid from this tick on.
+    fn run(&mut self) -> CarrierPeriod {
+        self.pwm.run(&mut self.played, &self.shared);
+        self.played.0.last().unwrap().1
+    }
+
+    /// Publishes a command that is valid from this tick on, one control period after its sample.
     fn publish(&self, voltage_v: f32, valid_from: u32, revises: bool) {
-        let at = Instant(valid_from - 2_500);
-        let reference = reference(voltage_v, 1.0, at);
+        self.publish_of(valid_from - 2_500, voltage_v, valid_from, revises);
+    }
+
+    /// The same for a sample of any tick.
+    fn publish_of(&self, at: u32, voltage_v: f32, valid_from: u32, revises: bool) {
+        let reference = reference(voltage_v, 1.0, Instant(at));
         let valid_from = Instant(valid_from);
         self.shared.command.publish(VoltageCommand { reference, valid_from, gates: Gates::Pulse, revises });
     }
@@ -118,16 +134,16 @@ fn a_revised_half_has_the_newer_voltage_and_is_told_to_control() {
     let committed = drive.played.0.last().unwrap().1;
     drive.publish(700.0, 3 * half_ticks() + 2_500, true);
     let revised = drive.revise().unwrap();
-    assert_eq!(
-        (revised.period_ticks, revised.start_levels),
-        (committed.period_ticks, committed.start_levels)
-    );
-    assert_ne!(revised.compare_ticks, committed.compare_ticks);
+    assert_ne!(revised, committed);
+    // What the boundary would have made of the same reference, had it known it.
+    let mut knowing = Pulsing::at_two_boundaries();
+    knowing.publish_of(3 * half_ticks(), 700.0, 3 * half_ticks() - 1, false);
+    assert_eq!(revised, knowing.run());
     let [newest, _] = drive.told();
     assert_eq!(newest, (Instant(3 * half_ticks()), volt_ticks(revised.on_ticks(0))));
     // What control is told of the running half is what was played last.
     drive.publish(700.0, 4 * half_ticks() - 2_500, false);
-    drive.pwm.run(&mut drive.played, &drive.shared);
+    drive.run();
     let [_, running] = drive.told();
     assert_eq!(running.1, volt_ticks(revised.on_ticks(0)));
 }
