@@ -90,28 +90,26 @@ impl<T: Words<N>, const N: usize> Downlink<T, N> {
         self.published.store(next, Ordering::Release);
     }
 
-    /// Reader's side: the newest value that is `ready`, of the two newest; `None` when neither is.
+    /// Reader's side: the newest value whose record is `ready`, of the two newest; `None` when neither is.
     #[inline]
-    pub fn newest(&self, ready: impl Fn(&T) -> bool) -> Option<T> {
+    pub fn newest(&self, ready: impl Fn(&Record<N>) -> bool) -> Option<T> {
         let published = self.published.load(Ordering::Acquire);
         if published == 0 {
             return None;
         }
-        let newest = T::from_words(load(self.slot(published)));
-        if ready(&newest) {
-            return Some(newest);
+        let mut record = self.slot(published);
+        if !ready(&Record(record)) {
+            record = self.slot(published.wrapping_sub(1));
+            if published == 1 || !ready(&Record(record)) {
+                return None;
+            }
         }
-        if published == 1 {
-            return None;
-        }
-        let older = T::from_words(load(self.slot(published.wrapping_sub(1))));
-        if ready(&older) { Some(older) } else { None }
+        Some(T::from_words(load(record)))
     }
 
     #[inline]
     fn slot(&self, count: u32) -> &[AtomicU32; N] {
-        let [even, odd] = &self.slots;
-        if count & 1 == 0 { even } else { odd }
+        &self.slots[count as usize % 2]
     }
 }
 

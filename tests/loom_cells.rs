@@ -91,7 +91,7 @@ fn a_downlink_gives_the_value_that_is_ready_while_the_next_one_is_written() {
         cell.publish(Message::number(2));
         let reader = Arc::clone(&cell);
         // Value 2 is ready; 3 is not yet, by its valid-from instant.
-        let thread = thread::spawn(move || reader.newest(|message| message.0[0] != 3));
+        let thread = thread::spawn(move || reader.newest(|record| record.word::<0>() != 3));
         cell.publish(Message::number(3));
         assert_eq!(thread.join().unwrap(), Some(Message::number(2)));
         assert_eq!(cell.newest(|_| true), Some(Message::number(3)));

@@ -28,6 +28,14 @@ pub struct VoltageCommand {
     pub revises: bool,
 }
 
+impl VoltageCommand {
+    /// Of a command where it lies, from when on it may be used.
+    #[inline]
+    pub fn valid_from(record: &Record<10>) -> Instant {
+        Instant(record.word::<8>())
+    }
+}
+
 impl Words<10> for VoltageCommand {
     fn to_words(self) -> [u32; 10] {
         let reference = self.reference;

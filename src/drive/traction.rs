@@ -490,7 +490,7 @@ impl<M: Machine> PwmTask<M> {
         let now = self.newest.begins;
         let currents_a = port.sample(now);
         self.currents_before_a = self.newest.currents_a;
-        let command = shared.command.newest(|command| now.reached(command.valid_from));
+        let command = shared.command.newest(|command| now.reached(VoltageCommand::valid_from(command)));
         self.check(&currents_a, &command, port, shared);
         let begins = now.after(self.newest.half.period_ticks);
         let pulsing = self.trip.is_none();
@@ -511,7 +511,7 @@ impl<M: Machine> PwmTask<M> {
     pub fn revise(&mut self, port: &mut impl PwmPort, shared: &Shared) {
         let Committal { at, begins, half, tripped, .. } = self.newest;
         // A command from before the last boundary was for the half that runs by now.
-        let command = shared.command.newest(|command| command.valid_from.reached(at));
+        let command = shared.command.newest(|command| VoltageCommand::valid_from(command).reached(at));
         if let Some(command) = command
             && command.revises
             && !tripped

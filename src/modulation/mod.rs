@@ -25,7 +25,7 @@ pub use ripple::{RippleFlux, ripple_share};
 pub use schedule::{Schedule, depth_limit, first_half};
 
 /// How the pulses are made.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(u8)]
 pub enum Mode {
     /// All gates off.
@@ -464,8 +464,9 @@ impl Modulator {
     fn locked(&mut self, start: Instant, pulse: Angle, seen: &Reference) -> CarrierPeriod {
         let carriers = self.mode.carriers();
         let end = boundary(self.next_half + 1, carriers);
-        let nominal = boundary(1, carriers).0 as f32 / seen.rate;
-        let wanted = (end - pulse).signed() as f32 / seen.rate;
+        let ticks_per_unit = 1.0 / seen.rate;
+        let nominal = boundary(1, carriers).0 as f32 * ticks_per_unit;
+        let wanted = (end - pulse).signed() as f32 * ticks_per_unit;
         if self.mode.is_carrier() {
             let (shortest, longest) = CARRIER_STRETCH;
             let period_ticks = self.whole_ticks(limit(wanted, shortest * nominal, longest * nominal));

@@ -52,7 +52,7 @@ impl<M: Machine> PwmTask<M> {
         self.now = now.after(self.settings.carrier_ticks);
         let [before, running] = self.periods;
         let sample = port.sample(now);
-        let command = shared.command.newest(|command| now.reached(command.valid_from));
+        let command = shared.command.newest(|command| now.reached(DualCommand::valid_from(command)));
         let violation = self.violation(&sample, command.as_ref(), &before, &running);
         self.check(violation, port);
         let mut next = PlayedPeriod::off(self.settings.half_steps());
