@@ -25,7 +25,8 @@ pub fn mtpa_passes<const PASSES: usize>(torque_nm: f32, start: Dq, tables: &Tabl
     current
 }
 
-/// One look-up of the parameters and of the universal curve, for T ≥ 0.
+/// One look-up of the parameters and of the universal curve, for T ≥ 0. Inlined, so that the compiler knows the tables.
+#[inline(always)]
 fn pass(torque: f32, at: Dq, tables: &Tables) -> Dq {
     let [psi_f, saliency] = tables.mtpa.parameters.at(at.d, at.q);
     let torque_per_flux = torque / (1.5 * tables.ratings.pole_pairs);

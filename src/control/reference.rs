@@ -125,7 +125,8 @@ struct Weakened {
     region: Region,
 }
 
-/// The point on the circle of flux linkage `psi`, for either sign of torque.
+/// The point on the circle of flux linkage `psi`, for either sign of torque. Inlined, so that the compiler knows the tables.
+#[inline(always)]
 fn weakened(torque_nm: f32, psi: f32, tables: &Tables) -> Weakened {
     let [circle, most] = tables.weakening.torque.at(psi);
     let torque = torque_nm.abs();

@@ -102,6 +102,8 @@ impl Committal {
     pub fn to_words(&self) -> [u32; COMMITTAL_WORDS] {
         let on = volt_ticks(self.half.on_ticks(0));
         let [period, u, v, w, packed] = half_to_words(self.half);
+        // What never toggles does so at the end.
+        let [u, v, w] = [u, v, w].map(|compare| compare.min(period));
         let [a, b, c] = currents_to_words(self.currents_a);
         let flags = u32::from(self.mirrored) * MIRRORED | u32::from(self.tripped) * TRIPPED;
         let (alpha, beta) = (on.alpha.to_bits(), on.beta.to_bits());
@@ -161,10 +163,10 @@ impl CommittalRecord<'_> {
     #[inline]
     pub fn volt_ticks_from(&self, elapsed: u32) -> AlphaBeta {
         let (period, packed) = (self.period_ticks(), self.0.word::<6>());
+        let left = period.saturating_sub(elapsed);
         let on = |compare: u32, level: u32| {
-            let toggle = if compare > elapsed { compare } else { elapsed };
-            let toggle = if toggle < period { toggle } else { period };
-            if packed & level != 0 { toggle.saturating_sub(elapsed) } else { period - toggle }
+            let before = compare.saturating_sub(elapsed);
+            if packed & level != 0 { before } else { left - before }
         };
         volt_ticks([on(self.0.word::<3>(), 1), on(self.0.word::<4>(), 2), on(self.0.word::<5>(), 4)])
     }

@@ -20,6 +20,7 @@ pub struct RippleFlux {
 impl RippleFlux {
     /// Of a pattern with a fundamental of `voltage_v` (peak phase) at a stator frequency of `omega` (rad/s, greater than zero).
     /// `None` for the triangular carriers: at their peaks and valleys the flux is that of the sampled fundamental.
+    #[inline]
     pub fn new(mode: Mode, voltage_v: f32, udc_v: f32, omega: f32) -> Option<Self> {
         if !mode.is_pattern() {
             return None;
