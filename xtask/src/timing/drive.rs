@@ -23,6 +23,8 @@ const END: &[u8] = b"end of the log";
 pub struct Bench {
     pub rig: PathBuf,
     pub qemu: PathBuf,
+    /// The rig's scenario.
+    pub scenario: &'static str,
     pub path: PathBuf,
     pub image: Image,
 }
@@ -39,7 +41,7 @@ pub struct Drive {
 }
 
 impl Bench {
-    /// Runs the rig's scenario `timing` with these options.
+    /// Runs the scenario with these options.
     pub fn drive(&self, options: &[&str]) -> Result<Drive> {
         let folder = std::env::temp_dir().join(format!("tractive-timing-{}", std::process::id()));
         std::fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
@@ -52,7 +54,7 @@ impl Bench {
         let (log, modes) = (folder.join("log"), folder.join("calls"));
         let (reader, mut end) = fifo(&log)?;
         let mut rig = Command::new(&self.rig);
-        rig.args(["run", "timing", "--on", "qemu", "--dt", "1e-3", "--out"]).arg(folder.join("out"));
+        rig.args(["run", self.scenario, "--on", "qemu", "--dt", "1e-3", "--out"]).arg(folder.join("out"));
         rig.arg("--image").arg(&self.path).arg("--qemu").arg(&self.qemu).arg("--calls").arg(&modes);
         let (filter, log) = (filter(&self.image), log.to_string_lossy().into_owned());
         for argument in ARGUMENTS.into_iter().chain(["-dfilter", &filter, "-D", &log]) {
