@@ -1,5 +1,6 @@
 //! Drives the image in the emulator and follows its log while it runs.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{File, OpenOptions};
 use std::io::{BufRead, BufReader, Read, Write};
 use std::path::{Path, PathBuf};
@@ -36,6 +37,10 @@ pub struct Drive {
     pub hits: Tally,
     pub behind: Tally,
     pub stack_bytes: i32,
+    /// Of each exception the addresses that its longest interrupt executed.
+    pub longest: BTreeMap<u32, Vec<u32>>,
+    /// Of each exception the addresses before which another one came.
+    pub interrupted: BTreeMap<u32, BTreeSet<u32>>,
     /// Interrupt, mode and stator frequency, in the order in which the rig served them.
     pub modes: Vec<(String, String, f64)>,
 }
@@ -95,8 +100,8 @@ impl Bench {
             line.clear();
         }
         outcome?;
-        let Meter { calls, hits, behind, stack_bytes, .. } = meter;
-        Ok(Drive { calls, hits, behind, stack_bytes, modes: Vec::new() })
+        let Meter { calls, hits, behind, stack_bytes, longest, interrupted, .. } = meter;
+        Ok(Drive { calls, hits, behind, stack_bytes, longest, interrupted, modes: Vec::new() })
     }
 }
 
