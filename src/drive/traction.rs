@@ -14,7 +14,7 @@ use crate::modulation::{
     CarrierPeriod, Devices, Mode, Modulator, Reference, Schedule, compensated, depth_limit, first_half,
     ripple_flux, ripple_share,
 };
-use crate::protection::{self, Fault, FrozenWatch, Trip, Violation};
+use crate::protection::{self, Fault, FrozenWatch, SafeState, Trip, Violation};
 use crate::time::{Clock, Instant};
 
 /// Angle units (2⁻³² turn) in one radian.
@@ -83,6 +83,8 @@ pub struct ControlTask {
     /// Mode that the newest command was made for, and the halves for which its flux hexagon still changes its size.
     unsettled: (Mode, u32),
     trip: Option<Trip>,
+    /// Number of the acknowledge that both interrupts have carried out.
+    acknowledged: u8,
 }
 
 impl ControlTask {
@@ -100,6 +102,7 @@ impl ControlTask {
             filled_to: 0.0,
             unsettled: (Mode::Off, 0),
             trip: None,
+            acknowledged: 0,
         }
     }
 
@@ -111,15 +114,31 @@ impl ControlTask {
         let before = self.controller.omega();
         let omega = self.controller.track(sample.measured.angle, &self.settings.clock);
         let applied = shared.applied.read().map(|applied| as_of(&applied, now));
+        self.forget_acknowledged(sample.acknowledge, applied.as_ref());
+        self.check(sample.hardware.map(|fault| (fault, 1.0, 0.0)), &sample, port);
         self.adopt_trip(applied.as_ref().and_then(|applied| applied.trip));
         self.check(
             protection::check_measurements(&sample.measured, omega, &self.tables.ratings),
             &sample,
             port,
         );
+        if sample.enable {
+            self.check(
+                protection::check_undervoltage(sample.measured.udc_v, &self.tables.ratings),
+                &sample,
+                port,
+            );
+        }
         self.check(protection::check_demand(&sample.demand), &sample, port);
         let pulsing = self.trip.is_none() && sample.enable && self.controller.speed_is_known();
-        let mut report = Report { frequency_hz: omega / core::f32::consts::TAU, ..Report::default() };
+        let mut report = Report {
+            frequency_hz: omega / core::f32::consts::TAU,
+            udc_v: sample.measured.udc_v,
+            current_a: sample.measured.currents_a.peak(),
+            speed_known: self.controller.speed_is_known(),
+            acknowledged: self.acknowledged,
+            ..Report::default()
+        };
         let mut command = VoltageCommand {
             reference: Reference {
                 voltage_v: 0.0,
@@ -132,6 +151,7 @@ impl ControlTask {
             },
             valid_from: self.now,
             gates: Gates::Off,
+            acknowledge: sample.acknowledge,
         };
         if pulsing {
             let frozen = self.watch.check(
@@ -192,6 +212,7 @@ impl ControlTask {
         let input = Input {
             measured: &sample.measured,
             demand: &sample.demand,
+            window: &sample.window,
             committed: &committed,
             boundary: boundary.as_ref(),
         };
@@ -344,6 +365,17 @@ impl ControlTask {
         self.trip = Some(Trip { fault, value, limit, at, safe });
     }
 
+    /// Forgets the fault that is acknowledged once the PWM interrupt has: what it told before that cannot come back, and
+    /// the safe state that it has left is not entered again for the old fault's sake.
+    fn forget_acknowledged(&mut self, acknowledge: u8, applied: Option<&Applied>) {
+        if acknowledge != self.acknowledged
+            && applied.is_some_and(|applied| applied.acknowledged[0] == acknowledge)
+        {
+            self.acknowledged = acknowledge;
+            self.trip = None;
+        }
+    }
+
     fn adopt_trip(&mut self, trip: Option<Trip>) {
         if self.trip.is_none() {
             self.trip = trip;
@@ -363,6 +395,7 @@ fn as_of(applied: &Applied, now: Instant) -> Applied {
         running: applied.before,
         next: applied.running,
         currents_a: applied.currents_before_a,
+        acknowledged: [applied.acknowledged[1]; 2],
         trip: applied.trip.filter(|trip| now.reached(trip.at)),
         ..*applied
     }
@@ -385,6 +418,8 @@ pub struct PwmTask {
     next: CarrierPeriod,
     currents_a: Abc,
     trip: Option<Trip>,
+    /// Number of the acknowledge that was carried out last.
+    acknowledged: u8,
 }
 
 impl PwmTask {
@@ -410,6 +445,7 @@ impl PwmTask {
             next: off,
             currents_a: Abc { a: 0.0, b: 0.0, c: 0.0 },
             trip: None,
+            acknowledged: 0,
         }
     }
 
@@ -426,6 +462,8 @@ impl PwmTask {
         let before = core::mem::replace(&mut self.running, self.next);
         let currents_before_a = core::mem::replace(&mut self.currents_a, port.sample(now));
         let command = shared.command.newest(|command| now.reached(command.valid_from));
+        let acknowledged_before = self.acknowledged;
+        self.forget_acknowledged(&command, port);
         self.check(&command, port);
         let start = now.after(self.running.period_ticks);
         let pulsing = self.trip.is_none();
@@ -448,6 +486,7 @@ impl PwmTask {
             currents_before_a,
             mirrored: self.modulator.is_mirrored(),
             trip: self.trip,
+            acknowledged: [self.acknowledged, acknowledged_before],
         });
     }
 
@@ -468,6 +507,26 @@ impl PwmTask {
     /// The latched fault.
     pub fn trip(&self) -> Option<Trip> {
         self.trip
+    }
+
+    /// Forgets the fault that is acknowledged and leaves the safe state, gates off. Each acknowledge does so once: while pulses are
+    /// made there is nothing to forget.
+    fn forget_acknowledged(&mut self, command: &Option<VoltageCommand>, port: &mut impl PwmPort) {
+        let Some(command) = command else {
+            return;
+        };
+        if command.acknowledge == self.acknowledged {
+            return;
+        }
+        self.acknowledged = command.acknowledge;
+        if command.gates == Gates::Pulse {
+            return;
+        }
+        self.trip = None;
+        if !port.leave(self.now) {
+            let (value, limit, safe) = (1.0, 0.0, SafeState::GatesOff);
+            self.trip = Some(Trip { fault: Fault::GatesHeld, value, limit, at: self.now, safe });
+        }
     }
 
     fn check(&mut self, command: &Option<VoltageCommand>, port: &mut impl PwmPort) {
