@@ -106,7 +106,13 @@ impl Pulsing {
     fn publish_of(&self, at: u32, voltage_v: f32, valid_from: u32, revises: bool) {
         let reference = reference(voltage_v, 1.0, Instant(at));
         let valid_from = Instant(valid_from);
-        self.shared.command.publish(VoltageCommand { reference, valid_from, gates: Gates::Pulse, revises });
+        self.shared.command.publish(VoltageCommand {
+            reference,
+            valid_from,
+            gates: Gates::Pulse,
+            revises,
+            acknowledge: 0,
+        });
     }
 
     fn revise(&mut self) -> Option<CarrierPeriod> {

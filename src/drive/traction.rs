@@ -14,7 +14,7 @@ use crate::modulation::{
     CarrierPeriod, Devices, Mode, Modulator, Reference, Schedule, compensated, depth_limit, first_half,
     ripple_flux, ripple_share,
 };
-use crate::protection::{self, Fault, FrozenWatch, Trip, Violation};
+use crate::protection::{self, Fault, FrozenWatch, SafeState, Trip, Violation};
 use crate::time::{Clock, Instant};
 
 /// Angle units (2⁻³² turn) in one radian.
@@ -97,6 +97,8 @@ pub struct ControlTask {
     /// Whether the newest command is for the half that is already committed.
     revises: bool,
     trip: Option<Trip>,
+    /// Number of the acknowledge that both interrupts have carried out.
+    acknowledged: u8,
 }
 
 impl ControlTask {
@@ -117,6 +119,7 @@ impl ControlTask {
             jumped: false,
             revises: false,
             trip: None,
+            acknowledged: 0,
         }
     }
 
@@ -134,15 +137,31 @@ impl ControlTask {
         let before = self.controller.omega();
         let omega = self.controller.track(sample.measured.angle, &self.settings.clock);
         let applied = shared.applied.read().map(|applied| as_of(&applied, now));
+        self.forget_acknowledged(sample.acknowledge, applied.as_ref());
+        self.check(sample.hardware.map(|fault| (fault, 1.0, 0.0)), &sample, port);
         self.adopt_trip(applied.as_ref().and_then(|applied| applied.trip));
         self.check(
             protection::check_measurements(&sample.measured, omega, &self.tables.ratings),
             &sample,
             port,
         );
+        if sample.enable {
+            self.check(
+                protection::check_undervoltage(sample.measured.udc_v, &self.tables.ratings),
+                &sample,
+                port,
+            );
+        }
         self.check(protection::check_demand(&sample.demand), &sample, port);
         let pulsing = self.trip.is_none() && sample.enable && self.controller.speed_is_known();
-        let mut report = Report { frequency_hz: omega / core::f32::consts::TAU, ..Report::default() };
+        let mut report = Report {
+            frequency_hz: omega / core::f32::consts::TAU,
+            udc_v: sample.measured.udc_v,
+            current_a: sample.measured.currents_a.peak(),
+            speed_known: self.controller.speed_is_known(),
+            acknowledged: self.acknowledged,
+            ..Report::default()
+        };
         let mut command = VoltageCommand {
             reference: Reference {
                 voltage_v: 0.0,
@@ -156,6 +175,7 @@ impl ControlTask {
             valid_from: self.now,
             gates: Gates::Off,
             revises: false,
+            acknowledge: sample.acknowledge,
         };
         if pulsing {
             let frozen = self.watch.check(
@@ -218,6 +238,7 @@ impl ControlTask {
         let input = Input {
             measured: &sample.measured,
             demand: &sample.demand,
+            window: &sample.window,
             committed: &committed,
             boundary: boundary.as_ref(),
         };
@@ -393,6 +414,17 @@ impl ControlTask {
         self.trip = Some(Trip { fault, value, limit, at, safe });
     }
 
+    /// Forgets the fault that is acknowledged once the PWM interrupt has: what it told before that cannot come back, and
+    /// the safe state that it has left is not entered again for the old fault's sake.
+    fn forget_acknowledged(&mut self, acknowledge: u8, applied: Option<&Applied>) {
+        if acknowledge != self.acknowledged
+            && applied.is_some_and(|applied| applied.acknowledged[0] == acknowledge)
+        {
+            self.acknowledged = acknowledge;
+            self.trip = None;
+        }
+    }
+
     fn adopt_trip(&mut self, trip: Option<Trip>) {
         if self.trip.is_none() {
             self.trip = trip;
@@ -412,6 +444,7 @@ fn as_of(applied: &Applied, now: Instant) -> Applied {
         running: applied.before,
         next: applied.running,
         currents_a: applied.currents_before_a,
+        acknowledged: [applied.acknowledged[1]; 2],
         trip: applied.trip.filter(|trip| now.reached(trip.at)),
         ..*applied
     }
@@ -472,9 +505,11 @@ impl PwmTask {
             running: last.next,
             currents_a: port.sample(now),
             currents_before_a: last.currents_a,
+            acknowledged: [last.acknowledged[0]; 2],
             ..last
         };
         let command = shared.command.newest(|command| now.reached(command.valid_from));
+        self.forget_acknowledged(&command, port);
         self.check(&command, port);
         let start = now.after(self.applied.running.period_ticks);
         let pulsing = self.applied.trip.is_none();
@@ -530,6 +565,26 @@ impl PwmTask {
     /// The latched fault.
     pub fn trip(&self) -> Option<Trip> {
         self.applied.trip
+    }
+
+    /// Forgets the fault that is acknowledged and leaves the safe state, gates off. Each acknowledge does so once: while pulses are
+    /// made there is nothing to forget.
+    fn forget_acknowledged(&mut self, command: &Option<VoltageCommand>, port: &mut impl PwmPort) {
+        let Some(command) = command else {
+            return;
+        };
+        if command.acknowledge == self.applied.acknowledged[0] {
+            return;
+        }
+        self.applied.acknowledged[0] = command.acknowledge;
+        if command.gates == Gates::Pulse {
+            return;
+        }
+        self.applied.trip = None;
+        if !port.leave(self.now) {
+            let (value, limit, safe) = (1.0, 0.0, SafeState::GatesOff);
+            self.applied.trip = Some(Trip { fault: Fault::GatesHeld, value, limit, at: self.now, safe });
+        }
     }
 
     fn check(&mut self, command: &Option<VoltageCommand>, port: &mut impl PwmPort) {

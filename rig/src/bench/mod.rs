@@ -15,7 +15,7 @@ use crate::plant::Plant;
 use crate::trace::{Row, Switch};
 use std::collections::VecDeque;
 use tractive::board::Sample;
-use tractive::control::Demand;
+use tractive::control::{Demand, LinkWindow};
 use tractive::drive::Report;
 use tractive::frames::{Abc, Angle};
 use tractive::modulation::{CarrierPeriod, Mode};
@@ -256,7 +256,9 @@ impl Bench {
         let t_s = self.seconds(self.now);
         let (demand, enable) = self.operator.demand(t_s);
         let measured = self.sensors.measure(&self.plant, t_s);
-        self.samples.push_back((self.now, Sample { measured, demand, enable }));
+        let sample =
+            Sample { measured, demand, enable, window: LinkWindow::OPEN, acknowledge: 0, hardware: None };
+        self.samples.push_back((self.now, sample));
         self.next_sample = self.now + Tick::from(self.clock.control_ticks);
         Ok(())
     }

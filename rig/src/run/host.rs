@@ -4,7 +4,7 @@ use super::Progress;
 use crate::bench::{Bench, BenchError};
 use crate::trace::Recording;
 use tractive::board::{ControlPort, PwmPort, Sample};
-use tractive::control::{Demand, Measurements};
+use tractive::control::{Demand, LinkWindow, Measurements};
 use tractive::drive::Report;
 use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
 use tractive::frames::{Abc, Angle};
@@ -24,7 +24,14 @@ impl ControlPort for Port<'_> {
         self.bench.control_sample(now).unwrap_or_else(|error| {
             self.error = Some(error);
             let measured = Measurements { currents_a: Abc::default(), udc_v: 0.0, angle: Angle::ZERO };
-            Sample { measured, demand: Demand::default(), enable: false }
+            Sample {
+                measured,
+                demand: Demand::default(),
+                enable: false,
+                window: LinkWindow::OPEN,
+                acknowledge: 0,
+                hardware: None,
+            }
         })
     }
 
