@@ -47,6 +47,10 @@ pub struct Inverter {
     /// Next toggle of each leg within the half.
     toggles: [Option<Tick>; 3],
     safe: Option<SafeState>,
+    /// A gate that no longer does what it is told: on (true) or off for good.
+    stuck: Option<(u8, bool)>,
+    /// Devices whose drivers have found a short circuit and block, a bit each in the order of [`GATES`].
+    blocked: u8,
     edges: Vec<Edge>,
 }
 
@@ -61,6 +65,8 @@ impl Inverter {
             half_start: 0,
             toggles: [None; 3],
             safe: None,
+            stuck: None,
+            blocked: 0,
             edges: Vec::new(),
         }
     }
@@ -137,8 +143,46 @@ impl Inverter {
         }
     }
 
+    /// A gate is stuck from now on: its device conducts (true) or not, whatever is ordered.
+    pub fn stick(&mut self, gate: u8, on: bool) {
+        self.stuck = Some((gate, on));
+        let leg = &self.legs[usize::from(gate / 2)];
+        if if gate.is_multiple_of(2) { leg.lower_on } else { leg.upper_on } {
+            self.turns_on(gate ^ 1);
+        }
+    }
+
+    /// A device is turned on. Where the other one of its leg is stuck on, its driver sees it desaturate, turns it off within some
+    /// microseconds, and blocks.
+    fn turns_on(&mut self, gate: u8) {
+        if self.stuck == Some((gate ^ 1, true)) {
+            self.blocked |= 1 << gate;
+        }
+    }
+
+    /// Devices whose drivers block, a bit each in the order of [`GATES`].
+    pub fn blocked(&self) -> u8 {
+        self.blocked
+    }
+
     /// The legs as the machine sees them.
     pub fn legs(&self) -> [Leg; 3] {
+        let mut legs = self.ordered_legs();
+        if let Some((gate, on)) = self.stuck
+            && let Some(leg) = legs.get_mut(usize::from(gate / 2))
+        {
+            let state = if gate.is_multiple_of(2) { Leg::Upper } else { Leg::Lower };
+            if on {
+                *leg = state;
+            } else if *leg == state {
+                *leg = Leg::Open;
+            }
+        }
+        legs
+    }
+
+    /// The legs as they would be without a stuck gate.
+    pub fn ordered_legs(&self) -> [Leg; 3] {
         self.legs.map(|leg| match (leg.upper_on, leg.lower_on) {
             (true, _) => Leg::Upper,
             (_, true) => Leg::Lower,
@@ -175,11 +219,15 @@ impl Inverter {
 
     fn gate(&mut self, phase: usize, upper: bool, on: bool, tick: Tick) {
         let leg = &mut self.legs[phase];
+        debug_assert!(!on || !(if upper { leg.lower_on } else { leg.upper_on }), "both devices of a leg on");
         let state = if upper { &mut leg.upper_on } else { &mut leg.lower_on };
         if *state != on {
             *state = on;
-            self.edges.push(Edge { tick, gate: (phase * 2) as u8 + u8::from(!upper), on });
+            let gate = (phase * 2) as u8 + u8::from(!upper);
+            self.edges.push(Edge { tick, gate, on });
+            if on {
+                self.turns_on(gate);
+            }
         }
-        debug_assert!(!(leg.upper_on && leg.lower_on), "both devices of a leg on");
     }
 }
