@@ -13,7 +13,7 @@ use crate::control::{Demand, Measurements};
 use crate::drive::Report;
 use crate::frames::Abc;
 use crate::modulation::CarrierPeriod;
-use crate::protection::SafeState;
+use crate::protection::{LegFaults, SafeState};
 use crate::time::Instant;
 
 pub use dual::{
@@ -41,6 +41,10 @@ pub trait ControlPort {
     fn overrun_ticks(&mut self, now: Instant) -> u32;
     /// What the control task did, for whoever watches.
     fn report(&mut self, now: Instant, report: &Report);
+    /// What the power stage tells of itself; nothing where it cannot.
+    fn leg_faults(&mut self) -> LegFaults {
+        LegFaults::default()
+    }
 }
 
 /// What the PWM interrupt needs of a board.
@@ -51,4 +55,8 @@ pub trait PwmPort {
     fn play(&mut self, now: Instant, next: &CarrierPeriod);
     /// Puts the gates into the safe state at once, whatever is played.
     fn enter(&mut self, safe: SafeState, now: Instant);
+    /// As [`ControlPort::leg_faults`].
+    fn leg_faults(&mut self) -> LegFaults {
+        LegFaults::default()
+    }
 }

@@ -14,7 +14,7 @@ use crate::modulation::{
     CarrierPeriod, Devices, Mode, Modulator, Reference, Schedule, compensated, depth_limit, first_half,
     ripple_flux, ripple_share,
 };
-use crate::protection::{self, Fault, FrozenWatch, Trip, Violation};
+use crate::protection::{self, Disarmed, Fault, FrozenWatch, Trip, Violation};
 use crate::time::{Clock, Instant};
 
 /// Angle units (2⁻³² turn) in one radian.
@@ -82,6 +82,7 @@ pub struct ControlTask {
     filled_to: f32,
     /// Mode that the newest command was made for, and the halves for which its flux hexagon still changes its size.
     unsettled: (Mode, u32),
+    disarmed: Disarmed,
     trip: Option<Trip>,
 }
 
@@ -99,8 +100,15 @@ impl ControlTask {
             depth: 0.0,
             filled_to: 0.0,
             unsettled: (Mode::Off, 0),
+            disarmed: Disarmed::NONE,
             trip: None,
         }
+    }
+
+    /// The same without a check.
+    pub const fn without(mut self, disarmed: Disarmed) -> Self {
+        self.disarmed = disarmed;
+        self
     }
 
     /// The control timer's interrupt. Deadline: one control period after its nominal instant; a missed one is a fault.
@@ -108,10 +116,10 @@ impl ControlTask {
         let now = self.now;
         self.now = now.after(self.settings.clock.control_ticks);
         let sample = port.sample(now);
-        let before = self.controller.omega();
-        let omega = self.controller.track(sample.measured.angle, &self.settings.clock);
         let applied = shared.applied.read().map(|applied| as_of(&applied, now));
         self.adopt_trip(applied.as_ref().and_then(|applied| applied.trip));
+        self.check_legs(&sample, port);
+        let omega = self.track(&sample, port);
         self.check(
             protection::check_measurements(&sample.measured, omega, &self.tables.ratings),
             &sample,
@@ -136,7 +144,7 @@ impl ControlTask {
         if pulsing {
             let frozen = self.watch.check(
                 &sample.measured,
-                before,
+                omega,
                 self.settings.clock.control_s(),
                 &self.tables.ratings,
             );
@@ -173,6 +181,20 @@ impl ControlTask {
     /// The latched fault.
     pub fn trip(&self) -> Option<Trip> {
         self.trip
+    }
+
+    /// Follows the angle; returns the electrical speed, in rad/s. An angle that cannot be leaves the speed as it was.
+    fn track(&mut self, sample: &Sample, port: &mut impl ControlPort) -> f32 {
+        let clock = self.settings.clock;
+        if self.controller.speed_is_known() {
+            let surprise_rad = self.controller.surprise_rad(sample.measured.angle, &clock);
+            let lost = protection::check_angle(surprise_rad);
+            if lost.is_some() && !self.disarmed.has(Fault::AngleLost) {
+                self.check(lost, sample, port);
+                return self.controller.omega();
+            }
+        }
+        self.controller.track(sample.measured.angle, &clock)
     }
 
     /// Control law and its surroundings, while pulses are made.
@@ -337,11 +359,26 @@ impl ControlTask {
         let (Some((fault, value, limit)), None) = (violation, self.trip) else {
             return;
         };
+        if self.disarmed.has(fault) {
+            return;
+        }
         let at = self.now.before(self.settings.clock.control_ticks);
         let safe =
             protection::safe_state(self.controller.omega(), sample.measured.udc_v, &self.tables.ratings);
         port.enter(safe, at);
         self.trip = Some(Trip { fault, value, limit, at, safe });
+    }
+
+    /// First of all checks: a leg that is stuck decides on the safe state.
+    fn check_legs(&mut self, sample: &Sample, port: &mut impl ControlPort) {
+        let found = port.leg_faults();
+        if let (Some((fault, value, limit)), None) = (found.check(), self.trip) {
+            let at = self.now.before(self.settings.clock.control_ticks);
+            let (omega, ratings) = (self.controller.omega(), &self.tables.ratings);
+            let safe = found.safe_state(omega, sample.measured.udc_v, ratings);
+            port.enter(safe, at);
+            self.trip = Some(Trip { fault, value, limit, at, safe });
+        }
     }
 
     fn adopt_trip(&mut self, trip: Option<Trip>) {
@@ -384,6 +421,7 @@ pub struct PwmTask {
     running: CarrierPeriod,
     next: CarrierPeriod,
     currents_a: Abc,
+    disarmed: Disarmed,
     trip: Option<Trip>,
 }
 
@@ -409,8 +447,15 @@ impl PwmTask {
             running: off,
             next: off,
             currents_a: Abc { a: 0.0, b: 0.0, c: 0.0 },
+            disarmed: Disarmed::NONE,
             trip: None,
         }
+    }
+
+    /// The same without a check.
+    pub const fn without(mut self, disarmed: Disarmed) -> Self {
+        self.disarmed = disarmed;
+        self
     }
 
     /// The same for a timer whose first two halves, before the first one of the modulator's, have another length.
@@ -474,8 +519,11 @@ impl PwmTask {
         if self.trip.is_some() {
             return;
         }
-        let violation = protection::check_currents(&self.currents_a, &self.tables.ratings)
-            .or_else(|| command.as_ref().and_then(|command| self.stale(command)));
+        let legs = port.leg_faults();
+        let armed = |(fault, _, _): &Violation| !self.disarmed.has(*fault);
+        let currents = || protection::check_currents(&self.currents_a, &self.tables.ratings);
+        let stale = || command.as_ref().and_then(|command| self.stale(command));
+        let violation = legs.check().or_else(|| currents().filter(armed)).or_else(|| stale().filter(armed));
         let Some((fault, value, limit)) = violation else {
             return;
         };
@@ -484,7 +532,7 @@ impl PwmTask {
             None => (0.0, self.tables.ratings.dc_link_nominal_v),
         };
         let omega = rate * self.settings.clock.ticks_per_s / UNITS_PER_RADIAN;
-        let safe = protection::safe_state(omega, udc_v, &self.tables.ratings);
+        let safe = legs.safe_state(omega, udc_v, &self.tables.ratings);
         port.enter(safe, self.now);
         self.trip = Some(Trip { fault, value, limit, at: self.now, safe });
     }

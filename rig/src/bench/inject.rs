@@ -15,7 +15,9 @@ pub enum Kind {
     Supply(SupplyFault),
     /// A gate, in the order of [`super::GATES`], is stuck: on (true) or off.
     Gate(u8, bool),
-    /// The feedback of leg 0 ..= 2 tells the opposite.
+    /// A device, in the order of [`super::GATES`], has failed and conducts for good.
+    Device(u8),
+    /// The monitor of leg 0 ..= 2 tells of an output at the lower rail.
     Feedback(usize),
     /// The control interrupt ends this many ticks after its period.
     ControlLate(u32),

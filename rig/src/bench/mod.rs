@@ -12,12 +12,12 @@ mod observe;
 mod sensors;
 
 pub use inject::Injection;
-pub use inverter::{Edge, GATES, Inverter};
+pub use inverter::{Edge, GATES, Inverter, Stuck};
 pub use link::{LineFilter, Supply};
 pub use observe::{Observed, Peaks};
 pub use sensors::{Converter, Flaws, Sensors};
 
-use crate::plant::{Leg, Plant};
+use crate::plant::Plant;
 use crate::trace::{Row, Switch};
 use inject::{Kind, Spoiler};
 use link::Link;
@@ -27,7 +27,7 @@ use tractive::control::Demand;
 use tractive::drive::Report;
 use tractive::frames::{Abc, Angle};
 use tractive::modulation::{CarrierPeriod, Mode};
-use tractive::protection::SafeState;
+use tractive::protection::{LegFaults, SafeState};
 use tractive::time::{Clock, Instant};
 
 /// Ticks since the run's beginning.
@@ -105,8 +105,6 @@ pub struct Bench {
     link: Option<Link>,
     spoiler: Spoiler,
     observed: Observed,
-    /// Outputs of the legs just before the last carrier boundary: at the upper rail or not.
-    outputs: [bool; 3],
     operator: Box<dyn Operator + Send>,
     clock: Clock,
     tick_s: f64,
@@ -144,7 +142,6 @@ impl Bench {
             },
             spoiler: Spoiler::new(settings.injection),
             observed: Observed::new(from),
-            outputs: [false; 3],
             operator,
             clock: settings.clock,
             tick_s,
@@ -207,19 +204,13 @@ impl Bench {
         Ok(self.read_currents(currents_a))
     }
 
-    /// Outputs of the legs just before the last carrier boundary, a bit each: at the upper rail.
-    pub fn leg_feedback(&self) -> u8 {
-        let wrong = match self.spoiler.kind(self.seconds(self.now)) {
-            Some(Kind::Feedback(leg)) => 1 << leg,
-            _ => 0,
-        };
-        let [u, v, w] = self.outputs.map(u8::from);
-        (u | v << 1 | w << 2) ^ wrong
-    }
-
-    /// Devices whose drivers block, a bit each in the order of [`GATES`].
-    pub fn blocked_gates(&self) -> u8 {
-        self.inverter.blocked()
+    /// What drivers and monitors of the legs have found.
+    pub fn leg_faults(&self) -> LegFaults {
+        let mut found = self.inverter.leg_faults();
+        if let Some(Kind::Feedback(leg)) = self.spoiler.kind(self.seconds(self.now)) {
+            found.low |= 1 << leg;
+        }
+        found
     }
 
     /// By how much the control interrupt is late, in ticks.
@@ -314,7 +305,9 @@ impl Bench {
                 let drawn_j = self.plant.energies().electrical_j - before_j;
                 link.advance(drawn_j, dt_s, self.sensors.udc_v(t_s), self.spoiler.supply(t_s));
             }
-            self.watch(legs);
+            if self.inverter.monitor(self.plant.currents_abc(), self.now, tick) {
+                self.observed.makes_a_difference(self.now);
+            }
             self.now = tick;
             let udc_v = self.udc_v(self.seconds(tick));
             self.observed.note(tick, self.plant.currents_abc(), udc_v);
@@ -329,24 +322,14 @@ impl Bench {
         }
     }
 
-    /// Notes where a leg's output is not what is ordered.
-    fn watch(&mut self, legs: [Leg; 3]) {
-        let ordered = self.inverter.ordered_legs();
-        if legs != ordered {
-            let currents_a = self.plant.currents_abc();
-            let differs = (0..3).any(|k| legs[k].is_high(currents_a[k]) != ordered[k].is_high(currents_a[k]));
-            if differs {
-                self.observed.makes_a_difference(self.now);
-            }
-        }
-    }
-
     fn act(&mut self) -> Result<(), BenchError> {
         let now = self.now;
         if now == self.observed.from {
             self.observed.carrier_ticks = 2 * Tick::from(self.inverter.half().period_ticks);
-            if let Some(Kind::Gate(gate, on)) = self.spoiler.kind(self.seconds(now)) {
-                self.inverter.stick(gate, on);
+            match self.spoiler.kind(self.seconds(now)) {
+                Some(Kind::Gate(gate, on)) => self.inverter.stick(gate, if on { Stuck::On } else { Stuck::Off }),
+                Some(Kind::Device(gate)) => self.inverter.stick(gate, Stuck::Shorted),
+                _ => {}
             }
         }
         if let Some((at, safe)) = self.safe
@@ -359,9 +342,6 @@ impl Bench {
         }
         self.inverter.act(now);
         if now == self.inverter.half_end() {
-            let currents_a = self.plant.currents_abc();
-            let legs = self.inverter.legs();
-            self.outputs = core::array::from_fn(|k| legs[k].is_high(currents_a[k]));
             let next = self.next.take().ok_or(BenchError::NothingToPlay(self.seconds(now)))?;
             self.note_switch(&next);
             self.inverter.begin(next, now);

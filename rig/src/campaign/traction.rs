@@ -35,7 +35,7 @@ pub const POINTS: [(f64, f64); 17] = [
 ];
 
 /// When the fault comes, in s.
-const FAULT_S: f64 = 0.005;
+const FAULT_S: f64 = 0.005_037;
 /// When another torque is wanted, in s: a fault that has not shown must not hide for ever.
 const TURN_S: f64 = 0.125;
 /// End, in s.
@@ -71,6 +71,7 @@ pub fn faults() -> Vec<(String, Cause)> {
         ("uh-stuck-on".to_owned(), Cause::Injected(Kind::Gate(0, true))),
         ("uh-stuck-off".to_owned(), Cause::Injected(Kind::Gate(0, false))),
         ("ul-stuck-on".to_owned(), Cause::Injected(Kind::Gate(1, true))),
+        ("uh-device".to_owned(), Cause::Injected(Kind::Device(0))),
         ("link-lost".to_owned(), Cause::Injected(Kind::Supply(SupplyFault::Lost))),
         ("link-over".to_owned(), Cause::Injected(Kind::Supply(SupplyFault::To(2300.0)))),
         ("link-swings".to_owned(), Cause::Injected(Kind::Supply(SupplyFault::Swinging(300.0, 30.0)))),

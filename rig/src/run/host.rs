@@ -10,7 +10,7 @@ use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
 use tractive::frames::{Abc, Angle};
 use tractive::machine::Tables;
 use tractive::modulation::CarrierPeriod;
-use tractive::protection::SafeState;
+use tractive::protection::{LegFaults, SafeState};
 use tractive::time::Instant;
 
 /// The bench behind a board's ports; the first error ends the run.
@@ -39,6 +39,10 @@ impl ControlPort for Port<'_> {
     fn report(&mut self, now: Instant, report: &Report) {
         self.bench.control_report(now, *report);
     }
+
+    fn leg_faults(&mut self) -> LegFaults {
+        self.bench.leg_faults()
+    }
 }
 
 impl PwmPort for Port<'_> {
@@ -55,6 +59,10 @@ impl PwmPort for Port<'_> {
 
     fn enter(&mut self, safe: SafeState, now: Instant) {
         self.bench.enter(now, safe);
+    }
+
+    fn leg_faults(&mut self) -> LegFaults {
+        self.bench.leg_faults()
     }
 }
 
