@@ -97,8 +97,7 @@ impl Request {
             }
             6 => {
                 let [safe, ..] = payload;
-                let short = safe == SafeState::ShortCircuit as u32;
-                Self::Enter(at, if short { SafeState::ShortCircuit } else { SafeState::GatesOff })
+                Self::Enter(at, SafeState::from_code(safe))
             }
             7 => Self::Dead,
             _ => return None,

@@ -196,11 +196,7 @@ pub fn trip_from_words(words: [u32; 4]) -> Option<Trip> {
         value: f32::from_bits(value),
         limit: f32::from_bits(limit),
         at: Instant(at),
-        safe: if code >> 8 & 0xFF == SafeState::ShortCircuit as u32 {
-            SafeState::ShortCircuit
-        } else {
-            SafeState::GatesOff
-        },
+        safe: SafeState::from_code(code >> 8 & 0xFF),
     })
 }
 

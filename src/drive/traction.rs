@@ -14,7 +14,7 @@ use crate::modulation::{
     CarrierPeriod, Devices, Mode, Modulator, Reference, Schedule, compensated, depth_limit, first_half,
     ripple_flux, ripple_share,
 };
-use crate::protection::{self, Fault, FrozenWatch, SafeState, Trip, Violation};
+use crate::protection::{self, Disarmed, Fault, FrozenWatch, SafeState, Trip, Violation};
 use crate::time::{Clock, Instant};
 
 /// Angle units (2⁻³² turn) in one radian.
@@ -96,6 +96,7 @@ pub struct ControlTask {
     jumped: bool,
     /// Whether the newest command is for the half that is already committed.
     revises: bool,
+    disarmed: Disarmed,
     trip: Option<Trip>,
     /// Number of the acknowledge that both interrupts have carried out.
     acknowledged: u8,
@@ -118,6 +119,7 @@ impl ControlTask {
             demand_nm: 0.0,
             jumped: false,
             revises: false,
+            disarmed: Disarmed::NONE,
             trip: None,
             acknowledged: 0,
         }
@@ -129,17 +131,23 @@ impl ControlTask {
         self.revises
     }
 
+    /// The same without a check.
+    pub const fn without(mut self, disarmed: Disarmed) -> Self {
+        self.disarmed = disarmed;
+        self
+    }
+
     /// The control timer's interrupt. Deadline: one control period after its nominal instant; a missed one is a fault.
     pub fn run(&mut self, port: &mut impl ControlPort, shared: &Shared) {
         let now = self.now;
         self.now = now.after(self.settings.clock.control_ticks);
         let sample = port.sample(now);
-        let before = self.controller.omega();
-        let omega = self.controller.track(sample.measured.angle, &self.settings.clock);
         let applied = shared.applied.read().map(|applied| as_of(&applied, now));
         self.forget_acknowledged(sample.acknowledge, applied.as_ref());
         self.check(sample.hardware.map(|fault| (fault, 1.0, 0.0)), &sample, port);
         self.adopt_trip(applied.as_ref().and_then(|applied| applied.trip));
+        self.check_legs(&sample, port);
+        let omega = self.track(&sample, port);
         self.check(
             protection::check_measurements(&sample.measured, omega, &self.tables.ratings),
             &sample,
@@ -180,7 +188,7 @@ impl ControlTask {
         if pulsing {
             let frozen = self.watch.check(
                 &sample.measured,
-                before,
+                omega,
                 self.settings.clock.control_s(),
                 &self.tables.ratings,
             );
@@ -218,6 +226,20 @@ impl ControlTask {
     /// The latched fault.
     pub fn trip(&self) -> Option<Trip> {
         self.trip
+    }
+
+    /// Follows the angle; returns the electrical speed, in rad/s. An angle that cannot be leaves the speed as it was.
+    fn track(&mut self, sample: &Sample, port: &mut impl ControlPort) -> f32 {
+        let clock = self.settings.clock;
+        if self.controller.speed_is_known() {
+            let surprise_rad = self.controller.surprise_rad(sample.measured.angle, &clock);
+            let lost = protection::check_angle(surprise_rad);
+            if lost.is_some() && !self.disarmed.has(Fault::AngleLost) {
+                self.check(lost, sample, port);
+                return self.controller.omega();
+            }
+        }
+        self.controller.track(sample.measured.angle, &clock)
     }
 
     /// Control law and its surroundings, while pulses are made.
@@ -407,6 +429,9 @@ impl ControlTask {
         let (Some((fault, value, limit)), None) = (violation, self.trip) else {
             return;
         };
+        if self.disarmed.has(fault) {
+            return;
+        }
         let at = self.now.before(self.settings.clock.control_ticks);
         let safe =
             protection::safe_state(self.controller.omega(), sample.measured.udc_v, &self.tables.ratings);
@@ -422,6 +447,18 @@ impl ControlTask {
         {
             self.acknowledged = acknowledge;
             self.trip = None;
+        }
+    }
+
+    /// First of all checks: a leg that is stuck decides on the safe state.
+    fn check_legs(&mut self, sample: &Sample, port: &mut impl ControlPort) {
+        let found = port.leg_faults();
+        if let (Some((fault, value, limit)), None) = (found.check(), self.trip) {
+            let at = self.now.before(self.settings.clock.control_ticks);
+            let (omega, ratings) = (self.controller.omega(), &self.tables.ratings);
+            let safe = found.safe_state(omega, sample.measured.udc_v, ratings);
+            port.enter(safe, at);
+            self.trip = Some(Trip { fault, value, limit, at, safe });
         }
     }
 
@@ -464,6 +501,7 @@ pub struct PwmTask {
     /// Nominal instant of the next call: the boundary where `applied.next` begins.
     now: Instant,
     applied: Applied,
+    disarmed: Disarmed,
 }
 
 impl PwmTask {
@@ -486,7 +524,14 @@ impl PwmTask {
             modulator: Modulator::new(settings.devices, schedule),
             now: first,
             applied: Applied::at_rest(first, off),
+            disarmed: Disarmed::NONE,
         }
+    }
+
+    /// The same without a check.
+    pub const fn without(mut self, disarmed: Disarmed) -> Self {
+        self.disarmed = disarmed;
+        self
     }
 
     /// The same for a timer whose first two halves, before the first one of the modulator's, have another length.
@@ -591,8 +636,11 @@ impl PwmTask {
         if self.applied.trip.is_some() {
             return;
         }
-        let violation = protection::check_currents(&self.applied.currents_a, &self.tables.ratings)
-            .or_else(|| command.as_ref().and_then(|command| self.stale(command)));
+        let legs = port.leg_faults();
+        let armed = |(fault, _, _): &Violation| !self.disarmed.has(*fault);
+        let currents = || protection::check_currents(&self.applied.currents_a, &self.tables.ratings);
+        let stale = || command.as_ref().and_then(|command| self.stale(command));
+        let violation = legs.check().or_else(|| currents().filter(armed)).or_else(|| stale().filter(armed));
         let Some((fault, value, limit)) = violation else {
             return;
         };
@@ -601,7 +649,7 @@ impl PwmTask {
             None => (0.0, self.tables.ratings.dc_link_nominal_v),
         };
         let omega = rate * self.settings.clock.ticks_per_s / UNITS_PER_RADIAN;
-        let safe = protection::safe_state(omega, udc_v, &self.tables.ratings);
+        let safe = legs.safe_state(omega, udc_v, &self.tables.ratings);
         port.enter(safe, self.now);
         self.applied.trip = Some(Trip { fault, value, limit, at: self.now, safe });
     }

@@ -159,7 +159,8 @@ impl PwmPort for Pwm {
 #[inline]
 fn enter(registers: &Registers, safe: SafeState) {
     match safe {
-        SafeState::GatesOff => registers.legs.trip(),
+        // Nothing here tells of a leg stuck at the upper rail.
+        SafeState::GatesOff | SafeState::UpperShortCircuit => registers.legs.trip(),
         SafeState::ShortCircuit => registers.legs.short_circuit(),
     }
 }
