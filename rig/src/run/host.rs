@@ -11,6 +11,7 @@ use tractive::frames::{Abc, Angle};
 use tractive::machine::Tables;
 use tractive::modulation::CarrierPeriod;
 use tractive::protection::SafeState;
+use tractive::recorder::Recorder;
 use tractive::time::Instant;
 
 /// The bench behind a board's ports; the first error ends the run.
@@ -66,7 +67,8 @@ pub fn run_on_host(
     settings: Settings,
     first_half_ticks: u32,
 ) -> Result<Recording, BenchError> {
-    let shared = Shared::new();
+    let recorder = Recorder::new();
+    let shared = Shared::recorded_by(&recorder);
     let mut control_at = Instant(settings.clock.control_ticks);
     let mut pwm_at = Instant(first_half_ticks);
     let mut control = ControlTask::new(tables, settings, control_at);
@@ -87,5 +89,6 @@ pub fn run_on_host(
         }
         progress.show(bench.progress());
     }
-    Ok(super::record(bench))
+    let records = (0..).map_while(|index| recorder.read(index)).collect();
+    Ok(super::record(bench, records))
 }
