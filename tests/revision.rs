@@ -66,7 +66,7 @@ impl PwmPort for Played {
 /// A drive whose PWM interrupt has come at three boundaries, with pulses since the second.
 struct Pulsing {
     pwm: PwmTask,
-    shared: Shared,
+    shared: Shared<'static>,
     played: Played,
 }
 

@@ -15,6 +15,7 @@ use crate::modulation::{
     ripple_flux, ripple_share,
 };
 use crate::protection::{self, Disarmed, Fault, FrozenWatch, SafeState, Trip, Violation};
+use crate::recorder::{Record, Recorder, State};
 use crate::time::{Clock, Instant};
 
 /// Angle units (2⁻³² turn) in one radian.
@@ -50,24 +51,31 @@ pub struct Settings {
     pub gains: Gains,
 }
 
-/// The cells between the two interrupts.
-pub struct Shared {
+/// The cells between the two interrupts, and the flight recorder, if there is one.
+pub struct Shared<'a> {
     /// What control wants of the modulator.
     pub command: Downlink<VoltageCommand, 9>,
     /// What the modulator does.
     pub applied: Uplink<Applied, 27>,
+    recorder: Option<&'a Recorder>,
 }
 
-impl Shared {
+impl<'a> Shared<'a> {
     /// Empty cells.
     #[cfg(not(loom))]
     pub const fn new() -> Self {
-        Self { command: Downlink::new(), applied: Uplink::new() }
+        Self { command: Downlink::new(), applied: Uplink::new(), recorder: None }
+    }
+
+    /// The same with a flight recorder, which the control interrupt fills.
+    #[cfg(not(loom))]
+    pub const fn recorded_by(recorder: &'a Recorder) -> Self {
+        Self { command: Downlink::new(), applied: Uplink::new(), recorder: Some(recorder) }
     }
 }
 
 #[cfg(not(loom))]
-impl Default for Shared {
+impl Default for Shared<'_> {
     fn default() -> Self {
         Self::new()
     }
@@ -215,7 +223,31 @@ impl ControlTask {
         self.revises = command.revises && command.gates == Gates::Pulse;
         shared.command.publish(command);
         report.trip = self.trip;
+        if let Some(recorder) = shared.recorder {
+            let mode = applied.as_ref().map_or(Mode::Off, |applied| applied.running.mode);
+            recorder.record(self.entry(now, &sample, &report, mode, command.gates), self.trip.is_some());
+        }
         port.report(now, &report);
+    }
+
+    /// The period's entry in the flight recorder.
+    #[inline(always)]
+    fn entry(&self, at: Instant, sample: &Sample, report: &Report, mode: Mode, gates: Gates) -> Record {
+        Record {
+            at,
+            currents_a: sample.measured.currents_a,
+            udc_v: sample.measured.udc_v,
+            angle: sample.measured.angle,
+            id_a: report.id_a,
+            iq_a: report.iq_a,
+            voltage_v: report.voltage_v,
+            state: State {
+                mode,
+                enabled: sample.enable,
+                pulsing: gates == Gates::Pulse,
+                fault: self.trip.map(|trip| trip.fault),
+            },
+        }
     }
 
     /// Nominal instant of the next call.

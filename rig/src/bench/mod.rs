@@ -178,6 +178,11 @@ impl Bench {
         (self.rows, self.switches, edges, self.lead, self.tick_s)
     }
 
+    /// An instant near to now, in s from the recording's beginning.
+    pub fn instant_s(&self, instant: Instant) -> f64 {
+        self.seconds(self.widen(instant))
+    }
+
     /// The conversions that the control timer triggered at `instant`.
     pub fn control_sample(&mut self, instant: Instant) -> Result<Sample, BenchError> {
         let tick = self.widen(instant);

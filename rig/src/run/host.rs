@@ -11,6 +11,7 @@ use tractive::frames::{Abc, Angle};
 use tractive::machine::Tables;
 use tractive::modulation::CarrierPeriod;
 use tractive::protection::{LegFaults, SafeState};
+use tractive::recorder::Recorder;
 use tractive::time::Instant;
 
 /// The bench behind a board's ports; the first error ends the run.
@@ -81,23 +82,25 @@ pub fn run_on_host(
     settings: Settings,
     first_half_ticks: u32,
 ) -> Result<Recording, BenchError> {
+    let recorder = Recorder::new();
     let mut progress = Progress::new(name);
-    let tasks = Tasks::new(tables, settings, first_half_ticks);
+    let tasks = Tasks::new(tables, settings, first_half_ticks).recorded_by(&recorder);
     tasks.drive(&mut bench, |bench| {
         progress.show(bench.progress());
         true
     })?;
-    Ok(super::record(bench))
+    let records = (0..).map_while(|index| recorder.read(index)).collect();
+    Ok(super::record(bench, records))
 }
 
 /// Both tasks and the cells between them.
-pub struct Tasks {
+pub struct Tasks<'a> {
     control: ControlTask,
     pwm: PwmTask,
-    shared: Shared,
+    shared: Shared<'a>,
 }
 
-impl Tasks {
+impl<'a> Tasks<'a> {
     /// Before their first interrupts.
     pub fn new(tables: &'static Tables, settings: Settings, first_half_ticks: u32) -> Self {
         let first_control = Instant(settings.clock.control_ticks);
@@ -106,6 +109,12 @@ impl Tasks {
             pwm: PwmTask::new(tables, settings, Instant(first_half_ticks)).after_halves_of(first_half_ticks),
             shared: Shared::new(),
         }
+    }
+
+    /// The same with a flight recorder.
+    pub fn recorded_by(mut self, recorder: &'a Recorder) -> Self {
+        self.shared = Shared::recorded_by(recorder);
+        self
     }
 
     /// Until the bench's recording is complete, or nobody wants to see more of it.
