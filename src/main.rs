@@ -22,7 +22,7 @@ mod firmware {
     use tractive::modulation::Devices;
     use tractive::time::Instant;
 
-    static SHARED: Shared = Shared::new();
+    static SHARED: Shared = Shared::recorded_by(&qemu::RECORDER);
     static MIN_PULSE_TICKS: AtomicU32 = AtomicU32::new(0);
     static DEAD_TIME_TICKS: AtomicU32 = AtomicU32::new(0);
     static FIRST_HALF_TICKS: AtomicU32 = AtomicU32::new(0);

@@ -66,7 +66,7 @@ impl PwmPort for Played {
 /// A drive whose PWM interrupt has come at three boundaries, with pulses since the second.
 struct Pulsing {
     pwm: PwmTask,
-    shared: Shared,
+    shared: Shared<'static>,
     played: Played,
 }
 
@@ -106,7 +106,13 @@ impl Pulsing {
     fn publish_of(&self, at: u32, voltage_v: f32, valid_from: u32, revises: bool) {
         let reference = reference(voltage_v, 1.0, Instant(at));
         let valid_from = Instant(valid_from);
-        self.shared.command.publish(VoltageCommand { reference, valid_from, gates: Gates::Pulse, revises });
+        self.shared.command.publish(VoltageCommand {
+            reference,
+            valid_from,
+            gates: Gates::Pulse,
+            revises,
+            acknowledge: 0,
+        });
     }
 
     /// Boundaries and what their halves give, as control reads them: of the next half, and of the running one.

@@ -18,12 +18,16 @@ use crate::frames::Abc;
 use crate::link::Setup;
 use crate::modulation::CarrierPeriod;
 use crate::protection::SafeState;
+use crate::recorder::Recorder;
 use crate::time::{Clock, Instant};
 use cortex_m::peripheral::NVIC;
 use cortex_m_semihosting::debug;
 
 /// 25 MHz ticks; control at 10 kHz.
 pub const CLOCK: Clock = Clock::new(25_000_000, 2_500);
+
+/// The PMaSynRM drive's flight recorder. The rig reads it when the run is over.
+pub static RECORDER: Recorder = Recorder::new();
 
 const CONTROL_TIMER: usize = 0x4000_0000;
 const PWM_TIMER: usize = 0x4000_2000;

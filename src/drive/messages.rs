@@ -26,6 +26,8 @@ pub struct VoltageCommand {
     pub gates: Gates,
     /// Whether it is for the half that is already committed, not for the one after it.
     pub revises: bool,
+    /// Number of the operator's last acknowledge.
+    pub acknowledge: u8,
 }
 
 impl VoltageCommand {
@@ -49,7 +51,9 @@ impl Words<10> for VoltageCommand {
             reference.udc_v.to_bits(),
             reference.depth.to_bits(),
             self.valid_from.0,
-            u32::from(self.gates == Gates::Pulse) | u32::from(self.revises) << 1,
+            u32::from(self.gates == Gates::Pulse)
+                | u32::from(self.revises) << 1
+                | u32::from(self.acknowledge) << 8,
         ]
     }
 
@@ -68,6 +72,7 @@ impl Words<10> for VoltageCommand {
             valid_from: Instant(valid_from),
             gates: if flags & 1 != 0 { Gates::Pulse } else { Gates::Off },
             revises: flags & 2 != 0,
+            acknowledge: (flags >> 8) as u8,
         }
     }
 }
@@ -88,10 +93,12 @@ pub struct Committal {
     pub mirrored: bool,
     /// Whether the PWM interrupt has found a fault; it then stands in a cell of its own.
     pub tripped: bool,
+    /// Number of the acknowledge that it carried out last.
+    pub acknowledged: u8,
 }
 
 /// Words of a [`Committal`] in its cell.
-pub const COMMITTAL_WORDS: usize = 12;
+pub const COMMITTAL_WORDS: usize = 13;
 
 const MIRRORED: u32 = 1 << 3;
 const TRIPPED: u32 = 1 << 4;
@@ -107,7 +114,8 @@ impl Committal {
         let [a, b, c] = currents_to_words(self.currents_a);
         let flags = u32::from(self.mirrored) * MIRRORED | u32::from(self.tripped) * TRIPPED;
         let (alpha, beta) = (on.alpha.to_bits(), on.beta.to_bits());
-        [self.at.0, self.begins.0, period, u, v, w, packed | flags, alpha, beta, a, b, c]
+        let acknowledged = self.acknowledged.into();
+        [self.at.0, self.begins.0, period, u, v, w, packed | flags, alpha, beta, a, b, c, acknowledged]
     }
 }
 
@@ -121,6 +129,7 @@ impl Committal {
             half: CarrierPeriod::off(off_ticks),
             mirrored: false,
             tripped: false,
+            acknowledged: 0,
         }
     }
 }
@@ -175,6 +184,12 @@ impl CommittalRecord<'_> {
     #[inline]
     pub fn currents_a(&self) -> Abc {
         currents_from_words([self.0.word::<9>(), self.0.word::<10>(), self.0.word::<11>()])
+    }
+
+    /// See [`Committal::acknowledged`].
+    #[inline]
+    pub fn acknowledged(&self) -> u8 {
+        self.0.word::<12>() as u8
     }
 }
 
@@ -302,11 +317,7 @@ pub fn trip_from_words(words: [u32; 4]) -> Option<Trip> {
         value: f32::from_bits(value),
         limit: f32::from_bits(limit),
         at: Instant(at),
-        safe: if code >> 8 == SafeState::ShortCircuit as u32 {
-            SafeState::ShortCircuit
-        } else {
-            SafeState::GatesOff
-        },
+        safe: SafeState::from_code(code >> 8 & 0xFF),
     })
 }
 
@@ -327,11 +338,20 @@ pub struct Report {
     pub map_error: f32,
     /// The latched fault, if any.
     pub trip: Option<Trip>,
+    /// DC-link voltage, in V.
+    pub udc_v: f32,
+    /// Largest magnitude of a phase current, in A.
+    pub current_a: f32,
+    /// Whether the speed has been followed long enough to be used.
+    pub speed_known: bool,
+    /// Number of the acknowledge that both interrupts have carried out.
+    pub acknowledged: u8,
 }
 
-impl Words<10> for Report {
-    fn to_words(self) -> [u32; 10] {
+impl Words<12> for Report {
+    fn to_words(self) -> [u32; 12] {
         let [code, value, limit, at] = trip_to_words(self.trip);
+        let code = code | u32::from(self.acknowledged) << 16 | u32::from(self.speed_known) << 24;
         [
             self.torque_nm.to_bits(),
             self.id_a.to_bits(),
@@ -343,11 +363,13 @@ impl Words<10> for Report {
             value,
             limit,
             at,
+            self.udc_v.to_bits(),
+            self.current_a.to_bits(),
         ]
     }
 
-    fn from_words(words: [u32; 10]) -> Self {
-        let [torque, id, iq, voltage, frequency, map_error, trip @ ..] = words;
+    fn from_words(words: [u32; 12]) -> Self {
+        let [torque, id, iq, voltage, frequency, map_error, code, value, limit, at, udc, current] = words;
         Self {
             torque_nm: f32::from_bits(torque),
             id_a: f32::from_bits(id),
@@ -355,7 +377,11 @@ impl Words<10> for Report {
             voltage_v: f32::from_bits(voltage),
             frequency_hz: f32::from_bits(frequency),
             map_error: f32::from_bits(map_error),
-            trip: trip_from_words(trip),
+            trip: trip_from_words([code, value, limit, at]),
+            udc_v: f32::from_bits(udc),
+            current_a: f32::from_bits(current),
+            speed_known: code >> 24 & 1 != 0,
+            acknowledged: (code >> 16) as u8,
         }
     }
 }

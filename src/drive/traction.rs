@@ -14,7 +14,8 @@ use crate::modulation::{
     Devices, Mode, Modulator, Reference, RippleFlux, Schedule, compensated, depth_limit, first_half,
     ripple_share,
 };
-use crate::protection::{self, Fault, FrozenWatch, Trip, Violation};
+use crate::protection::{self, Disarmed, Fault, FrozenWatch, SafeState, Trip, Violation};
+use crate::recorder::{Record, Recorder, State};
 use crate::time::{Clock, Instant};
 
 /// A demand that jumps by more than this share of the largest torque is worth revising the next half for.
@@ -47,26 +48,38 @@ pub struct Settings {
     pub gains: Gains,
 }
 
-/// The cells between the two interrupts.
-pub struct Shared {
+/// The cells between the two interrupts, and the flight recorder, if there is one.
+pub struct Shared<'a> {
     /// What control wants of the modulator.
     pub command: Downlink<VoltageCommand, 10>,
     /// What the modulator does.
     pub applied: Trail<COMMITTAL_WORDS>,
     /// What the PWM interrupt tripped on.
     pub trip: Uplink<Trip, 4>,
+    recorder: Option<&'a Recorder>,
 }
 
-impl Shared {
+impl<'a> Shared<'a> {
     /// Empty cells.
     #[cfg(not(loom))]
     pub const fn new() -> Self {
-        Self { command: Downlink::new(), applied: Trail::new(), trip: Uplink::new() }
+        Self { command: Downlink::new(), applied: Trail::new(), trip: Uplink::new(), recorder: None }
+    }
+
+    /// The same with a flight recorder, which the control interrupt fills.
+    #[cfg(not(loom))]
+    pub const fn recorded_by(recorder: &'a Recorder) -> Self {
+        Self {
+            command: Downlink::new(),
+            applied: Trail::new(),
+            trip: Uplink::new(),
+            recorder: Some(recorder),
+        }
     }
 }
 
 #[cfg(not(loom))]
-impl Default for Shared {
+impl Default for Shared<'_> {
     fn default() -> Self {
         Self::new()
     }
@@ -95,7 +108,10 @@ pub struct ControlTask<M = &'static Tables> {
     jumped: bool,
     /// Whether the newest command is for the half that is already committed.
     revises: bool,
+    disarmed: Disarmed,
     trip: Option<Trip>,
+    /// Number of the acknowledge that both interrupts have carried out.
+    acknowledged: u8,
 }
 
 impl<M: Machine> ControlTask<M> {
@@ -115,7 +131,9 @@ impl<M: Machine> ControlTask<M> {
             demand_nm: 0.0,
             jumped: false,
             revises: false,
+            disarmed: Disarmed::NONE,
             trip: None,
+            acknowledged: 0,
         }
     }
 
@@ -125,25 +143,47 @@ impl<M: Machine> ControlTask<M> {
         self.revises
     }
 
+    /// The same without a check.
+    pub const fn without(mut self, disarmed: Disarmed) -> Self {
+        self.disarmed = disarmed;
+        self
+    }
+
     /// The control timer's interrupt. Deadline: one control period after its nominal instant; a missed one is a fault.
     pub fn run(&mut self, port: &mut impl ControlPort, shared: &Shared) {
         let now = self.now;
         self.now = now.after(self.settings.clock.control_ticks);
         let sample = port.sample(now);
-        let before = self.controller.omega();
-        let omega = self.controller.track(sample.measured.angle, &self.settings.clock);
         let applied = shared.applied.read(|records| Applied::seen(records, now)).flatten();
+        self.forget_acknowledged(sample.acknowledge, applied.as_ref());
+        self.check(sample.hardware.map(|fault| (fault, 1.0, 0.0)), &sample, port);
         if self.trip.is_none() && applied.as_ref().is_some_and(|applied| applied.next.kind.is_tripped()) {
             self.trip = shared.trip.read();
         }
+        self.check_legs(&sample, port);
+        let omega = self.track(&sample, port);
         self.check(
             protection::check_measurements(&sample.measured, omega, &self.machine.tables().ratings),
             &sample,
             port,
         );
+        if sample.enable {
+            self.check(
+                protection::check_undervoltage(sample.measured.udc_v, &self.machine.tables().ratings),
+                &sample,
+                port,
+            );
+        }
         self.check(protection::check_demand(&sample.demand), &sample, port);
         let pulsing = self.trip.is_none() && sample.enable && self.controller.speed_is_known();
-        let mut report = Report { frequency_hz: omega / core::f32::consts::TAU, ..Report::default() };
+        let mut report = Report {
+            frequency_hz: omega / core::f32::consts::TAU,
+            udc_v: sample.measured.udc_v,
+            current_a: sample.measured.currents_a.peak(),
+            speed_known: self.controller.speed_is_known(),
+            acknowledged: self.acknowledged,
+            ..Report::default()
+        };
         let mut command = VoltageCommand {
             reference: Reference {
                 voltage_v: 0.0,
@@ -157,11 +197,12 @@ impl<M: Machine> ControlTask<M> {
             valid_from: self.now,
             gates: Gates::Off,
             revises: false,
+            acknowledge: sample.acknowledge,
         };
         if pulsing {
             let frozen = self.watch.check(
                 &sample.measured,
-                before,
+                omega,
                 self.settings.clock.control_s(),
                 &self.machine.tables().ratings,
             );
@@ -188,7 +229,31 @@ impl<M: Machine> ControlTask<M> {
         self.revises = command.revises && command.gates == Gates::Pulse;
         shared.command.publish(command);
         report.trip = self.trip;
+        if let Some(recorder) = shared.recorder {
+            let mode = applied.as_ref().map_or(Mode::Off, |applied| applied.mode);
+            recorder.record(self.entry(now, &sample, &report, mode, command.gates), self.trip.is_some());
+        }
         port.report(now, &report);
+    }
+
+    /// The period's entry in the flight recorder.
+    #[inline(always)]
+    fn entry(&self, at: Instant, sample: &Sample, report: &Report, mode: Mode, gates: Gates) -> Record {
+        Record {
+            at,
+            currents_a: sample.measured.currents_a,
+            udc_v: sample.measured.udc_v,
+            angle: sample.measured.angle,
+            id_a: report.id_a,
+            iq_a: report.iq_a,
+            voltage_v: report.voltage_v,
+            state: State {
+                mode,
+                enabled: sample.enable,
+                pulsing: gates == Gates::Pulse,
+                fault: self.trip.map(|trip| trip.fault),
+            },
+        }
     }
 
     /// Nominal instant of the next call.
@@ -199,6 +264,20 @@ impl<M: Machine> ControlTask<M> {
     /// The latched fault.
     pub fn trip(&self) -> Option<Trip> {
         self.trip
+    }
+
+    /// Follows the angle; returns the electrical speed, in rad/s. An angle that cannot be leaves the speed as it was.
+    fn track(&mut self, sample: &Sample, port: &mut impl ControlPort) -> f32 {
+        let clock = self.settings.clock;
+        if self.controller.speed_is_known() {
+            let surprise_rad = self.controller.surprise_rad(sample.measured.angle, &clock);
+            let lost = protection::check_angle(surprise_rad);
+            if lost.is_some() && !self.disarmed.has(Fault::AngleLost) {
+                self.check(lost, sample, port);
+                return self.controller.omega();
+            }
+        }
+        self.controller.track(sample.measured.angle, &clock)
     }
 
     /// Control law and its surroundings, while pulses are made.
@@ -219,6 +298,7 @@ impl<M: Machine> ControlTask<M> {
         let input = Input {
             measured: &sample.measured,
             demand: &sample.demand,
+            window: &sample.window,
             committed: &committed,
             boundary: boundary.as_ref(),
         };
@@ -390,6 +470,9 @@ impl<M: Machine> ControlTask<M> {
         let (Some((fault, value, limit)), None) = (violation, self.trip) else {
             return;
         };
+        if self.disarmed.has(fault) {
+            return;
+        }
         let at = self.now.before(self.settings.clock.control_ticks);
         let safe = protection::safe_state(
             self.controller.omega(),
@@ -398,6 +481,29 @@ impl<M: Machine> ControlTask<M> {
         );
         port.enter(safe, at);
         self.trip = Some(Trip { fault, value, limit, at, safe });
+    }
+
+    /// Forgets the fault that is acknowledged once the PWM interrupt has: what it told before that cannot come back, and
+    /// the safe state that it has left is not entered again for the old fault's sake.
+    fn forget_acknowledged(&mut self, acknowledge: u8, applied: Option<&Applied>) {
+        if acknowledge != self.acknowledged
+            && applied.is_some_and(|applied| applied.acknowledged == acknowledge)
+        {
+            self.acknowledged = acknowledge;
+            self.trip = None;
+        }
+    }
+
+    /// First of all checks: a leg that is stuck decides on the safe state.
+    fn check_legs(&mut self, sample: &Sample, port: &mut impl ControlPort) {
+        let found = port.leg_faults();
+        if let (Some((fault, value, limit)), None) = (found.check(), self.trip) {
+            let at = self.now.before(self.settings.clock.control_ticks);
+            let (omega, ratings) = (self.controller.omega(), &self.machine.tables().ratings);
+            let safe = found.safe_state(omega, sample.measured.udc_v, ratings);
+            port.enter(safe, at);
+            self.trip = Some(Trip { fault, value, limit, at, safe });
+        }
     }
 }
 
@@ -413,7 +519,11 @@ struct Applied {
     passed: Option<AlphaBeta>,
     /// What the running half gives from now on; `None` if the gates are off in it or in the next one.
     running: Option<AlphaBeta>,
+    /// Mode of the running half.
+    mode: Mode,
     next: Next,
+    /// Number of the acknowledge that the PWM interrupt had carried out.
+    acknowledged: u8,
 }
 
 /// The half after the running one.
@@ -442,10 +552,20 @@ impl Applied {
         let (begins, period_ticks, volt_ticks) =
             (newest.begins(), newest.period_ticks(), newest.volt_ticks());
         let next = Next { begins, period_ticks, volt_ticks, kind };
-        let off = one.kind().mode() == Mode::Off || kind.mode() == Mode::Off;
+        let mode = one.kind().mode();
+        let off = mode == Mode::Off || kind.mode() == Mode::Off;
         let running = (!off).then(|| one.volt_ticks_from(now.since(at).max(0) as u32));
         let passed = (two.kind().mode() != Mode::Off).then(|| two.volt_ticks());
-        Self { at, before: one.at(), currents_a: newest.currents_a(), passed, running, next }
+        Self {
+            at,
+            before: one.at(),
+            currents_a: newest.currents_a(),
+            passed,
+            running,
+            mode,
+            next,
+            acknowledged: newest.acknowledged(),
+        }
     }
 }
 
@@ -459,6 +579,9 @@ pub struct PwmTask<M = &'static Tables> {
     /// Phase currents at the boundary before, in A.
     currents_before_a: Abc,
     trip: Option<Trip>,
+    disarmed: Disarmed,
+    /// Number of the acknowledge that was carried out last.
+    acknowledged: u8,
 }
 
 impl<M: Machine> PwmTask<M> {
@@ -476,7 +599,15 @@ impl<M: Machine> PwmTask<M> {
             newest: Committal::at_rest(first, settings.devices.shortest_half_ticks),
             currents_before_a: Abc { a: 0.0, b: 0.0, c: 0.0 },
             trip: None,
+            disarmed: Disarmed::NONE,
+            acknowledged: 0,
         }
+    }
+
+    /// The same without a check.
+    pub const fn without(mut self, disarmed: Disarmed) -> Self {
+        self.disarmed = disarmed;
+        self
     }
 
     /// The same for a timer whose first two halves, before the first one of the modulator's, have another length.
@@ -491,6 +622,7 @@ impl<M: Machine> PwmTask<M> {
         let currents_a = port.sample(now);
         self.currents_before_a = self.newest.currents_a;
         let command = shared.command.newest(|command| now.reached(VoltageCommand::valid_from(command)));
+        self.forget_acknowledged(&command, now, port, shared);
         self.check(&currents_a, &command, port, shared);
         let begins = now.after(self.newest.half.period_ticks);
         let pulsing = self.trip.is_none();
@@ -501,7 +633,15 @@ impl<M: Machine> PwmTask<M> {
             resting => self.modulator.rest(begins, resting.as_ref().map(|command| &command.reference)),
         };
         let mirrored = self.modulator.is_mirrored();
-        self.newest = Committal { at: now, currents_a, begins, half, mirrored, tripped: !pulsing };
+        self.newest = Committal {
+            at: now,
+            currents_a,
+            begins,
+            half,
+            mirrored,
+            tripped: !pulsing,
+            acknowledged: self.acknowledged,
+        };
         self.play(port);
         shared.applied.publish(self.newest.to_words());
     }
@@ -552,6 +692,32 @@ impl<M: Machine> PwmTask<M> {
         self.trip
     }
 
+    /// Forgets the fault that is acknowledged and leaves the safe state, gates off. Each acknowledge does so once: while pulses are
+    /// made there is nothing to forget.
+    fn forget_acknowledged(
+        &mut self,
+        command: &Option<VoltageCommand>,
+        now: Instant,
+        port: &mut impl PwmPort,
+        shared: &Shared,
+    ) {
+        let Some(command) = command else {
+            return;
+        };
+        if command.acknowledge == self.acknowledged {
+            return;
+        }
+        self.acknowledged = command.acknowledge;
+        if command.gates == Gates::Pulse {
+            return;
+        }
+        self.trip = None;
+        if !port.leave(now) {
+            let (fault, safe) = (Fault::GatesHeld, SafeState::GatesOff);
+            self.latch(Trip { fault, value: 1.0, limit: 0.0, at: now, safe }, shared);
+        }
+    }
+
     fn check(
         &mut self,
         currents_a: &Abc,
@@ -562,8 +728,11 @@ impl<M: Machine> PwmTask<M> {
         if self.trip.is_some() {
             return;
         }
-        let violation = protection::check_currents(currents_a, &self.tables().ratings)
-            .or_else(|| command.as_ref().and_then(|command| self.stale(command)));
+        let legs = port.leg_faults();
+        let armed = |(fault, _, _): &Violation| !self.disarmed.has(*fault);
+        let currents = || protection::check_currents(currents_a, &self.tables().ratings);
+        let stale = || command.as_ref().and_then(|command| self.stale(command));
+        let violation = legs.check().or_else(|| currents().filter(armed)).or_else(|| stale().filter(armed));
         let Some((fault, value, limit)) = violation else {
             return;
         };
@@ -572,10 +741,13 @@ impl<M: Machine> PwmTask<M> {
             None => (0.0, self.tables().ratings.dc_link_nominal_v),
         };
         let omega = rate * self.settings.clock.ticks_per_s / UNITS_PER_RADIAN;
-        let safe = protection::safe_state(omega, udc_v, &self.tables().ratings);
+        let safe = legs.safe_state(omega, udc_v, &self.tables().ratings);
         let at = self.newest.begins;
         port.enter(safe, at);
-        let trip = Trip { fault, value, limit, at, safe };
+        self.latch(Trip { fault, value, limit, at, safe }, shared);
+    }
+
+    fn latch(&mut self, trip: Trip, shared: &Shared) {
         shared.trip.publish(trip);
         self.trip = Some(trip);
     }

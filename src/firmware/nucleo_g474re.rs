@@ -8,7 +8,7 @@ use tractive::board::nucleo_g474re::registers::Registers;
 use tractive::board::nucleo_g474re::sampling::Zeros;
 use tractive::board::nucleo_g474re::start::Plan;
 use tractive::board::nucleo_g474re::{
-    self as board, CLOCK, Control, Interrupt as interrupt, OPERATOR, PRESCALER, PULSE, Pwm,
+    self as board, CLOCK, Control, Interrupt as interrupt, OPERATOR, PRESCALER, PULSE, Pwm, RECORDER,
 };
 use tractive::control::Gains;
 use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
@@ -16,7 +16,7 @@ use tractive::machine::{BUILT_IN, BuiltIn};
 use tractive::modulation::Devices;
 use tractive::time::Instant;
 
-static SHARED: Shared = Shared::new();
+static SHARED: Shared = Shared::recorded_by(&RECORDER);
 /// What the start measured, written before the interrupts are unmasked.
 static CONTROL_ZEROS: [AtomicU32; 3] = [const { AtomicU32::new(0) }; 3];
 static PWM_ZEROS: [AtomicU32; 3] = [const { AtomicU32::new(0) }; 3];
