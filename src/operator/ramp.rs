@@ -38,16 +38,16 @@ impl Ramp {
         let Rates { step_s, slew_nm_s, jerk_nm_s2 } = *rates;
         let change = jerk_nm_s2 * step_s;
         let error = target_nm - self.torque_nm;
-        if error.abs() <= change * step_s && self.rate_nm_s.abs() <= change {
-            *self = Self { torque_nm: target_nm, rate_nm_s: 0.0 };
-            return target_nm;
-        }
         // The largest rate from which whole steps of the jerk lead to rest within what is left: r²/2j + r·dt/2 = |error|.
         let able = change * (sqrt(0.25 + 2.0 * error.abs() / (change * step_s)) - 0.5);
         let rate = if able < slew_nm_s { able } else { slew_nm_s };
         let wanted = if error < 0.0 { -rate } else { rate };
         self.rate_nm_s = limit(wanted, self.rate_nm_s - change, self.rate_nm_s + change);
         self.torque_nm += self.rate_nm_s * step_s;
+        let passed = (target_nm - self.torque_nm) * error <= 0.0;
+        if passed && self.rate_nm_s.abs() <= 2.0 * change {
+            *self = Self { torque_nm: target_nm, rate_nm_s: 0.0 };
+        }
         self.torque_nm
     }
 }
