@@ -28,12 +28,19 @@ pub use settings::{Line, Settings};
 pub use slot::{OperatorPort, Slot};
 pub use status::{Refusal, State, Status, Switches};
 
+use crate::board::Sample;
 use crate::control::{Demand, LinkWindow};
 use crate::protection::{Fault, SafeState, Trip, Violation};
+use crate::time::Clock;
 use line::{Discharge, Outcome, Precharge};
 
 /// Control periods in a slot.
 pub const SLOT_PERIODS: u32 = 10;
+
+/// Length of a slot, in s.
+pub fn slot_s(clock: &Clock) -> f32 {
+    SLOT_PERIODS as f32 * clock.control_s()
+}
 
 /// Time for which everything must be in order in the self-test, in s.
 const SELF_TEST_S: f32 = 0.05;
@@ -65,6 +72,13 @@ pub struct Permit {
 }
 
 impl Permit {
+    /// What the drive gets: the board may hold the gates off, never more than that.
+    #[inline]
+    pub fn applied_to(self, sample: Sample) -> Sample {
+        let Self { enable, demand, window, acknowledge } = self;
+        Sample { enable: enable && sample.enable, demand, window, acknowledge, ..sample }
+    }
+
     /// Nothing.
     pub const NONE: Self = Self {
         enable: false,

@@ -6,19 +6,22 @@
 //! fixed delay after its nominal instant, so that arrival order changes nothing.
 
 mod inverter;
+mod line;
 mod sensors;
 
 pub use inverter::{Edge, GATES, Inverter};
+pub use line::{Commander, LinePlan, LineSide, SlotRow};
 pub use sensors::{Converter, Flaws, Sensors};
 
 use crate::plant::Plant;
-use crate::trace::{Row, Switch};
+use crate::trace::{Recording, Row, Switch};
 use std::collections::VecDeque;
 use tractive::board::Sample;
 use tractive::control::{Demand, LinkWindow};
 use tractive::drive::Report;
 use tractive::frames::{Abc, Angle};
 use tractive::modulation::{CarrierPeriod, Mode};
+use tractive::operator::{Feedback, Request, Status};
 use tractive::protection::SafeState;
 use tractive::time::{Clock, Instant};
 
@@ -55,6 +58,12 @@ pub enum BenchError {
         /// What there is.
         oldest: Option<Tick>,
     },
+    /// The operator asked for a slot that is not there.
+    #[error("the operator's slot of tick {0} was asked for and is not kept")]
+    NoSlot(Tick),
+    /// The operator fell behind.
+    #[error("at {0:.6} s the operator has not finished its slot before the next one")]
+    OperatorLate(f64),
     /// Control fell behind.
     #[error("at {0:.6} s the control interrupt has not reported within its period")]
     ControlLate(f64),
@@ -94,7 +103,10 @@ pub struct Bench {
     lead: Tick,
     end: Tick,
     next: Option<CarrierPeriod>,
-    safe: Option<(Tick, SafeState)>,
+    /// Orders to enter a safe state, or to leave it (`None`), and when they reach the gates.
+    orders: VecDeque<(Tick, Option<SafeState>)>,
+    line: Option<LineSide>,
+    slots: Vec<SlotRow>,
     samples: VecDeque<(Tick, Sample)>,
     next_sample: Tick,
     reports: VecDeque<(Tick, Report)>,
@@ -124,7 +136,9 @@ impl Bench {
             lead,
             end: lead + ticks(settings.duration_s),
             next: Some(first),
-            safe: None,
+            orders: VecDeque::new(),
+            line: None,
+            slots: Vec::new(),
             samples: VecDeque::new(),
             next_sample: settings.clock.control_ticks.into(),
             reports: VecDeque::new(),
@@ -135,6 +149,35 @@ impl Bench {
             rows: Vec::with_capacity((settings.duration_s / settings.trace_step_s) as usize + 2),
             switches: Vec::new(),
         }
+    }
+
+    /// The same with a line side: the link's voltage is its capacitor's, and the drive has an operator.
+    pub fn with_line(mut self, plan: LinePlan) -> Self {
+        self.line = Some(LineSide::new(plan, &self.clock));
+        self
+    }
+
+    /// Whether the drive has an operator.
+    pub fn is_operated(&self) -> bool {
+        self.line.is_some()
+    }
+
+    /// What is asked of the operator in the slot that began at `instant`, and what the board says.
+    pub fn ask(&mut self, instant: Instant) -> Result<(Request, Feedback), BenchError> {
+        let tick = self.widen(instant);
+        self.line.as_mut().and_then(|line| line.ask(tick)).ok_or(BenchError::NoSlot(tick))
+    }
+
+    /// What the operator told; it holds from `from` on.
+    pub fn told(&mut self, from: Instant, status: Status) -> Result<(), BenchError> {
+        let tick = self.widen(from);
+        if tick < self.now {
+            return Err(BenchError::OperatorLate(self.seconds(tick)));
+        }
+        if let Some(line) = &mut self.line {
+            line.tell(tick, status);
+        }
+        Ok(())
     }
 
     /// Whether the recording is complete.
@@ -148,9 +191,17 @@ impl Bench {
     }
 
     /// The recording: trace, switches of mode, edges; instants in seconds from its beginning.
-    pub fn into_recording(self) -> (Vec<Row>, Vec<Switch>, Vec<Edge>, Tick, f64) {
+    pub fn into_recording(self) -> Recording {
         let edges = self.inverter.edges().to_vec();
-        (self.rows, self.switches, edges, self.lead, self.tick_s)
+        Recording {
+            rows: self.rows,
+            switches: self.switches,
+            edges,
+            slots: self.slots,
+            link: self.line.map(|line| line.link.energies()),
+            lead: self.lead,
+            tick_s: self.tick_s,
+        }
     }
 
     /// The conversions that the control timer triggered at `instant`.
@@ -185,10 +236,26 @@ impl Bench {
 
     /// An interrupt at `instant` orders the safe state.
     pub fn enter(&mut self, instant: Instant, safe: SafeState) {
-        let effective = self.widen(instant) + SAFE_STATE_DELAY;
-        if self.safe.is_none() && !self.inverter.is_safe() {
-            self.safe = Some((effective, safe));
+        if !self.will_be_safe() {
+            self.order(instant, Some(safe));
         }
+    }
+
+    /// The PWM interrupt at `instant` leaves it.
+    pub fn leave(&mut self, instant: Instant) {
+        if self.will_be_safe() {
+            self.order(instant, None);
+        }
+    }
+
+    fn order(&mut self, instant: Instant, order: Option<SafeState>) {
+        let effective = self.widen(instant) + SAFE_STATE_DELAY;
+        self.orders.push_back((effective, order));
+    }
+
+    /// Whether the gates will be in a safe state once every order has reached them.
+    fn will_be_safe(&self) -> bool {
+        self.orders.back().map_or(self.inverter.is_safe(), |(_, order)| order.is_some())
     }
 
     /// The tick of an instant near to now.
@@ -208,8 +275,11 @@ impl Bench {
             if let Some(event) = self.inverter.next_event() {
                 due = due.min(event);
             }
-            if let Some((at, _)) = self.safe {
-                due = due.min(at);
+            if let Some((at, _)) = self.orders.front() {
+                due = due.min(*at);
+            }
+            if let Some(event) = self.line.as_ref().and_then(LineSide::next_event) {
+                due = due.min(event);
             }
             self.integrate(due);
             self.act()?;
@@ -219,19 +289,34 @@ impl Bench {
 
     fn integrate(&mut self, tick: Tick) {
         if tick > self.now {
-            let udc_v = self.sensors.udc_v(self.seconds(self.now));
-            self.plant.advance(self.inverter.legs(), udc_v, (tick - self.now) as f64 * self.tick_s);
+            let dt_s = (tick - self.now) as f64 * self.tick_s;
+            if let Some(line) = &mut self.line {
+                self.plant.advance_on(&mut line.link, self.inverter.legs(), dt_s);
+            } else {
+                let udc_v = self.sensors.udc_v(self.seconds(self.now));
+                self.plant.advance(self.inverter.legs(), udc_v, dt_s);
+            }
             self.now = tick;
         }
     }
 
     fn act(&mut self) -> Result<(), BenchError> {
         let now = self.now;
-        if let Some((at, safe)) = self.safe
+        while let Some((at, order)) = self.orders.front().copied()
             && at <= now
         {
-            self.safe = None;
-            self.inverter.enter(safe, now);
+            self.orders.pop_front();
+            match order {
+                Some(safe) => self.inverter.enter(safe, now),
+                None => self.inverter.leave(now),
+            }
+        }
+        let t_s = self.seconds(now);
+        if let Some(row) = self.line.as_mut().and_then(|line| line.act(now, t_s))
+            && now >= self.lead
+            && now <= self.end
+        {
+            self.slots.push(row);
         }
         self.inverter.act(now);
         if now == self.inverter.half_end() {
@@ -255,12 +340,24 @@ impl Bench {
         }
         let t_s = self.seconds(self.now);
         let (demand, enable) = self.operator.demand(t_s);
-        let measured = self.sensors.measure(&self.plant, t_s);
-        let sample =
-            Sample { measured, demand, enable, window: LinkWindow::OPEN, acknowledge: 0, hardware: None };
+        let udc_v = self.udc_v(t_s);
+        let measured = self.sensors.measure(&self.plant, udc_v, t_s);
+        let hardware = self.line.as_ref().and_then(|line| line.hardware(t_s));
+        if self.line.as_mut().is_some_and(|line| line.sampled(self.now, t_s)) {
+            return Err(BenchError::OperatorLate(t_s));
+        }
+        let sample = Sample { measured, demand, enable, window: LinkWindow::OPEN, acknowledge: 0, hardware };
         self.samples.push_back((self.now, sample));
         self.next_sample = self.now + Tick::from(self.clock.control_ticks);
         Ok(())
+    }
+
+    /// The link's true voltage, in V, a rectifier's ripple included.
+    fn udc_v(&self, t_s: f64) -> f64 {
+        match &self.line {
+            Some(line) => line.link.udc_v(),
+            None => self.sensors.udc_v(t_s),
+        }
     }
 
     fn note_switch(&mut self, next: &CarrierPeriod) {
@@ -304,11 +401,12 @@ impl Bench {
                 ib_a: ib,
                 ic_a: ic,
                 u_v: report.voltage_v.into(),
-                udc_v: self.sensors.udc_v(t_s),
+                udc_v: self.udc_v(t_s),
                 f1_hz: report.frequency_hz.into(),
                 map_error: report.map_error.into(),
                 mode,
                 trip: report.trip,
+                status: self.line.as_ref().and_then(LineSide::status),
             });
         }
         self.rows_done += 1;

@@ -86,6 +86,11 @@ impl DcLink {
         &mut self.settings.source
     }
 
+    /// Changes the braking resistor, in ohm.
+    pub fn set_chopper_ohm(&mut self, ohm: f64) {
+        self.settings.chopper_ohm = ohm;
+    }
+
     /// Voltage, in V.
     pub fn udc_v(&self) -> f64 {
         self.udc_v

@@ -8,20 +8,29 @@ use tractive::control::{Demand, LinkWindow, Measurements};
 use tractive::drive::Report;
 use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
 use tractive::frames::{Abc, Angle};
-use tractive::machine::Tables;
+use tractive::machine::{Ratings, Tables};
 use tractive::modulation::CarrierPeriod;
+use tractive::operator::{self, Desk, Feedback, Line, OperatorPort, Request, Slot, Status, slot_s};
 use tractive::protection::SafeState;
 use tractive::time::Instant;
 
 /// The bench behind a board's ports; the first error ends the run.
 struct Port<'a> {
     bench: &'a mut Bench,
+    desk: &'a Desk,
+    ratings: &'a Ratings,
     error: Option<BenchError>,
 }
 
 impl ControlPort for Port<'_> {
     fn sample(&mut self, now: Instant) -> Sample {
-        self.bench.control_sample(now).unwrap_or_else(|error| {
+        let sample = self.bench.control_sample(now);
+        let sample = if self.bench.is_operated() {
+            sample.map(|sample| self.desk.permit(now).applied_to(sample))
+        } else {
+            sample
+        };
+        sample.unwrap_or_else(|error| {
             self.error = Some(error);
             let measured = Measurements { currents_a: Abc::default(), udc_v: 0.0, angle: Angle::ZERO };
             Sample {
@@ -44,6 +53,7 @@ impl ControlPort for Port<'_> {
     }
 
     fn report(&mut self, now: Instant, report: &Report) {
+        self.desk.tell(now, report);
         self.bench.control_report(now, *report);
     }
 }
@@ -63,6 +73,26 @@ impl PwmPort for Port<'_> {
     fn enter(&mut self, safe: SafeState, now: Instant) {
         self.bench.enter(now, safe);
     }
+
+    fn leave(&mut self, now: Instant) -> bool {
+        self.bench.leave(now);
+        true
+    }
+}
+
+impl OperatorPort for Port<'_> {
+    fn ask(&mut self, at: Instant) -> (Request, Feedback) {
+        self.bench.ask(at).unwrap_or_else(|error| {
+            self.error = Some(error);
+            (Request::idle(self.ratings), Feedback::default())
+        })
+    }
+
+    fn tell(&mut self, from: Instant, status: &Status) {
+        if let Err(error) = self.bench.told(from, *status) {
+            self.error = Some(error);
+        }
+    }
 }
 
 /// Runs until the recording is complete.
@@ -72,15 +102,20 @@ pub fn run_on_host(
     tables: &'static Tables,
     settings: Settings,
     first_half_ticks: u32,
+    line: Option<Line>,
 ) -> Result<Recording, BenchError> {
     let shared = Shared::new();
     let mut control_at = Instant(settings.clock.control_ticks);
     let mut pwm_at = Instant(first_half_ticks);
     let mut control = ControlTask::new(tables, settings, control_at);
     let mut pwm = PwmTask::new(tables, settings, pwm_at).after_halves_of(first_half_ticks);
+    let desk = Desk::new();
+    let mut slot = Slot::new();
+    let operator = operator::Settings::rated(&tables.ratings, slot_s(&settings.clock), line);
     let mut progress = Progress::new(name);
     while !bench.is_done() {
-        let mut port = Port { bench: &mut bench, error: None };
+        let operated = bench.is_operated();
+        let mut port = Port { bench: &mut bench, desk: &desk, ratings: &tables.ratings, error: None };
         // At equal instants the PWM interrupt comes first: it has the higher priority.
         if control_at.reached(pwm_at) {
             pwm.run(&mut port, &shared);
@@ -88,11 +123,15 @@ pub fn run_on_host(
         } else {
             control.run(&mut port, &shared);
             control_at = control.next_call();
+            // The idle loop goes on where the interrupt ends.
+            if operated {
+                slot.run(&desk, &mut port, &operator, &settings.clock);
+            }
         }
         if let Some(error) = port.error {
             return Err(error);
         }
         progress.show(bench.progress());
     }
-    Ok(super::record(bench))
+    Ok(bench.into_recording())
 }

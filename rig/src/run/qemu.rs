@@ -46,7 +46,7 @@ pub fn run_in_qemu(name: &str, mut bench: Bench, setup: Setup, emulator: &Emulat
         std::fs::write(path, &calls.lines).with_context(|| path.display().to_string())?;
     }
     outcome?;
-    Ok(super::record(bench))
+    Ok(bench.into_recording())
 }
 
 /// What every interrupt was about, in the order in which they ended.

@@ -13,7 +13,7 @@ mod sweep;
 mod timing;
 
 use crate::analysis::Figures;
-use crate::bench::{self, Bench, Operator};
+use crate::bench::{self, Bench, LinePlan, Operator};
 use crate::machine::Machine;
 use crate::options::{On, RunOptions};
 use crate::plant::{Plant, PlantSettings, SpeedSource};
@@ -25,6 +25,7 @@ use tractive::control::Gains;
 use tractive::drive::traction::Settings;
 use tractive::link::Setup;
 use tractive::modulation::Devices;
+use tractive::operator::Line;
 
 /// The usual lead, in s.
 const LEAD_S: f64 = 0.1;
@@ -51,6 +52,10 @@ pub trait Scenario {
     fn figure(&self) -> &'static str;
     /// What is driven.
     fn plan(&self, options: &RunOptions, machine: &Machine) -> Plan;
+    /// The line side, where the scenario is about it; otherwise the link is stiff and the drive is commanded directly.
+    fn line(&self, _options: &RunOptions, _machine: &Machine) -> Option<LinePlan> {
+        None
+    }
     /// The figures to report.
     fn figures(&self, recording: &Recording, options: &RunOptions, machine: &Machine) -> Figures;
     /// The plots to draw.
@@ -119,10 +124,20 @@ pub fn drive(scenario: &dyn Scenario, options: &RunOptions, machine: &Machine) -
             flaws: options.flaws(parameters.trip_current_a),
         },
     );
+    let line_plan = scenario.line(options, machine);
+    let line = line_plan.as_ref().map(|plan| {
+        let link = &plan.link;
+        let seconds = |ohm: f64| (ohm * link.capacitance_f) as f32;
+        Line::rated(&machine.tables.ratings, seconds(link.precharge_ohm), seconds(link.discharge_ohm))
+    });
+    let bench = match line_plan {
+        Some(plan) => bench.with_line(plan),
+        None => bench,
+    };
     match options.on {
         On::Host => {
             let settings = Settings { clock: CLOCK, devices, gains: Gains::DEFAULT };
-            Ok(run::run_on_host(scenario.name(), bench, machine.tables, settings, first_half_ticks)?)
+            Ok(run::run_on_host(scenario.name(), bench, machine.tables, settings, first_half_ticks, line)?)
         }
         On::Qemu => run::run_in_qemu(scenario.name(), bench, setup, &options.emulator()?),
     }
