@@ -72,6 +72,17 @@ pub struct Switch {
     pub speed_rpm: f64,
 }
 
+/// Where a link's energy went.
+#[derive(Clone, Copy, Debug)]
+pub struct LinkBalance {
+    /// By who gave or took it.
+    pub energies: LinkEnergies,
+    /// All that was moved, of either sign, in J.
+    pub moved_j: f64,
+    /// Neither given nor kept: what integration has lost, in J.
+    pub missing_j: f64,
+}
+
 /// A whole run.
 pub struct Recording {
     /// Rows of the trace.
@@ -81,7 +92,7 @@ pub struct Recording {
     /// What the operator told, slot by slot; empty without one.
     pub slots: Vec<SlotRow>,
     /// Energies of a link with a capacitor, over the whole run.
-    pub link: Option<LinkEnergies>,
+    pub link: Option<LinkBalance>,
     /// Gate edges; ticks count from the run's beginning.
     pub edges: Vec<Edge>,
     /// Tick at which the recording begins.

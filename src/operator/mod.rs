@@ -251,7 +251,10 @@ impl Operator {
         }
         let violation = match self.phase {
             Phase::Init | Phase::Fault { .. } => None,
-            Phase::SelfTest { .. } | Phase::Ready => health::cause(input, false, settings),
+            Phase::SelfTest { .. } => {
+                health::cause(input, false, settings).or_else(|| health::resting_current(input, settings))
+            }
+            Phase::Ready => health::cause(input, false, settings),
             Phase::Precharge(_) | Phase::Discharge(_) => health::hardware(input),
             Phase::Charged => health::cause(input, Self::main_closed(settings), settings)
                 .or_else(|| demand::link_lost(input, settings)),
@@ -388,7 +391,9 @@ impl Operator {
         };
         let shorted = trip.safe == SafeState::ShortCircuit;
         let held = shorted && !health::open_is_safe(input, settings);
-        if held || health::cause(input, false, settings).is_some() {
+        let cause =
+            health::cause(input, false, settings).or_else(|| health::resting_current(input, settings));
+        if held || cause.is_some() {
             return self.refuse(Refusal::CauseStillPresent);
         }
         // Zero is what both interrupts begin with.
@@ -428,6 +433,7 @@ impl Operator {
             ),
             (!feedback.position_known || !observed.speed_known, Refusal::PositionUnknown),
             (self.bad_values == Some(Refusal::RequestNotFinite), Refusal::RequestNotFinite),
+            (health::resting_current(input, settings).is_some(), Refusal::CauseStillPresent),
             (request.torque_nm != 0.0 && !request.with_torque, Refusal::TorqueNotZero),
         ];
         refusals.into_iter().find_map(|(refused, reason)| refused.then_some(reason))

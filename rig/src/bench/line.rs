@@ -1,7 +1,8 @@
 //! The line side in the timers' time: contactors that take their time, a chopper that switches, and whoever commands the drive.
 
 use super::Tick;
-use crate::plant::{DcLink, DcLinkSettings, LinkSwitches};
+use crate::plant::{DcLink, DcLinkSettings, LinkEnergies, LinkSwitches};
+use crate::trace::LinkBalance;
 use std::collections::VecDeque;
 use tractive::frames::Abc;
 use tractive::operator::{Configuration, Feedback, Request, SLOT_PERIODS, Status, Switches};
@@ -68,6 +69,7 @@ pub struct SlotRow {
 pub struct LineSide {
     /// The link itself.
     pub link: DcLink,
+    stored_before_j: f64,
     plan: LinePlan,
     tick_s: f64,
     slot_ticks: Tick,
@@ -94,6 +96,7 @@ impl LineSide {
             link.set_udc_v(plan.link.source.voltage_v);
         }
         Self {
+            stored_before_j: link.stored_j(),
             link,
             plan,
             tick_s: f64::from(clock.ticks_per_s).recip(),
@@ -108,6 +111,18 @@ impl LineSide {
             asked: VecDeque::new(),
             samples: 0,
             status: None,
+        }
+    }
+
+    /// Where the link's energy went since tick 0.
+    pub fn balance(&self) -> LinkBalance {
+        let energies = self.link.energies();
+        let LinkEnergies { source_j, path_j, discharge_j, chopper_j, inverter_j } = energies;
+        let kept_j = self.link.stored_j() - self.stored_before_j;
+        LinkBalance {
+            energies,
+            moved_j: source_j.abs() + inverter_j.abs() + self.stored_before_j,
+            missing_j: source_j - path_j - discharge_j - chopper_j - inverter_j - kept_j,
         }
     }
 

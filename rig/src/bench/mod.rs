@@ -198,7 +198,7 @@ impl Bench {
             switches: self.switches,
             edges,
             slots: self.slots,
-            link: self.line.map(|line| line.link.energies()),
+            link: self.line.map(|line| line.balance()),
             lead: self.lead,
             tick_s: self.tick_s,
         }

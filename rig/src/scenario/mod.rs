@@ -1,10 +1,13 @@
 //! What is driven, and what is to be seen.
 
 mod characteristic;
+mod chopper;
 mod full_step;
+mod line;
 mod link_steps;
 mod load_steps;
 mod mode_borders;
+mod precharge;
 mod restart;
 mod reversal;
 mod script;
@@ -74,6 +77,8 @@ pub fn all() -> Vec<Box<dyn Scenario>> {
         Box::new(reversal::Reversal),
         Box::new(restart::Restart),
         Box::new(link_steps::LinkSteps),
+        Box::new(precharge::Precharge),
+        Box::new(chopper::Chopper),
         Box::new(timing::Timing),
     ]
 }
