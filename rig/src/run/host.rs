@@ -8,8 +8,9 @@ use tractive::control::{Demand, LinkWindow, Measurements};
 use tractive::drive::Report;
 use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
 use tractive::frames::{Abc, Angle};
-use tractive::machine::Tables;
+use tractive::machine::{Ratings, Tables};
 use tractive::modulation::CarrierPeriod;
+use tractive::operator::{self, Desk, Feedback, Line, OperatorPort, Request, Slot, Status, slot_s};
 use tractive::protection::{LegFaults, SafeState};
 use tractive::recorder::Recorder;
 use tractive::time::Instant;
@@ -17,12 +18,20 @@ use tractive::time::Instant;
 /// The bench behind a board's ports; the first error ends the run.
 struct Port<'a> {
     bench: &'a mut Bench,
+    desk: &'a Desk,
+    ratings: &'a Ratings,
     error: Option<BenchError>,
 }
 
 impl ControlPort for Port<'_> {
     fn sample(&mut self, now: Instant) -> Sample {
-        self.bench.control_sample(now).unwrap_or_else(|error| {
+        let sample = self.bench.control_sample(now);
+        let sample = if self.bench.is_operated() {
+            sample.map(|sample| self.desk.permit(now).applied_to(sample))
+        } else {
+            sample
+        };
+        sample.unwrap_or_else(|error| {
             self.error = Some(error);
             let measured = Measurements { currents_a: Abc::default(), udc_v: 0.0, angle: Angle::ZERO };
             Sample {
@@ -45,6 +54,7 @@ impl ControlPort for Port<'_> {
     }
 
     fn report(&mut self, now: Instant, report: &Report) {
+        self.desk.tell(now, report);
         self.bench.control_report(now, *report);
     }
 
@@ -72,6 +82,26 @@ impl PwmPort for Port<'_> {
     fn leg_faults(&mut self) -> LegFaults {
         self.bench.leg_faults()
     }
+
+    fn leave(&mut self, now: Instant) -> bool {
+        self.bench.leave(now);
+        true
+    }
+}
+
+impl OperatorPort for Port<'_> {
+    fn ask(&mut self, at: Instant) -> (Request, Feedback) {
+        self.bench.ask(at).unwrap_or_else(|error| {
+            self.error = Some(error);
+            (Request::idle(self.ratings), Feedback::default())
+        })
+    }
+
+    fn tell(&mut self, from: Instant, status: &Status) {
+        if let Err(error) = self.bench.told(from, *status) {
+            self.error = Some(error);
+        }
+    }
 }
 
 /// Runs until the recording is complete.
@@ -81,10 +111,12 @@ pub fn run_on_host(
     tables: &'static Tables,
     settings: Settings,
     first_half_ticks: u32,
+    line: Option<Line>,
 ) -> Result<Recording, BenchError> {
     let recorder = Recorder::new();
+    let operator = operator::Settings::rated(&tables.ratings, slot_s(&settings.clock), line);
     let mut progress = Progress::new(name);
-    let tasks = Tasks::new(tables, settings, first_half_ticks).recorded_by(&recorder);
+    let tasks = Tasks::new(tables, settings, first_half_ticks).recorded_by(&recorder).commanded_by(operator);
     tasks.drive(&mut bench, |bench| {
         progress.show(bench.progress());
         true
@@ -93,11 +125,14 @@ pub fn run_on_host(
     Ok(super::record(bench, records))
 }
 
-/// Both tasks and the cells between them.
+/// Both tasks, the cells between them, and the operator's slot of the idle loop.
 pub struct Tasks<'a> {
+    tables: &'static Tables,
+    settings: Settings,
     control: ControlTask,
     pwm: PwmTask,
     shared: Shared<'a>,
+    operator: Option<operator::Settings<'a>>,
 }
 
 impl<'a> Tasks<'a> {
@@ -105,9 +140,12 @@ impl<'a> Tasks<'a> {
     pub fn new(tables: &'static Tables, settings: Settings, first_half_ticks: u32) -> Self {
         let first_control = Instant(settings.clock.control_ticks);
         Self {
+            tables,
+            settings,
             control: ControlTask::new(tables, settings, first_control),
             pwm: PwmTask::new(tables, settings, Instant(first_half_ticks)).after_halves_of(first_half_ticks),
             shared: Shared::new(),
+            operator: None,
         }
     }
 
@@ -117,16 +155,24 @@ impl<'a> Tasks<'a> {
         self
     }
 
+    /// The same with an operator, on a bench that has one.
+    pub fn commanded_by(mut self, operator: operator::Settings<'a>) -> Self {
+        self.operator = Some(operator);
+        self
+    }
+
     /// Until the bench's recording is complete, or nobody wants to see more of it.
     pub fn drive(
         mut self,
         bench: &mut Bench,
         mut goes_on: impl FnMut(&Bench) -> bool,
     ) -> Result<(), BenchError> {
+        let (desk, mut slot) = (Desk::new(), Slot::new());
         while !bench.is_done() {
             let (control_at, pwm_at) = (self.control.next_call(), self.pwm.next_call());
             let has_control = bench.has_control(control_at);
-            let mut port = Port { bench, error: None };
+            let operator = self.operator.as_ref().filter(|_| bench.is_operated());
+            let mut port = Port { bench, desk: &desk, ratings: &self.tables.ratings, error: None };
             // At equal instants the PWM interrupt comes first: it has the higher priority.
             if control_at.reached(pwm_at) || !has_control {
                 self.pwm.run(&mut port, &self.shared);
@@ -135,6 +181,10 @@ impl<'a> Tasks<'a> {
                     self.pwm.revise(&mut port, &self.shared);
                 }
                 self.control.run(&mut port, &self.shared);
+                // The idle loop goes on where the interrupt ends.
+                if let Some(operator) = operator {
+                    slot.run(&desk, &mut port, operator, &self.settings.clock);
+                }
             }
             if let Some(error) = port.error {
                 return Err(error);

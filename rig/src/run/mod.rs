@@ -21,8 +21,7 @@ pub const CLOCK: Clock = Clock::new(25_000_000, 2_500);
 /// What the bench saw, and what the drive's own recorder holds.
 fn record(bench: Bench, records: Vec<Record>) -> Recording {
     let recorded = records.into_iter().map(|record| (bench.instant_s(record.at), record)).collect();
-    let (rows, switches, edges, lead, tick_s) = bench.into_recording();
-    Recording { rows, switches, edges, lead, tick_s, recorded }
+    Recording { recorded, ..bench.into_recording() }
 }
 
 /// A bar on a terminal; in a pipe indicatif draws none.

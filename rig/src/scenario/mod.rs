@@ -1,10 +1,13 @@
 //! What is driven, and what is to be seen.
 
 mod characteristic;
+mod chopper;
 mod full_step;
+mod line;
 mod link_steps;
 mod load_steps;
 mod mode_borders;
+mod precharge;
 mod restart;
 mod reversal;
 mod script;
@@ -13,7 +16,7 @@ mod sweep;
 mod timing;
 
 use crate::analysis::Figures;
-use crate::bench::{self, Bench, Operator, Supply};
+use crate::bench::{self, Bench, LinePlan, Operator, Supply};
 use crate::machine::Machine;
 use crate::options::{On, RunOptions};
 use crate::plant::{Plant, PlantSettings, SpeedSource};
@@ -25,6 +28,7 @@ use tractive::control::Gains;
 use tractive::drive::traction::Settings;
 use tractive::link::Setup;
 use tractive::modulation::Devices;
+use tractive::operator::Line;
 
 /// The usual lead, in s.
 const LEAD_S: f64 = 0.1;
@@ -51,6 +55,10 @@ pub trait Scenario {
     fn figure(&self) -> &'static str;
     /// What is driven.
     fn plan(&self, options: &RunOptions, machine: &Machine) -> Plan;
+    /// The line side, where the scenario is about it; otherwise the link is stiff and the drive is commanded directly.
+    fn line(&self, _options: &RunOptions, _machine: &Machine) -> Option<LinePlan> {
+        None
+    }
     /// The figures to report.
     fn figures(&self, recording: &Recording, options: &RunOptions, machine: &Machine) -> Figures;
     /// The plots to draw.
@@ -69,6 +77,8 @@ pub fn all() -> Vec<Box<dyn Scenario>> {
         Box::new(reversal::Reversal),
         Box::new(restart::Restart),
         Box::new(link_steps::LinkSteps),
+        Box::new(precharge::Precharge),
+        Box::new(chopper::Chopper),
         Box::new(timing::Timing),
     ]
 }
@@ -121,10 +131,20 @@ pub fn drive(scenario: &dyn Scenario, options: &RunOptions, machine: &Machine) -
             injection: None,
         },
     );
+    let line_plan = scenario.line(options, machine);
+    let line = line_plan.as_ref().map(|plan| {
+        let link = &plan.link;
+        let seconds = |ohm: f64| (ohm * link.capacitance_f) as f32;
+        Line::rated(&machine.tables.ratings, seconds(link.precharge_ohm), seconds(link.discharge_ohm))
+    });
+    let bench = match line_plan {
+        Some(plan) => bench.with_line(plan),
+        None => bench,
+    };
     match options.on {
         On::Host => {
             let settings = Settings { clock: CLOCK, devices, gains: Gains::DEFAULT };
-            Ok(run::run_on_host(scenario.name(), bench, machine.tables, settings, first_half_ticks)?)
+            Ok(run::run_on_host(scenario.name(), bench, machine.tables, settings, first_half_ticks, line)?)
         }
         On::Qemu => run::run_in_qemu(scenario.name(), bench, setup, &options.emulator()?),
     }
