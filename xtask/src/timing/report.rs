@@ -79,7 +79,7 @@ impl Report<'_> {
             "blocks": blocks,
             "image": {
                 "code_bytes": self.sizes.code, "table_bytes": self.sizes.tables, "ram_bytes": self.sizes.ram,
-                "stack_bytes": self.statistics.stack_bytes, "stack_left_bytes": self.sizes.stack,
+                "recorder_bytes": self.sizes.recorder, "stack_bytes": self.statistics.stack_bytes, "stack_left_bytes": self.sizes.stack,
             },
             "budgets": budgets,
         })
@@ -164,7 +164,7 @@ mod tests {
     #[test]
     fn the_json_holds_what_the_contract_names() {
         let statistics = statistics();
-        let sizes = Sizes { code: 1, tables: 2, rodata: 3, ram: 4, stack: 5 };
+        let sizes = Sizes { code: 1, tables: 2, rodata: 3, ram: 4, recorder: 6, stack: 5 };
         let judged = judge("[a]\nb = { target = 1 }", &[("a.b", 2.0)]).unwrap();
         let block =
             Block { name: "core_tick/tractive".to_owned(), max: 120, mean: 110.0, max_error: Some(1e-7) };
