@@ -21,13 +21,16 @@ const SECOND_MARK: u16 = 0b0101010 << 9;
 /// Looks at the receive flag before a word counts as missing: several times a word's length.
 const PATIENCE: u32 = 100;
 
+/// The select line's number in its port.
+pub const SELECT: usize = 15;
+
 /// The way to the driver board.
 #[derive(Clone, Copy)]
 pub struct Feedback {
     /// SPI3.
     pub spi: Spi,
-    /// Port and number of the select line.
-    pub select: (Gpio, usize),
+    /// Port of the select line, number [`SELECT`].
+    pub port: Gpio,
 }
 
 impl Feedback {
@@ -46,8 +49,7 @@ impl Feedback {
     /// First thing at a peak: both words are under way.
     #[inline]
     pub fn begin(&self) {
-        let (port, number) = self.select;
-        port.bsrr().write(|w| w.set_br(number, true));
+        self.port.bsrr().write(|w| w.set_br(SELECT, true));
         self.spi.dr16().write_value(0);
         self.spi.dr16().write_value(0);
     }
@@ -56,8 +58,7 @@ impl Feedback {
     #[inline]
     pub fn end(&self) -> GateFeedback {
         let words = (self.word(), self.word());
-        let (port, number) = self.select;
-        port.bsrr().write(|w| w.set_bs(number, true));
+        self.port.bsrr().write(|w| w.set_bs(SELECT, true));
         match words {
             (Some(on), Some(off)) if on & !GATES == FIRST_MARK && off & !GATES == SECOND_MARK => {
                 GateFeedback { on: on & GATES, off: off & GATES }

@@ -2,7 +2,6 @@
 
 use crate::board::nucleo_g474re::pins::{Function, Pin, Port, is_high, pin};
 use crate::board::nucleo_g474re::registers::Registers;
-use stm32_metapac::gpio::Gpio;
 
 /// Every pin the ZS9's drive uses.
 pub const PINS: [Pin; 31] = [
@@ -38,11 +37,6 @@ pub const PINS: [Pin; 31] = [
     pin(Port::A, 15, Function::Output, &[], "gate feedback, select, low while it is read"),
     pin(Port::C, 4, Function::Input, &[], "enable: high lets the gates pulse"),
 ];
-
-/// The select line of the gates' feedback.
-pub const fn select(registers: &Registers) -> (Gpio, usize) {
-    (registers.gpioa, 15)
-}
 
 /// Whether the enable input is high.
 #[inline]

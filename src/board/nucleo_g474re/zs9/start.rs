@@ -112,5 +112,5 @@ pub const fn bridge(registers: &Registers) -> Bridge {
 
 /// The gates' feedback.
 pub const fn feedback(registers: &Registers) -> Feedback {
-    Feedback { spi: registers.spi3, select: pins::select(registers) }
+    Feedback { spi: registers.spi3, port: registers.gpioa }
 }
