@@ -10,7 +10,8 @@ fn main() {
 }
 
 #[cfg(all(target_os = "none", feature = "board-nucleo-g474re"))]
-compile_error!("the ZS9 has no board but QEMU's yet: build it without the feature board-nucleo-g474re");
+#[path = "../firmware/zs9_nucleo_g474re.rs"]
+mod firmware;
 
 #[cfg(all(target_os = "none", not(feature = "board-nucleo-g474re")))]
 mod firmware {

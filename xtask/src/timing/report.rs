@@ -71,6 +71,7 @@ impl Measured {
         let sizes = &self.image.sizes;
         json!({
             "code_bytes": sizes.code, "table_bytes": sizes.tables, "ram_bytes": sizes.ram,
+            "recorder_bytes": sizes.recorder,
             "stack_bytes": self.statistics.stack_bytes, "stack_left_bytes": sizes.stack,
         })
     }

@@ -225,7 +225,7 @@ pub mod tests {
         };
         let mut statistics = Statistics::default();
         statistics.add(&drive).unwrap();
-        let sizes = Sizes { code: 1, tables: 2, rodata: 3, ram: 4, stack: 5 };
+        let sizes = Sizes { code: 1, tables: 2, rodata: 3, ram: 4, recorder: 6, stack: 5 };
         let part = Part { name: "MTPA, two passes", mean: 12.0, longest: 20 };
         Measured {
             system: System::ALL[0],
