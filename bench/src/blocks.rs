@@ -160,10 +160,10 @@ fn core_tick_foc(input: &Input, output: &mut Output) {
 /// The same of `fluxkit_math`: no map, no decoupling.
 #[inline(never)]
 fn core_tick_fluxkit(input: &Input, output: &mut Output) {
-    use fluxkit_math::{PiConfig, PiController};
     use fluxkit_math::frame;
     use fluxkit_math::modulation::svpwm;
     use fluxkit_math::transforms::{clarke, inverse_park, park};
+    use fluxkit_math::{PiConfig, PiController};
     const LINK_V: f32 = 100.0;
     const PERIOD_S: f32 = 1e-4;
     let controller = || PiController::new(PiConfig { kp: 1.0, ki: 10.0, out_min: -50.0, out_max: 50.0 });

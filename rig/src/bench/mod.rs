@@ -19,6 +19,7 @@ pub use link::{LineFilter, Supply};
 pub use observe::{Observed, Peaks};
 pub use sensors::{Converter, Flaws, Sensors};
 
+use crate::benchmark::in_plant;
 use crate::plant::Plant;
 use crate::trace::{Recording, Row, Switch};
 use inject::{Kind, Spoiler};
@@ -374,12 +375,12 @@ impl Bench {
         if tick > self.now {
             let dt_s = (tick - self.now) as f64 * self.tick_s;
             if let Some(line) = &mut self.line {
-                self.plant.advance_on(&mut line.link, self.inverter.legs(), dt_s);
+                in_plant(|| self.plant.advance_on(&mut line.link, self.inverter.legs(), dt_s));
             } else {
                 let t_s = self.seconds(self.now);
                 let (udc_v, legs) = (self.udc_v(t_s), self.inverter.legs());
                 let before_j = self.plant.energies().electrical_j;
-                self.plant.advance(legs, udc_v, dt_s);
+                in_plant(|| self.plant.advance(legs, udc_v, dt_s));
                 if let Some(link) = &mut self.link {
                     let drawn_j = self.plant.energies().electrical_j - before_j;
                     link.advance(drawn_j, dt_s, self.sensors.udc_v(t_s), self.spoiler.supply(t_s));
