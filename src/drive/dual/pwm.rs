@@ -62,13 +62,17 @@ impl<M: Machine> PwmTask<M> {
         let violation = self.violation(&sample, command.as_ref());
         self.check(violation, port);
         let mut given = None;
-        let mut made = None;
+        let mut next = PlayedPeriod::off(self.settings.half_steps());
+        let mut expected = Expected::OFF;
         if let Some(command) = command.filter(|command| command.gates == Gates::Pulse && self.trip.is_none())
         {
             let request = self.request(&command, &sample);
             match nine_switch::step(&request) {
                 Ok(period) => {
-                    made = Some(PlayedPeriod { gates: period.ticks(self.settings.half_steps()) });
+                    for (ticks, gate) in next.gates.iter_mut().zip(&period.gates) {
+                        *ticks = gate.ticks(self.settings.half_steps());
+                    }
+                    expected = Expected::of(&next, &self.settings);
                     given = Some(shares(&request, &period));
                 }
                 Err(refused) => self.check(Some(refusal(refused, &request)), port),
@@ -76,17 +80,8 @@ impl<M: Machine> PwmTask<M> {
         }
         self.last_link_v = Some(link_v(&sample));
         let [_, running] = self.expected;
-        let next = match &made {
-            Some(next) => {
-                port.play(now, next);
-                Expected::of(next, &self.settings)
-            }
-            None => {
-                port.play(now, &PlayedPeriod::off(self.settings.half_steps()));
-                Expected::OFF
-            }
-        };
-        self.expected = [running, next];
+        self.expected = [running, expected];
+        port.play(now, &next);
         shared.applied.publish(DualApplied { at: now, next: given, trip: self.trip });
     }
 
