@@ -15,6 +15,7 @@ use crate::drive::{Report, half_from_words, half_to_words};
 use crate::frames::{Abc, Angle};
 use crate::modulation::CarrierPeriod;
 use crate::protection::{Fault, SafeState};
+use crate::recorder::Record;
 use crate::time::Instant;
 
 pub use dual::{
@@ -57,6 +58,10 @@ pub enum Request {
     Enter(Instant, SafeState),
     /// The processor has stopped in a panic or a HardFault, gates off.
     Dead,
+    /// A control period from the flight recorder, the oldest first; after the last answer, if a fault has frozen it.
+    Recorded(Record),
+    /// The image has nothing more to say.
+    End,
 }
 
 impl Request {
@@ -71,6 +76,8 @@ impl Request {
             Self::Play(at, half) => (5, *at, &half_to_words(*half)),
             Self::Enter(at, safe) => (6, *at, &[*safe as u32]),
             Self::Dead => (7, Instant(0), &[]),
+            Self::Recorded(record) => (8, record.at, &record.to_words()),
+            Self::End => (9, Instant(0), &[]),
         };
         let words = [tag, at.0].into_iter().chain(payload.iter().copied());
         for (slot, word) in block.iter_mut().zip(words) {
@@ -97,10 +104,14 @@ impl Request {
             }
             6 => {
                 let [safe, ..] = payload;
-                let short = safe == SafeState::ShortCircuit as u32;
-                Self::Enter(at, if short { SafeState::ShortCircuit } else { SafeState::GatesOff })
+                Self::Enter(at, SafeState::from_code(safe))
             }
             7 => Self::Dead,
+            8 => {
+                let [a, b, c, d, e, f, g, h, i, j, ..] = payload;
+                Self::Recorded(Record::from_words([a, b, c, d, e, f, g, h, i, j]))
+            }
+            9 => Self::End,
             _ => return None,
         })
     }

@@ -11,8 +11,9 @@ use tractive::frames::{Abc, Angle};
 use tractive::machine::{Ratings, Tables};
 use tractive::modulation::CarrierPeriod;
 use tractive::operator::{self, Desk, Feedback, Line, OperatorPort, Request, Slot, Status, slot_s};
-use tractive::protection::SafeState;
-use tractive::time::Instant;
+use tractive::protection::{LegFaults, SafeState};
+use tractive::recorder::Recorder;
+use tractive::time::{Clock, Instant};
 
 /// The bench behind a board's ports; the first error ends the run.
 struct Port<'a> {
@@ -49,12 +50,16 @@ impl ControlPort for Port<'_> {
     }
 
     fn overrun_ticks(&mut self, _now: Instant) -> u32 {
-        0
+        self.bench.control_late_ticks()
     }
 
     fn report(&mut self, now: Instant, report: &Report) {
         self.desk.tell(now, report);
         self.bench.control_report(now, *report);
+    }
+
+    fn leg_faults(&mut self) -> LegFaults {
+        self.bench.leg_faults()
     }
 }
 
@@ -77,6 +82,10 @@ impl PwmPort for Port<'_> {
     fn leave(&mut self, now: Instant) -> bool {
         self.bench.leave(now);
         true
+    }
+
+    fn leg_faults(&mut self) -> LegFaults {
+        self.bench.leg_faults()
     }
 }
 
@@ -104,34 +113,86 @@ pub fn run_on_host(
     first_half_ticks: u32,
     line: Option<Line>,
 ) -> Result<Recording, BenchError> {
-    let shared = Shared::new();
-    let mut control_at = Instant(settings.clock.control_ticks);
-    let mut pwm_at = Instant(first_half_ticks);
-    let mut control = ControlTask::new(tables, settings, control_at);
-    let mut pwm = PwmTask::new(tables, settings, pwm_at).after_halves_of(first_half_ticks);
-    let desk = Desk::new();
-    let mut slot = Slot::new();
-    let operator = operator::Settings::rated(&tables.ratings, slot_s(&settings.clock), line);
+    let recorder = Recorder::new();
     let mut progress = Progress::new(name);
-    while !bench.is_done() {
-        let operated = bench.is_operated();
-        let mut port = Port { bench: &mut bench, desk: &desk, ratings: &tables.ratings, error: None };
-        // At equal instants the PWM interrupt comes first: it has the higher priority.
-        if control_at.reached(pwm_at) {
-            pwm.run(&mut port, &shared);
-            pwm_at = pwm.next_call();
-        } else {
-            control.run(&mut port, &shared);
-            control_at = control.next_call();
-            // The idle loop goes on where the interrupt ends.
-            if operated {
-                slot.run(&desk, &mut port, &operator, &settings.clock);
+    let tasks = Tasks::new(tables, settings, first_half_ticks).recorded_by(&recorder).operated_on(line);
+    tasks.drive(&mut bench, |bench| {
+        progress.show(bench.progress());
+        true
+    })?;
+    let records = (0..).map_while(|index| recorder.read(index)).collect();
+    Ok(bench.into_recording(records))
+}
+
+/// Both tasks and the cells between them.
+pub struct Tasks<'a> {
+    control: ControlTask,
+    pwm: PwmTask,
+    shared: Shared<'a>,
+    desk: Desk,
+    slot: Slot,
+    operator: operator::Settings<'static>,
+    clock: Clock,
+}
+
+impl<'a> Tasks<'a> {
+    /// Before their first interrupts.
+    pub fn new(tables: &'static Tables, settings: Settings, first_half_ticks: u32) -> Self {
+        let first_control = Instant(settings.clock.control_ticks);
+        Self {
+            control: ControlTask::new(tables, settings, first_control),
+            pwm: PwmTask::new(tables, settings, Instant(first_half_ticks)).after_halves_of(first_half_ticks),
+            shared: Shared::new(),
+            desk: Desk::new(),
+            slot: Slot::new(),
+            operator: operator::Settings::rated(&tables.ratings, slot_s(&settings.clock), None),
+            clock: settings.clock,
+        }
+    }
+
+    /// The same with an operator who switches the line side, if the bench has one to ask.
+    pub fn operated_on(mut self, line: Option<Line>) -> Self {
+        self.operator.line = line;
+        self
+    }
+
+    /// The same with a flight recorder.
+    pub fn recorded_by(mut self, recorder: &'a Recorder) -> Self {
+        self.shared = Shared::recorded_by(recorder);
+        self
+    }
+
+    /// Until the bench's recording is complete, or nobody wants to see more of it.
+    pub fn drive(
+        mut self,
+        bench: &mut Bench,
+        mut goes_on: impl FnMut(&Bench) -> bool,
+    ) -> Result<(), BenchError> {
+        while !bench.is_done() {
+            let (control_at, pwm_at) = (self.control.next_call(), self.pwm.next_call());
+            let has_control = bench.has_control(control_at);
+            let (desk, ratings) = (&self.desk, self.operator.ratings);
+            let mut port = Port { bench, desk, ratings, error: None };
+            // At equal instants the PWM interrupt comes first: it has the higher priority.
+            if control_at.reached(pwm_at) || !has_control {
+                self.pwm.run(&mut port, &self.shared);
+            } else {
+                if self.control.wants_revision() {
+                    self.pwm.revise(&mut port, &self.shared);
+                }
+                self.control.run(&mut port, &self.shared);
+                // The idle loop goes on where the interrupt ends.
+                if port.bench.is_operated() {
+                    self.slot.run(&self.desk, &mut port, &self.operator, &self.clock);
+                }
+            }
+            if let Some(error) = port.error {
+                return Err(error);
+            }
+            if !goes_on(bench) {
+                break;
             }
         }
-        if let Some(error) = port.error {
-            return Err(error);
-        }
-        progress.show(bench.progress());
+        Ok(())
     }
-    Ok(bench.into_recording())
 }

@@ -6,7 +6,7 @@ mod qemu;
 
 pub use emulator::Emulator;
 pub(crate) use emulator::emulate;
-pub use host::run_on_host;
+pub use host::{Tasks, run_on_host};
 pub use qemu::run_in_qemu;
 
 use indicatif::{ProgressBar, ProgressStyle};
