@@ -1,5 +1,6 @@
 //! What is driven, and what is to be seen.
 
+mod acknowledge;
 mod characteristic;
 mod chopper;
 mod full_step;
@@ -79,6 +80,7 @@ pub fn all() -> Vec<Box<dyn Scenario>> {
         Box::new(link_steps::LinkSteps),
         Box::new(precharge::Precharge),
         Box::new(chopper::Chopper),
+        Box::new(acknowledge::Acknowledge),
         Box::new(timing::Timing),
     ]
 }
