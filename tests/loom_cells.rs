@@ -3,7 +3,7 @@
 
 use loom::sync::Arc;
 use loom::thread;
-use tractive::cell::{Downlink, Uplink, Words};
+use tractive::cell::{Downlink, Ring, Uplink, Words};
 
 /// Two words that belong together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -166,5 +166,38 @@ fn words_alone_are_torn() {
         words.iter().for_each(|word| word.store(2, Ordering::Release));
         let read = Message(thread.join().unwrap());
         assert!(read.is_whole(), "torn: {read:?}");
+    });
+}
+
+/// The reader gets only what a fault has frozen, whole; nothing while the writer still writes, or writes again.
+#[test]
+fn a_ring_gives_only_what_is_frozen() {
+    loom::model(|| {
+        let ring = Arc::new(Ring::<Message, 2, 8>::new());
+        ring.record(Message::number(1), false);
+        let reader = Arc::clone(&ring);
+        let thread = thread::spawn(move || [reader.read(0), reader.read(1)]);
+        ring.record(Message::number(2), true);
+        let expected = [Some(Message::number(1)), Some(Message::number(2))];
+        for (read, expected) in thread.join().unwrap().into_iter().zip(expected) {
+            assert!(read.is_none() || read == expected, "{read:?}");
+        }
+        assert_eq!([ring.read(0), ring.read(1), ring.read(2)], [expected[0], expected[1], None]);
+    });
+}
+
+#[test]
+fn a_ring_that_is_released_under_the_readers_hands_gives_nothing_torn() {
+    loom::model(|| {
+        let ring = Arc::new(Ring::<Message, 2, 8>::new());
+        for n in 1..9 {
+            ring.record(Message::number(n), n == 8);
+        }
+        let reader = Arc::clone(&ring);
+        let thread = thread::spawn(move || reader.read(0));
+        ring.release();
+        ring.record(Message::number(9), true);
+        let read = thread.join().unwrap();
+        assert!([None, Some(Message::number(1)), Some(Message::number(9))].contains(&read), "{read:?}");
     });
 }

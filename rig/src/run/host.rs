@@ -4,13 +4,14 @@ use super::Progress;
 use crate::bench::{Bench, BenchError};
 use crate::trace::Recording;
 use tractive::board::{ControlPort, PwmPort, Sample};
-use tractive::control::{Demand, Measurements};
+use tractive::control::{Demand, LinkWindow, Measurements};
 use tractive::drive::Report;
 use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
 use tractive::frames::{Abc, Angle};
 use tractive::machine::Tables;
 use tractive::modulation::CarrierPeriod;
-use tractive::protection::SafeState;
+use tractive::protection::{LegFaults, SafeState};
+use tractive::recorder::Recorder;
 use tractive::time::Instant;
 
 /// The bench behind a board's ports; the first error ends the run.
@@ -24,7 +25,14 @@ impl ControlPort for Port<'_> {
         self.bench.control_sample(now).unwrap_or_else(|error| {
             self.error = Some(error);
             let measured = Measurements { currents_a: Abc::default(), udc_v: 0.0, angle: Angle::ZERO };
-            Sample { measured, demand: Demand::default(), enable: false }
+            Sample {
+                measured,
+                demand: Demand::default(),
+                enable: false,
+                window: LinkWindow::OPEN,
+                acknowledge: 0,
+                hardware: None,
+            }
         })
     }
 
@@ -33,11 +41,15 @@ impl ControlPort for Port<'_> {
     }
 
     fn overrun_ticks(&mut self, _now: Instant) -> u32 {
-        0
+        self.bench.control_late_ticks()
     }
 
     fn report(&mut self, now: Instant, report: &Report) {
         self.bench.control_report(now, *report);
+    }
+
+    fn leg_faults(&mut self) -> LegFaults {
+        self.bench.leg_faults()
     }
 }
 
@@ -56,6 +68,10 @@ impl PwmPort for Port<'_> {
     fn enter(&mut self, safe: SafeState, now: Instant) {
         self.bench.enter(now, safe);
     }
+
+    fn leg_faults(&mut self) -> LegFaults {
+        self.bench.leg_faults()
+    }
 }
 
 /// Runs until the recording is complete.
@@ -66,26 +82,67 @@ pub fn run_on_host(
     settings: Settings,
     first_half_ticks: u32,
 ) -> Result<Recording, BenchError> {
-    let shared = Shared::new();
-    let mut control_at = Instant(settings.clock.control_ticks);
-    let mut pwm_at = Instant(first_half_ticks);
-    let mut control = ControlTask::new(tables, settings, control_at);
-    let mut pwm = PwmTask::new(tables, settings, pwm_at).after_halves_of(first_half_ticks);
+    let recorder = Recorder::new();
     let mut progress = Progress::new(name);
-    while !bench.is_done() {
-        let mut port = Port { bench: &mut bench, error: None };
-        // At equal instants the PWM interrupt comes first: it has the higher priority.
-        if control_at.reached(pwm_at) {
-            pwm.run(&mut port, &shared);
-            pwm_at = pwm.next_call();
-        } else {
-            control.run(&mut port, &shared);
-            control_at = control.next_call();
-        }
-        if let Some(error) = port.error {
-            return Err(error);
-        }
+    let tasks = Tasks::new(tables, settings, first_half_ticks).recorded_by(&recorder);
+    tasks.drive(&mut bench, |bench| {
         progress.show(bench.progress());
+        true
+    })?;
+    let records = (0..).map_while(|index| recorder.read(index)).collect();
+    Ok(super::record(bench, records))
+}
+
+/// Both tasks and the cells between them.
+pub struct Tasks<'a> {
+    control: ControlTask,
+    pwm: PwmTask,
+    shared: Shared<'a>,
+}
+
+impl<'a> Tasks<'a> {
+    /// Before their first interrupts.
+    pub fn new(tables: &'static Tables, settings: Settings, first_half_ticks: u32) -> Self {
+        let first_control = Instant(settings.clock.control_ticks);
+        Self {
+            control: ControlTask::new(tables, settings, first_control),
+            pwm: PwmTask::new(tables, settings, Instant(first_half_ticks)).after_halves_of(first_half_ticks),
+            shared: Shared::new(),
+        }
     }
-    Ok(super::record(bench))
+
+    /// The same with a flight recorder.
+    pub fn recorded_by(mut self, recorder: &'a Recorder) -> Self {
+        self.shared = Shared::recorded_by(recorder);
+        self
+    }
+
+    /// Until the bench's recording is complete, or nobody wants to see more of it.
+    pub fn drive(
+        mut self,
+        bench: &mut Bench,
+        mut goes_on: impl FnMut(&Bench) -> bool,
+    ) -> Result<(), BenchError> {
+        while !bench.is_done() {
+            let (control_at, pwm_at) = (self.control.next_call(), self.pwm.next_call());
+            let has_control = bench.has_control(control_at);
+            let mut port = Port { bench, error: None };
+            // At equal instants the PWM interrupt comes first: it has the higher priority.
+            if control_at.reached(pwm_at) || !has_control {
+                self.pwm.run(&mut port, &self.shared);
+            } else {
+                if self.control.wants_revision() {
+                    self.pwm.revise(&mut port, &self.shared);
+                }
+                self.control.run(&mut port, &self.shared);
+            }
+            if let Some(error) = port.error {
+                return Err(error);
+            }
+            if !goes_on(bench) {
+                break;
+            }
+        }
+        Ok(())
+    }
 }

@@ -11,7 +11,7 @@ use tractive::modulation::Mode;
 
 /// Runs until the recording is complete.
 pub fn run_in_qemu(name: &str, mut bench: Bench, setup: Setup, emulator: &Emulator) -> Result<Recording> {
-    let mut calls = Calls::default();
+    let (mut calls, mut records) = (Calls::default(), Vec::new());
     let mut progress = Progress::new(name);
     let outcome = emulate(emulator, |block, answers| {
         let Some(request) = Request::from_block(block) else {
@@ -23,9 +23,6 @@ pub fn run_in_qemu(name: &str, mut bench: Bench, setup: Setup, emulator: &Emulat
                 let sample = bench.control_sample(at)?;
                 let done = bench.is_done();
                 answers.control(&link::sample_to_block(&sample, done))?;
-                if done {
-                    return Ok(true);
-                }
             }
             Request::ControlReport(at, report) => {
                 calls.control(&report);
@@ -37,6 +34,8 @@ pub fn run_in_qemu(name: &str, mut bench: Bench, setup: Setup, emulator: &Emulat
                 bench.play(at, half);
             }
             Request::Enter(at, safe) => bench.enter(at, safe),
+            Request::Recorded(record) => records.push(record),
+            Request::End => return Ok(true),
             Request::Dead => bail!("the firmware stopped in a panic or a HardFault, gates off"),
         }
         progress.show(bench.progress());
@@ -46,7 +45,7 @@ pub fn run_in_qemu(name: &str, mut bench: Bench, setup: Setup, emulator: &Emulat
         std::fs::write(path, &calls.lines).with_context(|| path.display().to_string())?;
     }
     outcome?;
-    Ok(super::record(bench))
+    Ok(super::record(bench, records))
 }
 
 /// What every interrupt was about, in the order in which they ended.
