@@ -17,6 +17,7 @@ use crate::modulation::{
 use crate::protection::{self, Disarmed, Fault, FrozenWatch, SafeState, Trip, Violation};
 use crate::recorder::{Record, Recorder, State};
 use crate::time::{Clock, Instant};
+use core::sync::atomic::{AtomicU32, Ordering};
 
 /// Angle units (2⁻³² turn) in one radian.
 pub(super) const UNITS_PER_RADIAN: f32 = 4_294_967_296.0 / core::f32::consts::TAU;
@@ -28,8 +29,9 @@ const JUMP_SHARE: f32 = 0.05;
 /// in which control sees what became of it.
 const REVISION_PERIODS: u32 = 2;
 
-/// Control periods after which a command is too old to make pulses from.
-const STALE_PERIODS: i32 = 5;
+/// By which part of a control period an interrupt may be late before the other one calls it lost: more than it takes to enter it.
+const PWM_LATE_PART: u32 = 4;
+const CONTROL_LATE_PART: u32 = 16;
 
 /// How fast the voltage glides from square wave to what the torque needs, in shares of six-step per second.
 const GLIDE_PER_S: f32 = 12.0;
@@ -57,6 +59,8 @@ pub struct Shared<'a> {
     pub command: Downlink<VoltageCommand, 9>,
     /// What the modulator does.
     pub applied: Uplink<Applied, 27>,
+    /// Instant of the newest control interrupt, from its beginning on.
+    pub began: AtomicU32,
     recorder: Option<&'a Recorder>,
 }
 
@@ -64,13 +68,13 @@ impl<'a> Shared<'a> {
     /// Empty cells.
     #[cfg(not(loom))]
     pub const fn new() -> Self {
-        Self { command: Downlink::new(), applied: Uplink::new(), recorder: None }
+        Self { command: Downlink::new(), applied: Uplink::new(), began: AtomicU32::new(0), recorder: None }
     }
 
     /// The same with a flight recorder, which the control interrupt fills.
     #[cfg(not(loom))]
     pub const fn recorded_by(recorder: &'a Recorder) -> Self {
-        Self { command: Downlink::new(), applied: Uplink::new(), recorder: Some(recorder) }
+        Self { recorder: Some(recorder), ..Self::new() }
     }
 }
 
@@ -149,11 +153,14 @@ impl ControlTask {
     pub fn run(&mut self, port: &mut impl ControlPort, shared: &Shared) {
         let now = self.now;
         self.now = now.after(self.settings.clock.control_ticks);
+        shared.began.store(now.0, Ordering::Relaxed);
         let sample = port.sample(now);
-        let applied = shared.applied.read().map(|applied| as_of(&applied, now));
+        let newest = shared.applied.read();
+        let applied = newest.map(|applied| as_of(&applied, now));
         self.forget_acknowledged(sample.acknowledge, applied.as_ref());
         self.check(sample.hardware.map(|fault| (fault, 1.0, 0.0)), &sample, port);
         self.adopt_trip(applied.as_ref().and_then(|applied| applied.trip));
+        self.check(newest.and_then(|newest| overdue(&newest, now, &self.settings.clock)), &sample, port);
         self.check_legs(&sample, port);
         let omega = self.track(&sample, port);
         self.check(
@@ -519,6 +526,13 @@ fn as_of(applied: &Applied, now: Instant) -> Applied {
     }
 }
 
+/// The PWM interrupt that should have come by `now` and has not: since when, in s.
+fn overdue(newest: &Applied, now: Instant, clock: &Clock) -> Option<Violation> {
+    let late = now.since(newest.at.after(newest.running.period_ticks));
+    let limit = (clock.control_ticks / PWM_LATE_PART) as i32;
+    (late > limit).then(|| (Fault::PwmDeadline, clock.seconds(late), clock.seconds(limit)))
+}
+
 /// Volt-seconds of a half from `from` ticks after its start to its end, in V·s.
 fn volt_seconds(half: &CarrierPeriod, from: u32, udc_v: f32, clock: &Clock) -> AlphaBeta {
     let [a, b, c] = half.on_ticks(from).map(|ticks| ticks as f32);
@@ -587,7 +601,7 @@ impl PwmTask {
         };
         let command = shared.command.newest(|command| now.reached(command.valid_from));
         self.forget_acknowledged(&command, port);
-        self.check(&command, port);
+        self.check(&command, Instant(shared.began.load(Ordering::Relaxed)), port);
         let start = now.after(self.applied.running.period_ticks);
         let pulsing = self.applied.trip.is_none();
         self.applied.next = match &command {
@@ -664,14 +678,15 @@ impl PwmTask {
         }
     }
 
-    fn check(&mut self, command: &Option<VoltageCommand>, port: &mut impl PwmPort) {
+    fn check(&mut self, command: &Option<VoltageCommand>, began: Instant, port: &mut impl PwmPort) {
         if self.applied.trip.is_some() {
             return;
         }
         let legs = port.leg_faults();
         let armed = |(fault, _, _): &Violation| !self.disarmed.has(*fault);
         let currents = || protection::check_currents(&self.applied.currents_a, &self.tables.ratings);
-        let stale = || command.as_ref().and_then(|command| self.stale(command));
+        let pulses = command.as_ref().is_some_and(|command| command.gates == Gates::Pulse);
+        let stale = || if pulses { stale(self.now, began, &self.settings.clock) } else { None };
         let violation = legs.check().or_else(|| currents().filter(armed)).or_else(|| stale().filter(armed));
         let Some((fault, value, limit)) = violation else {
             return;
@@ -685,12 +700,11 @@ impl PwmTask {
         port.enter(safe, self.now);
         self.applied.trip = Some(Trip { fault, value, limit, at: self.now, safe });
     }
+}
 
-    fn stale(&self, command: &VoltageCommand) -> Option<Violation> {
-        let clock = &self.settings.clock;
-        let age = self.now.since(command.reference.at);
-        let limit = STALE_PERIODS * clock.control_ticks as i32;
-        let stale = command.gates == Gates::Pulse && !(0..=limit).contains(&age);
-        stale.then(|| (Fault::StaleCommand, clock.seconds(age), clock.seconds(limit)))
-    }
+/// The control interrupt that should have come by `now` and has not: how long ago the last one began, in s.
+pub(super) fn stale(now: Instant, began: Instant, clock: &Clock) -> Option<Violation> {
+    let age = now.since(began);
+    let limit = (clock.control_ticks + clock.control_ticks / CONTROL_LATE_PART) as i32;
+    (age > limit).then(|| (Fault::StaleCommand, clock.seconds(age), clock.seconds(limit)))
 }
