@@ -1,5 +1,6 @@
 //! What is driven, and what is to be seen.
 
+mod acknowledge;
 mod characteristic;
 mod chopper;
 mod full_step;
@@ -19,14 +20,14 @@ use crate::analysis::Figures;
 use crate::bench::{self, Bench, LinePlan, Operator, Supply};
 use crate::machine::Machine;
 use crate::options::{On, RunOptions};
-use crate::plant::{Plant, PlantSettings, SpeedSource};
+use crate::plant::{DcLinkSettings, Plant, PlantSettings, SpeedSource};
 use crate::report::Page;
 use crate::run::{self, CLOCK};
 use crate::trace::Recording;
 use anyhow::{Context, Result};
 use tractive::control::Gains;
 use tractive::drive::traction::Settings;
-use tractive::link::Setup;
+use tractive::link::{LineTimes, Setup};
 use tractive::modulation::Devices;
 use tractive::operator::Line;
 
@@ -79,6 +80,7 @@ pub fn all() -> Vec<Box<dyn Scenario>> {
         Box::new(link_steps::LinkSteps),
         Box::new(precharge::Precharge),
         Box::new(chopper::Chopper),
+        Box::new(acknowledge::Acknowledge),
         Box::new(timing::Timing),
     ]
 }
@@ -98,12 +100,14 @@ pub fn find(name: &str) -> Result<Box<dyn Scenario>> {
 /// Drives a scenario.
 pub fn drive(scenario: &dyn Scenario, options: &RunOptions, machine: &Machine) -> Result<Recording> {
     let plan = scenario.plan(options, machine);
+    let line_plan = scenario.line(options, machine);
     let ticks = |microseconds: f64| (microseconds * 1e-6 * f64::from(CLOCK.ticks_per_s)).round() as u32;
     let setup = Setup {
         min_pulse_ticks: ticks(options.min_pulse_us),
         // What the firmware compensates.
         dead_time_ticks: if options.uncompensated { 0 } else { ticks(options.dead_time_us) },
         pwm_delay_ticks: ticks(options.pwm_delay_us),
+        line: line_plan.as_ref().map(|plan| times(&plan.link)),
     };
     let devices = Devices::new(
         setup.min_pulse_ticks,
@@ -131,12 +135,8 @@ pub fn drive(scenario: &dyn Scenario, options: &RunOptions, machine: &Machine) -
             injection: None,
         },
     );
-    let line_plan = scenario.line(options, machine);
-    let line = line_plan.as_ref().map(|plan| {
-        let link = &plan.link;
-        let seconds = |ohm: f64| (ohm * link.capacitance_f) as f32;
-        Line::rated(&machine.tables.ratings, seconds(link.precharge_ohm), seconds(link.discharge_ohm))
-    });
+    let line =
+        setup.line.map(|times| Line::rated(&machine.tables.ratings, times.precharge_s, times.discharge_s));
     let bench = match line_plan {
         Some(plan) => bench.with_line(plan),
         None => bench,
@@ -160,4 +160,10 @@ fn plant(plan: &Plan, options: &RunOptions, machine: &Machine) -> Plant {
             resistance_scale: 1.0 + options.rs_error / 100.0,
         },
     )
+}
+
+/// What the operator has to know of a link.
+fn times(link: &DcLinkSettings) -> LineTimes {
+    let seconds = |ohm: f64| (ohm * link.capacitance_f) as f32;
+    LineTimes { precharge_s: seconds(link.precharge_ohm), discharge_s: seconds(link.discharge_ohm) }
 }
