@@ -16,7 +16,7 @@ pub struct Timing;
 const SPEEDS_RPM: [f64; 6] = [150.0, 750.0, 1000.0, 1450.0, 1800.0, 2200.0];
 /// From one speed to the next, to the last one, and at each, in s. A quicker ramp would count as a lost angle.
 const RAMP_S: f64 = 0.03;
-const LAST_RAMP_S: f64 = 0.12;
+const LAST_RAMP_S: f64 = 0.16;
 const HOLD_S: f64 = 0.03;
 /// What is left of the run behind the fault, in s.
 const AFTER_FAULT_S: f64 = 0.005;
