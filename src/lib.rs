@@ -31,4 +31,5 @@ pub mod modulation;
 pub mod nine_switch;
 pub mod operator;
 pub mod protection;
+pub mod protocol;
 pub mod time;
