@@ -1,5 +1,6 @@
 //! What is asked of the drive, and what the board says of itself.
 
+use super::settings::Ends;
 use crate::frames::Abc;
 use crate::machine::Ratings;
 use crate::protection::{Fault, Trip};
@@ -63,15 +64,16 @@ pub struct Limits {
 }
 
 impl Limits {
-    /// As the machine is rated: braking ends halfway between the link's highest operating voltage and its trip level, motoring
-    /// halfway between its lowest one and that trip level.
+    /// As the machine is rated: braking ends between the link's highest operating voltage and its trip level, motoring between its
+    /// lowest one and that trip level.
     pub const fn rated(ratings: &Ratings) -> Self {
+        let ends = Ends::rated(ratings);
         Self {
             motoring_nm: ratings.max_torque_nm,
             braking_nm: ratings.max_torque_nm,
             speed_rad_s: ratings.max_speed_rad_s,
-            link_low_v: 0.5 * (ratings.dc_link_min_v + ratings.trip_dc_under_v),
-            link_high_v: 0.5 * (ratings.dc_link_max_v + ratings.trip_dc_over_v),
+            link_low_v: ends.motoring_none_v,
+            link_high_v: ends.braking_none_v,
         }
     }
 }

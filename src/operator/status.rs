@@ -90,6 +90,8 @@ named! {
         Discharging = "discharging",
         /// The machine turns so fast that its EMF would charge the link again.
         MachineTurning = "machine_turning",
+        /// This drive has no contactors on its link.
+        NoContactors = "no_contactors",
         /// A value of the request is not a finite number; its torque counts as zero, its limits as those before.
         RequestNotFinite = "request_not_finite",
         /// A limit lies outside the machine's ratings; the limits before go on.
