@@ -7,6 +7,7 @@
 #![forbid(unsafe_code)]
 
 mod dual;
+mod slot;
 
 use crate::board::Sample;
 use crate::cell::Words;
@@ -21,6 +22,8 @@ pub use dual::{
     DualRequest, DualSetup, dual_sample_from_block, dual_sample_to_block, dual_setup_from_block,
     dual_setup_to_block, power_from_block, power_to_block,
 };
+
+pub use slot::{SlotAnswer, SlotRequest};
 
 /// Words in a block.
 pub const BLOCK_WORDS: usize = 16;
@@ -38,6 +41,8 @@ pub struct Setup {
     pub dead_time_ticks: u32,
     /// By how much the PWM timer's first half is longer than the shortest one, in ticks.
     pub pwm_delay_ticks: u32,
+    /// Whether the drive is commanded over the protocol, in slots, and not by the samples.
+    pub commanded: bool,
 }
 
 /// From the firmware to the rig.
@@ -57,6 +62,8 @@ pub enum Request {
     Enter(Instant, SafeState),
     /// The processor has stopped in a panic or a HardFault, gates off.
     Dead,
+    /// A slot of the operator's: what the one before sends and switches.
+    Slot(Instant, SlotRequest),
 }
 
 impl Request {
@@ -71,6 +78,7 @@ impl Request {
             Self::Play(at, half) => (5, *at, &half_to_words(*half)),
             Self::Enter(at, safe) => (6, *at, &[*safe as u32]),
             Self::Dead => (7, Instant(0), &[]),
+            Self::Slot(at, request) => (16, *at, &request.to_words()),
         };
         let words = [tag, at.0].into_iter().chain(payload.iter().copied());
         for (slot, word) in block.iter_mut().zip(words) {
@@ -101,6 +109,10 @@ impl Request {
                 Self::Enter(at, if short { SafeState::ShortCircuit } else { SafeState::GatesOff })
             }
             7 => Self::Dead,
+            16 => {
+                let [a, b, c, d, e, ..] = payload;
+                Self::Slot(at, SlotRequest::from_words([a, b, c, d, e]))
+            }
             _ => return None,
         })
     }
@@ -110,13 +122,14 @@ impl Request {
 pub fn setup_to_block(setup: Setup) -> Block {
     let mut block = [0; BLOCK_WORDS];
     [block[0], block[1], block[2]] = [setup.min_pulse_ticks, setup.dead_time_ticks, setup.pwm_delay_ticks];
+    block[3] = setup.commanded.into();
     block
 }
 
 /// The inverse of [`setup_to_block`].
 pub fn setup_from_block(block: &Block) -> Setup {
-    let [min_pulse_ticks, dead_time_ticks, pwm_delay_ticks, ..] = *block;
-    Setup { min_pulse_ticks, dead_time_ticks, pwm_delay_ticks }
+    let [min_pulse_ticks, dead_time_ticks, pwm_delay_ticks, commanded, ..] = *block;
+    Setup { min_pulse_ticks, dead_time_ticks, pwm_delay_ticks, commanded: commanded != 0 }
 }
 
 /// The answer to [`Request::ControlSample`]; `stop` ends the run.

@@ -13,6 +13,7 @@ use crate::control::{Demand, LinkWindow, Measurements};
 use crate::drive::Report;
 use crate::frames::Abc;
 use crate::modulation::CarrierPeriod;
+use crate::operator::Permit;
 use crate::protection::{Fault, SafeState};
 use crate::time::Instant;
 
@@ -35,6 +36,14 @@ pub struct Sample {
     pub acknowledge: u8,
     /// What holds the gates off in hardware.
     pub hardware: Option<Fault>,
+}
+
+impl Sample {
+    /// The same measurements with what the operator permits.
+    pub fn permitted(self, permit: &Permit) -> Self {
+        let Permit { enable, demand, window, acknowledge } = *permit;
+        Self { enable, demand, window, acknowledge, ..self }
+    }
 }
 
 /// What the control interrupt needs of a board.

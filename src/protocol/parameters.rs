@@ -1,6 +1,7 @@
 //! Parameters: what is set once for a drive, whatever its machine. Kept in RAM; a reset brings the defaults back.
 
 use crate::machine::Ratings;
+use crate::operator::Settings;
 use core::f32::consts::TAU;
 
 /// A parameter.
@@ -70,11 +71,12 @@ pub enum WriteError {
 }
 
 impl Parameters {
-    /// As the machine is rated.
+    /// As the machine is rated, slew and jerk as the operator's usual ones.
     pub const fn rated(ratings: &Ratings) -> Self {
+        let usual = Settings::rated(ratings, 0.0, None);
         Self {
-            torque_slew_nm_s: ratings.torque_slew_nm_s,
-            torque_jerk_nm_s2: ratings.torque_slew_nm_s * JERK_PER_SLEW,
+            torque_slew_nm_s: usual.slew_nm_s,
+            torque_jerk_nm_s2: usual.jerk_nm_s2,
             torque_limit_nm: ratings.max_torque_nm,
             speed_limit_rpm: ratings.max_speed_rad_s * RPM_PER_RAD_S,
             command_zero_ms: 50.0,
@@ -119,6 +121,3 @@ impl Parameters {
         Ok(())
     }
 }
-
-/// By default the slew rate is reached within 20 ms.
-const JERK_PER_SLEW: f32 = 50.0;

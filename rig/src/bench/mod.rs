@@ -29,6 +29,9 @@ pub type Tick = u64;
 /// than both interrupts together take, as a bound that does not depend on which of them came first.
 const SAFE_STATE_DELAY: Tick = 625;
 
+/// Rows for which room is made at once.
+const MOST_ROWS: usize = 1 << 20;
+
 /// What the operator does, as a function of time.
 pub trait Operator {
     /// Demand and enable at `t_s` seconds after the recording begins (negative before).
@@ -98,6 +101,8 @@ pub struct Bench {
     samples: VecDeque<(Tick, Sample)>,
     next_sample: Tick,
     reports: VecDeque<(Tick, Report)>,
+    /// Loads to come, by their ticks.
+    loads: VecDeque<(Tick, f64)>,
     report: Report,
     next_row: Tick,
     rows_done: u64,
@@ -128,11 +133,14 @@ impl Bench {
             samples: VecDeque::new(),
             next_sample: settings.clock.control_ticks.into(),
             reports: VecDeque::new(),
+            loads: VecDeque::new(),
             report: Report::default(),
             next_row: lead,
             rows_done: 0,
             trace_step_s: settings.trace_step_s,
-            rows: Vec::with_capacity((settings.duration_s / settings.trace_step_s) as usize + 2),
+            rows: Vec::with_capacity(
+                MOST_ROWS.min((settings.duration_s / settings.trace_step_s) as usize + 2),
+            ),
             switches: Vec::new(),
         }
     }
@@ -151,6 +159,21 @@ impl Bench {
     pub fn into_recording(self) -> (Vec<Row>, Vec<Switch>, Vec<Edge>, Tick, f64) {
         let edges = self.inverter.edges().to_vec();
         (self.rows, self.switches, edges, self.lead, self.tick_s)
+    }
+
+    /// An instant near to now, in s from the recording's beginning.
+    pub fn instant_s(&self, instant: Instant) -> f64 {
+        self.seconds(self.widen(instant))
+    }
+
+    /// A free rotor's load from `instant` on, in N·m.
+    pub fn load_from(&mut self, instant: Instant, load_nm: f64) {
+        self.loads.push_back((self.widen(instant), load_nm));
+    }
+
+    /// Ends the recording at `instant`.
+    pub fn end_at(&mut self, instant: Instant) {
+        self.end = self.end.min(self.widen(instant));
     }
 
     /// The conversions that the control timer triggered at `instant`.
@@ -211,6 +234,9 @@ impl Bench {
             if let Some((at, _)) = self.safe {
                 due = due.min(at);
             }
+            if let Some((at, _)) = self.loads.front() {
+                due = due.min((*at).max(self.now));
+            }
             self.integrate(due);
             self.act()?;
         }
@@ -232,6 +258,12 @@ impl Bench {
         {
             self.safe = None;
             self.inverter.enter(safe, now);
+        }
+        while let Some((at, load_nm)) = self.loads.front().copied()
+            && at <= now
+        {
+            self.loads.pop_front();
+            self.plant.set_load_nm(load_nm);
         }
         self.inverter.act(now);
         if now == self.inverter.half_end() {

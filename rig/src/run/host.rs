@@ -1,6 +1,6 @@
 //! The drive on the host: the firmware's own tasks, called in the order in which their interrupts would come.
 
-use super::Progress;
+use super::{Progress, Supervisor, Turn};
 use crate::bench::{Bench, BenchError};
 use crate::trace::Recording;
 use tractive::board::{ControlPort, PwmPort, Sample};
@@ -8,20 +8,24 @@ use tractive::control::{Demand, LinkWindow, Measurements};
 use tractive::drive::Report;
 use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
 use tractive::frames::{Abc, Angle};
+use tractive::link::{SlotAnswer, SlotRequest};
 use tractive::machine::Tables;
 use tractive::modulation::CarrierPeriod;
+use tractive::operator::{self, Desk, Feedback, Slot, Switches};
 use tractive::protection::SafeState;
-use tractive::time::Instant;
+use tractive::protocol::{Carrier, Frame, Station};
+use tractive::time::{Clock, Instant};
 
 /// The bench behind a board's ports; the first error ends the run.
 struct Port<'a> {
     bench: &'a mut Bench,
+    desk: Option<&'a Desk>,
     error: Option<BenchError>,
 }
 
 impl ControlPort for Port<'_> {
     fn sample(&mut self, now: Instant) -> Sample {
-        self.bench.control_sample(now).unwrap_or_else(|error| {
+        let sample = self.bench.control_sample(now).unwrap_or_else(|error| {
             self.error = Some(error);
             let measured = Measurements { currents_a: Abc::default(), udc_v: 0.0, angle: Angle::ZERO };
             Sample {
@@ -32,7 +36,11 @@ impl ControlPort for Port<'_> {
                 acknowledge: 0,
                 hardware: None,
             }
-        })
+        });
+        match self.desk {
+            Some(desk) => sample.permitted(&desk.permit(now)),
+            None => sample,
+        }
     }
 
     fn enter(&mut self, safe: SafeState, now: Instant) {
@@ -45,6 +53,9 @@ impl ControlPort for Port<'_> {
 
     fn report(&mut self, now: Instant, report: &Report) {
         self.bench.control_report(now, *report);
+        if let Some(desk) = self.desk {
+            desk.tell(now, report);
+        }
     }
 }
 
@@ -65,14 +76,77 @@ impl PwmPort for Port<'_> {
     }
 }
 
-/// Runs until the recording is complete.
+/// The supervisor at the end of the station's wires.
+struct HostLink<'a> {
+    supervisor: &'a mut dyn Supervisor,
+    outbound: SlotRequest,
+    /// When the slot began, in s.
+    t_s: f64,
+    turn: Option<anyhow::Result<Turn>>,
+}
+
+impl Carrier for HostLink<'_> {
+    fn receive(&mut self, _at: Instant) -> (Option<Frame>, Feedback) {
+        let turn = self.supervisor.slot(self.t_s, &self.outbound);
+        let answer = turn.as_ref().map_or_else(|_| SlotAnswer::default(), |turn| turn.answer);
+        self.turn = Some(turn);
+        (answer.frame, answer.feedback)
+    }
+
+    fn send(&mut self, _from: Instant, frame: Option<Frame>, switches: &Switches) {
+        self.outbound = SlotRequest { frame, switches: *switches };
+    }
+}
+
+/// The idle loop: the operator's slots and the protocol.
+struct Idle<'a> {
+    station: Station<'a, HostLink<'a>>,
+    slot: Slot,
+    rated: operator::Settings<'static>,
+    desk: &'a Desk,
+}
+
+impl<'a> Idle<'a> {
+    fn new(
+        tables: &'static Tables,
+        clock: &Clock,
+        desk: &'a Desk,
+        supervisor: &'a mut dyn Supervisor,
+    ) -> Self {
+        let link = HostLink { supervisor, outbound: SlotRequest::default(), t_s: 0.0, turn: None };
+        let slot_s = operator::SLOT_PERIODS as f32 * clock.control_s();
+        Self {
+            station: Station::new(&tables.ratings, desk, link),
+            slot: Slot::new(),
+            rated: operator::Settings::rated(&tables.ratings, slot_s, None),
+            desk,
+        }
+    }
+
+    fn run(&mut self, bench: &mut Bench, clock: &Clock) -> anyhow::Result<()> {
+        let Some(observed) = self.desk.observed() else { return Ok(()) };
+        self.station.carrier.t_s = bench.instant_s(observed.at);
+        let settings = self.station.settings(&self.rated);
+        self.slot.run(self.desk, &mut self.station, &settings, clock);
+        match self.station.carrier.turn.take() {
+            Some(turn) => super::follow(bench, observed.at, &turn?),
+            None => {}
+        }
+        Ok(())
+    }
+}
+
+/// Runs until the recording is complete; commanded by the bench's samples, or over the protocol by a supervisor.
 pub fn run_on_host(
     name: &str,
     mut bench: Bench,
     tables: &'static Tables,
     settings: Settings,
     first_half_ticks: u32,
-) -> Result<Recording, BenchError> {
+    supervisor: Option<&mut dyn Supervisor>,
+) -> anyhow::Result<Recording> {
+    let desk = Desk::new();
+    let mut idle = supervisor.map(|supervisor| Idle::new(tables, &settings.clock, &desk, supervisor));
     let shared = Shared::new();
     let mut control_at = Instant(settings.clock.control_ticks);
     let mut pwm_at = Instant(first_half_ticks);
@@ -80,7 +154,7 @@ pub fn run_on_host(
     let mut pwm = PwmTask::new(tables, settings, pwm_at).after_halves_of(first_half_ticks);
     let mut progress = Progress::new(name);
     while !bench.is_done() {
-        let mut port = Port { bench: &mut bench, error: None };
+        let mut port = Port { bench: &mut bench, desk: idle.as_ref().map(|_| &desk), error: None };
         // At equal instants the PWM interrupt comes first: it has the higher priority.
         if control_at.reached(pwm_at) {
             pwm.run(&mut port, &shared);
@@ -90,7 +164,10 @@ pub fn run_on_host(
             control_at = control.next_call();
         }
         if let Some(error) = port.error {
-            return Err(error);
+            return Err(error.into());
+        }
+        if let Some(idle) = &mut idle {
+            idle.run(&mut bench, &settings.clock)?;
         }
         progress.show(bench.progress());
     }

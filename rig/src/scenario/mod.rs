@@ -18,7 +18,7 @@ use crate::machine::Machine;
 use crate::options::{On, RunOptions};
 use crate::plant::{Plant, PlantSettings, SpeedSource};
 use crate::report::Page;
-use crate::run::{self, CLOCK};
+use crate::run::{self, CLOCK, Supervisor};
 use crate::trace::Recording;
 use anyhow::{Context, Result};
 use tractive::control::Gains;
@@ -88,12 +88,26 @@ pub fn find(name: &str) -> Result<Box<dyn Scenario>> {
 /// Drives a scenario.
 pub fn drive(scenario: &dyn Scenario, options: &RunOptions, machine: &Machine) -> Result<Recording> {
     let plan = scenario.plan(options, machine);
+    let speed = plan.speed.iter().map(|(t_s, rpm)| (t_s + plan.lead_s, *rpm)).collect();
+    run_plan(scenario.name(), plan, SpeedSource::profile(speed), None, options, machine)
+}
+
+/// Runs a plan with a rotor; a supervisor takes the place of the plan's operator.
+pub(crate) fn run_plan(
+    name: &str,
+    plan: Plan,
+    speed: SpeedSource,
+    supervisor: Option<&mut dyn Supervisor>,
+    options: &RunOptions,
+    machine: &Machine,
+) -> Result<Recording> {
     let ticks = |microseconds: f64| (microseconds * 1e-6 * f64::from(CLOCK.ticks_per_s)).round() as u32;
     let setup = Setup {
         min_pulse_ticks: ticks(options.min_pulse_us),
         // What the firmware compensates.
         dead_time_ticks: if options.uncompensated { 0 } else { ticks(options.dead_time_us) },
         pwm_delay_ticks: ticks(options.pwm_delay_us),
+        commanded: supervisor.is_some(),
     };
     let devices = Devices::new(
         setup.min_pulse_ticks,
@@ -102,7 +116,7 @@ pub fn drive(scenario: &dyn Scenario, options: &RunOptions, machine: &Machine) -
         &CLOCK,
     );
     let parameters = &machine.folder.parameters;
-    let plant = plant(&plan, options, machine);
+    let plant = plant(speed, options, machine);
     let first_half_ticks = devices.shortest_half_ticks + setup.pwm_delay_ticks;
     let bench = Bench::new(
         plant,
@@ -122,17 +136,16 @@ pub fn drive(scenario: &dyn Scenario, options: &RunOptions, machine: &Machine) -
     match options.on {
         On::Host => {
             let settings = Settings { clock: CLOCK, devices, gains: Gains::DEFAULT };
-            Ok(run::run_on_host(scenario.name(), bench, machine.tables, settings, first_half_ticks)?)
+            run::run_on_host(name, bench, machine.tables, settings, first_half_ticks, supervisor)
         }
-        On::Qemu => run::run_in_qemu(scenario.name(), bench, setup, &options.emulator()?),
+        On::Qemu => run::run_in_qemu(name, bench, setup, &options.emulator()?, supervisor),
     }
 }
 
-fn plant(plan: &Plan, options: &RunOptions, machine: &Machine) -> Plant {
-    let speed = plan.speed.iter().map(|(t_s, rpm)| (t_s + plan.lead_s, *rpm)).collect();
+fn plant(speed: SpeedSource, options: &RunOptions, machine: &Machine) -> Plant {
     Plant::new(
         &machine.folder,
-        SpeedSource::profile(speed),
+        speed,
         &PlantSettings {
             flux_scale: 1.0 + options.map_error / 100.0,
             resistance_scale: 1.0 + options.rs_error / 100.0,
