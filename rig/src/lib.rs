@@ -21,6 +21,7 @@ pub mod points;
 pub mod report;
 pub mod run;
 pub mod scenario;
+pub mod talk;
 pub mod trace;
 pub mod verdict;
 pub mod zs9;

@@ -26,6 +26,11 @@ pub trait Supervisor {
     /// # Errors
     /// Ends the run.
     fn slot(&mut self, t_s: f64, told: &SlotRequest) -> anyhow::Result<Turn>;
+
+    /// Whether a turn may take as long as somebody types.
+    fn is_typed(&self) -> bool {
+        false
+    }
 }
 
 /// A supervisor's turn.

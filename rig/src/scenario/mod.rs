@@ -18,7 +18,7 @@ use crate::machine::Machine;
 use crate::options::{On, RunOptions};
 use crate::plant::{Plant, PlantSettings, SpeedSource};
 use crate::report::Page;
-use crate::run::{self, CLOCK, Supervisor};
+use crate::run::{self, CLOCK, Emulator, Supervisor};
 use crate::trace::Recording;
 use anyhow::{Context, Result};
 use tractive::control::Gains;
@@ -138,7 +138,11 @@ pub(crate) fn run_plan(
             let settings = Settings { clock: CLOCK, devices, gains: Gains::DEFAULT };
             run::run_on_host(name, bench, machine.tables, settings, first_half_ticks, supervisor)
         }
-        On::Qemu => run::run_in_qemu(name, bench, setup, &options.emulator()?, supervisor),
+        On::Qemu => {
+            let patient = supervisor.as_ref().is_some_and(|supervisor| supervisor.is_typed());
+            let emulator = Emulator { patient, ..options.emulator()? };
+            run::run_in_qemu(name, bench, setup, &emulator, supervisor)
+        }
     }
 }
 
