@@ -8,8 +8,13 @@
 //!   it reads, and never sees a half-written value because the writer fills the slot that nobody reads.
 //! * [`Uplink`], high → low: a sequence counter. The writer is wait-free; the reader tries again when a write
 //!   came in between, a bounded number of times (a second write within one read takes a carrier half).
+//! * [`Ring`], one interrupt → anybody, afterwards: the flight recorder's memory, read only once a fault has frozen it.
 
 #![forbid(unsafe_code)]
+
+mod ring;
+
+pub use ring::Ring;
 
 #[cfg(loom)]
 use loom::sync::atomic::{AtomicU32, Ordering, fence};

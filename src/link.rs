@@ -16,6 +16,7 @@ use crate::drive::{Report, half_from_words, half_to_words};
 use crate::frames::{Abc, Angle};
 use crate::modulation::CarrierPeriod;
 use crate::protection::{Fault, SafeState};
+use crate::recorder::Record;
 use crate::time::Instant;
 
 pub use dual::{
@@ -64,6 +65,10 @@ pub enum Request {
     Dead,
     /// A slot of the operator's: what the one before sends and switches.
     Slot(Instant, SlotRequest),
+    /// A control period from the flight recorder, the oldest first; after the last answer, if a fault has frozen it.
+    Recorded(Record),
+    /// The image has nothing more to say.
+    End,
 }
 
 impl Request {
@@ -79,6 +84,8 @@ impl Request {
             Self::Enter(at, safe) => (6, *at, &[*safe as u32]),
             Self::Dead => (7, Instant(0), &[]),
             Self::Slot(at, request) => (16, *at, &request.to_words()),
+            Self::Recorded(record) => (8, record.at, &record.to_words()),
+            Self::End => (9, Instant(0), &[]),
         };
         let words = [tag, at.0].into_iter().chain(payload.iter().copied());
         for (slot, word) in block.iter_mut().zip(words) {
@@ -105,14 +112,18 @@ impl Request {
             }
             6 => {
                 let [safe, ..] = payload;
-                let short = safe == SafeState::ShortCircuit as u32;
-                Self::Enter(at, if short { SafeState::ShortCircuit } else { SafeState::GatesOff })
+                Self::Enter(at, SafeState::from_code(safe))
             }
             7 => Self::Dead,
             16 => {
                 let [a, b, c, d, e, ..] = payload;
                 Self::Slot(at, SlotRequest::from_words([a, b, c, d, e]))
             }
+            8 => {
+                let [a, b, c, d, e, f, g, h, i, j, ..] = payload;
+                Self::Recorded(Record::from_words([a, b, c, d, e, f, g, h, i, j]))
+            }
+            9 => Self::End,
             _ => return None,
         })
     }

@@ -24,7 +24,7 @@ mod firmware {
     use tractive::protocol::Station;
     use tractive::time::Instant;
 
-    static SHARED: Shared = Shared::new();
+    static SHARED: Shared = Shared::recorded_by(&qemu::RECORDER);
     static MIN_PULSE_TICKS: AtomicU32 = AtomicU32::new(0);
     static DEAD_TIME_TICKS: AtomicU32 = AtomicU32::new(0);
     static FIRST_HALF_TICKS: AtomicU32 = AtomicU32::new(0);
@@ -82,7 +82,11 @@ mod firmware {
         let mut board = qemu::Control { desk };
         board.acknowledge();
         let first = Instant(CLOCK.control_ticks);
-        TASK.get_or_insert_with(|| ControlTask::new(&BUILT_IN, settings(), first)).run(&mut board, &SHARED);
+        let task = TASK.get_or_insert_with(|| ControlTask::new(&BUILT_IN, settings(), first));
+        if task.wants_revision() {
+            board.revise_pulses();
+        }
+        task.run(&mut board, &SHARED);
     }
 
     /// Deadline: the next carrier boundary, where the shadow registers take over.
@@ -90,11 +94,16 @@ mod firmware {
     fn DUALTIMER() {
         static mut TASK: Option<PwmTask> = None;
         let mut board = qemu::Pwm;
-        board.acknowledge();
         let settings = settings();
         let first = Instant(FIRST_HALF_TICKS.load(Ordering::Relaxed));
         let task = || PwmTask::new(&BUILT_IN, settings, first).after_halves_of(first.0);
-        TASK.get_or_insert_with(task).run(&mut board, &SHARED);
+        let task = TASK.get_or_insert_with(task);
+        if board.is_boundary() {
+            board.acknowledge();
+            task.run(&mut board, &SHARED);
+        } else {
+            task.revise(&mut board, &SHARED);
+        }
     }
 
     #[exception]

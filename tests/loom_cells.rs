@@ -3,7 +3,7 @@
 
 use loom::sync::Arc;
 use loom::thread;
-use tractive::cell::{Downlink, Uplink, Words};
+use tractive::cell::{Downlink, Ring, Uplink, Words};
 
 /// Two words that belong together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -91,5 +91,38 @@ fn a_downlink_outside_its_protocol_is_torn() {
         if let Some(message) = thread.join().unwrap() {
             assert!(message.is_whole(), "torn: {message:?}");
         }
+    });
+}
+
+/// The reader gets only what a fault has frozen, whole; nothing while the writer still writes, or writes again.
+#[test]
+fn a_ring_gives_only_what_is_frozen() {
+    loom::model(|| {
+        let ring = Arc::new(Ring::<Message, 2, 8>::new());
+        ring.record(Message::number(1), false);
+        let reader = Arc::clone(&ring);
+        let thread = thread::spawn(move || [reader.read(0), reader.read(1)]);
+        ring.record(Message::number(2), true);
+        let expected = [Some(Message::number(1)), Some(Message::number(2))];
+        for (read, expected) in thread.join().unwrap().into_iter().zip(expected) {
+            assert!(read.is_none() || read == expected, "{read:?}");
+        }
+        assert_eq!([ring.read(0), ring.read(1), ring.read(2)], [expected[0], expected[1], None]);
+    });
+}
+
+#[test]
+fn a_ring_that_is_released_under_the_readers_hands_gives_nothing_torn() {
+    loom::model(|| {
+        let ring = Arc::new(Ring::<Message, 2, 8>::new());
+        for n in 1..9 {
+            ring.record(Message::number(n), n == 8);
+        }
+        let reader = Arc::clone(&ring);
+        let thread = thread::spawn(move || reader.read(0));
+        ring.release();
+        ring.record(Message::number(9), true);
+        let read = thread.join().unwrap();
+        assert!([None, Some(Message::number(1)), Some(Message::number(9))].contains(&read), "{read:?}");
     });
 }

@@ -186,7 +186,11 @@ fn a_healthy_drive_does_not_trip() {
 
 /// Spoils the measurements of a healthy drive; the control interrupt must find it.
 fn found_by_control(fault: Fault, periods: u32, spoil: fn(&mut Sample)) -> Trip {
-    let mut fake = Fake { spoil, spoil_from: SETTLED, ..Fake::turning(400.0) };
+    found_at(400.0, fault, periods, spoil)
+}
+
+fn found_at(omega: f32, fault: Fault, periods: u32, spoil: fn(&mut Sample)) -> Trip {
+    let mut fake = Fake { spoil, spoil_from: SETTLED, ..Fake::turning(omega) };
     let trip = drive(&mut fake, END, u32::MAX).unwrap_or_else(|| panic!("{fault:?} was not found"));
     assert_eq!(trip.fault, fault);
     assert!(trip.at.0 >= SETTLED && trip.at.0 < SETTLED + periods * 2_500 + 2_500, "{trip:?}");
@@ -231,7 +235,21 @@ fn frozen_measurements_are_found() {
     found_by_control(Fault::Frozen, 21, |sample| {
         sample.measured.currents_a = Abc { a: 50.0, b: -20.0, c: -30.0 };
     });
-    found_by_control(Fault::Frozen, 12, |sample| sample.measured.angle = Angle(12345));
+    // Too slow for a surprise.
+    found_at(20.0, Fault::Frozen, 140, |sample| {
+        sample.measured.angle = Fake::turning(20.0).angle(Instant(SETTLED));
+    });
+    found_by_control(Fault::AngleLost, 2, |sample| {
+        sample.measured.angle = Fake::turning(400.0).angle(Instant(SETTLED));
+    });
+}
+
+#[test]
+fn an_angle_that_cannot_be_is_found_at_once() {
+    let trip = found_by_control(Fault::AngleLost, 1, |sample| {
+        sample.measured.angle = sample.measured.angle + Angle::from_radians(0.06);
+    });
+    assert!((trip.value - 0.06).abs() < 1e-3, "{trip:?}");
 }
 
 #[test]

@@ -1,11 +1,12 @@
 //! What a run leaves behind: trace, edges, switches of mode. Files are written whole or not at all.
 
-use crate::bench::{Edge, GATES, Tick};
+use crate::bench::{Edge, GATES, Tick, degrees};
 use anyhow::{Context, Result};
 use std::io::Write;
 use std::path::Path;
 use tractive::modulation::Mode;
 use tractive::protection::Trip;
+use tractive::recorder::Record;
 
 /// One line of trace.csv: the plant's true values, and control's intentions at that instant.
 #[derive(Clone, Copy, Debug)]
@@ -80,6 +81,8 @@ pub struct Recording {
     pub lead: Tick,
     /// Length of a tick, in s.
     pub tick_s: f64,
+    /// What the drive's flight recorder holds, with its times in s from the recording's beginning; empty without a fault.
+    pub recorded: Vec<(f64, Record)>,
 }
 
 impl Recording {
@@ -136,6 +139,54 @@ impl Recording {
                         row.mode.name(),
                         row.trip.map_or("", |trip| trip.fault.name()),
                     ),
+                ))?;
+            }
+            Ok(())
+        })
+    }
+
+    /// Writes recorder.csv, if a fault has frozen the flight recorder; else takes away what an earlier run has left.
+    pub fn write_recorder(&self, path: &Path) -> Result<()> {
+        if self.recorded.is_empty() {
+            return match std::fs::remove_file(path) {
+                Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+                    Err(error).with_context(|| path.display().to_string())
+                }
+                _ => Ok(()),
+            };
+        }
+        write_whole(path, |out| {
+            out.write_record([
+                "t_s",
+                "ia_a",
+                "ib_a",
+                "ic_a",
+                "udc_v",
+                "angle_deg",
+                "id_ref_a",
+                "iq_ref_a",
+                "u_v",
+                "mode",
+                "enabled",
+                "pulsing",
+                "fault",
+            ])?;
+            for (t_s, record) in &self.recorded {
+                let state = record.state;
+                out.serialize((
+                    short_time(*t_s),
+                    record.currents_a.a,
+                    record.currents_a.b,
+                    record.currents_a.c,
+                    record.udc_v,
+                    degrees(record.angle) as f32,
+                    record.id_a,
+                    record.iq_a,
+                    record.voltage_v,
+                    state.mode.name(),
+                    u8::from(state.enabled),
+                    u8::from(state.pulsing),
+                    state.fault.map_or("", |fault| fault.name()),
                 ))?;
             }
             Ok(())

@@ -14,7 +14,7 @@ use crate::drive::Report;
 use crate::frames::Abc;
 use crate::modulation::CarrierPeriod;
 use crate::operator::Permit;
-use crate::protection::{Fault, SafeState};
+use crate::protection::{Fault, LegFaults, SafeState};
 use crate::time::Instant;
 
 pub use dual::{
@@ -56,6 +56,10 @@ pub trait ControlPort {
     fn overrun_ticks(&mut self, now: Instant) -> u32;
     /// What the control task did, for whoever watches.
     fn report(&mut self, now: Instant, report: &Report);
+    /// What the power stage tells of itself; nothing where it cannot.
+    fn leg_faults(&mut self) -> LegFaults {
+        LegFaults::default()
+    }
 }
 
 /// What the PWM interrupt needs of a board.
@@ -70,5 +74,9 @@ pub trait PwmPort {
     /// hardware, or a board that only a reset lets go on.
     fn leave(&mut self, _now: Instant) -> bool {
         false
+    }
+    /// As [`ControlPort::leg_faults`].
+    fn leg_faults(&mut self) -> LegFaults {
+        LegFaults::default()
     }
 }

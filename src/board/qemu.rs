@@ -20,12 +20,16 @@ use crate::modulation::CarrierPeriod;
 use crate::operator::{Desk, Feedback, Switches};
 use crate::protection::SafeState;
 use crate::protocol::{Carrier, Frame};
+use crate::recorder::Recorder;
 use crate::time::{Clock, Instant};
 use cortex_m::peripheral::NVIC;
 use cortex_m_semihosting::debug;
 
 /// 25 MHz ticks; control at 10 kHz.
 pub const CLOCK: Clock = Clock::new(25_000_000, 2_500);
+
+/// The PMaSynRM drive's flight recorder. The rig reads it when the run is over.
+pub static RECORDER: Recorder = Recorder::new();
 
 const CONTROL_TIMER: usize = 0x4000_0000;
 const PWM_TIMER: usize = 0x4000_2000;
@@ -156,9 +160,22 @@ impl Control {
     pub fn acknowledge(&mut self) {
         write_register(CONTROL_TIMER + 0xC, 1);
     }
+
+    /// Makes the PWM interrupt come at once, between two boundaries.
+    pub fn revise_pulses(&mut self) {
+        NVIC::pend(Interrupt::DUALTIMER);
+        // It has run before anything else is done.
+        cortex_m::asm::dsb();
+        cortex_m::asm::isb();
+    }
 }
 
 impl Pwm {
+    /// Whether the interrupt is a carrier boundary's. If not, control wants a revision, and there is nothing to acknowledge.
+    pub fn is_boundary(&self) -> bool {
+        read_register(PWM_TIMER + 0x10) & 1 != 0
+    }
+
     /// Acknowledges the timer's interrupt.
     pub fn acknowledge(&mut self) {
         write_register(PWM_TIMER + 0xC, 1);

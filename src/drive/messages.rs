@@ -24,6 +24,8 @@ pub struct VoltageCommand {
     pub valid_from: Instant,
     /// Whether to make pulses at all.
     pub gates: Gates,
+    /// Whether it is for the half that is already committed, not for the one after it.
+    pub revises: bool,
     /// Number of the operator's last acknowledge.
     pub acknowledge: u8,
 }
@@ -40,12 +42,14 @@ impl Words<9> for VoltageCommand {
             reference.udc_v.to_bits(),
             reference.depth.to_bits(),
             self.valid_from.0,
-            u32::from(self.gates == Gates::Pulse) | u32::from(self.acknowledge) << 8,
+            u32::from(self.gates == Gates::Pulse)
+                | u32::from(self.revises) << 1
+                | u32::from(self.acknowledge) << 8,
         ]
     }
 
     fn from_words(words: [u32; 9]) -> Self {
-        let [voltage, angle, carrier_angle, rate, at, udc, depth, valid_from, gates] = words;
+        let [voltage, angle, carrier_angle, rate, at, udc, depth, valid_from, flags] = words;
         Self {
             reference: Reference {
                 voltage_v: f32::from_bits(voltage),
@@ -57,8 +61,9 @@ impl Words<9> for VoltageCommand {
                 depth: f32::from_bits(depth),
             },
             valid_from: Instant(valid_from),
-            gates: if gates & 1 == 1 { Gates::Pulse } else { Gates::Off },
-            acknowledge: (gates >> 8) as u8,
+            gates: if flags & 1 != 0 { Gates::Pulse } else { Gates::Off },
+            revises: flags & 2 != 0,
+            acknowledge: (flags >> 8) as u8,
         }
     }
 }
@@ -85,6 +90,24 @@ pub struct Applied {
     pub trip: Option<Trip>,
     /// Number of the acknowledge that it carried out last, at `at` and at the boundary before.
     pub acknowledged: [u8; 2],
+}
+
+impl Applied {
+    /// Gates off, in halves of one length, the present one from `at` on.
+    pub const fn at_rest(at: Instant, off: CarrierPeriod) -> Self {
+        let currents_a = Abc { a: 0.0, b: 0.0, c: 0.0 };
+        Self {
+            at,
+            before: off,
+            running: off,
+            next: off,
+            currents_a,
+            currents_before_a: currents_a,
+            mirrored: false,
+            trip: None,
+            acknowledged: [0; 2],
+        }
+    }
 }
 
 impl Words<27> for Applied {
@@ -173,11 +196,7 @@ pub fn trip_from_words(words: [u32; 4]) -> Option<Trip> {
         value: f32::from_bits(value),
         limit: f32::from_bits(limit),
         at: Instant(at),
-        safe: if code >> 8 & 0xFF == SafeState::ShortCircuit as u32 {
-            SafeState::ShortCircuit
-        } else {
-            SafeState::GatesOff
-        },
+        safe: SafeState::from_code(code >> 8 & 0xFF),
     })
 }
 

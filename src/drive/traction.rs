@@ -7,18 +7,26 @@
 use super::messages::{Applied, Gates, Report, VoltageCommand};
 use crate::board::{ControlPort, PwmPort, Sample};
 use crate::cell::{Downlink, Uplink};
-use crate::control::{Boundary, Committed, Controller, Follows, Gains, Input, Law};
+use crate::control::{Boundary, Committed, Controller, Demand, Follows, Gains, Input, Law};
 use crate::frames::{Abc, AlphaBeta, Angle};
 use crate::machine::Tables;
 use crate::modulation::{
     CarrierPeriod, Devices, Mode, Modulator, Reference, Schedule, compensated, depth_limit, first_half,
     ripple_flux, ripple_share,
 };
-use crate::protection::{self, Fault, FrozenWatch, SafeState, Trip, Violation};
+use crate::protection::{self, Disarmed, Fault, FrozenWatch, SafeState, Trip, Violation};
+use crate::recorder::{Record, Recorder, State};
 use crate::time::{Clock, Instant};
 
 /// Angle units (2⁻³² turn) in one radian.
 pub(super) const UNITS_PER_RADIAN: f32 = 4_294_967_296.0 / core::f32::consts::TAU;
+
+/// A demand that jumps by more than this share of the largest torque is worth revising the next half for.
+const JUMP_SHARE: f32 = 0.05;
+
+/// Control periods that the running half must still last for the next one to be revised: one until the command is valid, and one
+/// in which control sees what became of it.
+const REVISION_PERIODS: u32 = 2;
 
 /// Control periods after which a command is too old to make pulses from.
 const STALE_PERIODS: i32 = 5;
@@ -43,22 +51,31 @@ pub struct Settings {
     pub gains: Gains,
 }
 
-/// The cells between the two interrupts.
-pub struct Shared {
-    command: Downlink<VoltageCommand, 9>,
-    applied: Uplink<Applied, 27>,
+/// The cells between the two interrupts, and the flight recorder, if there is one.
+pub struct Shared<'a> {
+    /// What control wants of the modulator.
+    pub command: Downlink<VoltageCommand, 9>,
+    /// What the modulator does.
+    pub applied: Uplink<Applied, 27>,
+    recorder: Option<&'a Recorder>,
 }
 
-impl Shared {
+impl<'a> Shared<'a> {
     /// Empty cells.
     #[cfg(not(loom))]
     pub const fn new() -> Self {
-        Self { command: Downlink::new(), applied: Uplink::new() }
+        Self { command: Downlink::new(), applied: Uplink::new(), recorder: None }
+    }
+
+    /// The same with a flight recorder, which the control interrupt fills.
+    #[cfg(not(loom))]
+    pub const fn recorded_by(recorder: &'a Recorder) -> Self {
+        Self { command: Downlink::new(), applied: Uplink::new(), recorder: Some(recorder) }
     }
 }
 
 #[cfg(not(loom))]
-impl Default for Shared {
+impl Default for Shared<'_> {
     fn default() -> Self {
         Self::new()
     }
@@ -82,6 +99,12 @@ pub struct ControlTask {
     filled_to: f32,
     /// Mode that the newest command was made for, and the halves for which its flux hexagon still changes its size.
     unsettled: (Mode, u32),
+    /// The last demand, in N·m, and whether it has jumped and no half has been revised for it yet.
+    demand_nm: f32,
+    jumped: bool,
+    /// Whether the newest command is for the half that is already committed.
+    revises: bool,
+    disarmed: Disarmed,
     trip: Option<Trip>,
     /// Number of the acknowledge that both interrupts have carried out.
     acknowledged: u8,
@@ -101,9 +124,25 @@ impl ControlTask {
             depth: 0.0,
             filled_to: 0.0,
             unsettled: (Mode::Off, 0),
+            demand_nm: 0.0,
+            jumped: false,
+            revises: false,
+            disarmed: Disarmed::NONE,
             trip: None,
             acknowledged: 0,
         }
+    }
+
+    /// Whether [`PwmTask::revise`] is to run before the next [`ControlTask::run`], at the same instant: first thing in the interrupt,
+    /// the handler makes the PWM interrupt pending.
+    pub fn wants_revision(&self) -> bool {
+        self.revises
+    }
+
+    /// The same without a check.
+    pub const fn without(mut self, disarmed: Disarmed) -> Self {
+        self.disarmed = disarmed;
+        self
     }
 
     /// The control timer's interrupt. Deadline: one control period after its nominal instant; a missed one is a fault.
@@ -111,12 +150,12 @@ impl ControlTask {
         let now = self.now;
         self.now = now.after(self.settings.clock.control_ticks);
         let sample = port.sample(now);
-        let before = self.controller.omega();
-        let omega = self.controller.track(sample.measured.angle, &self.settings.clock);
         let applied = shared.applied.read().map(|applied| as_of(&applied, now));
         self.forget_acknowledged(sample.acknowledge, applied.as_ref());
         self.check(sample.hardware.map(|fault| (fault, 1.0, 0.0)), &sample, port);
         self.adopt_trip(applied.as_ref().and_then(|applied| applied.trip));
+        self.check_legs(&sample, port);
+        let omega = self.track(&sample, port);
         self.check(
             protection::check_measurements(&sample.measured, omega, &self.tables.ratings),
             &sample,
@@ -151,12 +190,13 @@ impl ControlTask {
             },
             valid_from: self.now,
             gates: Gates::Off,
+            revises: false,
             acknowledge: sample.acknowledge,
         };
         if pulsing {
             let frozen = self.watch.check(
                 &sample.measured,
-                before,
+                omega,
                 self.settings.clock.control_s(),
                 &self.tables.ratings,
             );
@@ -180,9 +220,34 @@ impl ControlTask {
         if self.trip.is_some() {
             command.gates = Gates::Off;
         }
+        self.revises = command.revises && command.gates == Gates::Pulse;
         shared.command.publish(command);
         report.trip = self.trip;
+        if let Some(recorder) = shared.recorder {
+            let mode = applied.as_ref().map_or(Mode::Off, |applied| applied.running.mode);
+            recorder.record(self.entry(now, &sample, &report, mode, command.gates), self.trip.is_some());
+        }
         port.report(now, &report);
+    }
+
+    /// The period's entry in the flight recorder.
+    #[inline(always)]
+    fn entry(&self, at: Instant, sample: &Sample, report: &Report, mode: Mode, gates: Gates) -> Record {
+        Record {
+            at,
+            currents_a: sample.measured.currents_a,
+            udc_v: sample.measured.udc_v,
+            angle: sample.measured.angle,
+            id_a: report.id_a,
+            iq_a: report.iq_a,
+            voltage_v: report.voltage_v,
+            state: State {
+                mode,
+                enabled: sample.enable,
+                pulsing: gates == Gates::Pulse,
+                fault: self.trip.map(|trip| trip.fault),
+            },
+        }
     }
 
     /// Nominal instant of the next call.
@@ -195,6 +260,20 @@ impl ControlTask {
         self.trip
     }
 
+    /// Follows the angle; returns the electrical speed, in rad/s. An angle that cannot be leaves the speed as it was.
+    fn track(&mut self, sample: &Sample, port: &mut impl ControlPort) -> f32 {
+        let clock = self.settings.clock;
+        if self.controller.speed_is_known() {
+            let surprise_rad = self.controller.surprise_rad(sample.measured.angle, &clock);
+            let lost = protection::check_angle(surprise_rad);
+            if lost.is_some() && !self.disarmed.has(Fault::AngleLost) {
+                self.check(lost, sample, port);
+                return self.controller.omega();
+            }
+        }
+        self.controller.track(sample.measured.angle, &clock)
+    }
+
     /// Control law and its surroundings, while pulses are made.
     fn pulse(
         &mut self,
@@ -205,7 +284,8 @@ impl ControlTask {
         report: &mut Report,
     ) {
         let now = command.reference.at;
-        let committed = self.committed(applied, now, omega, sample.measured.udc_v);
+        command.revises = applied.is_some_and(|applied| self.is_to_revise(applied, now, &sample.demand));
+        let committed = self.committed(applied, now, omega, sample.measured.udc_v, command.revises);
         let boundary = self.new_boundary(applied, now, sample.measured.udc_v);
         let decided = applied.map_or(Mode::Off, |applied| applied.next.ahead[0]);
         let committed = Committed { settled: self.is_settled(decided, boundary.is_some()), ..committed };
@@ -268,8 +348,28 @@ impl ControlTask {
         omega * (UNITS_PER_RADIAN * self.settings.clock.tick_s)
     }
 
-    /// What the modulator will do until a command of this period can act.
-    fn committed(&mut self, applied: Option<&Applied>, now: Instant, omega: f32, udc_v: f32) -> Committed {
+    /// Whether the demand has jumped and the next half can still be changed: the running one lasts long enough, and the next one is
+    /// of the free carrier, whose length is always the same.
+    fn is_to_revise(&mut self, applied: &Applied, now: Instant, demand: &Demand) -> bool {
+        let change = demand.torque_nm - self.demand_nm;
+        self.demand_nm = demand.torque_nm;
+        self.jumped |= !demand.slew_limited && change.abs() > JUMP_SHARE * self.tables.ratings.max_torque_nm;
+        let latest = now.after(REVISION_PERIODS * self.settings.clock.control_ticks);
+        let end = applied.at.after(applied.running.period_ticks);
+        let revises = self.jumped && applied.next.is_free() && end.reached(latest);
+        self.jumped &= !revises;
+        revises
+    }
+
+    /// What the modulator will do until a command of this period can act; with `revises` only the running half stands.
+    fn committed(
+        &mut self,
+        applied: Option<&Applied>,
+        now: Instant,
+        omega: f32,
+        udc_v: f32,
+        revises: bool,
+    ) -> Committed {
         let clock = self.settings.clock;
         let Some(applied) = applied else {
             let interval_s = clock.seconds(self.settings.devices.shortest_half_ticks as i32);
@@ -290,9 +390,12 @@ impl ControlTask {
         let (running, next) = (&applied.running, &applied.next);
         let elapsed = now.since(applied.at).max(0) as u32;
         let off = running.mode == Mode::Off || next.mode == Mode::Off;
-        let left = running.period_ticks.saturating_sub(elapsed) + next.period_ticks;
-        let volt_seconds =
-            volt_seconds(running, elapsed, udc_v, &clock) + volt_seconds(next, 0, udc_v, &clock);
+        let mut left = running.period_ticks.saturating_sub(elapsed);
+        let mut volt_seconds = volt_seconds(running, elapsed, udc_v, &clock);
+        if !revises {
+            left += next.period_ticks;
+            volt_seconds = volt_seconds + self::volt_seconds(next, 0, udc_v, &clock);
+        }
         let [decided, _] = next.ahead;
         let largest = depth_limit(decided, self.rate(omega), &self.settings.devices);
         let largest = if decided == Mode::Square { largest } else { REGULATION_ROOM * largest };
@@ -359,6 +462,9 @@ impl ControlTask {
         let (Some((fault, value, limit)), None) = (violation, self.trip) else {
             return;
         };
+        if self.disarmed.has(fault) {
+            return;
+        }
         let at = self.now.before(self.settings.clock.control_ticks);
         let safe =
             protection::safe_state(self.controller.omega(), sample.measured.udc_v, &self.tables.ratings);
@@ -374,6 +480,18 @@ impl ControlTask {
         {
             self.acknowledged = acknowledge;
             self.trip = None;
+        }
+    }
+
+    /// First of all checks: a leg that is stuck decides on the safe state.
+    fn check_legs(&mut self, sample: &Sample, port: &mut impl ControlPort) {
+        let found = port.leg_faults();
+        if let (Some((fault, value, limit)), None) = (found.check(), self.trip) {
+            let at = self.now.before(self.settings.clock.control_ticks);
+            let (omega, ratings) = (self.controller.omega(), &self.tables.ratings);
+            let safe = found.safe_state(omega, sample.measured.udc_v, ratings);
+            port.enter(safe, at);
+            self.trip = Some(Trip { fault, value, limit, at, safe });
         }
     }
 
@@ -413,14 +531,10 @@ pub struct PwmTask {
     tables: &'static Tables,
     settings: Settings,
     modulator: Modulator,
-    /// Nominal instant of the next call: the boundary where `next` begins.
+    /// Nominal instant of the next call: the boundary where `applied.next` begins.
     now: Instant,
-    running: CarrierPeriod,
-    next: CarrierPeriod,
-    currents_a: Abc,
-    trip: Option<Trip>,
-    /// Number of the acknowledge that was carried out last.
-    acknowledged: u8,
+    applied: Applied,
+    disarmed: Disarmed,
 }
 
 impl PwmTask {
@@ -442,61 +556,82 @@ impl PwmTask {
             settings,
             modulator: Modulator::new(settings.devices, schedule),
             now: first,
-            running: off,
-            next: off,
-            currents_a: Abc { a: 0.0, b: 0.0, c: 0.0 },
-            trip: None,
-            acknowledged: 0,
+            applied: Applied::at_rest(first, off),
+            disarmed: Disarmed::NONE,
         }
+    }
+
+    /// The same without a check.
+    pub const fn without(mut self, disarmed: Disarmed) -> Self {
+        self.disarmed = disarmed;
+        self
     }
 
     /// The same for a timer whose first two halves, before the first one of the modulator's, have another length.
     pub const fn after_halves_of(mut self, ticks: u32) -> Self {
-        self.running = CarrierPeriod::off(ticks);
-        self.next = CarrierPeriod::off(ticks);
+        self.applied = Applied::at_rest(self.now, CarrierPeriod::off(ticks));
         self
     }
 
     /// The PWM timer's interrupt, at a carrier boundary. Deadline: the next boundary, where the shadow registers take over.
     pub fn run(&mut self, port: &mut impl PwmPort, shared: &Shared) {
         let now = self.now;
-        let before = core::mem::replace(&mut self.running, self.next);
-        let currents_before_a = core::mem::replace(&mut self.currents_a, port.sample(now));
+        let last = self.applied;
+        self.applied = Applied {
+            at: now,
+            before: last.running,
+            running: last.next,
+            currents_a: port.sample(now),
+            currents_before_a: last.currents_a,
+            acknowledged: [last.acknowledged[0]; 2],
+            ..last
+        };
         let command = shared.command.newest(|command| now.reached(command.valid_from));
-        let acknowledged_before = self.acknowledged;
         self.forget_acknowledged(&command, port);
         self.check(&command, port);
-        let start = now.after(self.running.period_ticks);
-        let pulsing = self.trip.is_none();
-        self.next = match &command {
+        let start = now.after(self.applied.running.period_ticks);
+        let pulsing = self.applied.trip.is_none();
+        self.applied.next = match &command {
             Some(command) if command.gates == Gates::Pulse && pulsing => {
                 self.modulator.step(start, Some(&command.reference))
             }
             resting => self.modulator.rest(start, resting.as_ref().map(|command| &command.reference)),
         };
+        self.applied.mirrored = self.modulator.is_mirrored();
         self.now = start;
-        let expected = self.expected_currents(currents_before_a);
+        self.play(port, shared);
+    }
+
+    /// The PWM interrupt when it is no boundary that it comes for, but control's [`ControlTask::wants_revision`]: makes the next half
+    /// anew from the newest command, if its boundary is still ahead.
+    pub fn revise(&mut self, port: &mut impl PwmPort, shared: &Shared) {
+        let Applied { at, next, trip, .. } = self.applied;
+        // A command from before the last boundary was for the half that runs by now.
+        let command = shared.command.newest(|command| command.valid_from.reached(at));
+        if let Some(command) = command
+            && command.revises
+            && trip.is_none()
+            && next.is_free()
+        {
+            self.applied.next = self.modulator.revised(&next, self.now, &command.reference);
+            self.play(port, shared);
+        }
+    }
+
+    fn play(&self, port: &mut impl PwmPort, shared: &Shared) {
+        let applied = &self.applied;
         let small_a = SMALL_CURRENT_SHARE * self.tables.ratings.max_current_a;
-        port.play(now, &compensated(&self.next, &expected, small_a, &self.settings.devices));
-        shared.applied.publish(Applied {
-            at: now,
-            before,
-            running: self.running,
-            next: self.next,
-            currents_a: self.currents_a,
-            currents_before_a,
-            mirrored: self.modulator.is_mirrored(),
-            trip: self.trip,
-            acknowledged: [self.acknowledged, acknowledged_before],
-        });
+        let expected = self.expected_currents();
+        port.play(applied.at, &compensated(&applied.next, &expected, small_a, &self.settings.devices));
+        shared.applied.publish(*applied);
     }
 
     /// Phase currents in the middle of the next half, from the boundaries at both ends of the half before the running one.
-    fn expected_currents(&self, before: Abc) -> Abc {
+    fn expected_currents(&self) -> Abc {
         /// From the last boundary to the middle of the next half, in halves.
         const AHEAD: f32 = 1.5;
         let ahead = |now: f32, before: f32| now + AHEAD * (now - before);
-        let now = self.currents_a;
+        let Applied { currents_a: now, currents_before_a: before, .. } = self.applied;
         Abc { a: ahead(now.a, before.a), b: ahead(now.b, before.b), c: ahead(now.c, before.c) }
     }
 
@@ -507,7 +642,7 @@ impl PwmTask {
 
     /// The latched fault.
     pub fn trip(&self) -> Option<Trip> {
-        self.trip
+        self.applied.trip
     }
 
     /// Forgets the fault that is acknowledged and leaves the safe state, gates off. Each acknowledge does so once: while pulses are
@@ -516,26 +651,29 @@ impl PwmTask {
         let Some(command) = command else {
             return;
         };
-        if command.acknowledge == self.acknowledged {
+        if command.acknowledge == self.applied.acknowledged[0] {
             return;
         }
-        self.acknowledged = command.acknowledge;
+        self.applied.acknowledged[0] = command.acknowledge;
         if command.gates == Gates::Pulse {
             return;
         }
-        self.trip = None;
+        self.applied.trip = None;
         if !port.leave(self.now) {
             let (value, limit, safe) = (1.0, 0.0, SafeState::GatesOff);
-            self.trip = Some(Trip { fault: Fault::GatesHeld, value, limit, at: self.now, safe });
+            self.applied.trip = Some(Trip { fault: Fault::GatesHeld, value, limit, at: self.now, safe });
         }
     }
 
     fn check(&mut self, command: &Option<VoltageCommand>, port: &mut impl PwmPort) {
-        if self.trip.is_some() {
+        if self.applied.trip.is_some() {
             return;
         }
-        let violation = protection::check_currents(&self.currents_a, &self.tables.ratings)
-            .or_else(|| command.as_ref().and_then(|command| self.stale(command)));
+        let legs = port.leg_faults();
+        let armed = |(fault, _, _): &Violation| !self.disarmed.has(*fault);
+        let currents = || protection::check_currents(&self.applied.currents_a, &self.tables.ratings);
+        let stale = || command.as_ref().and_then(|command| self.stale(command));
+        let violation = legs.check().or_else(|| currents().filter(armed)).or_else(|| stale().filter(armed));
         let Some((fault, value, limit)) = violation else {
             return;
         };
@@ -544,9 +682,9 @@ impl PwmTask {
             None => (0.0, self.tables.ratings.dc_link_nominal_v),
         };
         let omega = rate * self.settings.clock.ticks_per_s / UNITS_PER_RADIAN;
-        let safe = protection::safe_state(omega, udc_v, &self.tables.ratings);
+        let safe = legs.safe_state(omega, udc_v, &self.tables.ratings);
         port.enter(safe, self.now);
-        self.trip = Some(Trip { fault, value, limit, at: self.now, safe });
+        self.applied.trip = Some(Trip { fault, value, limit, at: self.now, safe });
     }
 
     fn stale(&self, command: &VoltageCommand) -> Option<Violation> {

@@ -5,21 +5,29 @@
 //! ahead of what is decided: it advances only as far as it is asked to, and everything it is told takes effect at a
 //! fixed delay after its nominal instant, so that arrival order changes nothing.
 
+pub mod inject;
 mod inverter;
+mod link;
+mod observe;
 mod sensors;
 
-pub use inverter::{Edge, GATES, Inverter};
+pub use inject::Injection;
+pub use inverter::{Edge, GATES, Inverter, Stuck};
+pub use link::{LineFilter, Supply};
+pub use observe::{Observed, Peaks};
 pub use sensors::{Converter, Flaws, Sensors};
 
 use crate::plant::Plant;
 use crate::trace::{Row, Switch};
+use inject::{Kind, Spoiler};
+use link::Link;
 use std::collections::VecDeque;
 use tractive::board::Sample;
 use tractive::control::{Demand, LinkWindow};
 use tractive::drive::Report;
 use tractive::frames::{Abc, Angle};
 use tractive::modulation::{CarrierPeriod, Mode};
-use tractive::protection::SafeState;
+use tractive::protection::{LegFaults, SafeState};
 use tractive::time::{Clock, Instant};
 
 /// Ticks since the run's beginning.
@@ -31,6 +39,8 @@ const SAFE_STATE_DELAY: Tick = 625;
 
 /// Rows for which room is made at once.
 const MOST_ROWS: usize = 1 << 20;
+/// How far a current's reading may be off without making a difference that counts, in A.
+const MUCH_A: f32 = 10.0;
 
 /// What the operator does, as a function of time.
 pub trait Operator {
@@ -83,6 +93,10 @@ pub struct Settings {
     pub link_steps: Vec<(f64, f64)>,
     /// Imperfections of the sensors.
     pub flaws: Flaws,
+    /// What feeds the inverter.
+    pub supply: Supply,
+    /// What goes wrong.
+    pub injection: Option<Injection>,
 }
 
 /// Machine, inverter, sensors and recorder.
@@ -90,6 +104,9 @@ pub struct Bench {
     plant: Plant,
     inverter: Inverter,
     sensors: Sensors,
+    link: Option<Link>,
+    spoiler: Spoiler,
+    observed: Observed,
     operator: Box<dyn Operator + Send>,
     clock: Clock,
     tick_s: f64,
@@ -118,10 +135,17 @@ impl Bench {
         let ticks = |seconds: f64| (seconds / tick_s).round() as Tick;
         let first = CarrierPeriod::off(settings.first_half_ticks);
         let lead = ticks(settings.lead_s);
+        let from = settings.injection.map_or(Tick::MAX, |injection| ticks(settings.lead_s + injection.at_s));
         Self {
             plant,
             inverter: Inverter::new(settings.dead_time_ticks.into(), first),
             sensors: Sensors::new(settings.udc_v, settings.link_steps.clone(), settings.flaws),
+            link: match settings.supply {
+                Supply::Stiff => None,
+                Supply::Line(filter) => Some(Link::new(filter, settings.udc_v)),
+            },
+            spoiler: Spoiler::new(settings.injection),
+            observed: Observed::new(from),
             operator,
             clock: settings.clock,
             tick_s,
@@ -198,7 +222,56 @@ impl Bench {
     pub fn pwm_sample(&mut self, instant: Instant) -> Result<Abc, BenchError> {
         let tick = self.widen(instant);
         self.advance(tick)?;
-        Ok(self.sensors.currents(&self.plant))
+        let currents_a = self.sensors.currents(&self.plant);
+        Ok(self.read_currents(currents_a))
+    }
+
+    /// What drivers and monitors of the legs have found.
+    pub fn leg_faults(&self) -> LegFaults {
+        let mut found = self.inverter.leg_faults();
+        if let Some(Kind::Feedback(leg)) = self.spoiler.kind(self.seconds(self.now)) {
+            found.low |= 1 << leg;
+        }
+        found
+    }
+
+    /// By how much the control interrupt is late, in ticks.
+    pub fn control_late_ticks(&self) -> u32 {
+        match self.spoiler.kind(self.seconds(self.now)) {
+            Some(Kind::ControlLate(ticks)) => ticks,
+            _ => 0,
+        }
+    }
+
+    /// Whether the control interrupt comes at this instant at all.
+    pub fn has_control(&self, instant: Instant) -> bool {
+        self.spoiler.kind(self.seconds(self.widen(instant))) != Some(Kind::ControlStopped)
+    }
+
+    /// Time since the recording's beginning, in s.
+    pub fn time_s(&self) -> f64 {
+        self.seconds(self.now)
+    }
+
+    /// The trace so far.
+    pub fn rows(&self) -> &[Row] {
+        &self.rows
+    }
+
+    /// What a fault did.
+    pub fn observed(&self) -> &Observed {
+        &self.observed
+    }
+
+    /// What the converters make of the phase currents.
+    fn read_currents(&mut self, true_a: Abc) -> Abc {
+        let read_a = self.spoiler.currents(self.seconds(self.now), true_a);
+        let off = [read_a.a - true_a.a, read_a.b - true_a.b, read_a.c - true_a.c];
+        // What is not a number is off as well.
+        if off.iter().any(|off| off.is_nan() || off.abs() > MUCH_A) {
+            self.observed.makes_a_difference(self.now);
+        }
+        read_a
     }
 
     /// The half to play after the one that begins at `instant`.
@@ -228,6 +301,9 @@ impl Bench {
     fn advance(&mut self, tick: Tick) -> Result<(), BenchError> {
         while self.now < tick {
             let mut due = tick.min(self.inverter.half_end()).min(self.next_sample).min(self.next_row);
+            if self.observed.from > self.now {
+                due = due.min(self.observed.from);
+            }
             if let Some(event) = self.inverter.next_event() {
                 due = due.min(event);
             }
@@ -245,19 +321,51 @@ impl Bench {
 
     fn integrate(&mut self, tick: Tick) {
         if tick > self.now {
-            let udc_v = self.sensors.udc_v(self.seconds(self.now));
-            self.plant.advance(self.inverter.legs(), udc_v, (tick - self.now) as f64 * self.tick_s);
+            let t_s = self.seconds(self.now);
+            let (udc_v, legs) = (self.udc_v(t_s), self.inverter.legs());
+            let dt_s = (tick - self.now) as f64 * self.tick_s;
+            let before_j = self.plant.energies().electrical_j;
+            self.plant.advance(legs, udc_v, dt_s);
+            if let Some(link) = &mut self.link {
+                let drawn_j = self.plant.energies().electrical_j - before_j;
+                link.advance(drawn_j, dt_s, self.sensors.udc_v(t_s), self.spoiler.supply(t_s));
+            }
+            if self.inverter.monitor(self.plant.currents_abc(), self.now, tick) {
+                self.observed.makes_a_difference(self.now);
+            }
             self.now = tick;
+            let udc_v = self.udc_v(self.seconds(tick));
+            self.observed.note(tick, self.plant.currents_abc(), udc_v);
+        }
+    }
+
+    /// The link's true voltage, in V.
+    fn udc_v(&self, t_s: f64) -> f64 {
+        match &self.link {
+            Some(link) => link.voltage_v(),
+            None => self.sensors.udc_v(t_s),
         }
     }
 
     fn act(&mut self) -> Result<(), BenchError> {
         let now = self.now;
+        if now == self.observed.from {
+            self.observed.carrier_ticks = 2 * Tick::from(self.inverter.half().period_ticks);
+            match self.spoiler.kind(self.seconds(now)) {
+                Some(Kind::Gate(gate, on)) => {
+                    self.inverter.stick(gate, if on { Stuck::On } else { Stuck::Off })
+                }
+                Some(Kind::Device(gate)) => self.inverter.stick(gate, Stuck::Shorted),
+                _ => {}
+            }
+        }
         if let Some((at, safe)) = self.safe
             && at <= now
         {
             self.safe = None;
             self.inverter.enter(safe, now);
+            let (udc_v, field_j) = (self.udc_v(self.seconds(now)), self.plant.field_j());
+            self.observed.enters(now, safe, udc_v, field_j);
         }
         while let Some((at, load_nm)) = self.loads.front().copied()
             && at <= now
@@ -283,13 +391,19 @@ impl Bench {
     fn take_sample(&mut self) -> Result<(), BenchError> {
         // The report of the period before last must be there: its command takes effect now.
         if self.samples.len() > 1 {
-            return Err(BenchError::ControlLate(self.seconds(self.now)));
+            if self.has_control(Instant(self.now as u32)) {
+                return Err(BenchError::ControlLate(self.seconds(self.now)));
+            }
+            self.samples.clear();
         }
         let t_s = self.seconds(self.now);
         let (demand, enable) = self.operator.demand(t_s);
-        let measured = self.sensors.measure(&self.plant, t_s);
-        let sample =
+        let mut measured = self.sensors.measure(&self.plant, t_s);
+        measured.udc_v = self.udc_v(t_s) as f32;
+        measured.currents_a = self.read_currents(measured.currents_a);
+        let mut sample =
             Sample { measured, demand, enable, window: LinkWindow::OPEN, acknowledge: 0, hardware: None };
+        self.spoiler.control(t_s, &mut sample);
         self.samples.push_back((self.now, sample));
         self.next_sample = self.now + Tick::from(self.clock.control_ticks);
         Ok(())
@@ -336,7 +450,7 @@ impl Bench {
                 ib_a: ib,
                 ic_a: ic,
                 u_v: report.voltage_v.into(),
-                udc_v: self.sensors.udc_v(t_s),
+                udc_v: self.udc_v(t_s),
                 f1_hz: report.frequency_hz.into(),
                 map_error: report.map_error.into(),
                 mode,

@@ -112,6 +112,11 @@ impl Plant {
         self.rotor.speed_rpm()
     }
 
+    /// Energy of the field, above that at no current, in J.
+    pub fn field_j(&self) -> f64 {
+        self.stator.field_j(self.id_a, self.iq_a)
+    }
+
     /// Energies since the beginning.
     pub fn energies(&self) -> Energies {
         self.energies

@@ -12,8 +12,9 @@ use tractive::link::{SlotAnswer, SlotRequest};
 use tractive::machine::Tables;
 use tractive::modulation::CarrierPeriod;
 use tractive::operator::{self, Desk, Feedback, Slot, Switches};
-use tractive::protection::SafeState;
+use tractive::protection::{LegFaults, SafeState};
 use tractive::protocol::{Carrier, Frame, Station};
+use tractive::recorder::Recorder;
 use tractive::time::{Clock, Instant};
 
 /// The bench behind a board's ports; the first error ends the run.
@@ -48,7 +49,7 @@ impl ControlPort for Port<'_> {
     }
 
     fn overrun_ticks(&mut self, _now: Instant) -> u32 {
-        0
+        self.bench.control_late_ticks()
     }
 
     fn report(&mut self, now: Instant, report: &Report) {
@@ -56,6 +57,10 @@ impl ControlPort for Port<'_> {
         if let Some(desk) = self.desk {
             desk.tell(now, report);
         }
+    }
+
+    fn leg_faults(&mut self) -> LegFaults {
+        self.bench.leg_faults()
     }
 }
 
@@ -73,6 +78,10 @@ impl PwmPort for Port<'_> {
 
     fn enter(&mut self, safe: SafeState, now: Instant) {
         self.bench.enter(now, safe);
+    }
+
+    fn leg_faults(&mut self) -> LegFaults {
+        self.bench.leg_faults()
     }
 }
 
@@ -145,31 +154,77 @@ pub fn run_on_host(
     first_half_ticks: u32,
     supervisor: Option<&mut dyn Supervisor>,
 ) -> anyhow::Result<Recording> {
-    let desk = Desk::new();
-    let mut idle = supervisor.map(|supervisor| Idle::new(tables, &settings.clock, &desk, supervisor));
-    let shared = Shared::new();
-    let mut control_at = Instant(settings.clock.control_ticks);
-    let mut pwm_at = Instant(first_half_ticks);
-    let mut control = ControlTask::new(tables, settings, control_at);
-    let mut pwm = PwmTask::new(tables, settings, pwm_at).after_halves_of(first_half_ticks);
+    let (recorder, desk, clock) = (Recorder::new(), Desk::new(), settings.clock);
+    let mut idle = supervisor.map(|supervisor| Idle::new(tables, &clock, &desk, supervisor));
     let mut progress = Progress::new(name);
-    while !bench.is_done() {
-        let mut port = Port { bench: &mut bench, desk: idle.as_ref().map(|_| &desk), error: None };
-        // At equal instants the PWM interrupt comes first: it has the higher priority.
-        if control_at.reached(pwm_at) {
-            pwm.run(&mut port, &shared);
-            pwm_at = pwm.next_call();
-        } else {
-            control.run(&mut port, &shared);
-            control_at = control.next_call();
-        }
-        if let Some(error) = port.error {
-            return Err(error.into());
-        }
+    let mut tasks = Tasks::new(tables, settings, first_half_ticks).recorded_by(&recorder);
+    tasks.desk = idle.as_ref().map(|_| &desk);
+    let mut outcome = Ok(());
+    tasks.drive(&mut bench, |bench| {
         if let Some(idle) = &mut idle {
-            idle.run(&mut bench, &settings.clock)?;
+            outcome = idle.run(bench, &clock);
         }
         progress.show(bench.progress());
+        outcome.is_ok()
+    })?;
+    outcome?;
+    let records = (0..).map_while(|index| recorder.read(index)).collect();
+    Ok(super::record(bench, records))
+}
+
+/// Both tasks and the cells between them.
+pub struct Tasks<'a> {
+    control: ControlTask,
+    pwm: PwmTask,
+    shared: Shared<'a>,
+    /// Where the operator's permits come from; `None`: the bench's samples.
+    desk: Option<&'a Desk>,
+}
+
+impl<'a> Tasks<'a> {
+    /// Before their first interrupts.
+    pub fn new(tables: &'static Tables, settings: Settings, first_half_ticks: u32) -> Self {
+        let first_control = Instant(settings.clock.control_ticks);
+        Self {
+            control: ControlTask::new(tables, settings, first_control),
+            pwm: PwmTask::new(tables, settings, Instant(first_half_ticks)).after_halves_of(first_half_ticks),
+            shared: Shared::new(),
+            desk: None,
+        }
     }
-    Ok(super::record(bench))
+
+    /// The same with a flight recorder.
+    pub fn recorded_by(mut self, recorder: &'a Recorder) -> Self {
+        self.shared = Shared::recorded_by(recorder);
+        self
+    }
+
+    /// Until the bench's recording is complete, or nobody wants to see more of it.
+    pub fn drive(
+        mut self,
+        bench: &mut Bench,
+        mut goes_on: impl FnMut(&mut Bench) -> bool,
+    ) -> Result<(), BenchError> {
+        while !bench.is_done() {
+            let (control_at, pwm_at) = (self.control.next_call(), self.pwm.next_call());
+            let has_control = bench.has_control(control_at);
+            let mut port = Port { bench, desk: self.desk, error: None };
+            // At equal instants the PWM interrupt comes first: it has the higher priority.
+            if control_at.reached(pwm_at) || !has_control {
+                self.pwm.run(&mut port, &self.shared);
+            } else {
+                if self.control.wants_revision() {
+                    self.pwm.revise(&mut port, &self.shared);
+                }
+                self.control.run(&mut port, &self.shared);
+            }
+            if let Some(error) = port.error {
+                return Err(error);
+            }
+            if !goes_on(bench) {
+                break;
+            }
+        }
+        Ok(())
+    }
 }

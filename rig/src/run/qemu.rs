@@ -17,7 +17,7 @@ pub fn run_in_qemu(
     emulator: &Emulator,
     mut supervisor: Option<&mut dyn Supervisor>,
 ) -> Result<Recording> {
-    let mut calls = Calls::default();
+    let (mut calls, mut records) = (Calls::default(), Vec::new());
     let mut progress = Progress::new(name);
     let outcome = emulate(emulator, |block, answers| {
         let Some(request) = Request::from_block(block) else {
@@ -29,9 +29,6 @@ pub fn run_in_qemu(
                 let sample = bench.control_sample(at)?;
                 let done = bench.is_done();
                 answers.control(&link::sample_to_block(&sample, done))?;
-                if done {
-                    return Ok(true);
-                }
             }
             Request::ControlReport(at, report) => {
                 calls.control(&report);
@@ -51,6 +48,8 @@ pub fn run_in_qemu(
                 super::follow(&mut bench, at, &turn);
                 answers.slot(&turn.answer.to_block())?;
             }
+            Request::Recorded(record) => records.push(record),
+            Request::End => return Ok(true),
             Request::Dead => bail!("the firmware stopped in a panic or a HardFault, gates off"),
         }
         progress.show(bench.progress());
@@ -60,7 +59,7 @@ pub fn run_in_qemu(
         std::fs::write(path, &calls.lines).with_context(|| path.display().to_string())?;
     }
     outcome?;
-    Ok(super::record(bench))
+    Ok(super::record(bench, records))
 }
 
 /// What every interrupt was about, in the order in which they ended.

@@ -13,7 +13,7 @@ mod sweep;
 mod timing;
 
 use crate::analysis::Figures;
-use crate::bench::{self, Bench, Operator};
+use crate::bench::{self, Bench, Operator, Supply};
 use crate::machine::Machine;
 use crate::options::{On, RunOptions};
 use crate::plant::{Plant, PlantSettings, SpeedSource};
@@ -131,6 +131,8 @@ pub(crate) fn run_plan(
             udc_v: options.udc.unwrap_or(parameters.dc_link_nominal_v),
             link_steps: plan.link,
             flaws: options.flaws(parameters.trip_current_a),
+            supply: Supply::Stiff,
+            injection: None,
         },
     );
     match options.on {

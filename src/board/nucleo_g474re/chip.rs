@@ -7,12 +7,16 @@ use super::registers::Registers;
 use super::start::{self, Found, Plan, StartError, Timeout, Wait};
 use super::watchdog::Pulse;
 use crate::drive::Report;
+use crate::recorder::{Record, Recorder};
 use cortex_m::peripheral::NVIC;
 use defmt_rtt as _;
 pub use stm32_metapac::Interrupt;
 
 /// The drive's operator.
 pub static OPERATOR: Operator = Operator::new();
+
+/// The drive's flight recorder.
+pub static RECORDER: Recorder = Recorder::new();
 
 /// What the interrupts tell the watchdog.
 pub static PULSE: Pulse = Pulse::new();
@@ -88,11 +92,29 @@ pub fn run() {
     defmt::info!("running");
 }
 
-/// The idle loop, forever: feeds the watchdog, tells what has changed.
+/// Makes the PWM interrupt come at once, between two boundaries.
+pub fn revise_pulses() {
+    NVIC::pend(Interrupt::TIM1_UP_TIM16);
+    // It has run before anything else is done.
+    cortex_m::asm::dsb();
+    cortex_m::asm::isb();
+}
+
+/// The idle loop, forever: feeds the watchdog, tells what has changed, and after a fault what the flight recorder holds.
 pub fn idle() -> ! {
-    let (mut told, mut broken) = (None, false);
+    let (mut told, mut broken, mut records_told) = (None, false, 0);
     loop {
-        PULSE.feed_if_both_ran(&Registers::CHIP);
+        // One record a meal: a log that nobody hurries to read holds few.
+        if PULSE.feed_if_both_ran(&Registers::CHIP) {
+            match RECORDER.read(records_told) {
+                Some(record) => {
+                    tell(&record);
+                    records_told += 1;
+                }
+                None if !RECORDER.is_frozen() => records_told = 0,
+                None => {}
+            }
+        }
         if !broken && Registers::CHIP.legs.is_tripped() {
             broken = true;
             defmt::error!("gates off by a break: hardware, or the fault that follows");
@@ -105,6 +127,24 @@ pub fn idle() -> ! {
             told = Some(trip);
         }
     }
+}
+
+fn tell(record: &Record) {
+    let Record { at, currents_a, udc_v, angle, id_a, iq_a, voltage_v, state } = *record;
+    defmt::info!(
+        "{} ticks: {} {} {} A, {} V, angle {=u32:#x}; wanted {} {} A, {} V; {} {}",
+        at.0,
+        currents_a.a,
+        currents_a.b,
+        currents_a.c,
+        udc_v,
+        angle.0,
+        id_a,
+        iq_a,
+        voltage_v,
+        state.mode.name(),
+        state.fault.map_or("", |fault| fault.name()),
+    );
 }
 
 /// Gates off for good, whatever state the program is in, then nothing more; the watchdog resets the chip if it runs.

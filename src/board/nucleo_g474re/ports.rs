@@ -103,7 +103,14 @@ impl Pwm {
         Self { registers, sampler, zeros, pulses: false, levels: [false; 3] }
     }
 
-    /// First thing in the interrupt.
+    /// First thing in the interrupt: whether it is a carrier boundary's. If not, control wants a revision, and there is nothing to
+    /// acknowledge.
+    #[inline]
+    pub fn is_boundary(&self) -> bool {
+        self.registers.legs.has_updated()
+    }
+
+    /// First thing at a boundary.
     #[inline]
     pub fn acknowledge(&mut self) {
         self.registers.legs.acknowledge();
@@ -137,7 +144,7 @@ impl PwmPort for Pwm {
         let half = HalfRegisters::new(next, self.levels);
         let legs = &self.registers.legs;
         legs.play(&half);
-        if legs.is_late() {
+        if legs.has_updated() {
             legs.trip();
         }
         self.pulses = next.mode != Mode::Off;
@@ -152,7 +159,8 @@ impl PwmPort for Pwm {
 #[inline]
 fn enter(registers: &Registers, safe: SafeState) {
     match safe {
-        SafeState::GatesOff => registers.legs.trip(),
+        // Nothing here tells of a leg stuck at the upper rail.
+        SafeState::GatesOff | SafeState::UpperShortCircuit => registers.legs.trip(),
         SafeState::ShortCircuit => registers.legs.short_circuit(),
     }
 }

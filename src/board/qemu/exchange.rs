@@ -5,7 +5,7 @@ mod dual;
 
 pub use dual::{dead_dual, gates_off, open_dual, play_dual, power_sample, report_dual, sample_dual};
 
-use super::stop;
+use super::{RECORDER, stop};
 use crate::board::Sample;
 use crate::drive::Report;
 use crate::frames::Abc;
@@ -52,9 +52,20 @@ pub fn control_sample(now: Instant) -> Sample {
     send(&Request::ControlSample(now).to_block());
     let (sample, end) = link::sample_from_block(&receive(CONTROL_ANSWERS));
     if end {
-        stop(true);
+        finish();
     }
     sample
+}
+
+/// Tells what the flight recorder holds, if a fault has frozen it, and ends the emulation.
+fn finish() -> ! {
+    // The rig's time stands still from here on: no interrupt may ask it for samples.
+    cortex_m::interrupt::disable();
+    for record in (0..).map_while(|index| RECORDER.read(index)) {
+        send(&Request::Recorded(record).to_block());
+    }
+    send(&Request::End.to_block());
+    stop(true)
 }
 
 /// Phase currents at a carrier boundary.

@@ -26,8 +26,6 @@ pub struct Axis {
     controller: Controller,
     speed_loop: SpeedLoop,
     watch: FrozenWatch,
-    /// Electrical speed while the angle last moved, in rad/s: the tracker soon believes a sensor that stands still.
-    moving: f32,
     /// Volt-seconds of the period that began at the last sample, per volt of link, in s; and the link's voltage there.
     acting: Option<(AlphaBeta, f32)>,
 }
@@ -57,15 +55,14 @@ impl Axis {
             controller: Controller::with_tracking(TRACKING_RAD_S),
             speed_loop: SpeedLoop::new(),
             watch: FrozenWatch::new(),
-            moving: 0.0,
             acting: None,
         }
     }
 
-    /// Follows the angle. Says by how much, in rad, it is off where that is too much.
-    pub fn track(&mut self, angle: Angle, settings: &Settings) -> Option<f32> {
+    /// Follows the angle, where it is `trusted` whatever it is. Says by how much, in rad, it is off where that is too much.
+    pub fn track(&mut self, angle: Angle, trusted: bool, settings: &Settings) -> Option<f32> {
         let surprise = self.controller.surprise_rad(angle, &settings.clock);
-        let lost = self.controller.speed_is_known() && surprise.abs() > SURPRISE_RAD;
+        let lost = self.controller.speed_is_known() && surprise.abs() > SURPRISE_RAD && !trusted;
         if !lost {
             self.controller.track(angle, &settings.clock);
         }
@@ -98,11 +95,8 @@ impl Axis {
         tables: &Tables,
     ) -> Option<Violation> {
         let stands = self.watch.last_angle() == Some(measured.angle);
-        if !stands {
-            self.moving = self.omega();
-        }
         let period_s = settings.clock.control_s();
-        let violation = self.watch.check(measured, self.moving, period_s, &tables.ratings)?;
+        let violation = self.watch.check(measured, self.omega(), period_s, &tables.ratings)?;
         let (turned_rad, limit_rad) = self.watch.turned_rad();
         if stands { Some((lost, turned_rad, limit_rad)) } else { Some(violation) }
     }

@@ -6,7 +6,7 @@ use crate::drive::Gates;
 use crate::frames::{Angle, limit};
 use crate::machine::Tables;
 use crate::nine_switch::{self, GateTicks, MotorVoltage, Period, Refused, Request};
-use crate::protection::{self, Fault, SafeState, Trip, Violation};
+use crate::protection::{self, Disarmed, Fault, SafeState, Trip, Violation};
 use crate::time::Instant;
 
 /// Longest dead time that the gates' hardware may insert, in s.
@@ -27,6 +27,7 @@ pub struct PwmTask {
     now: Instant,
     /// The period that was played before, and the one that is played.
     periods: [PlayedPeriod; 2],
+    disarmed: Disarmed,
     trip: Option<Trip>,
     /// Link voltage at the last peak, in V.
     last_link_v: Option<f32>,
@@ -41,9 +42,16 @@ impl PwmTask {
             settings,
             now: Instant(settings.first_peak_ticks()),
             periods: [off; 2],
+            disarmed: Disarmed::NONE,
             trip: None,
             last_link_v: None,
         }
+    }
+
+    /// The same without a check.
+    pub const fn without(mut self, disarmed: Disarmed) -> Self {
+        self.disarmed = disarmed;
+        self
     }
 
     /// The PWM timer's interrupt, at the carrier's peak. Deadline: the next valley, where the shadow registers take over.
@@ -108,14 +116,17 @@ impl PwmTask {
     ) -> Option<Violation> {
         let limits = &self.settings.limits;
         let [upper, lower] = &sample.currents_a;
+        let armed = |(fault, _, _): &Violation| !self.disarmed.has(*fault);
         protection::check_currents(upper, &self.tables.ratings)
-            .or_else(|| protection::check_currents(lower, &self.tables.ratings))
-            .or_else(|| limits.check_link(sample.source_v, sample.capacitor_v))
+            .filter(armed)
+            .or_else(|| protection::check_currents(lower, &self.tables.ratings).filter(armed))
+            .or_else(|| limits.check_link(sample.source_v, sample.capacitor_v).filter(armed))
             .or_else(|| {
                 let command = command.filter(|command| command.gates == Gates::Pulse)?;
                 // Only while pulses are wanted: control may have turned the gates off meanwhile.
                 self.stuck(&sample.gates, before, running)
-                    .or_else(|| self.stale(command))
+                    .filter(armed)
+                    .or_else(|| self.stale(command).filter(armed))
                     .or_else(|| limits.check_duty(command.duty))
             })
     }
@@ -151,6 +162,9 @@ impl PwmTask {
         let (Some((fault, value, limit)), None) = (violation, self.trip) else {
             return;
         };
+        if self.disarmed.has(fault) {
+            return;
+        }
         let at = self.now.before(self.settings.carrier_ticks);
         port.gates_off(at);
         self.trip = Some(Trip { fault, value, limit, at, safe: SafeState::GatesOff });
