@@ -6,7 +6,7 @@ use can_dbc::{
 use proptest::prelude::*;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use tractive::modulation::Mode;
 use tractive::operator::{Refusal, State};
 use tractive::protection::Fault;
@@ -14,9 +14,12 @@ use tractive::protocol::{
     COUNTER, CRC, FROM_DRIVE, Kind, Listening, Message, Outcome, Payload, Signal, TO_DRIVE,
 };
 
+fn path() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/tractive.dbc")
+}
+
 fn published() -> String {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/tractive.dbc");
-    std::fs::read_to_string(path).unwrap_or_default()
+    std::fs::read_to_string(path()).unwrap_or_default()
 }
 
 fn parsed() -> Dbc {
@@ -105,7 +108,13 @@ fn wanted() -> String {
 #[test]
 fn the_file_is_what_the_code_says() {
     let wanted = wanted();
-    assert!(published() == wanted, "docs/tractive.dbc should be:\n{wanted}");
+    if std::env::var_os("TRACTIVE_RENEW_DBC").is_some() {
+        std::fs::write(path(), &wanted).unwrap();
+    }
+    assert!(
+        published() == wanted,
+        "docs/tractive.dbc is not what the code says; TRACTIVE_RENEW_DBC=1 cargo test --test protocol writes it anew"
+    );
 }
 
 fn float(value: &NumericValue) -> f64 {
