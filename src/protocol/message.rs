@@ -23,6 +23,8 @@ pub struct Message {
     /// Signals besides CRC and counter.
     pub signals: &'static [Signal],
     data_ids: DataIds,
+    /// The bits of all signals.
+    used: u64,
 }
 
 impl Message {
@@ -34,7 +36,13 @@ impl Message {
         period_ms: u16,
         signals: &'static [Signal],
     ) -> Self {
-        Self { name, id, number, period_ms, signals, data_ids: e2e::data_ids(number) }
+        let mut used = CRC.mask() | COUNTER.mask();
+        let mut index = 0;
+        while index < signals.len() {
+            used |= signals[index].mask();
+            index += 1;
+        }
+        Self { name, id, number, period_ms, signals, data_ids: e2e::data_ids(number), used }
     }
 
     /// Its 16 data identifiers.
@@ -43,6 +51,7 @@ impl Message {
     }
 
     /// The frame with this content.
+    #[inline(never)]
     pub fn frame(&self, content: Payload, counter: &mut Counter) -> Frame {
         let mut data = content.0.to_le_bytes();
         e2e::protect(&mut data, counter.take(), &self.data_ids);
@@ -50,13 +59,13 @@ impl Message {
     }
 
     /// Whether a frame of this message has the right CRC.
+    #[inline(never)]
     pub fn is_intact(&self, frame: &Frame) -> bool {
         e2e::is_intact(&frame.data, &self.data_ids)
     }
 
     /// Whether every bit outside the message's signals is zero.
-    pub fn is_tidy(&self, payload: Payload) -> bool {
-        let used = self.signals.iter().fold(CRC.mask() | COUNTER.mask(), |used, signal| used | signal.mask());
-        payload.0 & !used == 0
+    pub const fn is_tidy(&self, payload: Payload) -> bool {
+        payload.0 & !self.used == 0
     }
 }

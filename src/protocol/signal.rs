@@ -19,7 +19,8 @@ pub enum Kind {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct OutOfRange;
 
-/// A signal. Little-endian; its value is `raw · scale + offset`.
+/// A signal. Little-endian; its value is `raw · scale + offset`. Its methods stay out of line: nothing here is in a hurry, and
+/// sixty signals would otherwise be sixty copies.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Signal {
     /// Name, with the unit where it has one.
@@ -102,11 +103,13 @@ impl Signal {
     }
 
     /// The bits as they are.
+    #[inline(never)]
     pub const fn raw(&self, payload: Payload) -> u32 {
         (payload.0.wrapping_shr(self.start) & self.ones()) as u32
     }
 
     /// Sets the bits as they are; those too many are cut off.
+    #[inline(never)]
     pub const fn put_raw(&self, payload: &mut Payload, raw: u32) {
         payload.0 = payload.0 & !self.mask() | (raw as u64 & self.ones()).wrapping_shl(self.start);
     }
@@ -117,6 +120,7 @@ impl Signal {
     }
 
     /// The value; `None` outside its range, which is also how "not available" is written.
+    #[inline(never)]
     pub fn get(&self, payload: Payload) -> Option<f32> {
         let raw = self.raw(payload);
         let steps = match self.kind {
@@ -135,6 +139,7 @@ impl Signal {
     }
 
     /// Sets the value, rounded to the nearest step; an error outside its range and for what is not finite.
+    #[inline(never)]
     pub fn put(&self, payload: &mut Payload, value: f32) -> Result<(), OutOfRange> {
         let within = value >= self.min && value <= self.max;
         if !within {
@@ -146,6 +151,7 @@ impl Signal {
     }
 
     /// Sets a measured value; where there is none, or it is outside the range, the raw number that says so.
+    #[inline(never)]
     pub fn put_measured(&self, payload: &mut Payload, value: Option<f32>) {
         if value.is_none_or(|value| self.put(payload, value).is_err()) {
             self.put_raw(payload, self.not_available());
