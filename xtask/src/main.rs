@@ -3,6 +3,7 @@
 //! | command | what it does |
 //! |---|---|
 //! | `run [SCENARIO] [--on qemu\|host] [--out DIR] …` | sets up what is missing, builds, hands over to the rig |
+//! | `talk [SCRIPT] [--on qemu\|host] [--out DIR] …` | the same, and commands the drive over the protocol |
 //! | `test [--only STEP]… [--list]` | sets up what is missing, runs every check, ends with a table and a count |
 //! | `image [--json]` | builds the image and says what is in it |
 //! | `timing [--json] [--profile [N]]` | instructions per interrupt against `budgets.toml` |
@@ -38,6 +39,7 @@ use clap::Parser;
 fn main() -> ExitCode {
     let result = match cli::Cli::parse().command {
         cli::Command::Run(args) => run::run(&args.words),
+        cli::Command::Talk(args) => run::talk(&args.words),
         cli::Command::Test(args) => test::run(&args),
         cli::Command::Image(args) => image::run(&args),
         cli::Command::Timing(args) => timing::run(&args),
