@@ -7,7 +7,6 @@
 #![forbid(unsafe_code)]
 
 mod dual;
-mod slot;
 
 use crate::board::Sample;
 use crate::cell::Words;
@@ -23,8 +22,6 @@ pub use dual::{
     DualRequest, DualSetup, dual_sample_from_block, dual_sample_to_block, dual_setup_from_block,
     dual_setup_to_block, power_from_block, power_to_block,
 };
-
-pub use slot::{SlotAnswer, SlotRequest};
 
 /// Words in a block.
 pub const BLOCK_WORDS: usize = 16;
@@ -42,8 +39,6 @@ pub struct Setup {
     pub dead_time_ticks: u32,
     /// By how much the PWM timer's first half is longer than the shortest one, in ticks.
     pub pwm_delay_ticks: u32,
-    /// Whether the drive is commanded over the protocol, in slots, and not by the samples.
-    pub commanded: bool,
 }
 
 /// From the firmware to the rig.
@@ -63,8 +58,6 @@ pub enum Request {
     Enter(Instant, SafeState),
     /// The processor has stopped in a panic or a HardFault, gates off.
     Dead,
-    /// A slot of the operator's: what the one before sends and switches.
-    Slot(Instant, SlotRequest),
     /// A control period from the flight recorder, the oldest first; after the last answer, if a fault has frozen it.
     Recorded(Record),
     /// The image has nothing more to say.
@@ -83,7 +76,6 @@ impl Request {
             Self::Play(at, half) => (5, *at, &half_to_words(*half)),
             Self::Enter(at, safe) => (6, *at, &[*safe as u32]),
             Self::Dead => (7, Instant(0), &[]),
-            Self::Slot(at, request) => (16, *at, &request.to_words()),
             Self::Recorded(record) => (8, record.at, &record.to_words()),
             Self::End => (9, Instant(0), &[]),
         };
@@ -115,10 +107,6 @@ impl Request {
                 Self::Enter(at, SafeState::from_code(safe))
             }
             7 => Self::Dead,
-            16 => {
-                let [a, b, c, d, e, ..] = payload;
-                Self::Slot(at, SlotRequest::from_words([a, b, c, d, e]))
-            }
             8 => {
                 let [a, b, c, d, e, f, g, h, i, j, ..] = payload;
                 Self::Recorded(Record::from_words([a, b, c, d, e, f, g, h, i, j]))
@@ -133,14 +121,13 @@ impl Request {
 pub fn setup_to_block(setup: Setup) -> Block {
     let mut block = [0; BLOCK_WORDS];
     [block[0], block[1], block[2]] = [setup.min_pulse_ticks, setup.dead_time_ticks, setup.pwm_delay_ticks];
-    block[3] = setup.commanded.into();
     block
 }
 
 /// The inverse of [`setup_to_block`].
 pub fn setup_from_block(block: &Block) -> Setup {
-    let [min_pulse_ticks, dead_time_ticks, pwm_delay_ticks, commanded, ..] = *block;
-    Setup { min_pulse_ticks, dead_time_ticks, pwm_delay_ticks, commanded: commanded != 0 }
+    let [min_pulse_ticks, dead_time_ticks, pwm_delay_ticks, ..] = *block;
+    Setup { min_pulse_ticks, dead_time_ticks, pwm_delay_ticks }
 }
 
 /// The answer to [`Request::ControlSample`]; `stop` ends the run.

@@ -13,26 +13,22 @@ mod firmware;
 
 #[cfg(all(target_os = "none", not(feature = "board-nucleo-g474re")))]
 mod firmware {
-    use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+    use core::sync::atomic::{AtomicU32, Ordering};
     use cortex_m_rt::{entry, exception, interrupt};
     use tractive::board::qemu::{self, CLOCK, Interrupt as interrupt};
     use tractive::control::Gains;
-    use tractive::drive::traction::{self, ControlTask, PwmTask, Shared};
-    use tractive::machine::BUILT_IN;
+    use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
+    use tractive::machine::{BUILT_IN, BuiltIn};
     use tractive::modulation::Devices;
-    use tractive::operator::{Desk, SLOT_PERIODS, Settings, Slot};
-    use tractive::protocol::Station;
     use tractive::time::Instant;
 
     static SHARED: Shared = Shared::recorded_by(&qemu::RECORDER);
     static MIN_PULSE_TICKS: AtomicU32 = AtomicU32::new(0);
     static DEAD_TIME_TICKS: AtomicU32 = AtomicU32::new(0);
     static FIRST_HALF_TICKS: AtomicU32 = AtomicU32::new(0);
-    static COMMANDED: AtomicBool = AtomicBool::new(false);
-    static DESK: Desk = Desk::new();
 
-    fn settings() -> traction::Settings {
-        traction::Settings {
+    fn settings() -> Settings {
+        Settings {
             clock: CLOCK,
             devices: Devices::new(
                 MIN_PULSE_TICKS.load(Ordering::Relaxed),
@@ -51,25 +47,8 @@ mod firmware {
         DEAD_TIME_TICKS.store(setup.dead_time_ticks, Ordering::Relaxed);
         let first_half_ticks = settings().devices.shortest_half_ticks.saturating_add(setup.pwm_delay_ticks);
         FIRST_HALF_TICKS.store(first_half_ticks, Ordering::Relaxed);
-        COMMANDED.store(setup.commanded, Ordering::Relaxed);
         qemu::start(first_half_ticks);
-        if setup.commanded {
-            serve();
-        }
         loop {
-            qemu::idle();
-        }
-    }
-
-    /// The idle loop of a drive that is commanded over the protocol: a slot as soon as the control interrupt has begun one. Nothing waits for
-    /// it: what it decides holds from the next slot on, a whole slot later.
-    fn serve() -> ! {
-        let rated = Settings::rated(&BUILT_IN.ratings, SLOT_PERIODS as f32 * CLOCK.control_s(), None);
-        let mut station = Station::new(&BUILT_IN.ratings, &DESK, qemu::SlotLink::new());
-        let mut slot = Slot::new();
-        loop {
-            let settings = station.settings(&rated);
-            slot.run(&DESK, &mut station, &settings, &CLOCK);
             qemu::idle();
         }
     }
@@ -77,12 +56,11 @@ mod firmware {
     /// Deadline: the next control interrupt. Missed: fault `control_deadline`, gates into the safe state.
     #[interrupt]
     fn TIMER0() {
-        static mut TASK: Option<ControlTask> = None;
-        let desk = COMMANDED.load(Ordering::Relaxed).then_some(&DESK);
-        let mut board = qemu::Control { desk };
+        static mut TASK: Option<ControlTask<BuiltIn>> = None;
+        let mut board = qemu::Control;
         board.acknowledge();
         let first = Instant(CLOCK.control_ticks);
-        let task = TASK.get_or_insert_with(|| ControlTask::new(&BUILT_IN, settings(), first));
+        let task = TASK.get_or_insert_with(|| ControlTask::new(BuiltIn, settings(), first));
         if task.wants_revision() {
             board.revise_pulses();
         }
@@ -92,11 +70,11 @@ mod firmware {
     /// Deadline: the next carrier boundary, where the shadow registers take over.
     #[interrupt]
     fn DUALTIMER() {
-        static mut TASK: Option<PwmTask> = None;
+        static mut TASK: Option<PwmTask<BuiltIn>> = None;
         let mut board = qemu::Pwm;
         let settings = settings();
         let first = Instant(FIRST_HALF_TICKS.load(Ordering::Relaxed));
-        let task = || PwmTask::new(&BUILT_IN, settings, first).after_halves_of(first.0);
+        let task = || PwmTask::new(BuiltIn, settings, first).after_halves_of(first.0);
         let task = TASK.get_or_insert_with(task);
         if board.is_boundary() {
             board.acknowledge();

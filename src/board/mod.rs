@@ -13,7 +13,6 @@ use crate::control::{Demand, LinkWindow, Measurements};
 use crate::drive::Report;
 use crate::frames::Abc;
 use crate::modulation::CarrierPeriod;
-use crate::operator::Permit;
 use crate::protection::{Fault, LegFaults, SafeState};
 use crate::time::Instant;
 
@@ -36,14 +35,6 @@ pub struct Sample {
     pub acknowledge: u8,
     /// What holds the gates off in hardware.
     pub hardware: Option<Fault>,
-}
-
-impl Sample {
-    /// The same measurements with what the operator permits.
-    pub fn permitted(self, permit: &Permit) -> Self {
-        let Permit { enable, demand, window, acknowledge } = *permit;
-        Self { enable, demand, window, acknowledge, ..self }
-    }
 }
 
 /// What the control interrupt needs of a board.

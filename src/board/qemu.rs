@@ -15,11 +15,9 @@ pub use dual::{connect_dual, die_dual, start_dual};
 use super::{ControlPort, PwmPort, Sample};
 use crate::drive::Report;
 use crate::frames::Abc;
-use crate::link::{Setup, SlotAnswer, SlotRequest};
+use crate::link::Setup;
 use crate::modulation::CarrierPeriod;
-use crate::operator::{Desk, Feedback, Switches};
 use crate::protection::SafeState;
-use crate::protocol::{Carrier, Frame};
 use crate::recorder::Recorder;
 use crate::time::{Clock, Instant};
 use cortex_m::peripheral::NVIC;
@@ -125,8 +123,6 @@ fn start_timers() {
 
 /// Waits for a while, in instructions that do nothing. Not `wfi`: with `sleep=off` QEMU 7.2 skips timer periods while the
 /// processor sleeps. Not a short loop: leaving a translated block costs more than a thousand idle instructions.
-/// Out of line: constants of a function around it would be out of reach.
-#[inline(never)]
 pub fn idle() {
     // SAFETY: the instructions read and write nothing.
     unsafe { core::arch::asm!(".rept 500", "nop", ".endr", options(nomem, nostack, preserves_flags)) }
@@ -147,10 +143,7 @@ pub fn die() -> ! {
 }
 
 /// The control interrupt's side of the board.
-pub struct Control {
-    /// Where torque and enable come from; `None`: from the rig's samples.
-    pub desk: Option<&'static Desk>,
-}
+pub struct Control;
 
 /// The PWM interrupt's side of the board.
 pub struct Pwm;
@@ -184,11 +177,7 @@ impl Pwm {
 
 impl ControlPort for Control {
     fn sample(&mut self, now: Instant) -> Sample {
-        let sample = exchange::control_sample(now);
-        match self.desk {
-            Some(desk) => sample.permitted(&desk.permit(now)),
-            None => sample,
-        }
+        exchange::control_sample(now)
     }
 
     fn enter(&mut self, safe: SafeState, now: Instant) {
@@ -205,39 +194,6 @@ impl ControlPort for Control {
 
     fn report(&mut self, now: Instant, report: &Report) {
         exchange::report(now, report);
-        if let Some(desk) = self.desk {
-            desk.tell(now, report);
-        }
-    }
-}
-
-/// The idle loop's side of the link: frames, contactors, the board's word.
-pub struct SlotLink {
-    outbound: SlotRequest,
-}
-
-impl SlotLink {
-    /// Nothing sent, nothing switched.
-    pub const fn new() -> Self {
-        let switches = Switches { precharge: false, main: false, discharge: false, chopper: 0.0 };
-        Self { outbound: SlotRequest { frame: None, switches } }
-    }
-}
-
-impl Default for SlotLink {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
-impl Carrier for SlotLink {
-    fn receive(&mut self, at: Instant) -> (Option<Frame>, Feedback) {
-        let SlotAnswer { frame, feedback } = exchange::slot(at, &self.outbound);
-        (frame, feedback)
-    }
-
-    fn send(&mut self, _from: Instant, frame: Option<Frame>, switches: &Switches) {
-        self.outbound = SlotRequest { frame, switches: *switches };
     }
 }
 

@@ -38,14 +38,19 @@ fn configuration(input: &Input) -> Option<Violation> {
 }
 
 fn current_sensors(input: &Input, settings: &Settings) -> Option<Violation> {
-    let (ratings, observed) = (settings.ratings, input.observed);
     let offsets = input.feedback.offsets_a;
-    let offset_a = OFFSET_SHARE * ratings.max_current_a;
+    let offset_a = OFFSET_SHARE * settings.ratings.max_current_a;
     let offset =
         [offsets.a, offsets.b, offsets.c].into_iter().find(|offset| is_beyond(offset.abs(), offset_a));
     if let Some(offset) = offset {
         return Some((Fault::CurrentOffset, offset.abs(), offset_a));
     }
+    None
+}
+
+/// No current flows: for where the gates have been off for a while.
+pub(super) fn resting_current(input: &Input, settings: &Settings) -> Option<Violation> {
+    let (ratings, observed) = (settings.ratings, input.observed);
     // A machine that turns fast, or whose link is empty, lets current flow through the diodes.
     let open = protection::safe_state(observed.omega, observed.udc_v, ratings) == SafeState::GatesOff;
     let resting_a = if open { RESTING_SHARE * ratings.max_current_a } else { ratings.trip_current_a };

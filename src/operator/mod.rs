@@ -28,12 +28,19 @@ pub use settings::{Line, Settings};
 pub use slot::{OperatorPort, Slot};
 pub use status::{Refusal, State, Status, Switches};
 
+use crate::board::Sample;
 use crate::control::{Demand, LinkWindow};
 use crate::protection::{Fault, SafeState, Trip, Violation};
+use crate::time::Clock;
 use line::{Discharge, Outcome, Precharge};
 
 /// Control periods in a slot.
 pub const SLOT_PERIODS: u32 = 10;
+
+/// Length of a slot, in s.
+pub fn slot_s(clock: &Clock) -> f32 {
+    SLOT_PERIODS as f32 * clock.control_s()
+}
 
 /// Time for which everything must be in order in the self-test, in s.
 const SELF_TEST_S: f32 = 0.05;
@@ -65,6 +72,13 @@ pub struct Permit {
 }
 
 impl Permit {
+    /// What the drive gets: the board may hold the gates off, never more than that.
+    #[inline]
+    pub fn applied_to(self, sample: Sample) -> Sample {
+        let Self { enable, demand, window, acknowledge } = self;
+        Sample { enable: enable && sample.enable, demand, window, acknowledge, ..sample }
+    }
+
     /// Nothing.
     pub const NONE: Self = Self {
         enable: false,
@@ -237,7 +251,10 @@ impl Operator {
         }
         let violation = match self.phase {
             Phase::Init | Phase::Fault { .. } => None,
-            Phase::SelfTest { .. } | Phase::Ready => health::cause(input, false, settings),
+            Phase::SelfTest { .. } => {
+                health::cause(input, false, settings).or_else(|| health::resting_current(input, settings))
+            }
+            Phase::Ready => health::cause(input, false, settings),
             Phase::Precharge(_) | Phase::Discharge(_) => health::hardware(input),
             Phase::Charged => health::cause(input, Self::main_closed(settings), settings)
                 .or_else(|| demand::link_lost(input, settings)),
@@ -374,7 +391,9 @@ impl Operator {
         };
         let shorted = trip.safe == SafeState::ShortCircuit;
         let held = shorted && !health::open_is_safe(input, settings);
-        if held || health::cause(input, false, settings).is_some() {
+        let cause =
+            health::cause(input, false, settings).or_else(|| health::resting_current(input, settings));
+        if held || cause.is_some() {
             return self.refuse(Refusal::CauseStillPresent);
         }
         // Zero is what both interrupts begin with.
@@ -414,6 +433,7 @@ impl Operator {
             ),
             (!feedback.position_known || !observed.speed_known, Refusal::PositionUnknown),
             (self.bad_values == Some(Refusal::RequestNotFinite), Refusal::RequestNotFinite),
+            (health::resting_current(input, settings).is_some(), Refusal::CauseStillPresent),
             (request.torque_nm != 0.0 && !request.with_torque, Refusal::TorqueNotZero),
         ];
         refusals.into_iter().find_map(|(refused, reason)| refused.then_some(reason))

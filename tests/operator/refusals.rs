@@ -68,7 +68,8 @@ fn fault_not_acknowledged() {
 
 #[test]
 fn cause_still_present() {
-    let causes: [fn(&mut World); 8] = [
+    let causes: [fn(&mut World); 9] = [
+        |world| (world.observed.current_a, world.observed.udc_v) = (15.0, 100.0),
         |world| world.feedback.driver_ready = false,
         |world| world.feedback.hardware = Some(Fault::ClockFailure),
         |world| world.feedback.configuration = Configuration::Bad,
@@ -144,7 +145,8 @@ fn torque_not_zero() {
 
 #[test]
 fn what_keeps_a_charged_drive_from_being_enabled() {
-    let reasons: [(fn(&mut World), Refusal); 6] = [
+    let reasons: [(fn(&mut World), Refusal); 7] = [
+        (|world| world.observed.current_a = 15.0, Refusal::CauseStillPresent),
         (|world| world.feedback.parameters_open = true, Refusal::ParametersOpen),
         (|world| world.feedback.enable_input = false, Refusal::EnableInputLow),
         (|world| world.request.off = true, Refusal::OffRequested),

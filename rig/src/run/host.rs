@@ -1,6 +1,6 @@
 //! The drive on the host: the firmware's own tasks, called in the order in which their interrupts would come.
 
-use super::{Progress, Supervisor, Turn};
+use super::Progress;
 use crate::bench::{Bench, BenchError};
 use crate::trace::Recording;
 use tractive::board::{ControlPort, PwmPort, Sample};
@@ -8,25 +8,30 @@ use tractive::control::{Demand, LinkWindow, Measurements};
 use tractive::drive::Report;
 use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
 use tractive::frames::{Abc, Angle};
-use tractive::link::{SlotAnswer, SlotRequest};
-use tractive::machine::Tables;
+use tractive::machine::{Ratings, Tables};
 use tractive::modulation::CarrierPeriod;
-use tractive::operator::{self, Desk, Feedback, Slot, Switches};
+use tractive::operator::{self, Desk, Feedback, Line, OperatorPort, Request, Slot, Status, slot_s};
 use tractive::protection::{LegFaults, SafeState};
-use tractive::protocol::{Carrier, Frame, Station};
 use tractive::recorder::Recorder;
-use tractive::time::{Clock, Instant};
+use tractive::time::Instant;
 
 /// The bench behind a board's ports; the first error ends the run.
 struct Port<'a> {
     bench: &'a mut Bench,
-    desk: Option<&'a Desk>,
+    desk: &'a Desk,
+    ratings: &'a Ratings,
     error: Option<BenchError>,
 }
 
 impl ControlPort for Port<'_> {
     fn sample(&mut self, now: Instant) -> Sample {
-        let sample = self.bench.control_sample(now).unwrap_or_else(|error| {
+        let sample = self.bench.control_sample(now);
+        let sample = if self.bench.is_operated() {
+            sample.map(|sample| self.desk.permit(now).applied_to(sample))
+        } else {
+            sample
+        };
+        sample.unwrap_or_else(|error| {
             self.error = Some(error);
             let measured = Measurements { currents_a: Abc::default(), udc_v: 0.0, angle: Angle::ZERO };
             Sample {
@@ -37,11 +42,7 @@ impl ControlPort for Port<'_> {
                 acknowledge: 0,
                 hardware: None,
             }
-        });
-        match self.desk {
-            Some(desk) => sample.permitted(&desk.permit(now)),
-            None => sample,
-        }
+        })
     }
 
     fn enter(&mut self, safe: SafeState, now: Instant) {
@@ -53,10 +54,8 @@ impl ControlPort for Port<'_> {
     }
 
     fn report(&mut self, now: Instant, report: &Report) {
+        self.desk.tell(now, report);
         self.bench.control_report(now, *report);
-        if let Some(desk) = self.desk {
-            desk.tell(now, report);
-        }
     }
 
     fn leg_faults(&mut self) -> LegFaults {
@@ -83,102 +82,57 @@ impl PwmPort for Port<'_> {
     fn leg_faults(&mut self) -> LegFaults {
         self.bench.leg_faults()
     }
-}
 
-/// The supervisor at the end of the station's wires.
-struct HostLink<'a> {
-    supervisor: &'a mut dyn Supervisor,
-    outbound: SlotRequest,
-    /// When the slot began, in s.
-    t_s: f64,
-    turn: Option<anyhow::Result<Turn>>,
-}
-
-impl Carrier for HostLink<'_> {
-    fn receive(&mut self, _at: Instant) -> (Option<Frame>, Feedback) {
-        let turn = self.supervisor.slot(self.t_s, &self.outbound);
-        let answer = turn.as_ref().map_or_else(|_| SlotAnswer::default(), |turn| turn.answer);
-        self.turn = Some(turn);
-        (answer.frame, answer.feedback)
-    }
-
-    fn send(&mut self, _from: Instant, frame: Option<Frame>, switches: &Switches) {
-        self.outbound = SlotRequest { frame, switches: *switches };
+    fn leave(&mut self, now: Instant) -> bool {
+        self.bench.leave(now);
+        true
     }
 }
 
-/// The idle loop: the operator's slots and the protocol.
-struct Idle<'a> {
-    station: Station<'a, HostLink<'a>>,
-    slot: Slot,
-    rated: operator::Settings<'static>,
-    desk: &'a Desk,
-}
+impl OperatorPort for Port<'_> {
+    fn ask(&mut self, at: Instant) -> (Request, Feedback) {
+        self.bench.ask(at).unwrap_or_else(|error| {
+            self.error = Some(error);
+            (Request::idle(self.ratings), Feedback::default())
+        })
+    }
 
-impl<'a> Idle<'a> {
-    fn new(
-        tables: &'static Tables,
-        clock: &Clock,
-        desk: &'a Desk,
-        supervisor: &'a mut dyn Supervisor,
-    ) -> Self {
-        let link = HostLink { supervisor, outbound: SlotRequest::default(), t_s: 0.0, turn: None };
-        let slot_s = operator::SLOT_PERIODS as f32 * clock.control_s();
-        Self {
-            station: Station::new(&tables.ratings, desk, link),
-            slot: Slot::new(),
-            rated: operator::Settings::rated(&tables.ratings, slot_s, None),
-            desk,
+    fn tell(&mut self, from: Instant, status: &Status) {
+        if let Err(error) = self.bench.told(from, *status) {
+            self.error = Some(error);
         }
     }
-
-    fn run(&mut self, bench: &mut Bench, clock: &Clock) -> anyhow::Result<()> {
-        let Some(observed) = self.desk.observed() else { return Ok(()) };
-        self.station.carrier.t_s = bench.instant_s(observed.at);
-        let settings = self.station.settings(&self.rated);
-        self.slot.run(self.desk, &mut self.station, &settings, clock);
-        match self.station.carrier.turn.take() {
-            Some(turn) => super::follow(bench, observed.at, &turn?),
-            None => {}
-        }
-        Ok(())
-    }
 }
 
-/// Runs until the recording is complete; commanded by the bench's samples, or over the protocol by a supervisor.
+/// Runs until the recording is complete.
 pub fn run_on_host(
     name: &str,
     mut bench: Bench,
     tables: &'static Tables,
     settings: Settings,
     first_half_ticks: u32,
-    supervisor: Option<&mut dyn Supervisor>,
-) -> anyhow::Result<Recording> {
-    let (recorder, desk, clock) = (Recorder::new(), Desk::new(), settings.clock);
-    let mut idle = supervisor.map(|supervisor| Idle::new(tables, &clock, &desk, supervisor));
+    line: Option<Line>,
+) -> Result<Recording, BenchError> {
+    let recorder = Recorder::new();
+    let operator = operator::Settings::rated(&tables.ratings, slot_s(&settings.clock), line);
     let mut progress = Progress::new(name);
-    let mut tasks = Tasks::new(tables, settings, first_half_ticks).recorded_by(&recorder);
-    tasks.desk = idle.as_ref().map(|_| &desk);
-    let mut outcome = Ok(());
+    let tasks = Tasks::new(tables, settings, first_half_ticks).recorded_by(&recorder).commanded_by(operator);
     tasks.drive(&mut bench, |bench| {
-        if let Some(idle) = &mut idle {
-            outcome = idle.run(bench, &clock);
-        }
         progress.show(bench.progress());
-        outcome.is_ok()
+        true
     })?;
-    outcome?;
     let records = (0..).map_while(|index| recorder.read(index)).collect();
     Ok(super::record(bench, records))
 }
 
-/// Both tasks and the cells between them.
+/// Both tasks, the cells between them, and the operator's slot of the idle loop.
 pub struct Tasks<'a> {
+    tables: &'static Tables,
+    settings: Settings,
     control: ControlTask,
     pwm: PwmTask,
     shared: Shared<'a>,
-    /// Where the operator's permits come from; `None`: the bench's samples.
-    desk: Option<&'a Desk>,
+    operator: Option<operator::Settings<'a>>,
 }
 
 impl<'a> Tasks<'a> {
@@ -186,10 +140,12 @@ impl<'a> Tasks<'a> {
     pub fn new(tables: &'static Tables, settings: Settings, first_half_ticks: u32) -> Self {
         let first_control = Instant(settings.clock.control_ticks);
         Self {
+            tables,
+            settings,
             control: ControlTask::new(tables, settings, first_control),
             pwm: PwmTask::new(tables, settings, Instant(first_half_ticks)).after_halves_of(first_half_ticks),
             shared: Shared::new(),
-            desk: None,
+            operator: None,
         }
     }
 
@@ -199,16 +155,24 @@ impl<'a> Tasks<'a> {
         self
     }
 
+    /// The same with an operator, on a bench that has one.
+    pub fn commanded_by(mut self, operator: operator::Settings<'a>) -> Self {
+        self.operator = Some(operator);
+        self
+    }
+
     /// Until the bench's recording is complete, or nobody wants to see more of it.
     pub fn drive(
         mut self,
         bench: &mut Bench,
-        mut goes_on: impl FnMut(&mut Bench) -> bool,
+        mut goes_on: impl FnMut(&Bench) -> bool,
     ) -> Result<(), BenchError> {
+        let (desk, mut slot) = (Desk::new(), Slot::new());
         while !bench.is_done() {
             let (control_at, pwm_at) = (self.control.next_call(), self.pwm.next_call());
             let has_control = bench.has_control(control_at);
-            let mut port = Port { bench, desk: self.desk, error: None };
+            let operator = self.operator.as_ref().filter(|_| bench.is_operated());
+            let mut port = Port { bench, desk: &desk, ratings: &self.tables.ratings, error: None };
             // At equal instants the PWM interrupt comes first: it has the higher priority.
             if control_at.reached(pwm_at) || !has_control {
                 self.pwm.run(&mut port, &self.shared);
@@ -217,6 +181,10 @@ impl<'a> Tasks<'a> {
                     self.pwm.revise(&mut port, &self.shared);
                 }
                 self.control.run(&mut port, &self.shared);
+                // The idle loop goes on where the interrupt ends.
+                if let Some(operator) = operator {
+                    slot.run(&desk, &mut port, operator, &self.settings.clock);
+                }
             }
             if let Some(error) = port.error {
                 return Err(error);

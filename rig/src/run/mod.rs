@@ -12,53 +12,16 @@ pub use qemu::run_in_qemu;
 use crate::bench::Bench;
 use crate::trace::Recording;
 use indicatif::{ProgressBar, ProgressStyle};
-use tractive::link::{SlotAnswer, SlotRequest};
-use tractive::operator::SLOT_PERIODS;
 use tractive::recorder::Record;
-use tractive::time::{Clock, Instant};
+use tractive::time::Clock;
 
 /// The clock of the emulated board: 25 MHz ticks, control at 10 kHz. The host runs on the same.
 pub const CLOCK: Clock = Clock::new(25_000_000, 2_500);
 
-/// Who commands the drive over the protocol.
-pub trait Supervisor {
-    /// The slot that began at `t_s`, and what the slot before it sent and switched.
-    ///
-    /// # Errors
-    /// Ends the run.
-    fn slot(&mut self, t_s: f64, told: &SlotRequest) -> anyhow::Result<Turn>;
-
-    /// Whether a turn may take as long as somebody types.
-    fn is_typed(&self) -> bool {
-        false
-    }
-}
-
-/// A supervisor's turn.
-#[derive(Clone, Copy, Debug)]
-pub struct Turn {
-    /// For the drive.
-    pub answer: SlotAnswer,
-    /// The rotor's load from the next slot on, in N·m.
-    pub load_nm: f64,
-    /// Whether the run ends with this slot.
-    pub done: bool,
-}
-
-/// Does at the bench what a turn says; all of it at the next slot's beginning, whenever the slot was served.
-fn follow(bench: &mut Bench, at: Instant, turn: &Turn) {
-    let next = at.after(SLOT_PERIODS * CLOCK.control_ticks);
-    bench.load_from(next, turn.load_nm);
-    if turn.done {
-        bench.end_at(next);
-    }
-}
-
 /// What the bench saw, and what the drive's own recorder holds.
 fn record(bench: Bench, records: Vec<Record>) -> Recording {
     let recorded = records.into_iter().map(|record| (bench.instant_s(record.at), record)).collect();
-    let (rows, switches, edges, lead, tick_s) = bench.into_recording();
-    Recording { rows, switches, edges, lead, tick_s, recorded }
+    Recording { recorded, ..bench.into_recording() }
 }
 
 /// A bar on a terminal; in a pipe indicatif draws none.

@@ -1,7 +1,7 @@
 //! The drive in QEMU: the image's own interrupts, in lockstep with the bench over three FIFOs.
 
+use super::Progress;
 use super::emulator::{Emulator, emulate};
-use super::{Progress, Supervisor};
 use crate::bench::Bench;
 use crate::trace::Recording;
 use anyhow::{Context, Result, bail};
@@ -9,14 +9,8 @@ use tractive::drive::Report;
 use tractive::link::{self, Request, Setup};
 use tractive::modulation::Mode;
 
-/// Runs until the recording is complete; commanded by the bench's samples, or over the protocol by a supervisor.
-pub fn run_in_qemu(
-    name: &str,
-    mut bench: Bench,
-    setup: Setup,
-    emulator: &Emulator,
-    mut supervisor: Option<&mut dyn Supervisor>,
-) -> Result<Recording> {
+/// Runs until the recording is complete.
+pub fn run_in_qemu(name: &str, mut bench: Bench, setup: Setup, emulator: &Emulator) -> Result<Recording> {
     let (mut calls, mut records) = (Calls::default(), Vec::new());
     let mut progress = Progress::new(name);
     let outcome = emulate(emulator, |block, answers| {
@@ -40,14 +34,6 @@ pub fn run_in_qemu(
                 bench.play(at, half);
             }
             Request::Enter(at, safe) => bench.enter(at, safe),
-            Request::Slot(at, told) => {
-                let Some(supervisor) = &mut supervisor else {
-                    bail!("the firmware asks for commands although nobody commands it");
-                };
-                let turn = supervisor.slot(bench.instant_s(at), &told)?;
-                super::follow(&mut bench, at, &turn);
-                answers.slot(&turn.answer.to_block())?;
-            }
             Request::Recorded(record) => records.push(record),
             Request::End => return Ok(true),
             Request::Dead => bail!("the firmware stopped in a panic or a HardFault, gates off"),

@@ -1,10 +1,13 @@
 //! What is driven, and what is to be seen.
 
 mod characteristic;
+mod chopper;
 mod full_step;
+mod line;
 mod link_steps;
 mod load_steps;
 mod mode_borders;
+mod precharge;
 mod restart;
 mod reversal;
 mod script;
@@ -13,18 +16,19 @@ mod sweep;
 mod timing;
 
 use crate::analysis::Figures;
-use crate::bench::{self, Bench, Operator, Supply};
+use crate::bench::{self, Bench, LinePlan, Operator, Supply};
 use crate::machine::Machine;
 use crate::options::{On, RunOptions};
 use crate::plant::{Plant, PlantSettings, SpeedSource};
 use crate::report::Page;
-use crate::run::{self, CLOCK, Emulator, Supervisor};
+use crate::run::{self, CLOCK};
 use crate::trace::Recording;
 use anyhow::{Context, Result};
 use tractive::control::Gains;
 use tractive::drive::traction::Settings;
 use tractive::link::Setup;
 use tractive::modulation::Devices;
+use tractive::operator::Line;
 
 /// The usual lead, in s.
 const LEAD_S: f64 = 0.1;
@@ -51,6 +55,10 @@ pub trait Scenario {
     fn figure(&self) -> &'static str;
     /// What is driven.
     fn plan(&self, options: &RunOptions, machine: &Machine) -> Plan;
+    /// The line side, where the scenario is about it; otherwise the link is stiff and the drive is commanded directly.
+    fn line(&self, _options: &RunOptions, _machine: &Machine) -> Option<LinePlan> {
+        None
+    }
     /// The figures to report.
     fn figures(&self, recording: &Recording, options: &RunOptions, machine: &Machine) -> Figures;
     /// The plots to draw.
@@ -69,6 +77,8 @@ pub fn all() -> Vec<Box<dyn Scenario>> {
         Box::new(reversal::Reversal),
         Box::new(restart::Restart),
         Box::new(link_steps::LinkSteps),
+        Box::new(precharge::Precharge),
+        Box::new(chopper::Chopper),
         Box::new(timing::Timing),
     ]
 }
@@ -88,26 +98,12 @@ pub fn find(name: &str) -> Result<Box<dyn Scenario>> {
 /// Drives a scenario.
 pub fn drive(scenario: &dyn Scenario, options: &RunOptions, machine: &Machine) -> Result<Recording> {
     let plan = scenario.plan(options, machine);
-    let speed = plan.speed.iter().map(|(t_s, rpm)| (t_s + plan.lead_s, *rpm)).collect();
-    run_plan(scenario.name(), plan, SpeedSource::profile(speed), None, options, machine)
-}
-
-/// Runs a plan with a rotor; a supervisor takes the place of the plan's operator.
-pub(crate) fn run_plan(
-    name: &str,
-    plan: Plan,
-    speed: SpeedSource,
-    supervisor: Option<&mut dyn Supervisor>,
-    options: &RunOptions,
-    machine: &Machine,
-) -> Result<Recording> {
     let ticks = |microseconds: f64| (microseconds * 1e-6 * f64::from(CLOCK.ticks_per_s)).round() as u32;
     let setup = Setup {
         min_pulse_ticks: ticks(options.min_pulse_us),
         // What the firmware compensates.
         dead_time_ticks: if options.uncompensated { 0 } else { ticks(options.dead_time_us) },
         pwm_delay_ticks: ticks(options.pwm_delay_us),
-        commanded: supervisor.is_some(),
     };
     let devices = Devices::new(
         setup.min_pulse_ticks,
@@ -116,7 +112,7 @@ pub(crate) fn run_plan(
         &CLOCK,
     );
     let parameters = &machine.folder.parameters;
-    let plant = plant(speed, options, machine);
+    let plant = plant(&plan, options, machine);
     let first_half_ticks = devices.shortest_half_ticks + setup.pwm_delay_ticks;
     let bench = Bench::new(
         plant,
@@ -135,23 +131,30 @@ pub(crate) fn run_plan(
             injection: None,
         },
     );
+    let line_plan = scenario.line(options, machine);
+    let line = line_plan.as_ref().map(|plan| {
+        let link = &plan.link;
+        let seconds = |ohm: f64| (ohm * link.capacitance_f) as f32;
+        Line::rated(&machine.tables.ratings, seconds(link.precharge_ohm), seconds(link.discharge_ohm))
+    });
+    let bench = match line_plan {
+        Some(plan) => bench.with_line(plan),
+        None => bench,
+    };
     match options.on {
         On::Host => {
             let settings = Settings { clock: CLOCK, devices, gains: Gains::DEFAULT };
-            run::run_on_host(name, bench, machine.tables, settings, first_half_ticks, supervisor)
+            Ok(run::run_on_host(scenario.name(), bench, machine.tables, settings, first_half_ticks, line)?)
         }
-        On::Qemu => {
-            let patient = supervisor.as_ref().is_some_and(|supervisor| supervisor.is_typed());
-            let emulator = Emulator { patient, ..options.emulator()? };
-            run::run_in_qemu(name, bench, setup, &emulator, supervisor)
-        }
+        On::Qemu => run::run_in_qemu(scenario.name(), bench, setup, &options.emulator()?),
     }
 }
 
-fn plant(speed: SpeedSource, options: &RunOptions, machine: &Machine) -> Plant {
+fn plant(plan: &Plan, options: &RunOptions, machine: &Machine) -> Plant {
+    let speed = plan.speed.iter().map(|(t_s, rpm)| (t_s + plan.lead_s, *rpm)).collect();
     Plant::new(
         &machine.folder,
-        speed,
+        SpeedSource::profile(speed),
         &PlantSettings {
             flux_scale: 1.0 + options.map_error / 100.0,
             resistance_scale: 1.0 + options.rs_error / 100.0,

@@ -1,4 +1,4 @@
-//! The exchange with the rig, over four semihosting files. A real board has nothing of this: `cargo xtask timing` knows
+//! The exchange with the rig, over three semihosting files. A real board has nothing of this: `cargo xtask timing` knows
 //! these functions by their module and does not count them, so they stay out of line and take what they tell by reference.
 
 mod dual;
@@ -9,19 +9,18 @@ use super::{RECORDER, stop};
 use crate::board::Sample;
 use crate::drive::Report;
 use crate::frames::Abc;
-use crate::link::{self, BLOCK_BYTES, Block, Request, Setup, SlotAnswer, SlotRequest};
+use crate::link::{self, BLOCK_BYTES, Block, Request, Setup};
 use crate::modulation::CarrierPeriod;
 use crate::protection::SafeState;
 use crate::time::Instant;
 use core::sync::atomic::{AtomicU32, Ordering};
 use cortex_m_semihosting::syscall;
 
-/// File handles of the link: requests, answers to control, to PWM, to the idle loop.
-static FILES: [AtomicU32; 4] = [const { AtomicU32::new(0) }; 4];
+/// File handles of the link: requests, answers to control, answers to PWM.
+static FILES: [AtomicU32; 3] = [const { AtomicU32::new(0) }; 3];
 const REQUESTS: usize = 0;
 const CONTROL_ANSWERS: usize = 1;
 const PWM_ANSWERS: usize = 2;
-const SLOT_ANSWERS: usize = 3;
 
 /// Opens the files and fetches the set-up.
 #[inline(never)]
@@ -34,9 +33,9 @@ pub fn open() -> Setup {
 fn open_files() {
     const READ: usize = 1;
     const WRITE: usize = 5;
-    let names =
-        [(c"requests", WRITE), (c"control-answers", READ), (c"pwm-answers", READ), (c"slot-answers", READ)];
-    for (file, (name, mode)) in FILES.iter().zip(names) {
+    for (file, (name, mode)) in
+        FILES.iter().zip([(c"requests", WRITE), (c"control-answers", READ), (c"pwm-answers", READ)])
+    {
         // SAFETY: SYS_OPEN reads a NUL-terminated name of the given length, which lives for the program.
         let handle = unsafe { syscall!(OPEN, name.as_ptr(), mode, name.count_bytes()) };
         if handle == usize::MAX {
@@ -91,13 +90,6 @@ pub fn report(now: Instant, report: &Report) {
 #[inline(never)]
 pub fn enter(safe: SafeState, now: Instant) {
     send(&Request::Enter(now, safe).to_block());
-}
-
-/// A slot of the operator's, in the idle loop.
-#[inline(never)]
-pub fn slot(at: Instant, request: &SlotRequest) -> SlotAnswer {
-    send(&Request::Slot(at, *request).to_block());
-    SlotAnswer::from_block(&receive(SLOT_ANSWERS))
 }
 
 /// The processor stops, gates off.
