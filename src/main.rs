@@ -20,6 +20,8 @@ mod firmware {
     use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
     use tractive::machine::{BUILT_IN, BuiltIn};
     use tractive::modulation::Devices;
+    use tractive::operator::{self, Line, Slot, slot_s};
+    use tractive::protocol::Station;
     use tractive::time::Instant;
 
     static SHARED: Shared = Shared::recorded_by(&qemu::RECORDER);
@@ -47,8 +49,20 @@ mod firmware {
         DEAD_TIME_TICKS.store(setup.dead_time_ticks, Ordering::Relaxed);
         let first_half_ticks = settings().devices.shortest_half_ticks.saturating_add(setup.pwm_delay_ticks);
         FIRST_HALF_TICKS.store(first_half_ticks, Ordering::Relaxed);
+        let line =
+            setup.line.map(|times| Line::rated(&BUILT_IN.ratings, times.precharge_s, times.discharge_s));
+        let operator = operator::Settings::rated(&BUILT_IN.ratings, slot_s(&CLOCK), line);
+        let station = setup.over_protocol.then(|| Station::new(&BUILT_IN.ratings));
+        let (mut slot, mut idle) = (Slot::new(), qemu::Idle { station });
         qemu::start(first_half_ticks);
         loop {
+            if line.is_some() || setup.over_protocol {
+                let settings = match &idle.station {
+                    Some(station) => station.settings(&operator),
+                    None => operator,
+                };
+                slot.run(&qemu::DESK, &mut idle, &settings, &CLOCK);
+            }
             qemu::idle();
         }
     }

@@ -43,7 +43,7 @@ fn the_drive_goes_from_standstill_to_2000_rpm_and_back() {
     states.dedup();
     assert_eq!(states.first().copied(), Some("self_test"));
     assert_eq!(states.last().copied(), Some("ready"));
-    assert!(states.windows(3).any(|three| three == ["ready", "enabled", "running"]), "{states:?}");
+    assert!(states.windows(3).any(|three| three == ["charged", "enabled", "running"]), "{states:?}");
     let trace = rows(&out.path().join("trace.csv"));
     for told in telemetry.iter().filter(|row| !row["speed_rpm"].is_empty()).step_by(37) {
         let t_s: f64 = told["t_s"].parse().unwrap();
@@ -74,10 +74,10 @@ fn hostile_frames_are_rejected_and_counted_and_silence_ends_the_drive() {
     // The machine itself had no torque while nobody spoke, and no pulses after the time-out to off.
     for row in rows(&out.path().join("trace.csv")) {
         let [t_s, torque_nm] = ["t_s", "te_nm"].map(|name| row[name].parse::<f64>().unwrap());
-        if (2.25..2.3).contains(&t_s) || (2.75..3.9).contains(&t_s) {
+        if (4.25..4.3).contains(&t_s) || (4.75..5.9).contains(&t_s) {
             assert!(torque_nm.abs() < 25.0, "{t_s}: {torque_nm}");
         }
-        if (3.2..3.9).contains(&t_s) {
+        if (5.2..5.9).contains(&t_s) {
             assert_eq!(row["mode"], "off", "{t_s}");
         }
     }
@@ -129,7 +129,7 @@ fn typed(text: &str, out: &Path) -> Output {
 fn lines_are_taken_from_standard_input() {
     let out = tempfile::tempdir().unwrap();
     let output = typed(
-        "wait 0.2\nenable\nexpect state enabled\ntorque 100\nexpect torque_nm 100 within 1\n",
+        "wait 0.2\ncharge\nwait 2\nenable\nexpect state enabled\ntorque 100\nexpect torque_nm 100 within 1\n",
         out.path(),
     );
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));

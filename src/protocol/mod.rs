@@ -32,7 +32,7 @@ pub use receiver::{Content, Receiver, Reject};
 pub use sender::Sender;
 pub use session::{Session, Told};
 pub use signal::{Kind, OutOfRange, Payload, Signal};
-pub use station::{Carrier, Station};
+pub use station::Station;
 pub use telemetry::{
     COUNTERS, CURRENTS, Counts, FAULT_LIMIT, FAULT_VALUE, Listening, MOTION, Measured, Outcome,
     PARAMETER_ANSWER, ParameterAnswer, STATUS, StatusFrame, VOLTAGES, trip_frames, trip_number,

@@ -1,58 +1,47 @@
-//! The protocol as the operator's counterpart: whatever carries the frames, a bus or the link to the rig.
+//! The drive's end of the protocol beside the operator: what the observations become in telemetry, the parameters in settings.
 
 use super::frame::Frame;
 use super::parameters::{Parameters, RPM_PER_RAD_S};
 use super::session::{Session, Told};
 use super::telemetry::Measured;
 use crate::machine::Ratings;
-use crate::operator::{Desk, Feedback, Observation, OperatorPort, Request, Settings, Status, Switches};
-use crate::time::Instant;
+use crate::modulation::Mode;
+use crate::operator::{Observation, Request, Settings, Status};
 
-/// What carries frames, and what else the idle loop asks of a board.
-pub trait Carrier {
-    /// A frame that has come, and what the board says, in the slot that began at `at`.
-    fn receive(&mut self, at: Instant) -> (Option<Frame>, Feedback);
-    /// A frame to send, and what is to be switched, from `from` on.
-    fn send(&mut self, from: Instant, frame: Option<Frame>, switches: &Switches);
-}
-
-/// The drive's end of the protocol, at a carrier.
-pub struct Station<'a, C> {
+/// The drive's end of the protocol. A board calls [`Station::listen`] where the operator asks, [`Station::tell`] where it tells.
+#[derive(Clone, Copy, Debug)]
+pub struct Station {
     session: Session,
     ratings: &'static Ratings,
-    desk: &'a Desk,
     /// The slot's observation.
     observed: Option<Observation>,
-    /// The carrier.
-    pub carrier: C,
 }
 
-impl<'a, C: Carrier> Station<'a, C> {
+impl Station {
     /// At power-up.
-    pub const fn new(ratings: &'static Ratings, desk: &'a Desk, carrier: C) -> Self {
-        Self { session: Session::new(ratings), ratings, desk, observed: None, carrier }
+    pub const fn new(ratings: &'static Ratings) -> Self {
+        Self { session: Session::new(ratings), ratings, observed: None }
     }
 
     /// The operator's settings with the parameters that are in force.
-    pub fn settings(&self, settings: &Settings<'static>) -> Settings<'static> {
+    pub fn settings<'a>(&self, settings: &Settings<'a>) -> Settings<'a> {
         let Parameters { torque_slew_nm_s, torque_jerk_nm_s2, .. } = *self.session.parameters();
         Settings { slew_nm_s: torque_slew_nm_s, jerk_nm_s2: torque_jerk_nm_s2, ..*settings }
     }
-}
 
-impl<C: Carrier> OperatorPort for Station<'_, C> {
-    fn ask(&mut self, at: Instant) -> (Request, Feedback) {
-        self.observed = self.desk.observed();
-        let (frame, feedback) = self.carrier.receive(at);
-        (self.session.listen(frame.as_ref()), feedback)
+    /// What is asked in a slot, after a frame that may have come; and what the drive said of itself at the slot's beginning.
+    pub fn listen(&mut self, observed: Option<Observation>, frame: Option<&Frame>) -> Request {
+        self.observed = observed;
+        self.session.listen(frame)
     }
 
-    fn tell(&mut self, from: Instant, status: &Status) {
-        let measured =
-            self.observed.map_or(Measured::default(), |observed| measured(&observed, self.ratings));
-        let mode = self.observed.map_or(crate::modulation::Mode::Off, |observed| observed.mode);
-        let frame = self.session.tell(&Told { status, measured: &measured, mode });
-        self.carrier.send(from, frame, &status.switches);
+    /// The frame to send after the slot, if one is due.
+    pub fn tell(&mut self, status: &Status) -> Option<Frame> {
+        let (measured, mode) = match &self.observed {
+            Some(observed) => (measured(observed, self.ratings), observed.mode),
+            None => (Measured::default(), Mode::Off),
+        };
+        self.session.tell(&Told { status, measured: &measured, mode })
     }
 }
 

@@ -1,4 +1,4 @@
-//! The emulator and its three FIFOs, whichever firmware runs in it.
+//! The emulator and its four FIFOs, whichever firmware runs in it.
 
 use anyhow::{Context, Result, bail};
 use std::fs::{File, OpenOptions};
@@ -21,6 +21,8 @@ pub struct Emulator {
     pub arguments: Vec<String>,
     /// Where the mode of every interrupt is written, a line `control,MODE` or `pwm,MODE` each.
     pub calls: Option<PathBuf>,
+    /// Whether the run may stand still for as long as somebody types.
+    pub patient: bool,
 }
 
 /// Two to this many nanoseconds of virtual time per instruction: 8 ns, 125 MIPS, nearest to the real part.
@@ -37,7 +39,7 @@ pub(crate) fn emulate(
 ) -> Result<()> {
     let folder = tempfile::tempdir().context("no temporary folder for the link")?;
     let mut link = Link::open(folder.path())?;
-    let watch = Watch::start(spawn(emulator, folder.path())?, link.requests.try_clone()?);
+    let watch = Watch::start(spawn(emulator, folder.path())?, link.requests.try_clone()?, emulator.patient);
     let mut serve = || -> Result<()> {
         loop {
             let block = link.receive()?;
@@ -59,6 +61,7 @@ pub(crate) fn emulate(
 pub(crate) struct Answers {
     control: File,
     pwm: File,
+    idle: File,
 }
 
 impl Answers {
@@ -71,9 +74,14 @@ impl Answers {
     pub(crate) fn pwm(&mut self, block: &Block) -> Result<()> {
         Ok(self.pwm.write_all(&bytes(block))?)
     }
+
+    /// To the idle loop.
+    pub(crate) fn idle(&mut self, block: &Block) -> Result<()> {
+        Ok(self.idle.write_all(&bytes(block))?)
+    }
 }
 
-/// The three FIFOs. Both ends of each are held open, so that nobody waits for the other to open its end.
+/// The four FIFOs. Both ends of each are held open, so that nobody waits for the other to open its end.
 struct Link {
     requests: File,
     answers: Answers,
@@ -93,7 +101,11 @@ impl Link {
             .with_context(|| format!("cannot make the FIFO {}", path.display()))?;
             Ok(OpenOptions::new().read(true).write(true).open(&path)?)
         };
-        let answers = Answers { control: open("control-answers")?, pwm: open("pwm-answers")? };
+        let answers = Answers {
+            control: open("control-answers")?,
+            pwm: open("pwm-answers")?,
+            idle: open("idle-answers")?,
+        };
         Ok(Self { requests: open("requests")?, answers })
     }
 
@@ -141,10 +153,10 @@ struct Watch {
 }
 
 impl Watch {
-    fn start(child: Child, requests: File) -> Self {
+    fn start(child: Child, requests: File, patient: bool) -> Self {
         let (blocks, done) = (Arc::new(AtomicU64::new(0)), Arc::new(AtomicBool::new(false)));
         let (seen, stop) = (Arc::clone(&blocks), Arc::clone(&done));
-        let thread = std::thread::spawn(move || watch(child, requests, &seen, &stop));
+        let thread = std::thread::spawn(move || watch(child, requests, patient, &seen, &stop));
         Self { blocks, done, thread }
     }
 
@@ -157,7 +169,13 @@ impl Watch {
     }
 }
 
-fn watch(mut child: Child, mut requests: File, blocks: &AtomicU64, stop: &AtomicBool) -> String {
+fn watch(
+    mut child: Child,
+    mut requests: File,
+    patient: bool,
+    blocks: &AtomicU64,
+    stop: &AtomicBool,
+) -> String {
     let pause = Duration::from_millis(5);
     let (mut last, mut silent) = (0, Duration::ZERO);
     while let Ok(None) = child.try_wait() {
@@ -165,7 +183,7 @@ fn watch(mut child: Child, mut requests: File, blocks: &AtomicU64, stop: &Atomic
         let now = blocks.load(Ordering::Relaxed);
         silent = if now == last { silent + pause } else { Duration::ZERO };
         last = now;
-        if stop.load(Ordering::Relaxed) || silent > SILENCE {
+        if stop.load(Ordering::Relaxed) || (silent > SILENCE && !patient) {
             let _ = child.kill();
         }
     }

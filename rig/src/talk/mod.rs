@@ -15,15 +15,11 @@ pub use supervisor::Talk;
 use crate::analysis::Figures;
 use crate::machine::Machine;
 use crate::options::RunOptions;
-use crate::plant::SpeedSource;
-use crate::scenario::{self, Plan};
+use crate::scenario;
 use crate::trace::{self, Recording};
 use anyhow::Result;
 use std::path::{Path, PathBuf};
-use tractive::control::Demand;
 
-/// Longest run, in s.
-const LONGEST_S: f64 = 1e5;
 /// Step of trace.csv unless told otherwise, in s.
 const TRACE_STEP_S: f64 = 1e-3;
 
@@ -61,16 +57,8 @@ pub fn run(options: &TalkOptions) -> Result<Outcome> {
     };
     let machine = Machine::load(options.run.machine())?;
     let mut talk = Talk::new(lines, options.inertia, machine.folder.parameters.max_torque_nm);
-    let plan = Plan {
-        lead_s: 0.0,
-        duration_s: LONGEST_S,
-        speed: Vec::new(),
-        link: Vec::new(),
-        operator: Box::new(|_: f64| (Demand::default(), false)),
-    };
-    let rotor = SpeedSource::Inertia { inertia_kg_m2: options.inertia, load_nm: 0.0 };
     let run = RunOptions { dt: Some(options.run.dt.unwrap_or(TRACE_STEP_S)), ..options.run.clone() };
-    let recording = scenario::run_plan("talk", plan, rotor, Some(&mut talk), &run, &machine)?;
+    let recording = scenario::drive_supervised("talk", &mut talk, options.inertia, &run, &machine)?;
     let figures = figures(&talk, &recording);
     Ok(Outcome { talk, recording, figures })
 }

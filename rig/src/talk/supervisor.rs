@@ -8,9 +8,6 @@ use super::speed_loop::SpeedLoop;
 use crate::run::{Supervisor, Turn};
 use anyhow::{Result, anyhow};
 use std::fmt::Write as _;
-use tractive::frames::Abc;
-use tractive::link::{SlotAnswer, SlotRequest};
-use tractive::operator::{Configuration, Feedback, Switches};
 use tractive::protocol::{Command, Frame, ParameterRequest};
 
 /// Slots for which a level stands whose edge counts: more than may be lost in a row.
@@ -105,15 +102,6 @@ impl Talk {
         let bytes = frame.data.iter().take(usize::from(frame.length));
         let bytes: String = bytes.map(|byte| format!("{byte:02X}")).collect();
         let _ = writeln!(self.frames, "({t_s:.6}) can0 {:03X}#{bytes} {direction}", frame.id);
-    }
-
-    fn hear(&mut self, t_s: f64, told: &SlotRequest) {
-        let Some(frame) = &told.frame else { return };
-        self.received += 1;
-        self.log(t_s, frame, 'R');
-        if self.listener.receive(frame) {
-            self.rows.push(self.listener.row(t_s));
-        }
     }
 
     /// Does the lines that are due.
@@ -243,25 +231,16 @@ impl Talk {
     }
 }
 
-/// The wires of a board that has nothing to object; its contactors follow at once.
-fn feedback(switches: &Switches) -> Feedback {
-    Feedback {
-        precharge_closed: switches.precharge,
-        main_closed: switches.main,
-        driver_ready: true,
-        enable_input: true,
-        sensor_alive: true,
-        position_known: true,
-        offsets_a: Abc::default(),
-        configuration: Configuration::Good,
-        parameters_open: false,
-        hardware: None,
-    }
-}
-
 impl Supervisor for Talk {
-    fn slot(&mut self, t_s: f64, told: &SlotRequest) -> Result<Turn> {
-        self.hear(t_s, told);
+    fn hear(&mut self, t_s: f64, frame: &Frame) {
+        self.received += 1;
+        self.log(t_s, frame, 'R');
+        if self.listener.receive(frame) {
+            self.rows.push(self.listener.row(t_s));
+        }
+    }
+
+    fn slot(&mut self, t_s: f64) -> Result<Turn> {
         let done = self.expectations;
         let waited = self.lines.are_typed() && t_s + DUE_S >= self.wait_until_s;
         if waited && self.slot > 0 {
@@ -282,8 +261,7 @@ impl Supervisor for Talk {
             self.log(t_s, frame, 'T');
         }
         self.slot += 1;
-        let answer = SlotAnswer { frame, feedback: feedback(&told.switches) };
-        Ok(Turn { answer, load_nm: self.load_nm, done: self.ended })
+        Ok(Turn { frame, load_nm: self.load_nm, done: self.ended })
     }
 
     fn is_typed(&self) -> bool {
