@@ -14,7 +14,7 @@ use tractive::operator::{self, Desk, Feedback, Line, OperatorPort, Request, Slot
 use tractive::protection::{LegFaults, SafeState};
 use tractive::protocol::Station;
 use tractive::recorder::Recorder;
-use tractive::time::Instant;
+use tractive::time::{Clock, Instant};
 
 /// The bench behind a board's ports; the first error ends the run.
 struct Port<'a, 'w> {
@@ -87,13 +87,13 @@ impl PwmPort for Port<'_, '_> {
         self.bench.enter(now, safe);
     }
 
-    fn leg_faults(&mut self) -> LegFaults {
-        self.bench.leg_faults()
-    }
-
     fn leave(&mut self, now: Instant) -> bool {
         self.bench.leave(now);
         true
+    }
+
+    fn leg_faults(&mut self) -> LegFaults {
+        self.bench.leg_faults()
     }
 }
 
@@ -133,27 +133,26 @@ pub fn run_on_host(
     supervisor: Option<&mut dyn Supervisor>,
 ) -> anyhow::Result<Recording> {
     let recorder = Recorder::new();
-    let operator = operator::Settings::rated(&tables.ratings, slot_s(&settings.clock), line);
     let mut progress = Progress::new(name);
-    let mut tasks =
-        Tasks::new(tables, settings, first_half_ticks).recorded_by(&recorder).commanded_by(operator);
+    let mut tasks = Tasks::new(tables, settings, first_half_ticks).recorded_by(&recorder).operated_on(line);
     tasks.wire = supervisor.map(|supervisor| Wire { station: Station::new(&tables.ratings), supervisor });
     tasks.drive(&mut bench, |bench| {
         progress.show(bench.progress());
         true
     })?;
     let records = (0..).map_while(|index| recorder.read(index)).collect();
-    Ok(super::record(bench, records))
+    Ok(bench.into_recording(records))
 }
 
-/// Both tasks, the cells between them, and the operator's slot of the idle loop.
+/// Both tasks and the cells between them.
 pub struct Tasks<'a> {
-    tables: &'static Tables,
-    settings: Settings,
     control: ControlTask,
     pwm: PwmTask,
     shared: Shared<'a>,
-    operator: Option<operator::Settings<'a>>,
+    desk: Desk,
+    slot: Slot,
+    operator: operator::Settings<'static>,
+    clock: Clock,
     /// Over the protocol, if there is a supervisor.
     wire: Option<Wire<'a>>,
 }
@@ -163,14 +162,21 @@ impl<'a> Tasks<'a> {
     pub fn new(tables: &'static Tables, settings: Settings, first_half_ticks: u32) -> Self {
         let first_control = Instant(settings.clock.control_ticks);
         Self {
-            tables,
-            settings,
             control: ControlTask::new(tables, settings, first_control),
             pwm: PwmTask::new(tables, settings, Instant(first_half_ticks)).after_halves_of(first_half_ticks),
             shared: Shared::new(),
-            operator: None,
+            desk: Desk::new(),
+            slot: Slot::new(),
+            operator: operator::Settings::rated(&tables.ratings, slot_s(&settings.clock), None),
+            clock: settings.clock,
             wire: None,
         }
+    }
+
+    /// The same with an operator who switches the line side, if the bench has one to ask.
+    pub fn operated_on(mut self, line: Option<Line>) -> Self {
+        self.operator.line = line;
+        self
     }
 
     /// The same with a flight recorder.
@@ -179,25 +185,17 @@ impl<'a> Tasks<'a> {
         self
     }
 
-    /// The same with an operator, on a bench that has one.
-    pub fn commanded_by(mut self, operator: operator::Settings<'a>) -> Self {
-        self.operator = Some(operator);
-        self
-    }
-
     /// Until the bench's recording is complete, or nobody wants to see more of it.
     pub fn drive(mut self, bench: &mut Bench, mut goes_on: impl FnMut(&Bench) -> bool) -> anyhow::Result<()> {
-        let (desk, mut slot) = (Desk::new(), Slot::new());
         while !bench.is_done() {
             let (control_at, pwm_at) = (self.control.next_call(), self.pwm.next_call());
             let has_control = bench.has_control(control_at);
-            let operator = self.operator.filter(|_| bench.is_operated());
-            let operator = operator.map(|operator| match &self.wire {
-                Some(wire) => wire.station.settings(&operator),
-                None => operator,
-            });
-            let ratings = &self.tables.ratings;
-            let mut port = Port { bench, desk: &desk, ratings, wire: self.wire.as_mut(), error: None };
+            let operator = match &self.wire {
+                Some(wire) => wire.station.settings(&self.operator),
+                None => self.operator,
+            };
+            let (desk, ratings) = (&self.desk, self.operator.ratings);
+            let mut port = Port { bench, desk, ratings, wire: self.wire.as_mut(), error: None };
             // At equal instants the PWM interrupt comes first: it has the higher priority.
             if control_at.reached(pwm_at) || !has_control {
                 self.pwm.run(&mut port, &self.shared);
@@ -207,8 +205,8 @@ impl<'a> Tasks<'a> {
                 }
                 self.control.run(&mut port, &self.shared);
                 // The idle loop goes on where the interrupt ends.
-                if let Some(operator) = operator {
-                    slot.run(&desk, &mut port, &operator, &self.settings.clock);
+                if port.bench.is_operated() {
+                    self.slot.run(&self.desk, &mut port, &operator, &self.clock);
                 }
             }
             if let Some(error) = port.error {

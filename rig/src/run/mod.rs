@@ -10,11 +10,9 @@ pub use host::{Tasks, run_on_host};
 pub use qemu::run_in_qemu;
 
 use crate::bench::Bench;
-use crate::trace::Recording;
 use indicatif::{ProgressBar, ProgressStyle};
 use tractive::operator::SLOT_PERIODS;
 use tractive::protocol::Frame;
-use tractive::recorder::Record;
 use tractive::time::{Clock, Instant};
 
 /// The clock of the emulated board: 25 MHz ticks, control at 10 kHz. The host runs on the same.
@@ -58,12 +56,6 @@ fn turn(supervisor: &mut dyn Supervisor, bench: &mut Bench, at: Instant) -> anyh
         bench.end_at(next);
     }
     Ok(turn.frame)
-}
-
-/// What the bench saw, and what the drive's own recorder holds.
-fn record(bench: Bench, records: Vec<Record>) -> Recording {
-    let recorded = records.into_iter().map(|record| (bench.instant_s(record.at), record)).collect();
-    Recording { recorded, ..bench.into_recording() }
 }
 
 /// A bar on a terminal; in a pipe indicatif draws none.
