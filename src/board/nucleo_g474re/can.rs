@@ -4,7 +4,6 @@
 //! filters, two receive FIFOs and a transmit FIFO of three elements each, 18 words an element. Only the protocol's own identifiers
 //! pass the filters; remote frames and 29-bit identifiers never do.
 
-use super::registers::Registers;
 use super::start::{StartError, Wait};
 use crate::protocol::{Frame, TO_DRIVE};
 use stm32_metapac as pac;
@@ -94,10 +93,10 @@ impl Can {
         Self { can, ram, health: Health { dropped: 0, bus_offs: 0 }, waits_ms: None }
     }
 
-    /// Clock, timing, filters; then it joins the bus. Its pins are configured with the inputs.
-    pub fn configure(&self, registers: &Registers, wait: &mut dyn Wait) -> Result<(), StartError> {
-        registers.rcc.ccipr().modify(|w| w.set_fdcansel(Fdcansel::HSE));
-        registers.rcc.apb1enr1().modify(|w| w.set_fdcanen(true));
+    /// Clock, timing, filters; then it joins the bus. Its pins follow, so that nothing dominant is sent before.
+    pub fn configure(&self, rcc: &pac::rcc::Rcc, wait: &mut dyn Wait) -> Result<(), StartError> {
+        rcc.ccipr().modify(|w| w.set_fdcansel(Fdcansel::HSE));
+        rcc.apb1enr1().modify(|w| w.set_fdcanen(true));
         let can = self.can;
         can.cccr().modify(|w| w.set_init(true));
         wait.until(&mut || can.cccr().read().init()).or(Err(StartError::Can))?;
