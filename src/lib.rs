@@ -30,6 +30,7 @@ pub mod link;
 pub mod machine;
 pub mod modulation;
 pub mod nine_switch;
+pub mod operator;
 pub mod protection;
 pub mod recorder;
 pub mod time;

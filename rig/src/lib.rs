@@ -8,6 +8,7 @@
 pub mod analysis;
 pub mod bench;
 pub mod bound;
+pub mod campaign;
 pub mod columns;
 pub mod distortion;
 pub mod figures;
@@ -21,6 +22,7 @@ pub mod points;
 pub mod report;
 pub mod run;
 pub mod scenario;
+pub mod sensor_faults;
 pub mod trace;
 pub mod verdict;
 pub mod zs9;

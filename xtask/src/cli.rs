@@ -68,6 +68,9 @@ pub struct TimingArgs {
     /// As one JSON object
     #[arg(long)]
     pub json: bool,
+    /// Take the numbers into docs/cost.md and sizes.toml
+    #[arg(long)]
+    pub write: bool,
     /// Say where the instructions go: this many functions of each interrupt
     #[arg(long, value_name = "FUNCTIONS", num_args = 0..=1, default_missing_value = "20", conflicts_with = "json")]
     pub profile: Option<usize>,

@@ -3,7 +3,7 @@
 use super::Tick;
 use crate::plant::Leg;
 use tractive::modulation::{CarrierPeriod, Mode};
-use tractive::protection::SafeState;
+use tractive::protection::{LegFaults, SafeState};
 
 /// A gate edge: device 0 ..= 5 is uh ul vh vl wh wl.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -18,6 +18,20 @@ pub struct Edge {
 
 /// Names of the gates, in the order of [`Edge::gate`].
 pub const GATES: [&str; 6] = ["uh", "ul", "vh", "vl", "wh", "wl"];
+
+/// What is wrong with a gate.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stuck {
+    /// Its order is on for good; its driver still turns the device off where it desaturates.
+    On,
+    /// It is off for good.
+    Off,
+    /// Its device has failed and conducts for good.
+    Shorted,
+}
+
+/// How long a leg's output may be away from where it should be before its monitor tells, in ticks (10 µs).
+const MONITOR_TICKS: Tick = 250;
 
 /// What a leg is told to do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -47,6 +61,11 @@ pub struct Inverter {
     /// Next toggle of each leg within the half.
     toggles: [Option<Tick>; 3],
     safe: Option<SafeState>,
+    /// A gate that no longer does what it is told.
+    stuck: Option<(u8, Stuck)>,
+    /// Since when a leg's output is not where it should be.
+    astray_since: Option<Tick>,
+    found: LegFaults,
     edges: Vec<Edge>,
 }
 
@@ -61,6 +80,9 @@ impl Inverter {
             half_start: 0,
             toggles: [None; 3],
             safe: None,
+            stuck: None,
+            astray_since: None,
+            found: LegFaults::default(),
             edges: Vec::new(),
         }
     }
@@ -103,7 +125,7 @@ impl Inverter {
         }
     }
 
-    /// The safe state takes over, for good.
+    /// The safe state takes over, until it is left.
     pub fn enter(&mut self, safe: SafeState, tick: Tick) {
         self.safe = Some(safe);
         self.toggles = [None; 3];
@@ -111,8 +133,17 @@ impl Inverter {
             let order = match safe {
                 SafeState::GatesOff => Order::Off,
                 SafeState::ShortCircuit => Order::Lower,
+                SafeState::UpperShortCircuit => Order::Upper,
             };
             self.order(phase, order, tick);
+        }
+    }
+
+    /// The safe state is left: all gates off, until the next half takes over.
+    pub fn leave(&mut self, tick: Tick) {
+        self.safe = None;
+        for phase in 0..3 {
+            self.order(phase, Order::Off, tick);
         }
     }
 
@@ -137,8 +168,68 @@ impl Inverter {
         }
     }
 
+    /// Something is wrong with a gate from now on.
+    pub fn stick(&mut self, gate: u8, stuck: Stuck) {
+        self.stuck = Some((gate, stuck));
+        let leg = &self.legs[usize::from(gate / 2)];
+        if if gate.is_multiple_of(2) { leg.lower_on } else { leg.upper_on } {
+            self.turns_on(gate ^ 1);
+        }
+    }
+
+    /// A device is turned on. Where the other one of its leg conducts, the drivers see their devices desaturate, turn them off within
+    /// some microseconds, and block. A device that has failed stays on.
+    fn turns_on(&mut self, gate: u8) {
+        match self.stuck {
+            Some((other, Stuck::On)) if other == gate ^ 1 => self.found.blocked |= 0b11 << (gate & !1),
+            Some((other, Stuck::Shorted)) if other == gate ^ 1 => self.found.blocked |= 1 << gate,
+            _ => {}
+        }
+    }
+
+    /// Looks at the legs' outputs over a time in which nothing changed; `currents_a` at its end. Whether one of them is not where it
+    /// should be.
+    pub fn monitor(&mut self, currents_a: [f64; 3], from: Tick, to: Tick) -> bool {
+        let Some((gate, _)) = self.stuck else { return false };
+        let leg = usize::from(gate / 2);
+        let (real, ordered) = (self.legs()[leg], self.ordered_legs()[leg]);
+        let high = real.is_high(currents_a[leg]);
+        if ordered == Leg::Open || high == (ordered == Leg::Upper) {
+            self.astray_since = None;
+            return false;
+        }
+        if to - *self.astray_since.get_or_insert(from) > MONITOR_TICKS {
+            let found = if high { &mut self.found.high } else { &mut self.found.low };
+            *found |= 1 << leg;
+        }
+        true
+    }
+
+    /// What drivers and monitors of the legs have found.
+    pub fn leg_faults(&self) -> LegFaults {
+        self.found
+    }
+
     /// The legs as the machine sees them.
     pub fn legs(&self) -> [Leg; 3] {
+        let mut legs = self.ordered_legs();
+        if let Some((gate, stuck)) = self.stuck
+            && let Some(leg) = legs.get_mut(usize::from(gate / 2))
+        {
+            let state = if gate.is_multiple_of(2) { Leg::Upper } else { Leg::Lower };
+            match stuck {
+                Stuck::Shorted => *leg = state,
+                Stuck::On if self.found.blocked != 0 => *leg = Leg::Open,
+                Stuck::On => *leg = state,
+                Stuck::Off if *leg == state => *leg = Leg::Open,
+                Stuck::Off => {}
+            }
+        }
+        legs
+    }
+
+    /// The legs as they would be without a stuck gate.
+    pub fn ordered_legs(&self) -> [Leg; 3] {
         self.legs.map(|leg| match (leg.upper_on, leg.lower_on) {
             (true, _) => Leg::Upper,
             (_, true) => Leg::Lower,
@@ -175,11 +266,15 @@ impl Inverter {
 
     fn gate(&mut self, phase: usize, upper: bool, on: bool, tick: Tick) {
         let leg = &mut self.legs[phase];
+        debug_assert!(!on || !(if upper { leg.lower_on } else { leg.upper_on }), "both devices of a leg on");
         let state = if upper { &mut leg.upper_on } else { &mut leg.lower_on };
         if *state != on {
             *state = on;
-            self.edges.push(Edge { tick, gate: (phase * 2) as u8 + u8::from(!upper), on });
+            let gate = (phase * 2) as u8 + u8::from(!upper);
+            self.edges.push(Edge { tick, gate, on });
+            if on {
+                self.turns_on(gate);
+            }
         }
-        debug_assert!(!(leg.upper_on && leg.lower_on), "both devices of a leg on");
     }
 }

@@ -5,21 +5,33 @@
 //! ahead of what is decided: it advances only as far as it is asked to, and everything it is told takes effect at a
 //! fixed delay after its nominal instant, so that arrival order changes nothing.
 
+pub mod inject;
 mod inverter;
+mod line;
+mod link;
+mod observe;
 mod sensors;
 
-pub use inverter::{Edge, GATES, Inverter};
+pub use inject::Injection;
+pub use inverter::{Edge, GATES, Inverter, Stuck};
+pub use line::{Commander, LinePlan, LineSide, SlotRow};
+pub use link::{LineFilter, Supply};
+pub use observe::{Observed, Peaks};
 pub use sensors::{Converter, Flaws, Sensors};
 
 use crate::plant::Plant;
-use crate::trace::{Row, Switch};
+use crate::trace::{Recording, Row, Switch};
+use inject::{Kind, Spoiler};
+use link::Link;
 use std::collections::VecDeque;
 use tractive::board::Sample;
-use tractive::control::Demand;
+use tractive::control::{Demand, LinkWindow};
 use tractive::drive::Report;
 use tractive::frames::{Abc, Angle};
 use tractive::modulation::{CarrierPeriod, Mode};
-use tractive::protection::SafeState;
+use tractive::operator::{Feedback, Request, Status};
+use tractive::protection::{LegFaults, SafeState};
+use tractive::recorder::Record;
 use tractive::time::{Clock, Instant};
 
 /// Ticks since the run's beginning.
@@ -28,6 +40,9 @@ pub type Tick = u64;
 /// How long after its nominal instant an interrupt's order to enter a safe state reaches the gates, in ticks (25 µs): longer
 /// than both interrupts together take, as a bound that does not depend on which of them came first.
 const SAFE_STATE_DELAY: Tick = 625;
+
+/// How far a current's reading may be off without making a difference that counts, in A.
+const MUCH_A: f32 = 10.0;
 
 /// What the operator does, as a function of time.
 pub trait Operator {
@@ -55,6 +70,12 @@ pub enum BenchError {
         /// What there is.
         oldest: Option<Tick>,
     },
+    /// The operator asked for a slot that is not there.
+    #[error("the operator's slot of tick {0} was asked for and is not kept")]
+    NoSlot(Tick),
+    /// The operator fell behind.
+    #[error("at {0:.6} s the operator has not finished its slot before the next one")]
+    OperatorLate(f64),
     /// Control fell behind.
     #[error("at {0:.6} s the control interrupt has not reported within its period")]
     ControlLate(f64),
@@ -80,6 +101,10 @@ pub struct Settings {
     pub link_steps: Vec<(f64, f64)>,
     /// Imperfections of the sensors.
     pub flaws: Flaws,
+    /// What feeds the inverter.
+    pub supply: Supply,
+    /// What goes wrong.
+    pub injection: Option<Injection>,
 }
 
 /// Machine, inverter, sensors and recorder.
@@ -87,6 +112,9 @@ pub struct Bench {
     plant: Plant,
     inverter: Inverter,
     sensors: Sensors,
+    link: Option<Link>,
+    spoiler: Spoiler,
+    observed: Observed,
     operator: Box<dyn Operator + Send>,
     clock: Clock,
     tick_s: f64,
@@ -94,7 +122,10 @@ pub struct Bench {
     lead: Tick,
     end: Tick,
     next: Option<CarrierPeriod>,
-    safe: Option<(Tick, SafeState)>,
+    /// Orders to enter a safe state, or to leave it (`None`), and when they reach the gates.
+    orders: VecDeque<(Tick, Option<SafeState>)>,
+    line: Option<LineSide>,
+    slots: Vec<SlotRow>,
     samples: VecDeque<(Tick, Sample)>,
     next_sample: Tick,
     reports: VecDeque<(Tick, Report)>,
@@ -113,10 +144,17 @@ impl Bench {
         let ticks = |seconds: f64| (seconds / tick_s).round() as Tick;
         let first = CarrierPeriod::off(settings.first_half_ticks);
         let lead = ticks(settings.lead_s);
+        let from = settings.injection.map_or(Tick::MAX, |injection| ticks(settings.lead_s + injection.at_s));
         Self {
             plant,
             inverter: Inverter::new(settings.dead_time_ticks.into(), first),
             sensors: Sensors::new(settings.udc_v, settings.link_steps.clone(), settings.flaws),
+            link: match settings.supply {
+                Supply::Stiff => None,
+                Supply::Line(filter) => Some(Link::new(filter, settings.udc_v)),
+            },
+            spoiler: Spoiler::new(settings.injection),
+            observed: Observed::new(from),
             operator,
             clock: settings.clock,
             tick_s,
@@ -124,7 +162,9 @@ impl Bench {
             lead,
             end: lead + ticks(settings.duration_s),
             next: Some(first),
-            safe: None,
+            orders: VecDeque::new(),
+            line: None,
+            slots: Vec::new(),
             samples: VecDeque::new(),
             next_sample: settings.clock.control_ticks.into(),
             reports: VecDeque::new(),
@@ -137,6 +177,35 @@ impl Bench {
         }
     }
 
+    /// The same with a line side: the link's voltage is its capacitor's, and the drive has an operator.
+    pub fn with_line(mut self, plan: LinePlan) -> Self {
+        self.line = Some(LineSide::new(plan, &self.clock));
+        self
+    }
+
+    /// Whether the drive has an operator.
+    pub fn is_operated(&self) -> bool {
+        self.line.is_some()
+    }
+
+    /// What is asked of the operator in the slot that began at `instant`, and what the board says.
+    pub fn ask(&mut self, instant: Instant) -> Result<(Request, Feedback), BenchError> {
+        let tick = self.widen(instant);
+        self.line.as_mut().and_then(|line| line.ask(tick)).ok_or(BenchError::NoSlot(tick))
+    }
+
+    /// What the operator told; it holds from `from` on.
+    pub fn told(&mut self, from: Instant, status: Status) -> Result<(), BenchError> {
+        let tick = self.widen(from);
+        if tick < self.now {
+            return Err(BenchError::OperatorLate(self.seconds(tick)));
+        }
+        if let Some(line) = &mut self.line {
+            line.tell(tick, status);
+        }
+        Ok(())
+    }
+
     /// Whether the recording is complete.
     pub fn is_done(&self) -> bool {
         self.now > self.end
@@ -147,10 +216,20 @@ impl Bench {
         self.now as f64 / self.end as f64
     }
 
-    /// The recording: trace, switches of mode, edges; instants in seconds from its beginning.
-    pub fn into_recording(self) -> (Vec<Row>, Vec<Switch>, Vec<Edge>, Tick, f64) {
+    /// The recording: what the bench saw, and what the drive's own recorder holds; instants in seconds from its beginning.
+    pub fn into_recording(self, records: Vec<Record>) -> Recording {
+        let recorded = records.into_iter().map(|record| (self.instant_s(record.at), record)).collect();
         let edges = self.inverter.edges().to_vec();
-        (self.rows, self.switches, edges, self.lead, self.tick_s)
+        Recording {
+            rows: self.rows,
+            switches: self.switches,
+            edges,
+            recorded,
+            slots: self.slots,
+            link: self.line.map(|line| line.balance()),
+            lead: self.lead,
+            tick_s: self.tick_s,
+        }
     }
 
     /// An instant near to now, in s from the recording's beginning.
@@ -180,7 +259,56 @@ impl Bench {
     pub fn pwm_sample(&mut self, instant: Instant) -> Result<Abc, BenchError> {
         let tick = self.widen(instant);
         self.advance(tick)?;
-        Ok(self.sensors.currents(&self.plant))
+        let currents_a = self.sensors.currents(&self.plant);
+        Ok(self.read_currents(currents_a))
+    }
+
+    /// What drivers and monitors of the legs have found.
+    pub fn leg_faults(&self) -> LegFaults {
+        let mut found = self.inverter.leg_faults();
+        if let Some(Kind::Feedback(leg)) = self.spoiler.kind(self.seconds(self.now)) {
+            found.low |= 1 << leg;
+        }
+        found
+    }
+
+    /// By how much the control interrupt is late, in ticks.
+    pub fn control_late_ticks(&self) -> u32 {
+        match self.spoiler.kind(self.seconds(self.now)) {
+            Some(Kind::ControlLate(ticks)) => ticks,
+            _ => 0,
+        }
+    }
+
+    /// Whether the control interrupt comes at this instant at all.
+    pub fn has_control(&self, instant: Instant) -> bool {
+        self.spoiler.kind(self.seconds(self.widen(instant))) != Some(Kind::ControlStopped)
+    }
+
+    /// Time since the recording's beginning, in s.
+    pub fn time_s(&self) -> f64 {
+        self.seconds(self.now)
+    }
+
+    /// The trace so far.
+    pub fn rows(&self) -> &[Row] {
+        &self.rows
+    }
+
+    /// What a fault did.
+    pub fn observed(&self) -> &Observed {
+        &self.observed
+    }
+
+    /// What the converters make of the phase currents.
+    fn read_currents(&mut self, true_a: Abc) -> Abc {
+        let read_a = self.spoiler.currents(self.seconds(self.now), true_a);
+        let off = [read_a.a - true_a.a, read_a.b - true_a.b, read_a.c - true_a.c];
+        // What is not a number is off as well.
+        if off.iter().any(|off| off.is_nan() || off.abs() > MUCH_A) {
+            self.observed.makes_a_difference(self.now);
+        }
+        read_a
     }
 
     /// The half to play after the one that begins at `instant`.
@@ -190,10 +318,26 @@ impl Bench {
 
     /// An interrupt at `instant` orders the safe state.
     pub fn enter(&mut self, instant: Instant, safe: SafeState) {
-        let effective = self.widen(instant) + SAFE_STATE_DELAY;
-        if self.safe.is_none() && !self.inverter.is_safe() {
-            self.safe = Some((effective, safe));
+        if !self.will_be_safe() {
+            self.order(instant, Some(safe));
         }
+    }
+
+    /// The PWM interrupt at `instant` leaves it.
+    pub fn leave(&mut self, instant: Instant) {
+        if self.will_be_safe() {
+            self.order(instant, None);
+        }
+    }
+
+    fn order(&mut self, instant: Instant, order: Option<SafeState>) {
+        let effective = self.widen(instant) + SAFE_STATE_DELAY;
+        self.orders.push_back((effective, order));
+    }
+
+    /// Whether the gates will be in a safe state once every order has reached them.
+    fn will_be_safe(&self) -> bool {
+        self.orders.back().map_or(self.inverter.is_safe(), |(_, order)| order.is_some())
     }
 
     /// The tick of an instant near to now.
@@ -210,11 +354,17 @@ impl Bench {
     fn advance(&mut self, tick: Tick) -> Result<(), BenchError> {
         while self.now < tick {
             let mut due = tick.min(self.inverter.half_end()).min(self.next_sample).min(self.next_row);
+            if self.observed.from > self.now {
+                due = due.min(self.observed.from);
+            }
             if let Some(event) = self.inverter.next_event() {
                 due = due.min(event);
             }
-            if let Some((at, _)) = self.safe {
-                due = due.min(at);
+            if let Some((at, _)) = self.orders.front() {
+                due = due.min(*at);
+            }
+            if let Some(event) = self.line.as_ref().and_then(LineSide::next_event) {
+                due = due.min(event);
             }
             self.integrate(due);
             self.act()?;
@@ -224,19 +374,68 @@ impl Bench {
 
     fn integrate(&mut self, tick: Tick) {
         if tick > self.now {
-            let udc_v = self.sensors.udc_v(self.seconds(self.now));
-            self.plant.advance(self.inverter.legs(), udc_v, (tick - self.now) as f64 * self.tick_s);
+            let t_s = self.seconds(self.now);
+            let (udc_v, legs) = (self.udc_v(t_s), self.inverter.legs());
+            let dt_s = (tick - self.now) as f64 * self.tick_s;
+            let before_j = self.plant.energies().electrical_j;
+            if let Some(line) = &mut self.line {
+                self.plant.advance_on(&mut line.link, legs, dt_s);
+            } else {
+                self.plant.advance(legs, udc_v, dt_s);
+            }
+            if let Some(link) = &mut self.link {
+                let drawn_j = self.plant.energies().electrical_j - before_j;
+                link.advance(drawn_j, dt_s, self.sensors.udc_v(t_s), self.spoiler.supply(t_s));
+            }
+            if self.inverter.monitor(self.plant.currents_abc(), self.now, tick) {
+                self.observed.makes_a_difference(self.now);
+            }
             self.now = tick;
+            let udc_v = self.udc_v(self.seconds(tick));
+            self.observed.note(tick, self.plant.currents_abc(), udc_v);
+        }
+    }
+
+    /// The link's true voltage, in V.
+    fn udc_v(&self, t_s: f64) -> f64 {
+        match (&self.line, &self.link) {
+            (Some(line), _) => line.link.udc_v(),
+            (None, Some(link)) => link.voltage_v(),
+            (None, None) => self.sensors.udc_v(t_s),
         }
     }
 
     fn act(&mut self) -> Result<(), BenchError> {
         let now = self.now;
-        if let Some((at, safe)) = self.safe
+        let t_s = self.seconds(now);
+        if let Some(row) = self.line.as_mut().and_then(|line| line.act(now, t_s))
+            && now >= self.lead
+            && now <= self.end
+        {
+            self.slots.push(row);
+        }
+        if now == self.observed.from {
+            self.observed.carrier_ticks = 2 * Tick::from(self.inverter.half().period_ticks);
+            match self.spoiler.kind(self.seconds(now)) {
+                Some(Kind::Gate(gate, on)) => {
+                    self.inverter.stick(gate, if on { Stuck::On } else { Stuck::Off })
+                }
+                Some(Kind::Device(gate)) => self.inverter.stick(gate, Stuck::Shorted),
+                _ => {}
+            }
+        }
+        while let Some((at, order)) = self.orders.front().copied()
             && at <= now
         {
-            self.safe = None;
-            self.inverter.enter(safe, now);
+            self.orders.pop_front();
+            match order {
+                Some(safe) => {
+                    self.inverter.enter(safe, now);
+                    let (udc_v, field_j) = (self.udc_v(self.seconds(now)), self.plant.field_j());
+                    self.observed.enters(now, safe, udc_v, field_j);
+                }
+                None => self.inverter.leave(now),
+            }
         }
         self.inverter.act(now);
         if now == self.inverter.half_end() {
@@ -256,12 +455,24 @@ impl Bench {
     fn take_sample(&mut self) -> Result<(), BenchError> {
         // The report of the period before last must be there: its command takes effect now.
         if self.samples.len() > 1 {
-            return Err(BenchError::ControlLate(self.seconds(self.now)));
+            if self.has_control(Instant(self.now as u32)) {
+                return Err(BenchError::ControlLate(self.seconds(self.now)));
+            }
+            self.samples.clear();
         }
         let t_s = self.seconds(self.now);
         let (demand, enable) = self.operator.demand(t_s);
-        let measured = self.sensors.measure(&self.plant, t_s);
-        self.samples.push_back((self.now, Sample { measured, demand, enable }));
+        let udc_v = self.udc_v(t_s);
+        let mut measured = self.sensors.measure(&self.plant, udc_v, t_s);
+        measured.currents_a = self.read_currents(measured.currents_a);
+        let hardware = self.line.as_ref().and_then(|line| line.hardware(t_s));
+        if self.line.as_mut().is_some_and(|line| line.sampled(self.now, t_s)) {
+            return Err(BenchError::OperatorLate(t_s));
+        }
+        let mut sample =
+            Sample { measured, demand, enable, window: LinkWindow::OPEN, acknowledge: 0, hardware };
+        self.spoiler.control(t_s, &mut sample);
+        self.samples.push_back((self.now, sample));
         self.next_sample = self.now + Tick::from(self.clock.control_ticks);
         Ok(())
     }
@@ -307,11 +518,12 @@ impl Bench {
                 ib_a: ib,
                 ic_a: ic,
                 u_v: report.voltage_v.into(),
-                udc_v: self.sensors.udc_v(t_s),
+                udc_v: self.udc_v(t_s),
                 f1_hz: report.frequency_hz.into(),
                 map_error: report.map_error.into(),
                 mode,
                 trip: report.trip,
+                status: self.line.as_ref().and_then(LineSide::status),
             });
         }
         self.rows_done += 1;

@@ -13,6 +13,17 @@ pub enum Leg {
     Open,
 }
 
+impl Leg {
+    /// Whether its output is at the upper rail while this current flows out of it, in A: of an open leg the diodes decide.
+    pub fn is_high(self, current_a: f64) -> bool {
+        match self {
+            Self::Upper => true,
+            Self::Lower => false,
+            Self::Open => current_a < 0.0,
+        }
+    }
+}
+
 /// The diodes of an open leg: current out of the leg (positive) flows through the lower one, current into it through
 /// the upper one. In between, for currents below half a percent of the machine's largest, the leg's voltage follows the current
 /// linearly, as with a small snubber; so a machine whose EMF stays below the link carries no more than that.

@@ -101,6 +101,14 @@ pub(super) fn unmask(pwm: Interrupt, control: Interrupt) {
     }
 }
 
+/// Makes the PWM interrupt come at once, between two boundaries.
+pub fn revise_pulses() {
+    NVIC::pend(Interrupt::TIM1_UP_TIM16);
+    // It has run before anything else is done.
+    cortex_m::asm::dsb();
+    cortex_m::asm::isb();
+}
+
 /// The idle loop, forever: feeds the watchdog, tells what has changed, and after a fault what the flight recorder holds.
 pub fn idle() -> ! {
     let (mut told, mut broken, mut records_told) = (None, false, 0);

@@ -3,10 +3,10 @@
 use super::{MotorCommand, MotorShare, Settings};
 use crate::board::MotorDemand;
 use crate::control::{
-    Boundary, Committed, Controller, Demand, Follows, Input, Law, Measurements, Region, SpeedInput, SpeedLoop,
+    Boundary, Committed, Controller, Demand, Follows, Input, Law, LinkWindow, Measurements, Region,
+    SpeedInput, SpeedLoop,
 };
-use crate::drive::traction::UNITS_PER_RADIAN;
-use crate::frames::{AlphaBeta, Angle};
+use crate::frames::{AlphaBeta, Angle, UNITS_PER_RADIAN};
 use crate::machine::Tables;
 use crate::protection::{self, Fault, FrozenWatch, Violation};
 
@@ -25,8 +25,6 @@ pub struct Axis {
     controller: Controller,
     speed_loop: SpeedLoop,
     watch: FrozenWatch,
-    /// Electrical speed while the angle last moved, in rad/s: the tracker soon believes a sensor that stands still.
-    moving: f32,
     /// Volt-seconds of the period that began at the last sample, per volt of link, in s; and the link's voltage there.
     acting: Option<(AlphaBeta, f32)>,
 }
@@ -56,15 +54,14 @@ impl Axis {
             controller: Controller::with_tracking(TRACKING_RAD_S),
             speed_loop: SpeedLoop::new(),
             watch: FrozenWatch::new(),
-            moving: 0.0,
             acting: None,
         }
     }
 
-    /// Follows the angle. Says by how much, in rad, it is off where that is too much.
-    pub fn track(&mut self, angle: Angle, settings: &Settings) -> Option<f32> {
+    /// Follows the angle, where it is `trusted` whatever it is. Says by how much, in rad, it is off where that is too much.
+    pub fn track(&mut self, angle: Angle, trusted: bool, settings: &Settings) -> Option<f32> {
         let surprise = self.controller.surprise_rad(angle, &settings.clock);
-        let lost = self.controller.speed_is_known() && surprise.abs() > SURPRISE_RAD;
+        let lost = self.controller.speed_is_known() && surprise.abs() > SURPRISE_RAD && !trusted;
         if !lost {
             self.controller.track(angle, &settings.clock);
         }
@@ -97,11 +94,8 @@ impl Axis {
         tables: &Tables,
     ) -> Option<Violation> {
         let stands = self.watch.last_angle() == Some(measured.angle);
-        if !stands {
-            self.moving = self.omega();
-        }
         let period_s = settings.clock.control_s();
-        let violation = self.watch.check(measured, self.moving, period_s, &tables.ratings)?;
+        let violation = self.watch.check(measured, self.omega(), period_s, &tables.ratings)?;
         let (turned_rad, limit_rad) = self.watch.turned_rad();
         if stands { Some((lost, turned_rad, limit_rad)) } else { Some(violation) }
     }
@@ -123,8 +117,7 @@ impl Axis {
             horizon_s: period_s,
             volt_seconds: share.map(|share| share * input.link_v),
             // A period is its own mirror image, so at its ends the ripple is nothing.
-            ripple_wb: AlphaBeta::default(),
-            ripple_after_wb: AlphaBeta::default(),
+            ripple: None,
             interval_s: period_s,
             follows: Follows::Mean,
             depth_limit: LOOP_SHARE,
@@ -139,6 +132,7 @@ impl Axis {
         let control = Input {
             measured: input.measured,
             demand: &demand,
+            window: &LinkWindow::OPEN,
             committed: &committed,
             boundary: Some(&boundary),
         };
@@ -146,7 +140,7 @@ impl Axis {
         AxisOutput {
             command: MotorCommand {
                 voltage_v: output.voltage.voltage_v,
-                angle: output.voltage.angle,
+                angle: output.voltage.vector.angle(),
                 rate: omega * (UNITS_PER_RADIAN * settings.clock.tick_s),
             },
             torque_nm: output.torque_nm,
@@ -175,7 +169,7 @@ impl Axis {
     /// on by one carrier period.
     fn volt_seconds_share(&self, share: &MotorShare, settings: &Settings) -> AlphaBeta {
         let carrier_s = settings.clock.seconds(settings.carrier_ticks as i32);
-        let turn = Angle::from_radians(self.controller.omega() * carrier_s);
+        let turn = Angle::within_half_turn(self.controller.omega() * carrier_s);
         let (mut sum, mut angle) = (AlphaBeta::default(), share.angle);
         for _ in 0..settings.carriers_per_control() {
             let direction = angle.sin_cos();

@@ -6,8 +6,8 @@ use crate::board::{DualControlPort, DualSample, MotorDemand};
 use crate::control::{Measurements, ZSource, ZSourceError, ZSourceInput};
 use crate::drive::Gates;
 use crate::frames::{Angle, SQRT_3};
-use crate::machine::Tables;
-use crate::protection::{self, Fault, SafeState, Trip, Violation};
+use crate::machine::{Machine, Tables};
+use crate::protection::{self, Disarmed, Fault, SafeState, Trip, Violation};
 use crate::time::Instant;
 use core::f32::consts::{FRAC_PI_4, TAU};
 
@@ -19,8 +19,8 @@ const TWO_LEVEL_SHARE: f32 = FRAC_PI_4 / SQRT_3;
 const SENSOR_LOST: [Fault; 2] = [Fault::SensorLost1, Fault::SensorLost2];
 
 /// The ZS9's control task.
-pub struct ControlTask {
-    tables: &'static Tables,
+pub struct ControlTask<M = &'static Tables> {
+    machine: M,
     settings: Settings,
     axes: [Axis; 2],
     link: ZSource,
@@ -28,21 +28,29 @@ pub struct ControlTask {
     filtered_v: Option<f32>,
     /// Nominal instant of the next call.
     now: Instant,
+    disarmed: Disarmed,
     trip: Option<Trip>,
 }
 
-impl ControlTask {
+impl<M: Machine> ControlTask<M> {
     /// A task whose first call is the control timer's first interrupt, one control period after the start.
-    pub const fn new(tables: &'static Tables, settings: Settings) -> Self {
+    pub const fn new(machine: M, settings: Settings) -> Self {
         Self {
-            tables,
+            machine,
             settings,
             axes: [Axis::new(), Axis::new()],
             link: ZSource::new(),
             filtered_v: None,
             now: Instant(settings.clock.control_ticks),
+            disarmed: Disarmed::NONE,
             trip: None,
         }
+    }
+
+    /// The same without a check.
+    pub const fn without(mut self, disarmed: Disarmed) -> Self {
+        self.disarmed = disarmed;
+        self
     }
 
     /// The control timer's interrupt, at a valley of the carrier. Deadline: [`Settings::deadline_ticks`] after its nominal instant,
@@ -108,7 +116,8 @@ impl ControlTask {
             let off_rad = match measured {
                 Some(measured) => {
                     *angle = measured;
-                    axis.track(measured, &self.settings)
+                    let trusted = self.disarmed.has(fault);
+                    axis.track(measured, trusted, &self.settings)
                 }
                 None => {
                     violation = violation.or(Some((fault, 1.0, 0.0)));
@@ -116,6 +125,7 @@ impl ControlTask {
                 }
             };
             violation = violation.or(off_rad.map(|rad| (fault, rad, axis::SURPRISE_RAD)));
+            violation = violation.filter(|(fault, _, _)| !self.disarmed.has(*fault));
         }
         self.check(violation, port);
         angles
@@ -143,12 +153,15 @@ impl ControlTask {
         port: &mut impl DualControlPort,
     ) {
         let limits = &self.settings.limits;
+        let armed = |(fault, _, _): &Violation| !self.disarmed.has(*fault);
         let mut violation = limits
             .check_link(sample.source_v, sample.capacitor_v)
             .or_else(|| limits.check_link_reference(sample.link_ref_v, sample.source_v));
         for ((axis, measured), demand) in self.axes.iter().zip(measured).zip(&sample.demands) {
             violation = violation
-                .or_else(|| axis::check(measured, axis.omega(), self.tables))
+                .filter(armed)
+                .or_else(|| axis::check(measured, axis.omega(), self.machine.tables()))
+                .filter(armed)
                 .or_else(|| check_demand(demand));
         }
         self.check(violation, port);
@@ -157,8 +170,8 @@ impl ControlTask {
     fn check_frozen(&mut self, measured: &[Measurements; 2], port: &mut impl DualControlPort) {
         let mut violation = None;
         for ((axis, measured), lost) in self.axes.iter_mut().zip(measured).zip(SENSOR_LOST) {
-            let found = axis.check_frozen(measured, lost, &self.settings, self.tables);
-            violation = violation.or(found);
+            let found = axis.check_frozen(measured, lost, &self.settings, self.machine.tables());
+            violation = violation.or(found.filter(|(fault, _, _)| !self.disarmed.has(*fault)));
         }
         self.check(violation, port);
     }
@@ -177,7 +190,7 @@ impl ControlTask {
         let [first, second] = &mut self.axes;
         let ([m1, m2], [d1, d2]) = (measured, &sample.demands);
         let (a1, a2) = applied.map_or((None, None), |[a1, a2]| (Some(a1), Some(a2)));
-        let (settings, tables) = (&self.settings, self.tables);
+        let (settings, tables) = (&self.settings, self.machine.tables());
         let step = |axis: &mut Axis, measured, demand, applied| {
             axis.step(&AxisInput { measured, demand, applied, link_v }, settings, tables)
         };
@@ -218,6 +231,9 @@ impl ControlTask {
         let (Some((fault, value, limit)), None) = (violation, self.trip) else {
             return;
         };
+        if self.disarmed.has(fault) {
+            return;
+        }
         let at = self.now.before(self.settings.clock.control_ticks);
         port.gates_off(at);
         self.trip = Some(Trip { fault, value, limit, at, safe: SafeState::GatesOff });

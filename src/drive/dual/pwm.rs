@@ -4,9 +4,9 @@ use super::{COMPARE_STEPS, DualApplied, DualCommand, MotorShare, Settings, Share
 use crate::board::{DualPwmPort, GateFeedback, PlayedPeriod, PowerSample};
 use crate::drive::Gates;
 use crate::frames::{Angle, limit};
-use crate::machine::Tables;
+use crate::machine::{Machine, Tables};
 use crate::nine_switch::{self, GateTicks, MotorVoltage, Period, Refused, Request};
-use crate::protection::{self, Fault, SafeState, Trip, Violation};
+use crate::protection::{self, Disarmed, Fault, SafeState, Trip, Violation};
 use crate::time::Instant;
 
 /// Longest dead time that the gates' hardware may insert, in s.
@@ -20,30 +20,38 @@ const MOST_MOVED_V: f32 = 10.0;
 const LEAST_LINK_V: f32 = 50.0;
 
 /// The ZS9's PWM task.
-pub struct PwmTask {
-    tables: &'static Tables,
+pub struct PwmTask<M = &'static Tables> {
+    machine: M,
     settings: Settings,
     /// Nominal instant of the next call: a peak.
     now: Instant,
     /// The period that was played before, and the one that is played.
     periods: [PlayedPeriod; 2],
+    disarmed: Disarmed,
     trip: Option<Trip>,
     /// Link voltage at the last peak, in V.
     last_link_v: Option<f32>,
 }
 
-impl PwmTask {
+impl<M: Machine> PwmTask<M> {
     /// A task whose first call is at the first peak, half a carrier period after the start, gates off until the second valley.
-    pub const fn new(tables: &'static Tables, settings: Settings) -> Self {
+    pub const fn new(machine: M, settings: Settings) -> Self {
         let off = PlayedPeriod::off(settings.half_steps());
         Self {
-            tables,
+            machine,
             settings,
             now: Instant(settings.first_peak_ticks()),
             periods: [off; 2],
+            disarmed: Disarmed::NONE,
             trip: None,
             last_link_v: None,
         }
+    }
+
+    /// The same without a check.
+    pub const fn without(mut self, disarmed: Disarmed) -> Self {
+        self.disarmed = disarmed;
+        self
     }
 
     /// The PWM timer's interrupt, at the carrier's peak. Deadline: the next valley, where the shadow registers take over.
@@ -52,7 +60,7 @@ impl PwmTask {
         self.now = now.after(self.settings.carrier_ticks);
         let [before, running] = self.periods;
         let sample = port.sample(now);
-        let command = shared.command.newest(|command| now.reached(command.valid_from));
+        let command = shared.command.newest(|command| now.reached(DualCommand::valid_from(command)));
         let violation = self.violation(&sample, command.as_ref(), &before, &running);
         self.check(violation, port);
         let mut next = PlayedPeriod::off(self.settings.half_steps());
@@ -108,14 +116,17 @@ impl PwmTask {
     ) -> Option<Violation> {
         let limits = &self.settings.limits;
         let [upper, lower] = &sample.currents_a;
-        protection::check_currents(upper, &self.tables.ratings)
-            .or_else(|| protection::check_currents(lower, &self.tables.ratings))
-            .or_else(|| limits.check_link(sample.source_v, sample.capacitor_v))
+        let armed = |(fault, _, _): &Violation| !self.disarmed.has(*fault);
+        protection::check_currents(upper, &self.machine.tables().ratings)
+            .filter(armed)
+            .or_else(|| protection::check_currents(lower, &self.machine.tables().ratings).filter(armed))
+            .or_else(|| limits.check_link(sample.source_v, sample.capacitor_v).filter(armed))
             .or_else(|| {
                 let command = command.filter(|command| command.gates == Gates::Pulse)?;
                 // Only while pulses are wanted: control may have turned the gates off meanwhile.
                 self.stuck(&sample.gates, before, running)
-                    .or_else(|| self.stale(command))
+                    .filter(armed)
+                    .or_else(|| self.stale(command).filter(armed))
                     .or_else(|| limits.check_duty(command.duty))
             })
     }
@@ -151,6 +162,9 @@ impl PwmTask {
         let (Some((fault, value, limit)), None) = (violation, self.trip) else {
             return;
         };
+        if self.disarmed.has(fault) {
+            return;
+        }
         let at = self.now.before(self.settings.carrier_ticks);
         port.gates_off(at);
         self.trip = Some(Trip { fault, value, limit, at, safe: SafeState::GatesOff });

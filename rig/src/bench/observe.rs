@@ -1,0 +1,81 @@
+//! What a fault did: the extremes of currents and link until the gates are safe and after that.
+
+use super::Tick;
+use tractive::protection::SafeState;
+
+/// Extremes over a time.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Peaks {
+    /// Largest phase current, in A.
+    pub current_a: f64,
+    /// Largest link voltage, in V.
+    pub udc_v: f64,
+}
+
+impl Peaks {
+    fn note(&mut self, currents_a: [f64; 3], udc_v: f64) {
+        let current_a = currents_a.into_iter().fold(0.0_f64, |most, current| most.max(current.abs()));
+        self.current_a = self.current_a.max(current_a);
+        self.udc_v = self.udc_v.max(udc_v);
+    }
+}
+
+/// What happened from a fault's instant on.
+#[derive(Clone, Copy, Debug)]
+pub struct Observed {
+    /// The fault's instant.
+    pub from: Tick,
+    /// When the fault first made a difference that is more than small, if that is known.
+    pub effect: Option<Tick>,
+    /// Length of a carrier at the fault's instant, in ticks.
+    pub carrier_ticks: Tick,
+    /// When the gates were safe, and how.
+    pub safe: Option<(Tick, SafeState)>,
+    /// Link voltage then, in V.
+    pub udc_at_safe_v: f64,
+    /// Energy of the machine's field then, in J.
+    pub field_at_safe_j: f64,
+    /// Extremes until then.
+    pub until: Peaks,
+    /// And after that.
+    pub after: Peaks,
+}
+
+impl Observed {
+    /// Nothing yet.
+    pub fn new(from: Tick) -> Self {
+        Self {
+            from,
+            effect: None,
+            carrier_ticks: 0,
+            safe: None,
+            udc_at_safe_v: 0.0,
+            field_at_safe_j: 0.0,
+            until: Peaks::default(),
+            after: Peaks::default(),
+        }
+    }
+
+    /// The plant at an instant.
+    pub fn note(&mut self, now: Tick, currents_a: [f64; 3], udc_v: f64) {
+        if now >= self.from {
+            let peaks = if self.safe.is_some() { &mut self.after } else { &mut self.until };
+            peaks.note(currents_a, udc_v);
+        }
+    }
+
+    /// The fault makes a difference now.
+    pub fn makes_a_difference(&mut self, now: Tick) {
+        if now >= self.from {
+            self.effect.get_or_insert(now);
+        }
+    }
+
+    /// The gates are safe from now on.
+    pub fn enters(&mut self, now: Tick, safe: SafeState, udc_v: f64, field_j: f64) {
+        if self.safe.is_none() {
+            self.safe = Some((now, safe));
+            (self.udc_at_safe_v, self.field_at_safe_j) = (udc_v, field_j);
+        }
+    }
+}
