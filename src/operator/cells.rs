@@ -140,8 +140,13 @@ impl Desk {
     /// In the idle loop, once a slot: what is permitted from the next slot's beginning on. Returns that instant.
     pub fn allow(&self, permit: Permit, observed: &Observation, clock: &Clock) -> Instant {
         let from = next_slot(observed.at, clock);
-        self.permit.publish(Timed { permit, from });
+        self.allow_from(permit, from);
         from
+    }
+
+    /// The same from an instant of one's own on.
+    pub fn allow_from(&self, permit: Permit, from: Instant) {
+        self.permit.publish(Timed { permit, from });
     }
 }
 

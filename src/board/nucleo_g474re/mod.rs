@@ -28,6 +28,7 @@ pub mod position;
 pub mod power_stage;
 pub mod registers;
 pub mod sampling;
+pub mod serve;
 pub mod start;
 pub mod watchdog;
 pub mod zs9;

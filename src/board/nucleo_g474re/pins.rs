@@ -101,11 +101,21 @@ impl Pin {
     pub const fn is_gate(&self) -> bool {
         matches!(self.function, Function::Gate(_))
     }
+
+    /// Whether it belongs to a bus.
+    pub const fn is_bus(&self) -> bool {
+        matches!(self.function, Function::Bus(_))
+    }
 }
 
-/// Configures every pin of the table that drives no gate.
+/// Configures every pin of the table that drives no gate and belongs to no bus.
 pub fn configure_inputs(registers: &Registers, pins: &[Pin]) {
-    pins.iter().filter(|pin| !pin.is_gate()).for_each(|pin| configure(registers, pin));
+    pins.iter().filter(|pin| !pin.is_gate() && !pin.is_bus()).for_each(|pin| configure(registers, pin));
+}
+
+/// Gives a bus its pins, when its controller rests.
+pub fn configure_bus(registers: &Registers, pins: &[Pin]) {
+    pins.iter().filter(|pin| pin.is_bus()).for_each(|pin| configure(registers, pin));
 }
 
 /// Gives the gates' pins to the timers, which drive them low as long as their outputs are off. Until then the pins float, as
