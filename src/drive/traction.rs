@@ -324,6 +324,7 @@ impl<M: Machine> ControlTask<M> {
         report.iq_a = output.point.current.q;
         report.voltage_v = output.voltage.voltage_v;
         report.map_error = output.map_error;
+        report.mode = decided;
     }
 
     /// The largest fundamental as a share of six-step, and whether it is to be used whatever the torque needs: in square wave, and
@@ -475,9 +476,15 @@ impl<M: Machine> ControlTask<M> {
     }
 
     fn check(&mut self, violation: Option<Violation>, sample: &Sample, port: &mut impl ControlPort) {
-        let (Some((fault, value, limit)), None) = (violation, self.trip) else {
-            return;
-        };
+        if let (Some(violation), None) = (violation, self.trip) {
+            self.trip_on(violation, sample, port);
+        }
+    }
+
+    /// Out of line: it happens once, and there are many checks.
+    #[cold]
+    #[inline(never)]
+    fn trip_on(&mut self, (fault, value, limit): Violation, sample: &Sample, port: &mut impl ControlPort) {
         if self.disarmed.has(fault) {
             return;
         }
