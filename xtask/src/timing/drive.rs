@@ -1,6 +1,6 @@
 //! Drives the image in the emulator and follows its log while it runs.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::fs::{File, OpenOptions};
 use std::io::{BufRead, BufReader, Read, Write};
 use std::path::{Path, PathBuf};
@@ -39,8 +39,6 @@ pub struct Drive {
     pub stack_bytes: i32,
     /// Of each exception the addresses that its longest interrupt executed.
     pub longest: BTreeMap<u32, Vec<u32>>,
-    /// Of each exception the addresses before which another one came.
-    pub interrupted: BTreeMap<u32, BTreeSet<u32>>,
     /// Interrupt, mode and stator frequency, in the order in which the rig served them.
     pub modes: Vec<(String, String, f64)>,
 }
@@ -100,8 +98,8 @@ impl Bench {
             line.clear();
         }
         outcome?;
-        let Meter { calls, hits, behind, stack_bytes, longest, interrupted, .. } = meter;
-        Ok(Drive { calls, hits, behind, stack_bytes, longest, interrupted, modes: Vec::new() })
+        let Meter { calls, hits, behind, stack_bytes, longest, .. } = meter;
+        Ok(Drive { calls, hits, behind, stack_bytes, longest, modes: Vec::new() })
     }
 }
 

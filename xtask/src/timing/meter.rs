@@ -45,8 +45,6 @@ pub struct Meter<'a> {
     pub stack_bytes: i32,
     /// Of each exception the addresses that its longest interrupt executed.
     pub longest: BTreeMap<u32, Vec<u32>>,
-    /// Of each exception the addresses before which another one came.
-    pub interrupted: BTreeMap<u32, BTreeSet<u32>>,
 }
 
 #[derive(Clone, Copy)]
@@ -70,8 +68,6 @@ struct Handler {
     next: Option<u32>,
     /// What was executed.
     addresses: Vec<u32>,
-    /// Whether another handler has come since the last instruction.
-    interrupted: bool,
 }
 
 impl<'a> Meter<'a> {
@@ -89,7 +85,6 @@ impl<'a> Meter<'a> {
             behind: Tally::default(),
             stack_bytes: 0,
             longest: BTreeMap::new(),
-            interrupted: BTreeMap::new(),
         }
     }
 
@@ -110,9 +105,6 @@ impl<'a> Meter<'a> {
     }
 
     fn enter(&mut self, exception: u32) {
-        if let Some(handler) = self.active.last_mut() {
-            handler.interrupted = true;
-        }
         let stack = self.active.last().map_or(0, |handler| handler.stack) + EXCEPTION_FRAME;
         let call = Call {
             exception,
@@ -127,7 +119,6 @@ impl<'a> Meter<'a> {
             resumes: None,
             next: None,
             addresses: Vec::new(),
-            interrupted: false,
         });
         let depth = self.active.len();
         for handler in &mut self.active {
@@ -171,9 +162,6 @@ impl<'a> Meter<'a> {
         handler.next = Some(address + instruction.length);
         handler.call.instructions += 1;
         handler.addresses.push(address);
-        if core::mem::take(&mut handler.interrupted) {
-            self.interrupted.entry(handler.call.exception).or_default().insert(address);
-        }
         handler.call.cycles += instruction.cycles;
         handler.stack -= instruction.stack_move;
         self.stack_bytes = self.stack_bytes.max(handler.stack);
