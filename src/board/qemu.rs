@@ -13,6 +13,7 @@ mod exchange;
 pub use dual::{connect_dual, die_dual, start_dual};
 
 use super::{ControlPort, PwmPort, Sample};
+use crate::configuration::Refused;
 use crate::drive::Report;
 use crate::frames::Abc;
 use crate::link::Setup;
@@ -123,6 +124,8 @@ fn start_timers() {
 
 /// Waits for a while, in instructions that do nothing. Not `wfi`: with `sleep=off` QEMU 7.2 skips timer periods while the
 /// processor sleeps. Not a short loop: leaving a translated block costs more than a thousand idle instructions.
+/// Out of line: the compiler does not know how long this is, and no short branch reaches across it.
+#[inline(never)]
 pub fn idle() {
     // SAFETY: the instructions read and write nothing.
     unsafe { core::arch::asm!(".rept 500", "nop", ".endr", options(nomem, nostack, preserves_flags)) }
@@ -134,6 +137,12 @@ pub fn stop(success: bool) -> ! {
     loop {
         cortex_m::asm::wfi();
     }
+}
+
+/// Does not start: names what is refused and ends the emulation. No interrupt is unmasked, and the gates are off.
+pub fn refuse(refused: &Refused) -> ! {
+    exchange::refused(refused.name);
+    stop(false)
 }
 
 /// Gates off, whatever state the program is in, then the end: for panics and HardFaults.

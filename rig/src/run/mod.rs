@@ -12,6 +12,7 @@ pub use qemu::run_in_qemu;
 use crate::bench::Bench;
 use crate::trace::Recording;
 use indicatif::{ProgressBar, ProgressStyle};
+use tractive::configuration::Refused;
 use tractive::recorder::Record;
 use tractive::time::Clock;
 
@@ -19,6 +20,11 @@ use tractive::time::Clock;
 pub const CLOCK: Clock = Clock::new(25_000_000, 2_500);
 
 /// What the bench saw, and what the drive's own recorder holds.
+/// What an image says that does not start.
+pub(crate) fn refused(refused: Refused) -> anyhow::Error {
+    anyhow::anyhow!("configuration refused: {refused}")
+}
+
 fn record(bench: Bench, records: Vec<Record>) -> Recording {
     let recorded = records.into_iter().map(|record| (bench.instant_s(record.at), record)).collect();
     let (rows, switches, edges, lead, tick_s) = bench.into_recording();

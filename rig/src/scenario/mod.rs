@@ -124,6 +124,7 @@ pub fn drive(scenario: &dyn Scenario, options: &RunOptions, machine: &Machine) -
     match options.on {
         On::Host => {
             let settings = Settings { clock: CLOCK, devices, gains: Gains::DEFAULT };
+            settings.check(machine.tables).map_err(run::refused)?;
             Ok(run::run_on_host(scenario.name(), bench, machine.tables, settings, first_half_ticks)?)
         }
         On::Qemu => run::run_in_qemu(scenario.name(), bench, setup, &options.emulator()?),

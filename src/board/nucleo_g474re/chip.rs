@@ -6,6 +6,7 @@ use super::power_stage::CORE_HZ;
 use super::registers::Registers;
 use super::start::{self, Found, Plan, StartError, Timeout, Wait};
 use super::watchdog::Pulse;
+use crate::configuration::Refused;
 use crate::drive::Report;
 use crate::recorder::{Record, Recorder};
 use cortex_m::peripheral::NVIC;
@@ -74,6 +75,15 @@ pub fn prepare(plan: Plan) -> Result<Found, StartError> {
         defmt::error!("no start: {}", error);
     }
     found
+}
+
+/// Does not start: the reset has left every gate's pin floating and every interrupt masked, and so they stay.
+pub fn refuse(refused: &Refused) -> ! {
+    let Refused { name, value, least, most } = refused;
+    defmt::error!("no start: {=str} = {=f32}, must be from {=f32} to {=f32}", name, value, least, most);
+    loop {
+        cortex_m::asm::wfi();
+    }
 }
 
 /// Starts both timers and unmasks their interrupts: PWM preempts control.

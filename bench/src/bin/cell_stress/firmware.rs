@@ -79,16 +79,10 @@ fn main() -> ! {
     qemu::start(PWM_TICKS);
     write_register(CONTROL_RELOAD, CONTROL_TICKS - 1);
     while !DONE.load(SeqCst) {
-        wait();
+        qemu::idle();
     }
     report();
     qemu::stop(true)
-}
-
-/// Out of line: no short branch reaches across it.
-#[inline(never)]
-fn wait() {
-    qemu::idle();
 }
 
 #[interrupt]
