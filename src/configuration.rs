@@ -58,12 +58,14 @@ impl Clock {
     /// # Errors
     /// The first scalar that makes no sense.
     pub fn check(&self) -> Result<(), Refused> {
-        let Self { tick_s, ticks_per_s, control_ticks } = *self;
+        let Self { tick_s, ticks_per_s, control_ticks, control_s } = *self;
+        let period_s = control_ticks as f32 * tick_s;
         within(&[
             Bound("clock.ticks_per_s", ticks_per_s, 1e5, 1e9),
             Bound("clock.tick_s", tick_s, (1.0 - ROUNDING) / ticks_per_s, (1.0 + ROUNDING) / ticks_per_s),
             // From 100 kHz to 1 kHz.
             Bound("clock.control_ticks", control_ticks as f32, 1e-5 * ticks_per_s, 1e-3 * ticks_per_s),
+            Bound("clock.control_s", control_s, (1.0 - ROUNDING) * period_s, (1.0 + ROUNDING) * period_s),
         ])
     }
 }

@@ -71,7 +71,7 @@ fn a_downlink_between_threads_has_what_is_ready() {
         });
         for now in 1..rounds - 1 {
             period.wait();
-            let ready = cell.newest(|message| message.0[0] == now);
+            let ready = cell.newest(|message| message.word::<0>() == now);
             let newest = cell.newest(|_| true).and_then(|message| message.whole());
             period.wait();
             assert_eq!(ready, Some(Message::number(now)));
@@ -88,8 +88,8 @@ fn every_value_arrives_in_its_turn() {
         up.publish(Message::number(n));
         assert_eq!(down.newest(|_| true), Some(Message::number(n)));
         assert_eq!(up.read(), Some(Message::number(n)));
-        let before = down.newest(|message| message.0[0] < n);
+        let before = down.newest(|message| message.word::<0>() < n);
         assert_eq!(before, (n > 1).then(|| Message::number(n - 1)));
-        assert_eq!(down.newest(|message| message.0[0] + 1 < n), None);
+        assert_eq!(down.newest(|message| message.word::<0>() + 1 < n), None);
     }
 }

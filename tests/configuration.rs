@@ -183,7 +183,7 @@ fn every_scalar_of_the_traction_drive() {
     try_tables(&BUILT_IN, |tables| settings.check(tables));
     let check = |settings: &traction::Settings| settings.check(&BUILT_IN);
     let _ = fields!(traction::Settings as traction::Settings { | clock, devices, gains }: f32);
-    let floats = fields!(Clock as Clock { tick_s, ticks_per_s | control_ticks }: f32);
+    let floats = fields!(Clock as Clock { tick_s, ticks_per_s, control_s | control_ticks }: f32);
     try_all(settings, "clock.", floats, |settings| &mut settings.clock, check);
     let ticks: [Field<Clock, u32>; 1] = [("control_ticks", |clock| &mut clock.control_ticks)];
     try_all(settings, "clock.", &ticks, |settings| &mut settings.clock, check);

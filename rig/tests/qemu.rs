@@ -32,6 +32,9 @@ fn same(scenario: &str, code: i32) {
     if code == 1 && !scenario.starts_with("zs9-") {
         files.push("recorder.csv");
     }
+    if ["precharge", "chopper", "acknowledge"].contains(&scenario) {
+        files.push("operator.csv");
+    }
     for file in files {
         let [host, qemu] = [&outs[0], &outs[1]].map(|out| std::fs::read(out.join(file)).unwrap());
         assert!(host.starts_with(b"t_s,"), "{scenario}: {file} has no header");
@@ -129,4 +132,22 @@ fn nonsense_is_refused_by_name_before_anything_starts() {
             assert!(!out.join("trace.csv").exists());
         }
     }
+}
+
+#[test]
+#[ignore = "needs the image and QEMU"]
+fn from_power_up_to_an_empty_link_is_the_same() {
+    same("precharge", 0);
+}
+
+#[test]
+#[ignore = "needs the image and QEMU"]
+fn braking_into_a_link_that_cannot_take_it_is_the_same() {
+    same("chopper", 0);
+}
+
+#[test]
+#[ignore = "needs the image and QEMU"]
+fn an_acknowledged_fault_is_the_same() {
+    same("acknowledge", 1);
 }

@@ -8,21 +8,30 @@ use tractive::control::{Demand, LinkWindow, Measurements};
 use tractive::drive::Report;
 use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
 use tractive::frames::{Abc, Angle};
-use tractive::machine::Tables;
+use tractive::machine::{Ratings, Tables};
 use tractive::modulation::CarrierPeriod;
+use tractive::operator::{self, Desk, Feedback, Line, OperatorPort, Request, Slot, Status, slot_s};
 use tractive::protection::{LegFaults, SafeState};
 use tractive::recorder::Recorder;
-use tractive::time::Instant;
+use tractive::time::{Clock, Instant};
 
 /// The bench behind a board's ports; the first error ends the run.
 struct Port<'a> {
     bench: &'a mut Bench,
+    desk: &'a Desk,
+    ratings: &'a Ratings,
     error: Option<BenchError>,
 }
 
 impl ControlPort for Port<'_> {
     fn sample(&mut self, now: Instant) -> Sample {
-        self.bench.control_sample(now).unwrap_or_else(|error| {
+        let sample = self.bench.control_sample(now);
+        let sample = if self.bench.is_operated() {
+            sample.map(|sample| self.desk.permit(now).applied_to(sample))
+        } else {
+            sample
+        };
+        sample.unwrap_or_else(|error| {
             self.error = Some(error);
             let measured = Measurements { currents_a: Abc::default(), udc_v: 0.0, angle: Angle::ZERO };
             Sample {
@@ -45,6 +54,7 @@ impl ControlPort for Port<'_> {
     }
 
     fn report(&mut self, now: Instant, report: &Report) {
+        self.desk.tell(now, report);
         self.bench.control_report(now, *report);
     }
 
@@ -69,8 +79,28 @@ impl PwmPort for Port<'_> {
         self.bench.enter(now, safe);
     }
 
+    fn leave(&mut self, now: Instant) -> bool {
+        self.bench.leave(now);
+        true
+    }
+
     fn leg_faults(&mut self) -> LegFaults {
         self.bench.leg_faults()
+    }
+}
+
+impl OperatorPort for Port<'_> {
+    fn ask(&mut self, at: Instant) -> (Request, Feedback) {
+        self.bench.ask(at).unwrap_or_else(|error| {
+            self.error = Some(error);
+            (Request::idle(self.ratings), Feedback::default())
+        })
+    }
+
+    fn tell(&mut self, from: Instant, status: &Status) {
+        if let Err(error) = self.bench.told(from, *status) {
+            self.error = Some(error);
+        }
     }
 }
 
@@ -81,16 +111,17 @@ pub fn run_on_host(
     tables: &'static Tables,
     settings: Settings,
     first_half_ticks: u32,
+    line: Option<Line>,
 ) -> Result<Recording, BenchError> {
     let recorder = Recorder::new();
     let mut progress = Progress::new(name);
-    let tasks = Tasks::new(tables, settings, first_half_ticks).recorded_by(&recorder);
+    let tasks = Tasks::new(tables, settings, first_half_ticks).recorded_by(&recorder).operated_on(line);
     tasks.drive(&mut bench, |bench| {
         progress.show(bench.progress());
         true
     })?;
     let records = (0..).map_while(|index| recorder.read(index)).collect();
-    Ok(super::record(bench, records))
+    Ok(bench.into_recording(records))
 }
 
 /// Both tasks and the cells between them.
@@ -98,6 +129,10 @@ pub struct Tasks<'a> {
     control: ControlTask,
     pwm: PwmTask,
     shared: Shared<'a>,
+    desk: Desk,
+    slot: Slot,
+    operator: operator::Settings<'static>,
+    clock: Clock,
 }
 
 impl<'a> Tasks<'a> {
@@ -108,7 +143,17 @@ impl<'a> Tasks<'a> {
             control: ControlTask::new(tables, settings, first_control),
             pwm: PwmTask::new(tables, settings, Instant(first_half_ticks)).after_halves_of(first_half_ticks),
             shared: Shared::new(),
+            desk: Desk::new(),
+            slot: Slot::new(),
+            operator: operator::Settings::rated(&tables.ratings, slot_s(&settings.clock), None),
+            clock: settings.clock,
         }
+    }
+
+    /// The same with an operator who switches the line side, if the bench has one to ask.
+    pub fn operated_on(mut self, line: Option<Line>) -> Self {
+        self.operator.line = line;
+        self
     }
 
     /// The same with a flight recorder.
@@ -126,7 +171,8 @@ impl<'a> Tasks<'a> {
         while !bench.is_done() {
             let (control_at, pwm_at) = (self.control.next_call(), self.pwm.next_call());
             let has_control = bench.has_control(control_at);
-            let mut port = Port { bench, error: None };
+            let (desk, ratings) = (&self.desk, self.operator.ratings);
+            let mut port = Port { bench, desk, ratings, error: None };
             // At equal instants the PWM interrupt comes first: it has the higher priority.
             if control_at.reached(pwm_at) || !has_control {
                 self.pwm.run(&mut port, &self.shared);
@@ -135,6 +181,10 @@ impl<'a> Tasks<'a> {
                     self.pwm.revise(&mut port, &self.shared);
                 }
                 self.control.run(&mut port, &self.shared);
+                // The idle loop goes on where the interrupt ends.
+                if port.bench.is_operated() {
+                    self.slot.run(&self.desk, &mut port, &self.operator, &self.clock);
+                }
             }
             if let Some(error) = port.error {
                 return Err(error);

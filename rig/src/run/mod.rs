@@ -9,26 +9,16 @@ pub(crate) use emulator::emulate;
 pub use host::{Tasks, run_on_host};
 pub use qemu::run_in_qemu;
 
-use crate::bench::Bench;
-use crate::trace::Recording;
 use indicatif::{ProgressBar, ProgressStyle};
 use tractive::configuration::Refused;
-use tractive::recorder::Record;
 use tractive::time::Clock;
 
 /// The clock of the emulated board: 25 MHz ticks, control at 10 kHz. The host runs on the same.
 pub const CLOCK: Clock = Clock::new(25_000_000, 2_500);
 
-/// What the bench saw, and what the drive's own recorder holds.
 /// What an image says that does not start.
 pub(crate) fn refused(refused: Refused) -> anyhow::Error {
     anyhow::anyhow!("configuration refused: {refused}")
-}
-
-fn record(bench: Bench, records: Vec<Record>) -> Recording {
-    let recorded = records.into_iter().map(|record| (bench.instant_s(record.at), record)).collect();
-    let (rows, switches, edges, lead, tick_s) = bench.into_recording();
-    Recording { rows, switches, edges, lead, tick_s, recorded }
 }
 
 /// A bar on a terminal; in a pipe indicatif draws none.
