@@ -22,7 +22,7 @@ use tractive::time::{Clock, Instant};
 const CLOCK: Clock = Clock::new(25_000_000, 2_500);
 
 fn config() -> ProptestConfig {
-    let cases = std::env::var("TRACTIVE_FUZZ_CASES").ok().and_then(|cases| cases.parse().ok()).unwrap_or(200);
+    let cases = std::env::var("TRACTIVE_FUZZ_CASES").ok().and_then(|cases| cases.parse().ok()).unwrap_or(1_000);
     ProptestConfig { cases, failure_persistence: None, ..ProptestConfig::default() }
 }
 
@@ -33,8 +33,10 @@ enum Call {
     Pwm(Option<(u8, u32)>),
     /// What control asks for first thing in its interrupt, whether it wants it or not.
     Revise,
-    /// Both in their order for so many control periods.
+    /// Both in their order, so many of them.
     Healthy(u16),
+    /// The same with the samples of both spoilt.
+    Spoilt((u8, u32), u16),
 }
 
 /// Bits of a number: any at all, or one that is likely to matter.
@@ -59,11 +61,22 @@ fn bits() -> impl Strategy<Value = u32> {
 fn call() -> impl Strategy<Value = Call> {
     let spoilt = || prop::option::of((0..16_u8, bits()));
     prop_oneof![
-        spoilt().prop_map(Call::Control),
-        spoilt().prop_map(Call::Pwm),
-        Just(Call::Revise),
-        prop_oneof![3 => 1..20_u16, 1 => 300..900_u16].prop_map(Call::Healthy),
+        1 => spoilt().prop_map(Call::Control),
+        1 => spoilt().prop_map(Call::Pwm),
+        1 => Just(Call::Revise),
+        4 => prop_oneof![3 => 1..20_u16, 1 => 300..900_u16].prop_map(Call::Healthy),
+        6 => ((0..16_u8, bits()), 1..12_u16).prop_map(|(spoilt, calls)| Call::Spoilt(spoilt, calls)),
     ]
+}
+
+/// Mostly a drive that has pulsed for a while before anything befalls it.
+fn calls() -> impl Strategy<Value = Vec<Call>> {
+    (prop_oneof![1 => Just(0_u16), 3 => Just(900)], prop::collection::vec(call(), 1..30)).prop_map(
+        |(before, mut calls)| {
+            calls.insert(0, Call::Healthy(before));
+            calls
+        },
+    )
 }
 
 fn angle(omega: f32, at: u32) -> Angle {
@@ -272,7 +285,7 @@ proptest! {
     fn traction_takes_anything(
         omega in prop_oneof![Just(0.0_f32), -2600.0_f32..2600.0],
         first in any::<u32>(),
-        calls in prop::collection::vec(call(), 1..60),
+        calls in calls(),
     ) {
         let devices = Devices::new(250, 100, 900.0, &CLOCK);
         let settings = traction::Settings { clock: CLOCK, devices, gains: Gains::DEFAULT };
@@ -281,13 +294,13 @@ proptest! {
         let mut pwm = traction::PwmTask::new(&BUILT_IN, settings, Instant(first).after(devices.shortest_half_ticks));
         let mut board = Board::new(omega);
         for call in calls {
-            let healthy = if let Call::Healthy(periods) = call { periods } else { 0 };
-            board.spoilt = match call { Call::Control(spoilt) | Call::Pwm(spoilt) => spoilt, _ => None };
+            let healthy = if let Call::Healthy(count) | Call::Spoilt(_, count) = call { count } else { 0 };
+            board.spoilt = match call { Call::Control(spoilt) | Call::Pwm(spoilt) => spoilt, Call::Spoilt(spoilt, _) => Some(spoilt), _ => None };
             match call {
                 Call::Control(_) => control.run(&mut board, &shared),
                 Call::Pwm(_) => pwm.run(&mut board, &shared),
                 Call::Revise => pwm.revise(&mut board, &shared),
-                Call::Healthy(_) => {}
+                Call::Healthy(_) | Call::Spoilt(..) => {}
             }
             for _ in 0..healthy {
                 if control.next_call().reached(pwm.next_call()) {
@@ -305,7 +318,7 @@ proptest! {
     fn the_zs9_takes_anything(
         omega in prop_oneof![Just(0.0_f32), -700.0_f32..700.0],
         carrier_ticks in prop::sample::select(vec![2_500_u32, 1_250]),
-        calls in prop::collection::vec(call(), 1..40),
+        calls in calls(),
     ) {
         let settings = dual::Settings::new(CLOCK, carrier_ticks);
         let half = settings.half_steps();
@@ -314,8 +327,8 @@ proptest! {
         let mut pwm = dual::PwmTask::new(&zs9::BUILT_IN, settings);
         let mut board = Board::new(omega);
         for call in calls {
-            let healthy = if let Call::Healthy(periods) = call { periods } else { 1 };
-            board.spoilt = match call { Call::Control(spoilt) | Call::Pwm(spoilt) => spoilt, _ => None };
+            let healthy = if let Call::Healthy(count) | Call::Spoilt(_, count) = call { count } else { 1 };
+            board.spoilt = match call { Call::Control(spoilt) | Call::Pwm(spoilt) => spoilt, Call::Spoilt(spoilt, _) => Some(spoilt), _ => None };
             for _ in 0..healthy {
                 match call {
                     Call::Control(_) => control.run(&mut board, &shared),
