@@ -22,7 +22,8 @@ use tractive::time::{Clock, Instant};
 const CLOCK: Clock = Clock::new(25_000_000, 2_500);
 
 fn config() -> ProptestConfig {
-    let cases = std::env::var("TRACTIVE_FUZZ_CASES").ok().and_then(|cases| cases.parse().ok()).unwrap_or(1_000);
+    let cases =
+        std::env::var("TRACTIVE_FUZZ_CASES").ok().and_then(|cases| cases.parse().ok()).unwrap_or(1_000);
     ProptestConfig { cases, failure_persistence: None, ..ProptestConfig::default() }
 }
 
