@@ -9,8 +9,6 @@
 
 mod drives;
 mod machine;
-#[cfg(feature = "board-nucleo-g474re")]
-mod power_stage;
 
 use crate::modulation::Devices;
 use crate::time::Clock;
@@ -59,7 +57,7 @@ impl Clock {
     /// The first scalar that makes no sense.
     pub fn check(&self) -> Result<(), Refused> {
         let Self { tick_s, ticks_per_s, control_ticks, control_s } = *self;
-        let period_s = control_ticks as f32 * tick_s;
+        let period_s = control_ticks as f32 / ticks_per_s;
         within(&[
             Bound("clock.ticks_per_s", ticks_per_s, 1e5, 1e9),
             Bound("clock.tick_s", tick_s, (1.0 - ROUNDING) / ticks_per_s, (1.0 + ROUNDING) / ticks_per_s),

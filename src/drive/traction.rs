@@ -166,11 +166,8 @@ impl<M: Machine> ControlTask<M> {
         if self.trip.is_none() && applied.as_ref().is_some_and(|applied| applied.next.kind.is_tripped()) {
             self.trip = shared.trip.read();
         }
-        self.check(
-            applied.as_ref().and_then(|applied| applied.overdue(now, &self.settings.clock)),
-            &sample,
-            port,
-        );
+        let overdue = applied.as_ref().and_then(|applied| applied.overdue(now, &self.settings.clock));
+        self.check(overdue, &sample, port);
         self.check_legs(&sample, port);
         let omega = self.track(&sample, port);
         self.check(
@@ -546,6 +543,13 @@ struct Next {
 }
 
 impl Applied {
+    /// The PWM interrupt that should have come by `now` and has not: since when, in s.
+    fn overdue(&self, now: Instant, clock: &Clock) -> Option<Violation> {
+        let late = now.since(self.next.begins);
+        let limit = (clock.control_ticks / PWM_LATE_PART) as i32;
+        (late > limit).then(|| (Fault::PwmDeadline, clock.seconds(late), clock.seconds(limit)))
+    }
+
     /// As it stood at `now`, even if the PWM interrupt has come since.
     #[inline]
     fn seen(records: [crate::cell::Record<COMMITTAL_WORDS>; SEEN], now: Instant) -> Option<Self> {
@@ -555,13 +559,6 @@ impl Applied {
         }
         // Words that were never written say instant 0, of which there is none.
         now.reached(one.at()).then(|| Self::of([one, two, three], now))
-    }
-
-    /// The PWM interrupt that should have come by `now` and has not: since when, in s.
-    fn overdue(&self, now: Instant, clock: &Clock) -> Option<Violation> {
-        let late = now.since(self.next.begins);
-        let limit = (clock.control_ticks / PWM_LATE_PART) as i32;
-        (late > limit).then(|| (Fault::PwmDeadline, clock.seconds(late), clock.seconds(limit)))
     }
 
     #[inline]
