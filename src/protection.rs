@@ -392,12 +392,10 @@ impl LinkLimits {
 
 /// Mechanical overspeed, for an electrical speed in rad/s.
 pub fn check_speed(omega: f32, ratings: &Ratings) -> Option<Violation> {
-    let mechanical = omega.abs() / ratings.pole_pairs;
-    (mechanical > ratings.trip_speed_rad_s).then_some((
-        Fault::Overspeed,
-        mechanical,
-        ratings.trip_speed_rad_s,
-    ))
+    if omega.abs() > ratings.trip_speed_rad_s * ratings.pole_pairs {
+        return Some((Fault::Overspeed, omega.abs() / ratings.pole_pairs, ratings.trip_speed_rad_s));
+    }
+    None
 }
 
 /// Control periods for which a measurement may repeat to the last bit.

@@ -8,10 +8,12 @@ use tractive::frames::{self, Abc, Angle, Dq};
 use tractive::machine::BUILT_IN;
 
 /// Every block; of those with the same word before the stroke the first is ours.
-pub const ALL: [Block; 16] = [
+pub const ALL: [Block; 19] = [
+    Block { name: "call/nothing", run: call_nothing, exact: None },
     Block { name: "sin_cos/tractive", run: sin_cos_tractive, exact: Some(exact::sin_cos) },
     Block { name: "sin_cos/idsp", run: sin_cos_idsp, exact: Some(exact::sin_cos) },
     Block { name: "sin_cos/micromath", run: sin_cos_micromath, exact: Some(exact::sin_cos) },
+    Block { name: "sin_cos/fluxkit", run: sin_cos_fluxkit, exact: Some(exact::sin_cos) },
     Block { name: "sin_cos/libm", run: sin_cos_libm, exact: Some(exact::sin_cos) },
     Block { name: "atan2/tractive", run: atan2_tractive, exact: Some(exact::direction) },
     Block { name: "atan2/idsp", run: atan2_idsp, exact: Some(exact::direction) },
@@ -25,7 +27,14 @@ pub const ALL: [Block; 16] = [
     Block { name: "mtpa/tractive", run: mtpa_tractive, exact: None },
     Block { name: "core_tick/tractive", run: core_tick_tractive, exact: None },
     Block { name: "core_tick/foc", run: core_tick_foc, exact: None },
+    Block { name: "core_tick/fluxkit", run: core_tick_fluxkit, exact: None },
 ];
+
+/// What every block has besides its work: the call's return, two values read and two written.
+#[inline(never)]
+fn call_nothing(input: &Input, output: &mut Output) {
+    *output = input.vector;
+}
 
 #[inline(never)]
 fn sin_cos_tractive(input: &Input, output: &mut Output) {
@@ -43,6 +52,12 @@ fn sin_cos_idsp(input: &Input, output: &mut Output) {
 #[inline(never)]
 fn sin_cos_micromath(input: &Input, output: &mut Output) {
     let (sin, cos) = F32Ext::sin_cos(input.radians);
+    *output = [sin, cos];
+}
+
+#[inline(never)]
+fn sin_cos_fluxkit(input: &Input, output: &mut Output) {
+    let (sin, cos) = fluxkit_math::trig::sin_cos(input.radians);
     *output = [sin, cos];
 }
 
@@ -140,6 +155,27 @@ fn core_tick_foc(input: &Input, output: &mut Output) {
     let angle = number(input.radians);
     let compare = foc.update([number(a), number(b)], angle, I16F16::ONE, I16F16::DELTA);
     *output = [f32::from(compare[0]), f32::from(compare[1])];
+}
+
+/// The same of `fluxkit_math`: no map, no decoupling.
+#[inline(never)]
+fn core_tick_fluxkit(input: &Input, output: &mut Output) {
+    use fluxkit_math::frame;
+    use fluxkit_math::modulation::svpwm;
+    use fluxkit_math::transforms::{clarke, inverse_park, park};
+    use fluxkit_math::{PiConfig, PiController};
+    const LINK_V: f32 = 100.0;
+    const PERIOD_S: f32 = 1e-4;
+    let controller = || PiController::new(PiConfig { kp: 1.0, ki: 10.0, out_min: -50.0, out_max: 50.0 });
+    let Abc { a, b, c } = currents(input);
+    let current = park(clarke(frame::Abc::new(a, b, c)), input.radians);
+    let [d, q] = input.vector;
+    let voltage = frame::Dq::new(
+        controller().update(d - current.d, PERIOD_S),
+        controller().update(q - current.q, PERIOD_S),
+    );
+    let duty = svpwm(inverse_park(voltage, input.radians), LINK_V).duty;
+    *output = [duty.a.get(), duty.b.get()];
 }
 
 fn currents(input: &Input) -> Abc {

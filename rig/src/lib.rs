@@ -7,6 +7,7 @@
 
 pub mod analysis;
 pub mod bench;
+pub mod benchmark;
 pub mod bound;
 pub mod campaign;
 pub mod columns;

@@ -11,7 +11,7 @@ use tractive_rig::options::{RunOptions, not_negative, positive};
 use tractive_rig::report::{self, Page};
 use tractive_rig::scenario::{self, Scenario};
 use tractive_rig::trace::{self, Recording};
-use tractive_rig::{figures, nine_switch, pattern, points, talk, zs9};
+use tractive_rig::{benchmark, figures, nine_switch, pattern, points, talk, zs9};
 
 #[derive(Parser)]
 #[command(name = "tractive-rig", about = "Plays the motor to the drive, and shows what happened", version)]
@@ -27,6 +27,13 @@ enum Command {
         /// load-steps, sweep, characteristic, zs9-load-step, zs9-reverse, zs9-cycle or zs9-steady.
         #[arg(default_value = "sweep")]
         scenario: String,
+        #[command(flatten)]
+        options: Box<RunOptions>,
+    },
+    /// Simulated seconds per second of each scenario, on one thread of this machine, and where the time goes.
+    Bench {
+        /// All of them unless some are named.
+        scenarios: Vec<String>,
         #[command(flatten)]
         options: Box<RunOptions>,
     },
@@ -124,6 +131,10 @@ fn main() -> ExitCode {
 fn command(command: Command) -> Result<ExitCode> {
     match command {
         Command::Run { scenario, options } => run(&scenario, &options),
+        Command::Bench { scenarios, options } => {
+            benchmark::run(&scenarios, &options)?;
+            Ok(ExitCode::SUCCESS)
+        }
         Command::Talk(options) => run_talk(&options),
         Command::Points { input, output, machine } => {
             points::run(&input, &output, &Machine::load(&machine)?)?;

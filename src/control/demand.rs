@@ -111,10 +111,6 @@ impl Shaper {
 
 /// Largest torque of the rating's envelope, in N·m: constant torque, then constant power.
 fn envelope_nm(omega: f32, ratings: &Ratings) -> f32 {
-    let mechanical = omega.abs() / ratings.pole_pairs;
-    if ratings.max_torque_nm * mechanical > ratings.max_power_w {
-        ratings.max_power_w / mechanical
-    } else {
-        ratings.max_torque_nm
-    }
+    let (speed, power) = (omega.abs(), ratings.max_power_w * ratings.pole_pairs);
+    if ratings.max_torque_nm * speed > power { power / speed } else { ratings.max_torque_nm }
 }

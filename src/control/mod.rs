@@ -37,8 +37,9 @@ pub use z_source::{
 /// The machine's flux linkage at a current, in Wb.
 #[inline]
 pub fn flux_linkage(tables: &Tables, current: Dq) -> Dq {
+    const SIGN: u32 = 1 << 31;
     let [psi_d, psi_q] = tables.flux.at(current.d, current.q.abs());
-    Dq { d: psi_d, q: if current.q < 0.0 { -psi_q } else { psi_q } }
+    Dq { d: psi_d, q: f32::from_bits(psi_q.to_bits() ^ (current.q.to_bits() & SIGN)) }
 }
 
 /// Air-gap torque of a flux linkage and a current, in N·m: `1.5 n_p (psi_d i_q − psi_q i_d)`.

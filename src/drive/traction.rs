@@ -476,9 +476,15 @@ impl<M: Machine> ControlTask<M> {
     }
 
     fn check(&mut self, violation: Option<Violation>, sample: &Sample, port: &mut impl ControlPort) {
-        let (Some((fault, value, limit)), None) = (violation, self.trip) else {
-            return;
-        };
+        if let (Some(violation), None) = (violation, self.trip) {
+            self.trip_on(violation, sample, port);
+        }
+    }
+
+    /// Out of line: it happens once, and there are many checks.
+    #[cold]
+    #[inline(never)]
+    fn trip_on(&mut self, (fault, value, limit): Violation, sample: &Sample, port: &mut impl ControlPort) {
         if self.disarmed.has(fault) {
             return;
         }

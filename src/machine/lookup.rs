@@ -31,6 +31,12 @@ pub struct Grid<const N: usize> {
     pub nodes: &'static [[f32; N]],
 }
 
+/// Position on an axis, in cells. The axis' beginning in cells is known to the compiler where the table is.
+#[inline(always)]
+fn position(x: f32, first: f32, inverse_step: f32) -> f32 {
+    x * inverse_step - first * inverse_step
+}
+
 /// Cell index and the fraction inside it, for a position in cells and `count` nodes.
 #[inline(always)]
 fn cell(position: f32, count: usize) -> (usize, f32) {
@@ -62,7 +68,7 @@ impl<const N: usize> Curve<N> {
     /// Linear interpolation at `x` (axis units); linear extrapolation beyond both ends.
     #[inline]
     pub fn at(&self, x: f32) -> [f32; N] {
-        let (k, fraction) = cell((x - self.first) * self.inverse_step, self.nodes.len());
+        let (k, fraction) = cell(position(x, self.first, self.inverse_step), self.nodes.len());
         between(self.nodes, k, fraction)
     }
 
@@ -77,9 +83,9 @@ impl<const N: usize> Grid<N> {
     /// Bilinear interpolation at (`row`, `column`), in axis units; linear extrapolation beyond the edges.
     #[inline]
     pub fn at(&self, row: f32, column: f32) -> [f32; N] {
-        let (r, row_fraction) = cell((row - self.first_row) * self.inverse_row_step, self.rows);
+        let (r, row_fraction) = cell(position(row, self.first_row, self.inverse_row_step), self.rows);
         let (c, column_fraction) =
-            cell((column - self.first_column) * self.inverse_column_step, self.columns);
+            cell(position(column, self.first_column, self.inverse_column_step), self.columns);
         let low = r * self.columns + c;
         let high = low + self.columns;
         lerp(

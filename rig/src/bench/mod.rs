@@ -19,6 +19,7 @@ pub use link::{LineFilter, Supply};
 pub use observe::{Observed, Peaks};
 pub use sensors::{Converter, Flaws, Sensors};
 
+use crate::benchmark::in_plant;
 use crate::plant::Plant;
 use crate::trace::{Recording, Row, Switch};
 use inject::{Kind, Spoiler};
@@ -417,9 +418,9 @@ impl Bench {
             let dt_s = (tick - self.now) as f64 * self.tick_s;
             let before_j = self.plant.energies().electrical_j;
             if let Some(line) = &mut self.line {
-                self.plant.advance_on(&mut line.link, legs, dt_s);
+                in_plant(|| self.plant.advance_on(&mut line.link, legs, dt_s));
             } else {
-                self.plant.advance(legs, udc_v, dt_s);
+                in_plant(|| self.plant.advance(legs, udc_v, dt_s));
             }
             if let Some(link) = &mut self.link {
                 let drawn_j = self.plant.energies().electrical_j - before_j;

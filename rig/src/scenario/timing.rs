@@ -14,8 +14,9 @@ pub struct Timing;
 
 /// Speeds where async, sync 15, sync 12, middle 7, middle 3 and square are used, in r/min.
 const SPEEDS_RPM: [f64; 6] = [150.0, 750.0, 1000.0, 1450.0, 1800.0, 2200.0];
-/// From one speed to the next, and at each, in s.
+/// From one speed to the next, to the last one, and at each, in s. A quicker ramp would count as a lost angle.
 const RAMP_S: f64 = 0.03;
+const LAST_RAMP_S: f64 = 0.16;
 const HOLD_S: f64 = 0.03;
 /// What is left of the run behind the fault, in s.
 const AFTER_FAULT_S: f64 = 0.005;
@@ -32,12 +33,14 @@ impl Scenario for Timing {
 
     fn plan(&self, options: &RunOptions, machine: &Machine) -> Plan {
         let turn = options.to.signum();
-        let speeds = SPEEDS_RPM.iter().map(|rpm| rpm * turn).chain([options.to]);
         let (mut speed, mut t_s) = (Vec::new(), 0.0);
-        for rpm in speeds {
-            speed.extend([(t_s, rpm), (t_s + HOLD_S, rpm)]);
+        for rpm in SPEEDS_RPM {
+            speed.extend([(t_s, rpm * turn), (t_s + HOLD_S, rpm * turn)]);
             t_s += HOLD_S + RAMP_S;
         }
+        t_s += LAST_RAMP_S - RAMP_S;
+        speed.extend([(t_s, options.to), (t_s + HOLD_S, options.to)]);
+        t_s += HOLD_S + RAMP_S;
         let direction = if options.brake { -turn } else { turn };
         let torque_nm = (machine.folder.parameters.max_torque_nm * options.torque_scale * direction) as f32;
         let fault_s = options.fault_at.unwrap_or(f64::INFINITY);

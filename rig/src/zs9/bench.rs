@@ -9,6 +9,7 @@ use super::operator::{Operator, Orders};
 use super::sensors::Sensors;
 use super::trace::{Edge, MotorRow, Row};
 use crate::bench::{Converter, Flaws};
+use crate::benchmark::in_plant;
 use crate::plant::zs9::{IllegalState, LegGates, Zs9Plant};
 use std::collections::VecDeque;
 use tractive::board::{DualSample, GateFeedback, PlayedPeriod, PowerSample};
@@ -263,7 +264,8 @@ impl Bench {
             middle,
             low,
         });
-        self.plant.advance(self.as_diodes_have_it(gates), steps * self.step_s)?;
+        let gates = self.as_diodes_have_it(gates);
+        in_plant(|| self.plant.advance(gates, steps * self.step_s))?;
         for (gate, on) in self.levels.into_iter().enumerate() {
             let latch = if on { &mut self.feedback.on } else { &mut self.feedback.off };
             *latch |= 1 << gate;

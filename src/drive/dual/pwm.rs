@@ -25,8 +25,8 @@ pub struct PwmTask<M = &'static Tables> {
     settings: Settings,
     /// Nominal instant of the next call: a peak.
     now: Instant,
-    /// The period that was played before, and the one that is played.
-    periods: [PlayedPeriod; 2],
+    /// What the gates should have shown in the period that was played before, and in the one that is played.
+    expected: [Expected; 2],
     disarmed: Disarmed,
     trip: Option<Trip>,
     /// Link voltage at the last peak, in V.
@@ -36,12 +36,11 @@ pub struct PwmTask<M = &'static Tables> {
 impl<M: Machine> PwmTask<M> {
     /// A task whose first call is at the first peak, half a carrier period after the start, gates off until the second valley.
     pub const fn new(machine: M, settings: Settings) -> Self {
-        let off = PlayedPeriod::off(settings.half_steps());
         Self {
             machine,
             settings,
             now: Instant(settings.first_peak_ticks()),
-            periods: [off; 2],
+            expected: [Expected::OFF; 2],
             disarmed: Disarmed::NONE,
             trip: None,
             last_link_v: None,
@@ -58,28 +57,32 @@ impl<M: Machine> PwmTask<M> {
     pub fn run(&mut self, port: &mut impl DualPwmPort, shared: &Shared) {
         let now = self.now;
         self.now = now.after(self.settings.carrier_ticks);
-        let [before, running] = self.periods;
         let sample = port.sample(now);
         let command = shared.command.newest(|command| now.reached(DualCommand::valid_from(command)));
         let began = Instant(shared.began.load(Ordering::Relaxed));
         let stale = stale(now, began, &self.settings.clock);
-        let violation = self.violation(&sample, command.as_ref(), [&before, &running], stale);
+        let violation = self.violation(&sample, command.as_ref(), stale);
         self.check(violation, port);
-        let mut next = PlayedPeriod::off(self.settings.half_steps());
         let mut given = None;
+        let mut next = PlayedPeriod::off(self.settings.half_steps());
+        let mut expected = Expected::OFF;
         if let Some(command) = command.filter(|command| command.gates == Gates::Pulse && self.trip.is_none())
         {
             let request = self.request(&command, &sample);
             match nine_switch::step(&request) {
                 Ok(period) => {
-                    next.gates = period.ticks(self.settings.half_steps());
+                    for (ticks, gate) in next.gates.iter_mut().zip(&period.gates) {
+                        *ticks = gate.ticks(self.settings.half_steps());
+                    }
+                    expected = Expected::of(&next, &self.settings);
                     given = Some(shares(&request, &period));
                 }
                 Err(refused) => self.check(Some(refusal(refused, &request)), port),
             }
         }
         self.last_link_v = Some(link_v(&sample));
-        self.periods = [running, next];
+        let [_, running] = self.expected;
+        self.expected = [running, expected];
         port.play(now, &next);
         shared.applied.publish(DualApplied { at: now, next: given, trip: self.trip });
     }
@@ -113,7 +116,6 @@ impl<M: Machine> PwmTask<M> {
         &self,
         sample: &PowerSample,
         command: Option<&DualCommand>,
-        [before, running]: [&PlayedPeriod; 2],
         stale: Option<Violation>,
     ) -> Option<Violation> {
         let limits = &self.settings.limits;
@@ -126,7 +128,7 @@ impl<M: Machine> PwmTask<M> {
             .or_else(|| {
                 let command = command.filter(|command| command.gates == Gates::Pulse)?;
                 // Only while pulses are wanted: control may have turned the gates off meanwhile.
-                self.stuck(&sample.gates, before, running)
+                self.stuck(&sample.gates)
                     .filter(armed)
                     .or_else(|| stale.filter(armed))
                     .or_else(|| limits.check_duty(command.duty))
@@ -134,22 +136,13 @@ impl<M: Machine> PwmTask<M> {
     }
 
     /// Gates that were not seen as they should be since the last peak: in the falling half of the one period and the rising
-    /// half of the other. A gate that is to be on for no longer than a dead time may stay off.
-    fn stuck(&self, seen: &GateFeedback, before: &PlayedPeriod, running: &PlayedPeriod) -> Option<Violation> {
-        let half = self.settings.half_steps();
-        let shortest = (DEAD_TIME_S * self.settings.clock.ticks_per_s) as u32 * COMPARE_STEPS;
-        let (mut wrong, mut bit) = (0_u16, 1_u16);
-        for (before, running) in before.gates.iter().zip(&running.gates) {
-            let (on_before, on_running) = (on_steps(before, half), on_steps(running, half));
-            let must_be_on = on_before > shortest || on_running > shortest;
-            let may_be_on = on_before > 0 || on_running > 0;
-            let should_off = is_ever_off(before) || is_ever_off(running);
-            let (on, off) = (seen.on & bit != 0, seen.off & bit != 0);
-            if (must_be_on && !on) || (on && !may_be_on) || off != should_off {
-                wrong |= bit;
-            }
-            bit <<= 1;
-        }
+    /// half of the other.
+    fn stuck(&self, seen: &GateFeedback) -> Option<Violation> {
+        let [before, running] = &self.expected;
+        let missing = (before.must_be_on | running.must_be_on) & !seen.on;
+        let surplus = seen.on & !(before.may_be_on | running.may_be_on);
+        let never_off = (before.is_off | running.is_off) ^ seen.off;
+        let wrong = (missing | surplus | never_off) & ALL_GATES;
         (wrong != 0).then_some((Fault::LegStuck, f32::from(wrong), 0.0))
     }
 
@@ -178,13 +171,38 @@ fn link_v(sample: &PowerSample) -> f32 {
     2.0 * sample.capacitor_v - sample.source_v
 }
 
-/// Compare steps of a half in which a gate is on.
-fn on_steps(gate: &GateTicks, half_steps: u32) -> u32 {
-    half_steps.saturating_sub(gate.off_to.saturating_sub(gate.off_from))
+/// A bit for each of the nine gates.
+const ALL_GATES: u16 = 0x1FF;
+
+/// What the gates show in a period, a bit each in the order of [`crate::nine_switch::GATES`].
+#[derive(Clone, Copy, Debug)]
+struct Expected {
+    /// On for longer than a dead time; a gate that is to be on for less may stay off.
+    must_be_on: u16,
+    may_be_on: u16,
+    /// Off at some time.
+    is_off: u16,
 }
 
-fn is_ever_off(gate: &GateTicks) -> bool {
-    gate.off_from < gate.off_to
+impl Expected {
+    const OFF: Self = Self { must_be_on: 0, may_be_on: 0, is_off: ALL_GATES };
+
+    fn of(period: &PlayedPeriod, settings: &Settings) -> Self {
+        let half = settings.half_steps();
+        let shortest = (DEAD_TIME_S * settings.clock.ticks_per_s) as u32 * COMPARE_STEPS;
+        // As a pause: what is left of the half after the shortest time.
+        let longest_pause = half.saturating_sub(shortest);
+        let mut expected = Self { must_be_on: 0, may_be_on: 0, is_off: 0 };
+        let mut bit = 1;
+        for gate in &period.gates {
+            let pause = gate.off_to.saturating_sub(gate.off_from);
+            expected.must_be_on |= if pause < longest_pause { bit } else { 0 };
+            expected.may_be_on |= if pause < half { bit } else { 0 };
+            expected.is_off |= if pause > 0 { bit } else { 0 };
+            bit <<= 1;
+        }
+        expected
+    }
 }
 
 fn shares(request: &Request, period: &Period) -> [MotorShare; 2] {

@@ -61,8 +61,7 @@ fn counts(image: &Image, log: &[u8]) -> BTreeMap<String, Vec<Count>> {
     // Where the running block returns to, and how far it is.
     let mut running: Option<(&String, u32, Count)> = None;
     let mut last = 0;
-    for line in log.split(|byte| *byte == b'\n') {
-        let Some(Event::Step(address)) = event(line) else { continue };
+    for address in executed(log) {
         running = match running {
             Some((name, back, count)) if address == back => {
                 counts.entry(name.clone()).or_default().push(count.after(0, REFILL));
@@ -79,6 +78,19 @@ fn counts(image: &Image, log: &[u8]) -> BTreeMap<String, Vec<Count>> {
         last = address;
     }
     counts
+}
+
+/// The addresses of the instructions that were executed; an announced one that is withdrawn was not.
+fn executed(log: &[u8]) -> Vec<u32> {
+    let mut addresses = Vec::new();
+    for line in log.split(|byte| *byte == b'\n') {
+        match event(line) {
+            Some(Event::Step(address)) => addresses.push(address),
+            Some(Event::Withdrawn) => _ = addresses.pop(),
+            _ => {}
+        }
+    }
+    addresses
 }
 
 /// What a call took.
