@@ -47,6 +47,9 @@ mod firmware {
         let setup = qemu::connect();
         MIN_PULSE_TICKS.store(setup.min_pulse_ticks, Ordering::Relaxed);
         DEAD_TIME_TICKS.store(setup.dead_time_ticks, Ordering::Relaxed);
+        if let Err(refused) = settings().check(&BUILT_IN) {
+            qemu::refuse(&refused);
+        }
         let first_half_ticks = settings().devices.shortest_half_ticks.saturating_add(setup.pwm_delay_ticks);
         FIRST_HALF_TICKS.store(first_half_ticks, Ordering::Relaxed);
         let line =

@@ -1,6 +1,7 @@
 //! Each scalar of the configuration at 0, NaN, ±∞, negative and 1000-fold: refused by its own name, or 0 is a value that it may have.
 //! The lists below take the structures apart whole: a new field does not compile until it is listed, and fails until it is checked.
 
+use tractive::board::nucleo_g474re::power_stage::{POWER_STAGE, PowerStage};
 use tractive::configuration::Refused;
 use tractive::control::{Gains, SpeedDesign, ZSourceDesign, ZSourceGains};
 use tractive::drive::{dual, traction};
@@ -47,19 +48,17 @@ impl Scalar for f32 {
     }
 }
 
-impl Scalar for u32 {
-    const ZERO: Self = 0;
-    fn nonsense(self) -> Vec<Self> {
-        vec![0, u32::MAX, self.wrapping_neg(), self.saturating_mul(1_000)]
-    }
+macro_rules! whole_scalars {
+    ($($whole:ty),*) => {$(
+        impl Scalar for $whole {
+            const ZERO: Self = 0;
+            fn nonsense(self) -> Vec<Self> {
+                vec![0, Self::MAX, self.wrapping_neg(), self.saturating_mul(1_000)]
+            }
+        }
+    )*};
 }
-
-impl Scalar for usize {
-    const ZERO: Self = 0;
-    fn nonsense(self) -> Vec<Self> {
-        vec![0, usize::MAX, self.wrapping_neg(), self.saturating_mul(1_000)]
-    }
-}
+whole_scalars!(u16, u32, usize);
 
 /// Scalars for which 0 is a value like any other: what is ideal, what is not there, where an axis begins.
 const MAY_BE_ZERO: [&str; 6] = [
@@ -218,6 +217,26 @@ fn every_scalar_of_the_zs9() {
     try_all(settings, "link_gains.", link_gains, |settings| &mut settings.link_gains, check);
     let limits = fields!(LinkLimits as LinkLimits { source_min_v, capacitor_max_v, duty_max | }: f32);
     try_all(settings, "limits.", limits, |settings| &mut settings.limits, check);
+}
+
+#[test]
+fn every_scalar_of_the_nucleos_power_stage() {
+    let check = |stage: &PowerStage| stage.check(&BUILT_IN.ratings);
+    check(&POWER_STAGE).unwrap();
+    let floats = fields!(PowerStage as PowerStage {
+        current_a_per_code, udc_v_per_code, break_current_a |
+        dead_time_ns, min_pulse_ns, zero_code, zero_tolerance, encoder_counts, encoder_zero
+    }: f32);
+    try_all(POWER_STAGE, "power_stage.", floats, |stage| stage, check);
+    let words: [Field<PowerStage, u32>; 3] = [
+        ("dead_time_ns", |stage| &mut stage.dead_time_ns),
+        ("min_pulse_ns", |stage| &mut stage.min_pulse_ns),
+        ("encoder_counts", |stage| &mut stage.encoder_counts),
+    ];
+    try_all(POWER_STAGE, "power_stage.", &words, |stage| stage, check);
+    let codes: [Field<PowerStage, u16>; 2] =
+        [("zero_code", |stage| &mut stage.zero_code), ("zero_tolerance", |stage| &mut stage.zero_tolerance)];
+    try_all(POWER_STAGE, "power_stage.", &codes, |stage| stage, check);
 }
 
 fn zs9_settings_of(carrier_ticks: u32) -> dual::Settings {

@@ -112,6 +112,28 @@ fn both_motors_trips_are_the_same() {
     same("zs9-load-step --carrier-hz 20000 --inject source-short@0.1", 1);
 }
 
+/// An image that is told nonsense does not start: it names what is wrong, no interrupt comes, nothing is written.
+#[test]
+#[ignore = "needs the image and QEMU"]
+fn nonsense_is_refused_by_name_before_anything_starts() {
+    for (scenario, name) in [
+        ("load-steps --min-pulse-us 300", "devices.min_pulse_ticks"),
+        ("load-steps --dead-time-us 140", "devices.dead_time_ticks"),
+    ] {
+        for on in ["host", "qemu"] {
+            let folder = tempfile::tempdir().unwrap();
+            let out = folder.path().join("out");
+            let (code, errors) = run(scenario, on, &out);
+            assert_eq!(code, 2, "{scenario} on {on}: {errors}");
+            assert!(
+                errors.contains(&format!("configuration refused: {name}")),
+                "{scenario} on {on}: {errors}"
+            );
+            assert!(!out.join("trace.csv").exists());
+        }
+    }
+}
+
 #[test]
 #[ignore = "needs the image and QEMU"]
 fn from_power_up_to_an_empty_link_is_the_same() {

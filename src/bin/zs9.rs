@@ -32,6 +32,9 @@ mod firmware {
     fn main() -> ! {
         let setup = qemu::connect_dual();
         CARRIER_TICKS.store(setup.carrier_ticks, Ordering::Relaxed);
+        if let Err(refused) = settings().check(&BUILT_IN) {
+            qemu::refuse(&refused);
+        }
         qemu::start_dual(&settings());
         loop {
             qemu::idle();

@@ -13,6 +13,7 @@ mod exchange;
 pub use dual::{connect_dual, die_dual, start_dual};
 
 use super::{ControlPort, PwmPort, Sample};
+use crate::configuration::Refused;
 use crate::drive::Report;
 use crate::frames::Abc;
 use crate::link::Setup;
@@ -147,6 +148,12 @@ pub fn stop(success: bool) -> ! {
     loop {
         cortex_m::asm::wfi();
     }
+}
+
+/// Does not start: names what is refused and ends the emulation. No interrupt is unmasked, and the gates are off.
+pub fn refuse(refused: &Refused) -> ! {
+    exchange::refused(refused.name);
+    stop(false)
 }
 
 /// Gates off, whatever state the program is in, then the end: for panics and HardFaults.

@@ -65,7 +65,7 @@ impl dual::Settings {
         check_speed(speed, clock.control_s(), tables)?;
         check_link(link, clock.control_s())?;
         check_link_gains(link_gains, link)?;
-        check_limits(limits, tables)
+        check_limits(limits)
     }
 }
 
@@ -116,13 +116,11 @@ fn check_link_gains(gains: &ZSourceGains, link: &ZSourceDesign) -> Result<(), Re
     ])
 }
 
-fn check_limits(limits: &LinkLimits, tables: &Tables) -> Result<(), Refused> {
+fn check_limits(limits: &LinkLimits) -> Result<(), Refused> {
     let LinkLimits { source_min_v, capacitor_max_v, duty_max } = *limits;
-    // The highest capacitor voltage of normal operation.
-    let highest_v = tables.ratings.dc_link_max_v / dual::TWO_LEVEL_SHARE;
     within(&[
-        Bound("limits.capacitor_max_v", capacitor_max_v, highest_v, 3.0 * highest_v),
-        Bound("limits.source_min_v", source_min_v, ABOVE_ZERO, highest_v),
+        Bound("limits.capacitor_max_v", capacitor_max_v, 1.0, 1e4),
+        Bound("limits.source_min_v", source_min_v, ABOVE_ZERO, capacitor_max_v),
         Bound("limits.duty_max", duty_max, ABOVE_ZERO, 0.5 - ROUNDING),
     ])
 }

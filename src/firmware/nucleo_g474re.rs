@@ -47,6 +47,10 @@ fn kept(cells: &[AtomicU32; 3]) -> Zeros {
 
 #[entry]
 fn main() -> ! {
+    let checked = settings().check(&BUILT_IN).and_then(|()| POWER_STAGE.check(&BUILT_IN.ratings));
+    if let Err(refused) = checked {
+        board::refuse(&refused);
+    }
     if let Ok(found) = board::prepare(Plan { shortest_half_ticks: settings().devices.shortest_half_ticks }) {
         keep(&CONTROL_ZEROS, found.control_zeros);
         keep(&PWM_ZEROS, found.pwm_zeros);

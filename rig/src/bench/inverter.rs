@@ -67,6 +67,7 @@ pub struct Inverter {
     astray_since: Option<Tick>,
     found: LegFaults,
     edges: Vec<Edge>,
+    keeps_edges: bool,
 }
 
 impl Inverter {
@@ -84,7 +85,20 @@ impl Inverter {
             astray_since: None,
             found: LegFaults::default(),
             edges: Vec::new(),
+            keeps_edges: true,
         }
+    }
+
+    /// The same playing from another tick on.
+    pub fn beginning_at(mut self, origin: Tick) -> Self {
+        self.half_start += origin;
+        self
+    }
+
+    /// The same without a list of edges.
+    pub fn without_edges(mut self) -> Self {
+        self.keeps_edges = false;
+        self
     }
 
     /// The half that is played.
@@ -271,7 +285,9 @@ impl Inverter {
         if *state != on {
             *state = on;
             let gate = (phase * 2) as u8 + u8::from(!upper);
-            self.edges.push(Edge { tick, gate, on });
+            if self.keeps_edges {
+                self.edges.push(Edge { tick, gate, on });
+            }
             if on {
                 self.turns_on(gate);
             }

@@ -186,6 +186,23 @@ impl Bench {
         }
     }
 
+    /// The same beginning at another tick than 0, with tasks of [`crate::run::Tasks::beginning_at`] the same: where instants wrap.
+    pub fn beginning_at(mut self, origin: Tick) -> Self {
+        for tick in [&mut self.now, &mut self.lead, &mut self.end, &mut self.next_sample, &mut self.next_row]
+        {
+            *tick += origin;
+        }
+        self.observed.from = self.observed.from.saturating_add(origin);
+        self.inverter = self.inverter.beginning_at(origin);
+        self
+    }
+
+    /// The same without a list of edges: for runs so long that it would fill the memory.
+    pub fn without_edges(mut self) -> Self {
+        self.inverter = self.inverter.without_edges();
+        self
+    }
+
     /// The same with a line side: the link's voltage is its capacitor's, and the drive has an operator.
     pub fn with_line(mut self, plan: LinePlan) -> Self {
         self.line = Some(LineSide::new(plan, &self.clock));

@@ -160,10 +160,21 @@ pub struct Tasks<'a> {
 impl<'a> Tasks<'a> {
     /// Before their first interrupts.
     pub fn new(tables: &'static Tables, settings: Settings, first_half_ticks: u32) -> Self {
-        let first_control = Instant(settings.clock.control_ticks);
+        Self::beginning_at(Instant(0), tables, settings, first_half_ticks)
+    }
+
+    /// The same for timers that start at another instant.
+    pub fn beginning_at(
+        origin: Instant,
+        tables: &'static Tables,
+        settings: Settings,
+        first_half_ticks: u32,
+    ) -> Self {
+        let first_control = origin.after(settings.clock.control_ticks);
+        let first_pwm = origin.after(first_half_ticks);
         Self {
             control: ControlTask::new(tables, settings, first_control),
-            pwm: PwmTask::new(tables, settings, Instant(first_half_ticks)).after_halves_of(first_half_ticks),
+            pwm: PwmTask::new(tables, settings, first_pwm).after_halves_of(first_half_ticks),
             shared: Shared::new(),
             desk: Desk::new(),
             slot: Slot::new(),

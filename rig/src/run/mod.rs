@@ -11,6 +11,7 @@ pub use qemu::run_in_qemu;
 
 use crate::bench::Bench;
 use indicatif::{ProgressBar, ProgressStyle};
+use tractive::configuration::Refused;
 use tractive::operator::SLOT_PERIODS;
 use tractive::protocol::Frame;
 use tractive::time::{Clock, Instant};
@@ -56,6 +57,11 @@ fn turn(supervisor: &mut dyn Supervisor, bench: &mut Bench, at: Instant) -> anyh
         bench.end_at(next);
     }
     Ok(turn.frame)
+}
+
+/// What an image says that does not start.
+pub(crate) fn refused(refused: Refused) -> anyhow::Error {
+    anyhow::anyhow!("configuration refused: {refused}")
 }
 
 /// A bar on a terminal; in a pipe indicatif draws none.

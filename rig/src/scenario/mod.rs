@@ -191,6 +191,7 @@ fn run_plan(
     match options.on {
         On::Host => {
             let settings = Settings { clock: CLOCK, devices, gains: Gains::DEFAULT };
+            settings.check(machine.tables).map_err(run::refused)?;
             run::run_on_host(name, bench, machine.tables, settings, first_half_ticks, line, supervisor)
         }
         On::Qemu => {

@@ -10,6 +10,7 @@ use super::serve::Serve;
 use super::start::{self, Found, Plan, StartError, Timeout, Wait};
 use super::watchdog::Pulse;
 use super::{CLOCK, zs9};
+use crate::configuration::Refused;
 use crate::drive::Report;
 use crate::machine::BUILT_IN;
 use crate::operator::{self, Configuration, Slot, slot_s};
@@ -90,6 +91,15 @@ pub fn prepare(plan: Plan) -> Result<Found, StartError> {
         Err(error) => defmt::error!("no bus: {}", error),
     }
     found
+}
+
+/// Does not start: the reset has left every gate's pin floating and every interrupt masked, and so they stay.
+pub fn refuse(refused: &Refused) -> ! {
+    let Refused { name, value, least, most } = refused;
+    defmt::error!("no start: {=str} = {=f32}, must be from {=f32} to {=f32}", name, value, least, most);
+    loop {
+        cortex_m::asm::wfi();
+    }
 }
 
 /// Starts both timers and unmasks their interrupts: PWM preempts control.

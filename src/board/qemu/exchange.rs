@@ -120,6 +120,20 @@ pub fn dead() {
     send(&Request::Dead.to_block());
 }
 
+/// Says on the emulator's standard error what of the configuration is refused.
+#[inline(never)]
+pub fn refused(name: &str) {
+    const APPEND: usize = 8;
+    let console = c":tt";
+    // SAFETY: SYS_OPEN reads a NUL-terminated name of the given length, which lives for the program; opened for appending it is
+    // the standard error.
+    let handle = unsafe { syscall!(OPEN, console.as_ptr(), APPEND, console.count_bytes()) };
+    for text in ["configuration refused: ", name, "\n"] {
+        // SAFETY: SYS_WRITE reads exactly the text, which outlives the call.
+        unsafe { syscall!(WRITE, handle, text.as_ptr(), text.len()) };
+    }
+}
+
 fn file(index: usize) -> usize {
     match FILES.get(index) {
         Some(handle) => handle.load(Ordering::Relaxed) as usize,

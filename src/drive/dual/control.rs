@@ -15,7 +15,7 @@ use core::sync::atomic::Ordering;
 /// Corner of the filter on the voltage limit, in Hz: fed by the link as it is, the limit would make it oscillate.
 const LIMIT_FILTER_HZ: f32 = 10.0;
 /// A motor has at most U_c/(2√3). The link of a two-level inverter whose six-step fundamental is as large, as a share of U_c.
-pub const TWO_LEVEL_SHARE: f32 = FRAC_PI_4 / SQRT_3;
+const TWO_LEVEL_SHARE: f32 = FRAC_PI_4 / SQRT_3;
 /// What a lost sensor is called, by motor.
 const SENSOR_LOST: [Fault; 2] = [Fault::SensorLost1, Fault::SensorLost2];
 

@@ -28,7 +28,7 @@ use crate::protection::LinkLimits;
 use crate::time::Clock;
 use core::sync::atomic::AtomicU32;
 
-pub use control::{ControlTask, TWO_LEVEL_SHARE};
+pub use control::ControlTask;
 pub use messages::{DualApplied, DualCommand, DualReport, MotorCommand, MotorShare, scheme_from_code};
 pub use pwm::PwmTask;
 

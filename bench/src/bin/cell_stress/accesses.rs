@@ -3,23 +3,20 @@
 
 use crate::broken::{Eager, Plain};
 use crate::message::Message;
-use tractive::cell::{Downlink, Uplink};
+use tractive::cell::{Downlink, SEEN, Trail, Uplink, Words};
 
-pub static DOWNLINK_9: Downlink<Message<9>, 9> = Downlink::new();
 pub static DOWNLINK_10: Downlink<Message<10>, 10> = Downlink::new();
-pub static UPLINK_27: Uplink<Message<27>, 27> = Uplink::new();
+pub static UPLINK_4: Uplink<Message<4>, 4> = Uplink::new();
 pub static UPLINK_10: Uplink<Message<10>, 10> = Uplink::new();
+pub static TRAIL_13: Trail<13> = Trail::new();
+pub static TRAIL_REVISED: Trail<13> = Trail::new();
 /// Never written.
-pub static EMPTY_27: Uplink<Message<27>, 27> = Uplink::new();
+pub static EMPTY_13: Trail<13> = Trail::new();
+pub static EMPTY_4: Uplink<Message<4>, 4> = Uplink::new();
 pub static EMPTY_10: Uplink<Message<10>, 10> = Uplink::new();
-pub static PLAIN_DOWN: Plain<9> = Plain::new();
-pub static PLAIN_UP: Plain<27> = Plain::new();
-pub static EAGER: Eager<9> = Eager::new();
-
-#[inline(never)]
-pub fn downlink_9_publish(message: &Message<9>) {
-    DOWNLINK_9.publish(*message);
-}
+pub static PLAIN_DOWN: Plain<10> = Plain::new();
+pub static PLAIN_UP: Plain<13> = Plain::new();
+pub static EAGER: Eager<10> = Eager::new();
 
 #[inline(never)]
 pub fn downlink_10_publish(message: &Message<10>) {
@@ -27,7 +24,7 @@ pub fn downlink_10_publish(message: &Message<10>) {
 }
 
 #[inline(never)]
-pub fn uplink_27_read(cell: &Uplink<Message<27>, 27>) -> Option<Message<27>> {
+pub fn uplink_4_read(cell: &Uplink<Message<4>, 4>) -> Option<Message<4>> {
     cell.read()
 }
 
@@ -36,17 +33,31 @@ pub fn uplink_10_read(cell: &Uplink<Message<10>, 10>) -> Option<Message<10>> {
     cell.read()
 }
 
+/// All that a reader may look at, the newest first.
 #[inline(never)]
-pub fn plain_publish(message: &Message<9>) {
+pub fn trail_13_read(cell: &Trail<13>) -> Option<[Message<13>; SEEN]> {
+    cell.read(|records| records.map(|record| Message::from_words(words(&record))))
+}
+
+#[inline(always)]
+fn words(record: &tractive::cell::Record<13>) -> [u32; 13] {
+    macro_rules! all {
+        ($($k:literal)*) => { [$(record.word::<$k>()),*] };
+    }
+    all!(0 1 2 3 4 5 6 7 8 9 10 11 12)
+}
+
+#[inline(never)]
+pub fn plain_publish(message: &Message<10>) {
     PLAIN_DOWN.publish(*message);
 }
 
 #[inline(never)]
-pub fn plain_read() -> Option<Message<27>> {
+pub fn plain_read() -> Option<Message<13>> {
     Some(PLAIN_UP.read())
 }
 
 #[inline(never)]
-pub fn eager_publish(message: &Message<9>) {
+pub fn eager_publish(message: &Message<10>) {
     EAGER.publish(*message);
 }

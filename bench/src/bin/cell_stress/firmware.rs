@@ -18,11 +18,11 @@ const PWM_TICKS: u32 = CONTROL_TICKS + 1;
 /// First part: one PWM interrupt in each control period. Control interrupts in which each subject meets each phase, because
 /// the number of subjects and the PWM timer's period have no divisor in common.
 const SINGLE_ROUNDS: u32 = PWM_TICKS * SUBJECTS.len() as u32;
-const _: () = assert!(!PWM_TICKS.is_multiple_of(3), "the subjects are nine");
+const _: () = assert!(!PWM_TICKS.is_multiple_of(SUBJECTS.len() as u32));
 /// Second part: four PWM interrupts in a row, so that a reader is hit in every try, and where it gives up. One subject after the other, a
 /// sweep for each of these times from one interrupt's end to the next: any part of a try.
 const BURST: u32 = 4;
-const PAUSES_TICKS: [u32; 16] = [20, 25, 30, 35, 40, 45, 50, 55, 60, 65, 70, 75, 80, 85, 90, 95];
+const PAUSES_TICKS: [u32; 16] = [16, 20, 25, 30, 36, 43, 51, 60, 70, 80, 90, 105, 120, 135, 150, 170];
 const PAUSES: usize = PAUSES_TICKS.len();
 const ROUNDS: u32 = SINGLE_ROUNDS + (PAUSES * BURST_SUBJECTS.len()) as u32 * PWM_TICKS;
 
@@ -79,16 +79,10 @@ fn main() -> ! {
     qemu::start(PWM_TICKS);
     write_register(CONTROL_RELOAD, CONTROL_TICKS - 1);
     while !DONE.load(SeqCst) {
-        wait();
+        qemu::idle();
     }
     report();
     qemu::stop(true)
-}
-
-/// Out of line: no short branch reaches across it.
-#[inline(never)]
-fn wait() {
-    qemu::idle();
 }
 
 #[interrupt]

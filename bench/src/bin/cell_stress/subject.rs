@@ -3,6 +3,7 @@
 use crate::accesses::*;
 use crate::message::Message;
 use core::sync::atomic::{AtomicU32, Ordering::SeqCst, compiler_fence};
+use tractive::cell::{SEEN, Words};
 
 /// What was published and what was read.
 pub struct Counts {
@@ -30,15 +31,7 @@ impl Subject {
     }
 }
 
-pub static SUBJECTS: [Subject; 9] = [
-    Subject::new(
-        "downlink-9",
-        |c| c.publish(downlink_9_publish),
-        |c| {
-            c.read(|| DOWNLINK_9.newest(|_| true));
-            c.read_before(|not| DOWNLINK_9.newest(|message| message.word::<0>() != not));
-        },
-    ),
+pub static SUBJECTS: [Subject; 11] = [
     Subject::new(
         "downlink-10",
         |c| c.publish(downlink_10_publish),
@@ -48,33 +41,52 @@ pub static SUBJECTS: [Subject; 9] = [
         },
     ),
     Subject::new(
-        "uplink-27",
-        |c| c.read(|| uplink_27_read(&UPLINK_27)),
-        |c| c.publish(|m| UPLINK_27.publish(*m)),
+        "uplink-4",
+        |c| c.read(|| uplink_4_read(&UPLINK_4)),
+        |c| c.publish(|m| UPLINK_4.publish(*m)),
     ),
     Subject::new(
         "uplink-10",
         |c| c.read(|| uplink_10_read(&UPLINK_10)),
         |c| c.publish(|m| UPLINK_10.publish(*m)),
     ),
-    Subject::new("uplink-27-empty", |c| c.read_empty(uplink_27_read(&EMPTY_27)), |_| ()),
-    Subject::new("uplink-10-empty", |c| c.read_empty(uplink_10_read(&EMPTY_10)), |_| ()),
+    Subject::new(
+        "trail-13",
+        |c| c.read_trail(|| trail_13_read(&TRAIL_13)),
+        |c| c.publish(|m| TRAIL_13.publish(m.to_words())),
+    ),
+    Subject::new(
+        "trail-13-revised",
+        |c| c.read_trail(|| trail_13_read(&TRAIL_REVISED)),
+        |c| {
+            c.publish(|m| TRAIL_REVISED.publish(m.to_words()));
+            c.publish(|m| TRAIL_REVISED.revise(m.to_words()));
+        },
+    ),
+    Subject::new("uplink-4-empty", |c| c.read_empty(uplink_4_read(&EMPTY_4).is_some()), |_| ()),
+    Subject::new("uplink-10-empty", |c| c.read_empty(uplink_10_read(&EMPTY_10).is_some()), |_| ()),
+    Subject::new("trail-13-empty", |c| c.read_empty(trail_13_read(&EMPTY_13).is_some()), |_| ()),
     Subject::new("broken-plain-down", |c| c.publish(plain_publish), |c| c.read(|| Some(PLAIN_DOWN.read()))),
     Subject::new("broken-plain-up", |c| c.read(plain_read), |c| c.publish(|m| PLAIN_UP.publish(*m))),
     Subject::new("broken-eager-down", |c| c.publish(eager_publish), |c| c.read(|| EAGER.read())),
 ];
 
 /// Those whose reader tries again, for several interrupts in a row; it may give up then.
-pub static BURST_SUBJECTS: [Subject; 2] = [
+pub static BURST_SUBJECTS: [Subject; 3] = [
     Subject::new(
-        "burst-uplink-27",
-        |c| c.read(|| uplink_27_read(&UPLINK_27)),
-        |c| c.publish(|m| UPLINK_27.publish(*m)),
+        "burst-uplink-4",
+        |c| c.read(|| uplink_4_read(&UPLINK_4)),
+        |c| c.publish(|m| UPLINK_4.publish(*m)),
     ),
     Subject::new(
         "burst-uplink-10",
         |c| c.read(|| uplink_10_read(&UPLINK_10)),
         |c| c.publish(|m| UPLINK_10.publish(*m)),
+    ),
+    Subject::new(
+        "burst-trail-13",
+        |c| c.read(|| trail_13_read(&TRAIL_13).map(|[newest, ..]| newest)),
+        |c| c.publish(|m| TRAIL_13.revise(m.to_words())),
     ),
 ];
 
@@ -124,10 +136,31 @@ impl Counts {
     }
 
     /// A cell that nobody has written: anything found in it is torn.
-    fn read_empty<const N: usize>(&self, message: Option<Message<N>>) {
+    fn read_empty(&self, is_found: bool) {
         add(&self.reads);
-        if message.is_some() {
+        if is_found {
             add(&self.torn);
+        }
+    }
+
+    /// The newest value as in [`Self::read`]; those before it each older, none skipped by more than a revision.
+    fn read_trail<const N: usize>(&self, read: impl Fn() -> Option<[Message<N>; SEEN]>) {
+        let oldest = self.done.load(SeqCst);
+        compiler_fence(SeqCst);
+        let records = read();
+        compiler_fence(SeqCst);
+        // As many as the reader looks at.
+        if oldest < 2 * SEEN as u32 {
+            return;
+        }
+        let Some([newest, before @ ..]) = records else {
+            return self.judge::<N>(None, 0, 0);
+        };
+        let mut last = newest.claimed();
+        self.judge(Some(newest), oldest, self.begun.load(SeqCst));
+        for record in before {
+            self.judge(Some(record), last.saturating_sub(3), last.saturating_sub(1));
+            last = record.claimed();
         }
     }
 

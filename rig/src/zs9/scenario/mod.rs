@@ -16,7 +16,7 @@ use crate::options::{On, RunOptions};
 use crate::plant::zs9::{NetworkState, Zs9Plant, Zs9Settings};
 use crate::plant::{PlantSettings, SpeedSource};
 use crate::report::Page;
-use crate::run::CLOCK;
+use crate::run::{CLOCK, refused};
 use anyhow::{Result, bail};
 use core::f64::consts::TAU;
 use tractive::link::DualSetup;
@@ -86,7 +86,10 @@ pub fn drive(scenario: &dyn Scenario, options: &RunOptions, machine: &Machine) -
     let bench = bench(scenario, options, machine)?;
     let settings = settings::drive(CLOCK, options.zs9.carrier_hz);
     match options.on {
-        On::Host => Ok(run::run_on_host(scenario.name(), bench, machine.tables, settings)?),
+        On::Host => {
+            settings.check(machine.tables).map_err(refused)?;
+            Ok(run::run_on_host(scenario.name(), bench, machine.tables, settings)?)
+        }
         On::Qemu => {
             let setup = DualSetup { carrier_ticks: settings.carrier_ticks };
             run::run_in_qemu(scenario.name(), bench, setup, &options.emulator()?)
