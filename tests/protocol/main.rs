@@ -24,7 +24,7 @@ impl Stream {
     }
 
     /// The next frame, with this content.
-    pub fn next(&mut self, content: Payload) -> Frame {
+    pub fn frame(&mut self, content: Payload) -> Frame {
         self.message.frame(content, &mut self.counter)
     }
 }

@@ -13,7 +13,7 @@ fn command(torque_nm: f32) -> Payload {
 /// A receiver that has heard the first frame, and the stream that goes on from it.
 fn met() -> (Receiver, Stream) {
     let (mut receiver, mut stream) = (Receiver::new(), Stream::of(&COMMAND));
-    assert_eq!(receiver.receive(&stream.next(command(0.0))), Ok(Content::Greeting));
+    assert_eq!(receiver.receive(&stream.frame(command(0.0))), Ok(Content::Greeting));
     (receiver, stream)
 }
 
@@ -29,7 +29,7 @@ fn frames_in_order_take_effect() {
     let (mut receiver, mut stream) = met();
     for k in 0..40 {
         let torque_nm = k as f32;
-        assert_eq!(torque(receiver.receive(&stream.next(command(torque_nm)))), Some(torque_nm));
+        assert_eq!(torque(receiver.receive(&stream.frame(command(torque_nm)))), Some(torque_nm));
     }
     assert_eq!(*receiver.counts(), Counts { received: 41, taken: 41, ..Counts::default() });
 }
@@ -37,7 +37,7 @@ fn frames_in_order_take_effect() {
 #[test]
 fn each_cause_is_named_and_counted() {
     let (mut receiver, mut stream) = met();
-    let good = stream.next(command(10.0));
+    let good = stream.frame(command(10.0));
     assert!(receiver.receive(&good).is_ok());
     assert_eq!(receiver.receive(&good), Err(Reject::Repeated));
     assert_eq!(receiver.receive(&Frame { id: 0x7FF, ..good }), Err(Reject::Unknown));
@@ -46,16 +46,16 @@ fn each_cause_is_named_and_counted() {
         assert_eq!(receiver.receive(&Frame { length, ..good }), Err(Reject::Truncated));
     }
     for bit in 0..64 {
-        let mut bad = stream.next(command(20.0));
+        let mut bad = stream.frame(command(20.0));
         bad.data[bit / 8] ^= 1 << (bit % 8);
         assert_eq!(receiver.receive(&bad), Err(Reject::Corrupted), "bit {bit}");
     }
     // The 64 corrupted frames have taken the counter round four times.
-    assert_eq!(torque(receiver.receive(&stream.next(command(30.0)))), Some(30.0));
+    assert_eq!(torque(receiver.receive(&stream.frame(command(30.0)))), Some(30.0));
     assert_eq!(receiver.receive(&good), Err(Reject::Disordered), "an old frame");
     let mut reserved = command(40.0);
     reserved.0 |= 1 << 63;
-    assert_eq!(receiver.receive(&stream.next(reserved)), Err(Reject::OutOfRange));
+    assert_eq!(receiver.receive(&stream.frame(reserved)), Err(Reject::OutOfRange));
     let counts = *receiver.counts();
     let wanted = Counts {
         received: 87,
@@ -76,7 +76,7 @@ fn each_cause_is_named_and_counted() {
 fn frames_that_change_places_lose_the_late_one() {
     let (mut receiver, mut stream) = met();
     let (first, second, third) =
-        (stream.next(command(1.0)), stream.next(command(2.0)), stream.next(command(3.0)));
+        (stream.frame(command(1.0)), stream.frame(command(2.0)), stream.frame(command(3.0)));
     assert_eq!(torque(receiver.receive(&second)), Some(2.0));
     assert_eq!(receiver.receive(&first), Err(Reject::Disordered));
     assert_eq!(torque(receiver.receive(&third)), Some(3.0));
@@ -88,14 +88,14 @@ fn up_to_two_lost_frames_are_forgiven_and_counted_more_wait_for_the_silence() {
     for lost in 0..6 {
         let (mut receiver, mut stream) = met();
         for _ in 0..lost {
-            stream.next(command(0.0));
+            stream.frame(command(0.0));
         }
-        let verdict = receiver.receive(&stream.next(command(5.0)));
+        let verdict = receiver.receive(&stream.frame(command(5.0)));
         assert_eq!(verdict.is_ok(), lost <= 2, "{lost}");
         assert_eq!(receiver.counts().lost, if lost <= 2 { lost } else { 0 });
         (0..50).for_each(|_| receiver.wait(50));
-        assert_eq!(receiver.receive(&stream.next(command(6.0))), Ok(Content::Greeting), "after the silence");
-        assert_eq!(torque(receiver.receive(&stream.next(command(7.0)))), Some(7.0));
+        assert_eq!(receiver.receive(&stream.frame(command(6.0))), Ok(Content::Greeting), "after the silence");
+        assert_eq!(torque(receiver.receive(&stream.frame(command(7.0)))), Some(7.0));
     }
 }
 
@@ -116,9 +116,9 @@ fn out_of_range_is_rejected_whole_in_every_message() {
         ),
     ] {
         let (mut receiver, mut stream) = (Receiver::new(), Stream::of(stream));
-        receiver.receive(&stream.next(contents[0])).unwrap();
+        receiver.receive(&stream.frame(contents[0])).unwrap();
         for content in &contents {
-            assert_eq!(receiver.receive(&stream.next(*content)), Err(Reject::OutOfRange), "{content:X?}");
+            assert_eq!(receiver.receive(&stream.frame(*content)), Err(Reject::OutOfRange), "{content:X?}");
         }
     }
 }
@@ -138,7 +138,7 @@ fn every_message_says_what_was_put_in() {
         (&PARAMETER_REQUEST, request.encode().unwrap(), Content::Parameter(request)),
     ] {
         let mut stream = Stream::of(message);
-        assert_eq!(receiver.receive(&stream.next(content)), Ok(Content::Greeting));
-        assert_eq!(receiver.receive(&stream.next(content)), Ok(wanted));
+        assert_eq!(receiver.receive(&stream.frame(content)), Ok(Content::Greeting));
+        assert_eq!(receiver.receive(&stream.frame(content)), Ok(wanted));
     }
 }

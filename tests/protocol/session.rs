@@ -47,7 +47,7 @@ impl Bench {
     }
 
     fn command(&mut self, command: Command) -> Request {
-        let frame = self.commands.next(command.encode().unwrap());
+        let frame = self.commands.frame(command.encode().unwrap());
         self.slot(Some(frame))
     }
 
@@ -65,7 +65,7 @@ impl Bench {
 
     fn parameter(&mut self, parameter: u8, write: Option<f32>) -> Option<ParameterAnswer> {
         let content = ParameterRequest { parameter, write }.encode().unwrap();
-        let frame = self.parameters.next(content);
+        let frame = self.parameters.frame(content);
         self.sent.clear();
         self.slot(Some(frame));
         self.silence(2);
@@ -147,8 +147,8 @@ fn limits_are_the_senders_within_the_parameters() {
     let at_link = LinkLimits { low_v: 1_100.0, high_v: 1_750.0 };
     let mut request = bench.slot(None);
     for _ in 0..2 {
-        bench.slot(Some(torque.next(as_rated.encode().unwrap())));
-        request = bench.slot(Some(link.next(at_link.encode().unwrap())));
+        bench.slot(Some(torque.frame(as_rated.encode().unwrap())));
+        request = bench.slot(Some(link.frame(at_link.encode().unwrap())));
     }
     let limits = request.limits;
     assert_eq!((limits.motoring_nm, limits.braking_nm), (rated.motoring_nm, 100.0));
@@ -158,7 +158,7 @@ fn limits_are_the_senders_within_the_parameters() {
     bench.parameter(3, Some(500.0)).unwrap();
     assert_eq!(bench.slot(None).limits.motoring_nm, 500.0);
     let beyond = TorqueLimits { motoring_nm: ratings.max_torque_nm + 1.0, ..as_rated };
-    let limits = bench.slot(Some(torque.next(beyond.encode().unwrap()))).limits;
+    let limits = bench.slot(Some(torque.frame(beyond.encode().unwrap()))).limits;
     assert!(limits.motoring_nm > ratings.max_torque_nm, "the operator refuses it; nothing is clamped here");
 }
 

@@ -35,7 +35,7 @@ impl Lines {
     ///
     /// # Errors
     /// A line that cannot be understood; on a terminal it is said and the next one is read.
-    pub fn next(&mut self) -> Result<Option<Line>> {
+    pub fn take(&mut self) -> Result<Option<Line>> {
         let count = match self {
             Self::Script(lines) => return Ok(lines.pop_front()),
             Self::Typed(count) => count,

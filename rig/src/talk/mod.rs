@@ -72,7 +72,7 @@ fn figures(talk: &Talk, recording: &Recording) -> Figures {
     figures.set("telemetry_errors", talk.listener.errors);
     figures.set("frames_rejected", talk.listener.counts.rejected());
     figures.set("highest_speed_rpm", speeds().fold(0.0, f64::max));
-    figures.set("last_speed_rpm", speeds().last().unwrap_or(0.0));
+    figures.set("last_speed_rpm", recording.rows.last().map_or(0.0, |row| row.speed_rpm));
     figures.set("fault", recording.trip().map_or("", |trip| trip.fault.name()));
     figures.set("expectations", talk.expectations);
     figures.set("not_met", &talk.failures);

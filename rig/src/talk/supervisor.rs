@@ -108,7 +108,7 @@ impl Talk {
     fn read(&mut self, t_s: f64) -> Result<()> {
         while !self.ended && t_s + DUE_S >= self.wait_until_s {
             if self.next.is_none() {
-                self.next = self.lines.next()?;
+                self.next = self.lines.take()?;
             }
             let Some(line) = self.next.take() else {
                 self.ended = true;
