@@ -51,9 +51,7 @@ pub(super) fn window(limits: &Limits, ratings: &Ratings) -> LinkWindow {
 
 /// A link that has lost its source while the main contactor is closed: it must not come back without precharge.
 pub(super) fn link_lost(input: &Input, settings: &Settings) -> Option<Violation> {
-    if settings.line.is_none() {
-        return None;
-    }
+    settings.line?;
     protection::check_undervoltage(input.observed.udc_v, settings.ratings)
 }
 
