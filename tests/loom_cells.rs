@@ -3,7 +3,7 @@
 
 use loom::sync::Arc;
 use loom::thread;
-use tractive::cell::{Downlink, Ring, Uplink, Words};
+use tractive::cell::{Downlink, Ring, Trail, Uplink, Words};
 
 /// Two words that belong together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -46,6 +46,41 @@ fn an_uplink_is_never_torn() {
     });
 }
 
+/// The newest two records' words, of which both are the record's number.
+fn newest_two(trail: &Trail<2>) -> Option<[[u32; 2]; 2]> {
+    trail.read(|[one, two, ..]| [one, two].map(|record| [record.word::<0>(), record.word::<1>()]))
+}
+
+#[test]
+fn a_trail_is_never_torn_by_the_next_record() {
+    loom::model(|| {
+        let trail = Arc::new(Trail::<2>::new());
+        trail.publish([1; 2]);
+        let reader = Arc::clone(&trail);
+        let thread = thread::spawn(move || newest_two(&reader));
+        trail.publish([2; 2]);
+        trail.publish([3; 2]);
+        let read = thread.join().unwrap();
+        let whole = [None, Some([[1; 2], [0; 2]]), Some([[2; 2], [1; 2]]), Some([[3; 2], [2; 2]])];
+        assert!(whole.contains(&read), "{read:?}");
+        assert_eq!(newest_two(&trail), Some([[3; 2], [2; 2]]));
+    });
+}
+
+#[test]
+fn a_trail_is_never_torn_by_a_revision() {
+    loom::model(|| {
+        let trail = Arc::new(Trail::<2>::new());
+        trail.publish([1; 2]);
+        let reader = Arc::clone(&trail);
+        let thread = thread::spawn(move || newest_two(&reader));
+        trail.revise([9; 2]);
+        let read = thread.join().unwrap();
+        assert!([None, Some([[1; 2], [0; 2]]), Some([[9; 2], [0; 2]])].contains(&read), "{read:?}");
+        assert_eq!(newest_two(&trail), Some([[9; 2], [0; 2]]));
+    });
+}
+
 /// The protocol: while a reader reads, the writer publishes at most once, because its previous value was ready for every
 /// reader before it began.
 #[test]
@@ -56,7 +91,7 @@ fn a_downlink_gives_the_value_that_is_ready_while_the_next_one_is_written() {
         cell.publish(Message::number(2));
         let reader = Arc::clone(&cell);
         // Value 2 is ready; 3 is not yet, by its valid-from instant.
-        let thread = thread::spawn(move || reader.newest(|message| message.0[0] != 3));
+        let thread = thread::spawn(move || reader.newest(|record| record.word::<0>() != 3));
         cell.publish(Message::number(3));
         assert_eq!(thread.join().unwrap(), Some(Message::number(2)));
         assert_eq!(cell.newest(|_| true), Some(Message::number(3)));

@@ -12,7 +12,7 @@ use tractive::board::nucleo_g474re::{
 };
 use tractive::control::Gains;
 use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
-use tractive::machine::BUILT_IN;
+use tractive::machine::{BUILT_IN, BuiltIn};
 use tractive::modulation::Devices;
 use tractive::time::Instant;
 
@@ -59,7 +59,7 @@ fn main() -> ! {
 #[interrupt]
 fn TIM3() {
     static mut BOARD: Option<Control<'static, Encoder>> = None;
-    static mut TASK: Option<ControlTask> = None;
+    static mut TASK: Option<ControlTask<BuiltIn>> = None;
     let board = BOARD.get_or_insert_with(|| {
         let registers = Registers::CHIP;
         let encoder = Encoder::new(registers.tim4, &POWER_STAGE, BUILT_IN.ratings.pole_pairs as u32);
@@ -67,7 +67,7 @@ fn TIM3() {
     });
     board.acknowledge();
     let first = Instant(CLOCK.control_ticks);
-    let task = TASK.get_or_insert_with(|| ControlTask::new(&BUILT_IN, settings(), first));
+    let task = TASK.get_or_insert_with(|| ControlTask::new(BuiltIn, settings(), first));
     if task.wants_revision() {
         board::revise_pulses();
     }
@@ -79,12 +79,12 @@ fn TIM3() {
 #[interrupt]
 fn TIM1_UP_TIM16() {
     static mut BOARD: Option<Pwm> = None;
-    static mut TASK: Option<PwmTask> = None;
+    static mut TASK: Option<PwmTask<BuiltIn>> = None;
     let board = BOARD.get_or_insert_with(|| Pwm::new(Registers::CHIP, kept(&PWM_ZEROS)));
     let task = TASK.get_or_insert_with(|| {
         let settings = settings();
         let first = Instant(settings.devices.shortest_half_ticks);
-        PwmTask::new(&BUILT_IN, settings, first)
+        PwmTask::new(BuiltIn, settings, first)
     });
     if board.is_boundary() {
         board.acknowledge();

@@ -15,6 +15,9 @@ struct Timed {
     from: Instant,
 }
 
+/// The word of [`Timed`] that says from when on it holds.
+const FROM: usize = 6;
+
 impl Words<7> for Timed {
     fn to_words(self) -> [u32; 7] {
         let Permit { enable, demand, window, acknowledge } = self.permit;
@@ -91,7 +94,7 @@ impl Desk {
     /// In the control interrupt: what is permitted at `now`; nothing before the first permit.
     #[inline]
     pub fn permit(&self, now: Instant) -> Permit {
-        match self.permit.newest(|timed| now.reached(timed.from)) {
+        match self.permit.newest(|timed| now.reached(Instant(timed.word::<FROM>()))) {
             Some(timed) => timed.permit,
             None => Permit::NONE,
         }

@@ -31,7 +31,7 @@ pub enum Step {
     Image,
     /// No panic within an interrupt's reach, no double precision
     ImageCheck,
-    /// The NUCLEO-G474RE's image builds, with no panic within an interrupt's reach and no double precision
+    /// The NUCLEO-G474RE's images build, with no panic within an interrupt's reach and no double precision
     NucleoImage,
     /// The image builds for every folder of tables/
     Machines,
@@ -96,10 +96,7 @@ fn perform(step: Step, setup: &mut Setup) -> Result<Outcome> {
                 return Ok(Outcome::Skipped(format!("clippy needs rustup's target {TARGET}")));
             }
             let what = ["--target", TARGET, "--package", "tractive", "--lib", "--bins"];
-            // The ZS9's firmware has no board but QEMU's.
-            let features = Board::NucleoG474re.feature();
-            let nucleo = ["--target", TARGET, "--package", "tractive", "--lib", "--bin", "tractive"];
-            let nucleo = [&nucleo[..], &["--features", features]].concat();
+            let nucleo = [&what[..], &["--features", Board::NucleoG474re.feature()]].concat();
             lint(&mut cargo(), &what)? && lint(&mut cargo(), &nucleo)?
         }
         Step::Doc => {
@@ -131,7 +128,15 @@ fn perform(step: Step, setup: &mut Setup) -> Result<Outcome> {
         }
         Step::NucleoImage => {
             let board = Board::NucleoG474re;
-            image::check_board(&build::board_image(&setup.toolchain()?, board)?, board)?
+            let mut good = true;
+            for system in System::ALL {
+                println!("{}:", system.image());
+                good &= image::check_board(
+                    &build::board_image(&setup.toolchain()?, board, system, None)?,
+                    board,
+                )?;
+            }
+            good
         }
         Step::Machines => {
             let toolchain = setup.toolchain()?;

@@ -6,6 +6,7 @@ use super::power_stage::CORE_HZ;
 use super::registers::Registers;
 use super::start::{self, Found, Plan, StartError, Timeout, Wait};
 use super::watchdog::Pulse;
+use super::zs9;
 use crate::drive::Report;
 use crate::recorder::{Record, Recorder};
 use cortex_m::peripheral::NVIC;
@@ -23,16 +24,19 @@ pub static PULSE: Pulse = Pulse::new();
 
 unsafe extern "C" {
     fn TIM1_UP_TIM16();
+    fn TIM2();
     fn TIM3();
     fn DefaultHandler();
 }
 
-/// The vector table's device part. Every entry leads somewhere; those never unmasked to the default handler.
+/// The vector table's device part. Every entry leads somewhere; those that a firmware does not define, and all others, to the
+/// default handler.
 #[unsafe(link_section = ".vector_table.interrupts")]
 #[unsafe(no_mangle)]
 pub static __INTERRUPTS: [unsafe extern "C" fn(); 102] = {
     let mut table: [unsafe extern "C" fn(); 102] = [DefaultHandler; 102];
     table[Interrupt::TIM1_UP_TIM16 as usize] = TIM1_UP_TIM16;
+    table[Interrupt::TIM2 as usize] = TIM2;
     table[Interrupt::TIM3 as usize] = TIM3;
     table
 };
@@ -48,7 +52,7 @@ unsafe impl critical_section::Impl for Unlocked {
 }
 
 /// Waits by counting cycles.
-struct Cycles;
+pub(super) struct Cycles;
 
 impl Wait for Cycles {
     fn until(&mut self, done: &mut dyn FnMut() -> bool) -> Result<(), Timeout> {
@@ -78,18 +82,23 @@ pub fn prepare(plan: Plan) -> Result<Found, StartError> {
 
 /// Starts both timers and unmasks their interrupts: PWM preempts control.
 pub fn run() {
+    unmask(Interrupt::TIM1_UP_TIM16, Interrupt::TIM3);
+    start::run(&Registers::CHIP);
+    defmt::info!("running");
+}
+
+/// Lets both interrupts come. Call it once.
+pub(super) fn unmask(pwm: Interrupt, control: Interrupt) {
     // SAFETY: the only use of the core peripherals, before any interrupt is unmasked.
     let mut core = unsafe { cortex_m::Peripherals::steal() };
     // SAFETY: priorities are changed while both interrupts are masked; no code relies on a priority ceiling. After that
     // both may come: their handlers share nothing but cells and registers that each writes as the modules say.
     unsafe {
-        core.NVIC.set_priority(Interrupt::TIM1_UP_TIM16, 0x40);
-        core.NVIC.set_priority(Interrupt::TIM3, 0x80);
-        NVIC::unmask(Interrupt::TIM1_UP_TIM16);
-        NVIC::unmask(Interrupt::TIM3);
+        core.NVIC.set_priority(pwm, 0x40);
+        core.NVIC.set_priority(control, 0x80);
+        NVIC::unmask(pwm);
+        NVIC::unmask(control);
     }
-    start::run(&Registers::CHIP);
-    defmt::info!("running");
 }
 
 /// Makes the PWM interrupt come at once, between two boundaries.
@@ -149,7 +158,8 @@ fn tell(record: &Record) {
 
 /// Gates off for good, whatever state the program is in, then nothing more; the watchdog resets the chip if it runs.
 pub fn die() -> ! {
-    Registers::CHIP.legs.trip();
+    // All timers that may have gates, of whichever drive.
+    zs9::start::bridge(&Registers::CHIP).outputs().trip();
     loop {
         cortex_m::asm::nop();
     }

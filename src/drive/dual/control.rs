@@ -6,7 +6,7 @@ use crate::board::{DualControlPort, DualSample, MotorDemand};
 use crate::control::{Measurements, ZSource, ZSourceError, ZSourceInput};
 use crate::drive::Gates;
 use crate::frames::{Angle, SQRT_3};
-use crate::machine::Tables;
+use crate::machine::{Machine, Tables};
 use crate::protection::{self, Disarmed, Fault, SafeState, Trip, Violation};
 use crate::time::Instant;
 use core::f32::consts::{FRAC_PI_4, TAU};
@@ -19,8 +19,8 @@ const TWO_LEVEL_SHARE: f32 = FRAC_PI_4 / SQRT_3;
 const SENSOR_LOST: [Fault; 2] = [Fault::SensorLost1, Fault::SensorLost2];
 
 /// The ZS9's control task.
-pub struct ControlTask {
-    tables: &'static Tables,
+pub struct ControlTask<M = &'static Tables> {
+    machine: M,
     settings: Settings,
     axes: [Axis; 2],
     link: ZSource,
@@ -32,11 +32,11 @@ pub struct ControlTask {
     trip: Option<Trip>,
 }
 
-impl ControlTask {
+impl<M: Machine> ControlTask<M> {
     /// A task whose first call is the control timer's first interrupt, one control period after the start.
-    pub const fn new(tables: &'static Tables, settings: Settings) -> Self {
+    pub const fn new(machine: M, settings: Settings) -> Self {
         Self {
-            tables,
+            machine,
             settings,
             axes: [Axis::new(), Axis::new()],
             link: ZSource::new(),
@@ -160,7 +160,7 @@ impl ControlTask {
         for ((axis, measured), demand) in self.axes.iter().zip(measured).zip(&sample.demands) {
             violation = violation
                 .filter(armed)
-                .or_else(|| axis::check(measured, axis.omega(), self.tables))
+                .or_else(|| axis::check(measured, axis.omega(), self.machine.tables()))
                 .filter(armed)
                 .or_else(|| check_demand(demand));
         }
@@ -170,7 +170,7 @@ impl ControlTask {
     fn check_frozen(&mut self, measured: &[Measurements; 2], port: &mut impl DualControlPort) {
         let mut violation = None;
         for ((axis, measured), lost) in self.axes.iter_mut().zip(measured).zip(SENSOR_LOST) {
-            let found = axis.check_frozen(measured, lost, &self.settings, self.tables);
+            let found = axis.check_frozen(measured, lost, &self.settings, self.machine.tables());
             violation = violation.or(found.filter(|(fault, _, _)| !self.disarmed.has(*fault)));
         }
         self.check(violation, port);
@@ -190,7 +190,7 @@ impl ControlTask {
         let [first, second] = &mut self.axes;
         let ([m1, m2], [d1, d2]) = (measured, &sample.demands);
         let (a1, a2) = applied.map_or((None, None), |[a1, a2]| (Some(a1), Some(a2)));
-        let (settings, tables) = (&self.settings, self.tables);
+        let (settings, tables) = (&self.settings, self.machine.tables());
         let step = |axis: &mut Axis, measured, demand, applied| {
             axis.step(&AxisInput { measured, demand, applied, link_v }, settings, tables)
         };

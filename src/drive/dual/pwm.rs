@@ -4,7 +4,7 @@ use super::{COMPARE_STEPS, DualApplied, DualCommand, MotorShare, Settings, Share
 use crate::board::{DualPwmPort, GateFeedback, PlayedPeriod, PowerSample};
 use crate::drive::Gates;
 use crate::frames::{Angle, limit};
-use crate::machine::Tables;
+use crate::machine::{Machine, Tables};
 use crate::nine_switch::{self, GateTicks, MotorVoltage, Period, Refused, Request};
 use crate::protection::{self, Disarmed, Fault, SafeState, Trip, Violation};
 use crate::time::Instant;
@@ -20,8 +20,8 @@ const MOST_MOVED_V: f32 = 10.0;
 const LEAST_LINK_V: f32 = 50.0;
 
 /// The ZS9's PWM task.
-pub struct PwmTask {
-    tables: &'static Tables,
+pub struct PwmTask<M = &'static Tables> {
+    machine: M,
     settings: Settings,
     /// Nominal instant of the next call: a peak.
     now: Instant,
@@ -33,12 +33,12 @@ pub struct PwmTask {
     last_link_v: Option<f32>,
 }
 
-impl PwmTask {
+impl<M: Machine> PwmTask<M> {
     /// A task whose first call is at the first peak, half a carrier period after the start, gates off until the second valley.
-    pub const fn new(tables: &'static Tables, settings: Settings) -> Self {
+    pub const fn new(machine: M, settings: Settings) -> Self {
         let off = PlayedPeriod::off(settings.half_steps());
         Self {
-            tables,
+            machine,
             settings,
             now: Instant(settings.first_peak_ticks()),
             periods: [off; 2],
@@ -60,7 +60,7 @@ impl PwmTask {
         self.now = now.after(self.settings.carrier_ticks);
         let [before, running] = self.periods;
         let sample = port.sample(now);
-        let command = shared.command.newest(|command| now.reached(command.valid_from));
+        let command = shared.command.newest(|command| now.reached(DualCommand::valid_from(command)));
         let violation = self.violation(&sample, command.as_ref(), &before, &running);
         self.check(violation, port);
         let mut next = PlayedPeriod::off(self.settings.half_steps());
@@ -117,9 +117,9 @@ impl PwmTask {
         let limits = &self.settings.limits;
         let [upper, lower] = &sample.currents_a;
         let armed = |(fault, _, _): &Violation| !self.disarmed.has(*fault);
-        protection::check_currents(upper, &self.tables.ratings)
+        protection::check_currents(upper, &self.machine.tables().ratings)
             .filter(armed)
-            .or_else(|| protection::check_currents(lower, &self.tables.ratings).filter(armed))
+            .or_else(|| protection::check_currents(lower, &self.machine.tables().ratings).filter(armed))
             .or_else(|| limits.check_link(sample.source_v, sample.capacitor_v).filter(armed))
             .or_else(|| {
                 let command = command.filter(|command| command.gates == Gates::Pulse)?;
