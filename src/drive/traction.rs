@@ -156,9 +156,13 @@ impl<M: Machine> ControlTask<M> {
         let sample = port.sample(now);
         let applied = shared.applied.read(|records| Applied::seen(records, now)).flatten();
         self.forget_acknowledged(sample.acknowledge, applied.as_ref());
-        self.check(sample.hardware.map(|fault| (fault, 1.0, 0.0)), &sample, port);
         if self.trip.is_none() && applied.as_ref().is_some_and(|applied| applied.next.kind.is_tripped()) {
             self.trip = shared.trip.read();
+        }
+        if let Some(fault) = sample.hardware {
+            // That the gates are held is only what comes of it.
+            self.trip = self.trip.filter(|trip| trip.fault != Fault::GatesHeld);
+            self.check(Some((fault, 1.0, 0.0)), &sample, port);
         }
         self.check_legs(&sample, port);
         let omega = self.track(&sample, port);
@@ -643,6 +647,11 @@ impl<M: Machine> PwmTask<M> {
             acknowledged: self.acknowledged,
         };
         self.play(port);
+        if port.is_late() && self.trip.is_none() {
+            let (fault, safe) = (Fault::PwmDeadline, SafeState::GatesOff);
+            self.latch(Trip { fault, value: 1.0, limit: 0.0, at: now, safe }, shared);
+            self.newest.tripped = true;
+        }
         shared.applied.publish(self.newest.to_words());
     }
 

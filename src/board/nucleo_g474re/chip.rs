@@ -1,6 +1,8 @@
 //! What only the chip has: the vector table, the interrupt controller, waiting, the log.
 #![allow(unsafe_code)]
 
+use super::CLOCK;
+use super::idle::Idle;
 use super::operator::Operator;
 use super::power_stage::CORE_HZ;
 use super::registers::Registers;
@@ -8,6 +10,7 @@ use super::start::{self, Found, Plan, StartError, Timeout, Wait};
 use super::watchdog::Pulse;
 use super::zs9;
 use crate::drive::Report;
+use crate::operator::{Commander, Settings, Slot};
 use crate::recorder::{Record, Recorder};
 use cortex_m::peripheral::NVIC;
 use defmt_rtt as _;
@@ -109,9 +112,11 @@ pub fn revise_pulses() {
     cortex_m::asm::isb();
 }
 
-/// The idle loop, forever: feeds the watchdog, tells what has changed, and after a fault what the flight recorder holds.
-pub fn idle() -> ! {
-    let (mut told, mut broken, mut records_told) = (None, false, 0);
+/// The idle loop, forever: feeds the watchdog, does the operator's slots, tells what has changed, and after a fault what the flight
+/// recorder holds. Without an operator, because the start has failed, nothing is ever permitted.
+pub fn idle<C: Commander>(mut operator: Option<(Idle<C>, Settings)>) -> ! {
+    let mut slot = Slot::new();
+    let (mut told, mut records_told) = (None, 0);
     loop {
         // One record a meal: a log that nobody hurries to read holds few.
         if PULSE.feed_if_both_ran(&Registers::CHIP) {
@@ -124,16 +129,18 @@ pub fn idle() -> ! {
                 None => {}
             }
         }
-        if !broken && Registers::CHIP.legs.is_tripped() {
-            broken = true;
-            defmt::error!("gates off by a break: hardware, or the fault that follows");
+        if let Some((port, settings)) = &mut operator {
+            slot.run(&OPERATOR.desk, port, settings, &CLOCK);
         }
         let trip = OPERATOR.report().and_then(|report: Report| report.trip);
-        if told.is_none()
-            && let Some(trip) = trip
-        {
-            defmt::error!("fault {}: {} beyond {}", trip.fault.name(), trip.value, trip.limit);
-            told = Some(trip);
+        if trip != told {
+            match trip {
+                Some(trip) => {
+                    defmt::error!("fault {}: {} beyond {}", trip.fault.name(), trip.value, trip.limit);
+                }
+                None => defmt::info!("fault acknowledged"),
+            }
+            told = trip;
         }
     }
 }

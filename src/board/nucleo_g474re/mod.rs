@@ -18,6 +18,8 @@ pub mod comparators;
 pub mod control_timer;
 pub mod dead_time;
 pub mod half;
+pub mod hardware;
+pub mod idle;
 pub mod legs;
 pub mod operator;
 pub mod outputs;
@@ -28,6 +30,7 @@ pub mod power_stage;
 pub mod registers;
 pub mod sampling;
 pub mod start;
+pub mod switchgear;
 pub mod watchdog;
 pub mod zs9;
 

@@ -1,39 +1,44 @@
-//! What the operator asks for, and what is told. Words between the idle loop and the control interrupt; a bus driver
-//! will write the first and read the second.
+//! Between the idle loop, where the operator runs, and the interrupts.
 
+use crate::board::Sample;
 use crate::cell::Uplink;
-use crate::control::Demand;
 use crate::drive::Report;
-use core::sync::atomic::{AtomicU32, Ordering};
+use crate::operator::Desk;
+use crate::time::Instant;
+use core::sync::atomic::{AtomicBool, Ordering};
 
-/// Demand in, report out.
+/// Permit in, observation and report out.
 pub struct Operator {
-    torque_nm: AtomicU32,
+    /// Permit and observation, slot by slot.
+    pub desk: Desk,
     report: Uplink<Report, 12>,
+    position_known: AtomicBool,
 }
 
 impl Operator {
-    /// No torque.
+    /// Nothing permitted.
     #[cfg(not(loom))]
     pub const fn new() -> Self {
-        Self { torque_nm: AtomicU32::new(0), report: Uplink::new() }
+        Self { desk: Desk::new(), report: Uplink::new(), position_known: AtomicBool::new(false) }
     }
 
-    /// Sets the torque demand, in N·m; its rate of change is limited to the machine's slew rate.
-    pub fn ask(&self, torque_nm: f32) {
-        self.torque_nm.store(torque_nm.to_bits(), Ordering::Relaxed);
-    }
-
-    /// The demand.
+    /// In the control interrupt: a sample with what is permitted; `position_known` says whether its angle is one.
     #[inline]
-    pub fn demand(&self) -> Demand {
-        Demand { torque_nm: f32::from_bits(self.torque_nm.load(Ordering::Relaxed)), slew_limited: true }
+    pub(super) fn permit(&self, now: Instant, sample: Sample, position_known: bool) -> Sample {
+        self.position_known.store(position_known, Ordering::Relaxed);
+        self.desk.permit(now).applied_to(sample)
     }
 
     /// From the control interrupt, which nothing that reads this can interrupt.
     #[inline]
-    pub(super) fn tell(&self, report: &Report) {
+    pub(super) fn tell(&self, now: Instant, report: &Report) {
+        self.desk.tell(now, report);
         self.report.publish(*report);
+    }
+
+    /// Whether the rotor's angle was known in the last control period.
+    pub fn position_known(&self) -> bool {
+        self.position_known.load(Ordering::Relaxed)
     }
 
     /// What the control interrupt did last; `None` before its first time.

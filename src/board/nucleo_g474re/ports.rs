@@ -2,6 +2,7 @@
 
 use super::control_timer::ControlTimer;
 use super::half::HalfRegisters;
+use super::hardware;
 use super::operator::Operator;
 use super::pins;
 use super::position::Position;
@@ -9,7 +10,7 @@ use super::registers::Registers;
 use super::sampling::{Sampler, Zeros, currents_a};
 use super::start::{control_sampler, pwm_sampler};
 use crate::board::{ControlPort, PwmPort, Sample};
-use crate::control::{LinkWindow, Measurements};
+use crate::control::{Demand, LinkWindow, Measurements};
 use crate::drive::Report;
 use crate::frames::{Abc, Angle};
 use crate::modulation::{CarrierPeriod, Mode};
@@ -51,7 +52,7 @@ impl<'a, P: Position> Control<'a, P> {
 
 impl<P: Position> ControlPort for Control<'_, P> {
     /// Position first: it is read, not sampled, and moves on while the conversions end.
-    fn sample(&mut self, _now: Instant) -> Sample {
+    fn sample(&mut self, now: Instant) -> Sample {
         let angle = self.position.angle();
         if let Some(angle) = angle {
             self.angle = angle;
@@ -61,15 +62,17 @@ impl<P: Position> ControlPort for Control<'_, P> {
             Some([_, _, _, udc]) => udc.udc_v(),
             None => f32::NAN,
         };
-        let healthy = angle.is_some() && !self.registers.legs.is_tripped();
-        Sample {
+        let hardware = hardware::latched_by(&self.registers);
+        let healthy = angle.is_some() && hardware.is_none();
+        let sample = Sample {
             measured: Measurements { currents_a: currents_a(codes, &self.zeros), udc_v, angle: self.angle },
-            demand: self.operator.demand(),
+            demand: Demand::default(),
             enable: healthy && pins::is_enabled(&self.registers),
             window: LinkWindow::OPEN,
             acknowledge: 0,
-            hardware: None,
-        }
+            hardware,
+        };
+        self.operator.permit(now, sample, angle.is_some())
     }
 
     fn enter(&mut self, safe: SafeState, _now: Instant) {
@@ -80,8 +83,8 @@ impl<P: Position> ControlPort for Control<'_, P> {
         self.timer.overrun_ticks()
     }
 
-    fn report(&mut self, _now: Instant, report: &Report) {
-        self.operator.tell(report);
+    fn report(&mut self, now: Instant, report: &Report) {
+        self.operator.tell(now, report);
     }
 }
 
@@ -94,13 +97,15 @@ pub struct Pwm {
     pulses: bool,
     /// The levels on which the legs stand at its end.
     levels: [bool; 3],
+    /// The last half was over before it was loaded.
+    late: bool,
 }
 
 impl Pwm {
     /// At rest, with the zeros that the start measured.
     pub const fn new(registers: Registers, zeros: Zeros) -> Self {
         let sampler = pwm_sampler(&registers);
-        Self { registers, sampler, zeros, pulses: false, levels: [false; 3] }
+        Self { registers, sampler, zeros, pulses: false, levels: [false; 3], late: false }
     }
 
     /// First thing in the interrupt: whether it is a carrier boundary's. If not, control wants a revision, and there is nothing to
@@ -139,7 +144,7 @@ impl PwmPort for Pwm {
         currents_a(self.sampler.read(), &self.zeros)
     }
 
-    /// An interrupt that ends after its half has left the timers a mixture of two halves: the gates go off for good.
+    /// An interrupt that ends after its half has left the timers a mixture of two halves: the gates go off.
     fn play(&mut self, _now: Instant, next: &CarrierPeriod) {
         let half = HalfRegisters::new(next, self.levels);
         let legs = &self.registers.legs;
@@ -153,6 +158,15 @@ impl PwmPort for Pwm {
 
     fn enter(&mut self, safe: SafeState, _now: Instant) {
         enter(&self.registers, safe);
+    }
+
+    fn leave(&mut self, _now: Instant) -> bool {
+        self.late = false;
+        self.registers.legs.leave()
+    }
+
+    fn is_late(&mut self) -> bool {
+        self.late
     }
 }
 
