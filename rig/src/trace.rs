@@ -164,6 +164,44 @@ impl Recording {
         })
     }
 
+    /// Writes operator.csv: a line for every slot from whose beginning on the operator's words differ from those before.
+    pub fn write_slots(&self, path: &Path) -> Result<()> {
+        write_whole(path, |out| {
+            out.write_record([
+                "t_s",
+                "state",
+                "fault",
+                "refusal",
+                "refusals",
+                "torque_nm",
+                "precharge",
+                "main",
+                "discharge",
+                "chopper",
+            ])?;
+            let mut last = None;
+            for SlotRow { t_s, status } in &self.slots {
+                if last == Some(*status) {
+                    continue;
+                }
+                last = Some(*status);
+                out.serialize((
+                    short_time(*t_s),
+                    status.state.name(),
+                    status.trip.map_or("", |trip| trip.fault.name()),
+                    status.refusal.map_or("", |refusal| refusal.name()),
+                    status.refusals,
+                    status.torque_nm,
+                    u8::from(status.switches.precharge),
+                    u8::from(status.switches.main),
+                    u8::from(status.switches.discharge),
+                    status.switches.chopper,
+                ))?;
+            }
+            Ok(())
+        })
+    }
+
     /// Writes recorder.csv, if a fault has frozen the flight recorder; else takes away what an earlier run has left.
     pub fn write_recorder(&self, path: &Path) -> Result<()> {
         if self.recorded.is_empty() {
@@ -206,44 +244,6 @@ impl Recording {
                     u8::from(state.enabled),
                     u8::from(state.pulsing),
                     state.fault.map_or("", |fault| fault.name()),
-                ))?;
-            }
-            Ok(())
-        })
-    }
-
-    /// Writes operator.csv: a line for every slot from whose beginning on the operator's words differ from those before.
-    pub fn write_slots(&self, path: &Path) -> Result<()> {
-        write_whole(path, |out| {
-            out.write_record([
-                "t_s",
-                "state",
-                "fault",
-                "refusal",
-                "refusals",
-                "torque_nm",
-                "precharge",
-                "main",
-                "discharge",
-                "chopper",
-            ])?;
-            let mut last = None;
-            for SlotRow { t_s, status } in &self.slots {
-                if last == Some(*status) {
-                    continue;
-                }
-                last = Some(*status);
-                out.serialize((
-                    short_time(*t_s),
-                    status.state.name(),
-                    status.trip.map_or("", |trip| trip.fault.name()),
-                    status.refusal.map_or("", |refusal| refusal.name()),
-                    status.refusals,
-                    status.torque_nm,
-                    u8::from(status.switches.precharge),
-                    u8::from(status.switches.main),
-                    u8::from(status.switches.discharge),
-                    status.switches.chopper,
                 ))?;
             }
             Ok(())

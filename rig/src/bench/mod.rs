@@ -31,6 +31,7 @@ use tractive::frames::{Abc, Angle};
 use tractive::modulation::{CarrierPeriod, Mode};
 use tractive::operator::{Feedback, Request, Status};
 use tractive::protection::{LegFaults, SafeState};
+use tractive::recorder::Record;
 use tractive::time::{Clock, Instant};
 
 /// Ticks since the run's beginning.
@@ -215,16 +216,17 @@ impl Bench {
         self.now as f64 / self.end as f64
     }
 
-    /// The recording: trace, switches of mode, edges; instants in seconds from its beginning.
-    pub fn into_recording(self) -> Recording {
+    /// The recording: what the bench saw, and what the drive's own recorder holds; instants in seconds from its beginning.
+    pub fn into_recording(self, records: Vec<Record>) -> Recording {
+        let recorded = records.into_iter().map(|record| (self.instant_s(record.at), record)).collect();
         let edges = self.inverter.edges().to_vec();
         Recording {
             rows: self.rows,
             switches: self.switches,
             edges,
+            recorded,
             slots: self.slots,
             link: self.line.map(|line| line.balance()),
-            recorded: Vec::new(),
             lead: self.lead,
             tick_s: self.tick_s,
         }
@@ -372,18 +374,18 @@ impl Bench {
 
     fn integrate(&mut self, tick: Tick) {
         if tick > self.now {
+            let t_s = self.seconds(self.now);
+            let (udc_v, legs) = (self.udc_v(t_s), self.inverter.legs());
             let dt_s = (tick - self.now) as f64 * self.tick_s;
+            let before_j = self.plant.energies().electrical_j;
             if let Some(line) = &mut self.line {
-                self.plant.advance_on(&mut line.link, self.inverter.legs(), dt_s);
+                self.plant.advance_on(&mut line.link, legs, dt_s);
             } else {
-                let t_s = self.seconds(self.now);
-                let (udc_v, legs) = (self.udc_v(t_s), self.inverter.legs());
-                let before_j = self.plant.energies().electrical_j;
                 self.plant.advance(legs, udc_v, dt_s);
-                if let Some(link) = &mut self.link {
-                    let drawn_j = self.plant.energies().electrical_j - before_j;
-                    link.advance(drawn_j, dt_s, self.sensors.udc_v(t_s), self.spoiler.supply(t_s));
-                }
+            }
+            if let Some(link) = &mut self.link {
+                let drawn_j = self.plant.energies().electrical_j - before_j;
+                link.advance(drawn_j, dt_s, self.sensors.udc_v(t_s), self.spoiler.supply(t_s));
             }
             if self.inverter.monitor(self.plant.currents_abc(), self.now, tick) {
                 self.observed.makes_a_difference(self.now);
@@ -405,6 +407,13 @@ impl Bench {
 
     fn act(&mut self) -> Result<(), BenchError> {
         let now = self.now;
+        let t_s = self.seconds(now);
+        if let Some(row) = self.line.as_mut().and_then(|line| line.act(now, t_s))
+            && now >= self.lead
+            && now <= self.end
+        {
+            self.slots.push(row);
+        }
         if now == self.observed.from {
             self.observed.carrier_ticks = 2 * Tick::from(self.inverter.half().period_ticks);
             match self.spoiler.kind(self.seconds(now)) {
@@ -427,13 +436,6 @@ impl Bench {
                 }
                 None => self.inverter.leave(now),
             }
-        }
-        let t_s = self.seconds(now);
-        if let Some(row) = self.line.as_mut().and_then(|line| line.act(now, t_s))
-            && now >= self.lead
-            && now <= self.end
-        {
-            self.slots.push(row);
         }
         self.inverter.act(now);
         if now == self.inverter.half_end() {

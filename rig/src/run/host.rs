@@ -13,7 +13,7 @@ use tractive::modulation::CarrierPeriod;
 use tractive::operator::{self, Desk, Feedback, Line, OperatorPort, Request, Slot, Status, slot_s};
 use tractive::protection::{LegFaults, SafeState};
 use tractive::recorder::Recorder;
-use tractive::time::Instant;
+use tractive::time::{Clock, Instant};
 
 /// The bench behind a board's ports; the first error ends the run.
 struct Port<'a> {
@@ -79,13 +79,13 @@ impl PwmPort for Port<'_> {
         self.bench.enter(now, safe);
     }
 
-    fn leg_faults(&mut self) -> LegFaults {
-        self.bench.leg_faults()
-    }
-
     fn leave(&mut self, now: Instant) -> bool {
         self.bench.leave(now);
         true
+    }
+
+    fn leg_faults(&mut self) -> LegFaults {
+        self.bench.leg_faults()
     }
 }
 
@@ -114,25 +114,25 @@ pub fn run_on_host(
     line: Option<Line>,
 ) -> Result<Recording, BenchError> {
     let recorder = Recorder::new();
-    let operator = operator::Settings::rated(&tables.ratings, slot_s(&settings.clock), line);
     let mut progress = Progress::new(name);
-    let tasks = Tasks::new(tables, settings, first_half_ticks).recorded_by(&recorder).commanded_by(operator);
+    let tasks = Tasks::new(tables, settings, first_half_ticks).recorded_by(&recorder).operated_on(line);
     tasks.drive(&mut bench, |bench| {
         progress.show(bench.progress());
         true
     })?;
     let records = (0..).map_while(|index| recorder.read(index)).collect();
-    Ok(super::record(bench, records))
+    Ok(bench.into_recording(records))
 }
 
-/// Both tasks, the cells between them, and the operator's slot of the idle loop.
+/// Both tasks and the cells between them.
 pub struct Tasks<'a> {
-    tables: &'static Tables,
-    settings: Settings,
     control: ControlTask,
     pwm: PwmTask,
     shared: Shared<'a>,
-    operator: Option<operator::Settings<'a>>,
+    desk: Desk,
+    slot: Slot,
+    operator: operator::Settings<'static>,
+    clock: Clock,
 }
 
 impl<'a> Tasks<'a> {
@@ -140,24 +140,25 @@ impl<'a> Tasks<'a> {
     pub fn new(tables: &'static Tables, settings: Settings, first_half_ticks: u32) -> Self {
         let first_control = Instant(settings.clock.control_ticks);
         Self {
-            tables,
-            settings,
             control: ControlTask::new(tables, settings, first_control),
             pwm: PwmTask::new(tables, settings, Instant(first_half_ticks)).after_halves_of(first_half_ticks),
             shared: Shared::new(),
-            operator: None,
+            desk: Desk::new(),
+            slot: Slot::new(),
+            operator: operator::Settings::rated(&tables.ratings, slot_s(&settings.clock), None),
+            clock: settings.clock,
         }
+    }
+
+    /// The same with an operator who switches the line side, if the bench has one to ask.
+    pub fn operated_on(mut self, line: Option<Line>) -> Self {
+        self.operator.line = line;
+        self
     }
 
     /// The same with a flight recorder.
     pub fn recorded_by(mut self, recorder: &'a Recorder) -> Self {
         self.shared = Shared::recorded_by(recorder);
-        self
-    }
-
-    /// The same with an operator, on a bench that has one.
-    pub fn commanded_by(mut self, operator: operator::Settings<'a>) -> Self {
-        self.operator = Some(operator);
         self
     }
 
@@ -167,12 +168,11 @@ impl<'a> Tasks<'a> {
         bench: &mut Bench,
         mut goes_on: impl FnMut(&Bench) -> bool,
     ) -> Result<(), BenchError> {
-        let (desk, mut slot) = (Desk::new(), Slot::new());
         while !bench.is_done() {
             let (control_at, pwm_at) = (self.control.next_call(), self.pwm.next_call());
             let has_control = bench.has_control(control_at);
-            let operator = self.operator.as_ref().filter(|_| bench.is_operated());
-            let mut port = Port { bench, desk: &desk, ratings: &self.tables.ratings, error: None };
+            let (desk, ratings) = (&self.desk, self.operator.ratings);
+            let mut port = Port { bench, desk, ratings, error: None };
             // At equal instants the PWM interrupt comes first: it has the higher priority.
             if control_at.reached(pwm_at) || !has_control {
                 self.pwm.run(&mut port, &self.shared);
@@ -182,8 +182,8 @@ impl<'a> Tasks<'a> {
                 }
                 self.control.run(&mut port, &self.shared);
                 // The idle loop goes on where the interrupt ends.
-                if let Some(operator) = operator {
-                    slot.run(&desk, &mut port, operator, &self.settings.clock);
+                if port.bench.is_operated() {
+                    self.slot.run(&self.desk, &mut port, &self.operator, &self.clock);
                 }
             }
             if let Some(error) = port.error {

@@ -9,20 +9,11 @@ pub(crate) use emulator::emulate;
 pub use host::{Tasks, run_on_host};
 pub use qemu::run_in_qemu;
 
-use crate::bench::Bench;
-use crate::trace::Recording;
 use indicatif::{ProgressBar, ProgressStyle};
-use tractive::recorder::Record;
 use tractive::time::Clock;
 
 /// The clock of the emulated board: 25 MHz ticks, control at 10 kHz. The host runs on the same.
 pub const CLOCK: Clock = Clock::new(25_000_000, 2_500);
-
-/// What the bench saw, and what the drive's own recorder holds.
-fn record(bench: Bench, records: Vec<Record>) -> Recording {
-    let recorded = records.into_iter().map(|record| (bench.instant_s(record.at), record)).collect();
-    Recording { recorded, ..bench.into_recording() }
-}
 
 /// A bar on a terminal; in a pipe indicatif draws none.
 pub(crate) struct Progress {

@@ -51,7 +51,7 @@ pub fn run_in_qemu(name: &str, mut bench: Bench, setup: Setup, emulator: &Emulat
         std::fs::write(path, &calls.lines).with_context(|| path.display().to_string())?;
     }
     outcome?;
-    Ok(super::record(bench, records))
+    Ok(bench.into_recording(records))
 }
 
 /// What every interrupt was about, in the order in which they ended.
