@@ -22,11 +22,11 @@ impl Operator {
         Self { desk: Desk::new(), report: Uplink::new(), position_known: AtomicBool::new(false) }
     }
 
-    /// In the control interrupt: a sample with what is permitted; `position_known` says whether its angle is one.
+    /// In the control interrupt: gives a sample what is permitted; `position_known` says whether its angle is one.
     #[inline]
-    pub(super) fn permit(&self, now: Instant, sample: Sample, position_known: bool) -> Sample {
+    pub(super) fn permit(&self, now: Instant, sample: &mut Sample, position_known: bool) {
         self.position_known.store(position_known, Ordering::Relaxed);
-        self.desk.permit(now).applied_to(sample)
+        self.desk.permit(now).apply(sample);
     }
 
     /// From the control interrupt, which nothing that reads this can interrupt.

@@ -64,7 +64,7 @@ impl<P: Position> ControlPort for Control<'_, P> {
         };
         let hardware = hardware::latched_by(&self.registers);
         let healthy = angle.is_some() && hardware.is_none();
-        let sample = Sample {
+        let mut sample = Sample {
             measured: Measurements { currents_a: currents_a(codes, &self.zeros), udc_v, angle: self.angle },
             demand: Demand::default(),
             enable: healthy && pins::is_enabled(&self.registers),
@@ -72,7 +72,8 @@ impl<P: Position> ControlPort for Control<'_, P> {
             acknowledge: 0,
             hardware,
         };
-        self.operator.permit(now, sample, angle.is_some())
+        self.operator.permit(now, &mut sample, angle.is_some());
+        sample
     }
 
     fn enter(&mut self, safe: SafeState, _now: Instant) {
