@@ -36,7 +36,7 @@ pub static SUBJECTS: [Subject; 9] = [
         |c| c.publish(downlink_9_publish),
         |c| {
             c.read(|| DOWNLINK_9.newest(|_| true));
-            c.read_before(|not| DOWNLINK_9.newest(|message| message.claimed() != not));
+            c.read_before(|not| DOWNLINK_9.newest(|message| message.word::<0>() != not));
         },
     ),
     Subject::new(
@@ -44,7 +44,7 @@ pub static SUBJECTS: [Subject; 9] = [
         |c| c.publish(downlink_10_publish),
         |c| {
             c.read(|| DOWNLINK_10.newest(|_| true));
-            c.read_before(|not| DOWNLINK_10.newest(|message| message.claimed() != not));
+            c.read_before(|not| DOWNLINK_10.newest(|message| message.word::<0>() != not));
         },
     ),
     Subject::new(
