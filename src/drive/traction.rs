@@ -662,11 +662,7 @@ impl<M: Machine> PwmTask<M> {
             acknowledged: self.acknowledged,
         };
         self.play(port);
-        if port.is_late() && self.trip.is_none() {
-            let (fault, safe) = (Fault::PwmDeadline, SafeState::GatesOff);
-            self.latch(Trip { fault, value: 1.0, limit: 0.0, at: now, safe }, shared);
-            self.newest.tripped = true;
-        }
+        self.check_late(port, shared);
         shared.applied.publish(self.newest.to_words());
     }
 
@@ -683,6 +679,7 @@ impl<M: Machine> PwmTask<M> {
         {
             self.newest.half = self.modulator.revised(&half, begins, &command.reference);
             self.play(port);
+            self.check_late(port, shared);
             shared.applied.revise(self.newest.to_words());
         }
     }
@@ -771,6 +768,15 @@ impl<M: Machine> PwmTask<M> {
         let at = self.newest.begins;
         port.enter(safe, at);
         self.latch(Trip { fault, value, limit, at, safe }, shared);
+    }
+
+    /// A half that was loaded after its beginning: the board has turned the gates off.
+    fn check_late(&mut self, port: &mut impl PwmPort, shared: &Shared) {
+        if port.is_late() && self.trip.is_none() {
+            let (fault, safe) = (Fault::PwmDeadline, SafeState::GatesOff);
+            self.latch(Trip { fault, value: 1.0, limit: 0.0, at: self.newest.at, safe }, shared);
+            self.newest.tripped = true;
+        }
     }
 
     fn latch(&mut self, trip: Trip, shared: &Shared) {

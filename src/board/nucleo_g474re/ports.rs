@@ -98,7 +98,7 @@ pub struct Pwm {
     pulses: bool,
     /// The levels on which the legs stand at its end.
     levels: [bool; 3],
-    /// The last half was over before it was loaded.
+    /// A half was over before it was loaded, and the safe state has not been left since.
     late: bool,
 }
 
@@ -152,6 +152,7 @@ impl PwmPort for Pwm {
         legs.play(&half);
         if legs.has_updated() {
             legs.trip();
+            self.late = true;
         }
         self.pulses = next.mode != Mode::Off;
         self.levels = half.end_levels();
