@@ -391,7 +391,7 @@ impl Operator {
             let waiting = matches!(self.phase, Phase::Fault { .. });
             return self.refuse(if waiting { Refusal::FaultNotAcknowledged } else { Refusal::NoFault });
         };
-        let shorted = trip.safe == SafeState::ShortCircuit;
+        let shorted = trip.safe != SafeState::GatesOff;
         let held = shorted && !health::open_is_safe(input, settings);
         let cause =
             health::cause(input, false, settings).or_else(|| health::resting_current(input, settings));
