@@ -57,10 +57,9 @@ fn main() -> ! {
         let ratings = &BUILT_IN.ratings;
         let line = Line::rated(ratings, TIMES.precharge_s, TIMES.discharge_s);
         let settings = operator::Settings::rated(ratings, slot_s(&CLOCK), Some(line));
-        // The machine's tables and the power stage are checked when the image is built.
-        let good = Configuration::Good;
+        let configuration = Configuration::from(self::settings().check(&BUILT_IN));
         let commander = Nobody(ratings);
-        let port = Idle::new(Registers::CHIP, &OPERATOR, found.control_zeros, good, commander);
+        let port = Idle::new(Registers::CHIP, &OPERATOR, found.control_zeros, configuration, commander);
         board::idle(Some((port, settings)))
     }
     board::idle::<Nobody>(None)
