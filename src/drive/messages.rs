@@ -112,7 +112,7 @@ impl Committal {
         // What never toggles does so at the end.
         let [u, v, w] = [u, v, w].map(|compare| compare.min(period));
         let [a, b, c] = currents_to_words(self.currents_a);
-        let flags = u32::from(self.mirrored) * MIRRORED | u32::from(self.tripped) * TRIPPED;
+        let flags = (u32::from(self.mirrored) * MIRRORED) | (u32::from(self.tripped) * TRIPPED);
         let (alpha, beta) = (on.alpha.to_bits(), on.beta.to_bits());
         let acknowledged = self.acknowledged.into();
         [self.at.0, self.begins.0, period, u, v, w, packed | flags, alpha, beta, a, b, c, acknowledged]
