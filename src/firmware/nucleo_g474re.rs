@@ -2,13 +2,11 @@
 
 use core::sync::atomic::{AtomicU32, Ordering};
 use cortex_m_rt::{entry, exception, interrupt};
-use tractive::board::nucleo_g474re::idle::Idle;
 use tractive::board::nucleo_g474re::position::Encoder;
 use tractive::board::nucleo_g474re::power_stage::{AdcCode, POWER_STAGE, cycles_to_ticks, ns_to_cycles};
 use tractive::board::nucleo_g474re::registers::Registers;
 use tractive::board::nucleo_g474re::sampling::Zeros;
 use tractive::board::nucleo_g474re::start::Plan;
-use tractive::board::nucleo_g474re::switchgear::TIMES;
 use tractive::board::nucleo_g474re::{
     self as board, CLOCK, Control, Interrupt as interrupt, OPERATOR, PRESCALER, PULSE, Pwm, RECORDER,
 };
@@ -16,7 +14,6 @@ use tractive::control::Gains;
 use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
 use tractive::machine::{BUILT_IN, BuiltIn};
 use tractive::modulation::Devices;
-use tractive::operator::{self, Configuration, Line, Nobody, slot_s};
 use tractive::time::Instant;
 
 static SHARED: Shared = Shared::recorded_by(&RECORDER);
@@ -54,15 +51,8 @@ fn main() -> ! {
         keep(&CONTROL_ZEROS, found.control_zeros);
         keep(&PWM_ZEROS, found.pwm_zeros);
         board::run();
-        let ratings = &BUILT_IN.ratings;
-        let line = Line::rated(ratings, TIMES.precharge_s, TIMES.discharge_s);
-        let settings = operator::Settings::rated(ratings, slot_s(&CLOCK), Some(line));
-        let configuration = Configuration::from(self::settings().check(&BUILT_IN));
-        let commander = Nobody(ratings);
-        let port = Idle::new(Registers::CHIP, &OPERATOR, found.control_zeros, configuration, commander);
-        board::idle(Some((port, settings)))
     }
-    board::idle::<Nobody>(None)
+    board::idle()
 }
 
 /// Deadline: the next control interrupt. Missed: fault `control_deadline`, gates into the safe state.

@@ -25,7 +25,7 @@ pub use cells::Desk;
 pub use ramp::{Ramp, Rates};
 pub use request::{Configuration, Feedback, Limits, Observation, Request};
 pub use settings::{Line, Settings};
-pub use slot::{Commander, Nobody, OperatorPort, Slot};
+pub use slot::{OperatorPort, Slot};
 pub use status::{Refusal, State, Status, Switches};
 
 use crate::board::Sample;

@@ -1,7 +1,6 @@
 //! The idle loop's part: once a slot, look, step, allow, tell.
 
 use super::{Desk, Feedback, Input, Operator, Request, Settings, Status};
-use crate::machine::Ratings;
 use crate::time::{Clock, Instant};
 
 /// What the operator needs of a board and of whoever commands it.
@@ -10,32 +9,6 @@ pub trait OperatorPort {
     fn ask(&mut self, at: Instant) -> (Request, Feedback);
     /// What came of it; its switches are to be set at `from`, or as soon as the board can.
     fn tell(&mut self, from: Instant, status: &Status);
-}
-
-/// Who commands, on a real board: a bus, a panel.
-pub trait Commander {
-    /// What is asked in the slot that began at `at`.
-    fn request(&mut self, at: Instant) -> Request;
-    /// Whether parameters are being written.
-    fn parameters_open(&self) -> bool;
-    /// What came of it.
-    fn told(&mut self, status: &Status);
-}
-
-/// Nobody commands: the drive stays ready.
-#[derive(Clone, Copy, Debug)]
-pub struct Nobody<'a>(pub &'a Ratings);
-
-impl Commander for Nobody<'_> {
-    fn request(&mut self, _at: Instant) -> Request {
-        Request::idle(self.0)
-    }
-
-    fn parameters_open(&self) -> bool {
-        false
-    }
-
-    fn told(&mut self, _status: &Status) {}
 }
 
 /// The operator with its place in time.

@@ -22,9 +22,9 @@ fn the_drive_pulses_a_turning_machine_through_the_registers() {
     let registers = bench.registers;
     let (shared, operator) = (Shared::new(), Operator::new());
     let settings = Settings { clock: CLOCK, devices: devices(), gains: Gains::DEFAULT };
+    operator.desk.allow_from(Permit { enable: true, ..Permit::NONE }, Instant(0));
     let zeros = [AdcCode(2_048); 3];
     let encoder = Encoder::new(registers.tim4, &POWER_STAGE, 4);
-    crate::ports::allow(&operator, Permit { enable: true, ..Permit::NONE });
     let mut control = Control::new(registers, zeros, encoder, &operator);
     let mut pwm = Pwm::new(registers, zeros);
     let first_half = Instant(plan().shortest_half_ticks);

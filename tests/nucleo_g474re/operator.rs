@@ -4,16 +4,17 @@ use crate::bench::Bench;
 use crate::plan;
 use stm32_metapac::gpio::{self, regs::Idr};
 use tractive::board::PwmPort;
-use tractive::board::nucleo_g474re::idle::Idle;
-use tractive::board::nucleo_g474re::operator::Operator;
+use tractive::board::nucleo_g474re::can::Can;
 use tractive::board::nucleo_g474re::pins::{Function, PINS};
 use tractive::board::nucleo_g474re::power_stage::AdcCode;
 use tractive::board::nucleo_g474re::registers::Registers;
+use tractive::board::nucleo_g474re::serve::Serve;
 use tractive::board::nucleo_g474re::{Pwm, hardware, switchgear};
 use tractive::machine::BUILT_IN;
 use tractive::modulation::{CarrierPeriod, Mode};
-use tractive::operator::{Configuration, Feedback, Nobody, OperatorPort, Request, Switches};
+use tractive::operator::{Configuration, Desk, Feedback, Switches};
 use tractive::protection::{Fault, SafeState};
+use tractive::protocol::Station;
 use tractive::time::Instant;
 
 const NOW: Instant = Instant(0);
@@ -78,12 +79,12 @@ fn each_switch_has_its_pin_and_the_chopper_its_duty() {
 }
 
 #[test]
-fn the_operator_hears_of_contacts_drivers_inputs_and_offsets() {
+fn the_operator_hears_of_contacts_drivers_and_inputs() {
     let registers = Bench::started(plan()).registers;
-    let operator = Operator::new();
-    let zeros = [AdcCode(2_048), AdcCode(2_058), AdcCode(2_038)];
-    let commander = Nobody(&BUILT_IN.ratings);
-    let mut idle = Idle::new(registers, &operator, zeros, Configuration::Good, commander);
+    let desk = Desk::new();
+    let station = Station::new(&BUILT_IN.ratings);
+    // The bus is not touched by what is tested here.
+    let serve = Serve::new(registers, Can::CHIP, station, &desk, Configuration::Good);
     drivers_ready(&registers, true);
     let healthy = Feedback {
         driver_ready: true,
@@ -98,14 +99,10 @@ fn the_operator_hears_of_contacts_drivers_inputs_and_offsets() {
         (1 << 5, Feedback { main_closed: true, ..healthy }),
     ] {
         write_input(registers.gpioc, levels);
-        let (request, feedback) = idle.ask(NOW);
-        assert_eq!(request, Request::idle(&BUILT_IN.ratings));
-        let offsets = feedback.offsets_a;
-        assert!(offsets.a == 0.0 && (offsets.b - 2.44).abs() < 0.01 && (offsets.c + 2.44).abs() < 0.01);
-        assert_eq!(Feedback { offsets_a: wanted.offsets_a, ..feedback }, wanted, "{levels:#b}");
+        assert_eq!(serve.feedback(), wanted, "{levels:#b}");
     }
     drivers_ready(&registers, false);
-    let (_, feedback) = idle.ask(NOW);
+    let feedback = serve.feedback();
     assert_eq!((feedback.driver_ready, feedback.hardware), (false, Some(Fault::GateDriver)));
 }
 

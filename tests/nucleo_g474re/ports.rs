@@ -8,51 +8,16 @@ use tractive::board::nucleo_g474re::position::{Encoder, Position};
 use tractive::board::nucleo_g474re::power_stage::{AdcCode, POWER_STAGE};
 use tractive::board::nucleo_g474re::sampling::Zeros;
 use tractive::board::nucleo_g474re::watchdog::Pulse;
-use tractive::board::nucleo_g474re::{CLOCK, Control, Pwm};
+use tractive::board::nucleo_g474re::{Control, Pwm};
 use tractive::board::{ControlPort, PwmPort};
 use tractive::control::Demand;
 use tractive::drive::Report;
 use tractive::frames::Angle;
-use tractive::operator::{Permit, SLOT_PERIODS};
+use tractive::operator::Permit;
 use tractive::protection::SafeState;
 use tractive::time::Instant;
 
 const NOW: Instant = Instant(0);
-/// The slot after that.
-const LATER: Instant = Instant(SLOT_PERIODS * CLOCK.control_ticks);
-const DEMAND: Demand = Demand { torque_nm: 120.0, slew_limited: true };
-const ENABLED: Permit = Permit { enable: true, ..Permit::NONE };
-
-/// Permits from [`LATER`] on.
-pub fn allow(operator: &Operator, permit: Permit) {
-    operator.desk.tell(NOW, &Report::default());
-    let observed = operator.desk.observed().unwrap();
-    assert_eq!(operator.desk.allow(permit, &observed, &CLOCK), LATER);
-}
-
-#[test]
-fn nothing_is_enabled_that_is_not_permitted() {
-    let bench = Bench::started(plan());
-    let registers = bench.registers;
-    registers.tim4.sr().write(|w| w.set_idxif(true));
-    write_input(registers.gpioc, 1 << 2);
-    for (permit, at, enabled) in [
-        (None, LATER, false),
-        (Some(Permit::NONE), LATER, false),
-        (Some(ENABLED), NOW, false),
-        (Some(ENABLED), LATER, true),
-    ] {
-        let operator = Operator::new();
-        if let Some(permit) = permit {
-            allow(&operator, permit);
-        }
-        let encoder = Encoder::new(registers.tim4, &POWER_STAGE, 4);
-        let mut control = Control::new(registers, ZEROS, encoder, &operator);
-        bench.finish_sequence(registers.adc1);
-        assert_eq!(control.sample(at).enable, enabled, "{permit:?} {at:?}");
-        assert!(operator.position_known());
-    }
-}
 const ZEROS: Zeros = [AdcCode(2_048), AdcCode(2_050), AdcCode(2_040)];
 
 /// Writes a register that only the hardware writes.
@@ -74,9 +39,9 @@ fn a_sample_has_currents_link_voltage_and_angle_in_si_units() {
     registers.tim4.cnt().write(|w| w.set_cnt(256));
     registers.tim4.sr().write(|w| w.set_idxif(true));
     write_input(registers.gpioc, 1 << 2);
-    // What was permitted a slot ago.
-    allow(&operator, Permit { demand: DEMAND, ..ENABLED });
-    let sample = control.sample(LATER);
+    let demand = Demand { torque_nm: 120.0, slew_limited: true };
+    operator.desk.allow_from(Permit { enable: true, demand, ..Permit::NONE }, NOW);
+    let sample = control.sample(NOW);
     let currents = sample.measured.currents_a;
     assert_eq!((currents.a, currents.b, currents.c), (125.0, -62.5, -62.5));
     assert!((sample.measured.udc_v - 1_500.0).abs() < 0.5);
@@ -92,8 +57,8 @@ fn the_gates_wait_for_the_index_the_enable_input_and_quiet_break_inputs() {
         let mut bench = Bench::started(plan());
         let registers = bench.registers;
         let operator = Operator::new();
-        allow(&operator, ENABLED);
         let encoder = Encoder::new(registers.tim4, &POWER_STAGE, 4);
+        operator.desk.allow_from(Permit { enable: true, ..Permit::NONE }, NOW);
         let mut control = Control::new(registers, ZEROS, encoder, &operator);
         registers.tim4.sr().write(|w| w.set_idxif(index));
         write_input(registers.gpioc, u32::from(enable) << 2);
@@ -102,7 +67,7 @@ fn the_gates_wait_for_the_index_the_enable_input_and_quiet_break_inputs() {
             bench.settle();
         }
         bench.finish_sequence(registers.adc1);
-        assert!(!control.sample(LATER).enable);
+        assert!(!control.sample(NOW).enable);
     }
 }
 

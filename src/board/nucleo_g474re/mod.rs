@@ -13,13 +13,13 @@
 //!
 //! Everything here but `chip` takes its registers as values, so tests on the host run it against blocks of memory.
 
+pub mod can;
 pub mod clock;
 pub mod comparators;
 pub mod control_timer;
 pub mod dead_time;
 pub mod half;
 pub mod hardware;
-pub mod idle;
 pub mod legs;
 pub mod operator;
 pub mod outputs;
@@ -29,6 +29,7 @@ pub mod position;
 pub mod power_stage;
 pub mod registers;
 pub mod sampling;
+pub mod serve;
 pub mod start;
 pub mod switchgear;
 pub mod watchdog;

@@ -72,7 +72,7 @@ impl<P: Position> ControlPort for Control<'_, P> {
             acknowledge: 0,
             hardware,
         };
-        self.operator.permit(now, &mut sample, angle.is_some());
+        self.operator.desk.permit(now).apply(&mut sample);
         sample
     }
 
@@ -85,7 +85,8 @@ impl<P: Position> ControlPort for Control<'_, P> {
     }
 
     fn report(&mut self, now: Instant, report: &Report) {
-        self.operator.tell(now, report);
+        self.operator.desk.tell(now, report);
+        self.operator.tell(report);
     }
 }
 

@@ -26,8 +26,9 @@ struct Timer {
     status: u32,
 }
 
-/// Longest time for which a leg may have a node on no rail: a pulse that the dead time swallows, with the dead time behind it.
-const MOST_FLOATING_DEAD_TIMES: u64 = 2;
+/// Longest time for which a leg may have a node on no rail: around a valley or a peak it passes at most three states that are each too
+/// short for the dead time, and then waits for it.
+const MOST_FLOATING_DEAD_TIMES: u64 = 4;
 
 /// The three timers and nine gates.
 pub struct Model {

@@ -23,7 +23,8 @@
 //! * where one device of a leg goes off and another one on, all conduct the dead time later;
 //! * each shoot-through, which begins where a device goes on, is shorter by the dead time, and none if that is all of it. The link's
 //!   control, which has an integral part, makes up for it with its duty;
-//! * a pulse shorter than the dead time is none.
+//! * a pulse shorter than the dead time is none. A leg that has only such around a valley or a peak hangs on its diodes for at most four
+//!   dead times.
 //!
 //! Dead time, breaks and off levels are locked before any pin is a timer's.
 //!
