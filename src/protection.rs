@@ -48,7 +48,7 @@ pub enum Fault {
     LegStuck,
     /// A gate driver is not ready, or its wire is broken: the hardware holds the gates off.
     GateDriver,
-    /// A comparator has seen a phase current beyond its threshold; the limit is the threshold, in A.
+    /// A comparator has seen a phase current beyond its threshold.
     HardwareOvercurrent,
     /// The chip's own break: crystal stopped, processor locked up, or a memory word with a two-bit error.
     ClockFailure,

@@ -37,6 +37,9 @@ struct Fake {
     faults: Vec<(Option<Fault>, u32)>,
     /// The last half with pulses.
     pulsed: u32,
+    /// From when on halves are loaded too late, and when the last one was.
+    late_from: u32,
+    played_at: Instant,
 }
 
 impl Fake {
@@ -59,6 +62,8 @@ impl Fake {
             safe_states: Vec::new(),
             faults: Vec::new(),
             pulsed: 0,
+            late_from: u32::MAX,
+            played_at: Instant(0),
         }
     }
 
@@ -127,9 +132,14 @@ impl PwmPort for Fake {
 
     fn play(&mut self, now: Instant, next: &CarrierPeriod) {
         self.played = *next;
+        self.played_at = now;
         if next.mode != Mode::Off {
             self.pulsed = now.0;
         }
+    }
+
+    fn is_late(&mut self) -> bool {
+        self.late_from <= self.played_at.0
     }
 
     fn leave(&mut self, now: Instant) -> bool {
@@ -413,4 +423,28 @@ fn every_fault_has_a_code_and_a_name_of_its_own() {
     }
     assert_eq!(Fault::from_code(0), None);
     assert_eq!(Fault::from_code(Fault::ALL.len() as u32 + 1), None);
+}
+
+#[test]
+fn a_half_that_is_loaded_too_late_is_a_fault_and_control_knows() {
+    let mut fake = Fake { late_from: SETTLED, ..Fake::turning(400.0) };
+    let trip = drive(&mut fake, END, u32::MAX).unwrap();
+    assert_eq!(trip.fault, Fault::PwmDeadline);
+    assert!((SETTLED..SETTLED + 20_000).contains(&trip.at.0));
+    assert_eq!(fake.report.trip, Some(trip));
+    assert_eq!(fake.played.mode, Mode::Off);
+}
+
+#[test]
+fn a_cause_in_hardware_names_the_fault_where_the_gates_are_held() {
+    let mut fake = Fake {
+        lets_go: false,
+        spoil: |sample| sample.hardware = Some(Fault::GateDriver),
+        spoil_from: SETTLED,
+        acknowledge_from: SETTLED + 100_000,
+        ..Fake::turning(400.0)
+    };
+    let trip = drive(&mut fake, END, u32::MAX).unwrap();
+    assert_eq!(trip.fault, Fault::GateDriver);
+    assert!(trip.at.0 >= SETTLED + 100_000, "the one after the acknowledge");
 }

@@ -61,6 +61,10 @@ pub trait PwmPort {
     fn play(&mut self, now: Instant, next: &CarrierPeriod);
     /// Puts the gates into the safe state at once, whatever is played.
     fn enter(&mut self, safe: SafeState, now: Instant);
+    /// Whether what was played last came after the half that it was for had ended; the gates are off then.
+    fn is_late(&mut self) -> bool {
+        false
+    }
     /// Leaves the safe state: gates off, until pulses are played again. `false` when something holds the gates: a cause in
     /// hardware, or a board that only a reset lets go on.
     fn leave(&mut self, _now: Instant) -> bool {

@@ -197,8 +197,11 @@ impl Pwm {
 
 impl ControlPort for Control {
     fn sample(&mut self, now: Instant) -> Sample {
-        let sample = exchange::control_sample(now);
-        if OPERATED.load(Ordering::Relaxed) { DESK.permit(now).applied_to(sample) } else { sample }
+        let mut sample = exchange::control_sample(now);
+        if OPERATED.load(Ordering::Relaxed) {
+            DESK.permit(now).apply(&mut sample);
+        }
+        sample
     }
 
     fn enter(&mut self, safe: SafeState, now: Instant) {

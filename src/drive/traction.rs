@@ -162,9 +162,13 @@ impl<M: Machine> ControlTask<M> {
         let sample = port.sample(now);
         let applied = shared.applied.read(|records| Applied::seen(records, now)).flatten();
         self.forget_acknowledged(sample.acknowledge, applied.as_ref());
-        self.check(sample.hardware.map(|fault| (fault, 1.0, 0.0)), &sample, port);
         if self.trip.is_none() && applied.as_ref().is_some_and(|applied| applied.next.kind.is_tripped()) {
             self.trip = shared.trip.read();
+        }
+        if let Some(fault) = sample.hardware {
+            // That the gates are held is only what comes of it.
+            self.trip = self.trip.filter(|trip| trip.fault != Fault::GatesHeld);
+            self.check(Some((fault, 1.0, 0.0)), &sample, port);
         }
         let overdue = applied.as_ref().and_then(|applied| applied.overdue(now, &self.settings.clock));
         self.check(overdue, &sample, port);
@@ -665,6 +669,7 @@ impl<M: Machine> PwmTask<M> {
             acknowledged: self.acknowledged,
         };
         self.play(port);
+        self.check_late(port, shared);
         shared.applied.publish(self.newest.to_words());
     }
 
@@ -681,6 +686,7 @@ impl<M: Machine> PwmTask<M> {
         {
             self.newest.half = self.modulator.revised(&half, begins, &command.reference);
             self.play(port);
+            self.check_late(port, shared);
             shared.applied.revise(self.newest.to_words());
         }
     }
@@ -769,6 +775,15 @@ impl<M: Machine> PwmTask<M> {
         let at = self.newest.begins;
         port.enter(safe, at);
         self.latch(Trip { fault, value, limit, at, safe }, shared);
+    }
+
+    /// A half that was loaded after its beginning: the board has turned the gates off.
+    fn check_late(&mut self, port: &mut impl PwmPort, shared: &Shared) {
+        if port.is_late() && self.trip.is_none() {
+            let (fault, safe) = (Fault::PwmDeadline, SafeState::GatesOff);
+            self.latch(Trip { fault, value: 1.0, limit: 0.0, at: self.newest.at, safe }, shared);
+            self.newest.tripped = true;
+        }
     }
 
     fn latch(&mut self, trip: Trip, shared: &Shared) {

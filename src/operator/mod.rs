@@ -74,9 +74,11 @@ pub struct Permit {
 impl Permit {
     /// What the drive gets: the board may hold the gates off, never more than that.
     #[inline]
-    pub fn applied_to(self, sample: Sample) -> Sample {
-        let Self { enable, demand, window, acknowledge } = self;
-        Sample { enable: enable && sample.enable, demand, window, acknowledge, ..sample }
+    pub fn apply(&self, sample: &mut Sample) {
+        sample.enable &= self.enable;
+        sample.demand = self.demand;
+        sample.window = self.window;
+        sample.acknowledge = self.acknowledge;
     }
 
     /// Nothing.
@@ -389,7 +391,7 @@ impl Operator {
             let waiting = matches!(self.phase, Phase::Fault { .. });
             return self.refuse(if waiting { Refusal::FaultNotAcknowledged } else { Refusal::NoFault });
         };
-        let shorted = trip.safe == SafeState::ShortCircuit;
+        let shorted = trip.safe != SafeState::GatesOff;
         let held = shorted && !health::open_is_safe(input, settings);
         let cause =
             health::cause(input, false, settings).or_else(|| health::resting_current(input, settings));

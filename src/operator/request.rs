@@ -2,6 +2,7 @@
 
 use super::settings::Ends;
 use crate::cell::Words;
+use crate::configuration::Refused;
 use crate::frames::Abc;
 use crate::machine::Ratings;
 use crate::modulation::Mode;
@@ -80,7 +81,7 @@ impl Limits {
     }
 }
 
-/// The check of the configuration, which others make.
+/// The check of the configuration ([`crate::configuration`]).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Configuration {
@@ -91,6 +92,12 @@ pub enum Configuration {
     Good = 1,
     /// Checked and refused.
     Bad = 2,
+}
+
+impl From<Result<(), Refused>> for Configuration {
+    fn from(checked: Result<(), Refused>) -> Self {
+        if checked.is_ok() { Self::Good } else { Self::Bad }
+    }
 }
 
 /// What the board says of itself.

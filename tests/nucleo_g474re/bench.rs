@@ -90,6 +90,7 @@ impl Bench {
             gpiod: at_memory!(pac::gpio::Gpio),
             legs,
             tim20: at_memory!(pac::timer::TimAdv),
+            tim16: at_memory!(pac::timer::Tim1chCmp),
             tim2: at_memory!(pac::timer::TimGp32),
             tim3: at_memory!(pac::timer::TimGp16),
             tim4: at_memory!(pac::timer::TimGp16),

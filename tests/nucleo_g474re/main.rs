@@ -3,6 +3,7 @@
 mod bench;
 mod drive;
 mod legs;
+mod operator;
 mod pins;
 mod ports;
 mod start;

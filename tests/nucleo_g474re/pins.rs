@@ -19,7 +19,7 @@ fn the_chip_has_every_signal_on_its_pin() {
     for pin in TABLES.iter().flat_map(|(_, pins)| *pins) {
         let function = match pin.function {
             Function::Gate(number) | Function::Alternate(number) | Function::Bus(number) => Some(number),
-            Function::Analog | Function::Input | Function::Output => None,
+            Function::Analog | Function::Input | Function::Output | Function::Switch => None,
         };
         for signal in pin.signals {
             let (peripheral, signal) = signal.split_once('_').unwrap();
@@ -30,7 +30,7 @@ fn the_chip_has_every_signal_on_its_pin() {
                 .any(|found| found.pin == name(pin) && found.signal == signal && found.af == function);
             assert!(there, "{} is not {} {signal} by {function:?}", name(pin), peripheral.name);
         }
-        let by_software = matches!(pin.function, Function::Input | Function::Output);
+        let by_software = matches!(pin.function, Function::Input | Function::Output | Function::Switch);
         assert_eq!(pin.signals.is_empty(), by_software, "{}", name(pin));
     }
 }
@@ -54,6 +54,7 @@ fn row(pin: &Pin) -> String {
         Function::Analog => "analog".to_owned(),
         Function::Input => "input, pull-down".to_owned(),
         Function::Output => "output".to_owned(),
+        Function::Switch => "output, low at first".to_owned(),
     };
     format!("| {} | {} | {function} | {} |", name(pin), pin.signals.join(", "), pin.purpose)
 }

@@ -4,8 +4,10 @@ use crate::world::{World, trip};
 use tractive::operator::{Configuration, State};
 use tractive::protection::Fault;
 
+type Spoil = fn(&mut World);
+
 /// Ends in this fault, everything off.
-fn fails(mut world: World, spoil: fn(&mut World), fault: Fault) {
+fn fails(mut world: World, spoil: Spoil, fault: Fault) {
     spoil(&mut world);
     for _ in 0..3_000 {
         world.slot();
@@ -20,7 +22,7 @@ fn fails(mut world: World, spoil: fn(&mut World), fault: Fault) {
 
 #[test]
 fn the_self_test_finds_what_is_not_in_order() {
-    let spoils: [(fn(&mut World), Fault); 13] = [
+    let spoils: [(Spoil, Fault); 13] = [
         (|world| world.feedback.offsets_a.c = 5.0, Fault::CurrentOffset),
         (|world| world.feedback.offsets_a.a = f32::NAN, Fault::CurrentOffset),
         (|world| (world.observed.current_a, world.observed.udc_v) = (15.0, 100.0), Fault::CurrentOffset),
@@ -60,7 +62,7 @@ fn a_source_that_is_not_there_is_a_precharge_timeout() {
 
 #[test]
 fn contactors_that_do_not_move_are_found() {
-    let stick: fn(&mut World) = |world| world.stuck = true;
+    let stick: Spoil = |world| world.stuck = true;
     let mut charging = World::ready();
     charging.request.charge = true;
     fails(charging, stick, Fault::Contactor);
@@ -81,7 +83,7 @@ fn contactors_that_do_not_move_are_found() {
 
 #[test]
 fn contactors_that_move_by_themselves_are_found() {
-    let open: fn(&mut World) = |world| (world.feedback.main_closed, world.stuck) = (false, true);
+    let open: Spoil = |world| (world.feedback.main_closed, world.stuck) = (false, true);
     fails(World::charged(), open, Fault::Contactor);
     fails(World::running(), open, Fault::Contactor);
     fails(
@@ -116,7 +118,7 @@ fn a_source_that_is_lost_opens_the_main_contactor_before_it_can_come_back() {
 
 #[test]
 fn what_must_stay_in_order_while_the_gates_pulse() {
-    let spoils: [(fn(&mut World), Fault); 4] = [
+    let spoils: [(Spoil, Fault); 4] = [
         (|world| world.feedback.driver_ready = false, Fault::GateDriver),
         (|world| world.feedback.hardware = Some(Fault::ClockFailure), Fault::ClockFailure),
         (|world| world.feedback.sensor_alive = false, Fault::PositionSensor),

@@ -1,5 +1,6 @@
 //! The operator's state machine: every transition, every refusal, every fault of its own, and what no sequence may do.
 
+mod document;
 mod faults;
 mod properties;
 mod ramp;

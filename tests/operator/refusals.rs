@@ -5,6 +5,7 @@ use tractive::operator::{Configuration, Refusal, Request, State};
 use tractive::protection::{Fault, SafeState, Trip};
 
 type Set = fn(&mut Request, bool);
+type Spoil = fn(&mut World);
 const ENABLE: Set = |request, level| request.enable = level;
 const CHARGE: Set = |request, level| request.charge = level;
 const DISCHARGE: Set = |request, level| request.discharge = level;
@@ -145,7 +146,7 @@ fn torque_not_zero() {
 
 #[test]
 fn what_keeps_a_charged_drive_from_being_enabled() {
-    let reasons: [(fn(&mut World), Refusal); 7] = [
+    let reasons: [(Spoil, Refusal); 7] = [
         (|world| world.observed.current_a = 15.0, Refusal::CauseStillPresent),
         (|world| world.feedback.parameters_open = true, Refusal::ParametersOpen),
         (|world| world.feedback.enable_input = false, Refusal::EnableInputLow),

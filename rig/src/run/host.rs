@@ -33,12 +33,12 @@ struct Wire<'w> {
 
 impl ControlPort for Port<'_, '_> {
     fn sample(&mut self, now: Instant) -> Sample {
-        let sample = self.bench.control_sample(now);
-        let sample = if self.bench.is_operated() {
-            sample.map(|sample| self.desk.permit(now).applied_to(sample))
-        } else {
-            sample
-        };
+        let mut sample = self.bench.control_sample(now);
+        if self.bench.is_operated()
+            && let Ok(sample) = &mut sample
+        {
+            self.desk.permit(now).apply(sample);
+        }
         sample.unwrap_or_else(|error| {
             self.error = Some(error.into());
             let measured = Measurements { currents_a: Abc::default(), udc_v: 0.0, angle: Angle::ZERO };

@@ -8,12 +8,13 @@ use super::power_stage::CORE_HZ;
 use super::registers::Registers;
 use super::serve::Serve;
 use super::start::{self, Found, Plan, StartError, Timeout, Wait};
+use super::switchgear::TIMES;
 use super::watchdog::Pulse;
 use super::{CLOCK, zs9};
 use crate::configuration::Refused;
 use crate::drive::Report;
 use crate::machine::BUILT_IN;
-use crate::operator::{self, Configuration, Slot, slot_s};
+use crate::operator::{self, Configuration, Line, Slot, slot_s};
 use crate::protocol::Station;
 use crate::recorder::{Record, Recorder};
 use cortex_m::peripheral::NVIC;
@@ -144,8 +145,9 @@ fn configuration() -> Configuration {
 
 /// The idle loop, forever: serves the bus and the operator, feeds the watchdog, tells what has changed, and after a fault what the flight recorder holds.
 pub fn idle() -> ! {
-    let (mut told, mut broken, mut records_told) = (None, false, 0);
-    let rated = operator::Settings::rated(&BUILT_IN.ratings, slot_s(&CLOCK), None);
+    let (mut told, mut records_told) = (None, 0);
+    let line = Line::rated(&BUILT_IN.ratings, TIMES.precharge_s, TIMES.discharge_s);
+    let rated = operator::Settings::rated(&BUILT_IN.ratings, slot_s(&CLOCK), Some(line));
     let station = Station::new(&BUILT_IN.ratings);
     let mut serve = Serve::new(Registers::CHIP, Can::CHIP, station, &OPERATOR.desk, configuration());
     let mut slot = Slot::new();
@@ -163,16 +165,15 @@ pub fn idle() -> ! {
                 None => {}
             }
         }
-        if !broken && Registers::CHIP.legs.is_tripped() {
-            broken = true;
-            defmt::error!("gates off by a break: hardware, or the fault that follows");
-        }
         let trip = OPERATOR.report().and_then(|report: Report| report.trip);
-        if told.is_none()
-            && let Some(trip) = trip
-        {
-            defmt::error!("fault {}: {} beyond {}", trip.fault.name(), trip.value, trip.limit);
-            told = Some(trip);
+        if trip != told {
+            match trip {
+                Some(trip) => {
+                    defmt::error!("fault {}: {} beyond {}", trip.fault.name(), trip.value, trip.limit);
+                }
+                None => defmt::info!("fault acknowledged"),
+            }
+            told = trip;
         }
     }
 }

@@ -66,6 +66,7 @@ pub fn enable_peripherals(registers: &Registers) {
         w.set_syscfgen(true);
         w.set_tim1en(true);
         w.set_tim8en(true);
+        w.set_tim16en(true);
         w.set_tim20en(true);
     });
     dbgmcu.apb2fzr().modify(|w| {

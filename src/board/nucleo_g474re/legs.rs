@@ -153,6 +153,26 @@ impl Legs {
         self.outputs().is_tripped()
     }
 
+    /// Whether it was the chip itself: clock, lock-up or memory.
+    #[inline]
+    pub fn is_tripped_by_the_chip(&self) -> bool {
+        [self.tim1, self.tim8].into_iter().any(|timer| timer.sr().read().sbif())
+    }
+
+    /// Forgets a break or a short circuit: outputs off, legs as they are played again. `false` while the cause of a break lasts,
+    /// which sets its flag again.
+    #[inline]
+    pub fn leave(&self) -> bool {
+        self.outputs().switch_off();
+        self.tim1.ccmr_output(FIRST_PAIR).write_value(combined());
+        self.tim1.ccmr_output(SECOND_PAIR).write_value(combined());
+        self.tim8.ccmr_output(FIRST_PAIR).write_value(combined());
+        for timer in [self.tim1, self.tim8] {
+            timer.sr().write_value(all_but_breaks());
+        }
+        !self.is_tripped()
+    }
+
     /// The three lower devices on for good, unless a break is latched. The dead time passes first, in hardware.
     #[inline]
     pub fn short_circuit(&self) {
@@ -203,4 +223,13 @@ fn driven(channels: &[usize]) -> regs::CcerAdv {
 /// Status flags are cleared by writing 0 and left alone by writing 1.
 const fn all_but_update() -> regs::SrAdv {
     regs::SrAdv(!1)
+}
+
+/// Likewise, of the breaks' flags.
+fn all_but_breaks() -> regs::SrAdv {
+    let mut flags = regs::SrAdv(u32::MAX);
+    flags.set_bif(0, false);
+    flags.set_bif(1, false);
+    flags.set_sbif(false);
+    flags
 }

@@ -19,6 +19,7 @@ pub mod comparators;
 pub mod control_timer;
 pub mod dead_time;
 pub mod half;
+pub mod hardware;
 pub mod legs;
 pub mod operator;
 pub mod outputs;
@@ -30,6 +31,7 @@ pub mod registers;
 pub mod sampling;
 pub mod serve;
 pub mod start;
+pub mod switchgear;
 pub mod watchdog;
 pub mod zs9;
 

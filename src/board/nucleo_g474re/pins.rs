@@ -27,6 +27,8 @@ pub enum Function {
     Input,
     /// Written by software, high at first.
     Output,
+    /// Written by software, low at first: switches something on when high.
+    Switch,
     /// A bus: alternate function of this number, with pull-up, so that it rests.
     Bus(u8),
 }
@@ -57,7 +59,7 @@ pub(super) const fn pin(
 }
 
 /// Every pin the PMaSynRM's drive uses.
-pub const PINS: [Pin; 21] = [
+pub const PINS: [Pin; 27] = [
     pin(Port::A, 8, Function::Gate(6), &["TIM1_CH1"], "gate U, upper device"),
     pin(Port::B, 13, Function::Gate(6), &["TIM1_CH1N"], "gate U, lower device"),
     pin(Port::A, 10, Function::Gate(6), &["TIM1_CH3"], "gate V, upper device"),
@@ -77,9 +79,53 @@ pub const PINS: [Pin; 21] = [
     pin(Port::B, 7, Function::Alternate(2), &["TIM4_CH2"], "encoder, track B"),
     pin(Port::B, 3, Function::Alternate(2), &["TIM4_ETR"], "encoder, index"),
     pin(Port::C, 2, Function::Input, &[], "enable: high lets the gates pulse"),
+    pin(Port::C, 8, Function::Switch, &[], "precharge relay, high closes"),
+    pin(Port::C, 9, Function::Switch, &[], "main contactor, high closes"),
+    pin(Port::C, 11, Function::Switch, &[], "discharge resistor, high switches it on"),
+    pin(Port::B, 4, Function::Gate(1), &["TIM16_CH1"], "braking chopper, high conducts"),
+    pin(Port::C, 4, Function::Input, &[], "precharge relay's auxiliary contact, high: closed"),
+    pin(Port::C, 5, Function::Input, &[], "main contactor's auxiliary contact, high: closed"),
     pin(Port::A, 11, Function::Bus(9), &["FDCAN1_RX"], "CAN transceiver, RXD"),
     pin(Port::A, 12, Function::Bus(9), &["FDCAN1_TX"], "CAN transceiver, TXD"),
 ];
+
+/// A wire to the switchgear.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Wire {
+    port: Port,
+    /// Number within the port.
+    pub(super) number: usize,
+}
+
+impl Wire {
+    pub(super) const PRECHARGE: Self = Self { port: Port::C, number: 8 };
+    pub(super) const MAIN: Self = Self { port: Port::C, number: 9 };
+    pub(super) const DISCHARGE: Self = Self { port: Port::C, number: 11 };
+    pub(super) const PRECHARGE_CONTACT: Self = Self { port: Port::C, number: 4 };
+    pub(super) const MAIN_CONTACT: Self = Self { port: Port::C, number: 5 };
+
+    pub(super) const fn port(self, registers: &Registers) -> Gpio {
+        self.port.of(registers)
+    }
+
+    /// Sets an output, by a write that touches no other pin.
+    pub(super) fn set(self, registers: &Registers, high: bool) {
+        let (port, number) = (self.port.of(registers), self.number);
+        port.bsrr().write(|w| if high { w.set_bs(number, true) } else { w.set_br(number, true) });
+    }
+}
+
+/// The chopper's compare at which it never conducts.
+pub(super) const CHOPPER_OFF: u16 = 0;
+
+/// Input of the gate drivers' ready wire.
+const DRIVERS_READY: usize = 12;
+
+/// Whether the gate drivers are ready.
+#[inline]
+pub fn drivers_ready(registers: &Registers) -> bool {
+    is_high(registers.gpiob, DRIVERS_READY)
+}
 
 /// The enable input.
 const ENABLE: usize = 2;
@@ -143,11 +189,14 @@ fn configure(registers: &Registers, pin: &Pin) {
         Function::Gate(_) | Function::Alternate(_) => (Moder::ALTERNATE, Pupdr::PULL_DOWN),
         Function::Analog => (Moder::ANALOG, Pupdr::FLOATING),
         Function::Input => (Moder::INPUT, Pupdr::PULL_DOWN),
-        Function::Output => (Moder::OUTPUT, Pupdr::FLOATING),
+        Function::Output | Function::Switch => (Moder::OUTPUT, Pupdr::FLOATING),
         Function::Bus(_) => (Moder::ALTERNATE, Pupdr::PULL_UP),
     };
     if pin.function == Function::Output {
         port.bsrr().write(|w| w.set_bs(number, true));
+    }
+    if pin.function == Function::Switch {
+        port.bsrr().write(|w| w.set_br(number, true));
     }
     port.pupdr().modify(|w| w.set_pupdr(number, pull));
     if let Function::Gate(function) | Function::Alternate(function) | Function::Bus(function) = pin.function {

@@ -2,6 +2,7 @@
 
 use super::control_timer::ControlTimer;
 use super::half::HalfRegisters;
+use super::hardware;
 use super::operator::Operator;
 use super::pins;
 use super::position::Position;
@@ -61,16 +62,18 @@ impl<P: Position> ControlPort for Control<'_, P> {
             Some([_, _, _, udc]) => udc.udc_v(),
             None => f32::NAN,
         };
-        let healthy = angle.is_some() && !self.registers.legs.is_tripped();
-        let sample = Sample {
+        let hardware = hardware::latched_by(&self.registers);
+        let healthy = angle.is_some() && hardware.is_none();
+        let mut sample = Sample {
             measured: Measurements { currents_a: currents_a(codes, &self.zeros), udc_v, angle: self.angle },
             demand: Demand::default(),
             enable: healthy && pins::is_enabled(&self.registers),
             window: LinkWindow::OPEN,
             acknowledge: 0,
-            hardware: None,
+            hardware,
         };
-        self.operator.desk.permit(now).applied_to(sample)
+        self.operator.desk.permit(now).apply(&mut sample);
+        sample
     }
 
     fn enter(&mut self, safe: SafeState, _now: Instant) {
@@ -96,13 +99,15 @@ pub struct Pwm {
     pulses: bool,
     /// The levels on which the legs stand at its end.
     levels: [bool; 3],
+    /// A half was over before it was loaded, and the safe state has not been left since.
+    late: bool,
 }
 
 impl Pwm {
     /// At rest, with the zeros that the start measured.
     pub const fn new(registers: Registers, zeros: Zeros) -> Self {
         let sampler = pwm_sampler(&registers);
-        Self { registers, sampler, zeros, pulses: false, levels: [false; 3] }
+        Self { registers, sampler, zeros, pulses: false, levels: [false; 3], late: false }
     }
 
     /// First thing in the interrupt: whether it is a carrier boundary's. If not, control wants a revision, and there is nothing to
@@ -141,13 +146,14 @@ impl PwmPort for Pwm {
         currents_a(self.sampler.read(), &self.zeros)
     }
 
-    /// An interrupt that ends after its half has left the timers a mixture of two halves: the gates go off for good.
+    /// An interrupt that ends after its half has left the timers a mixture of two halves: the gates go off.
     fn play(&mut self, _now: Instant, next: &CarrierPeriod) {
         let half = HalfRegisters::new(next, self.levels);
         let legs = &self.registers.legs;
         legs.play(&half);
         if legs.has_updated() {
             legs.trip();
+            self.late = true;
         }
         self.pulses = next.mode != Mode::Off;
         self.levels = half.end_levels();
@@ -155,6 +161,15 @@ impl PwmPort for Pwm {
 
     fn enter(&mut self, safe: SafeState, _now: Instant) {
         enter(&self.registers, safe);
+    }
+
+    fn leave(&mut self, _now: Instant) -> bool {
+        self.late = false;
+        self.registers.legs.leave()
+    }
+
+    fn is_late(&mut self) -> bool {
+        self.late
     }
 }
 

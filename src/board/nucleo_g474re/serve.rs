@@ -1,15 +1,14 @@
 //! The idle loop's operator: asked over CAN, answered by what the board says of itself.
 
 use super::can::Can;
-use super::pins;
 use super::registers::Registers;
+use super::{hardware, pins, switchgear};
 use crate::frames::Abc;
 use crate::operator::{Configuration, Desk, Feedback, OperatorPort, Request, Status};
-use crate::protection::Fault;
 use crate::protocol::Station;
 use crate::time::Instant;
 
-/// The operator's side of the board. It has no contactors: the link is alive by itself.
+/// The operator's side of the board.
 pub struct Serve<'a> {
     registers: Registers,
     /// The bus.
@@ -32,13 +31,15 @@ impl<'a> Serve<'a> {
         Self { registers, can, station, desk, configuration }
     }
 
-    fn feedback(&self) -> Feedback {
-        let tripped = self.registers.legs.is_tripped();
+    /// What the board says of itself.
+    pub fn feedback(&self) -> Feedback {
+        let (precharge_closed, main_closed) = switchgear::contacts(&self.registers);
         Feedback {
-            precharge_closed: false,
-            main_closed: false,
-            driver_ready: !tripped,
+            precharge_closed,
+            main_closed,
+            driver_ready: pins::drivers_ready(&self.registers),
             enable_input: pins::is_enabled(&self.registers),
+            // An incremental encoder cannot tell at standstill; while it turns, the drive looks at its angle.
             sensor_alive: true,
             // The encoder's index has passed.
             position_known: self.registers.tim4.sr().read().idxif(),
@@ -46,7 +47,7 @@ impl<'a> Serve<'a> {
             offsets_a: Abc::default(),
             configuration: self.configuration,
             parameters_open: false,
-            hardware: tripped.then_some(Fault::GateDriver),
+            hardware: hardware::held_by(&self.registers),
         }
     }
 }
@@ -58,7 +59,9 @@ impl OperatorPort for Serve<'_> {
         (self.station.listen(self.desk.observed(), frame.as_ref()), self.feedback())
     }
 
+    /// The switches at once: a slot earlier or later is nothing to a contactor, and the chopper's compare is preloaded.
     fn tell(&mut self, _from: Instant, status: &Status) {
+        switchgear::set(&self.registers, &status.switches);
         if let Some(frame) = self.station.tell(status) {
             self.can.send(&frame);
         }

@@ -7,7 +7,7 @@ use super::position::Encoder;
 use super::power_stage::{POWER_STAGE, PowerStage};
 use super::registers::Registers;
 use super::sampling::{self, Sampler, Zeros};
-use super::{CLOCK, PRESCALER, clock, pins, watchdog};
+use super::{CLOCK, PRESCALER, clock, pins, switchgear, watchdog};
 
 /// Waiting for the hardware: on the chip a loop with a bound, in a test the hardware's turn.
 pub trait Wait {
@@ -94,7 +94,7 @@ pub type Step = fn(&mut Start) -> Result<(), StartError>;
 
 /// The steps in their order. The PWM timers are locked into their safe configuration before any gate pin is theirs,
 /// and break inputs and comparators watch before that; nothing counts until [`run`].
-pub const STEPS: [(&str, Step); 11] = [
+pub const STEPS: [(&str, Step); 12] = [
     ("reset cause", |start| watchdog::refuse_after_bite(start.registers)),
     ("clock tree", |start| clock::configure(start.registers, start.wait)),
     ("peripheral clocks", |start| {
@@ -113,6 +113,10 @@ pub const STEPS: [(&str, Step); 11] = [
     ("control timer and encoder", |start| {
         ControlTimer(start.registers.tim3).configure(PRESCALER, CLOCK.control_ticks);
         Encoder::configure(start.registers.tim4, start.stage);
+        Ok(())
+    }),
+    ("switchgear", |start| {
+        switchgear::configure(start.registers);
         Ok(())
     }),
     ("converters", prepare_samplers),

@@ -1,0 +1,81 @@
+//! Contactors, discharge resistor and braking chopper.
+//!
+//! Relays and contactors are plain outputs, high to close, with an input each for their auxiliary contacts. The chopper is TIM16's
+//! channel 1, edge-aligned, 1 kHz: one period an operator's slot. Its compare is preloaded, so a duty holds for whole periods.
+
+use super::pins::{CHOPPER_OFF, Wire, is_high};
+use super::power_stage::CORE_HZ;
+use super::registers::Registers;
+use crate::link::LineTimes;
+use crate::operator::Switches;
+use stm32_metapac::timer::vals::Ocm;
+
+/// Time constants of the line side that this board file is for: 50 ohm, 100 ohm and 6 mF.
+pub const TIMES: LineTimes = LineTimes { precharge_s: 0.3, discharge_s: 0.6 };
+
+/// Counts of a chopper period.
+pub const CHOPPER_COUNTS: u16 = 1_000;
+/// Chopper periods per second, in Hz.
+const CHOPPER_HZ: u32 = 1_000;
+
+/// Outputs low, the chopper off and counting. Its pin is still an input then.
+pub fn configure(registers: &Registers) {
+    let timer = registers.tim16;
+    timer.psc().write_value((CORE_HZ / CHOPPER_HZ / u32::from(CHOPPER_COUNTS) - 1) as u16);
+    timer.arr().write(|w| w.set_arr(CHOPPER_COUNTS - 1));
+    timer.ccr(0).write(|w| w.set_ccr(CHOPPER_OFF));
+    timer.ccmr_output(0).write(|w| {
+        w.set_ocm(0, Ocm::PWM_MODE1);
+        w.set_ocpe(0, true);
+    });
+    timer.ccer().write(|w| w.set_cce(0, true));
+    timer.egr().write(|w| w.set_ug(true));
+    timer.bdtr().write(|w| w.set_moe(true));
+    timer.cr1().write(|w| {
+        w.set_arpe(true);
+        w.set_cen(true);
+    });
+}
+
+/// Sets all of them. From the idle loop only.
+pub fn set(registers: &Registers, switches: &Switches) {
+    let Switches { precharge, main, discharge, chopper } = *switches;
+    // What opens before what closes: a contactor is never still told to be closed when the discharge resistor goes on.
+    let wires = [(Wire::PRECHARGE, precharge), (Wire::MAIN, main), (Wire::DISCHARGE, discharge)];
+    for closes in [false, true] {
+        for (wire, _) in wires.iter().filter(|(_, closed)| *closed == closes) {
+            wire.set(registers, closes);
+        }
+    }
+    registers.tim16.ccr(0).write(|w| w.set_ccr(counts(chopper)));
+}
+
+/// What the auxiliary contacts of precharge relay and main contactor say: closed.
+pub fn contacts(registers: &Registers) -> (bool, bool) {
+    let closed = |wire: Wire| is_high(wire.port(registers), wire.number);
+    (closed(Wire::PRECHARGE_CONTACT), closed(Wire::MAIN_CONTACT))
+}
+
+/// A duty as a compare; what is no number is none.
+fn counts(duty: f32) -> u16 {
+    let counts = duty * f32::from(CHOPPER_COUNTS);
+    if counts >= f32::from(CHOPPER_COUNTS) {
+        CHOPPER_COUNTS
+    } else if counts > 0.0 {
+        counts as u16
+    } else {
+        CHOPPER_OFF
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_duty_is_a_share_of_the_period() {
+        for (duty, wanted) in [(0.0, 0), (0.5, 500), (1.0, 1_000), (2.0, 1_000), (-1.0, 0), (f32::NAN, 0)] {
+            assert_eq!(counts(duty), wanted, "{duty}");
+        }
+    }
+}
