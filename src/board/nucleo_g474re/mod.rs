@@ -13,6 +13,7 @@
 //!
 //! Everything here but `chip` takes its registers as values, so tests on the host run it against blocks of memory.
 
+pub mod break_cause;
 pub mod clock;
 pub mod comparators;
 pub mod control_timer;

@@ -116,6 +116,12 @@ pub fn is_enabled(registers: &Registers) -> bool {
     is_high(registers.gpioc, ENABLE)
 }
 
+/// Whether the gate drivers say at both break inputs that they are ready.
+#[inline]
+pub fn drivers_are_ready(registers: &Registers) -> bool {
+    is_high(registers.gpiob, 12) && is_high(registers.gpioa, 6)
+}
+
 /// Whether an input is high.
 #[inline]
 pub(super) fn is_high(port: Gpio, number: usize) -> bool {

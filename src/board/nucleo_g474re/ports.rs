@@ -1,7 +1,9 @@
 //! The two interrupts' sides of the board.
 
+use super::break_cause;
 use super::control_timer::ControlTimer;
 use super::half::HalfRegisters;
+use super::legs::SoftwareBreak;
 use super::operator::Operator;
 use super::pins;
 use super::position::Position;
@@ -13,7 +15,7 @@ use crate::control::{LinkWindow, Measurements};
 use crate::drive::Report;
 use crate::frames::{Abc, Angle};
 use crate::modulation::{CarrierPeriod, Mode};
-use crate::protection::SafeState;
+use crate::protection::{Fault, SafeState};
 use crate::time::Instant;
 
 /// The control interrupt's side.
@@ -56,6 +58,7 @@ impl<P: Position> ControlPort for Control<'_, P> {
         if let Some(angle) = angle {
             self.angle = angle;
         }
+        let lost = self.position.is_lost();
         let codes = self.sampler.read();
         let udc_v = match codes {
             Some([_, _, _, udc]) => udc.udc_v(),
@@ -68,7 +71,7 @@ impl<P: Position> ControlPort for Control<'_, P> {
             enable: healthy && pins::is_enabled(&self.registers),
             window: LinkWindow::OPEN,
             acknowledge: 0,
-            hardware: None,
+            hardware: if lost { Some(Fault::PositionSensor) } else { break_cause::cause(&self.registers) },
         }
     }
 
@@ -145,7 +148,7 @@ impl PwmPort for Pwm {
         let legs = &self.registers.legs;
         legs.play(&half);
         if legs.has_updated() {
-            legs.trip();
+            legs.trip_by(SoftwareBreak::Late);
         }
         self.pulses = next.mode != Mode::Off;
         self.levels = half.end_levels();
@@ -160,7 +163,7 @@ impl PwmPort for Pwm {
 fn enter(registers: &Registers, safe: SafeState) {
     match safe {
         // Nothing here tells of a leg stuck at the upper rail.
-        SafeState::GatesOff | SafeState::UpperShortCircuit => registers.legs.trip(),
+        SafeState::GatesOff | SafeState::UpperShortCircuit => registers.legs.trip_by(SoftwareBreak::Drive),
         SafeState::ShortCircuit => registers.legs.short_circuit(),
     }
 }
