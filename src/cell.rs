@@ -304,3 +304,37 @@ impl<const N: usize> Default for Trail<N> {
         Self::new()
     }
 }
+
+#[cfg(all(test, not(loom)))]
+mod tests {
+    use super::*;
+
+    impl Words<1> for u32 {
+        fn to_words(self) -> [u32; 1] {
+            [self]
+        }
+
+        fn from_words([word]: [u32; 1]) -> Self {
+            word
+        }
+    }
+
+    /// Both counts skip 0, which means "none yet", and keep to the order of the slots.
+    #[test]
+    fn the_counts_wrap_without_a_gap() {
+        let (down, up) = (Downlink::<u32, 1>::new(), Uplink::<u32, 1>::new());
+        for n in 1..10 {
+            if n == 4 {
+                // As after 2³² publications, less a few; each count in step with what it has come from.
+                down.published
+                    .store(down.published.load(Ordering::Relaxed).wrapping_sub(6), Ordering::Relaxed);
+                up.sequence.store(0_u32.wrapping_sub(6), Ordering::Relaxed);
+            }
+            down.publish(n);
+            up.publish(n);
+            assert_eq!((down.newest(|_| true), up.read()), (Some(n), Some(n)));
+            assert_eq!(down.newest(|value| value.word::<0>() < n), (n > 1).then(|| n - 1), "{n}");
+        }
+        assert!(down.published.load(Ordering::Relaxed) < 10 && up.sequence.load(Ordering::Relaxed) < 20);
+    }
+}

@@ -23,6 +23,7 @@
 
 pub mod board;
 pub mod cell;
+pub mod configuration;
 pub mod control;
 pub mod drive;
 pub mod frames;

@@ -43,7 +43,7 @@ pub struct Clock {
     /// Period of the control timer, in ticks.
     pub control_ticks: u32,
     /// The same, in s.
-    control_s: f32,
+    pub control_s: f32,
 }
 
 impl Clock {

@@ -129,6 +129,81 @@ fn a_downlink_outside_its_protocol_is_torn() {
     });
 }
 
+/// Nothing of the first value is seen before all of it.
+#[test]
+fn the_first_value_of_an_uplink_is_whole_or_not_there() {
+    loom::model(|| {
+        let cell = Arc::new(Uplink::<Message, 2>::new());
+        let reader = Arc::clone(&cell);
+        let thread = thread::spawn(move || reader.read());
+        cell.publish(Message::number(1));
+        let read = thread.join().unwrap();
+        assert!([None, Some(Message::number(1))].contains(&read), "{read:?}");
+        assert_eq!(cell.read(), Some(Message::number(1)));
+    });
+}
+
+#[test]
+fn the_first_value_of_a_downlink_is_whole_or_not_there() {
+    loom::model(|| {
+        let cell = Arc::new(Downlink::<Message, 2>::new());
+        let reader = Arc::clone(&cell);
+        let thread = thread::spawn(move || reader.newest(|_| true));
+        cell.publish(Message::number(1));
+        let read = thread.join().unwrap();
+        assert!([None, Some(Message::number(1))].contains(&read), "{read:?}");
+        assert_eq!(cell.newest(|_| true), Some(Message::number(1)));
+    });
+}
+
+/// A reader never goes back to an older value.
+#[test]
+fn an_uplink_goes_forward() {
+    let mut model = loom::model::Builder::new();
+    model.preemption_bound = Some(2);
+    model.check(|| {
+        let cell = Arc::new(Uplink::<Message, 2>::new());
+        cell.publish(Message::number(1));
+        let reader = Arc::clone(&cell);
+        let thread = thread::spawn(move || [reader.read(), reader.read()]);
+        cell.publish(Message::number(2));
+        if let [Some(first), Some(second)] = thread.join().unwrap() {
+            assert!(first.0[0] <= second.0[0], "{first:?} then {second:?}");
+        }
+    });
+}
+
+#[test]
+fn a_downlink_goes_forward() {
+    let mut model = loom::model::Builder::new();
+    model.preemption_bound = Some(3);
+    model.check(|| {
+        let cell = Arc::new(Downlink::<Message, 2>::new());
+        cell.publish(Message::number(1));
+        cell.publish(Message::number(2));
+        let reader = Arc::clone(&cell);
+        let thread = thread::spawn(move || [reader.newest(|_| true), reader.newest(|_| true)]);
+        cell.publish(Message::number(3));
+        let [first, second] = thread.join().unwrap().map(|read| read.unwrap().0[0]);
+        assert!(first <= second, "{first} then {second}");
+    });
+}
+
+/// Words behind one another, with nothing that says whether they belong together: what the cells are instead of.
+#[test]
+#[should_panic(expected = "torn")]
+fn words_alone_are_torn() {
+    use loom::sync::atomic::{AtomicU32, Ordering};
+    loom::model(|| {
+        let words = Arc::new([AtomicU32::new(1), AtomicU32::new(1)]);
+        let reader = Arc::clone(&words);
+        let thread = thread::spawn(move || [0, 1].map(|k: usize| reader[k].load(Ordering::Acquire)));
+        words.iter().for_each(|word| word.store(2, Ordering::Release));
+        let read = Message(thread.join().unwrap());
+        assert!(read.is_whole(), "torn: {read:?}");
+    });
+}
+
 /// The reader gets only what a fault has frozen, whole; nothing while the writer still writes, or writes again.
 #[test]
 fn a_ring_gives_only_what_is_frozen() {

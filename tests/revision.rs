@@ -105,6 +105,7 @@ impl Pulsing {
     /// The same for a sample of any tick.
     fn publish_of(&self, at: u32, voltage_v: f32, valid_from: u32, revises: bool) {
         let reference = reference(voltage_v, 1.0, Instant(at));
+        self.shared.began.store(valid_from, std::sync::atomic::Ordering::Relaxed);
         let valid_from = Instant(valid_from);
         self.shared.command.publish(VoltageCommand {
             reference,

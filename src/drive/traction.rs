@@ -17,6 +17,7 @@ use crate::modulation::{
 use crate::protection::{self, Disarmed, Fault, FrozenWatch, SafeState, Trip, Violation};
 use crate::recorder::{Record, Recorder, State};
 use crate::time::{Clock, Instant};
+use core::sync::atomic::{AtomicU32, Ordering};
 
 /// A demand that jumps by more than this share of the largest torque is worth revising the next half for.
 const JUMP_SHARE: f32 = 0.05;
@@ -25,8 +26,9 @@ const JUMP_SHARE: f32 = 0.05;
 /// in which control sees what became of it.
 const REVISION_PERIODS: u32 = 2;
 
-/// Control periods after which a command is too old to make pulses from.
-const STALE_PERIODS: i32 = 5;
+/// By which part of a control period an interrupt may be late before the other one calls it lost: more than it takes to enter it.
+const PWM_LATE_PART: u32 = 4;
+const CONTROL_LATE_PART: u32 = 16;
 
 /// How fast the voltage glides from square wave to what the torque needs, in shares of six-step per second.
 const GLIDE_PER_S: f32 = 12.0;
@@ -56,6 +58,8 @@ pub struct Shared<'a> {
     pub applied: Trail<COMMITTAL_WORDS>,
     /// What the PWM interrupt tripped on.
     pub trip: Uplink<Trip, 4>,
+    /// Instant of the newest control interrupt, from its beginning on.
+    pub began: AtomicU32,
     recorder: Option<&'a Recorder>,
 }
 
@@ -63,18 +67,19 @@ impl<'a> Shared<'a> {
     /// Empty cells.
     #[cfg(not(loom))]
     pub const fn new() -> Self {
-        Self { command: Downlink::new(), applied: Trail::new(), trip: Uplink::new(), recorder: None }
+        Self {
+            command: Downlink::new(),
+            applied: Trail::new(),
+            trip: Uplink::new(),
+            began: AtomicU32::new(0),
+            recorder: None,
+        }
     }
 
     /// The same with a flight recorder, which the control interrupt fills.
     #[cfg(not(loom))]
     pub const fn recorded_by(recorder: &'a Recorder) -> Self {
-        Self {
-            command: Downlink::new(),
-            applied: Trail::new(),
-            trip: Uplink::new(),
-            recorder: Some(recorder),
-        }
+        Self { recorder: Some(recorder), ..Self::new() }
     }
 }
 
@@ -153,6 +158,7 @@ impl<M: Machine> ControlTask<M> {
     pub fn run(&mut self, port: &mut impl ControlPort, shared: &Shared) {
         let now = self.now;
         self.now = now.after(self.settings.clock.control_ticks);
+        shared.began.store(now.0, Ordering::Relaxed);
         let sample = port.sample(now);
         let applied = shared.applied.read(|records| Applied::seen(records, now)).flatten();
         self.forget_acknowledged(sample.acknowledge, applied.as_ref());
@@ -160,6 +166,8 @@ impl<M: Machine> ControlTask<M> {
         if self.trip.is_none() && applied.as_ref().is_some_and(|applied| applied.next.kind.is_tripped()) {
             self.trip = shared.trip.read();
         }
+        let overdue = applied.as_ref().and_then(|applied| applied.overdue(now, &self.settings.clock));
+        self.check(overdue, &sample, port);
         self.check_legs(&sample, port);
         let omega = self.track(&sample, port);
         self.check(
@@ -535,6 +543,13 @@ struct Next {
 }
 
 impl Applied {
+    /// The PWM interrupt that should have come by `now` and has not: since when, in s.
+    fn overdue(&self, now: Instant, clock: &Clock) -> Option<Violation> {
+        let late = now.since(self.next.begins);
+        let limit = (clock.control_ticks / PWM_LATE_PART) as i32;
+        (late > limit).then(|| (Fault::PwmDeadline, clock.seconds(late), clock.seconds(limit)))
+    }
+
     /// As it stood at `now`, even if the PWM interrupt has come since.
     #[inline]
     fn seen(records: [crate::cell::Record<COMMITTAL_WORDS>; SEEN], now: Instant) -> Option<Self> {
@@ -731,7 +746,9 @@ impl<M: Machine> PwmTask<M> {
         let legs = port.leg_faults();
         let armed = |(fault, _, _): &Violation| !self.disarmed.has(*fault);
         let currents = || protection::check_currents(currents_a, &self.tables().ratings);
-        let stale = || command.as_ref().and_then(|command| self.stale(command));
+        let pulses = command.as_ref().is_some_and(|command| command.gates == Gates::Pulse);
+        let began = Instant(shared.began.load(Ordering::Relaxed));
+        let stale = || if pulses { stale(self.newest.begins, began, &self.settings.clock) } else { None };
         let violation = legs.check().or_else(|| currents().filter(armed)).or_else(|| stale().filter(armed));
         let Some((fault, value, limit)) = violation else {
             return;
@@ -755,12 +772,11 @@ impl<M: Machine> PwmTask<M> {
     fn tables(&self) -> &'static Tables {
         self.machine.tables()
     }
+}
 
-    fn stale(&self, command: &VoltageCommand) -> Option<Violation> {
-        let clock = &self.settings.clock;
-        let age = self.newest.begins.since(command.reference.at);
-        let limit = STALE_PERIODS * clock.control_ticks as i32;
-        let stale = command.gates == Gates::Pulse && !(0..=limit).contains(&age);
-        stale.then(|| (Fault::StaleCommand, clock.seconds(age), clock.seconds(limit)))
-    }
+/// The control interrupt that should have come by `now` and has not: how long ago the last one began, in s.
+pub(super) fn stale(now: Instant, began: Instant, clock: &Clock) -> Option<Violation> {
+    let age = now.since(began);
+    let limit = (clock.control_ticks + clock.control_ticks / CONTROL_LATE_PART) as i32;
+    (age > limit).then(|| (Fault::StaleCommand, clock.seconds(age), clock.seconds(limit)))
 }

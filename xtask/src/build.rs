@@ -104,10 +104,10 @@ pub fn image(toolchain: &Toolchain, system: System, machine: Option<&OsString>) 
     executable(&mut command, name, machine.is_some()).context("the image was not built")
 }
 
-/// Builds the image of the building blocks.
-pub fn bench(toolchain: &Toolchain) -> Result<PathBuf> {
-    let name = "tractive-bench";
-    let args = ["build", "--profile", "firmware", "--target", TARGET, "--package", name, "--bin", name];
+/// Builds one of the bench's images: `tractive-bench`, the building blocks, or `cell_stress`.
+pub fn bench(toolchain: &Toolchain, name: &str) -> Result<PathBuf> {
+    let package = "tractive-bench";
+    let args = ["build", "--profile", "firmware", "--target", TARGET, "--package", package, "--bin", name];
     executable(toolchain.cargo(&args).env_remove("TRACTIVE_MACHINE"), name, false)
         .context("the bench was not built")
 }

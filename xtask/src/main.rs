@@ -12,15 +12,19 @@
 //! and something failed; 2 it could not run (bad usage, bad input, something missing), with the reason on a line.
 //!
 //! The modules: [`cli`] is what may be typed, [`setup`] what has to be installed, [`build`] how cargo is called,
-//! [`run`], [`mod@test`], [`image`], [`timing`] and [`flash`] the commands; [`guide`] runs those of the documentation. An image is read by [`elf`], its instructions by [`thumb`]; [`graph`]
-//! says which function calls which and [`check`] refuses what an image must not hold.
+//! [`run`], [`mod@test`], [`image`], [`timing`] and [`flash`] the commands, [`guide`] those of the
+//! documentation. An image is read by [`elf`], its instructions by [`thumb`]; [`graph`]
+//! says which function calls which [`check`] refuses what an image must not hold, and [`cells`] looks at what the cells
+//! did under the interrupts, in the [`emulator`].
 
 #![forbid(unsafe_code)]
 
 mod build;
+mod cells;
 mod check;
 mod cli;
 mod elf;
+mod emulator;
 mod flash;
 mod graph;
 mod guide;

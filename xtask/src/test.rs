@@ -8,7 +8,7 @@ use clap::ValueEnum;
 
 use crate::build::{Board, System, TARGET, cargo};
 use crate::cli::{TestArgs, TimingArgs};
-use crate::process::{find, succeeds};
+use crate::process::{find, quietly, succeeds};
 use crate::setup::Setup;
 use crate::{build, image};
 
@@ -27,6 +27,10 @@ pub enum Step {
     Host,
     /// The lock-free cells under every interleaving
     Loom,
+    /// The lock-free cells in the interpreter that knows undefined behaviour
+    Miri,
+    /// The lock-free cells in QEMU, interrupted on every instruction
+    Cells,
     /// The image builds
     Image,
     /// No panic within an interrupt's reach, no double precision
@@ -116,6 +120,14 @@ fn perform(step: Step, setup: &mut Setup) -> Result<Outcome> {
             command.args(["--test", "loom_cells", "--target-dir", "target/loom"]);
             succeeds(&mut command)?
         }
+        Step::Miri => {
+            let Some(mut command) = miri() else {
+                return Ok(Outcome::Skipped("cargo miri is not installed".to_owned()));
+            };
+            command.args(["test", "--package", "tractive", "--test", "cells", "--target-dir", "target/miri"]);
+            succeeds(&mut command)?
+        }
+        Step::Cells => crate::cells::check(setup)?,
         Step::Image => {
             for system in System::ALL {
                 println!("{}", build::image(&setup.toolchain()?, system, None)?.display());
@@ -184,6 +196,20 @@ fn perform(step: Step, setup: &mut Setup) -> Result<Outcome> {
 
 fn lint(command: &mut Command, what: &[&str]) -> Result<bool> {
     succeeds(command.arg("clippy").args(what).args(["--", "--deny", "warnings"]))
+}
+
+/// `cargo miri` of the toolchain in use, else of nightly.
+fn miri() -> Option<Command> {
+    let nightly = || {
+        let mut command = Command::new("rustup");
+        command.current_dir(build::root()).args(["run", "nightly", "cargo"]);
+        command
+    };
+    [cargo, nightly].into_iter().find_map(|candidate| {
+        let mut command = candidate();
+        command.arg("miri");
+        quietly(candidate().args(["miri", "--version"])).then_some(command)
+    })
 }
 
 fn no_component(component: &str) -> Outcome {

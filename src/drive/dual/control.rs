@@ -1,7 +1,7 @@
 //! The control interrupt's task.
 
 use super::axis::{self, Axis, AxisInput, AxisOutput};
-use super::{DualCommand, DualReport, MotorCommand, MotorShare, Settings, Shared};
+use super::{DualApplied, DualCommand, DualReport, MotorCommand, MotorShare, Settings, Shared};
 use crate::board::{DualControlPort, DualSample, MotorDemand};
 use crate::control::{Measurements, ZSource, ZSourceError, ZSourceInput};
 use crate::drive::Gates;
@@ -10,11 +10,12 @@ use crate::machine::{Machine, Tables};
 use crate::protection::{self, Disarmed, Fault, SafeState, Trip, Violation};
 use crate::time::Instant;
 use core::f32::consts::{FRAC_PI_4, TAU};
+use core::sync::atomic::Ordering;
 
 /// Corner of the filter on the voltage limit, in Hz: fed by the link as it is, the limit would make it oscillate.
 const LIMIT_FILTER_HZ: f32 = 10.0;
 /// A motor has at most U_c/(2√3). The link of a two-level inverter whose six-step fundamental is as large, as a share of U_c.
-const TWO_LEVEL_SHARE: f32 = FRAC_PI_4 / SQRT_3;
+pub const TWO_LEVEL_SHARE: f32 = FRAC_PI_4 / SQRT_3;
 /// What a lost sensor is called, by motor.
 const SENSOR_LOST: [Fault; 2] = [Fault::SensorLost1, Fault::SensorLost2];
 
@@ -59,12 +60,14 @@ impl<M: Machine> ControlTask<M> {
         let now = self.now;
         let deadline_ticks = self.settings.deadline_ticks();
         self.now = now.after(self.settings.clock.control_ticks);
+        shared.began.store(now.0, Ordering::Relaxed);
         // First of all: the next peak writes it again.
         let applied = shared.applied.read().filter(|applied| now.reached(applied.at));
         let sample = port.sample(now);
         if self.trip.is_none() {
             self.trip = applied.and_then(|applied| applied.trip);
         }
+        self.check(applied.and_then(|applied| self.overdue(&applied, now)), port);
         let angles = self.track(&sample, port);
         let measured = self.measured(&sample, angles);
         self.check_measurements(&sample, &measured, port);
@@ -105,6 +108,12 @@ impl<M: Machine> ControlTask<M> {
     /// The latched fault.
     pub fn trip(&self) -> Option<Trip> {
         self.trip
+    }
+
+    /// The PWM interrupt that should have come since the last one seen and has not: since when, in s.
+    fn overdue(&self, applied: &DualApplied, now: Instant) -> Option<Violation> {
+        let late = now.since(applied.at.after(self.settings.carrier_ticks));
+        (late >= 0).then(|| (Fault::PwmDeadline, self.settings.clock.seconds(late), 0.0))
     }
 
     /// Follows both rotors.

@@ -3,17 +3,17 @@
 use super::{COMPARE_STEPS, DualApplied, DualCommand, MotorShare, Settings, Shared};
 use crate::board::{DualPwmPort, GateFeedback, PlayedPeriod, PowerSample};
 use crate::drive::Gates;
+use crate::drive::traction::stale;
 use crate::frames::{Angle, limit};
 use crate::machine::{Machine, Tables};
 use crate::nine_switch::{self, GateTicks, MotorVoltage, Period, Refused, Request};
 use crate::protection::{self, Disarmed, Fault, SafeState, Trip, Violation};
 use crate::time::Instant;
+use core::sync::atomic::Ordering;
 
 /// Longest dead time that the gates' hardware may insert, in s.
 const DEAD_TIME_S: f32 = 5e-6;
 
-/// Control periods after which a command is too old to make pulses from.
-const STALE_PERIODS: i32 = 5;
 /// How far the link is believed to move in a carrier period, in V; more is an error of the measurement.
 const MOST_MOVED_V: f32 = 10.0;
 /// Least link voltage that is divided by, in V.
@@ -61,7 +61,9 @@ impl<M: Machine> PwmTask<M> {
         let [before, running] = self.periods;
         let sample = port.sample(now);
         let command = shared.command.newest(|command| now.reached(DualCommand::valid_from(command)));
-        let violation = self.violation(&sample, command.as_ref(), &before, &running);
+        let began = Instant(shared.began.load(Ordering::Relaxed));
+        let stale = stale(now, began, &self.settings.clock);
+        let violation = self.violation(&sample, command.as_ref(), [&before, &running], stale);
         self.check(violation, port);
         let mut next = PlayedPeriod::off(self.settings.half_steps());
         let mut given = None;
@@ -111,8 +113,8 @@ impl<M: Machine> PwmTask<M> {
         &self,
         sample: &PowerSample,
         command: Option<&DualCommand>,
-        before: &PlayedPeriod,
-        running: &PlayedPeriod,
+        [before, running]: [&PlayedPeriod; 2],
+        stale: Option<Violation>,
     ) -> Option<Violation> {
         let limits = &self.settings.limits;
         let [upper, lower] = &sample.currents_a;
@@ -126,7 +128,7 @@ impl<M: Machine> PwmTask<M> {
                 // Only while pulses are wanted: control may have turned the gates off meanwhile.
                 self.stuck(&sample.gates, before, running)
                     .filter(armed)
-                    .or_else(|| self.stale(command).filter(armed))
+                    .or_else(|| stale.filter(armed))
                     .or_else(|| limits.check_duty(command.duty))
             })
     }
@@ -149,13 +151,6 @@ impl<M: Machine> PwmTask<M> {
             bit <<= 1;
         }
         (wrong != 0).then_some((Fault::LegStuck, f32::from(wrong), 0.0))
-    }
-
-    fn stale(&self, command: &DualCommand) -> Option<Violation> {
-        let clock = &self.settings.clock;
-        let age = self.now.before(self.settings.carrier_ticks).since(command.at);
-        let limit = STALE_PERIODS * clock.control_ticks as i32;
-        (!(0..=limit).contains(&age)).then(|| (Fault::StaleCommand, clock.seconds(age), clock.seconds(limit)))
     }
 
     fn check(&mut self, violation: Option<Violation>, port: &mut impl DualPwmPort) {

@@ -2,7 +2,6 @@
 
 use std::collections::BTreeMap;
 use std::path::Path;
-use std::process::{Command, Stdio};
 
 use anyhow::{Context, Result, bail};
 
@@ -12,7 +11,7 @@ use crate::build::{self, cargo};
 use crate::elf::Image;
 use crate::setup::Toolchain;
 use crate::thumb::decode;
-use crate::{image, process};
+use crate::{emulator, image, process};
 
 /// A building block.
 #[derive(Clone, Debug, PartialEq)]
@@ -30,7 +29,7 @@ pub struct Block {
 
 /// Builds the bench for the board and for the host, runs both.
 pub fn measure(toolchain: &Toolchain, qemu: &Path) -> Result<Vec<Block>> {
-    let path = build::bench(toolchain)?;
+    let path = build::bench(toolchain, "tractive-bench")?;
     let image = image::read(&path)?;
     let counts = counts(&image, &run(qemu, &path)?);
     let mut host = cargo();
@@ -41,26 +40,9 @@ pub fn measure(toolchain: &Toolchain, qemu: &Path) -> Result<Vec<Block>> {
 
 /// Runs the image with its instructions logged; the log.
 fn run(qemu: &Path, path: &Path) -> Result<Vec<u8>> {
-    let mut command = Command::new(qemu);
-    command.args([
-        "-M",
-        "mps2-an386",
-        "-cpu",
-        "cortex-m4",
-        "-nographic",
-        "-monitor",
-        "none",
-        "-serial",
-        "null",
-    ]);
-    command.args([
-        "-icount",
-        "shift=3,align=off,sleep=off",
-        "-semihosting-config",
-        "enable=on,target=native",
-    ]);
+    let mut command = emulator::command(qemu, path, 3);
     // Without -D the log goes to the standard error.
-    command.args(super::log::ARGUMENTS).arg("-kernel").arg(path).stdin(Stdio::null());
+    command.args(super::log::ARGUMENTS);
     let output = command.output().with_context(|| process::cannot_start(&command))?;
     if !output.status.success() {
         bail!("the bench failed in the emulator ({})", output.status);
