@@ -18,7 +18,7 @@ fn name(pin: &Pin) -> String {
 fn the_chip_has_every_signal_on_its_pin() {
     for pin in TABLES.iter().flat_map(|(_, pins)| *pins) {
         let function = match pin.function {
-            Function::Gate(number) | Function::Alternate(number) => Some(number),
+            Function::Gate(number) | Function::Alternate(number) | Function::Bus(number) => Some(number),
             Function::Analog | Function::Input | Function::Output => None,
         };
         for signal in pin.signals {
@@ -50,6 +50,7 @@ fn row(pin: &Pin) -> String {
     let function = match pin.function {
         Function::Gate(number) => format!("AF{number}, output"),
         Function::Alternate(number) => format!("AF{number}, pull-down"),
+        Function::Bus(number) => format!("AF{number}, pull-up"),
         Function::Analog => "analog".to_owned(),
         Function::Input => "input, pull-down".to_owned(),
         Function::Output => "output".to_owned(),

@@ -14,6 +14,7 @@
 //! Everything here but `chip` takes its registers as values, so tests on the host run it against blocks of memory.
 
 pub mod break_cause;
+pub mod can;
 pub mod clock;
 pub mod comparators;
 pub mod control_timer;
@@ -28,6 +29,7 @@ pub mod position;
 pub mod power_stage;
 pub mod registers;
 pub mod sampling;
+pub mod serve;
 pub mod start;
 pub mod watchdog;
 pub mod zs9;
