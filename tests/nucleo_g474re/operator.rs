@@ -26,6 +26,7 @@ fn write_input(port: gpio::Gpio, levels: u32) {
 
 fn drivers_ready(registers: &Registers, ready: bool) {
     write_input(registers.gpiob, u32::from(ready) << 12);
+    write_input(registers.gpioa, u32::from(ready) << 6);
 }
 
 /// What a set-and-reset register did last, as (set, reset); the memory is emptied.

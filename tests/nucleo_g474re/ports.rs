@@ -3,9 +3,11 @@
 use crate::bench::Bench;
 use crate::plan;
 use stm32_metapac::gpio::regs::Idr;
+use tractive::board::nucleo_g474re::legs::SoftwareBreak;
 use tractive::board::nucleo_g474re::operator::Operator;
 use tractive::board::nucleo_g474re::position::{Encoder, Position};
 use tractive::board::nucleo_g474re::power_stage::{AdcCode, POWER_STAGE};
+use tractive::board::nucleo_g474re::registers::Registers;
 use tractive::board::nucleo_g474re::sampling::Zeros;
 use tractive::board::nucleo_g474re::watchdog::Pulse;
 use tractive::board::nucleo_g474re::{Control, Pwm};
@@ -14,7 +16,7 @@ use tractive::control::Demand;
 use tractive::drive::Report;
 use tractive::frames::Angle;
 use tractive::operator::Permit;
-use tractive::protection::SafeState;
+use tractive::protection::{Fault, SafeState};
 use tractive::time::Instant;
 
 const NOW: Instant = Instant(0);
@@ -147,4 +149,91 @@ fn the_idle_loop_hears_what_control_did() {
     let report = Report { torque_nm: 7.0, ..Report::default() };
     Control::new(registers, ZEROS, encoder, &operator).report(NOW, &report);
     assert_eq!(operator.report(), Some(report));
+}
+
+/// An encoder whose index is at count 0, turning by `step` counts a control period from `from` on.
+fn turn(encoder: &mut Encoder, registers: &Registers, from: i32, step: i32, periods: i32, slip: i32) {
+    let mut before = from;
+    for period in 1..=periods {
+        let now = from + period * step;
+        let passed = now.div_euclid(4_096) != before.div_euclid(4_096);
+        // The index sets the count right, whatever was lost until then.
+        let count = now.rem_euclid(4_096) + if passed || period * step.abs() > 4_096 { 0 } else { slip };
+        registers.tim4.cnt().write(|w| w.set_cnt(count.rem_euclid(4_096) as u16));
+        registers.tim4.sr().write(|w| w.set_idxif(passed));
+        encoder.angle();
+        before = now;
+    }
+}
+
+#[test]
+fn an_index_must_find_the_count_where_it_is_expected() {
+    for (step, slip, lost) in [
+        (41, 0, false),
+        (-41, 0, false),
+        (7, 5, false),
+        (41, 40, true),
+        (-41, -40, true),
+        (41, -2_000, true),
+        (3, 9, true),
+    ] {
+        let registers = Bench::started(plan()).registers;
+        let mut encoder = Encoder::new(registers.tim4, &POWER_STAGE, 4);
+        registers.tim4.sr().write(|_| ());
+        assert_eq!(encoder.angle(), None, "no index yet");
+        registers.tim4.sr().write(|w| w.set_idxif(true));
+        registers.tim4.cnt().write(|w| w.set_cnt(2_000));
+        assert!(encoder.angle().is_some());
+        assert!(!registers.tim4.sr().read().idxif(), "acknowledged");
+        turn(&mut encoder, &registers, 2_000, step, 2_500 / step.abs(), slip);
+        assert_eq!(encoder.is_lost(), lost, "{step} {slip}");
+    }
+}
+
+#[test]
+fn what_holds_the_gates_has_a_name() {
+    type Spoil = fn(&Registers);
+    let broken: Spoil = |registers| registers.legs.tim8.sr().write(|w| w.set_bif(0, true));
+    let cases: [(&str, Spoil, bool, Option<Fault>); 6] = [
+        ("nothing", |_| (), true, None),
+        ("the ready line", broken, false, Some(Fault::GateDriver)),
+        ("a comparator", broken, true, Some(Fault::HardwareOvercurrent)),
+        (
+            "the crystal",
+            |registers| registers.legs.tim1.sr().write(|w| w.set_sbif(true)),
+            true,
+            Some(Fault::ClockFailure),
+        ),
+        (
+            "a late interrupt",
+            |registers| {
+                registers.legs.trip_by(SoftwareBreak::Late);
+                registers.legs.tim1.sr().write(|w| w.set_bif(0, true));
+            },
+            true,
+            Some(Fault::PwmDeadline),
+        ),
+        (
+            "the drive itself",
+            |registers| {
+                registers.legs.trip_by(SoftwareBreak::Drive);
+                registers.legs.tim1.sr().write(|w| w.set_bif(0, true));
+                registers.legs.trip_by(SoftwareBreak::Late);
+            },
+            true,
+            None,
+        ),
+    ];
+    for (what, spoil, ready, fault) in cases {
+        let bench = Bench::started(plan());
+        let registers = bench.registers;
+        let operator = Operator::new();
+        let encoder = Encoder::new(registers.tim4, &POWER_STAGE, 4);
+        let mut control = Control::new(registers, ZEROS, encoder, &operator);
+        write_input(registers.gpiob, u32::from(ready) << 12);
+        write_input(registers.gpioa, u32::from(ready) << 6);
+        spoil(&registers);
+        bench.finish_sequence(registers.adc1);
+        assert_eq!(control.sample(NOW).hardware, fault, "{what}");
+    }
 }

@@ -32,6 +32,19 @@ use stm32_metapac::timer::{TimAdv, regs, vals};
 const FIRST_PAIR: usize = 0;
 const SECOND_PAIR: usize = 1;
 
+/// The channel of TIM8 whose compare says on whose account software has broken.
+const NOTE: usize = 3;
+
+/// A break made by software.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u16)]
+pub enum SoftwareBreak {
+    /// The drive has a fault of its own.
+    Drive = 1,
+    /// The PWM interrupt ended after its half.
+    Late,
+}
+
 /// The two timers.
 #[derive(Clone, Copy)]
 pub struct Legs {
@@ -147,16 +160,35 @@ impl Legs {
         self.outputs().trip();
     }
 
+    /// The same on software's own account, which is kept in the compare of TIM8's fourth channel: it has no output.
+    #[inline]
+    pub fn trip_by(&self, software: SoftwareBreak) {
+        if !self.is_tripped() {
+            self.tim8.ccr(NOTE).write(|w| w.set_ccr(software as u16));
+        }
+        self.trip();
+    }
+
+    /// On whose account software has broken; `None` where the hardware was first.
+    #[inline]
+    pub fn software_break(&self) -> Option<SoftwareBreak> {
+        match self.tim8.ccr(NOTE).read().ccr() {
+            1 => Some(SoftwareBreak::Drive),
+            2 => Some(SoftwareBreak::Late),
+            _ => None,
+        }
+    }
+
+    /// Whether the chip's own break was there: crystal, lock-up, memory.
+    #[inline]
+    pub fn is_system_break(&self) -> bool {
+        self.tim1.sr().read().sbif() || self.tim8.sr().read().sbif()
+    }
+
     /// Whether a break, from hardware or software, has switched the outputs off.
     #[inline]
     pub fn is_tripped(&self) -> bool {
         self.outputs().is_tripped()
-    }
-
-    /// Whether it was the chip itself: clock, lock-up or memory.
-    #[inline]
-    pub fn is_tripped_by_the_chip(&self) -> bool {
-        [self.tim1, self.tim8].into_iter().any(|timer| timer.sr().read().sbif())
     }
 
     /// Forgets a break or a short circuit: outputs off, legs as they are played again. `false` while the cause of a break lasts,
@@ -164,6 +196,7 @@ impl Legs {
     #[inline]
     pub fn leave(&self) -> bool {
         self.outputs().switch_off();
+        self.tim8.ccr(NOTE).write(|w| w.set_ccr(0));
         self.tim1.ccmr_output(FIRST_PAIR).write_value(combined());
         self.tim1.ccmr_output(SECOND_PAIR).write_value(combined());
         self.tim8.ccmr_output(FIRST_PAIR).write_value(combined());

@@ -118,13 +118,14 @@ impl Wire {
 /// The chopper's compare at which it never conducts.
 pub(super) const CHOPPER_OFF: u16 = 0;
 
-/// Input of the gate drivers' ready wire.
+/// Inputs of the gate drivers' ready wire: PB12, and PA6 for leg W.
 const DRIVERS_READY: usize = 12;
+const DRIVERS_READY_W: usize = 6;
 
-/// Whether the gate drivers are ready.
+/// Whether the gate drivers say at both break inputs that they are ready.
 #[inline]
 pub fn drivers_ready(registers: &Registers) -> bool {
-    is_high(registers.gpiob, DRIVERS_READY)
+    is_high(registers.gpiob, DRIVERS_READY) && is_high(registers.gpioa, DRIVERS_READY_W)
 }
 
 /// The enable input.

@@ -3,6 +3,7 @@
 use super::control_timer::ControlTimer;
 use super::half::HalfRegisters;
 use super::hardware;
+use super::legs::SoftwareBreak;
 use super::operator::Operator;
 use super::pins;
 use super::position::Position;
@@ -14,7 +15,7 @@ use crate::control::{Demand, LinkWindow, Measurements};
 use crate::drive::Report;
 use crate::frames::{Abc, Angle};
 use crate::modulation::{CarrierPeriod, Mode};
-use crate::protection::SafeState;
+use crate::protection::{Fault, SafeState};
 use crate::time::Instant;
 
 /// The control interrupt's side.
@@ -57,13 +58,14 @@ impl<P: Position> ControlPort for Control<'_, P> {
         if let Some(angle) = angle {
             self.angle = angle;
         }
+        let lost = self.position.is_lost();
         let codes = self.sampler.read();
         let udc_v = match codes {
             Some([_, _, _, udc]) => udc.udc_v(),
             None => f32::NAN,
         };
-        let hardware = hardware::latched_by(&self.registers);
-        let healthy = angle.is_some() && hardware.is_none();
+        let hardware = if lost { Some(Fault::PositionSensor) } else { hardware::latched_by(&self.registers) };
+        let healthy = angle.is_some() && hardware.is_none() && !self.registers.legs.is_tripped();
         let mut sample = Sample {
             measured: Measurements { currents_a: currents_a(codes, &self.zeros), udc_v, angle: self.angle },
             demand: Demand::default(),
@@ -99,15 +101,13 @@ pub struct Pwm {
     pulses: bool,
     /// The levels on which the legs stand at its end.
     levels: [bool; 3],
-    /// A half was over before it was loaded, and the safe state has not been left since.
-    late: bool,
 }
 
 impl Pwm {
     /// At rest, with the zeros that the start measured.
     pub const fn new(registers: Registers, zeros: Zeros) -> Self {
         let sampler = pwm_sampler(&registers);
-        Self { registers, sampler, zeros, pulses: false, levels: [false; 3], late: false }
+        Self { registers, sampler, zeros, pulses: false, levels: [false; 3] }
     }
 
     /// First thing in the interrupt: whether it is a carrier boundary's. If not, control wants a revision, and there is nothing to
@@ -152,8 +152,7 @@ impl PwmPort for Pwm {
         let legs = &self.registers.legs;
         legs.play(&half);
         if legs.has_updated() {
-            legs.trip();
-            self.late = true;
+            legs.trip_by(SoftwareBreak::Late);
         }
         self.pulses = next.mode != Mode::Off;
         self.levels = half.end_levels();
@@ -164,12 +163,11 @@ impl PwmPort for Pwm {
     }
 
     fn leave(&mut self, _now: Instant) -> bool {
-        self.late = false;
         self.registers.legs.leave()
     }
 
     fn is_late(&mut self) -> bool {
-        self.late
+        self.registers.legs.software_break() == Some(SoftwareBreak::Late)
     }
 }
 
@@ -177,7 +175,7 @@ impl PwmPort for Pwm {
 fn enter(registers: &Registers, safe: SafeState) {
     match safe {
         // Nothing here tells of a leg stuck at the upper rail.
-        SafeState::GatesOff | SafeState::UpperShortCircuit => registers.legs.trip(),
+        SafeState::GatesOff | SafeState::UpperShortCircuit => registers.legs.trip_by(SoftwareBreak::Drive),
         SafeState::ShortCircuit => registers.legs.short_circuit(),
     }
 }

@@ -2,13 +2,18 @@
 
 use super::power_stage::PowerStage;
 use crate::frames::Angle;
-use stm32_metapac::timer::{TimGp16, vals};
+use stm32_metapac::timer::{TimGp16, regs, vals};
 
 /// A source of the electrical angle. The board has the encoder; a resolver or an absolute encoder (SSI) implements this
 /// and takes its place in [`super::Control`].
 pub trait Position {
     /// The angle now; `None` while it is not known, which keeps the gates off. Called in the control interrupt: it may not wait.
     fn angle(&mut self) -> Option<Angle>;
+
+    /// Whether the sensor has noticed that it lost its rotor: a fault, and for good.
+    fn is_lost(&self) -> bool {
+        false
+    }
 }
 
 /// An incremental encoder with an index, counted by TIM4.
@@ -16,8 +21,15 @@ pub trait Position {
 pub struct Encoder {
     timer: TimGp16,
     units_per_count: u32,
+    counts: u32,
     zero: Angle,
+    /// Count of the last call and counts since the one before, once the index has passed.
+    last: Option<(u32, u32)>,
+    lost: bool,
 }
+
+/// By how many counts an index pulse may be off: acceleration within a control period, and the filters' delays.
+const INDEX_TOLERANCE: u32 = 8;
 
 impl Encoder {
     /// The encoder of a machine with this many pole pairs.
@@ -25,7 +37,10 @@ impl Encoder {
         Self {
             timer,
             units_per_count: units_per_count(stage.encoder_counts, pole_pairs),
+            counts: stage.encoder_counts.max(1),
             zero: stage.encoder_zero,
+            last: None,
+            lost: false,
         }
     }
 
@@ -48,12 +63,43 @@ impl Encoder {
 }
 
 impl Position for Encoder {
-    /// Known once the index has passed.
+    /// Known once the index has passed. Called every control period: each further index must find the count where the speed lets it
+    /// be expected, else counts were lost or invented on the way, and the angle is lost for good.
     #[inline]
     fn angle(&mut self) -> Option<Angle> {
-        let known = self.timer.sr().read().idxif();
+        let index = self.timer.sr().read().idxif();
         let count = u32::from(self.timer.cnt().read().cnt());
-        known.then(|| Angle(count.wrapping_mul(self.units_per_count)) + self.zero)
+        if index {
+            // Status flags are cleared by writing 0 and left alone by writing 1.
+            let mut all_but_index = regs::SrGp16(u32::MAX);
+            all_but_index.set_idxif(false);
+            self.timer.sr().write_value(all_but_index);
+        }
+        self.last = match self.last {
+            None if !index => return None,
+            None => Some((count, 0)),
+            Some((before, moved)) => {
+                let moves = self.wrapped(count + self.counts - before);
+                let off = self.wrapped(moves + self.counts - moved);
+                self.lost |=
+                    index && off > INDEX_TOLERANCE && off < self.counts.saturating_sub(INDEX_TOLERANCE);
+                Some((count, moves))
+            }
+        };
+        Some(Angle(count.wrapping_mul(self.units_per_count)) + self.zero)
+    }
+
+    #[inline]
+    fn is_lost(&self) -> bool {
+        self.lost
+    }
+}
+
+impl Encoder {
+    /// Less than a turn, from less than two.
+    #[inline]
+    fn wrapped(&self, counts: u32) -> u32 {
+        if counts >= self.counts { counts - self.counts } else { counts }
     }
 }
 

@@ -28,6 +28,9 @@ pub const CONTROL: Sequence = Sequence { channels: CHANNELS, count: 4, trigger: 
 /// ADC2: currents at TIM1's update (its TRGO2).
 pub const PWM: Sequence = Sequence { channels: CHANNELS, count: 3, trigger: 8 };
 
+/// Core cycles of a conversion: 12.5 cycles to sample and 12.5 to convert, at a quarter of the core's clock.
+pub const CONVERSION_CYCLES: u32 = 100;
+
 /// Conversions that are averaged to find a sensor's zero.
 const ZERO_SAMPLES: u32 = 64;
 

@@ -86,26 +86,43 @@ fn a_sample_has_both_motors_and_the_link_in_si_units() {
 #[test]
 fn the_gates_wait_for_both_indices_the_enable_input_and_quiet_breaks() {
     type Spoil = fn(&Registers);
-    let cases: [Spoil; 4] = [
-        |registers| registers.tim3.sr().write(|w| w.set_idxif(false)),
-        |registers| registers.tim4.sr().write(|w| w.set_idxif(false)),
+    let cases: [(bool, Spoil); 5] = [
+        (true, |_| ()),
+        (false, |registers| registers.tim3.sr().write(|w| w.set_idxif(false))),
+        (false, |registers| registers.tim4.sr().write(|w| w.set_idxif(false))),
         // SAFETY: IDR is word 4 of the port's block of memory.
-        |registers| unsafe { registers.gpioc.as_ptr().cast::<Idr>().add(4).write_volatile(Idr(0)) },
-        |registers| registers.tim20.sr().write(|w| w.set_bif(0, true)),
+        (false, |registers| unsafe { registers.gpioc.as_ptr().cast::<Idr>().add(4).write_volatile(Idr(0)) }),
+        (false, |registers| registers.tim20.sr().write(|w| w.set_bif(0, true))),
     ];
-    for spoil in cases {
+    for (enabled, spoil) in cases {
         let registers = Model::started().registers;
         let operator = Operator::new(600.0);
         let mut control = control(registers, &operator);
         converted(&[], registers);
         make_ready(&registers);
-        assert!(control.sample(NOW).enable);
-        converted(&[], registers);
         spoil(&registers);
         let sample = control.sample(NOW);
-        assert!(!sample.enable);
+        assert_eq!(sample.enable, enabled);
         assert!(sample.angles.iter().all(Option::is_some), "an angle not known yet is none that is lost");
     }
+}
+
+#[test]
+fn an_index_at_the_wrong_count_is_a_lost_sensor() {
+    let registers = Model::started().registers;
+    let operator = Operator::new(600.0);
+    let mut control = control(registers, &operator);
+    let mut sample = |count, index| {
+        registers.tim3.cnt().write(|w| w.set_cnt(count));
+        registers.tim3.sr().write(|w| w.set_idxif(index));
+        converted(&[], registers);
+        control.sample(NOW).angles.map(|angle| angle.is_some())
+    };
+    assert_eq!(sample(0, true), [true, true]);
+    assert_eq!(sample(4_000, false), [true, true]);
+    assert_eq!(sample(3_904, false), [true, true]);
+    assert_eq!(sample(5, true), [true, false], "96 counts back, then 197 forward");
+    assert_eq!(sample(0, false), [true, false], "for good");
 }
 
 #[test]

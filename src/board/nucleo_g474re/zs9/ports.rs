@@ -63,11 +63,13 @@ impl<P: Position> DualControlPort for Control<'_, P> {
         let [first, second] = &mut self.positions;
         let angles = [first.angle(), second.angle()];
         let converted = self.samplers.read(&self.zeros);
+        let ([first_angle, second_angle], [first_lost, second_lost]) =
+            (angles, [first.is_lost(), second.is_lost()]);
         let known = angles.iter().all(Option::is_some);
         let healthy = known && !bridge(&self.registers).outputs().is_tripped();
         DualSample {
             currents_a: converted.currents_a,
-            angles: angles.map(|angle| Some(angle.unwrap_or(Angle::ZERO))),
+            angles: [reported(first_angle, first_lost), reported(second_angle, second_lost)],
             capacitor_v: converted.capacitor_v,
             inductor_a: self.samplers.inductor_a(&self.zeros),
             source_v: converted.source_v,
@@ -89,6 +91,12 @@ impl<P: Position> DualControlPort for Control<'_, P> {
     fn report(&mut self, _now: Instant, report: &DualReport) {
         self.operator.tell(report);
     }
+}
+
+/// What the drive is told of an angle: nothing where the sensor itself has lost its rotor.
+#[inline]
+fn reported(angle: Option<Angle>, lost: bool) -> Option<Angle> {
+    if lost { None } else { Some(angle.unwrap_or(Angle::ZERO)) }
 }
 
 /// The PWM interrupt's side.
