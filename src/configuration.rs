@@ -9,6 +9,8 @@
 
 mod drives;
 mod machine;
+#[cfg(feature = "board-nucleo-g474re")]
+mod power_stage;
 
 use crate::modulation::Devices;
 use crate::time::Clock;

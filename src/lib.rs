@@ -33,5 +33,6 @@ pub mod modulation;
 pub mod nine_switch;
 pub mod operator;
 pub mod protection;
+pub mod protocol;
 pub mod recorder;
 pub mod time;

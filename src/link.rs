@@ -16,6 +16,7 @@ use crate::frames::{Abc, Angle};
 use crate::modulation::CarrierPeriod;
 use crate::operator::{self, Feedback, Status};
 use crate::protection::{Fault, SafeState};
+use crate::protocol::Frame;
 use crate::recorder::Record;
 use crate::time::Instant;
 
@@ -42,6 +43,8 @@ pub struct Setup {
     pub pwm_delay_ticks: u32,
     /// The line side that the operator switches; `None`: no operator, the rig commands the drive directly.
     pub line: Option<LineTimes>,
+    /// Whether the operator is asked over the protocol, by frames, and not by the words of the answers.
+    pub over_protocol: bool,
 }
 
 /// Time constants of the line side.
@@ -72,8 +75,8 @@ pub enum Request {
     Leave(Instant),
     /// What is asked of the operator, and what the board says, in the slot that began at the instant.
     Ask(Instant),
-    /// What the operator told; it holds from the instant on.
-    Tell(Instant, Status),
+    /// What the operator told, and the frame that says so; both from the instant on.
+    Tell(Instant, Status, Option<Frame>),
     /// The processor has stopped in a panic or a HardFault, gates off.
     Dead,
     /// A control period from the flight recorder, the oldest first; after the last answer, if a fault has frozen it.
@@ -98,7 +101,7 @@ impl Request {
             Self::End => (9, Instant(0), &[]),
             Self::Leave(at) => (10, *at, &[]),
             Self::Ask(at) => (11, *at, &[]),
-            Self::Tell(from, status) => (12, *from, &status.to_words()),
+            Self::Tell(from, status, frame) => (12, *from, &told_to_words(status, *frame)),
         };
         let words = [tag, at.0].into_iter().chain(payload.iter().copied());
         for (slot, word) in block.iter_mut().zip(words) {
@@ -136,8 +139,10 @@ impl Request {
             10 => Self::Leave(at),
             11 => Self::Ask(at),
             12 => {
-                let [a, b, c, d, e, f, g, h, ..] = payload;
-                Self::Tell(at, Status::from_words([a, b, c, d, e, f, g, h])?)
+                let [a, b, c, d, e, f, g, h, frame @ ..] = payload;
+                let [head, low, high, ..] = frame;
+                let status = Status::from_words([a, b, c, d, e, f, g, h])?;
+                Self::Tell(at, status, Option::from_words([head, low, high]))
             }
             _ => return None,
         })
@@ -151,14 +156,24 @@ pub fn setup_to_block(setup: Setup) -> Block {
     if let Some(LineTimes { precharge_s, discharge_s }) = setup.line {
         [block[3], block[4], block[5]] = [1, precharge_s.to_bits(), discharge_s.to_bits()];
     }
+    block[6] = setup.over_protocol.into();
     block
+}
+
+/// A status and a frame, one after the other.
+fn told_to_words(status: &Status, frame: Option<Frame>) -> [u32; 11] {
+    let [a, b, c, d, e, f, g, h] = status.to_words();
+    let [head, low, high] = frame.to_words();
+    [a, b, c, d, e, f, g, h, head, low, high]
 }
 
 /// The inverse of [`setup_to_block`].
 pub fn setup_from_block(block: &Block) -> Setup {
-    let [min_pulse_ticks, dead_time_ticks, pwm_delay_ticks, operated, precharge, discharge, ..] = *block;
+    let [min_pulse_ticks, dead_time_ticks, pwm_delay_ticks, operated, precharge, discharge, frames, ..] =
+        *block;
     let times = LineTimes { precharge_s: f32::from_bits(precharge), discharge_s: f32::from_bits(discharge) };
-    Setup { min_pulse_ticks, dead_time_ticks, pwm_delay_ticks, line: (operated == 1).then_some(times) }
+    let line = (operated == 1).then_some(times);
+    Setup { min_pulse_ticks, dead_time_ticks, pwm_delay_ticks, line, over_protocol: frames != 0 }
 }
 
 /// The answer to [`Request::ControlSample`]; `stop` ends the run.
@@ -189,10 +204,10 @@ pub fn sample_from_block(block: &Block) -> (Sample, bool) {
     (sample, flags & 4 != 0)
 }
 
-/// The answer to [`Request::Ask`].
-pub fn asked_to_block(asked: &operator::Request, feedback: &Feedback) -> Block {
+/// The answer to [`Request::Ask`]; over the protocol the frame asks, not the words.
+pub fn asked_to_block(asked: &operator::Request, feedback: &Feedback, frame: Option<Frame>) -> Block {
     let mut block = [0; BLOCK_WORDS];
-    let words = asked.to_words().into_iter().chain(feedback.to_words());
+    let words = asked.to_words().into_iter().chain(feedback.to_words()).chain(frame.to_words());
     for (slot, word) in block.iter_mut().zip(words) {
         *slot = word;
     }
@@ -200,9 +215,10 @@ pub fn asked_to_block(asked: &operator::Request, feedback: &Feedback) -> Block {
 }
 
 /// The inverse of [`asked_to_block`].
-pub fn asked_from_block(block: &Block) -> (operator::Request, Feedback) {
-    let [a, b, c, d, e, f, g, h, i, j, k, ..] = *block;
-    (operator::Request::from_words([a, b, c, d, e, f, g]), Feedback::from_words([h, i, j, k]))
+pub fn asked_from_block(block: &Block) -> (operator::Request, Feedback, Option<Frame>) {
+    let [a, b, c, d, e, f, g, h, i, j, k, head, low, high, ..] = *block;
+    let asked = operator::Request::from_words([a, b, c, d, e, f, g]);
+    (asked, Feedback::from_words([h, i, j, k]), Option::from_words([head, low, high]))
 }
 
 /// The answer to [`Request::PwmSample`].

@@ -21,6 +21,7 @@ mod firmware {
     use tractive::machine::{BUILT_IN, BuiltIn};
     use tractive::modulation::Devices;
     use tractive::operator::{self, Line, Slot, slot_s};
+    use tractive::protocol::Station;
     use tractive::time::Instant;
 
     static SHARED: Shared = Shared::recorded_by(&qemu::RECORDER);
@@ -54,11 +55,16 @@ mod firmware {
         let line =
             setup.line.map(|times| Line::rated(&BUILT_IN.ratings, times.precharge_s, times.discharge_s));
         let operator = operator::Settings::rated(&BUILT_IN.ratings, slot_s(&CLOCK), line);
-        let mut slot = Slot::new();
+        let station = setup.over_protocol.then(|| Station::new(&BUILT_IN.ratings));
+        let (mut slot, mut idle) = (Slot::new(), qemu::Idle { station });
         qemu::start(first_half_ticks);
         loop {
-            if line.is_some() {
-                slot.run(&qemu::DESK, &mut qemu::Idle, &operator, &CLOCK);
+            if line.is_some() || setup.over_protocol {
+                let settings = match &idle.station {
+                    Some(station) => station.settings(&operator),
+                    None => operator,
+                };
+                slot.run(&qemu::DESK, &mut idle, &settings, &CLOCK);
             }
             qemu::idle();
         }

@@ -23,6 +23,7 @@ pub mod report;
 pub mod run;
 pub mod scenario;
 pub mod sensor_faults;
+pub mod talk;
 pub mod trace;
 pub mod verdict;
 pub mod zs9;

@@ -11,7 +11,7 @@ use tractive_rig::options::{RunOptions, not_negative, positive};
 use tractive_rig::report::{self, Page};
 use tractive_rig::scenario::{self, Scenario};
 use tractive_rig::trace::{self, Recording};
-use tractive_rig::{figures, nine_switch, pattern, points, zs9};
+use tractive_rig::{figures, nine_switch, pattern, points, talk, zs9};
 
 #[derive(Parser)]
 #[command(name = "tractive-rig", about = "Plays the motor to the drive, and shows what happened", version)]
@@ -30,6 +30,9 @@ enum Command {
         #[command(flatten)]
         options: Box<RunOptions>,
     },
+    /// Commands the drive over the protocol, by a script or line by line, and logs its telemetry.
+    #[command(after_help = talk_help())]
+    Talk(Box<talk::TalkOptions>),
     /// Operating points: IN.csv has torque_nm,speed_rpm,udc_v; OUT.csv adds id_a,iq_a,region.
     Points {
         /// Points wanted.
@@ -121,6 +124,7 @@ fn main() -> ExitCode {
 fn command(command: Command) -> Result<ExitCode> {
     match command {
         Command::Run { scenario, options } => run(&scenario, &options),
+        Command::Talk(options) => run_talk(&options),
         Command::Points { input, output, machine } => {
             points::run(&input, &output, &Machine::load(&machine)?)?;
             Ok(ExitCode::SUCCESS)
@@ -166,10 +170,10 @@ fn run(name: &str, options: &RunOptions) -> Result<ExitCode> {
     let figures = scenario.figures(&recording, options, &machine);
     recording.write_trace(&out.join("trace.csv"))?;
     recording.write_edges(&out.join("edges.csv"))?;
+    recording.write_recorder(&out.join("recorder.csv"))?;
     if !recording.slots.is_empty() {
         recording.write_slots(&out.join("operator.csv"))?;
     }
-    recording.write_recorder(&out.join("recorder.csv"))?;
     let summary = summary(scenario.as_ref(), options, &figures, &machine);
     trace::write_text(&out.join("summary.json"), &(serde_json::to_string_pretty(&summary)? + "\n"))?;
     trace::write_text(&out.join("overview.svg"), &report::overview(&recording)?)?;
@@ -197,6 +201,28 @@ fn out(name: &str, options: &RunOptions) -> Result<PathBuf> {
     let out = options.out.clone().unwrap_or_else(|| Path::new("target/tractive").join(name));
     std::fs::create_dir_all(&out).with_context(|| format!("--out {}", out.display()))?;
     Ok(out)
+}
+
+/// The commands of a script, for the help.
+fn talk_help() -> String {
+    let commands: Vec<_> = talk::script::COMMANDS.iter().map(|usage| format!("  {usage}")).collect();
+    format!("A line is [SECONDS] COMMAND; # begins a comment:\n{}", commands.join("\n"))
+}
+
+fn run_talk(options: &talk::TalkOptions) -> Result<ExitCode> {
+    let outcome = talk::run(options)?;
+    let out = out("talk", &options.run)?;
+    talk::write(options, &outcome, &out)?;
+    if options.run.json {
+        println!("{}", serde_json::to_string(outcome.figures.values())?);
+    } else {
+        print(&outcome.figures);
+        println!("report: {}", out.join("report.html").display());
+    }
+    for failure in &outcome.talk.failures {
+        eprintln!("{failure}");
+    }
+    Ok(if outcome.talk.failures.is_empty() { ExitCode::SUCCESS } else { ExitCode::from(1) })
 }
 
 fn run_zs9(scenario: &dyn zs9::scenario::Scenario, options: &RunOptions) -> Result<ExitCode> {

@@ -249,6 +249,7 @@ impl RunOptions {
             image,
             arguments: self.qemu_arg.clone(),
             calls: self.calls.clone(),
+            patient: false,
         })
     }
 

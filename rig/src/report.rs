@@ -154,7 +154,8 @@ impl Page {
         else {
             return;
         };
-        let panels: [(&str, &str, &[(&str, fn(&Record) -> f32)]); 3] = [
+        type Recorded = (&'static str, fn(&Record) -> f32);
+        let panels: [(&str, &str, &[Recorded]); 3] = [
             (
                 "phase currents as sampled",
                 "A",

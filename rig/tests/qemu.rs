@@ -151,3 +151,32 @@ fn braking_into_a_link_that_cannot_take_it_is_the_same() {
 fn an_acknowledged_fault_is_the_same() {
     same("acknowledge", 1);
 }
+
+/// The same scripts over the protocol: the same frames, telemetry and pulses.
+fn same_talk(name: &str) {
+    let folder = tempfile::tempdir().unwrap();
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("scripts").join(name);
+    for on in ["host", "qemu"] {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_tractive-rig"));
+        command.arg("talk").arg(&script).args(["--on", on, "--out"]).arg(folder.path().join(on));
+        let output = command.output().unwrap();
+        assert!(output.status.success(), "{name} on {on}: {}", String::from_utf8_lossy(&output.stderr));
+    }
+    for file in ["telemetry.csv", "frames.log", "trace.csv"] {
+        let [host, qemu] =
+            ["host", "qemu"].map(|on| std::fs::read(folder.path().join(on).join(file)).unwrap());
+        assert!(host.len() > 10_000 && host == qemu, "{name}: {file} differs");
+    }
+}
+
+#[test]
+#[ignore = "needs the image and QEMU"]
+fn a_round_trip_over_the_protocol_is_the_same() {
+    same_talk("round-trip.talk");
+}
+
+#[test]
+#[ignore = "needs the image and QEMU"]
+fn hostile_frames_are_treated_the_same() {
+    same_talk("hostile.talk");
+}

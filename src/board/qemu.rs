@@ -20,6 +20,7 @@ use crate::link::Setup;
 use crate::modulation::CarrierPeriod;
 use crate::operator::{self, Desk, Feedback, OperatorPort, Status};
 use crate::protection::SafeState;
+use crate::protocol::Station;
 use crate::recorder::Recorder;
 use crate::time::{Clock, Instant};
 use core::sync::atomic::{AtomicBool, Ordering};
@@ -99,7 +100,7 @@ static OPERATED: AtomicBool = AtomicBool::new(false);
 /// Opens the link and fetches the set-up. Call once, before [`start`].
 pub fn connect() -> Setup {
     let setup = exchange::open();
-    OPERATED.store(setup.line.is_some(), Ordering::Relaxed);
+    OPERATED.store(setup.line.is_some() || setup.over_protocol, Ordering::Relaxed);
     setup
 }
 
@@ -241,14 +242,23 @@ impl PwmPort for Pwm {
 }
 
 /// The idle loop's side of the board.
-pub struct Idle;
+pub struct Idle {
+    /// The protocol, where the operator is asked over it; `None`: the rig asks by words.
+    pub station: Option<Station>,
+}
 
 impl OperatorPort for Idle {
     fn ask(&mut self, at: Instant) -> (operator::Request, Feedback) {
-        exchange::ask(at)
+        let (request, feedback, frame) = exchange::ask(at);
+        let request = match &mut self.station {
+            Some(station) => station.listen(DESK.observed(), frame.as_ref()),
+            None => request,
+        };
+        (request, feedback)
     }
 
     fn tell(&mut self, from: Instant, status: &Status) {
-        exchange::tell(from, status);
+        let frame = self.station.as_mut().and_then(|station| station.tell(status));
+        exchange::tell(from, status, frame);
     }
 }

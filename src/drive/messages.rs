@@ -346,12 +346,15 @@ pub struct Report {
     pub speed_known: bool,
     /// Number of the acknowledge that both interrupts have carried out.
     pub acknowledged: u8,
+    /// Pulse pattern that the voltage was made for.
+    pub mode: Mode,
 }
 
 impl Words<12> for Report {
     fn to_words(self) -> [u32; 12] {
         let [code, value, limit, at] = trip_to_words(self.trip);
-        let code = code | u32::from(self.acknowledged) << 16 | u32::from(self.speed_known) << 24;
+        let flags = u32::from(self.acknowledged) | u32::from(self.speed_known) << 8;
+        let code = code | flags << 16 | (self.mode as u32) << 28;
         [
             self.torque_nm.to_bits(),
             self.id_a.to_bits(),
@@ -382,6 +385,7 @@ impl Words<12> for Report {
             current_a: f32::from_bits(current),
             speed_known: code >> 24 & 1 != 0,
             acknowledged: (code >> 16) as u8,
+            mode: Mode::from_code(code >> 28),
         }
     }
 }

@@ -324,6 +324,7 @@ impl<M: Machine> ControlTask<M> {
         report.iq_a = output.point.current.q;
         report.voltage_v = output.voltage.voltage_v;
         report.map_error = output.map_error;
+        report.mode = decided;
     }
 
     /// The largest fundamental as a share of six-step, and whether it is to be used whatever the torque needs: in square wave, and

@@ -65,6 +65,7 @@ fn TIM1_UP_TIM16() {
     static mut BOARD: Option<Pwm> = None;
     static mut TASK: Option<PwmTask> = None;
     let board = BOARD.get_or_insert_with(|| Pwm::new(Registers::CHIP, kept()));
+    board.acknowledge();
     if board.begin() {
         TASK.get_or_insert_with(|| PwmTask::new(&BUILT_IN, settings())).run(board, &SHARED);
         PULSE.pwm_ran();

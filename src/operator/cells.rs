@@ -5,6 +5,7 @@ use super::{Observation, Permit, SLOT_PERIODS};
 use crate::cell::{Downlink, Uplink, Words};
 use crate::control::{Demand, LinkWindow};
 use crate::drive::{Report, trip_from_words, trip_to_words};
+use crate::modulation::Mode;
 use crate::time::{Clock, Instant};
 use core::sync::atomic::{AtomicU32, Ordering};
 
@@ -52,17 +53,19 @@ impl Words<7> for Timed {
     }
 }
 
-impl Words<9> for Observation {
-    fn to_words(self) -> [u32; 9] {
+impl Words<12> for Observation {
+    fn to_words(self) -> [u32; 12] {
         let [code, value, limit, tripped_at] = trip_to_words(self.trip);
-        let code = code | u32::from(self.acknowledged) << 16 | u32::from(self.speed_known) << 24;
+        let flags = u32::from(self.acknowledged) | u32::from(self.speed_known) << 8;
+        let code = code | flags << 16 | (self.mode as u32) << 28;
         let measured = [self.udc_v, self.current_a, self.omega, self.torque_nm].map(f32::to_bits);
         let [udc, current, omega, torque] = measured;
-        [self.at.0, udc, current, omega, torque, code, value, limit, tripped_at]
+        let [id, iq, voltage] = [self.id_ref_a, self.iq_ref_a, self.voltage_v].map(f32::to_bits);
+        [self.at.0, udc, current, omega, torque, code, value, limit, tripped_at, id, iq, voltage]
     }
 
-    fn from_words(words: [u32; 9]) -> Self {
-        let [at, udc, current, omega, torque, code, value, limit, tripped_at] = words;
+    fn from_words(words: [u32; 12]) -> Self {
+        let [at, udc, current, omega, torque, code, value, limit, tripped_at, id, iq, voltage] = words;
         Self {
             at: Instant(at),
             udc_v: f32::from_bits(udc),
@@ -72,6 +75,10 @@ impl Words<9> for Observation {
             torque_nm: f32::from_bits(torque),
             trip: trip_from_words([code, value, limit, tripped_at]),
             acknowledged: (code >> 16) as u8,
+            id_ref_a: f32::from_bits(id),
+            iq_ref_a: f32::from_bits(iq),
+            voltage_v: f32::from_bits(voltage),
+            mode: Mode::from_code(code >> 28),
         }
     }
 }
@@ -79,7 +86,7 @@ impl Words<9> for Observation {
 /// Permit down, observation up.
 pub struct Desk {
     permit: Downlink<Timed, 7>,
-    observed: Uplink<Observation, 9>,
+    observed: Uplink<Observation, 12>,
     /// Control periods until the next slot.
     left: AtomicU32,
 }
@@ -118,6 +125,10 @@ impl Desk {
             torque_nm: report.torque_nm,
             trip: report.trip,
             acknowledged: report.acknowledged,
+            id_ref_a: report.id_a,
+            iq_ref_a: report.iq_a,
+            voltage_v: report.voltage_v,
+            mode: report.mode,
         });
     }
 
@@ -129,8 +140,13 @@ impl Desk {
     /// In the idle loop, once a slot: what is permitted from the next slot's beginning on. Returns that instant.
     pub fn allow(&self, permit: Permit, observed: &Observation, clock: &Clock) -> Instant {
         let from = next_slot(observed.at, clock);
-        self.permit.publish(Timed { permit, from });
+        self.allow_from(permit, from);
         from
+    }
+
+    /// The same from an instant of one's own on.
+    pub fn allow_from(&self, permit: Permit, from: Instant) {
+        self.permit.publish(Timed { permit, from });
     }
 }
 

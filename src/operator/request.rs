@@ -4,6 +4,7 @@ use super::settings::Ends;
 use crate::cell::Words;
 use crate::frames::Abc;
 use crate::machine::Ratings;
+use crate::modulation::Mode;
 use crate::protection::{Fault, Trip};
 use crate::time::Instant;
 
@@ -136,6 +137,14 @@ pub struct Observation {
     pub trip: Option<Trip>,
     /// Number of the last acknowledge that both sides have carried out.
     pub acknowledged: u8,
+    /// Current reference, d axis, in A.
+    pub id_ref_a: f32,
+    /// Current reference, q axis, in A.
+    pub iq_ref_a: f32,
+    /// Commanded fundamental, peak phase, in V.
+    pub voltage_v: f32,
+    /// Pulse pattern that control worked for.
+    pub mode: Mode,
 }
 
 /// Flags as bits of a word, the first the lowest.

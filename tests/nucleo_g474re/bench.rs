@@ -69,6 +69,8 @@ pub struct Bench {
     status: [u32; 2],
     shadows: [Shadow; 2],
     count: [u32; 2],
+    /// The timers play a two-level inverter; otherwise the bench leaves them alone but for their break inputs.
+    pub two_level: bool,
     /// Called at each wait.
     pub watch: fn(&Registers),
 }
@@ -85,11 +87,17 @@ impl Bench {
             gpioa: at_memory!(pac::gpio::Gpio),
             gpiob: at_memory!(pac::gpio::Gpio),
             gpioc: at_memory!(pac::gpio::Gpio),
+            gpiod: at_memory!(pac::gpio::Gpio),
             legs,
+            tim20: at_memory!(pac::timer::TimAdv),
+            tim2: at_memory!(pac::timer::TimGp32),
             tim3: at_memory!(pac::timer::TimGp16),
             tim4: at_memory!(pac::timer::TimGp16),
             adc1: at_memory!(pac::adc::Adc),
             adc2: at_memory!(pac::adc::Adc),
+            adc3: at_memory!(pac::adc::Adc),
+            adc345: at_memory!(pac::adccommon::AdcCommon),
+            spi3: at_memory!(pac::spi::Spi),
             adc12: at_memory!(pac::adccommon::AdcCommon),
             comparators: core::array::from_fn(|_| at_memory!(pac::comp::Comp)),
             dac3: at_memory!(pac::dac::Dac),
@@ -97,7 +105,7 @@ impl Bench {
             iwdg: at_memory!(pac::iwdg::Iwdg),
         };
         // Pins are analog after a reset.
-        for port in [registers.gpioa, registers.gpiob, registers.gpioc] {
+        for port in [registers.gpioa, registers.gpiob, registers.gpioc, registers.gpiod] {
             port.moder().write_value(pac::gpio::regs::Moder(u32::MAX));
         }
         Self {
@@ -110,8 +118,14 @@ impl Bench {
             status: [0; 2],
             shadows: [Shadow::default(); 2],
             count: [0; 2],
+            two_level: true,
             watch: |_| (),
         }
+    }
+
+    /// A bench for timers that play another inverter.
+    pub fn of_other_inverter() -> Self {
+        Self { two_level: false, ..Self::new() }
     }
 
     /// The bench after a whole start.
@@ -134,6 +148,11 @@ impl Bench {
         for (index, timer) in self.timers().into_iter().enumerate() {
             // Flags are cleared by writing 0; writing 1 does nothing.
             self.status[index] &= timer.sr().read().0;
+            if !self.two_level {
+                self.status[index] |= u32::from(self.fault[index]) << 7;
+                timer.sr().write_value(pac::timer::regs::SrAdv(self.status[index]));
+                continue;
+            }
             // SAFETY: EGR is a word of the timer's block; the hardware alone reads it back.
             let egr = unsafe { &mut *timer.as_ptr().cast::<u32>().add(5) };
             let events = core::mem::take(egr);
@@ -150,7 +169,9 @@ impl Bench {
             }
             timer.sr().write_value(pac::timer::regs::SrAdv(self.status[index]));
         }
-        self.drive_legs();
+        if self.two_level {
+            self.drive_legs();
+        }
     }
 
     /// TIM1's TRGO arrives at TIM8 and TIM3.
@@ -294,13 +315,13 @@ impl Wait for Bench {
         if self.broken {
             return Err(Timeout);
         }
-        let Registers { rcc, adc1, adc2, .. } = self.registers;
+        let Registers { rcc, adc1, adc2, adc3, .. } = self.registers;
         rcc.cr().modify(|w| {
             w.set_hserdy(w.hseon());
             w.set_pllrdy(w.pllon());
         });
         rcc.cfgr().modify(|w| w.set_sws(w.sw()));
-        for adc in [adc1, adc2] {
+        for adc in [adc1, adc2, adc3] {
             self.convert(adc);
         }
         self.settle();

@@ -9,6 +9,7 @@ use tractive::board::nucleo_g474re::{CLOCK, Control, Pwm};
 use tractive::control::Gains;
 use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
 use tractive::machine::BUILT_IN;
+use tractive::operator::Permit;
 use tractive::time::Instant;
 
 /// Ticks from one encoder count to the next at 200 r/min.
@@ -21,6 +22,7 @@ fn the_drive_pulses_a_turning_machine_through_the_registers() {
     let registers = bench.registers;
     let (shared, operator) = (Shared::new(), Operator::new());
     let settings = Settings { clock: CLOCK, devices: devices(), gains: Gains::DEFAULT };
+    operator.desk.allow_from(Permit { enable: true, ..Permit::NONE }, Instant(0));
     let zeros = [AdcCode(2_048); 3];
     let encoder = Encoder::new(registers.tim4, &POWER_STAGE, 4);
     let mut control = Control::new(registers, zeros, encoder, &operator);

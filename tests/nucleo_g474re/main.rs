@@ -6,6 +6,7 @@ mod legs;
 mod pins;
 mod ports;
 mod start;
+mod zs9;
 
 use tractive::board::nucleo_g474re::CLOCK;
 use tractive::board::nucleo_g474re::power_stage::{POWER_STAGE, cycles_to_ticks, ns_to_cycles};

@@ -10,8 +10,10 @@ use tractive::board::nucleo_g474re::sampling::Zeros;
 use tractive::board::nucleo_g474re::watchdog::Pulse;
 use tractive::board::nucleo_g474re::{Control, Pwm};
 use tractive::board::{ControlPort, PwmPort};
+use tractive::control::Demand;
 use tractive::drive::Report;
 use tractive::frames::Angle;
+use tractive::operator::Permit;
 use tractive::protection::SafeState;
 use tractive::time::Instant;
 
@@ -37,7 +39,8 @@ fn a_sample_has_currents_link_voltage_and_angle_in_si_units() {
     registers.tim4.cnt().write(|w| w.set_cnt(256));
     registers.tim4.sr().write(|w| w.set_idxif(true));
     write_input(registers.gpioc, 1 << 2);
-    operator.ask(120.0);
+    let demand = Demand { torque_nm: 120.0, slew_limited: true };
+    operator.desk.allow_from(Permit { enable: true, demand, ..Permit::NONE }, NOW);
     let sample = control.sample(NOW);
     let currents = sample.measured.currents_a;
     assert_eq!((currents.a, currents.b, currents.c), (125.0, -62.5, -62.5));
@@ -55,6 +58,7 @@ fn the_gates_wait_for_the_index_the_enable_input_and_quiet_break_inputs() {
         let registers = bench.registers;
         let operator = Operator::new();
         let encoder = Encoder::new(registers.tim4, &POWER_STAGE, 4);
+        operator.desk.allow_from(Permit { enable: true, ..Permit::NONE }, NOW);
         let mut control = Control::new(registers, ZEROS, encoder, &operator);
         registers.tim4.sr().write(|w| w.set_idxif(index));
         write_input(registers.gpioc, u32::from(enable) << 2);

@@ -3,7 +3,7 @@
 use crate::bench::Bench;
 use crate::plan;
 use stm32_metapac::{adc, gpio, rcc, timer};
-use tractive::board::nucleo_g474re::pins::{PINS, Port};
+use tractive::board::nucleo_g474re::pins::PINS;
 use tractive::board::nucleo_g474re::registers::Registers;
 use tractive::board::nucleo_g474re::start::{Found, Plan, STEPS, Start, StartError, prepare, run};
 use tractive::board::nucleo_g474re::{CLOCK, PRESCALER, power_stage::POWER_STAGE};
@@ -31,11 +31,7 @@ fn gates_are_off(registers: &Registers) {
 }
 
 fn mode(registers: &Registers, pin: &tractive::board::nucleo_g474re::pins::Pin) -> gpio::vals::Moder {
-    let port = match pin.port {
-        Port::A => registers.gpioa,
-        Port::B => registers.gpiob,
-        Port::C => registers.gpioc,
-    };
+    let port = pin.port.of(registers);
     port.moder().read().moder(usize::from(pin.number))
 }
 

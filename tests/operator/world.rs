@@ -59,6 +59,10 @@ impl World {
                 torque_nm: 0.0,
                 trip: None,
                 acknowledged: 0,
+                id_ref_a: 0.0,
+                iq_ref_a: 0.0,
+                voltage_v: 0.0,
+                mode: tractive::modulation::Mode::Off,
             },
             feedback: Feedback {
                 driver_ready: true,

@@ -21,6 +21,9 @@ pub enum Command {
         after_help = RUN_HELP
     )]
     Run(RunArgs),
+    /// Set up what is missing, build, command the drive over the protocol
+    #[command(override_usage = "cargo xtask talk [SCRIPT|-] [--on qemu|host] [--out DIR] [OPTIONS]", after_help = TALK_HELP)]
+    Talk(RunArgs),
     /// Set up what is missing, run every check
     Test(TestArgs),
     /// Build the image and print what is in it
@@ -38,6 +41,13 @@ const RUN_HELP: &str = "\
   --machine NAME|PATH    a folder of tables/, or any folder with the same two files
 
 Every other option goes to the rig as it is: `cargo rig run --help` lists them.";
+
+const TALK_HELP: &str = "\
+  SCRIPT                 what to say [default: rig/scripts/round-trip.talk]; - for lines from standard input
+  --on qemu|host         the firmware's image in QEMU, or its code on this machine [default: qemu]
+  --out DIR              where the files go [default: target/tractive/talk]
+
+Every other option goes to the rig as it is: `cargo rig talk --help` lists them, and the commands of a script.";
 
 #[derive(Args, Debug)]
 pub struct RunArgs {

@@ -3,6 +3,7 @@
 //! | command | what it does |
 //! |---|---|
 //! | `run [SCENARIO] [--on qemu\|host] [--out DIR] …` | sets up what is missing, builds, hands over to the rig |
+//! | `talk [SCRIPT] [--on qemu\|host] [--out DIR] …` | the same, and commands the drive over the protocol |
 //! | `test [--only STEP]… [--list]` | sets up what is missing, runs every check, ends with a table and a count |
 //! | `image [--json]` | builds the image and says what is in it |
 //! | `timing [--json] [--profile [N]]` | instructions per interrupt against `budgets.toml` |
@@ -12,9 +13,9 @@
 //! and something failed; 2 it could not run (bad usage, bad input, something missing), with the reason on a line.
 //!
 //! The modules: [`cli`] is what may be typed, [`setup`] what has to be installed, [`build`] how cargo is called,
-//! [`run`], [`mod@test`], [`image`], [`timing`] and [`flash`] the commands. An image is read by [`elf`], its instructions by [`thumb`]; [`graph`]
-//! says which function calls which [`check`] refuses what an image must not hold, and [`cells`] looks at what the cells
-//! did under the interrupts, in the [`emulator`].
+//! [`run`], [`mod@test`], [`image`], [`timing`] and [`flash`] the commands; [`guide`] runs those of the documentation. An image is read by [`elf`],
+//! its instructions by [`thumb`]; [`graph`] says which function calls which, [`check`] refuses what an image must not hold, and [`cells`]
+//! looks at what the cells did under the interrupts, in the [`emulator`].
 
 #![forbid(unsafe_code)]
 
@@ -26,6 +27,7 @@ mod elf;
 mod emulator;
 mod flash;
 mod graph;
+mod guide;
 mod image;
 mod process;
 mod run;
@@ -41,6 +43,7 @@ use clap::Parser;
 fn main() -> ExitCode {
     let result = match cli::Cli::parse().command {
         cli::Command::Run(args) => run::run(&args.words),
+        cli::Command::Talk(args) => run::talk(&args.words),
         cli::Command::Test(args) => test::run(&args),
         cli::Command::Image(args) => image::run(&args),
         cli::Command::Timing(args) => timing::run(&args),

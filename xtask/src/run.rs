@@ -21,9 +21,20 @@ enum On {
     Host,
 }
 
+/// The script that is run when none is named.
+const SCRIPT: &str = "rig/scripts/round-trip.talk";
+
+/// The rig's command that is meant.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Verb {
+    Run,
+    Talk,
+}
+
 /// What was asked for.
 #[derive(Debug, PartialEq, Eq)]
 struct Request {
+    /// The scenario; for a talk the script, or - for standard input.
     scenario: String,
     on: On,
     out: Option<String>,
@@ -35,7 +46,7 @@ struct Request {
 
 impl Request {
     /// Picks out what this program knows; the rest is the rig's.
-    fn parse(words: &[String]) -> Result<Self> {
+    fn parse(words: &[String], verb: Verb) -> Result<Self> {
         let mut scenario = None;
         let (mut on, mut out, mut machine) = (None, None, None);
         let (mut help, mut rest) = (false, Vec::new());
@@ -63,7 +74,7 @@ impl Request {
                 value_may_follow = false;
             } else if word == "--help" || word == "-h" {
                 help = true;
-            } else if word.starts_with('-') || value_may_follow || scenario.is_some() {
+            } else if (word.starts_with('-') && word != "-") || value_may_follow || scenario.is_some() {
                 rest.push(word.clone());
                 value_may_follow = word.starts_with("--") && inline.is_none() && !FLAGS.contains(&name);
             } else {
@@ -75,7 +86,10 @@ impl Request {
             Some("host") => On::Host,
             Some(other) => bail!("--on {other}: qemu or host is allowed"),
         };
-        let scenario = scenario.unwrap_or_else(|| "sweep".to_owned());
+        let scenario = scenario.unwrap_or_else(|| match verb {
+            Verb::Run => "sweep".to_owned(),
+            Verb::Talk => build::root().join(SCRIPT).to_string_lossy().into_owned(),
+        });
         Ok(Self { scenario, on, out, machine, help, rest })
     }
 
@@ -84,12 +98,17 @@ impl Request {
     }
 
     /// What the rig is called with; `image` and `qemu` as far as they were made ready here.
-    fn rig_args(&self, out: &Path, image: Option<&Path>, qemu: Option<&Path>) -> Vec<OsString> {
+    fn rig_args(&self, verb: Verb, out: &Path, image: Option<&Path>, qemu: Option<&Path>) -> Vec<OsString> {
         let on = match self.on {
             On::Qemu => "qemu",
             On::Host => "host",
         };
-        let mut args: Vec<OsString> = vec!["run".into(), (&self.scenario).into()];
+        let mut args: Vec<OsString> = match verb {
+            Verb::Run => vec!["run".into(), (&self.scenario).into()],
+            // The rig's own default is standard input.
+            Verb::Talk if self.scenario == "-" => vec!["talk".into()],
+            Verb::Talk => vec!["talk".into(), (&self.scenario).into()],
+        };
         args.extend(["--on".into(), on.into(), "--out".into(), out.into()]);
         for (option, path) in [("--image", image), ("--qemu", qemu)] {
             args.extend(path.into_iter().flat_map(|path| [option.into(), path.into()]));
@@ -102,17 +121,30 @@ impl Request {
 
 /// The command; its exit code is the rig's.
 pub fn run(words: &[String]) -> Result<u8> {
-    let request = Request::parse(words)?;
+    hand_over(words, Verb::Run)
+}
+
+/// The same for a talk over the protocol.
+pub fn talk(words: &[String]) -> Result<u8> {
+    hand_over(words, Verb::Talk)
+}
+
+fn hand_over(words: &[String], verb: Verb) -> Result<u8> {
+    let request = Request::parse(words, verb)?;
+    let name = match verb {
+        Verb::Run => "run",
+        Verb::Talk => "talk",
+    };
     if request.help {
         let mut top = cli::Cli::command();
-        top.find_subcommand_mut("run").context("no help for run")?.print_help()?;
+        top.find_subcommand_mut(name).with_context(|| format!("no help for {name}"))?.print_help()?;
         return Ok(0);
     }
     let machine =
         request.machine.as_deref().map(|machine| machine_for_build(machine, build::root())).transpose()?;
     let out = match &request.out {
         Some(out) => PathBuf::from(out),
-        None => default_out(&request.scenario)?,
+        None => default_out(if verb == Verb::Talk { name } else { &request.scenario })?,
     };
     let (mut image, mut qemu) = (None, None);
     if request.on == On::Qemu {
@@ -129,7 +161,7 @@ pub fn run(words: &[String]) -> Result<u8> {
         }
     }
     let mut rig = Command::new(build::rig()?);
-    rig.args(request.rig_args(&out, image.as_deref(), qemu.as_deref()));
+    rig.args(request.rig_args(verb, &out, image.as_deref(), qemu.as_deref()));
     let status = rig.status().with_context(|| process::cannot_start(&rig))?;
     match status.code() {
         Some(code) => Ok(u8::try_from(code).unwrap_or(1)),
@@ -177,8 +209,12 @@ pub fn machine_names(root: &Path) -> Vec<String> {
 mod tests {
     use super::*;
 
+    fn words(line: &str) -> Vec<String> {
+        line.split_whitespace().map(str::to_owned).collect()
+    }
+
     fn parse(line: &str) -> Result<Request> {
-        Request::parse(&line.split_whitespace().map(str::to_owned).collect::<Vec<_>>())
+        Request::parse(&words(line), Verb::Run)
     }
 
     #[test]
@@ -230,14 +266,28 @@ mod tests {
     #[test]
     fn the_rig_gets_everything_once() {
         let request = parse("sweep --down --machine m --json").unwrap();
-        let args = request.rig_args(Path::new("o"), Some(Path::new("i")), Some(Path::new("q")));
+        let args = request.rig_args(Verb::Run, Path::new("o"), Some(Path::new("i")), Some(Path::new("q")));
         let expected = "run sweep --on qemu --out o --image i --qemu q --machine m --down --json";
         assert_eq!(args, expected.split(' ').collect::<Vec<_>>());
         let request = parse("sweep --on host").unwrap();
         assert_eq!(
-            request.rig_args(Path::new("o"), None, None),
+            request.rig_args(Verb::Run, Path::new("o"), None, None),
             ["run", "sweep", "--on", "host", "--out", "o"]
         );
+    }
+
+    #[test]
+    fn a_talk_has_the_shipped_script_unless_told_otherwise() {
+        let args = |line: &str| {
+            let request = Request::parse(&words(line), Verb::Talk).unwrap();
+            let args = request.rig_args(Verb::Talk, Path::new("o"), None, None);
+            args.into_iter().map(|arg| arg.into_string().unwrap()).collect::<Vec<_>>().join(" ")
+        };
+        let shipped = build::root().join(SCRIPT);
+        assert!(shipped.is_file());
+        assert_eq!(args(""), format!("talk {} --on qemu --out o", shipped.display()));
+        assert_eq!(args("- --on host"), "talk --on host --out o");
+        assert_eq!(args("my.talk --inertia 5"), "talk my.talk --on qemu --out o --inertia 5");
     }
 
     #[test]

@@ -8,7 +8,7 @@ use clap::ValueEnum;
 
 use crate::build::{Board, System, TARGET, cargo};
 use crate::cli::{TestArgs, TimingArgs};
-use crate::process::{quietly, succeeds};
+use crate::process::{find, quietly, succeeds};
 use crate::setup::Setup;
 use crate::{build, image};
 
@@ -37,6 +37,10 @@ pub enum Step {
     ImageCheck,
     /// The NUCLEO-G474RE's images build, with no panic within an interrupt's reach and no double precision
     NucleoImage,
+    /// Every command of the engineer's guide
+    Guide,
+    /// The engineer's guide as a book
+    Book,
     /// The image builds for every folder of tables/
     Machines,
     /// The image in QEMU
@@ -149,6 +153,14 @@ fn perform(step: Step, setup: &mut Setup) -> Result<Outcome> {
                 )?;
             }
             good
+        }
+        Step::Guide => crate::guide::run(build::root())?,
+        Step::Book if find("mdbook").is_none() => {
+            return Ok(Outcome::Skipped("mdbook is not installed (cargo install mdbook)".to_owned()));
+        }
+        Step::Book => {
+            let docs = build::root().join("docs");
+            succeeds(Command::new("mdbook").arg("build").arg(docs))?
         }
         Step::Machines => {
             let toolchain = setup.toolchain()?;

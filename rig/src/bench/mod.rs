@@ -44,6 +44,9 @@ const SAFE_STATE_DELAY: Tick = 625;
 /// How far a current's reading may be off without making a difference that counts, in A.
 const MUCH_A: f32 = 10.0;
 
+/// Rows for which room is made at once.
+const MOST_ROWS: usize = 1 << 20;
+
 /// What the operator does, as a function of time.
 pub trait Operator {
     /// Demand and enable at `t_s` seconds after the recording begins (negative before).
@@ -129,6 +132,8 @@ pub struct Bench {
     samples: VecDeque<(Tick, Sample)>,
     next_sample: Tick,
     reports: VecDeque<(Tick, Report)>,
+    /// Loads to come, by their ticks.
+    loads: VecDeque<(Tick, f64)>,
     report: Report,
     next_row: Tick,
     rows_done: u64,
@@ -168,11 +173,14 @@ impl Bench {
             samples: VecDeque::new(),
             next_sample: settings.clock.control_ticks.into(),
             reports: VecDeque::new(),
+            loads: VecDeque::new(),
             report: Report::default(),
             next_row: lead,
             rows_done: 0,
             trace_step_s: settings.trace_step_s,
-            rows: Vec::with_capacity((settings.duration_s / settings.trace_step_s) as usize + 2),
+            rows: Vec::with_capacity(
+                MOST_ROWS.min((settings.duration_s / settings.trace_step_s) as usize + 2),
+            ),
             switches: Vec::new(),
         }
     }
@@ -252,6 +260,16 @@ impl Bench {
     /// An instant near to now, in s from the recording's beginning.
     pub fn instant_s(&self, instant: Instant) -> f64 {
         self.seconds(self.widen(instant))
+    }
+
+    /// A free rotor's load from `instant` on, in N·m.
+    pub fn load_from(&mut self, instant: Instant, load_nm: f64) {
+        self.loads.push_back((self.widen(instant), load_nm));
+    }
+
+    /// Ends the recording at `instant`.
+    pub fn end_at(&mut self, instant: Instant) {
+        self.end = self.end.min(self.widen(instant));
     }
 
     /// The conversions that the control timer triggered at `instant`.
@@ -380,6 +398,9 @@ impl Bench {
             if let Some((at, _)) = self.orders.front() {
                 due = due.min(*at);
             }
+            if let Some((at, _)) = self.loads.front() {
+                due = due.min((*at).max(self.now));
+            }
             if let Some(event) = self.line.as_ref().and_then(LineSide::next_event) {
                 due = due.min(event);
             }
@@ -453,6 +474,12 @@ impl Bench {
                 }
                 None => self.inverter.leave(now),
             }
+        }
+        while let Some((at, load_nm)) = self.loads.front().copied()
+            && at <= now
+        {
+            self.loads.pop_front();
+            self.plant.set_load_nm(load_nm);
         }
         self.inverter.act(now);
         if now == self.inverter.half_end() {

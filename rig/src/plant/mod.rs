@@ -101,6 +101,11 @@ impl Plant {
         self.stator.torque_nm(self.id_a, self.iq_a)
     }
 
+    /// Loads a free rotor with a torque against forward rotation, in N·m; a prescribed speed stays as it is.
+    pub fn set_load_nm(&mut self, load_nm: f64) {
+        self.rotor.set_load_nm(load_nm);
+    }
+
     /// Electrical rotor angle, in turns, 0 ≤ x < 1.
     pub fn angle_turns(&self) -> f64 {
         self.rotor.angle_turns()

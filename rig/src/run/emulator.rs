@@ -21,6 +21,8 @@ pub struct Emulator {
     pub arguments: Vec<String>,
     /// Where the mode of every interrupt is written, a line `control,MODE` or `pwm,MODE` each.
     pub calls: Option<PathBuf>,
+    /// Whether the run may stand still for as long as somebody types.
+    pub patient: bool,
 }
 
 /// Two to this many nanoseconds of virtual time per instruction: 8 ns, 125 MIPS, nearest to the real part.
@@ -37,7 +39,7 @@ pub(crate) fn emulate(
 ) -> Result<()> {
     let folder = tempfile::tempdir().context("no temporary folder for the link")?;
     let mut link = Link::open(folder.path())?;
-    let watch = Watch::start(spawn(emulator, folder.path())?, link.requests.try_clone()?);
+    let watch = Watch::start(spawn(emulator, folder.path())?, link.requests.try_clone()?, emulator.patient);
     let mut serve = || -> Result<()> {
         loop {
             let block = link.receive()?;
@@ -151,10 +153,10 @@ struct Watch {
 }
 
 impl Watch {
-    fn start(child: Child, requests: File) -> Self {
+    fn start(child: Child, requests: File, patient: bool) -> Self {
         let (blocks, done) = (Arc::new(AtomicU64::new(0)), Arc::new(AtomicBool::new(false)));
         let (seen, stop) = (Arc::clone(&blocks), Arc::clone(&done));
-        let thread = std::thread::spawn(move || watch(child, requests, &seen, &stop));
+        let thread = std::thread::spawn(move || watch(child, requests, patient, &seen, &stop));
         Self { blocks, done, thread }
     }
 
@@ -167,7 +169,13 @@ impl Watch {
     }
 }
 
-fn watch(mut child: Child, mut requests: File, blocks: &AtomicU64, stop: &AtomicBool) -> String {
+fn watch(
+    mut child: Child,
+    mut requests: File,
+    patient: bool,
+    blocks: &AtomicU64,
+    stop: &AtomicBool,
+) -> String {
     let pause = Duration::from_millis(5);
     let (mut last, mut silent) = (0, Duration::ZERO);
     while let Ok(None) = child.try_wait() {
@@ -175,7 +183,7 @@ fn watch(mut child: Child, mut requests: File, blocks: &AtomicU64, stop: &Atomic
         let now = blocks.load(Ordering::Relaxed);
         silent = if now == last { silent + pause } else { Duration::ZERO };
         last = now;
-        if stop.load(Ordering::Relaxed) || silent > SILENCE {
+        if stop.load(Ordering::Relaxed) || (silent > SILENCE && !patient) {
             let _ = child.kill();
         }
     }

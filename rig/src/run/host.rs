@@ -1,7 +1,7 @@
 //! The drive on the host: the firmware's own tasks, called in the order in which their interrupts would come.
 
-use super::Progress;
-use crate::bench::{Bench, BenchError};
+use super::{Progress, Supervisor};
+use crate::bench::Bench;
 use crate::trace::Recording;
 use tractive::board::{ControlPort, PwmPort, Sample};
 use tractive::control::{Demand, LinkWindow, Measurements};
@@ -12,18 +12,26 @@ use tractive::machine::{Ratings, Tables};
 use tractive::modulation::CarrierPeriod;
 use tractive::operator::{self, Desk, Feedback, Line, OperatorPort, Request, Slot, Status, slot_s};
 use tractive::protection::{LegFaults, SafeState};
+use tractive::protocol::Station;
 use tractive::recorder::Recorder;
 use tractive::time::{Clock, Instant};
 
 /// The bench behind a board's ports; the first error ends the run.
-struct Port<'a> {
+struct Port<'a, 'w> {
     bench: &'a mut Bench,
     desk: &'a Desk,
     ratings: &'a Ratings,
-    error: Option<BenchError>,
+    wire: Option<&'a mut Wire<'w>>,
+    error: Option<anyhow::Error>,
 }
 
-impl ControlPort for Port<'_> {
+/// The drive's end of the protocol, and who is at the other end.
+struct Wire<'w> {
+    station: Station,
+    supervisor: &'w mut dyn Supervisor,
+}
+
+impl ControlPort for Port<'_, '_> {
     fn sample(&mut self, now: Instant) -> Sample {
         let sample = self.bench.control_sample(now);
         let sample = if self.bench.is_operated() {
@@ -32,7 +40,7 @@ impl ControlPort for Port<'_> {
             sample
         };
         sample.unwrap_or_else(|error| {
-            self.error = Some(error);
+            self.error = Some(error.into());
             let measured = Measurements { currents_a: Abc::default(), udc_v: 0.0, angle: Angle::ZERO };
             Sample {
                 measured,
@@ -63,10 +71,10 @@ impl ControlPort for Port<'_> {
     }
 }
 
-impl PwmPort for Port<'_> {
+impl PwmPort for Port<'_, '_> {
     fn sample(&mut self, now: Instant) -> Abc {
         self.bench.pwm_sample(now).unwrap_or_else(|error| {
-            self.error = Some(error);
+            self.error = Some(error.into());
             Abc::default()
         })
     }
@@ -89,22 +97,32 @@ impl PwmPort for Port<'_> {
     }
 }
 
-impl OperatorPort for Port<'_> {
+impl OperatorPort for Port<'_, '_> {
     fn ask(&mut self, at: Instant) -> (Request, Feedback) {
-        self.bench.ask(at).unwrap_or_else(|error| {
-            self.error = Some(error);
+        let (request, feedback) = self.bench.ask(at).unwrap_or_else(|error| {
+            self.error = Some(error.into());
             (Request::idle(self.ratings), Feedback::default())
-        })
+        });
+        let Some(wire) = &mut self.wire else { return (request, feedback) };
+        let frame = super::turn(wire.supervisor, self.bench, at).unwrap_or_else(|error| {
+            self.error = Some(error);
+            None
+        });
+        (wire.station.listen(self.desk.observed(), frame.as_ref()), feedback)
     }
 
     fn tell(&mut self, from: Instant, status: &Status) {
         if let Err(error) = self.bench.told(from, *status) {
-            self.error = Some(error);
+            self.error = Some(error.into());
+        }
+        let Some(wire) = &mut self.wire else { return };
+        if let Some(frame) = wire.station.tell(status) {
+            wire.supervisor.hear(self.bench.instant_s(from), &frame);
         }
     }
 }
 
-/// Runs until the recording is complete.
+/// Runs until the recording is complete; a supervisor commands over the protocol.
 pub fn run_on_host(
     name: &str,
     mut bench: Bench,
@@ -112,10 +130,12 @@ pub fn run_on_host(
     settings: Settings,
     first_half_ticks: u32,
     line: Option<Line>,
-) -> Result<Recording, BenchError> {
+    supervisor: Option<&mut dyn Supervisor>,
+) -> anyhow::Result<Recording> {
     let recorder = Recorder::new();
     let mut progress = Progress::new(name);
-    let tasks = Tasks::new(tables, settings, first_half_ticks).recorded_by(&recorder).operated_on(line);
+    let mut tasks = Tasks::new(tables, settings, first_half_ticks).recorded_by(&recorder).operated_on(line);
+    tasks.wire = supervisor.map(|supervisor| Wire { station: Station::new(&tables.ratings), supervisor });
     tasks.drive(&mut bench, |bench| {
         progress.show(bench.progress());
         true
@@ -133,6 +153,8 @@ pub struct Tasks<'a> {
     slot: Slot,
     operator: operator::Settings<'static>,
     clock: Clock,
+    /// Over the protocol, if there is a supervisor.
+    wire: Option<Wire<'a>>,
 }
 
 impl<'a> Tasks<'a> {
@@ -158,6 +180,7 @@ impl<'a> Tasks<'a> {
             slot: Slot::new(),
             operator: operator::Settings::rated(&tables.ratings, slot_s(&settings.clock), None),
             clock: settings.clock,
+            wire: None,
         }
     }
 
@@ -174,16 +197,16 @@ impl<'a> Tasks<'a> {
     }
 
     /// Until the bench's recording is complete, or nobody wants to see more of it.
-    pub fn drive(
-        mut self,
-        bench: &mut Bench,
-        mut goes_on: impl FnMut(&Bench) -> bool,
-    ) -> Result<(), BenchError> {
+    pub fn drive(mut self, bench: &mut Bench, mut goes_on: impl FnMut(&Bench) -> bool) -> anyhow::Result<()> {
         while !bench.is_done() {
             let (control_at, pwm_at) = (self.control.next_call(), self.pwm.next_call());
             let has_control = bench.has_control(control_at);
+            let operator = match &self.wire {
+                Some(wire) => wire.station.settings(&self.operator),
+                None => self.operator,
+            };
             let (desk, ratings) = (&self.desk, self.operator.ratings);
-            let mut port = Port { bench, desk, ratings, error: None };
+            let mut port = Port { bench, desk, ratings, wire: self.wire.as_mut(), error: None };
             // At equal instants the PWM interrupt comes first: it has the higher priority.
             if control_at.reached(pwm_at) || !has_control {
                 self.pwm.run(&mut port, &self.shared);
@@ -194,7 +217,7 @@ impl<'a> Tasks<'a> {
                 self.control.run(&mut port, &self.shared);
                 // The idle loop goes on where the interrupt ends.
                 if port.bench.is_operated() {
-                    self.slot.run(&self.desk, &mut port, &self.operator, &self.clock);
+                    self.slot.run(&self.desk, &mut port, &operator, &self.clock);
                 }
             }
             if let Some(error) = port.error {

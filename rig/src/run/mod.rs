@@ -9,9 +9,12 @@ pub(crate) use emulator::emulate;
 pub use host::{Tasks, run_on_host};
 pub use qemu::run_in_qemu;
 
+use crate::bench::Bench;
 use indicatif::{ProgressBar, ProgressStyle};
 use tractive::configuration::Refused;
-use tractive::time::Clock;
+use tractive::operator::SLOT_PERIODS;
+use tractive::protocol::Frame;
+use tractive::time::{Clock, Instant};
 
 /// The clock of the emulated board: 25 MHz ticks, control at 10 kHz. The host runs on the same.
 pub const CLOCK: Clock = Clock::new(25_000_000, 2_500);
@@ -19,6 +22,46 @@ pub const CLOCK: Clock = Clock::new(25_000_000, 2_500);
 /// What an image says that does not start.
 pub(crate) fn refused(refused: Refused) -> anyhow::Error {
     anyhow::anyhow!("configuration refused: {refused}")
+}
+
+/// Who commands the drive over the protocol.
+pub trait Supervisor {
+    /// The slot that began at `t_s`: what is sent to the drive, and what happens to it.
+    ///
+    /// # Errors
+    /// Ends the run.
+    fn slot(&mut self, t_s: f64) -> anyhow::Result<Turn>;
+
+    /// A frame that the drive sends at `t_s`.
+    fn hear(&mut self, t_s: f64, frame: &Frame);
+
+    /// Whether a turn may take as long as somebody types.
+    fn is_typed(&self) -> bool {
+        false
+    }
+}
+
+/// A supervisor's turn.
+#[derive(Clone, Copy, Debug)]
+pub struct Turn {
+    /// For the drive.
+    pub frame: Option<Frame>,
+    /// The rotor's load from the next slot on, in N·m.
+    pub load_nm: f64,
+    /// Whether the run ends with this slot.
+    pub done: bool,
+}
+
+/// A supervisor's turn in the slot that began at `at`. What it does to the bench, it does at the next slot's beginning, whenever the slot
+/// is served.
+fn turn(supervisor: &mut dyn Supervisor, bench: &mut Bench, at: Instant) -> anyhow::Result<Option<Frame>> {
+    let turn = supervisor.slot(bench.instant_s(at))?;
+    let next = at.after(SLOT_PERIODS * CLOCK.control_ticks);
+    bench.load_from(next, turn.load_nm);
+    if turn.done {
+        bench.end_at(next);
+    }
+    Ok(turn.frame)
 }
 
 /// A bar on a terminal; in a pipe indicatif draws none.

@@ -1,7 +1,7 @@
 //! The drive in QEMU: the image's own interrupts, in lockstep with the bench over four FIFOs.
 
-use super::Progress;
 use super::emulator::{Emulator, emulate};
+use super::{Progress, Supervisor};
 use crate::bench::Bench;
 use crate::trace::Recording;
 use anyhow::{Context, Result, bail};
@@ -9,8 +9,14 @@ use tractive::drive::Report;
 use tractive::link::{self, Request, Setup};
 use tractive::modulation::Mode;
 
-/// Runs until the recording is complete.
-pub fn run_in_qemu(name: &str, mut bench: Bench, setup: Setup, emulator: &Emulator) -> Result<Recording> {
+/// Runs until the recording is complete; a supervisor commands over the protocol.
+pub fn run_in_qemu(
+    name: &str,
+    mut bench: Bench,
+    setup: Setup,
+    emulator: &Emulator,
+    mut supervisor: Option<&mut dyn Supervisor>,
+) -> Result<Recording> {
     let (mut calls, mut records) = (Calls::default(), Vec::new());
     let mut progress = Progress::new(name);
     let outcome = emulate(emulator, |block, answers| {
@@ -37,9 +43,18 @@ pub fn run_in_qemu(name: &str, mut bench: Bench, setup: Setup, emulator: &Emulat
             Request::Leave(at) => bench.leave(at),
             Request::Ask(at) => {
                 let (asked, feedback) = bench.ask(at)?;
-                answers.idle(&link::asked_to_block(&asked, &feedback))?;
+                let frame = match &mut supervisor {
+                    Some(supervisor) => super::turn(*supervisor, &mut bench, at)?,
+                    None => None,
+                };
+                answers.idle(&link::asked_to_block(&asked, &feedback, frame))?;
             }
-            Request::Tell(from, status) => bench.told(from, status)?,
+            Request::Tell(from, status, frame) => {
+                bench.told(from, status)?;
+                if let (Some(supervisor), Some(frame)) = (&mut supervisor, frame) {
+                    supervisor.hear(bench.instant_s(from), &frame);
+                }
+            }
             Request::Recorded(record) => records.push(record),
             Request::End => return Ok(true),
             Request::Dead => bail!("the firmware stopped in a panic or a HardFault, gates off"),

@@ -22,17 +22,20 @@ use crate::machine::Machine;
 use crate::options::{On, RunOptions};
 use crate::plant::{DcLinkSettings, Plant, PlantSettings, SpeedSource};
 use crate::report::Page;
-use crate::run::{self, CLOCK};
+use crate::run::{self, CLOCK, Emulator, Supervisor};
 use crate::trace::Recording;
 use anyhow::{Context, Result};
-use tractive::control::Gains;
+use tractive::control::{Demand, Gains};
 use tractive::drive::traction::Settings;
 use tractive::link::{LineTimes, Setup};
 use tractive::modulation::Devices;
-use tractive::operator::Line;
+use tractive::operator::{Line, Request};
 
 /// The usual lead, in s.
 const LEAD_S: f64 = 0.1;
+
+/// Longest run of a supervisor's, in s.
+const LONGEST_S: f64 = 1e5;
 
 /// A scenario's inputs.
 pub struct Plan {
@@ -100,7 +103,50 @@ pub fn find(name: &str) -> Result<Box<dyn Scenario>> {
 /// Drives a scenario.
 pub fn drive(scenario: &dyn Scenario, options: &RunOptions, machine: &Machine) -> Result<Recording> {
     let plan = scenario.plan(options, machine);
-    let line_plan = scenario.line(options, machine);
+    let line = scenario.line(options, machine);
+    let speed = plan.speed.iter().map(|(t_s, rpm)| (t_s + plan.lead_s, *rpm)).collect();
+    run_plan(scenario.name(), plan, SpeedSource::profile(speed), line, None, options, machine)
+}
+
+/// Drives a rotor on a link over the protocol, without an end until the supervisor says so.
+pub(crate) fn drive_supervised(
+    name: &str,
+    supervisor: &mut dyn Supervisor,
+    inertia_kg_m2: f64,
+    options: &RunOptions,
+    machine: &Machine,
+) -> Result<Recording> {
+    let plan = Plan {
+        lead_s: 0.0,
+        duration_s: LONGEST_S,
+        speed: Vec::new(),
+        link: Vec::new(),
+        // What the operator permits takes the place of this.
+        operator: Box::new(|_: f64| (Demand::default(), true)),
+    };
+    let idle = Request::idle(&machine.tables.ratings);
+    let line_plan = LinePlan {
+        link: line::scaled(machine),
+        starts_charged: false,
+        // The frames ask, not this.
+        commander: Box::new(move |_| idle),
+        hardware: Vec::new(),
+        chopper_ohm: Vec::new(),
+        reversible: Vec::new(),
+    };
+    let rotor = SpeedSource::Inertia { inertia_kg_m2, load_nm: 0.0 };
+    run_plan(name, plan, rotor, Some(line_plan), Some(supervisor), options, machine)
+}
+
+fn run_plan(
+    name: &str,
+    plan: Plan,
+    speed: SpeedSource,
+    line_plan: Option<LinePlan>,
+    supervisor: Option<&mut dyn Supervisor>,
+    options: &RunOptions,
+    machine: &Machine,
+) -> Result<Recording> {
     let ticks = |microseconds: f64| (microseconds * 1e-6 * f64::from(CLOCK.ticks_per_s)).round() as u32;
     let setup = Setup {
         min_pulse_ticks: ticks(options.min_pulse_us),
@@ -108,6 +154,7 @@ pub fn drive(scenario: &dyn Scenario, options: &RunOptions, machine: &Machine) -
         dead_time_ticks: if options.uncompensated { 0 } else { ticks(options.dead_time_us) },
         pwm_delay_ticks: ticks(options.pwm_delay_us),
         line: line_plan.as_ref().map(|plan| times(&plan.link)),
+        over_protocol: supervisor.is_some(),
     };
     let devices = Devices::new(
         setup.min_pulse_ticks,
@@ -116,7 +163,7 @@ pub fn drive(scenario: &dyn Scenario, options: &RunOptions, machine: &Machine) -
         &CLOCK,
     );
     let parameters = &machine.folder.parameters;
-    let plant = plant(&plan, options, machine);
+    let plant = plant(speed, options, machine);
     let first_half_ticks = devices.shortest_half_ticks + setup.pwm_delay_ticks;
     let bench = Bench::new(
         plant,
@@ -145,17 +192,20 @@ pub fn drive(scenario: &dyn Scenario, options: &RunOptions, machine: &Machine) -
         On::Host => {
             let settings = Settings { clock: CLOCK, devices, gains: Gains::DEFAULT };
             settings.check(machine.tables).map_err(run::refused)?;
-            Ok(run::run_on_host(scenario.name(), bench, machine.tables, settings, first_half_ticks, line)?)
+            run::run_on_host(name, bench, machine.tables, settings, first_half_ticks, line, supervisor)
         }
-        On::Qemu => run::run_in_qemu(scenario.name(), bench, setup, &options.emulator()?),
+        On::Qemu => {
+            let patient = supervisor.as_ref().is_some_and(|supervisor| supervisor.is_typed());
+            let emulator = Emulator { patient, ..options.emulator()? };
+            run::run_in_qemu(name, bench, setup, &emulator, supervisor)
+        }
     }
 }
 
-fn plant(plan: &Plan, options: &RunOptions, machine: &Machine) -> Plant {
-    let speed = plan.speed.iter().map(|(t_s, rpm)| (t_s + plan.lead_s, *rpm)).collect();
+fn plant(speed: SpeedSource, options: &RunOptions, machine: &Machine) -> Plant {
     Plant::new(
         &machine.folder,
-        SpeedSource::profile(speed),
+        speed,
         &PlantSettings {
             flux_scale: 1.0 + options.map_error / 100.0,
             resistance_scale: 1.0 + options.rs_error / 100.0,

@@ -1,14 +1,20 @@
 //! What only the chip has: the vector table, the interrupt controller, waiting, the log.
 #![allow(unsafe_code)]
 
+use super::can::Can;
 use super::operator::Operator;
+use super::pins;
 use super::power_stage::CORE_HZ;
 use super::registers::Registers;
+use super::serve::Serve;
 use super::start::{self, Found, Plan, StartError, Timeout, Wait};
 use super::watchdog::Pulse;
-use super::zs9;
+use super::{CLOCK, zs9};
 use crate::configuration::Refused;
 use crate::drive::Report;
+use crate::machine::BUILT_IN;
+use crate::operator::{self, Configuration, Slot, slot_s};
+use crate::protocol::Station;
 use crate::recorder::{Record, Recorder};
 use cortex_m::peripheral::NVIC;
 use defmt_rtt as _;
@@ -78,6 +84,12 @@ pub fn prepare(plan: Plan) -> Result<Found, StartError> {
     if let Err(error) = &found {
         defmt::error!("no start: {}", error);
     }
+    let registers = Registers::CHIP;
+    match Can::CHIP.configure(&registers.rcc, &mut Cycles) {
+        Ok(()) => pins::configure_bus(&registers, &pins::PINS),
+        // Nobody can command the drive then; it rests.
+        Err(error) => defmt::error!("no bus: {}", error),
+    }
     found
 }
 
@@ -119,10 +131,27 @@ pub fn revise_pulses() {
     cortex_m::asm::isb();
 }
 
-/// The idle loop, forever: feeds the watchdog, tells what has changed, and after a fault what the flight recorder holds.
+/// Whether the machine's ratings make sense.
+fn configuration() -> Configuration {
+    match BUILT_IN.ratings.check() {
+        Ok(()) => Configuration::Good,
+        Err(refused) => {
+            defmt::error!("configuration: {} is {}", refused.name, refused.value);
+            Configuration::Bad
+        }
+    }
+}
+
+/// The idle loop, forever: serves the bus and the operator, feeds the watchdog, tells what has changed, and after a fault what the flight recorder holds.
 pub fn idle() -> ! {
     let (mut told, mut broken, mut records_told) = (None, false, 0);
+    let rated = operator::Settings::rated(&BUILT_IN.ratings, slot_s(&CLOCK), None);
+    let station = Station::new(&BUILT_IN.ratings);
+    let mut serve = Serve::new(Registers::CHIP, Can::CHIP, station, &OPERATOR.desk, configuration());
+    let mut slot = Slot::new();
     loop {
+        let settings = serve.station.settings(&rated);
+        slot.run(&OPERATOR.desk, &mut serve, &settings, &CLOCK);
         // One record a meal: a log that nobody hurries to read holds few.
         if PULSE.feed_if_both_ran(&Registers::CHIP) {
             match RECORDER.read(records_told) {

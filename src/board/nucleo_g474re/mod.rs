@@ -13,6 +13,7 @@
 //!
 //! Everything here but `chip` takes its registers as values, so tests on the host run it against blocks of memory.
 
+pub mod can;
 pub mod clock;
 pub mod comparators;
 pub mod control_timer;
@@ -27,6 +28,7 @@ pub mod position;
 pub mod power_stage;
 pub mod registers;
 pub mod sampling;
+pub mod serve;
 pub mod start;
 pub mod watchdog;
 pub mod zs9;

@@ -1,33 +1,21 @@
-//! What the operator asks for, and what is told. Words between the idle loop and the control interrupt; a bus driver
-//! will write the first and read the second.
+//! What the operator permits, and what is told. Words between the idle loop, which serves the bus, and the control interrupt.
 
 use crate::cell::Uplink;
-use crate::control::Demand;
 use crate::drive::Report;
-use core::sync::atomic::{AtomicU32, Ordering};
+use crate::operator::Desk;
 
-/// Demand in, report out.
+/// Permit in, observations and report out.
 pub struct Operator {
-    torque_nm: AtomicU32,
+    /// Permit in, observations out.
+    pub desk: Desk,
     report: Uplink<Report, 12>,
 }
 
 impl Operator {
-    /// No torque.
+    /// Nothing permitted.
     #[cfg(not(loom))]
     pub const fn new() -> Self {
-        Self { torque_nm: AtomicU32::new(0), report: Uplink::new() }
-    }
-
-    /// Sets the torque demand, in N·m; its rate of change is limited to the machine's slew rate.
-    pub fn ask(&self, torque_nm: f32) {
-        self.torque_nm.store(torque_nm.to_bits(), Ordering::Relaxed);
-    }
-
-    /// The demand.
-    #[inline]
-    pub fn demand(&self) -> Demand {
-        Demand { torque_nm: f32::from_bits(self.torque_nm.load(Ordering::Relaxed)), slew_limited: true }
+        Self { desk: Desk::new(), report: Uplink::new() }
     }
 
     /// From the control interrupt, which nothing that reads this can interrupt.

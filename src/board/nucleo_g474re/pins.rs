@@ -27,6 +27,8 @@ pub enum Function {
     Input,
     /// Written by software, high at first.
     Output,
+    /// A bus: alternate function of this number, with pull-up, so that it rests.
+    Bus(u8),
 }
 
 /// A pin.
@@ -55,7 +57,7 @@ pub(super) const fn pin(
 }
 
 /// Every pin the PMaSynRM's drive uses.
-pub const PINS: [Pin; 19] = [
+pub const PINS: [Pin; 21] = [
     pin(Port::A, 8, Function::Gate(6), &["TIM1_CH1"], "gate U, upper device"),
     pin(Port::B, 13, Function::Gate(6), &["TIM1_CH1N"], "gate U, lower device"),
     pin(Port::A, 10, Function::Gate(6), &["TIM1_CH3"], "gate V, upper device"),
@@ -75,6 +77,8 @@ pub const PINS: [Pin; 19] = [
     pin(Port::B, 7, Function::Alternate(2), &["TIM4_CH2"], "encoder, track B"),
     pin(Port::B, 3, Function::Alternate(2), &["TIM4_ETR"], "encoder, index"),
     pin(Port::C, 2, Function::Input, &[], "enable: high lets the gates pulse"),
+    pin(Port::A, 11, Function::Bus(9), &["FDCAN1_RX"], "CAN transceiver, RXD"),
+    pin(Port::A, 12, Function::Bus(9), &["FDCAN1_TX"], "CAN transceiver, TXD"),
 ];
 
 /// The enable input.
@@ -97,11 +101,21 @@ impl Pin {
     pub const fn is_gate(&self) -> bool {
         matches!(self.function, Function::Gate(_))
     }
+
+    /// Whether it belongs to a bus.
+    pub const fn is_bus(&self) -> bool {
+        matches!(self.function, Function::Bus(_))
+    }
 }
 
-/// Configures every pin of the table that drives no gate.
+/// Configures every pin of the table that drives no gate and belongs to no bus.
 pub fn configure_inputs(registers: &Registers, pins: &[Pin]) {
-    pins.iter().filter(|pin| !pin.is_gate()).for_each(|pin| configure(registers, pin));
+    pins.iter().filter(|pin| !pin.is_gate() && !pin.is_bus()).for_each(|pin| configure(registers, pin));
+}
+
+/// Gives a bus its pins, when its controller rests.
+pub fn configure_bus(registers: &Registers, pins: &[Pin]) {
+    pins.iter().filter(|pin| pin.is_bus()).for_each(|pin| configure(registers, pin));
 }
 
 /// Gives the gates' pins to the timers, which drive them low as long as their outputs are off. Until then the pins float, as
@@ -130,12 +144,13 @@ fn configure(registers: &Registers, pin: &Pin) {
         Function::Analog => (Moder::ANALOG, Pupdr::FLOATING),
         Function::Input => (Moder::INPUT, Pupdr::PULL_DOWN),
         Function::Output => (Moder::OUTPUT, Pupdr::FLOATING),
+        Function::Bus(_) => (Moder::ALTERNATE, Pupdr::PULL_UP),
     };
     if pin.function == Function::Output {
         port.bsrr().write(|w| w.set_bs(number, true));
     }
     port.pupdr().modify(|w| w.set_pupdr(number, pull));
-    if let Function::Gate(function) | Function::Alternate(function) = pin.function {
+    if let Function::Gate(function) | Function::Alternate(function) | Function::Bus(function) = pin.function {
         port.ospeedr().modify(|w| w.set_ospeedr(number, Ospeedr::MEDIUM_SPEED));
         port.afr(number / 8).modify(|w| w.set_afr(number % 8, function));
     }

@@ -9,7 +9,7 @@ use super::registers::Registers;
 use super::sampling::{Sampler, Zeros, currents_a};
 use super::start::{control_sampler, pwm_sampler};
 use crate::board::{ControlPort, PwmPort, Sample};
-use crate::control::{LinkWindow, Measurements};
+use crate::control::{Demand, LinkWindow, Measurements};
 use crate::drive::Report;
 use crate::frames::{Abc, Angle};
 use crate::modulation::{CarrierPeriod, Mode};
@@ -51,7 +51,7 @@ impl<'a, P: Position> Control<'a, P> {
 
 impl<P: Position> ControlPort for Control<'_, P> {
     /// Position first: it is read, not sampled, and moves on while the conversions end.
-    fn sample(&mut self, _now: Instant) -> Sample {
+    fn sample(&mut self, now: Instant) -> Sample {
         let angle = self.position.angle();
         if let Some(angle) = angle {
             self.angle = angle;
@@ -62,14 +62,15 @@ impl<P: Position> ControlPort for Control<'_, P> {
             None => f32::NAN,
         };
         let healthy = angle.is_some() && !self.registers.legs.is_tripped();
-        Sample {
+        let sample = Sample {
             measured: Measurements { currents_a: currents_a(codes, &self.zeros), udc_v, angle: self.angle },
-            demand: self.operator.demand(),
+            demand: Demand::default(),
             enable: healthy && pins::is_enabled(&self.registers),
             window: LinkWindow::OPEN,
             acknowledge: 0,
             hardware: None,
-        }
+        };
+        self.operator.desk.permit(now).applied_to(sample)
     }
 
     fn enter(&mut self, safe: SafeState, _now: Instant) {
@@ -80,7 +81,8 @@ impl<P: Position> ControlPort for Control<'_, P> {
         self.timer.overrun_ticks()
     }
 
-    fn report(&mut self, _now: Instant, report: &Report) {
+    fn report(&mut self, now: Instant, report: &Report) {
+        self.operator.desk.tell(now, report);
         self.operator.tell(report);
     }
 }

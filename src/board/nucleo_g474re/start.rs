@@ -53,6 +53,8 @@ pub enum StartError {
     },
     /// A break input is active: a gate driver is not ready, or a comparator sees an overcurrent.
     BreakInput,
+    /// The CAN controller does not answer.
+    Can,
     /// The watchdog does not take its settings.
     Watchdog,
 }

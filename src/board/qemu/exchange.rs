@@ -13,6 +13,7 @@ use crate::link::{self, BLOCK_BYTES, Block, Request, Setup};
 use crate::modulation::CarrierPeriod;
 use crate::operator::{self, Feedback, Status};
 use crate::protection::SafeState;
+use crate::protocol::Frame;
 use crate::time::Instant;
 use core::sync::atomic::{AtomicU32, Ordering};
 use cortex_m_semihosting::syscall;
@@ -102,15 +103,15 @@ pub fn leave(now: Instant) {
 
 /// What is asked of the operator. The idle loop's answers have a stream of their own: an interrupt may ask while it waits.
 #[inline(never)]
-pub fn ask(at: Instant) -> (operator::Request, Feedback) {
+pub fn ask(at: Instant) -> (operator::Request, Feedback, Option<Frame>) {
     send(&Request::Ask(at).to_block());
     link::asked_from_block(&receive(IDLE_ANSWERS))
 }
 
-/// What the operator told.
+/// What the operator told, and the frame that says so.
 #[inline(never)]
-pub fn tell(from: Instant, status: &Status) {
-    send(&Request::Tell(from, *status).to_block());
+pub fn tell(from: Instant, status: &Status, frame: Option<Frame>) {
+    send(&Request::Tell(from, *status, frame).to_block());
 }
 
 /// The processor stops, gates off.

@@ -21,9 +21,10 @@
 //! * a device is on only while its compares say so, whatever happens: the three of a leg conduct together only within the
 //!   shoot-through that is played, and never beyond it;
 //! * where one device of a leg goes off and another one on, all conduct the dead time later;
-//! * each shoot-through, which begins where a device goes on, is shorter by the dead time. The link's control, which has an
-//!   integral part, makes up for it with its duty;
-//! * a pulse shorter than the dead time is none.
+//! * each shoot-through, which begins where a device goes on, is shorter by the dead time, and none if that is all of it. The link's
+//!   control, which has an integral part, makes up for it with its duty;
+//! * a pulse shorter than the dead time is none. A leg that has only such around a valley or a peak hangs on its diodes for at most four
+//!   dead times.
 //!
 //! Dead time, breaks and off levels are locked before any pin is a timer's.
 //!
@@ -125,12 +126,18 @@ impl Bridge {
         }
     }
 
-    /// Acknowledges the PWM interrupt and says which it was.
+    /// Acknowledges the PWM interrupt.
     #[inline]
-    pub fn acknowledge(&self) -> Beat {
+    pub fn acknowledge(&self) {
         let [first, ..] = self.timers;
         // Status flags are cleared by writing 0 and left alone by writing 1.
         first.sr().write_value(regs::SrAdv(!1));
+    }
+
+    /// Which beat was the last.
+    #[inline]
+    pub fn beat(&self) -> Beat {
+        let [first, ..] = self.timers;
         if first.cr1().read().dir() == vals::Dir::DOWN { Beat::Peak } else { Beat::Valley }
     }
 

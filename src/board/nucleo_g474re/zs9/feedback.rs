@@ -60,9 +60,7 @@ impl Feedback {
         let words = (self.word(), self.word());
         self.port.bsrr().write(|w| w.set_bs(SELECT, true));
         match words {
-            (Some(on), Some(off)) if on & !GATES == FIRST_MARK && off & !GATES == SECOND_MARK => {
-                GateFeedback { on: on & GATES, off: off & GATES }
-            }
+            (Some(on), Some(off)) => decoded([on, off]),
             _ => GateFeedback::default(),
         }
     }
@@ -72,4 +70,19 @@ impl Feedback {
         let arrived = (0..PATIENCE).any(|_| self.spi.sr().read().rxne());
         arrived.then(|| self.spi.dr16().read())
     }
+}
+
+/// What two words say; nothing seen if one of them has no mark.
+#[inline]
+pub fn decoded([on, off]: [u16; 2]) -> GateFeedback {
+    if on & !GATES == FIRST_MARK && off & !GATES == SECOND_MARK {
+        GateFeedback { on: on & GATES, off: off & GATES }
+    } else {
+        GateFeedback::default()
+    }
+}
+
+/// The words of a driver board that has seen this.
+pub const fn encoded(seen: GateFeedback) -> [u16; 2] {
+    [FIRST_MARK | (seen.on & GATES), SECOND_MARK | (seen.off & GATES)]
 }

@@ -44,24 +44,56 @@ impl PeriodCompares {
     pub const OFF: Self = Self { legs: [LegCompares::OFF; 3] };
 
     /// From the modulator's period. `None` where an H is on again before the peak, or an L at the valley: as only the scheme
-    /// with its shoot-through in the centres of V14 and V15 has it; these timers have no compares for that.
+    /// with its shoot-through in the centres of V14 and V15 has it; these timers have no compares for that. What one gate of a leg must
+    /// wait after another, `dead_cycles`, is the timers' doing; here only no shoot-through is left that is no longer than that.
     #[inline]
-    pub fn new(period: &PlayedPeriod) -> Option<Self> {
+    pub fn new(period: &PlayedPeriod, dead_cycles: u16) -> Option<Self> {
         let [uh, vh, wh, um, vm, wm, ul, vl, wl] = &period.gates;
+        let leg = |high, middle, low| leg(high, middle, low, dead_cycles);
         Some(Self { legs: [leg(uh, um, ul)?, leg(vh, vm, vl)?, leg(wh, wm, wl)?] })
     }
 }
 
 #[inline]
-fn leg(high: &GateTicks, middle: &GateTicks, low: &GateTicks) -> Option<LegCompares> {
+fn leg(high: &GateTicks, middle: &GateTicks, low: &GateTicks, dead_cycles: u16) -> Option<LegCompares> {
     let [high_from, high_to] = cycles(high);
-    let [middle_from, middle_to] = cycles(middle);
+    let [mut middle_from, mut middle_to] = cycles(middle);
     let [low_from, low_to] = cycles(low);
-    // Never off: the pause is empty, wherever it lies.
-    let high = if high_from == high_to { HALF_CYCLES } else { high_from };
-    let low = if low_from == low_to { 0 } else { low_to };
-    let playable = (high == HALF_CYCLES || high_to == HALF_CYCLES) && (low == 0 || low_from == 0);
-    playable.then_some(LegCompares { high, low, middle_from, middle_to })
+    let (high_pauses, low_pauses) = (high.off_from < high.off_to, low.off_from < low.off_to);
+    if (high_pauses && high_to != HALF_CYCLES) || (low_pauses && low_from != 0) {
+        return None;
+    }
+    let mut high = if high_pauses { high_from } else { HALF_CYCLES };
+    let mut low = if low_pauses { low_to } else { 0 };
+    // A pause that the rounding would swallow is one cycle: the gate is expected to be seen off. Its neighbours make room.
+    if high_pauses && high == HALF_CYCLES {
+        high = HALF_CYCLES - 1;
+        middle_to = middle_to.min(high);
+    }
+    if low_pauses && low == 0 {
+        low = 1;
+        middle_from = middle_from.max(low);
+    }
+    if middle.off_from < middle.off_to && middle_from >= middle_to {
+        middle_from = middle_from.min(HALF_CYCLES - 1);
+        middle_to = middle_from + 1;
+        low = low.min(middle_from);
+        high = high.max(middle_to);
+    }
+    // A shoot-through that the dead time would use up leaves its time to the dead time, whole.
+    if middle_from >= middle_to {
+        if (1..=dead_cycles).contains(&high.saturating_sub(low)) {
+            high = low;
+        }
+    } else {
+        if (1..=dead_cycles).contains(&high.saturating_sub(middle_to)) {
+            middle_to = high;
+        }
+        if (1..=dead_cycles).contains(&middle_from.saturating_sub(low)) {
+            middle_from = low;
+        }
+    }
+    Some(LegCompares { high, low, middle_from, middle_to })
 }
 
 /// Both ends of a pause, each to the nearest cycle. Rounding keeps order, and what was at the same instant stays so.

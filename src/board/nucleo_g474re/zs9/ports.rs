@@ -6,6 +6,7 @@ use super::feedback::Feedback;
 use super::operator::Operator;
 use super::period::PeriodCompares;
 use super::sampling::{Samplers, Zeros};
+use super::stage::STAGE;
 use super::start::{bridge, feedback};
 use super::{CLOCK, pins};
 use crate::board::nucleo_g474re::position::Position;
@@ -18,6 +19,12 @@ use crate::time::Instant;
 
 /// Where the zero vectors lie: the least harmonics in the motors' currents.
 const SCHEME: Scheme = Scheme::Rthd;
+
+/// The dead time as the timers make it.
+const DEAD_CYCLES: u16 = match STAGE.common.dead_time() {
+    Some(dead_time) => dead_time.cycles() as u16,
+    None => panic!("no such dead time"),
+};
 
 /// The control interrupt's side.
 pub struct Control<'a, P> {
@@ -109,11 +116,17 @@ impl Pwm {
         }
     }
 
-    /// First thing in the interrupt: acknowledges it, and says whether the drive's task is to run, which is so at a peak. A
+    /// First thing in the interrupt.
+    #[inline]
+    pub fn acknowledge(&mut self) {
+        self.bridge.acknowledge();
+    }
+
+    /// Second thing: says whether the drive's task is to run, which is so at a peak. A
     /// peak that was never served turns the gates off for good: the drive's time would be wrong from then on.
     #[inline]
     pub fn begin(&mut self) -> bool {
-        match self.bridge.acknowledge() {
+        match self.bridge.beat() {
             Beat::Valley => {
                 if !self.served {
                     self.bridge.outputs().trip();
@@ -151,7 +164,7 @@ impl DualPwmPort for Pwm {
     /// for good.
     fn play(&mut self, _now: Instant, next: &PlayedPeriod) {
         let outputs = self.bridge.outputs();
-        let Some(compares) = PeriodCompares::new(next) else {
+        let Some(compares) = PeriodCompares::new(next, DEAD_CYCLES) else {
             outputs.trip();
             return;
         };

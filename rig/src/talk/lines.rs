@@ -1,0 +1,62 @@
+//! Where the lines come from: a script, read whole before anything runs, or standard input, a line when it is wanted.
+
+use super::listener::COLUMNS;
+use super::script::{self, Line};
+use anyhow::{Context, Result};
+use std::collections::VecDeque;
+use std::io::{BufRead, IsTerminal, Write};
+use std::path::Path;
+
+/// A source of lines.
+pub enum Lines {
+    /// The rest of a script.
+    Script(VecDeque<Line>),
+    /// Standard input, and how many lines were read.
+    Typed(usize),
+}
+
+impl Lines {
+    /// A script's.
+    ///
+    /// # Errors
+    /// Names the file, the line and the word.
+    pub fn of_script(path: &Path) -> Result<Self> {
+        let text = std::fs::read_to_string(path).with_context(|| path.display().to_string())?;
+        let lines = script::script(&text, &COLUMNS).with_context(|| path.display().to_string())?;
+        Ok(Self::Script(lines.into()))
+    }
+
+    /// Whether somebody types them.
+    pub fn are_typed(&self) -> bool {
+        matches!(self, Self::Typed(_))
+    }
+
+    /// The next line; `None` at the end.
+    ///
+    /// # Errors
+    /// A line that cannot be understood; on a terminal it is said and the next one is read.
+    pub fn next(&mut self) -> Result<Option<Line>> {
+        let count = match self {
+            Self::Script(lines) => return Ok(lines.pop_front()),
+            Self::Typed(count) => count,
+        };
+        let input = std::io::stdin();
+        loop {
+            if input.is_terminal() {
+                eprint!("> ");
+                std::io::stderr().flush()?;
+            }
+            let mut text = String::new();
+            if input.lock().read_line(&mut text)? == 0 {
+                return Ok(None);
+            }
+            *count += 1;
+            match script::line(&text, *count, &COLUMNS) {
+                Ok(Some(line)) => return Ok(Some(line)),
+                Ok(None) => {}
+                Err(error) if input.is_terminal() => eprintln!("{error:#}"),
+                Err(error) => return Err(error),
+            }
+        }
+    }
+}

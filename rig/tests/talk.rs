@@ -1,0 +1,165 @@
+//! `rig talk` on the host: the shipped scripts, what they leave, and standard input.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+use tractive::protocol::{COMMAND, FROM_DRIVE, Frame, LIMITS, PARAMETER_REQUEST};
+
+fn script(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("scripts").join(name)
+}
+
+fn rig() -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_tractive-rig"));
+    command.arg("talk");
+    command
+}
+
+fn talk(name: &str, out: &Path) -> Output {
+    rig().arg(script(name)).arg("--out").arg(out).output().unwrap()
+}
+
+/// Rows of a CSV file by the names of their columns.
+fn rows(path: &Path) -> Vec<std::collections::BTreeMap<String, String>> {
+    csv::Reader::from_path(path).unwrap().deserialize().map(Result::unwrap).collect()
+}
+
+fn numbers(path: &Path, column: &str) -> Vec<f64> {
+    rows(path).iter().filter_map(|row| row[column].parse().ok()).collect()
+}
+
+#[test]
+fn the_drive_goes_from_standstill_to_2000_rpm_and_back() {
+    let out = tempfile::tempdir().unwrap();
+    let output = talk("round-trip.talk", out.path());
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let speeds = numbers(&out.path().join("trace.csv"), "speed_rpm");
+    let highest = speeds.iter().copied().fold(0.0, f64::max);
+    assert!((1_995.0..2_010.0).contains(&highest), "{highest}");
+    assert!(speeds[0] == 0.0 && speeds.last().unwrap().abs() < 5.0);
+    // The telemetry says what really happened, at the time at which it says it.
+    let telemetry = rows(&out.path().join("telemetry.csv"));
+    let mut states: Vec<_> = telemetry.iter().map(|row| row["state"].as_str()).collect();
+    states.dedup();
+    assert_eq!(states.first().copied(), Some("self_test"));
+    assert_eq!(states.last().copied(), Some("ready"));
+    assert!(states.windows(3).any(|three| three == ["charged", "enabled", "running"]), "{states:?}");
+    let trace = rows(&out.path().join("trace.csv"));
+    for told in telemetry.iter().filter(|row| !row["speed_rpm"].is_empty()).step_by(37) {
+        let t_s: f64 = told["t_s"].parse().unwrap();
+        let true_rpm: f64 = trace[(t_s * 1e3) as usize]["speed_rpm"].parse().unwrap();
+        let told_rpm: f64 = told["speed_rpm"].parse().unwrap();
+        // At 1,000 r/min a second: a message up to 10 ms old, the drive's estimate, and its way.
+        assert!((told_rpm - true_rpm).abs() < 16.0, "{t_s}: {told_rpm} {true_rpm}");
+    }
+}
+
+#[test]
+fn hostile_frames_are_rejected_and_counted_and_silence_ends_the_drive() {
+    let out = tempfile::tempdir().unwrap();
+    let output = talk("hostile.talk", out.path());
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let telemetry = rows(&out.path().join("telemetry.csv"));
+    let last = telemetry.last().unwrap();
+    let count = |name: &str| last[name].parse::<u32>().unwrap();
+    let rejected = ["unknown", "truncated", "corrupted", "repeated", "disordered", "out_of_range"].map(count);
+    assert_eq!(rejected, [4, 2, 2, 1, 3, 3]);
+    // Pages come one after another: what came between them is not on all of them yet.
+    let together = count("taken") + rejected.iter().sum::<u32>();
+    assert!(count("received").abs_diff(together) <= 30, "{} {together}", count("received"));
+    let mut listening: Vec<_> = telemetry.iter().map(|row| row["listening"].as_str()).collect();
+    listening.dedup();
+    let wanted = ["off", "fresh", "zero_torque", "fresh", "zero_torque", "off", "fresh"];
+    assert_eq!(listening, wanted);
+    // The machine itself had no torque while nobody spoke, and no pulses after the time-out to off.
+    for row in rows(&out.path().join("trace.csv")) {
+        let [t_s, torque_nm] = ["t_s", "te_nm"].map(|name| row[name].parse::<f64>().unwrap());
+        if (4.25..4.3).contains(&t_s) || (4.75..5.9).contains(&t_s) {
+            assert!(torque_nm.abs() < 25.0, "{t_s}: {torque_nm}");
+        }
+        if (5.2..5.9).contains(&t_s) {
+            assert_eq!(row["mode"], "off", "{t_s}");
+        }
+    }
+}
+
+#[test]
+fn frames_log_can_be_read_back_and_checks() {
+    let out = tempfile::tempdir().unwrap();
+    assert!(talk("round-trip.talk", out.path()).status.success());
+    let log = std::fs::read_to_string(out.path().join("frames.log")).unwrap();
+    let mut counts = [0_u32; 2];
+    let mut last_s = -1.0;
+    for line in log.lines() {
+        let words: Vec<_> = line.split(' ').collect();
+        let [time, "can0", frame, direction] = words[..] else { panic!("{line}") };
+        let t_s: f64 = time.trim_matches(['(', ')']).parse().unwrap();
+        assert!(t_s >= last_s);
+        last_s = t_s;
+        let (id, bytes) = frame.split_once('#').unwrap();
+        let id = u16::from_str_radix(id, 16).unwrap();
+        let data: Vec<u8> =
+            (0..8).map(|k| u8::from_str_radix(&bytes[2 * k..2 * k + 2], 16).unwrap()).collect();
+        let frame = Frame { id, length: 8, data: data.try_into().unwrap() };
+        let sent = [&COMMAND, &LIMITS, &PARAMETER_REQUEST].into_iter();
+        let message = match direction {
+            "T" => sent.into_iter().find(|message| message.id == id),
+            _ => FROM_DRIVE.into_iter().find(|message| message.id == id),
+        };
+        assert!(message.unwrap().is_intact(&frame), "{line}");
+        counts[usize::from(direction == "R")] += 1;
+    }
+    assert!(counts[0] > 1_000 && counts[1] > 4_000, "{counts:?}");
+}
+
+fn typed(text: &str, out: &Path) -> Output {
+    let mut child = rig()
+        .arg("--out")
+        .arg(out)
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    child.stdin.take().unwrap().write_all(text.as_bytes()).unwrap();
+    child.wait_with_output().unwrap()
+}
+
+#[test]
+fn lines_are_taken_from_standard_input() {
+    let out = tempfile::tempdir().unwrap();
+    let output = typed(
+        "wait 0.2\ncharge\nwait 2\nenable\nexpect state enabled\ntorque 100\nexpect torque_nm 100 within 1\n",
+        out.path(),
+    );
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let said = String::from_utf8_lossy(&output.stdout);
+    assert!(said.contains("as expected") && said.contains("running"), "{said}");
+    for file in ["telemetry.csv", "frames.log", "trace.csv", "summary.json", "report.html"] {
+        assert!(out.path().join(file).exists(), "{file}");
+    }
+}
+
+#[test]
+fn what_is_not_as_expected_is_said_with_exit_code_1() {
+    let out = tempfile::tempdir().unwrap();
+    let output = typed("wait 0.2\nexpect state running\n", out.path());
+    assert_eq!(output.status.code(), Some(1));
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(errors.trim(), "line 2: expect state running: it is ready");
+}
+
+#[test]
+fn a_bad_script_is_named_with_exit_code_2_and_leaves_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let (script, out) = (folder.path().join("bad.talk"), folder.path().join("out"));
+    std::fs::write(&script, "0.1 enable\n0.2 torque 4000\n").unwrap();
+    let output = rig().arg(&script).arg("--out").arg(&out).output().unwrap();
+    assert_eq!(output.status.code(), Some(2));
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(
+        errors.contains("bad.talk: line 2: torque 4000: must be a number from -3000 to 3000"),
+        "{errors}"
+    );
+    assert!(!out.exists());
+}

@@ -1,0 +1,197 @@
+//! What is sent to the drive.
+
+use super::message::Message;
+use super::signal::{OutOfRange, Payload, Signal};
+
+/// Range of every torque, in N·m.
+pub(super) const TORQUE_NM: [f32; 2] = [-3_000.0, 3_000.0];
+const LIMIT_NM: [f32; 2] = [0.0, 3_000.0];
+const LIMIT_RPM: [f32; 2] = [0.5, 30_000.0];
+/// Range of every link voltage, in V.
+pub(super) const LINK_V: [f32; 2] = [0.0, 6_500.0];
+
+const ENABLE: Signal = Signal::flag("enable", 12);
+const WITH_TORQUE: Signal = Signal::flag("with_torque", 13);
+const OFF: Signal = Signal::flag("off", 14);
+const COAST: Signal = Signal::flag("coast", 15);
+const TORQUE: Signal = Signal::physical("torque_nm", "N.m", 16, 0.1, TORQUE_NM);
+const CHARGE: Signal = Signal::flag("charge", 32);
+const DISCHARGE: Signal = Signal::flag("discharge", 33);
+const ACKNOWLEDGE: Signal = Signal::flag("acknowledge", 34);
+
+const MOTORING: Signal = Signal::physical("motoring_nm", "N.m", 16, 0.1, LIMIT_NM);
+const BRAKING: Signal = Signal::physical("braking_nm", "N.m", 32, 0.1, LIMIT_NM);
+const SPEED: Signal = Signal::physical("speed_rpm", "r/min", 48, 0.5, LIMIT_RPM);
+
+const LINK_LOW: Signal = Signal::physical("link_low_v", "V", 16, 0.1, LINK_V);
+const LINK_HIGH: Signal = Signal::physical("link_high_v", "V", 32, 0.1, LINK_V);
+
+const WRITE: Signal = Signal::flag("write", 12);
+const PARAMETER: Signal = Signal::number("parameter", 16, 8, 0xFF);
+const VALUE: Signal = Signal::float("value", 32);
+
+/// Levels and torque. Without it the drive does nothing.
+pub const COMMAND: Message = Message::new(
+    "COMMAND",
+    0x101,
+    1,
+    10,
+    &[ENABLE, WITH_TORQUE, OFF, COAST, TORQUE, CHARGE, DISCHARGE, ACKNOWLEDGE],
+);
+
+/// Limits of torque and speed; as rated until it comes.
+pub const LIMITS: Message = Message::new("LIMITS", 0x102, 2, 100, &[MOTORING, BRAKING, SPEED]);
+
+/// Limits of the link; as rated until it comes.
+pub const LINK_LIMITS: Message = Message::new("LINK_LIMITS", 0x103, 3, 100, &[LINK_LOW, LINK_HIGH]);
+
+/// Reads a parameter, or writes it.
+pub const PARAMETER_REQUEST: Message =
+    Message::new("PARAMETER_REQUEST", 0x104, 4, 0, &[WRITE, PARAMETER, VALUE]);
+
+/// Content of [`COMMAND`].
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Command {
+    /// Enable, by its rising edge.
+    pub enable: bool,
+    /// The enabling edge may come with a torque.
+    pub with_torque: bool,
+    /// Gates off at once.
+    pub off: bool,
+    /// Torque to zero, then gates off, for as long as it is set.
+    pub coast: bool,
+    /// Charge the link, by its rising edge.
+    pub charge: bool,
+    /// Discharge the link, by its rising edge.
+    pub discharge: bool,
+    /// Acknowledge the fault, by its rising edge.
+    pub acknowledge: bool,
+    /// Torque, in N·m.
+    pub torque_nm: f32,
+}
+
+impl Command {
+    /// As a frame's content.
+    pub fn encode(&self) -> Result<Payload, OutOfRange> {
+        let mut payload = Payload::default();
+        for (signal, level) in [
+            (&ENABLE, self.enable),
+            (&WITH_TORQUE, self.with_torque),
+            (&OFF, self.off),
+            (&COAST, self.coast),
+            (&CHARGE, self.charge),
+            (&DISCHARGE, self.discharge),
+            (&ACKNOWLEDGE, self.acknowledge),
+        ] {
+            signal.put_raw(&mut payload, level.into());
+        }
+        TORQUE.put(&mut payload, self.torque_nm)?;
+        Ok(payload)
+    }
+
+    /// From a frame's content; `None` if a value is out of its range or an unused bit is set.
+    pub fn decode(payload: Payload) -> Option<Self> {
+        COMMAND.is_tidy(payload).then_some(())?;
+        Some(Self {
+            enable: ENABLE.is_set(payload),
+            with_torque: WITH_TORQUE.is_set(payload),
+            off: OFF.is_set(payload),
+            coast: COAST.is_set(payload),
+            charge: CHARGE.is_set(payload),
+            discharge: DISCHARGE.is_set(payload),
+            acknowledge: ACKNOWLEDGE.is_set(payload),
+            torque_nm: TORQUE.get(payload)?,
+        })
+    }
+}
+
+/// Content of [`LIMITS`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TorqueLimits {
+    /// Largest motoring torque, in N·m.
+    pub motoring_nm: f32,
+    /// Largest braking torque, in N·m.
+    pub braking_nm: f32,
+    /// Speed beyond which nothing accelerates, in r/min.
+    pub speed_rpm: f32,
+}
+
+impl TorqueLimits {
+    /// As a frame's content.
+    pub fn encode(&self) -> Result<Payload, OutOfRange> {
+        let mut payload = Payload::default();
+        MOTORING.put(&mut payload, self.motoring_nm)?;
+        BRAKING.put(&mut payload, self.braking_nm)?;
+        SPEED.put(&mut payload, self.speed_rpm)?;
+        Ok(payload)
+    }
+
+    /// From a frame's content; `None` if a value is out of its range or an unused bit is set.
+    pub fn decode(payload: Payload) -> Option<Self> {
+        LIMITS.is_tidy(payload).then_some(())?;
+        Some(Self {
+            motoring_nm: MOTORING.get(payload)?,
+            braking_nm: BRAKING.get(payload)?,
+            speed_rpm: SPEED.get(payload)?,
+        })
+    }
+}
+
+/// Content of [`LINK_LIMITS`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LinkLimits {
+    /// Voltage at and below which there is no motoring torque, in V.
+    pub low_v: f32,
+    /// Voltage at and above which there is no braking torque, in V.
+    pub high_v: f32,
+}
+
+impl LinkLimits {
+    /// As a frame's content.
+    pub fn encode(&self) -> Result<Payload, OutOfRange> {
+        let mut payload = Payload::default();
+        LINK_LOW.put(&mut payload, self.low_v)?;
+        LINK_HIGH.put(&mut payload, self.high_v)?;
+        Ok(payload)
+    }
+
+    /// From a frame's content; `None` if a value is out of its range, an unused bit is set, or low is not below high.
+    pub fn decode(payload: Payload) -> Option<Self> {
+        LINK_LIMITS.is_tidy(payload).then_some(())?;
+        let limits = Self { low_v: LINK_LOW.get(payload)?, high_v: LINK_HIGH.get(payload)? };
+        (limits.low_v < limits.high_v).then_some(limits)
+    }
+}
+
+/// Content of [`PARAMETER_REQUEST`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ParameterRequest {
+    /// The parameter's number.
+    pub parameter: u8,
+    /// The value to write; `None` reads.
+    pub write: Option<f32>,
+}
+
+impl ParameterRequest {
+    /// As a frame's content.
+    pub fn encode(&self) -> Result<Payload, OutOfRange> {
+        let mut payload = Payload::default();
+        PARAMETER.put_raw(&mut payload, self.parameter.into());
+        if let Some(value) = self.write {
+            WRITE.put_raw(&mut payload, 1);
+            VALUE.put(&mut payload, value)?;
+        }
+        Ok(payload)
+    }
+
+    /// From a frame's content; `None` if the value is not finite, an unused bit is set, or a value comes with a read.
+    pub fn decode(payload: Payload) -> Option<Self> {
+        PARAMETER_REQUEST.is_tidy(payload).then_some(())?;
+        let value = VALUE.get(payload)?;
+        let write = WRITE.is_set(payload);
+        if !write && VALUE.raw(payload) != 0 {
+            return None;
+        }
+        Some(Self { parameter: PARAMETER.raw(payload) as u8, write: write.then_some(value) })
+    }
+}

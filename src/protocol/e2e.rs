@@ -1,0 +1,113 @@
+//! End-to-end protection after AUTOSAR's profile 2: byte 0 is a CRC, the lower half of byte 1 a counter.
+//!
+//! The CRC ([`crc8_h2f`]) runs over bytes 1 to 7 and then over a byte that is not sent: of 16 data identifiers of the message
+//! the one with the counter's number. So a frame that comes under another message's identifier does not check.
+
+use super::crc::crc8_h2f;
+
+/// The 16 data identifiers of a message.
+pub type DataIds = [u8; 16];
+
+/// Largest step of the counter that is taken: up to two frames may be lost in a row.
+pub const MAX_DELTA: u8 = 3;
+
+/// The data identifiers of the message with this number, 1 ..= 15: number in the upper half, counter in the lower, so no
+/// two messages share one.
+pub const fn data_ids(number: u8) -> DataIds {
+    let mut list = [0; 16];
+    let mut counter = 0;
+    while counter < 16 {
+        list[counter] = number << 4 | counter as u8;
+        counter += 1;
+    }
+    list
+}
+
+/// The counter of a frame.
+pub const fn counter(data: &[u8; 8]) -> u8 {
+    data[1] & 0xF
+}
+
+fn crc(data: &[u8; 8], ids: &DataIds) -> u8 {
+    let [_, protected @ ..] = *data;
+    crc8_h2f(protected.into_iter().chain([ids[usize::from(counter(data)) & 0xF]]))
+}
+
+/// Writes counter and CRC.
+pub fn protect(data: &mut [u8; 8], counter: u8, ids: &DataIds) {
+    data[1] = data[1] & 0xF0 | counter & 0xF;
+    data[0] = crc(data, ids);
+}
+
+/// Whether the CRC is right.
+pub fn is_intact(data: &[u8; 8], ids: &DataIds) -> bool {
+    data[0] == crc(data, ids)
+}
+
+/// What a counter says about the frame's place in the sequence.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Order {
+    /// The first one, or the first after a silence: it sets the counter and has no effect.
+    First,
+    /// In order, after this many lost ones.
+    Next {
+        /// How many frames are missing before it.
+        lost: u8,
+    },
+    /// The same counter again.
+    Repeated,
+    /// Too far from the last one: old, or too many are lost.
+    Wrong,
+}
+
+/// The receiver's side of one message.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Sequence {
+    last: Option<u8>,
+}
+
+impl Sequence {
+    /// Nothing received yet.
+    pub const fn new() -> Self {
+        Self { last: None }
+    }
+
+    /// After a silence: the next frame only sets the counter.
+    pub fn forget(&mut self) {
+        self.last = None;
+    }
+
+    /// A frame with a right CRC. One that is repeated or out of order leaves the sequence as it is, so that it cannot disturb.
+    pub fn judge(&mut self, counter: u8) -> Order {
+        let Some(last) = self.last else {
+            self.last = Some(counter);
+            return Order::First;
+        };
+        match counter.wrapping_sub(last) & 0xF {
+            0 => Order::Repeated,
+            delta @ 1..=MAX_DELTA => {
+                self.last = Some(counter);
+                Order::Next { lost: delta - 1 }
+            }
+            _ => Order::Wrong,
+        }
+    }
+}
+
+/// The sender's side of one message.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counter(u8);
+
+impl Counter {
+    /// Begins at 0.
+    pub const fn new() -> Self {
+        Self(0)
+    }
+
+    /// The counter of the next frame.
+    pub fn take(&mut self) -> u8 {
+        let counter = self.0;
+        self.0 = counter.wrapping_add(1) & 0xF;
+        counter
+    }
+}

@@ -1,0 +1,71 @@
+//! A message: an identifier, a number for its protection, a period, and signals.
+
+use super::e2e::{self, Counter, DataIds};
+use super::frame::{Frame, LENGTH};
+use super::signal::{Payload, Signal};
+
+/// The CRC of every message.
+pub const CRC: Signal = Signal::number("crc", 0, 8, 0xFF);
+/// The counter of every message.
+pub const COUNTER: Signal = Signal::number("counter", 8, 4, 0xF);
+
+/// A message.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Message {
+    /// Name.
+    pub name: &'static str,
+    /// CAN identifier, 11 bits.
+    pub id: u16,
+    /// Number for the protection, 1 ..= 15.
+    pub number: u8,
+    /// Time from one to the next, in ms; 0 where it is sent on occasion.
+    pub period_ms: u16,
+    /// Signals besides CRC and counter.
+    pub signals: &'static [Signal],
+    data_ids: DataIds,
+    /// The bits of all signals.
+    used: u64,
+}
+
+impl Message {
+    /// A message.
+    pub const fn new(
+        name: &'static str,
+        id: u16,
+        number: u8,
+        period_ms: u16,
+        signals: &'static [Signal],
+    ) -> Self {
+        let mut used = CRC.mask() | COUNTER.mask();
+        let mut index = 0;
+        while index < signals.len() {
+            used |= signals[index].mask();
+            index += 1;
+        }
+        Self { name, id, number, period_ms, signals, data_ids: e2e::data_ids(number), used }
+    }
+
+    /// Its 16 data identifiers.
+    pub const fn data_ids(&self) -> &DataIds {
+        &self.data_ids
+    }
+
+    /// The frame with this content.
+    #[inline(never)]
+    pub fn frame(&self, content: Payload, counter: &mut Counter) -> Frame {
+        let mut data = content.0.to_le_bytes();
+        e2e::protect(&mut data, counter.take(), &self.data_ids);
+        Frame { id: self.id, length: LENGTH, data }
+    }
+
+    /// Whether a frame of this message has the right CRC.
+    #[inline(never)]
+    pub fn is_intact(&self, frame: &Frame) -> bool {
+        e2e::is_intact(&frame.data, &self.data_ids)
+    }
+
+    /// Whether every bit outside the message's signals is zero.
+    pub const fn is_tidy(&self, payload: Payload) -> bool {
+        payload.0 & !self.used == 0
+    }
+}

@@ -1,0 +1,123 @@
+//! Parameters: what is set once for a drive, whatever its machine. Kept in RAM; a reset brings the defaults back.
+
+use crate::machine::Ratings;
+use crate::operator::Settings;
+use core::f32::consts::TAU;
+
+/// A parameter.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Parameter {
+    /// Number in the messages.
+    pub id: u8,
+    /// Name.
+    pub name: &'static str,
+    /// Unit.
+    pub unit: &'static str,
+    /// Smallest value.
+    pub min: f32,
+    /// Largest value; the machine's rating may be lower.
+    pub max: f32,
+    /// What it does.
+    pub purpose: &'static str,
+}
+
+/// Every parameter, by its number from 1 on.
+pub const PARAMETERS: [Parameter; 6] = [
+    parameter(1, "torque_slew", "N.m/s", [1.0, 1e6], "fastest change of the torque demand"),
+    parameter(2, "torque_jerk", "N.m/s2", [1.0, 1e9], "fastest change of that change"),
+    parameter(3, "torque_limit", "N.m", [0.0, 3_000.0], "largest torque demand, either sign"),
+    parameter(4, "speed_limit", "r/min", [0.5, 30_000.0], "speed beyond which nothing accelerates"),
+    parameter(5, "command_zero", "ms", [20.0, 1_000.0], "silence after which torque is zero"),
+    parameter(6, "command_off", "ms", [20.0, 10_000.0], "silence after which the drive stops"),
+];
+
+const fn parameter(
+    id: u8,
+    name: &'static str,
+    unit: &'static str,
+    [min, max]: [f32; 2],
+    purpose: &'static str,
+) -> Parameter {
+    Parameter { id, name, unit, min, max, purpose }
+}
+
+/// r/min in one rad/s.
+pub const RPM_PER_RAD_S: f32 = 60.0 / TAU;
+
+/// The values.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Parameters {
+    /// Fastest change of the torque demand, in N·m/s.
+    pub torque_slew_nm_s: f32,
+    /// Fastest change of that, in N·m/s².
+    pub torque_jerk_nm_s2: f32,
+    /// Largest torque demand, in N·m.
+    pub torque_limit_nm: f32,
+    /// Speed beyond which nothing accelerates, in r/min.
+    pub speed_limit_rpm: f32,
+    /// Silence after which torque is zero, in ms.
+    pub command_zero_ms: f32,
+    /// Silence after which the drive stops, in ms; counted from the same command.
+    pub command_off_ms: f32,
+}
+
+/// Why a value was not written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum WriteError {
+    /// There is no such parameter.
+    Unknown,
+    /// The value is out of the parameter's range or beyond the machine's rating.
+    OutOfRange,
+}
+
+impl Parameters {
+    /// As the machine is rated, slew and jerk as the operator's usual ones.
+    pub const fn rated(ratings: &Ratings) -> Self {
+        let usual = Settings::rated(ratings, 0.0, None);
+        Self {
+            torque_slew_nm_s: usual.slew_nm_s,
+            torque_jerk_nm_s2: usual.jerk_nm_s2,
+            torque_limit_nm: ratings.max_torque_nm,
+            speed_limit_rpm: ratings.max_speed_rad_s * RPM_PER_RAD_S,
+            command_zero_ms: 50.0,
+            command_off_ms: 500.0,
+        }
+    }
+
+    fn slot(&mut self, id: u8) -> Option<&mut f32> {
+        Some(match id {
+            1 => &mut self.torque_slew_nm_s,
+            2 => &mut self.torque_jerk_nm_s2,
+            3 => &mut self.torque_limit_nm,
+            4 => &mut self.speed_limit_rpm,
+            5 => &mut self.command_zero_ms,
+            6 => &mut self.command_off_ms,
+            _ => return None,
+        })
+    }
+
+    /// The value of a parameter.
+    pub fn read(&self, id: u8) -> Option<f32> {
+        let mut copy = *self;
+        copy.slot(id).copied()
+    }
+
+    /// Writes a parameter, or leaves everything as it is. Slew, torque and speed reach as far as the machine's ratings at most, and
+    /// torque is zero before the drive stops.
+    pub fn write(&mut self, id: u8, value: f32, ratings: &Ratings) -> Result<(), WriteError> {
+        let known = PARAMETERS.iter().find(|parameter| parameter.id == id).ok_or(WriteError::Unknown)?;
+        let rated = Self::rated(ratings);
+        let largest = match id {
+            1 | 3 | 4 => rated.read(id).unwrap_or(known.max),
+            5 => self.command_off_ms,
+            _ => known.max,
+        };
+        let smallest = if id == 6 { self.command_zero_ms } else { known.min };
+        let inside = value >= known.min && value <= known.max && value >= smallest && value <= largest;
+        if !inside {
+            return Err(WriteError::OutOfRange);
+        }
+        *self.slot(id).ok_or(WriteError::Unknown)? = value;
+        Ok(())
+    }
+}

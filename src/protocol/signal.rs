@@ -1,0 +1,174 @@
+//! Signals: numbers and flags in a frame's 64 bits, by the description that the DBC file publishes.
+
+/// The eight bytes of a frame as one number: bit 0 is the first byte's lowest.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Payload(pub u64);
+
+/// How a signal's bits are read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// A number without a sign.
+    Unsigned,
+    /// Two's complement.
+    Signed,
+    /// IEEE 754, 32 bits.
+    Float,
+}
+
+/// A value that its signal cannot carry.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct OutOfRange;
+
+/// A signal. Little-endian; its value is `raw · scale + offset`. Its methods stay out of line: nothing here is in a hurry, and
+/// sixty signals would otherwise be sixty copies.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Signal {
+    /// Name, with the unit where it has one.
+    pub name: &'static str,
+    /// Unit.
+    pub unit: &'static str,
+    /// Number of the lowest bit.
+    pub start: u32,
+    /// How many bits.
+    pub bits: u32,
+    /// How they are read.
+    pub kind: Kind,
+    /// Value of the lowest bit.
+    pub scale: f32,
+    /// Value of raw zero.
+    pub offset: f32,
+    /// Smallest value.
+    pub min: f32,
+    /// Largest value.
+    pub max: f32,
+    /// The page on which the signal is, in messages of several pages.
+    pub page: Option<u32>,
+}
+
+impl Signal {
+    /// A raw number from `start` on, 0 ..= `max`.
+    pub const fn number(name: &'static str, start: u32, bits: u32, max: u32) -> Self {
+        let max = max as f32;
+        let (unit, kind, page) = ("", Kind::Unsigned, None);
+        Self { name, unit, start, bits, kind, scale: 1.0, offset: 0.0, min: 0.0, max, page }
+    }
+
+    /// A flag.
+    pub const fn flag(name: &'static str, start: u32) -> Self {
+        Self::number(name, start, 1, 1)
+    }
+
+    /// A physical value in 16 bits; signed where its smallest value is below zero. The raw numbers beyond its range
+    /// are free to say that there is none.
+    pub const fn physical(
+        name: &'static str,
+        unit: &'static str,
+        start: u32,
+        scale: f32,
+        [min, max]: [f32; 2],
+    ) -> Self {
+        let kind = if min < 0.0 { Kind::Signed } else { Kind::Unsigned };
+        Self { name, unit, start, bits: 16, kind, scale, offset: 0.0, min, max, page: None }
+    }
+
+    /// Any finite number, as it is.
+    pub const fn float(name: &'static str, start: u32) -> Self {
+        let (unit, kind, page) = ("", Kind::Float, None);
+        Self {
+            name,
+            unit,
+            start,
+            bits: 32,
+            kind,
+            scale: 1.0,
+            offset: 0.0,
+            min: f32::MIN,
+            max: f32::MAX,
+            page,
+        }
+    }
+
+    /// The same on one page of several.
+    pub const fn on_page(self, page: u32) -> Self {
+        Self { page: Some(page), ..self }
+    }
+
+    /// The bits it takes.
+    pub const fn mask(&self) -> u64 {
+        self.ones().wrapping_shl(self.start)
+    }
+
+    const fn ones(&self) -> u64 {
+        if self.bits >= 64 { u64::MAX } else { 1_u64.wrapping_shl(self.bits) - 1 }
+    }
+
+    /// The bits as they are.
+    #[inline(never)]
+    pub const fn raw(&self, payload: Payload) -> u32 {
+        (payload.0.wrapping_shr(self.start) & self.ones()) as u32
+    }
+
+    /// Sets the bits as they are; those too many are cut off.
+    #[inline(never)]
+    pub const fn put_raw(&self, payload: &mut Payload, raw: u32) {
+        payload.0 = payload.0 & !self.mask() | (raw as u64 & self.ones()).wrapping_shl(self.start);
+    }
+
+    /// Whether a flag is set.
+    pub const fn is_set(&self, payload: Payload) -> bool {
+        self.raw(payload) != 0
+    }
+
+    /// The value; `None` outside its range, which is also how "not available" is written.
+    #[inline(never)]
+    pub fn get(&self, payload: Payload) -> Option<f32> {
+        let raw = self.raw(payload);
+        let steps = match self.kind {
+            Kind::Float => {
+                let value = f32::from_bits(raw);
+                return value.is_finite().then_some(value);
+            }
+            Kind::Unsigned => raw as i32,
+            Kind::Signed => {
+                let unused = 32_u32.saturating_sub(self.bits);
+                (raw.wrapping_shl(unused) as i32).wrapping_shr(unused)
+            }
+        };
+        let inside = (self.steps(self.min)..=self.steps(self.max)).contains(&steps);
+        inside.then_some(steps as f32 * self.scale + self.offset)
+    }
+
+    /// Sets the value, rounded to the nearest step; an error outside its range and for what is not finite.
+    #[inline(never)]
+    pub fn put(&self, payload: &mut Payload, value: f32) -> Result<(), OutOfRange> {
+        let within = value >= self.min && value <= self.max;
+        if !within {
+            return Err(OutOfRange);
+        }
+        let raw = if self.kind == Kind::Float { value.to_bits() } else { self.steps(value) as u32 };
+        self.put_raw(payload, raw);
+        Ok(())
+    }
+
+    /// Sets a measured value; where there is none, or it is outside the range, the raw number that says so.
+    #[inline(never)]
+    pub fn put_measured(&self, payload: &mut Payload, value: Option<f32>) {
+        if value.is_none_or(|value| self.put(payload, value).is_err()) {
+            self.put_raw(payload, self.not_available());
+        }
+    }
+
+    /// The raw number that says "not available": all ones, in two's complement the most negative number, of floats not a number.
+    pub const fn not_available(&self) -> u32 {
+        match self.kind {
+            Kind::Unsigned => self.ones() as u32,
+            Kind::Signed => 1_u32.wrapping_shl(self.bits.wrapping_sub(1)),
+            Kind::Float => f32::NAN.to_bits(),
+        }
+    }
+
+    fn steps(&self, value: f32) -> i32 {
+        let steps = (value - self.offset) / self.scale;
+        (if steps < 0.0 { steps - 0.5 } else { steps + 0.5 }) as i32
+    }
+}

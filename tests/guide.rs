@@ -1,0 +1,22 @@
+//! The guide's lists against the code.
+
+use std::path::Path;
+use tractive::protection::Fault;
+
+fn page(name: &str) -> String {
+    std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("docs").join(name)).unwrap()
+}
+
+#[test]
+fn every_fault_is_explained_once_and_in_the_order_of_its_code() {
+    let text = page("faults.md");
+    let explained: Vec<_> = text
+        .lines()
+        .filter_map(|line| line.strip_prefix("| `")?.split_once("` | "))
+        .map(|(name, rest)| {
+            assert!(rest.split(" | ").nth(1).is_some_and(|causes| causes.len() > 10), "{name} has no causes");
+            name
+        })
+        .collect();
+    assert_eq!(explained, Fault::ALL.map(Fault::name));
+}

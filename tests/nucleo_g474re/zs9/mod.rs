@@ -1,0 +1,7 @@
+//! The ZS9's registers: the board's own functions against blocks of memory, with a model of three up-down timers behind.
+
+mod bridge;
+mod drive;
+mod model;
+mod ports;
+mod start;

@@ -1,0 +1,168 @@
+//! What the interrupts see of the board.
+
+use super::model::Model;
+use crate::bench::Bench;
+use stm32_metapac::gpio::regs::Idr;
+use tractive::board::nucleo_g474re::position::Encoder;
+use tractive::board::nucleo_g474re::power_stage::AdcCode;
+use tractive::board::nucleo_g474re::registers::Registers;
+use tractive::board::nucleo_g474re::zs9::operator::Operator;
+use tractive::board::nucleo_g474re::zs9::sampling::Zeros;
+use tractive::board::nucleo_g474re::zs9::stage::STAGE;
+use tractive::board::nucleo_g474re::zs9::{CLOCK, Control, Pwm, start};
+use tractive::board::{DualControlPort, DualPwmPort, GateFeedback, MotorDemand};
+use tractive::control::Demand;
+use tractive::frames::Angle;
+use tractive::time::Instant;
+
+const NOW: Instant = Instant(0);
+
+pub fn zeros() -> Zeros {
+    Zeros { motors: [[AdcCode(2_048); 3]; 2], inductor: AdcCode(2_048) }
+}
+
+pub fn control<'a>(registers: Registers, operator: &'a Operator) -> Control<'a, Encoder> {
+    let encoders = [registers.tim4, registers.tim3].map(|timer| Encoder::new(timer, &STAGE.common, 4));
+    Control::new(registers, zeros(), encoders, operator)
+}
+
+/// Enable input and indices.
+pub fn make_ready(registers: &Registers) {
+    // SAFETY: IDR is word 4 of the port's block of memory; bit 4 is the enable input.
+    unsafe { registers.gpioc.as_ptr().cast::<Idr>().add(4).write_volatile(Idr(1 << 4)) };
+    for timer in [registers.tim3, registers.tim4] {
+        timer.sr().write(|w| w.set_idxif(true));
+    }
+}
+
+/// A bench whose converters hold these codes by channel.
+pub fn converted(codes: &[(usize, u16)], registers: Registers) {
+    let mut bench = Bench::of_other_inverter();
+    for (channel, code) in codes {
+        bench.codes[*channel] = *code;
+    }
+    for adc in [registers.adc1, registers.adc2, registers.adc3] {
+        bench.finish_sequence(adc);
+    }
+}
+
+#[test]
+fn a_sample_has_both_motors_and_the_link_in_si_units() {
+    let registers = Model::started().registers;
+    let operator = Operator::new(600.0);
+    let mut control = control(registers, &operator);
+    // Channels of U, V, W: 2, 7, 14 and 15, 5, 4; capacitors 6, source 9, inductor 1.
+    converted(
+        &[
+            (2, 2_148),
+            (7, 1_948),
+            (14, 2_048),
+            (15, 1_848),
+            (5, 2_048),
+            (4, 2_248),
+            (6, 2_184),
+            (9, 1_638),
+            (1, 3_048),
+        ],
+        registers,
+    );
+    make_ready(&registers);
+    registers.tim4.cnt().write(|w| w.set_cnt(256));
+    registers.tim3.cnt().write(|w| w.set_cnt(512));
+    operator.ask([50.0, -20.0]);
+    let sample = control.sample(NOW);
+    let unit = 150.0 / 2_048.0;
+    let [upper, lower] = sample.currents_a;
+    assert_eq!([upper.a, upper.b, upper.c], [100.0 * unit, -100.0 * unit, 0.0]);
+    assert_eq!([lower.a, lower.b, lower.c], [-200.0 * unit, 0.0, 200.0 * unit]);
+    assert!((sample.capacitor_v - 533.0).abs() < 0.5 && (sample.source_v - 400.0).abs() < 0.5);
+    assert_eq!(sample.inductor_a, 1_000.0 * unit);
+    assert_eq!(sample.angles, [Some(Angle(1 << 30)), Some(Angle(1 << 31))]);
+    let torque = |torque_nm| MotorDemand::Torque(Demand { torque_nm, slew_limited: true });
+    assert_eq!(sample.demands, [torque(50.0), torque(-20.0)]);
+    assert_eq!((sample.link_ref_v, sample.enable), (600.0, true));
+}
+
+#[test]
+fn the_gates_wait_for_both_indices_the_enable_input_and_quiet_breaks() {
+    type Spoil = fn(&Registers);
+    let cases: [Spoil; 4] = [
+        |registers| registers.tim3.sr().write(|w| w.set_idxif(false)),
+        |registers| registers.tim4.sr().write(|w| w.set_idxif(false)),
+        // SAFETY: IDR is word 4 of the port's block of memory.
+        |registers| unsafe { registers.gpioc.as_ptr().cast::<Idr>().add(4).write_volatile(Idr(0)) },
+        |registers| registers.tim20.sr().write(|w| w.set_bif(0, true)),
+    ];
+    for spoil in cases {
+        let registers = Model::started().registers;
+        let operator = Operator::new(600.0);
+        let mut control = control(registers, &operator);
+        converted(&[], registers);
+        make_ready(&registers);
+        assert!(control.sample(NOW).enable);
+        converted(&[], registers);
+        spoil(&registers);
+        let sample = control.sample(NOW);
+        assert!(!sample.enable);
+        assert!(sample.angles.iter().all(Option::is_some), "an angle not known yet is none that is lost");
+    }
+}
+
+#[test]
+fn converters_that_are_silent_give_no_number() {
+    let registers = Model::started().registers;
+    for adc in [registers.adc1, registers.adc2, registers.adc3] {
+        adc.isr().write(|_| ());
+    }
+    let sample = Pwm::new(registers, zeros()).sample(NOW);
+    assert!(sample.currents_a.iter().all(|current| current.a.is_nan()) && sample.source_v.is_nan());
+    let operator = Operator::new(600.0);
+    assert!(control(registers, &operator).sample(NOW).inductor_a.is_nan());
+}
+
+#[test]
+fn the_driver_boards_latches_are_two_marked_words() {
+    let read = |words: &[u16]| {
+        let registers = Model::started().registers;
+        let feedback = start::feedback(&registers);
+        feedback.begin();
+        // One word at a time: in memory the second read sees the same register, so each pair is given its own.
+        registers.spi3.sr().write(|w| w.set_rxne(true));
+        registers.spi3.dr16().write_value(words[0]);
+        (feedback, registers)
+    };
+    // The same word twice has one mark wrong: nothing counts as seen.
+    for word in [0b1010101 << 9 | 0x1FF, 0b0101010 << 9 | 0x1FF, 0xFFFF, 0] {
+        let (feedback, _) = read(&[word]);
+        assert_eq!(feedback.end(), GateFeedback::default());
+    }
+    // And none at all.
+    let (feedback, registers) = read(&[0]);
+    registers.spi3.sr().write(|w| w.set_rxne(false));
+    assert_eq!(feedback.end(), GateFeedback::default());
+}
+
+#[test]
+fn two_marked_words_are_what_the_gates_did() {
+    use tractive::board::nucleo_g474re::zs9::feedback::decoded;
+    let (on, off) = (0x1A5, 0x05A);
+    let words = [0b1010101 << 9 | on, 0b0101010 << 9 | off];
+    assert_eq!(decoded(words), GateFeedback { on, off });
+    for bit in 9..16 {
+        assert_eq!(decoded([words[0] ^ 1 << bit, words[1]]), GateFeedback::default());
+        assert_eq!(decoded([words[0], words[1] ^ 1 << bit]), GateFeedback::default());
+    }
+}
+
+#[test]
+fn an_overrun_is_counted_from_the_deadline() {
+    let registers = Model::started().registers;
+    let operator = Operator::new(600.0);
+    let mut control = control(registers, &operator);
+    let deadline = CLOCK.control_ticks / 2;
+    for (count, again, late) in [(deadline, false, 0), (deadline + 7, false, 7), (3, true, deadline + 3)] {
+        registers.tim2.cnt().write_value(count);
+        registers.tim2.sr().write(|w| w.set_uif(again));
+        assert_eq!(control.overrun_ticks(NOW, deadline), late);
+    }
+}

@@ -1,0 +1,109 @@
+//! The commands of the engineer's guide, run as they stand there: an option that is renamed fails here.
+//!
+//! They are the lines of the `sh` blocks in the chapters of `docs/SUMMARY.md`. A line that ends in `# exits with N` has to; all
+//! others have to succeed. What would touch a board is given `--dry-run`: the image is built, and nobody is asked to flash it.
+
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::Instant;
+
+use anyhow::{Context, Result, bail};
+
+use crate::process::cannot_start;
+
+/// A command and the exit code that it has to have.
+#[derive(Clone, Debug, PartialEq, Eq)]
+struct Line {
+    chapter: String,
+    command: String,
+    code: i32,
+}
+
+/// Runs them all; `true` is good.
+pub fn run(root: &Path) -> Result<bool> {
+    let mut good = true;
+    for Line { chapter, command, code } in lines(root)? {
+        let began = Instant::now();
+        let mut shell = Command::new("sh");
+        shell.current_dir(root).args(["-c", &command]).stdin(Stdio::null());
+        let output = shell.output().with_context(|| cannot_start(&shell))?;
+        let passed = output.status.code() == Some(code);
+        let verdict = if passed { "passed" } else { "FAILED" };
+        println!("{verdict} {:>5.1} s  {chapter}: {command}", began.elapsed().as_secs_f64());
+        if !passed {
+            println!("{}, expected {code}", output.status);
+            println!("{}", String::from_utf8_lossy(&output.stderr).trim_end());
+        }
+        good &= passed;
+    }
+    Ok(good)
+}
+
+fn lines(root: &Path) -> Result<Vec<Line>> {
+    let read = |name: &str| {
+        let path = root.join("docs").join(name);
+        std::fs::read_to_string(&path).with_context(|| path.display().to_string())
+    };
+    let mut lines = Vec::new();
+    for chapter in chapters(&read("SUMMARY.md")?) {
+        lines.extend(commands(&chapter, &read(&chapter)?));
+    }
+    if lines.is_empty() {
+        bail!("the guide holds no command");
+    }
+    Ok(lines)
+}
+
+/// The files that the summary links to.
+fn chapters(summary: &str) -> Vec<String> {
+    let links = summary.lines().filter_map(|line| line.split_once("](")?.1.split_once(')'));
+    links.map(|(file, _)| file.to_owned()).collect()
+}
+
+fn commands(chapter: &str, text: &str) -> Vec<Line> {
+    let mut lines = Vec::new();
+    let mut inside = false;
+    for line in text.lines() {
+        if line.starts_with("```") {
+            inside = line == "```sh";
+        } else if inside && !line.trim().is_empty() {
+            lines.push(command(chapter, line));
+        }
+    }
+    lines
+}
+
+fn command(chapter: &str, line: &str) -> Line {
+    let (command, comment) = line.split_once(" # ").unwrap_or((line, ""));
+    let code = comment.trim().strip_prefix("exits with ").and_then(|code| code.parse().ok()).unwrap_or(0);
+    let mut command = command.trim_end().to_owned();
+    if command.starts_with("cargo xtask flash")
+        && !["--dry-run", "--help"].iter().any(|word| command.contains(word))
+    {
+        command += " --dry-run";
+    }
+    Line { chapter: chapter.to_owned(), command, code }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_summary_names_the_chapters() {
+        assert_eq!(chapters("# Summary\n\n- [One](one.md)\n  - [Two](two.md)\n"), ["one.md", "two.md"]);
+    }
+
+    #[test]
+    fn commands_stand_in_sh_blocks_alone() {
+        let text = "ls\n```sh\ncargo rig run sweep # exits with 1\n\ncargo xtask flash --log   # prints\n```\n```text\nno\n```\n";
+        let line = |command: &str, code| Line { chapter: "c".to_owned(), command: command.to_owned(), code };
+        let wanted = [line("cargo rig run sweep", 1), line("cargo xtask flash --log --dry-run", 0)];
+        assert_eq!(commands("c", text), wanted);
+    }
+
+    #[test]
+    fn every_chapter_is_there() {
+        assert!(lines(crate::build::root()).unwrap().len() > 10);
+    }
+}
