@@ -19,6 +19,11 @@ use tractive::time::{Clock, Instant};
 /// The clock of the emulated board: 25 MHz ticks, control at 10 kHz. The host runs on the same.
 pub const CLOCK: Clock = Clock::new(25_000_000, 2_500);
 
+/// What an image says that does not start.
+pub(crate) fn refused(refused: Refused) -> anyhow::Error {
+    anyhow::anyhow!("configuration refused: {refused}")
+}
+
 /// Who commands the drive over the protocol.
 pub trait Supervisor {
     /// The slot that began at `t_s`: what is sent to the drive, and what happens to it.
@@ -57,11 +62,6 @@ fn turn(supervisor: &mut dyn Supervisor, bench: &mut Bench, at: Instant) -> anyh
         bench.end_at(next);
     }
     Ok(turn.frame)
-}
-
-/// What an image says that does not start.
-pub(crate) fn refused(refused: Refused) -> anyhow::Error {
-    anyhow::anyhow!("configuration refused: {refused}")
 }
 
 /// A bar on a terminal; in a pipe indicatif draws none.
