@@ -48,6 +48,11 @@ impl Link {
         Self { filter, line_v, choke_a: 0.0, voltage_v: line_v }
     }
 
+    /// Current out of the line, in A.
+    pub fn choke_a(&self) -> f64 {
+        self.choke_a
+    }
+
     /// Its voltage, in V.
     pub fn voltage_v(&self) -> f64 {
         self.voltage_v

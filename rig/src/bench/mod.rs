@@ -14,7 +14,7 @@ mod sensors;
 pub use inject::Injection;
 pub use inverter::{Edge, GATES, Inverter, Stuck};
 pub use link::{LineFilter, Supply};
-pub use observe::{Observed, Peaks};
+pub use observe::{Limits, Observed, Peaks};
 pub use sensors::{Converter, Flaws, Sensors};
 
 use crate::plant::Plant;
@@ -27,7 +27,7 @@ use tractive::control::Demand;
 use tractive::drive::Report;
 use tractive::frames::{Abc, Angle};
 use tractive::modulation::{CarrierPeriod, Mode};
-use tractive::protection::{LegFaults, SafeState};
+use tractive::protection::{LegFaults, SafeState, Trip};
 use tractive::time::{Clock, Instant};
 
 /// Ticks since the run's beginning.
@@ -95,6 +95,8 @@ pub struct Settings {
     pub supply: Supply,
     /// What goes wrong.
     pub injection: Option<Injection>,
+    /// Beyond what it is said to make a difference.
+    pub limits: Limits,
 }
 
 /// Machine, inverter, sensors and recorder.
@@ -141,7 +143,7 @@ impl Bench {
                 Supply::Line(filter) => Some(Link::new(filter, settings.udc_v)),
             },
             spoiler: Spoiler::new(settings.injection),
-            observed: Observed::new(from),
+            observed: Observed::new(from, settings.limits),
             operator,
             clock: settings.clock,
             tick_s,
@@ -231,6 +233,11 @@ impl Bench {
         self.seconds(self.now)
     }
 
+    /// The latched fault, as control has reported it last.
+    pub fn trip(&self) -> Option<Trip> {
+        self.reports.back().map_or(self.report, |(_, report)| *report).trip
+    }
+
     /// The trace so far.
     pub fn rows(&self) -> &[Row] {
         &self.rows
@@ -305,12 +312,14 @@ impl Bench {
                 let drawn_j = self.plant.energies().electrical_j - before_j;
                 link.advance(drawn_j, dt_s, self.sensors.udc_v(t_s), self.spoiler.supply(t_s));
             }
-            if self.inverter.monitor(self.plant.currents_abc(), self.now, tick) {
+            if self.inverter.monitor(self.plant.currents_abc(), self.now, tick)
+                || self.inverter.leg_faults() != LegFaults::default()
+            {
                 self.observed.makes_a_difference(self.now);
             }
             self.now = tick;
             let udc_v = self.udc_v(self.seconds(tick));
-            self.observed.note(tick, self.plant.currents_abc(), udc_v);
+            self.observed.note(tick, self.plant.currents_abc(), udc_v, self.plant.speed_rpm());
         }
     }
 
@@ -327,7 +336,9 @@ impl Bench {
         if now == self.observed.from {
             self.observed.carrier_ticks = 2 * Tick::from(self.inverter.half().period_ticks);
             match self.spoiler.kind(self.seconds(now)) {
-                Some(Kind::Gate(gate, on)) => self.inverter.stick(gate, if on { Stuck::On } else { Stuck::Off }),
+                Some(Kind::Gate(gate, on)) => {
+                    self.inverter.stick(gate, if on { Stuck::On } else { Stuck::Off })
+                }
                 Some(Kind::Device(gate)) => self.inverter.stick(gate, Stuck::Shorted),
                 _ => {}
             }
@@ -337,8 +348,9 @@ impl Bench {
         {
             self.safe = None;
             self.inverter.enter(safe, now);
-            let (udc_v, field_j) = (self.udc_v(self.seconds(now)), self.plant.field_j());
-            self.observed.enters(now, safe, udc_v, field_j);
+            let udc_v = self.udc_v(self.seconds(now));
+            let choke_a = self.link.as_ref().map_or(0.0, Link::choke_a);
+            self.observed.enters(now, safe, udc_v, choke_a, &self.plant);
         }
         self.inverter.act(now);
         if now == self.inverter.half_end() {

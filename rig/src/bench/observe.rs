@@ -1,6 +1,7 @@
 //! What a fault did: the extremes of currents and link until the gates are safe and after that.
 
 use super::Tick;
+use crate::plant::Plant;
 use tractive::protection::SafeState;
 
 /// Extremes over a time.
@@ -20,6 +21,26 @@ impl Peaks {
     }
 }
 
+/// What a sound plant keeps to: beyond it a fault makes a difference.
+#[derive(Clone, Copy, Debug)]
+pub struct Limits {
+    /// Largest phase current, in A.
+    pub current_a: f64,
+    /// Lowest and highest link voltage, in V.
+    pub udc_v: (f64, f64),
+    /// Highest speed, in r/min.
+    pub speed_rpm: f64,
+}
+
+impl Limits {
+    /// Everything is sound.
+    pub const NONE: Self = Self {
+        current_a: f64::INFINITY,
+        udc_v: (f64::NEG_INFINITY, f64::INFINITY),
+        speed_rpm: f64::INFINITY,
+    };
+}
+
 /// What happened from a fault's instant on.
 #[derive(Clone, Copy, Debug)]
 pub struct Observed {
@@ -35,6 +56,11 @@ pub struct Observed {
     pub udc_at_safe_v: f64,
     /// Energy of the machine's field then, in J.
     pub field_at_safe_j: f64,
+    /// Current out of the line then, in A.
+    pub choke_at_safe_a: f64,
+    /// Largest current of the short-circuited machine with the flux linkage that it has then, in A.
+    pub forced_a: f64,
+    limits: Limits,
     /// Extremes until then.
     pub until: Peaks,
     /// And after that.
@@ -43,7 +69,7 @@ pub struct Observed {
 
 impl Observed {
     /// Nothing yet.
-    pub fn new(from: Tick) -> Self {
+    pub fn new(from: Tick, limits: Limits) -> Self {
         Self {
             from,
             effect: None,
@@ -51,14 +77,24 @@ impl Observed {
             safe: None,
             udc_at_safe_v: 0.0,
             field_at_safe_j: 0.0,
+            choke_at_safe_a: 0.0,
+            forced_a: 0.0,
+            limits,
             until: Peaks::default(),
             after: Peaks::default(),
         }
     }
 
     /// The plant at an instant.
-    pub fn note(&mut self, now: Tick, currents_a: [f64; 3], udc_v: f64) {
+    pub fn note(&mut self, now: Tick, currents_a: [f64; 3], udc_v: f64, speed_rpm: f64) {
         if now >= self.from {
+            let Limits { current_a, udc_v: (lowest_v, highest_v), speed_rpm: fastest_rpm } = self.limits;
+            if currents_a.iter().any(|current| current.abs() > current_a)
+                || !(lowest_v..=highest_v).contains(&udc_v)
+                || speed_rpm.abs() > fastest_rpm
+            {
+                self.makes_a_difference(now);
+            }
             let peaks = if self.safe.is_some() { &mut self.after } else { &mut self.until };
             peaks.note(currents_a, udc_v);
         }
@@ -72,10 +108,18 @@ impl Observed {
     }
 
     /// The gates are safe from now on.
-    pub fn enters(&mut self, now: Tick, safe: SafeState, udc_v: f64, field_j: f64) {
+    pub fn enters(&mut self, now: Tick, safe: SafeState, udc_v: f64, choke_a: f64, plant: &Plant) {
         if self.safe.is_none() {
             self.safe = Some((now, safe));
-            (self.udc_at_safe_v, self.field_at_safe_j) = (udc_v, field_j);
+            (self.udc_at_safe_v, self.choke_at_safe_a) = (udc_v, choke_a);
+            (self.field_at_safe_j, self.forced_a) = (plant.field_j(), plant.short_circuit_peak_a());
         }
+    }
+
+    /// From the fault's first effect, or from the fault where none is known, until the gates were safe, in ticks.
+    pub fn ticks_to_safe(&self) -> Option<Tick> {
+        let (safe, _) = self.safe?;
+        let effect = self.effect.filter(|effect| *effect <= safe).unwrap_or(self.from);
+        Some(safe.saturating_sub(effect))
     }
 }

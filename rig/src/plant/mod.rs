@@ -107,6 +107,11 @@ impl Plant {
         self.rotor.speed_rpm()
     }
 
+    /// Largest current vector that the machine has when it is short-circuited now and turns on without losses, in A.
+    pub fn short_circuit_peak_a(&self) -> f64 {
+        self.stator.peak_on_flux_circle_a(self.id_a, self.iq_a)
+    }
+
     /// Energy of the field, above that at no current, in J.
     pub fn field_j(&self) -> f64 {
         self.stator.field_j(self.id_a, self.iq_a)

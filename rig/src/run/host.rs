@@ -2,6 +2,7 @@
 
 use super::Progress;
 use crate::bench::{Bench, BenchError};
+use crate::campaign::without::Without;
 use crate::trace::Recording;
 use tractive::board::{ControlPort, PwmPort, Sample};
 use tractive::control::{Demand, Measurements};
@@ -16,6 +17,7 @@ use tractive::time::Instant;
 /// The bench behind a board's ports; the first error ends the run.
 struct Port<'a> {
     bench: &'a mut Bench,
+    without: Option<Without>,
     error: Option<BenchError>,
 }
 
@@ -41,7 +43,8 @@ impl ControlPort for Port<'_> {
     }
 
     fn leg_faults(&mut self) -> LegFaults {
-        self.bench.leg_faults()
+        let found = self.bench.leg_faults();
+        self.without.map_or(found, |without| without.leg_faults(found))
     }
 }
 
@@ -62,7 +65,8 @@ impl PwmPort for Port<'_> {
     }
 
     fn leg_faults(&mut self) -> LegFaults {
-        self.bench.leg_faults()
+        let found = self.bench.leg_faults();
+        self.without.map_or(found, |without| without.leg_faults(found))
     }
 }
 
@@ -88,6 +92,7 @@ pub struct Tasks {
     control: ControlTask,
     pwm: PwmTask,
     shared: Shared,
+    without: Option<Without>,
 }
 
 impl Tasks {
@@ -98,15 +103,27 @@ impl Tasks {
             control: ControlTask::new(tables, settings, first_control),
             pwm: PwmTask::new(tables, settings, Instant(first_half_ticks)).after_halves_of(first_half_ticks),
             shared: Shared::new(),
+            without: None,
         }
     }
 
+    /// The same with a protection off; its levels are the tables' business.
+    pub fn without(self, without: Without) -> Self {
+        let disarmed = without.disarmed();
+        let (control, pwm) = (self.control.without(disarmed), self.pwm.without(disarmed));
+        Self { control, pwm, without: Some(without), ..self }
+    }
+
     /// Until the bench's recording is complete, or nobody wants to see more of it.
-    pub fn drive(mut self, bench: &mut Bench, mut goes_on: impl FnMut(&Bench) -> bool) -> Result<(), BenchError> {
+    pub fn drive(
+        mut self,
+        bench: &mut Bench,
+        mut goes_on: impl FnMut(&Bench) -> bool,
+    ) -> Result<(), BenchError> {
         while !bench.is_done() {
             let (control_at, pwm_at) = (self.control.next_call(), self.pwm.next_call());
             let has_control = bench.has_control(control_at);
-            let mut port = Port { bench, error: None };
+            let mut port = Port { bench, without: self.without, error: None };
             // At equal instants the PWM interrupt comes first: it has the higher priority.
             if control_at.reached(pwm_at) || !has_control {
                 self.pwm.run(&mut port, &self.shared);

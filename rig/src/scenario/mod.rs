@@ -13,7 +13,7 @@ mod sweep;
 mod timing;
 
 use crate::analysis::Figures;
-use crate::bench::{self, Bench, Operator, Supply};
+use crate::bench::{self, Bench, Limits, Operator, Supply};
 use crate::machine::Machine;
 use crate::options::{On, RunOptions};
 use crate::plant::{Plant, PlantSettings, SpeedSource};
@@ -119,6 +119,7 @@ pub fn drive(scenario: &dyn Scenario, options: &RunOptions, machine: &Machine) -
             flaws: options.flaws(parameters.trip_current_a),
             supply: Supply::Stiff,
             injection: None,
+            limits: Limits::NONE,
         },
     );
     match options.on {

@@ -1,0 +1,1 @@
+//! `campaign`: runs cases, prints the table and writes it.
