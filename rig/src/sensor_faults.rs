@@ -19,6 +19,8 @@ pub enum CurrentFault {
     Scaled(f64),
     /// Adds white noise of this rms value, in A.
     Noisy(f64),
+    /// Reads the end of its range, in A.
+    Railed(f64),
     /// Reads NaN.
     NotFinite,
 }
@@ -73,6 +75,7 @@ impl CurrentSpoiler {
                 let noise = Normal::new(0.0, rms_a).map_or(0.0, |noise| noise.sample(&mut self.random));
                 *reading + noise as f32
             }
+            CurrentFault::Railed(end_a) => end_a as f32,
             CurrentFault::NotFinite => f32::NAN,
         };
         true_a

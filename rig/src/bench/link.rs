@@ -24,7 +24,7 @@ pub struct LineFilter {
 
 impl LineFilter {
     /// For 250 kW at 1,500 V: 46 Hz, damped enough for a load of constant power.
-    pub const TRACTION: Self = Self { inductance_h: 3e-3, resistance_ohm: 0.15, capacitance_f: 4e-3 };
+    pub const TRACTION: Self = Self { inductance_h: 3e-3, resistance_ohm: 0.3, capacitance_f: 4e-3 };
 }
 
 /// How fast a line that fails moves, in V/s.
@@ -46,11 +46,6 @@ impl Link {
     /// Charged to the line's voltage.
     pub fn new(filter: LineFilter, line_v: f64) -> Self {
         Self { filter, line_v, choke_a: 0.0, voltage_v: line_v }
-    }
-
-    /// Current out of the line, in A.
-    pub fn choke_a(&self) -> f64 {
-        self.choke_a
     }
 
     /// Its voltage, in V.

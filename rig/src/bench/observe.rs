@@ -52,12 +52,10 @@ pub struct Observed {
     pub carrier_ticks: Tick,
     /// When the gates were safe, and how.
     pub safe: Option<(Tick, SafeState)>,
-    /// Link voltage then, in V.
-    pub udc_at_safe_v: f64,
+    /// The highest link voltage from then on if the inverter were gone, in V.
+    pub unloaded_v: f64,
     /// Energy of the machine's field then, in J.
     pub field_at_safe_j: f64,
-    /// Current out of the line then, in A.
-    pub choke_at_safe_a: f64,
     /// Largest current of the short-circuited machine with the flux linkage that it has then, in A.
     pub forced_a: f64,
     limits: Limits,
@@ -75,9 +73,8 @@ impl Observed {
             effect: None,
             carrier_ticks: 0,
             safe: None,
-            udc_at_safe_v: 0.0,
+            unloaded_v: 0.0,
             field_at_safe_j: 0.0,
-            choke_at_safe_a: 0.0,
             forced_a: 0.0,
             limits,
             until: Peaks::default(),
@@ -107,11 +104,11 @@ impl Observed {
         }
     }
 
-    /// The gates are safe from now on.
-    pub fn enters(&mut self, now: Tick, safe: SafeState, udc_v: f64, choke_a: f64, plant: &Plant) {
+    /// The gates are safe from now on; without the inverter the link would reach `unloaded_v`.
+    pub fn enters(&mut self, now: Tick, safe: SafeState, unloaded_v: f64, plant: &Plant) {
         if self.safe.is_none() {
             self.safe = Some((now, safe));
-            (self.udc_at_safe_v, self.choke_at_safe_a) = (udc_v, choke_a);
+            self.unloaded_v = unloaded_v;
             (self.field_at_safe_j, self.forced_a) = (plant.field_j(), plant.short_circuit_peak_a());
         }
     }

@@ -112,6 +112,9 @@ impl Case {
     }
 }
 
+/// Range of the current converters, in A: a quarter above the trip level.
+const RANGE_A: f64 = 379.2;
+
 /// Mean torque error where a fault must not be felt, as a share of the largest torque.
 const UNFELT: f64 = 0.03;
 /// Where a current sensor's error bends the torque.
@@ -127,6 +130,7 @@ fn faults() -> Vec<Named> {
         };
     add("none", Cause::Bench(Kind::Elsewhere), &[], Some(UNFELT), true);
     const SUM: &[Fault] = &[Fault::PhaseSum];
+    const RAILED: &[Fault] = &[Fault::Overcurrent];
     for (phase, letter) in ["u", "v", "w"].into_iter().enumerate() {
         let first = phase == 0;
         let mut sensor = |what: &str, fault, names, share| {
@@ -138,7 +142,7 @@ fn faults() -> Vec<Named> {
         sensor("offset", CurrentFault::Offset(60.0), SUM, None);
         sensor("scaled", CurrentFault::Scaled(1.5), SUM, Some(BENT));
         sensor("noisy", CurrentFault::Noisy(30.0), SUM, None);
-        sensor("full-scale", CurrentFault::Offset(-400.0), &[Fault::Overcurrent], None);
+        sensor("railed", CurrentFault::Railed(-RANGE_A), RAILED, None);
         sensor("not-finite", CurrentFault::NotFinite, &[Fault::NotFinite], None);
     }
     let small = |fault| Cause::Bench(Kind::Current(1, fault));
@@ -156,7 +160,8 @@ fn faults() -> Vec<Named> {
     let supply = |fault| Cause::Bench(Kind::Supply(fault));
     const LINK: &[Fault] = &[Fault::DcOvervoltage, Fault::DcUndervoltage];
     add("link-lost", supply(SupplyFault::Lost), LINK, Some(UNFELT), true);
-    add("link-over", supply(SupplyFault::To(2300.0)), &[Fault::DcOvervoltage], None, true);
+    const OVER: &[Fault] = &[Fault::DcOvervoltage, Fault::Overcurrent];
+    add("link-over", supply(SupplyFault::To(2300.0)), OVER, None, true);
     add("link-under", supply(SupplyFault::To(600.0)), &[Fault::DcUndervoltage], None, true);
     const SWINGS: &[Fault] = &[Fault::DcOvervoltage, Fault::DcUndervoltage, Fault::Overcurrent];
     add("link-swings", supply(SupplyFault::Swinging(300.0, 40.0)), SWINGS, Some(UNFELT), true);
@@ -265,7 +270,7 @@ impl Drive {
         let before = rows.iter().take_while(|row| row.t_s < case.at_s.max(FAULT_S));
         Ok(Seen {
             observed: *bench.observed(),
-            trip: bench.trip(),
+            trip: tasks.trip(),
             mode: before.last().map_or(Mode::Off, |row| row.mode),
             torque_error_nm: torque_error_nm(rows, TURN_S).max(torque_error_nm(rows, END_S)),
         })
@@ -352,7 +357,7 @@ impl Drive {
         ];
         let torque_share = case.fault.rule.torque_share.unwrap_or(0.0);
         let went_on = [
-            Bounded::new("A", observed.until.current_a, trip_a),
+            Bounded::new("A", observed.until.current_a, BETWEEN_SAMPLES * trip_a),
             Bounded::new("V", observed.until.udc_v, over_v),
             Bounded::new("N·m off", *torque_error_nm, torque_share * parameters.max_torque_nm),
         ];
@@ -393,6 +398,7 @@ impl Drive {
                     case.point.speed_rpm.abs() / 60.0 * f64::from(self.machine.folder.parameters.pole_pairs);
                 carriers_s.max((0.5 / turns_s).min(0.1))
             }
+            Cause::Runaway => carriers_s + TRACKING_S,
             _ => carriers_s,
         }
     }
@@ -405,28 +411,23 @@ impl Drive {
         most_a / capacitance_f * time_s
     }
 
-    /// The highest link voltage that must be expected once the gates are safe, in V: where the capacitor swings to on the line's
-    /// choke, with the energy of the machine's field on top; or what the diodes rectify.
+    /// The highest link voltage that must be expected once the gates are safe, in V: where the line and its choke take the capacitor,
+    /// with the energy of the machine's field on top; or what the diodes rectify.
     fn forced_udc_v(&self, case: &Case, observed: &Observed) -> f64 {
-        let LineFilter { inductance_h, capacitance_f, .. } = LineFilter::TRACTION;
-        let parameters = &self.machine.folder.parameters;
-        let nominal_v = parameters.dc_link_nominal_v;
-        let line_v = match case.fault.cause {
-            Cause::Bench(Kind::Supply(SupplyFault::To(line_v))) => line_v.max(nominal_v),
-            Cause::Bench(Kind::Supply(SupplyFault::Swinging(amplitude_v, _))) => nominal_v + amplitude_v,
-            _ => nominal_v,
-        };
-        let swing_v = (observed.udc_at_safe_v - line_v)
-            .hypot((inductance_h / capacitance_f).sqrt() * observed.choke_at_safe_a);
-        let charged_v = (line_v + swing_v).hypot((2.0 * observed.field_at_safe_j / capacitance_f).sqrt());
-        let omega = case.point.speed_rpm.abs() * TAU / 60.0 * f64::from(parameters.pole_pairs);
+        let field_v = (2.0 * observed.field_at_safe_j / LineFilter::TRACTION.capacitance_f).sqrt();
+        let pole_pairs = f64::from(self.machine.folder.parameters.pole_pairs);
+        let omega = case.point.speed_rpm.abs() * TAU / 60.0 * pole_pairs;
         let rectified_v = 3.0_f64.sqrt() * omega * f64::from(self.machine.tables.ratings.magnet_flux_wb);
-        charged_v.max(rectified_v)
+        FORCED * observed.unloaded_v.hypot(field_v).max(rectified_v)
     }
 }
 
-/// Rounding of what is forced: the short circuit's current is looked for at 180 angles.
-const FORCED: f64 = 1.02;
+/// How far the speed tracker lags behind, in s: 2/500 rad/s.
+const TRACKING_S: f64 = 4e-3;
+/// What a current that no sample finds above the trip level may reach between two samples, over that level.
+const BETWEEN_SAMPLES: f64 = 1.1;
+/// Room for the rounding of what is forced, and for what happens between two instants at which it is looked at.
+const FORCED: f64 = 1.01;
 /// From an interrupt's instant to the gates, in s.
 const SAFE_STATE_S: f64 = 25e-6;
 
@@ -454,6 +455,35 @@ fn first_look() {
     let fast = std::env::var("FAST").is_ok();
     let only = std::env::var("ONLY").unwrap_or_default();
     let list: Vec<_> = super::cases(fast).into_iter().filter(|case| case.name().contains(&only)).collect();
+    if std::env::var("DUMP").is_ok() {
+        let super::Case::Traction(case) = &list[0];
+        let mut bench = campaign.traction.bench(case);
+        let devices = campaign.traction.devices();
+        let settings = Settings { clock: CLOCK, devices, gains: Gains::DEFAULT };
+        let mut tasks = Tasks::new(campaign.traction.tables, settings, devices.shortest_half_ticks);
+        tasks.drive(&mut bench, |_| true).unwrap();
+        for row in bench.rows() {
+            println!(
+                "{:.5} n {:.0} Te {:.0}/{:.0} id {:.0}/{:.0} iq {:.0}/{:.0} i {:.0} u {:.0} udc {:.0} f {:.1} map {:.3} {} {}",
+                row.t_s,
+                row.speed_rpm,
+                row.te_nm,
+                row.te_ref_nm,
+                row.id_a,
+                row.id_ref_a,
+                row.iq_a,
+                row.iq_ref_a,
+                row.peak_current_a(),
+                row.u_v,
+                row.udc_v,
+                row.f1_hz,
+                row.map_error,
+                row.mode.name(),
+                row.trip.is_some()
+            );
+        }
+        return;
+    }
     for o in campaign.run_all(&list, || ()).unwrap() {
         println!(
             "{:?} {:20} {:6} {:8} {:8} {:16} {:12} ms {:.2} periods {:.2} I {:.0}/{:.0} lim {:.0} U {:.0}/{:.0} lim {:.0} Te {:.0} {}",

@@ -11,7 +11,7 @@ use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
 use tractive::frames::{Abc, Angle};
 use tractive::machine::Tables;
 use tractive::modulation::CarrierPeriod;
-use tractive::protection::{LegFaults, SafeState};
+use tractive::protection::{LegFaults, SafeState, Trip};
 use tractive::time::Instant;
 
 /// The bench behind a board's ports; the first error ends the run.
@@ -79,7 +79,7 @@ pub fn run_on_host(
     first_half_ticks: u32,
 ) -> Result<Recording, BenchError> {
     let mut progress = Progress::new(name);
-    let tasks = Tasks::new(tables, settings, first_half_ticks);
+    let mut tasks = Tasks::new(tables, settings, first_half_ticks);
     tasks.drive(&mut bench, |bench| {
         progress.show(bench.progress());
         true
@@ -114,9 +114,14 @@ impl Tasks {
         Self { control, pwm, without: Some(without), ..self }
     }
 
+    /// The latched fault.
+    pub fn trip(&self) -> Option<Trip> {
+        self.control.trip().or(self.pwm.trip())
+    }
+
     /// Until the bench's recording is complete, or nobody wants to see more of it.
     pub fn drive(
-        mut self,
+        &mut self,
         bench: &mut Bench,
         mut goes_on: impl FnMut(&Bench) -> bool,
     ) -> Result<(), BenchError> {
