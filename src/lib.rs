@@ -29,5 +29,6 @@ pub mod link;
 pub mod machine;
 pub mod modulation;
 pub mod nine_switch;
+pub mod operator;
 pub mod protection;
 pub mod time;

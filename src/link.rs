@@ -10,11 +10,11 @@ mod dual;
 
 use crate::board::Sample;
 use crate::cell::Words;
-use crate::control::{Demand, Measurements};
+use crate::control::{Demand, LinkWindow, Measurements};
 use crate::drive::{Report, half_from_words, half_to_words};
 use crate::frames::{Abc, Angle};
 use crate::modulation::CarrierPeriod;
-use crate::protection::SafeState;
+use crate::protection::{Fault, SafeState};
 use crate::time::Instant;
 
 pub use dual::{
@@ -87,8 +87,8 @@ impl Request {
             1 => Self::Hello,
             2 => Self::ControlSample(at),
             3 => {
-                let [a, b, c, d, e, f, g, h, i, j, ..] = payload;
-                Self::ControlReport(at, Report::from_words([a, b, c, d, e, f, g, h, i, j]))
+                let [a, b, c, d, e, f, g, h, i, j, k, l, ..] = payload;
+                Self::ControlReport(at, Report::from_words([a, b, c, d, e, f, g, h, i, j, k, l]))
             }
             4 => Self::PwmSample(at),
             5 => {
@@ -124,12 +124,13 @@ pub fn sample_to_block(sample: &Sample, stop: bool) -> Block {
     let flags = u32::from(sample.enable) | u32::from(sample.demand.slew_limited) << 1 | u32::from(stop) << 2;
     let [a, b, c] = currents_to_words(measured.currents_a);
     let torque = sample.demand.torque_nm.to_bits();
-    [a, b, c, measured.udc_v.to_bits(), measured.angle.0, torque, flags, 0, 0, 0, 0, 0, 0, 0, 0, 0]
+    let hardware = sample.hardware.map_or(0, |fault| fault as u32);
+    [a, b, c, measured.udc_v.to_bits(), measured.angle.0, torque, flags, hardware, 0, 0, 0, 0, 0, 0, 0, 0]
 }
 
 /// The inverse of [`sample_to_block`].
 pub fn sample_from_block(block: &Block) -> (Sample, bool) {
-    let [a, b, c, udc, angle, torque, flags, ..] = *block;
+    let [a, b, c, udc, angle, torque, flags, hardware, ..] = *block;
     let sample = Sample {
         measured: Measurements {
             currents_a: currents_from_words(a, b, c),
@@ -138,6 +139,9 @@ pub fn sample_from_block(block: &Block) -> (Sample, bool) {
         },
         demand: Demand { torque_nm: f32::from_bits(torque), slew_limited: flags & 2 != 0 },
         enable: flags & 1 != 0,
+        window: LinkWindow::OPEN,
+        acknowledge: 0,
+        hardware: Fault::from_code(hardware),
     };
     (sample, flags & 4 != 0)
 }

@@ -60,7 +60,11 @@ mod firmware {
         let mut board = qemu::Control;
         board.acknowledge();
         let first = Instant(CLOCK.control_ticks);
-        TASK.get_or_insert_with(|| ControlTask::new(&BUILT_IN, settings(), first)).run(&mut board, &SHARED);
+        let task = TASK.get_or_insert_with(|| ControlTask::new(&BUILT_IN, settings(), first));
+        if task.wants_revision() {
+            board.revise_pulses();
+        }
+        task.run(&mut board, &SHARED);
     }
 
     /// Deadline: the next carrier boundary, where the shadow registers take over.
@@ -68,11 +72,16 @@ mod firmware {
     fn DUALTIMER() {
         static mut TASK: Option<PwmTask> = None;
         let mut board = qemu::Pwm;
-        board.acknowledge();
         let settings = settings();
         let first = Instant(FIRST_HALF_TICKS.load(Ordering::Relaxed));
         let task = || PwmTask::new(&BUILT_IN, settings, first).after_halves_of(first.0);
-        TASK.get_or_insert_with(task).run(&mut board, &SHARED);
+        let task = TASK.get_or_insert_with(task);
+        if board.is_boundary() {
+            board.acknowledge();
+            task.run(&mut board, &SHARED);
+        } else {
+            task.revise(&mut board, &SHARED);
+        }
     }
 
     #[exception]

@@ -46,6 +46,30 @@ pub enum Fault {
     /// Gates did not do what they were told. The value has a bit for each: of the ZS9 in the order of
     /// [`crate::nine_switch::GATES`], of the PMaSynRM drive from u on for the legs.
     LegStuck,
+    /// A gate driver is not ready, or its wire is broken: the hardware holds the gates off.
+    GateDriver,
+    /// A comparator has seen a phase current beyond its threshold; the limit is the threshold, in A.
+    HardwareOvercurrent,
+    /// The chip's own break: crystal stopped, processor locked up, or a memory word with a two-bit error.
+    ClockFailure,
+    /// A carrier half ended before its interrupt did.
+    PwmDeadline,
+    /// The board did not leave the safe state when it was told to.
+    GatesHeld,
+    /// A current sensor shows a current where there is none, in A.
+    CurrentOffset,
+    /// The link's voltage cannot be what it is measured as, in V.
+    LinkImplausible,
+    /// The position sensor does not answer, or the rotor's speed does not settle while it should stand still.
+    PositionSensor,
+    /// The configuration was refused, or nobody has checked it.
+    Configuration,
+    /// The link did not reach its voltage in time, in V.
+    PrechargeTimeout,
+    /// A contactor does not do what it is told; the value is 1 for the main contactor, 2 for the precharge relay.
+    Contactor,
+    /// The link did not lose its voltage in time, in V.
+    DischargeTimeout,
     /// The angle is far off what the speed makes of the one before, in electrical rad.
     AngleLost,
     /// Drivers found their devices short-circuited and block them; the value has a bit for each, from bit 0 on uh ul vh vl wh wl.
@@ -53,7 +77,8 @@ pub enum Fault {
 }
 
 impl Fault {
-    const ALL: [Self; 17] = [
+    /// All of them, in the order of their codes, which begin at 1.
+    pub const ALL: [Self; 29] = [
         Self::Overcurrent,
         Self::DcOvervoltage,
         Self::DcUndervoltage,
@@ -69,6 +94,18 @@ impl Fault {
         Self::SensorLost1,
         Self::SensorLost2,
         Self::LegStuck,
+        Self::GateDriver,
+        Self::HardwareOvercurrent,
+        Self::ClockFailure,
+        Self::PwmDeadline,
+        Self::GatesHeld,
+        Self::CurrentOffset,
+        Self::LinkImplausible,
+        Self::PositionSensor,
+        Self::Configuration,
+        Self::PrechargeTimeout,
+        Self::Contactor,
+        Self::DischargeTimeout,
         Self::AngleLost,
         Self::DriverBlocked,
     ];
@@ -96,6 +133,18 @@ impl Fault {
             Self::SensorLost1 => "sensor_lost_1",
             Self::SensorLost2 => "sensor_lost_2",
             Self::LegStuck => "leg_stuck",
+            Self::GateDriver => "gate_driver",
+            Self::HardwareOvercurrent => "hardware_overcurrent",
+            Self::ClockFailure => "clock_failure",
+            Self::PwmDeadline => "pwm_deadline",
+            Self::GatesHeld => "gates_held",
+            Self::CurrentOffset => "current_offset",
+            Self::LinkImplausible => "link_implausible",
+            Self::PositionSensor => "position_sensor",
+            Self::Configuration => "configuration",
+            Self::PrechargeTimeout => "precharge_timeout",
+            Self::Contactor => "contactor",
+            Self::DischargeTimeout => "discharge_timeout",
             Self::AngleLost => "angle_lost",
             Self::DriverBlocked => "driver_blocked",
         }
@@ -284,10 +333,12 @@ pub fn check_measurements(measured: &Measurements, omega: f32, ratings: &Ratings
     if udc > ratings.trip_dc_over_v {
         return Some((Fault::DcOvervoltage, udc, ratings.trip_dc_over_v));
     }
-    if udc < ratings.trip_dc_under_v {
-        return Some((Fault::DcUndervoltage, udc, ratings.trip_dc_under_v));
-    }
     check_speed(omega, ratings).or_else(|| check_currents(&measured.currents_a, ratings))
+}
+
+/// The link while the gates may be on: without them it may be empty.
+pub fn check_undervoltage(udc_v: f32, ratings: &Ratings) -> Option<Violation> {
+    (udc_v < ratings.trip_dc_under_v).then_some((Fault::DcUndervoltage, udc_v, ratings.trip_dc_under_v))
 }
 
 /// The operator's demand: any finite number is a demand, which the envelope limits.

@@ -1,7 +1,7 @@
 //! Every fault, by name, with value and limit, and the gates in the safe state in the same interrupt.
 
 use tractive::board::{ControlPort, PwmPort, Sample};
-use tractive::control::{Demand, Gains, Measurements};
+use tractive::control::{Demand, Gains, LinkWindow, Measurements};
 use tractive::drive::Report;
 use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
 use tractive::frames::{Abc, Angle, Dq};
@@ -25,6 +25,18 @@ struct Fake {
     played: CarrierPeriod,
     report: Report,
     pwm_currents: Option<Abc>,
+    /// From when on nothing is spoilt any more.
+    spoil_until: u32,
+    /// The operator acknowledges from this instant on.
+    acknowledge_from: u32,
+    /// Whether the board lets the gates go again.
+    lets_go: bool,
+    /// What happened to the safe state, by either interrupt: entered or left, when.
+    safe_states: Vec<(Option<SafeState>, u32)>,
+    /// Every change of the reported fault.
+    faults: Vec<(Option<Fault>, u32)>,
+    /// The last half with pulses.
+    pulsed: u32,
 }
 
 impl Fake {
@@ -41,7 +53,17 @@ impl Fake {
             played: CarrierPeriod::default(),
             report: Report::default(),
             pwm_currents: None,
+            spoil_until: u32::MAX,
+            acknowledge_from: u32::MAX,
+            lets_go: true,
+            safe_states: Vec::new(),
+            faults: Vec::new(),
+            pulsed: 0,
         }
+    }
+
+    fn is_spoilt(&self, now: Instant) -> bool {
+        (self.spoil_from..self.spoil_until).contains(&now.0)
     }
 
     fn angle(&self, now: Instant) -> Angle {
@@ -66,22 +88,31 @@ impl ControlPort for Fake {
             },
             demand: Demand { torque_nm: 200.0, slew_limited: false },
             enable: true,
+            window: LinkWindow::OPEN,
+            acknowledge: 0,
+            hardware: None,
         };
-        if now.0 >= self.spoil_from {
+        if self.is_spoilt(now) {
             (self.spoil)(&mut sample);
         }
+        sample.acknowledge = u8::from(now.0 >= self.acknowledge_from);
         sample
     }
 
     fn enter(&mut self, safe: SafeState, now: Instant) {
         self.control_entered = Some((safe, now.0));
+        self.safe_states.push((Some(safe), now.0));
     }
 
     fn overrun_ticks(&mut self, now: Instant) -> u32 {
         if now.0 >= self.spoil_from { self.overrun } else { 0 }
     }
 
-    fn report(&mut self, _now: Instant, report: &Report) {
+    fn report(&mut self, now: Instant, report: &Report) {
+        let fault = report.trip.map(|trip| trip.fault);
+        if fault != self.report.trip.map(|trip| trip.fault) {
+            self.faults.push((fault, now.0));
+        }
         self.report = *report;
     }
 }
@@ -89,17 +120,26 @@ impl ControlPort for Fake {
 impl PwmPort for Fake {
     fn sample(&mut self, now: Instant) -> Abc {
         match self.pwm_currents {
-            Some(currents) if now.0 >= self.spoil_from => currents,
+            Some(currents) if self.is_spoilt(now) => currents,
             _ => self.currents(now),
         }
     }
 
-    fn play(&mut self, _now: Instant, next: &CarrierPeriod) {
+    fn play(&mut self, now: Instant, next: &CarrierPeriod) {
         self.played = *next;
+        if next.mode != Mode::Off {
+            self.pulsed = now.0;
+        }
+    }
+
+    fn leave(&mut self, now: Instant) -> bool {
+        self.safe_states.push((None, now.0));
+        self.lets_go
     }
 
     fn enter(&mut self, safe: SafeState, now: Instant) {
         self.pwm_entered = Some((safe, now.0));
+        self.safe_states.push((Some(safe), now.0));
     }
 }
 
@@ -263,4 +303,114 @@ fn the_safe_state_follows_the_emf() {
     }
     // On a lower link the diodes rectify earlier.
     assert_eq!(tractive::protection::safe_state(1300.0, 1000.0, &BUILT_IN.ratings), SafeState::ShortCircuit);
+}
+
+/// When a passing cause is over.
+const HEALED: u32 = SETTLED + 250_000;
+/// Both sides agree within a control period and the two halves after it.
+const AGREED: u32 = 2_500 + 2 * 20_000;
+
+/// A drive whose measurements are spoilt from `SETTLED` to `HEALED`.
+fn passing(spoil: fn(&mut Sample), acknowledge_from: u32) -> Fake {
+    Fake { spoil, spoil_from: SETTLED, spoil_until: HEALED, acknowledge_from, ..Fake::turning(400.0) }
+}
+
+fn overvoltage(sample: &mut Sample) {
+    sample.measured.udc_v = 2200.0;
+}
+
+#[test]
+fn without_an_acknowledge_a_fault_stays() {
+    let mut fake = passing(overvoltage, u32::MAX);
+    let trip = drive(&mut fake, END, u32::MAX);
+    assert_eq!(trip.map(|trip| trip.fault), Some(Fault::DcOvervoltage));
+    assert_eq!(fake.safe_states.len(), 1, "entered once, never left");
+    assert!(fake.pulsed < SETTLED + 20_000);
+}
+
+#[test]
+fn an_acknowledged_fault_is_forgotten_by_both_sides_and_pulses_are_made_again() {
+    let acknowledged = HEALED + 100_000;
+    for fake in [
+        passing(overvoltage, acknowledged),
+        Fake { pwm_currents: Some(Abc { a: -320.0, b: 160.0, c: 160.0 }), ..passing(|_| {}, acknowledged) },
+    ] {
+        let mut fake = fake;
+        assert_eq!(drive(&mut fake, END, u32::MAX), None);
+        let [(entered, from), (None, until)] = fake.safe_states[..] else { panic!("{:?}", fake.safe_states) };
+        assert_eq!(entered, Some(SafeState::GatesOff));
+        assert!(from < SETTLED + 20_000 && (acknowledged..acknowledged + AGREED).contains(&until));
+        let [(Some(_), _), (None, forgotten)] = fake.faults[..] else { panic!("{:?}", fake.faults) };
+        assert!(
+            (until..acknowledged + AGREED).contains(&forgotten),
+            "control forgets after the PWM interrupt"
+        );
+        assert!(fake.pulsed > END - 40_000, "the machine is caught");
+        assert_eq!(fake.report.acknowledged, 1);
+    }
+}
+
+#[test]
+fn a_fault_whose_cause_is_still_there_is_reported_again() {
+    let acknowledged = SETTLED + 100_000;
+    let mut fake = passing(overvoltage, acknowledged);
+    let trip = drive(&mut fake, END, u32::MAX).unwrap();
+    assert_eq!(trip.fault, Fault::DcOvervoltage);
+    assert!(trip.at.0 > acknowledged, "a new one: {trip:?}");
+    let states: Vec<_> = fake.safe_states.iter().map(|(state, _)| state.is_some()).collect();
+    assert_eq!(states, [true, false, true], "left and entered again: {:?}", fake.safe_states);
+    assert!(fake.pulsed < SETTLED + 20_000, "and no pulse in between");
+}
+
+#[test]
+fn an_acknowledge_counts_once() {
+    // It comes first, the fault later.
+    let mut fake = passing(overvoltage, SETTLED - 500_000);
+    let trip = drive(&mut fake, END, u32::MAX);
+    assert_eq!(trip.map(|trip| trip.fault), Some(Fault::DcOvervoltage));
+    assert_eq!(fake.safe_states.len(), 1);
+}
+
+#[test]
+fn a_board_that_holds_the_gates_is_a_fault_of_its_own() {
+    let mut fake = Fake { lets_go: false, ..passing(overvoltage, HEALED + 100_000) };
+    let trip = drive(&mut fake, END, u32::MAX).unwrap();
+    assert_eq!(trip.fault, Fault::GatesHeld);
+    assert!(fake.pulsed < SETTLED + 20_000);
+}
+
+#[test]
+fn what_holds_the_gates_in_hardware_has_its_name() {
+    for fault in [Fault::GateDriver, Fault::HardwareOvercurrent, Fault::ClockFailure, Fault::PwmDeadline] {
+        let spoil: fn(&mut Sample) = match fault {
+            Fault::GateDriver => |sample| sample.hardware = Some(Fault::GateDriver),
+            Fault::HardwareOvercurrent => |sample| sample.hardware = Some(Fault::HardwareOvercurrent),
+            Fault::ClockFailure => |sample| sample.hardware = Some(Fault::ClockFailure),
+            _ => |sample| sample.hardware = Some(Fault::PwmDeadline),
+        };
+        found_by_control(fault, 1, spoil);
+    }
+}
+
+#[test]
+fn an_empty_link_is_a_fault_only_where_the_gates_may_be_on() {
+    let mut fake = Fake {
+        spoil: |sample| {
+            sample.measured.udc_v = 3.0;
+            sample.enable = false;
+        },
+        ..Fake::turning(0.0)
+    };
+    assert_eq!(drive(&mut fake, END, u32::MAX), None);
+}
+
+#[test]
+fn every_fault_has_a_code_and_a_name_of_its_own() {
+    let names: std::collections::BTreeSet<_> = Fault::ALL.iter().map(|fault| fault.name()).collect();
+    assert_eq!(names.len(), Fault::ALL.len());
+    for fault in Fault::ALL {
+        assert_eq!(Fault::from_code(fault as u32), Some(fault));
+    }
+    assert_eq!(Fault::from_code(0), None);
+    assert_eq!(Fault::from_code(Fault::ALL.len() as u32 + 1), None);
 }

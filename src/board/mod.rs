@@ -9,11 +9,11 @@ pub mod qemu;
 
 mod dual;
 
-use crate::control::{Demand, Measurements};
+use crate::control::{Demand, LinkWindow, Measurements};
 use crate::drive::Report;
 use crate::frames::Abc;
 use crate::modulation::CarrierPeriod;
-use crate::protection::{LegFaults, SafeState};
+use crate::protection::{Fault, LegFaults, SafeState};
 use crate::time::Instant;
 
 pub use dual::{
@@ -29,6 +29,12 @@ pub struct Sample {
     pub demand: Demand,
     /// Whether the gates may be on.
     pub enable: bool,
+    /// DC-link voltages at which torque ends.
+    pub window: LinkWindow,
+    /// Number of the operator's last acknowledge; a new one makes the drive forget its fault.
+    pub acknowledge: u8,
+    /// What holds the gates off in hardware.
+    pub hardware: Option<Fault>,
 }
 
 /// What the control interrupt needs of a board.
@@ -55,6 +61,11 @@ pub trait PwmPort {
     fn play(&mut self, now: Instant, next: &CarrierPeriod);
     /// Puts the gates into the safe state at once, whatever is played.
     fn enter(&mut self, safe: SafeState, now: Instant);
+    /// Leaves the safe state: gates off, until pulses are played again. `false` when something holds the gates: a cause in
+    /// hardware, or a board that only a reset lets go on.
+    fn leave(&mut self, _now: Instant) -> bool {
+        false
+    }
     /// As [`ControlPort::leg_faults`].
     fn leg_faults(&mut self) -> LegFaults {
         LegFaults::default()

@@ -149,9 +149,22 @@ impl Control {
     pub fn acknowledge(&mut self) {
         write_register(CONTROL_TIMER + 0xC, 1);
     }
+
+    /// Makes the PWM interrupt come at once, between two boundaries.
+    pub fn revise_pulses(&mut self) {
+        NVIC::pend(Interrupt::DUALTIMER);
+        // It has run before anything else is done.
+        cortex_m::asm::dsb();
+        cortex_m::asm::isb();
+    }
 }
 
 impl Pwm {
+    /// Whether the interrupt is a carrier boundary's. If not, control wants a revision, and there is nothing to acknowledge.
+    pub fn is_boundary(&self) -> bool {
+        read_register(PWM_TIMER + 0x10) & 1 != 0
+    }
+
     /// Acknowledges the timer's interrupt.
     pub fn acknowledge(&mut self) {
         write_register(PWM_TIMER + 0xC, 1);

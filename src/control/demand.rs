@@ -12,6 +12,53 @@ pub struct Demand {
     pub slew_limited: bool,
 }
 
+/// DC-link voltages between which torque is given: motoring torque ends where the link is low, braking torque where it is high,
+/// each along a straight line between two voltages. By default there is no such end.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LinkWindow {
+    /// No motoring torque here and below, in V.
+    pub motoring_none_v: f32,
+    /// All of it here and above, in V; above `motoring_none_v`.
+    pub motoring_full_v: f32,
+    /// All braking torque here and below, in V; below `braking_none_v`.
+    pub braking_full_v: f32,
+    /// None here and above, in V.
+    pub braking_none_v: f32,
+}
+
+impl LinkWindow {
+    /// No limit.
+    pub const OPEN: Self = Self {
+        motoring_none_v: 0.0,
+        motoring_full_v: 0.0,
+        braking_full_v: f32::MAX,
+        braking_none_v: f32::MAX,
+    };
+
+    /// Lowest and highest torque at a link voltage, of a largest one in N·m, for an electrical angular speed.
+    fn bounds_nm(&self, udc_v: f32, largest_nm: f32, omega: f32) -> (f32, f32) {
+        let (mut motoring, mut braking) = (largest_nm, largest_nm);
+        if udc_v < self.motoring_full_v {
+            motoring *= share(udc_v - self.motoring_none_v, self.motoring_full_v - self.motoring_none_v);
+        }
+        if udc_v > self.braking_full_v {
+            braking *= share(self.braking_none_v - udc_v, self.braking_none_v - self.braking_full_v);
+        }
+        if omega < 0.0 { (-motoring, braking) } else { (-braking, motoring) }
+    }
+}
+
+impl Default for LinkWindow {
+    fn default() -> Self {
+        Self::OPEN
+    }
+}
+
+/// `x` of `span`, 0 where `x` is not positive.
+fn share(x: f32, span: f32) -> f32 {
+    if x > 0.0 { x / span } else { 0.0 }
+}
+
 #[derive(Clone, Copy, Debug)]
 pub struct Shaper {
     /// `None` until pulses are made.
@@ -21,6 +68,8 @@ pub struct Shaper {
 /// What shapes a demand.
 pub struct Input<'a> {
     pub demand: &'a Demand,
+    pub window: &'a LinkWindow,
+    pub udc_v: f32,
     /// Electrical angular speed, in rad/s.
     pub omega: f32,
     /// Torque that flows already, in N·m: where a machine that is caught while turning begins.
@@ -52,7 +101,9 @@ impl Shaper {
         } else {
             wanted
         };
-        let shaped = limit(shaped, -largest, largest);
+        // The link is not slewed: its capacitor is full in milliseconds. A pattern follows torque towards zero at any rate.
+        let (lowest, highest) = input.window.bounds_nm(input.udc_v, largest, input.omega);
+        let shaped = limit(shaped, lowest, highest);
         self.torque_nm = Some(shaped);
         shaped
     }

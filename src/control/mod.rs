@@ -26,7 +26,7 @@ use crate::machine::Tables;
 use crate::time::Clock;
 
 pub use current_loop::{Follows, Gains};
-pub use demand::Demand;
+pub use demand::{Demand, LinkWindow};
 pub use mtpa::{mtpa, mtpa_passes};
 pub use reference::{OperatingPoint, Region, VoltageLimit, operating_point, six_step_v};
 pub use speed_loop::{SpeedDesign, SpeedInput, SpeedLoop};
@@ -105,6 +105,8 @@ pub struct Input<'a> {
     pub measured: &'a Measurements,
     /// The operator's demand.
     pub demand: &'a Demand,
+    /// Where the link ends it.
+    pub window: &'a LinkWindow,
     /// What the modulator will do meanwhile.
     pub committed: &'a Committed,
     /// The carrier boundary that has passed since the last step, if one has.
@@ -228,7 +230,7 @@ impl Controller {
 
     /// One control period: the voltage for the carrier half that begins at the horizon.
     pub fn step(&mut self, input: &Input, law: &Law) -> Output {
-        let Input { measured, demand, committed, boundary } = *input;
+        let Input { measured, demand, window, committed, boundary } = *input;
         let Law { gains, clock, tables } = *law;
         let omega = self.speed.omega();
         let frame = measured.angle.sin_cos();
@@ -237,6 +239,8 @@ impl Controller {
         let measured_nm = self::torque_nm(tables, flux, current) * self.map_error.scale();
         let shaping = demand::Input {
             demand,
+            window,
+            udc_v: measured.udc_v,
             omega,
             flowing_nm: measured_nm,
             can_step: committed.follows == Follows::Mean,

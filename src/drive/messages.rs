@@ -24,6 +24,10 @@ pub struct VoltageCommand {
     pub valid_from: Instant,
     /// Whether to make pulses at all.
     pub gates: Gates,
+    /// Whether it is for the half that is already committed, not for the one after it.
+    pub revises: bool,
+    /// Number of the operator's last acknowledge.
+    pub acknowledge: u8,
 }
 
 impl Words<9> for VoltageCommand {
@@ -38,12 +42,14 @@ impl Words<9> for VoltageCommand {
             reference.udc_v.to_bits(),
             reference.depth.to_bits(),
             self.valid_from.0,
-            u32::from(self.gates == Gates::Pulse),
+            u32::from(self.gates == Gates::Pulse)
+                | u32::from(self.revises) << 1
+                | u32::from(self.acknowledge) << 8,
         ]
     }
 
     fn from_words(words: [u32; 9]) -> Self {
-        let [voltage, angle, carrier_angle, rate, at, udc, depth, valid_from, gates] = words;
+        let [voltage, angle, carrier_angle, rate, at, udc, depth, valid_from, flags] = words;
         Self {
             reference: Reference {
                 voltage_v: f32::from_bits(voltage),
@@ -55,7 +61,9 @@ impl Words<9> for VoltageCommand {
                 depth: f32::from_bits(depth),
             },
             valid_from: Instant(valid_from),
-            gates: if gates == 1 { Gates::Pulse } else { Gates::Off },
+            gates: if flags & 1 != 0 { Gates::Pulse } else { Gates::Off },
+            revises: flags & 2 != 0,
+            acknowledge: (flags >> 8) as u8,
         }
     }
 }
@@ -80,6 +88,26 @@ pub struct Applied {
     pub mirrored: bool,
     /// A fault that the PWM interrupt found.
     pub trip: Option<Trip>,
+    /// Number of the acknowledge that it carried out last, at `at` and at the boundary before.
+    pub acknowledged: [u8; 2],
+}
+
+impl Applied {
+    /// Gates off, in halves of one length, the present one from `at` on.
+    pub const fn at_rest(at: Instant, off: CarrierPeriod) -> Self {
+        let currents_a = Abc { a: 0.0, b: 0.0, c: 0.0 };
+        Self {
+            at,
+            before: off,
+            running: off,
+            next: off,
+            currents_a,
+            currents_before_a: currents_a,
+            mirrored: false,
+            trip: None,
+            acknowledged: [0; 2],
+        }
+    }
 }
 
 impl Words<27> for Applied {
@@ -90,7 +118,8 @@ impl Words<27> for Applied {
         let [ia, ib, ic] = currents_to_words(self.currents_a);
         let [ja, jb, jc] = currents_to_words(self.currents_before_a);
         let [t0, t1, t2, t3] = trip_to_words(self.trip);
-        let (at, mirrored) = (self.at.0, u32::from(self.mirrored));
+        let [now, before] = self.acknowledged.map(u32::from);
+        let (at, mirrored) = (self.at.0, u32::from(self.mirrored) | now << 8 | before << 16);
         [
             at, b0, b1, b2, b3, b4, r0, r1, r2, r3, r4, n0, n1, n2, n3, n4, ia, ib, ic, ja, jb, jc, mirrored,
             t0, t1, t2, t3,
@@ -107,8 +136,9 @@ impl Words<27> for Applied {
             next: half_from_words([n0, n1, n2, n3, n4]),
             currents_a: currents_from_words([ia, ib, ic]),
             currents_before_a: currents_from_words([ja, jb, jc]),
-            mirrored: mirrored != 0,
+            mirrored: mirrored & 1 != 0,
             trip: trip_from_words(trip),
+            acknowledged: [(mirrored >> 8) as u8, (mirrored >> 16) as u8],
         }
     }
 }
@@ -166,7 +196,7 @@ pub fn trip_from_words(words: [u32; 4]) -> Option<Trip> {
         value: f32::from_bits(value),
         limit: f32::from_bits(limit),
         at: Instant(at),
-        safe: SafeState::from_code(code >> 8),
+        safe: SafeState::from_code(code >> 8 & 0xFF),
     })
 }
 
@@ -187,11 +217,20 @@ pub struct Report {
     pub map_error: f32,
     /// The latched fault, if any.
     pub trip: Option<Trip>,
+    /// DC-link voltage, in V.
+    pub udc_v: f32,
+    /// Largest magnitude of a phase current, in A.
+    pub current_a: f32,
+    /// Whether the speed has been followed long enough to be used.
+    pub speed_known: bool,
+    /// Number of the acknowledge that both interrupts have carried out.
+    pub acknowledged: u8,
 }
 
-impl Words<10> for Report {
-    fn to_words(self) -> [u32; 10] {
+impl Words<12> for Report {
+    fn to_words(self) -> [u32; 12] {
         let [code, value, limit, at] = trip_to_words(self.trip);
+        let code = code | u32::from(self.acknowledged) << 16 | u32::from(self.speed_known) << 24;
         [
             self.torque_nm.to_bits(),
             self.id_a.to_bits(),
@@ -203,11 +242,13 @@ impl Words<10> for Report {
             value,
             limit,
             at,
+            self.udc_v.to_bits(),
+            self.current_a.to_bits(),
         ]
     }
 
-    fn from_words(words: [u32; 10]) -> Self {
-        let [torque, id, iq, voltage, frequency, map_error, trip @ ..] = words;
+    fn from_words(words: [u32; 12]) -> Self {
+        let [torque, id, iq, voltage, frequency, map_error, code, value, limit, at, udc, current] = words;
         Self {
             torque_nm: f32::from_bits(torque),
             id_a: f32::from_bits(id),
@@ -215,7 +256,11 @@ impl Words<10> for Report {
             voltage_v: f32::from_bits(voltage),
             frequency_hz: f32::from_bits(frequency),
             map_error: f32::from_bits(map_error),
-            trip: trip_from_words(trip),
+            trip: trip_from_words([code, value, limit, at]),
+            udc_v: f32::from_bits(udc),
+            current_a: f32::from_bits(current),
+            speed_known: code >> 24 & 1 != 0,
+            acknowledged: (code >> 16) as u8,
         }
     }
 }

@@ -7,18 +7,25 @@
 use super::messages::{Applied, Gates, Report, VoltageCommand};
 use crate::board::{ControlPort, PwmPort, Sample};
 use crate::cell::{Downlink, Uplink};
-use crate::control::{Boundary, Committed, Controller, Follows, Gains, Input, Law};
+use crate::control::{Boundary, Committed, Controller, Demand, Follows, Gains, Input, Law};
 use crate::frames::{Abc, AlphaBeta, Angle};
 use crate::machine::Tables;
 use crate::modulation::{
     CarrierPeriod, Devices, Mode, Modulator, Reference, Schedule, compensated, depth_limit, first_half,
     ripple_flux, ripple_share,
 };
-use crate::protection::{self, Disarmed, Fault, FrozenWatch, Trip, Violation};
+use crate::protection::{self, Disarmed, Fault, FrozenWatch, SafeState, Trip, Violation};
 use crate::time::{Clock, Instant};
 
 /// Angle units (2⁻³² turn) in one radian.
 pub(super) const UNITS_PER_RADIAN: f32 = 4_294_967_296.0 / core::f32::consts::TAU;
+
+/// A demand that jumps by more than this share of the largest torque is worth revising the next half for.
+const JUMP_SHARE: f32 = 0.05;
+
+/// Control periods that the running half must still last for the next one to be revised: one until the command is valid, and one
+/// in which control sees what became of it.
+const REVISION_PERIODS: u32 = 2;
 
 /// Control periods after which a command is too old to make pulses from.
 const STALE_PERIODS: i32 = 5;
@@ -45,8 +52,10 @@ pub struct Settings {
 
 /// The cells between the two interrupts.
 pub struct Shared {
-    command: Downlink<VoltageCommand, 9>,
-    applied: Uplink<Applied, 27>,
+    /// What control wants of the modulator.
+    pub command: Downlink<VoltageCommand, 9>,
+    /// What the modulator does.
+    pub applied: Uplink<Applied, 27>,
 }
 
 impl Shared {
@@ -82,8 +91,15 @@ pub struct ControlTask {
     filled_to: f32,
     /// Mode that the newest command was made for, and the halves for which its flux hexagon still changes its size.
     unsettled: (Mode, u32),
+    /// The last demand, in N·m, and whether it has jumped and no half has been revised for it yet.
+    demand_nm: f32,
+    jumped: bool,
+    /// Whether the newest command is for the half that is already committed.
+    revises: bool,
     disarmed: Disarmed,
     trip: Option<Trip>,
+    /// Number of the acknowledge that both interrupts have carried out.
+    acknowledged: u8,
 }
 
 impl ControlTask {
@@ -100,9 +116,19 @@ impl ControlTask {
             depth: 0.0,
             filled_to: 0.0,
             unsettled: (Mode::Off, 0),
+            demand_nm: 0.0,
+            jumped: false,
+            revises: false,
             disarmed: Disarmed::NONE,
             trip: None,
+            acknowledged: 0,
         }
+    }
+
+    /// Whether [`PwmTask::revise`] is to run before the next [`ControlTask::run`], at the same instant: first thing in the interrupt,
+    /// the handler makes the PWM interrupt pending.
+    pub fn wants_revision(&self) -> bool {
+        self.revises
     }
 
     /// The same without a check.
@@ -117,6 +143,8 @@ impl ControlTask {
         self.now = now.after(self.settings.clock.control_ticks);
         let sample = port.sample(now);
         let applied = shared.applied.read().map(|applied| as_of(&applied, now));
+        self.forget_acknowledged(sample.acknowledge, applied.as_ref());
+        self.check(sample.hardware.map(|fault| (fault, 1.0, 0.0)), &sample, port);
         self.adopt_trip(applied.as_ref().and_then(|applied| applied.trip));
         self.check_legs(&sample, port);
         let omega = self.track(&sample, port);
@@ -125,9 +153,23 @@ impl ControlTask {
             &sample,
             port,
         );
+        if sample.enable {
+            self.check(
+                protection::check_undervoltage(sample.measured.udc_v, &self.tables.ratings),
+                &sample,
+                port,
+            );
+        }
         self.check(protection::check_demand(&sample.demand), &sample, port);
         let pulsing = self.trip.is_none() && sample.enable && self.controller.speed_is_known();
-        let mut report = Report { frequency_hz: omega / core::f32::consts::TAU, ..Report::default() };
+        let mut report = Report {
+            frequency_hz: omega / core::f32::consts::TAU,
+            udc_v: sample.measured.udc_v,
+            current_a: sample.measured.currents_a.peak(),
+            speed_known: self.controller.speed_is_known(),
+            acknowledged: self.acknowledged,
+            ..Report::default()
+        };
         let mut command = VoltageCommand {
             reference: Reference {
                 voltage_v: 0.0,
@@ -140,6 +182,8 @@ impl ControlTask {
             },
             valid_from: self.now,
             gates: Gates::Off,
+            revises: false,
+            acknowledge: sample.acknowledge,
         };
         if pulsing {
             let frozen = self.watch.check(
@@ -168,6 +212,7 @@ impl ControlTask {
         if self.trip.is_some() {
             command.gates = Gates::Off;
         }
+        self.revises = command.revises && command.gates == Gates::Pulse;
         shared.command.publish(command);
         report.trip = self.trip;
         port.report(now, &report);
@@ -207,13 +252,15 @@ impl ControlTask {
         report: &mut Report,
     ) {
         let now = command.reference.at;
-        let committed = self.committed(applied, now, omega, sample.measured.udc_v);
+        command.revises = applied.is_some_and(|applied| self.is_to_revise(applied, now, &sample.demand));
+        let committed = self.committed(applied, now, omega, sample.measured.udc_v, command.revises);
         let boundary = self.new_boundary(applied, now, sample.measured.udc_v);
         let decided = applied.map_or(Mode::Off, |applied| applied.next.ahead[0]);
         let committed = Committed { settled: self.is_settled(decided, boundary.is_some()), ..committed };
         let input = Input {
             measured: &sample.measured,
             demand: &sample.demand,
+            window: &sample.window,
             committed: &committed,
             boundary: boundary.as_ref(),
         };
@@ -268,8 +315,28 @@ impl ControlTask {
         omega * (UNITS_PER_RADIAN * self.settings.clock.tick_s)
     }
 
-    /// What the modulator will do until a command of this period can act.
-    fn committed(&mut self, applied: Option<&Applied>, now: Instant, omega: f32, udc_v: f32) -> Committed {
+    /// Whether the demand has jumped and the next half can still be changed: the running one lasts long enough, and the next one is
+    /// of the free carrier, whose length is always the same.
+    fn is_to_revise(&mut self, applied: &Applied, now: Instant, demand: &Demand) -> bool {
+        let change = demand.torque_nm - self.demand_nm;
+        self.demand_nm = demand.torque_nm;
+        self.jumped |= !demand.slew_limited && change.abs() > JUMP_SHARE * self.tables.ratings.max_torque_nm;
+        let latest = now.after(REVISION_PERIODS * self.settings.clock.control_ticks);
+        let end = applied.at.after(applied.running.period_ticks);
+        let revises = self.jumped && applied.next.is_free() && end.reached(latest);
+        self.jumped &= !revises;
+        revises
+    }
+
+    /// What the modulator will do until a command of this period can act; with `revises` only the running half stands.
+    fn committed(
+        &mut self,
+        applied: Option<&Applied>,
+        now: Instant,
+        omega: f32,
+        udc_v: f32,
+        revises: bool,
+    ) -> Committed {
         let clock = self.settings.clock;
         let Some(applied) = applied else {
             let interval_s = clock.seconds(self.settings.devices.shortest_half_ticks as i32);
@@ -290,9 +357,12 @@ impl ControlTask {
         let (running, next) = (&applied.running, &applied.next);
         let elapsed = now.since(applied.at).max(0) as u32;
         let off = running.mode == Mode::Off || next.mode == Mode::Off;
-        let left = running.period_ticks.saturating_sub(elapsed) + next.period_ticks;
-        let volt_seconds =
-            volt_seconds(running, elapsed, udc_v, &clock) + volt_seconds(next, 0, udc_v, &clock);
+        let mut left = running.period_ticks.saturating_sub(elapsed);
+        let mut volt_seconds = volt_seconds(running, elapsed, udc_v, &clock);
+        if !revises {
+            left += next.period_ticks;
+            volt_seconds = volt_seconds + self::volt_seconds(next, 0, udc_v, &clock);
+        }
         let [decided, _] = next.ahead;
         let largest = depth_limit(decided, self.rate(omega), &self.settings.devices);
         let largest = if decided == Mode::Square { largest } else { REGULATION_ROOM * largest };
@@ -369,6 +439,17 @@ impl ControlTask {
         self.trip = Some(Trip { fault, value, limit, at, safe });
     }
 
+    /// Forgets the fault that is acknowledged once the PWM interrupt has: what it told before that cannot come back, and
+    /// the safe state that it has left is not entered again for the old fault's sake.
+    fn forget_acknowledged(&mut self, acknowledge: u8, applied: Option<&Applied>) {
+        if acknowledge != self.acknowledged
+            && applied.is_some_and(|applied| applied.acknowledged[0] == acknowledge)
+        {
+            self.acknowledged = acknowledge;
+            self.trip = None;
+        }
+    }
+
     /// First of all checks: a leg that is stuck decides on the safe state.
     fn check_legs(&mut self, sample: &Sample, port: &mut impl ControlPort) {
         let found = port.leg_faults();
@@ -400,6 +481,7 @@ fn as_of(applied: &Applied, now: Instant) -> Applied {
         running: applied.before,
         next: applied.running,
         currents_a: applied.currents_before_a,
+        acknowledged: [applied.acknowledged[1]; 2],
         trip: applied.trip.filter(|trip| now.reached(trip.at)),
         ..*applied
     }
@@ -416,13 +498,10 @@ pub struct PwmTask {
     tables: &'static Tables,
     settings: Settings,
     modulator: Modulator,
-    /// Nominal instant of the next call: the boundary where `next` begins.
+    /// Nominal instant of the next call: the boundary where `applied.next` begins.
     now: Instant,
-    running: CarrierPeriod,
-    next: CarrierPeriod,
-    currents_a: Abc,
+    applied: Applied,
     disarmed: Disarmed,
-    trip: Option<Trip>,
 }
 
 impl PwmTask {
@@ -444,11 +523,8 @@ impl PwmTask {
             settings,
             modulator: Modulator::new(settings.devices, schedule),
             now: first,
-            running: off,
-            next: off,
-            currents_a: Abc { a: 0.0, b: 0.0, c: 0.0 },
+            applied: Applied::at_rest(first, off),
             disarmed: Disarmed::NONE,
-            trip: None,
         }
     }
 
@@ -460,48 +536,69 @@ impl PwmTask {
 
     /// The same for a timer whose first two halves, before the first one of the modulator's, have another length.
     pub const fn after_halves_of(mut self, ticks: u32) -> Self {
-        self.running = CarrierPeriod::off(ticks);
-        self.next = CarrierPeriod::off(ticks);
+        self.applied = Applied::at_rest(self.now, CarrierPeriod::off(ticks));
         self
     }
 
     /// The PWM timer's interrupt, at a carrier boundary. Deadline: the next boundary, where the shadow registers take over.
     pub fn run(&mut self, port: &mut impl PwmPort, shared: &Shared) {
         let now = self.now;
-        let before = core::mem::replace(&mut self.running, self.next);
-        let currents_before_a = core::mem::replace(&mut self.currents_a, port.sample(now));
+        let last = self.applied;
+        self.applied = Applied {
+            at: now,
+            before: last.running,
+            running: last.next,
+            currents_a: port.sample(now),
+            currents_before_a: last.currents_a,
+            acknowledged: [last.acknowledged[0]; 2],
+            ..last
+        };
         let command = shared.command.newest(|command| now.reached(command.valid_from));
+        self.forget_acknowledged(&command, port);
         self.check(&command, port);
-        let start = now.after(self.running.period_ticks);
-        let pulsing = self.trip.is_none();
-        self.next = match &command {
+        let start = now.after(self.applied.running.period_ticks);
+        let pulsing = self.applied.trip.is_none();
+        self.applied.next = match &command {
             Some(command) if command.gates == Gates::Pulse && pulsing => {
                 self.modulator.step(start, Some(&command.reference))
             }
             resting => self.modulator.rest(start, resting.as_ref().map(|command| &command.reference)),
         };
+        self.applied.mirrored = self.modulator.is_mirrored();
         self.now = start;
-        let expected = self.expected_currents(currents_before_a);
+        self.play(port, shared);
+    }
+
+    /// The PWM interrupt when it is no boundary that it comes for, but control's [`ControlTask::wants_revision`]: makes the next half
+    /// anew from the newest command, if its boundary is still ahead.
+    pub fn revise(&mut self, port: &mut impl PwmPort, shared: &Shared) {
+        let Applied { at, next, trip, .. } = self.applied;
+        // A command from before the last boundary was for the half that runs by now.
+        let command = shared.command.newest(|command| command.valid_from.reached(at));
+        if let Some(command) = command
+            && command.revises
+            && trip.is_none()
+            && next.is_free()
+        {
+            self.applied.next = self.modulator.revised(&next, self.now, &command.reference);
+            self.play(port, shared);
+        }
+    }
+
+    fn play(&self, port: &mut impl PwmPort, shared: &Shared) {
+        let applied = &self.applied;
         let small_a = SMALL_CURRENT_SHARE * self.tables.ratings.max_current_a;
-        port.play(now, &compensated(&self.next, &expected, small_a, &self.settings.devices));
-        shared.applied.publish(Applied {
-            at: now,
-            before,
-            running: self.running,
-            next: self.next,
-            currents_a: self.currents_a,
-            currents_before_a,
-            mirrored: self.modulator.is_mirrored(),
-            trip: self.trip,
-        });
+        let expected = self.expected_currents();
+        port.play(applied.at, &compensated(&applied.next, &expected, small_a, &self.settings.devices));
+        shared.applied.publish(*applied);
     }
 
     /// Phase currents in the middle of the next half, from the boundaries at both ends of the half before the running one.
-    fn expected_currents(&self, before: Abc) -> Abc {
+    fn expected_currents(&self) -> Abc {
         /// From the last boundary to the middle of the next half, in halves.
         const AHEAD: f32 = 1.5;
         let ahead = |now: f32, before: f32| now + AHEAD * (now - before);
-        let now = self.currents_a;
+        let Applied { currents_a: now, currents_before_a: before, .. } = self.applied;
         Abc { a: ahead(now.a, before.a), b: ahead(now.b, before.b), c: ahead(now.c, before.c) }
     }
 
@@ -512,16 +609,36 @@ impl PwmTask {
 
     /// The latched fault.
     pub fn trip(&self) -> Option<Trip> {
-        self.trip
+        self.applied.trip
+    }
+
+    /// Forgets the fault that is acknowledged and leaves the safe state, gates off. Each acknowledge does so once: while pulses are
+    /// made there is nothing to forget.
+    fn forget_acknowledged(&mut self, command: &Option<VoltageCommand>, port: &mut impl PwmPort) {
+        let Some(command) = command else {
+            return;
+        };
+        if command.acknowledge == self.applied.acknowledged[0] {
+            return;
+        }
+        self.applied.acknowledged[0] = command.acknowledge;
+        if command.gates == Gates::Pulse {
+            return;
+        }
+        self.applied.trip = None;
+        if !port.leave(self.now) {
+            let (value, limit, safe) = (1.0, 0.0, SafeState::GatesOff);
+            self.applied.trip = Some(Trip { fault: Fault::GatesHeld, value, limit, at: self.now, safe });
+        }
     }
 
     fn check(&mut self, command: &Option<VoltageCommand>, port: &mut impl PwmPort) {
-        if self.trip.is_some() {
+        if self.applied.trip.is_some() {
             return;
         }
         let legs = port.leg_faults();
         let armed = |(fault, _, _): &Violation| !self.disarmed.has(*fault);
-        let currents = || protection::check_currents(&self.currents_a, &self.tables.ratings);
+        let currents = || protection::check_currents(&self.applied.currents_a, &self.tables.ratings);
         let stale = || command.as_ref().and_then(|command| self.stale(command));
         let violation = legs.check().or_else(|| currents().filter(armed)).or_else(|| stale().filter(armed));
         let Some((fault, value, limit)) = violation else {
@@ -534,7 +651,7 @@ impl PwmTask {
         let omega = rate * self.settings.clock.ticks_per_s / UNITS_PER_RADIAN;
         let safe = legs.safe_state(omega, udc_v, &self.tables.ratings);
         port.enter(safe, self.now);
-        self.trip = Some(Trip { fault, value, limit, at: self.now, safe });
+        self.applied.trip = Some(Trip { fault, value, limit, at: self.now, safe });
     }
 
     fn stale(&self, command: &VoltageCommand) -> Option<Violation> {

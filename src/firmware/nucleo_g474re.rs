@@ -67,7 +67,11 @@ fn TIM3() {
     });
     board.acknowledge();
     let first = Instant(CLOCK.control_ticks);
-    TASK.get_or_insert_with(|| ControlTask::new(&BUILT_IN, settings(), first)).run(board, &SHARED);
+    let task = TASK.get_or_insert_with(|| ControlTask::new(&BUILT_IN, settings(), first));
+    if task.wants_revision() {
+        board::revise_pulses();
+    }
+    task.run(board, &SHARED);
     PULSE.control_ran();
 }
 
@@ -77,15 +81,19 @@ fn TIM1_UP_TIM16() {
     static mut BOARD: Option<Pwm> = None;
     static mut TASK: Option<PwmTask> = None;
     let board = BOARD.get_or_insert_with(|| Pwm::new(Registers::CHIP, kept(&PWM_ZEROS)));
-    board.acknowledge();
-    board.begin_half();
     let task = TASK.get_or_insert_with(|| {
         let settings = settings();
         let first = Instant(settings.devices.shortest_half_ticks);
         PwmTask::new(&BUILT_IN, settings, first)
     });
-    task.run(board, &SHARED);
-    PULSE.pwm_ran();
+    if board.is_boundary() {
+        board.acknowledge();
+        board.begin_half();
+        task.run(board, &SHARED);
+        PULSE.pwm_ran();
+    } else {
+        task.revise(board, &SHARED);
+    }
 }
 
 #[exception]

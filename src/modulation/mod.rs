@@ -143,6 +143,11 @@ impl CarrierPeriod {
         }
     }
 
+    /// Whether it is a half of the free carrier and two more follow: its length depends on nothing.
+    pub fn is_free(&self) -> bool {
+        (self.mode, self.ahead) == (Mode::Async, [Mode::Async; 2])
+    }
+
     /// For how many ticks each phase is at the upper level, from `from` ticks after the start to the end.
     pub fn on_ticks(&self, from: u32) -> [u32; 3] {
         let mut on = [0; 3];
@@ -337,6 +342,18 @@ impl Modulator {
             half.start_levels.swap(1, 2);
         }
         half
+    }
+
+    /// A free half ([`CarrierPeriod::is_free`]) that begins at `start`, made anew from a newer reference.
+    pub fn revised(&self, half: &CarrierPeriod, start: Instant, reference: &Reference) -> CarrierPeriod {
+        let seen = if self.mirrored { reference.mirrored() } else { *reference };
+        let mut revised = carrier::asynchronous(half.half.into(), start, &seen, &self.devices);
+        (revised.mode, revised.half, revised.ahead) = (half.mode, half.half, half.ahead);
+        if self.mirrored {
+            revised.compare_ticks.swap(1, 2);
+            revised.start_levels.swap(1, 2);
+        }
+        revised
     }
 
     /// All gates off; where a reference is known, with the mode that it would begin with announced.

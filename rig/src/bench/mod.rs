@@ -23,7 +23,7 @@ use inject::{Kind, Spoiler};
 use link::Link;
 use std::collections::VecDeque;
 use tractive::board::Sample;
-use tractive::control::Demand;
+use tractive::control::{Demand, LinkWindow};
 use tractive::drive::Report;
 use tractive::frames::{Abc, Angle};
 use tractive::modulation::{CarrierPeriod, Mode};
@@ -386,7 +386,8 @@ impl Bench {
         let mut measured = self.sensors.measure(&self.plant, t_s);
         measured.udc_v = self.udc_v(t_s) as f32;
         measured.currents_a = self.read_currents(measured.currents_a);
-        let mut sample = Sample { measured, demand, enable };
+        let mut sample =
+            Sample { measured, demand, enable, window: LinkWindow::OPEN, acknowledge: 0, hardware: None };
         self.spoiler.control(t_s, &mut sample);
         self.samples.push_back((self.now, sample));
         self.next_sample = self.now + Tick::from(self.clock.control_ticks);

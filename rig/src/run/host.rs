@@ -5,7 +5,7 @@ use crate::bench::{Bench, BenchError};
 use crate::campaign::without::Without;
 use crate::trace::Recording;
 use tractive::board::{ControlPort, PwmPort, Sample};
-use tractive::control::{Demand, Measurements};
+use tractive::control::{Demand, LinkWindow, Measurements};
 use tractive::drive::Report;
 use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
 use tractive::frames::{Abc, Angle};
@@ -26,7 +26,14 @@ impl ControlPort for Port<'_> {
         self.bench.control_sample(now).unwrap_or_else(|error| {
             self.error = Some(error);
             let measured = Measurements { currents_a: Abc::default(), udc_v: 0.0, angle: Angle::ZERO };
-            Sample { measured, demand: Demand::default(), enable: false }
+            Sample {
+                measured,
+                demand: Demand::default(),
+                enable: false,
+                window: LinkWindow::OPEN,
+                acknowledge: 0,
+                hardware: None,
+            }
         })
     }
 
@@ -133,6 +140,9 @@ impl Tasks {
             if control_at.reached(pwm_at) || !has_control {
                 self.pwm.run(&mut port, &self.shared);
             } else {
+                if self.control.wants_revision() {
+                    self.pwm.revise(&mut port, &self.shared);
+                }
                 self.control.run(&mut port, &self.shared);
             }
             if let Some(error) = port.error {

@@ -88,6 +88,14 @@ pub fn run() {
     defmt::info!("running");
 }
 
+/// Makes the PWM interrupt come at once, between two boundaries.
+pub fn revise_pulses() {
+    NVIC::pend(Interrupt::TIM1_UP_TIM16);
+    // It has run before anything else is done.
+    cortex_m::asm::dsb();
+    cortex_m::asm::isb();
+}
+
 /// The idle loop, forever: feeds the watchdog, tells what has changed.
 pub fn idle() -> ! {
     let (mut told, mut broken) = (None, false);

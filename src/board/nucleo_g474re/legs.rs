@@ -128,9 +128,9 @@ impl Legs {
         self.tim1.sr().write_value(all_but_update());
     }
 
-    /// Whether another update has come since [`Self::acknowledge`].
+    /// Whether an update has come since the last [`Self::acknowledge`].
     #[inline]
-    pub fn is_late(&self) -> bool {
+    pub fn has_updated(&self) -> bool {
         self.tim1.sr().read().uif()
     }
 

@@ -9,7 +9,7 @@ use core::sync::atomic::{AtomicU32, Ordering};
 /// Demand in, report out.
 pub struct Operator {
     torque_nm: AtomicU32,
-    report: Uplink<Report, 10>,
+    report: Uplink<Report, 12>,
 }
 
 impl Operator {

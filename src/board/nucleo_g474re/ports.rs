@@ -9,7 +9,7 @@ use super::registers::Registers;
 use super::sampling::{Sampler, Zeros, currents_a};
 use super::start::{control_sampler, pwm_sampler};
 use crate::board::{ControlPort, PwmPort, Sample};
-use crate::control::Measurements;
+use crate::control::{LinkWindow, Measurements};
 use crate::drive::Report;
 use crate::frames::{Abc, Angle};
 use crate::modulation::{CarrierPeriod, Mode};
@@ -66,6 +66,9 @@ impl<P: Position> ControlPort for Control<'_, P> {
             measured: Measurements { currents_a: currents_a(codes, &self.zeros), udc_v, angle: self.angle },
             demand: self.operator.demand(),
             enable: healthy && pins::is_enabled(&self.registers),
+            window: LinkWindow::OPEN,
+            acknowledge: 0,
+            hardware: None,
         }
     }
 
@@ -100,7 +103,14 @@ impl Pwm {
         Self { registers, sampler, zeros, pulses: false, levels: [false; 3] }
     }
 
-    /// First thing in the interrupt.
+    /// First thing in the interrupt: whether it is a carrier boundary's. If not, control wants a revision, and there is nothing to
+    /// acknowledge.
+    #[inline]
+    pub fn is_boundary(&self) -> bool {
+        self.registers.legs.has_updated()
+    }
+
+    /// First thing at a boundary.
     #[inline]
     pub fn acknowledge(&mut self) {
         self.registers.legs.acknowledge();
@@ -134,7 +144,7 @@ impl PwmPort for Pwm {
         let half = HalfRegisters::new(next, self.levels);
         let legs = &self.registers.legs;
         legs.play(&half);
-        if legs.is_late() {
+        if legs.has_updated() {
             legs.trip();
         }
         self.pulses = next.mode != Mode::Off;

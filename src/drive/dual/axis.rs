@@ -3,7 +3,8 @@
 use super::{MotorCommand, MotorShare, Settings};
 use crate::board::MotorDemand;
 use crate::control::{
-    Boundary, Committed, Controller, Demand, Follows, Input, Law, Measurements, Region, SpeedInput, SpeedLoop,
+    Boundary, Committed, Controller, Demand, Follows, Input, Law, LinkWindow, Measurements, Region,
+    SpeedInput, SpeedLoop,
 };
 use crate::drive::traction::UNITS_PER_RADIAN;
 use crate::frames::{AlphaBeta, Angle};
@@ -133,6 +134,7 @@ impl Axis {
         let control = Input {
             measured: input.measured,
             demand: &demand,
+            window: &LinkWindow::OPEN,
             committed: &committed,
             boundary: Some(&boundary),
         };

@@ -1,0 +1,136 @@
+//! What is asked of the drive, and what the board says of itself.
+
+use crate::frames::Abc;
+use crate::machine::Ratings;
+use crate::protection::{Fault, Trip};
+use crate::time::Instant;
+
+/// What the command's sender wants, as levels: a frame that is lost or repeated changes nothing. Where a command is an edge, it is
+/// the change from `false` to `true` between two steps; at power-up every level counts as having been `true`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Request {
+    /// Rising edge: enable. `false`: stop, torque ramped to zero, then gates off.
+    pub enable: bool,
+    /// Whether the enabling edge may come with a torque demand other than zero.
+    pub with_torque: bool,
+    /// `true`: gates off at once, without a ramp; as a stop it needs a new enabling edge.
+    pub off: bool,
+    /// `true`: torque ramped to zero, then gates off, the drive stays enabled; `false` again: the machine is caught.
+    pub coast: bool,
+    /// Rising edge: precharge the link and close the main contactor.
+    pub charge: bool,
+    /// Rising edge: open the main contactor and discharge the link.
+    pub discharge: bool,
+    /// Rising edge: acknowledge the fault.
+    pub acknowledge: bool,
+    /// Torque demand, in N·m; positive turns the rotor forward.
+    pub torque_nm: f32,
+    /// Limits within the machine's ratings.
+    pub limits: Limits,
+}
+
+impl Request {
+    /// Nothing wanted, limits as rated.
+    pub const fn idle(ratings: &Ratings) -> Self {
+        Self {
+            enable: false,
+            with_torque: false,
+            off: false,
+            coast: false,
+            charge: false,
+            discharge: false,
+            acknowledge: false,
+            torque_nm: 0.0,
+            limits: Limits::rated(ratings),
+        }
+    }
+}
+
+/// Limits that the command's sender may set, each within the machine's ratings: outside of them they are refused, and the limits
+/// that held before go on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Limits {
+    /// Largest motoring torque, in N·m, 0 ..= the rated largest.
+    pub motoring_nm: f32,
+    /// Largest braking torque, in N·m, 0 ..= the rated largest.
+    pub braking_nm: f32,
+    /// Mechanical speed at which torque that would raise it further is zero, in rad/s, above 0, at most the rated largest.
+    pub speed_rad_s: f32,
+    /// Link voltage at and below which there is no motoring torque, in V.
+    pub link_low_v: f32,
+    /// Link voltage at and above which there is no braking torque, in V.
+    pub link_high_v: f32,
+}
+
+impl Limits {
+    /// As the machine is rated: braking ends halfway between the link's highest operating voltage and its trip level, motoring
+    /// halfway between its lowest one and that trip level.
+    pub const fn rated(ratings: &Ratings) -> Self {
+        Self {
+            motoring_nm: ratings.max_torque_nm,
+            braking_nm: ratings.max_torque_nm,
+            speed_rad_s: ratings.max_speed_rad_s,
+            link_low_v: 0.5 * (ratings.dc_link_min_v + ratings.trip_dc_under_v),
+            link_high_v: 0.5 * (ratings.dc_link_max_v + ratings.trip_dc_over_v),
+        }
+    }
+}
+
+/// The check of the configuration, which others make.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Configuration {
+    /// Not checked yet.
+    #[default]
+    Unchecked = 0,
+    /// Checked and good.
+    Good = 1,
+    /// Checked and refused.
+    Bad = 2,
+}
+
+/// What the board says of itself.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Feedback {
+    /// The precharge relay's auxiliary contact: closed.
+    pub precharge_closed: bool,
+    /// The main contactor's auxiliary contact: closed.
+    pub main_closed: bool,
+    /// The gate drivers are ready.
+    pub driver_ready: bool,
+    /// The input that lets the gates pulse is high.
+    pub enable_input: bool,
+    /// The position sensor answers, or is one that cannot tell at standstill.
+    pub sensor_alive: bool,
+    /// The rotor's angle is known (an incremental encoder's index has passed).
+    pub position_known: bool,
+    /// Phase currents that the sensors show at no current, in A, as found at the start.
+    pub offsets_a: Abc,
+    /// The configuration's check.
+    pub configuration: Configuration,
+    /// Parameters are being written.
+    pub parameters_open: bool,
+    /// What keeps the gates off in hardware, while its cause lasts.
+    pub hardware: Option<Fault>,
+}
+
+/// What the drive says of itself: words of one control interrupt.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Observation {
+    /// The control instant.
+    pub at: Instant,
+    /// DC-link voltage, in V.
+    pub udc_v: f32,
+    /// Largest magnitude of a phase current, in A.
+    pub current_a: f32,
+    /// Electrical angular speed, in rad/s.
+    pub omega: f32,
+    /// Whether the speed has been followed long enough to be used.
+    pub speed_known: bool,
+    /// Torque demand after envelope, slew and limits, in N·m.
+    pub torque_nm: f32,
+    /// The fault that either side has latched.
+    pub trip: Option<Trip>,
+    /// Number of the last acknowledge that both sides have carried out.
+    pub acknowledged: u8,
+}

@@ -1,0 +1,128 @@
+//! What the operator is told.
+
+use crate::protection::Trip;
+
+macro_rules! named {
+    ($(#[$meta:meta])* $name:ident { $($(#[$doc:meta])* $variant:ident = $text:literal),+ $(,)? }) => {
+        $(#[$meta])*
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        #[repr(u8)]
+        pub enum $name { $($(#[$doc])* $variant),+ }
+
+        impl $name {
+            /// All of them, in the order of their codes.
+            pub const ALL: &'static [Self] = &[$(Self::$variant),+];
+
+            /// The name in traces and documents.
+            pub const fn name(self) -> &'static str {
+                match self { $(Self::$variant => $text),+ }
+            }
+
+            /// Its code, its place in [`Self::ALL`].
+            pub const fn code(self) -> u8 {
+                self as u8
+            }
+
+            /// The one with this code; `None` for an unknown number.
+            pub fn from_code(code: u32) -> Option<Self> {
+                Self::ALL.get(code as usize).copied()
+            }
+        }
+    };
+}
+
+named! {
+    /// What the drive is doing.
+    State {
+        /// Waiting for the first measurements and for the configuration's check.
+        Init = "init",
+        /// Sensors, gate drivers, link and configuration are looked at, gates off, contactors open.
+        SelfTest = "self_test",
+        /// Healthy, contactors open, gates off. A link that is alive without them may be used at once.
+        Ready = "ready",
+        /// The link is being charged through the precharge resistor, or the main contactor is closing.
+        Precharge = "precharge",
+        /// The link is alive, the main contactor closed, gates off.
+        Charged = "charged",
+        /// Gates pulse, no torque is asked for.
+        Enabled = "enabled",
+        /// Gates pulse, torque as demanded.
+        Running = "running",
+        /// Enabled, but the gates are off: the machine turns freely and will be caught.
+        Coasting = "coasting",
+        /// Torque is ramped to zero, then the gates go off.
+        Stopping = "stopping",
+        /// Contactors open, then the link's energy goes into the discharge resistor.
+        Discharge = "discharge",
+        /// Gates off or active short circuit, contactors open, until acknowledged.
+        Fault = "fault",
+    }
+}
+
+named! {
+    /// Why a command was not followed.
+    Refusal {
+        /// The self-test has not been passed.
+        NotReady = "not_ready",
+        /// The drive is in fault: acknowledge first.
+        FaultNotAcknowledged = "fault_not_acknowledged",
+        /// The fault's cause is still there.
+        CauseStillPresent = "cause_still_present",
+        /// There is no fault to acknowledge.
+        NoFault = "no_fault",
+        /// The link's voltage is below what operation needs, or it is still being charged.
+        LinkNotCharged = "link_not_charged",
+        /// The link is charged already, or is being charged.
+        AlreadyCharged = "already_charged",
+        /// A torque is demanded at the enabling edge, and it does not say that it may be.
+        TorqueNotZero = "torque_not_zero",
+        /// Parameters are being written.
+        ParametersOpen = "parameters_open",
+        /// The enable input is low.
+        EnableInputLow = "enable_input_low",
+        /// `off` is asked for.
+        OffRequested = "off_requested",
+        /// The rotor's angle or speed is not known yet.
+        PositionUnknown = "position_unknown",
+        /// Gates pulse, or the drive is on its way to a stop: stop first.
+        NotStopped = "not_stopped",
+        /// The link is being discharged.
+        Discharging = "discharging",
+        /// The machine turns so fast that its EMF would charge the link again.
+        MachineTurning = "machine_turning",
+        /// A value of the request is not a finite number; its torque counts as zero, its limits as those before.
+        RequestNotFinite = "request_not_finite",
+        /// A limit lies outside the machine's ratings; the limits before go on.
+        LimitOutOfRange = "limit_out_of_range",
+    }
+}
+
+/// The contactors and the resistors on the link.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Switches {
+    /// Precharge relay closed.
+    pub precharge: bool,
+    /// Main contactor closed.
+    pub main: bool,
+    /// Discharge resistor on the link.
+    pub discharge: bool,
+    /// Braking chopper's duty, 0 ..= 1.
+    pub chopper: f32,
+}
+
+/// What is told after each step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Status {
+    /// The state.
+    pub state: State,
+    /// The fault that is not acknowledged yet.
+    pub trip: Option<Trip>,
+    /// The newest refusal; it stays until a command is followed.
+    pub refusal: Option<Refusal>,
+    /// Commands refused so far; wraps.
+    pub refusals: u32,
+    /// Torque demand after limits, slew and jerk, in N·m.
+    pub torque_nm: f32,
+    /// What is switched.
+    pub switches: Switches,
+}

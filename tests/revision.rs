@@ -1,0 +1,170 @@
+//! A demand that jumps revises the half that is already committed, and nothing else does.
+
+use tractive::board::PwmPort;
+use tractive::drive::traction::{PwmTask, Settings, Shared};
+use tractive::drive::{Gates, VoltageCommand};
+use tractive::frames::{Abc, Angle};
+use tractive::machine::BUILT_IN;
+use tractive::modulation::{CarrierPeriod, Devices, Mode, Modulator, Reference, Schedule};
+use tractive::protection::SafeState;
+use tractive::time::{Clock, Instant};
+
+const CLOCK: Clock = Clock::new(25_000_000, 2_500);
+
+fn settings() -> Settings {
+    Settings {
+        clock: CLOCK,
+        devices: Devices::new(250, 0, 900.0, &CLOCK),
+        gains: tractive::control::Gains::DEFAULT,
+    }
+}
+
+fn half_ticks() -> u32 {
+    settings().devices.shortest_half_ticks
+}
+
+/// A slow fundamental, forward or backward.
+fn reference(voltage_v: f32, direction: f32, at: Instant) -> Reference {
+    let angle = Angle(0x2345_6789);
+    let rate = direction * 13.0 * 4_294_967_296.0 / 25e6;
+    Reference { voltage_v, angle, carrier_angle: angle, rate, at, udc_v: 1_500.0, depth: voltage_v / 955.0 }
+}
+
+#[test]
+fn a_half_made_anew_from_the_same_reference_is_the_same() {
+    for direction in [1.0, -1.0] {
+        let mut modulator = Modulator::new(settings().devices, Schedule::new(&CLOCK));
+        let mut start = Instant(0);
+        for step in 0..40 {
+            let reference = reference(10.0 * step as f32, direction, start);
+            let half = modulator.step(start, Some(&reference));
+            assert!(half.is_free(), "{half:?}");
+            assert_eq!(modulator.revised(&half, start, &reference), half);
+            start = start.after(half.period_ticks);
+        }
+    }
+}
+
+/// What the PWM interrupt plays.
+#[derive(Default)]
+struct Played(Vec<(Instant, CarrierPeriod)>);
+
+impl PwmPort for Played {
+    fn sample(&mut self, _now: Instant) -> Abc {
+        Abc::default()
+    }
+
+    fn play(&mut self, now: Instant, next: &CarrierPeriod) {
+        self.0.push((now, *next));
+    }
+
+    fn enter(&mut self, _safe: SafeState, _now: Instant) {
+        unreachable!("nothing is wrong");
+    }
+}
+
+/// A drive whose PWM interrupt has come at three boundaries, with pulses since the second.
+struct Pulsing {
+    pwm: PwmTask,
+    shared: Shared,
+    played: Played,
+}
+
+impl Pulsing {
+    fn new() -> Self {
+        let mut pulsing = Self::at_two_boundaries();
+        pulsing.publish(100.0, 3 * half_ticks() - 2_500, false);
+        pulsing.run();
+        pulsing
+    }
+
+    fn at_two_boundaries() -> Self {
+        let first = Instant(half_ticks());
+        let mut pulsing = Self {
+            pwm: PwmTask::new(&BUILT_IN, settings(), first),
+            shared: Shared::new(),
+            played: Played::default(),
+        };
+        for boundary in 1..=2 {
+            pulsing.publish(100.0, boundary * half_ticks() - 2_500, false);
+            pulsing.run();
+        }
+        pulsing
+    }
+
+    fn run(&mut self) -> CarrierPeriod {
+        self.pwm.run(&mut self.played, &self.shared);
+        self.played.0.last().unwrap().1
+    }
+
+    /// Publishes a command that is valid from this tick on, one control period after its sample.
+    fn publish(&self, voltage_v: f32, valid_from: u32, revises: bool) {
+        self.publish_of(valid_from - 2_500, voltage_v, valid_from, revises);
+    }
+
+    /// The same for a sample of any tick.
+    fn publish_of(&self, at: u32, voltage_v: f32, valid_from: u32, revises: bool) {
+        let reference = reference(voltage_v, 1.0, Instant(at));
+        let valid_from = Instant(valid_from);
+        self.shared.command.publish(VoltageCommand {
+            reference,
+            valid_from,
+            gates: Gates::Pulse,
+            revises,
+            acknowledge: 0,
+        });
+    }
+
+    fn revise(&mut self) -> Option<CarrierPeriod> {
+        let before = self.played.0.len();
+        self.pwm.revise(&mut self.played, &self.shared);
+        self.played.0.get(before).map(|(at, half)| {
+            assert_eq!(at.0, 3 * half_ticks(), "in the name of the last boundary");
+            *half
+        })
+    }
+}
+
+#[test]
+fn a_revised_half_has_the_newer_voltage_and_is_told_to_control() {
+    let mut drive = Pulsing::new();
+    let committed = drive.played.0.last().unwrap().1;
+    drive.publish(700.0, 3 * half_ticks() + 2_500, true);
+    let revised = drive.revise().unwrap();
+    assert_ne!(revised, committed);
+    // What the boundary would have made of the same reference, had it known it.
+    let mut knowing = Pulsing::at_two_boundaries();
+    knowing.publish_of(3 * half_ticks(), 700.0, 3 * half_ticks() - 1, false);
+    assert_eq!(revised, knowing.run());
+    let applied = drive.shared.applied.read().unwrap();
+    assert_eq!((applied.next, applied.at), (revised, Instant(3 * half_ticks())));
+    // What control is told of the running half is what was played last.
+    drive.publish(700.0, 4 * half_ticks() - 2_500, false);
+    drive.run();
+    assert_eq!(drive.shared.applied.read().unwrap().running, revised);
+}
+
+#[test]
+fn only_a_command_that_asks_for_it_revises() {
+    let mut drive = Pulsing::new();
+    drive.publish(700.0, 3 * half_ticks() + 2_500, false);
+    assert_eq!(drive.revise(), None);
+}
+
+#[test]
+fn a_revision_that_a_boundary_has_overtaken_is_dropped() {
+    let mut drive = Pulsing::new();
+    drive.publish(700.0, 3 * half_ticks() - 1, true);
+    assert_eq!(drive.revise(), None);
+}
+
+#[test]
+fn a_half_that_gives_way_to_another_mode_is_not_revised() {
+    let mut half = Pulsing::new().played.0.last().unwrap().1;
+    assert!(half.is_free());
+    half.ahead = [Mode::Async, Mode::Sync15];
+    assert!(!half.is_free());
+    half.ahead = [Mode::Async; 2];
+    half.mode = Mode::Off;
+    assert!(!half.is_free());
+}
