@@ -38,7 +38,7 @@ pub type Tick = u64;
 const SAFE_STATE_DELAY: Tick = 625;
 
 /// How far a current's reading may be off without making a difference that counts, in A.
-const MUCH_A: f32 = 25.0;
+const MUCH_A: f32 = 23.0;
 
 /// What the operator does, as a function of time.
 pub trait Operator {
