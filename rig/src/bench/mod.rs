@@ -37,8 +37,9 @@ pub type Tick = u64;
 /// than both interrupts together take, as a bound that does not depend on which of them came first.
 const SAFE_STATE_DELAY: Tick = 625;
 
-/// How far a current's reading may be off without making a difference that counts, in A.
-const MUCH_A: f32 = 23.0;
+/// How far a current's reading may be off without making a difference that counts, in A: a tenth of the machine's largest current,
+/// which is what the sum of the phases may be.
+const MUCH_A: f32 = 23.3;
 
 /// What the operator does, as a function of time.
 pub trait Operator {
@@ -356,7 +357,7 @@ impl Bench {
             self.inverter.enter(safe, now);
             let udc_v = self.udc_v(self.seconds(now));
             let unloaded_v = self.unloaded_v(now);
-            self.observed.enters(now, safe, udc_v.max(unloaded_v), &self.plant);
+            self.observed.enters(now, safe, udc_v.max(unloaded_v), udc_v, &self.plant);
         }
         self.inverter.act(now);
         if now == self.inverter.half_end() {

@@ -56,6 +56,8 @@ pub struct Observed {
     pub unloaded_v: f64,
     /// Energy of the machine's field then, in J.
     pub field_at_safe_j: f64,
+    /// Energy that the rotor then still gives while the machine's flux decays against the link, in J.
+    pub braked_at_safe_j: f64,
     /// Largest current of the short-circuited machine with the flux linkage that it has then, in A.
     pub forced_a: f64,
     limits: Limits,
@@ -75,6 +77,7 @@ impl Observed {
             safe: None,
             unloaded_v: 0.0,
             field_at_safe_j: 0.0,
+            braked_at_safe_j: 0.0,
             forced_a: 0.0,
             limits,
             until: Peaks::default(),
@@ -104,11 +107,12 @@ impl Observed {
         }
     }
 
-    /// The gates are safe from now on; without the inverter the link would reach `unloaded_v`.
-    pub fn enters(&mut self, now: Tick, safe: SafeState, unloaded_v: f64, plant: &Plant) {
+    /// The gates are safe from now on, at a link of `udc_v`; without the inverter it would reach `unloaded_v`.
+    pub fn enters(&mut self, now: Tick, safe: SafeState, unloaded_v: f64, udc_v: f64, plant: &Plant) {
         if self.safe.is_none() {
             self.safe = Some((now, safe));
             self.unloaded_v = unloaded_v;
+            self.braked_at_safe_j = plant.braked_j(udc_v);
             (self.field_at_safe_j, self.forced_a) = (plant.field_j(), plant.short_circuit_peak_a());
         }
     }

@@ -61,9 +61,9 @@ const FAULT_S: f64 = 0.005_037;
 const LATER_S: f64 = 0.000_173;
 const LATER_STEPS: usize = 23;
 /// When another torque is wanted, in s: a fault that has not shown must not hide for ever.
-const TURN_S: f64 = 0.125;
-/// End, in s.
-const END_S: f64 = 0.25;
+const TURN_S: f64 = 0.1;
+/// End, in s: full torque is reversed in 0.15 s where it cannot step.
+const END_S: f64 = 0.3;
 /// Before the recording, in s; the torque comes 90 ms before its end.
 const LEAD_S: f64 = 0.12;
 const TORQUE_S: f64 = -0.09;
@@ -71,6 +71,10 @@ const TORQUE_S: f64 = -0.09;
 const AFTERMATH_S: f64 = 0.06;
 /// Means of the torque are over this much time, in s.
 const MEAN_S: f64 = 0.04;
+/// How fast a rotor that is pushed off gets faster, in r/min per s.
+const PUSH_RPM_S: f64 = 2_000.0;
+/// From where a rotor runs away, in r/min: it must be above 6,600 in time.
+const RUNAWAY_FROM_RPM: f64 = 5_000.0;
 /// How fast a rotor that runs away gets faster, in r/min per s: twice what the machine itself can do.
 const RUNAWAY_RPM_S: f64 = 12_000.0;
 
@@ -93,6 +97,25 @@ struct Named {
     rule: Rule,
     /// One of its kind is enough for the fast campaign.
     fast: bool,
+}
+
+impl Named {
+    /// Whether it comes at rest, and the rotor is pushed off.
+    fn needs_rest(&self) -> bool {
+        self.name.ends_with("at-rest")
+    }
+
+    /// Whether it can come there.
+    fn fits(&self, point: &Point) -> bool {
+        let speed_rpm = point.speed_rpm.abs();
+        match self.cause {
+            Cause::Runaway => speed_rpm >= RUNAWAY_FROM_RPM,
+            Cause::Bench(Kind::Angle(AngleFault::Frozen | AngleFault::Reversed)) => {
+                self.needs_rest() == (speed_rpm == 0.0)
+            }
+            _ => true,
+        }
+    }
 }
 
 /// One run.
@@ -130,6 +153,7 @@ fn faults() -> Vec<Named> {
         };
     add("none", Cause::Bench(Kind::Elsewhere), &[], Some(UNFELT), true);
     const SUM: &[Fault] = &[Fault::PhaseSum];
+    const TOO_MUCH: &[Fault] = &[Fault::PhaseSum, Fault::Overcurrent];
     const RAILED: &[Fault] = &[Fault::Overcurrent];
     for (phase, letter) in ["u", "v", "w"].into_iter().enumerate() {
         let first = phase == 0;
@@ -140,7 +164,7 @@ fn faults() -> Vec<Named> {
         sensor("stuck", CurrentFault::Stuck, SUM, Some(BENT));
         sensor("open", CurrentFault::Open, SUM, Some(BENT));
         sensor("offset", CurrentFault::Offset(60.0), SUM, None);
-        sensor("scaled", CurrentFault::Scaled(1.5), SUM, Some(BENT));
+        sensor("scaled", CurrentFault::Scaled(1.5), TOO_MUCH, Some(BENT));
         sensor("noisy", CurrentFault::Noisy(30.0), SUM, None);
         sensor("railed", CurrentFault::Railed(-RANGE_A), RAILED, None);
         sensor("not-finite", CurrentFault::NotFinite, &[Fault::NotFinite], None);
@@ -150,11 +174,15 @@ fn faults() -> Vec<Named> {
     add("current-v-scaled-3%", small(CurrentFault::Scaled(1.03)), &[], Some(BENT), true);
     add("current-v-noisy-2A", small(CurrentFault::Noisy(2.0)), &[], Some(UNFELT), true);
     const LOST: &[Fault] = &[Fault::AngleLost, Fault::Frozen];
+    const PUSHED: &[Fault] = &[Fault::AngleLost, Fault::Frozen, Fault::Overcurrent];
     let angle = |fault| Cause::Bench(Kind::Angle(fault));
     add("angle-frozen", angle(AngleFault::Frozen), LOST, None, true);
     add("angle-jump", angle(AngleFault::Jump(90.0)), LOST, None, true);
     add("angle-glitches", angle(AngleFault::Glitches(40.0, 50)), LOST, None, true);
     add("angle-reversed", angle(AngleFault::Reversed), LOST, None, true);
+    // At rest these cannot be told from a rotor that stands: they come with one that is pushed off.
+    add("angle-frozen-at-rest", angle(AngleFault::Frozen), PUSHED, None, true);
+    add("angle-reversed-at-rest", angle(AngleFault::Reversed), PUSHED, None, true);
     add("angle-late", angle(AngleFault::Late(5)), LOST, Some(BENT), true);
     add("angle-off-2deg", angle(AngleFault::Jump(2.0)), &[], Some(BENT), true);
     let supply = |fault| Cause::Bench(Kind::Supply(fault));
@@ -165,7 +193,7 @@ fn faults() -> Vec<Named> {
     add("link-under", supply(SupplyFault::To(600.0)), &[Fault::DcUndervoltage], None, true);
     const SWINGS: &[Fault] = &[Fault::DcOvervoltage, Fault::DcUndervoltage, Fault::Overcurrent];
     add("link-swings", supply(SupplyFault::Swinging(300.0, 40.0)), SWINGS, Some(UNFELT), true);
-    add("link-sways", supply(SupplyFault::Swinging(150.0, 16.7)), &[], Some(UNFELT), true);
+    add("link-sways", supply(SupplyFault::Swinging(150.0, 16.7)), &[], Some(BENT), true);
     add("overspeed", Cause::Runaway, &[Fault::Overspeed], None, true);
     for (gate, name) in (0_u8..).zip(bench::GATES) {
         let gate_fault = |on| Cause::Bench(Kind::Gate(gate, on));
@@ -201,9 +229,8 @@ pub fn cases(fast: bool) -> Vec<Case> {
     for fault in faults() {
         for point in POINTS {
             for action in Action::ALL {
-                if (fault.cause == Cause::Runaway && point.speed_rpm < 5000.0)
-                    || (fast && !(fault.fast && point.fast))
-                {
+                let slow = fault.needs_rest() || fault.cause == Cause::Runaway;
+                if !fault.fits(&point) || (fast && !(fault.fast && (point.fast || slow))) {
                     continue;
                 }
                 let at_s = match fault.cause {
@@ -297,6 +324,10 @@ impl Drive {
             (Demand { torque_nm: torque_nm as f32, slew_limited: false }, true)
         };
         let (kind, machine, speed) = match case.fault.cause {
+            Cause::Bench(kind) if case.fault.needs_rest() => {
+                let speed = vec![(LEAD_S + at_s, 0.0), (LEAD_S + END_S, PUSH_RPM_S * (END_S - at_s))];
+                (kind, PlantSettings::default(), speed)
+            }
             Cause::Bench(kind) => (kind, PlantSettings::default(), vec![(0.0, point.speed_rpm)]),
             Cause::Machine(flux_scale, resistance_scale) => {
                 let settings = PlantSettings { flux_scale, resistance_scale };
@@ -392,6 +423,9 @@ impl Drive {
     /// rotor's angle, half an electrical turn.
     fn longest_s(&self, case: &Case, carrier_s: f64) -> f64 {
         let carriers_s = 3.0 * carrier_s;
+        if case.fault.needs_rest() {
+            return END_S;
+        }
         match case.fault.cause {
             Cause::Bench(Kind::Current(..) | Kind::Angle(_)) => {
                 let turns_s =
@@ -412,13 +446,18 @@ impl Drive {
     }
 
     /// The highest link voltage that must be expected once the gates are safe, in V: where the line and its choke take the capacitor,
-    /// with the energy of the machine's field on top; or what the diodes rectify.
+    /// with the energy on top that is in the machine's field, and that its rotor gives while the field decays; or what the diodes
+    /// rectify. Below its trip level the link may do what it likes.
     fn forced_udc_v(&self, case: &Case, observed: &Observed) -> f64 {
-        let field_v = (2.0 * observed.field_at_safe_j / LineFilter::TRACTION.capacitance_f).sqrt();
         let pole_pairs = f64::from(self.machine.folder.parameters.pole_pairs);
         let omega = case.point.speed_rpm.abs() * TAU / 60.0 * pole_pairs;
         let rectified_v = 3.0_f64.sqrt() * omega * f64::from(self.machine.tables.ratings.magnet_flux_wb);
-        FORCED * observed.unloaded_v.hypot(field_v).max(rectified_v)
+        let capacitance_f = LineFilter::TRACTION.capacitance_f;
+        let field_v = (2.0 * observed.field_at_safe_j / capacitance_f).sqrt();
+        let braked_v = (2.0 * observed.braked_at_safe_j / capacitance_f).sqrt();
+        let charged_v = observed.unloaded_v.hypot(field_v).hypot(braked_v);
+        let highest_v = self.machine.folder.parameters.trip_dc_over_v;
+        (FORCED * charged_v.max(rectified_v)).max(highest_v)
     }
 }
 
