@@ -75,6 +75,8 @@ pub struct Outcome {
     pub carrier_periods: Option<f64>,
     /// The same time, in ms.
     pub time_ms: Option<f64>,
+    /// From the fault itself, in ms: a sensor that is stuck shows where the current goes elsewhere.
+    pub since_fault_ms: Option<f64>,
     /// Largest phase current from the fault until the gates were safe, in A.
     pub current_until_a: f64,
     /// And after that.

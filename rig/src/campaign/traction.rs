@@ -405,6 +405,9 @@ impl Drive {
             safe_state: observed.safe.map_or("", |(_, safe)| safe_state_name(safe)).to_owned(),
             carrier_periods: time_s.map(|time_s| time_s / carrier_s),
             time_ms: time_s.map(|time_s| time_s * 1e3),
+            since_fault_ms: observed
+                .safe
+                .map(|(safe, _)| (safe as f64 - observed.from as f64) * tick_s * 1e3),
             current_until_a: observed.until.current_a,
             current_after_a: observed.after.current_a,
             current_limit_a,
