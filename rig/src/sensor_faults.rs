@@ -3,11 +3,13 @@
 use rand::SeedableRng;
 use rand::rngs::StdRng;
 use rand_distr::{Distribution, Normal};
+use serde::Serialize;
 use std::collections::VecDeque;
 use tractive::frames::{Abc, Angle};
 
 /// What a current sensor does wrong.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum CurrentFault {
     /// Repeats its last reading.
     Stuck,
@@ -26,7 +28,8 @@ pub enum CurrentFault {
 }
 
 /// What an angle sensor does wrong. Angles electrical, in degrees.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum AngleFault {
     /// Stands still.
     Frozen,

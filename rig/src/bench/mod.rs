@@ -14,7 +14,7 @@ mod sensors;
 pub use inject::Injection;
 pub use inverter::{Edge, GATES, Inverter, Stuck};
 pub use link::{LineFilter, Supply};
-pub use observe::{Limits, Observed, Peaks};
+pub use observe::{Limits, Observed, Peaks, Stored};
 pub use sensors::{Converter, Flaws, Sensors};
 
 use crate::plant::Plant;
@@ -314,7 +314,8 @@ impl Bench {
             }
             self.now = tick;
             let udc_v = self.udc_v(self.seconds(tick));
-            self.observed.note(tick, self.plant.currents_abc(), udc_v, self.plant.speed_rpm());
+            let peaks = Peaks::at(&self.plant.currents_abc(), udc_v, 0.0);
+            self.observed.note(tick, &peaks, self.plant.speed_rpm());
         }
     }
 
@@ -357,7 +358,7 @@ impl Bench {
             self.inverter.enter(safe, now);
             let udc_v = self.udc_v(self.seconds(now));
             let unloaded_v = self.unloaded_v(now);
-            self.observed.enters(now, safe, udc_v.max(unloaded_v), udc_v, &self.plant);
+            self.observed.enters(now, safe, Stored::of(&self.plant, udc_v, unloaded_v));
         }
         self.inverter.act(now);
         if now == self.inverter.half_end() {

@@ -6,6 +6,7 @@
 //! protection off to see which cases are lost.
 
 pub mod command;
+pub mod dual;
 pub mod judge;
 pub mod report;
 pub mod traction;
@@ -106,6 +107,8 @@ pub struct Outcome {
 pub enum Case {
     /// Of the PMaSynRM drive.
     Traction(traction::Case),
+    /// Of the ZS9.
+    Dual(dual::Case),
 }
 
 impl Case {
@@ -113,6 +116,7 @@ impl Case {
     pub fn name(&self) -> String {
         match self {
             Self::Traction(case) => case.name(),
+            Self::Dual(case) => case.name(),
         }
     }
 }
@@ -120,6 +124,7 @@ impl Case {
 /// The machines of both systems, with one protection off or none.
 pub struct Campaign {
     traction: traction::Drive,
+    dual: dual::Drive,
 }
 
 impl Campaign {
@@ -128,7 +133,7 @@ impl Campaign {
     /// # Errors
     /// Machine folders that are not there.
     pub fn new(without: Option<Without>) -> Result<Self> {
-        Ok(Self { traction: traction::Drive::new(without)? })
+        Ok(Self { traction: traction::Drive::new(without)?, dual: dual::Drive::new(without)? })
     }
 
     /// Runs one case.
@@ -138,6 +143,7 @@ impl Campaign {
     pub fn run(&self, case: &Case) -> Result<Outcome> {
         match case {
             Case::Traction(case) => self.traction.run(case),
+            Case::Dual(case) => self.dual.run(case),
         }
     }
 
@@ -157,5 +163,6 @@ impl Campaign {
 
 /// Every case; of the fast ones each fault in each mode once at least.
 pub fn cases(fast: bool) -> Vec<Case> {
-    traction::cases(fast).into_iter().map(Case::Traction).collect()
+    let traction = traction::cases(fast).into_iter().map(Case::Traction);
+    traction.chain(dual::cases(fast).into_iter().map(Case::Dual)).collect()
 }

@@ -355,6 +355,7 @@ impl Drive {
                 current_a: parameters.trip_current_a,
                 udc_v: (parameters.trip_dc_under_v, parameters.trip_dc_over_v),
                 speed_rpm: parameters.trip_speed_rpm,
+                ..Limits::NONE
             },
         };
         let plant = Plant::new(&self.machine.folder, SpeedSource::profile(speed), &machine);
@@ -373,7 +374,9 @@ impl Drive {
         let (trip_a, over_v) = (parameters.trip_current_a, parameters.trip_dc_over_v);
         let current_limit_a = match case.fault.cause {
             // Flux linkage that is there when a device fails cannot leave a machine that is shorted; nothing the gates do is better.
-            Cause::Bench(Kind::Device(_)) => (CURRENT_SHARE * trip_a).max(FORCED * observed.forced_a),
+            Cause::Bench(Kind::Device(_)) => {
+                (CURRENT_SHARE * trip_a).max(FORCED * observed.stored.short_circuit_a)
+            }
             _ => CURRENT_SHARE * trip_a,
         };
         let udc_limit_v = self.forced_udc_v(case, observed);
@@ -456,9 +459,9 @@ impl Drive {
         let omega = case.point.speed_rpm.abs() * TAU / 60.0 * pole_pairs;
         let rectified_v = 3.0_f64.sqrt() * omega * f64::from(self.machine.tables.ratings.magnet_flux_wb);
         let capacitance_f = LineFilter::TRACTION.capacitance_f;
-        let field_v = (2.0 * observed.field_at_safe_j / capacitance_f).sqrt();
-        let braked_v = (2.0 * observed.braked_at_safe_j / capacitance_f).sqrt();
-        let charged_v = observed.unloaded_v.hypot(field_v).hypot(braked_v);
+        let field_v = (2.0 * observed.stored.field_j / capacitance_f).sqrt();
+        let braked_v = (2.0 * observed.stored.braked_j / capacitance_f).sqrt();
+        let charged_v = observed.stored.unloaded_v.hypot(field_v).hypot(braked_v);
         let highest_v = self.machine.folder.parameters.trip_dc_over_v;
         (FORCED * charged_v.max(rectified_v)).max(highest_v)
     }

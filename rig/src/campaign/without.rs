@@ -2,7 +2,7 @@
 
 use std::str::FromStr;
 use tractive::machine::{Ratings, Tables};
-use tractive::protection::{Disarmed, Fault, LegFaults};
+use tractive::protection::{Disarmed, Fault, LegFaults, LinkLimits};
 
 /// What is switched off.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -59,6 +59,17 @@ impl Without {
             Self::Check(Fault::DcUndervoltage) => changed.trip_dc_under_v = f32::NEG_INFINITY,
             Self::Check(Fault::Overspeed) => changed.trip_speed_rad_s = f32::INFINITY,
             Self::ShortCircuit => changed.magnet_flux_wb = 0.0,
+            _ => {}
+        }
+        changed
+    }
+
+    /// The ZS9's limits, likewise.
+    pub fn link_limits(self, limits: LinkLimits) -> LinkLimits {
+        let mut changed = limits;
+        match self {
+            Self::Check(Fault::SourceUndervoltage) => changed.source_min_v = f32::NEG_INFINITY,
+            Self::Check(Fault::CapacitorOvervoltage) => changed.capacitor_max_v = f32::INFINITY,
             _ => {}
         }
         changed

@@ -112,13 +112,10 @@ impl Plant {
         self.stator.peak_on_flux_circle_a(self.id_a, self.iq_a)
     }
 
-    /// Energy that the rotor gives when the gates are blocked now, in J: its power falls to nothing while two thirds of the link take
-    /// the flux linkage away.
+    /// Energy that the rotor gives when the gates are blocked now, in J: two thirds of the link take the flux linkage away.
     pub fn braked_j(&self, udc_v: f64) -> f64 {
-        let flux = self.stator.flux(self.id_a, self.iq_a);
-        let decay_s = flux.psi_d_wb.hypot(flux.psi_q_wb) / (2.0 / 3.0 * udc_v);
-        let power_w = self.torque_nm() * self.rotor.speed_rpm() * TAU / 60.0;
-        0.5 * power_w.abs() * decay_s
+        let speed_rad_s = self.rotor.speed_rpm() * TAU / 60.0;
+        self.stator.braked_j((self.id_a, self.iq_a), speed_rad_s, 2.0 / 3.0 * udc_v)
     }
 
     /// Energy of the field, above that at no current, in J.

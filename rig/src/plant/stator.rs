@@ -106,6 +106,14 @@ impl Stator {
         }
     }
 
+    /// Energy that the rotor gives when the gates are blocked, in J, at a current in A and a speed in mechanical rad/s: its power falls
+    /// to nothing while `against_v` takes the flux linkage away.
+    pub fn braked_j(&self, (id_a, iq_a): (f64, f64), speed_rad_s: f64, against_v: f64) -> f64 {
+        let flux = self.flux(id_a, iq_a);
+        let decay_s = flux.psi_d_wb.hypot(flux.psi_q_wb) / against_v;
+        0.5 * (self.torque_nm(id_a, iq_a) * speed_rad_s).abs() * decay_s
+    }
+
     /// Largest current whose flux linkage is as large as that of a current in A: what a short circuit leads to when the rotor turns
     /// under a flux linkage that stands still.
     pub fn peak_on_flux_circle_a(&self, id_a: f64, iq_a: f64) -> f64 {

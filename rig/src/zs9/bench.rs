@@ -4,16 +4,17 @@
 //! system's bench nothing runs ahead of what is decided, and what an interrupt orders takes effect at a fixed delay after
 //! its nominal instant.
 
-use super::inject::{Injection, Spoiler};
+use super::inject::{Injection, Kind, Spoiler};
 use super::operator::{Operator, Orders};
 use super::sensors::Sensors;
 use super::trace::{Edge, MotorRow, Row};
-use crate::bench::{Converter, Flaws};
-use crate::plant::zs9::{IllegalState, LegGates, Zs9Plant};
+use crate::bench::{Converter, Flaws, Limits, Observed, Peaks, Stored};
+use crate::plant::zs9::{IllegalState, LegGates, Source, Zs9Plant};
 use std::collections::VecDeque;
 use tractive::board::{DualSample, GateFeedback, PlayedPeriod, PowerSample};
 use tractive::drive::dual::{COMPARE_STEPS, DualReport};
 use tractive::nine_switch::Scheme;
+use tractive::protection::SafeState;
 use tractive::time::{Clock, Instant};
 
 /// Compare steps since the run's beginning.
@@ -63,6 +64,8 @@ pub struct BenchSettings {
     pub flaws: Flaws,
     /// What goes wrong.
     pub injection: Option<Injection>,
+    /// Beyond what it is said to make a difference.
+    pub limits: Limits,
     /// Whether edges are kept.
     pub edges: bool,
     /// Time for which a gate that turns on where another one of its leg turns off has to wait, in s.
@@ -104,6 +107,7 @@ pub struct Bench {
     dead_time: Steps,
     off: bool,
     off_at: Option<Steps>,
+    observed: Observed,
     feedback: GateFeedback,
     orders: Orders,
     samples: VecDeque<(Steps, DualSample)>,
@@ -125,6 +129,7 @@ impl Bench {
         let rows_wanted = (settings.duration_s / settings.trace_step_s).round() as usize;
         let speeds = plant.motors().each_ref().map(|motor| motor.speed_rpm());
         let control = Steps::from(settings.clock.control_ticks * COMPARE_STEPS);
+        let from = settings.injection.map_or(Steps::MAX, |injection| steps(settings.lead_s + injection.at_s));
         Self {
             orders: operator.orders(-settings.lead_s, speeds),
             nominal_source_v: plant.source_v(),
@@ -146,6 +151,7 @@ impl Bench {
             dead_time: steps(settings.dead_time_s),
             off: false,
             off_at: None,
+            observed: Observed::new(from, settings.limits),
             feedback: GateFeedback::default(),
             samples: VecDeque::new(),
             next_sample: control,
@@ -214,6 +220,91 @@ impl Bench {
         self.off_at = Some(self.off_at.map_or(at, |earlier| earlier.min(at)));
     }
 
+    /// By how much the control interrupt is late, in ticks.
+    pub fn control_late_ticks(&self) -> u32 {
+        match self.spoiler.kind(self.seconds(self.now)) {
+            Some(Kind::ControlLate(ticks)) => ticks,
+            _ => 0,
+        }
+    }
+
+    /// Whether the control interrupt comes at this instant at all.
+    pub fn has_control(&self, instant: Instant) -> bool {
+        self.spoiler.kind(self.seconds(self.widen(instant))) != Some(Kind::ControlStopped)
+    }
+
+    /// Time since the recording's beginning, in s.
+    pub fn time_s(&self) -> f64 {
+        self.seconds(self.now)
+    }
+
+    /// The trace so far.
+    pub fn rows(&self) -> &[Row] {
+        &self.rows
+    }
+
+    /// What a fault did.
+    pub fn observed(&self) -> &Observed {
+        &self.observed
+    }
+
+    /// Length of a compare step, in s.
+    pub fn step_s(&self) -> f64 {
+        self.step_s
+    }
+
+    /// The gates as they are: what is stuck does not do what it is told.
+    fn real_levels(&self) -> [bool; 9] {
+        let mut levels = self.levels;
+        match self.spoiler.kind(self.seconds(self.now)) {
+            Some(Kind::Gate(gate, on)) => levels[usize::from(gate)] = on,
+            Some(Kind::ShootThrough(leg)) if !self.off => {
+                for gate in [leg, leg + 3, leg + 6] {
+                    levels[usize::from(gate)] = true;
+                }
+            }
+            _ => {}
+        }
+        levels
+    }
+
+    /// What happens to source and network, and what the plant shows.
+    fn watch(&mut self) {
+        let kind = self.spoiler.kind(self.seconds(self.now));
+        match kind {
+            Some(Kind::SourceSwitchOpen | Kind::SourceLost) => self.plant.set_source(Source::Diode),
+            Some(Kind::CapacitorsHalved) if self.now == self.observed.from => {
+                let capacitance_f = 0.5 * self.plant.network_parts().capacitance_f;
+                self.plant.set_capacitance_f(capacitance_f);
+            }
+            _ => {}
+        }
+        let [upper, lower] = self.plant.motors().each_ref().map(|motor| motor.currents_abc());
+        let [a, b, c] = upper;
+        let [d, e, f] = lower;
+        let [v1, v2] = self.plant.network().capacitors_v;
+        let peaks = Peaks::at(&[a, b, c, d, e, f], self.plant.link_v(), v1.max(v2));
+        let speeds = self.plant.motors().each_ref().map(|motor| motor.speed_rpm().abs());
+        self.observed.note(self.now, &peaks, speeds[0].max(speeds[1]));
+        if self.real_levels() != self.levels {
+            self.observed.makes_a_difference(self.now);
+        }
+    }
+
+    /// What is stored in network and motors, and how high the capacitors go with the network's own oscillation.
+    fn stored(&self) -> Stored {
+        let (parts, network) = (self.plant.network_parts(), self.plant.network());
+        let (source_v, link_v) = (self.plant.source_v(), self.plant.link_v().max(self.plant.source_v()));
+        let surge_v = network.inductor_a() * (parts.inductance_h / parts.capacitance_f).sqrt();
+        let motors = self.plant.motors();
+        Stored {
+            unloaded_v: source_v + (network.capacitor_v() - source_v).hypot(surge_v),
+            field_j: motors.iter().map(|motor| motor.field_j()).sum(),
+            braked_j: motors.iter().map(|motor| motor.braked_j(link_v)).sum(),
+            short_circuit_a: 0.0,
+        }
+    }
+
     /// The step of an instant near to now.
     fn widen(&self, instant: Instant) -> Steps {
         let ticks = self.now / Steps::from(COMPARE_STEPS);
@@ -232,6 +323,9 @@ impl Bench {
         }
         while self.now < to {
             let mut due = to.min(self.begun + self.period).min(self.next_sample).min(self.next_row);
+            if self.observed.from > self.now {
+                due = due.min(self.observed.from);
+            }
             if let Some((toggle, _)) = self.toggles.last() {
                 due = due.min(*toggle);
             }
@@ -252,14 +346,19 @@ impl Bench {
             return Ok(());
         }
         let steps = (to - self.now) as f64;
-        let [uh, vh, wh, um, vm, wm, ul, vl, wl] = self.levels;
+        let real = self.real_levels();
+        let [uh, vh, wh, um, vm, wm, ul, vl, wl] = real;
         let gates = [(uh, um, ul), (vh, vm, vl), (wh, wm, wl)].map(|(high, middle, low)| LegGates {
             high,
             middle,
             low,
         });
-        self.plant.advance(self.as_diodes_have_it(gates), steps * self.step_s)?;
-        for (gate, on) in self.levels.into_iter().enumerate() {
+        if real == self.levels {
+            self.plant.advance(self.as_diodes_have_it(gates), steps * self.step_s)?;
+        } else {
+            self.plant.advance_any(gates, steps * self.step_s);
+        }
+        for (gate, on) in real.into_iter().enumerate() {
             let latch = if on { &mut self.feedback.on } else { &mut self.feedback.off };
             *latch |= 1 << gate;
         }
@@ -274,6 +373,7 @@ impl Bench {
             sums.shorted += steps;
         }
         self.now = to;
+        self.watch();
         Ok(())
     }
 
@@ -283,6 +383,7 @@ impl Bench {
             self.off = true;
             self.toggles.clear();
             self.order([false; 9]);
+            self.observed.enters(self.now, SafeState::GatesOff, self.stored());
         }
         let mut ordered = self.ordered;
         while let Some((at, gate)) = self.toggles.last().copied()
@@ -406,7 +507,10 @@ impl Bench {
 
     fn take_sample(&mut self) -> Result<(), BenchError> {
         if self.samples.len() > 1 {
-            return Err(BenchError::ControlLate(self.seconds(self.now)));
+            if self.has_control(Instant((self.now / Steps::from(COMPARE_STEPS)) as u32)) {
+                return Err(BenchError::ControlLate(self.seconds(self.now)));
+            }
+            self.samples.clear();
         }
         self.next_sample = self.now + Steps::from(self.settings.clock.control_ticks * COMPARE_STEPS);
         let t_s = self.seconds(self.now);
