@@ -2,10 +2,11 @@
 
 use super::judge::Verdict;
 use super::without::Without;
-use super::{Campaign, report};
+use super::{Campaign, healthy, report, traction};
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
+use rayon::prelude::*;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -30,6 +31,12 @@ pub struct CampaignOptions {
     /// The document is not written: whether it is up to date decides on the exit code.
     #[arg(long, requires = "doc")]
     pub check_doc: bool,
+    /// Instead of faults: this many minutes of hard but healthy driving, at random, in which nothing may trip.
+    #[arg(long, value_name = "MINUTES", value_parser = crate::options::positive)]
+    pub healthy: Option<f64>,
+    /// Seed of the driving.
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
     /// Print the totals as JSON.
     #[arg(long)]
     pub json: bool,
@@ -40,6 +47,9 @@ pub struct CampaignOptions {
 /// # Errors
 /// Bad options, files that cannot be written, or a drive that breaks its bench's rules.
 pub fn run(options: &CampaignOptions) -> Result<ExitCode> {
+    if let Some(minutes) = options.healthy {
+        return drive_healthy(minutes, options);
+    }
     let mut cases = super::cases(options.fast);
     cases.retain(|case| {
         let name = case.name();
@@ -87,4 +97,36 @@ pub fn run(options: &CampaignOptions) -> Result<ExitCode> {
         }
     }
     Ok(if good { ExitCode::SUCCESS } else { ExitCode::from(1) })
+}
+
+/// Minutes of a piece: pieces are driven on all cores.
+const PIECE_MIN: f64 = 0.5;
+
+fn drive_healthy(minutes: f64, options: &CampaignOptions) -> Result<ExitCode> {
+    let drive = traction::Drive::new(options.without)?;
+    let pieces = (minutes / PIECE_MIN).ceil() as u64;
+    let piece_s = minutes * 60.0 / pieces as f64;
+    let seeds: Vec<_> = (0..pieces).map(|piece| options.seed + piece).collect();
+    let ridden = seeds.par_iter().map(|seed| Ok((*seed, healthy::drive(&drive, piece_s, *seed)?)));
+    let ridden: Vec<_> = ridden.collect::<Result<_>>()?;
+    let mut trips = 0;
+    let (mut current_a, mut udc_v) = (0.0_f64, 0.0_f64);
+    for (seed, ridden) in &ridden {
+        current_a = current_a.max(ridden.observed.until.current_a);
+        udc_v = udc_v.max(ridden.observed.until.udc_v);
+        if let (Some(trip), Some(row)) = (ridden.trip, ridden.rows.iter().find(|row| row.trip.is_some())) {
+            trips += 1;
+            let (name, at_s, rpm) = (trip.fault.name(), row.t_s, row.speed_rpm);
+            let before =
+                ridden.rows.iter().rev().find(|row| row.trip.is_none()).map_or("", |row| row.mode.name());
+            eprintln!(
+                "seed {seed}: {name} {} (limit {}) at {at_s:.3} s, {rpm:.0} r/min, {before}",
+                trip.value, trip.limit
+            );
+        }
+    }
+    println!(
+        "{minutes} min of driving in {pieces} pieces: {trips} trips, {current_a:.0} A and {udc_v:.0} V at most"
+    );
+    Ok(if trips == 0 { ExitCode::SUCCESS } else { ExitCode::from(1) })
 }

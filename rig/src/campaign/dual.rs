@@ -97,10 +97,11 @@ impl Case {
 }
 
 /// Mean torque error where a fault must not be felt, where a sensor bends the torque, and where the machine differs by a fifth from
-/// its map; shares of the largest torque.
+/// its map; shares of the largest torque. At 1,000 r/min a fifth more flux needs more voltage than there is; the torque is then what is
+/// left.
 const UNFELT: f64 = 0.03;
 const BENT: f64 = 0.1;
-const ANOTHER_MACHINE: f64 = 0.25;
+const ANOTHER_MACHINE: f64 = 0.45;
 
 fn faults() -> Vec<Named> {
     let mut list = Vec::new();
@@ -145,9 +146,7 @@ fn faults() -> Vec<Named> {
     add("current-v2-offset-2A", small(CurrentFault::Offset(2.0)), &[], Some(BENT), true);
     add("current-v2-noisy-0.5A", small(CurrentFault::Noisy(0.5)), &[], Some(UNFELT), true);
     const SOURCE: &[Fault] = &[Fault::SourceUndervoltage];
-    add("source-short", Cause::Bench(Kind::SourceShort), SOURCE, None, true);
     add("source-low", Cause::Bench(Kind::SourceLow), SOURCE, None, true);
-    add("source-lost", Cause::Bench(Kind::SourceLost), SOURCE, None, true);
     const HIGH: &[Fault] = &[Fault::CapacitorOvervoltage, Fault::DutyRange];
     add("source-high", Cause::Bench(Kind::SourceHigh), HIGH, None, true);
     add("source-swings", Cause::Bench(Kind::SourceSwings(30.0, 50.0)), HIGH, Some(UNFELT), true);
@@ -395,6 +394,7 @@ impl Drive {
                 carriers_s.max((0.5 * turn_s(motor)).min(0.1))
             }
             Cause::Bench(Kind::Gate(..)) => STUCK_S,
+            Cause::Bench(Kind::ControlStopped) => carriers_s + STALE_S,
             Cause::Runaway => carriers_s + TRACKING_S,
             _ => carriers_s,
         }
@@ -403,6 +403,8 @@ impl Drive {
 
 /// Until a gate that is stuck has made a difference to the feedback, in s: five carriers.
 const STUCK_S: f64 = 5e-4;
+/// How old a command may become, in s.
+const STALE_S: f64 = 5e-4;
 /// How far the speed tracker lags behind, in s: 2/4000 rad/s.
 const TRACKING_S: f64 = 0.5e-3;
 /// How far a capacitor rises between a sample at its trip level and gates that are off, in V: 300 A for 175 µs.

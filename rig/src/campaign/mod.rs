@@ -7,6 +7,7 @@
 
 pub mod command;
 pub mod dual;
+pub mod healthy;
 pub mod judge;
 pub mod report;
 pub mod traction;

@@ -252,12 +252,47 @@ pub struct Drive {
     without: Option<Without>,
 }
 
+/// A drive written down as what happens when; times in s from the recording's beginning.
+#[derive(Clone, Debug, Default)]
+pub struct Ride {
+    /// Speeds in r/min, straight lines between.
+    pub speed: Vec<(f64, f64)>,
+    /// Torques in N·m, each from its time on, and whether the demand's rate is limited.
+    pub torque: Vec<(f64, (f64, bool))>,
+    /// Whether the drive is enabled, each from its time on.
+    pub enable: Vec<(f64, bool)>,
+    /// Voltages of the line, each from its time on.
+    pub line: Vec<(f64, f64)>,
+    /// What goes wrong.
+    pub injection: Option<Injection>,
+    /// Length, in s.
+    pub duration_s: f64,
+}
+
+/// What a ride left.
+pub struct Ridden {
+    /// The trace.
+    pub rows: Vec<Row>,
+    /// What a fault did.
+    pub observed: Observed,
+    /// The latched fault.
+    pub trip: Option<Trip>,
+}
+
+/// The value that holds at a time.
+fn held<T: Copy>(steps: &[(f64, T)], t_s: f64) -> Option<T> {
+    let after = steps.partition_point(|(at_s, _)| *at_s <= t_s + 1e-9);
+    after.checked_sub(1).and_then(|last| steps.get(last)).map(|(_, value)| *value)
+}
+
 /// What a run left.
 struct Seen {
     observed: Observed,
     trip: Option<Trip>,
     mode: Mode,
     torque_error_nm: f64,
+    /// Mean torque at the end of the aftermath, in N·m.
+    safe_torque_nm: f64,
 }
 
 impl Drive {
@@ -300,6 +335,7 @@ impl Drive {
             trip: tasks.trip(),
             mode: before.last().map_or(Mode::Off, |row| row.mode),
             torque_error_nm: torque_error_nm(rows, TURN_S).max(torque_error_nm(rows, END_S)),
+            safe_torque_nm: last_torque_nm(rows),
         })
     }
 
@@ -362,8 +398,59 @@ impl Drive {
         Bench::new(plant, Box::new(operator), &settings)
     }
 
+    /// Drives a script instead of a case.
+    ///
+    /// # Errors
+    /// A drive that breaks the bench's rules.
+    pub fn ride(&self, ride: Ride, flaws: Flaws) -> Result<Ridden> {
+        let Ride { speed, torque, enable, line, injection, duration_s } = ride;
+        let parameters = &self.machine.folder.parameters;
+        let devices = self.devices();
+        let operator = move |t_s: f64| {
+            let (torque_nm, slew_limited) = held(&torque, t_s).unwrap_or((0.0, true));
+            let demand = Demand { torque_nm: torque_nm as f32, slew_limited };
+            (demand, held(&enable, t_s).unwrap_or(true))
+        };
+        let speed = speed.into_iter().map(|(t_s, rpm)| (t_s + LEAD_S, rpm)).collect();
+        let settings = bench::Settings {
+            clock: CLOCK,
+            first_half_ticks: devices.shortest_half_ticks,
+            dead_time_ticks: 0,
+            lead_s: LEAD_S,
+            duration_s,
+            trace_step_s: 100e-6,
+            udc_v: parameters.dc_link_nominal_v,
+            link_steps: line,
+            flaws,
+            supply: Supply::Line(LineFilter::TRACTION),
+            injection: Some(injection.unwrap_or(Injection { kind: Kind::Elsewhere, at_s: -LEAD_S, seed: 1 })),
+            limits: Limits::NONE,
+        };
+        let plant = Plant::new(&self.machine.folder, SpeedSource::profile(speed), &PlantSettings::default());
+        let mut bench = Bench::new(plant, Box::new(operator), &settings);
+        let drive = Settings { clock: CLOCK, devices, gains: Gains::DEFAULT };
+        let mut tasks = Tasks::new(self.tables, drive, devices.shortest_half_ticks);
+        if let Some(without) = self.without {
+            tasks = tasks.without(without);
+        }
+        let mut tripped_s = None;
+        tasks.drive(&mut bench, |bench| {
+            // Once it has stopped there is little to see.
+            if bench.observed().safe.is_some() {
+                tripped_s.get_or_insert(bench.time_s());
+            }
+            tripped_s.is_none_or(|tripped_s| bench.time_s() < tripped_s + AFTERMATH_S)
+        })?;
+        Ok(Ridden { rows: bench.rows().to_vec(), observed: *bench.observed(), trip: tasks.trip() })
+    }
+
+    /// The machine's folder.
+    pub fn machine(&self) -> &Machine {
+        &self.machine
+    }
+
     fn judged(&self, case: &Case, seen: &Seen) -> Outcome {
-        let Seen { observed, trip, mode, torque_error_nm } = seen;
+        let Seen { observed, trip, mode, torque_error_nm, safe_torque_nm } = seen;
         let parameters = &self.machine.folder.parameters;
         let tick_s = f64::from(CLOCK.tick_s);
         let time_s = observed.ticks_to_safe().map(|ticks| ticks as f64 * tick_s);
@@ -388,6 +475,7 @@ impl Drive {
             Bounded::new("A with safe gates", observed.after.current_a, current_limit_a),
             Bounded::new("V until the gates are safe", observed.until.udc_v, over_v + self.link_rise_v()),
             Bounded::new("V with safe gates", observed.after.udc_v, udc_limit_v),
+            Bounded::new("N·m with safe gates", safe_torque_nm.abs(), self.safe_torque_limit_nm(case)),
         ];
         let torque_share = case.fault.rule.torque_share.unwrap_or(0.0);
         let went_on = [
@@ -443,6 +531,15 @@ impl Drive {
         }
     }
 
+    /// The most torque that safe gates may leave, in N·m: a tenth of the largest, so that nobody is braked who did not ask for it. A
+    /// leg that is stuck has no such choice, and the short circuit's torque has its peak at a few per cent of the speed.
+    fn safe_torque_limit_nm(&self, case: &Case) -> f64 {
+        match case.fault.cause {
+            Cause::Bench(Kind::Gate(..) | Kind::Device(_)) => f64::INFINITY,
+            _ => 0.1 * self.machine.folder.parameters.max_torque_nm,
+        }
+    }
+
     /// How far the link can rise between a sample at the trip level and safe gates, in V.
     fn link_rise_v(&self) -> f64 {
         let LineFilter { capacitance_f, .. } = LineFilter::TRACTION;
@@ -484,71 +581,19 @@ fn torque_error_nm(rows: &[Row], before_s: f64) -> f64 {
     (sum / count.max(1.0)).abs()
 }
 
+/// Mean torque over the last half of the aftermath, in N·m.
+fn last_torque_nm(rows: &[Row]) -> f64 {
+    let end_s = rows.last().map_or(0.0, |row| row.t_s);
+    let window = rows.iter().filter(|row| row.t_s > end_s - 0.5 * AFTERMATH_S);
+    let (count, sum) = window.fold((0.0_f64, 0.0), |(count, sum), row| (count + 1.0, sum + row.te_nm));
+    sum / count.max(1.0)
+}
+
 /// The name in tables.
 fn safe_state_name(safe: SafeState) -> &'static str {
     match safe {
         SafeState::GatesOff => "gates off",
         SafeState::ShortCircuit => "short circuit, lower",
         SafeState::UpperShortCircuit => "short circuit, upper",
-    }
-}
-
-#[test]
-fn first_look() {
-    use super::Campaign;
-    let campaign = Campaign::new(None).unwrap();
-    let fast = std::env::var("FAST").is_ok();
-    let only = std::env::var("ONLY").unwrap_or_default();
-    let list: Vec<_> = super::cases(fast).into_iter().filter(|case| case.name().contains(&only)).collect();
-    if std::env::var("DUMP").is_ok() {
-        let super::Case::Traction(case) = &list[0];
-        let mut bench = campaign.traction.bench(case);
-        let devices = campaign.traction.devices();
-        let settings = Settings { clock: CLOCK, devices, gains: Gains::DEFAULT };
-        let mut tasks = Tasks::new(campaign.traction.tables, settings, devices.shortest_half_ticks);
-        tasks.drive(&mut bench, |_| true).unwrap();
-        for row in bench.rows() {
-            println!(
-                "{:.5} n {:.0} Te {:.0}/{:.0} id {:.0}/{:.0} iq {:.0}/{:.0} i {:.0} u {:.0} udc {:.0} f {:.1} map {:.3} {} {}",
-                row.t_s,
-                row.speed_rpm,
-                row.te_nm,
-                row.te_ref_nm,
-                row.id_a,
-                row.id_ref_a,
-                row.iq_a,
-                row.iq_ref_a,
-                row.peak_current_a(),
-                row.u_v,
-                row.udc_v,
-                row.f1_hz,
-                row.map_error,
-                row.mode.name(),
-                row.trip.is_some()
-            );
-        }
-        return;
-    }
-    for o in campaign.run_all(&list, || ()).unwrap() {
-        println!(
-            "{:?} {:20} {:6} {:8} {:8} {:16} {:12} ms {:.2} periods {:.2} I {:.0}/{:.0} lim {:.0} U {:.0}/{:.0} lim {:.0} Te {:.0} {}",
-            o.verdict,
-            o.fault,
-            o.speed_rpm,
-            o.action.name(),
-            o.mode,
-            o.named,
-            o.safe_state,
-            o.time_ms.unwrap_or(f64::NAN),
-            o.carrier_periods.unwrap_or(f64::NAN),
-            o.current_until_a,
-            o.current_after_a,
-            o.current_limit_a,
-            o.udc_until_v,
-            o.udc_after_v,
-            o.udc_limit_v,
-            o.torque_error_nm,
-            o.why
-        );
     }
 }

@@ -13,6 +13,7 @@ use crate::plant::zs9::{IllegalState, LegGates, Source, Zs9Plant};
 use std::collections::VecDeque;
 use tractive::board::{DualSample, GateFeedback, PlayedPeriod, PowerSample};
 use tractive::drive::dual::{COMPARE_STEPS, DualReport};
+use tractive::frames::Abc;
 use tractive::nine_switch::Scheme;
 use tractive::protection::SafeState;
 use tractive::time::{Clock, Instant};
@@ -25,6 +26,9 @@ pub type Steps = u64;
 const CONTROL_OFF_TICKS: u32 = 1875;
 /// The same for the PWM interrupt (25 µs), as a bound on its length.
 const PWM_OFF_TICKS: u32 = 625;
+
+/// How far a current's reading may be off without making a difference that counts, in A: a tenth of a machine's largest current.
+const MUCH_A: f32 = 8.49;
 
 /// Why the bench cannot go on.
 #[derive(Debug, thiserror::Error)]
@@ -203,8 +207,21 @@ impl Bench {
         self.advance(at)?;
         let feedback = std::mem::take(&mut self.feedback);
         let mut sample = self.sensors.power(&self.plant, feedback);
+        let true_a = sample.currents_a;
         self.spoiler.power(self.seconds(at), &mut sample);
+        self.compare(true_a, sample.currents_a);
         Ok(sample)
+    }
+
+    /// Notes readings that are off by more than a little.
+    fn compare(&mut self, true_a: [Abc; 2], read_a: [Abc; 2]) {
+        let off = |(read, told): (Abc, Abc)| {
+            (read.a - told.a).abs().max((read.b - told.b).abs()).max((read.c - told.c).abs())
+        };
+        let most_a = read_a.into_iter().zip(true_a).map(off).fold(0.0, f32::max);
+        if most_a > MUCH_A {
+            self.observed.makes_a_difference(self.now);
+        }
     }
 
     /// The period to play from the next valley on.
@@ -257,7 +274,8 @@ impl Bench {
     fn real_levels(&self) -> [bool; 9] {
         let mut levels = self.levels;
         match self.spoiler.kind(self.seconds(self.now)) {
-            Some(Kind::Gate(gate, on)) => levels[usize::from(gate)] = on,
+            // What turns the gates off for good holds the drivers, whatever they are ordered.
+            Some(Kind::Gate(gate, on)) if !self.off => levels[usize::from(gate)] = on,
             Some(Kind::ShootThrough(leg)) if !self.off => {
                 for gate in [leg, leg + 3, leg + 6] {
                     levels[usize::from(gate)] = true;
@@ -272,7 +290,7 @@ impl Bench {
     fn watch(&mut self) {
         let kind = self.spoiler.kind(self.seconds(self.now));
         match kind {
-            Some(Kind::SourceSwitchOpen | Kind::SourceLost) => self.plant.set_source(Source::Diode),
+            Some(Kind::SourceSwitchOpen) => self.plant.set_source(Source::Diode),
             Some(Kind::CapacitorsHalved) if self.now == self.observed.from => {
                 let capacitance_f = 0.5 * self.plant.network_parts().capacitance_f;
                 self.plant.set_capacitance_f(capacitance_f);
@@ -534,7 +552,9 @@ impl Bench {
             scheme: self.settings.scheme,
             enable: self.orders.enable,
         };
+        let true_a = sample.currents_a;
         self.spoiler.control(t_s, &mut sample);
+        self.compare(true_a, sample.currents_a);
         self.samples.push_back((self.now, sample));
         self.show_reports();
         Ok(())

@@ -37,14 +37,13 @@ pub enum Kind {
     Current(usize, usize, CurrentFault),
     /// The angle sensor of motor 0 or 1.
     Angle(usize, AngleFault),
-    /// A gate, in the order of [`tractive::nine_switch::GATES`], is stuck: on (true) or off.
+    /// A gate's order, in the order of [`tractive::nine_switch::GATES`], is stuck, on (true) or off, until the gates are turned off
+    /// for good.
     Gate(u8, bool),
     /// All gates of leg 0 ..= 2 are on, until the gates are turned off for good.
     ShootThrough(u8),
     /// The source's switch does not turn on any more: its diode is left.
     SourceSwitchOpen,
-    /// The source is cut off.
-    SourceLost,
     /// The source swings by this amplitude (V) at this frequency (Hz).
     SourceSwings(f64, f64),
     /// The capacitors lose half of their capacitance.
@@ -111,8 +110,6 @@ pub struct Spoiler {
 
 /// Seed of a sensor's noise.
 const SEED: u64 = 1;
-/// What is left of a source that is cut off, in V.
-const NOTHING_V: f64 = 1.0;
 
 impl Spoiler {
     /// Spoils from the injection's instant on.
@@ -149,7 +146,6 @@ impl Spoiler {
             Some(Kind::SourceShort) => 1.0,
             Some(Kind::SourceLow) => 250.0,
             Some(Kind::SourceHigh) => 900.0,
-            Some(Kind::SourceLost) => NOTHING_V,
             Some(Kind::SourceSwings(amplitude_v, hz)) => {
                 let since_s = t_s - self.injection.map_or(0.0, |injection| injection.at_s);
                 source_v + amplitude_v * (core::f64::consts::TAU * hz * since_s).sin()

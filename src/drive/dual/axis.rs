@@ -13,8 +13,7 @@ use crate::protection::{self, Fault, FrozenWatch, Violation};
 
 /// Natural frequency of the speed tracker, in rad/s: the speed loop's phase needs it quick.
 const TRACKING_RAD_S: f32 = 4000.0;
-/// How far an angle may be off what the speed tells, in electrical rad: half a turn a period would still look like rest.
-pub const SURPRISE_RAD: f32 = 0.5;
+pub use crate::protection::SURPRISE_RAD;
 /// What the loop may ask for, as a share of the largest voltage that is to be had at every angle. The modulator gives what its
 /// hexagon has at the angle, up to 1.155, and tells.
 const LOOP_SHARE: f32 = 1.15;
