@@ -34,6 +34,9 @@ pub struct CampaignOptions {
     /// Instead of faults: this many minutes of hard but healthy driving, at random, in which nothing may trip.
     #[arg(long, value_name = "MINUTES", value_parser = crate::options::positive)]
     pub healthy: Option<f64>,
+    /// With --healthy: the gates are blocked and released now and then, too.
+    #[arg(long, requires = "healthy")]
+    pub blocks: bool,
     /// Seed of the driving.
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
@@ -107,7 +110,8 @@ fn drive_healthy(minutes: f64, options: &CampaignOptions) -> Result<ExitCode> {
     let pieces = (minutes / PIECE_MIN).ceil() as u64;
     let piece_s = minutes * 60.0 / pieces as f64;
     let seeds: Vec<_> = (0..pieces).map(|piece| options.seed + piece).collect();
-    let ridden = seeds.par_iter().map(|seed| Ok((*seed, healthy::drive(&drive, piece_s, *seed)?)));
+    let ridden =
+        seeds.par_iter().map(|seed| Ok((*seed, healthy::drive(&drive, piece_s, *seed, options.blocks)?)));
     let ridden: Vec<_> = ridden.collect::<Result<_>>()?;
     let mut trips = 0;
     let (mut current_a, mut udc_v) = (0.0_f64, 0.0_f64);

@@ -11,9 +11,9 @@ const STEEPEST_RPM_S: f64 = 3_000.0;
 /// The line's voltages, in V.
 const LINE_V: (f64, f64) = (1_150.0, 1_750.0);
 
-/// A random ride: speeds between both directions' highest, torques that step or are slewed from one sign to the other, the gates blocked
-/// now and then, and a line that jumps.
-pub fn ride(drive: &Drive, duration_s: f64, seed: u64) -> Ride {
+/// A random ride: speeds between both directions' highest, torques that step or are slewed from one sign to the other, a line that
+/// jumps, and, with `blocks`, gates that are blocked now and then.
+pub fn ride(drive: &Drive, duration_s: f64, seed: u64, blocks: bool) -> Ride {
     let parameters = &drive.machine().folder.parameters;
     let mut random = StdRng::seed_from_u64(seed);
     let mut ride = Ride { duration_s, ..Ride::default() };
@@ -41,7 +41,7 @@ pub fn ride(drive: &Drive, duration_s: f64, seed: u64) -> Ride {
         t_s += random.random_range(0.2..2.0);
     }
     t_s = 3.0;
-    while t_s < duration_s {
+    while blocks && t_s < duration_s {
         let again_s = t_s + random.random_range(0.05..0.3);
         ride.enable.extend([(t_s, false), (again_s, true)]);
         t_s = again_s + random.random_range(1.0..6.0);
@@ -59,6 +59,6 @@ pub fn flaws(drive: &Drive, seed: u64) -> Flaws {
 ///
 /// # Errors
 /// A drive that breaks the bench's rules.
-pub fn drive(drive: &Drive, duration_s: f64, seed: u64) -> Result<Ridden> {
-    drive.ride(ride(drive, duration_s, seed), flaws(drive, seed))
+pub fn drive(drive: &Drive, duration_s: f64, seed: u64, blocks: bool) -> Result<Ridden> {
+    drive.ride(ride(drive, duration_s, seed, blocks), flaws(drive, seed))
 }
