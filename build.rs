@@ -18,14 +18,18 @@ struct Board {
     /// file, whatever the board.
     memory: &'static str,
     /// Interrupt handlers that a firmware may define; the others end in cortex-m-rt's default handler.
-    handlers: [&'static str; 2],
+    handlers: &'static [&'static str],
     scripts: &'static [&'static str],
 }
 
 /// QEMU's, unless a feature names another.
-const QEMU: Board = Board { memory: "mps2-an386.x", handlers: ["TIMER0", "DUALTIMER"], scripts: &["link.x"] };
-const NUCLEO_G474RE: Board =
-    Board { memory: "nucleo-g474re.x", handlers: ["TIM1_UP_TIM16", "TIM3"], scripts: &["link.x", "defmt.x"] };
+const QEMU: Board =
+    Board { memory: "mps2-an386.x", handlers: &["TIMER0", "DUALTIMER"], scripts: &["link.x"] };
+const NUCLEO_G474RE: Board = Board {
+    memory: "nucleo-g474re.x",
+    handlers: &["TIM1_UP_TIM16", "TIM2", "TIM3"],
+    scripts: &["link.x", "defmt.x"],
+};
 
 fn main() -> ExitCode {
     match generate() {

@@ -1,15 +1,22 @@
 //! The cells between the two interrupts: one type per priority direction.
 //!
-//! Both are arrays of 32-bit atomics with relaxed loads and stores (plain `ldr`/`str` on the target), so a value
+//! All are arrays of 32-bit atomics with relaxed loads and stores (plain `ldr`/`str` on the target), so a value
 //! can be stale but never undefined, and nothing here needs `unsafe`. One core; the higher-priority interrupt
 //! preempts the lower one and runs to completion.
 //!
 //! * [`Downlink`], low → high: a double buffer. The reader is wait-free because the writer cannot run while
 //!   it reads, and never sees a half-written value because the writer fills the slot that nobody reads.
+//! * [`Trail`], high → low: a ring of records. The writer is wait-free and writes each record once; the reader looks at the last
+//!   few where they lie, and the writer cannot come round to them while it does.
 //! * [`Uplink`], high → low: a sequence counter. The writer is wait-free; the reader tries again when a write
 //!   came in between, a bounded number of times (a second write within one read takes a carrier half).
+//! * [`Ring`], one interrupt → anybody, afterwards: the flight recorder's memory, read only once a fault has frozen it.
 
 #![forbid(unsafe_code)]
+
+mod ring;
+
+pub use ring::Ring;
 
 #[cfg(loom)]
 use loom::sync::atomic::{AtomicU32, Ordering, fence};
@@ -88,28 +95,26 @@ impl<T: Words<N>, const N: usize> Downlink<T, N> {
         self.published.store(next, Ordering::Release);
     }
 
-    /// Reader's side: the newest value that is `ready`, of the two newest; `None` when neither is.
+    /// Reader's side: the newest value whose record is `ready`, of the two newest; `None` when neither is.
     #[inline]
-    pub fn newest(&self, ready: impl Fn(&T) -> bool) -> Option<T> {
+    pub fn newest(&self, ready: impl Fn(&Record<N>) -> bool) -> Option<T> {
         let published = self.published.load(Ordering::Acquire);
         if published == 0 {
             return None;
         }
-        let newest = T::from_words(load(self.slot(published)));
-        if ready(&newest) {
-            return Some(newest);
+        let mut record = self.slot(published);
+        if !ready(&Record(record)) {
+            record = self.slot(published.wrapping_sub(1));
+            if published == 1 || !ready(&Record(record)) {
+                return None;
+            }
         }
-        if published == 1 {
-            return None;
-        }
-        let older = T::from_words(load(self.slot(published.wrapping_sub(1))));
-        if ready(&older) { Some(older) } else { None }
+        Some(T::from_words(load(record)))
     }
 
     #[inline]
     fn slot(&self, count: u32) -> &[AtomicU32; N] {
-        let [even, odd] = &self.slots;
-        if count & 1 == 0 { even } else { odd }
+        &self.slots[count as usize % 2]
     }
 }
 
@@ -187,5 +192,149 @@ impl<T: Words<N>, const N: usize> Uplink<T, N> {
 impl<T: Words<N>, const N: usize> Default for Uplink<T, N> {
     fn default() -> Self {
         Self::new()
+    }
+}
+
+/// Records that a [`Trail`] holds.
+const RECORDS: usize = 8;
+/// Records of them that a reader may look at.
+pub const SEEN: usize = 4;
+
+/// From the high-priority interrupt (writer) to the low-priority one (reader): the last records of `N` words.
+///
+/// The reader sees the last [`SEEN`] of the records that were there when it began, and a new one goes into the oldest of the ring:
+/// a read is good unless more than `RECORDS - SEEN` writes come in between, which is noticed. A record that is written anew
+/// makes a reader that it interrupts look again.
+pub struct Trail<const N: usize> {
+    records: [[AtomicU32; N]; RECORDS],
+    /// Counts the records, 0 before the first; record n is in place `n % RECORDS`.
+    published: AtomicU32,
+    /// Counts twice what was written into the newest record anew; odd while that is under way.
+    revised: AtomicU32,
+}
+
+/// A record where it lies: each word is loaded when it is asked for. Zeros where nothing was published yet.
+pub struct Record<'a, const N: usize>(&'a [AtomicU32; N]);
+
+impl<const N: usize> Record<'_, N> {
+    /// Word number `K`.
+    #[inline(always)]
+    pub fn word<const K: usize>(&self) -> u32 {
+        const { assert!(K < N) };
+        self.0[K].load(Ordering::Relaxed)
+    }
+}
+
+impl<const N: usize> Trail<N> {
+    /// An empty cell.
+    #[cfg(not(loom))]
+    #[allow(clippy::declare_interior_mutable_const, reason = "an array initialiser, never borrowed")]
+    pub const fn new() -> Self {
+        Self {
+            records: [const { [const { AtomicU32::new(0) }; N] }; RECORDS],
+            published: AtomicU32::new(0),
+            revised: AtomicU32::new(0),
+        }
+    }
+
+    /// An empty cell (loom's atomics are not `const`).
+    #[cfg(loom)]
+    pub fn new() -> Self {
+        Self {
+            records: core::array::from_fn(|_| core::array::from_fn(|_| AtomicU32::new(0))),
+            published: AtomicU32::new(0),
+            revised: AtomicU32::new(0),
+        }
+    }
+
+    /// Writer's side: publishes a record. Called by one interrupt only.
+    #[inline]
+    pub fn publish(&self, words: [u32; N]) {
+        let count = self.published.load(Ordering::Relaxed);
+        // The words must not be seen before the count of the write before.
+        fence(Ordering::Release);
+        store(&self.records[count as usize % RECORDS], words);
+        // Zero means "none yet", so the count wraps to a full ring.
+        let next = match count.wrapping_add(1) {
+            0 => RECORDS as u32,
+            next => next,
+        };
+        self.published.store(next, Ordering::Release);
+    }
+
+    /// Writer's side: writes the newest record anew.
+    #[inline]
+    pub fn revise(&self, words: [u32; N]) {
+        let revised = self.revised.load(Ordering::Relaxed);
+        self.revised.store(revised.wrapping_add(1), Ordering::Relaxed);
+        fence(Ordering::Release);
+        let newest = self.published.load(Ordering::Relaxed).wrapping_sub(1);
+        store(&self.records[newest as usize % RECORDS], words);
+        self.revised.store(revised.wrapping_add(2), Ordering::Release);
+    }
+
+    /// Reader's side: what `look` makes of the last records, the newest first; `None` before the first, or when every try was
+    /// overtaken by writes.
+    #[inline]
+    pub fn read<R>(&self, look: impl Fn([Record<N>; SEEN]) -> R) -> Option<R> {
+        for _ in 0..READ_TRIES {
+            let revised = self.revised.load(Ordering::Acquire);
+            let published = self.published.load(Ordering::Acquire);
+            if published == 0 {
+                return None;
+            }
+            let record = |back: u32| {
+                // The count wraps by whole rings.
+                Record(&self.records[published.wrapping_sub(1 + back) as usize % RECORDS])
+            };
+            let seen = look([record(0), record(1), record(2), record(3)]);
+            fence(Ordering::Acquire);
+            let written = self.published.load(Ordering::Relaxed).wrapping_sub(published);
+            let whole = revised & 1 == 0 && self.revised.load(Ordering::Relaxed) == revised;
+            if whole && written <= (RECORDS - SEEN) as u32 {
+                return Some(seen);
+            }
+        }
+        None
+    }
+}
+
+impl<const N: usize> Default for Trail<N> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+#[cfg(all(test, not(loom)))]
+mod tests {
+    use super::*;
+
+    impl Words<1> for u32 {
+        fn to_words(self) -> [u32; 1] {
+            [self]
+        }
+
+        fn from_words([word]: [u32; 1]) -> Self {
+            word
+        }
+    }
+
+    /// Both counts skip 0, which means "none yet", and keep to the order of the slots.
+    #[test]
+    fn the_counts_wrap_without_a_gap() {
+        let (down, up) = (Downlink::<u32, 1>::new(), Uplink::<u32, 1>::new());
+        for n in 1..10 {
+            if n == 4 {
+                // As after 2³² publications, less a few; each count in step with what it has come from.
+                down.published
+                    .store(down.published.load(Ordering::Relaxed).wrapping_sub(6), Ordering::Relaxed);
+                up.sequence.store(0_u32.wrapping_sub(6), Ordering::Relaxed);
+            }
+            down.publish(n);
+            up.publish(n);
+            assert_eq!((down.newest(|_| true), up.read()), (Some(n), Some(n)));
+            assert_eq!(down.newest(|value| value.word::<0>() < n), (n > 1).then(|| n - 1), "{n}");
+        }
+        assert!(down.published.load(Ordering::Relaxed) < 10 && up.sequence.load(Ordering::Relaxed) < 20);
     }
 }

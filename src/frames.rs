@@ -12,6 +12,8 @@ use core::ops::{Add, Mul, Neg, Sub};
 pub const SQRT_3: f32 = 1.732_050_8;
 /// Angle units in one turn, 2³².
 const UNITS_PER_TURN: f32 = 4_294_967_296.0;
+/// Angle units (2⁻³² turn) in one radian.
+pub const UNITS_PER_RADIAN: f32 = UNITS_PER_TURN / core::f32::consts::TAU;
 
 /// An angle, or a difference of two, as a fraction of a turn in units of 2⁻³² turn.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -50,6 +52,12 @@ impl Angle {
         Self::from_turns(radians * core::f32::consts::FRAC_1_PI * 0.5)
     }
 
+    /// From radians, −π ≤ radians < π; beyond that the nearer end. NaN gives zero.
+    #[inline]
+    pub fn within_half_turn(radians: f32) -> Self {
+        Self((radians * UNITS_PER_RADIAN) as i32 as u32)
+    }
+
     /// The angle of the vector (`x`, `y`); error below 3e-7 rad. The zero vector gives zero.
     #[inline]
     pub fn of_vector(x: f32, y: f32) -> Self {
@@ -59,17 +67,10 @@ impl Angle {
         if large == 0.0 {
             return Self::ZERO;
         }
-        let mut radians = octant_atan(small, large);
-        if steep {
-            radians = core::f32::consts::FRAC_PI_2 - radians;
-        }
-        if x < 0.0 {
-            radians = core::f32::consts::PI - radians;
-        }
-        if y < 0.0 {
-            radians = -radians;
-        }
-        Self::from_radians(radians)
+        let first = (octant_atan(small, large) * UNITS_PER_RADIAN) as u32;
+        let upper = if steep { (1 << 30) - first } else { first };
+        let ahead = if x < 0.0 { (1 << 31) - upper } else { upper };
+        Self(if y < 0.0 { ahead.wrapping_neg() } else { ahead })
     }
 
     /// In turns, 0 ≤ turns < 1 (rounding may give 1).
@@ -90,17 +91,66 @@ impl Angle {
         self.0 as i32
     }
 
-    /// Sine and cosine, absolute error below 1.5e-7 (a polynomial on ±45°, no table, no branch on data).
+    /// Sine and cosine, absolute error below 1.5e-7: the nearest direction of a table, turned by what is left. No branch.
     #[inline]
     pub fn sin_cos(self) -> SinCos {
-        let quadrant = self.0.wrapping_add(1 << 29) >> 30;
-        let rest = self.0.wrapping_sub(quadrant << 30) as i32 as f32;
-        let x = rest * (core::f32::consts::PI / (UNITS_PER_TURN / 2.0));
+        const RAD_PER_UNIT: f32 = core::f32::consts::PI / (UNITS_PER_TURN / 2.0) / STEPS as f32;
+        let node = DIRECTIONS[(self.0 >> (32 - STEP_BITS)) as usize];
+        // The directions stand in the middle of their steps.
+        let x = ((self.0 << STEP_BITS) ^ (1 << 31)) as i32 as f32 * RAD_PER_UNIT;
         let z = x * x;
-        let s = x + x * z * (-1.666_665_5e-1 + z * (8.332_161e-3 - z * 1.951_529_6e-4));
-        let c = 1.0 - 0.5 * z + z * z * (4.166_664_6e-2 + z * (-1.388_731_6e-3 + z * 2.443_315_7e-5));
-        let (s, c) = if quadrant & 1 == 0 { (s, c) } else { (c, -s) };
-        if quadrant & 2 == 0 { SinCos { sin: s, cos: c } } else { SinCos { sin: -s, cos: -c } }
+        node.turned(SinCos { sin: x + x * z * (-1.0 / 6.0), cos: 1.0 - 0.5 * z })
+    }
+}
+
+/// Steps a turn in [`DIRECTIONS`]: half a step to the fourth over 24 is 1.5e-8.
+const STEPS: usize = 1 << STEP_BITS;
+const STEP_BITS: u32 = 7;
+
+/// Sine and cosine of the middle of each step, to the last bit.
+static DIRECTIONS: [SinCos; STEPS] = {
+    let mut directions = [SinCos { sin: 0.0, cos: 1.0 }; STEPS];
+    let mut k = 0;
+    while k < STEPS {
+        directions[k] = SinCos::of_turns((2 * k + 1) as f64 / (2 * STEPS) as f64);
+        k += 1;
+    }
+    directions
+};
+
+/// The power series, at compile time, 0 ≤ radians ≤ 2π.
+const fn series(radians: f64) -> SinCos {
+    let (mut sin, mut cos, mut term, mut n) = (0.0, 0.0, 1.0, 0);
+    while n < 40 {
+        // cos + j sin is the sum of (j x)ⁿ/n!.
+        match n % 4 {
+            0 => cos += term,
+            1 => sin += term,
+            2 => cos -= term,
+            _ => sin -= term,
+        }
+        n += 1;
+        term *= radians / n as f64;
+    }
+    SinCos { sin: sin as f32, cos: cos as f32 }
+}
+
+impl SinCos {
+    /// Of an angle in turns, 0 ≤ turns ≤ 1, to the last bit; for tables.
+    pub const fn of_turns(turns: f64) -> Self {
+        series(turns * core::f64::consts::TAU)
+    }
+
+    /// The direction turned on by another one: the sum of the angles.
+    #[inline]
+    pub fn turned(self, by: Self) -> Self {
+        Self { sin: self.sin * by.cos + self.cos * by.sin, cos: self.cos * by.cos - self.sin * by.sin }
+    }
+
+    /// The direction of the opposite angle.
+    #[inline]
+    pub fn back(self) -> Self {
+        Self { sin: -self.sin, ..self }
     }
 }
 
@@ -218,6 +268,21 @@ impl AlphaBeta {
         }
     }
 
+    /// The angle of the vector.
+    #[inline]
+    pub fn angle(self) -> Angle {
+        Angle::of_vector(self.alpha, self.beta)
+    }
+
+    /// Turned by the angle of a direction.
+    #[inline]
+    pub fn turned(self, by: SinCos) -> Self {
+        Self {
+            alpha: self.alpha * by.cos - self.beta * by.sin,
+            beta: self.beta * by.cos + self.alpha * by.sin,
+        }
+    }
+
     /// Inverse Clarke.
     #[inline]
     pub fn abc(self) -> Abc {
@@ -251,7 +316,13 @@ impl Dq {
     /// Length.
     #[inline]
     pub fn length(self) -> f32 {
-        sqrt(self.squared())
+        crate::board::fpu::sqrt(self.squared())
+    }
+
+    /// Turned by the angle of a direction.
+    #[inline]
+    pub fn turned(self, by: SinCos) -> Self {
+        Self { d: self.d * by.cos - self.q * by.sin, q: self.q * by.cos + self.d * by.sin }
     }
 
     /// Scalar product.

@@ -4,7 +4,8 @@
 //! inverters, [`nine_switch`] for the one that feeds two motors),
 //! lock-free cells carry the few words between them ([`cell`]), a board knows the hardware ([`board`]), and a rig on the
 //! host plays the motor. [`drive`] puts them together, once for each system ([`drive::traction`], [`drive::dual`]): its tasks are
-//! what the two interrupts call, on any board and on the host. [`machine`] holds the tables made offline, [`protection`] the faults and the safe state.
+//! what the two interrupts call, on any board and on the host. [`machine`] holds the tables made offline, [`protection`] the faults and the safe state,
+//! [`recorder`] what led to one.
 //!
 //! Who knows whom: [`frames`], [`time`] and [`machine`] know nobody; control and modulation know these, never each other;
 //! neither knows the cells; only the drive knows all of them; only a board knows registers.
@@ -22,6 +23,7 @@
 
 pub mod board;
 pub mod cell;
+pub mod configuration;
 pub mod control;
 pub mod drive;
 pub mod frames;
@@ -31,4 +33,5 @@ pub mod modulation;
 pub mod nine_switch;
 pub mod operator;
 pub mod protection;
+pub mod recorder;
 pub mod time;

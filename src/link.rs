@@ -14,7 +14,9 @@ use crate::control::{Demand, LinkWindow, Measurements};
 use crate::drive::{Report, half_from_words, half_to_words};
 use crate::frames::{Abc, Angle};
 use crate::modulation::CarrierPeriod;
+use crate::operator::{self, Feedback, Status};
 use crate::protection::{Fault, SafeState};
+use crate::recorder::Record;
 use crate::time::Instant;
 
 pub use dual::{
@@ -30,7 +32,7 @@ pub const BLOCK_BYTES: usize = BLOCK_WORDS * 4;
 pub type Block = [u32; BLOCK_WORDS];
 
 /// What the timers run on and what the inverter is; the rig tells it before anything starts.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Setup {
     /// Shortest pulse of a device, in ticks.
     pub min_pulse_ticks: u32,
@@ -38,6 +40,17 @@ pub struct Setup {
     pub dead_time_ticks: u32,
     /// By how much the PWM timer's first half is longer than the shortest one, in ticks.
     pub pwm_delay_ticks: u32,
+    /// The line side that the operator switches; `None`: no operator, the rig commands the drive directly.
+    pub line: Option<LineTimes>,
+}
+
+/// Time constants of the line side.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LineTimes {
+    /// Of precharge resistor and link capacitor, in s.
+    pub precharge_s: f32,
+    /// Of discharge resistor and link capacitor, in s.
+    pub discharge_s: f32,
 }
 
 /// From the firmware to the rig.
@@ -55,8 +68,18 @@ pub enum Request {
     Play(Instant, CarrierPeriod),
     /// Gates into the safe state; `true` from the control interrupt.
     Enter(Instant, SafeState),
+    /// The safe state is left.
+    Leave(Instant),
+    /// What is asked of the operator, and what the board says, in the slot that began at the instant.
+    Ask(Instant),
+    /// What the operator told; it holds from the instant on.
+    Tell(Instant, Status),
     /// The processor has stopped in a panic or a HardFault, gates off.
     Dead,
+    /// A control period from the flight recorder, the oldest first; after the last answer, if a fault has frozen it.
+    Recorded(Record),
+    /// The image has nothing more to say.
+    End,
 }
 
 impl Request {
@@ -71,6 +94,11 @@ impl Request {
             Self::Play(at, half) => (5, *at, &half_to_words(*half)),
             Self::Enter(at, safe) => (6, *at, &[*safe as u32]),
             Self::Dead => (7, Instant(0), &[]),
+            Self::Recorded(record) => (8, record.at, &record.to_words()),
+            Self::End => (9, Instant(0), &[]),
+            Self::Leave(at) => (10, *at, &[]),
+            Self::Ask(at) => (11, *at, &[]),
+            Self::Tell(from, status) => (12, *from, &status.to_words()),
         };
         let words = [tag, at.0].into_iter().chain(payload.iter().copied());
         for (slot, word) in block.iter_mut().zip(words) {
@@ -100,6 +128,17 @@ impl Request {
                 Self::Enter(at, SafeState::from_code(safe))
             }
             7 => Self::Dead,
+            8 => {
+                let [a, b, c, d, e, f, g, h, i, j, ..] = payload;
+                Self::Recorded(Record::from_words([a, b, c, d, e, f, g, h, i, j]))
+            }
+            9 => Self::End,
+            10 => Self::Leave(at),
+            11 => Self::Ask(at),
+            12 => {
+                let [a, b, c, d, e, f, g, h, ..] = payload;
+                Self::Tell(at, Status::from_words([a, b, c, d, e, f, g, h])?)
+            }
             _ => return None,
         })
     }
@@ -109,13 +148,17 @@ impl Request {
 pub fn setup_to_block(setup: Setup) -> Block {
     let mut block = [0; BLOCK_WORDS];
     [block[0], block[1], block[2]] = [setup.min_pulse_ticks, setup.dead_time_ticks, setup.pwm_delay_ticks];
+    if let Some(LineTimes { precharge_s, discharge_s }) = setup.line {
+        [block[3], block[4], block[5]] = [1, precharge_s.to_bits(), discharge_s.to_bits()];
+    }
     block
 }
 
 /// The inverse of [`setup_to_block`].
 pub fn setup_from_block(block: &Block) -> Setup {
-    let [min_pulse_ticks, dead_time_ticks, pwm_delay_ticks, ..] = *block;
-    Setup { min_pulse_ticks, dead_time_ticks, pwm_delay_ticks }
+    let [min_pulse_ticks, dead_time_ticks, pwm_delay_ticks, operated, precharge, discharge, ..] = *block;
+    let times = LineTimes { precharge_s: f32::from_bits(precharge), discharge_s: f32::from_bits(discharge) };
+    Setup { min_pulse_ticks, dead_time_ticks, pwm_delay_ticks, line: (operated == 1).then_some(times) }
 }
 
 /// The answer to [`Request::ControlSample`]; `stop` ends the run.
@@ -144,6 +187,22 @@ pub fn sample_from_block(block: &Block) -> (Sample, bool) {
         hardware: Fault::from_code(hardware),
     };
     (sample, flags & 4 != 0)
+}
+
+/// The answer to [`Request::Ask`].
+pub fn asked_to_block(asked: &operator::Request, feedback: &Feedback) -> Block {
+    let mut block = [0; BLOCK_WORDS];
+    let words = asked.to_words().into_iter().chain(feedback.to_words());
+    for (slot, word) in block.iter_mut().zip(words) {
+        *slot = word;
+    }
+    block
+}
+
+/// The inverse of [`asked_to_block`].
+pub fn asked_from_block(block: &Block) -> (operator::Request, Feedback) {
+    let [a, b, c, d, e, f, g, h, i, j, k, ..] = *block;
+    (operator::Request::from_words([a, b, c, d, e, f, g]), Feedback::from_words([h, i, j, k]))
 }
 
 /// The answer to [`Request::PwmSample`].

@@ -18,11 +18,12 @@ mod firmware {
     use tractive::board::qemu::{self, CLOCK, Interrupt as interrupt};
     use tractive::control::Gains;
     use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
-    use tractive::machine::BUILT_IN;
+    use tractive::machine::{BUILT_IN, BuiltIn};
     use tractive::modulation::Devices;
+    use tractive::operator::{self, Line, Slot, slot_s};
     use tractive::time::Instant;
 
-    static SHARED: Shared = Shared::new();
+    static SHARED: Shared = Shared::recorded_by(&qemu::RECORDER);
     static MIN_PULSE_TICKS: AtomicU32 = AtomicU32::new(0);
     static DEAD_TIME_TICKS: AtomicU32 = AtomicU32::new(0);
     static FIRST_HALF_TICKS: AtomicU32 = AtomicU32::new(0);
@@ -47,8 +48,15 @@ mod firmware {
         DEAD_TIME_TICKS.store(setup.dead_time_ticks, Ordering::Relaxed);
         let first_half_ticks = settings().devices.shortest_half_ticks.saturating_add(setup.pwm_delay_ticks);
         FIRST_HALF_TICKS.store(first_half_ticks, Ordering::Relaxed);
+        let line =
+            setup.line.map(|times| Line::rated(&BUILT_IN.ratings, times.precharge_s, times.discharge_s));
+        let operator = operator::Settings::rated(&BUILT_IN.ratings, slot_s(&CLOCK), line);
+        let mut slot = Slot::new();
         qemu::start(first_half_ticks);
         loop {
+            if line.is_some() {
+                slot.run(&qemu::DESK, &mut qemu::Idle, &operator, &CLOCK);
+            }
             qemu::idle();
         }
     }
@@ -56,11 +64,11 @@ mod firmware {
     /// Deadline: the next control interrupt. Missed: fault `control_deadline`, gates into the safe state.
     #[interrupt]
     fn TIMER0() {
-        static mut TASK: Option<ControlTask> = None;
+        static mut TASK: Option<ControlTask<BuiltIn>> = None;
         let mut board = qemu::Control;
         board.acknowledge();
         let first = Instant(CLOCK.control_ticks);
-        let task = TASK.get_or_insert_with(|| ControlTask::new(&BUILT_IN, settings(), first));
+        let task = TASK.get_or_insert_with(|| ControlTask::new(BuiltIn, settings(), first));
         if task.wants_revision() {
             board.revise_pulses();
         }
@@ -70,11 +78,11 @@ mod firmware {
     /// Deadline: the next carrier boundary, where the shadow registers take over.
     #[interrupt]
     fn DUALTIMER() {
-        static mut TASK: Option<PwmTask> = None;
+        static mut TASK: Option<PwmTask<BuiltIn>> = None;
         let mut board = qemu::Pwm;
         let settings = settings();
         let first = Instant(FIRST_HALF_TICKS.load(Ordering::Relaxed));
-        let task = || PwmTask::new(&BUILT_IN, settings, first).after_halves_of(first.0);
+        let task = || PwmTask::new(BuiltIn, settings, first).after_halves_of(first.0);
         let task = TASK.get_or_insert_with(task);
         if board.is_boundary() {
             board.acknowledge();

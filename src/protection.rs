@@ -52,7 +52,7 @@ pub enum Fault {
     HardwareOvercurrent,
     /// The chip's own break: crystal stopped, processor locked up, or a memory word with a two-bit error.
     ClockFailure,
-    /// A carrier half ended before its interrupt did.
+    /// A carrier half ended before its interrupt did, or control saw none come, in s.
     PwmDeadline,
     /// The board did not leave the safe state when it was told to.
     GatesHeld,

@@ -42,12 +42,15 @@ pub struct Clock {
     pub ticks_per_s: f32,
     /// Period of the control timer, in ticks.
     pub control_ticks: u32,
+    /// The same, in s.
+    pub control_s: f32,
 }
 
 impl Clock {
     /// A clock of `hz` ticks per second with control at every `control_ticks`.
     pub const fn new(hz: u32, control_ticks: u32) -> Self {
-        Self { tick_s: 1.0 / hz as f32, ticks_per_s: hz as f32, control_ticks }
+        let tick_s = 1.0 / hz as f32;
+        Self { tick_s, ticks_per_s: hz as f32, control_ticks, control_s: control_ticks as f32 * tick_s }
     }
 
     /// A number of ticks, in s.
@@ -58,7 +61,7 @@ impl Clock {
 
     /// The control timer's period, in s.
     #[inline]
-    pub fn control_s(&self) -> f32 {
-        self.seconds(self.control_ticks as i32)
+    pub const fn control_s(&self) -> f32 {
+        self.control_s
     }
 }

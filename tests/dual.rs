@@ -273,7 +273,7 @@ fn without_control_the_pwm_interrupt_stops() {
     }
     let trip = drive.pwm.trip().unwrap();
     assert_eq!(trip.fault, Fault::StaleCommand);
-    assert!(trip.value > trip.limit && drive.is_off(), "{trip:?}");
+    assert!(trip.value >= trip.limit && drive.is_off(), "{trip:?}");
     assert_eq!(drive.fake.off_at, Some(trip.at));
 }
 

@@ -3,7 +3,7 @@
 
 use loom::sync::Arc;
 use loom::thread;
-use tractive::cell::{Downlink, Uplink, Words};
+use tractive::cell::{Downlink, Ring, Trail, Uplink, Words};
 
 /// Two words that belong together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -46,6 +46,41 @@ fn an_uplink_is_never_torn() {
     });
 }
 
+/// The newest two records' words, of which both are the record's number.
+fn newest_two(trail: &Trail<2>) -> Option<[[u32; 2]; 2]> {
+    trail.read(|[one, two, ..]| [one, two].map(|record| [record.word::<0>(), record.word::<1>()]))
+}
+
+#[test]
+fn a_trail_is_never_torn_by_the_next_record() {
+    loom::model(|| {
+        let trail = Arc::new(Trail::<2>::new());
+        trail.publish([1; 2]);
+        let reader = Arc::clone(&trail);
+        let thread = thread::spawn(move || newest_two(&reader));
+        trail.publish([2; 2]);
+        trail.publish([3; 2]);
+        let read = thread.join().unwrap();
+        let whole = [None, Some([[1; 2], [0; 2]]), Some([[2; 2], [1; 2]]), Some([[3; 2], [2; 2]])];
+        assert!(whole.contains(&read), "{read:?}");
+        assert_eq!(newest_two(&trail), Some([[3; 2], [2; 2]]));
+    });
+}
+
+#[test]
+fn a_trail_is_never_torn_by_a_revision() {
+    loom::model(|| {
+        let trail = Arc::new(Trail::<2>::new());
+        trail.publish([1; 2]);
+        let reader = Arc::clone(&trail);
+        let thread = thread::spawn(move || newest_two(&reader));
+        trail.revise([9; 2]);
+        let read = thread.join().unwrap();
+        assert!([None, Some([[1; 2], [0; 2]]), Some([[9; 2], [0; 2]])].contains(&read), "{read:?}");
+        assert_eq!(newest_two(&trail), Some([[9; 2], [0; 2]]));
+    });
+}
+
 /// The protocol: while a reader reads, the writer publishes at most once, because its previous value was ready for every
 /// reader before it began.
 #[test]
@@ -56,7 +91,7 @@ fn a_downlink_gives_the_value_that_is_ready_while_the_next_one_is_written() {
         cell.publish(Message::number(2));
         let reader = Arc::clone(&cell);
         // Value 2 is ready; 3 is not yet, by its valid-from instant.
-        let thread = thread::spawn(move || reader.newest(|message| message.0[0] != 3));
+        let thread = thread::spawn(move || reader.newest(|record| record.word::<0>() != 3));
         cell.publish(Message::number(3));
         assert_eq!(thread.join().unwrap(), Some(Message::number(2)));
         assert_eq!(cell.newest(|_| true), Some(Message::number(3)));
@@ -91,5 +126,113 @@ fn a_downlink_outside_its_protocol_is_torn() {
         if let Some(message) = thread.join().unwrap() {
             assert!(message.is_whole(), "torn: {message:?}");
         }
+    });
+}
+
+/// Nothing of the first value is seen before all of it.
+#[test]
+fn the_first_value_of_an_uplink_is_whole_or_not_there() {
+    loom::model(|| {
+        let cell = Arc::new(Uplink::<Message, 2>::new());
+        let reader = Arc::clone(&cell);
+        let thread = thread::spawn(move || reader.read());
+        cell.publish(Message::number(1));
+        let read = thread.join().unwrap();
+        assert!([None, Some(Message::number(1))].contains(&read), "{read:?}");
+        assert_eq!(cell.read(), Some(Message::number(1)));
+    });
+}
+
+#[test]
+fn the_first_value_of_a_downlink_is_whole_or_not_there() {
+    loom::model(|| {
+        let cell = Arc::new(Downlink::<Message, 2>::new());
+        let reader = Arc::clone(&cell);
+        let thread = thread::spawn(move || reader.newest(|_| true));
+        cell.publish(Message::number(1));
+        let read = thread.join().unwrap();
+        assert!([None, Some(Message::number(1))].contains(&read), "{read:?}");
+        assert_eq!(cell.newest(|_| true), Some(Message::number(1)));
+    });
+}
+
+/// A reader never goes back to an older value.
+#[test]
+fn an_uplink_goes_forward() {
+    let mut model = loom::model::Builder::new();
+    model.preemption_bound = Some(2);
+    model.check(|| {
+        let cell = Arc::new(Uplink::<Message, 2>::new());
+        cell.publish(Message::number(1));
+        let reader = Arc::clone(&cell);
+        let thread = thread::spawn(move || [reader.read(), reader.read()]);
+        cell.publish(Message::number(2));
+        if let [Some(first), Some(second)] = thread.join().unwrap() {
+            assert!(first.0[0] <= second.0[0], "{first:?} then {second:?}");
+        }
+    });
+}
+
+#[test]
+fn a_downlink_goes_forward() {
+    let mut model = loom::model::Builder::new();
+    model.preemption_bound = Some(3);
+    model.check(|| {
+        let cell = Arc::new(Downlink::<Message, 2>::new());
+        cell.publish(Message::number(1));
+        cell.publish(Message::number(2));
+        let reader = Arc::clone(&cell);
+        let thread = thread::spawn(move || [reader.newest(|_| true), reader.newest(|_| true)]);
+        cell.publish(Message::number(3));
+        let [first, second] = thread.join().unwrap().map(|read| read.unwrap().0[0]);
+        assert!(first <= second, "{first} then {second}");
+    });
+}
+
+/// Words behind one another, with nothing that says whether they belong together: what the cells are instead of.
+#[test]
+#[should_panic(expected = "torn")]
+fn words_alone_are_torn() {
+    use loom::sync::atomic::{AtomicU32, Ordering};
+    loom::model(|| {
+        let words = Arc::new([AtomicU32::new(1), AtomicU32::new(1)]);
+        let reader = Arc::clone(&words);
+        let thread = thread::spawn(move || [0, 1].map(|k: usize| reader[k].load(Ordering::Acquire)));
+        words.iter().for_each(|word| word.store(2, Ordering::Release));
+        let read = Message(thread.join().unwrap());
+        assert!(read.is_whole(), "torn: {read:?}");
+    });
+}
+
+/// The reader gets only what a fault has frozen, whole; nothing while the writer still writes, or writes again.
+#[test]
+fn a_ring_gives_only_what_is_frozen() {
+    loom::model(|| {
+        let ring = Arc::new(Ring::<Message, 2, 8>::new());
+        ring.record(Message::number(1), false);
+        let reader = Arc::clone(&ring);
+        let thread = thread::spawn(move || [reader.read(0), reader.read(1)]);
+        ring.record(Message::number(2), true);
+        let expected = [Some(Message::number(1)), Some(Message::number(2))];
+        for (read, expected) in thread.join().unwrap().into_iter().zip(expected) {
+            assert!(read.is_none() || read == expected, "{read:?}");
+        }
+        assert_eq!([ring.read(0), ring.read(1), ring.read(2)], [expected[0], expected[1], None]);
+    });
+}
+
+#[test]
+fn a_ring_that_is_released_under_the_readers_hands_gives_nothing_torn() {
+    loom::model(|| {
+        let ring = Arc::new(Ring::<Message, 2, 8>::new());
+        for n in 1..9 {
+            ring.record(Message::number(n), n == 8);
+        }
+        let reader = Arc::clone(&ring);
+        let thread = thread::spawn(move || reader.read(0));
+        ring.release();
+        ring.record(Message::number(9), true);
+        let read = thread.join().unwrap();
+        assert!([None, Some(Message::number(1)), Some(Message::number(9))].contains(&read), "{read:?}");
     });
 }

@@ -24,15 +24,8 @@ fn play(references: &[(f32, f32, f32)]) -> Vec<CarrierPeriod> {
     let mut halves = Vec::new();
     for (depth, hz, udc_v) in references {
         for _ in 0..40 {
-            let reference = Reference {
-                voltage_v: depth * udc_v * std::f32::consts::FRAC_2_PI,
-                angle,
-                carrier_angle: angle,
-                rate: rate(*hz),
-                at: now,
-                udc_v: *udc_v,
-                depth: *depth,
-            };
+            let voltage_v = depth * udc_v * std::f32::consts::FRAC_2_PI;
+            let reference = Reference::turning(voltage_v, angle, rate(*hz), now, *udc_v);
             let half = modulator.step(now, Some(&reference));
             now = now.after(half.period_ticks);
             angle = angle + Angle((rate(*hz) * half.period_ticks as f32) as i32 as u32);
@@ -65,7 +58,7 @@ proptest! {
     #[test]
     fn nonsense_makes_no_endless_half(voltage in any::<f32>(), rate in any::<f32>(), udc in any::<f32>(), depth in any::<f32>()) {
         let mut modulator = Modulator::new(devices(), Schedule::new(&CLOCK));
-        let reference = Reference { voltage_v: voltage, angle: Angle(77), carrier_angle: Angle(77), rate, at: Instant(0), udc_v: udc, depth };
+        let reference = Reference { depth, ..Reference::turning(voltage, Angle(77), rate, Instant(0), udc) };
         for k in 0..10 {
             let half = modulator.step(Instant(k * 10_000), Some(&reference));
             prop_assert!(half.period_ticks >= 1 && half.period_ticks <= 4 * devices().shortest_half_ticks);
@@ -99,15 +92,7 @@ fn mean_voltage_of_every_carrier_half_is_the_reference() {
         let mut now = Instant(0);
         for _ in 0..200 {
             let turned = (f64::from(rate(hz)) * f64::from(now.0)) as u64 as u32;
-            let reference = Reference {
-                voltage_v: 600.0,
-                angle: Angle(turned),
-                carrier_angle: Angle(turned),
-                rate: rate(hz),
-                at: now,
-                udc_v: 1500.0,
-                depth: 0.6,
-            };
+            let reference = Reference::turning(600.0, Angle(turned), rate(hz), now, 1500.0);
             let half = modulator.step(now, Some(&reference));
             let [a, b, c] = half.on_ticks(0).map(|on| f64::from(on) * 1500.0 / f64::from(half.period_ticks));
             let (alpha, beta) = ((2.0 * a - b - c) / 3.0, (b - c) / 3_f64.sqrt());

@@ -2,8 +2,8 @@
 
 use tractive::board::PwmPort;
 use tractive::drive::traction::{PwmTask, Settings, Shared};
-use tractive::drive::{Gates, VoltageCommand};
-use tractive::frames::{Abc, Angle};
+use tractive::drive::{CommittalRecord, Gates, VoltageCommand, volt_ticks};
+use tractive::frames::{Abc, AlphaBeta, Angle};
 use tractive::machine::BUILT_IN;
 use tractive::modulation::{CarrierPeriod, Devices, Mode, Modulator, Reference, Schedule};
 use tractive::protection::SafeState;
@@ -27,7 +27,7 @@ fn half_ticks() -> u32 {
 fn reference(voltage_v: f32, direction: f32, at: Instant) -> Reference {
     let angle = Angle(0x2345_6789);
     let rate = direction * 13.0 * 4_294_967_296.0 / 25e6;
-    Reference { voltage_v, angle, carrier_angle: angle, rate, at, udc_v: 1_500.0, depth: voltage_v / 955.0 }
+    Reference::turning(voltage_v, angle, rate, at, 1_500.0)
 }
 
 #[test]
@@ -66,7 +66,7 @@ impl PwmPort for Played {
 /// A drive whose PWM interrupt has come at three boundaries, with pulses since the second.
 struct Pulsing {
     pwm: PwmTask,
-    shared: Shared,
+    shared: Shared<'static>,
     played: Played,
 }
 
@@ -105,6 +105,7 @@ impl Pulsing {
     /// The same for a sample of any tick.
     fn publish_of(&self, at: u32, voltage_v: f32, valid_from: u32, revises: bool) {
         let reference = reference(voltage_v, 1.0, Instant(at));
+        self.shared.began.store(valid_from, std::sync::atomic::Ordering::Relaxed);
         let valid_from = Instant(valid_from);
         self.shared.command.publish(VoltageCommand {
             reference,
@@ -113,6 +114,15 @@ impl Pulsing {
             revises,
             acknowledge: 0,
         });
+    }
+
+    /// Boundaries and what their halves give, as control reads them: of the next half, and of the running one.
+    fn told(&self) -> [(Instant, AlphaBeta); 2] {
+        let told = self.shared.applied.read(|records| {
+            let [newest, running, ..] = records.map(CommittalRecord);
+            [(newest.at(), newest.volt_ticks()), (running.at(), running.volt_ticks_from(0))]
+        });
+        told.unwrap()
     }
 
     fn revise(&mut self) -> Option<CarrierPeriod> {
@@ -136,12 +146,13 @@ fn a_revised_half_has_the_newer_voltage_and_is_told_to_control() {
     let mut knowing = Pulsing::at_two_boundaries();
     knowing.publish_of(3 * half_ticks(), 700.0, 3 * half_ticks() - 1, false);
     assert_eq!(revised, knowing.run());
-    let applied = drive.shared.applied.read().unwrap();
-    assert_eq!((applied.next, applied.at), (revised, Instant(3 * half_ticks())));
+    let [newest, _] = drive.told();
+    assert_eq!(newest, (Instant(3 * half_ticks()), volt_ticks(revised.on_ticks(0))));
     // What control is told of the running half is what was played last.
     drive.publish(700.0, 4 * half_ticks() - 2_500, false);
     drive.run();
-    assert_eq!(drive.shared.applied.read().unwrap().running, revised);
+    let [_, running] = drive.told();
+    assert_eq!(running.1, volt_ticks(revised.on_ticks(0)));
 }
 
 #[test]

@@ -170,6 +170,10 @@ fn run(name: &str, options: &RunOptions) -> Result<ExitCode> {
     let figures = scenario.figures(&recording, options, &machine);
     recording.write_trace(&out.join("trace.csv"))?;
     recording.write_edges(&out.join("edges.csv"))?;
+    if !recording.slots.is_empty() {
+        recording.write_slots(&out.join("operator.csv"))?;
+    }
+    recording.write_recorder(&out.join("recorder.csv"))?;
     let summary = summary(scenario.as_ref(), options, &figures, &machine);
     trace::write_text(&out.join("summary.json"), &(serde_json::to_string_pretty(&summary)? + "\n"))?;
     trace::write_text(&out.join("overview.svg"), &report::overview(&recording)?)?;
@@ -244,6 +248,7 @@ fn page(
     measured: &Figures,
 ) -> Result<String> {
     let mut page = Page::new(scenario.name(), scenario.figure());
+    page.recorder(recording);
     scenario.plots(recording, &mut page);
     if scenario.name() == "characteristic" {
         figures::draw(&mut page, machine);

@@ -79,15 +79,9 @@ pub fn edges(wanted: &Wanted) -> Result<Vec<LegEdge>> {
 /// The reference at a tick, for a steadily turning fundamental whose pulse angle is zero at tick zero.
 fn reference(wanted: &Wanted, rate: f32, tick: u64) -> Reference {
     let turned = (f64::from(rate) * tick as f64).rem_euclid(4_294_967_296.0);
-    Reference {
-        voltage_v: wanted.voltage_v as f32,
-        angle: Angle(turned as u64 as u32) - Angle::DEG_90,
-        carrier_angle: Angle(turned as u64 as u32) - Angle::DEG_90,
-        rate,
-        at: Instant(tick as u32),
-        udc_v: wanted.udc_v as f32,
-        depth: 0.0,
-    }
+    let angle = Angle(turned as u64 as u32) - Angle::DEG_90;
+    let udc_v = wanted.udc_v as f32;
+    Reference::turning(wanted.voltage_v as f32, angle, rate, Instant(tick as u32), udc_v)
 }
 
 /// Levels at `begin`, then every change until `end`.

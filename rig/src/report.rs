@@ -7,6 +7,7 @@ use anyhow::{Result, anyhow};
 use plotters::prelude::*;
 use serde_json::Value;
 use std::fmt::Write as _;
+use tractive::recorder::Record;
 
 /// Size of a plot, in pixels.
 const SIZE: (u32, u32) = (1000, 280);
@@ -144,6 +145,45 @@ impl Page {
             })
             .collect::<Vec<_>>();
         self.draw(title, unit, &series);
+    }
+
+    /// What the drive's flight recorder holds of a fault; nothing if there was none.
+    pub fn recorder(&mut self, recording: &Recording) {
+        let recorded = &recording.recorded;
+        let Some((t_s, fault)) = recorded.iter().find_map(|(t_s, record)| Some((*t_s, record.state.fault?)))
+        else {
+            return;
+        };
+        let panels: [(&str, &str, &[(&str, fn(&Record) -> f32)]); 3] = [
+            (
+                "phase currents as sampled",
+                "A",
+                &[
+                    ("ia", |record| record.currents_a.a),
+                    ("ib", |record| record.currents_a.b),
+                    ("ic", |record| record.currents_a.c),
+                ],
+            ),
+            ("current references", "A", &[("id", |record| record.id_a), ("iq", |record| record.iq_a)]),
+            (
+                "DC link as sampled and commanded voltage",
+                "V",
+                &[("udc", |record| record.udc_v), ("u", |record| record.voltage_v)],
+            ),
+        ];
+        for (what, unit, curves) in panels {
+            let series: Vec<_> = curves
+                .iter()
+                .map(|(name, value)| {
+                    let of = |(at_s, record): &(f64, Record)| (1e3 * (at_s - t_s), f64::from(value(record)));
+                    // What is not finite may be the fault itself, and cannot be drawn.
+                    let points = recorded.iter().map(of).filter(|(_, value)| value.is_finite()).collect();
+                    (*name, points)
+                })
+                .collect();
+            let heading = format!("Flight recorder · {what} around {} at {t_s:.4} s", fault.name());
+            self.add(&heading, ("time from the fault in ms", unit), &series);
+        }
     }
 
     /// Line voltage between phases u and v from the gates' edges, over a part of the recording.

@@ -1,11 +1,14 @@
 //! What a run leaves behind: trace, edges, switches of mode. Files are written whole or not at all.
 
-use crate::bench::{Edge, GATES, Tick};
+use crate::bench::{Edge, GATES, SlotRow, Tick, degrees};
+use crate::plant::LinkEnergies;
 use anyhow::{Context, Result};
 use std::io::Write;
 use std::path::Path;
 use tractive::modulation::Mode;
+use tractive::operator::Status;
 use tractive::protection::Trip;
+use tractive::recorder::Record;
 
 /// One line of trace.csv: the plant's true values, and control's intentions at that instant.
 #[derive(Clone, Copy, Debug)]
@@ -44,6 +47,8 @@ pub struct Row {
     pub mode: Mode,
     /// The latched fault.
     pub trip: Option<Trip>,
+    /// The operator's last word, if there is one.
+    pub status: Option<Status>,
 }
 
 impl Row {
@@ -68,18 +73,35 @@ pub struct Switch {
     pub speed_rpm: f64,
 }
 
+/// Where a link's energy went.
+#[derive(Clone, Copy, Debug)]
+pub struct LinkBalance {
+    /// By who gave or took it.
+    pub energies: LinkEnergies,
+    /// All that was moved, of either sign, in J.
+    pub moved_j: f64,
+    /// Neither given nor kept: what integration has lost, in J.
+    pub missing_j: f64,
+}
+
 /// A whole run.
 pub struct Recording {
     /// Rows of the trace.
     pub rows: Vec<Row>,
     /// Changes of mode.
     pub switches: Vec<Switch>,
+    /// What the operator told, slot by slot; empty without one.
+    pub slots: Vec<SlotRow>,
+    /// Energies of a link with a capacitor, over the whole run.
+    pub link: Option<LinkBalance>,
     /// Gate edges; ticks count from the run's beginning.
     pub edges: Vec<Edge>,
     /// Tick at which the recording begins.
     pub lead: Tick,
     /// Length of a tick, in s.
     pub tick_s: f64,
+    /// What the drive's flight recorder holds, with its times in s from the recording's beginning; empty without a fault.
+    pub recorded: Vec<(f64, Record)>,
 }
 
 impl Recording {
@@ -136,6 +158,92 @@ impl Recording {
                         row.mode.name(),
                         row.trip.map_or("", |trip| trip.fault.name()),
                     ),
+                ))?;
+            }
+            Ok(())
+        })
+    }
+
+    /// Writes operator.csv: a line for every slot from whose beginning on the operator's words differ from those before.
+    pub fn write_slots(&self, path: &Path) -> Result<()> {
+        write_whole(path, |out| {
+            out.write_record([
+                "t_s",
+                "state",
+                "fault",
+                "refusal",
+                "refusals",
+                "torque_nm",
+                "precharge",
+                "main",
+                "discharge",
+                "chopper",
+            ])?;
+            let mut last = None;
+            for SlotRow { t_s, status } in &self.slots {
+                if last == Some(*status) {
+                    continue;
+                }
+                last = Some(*status);
+                out.serialize((
+                    short_time(*t_s),
+                    status.state.name(),
+                    status.trip.map_or("", |trip| trip.fault.name()),
+                    status.refusal.map_or("", |refusal| refusal.name()),
+                    status.refusals,
+                    status.torque_nm,
+                    u8::from(status.switches.precharge),
+                    u8::from(status.switches.main),
+                    u8::from(status.switches.discharge),
+                    status.switches.chopper,
+                ))?;
+            }
+            Ok(())
+        })
+    }
+
+    /// Writes recorder.csv, if a fault has frozen the flight recorder; else takes away what an earlier run has left.
+    pub fn write_recorder(&self, path: &Path) -> Result<()> {
+        if self.recorded.is_empty() {
+            return match std::fs::remove_file(path) {
+                Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+                    Err(error).with_context(|| path.display().to_string())
+                }
+                _ => Ok(()),
+            };
+        }
+        write_whole(path, |out| {
+            out.write_record([
+                "t_s",
+                "ia_a",
+                "ib_a",
+                "ic_a",
+                "udc_v",
+                "angle_deg",
+                "id_ref_a",
+                "iq_ref_a",
+                "u_v",
+                "mode",
+                "enabled",
+                "pulsing",
+                "fault",
+            ])?;
+            for (t_s, record) in &self.recorded {
+                let state = record.state;
+                out.serialize((
+                    short_time(*t_s),
+                    record.currents_a.a,
+                    record.currents_a.b,
+                    record.currents_a.c,
+                    record.udc_v,
+                    degrees(record.angle) as f32,
+                    record.id_a,
+                    record.iq_a,
+                    record.voltage_v,
+                    state.mode.name(),
+                    u8::from(state.enabled),
+                    u8::from(state.pulsing),
+                    state.fault.map_or("", |fault| fault.name()),
                 ))?;
             }
             Ok(())

@@ -114,3 +114,47 @@ fn a_trip_is_exit_code_1_with_its_name_value_and_limit() {
         "{errors}"
     );
 }
+
+/// Columns of a CSV by name.
+fn column(text: &str, name: &str) -> Vec<String> {
+    let mut lines = text.lines().map(|line| line.split(',').collect::<Vec<_>>());
+    let index = lines.next().unwrap().iter().position(|head| *head == name).unwrap();
+    lines.map(|fields| fields[index].to_owned()).collect()
+}
+
+#[test]
+fn a_fault_leaves_the_flight_recorder_and_a_good_run_takes_it_away() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().display();
+    let recorder = folder.path().join("recorder.csv");
+    let bad = rig(&format!("run timing --to 2000 --fault-at 0.05 --out {out}"));
+    assert_eq!(bad.status.code(), Some(1));
+    let text = std::fs::read_to_string(&recorder).unwrap();
+    let times: Vec<f64> = column(&text, "t_s").iter().map(|t_s| t_s.parse().unwrap()).collect();
+    assert_eq!(times.len(), tractive::recorder::RECORDS);
+    assert!(times.windows(2).all(|pair| (pair[1] - pair[0] - 1e-4).abs() < 1e-9), "control periods in a row");
+    let faults = column(&text, "fault");
+    let first = faults.iter().position(|fault| !fault.is_empty()).unwrap();
+    assert_eq!(times.len() - first, tractive::recorder::Recorder::AFTER);
+    assert!(faults[first..].iter().all(|fault| fault == "not_finite"));
+    assert!((times[first] - 0.05).abs() < 1.5e-4, "{}", times[first]);
+    let pulsing = column(&text, "pulsing");
+    assert!(pulsing[..first].iter().all(|on| on == "1") && pulsing[first..].iter().all(|on| on == "0"));
+    // The same samples as the drive's: the trace has the true currents at these instants.
+    let trace = std::fs::read_to_string(folder.path().join("trace.csv")).unwrap();
+    let truth: Vec<(f64, f64)> = column(&trace, "t_s")
+        .iter()
+        .zip(column(&trace, "ia_a"))
+        .map(|(t_s, ia)| (t_s.parse().unwrap(), ia.parse().unwrap()))
+        .collect();
+    for (t_s, ia) in times.iter().zip(column(&text, "ia_a")) {
+        let (_, wanted) = truth.iter().find(|(at_s, _)| (at_s - t_s).abs() < 1e-8).unwrap();
+        let recorded: f64 = ia.parse().unwrap();
+        assert!((recorded - wanted).abs() < 1e-2, "at {t_s}: {recorded} A, true {wanted} A");
+    }
+    let page = std::fs::read_to_string(folder.path().join("report.html")).unwrap();
+    assert!(page.contains("Flight recorder · phase currents as sampled around not_finite at 0.05"));
+    let good = rig(&format!("run timing --to 300 --torque-scale 0.1 --out {out}"));
+    assert_eq!(good.status.code(), Some(0), "{}", String::from_utf8_lossy(&good.stderr));
+    assert!(!recorder.exists());
+}

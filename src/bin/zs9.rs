@@ -10,7 +10,8 @@ fn main() {
 }
 
 #[cfg(all(target_os = "none", feature = "board-nucleo-g474re"))]
-compile_error!("the ZS9 has no board but QEMU's yet: build it without the feature board-nucleo-g474re");
+#[path = "../firmware/zs9_nucleo_g474re.rs"]
+mod firmware;
 
 #[cfg(all(target_os = "none", not(feature = "board-nucleo-g474re")))]
 mod firmware {
@@ -18,7 +19,7 @@ mod firmware {
     use cortex_m_rt::{entry, exception, interrupt};
     use tractive::board::qemu::{self, CLOCK, Interrupt as interrupt};
     use tractive::drive::dual::{ControlTask, PwmTask, Settings, Shared};
-    use tractive::machine::zs9::BUILT_IN;
+    use tractive::machine::zs9::BuiltIn;
 
     static SHARED: Shared = Shared::new();
     static CARRIER_TICKS: AtomicU32 = AtomicU32::new(0);
@@ -40,19 +41,19 @@ mod firmware {
     /// Deadline: the last peak before the next control interrupt. Missed: fault `control_deadline`, all gates off.
     #[interrupt]
     fn TIMER0() {
-        static mut TASK: Option<ControlTask> = None;
+        static mut TASK: Option<ControlTask<BuiltIn>> = None;
         let mut board = qemu::Control;
         board.acknowledge();
-        TASK.get_or_insert_with(|| ControlTask::new(&BUILT_IN, settings())).run(&mut board, &SHARED);
+        TASK.get_or_insert_with(|| ControlTask::new(BuiltIn, settings())).run(&mut board, &SHARED);
     }
 
     /// Deadline: the next valley, where the shadow registers take over.
     #[interrupt]
     fn DUALTIMER() {
-        static mut TASK: Option<PwmTask> = None;
+        static mut TASK: Option<PwmTask<BuiltIn>> = None;
         let mut board = qemu::Pwm;
         board.acknowledge();
-        TASK.get_or_insert_with(|| PwmTask::new(&BUILT_IN, settings())).run(&mut board, &SHARED);
+        TASK.get_or_insert_with(|| PwmTask::new(BuiltIn, settings())).run(&mut board, &SHARED);
     }
 
     #[exception]

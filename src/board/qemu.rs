@@ -1,5 +1,5 @@
 //! The emulated board: QEMU's `mps2-an386`, a Cortex-M4F at a deterministic instruction rate, with the rig at the other
-//! end of three semihosting files.
+//! end of four semihosting files.
 //!
 //! * Control timer: CMSDK timer 0. Its count gives the age of the running control period.
 //! * PWM timer: CMSDK dual timer, 32 bits; BGLOAD is its shadow register: what is written takes over at the next zero.
@@ -17,13 +17,19 @@ use crate::drive::Report;
 use crate::frames::Abc;
 use crate::link::Setup;
 use crate::modulation::CarrierPeriod;
+use crate::operator::{self, Desk, Feedback, OperatorPort, Status};
 use crate::protection::SafeState;
+use crate::recorder::Recorder;
 use crate::time::{Clock, Instant};
+use core::sync::atomic::{AtomicBool, Ordering};
 use cortex_m::peripheral::NVIC;
 use cortex_m_semihosting::debug;
 
 /// 25 MHz ticks; control at 10 kHz.
 pub const CLOCK: Clock = Clock::new(25_000_000, 2_500);
+
+/// The PMaSynRM drive's flight recorder. The rig reads it when the run is over.
+pub static RECORDER: Recorder = Recorder::new();
 
 const CONTROL_TIMER: usize = 0x4000_0000;
 const PWM_TIMER: usize = 0x4000_2000;
@@ -83,9 +89,17 @@ fn read_register(address: usize) -> u32 {
     unsafe { core::ptr::read_volatile(address as *const u32) }
 }
 
+/// Between the idle loop's operator and control.
+pub static DESK: Desk = Desk::new();
+
+/// Whether there is an operator; without one the rig's samples say what the drive may do.
+static OPERATED: AtomicBool = AtomicBool::new(false);
+
 /// Opens the link and fetches the set-up. Call once, before [`start`].
 pub fn connect() -> Setup {
-    exchange::open()
+    let setup = exchange::open();
+    OPERATED.store(setup.line.is_some(), Ordering::Relaxed);
+    setup
 }
 
 /// Starts both timers; the first PWM interrupt comes after `first_half_ticks`, the first control interrupt after one
@@ -119,6 +133,8 @@ fn start_timers() {
 
 /// Waits for a while, in instructions that do nothing. Not `wfi`: with `sleep=off` QEMU 7.2 skips timer periods while the
 /// processor sleeps. Not a short loop: leaving a translated block costs more than a thousand idle instructions.
+/// Out of line: constants of a caller's would lie behind all of them, out of reach.
+#[inline(never)]
 pub fn idle() {
     // SAFETY: the instructions read and write nothing.
     unsafe { core::arch::asm!(".rept 500", "nop", ".endr", options(nomem, nostack, preserves_flags)) }
@@ -173,7 +189,8 @@ impl Pwm {
 
 impl ControlPort for Control {
     fn sample(&mut self, now: Instant) -> Sample {
-        exchange::control_sample(now)
+        let sample = exchange::control_sample(now);
+        if OPERATED.load(Ordering::Relaxed) { DESK.permit(now).applied_to(sample) } else { sample }
     }
 
     fn enter(&mut self, safe: SafeState, now: Instant) {
@@ -189,6 +206,9 @@ impl ControlPort for Control {
     }
 
     fn report(&mut self, now: Instant, report: &Report) {
+        if OPERATED.load(Ordering::Relaxed) {
+            DESK.tell(now, report);
+        }
         exchange::report(now, report);
     }
 }
@@ -205,5 +225,23 @@ impl PwmPort for Pwm {
 
     fn enter(&mut self, safe: SafeState, now: Instant) {
         exchange::enter(safe, now);
+    }
+
+    fn leave(&mut self, now: Instant) -> bool {
+        exchange::leave(now);
+        true
+    }
+}
+
+/// The idle loop's side of the board.
+pub struct Idle;
+
+impl OperatorPort for Idle {
+    fn ask(&mut self, at: Instant) -> (operator::Request, Feedback) {
+        exchange::ask(at)
+    }
+
+    fn tell(&mut self, from: Instant, status: &Status) {
+        exchange::tell(from, status);
     }
 }

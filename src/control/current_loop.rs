@@ -107,30 +107,37 @@ pub fn step(input: &Input, gains: &Gains) -> Output {
 fn mean_voltage(input: &Input, reference: Dq, predicted: Dq, gains: &Gains) -> Dq {
     let committed = input.committed;
     let x = 0.5 * input.omega * committed.interval_s;
-    let half_turn = Angle::from_radians(x).sin_cos();
+    let half_turn = Angle::within_half_turn(x).sin_cos();
     let error = predicted - reference * (1.0 + x * x * (1.0 / 6.0));
     let remaining = 1.0 - gains.carrier;
     let chord = reference.j() * (2.0 * x)
         + error * ((remaining - 1.0) * half_turn.cos)
         + error.j() * ((remaining + 1.0) * half_turn.sin);
-    let middle = Angle::from_radians(input.omega * committed.horizon_s + x);
-    let steering = (committed.ripple_after_wb - committed.ripple_wb).park((input.angle + middle).sin_cos());
-    (chord + steering) * (1.0 / committed.interval_s)
+    let led = match &committed.ripple {
+        None => chord,
+        Some(ripple) => {
+            let middle = Angle::within_half_turn(input.omega * committed.horizon_s + x);
+            chord + (ripple.after_wb - ripple.at_horizon_wb).park((input.angle + middle).sin_cos())
+        }
+    };
+    led * (1.0 / committed.interval_s)
 }
 
 /// Flux linkage at the horizon less the pattern's ripple, in the rotor frame there.
 fn predicted_flux(input: &Input) -> Dq {
     let committed = input.committed;
-    let turned = input.omega * committed.horizon_s;
     let Some(volt_seconds) = committed.volt_seconds else {
         return input.flux;
     };
-    let middle = (input.angle + Angle::from_radians(0.5 * turned)).sin_cos();
-    let end = (input.angle + Angle::from_radians(turned)).sin_cos();
+    let moved = match &committed.ripple {
+        None => volt_seconds,
+        Some(ripple) => volt_seconds - ripple.at_horizon_wb,
+    };
+    // By half the way to the horizon, and by that once more.
+    let half_way = Angle::within_half_turn(0.5 * input.omega * committed.horizon_s).sin_cos();
     let drop = (input.disturbance_until_then - input.current * input.resistance) * committed.horizon_s;
-    let at_horizon =
-        input.flux.unpark(input.frame) + volt_seconds + drop.unpark(middle) - committed.ripple_wb;
-    at_horizon.park(end)
+    let in_the_middle = input.flux.turned(half_way.back()) + moved.park(input.frame.turned(half_way)) + drop;
+    in_the_middle.turned(half_way.back())
 }
 
 /// The vector, no longer than `limit_v`, its direction kept.

@@ -15,9 +15,9 @@ pub struct Observer {
     /// Flux linkage at the last boundary, stationary frame, in Wb.
     last_flux: Option<AlphaBeta>,
     mean: Dq,
-    /// Amplitudes that turn with and against six times the rotor angle, in V.
-    with_sixth: Dq,
-    against_sixth: Dq,
+    /// Amplitudes of the cosine and the sine of six times the rotor angle, in V: what turns with it and against it.
+    cosine: Dq,
+    sine: Dq,
     follows_sixth: bool,
 }
 
@@ -35,7 +35,7 @@ pub struct Input<'a> {
 impl Observer {
     pub const fn new() -> Self {
         const ZERO: Dq = Dq { d: 0.0, q: 0.0 };
-        Self { last_flux: None, mean: ZERO, with_sixth: ZERO, against_sixth: ZERO, follows_sixth: false }
+        Self { last_flux: None, mean: ZERO, cosine: ZERO, sine: ZERO, follows_sixth: false }
     }
 
     /// The mean disturbance, in V, rotor frame: flux rises by it although nobody asked.
@@ -48,8 +48,11 @@ impl Observer {
         if !self.follows_sixth {
             return self.mean;
         }
-        let sixth = sixth(angle);
-        self.mean + turned(self.with_sixth, sixth) + turned(self.against_sixth, back(sixth))
+        self.at(sixth(angle))
+    }
+
+    fn at(&self, sixth: SinCos) -> Dq {
+        self.mean + self.cosine * sixth.cos + self.sine * sixth.sin
     }
 
     /// A boundary has passed.
@@ -59,7 +62,7 @@ impl Observer {
         let current = boundary.currents_a.clarke().park(frame);
         let flux = flux_linkage(tables, current).unpark(frame);
         if let (Some(last), Some(volt_seconds)) = (self.last_flux, boundary.volt_seconds) {
-            let middle = angle - Angle::from_radians(0.5 * omega * boundary.length_s);
+            let middle = angle - Angle::within_half_turn(0.5 * omega * boundary.length_s);
             let unexplained = (flux - last - volt_seconds).park(middle.sin_cos()) * (1.0 / boundary.length_s);
             let drop = current * tables.ratings.stator_resistance_ohm;
             self.learn(unexplained + drop, middle, input.sixth, gains.observer);
@@ -70,31 +73,21 @@ impl Observer {
     fn learn(&mut self, voltage: Dq, angle: Angle, follow_sixth: bool, gain: f32) {
         self.follows_sixth = follow_sixth;
         if !follow_sixth {
-            self.with_sixth = Dq::default();
-            self.against_sixth = Dq::default();
+            self.cosine = Dq::default();
+            self.sine = Dq::default();
             self.mean = self.mean + (voltage - self.mean) * gain;
             return;
         }
         let sixth = sixth(angle);
-        let expected = self.mean + turned(self.with_sixth, sixth) + turned(self.against_sixth, back(sixth));
-        let error = (voltage - expected) * gain;
+        let error = (voltage - self.at(sixth)) * gain;
         self.mean = self.mean + error;
-        self.with_sixth = self.with_sixth + turned(error, back(sixth));
-        self.against_sixth = self.against_sixth + turned(error, sixth);
+        // Either part moves by the error: the one that turns with the angle, and the one against it.
+        self.cosine = self.cosine + error * (2.0 * sixth.cos);
+        self.sine = self.sine + error * (2.0 * sixth.sin);
     }
 }
 
 /// Direction of six times an angle.
 fn sixth(angle: Angle) -> SinCos {
     Angle(angle.0.wrapping_mul(6)).sin_cos()
-}
-
-/// The direction turned the other way.
-fn back(direction: SinCos) -> SinCos {
-    SinCos { sin: -direction.sin, ..direction }
-}
-
-/// A vector turned by a direction.
-fn turned(vector: Dq, by: SinCos) -> Dq {
-    Dq { d: vector.d * by.cos - vector.q * by.sin, q: vector.d * by.sin + vector.q * by.cos }
 }

@@ -21,9 +21,9 @@ impl FluxPath {
 
     /// The reference on its way to `target`; at once there where a carrier follows (`can_step`).
     pub fn step(&mut self, target: Dq, can_step: bool, period_s: f32) -> Dq {
-        let size = target.length();
         let reference = match self.last {
             Some(last) if !can_step => {
+                let size = target.length();
                 let (change, most) = (target - last, TURN_RAD_S * period_s * size);
                 let length = change.length();
                 if length > most {

@@ -65,10 +65,8 @@ pub struct Committed {
     pub horizon_s: f32,
     /// Volt-seconds until then, in V·s; `None` while the gates are off.
     pub volt_seconds: Option<AlphaBeta>,
-    /// Ripple flux of the pattern at that boundary, in Wb.
-    pub ripple_wb: AlphaBeta,
-    /// Ripple flux that is wanted at the end of the half that begins there, in Wb: the next pattern's, if it is to begin.
-    pub ripple_after_wb: AlphaBeta,
+    /// Ripple flux; `None` where there is none at the carrier's boundaries.
+    pub ripple: Option<Ripple>,
     /// Expected length of the carrier half that begins there, in s, greater than zero.
     pub interval_s: f32,
     /// What of the command the modulator's mode can follow.
@@ -83,6 +81,15 @@ pub struct Committed {
     pub ripple_share: f32,
     /// Whether the pattern's flux is where it will stay; not while a switch between two of them is still going on.
     pub settled: bool,
+}
+
+/// Ripple flux of a pattern, in Wb.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ripple {
+    /// At the boundary where the next voltage begins to act.
+    pub at_horizon_wb: AlphaBeta,
+    /// What is wanted at the end of the half that begins there: the next pattern's, if it is to begin.
+    pub after_wb: AlphaBeta,
 }
 
 /// A carrier boundary that has passed since the last step.
@@ -129,11 +136,11 @@ pub struct Law<'a> {
 pub struct VoltageVector {
     /// Fundamental, peak phase, in V.
     pub voltage_v: f32,
-    /// Angle of the vector at the sample, as if it acted there already; it turns with `omega`.
-    pub angle: Angle,
-    /// Likewise the angle that a locked carrier keeps to: that of the steady fundamental where pulses can regulate
-    /// without it, the vector's own where the angle is what regulates.
-    pub carrier_angle: Angle,
+    /// The same as a vector at the sample, as if it acted there already, in V; it turns with `omega`.
+    pub vector: AlphaBeta,
+    /// Likewise what a locked carrier keeps its angle to: the steady fundamental where pulses can regulate
+    /// without it, the vector itself where the angle is what regulates.
+    pub carrier: AlphaBeta,
     /// Fundamental of the operating point without regulation, peak phase, in V.
     pub steady_v: f32,
     /// Electrical angular speed, in rad/s, signed.
@@ -236,7 +243,8 @@ impl Controller {
         let frame = measured.angle.sin_cos();
         let current = measured.currents_a.clarke().park(frame);
         let flux = flux_linkage(tables, current);
-        let measured_nm = self::torque_nm(tables, flux, current) * self.map_error.scale();
+        let scale = self.map_error.scale();
+        let measured_nm = self::torque_nm(tables, flux, current) * scale;
         let shaping = demand::Input {
             demand,
             window,
@@ -250,7 +258,6 @@ impl Controller {
         let before = self.link_v.unwrap_or(measured.udc_v);
         let link_v = before + LINK_RAD_S * clock.control_s() * (measured.udc_v - before);
         self.link_v = Some(link_v);
-        let scale = self.map_error.scale();
         let depth = committed.depth_limit * committed.steady_share;
         let limit = VoltageLimit { udc_v: link_v / scale, depth, filled: committed.filled };
         let trimmed_nm = self.trim.apply(torque_nm, committed.ripple_share, tables.ratings.max_torque_nm);
@@ -267,15 +274,15 @@ impl Controller {
         });
         let resistance = tables.ratings.stator_resistance_ohm;
         if let Some(boundary) = boundary {
-            let angle = measured.angle - Angle::from_radians(omega * boundary.age_s);
+            let angle = measured.angle - Angle::within_half_turn(omega * boundary.age_s);
             let sixth =
                 committed.follows == Follows::Mean && 6.0 * omega.abs() * boundary.length_s < SIXTH_TURN_RAD;
             self.disturbance.step(&disturbance::Input { boundary, angle, omega, sixth }, gains, tables);
         }
-        let ahead = |seconds: f32| measured.angle + Angle::from_radians(omega * seconds);
+        let ahead = |seconds: f32| measured.angle + Angle::within_half_turn(omega * seconds);
         let disturbance = self.disturbance.voltage(ahead(committed.horizon_s + 0.5 * committed.interval_s));
         let until_then = self.disturbance.voltage(ahead(0.5 * committed.horizon_s));
-        let target = flux_linkage(tables, point.current);
+        let target = point.flux;
         let reference = self.path.step(target, shaping.can_step, clock.control_s());
         let voltage = current_loop::step(
             &current_loop::Input {
@@ -297,12 +304,11 @@ impl Controller {
         let current_loop::Output { voltage, steady } = voltage;
         self.map_error.step(self.disturbance.mean(), target, omega, clock.control_s());
         let regulates_by_pulses = committed.follows == Follows::Mean;
-        let carrier = if regulates_by_pulses { steady } else { voltage };
         Output {
             voltage: VoltageVector {
                 voltage_v: voltage.length(),
-                angle: measured.angle + voltage.angle(),
-                carrier_angle: measured.angle + carrier.angle(),
+                vector: voltage.unpark(frame),
+                carrier: if regulates_by_pulses { steady } else { voltage }.unpark(frame),
                 steady_v: steady.length(),
                 omega,
                 depth: point.depth,

@@ -25,13 +25,15 @@ pub fn mtpa_passes<const PASSES: usize>(torque_nm: f32, start: Dq, tables: &Tabl
     current
 }
 
-/// One look-up of the parameters and of the universal curve, for T ≥ 0.
+/// One look-up of the parameters and of the universal curve, for T ≥ 0. Inlined, so that the compiler knows the tables.
+#[inline(always)]
 fn pass(torque: f32, at: Dq, tables: &Tables) -> Dq {
     let [psi_f, saliency] = tables.mtpa.parameters.at(at.d, at.q);
     let torque_per_flux = torque / (1.5 * tables.ratings.pole_pairs);
     // t_en = T/t_eb with t_eb = 1.5 n_p psi_f i_b (9) and i_b = psi_f/(L_q − L_d) (10).
-    let root = sqrt(torque_per_flux * saliency) / psi_f;
-    let [share] = tables.mtpa.universal.at(root / (1.0 + root));
-    let d = -(psi_f / saliency) * root * share;
-    Dq { d, q: torque_per_flux / (psi_f - saliency * d) }
+    // √t_en is root/psi_f, and i_dn the share of it.
+    let root = sqrt(torque_per_flux * saliency);
+    let [share] = tables.mtpa.universal.at(root / (psi_f + root));
+    let weakening = root * share;
+    Dq { d: -weakening / saliency, q: torque_per_flux / (psi_f + weakening) }
 }

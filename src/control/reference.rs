@@ -46,6 +46,8 @@ pub struct VoltageLimit {
 pub struct OperatingPoint {
     /// Current, in A.
     pub current: Dq,
+    /// Flux linkage that belongs to it by the map, in Wb.
+    pub flux: Dq,
     /// Torque that it gives, in N·m.
     pub torque_nm: f32,
     /// Where it comes from.
@@ -59,7 +61,7 @@ pub fn six_step_v(udc_v: f32) -> f32 {
     udc_v * (2.0 * core::f32::consts::FRAC_1_PI)
 }
 
-/// The current for a torque in N·m at an electrical angular speed in rad/s.
+/// The current for a torque in N·m at an electrical angular speed in rad/s. The voltage is that of equation (3) on the flux map.
 pub fn operating_point(torque_nm: f32, omega: f32, limit: &VoltageLimit, tables: &Tables) -> OperatingPoint {
     // The torque axis ends where the current does.
     let most = tables.mtpa.start.last();
@@ -67,8 +69,11 @@ pub fn operating_point(torque_nm: f32, omega: f32, limit: &VoltageLimit, tables:
     let torque_nm = crate::frames::limit(wanted_nm, -most, most);
     let region = if torque_nm == wanted_nm { Region::Mtpa } else { Region::Limit };
     let best = mtpa(torque_nm, tables);
-    let depth = steady_voltage(best, omega, tables) / six_step_v(limit.udc_v);
-    let unweakened = OperatingPoint { current: best, torque_nm, region, depth };
+    let flux = flux_linkage(tables, best);
+    let resistance = tables.ratings.stator_resistance_ohm;
+    let steady_v = (flux.j() * omega + best * resistance).length();
+    let depth = steady_v / six_step_v(limit.udc_v);
+    let unweakened = OperatingPoint { current: best, flux, torque_nm, region, depth };
     if depth <= limit.depth && !limit.filled {
         return unweakened;
     }
@@ -79,19 +84,14 @@ pub fn operating_point(torque_nm: f32, omega: f32, limit: &VoltageLimit, tables:
     if on_circle.region == Region::Weakening && on_circle.current.d >= best.d && !limit.filled {
         return unweakened;
     }
-    if on_circle.region == Region::Limit {
+    let Weakened { current, torque_nm, region } = if on_circle.region == Region::Limit {
         // Less torque leaves less resistive drop: once more with the torque that is left.
         let left = flux_limit(on_circle.torque_nm, on_circle.current.squared(), omega, limit, tables);
-        let again = weakened(torque_nm, left.unwrap_or(psi), tables);
-        return OperatingPoint { depth, ..again };
-    }
-    OperatingPoint { depth, ..on_circle }
-}
-
-/// Magnitude of the steady-state phase voltage at a current, in V: equation (3) on the flux map.
-fn steady_voltage(current: Dq, omega: f32, tables: &Tables) -> f32 {
-    let flux = flux_linkage(tables, current);
-    (flux.j() * omega + current * tables.ratings.stator_resistance_ohm).length()
+        weakened(torque_nm, left.unwrap_or(psi), tables)
+    } else {
+        on_circle
+    };
+    OperatingPoint { current, flux: flux_linkage(tables, current), torque_nm, region, depth }
 }
 
 /// Largest flux linkage that the voltage allows, in Wb; `None` where it lies beyond the tables, so that no weakening
@@ -118,8 +118,16 @@ fn flux_limit(
     Some(if psi > largest { largest } else { psi })
 }
 
-/// The point on the circle of flux linkage `psi`, for either sign of torque.
-fn weakened(torque_nm: f32, psi: f32, tables: &Tables) -> OperatingPoint {
+/// A point on a circle of flux linkage.
+struct Weakened {
+    current: Dq,
+    torque_nm: f32,
+    region: Region,
+}
+
+/// The point on the circle of flux linkage `psi`, for either sign of torque. Inlined, so that the compiler knows the tables.
+#[inline(always)]
+fn weakened(torque_nm: f32, psi: f32, tables: &Tables) -> Weakened {
     let [circle, most] = tables.weakening.torque.at(psi);
     let torque = torque_nm.abs();
     let limited = torque > most;
@@ -127,10 +135,9 @@ fn weakened(torque_nm: f32, psi: f32, tables: &Tables) -> OperatingPoint {
     let share = if torque > circle { 1.0 } else { torque / circle };
     let [d, q] = tables.weakening.currents.at(psi, 1.0 - sqrt(1.0 - share));
     let negative = torque_nm < 0.0;
-    OperatingPoint {
+    Weakened {
         current: Dq { d, q: if negative { -q } else { q } },
         torque_nm: if negative { -torque } else { torque },
         region: if limited { Region::Limit } else { Region::Weakening },
-        depth: 0.0,
     }
 }

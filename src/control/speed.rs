@@ -27,7 +27,7 @@ impl SpeedTracker {
 
     /// The angle that the next sample should show.
     pub fn predicted(&self, period_s: f32) -> Angle {
-        self.angle + Angle::from_radians(self.omega * period_s)
+        self.angle + Angle::within_half_turn(self.omega * period_s)
     }
 
     /// The angle measured now; returns the electrical angular speed in rad/s.
@@ -42,7 +42,7 @@ impl SpeedTracker {
             let predicted = self.predicted(period_s);
             let error = (measured - predicted).signed_radians();
             self.omega += self.natural_rad_s * self.natural_rad_s * period_s * error;
-            self.angle = predicted + Angle::from_radians(2.0 * self.natural_rad_s * period_s * error);
+            self.angle = predicted + Angle::within_half_turn(2.0 * self.natural_rad_s * period_s * error);
         }
         self.steps = self.steps.saturating_add(1);
         self.omega

@@ -1,7 +1,7 @@
 //! What travels between the interrupts, and what control reports.
 
-use crate::cell::Words;
-use crate::frames::{Abc, Angle};
+use crate::cell::{Record, Words};
+use crate::frames::{Abc, AlphaBeta, Angle, SQRT_3};
 use crate::modulation::{CarrierPeriod, Mode, Reference};
 use crate::protection::{Fault, SafeState, Trip};
 use crate::time::Instant;
@@ -30,12 +30,21 @@ pub struct VoltageCommand {
     pub acknowledge: u8,
 }
 
-impl Words<9> for VoltageCommand {
-    fn to_words(self) -> [u32; 9] {
+impl VoltageCommand {
+    /// Of a command where it lies, from when on it may be used.
+    #[inline]
+    pub fn valid_from(record: &Record<10>) -> Instant {
+        Instant(record.word::<8>())
+    }
+}
+
+impl Words<10> for VoltageCommand {
+    fn to_words(self) -> [u32; 10] {
         let reference = self.reference;
         [
             reference.voltage_v.to_bits(),
-            reference.angle.0,
+            reference.vector.alpha.to_bits(),
+            reference.vector.beta.to_bits(),
             reference.carrier_angle.0,
             reference.rate.to_bits(),
             reference.at.0,
@@ -48,12 +57,12 @@ impl Words<9> for VoltageCommand {
         ]
     }
 
-    fn from_words(words: [u32; 9]) -> Self {
-        let [voltage, angle, carrier_angle, rate, at, udc, depth, valid_from, flags] = words;
+    fn from_words(words: [u32; 10]) -> Self {
+        let [voltage, alpha, beta, carrier_angle, rate, at, udc, depth, valid_from, flags] = words;
         Self {
             reference: Reference {
                 voltage_v: f32::from_bits(voltage),
-                angle: Angle(angle),
+                vector: AlphaBeta { alpha: f32::from_bits(alpha), beta: f32::from_bits(beta) },
                 carrier_angle: Angle(carrier_angle),
                 rate: f32::from_bits(rate),
                 at: Instant(at),
@@ -68,78 +77,190 @@ impl Words<9> for VoltageCommand {
     }
 }
 
-/// From the modulator to control: three consecutive carrier halves and the samples at their boundaries, so that control
-/// can look at the state of affairs at its own sample even if the PWM interrupt came in between.
+/// From the modulator to control, one record a boundary: the samples there, and the half that was committed there, which begins
+/// at the next boundary. What is running at a boundary stands in the record before.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Applied {
-    /// Instant at which `running` began.
+pub struct Committal {
+    /// The boundary.
     pub at: Instant,
-    /// The half before `running`.
-    pub before: CarrierPeriod,
-    /// The half that began at `at`.
-    pub running: CarrierPeriod,
-    /// The half that follows, already committed.
-    pub next: CarrierPeriod,
-    /// Phase currents at `at`, in A.
+    /// Phase currents there, in A.
     pub currents_a: Abc,
-    /// Phase currents at the boundary before, in A.
-    pub currents_before_a: Abc,
+    /// The boundary where `half` begins.
+    pub begins: Instant,
+    /// The half.
+    pub half: CarrierPeriod,
     /// Whether the modulator sees the machine in the mirror (turning backward).
     pub mirrored: bool,
-    /// A fault that the PWM interrupt found.
-    pub trip: Option<Trip>,
-    /// Number of the acknowledge that it carried out last, at `at` and at the boundary before.
-    pub acknowledged: [u8; 2],
+    /// Whether the PWM interrupt has found a fault; it then stands in a cell of its own.
+    pub tripped: bool,
+    /// Number of the acknowledge that it carried out last.
+    pub acknowledged: u8,
 }
 
-impl Applied {
-    /// Gates off, in halves of one length, the present one from `at` on.
-    pub const fn at_rest(at: Instant, off: CarrierPeriod) -> Self {
-        let currents_a = Abc { a: 0.0, b: 0.0, c: 0.0 };
+/// Words of a [`Committal`] in its cell.
+pub const COMMITTAL_WORDS: usize = 13;
+
+const MIRRORED: u32 = 1 << 3;
+const TRIPPED: u32 = 1 << 4;
+
+impl Committal {
+    /// As a record.
+    #[inline]
+    pub fn to_words(&self) -> [u32; COMMITTAL_WORDS] {
+        let on = volt_ticks(self.half.on_ticks(0));
+        let [period, u, v, w, packed] = half_to_words(self.half);
+        // What never toggles does so at the end.
+        let [u, v, w] = [u, v, w].map(|compare| compare.min(period));
+        let [a, b, c] = currents_to_words(self.currents_a);
+        let flags = u32::from(self.mirrored) * MIRRORED | u32::from(self.tripped) * TRIPPED;
+        let (alpha, beta) = (on.alpha.to_bits(), on.beta.to_bits());
+        let acknowledged = self.acknowledged.into();
+        [self.at.0, self.begins.0, period, u, v, w, packed | flags, alpha, beta, a, b, c, acknowledged]
+    }
+}
+
+impl Committal {
+    /// Gates off from an instant on, for so many ticks, and before that as well.
+    pub const fn at_rest(at: Instant, off_ticks: u32) -> Self {
         Self {
             at,
-            before: off,
-            running: off,
-            next: off,
-            currents_a,
-            currents_before_a: currents_a,
+            currents_a: Abc { a: 0.0, b: 0.0, c: 0.0 },
+            begins: at,
+            half: CarrierPeriod::off(off_ticks),
             mirrored: false,
-            trip: None,
-            acknowledged: [0; 2],
+            tripped: false,
+            acknowledged: 0,
         }
     }
 }
 
-impl Words<27> for Applied {
-    fn to_words(self) -> [u32; 27] {
-        let [b0, b1, b2, b3, b4] = half_to_words(self.before);
-        let [r0, r1, r2, r3, r4] = half_to_words(self.running);
-        let [n0, n1, n2, n3, n4] = half_to_words(self.next);
-        let [ia, ib, ic] = currents_to_words(self.currents_a);
-        let [ja, jb, jc] = currents_to_words(self.currents_before_a);
-        let [t0, t1, t2, t3] = trip_to_words(self.trip);
-        let [now, before] = self.acknowledged.map(u32::from);
-        let (at, mirrored) = (self.at.0, u32::from(self.mirrored) | now << 8 | before << 16);
-        [
-            at, b0, b1, b2, b3, b4, r0, r1, r2, r3, r4, n0, n1, n2, n3, n4, ia, ib, ic, ja, jb, jc, mirrored,
-            t0, t1, t2, t3,
-        ]
+/// A [`Committal`] where it lies.
+pub struct CommittalRecord<'a>(pub Record<'a, COMMITTAL_WORDS>);
+
+impl CommittalRecord<'_> {
+    /// The boundary.
+    #[inline]
+    pub fn at(&self) -> Instant {
+        Instant(self.0.word::<0>())
     }
 
-    fn from_words(words: [u32; 27]) -> Self {
-        let [at, b0, b1, b2, b3, b4, r0, r1, r2, r3, r4, n0, n1, n2, n3, n4, rest @ ..] = words;
-        let [ia, ib, ic, ja, jb, jc, mirrored, trip @ ..] = rest;
-        Self {
-            at: Instant(at),
-            before: half_from_words([b0, b1, b2, b3, b4]),
-            running: half_from_words([r0, r1, r2, r3, r4]),
-            next: half_from_words([n0, n1, n2, n3, n4]),
-            currents_a: currents_from_words([ia, ib, ic]),
-            currents_before_a: currents_from_words([ja, jb, jc]),
-            mirrored: mirrored & 1 != 0,
-            trip: trip_from_words(trip),
-            acknowledged: [(mirrored >> 8) as u8, (mirrored >> 16) as u8],
-        }
+    /// The boundary where the half begins.
+    #[inline]
+    pub fn begins(&self) -> Instant {
+        Instant(self.0.word::<1>())
+    }
+
+    /// The half's length, in ticks.
+    #[inline]
+    pub fn period_ticks(&self) -> u32 {
+        self.0.word::<2>()
+    }
+
+    /// Mode, number and levels of the half.
+    #[inline]
+    pub fn kind(&self) -> HalfKind {
+        HalfKind(self.0.word::<6>())
+    }
+
+    /// What the whole half gives, in ticks; see [`volt_ticks`].
+    #[inline]
+    pub fn volt_ticks(&self) -> AlphaBeta {
+        AlphaBeta { alpha: f32::from_bits(self.0.word::<7>()), beta: f32::from_bits(self.0.word::<8>()) }
+    }
+
+    /// The same from `elapsed` ticks after its beginning on.
+    #[inline]
+    pub fn volt_ticks_from(&self, elapsed: u32) -> AlphaBeta {
+        let (period, packed) = (self.period_ticks(), self.0.word::<6>());
+        let left = period.saturating_sub(elapsed);
+        let on = |compare: u32, level: u32| {
+            let before = compare.saturating_sub(elapsed);
+            if packed & level != 0 { before } else { left - before }
+        };
+        volt_ticks([on(self.0.word::<3>(), 1), on(self.0.word::<4>(), 2), on(self.0.word::<5>(), 4)])
+    }
+
+    /// Phase currents at the boundary, in A.
+    #[inline]
+    pub fn currents_a(&self) -> Abc {
+        currents_from_words([self.0.word::<9>(), self.0.word::<10>(), self.0.word::<11>()])
+    }
+
+    /// See [`Committal::acknowledged`].
+    #[inline]
+    pub fn acknowledged(&self) -> u8 {
+        self.0.word::<12>() as u8
+    }
+}
+
+/// What a half is, in one word.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct HalfKind(u32);
+
+impl HalfKind {
+    /// The mode that made it.
+    #[inline]
+    pub fn mode(self) -> Mode {
+        Mode::from_code(self.0 >> 8 & 0xFF)
+    }
+
+    /// See [`CarrierPeriod::is_free`].
+    #[inline]
+    pub fn is_free(self) -> bool {
+        const FREE: u32 = (Mode::Async as u32) << 8 | (Mode::Async as u32) << 24 | (Mode::Async as u32) << 28;
+        self.0 & 0xFF00_FF00 == FREE
+    }
+
+    /// Its number within the turn.
+    #[inline]
+    pub fn half(self) -> u32 {
+        self.0 >> 16 & 0xFF
+    }
+
+    /// Modes of the two halves that follow.
+    #[inline]
+    pub fn ahead(self) -> [Mode; 2] {
+        [Mode::from_code(self.0 >> 24 & 0xF), Mode::from_code(self.0 >> 28)]
+    }
+
+    /// See [`Committal::mirrored`].
+    #[inline]
+    pub fn is_mirrored(self) -> bool {
+        self.0 & MIRRORED != 0
+    }
+
+    /// See [`Committal::tripped`].
+    #[inline]
+    pub fn is_tripped(self) -> bool {
+        self.0 & TRIPPED != 0
+    }
+}
+
+/// The space vector of on-times in ticks: times the link voltage it is volt-ticks.
+#[inline]
+pub fn volt_ticks([a, b, c]: [u32; 3]) -> AlphaBeta {
+    let (a, b, c) = (a as i32, b as i32, c as i32);
+    let whole = |ticks: i32| ticks as f32;
+    AlphaBeta {
+        alpha: whole(a.wrapping_sub(b).wrapping_add(a.wrapping_sub(c))) * (1.0 / 3.0),
+        beta: whole(b.wrapping_sub(c)) * (1.0 / SQRT_3),
+    }
+}
+
+impl Words<4> for Trip {
+    fn to_words(self) -> [u32; 4] {
+        trip_to_words(Some(self))
+    }
+
+    fn from_words(words: [u32; 4]) -> Self {
+        let unknown = Self {
+            fault: Fault::NotFinite,
+            value: 0.0,
+            limit: 0.0,
+            at: Instant(0),
+            safe: SafeState::GatesOff,
+        };
+        trip_from_words(words).unwrap_or(unknown)
     }
 }
 

@@ -8,5 +8,6 @@ mod messages;
 pub mod traction;
 
 pub use messages::{
-    Applied, Gates, Report, VoltageCommand, half_from_words, half_to_words, trip_from_words, trip_to_words,
+    COMMITTAL_WORDS, Committal, CommittalRecord, Gates, HalfKind, Report, VoltageCommand, half_from_words,
+    half_to_words, trip_from_words, trip_to_words, volt_ticks,
 };

@@ -4,21 +4,22 @@
 //! looks at the other's words by their instants, not by their arrival. So where one interrupt lands in the other
 //! changes nothing, and the same inputs give the same pulses on every board and on the host.
 
-use super::messages::{Applied, Gates, Report, VoltageCommand};
+use super::messages::{COMMITTAL_WORDS, Committal, CommittalRecord, Gates, HalfKind, Report, VoltageCommand};
 use crate::board::{ControlPort, PwmPort, Sample};
-use crate::cell::{Downlink, Uplink};
-use crate::control::{Boundary, Committed, Controller, Demand, Follows, Gains, Input, Law, six_step_v};
-use crate::frames::{Abc, AlphaBeta, Angle};
-use crate::machine::Tables;
+use crate::cell::{Downlink, SEEN, Trail, Uplink};
+use crate::control::{
+    Boundary, Committed, Controller, Demand, Follows, Gains, Input, Law, Ripple, six_step_v,
+};
+use crate::frames::{Abc, AlphaBeta, Angle, UNITS_PER_RADIAN};
+use crate::machine::{Machine, Tables};
 use crate::modulation::{
-    CarrierPeriod, Devices, Mode, Modulator, Reference, Schedule, compensated, depth_limit, first_half,
-    ripple_flux, ripple_share,
+    Devices, Mode, Modulator, Reference, RippleFlux, Schedule, compensated, depth_limit, first_half,
+    ripple_share,
 };
 use crate::protection::{self, Disarmed, Fault, FrozenWatch, SafeState, Trip, Violation};
+use crate::recorder::{Record, Recorder, State};
 use crate::time::{Clock, Instant};
-
-/// Angle units (2⁻³² turn) in one radian.
-pub(super) const UNITS_PER_RADIAN: f32 = 4_294_967_296.0 / core::f32::consts::TAU;
+use core::sync::atomic::{AtomicU32, Ordering};
 
 /// A demand that jumps by more than this share of the largest torque is worth revising the next half for.
 const JUMP_SHARE: f32 = 0.05;
@@ -27,8 +28,9 @@ const JUMP_SHARE: f32 = 0.05;
 /// in which control sees what became of it.
 const REVISION_PERIODS: u32 = 2;
 
-/// Control periods after which a command is too old to make pulses from.
-const STALE_PERIODS: i32 = 5;
+/// By which part of a control period an interrupt may be late before the other one calls it lost: more than it takes to enter it.
+const PWM_LATE_PART: u32 = 4;
+const CONTROL_LATE_PART: u32 = 16;
 
 /// How fast the voltage glides from square wave to what the torque needs, in shares of six-step per second.
 const GLIDE_PER_S: f32 = 12.0;
@@ -55,32 +57,49 @@ pub struct Settings {
     pub gains: Gains,
 }
 
-/// The cells between the two interrupts.
-pub struct Shared {
+/// The cells between the two interrupts, and the flight recorder, if there is one.
+pub struct Shared<'a> {
     /// What control wants of the modulator.
-    pub command: Downlink<VoltageCommand, 9>,
+    pub command: Downlink<VoltageCommand, 10>,
     /// What the modulator does.
-    pub applied: Uplink<Applied, 27>,
+    pub applied: Trail<COMMITTAL_WORDS>,
+    /// What the PWM interrupt tripped on.
+    pub trip: Uplink<Trip, 4>,
+    /// Instant of the newest control interrupt, from its beginning on.
+    pub began: AtomicU32,
+    recorder: Option<&'a Recorder>,
 }
 
-impl Shared {
+impl<'a> Shared<'a> {
     /// Empty cells.
     #[cfg(not(loom))]
     pub const fn new() -> Self {
-        Self { command: Downlink::new(), applied: Uplink::new() }
+        Self {
+            command: Downlink::new(),
+            applied: Trail::new(),
+            trip: Uplink::new(),
+            began: AtomicU32::new(0),
+            recorder: None,
+        }
+    }
+
+    /// The same with a flight recorder, which the control interrupt fills.
+    #[cfg(not(loom))]
+    pub const fn recorded_by(recorder: &'a Recorder) -> Self {
+        Self { recorder: Some(recorder), ..Self::new() }
     }
 }
 
 #[cfg(not(loom))]
-impl Default for Shared {
+impl Default for Shared<'_> {
     fn default() -> Self {
         Self::new()
     }
 }
 
-/// The control interrupt's task.
-pub struct ControlTask {
-    tables: &'static Tables,
+/// The control interrupt's task, for a machine.
+pub struct ControlTask<M = &'static Tables> {
+    machine: M,
     settings: Settings,
     controller: Controller,
     watch: FrozenWatch,
@@ -109,11 +128,11 @@ pub struct ControlTask {
     acknowledged: u8,
 }
 
-impl ControlTask {
+impl<M: Machine> ControlTask<M> {
     /// A task whose first call is the control timer's first interrupt, at `first`.
-    pub const fn new(tables: &'static Tables, settings: Settings, first: Instant) -> Self {
+    pub const fn new(machine: M, settings: Settings, first: Instant) -> Self {
         Self {
-            tables,
+            machine,
             settings,
             controller: Controller::new(),
             watch: FrozenWatch::new(),
@@ -149,21 +168,26 @@ impl ControlTask {
     pub fn run(&mut self, port: &mut impl ControlPort, shared: &Shared) {
         let now = self.now;
         self.now = now.after(self.settings.clock.control_ticks);
+        shared.began.store(now.0, Ordering::Relaxed);
         let sample = port.sample(now);
-        let applied = shared.applied.read().map(|applied| as_of(&applied, now));
+        let applied = shared.applied.read(|records| Applied::seen(records, now)).flatten();
         self.forget_acknowledged(sample.acknowledge, applied.as_ref());
         self.check(sample.hardware.map(|fault| (fault, 1.0, 0.0)), &sample, port);
-        self.adopt_trip(applied.as_ref().and_then(|applied| applied.trip));
+        if self.trip.is_none() && applied.as_ref().is_some_and(|applied| applied.next.kind.is_tripped()) {
+            self.trip = shared.trip.read();
+        }
+        let overdue = applied.as_ref().and_then(|applied| applied.overdue(now, &self.settings.clock));
+        self.check(overdue, &sample, port);
         self.check_legs(&sample, port);
         let omega = self.track(&sample, port);
         self.check(
-            protection::check_measurements(&sample.measured, omega, &self.tables.ratings),
+            protection::check_measurements(&sample.measured, omega, &self.machine.tables().ratings),
             &sample,
             port,
         );
         if sample.enable {
             self.check(
-                protection::check_undervoltage(sample.measured.udc_v, &self.tables.ratings),
+                protection::check_undervoltage(sample.measured.udc_v, &self.machine.tables().ratings),
                 &sample,
                 port,
             );
@@ -181,7 +205,7 @@ impl ControlTask {
         let mut command = VoltageCommand {
             reference: Reference {
                 voltage_v: 0.0,
-                angle: sample.measured.angle,
+                vector: AlphaBeta::default(),
                 carrier_angle: sample.measured.angle,
                 rate: self.rate(omega),
                 at: now,
@@ -198,7 +222,7 @@ impl ControlTask {
                 &sample.measured,
                 omega,
                 self.settings.clock.control_s(),
-                &self.tables.ratings,
+                &self.machine.tables().ratings,
             );
             self.check(frozen, &sample, port);
             self.pulse(&sample, applied.as_ref(), omega, &mut command, &mut report);
@@ -224,7 +248,31 @@ impl ControlTask {
         self.revises = command.revises && command.gates == Gates::Pulse;
         shared.command.publish(command);
         report.trip = self.trip;
+        if let Some(recorder) = shared.recorder {
+            let mode = applied.as_ref().map_or(Mode::Off, |applied| applied.mode);
+            recorder.record(self.entry(now, &sample, &report, mode, command.gates), self.trip.is_some());
+        }
         port.report(now, &report);
+    }
+
+    /// The period's entry in the flight recorder.
+    #[inline(always)]
+    fn entry(&self, at: Instant, sample: &Sample, report: &Report, mode: Mode, gates: Gates) -> Record {
+        Record {
+            at,
+            currents_a: sample.measured.currents_a,
+            udc_v: sample.measured.udc_v,
+            angle: sample.measured.angle,
+            id_a: report.id_a,
+            iq_a: report.iq_a,
+            voltage_v: report.voltage_v,
+            state: State {
+                mode,
+                enabled: sample.enable,
+                pulsing: gates == Gates::Pulse,
+                fault: self.trip.map(|trip| trip.fault),
+            },
+        }
     }
 
     /// Nominal instant of the next call.
@@ -264,7 +312,7 @@ impl ControlTask {
         command.revises = applied.is_some_and(|applied| self.is_to_revise(applied, now, &sample.demand));
         let committed = self.committed(applied, now, omega, sample.measured.udc_v, command.revises);
         let boundary = self.new_boundary(applied, now, sample.measured.udc_v);
-        let decided = applied.map_or(Mode::Off, |applied| applied.next.ahead[0]);
+        let decided = applied.map_or(Mode::Off, |applied| applied.next.kind.ahead()[0]);
         let committed = Committed { settled: self.is_settled(decided, boundary.is_some()), ..committed };
         let demand = self.one_sided(&sample.demand, committed.filled, omega, sample.measured.udc_v);
         let input = Input {
@@ -275,15 +323,15 @@ impl ControlTask {
             boundary: boundary.as_ref(),
         };
         let Settings { gains, clock, .. } = &self.settings;
-        let output = self.controller.step(&input, &Law { gains, clock, tables: self.tables });
+        let output = self.controller.step(&input, &Law { gains, clock, tables: self.machine.tables() });
         self.steady_v = output.voltage.steady_v;
         self.depth = output.voltage.depth;
         if output.torque_nm != 0.0 {
             self.side_nm = output.torque_nm;
         }
         command.reference.voltage_v = output.voltage.voltage_v;
-        command.reference.angle = output.voltage.angle;
-        command.reference.carrier_angle = output.voltage.carrier_angle;
+        command.reference.vector = output.voltage.vector;
+        command.reference.carrier_angle = output.voltage.carrier.angle();
         command.reference.depth = output.voltage.depth;
         command.gates = Gates::Pulse;
         report.torque_nm = output.torque_nm;
@@ -312,7 +360,7 @@ impl ControlTask {
     /// no torque the two signs then lie far apart on the circle of flux linkage, and the way between them goes past currents
     /// beyond the largest. The voltage is on its way down meanwhile, so this lasts tens of milliseconds.
     fn one_sided(&self, demand: &Demand, filled: bool, omega: f32, udc_v: f32) -> Demand {
-        let ratings = &self.tables.ratings;
+        let ratings = &self.machine.tables().ratings;
         let forced_v = self.filled_to * six_step_v(udc_v);
         let forces = filled && forced_v > ONE_SIDED_FLUX * omega.abs() * ratings.magnet_flux_wb;
         let least_nm = ONE_SIDED_SHARE * ratings.max_torque_nm;
@@ -349,10 +397,10 @@ impl ControlTask {
     fn is_to_revise(&mut self, applied: &Applied, now: Instant, demand: &Demand) -> bool {
         let change = demand.torque_nm - self.demand_nm;
         self.demand_nm = demand.torque_nm;
-        self.jumped |= !demand.slew_limited && change.abs() > JUMP_SHARE * self.tables.ratings.max_torque_nm;
+        let largest_nm = self.machine.tables().ratings.max_torque_nm;
+        self.jumped |= !demand.slew_limited && change.abs() > JUMP_SHARE * largest_nm;
         let latest = now.after(REVISION_PERIODS * self.settings.clock.control_ticks);
-        let end = applied.at.after(applied.running.period_ticks);
-        let revises = self.jumped && applied.next.is_free() && end.reached(latest);
+        let revises = self.jumped && applied.next.kind.is_free() && applied.next.begins.reached(latest);
         self.jumped &= !revises;
         revises
     }
@@ -366,51 +414,48 @@ impl ControlTask {
         udc_v: f32,
         revises: bool,
     ) -> Committed {
-        let clock = self.settings.clock;
+        let Settings { clock, devices, .. } = self.settings;
         let Some(applied) = applied else {
-            let interval_s = clock.seconds(self.settings.devices.shortest_half_ticks as i32);
             return Committed {
                 horizon_s: 0.0,
                 volt_seconds: None,
-                ripple_wb: AlphaBeta::default(),
-                ripple_after_wb: AlphaBeta::default(),
-                interval_s,
+                ripple: None,
+                interval_s: clock.seconds(devices.shortest_half_ticks as i32),
                 follows: Follows::Mean,
-                depth_limit: depth_limit(Mode::Async, 0.0, &self.settings.devices),
+                depth_limit: depth_limit(Mode::Async, 0.0, &devices),
                 steady_share: 1.0,
                 filled: false,
                 ripple_share: ripple_share(Mode::Async, 0.0),
                 settled: true,
             };
         };
-        let (running, next) = (&applied.running, &applied.next);
-        let elapsed = now.since(applied.at).max(0) as u32;
-        let off = running.mode == Mode::Off || next.mode == Mode::Off;
-        let mut left = running.period_ticks.saturating_sub(elapsed);
-        let mut volt_seconds = volt_seconds(running, elapsed, udc_v, &clock);
-        if !revises {
-            left += next.period_ticks;
-            volt_seconds = volt_seconds + self::volt_seconds(next, 0, udc_v, &clock);
-        }
-        let [decided, _] = next.ahead;
-        let largest = depth_limit(decided, self.rate(omega), &self.settings.devices);
+        let kind = applied.next.kind;
+        let [decided, _] = kind.ahead();
+        let largest = depth_limit(decided, self.rate(omega), &devices);
         let largest = if decided == Mode::Square { largest } else { REGULATION_ROOM * largest };
         let (depth_limit, filled) = self.fill(decided, largest);
-        let (ripple_wb, ripple_after_wb) = self.ripple(next, omega.abs(), udc_v, applied.mirrored);
+        let running = applied.next.begins.since(now).max(0) as u32;
+        let left = running + if revises { 0 } else { applied.next.period_ticks };
+        let volt_ticks =
+            applied.running.map(|ticks| if revises { ticks } else { ticks + applied.next.volt_ticks });
+        let (interval_s, follows) = match decided.carriers() {
+            0 => (clock.seconds(devices.shortest_half_ticks as i32), Follows::Mean),
+            carriers => {
+                let interval_s = core::f32::consts::PI / (carriers as f32 * omega.abs());
+                let follows = match decided {
+                    Mode::Mid7 | Mode::Mid3 => Follows::Fundamental,
+                    Mode::Square => Follows::Angle,
+                    _ => Follows::Mean,
+                };
+                (interval_s, follows)
+            }
+        };
         Committed {
             horizon_s: clock.seconds(left as i32),
-            volt_seconds: (!off).then_some(volt_seconds),
-            ripple_wb,
-            ripple_after_wb,
-            interval_s: match decided.carriers() {
-                0 => clock.seconds(self.settings.devices.shortest_half_ticks as i32),
-                carriers => core::f32::consts::PI / (carriers as f32 * omega.abs()),
-            },
-            follows: match decided {
-                Mode::Mid7 | Mode::Mid3 => Follows::Fundamental,
-                Mode::Square => Follows::Angle,
-                _ => Follows::Mean,
-            },
+            volt_seconds: volt_ticks.map(|ticks| ticks * (udc_v * clock.tick_s)),
+            ripple: self.ripple(kind, omega.abs(), udc_v),
+            interval_s,
+            follows,
             depth_limit,
             steady_share: 1.0,
             filled,
@@ -421,19 +466,25 @@ impl ControlTask {
 
     /// Ripple flux at the end of the committed half `next`, and the one wanted at the end of the half after it. Where a
     /// pattern begins at the first of these, its own ripple is expected; where a carrier begins, what the old pattern leaves.
-    fn ripple(&self, next: &CarrierPeriod, omega: f32, udc_v: f32, mirrored: bool) -> (AlphaBeta, AlphaBeta) {
-        let [decided, after] = next.ahead;
-        let end = u32::from(next.half) + 1;
+    fn ripple(&self, next: HalfKind, omega: f32, udc_v: f32) -> Option<Ripple> {
+        let (mode, [decided, after]) = (next.mode(), next.ahead());
+        let flux = |mode: Mode| RippleFlux::new(mode, self.steady_v, udc_v, omega);
+        let seen = |ripple: AlphaBeta| AlphaBeta {
+            beta: if next.is_mirrored() { -ripple.beta } else { ripple.beta },
+            ..ripple
+        };
+        let end = next.half() + 1;
+        if mode == decided && decided == after {
+            let flux = flux(mode)?;
+            return Some(Ripple { at_horizon_wb: seen(flux.at(end)), after_wb: seen(flux.at(end + 1)) });
+        }
         let number = |from: Mode, to: Mode, half: u32| {
             if from == to { half } else { first_half(from, to, half, Angle::ZERO) }
         };
-        let at = |mode: Mode, half: u32| {
-            let ripple = ripple_flux(mode, half, self.steady_v, udc_v, omega);
-            AlphaBeta { beta: if mirrored { -ripple.beta } else { ripple.beta }, ..ripple }
-        };
-        let begins = number(next.mode, decided, end);
-        let pattern = if decided.is_carrier() { at(next.mode, end) } else { at(decided, begins) };
-        (pattern, at(after, number(decided, after, begins + 1)))
+        let at = |mode: Mode, half: u32| flux(mode).map_or(AlphaBeta::default(), |flux| seen(flux.at(half)));
+        let begins = number(mode, decided, end);
+        let at_horizon_wb = if decided.is_carrier() { at(mode, end) } else { at(decided, begins) };
+        Some(Ripple { at_horizon_wb, after_wb: at(after, number(decided, after, begins + 1)) })
     }
 
     /// The newest boundary, once.
@@ -442,15 +493,15 @@ impl ControlTask {
         if self.boundary == Some(applied.at) {
             return None;
         }
-        let consecutive = self.boundary == Some(applied.at.before(applied.before.period_ticks));
+        let consecutive = self.boundary == Some(applied.before);
         self.boundary = Some(applied.at);
         let clock = &self.settings.clock;
-        let pulsed = consecutive && applied.before.mode != Mode::Off;
+        let passed = if consecutive { applied.passed } else { None };
         Some(Boundary {
             currents_a: applied.currents_a,
             age_s: clock.seconds(now.since(applied.at)),
-            volt_seconds: pulsed.then(|| volt_seconds(&applied.before, 0, udc_v, clock)),
-            length_s: clock.seconds(applied.before.period_ticks as i32),
+            volt_seconds: passed.map(|ticks| ticks * (udc_v * clock.tick_s)),
+            length_s: clock.seconds(applied.at.since(applied.before)),
         })
     }
 
@@ -462,8 +513,11 @@ impl ControlTask {
             return;
         }
         let at = self.now.before(self.settings.clock.control_ticks);
-        let safe =
-            protection::safe_state(self.controller.omega(), sample.measured.udc_v, &self.tables.ratings);
+        let safe = protection::safe_state(
+            self.controller.omega(),
+            sample.measured.udc_v,
+            &self.machine.tables().ratings,
+        );
         port.enter(safe, at);
         self.trip = Some(Trip { fault, value, limit, at, safe });
     }
@@ -472,7 +526,7 @@ impl ControlTask {
     /// the safe state that it has left is not entered again for the old fault's sake.
     fn forget_acknowledged(&mut self, acknowledge: u8, applied: Option<&Applied>) {
         if acknowledge != self.acknowledged
-            && applied.is_some_and(|applied| applied.acknowledged[0] == acknowledge)
+            && applied.is_some_and(|applied| applied.acknowledged == acknowledge)
         {
             self.acknowledged = acknowledge;
             self.trip = None;
@@ -484,76 +538,115 @@ impl ControlTask {
         let found = port.leg_faults();
         if let (Some((fault, value, limit)), None) = (found.check(), self.trip) {
             let at = self.now.before(self.settings.clock.control_ticks);
-            let (omega, ratings) = (self.controller.omega(), &self.tables.ratings);
+            let (omega, ratings) = (self.controller.omega(), &self.machine.tables().ratings);
             let safe = found.safe_state(omega, sample.measured.udc_v, ratings);
             port.enter(safe, at);
             self.trip = Some(Trip { fault, value, limit, at, safe });
         }
     }
+}
 
-    fn adopt_trip(&mut self, trip: Option<Trip>) {
-        if self.trip.is_none() {
-            self.trip = trip;
+/// What control makes of the modulator's records: the newest boundary and what is committed from there on. Of the voltages only
+/// the ticks for which they act.
+struct Applied {
+    /// The newest boundary, and the one before it.
+    at: Instant,
+    before: Instant,
+    /// Phase currents at the newest one, in A.
+    currents_a: Abc,
+    /// What the half gave that ended there; `None` while the gates were off.
+    passed: Option<AlphaBeta>,
+    /// What the running half gives from now on; `None` if the gates are off in it or in the next one.
+    running: Option<AlphaBeta>,
+    /// Mode of the running half.
+    mode: Mode,
+    next: Next,
+    /// Number of the acknowledge that the PWM interrupt had carried out.
+    acknowledged: u8,
+}
+
+/// The half after the running one.
+struct Next {
+    begins: Instant,
+    period_ticks: u32,
+    volt_ticks: AlphaBeta,
+    kind: HalfKind,
+}
+
+impl Applied {
+    /// The PWM interrupt that should have come by `now` and has not: since when, in s.
+    fn overdue(&self, now: Instant, clock: &Clock) -> Option<Violation> {
+        let late = now.since(self.next.begins);
+        let limit = (clock.control_ticks / PWM_LATE_PART) as i32;
+        (late > limit).then(|| (Fault::PwmDeadline, clock.seconds(late), clock.seconds(limit)))
+    }
+
+    /// As it stood at `now`, even if the PWM interrupt has come since.
+    #[inline]
+    fn seen(records: [crate::cell::Record<COMMITTAL_WORDS>; SEEN], now: Instant) -> Option<Self> {
+        let [newest, one, two, three] = records.map(CommittalRecord);
+        if now.reached(newest.at()) {
+            return Some(Self::of([newest, one, two], now));
+        }
+        // Words that were never written say instant 0, of which there is none.
+        now.reached(one.at()).then(|| Self::of([one, two, three], now))
+    }
+
+    #[inline]
+    fn of([newest, one, two]: [CommittalRecord; 3], now: Instant) -> Self {
+        let (at, kind) = (newest.at(), newest.kind());
+        let (begins, period_ticks, volt_ticks) =
+            (newest.begins(), newest.period_ticks(), newest.volt_ticks());
+        let next = Next { begins, period_ticks, volt_ticks, kind };
+        let mode = one.kind().mode();
+        let off = mode == Mode::Off || kind.mode() == Mode::Off;
+        let running = (!off).then(|| one.volt_ticks_from(now.since(at).max(0) as u32));
+        let passed = (two.kind().mode() != Mode::Off).then(|| two.volt_ticks());
+        Self {
+            at,
+            before: one.at(),
+            currents_a: newest.currents_a(),
+            passed,
+            running,
+            mode,
+            next,
+            acknowledged: newest.acknowledged(),
         }
     }
 }
 
-/// The modulator's words as they stood at `now`, if the PWM interrupt has come since.
-fn as_of(applied: &Applied, now: Instant) -> Applied {
-    if now.reached(applied.at) {
-        return *applied;
-    }
-    Applied {
-        at: applied.at.before(applied.before.period_ticks),
-        // Not known any more; its length, zero, makes it no neighbour of any boundary.
-        before: CarrierPeriod::default(),
-        running: applied.before,
-        next: applied.running,
-        currents_a: applied.currents_before_a,
-        acknowledged: [applied.acknowledged[1]; 2],
-        trip: applied.trip.filter(|trip| now.reached(trip.at)),
-        ..*applied
-    }
-}
-
-/// Volt-seconds of a half from `from` ticks after its start to its end, in V·s.
-fn volt_seconds(half: &CarrierPeriod, from: u32, udc_v: f32, clock: &Clock) -> AlphaBeta {
-    let [a, b, c] = half.on_ticks(from).map(|ticks| ticks as f32);
-    Abc { a, b, c }.clarke() * (udc_v * clock.tick_s)
-}
-
-/// The PWM interrupt's task.
-pub struct PwmTask {
-    tables: &'static Tables,
+/// The PWM interrupt's task, for a machine.
+pub struct PwmTask<M = &'static Tables> {
+    machine: M,
     settings: Settings,
     modulator: Modulator,
-    /// Nominal instant of the next call: the boundary where `applied.next` begins.
-    now: Instant,
-    applied: Applied,
+    /// What was decided at the last boundary. Where its half begins is the nominal instant of the next call.
+    newest: Committal,
+    /// Phase currents at the boundary before, in A.
+    currents_before_a: Abc,
+    trip: Option<Trip>,
     disarmed: Disarmed,
+    /// Number of the acknowledge that was carried out last.
+    acknowledged: u8,
 }
 
-impl PwmTask {
+impl<M: Machine> PwmTask<M> {
     /// A task whose first call is at `first`, with all gates off until then and for one half more.
-    pub const fn new(tables: &'static Tables, settings: Settings, first: Instant) -> Self {
-        Self::with_schedule(tables, settings, first, Schedule::new(&settings.clock))
+    pub const fn new(machine: M, settings: Settings, first: Instant) -> Self {
+        Self::with_schedule(machine, settings, first, Schedule::new(&settings.clock))
     }
 
     /// The same with a schedule of one's own.
-    pub const fn with_schedule(
-        tables: &'static Tables,
-        settings: Settings,
-        first: Instant,
-        schedule: Schedule,
-    ) -> Self {
-        let off = CarrierPeriod::off(settings.devices.shortest_half_ticks);
+    pub const fn with_schedule(machine: M, settings: Settings, first: Instant, schedule: Schedule) -> Self {
         Self {
-            tables,
+            machine,
             settings,
             modulator: Modulator::new(settings.devices, schedule),
-            now: first,
-            applied: Applied::at_rest(first, off),
+            newest: Committal::at_rest(first, settings.devices.shortest_half_ticks),
+            currents_before_a: Abc { a: 0.0, b: 0.0, c: 0.0 },
+            trip: None,
             disarmed: Disarmed::NONE,
+            acknowledged: 0,
         }
     }
 
@@ -565,61 +658,65 @@ impl PwmTask {
 
     /// The same for a timer whose first two halves, before the first one of the modulator's, have another length.
     pub const fn after_halves_of(mut self, ticks: u32) -> Self {
-        self.applied = Applied::at_rest(self.now, CarrierPeriod::off(ticks));
+        self.newest = Committal::at_rest(self.newest.begins, ticks);
         self
     }
 
     /// The PWM timer's interrupt, at a carrier boundary. Deadline: the next boundary, where the shadow registers take over.
     pub fn run(&mut self, port: &mut impl PwmPort, shared: &Shared) {
-        let now = self.now;
-        let last = self.applied;
-        self.applied = Applied {
-            at: now,
-            before: last.running,
-            running: last.next,
-            currents_a: port.sample(now),
-            currents_before_a: last.currents_a,
-            acknowledged: [last.acknowledged[0]; 2],
-            ..last
-        };
-        let command = shared.command.newest(|command| now.reached(command.valid_from));
-        self.forget_acknowledged(&command, port);
-        self.check(&command, port);
-        let start = now.after(self.applied.running.period_ticks);
-        let pulsing = self.applied.trip.is_none();
-        self.applied.next = match &command {
+        let now = self.newest.begins;
+        let currents_a = port.sample(now);
+        self.currents_before_a = self.newest.currents_a;
+        let command = shared.command.newest(|command| now.reached(VoltageCommand::valid_from(command)));
+        self.forget_acknowledged(&command, now, port, shared);
+        self.check(&currents_a, &command, port, shared);
+        let begins = now.after(self.newest.half.period_ticks);
+        let pulsing = self.trip.is_none();
+        let half = match &command {
             Some(command) if command.gates == Gates::Pulse && pulsing => {
-                self.modulator.step(start, Some(&command.reference))
+                self.modulator.step(begins, Some(&command.reference))
             }
-            resting => self.modulator.rest(start, resting.as_ref().map(|command| &command.reference)),
+            resting => self.modulator.rest(begins, resting.as_ref().map(|command| &command.reference)),
         };
-        self.applied.mirrored = self.modulator.is_mirrored();
-        self.now = start;
-        self.play(port, shared);
+        let mirrored = self.modulator.is_mirrored();
+        self.newest = Committal {
+            at: now,
+            currents_a,
+            begins,
+            half,
+            mirrored,
+            tripped: !pulsing,
+            acknowledged: self.acknowledged,
+        };
+        self.play(port);
+        shared.applied.publish(self.newest.to_words());
     }
 
     /// The PWM interrupt when it is no boundary that it comes for, but control's [`ControlTask::wants_revision`]: makes the next half
     /// anew from the newest command, if its boundary is still ahead.
     pub fn revise(&mut self, port: &mut impl PwmPort, shared: &Shared) {
-        let Applied { at, next, trip, .. } = self.applied;
+        let Committal { at, begins, half, tripped, .. } = self.newest;
         // A command from before the last boundary was for the half that runs by now.
-        let command = shared.command.newest(|command| command.valid_from.reached(at));
+        let command = shared.command.newest(|command| VoltageCommand::valid_from(command).reached(at));
         if let Some(command) = command
             && command.revises
-            && trip.is_none()
-            && next.is_free()
+            && !tripped
+            && half.is_free()
         {
-            self.applied.next = self.modulator.revised(&next, self.now, &command.reference);
-            self.play(port, shared);
+            self.newest.half = self.modulator.revised(&half, begins, &command.reference);
+            self.play(port);
+            shared.applied.revise(self.newest.to_words());
         }
     }
 
-    fn play(&self, port: &mut impl PwmPort, shared: &Shared) {
-        let applied = &self.applied;
-        let small_a = SMALL_CURRENT_SHARE * self.tables.ratings.max_current_a;
-        let expected = self.expected_currents();
-        port.play(applied.at, &compensated(&applied.next, &expected, small_a, &self.settings.devices));
-        shared.applied.publish(*applied);
+    /// Gives the port the half that makes the legs do what the newest one says.
+    fn play(&self, port: &mut impl PwmPort) {
+        let (newest, devices) = (&self.newest, &self.settings.devices);
+        if devices.dead_time_ticks == 0 {
+            return port.play(newest.at, &newest.half);
+        }
+        let small_a = SMALL_CURRENT_SHARE * self.tables().ratings.max_current_a;
+        port.play(newest.at, &compensated(&newest.half, &self.expected_currents(), small_a, devices));
     }
 
     /// Phase currents in the middle of the next half, from the boundaries at both ends of the half before the running one.
@@ -627,67 +724,90 @@ impl PwmTask {
         /// From the last boundary to the middle of the next half, in halves.
         const AHEAD: f32 = 1.5;
         let ahead = |now: f32, before: f32| now + AHEAD * (now - before);
-        let Applied { currents_a: now, currents_before_a: before, .. } = self.applied;
+        let (now, before) = (self.newest.currents_a, self.currents_before_a);
         Abc { a: ahead(now.a, before.a), b: ahead(now.b, before.b), c: ahead(now.c, before.c) }
     }
 
     /// Nominal instant of the next call.
     pub fn next_call(&self) -> Instant {
-        self.now
+        self.newest.begins
     }
 
     /// The latched fault.
     pub fn trip(&self) -> Option<Trip> {
-        self.applied.trip
+        self.trip
     }
 
     /// Forgets the fault that is acknowledged and leaves the safe state, gates off. Each acknowledge does so once: while pulses are
     /// made there is nothing to forget.
-    fn forget_acknowledged(&mut self, command: &Option<VoltageCommand>, port: &mut impl PwmPort) {
+    fn forget_acknowledged(
+        &mut self,
+        command: &Option<VoltageCommand>,
+        now: Instant,
+        port: &mut impl PwmPort,
+        shared: &Shared,
+    ) {
         let Some(command) = command else {
             return;
         };
-        if command.acknowledge == self.applied.acknowledged[0] {
+        if command.acknowledge == self.acknowledged {
             return;
         }
-        self.applied.acknowledged[0] = command.acknowledge;
+        self.acknowledged = command.acknowledge;
         if command.gates == Gates::Pulse {
             return;
         }
-        self.applied.trip = None;
-        if !port.leave(self.now) {
-            let (value, limit, safe) = (1.0, 0.0, SafeState::GatesOff);
-            self.applied.trip = Some(Trip { fault: Fault::GatesHeld, value, limit, at: self.now, safe });
+        self.trip = None;
+        if !port.leave(now) {
+            let (fault, safe) = (Fault::GatesHeld, SafeState::GatesOff);
+            self.latch(Trip { fault, value: 1.0, limit: 0.0, at: now, safe }, shared);
         }
     }
 
-    fn check(&mut self, command: &Option<VoltageCommand>, port: &mut impl PwmPort) {
-        if self.applied.trip.is_some() {
+    fn check(
+        &mut self,
+        currents_a: &Abc,
+        command: &Option<VoltageCommand>,
+        port: &mut impl PwmPort,
+        shared: &Shared,
+    ) {
+        if self.trip.is_some() {
             return;
         }
         let legs = port.leg_faults();
         let armed = |(fault, _, _): &Violation| !self.disarmed.has(*fault);
-        let currents = || protection::check_currents(&self.applied.currents_a, &self.tables.ratings);
-        let stale = || command.as_ref().and_then(|command| self.stale(command));
+        let currents = || protection::check_currents(currents_a, &self.tables().ratings);
+        let pulses = command.as_ref().is_some_and(|command| command.gates == Gates::Pulse);
+        let began = Instant(shared.began.load(Ordering::Relaxed));
+        let stale = || if pulses { stale(self.newest.begins, began, &self.settings.clock) } else { None };
         let violation = legs.check().or_else(|| currents().filter(armed)).or_else(|| stale().filter(armed));
         let Some((fault, value, limit)) = violation else {
             return;
         };
         let (rate, udc_v) = match command {
             Some(command) => (command.reference.rate, command.reference.udc_v),
-            None => (0.0, self.tables.ratings.dc_link_nominal_v),
+            None => (0.0, self.tables().ratings.dc_link_nominal_v),
         };
         let omega = rate * self.settings.clock.ticks_per_s / UNITS_PER_RADIAN;
-        let safe = legs.safe_state(omega, udc_v, &self.tables.ratings);
-        port.enter(safe, self.now);
-        self.applied.trip = Some(Trip { fault, value, limit, at: self.now, safe });
+        let safe = legs.safe_state(omega, udc_v, &self.tables().ratings);
+        let at = self.newest.begins;
+        port.enter(safe, at);
+        self.latch(Trip { fault, value, limit, at, safe }, shared);
     }
 
-    fn stale(&self, command: &VoltageCommand) -> Option<Violation> {
-        let clock = &self.settings.clock;
-        let age = self.now.since(command.reference.at);
-        let limit = STALE_PERIODS * clock.control_ticks as i32;
-        let stale = command.gates == Gates::Pulse && !(0..=limit).contains(&age);
-        stale.then(|| (Fault::StaleCommand, clock.seconds(age), clock.seconds(limit)))
+    fn latch(&mut self, trip: Trip, shared: &Shared) {
+        shared.trip.publish(trip);
+        self.trip = Some(trip);
     }
+
+    fn tables(&self) -> &'static Tables {
+        self.machine.tables()
+    }
+}
+
+/// The control interrupt that should have come by `now` and has not: how long ago the last one began, in s.
+pub(super) fn stale(now: Instant, began: Instant, clock: &Clock) -> Option<Violation> {
+    let age = now.since(began);
+    let limit = (clock.control_ticks + clock.control_ticks / CONTROL_LATE_PART) as i32;
+    (age > limit).then(|| (Fault::StaleCommand, clock.seconds(age), clock.seconds(limit)))
 }

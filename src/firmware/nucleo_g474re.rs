@@ -8,15 +8,15 @@ use tractive::board::nucleo_g474re::registers::Registers;
 use tractive::board::nucleo_g474re::sampling::Zeros;
 use tractive::board::nucleo_g474re::start::Plan;
 use tractive::board::nucleo_g474re::{
-    self as board, CLOCK, Control, Interrupt as interrupt, OPERATOR, PRESCALER, PULSE, Pwm,
+    self as board, CLOCK, Control, Interrupt as interrupt, OPERATOR, PRESCALER, PULSE, Pwm, RECORDER,
 };
 use tractive::control::Gains;
 use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
-use tractive::machine::BUILT_IN;
+use tractive::machine::{BUILT_IN, BuiltIn};
 use tractive::modulation::Devices;
 use tractive::time::Instant;
 
-static SHARED: Shared = Shared::new();
+static SHARED: Shared = Shared::recorded_by(&RECORDER);
 /// What the start measured, written before the interrupts are unmasked.
 static CONTROL_ZEROS: [AtomicU32; 3] = [const { AtomicU32::new(0) }; 3];
 static PWM_ZEROS: [AtomicU32; 3] = [const { AtomicU32::new(0) }; 3];
@@ -59,7 +59,7 @@ fn main() -> ! {
 #[interrupt]
 fn TIM3() {
     static mut BOARD: Option<Control<'static, Encoder>> = None;
-    static mut TASK: Option<ControlTask> = None;
+    static mut TASK: Option<ControlTask<BuiltIn>> = None;
     let board = BOARD.get_or_insert_with(|| {
         let registers = Registers::CHIP;
         let encoder = Encoder::new(registers.tim4, &POWER_STAGE, BUILT_IN.ratings.pole_pairs as u32);
@@ -67,7 +67,7 @@ fn TIM3() {
     });
     board.acknowledge();
     let first = Instant(CLOCK.control_ticks);
-    let task = TASK.get_or_insert_with(|| ControlTask::new(&BUILT_IN, settings(), first));
+    let task = TASK.get_or_insert_with(|| ControlTask::new(BuiltIn, settings(), first));
     if task.wants_revision() {
         board::revise_pulses();
     }
@@ -79,12 +79,12 @@ fn TIM3() {
 #[interrupt]
 fn TIM1_UP_TIM16() {
     static mut BOARD: Option<Pwm> = None;
-    static mut TASK: Option<PwmTask> = None;
+    static mut TASK: Option<PwmTask<BuiltIn>> = None;
     let board = BOARD.get_or_insert_with(|| Pwm::new(Registers::CHIP, kept(&PWM_ZEROS)));
     let task = TASK.get_or_insert_with(|| {
         let settings = settings();
         let first = Instant(settings.devices.shortest_half_ticks);
-        PwmTask::new(&BUILT_IN, settings, first)
+        PwmTask::new(BuiltIn, settings, first)
     });
     if board.is_boundary() {
         board.acknowledge();

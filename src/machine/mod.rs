@@ -88,11 +88,47 @@ pub struct Tables {
     pub weakening: Weakening,
 }
 
+/// Where a task finds its tables: behind a reference where they are made at run time; in an image in [`BuiltIn`], so that the
+/// compiler knows every number of them.
+pub trait Machine: Copy {
+    /// The tables.
+    fn tables(self) -> &'static Tables;
+}
+
+impl Machine for &'static Tables {
+    #[inline(always)]
+    fn tables(self) -> &'static Tables {
+        self
+    }
+}
+
+/// The machine of [`BUILT_IN`].
+#[derive(Clone, Copy, Debug)]
+pub struct BuiltIn;
+
+impl Machine for BuiltIn {
+    #[inline(always)]
+    fn tables(self) -> &'static Tables {
+        &BUILT_IN
+    }
+}
+
 include!(concat!(env!("OUT_DIR"), "/machine_tables.rs"));
 
 /// The machine that drives the ZS9, both motors alike.
 pub mod zs9 {
-    use super::{Curve, Grid, Mtpa, Ratings, Tables, Weakening};
+    use super::{Curve, Grid, Machine, Mtpa, Ratings, Tables, Weakening};
+
+    /// The machine of [`BUILT_IN`].
+    #[derive(Clone, Copy, Debug)]
+    pub struct BuiltIn;
+
+    impl Machine for BuiltIn {
+        #[inline(always)]
+        fn tables(self) -> &'static Tables {
+            &BUILT_IN
+        }
+    }
 
     include!(concat!(env!("OUT_DIR"), "/zs9_tables.rs"));
 }

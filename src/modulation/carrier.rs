@@ -4,7 +4,7 @@
 //! reference is sampled in the middle of its half, where the mean of a turning vector over the half stands.
 
 use super::{CarrierPeriod, Devices, Reference};
-use crate::frames::{Abc, AlphaBeta, Angle, limit};
+use crate::frames::{Abc, AlphaBeta, limit};
 use crate::time::Instant;
 
 /// A half of the asynchronous carrier.
@@ -45,11 +45,11 @@ pub fn synchronous(
     seen: &Reference,
     devices: &Devices,
 ) -> CarrierPeriod {
-    let middle = seen.angle_at(start.after(period_ticks / 2));
+    let middle = seen.vector_at(start.after(period_ticks / 2));
     let rising = half & 1 == 0;
     // A rising half starts with all upper devices on.
     let all_on = if rising { zeros.at_start() } else { 1.0 - zeros.at_start() };
-    let shares = on_shares(seen.voltage_v, middle, seen.udc_v, all_on);
+    let shares = on_shares(middle * (1.0 / seen.udc_v), all_on);
     let mut out = CarrierPeriod { period_ticks, start_levels: [rising; 3], ..CarrierPeriod::default() };
     for (compare, share) in out.compare_ticks.iter_mut().zip([shares.a, shares.b, shares.c]) {
         let on = whole_pulse(share, period_ticks, devices.min_pulse_ticks);
@@ -58,12 +58,10 @@ pub fn synchronous(
     out
 }
 
-/// The share of the half for which each upper device is on, 0 ..= 1, with a share `all_on` of the zero vectors made by all
-/// three of them: a half is the min-max zero sequence.
-fn on_shares(voltage_v: f32, angle: Angle, udc_v: f32, all_on: f32) -> Abc {
-    let direction = angle.sin_cos();
-    let scale = voltage_v / udc_v;
-    let phase = AlphaBeta { alpha: scale * direction.cos, beta: scale * direction.sin }.abc();
+/// The share of the half for which each upper device is on, 0 ..= 1, for a voltage as a share of the link's, with a share
+/// `all_on` of the zero vectors made by all three of them: a half is the min-max zero sequence.
+fn on_shares(voltage: AlphaBeta, all_on: f32) -> Abc {
+    let phase = voltage.abc();
     let high = max(phase.a, max(phase.b, phase.c));
     let low = -max(-phase.a, max(-phase.b, -phase.c));
     let centre = all_on * (1.0 - high) - (1.0 - all_on) * low;
@@ -104,7 +102,8 @@ mod tests {
 
     #[test]
     fn the_zero_sequence_centres_the_three_phases() {
-        let shares = on_shares(866.0, Angle::DEG_30, 1500.0, 0.5);
+        // 866 V of 1,500 V at 30°.
+        let shares = on_shares(AlphaBeta { alpha: 0.5, beta: 0.288_7 }, 0.5);
         assert!((shares.a - 1.0).abs() < 1e-3 && shares.c.abs() < 1e-3, "{shares:?}");
     }
 }

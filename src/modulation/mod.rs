@@ -16,16 +16,16 @@ mod middle60;
 mod ripple;
 mod schedule;
 
-use crate::frames::{Angle, limit};
+use crate::frames::{AlphaBeta, Angle, limit};
 use crate::time::{Clock, Instant};
 
 use carrier::Zeros;
 pub use dead_time::compensated;
-pub use ripple::{ripple_flux, ripple_share};
+pub use ripple::{RippleFlux, ripple_share};
 pub use schedule::{Schedule, depth_limit, first_half};
 
 /// How the pulses are made.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(u8)]
 pub enum Mode {
     /// All gates off.
@@ -52,9 +52,14 @@ impl Mode {
 
     /// The mode with this discriminant; `Off` for any other number.
     pub fn from_code(code: u32) -> Self {
-        match Self::ALL.get(code as usize) {
-            Some(mode) => *mode,
-            None => Self::Off,
+        match code {
+            1 => Self::Async,
+            2 => Self::Sync15,
+            3 => Self::Sync12,
+            4 => Self::Mid7,
+            5 => Self::Mid3,
+            6 => Self::Square,
+            _ => Self::Off,
         }
     }
 
@@ -175,13 +180,13 @@ impl CarrierPeriod {
 pub struct Reference {
     /// Fundamental phase voltage, peak, in V.
     pub voltage_v: f32,
-    /// Angle of the voltage vector at `at`.
-    pub angle: Angle,
+    /// The same as a vector at `at`, in V.
+    pub vector: AlphaBeta,
     /// Angle of the vector to which a locked carrier keeps, at `at`: without what regulation adds for one half only.
     pub carrier_angle: Angle,
     /// Angle units (2⁻³² turn) per tick by which it turns; negative backward.
     pub rate: f32,
-    /// The instant of `angle`.
+    /// The instant of `vector`.
     pub at: Instant,
     /// DC-link voltage, in V, greater than zero.
     pub udc_v: f32,
@@ -190,9 +195,17 @@ pub struct Reference {
 }
 
 impl Reference {
-    /// The voltage angle at an instant, extrapolated at constant rate.
-    fn angle_at(&self, instant: Instant) -> Angle {
-        self.angle + self.turned(instant)
+    /// A fundamental with its vector and its carrier at one angle, and a mode by its own depth.
+    pub fn turning(voltage_v: f32, angle: Angle, rate: f32, at: Instant, udc_v: f32) -> Self {
+        let direction = angle.sin_cos();
+        let vector = AlphaBeta { alpha: direction.cos, beta: direction.sin } * voltage_v;
+        let depth = voltage_v / (udc_v * (2.0 * core::f32::consts::FRAC_1_PI));
+        Self { voltage_v, vector, carrier_angle: angle, rate, at, udc_v, depth }
+    }
+
+    /// The vector at an instant, turned on at constant rate.
+    fn vector_at(&self, instant: Instant) -> AlphaBeta {
+        self.vector.turned(self.turned(instant).sin_cos())
     }
 
     /// The pulse angle at an instant: that of the carrier's vector and 90°.
@@ -206,7 +219,8 @@ impl Reference {
 
     /// The same fundamental in the mirror: turning forward.
     fn mirrored(self) -> Self {
-        Self { angle: -self.angle, carrier_angle: -self.carrier_angle, rate: -self.rate, ..self }
+        let vector = AlphaBeta { beta: -self.vector.beta, ..self.vector };
+        Self { vector, carrier_angle: -self.carrier_angle, rate: -self.rate, ..self }
     }
 }
 
@@ -450,8 +464,9 @@ impl Modulator {
     fn locked(&mut self, start: Instant, pulse: Angle, seen: &Reference) -> CarrierPeriod {
         let carriers = self.mode.carriers();
         let end = boundary(self.next_half + 1, carriers);
-        let nominal = boundary(1, carriers).0 as f32 / seen.rate;
-        let wanted = (end - pulse).signed() as f32 / seen.rate;
+        let ticks_per_unit = 1.0 / seen.rate;
+        let nominal = boundary(1, carriers).0 as f32 * ticks_per_unit;
+        let wanted = (end - pulse).signed() as f32 * ticks_per_unit;
         if self.mode.is_carrier() {
             let (shortest, longest) = CARRIER_STRETCH;
             let period_ticks = self.whole_ticks(limit(wanted, shortest * nominal, longest * nominal));

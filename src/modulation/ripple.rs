@@ -4,35 +4,72 @@
 //! by an amount that is known beforehand. Control subtracts it, so that samples at boundaries tell the fundamental.
 
 use super::{Mode, middle60};
-use crate::frames::{AlphaBeta, Angle, Dq};
+use crate::frames::{AlphaBeta, SinCos};
 
-/// Ripple flux linkage at the boundary where half number `half` begins, in Wb, in the stationary frame of the
-/// (mirrored) turn. `voltage_v`: fundamental, peak phase; `omega`: stator frequency in rad/s, greater than zero.
-///
-/// Zero for the triangular carriers: at their peaks and valleys the flux is that of the sampled fundamental. For
-/// middle 60° and square wave: in each sector the flux moves along one edge of a hexagon, by
-/// `D = (2/3) udc (π/3 − N β/2)/ω` over N halves, so at half i it stands at `D (1 + (i/N)(e^{j60°} − 1))`, turned by
-/// the sector; from that the fundamental `u/ω` at `i/N · 60°` is taken away. The flux lags the voltage by 90°.
-pub fn ripple_flux(mode: Mode, half: u32, voltage_v: f32, udc_v: f32, omega: f32) -> AlphaBeta {
-    let per_sector = match mode {
-        Mode::Mid7 | Mode::Mid3 | Mode::Square => mode.carriers() / 3,
-        _ => return AlphaBeta::default(),
-    };
-    let notch = if mode == Mode::Square { 0.0 } else { middle60::half_notch_rad(mode, voltage_v, udc_v) };
-    let edge = (2.0 / 3.0) * udc_v * (core::f32::consts::FRAC_PI_3 - per_sector as f32 * notch) / omega;
-    let half = half % (per_sector * 6);
-    let (sector, within) = (half / per_sector, half % per_sector);
-    let part = within as f32 / per_sector as f32;
-    // The flux lags the voltage by 90°, and the voltage lags the pulse angle by 90°.
-    let start = Angle(sector.wrapping_mul(SECTOR)) - Angle::DEG_90 - Angle::DEG_90;
-    let chord = Dq { d: edge * (1.0 - 0.5 * part), q: edge * part * (0.5 * crate::frames::SQRT_3) };
-    let fundamental = Angle((SECTOR as f32 * part) as u32).sin_cos();
-    let round = Dq { d: fundamental.cos, q: fundamental.sin } * (voltage_v / omega);
-    (chord - round).unpark(start.sin_cos())
+/// The ripple flux of a pattern in steady state. In each sector of 60° the flux moves along one edge of a hexagon, over as many
+/// halves as the sector has.
+#[derive(Clone, Copy, Debug)]
+pub struct RippleFlux {
+    sector_halves: u32,
+    /// Length of the hexagon's edge, `(2/3) udc (π/3 − N β/2)/ω`, in Wb.
+    edge_wb: f32,
+    /// Fundamental, `u/ω`, in Wb.
+    fundamental_wb: f32,
 }
 
-/// 60° in angle units, rounded to the nearest.
-const SECTOR: u32 = 715_827_883;
+impl RippleFlux {
+    /// Of a pattern with a fundamental of `voltage_v` (peak phase) at a stator frequency of `omega` (rad/s, greater than zero).
+    /// `None` for the triangular carriers: at their peaks and valleys the flux is that of the sampled fundamental.
+    #[inline]
+    pub fn new(mode: Mode, voltage_v: f32, udc_v: f32, omega: f32) -> Option<Self> {
+        if !mode.is_pattern() {
+            return None;
+        }
+        let sector_halves = mode.sector_halves();
+        let zero = if mode == Mode::Square {
+            0.0
+        } else {
+            sector_halves as f32 * middle60::half_notch_rad(mode, voltage_v, udc_v)
+        };
+        let per_omega = 1.0 / omega;
+        let edge_wb = (2.0 / 3.0) * udc_v * (core::f32::consts::FRAC_PI_3 - zero) * per_omega;
+        Some(Self { sector_halves, edge_wb, fundamental_wb: voltage_v * per_omega })
+    }
+
+    /// At the boundary where half number `half` begins, in Wb, in the stationary frame of the (mirrored) turn.
+    ///
+    /// At half i of N the flux stands at `D (1 + (i/N)(e^{j60°} − 1))`, turned by the sector, with the edge D; from that the
+    /// fundamental at `i/N · 60°` is taken away. The flux lags the voltage by 90°, and that the pulse angle by 90°.
+    pub fn at(&self, half: u32) -> AlphaBeta {
+        let turn = 6 * self.sector_halves;
+        let half = if half >= turn { half - turn } else { half };
+        let sector = half.checked_div(self.sector_halves).unwrap_or(0);
+        let place = (half - sector * self.sector_halves) * if self.sector_halves == 2 { 3 } else { 1 };
+        let (Some(start), Some(round)) = (SECTORS.get(sector as usize), PLACES.get(place as usize)) else {
+            return AlphaBeta::default();
+        };
+        let part = place as f32 * (1.0 / 6.0);
+        let chord = AlphaBeta { alpha: 1.0 - 0.5 * part, beta: part * (0.5 * crate::frames::SQRT_3) };
+        let round = AlphaBeta { alpha: round.cos, beta: round.sin };
+        (round * self.fundamental_wb - chord * self.edge_wb).turned(*start)
+    }
+}
+
+/// The sectors' beginnings.
+static SECTORS: [SinCos; 6] = directions(6);
+/// The places of 10° in a sector where a boundary may lie.
+static PLACES: [SinCos; 6] = directions(36);
+
+/// The first six directions of so many that are evenly spread over the turn.
+const fn directions(count: u32) -> [SinCos; 6] {
+    let mut directions = [SinCos { sin: 0.0, cos: 1.0 }; 6];
+    let mut k = 0;
+    while k < directions.len() {
+        directions[k] = SinCos::of_turns(k as f64 / count as f64);
+        k += 1;
+    }
+    directions
+}
 
 /// The flux ripple of a mode as a share of the fundamental flux (its weighted distortion), for a fundamental of `depth` of
 /// six-step: within a tenth of what the pulses have. The carriers count as one, that of 12 carriers a turn.
@@ -44,5 +81,47 @@ pub fn ripple_share(mode: Mode, depth: f32) -> f32 {
         Mode::Mid3 => SQUARE + 0.49 * missing * missing,
         Mode::Mid7 => SQUARE + 0.02 * missing,
         _ => 0.045_3,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+
+    use super::*;
+
+    /// The flux of the pulses themselves, summed up over a turn, less its fundamental.
+    #[test]
+    fn the_ripple_is_that_of_a_hexagon() {
+        for (mode, halves) in [(Mode::Mid7, 36), (Mode::Mid3, 12), (Mode::Square, 12)] {
+            let (omega, udc_v) = (600.0_f32, 1500.0_f32);
+            let voltage_v = if mode == Mode::Square { 954.93 } else { 900.0 };
+            let ripple = RippleFlux::new(mode, voltage_v, udc_v, omega).unwrap();
+            let notch =
+                if mode == Mode::Square { 0.0 } else { middle60::half_notch_rad(mode, voltage_v, udc_v) };
+            let per_sector = halves / 6;
+            let edge = f64::from(2.0 / 3.0 * udc_v / omega)
+                * (core::f64::consts::FRAC_PI_3 - f64::from(per_sector) * f64::from(notch));
+            for half in 0..halves {
+                let corner = |k: u32| {
+                    let angle = f64::from(k) * core::f64::consts::FRAC_PI_3 + core::f64::consts::PI;
+                    (edge * angle.cos(), edge * angle.sin())
+                };
+                let (sector, part) =
+                    (half / per_sector, f64::from(half % per_sector) / f64::from(per_sector));
+                let ((x0, y0), (x1, y1)) = (corner(sector), corner(sector + 1));
+                let turned =
+                    f64::from(half) / f64::from(halves) * core::f64::consts::TAU + core::f64::consts::PI;
+                let round = f64::from(voltage_v / omega);
+                let expected = (
+                    x0 + part * (x1 - x0) - round * turned.cos(),
+                    y0 + part * (y1 - y0) - round * turned.sin(),
+                );
+                let got = ripple.at(half);
+                let error = (f64::from(got.alpha) - expected.0).hypot(f64::from(got.beta) - expected.1);
+                assert!(error < 2e-6, "{mode:?} {half} {got:?} {expected:?}");
+            }
+        }
+        assert!(RippleFlux::new(Mode::Sync12, 500.0, 1500.0, 300.0).is_none());
     }
 }

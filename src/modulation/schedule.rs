@@ -5,35 +5,36 @@
 //! the last switch. A switch waits for the end of a whole carrier at an angle where both modes' carriers end.
 
 use super::{Devices, Mode, Reference, middle60::notch_sum};
-use crate::frames::Angle;
+use crate::frames::{Angle, UNITS_PER_RADIAN};
 use crate::time::{Clock, Instant};
 
-/// A border between a mode and the next one up. Frequencies are shares of the highest switching frequency.
+/// A border between a mode and the next one up. Frequencies are shares of the highest switching frequency; each of the pair
+/// is for going up and for coming down.
 #[derive(Clone, Copy, Debug)]
 struct Border {
+    below: Mode,
     above: Mode,
-    up_share: f32,
-    down_share: f32,
-    /// Depths for going up and coming down; `None` where depth alone does not matter.
-    depths: Option<(f32, f32)>,
+    shares: (f32, f32),
+    depths: (f32, f32),
 }
 
 /// A border given in Hz for devices of 900 Hz.
-const fn border(above: Mode, hz: (f32, f32), depths: Option<(f32, f32)>) -> Border {
-    Border { above, up_share: hz.0 / 900.0, down_share: hz.1 / 900.0, depths }
+const fn border(below: Mode, above: Mode, hz: (f32, f32), depths: (f32, f32)) -> Border {
+    Border { below, above, shares: (hz.0 / 900.0, hz.1 / 900.0), depths }
 }
 
 /// Carrier modes end at udc/√3 = 0.907 of six-step. The frequencies lie a little below what the devices allow (for
 /// 900 Hz: 60, 75, 128.6, 300 Hz), so that waiting for a legal angle on the steepest ramp stays within it. Depth alone does not
 /// end the asynchronous mode: at a low frequency a pattern of few pulses would leave more ripple than the tenth of voltage is
 /// worth that it adds.
-const BORDERS: [Border; 5] = [
-    border(Mode::Sync15, (40.0, 38.0), None),
-    border(Mode::Sync12, (59.5, 57.0), Some((0.88, 0.84))),
-    border(Mode::Mid7, (74.5, 72.0), Some((0.88, 0.84))),
-    border(Mode::Mid3, (126.0, 121.0), Some((0.913, 0.885))),
-    border(Mode::Square, (297.0, 290.0), Some((0.990, 0.978))),
+const BORDERS: [Border; 4] = [
+    border(Mode::Mid3, Mode::Square, (297.0, 290.0), (0.990, 0.978)),
+    border(Mode::Mid7, Mode::Mid3, (126.0, 121.0), (0.913, 0.885)),
+    border(Mode::Sync12, Mode::Mid7, (74.5, 72.0), (0.88, 0.84)),
+    border(Mode::Sync15, Mode::Sync12, (59.5, 57.0), (0.88, 0.84)),
 ];
+/// Where the asynchronous mode ends.
+const FREE_SHARES: (f32, f32) = (40.0 / 900.0, 38.0 / 900.0);
 
 /// Room kept between a mode's largest depth and the border above it, and the hysteresis kept below a border that
 /// the shortest pulse has lowered; shares of six-step.
@@ -67,39 +68,27 @@ impl Schedule {
         if let Some(fixed) = self.fixed {
             return fixed;
         }
-        let dwelling = match self.last_switch {
-            Some(last) if mode != Mode::Off => {
-                let elapsed = now.since(last);
-                if elapsed < 0 || elapsed >= self.dwell_ticks {
-                    self.last_switch = None;
-                }
-                (0..self.dwell_ticks).contains(&elapsed)
+        if let Some(last) = self.last_switch
+            && mode != Mode::Off
+        {
+            if (0..self.dwell_ticks).contains(&now.since(last)) {
+                return mode;
             }
-            _ => false,
-        };
-        if dwelling {
-            return mode;
+            self.last_switch = None;
         }
-        let switching_turns = 2.0 * devices.shortest_half_ticks as f32;
-        let share = seen.rate * switching_turns * (1.0 / 4_294_967_296.0);
-        let mut best = Mode::Async;
-        for (index, border) in BORDERS.iter().enumerate() {
-            let below = Mode::from_code(index as u32 + Mode::Async as u32);
-            let here = rank(mode) > index;
-            let fast = share >= if here { border.down_share } else { border.up_share };
-            let deep = match border.depths {
-                None => false,
-                Some(_) if best == Mode::Async => false,
-                Some(depths) => {
-                    let (up, down) = lowered(depths, depth_limit(below, seen.rate, devices) - DEPTH_ROOM);
-                    seen.depth >= if here { down } else { up }
-                }
-            };
-            if fast || deep {
-                best = border.above;
+        let share = seen.rate * (2.0 / 4_294_967_296.0) * devices.shortest_half_ticks as f32;
+        // Whoever passes a border passes those of lower frequencies as well, so the highest one decides.
+        if share < pick(FREE_SHARES, mode > Mode::Async) {
+            return Mode::Async;
+        }
+        for border in &BORDERS {
+            let from_above = mode > border.below;
+            let fast = share >= pick(border.shares, from_above);
+            if fast || seen.depth >= pick(reached(border, seen.rate, devices), from_above) {
+                return border.above;
             }
         }
-        best
+        Mode::Sync15
     }
 
     /// Tells the schedule that the mode changed at this instant.
@@ -108,14 +97,15 @@ impl Schedule {
     }
 }
 
-/// Place of a mode in the row; `Off` and `Async` are at its foot.
-fn rank(mode: Mode) -> usize {
-    (mode as usize).saturating_sub(Mode::Async as usize)
+/// Of a border's pair of values the one for this side.
+fn pick((up, down): (f32, f32), from_above: bool) -> f32 {
+    if from_above { down } else { up }
 }
 
 /// A border's depths, lowered where the mode below does not reach them because of the shortest pulse.
-fn lowered((up, down): (f32, f32), reach: f32) -> (f32, f32) {
-    if reach < up { (reach, reach - DEPTH_HYSTERESIS) } else { (up, down) }
+fn reached(border: &Border, rate: f32, devices: &Devices) -> (f32, f32) {
+    let reach = depth_limit(border.below, rate, devices) - DEPTH_ROOM;
+    if reach < border.depths.0 { (reach, reach - DEPTH_HYSTERESIS) } else { border.depths }
 }
 
 /// The largest fundamental of a mode as a share of six-step 2 udc/π, with `rate` in angle units per tick: udc/√3 for
@@ -126,8 +116,10 @@ pub fn depth_limit(mode: Mode, rate: f32, devices: &Devices) -> f32 {
     match mode {
         Mode::Square => 1.0,
         Mode::Mid7 | Mode::Mid3 => {
-            let half_notch = Angle((0.5 * rate.abs() * devices.min_pulse_ticks as f32) as u32);
-            1.0 - notch_sum(mode) * half_notch.sin_cos().sin
+            let half_notch_rad = rate.abs() * (0.5 / UNITS_PER_RADIAN) * devices.min_pulse_ticks as f32;
+            // The sine of an angle of a few degrees.
+            let sine = half_notch_rad - half_notch_rad * half_notch_rad * half_notch_rad * (1.0 / 6.0);
+            1.0 - notch_sum(mode) * sine
         }
         _ => CARRIER,
     }

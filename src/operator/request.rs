@@ -1,5 +1,7 @@
 //! What is asked of the drive, and what the board says of itself.
 
+use super::settings::Ends;
+use crate::cell::Words;
 use crate::frames::Abc;
 use crate::machine::Ratings;
 use crate::protection::{Fault, Trip};
@@ -63,15 +65,16 @@ pub struct Limits {
 }
 
 impl Limits {
-    /// As the machine is rated: braking ends halfway between the link's highest operating voltage and its trip level, motoring
-    /// halfway between its lowest one and that trip level.
+    /// As the machine is rated: braking ends between the link's highest operating voltage and its trip level, motoring between its
+    /// lowest one and that trip level.
     pub const fn rated(ratings: &Ratings) -> Self {
+        let ends = Ends::rated(ratings);
         Self {
             motoring_nm: ratings.max_torque_nm,
             braking_nm: ratings.max_torque_nm,
             speed_rad_s: ratings.max_speed_rad_s,
-            link_low_v: 0.5 * (ratings.dc_link_min_v + ratings.trip_dc_under_v),
-            link_high_v: 0.5 * (ratings.dc_link_max_v + ratings.trip_dc_over_v),
+            link_low_v: ends.motoring_none_v,
+            link_high_v: ends.braking_none_v,
         }
     }
 }
@@ -133,4 +136,95 @@ pub struct Observation {
     pub trip: Option<Trip>,
     /// Number of the last acknowledge that both sides have carried out.
     pub acknowledged: u8,
+}
+
+/// Flags as bits of a word, the first the lowest.
+fn bits<const N: usize>(flags: [bool; N]) -> u32 {
+    flags.into_iter().rev().fold(0, |word, flag| word << 1 | u32::from(flag))
+}
+
+impl Words<7> for Request {
+    fn to_words(self) -> [u32; 7] {
+        let Self { enable, with_torque, off, coast, charge, discharge, acknowledge, torque_nm, limits } =
+            self;
+        let Limits { motoring_nm, braking_nm, speed_rad_s, link_low_v, link_high_v } = limits;
+        let flags = bits([enable, with_torque, off, coast, charge, discharge, acknowledge]);
+        let [torque, motoring, braking, speed, low, high] =
+            [torque_nm, motoring_nm, braking_nm, speed_rad_s, link_low_v, link_high_v].map(f32::to_bits);
+        [flags, torque, motoring, braking, speed, low, high]
+    }
+
+    fn from_words(words: [u32; 7]) -> Self {
+        let [flags, values @ ..] = words;
+        let [torque_nm, motoring_nm, braking_nm, speed_rad_s, link_low_v, link_high_v] =
+            values.map(f32::from_bits);
+        let flag = |bit: u32| flags >> bit & 1 != 0;
+        Self {
+            enable: flag(0),
+            with_torque: flag(1),
+            off: flag(2),
+            coast: flag(3),
+            charge: flag(4),
+            discharge: flag(5),
+            acknowledge: flag(6),
+            torque_nm,
+            limits: Limits { motoring_nm, braking_nm, speed_rad_s, link_low_v, link_high_v },
+        }
+    }
+}
+
+impl Words<4> for Feedback {
+    fn to_words(self) -> [u32; 4] {
+        let flags = bits([
+            self.precharge_closed,
+            self.main_closed,
+            self.driver_ready,
+            self.enable_input,
+            self.sensor_alive,
+            self.position_known,
+            self.parameters_open,
+        ]);
+        let hardware = self.hardware.map_or(0, |fault| fault as u32);
+        let Abc { a, b, c } = self.offsets_a;
+        [flags | (self.configuration as u32) << 8 | hardware << 16, a.to_bits(), b.to_bits(), c.to_bits()]
+    }
+
+    fn from_words(words: [u32; 4]) -> Self {
+        let [flags, offsets @ ..] = words;
+        let [a, b, c] = offsets.map(f32::from_bits);
+        let flag = |bit: u32| flags >> bit & 1 != 0;
+        Self {
+            precharge_closed: flag(0),
+            main_closed: flag(1),
+            driver_ready: flag(2),
+            enable_input: flag(3),
+            sensor_alive: flag(4),
+            position_known: flag(5),
+            parameters_open: flag(6),
+            offsets_a: Abc { a, b, c },
+            configuration: match flags >> 8 & 0xFF {
+                1 => Configuration::Good,
+                2 => Configuration::Bad,
+                _ => Configuration::Unchecked,
+            },
+            hardware: Fault::from_code(flags >> 16),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn requests_and_feedback_survive_as_words() {
+        for bit in 0..7 {
+            let words = [1 << bit, 1, 2, 3, 4, 5, 6];
+            assert_eq!(Request::from_words(words).to_words(), words);
+        }
+        for flags in (0..7).map(|bit| 1 << bit).chain([1 << 8, 2 << 8, (Fault::GateDriver as u32) << 16]) {
+            let words = [flags, 7, 8, 9];
+            assert_eq!(Feedback::from_words(words).to_words(), words);
+        }
+    }
 }

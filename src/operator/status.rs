@@ -1,5 +1,6 @@
 //! What the operator is told.
 
+use crate::drive::{trip_from_words, trip_to_words};
 use crate::protection::Trip;
 
 macro_rules! named {
@@ -90,6 +91,8 @@ named! {
         Discharging = "discharging",
         /// The machine turns so fast that its EMF would charge the link again.
         MachineTurning = "machine_turning",
+        /// This drive has no contactors on its link.
+        NoContactors = "no_contactors",
         /// A value of the request is not a finite number; its torque counts as zero, its limits as those before.
         RequestNotFinite = "request_not_finite",
         /// A limit lies outside the machine's ratings; the limits before go on.
@@ -125,4 +128,73 @@ pub struct Status {
     pub torque_nm: f32,
     /// What is switched.
     pub switches: Switches,
+}
+
+const NONE: u32 = 0xFF;
+
+impl Status {
+    /// As eight words.
+    pub fn to_words(self) -> [u32; 8] {
+        let Self { state, trip, refusal, refusals, torque_nm, switches } = self;
+        let refusal = refusal.map_or(NONE, |refusal| refusal.code().into());
+        let Switches { precharge, main, discharge, chopper } = switches;
+        let flags = u32::from(precharge) | u32::from(main) << 1 | u32::from(discharge) << 2;
+        let [fault, value, limit, at] = trip_to_words(trip);
+        let codes = u32::from(state.code()) | refusal << 8 | flags << 16;
+        [codes, refusals, torque_nm.to_bits(), chopper.to_bits(), fault, value, limit, at]
+    }
+
+    /// The inverse of [`Self::to_words`]; `None` for words that are none of ours.
+    pub fn from_words(words: [u32; 8]) -> Option<Self> {
+        let [codes, refusals, torque, chopper, trip @ ..] = words;
+        let refusal = match codes >> 8 & 0xFF {
+            NONE => None,
+            code => Some(Refusal::from_code(code)?),
+        };
+        let flag = |bit: u32| codes >> (16 + bit) & 1 != 0;
+        Some(Self {
+            state: State::from_code(codes & 0xFF)?,
+            trip: trip_from_words(trip),
+            refusal,
+            refusals,
+            torque_nm: f32::from_bits(torque),
+            switches: Switches {
+                precharge: flag(0),
+                main: flag(1),
+                discharge: flag(2),
+                chopper: f32::from_bits(chopper),
+            },
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::protection::{Fault, SafeState};
+    use crate::time::Instant;
+
+    #[test]
+    fn a_status_survives_as_words() {
+        let trip = Trip {
+            fault: Fault::Contactor,
+            value: 1.0,
+            limit: 0.0,
+            at: Instant(7),
+            safe: SafeState::GatesOff,
+        };
+        for (state, refusal, trip) in
+            [(State::Init, None, None), (State::Fault, Some(Refusal::LimitOutOfRange), Some(trip))]
+        {
+            for switches in [
+                Switches { precharge: true, ..Switches::default() },
+                Switches { main: true, chopper: 0.25, ..Switches::default() },
+                Switches { discharge: true, ..Switches::default() },
+            ] {
+                let status = Status { state, trip, refusal, refusals: 3, torque_nm: -20.0, switches };
+                assert_eq!(Status::from_words(status.to_words()), Some(status));
+            }
+        }
+        assert_eq!(Status::from_words([0xFE; 8]), None);
+    }
 }

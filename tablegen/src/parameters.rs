@@ -88,6 +88,9 @@ impl Parameters {
     fn check(&self, file: &Path) -> Result<(), InputError> {
         let rated_power_w = self.rated_torque_nm * self.rated_speed_rpm * std::f64::consts::TAU / 60.0;
         let full_power_w = self.max_torque_nm * self.max_speed_rpm * std::f64::consts::TAU / 60.0;
+        let resistive_v = self.stator_resistance_ohm * self.max_current_a;
+        let spin_up_s =
+            self.rotor_inertia_kg_m2 * self.max_speed_rpm * std::f64::consts::TAU / 60.0 / self.max_torque_nm;
         let orders = [
             ("rated_torque_nm", self.rated_torque_nm, "max_torque_nm", self.max_torque_nm, true),
             ("rated_speed_rpm", self.rated_speed_rpm, "max_speed_rpm", self.max_speed_rpm, true),
@@ -110,6 +113,39 @@ impl Parameters {
                 self.max_power_w,
                 "power of max_torque_nm at max_speed_rpm",
                 full_power_w * 1.01,
+                true,
+            ),
+            // A trip level far above its limit protects nothing.
+            ("trip_current_a", self.trip_current_a, "4 × max_current_a", 4.0 * self.max_current_a, true),
+            ("trip_dc_over_v", self.trip_dc_over_v, "3 × dc_link_max_v", 3.0 * self.dc_link_max_v, true),
+            ("trip_speed_rpm", self.trip_speed_rpm, "3 × max_speed_rpm", 3.0 * self.max_speed_rpm, true),
+            (
+                "drop of max_current_a across stator_resistance_ohm",
+                resistive_v,
+                "half of dc_link_nominal_v",
+                0.5 * self.dc_link_nominal_v,
+                true,
+            ),
+            (
+                "torque_slew_nm_per_s",
+                self.torque_slew_nm_per_s,
+                "max_torque_nm in 1 ms",
+                1e3 * self.max_torque_nm,
+                true,
+            ),
+            (
+                "max_torque_nm in 100 s",
+                0.01 * self.max_torque_nm,
+                "torque_slew_nm_per_s",
+                self.torque_slew_nm_per_s,
+                true,
+            ),
+            ("loss_rated_w", self.loss_rated_w, "max_power_w", self.max_power_w, true),
+            (
+                "seconds at max_torque_nm to max_speed_rpm with rotor_inertia_kg_m2",
+                spin_up_s,
+                "ten minutes",
+                600.0,
                 true,
             ),
         ];

@@ -154,6 +154,33 @@ fn limits_that_contradict_each_other() {
     }
 }
 
+/// A thousand times what is good is nonsense for every key, and told by the key's name.
+#[test]
+fn a_number_a_thousand_times_too_large() {
+    let optional = [
+        ("trip_current_a", 303.0),
+        ("trip_dc_over_v", 2_070.0),
+        ("trip_dc_under_v", 850.0),
+        ("trip_speed_rpm", 6_600.0),
+        ("torque_slew_nm_per_s", 12_350.0),
+        ("rotor_inertia_kg_m2", 2.0),
+        ("loss_rated_w", 5_409.0),
+        ("loss_quadratic_fraction", 0.6),
+    ];
+    let good = good_toml();
+    let value = |key: &str| -> f64 {
+        let line = good.lines().find(|line| line.starts_with(&format!("{key} ="))).unwrap();
+        line.split(['=', '#']).nth(1).unwrap().trim().parse().unwrap()
+    };
+    let required = REQUIRED.into_iter().skip(1).map(|key| (key, value(key)));
+    for (key, value) in required.chain(optional) {
+        let rest = good.lines().filter(|old| !old.starts_with(key)).collect::<Vec<_>>().join("\n");
+        Folder::new(&format!("{rest}\n{key} = {value:.4}\n"), &good_map()).read().unwrap();
+        let text = refusal(&format!("{rest}\n{key} = {}\n", value * 1e3));
+        assert!(text.contains(key), "{key}: {text}");
+    }
+}
+
 #[test]
 fn a_torque_or_a_current_beyond_the_map() {
     let text = refusal(&toml_with("max_current_a", "max_current_a = 150.0"));

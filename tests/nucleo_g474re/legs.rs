@@ -64,15 +64,8 @@ fn halves_of_all_modes(direction: f32) -> Vec<CarrierPeriod> {
     for _ in 0..200_000 {
         let rate = direction * hz * 4_294_967_296.0 / CLOCK.ticks_per_s;
         let depth = (hz / 120.0).min(1.05);
-        let reference = Reference {
-            voltage_v: depth.min(1.0) * 954.9,
-            angle,
-            carrier_angle: angle,
-            rate,
-            at: start,
-            udc_v: 1_500.0,
-            depth,
-        };
+        let turning = Reference::turning(depth.min(1.0) * 954.9, angle, rate, start, 1_500.0);
+        let reference = Reference { depth, ..turning };
         let half = modulator.step(start, Some(&reference));
         if found.iter().filter(|other| other.mode == half.mode).count() < 24 {
             found.push(half);

@@ -57,11 +57,12 @@ pub fn cargo() -> Command {
 }
 
 /// The systems, each with an image of its own.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum System {
-    /// The PMaSynRM behind a two-level inverter.
+    /// The PMaSynRM behind a two-level inverter
+    #[value(name = "pmasynrm")]
     Traction,
-    /// Two motors behind a Z-source nine-switch inverter.
+    /// Two motors behind a Z-source nine-switch inverter
     Zs9,
 }
 
@@ -103,21 +104,30 @@ pub fn image(toolchain: &Toolchain, system: System, machine: Option<&OsString>) 
     executable(&mut command, name, machine.is_some()).context("the image was not built")
 }
 
-/// Builds the image of the building blocks.
-pub fn bench(toolchain: &Toolchain) -> Result<PathBuf> {
-    let name = "tractive-bench";
-    let args = ["build", "--profile", "firmware", "--target", TARGET, "--package", name, "--bin", name];
+/// Builds one of the bench's images: `tractive-bench`, the building blocks, or `cell_stress`.
+pub fn bench(toolchain: &Toolchain, name: &str) -> Result<PathBuf> {
+    let package = "tractive-bench";
+    let args = ["build", "--profile", "firmware", "--target", TARGET, "--package", package, "--bin", name];
     executable(toolchain.cargo(&args).env_remove("TRACTIVE_MACHINE"), name, false)
         .context("the bench was not built")
 }
 
-/// Builds the firmware's image for a board of real hardware.
-pub fn board_image(toolchain: &Toolchain, board: Board) -> Result<PathBuf> {
-    let args =
-        ["build", "--profile", "firmware", "--target", TARGET, "--package", "tractive", "--bin", "tractive"];
+/// Builds a system's image for a board of real hardware, with the tables of `machine` if one is named.
+pub fn board_image(
+    toolchain: &Toolchain,
+    board: Board,
+    system: System,
+    machine: Option<&OsString>,
+) -> Result<PathBuf> {
+    let name = system.image();
+    let args = ["build", "--profile", "firmware", "--target", TARGET, "--package", "tractive", "--bin", name];
     let mut command = toolchain.cargo(&args);
-    command.args(["--features", board.feature()]).env_remove("TRACTIVE_MACHINE");
-    executable(&mut command, "tractive", false).context("the image was not built")
+    command.args(["--features", board.feature()]);
+    for other in System::ALL {
+        command.env_remove(other.machine_variable());
+    }
+    command.envs(machine.map(|machine| (system.machine_variable(), machine)));
+    executable(&mut command, name, machine.is_some()).context("the image was not built")
 }
 
 /// Builds the rig's program.

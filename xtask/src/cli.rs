@@ -2,7 +2,7 @@
 
 use clap::{Args, Parser, Subcommand};
 
-use crate::build::Board;
+use crate::build::{Board, System};
 use crate::test::Step;
 
 /// The chores of `tractive`.
@@ -68,6 +68,9 @@ pub struct TimingArgs {
     /// As one JSON object
     #[arg(long)]
     pub json: bool,
+    /// Take the numbers into docs/cost.md and sizes.toml
+    #[arg(long)]
+    pub write: bool,
     /// Say where the instructions go: this many functions of each interrupt
     #[arg(long, value_name = "FUNCTIONS", num_args = 0..=1, default_missing_value = "20", conflicts_with = "json")]
     pub profile: Option<usize>,
@@ -78,9 +81,18 @@ pub struct FlashArgs {
     /// The board
     #[arg(long, value_enum, default_value = "nucleo-g474re")]
     pub board: Board,
+    /// The system whose image it is
+    #[arg(long, value_enum, default_value = "pmasynrm")]
+    pub system: System,
+    /// A folder of tables/, or the path of any machine folder [default: the system's own]
+    #[arg(long, value_name = "NAME|PATH")]
+    pub machine: Option<String>,
     /// Stay and print the firmware's log
     #[arg(long)]
     pub log: bool,
+    /// Build the image, and only say what probe-rs would be called with
+    #[arg(long)]
+    pub dry_run: bool,
 }
 
 #[cfg(test)]
@@ -106,8 +118,11 @@ mod tests {
             let Command::Flash(args) = Cli::try_parse_from(words).unwrap().command else {
                 panic!("not flash")
             };
-            assert_eq!(args.board, Board::NucleoG474re);
+            assert_eq!((args.board, args.system), (Board::NucleoG474re, System::Traction));
         }
+        let cli = Cli::try_parse_from(["xtask", "flash", "--system", "zs9", "--dry-run"]).unwrap();
+        let Command::Flash(args) = cli.command else { panic!("not flash") };
+        assert_eq!((args.system, args.dry_run), (System::Zs9, true));
         let error = Cli::try_parse_from(["xtask", "flash", "--board", "arduino"]).unwrap_err();
         assert_eq!(error.exit_code(), 2);
     }

@@ -23,8 +23,10 @@ pub struct Sizes {
     pub tables: u64,
     /// All read-only data, the tables among it.
     pub rodata: u64,
-    /// Initialised and zeroed data.
+    /// Initialised and zeroed data, but for the flight recorder.
     pub ram: u64,
+    /// The flight recorder's ring.
+    pub recorder: u64,
     /// What is left of the memory for the stack.
     pub stack: u64,
 }
@@ -131,8 +133,12 @@ impl Image {
             if name.contains("tractive::machine") && is_read_only_data(file, &symbol) {
                 self.sizes.tables += symbol.size();
             }
+            if name.starts_with("tractive::") && name.ends_with("::RECORDER") {
+                self.sizes.recorder += symbol.size();
+            }
             self.symbols.insert(name);
         }
+        self.sizes.ram = self.sizes.ram.saturating_sub(self.sizes.recorder);
         self.sizes.stack = stack_start.zip(stack_end).map_or(0, |(start, end)| start.saturating_sub(end));
         self.close_gaps();
         Ok(())
@@ -275,7 +281,7 @@ pub mod tests {
         assert_eq!(image.function_at(0x106), None);
         assert_eq!(image.half_word(0x104), Some(0x4770));
         assert_eq!(image.half_word(0x106), None);
-        let sizes = Sizes { code: 68 + 6, tables: 48, rodata: 64, ram: 0, stack: 0 };
+        let sizes = Sizes { code: 68 + 6, tables: 48, rodata: 64, ram: 0, recorder: 0, stack: 0 };
         assert_eq!(image.sizes, sizes);
     }
 

@@ -8,6 +8,7 @@ use anyhow::{Result, bail};
 use crate::build::{self, Board, root};
 use crate::cli::FlashArgs;
 use crate::process::{find, succeeds};
+use crate::run::machine_for_build;
 use crate::setup::Setup;
 
 const PROGRAM: &str = "probe-rs";
@@ -15,16 +16,25 @@ const INSTALL: &str = "cargo install probe-rs-tools --locked";
 
 /// The command.
 pub fn run(args: &FlashArgs) -> Result<u8> {
-    if find(PROGRAM).is_none() {
+    if !args.dry_run && find(PROGRAM).is_none() {
         bail!("{PROGRAM} is missing; install it with: {INSTALL}");
     }
-    let image = build::board_image(&Setup::default().toolchain()?, args.board)?;
+    let machine = args.machine.as_deref().map(|machine| machine_for_build(machine, root())).transpose()?;
+    let toolchain = Setup::default().toolchain()?;
+    let image = build::board_image(&toolchain, args.board, args.system, machine.as_ref())?;
     for mut command in commands(args.board, args.log, &image) {
-        if !succeeds(&mut command)? {
+        if args.dry_run {
+            println!("{}", spelled(&command));
+        } else if !succeeds(&mut command)? {
             return Ok(1);
         }
     }
     Ok(0)
+}
+
+fn spelled(command: &Command) -> String {
+    let words = std::iter::once(command.get_program()).chain(command.get_args());
+    words.map(|word| word.to_string_lossy().into_owned()).collect::<Vec<_>>().join(" ")
 }
 
 /// What probe-rs is asked for, one after the other.
@@ -50,17 +60,14 @@ mod tests {
 
     fn words(log: bool) -> Vec<String> {
         let commands = commands(Board::NucleoG474re, log, Path::new("i.elf"));
-        let line = |command: &Command| {
-            let words = command.get_args().map(|word| word.to_string_lossy().into_owned());
-            words.collect::<Vec<_>>().join(" ")
-        };
-        commands.iter().map(line).collect()
+        commands.iter().map(spelled).collect()
     }
 
     #[test]
     fn the_image_is_flashed_and_the_chip_reset_or_watched() {
         let chip = "--chip STM32G474RETx";
-        assert_eq!(words(false), [format!("download {chip} --verify i.elf"), format!("reset {chip}")]);
-        assert_eq!(words(true), [format!("run {chip} i.elf")]);
+        let download = format!("probe-rs download {chip} --verify i.elf");
+        assert_eq!(words(false), [download, format!("probe-rs reset {chip}")]);
+        assert_eq!(words(true), [format!("probe-rs run {chip} i.elf")]);
     }
 }

@@ -52,12 +52,13 @@ pub fn read(path: &Path) -> Result<Image> {
     Image::parse(&bytes).with_context(|| path.display().to_string())
 }
 
-fn rows(sizes: &Sizes) -> [(&'static str, &'static str, u64); 5] {
+fn rows(sizes: &Sizes) -> [(&'static str, &'static str, u64); 6] {
     [
         ("code_bytes", "code (.text and vectors)", sizes.code),
         ("table_bytes", "the machine's tables, by name", sizes.tables),
         ("rodata_bytes", "read-only data, tables included", sizes.rodata),
         ("ram_bytes", "RAM (.data and .bss)", sizes.ram),
+        ("recorder_bytes", "RAM of the flight recorder", sizes.recorder),
         ("stack_bytes", "left for the stack", sizes.stack),
     ]
 }
@@ -77,7 +78,7 @@ fn as_json(sizes: &Sizes) -> serde_json::Value {
 mod tests {
     use super::*;
 
-    const SIZES: Sizes = Sizes { code: 12_345, tables: 20, rodata: 30, ram: 40, stack: 50 };
+    const SIZES: Sizes = Sizes { code: 12_345, tables: 20, rodata: 30, ram: 40, recorder: 45, stack: 50 };
 
     #[test]
     fn the_same_numbers_in_both_forms() {

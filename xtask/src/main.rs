@@ -13,14 +13,17 @@
 //!
 //! The modules: [`cli`] is what may be typed, [`setup`] what has to be installed, [`build`] how cargo is called,
 //! [`run`], [`mod@test`], [`image`], [`timing`] and [`flash`] the commands. An image is read by [`elf`], its instructions by [`thumb`]; [`graph`]
-//! says which function calls which and [`check`] refuses what an image must not hold.
+//! says which function calls which [`check`] refuses what an image must not hold, and [`cells`] looks at what the cells
+//! did under the interrupts, in the [`emulator`].
 
 #![forbid(unsafe_code)]
 
 mod build;
+mod cells;
 mod check;
 mod cli;
 mod elf;
+mod emulator;
 mod flash;
 mod graph;
 mod image;

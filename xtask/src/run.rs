@@ -151,7 +151,7 @@ fn default_out(scenario: &str) -> Result<PathBuf> {
 }
 
 /// A machine as the build script of the firmware takes it: a folder of tables/ by its name, any other by its absolute path.
-fn machine_for_build(machine: &str, root: &Path) -> Result<OsString> {
+pub fn machine_for_build(machine: &str, root: &Path) -> Result<OsString> {
     let is_name = !machine.contains(['/', '\\']) && machine != "." && machine != "..";
     if is_name && root.join("tables").join(machine).is_dir() {
         return Ok(machine.into());

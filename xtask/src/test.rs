@@ -8,7 +8,7 @@ use clap::ValueEnum;
 
 use crate::build::{Board, System, TARGET, cargo};
 use crate::cli::{TestArgs, TimingArgs};
-use crate::process::succeeds;
+use crate::process::{quietly, succeeds};
 use crate::setup::Setup;
 use crate::{build, image};
 
@@ -27,11 +27,15 @@ pub enum Step {
     Host,
     /// The lock-free cells under every interleaving
     Loom,
+    /// The lock-free cells in the interpreter that knows undefined behaviour
+    Miri,
+    /// The lock-free cells in QEMU, interrupted on every instruction
+    Cells,
     /// The image builds
     Image,
     /// No panic within an interrupt's reach, no double precision
     ImageCheck,
-    /// The NUCLEO-G474RE's image builds, with no panic within an interrupt's reach and no double precision
+    /// The NUCLEO-G474RE's images build, with no panic within an interrupt's reach and no double precision
     NucleoImage,
     /// The image builds for every folder of tables/
     Machines,
@@ -96,10 +100,7 @@ fn perform(step: Step, setup: &mut Setup) -> Result<Outcome> {
                 return Ok(Outcome::Skipped(format!("clippy needs rustup's target {TARGET}")));
             }
             let what = ["--target", TARGET, "--package", "tractive", "--lib", "--bins"];
-            // The ZS9's firmware has no board but QEMU's.
-            let features = Board::NucleoG474re.feature();
-            let nucleo = ["--target", TARGET, "--package", "tractive", "--lib", "--bin", "tractive"];
-            let nucleo = [&nucleo[..], &["--features", features]].concat();
+            let nucleo = [&what[..], &["--features", Board::NucleoG474re.feature()]].concat();
             lint(&mut cargo(), &what)? && lint(&mut cargo(), &nucleo)?
         }
         Step::Doc => {
@@ -115,6 +116,14 @@ fn perform(step: Step, setup: &mut Setup) -> Result<Outcome> {
             command.args(["--test", "loom_cells", "--target-dir", "target/loom"]);
             succeeds(&mut command)?
         }
+        Step::Miri => {
+            let Some(mut command) = miri() else {
+                return Ok(Outcome::Skipped("cargo miri is not installed".to_owned()));
+            };
+            command.args(["test", "--package", "tractive", "--test", "cells", "--target-dir", "target/miri"]);
+            succeeds(&mut command)?
+        }
+        Step::Cells => crate::cells::check(setup)?,
         Step::Image => {
             for system in System::ALL {
                 println!("{}", build::image(&setup.toolchain()?, system, None)?.display());
@@ -131,7 +140,15 @@ fn perform(step: Step, setup: &mut Setup) -> Result<Outcome> {
         }
         Step::NucleoImage => {
             let board = Board::NucleoG474re;
-            image::check_board(&build::board_image(&setup.toolchain()?, board)?, board)?
+            let mut good = true;
+            for system in System::ALL {
+                println!("{}:", system.image());
+                good &= image::check_board(
+                    &build::board_image(&setup.toolchain()?, board, system, None)?,
+                    board,
+                )?;
+            }
+            good
         }
         Step::Machines => {
             let toolchain = setup.toolchain()?;
@@ -167,6 +184,20 @@ fn perform(step: Step, setup: &mut Setup) -> Result<Outcome> {
 
 fn lint(command: &mut Command, what: &[&str]) -> Result<bool> {
     succeeds(command.arg("clippy").args(what).args(["--", "--deny", "warnings"]))
+}
+
+/// `cargo miri` of the toolchain in use, else of nightly.
+fn miri() -> Option<Command> {
+    let nightly = || {
+        let mut command = Command::new("rustup");
+        command.current_dir(build::root()).args(["run", "nightly", "cargo"]);
+        command
+    };
+    [cargo, nightly].into_iter().find_map(|candidate| {
+        let mut command = candidate();
+        command.arg("miri");
+        quietly(candidate().args(["miri", "--version"])).then_some(command)
+    })
 }
 
 fn no_component(component: &str) -> Outcome {

@@ -125,7 +125,7 @@ impl Inverter {
         }
     }
 
-    /// The safe state takes over, for good.
+    /// The safe state takes over, until it is left.
     pub fn enter(&mut self, safe: SafeState, tick: Tick) {
         self.safe = Some(safe);
         self.toggles = [None; 3];
@@ -136,6 +136,14 @@ impl Inverter {
                 SafeState::UpperShortCircuit => Order::Upper,
             };
             self.order(phase, order, tick);
+        }
+    }
+
+    /// The safe state is left: all gates off, until the next half takes over.
+    pub fn leave(&mut self, tick: Tick) {
+        self.safe = None;
+        for phase in 0..3 {
+            self.order(phase, Order::Off, tick);
         }
     }
 

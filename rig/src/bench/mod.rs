@@ -7,18 +7,20 @@
 
 pub mod inject;
 mod inverter;
+mod line;
 mod link;
 mod observe;
 mod sensors;
 
 pub use inject::Injection;
 pub use inverter::{Edge, GATES, Inverter, Stuck};
+pub use line::{Commander, LinePlan, LineSide, SlotRow};
 pub use link::{LineFilter, Supply};
 pub use observe::{Limits, Observed, Peaks, Stored};
 pub use sensors::{Converter, Flaws, Sensors};
 
 use crate::plant::Plant;
-use crate::trace::{Row, Switch};
+use crate::trace::{Recording, Row, Switch};
 use inject::{Kind, Spoiler};
 use link::Link;
 use std::collections::VecDeque;
@@ -27,7 +29,9 @@ use tractive::control::{Demand, LinkWindow};
 use tractive::drive::Report;
 use tractive::frames::{Abc, Angle};
 use tractive::modulation::{CarrierPeriod, Mode};
+use tractive::operator::{Feedback, Request, Status};
 use tractive::protection::{LegFaults, SafeState};
+use tractive::recorder::Record;
 use tractive::time::{Clock, Instant};
 
 /// Ticks since the run's beginning.
@@ -67,6 +71,12 @@ pub enum BenchError {
         /// What there is.
         oldest: Option<Tick>,
     },
+    /// The operator asked for a slot that is not there.
+    #[error("the operator's slot of tick {0} was asked for and is not kept")]
+    NoSlot(Tick),
+    /// The operator fell behind.
+    #[error("at {0:.6} s the operator has not finished its slot before the next one")]
+    OperatorLate(f64),
     /// Control fell behind.
     #[error("at {0:.6} s the control interrupt has not reported within its period")]
     ControlLate(f64),
@@ -115,7 +125,10 @@ pub struct Bench {
     lead: Tick,
     end: Tick,
     next: Option<CarrierPeriod>,
-    safe: Option<(Tick, SafeState)>,
+    /// Orders to enter a safe state, or to leave it (`None`), and when they reach the gates.
+    orders: VecDeque<(Tick, Option<SafeState>)>,
+    line: Option<LineSide>,
+    slots: Vec<SlotRow>,
     samples: VecDeque<(Tick, Sample)>,
     next_sample: Tick,
     reports: VecDeque<(Tick, Report)>,
@@ -152,7 +165,9 @@ impl Bench {
             lead,
             end: lead + ticks(settings.duration_s),
             next: Some(first),
-            safe: None,
+            orders: VecDeque::new(),
+            line: None,
+            slots: Vec::new(),
             samples: VecDeque::new(),
             next_sample: settings.clock.control_ticks.into(),
             reports: VecDeque::new(),
@@ -165,6 +180,35 @@ impl Bench {
         }
     }
 
+    /// The same with a line side: the link's voltage is its capacitor's, and the drive has an operator.
+    pub fn with_line(mut self, plan: LinePlan) -> Self {
+        self.line = Some(LineSide::new(plan, &self.clock));
+        self
+    }
+
+    /// Whether the drive has an operator.
+    pub fn is_operated(&self) -> bool {
+        self.line.is_some()
+    }
+
+    /// What is asked of the operator in the slot that began at `instant`, and what the board says.
+    pub fn ask(&mut self, instant: Instant) -> Result<(Request, Feedback), BenchError> {
+        let tick = self.widen(instant);
+        self.line.as_mut().and_then(|line| line.ask(tick)).ok_or(BenchError::NoSlot(tick))
+    }
+
+    /// What the operator told; it holds from `from` on.
+    pub fn told(&mut self, from: Instant, status: Status) -> Result<(), BenchError> {
+        let tick = self.widen(from);
+        if tick < self.now {
+            return Err(BenchError::OperatorLate(self.seconds(tick)));
+        }
+        if let Some(line) = &mut self.line {
+            line.tell(tick, status);
+        }
+        Ok(())
+    }
+
     /// Whether the recording is complete.
     pub fn is_done(&self) -> bool {
         self.now > self.end
@@ -175,10 +219,25 @@ impl Bench {
         self.now as f64 / self.end as f64
     }
 
-    /// The recording: trace, switches of mode, edges; instants in seconds from its beginning.
-    pub fn into_recording(self) -> (Vec<Row>, Vec<Switch>, Vec<Edge>, Tick, f64) {
+    /// The recording: what the bench saw, and what the drive's own recorder holds; instants in seconds from its beginning.
+    pub fn into_recording(self, records: Vec<Record>) -> Recording {
+        let recorded = records.into_iter().map(|record| (self.instant_s(record.at), record)).collect();
         let edges = self.inverter.edges().to_vec();
-        (self.rows, self.switches, edges, self.lead, self.tick_s)
+        Recording {
+            rows: self.rows,
+            switches: self.switches,
+            edges,
+            recorded,
+            slots: self.slots,
+            link: self.line.map(|line| line.balance()),
+            lead: self.lead,
+            tick_s: self.tick_s,
+        }
+    }
+
+    /// An instant near to now, in s from the recording's beginning.
+    pub fn instant_s(&self, instant: Instant) -> f64 {
+        self.seconds(self.widen(instant))
     }
 
     /// The conversions that the control timer triggered at `instant`.
@@ -262,10 +321,26 @@ impl Bench {
 
     /// An interrupt at `instant` orders the safe state.
     pub fn enter(&mut self, instant: Instant, safe: SafeState) {
-        let effective = self.widen(instant) + SAFE_STATE_DELAY;
-        if self.safe.is_none() && !self.inverter.is_safe() {
-            self.safe = Some((effective, safe));
+        if !self.will_be_safe() {
+            self.order(instant, Some(safe));
         }
+    }
+
+    /// The PWM interrupt at `instant` leaves it.
+    pub fn leave(&mut self, instant: Instant) {
+        if self.will_be_safe() {
+            self.order(instant, None);
+        }
+    }
+
+    fn order(&mut self, instant: Instant, order: Option<SafeState>) {
+        let effective = self.widen(instant) + SAFE_STATE_DELAY;
+        self.orders.push_back((effective, order));
+    }
+
+    /// Whether the gates will be in a safe state once every order has reached them.
+    fn will_be_safe(&self) -> bool {
+        self.orders.back().map_or(self.inverter.is_safe(), |(_, order)| order.is_some())
     }
 
     /// The tick of an instant near to now.
@@ -288,8 +363,11 @@ impl Bench {
             if let Some(event) = self.inverter.next_event() {
                 due = due.min(event);
             }
-            if let Some((at, _)) = self.safe {
-                due = due.min(at);
+            if let Some((at, _)) = self.orders.front() {
+                due = due.min(*at);
+            }
+            if let Some(event) = self.line.as_ref().and_then(LineSide::next_event) {
+                due = due.min(event);
             }
             self.integrate(due);
             self.act()?;
@@ -303,7 +381,11 @@ impl Bench {
             let (udc_v, legs) = (self.udc_v(t_s), self.inverter.legs());
             let dt_s = (tick - self.now) as f64 * self.tick_s;
             let before_j = self.plant.energies().electrical_j;
-            self.plant.advance(legs, udc_v, dt_s);
+            if let Some(line) = &mut self.line {
+                self.plant.advance_on(&mut line.link, legs, dt_s);
+            } else {
+                self.plant.advance(legs, udc_v, dt_s);
+            }
             if let Some(link) = &mut self.link {
                 let drawn_j = self.plant.energies().electrical_j - before_j;
                 link.advance(drawn_j, dt_s, self.sensors.udc_v(t_s), self.spoiler.supply(t_s));
@@ -321,9 +403,10 @@ impl Bench {
 
     /// The link's true voltage, in V.
     fn udc_v(&self, t_s: f64) -> f64 {
-        match &self.link {
-            Some(link) => link.voltage_v(),
-            None => self.sensors.udc_v(t_s),
+        match (&self.line, &self.link) {
+            (Some(line), _) => line.link.udc_v(),
+            (None, Some(link)) => link.voltage_v(),
+            (None, None) => self.sensors.udc_v(t_s),
         }
     }
 
@@ -341,6 +424,13 @@ impl Bench {
 
     fn act(&mut self) -> Result<(), BenchError> {
         let now = self.now;
+        let t_s = self.seconds(now);
+        if let Some(row) = self.line.as_mut().and_then(|line| line.act(now, t_s))
+            && now >= self.lead
+            && now <= self.end
+        {
+            self.slots.push(row);
+        }
         if now == self.observed.from {
             self.observed.carrier_ticks = 2 * Tick::from(self.inverter.half().period_ticks);
             match self.spoiler.kind(self.seconds(now)) {
@@ -351,14 +441,19 @@ impl Bench {
                 _ => {}
             }
         }
-        if let Some((at, safe)) = self.safe
+        while let Some((at, order)) = self.orders.front().copied()
             && at <= now
         {
-            self.safe = None;
-            self.inverter.enter(safe, now);
-            let udc_v = self.udc_v(self.seconds(now));
-            let unloaded_v = self.unloaded_v(now);
-            self.observed.enters(now, safe, Stored::of(&self.plant, udc_v, unloaded_v));
+            self.orders.pop_front();
+            match order {
+                Some(safe) => {
+                    self.inverter.enter(safe, now);
+                    let udc_v = self.udc_v(self.seconds(now));
+                    let unloaded_v = self.unloaded_v(now);
+                    self.observed.enters(now, safe, Stored::of(&self.plant, udc_v, unloaded_v));
+                }
+                None => self.inverter.leave(now),
+            }
         }
         self.inverter.act(now);
         if now == self.inverter.half_end() {
@@ -385,11 +480,15 @@ impl Bench {
         }
         let t_s = self.seconds(self.now);
         let (demand, enable) = self.operator.demand(t_s);
-        let mut measured = self.sensors.measure(&self.plant, t_s);
-        measured.udc_v = self.udc_v(t_s) as f32;
+        let udc_v = self.udc_v(t_s);
+        let mut measured = self.sensors.measure(&self.plant, udc_v, t_s);
         measured.currents_a = self.read_currents(measured.currents_a);
+        let hardware = self.line.as_ref().and_then(|line| line.hardware(t_s));
+        if self.line.as_mut().is_some_and(|line| line.sampled(self.now, t_s)) {
+            return Err(BenchError::OperatorLate(t_s));
+        }
         let mut sample =
-            Sample { measured, demand, enable, window: LinkWindow::OPEN, acknowledge: 0, hardware: None };
+            Sample { measured, demand, enable, window: LinkWindow::OPEN, acknowledge: 0, hardware };
         self.spoiler.control(t_s, &mut sample);
         self.samples.push_back((self.now, sample));
         self.next_sample = self.now + Tick::from(self.clock.control_ticks);
@@ -442,6 +541,7 @@ impl Bench {
                 map_error: report.map_error.into(),
                 mode,
                 trip: report.trip,
+                status: self.line.as_ref().and_then(LineSide::status),
             });
         }
         self.rows_done += 1;

@@ -92,15 +92,15 @@ impl Sensors {
         Abc { a, b, c }
     }
 
-    /// All that control measures.
-    pub fn measure(&mut self, plant: &Plant, t_s: f64) -> Measurements {
+    /// All that control measures, on a link of this true voltage, in V.
+    pub fn measure(&mut self, plant: &Plant, udc_v: f64, t_s: f64) -> Measurements {
         let turns = plant.angle_turns() + self.converter.flaws.angle_error_deg / 360.0;
         if self.converter.flaws.freeze_at_s.is_none_or(|freeze_s| t_s < freeze_s) {
             self.told_a = self.currents(plant);
         }
         Measurements {
             currents_a: self.told_a,
-            udc_v: self.udc_v(t_s) as f32,
+            udc_v: udc_v as f32,
             angle: Angle((turns.rem_euclid(1.0) * 4_294_967_296.0).round() as u64 as u32),
         }
     }

@@ -4,12 +4,14 @@
 //! `L(i) di/dt = u − R i − jω ψ(i)`. Amplitude-invariant, peak, electrical; d along the magnet flux; currents positive into the
 //! machine. The legs' voltages count from the link's midpoint.
 
+mod dc_link;
 mod legs;
 mod rotor;
 mod speed;
 mod stator;
 pub mod zs9;
 
+pub use dc_link::{DcLink, DcLinkSettings, LinkEnergies, LinkSwitches, Source};
 pub use legs::Leg;
 pub use rotor::{Rotor, Turning};
 pub use speed::SpeedSource;
@@ -60,6 +62,8 @@ pub struct Plant {
 
 /// What is integrated: id, iq, electrical energy, copper loss, the torque's impulse.
 type State = [f64; 5];
+/// The same, and of the link its voltage and its five energies.
+type LinkedState = [f64; 11];
 
 impl Plant {
     /// At rest electrically, angle zero, turning as the speed source says.
@@ -142,40 +146,95 @@ impl Plant {
         }
     }
 
-    /// Runge–Kutta, fourth order. The frame turns during the step; the speed changes linearly at most.
+    /// Lets time pass with the legs and the link's switches unchanged, on a link whose voltage follows.
+    pub fn advance_on(&mut self, link: &mut DcLink, legs: [Leg; 3], dt_s: f64) {
+        let open = legs.contains(&Leg::Open);
+        let mut left = dt_s;
+        while left > 0.0 {
+            let longest = if open {
+                self.clamp.step_s(link.udc_v().max(1.0), self.currents_abc(), &legs).min(LONGEST_STEP_S)
+            } else {
+                LONGEST_STEP_S
+            };
+            let steps = (left / longest).ceil().max(1.0);
+            let step = if open { left.min(longest) } else { left / steps };
+            self.step_on(link, legs, step);
+            left = if steps <= 1.0 { 0.0 } else { left - step };
+        }
+    }
+
     fn step(&mut self, legs: [Leg; 3], udc_v: f64, dt_s: f64) {
+        let y0: State = [self.id_a, self.iq_a, 0.0, 0.0, 0.0];
+        let y = self
+            .integrate(&y0, dt_s, |y, frame, omega| self.slope((y[0], y[1]), legs, udc_v, frame, omega).0);
+        self.finish(y, dt_s);
+    }
+
+    /// The same with the link's voltage as one more state: what the legs take of its current is what they give the machine.
+    fn step_on(&mut self, link: &mut DcLink, legs: [Leg; 3], dt_s: f64) {
+        let y0: LinkedState = [self.id_a, self.iq_a, 0.0, 0.0, 0.0, link.udc_v(), 0.0, 0.0, 0.0, 0.0, 0.0];
+        let [id, iq, electrical, copper, impulse, udc_v, energies @ ..] =
+            self.integrate(&y0, dt_s, |y, frame, omega| {
+                let ([id, iq, electrical, copper, impulse], current) =
+                    self.slope((y[0], y[1]), legs, y[5], frame, omega);
+                let [udc, source, path, discharge, chopper, inverter] = link.slopes(y[5], current);
+                [id, iq, electrical, copper, impulse, udc, source, path, discharge, chopper, inverter]
+            });
+        link.finish(udc_v, energies);
+        self.finish([id, iq, electrical, copper, impulse], dt_s);
+    }
+
+    fn finish(&mut self, [id, iq, electrical_j, copper_j, impulse]: State, dt_s: f64) {
+        (self.id_a, self.iq_a) = (id, iq);
+        self.energies.electrical_j += electrical_j;
+        self.energies.copper_j += copper_j;
+        self.energies.mechanical_j += self.rotor.finish(impulse, dt_s);
+    }
+
+    /// Runge–Kutta, fourth order. The frame turns during the step; the speed changes linearly at most.
+    fn integrate<const N: usize>(
+        &self,
+        y0: &[f64; N],
+        dt_s: f64,
+        slope: impl Fn(&[f64; N], (f64, f64), f64) -> [f64; N],
+    ) -> [f64; N] {
         let turning = self.rotor.turning(|| self.torque_nm(), dt_s);
         let (sin0, cos0) = (self.rotor.angle_turns() * TAU).sin_cos();
         let (sin_half, cos_half) = turning.turned(0.5 * dt_s).sin_cos();
         let (sin1, cos1) = (sin0 * cos_half + cos0 * sin_half, cos0 * cos_half - sin0 * sin_half);
         let (sin_whole, cos_whole) = turning.turned(dt_s).sin_cos();
         let (sin2, cos2) = (sin0 * cos_whole + cos0 * sin_whole, cos0 * cos_whole - sin0 * sin_whole);
-        let y0: State = [self.id_a, self.iq_a, 0.0, 0.0, 0.0];
-        let slope =
-            |y: &State, sin: f64, cos: f64, t: f64| self.slope(y, legs, udc_v, (sin, cos), turning.omega(t));
-        let k1 = slope(&y0, sin0, cos0, 0.0);
-        let k2 = slope(&along(&y0, &k1, 0.5 * dt_s), sin1, cos1, 0.5 * dt_s);
-        let k3 = slope(&along(&y0, &k2, 0.5 * dt_s), sin1, cos1, 0.5 * dt_s);
-        let k4 = slope(&along(&y0, &k3, dt_s), sin2, cos2, dt_s);
-        let mut y = y0;
+        let half = turning.omega(0.5 * dt_s);
+        let k1 = slope(y0, (sin0, cos0), turning.omega(0.0));
+        let k2 = slope(&along(y0, &k1, 0.5 * dt_s), (sin1, cos1), half);
+        let k3 = slope(&along(y0, &k2, 0.5 * dt_s), (sin1, cos1), half);
+        let k4 = slope(&along(y0, &k3, dt_s), (sin2, cos2), turning.omega(dt_s));
+        let mut y = *y0;
         for (index, value) in y.iter_mut().enumerate() {
             *value += dt_s / 6.0 * (k1[index] + 2.0 * (k2[index] + k3[index]) + k4[index]);
         }
-        [self.id_a, self.iq_a, _, _, _] = y;
-        self.energies.electrical_j += y[2];
-        self.energies.copper_j += y[3];
-        self.energies.mechanical_j += self.rotor.finish(y[4], dt_s);
+        y
     }
 
-    fn slope(&self, y: &State, legs: [Leg; 3], udc_v: f64, (sin, cos): (f64, f64), omega: f64) -> State {
-        let (id, iq) = (y[0], y[1]);
+    /// Rates of change, and the current that the legs take from the link.
+    fn slope(
+        &self,
+        (id, iq): (f64, f64),
+        legs: [Leg; 3],
+        udc_v: f64,
+        (sin, cos): (f64, f64),
+        omega: f64,
+    ) -> (State, f64) {
         let currents = phases(id * cos - iq * sin, id * sin + iq * cos);
         let mut volts = [0.0; 3];
+        let mut link_a = 0.0;
         for ((volt, leg), current) in volts.iter_mut().zip(legs).zip(currents) {
-            *volt = match leg {
-                Leg::Upper => 0.5 * udc_v,
-                Leg::Lower => -0.5 * udc_v,
-                Leg::Open => self.clamp.voltage(current, udc_v),
+            (*volt, link_a) = match leg {
+                Leg::Upper => (0.5 * udc_v, link_a + current),
+                Leg::Lower => (-0.5 * udc_v, link_a),
+                Leg::Open => {
+                    (self.clamp.voltage(current, udc_v), link_a + self.clamp.share(current) * current)
+                }
             };
         }
         let [a, b, c] = volts;
@@ -183,11 +242,11 @@ impl Plant {
         let (ud, uq) = (alpha * cos + beta * sin, beta * cos - alpha * sin);
         let StatorSlopes { id_a_s, iq_a_s, electrical_w, copper_w, torque_nm } =
             self.stator.slopes((id, iq), (ud, uq), omega);
-        [id_a_s, iq_a_s, electrical_w, copper_w, torque_nm]
+        ([id_a_s, iq_a_s, electrical_w, copper_w, torque_nm], link_a)
     }
 }
 
-fn along(y: &State, slope: &State, dt_s: f64) -> State {
+fn along<const N: usize>(y: &[f64; N], slope: &[f64; N], dt_s: f64) -> [f64; N] {
     let mut out = *y;
     for (value, rate) in out.iter_mut().zip(slope) {
         *value += dt_s * rate;

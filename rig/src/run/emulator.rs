@@ -1,4 +1,4 @@
-//! The emulator and its three FIFOs, whichever firmware runs in it.
+//! The emulator and its four FIFOs, whichever firmware runs in it.
 
 use anyhow::{Context, Result, bail};
 use std::fs::{File, OpenOptions};
@@ -59,6 +59,7 @@ pub(crate) fn emulate(
 pub(crate) struct Answers {
     control: File,
     pwm: File,
+    idle: File,
 }
 
 impl Answers {
@@ -71,9 +72,14 @@ impl Answers {
     pub(crate) fn pwm(&mut self, block: &Block) -> Result<()> {
         Ok(self.pwm.write_all(&bytes(block))?)
     }
+
+    /// To the idle loop.
+    pub(crate) fn idle(&mut self, block: &Block) -> Result<()> {
+        Ok(self.idle.write_all(&bytes(block))?)
+    }
 }
 
-/// The three FIFOs. Both ends of each are held open, so that nobody waits for the other to open its end.
+/// The four FIFOs. Both ends of each are held open, so that nobody waits for the other to open its end.
 struct Link {
     requests: File,
     answers: Answers,
@@ -93,7 +99,11 @@ impl Link {
             .with_context(|| format!("cannot make the FIFO {}", path.display()))?;
             Ok(OpenOptions::new().read(true).write(true).open(&path)?)
         };
-        let answers = Answers { control: open("control-answers")?, pwm: open("pwm-answers")? };
+        let answers = Answers {
+            control: open("control-answers")?,
+            pwm: open("pwm-answers")?,
+            idle: open("idle-answers")?,
+        };
         Ok(Self { requests: open("requests")?, answers })
     }
 

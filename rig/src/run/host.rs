@@ -9,21 +9,31 @@ use tractive::control::{Demand, LinkWindow, Measurements};
 use tractive::drive::Report;
 use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
 use tractive::frames::{Abc, Angle};
-use tractive::machine::Tables;
+use tractive::machine::{Ratings, Tables};
 use tractive::modulation::CarrierPeriod;
+use tractive::operator::{self, Desk, Feedback, Line, OperatorPort, Request, Slot, Status, slot_s};
 use tractive::protection::{LegFaults, SafeState, Trip};
-use tractive::time::Instant;
+use tractive::recorder::Recorder;
+use tractive::time::{Clock, Instant};
 
 /// The bench behind a board's ports; the first error ends the run.
 struct Port<'a> {
     bench: &'a mut Bench,
     without: Option<Without>,
+    desk: &'a Desk,
+    ratings: &'a Ratings,
     error: Option<BenchError>,
 }
 
 impl ControlPort for Port<'_> {
     fn sample(&mut self, now: Instant) -> Sample {
-        self.bench.control_sample(now).unwrap_or_else(|error| {
+        let sample = self.bench.control_sample(now);
+        let sample = if self.bench.is_operated() {
+            sample.map(|sample| self.desk.permit(now).applied_to(sample))
+        } else {
+            sample
+        };
+        sample.unwrap_or_else(|error| {
             self.error = Some(error);
             let measured = Measurements { currents_a: Abc::default(), udc_v: 0.0, angle: Angle::ZERO };
             Sample {
@@ -46,6 +56,7 @@ impl ControlPort for Port<'_> {
     }
 
     fn report(&mut self, now: Instant, report: &Report) {
+        self.desk.tell(now, report);
         self.bench.control_report(now, *report);
     }
 
@@ -71,9 +82,29 @@ impl PwmPort for Port<'_> {
         self.bench.enter(now, safe);
     }
 
+    fn leave(&mut self, now: Instant) -> bool {
+        self.bench.leave(now);
+        true
+    }
+
     fn leg_faults(&mut self) -> LegFaults {
         let found = self.bench.leg_faults();
         self.without.map_or(found, |without| without.leg_faults(found))
+    }
+}
+
+impl OperatorPort for Port<'_> {
+    fn ask(&mut self, at: Instant) -> (Request, Feedback) {
+        self.bench.ask(at).unwrap_or_else(|error| {
+            self.error = Some(error);
+            (Request::idle(self.ratings), Feedback::default())
+        })
+    }
+
+    fn tell(&mut self, from: Instant, status: &Status) {
+        if let Err(error) = self.bench.told(from, *status) {
+            self.error = Some(error);
+        }
     }
 }
 
@@ -84,25 +115,32 @@ pub fn run_on_host(
     tables: &'static Tables,
     settings: Settings,
     first_half_ticks: u32,
+    line: Option<Line>,
 ) -> Result<Recording, BenchError> {
+    let recorder = Recorder::new();
     let mut progress = Progress::new(name);
-    let mut tasks = Tasks::new(tables, settings, first_half_ticks);
+    let mut tasks = Tasks::new(tables, settings, first_half_ticks).recorded_by(&recorder).operated_on(line);
     tasks.drive(&mut bench, |bench| {
         progress.show(bench.progress());
         true
     })?;
-    Ok(super::record(bench))
+    let records = (0..).map_while(|index| recorder.read(index)).collect();
+    Ok(bench.into_recording(records))
 }
 
 /// Both tasks and the cells between them.
-pub struct Tasks {
+pub struct Tasks<'a> {
     control: ControlTask,
     pwm: PwmTask,
-    shared: Shared,
+    shared: Shared<'a>,
+    desk: Desk,
+    slot: Slot,
+    operator: operator::Settings<'static>,
+    clock: Clock,
     without: Option<Without>,
 }
 
-impl Tasks {
+impl<'a> Tasks<'a> {
     /// Before their first interrupts.
     pub fn new(tables: &'static Tables, settings: Settings, first_half_ticks: u32) -> Self {
         let first_control = Instant(settings.clock.control_ticks);
@@ -110,8 +148,24 @@ impl Tasks {
             control: ControlTask::new(tables, settings, first_control),
             pwm: PwmTask::new(tables, settings, Instant(first_half_ticks)).after_halves_of(first_half_ticks),
             shared: Shared::new(),
+            desk: Desk::new(),
+            slot: Slot::new(),
+            operator: operator::Settings::rated(&tables.ratings, slot_s(&settings.clock), None),
+            clock: settings.clock,
             without: None,
         }
+    }
+
+    /// The same with an operator who switches the line side, if the bench has one to ask.
+    pub fn operated_on(mut self, line: Option<Line>) -> Self {
+        self.operator.line = line;
+        self
+    }
+
+    /// The same with a flight recorder.
+    pub fn recorded_by(mut self, recorder: &'a Recorder) -> Self {
+        self.shared = Shared::recorded_by(recorder);
+        self
     }
 
     /// The same with a protection off; its levels are the tables' business.
@@ -135,7 +189,8 @@ impl Tasks {
         while !bench.is_done() {
             let (control_at, pwm_at) = (self.control.next_call(), self.pwm.next_call());
             let has_control = bench.has_control(control_at);
-            let mut port = Port { bench, without: self.without, error: None };
+            let (desk, ratings) = (&self.desk, self.operator.ratings);
+            let mut port = Port { bench, desk, ratings, without: self.without, error: None };
             // At equal instants the PWM interrupt comes first: it has the higher priority.
             if control_at.reached(pwm_at) || !has_control {
                 self.pwm.run(&mut port, &self.shared);
@@ -144,6 +199,10 @@ impl Tasks {
                     self.pwm.revise(&mut port, &self.shared);
                 }
                 self.control.run(&mut port, &self.shared);
+                // The idle loop goes on where the interrupt ends.
+                if port.bench.is_operated() {
+                    self.slot.run(&self.desk, &mut port, &self.operator, &self.clock);
+                }
             }
             if let Some(error) = port.error {
                 return Err(error);

@@ -9,18 +9,11 @@ pub(crate) use emulator::emulate;
 pub use host::{Tasks, run_on_host};
 pub use qemu::run_in_qemu;
 
-use crate::bench::Bench;
-use crate::trace::Recording;
 use indicatif::{ProgressBar, ProgressStyle};
 use tractive::time::Clock;
 
 /// The clock of the emulated board: 25 MHz ticks, control at 10 kHz. The host runs on the same.
 pub const CLOCK: Clock = Clock::new(25_000_000, 2_500);
-
-fn record(bench: Bench) -> Recording {
-    let (rows, switches, edges, lead, tick_s) = bench.into_recording();
-    Recording { rows, switches, edges, lead, tick_s }
-}
 
 /// A bar on a terminal; in a pipe indicatif draws none.
 pub(crate) struct Progress {

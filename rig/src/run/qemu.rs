@@ -1,4 +1,4 @@
-//! The drive in QEMU: the image's own interrupts, in lockstep with the bench over three FIFOs.
+//! The drive in QEMU: the image's own interrupts, in lockstep with the bench over four FIFOs.
 
 use super::Progress;
 use super::emulator::{Emulator, emulate};
@@ -11,7 +11,7 @@ use tractive::modulation::Mode;
 
 /// Runs until the recording is complete.
 pub fn run_in_qemu(name: &str, mut bench: Bench, setup: Setup, emulator: &Emulator) -> Result<Recording> {
-    let mut calls = Calls::default();
+    let (mut calls, mut records) = (Calls::default(), Vec::new());
     let mut progress = Progress::new(name);
     let outcome = emulate(emulator, |block, answers| {
         let Some(request) = Request::from_block(block) else {
@@ -23,9 +23,6 @@ pub fn run_in_qemu(name: &str, mut bench: Bench, setup: Setup, emulator: &Emulat
                 let sample = bench.control_sample(at)?;
                 let done = bench.is_done();
                 answers.control(&link::sample_to_block(&sample, done))?;
-                if done {
-                    return Ok(true);
-                }
             }
             Request::ControlReport(at, report) => {
                 calls.control(&report);
@@ -37,6 +34,14 @@ pub fn run_in_qemu(name: &str, mut bench: Bench, setup: Setup, emulator: &Emulat
                 bench.play(at, half);
             }
             Request::Enter(at, safe) => bench.enter(at, safe),
+            Request::Leave(at) => bench.leave(at),
+            Request::Ask(at) => {
+                let (asked, feedback) = bench.ask(at)?;
+                answers.idle(&link::asked_to_block(&asked, &feedback))?;
+            }
+            Request::Tell(from, status) => bench.told(from, status)?,
+            Request::Recorded(record) => records.push(record),
+            Request::End => return Ok(true),
             Request::Dead => bail!("the firmware stopped in a panic or a HardFault, gates off"),
         }
         progress.show(bench.progress());
@@ -46,7 +51,7 @@ pub fn run_in_qemu(name: &str, mut bench: Bench, setup: Setup, emulator: &Emulat
         std::fs::write(path, &calls.lines).with_context(|| path.display().to_string())?;
     }
     outcome?;
-    Ok(super::record(bench))
+    Ok(bench.into_recording(records))
 }
 
 /// What every interrupt was about, in the order in which they ended.

@@ -1,10 +1,14 @@
 //! What is driven, and what is to be seen.
 
+mod acknowledge;
 mod characteristic;
+mod chopper;
 mod full_step;
+mod line;
 mod link_steps;
 mod load_steps;
 mod mode_borders;
+mod precharge;
 mod restart;
 mod reversal;
 mod script;
@@ -13,18 +17,19 @@ mod sweep;
 mod timing;
 
 use crate::analysis::Figures;
-use crate::bench::{self, Bench, Limits, Operator, Supply};
+use crate::bench::{self, Bench, Limits, LinePlan, Operator, Supply};
 use crate::machine::Machine;
 use crate::options::{On, RunOptions};
-use crate::plant::{Plant, PlantSettings, SpeedSource};
+use crate::plant::{DcLinkSettings, Plant, PlantSettings, SpeedSource};
 use crate::report::Page;
 use crate::run::{self, CLOCK};
 use crate::trace::Recording;
 use anyhow::{Context, Result};
 use tractive::control::Gains;
 use tractive::drive::traction::Settings;
-use tractive::link::Setup;
+use tractive::link::{LineTimes, Setup};
 use tractive::modulation::Devices;
+use tractive::operator::Line;
 
 /// The usual lead, in s.
 const LEAD_S: f64 = 0.1;
@@ -51,6 +56,10 @@ pub trait Scenario {
     fn figure(&self) -> &'static str;
     /// What is driven.
     fn plan(&self, options: &RunOptions, machine: &Machine) -> Plan;
+    /// The line side, where the scenario is about it; otherwise the link is stiff and the drive is commanded directly.
+    fn line(&self, _options: &RunOptions, _machine: &Machine) -> Option<LinePlan> {
+        None
+    }
     /// The figures to report.
     fn figures(&self, recording: &Recording, options: &RunOptions, machine: &Machine) -> Figures;
     /// The plots to draw.
@@ -69,6 +78,9 @@ pub fn all() -> Vec<Box<dyn Scenario>> {
         Box::new(reversal::Reversal),
         Box::new(restart::Restart),
         Box::new(link_steps::LinkSteps),
+        Box::new(precharge::Precharge),
+        Box::new(chopper::Chopper),
+        Box::new(acknowledge::Acknowledge),
         Box::new(timing::Timing),
     ]
 }
@@ -88,12 +100,14 @@ pub fn find(name: &str) -> Result<Box<dyn Scenario>> {
 /// Drives a scenario.
 pub fn drive(scenario: &dyn Scenario, options: &RunOptions, machine: &Machine) -> Result<Recording> {
     let plan = scenario.plan(options, machine);
+    let line_plan = scenario.line(options, machine);
     let ticks = |microseconds: f64| (microseconds * 1e-6 * f64::from(CLOCK.ticks_per_s)).round() as u32;
     let setup = Setup {
         min_pulse_ticks: ticks(options.min_pulse_us),
         // What the firmware compensates.
         dead_time_ticks: if options.uncompensated { 0 } else { ticks(options.dead_time_us) },
         pwm_delay_ticks: ticks(options.pwm_delay_us),
+        line: line_plan.as_ref().map(|plan| times(&plan.link)),
     };
     let devices = Devices::new(
         setup.min_pulse_ticks,
@@ -122,10 +136,16 @@ pub fn drive(scenario: &dyn Scenario, options: &RunOptions, machine: &Machine) -
             limits: Limits::NONE,
         },
     );
+    let line =
+        setup.line.map(|times| Line::rated(&machine.tables.ratings, times.precharge_s, times.discharge_s));
+    let bench = match line_plan {
+        Some(plan) => bench.with_line(plan),
+        None => bench,
+    };
     match options.on {
         On::Host => {
             let settings = Settings { clock: CLOCK, devices, gains: Gains::DEFAULT };
-            Ok(run::run_on_host(scenario.name(), bench, machine.tables, settings, first_half_ticks)?)
+            Ok(run::run_on_host(scenario.name(), bench, machine.tables, settings, first_half_ticks, line)?)
         }
         On::Qemu => run::run_in_qemu(scenario.name(), bench, setup, &options.emulator()?),
     }
@@ -141,4 +161,10 @@ fn plant(plan: &Plan, options: &RunOptions, machine: &Machine) -> Plant {
             resistance_scale: 1.0 + options.rs_error / 100.0,
         },
     )
+}
+
+/// What the operator has to know of a link.
+fn times(link: &DcLinkSettings) -> LineTimes {
+    let seconds = |ohm: f64| (ohm * link.capacitance_f) as f32;
+    LineTimes { precharge_s: seconds(link.precharge_ohm), discharge_s: seconds(link.discharge_ohm) }
 }

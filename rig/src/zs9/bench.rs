@@ -169,6 +169,11 @@ impl Bench {
         }
     }
 
+    /// The motors' true speeds, in r/min.
+    pub fn speeds_rpm(&self) -> [f64; 2] {
+        self.plant.motors().each_ref().map(|motor| motor.speed_rpm())
+    }
+
     /// Whether the recording is complete.
     pub fn is_done(&self) -> bool {
         self.rows.len() >= self.rows_wanted

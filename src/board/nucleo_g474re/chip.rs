@@ -6,7 +6,9 @@ use super::power_stage::CORE_HZ;
 use super::registers::Registers;
 use super::start::{self, Found, Plan, StartError, Timeout, Wait};
 use super::watchdog::Pulse;
+use super::zs9;
 use crate::drive::Report;
+use crate::recorder::{Record, Recorder};
 use cortex_m::peripheral::NVIC;
 use defmt_rtt as _;
 pub use stm32_metapac::Interrupt;
@@ -14,21 +16,27 @@ pub use stm32_metapac::Interrupt;
 /// The drive's operator.
 pub static OPERATOR: Operator = Operator::new();
 
+/// The drive's flight recorder.
+pub static RECORDER: Recorder = Recorder::new();
+
 /// What the interrupts tell the watchdog.
 pub static PULSE: Pulse = Pulse::new();
 
 unsafe extern "C" {
     fn TIM1_UP_TIM16();
+    fn TIM2();
     fn TIM3();
     fn DefaultHandler();
 }
 
-/// The vector table's device part. Every entry leads somewhere; those never unmasked to the default handler.
+/// The vector table's device part. Every entry leads somewhere; those that a firmware does not define, and all others, to the
+/// default handler.
 #[unsafe(link_section = ".vector_table.interrupts")]
 #[unsafe(no_mangle)]
 pub static __INTERRUPTS: [unsafe extern "C" fn(); 102] = {
     let mut table: [unsafe extern "C" fn(); 102] = [DefaultHandler; 102];
     table[Interrupt::TIM1_UP_TIM16 as usize] = TIM1_UP_TIM16;
+    table[Interrupt::TIM2 as usize] = TIM2;
     table[Interrupt::TIM3 as usize] = TIM3;
     table
 };
@@ -44,7 +52,7 @@ unsafe impl critical_section::Impl for Unlocked {
 }
 
 /// Waits by counting cycles.
-struct Cycles;
+pub(super) struct Cycles;
 
 impl Wait for Cycles {
     fn until(&mut self, done: &mut dyn FnMut() -> bool) -> Result<(), Timeout> {
@@ -74,18 +82,23 @@ pub fn prepare(plan: Plan) -> Result<Found, StartError> {
 
 /// Starts both timers and unmasks their interrupts: PWM preempts control.
 pub fn run() {
+    unmask(Interrupt::TIM1_UP_TIM16, Interrupt::TIM3);
+    start::run(&Registers::CHIP);
+    defmt::info!("running");
+}
+
+/// Lets both interrupts come. Call it once.
+pub(super) fn unmask(pwm: Interrupt, control: Interrupt) {
     // SAFETY: the only use of the core peripherals, before any interrupt is unmasked.
     let mut core = unsafe { cortex_m::Peripherals::steal() };
     // SAFETY: priorities are changed while both interrupts are masked; no code relies on a priority ceiling. After that
     // both may come: their handlers share nothing but cells and registers that each writes as the modules say.
     unsafe {
-        core.NVIC.set_priority(Interrupt::TIM1_UP_TIM16, 0x40);
-        core.NVIC.set_priority(Interrupt::TIM3, 0x80);
-        NVIC::unmask(Interrupt::TIM1_UP_TIM16);
-        NVIC::unmask(Interrupt::TIM3);
+        core.NVIC.set_priority(pwm, 0x40);
+        core.NVIC.set_priority(control, 0x80);
+        NVIC::unmask(pwm);
+        NVIC::unmask(control);
     }
-    start::run(&Registers::CHIP);
-    defmt::info!("running");
 }
 
 /// Makes the PWM interrupt come at once, between two boundaries.
@@ -96,11 +109,21 @@ pub fn revise_pulses() {
     cortex_m::asm::isb();
 }
 
-/// The idle loop, forever: feeds the watchdog, tells what has changed.
+/// The idle loop, forever: feeds the watchdog, tells what has changed, and after a fault what the flight recorder holds.
 pub fn idle() -> ! {
-    let (mut told, mut broken) = (None, false);
+    let (mut told, mut broken, mut records_told) = (None, false, 0);
     loop {
-        PULSE.feed_if_both_ran(&Registers::CHIP);
+        // One record a meal: a log that nobody hurries to read holds few.
+        if PULSE.feed_if_both_ran(&Registers::CHIP) {
+            match RECORDER.read(records_told) {
+                Some(record) => {
+                    tell(&record);
+                    records_told += 1;
+                }
+                None if !RECORDER.is_frozen() => records_told = 0,
+                None => {}
+            }
+        }
         if !broken && Registers::CHIP.legs.is_tripped() {
             broken = true;
             defmt::error!("gates off by a break: hardware, or the fault that follows");
@@ -115,9 +138,28 @@ pub fn idle() -> ! {
     }
 }
 
+fn tell(record: &Record) {
+    let Record { at, currents_a, udc_v, angle, id_a, iq_a, voltage_v, state } = *record;
+    defmt::info!(
+        "{} ticks: {} {} {} A, {} V, angle {=u32:#x}; wanted {} {} A, {} V; {} {}",
+        at.0,
+        currents_a.a,
+        currents_a.b,
+        currents_a.c,
+        udc_v,
+        angle.0,
+        id_a,
+        iq_a,
+        voltage_v,
+        state.mode.name(),
+        state.fault.map_or("", |fault| fault.name()),
+    );
+}
+
 /// Gates off for good, whatever state the program is in, then nothing more; the watchdog resets the chip if it runs.
 pub fn die() -> ! {
-    Registers::CHIP.legs.trip();
+    // All timers that may have gates, of whichever drive.
+    zs9::start::bridge(&Registers::CHIP).outputs().trip();
     loop {
         cortex_m::asm::nop();
     }

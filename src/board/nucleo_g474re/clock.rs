@@ -50,24 +50,31 @@ pub fn enable_peripherals(registers: &Registers) {
         w.set_gpioaen(true);
         w.set_gpioben(true);
         w.set_gpiocen(true);
+        w.set_gpioden(true);
         w.set_adc12en(true);
+        w.set_adc345en(true);
         w.set_dac3en(true);
         w.set_dac4en(true);
     });
     rcc.apb1enr1().modify(|w| {
+        w.set_tim2en(true);
         w.set_tim3en(true);
         w.set_tim4en(true);
+        w.set_spi3en(true);
     });
     rcc.apb2enr().modify(|w| {
         w.set_syscfgen(true);
         w.set_tim1en(true);
         w.set_tim8en(true);
+        w.set_tim20en(true);
     });
     dbgmcu.apb2fzr().modify(|w| {
         w.set_tim1(true);
         w.set_tim8(true);
+        w.set_tim20(true);
     });
     dbgmcu.apb1lfzr().modify(|w| {
+        w.set_tim2(true);
         w.set_tim3(true);
         w.set_iwdg(true);
     });

@@ -10,21 +10,46 @@ use stm32_metapac::{comp, dac};
 /// Numbers of the comparators that break the PWM timers.
 pub const WATCHING: [usize; 6] = [1, 2, 3, 4, 6, 7];
 
-/// A comparator: its number, which of its two inputs the current is on, and whether it watches the lower threshold.
-/// The inverting input of 1 and 3 is DAC3 channel 1, of 2 and 4 DAC3 channel 2, of 6 DAC4 channel 2, of 7 DAC4 channel 1.
-const INPUTS: [(usize, bool, bool); 6] = [
-    (1, false, false),
-    (3, true, false),
-    (6, false, false),
-    (2, false, true),
-    (4, false, true),
-    (7, false, true),
+/// What a comparator looks at.
+#[derive(Clone, Copy, Debug)]
+pub struct Watch {
+    /// COMP1 ..= COMP7.
+    pub number: usize,
+    /// The wire is on the second of its two inputs.
+    pub second_input: bool,
+    /// It breaks below its threshold, not above.
+    pub below: bool,
+    /// Its threshold: a DAC (that of 1 and 3 is DAC3 channel 1, of 2 and 4 DAC3 channel 2, of 6 DAC4 channel 2, of 7 DAC4
+    /// channel 1), or the internal reference of 1.2 V.
+    pub threshold: comp::vals::Inm,
+}
+
+impl Watch {
+    /// With a DAC's threshold.
+    pub const fn dac(number: usize, second_input: bool, below: bool) -> Self {
+        Self { number, second_input, below, threshold: comp::vals::Inm::DACA }
+    }
+}
+
+/// Each current on two comparators.
+const WATCHES: [Watch; 6] = [
+    Watch::dac(1, false, false),
+    Watch::dac(3, true, false),
+    Watch::dac(6, false, false),
+    Watch::dac(2, false, true),
+    Watch::dac(4, false, true),
+    Watch::dac(7, false, true),
 ];
 
-/// Sets thresholds, then comparators, and locks these until the next reset.
+/// Sets the PMaSynRM drive's thresholds, then its comparators.
 pub fn configure(registers: &Registers, stage: &PowerStage) {
     let (lower, upper) = stage.break_codes();
-    for (converter, codes) in [(registers.dac3, [upper, lower]), (registers.dac4, [lower, upper])] {
+    configure_watches(registers, [[upper, lower], [lower, upper]], &WATCHES);
+}
+
+/// Sets thresholds (codes of DAC3 and DAC4, both channels), then comparators, and locks these until the next reset.
+pub fn configure_watches(registers: &Registers, thresholds: [[u16; 2]; 2], watches: &[Watch]) {
+    for (converter, codes) in [registers.dac3, registers.dac4].into_iter().zip(thresholds) {
         converter.mcr().write(|w| {
             // The bus runs at more than 160 MHz.
             w.set_hfsel(2);
@@ -39,12 +64,15 @@ pub fn configure(registers: &Registers, stage: &PowerStage) {
             w.set_en(1, true);
         });
     }
-    for (number, second_input, lower) in INPUTS {
-        registers.comparators[number - 1].csr().write(|w| {
-            w.set_inmsel(comp::vals::Inm::DACA);
-            w.set_inpsel(second_input);
+    for watch in watches {
+        let Some(comparator) = registers.comparators.get(watch.number.wrapping_sub(1)) else { continue };
+        comparator.csr().write(|w| {
+            w.set_inmsel(watch.threshold);
+            w.set_inpsel(watch.second_input);
             w.set_hyst(comp::vals::Hysteresis::HYST20M);
-            if lower {
+            // The internal reference has to be lent to the comparator.
+            w.set_scalen(watch.threshold == comp::vals::Inm::VREF);
+            if watch.below {
                 w.set_polarity(comp::vals::Polarity::INVERTED);
             }
             w.set_en(true);

@@ -20,13 +20,12 @@
 //! of the trigger's synchroniser, always the same.
 //!
 //! # On and off
-//! MOE alone switches outputs on and off; off, both gates of a leg are driven low (OSSI = 1, OIS = 0), whatever the
-//! compares say. A break clears MOE without clock or software and sets BIF, and BIF, which nothing clears, is the latch:
-//! while it is set the outputs are not switched on again. Switching off for good is a break made by software.
+//! See [`super::outputs`].
 
 use super::comparators;
 use super::dead_time::DeadTime;
 use super::half::{HalfRegisters, LegCompares, NEVER};
+use super::outputs::{BreakSources, Outputs};
 use stm32_metapac::timer::{TimAdv, regs, vals};
 
 /// A leg's channel pair.
@@ -70,30 +69,17 @@ impl Legs {
             w.set_ts(vals::Ts::ITR0);
             w.set_sms(vals::Sms::COMBINED_RESET_TRIGGER);
         });
-        for timer in [self.tim1, self.tim8] {
-            timer.af1().write(|w| {
-                w.set_bkine(true);
-                w.set_bkinp(vals::Bkinp::INVERTED);
-                for comparator in comparators::WATCHING {
-                    w.set_bkcmpe(comparator - 1, true);
-                }
-            });
-            timer.bdtr().write(|w| {
-                w.set_dtg(dead_time.code);
-                w.set_ossi(vals::Ossi::IDLE_LEVEL);
-                w.set_ossr(vals::Ossr::IDLE_LEVEL);
-                w.set_bke(0, true);
-                w.set_bkp(0, vals::Bkp::ACTIVE_HIGH);
-                w.set_lock(vals::Lock::LEVEL2);
-            });
-        }
+        let sources = BreakSources { pin: true, comparators: &comparators::WATCHING };
+        self.outputs().lock(dead_time, [sources; 2]);
+    }
+
+    const fn outputs(&self) -> Outputs<2> {
+        Outputs([self.tim1, self.tim8])
     }
 
     /// Forgets what the break inputs saw before they were wired up. Only for the start, with the outputs off.
     pub fn forget_breaks(&self) {
-        for timer in [self.tim1, self.tim8] {
-            timer.sr().write_value(regs::SrAdv(0));
-        }
+        self.outputs().forget_breaks();
     }
 
     /// Starts to count: TIM1's update by software takes over what is preloaded, and its TRGO starts whoever waits for it.
@@ -137,13 +123,8 @@ impl Legs {
     /// Switches the outputs on, unless a break is latched or the lower devices short the machine.
     #[inline]
     pub fn switch_on(&self) {
-        if self.is_tripped() || self.is_short_circuited() {
-            return;
-        }
-        self.set_main_output(true);
-        // A break between the look and the write would be undone by the write; its latch tells.
-        if self.is_tripped() {
-            self.trip();
+        if !self.is_short_circuited() {
+            self.outputs().switch_on();
         }
     }
 
@@ -151,30 +132,25 @@ impl Legs {
     #[inline]
     pub fn switch_off(&self) {
         if !self.is_short_circuited() {
-            self.set_main_output(false);
+            self.outputs().switch_off();
         }
     }
 
     /// Whether the outputs are on.
     pub fn is_on(&self) -> bool {
-        self.tim1.bdtr().read().moe() || self.tim8.bdtr().read().moe()
+        self.outputs().is_on()
     }
 
     /// Switches the outputs off for good, as a break input would.
     #[inline]
     pub fn trip(&self) {
-        for timer in [self.tim1, self.tim8] {
-            timer.egr().write(|w| w.set_bg(0, true));
-        }
+        self.outputs().trip();
     }
 
     /// Whether a break, from hardware or software, has switched the outputs off.
     #[inline]
     pub fn is_tripped(&self) -> bool {
-        [self.tim1, self.tim8].into_iter().any(|timer| {
-            let status = timer.sr().read();
-            status.bif(0) || status.bif(1) || status.sbif()
-        })
+        self.outputs().is_tripped()
     }
 
     /// The three lower devices on for good, unless a break is latched. The dead time passes first, in hardware.
@@ -186,22 +162,12 @@ impl Legs {
         self.tim1.ccmr_output(FIRST_PAIR).write_value(forced_low());
         self.tim1.ccmr_output(SECOND_PAIR).write_value(forced_low());
         self.tim8.ccmr_output(FIRST_PAIR).write_value(forced_low());
-        self.set_main_output(true);
-        if self.is_tripped() {
-            self.trip();
-        }
+        self.outputs().switch_on();
     }
 
     #[inline]
     fn is_short_circuited(&self) -> bool {
         self.tim1.ccmr_output(FIRST_PAIR).read().ocm(0) == vals::Ocm::FORCE_INACTIVE
-    }
-
-    #[inline]
-    fn set_main_output(&self, on: bool) {
-        for timer in [self.tim1, self.tim8] {
-            timer.bdtr().modify(|w| w.set_moe(on));
-        }
     }
 }
 

@@ -8,6 +8,7 @@
 //!   TIM4, or whatever implements [`Position`].
 //! * Break inputs and comparators turn the gates off without clock and software ([`comparators`]); the watchdog
 //!   does when an interrupt stops coming ([`watchdog`]).
+//! * [`zs9`] is the same for the nine-switch inverter.
 //! * [`pins`] is the wiring, [`power_stage`] the scales, [`mod@start`] the order of the start.
 //!
 //! Everything here but `chip` takes its registers as values, so tests on the host run it against blocks of memory.
@@ -19,6 +20,7 @@ pub mod dead_time;
 pub mod half;
 pub mod legs;
 pub mod operator;
+pub mod outputs;
 pub mod pins;
 mod ports;
 pub mod position;
@@ -27,6 +29,7 @@ pub mod registers;
 pub mod sampling;
 pub mod start;
 pub mod watchdog;
+pub mod zs9;
 
 #[cfg(target_os = "none")]
 mod chip;

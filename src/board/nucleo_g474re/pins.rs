@@ -1,7 +1,8 @@
 //! Which pin does what: the one table, from which the pins are configured and with which the documentation is compared.
 
 use super::registers::Registers;
-use stm32_metapac::gpio::vals::{Moder, Ospeedr, Pupdr};
+use stm32_metapac::gpio::Gpio;
+use stm32_metapac::gpio::vals::{Idr, Moder, Ospeedr, Pupdr};
 
 /// A port.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -10,6 +11,7 @@ pub enum Port {
     A,
     B,
     C,
+    D,
 }
 
 /// What a pin is connected to inside.
@@ -23,6 +25,8 @@ pub enum Function {
     Analog,
     /// Read by software, with pull-down.
     Input,
+    /// Written by software, high at first.
+    Output,
 }
 
 /// A pin.
@@ -40,7 +44,7 @@ pub struct Pin {
     pub purpose: &'static str,
 }
 
-const fn pin(
+pub(super) const fn pin(
     port: Port,
     number: u8,
     function: Function,
@@ -50,7 +54,7 @@ const fn pin(
     Pin { port, number, function, signals, purpose }
 }
 
-/// Every pin the board uses.
+/// Every pin the PMaSynRM's drive uses.
 pub const PINS: [Pin; 19] = [
     pin(Port::A, 8, Function::Gate(6), &["TIM1_CH1"], "gate U, upper device"),
     pin(Port::B, 13, Function::Gate(6), &["TIM1_CH1N"], "gate U, lower device"),
@@ -76,6 +80,18 @@ pub const PINS: [Pin; 19] = [
 /// The enable input.
 const ENABLE: usize = 2;
 
+impl Port {
+    /// Its registers.
+    pub const fn of(self, registers: &Registers) -> Gpio {
+        match self {
+            Self::A => registers.gpioa,
+            Self::B => registers.gpiob,
+            Self::C => registers.gpioc,
+            Self::D => registers.gpiod,
+        }
+    }
+}
+
 impl Pin {
     /// Whether it drives a gate.
     pub const fn is_gate(&self) -> bool {
@@ -83,35 +99,41 @@ impl Pin {
     }
 }
 
-/// Configures every pin that drives no gate.
-pub fn configure_inputs(registers: &Registers) {
-    PINS.iter().filter(|pin| !pin.is_gate()).for_each(|pin| configure(registers, pin));
+/// Configures every pin of the table that drives no gate.
+pub fn configure_inputs(registers: &Registers, pins: &[Pin]) {
+    pins.iter().filter(|pin| !pin.is_gate()).for_each(|pin| configure(registers, pin));
 }
 
 /// Gives the gates' pins to the timers, which drive them low as long as their outputs are off. Until then the pins float, as
 /// after a reset: each gate driver needs a pull-down of its own.
-pub fn configure_gates(registers: &Registers) {
-    PINS.iter().filter(|pin| pin.is_gate()).for_each(|pin| configure(registers, pin));
+pub fn configure_gates(registers: &Registers, pins: &[Pin]) {
+    pins.iter().filter(|pin| pin.is_gate()).for_each(|pin| configure(registers, pin));
 }
 
 /// Whether the enable input is high.
 #[inline]
 pub fn is_enabled(registers: &Registers) -> bool {
-    registers.gpioc.idr().read().idr(ENABLE) == stm32_metapac::gpio::vals::Idr::HIGH
+    is_high(registers.gpioc, ENABLE)
+}
+
+/// Whether an input is high.
+#[inline]
+pub(super) fn is_high(port: Gpio, number: usize) -> bool {
+    port.idr().read().idr(number) == Idr::HIGH
 }
 
 fn configure(registers: &Registers, pin: &Pin) {
-    let port = match pin.port {
-        Port::A => registers.gpioa,
-        Port::B => registers.gpiob,
-        Port::C => registers.gpioc,
-    };
+    let port = pin.port.of(registers);
     let number = usize::from(pin.number);
     let (mode, pull) = match pin.function {
         Function::Gate(_) | Function::Alternate(_) => (Moder::ALTERNATE, Pupdr::PULL_DOWN),
         Function::Analog => (Moder::ANALOG, Pupdr::FLOATING),
         Function::Input => (Moder::INPUT, Pupdr::PULL_DOWN),
+        Function::Output => (Moder::OUTPUT, Pupdr::FLOATING),
     };
+    if pin.function == Function::Output {
+        port.bsrr().write(|w| w.set_bs(number, true));
+    }
     port.pupdr().modify(|w| w.set_pupdr(number, pull));
     if let Function::Gate(function) | Function::Alternate(function) = pin.function {
         port.ospeedr().modify(|w| w.set_ospeedr(number, Ospeedr::MEDIUM_SPEED));

@@ -1,6 +1,7 @@
 //! What is wired to the board: every scale and time of the power stage, in this one place.
 
 use super::dead_time::DeadTime;
+use super::start::StartError;
 use crate::frames::Angle;
 
 /// The timers' undivided clock, in Hz.
@@ -50,6 +51,12 @@ impl PowerStage {
         DeadTime::at_least(ns_to_cycles(self.dead_time_ns))
     }
 
+    /// A current sensor's measured zero, unless it is too far from the nominal one.
+    pub fn check_zero(&self, zero: AdcCode) -> Result<AdcCode, StartError> {
+        let near = zero.0.abs_diff(self.zero_code) <= self.zero_tolerance;
+        if near { Ok(zero) } else { Err(StartError::CurrentSensor { code: zero.0 }) }
+    }
+
     /// Codes between which the phase currents stay while the comparators are content.
     pub fn break_codes(&self) -> (u16, u16) {
         let away = (self.break_current_a / self.current_a_per_code) as u16;
@@ -75,7 +82,13 @@ impl AdcCode {
     /// As a phase current in A; `zero` is the code at no current.
     #[inline]
     pub fn current_a(self, zero: AdcCode) -> f32 {
-        (i32::from(self.0) - i32::from(zero.0)) as f32 * POWER_STAGE.current_a_per_code
+        self.above(zero) * POWER_STAGE.current_a_per_code
+    }
+
+    /// Codes above another one.
+    #[inline]
+    pub fn above(self, zero: AdcCode) -> f32 {
+        (i32::from(self.0) - i32::from(zero.0)) as f32
     }
 
     /// As the link voltage in V.

@@ -15,17 +15,27 @@ pub struct Registers {
     pub gpioa: pac::gpio::Gpio,
     pub gpiob: pac::gpio::Gpio,
     pub gpioc: pac::gpio::Gpio,
+    pub gpiod: pac::gpio::Gpio,
     /// TIM1 and TIM8.
     pub legs: Legs,
-    /// Control timer.
+    /// The ZS9's third leg.
+    pub tim20: pac::timer::TimAdv,
+    /// The ZS9's control timer.
+    pub tim2: pac::timer::TimGp32,
+    /// Control timer; the ZS9's second encoder.
     pub tim3: pac::timer::TimGp16,
     /// Encoder.
     pub tim4: pac::timer::TimGp16,
-    /// Samples of the control interrupt.
+    /// Samples of the control interrupt; with the ZS9 both interrupts'.
     pub adc1: pac::adc::Adc,
-    /// Samples of the PWM interrupt.
+    /// Samples of the PWM interrupt; with the ZS9 both interrupts'.
     pub adc2: pac::adc::Adc,
+    /// The ZS9's inductor current.
+    pub adc3: pac::adc::Adc,
     pub adc12: pac::adccommon::AdcCommon,
+    pub adc345: pac::adccommon::AdcCommon,
+    /// The ZS9's gate feedback.
+    pub spi3: pac::spi::Spi,
     /// COMP1 ..= COMP7.
     pub comparators: [pac::comp::Comp; 7],
     pub dac3: pac::dac::Dac,
@@ -44,12 +54,18 @@ impl Registers {
         gpioa: pac::GPIOA,
         gpiob: pac::GPIOB,
         gpioc: pac::GPIOC,
+        gpiod: pac::GPIOD,
         legs: Legs { tim1: pac::TIM1, tim8: pac::TIM8 },
+        tim20: pac::TIM20,
+        tim2: pac::TIM2,
         tim3: pac::TIM3,
         tim4: pac::TIM4,
         adc1: pac::ADC1,
         adc2: pac::ADC2,
+        adc3: pac::ADC3,
         adc12: pac::ADC12_COMMON,
+        adc345: pac::ADC345_COMMON,
+        spi3: pac::SPI3,
         comparators: [pac::COMP1, pac::COMP2, pac::COMP3, pac::COMP4, pac::COMP5, pac::COMP6, pac::COMP7],
         dac3: pac::DAC3,
         dac4: pac::DAC4,

@@ -4,7 +4,6 @@
 //! has samples of its own instant. A sequence's conversions follow each other within 0.6 µs.
 
 use super::power_stage::{AdcCode, PowerStage};
-use super::registers::Registers;
 use super::start::{StartError, Wait};
 use crate::frames::Abc;
 use stm32_metapac::{adc, adccommon};
@@ -73,8 +72,14 @@ impl Sampler {
 
     /// The mean code of each current, converted on command. The gates are off, so no current flows.
     pub fn zeros(&self, stage: &PowerStage, wait: &mut dyn Wait) -> Result<Zeros, StartError> {
+        let [a, b, c, _] = self.means(wait)?;
+        Ok([stage.check_zero(a)?, stage.check_zero(b)?, stage.check_zero(c)?])
+    }
+
+    /// The mean code of each channel, converted on command.
+    pub fn means(&self, wait: &mut dyn Wait) -> Result<[AdcCode; 4], StartError> {
         self.write_sequence(adc::vals::Exten::DISABLED);
-        let mut sums = [0; 3];
+        let mut sums = [0; 4];
         for _ in 0..ZERO_SAMPLES {
             self.arm();
             wait.until(&mut || self.is_done()).or(Err(StartError::Converter))?;
@@ -82,13 +87,7 @@ impl Sampler {
                 *sum += u32::from(code.0);
             }
         }
-        let zeros = sums.map(|sum| AdcCode(((sum + ZERO_SAMPLES / 2) / ZERO_SAMPLES) as u16));
-        for zero in zeros {
-            if zero.0.abs_diff(stage.zero_code) > stage.zero_tolerance {
-                return Err(StartError::CurrentSensor { code: zero.0 });
-            }
-        }
-        Ok(zeros)
+        Ok(sums.map(|sum| AdcCode(((sum + ZERO_SAMPLES / 2) / ZERO_SAMPLES) as u16)))
     }
 
     /// From now on the timer starts the sequence.
@@ -106,6 +105,12 @@ impl Sampler {
             }
         }
         None
+    }
+
+    /// What is complete by now counts no more.
+    #[inline]
+    pub fn forget(&self) {
+        self.adc.isr().write(|w| w.set_jeos(true));
     }
 
     fn arm(&self) {
@@ -140,8 +145,8 @@ impl Sampler {
 }
 
 /// The converters' clock: a quarter of the bus, 42.5 MHz.
-pub fn configure_clock(registers: &Registers) {
-    registers.adc12.ccr().write(|w| w.set_ckmode(adccommon::vals::Ckmode::SYNC_DIV4));
+pub fn configure_clock(converters: adccommon::AdcCommon) {
+    converters.ccr().write(|w| w.set_ckmode(adccommon::vals::Ckmode::SYNC_DIV4));
 }
 
 /// Currents in A; NaN, which the drive's protection names, where the converter gave nothing.

@@ -100,7 +100,7 @@ pub const STEPS: [(&str, Step); 11] = [
         Ok(())
     }),
     ("inputs", |start| {
-        pins::configure_inputs(start.registers);
+        pins::configure_inputs(start.registers, &pins::PINS);
         Ok(())
     }),
     ("comparators", |start| {
@@ -115,7 +115,7 @@ pub const STEPS: [(&str, Step); 11] = [
     }),
     ("converters", prepare_samplers),
     ("gate pins", |start| {
-        pins::configure_gates(start.registers);
+        pins::configure_gates(start.registers, &pins::PINS);
         Ok(())
     }),
     ("break inputs", |start| {
@@ -166,7 +166,7 @@ fn configure_legs(start: &mut Start) -> Result<(), StartError> {
 }
 
 fn prepare_samplers(start: &mut Start) -> Result<(), StartError> {
-    sampling::configure_clock(start.registers);
+    sampling::configure_clock(start.registers.adc12);
     let (control, pwm) = (control_sampler(start.registers), pwm_sampler(start.registers));
     control.prepare(start.wait)?;
     pwm.prepare(start.wait)?;

@@ -56,13 +56,15 @@ impl Pulse {
         self.pwm.store(true, Ordering::Relaxed);
     }
 
-    /// In the idle loop: feeds the watchdog if both have run since the last time.
-    pub fn feed_if_both_ran(&self, registers: &Registers) {
-        if self.control.load(Ordering::Relaxed) && self.pwm.load(Ordering::Relaxed) {
+    /// In the idle loop: feeds the watchdog if both have run since the last time, and says so.
+    pub fn feed_if_both_ran(&self, registers: &Registers) -> bool {
+        let both = self.control.load(Ordering::Relaxed) && self.pwm.load(Ordering::Relaxed);
+        if both {
             self.control.store(false, Ordering::Relaxed);
             self.pwm.store(false, Ordering::Relaxed);
             feed(registers);
         }
+        both
     }
 }
 

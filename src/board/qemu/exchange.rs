@@ -1,26 +1,28 @@
-//! The exchange with the rig, over three semihosting files. A real board has nothing of this: `cargo xtask timing` knows
+//! The exchange with the rig, over four semihosting files. A real board has nothing of this: `cargo xtask timing` knows
 //! these functions by their module and does not count them, so they stay out of line and take what they tell by reference.
 
 mod dual;
 
 pub use dual::{dead_dual, gates_off, open_dual, play_dual, power_sample, report_dual, sample_dual};
 
-use super::stop;
+use super::{RECORDER, stop};
 use crate::board::Sample;
 use crate::drive::Report;
 use crate::frames::Abc;
 use crate::link::{self, BLOCK_BYTES, Block, Request, Setup};
 use crate::modulation::CarrierPeriod;
+use crate::operator::{self, Feedback, Status};
 use crate::protection::SafeState;
 use crate::time::Instant;
 use core::sync::atomic::{AtomicU32, Ordering};
 use cortex_m_semihosting::syscall;
 
-/// File handles of the link: requests, answers to control, answers to PWM.
-static FILES: [AtomicU32; 3] = [const { AtomicU32::new(0) }; 3];
+/// File handles of the link: requests, answers to control, answers to PWM, answers to the idle loop.
+static FILES: [AtomicU32; 4] = [const { AtomicU32::new(0) }; 4];
 const REQUESTS: usize = 0;
 const CONTROL_ANSWERS: usize = 1;
 const PWM_ANSWERS: usize = 2;
+const IDLE_ANSWERS: usize = 3;
 
 /// Opens the files and fetches the set-up.
 #[inline(never)]
@@ -33,9 +35,9 @@ pub fn open() -> Setup {
 fn open_files() {
     const READ: usize = 1;
     const WRITE: usize = 5;
-    for (file, (name, mode)) in
-        FILES.iter().zip([(c"requests", WRITE), (c"control-answers", READ), (c"pwm-answers", READ)])
-    {
+    let files =
+        [(c"requests", WRITE), (c"control-answers", READ), (c"pwm-answers", READ), (c"idle-answers", READ)];
+    for (file, (name, mode)) in FILES.iter().zip(files) {
         // SAFETY: SYS_OPEN reads a NUL-terminated name of the given length, which lives for the program.
         let handle = unsafe { syscall!(OPEN, name.as_ptr(), mode, name.count_bytes()) };
         if handle == usize::MAX {
@@ -51,9 +53,20 @@ pub fn control_sample(now: Instant) -> Sample {
     send(&Request::ControlSample(now).to_block());
     let (sample, end) = link::sample_from_block(&receive(CONTROL_ANSWERS));
     if end {
-        stop(true);
+        finish();
     }
     sample
+}
+
+/// Tells what the flight recorder holds, if a fault has frozen it, and ends the emulation.
+fn finish() -> ! {
+    // The rig's time stands still from here on: no interrupt may ask it for samples.
+    cortex_m::interrupt::disable();
+    for record in (0..).map_while(|index| RECORDER.read(index)) {
+        send(&Request::Recorded(record).to_block());
+    }
+    send(&Request::End.to_block());
+    stop(true)
 }
 
 /// Phase currents at a carrier boundary.
@@ -79,6 +92,25 @@ pub fn report(now: Instant, report: &Report) {
 #[inline(never)]
 pub fn enter(safe: SafeState, now: Instant) {
     send(&Request::Enter(now, safe).to_block());
+}
+
+/// The safe state is left.
+#[inline(never)]
+pub fn leave(now: Instant) {
+    send(&Request::Leave(now).to_block());
+}
+
+/// What is asked of the operator. The idle loop's answers have a stream of their own: an interrupt may ask while it waits.
+#[inline(never)]
+pub fn ask(at: Instant) -> (operator::Request, Feedback) {
+    send(&Request::Ask(at).to_block());
+    link::asked_from_block(&receive(IDLE_ANSWERS))
+}
+
+/// What the operator told.
+#[inline(never)]
+pub fn tell(from: Instant, status: &Status) {
+    send(&Request::Tell(from, *status).to_block());
 }
 
 /// The processor stops, gates off.

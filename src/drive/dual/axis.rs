@@ -6,8 +6,7 @@ use crate::control::{
     Boundary, Committed, Controller, Demand, Follows, Input, Law, LinkWindow, Measurements, Region,
     SpeedInput, SpeedLoop,
 };
-use crate::drive::traction::UNITS_PER_RADIAN;
-use crate::frames::{AlphaBeta, Angle};
+use crate::frames::{AlphaBeta, Angle, UNITS_PER_RADIAN};
 use crate::machine::Tables;
 use crate::protection::{self, Fault, FrozenWatch, Violation};
 
@@ -131,8 +130,7 @@ impl Axis {
             horizon_s: period_s,
             volt_seconds: share.map(|share| share * input.link_v),
             // A period is its own mirror image, so at its ends the ripple is nothing.
-            ripple_wb: AlphaBeta::default(),
-            ripple_after_wb: AlphaBeta::default(),
+            ripple: None,
             interval_s: period_s,
             follows: Follows::Mean,
             depth_limit: LOOP_SHARE,
@@ -155,7 +153,7 @@ impl Axis {
         AxisOutput {
             command: MotorCommand {
                 voltage_v: output.voltage.voltage_v,
-                angle: output.voltage.angle,
+                angle: output.voltage.vector.angle(),
                 rate: omega * (UNITS_PER_RADIAN * settings.clock.tick_s),
             },
             torque_nm: output.torque_nm,
@@ -184,7 +182,7 @@ impl Axis {
     /// on by one carrier period.
     fn volt_seconds_share(&self, share: &MotorShare, settings: &Settings) -> AlphaBeta {
         let carrier_s = settings.clock.seconds(settings.carrier_ticks as i32);
-        let turn = Angle::from_radians(self.controller.omega() * carrier_s);
+        let turn = Angle::within_half_turn(self.controller.omega() * carrier_s);
         let (mut sum, mut angle) = (AlphaBeta::default(), share.angle);
         for _ in 0..settings.carriers_per_control() {
             let direction = angle.sin_cos();

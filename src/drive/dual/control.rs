@@ -1,26 +1,27 @@
 //! The control interrupt's task.
 
 use super::axis::{self, Axis, AxisInput, AxisOutput};
-use super::{DualCommand, DualReport, MotorCommand, MotorShare, Settings, Shared};
+use super::{DualApplied, DualCommand, DualReport, MotorCommand, MotorShare, Settings, Shared};
 use crate::board::{DualControlPort, DualSample, MotorDemand};
 use crate::control::{Measurements, ZSource, ZSourceError, ZSourceInput};
 use crate::drive::Gates;
 use crate::frames::{Angle, SQRT_3};
-use crate::machine::Tables;
+use crate::machine::{Machine, Tables};
 use crate::protection::{self, Disarmed, Fault, SafeState, Trip, Violation};
 use crate::time::Instant;
 use core::f32::consts::{FRAC_PI_4, TAU};
+use core::sync::atomic::Ordering;
 
 /// Corner of the filter on the voltage limit, in Hz: fed by the link as it is, the limit would make it oscillate.
 const LIMIT_FILTER_HZ: f32 = 10.0;
 /// A motor has at most U_c/(2√3). The link of a two-level inverter whose six-step fundamental is as large, as a share of U_c.
-const TWO_LEVEL_SHARE: f32 = FRAC_PI_4 / SQRT_3;
+pub const TWO_LEVEL_SHARE: f32 = FRAC_PI_4 / SQRT_3;
 /// What a lost sensor is called, by motor.
 const SENSOR_LOST: [Fault; 2] = [Fault::SensorLost1, Fault::SensorLost2];
 
 /// The ZS9's control task.
-pub struct ControlTask {
-    tables: &'static Tables,
+pub struct ControlTask<M = &'static Tables> {
+    machine: M,
     settings: Settings,
     axes: [Axis; 2],
     link: ZSource,
@@ -32,11 +33,11 @@ pub struct ControlTask {
     trip: Option<Trip>,
 }
 
-impl ControlTask {
+impl<M: Machine> ControlTask<M> {
     /// A task whose first call is the control timer's first interrupt, one control period after the start.
-    pub const fn new(tables: &'static Tables, settings: Settings) -> Self {
+    pub const fn new(machine: M, settings: Settings) -> Self {
         Self {
-            tables,
+            machine,
             settings,
             axes: [Axis::new(), Axis::new()],
             link: ZSource::new(),
@@ -59,12 +60,14 @@ impl ControlTask {
         let now = self.now;
         let deadline_ticks = self.settings.deadline_ticks();
         self.now = now.after(self.settings.clock.control_ticks);
+        shared.began.store(now.0, Ordering::Relaxed);
         // First of all: the next peak writes it again.
         let applied = shared.applied.read().filter(|applied| now.reached(applied.at));
         let sample = port.sample(now);
         if self.trip.is_none() {
             self.trip = applied.and_then(|applied| applied.trip);
         }
+        self.check(applied.and_then(|applied| self.overdue(&applied, now)), port);
         let angles = self.track(&sample, port);
         let measured = self.measured(&sample, angles);
         self.check_measurements(&sample, &measured, port);
@@ -105,6 +108,12 @@ impl ControlTask {
     /// The latched fault.
     pub fn trip(&self) -> Option<Trip> {
         self.trip
+    }
+
+    /// The PWM interrupt that should have come since the last one seen and has not: since when, in s.
+    fn overdue(&self, applied: &DualApplied, now: Instant) -> Option<Violation> {
+        let late = now.since(applied.at.after(self.settings.carrier_ticks));
+        (late >= 0).then(|| (Fault::PwmDeadline, self.settings.clock.seconds(late), 0.0))
     }
 
     /// Follows both rotors.
@@ -160,7 +169,7 @@ impl ControlTask {
         for ((axis, measured), demand) in self.axes.iter().zip(measured).zip(&sample.demands) {
             violation = violation
                 .filter(armed)
-                .or_else(|| axis::check(measured, axis.omega(), self.tables))
+                .or_else(|| axis::check(measured, axis.omega(), self.machine.tables()))
                 .filter(armed)
                 .or_else(|| check_demand(demand));
         }
@@ -170,7 +179,7 @@ impl ControlTask {
     fn check_frozen(&mut self, measured: &[Measurements; 2], port: &mut impl DualControlPort) {
         let mut violation = None;
         for ((axis, measured), lost) in self.axes.iter_mut().zip(measured).zip(SENSOR_LOST) {
-            let found = axis.check_frozen(measured, lost, &self.settings, self.tables);
+            let found = axis.check_frozen(measured, lost, &self.settings, self.machine.tables());
             violation = violation.or(found.filter(|(fault, _, _)| !self.disarmed.has(*fault)));
         }
         self.check(violation, port);
@@ -190,7 +199,7 @@ impl ControlTask {
         let [first, second] = &mut self.axes;
         let ([m1, m2], [d1, d2]) = (measured, &sample.demands);
         let (a1, a2) = applied.map_or((None, None), |[a1, a2]| (Some(a1), Some(a2)));
-        let (settings, tables) = (&self.settings, self.tables);
+        let (settings, tables) = (&self.settings, self.machine.tables());
         let step = |axis: &mut Axis, measured, demand, applied| {
             axis.step(&AxisInput { measured, demand, applied, link_v }, settings, tables)
         };

@@ -1,6 +1,6 @@
 //! What travels between the ZS9's interrupts, and what control reports.
 
-use crate::cell::Words;
+use crate::cell::{Record, Words};
 use crate::drive::{Gates, trip_from_words, trip_to_words};
 use crate::frames::Angle;
 use crate::nine_switch::Scheme;
@@ -33,6 +33,14 @@ pub struct DualCommand {
     pub scheme: Scheme,
     /// Whether to make pulses at all.
     pub gates: Gates,
+}
+
+impl DualCommand {
+    /// Of a command where it lies, from when on it may be used.
+    #[inline]
+    pub fn valid_from(record: &Record<10>) -> Instant {
+        Instant(record.word::<7>())
+    }
 }
 
 impl Words<10> for DualCommand {

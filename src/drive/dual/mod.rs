@@ -26,8 +26,9 @@ use crate::cell::{Downlink, Uplink};
 use crate::control::{Gains, SpeedDesign, ZSourceDesign, ZSourceGains};
 use crate::protection::LinkLimits;
 use crate::time::Clock;
+use core::sync::atomic::AtomicU32;
 
-pub use control::ControlTask;
+pub use control::{ControlTask, TWO_LEVEL_SHARE};
 pub use messages::{DualApplied, DualCommand, DualReport, MotorCommand, MotorShare, scheme_from_code};
 pub use pwm::PwmTask;
 
@@ -100,13 +101,15 @@ impl Settings {
 pub struct Shared {
     command: Downlink<DualCommand, 10>,
     applied: Uplink<DualApplied, 10>,
+    /// Instant of the newest control interrupt, from its beginning on.
+    began: AtomicU32,
 }
 
 impl Shared {
     /// Empty cells.
     #[cfg(not(loom))]
     pub const fn new() -> Self {
-        Self { command: Downlink::new(), applied: Uplink::new() }
+        Self { command: Downlink::new(), applied: Uplink::new(), began: AtomicU32::new(0) }
     }
 }
 

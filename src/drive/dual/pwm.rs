@@ -3,25 +3,25 @@
 use super::{COMPARE_STEPS, DualApplied, DualCommand, MotorShare, Settings, Shared};
 use crate::board::{DualPwmPort, GateFeedback, PlayedPeriod, PowerSample};
 use crate::drive::Gates;
+use crate::drive::traction::stale;
 use crate::frames::{Angle, limit};
-use crate::machine::Tables;
+use crate::machine::{Machine, Tables};
 use crate::nine_switch::{self, GateTicks, MotorVoltage, Period, Refused, Request};
 use crate::protection::{self, Disarmed, Fault, SafeState, Trip, Violation};
 use crate::time::Instant;
+use core::sync::atomic::Ordering;
 
 /// Longest dead time that the gates' hardware may insert, in s.
 const DEAD_TIME_S: f32 = 5e-6;
 
-/// Control periods after which a command is too old to make pulses from.
-const STALE_PERIODS: i32 = 5;
 /// How far the link is believed to move in a carrier period, in V; more is an error of the measurement.
 const MOST_MOVED_V: f32 = 10.0;
 /// Least link voltage that is divided by, in V.
 const LEAST_LINK_V: f32 = 50.0;
 
 /// The ZS9's PWM task.
-pub struct PwmTask {
-    tables: &'static Tables,
+pub struct PwmTask<M = &'static Tables> {
+    machine: M,
     settings: Settings,
     /// Nominal instant of the next call: a peak.
     now: Instant,
@@ -33,12 +33,12 @@ pub struct PwmTask {
     last_link_v: Option<f32>,
 }
 
-impl PwmTask {
+impl<M: Machine> PwmTask<M> {
     /// A task whose first call is at the first peak, half a carrier period after the start, gates off until the second valley.
-    pub const fn new(tables: &'static Tables, settings: Settings) -> Self {
+    pub const fn new(machine: M, settings: Settings) -> Self {
         let off = PlayedPeriod::off(settings.half_steps());
         Self {
-            tables,
+            machine,
             settings,
             now: Instant(settings.first_peak_ticks()),
             periods: [off; 2],
@@ -60,8 +60,10 @@ impl PwmTask {
         self.now = now.after(self.settings.carrier_ticks);
         let [before, running] = self.periods;
         let sample = port.sample(now);
-        let command = shared.command.newest(|command| now.reached(command.valid_from));
-        let violation = self.violation(&sample, command.as_ref(), &before, &running);
+        let command = shared.command.newest(|command| now.reached(DualCommand::valid_from(command)));
+        let began = Instant(shared.began.load(Ordering::Relaxed));
+        let stale = stale(now, began, &self.settings.clock);
+        let violation = self.violation(&sample, command.as_ref(), [&before, &running], stale);
         self.check(violation, port);
         let mut next = PlayedPeriod::off(self.settings.half_steps());
         let mut given = None;
@@ -111,22 +113,22 @@ impl PwmTask {
         &self,
         sample: &PowerSample,
         command: Option<&DualCommand>,
-        before: &PlayedPeriod,
-        running: &PlayedPeriod,
+        [before, running]: [&PlayedPeriod; 2],
+        stale: Option<Violation>,
     ) -> Option<Violation> {
         let limits = &self.settings.limits;
         let [upper, lower] = &sample.currents_a;
         let armed = |(fault, _, _): &Violation| !self.disarmed.has(*fault);
-        protection::check_currents(upper, &self.tables.ratings)
+        protection::check_currents(upper, &self.machine.tables().ratings)
             .filter(armed)
-            .or_else(|| protection::check_currents(lower, &self.tables.ratings).filter(armed))
+            .or_else(|| protection::check_currents(lower, &self.machine.tables().ratings).filter(armed))
             .or_else(|| limits.check_link(sample.source_v, sample.capacitor_v).filter(armed))
             .or_else(|| {
                 let command = command.filter(|command| command.gates == Gates::Pulse)?;
                 // Only while pulses are wanted: control may have turned the gates off meanwhile.
                 self.stuck(&sample.gates, before, running)
                     .filter(armed)
-                    .or_else(|| self.stale(command).filter(armed))
+                    .or_else(|| stale.filter(armed))
                     .or_else(|| limits.check_duty(command.duty))
             })
     }
@@ -149,13 +151,6 @@ impl PwmTask {
             bit <<= 1;
         }
         (wrong != 0).then_some((Fault::LegStuck, f32::from(wrong), 0.0))
-    }
-
-    fn stale(&self, command: &DualCommand) -> Option<Violation> {
-        let clock = &self.settings.clock;
-        let age = self.now.before(self.settings.carrier_ticks).since(command.at);
-        let limit = STALE_PERIODS * clock.control_ticks as i32;
-        (!(0..=limit).contains(&age)).then(|| (Fault::StaleCommand, clock.seconds(age), clock.seconds(limit)))
     }
 
     fn check(&mut self, violation: Option<Violation>, port: &mut impl DualPwmPort) {

@@ -2,16 +2,16 @@
 
 use std::collections::BTreeMap;
 use std::path::Path;
-use std::process::{Command, Stdio};
 
 use anyhow::{Context, Result, bail};
 
+use super::cost::{self, REFILL};
 use super::log::{Event, event};
 use crate::build::{self, cargo};
 use crate::elf::Image;
 use crate::setup::Toolchain;
 use crate::thumb::decode;
-use crate::{image, process};
+use crate::{emulator, image, process};
 
 /// A building block.
 #[derive(Clone, Debug, PartialEq)]
@@ -21,13 +21,15 @@ pub struct Block {
     /// Instructions on the dearest input.
     pub max: u32,
     pub mean: f64,
+    /// Cycles that they take at most.
+    pub cycles: u32,
     /// Largest absolute error; nothing where there is nothing to compare with.
     pub max_error: Option<f64>,
 }
 
 /// Builds the bench for the board and for the host, runs both.
 pub fn measure(toolchain: &Toolchain, qemu: &Path) -> Result<Vec<Block>> {
-    let path = build::bench(toolchain)?;
+    let path = build::bench(toolchain, "tractive-bench")?;
     let image = image::read(&path)?;
     let counts = counts(&image, &run(qemu, &path)?);
     let mut host = cargo();
@@ -38,26 +40,9 @@ pub fn measure(toolchain: &Toolchain, qemu: &Path) -> Result<Vec<Block>> {
 
 /// Runs the image with its instructions logged; the log.
 fn run(qemu: &Path, path: &Path) -> Result<Vec<u8>> {
-    let mut command = Command::new(qemu);
-    command.args([
-        "-M",
-        "mps2-an386",
-        "-cpu",
-        "cortex-m4",
-        "-nographic",
-        "-monitor",
-        "none",
-        "-serial",
-        "null",
-    ]);
-    command.args([
-        "-icount",
-        "shift=3,align=off,sleep=off",
-        "-semihosting-config",
-        "enable=on,target=native",
-    ]);
+    let mut command = emulator::command(qemu, path, 3);
     // Without -D the log goes to the standard error.
-    command.args(super::log::ARGUMENTS).arg("-kernel").arg(path).stdin(Stdio::null());
+    command.args(super::log::ARGUMENTS);
     let output = command.output().with_context(|| process::cannot_start(&command))?;
     if !output.status.success() {
         bail!("the bench failed in the emulator ({})", output.status);
@@ -66,29 +51,52 @@ fn run(qemu: &Path, path: &Path) -> Result<Vec<u8>> {
 }
 
 /// Instructions of each call of each function `tractive_bench::blocks::…`, from its first instruction to its return.
-fn counts(image: &Image, log: &[u8]) -> BTreeMap<String, Vec<u32>> {
+fn counts(image: &Image, log: &[u8]) -> BTreeMap<String, Vec<Count>> {
     let named = image.functions.iter().filter_map(|(start, function)| {
         let name = function.names.iter().find_map(|name| name.strip_prefix("tractive_bench::blocks::"))?;
         Some((*start, name.to_owned()))
     });
     let blocks: BTreeMap<u32, String> = named.collect();
-    let mut counts = BTreeMap::<String, Vec<u32>>::new();
+    let mut counts = BTreeMap::<String, Vec<Count>>::new();
     // Where the running block returns to, and how far it is.
-    let mut running: Option<(&String, u32, u32)> = None;
+    let mut running: Option<(&String, u32, Count)> = None;
     let mut last = 0;
     for line in log.split(|byte| *byte == b'\n') {
         let Some(Event::Step(address)) = event(line) else { continue };
         running = match running {
             Some((name, back, count)) if address == back => {
-                counts.entry(name.clone()).or_default().push(count);
+                counts.entry(name.clone()).or_default().push(count.after(0, REFILL));
                 None
             }
-            Some((name, back, count)) => Some((name, back, count + 1)),
-            None => blocks.get(&address).map(|name| (name, behind(image, last), 1)),
+            Some((name, back, count)) => {
+                let refill = if address == behind(image, last) { 0 } else { REFILL };
+                Some((name, back, count.after(1, cycles(image, address) + refill)))
+            }
+            None => blocks
+                .get(&address)
+                .map(|name| (name, behind(image, last), Count::default().after(1, cycles(image, address)))),
         };
         last = address;
     }
     counts
+}
+
+/// What a call took.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct Count {
+    instructions: u32,
+    cycles: u32,
+}
+
+impl Count {
+    fn after(self, instructions: u32, cycles: u32) -> Self {
+        Self { instructions: self.instructions + instructions, cycles: self.cycles + cycles }
+    }
+}
+
+fn cycles(image: &Image, address: u32) -> u32 {
+    let half = |at| image.half_word(at).unwrap_or(0);
+    cost::cycles(half(address), half(address + 2))
 }
 
 /// The address behind the instruction at this one.
@@ -98,12 +106,13 @@ fn behind(image: &Image, address: u32) -> u32 {
 }
 
 /// One of the host's lines, `name,error`, with its counts.
-fn block(line: &str, counts: &BTreeMap<String, Vec<u32>>) -> Result<Block> {
+fn block(line: &str, counts: &BTreeMap<String, Vec<Count>>) -> Result<Block> {
     let (name, error) = line.split_once(',').with_context(|| format!("the bench says `{line}`"))?;
     let of = counts.get(&name.replace('/', "_")).with_context(|| format!("{name} was never called"))?;
-    let max = of.iter().copied().max().unwrap_or(0);
-    let mean = of.iter().copied().map(f64::from).sum::<f64>() / of.len() as f64;
-    Ok(Block { name: name.to_owned(), max, mean, max_error: error.parse().ok() })
+    let max = of.iter().map(|count| count.instructions).max().unwrap_or(0);
+    let cycles = of.iter().map(|count| count.cycles).max().unwrap_or(0);
+    let mean = of.iter().map(|count| f64::from(count.instructions)).sum::<f64>() / of.len() as f64;
+    Ok(Block { name: name.to_owned(), max, mean, cycles, max_error: error.parse().ok() })
 }
 
 #[cfg(test)]
@@ -127,8 +136,16 @@ mod tests {
         let log: String =
             steps.iter().map(|at| format!("Trace 0: 0x7f [00800400/{at:08x}/0/0] x\n")).collect();
         let counts = counts(&image, log.as_bytes());
-        assert_eq!(counts["sqrt_libm"], [3, 2]);
-        let expected = Block { name: "sqrt/libm".to_owned(), max: 3, mean: 2.5, max_error: Some(1e-7) };
+        // Two branches and the return; the return alone.
+        let count = |instructions, cycles| Count { instructions, cycles };
+        assert_eq!(counts["sqrt_libm"], [count(3, 3 + 3 * REFILL), count(2, 2 + REFILL)]);
+        let expected = Block {
+            name: "sqrt/libm".to_owned(),
+            max: 3,
+            mean: 2.5,
+            cycles: 3 + 3 * REFILL,
+            max_error: Some(1e-7),
+        };
         assert_eq!(block("sqrt/libm,1e-7", &counts).unwrap(), expected);
         assert_eq!(block("sqrt/libm,", &counts).unwrap().max_error, None);
         assert!(block("sqrt/other,", &counts).is_err());

@@ -67,7 +67,7 @@ impl Judged {
 }
 
 /// Judges the values by the file's text: each has to have a budget, each budget a value.
-pub fn judge(text: &str, values: &[(&str, f64)]) -> Result<Vec<Judged>> {
+pub fn judge(text: &str, values: &[(impl AsRef<str>, f64)]) -> Result<Vec<Judged>> {
     let groups: BTreeMap<String, BTreeMap<String, Budget>> = toml::from_str(text).context("budgets.toml")?;
     let mut budgets = BTreeMap::new();
     for (group, entries) in groups {
@@ -75,8 +75,9 @@ pub fn judge(text: &str, values: &[(&str, f64)]) -> Result<Vec<Judged>> {
     }
     let mut judged = Vec::new();
     for (name, value) in values {
-        let budget = budgets.remove(*name).with_context(|| format!("budgets.toml: {name} is missing"))?;
-        judged.push(Judged { name: (*name).to_owned(), value: *value, budget });
+        let name = name.as_ref();
+        let budget = budgets.remove(name).with_context(|| format!("budgets.toml: {name} is missing"))?;
+        judged.push(Judged { name: name.to_owned(), value: *value, budget });
     }
     if let Some(name) = budgets.keys().next() {
         bail!("budgets.toml: {name} is a budget for nothing that is measured");
@@ -122,7 +123,7 @@ mod tests {
             message(&[("a.plain", 1.0)]),
             "budgets.toml: b.raised is a budget for nothing that is measured"
         );
-        assert!(judge("[a]\nx = { ceiling = 1 }", &[]).is_err());
-        assert!(judge("[a]\nx = { target = 1, roof = 2 }", &[]).is_err());
+        assert!(judge("[a]\nx = { ceiling = 1 }", &[] as &[(&str, f64)]).is_err());
+        assert!(judge("[a]\nx = { target = 1, roof = 2 }", &[] as &[(&str, f64)]).is_err());
     }
 }

@@ -1,5 +1,6 @@
 //! Drives the image in the emulator and follows its log while it runs.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{File, OpenOptions};
 use std::io::{BufRead, BufReader, Read, Write};
 use std::path::{Path, PathBuf};
@@ -23,6 +24,8 @@ const END: &[u8] = b"end of the log";
 pub struct Bench {
     pub rig: PathBuf,
     pub qemu: PathBuf,
+    /// The rig's scenario.
+    pub scenario: &'static str,
     pub path: PathBuf,
     pub image: Image,
 }
@@ -34,12 +37,16 @@ pub struct Drive {
     pub hits: Tally,
     pub behind: Tally,
     pub stack_bytes: i32,
+    /// Of each exception the addresses that its longest interrupt executed.
+    pub longest: BTreeMap<u32, Vec<u32>>,
+    /// Of each exception the addresses before which another one came.
+    pub interrupted: BTreeMap<u32, BTreeSet<u32>>,
     /// Interrupt, mode and stator frequency, in the order in which the rig served them.
     pub modes: Vec<(String, String, f64)>,
 }
 
 impl Bench {
-    /// Runs the rig's scenario `timing` with these options.
+    /// Runs the scenario with these options.
     pub fn drive(&self, options: &[&str]) -> Result<Drive> {
         let folder = std::env::temp_dir().join(format!("tractive-timing-{}", std::process::id()));
         std::fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
@@ -52,7 +59,7 @@ impl Bench {
         let (log, modes) = (folder.join("log"), folder.join("calls"));
         let (reader, mut end) = fifo(&log)?;
         let mut rig = Command::new(&self.rig);
-        rig.args(["run", "timing", "--on", "qemu", "--dt", "1e-3", "--out"]).arg(folder.join("out"));
+        rig.args(["run", self.scenario, "--on", "qemu", "--dt", "1e-3", "--out"]).arg(folder.join("out"));
         rig.arg("--image").arg(&self.path).arg("--qemu").arg(&self.qemu).arg("--calls").arg(&modes);
         let (filter, log) = (filter(&self.image), log.to_string_lossy().into_owned());
         for argument in ARGUMENTS.into_iter().chain(["-dfilter", &filter, "-D", &log]) {
@@ -93,8 +100,8 @@ impl Bench {
             line.clear();
         }
         outcome?;
-        let Meter { calls, hits, behind, stack_bytes, .. } = meter;
-        Ok(Drive { calls, hits, behind, stack_bytes, modes: Vec::new() })
+        let Meter { calls, hits, behind, stack_bytes, longest, interrupted, .. } = meter;
+        Ok(Drive { calls, hits, behind, stack_bytes, longest, interrupted, modes: Vec::new() })
     }
 }
 

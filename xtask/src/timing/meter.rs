@@ -43,6 +43,10 @@ pub struct Meter<'a> {
     pub behind: Tally,
     /// Bytes of stack below the idle loop's, at most.
     pub stack_bytes: i32,
+    /// Of each exception the addresses that its longest interrupt executed.
+    pub longest: BTreeMap<u32, Vec<u32>>,
+    /// Of each exception the addresses before which another one came.
+    pub interrupted: BTreeMap<u32, BTreeSet<u32>>,
 }
 
 #[derive(Clone, Copy)]
@@ -64,6 +68,10 @@ struct Handler {
     resumes: Option<u32>,
     /// Where the next instruction stands unless the last one branched.
     next: Option<u32>,
+    /// What was executed.
+    addresses: Vec<u32>,
+    /// Whether another handler has come since the last instruction.
+    interrupted: bool,
 }
 
 impl<'a> Meter<'a> {
@@ -80,6 +88,8 @@ impl<'a> Meter<'a> {
             hits: Tally::default(),
             behind: Tally::default(),
             stack_bytes: 0,
+            longest: BTreeMap::new(),
+            interrupted: BTreeMap::new(),
         }
     }
 
@@ -100,6 +110,9 @@ impl<'a> Meter<'a> {
     }
 
     fn enter(&mut self, exception: u32) {
+        if let Some(handler) = self.active.last_mut() {
+            handler.interrupted = true;
+        }
         let stack = self.active.last().map_or(0, |handler| handler.stack) + EXCEPTION_FRAME;
         let call = Call {
             exception,
@@ -107,7 +120,15 @@ impl<'a> Meter<'a> {
             cycles: ENTRY_AND_RETURN,
             ..Call::default()
         };
-        self.active.push(Handler { call, within: Vec::new(), stack, resumes: None, next: None });
+        self.active.push(Handler {
+            call,
+            within: Vec::new(),
+            stack,
+            resumes: None,
+            next: None,
+            addresses: Vec::new(),
+            interrupted: false,
+        });
         let depth = self.active.len();
         for handler in &mut self.active {
             handler.call.depth = handler.call.depth.max(depth);
@@ -116,7 +137,13 @@ impl<'a> Meter<'a> {
 
     fn leave(&mut self, exception: u32) -> Result<()> {
         match self.active.pop() {
-            Some(handler) if handler.call.exception == exception => self.calls.push(handler.call),
+            Some(handler) if handler.call.exception == exception => {
+                self.calls.push(handler.call);
+                let longest = self.longest.entry(exception).or_default();
+                if handler.addresses.len() > longest.len() {
+                    *longest = handler.addresses;
+                }
+            }
             Some(handler) => bail!("exception {exception} returns within {}", handler.call.exception),
             None => bail!("exception {exception} returns and was never entered"),
         }
@@ -143,6 +170,10 @@ impl<'a> Meter<'a> {
         }
         handler.next = Some(address + instruction.length);
         handler.call.instructions += 1;
+        handler.addresses.push(address);
+        if core::mem::take(&mut handler.interrupted) {
+            self.interrupted.entry(handler.call.exception).or_default().insert(address);
+        }
         handler.call.cycles += instruction.cycles;
         handler.stack -= instruction.stack_move;
         self.stack_bytes = self.stack_bytes.max(handler.stack);

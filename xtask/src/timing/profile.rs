@@ -57,7 +57,7 @@ impl<'a> Profile<'a> {
     }
 
     /// The function at an address and those that it was inlined into, the innermost first.
-    fn chain(&self, address: u32) -> Result<Vec<String>> {
+    pub fn chain(&self, address: u32) -> Result<Vec<String>> {
         let mut frames = self.lines.find_frames(address.into()).skip_all_loads()?;
         let mut chain = Vec::new();
         while let Some(frame) = frames.next()? {

@@ -1,21 +1,18 @@
-//! The numbers as a table and as JSON.
+//! What was measured and judged, and the same as JSON.
 
 use serde_json::{Value, json};
 
 use super::blocks::Block;
 use super::budget::Judged;
-use super::statistics::{Row, Statistics};
-use crate::elf::Sizes;
+use super::statistics::Row;
+use super::system::Measured;
 
-/// The modes in which pulses are made, and gates off, in the order of the table.
-const MODES: [&str; 7] = ["async", "sync15", "sync12", "mid7", "mid3", "square", "off"];
 const INTERRUPTS: [&str; 2] = ["control", "pwm"];
 
 /// What was measured and judged.
 pub struct Report<'a> {
-    pub statistics: &'a Statistics,
+    pub systems: &'a [Measured],
     pub blocks: &'a [Block],
-    pub sizes: &'a Sizes,
     pub judged: &'a [Judged],
 }
 
@@ -24,39 +21,73 @@ pub fn core_tick(blocks: &[Block]) -> Option<u32> {
     blocks.iter().find(|block| block.name == "core_tick/tractive").map(|block| block.max)
 }
 
-impl Report<'_> {
-    fn rows(&self) -> impl Iterator<Item = (&'static str, &'static str, &Row)> {
-        let pairs = INTERRUPTS.into_iter().flat_map(|name| MODES.into_iter().map(move |mode| (mode, name)));
-        pairs.filter_map(|(mode, name)| Some((mode, name, self.statistics.row(mode, name)?)))
+impl Measured {
+    /// Interrupt, mode and what was counted, in the order of the tables.
+    pub fn rows(&self) -> impl Iterator<Item = (&'static str, &'static str, &Row)> {
+        let pairs =
+            INTERRUPTS.into_iter().flat_map(|name| self.system.modes.iter().map(move |mode| (name, *mode)));
+        pairs.filter_map(|(name, mode)| Some((name, mode, self.statistics.row(mode, name)?)))
     }
 
-    /// As the contract of `timing --json` has it, and more.
-    pub fn json(&self) -> Value {
-        let interrupts: Vec<Value> = self
-            .rows()
-            .map(|(mode, name, row)| {
+    fn json_rows(&self) -> Vec<Value> {
+        let system = self.system.name;
+        self.rows()
+            .map(|(name, mode, row)| {
                 json!({
-                    "system": "pmasynrm", "name": name, "mode": mode, "calls": row.instructions.count,
+                    "system": system, "name": name, "mode": mode, "calls": row.instructions.count,
                     "min": row.instructions.min, "mean": row.instructions.mean(), "max": row.instructions.max,
                     "cycles_mean": row.cycles.mean(), "cycles_max": row.cycles.max,
                     "latency_min": row.latency.min, "latency_max": row.latency.max,
                     "jitter": row.latency.max - row.latency.min, "depth": row.depth,
                 })
             })
-            .collect();
-        let load: Vec<Value> = MODES
-            .into_iter()
-            .filter_map(|mode| {
-                let load = self.statistics.load(mode)?;
-                Some(json!({ "system": "pmasynrm", "mode": mode, "mean_percent": load.mean, "max_percent": load.max }))
+            .collect()
+    }
+
+    fn json_load(&self) -> Vec<Value> {
+        let load = |mode: &&'static str| {
+            let load = self.statistics.load(mode)?;
+            let system = self.system.name;
+            Some(
+                json!({ "system": system, "mode": mode, "mean_percent": load.mean, "max_percent": load.max }),
+            )
+        };
+        self.system.modes.iter().filter_map(load).collect()
+    }
+
+    fn json_parts(&self) -> Vec<Value> {
+        let parts = self.parts.iter().flat_map(|(name, parts)| parts.iter().map(move |part| (name, part)));
+        parts
+            .map(|(name, part)| {
+                json!({
+                    "system": self.system.name, "interrupt": name, "part": part.name,
+                    "mean": part.mean, "in_longest": part.longest,
+                })
             })
-            .collect();
+            .collect()
+    }
+
+    fn json_image(&self) -> Value {
+        let sizes = &self.image.sizes;
+        json!({
+            "code_bytes": sizes.code, "table_bytes": sizes.tables, "ram_bytes": sizes.ram,
+            "recorder_bytes": sizes.recorder,
+            "stack_bytes": self.statistics.stack_bytes, "stack_left_bytes": sizes.stack,
+        })
+    }
+}
+
+impl Report<'_> {
+    /// As the contract of `timing --json` has it, and more. `image` is the first system's.
+    pub fn json(&self) -> Value {
+        let all = |of: fn(&Measured) -> Vec<Value>| self.systems.iter().flat_map(of).collect::<Vec<_>>();
         let blocks: Vec<Value> = self
             .blocks
             .iter()
             .map(|block| {
                 json!({
-                    "name": block.name, "instructions": block.max, "mean": block.mean, "max_error": block.max_error,
+                    "name": block.name, "instructions": block.max, "mean": block.mean, "cycles": block.cycles,
+                    "max_error": block.max_error,
                 })
             })
             .collect();
@@ -70,72 +101,22 @@ impl Report<'_> {
                 })
             })
             .collect();
+        let first = self.systems.first();
+        let images = self.systems.iter().map(|measured| (measured.system.name, measured.json_image()));
+        let images: serde_json::Map<String, Value> =
+            images.map(|(name, image)| (name.to_owned(), image)).collect();
         json!({
-            "interrupts": interrupts,
-            "load_at_170_mhz": load,
-            "cycles_per_instruction": self.statistics.cycles_per_instruction(),
-            "max_stator_frequency_hz": self.statistics.hertz,
+            "interrupts": all(Measured::json_rows),
+            "parts": all(Measured::json_parts),
+            "load_at_170_mhz": all(Measured::json_load),
+            "cycles_per_instruction": first.map(|measured| measured.statistics.cycles_per_instruction()),
+            "max_stator_frequency_hz": first.map(|measured| measured.statistics.hertz),
             "core_tick": { "instructions": core_tick(self.blocks) },
             "blocks": blocks,
-            "image": {
-                "code_bytes": self.sizes.code, "table_bytes": self.sizes.tables, "ram_bytes": self.sizes.ram,
-                "stack_bytes": self.statistics.stack_bytes, "stack_left_bytes": self.sizes.stack,
-            },
+            "image": first.map(Measured::json_image),
+            "images": images,
             "budgets": budgets,
         })
-    }
-
-    /// For people.
-    pub fn table(&self) -> String {
-        let mut text = format!(
-            "{:<8} {:<7} {:>6} {:>6} {:>8} {:>6} {:>10} {:>8} {:>7} {:>6}\n",
-            "", "mode", "calls", "min", "mean", "max", "cycles max", "latency", "jitter", "depth"
-        );
-        for (mode, name, row) in self.rows() {
-            let (count, latency) = (&row.instructions, &row.latency);
-            text += &format!(
-                "{name:<8} {mode:<7} {:>6} {:>6} {:>8.1} {:>6} {:>10} {:>8} {:>7} {:>6}\n",
-                count.count,
-                count.min,
-                count.mean(),
-                count.max,
-                row.cycles.max,
-                latency.max,
-                latency.max - latency.min,
-                row.depth,
-            );
-        }
-        text += &format!(
-            "\ninstructions, without the link to the rig; up to {:.0} Hz stator frequency\n\
-             cycles: upper bound, {:.2} an instruction on the mean\n\n{:<8} {:>12} {:>12}\n",
-            self.statistics.hertz,
-            self.statistics.cycles_per_instruction(),
-            "170 MHz",
-            "load, mean",
-            "load, max"
-        );
-        for mode in MODES {
-            if let Some(load) = self.statistics.load(mode) {
-                text += &format!("{mode:<8} {:>10.1} % {:>10.1} %\n", load.mean, load.max);
-            }
-        }
-        text += &format!("\n{:<24} {:>6} {:>8} {:>10}\n", "block", "max", "mean", "error");
-        for block in self.blocks {
-            let error = block.max_error.map_or_else(String::new, |error| format!("{error:.1e}"));
-            text += &format!("{:<24} {:>6} {:>8.1} {error:>10}\n", block.name, block.max, block.mean);
-        }
-        text += &format!("\n{:<30} {:>9} {:>9} {:>9}\n", "budget", "value", "target", "ceiling");
-        for judged in self.judged {
-            text += &format!(
-                "{:<30} {:>9.1} {:>9} {:>9}  {}\n",
-                judged.name,
-                judged.value,
-                judged.budget.target,
-                judged.budget.bound(),
-                judged.verdict().name()
-            );
-        }
-        text
     }
 }
 
@@ -143,32 +124,15 @@ impl Report<'_> {
 mod tests {
     use super::*;
     use crate::timing::budget::judge;
-    use crate::timing::drive::Drive;
-    use crate::timing::meter::Call;
-
-    fn statistics() -> Statistics {
-        let call =
-            |exception, instructions| Call { exception, instructions, cycles: 1_700, ..Call::default() };
-        let served = |name: &str| (name.to_owned(), "mid7".to_owned(), 100.0);
-        let drive = Drive {
-            calls: vec![call(26, 7), call(24, 10), call(24, 20)],
-            modes: vec![served("pwm"), served("control"), served("control")],
-            stack_bytes: 640,
-            ..Drive::default()
-        };
-        let mut statistics = Statistics::default();
-        statistics.add(&drive).unwrap();
-        statistics
-    }
+    use crate::timing::system::tests::example;
+    use crate::timing::table;
 
     #[test]
     fn the_json_holds_what_the_contract_names() {
-        let statistics = statistics();
-        let sizes = Sizes { code: 1, tables: 2, rodata: 3, ram: 4, stack: 5 };
         let judged = judge("[a]\nb = { target = 1 }", &[("a.b", 2.0)]).unwrap();
-        let block =
-            Block { name: "core_tick/tractive".to_owned(), max: 120, mean: 110.0, max_error: Some(1e-7) };
-        let report = Report { statistics: &statistics, blocks: &[block], sizes: &sizes, judged: &judged };
+        let name = "core_tick/tractive".to_owned();
+        let block = Block { name, max: 120, mean: 110.0, cycles: 250, max_error: Some(1e-7) };
+        let report = Report { systems: &[example()], blocks: &[block], judged: &judged };
         let json = report.json();
         let row = &json["interrupts"][0];
         assert_eq!(
@@ -183,14 +147,8 @@ mod tests {
         let image = &json["image"];
         assert_eq!([&image["code_bytes"], &image["table_bytes"], &image["ram_bytes"]], [1, 2, 4]);
         assert_eq!(image["stack_bytes"], 640);
-        assert!(report.table().contains("OVER"));
-    }
-
-    #[test]
-    fn the_load_is_that_of_both_interrupts() {
-        // 1,700 cycles ten thousand times a second are a tenth of 170 MHz; one PWM interrupt comes for two of control.
-        let load = statistics().load("mid7").unwrap();
-        assert!((load.mean - 15.0).abs() < 1e-9 && (load.max - 15.0).abs() < 1e-9);
-        assert!(statistics().load("square").is_none());
+        assert_eq!(json["parts"][0]["in_longest"], 20);
+        assert!(table::plain(&report).contains("OVER"));
+        assert!(table::page(&report).contains("| control | mid7 | 15 | 20 | 1700 | 0 |"));
     }
 }

@@ -4,6 +4,7 @@ mod cycle;
 mod load_step;
 mod reverse;
 mod steady;
+mod timing;
 
 use super::bench::{Bench, BenchSettings};
 use super::operator::Operator;
@@ -66,12 +67,13 @@ pub trait Scenario {
 }
 
 /// Every scenario of the ZS9.
-pub fn all() -> [Box<dyn Scenario>; 4] {
+pub fn all() -> [Box<dyn Scenario>; 5] {
     [
         Box::new(load_step::LoadStep),
         Box::new(reverse::Reverse),
         Box::new(cycle::Cycle),
         Box::new(steady::Steady),
+        Box::new(timing::Timing),
     ]
 }
 

@@ -1,0 +1,232 @@
+//! The line side in the timers' time: contactors that take their time, a chopper that switches, and whoever commands the drive.
+
+use super::Tick;
+use crate::plant::{DcLink, DcLinkSettings, LinkEnergies, LinkSwitches};
+use crate::trace::LinkBalance;
+use std::collections::VecDeque;
+use tractive::frames::Abc;
+use tractive::operator::{Configuration, Feedback, Request, SLOT_PERIODS, Status, Switches};
+use tractive::protection::Fault;
+use tractive::time::{Clock, Instant};
+
+/// Time in which a contactor closes, and opens, in s.
+const CLOSES_S: f64 = 0.04;
+const OPENS_S: f64 = 0.02;
+
+/// Who commands: the request at `t_s` seconds after the recording begins.
+pub type Commander = Box<dyn Fn(f64) -> Request + Send>;
+
+/// What the line side is, and what happens to it.
+pub struct LinePlan {
+    /// The link.
+    pub link: DcLinkSettings,
+    /// Whether the link stands at the source's voltage, main contactor open, when the run begins.
+    pub starts_charged: bool,
+    /// Who commands.
+    pub commander: Commander,
+    /// Causes in hardware that hold the gates off: from, until (s from the recording's beginning), which.
+    pub hardware: Vec<(f64, f64, Fault)>,
+    /// From these times on (s) the braking resistor has this resistance, in ohm.
+    pub chopper_ohm: Vec<(f64, f64)>,
+    /// Whether the source takes energy back from these times on (s).
+    pub reversible: Vec<(f64, bool)>,
+}
+
+/// A contactor: told, and where it is.
+#[derive(Clone, Copy, Debug, Default)]
+struct Contactor {
+    told: bool,
+    closed: bool,
+    moves: Option<Tick>,
+}
+
+impl Contactor {
+    fn tell(&mut self, told: bool, now: Tick, tick_s: f64) {
+        if told != self.told {
+            self.told = told;
+            let takes_s = if told { CLOSES_S } else { OPENS_S };
+            self.moves = (told != self.closed).then(|| now + (takes_s / tick_s).round() as Tick);
+        }
+    }
+
+    fn act(&mut self, now: Tick) {
+        if self.moves.is_some_and(|at| at <= now) {
+            (self.closed, self.moves) = (self.told, None);
+        }
+    }
+}
+
+/// What the operator did in one slot, for the trace.
+#[derive(Clone, Copy, Debug)]
+pub struct SlotRow {
+    /// When it took effect, in s from the recording's beginning.
+    pub t_s: f64,
+    /// What it told.
+    pub status: Status,
+}
+
+/// The line side of a bench.
+pub struct LineSide {
+    /// The link itself.
+    pub link: DcLink,
+    stored_before_j: f64,
+    plan: LinePlan,
+    tick_s: f64,
+    slot_ticks: Tick,
+    main: Contactor,
+    precharge: Contactor,
+    discharge: bool,
+    duty: f64,
+    /// The running chopper period's end, and where in it the chopper goes off.
+    chopper_period: Tick,
+    chopper_off: Option<Tick>,
+    /// What the operator told, and from when on it holds.
+    told: VecDeque<(Tick, Status)>,
+    /// What the operator will ask for, by the slot's beginning.
+    asked: VecDeque<(Tick, Request, Feedback)>,
+    samples: u32,
+    status: Option<Status>,
+}
+
+impl LineSide {
+    /// At tick 0, everything open.
+    pub fn new(plan: LinePlan, clock: &Clock) -> Self {
+        let mut link = DcLink::new(plan.link);
+        if plan.starts_charged {
+            link.set_udc_v(plan.link.source.voltage_v);
+        }
+        Self {
+            stored_before_j: link.stored_j(),
+            link,
+            plan,
+            tick_s: f64::from(clock.ticks_per_s).recip(),
+            slot_ticks: Tick::from(SLOT_PERIODS * clock.control_ticks),
+            main: Contactor::default(),
+            precharge: Contactor::default(),
+            discharge: false,
+            duty: 0.0,
+            chopper_period: 0,
+            chopper_off: None,
+            told: VecDeque::new(),
+            asked: VecDeque::new(),
+            samples: 0,
+            status: None,
+        }
+    }
+
+    /// Where the link's energy went since tick 0.
+    pub fn balance(&self) -> LinkBalance {
+        let energies = self.link.energies();
+        let LinkEnergies { source_j, path_j, discharge_j, chopper_j, inverter_j } = energies;
+        let kept_j = self.link.stored_j() - self.stored_before_j;
+        LinkBalance {
+            energies,
+            moved_j: source_j.abs() + inverter_j.abs() + self.stored_before_j,
+            missing_j: source_j - path_j - discharge_j - chopper_j - inverter_j - kept_j,
+        }
+    }
+
+    /// The operator's last word that has taken effect.
+    pub fn status(&self) -> Option<Status> {
+        self.status
+    }
+
+    /// What holds the gates off in hardware at `t_s`.
+    pub fn hardware(&self, t_s: f64) -> Option<Fault> {
+        let held = self.plan.hardware.iter().find(|(from, until, _)| (*from..*until).contains(&t_s));
+        held.map(|(.., fault)| *fault)
+    }
+
+    /// A control sample at `now`, `t_s`: every [`SLOT_PERIODS`]th begins a slot. Returns whether the operator has fallen behind.
+    pub fn sampled(&mut self, now: Tick, t_s: f64) -> bool {
+        let begins = self.samples.is_multiple_of(SLOT_PERIODS);
+        self.samples = self.samples.wrapping_add(1);
+        if begins {
+            let feedback = Feedback {
+                precharge_closed: self.precharge.closed,
+                main_closed: self.main.closed,
+                driver_ready: self.hardware(t_s) != Some(Fault::GateDriver),
+                enable_input: true,
+                sensor_alive: true,
+                position_known: true,
+                offsets_a: Abc::default(),
+                configuration: Configuration::Good,
+                parameters_open: false,
+                hardware: self.hardware(t_s),
+            };
+            self.asked.push_back((now, (self.plan.commander)(t_s), feedback));
+        }
+        self.asked.len() > 2
+    }
+
+    /// What is asked in the slot that began at `tick`, and what the board says.
+    pub fn ask(&mut self, tick: Tick) -> Option<(Request, Feedback)> {
+        while let Some((at, request, feedback)) = self.asked.pop_front() {
+            if at == tick {
+                return Some((request, feedback));
+            }
+        }
+        None
+    }
+
+    /// What the operator told; it holds from `from` on.
+    pub fn tell(&mut self, from: Tick, status: Status) {
+        self.told.push_back((from, status));
+    }
+
+    /// The next instant at which something changes.
+    pub fn next_event(&self) -> Option<Tick> {
+        let told = self.told.front().map(|(at, _)| *at);
+        let period = (self.duty > 0.0 || self.chopper_off.is_some()).then_some(self.chopper_period);
+        [told, period, self.chopper_off, self.main.moves, self.precharge.moves].into_iter().flatten().min()
+    }
+
+    /// Does what is due at `now`, `t_s`; returns the operator's word if it takes effect here.
+    pub fn act(&mut self, now: Tick, t_s: f64) -> Option<SlotRow> {
+        let mut row = None;
+        while let Some((at, status)) = self.told.front().copied()
+            && at <= now
+        {
+            self.told.pop_front();
+            self.status = Some(status);
+            let Switches { precharge, main, discharge, chopper } = status.switches;
+            self.precharge.tell(precharge, now, self.tick_s);
+            self.main.tell(main, now, self.tick_s);
+            self.discharge = discharge;
+            self.duty = f64::from(chopper);
+            // The chopper's period is the slot.
+            self.chopper_period = now;
+            row = Some(SlotRow { t_s, status });
+        }
+        self.main.act(now);
+        self.precharge.act(now);
+        if self.chopper_off.is_some_and(|at| at <= now) {
+            self.chopper_off = None;
+        }
+        if self.chopper_period <= now && self.duty > 0.0 {
+            self.chopper_period = now + self.slot_ticks;
+            let on = (self.duty * self.slot_ticks as f64).round() as Tick;
+            self.chopper_off = (on > 0).then_some(now + on);
+        }
+        self.link.switches = LinkSwitches {
+            precharge: self.precharge.closed,
+            main: self.main.closed,
+            discharge: self.discharge,
+            chopper: self.chopper_off.is_some(),
+        };
+        let held =
+            |steps: &[(f64, f64)]| steps.iter().rev().find(|(at, _)| t_s >= *at).map(|(_, value)| *value);
+        if let Some(ohm) = held(&self.plan.chopper_ohm) {
+            self.link.set_chopper_ohm(ohm);
+        }
+        if let Some((_, reversible)) = self.plan.reversible.iter().rev().find(|(at, _)| t_s >= *at) {
+            self.link.source_mut().reversible = *reversible;
+        }
+        row
+    }
+
+    /// The tick of an instant near to `now`.
+    pub fn widen(now: Tick, instant: Instant) -> Tick {
+        now.saturating_add_signed(i64::from(instant.since(Instant(now as u32))))
+    }
+}

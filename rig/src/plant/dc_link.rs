@@ -1,0 +1,151 @@
+//! The DC link: a capacitor between source, resistors and inverter.
+//!
+//! `C du/dt = i_source − u/R_discharge − u/R_chopper − i_inverter`, with `i_source = (U − u)/R` through whatever contactor is
+//! closed; a rectifier gives current only, a reversible source takes it too.
+
+/// Where the link's energy comes from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Source {
+    /// Voltage without load, in V.
+    pub voltage_v: f64,
+    /// Inner resistance, in ohm.
+    pub resistance_ohm: f64,
+    /// Whether it takes energy back; a rectifier does not.
+    pub reversible: bool,
+}
+
+/// What the link is made of.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DcLinkSettings {
+    /// Capacitance, in F.
+    pub capacitance_f: f64,
+    /// Source.
+    pub source: Source,
+    /// Precharge resistor, in ohm.
+    pub precharge_ohm: f64,
+    /// Discharge resistor, in ohm.
+    pub discharge_ohm: f64,
+    /// Braking resistor behind the chopper, in ohm.
+    pub chopper_ohm: f64,
+}
+
+/// What is on the link now.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct LinkSwitches {
+    /// The precharge relay is closed.
+    pub precharge: bool,
+    /// The main contactor is closed.
+    pub main: bool,
+    /// The discharge resistor is on the link.
+    pub discharge: bool,
+    /// The chopper conducts.
+    pub chopper: bool,
+}
+
+/// Energies since the beginning, in J.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct LinkEnergies {
+    /// Given by the source's voltage, before its resistance; negative when it took more.
+    pub source_j: f64,
+    /// Turned into heat in the source's and the precharge resistor.
+    pub path_j: f64,
+    /// Likewise in the discharge resistor.
+    pub discharge_j: f64,
+    /// Likewise in the braking resistor.
+    pub chopper_j: f64,
+    /// Given to the inverter; negative when braking returned more.
+    pub inverter_j: f64,
+}
+
+/// Capacitor and bookkeeping.
+#[derive(Clone, Debug)]
+pub struct DcLink {
+    settings: DcLinkSettings,
+    /// What is closed; set it between two steps.
+    pub switches: LinkSwitches,
+    udc_v: f64,
+    energies: LinkEnergies,
+}
+
+/// Rates of change: the voltage and the energies in their order.
+pub(super) type LinkSlopes = [f64; 6];
+
+impl DcLink {
+    /// Empty, everything open.
+    pub fn new(settings: DcLinkSettings) -> Self {
+        Self { settings, switches: LinkSwitches::default(), udc_v: 0.0, energies: LinkEnergies::default() }
+    }
+
+    /// What it is made of.
+    pub fn settings(&self) -> &DcLinkSettings {
+        &self.settings
+    }
+
+    /// The source, which may change during a run.
+    pub fn source_mut(&mut self) -> &mut Source {
+        &mut self.settings.source
+    }
+
+    /// Changes the braking resistor, in ohm.
+    pub fn set_chopper_ohm(&mut self, ohm: f64) {
+        self.settings.chopper_ohm = ohm;
+    }
+
+    /// Voltage, in V.
+    pub fn udc_v(&self) -> f64 {
+        self.udc_v
+    }
+
+    /// Sets the voltage, in V.
+    pub fn set_udc_v(&mut self, udc_v: f64) {
+        self.udc_v = udc_v;
+    }
+
+    /// Energies since the beginning.
+    pub fn energies(&self) -> LinkEnergies {
+        self.energies
+    }
+
+    /// Energy in the capacitor, in J.
+    pub fn stored_j(&self) -> f64 {
+        0.5 * self.settings.capacitance_f * self.udc_v * self.udc_v
+    }
+
+    /// Current that the source gives at a link voltage, and the resistance that it flows through.
+    fn source(&self, udc_v: f64) -> (f64, f64) {
+        let Source { voltage_v, resistance_ohm, reversible } = self.settings.source;
+        let resistance = match self.switches {
+            LinkSwitches { main: true, .. } => resistance_ohm,
+            LinkSwitches { precharge: true, .. } => resistance_ohm + self.settings.precharge_ohm,
+            _ => return (0.0, 0.0),
+        };
+        let current = (voltage_v - udc_v) / resistance;
+        (if reversible { current } else { current.max(0.0) }, resistance)
+    }
+
+    pub(super) fn slopes(&self, udc_v: f64, inverter_a: f64) -> LinkSlopes {
+        let DcLinkSettings { capacitance_f, discharge_ohm, chopper_ohm, source, .. } = self.settings;
+        let (source_a, path_ohm) = self.source(udc_v);
+        let through = |on: bool, ohm: f64| if on { udc_v / ohm } else { 0.0 };
+        let discharge_a = through(self.switches.discharge, discharge_ohm);
+        let chopper_a = through(self.switches.chopper, chopper_ohm);
+        [
+            (source_a - discharge_a - chopper_a - inverter_a) / capacitance_f,
+            source.voltage_v * source_a,
+            path_ohm * source_a * source_a,
+            udc_v * discharge_a,
+            udc_v * chopper_a,
+            udc_v * inverter_a,
+        ]
+    }
+
+    pub(super) fn finish(&mut self, udc_v: f64, energies: [f64; 5]) {
+        self.udc_v = udc_v;
+        let [source, path, discharge, chopper, inverter] = energies;
+        self.energies.source_j += source;
+        self.energies.path_j += path;
+        self.energies.discharge_j += discharge;
+        self.energies.chopper_j += chopper;
+        self.energies.inverter_j += inverter;
+    }
+}

@@ -1,0 +1,137 @@
+//! A gate driver fails under torque: the fault, what is refused meanwhile, the acknowledge, and the machine caught again.
+
+use super::line::{self, held, within};
+use super::{Plan, Scenario};
+use crate::analysis::{self, Figures};
+use crate::bench::LinePlan;
+use crate::machine::Machine;
+use crate::options::RunOptions;
+use crate::report::Page;
+use crate::trace::Recording;
+use crate::verdict::Verdict;
+use tractive::control::Demand;
+use tractive::machine::Ratings;
+use tractive::operator::Request;
+use tractive::protection::Fault;
+
+/// See the module. The run ends with exit code 1, because the drive has tripped.
+pub struct Acknowledge;
+
+const SPEED_RPM: f64 = 1_500.0;
+const FAILS_S: (f64, f64) = (1.0, 1.5);
+const CHARGE: [(f64, f64); 3] = [(0.1, 0.2), (1.35, 1.38) /* fault_not_acknowledged */, (1.9, 2.0)];
+const ENABLE: [(f64, f64); 3] = [(0.5, 1.25), (1.3, 1.33) /* fault_not_acknowledged */, (2.3, 3.0)];
+const ACKNOWLEDGE: [(f64, f64); 3] =
+    [(0.7, 0.75) /* no_fault */, (1.2, 1.25) /* cause_still_present */, (1.7, 1.75)];
+const REFUSALS: [&str; 4] =
+    ["no_fault", "cause_still_present", "fault_not_acknowledged", "fault_not_acknowledged"];
+const STATES: [&str; 13] = [
+    "self_test",
+    "ready",
+    "precharge",
+    "charged",
+    "enabled",
+    "running",
+    "fault",
+    "self_test",
+    "ready",
+    "precharge",
+    "charged",
+    "enabled",
+    "running",
+];
+const TORQUE: [(f64, f64); 3] = [(0.6, 0.5), (1.1, 0.0), (2.4, 0.5)];
+const DURATION_S: f64 = 3.0;
+
+fn request(t_s: f64, ratings: &Ratings) -> Request {
+    Request {
+        enable: within(&ENABLE, t_s),
+        charge: within(&CHARGE, t_s),
+        acknowledge: within(&ACKNOWLEDGE, t_s),
+        torque_nm: held(&TORQUE, t_s, 0.0) as f32 * ratings.max_torque_nm,
+        ..Request::idle(ratings)
+    }
+}
+
+impl Scenario for Acknowledge {
+    fn name(&self) -> &'static str {
+        "acknowledge"
+    }
+
+    fn figure(&self) -> &'static str {
+        "no figure: a gate driver fails, and the fault is acknowledged"
+    }
+
+    fn plan(&self, options: &RunOptions, machine: &Machine) -> Plan {
+        let scale = machine.folder.parameters.rated_speed_rpm / 2_000.0;
+        Plan {
+            lead_s: 0.0,
+            duration_s: DURATION_S,
+            speed: vec![(0.0, options.speed.unwrap_or(SPEED_RPM * scale))],
+            link: Vec::new(),
+            operator: Box::new(|_| (Demand::default(), true)),
+        }
+    }
+
+    fn line(&self, _options: &RunOptions, machine: &Machine) -> Option<LinePlan> {
+        let ratings = &machine.tables.ratings;
+        Some(LinePlan {
+            link: line::scaled(machine),
+            starts_charged: true,
+            commander: Box::new(|t_s| request(t_s, ratings)),
+            hardware: vec![(FAILS_S.0, FAILS_S.1, Fault::GateDriver)],
+            chopper_ohm: Vec::new(),
+            reversible: Vec::new(),
+        })
+    }
+
+    fn figures(&self, recording: &Recording, _options: &RunOptions, machine: &Machine) -> Figures {
+        let mut figures = analysis::common(recording);
+        let found: Vec<_> = line::states(recording).iter().map(|entered| entered.state).collect();
+        let named = recording.trip().is_some_and(|trip| trip.fault == Fault::GateDriver);
+        // Current flows on through the diodes until the field is empty.
+        let dead = analysis::window(recording, FAILS_S.0 + 0.05, 2.3);
+        let current_a = crate::verdict::worst(dead.iter().map(crate::trace::Row::peak_current_a));
+        let after = analysis::window(recording, 2.8, DURATION_S);
+        let torque_nm = after.iter().map(|row| row.te_nm).sum::<f64>() / after.len().max(1) as f64;
+        let error = (torque_nm / (0.5 * machine.folder.parameters.max_torque_nm) - 1.0).abs();
+        let mut verdicts = line::verdicts(recording, &REFUSALS);
+        verdicts.extend([
+            Verdict::at_most(
+                "states that are not the expected ones",
+                f64::from(u8::from(found != STATES)),
+                0.0,
+                "–",
+            ),
+            Verdict::at_most("fault with another name", f64::from(u8::from(!named)), 0.0, "–"),
+            Verdict::at_most(
+                "current between fault and enable (of the largest)",
+                current_a / machine.folder.parameters.max_current_a,
+                0.02,
+                "–",
+            ),
+            Verdict::at_most("mean torque off the demand at the end (share)", error, 0.01, "–"),
+        ]);
+        line::figures(&mut figures, recording);
+        figures.set("verdicts", verdicts);
+        figures
+    }
+
+    fn plots(&self, recording: &Recording, page: &mut Page) {
+        line::plots(page, recording);
+        page.plot_window(
+            "the gate driver fails: phase current u",
+            "A",
+            recording,
+            (FAILS_S.0 - 0.02, FAILS_S.0 + 0.05),
+            &[("ia", |row| row.ia_a)],
+        );
+        page.plot_window(
+            "the machine is caught: phase current u",
+            "A",
+            recording,
+            (2.28, 2.6),
+            &[("ia", |row| row.ia_a)],
+        );
+    }
+}

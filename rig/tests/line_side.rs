@@ -1,0 +1,67 @@
+//! The scenarios with a line side: every verdict is kept, on the built-in machine and where things are harder.
+
+use clap::Parser;
+use tractive_rig::machine::Machine;
+use tractive_rig::options::RunOptions;
+use tractive_rig::scenario;
+use tractive_rig::trace::Recording;
+
+#[derive(Parser)]
+struct Line {
+    scenario: String,
+    #[command(flatten)]
+    options: RunOptions,
+}
+
+/// Runs a scenario as on the command line; its recording and the verdicts that fall short.
+fn run(line: &str) -> (Recording, Vec<String>) {
+    let line = Line::parse_from(std::iter::once("test").chain(line.split(' ')));
+    let machine = Machine::load(line.options.machine()).unwrap();
+    let scenario = scenario::find(&line.scenario).unwrap();
+    let recording = scenario::drive(scenario.as_ref(), &line.options, &machine).unwrap();
+    let figures = scenario.figures(&recording, &line.options, &machine);
+    let (_, verdicts) = figures.values().iter().find(|(name, _)| *name == "verdicts").unwrap();
+    let verdicts = verdicts.as_array().unwrap();
+    assert!(verdicts.len() > 6);
+    let short = verdicts.iter().filter(|verdict| verdict["verdict"] != "pass");
+    (recording, short.map(|verdict| format!("{}: {}", verdict["what"], verdict["found"])).collect())
+}
+
+fn keeps_all(line: &str) -> Recording {
+    let (recording, short) = run(line);
+    assert!(short.is_empty(), "{line}: {short:?}");
+    recording
+}
+
+#[test]
+fn from_power_up_to_running_and_back_to_an_empty_link() {
+    let recording = keeps_all("precharge");
+    assert!(recording.trip().is_none());
+    // The chopper has nothing to do, and the discharge resistor takes what the capacitor held: C U²/2 = 6.75 kJ.
+    let energies = recording.link.unwrap().energies;
+    assert_eq!(energies.chopper_j, 0.0);
+    assert!((6_700.0..6_750.0).contains(&energies.discharge_j), "{} J", energies.discharge_j);
+}
+
+#[test]
+fn braking_into_a_link_that_cannot_take_it() {
+    for line in ["chopper", "chopper --dead-time-us 5 --adc-bits 12 --noise-a 0.5 --rs-error 50"] {
+        assert!(keeps_all(line).trip().is_none(), "{line}");
+    }
+}
+
+/// In every mode: with the chopper, with half of it, and when all of it is lost under full braking, the drive does not trip.
+#[test]
+fn no_overvoltage_whatever_the_speed_at_which_the_resistor_is_lost() {
+    for speed_rpm in [300, 800, 1_000, 1_300, 1_600, 1_900, 2_300, 3_000] {
+        let (recording, _) = run(&format!("chopper --speed {speed_rpm}"));
+        assert!(recording.trip().is_none(), "{speed_rpm} r/min: {:?}", recording.trip());
+        let peak_v = recording.rows.iter().map(|row| row.udc_v).fold(0.0, f64::max);
+        assert!((1_880.0..2_020.0).contains(&peak_v), "{speed_rpm} r/min: {peak_v} V");
+    }
+}
+
+#[test]
+fn a_gate_driver_that_fails_is_acknowledged() {
+    assert!(keeps_all("acknowledge").trip().is_some());
+}

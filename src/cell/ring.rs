@@ -1,0 +1,166 @@
+//! A ring that one interrupt fills until a fault freezes it, and that anybody reads afterwards.
+
+#[cfg(loom)]
+use loom::sync::atomic::{AtomicU32, Ordering, fence};
+
+#[cfg(not(loom))]
+use core::sync::atomic::{AtomicU32, Ordering, fence};
+
+use super::{Words, load, store};
+
+/// The last `N` values of one writer, `N` a power of two.
+///
+/// The writer is wait-free. Once it has been told of a fault it takes `N / 8` values more, the faulty one among them, and then
+/// no others: what led to the fault stays. The reader gets values only from a frozen ring, so nothing is written under its hands;
+/// should the ring be released while it reads, it notices and gets nothing.
+pub struct Ring<T, const W: usize, const N: usize> {
+    slots: [[AtomicU32; W]; N],
+    /// Values ever written. Beyond its largest number it goes on with `N`: the ring stays full.
+    written: AtomicU32,
+    /// How many of them a release has forgotten.
+    forgotten: AtomicU32,
+    /// Values since the fault, the faulty one among them.
+    after: AtomicU32,
+    value: core::marker::PhantomData<fn(T) -> T>,
+}
+
+impl<T: Words<W>, const W: usize, const N: usize> Ring<T, W, N> {
+    /// Values that are still taken from the faulty one on.
+    pub const AFTER: usize = {
+        assert!(N.is_power_of_two() && N >= 8);
+        N / 8
+    };
+
+    /// An empty ring.
+    #[cfg(not(loom))]
+    #[allow(clippy::declare_interior_mutable_const, reason = "an array initialiser, never borrowed")]
+    pub const fn new() -> Self {
+        Self {
+            slots: [const { [const { AtomicU32::new(0) }; W] }; N],
+            written: AtomicU32::new(0),
+            forgotten: AtomicU32::new(0),
+            after: AtomicU32::new(0),
+            value: core::marker::PhantomData,
+        }
+    }
+
+    /// An empty ring (loom's atomics are not `const`).
+    #[cfg(loom)]
+    pub fn new() -> Self {
+        Self {
+            slots: core::array::from_fn(|_| core::array::from_fn(|_| AtomicU32::new(0))),
+            written: AtomicU32::new(0),
+            forgotten: AtomicU32::new(0),
+            after: AtomicU32::new(0),
+            value: core::marker::PhantomData,
+        }
+    }
+
+    /// Writer's side: the next value, and whether a fault is latched.
+    #[inline(always)]
+    pub fn record(&self, value: T, faulty: bool) {
+        let after = self.after.load(Ordering::Relaxed);
+        if after == Self::AFTER as u32 {
+            return;
+        }
+        let written = self.written.load(Ordering::Relaxed);
+        let Some(slot) = self.slots.get(written as usize % N) else { return };
+        store(slot, value.to_words());
+        let next = written.wrapping_add(1);
+        self.written.store(if next == 0 { N as u32 } else { next }, Ordering::Release);
+        // The last word to change: who sees it full sees all that it froze.
+        self.after.store(after + u32::from(faulty), Ordering::Release);
+    }
+
+    /// Writer's side: forgets the fault and what led to it, and records anew.
+    pub fn release(&self) {
+        self.after.store(0, Ordering::Relaxed);
+        self.forgotten.store(self.written.load(Ordering::Relaxed), Ordering::Relaxed);
+        fence(Ordering::Release);
+    }
+
+    /// Reader's side: whether a fault has frozen the ring.
+    pub fn is_frozen(&self) -> bool {
+        self.after.load(Ordering::Acquire) == Self::AFTER as u32
+    }
+
+    /// Reader's side: the value number `index`, 0 the oldest; `None` beyond the newest, and while the ring is not frozen.
+    pub fn read(&self, index: usize) -> Option<T> {
+        if !self.is_frozen() {
+            return None;
+        }
+        let written = self.written.load(Ordering::Acquire);
+        let length = match written.checked_sub(self.forgotten.load(Ordering::Relaxed)) {
+            Some(kept) if (kept as usize) < N => kept as usize,
+            _ => N,
+        };
+        let back = length.checked_sub(index).filter(|back| *back > 0)?;
+        let value = T::from_words(load(self.slots.get((written as usize).wrapping_sub(back) % N)?));
+        fence(Ordering::Acquire);
+        let untouched = self.is_frozen() && self.written.load(Ordering::Relaxed) == written;
+        untouched.then_some(value)
+    }
+}
+
+impl<T: Words<W>, const W: usize, const N: usize> Default for Ring<T, W, N> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+#[cfg(all(test, not(loom)))]
+mod tests {
+    use super::*;
+
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    struct Number(u32);
+
+    impl Words<1> for Number {
+        fn to_words(self) -> [u32; 1] {
+            [self.0]
+        }
+
+        fn from_words([word]: [u32; 1]) -> Self {
+            Self(word)
+        }
+    }
+
+    fn contents<const N: usize>(ring: &Ring<Number, 1, N>) -> Vec<u32> {
+        (0..).map_while(|index| ring.read(index)).map(|number| number.0).collect()
+    }
+
+    extern crate std;
+    use std::vec::Vec;
+
+    #[test]
+    fn a_fault_freezes_what_came_before_and_a_little_after() {
+        for faulty_at in 0..40 {
+            let ring = Ring::<Number, 1, 16>::new();
+            for n in 0..60 {
+                let open = n < faulty_at + 2;
+                assert_eq!(contents(&ring).is_empty(), open, "{n}");
+                ring.record(Number(n), n >= faulty_at);
+            }
+            let first = (faulty_at + 2).saturating_sub(16);
+            assert_eq!(contents(&ring), (first..faulty_at + 2).collect::<Vec<_>>());
+        }
+    }
+
+    #[test]
+    fn a_released_ring_records_the_next_fault() {
+        let ring = Ring::<Number, 1, 8>::new();
+        (0..20).for_each(|n| ring.record(Number(n), n > 10));
+        ring.release();
+        assert!(!ring.is_frozen() && ring.read(0).is_none());
+        (100..103).for_each(|n| ring.record(Number(n), n > 100));
+        assert_eq!(contents(&ring), [100, 101]);
+    }
+
+    #[test]
+    fn a_full_ring_stays_full_when_the_count_wraps() {
+        let ring = Ring::<Number, 1, 8>::new();
+        ring.written.store(u32::MAX - 3, Ordering::Relaxed);
+        (0..12).for_each(|n| ring.record(Number(n), n >= 11));
+        assert_eq!(contents(&ring), (4..12).collect::<Vec<_>>());
+    }
+}

@@ -1,0 +1,128 @@
+//! Settings of the two systems.
+
+use super::{ABOVE_ZERO, Bound, ROUNDING, Refused, within};
+use crate::control::{Gains, SpeedDesign, ZSourceDesign, ZSourceGains};
+use crate::drive::{dual, traction};
+use crate::machine::Tables;
+use crate::protection::LinkLimits;
+
+/// Largest torque that a speed error of 1 rad/s may ask for, as a multiple of the largest.
+const STIFFEST: f32 = 10.0;
+/// Carrier periods in a control period.
+const MOST_CARRIERS: f32 = 8.0;
+/// What the compare units count in a carrier period, in ticks: sixteen bits hold a half of it in compare steps.
+const LONGEST_CARRIER: f32 = 4_000.0;
+
+impl Gains {
+    /// Whether they make sense.
+    ///
+    /// # Errors
+    /// The first scalar that does not.
+    pub fn check(&self) -> Result<(), Refused> {
+        let Self { carrier, pattern_rad_s, square_damping, observer } = *self;
+        within(&[
+            Bound("gains.carrier", carrier, ABOVE_ZERO, 1.0),
+            Bound("gains.pattern_rad_s", pattern_rad_s, ABOVE_ZERO, 1e4),
+            Bound("gains.square_damping", square_damping, ABOVE_ZERO, 10.0),
+            Bound("gains.observer", observer, ABOVE_ZERO, 0.5),
+        ])
+    }
+}
+
+impl traction::Settings {
+    /// Whether a drive may start with them and this machine.
+    ///
+    /// # Errors
+    /// The first scalar that makes no sense, of the machine or of the settings.
+    pub fn check(&self, tables: &Tables) -> Result<(), Refused> {
+        let Self { clock, devices, gains } = self;
+        tables.check()?;
+        clock.check()?;
+        devices.check(clock)?;
+        gains.check()
+    }
+}
+
+impl dual::Settings {
+    /// Whether a drive may start with them and this machine.
+    ///
+    /// # Errors
+    /// The first scalar that makes no sense, of the machine or of the settings.
+    pub fn check(&self, tables: &Tables) -> Result<(), Refused> {
+        let Self { clock, carrier_ticks, gains, speed, link, link_gains, limits } = self;
+        tables.check()?;
+        clock.check()?;
+        let control = clock.control_ticks as f32;
+        let carrier = *carrier_ticks as f32;
+        let longest = if control < LONGEST_CARRIER { control } else { LONGEST_CARRIER };
+        within(&[Bound("carrier_ticks", carrier, control / MOST_CARRIERS, longest)])?;
+        // An even number, and a whole part of the control period.
+        let whole = clock.control_ticks.is_multiple_of(*carrier_ticks) && carrier_ticks.is_multiple_of(2);
+        if !whole {
+            return Err(Refused { name: "carrier_ticks", value: carrier, least: control, most: control });
+        }
+        gains.check()?;
+        check_speed(speed, clock.control_s(), tables)?;
+        check_link(link, clock.control_s())?;
+        check_link_gains(link_gains, link)?;
+        check_limits(limits, tables)
+    }
+}
+
+fn check_speed(speed: &SpeedDesign, control_s: f32, tables: &Tables) -> Result<(), Refused> {
+    let SpeedDesign { inertia_kg_m2, natural_rad_s, period_s } = *speed;
+    let most_nm = STIFFEST * tables.ratings.max_torque_nm;
+    within(&[
+        Bound("speed.period_s", period_s, (1.0 - ROUNDING) * control_s, (1.0 + ROUNDING) * control_s),
+        Bound("speed.natural_rad_s", natural_rad_s, ABOVE_ZERO, 0.5 / control_s),
+        Bound("speed.inertia_kg_m2", inertia_kg_m2, ABOVE_ZERO, 0.5 * most_nm / natural_rad_s),
+    ])
+}
+
+fn check_link(link: &ZSourceDesign, control_s: f32) -> Result<(), Refused> {
+    let ZSourceDesign {
+        inductance_h,
+        resistance_ohm,
+        capacitance_f,
+        period_s,
+        inner_hz,
+        outer_hz,
+        link_slew_v_s,
+        duty_max,
+        inductor_max_a,
+    } = *link;
+    within(&[
+        Bound("link.inductance_h", inductance_h, ABOVE_ZERO, 0.1),
+        Bound("link.resistance_ohm", resistance_ohm, 0.0, 1.0),
+        Bound("link.capacitance_f", capacitance_f, ABOVE_ZERO, 0.1),
+        Bound("link.period_s", period_s, (1.0 - ROUNDING) * control_s, (1.0 + ROUNDING) * control_s),
+        Bound("link.inner_hz", inner_hz, ABOVE_ZERO, 0.2 / control_s),
+        Bound("link.outer_hz", outer_hz, ABOVE_ZERO, 0.5 * inner_hz),
+        Bound("link.link_slew_v_s", link_slew_v_s, ABOVE_ZERO, 1e5),
+        Bound("link.duty_max", duty_max, ABOVE_ZERO, 0.5 - ROUNDING),
+        Bound("link.inductor_max_a", inductor_max_a, ABOVE_ZERO, 1e4),
+    ])
+}
+
+/// The gains are those of the design.
+fn check_link_gains(gains: &ZSourceGains, link: &ZSourceDesign) -> Result<(), Refused> {
+    let ZSourceGains { inner_ohm, outer_s, integral_share } = *gains;
+    let wanted = link.gains();
+    let near = |name, value: f32, wanted: f32| Bound(name, value, 0.99 * wanted, 1.01 * wanted);
+    within(&[
+        near("link_gains.inner_ohm", inner_ohm, wanted.inner_ohm),
+        near("link_gains.outer_s", outer_s, wanted.outer_s),
+        near("link_gains.integral_share", integral_share, wanted.integral_share),
+    ])
+}
+
+fn check_limits(limits: &LinkLimits, tables: &Tables) -> Result<(), Refused> {
+    let LinkLimits { source_min_v, capacitor_max_v, duty_max } = *limits;
+    // The highest capacitor voltage of normal operation.
+    let highest_v = tables.ratings.dc_link_max_v / dual::TWO_LEVEL_SHARE;
+    within(&[
+        Bound("limits.capacitor_max_v", capacitor_max_v, highest_v, 3.0 * highest_v),
+        Bound("limits.source_min_v", source_min_v, ABOVE_ZERO, highest_v),
+        Bound("limits.duty_max", duty_max, ABOVE_ZERO, 0.5 - ROUNDING),
+    ])
+}

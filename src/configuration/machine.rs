@@ -1,0 +1,232 @@
+//! Ratings and tables of a machine.
+
+use super::{ABOVE_ZERO, Bound, ROUNDING, Refused, within};
+use crate::frames::Dq;
+use crate::machine::{Curve, Grid, Mtpa, Ratings, Tables, Weakening};
+use core::f32::consts::FRAC_2_PI;
+
+/// How far above its limit a trip level may lie, as a multiple: farther it protects nothing.
+const TRIP_CURRENT: f32 = 4.0;
+const TRIP_OTHERS: f32 = 3.0;
+/// Full torque in 1 ms at the quickest, in 100 s at the slowest.
+const SLEW_PER_S: (f32, f32) = (0.01, 1e3);
+/// Largest share of the nominal link that the largest current may drop across the stator's resistance.
+const RESISTIVE_SHARE: f32 = 0.5;
+/// Nodes of an axis.
+const NODES: (f32, f32) = (2.0, 1e4);
+
+impl Ratings {
+    /// Whether they make sense, by themselves and together.
+    ///
+    /// # Errors
+    /// The first scalar that does not.
+    pub fn check(&self) -> Result<(), Refused> {
+        let Self {
+            pole_pairs,
+            stator_resistance_ohm,
+            max_torque_nm,
+            max_power_w,
+            max_current_a,
+            max_speed_rad_s,
+            magnet_flux_wb,
+            dc_link_min_v,
+            dc_link_nominal_v,
+            dc_link_max_v,
+            max_switching_hz,
+            trip_current_a,
+            trip_dc_over_v,
+            trip_dc_under_v,
+            trip_speed_rad_s,
+            torque_slew_nm_s,
+        } = *self;
+        within(&[
+            Bound("ratings.pole_pairs", pole_pairs, 1.0, 100.0),
+            Bound("ratings.stator_resistance_ohm", stator_resistance_ohm, 0.0, 1e3),
+            Bound("ratings.max_torque_nm", max_torque_nm, ABOVE_ZERO, 1e7),
+            Bound("ratings.max_power_w", max_power_w, ABOVE_ZERO, 1e9),
+            Bound("ratings.max_current_a", max_current_a, ABOVE_ZERO, 1e5),
+            Bound("ratings.max_speed_rad_s", max_speed_rad_s, ABOVE_ZERO, 1.1e5),
+            Bound("ratings.magnet_flux_wb", magnet_flux_wb, 0.0, 1e3),
+            Bound("ratings.dc_link_min_v", dc_link_min_v, ABOVE_ZERO, 1e5),
+            Bound("ratings.dc_link_nominal_v", dc_link_nominal_v, ABOVE_ZERO, 1e5),
+            Bound("ratings.dc_link_max_v", dc_link_max_v, ABOVE_ZERO, 1e5),
+            Bound("ratings.max_switching_hz", max_switching_hz, 50.0, 1e5),
+            Bound("ratings.trip_current_a", trip_current_a, ABOVE_ZERO, 1e6),
+            Bound("ratings.trip_dc_over_v", trip_dc_over_v, ABOVE_ZERO, 1e6),
+            Bound("ratings.trip_dc_under_v", trip_dc_under_v, 0.0, 1e6),
+            Bound("ratings.trip_speed_rad_s", trip_speed_rad_s, ABOVE_ZERO, 1.1e6),
+            Bound("ratings.torque_slew_nm_s", torque_slew_nm_s, ABOVE_ZERO, 1e9),
+        ])?;
+        let whole = pole_pairs as u32 as f32;
+        let ohm = RESISTIVE_SHARE * dc_link_nominal_v / max_current_a;
+        let (slowest, quickest) = SLEW_PER_S;
+        let full_power_w = (1.0 + 0.01) * max_torque_nm * max_speed_rad_s;
+        within(&[
+            Bound("ratings.pole_pairs", pole_pairs, whole, whole),
+            Bound("ratings.max_power_w", max_power_w, ABOVE_ZERO, full_power_w),
+            Bound("ratings.dc_link_min_v", dc_link_min_v, ABOVE_ZERO, dc_link_nominal_v),
+            Bound("ratings.dc_link_nominal_v", dc_link_nominal_v, dc_link_min_v, dc_link_max_v),
+            Bound("ratings.dc_link_max_v", dc_link_max_v, dc_link_nominal_v, below(trip_dc_over_v)),
+            Bound("ratings.trip_dc_over_v", trip_dc_over_v, dc_link_max_v, TRIP_OTHERS * dc_link_max_v),
+            Bound("ratings.trip_dc_under_v", trip_dc_under_v, 0.0, below(dc_link_min_v)),
+            Bound("ratings.max_current_a", max_current_a, ABOVE_ZERO, below(trip_current_a)),
+            Bound("ratings.trip_current_a", trip_current_a, max_current_a, TRIP_CURRENT * max_current_a),
+            Bound("ratings.max_speed_rad_s", max_speed_rad_s, ABOVE_ZERO, below(trip_speed_rad_s)),
+            Bound(
+                "ratings.trip_speed_rad_s",
+                trip_speed_rad_s,
+                max_speed_rad_s,
+                TRIP_OTHERS * max_speed_rad_s,
+            ),
+            Bound("ratings.stator_resistance_ohm", stator_resistance_ohm, 0.0, ohm),
+            Bound(
+                "ratings.torque_slew_nm_s",
+                torque_slew_nm_s,
+                slowest * max_torque_nm,
+                quickest * max_torque_nm,
+            ),
+        ])
+    }
+}
+
+/// The largest number below one that is above 0.
+fn below(value: f32) -> f32 {
+    f32::from_bits(value.to_bits().saturating_sub(1))
+}
+
+/// What is allowed of an axis: its first value, its last one.
+struct Axis {
+    names: [&'static str; 3],
+    first: (f32, f32),
+    last: (f32, f32),
+}
+
+impl Axis {
+    fn check(&self, first: f32, inverse_step: f32, count: usize) -> Result<(), Refused> {
+        let [first_name, step_name, count_name] = self.names;
+        let steps = count.saturating_sub(1) as f32;
+        let (least, most) = self.last;
+        within(&[
+            Bound(count_name, count as f32, NODES.0, NODES.1),
+            Bound(first_name, first, self.first.0, self.first.1),
+            // The last node lies where it may.
+            Bound(step_name, inverse_step, steps / (most - first), steps / (least - first)),
+        ])
+    }
+}
+
+/// As many nodes as there are said to be, every one a number.
+fn nodes<const N: usize>(
+    name: &'static str,
+    nodes: &[[f32; N]],
+    count: usize,
+    least: f32,
+) -> Result<(), Refused> {
+    let length = nodes.len() as f32;
+    within(&[Bound(name, length, count as f32, count as f32)])?;
+    nodes.iter().flatten().try_for_each(|value| within(&[Bound(name, *value, least, f32::MAX)]))
+}
+
+fn near(name: &'static str, value: f32, wanted: f32, off: f32) -> Result<(), Refused> {
+    within(&[Bound(name, value, wanted - off, wanted + off)])
+}
+
+impl Tables {
+    /// Whether ratings and tables make sense, by themselves and together.
+    ///
+    /// # Errors
+    /// The first scalar that does not.
+    pub fn check(&self) -> Result<(), Refused> {
+        let Self { name: _, ratings, flux, mtpa, weakening } = self;
+        ratings.check()?;
+        check_flux(flux, ratings)?;
+        check_weakening(weakening, ratings)?;
+        let [_, most_nm] = weakening.torque.at(weakening.torque.last());
+        within(&[Bound("ratings.max_torque_nm", ratings.max_torque_nm, ABOVE_ZERO, 1.02 * most_nm)])?;
+        // The table's nodes lie a little off the map, so that it is right on average.
+        let rest = crate::control::flux_linkage(self, Dq::default());
+        let off = 0.05 * weakening.torque.last();
+        near("ratings.magnet_flux_wb", ratings.magnet_flux_wb, if rest.d > 0.0 { rest.d } else { 0.0 }, off)?;
+        check_mtpa(mtpa, flux, ratings)
+    }
+}
+
+fn check_flux(flux: &Grid<2>, ratings: &Ratings) -> Result<(), Refused> {
+    let Grid { first_row, inverse_row_step, rows, first_column, inverse_column_step, columns, nodes: fluxes } =
+        *flux;
+    let reach = ratings.max_current_a;
+    let rows_of = Axis {
+        names: ["flux.first_row", "flux.inverse_row_step", "flux.rows"],
+        first: (-4.0 * reach, -(1.0 - ROUNDING) * reach),
+        last: (-ROUNDING * reach, 4.0 * reach),
+    };
+    rows_of.check(first_row, inverse_row_step, rows)?;
+    let columns_of = Axis {
+        names: ["flux.first_column", "flux.inverse_column_step", "flux.columns"],
+        first: (0.0, 0.0),
+        last: ((1.0 - ROUNDING) * reach, 4.0 * reach),
+    };
+    columns_of.check(first_column, inverse_column_step, columns)?;
+    nodes("flux.nodes", fluxes, rows.saturating_mul(columns), f32::MIN)
+}
+
+fn check_mtpa(mtpa: &Mtpa, flux: &Grid<2>, ratings: &Ratings) -> Result<(), Refused> {
+    let Mtpa { universal, parameters, start } = mtpa;
+    let Curve { first, inverse_step, nodes: values } = *universal;
+    let axis = Axis {
+        names: ["mtpa.universal.first", "mtpa.universal.inverse_step", "mtpa.universal.nodes"],
+        first: (0.0, 0.0),
+        last: (1.0 - ROUNDING, 1.0 + ROUNDING),
+    };
+    axis.check(first, inverse_step, values.len())?;
+    nodes("mtpa.universal.nodes", values, values.len(), 0.0)?;
+    let Grid { first_row, inverse_row_step, rows, first_column, inverse_column_step, columns, nodes: values } =
+        *parameters;
+    // The same axes as the flux's.
+    near("mtpa.parameters.first_row", first_row, flux.first_row, 0.0)?;
+    near("mtpa.parameters.inverse_row_step", inverse_row_step, flux.inverse_row_step, 0.0)?;
+    near("mtpa.parameters.rows", rows as f32, flux.rows as f32, 0.0)?;
+    near("mtpa.parameters.first_column", first_column, flux.first_column, 0.0)?;
+    near("mtpa.parameters.inverse_column_step", inverse_column_step, flux.inverse_column_step, 0.0)?;
+    near("mtpa.parameters.columns", columns as f32, flux.columns as f32, 0.0)?;
+    // Both are divided by.
+    nodes("mtpa.parameters.nodes", values, rows.saturating_mul(columns), f32::MIN_POSITIVE)?;
+    let Curve { first, inverse_step, nodes: values } = *start;
+    let axis = Axis {
+        names: ["mtpa.start.first", "mtpa.start.inverse_step", "mtpa.start.nodes"],
+        first: (0.0, 0.0),
+        last: ((1.0 - ROUNDING) * ratings.max_torque_nm, 1.2 * ratings.max_torque_nm),
+    };
+    axis.check(first, inverse_step, values.len())?;
+    nodes("mtpa.start.nodes", values, values.len(), f32::MIN)
+}
+
+fn check_weakening(weakening: &Weakening, ratings: &Ratings) -> Result<(), Refused> {
+    let Weakening { currents, torque } = weakening;
+    let Curve { first, inverse_step, nodes: values } = *torque;
+    // The flux that the lowest link leaves at the highest speed is on the table, and a good deal more.
+    let least_wb = FRAC_2_PI * ratings.dc_link_min_v / (ratings.max_speed_rad_s * ratings.pole_pairs);
+    let axis = Axis {
+        names: ["weakening.torque.first", "weakening.torque.inverse_step", "weakening.torque.nodes"],
+        first: (ABOVE_ZERO, least_wb),
+        last: (1.4 * first, 1e3 * first),
+    };
+    axis.check(first, inverse_step, values.len())?;
+    nodes("weakening.torque.nodes", values, values.len(), 0.0)?;
+    let Grid { first_row, inverse_row_step, rows, first_column, inverse_column_step, columns, nodes: pairs } =
+        *currents;
+    near("weakening.currents.first_row", first_row, first, 0.0)?;
+    near("weakening.currents.inverse_row_step", inverse_row_step, inverse_step, 0.0)?;
+    near("weakening.currents.rows", rows as f32, values.len() as f32, 0.0)?;
+    let axis = Axis {
+        names: [
+            "weakening.currents.first_column",
+            "weakening.currents.inverse_column_step",
+            "weakening.currents.columns",
+        ],
+        first: (0.0, 0.0),
+        last: (1.0 - ROUNDING, 1.0 + ROUNDING),
+    };
+    axis.check(first_column, inverse_column_step, columns)?;
+    nodes("weakening.currents.nodes", pairs, rows.saturating_mul(columns), f32::MIN)
+}

@@ -1,0 +1,88 @@
+//! The ZS9 firmware on the NUCLEO-G474RE.
+
+use core::sync::atomic::{AtomicU32, Ordering};
+use cortex_m_rt::{entry, exception, interrupt};
+use tractive::board::nucleo_g474re::position::Encoder;
+use tractive::board::nucleo_g474re::power_stage::{AdcCode, PowerStage};
+use tractive::board::nucleo_g474re::registers::Registers;
+use tractive::board::nucleo_g474re::zs9::sampling::Zeros;
+use tractive::board::nucleo_g474re::zs9::stage::STAGE;
+use tractive::board::nucleo_g474re::zs9::{self as board, Control, OPERATOR, Pwm, settings};
+use tractive::board::nucleo_g474re::{Interrupt as interrupt, PULSE, die};
+use tractive::drive::dual::{ControlTask, PwmTask, Shared};
+use tractive::machine::zs9::BUILT_IN;
+
+static SHARED: Shared = Shared::new();
+/// What the start measured, written before the interrupts are unmasked.
+static ZEROS: [AtomicU32; 7] = [const { AtomicU32::new(0) }; 7];
+
+fn keep(zeros: &Zeros) {
+    let codes = zeros.motors.iter().flatten().chain([&zeros.inductor]);
+    for (cell, zero) in ZEROS.iter().zip(codes) {
+        cell.store(u32::from(zero.0), Ordering::Relaxed);
+    }
+}
+
+fn kept() -> Zeros {
+    let [u1, v1, w1, u2, v2, w2, inductor] =
+        ZEROS.each_ref().map(|cell| AdcCode(cell.load(Ordering::Relaxed) as u16));
+    Zeros { motors: [[u1, v1, w1], [u2, v2, w2]], inductor }
+}
+
+#[entry]
+fn main() -> ! {
+    if let Ok(zeros) = board::prepare() {
+        keep(&zeros);
+        board::run();
+    }
+    board::idle()
+}
+
+/// Deadline: the last peak before the next control interrupt. Missed: fault `control_deadline`, all gates off.
+#[interrupt]
+fn TIM2() {
+    static mut BOARD: Option<Control<'static, Encoder>> = None;
+    static mut TASK: Option<ControlTask> = None;
+    let board = BOARD.get_or_insert_with(|| {
+        let registers = Registers::CHIP;
+        let [first, second] = STAGE.encoder_zeros;
+        let encoder = |timer, encoder_zero| {
+            let stage = PowerStage { encoder_zero, ..STAGE.common };
+            Encoder::new(timer, &stage, BUILT_IN.ratings.pole_pairs as u32)
+        };
+        let encoders = [encoder(registers.tim4, first), encoder(registers.tim3, second)];
+        Control::new(registers, kept(), encoders, &OPERATOR)
+    });
+    board.acknowledge();
+    TASK.get_or_insert_with(|| ControlTask::new(&BUILT_IN, settings())).run(board, &SHARED);
+    PULSE.control_ran();
+}
+
+/// Comes at peaks and valleys; only the peaks are the drive's. Deadline: the next valley, where the shadow registers take
+/// over. Missed: a break, gates off for good.
+#[interrupt]
+fn TIM1_UP_TIM16() {
+    static mut BOARD: Option<Pwm> = None;
+    static mut TASK: Option<PwmTask> = None;
+    let board = BOARD.get_or_insert_with(|| Pwm::new(Registers::CHIP, kept()));
+    if board.begin() {
+        TASK.get_or_insert_with(|| PwmTask::new(&BUILT_IN, settings())).run(board, &SHARED);
+        PULSE.pwm_ran();
+    }
+}
+
+#[exception]
+unsafe fn HardFault(_frame: &cortex_m_rt::ExceptionFrame) -> ! {
+    die()
+}
+
+/// Any other exception or interrupt: there is none that the drive survives (the clock security system's among them).
+#[exception]
+unsafe fn DefaultHandler(_number: i16) -> ! {
+    die()
+}
+
+#[panic_handler]
+fn panic(_info: &core::panic::PanicInfo) -> ! {
+    die()
+}

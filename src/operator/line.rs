@@ -1,0 +1,159 @@
+//! The line side: precharge, discharge, chopper.
+
+use super::health::contactors;
+use super::settings::Line;
+use super::{Input, Settings, Switches};
+use crate::protection::{Fault, Violation};
+
+/// Link voltage below which it counts as empty, in V: the limit of extra-low voltage.
+pub(super) const EMPTY_V: f32 = 60.0;
+/// Time constants after which charging or discharging has failed.
+const TOO_LONG: f32 = 10.0;
+/// Share of the nominal voltage that may be left between source and link when the main contactor closes.
+const GAP_SHARE: f32 = 0.02;
+/// Slots over which the link's rate is taken.
+const RATE_SLOTS: u32 = 20;
+
+/// What a sequence has come to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Outcome {
+    /// Not there yet.
+    Going,
+    /// Done.
+    Done,
+    /// Failed.
+    Failed(Violation),
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Charging {
+    /// The precharge relay is closing.
+    RelayCloses,
+    /// The link charges.
+    Charges,
+    /// The main contactor is closing.
+    MainCloses,
+    /// The precharge relay is opening.
+    RelayOpens,
+}
+
+/// Charging the link: relay, resistor, main contactor, relay.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Precharge {
+    stage: Charging,
+    /// Slots in this stage.
+    slots: u32,
+    /// Link voltage when the rate was taken last, in V.
+    before_v: f32,
+}
+
+impl Precharge {
+    pub(super) const fn new() -> Self {
+        Self { stage: Charging::RelayCloses, slots: 0, before_v: 0.0 }
+    }
+
+    pub(super) const fn switches(&self) -> Switches {
+        let main = matches!(self.stage, Charging::MainCloses | Charging::RelayOpens);
+        let precharge = !matches!(self.stage, Charging::RelayOpens);
+        Switches { precharge, main, discharge: false, chopper: 0.0 }
+    }
+
+    /// One slot. The main contactor closes when the source is at most [`GAP_SHARE`] away: by the link's own rate times the time
+    /// constant, so the source need not be measured.
+    pub(super) fn step(&mut self, input: &Input, line: &Line, settings: &Settings) -> Outcome {
+        self.slots = self.slots.saturating_add(1);
+        let passed_s = self.slots as f32 * settings.slot_s;
+        let udc_v = input.observed.udc_v;
+        let (wrong, next) = match self.stage {
+            Charging::RelayCloses => (contactors(input, false, true), Charging::Charges),
+            Charging::Charges => {
+                if let Some(violation) = contactors(input, false, true) {
+                    return Outcome::Failed(violation);
+                }
+                let lowest_v = settings.ratings.dc_link_min_v;
+                if passed_s > TOO_LONG * line.precharge_s {
+                    return Outcome::Failed((Fault::PrechargeTimeout, udc_v, lowest_v));
+                }
+                if self.is_near(udc_v, line, settings) && udc_v >= lowest_v {
+                    self.enter(Charging::MainCloses, udc_v);
+                }
+                return Outcome::Going;
+            }
+            Charging::MainCloses => (contactors(input, true, true), Charging::RelayOpens),
+            Charging::RelayOpens => match contactors(input, true, false) {
+                None => return Outcome::Done,
+                wrong => (wrong, Charging::RelayOpens),
+            },
+        };
+        match wrong {
+            None => self.enter(next, udc_v),
+            Some(violation) if passed_s > line.contactor_s => return Outcome::Failed(violation),
+            Some(_) => {}
+        }
+        Outcome::Going
+    }
+
+    fn enter(&mut self, stage: Charging, udc_v: f32) {
+        *self = Self { stage, slots: 0, before_v: udc_v };
+    }
+
+    /// Whether the source is near, looked at every [`RATE_SLOTS`] slots.
+    fn is_near(&mut self, udc_v: f32, line: &Line, settings: &Settings) -> bool {
+        if !self.slots.is_multiple_of(RATE_SLOTS) {
+            return false;
+        }
+        let rate_v_s = (udc_v - self.before_v) / (RATE_SLOTS as f32 * settings.slot_s);
+        self.before_v = udc_v;
+        (rate_v_s * line.precharge_s).abs() < GAP_SHARE * settings.ratings.dc_link_nominal_v
+    }
+}
+
+/// Discharging the link: contactors open, then the resistor.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Discharge {
+    /// Both contactors are open, by their own contacts.
+    open: bool,
+    slots: u32,
+}
+
+impl Discharge {
+    pub(super) const fn new() -> Self {
+        Self { open: false, slots: 0 }
+    }
+
+    /// The resistor is never on the link while a contactor may be closed.
+    pub(super) const fn switches(&self) -> Switches {
+        Switches { precharge: false, main: false, discharge: self.open, chopper: 0.0 }
+    }
+
+    /// One slot.
+    pub(super) fn step(&mut self, input: &Input, line: &Line, settings: &Settings) -> Outcome {
+        self.slots = self.slots.saturating_add(1);
+        let passed_s = self.slots as f32 * settings.slot_s;
+        let udc_v = input.observed.udc_v;
+        match contactors(input, false, false) {
+            Some(violation) if self.open || passed_s > line.contactor_s => return Outcome::Failed(violation),
+            Some(_) => return Outcome::Going,
+            None if !self.open => *self = Self { open: true, slots: 0 },
+            None => {}
+        }
+        if udc_v < EMPTY_V {
+            return Outcome::Done;
+        }
+        if self.slots as f32 * settings.slot_s > TOO_LONG * line.discharge_s {
+            return Outcome::Failed((Fault::DischargeTimeout, udc_v, EMPTY_V));
+        }
+        Outcome::Going
+    }
+}
+
+/// The chopper's duty at a link voltage: a straight line between its two levels. A voltage that is no number calls for nothing.
+pub(super) fn chopper(udc_v: f32, line: &Line) -> f32 {
+    if udc_v >= line.chopper_full_v {
+        1.0
+    } else if udc_v > line.chopper_from_v {
+        (udc_v - line.chopper_from_v) / (line.chopper_full_v - line.chopper_from_v)
+    } else {
+        0.0
+    }
+}

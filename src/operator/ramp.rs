@@ -1,0 +1,53 @@
+//! The torque demand's way: limited in its rate (slew) and in how fast the rate changes (jerk). What passengers and couplings feel
+//! is shaped here; the drive's own slew limit behind it is the inverter's.
+
+use crate::frames::{limit, sqrt};
+
+/// Slew and jerk.
+#[derive(Clone, Copy, Debug)]
+pub struct Rates {
+    /// Length of a step, in s.
+    pub step_s: f32,
+    /// Largest rate, in N·m/s.
+    pub slew_nm_s: f32,
+    /// Largest change of the rate, in N·m/s².
+    pub jerk_nm_s2: f32,
+}
+
+/// The demand on its way.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Ramp {
+    torque_nm: f32,
+    rate_nm_s: f32,
+}
+
+impl Ramp {
+    /// At rest at zero.
+    pub const fn new() -> Self {
+        Self { torque_nm: 0.0, rate_nm_s: 0.0 }
+    }
+
+    /// Where it is, in N·m.
+    pub const fn torque_nm(&self) -> f32 {
+        self.torque_nm
+    }
+
+    /// One step towards a target, in N·m. The target is reached exactly; it is passed only where it came nearer, or turned
+    /// back, faster than the jerk limit lets the rate follow.
+    pub fn step(&mut self, target_nm: f32, rates: &Rates) -> f32 {
+        let Rates { step_s, slew_nm_s, jerk_nm_s2 } = *rates;
+        let change = jerk_nm_s2 * step_s;
+        let error = target_nm - self.torque_nm;
+        // The largest rate from which whole steps of the jerk lead to rest within what is left: r²/2j + r·dt/2 = |error|.
+        let able = change * (sqrt(0.25 + 2.0 * error.abs() / (change * step_s)) - 0.5);
+        let rate = if able < slew_nm_s { able } else { slew_nm_s };
+        let wanted = if error < 0.0 { -rate } else { rate };
+        self.rate_nm_s = limit(wanted, self.rate_nm_s - change, self.rate_nm_s + change);
+        self.torque_nm += self.rate_nm_s * step_s;
+        let passed = (target_nm - self.torque_nm) * error <= 0.0;
+        if passed && self.rate_nm_s.abs() <= 2.0 * change {
+            *self = Self { torque_nm: target_nm, rate_nm_s: 0.0 };
+        }
+        self.torque_nm
+    }
+}

@@ -1,0 +1,92 @@
+//! What the operator's step is built with.
+
+use crate::machine::Ratings;
+
+/// The line side: what stands between the source and the link.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Line {
+    /// Time constant of precharge resistor and link capacitor, in s.
+    pub precharge_s: f32,
+    /// Time constant of discharge resistor and link capacitor, in s.
+    pub discharge_s: f32,
+    /// Longest time in which a contactor answers, in s.
+    pub contactor_s: f32,
+    /// Link voltage at which the chopper begins, in V; none has no chopper.
+    pub chopper_from_v: f32,
+    /// Link voltage at which it is always on, in V, above `chopper_from_v`.
+    pub chopper_full_v: f32,
+}
+
+impl Line {
+    /// The usual levels for a machine: the chopper works between its highest operating voltage and where braking is limited.
+    pub const fn rated(ratings: &Ratings, precharge_s: f32, discharge_s: f32) -> Self {
+        Self {
+            precharge_s,
+            discharge_s,
+            contactor_s: 0.2,
+            chopper_from_v: above_highest_v(ratings, CHOPPER_FROM),
+            chopper_full_v: above_highest_v(ratings, CHOPPER_FULL),
+        }
+    }
+}
+
+/// Places between the highest operating voltage (0) and the overvoltage trip (1).
+const CHOPPER_FROM: f32 = 0.05;
+const CHOPPER_FULL: f32 = 0.25;
+const BRAKING_NONE: f32 = 0.6;
+const BRAKING_SPAN: f32 = 0.3;
+/// Places between the lowest operating voltage (0) and the undervoltage trip (1).
+const MOTORING_NONE: f32 = 0.5;
+
+const fn above_highest_v(ratings: &Ratings, place: f32) -> f32 {
+    ratings.dc_link_max_v + place * (ratings.trip_dc_over_v - ratings.dc_link_max_v)
+}
+
+/// Link voltages that end motoring and braking as rated, and over how many volts each fades, in V.
+pub(super) struct Ends {
+    pub motoring_none_v: f32,
+    pub motoring_span_v: f32,
+    pub braking_none_v: f32,
+    pub braking_span_v: f32,
+}
+
+impl Ends {
+    pub(super) const fn rated(ratings: &Ratings) -> Self {
+        let below = ratings.dc_link_min_v - ratings.trip_dc_under_v;
+        let above = ratings.trip_dc_over_v - ratings.dc_link_max_v;
+        Self {
+            motoring_none_v: ratings.dc_link_min_v - MOTORING_NONE * below,
+            motoring_span_v: MOTORING_NONE * below,
+            braking_none_v: above_highest_v(ratings, BRAKING_NONE),
+            braking_span_v: BRAKING_SPAN * above,
+        }
+    }
+}
+
+/// Everything that does not change while it runs.
+#[derive(Clone, Copy, Debug)]
+pub struct Settings<'a> {
+    /// The machine.
+    pub ratings: &'a Ratings,
+    /// Length of a slot, in s, above 0.
+    pub slot_s: f32,
+    /// Slew rate of the torque demand, in N·m/s, above 0; below the drive's own, so that it follows.
+    pub slew_nm_s: f32,
+    /// Rate at which the slew rate changes, in N·m/s², above 0.
+    pub jerk_nm_s2: f32,
+    /// Contactors and resistors; `None`: the link is alive by itself.
+    pub line: Option<Line>,
+}
+
+/// The demand's slew rate as a share of the drive's.
+const SLEW_SHARE: f32 = 0.8;
+/// Time in which the demand takes up its slew rate, in s.
+const JERK_S: f32 = 0.05;
+
+impl<'a> Settings<'a> {
+    /// The usual ones for a machine.
+    pub const fn rated(ratings: &'a Ratings, slot_s: f32, line: Option<Line>) -> Self {
+        let slew_nm_s = SLEW_SHARE * ratings.torque_slew_nm_s;
+        Self { ratings, slot_s, slew_nm_s, jerk_nm_s2: slew_nm_s / JERK_S, line }
+    }
+}

@@ -1,0 +1,8 @@
+//! The operator's state machine: every transition, every refusal, every fault of its own, and what no sequence may do.
+
+mod faults;
+mod properties;
+mod ramp;
+mod refusals;
+mod transitions;
+mod world;

@@ -1,0 +1,327 @@
+//! Interrupts that are late or lost, in both drives: each side notices what the other one misses, by its first interrupt that can, and
+//! turns the gates off in it. Instants here are real ones; the tasks count theirs, and fall behind with every interrupt they miss.
+
+use tractive::board::{
+    ControlPort, DualControlPort, DualPwmPort, DualSample, GateFeedback, MotorDemand, PlayedPeriod,
+    PowerSample, PwmPort, Sample,
+};
+use tractive::control::{Demand, Gains, LinkWindow, Measurements};
+use tractive::drive::Report;
+use tractive::drive::dual::{self, DualReport};
+use tractive::drive::traction;
+use tractive::frames::{Abc, Angle, Dq};
+use tractive::machine::{BUILT_IN, zs9};
+use tractive::modulation::{CarrierPeriod, Devices, Mode};
+use tractive::nine_switch::Scheme;
+use tractive::protection::{Disarmed, Fault, SafeState, Trip};
+use tractive::time::{Clock, Instant};
+
+const CLOCK: Clock = Clock::new(25_000_000, 2_500);
+/// Electrical, in rad/s: slow enough for an angle of the next period to be no surprise.
+const OMEGA: f32 = 84.0;
+/// From here on interrupts go astray.
+const SETTLED: u32 = 2_000_000;
+
+/// What befalls the interrupts from [`SETTLED`] on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Mishap {
+    None,
+    /// So many control ticks are lost.
+    ControlLost(u32),
+    /// So many PWM ticks are lost: the shadow registers are played once more each.
+    PwmLost(u32),
+    /// One control interrupt ends so many ticks after its period.
+    ControlLate(u32),
+    /// PWM interrupts come this much later than they should, in ticks, from now on.
+    PwmLate(u32),
+}
+
+fn angle(at: u32) -> Angle {
+    let turns = f64::from(OMEGA) * f64::from(at) / 25e6 / std::f64::consts::TAU;
+    Angle((turns.rem_euclid(1.0) * 4_294_967_296.0) as u64 as u32)
+}
+
+fn currents(at: u32, current: Dq) -> Abc {
+    let ripple = (at % 7919) as f32 * 1e-4;
+    (current + Dq { d: ripple, q: -ripple }).unpark(angle(at).sin_cos()).abc()
+}
+
+/// The timers and the gates of either drive.
+struct Board {
+    now: u32,
+    late: u32,
+    entered: Option<u32>,
+    shadow: CarrierPeriod,
+    periods: [PlayedPeriod; 2],
+    trip: Option<Trip>,
+}
+
+impl Board {
+    fn new(first: CarrierPeriod, off: PlayedPeriod) -> Self {
+        Self { now: 0, late: 0, entered: None, shadow: first, periods: [off; 2], trip: None }
+    }
+}
+
+impl ControlPort for Board {
+    fn sample(&mut self, _now: Instant) -> Sample {
+        Sample {
+            measured: Measurements {
+                currents_a: currents(self.now, Dq { d: -30.0, q: 40.0 }),
+                udc_v: 1500.0,
+                angle: angle(self.now),
+            },
+            demand: Demand { torque_nm: 200.0, slew_limited: false },
+            enable: true,
+            window: LinkWindow::OPEN,
+            acknowledge: 0,
+            hardware: None,
+        }
+    }
+
+    fn enter(&mut self, _safe: SafeState, _now: Instant) {
+        self.entered = self.entered.or(Some(self.now));
+    }
+
+    fn overrun_ticks(&mut self, _now: Instant) -> u32 {
+        self.late
+    }
+
+    fn report(&mut self, _now: Instant, report: &Report) {
+        self.trip = report.trip;
+    }
+}
+
+impl PwmPort for Board {
+    fn sample(&mut self, _now: Instant) -> Abc {
+        currents(self.now, Dq { d: -30.0, q: 40.0 })
+    }
+
+    fn play(&mut self, _now: Instant, next: &CarrierPeriod) {
+        self.shadow = *next;
+    }
+
+    fn enter(&mut self, _safe: SafeState, _now: Instant) {
+        self.entered = self.entered.or(Some(self.now));
+    }
+}
+
+impl DualControlPort for Board {
+    fn sample(&mut self, _now: Instant) -> DualSample {
+        DualSample {
+            currents_a: [currents(self.now, Dq { d: -5.0, q: 25.0 }); 2],
+            angles: [Some(angle(self.now)); 2],
+            capacitor_v: 533.5,
+            inductor_a: 20.0,
+            source_v: 400.0,
+            demands: [MotorDemand::Torque(Demand { torque_nm: 50.0, slew_limited: true }); 2],
+            link_ref_v: 667.0,
+            scheme: Scheme::Rthd,
+            enable: true,
+        }
+    }
+
+    fn gates_off(&mut self, _now: Instant) {
+        self.entered = self.entered.or(Some(self.now));
+    }
+
+    fn overrun_ticks(&mut self, _now: Instant, _deadline_ticks: u32) -> u32 {
+        self.late
+    }
+
+    fn report(&mut self, _now: Instant, report: &DualReport) {
+        self.trip = report.trip;
+    }
+}
+
+impl DualPwmPort for Board {
+    fn sample(&mut self, _now: Instant) -> PowerSample {
+        PowerSample {
+            currents_a: [currents(self.now, Dq { d: -5.0, q: 25.0 }); 2],
+            capacitor_v: 533.5,
+            source_v: 400.0,
+            gates: GateFeedback::default(),
+        }
+    }
+
+    fn play(&mut self, _now: Instant, next: &PlayedPeriod) {
+        self.periods = [self.periods[1], *next];
+    }
+
+    fn gates_off(&mut self, _now: Instant) {
+        self.entered = self.entered.or(Some(self.now));
+    }
+}
+
+/// The real instants of both timers, and who is served next.
+struct Timers {
+    control: u32,
+    pwm: u32,
+    mishap: Mishap,
+    lost: u32,
+}
+
+enum Turn {
+    Control,
+    Pwm,
+}
+
+impl Timers {
+    /// The next interrupt, whether it is served, and its real instant; the PWM timer's half lasts `half` from there.
+    fn next(&mut self, half: impl Fn() -> u32) -> (Turn, bool, u32) {
+        let delay = if let Mishap::PwmLate(ticks) = self.mishap { ticks } else { 0 };
+        let delay = if self.pwm >= SETTLED { delay } else { 0 };
+        if self.pwm + delay <= self.control {
+            let at = self.pwm + delay;
+            self.pwm += half();
+            let lost = matches!(self.mishap, Mishap::PwmLost(count) if at >= SETTLED && self.lost < count);
+            self.lost += u32::from(lost);
+            (Turn::Pwm, !lost, at)
+        } else {
+            let at = self.control;
+            self.control += CLOCK.control_ticks;
+            let lost =
+                matches!(self.mishap, Mishap::ControlLost(count) if at >= SETTLED && self.lost < count);
+            self.lost += u32::from(lost);
+            (Turn::Control, !lost, at)
+        }
+    }
+
+    fn overrun(&self, at: u32) -> u32 {
+        match self.mishap {
+            Mishap::ControlLate(ticks) if (SETTLED..SETTLED + CLOCK.control_ticks).contains(&at) => ticks,
+            _ => 0,
+        }
+    }
+}
+
+/// The PMaSynRM drive for some time after the mishap: the trip, when the gates went off, the longest half meanwhile.
+fn traction(mishap: Mishap) -> (Option<Trip>, Option<u32>, u32) {
+    let devices = Devices::new(250, 0, 900.0, &CLOCK);
+    let settings = traction::Settings { clock: CLOCK, devices, gains: Gains::DEFAULT };
+    let first = devices.shortest_half_ticks;
+    let shared = traction::Shared::new();
+    let lost = Disarmed::of(Fault::AngleLost);
+    let mut control =
+        traction::ControlTask::new(&BUILT_IN, settings, Instant(CLOCK.control_ticks)).without(lost);
+    let mut pwm = traction::PwmTask::new(&BUILT_IN, settings, Instant(first));
+    let mut board = Board::new(CarrierPeriod::off(first), PlayedPeriod::off(0));
+    let mut timers = Timers { control: CLOCK.control_ticks, pwm: first, mishap, lost: 0 };
+    let mut longest = 0;
+    while timers.control < SETTLED + 200_000 {
+        let half = board.shadow.period_ticks;
+        longest = longest.max(half);
+        let (turn, served, at) = timers.next(|| half);
+        board.now = at;
+        board.late = timers.overrun(at);
+        match turn {
+            Turn::Control if served => control.run(&mut board, &shared),
+            Turn::Pwm if served => pwm.run(&mut board, &shared),
+            _ => {}
+        }
+        assert!(at < SETTLED || board.entered.is_some() || pwm.trip().is_none());
+    }
+    // A timer without its interrupt plays on; but the gates are in the safe state.
+    let plays_on = matches!(mishap, Mishap::PwmLost(count) if count > 10);
+    let pulses = board.shadow.mode != Mode::Off;
+    assert_eq!(pulses, board.entered.is_none() || plays_on, "pulses without a fault, none with one");
+    (board.trip.or(pwm.trip()), board.entered, longest)
+}
+
+/// The same of the ZS9, with a carrier period in ticks.
+fn zs9(mishap: Mishap, carrier_ticks: u32) -> (Option<Trip>, Option<u32>) {
+    let settings = dual::Settings::new(CLOCK, carrier_ticks);
+    let shared = dual::Shared::new();
+    // What the gates do is not played here.
+    let stuck = Disarmed::of(Fault::LegStuck);
+    let mut control = dual::ControlTask::new(&zs9::BUILT_IN, settings);
+    let mut pwm = dual::PwmTask::new(&zs9::BUILT_IN, settings).without(stuck);
+    let off = PlayedPeriod::off(settings.half_steps());
+    let mut board = Board::new(CarrierPeriod::default(), off);
+    let first = settings.first_peak_ticks();
+    let mut timers = Timers { control: CLOCK.control_ticks, pwm: first, mishap, lost: 0 };
+    while timers.control < SETTLED + 200_000 {
+        let (turn, served, at) = timers.next(|| carrier_ticks);
+        board.now = at;
+        board.late = timers.overrun(at);
+        match turn {
+            Turn::Control if served => control.run(&mut board, &shared),
+            Turn::Pwm if served => pwm.run(&mut board, &shared),
+            _ => {}
+        }
+    }
+    let plays_on = matches!(mishap, Mishap::PwmLost(count) if count > 10);
+    let pulses = board.periods[1] != off;
+    assert_eq!(pulses, board.entered.is_none() || plays_on, "pulses without a fault, none with one");
+    (board.trip.or(pwm.trip()), board.entered)
+}
+
+/// The mishap is told by this name, and the gates are off within this many ticks of its instant.
+fn both_trip(mishap: Mishap, fault: Fault, within: u32) {
+    let (trip, entered, longest) = traction(mishap);
+    assert_eq!(trip.map(|trip| trip.fault), Some(fault), "{mishap:?}");
+    let entered = entered.unwrap_or_else(|| panic!("{mishap:?}: gates are still on"));
+    // One carrier period is two halves; the tick that goes astray is the first after SETTLED.
+    let carrier = 2 * longest;
+    assert!(
+        entered - SETTLED <= within.min(carrier) + longest,
+        "{mishap:?}: after {} ticks",
+        entered - SETTLED
+    );
+    for carrier_ticks in [2_500, 1_250] {
+        let (trip, entered) = zs9(mishap, carrier_ticks);
+        assert_eq!(trip.map(|trip| trip.fault), Some(fault), "ZS9 at {carrier_ticks}: {mishap:?}");
+        let after = entered.unwrap_or_else(|| panic!("{mishap:?}: gates are still on")) - SETTLED;
+        assert!(after <= CLOCK.control_ticks + carrier_ticks, "ZS9: {mishap:?}: after {after} ticks");
+    }
+}
+
+#[test]
+fn nothing_astray_is_no_fault() {
+    let (trip, entered, _) = traction(Mishap::None);
+    assert_eq!((trip, entered), (None, None));
+    for carrier_ticks in [2_500, 1_250] {
+        assert_eq!(zs9(Mishap::None, carrier_ticks), (None, None));
+    }
+}
+
+#[test]
+fn a_lost_control_tick_is_noticed_by_the_pwm_interrupt() {
+    for count in [1, 2, 5, 1_000] {
+        both_trip(Mishap::ControlLost(count), Fault::StaleCommand, CLOCK.control_ticks);
+    }
+}
+
+#[test]
+fn a_lost_pwm_tick_is_noticed_by_the_control_interrupt() {
+    for count in [1, 2, 5, 1_000] {
+        both_trip(Mishap::PwmLost(count), Fault::PwmDeadline, 2 * CLOCK.control_ticks);
+    }
+}
+
+#[test]
+fn a_late_control_interrupt_notices_itself() {
+    for ticks in [1, 100, 2_400] {
+        both_trip(Mishap::ControlLate(ticks), Fault::ControlDeadline, CLOCK.control_ticks);
+    }
+}
+
+/// A PWM interrupt has time until the next boundary. What comes before the next control interrupt changes nothing; later than a quarter
+/// of a control period, with control in between, it counts as lost.
+#[test]
+fn a_delayed_pwm_interrupt_is_noticed_by_the_control_interrupt() {
+    let (trip, entered, _) = traction(Mishap::PwmLate(400));
+    assert_eq!((trip, entered), (None, None));
+    for late in [2_500, 6_000] {
+        let (trip, entered, longest) = traction(Mishap::PwmLate(late));
+        let (trip, entered) = (trip.unwrap(), entered.unwrap());
+        assert_eq!(trip.fault, Fault::PwmDeadline);
+        assert!(trip.value > trip.limit && trip.value < CLOCK.seconds(2 * 2_500), "{trip:?}");
+        assert!(entered - SETTLED <= 2 * longest, "{entered}");
+    }
+    for (carrier_ticks, harmless, late) in [(2_500, 1_200, 1_300), (1_250, 600, 700)] {
+        assert_eq!(zs9(Mishap::PwmLate(harmless), carrier_ticks), (None, None));
+        let (trip, entered) = zs9(Mishap::PwmLate(late), carrier_ticks);
+        assert_eq!(trip.map(|trip| trip.fault), Some(Fault::PwmDeadline));
+        assert!(entered.unwrap() - SETTLED <= CLOCK.control_ticks + carrier_ticks);
+    }
+}

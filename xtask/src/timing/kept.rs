@@ -1,0 +1,103 @@
+//! What the repository holds of the numbers: the page of costs, and the sizes that the images must not outgrow.
+
+use std::fmt::Write as _;
+use std::path::PathBuf;
+
+use anyhow::{Context, Result};
+
+use super::report::Report;
+use super::table;
+use crate::build;
+
+/// By how much a number of the page may have moved: this share, or this much.
+const MOVED_SHARE: f64 = 0.05;
+const MOVED: f64 = 10.0;
+/// Sizes are kept rounded up to a multiple of this many bytes.
+const GRAIN: u64 = 256;
+
+/// A kept file, as it should be now.
+pub struct Kept {
+    path: PathBuf,
+    text: String,
+    /// Whether numbers may only fall (sizes), or may move a little either way.
+    falls: bool,
+}
+
+/// The files by what was measured.
+pub fn files(report: &Report) -> [Kept; 2] {
+    let file = |name: &str| build::root().join(name);
+    [
+        Kept { path: file("docs/cost.md"), text: table::page(report), falls: false },
+        Kept { path: file("sizes.toml"), text: sizes(report), falls: true },
+    ]
+}
+
+fn sizes(report: &Report) -> String {
+    let mut text = String::from(
+        "# Sizes of the images in bytes, rounded up. `cargo xtask timing` fails when one of them grows beyond this;\n\
+         # `cargo xtask timing --write` takes them down anew.\n",
+    );
+    for measured in report.systems {
+        let sizes = &measured.image.sizes;
+        let stack = u64::from(measured.statistics.stack_bytes.unsigned_abs());
+        let _ = writeln!(text, "\n[{}]", measured.system.name);
+        for (name, bytes) in
+            [("code", sizes.code), ("tables", sizes.tables), ("ram", sizes.ram), ("stack", stack)]
+        {
+            let _ = writeln!(text, "{name} = {}", bytes.next_multiple_of(GRAIN));
+        }
+    }
+    text
+}
+
+/// Writes them.
+pub fn write(files: &[Kept]) -> Result<()> {
+    for Kept { path, text, .. } in files {
+        std::fs::write(path, text).with_context(|| path.display().to_string())?;
+    }
+    Ok(())
+}
+
+/// What does not fit.
+pub fn complaints(files: &[Kept]) -> Vec<String> {
+    let complaint = |file: &Kept| {
+        let found = std::fs::read_to_string(&file.path).unwrap_or_default();
+        let differs = difference(&found, &file.text, file.falls)?;
+        Some(format!("{}: {differs}; `cargo xtask timing --write` writes it anew", file.path.display()))
+    };
+    files.iter().filter_map(complaint).collect()
+}
+
+/// The first line that is out of date.
+fn difference(kept: &str, now: &str, falls: bool) -> Option<String> {
+    let (kept_lines, now_lines): (Vec<_>, Vec<_>) = (kept.lines().collect(), now.lines().collect());
+    if kept_lines.len() != now_lines.len() {
+        return Some(format!("{} lines, {} now", kept_lines.len(), now_lines.len()));
+    }
+    let same = |(kept, now): (&str, &str)| match (kept.parse::<f64>(), now.parse::<f64>()) {
+        (Ok(kept), Ok(now)) if falls => now <= kept,
+        (Ok(kept), Ok(now)) => (now - kept).abs() <= (MOVED_SHARE * kept).max(MOVED),
+        _ => kept == now,
+    };
+    let line = kept_lines.iter().zip(&now_lines).find(|(kept, now)| {
+        let (kept, now): (Vec<_>, Vec<_>) = (kept.split(' ').collect(), now.split(' ').collect());
+        kept.len() != now.len() || !kept.into_iter().zip(now).all(same)
+    });
+    line.map(|(kept, now)| format!("`{kept}` is now `{now}`"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes_may_fall_and_costs_may_move_a_little() {
+        assert_eq!(difference("code = 512\n", "code = 256\n", true), None);
+        assert!(difference("code = 512\n", "code = 768\n", true).unwrap().contains("768"));
+        assert_eq!(difference("| a | 1000 |", "| a | 1049 |", false), None);
+        assert!(difference("| a | 1000 |", "| a | 1051 |", false).is_some());
+        assert_eq!(difference("| a | 20 |", "| a | 29 |", false), None);
+        assert!(difference("| a | 20 |", "| b | 20 |", false).is_some());
+        assert!(difference("", "| b | 20 |", false).is_some());
+    }
+}

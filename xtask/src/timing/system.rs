@@ -1,0 +1,259 @@
+//! The systems, and what they are driven through.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result};
+
+use super::drive::{Bench, Drive};
+use super::parts::{self, Part};
+use super::profile::{self, Profile};
+use super::statistics::{INTERRUPTS, Statistics};
+use super::tally::Tally;
+use crate::elf::Image;
+use crate::setup::Toolchain;
+use crate::{build, image};
+
+/// Both directions of torque and of rotation through every mode, up to the highest stator frequency; once with dead time
+/// that is to be compensated.
+const DRIVES: [&str; 2] = ["--to=6000 --dead-time-us=3", "--to=-6000 --brake"];
+/// Then short ones: the PWM timer starts this much later against the control timer, in µs. Halves of the asynchronous
+/// carrier last five control periods and five ninths, so they meet nine phases, 11 µs apart; these fall between.
+/// A demand that is no number ends them.
+const PHASES_US: [f64; 3] = [3.0, 6.0, 9.0];
+const SHORT_S: f64 = 0.02;
+/// From the run's beginning to the scenario's, in control periods.
+const LEAD_PERIODS: usize = 100;
+const CONTROL_S: f64 = 1e-4;
+/// From the first frozen sample to the fault, in control periods.
+const FROZEN_PERIODS: f64 = 19.0;
+
+/// The ZS9 in every scheme; each drive motors, weakens the field and brakes. With two carrier periods a control period, and
+/// with a fault of either interrupt at the end.
+const DUAL_DRIVES: [&str; 7] = [
+    "--scheme=s",
+    "--scheme=rs",
+    "--scheme=rthd",
+    "--scheme=zvo",
+    "--scheme=s --carrier-hz=20000 --uin=800",
+    "--scheme=s --inject=sensor-frozen-2@0.05",
+    "--scheme=s --inject=leg-stuck-on@0.05",
+];
+
+/// A system of the repository.
+#[derive(Clone, Copy, Debug)]
+pub struct System {
+    /// As in `--json`.
+    pub name: &'static str,
+    pub build: build::System,
+    scenario: &'static str,
+    /// What the rows of its tables are called.
+    pub modes: &'static [&'static str],
+}
+
+impl System {
+    pub const ALL: [Self; 2] = [
+        Self {
+            name: "pmasynrm",
+            build: build::System::Traction,
+            scenario: "timing",
+            modes: &["async", "sync15", "sync12", "mid7", "mid3", "square", "off"],
+        },
+        Self {
+            name: "zs9",
+            build: build::System::Zs9,
+            scenario: "zs9-timing",
+            modes: &[
+                "s-motoring",
+                "s-weakening",
+                "s-braking",
+                "rs-motoring",
+                "rs-weakening",
+                "rs-braking",
+                "rthd-motoring",
+                "rthd-weakening",
+                "rthd-braking",
+                "zvo-motoring",
+                "zvo-weakening",
+                "zvo-braking",
+                "off",
+            ],
+        },
+    ];
+
+    /// Builds the image and drives it.
+    pub fn measure(self, toolchain: &Toolchain, rig: &Path, qemu: &Path) -> Result<Measured> {
+        let path = build::image(toolchain, self.build, None)?;
+        let image = image::read(&path)?;
+        let bench = Bench {
+            rig: rig.to_owned(),
+            qemu: qemu.to_owned(),
+            scenario: self.scenario,
+            image: image.clone(),
+            path: path.clone(),
+        };
+        let mut sum = Sum::default();
+        match self.build {
+            build::System::Traction => traction(&bench, &mut sum)?,
+            build::System::Zs9 => {
+                for options in DUAL_DRIVES {
+                    let drive = sum.add(&bench, options)?;
+                    sum.profile(&drive);
+                }
+            }
+        }
+        Measured::new(self, path, image, sum)
+    }
+}
+
+fn traction(bench: &Bench, sum: &mut Sum) -> Result<()> {
+    let mut switch_s = None;
+    for options in DRIVES {
+        let drive = sum.add(bench, options)?;
+        sum.profile(&drive);
+        switch_s = switch_s.or(first_switch_s(&drive));
+    }
+    for phase_us in PHASES_US {
+        sum.add(bench, &format!("--to=6000 --pwm-delay-us={phase_us} --fault-at={SHORT_S}"))?;
+    }
+    // A switch of mode, a fault and full torque at the limit of the current, all in one tick. Frozen currents are found
+    // after a number of periods, and of all faults they cost the most: the whole control law is executed besides.
+    let switch_s = switch_s.context("the drive never switched its mode")?;
+    let freeze_s = switch_s - FROZEN_PERIODS * CONTROL_S;
+    sum.add(bench, &format!("--to=6000 --freeze-at={freeze_s:.6}"))?;
+    Ok(())
+}
+
+/// When control first works for another mode with pulses than before, in the scenario's time: the middle of the period
+/// before that tick.
+fn first_switch_s(drive: &Drive) -> Option<f64> {
+    let modes: Vec<&str> =
+        drive.modes.iter().filter(|(name, ..)| name == "control").map(|(_, mode, _)| mode.as_str()).collect();
+    let index = modes.windows(2).position(|pair| pair[0] != "off" && pair[1] != pair[0])? + 1;
+    // The first interrupt, number 0, comes one period after the beginning.
+    Some((index as f64 + 0.5 - LEAD_PERIODS as f64) * CONTROL_S)
+}
+
+/// All drives of a system together.
+#[derive(Default)]
+struct Sum {
+    statistics: Statistics,
+    hits: Tally,
+    behind: Tally,
+    calls: BTreeMap<u32, usize>,
+    longest: BTreeMap<u32, Vec<u32>>,
+}
+
+impl Sum {
+    fn add(&mut self, bench: &Bench, options: &str) -> Result<Drive> {
+        eprintln!("{} {options}", bench.scenario);
+        let drive = bench.drive(&options.split(' ').collect::<Vec<_>>())?;
+        self.statistics.add(&drive)?;
+        for (exception, addresses) in &drive.longest {
+            let longest = self.longest.entry(*exception).or_default();
+            if addresses.len() > longest.len() {
+                longest.clone_from(addresses);
+            }
+        }
+        Ok(drive)
+    }
+
+    /// Takes it into the profile; the short drives would shift the means.
+    fn profile(&mut self, drive: &Drive) {
+        self.hits.merge(&drive.hits);
+        self.behind.merge(&drive.behind);
+        for call in &drive.calls {
+            *self.calls.entry(call.exception).or_default() += 1;
+        }
+    }
+}
+
+/// What a system's drives gave.
+pub struct Measured {
+    pub system: System,
+    pub image: Image,
+    pub statistics: Statistics,
+    /// Of each interrupt.
+    pub parts: Vec<(&'static str, Vec<Part>)>,
+    path: PathBuf,
+    sum: Sum,
+}
+
+impl Measured {
+    fn new(system: System, path: PathBuf, image: Image, sum: Sum) -> Result<Self> {
+        let bytes = profile::bytes(&path)?;
+        let profile = Profile::new(&bytes)?;
+        let mut parts = Vec::new();
+        for (name, exception) in INTERRUPTS {
+            let longest = sum.longest.get(&exception).map_or(&[][..], Vec::as_slice);
+            let calls = sum.calls.get(&exception).copied().unwrap_or(0);
+            parts.push((name, parts::parts(&profile, exception, &sum.hits, calls, longest)?));
+        }
+        Ok(Self { system, image, statistics: sum.statistics.clone(), parts, path, sum })
+    }
+
+    /// The dearest functions of each interrupt.
+    pub fn profile_table(&self, count: usize) -> Result<String> {
+        let bytes = profile::bytes(&self.path)?;
+        let profile = Profile::new(&bytes)?;
+        let mut text = String::new();
+        for (name, exception) in INTERRUPTS {
+            let shares = profile.shares(exception, &self.sum.hits, &self.sum.behind)?;
+            let calls = self.sum.calls.get(&exception).copied().unwrap_or(0);
+            text += &profile::table(&format!("{} {name}", self.system.name), &shares, calls, count);
+        }
+        Ok(text)
+    }
+}
+
+#[cfg(test)]
+pub mod tests {
+    use super::*;
+    use crate::elf::Sizes;
+    use crate::timing::meter::Call;
+
+    /// A PWM interrupt and two of control, of the first system.
+    pub fn example() -> Measured {
+        let call =
+            |exception, instructions| Call { exception, instructions, cycles: 1_700, ..Call::default() };
+        let served = |name: &str| (name.to_owned(), "mid7".to_owned(), 100.0);
+        let drive = Drive {
+            calls: vec![call(26, 7), call(24, 10), call(24, 20)],
+            modes: vec![served("pwm"), served("control"), served("control")],
+            stack_bytes: 640,
+            ..Drive::default()
+        };
+        let mut statistics = Statistics::default();
+        statistics.add(&drive).unwrap();
+        let sizes = Sizes { code: 1, tables: 2, rodata: 3, ram: 4, recorder: 6, stack: 5 };
+        let part = Part { name: "MTPA, two passes", mean: 12.0, longest: 20 };
+        Measured {
+            system: System::ALL[0],
+            image: Image { sizes, ..Image::default() },
+            statistics,
+            parts: vec![("control", vec![part])],
+            path: PathBuf::new(),
+            sum: Sum::default(),
+        }
+    }
+
+    #[test]
+    fn the_load_is_that_of_both_interrupts() {
+        // 1,700 cycles ten thousand times a second are a tenth of 170 MHz; one PWM interrupt comes for two of control.
+        let statistics = example().statistics;
+        let load = statistics.load("mid7").unwrap();
+        assert!((load.mean - 15.0).abs() < 1e-9 && (load.max - 15.0).abs() < 1e-9);
+        assert!(statistics.load("square").is_none());
+    }
+
+    #[test]
+    fn the_first_switch_is_found_in_the_middle_of_a_period() {
+        let served = |(name, mode): &(&str, &str)| ((*name).to_owned(), (*mode).to_owned(), 0.0);
+        let mut modes = vec![("control", "off"); 100];
+        modes.extend([("pwm", "async"), ("control", "async"), ("pwm", "sync15"), ("control", "sync15")]);
+        let drive = Drive { modes: modes.iter().map(served).collect(), ..Drive::default() };
+        // Interrupt number 101 comes 102 periods after the run's beginning, 2 after the scenario's.
+        assert!((first_switch_s(&drive).unwrap() - 1.5e-4).abs() < 1e-12);
+        assert!(first_switch_s(&Drive::default()).is_none());
+    }
+}
