@@ -535,7 +535,8 @@ impl Drive {
     /// leg that is stuck has no such choice, and the short circuit's torque has its peak at a few per cent of the speed.
     fn safe_torque_limit_nm(&self, case: &Case) -> f64 {
         match case.fault.cause {
-            Cause::Bench(Kind::Gate(..) | Kind::Device(_)) => f64::INFINITY,
+            // A line that goes on falling after the gates are off comes below the EMF in the end.
+            Cause::Bench(Kind::Gate(..) | Kind::Device(_) | Kind::Supply(_)) => f64::INFINITY,
             _ => 0.1 * self.machine.folder.parameters.max_torque_nm,
         }
     }
