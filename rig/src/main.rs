@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 use tractive_rig::analysis::Figures;
+use tractive_rig::campaign::{self, command::CampaignOptions};
 use tractive_rig::machine::Machine;
 use tractive_rig::options::{RunOptions, not_negative, positive};
 use tractive_rig::report::{self, Page};
@@ -52,6 +53,8 @@ enum Command {
     },
     /// The modulator's pulses in steady state.
     Pattern(PatternOptions),
+    /// Faults in every mode, at every speed, motoring, braking and coasting, and what came of each.
+    Campaign(CampaignOptions),
     /// The nine-switch modulator's gates for one carrier period (T = 1): IN.csv has scheme,theta1_deg,m1,theta2_deg,m2,d_sh;
     /// OUT.csv adds for each gate UH ... WL its level just after t = 0 (X_init) and its toggle instants (X_edges, with ; between),
     /// feasible (1 or 0; then the gates are those of what fits), m1_applied and m2_applied.
@@ -144,6 +147,7 @@ fn command(command: Command) -> Result<ExitCode> {
             nine_switch::run(&input, &output)?;
             Ok(ExitCode::SUCCESS)
         }
+        Command::Campaign(options) => campaign::command::run(&options),
         Command::Pattern(options) => {
             let machine = Machine::load(&options.machine)?;
             let wanted = pattern::Wanted {

@@ -3,11 +3,13 @@
 use rand::SeedableRng;
 use rand::rngs::StdRng;
 use rand_distr::{Distribution, Normal};
+use serde::Serialize;
 use std::collections::VecDeque;
 use tractive::frames::{Abc, Angle};
 
 /// What a current sensor does wrong.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum CurrentFault {
     /// Repeats its last reading.
     Stuck,
@@ -19,12 +21,15 @@ pub enum CurrentFault {
     Scaled(f64),
     /// Adds white noise of this rms value, in A.
     Noisy(f64),
+    /// Reads the end of its range, in A.
+    Railed(f64),
     /// Reads NaN.
     NotFinite,
 }
 
 /// What an angle sensor does wrong. Angles electrical, in degrees.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum AngleFault {
     /// Stands still.
     Frozen,
@@ -73,6 +78,7 @@ impl CurrentSpoiler {
                 let noise = Normal::new(0.0, rms_a).map_or(0.0, |noise| noise.sample(&mut self.random));
                 *reading + noise as f32
             }
+            CurrentFault::Railed(end_a) => end_a as f32,
             CurrentFault::NotFinite => f32::NAN,
         };
         true_a

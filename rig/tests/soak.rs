@@ -6,7 +6,7 @@ use tractive::control::{Demand, Gains};
 use tractive::drive::traction::Settings;
 use tractive::modulation::Devices;
 use tractive::time::Instant;
-use tractive_rig::bench::{self, Bench, Flaws, Supply, Tick};
+use tractive_rig::bench::{self, Bench, Flaws, Limits, Supply, Tick};
 use tractive_rig::machine::Machine;
 use tractive_rig::plant::{Plant, PlantSettings, SpeedSource};
 use tractive_rig::run::{CLOCK, Tasks};
@@ -51,11 +51,12 @@ fn drive(origin: Tick, duration_s: f64, trace_step_s: f64, goes_on: impl FnMut(&
         link_steps: Vec::new(),
         flaws: Flaws::default(),
         supply: Supply::Stiff,
+        limits: Limits::NONE,
         injection: None,
     };
     let mut bench = Bench::new(plant, Box::new(demand), &settings).beginning_at(origin).without_edges();
     let settings = Settings { clock: CLOCK, devices, gains: Gains::DEFAULT };
-    let tasks = Tasks::beginning_at(Instant(origin as u32), machine.tables, settings, first_half_ticks);
+    let mut tasks = Tasks::beginning_at(Instant(origin as u32), machine.tables, settings, first_half_ticks);
     tasks.drive(&mut bench, goes_on).unwrap();
     bench
 }

@@ -7,7 +7,9 @@
 use super::messages::{COMMITTAL_WORDS, Committal, CommittalRecord, Gates, HalfKind, Report, VoltageCommand};
 use crate::board::{ControlPort, PwmPort, Sample};
 use crate::cell::{Downlink, SEEN, Trail, Uplink};
-use crate::control::{Boundary, Committed, Controller, Demand, Follows, Gains, Input, Law, Ripple};
+use crate::control::{
+    Boundary, Committed, Controller, Demand, Follows, Gains, Input, Law, Ripple, six_step_v,
+};
 use crate::frames::{Abc, AlphaBeta, Angle, UNITS_PER_RADIAN};
 use crate::machine::{Machine, Tables};
 use crate::modulation::{
@@ -32,6 +34,11 @@ const CONTROL_LATE_PART: u32 = 16;
 
 /// How fast the voltage glides from square wave to what the torque needs, in shares of six-step per second.
 const GLIDE_PER_S: f32 = 12.0;
+
+/// Flux linkage that the voltage forces, over the magnets', above which torque keeps its sign.
+const ONE_SIDED_FLUX: f32 = 1.5;
+/// What is left of torque that keeps its sign, as a share of the largest.
+const ONE_SIDED_SHARE: f32 = 0.001;
 
 /// Phase current, as a share of the largest, whose sign may change within a half.
 const SMALL_CURRENT_SHARE: f32 = 0.05;
@@ -104,6 +111,8 @@ pub struct ControlTask<M = &'static Tables> {
     steady_v: f32,
     /// Fundamental that the last operating point would have without a limit, as a share of six-step.
     depth: f32,
+    /// The last torque that was not zero, in N·m: its sign is the side of the flux circle on which the machine is.
+    side_nm: f32,
     /// Fundamental to which the voltage has glided after square wave, as a share of six-step; 0 otherwise.
     filled_to: f32,
     /// Mode that the newest command was made for, and the halves for which its flux hexagon still changes its size.
@@ -131,6 +140,7 @@ impl<M: Machine> ControlTask<M> {
             boundary: None,
             steady_v: 0.0,
             depth: 0.0,
+            side_nm: 0.0,
             filled_to: 0.0,
             unsettled: (Mode::Off, 0),
             demand_nm: 0.0,
@@ -225,6 +235,7 @@ impl<M: Machine> ControlTask<M> {
             self.watch = FrozenWatch::new();
             self.boundary = None;
             self.steady_v = 0.0;
+            self.side_nm = 0.0;
         }
         let finite = command.reference.voltage_v.is_finite() && command.reference.rate.is_finite();
         self.check(
@@ -307,9 +318,10 @@ impl<M: Machine> ControlTask<M> {
         let boundary = self.new_boundary(applied, now, sample.measured.udc_v);
         let decided = applied.map_or(Mode::Off, |applied| applied.next.kind.ahead()[0]);
         let committed = Committed { settled: self.is_settled(decided, boundary.is_some()), ..committed };
+        let demand = self.one_sided(&sample.demand, committed.filled, omega, sample.measured.udc_v);
         let input = Input {
             measured: &sample.measured,
-            demand: &sample.demand,
+            demand: &demand,
             window: &sample.window,
             committed: &committed,
             boundary: boundary.as_ref(),
@@ -318,6 +330,9 @@ impl<M: Machine> ControlTask<M> {
         let output = self.controller.step(&input, &Law { gains, clock, tables: self.machine.tables() });
         self.steady_v = output.voltage.steady_v;
         self.depth = output.voltage.depth;
+        if output.torque_nm != 0.0 {
+            self.side_nm = output.torque_nm;
+        }
         command.reference.voltage_v = output.voltage.voltage_v;
         command.reference.vector = output.voltage.vector;
         command.reference.carrier_angle = output.voltage.carrier.angle();
@@ -344,6 +359,22 @@ impl<M: Machine> ControlTask<M> {
             return (largest, false);
         }
         (if self.filled_to < largest { self.filled_to } else { largest }, true)
+    }
+
+    /// The demand, which keeps its sign for as long as the voltage forces much more flux upon the machine than its magnets have: near
+    /// no torque the two signs then lie far apart on the circle of flux linkage, and the way between them goes past currents
+    /// beyond the largest. The voltage is on its way down meanwhile, so this lasts tens of milliseconds.
+    fn one_sided(&self, demand: &Demand, filled: bool, omega: f32, udc_v: f32) -> Demand {
+        let ratings = &self.machine.tables().ratings;
+        let forced_v = self.filled_to * six_step_v(udc_v);
+        let forces = filled && forced_v > ONE_SIDED_FLUX * omega.abs() * ratings.magnet_flux_wb;
+        let least_nm = ONE_SIDED_SHARE * ratings.max_torque_nm;
+        let (side, along_nm) =
+            if self.side_nm < 0.0 { (-1.0, -demand.torque_nm) } else { (1.0, demand.torque_nm) };
+        if forces && self.side_nm != 0.0 && along_nm < least_nm {
+            return Demand { torque_nm: side * least_nm, ..*demand };
+        }
+        *demand
     }
 
     /// Whether two sectors have passed since the square wave gave way to a pattern or the other way round: so long the flux

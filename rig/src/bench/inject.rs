@@ -25,6 +25,8 @@ pub enum Kind {
     ControlStopped,
     /// The torque demand is NaN.
     DemandNotFinite,
+    /// Nothing on the bench: what is wrong lies elsewhere.
+    Elsewhere,
 }
 
 /// What the supply does wrong.

@@ -201,22 +201,20 @@ impl Inverter {
         }
     }
 
-    /// Looks at the legs' outputs over a time in which nothing changed; `currents_a` at its end. Whether one of them is not where it
-    /// should be.
-    pub fn monitor(&mut self, currents_a: [f64; 3], from: Tick, to: Tick) -> bool {
-        let Some((gate, _)) = self.stuck else { return false };
+    /// Looks at the legs' outputs over a time in which no gate changed; `currents_a` at its end.
+    pub fn monitor(&mut self, currents_a: [f64; 3], from: Tick, to: Tick) {
+        let Some((gate, _)) = self.stuck else { return };
         let leg = usize::from(gate / 2);
         let (real, ordered) = (self.legs()[leg], self.ordered_legs()[leg]);
         let high = real.is_high(currents_a[leg]);
         if ordered == Leg::Open || high == (ordered == Leg::Upper) {
             self.astray_since = None;
-            return false;
+            return;
         }
         if to - *self.astray_since.get_or_insert(from) > MONITOR_TICKS {
             let found = if high { &mut self.found.high } else { &mut self.found.low };
             *found |= 1 << leg;
         }
-        true
     }
 
     /// What drivers and monitors of the legs have found.

@@ -24,7 +24,7 @@ pub struct LineFilter {
 
 impl LineFilter {
     /// For 250 kW at 1,500 V: 46 Hz, damped enough for a load of constant power.
-    pub const TRACTION: Self = Self { inductance_h: 3e-3, resistance_ohm: 0.15, capacitance_f: 4e-3 };
+    pub const TRACTION: Self = Self { inductance_h: 3e-3, resistance_ohm: 0.3, capacitance_f: 4e-3 };
 }
 
 /// How fast a line that fails moves, in V/s.

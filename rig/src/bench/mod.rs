@@ -16,7 +16,7 @@ pub use inject::Injection;
 pub use inverter::{Edge, GATES, Inverter, Stuck};
 pub use line::{Commander, LinePlan, LineSide, SlotRow};
 pub use link::{LineFilter, Supply};
-pub use observe::{Observed, Peaks};
+pub use observe::{Limits, Observed, Peaks, Stored};
 pub use sensors::{Converter, Flaws, Sensors};
 
 use crate::benchmark::in_plant;
@@ -42,8 +42,9 @@ pub type Tick = u64;
 /// than both interrupts together take, as a bound that does not depend on which of them came first.
 const SAFE_STATE_DELAY: Tick = 625;
 
-/// How far a current's reading may be off without making a difference that counts, in A.
-const MUCH_A: f32 = 10.0;
+/// How far a current's reading may be off without making a difference that counts, in A: a tenth of the machine's largest current,
+/// which is what the sum of the phases may be.
+const MUCH_A: f32 = 23.3;
 
 /// Rows for which room is made at once.
 const MOST_ROWS: usize = 1 << 20;
@@ -109,6 +110,8 @@ pub struct Settings {
     pub supply: Supply,
     /// What goes wrong.
     pub injection: Option<Injection>,
+    /// Beyond what it is said to make a difference.
+    pub limits: Limits,
 }
 
 /// Machine, inverter, sensors and recorder.
@@ -160,7 +163,7 @@ impl Bench {
                 Supply::Line(filter) => Some(Link::new(filter, settings.udc_v)),
             },
             spoiler: Spoiler::new(settings.injection),
-            observed: Observed::new(from),
+            observed: Observed::new(from, settings.limits),
             operator,
             clock: settings.clock,
             tick_s,
@@ -426,12 +429,14 @@ impl Bench {
                 let drawn_j = self.plant.energies().electrical_j - before_j;
                 link.advance(drawn_j, dt_s, self.sensors.udc_v(t_s), self.spoiler.supply(t_s));
             }
-            if self.inverter.monitor(self.plant.currents_abc(), self.now, tick) {
+            self.inverter.monitor(self.plant.currents_abc(), self.now, tick);
+            if self.inverter.leg_faults() != LegFaults::default() {
                 self.observed.makes_a_difference(self.now);
             }
             self.now = tick;
             let udc_v = self.udc_v(self.seconds(tick));
-            self.observed.note(tick, self.plant.currents_abc(), udc_v);
+            let peaks = Peaks::at(&self.plant.currents_abc(), udc_v, 0.0);
+            self.observed.note(tick, &peaks, self.plant.speed_rpm());
         }
     }
 
@@ -442,6 +447,18 @@ impl Bench {
             (None, Some(link)) => link.voltage_v(),
             (None, None) => self.sensors.udc_v(t_s),
         }
+    }
+
+    /// The highest voltage that the link would have from now on without the inverter, in V.
+    fn unloaded_v(&self, now: Tick) -> f64 {
+        const STEPS: u32 = 1_000;
+        const STEP_S: f64 = 0.1e-3;
+        let Some(mut link) = self.link else { return 0.0 };
+        (0..STEPS).fold(0.0_f64, |highest_v, k| {
+            let t_s = self.seconds(now) + f64::from(k) * STEP_S;
+            link.advance(0.0, STEP_S, self.sensors.udc_v(t_s), self.spoiler.supply(t_s));
+            highest_v.max(link.voltage_v())
+        })
     }
 
     fn act(&mut self) -> Result<(), BenchError> {
@@ -470,8 +487,9 @@ impl Bench {
             match order {
                 Some(safe) => {
                     self.inverter.enter(safe, now);
-                    let (udc_v, field_j) = (self.udc_v(self.seconds(now)), self.plant.field_j());
-                    self.observed.enters(now, safe, udc_v, field_j);
+                    let udc_v = self.udc_v(self.seconds(now));
+                    let unloaded_v = self.unloaded_v(now);
+                    self.observed.enters(now, safe, Stored::of(&self.plant, udc_v, unloaded_v));
                 }
                 None => self.inverter.leave(now),
             }

@@ -1,22 +1,87 @@
-//! What a fault did: the extremes of currents and link until the gates are safe and after that.
+//! What a fault did: the extremes of currents and voltages until the gates are safe and after that.
 
 use super::Tick;
+use crate::plant::Plant;
 use tractive::protection::SafeState;
 
-/// Extremes over a time.
+/// Largest values, of an instant or over a time.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Peaks {
-    /// Largest phase current, in A.
+    /// Phase current, in A.
     pub current_a: f64,
-    /// Largest link voltage, in V.
+    /// Link voltage, in V; the ZS9's outside shoot-through.
     pub udc_v: f64,
+    /// The ZS9's capacitor voltage, in V.
+    pub uc_v: f64,
 }
 
 impl Peaks {
-    fn note(&mut self, currents_a: [f64; 3], udc_v: f64) {
-        let current_a = currents_a.into_iter().fold(0.0_f64, |most, current| most.max(current.abs()));
-        self.current_a = self.current_a.max(current_a);
-        self.udc_v = self.udc_v.max(udc_v);
+    /// Of an instant.
+    pub fn at(currents_a: &[f64], udc_v: f64, uc_v: f64) -> Self {
+        let current_a = currents_a.iter().fold(0.0_f64, |most, current| most.max(current.abs()));
+        Self { current_a, udc_v, uc_v }
+    }
+
+    fn note(&mut self, now: &Self) {
+        self.current_a = self.current_a.max(now.current_a);
+        self.udc_v = self.udc_v.max(now.udc_v);
+        self.uc_v = self.uc_v.max(now.uc_v);
+    }
+}
+
+/// What a sound plant keeps to: beyond it a fault makes a difference.
+#[derive(Clone, Copy, Debug)]
+pub struct Limits {
+    /// Largest phase current, in A.
+    pub current_a: f64,
+    /// Lowest and highest link voltage, in V.
+    pub udc_v: (f64, f64),
+    /// Highest capacitor voltage of the ZS9, in V.
+    pub uc_v: f64,
+    /// Highest speed, in r/min.
+    pub speed_rpm: f64,
+}
+
+impl Limits {
+    /// Everything is sound.
+    pub const NONE: Self = Self {
+        current_a: f64::INFINITY,
+        udc_v: (f64::NEG_INFINITY, f64::INFINITY),
+        uc_v: f64::INFINITY,
+        speed_rpm: f64::INFINITY,
+    };
+
+    fn holds(&self, now: &Peaks, speed_rpm: f64) -> bool {
+        let (lowest_v, highest_v) = self.udc_v;
+        now.current_a <= self.current_a
+            && (lowest_v..=highest_v).contains(&now.udc_v)
+            && now.uc_v <= self.uc_v
+            && speed_rpm.abs() <= self.speed_rpm
+    }
+}
+
+/// What is stored when the gates become safe, and must go somewhere.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Stored {
+    /// The highest voltage from then on if the bridge were gone, in V: of the link, or of the ZS9's capacitors.
+    pub unloaded_v: f64,
+    /// Energy of the machines' fields, in J.
+    pub field_j: f64,
+    /// Energy that the rotors still give while the flux decays against the link, in J.
+    pub braked_j: f64,
+    /// Largest current of a machine that is short-circuited with the flux linkage that it has, in A.
+    pub short_circuit_a: f64,
+}
+
+impl Stored {
+    /// Of the PMaSynRM at a link of `udc_v`.
+    pub fn of(plant: &Plant, udc_v: f64, unloaded_v: f64) -> Self {
+        Self {
+            unloaded_v: unloaded_v.max(udc_v),
+            field_j: plant.field_j(),
+            braked_j: plant.braked_j(udc_v),
+            short_circuit_a: plant.short_circuit_peak_a(),
+        }
     }
 }
 
@@ -31,37 +96,39 @@ pub struct Observed {
     pub carrier_ticks: Tick,
     /// When the gates were safe, and how.
     pub safe: Option<(Tick, SafeState)>,
-    /// Link voltage then, in V.
-    pub udc_at_safe_v: f64,
-    /// Energy of the machine's field then, in J.
-    pub field_at_safe_j: f64,
+    /// What was stored then.
+    pub stored: Stored,
     /// Extremes until then.
     pub until: Peaks,
     /// And after that.
     pub after: Peaks,
+    limits: Limits,
 }
 
 impl Observed {
     /// Nothing yet.
-    pub fn new(from: Tick) -> Self {
+    pub fn new(from: Tick, limits: Limits) -> Self {
         Self {
             from,
             effect: None,
             carrier_ticks: 0,
             safe: None,
-            udc_at_safe_v: 0.0,
-            field_at_safe_j: 0.0,
+            stored: Stored::default(),
             until: Peaks::default(),
             after: Peaks::default(),
+            limits,
         }
     }
 
     /// The plant at an instant.
-    pub fn note(&mut self, now: Tick, currents_a: [f64; 3], udc_v: f64) {
-        if now >= self.from {
-            let peaks = if self.safe.is_some() { &mut self.after } else { &mut self.until };
-            peaks.note(currents_a, udc_v);
+    pub fn note(&mut self, now: Tick, peaks: &Peaks, speed_rpm: f64) {
+        if now < self.from {
+            return;
         }
+        if !self.limits.holds(peaks, speed_rpm) {
+            self.makes_a_difference(now);
+        }
+        if self.safe.is_some() { &mut self.after } else { &mut self.until }.note(peaks);
     }
 
     /// The fault makes a difference now.
@@ -72,10 +139,17 @@ impl Observed {
     }
 
     /// The gates are safe from now on.
-    pub fn enters(&mut self, now: Tick, safe: SafeState, udc_v: f64, field_j: f64) {
+    pub fn enters(&mut self, now: Tick, safe: SafeState, stored: Stored) {
         if self.safe.is_none() {
             self.safe = Some((now, safe));
-            (self.udc_at_safe_v, self.field_at_safe_j) = (udc_v, field_j);
+            self.stored = stored;
         }
+    }
+
+    /// From the fault's first effect, or from the fault where none is known, until the gates were safe, in ticks.
+    pub fn ticks_to_safe(&self) -> Option<Tick> {
+        let (safe, _) = self.safe?;
+        let effect = self.effect.filter(|effect| *effect <= safe).unwrap_or(self.from);
+        Some(safe.saturating_sub(effect))
     }
 }

@@ -116,6 +116,17 @@ impl Plant {
         self.rotor.speed_rpm()
     }
 
+    /// Largest current vector that the machine has when it is short-circuited now and turns on without losses, in A.
+    pub fn short_circuit_peak_a(&self) -> f64 {
+        self.stator.peak_on_flux_circle_a(self.id_a, self.iq_a)
+    }
+
+    /// Energy that the rotor gives when the gates are blocked now, in J: two thirds of the link take the flux linkage away.
+    pub fn braked_j(&self, udc_v: f64) -> f64 {
+        let speed_rad_s = self.rotor.speed_rpm() * TAU / 60.0;
+        self.stator.braked_j((self.id_a, self.iq_a), speed_rad_s, 2.0 / 3.0 * udc_v)
+    }
+
     /// Energy of the field, above that at no current, in J.
     pub fn field_j(&self) -> f64 {
         self.stator.field_j(self.id_a, self.iq_a)

@@ -106,6 +106,36 @@ impl Stator {
         }
     }
 
+    /// Energy that the rotor gives when the gates are blocked, in J, at a current in A and a speed in mechanical rad/s: its power falls
+    /// to nothing while `against_v` takes the flux linkage away.
+    pub fn braked_j(&self, (id_a, iq_a): (f64, f64), speed_rad_s: f64, against_v: f64) -> f64 {
+        let flux = self.flux(id_a, iq_a);
+        let decay_s = flux.psi_d_wb.hypot(flux.psi_q_wb) / against_v;
+        0.5 * (self.torque_nm(id_a, iq_a) * speed_rad_s).abs() * decay_s
+    }
+
+    /// Largest current whose flux linkage is as large as that of a current in A: what a short circuit leads to when the rotor turns
+    /// under a flux linkage that stands still.
+    pub fn peak_on_flux_circle_a(&self, id_a: f64, iq_a: f64) -> f64 {
+        const ANGLES: u32 = 180;
+        const STEPS: u32 = 20;
+        let start = self.flux(id_a, iq_a);
+        let (radius, from) = (start.psi_d_wb.hypot(start.psi_q_wb), start.psi_q_wb.atan2(start.psi_d_wb));
+        let (mut id, mut iq, mut most) = (id_a, iq_a, id_a.hypot(iq_a));
+        for k in 0..=ANGLES {
+            let angle = from - core::f64::consts::TAU * f64::from(k) / f64::from(ANGLES);
+            for _ in 0..STEPS {
+                let at = self.flux(id, iq);
+                let (off_d, off_q) = (radius * angle.cos() - at.psi_d_wb, radius * angle.sin() - at.psi_q_wb);
+                let det = at.ldd_h * at.lqq_h - at.ldq_h * at.lqd_h;
+                id += (at.lqq_h * off_d - at.ldq_h * off_q) / det;
+                iq += (at.ldd_h * off_q - at.lqd_h * off_d) / det;
+            }
+            most = most.max(id.hypot(iq));
+        }
+        most
+    }
+
     /// Energy of the field at a current, above that at no current, in J: `1.5 ∫ i·dψ` along a straight line from zero.
     pub fn field_j(&self, id_a: f64, iq_a: f64) -> f64 {
         // i·dψ = x iᵀ L(x i) i dx, by the middles of the pieces.

@@ -2,6 +2,7 @@
 
 use super::{Progress, Supervisor};
 use crate::bench::Bench;
+use crate::campaign::without::Without;
 use crate::trace::Recording;
 use tractive::board::{ControlPort, PwmPort, Sample};
 use tractive::control::{Demand, LinkWindow, Measurements};
@@ -11,7 +12,7 @@ use tractive::frames::{Abc, Angle};
 use tractive::machine::{Ratings, Tables};
 use tractive::modulation::CarrierPeriod;
 use tractive::operator::{self, Desk, Feedback, Line, OperatorPort, Request, Slot, Status, slot_s};
-use tractive::protection::{LegFaults, SafeState};
+use tractive::protection::{LegFaults, SafeState, Trip};
 use tractive::protocol::Station;
 use tractive::recorder::Recorder;
 use tractive::time::{Clock, Instant};
@@ -19,6 +20,7 @@ use tractive::time::{Clock, Instant};
 /// The bench behind a board's ports; the first error ends the run.
 struct Port<'a, 'w> {
     bench: &'a mut Bench,
+    without: Option<Without>,
     desk: &'a Desk,
     ratings: &'a Ratings,
     wire: Option<&'a mut Wire<'w>>,
@@ -67,7 +69,8 @@ impl ControlPort for Port<'_, '_> {
     }
 
     fn leg_faults(&mut self) -> LegFaults {
-        self.bench.leg_faults()
+        let found = self.bench.leg_faults();
+        self.without.map_or(found, |without| without.leg_faults(found))
     }
 }
 
@@ -93,7 +96,8 @@ impl PwmPort for Port<'_, '_> {
     }
 
     fn leg_faults(&mut self) -> LegFaults {
-        self.bench.leg_faults()
+        let found = self.bench.leg_faults();
+        self.without.map_or(found, |without| without.leg_faults(found))
     }
 }
 
@@ -155,6 +159,7 @@ pub struct Tasks<'a> {
     clock: Clock,
     /// Over the protocol, if there is a supervisor.
     wire: Option<Wire<'a>>,
+    without: Option<Without>,
 }
 
 impl<'a> Tasks<'a> {
@@ -181,6 +186,7 @@ impl<'a> Tasks<'a> {
             operator: operator::Settings::rated(&tables.ratings, slot_s(&settings.clock), None),
             clock: settings.clock,
             wire: None,
+            without: None,
         }
     }
 
@@ -196,8 +202,24 @@ impl<'a> Tasks<'a> {
         self
     }
 
+    /// The same with a protection off; its levels are the tables' business.
+    pub fn without(self, without: Without) -> Self {
+        let disarmed = without.disarmed();
+        let (control, pwm) = (self.control.without(disarmed), self.pwm.without(disarmed));
+        Self { control, pwm, without: Some(without), ..self }
+    }
+
+    /// The latched fault.
+    pub fn trip(&self) -> Option<Trip> {
+        self.control.trip().or(self.pwm.trip())
+    }
+
     /// Until the bench's recording is complete, or nobody wants to see more of it.
-    pub fn drive(mut self, bench: &mut Bench, mut goes_on: impl FnMut(&Bench) -> bool) -> anyhow::Result<()> {
+    pub fn drive(
+        &mut self,
+        bench: &mut Bench,
+        mut goes_on: impl FnMut(&Bench) -> bool,
+    ) -> anyhow::Result<()> {
         while !bench.is_done() {
             let (control_at, pwm_at) = (self.control.next_call(), self.pwm.next_call());
             let has_control = bench.has_control(control_at);
@@ -206,7 +228,8 @@ impl<'a> Tasks<'a> {
                 None => self.operator,
             };
             let (desk, ratings) = (&self.desk, self.operator.ratings);
-            let mut port = Port { bench, desk, ratings, wire: self.wire.as_mut(), error: None };
+            let mut port =
+                Port { bench, desk, ratings, without: self.without, wire: self.wire.as_mut(), error: None };
             // At equal instants the PWM interrupt comes first: it has the higher priority.
             if control_at.reached(pwm_at) || !has_control {
                 self.pwm.run(&mut port, &self.shared);

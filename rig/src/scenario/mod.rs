@@ -17,7 +17,7 @@ mod sweep;
 mod timing;
 
 use crate::analysis::Figures;
-use crate::bench::{self, Bench, LinePlan, Operator, Supply};
+use crate::bench::{self, Bench, Limits, LinePlan, Operator, Supply};
 use crate::machine::Machine;
 use crate::options::{On, RunOptions};
 use crate::plant::{DcLinkSettings, Plant, PlantSettings, SpeedSource};
@@ -180,6 +180,7 @@ fn run_plan(
             flaws: options.flaws(parameters.trip_current_a),
             supply: Supply::Stiff,
             injection: None,
+            limits: Limits::NONE,
         },
     );
     let line =

@@ -4,17 +4,19 @@
 //! system's bench nothing runs ahead of what is decided, and what an interrupt orders takes effect at a fixed delay after
 //! its nominal instant.
 
-use super::inject::{Injection, Spoiler};
+use super::inject::{Injection, Kind, Spoiler};
 use super::operator::{Operator, Orders};
 use super::sensors::Sensors;
 use super::trace::{Edge, MotorRow, Row};
-use crate::bench::{Converter, Flaws};
+use crate::bench::{Converter, Flaws, Limits, Observed, Peaks, Stored};
 use crate::benchmark::in_plant;
-use crate::plant::zs9::{IllegalState, LegGates, Zs9Plant};
+use crate::plant::zs9::{IllegalState, LegGates, Source, Zs9Plant};
 use std::collections::VecDeque;
 use tractive::board::{DualSample, GateFeedback, PlayedPeriod, PowerSample};
 use tractive::drive::dual::{COMPARE_STEPS, DualReport};
+use tractive::frames::Abc;
 use tractive::nine_switch::Scheme;
+use tractive::protection::SafeState;
 use tractive::time::{Clock, Instant};
 
 /// Compare steps since the run's beginning.
@@ -25,6 +27,9 @@ pub type Steps = u64;
 const CONTROL_OFF_TICKS: u32 = 1875;
 /// The same for the PWM interrupt (25 µs), as a bound on its length.
 const PWM_OFF_TICKS: u32 = 625;
+
+/// How far a current's reading may be off without making a difference that counts, in A: a tenth of a machine's largest current.
+const MUCH_A: f32 = 8.49;
 
 /// Why the bench cannot go on.
 #[derive(Debug, thiserror::Error)]
@@ -64,6 +69,8 @@ pub struct BenchSettings {
     pub flaws: Flaws,
     /// What goes wrong.
     pub injection: Option<Injection>,
+    /// Beyond what it is said to make a difference.
+    pub limits: Limits,
     /// Whether edges are kept.
     pub edges: bool,
     /// Time for which a gate that turns on where another one of its leg turns off has to wait, in s.
@@ -105,6 +112,7 @@ pub struct Bench {
     dead_time: Steps,
     off: bool,
     off_at: Option<Steps>,
+    observed: Observed,
     feedback: GateFeedback,
     orders: Orders,
     samples: VecDeque<(Steps, DualSample)>,
@@ -126,6 +134,7 @@ impl Bench {
         let rows_wanted = (settings.duration_s / settings.trace_step_s).round() as usize;
         let speeds = plant.motors().each_ref().map(|motor| motor.speed_rpm());
         let control = Steps::from(settings.clock.control_ticks * COMPARE_STEPS);
+        let from = settings.injection.map_or(Steps::MAX, |injection| steps(settings.lead_s + injection.at_s));
         Self {
             orders: operator.orders(-settings.lead_s, speeds),
             nominal_source_v: plant.source_v(),
@@ -147,6 +156,7 @@ impl Bench {
             dead_time: steps(settings.dead_time_s),
             off: false,
             off_at: None,
+            observed: Observed::new(from, settings.limits),
             feedback: GateFeedback::default(),
             samples: VecDeque::new(),
             next_sample: control,
@@ -203,8 +213,21 @@ impl Bench {
         self.advance(at)?;
         let feedback = std::mem::take(&mut self.feedback);
         let mut sample = self.sensors.power(&self.plant, feedback);
+        let true_a = sample.currents_a;
         self.spoiler.power(self.seconds(at), &mut sample);
+        self.compare(true_a, sample.currents_a);
         Ok(sample)
+    }
+
+    /// Notes readings that are off by more than a little.
+    fn compare(&mut self, true_a: [Abc; 2], read_a: [Abc; 2]) {
+        let off = |(read, told): (Abc, Abc)| {
+            (read.a - told.a).abs().max((read.b - told.b).abs()).max((read.c - told.c).abs())
+        };
+        let most_a = read_a.into_iter().zip(true_a).map(off).fold(0.0, f32::max);
+        if most_a > MUCH_A {
+            self.observed.makes_a_difference(self.now);
+        }
     }
 
     /// The period to play from the next valley on.
@@ -218,6 +241,92 @@ impl Bench {
         let delay = if is_control { CONTROL_OFF_TICKS } else { PWM_OFF_TICKS };
         let at = self.widen(instant) + Steps::from(delay * COMPARE_STEPS);
         self.off_at = Some(self.off_at.map_or(at, |earlier| earlier.min(at)));
+    }
+
+    /// By how much the control interrupt is late, in ticks.
+    pub fn control_late_ticks(&self) -> u32 {
+        match self.spoiler.kind(self.seconds(self.now)) {
+            Some(Kind::ControlLate(ticks)) => ticks,
+            _ => 0,
+        }
+    }
+
+    /// Whether the control interrupt comes at this instant at all.
+    pub fn has_control(&self, instant: Instant) -> bool {
+        self.spoiler.kind(self.seconds(self.widen(instant))) != Some(Kind::ControlStopped)
+    }
+
+    /// Time since the recording's beginning, in s.
+    pub fn time_s(&self) -> f64 {
+        self.seconds(self.now)
+    }
+
+    /// The trace so far.
+    pub fn rows(&self) -> &[Row] {
+        &self.rows
+    }
+
+    /// What a fault did.
+    pub fn observed(&self) -> &Observed {
+        &self.observed
+    }
+
+    /// Length of a compare step, in s.
+    pub fn step_s(&self) -> f64 {
+        self.step_s
+    }
+
+    /// The gates as they are: what is stuck does not do what it is told.
+    fn real_levels(&self) -> [bool; 9] {
+        let mut levels = self.levels;
+        match self.spoiler.kind(self.seconds(self.now)) {
+            // What turns the gates off for good holds the drivers, whatever they are ordered.
+            Some(Kind::Gate(gate, on)) if !self.off => levels[usize::from(gate)] = on,
+            Some(Kind::ShootThrough(leg)) if !self.off => {
+                for gate in [leg, leg + 3, leg + 6] {
+                    levels[usize::from(gate)] = true;
+                }
+            }
+            _ => {}
+        }
+        levels
+    }
+
+    /// What happens to source and network, and what the plant shows.
+    fn watch(&mut self) {
+        let kind = self.spoiler.kind(self.seconds(self.now));
+        match kind {
+            Some(Kind::SourceSwitchOpen) => self.plant.set_source(Source::Diode),
+            Some(Kind::CapacitorsHalved) if self.now == self.observed.from => {
+                let capacitance_f = 0.5 * self.plant.network_parts().capacitance_f;
+                self.plant.set_capacitance_f(capacitance_f);
+            }
+            _ => {}
+        }
+        let [upper, lower] = self.plant.motors().each_ref().map(|motor| motor.currents_abc());
+        let [a, b, c] = upper;
+        let [d, e, f] = lower;
+        let [v1, v2] = self.plant.network().capacitors_v;
+        let peaks = Peaks::at(&[a, b, c, d, e, f], self.plant.link_v(), v1.max(v2));
+        let speeds = self.plant.motors().each_ref().map(|motor| motor.speed_rpm().abs());
+        self.observed.note(self.now, &peaks, speeds[0].max(speeds[1]));
+        if self.real_levels() != self.levels {
+            self.observed.makes_a_difference(self.now);
+        }
+    }
+
+    /// What is stored in network and motors, and how high the capacitors go with the network's own oscillation.
+    fn stored(&self) -> Stored {
+        let (parts, network) = (self.plant.network_parts(), self.plant.network());
+        let (source_v, link_v) = (self.plant.source_v(), self.plant.link_v().max(self.plant.source_v()));
+        let surge_v = network.inductor_a() * (parts.inductance_h / parts.capacitance_f).sqrt();
+        let motors = self.plant.motors();
+        Stored {
+            unloaded_v: source_v + (network.capacitor_v() - source_v).hypot(surge_v),
+            field_j: motors.iter().map(|motor| motor.field_j()).sum(),
+            braked_j: motors.iter().map(|motor| motor.braked_j(link_v)).sum(),
+            short_circuit_a: 0.0,
+        }
     }
 
     /// The step of an instant near to now.
@@ -238,6 +347,9 @@ impl Bench {
         }
         while self.now < to {
             let mut due = to.min(self.begun + self.period).min(self.next_sample).min(self.next_row);
+            if self.observed.from > self.now {
+                due = due.min(self.observed.from);
+            }
             if let Some((toggle, _)) = self.toggles.last() {
                 due = due.min(*toggle);
             }
@@ -258,15 +370,20 @@ impl Bench {
             return Ok(());
         }
         let steps = (to - self.now) as f64;
-        let [uh, vh, wh, um, vm, wm, ul, vl, wl] = self.levels;
+        let real = self.real_levels();
+        let [uh, vh, wh, um, vm, wm, ul, vl, wl] = real;
         let gates = [(uh, um, ul), (vh, vm, vl), (wh, wm, wl)].map(|(high, middle, low)| LegGates {
             high,
             middle,
             low,
         });
-        let gates = self.as_diodes_have_it(gates);
-        in_plant(|| self.plant.advance(gates, steps * self.step_s))?;
-        for (gate, on) in self.levels.into_iter().enumerate() {
+        if real == self.levels {
+            let gates = self.as_diodes_have_it(gates);
+            in_plant(|| self.plant.advance(gates, steps * self.step_s))?;
+        } else {
+            self.plant.advance_any(gates, steps * self.step_s);
+        }
+        for (gate, on) in real.into_iter().enumerate() {
             let latch = if on { &mut self.feedback.on } else { &mut self.feedback.off };
             *latch |= 1 << gate;
         }
@@ -281,6 +398,7 @@ impl Bench {
             sums.shorted += steps;
         }
         self.now = to;
+        self.watch();
         Ok(())
     }
 
@@ -290,6 +408,7 @@ impl Bench {
             self.off = true;
             self.toggles.clear();
             self.order([false; 9]);
+            self.observed.enters(self.now, SafeState::GatesOff, self.stored());
         }
         let mut ordered = self.ordered;
         while let Some((at, gate)) = self.toggles.last().copied()
@@ -413,7 +532,10 @@ impl Bench {
 
     fn take_sample(&mut self) -> Result<(), BenchError> {
         if self.samples.len() > 1 {
-            return Err(BenchError::ControlLate(self.seconds(self.now)));
+            if self.has_control(Instant((self.now / Steps::from(COMPARE_STEPS)) as u32)) {
+                return Err(BenchError::ControlLate(self.seconds(self.now)));
+            }
+            self.samples.clear();
         }
         self.next_sample = self.now + Steps::from(self.settings.clock.control_ticks * COMPARE_STEPS);
         let t_s = self.seconds(self.now);
@@ -437,7 +559,9 @@ impl Bench {
             scheme: self.settings.scheme,
             enable: self.orders.enable,
         };
+        let true_a = sample.currents_a;
         self.spoiler.control(t_s, &mut sample);
+        self.compare(true_a, sample.currents_a);
         self.samples.push_back((self.now, sample));
         self.show_reports();
         Ok(())

@@ -1,10 +1,12 @@
 //! Things that go wrong on purpose.
 
+use crate::sensor_faults::{AngleFault, AngleSpoiler, CurrentFault, CurrentSpoiler};
 use std::str::FromStr;
-use tractive::board::{DualSample, PowerSample};
+use tractive::board::{DualSample, MotorDemand, PowerSample};
+use tractive::frames::Abc;
 
 /// What goes wrong.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Kind {
     /// The source is shorted.
@@ -31,6 +33,31 @@ pub enum Kind {
     LegStuckOn,
     /// The leg w, upper gate: is never seen on.
     LegStuckOff,
+    /// The current sensor of phase 0 ..= 2 of motor 0 or 1.
+    Current(usize, usize, CurrentFault),
+    /// The angle sensor of motor 0 or 1.
+    Angle(usize, AngleFault),
+    /// A gate's order, in the order of [`tractive::nine_switch::GATES`], is stuck, on (true) or off, until the gates are turned off
+    /// for good.
+    Gate(u8, bool),
+    /// All gates of leg 0 ..= 2 are on, until the gates are turned off for good.
+    ShootThrough(u8),
+    /// The source's switch does not turn on any more: its diode is left.
+    SourceSwitchOpen,
+    /// The source swings by this amplitude (V) at this frequency (Hz).
+    SourceSwings(f64, f64),
+    /// The capacitors lose half of their capacitance.
+    CapacitorsHalved,
+    /// The control interrupt ends this many ticks after its deadline.
+    ControlLate(u32),
+    /// The control interrupt comes no more: no new commands.
+    ControlStopped,
+    /// A torque demand is NaN.
+    DemandNotFinite,
+    /// A link voltage is wanted that needs too much shoot-through.
+    LinkOutOfRange,
+    /// Nothing on the bench: what is wrong lies elsewhere.
+    Elsewhere,
 }
 
 const NAMES: [(&str, Kind); 12] = [
@@ -77,15 +104,39 @@ impl FromStr for Injection {
 pub struct Spoiler {
     injection: Option<Injection>,
     before: Option<DualSample>,
+    current: Option<(usize, CurrentSpoiler)>,
+    angle: Option<(usize, AngleSpoiler)>,
 }
+
+/// Seed of a sensor's noise.
+const SEED: u64 = 1;
 
 impl Spoiler {
     /// Spoils from the injection's instant on.
     pub fn new(injection: Option<Injection>) -> Self {
-        Self { injection, before: None }
+        let (mut current, mut angle) = (None, None);
+        match injection.map(|injection| injection.kind) {
+            Some(Kind::Current(motor, phase, fault)) => {
+                current = Some((motor, CurrentSpoiler::new(phase, fault, SEED)));
+            }
+            Some(Kind::Angle(motor, fault)) => angle = Some((motor, AngleSpoiler::new(fault))),
+            _ => {}
+        }
+        Self { injection, before: None, current, angle }
     }
 
-    fn kind(&self, t_s: f64) -> Option<Kind> {
+    /// What the converters make of the phase currents.
+    fn currents(&mut self, t_s: f64, currents_a: &mut [Abc; 2]) {
+        let broken = self.kind(t_s).is_some();
+        if let Some((motor, sensor)) = &mut self.current
+            && let Some(currents_a) = currents_a.get_mut(*motor)
+        {
+            *currents_a = sensor.read(broken, *currents_a);
+        }
+    }
+
+    /// What is wrong at an instant, if anything is.
+    pub fn kind(&self, t_s: f64) -> Option<Kind> {
         self.injection.filter(|injection| t_s >= injection.at_s - 1e-9).map(|injection| injection.kind)
     }
 
@@ -95,6 +146,10 @@ impl Spoiler {
             Some(Kind::SourceShort) => 1.0,
             Some(Kind::SourceLow) => 250.0,
             Some(Kind::SourceHigh) => 900.0,
+            Some(Kind::SourceSwings(amplitude_v, hz)) => {
+                let since_s = t_s - self.injection.map_or(0.0, |injection| injection.at_s);
+                source_v + amplitude_v * (core::f64::consts::TAU * hz * since_s).sin()
+            }
             _ => source_v,
         }
     }
@@ -102,6 +157,13 @@ impl Spoiler {
     /// What control sees.
     pub fn control(&mut self, t_s: f64, sample: &mut DualSample) {
         let before = self.before.replace(*sample).unwrap_or(*sample);
+        self.currents(t_s, &mut sample.currents_a);
+        let kind = self.kind(t_s);
+        if let Some((motor, sensor)) = &mut self.angle
+            && let Some(Some(angle)) = sample.angles.get_mut(*motor)
+        {
+            *angle = sensor.read(kind.is_some(), *angle);
+        }
         let [first, second] = &mut sample.angles;
         match self.kind(t_s) {
             Some(Kind::SensorLost1) => *first = None,
@@ -120,12 +182,15 @@ impl Spoiler {
                 }
             }
             Some(Kind::NotFinite) => sample.currents_a[1].b = f32::NAN,
+            Some(Kind::DemandNotFinite) => sample.demands[1] = MotorDemand::Speed(f32::NAN),
+            Some(Kind::LinkOutOfRange) => sample.link_ref_v *= 2.0,
             _ => {}
         }
     }
 
     /// What the PWM interrupt sees.
-    pub fn power(&self, t_s: f64, sample: &mut PowerSample) {
+    pub fn power(&mut self, t_s: f64, sample: &mut PowerSample) {
+        self.currents(t_s, &mut sample.currents_a);
         match self.kind(t_s) {
             Some(Kind::Overcurrent) => {
                 let current = &mut sample.currents_a[0].a;

@@ -12,8 +12,11 @@ use crate::protection::{self, Fault, FrozenWatch, Violation};
 
 /// Natural frequency of the speed tracker, in rad/s: the speed loop's phase needs it quick.
 const TRACKING_RAD_S: f32 = 4000.0;
-/// How far an angle may be off what the speed tells, in electrical rad: half a turn a period would still look like rest.
-pub const SURPRISE_RAD: f32 = 0.5;
+pub use crate::protection::SURPRISE_RAD;
+/// Time over which the speed may change, in s, and by how much in that time, as electrical rad: the rotor itself makes half of it. So a
+/// sensor that begins to count the other way is found where it is too slow for a surprise.
+const SLOW_S: f32 = 5e-3;
+const ASTRAY_RAD: f32 = 0.25;
 /// What the loop may ask for, as a share of the largest voltage that is to be had at every angle. The modulator gives what its
 /// hexagon has at the angle, up to 1.155, and tells.
 const LOOP_SHARE: f32 = 1.15;
@@ -25,6 +28,8 @@ pub struct Axis {
     controller: Controller,
     speed_loop: SpeedLoop,
     watch: FrozenWatch,
+    /// Electrical speed behind a filter, in rad/s.
+    slow: f32,
     /// Volt-seconds of the period that began at the last sample, per volt of link, in s; and the link's voltage there.
     acting: Option<(AlphaBeta, f32)>,
 }
@@ -54,6 +59,7 @@ impl Axis {
             controller: Controller::with_tracking(TRACKING_RAD_S),
             speed_loop: SpeedLoop::new(),
             watch: FrozenWatch::new(),
+            slow: 0.0,
             acting: None,
         }
     }
@@ -61,11 +67,18 @@ impl Axis {
     /// Follows the angle, where it is `trusted` whatever it is. Says by how much, in rad, it is off where that is too much.
     pub fn track(&mut self, angle: Angle, trusted: bool, settings: &Settings) -> Option<f32> {
         let surprise = self.controller.surprise_rad(angle, &settings.clock);
-        let lost = self.controller.speed_is_known() && surprise.abs() > SURPRISE_RAD && !trusted;
-        if !lost {
-            self.controller.track(angle, &settings.clock);
+        let known = self.controller.speed_is_known();
+        if known && surprise.abs() > SURPRISE_RAD && !trusted {
+            return Some(surprise);
         }
-        lost.then_some(surprise)
+        self.controller.track(angle, &settings.clock);
+        let gone_astray = (self.omega() - self.slow) * SLOW_S;
+        self.slow += (self.omega() - self.slow) * (settings.clock.control_s() / SLOW_S);
+        if !known || trusted {
+            self.slow = self.omega();
+            return None;
+        }
+        (gone_astray.abs() > ASTRAY_RAD).then_some(gone_astray)
     }
 
     /// Electrical speed, in rad/s.

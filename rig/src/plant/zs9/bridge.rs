@@ -65,6 +65,8 @@ pub enum Bridge {
     Short,
     /// All gates off: the diodes decide.
     Off,
+    /// Gates stuck: where they leave a terminal free, the diodes decide.
+    Partly([LegGates; 3]),
 }
 
 impl Bridge {
@@ -89,6 +91,19 @@ impl Bridge {
         }
         Ok(if short { Self::Short } else { Self::Driven(shares.map(Vector::clarke)) })
     }
+
+    /// The same where gates are stuck: any state may be. A leg with all gates on shorts the link, whatever the others do.
+    pub fn of_any(gates: [LegGates; 3]) -> Self {
+        if gates.contains(&LegGates::SHOOT_THROUGH) {
+            return Self::Short;
+        }
+        Self::of(gates, 0.0).unwrap_or(Self::Partly(gates))
+    }
+
+    /// Whether diodes decide on a terminal.
+    pub fn is_free(&self) -> bool {
+        matches!(self, Self::Off | Self::Partly(_))
+    }
 }
 
 /// The terminals' shares of the link while all gates are off.
@@ -100,12 +115,29 @@ impl Bridge {
 ///
 /// The middle diodes put the motors in series: current flows where the EMFs of both together exceed the link, although neither
 /// does alone.
-pub fn freewheeling(clamp: &Clamp, upper_a: [f64; 3], lower_a: [f64; 3]) -> [Vector; 2] {
+///
+/// A gate that is on ties its two sides together.
+pub fn freewheeling(
+    clamp: &Clamp,
+    gates: &[LegGates; 3],
+    upper_a: [f64; 3],
+    lower_a: [f64; 3],
+) -> [Vector; 2] {
     let mut shares = [[0.0; 3]; 2];
     for leg in 0..3 {
+        let (upper, lower) = (clamp.share(upper_a[leg]), clamp.share(lower_a[leg]));
         let joined = clamp.share(upper_a[leg] + lower_a[leg]);
-        shares[0][leg] = clamp.share(upper_a[leg]).max(joined);
-        shares[1][leg] = clamp.share(lower_a[leg]).min(joined);
+        let LegGates { high, middle, low } = gates[leg];
+        let (upper, lower) = match (high, middle, low) {
+            (false, false, false) => (upper.max(joined), lower.min(joined)),
+            (true, false, false) => (1.0, lower),
+            (false, false, true) => (upper, 0.0),
+            (false, true, false) => (joined, joined),
+            (true, true, false) => (1.0, 1.0),
+            (false, true, true) => (0.0, 0.0),
+            (true, _, true) => (1.0, 0.0),
+        };
+        (shares[0][leg], shares[1][leg]) = (upper, lower);
     }
     shares.map(Vector::clarke)
 }
@@ -157,7 +189,7 @@ mod tests {
             (4.0, -10.0, [1.0, 1.0]),
         ];
         for (upper, lower, terminals) in legs {
-            let shares = freewheeling(&clamp, [upper, 0.0, 0.0], [lower, 0.0, 0.0]);
+            let shares = freewheeling(&clamp, &[LegGates::OFF; 3], [upper, 0.0, 0.0], [lower, 0.0, 0.0]);
             // The other legs carry nothing and stand in the middle.
             let expected = terminals.map(|share| Vector::clarke([share, 0.5, 0.5]));
             assert_eq!(shares, expected, "{upper} {lower}");

@@ -125,16 +125,24 @@ impl Zs9Plant {
     /// # Errors
     /// Names the first leg whose gates are illegal; nothing has happened then.
     pub fn advance(&mut self, gates: [LegGates; 3], dt_s: f64) -> Result<(), IllegalState> {
-        let bridge = Bridge::of(gates, self.time_s)?;
+        self.advance_bridge(&Bridge::of(gates, self.time_s)?, dt_s);
+        Ok(())
+    }
+
+    /// The same where gates are stuck, so that any state may be.
+    pub fn advance_any(&mut self, gates: [LegGates; 3], dt_s: f64) {
+        self.advance_bridge(&Bridge::of_any(gates), dt_s);
+    }
+
+    fn advance_bridge(&mut self, bridge: &Bridge, dt_s: f64) {
         let mut left = dt_s;
         while left > 0.0 {
-            let longest = if bridge == Bridge::Off { self.open_step_s() } else { LONGEST_STEP_S };
+            let longest = if bridge.is_free() { self.open_step_s() } else { LONGEST_STEP_S };
             // Even pieces, as long as nothing else shortens them.
-            let step = if bridge == Bridge::Off { left.min(longest) } else { left / (left / longest).ceil() };
-            let taken = self.step(&bridge, step);
+            let step = if bridge.is_free() { left.min(longest) } else { left / (left / longest).ceil() };
+            let taken = self.step(bridge, step);
             left = if taken >= left { 0.0 } else { left - taken };
         }
-        Ok(())
     }
 
     /// Time since the beginning, in s.
@@ -170,6 +178,21 @@ impl Zs9Plant {
     /// Sets the source voltage, in V, above 0.
     pub fn set_source_v(&mut self, source_v: f64) {
         self.source_v = source_v;
+    }
+
+    /// Another connection between source and network.
+    pub fn set_source(&mut self, source: Source) {
+        self.source = source;
+    }
+
+    /// Another capacitance, in F, above 0; the voltages stay.
+    pub fn set_capacitance_f(&mut self, capacitance_f: f64) {
+        self.network.capacitance_f = capacitance_f;
+    }
+
+    /// Inductance and capacitance of the network.
+    pub fn network_parts(&self) -> &ZNetwork {
+        &self.network
     }
 
     /// `U_in = v1 + v2 − U_dc`: the link's voltage outside shoot-through, in V.

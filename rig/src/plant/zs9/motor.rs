@@ -84,6 +84,13 @@ impl Motor {
         self.stator.field_j(self.id_a, self.iq_a)
     }
 
+    /// Energy that the rotor gives when the gates are blocked now, in J: in series with the other motor it has a third of the link
+    /// against it.
+    pub fn braked_j(&self, link_v: f64) -> f64 {
+        let speed_rad_s = self.rotor.speed_rpm() * TAU / 60.0;
+        self.stator.braked_j((self.id_a, self.iq_a), speed_rad_s, link_v / 3.0)
+    }
+
     /// Its stator.
     pub fn stator(&self) -> &Stator {
         &self.stator

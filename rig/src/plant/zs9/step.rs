@@ -1,6 +1,6 @@
 //! One Runge–Kutta step of network and motors together.
 
-use super::bridge::{Bridge, freewheeling};
+use super::bridge::{Bridge, LegGates, freewheeling};
 use super::means::Seen;
 use super::network::NetworkState;
 use super::{Vector, Zs9Plant};
@@ -180,12 +180,14 @@ impl Zs9Plant {
     /// The terminals' shares of the link, in the rotor frames.
     #[inline]
     fn shares(&self, y: &State, frames: &[Frame; 2], bridge: &Bridge) -> Shares {
-        if *bridge != Bridge::Off {
-            return [frames[0].share, frames[1].share];
-        }
+        let gates = match bridge {
+            Bridge::Off => [LegGates::OFF; 3],
+            Bridge::Partly(gates) => *gates,
+            Bridge::Driven(_) | Bridge::Short => return [frames[0].share, frames[1].share],
+        };
         let [upper, lower] =
             [0, 1].map(|k| Vector::from_rotor((y[2 * k], y[2 * k + 1]), frames[k].sin_cos).phases());
-        let stationary = freewheeling(&self.clamp, upper, lower);
+        let stationary = freewheeling(&self.clamp, &gates, upper, lower);
         [0, 1].map(|k| stationary[k].to_rotor(frames[k].sin_cos))
     }
 
@@ -229,7 +231,7 @@ type Shares = [(f64, f64); 2];
 fn frames(bridge: &Bridge, sin_cos: [(f64, f64); 2], turning: &[Turning; 2], t_s: f64) -> [Frame; 2] {
     let stationary = match bridge {
         Bridge::Driven(shares) => *shares,
-        Bridge::Short | Bridge::Off => [Vector::default(); 2],
+        Bridge::Short | Bridge::Off | Bridge::Partly(_) => [Vector::default(); 2],
     };
     [0, 1].map(|k| Frame {
         sin_cos: sin_cos[k],

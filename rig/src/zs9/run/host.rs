@@ -1,5 +1,6 @@
 //! On the host: the firmware's own tasks, called in the order in which their interrupts would come.
 
+use crate::campaign::without::Without;
 use crate::run::Progress;
 use crate::zs9::bench::{Bench, BenchError};
 use crate::zs9::trace::Recording;
@@ -8,6 +9,7 @@ use tractive::drive::dual::{ControlTask, DualReport, PwmTask, Settings, Shared};
 use tractive::frames::Abc;
 use tractive::machine::Tables;
 use tractive::nine_switch::Scheme;
+use tractive::protection::Trip;
 use tractive::time::Instant;
 
 /// The bench behind a board's ports; the first error ends the run.
@@ -42,7 +44,7 @@ impl DualControlPort for Port<'_> {
     }
 
     fn overrun_ticks(&mut self, _now: Instant, _deadline_ticks: u32) -> u32 {
-        0
+        self.bench.control_late_ticks()
     }
 
     fn report(&mut self, now: Instant, report: &DualReport) {
@@ -77,23 +79,69 @@ pub fn run_on_host(
     tables: &'static Tables,
     settings: Settings,
 ) -> Result<Recording, BenchError> {
-    let shared = Shared::new();
-    let mut control = ControlTask::new(tables, settings);
-    let mut pwm = PwmTask::new(tables, settings);
     let mut progress = Progress::new(name);
-    while !bench.is_done() {
-        let mut port = Port { bench: &mut bench, error: None };
-        // They never meet: control comes at valleys, PWM at peaks.
-        if control.next_call().reached(pwm.next_call()) {
-            pwm.run(&mut port, &shared);
-        } else {
-            control.run(&mut port, &shared);
-        }
-        if let Some(error) = port.error {
-            return Err(error);
-        }
+    Tasks::new(tables, settings).drive(&mut bench, |bench| {
         progress.show(bench.progress());
-    }
+        true
+    })?;
     let (rows, edges) = bench.into_recording();
     Ok(Recording { rows, edges })
+}
+
+/// Both tasks and the cells between them.
+pub struct Tasks {
+    control: ControlTask,
+    pwm: PwmTask,
+    shared: Shared,
+}
+
+impl Tasks {
+    /// Before their first interrupts.
+    pub fn new(tables: &'static Tables, settings: Settings) -> Self {
+        Self {
+            control: ControlTask::new(tables, settings),
+            pwm: PwmTask::new(tables, settings),
+            shared: Shared::new(),
+        }
+    }
+
+    /// The same with a protection off; its levels are the tables' and the settings' business.
+    pub fn without(self, without: Without) -> Self {
+        let disarmed = without.disarmed();
+        Self { control: self.control.without(disarmed), pwm: self.pwm.without(disarmed), ..self }
+    }
+
+    /// The latched fault.
+    pub fn trip(&self) -> Option<Trip> {
+        self.control.trip().or(self.pwm.trip())
+    }
+
+    /// Until the bench's recording is complete, or nobody wants to see more of it.
+    ///
+    /// # Errors
+    /// Where the bench cannot go on.
+    pub fn drive(
+        &mut self,
+        bench: &mut Bench,
+        mut goes_on: impl FnMut(&Bench) -> bool,
+    ) -> Result<(), BenchError> {
+        while !bench.is_done() {
+            let (control_at, pwm_at) = (self.control.next_call(), self.pwm.next_call());
+            let has_control = bench.has_control(control_at);
+            let mut port = Port { bench, error: None };
+            // They never meet: control comes at valleys, PWM at peaks.
+            if control_at.reached(pwm_at) || !has_control {
+                self.pwm.run(&mut port, &self.shared);
+            } else {
+                self.control.run(&mut port, &self.shared);
+            }
+            if let Some(error) = port.error {
+                return Err(error);
+            }
+            if !goes_on(bench) {
+                break;
+            }
+        }
+        Ok(())
+    }
 }

@@ -11,6 +11,7 @@ use super::operator::Operator;
 use super::trace::Recording;
 use super::{run, settings};
 use crate::analysis::Figures;
+use crate::bench::Limits;
 use crate::machine::Machine;
 use crate::options::{On, RunOptions};
 use crate::plant::zs9::{NetworkState, Zs9Plant, Zs9Settings};
@@ -130,6 +131,7 @@ fn bench(scenario: &dyn Scenario, options: &RunOptions, machine: &Machine) -> Re
         scheme: options.zs9.scheme,
         flaws: options.flaws(parameters.trip_current_a),
         injection: options.zs9.inject,
+        limits: Limits::NONE,
         edges: scenario.edges(options),
         dead_time_s: options.dead_time_us * 1e-6,
     };

@@ -1,0 +1,136 @@
+//! `campaign`: runs cases, prints the table and writes it.
+
+use super::judge::Verdict;
+use super::without::Without;
+use super::{Campaign, healthy, report, traction};
+use anyhow::{Context, Result, bail};
+use clap::Args;
+use indicatif::{ProgressBar, ProgressStyle};
+use rayon::prelude::*;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// What to run.
+#[derive(Args, Clone, Debug)]
+pub struct CampaignOptions {
+    /// Each fault of each kind once in each mode, instead of every case.
+    #[arg(long)]
+    pub fast: bool,
+    /// Only cases whose name (system, fault, speed in r/min, action) has each of these words.
+    #[arg(long, value_name = "WORD", num_args = 1..)]
+    pub only: Vec<String>,
+    /// One protection off: a fault's name, short_circuit or leg_safe_state. The cases that are lost are then listed.
+    #[arg(long, value_name = "PROTECTION")]
+    pub without: Option<Without>,
+    /// Folder for cases.csv, summary.json and report.html.
+    #[arg(long, default_value = "target/tractive/campaign")]
+    pub out: PathBuf,
+    /// A document whose generated part is written anew.
+    #[arg(long, value_name = "FILE")]
+    pub doc: Option<PathBuf>,
+    /// The document is not written: whether it is up to date decides on the exit code.
+    #[arg(long, requires = "doc")]
+    pub check_doc: bool,
+    /// Instead of faults: this many minutes of hard but healthy driving, at random, in which nothing may trip.
+    #[arg(long, value_name = "MINUTES", value_parser = crate::options::positive)]
+    pub healthy: Option<f64>,
+    /// With --healthy: the gates are blocked and released now and then, too.
+    #[arg(long, requires = "healthy")]
+    pub blocks: bool,
+    /// Seed of the driving.
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// Print the totals as JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Runs the campaign. Exit code 1 where a case is uncaught, or the document is not up to date.
+///
+/// # Errors
+/// Bad options, files that cannot be written, or a drive that breaks its bench's rules.
+pub fn run(options: &CampaignOptions) -> Result<ExitCode> {
+    if let Some(minutes) = options.healthy {
+        return drive_healthy(minutes, options);
+    }
+    let mut cases = super::cases(options.fast);
+    cases.retain(|case| {
+        let name = case.name();
+        options.only.iter().all(|word| name.split(' ').any(|part| part.contains(word.as_str())))
+    });
+    if cases.is_empty() {
+        bail!("--only {}: no case has all of these words", options.only.join(" "));
+    }
+    std::fs::create_dir_all(&options.out).with_context(|| format!("--out {}", options.out.display()))?;
+    let bar = ProgressBar::new(cases.len() as u64);
+    if let Ok(style) = ProgressStyle::with_template("campaign [{bar:40}] {pos}/{len} {elapsed} (left {eta})")
+    {
+        bar.set_style(style);
+    }
+    let outcomes = Campaign::new(options.without)?.run_all(&cases, || bar.inc(1))?;
+    bar.finish_and_clear();
+    let given = serde_json::json!({
+        "fast": options.fast,
+        "only": options.only,
+        "without": options.without.map(Without::name),
+    });
+    report::write(&outcomes, given, &options.out)?;
+    if options.json {
+        let totals = report::SYSTEMS.map(|(system, _)| (system.to_owned(), report::total(&outcomes, system)));
+        println!(
+            "{}",
+            serde_json::to_string(&totals.into_iter().collect::<std::collections::BTreeMap<_, _>>())?
+        );
+    } else {
+        println!("{}", report::text(&outcomes).trim_start());
+        println!("report: {}", options.out.join("report.html").display());
+    }
+    let lost: Vec<_> = outcomes.iter().filter(|outcome| outcome.verdict == Verdict::Uncaught).collect();
+    for outcome in &lost {
+        let (system, fault, mode, speed_rpm, why) =
+            (outcome.system, &outcome.fault, &outcome.mode, outcome.speed_rpm, &outcome.why);
+        eprintln!("uncaught: {system} {fault} {mode} {speed_rpm} r/min {}: {why}", outcome.action.name());
+    }
+    let mut good = lost.is_empty();
+    if let Some(path) = &options.doc {
+        let same = report::renew(path, &outcomes, options.check_doc)?;
+        if options.check_doc && !same {
+            eprintln!("{}: not up to date", path.display());
+            good = false;
+        }
+    }
+    Ok(if good { ExitCode::SUCCESS } else { ExitCode::from(1) })
+}
+
+/// Minutes of a piece: pieces are driven on all cores.
+const PIECE_MIN: f64 = 0.5;
+
+fn drive_healthy(minutes: f64, options: &CampaignOptions) -> Result<ExitCode> {
+    let drive = traction::Drive::new(options.without)?;
+    let pieces = (minutes / PIECE_MIN).ceil() as u64;
+    let piece_s = minutes * 60.0 / pieces as f64;
+    let seeds: Vec<_> = (0..pieces).map(|piece| options.seed + piece).collect();
+    let ridden =
+        seeds.par_iter().map(|seed| Ok((*seed, healthy::drive(&drive, piece_s, *seed, options.blocks)?)));
+    let ridden: Vec<_> = ridden.collect::<Result<_>>()?;
+    let mut trips = 0;
+    let (mut current_a, mut udc_v) = (0.0_f64, 0.0_f64);
+    for (seed, ridden) in &ridden {
+        current_a = current_a.max(ridden.observed.until.current_a);
+        udc_v = udc_v.max(ridden.observed.until.udc_v);
+        if let (Some(trip), Some(row)) = (ridden.trip, ridden.rows.iter().find(|row| row.trip.is_some())) {
+            trips += 1;
+            let (name, at_s, rpm) = (trip.fault.name(), row.t_s, row.speed_rpm);
+            let before =
+                ridden.rows.iter().rev().find(|row| row.trip.is_none()).map_or("", |row| row.mode.name());
+            eprintln!(
+                "seed {seed}: {name} {} (limit {}) at {at_s:.3} s, {rpm:.0} r/min, {before}",
+                trip.value, trip.limit
+            );
+        }
+    }
+    println!(
+        "{minutes} min of driving in {pieces} pieces: {trips} trips, {current_a:.0} A and {udc_v:.0} V at most"
+    );
+    Ok(if trips == 0 { ExitCode::SUCCESS } else { ExitCode::from(1) })
+}

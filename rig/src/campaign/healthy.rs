@@ -1,0 +1,64 @@
+//! Hard but healthy driving, at random: what must not trip.
+
+use super::traction::{Drive, Ridden, Ride};
+use crate::bench::Flaws;
+use anyhow::Result;
+use rand::rngs::StdRng;
+use rand::{Rng, SeedableRng};
+
+/// Steepest change of speed, in r/min per s: what the machine does to its own rotor.
+const STEEPEST_RPM_S: f64 = 3_000.0;
+/// The line's voltages, in V.
+const LINE_V: (f64, f64) = (1_150.0, 1_750.0);
+
+/// A random ride: speeds between both directions' highest, torques that step or are slewed from one sign to the other, a line that
+/// jumps, and, with `blocks`, gates that are blocked now and then.
+pub fn ride(drive: &Drive, duration_s: f64, seed: u64, blocks: bool) -> Ride {
+    let parameters = &drive.machine().folder.parameters;
+    let mut random = StdRng::seed_from_u64(seed);
+    let mut ride = Ride { duration_s, ..Ride::default() };
+    let (mut t_s, mut rpm) = (0.0, 0.0);
+    ride.speed.push((0.0, 0.0));
+    while t_s < duration_s {
+        let most_rpm = parameters.max_speed_rpm;
+        let next_rpm: f64 = random.random_range(-most_rpm..most_rpm);
+        let slope_rpm_s = random.random_range(0.1..1.0) * STEEPEST_RPM_S;
+        t_s += (next_rpm - rpm).abs() / slope_rpm_s;
+        rpm = next_rpm;
+        ride.speed.push((t_s, rpm));
+        t_s += random.random_range(0.0..1.0);
+        ride.speed.push((t_s, rpm));
+    }
+    t_s = 0.1;
+    while t_s < duration_s {
+        let share: f64 = if random.random_bool(0.2) { 0.0 } else { random.random_range(-1.0..1.0) };
+        ride.torque.push((t_s, (share * parameters.max_torque_nm, random.random_bool(0.5))));
+        t_s += random.random_range(0.02..0.8);
+    }
+    t_s = 0.0;
+    while t_s < duration_s {
+        ride.line.push((t_s, random.random_range(LINE_V.0..LINE_V.1)));
+        t_s += random.random_range(0.2..2.0);
+    }
+    t_s = 3.0;
+    while blocks && t_s < duration_s {
+        let again_s = t_s + random.random_range(0.05..0.3);
+        ride.enable.extend([(t_s, false), (again_s, true)]);
+        t_s = again_s + random.random_range(1.0..6.0);
+    }
+    ride
+}
+
+/// Sensors as they are: 12 bits, half an ampere of noise.
+pub fn flaws(drive: &Drive, seed: u64) -> Flaws {
+    let adc_full_scale_a = 1.25 * drive.machine().folder.parameters.trip_current_a;
+    Flaws { adc_bits: Some(12), adc_full_scale_a, noise_a: 0.5, seed, ..Flaws::default() }
+}
+
+/// Drives it; the trip in the end is what must not be.
+///
+/// # Errors
+/// A drive that breaks the bench's rules.
+pub fn drive(drive: &Drive, duration_s: f64, seed: u64, blocks: bool) -> Result<Ridden> {
+    drive.ride(ride(drive, duration_s, seed, blocks), flaws(drive, seed))
+}

@@ -1,0 +1,125 @@
+//! The fault campaign: nothing escapes, every protection is worth something, and the document says what there is.
+
+use std::collections::BTreeSet;
+use std::path::Path;
+use tractive::protection::Fault;
+use tractive_rig::campaign::judge::Verdict;
+use tractive_rig::campaign::without::Without;
+use tractive_rig::campaign::{Campaign, Outcome, cases, healthy, report, traction};
+
+/// Runs the cases whose names have all these words.
+fn run(campaign: &Campaign, fast: bool, words: &str) -> Vec<Outcome> {
+    let mut list = cases(fast);
+    list.retain(|case| words.split(' ').all(|word| case.name().split(' ').any(|part| part.contains(word))));
+    assert!(!list.is_empty(), "{words}");
+    campaign.run_all(&list, || ()).unwrap()
+}
+
+fn lost(outcomes: &[Outcome]) -> Vec<&Outcome> {
+    outcomes.iter().filter(|outcome| outcome.verdict == Verdict::Uncaught).collect()
+}
+
+#[test]
+fn nothing_escapes_the_fast_campaign() {
+    let outcomes = run(&Campaign::new(None).unwrap(), true, "");
+    let lost = lost(&outcomes);
+    assert!(lost.is_empty(), "{lost:#?}");
+    assert!(outcomes.len() >= 500, "{}", outcomes.len());
+    let modes: BTreeSet<_> = outcomes.iter().map(|outcome| (outcome.system, outcome.mode.as_str())).collect();
+    for mode in ["async", "sync15", "sync12", "mid7", "mid3", "square"] {
+        assert!(modes.contains(&("pmasynrm", mode)), "{mode}");
+    }
+    for scheme in ["s", "rs", "rthd-slide", "zvo"] {
+        assert!(
+            modes.iter().any(|(system, mode)| *system == "zs9" && scheme.starts_with(*mode)),
+            "{scheme} of {modes:?}"
+        );
+    }
+    for outcome in outcomes.iter().filter(|outcome| !outcome.fault.ends_with("-shorted")) {
+        let current_a = outcome.current_until_a.max(outcome.current_after_a);
+        let trip_a = if outcome.system == "zs9" { 110.5 } else { 303.349 };
+        assert!(current_a <= 1.5 * trip_a, "{outcome:?}");
+    }
+}
+
+/// What is switched off, and the cases that must then be lost.
+const WORTH: [(Without, &str); 18] = [
+    (Without::Check(Fault::Overcurrent), "pmasynrm current-u-railed 300"),
+    (Without::Check(Fault::DcOvervoltage), "pmasynrm link-over 300"),
+    (Without::Check(Fault::DcUndervoltage), "pmasynrm link-under 850"),
+    (Without::Check(Fault::Overspeed), "pmasynrm overspeed 6000"),
+    (Without::Check(Fault::PhaseSum), "pmasynrm current-u-offset 850"),
+    (Without::Check(Fault::NotFinite), "pmasynrm demand-not-finite 850"),
+    (Without::Check(Fault::Frozen), "pmasynrm angle-frozen 100"),
+    (Without::Check(Fault::ControlDeadline), "pmasynrm control-late 850"),
+    (Without::Check(Fault::StaleCommand), "pmasynrm commands-lost 850"),
+    (Without::Check(Fault::LegStuck), "pmasynrm uh-stuck-off 850 motoring"),
+    (Without::Check(Fault::AngleLost), "pmasynrm angle-jump 850"),
+    (Without::Check(Fault::DriverBlocked), "pmasynrm uh-stuck-on 850"),
+    (Without::ShortCircuit, "pmasynrm current-u-offset 6000"),
+    (Without::LegSafeState, "pmasynrm uh-shorted 2800"),
+    (Without::Check(Fault::SourceUndervoltage), "zs9 source-low 1000"),
+    (Without::Check(Fault::CapacitorOvervoltage), "zs9 source-high 1000"),
+    (Without::Check(Fault::DutyRange), "zs9 link-out-of-range 1000"),
+    (Without::Check(Fault::SensorLost1), "zs9 angle-1-jump 1000"),
+];
+
+#[test]
+fn without_a_protection_cases_are_lost() {
+    let also = [
+        (Without::Check(Fault::SensorLost2), "zs9 angle-2-jump 1000"),
+        (Without::Check(Fault::LegStuck), "zs9 um-stuck-on 1000"),
+        (Without::Check(Fault::StaleCommand), "zs9 commands-lost 1000"),
+    ];
+    let all = WORTH.into_iter().chain(also);
+    let sound = Campaign::new(None).unwrap();
+    let mut tried = BTreeSet::new();
+    for (without, words) in all {
+        let with = run(&sound, false, words);
+        assert!(lost(&with).is_empty(), "{words}: {:#?}", lost(&with));
+        let outcomes = run(&Campaign::new(Some(without)).unwrap(), false, words);
+        let lost = lost(&outcomes);
+        println!("without {}: {} of {} lost ({words})", without.name(), lost.len(), outcomes.len());
+        assert!(!lost.is_empty(), "without {} nothing of {words} is lost", without.name());
+        tried.insert(without.name());
+    }
+    for without in Without::all() {
+        assert!(tried.contains(without.name()), "{} is not tried", without.name());
+    }
+}
+
+#[test]
+fn the_document_has_every_case() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/fault-campaign.md");
+    let text = std::fs::read_to_string(path).unwrap();
+    let mut counts = std::collections::BTreeMap::new();
+    for case in cases(true) {
+        let name = case.name();
+        let mut parts = name.split(' ');
+        let (system, fault) = (parts.next().unwrap().to_owned(), parts.next().unwrap().to_owned());
+        *counts.entry((system, fault)).or_insert(0) += 1;
+    }
+    for (system, heading) in report::SYSTEMS {
+        let from = text.find(&format!("### {heading}")).unwrap_or_else(|| panic!("no {heading}"));
+        let part = &text[from..];
+        for ((of, fault), count) in &counts {
+            if of != system {
+                continue;
+            }
+            let line = part.lines().find(|line| line.starts_with(&format!("| {fault} ")));
+            let cells: Vec<_> =
+                line.unwrap_or_else(|| panic!("no {fault}")).split('|').map(str::trim).collect();
+            assert_eq!(cells[2], count.to_string(), "{fault}: write it anew with the command that it names");
+            assert_eq!(cells[5], "0", "{fault}");
+        }
+    }
+}
+
+#[test]
+fn a_random_ride_is_the_same_every_time() {
+    let drive = traction::Drive::new(None).unwrap();
+    let [a, b] = [0, 1].map(|_| healthy::drive(&drive, 2.0, 7, false).unwrap());
+    assert_eq!(a.rows.len(), b.rows.len());
+    assert!(a.rows.iter().zip(&b.rows).all(|(a, b)| a.te_nm == b.te_nm));
+    assert!(a.trip.is_none(), "{:?}", a.trip);
+}
