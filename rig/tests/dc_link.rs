@@ -113,7 +113,7 @@ fn a_stiff_link_is_the_limit_of_a_large_one() {
     for k in 0..20_000_u32 {
         let turns = 53.0 * f64::from(k) * 10e-6;
         let legs = [0.0, 1.0 / 3.0, 2.0 / 3.0]
-            .map(|lag| if (turns - lag as f64).rem_euclid(1.0) < 0.5 { Leg::Upper } else { Leg::Lower });
+            .map(|lag| if (turns - lag).rem_euclid(1.0) < 0.5 { Leg::Upper } else { Leg::Lower });
         on_link.advance_on(&mut link, legs, 10e-6);
         stiff.advance(legs, 250.0, 10e-6);
     }

@@ -29,7 +29,7 @@ fn speed(duration_s: f64) -> Vec<(f64, f64)> {
 
 fn demand(t_s: f64) -> (Demand, bool) {
     let phase = (t_s / PERIOD_S).rem_euclid(1.0);
-    let torque_nm = if (phase * 4.0) as u32 % 2 == 0 { 400.0 } else { -400.0 };
+    let torque_nm = if ((phase * 4.0) as u32).is_multiple_of(2) { 400.0 } else { -400.0 };
     (Demand { torque_nm, slew_limited: true }, true)
 }
 

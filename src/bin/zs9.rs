@@ -19,6 +19,7 @@ mod firmware {
     use cortex_m_rt::{entry, exception, interrupt};
     use tractive::board::qemu::{self, CLOCK, Interrupt as interrupt};
     use tractive::drive::dual::{ControlTask, PwmTask, Settings, Shared};
+    use tractive::machine::Machine;
     use tractive::machine::zs9::BuiltIn;
 
     static SHARED: Shared = Shared::new();
@@ -32,7 +33,7 @@ mod firmware {
     fn main() -> ! {
         let setup = qemu::connect_dual();
         CARRIER_TICKS.store(setup.carrier_ticks, Ordering::Relaxed);
-        if let Err(refused) = settings().check(&BUILT_IN) {
+        if let Err(refused) = settings().check(BuiltIn.tables()) {
             qemu::refuse(&refused);
         }
         qemu::start_dual(&settings());

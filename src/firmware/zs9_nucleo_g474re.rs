@@ -8,9 +8,9 @@ use tractive::board::nucleo_g474re::registers::Registers;
 use tractive::board::nucleo_g474re::zs9::sampling::Zeros;
 use tractive::board::nucleo_g474re::zs9::stage::STAGE;
 use tractive::board::nucleo_g474re::zs9::{self as board, Control, OPERATOR, Pwm, settings};
-use tractive::board::nucleo_g474re::{Interrupt as interrupt, PULSE, die};
+use tractive::board::nucleo_g474re::{Interrupt as interrupt, PULSE, die, refuse};
 use tractive::drive::dual::{ControlTask, PwmTask, Shared};
-use tractive::machine::zs9::BUILT_IN;
+use tractive::machine::zs9::{BUILT_IN, BuiltIn};
 
 static SHARED: Shared = Shared::new();
 /// What the start measured, written before the interrupts are unmasked.
@@ -31,6 +31,9 @@ fn kept() -> Zeros {
 
 #[entry]
 fn main() -> ! {
+    if let Err(refused) = settings().check(&BUILT_IN) {
+        refuse(&refused);
+    }
     if let Ok(zeros) = board::prepare() {
         keep(&zeros);
         board::run();
@@ -42,7 +45,7 @@ fn main() -> ! {
 #[interrupt]
 fn TIM2() {
     static mut BOARD: Option<Control<'static, Encoder>> = None;
-    static mut TASK: Option<ControlTask> = None;
+    static mut TASK: Option<ControlTask<BuiltIn>> = None;
     let board = BOARD.get_or_insert_with(|| {
         let registers = Registers::CHIP;
         let [first, second] = STAGE.encoder_zeros;
@@ -54,7 +57,7 @@ fn TIM2() {
         Control::new(registers, kept(), encoders, &OPERATOR)
     });
     board.acknowledge();
-    TASK.get_or_insert_with(|| ControlTask::new(&BUILT_IN, settings())).run(board, &SHARED);
+    TASK.get_or_insert_with(|| ControlTask::new(BuiltIn, settings())).run(board, &SHARED);
     PULSE.control_ran();
 }
 
@@ -63,11 +66,11 @@ fn TIM2() {
 #[interrupt]
 fn TIM1_UP_TIM16() {
     static mut BOARD: Option<Pwm> = None;
-    static mut TASK: Option<PwmTask> = None;
+    static mut TASK: Option<PwmTask<BuiltIn>> = None;
     let board = BOARD.get_or_insert_with(|| Pwm::new(Registers::CHIP, kept()));
     board.acknowledge();
     if board.begin() {
-        TASK.get_or_insert_with(|| PwmTask::new(&BUILT_IN, settings())).run(board, &SHARED);
+        TASK.get_or_insert_with(|| PwmTask::new(BuiltIn, settings())).run(board, &SHARED);
         PULSE.pwm_ran();
     }
 }

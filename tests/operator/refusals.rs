@@ -205,7 +205,8 @@ fn no_contactors() {
 
 #[test]
 fn values_that_cannot_be_used_are_refused_once() {
-    let values: [(fn(&mut Request), Refusal); 10] = [
+    type Spoil = fn(&mut Request);
+    let values: [(Spoil, Refusal); 10] = [
         (|request| request.torque_nm = f32::NAN, Refusal::RequestNotFinite),
         (|request| request.limits.braking_nm = f32::INFINITY, Refusal::RequestNotFinite),
         (|request| request.limits.motoring_nm = 1_236.0, Refusal::LimitOutOfRange),

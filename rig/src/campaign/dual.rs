@@ -113,7 +113,7 @@ fn faults() -> Vec<Named> {
     const SUM: &[Fault] = &[Fault::PhaseSum];
     const TOO_MUCH: &[Fault] = &[Fault::PhaseSum, Fault::Overcurrent];
     const LOST: [&[Fault]; 2] = [&[Fault::SensorLost1], &[Fault::SensorLost2]];
-    for motor in 0..2 {
+    for (motor, lost) in LOST.into_iter().enumerate() {
         for phase in 0..3 {
             let letter = ["u", "v", "w"][phase];
             let mut sensor = |what: &str, fault, names, share, fast| {
@@ -133,11 +133,11 @@ fn faults() -> Vec<Named> {
         let mut sensor = |what: &str, fault, names, share| {
             add(&format!("angle-{number}-{what}"), angle(fault), names, share, true);
         };
-        sensor("frozen", AngleFault::Frozen, LOST[motor], None);
-        sensor("jump", AngleFault::Jump(90.0), LOST[motor], None);
-        sensor("glitches", AngleFault::Glitches(60.0, 50), LOST[motor], None);
-        sensor("reversed", AngleFault::Reversed, LOST[motor], None);
-        sensor("late", AngleFault::Late(10), LOST[motor], Some(BENT));
+        sensor("frozen", AngleFault::Frozen, lost, None);
+        sensor("jump", AngleFault::Jump(90.0), lost, None);
+        sensor("glitches", AngleFault::Glitches(60.0, 50), lost, None);
+        sensor("reversed", AngleFault::Reversed, lost, None);
+        sensor("late", AngleFault::Late(10), lost, Some(BENT));
     }
     add("angle-1-lost", Cause::Bench(Kind::SensorLost1), LOST[0], None, true);
     add("angle-2-lost", Cause::Bench(Kind::SensorLost2), LOST[1], None, true);

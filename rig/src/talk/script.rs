@@ -270,8 +270,7 @@ mod tests {
     fn every_command_of_the_help_is_understood() {
         for usage in COMMANDS {
             let full = usage
-                .replace('[', "")
-                .replace(']', "")
+                .replace(['[', ']'], "")
                 .replace("on|off", "on")
                 .replace("LOW_V HIGH_V", "900 1800")
                 .replace("COLUMN VALUE", "state running");

@@ -30,7 +30,7 @@ impl Rig {
     }
 
     /// Counts to the next interrupt that is the drive's, serving those at valleys. `each` sees every cycle.
-    fn to_peak(&mut self, each: &mut dyn FnMut(&Model)) {
+    fn until_peak(&mut self, each: &mut dyn FnMut(&Model)) {
         loop {
             let beat = self.model.tick();
             each(&self.model);
@@ -51,7 +51,7 @@ impl Rig {
 
     /// To the next peak, where the next period is loaded.
     fn play(&mut self, next: &PlayedPeriod, each: &mut dyn FnMut(&Model)) {
-        self.to_peak(each);
+        self.until_peak(each);
         self.pwm.play(NOW, next);
         self.model.settle();
     }
@@ -98,7 +98,7 @@ fn every_scheme_is_played_cycle_by_cycle() {
             rig.play(&played, &mut nothing);
             // From this peak on both halves are the period's; two peaks later every cycle has been compared.
             let mut compared = 0;
-            rig.to_peak(&mut |model| {
+            rig.until_peak(&mut |model| {
                 compared += 1;
                 let (count, down) = model.position();
                 // The cycle's middle, as far from the valley as in the rising half.
@@ -123,7 +123,7 @@ fn the_second_half_is_the_exact_mirror_image() {
     rig.play(&played, &mut nothing);
     rig.play(&played, &mut nothing);
     let mut levels = Vec::new();
-    rig.to_peak(&mut |model| levels.push(model.references()));
+    rig.until_peak(&mut |model| levels.push(model.references()));
     // From peak to peak: falling half, rising half.
     let half = usize::from(HALF_CYCLES);
     for t in 0..half - 1 {
@@ -140,7 +140,7 @@ fn shoot_through_is_shorter_by_the_dead_time() {
         rig.play(&played, &mut nothing);
         rig.play(&played, &mut nothing);
         rig.model.shorted = [0; 2];
-        rig.to_peak(&mut nothing);
+        rig.until_peak(&mut nothing);
         rig.model.shorted
     };
     let [by_compares, by_devices] = shorted(0.2);
@@ -162,7 +162,7 @@ fn a_period_takes_over_at_the_valley_and_not_before() {
     let [first, second] =
         [first, second].map(|period| PeriodCompares::new(&period, DEAD_CYCLES as u16).unwrap());
     assert_ne!(first, second);
-    rig.to_peak(&mut |model| {
+    rig.until_peak(&mut |model| {
         let (count, down) = model.position();
         let expected = if down && count > 0 && count < HALF_CYCLES { &first } else { &second };
         until_valley += u32::from(expected == &first);
@@ -238,7 +238,7 @@ fn an_answer_that_comes_after_its_valley_turns_the_gates_off() {
     for _ in 0..3 {
         rig.play(&on, &mut nothing);
     }
-    rig.to_peak(&mut nothing);
+    rig.until_peak(&mut nothing);
     (0..u32::from(HALF_CYCLES) + 50).for_each(|_| _ = rig.model.tick());
     rig.pwm.play(NOW, &on);
     rig.model.settle();

@@ -60,17 +60,15 @@ fn the_drive_pulses_two_turning_motors_through_the_registers() {
             let mut port = Port { pwm: &mut rig.pwm, seen: core::mem::take(&mut seen) };
             pwm_task.run(&mut port, &shared);
             rig.model.settle();
-        } else if beat {
-            if cycle % control_cycles == 0 {
-                assert_eq!(control_task.next_call(), Instant((cycle / u64::from(CYCLES_PER_TICK)) as u32));
-                // 600 r/min and 300 r/min of 4,096 counts.
-                let counts = cycle * 4_096 / 17_000_000;
-                registers.tim4.cnt().write(|w| w.set_cnt((counts % 4_096) as u16));
-                registers.tim3.cnt().write(|w| w.set_cnt((counts / 2 % 4_096) as u16));
-                converted(&codes, registers);
-                control_task.run(&mut control, &shared);
-                rig.model.settle();
-            }
+        } else if beat && cycle % control_cycles == 0 {
+            assert_eq!(control_task.next_call(), Instant((cycle / u64::from(CYCLES_PER_TICK)) as u32));
+            // 600 r/min and 300 r/min of 4,096 counts.
+            let counts = cycle * 4_096 / 17_000_000;
+            registers.tim4.cnt().write(|w| w.set_cnt((counts % 4_096) as u16));
+            registers.tim3.cnt().write(|w| w.set_cnt((counts / 2 % 4_096) as u16));
+            converted(&codes, registers);
+            control_task.run(&mut control, &shared);
+            rig.model.settle();
         }
         shorted = rig.model.shorted[1];
     }
@@ -78,4 +76,9 @@ fn the_drive_pulses_two_turning_motors_through_the_registers() {
     assert_eq!(operator.report().unwrap().trip, None);
     let beats = 400 * CLOCK.control_ticks / CARRIER_TICKS;
     assert!(on > 100 * control_cycles && shorted > 1_000, "{beats} periods: {on} {shorted}");
+}
+
+#[test]
+fn the_firmwares_settings_are_accepted() {
+    assert_eq!(settings().check(&BUILT_IN), Ok(()));
 }
