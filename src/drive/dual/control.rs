@@ -62,10 +62,14 @@ impl<M: Machine> ControlTask<M> {
         self.now = now.after(self.settings.clock.control_ticks);
         shared.began.store(now.0, Ordering::Relaxed);
         // First of all: the next peak writes it again.
-        let applied = shared.applied.read().filter(|applied| now.reached(applied.at));
+        let newest = shared.applied.read();
+        let applied = newest.filter(|applied| now.reached(applied.at));
         let sample = port.sample(now);
         if self.trip.is_none() {
-            self.trip = applied.and_then(|applied| applied.trip);
+            // From beyond the next call only if calls of this one have been lost.
+            let latest = self.now;
+            let known = newest.filter(|newest| now.reached(newest.at) || !latest.reached(newest.at));
+            self.trip = known.and_then(|known| known.trip);
         }
         self.check(applied.and_then(|applied| self.overdue(&applied, now)), port);
         let angles = self.track(&sample, port);
