@@ -301,6 +301,9 @@ struct Plan {
     at: u32,
 }
 
+/// How far a carrier may be from its angle when it gives way to a pattern: 6°, less than half of its shortest half.
+const KEPT_ANGLE: Angle = Angle(71_582_788);
+
 /// Halves by which a switch between locked modes is announced.
 const AHEAD: u32 = 2;
 
@@ -406,12 +409,19 @@ impl Modulator {
         }
         if self.mode.carriers() > 0 && wanted.carriers() > 0 {
             let at = self.half_after(self.next_half, AHEAD);
-            if schedule::may_switch(self.mode, wanted, at) {
+            let keeps_angle = wanted.is_carrier() || self.keeps_its_angle(pulse);
+            if keeps_angle && schedule::may_switch(self.mode, wanted, at) {
                 self.plan = Some(Plan { to: wanted, at });
             }
         } else if schedule::may_switch(self.mode, wanted, self.next_half) {
             self.switch_to(start, wanted, pulse);
         }
+    }
+
+    /// Whether the locked half that begins at pulse angle `pulse` begins where it should. After a step of torque a carrier catches up
+    /// with its angle over many halves; a pattern that began then would have its pulses in the wrong place.
+    fn keeps_its_angle(&self, pulse: Angle) -> bool {
+        (boundary(self.next_half, self.mode.carriers()) - pulse).signed().unsigned_abs() < KEPT_ANGLE.0
     }
 
     fn switch_to(&mut self, start: Instant, mode: Mode, pulse: Angle) {
