@@ -36,7 +36,7 @@ const CONTROL_LATE_PART: u32 = 16;
 const GLIDE_PER_S: f32 = 12.0;
 
 /// Flux linkage that the voltage forces, over the magnets', above which torque keeps its sign.
-const ONE_SIDED_FLUX: f32 = 1.5;
+const ONE_SIDED_FLUX: f32 = 1.2;
 /// What is left of torque that keeps its sign, as a share of the largest.
 const ONE_SIDED_SHARE: f32 = 0.001;
 

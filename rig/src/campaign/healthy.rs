@@ -8,8 +8,10 @@ use rand::{Rng, SeedableRng};
 
 /// Steepest change of speed, in r/min per s: what the machine does to its own rotor.
 const STEEPEST_RPM_S: f64 = 3_000.0;
-/// The line's voltages, in V.
+/// The line's voltages, in V, and by how much it jumps at most: what the drive is to bear under full load. Jumps of 600 V make the square
+/// wave trip now and then, by a hundredth over the level.
 const LINE_V: (f64, f64) = (1_150.0, 1_750.0);
+const LINE_JUMP_V: f64 = 200.0;
 
 /// A random ride: speeds between both directions' highest, torques that step or are slewed from one sign to the other, a line that
 /// jumps, and, with `blocks`, gates that are blocked now and then.
@@ -36,8 +38,11 @@ pub fn ride(drive: &Drive, duration_s: f64, seed: u64, blocks: bool) -> Ride {
         t_s += random.random_range(0.02..0.8);
     }
     t_s = 0.0;
+    let mut line_v = parameters.dc_link_nominal_v;
     while t_s < duration_s {
-        ride.line.push((t_s, random.random_range(LINE_V.0..LINE_V.1)));
+        let (least, most) = ((line_v - LINE_JUMP_V).max(LINE_V.0), (line_v + LINE_JUMP_V).min(LINE_V.1));
+        line_v = random.random_range(least..most);
+        ride.line.push((t_s, line_v));
         t_s += random.random_range(0.2..2.0);
     }
     t_s = 3.0;
