@@ -3,6 +3,8 @@
 
 #![forbid(unsafe_code)]
 
+use crate::frames::UNITS_PER_RADIAN;
+
 /// An instant, in ticks of the timers' clock, modulo 2³².
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Instant(pub u32);
@@ -57,6 +59,12 @@ impl Clock {
     #[inline]
     pub fn seconds(&self, ticks: i32) -> f32 {
         ticks as f32 * self.tick_s
+    }
+
+    /// Angle units per tick of an electrical angular speed in rad/s.
+    #[inline]
+    pub fn angle_rate(&self, omega: f32) -> f32 {
+        omega * (UNITS_PER_RADIAN * self.tick_s)
     }
 
     /// The control timer's period, in s.

@@ -6,7 +6,7 @@ use crate::control::{
     Boundary, Committed, Controller, Demand, Follows, Input, Law, LinkWindow, Measurements, Region,
     SpeedInput, SpeedLoop,
 };
-use crate::frames::{AlphaBeta, Angle, UNITS_PER_RADIAN};
+use crate::frames::{AlphaBeta, Angle};
 use crate::machine::Tables;
 use crate::protection::{self, Fault, FrozenWatch, Violation};
 
@@ -154,7 +154,7 @@ impl Axis {
             command: MotorCommand {
                 voltage_v: output.voltage.voltage_v,
                 angle: output.voltage.vector.angle(),
-                rate: omega * (UNITS_PER_RADIAN * settings.clock.tick_s),
+                rate: settings.clock.angle_rate(omega),
             },
             torque_nm: output.torque_nm,
             weakening: output.point.region != Region::Mtpa,

@@ -1,0 +1,211 @@
+//! What the modulator does, as the control interrupt sees it.
+
+use super::Settings;
+use super::glide::Glide;
+use crate::cell::{Record, SEEN};
+use crate::control::{Boundary, Committed, Follows, Ripple};
+use crate::drive::messages::{COMMITTAL_WORDS, CommittalRecord, HalfKind};
+use crate::frames::{Abc, AlphaBeta, Angle};
+use crate::modulation::{Mode, RippleFlux, depth_limit, first_half, ripple_share};
+use crate::protection::{Fault, Violation};
+use crate::time::{Clock, Instant};
+
+/// By which part of a control period the PWM interrupt may be late before control calls it lost: more than it takes to enter it.
+const PWM_LATE_PART: u32 = 4;
+
+/// Share of a mode's largest fundamental that the operating point may use where the voltage must also regulate.
+const REGULATION_ROOM: f32 = 0.999;
+
+/// What control makes of the modulator's records: the newest boundary and what is committed from there on. Of the voltages only
+/// the ticks for which they act.
+pub(super) struct Applied {
+    /// The newest boundary, and the one before it.
+    pub at: Instant,
+    pub before: Instant,
+    /// Phase currents at the newest one, in A.
+    pub currents_a: Abc,
+    /// What the half gave that ended there; `None` while the gates were off.
+    pub passed: Option<AlphaBeta>,
+    /// What the running half gives from now on; `None` if the gates are off in it or in the next one.
+    pub running: Option<AlphaBeta>,
+    /// Mode of the running half.
+    pub mode: Mode,
+    pub next: Next,
+    /// Number of the acknowledge that the PWM interrupt had carried out.
+    pub acknowledged: u8,
+}
+
+/// The half after the running one.
+pub(super) struct Next {
+    pub begins: Instant,
+    pub period_ticks: u32,
+    pub volt_ticks: AlphaBeta,
+    pub kind: HalfKind,
+}
+
+impl Applied {
+    /// Mode of the half that this period's command is made for.
+    pub(super) fn decided(&self) -> Mode {
+        self.next.kind.ahead()[0]
+    }
+
+    /// The PWM interrupt that should have come by `now` and has not: since when, in s.
+    pub(super) fn overdue(&self, now: Instant, clock: &Clock) -> Option<Violation> {
+        let late = now.since(self.next.begins);
+        let limit = (clock.control_ticks / PWM_LATE_PART) as i32;
+        (late > limit).then(|| (Fault::PwmDeadline, clock.seconds(late), clock.seconds(limit)))
+    }
+
+    /// As it stood at `now`, even if the PWM interrupt has come since.
+    #[inline]
+    pub(super) fn seen(records: [Record<COMMITTAL_WORDS>; SEEN], now: Instant) -> Option<Self> {
+        let [newest, one, two, three] = records.map(CommittalRecord);
+        if now.reached(newest.at()) {
+            return Some(Self::of([newest, one, two], now));
+        }
+        // Words that were never written say instant 0, of which there is none.
+        now.reached(one.at()).then(|| Self::of([one, two, three], now))
+    }
+
+    #[inline]
+    fn of([newest, one, two]: [CommittalRecord; 3], now: Instant) -> Self {
+        let (at, kind) = (newest.at(), newest.kind());
+        let (begins, period_ticks, volt_ticks) =
+            (newest.begins(), newest.period_ticks(), newest.volt_ticks());
+        let next = Next { begins, period_ticks, volt_ticks, kind };
+        let mode = one.kind().mode();
+        let off = mode == Mode::Off || kind.mode() == Mode::Off;
+        let running = (!off).then(|| one.volt_ticks_from(now.since(at).max(0) as u32));
+        let passed = (two.kind().mode() != Mode::Off).then(|| two.volt_ticks());
+        Self {
+            at,
+            before: one.at(),
+            currents_a: newest.currents_a(),
+            passed,
+            running,
+            mode,
+            next,
+            acknowledged: newest.acknowledged(),
+        }
+    }
+}
+
+/// What the voltage is made for, at the instant of a control interrupt.
+pub(super) struct Steady {
+    /// Electrical angular speed, in rad/s.
+    pub omega: f32,
+    /// Link voltage, in V.
+    pub udc_v: f32,
+    /// The fundamental of the last operating point, in V.
+    pub voltage_v: f32,
+    /// Fundamental that the last operating point would have without a limit, as a share of six-step.
+    pub depth: f32,
+}
+
+/// What is committed before the modulator has told anything: nothing.
+pub(super) fn nothing_committed(settings: &Settings) -> Committed {
+    let Settings { clock, devices, .. } = settings;
+    Committed {
+        horizon_s: 0.0,
+        volt_seconds: None,
+        ripple: None,
+        interval_s: clock.seconds(devices.shortest_half_ticks as i32),
+        follows: Follows::Mean,
+        depth_limit: depth_limit(Mode::Async, 0.0, devices),
+        steady_share: 1.0,
+        filled: false,
+        ripple_share: ripple_share(Mode::Async, 0.0),
+        settled: true,
+    }
+}
+
+impl Applied {
+    /// What the modulator will do from `now` until a command of this period can act; with `revises` only the running half stands.
+    pub(super) fn committed(
+        &self,
+        now: Instant,
+        steady: &Steady,
+        glide: &mut Glide,
+        settings: &Settings,
+        revises: bool,
+    ) -> Committed {
+        let Settings { clock, devices, .. } = settings;
+        let next = &self.next;
+        let decided = self.decided();
+        let largest = depth_limit(decided, clock.angle_rate(steady.omega), devices);
+        let largest = if decided == Mode::Square { largest } else { REGULATION_ROOM * largest };
+        let (depth_limit, filled) = glide.fill(decided, largest, steady.depth, clock.control_s());
+        let running = next.begins.since(now).max(0) as u32;
+        let left = running + if revises { 0 } else { next.period_ticks };
+        let volt_ticks = self.running.map(|ticks| if revises { ticks } else { ticks + next.volt_ticks });
+        let (interval_s, follows) = match decided.carriers() {
+            0 => (clock.seconds(devices.shortest_half_ticks as i32), Follows::Mean),
+            carriers => {
+                let interval_s = core::f32::consts::PI / (carriers as f32 * steady.omega.abs());
+                let follows = match decided {
+                    Mode::Mid7 | Mode::Mid3 => Follows::Fundamental,
+                    Mode::Square => Follows::Angle,
+                    _ => Follows::Mean,
+                };
+                (interval_s, follows)
+            }
+        };
+        Committed {
+            horizon_s: clock.seconds(left as i32),
+            volt_seconds: volt_ticks.map(|ticks| ticks * (steady.udc_v * clock.tick_s)),
+            ripple: next.kind.ripple(steady),
+            interval_s,
+            follows,
+            depth_limit,
+            steady_share: 1.0,
+            filled,
+            ripple_share: ripple_share(decided, steady.depth),
+            settled: true,
+        }
+    }
+
+    /// The newest boundary, unless it is the one that was `used` last.
+    pub(super) fn boundary(
+        &self,
+        used: Option<Instant>,
+        now: Instant,
+        udc_v: f32,
+        clock: &Clock,
+    ) -> Option<Boundary> {
+        if used == Some(self.at) {
+            return None;
+        }
+        let passed = if used == Some(self.before) { self.passed } else { None };
+        Some(Boundary {
+            currents_a: self.currents_a,
+            age_s: clock.seconds(now.since(self.at)),
+            volt_seconds: passed.map(|ticks| ticks * (udc_v * clock.tick_s)),
+            length_s: clock.seconds(self.at.since(self.before)),
+        })
+    }
+}
+
+impl HalfKind {
+    /// Ripple flux at the end of this half, which is committed, and the one wanted at the end of the half after it. Where a
+    /// pattern begins at the first of these, its own ripple is expected; where a carrier begins, what the old pattern leaves.
+    fn ripple(self, steady: &Steady) -> Option<Ripple> {
+        let (mode, [decided, after]) = (self.mode(), self.ahead());
+        let flux = |mode: Mode| RippleFlux::new(mode, steady.voltage_v, steady.udc_v, steady.omega.abs());
+        let seen = |ripple: AlphaBeta| AlphaBeta {
+            beta: if self.is_mirrored() { -ripple.beta } else { ripple.beta },
+            ..ripple
+        };
+        let end = self.half() + 1;
+        if mode == decided && decided == after {
+            let flux = flux(mode)?;
+            return Some(Ripple { at_horizon_wb: seen(flux.at(end)), after_wb: seen(flux.at(end + 1)) });
+        }
+        let number = |from: Mode, to: Mode, half: u32| {
+            if from == to { half } else { first_half(from, to, half, Angle::ZERO) }
+        };
+        let at = |mode: Mode, half: u32| flux(mode).map_or(AlphaBeta::default(), |flux| seen(flux.at(half)));
+        let begins = number(mode, decided, end);
+        let at_horizon_wb = if decided.is_carrier() { at(mode, end) } else { at(decided, begins) };
+        Some(Ripple { at_horizon_wb, after_wb: at(after, number(decided, after, begins + 1)) })
+    }
+}

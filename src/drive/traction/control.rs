@@ -1,0 +1,339 @@
+//! The control interrupt's task.
+
+use super::applied::{Applied, Steady, nothing_committed};
+use super::glide::Glide;
+use super::{Settings, Shared};
+use crate::board::{ControlPort, Sample};
+use crate::control::{Boundary, Committed, Controller, Demand, Input, Law};
+use crate::drive::messages::{Gates, Report, VoltageCommand};
+use crate::frames::AlphaBeta;
+use crate::machine::{Machine, Tables};
+use crate::modulation::{Mode, Reference};
+use crate::protection::{self, Disarmed, Fault, FrozenWatch, Trip, Violation};
+use crate::recorder::{Record, State};
+use crate::time::Instant;
+use core::sync::atomic::Ordering;
+
+/// A demand that jumps by more than this share of the largest torque is worth revising the next half for.
+const JUMP_SHARE: f32 = 0.05;
+
+/// Control periods that the running half must still last for the next one to be revised: one until the command is valid, and one
+/// in which control sees what became of it.
+const REVISION_PERIODS: u32 = 2;
+
+/// The control interrupt's task, for a machine.
+pub struct ControlTask<M = &'static Tables> {
+    machine: M,
+    settings: Settings,
+    controller: Controller,
+    watch: FrozenWatch,
+    /// Nominal instant of the next call.
+    now: Instant,
+    /// Instant of the newest carrier boundary that was used.
+    boundary: Option<Instant>,
+    /// The fundamental of the last operating point, in V.
+    steady_v: f32,
+    /// Fundamental that the last operating point would have without a limit, as a share of six-step.
+    depth: f32,
+    glide: Glide,
+    /// The last demand, in N·m, and whether it has jumped and no half has been revised for it yet.
+    demand_nm: f32,
+    jumped: bool,
+    /// Whether the newest command is for the half that is already committed.
+    revises: bool,
+    disarmed: Disarmed,
+    trip: Option<Trip>,
+    /// Number of the acknowledge that both interrupts have carried out.
+    acknowledged: u8,
+}
+
+impl<M: Machine> ControlTask<M> {
+    /// A task whose first call is the control timer's first interrupt, at `first`.
+    pub const fn new(machine: M, settings: Settings, first: Instant) -> Self {
+        Self {
+            machine,
+            settings,
+            controller: Controller::new(),
+            watch: FrozenWatch::new(),
+            now: first,
+            boundary: None,
+            steady_v: 0.0,
+            depth: 0.0,
+            glide: Glide::new(),
+            demand_nm: 0.0,
+            jumped: false,
+            revises: false,
+            disarmed: Disarmed::NONE,
+            trip: None,
+            acknowledged: 0,
+        }
+    }
+
+    /// Whether [`PwmTask::revise`] is to run before the next [`ControlTask::run`], at the same instant: first thing in the interrupt,
+    /// the handler makes the PWM interrupt pending.
+    pub fn wants_revision(&self) -> bool {
+        self.revises
+    }
+
+    /// The same without a check.
+    pub const fn without(mut self, disarmed: Disarmed) -> Self {
+        self.disarmed = disarmed;
+        self
+    }
+
+    /// The control timer's interrupt. Deadline: one control period after its nominal instant; a missed one is a fault.
+    pub fn run(&mut self, port: &mut impl ControlPort, shared: &Shared) {
+        let now = self.now;
+        self.now = now.after(self.settings.clock.control_ticks);
+        shared.began.store(now.0, Ordering::Relaxed);
+        let sample = port.sample(now);
+        let applied = shared.applied.read(|records| Applied::seen(records, now)).flatten();
+        self.forget_acknowledged(sample.acknowledge, applied.as_ref());
+        if self.trip.is_none() && applied.as_ref().is_some_and(|applied| applied.next.kind.is_tripped()) {
+            self.trip = shared.trip.read();
+        }
+        if let Some(fault) = sample.hardware {
+            // That the gates are held is only what comes of it.
+            self.trip = self.trip.filter(|trip| trip.fault != Fault::GatesHeld);
+            self.check(Some((fault, 1.0, 0.0)), &sample, port);
+        }
+        let overdue = applied.as_ref().and_then(|applied| applied.overdue(now, &self.settings.clock));
+        self.check(overdue, &sample, port);
+        self.check_legs(&sample, port);
+        let omega = self.track(&sample, port);
+        self.check(
+            protection::check_measurements(&sample.measured, omega, &self.machine.tables().ratings),
+            &sample,
+            port,
+        );
+        if sample.enable {
+            self.check(
+                protection::check_undervoltage(sample.measured.udc_v, &self.machine.tables().ratings),
+                &sample,
+                port,
+            );
+        }
+        self.check(protection::check_demand(&sample.demand), &sample, port);
+        let pulsing = self.trip.is_none() && sample.enable && self.controller.speed_is_known();
+        let mut report = Report {
+            frequency_hz: omega / core::f32::consts::TAU,
+            udc_v: sample.measured.udc_v,
+            current_a: sample.measured.currents_a.peak(),
+            speed_known: self.controller.speed_is_known(),
+            acknowledged: self.acknowledged,
+            ..Report::default()
+        };
+        let mut command = VoltageCommand {
+            reference: Reference {
+                voltage_v: 0.0,
+                vector: AlphaBeta::default(),
+                carrier_angle: sample.measured.angle,
+                rate: self.settings.clock.angle_rate(omega),
+                at: now,
+                udc_v: sample.measured.udc_v,
+                depth: 0.0,
+            },
+            valid_from: self.now,
+            gates: Gates::Off,
+            revises: false,
+            acknowledge: sample.acknowledge,
+        };
+        if pulsing {
+            let frozen = self.watch.check(
+                &sample.measured,
+                omega,
+                self.settings.clock.control_s(),
+                &self.machine.tables().ratings,
+            );
+            self.check(frozen, &sample, port);
+            self.pulse(&sample, applied.as_ref(), omega, &mut command, &mut report);
+        } else {
+            self.controller.idle();
+            self.watch = FrozenWatch::new();
+            self.boundary = None;
+            self.steady_v = 0.0;
+            self.glide.forget_side();
+        }
+        let finite = command.reference.voltage_v.is_finite() && command.reference.rate.is_finite();
+        self.check(
+            (!finite).then_some((Fault::NotFinite, command.reference.voltage_v, f32::MAX)),
+            &sample,
+            port,
+        );
+        let late = port.overrun_ticks(now);
+        let late_s = self.settings.clock.seconds(late as i32);
+        self.check((late > 0).then_some((Fault::ControlDeadline, late_s, 0.0)), &sample, port);
+        if self.trip.is_some() {
+            command.gates = Gates::Off;
+        }
+        self.revises = command.revises && command.gates == Gates::Pulse;
+        shared.command.publish(command);
+        report.trip = self.trip;
+        if let Some(recorder) = shared.recorder {
+            let mode = applied.as_ref().map_or(Mode::Off, |applied| applied.mode);
+            recorder.record(self.entry(now, &sample, &report, mode, command.gates), self.trip.is_some());
+        }
+        port.report(now, &report);
+    }
+
+    /// The period's entry in the flight recorder.
+    #[inline(always)]
+    fn entry(&self, at: Instant, sample: &Sample, report: &Report, mode: Mode, gates: Gates) -> Record {
+        Record {
+            at,
+            currents_a: sample.measured.currents_a,
+            udc_v: sample.measured.udc_v,
+            angle: sample.measured.angle,
+            id_a: report.id_a,
+            iq_a: report.iq_a,
+            voltage_v: report.voltage_v,
+            state: State {
+                mode,
+                enabled: sample.enable,
+                pulsing: gates == Gates::Pulse,
+                fault: self.trip.map(|trip| trip.fault),
+            },
+        }
+    }
+
+    /// Nominal instant of the next call.
+    pub fn next_call(&self) -> Instant {
+        self.now
+    }
+
+    /// The latched fault.
+    pub fn trip(&self) -> Option<Trip> {
+        self.trip
+    }
+
+    /// Follows the angle; returns the electrical speed, in rad/s. An angle that cannot be leaves the speed as it was.
+    fn track(&mut self, sample: &Sample, port: &mut impl ControlPort) -> f32 {
+        let clock = self.settings.clock;
+        if self.controller.speed_is_known() {
+            let surprise_rad = self.controller.surprise_rad(sample.measured.angle, &clock);
+            let lost = protection::check_angle(surprise_rad);
+            if lost.is_some() && !self.disarmed.has(Fault::AngleLost) {
+                self.check(lost, sample, port);
+                return self.controller.omega();
+            }
+        }
+        self.controller.track(sample.measured.angle, &clock)
+    }
+
+    /// Control law and its surroundings, while pulses are made.
+    fn pulse(
+        &mut self,
+        sample: &Sample,
+        applied: Option<&Applied>,
+        omega: f32,
+        command: &mut VoltageCommand,
+        report: &mut Report,
+    ) {
+        let now = command.reference.at;
+        command.revises = applied.is_some_and(|applied| self.is_to_revise(applied, now, &sample.demand));
+        let udc_v = sample.measured.udc_v;
+        let steady = Steady { omega, udc_v, voltage_v: self.steady_v, depth: self.depth };
+        let committed = match applied {
+            Some(applied) => {
+                applied.committed(now, &steady, &mut self.glide, &self.settings, command.revises)
+            }
+            None => nothing_committed(&self.settings),
+        };
+        let boundary = self.new_boundary(applied, now, udc_v);
+        let decided = applied.map_or(Mode::Off, Applied::decided);
+        let settled = self.glide.is_settled(decided, boundary.is_some());
+        let committed = Committed { settled, ..committed };
+        let ratings = &self.machine.tables().ratings;
+        let demand = self.glide.one_sided(&sample.demand, omega, udc_v, ratings);
+        let input = Input {
+            measured: &sample.measured,
+            demand: &demand,
+            window: &sample.window,
+            committed: &committed,
+            boundary: boundary.as_ref(),
+        };
+        let Settings { gains, clock, .. } = &self.settings;
+        let output = self.controller.step(&input, &Law { gains, clock, tables: self.machine.tables() });
+        self.steady_v = output.voltage.steady_v;
+        self.depth = output.voltage.depth;
+        self.glide.drove(output.torque_nm);
+        command.reference.voltage_v = output.voltage.voltage_v;
+        command.reference.vector = output.voltage.vector;
+        command.reference.carrier_angle = output.voltage.carrier.angle();
+        command.reference.depth = output.voltage.depth;
+        command.gates = Gates::Pulse;
+        report.torque_nm = output.torque_nm;
+        report.id_a = output.point.current.d;
+        report.iq_a = output.point.current.q;
+        report.voltage_v = output.voltage.voltage_v;
+        report.map_error = output.map_error;
+        report.mode = decided;
+    }
+
+    /// The newest boundary, once.
+    fn new_boundary(&mut self, applied: Option<&Applied>, now: Instant, udc_v: f32) -> Option<Boundary> {
+        let applied = applied?;
+        let boundary = applied.boundary(self.boundary, now, udc_v, &self.settings.clock);
+        self.boundary = Some(applied.at);
+        boundary
+    }
+
+    /// Whether the demand has jumped and the next half can still be changed: the running one lasts long enough, and the next one is
+    /// of the free carrier, whose length is always the same.
+    fn is_to_revise(&mut self, applied: &Applied, now: Instant, demand: &Demand) -> bool {
+        let change = demand.torque_nm - self.demand_nm;
+        self.demand_nm = demand.torque_nm;
+        let largest_nm = self.machine.tables().ratings.max_torque_nm;
+        self.jumped |= !demand.slew_limited && change.abs() > JUMP_SHARE * largest_nm;
+        let latest = now.after(REVISION_PERIODS * self.settings.clock.control_ticks);
+        let revises = self.jumped && applied.next.kind.is_free() && applied.next.begins.reached(latest);
+        self.jumped &= !revises;
+        revises
+    }
+
+    fn check(&mut self, violation: Option<Violation>, sample: &Sample, port: &mut impl ControlPort) {
+        if let (Some(violation), None) = (violation, self.trip) {
+            self.trip_on(violation, sample, port);
+        }
+    }
+
+    /// Out of line: it happens once, and there are many checks.
+    #[cold]
+    #[inline(never)]
+    fn trip_on(&mut self, (fault, value, limit): Violation, sample: &Sample, port: &mut impl ControlPort) {
+        if self.disarmed.has(fault) {
+            return;
+        }
+        let at = self.now.before(self.settings.clock.control_ticks);
+        let safe = protection::safe_state(
+            self.controller.omega(),
+            sample.measured.udc_v,
+            &self.machine.tables().ratings,
+        );
+        port.enter(safe, at);
+        self.trip = Some(Trip { fault, value, limit, at, safe });
+    }
+
+    /// Forgets the fault that is acknowledged once the PWM interrupt has: what it told before that cannot come back, and
+    /// the safe state that it has left is not entered again for the old fault's sake.
+    fn forget_acknowledged(&mut self, acknowledge: u8, applied: Option<&Applied>) {
+        if acknowledge != self.acknowledged
+            && applied.is_some_and(|applied| applied.acknowledged == acknowledge)
+        {
+            self.acknowledged = acknowledge;
+            self.trip = None;
+        }
+    }
+
+    /// First of all checks: a leg that is stuck decides on the safe state.
+    fn check_legs(&mut self, sample: &Sample, port: &mut impl ControlPort) {
+        let found = port.leg_faults();
+        if let (Some((fault, value, limit)), None) = (found.check(), self.trip) {
+            let at = self.now.before(self.settings.clock.control_ticks);
+            let (omega, ratings) = (self.controller.omega(), &self.machine.tables().ratings);
+            let safe = found.safe_state(omega, sample.measured.udc_v, ratings);
+            port.enter(safe, at);
+            self.trip = Some(Trip { fault, value, limit, at, safe });
+        }
+    }
+}

@@ -1,0 +1,87 @@
+//! Voltage and torque after square wave.
+
+use crate::control::{Demand, six_step_v};
+use crate::machine::Ratings;
+use crate::modulation::Mode;
+
+/// How fast the voltage glides from square wave to what the torque needs, in shares of six-step per second.
+const GLIDE_PER_S: f32 = 12.0;
+
+/// Flux linkage that the voltage forces, over the magnets', above which torque keeps its sign.
+const ONE_SIDED_FLUX: f32 = 1.2;
+
+/// What is left of torque that keeps its sign, as a share of the largest.
+const ONE_SIDED_SHARE: f32 = 0.001;
+
+/// What square wave leaves behind: voltage and torque on their way to what the torque needs, and a flux hexagon off its centre.
+pub(super) struct Glide {
+    /// Fundamental to which the voltage has glided after square wave, as a share of six-step; 0 otherwise.
+    filled_to: f32,
+    /// The last torque that was not zero, in N·m: its sign is the side of the flux circle on which the machine is.
+    side_nm: f32,
+    /// Mode that the newest command was made for, and the halves for which its flux hexagon still changes its size.
+    unsettled: (Mode, u32),
+}
+
+impl Glide {
+    pub(super) const fn new() -> Self {
+        Self { filled_to: 0.0, side_nm: 0.0, unsettled: (Mode::Off, 0) }
+    }
+
+    /// No torque, and no side.
+    pub(super) fn forget_side(&mut self) {
+        self.side_nm = 0.0;
+    }
+
+    /// Remembers the side of a torque, in N·m.
+    pub(super) fn drove(&mut self, torque_nm: f32) {
+        if torque_nm != 0.0 {
+            self.side_nm = torque_nm;
+        }
+    }
+
+    /// The largest fundamental as a share of six-step, and whether it is to be used whatever the torque needs: in square wave, and
+    /// after it for as long as the voltage glides from there to what the torque `needed` in the last period.
+    pub(super) fn fill(&mut self, decided: Mode, largest: f32, needed: f32, period_s: f32) -> (f32, bool) {
+        if decided == Mode::Square {
+            self.filled_to = 1.0;
+            return (largest, true);
+        }
+        self.filled_to -= GLIDE_PER_S * period_s;
+        if !decided.is_pattern() || self.filled_to < needed {
+            self.filled_to = 0.0;
+            return (largest, false);
+        }
+        (if self.filled_to < largest { self.filled_to } else { largest }, true)
+    }
+
+    /// The demand, which keeps its sign for as long as the voltage forces much more flux upon the machine than its magnets have: near
+    /// no torque the two signs then lie far apart on the circle of flux linkage, and the way between them goes past currents
+    /// beyond the largest. The voltage is on its way down meanwhile, so this lasts tens of milliseconds.
+    pub(super) fn one_sided(&self, demand: &Demand, omega: f32, udc_v: f32, ratings: &Ratings) -> Demand {
+        let forced_v = self.filled_to * six_step_v(udc_v);
+        let forces = forced_v > ONE_SIDED_FLUX * omega.abs() * ratings.magnet_flux_wb;
+        let least_nm = ONE_SIDED_SHARE * ratings.max_torque_nm;
+        let (side, along_nm) =
+            if self.side_nm < 0.0 { (-1.0, -demand.torque_nm) } else { (1.0, demand.torque_nm) };
+        if forces && self.side_nm != 0.0 && along_nm < least_nm {
+            return Demand { torque_nm: side * least_nm, ..*demand };
+        }
+        *demand
+    }
+
+    /// Whether two sectors have passed since the square wave gave way to a pattern or the other way round: so long the flux
+    /// hexagon is off its centre, on its way to another size.
+    pub(super) fn is_settled(&mut self, decided: Mode, boundary_passed: bool) -> bool {
+        let (mode, halves) = &mut self.unsettled;
+        if decided != *mode {
+            let echoes = (decided == Mode::Square && mode.is_pattern())
+                || (*mode == Mode::Square && decided.is_pattern());
+            *halves = if echoes { 2 * decided.sector_halves() } else { 0 };
+            *mode = decided;
+        } else if boundary_passed {
+            *halves = halves.saturating_sub(1);
+        }
+        *halves == 0
+    }
+}

@@ -1,0 +1,74 @@
+//! The PMaSynRM drive: one control task, one PWM task, two cells.
+//!
+//! Logical execution time: a command sampled at one control instant may be used from the next one on, and each task
+//! looks at the other's words by their instants, not by their arrival. So where one interrupt lands in the other
+//! changes nothing, and the same inputs give the same pulses on every board and on the host.
+
+mod applied;
+mod control;
+mod glide;
+mod pwm;
+
+use super::messages::{COMMITTAL_WORDS, VoltageCommand};
+use crate::cell::{Downlink, Trail, Uplink};
+use crate::control::Gains;
+use crate::modulation::Devices;
+use crate::protection::Trip;
+use crate::recorder::Recorder;
+use crate::time::Clock;
+use core::sync::atomic::AtomicU32;
+
+pub use control::ControlTask;
+pub use pwm::PwmTask;
+pub(super) use pwm::stale;
+
+/// What both tasks are built with.
+#[derive(Clone, Copy, Debug)]
+pub struct Settings {
+    /// The timers' clock.
+    pub clock: Clock,
+    /// The inverter's devices.
+    pub devices: Devices,
+    /// The current loop's gains.
+    pub gains: Gains,
+}
+
+/// The cells between the two interrupts, and the flight recorder, if there is one.
+pub struct Shared<'a> {
+    /// What control wants of the modulator.
+    pub command: Downlink<VoltageCommand, 10>,
+    /// What the modulator does.
+    pub applied: Trail<COMMITTAL_WORDS>,
+    /// What the PWM interrupt tripped on.
+    pub trip: Uplink<Trip, 4>,
+    /// Instant of the newest control interrupt, from its beginning on.
+    pub began: AtomicU32,
+    recorder: Option<&'a Recorder>,
+}
+
+impl<'a> Shared<'a> {
+    /// Empty cells.
+    #[cfg(not(loom))]
+    pub const fn new() -> Self {
+        Self {
+            command: Downlink::new(),
+            applied: Trail::new(),
+            trip: Uplink::new(),
+            began: AtomicU32::new(0),
+            recorder: None,
+        }
+    }
+
+    /// The same with a flight recorder, which the control interrupt fills.
+    #[cfg(not(loom))]
+    pub const fn recorded_by(recorder: &'a Recorder) -> Self {
+        Self { recorder: Some(recorder), ..Self::new() }
+    }
+}
+
+#[cfg(not(loom))]
+impl Default for Shared<'_> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
