@@ -38,7 +38,7 @@ const PARTS: [(&str, &[&str]); 20] = [
     ("ripple of the pattern", &["modulation::ripple::", "::ripple"]),
     (
         "what is committed",
-        &["::committed", "::is_settled", "::fill", "::new_boundary", "::is_to_revise", "volt_seconds"],
+        &["committed", "traction::glide::", "::boundary", "::new_boundary", "::is_to_revise", "volt_seconds"],
     ),
     ("protection", &["tractive::protection::", "Task<M>::check", "::stale", "::violation", "::stuck"]),
     ("cells and messages", &["tractive::cell::", "messages::", "::Applied::"]),
