@@ -47,7 +47,7 @@ mod firmware {
         let setup = qemu::connect();
         MIN_PULSE_TICKS.store(setup.min_pulse_ticks, Ordering::Relaxed);
         DEAD_TIME_TICKS.store(setup.dead_time_ticks, Ordering::Relaxed);
-        if let Err(refused) = settings().check(&BUILT_IN) {
+        if let Err(refused) = const { BUILT_IN.check() }.and_then(|()| settings().check_settings()) {
             qemu::refuse(&refused);
         }
         let first_half_ticks = settings().devices.shortest_half_ticks.saturating_add(setup.pwm_delay_ticks);
