@@ -89,10 +89,10 @@ mod firmware {
     fn DUALTIMER() {
         static mut TASK: Option<PwmTask<BuiltIn>> = None;
         let mut board = qemu::Pwm;
-        let settings = settings();
-        let first = Instant(FIRST_HALF_TICKS.load(Ordering::Relaxed));
-        let task = || PwmTask::new(BuiltIn, settings, first).after_halves_of(first.0);
-        let task = TASK.get_or_insert_with(task);
+        let task = TASK.get_or_insert_with(|| {
+            let first = Instant(FIRST_HALF_TICKS.load(Ordering::Relaxed));
+            PwmTask::new(BuiltIn, settings(), first).after_halves_of(first.0)
+        });
         if board.is_boundary() {
             board.acknowledge();
             task.run(&mut board, &SHARED);

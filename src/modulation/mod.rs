@@ -375,6 +375,7 @@ impl Modulator {
     }
 
     /// All gates off; where a reference is known, with the mode that it would begin with announced.
+    #[inline(never)]
     pub fn rest(&mut self, start: Instant, reference: Option<&Reference>) -> CarrierPeriod {
         self.mode = Mode::Off;
         self.plan = None;

@@ -141,6 +141,7 @@ fn file(index: usize) -> usize {
     }
 }
 
+#[inline(never)]
 fn send(block: &Block) {
     // SAFETY: SYS_WRITE reads exactly the block, which outlives the call.
     let missing = unsafe { syscall!(WRITE, file(REQUESTS), block.as_ptr(), BLOCK_BYTES) };
@@ -149,6 +150,7 @@ fn send(block: &Block) {
     }
 }
 
+#[inline(never)]
 fn receive(answers: usize) -> Block {
     let mut block: Block = [0; link::BLOCK_WORDS];
     // SAFETY: SYS_READ writes at most the block's bytes, and the block is ours until it returns.

@@ -60,11 +60,10 @@ impl Applied {
     #[inline]
     pub(super) fn seen(records: [Record<COMMITTAL_WORDS>; SEEN], now: Instant) -> Option<Self> {
         let [newest, one, two, three] = records.map(CommittalRecord);
-        if now.reached(newest.at()) {
-            return Some(Self::of([newest, one, two], now));
-        }
+        let came_since = !now.reached(newest.at());
+        let records = if came_since { [one, two, three] } else { [newest, one, two] };
         // Words that were never written say instant 0, of which there is none.
-        now.reached(one.at()).then(|| Self::of([one, two, three], now))
+        now.reached(records[0].at()).then(|| Self::of(records, now))
     }
 
     #[inline]
