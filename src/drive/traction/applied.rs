@@ -60,10 +60,11 @@ impl Applied {
     #[inline]
     pub(super) fn seen(records: [Record<COMMITTAL_WORDS>; SEEN], now: Instant) -> Option<Self> {
         let [newest, one, two, three] = records.map(CommittalRecord);
-        let came_since = !now.reached(newest.at());
-        let records = if came_since { [one, two, three] } else { [newest, one, two] };
+        if now.reached(newest.at()) {
+            return Some(Self::of([newest, one, two], now));
+        }
         // Words that were never written say instant 0, of which there is none.
-        now.reached(records[0].at()).then(|| Self::of(records, now))
+        now.reached(one.at()).then(|| Self::of([one, two, three], now))
     }
 
     #[inline]
@@ -185,26 +186,32 @@ impl Applied {
 }
 
 impl HalfKind {
-    /// Ripple flux at the end of this half, which is committed, and the one wanted at the end of the half after it. Where a
-    /// pattern begins at the first of these, its own ripple is expected; where a carrier begins, what the old pattern leaves.
+    /// Ripple flux at the end of this half, which is committed, and what the half after it is to change of it. Where a pattern begins
+    /// at the first of these, its own ripple is expected; where a carrier begins, what the old pattern leaves.
     fn ripple(self, steady: &Steady) -> Option<Ripple> {
         let (mode, [decided, after]) = (self.mode(), self.ahead());
-        let flux = |mode: Mode| RippleFlux::new(mode, steady.voltage_v, steady.udc_v, steady.omega.abs());
-        let seen = |ripple: AlphaBeta| AlphaBeta {
-            beta: if self.is_mirrored() { -ripple.beta } else { ripple.beta },
-            ..ripple
-        };
         let end = self.half() + 1;
-        if mode == decided && decided == after {
-            let flux = flux(mode)?;
-            return Some(Ripple { at_horizon_wb: seen(flux.at(end)), after_wb: seen(flux.at(end + 1)) });
+        if decided.is_pattern() {
+            let at_horizon_wb = self.ripple_at(decided, number(mode, decided, end), steady);
+            return Some(Ripple { at_horizon_wb, led_wb: AlphaBeta::default() });
         }
-        let number = |from: Mode, to: Mode, half: u32| {
-            if from == to { half } else { first_half(from, to, half, Angle::ZERO) }
-        };
-        let at = |mode: Mode, half: u32| flux(mode).map_or(AlphaBeta::default(), |flux| seen(flux.at(half)));
-        let begins = number(mode, decided, end);
-        let at_horizon_wb = if decided.is_carrier() { at(mode, end) } else { at(decided, begins) };
-        Some(Ripple { at_horizon_wb, after_wb: at(after, number(decided, after, begins + 1)) })
+        if !mode.is_pattern() && !after.is_pattern() {
+            return None;
+        }
+        let at_horizon_wb = self.ripple_at(mode, end, steady);
+        let after_wb = self.ripple_at(after, number(decided, after, number(mode, decided, end) + 1), steady);
+        Some(Ripple { at_horizon_wb, led_wb: after_wb - at_horizon_wb })
     }
+
+    /// A mode's ripple where half number `half` begins, seen in the mirror if the half is: nothing under a carrier.
+    fn ripple_at(self, mode: Mode, half: u32, steady: &Steady) -> AlphaBeta {
+        let flux = RippleFlux::new(mode, steady.voltage_v, steady.udc_v, steady.omega.abs());
+        let ripple = flux.map_or(AlphaBeta::default(), |flux| flux.at(half));
+        AlphaBeta { beta: if self.is_mirrored() { -ripple.beta } else { ripple.beta }, ..ripple }
+    }
+}
+
+/// What half number `half` of a mode is in the mode that follows.
+fn number(from: Mode, to: Mode, half: u32) -> u32 {
+    if from == to { half } else { first_half(from, to, half, Angle::ZERO) }
 }

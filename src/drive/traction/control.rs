@@ -6,7 +6,7 @@ use super::{Settings, Shared};
 use crate::board::{ControlPort, Sample};
 use crate::control::{Boundary, Committed, Controller, Demand, Input, Law};
 use crate::drive::messages::{Gates, Report, VoltageCommand};
-use crate::frames::AlphaBeta;
+use crate::frames::{AlphaBeta, Angle};
 use crate::machine::{Machine, Tables};
 use crate::modulation::{Mode, Reference};
 use crate::protection::{self, Disarmed, Fault, FrozenWatch, Trip, Violation};
@@ -97,25 +97,14 @@ impl<M: Machine> ControlTask<M> {
             self.trip = self.trip.filter(|trip| trip.fault != Fault::GatesHeld);
             self.check(Some((fault, 1.0, 0.0)), &sample, port);
         }
-        let overdue = applied.as_ref().and_then(|applied| applied.overdue(now, &self.settings.clock));
-        self.check(overdue, &sample, port);
         self.check_legs(&sample, port);
-        let omega = self.track(&sample, port);
-        self.check(
-            protection::check_measurements(&sample.measured, omega, &self.machine.tables().ratings),
-            &sample,
-            port,
-        );
-        if sample.enable {
-            self.check(
-                protection::check_undervoltage(sample.measured.udc_v, &self.machine.tables().ratings),
-                &sample,
-                port,
-            );
-        }
-        self.check(protection::check_demand(&sample.demand), &sample, port);
+        let overdue = applied.as_ref().and_then(|applied| applied.overdue(now, &self.settings.clock));
+        let (omega, lost) = self.track(sample.measured.angle);
+        let violation =
+            self.armed(overdue).or_else(|| self.armed(lost)).or_else(|| self.judge(&sample, omega));
+        self.check(violation, &sample, port);
         let pulsing = self.trip.is_none() && sample.enable && self.controller.speed_is_known();
-        let mut report = Report {
+        let resting_report = Report {
             frequency_hz: omega / core::f32::consts::TAU,
             udc_v: sample.measured.udc_v,
             current_a: sample.measured.currents_a.peak(),
@@ -123,7 +112,7 @@ impl<M: Machine> ControlTask<M> {
             acknowledged: self.acknowledged,
             ..Report::default()
         };
-        let mut command = VoltageCommand {
+        let resting = VoltageCommand {
             reference: Reference {
                 voltage_v: 0.0,
                 vector: AlphaBeta::default(),
@@ -138,7 +127,7 @@ impl<M: Machine> ControlTask<M> {
             revises: false,
             acknowledge: sample.acknowledge,
         };
-        if pulsing {
+        let (mut command, mut report) = if pulsing {
             let frozen = self.watch.check(
                 &sample.measured,
                 omega,
@@ -146,15 +135,17 @@ impl<M: Machine> ControlTask<M> {
                 &self.machine.tables().ratings,
             );
             self.check(frozen, &sample, port);
-            self.pulse(&sample, applied.as_ref(), omega, &mut command, &mut report);
+            self.pulse(&sample, applied.as_ref(), omega, resting, resting_report)
         } else {
             self.controller.idle();
             self.watch = FrozenWatch::new();
             self.boundary = None;
             self.steady_v = 0.0;
             self.glide.forget_side();
-        }
-        let finite = command.reference.voltage_v.is_finite() && command.reference.rate.is_finite();
+            (resting, resting_report)
+        };
+        // Not finite if either is not.
+        let finite = (command.reference.voltage_v + command.reference.rate).is_finite();
         self.check(
             (!finite).then_some((Fault::NotFinite, command.reference.voltage_v, f32::MAX)),
             &sample,
@@ -207,36 +198,48 @@ impl<M: Machine> ControlTask<M> {
     }
 
     /// Follows the angle; returns the electrical speed, in rad/s. An angle that cannot be leaves the speed as it was.
-    fn track(&mut self, sample: &Sample, port: &mut impl ControlPort) -> f32 {
+    fn track(&mut self, angle: Angle) -> (f32, Option<Violation>) {
         let clock = self.settings.clock;
         if self.controller.speed_is_known() {
-            let surprise_rad = self.controller.surprise_rad(sample.measured.angle, &clock);
-            let lost = protection::check_angle(surprise_rad);
-            if lost.is_some() && !self.disarmed.has(Fault::AngleLost) {
-                self.check(lost, sample, port);
-                return self.controller.omega();
+            let lost = protection::check_angle(self.controller.surprise_rad(angle, &clock));
+            if self.armed(lost).is_some() {
+                return (self.controller.omega(), lost);
             }
         }
-        self.controller.track(sample.measured.angle, &clock)
+        (self.controller.track(angle, &clock), None)
     }
 
-    /// Control law and its surroundings, while pulses are made.
+    /// What is wrong with a sample by itself.
+    fn judge(&self, sample: &Sample, omega: f32) -> Option<Violation> {
+        let (measured, ratings) = (&sample.measured, &self.machine.tables().ratings);
+        let empty =
+            || if sample.enable { protection::check_undervoltage(measured.udc_v, ratings) } else { None };
+        self.armed(protection::check_measurements(measured, omega, ratings))
+            .or_else(|| self.armed(empty()))
+            .or_else(|| protection::check_demand(&sample.demand))
+    }
+
+    /// Nothing where the check that found it is switched off.
+    fn armed(&self, violation: Option<Violation>) -> Option<Violation> {
+        violation.filter(|(fault, _, _)| !self.disarmed.has(*fault))
+    }
+
+    /// Control law and its surroundings, while pulses are made: what becomes of the command and the report of an inverter at rest.
+    #[inline(always)]
     fn pulse(
         &mut self,
         sample: &Sample,
         applied: Option<&Applied>,
         omega: f32,
-        command: &mut VoltageCommand,
-        report: &mut Report,
-    ) {
-        let now = command.reference.at;
-        command.revises = applied.is_some_and(|applied| self.is_to_revise(applied, now, &sample.demand));
+        resting: VoltageCommand,
+        report: Report,
+    ) -> (VoltageCommand, Report) {
+        let now = resting.reference.at;
+        let revises = applied.is_some_and(|applied| self.is_to_revise(applied, now, &sample.demand));
         let udc_v = sample.measured.udc_v;
         let steady = Steady { omega, udc_v, voltage_v: self.steady_v, depth: self.depth };
         let committed = match applied {
-            Some(applied) => {
-                applied.committed(now, &steady, &mut self.glide, &self.settings, command.revises)
-            }
+            Some(applied) => applied.committed(now, &steady, &mut self.glide, &self.settings, revises),
             None => nothing_committed(&self.settings),
         };
         let boundary = self.new_boundary(applied, now, udc_v);
@@ -244,7 +247,8 @@ impl<M: Machine> ControlTask<M> {
         let settled = self.glide.is_settled(decided, boundary.is_some());
         let committed = Committed { settled, ..committed };
         let ratings = &self.machine.tables().ratings;
-        let demand = self.glide.one_sided(&sample.demand, omega, udc_v, ratings);
+        let torque_nm = self.glide.one_sided(sample.demand.torque_nm, omega, udc_v, ratings);
+        let demand = Demand { torque_nm, ..sample.demand };
         let input = Input {
             measured: &sample.measured,
             demand: &demand,
@@ -257,17 +261,23 @@ impl<M: Machine> ControlTask<M> {
         self.steady_v = output.voltage.steady_v;
         self.depth = output.voltage.depth;
         self.glide.drove(output.torque_nm);
-        command.reference.voltage_v = output.voltage.voltage_v;
-        command.reference.vector = output.voltage.vector;
-        command.reference.carrier_angle = output.voltage.carrier.angle();
-        command.reference.depth = output.voltage.depth;
-        command.gates = Gates::Pulse;
-        report.torque_nm = output.torque_nm;
-        report.id_a = output.point.current.d;
-        report.iq_a = output.point.current.q;
-        report.voltage_v = output.voltage.voltage_v;
-        report.map_error = output.map_error;
-        report.mode = decided;
+        let reference = Reference {
+            voltage_v: output.voltage.voltage_v,
+            vector: output.voltage.vector,
+            carrier_angle: output.voltage.carrier.angle(),
+            depth: output.voltage.depth,
+            ..resting.reference
+        };
+        let report = Report {
+            torque_nm: output.torque_nm,
+            id_a: output.point.current.d,
+            iq_a: output.point.current.q,
+            voltage_v: output.voltage.voltage_v,
+            map_error: output.map_error,
+            mode: decided,
+            ..report
+        };
+        (VoltageCommand { reference, gates: Gates::Pulse, revises, ..resting }, report)
     }
 
     /// The newest boundary, once.
