@@ -204,6 +204,12 @@ impl HalfKind {
         Mode::from_code(self.0 >> 8 & 0xFF)
     }
 
+    /// Whether the gates are off in it.
+    #[inline]
+    pub fn is_off(self) -> bool {
+        self.0 >> 8 & 0xFF == Mode::Off as u32
+    }
+
     /// See [`CarrierPeriod::is_free`].
     #[inline]
     pub fn is_free(self) -> bool {

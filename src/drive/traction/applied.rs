@@ -74,9 +74,9 @@ impl Applied {
             (newest.begins(), newest.period_ticks(), newest.volt_ticks());
         let next = Next { begins, period_ticks, volt_ticks, kind };
         let mode = one.kind().mode();
-        let off = mode == Mode::Off || kind.mode() == Mode::Off;
+        let off = one.kind().is_off() || kind.is_off();
         let running = (!off).then(|| one.volt_ticks_from(now.since(at).max(0) as u32));
-        let passed = (two.kind().mode() != Mode::Off).then(|| two.volt_ticks());
+        let passed = (!two.kind().is_off()).then(|| two.volt_ticks());
         Self {
             at,
             before: one.at(),

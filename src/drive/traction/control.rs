@@ -6,7 +6,7 @@ use super::{Settings, Shared};
 use crate::board::{ControlPort, Sample};
 use crate::control::{Boundary, Committed, Controller, Demand, Input, Law};
 use crate::drive::messages::{Gates, Report, VoltageCommand};
-use crate::frames::{AlphaBeta, Angle};
+use crate::frames::{AlphaBeta, Angle, Dq};
 use crate::machine::{Machine, Tables};
 use crate::modulation::{Mode, Reference};
 use crate::protection::{self, Disarmed, Fault, FrozenWatch, Trip, Violation};
@@ -45,6 +45,23 @@ pub struct ControlTask<M = &'static Tables> {
     trip: Option<Trip>,
     /// Number of the acknowledge that both interrupts have carried out.
     acknowledged: u8,
+}
+
+/// What a period's control law makes; nothing while no pulses are made.
+#[derive(Clone, Copy, Default)]
+struct Driven {
+    /// The command, as in [`Reference`].
+    voltage_v: f32,
+    vector: AlphaBeta,
+    carrier_angle: Angle,
+    depth: f32,
+    /// Whether it is for the half that is already committed.
+    revises: bool,
+    /// What is told of it, as in [`Report`].
+    torque_nm: f32,
+    current: Dq,
+    map_error: f32,
+    mode: Mode,
 }
 
 impl<M: Machine> ControlTask<M> {
@@ -104,30 +121,7 @@ impl<M: Machine> ControlTask<M> {
             self.armed(overdue).or_else(|| self.armed(lost)).or_else(|| self.judge(&sample, omega));
         self.check(violation, &sample, port);
         let pulsing = self.trip.is_none() && sample.enable && self.controller.speed_is_known();
-        let resting_report = Report {
-            frequency_hz: omega / core::f32::consts::TAU,
-            udc_v: sample.measured.udc_v,
-            current_a: sample.measured.currents_a.peak(),
-            speed_known: self.controller.speed_is_known(),
-            acknowledged: self.acknowledged,
-            ..Report::default()
-        };
-        let resting = VoltageCommand {
-            reference: Reference {
-                voltage_v: 0.0,
-                vector: AlphaBeta::default(),
-                carrier_angle: sample.measured.angle,
-                rate: self.settings.clock.angle_rate(omega),
-                at: now,
-                udc_v: sample.measured.udc_v,
-                depth: 0.0,
-            },
-            valid_from: self.now,
-            gates: Gates::Off,
-            revises: false,
-            acknowledge: sample.acknowledge,
-        };
-        let (mut command, mut report) = if pulsing {
+        let driven = if pulsing {
             let frozen = self.watch.check(
                 &sample.measured,
                 omega,
@@ -135,36 +129,63 @@ impl<M: Machine> ControlTask<M> {
                 &self.machine.tables().ratings,
             );
             self.check(frozen, &sample, port);
-            self.pulse(&sample, applied.as_ref(), omega, resting, resting_report)
+            self.pulse(&sample, applied.as_ref(), omega, now)
         } else {
-            self.controller.idle();
-            self.watch = FrozenWatch::new();
-            self.boundary = None;
-            self.steady_v = 0.0;
-            self.glide.forget_side();
-            (resting, resting_report)
+            self.rest(sample.measured.angle)
         };
+        let rate = self.settings.clock.angle_rate(omega);
         // Not finite if either is not.
-        let finite = (command.reference.voltage_v + command.reference.rate).is_finite();
-        self.check(
-            (!finite).then_some((Fault::NotFinite, command.reference.voltage_v, f32::MAX)),
-            &sample,
-            port,
-        );
+        let finite = (driven.voltage_v + rate).is_finite();
+        self.check((!finite).then_some((Fault::NotFinite, driven.voltage_v, f32::MAX)), &sample, port);
         let late = port.overrun_ticks(now);
         let late_s = self.settings.clock.seconds(late as i32);
         self.check((late > 0).then_some((Fault::ControlDeadline, late_s, 0.0)), &sample, port);
-        if self.trip.is_some() {
-            command.gates = Gates::Off;
-        }
-        self.revises = command.revises && command.gates == Gates::Pulse;
-        shared.command.publish(command);
-        report.trip = self.trip;
+        let gates = if pulsing && self.trip.is_none() { Gates::Pulse } else { Gates::Off };
+        self.revises = driven.revises && gates == Gates::Pulse;
+        shared.command.publish(VoltageCommand {
+            reference: Reference {
+                voltage_v: driven.voltage_v,
+                vector: driven.vector,
+                carrier_angle: driven.carrier_angle,
+                rate,
+                at: now,
+                udc_v: sample.measured.udc_v,
+                depth: driven.depth,
+            },
+            valid_from: self.now,
+            gates,
+            revises: driven.revises,
+            acknowledge: sample.acknowledge,
+        });
+        let report = Report {
+            torque_nm: driven.torque_nm,
+            id_a: driven.current.d,
+            iq_a: driven.current.q,
+            voltage_v: driven.voltage_v,
+            frequency_hz: omega / core::f32::consts::TAU,
+            map_error: driven.map_error,
+            trip: self.trip,
+            udc_v: sample.measured.udc_v,
+            current_a: sample.measured.currents_a.peak(),
+            speed_known: self.controller.speed_is_known(),
+            acknowledged: self.acknowledged,
+            mode: driven.mode,
+        };
         if let Some(recorder) = shared.recorder {
             let mode = applied.as_ref().map_or(Mode::Off, |applied| applied.mode);
-            recorder.record(self.entry(now, &sample, &report, mode, command.gates), self.trip.is_some());
+            recorder.record(self.entry(now, &sample, &report, mode, gates), self.trip.is_some());
         }
         port.report(now, &report);
+    }
+
+    /// No pulses: the control law begins anew.
+    fn rest(&mut self, angle: Angle) -> Driven {
+        self.controller.idle();
+        self.watch = FrozenWatch::new();
+        self.boundary = None;
+        self.steady_v = 0.0;
+        self.glide.forget_side();
+        Driven { carrier_angle: angle, ..Driven::default() }
     }
 
     /// The period's entry in the flight recorder.
@@ -224,17 +245,9 @@ impl<M: Machine> ControlTask<M> {
         violation.filter(|(fault, _, _)| !self.disarmed.has(*fault))
     }
 
-    /// Control law and its surroundings, while pulses are made: what becomes of the command and the report of an inverter at rest.
+    /// Control law and its surroundings, while pulses are made.
     #[inline(always)]
-    fn pulse(
-        &mut self,
-        sample: &Sample,
-        applied: Option<&Applied>,
-        omega: f32,
-        resting: VoltageCommand,
-        report: Report,
-    ) -> (VoltageCommand, Report) {
-        let now = resting.reference.at;
+    fn pulse(&mut self, sample: &Sample, applied: Option<&Applied>, omega: f32, now: Instant) -> Driven {
         let revises = applied.is_some_and(|applied| self.is_to_revise(applied, now, &sample.demand));
         let udc_v = sample.measured.udc_v;
         let steady = Steady { omega, udc_v, voltage_v: self.steady_v, depth: self.depth };
@@ -261,23 +274,17 @@ impl<M: Machine> ControlTask<M> {
         self.steady_v = output.voltage.steady_v;
         self.depth = output.voltage.depth;
         self.glide.drove(output.torque_nm);
-        let reference = Reference {
+        Driven {
             voltage_v: output.voltage.voltage_v,
             vector: output.voltage.vector,
             carrier_angle: output.voltage.carrier.angle(),
             depth: output.voltage.depth,
-            ..resting.reference
-        };
-        let report = Report {
             torque_nm: output.torque_nm,
-            id_a: output.point.current.d,
-            iq_a: output.point.current.q,
-            voltage_v: output.voltage.voltage_v,
+            current: output.point.current,
             map_error: output.map_error,
             mode: decided,
-            ..report
-        };
-        (VoltageCommand { reference, gates: Gates::Pulse, revises, ..resting }, report)
+            revises,
+        }
     }
 
     /// The newest boundary, once.
