@@ -445,9 +445,9 @@ impl FrozenWatch {
         ratings: &Ratings,
     ) -> Option<Violation> {
         let last = self.last.replace(*measured)?;
-        let flowing = measured.currents_a.peak() > FROZEN_CURRENT_SHARE * ratings.max_current_a;
+        let flowing = || measured.currents_a.peak() > FROZEN_CURRENT_SHARE * ratings.max_current_a;
         let same_currents = last.currents_a == measured.currents_a;
-        self.currents_for = if flowing && same_currents { self.currents_for + 1 } else { 0 };
+        self.currents_for = if same_currents && flowing() { self.currents_for + 1 } else { 0 };
         if last.angle == measured.angle {
             self.angle_for += 1;
             self.turned_rad += self.moving * period_s;

@@ -30,15 +30,6 @@ mod firmware {
 
     #[entry]
     fn main() -> ! {
-        begin();
-        loop {
-            qemu::idle();
-        }
-    }
-
-    /// Out of line: the interrupts' stack stands on what the idle loop holds.
-    #[inline(never)]
-    fn begin() {
         let setup = qemu::connect_dual();
         CARRIER_TICKS.store(setup.carrier_ticks, Ordering::Relaxed);
         let settings_alone = || settings().check_settings(&BUILT_IN.ratings);
@@ -46,6 +37,9 @@ mod firmware {
             qemu::refuse(&refused);
         }
         qemu::start_dual(&settings());
+        loop {
+            qemu::idle();
+        }
     }
 
     /// Deadline: the last peak before the next control interrupt. Missed: fault `control_deadline`, all gates off.

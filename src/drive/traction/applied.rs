@@ -120,18 +120,19 @@ pub(super) fn nothing_committed(settings: &Settings) -> Committed {
 }
 
 impl Applied {
-    /// What the modulator will do from `now` until a command of this period can act; with `revises` only the running half stands.
+    /// What the modulator will do from `now` until a command of this period can act, which is for the mode `decided`; with `revises`
+    /// only the running half stands.
     pub(super) fn committed(
         &self,
         now: Instant,
         steady: &Steady,
         glide: &mut Glide,
         settings: &Settings,
+        decided: Mode,
         revises: bool,
     ) -> Committed {
         let Settings { clock, devices, .. } = settings;
         let next = &self.next;
-        let decided = self.decided();
         let largest = depth_limit(decided, clock.angle_rate(steady.omega), devices);
         let largest = if decided == Mode::Square { largest } else { REGULATION_ROOM * largest };
         let (depth_limit, filled) = glide.fill(decided, largest, steady.depth, clock.control_s());

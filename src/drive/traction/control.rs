@@ -251,12 +251,14 @@ impl<M: Machine> ControlTask<M> {
         let revises = applied.is_some_and(|applied| self.is_to_revise(applied, now, &sample.demand));
         let udc_v = sample.measured.udc_v;
         let steady = Steady { omega, udc_v, voltage_v: self.steady_v, depth: self.depth };
+        let decided = applied.map_or(Mode::Off, Applied::decided);
         let committed = match applied {
-            Some(applied) => applied.committed(now, &steady, &mut self.glide, &self.settings, revises),
+            Some(applied) => {
+                applied.committed(now, &steady, &mut self.glide, &self.settings, decided, revises)
+            }
             None => nothing_committed(&self.settings),
         };
         let boundary = self.new_boundary(applied, now, udc_v);
-        let decided = applied.map_or(Mode::Off, Applied::decided);
         let settled = self.glide.is_settled(decided, boundary.is_some());
         let committed = Committed { settled, ..committed };
         let ratings = &self.machine.tables().ratings;
