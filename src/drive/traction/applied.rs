@@ -46,7 +46,7 @@ pub(super) struct Next {
 impl Applied {
     /// Mode of the half that this period's command is made for.
     pub(super) fn decided(&self) -> Mode {
-        self.next.kind.ahead()[0]
+        self.next.kind.next_mode()
     }
 
     /// The PWM interrupt that should have come by `now` and has not: since when, in s.
@@ -154,7 +154,7 @@ impl Applied {
         Committed {
             horizon_s: clock.seconds(left as i32),
             volt_seconds: volt_ticks.map(|ticks| ticks * (steady.udc_v * clock.tick_s)),
-            ripple: next.kind.ripple(steady),
+            ripple: next.kind.ripple(decided, steady),
             interval_s,
             follows,
             depth_limit,
@@ -187,15 +187,15 @@ impl Applied {
 }
 
 impl HalfKind {
-    /// Ripple flux at the end of this half, which is committed, and what the half after it is to change of it. Where a pattern begins
-    /// at the first of these, its own ripple is expected; where a carrier begins, what the old pattern leaves.
-    fn ripple(self, steady: &Steady) -> Option<Ripple> {
-        let (mode, [decided, after]) = (self.mode(), self.ahead());
-        let end = self.half() + 1;
+    /// Ripple flux at the end of this half, which is committed, and what the half after it, of the mode `decided`, is to change of it.
+    /// Where a pattern begins at the first of these, its own ripple is expected; where a carrier begins, what the old pattern leaves.
+    fn ripple(self, decided: Mode, steady: &Steady) -> Option<Ripple> {
+        let (mode, end) = (self.mode(), self.half() + 1);
         if decided.is_pattern() {
             let at_horizon_wb = self.ripple_at(decided, number(mode, decided, end), steady);
             return Some(Ripple { at_horizon_wb, led_wb: AlphaBeta::default() });
         }
+        let after = self.next_but_one_mode();
         if !mode.is_pattern() && !after.is_pattern() {
             return None;
         }
