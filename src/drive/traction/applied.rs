@@ -63,8 +63,8 @@ impl Applied {
         if now.reached(newest.at()) {
             return Some(Self::of([newest, one, two], now));
         }
-        // Words that were never written say instant 0, of which there is none.
-        now.reached(one.at()).then(|| Self::of([one, two, three], now))
+        // A half that was written has a length.
+        (one.period_ticks() > 0 && now.reached(one.at())).then(|| Self::of([one, two, three], now))
     }
 
     #[inline]
