@@ -118,7 +118,7 @@ fn the_document_has_every_case() {
 #[test]
 fn a_random_ride_is_the_same_every_time() {
     let drive = traction::Drive::new(None).unwrap();
-    let [a, b] = [0, 1].map(|_| healthy::drive(&drive, 2.0, 7, false).unwrap());
+    let [a, b] = [0, 1].map(|_| healthy::traction::drive(&drive, 2.0, 7, false).unwrap());
     assert_eq!(a.rows.len(), b.rows.len());
     assert!(a.rows.iter().zip(&b.rows).all(|(a, b)| a.te_nm == b.te_nm));
     assert!(a.trip.is_none(), "{:?}", a.trip);

@@ -2,7 +2,7 @@
 
 use super::judge::Verdict;
 use super::without::Without;
-use super::{Campaign, healthy, report, traction};
+use super::{Campaign, dual, healthy, report, traction};
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -107,30 +107,36 @@ const PIECE_MIN: f64 = 0.5;
 
 fn drive_healthy(minutes: f64, options: &CampaignOptions) -> Result<ExitCode> {
     let drive = traction::Drive::new(options.without)?;
+    let dual = dual::Drive::new(options.without)?;
     let pieces = (minutes / PIECE_MIN).ceil() as u64;
     let piece_s = minutes * 60.0 / pieces as f64;
     let seeds: Vec<_> = (0..pieces).map(|piece| options.seed + piece).collect();
-    let ridden =
-        seeds.par_iter().map(|seed| Ok((*seed, healthy::drive(&drive, piece_s, *seed, options.blocks)?)));
-    let ridden: Vec<_> = ridden.collect::<Result<_>>()?;
-    let mut trips = 0;
-    let (mut current_a, mut udc_v) = (0.0_f64, 0.0_f64);
-    for (seed, ridden) in &ridden {
-        current_a = current_a.max(ridden.observed.until.current_a);
-        udc_v = udc_v.max(ridden.observed.until.udc_v);
-        if let (Some(trip), Some(row)) = (ridden.trip, ridden.rows.iter().find(|row| row.trip.is_some())) {
-            trips += 1;
-            let (name, at_s, rpm) = (trip.fault.name(), row.t_s, row.speed_rpm);
-            let before =
-                ridden.rows.iter().rev().find(|row| row.trip.is_none()).map_or("", |row| row.mode.name());
-            eprintln!(
-                "seed {seed}: {name} {} (limit {}) at {at_s:.3} s, {rpm:.0} r/min, {before}",
-                trip.value, trip.limit
-            );
+    let systems = report::SYSTEMS.map(|(system, _)| system);
+    let rides: Vec<_> =
+        systems.into_iter().flat_map(|system| seeds.iter().map(move |seed| (system, *seed))).collect();
+    let ridden = rides.par_iter().map(|(system, seed)| {
+        let driven = match *system {
+            "zs9" => healthy::dual::drive(&dual, piece_s, *seed)?.into(),
+            _ => healthy::traction::drive(&drive, piece_s, *seed, options.blocks)?.into(),
+        };
+        Ok((*system, *seed, driven))
+    });
+    let ridden: Vec<(&str, u64, healthy::Driven)> = ridden.collect::<Result<_>>()?;
+    let mut good = true;
+    for system in systems {
+        let (mut trips, mut current_a, mut udc_v) = (0, 0.0_f64, 0.0_f64);
+        for (_, seed, driven) in ridden.iter().filter(|(of, _, _)| *of == system) {
+            current_a = current_a.max(driven.peaks.current_a);
+            udc_v = udc_v.max(driven.peaks.udc_v);
+            if let Some(tripped) = &driven.tripped {
+                trips += 1;
+                eprintln!("{system}, seed {seed}: {tripped}");
+            }
         }
+        println!(
+            "{system}: {minutes} min of driving in {pieces} pieces: {trips} trips, {current_a:.0} A and {udc_v:.0} V at most"
+        );
+        good &= trips == 0;
     }
-    println!(
-        "{minutes} min of driving in {pieces} pieces: {trips} trips, {current_a:.0} A and {udc_v:.0} V at most"
-    );
-    Ok(if trips == 0 { ExitCode::SUCCESS } else { ExitCode::from(1) })
+    Ok(if good { ExitCode::SUCCESS } else { ExitCode::from(1) })
 }

@@ -3,16 +3,17 @@
 use super::judge::{self, Bounded, CURRENT_SHARE, Rule};
 use super::without::Without;
 use super::{Action, Outcome};
-use crate::bench::{Flaws, Limits, Observed};
+use crate::bench::{Flaws, Limits, Observed, Tick};
 use crate::machine::Machine;
 use crate::plant::zs9::{NetworkState, ZNetwork, Zs9Plant, Zs9Settings};
-use crate::plant::{PlantSettings, SpeedSource};
+use crate::plant::{PlantSettings, SpeedSource, profile_speed};
 use crate::run::CLOCK;
 use crate::sensor_faults::{AngleFault, CurrentFault};
-use crate::zs9::bench::{Bench, BenchSettings};
+use crate::steps::held;
+use crate::zs9::bench::{Bench, BenchSettings, Course};
 use crate::zs9::inject::{Injection, Kind};
 use crate::zs9::run::Tasks;
-use crate::zs9::scenario::SOURCE_V;
+use crate::zs9::scenario::{INERTIA_KG_M2, SOURCE_V};
 use crate::zs9::trace::Row;
 use crate::zs9::{Orders, SeenMotors, command, settings};
 use anyhow::Result;
@@ -23,6 +24,7 @@ use tractive::drive::dual::Settings;
 use tractive::machine::Tables;
 use tractive::nine_switch::{GATES, Scheme};
 use tractive::protection::{Fault, Trip};
+use tractive::time::Instant;
 
 /// Speeds of the upper and the lower motor, in r/min.
 #[derive(Clone, Copy, Debug)]
@@ -208,6 +210,64 @@ pub fn cases(fast: bool) -> Vec<Case> {
 const RUNAWAY_FROM_RPM: f64 = 1_200.0;
 const RUNAWAY_RPM_S: f64 = 6_000.0;
 
+/// What one motor does, times in s from the recording's beginning.
+#[derive(Clone, Debug)]
+pub enum Script {
+    /// It follows torques, each from its time on (N·m, and whether the rate is limited), at a prescribed speed.
+    Torque {
+        /// In r/min, straight lines between.
+        speed_rpm: Vec<(f64, f64)>,
+        /// Demands.
+        torque_nm: Vec<(f64, (f64, bool))>,
+    },
+    /// It follows a speed, its rotor free and loaded.
+    Speed {
+        /// Wanted, in r/min, straight lines between.
+        wanted_rpm: Vec<(f64, f64)>,
+        /// Against forward rotation, each from its time on.
+        load_nm: Vec<(f64, f64)>,
+    },
+}
+
+impl Script {
+    /// The demand at a time, and the load in N·m.
+    fn order(&self, t_s: f64) -> (MotorDemand, f64) {
+        match self {
+            Self::Torque { torque_nm, .. } => {
+                let (torque_nm, slew_limited) = held(torque_nm, t_s).unwrap_or((0.0, true));
+                (MotorDemand::Torque(Demand { torque_nm: torque_nm as f32, slew_limited }), 0.0)
+            }
+            Self::Speed { wanted_rpm, load_nm } => {
+                let wanted_rad_s = profile_speed(wanted_rpm, t_s);
+                (MotorDemand::Speed(wanted_rad_s as f32), held(load_nm, t_s).unwrap_or(0.0))
+            }
+        }
+    }
+}
+
+/// A drive written down as what happens when.
+#[derive(Clone, Debug)]
+pub struct Ride {
+    /// The upper motor, the lower one.
+    pub motors: [Script; 2],
+    /// Source and schemes.
+    pub course: Course,
+    /// Length, in s.
+    pub duration_s: f64,
+}
+
+/// What a ride left.
+pub struct Ridden {
+    /// The trace.
+    pub rows: Vec<Row>,
+    /// What was seen.
+    pub observed: Observed,
+    /// The latched fault.
+    pub trip: Option<Trip>,
+    /// When the ride ended, in s.
+    pub ended_s: f64,
+}
+
 /// The drive, with one protection off or none.
 pub struct Drive {
     machine: Machine,
@@ -296,20 +356,10 @@ impl Drive {
             upper
         };
         let motor = PlantSettings { flux_scale, ..PlantSettings::default() };
-        let plant_settings = Zs9Settings { source_v: SOURCE_V, motors: [motor; 2], ..Zs9Settings::default() };
         let speeds = [SpeedSource::profile(upper), SpeedSource::profile(lower)];
-        let mut plant = Zs9Plant::new([&self.machine.folder; 2], speeds, &plant_settings);
-        plant.set_network(NetworkState::even(0.0, 0.5 * (LINK_V + SOURCE_V)));
         let limits = settings::drive(CLOCK, CARRIER_HZ).limits;
         let bench = BenchSettings {
-            clock: CLOCK,
-            carrier_ticks: settings::carrier_ticks(&CLOCK, CARRIER_HZ),
-            lead_s: LEAD_S,
-            duration_s: END_S,
-            trace_step_s: f64::from(CARRIER_HZ).recip(),
-            link_ref_v: LINK_V,
             scheme,
-            flaws: Flaws::default(),
             injection: Some(Injection { kind, at_s }),
             limits: Limits {
                 current_a: parameters.trip_current_a,
@@ -317,10 +367,78 @@ impl Drive {
                 speed_rpm: parameters.trip_speed_rpm,
                 ..Limits::NONE
             },
+            ..self.bench_settings(END_S, Flaws::default())
+        };
+        Bench::new(self.plant(speeds, motor), Box::new(operator), bench)
+    }
+
+    /// Both motors on a network that is charged.
+    fn plant(&self, speeds: [SpeedSource; 2], motor: PlantSettings) -> Zs9Plant {
+        let settings = Zs9Settings { source_v: SOURCE_V, motors: [motor; 2], ..Zs9Settings::default() };
+        let mut plant = Zs9Plant::new([&self.machine.folder; 2], speeds, &settings);
+        plant.set_network(NetworkState::even(0.0, 0.5 * (LINK_V + SOURCE_V)));
+        plant
+    }
+
+    /// A sound bench.
+    fn bench_settings(&self, duration_s: f64, flaws: Flaws) -> BenchSettings {
+        BenchSettings {
+            clock: CLOCK,
+            carrier_ticks: settings::carrier_ticks(&CLOCK, CARRIER_HZ),
+            lead_s: LEAD_S,
+            duration_s,
+            trace_step_s: f64::from(CARRIER_HZ).recip(),
+            link_ref_v: LINK_V,
+            scheme: SCHEMES[0],
+            flaws,
+            injection: Some(Injection { kind: Kind::Elsewhere, at_s: -LEAD_S }),
+            limits: Limits::NONE,
             edges: false,
             dead_time_s: 0.0,
+        }
+    }
+
+    /// Drives a script instead of a case; the timers start at a tick.
+    ///
+    /// # Errors
+    /// A drive that breaks the bench's rules.
+    pub fn ride(&self, ride: Ride, flaws: Flaws, trace_step_s: f64, origin: Tick) -> Result<Ridden> {
+        let Ride { motors, course, duration_s } = ride;
+        let later = |steps: &[(f64, f64)]| -> Vec<_> {
+            steps.iter().map(|(t_s, rpm)| (t_s + LEAD_S, *rpm)).collect()
         };
-        Bench::new(plant, Box::new(operator), bench)
+        let speeds = motors.each_ref().map(|motor| match motor {
+            Script::Torque { speed_rpm, .. } => SpeedSource::profile(later(speed_rpm)),
+            Script::Speed { .. } => SpeedSource::Inertia { inertia_kg_m2: INERTIA_KG_M2, load_nm: 0.0 },
+        });
+        let operator = move |t_s: f64, _: SeenMotors| {
+            let orders = motors.each_ref().map(|motor| motor.order(t_s));
+            Orders {
+                demands: orders.map(|(demand, _)| demand),
+                loads_nm: orders.map(|(_, load_nm)| load_nm),
+                enable: true,
+            }
+        };
+        let settings = BenchSettings { trace_step_s, ..self.bench_settings(duration_s, flaws) };
+        let bench = Bench::new(self.plant(speeds, PlantSettings::default()), Box::new(operator), settings);
+        let mut bench = bench.following(course).beginning_at(origin);
+        let mut tasks = Tasks::beginning_at(Instant(origin as u32), self.tables, self.settings);
+        if let Some(without) = self.without {
+            tasks = tasks.without(without);
+        }
+        // Once it has stopped there is nothing to see.
+        tasks.drive(&mut bench, |bench| bench.observed().safe.is_none())?;
+        Ok(Ridden {
+            observed: *bench.observed(),
+            trip: tasks.trip(),
+            ended_s: bench.time_s(),
+            rows: bench.rows().to_vec(),
+        })
+    }
+
+    /// The machine's folder.
+    pub fn machine(&self) -> &Machine {
+        &self.machine
     }
 
     fn judged(&self, case: &Case, seen: &Seen, step_s: f64) -> Outcome {
