@@ -16,7 +16,7 @@ pub struct CampaignOptions {
     /// Each fault of each kind once in each mode, instead of every case.
     #[arg(long)]
     pub fast: bool,
-    /// Only cases whose name (system, fault, speed in r/min, action) has each of these words.
+    /// Only cases whose name (system, fault, speed in r/min, the ZS9's scheme, action) has each of these words.
     #[arg(long, value_name = "WORD", num_args = 1..)]
     pub only: Vec<String>,
     /// One protection off: a fault's name, short_circuit or leg_safe_state. The cases that are lost are then listed.

@@ -45,7 +45,7 @@ const POINTS: [Point; 5] = [
     point(1300.0, 1300.0, true),
 ];
 
-/// Schemes, one after the other: each fault meets all of them.
+/// Schemes of the fast campaign, one after the other; the full one has every scheme.
 const SCHEMES: [Scheme; 4] = [Scheme::S, Scheme::Rs, Scheme::Rthd, Scheme::Zvo];
 
 const LINK_V: f64 = 667.0;
@@ -69,8 +69,8 @@ enum Cause {
     Bench(Kind),
     /// True flux linkage over the map's.
     Flux(f64),
-    /// The upper rotor runs away.
-    Runaway,
+    /// The rotor of motor 0 or 1 runs away.
+    Runaway(usize),
 }
 
 #[derive(Clone, Debug)]
@@ -94,7 +94,8 @@ pub struct Case {
 impl Case {
     /// What a filter searches.
     pub fn name(&self) -> String {
-        format!("zs9 {} {} {}", self.fault.name, self.point.speeds_rpm[0], self.action.name())
+        let Self { fault, point, action, scheme, .. } = self;
+        format!("zs9 {} {} {} {}", fault.name, point.speeds_rpm[0], scheme.name(), action.name())
     }
 }
 
@@ -151,6 +152,10 @@ fn faults() -> Vec<Named> {
     add("source-low", Cause::Bench(Kind::SourceLow), SOURCE, None, true);
     const HIGH: &[Fault] = &[Fault::CapacitorOvervoltage, Fault::DutyRange];
     add("source-high", Cause::Bench(Kind::SourceHigh), HIGH, None, true);
+    const CUT: &[Fault] = &[Fault::SourceUndervoltage, Fault::CapacitorOvervoltage, Fault::DutyRange];
+    // Where a motor gives what the other losses take, nothing changes.
+    add("source-lost", Cause::Bench(Kind::SourceLost), CUT, Some(UNFELT), true);
+    add("source-shorted", Cause::Bench(Kind::SourceShort), SOURCE, None, true);
     add("source-swings", Cause::Bench(Kind::SourceSwings(30.0, 50.0)), HIGH, Some(UNFELT), true);
     add("source-switch-open", Cause::Bench(Kind::SourceSwitchOpen), HIGH, Some(UNFELT), true);
     add("capacitors-halved", Cause::Bench(Kind::CapacitorsHalved), HIGH, Some(UNFELT), true);
@@ -172,7 +177,10 @@ fn faults() -> Vec<Named> {
     add("control-late", late, &[Fault::ControlDeadline], None, true);
     add("commands-lost", Cause::Bench(Kind::ControlStopped), &[Fault::StaleCommand], None, true);
     add("demand-not-finite", Cause::Bench(Kind::DemandNotFinite), &[Fault::NotFinite], None, true);
-    add("overspeed", Cause::Runaway, &[Fault::Overspeed], None, true);
+    for motor in [0, 1] {
+        let name = format!("overspeed-{}", motor + 1);
+        add(&name, Cause::Runaway(motor), &[Fault::Overspeed], None, true);
+    }
     const CURRENT: &[Fault] = &[Fault::Overcurrent];
     add("flux-20%-more", Cause::Flux(1.2), CURRENT, Some(ANOTHER_MACHINE), true);
     add("flux-20%-less", Cause::Flux(0.8), CURRENT, Some(ANOTHER_MACHINE), true);
@@ -189,17 +197,19 @@ pub fn cases(fast: bool) -> Vec<Case> {
         for point in POINTS {
             for action in Action::ALL {
                 let count = list.len();
-                if (fault.cause == Cause::Runaway && point.speeds_rpm[0] < RUNAWAY_FROM_RPM)
+                if (matches!(fault.cause, Cause::Runaway(_)) && point.speeds_rpm[0] < RUNAWAY_FROM_RPM)
                     || (fast && !(fault.fast && point.fast))
                 {
                     continue;
                 }
-                let at_s = match fault.cause {
-                    Cause::Flux(_) => -LEAD_S,
-                    _ => FAULT_S + LATER_S * (count % LATER_STEPS) as f64,
-                };
-                let scheme = SCHEMES[count % SCHEMES.len()];
-                list.push(Case { fault: fault.clone(), point, action, scheme, at_s });
+                let schemes = if fast { &SCHEMES[count % SCHEMES.len()..][..1] } else { &Scheme::ALL[..] };
+                for (number, scheme) in (count..).zip(schemes) {
+                    let at_s = match fault.cause {
+                        Cause::Flux(_) => -LEAD_S,
+                        _ => FAULT_S + LATER_S * (number % LATER_STEPS) as f64,
+                    };
+                    list.push(Case { fault: fault.clone(), point, action, scheme: *scheme, at_s });
+                }
             }
         }
     }
@@ -346,17 +356,15 @@ impl Drive {
         let (kind, flux_scale) = match case.fault.cause {
             Cause::Bench(kind) => (kind, 1.0),
             Cause::Flux(flux_scale) => (Kind::Elsewhere, flux_scale),
-            Cause::Runaway => (Kind::Elsewhere, 1.0),
+            Cause::Runaway(_) => (Kind::Elsewhere, 1.0),
         };
-        let [upper, lower] = point.speeds_rpm.map(|speed_rpm| vec![(0.0, speed_rpm)]);
-        let upper = if case.fault.cause == Cause::Runaway {
-            let from_rpm = point.speeds_rpm[0];
-            vec![(LEAD_S + at_s, from_rpm), (LEAD_S + END_S, from_rpm + RUNAWAY_RPM_S * (END_S - at_s))]
-        } else {
-            upper
-        };
+        let speeds = [0, 1].map(|motor| {
+            let from_rpm = point.speeds_rpm[motor];
+            let faster = (case.fault.cause == Cause::Runaway(motor))
+                .then_some((LEAD_S + END_S, from_rpm + RUNAWAY_RPM_S * (END_S - at_s)));
+            SpeedSource::profile([(LEAD_S + at_s, from_rpm)].into_iter().chain(faster).collect())
+        });
         let motor = PlantSettings { flux_scale, ..PlantSettings::default() };
-        let speeds = [SpeedSource::profile(upper), SpeedSource::profile(lower)];
         let limits = settings::drive(CLOCK, CARRIER_HZ).limits;
         let bench = BenchSettings {
             scheme,
@@ -364,6 +372,7 @@ impl Drive {
             limits: Limits {
                 current_a: parameters.trip_current_a,
                 uc_v: f64::from(limits.capacitor_max_v),
+                source_v: f64::from(limits.source_min_v),
                 speed_rpm: parameters.trip_speed_rpm,
                 ..Limits::NONE
             },
@@ -447,7 +456,13 @@ impl Drive {
         let time_s = observed.ticks_to_safe().map(|ticks| ticks as f64 * step_s);
         let carrier_s = f64::from(CARRIER_HZ).recip();
         let trip_a = parameters.trip_current_a;
-        let current_limit_a = CURRENT_SHARE * trip_a;
+        let current_limit_a = match case.fault.cause {
+            // The diodes of a bridge on a shorted source short the motors, whatever the gates do.
+            Cause::Bench(Kind::SourceShort) => {
+                (CURRENT_SHARE * trip_a).max(FORCED * observed.stored.short_circuit_a)
+            }
+            _ => CURRENT_SHARE * trip_a,
+        };
         let highest_v = f64::from(settings::drive(CLOCK, CARRIER_HZ).limits.capacitor_max_v);
         let uc_limit_v = forced_uc_v(observed).max(highest_v);
         // The source is what it is; the capacitors decide.
@@ -513,7 +528,7 @@ impl Drive {
             }
             Cause::Bench(Kind::Gate(..)) => STUCK_S,
             Cause::Bench(Kind::ControlStopped) => carriers_s + STALE_S,
-            Cause::Runaway => carriers_s + TRACKING_S,
+            Cause::Runaway(_) => carriers_s + TRACKING_S,
             _ => carriers_s,
         }
     }

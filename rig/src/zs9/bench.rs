@@ -32,6 +32,11 @@ const PWM_OFF_TICKS: u32 = 625;
 /// How far a current's reading may be off without making a difference that counts, in A: a tenth of a machine's largest current.
 const MUCH_A: f32 = 8.49;
 
+/// The capacitor behind the source's contactor, in F: as large as the network's.
+const INPUT_F: f64 = 500e-6;
+/// Longest step of its voltage, in s.
+const LONGEST_LOST_S: f64 = 10e-6;
+
 /// Why the bench cannot go on.
 #[derive(Debug, thiserror::Error)]
 pub enum BenchError {
@@ -345,7 +350,7 @@ impl Bench {
         let peaks = Peaks::at(&[a, b, c, d, e, f], self.plant.link_v(), v1.max(v2));
         let speeds = self.plant.motors().each_ref().map(|motor| motor.speed_rpm().abs());
         self.observed.note(self.now, &peaks, speeds[0].max(speeds[1]));
-        if self.real_levels() != self.levels {
+        if self.real_levels() != self.levels || self.plant.source_v() < self.settings.limits.source_v {
             self.observed.makes_a_difference(self.now);
         }
     }
@@ -360,7 +365,7 @@ impl Bench {
             unloaded_v: source_v + (network.capacitor_v() - source_v).hypot(surge_v),
             field_j: motors.iter().map(|motor| motor.field_j()).sum(),
             braked_j: motors.iter().map(|motor| motor.braked_j(link_v)).sum(),
-            short_circuit_a: 0.0,
+            short_circuit_a: motors.iter().map(|motor| motor.short_circuit_peak_a()).fold(0.0, f64::max),
         }
     }
 
@@ -404,6 +409,27 @@ impl Bench {
         if to <= self.now {
             return Ok(());
         }
+        if self.spoiler.kind(self.seconds(self.now)) == Some(Kind::SourceLost) {
+            let longest = (LONGEST_LOST_S / self.step_s).round() as Steps;
+            while self.now + longest < to {
+                self.integrate_lost(self.now + longest)?;
+            }
+            return self.integrate_lost(to);
+        }
+        self.integrate_fed(to)
+    }
+
+    /// With the source cut off: what its capacitor gives it loses.
+    fn integrate_lost(&mut self, to: Steps) -> Result<(), BenchError> {
+        let before_j = self.plant.energies().source_j;
+        self.integrate_fed(to)?;
+        let given_j = self.plant.energies().source_j - before_j;
+        let square = self.plant.source_v().powi(2) - 2.0 * given_j / INPUT_F;
+        self.plant.set_source_v(square.max(1.0).sqrt());
+        Ok(())
+    }
+
+    fn integrate_fed(&mut self, to: Steps) -> Result<(), BenchError> {
         let steps = (to - self.now) as f64;
         let real = self.real_levels();
         let [uh, vh, wh, um, vm, wm, ul, vl, wl] = real;
@@ -581,7 +607,12 @@ impl Bench {
         }
         let healthy_v = held(&self.course.source_v, t_s).unwrap_or(self.nominal_source_v);
         let supply_v = healthy_v + self.sensors.ripple_v(t_s);
-        let source_v = self.spoiler.source_v(t_s, supply_v);
+        // What is cut off is its capacitor's.
+        let source_v = if self.spoiler.kind(t_s) == Some(Kind::SourceLost) {
+            self.plant.source_v()
+        } else {
+            self.spoiler.source_v(t_s, supply_v)
+        };
         self.plant.set_source_v(source_v);
         let network = self.plant.network();
         let mut sample = DualSample {

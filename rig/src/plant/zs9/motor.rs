@@ -79,6 +79,11 @@ impl Motor {
         self.energies
     }
 
+    /// Largest current of the motor if it is short-circuited now, in A.
+    pub fn short_circuit_peak_a(&self) -> f64 {
+        self.stator.peak_on_flux_circle_a(self.id_a, self.iq_a)
+    }
+
     /// Energy of the field, in J.
     pub fn field_j(&self) -> f64 {
         self.stator.field_j(self.id_a, self.iq_a)
