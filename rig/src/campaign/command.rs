@@ -25,8 +25,8 @@ pub struct CampaignOptions {
     /// Folder for cases.csv, summary.json and report.html.
     #[arg(long, default_value = "target/tractive/campaign")]
     pub out: PathBuf,
-    /// A document whose generated part is written anew.
-    #[arg(long, value_name = "FILE")]
+    /// A document whose generated part is written anew: the tables of the fast campaign, the totals of the full one.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["only", "without"])]
     pub doc: Option<PathBuf>,
     /// The document is not written: whether it is up to date decides on the exit code.
     #[arg(long, requires = "doc")]
@@ -93,7 +93,8 @@ pub fn run(options: &CampaignOptions) -> Result<ExitCode> {
     }
     let mut good = lost.is_empty();
     if let Some(path) = &options.doc {
-        let same = report::renew(path, &outcomes, options.check_doc)?;
+        let part = if options.fast { report::Part::Tables } else { report::Part::Sentences };
+        let same = report::renew(path, &outcomes, part, options.check_doc)?;
         if options.check_doc && !same {
             eprintln!("{}: not up to date", path.display());
             good = false;

@@ -79,9 +79,10 @@ impl Motor {
         self.energies
     }
 
-    /// Largest current of the motor if it is short-circuited now, in A.
+    /// Largest current of the motor if it is short-circuited now, or once its current is gone, in A.
     pub fn short_circuit_peak_a(&self) -> f64 {
-        self.stator.peak_on_flux_circle_a(self.id_a, self.iq_a)
+        let peak_a = |id_a, iq_a| self.stator.peak_on_flux_circle_a(id_a, iq_a);
+        peak_a(self.id_a, self.iq_a).max(peak_a(0.0, 0.0))
     }
 
     /// Energy of the field, in J.
