@@ -17,7 +17,8 @@ const ONE_SIDED_SHARE: f32 = 0.001;
 pub(super) struct Glide {
     /// Fundamental to which the voltage has glided after square wave, as a share of six-step; 0 otherwise.
     filled_to: f32,
-    /// The last torque that was not zero, in N·m: its sign is the side of the flux circle on which the machine is.
+    /// The last torque, in N·m, none as the least positive one; 0 before the first. Its sign is the side of the flux circle on which the
+    /// machine is: no torque lies with the positive ones there.
     side_nm: f32,
     /// Mode that the newest command was made for, and the halves for which its flux hexagon still changes its size.
     unsettled: (Mode, u32),
@@ -35,9 +36,7 @@ impl Glide {
 
     /// Remembers the side of a torque, in N·m.
     pub(super) fn drove(&mut self, torque_nm: f32) {
-        if torque_nm != 0.0 {
-            self.side_nm = torque_nm;
-        }
+        self.side_nm = if torque_nm == 0.0 { f32::MIN_POSITIVE } else { torque_nm };
     }
 
     /// The largest fundamental as a share of six-step, and whether it is to be used whatever the torque needs: in square wave, and
