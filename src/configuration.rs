@@ -70,7 +70,7 @@ impl Clock {
     ///
     /// # Errors
     /// The first scalar that makes no sense.
-    pub fn check(&self) -> Result<(), Refused> {
+    pub const fn check(&self) -> Result<(), Refused> {
         let Self { tick_s, ticks_per_s, control_ticks, control_s } = *self;
         let period_s = control_ticks as f32 / ticks_per_s;
         within(&[
@@ -88,7 +88,7 @@ impl Devices {
     ///
     /// # Errors
     /// The first scalar that makes no sense.
-    pub fn check(&self, clock: &Clock) -> Result<(), Refused> {
+    pub const fn check(&self, clock: &Clock) -> Result<(), Refused> {
         let Self { min_pulse_ticks, dead_time_ticks, shortest_half_ticks } = *self;
         let half = shortest_half_ticks as f32;
         within(&[

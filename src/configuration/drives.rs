@@ -1,6 +1,6 @@
 //! Settings of the two systems.
 
-use super::{ABOVE_ZERO, Bound, ROUNDING, Refused, within};
+use super::{ABOVE_ZERO, Bound, ROUNDING, Refused, checked, within};
 use crate::control::{Gains, SpeedDesign, ZSourceDesign, ZSourceGains};
 use crate::drive::{dual, traction};
 use crate::machine::{Ratings, Tables};
@@ -18,7 +18,7 @@ impl Gains {
     ///
     /// # Errors
     /// The first scalar that does not.
-    pub fn check(&self) -> Result<(), Refused> {
+    pub const fn check(&self) -> Result<(), Refused> {
         let Self { carrier, pattern_rad_s, square_damping, observer } = *self;
         within(&[
             Bound("gains.carrier", carrier, ABOVE_ZERO, 1.0),
@@ -34,8 +34,8 @@ impl traction::Settings {
     ///
     /// # Errors
     /// The first scalar that makes no sense, of the machine or of the settings.
-    pub fn check(&self, tables: &Tables) -> Result<(), Refused> {
-        tables.check()?;
+    pub const fn check(&self, tables: &Tables) -> Result<(), Refused> {
+        checked!(tables.check());
         self.check_settings()
     }
 
@@ -43,10 +43,10 @@ impl traction::Settings {
     ///
     /// # Errors
     /// The first scalar that makes no sense.
-    pub fn check_settings(&self) -> Result<(), Refused> {
+    pub const fn check_settings(&self) -> Result<(), Refused> {
         let Self { clock, devices, gains } = self;
-        clock.check()?;
-        devices.check(clock)?;
+        checked!(clock.check());
+        checked!(devices.check(clock));
         gains.check()
     }
 }
@@ -56,36 +56,38 @@ impl dual::Settings {
     ///
     /// # Errors
     /// The first scalar that makes no sense, of the machine or of the settings.
-    pub fn check(&self, tables: &Tables) -> Result<(), Refused> {
-        tables.check()?;
-        self.check_settings(&tables.ratings)
+    pub const fn check(&self, tables: &Tables) -> Result<(), Refused> {
+        let Self { clock, carrier_ticks: _, gains, speed, link, link_gains, limits } = self;
+        checked!(tables.check());
+        checked!(clock.check());
+        checked!(self.check_carrier());
+        checked!(gains.check());
+        checked!(check_speed(speed, clock.control_s(), &tables.ratings));
+        checked!(check_link(link, clock.control_s()));
+        checked!(check_link_gains(link_gains, link));
+        check_limits(limits)
     }
 
-    /// The same for a machine that is checked already.
+    /// Whether the carrier suits a clock that is checked already.
     ///
     /// # Errors
-    /// The first scalar that makes no sense.
-    pub fn check_settings(&self, ratings: &Ratings) -> Result<(), Refused> {
-        let Self { clock, carrier_ticks, gains, speed, link, link_gains, limits } = self;
-        clock.check()?;
+    /// Its length, if it does not.
+    pub const fn check_carrier(&self) -> Result<(), Refused> {
+        let Self { clock, carrier_ticks, .. } = self;
         let control = clock.control_ticks as f32;
         let carrier = *carrier_ticks as f32;
         let longest = if control < LONGEST_CARRIER { control } else { LONGEST_CARRIER };
-        within(&[Bound("carrier_ticks", carrier, control / MOST_CARRIERS, longest)])?;
+        checked!(within(&[Bound("carrier_ticks", carrier, control / MOST_CARRIERS, longest)]));
         // An even number, and a whole part of the control period.
         let whole = clock.control_ticks.is_multiple_of(*carrier_ticks) && carrier_ticks.is_multiple_of(2);
         if !whole {
             return Err(Refused { name: "carrier_ticks", value: carrier, least: control, most: control });
         }
-        gains.check()?;
-        check_speed(speed, clock.control_s(), ratings)?;
-        check_link(link, clock.control_s())?;
-        check_link_gains(link_gains, link)?;
-        check_limits(limits)
+        Ok(())
     }
 }
 
-fn check_speed(speed: &SpeedDesign, control_s: f32, ratings: &Ratings) -> Result<(), Refused> {
+const fn check_speed(speed: &SpeedDesign, control_s: f32, ratings: &Ratings) -> Result<(), Refused> {
     let SpeedDesign { inertia_kg_m2, natural_rad_s, period_s } = *speed;
     let most_nm = STIFFEST * ratings.max_torque_nm;
     within(&[
@@ -95,7 +97,7 @@ fn check_speed(speed: &SpeedDesign, control_s: f32, ratings: &Ratings) -> Result
     ])
 }
 
-fn check_link(link: &ZSourceDesign, control_s: f32) -> Result<(), Refused> {
+const fn check_link(link: &ZSourceDesign, control_s: f32) -> Result<(), Refused> {
     let ZSourceDesign {
         inductance_h,
         resistance_ohm,
@@ -121,18 +123,24 @@ fn check_link(link: &ZSourceDesign, control_s: f32) -> Result<(), Refused> {
 }
 
 /// The gains are those of the design.
-fn check_link_gains(gains: &ZSourceGains, link: &ZSourceDesign) -> Result<(), Refused> {
+const fn check_link_gains(gains: &ZSourceGains, link: &ZSourceDesign) -> Result<(), Refused> {
+    const LEAST: f32 = 0.99;
+    const MOST: f32 = 1.01;
     let ZSourceGains { inner_ohm, outer_s, integral_share } = *gains;
     let wanted = link.gains();
-    let near = |name, value: f32, wanted: f32| Bound(name, value, 0.99 * wanted, 1.01 * wanted);
     within(&[
-        near("link_gains.inner_ohm", inner_ohm, wanted.inner_ohm),
-        near("link_gains.outer_s", outer_s, wanted.outer_s),
-        near("link_gains.integral_share", integral_share, wanted.integral_share),
+        Bound("link_gains.inner_ohm", inner_ohm, LEAST * wanted.inner_ohm, MOST * wanted.inner_ohm),
+        Bound("link_gains.outer_s", outer_s, LEAST * wanted.outer_s, MOST * wanted.outer_s),
+        Bound(
+            "link_gains.integral_share",
+            integral_share,
+            LEAST * wanted.integral_share,
+            MOST * wanted.integral_share,
+        ),
     ])
 }
 
-fn check_limits(limits: &LinkLimits) -> Result<(), Refused> {
+const fn check_limits(limits: &LinkLimits) -> Result<(), Refused> {
     let LinkLimits { source_min_v, capacitor_max_v, duty_max } = *limits;
     within(&[
         Bound("limits.capacitor_max_v", capacitor_max_v, 1.0, 1e4),
