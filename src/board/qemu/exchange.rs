@@ -160,6 +160,7 @@ fn file(index: usize) -> usize {
     }
 }
 
+#[inline(never)]
 fn send(block: &Block) {
     saboteur::sent(block);
     // SAFETY: SYS_WRITE reads exactly the block, which outlives the call.
@@ -169,6 +170,7 @@ fn send(block: &Block) {
     }
 }
 
+#[inline(never)]
 fn receive(answers: usize) -> Block {
     let mut block: Block = [0; link::BLOCK_WORDS];
     // SAFETY: SYS_READ writes at most the block's bytes, and the block is ours until it returns.

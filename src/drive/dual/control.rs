@@ -48,6 +48,12 @@ impl<M: Machine> ControlTask<M> {
         }
     }
 
+    /// The same where the timers start at another instant than 0.
+    pub fn beginning_at(mut self, origin: Instant) -> Self {
+        self.now = origin.after(self.settings.clock.control_ticks);
+        self
+    }
+
     /// The same without a check.
     pub const fn without(mut self, disarmed: Disarmed) -> Self {
         self.disarmed = disarmed;
