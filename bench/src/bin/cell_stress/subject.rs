@@ -34,7 +34,7 @@ impl Subject {
 /// Records that a ring holds: one from the fault on freezes it.
 const RING_RECORDS: u32 = 8;
 
-pub static SUBJECTS: [Subject; 15] = [
+pub static SUBJECTS: [Subject; 18] = [
     Subject::new(
         "downlink-10",
         |c| c.publish(downlink_10_publish),
@@ -61,11 +61,15 @@ pub static SUBJECTS: [Subject; 15] = [
             c.read_before(|not| DOWNLINK_7.newest(|message| message.word::<0>() != not));
         },
     ),
-    Subject::new("uplink-12", |c| c.read(uplink_12_read), |c| c.publish(|m| UPLINK_12.publish(*m))),
+    Subject::new(
+        "uplink-12",
+        |c| c.read(|| uplink_12_read(&UPLINK_12)),
+        |c| c.publish(|m| UPLINK_12.publish(*m)),
+    ),
     // Released and frozen again under the reader's hands: then it gets nothing.
     Subject::new(
         "ring-10",
-        |c| c.read(ring_read),
+        |c| c.read(|| ring_read(&RING)),
         |c| {
             c.publish(|m| {
                 RING.release();
@@ -88,19 +92,22 @@ pub static SUBJECTS: [Subject; 15] = [
     ),
     Subject::new("uplink-4-empty", |c| c.read_empty(uplink_4_read(&EMPTY_4).is_some()), |_| ()),
     Subject::new("uplink-10-empty", |c| c.read_empty(uplink_10_read(&EMPTY_10).is_some()), |_| ()),
+    Subject::new("uplink-12-empty", |c| c.read_empty(uplink_12_read(&EMPTY_12).is_some()), |_| ()),
     Subject::new("trail-13-empty", |c| c.read_empty(trail_13_read(&EMPTY_13).is_some()), |_| ()),
+    Subject::new("ring-10-empty", |c| c.read_empty(ring_read(&EMPTY_RING).is_some()), |_| ()),
+    Subject::new("unfrozen-empty", |c| c.read_empty(unfrozen_read(&EMPTY_UNFROZEN).is_some()), |_| ()),
     Subject::new("broken-plain-down", |c| c.publish(plain_publish), |c| c.read(|| Some(PLAIN_DOWN.read()))),
     Subject::new("broken-plain-up", |c| c.read(plain_read), |c| c.publish(|m| PLAIN_UP.publish(*m))),
     Subject::new(
         "broken-ring",
-        |c| c.read(unfrozen_read),
+        |c| c.read(|| unfrozen_read(&UNFROZEN)),
         |c| c.publish(|m| (0..RING_RECORDS).for_each(|_| UNFROZEN.record(*m))),
     ),
     Subject::new("broken-eager-down", |c| c.publish(eager_publish), |c| c.read(|| EAGER.read())),
 ];
 
 /// Those whose reader tries again, for several interrupts in a row; it may give up then.
-pub static BURST_SUBJECTS: [Subject; 3] = [
+pub static BURST_SUBJECTS: [Subject; 4] = [
     Subject::new(
         "burst-uplink-4",
         |c| c.read(|| uplink_4_read(&UPLINK_4)),
@@ -110,6 +117,11 @@ pub static BURST_SUBJECTS: [Subject; 3] = [
         "burst-uplink-10",
         |c| c.read(|| uplink_10_read(&UPLINK_10)),
         |c| c.publish(|m| UPLINK_10.publish(*m)),
+    ),
+    Subject::new(
+        "burst-uplink-12",
+        |c| c.read(|| uplink_12_read(&UPLINK_12)),
+        |c| c.publish(|m| UPLINK_12.publish(*m)),
     ),
     Subject::new(
         "burst-trail-13",
