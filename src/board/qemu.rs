@@ -10,7 +10,7 @@
 mod dual;
 mod exchange;
 
-pub use dual::{connect_dual, die_dual, start_dual};
+pub use dual::{DUAL_DESK, DUAL_RECORDER, DualIdle, connect_dual, die_dual, start_dual};
 
 use super::{ControlPort, PwmPort, Sample};
 use crate::configuration::Refused;

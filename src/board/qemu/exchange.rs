@@ -3,7 +3,10 @@
 
 mod dual;
 
-pub use dual::{dead_dual, gates_off, open_dual, play_dual, power_sample, report_dual, sample_dual};
+pub use dual::{
+    ask_dual, dead_dual, gates_off, leave_dual, open_dual, play_dual, power_sample, report_dual, sample_dual,
+    tell_dual,
+};
 
 use super::{RECORDER, stop};
 use crate::board::Sample;
@@ -61,13 +64,17 @@ pub fn control_sample(now: Instant) -> Sample {
 
 /// Tells what the flight recorder holds, if a fault has frozen it, and ends the emulation.
 fn finish() -> ! {
-    // The rig's time stands still from here on: no interrupt may ask it for samples.
-    cortex_m::interrupt::disable();
-    for record in (0..).map_while(|index| RECORDER.read(index)) {
-        send(&Request::Recorded(record).to_block());
-    }
+    tell_all(
+        (0..).map_while(|index| RECORDER.read(index)).map(|record| Request::Recorded(record).to_block()),
+    );
     send(&Request::End.to_block());
     stop(true)
+}
+
+/// Tells blocks while the rig's time stands still: no interrupt may ask it for samples from here on.
+fn tell_all(blocks: impl Iterator<Item = Block>) {
+    cortex_m::interrupt::disable();
+    blocks.for_each(|block| send(&block));
 }
 
 /// Phase currents at a carrier boundary.

@@ -24,7 +24,9 @@ mod pwm;
 
 use crate::cell::{Downlink, Uplink};
 use crate::control::{Gains, SpeedDesign, ZSourceDesign, ZSourceGains};
+use crate::machine::Ratings;
 use crate::protection::LinkLimits;
+use crate::recorder::DualRecorder;
 use crate::time::Clock;
 use core::sync::atomic::AtomicU32;
 
@@ -73,6 +75,18 @@ impl Settings {
         }
     }
 
+    /// The ratings as the operator looks at them: link voltages are those of the capacitors, and its trip levels the drive's own.
+    pub const fn operator_ratings(&self, ratings: &Ratings) -> Ratings {
+        Ratings {
+            dc_link_min_v: ratings.dc_link_min_v / control::TWO_LEVEL_SHARE,
+            dc_link_nominal_v: ratings.dc_link_nominal_v / control::TWO_LEVEL_SHARE,
+            dc_link_max_v: ratings.dc_link_max_v / control::TWO_LEVEL_SHARE,
+            trip_dc_over_v: self.limits.capacitor_max_v,
+            trip_dc_under_v: self.limits.source_min_v,
+            ..*ratings
+        }
+    }
+
     /// Instant of the first PWM interrupt, in ticks: the first peak.
     pub const fn first_peak_ticks(&self) -> u32 {
         self.carrier_ticks / 2
@@ -97,24 +111,31 @@ impl Settings {
     }
 }
 
-/// The cells between the two interrupts.
-pub struct Shared {
+/// The cells between the two interrupts, and the flight recorder, if there is one.
+pub struct Shared<'a> {
     command: Downlink<DualCommand, 10>,
     applied: Uplink<DualApplied, 10>,
     /// Instant of the newest control interrupt, from its beginning on.
     began: AtomicU32,
+    recorder: Option<&'a DualRecorder>,
 }
 
-impl Shared {
+impl<'a> Shared<'a> {
     /// Empty cells.
     #[cfg(not(loom))]
     pub const fn new() -> Self {
-        Self { command: Downlink::new(), applied: Uplink::new(), began: AtomicU32::new(0) }
+        Self { command: Downlink::new(), applied: Uplink::new(), began: AtomicU32::new(0), recorder: None }
+    }
+
+    /// The same with a flight recorder, which the control interrupt fills.
+    #[cfg(not(loom))]
+    pub const fn recorded_by(recorder: &'a DualRecorder) -> Self {
+        Self { recorder: Some(recorder), ..Self::new() }
     }
 }
 
 #[cfg(not(loom))]
-impl Default for Shared {
+impl Default for Shared<'_> {
     fn default() -> Self {
         Self::new()
     }
