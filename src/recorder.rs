@@ -140,6 +140,13 @@ pub struct DualRecord {
     pub state: DualState,
 }
 
+impl DualRecord {
+    /// Link voltage outside shoot-through, in V.
+    pub const fn link_v(&self) -> f32 {
+        2.0 * self.capacitor_v - self.source_v
+    }
+}
+
 /// What the ZS9 was doing.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct DualState {

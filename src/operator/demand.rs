@@ -40,6 +40,11 @@ pub trait Demands: Copy {
     fn drop(&mut self);
     /// One slot towards what is asked; towards nothing without a request.
     fn step(&mut self, request: Option<&Self::Request>, observed: &Self::Observation, settings: &Settings);
+    /// Whether the gates may go off at the end of a stop, as far as the link is concerned.
+    #[inline]
+    fn link_may_rest(_observed: &Self::Observation) -> bool {
+        true
+    }
     /// Where they are.
     fn told(&self) -> Self::Told;
     /// What the drive gets.

@@ -5,13 +5,17 @@ use super::demand::wanted_nm;
 use super::{Demands, Levels, Ramp, Rates, Refusal, Seen, Settings};
 use crate::board::{DualSample, MotorDemand};
 use crate::control::Demand;
-use crate::drive::dual::DualReport;
+use crate::drive::dual::{self, DualReport};
 use crate::frames::limit;
 use crate::machine::Ratings;
 use crate::time::Instant;
 
 /// Time in which a speed demand goes from standstill to the largest speed, in s.
 const SPEED_RISE_S: f32 = 0.5;
+
+/// Share of the source's voltage by which the link may be above it when the gates go off at the end of a stop: what is more swings
+/// back into the source through the inductors.
+const RESTING_SHARE: f32 = 0.05;
 
 /// What one motor is asked for.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -205,6 +209,8 @@ pub struct DualDemands {
     /// The limits that hold; `None`: as rated.
     limits: Option<[MotorLimits; 2]>,
     link_ref_v: f32,
+    /// While it stops the link goes down to the source's voltage.
+    resting_v: Option<f32>,
 }
 
 impl DualDemands {
@@ -219,7 +225,7 @@ impl Demands for DualDemands {
     type Permit = DualPermit;
     type Told = [MotorDemand; 2];
 
-    const AT_REST: Self = Self { ways: [Way::AT_REST; 2], limits: None, link_ref_v: 0.0 };
+    const AT_REST: Self = Self { ways: [Way::AT_REST; 2], limits: None, link_ref_v: 0.0, resting_v: None };
 
     fn levels(request: &DualRequest) -> Levels {
         request.levels
@@ -250,7 +256,7 @@ impl Demands for DualDemands {
         if !(sum(m1) + sum(m2) + request.link_ref_v).is_finite() {
             return Some(Refusal::RequestNotFinite);
         }
-        let (low_v, high_v) = (ratings.dc_link_min_v, 2.0 * ratings.dc_link_max_v - ratings.dc_link_min_v);
+        let [low_v, high_v, _] = dual::Settings::link_range_v(ratings);
         let inside = m1.limits.are_within(ratings)
             && m2.limits.are_within(ratings)
             && (low_v..=high_v).contains(&request.link_ref_v);
@@ -277,7 +283,8 @@ impl Demands for DualDemands {
     fn step(&mut self, request: Option<&DualRequest>, observed: &DualObservation, settings: &Settings) {
         let limits = self.limits(settings);
         let wanted = request.map_or([Wanted::Torque(0.0); 2], |request| request.motors.map(|m| m.wanted));
-        let DualReport { omega, torque_nm, .. } = observed.report;
+        let DualReport { omega, torque_nm, source_v, .. } = observed.report;
+        self.resting_v = if request.is_none() { Some(source_v) } else { None };
         let motors = omega.into_iter().zip(torque_nm);
         for (((way, wanted), limits), (omega, torque_nm)) in
             self.ways.iter_mut().zip(wanted).zip(&limits).zip(motors)
@@ -285,6 +292,11 @@ impl Demands for DualDemands {
             let motor = Motor { speed: omega / settings.ratings.pole_pairs, torque_nm };
             way.step(wanted, &motor, limits, settings);
         }
+    }
+
+    fn link_may_rest(observed: &DualObservation) -> bool {
+        let DualReport { source_v, .. } = observed.report;
+        observed.report.link_v() < (1.0 + RESTING_SHARE) * source_v
     }
 
     fn told(&self) -> [MotorDemand; 2] {
@@ -299,7 +311,7 @@ impl Demands for DualDemands {
             enable,
             demands: self.told(),
             speed_torque_nm: self.limits(settings).map(smaller),
-            link_ref_v: self.link_ref_v,
+            link_ref_v: self.resting_v.unwrap_or(self.link_ref_v),
             acknowledge,
         }
     }

@@ -100,7 +100,7 @@ impl<D: Demands> Operator<D> {
         self.look_at_values(input.request, settings);
         self.supervise(&situation, settings);
         self.advance(&situation, settings);
-        self.obey(input.request, &situation, settings);
+        self.obey(input, &situation, settings);
         self.shape(input, settings);
         let (enable, switches) = self.outputs(&situation, settings);
         Output {
@@ -248,11 +248,16 @@ impl<D: Demands> Operator<D> {
     }
 
     /// Commands: levels that stop first, then edges.
-    fn obey(&mut self, request: &D::Request, input: &Situation, settings: &Settings) {
+    fn obey(
+        &mut self,
+        Input { request, observed, .. }: &Input<D::Request, D::Observation>,
+        input: &Situation,
+        settings: &Settings,
+    ) {
         let levels = D::levels(request);
         let Levels { enable, charge, discharge, acknowledge, .. } = levels;
         let last = core::mem::replace(&mut self.last, Edges { enable, charge, discharge, acknowledge });
-        self.obey_levels(&levels, input, settings);
+        self.obey_levels(&levels, D::link_may_rest(observed), input, settings);
         if acknowledge && !last.acknowledge {
             self.acknowledge(input, settings);
         }
@@ -269,10 +274,10 @@ impl<D: Demands> Operator<D> {
 
     /// Off, stop, coast.
     #[inline(never)]
-    fn obey_levels(&mut self, request: &Levels, input: &Situation, settings: &Settings) {
+    fn obey_levels(&mut self, request: &Levels, link_may_rest: bool, input: &Situation, settings: &Settings) {
         let rest = if settings.line.is_some() { Phase::Charged } else { Phase::Ready };
         let resting = self.demands.are_at_rest();
-        let may_open = resting && health::open_is_safe(input, settings);
+        let may_open = resting && link_may_rest && health::open_is_safe(input, settings);
         let off = request.off || !input.feedback.enable_input;
         match self.phase {
             Phase::Pulsing | Phase::Coasting { .. } | Phase::Stopping if off => self.rest(rest),

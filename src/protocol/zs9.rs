@@ -13,6 +13,7 @@ use super::telemetry::{
     ANSWER_PARAMETER, ANSWER_RESULT, ANSWER_VALUE, CHOPPER, COUNTER_SIGNALS, DISCHARGE, FAULT, LISTENING,
     MAIN, PRECHARGE, REFUSAL, REFUSALS, SPEED_RPM, STATE, TAKEN, TRIP_FAULT, TRIP_LIMIT, TRIP_VALUE, encode,
 };
+use crate::drive::dual;
 use crate::machine::Ratings;
 use crate::nine_switch::Scheme;
 use crate::operator::{DualDemands, DualObservation, DualRequest, Levels, MotorRequest, Wanted};
@@ -300,7 +301,7 @@ impl Dialect for Zs9 {
             wanted,
             limits: motor_limits(sent.as_ref(), parameters, ratings),
         };
-        let nominal_v = 2.0 * ratings.dc_link_nominal_v - ratings.dc_link_min_v;
+        let [_, _, nominal_v] = dual::Settings::link_range_v(ratings);
         DualRequest {
             levels: if armed { levels } else { Levels { off: levels.off, ..Zs9Command::AT_REST.levels } },
             motors: [motor(first, limits1), motor(second, limits2)],

@@ -38,6 +38,10 @@ pub use pwm::PwmTask;
 /// whole ticks the rounding alone would shake each motor's torque by some hundredths of a N·m.
 pub const COMPARE_STEPS: u32 = 32;
 
+/// Share of the nominal source's voltage from which on the capacitors count as charged: at rest they have the source's, which may be
+/// that low.
+pub const LOWEST_SHARE: f32 = 0.9;
+
 /// What both tasks are built with.
 #[derive(Clone, Copy, Debug)]
 pub struct Settings {
@@ -78,13 +82,22 @@ impl Settings {
     /// The ratings as the operator looks at them: link voltages are those of the capacitors, and its trip levels the drive's own.
     pub const fn operator_ratings(&self, ratings: &Ratings) -> Ratings {
         Ratings {
-            dc_link_min_v: ratings.dc_link_min_v / control::TWO_LEVEL_SHARE,
+            dc_link_min_v: LOWEST_SHARE * ratings.dc_link_min_v / control::TWO_LEVEL_SHARE,
             dc_link_nominal_v: ratings.dc_link_nominal_v / control::TWO_LEVEL_SHARE,
             dc_link_max_v: ratings.dc_link_max_v / control::TWO_LEVEL_SHARE,
             trip_dc_over_v: self.limits.capacitor_max_v,
-            trip_dc_under_v: self.limits.source_min_v,
+            // Once the gates go off, what is above the source's voltage swings as far below it; a source that is lost has a limit
+            // of its own.
+            trip_dc_under_v: 0.5 * self.limits.source_min_v,
             ..*ratings
         }
+    }
+
+    /// The lowest and the highest link voltage outside shoot-through that an operator may ask for, and what holds until it does, in V,
+    /// by such ratings.
+    pub const fn link_range_v(ratings: &Ratings) -> [f32; 3] {
+        let source_v = ratings.dc_link_min_v / LOWEST_SHARE;
+        [source_v, 2.0 * ratings.dc_link_max_v - source_v, 2.0 * ratings.dc_link_nominal_v - source_v]
     }
 
     /// Instant of the first PWM interrupt, in ticks: the first peak.
