@@ -41,8 +41,17 @@ pub struct DualSample {
     pub speed_torque_nm: [f32; 2],
     /// Number of the operator's last acknowledge.
     pub acknowledge: u8,
-    /// What turned the gates off in hardware, and its name; it lasts until it is acknowledged.
-    pub hardware: Option<Fault>,
+    /// What turned the gates off in hardware; it lasts until it is acknowledged.
+    pub hardware: Option<HardwareBreak>,
+}
+
+/// A cause that turned the gates off in hardware.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct HardwareBreak {
+    /// Its name.
+    pub fault: Fault,
+    /// Where it was seen, the fault's value: bits that the board explains.
+    pub seen: u16,
 }
 
 impl DualSample {

@@ -1,7 +1,7 @@
 //! The ZS9's blocks: the same three streams and the same tags, other contents.
 
 use super::{BLOCK_WORDS, Block, LineTimes, line_from_words, line_to_words, told_from_words, told_to_words};
-use crate::board::{DualSample, GateFeedback, MotorDemand, PlayedPeriod, PowerSample};
+use crate::board::{DualSample, GateFeedback, HardwareBreak, MotorDemand, PlayedPeriod, PowerSample};
 use crate::cell::Words;
 use crate::control::Demand;
 use crate::drive::dual::{DualReport, scheme_from_code};
@@ -166,11 +166,14 @@ pub fn dual_sample_to_block(sample: &DualSample, stop: bool) -> Block {
         | lost2 << 3
         | kind1 << 4
         | kind2 << 6
-        | (sample.scheme as u32) << 8
-        | sample.hardware.map_or(0, |fault| fault as u32) << 16;
+        | (sample.scheme as u32) << 8;
+    let hardware = sample.hardware.map_or(0, |found| found.fault as u32 | u32::from(found.seen) << 16);
     let [capacitor, inductor, source, link] =
         [sample.capacitor_v, sample.inductor_a, sample.source_v, sample.link_ref_v].map(f32::to_bits);
-    [a1, b1, c1, a2, b2, c2, first, second, capacitor, inductor, source, demand1, demand2, link, flags, 0]
+    [
+        a1, b1, c1, a2, b2, c2, first, second, capacitor, inductor, source, demand1, demand2, link, flags,
+        hardware,
+    ]
 }
 
 /// The inverse of [`dual_sample_to_block`].
@@ -191,7 +194,7 @@ pub fn dual_sample_from_block(block: &Block) -> (DualSample, bool) {
         demand2,
         link,
         flags,
-        _,
+        hardware,
     ] = *block;
     let angle = |word, lost| (flags & lost == 0).then_some(Angle(word));
     let sample = DualSample {
@@ -205,7 +208,8 @@ pub fn dual_sample_from_block(block: &Block) -> (DualSample, bool) {
         scheme: scheme_from_code(flags >> 8 & 0xFF),
         speed_torque_nm: DualSample::UNLIMITED_NM,
         acknowledge: 0,
-        hardware: Fault::from_code(flags >> 16),
+        hardware: Fault::from_code(hardware & 0xFFFF)
+            .map(|fault| HardwareBreak { fault, seen: (hardware >> 16) as u16 }),
         enable: flags & 1 != 0,
     };
     (sample, flags & 2 != 0)

@@ -256,6 +256,23 @@ where
     }
 }
 
+/// Somewhere to look what a drive says of itself.
+pub trait Watched<O> {
+    /// The newest slot's words; `None` before the first.
+    fn observed(&self) -> Option<O>;
+}
+
+impl<P, O, const PERMIT: usize, const OBSERVATION: usize> Watched<O> for Desk<P, O, PERMIT, OBSERVATION>
+where
+    P: Grant,
+    O: Slotted + Words<OBSERVATION>,
+    Timed<P>: Words<PERMIT>,
+{
+    fn observed(&self) -> Option<O> {
+        self.observed()
+    }
+}
+
 #[cfg(not(loom))]
 impl<P, O, const PERMIT: usize, const OBSERVATION: usize> Default for Desk<P, O, PERMIT, OBSERVATION>
 where

@@ -14,7 +14,7 @@ use crate::benchmark::in_plant;
 use crate::plant::zs9::{IllegalState, LegGates, NetworkState, Source, Zs9Plant};
 use crate::run::Supervised;
 use std::collections::VecDeque;
-use tractive::board::{DualSample, GateFeedback, PlayedPeriod, PowerSample};
+use tractive::board::{DualSample, GateFeedback, HardwareBreak, PlayedPeriod, PowerSample};
 use tractive::drive::dual::{COMPARE_STEPS, DualReport};
 use tractive::frames::Abc;
 use tractive::nine_switch::Scheme;
@@ -675,7 +675,7 @@ impl Bench {
             enable: self.orders.enable && hardware.is_none(),
             speed_torque_nm: DualSample::UNLIMITED_NM,
             acknowledge: 0,
-            hardware,
+            hardware: hardware.map(|fault| HardwareBreak { fault, seen: 1 }),
         };
         let true_a = sample.currents_a;
         self.spoiler.control(t_s, &mut sample);

@@ -2,7 +2,7 @@
 
 use super::axis::{self, Axis, AxisInput, AxisOutput};
 use super::{DualApplied, DualCommand, DualReport, MotorCommand, MotorShare, Settings, Shared};
-use crate::board::{DualControlPort, DualSample, MotorDemand};
+use crate::board::{DualControlPort, DualSample, HardwareBreak, MotorDemand};
 use crate::control::{Measurements, ZSource, ZSourceError, ZSourceInput};
 use crate::drive::Gates;
 use crate::frames::{Angle, SQRT_3};
@@ -82,10 +82,10 @@ impl<M: Machine> ControlTask<M> {
             let known = newest.filter(|newest| now.reached(newest.at) || !latest.reached(newest.at));
             self.trip = known.and_then(|known| known.trip);
         }
-        if let Some(fault) = sample.hardware {
+        if let Some(HardwareBreak { fault, seen }) = sample.hardware {
             // That the gates are held, or did not do what they were told, is only what comes of it.
             self.trip = self.trip.filter(|trip| !matches!(trip.fault, Fault::GatesHeld | Fault::LegStuck));
-            self.check(Some((fault, 1.0, 0.0)), port);
+            self.check(Some((fault, f32::from(seen), 0.0)), port);
         }
         self.check(applied.and_then(|applied| self.overdue(&applied, now)), port);
         let angles = self.track(&sample, port);
