@@ -262,6 +262,8 @@ fn demand(kind: u32, value: u32) -> MotorDemand {
 mod tests {
     use super::*;
     use crate::nine_switch::Scheme;
+    use crate::operator::{State, Switches};
+    use crate::recorder::DualState;
 
     #[test]
     fn what_is_sent_arrives() {
@@ -279,6 +281,9 @@ mod tests {
             link_ref_v: 667.0,
             scheme: Scheme::Zvo,
             enable: true,
+            speed_torque_nm: DualSample::UNLIMITED_NM,
+            acknowledge: 0,
+            hardware: Some(HardwareBreak { fault: Fault::GateDriver, seen: 0x3FF }),
         };
         assert_eq!(dual_sample_from_block(&dual_sample_to_block(&sample, true)), (sample, true));
         let power = PowerSample {
@@ -291,6 +296,35 @@ mod tests {
         let mut gates = [GateTicks { off_from: 1, off_to: 40_000 }; 9];
         gates[4] = GateTicks { off_from: 65_535, off_to: 65_535 };
         let report = DualReport { torque_nm: [1.0, -2.0], weakening: [false, true], ..DualReport::default() };
+        let setup = DualSetup { carrier_ticks: 2_500, line: None };
+        let line = Some(LineTimes { precharge_s: 0.05, discharge_s: 0.5 });
+        for setup in [setup, DualSetup { line, ..setup }] {
+            assert_eq!(dual_setup_from_block(&dual_setup_to_block(setup)), setup);
+        }
+        let feedback = Feedback { main_closed: true, ..Feedback::default() };
+        let frame = Some(Frame { id: 0x111, length: 8, data: [1, 2, 3, 4, 5, 6, 7, 8] });
+        for frame in [None, frame] {
+            assert_eq!(dual_asked_from_block(&dual_asked_to_block(&feedback, frame)), (feedback, frame));
+        }
+        let status = DualStatus {
+            state: State::Running,
+            trip: None,
+            refusal: None,
+            refusals: 1,
+            torque_nm: sample.demands,
+            switches: Switches { main: true, ..Switches::default() },
+        };
+        let record = DualRecord {
+            at: Instant(12),
+            currents_a: sample.currents_a,
+            angles: [Angle(1), Angle(2)],
+            capacitor_v: 533.0,
+            source_v: 400.0,
+            inductor_a: 1.0,
+            torque_nm: [2.0, 3.0],
+            duty: 0.25,
+            state: DualState::default(),
+        };
         for request in [
             DualRequest::Hello,
             DualRequest::ControlSample(Instant(7)),
@@ -299,6 +333,11 @@ mod tests {
             DualRequest::Play(Instant(10), PlayedPeriod { gates }),
             DualRequest::GatesOff(Instant(11)),
             DualRequest::Dead,
+            DualRequest::Recorded(record),
+            DualRequest::End,
+            DualRequest::Leave(Instant(13)),
+            DualRequest::Ask(Instant(14)),
+            DualRequest::Tell(Instant(15), status, frame),
         ] {
             assert_eq!(DualRequest::from_block(&request.to_block()), Some(request));
         }
