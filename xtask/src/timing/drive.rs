@@ -28,12 +28,16 @@ pub struct Bench {
     pub scenario: &'static str,
     pub path: PathBuf,
     pub image: Image,
+    /// Whether the addresses of each interrupt are wanted.
+    pub keeps_addresses: bool,
 }
 
 /// What one drive gave.
 #[derive(Debug, Default)]
 pub struct Drive {
     pub calls: Vec<Call>,
+    /// What each of them executed, in the order of the addresses; empty unless it was wanted.
+    pub addresses: Vec<Vec<u32>>,
     pub hits: Tally,
     pub behind: Tally,
     pub stack_bytes: i32,
@@ -86,6 +90,7 @@ impl Bench {
         let link = self.image.functions.iter();
         let link = link.filter(|(_, function)| is_link(&function.names)).map(|(start, _)| *start).collect();
         let mut meter = Meter::new(&self.image, &link);
+        meter.keeps_addresses = self.keeps_addresses;
         let mut log = BufReader::with_capacity(1 << 20, Unhurried(log));
         let (mut line, mut outcome) = (Vec::new(), Ok(()));
         while log.read_until(b'\n', &mut line)? > 0 {
@@ -98,8 +103,8 @@ impl Bench {
             line.clear();
         }
         outcome?;
-        let Meter { calls, hits, behind, stack_bytes, longest, .. } = meter;
-        Ok(Drive { calls, hits, behind, stack_bytes, longest, modes: Vec::new() })
+        let Meter { calls, addresses, hits, behind, stack_bytes, longest, .. } = meter;
+        Ok(Drive { calls, addresses, hits, behind, stack_bytes, longest, modes: Vec::new() })
     }
 }
 

@@ -37,6 +37,10 @@ pub struct Meter<'a> {
     known: HashMap<u32, Instruction>,
     /// Every interrupt that has returned, in the order of their returns.
     pub calls: Vec<Call>,
+    /// Whether what each of them executed is kept.
+    pub keeps_addresses: bool,
+    /// What each of them executed, in the order of the addresses.
+    pub addresses: Vec<Vec<u32>>,
     /// How often each address was executed.
     pub hits: Tally,
     /// What was executed behind each call, by its return address.
@@ -81,6 +85,8 @@ impl<'a> Meter<'a> {
             announced: None,
             known: HashMap::new(),
             calls: Vec::new(),
+            keeps_addresses: false,
+            addresses: Vec::new(),
             hits: Tally::default(),
             behind: Tally::default(),
             stack_bytes: 0,
@@ -130,6 +136,12 @@ impl<'a> Meter<'a> {
         match self.active.pop() {
             Some(handler) if handler.call.exception == exception => {
                 self.calls.push(handler.call);
+                if self.keeps_addresses {
+                    let mut addresses = handler.addresses.clone();
+                    addresses.sort_unstable();
+                    addresses.dedup();
+                    self.addresses.push(addresses);
+                }
                 let longest = self.longest.entry(exception).or_default();
                 if handler.addresses.len() > longest.len() {
                     *longest = handler.addresses;

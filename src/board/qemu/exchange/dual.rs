@@ -1,7 +1,7 @@
 //! The same for the ZS9.
 
-use super::{CONTROL_ANSWERS, IDLE_ANSWERS, PWM_ANSWERS, open_files, receive, send, tell_all};
-use crate::board::qemu::{DUAL_RECORDER, stop};
+use super::{CONTROL_ANSWERS, IDLE_ANSWERS, PWM_ANSWERS, open_files, receive, send, stand_still};
+use crate::board::qemu::{DUAL_RECORDER, saboteur, stop};
 use crate::board::{DualSample, PlayedPeriod, PowerSample};
 use crate::drive::dual::DualReport;
 use crate::link::{self, DualRequest, DualSetup};
@@ -23,11 +23,15 @@ pub fn sample_dual(now: Instant) -> DualSample {
     send(&DualRequest::ControlSample(now).to_block());
     let (sample, end) = link::dual_sample_from_block(&receive(CONTROL_ANSWERS));
     if end {
-        let records = (0..).map_while(|index| DUAL_RECORDER.read(index));
-        tell_all(records.map(|record| DualRequest::Recorded(record).to_block()));
+        stand_still();
+        saboteur::finish();
+        for record in (0..).map_while(|index| DUAL_RECORDER.read(index)) {
+            send(&DualRequest::Recorded(record).to_block());
+        }
         send(&DualRequest::End.to_block());
         stop(true);
     }
+    saboteur::sampled();
     sample
 }
 
@@ -35,7 +39,7 @@ pub fn sample_dual(now: Instant) -> DualSample {
 #[inline(never)]
 pub fn power_sample(now: Instant) -> PowerSample {
     send(&DualRequest::PowerSample(now).to_block());
-    link::power_from_block(&receive(PWM_ANSWERS))
+    link::power_from_block(&saboteur::completed(receive(PWM_ANSWERS)))
 }
 
 /// What was loaded into the shadow registers.
@@ -53,6 +57,7 @@ pub fn report_dual(now: Instant, report: &DualReport) {
 /// An order to turn all gates off.
 #[inline(never)]
 pub fn gates_off(now: Instant) {
+    saboteur::gates_off();
     send(&DualRequest::GatesOff(now).to_block());
 }
 
