@@ -1,6 +1,6 @@
 //! What stands in for the saboteur in every image that is not built with it: nothing.
 
-pub use super::{DUALTIMER as pwm, TIMER0 as control};
+pub(super) use super::{DUALTIMER as pwm, TIMER0 as control};
 use crate::link::Block;
 use crate::modulation::Mode;
 
