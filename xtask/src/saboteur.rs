@@ -1,6 +1,5 @@
 //! The images whose board loses and delays interrupts when it is told to, driven by the rig.
 
-use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -12,6 +11,9 @@ use crate::setup::Setup;
 
 /// The feature of the firmware's crate.
 pub const FEATURE: &str = "saboteur";
+
+/// The file that the image reads and writes.
+const FOUND: &str = "found";
 
 /// What it takes to run one.
 pub struct Saboteur {
@@ -27,8 +29,8 @@ pub struct Found {
     /// The fault's name as it came over the link; empty without one.
     pub fault: String,
     pub gates_off: Option<GatesOff>,
-    /// Mode and address of each instruction of the control interrupt that a PWM interrupt landed on.
-    pub landed: BTreeSet<(usize, u32)>,
+    /// Numbers of control interrupts and where in each of them a PWM interrupt landed.
+    pub landed: Vec<(usize, u32)>,
 }
 
 /// When the gates were turned off.
@@ -58,10 +60,18 @@ impl Saboteur {
         ["--qemu-arg=-append".to_owned(), format!("--qemu-arg={orders}")]
     }
 
+    /// Runs the scenario with the PWM interrupt landing where each control interrupt wants it.
+    pub fn land(&self, wanted: &[u16], options: &[&str], out: &Path) -> Result<Found> {
+        let bytes: Vec<u8> = wanted.iter().flat_map(|wanted| wanted.to_le_bytes()).collect();
+        std::fs::create_dir_all(out).with_context(|| out.display().to_string())?;
+        std::fs::write(out.join(FOUND), bytes)?;
+        self.run(("landing", 0, 0), options, out)
+    }
+
     /// Runs the scenario for `cargo xtask timing` with these options of the rig; its files go to `out`.
     pub fn run(&self, orders: (&str, u32, u32), options: &[&str], out: &Path) -> Result<Found> {
         std::fs::create_dir_all(out).with_context(|| out.display().to_string())?;
-        let found = out.join("found");
+        let found = out.join(FOUND);
         let scenario = if self.system == System::Traction { "timing" } else { "zs9-timing" };
         let (kind, at_ticks, amount) = orders;
         let mut rig = Command::new(&self.rig);
@@ -93,10 +103,10 @@ fn read(text: &str) -> Result<Found> {
                 let (loaded_ticks, after_ticks) = (number(loaded)?, number(after)?);
                 found.gates_off = Some(GatesOff { struck: number(struck)?, loaded_ticks, after_ticks });
             }
-            ["landed", mode, address] => {
+            ["landed", call, address] => {
                 let address =
                     u32::from_str_radix(address, 16).with_context(|| format!("the image says `{line}`"))?;
-                found.landed.insert((number(mode)? as usize, address));
+                found.landed.push((number(call)? as usize, address));
             }
             ["end"] => ended = true,
             _ => bail!("the image says `{line}`"),
@@ -132,7 +142,7 @@ mod tests {
         let found = read("struck 1 loaded 13889 safe-after 2588\nlanded 2 41c\nend\n").unwrap();
         let gates_off = GatesOff { struck: 1, loaded_ticks: 13_889, after_ticks: 2_588 };
         assert_eq!(found.gates_off, Some(gates_off));
-        assert_eq!(found.landed, BTreeSet::from([(2, 0x41C)]));
+        assert_eq!(found.landed, [(2, 0x41C)]);
         assert_eq!(read("end\n").unwrap(), Found::default());
         for text in ["", "landed 2 41c\n", "struck 1\nend\n", "landed 2 x\nend\n", "nonsense\nend\n"] {
             assert!(read(text).is_err(), "{text}");

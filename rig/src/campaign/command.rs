@@ -112,9 +112,13 @@ fn drive_healthy(minutes: f64, options: &CampaignOptions) -> Result<ExitCode> {
     let pieces = (minutes / PIECE_MIN).ceil() as u64;
     let piece_s = minutes * 60.0 / pieces as f64;
     let seeds: Vec<_> = (0..pieces).map(|piece| options.seed + piece).collect();
-    let systems = report::SYSTEMS.map(|(system, _)| system);
+    let mut systems = report::SYSTEMS.map(|(system, _)| system).to_vec();
+    systems.retain(|system| options.only.iter().all(|word| system.contains(word.as_str())));
+    if systems.is_empty() {
+        bail!("--only {}: no system has all of these words", options.only.join(" "));
+    }
     let rides: Vec<_> =
-        systems.into_iter().flat_map(|system| seeds.iter().map(move |seed| (system, *seed))).collect();
+        systems.iter().flat_map(|system| seeds.iter().map(move |seed| (*system, *seed))).collect();
     let ridden = rides.par_iter().map(|(system, seed)| {
         let driven = match *system {
             "zs9" => healthy::dual::drive(&dual, piece_s, *seed)?.into(),
@@ -124,9 +128,9 @@ fn drive_healthy(minutes: f64, options: &CampaignOptions) -> Result<ExitCode> {
     });
     let ridden: Vec<(&str, u64, healthy::Driven)> = ridden.collect::<Result<_>>()?;
     let mut good = true;
-    for system in systems {
+    for system in &systems {
         let (mut trips, mut current_a, mut udc_v) = (0, 0.0_f64, 0.0_f64);
-        for (_, seed, driven) in ridden.iter().filter(|(of, _, _)| *of == system) {
+        for (_, seed, driven) in ridden.iter().filter(|(of, _, _)| of == system) {
             current_a = current_a.max(driven.peaks.current_a);
             udc_v = udc_v.max(driven.peaks.udc_v);
             if let Some(tripped) = &driven.tripped {

@@ -92,7 +92,6 @@ pub fn pwm_sample(now: Instant) -> Abc {
 /// What was loaded into the shadow registers.
 #[inline(never)]
 pub fn play(now: Instant, next: &CarrierPeriod) {
-    saboteur::playing(next.mode);
     send(&Request::Play(now, *next).to_block());
 }
 

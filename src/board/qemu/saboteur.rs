@@ -8,10 +8,9 @@
 use super::exchange::file::File;
 use super::{Control, DUALTIMER, Interrupt, PWM_TIMER, Pwm, TIMER0, read_register, write_register};
 use crate::link::{BLOCK_WORDS, Block};
-use crate::modulation::Mode;
 use crate::time::Instant;
 use core::fmt::Write;
-use core::sync::atomic::{AtomicBool, AtomicU32, Ordering::Relaxed};
+use core::sync::atomic::{AtomicBool, AtomicU16, AtomicU32, Ordering::Relaxed};
 use cortex_m::peripheral::NVIC;
 
 /// What is done to the interrupts.
@@ -28,7 +27,7 @@ enum Kind {
     PwmLate,
     /// `amount` PWM ticks pass without their interrupt: the shadow registers are played once more.
     PwmLost,
-    /// Control waits so that the PWM interrupt lands somewhere in it; `amount` seeds the choice.
+    /// Control waits so that the PWM interrupt lands in it where the file wants it that then takes what came of it.
     Landing,
 }
 
@@ -52,20 +51,19 @@ static STRUCK_AT: AtomicU32 = AtomicU32::new(0);
 /// Length of the half, or of the ZS9's carrier period, that the PWM timer would play next then.
 static LOADED: AtomicU32 = AtomicU32::new(0);
 static SAFE: AtomicBool = AtomicBool::new(false);
-/// Where the state of the pseudo-random numbers is kept.
-static RANDOM: AtomicU32 = AtomicU32::new(0);
-/// Mode of the newest half, which the control interrupt works for.
-static MODE: AtomicU32 = AtomicU32::new(0);
 /// What the ZS9's gates have shown since the PWM interrupt last asked, beyond what the rig will tell it.
 static LATCHED: AtomicU32 = AtomicU32::new(0);
 /// The word of a power sample that tells the gates.
 const GATES: usize = 8;
-/// For each mode a bit for each half-word of code in the control interrupt that a PWM interrupt landed on.
-static LANDED: [[AtomicU32; LANDED_WORDS]; MODES] =
-    [const { [const { AtomicU32::new(0) }; LANDED_WORDS] }; MODES];
-/// For 64 KiB of code.
-const LANDED_WORDS: usize = 1024;
-const MODES: usize = 7;
+/// Number of the present control interrupt, from 0.
+static CALL: AtomicU32 = AtomicU32::new(0);
+/// For each control interrupt, how many instructions later the PWM interrupt is to land in it: counted from its samples on, or with
+/// [`AT_ENTRY`] from its entry; `u16::MAX`: anywhere.
+static WANTED: [AtomicU16; CALLS] = [const { AtomicU16::new(u16::MAX) }; CALLS];
+const AT_ENTRY: u16 = 1 << 15;
+/// For each control interrupt, where one landed in it; 0: none did.
+static LANDED: [AtomicU32; CALLS] = [const { AtomicU32::new(0) }; CALLS];
+const CALLS: usize = 8_192;
 /// The newest half, as it went to the rig.
 static PLAYED: [AtomicU32; BLOCK_WORDS] = [const { AtomicU32::new(0) }; BLOCK_WORDS];
 static FOUND: File = File::closed();
@@ -87,11 +85,13 @@ pub fn connect() {
         return;
     };
     let Some((_, kind)) = KINDS.iter().find(|(name, _)| *name == kind) else { return };
-    FOUND.create(file);
     KIND.store(*kind as u32, Relaxed);
     AT.store(at.parse().unwrap_or(0), Relaxed);
     AMOUNT.store(amount.parse().unwrap_or(0), Relaxed);
-    RANDOM.store(amount.parse().unwrap_or(0), Relaxed);
+    if is(Kind::Landing) {
+        super::exchange::file::read_half_words(file, &WANTED);
+    }
+    FOUND.create(file);
 }
 
 /// Starts the counter of real time; call it with the timers.
@@ -136,10 +136,10 @@ pub unsafe extern "C" fn control() {
         Control.acknowledge();
         return;
     }
-    // Longer would count as a lost control tick.
-    wait_for_boundary(MOST_BEFORE_TICKS);
+    wait_for_boundary(true);
     // SAFETY: called as the vector table would have it.
     unsafe { TIMER0() }
+    CALL.store(CALL.load(Relaxed) + 1, Relaxed);
 }
 
 /// The vector table's entry for PWM: hands on the exception frame, which begins where the stack pointer is.
@@ -196,34 +196,41 @@ fn land(frame: &[u32; 8]) {
     if status & 0x1FF != CONTROL {
         return;
     }
-    let half_word = address / 2;
-    let landed = LANDED.get(MODE.load(Relaxed) as usize).and_then(|words| words.get(half_word as usize / 32));
-    if let Some(word) = landed {
-        word.store(word.load(Relaxed) | 1 << (half_word % 32), Relaxed);
+    if let Some(landed) = LANDED.get(CALL.load(Relaxed) as usize) {
+        landed.store(address, Relaxed);
     }
 }
 
 /// Ticks before a boundary from which on control waits at its entry, and behind its samples: it must still end in time.
 const MOST_BEFORE_TICKS: u32 = 140;
 const MOST_SAMPLED_TICKS: u32 = 1_600;
-/// How long the control interrupt takes from there on, in ticks, without the exchange at its end.
-const LENGTH_TICKS: u32 = 480;
+/// A tick is five instructions.
+const INSTRUCTIONS_PER_TICK: u32 = 5;
 
-/// Waits until the next carrier boundary is a pseudo-random time ahead, if it is near enough.
-fn wait_for_boundary(most_ticks: u32) {
-    if !is(Kind::Landing) {
+/// Waits until the next carrier boundary is as far ahead as the present control interrupt wants it, if it is near enough.
+fn wait_for_boundary(at_entry: bool) {
+    let most_ticks = if at_entry { MOST_BEFORE_TICKS } else { MOST_SAMPLED_TICKS };
+    let wanted = WANTED.get(CALL.load(Relaxed) as usize).map_or(u16::MAX, |wanted| wanted.load(Relaxed));
+    if !is(Kind::Landing) || wanted == u16::MAX || (wanted & AT_ENTRY != 0) != at_entry {
         return;
     }
-    let random = RANDOM.load(Relaxed).wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-    RANDOM.store(random, Relaxed);
+    let wanted = u32::from(wanted & !AT_ENTRY);
     let left = || read_register(PWM_TIMER + 4);
-    let wanted = (random >> 8) % if most_ticks < LENGTH_TICKS { most_ticks } else { LENGTH_TICKS };
-    if left() < most_ticks {
-        while left() > wanted && left() < most_ticks {}
-        // A tick is five instructions.
-        for _ in 0..random >> 30 {
-            cortex_m::asm::nop();
+    let mut last = left();
+    if last >= most_ticks {
+        return;
+    }
+    loop {
+        let now = left();
+        // Once the boundary is past it is too late.
+        if now <= wanted / INSTRUCTIONS_PER_TICK || now > last {
+            break;
         }
+        last = now;
+    }
+    // What is left of a tick has passed before what is wanted.
+    for _ in 0..INSTRUCTIONS_PER_TICK - 1 - wanted % INSTRUCTIONS_PER_TICK {
+        cortex_m::asm::nop();
     }
 }
 
@@ -233,12 +240,7 @@ pub fn sampled() {
         let begun = now();
         while now().wrapping_sub(begun) < AMOUNT.load(Relaxed) {}
     }
-    wait_for_boundary(MOST_SAMPLED_TICKS);
-}
-
-/// A half of this mode was loaded.
-pub fn playing(mode: Mode) {
-    MODE.store(mode as u32, Relaxed);
+    wait_for_boundary(false);
 }
 
 /// A block went to the rig.
@@ -280,11 +282,10 @@ pub fn gates_off() {
 /// The run is over.
 pub fn finish() {
     cortex_m::interrupt::disable();
-    for (mode, words) in LANDED.iter().enumerate() {
-        for (index, word) in words.iter().enumerate() {
-            for bit in (0..32).filter(|bit| word.load(Relaxed) >> bit & 1 == 1) {
-                let _ = writeln!(&FOUND, "landed {} {:x}", mode, (index * 32 + bit) * 2);
-            }
+    for (call, landed) in LANDED.iter().enumerate() {
+        let address = landed.load(Relaxed);
+        if address != 0 {
+            let _ = writeln!(&FOUND, "landed {call} {address:x}");
         }
     }
     let _ = writeln!(&FOUND, "end");

@@ -2,7 +2,6 @@
 
 pub(super) use super::{DUALTIMER as pwm, TIMER0 as control};
 use crate::link::Block;
-use crate::modulation::Mode;
 
 #[inline(always)]
 pub fn connect() {}
@@ -12,9 +11,6 @@ pub fn start() {}
 
 #[inline(always)]
 pub fn sampled() {}
-
-#[inline(always)]
-pub fn playing(_mode: Mode) {}
 
 #[inline(always)]
 pub fn sent(_block: &Block) {}

@@ -15,7 +15,7 @@ mod cost;
 pub mod drive;
 mod kept;
 mod log;
-mod meter;
+pub mod meter;
 mod parts;
 mod profile;
 mod report;

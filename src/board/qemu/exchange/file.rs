@@ -1,6 +1,6 @@
 //! A file of this machine's, and the emulator's command line.
 
-use core::sync::atomic::{AtomicU32, Ordering};
+use core::sync::atomic::{AtomicU16, AtomicU32, Ordering};
 use cortex_m_semihosting::syscall;
 
 /// A file to write into.
@@ -15,12 +15,7 @@ impl File {
     /// Creates it under this path.
     pub fn create(&self, path: &str) {
         const WRITE: usize = 5;
-        let mut name = [0; 256];
-        let Some(room) = name.get_mut(..path.len()).filter(|_| path.len() < 256) else { return };
-        room.copy_from_slice(path.as_bytes());
-        // SAFETY: SYS_OPEN reads a NUL-terminated name of the given length; the last byte is still 0.
-        let handle = unsafe { syscall!(OPEN, name.as_ptr(), WRITE, path.len()) };
-        self.0.store(handle as u32, Ordering::Relaxed);
+        self.0.store(open(path, WRITE), Ordering::Relaxed);
     }
 }
 
@@ -32,6 +27,26 @@ impl core::fmt::Write for &File {
             unsafe { syscall!(WRITE, handle, text.as_ptr(), text.len()) };
         }
         Ok(())
+    }
+}
+
+/// The handle of a file; `u32::MAX` where there is none.
+fn open(path: &str, mode: usize) -> u32 {
+    let mut name = [0; 256];
+    let Some(room) = name.get_mut(..path.len()).filter(|_| path.len() < 256) else { return u32::MAX };
+    room.copy_from_slice(path.as_bytes());
+    // SAFETY: SYS_OPEN reads a NUL-terminated name of the given length; the last byte is still 0.
+    unsafe { syscall!(OPEN, name.as_ptr(), mode, path.len()) as u32 }
+}
+
+/// What a file holds, in half-words, as far as there is room.
+pub fn read_half_words(path: &str, room: &[AtomicU16]) {
+    const READ: usize = 1;
+    let handle = open(path, READ);
+    if handle != u32::MAX {
+        // SAFETY: SYS_READ writes at most as many bytes as there is room for, and atomics may be written by way of a shared reference;
+        // no interrupt is unmasked yet.
+        unsafe { syscall!(READ, handle, room.as_ptr(), size_of_val(room)) };
     }
 }
 
