@@ -399,10 +399,13 @@ fn messages_arrive_as_they_were_sent() {
     assert_eq!(DualReport::from_words(report.to_words()), report);
 }
 
+/// What a test does to both interrupts' samples.
+type Spoiled = (fn(&mut DualSample), fn(&mut PowerSample));
+
 /// One fault stops both motors; an acknowledge with its cause gone lets both go on, with its cause there trips anew.
 #[test]
 fn a_fault_is_left_by_an_acknowledge_of_both_interrupts() {
-    let cases: [(fn(&mut DualSample), fn(&mut PowerSample)); 2] = [
+    let cases: [Spoiled; 2] = [
         (|sample| sample.currents_a[1].a = 150.0, |_| {}),
         (|_| {}, |sample| sample.currents_a[0].b = 150.0),
     ];
