@@ -14,15 +14,15 @@ use crate::control::{Demand, LinkWindow, Measurements};
 use crate::drive::{Report, half_from_words, half_to_words};
 use crate::frames::{Abc, Angle};
 use crate::modulation::CarrierPeriod;
-use crate::operator::{self, Feedback, Status};
+use crate::operator::{self, Feedback, Status, Told};
 use crate::protection::{Fault, SafeState};
 use crate::protocol::Frame;
 use crate::recorder::Record;
 use crate::time::Instant;
 
 pub use dual::{
-    DualRequest, DualSetup, dual_sample_from_block, dual_sample_to_block, dual_setup_from_block,
-    dual_setup_to_block, power_from_block, power_to_block,
+    DualRequest, DualSetup, dual_asked_from_block, dual_asked_to_block, dual_sample_from_block,
+    dual_sample_to_block, dual_setup_from_block, dual_setup_to_block, power_from_block, power_to_block,
 };
 
 /// Words in a block.
@@ -139,10 +139,8 @@ impl Request {
             10 => Self::Leave(at),
             11 => Self::Ask(at),
             12 => {
-                let [a, b, c, d, e, f, g, h, frame @ ..] = payload;
-                let [head, low, high, ..] = frame;
-                let status = Status::from_words([a, b, c, d, e, f, g, h])?;
-                Self::Tell(at, status, Option::from_words([head, low, high]))
+                let (status, frame) = told_from_words(payload)?;
+                Self::Tell(at, status, frame)
             }
             _ => return None,
         })
@@ -153,26 +151,38 @@ impl Request {
 pub fn setup_to_block(setup: Setup) -> Block {
     let mut block = [0; BLOCK_WORDS];
     [block[0], block[1], block[2]] = [setup.min_pulse_ticks, setup.dead_time_ticks, setup.pwm_delay_ticks];
-    if let Some(LineTimes { precharge_s, discharge_s }) = setup.line {
-        [block[3], block[4], block[5]] = [1, precharge_s.to_bits(), discharge_s.to_bits()];
-    }
+    [block[3], block[4], block[5]] = line_to_words(setup.line);
     block[6] = setup.over_protocol.into();
     block
 }
 
+fn line_to_words(line: Option<LineTimes>) -> [u32; 3] {
+    line.map_or([0; 3], |times| [1, times.precharge_s.to_bits(), times.discharge_s.to_bits()])
+}
+
+fn line_from_words([present, precharge, discharge]: [u32; 3]) -> Option<LineTimes> {
+    let times = LineTimes { precharge_s: f32::from_bits(precharge), discharge_s: f32::from_bits(discharge) };
+    (present == 1).then_some(times)
+}
+
 /// A status and a frame, one after the other.
-fn told_to_words(status: &Status, frame: Option<Frame>) -> [u32; 11] {
-    let [a, b, c, d, e, f, g, h] = status.to_words();
+fn told_to_words<T: Told>(status: &Status<T>, frame: Option<Frame>) -> [u32; 12] {
+    let [a, b, c, d, e, f, g, h, i] = status.to_words();
     let [head, low, high] = frame.to_words();
-    [a, b, c, d, e, f, g, h, head, low, high]
+    [a, b, c, d, e, f, g, h, i, head, low, high]
+}
+
+/// The inverse of [`told_to_words`].
+fn told_from_words<T: Told>(words: [u32; 14]) -> Option<(Status<T>, Option<Frame>)> {
+    let [a, b, c, d, e, f, g, h, i, head, low, high, ..] = words;
+    Some((Status::from_words([a, b, c, d, e, f, g, h, i])?, Option::from_words([head, low, high])))
 }
 
 /// The inverse of [`setup_to_block`].
 pub fn setup_from_block(block: &Block) -> Setup {
     let [min_pulse_ticks, dead_time_ticks, pwm_delay_ticks, operated, precharge, discharge, frames, ..] =
         *block;
-    let times = LineTimes { precharge_s: f32::from_bits(precharge), discharge_s: f32::from_bits(discharge) };
-    let line = (operated == 1).then_some(times);
+    let line = line_from_words([operated, precharge, discharge]);
     Setup { min_pulse_ticks, dead_time_ticks, pwm_delay_ticks, line, over_protocol: frames != 0 }
 }
 

@@ -1,7 +1,8 @@
 //! The ZS9's two tasks by themselves: faults, words, and what they play when the measurements make no sense.
 
 use tractive::board::{
-    DualControlPort, DualPwmPort, DualSample, GateFeedback, MotorDemand, PlayedPeriod, PowerSample,
+    DualControlPort, DualPwmPort, DualSample, GateFeedback, HardwareBreak, MotorDemand, PlayedPeriod,
+    PowerSample,
 };
 use tractive::cell::Words;
 use tractive::control::Demand;
@@ -13,6 +14,7 @@ use tractive::frames::{Abc, Angle, Dq};
 use tractive::machine::zs9::BUILT_IN;
 use tractive::nine_switch::{LegState, Scheme};
 use tractive::protection::{Fault, SafeState, Trip};
+use tractive::recorder::DualRecorder;
 use tractive::time::{Clock, Instant};
 
 const CLOCK: Clock = Clock::new(25_000_000, 2_500);
@@ -31,6 +33,10 @@ struct Fake {
     next: PlayedPeriod,
     before: PlayedPeriod,
     report: DualReport,
+    acknowledge: u8,
+    /// How often the gates were let go, and whether something holds them.
+    left: u32,
+    held: bool,
 }
 
 impl Fake {
@@ -45,6 +51,9 @@ impl Fake {
             next: off,
             before: off,
             report: DualReport::default(),
+            acknowledge: 0,
+            left: 0,
+            held: false,
         }
     }
 
@@ -87,6 +96,9 @@ impl DualControlPort for Fake {
             link_ref_v: 667.0,
             scheme: Scheme::Rthd,
             enable: true,
+            speed_torque_nm: DualSample::UNLIMITED_NM,
+            acknowledge: self.acknowledge,
+            hardware: None,
         };
         (self.spoil)(&mut sample);
         sample
@@ -126,11 +138,16 @@ impl DualPwmPort for Fake {
     fn gates_off(&mut self, now: Instant) {
         self.off_at = self.off_at.or(Some(now));
     }
+
+    fn leave(&mut self, _now: Instant) -> bool {
+        self.left += 1;
+        !self.held
+    }
 }
 
 struct Drive {
     fake: Fake,
-    shared: Shared,
+    shared: Shared<'static>,
     control: ControlTask,
     pwm: PwmTask,
 }
@@ -356,11 +373,12 @@ fn messages_arrive_as_they_were_sent() {
         duty: 0.2,
         scheme: Scheme::RthdSlide,
         gates: Gates::Pulse,
+        acknowledge: 200,
     };
     assert_eq!(DualCommand::from_words(command.to_words()), command);
     let share = MotorShare { depth: 0.4, angle: Angle(6) };
     for next in [None, Some([share, MotorShare { depth: 0.3, ..share }])] {
-        let applied = DualApplied { at: Instant(3), next, trip: Some(trip) };
+        let applied = DualApplied { at: Instant(3), next, trip: Some(trip), acknowledged: 7 };
         assert_eq!(DualApplied::from_words(applied.to_words()), applied);
     }
     let report = DualReport {
@@ -369,8 +387,98 @@ fn messages_arrive_as_they_were_sent() {
         weakening: [true, false],
         duty: 0.25,
         inductor_ref_a: -4.0,
-        scheme: Scheme::S,
+        scheme: Scheme::RthdSlide,
         trip: Some(trip),
+        omega: [100.0, -200.0],
+        current_a: [56.0, 20.0],
+        capacitor_v: 533.0,
+        source_v: 400.0,
+        speed_known: true,
+        acknowledged: 9,
     };
     assert_eq!(DualReport::from_words(report.to_words()), report);
+}
+
+/// What a test does to both interrupts' samples.
+type Spoiled = (fn(&mut DualSample), fn(&mut PowerSample));
+
+/// One fault stops both motors; an acknowledge with its cause gone lets both go on, with its cause there trips anew.
+#[test]
+fn a_fault_is_left_by_an_acknowledge_of_both_interrupts() {
+    let cases: [Spoiled; 2] = [
+        (|sample| sample.currents_a[1].a = 150.0, |_| {}),
+        (|_| {}, |sample| sample.currents_a[0].b = 150.0),
+    ];
+    for (spoil, spoil_power) in cases {
+        let mut drive = Drive::pulsing();
+        (drive.fake.spoil, drive.fake.spoil_power) = (spoil, spoil_power);
+        let trip = drive.trips(Fault::Overcurrent);
+        assert_eq!(drive.fake.left, 0);
+        // The cause is there again: the acknowledge is carried out, and a fault of its own is found.
+        (drive.fake.spoil, drive.fake.spoil_power) = (spoil, spoil_power);
+        drive.fake.acknowledge = 1;
+        drive.run(10);
+        let again = drive.fake.report.trip.expect("again");
+        assert_eq!((again.fault, drive.fake.report.acknowledged), (Fault::Overcurrent, 1));
+        assert!(again.at.since(trip.at) > 0 && drive.is_off());
+        // Gone.
+        drive.fake.spoil = |_| {};
+        drive.fake.spoil_power = |_| {};
+        drive.run(5);
+        drive.fake.acknowledge = 2;
+        drive.run(10);
+        assert_eq!(
+            (drive.fake.report.trip, drive.pwm.trip(), drive.fake.report.acknowledged),
+            (None, None, 2)
+        );
+        assert_eq!(drive.fake.left, 2);
+        assert!(!drive.is_off(), "pulses again");
+    }
+}
+
+#[test]
+fn gates_that_are_held_are_a_fault() {
+    let mut drive = Drive::pulsing();
+    drive.fake.spoil = |sample| sample.currents_a[1].a = 150.0;
+    drive.trips(Fault::Overcurrent);
+    (drive.fake.held, drive.fake.acknowledge) = (true, 1);
+    drive.run(10);
+    assert_eq!(drive.fake.report.trip.map(|trip| trip.fault), Some(Fault::GatesHeld));
+    assert!(drive.is_off());
+}
+
+#[test]
+fn a_break_in_hardware_has_its_name_and_where_it_was_seen() {
+    let mut drive = Drive::pulsing();
+    drive.fake.spoil = |sample| {
+        sample.hardware = Some(HardwareBreak { fault: Fault::HardwareOvercurrent, seen: 0b1010 });
+    };
+    assert_eq!(drive.trips(Fault::HardwareOvercurrent).value, 10.0);
+}
+
+#[test]
+fn the_flight_recorder_keeps_what_led_to_a_fault() {
+    let recorder = DualRecorder::new();
+    let shared = Shared::recorded_by(&recorder);
+    let (mut fake, mut control) = (Fake::new(), ControlTask::new(&BUILT_IN, SETTINGS));
+    let mut pwm = PwmTask::new(&BUILT_IN, SETTINGS);
+    let mut faulty_at = None;
+    for period in 0..700 {
+        if period == 600 {
+            fake.spoil = |sample| sample.currents_a[1].c = -150.0;
+            faulty_at = Some(control.next_call());
+            assert!(!recorder.is_frozen());
+        }
+        pwm.run(&mut fake, &shared);
+        control.run(&mut fake, &shared);
+    }
+    let records: Vec<_> = (0..).map_while(|index| recorder.read(index)).collect();
+    assert_eq!(records.len(), 256);
+    let first = records.iter().position(|record| record.state.fault.is_some()).unwrap();
+    assert_eq!((first, Some(records[first].at)), (256 - 32, faulty_at));
+    let (before, faulty) = (&records[first - 1], &records[first]);
+    assert_eq!((faulty.state.fault, faulty.currents_a[1].c), (Some(Fault::Overcurrent), -150.0));
+    assert!(before.state.pulsing && !faulty.state.pulsing && before.duty > 0.15);
+    assert_eq!(before.link_v(), 667.0);
+    assert!(before.torque_nm.iter().all(|torque_nm| (torque_nm - 50.0).abs() < 1.0), "{before:?}");
 }

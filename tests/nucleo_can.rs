@@ -49,7 +49,7 @@ impl Bench {
 
     fn configured() -> Self {
         let bench = Self::new();
-        bench.can.configure(&bench.rcc, &mut Once).unwrap();
+        bench.can.configure(&TO_DRIVE, &bench.rcc, &mut Once).unwrap();
         bench
     }
 
@@ -234,5 +234,19 @@ fn a_bus_off_is_left_after_a_pause_and_counted_once() {
 #[test]
 fn a_controller_that_does_not_answer_is_named() {
     let bench = Bench::new();
-    assert_eq!(bench.can.configure(&bench.rcc, &mut Never), Err(StartError::Can));
+    assert_eq!(bench.can.configure(&TO_DRIVE, &bench.rcc, &mut Never), Err(StartError::Can));
+}
+
+#[test]
+fn the_zs9s_messages_pass_and_no_others() {
+    use tractive::protocol::TO_ZS9;
+    let bench = Bench::new();
+    bench.can.configure(&TO_ZS9, &bench.rcc, &mut Once).unwrap();
+    // Five identifiers: three filters, the last of which has one twice.
+    let filters: Vec<_> = (0..3).map(|index| bench.memory(index)).collect();
+    for id in 0..0x800_u16 {
+        let passes =
+            filters.iter().any(|filter| [filter >> 16 & 0x7FF, filter & 0x7FF].contains(&u32::from(id)));
+        assert_eq!(passes, TO_ZS9.iter().any(|message| message.id == id), "{id:#05X}");
+    }
 }

@@ -117,6 +117,9 @@ impl DualControlPort for Board {
             link_ref_v: 667.0,
             scheme: Scheme::Rthd,
             enable: true,
+            speed_torque_nm: DualSample::UNLIMITED_NM,
+            acknowledge: 0,
+            hardware: None,
         }
     }
 

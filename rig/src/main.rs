@@ -221,7 +221,9 @@ fn out(name: &str, options: &RunOptions) -> Result<PathBuf> {
 /// The commands of a script, for the help.
 fn talk_help() -> String {
     let commands: Vec<_> = talk::script::COMMANDS.iter().map(|usage| format!("  {usage}")).collect();
-    format!("A line is [SECONDS] COMMAND; # begins a comment:\n{}", commands.join("\n"))
+    let zs9: Vec<_> = talk::script::ZS9_COMMANDS.iter().map(|usage| format!("  {usage}")).collect();
+    let [commands, zs9] = [commands, zs9].map(|lines| lines.join("\n"));
+    format!("A line is [SECONDS] COMMAND; # begins a comment:\n{commands}\nWith --system zs9:\n{zs9}")
 }
 
 fn run_talk(options: &talk::TalkOptions) -> Result<ExitCode> {

@@ -7,7 +7,11 @@ use anyhow::{Result, anyhow};
 use plotters::prelude::*;
 use serde_json::Value;
 use std::fmt::Write as _;
+use tractive::protection::Fault;
 use tractive::recorder::Record;
+
+/// What is drawn of a flight recorder's records: title, unit, and each curve's name and value.
+pub type Panel<'a, R> = (&'a str, &'a str, &'a [(&'static str, fn(&R) -> f32)]);
 
 /// Size of a plot, in pixels.
 const SIZE: (u32, u32) = (1000, 280);
@@ -149,34 +153,45 @@ impl Page {
 
     /// What the drive's flight recorder holds of a fault; nothing if there was none.
     pub fn recorder(&mut self, recording: &Recording) {
-        let recorded = &recording.recorded;
-        let Some((t_s, fault)) = recorded.iter().find_map(|(t_s, record)| Some((*t_s, record.state.fault?)))
+        self.recorded(
+            &recording.recorded,
+            |record| record.state.fault,
+            &[
+                (
+                    "phase currents as sampled",
+                    "A",
+                    &[
+                        ("ia", |record: &Record| record.currents_a.a),
+                        ("ib", |record| record.currents_a.b),
+                        ("ic", |record| record.currents_a.c),
+                    ],
+                ),
+                ("current references", "A", &[("id", |record| record.id_a), ("iq", |record| record.iq_a)]),
+                (
+                    "DC link as sampled and commanded voltage",
+                    "V",
+                    &[("udc", |record| record.udc_v), ("u", |record| record.voltage_v)],
+                ),
+            ],
+        );
+    }
+
+    /// Panels of what a flight recorder holds, each with its unit and its curves; nothing without a fault.
+    pub fn recorded<R>(
+        &mut self,
+        recorded: &[(f64, R)],
+        fault: fn(&R) -> Option<Fault>,
+        panels: &[Panel<R>],
+    ) {
+        let Some((t_s, fault)) = recorded.iter().find_map(|(t_s, record)| Some((*t_s, fault(record)?)))
         else {
             return;
         };
-        type Recorded = (&'static str, fn(&Record) -> f32);
-        let panels: [(&str, &str, &[Recorded]); 3] = [
-            (
-                "phase currents as sampled",
-                "A",
-                &[
-                    ("ia", |record| record.currents_a.a),
-                    ("ib", |record| record.currents_a.b),
-                    ("ic", |record| record.currents_a.c),
-                ],
-            ),
-            ("current references", "A", &[("id", |record| record.id_a), ("iq", |record| record.iq_a)]),
-            (
-                "DC link as sampled and commanded voltage",
-                "V",
-                &[("udc", |record| record.udc_v), ("u", |record| record.voltage_v)],
-            ),
-        ];
         for (what, unit, curves) in panels {
             let series: Vec<_> = curves
                 .iter()
                 .map(|(name, value)| {
-                    let of = |(at_s, record): &(f64, Record)| (1e3 * (at_s - t_s), f64::from(value(record)));
+                    let of = |(at_s, record): &(f64, R)| (1e3 * (at_s - t_s), f64::from(value(record)));
                     // What is not finite may be the fault itself, and cannot be drawn.
                     let points = recorded.iter().map(of).filter(|(_, value)| value.is_finite()).collect();
                     (*name, points)

@@ -205,12 +205,7 @@ impl Recording {
     /// Writes recorder.csv, if a fault has frozen the flight recorder; else takes away what an earlier run has left.
     pub fn write_recorder(&self, path: &Path) -> Result<()> {
         if self.recorded.is_empty() {
-            return match std::fs::remove_file(path) {
-                Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
-                    Err(error).with_context(|| path.display().to_string())
-                }
-                _ => Ok(()),
-            };
+            return forget(path);
         }
         write_whole(path, |out| {
             out.write_record([
@@ -265,6 +260,16 @@ impl Recording {
             }
             Ok(())
         })
+    }
+}
+
+/// Takes away a file that an earlier run has left.
+pub(crate) fn forget(path: &Path) -> Result<()> {
+    match std::fs::remove_file(path) {
+        Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+            Err(error).with_context(|| path.display().to_string())
+        }
+        _ => Ok(()),
     }
 }
 

@@ -163,3 +163,72 @@ fn a_bad_script_is_named_with_exit_code_2_and_leaves_nothing() {
     );
     assert!(!out.exists());
 }
+
+fn talk_zs9(name: &str, out: &Path, more: &[&str]) -> Output {
+    let mut command = rig();
+    command.args(["--system", "zs9"]).arg(script(name)).arg("--out").arg(out).args(more);
+    command.output().unwrap()
+}
+
+#[test]
+fn both_motors_of_the_zs9_go_to_their_speeds_and_back() {
+    let out = tempfile::tempdir().unwrap();
+    let output = talk_zs9("zs9.talk", out.path(), &[]);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let trace = out.path().join("trace.csv");
+    let extreme = |column, of: fn(f64, f64) -> f64| numbers(&trace, column).into_iter().fold(0.0, of);
+    assert!((998.0..1_010.0).contains(&extreme("speed1_rpm", f64::max)));
+    assert!((-710.0..-698.0).contains(&extreme("speed2_rpm", f64::min)));
+    for column in ["speed1_rpm", "speed2_rpm"] {
+        assert!(numbers(&trace, column).last().unwrap().abs() < 2.0);
+    }
+    let telemetry = rows(&out.path().join("telemetry.csv"));
+    let mut states: Vec<_> = telemetry.iter().map(|row| row["state"].as_str()).collect();
+    states.dedup();
+    assert!(
+        states.windows(4).any(|four| four == ["precharge", "charged", "enabled", "running"]),
+        "{states:?}"
+    );
+    assert_eq!(states.last().copied(), Some("ready"));
+    // What control measures is what is there.
+    let trace = rows(&trace);
+    for told in telemetry.iter().filter(|row| !row["speed1_rpm"].is_empty()).step_by(37) {
+        let t_s: f64 = told["t_s"].parse().unwrap();
+        for (column, most) in [("speed1_rpm", 25.0), ("speed2_rpm", 25.0)] {
+            let [told, really]: [f64; 2] =
+                [told, &trace[(t_s * 1e3) as usize]].map(|row| row[column].parse().unwrap());
+            assert!((told - really).abs() < most, "{t_s} {column}: {told} {really}");
+        }
+    }
+    assert!(!out.path().join("recorder.csv").exists());
+    let report = std::fs::read_to_string(out.path().join("report.html")).unwrap();
+    assert!(report.contains("Speeds") && report.contains("Shoot-through duty"));
+}
+
+#[test]
+fn the_zs9_rejects_hostile_frames_and_silence_ends_it() {
+    let out = tempfile::tempdir().unwrap();
+    let output = talk_zs9("zs9-hostile.talk", out.path(), &[]);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    for row in rows(&out.path().join("trace.csv")) {
+        let [t_s, te1, te2] = ["t_s", "te1_nm", "te2_nm"].map(|name| row[name].parse::<f64>().unwrap());
+        // No torque while nobody spoke.
+        if (3.25..3.3).contains(&t_s) || (4.8..5.2).contains(&t_s) {
+            assert!(te1.abs() < 2.0 && te2.abs() < 2.0, "{t_s}: {te1} {te2}");
+        }
+    }
+}
+
+#[test]
+fn a_fault_stops_both_motors_and_is_acknowledged() {
+    let out = tempfile::tempdir().unwrap();
+    let output = talk_zs9("zs9-fault.talk", out.path(), &["--inject", "gate-driver@2.6"]);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let recorder = rows(&out.path().join("recorder.csv"));
+    assert_eq!(recorder.len(), 256);
+    let first = recorder.iter().position(|row| row["fault"] == "gate_driver").unwrap();
+    assert_eq!(first, 224);
+    let at_s: f64 = recorder[first]["t_s"].parse().unwrap();
+    assert!((2.6..2.6002).contains(&at_s), "{at_s}");
+    assert_eq!((recorder[first - 1]["pulsing"].as_str(), recorder[first]["pulsing"].as_str()), ("1", "0"));
+}

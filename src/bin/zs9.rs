@@ -19,9 +19,14 @@ mod firmware {
     use cortex_m_rt::{entry, exception, interrupt};
     use tractive::board::qemu::{self, CLOCK, Interrupt as interrupt};
     use tractive::drive::dual::{ControlTask, PwmTask, Settings, Shared};
+    use tractive::machine::Ratings;
     use tractive::machine::zs9::{BUILT_IN, BuiltIn};
+    use tractive::operator::{self, DualSlot, Line, slot_s};
+    use tractive::protocol::Zs9Station;
 
-    static SHARED: Shared = Shared::new();
+    static SHARED: Shared = Shared::recorded_by(&qemu::DUAL_RECORDER);
+    /// As the operator looks at them.
+    static RATINGS: Ratings = Settings::new(CLOCK, CLOCK.control_ticks).operator_ratings(&BUILT_IN.ratings);
     static CARRIER_TICKS: AtomicU32 = AtomicU32::new(0);
 
     fn settings() -> Settings {
@@ -37,8 +42,17 @@ mod firmware {
         if let Err(refused) = constants.and_then(|()| settings().check_carrier()) {
             qemu::refuse(&refused);
         }
+        let line = setup
+            .line
+            .map(|times| Line::rated(&RATINGS, times.precharge_s, times.discharge_s).without_chopper());
+        let rated = operator::Settings::rated(&RATINGS, slot_s(&CLOCK), line);
+        let (mut slot, mut idle) = (DualSlot::new(), qemu::DualIdle { station: Zs9Station::new(&RATINGS) });
         qemu::start_dual(&settings());
         loop {
+            if line.is_some() {
+                let settings = idle.station.settings(&rated);
+                slot.run(&qemu::DUAL_DESK, &mut idle, &settings, &CLOCK);
+            }
             qemu::idle();
         }
     }

@@ -4,6 +4,7 @@ use crate::control::Demand;
 use crate::drive::dual::DualReport;
 use crate::frames::{Abc, Angle};
 use crate::nine_switch::{GateTicks, Scheme};
+use crate::protection::Fault;
 use crate::time::Instant;
 
 /// What one motor is to do.
@@ -36,6 +37,26 @@ pub struct DualSample {
     pub scheme: Scheme,
     /// Whether the gates may be on.
     pub enable: bool,
+    /// Largest torques that speed demands may take, in N·m; the machine's own holds as well.
+    pub speed_torque_nm: [f32; 2],
+    /// Number of the operator's last acknowledge.
+    pub acknowledge: u8,
+    /// What turned the gates off in hardware; it lasts until it is acknowledged.
+    pub hardware: Option<HardwareBreak>,
+}
+
+/// A cause that turned the gates off in hardware.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct HardwareBreak {
+    /// Its name.
+    pub fault: Fault,
+    /// Where it was seen, the fault's value: bits that the board explains.
+    pub seen: u16,
+}
+
+impl DualSample {
+    /// Without limits or commands of an operator: for boards that have none.
+    pub const UNLIMITED_NM: [f32; 2] = [f32::INFINITY; 2];
 }
 
 /// What the PWM interrupt samples at the carrier's peak.
@@ -72,7 +93,7 @@ pub struct PlayedPeriod {
 pub trait DualControlPort {
     /// The conversions that the control timer triggered at `now`.
     fn sample(&mut self, now: Instant) -> DualSample;
-    /// Turns all nine gates off at once and for good, whatever is played.
+    /// Turns all nine gates off at once, until an acknowledge, whatever is played.
     fn gates_off(&mut self, now: Instant);
     /// By how many ticks the interrupt, begun nominally at `now`, has outlived `deadline_ticks`; 0 when in time.
     fn overrun_ticks(&mut self, now: Instant, deadline_ticks: u32) -> u32;
@@ -86,6 +107,11 @@ pub trait DualPwmPort {
     fn sample(&mut self, now: Instant) -> PowerSample;
     /// Loads the shadow registers: `next` takes over at the next valley.
     fn play(&mut self, now: Instant, next: &PlayedPeriod);
-    /// Turns all nine gates off at once and for good, whatever is played.
+    /// Turns all nine gates off at once, until an acknowledge, whatever is played.
     fn gates_off(&mut self, now: Instant);
+    /// Lets the gates be played again, after an acknowledge; they stay off until then. `false` when something holds them: a cause in
+    /// hardware, or a board that only a reset lets go on.
+    fn leave(&mut self, _now: Instant) -> bool {
+        false
+    }
 }

@@ -20,7 +20,8 @@ use crate::protection::{Fault, LegFaults, SafeState};
 use crate::time::Instant;
 
 pub use dual::{
-    DualControlPort, DualPwmPort, DualSample, GateFeedback, MotorDemand, PlayedPeriod, PowerSample,
+    DualControlPort, DualPwmPort, DualSample, GateFeedback, HardwareBreak, MotorDemand, PlayedPeriod,
+    PowerSample,
 };
 
 /// A control sample: what the converters hold, and what the operator wants.

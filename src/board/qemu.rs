@@ -12,7 +12,7 @@ mod exchange;
 #[cfg_attr(not(feature = "saboteur"), path = "qemu/straight.rs")]
 mod saboteur;
 
-pub use dual::{connect_dual, die_dual, start_dual};
+pub use dual::{DUAL_DESK, DUAL_RECORDER, DualIdle, connect_dual, die_dual, start_dual};
 
 use super::{ControlPort, PwmPort, Sample};
 use crate::configuration::Refused;

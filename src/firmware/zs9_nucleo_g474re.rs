@@ -7,12 +7,12 @@ use tractive::board::nucleo_g474re::power_stage::{AdcCode, PowerStage};
 use tractive::board::nucleo_g474re::registers::Registers;
 use tractive::board::nucleo_g474re::zs9::sampling::Zeros;
 use tractive::board::nucleo_g474re::zs9::stage::STAGE;
-use tractive::board::nucleo_g474re::zs9::{self as board, Control, OPERATOR, Pwm, settings};
+use tractive::board::nucleo_g474re::zs9::{self as board, Control, DESK, Pwm, RECORDER, settings};
 use tractive::board::nucleo_g474re::{Interrupt as interrupt, PULSE, die, refuse};
 use tractive::drive::dual::{ControlTask, PwmTask, Shared};
 use tractive::machine::zs9::{BUILT_IN, BuiltIn};
 
-static SHARED: Shared = Shared::new();
+static SHARED: Shared = Shared::recorded_by(&RECORDER);
 /// What the start measured, written before the interrupts are unmasked.
 static ZEROS: [AtomicU32; 7] = [const { AtomicU32::new(0) }; 7];
 
@@ -54,7 +54,7 @@ fn TIM2() {
             Encoder::new(timer, &stage, BUILT_IN.ratings.pole_pairs as u32)
         };
         let encoders = [encoder(registers.tim4, first), encoder(registers.tim3, second)];
-        Control::new(registers, kept(), encoders, &OPERATOR)
+        Control::new(registers, kept(), encoders, &DESK)
     });
     board.acknowledge();
     TASK.get_or_insert_with(|| ControlTask::new(BuiltIn, settings())).run(board, &SHARED);

@@ -1,19 +1,25 @@
 //! The ZS9's blocks: the same three streams and the same tags, other contents.
 
-use super::{BLOCK_WORDS, Block};
-use crate::board::{DualSample, GateFeedback, MotorDemand, PlayedPeriod, PowerSample};
+use super::{BLOCK_WORDS, Block, LineTimes, line_from_words, line_to_words, told_from_words, told_to_words};
+use crate::board::{DualSample, GateFeedback, HardwareBreak, MotorDemand, PlayedPeriod, PowerSample};
 use crate::cell::Words;
 use crate::control::Demand;
 use crate::drive::dual::{DualReport, scheme_from_code};
 use crate::frames::{Abc, Angle};
 use crate::nine_switch::GateTicks;
+use crate::operator::{DualStatus, Feedback};
+use crate::protection::Fault;
+use crate::protocol::Frame;
+use crate::recorder::DualRecord;
 use crate::time::Instant;
 
 /// What the rig tells the image before anything starts.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DualSetup {
     /// Carrier period, in ticks.
     pub carrier_ticks: u32,
+    /// The line side that the operator switches; `None`: no operator, the rig commands the drive directly.
+    pub line: Option<LineTimes>,
 }
 
 /// From the firmware to the rig.
@@ -33,21 +39,40 @@ pub enum DualRequest {
     GatesOff(Instant),
     /// The processor has stopped in a panic or a HardFault, gates off.
     Dead,
+    /// A control period from the flight recorder, the oldest first; after the last answer, if a fault has frozen it.
+    Recorded(DualRecord),
+    /// The image has nothing more to say.
+    End,
+    /// The gates may be played again.
+    Leave(Instant),
+    /// The frame that has come, and what the board says, in the slot that began at the instant.
+    Ask(Instant),
+    /// What the operator told, and the frame that says so; both from the instant on.
+    Tell(Instant, DualStatus, Option<Frame>),
 }
 
 impl DualRequest {
     /// As a block.
     pub fn to_block(self) -> Block {
         let mut block = [0; BLOCK_WORDS];
+        let recorded;
         let (tag, at, payload): (u32, Instant, &[u32]) = match &self {
             Self::Hello => (1, Instant(0), &[]),
             Self::ControlSample(at) => (2, *at, &[]),
-            Self::ControlReport(at, report) => (3, *at, &report.to_words()),
+            Self::ControlReport(at, report) => (3, *at, &told_of(report)),
             Self::PowerSample(at) => (4, *at, &[]),
             // Both ends of a pause in one word: a half has at most 65,535 compare steps.
             Self::Play(at, period) => (5, *at, &period.gates.map(|gate| gate.off_from | gate.off_to << 16)),
             Self::GatesOff(at) => (6, *at, &[]),
             Self::Dead => (7, Instant(0), &[]),
+            Self::Recorded(record) => {
+                recorded = record.to_words();
+                (8, record.at, recorded.split_at(1).1)
+            }
+            Self::End => (9, Instant(0), &[]),
+            Self::Leave(at) => (10, *at, &[]),
+            Self::Ask(at) => (11, *at, &[]),
+            Self::Tell(from, status, frame) => (12, *from, &told_to_words(status, *frame)),
         };
         let words = [tag, at.0].into_iter().chain(payload.iter().copied());
         for (slot, word) in block.iter_mut().zip(words) {
@@ -64,8 +89,9 @@ impl DualRequest {
             1 => Self::Hello,
             2 => Self::ControlSample(at),
             3 => {
-                let [a, b, c, d, e, f, g, h, i, j, k, ..] = payload;
-                Self::ControlReport(at, DualReport::from_words([a, b, c, d, e, f, g, h, i, j, k]))
+                let [a, b, c, d, e, f, g, h, i, j, ..] = payload;
+                let report = [a, b, c, d, e, f, g, h, i, j, 0, 0, 0, 0, 0, 0];
+                Self::ControlReport(at, DualReport::from_words(report))
             }
             4 => Self::PowerSample(at),
             5 => {
@@ -76,22 +102,56 @@ impl DualRequest {
             }
             6 => Self::GatesOff(at),
             7 => Self::Dead,
+            8 => {
+                let [a, b, c, d, e, f, g, h, i, j, k, l, m, n] = payload;
+                let record = [at.0, a, b, c, d, e, f, g, h, i, j, k, l, m, n];
+                Self::Recorded(DualRecord::from_words(record))
+            }
+            9 => Self::End,
+            10 => Self::Leave(at),
+            11 => Self::Ask(at),
+            12 => {
+                let (status, frame) = told_from_words(payload)?;
+                Self::Tell(at, status, frame)
+            }
             _ => return None,
         })
     }
+}
+
+/// What the rig is told of a report: not what it has measured itself.
+fn told_of(report: &DualReport) -> [u32; 10] {
+    let [a, b, c, d, e, f, g, h, i, j, ..] = report.to_words();
+    [a, b, c, d, e, f, g, h, i, j]
 }
 
 /// The answer to [`DualRequest::Hello`].
 pub fn dual_setup_to_block(setup: DualSetup) -> Block {
     let mut block = [0; BLOCK_WORDS];
     block[0] = setup.carrier_ticks;
+    [block[1], block[2], block[3]] = line_to_words(setup.line);
     block
 }
 
 /// The inverse of [`dual_setup_to_block`].
 pub fn dual_setup_from_block(block: &Block) -> DualSetup {
-    let [carrier_ticks, ..] = *block;
-    DualSetup { carrier_ticks }
+    let [carrier_ticks, a, b, c, ..] = *block;
+    DualSetup { carrier_ticks, line: line_from_words([a, b, c]) }
+}
+
+/// The answer to [`DualRequest::Ask`].
+pub fn dual_asked_to_block(feedback: &Feedback, frame: Option<Frame>) -> Block {
+    let mut block = [0; BLOCK_WORDS];
+    for (slot, word) in block.iter_mut().zip(feedback.to_words().into_iter().chain(frame.to_words())) {
+        *slot = word;
+    }
+    block
+}
+
+/// The inverse of [`dual_asked_to_block`].
+pub fn dual_asked_from_block(block: &Block) -> (Feedback, Option<Frame>) {
+    let [a, b, c, d, head, low, high, ..] = *block;
+    (Feedback::from_words([a, b, c, d]), Option::from_words([head, low, high]))
 }
 
 /// The answer to [`DualRequest::ControlSample`]; `stop` ends the run.
@@ -107,9 +167,13 @@ pub fn dual_sample_to_block(sample: &DualSample, stop: bool) -> Block {
         | kind1 << 4
         | kind2 << 6
         | (sample.scheme as u32) << 8;
+    let hardware = sample.hardware.map_or(0, |found| found.fault as u32 | u32::from(found.seen) << 16);
     let [capacitor, inductor, source, link] =
         [sample.capacitor_v, sample.inductor_a, sample.source_v, sample.link_ref_v].map(f32::to_bits);
-    [a1, b1, c1, a2, b2, c2, first, second, capacitor, inductor, source, demand1, demand2, link, flags, 0]
+    [
+        a1, b1, c1, a2, b2, c2, first, second, capacitor, inductor, source, demand1, demand2, link, flags,
+        hardware,
+    ]
 }
 
 /// The inverse of [`dual_sample_to_block`].
@@ -130,7 +194,7 @@ pub fn dual_sample_from_block(block: &Block) -> (DualSample, bool) {
         demand2,
         link,
         flags,
-        _,
+        hardware,
     ] = *block;
     let angle = |word, lost| (flags & lost == 0).then_some(Angle(word));
     let sample = DualSample {
@@ -141,7 +205,11 @@ pub fn dual_sample_from_block(block: &Block) -> (DualSample, bool) {
         source_v: f32::from_bits(source),
         demands: [demand(flags >> 4 & 3, demand1), demand(flags >> 6 & 3, demand2)],
         link_ref_v: f32::from_bits(link),
-        scheme: scheme_from_code(flags >> 8),
+        scheme: scheme_from_code(flags >> 8 & 0xFF),
+        speed_torque_nm: DualSample::UNLIMITED_NM,
+        acknowledge: 0,
+        hardware: Fault::from_code(hardware & 0xFFFF)
+            .map(|fault| HardwareBreak { fault, seen: (hardware >> 16) as u16 }),
         enable: flags & 1 != 0,
     };
     (sample, flags & 2 != 0)
@@ -194,6 +262,8 @@ fn demand(kind: u32, value: u32) -> MotorDemand {
 mod tests {
     use super::*;
     use crate::nine_switch::Scheme;
+    use crate::operator::{State, Switches};
+    use crate::recorder::DualState;
 
     #[test]
     fn what_is_sent_arrives() {
@@ -211,6 +281,9 @@ mod tests {
             link_ref_v: 667.0,
             scheme: Scheme::Zvo,
             enable: true,
+            speed_torque_nm: DualSample::UNLIMITED_NM,
+            acknowledge: 0,
+            hardware: Some(HardwareBreak { fault: Fault::GateDriver, seen: 0x3FF }),
         };
         assert_eq!(dual_sample_from_block(&dual_sample_to_block(&sample, true)), (sample, true));
         let power = PowerSample {
@@ -223,6 +296,35 @@ mod tests {
         let mut gates = [GateTicks { off_from: 1, off_to: 40_000 }; 9];
         gates[4] = GateTicks { off_from: 65_535, off_to: 65_535 };
         let report = DualReport { torque_nm: [1.0, -2.0], weakening: [false, true], ..DualReport::default() };
+        let setup = DualSetup { carrier_ticks: 2_500, line: None };
+        let line = Some(LineTimes { precharge_s: 0.05, discharge_s: 0.5 });
+        for setup in [setup, DualSetup { line, ..setup }] {
+            assert_eq!(dual_setup_from_block(&dual_setup_to_block(setup)), setup);
+        }
+        let feedback = Feedback { main_closed: true, ..Feedback::default() };
+        let frame = Some(Frame { id: 0x111, length: 8, data: [1, 2, 3, 4, 5, 6, 7, 8] });
+        for frame in [None, frame] {
+            assert_eq!(dual_asked_from_block(&dual_asked_to_block(&feedback, frame)), (feedback, frame));
+        }
+        let status = DualStatus {
+            state: State::Running,
+            trip: None,
+            refusal: None,
+            refusals: 1,
+            torque_nm: sample.demands,
+            switches: Switches { main: true, ..Switches::default() },
+        };
+        let record = DualRecord {
+            at: Instant(12),
+            currents_a: sample.currents_a,
+            angles: [Angle(1), Angle(2)],
+            capacitor_v: 533.0,
+            source_v: 400.0,
+            inductor_a: 1.0,
+            torque_nm: [2.0, 3.0],
+            duty: 0.25,
+            state: DualState::default(),
+        };
         for request in [
             DualRequest::Hello,
             DualRequest::ControlSample(Instant(7)),
@@ -231,6 +333,11 @@ mod tests {
             DualRequest::Play(Instant(10), PlayedPeriod { gates }),
             DualRequest::GatesOff(Instant(11)),
             DualRequest::Dead,
+            DualRequest::Recorded(record),
+            DualRequest::End,
+            DualRequest::Leave(Instant(13)),
+            DualRequest::Ask(Instant(14)),
+            DualRequest::Tell(Instant(15), status, frame),
         ] {
             assert_eq!(DualRequest::from_block(&request.to_block()), Some(request));
         }

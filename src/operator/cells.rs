@@ -1,41 +1,108 @@
 //! Between the operator in the idle loop and the control interrupt: words with instants, so that the same control period sees the same
 //! permit wherever the idle loop stood.
 
-use super::{Observation, Permit, SLOT_PERIODS};
+use super::{DualObservation, DualPermit, Observation, Permit, SLOT_PERIODS};
+use crate::board::MotorDemand;
 use crate::cell::{Downlink, Uplink, Words};
 use crate::control::{Demand, LinkWindow};
+use crate::drive::dual::DualReport;
 use crate::drive::{Report, trip_from_words, trip_to_words};
 use crate::modulation::Mode;
 use crate::time::{Clock, Instant};
 use core::sync::atomic::{AtomicU32, Ordering};
 
-/// A permit and from when on it holds.
+/// What a drive may do.
+pub trait Grant: Copy {
+    /// Nothing.
+    const NONE: Self;
+}
+
+impl Grant for Permit {
+    const NONE: Self = Self::NONE;
+}
+
+impl Grant for DualPermit {
+    const NONE: Self = Self::NONE;
+}
+
+/// What a drive says of itself in the control interrupt that begins a slot.
+pub trait Slotted: Copy {
+    /// The control interrupt's report.
+    type Report;
+    /// What it says, at its instant.
+    fn of(at: Instant, report: &Self::Report) -> Self;
+    /// That instant.
+    fn at(&self) -> Instant;
+}
+
+impl Slotted for Observation {
+    type Report = Report;
+
+    #[inline]
+    fn of(at: Instant, report: &Report) -> Self {
+        Self {
+            at,
+            udc_v: report.udc_v,
+            current_a: report.current_a,
+            omega: report.frequency_hz * core::f32::consts::TAU,
+            speed_known: report.speed_known,
+            torque_nm: report.torque_nm,
+            trip: report.trip,
+            acknowledged: report.acknowledged,
+            id_ref_a: report.id_a,
+            iq_ref_a: report.iq_a,
+            voltage_v: report.voltage_v,
+            mode: report.mode,
+        }
+    }
+
+    #[inline]
+    fn at(&self) -> Instant {
+        self.at
+    }
+}
+
+impl Slotted for DualObservation {
+    type Report = DualReport;
+
+    #[inline]
+    fn of(at: Instant, report: &DualReport) -> Self {
+        Self { at, report: *report }
+    }
+
+    #[inline]
+    fn at(&self) -> Instant {
+        self.at
+    }
+}
+
+/// A permit and from when on it holds; that is the first word.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Timed {
-    permit: Permit,
+pub struct Timed<P> {
+    permit: P,
     from: Instant,
 }
 
 /// The word of [`Timed`] that says from when on it holds.
-const FROM: usize = 6;
+const FROM: usize = 0;
 
-impl Words<7> for Timed {
+impl Words<7> for Timed<Permit> {
     fn to_words(self) -> [u32; 7] {
         let Permit { enable, demand, window, acknowledge } = self.permit;
         let flags = u32::from(enable) | u32::from(demand.slew_limited) << 1 | u32::from(acknowledge) << 8;
         [
+            self.from.0,
             flags,
             demand.torque_nm.to_bits(),
             window.motoring_none_v.to_bits(),
             window.motoring_full_v.to_bits(),
             window.braking_full_v.to_bits(),
             window.braking_none_v.to_bits(),
-            self.from.0,
         ]
     }
 
     fn from_words(words: [u32; 7]) -> Self {
-        let [flags, torque, motoring_none, motoring_full, braking_full, braking_none, from] = words;
+        let [from, flags, torque, motoring_none, motoring_full, braking_full, braking_none] = words;
         Self {
             permit: Permit {
                 enable: flags & 1 != 0,
@@ -46,6 +113,38 @@ impl Words<7> for Timed {
                     braking_full_v: f32::from_bits(braking_full),
                     braking_none_v: f32::from_bits(braking_none),
                 },
+                acknowledge: (flags >> 8) as u8,
+            },
+            from: Instant(from),
+        }
+    }
+}
+
+impl Words<7> for Timed<DualPermit> {
+    fn to_words(self) -> [u32; 7] {
+        let DualPermit { enable, demands, speed_torque_nm, link_ref_v, acknowledge } = self.permit;
+        let word = |demand| match demand {
+            MotorDemand::Torque(Demand { torque_nm, .. }) => (0, torque_nm.to_bits()),
+            MotorDemand::Speed(speed) => (1, speed.to_bits()),
+        };
+        let [(kind1, d1), (kind2, d2)] = demands.map(word);
+        let [l1, l2] = speed_torque_nm.map(f32::to_bits);
+        let flags = u32::from(enable) | kind1 << 1 | kind2 << 2 | u32::from(acknowledge) << 8;
+        [self.from.0, flags, d1, d2, l1, l2, link_ref_v.to_bits()]
+    }
+
+    fn from_words(words: [u32; 7]) -> Self {
+        let [from, flags, d1, d2, l1, l2, link_ref] = words;
+        let demand = |bit: u32, word| match flags & bit {
+            0 => MotorDemand::Torque(Demand { torque_nm: f32::from_bits(word), slew_limited: true }),
+            _ => MotorDemand::Speed(f32::from_bits(word)),
+        };
+        Self {
+            permit: DualPermit {
+                enable: flags & 1 != 0,
+                demands: [demand(2, d1), demand(4, d2)],
+                speed_torque_nm: [l1, l2].map(f32::from_bits),
+                link_ref_v: f32::from_bits(link_ref),
                 acknowledge: (flags >> 8) as u8,
             },
             from: Instant(from),
@@ -83,15 +182,34 @@ impl Words<12> for Observation {
     }
 }
 
+impl Words<17> for DualObservation {
+    #[inline]
+    fn to_words(self) -> [u32; 17] {
+        let [a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p] = self.report.to_words();
+        [self.at.0, a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p]
+    }
+
+    fn from_words(words: [u32; 17]) -> Self {
+        let [at, a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p] = words;
+        let report = DualReport::from_words([a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p]);
+        Self { at: Instant(at), report }
+    }
+}
+
 /// Permit down, observation up.
-pub struct Desk {
-    permit: Downlink<Timed, 7>,
-    observed: Uplink<Observation, 12>,
+pub struct Desk<P, O, const PERMIT: usize, const OBSERVATION: usize> {
+    permit: Downlink<Timed<P>, PERMIT>,
+    observed: Uplink<O, OBSERVATION>,
     /// Control periods until the next slot.
     left: AtomicU32,
 }
 
-impl Desk {
+impl<P, O, const PERMIT: usize, const OBSERVATION: usize> Desk<P, O, PERMIT, OBSERVATION>
+where
+    P: Grant,
+    O: Slotted + Words<OBSERVATION>,
+    Timed<P>: Words<PERMIT>,
+{
     /// Nothing permitted, nothing seen.
     #[cfg(not(loom))]
     pub const fn new() -> Self {
@@ -100,58 +218,68 @@ impl Desk {
 
     /// In the control interrupt: what is permitted at `now`; nothing before the first permit.
     #[inline]
-    pub fn permit(&self, now: Instant) -> Permit {
+    pub fn permit(&self, now: Instant) -> P {
         match self.permit.newest(|timed| now.reached(Instant(timed.word::<FROM>()))) {
             Some(timed) => timed.permit,
-            None => Permit::NONE,
+            None => P::NONE,
         }
     }
 
     /// In the control interrupt: what it did at `now`. The first of every [`SLOT_PERIODS`] begins a slot.
     #[inline]
-    pub fn tell(&self, now: Instant, report: &Report) {
+    pub fn tell(&self, now: Instant, report: &O::Report) {
         let left = self.left.load(Ordering::Relaxed);
         if left > 0 {
             self.left.store(left - 1, Ordering::Relaxed);
             return;
         }
         self.left.store(SLOT_PERIODS - 1, Ordering::Relaxed);
-        self.observed.publish(Observation {
-            at: now,
-            udc_v: report.udc_v,
-            current_a: report.current_a,
-            omega: report.frequency_hz * core::f32::consts::TAU,
-            speed_known: report.speed_known,
-            torque_nm: report.torque_nm,
-            trip: report.trip,
-            acknowledged: report.acknowledged,
-            id_ref_a: report.id_a,
-            iq_ref_a: report.iq_a,
-            voltage_v: report.voltage_v,
-            mode: report.mode,
-        });
+        self.observed.publish(O::of(now, report));
     }
 
     /// In the idle loop: the newest slot's words; `None` before the first, or when every try was overtaken.
-    pub fn observed(&self) -> Option<Observation> {
+    #[inline(never)]
+    pub fn observed(&self) -> Option<O> {
         self.observed.read()
     }
 
     /// In the idle loop, once a slot: what is permitted from the next slot's beginning on. Returns that instant.
-    pub fn allow(&self, permit: Permit, observed: &Observation, clock: &Clock) -> Instant {
-        let from = next_slot(observed.at, clock);
+    pub fn allow(&self, permit: P, observed: &O, clock: &Clock) -> Instant {
+        let from = next_slot(observed.at(), clock);
         self.allow_from(permit, from);
         from
     }
 
     /// The same from an instant of one's own on.
-    pub fn allow_from(&self, permit: Permit, from: Instant) {
+    pub fn allow_from(&self, permit: P, from: Instant) {
         self.permit.publish(Timed { permit, from });
     }
 }
 
+/// Somewhere to look what a drive says of itself.
+pub trait Watched<O> {
+    /// The newest slot's words; `None` before the first.
+    fn observed(&self) -> Option<O>;
+}
+
+impl<P, O, const PERMIT: usize, const OBSERVATION: usize> Watched<O> for Desk<P, O, PERMIT, OBSERVATION>
+where
+    P: Grant,
+    O: Slotted + Words<OBSERVATION>,
+    Timed<P>: Words<PERMIT>,
+{
+    fn observed(&self) -> Option<O> {
+        self.observed()
+    }
+}
+
 #[cfg(not(loom))]
-impl Default for Desk {
+impl<P, O, const PERMIT: usize, const OBSERVATION: usize> Default for Desk<P, O, PERMIT, OBSERVATION>
+where
+    P: Grant,
+    O: Slotted + Words<OBSERVATION>,
+    Timed<P>: Words<PERMIT>,
+{
     fn default() -> Self {
         Self::new()
     }

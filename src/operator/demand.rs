@@ -1,17 +1,151 @@
-//! What a request comes to: its values checked, its torque within its limits.
+//! What a request comes to: its values checked, its torque within its limits, on its way to the drive.
 
 use super::settings::Ends;
-use super::{Input, Limits, Refusal, Request, Settings};
-use crate::control::LinkWindow;
+use super::{
+    Levels, Limits, MotorLimits, Observation, Permit, Ramp, Rates, Refusal, Request, Seen, Settings,
+    Situation,
+};
+use crate::control::{Demand, LinkWindow};
 use crate::frames::{SQRT_3, limit};
 use crate::machine::Ratings;
 use crate::protection::{self, Violation};
+
+/// What the state machine has to know of a drive: what is asked of it, what it says, and its demands on their way.
+pub trait Demands: Copy {
+    /// What is asked.
+    type Request: Copy;
+    /// What the drive says.
+    type Observation: Copy + core::fmt::Debug;
+    /// What the drive may do.
+    type Permit: Copy;
+    /// What is told of the demands.
+    type Told: Copy + core::fmt::Debug;
+
+    /// Nothing asked for.
+    const AT_REST: Self;
+
+    /// The request's levels.
+    fn levels(request: &Self::Request) -> Levels;
+    /// What of the observation is the same for every drive.
+    fn seen(observed: &Self::Observation) -> Seen;
+    /// Why the request's values cannot be used as they are.
+    fn wrong_with(request: &Self::Request, settings: &Settings) -> Option<Refusal>;
+    /// Whether more is asked for than nothing.
+    fn asks_torque(request: &Self::Request) -> bool;
+    /// Takes over limits that are good.
+    fn take_limits(&mut self, request: &Self::Request);
+    /// Whether nothing is asked for any more.
+    fn are_at_rest(&self) -> bool;
+    /// At rest at once.
+    fn drop(&mut self);
+    /// One slot towards what is asked; towards nothing without a request.
+    fn step(&mut self, request: Option<&Self::Request>, observed: &Self::Observation, settings: &Settings);
+    /// Whether the gates may go off at the end of a stop, as far as the link is concerned.
+    #[inline]
+    fn link_may_rest(_observed: &Self::Observation) -> bool {
+        true
+    }
+    /// Where they are.
+    fn told(&self) -> Self::Told;
+    /// What the drive gets.
+    fn permit(&self, enable: bool, acknowledge: u8, settings: &Settings) -> Self::Permit;
+}
+
+/// The PMaSynRM drive's demand: a torque.
+#[derive(Clone, Copy, Debug)]
+pub struct TorqueDemand {
+    ramp: Ramp,
+    /// The limits that hold; `None`: as rated.
+    limits: Option<Limits>,
+}
+
+impl TorqueDemand {
+    fn limits(&self, settings: &Settings) -> Limits {
+        self.limits.unwrap_or(Limits::rated(settings.ratings))
+    }
+}
+
+impl Demands for TorqueDemand {
+    type Request = Request;
+    type Observation = Observation;
+    type Permit = Permit;
+    type Told = f32;
+
+    const AT_REST: Self = Self { ramp: Ramp::new(), limits: None };
+
+    #[inline]
+    fn levels(request: &Request) -> Levels {
+        let Request { enable, with_torque, off, coast, charge, discharge, acknowledge, .. } = *request;
+        Levels { enable, with_torque, off, coast, charge, discharge, acknowledge }
+    }
+
+    #[inline]
+    fn seen(observed: &Observation) -> Seen {
+        let Observation { at, udc_v, current_a, omega, speed_known, trip, acknowledged, .. } = *observed;
+        Seen { at, udc_v, current_a, omega, emf_omega: omega, speed_known, trip, acknowledged }
+    }
+
+    #[inline]
+    fn wrong_with(request: &Request, settings: &Settings) -> Option<Refusal> {
+        wrong_with(request, settings.ratings)
+    }
+
+    #[inline]
+    fn asks_torque(request: &Request) -> bool {
+        request.torque_nm != 0.0
+    }
+
+    #[inline]
+    fn take_limits(&mut self, request: &Request) {
+        self.limits = Some(request.limits);
+    }
+
+    #[inline]
+    fn are_at_rest(&self) -> bool {
+        self.ramp.torque_nm() == 0.0
+    }
+
+    #[inline]
+    fn drop(&mut self) {
+        self.ramp = Ramp::new();
+    }
+
+    #[inline]
+    fn step(&mut self, request: Option<&Request>, observed: &Observation, settings: &Settings) {
+        let ratings = settings.ratings;
+        let target_nm = match request {
+            Some(request) => {
+                let Limits { motoring_nm, braking_nm, speed_rad_s, .. } = self.limits(settings);
+                let limits = MotorLimits { motoring_nm, braking_nm, speed_rad_s };
+                wanted_nm(request.torque_nm, observed.omega / ratings.pole_pairs, &limits)
+            }
+            None => 0.0,
+        };
+        self.ramp.step(target_nm, &Rates::of(settings));
+    }
+
+    #[inline]
+    fn told(&self) -> f32 {
+        self.ramp.torque_nm()
+    }
+
+    #[inline]
+    fn permit(&self, enable: bool, acknowledge: u8, settings: &Settings) -> Permit {
+        Permit {
+            enable,
+            demand: Demand { torque_nm: self.ramp.torque_nm(), slew_limited: true },
+            window: window(&self.limits(settings), settings.ratings),
+            acknowledge,
+        }
+    }
+}
 
 /// Share of the speed limit below it over which torque that raises the speed fades.
 const SPEED_SPAN: f32 = 0.05;
 
 /// Why the request's values cannot be used as they are.
-pub(super) fn wrong_with(request: &Request, ratings: &Ratings) -> Option<Refusal> {
+#[inline(never)]
+fn wrong_with(request: &Request, ratings: &Ratings) -> Option<Refusal> {
     let Limits { motoring_nm, braking_nm, speed_rad_s, link_low_v, link_high_v } = request.limits;
     let sum = request.torque_nm + motoring_nm + braking_nm + speed_rad_s + link_low_v + link_high_v;
     if !sum.is_finite() {
@@ -28,18 +162,17 @@ pub(super) fn wrong_with(request: &Request, ratings: &Ratings) -> Option<Refusal
     (!inside).then_some(Refusal::LimitOutOfRange)
 }
 
-/// The torque that is asked for, within the limits at this speed, in N·m.
-pub(super) fn wanted_nm(input: &Input, limits: &Limits, ratings: &Ratings) -> f32 {
-    let speed = input.observed.omega / ratings.pole_pairs;
+/// The torque that is asked for, within the limits at a mechanical speed in rad/s, in N·m.
+pub(super) fn wanted_nm(torque_nm: f32, speed: f32, limits: &MotorLimits) -> f32 {
     let fade = limit((limits.speed_rad_s - speed.abs()) / (SPEED_SPAN * limits.speed_rad_s), 0.0, 1.0);
     let motoring_nm = fade * limits.motoring_nm;
     let (lowest, highest) =
         if speed < 0.0 { (-motoring_nm, limits.braking_nm) } else { (-limits.braking_nm, motoring_nm) };
-    limit(input.request.torque_nm, lowest, highest)
+    limit(torque_nm, lowest, highest)
 }
 
 /// Where the link ends torque, for the control interrupt.
-pub(super) fn window(limits: &Limits, ratings: &Ratings) -> LinkWindow {
+fn window(limits: &Limits, ratings: &Ratings) -> LinkWindow {
     let ends = Ends::rated(ratings);
     LinkWindow {
         motoring_none_v: limits.link_low_v,
@@ -50,12 +183,12 @@ pub(super) fn window(limits: &Limits, ratings: &Ratings) -> LinkWindow {
 }
 
 /// A link that has lost its source while the main contactor is closed: it must not come back without precharge.
-pub(super) fn link_lost(input: &Input, settings: &Settings) -> Option<Violation> {
+pub(super) fn link_lost(input: &Situation, settings: &Settings) -> Option<Violation> {
     settings.line.as_ref()?;
     protection::check_undervoltage(input.observed.udc_v, settings.ratings)
 }
 
 /// The machine's EMF between two lines, peak, in V.
-pub(super) fn emf_v(input: &Input, ratings: &Ratings) -> f32 {
-    SQRT_3 * input.observed.omega.abs() * ratings.magnet_flux_wb
+pub(super) fn emf_v(input: &Situation, ratings: &Ratings) -> f32 {
+    SQRT_3 * input.observed.emf_omega.abs() * ratings.magnet_flux_wb
 }

@@ -1,7 +1,7 @@
 //! What must be in order before the gates may come on, and before a fault may be left: sensors, gate drivers, link, configuration,
 //! contactors.
 
-use super::{Configuration, Input, Settings};
+use super::{Configuration, Settings, Situation};
 use crate::protection::{self, Fault, SafeState, Violation};
 
 /// Share of the largest current that a current sensor may show where no current flows.
@@ -12,7 +12,8 @@ const RESTING_SHARE: f32 = 0.05;
 const NEGATIVE_LINK_SHARE: f32 = 0.02;
 
 /// The first thing that is not in order while the gates are off; `main_closed` is what the main contactor was told.
-pub(super) fn cause(input: &Input, main_closed: bool, settings: &Settings) -> Option<Violation> {
+#[inline(never)]
+pub(super) fn cause(input: &Situation, main_closed: bool, settings: &Settings) -> Option<Violation> {
     hardware(input)
         .or_else(|| configuration(input))
         .or_else(|| current_sensors(input, settings))
@@ -23,7 +24,7 @@ pub(super) fn cause(input: &Input, main_closed: bool, settings: &Settings) -> Op
 }
 
 /// Gate drivers, and whatever else holds the gates off.
-pub(super) fn hardware(input: &Input) -> Option<Violation> {
+pub(super) fn hardware(input: &Situation) -> Option<Violation> {
     let feedback = input.feedback;
     if let Some(fault) = feedback.hardware {
         return Some((fault, 1.0, 0.0));
@@ -31,13 +32,13 @@ pub(super) fn hardware(input: &Input) -> Option<Violation> {
     (!feedback.driver_ready).then_some((Fault::GateDriver, 1.0, 0.0))
 }
 
-fn configuration(input: &Input) -> Option<Violation> {
+fn configuration(input: &Situation) -> Option<Violation> {
     let found = input.feedback.configuration;
     let (value, wanted) = (f32::from(found as u8), f32::from(Configuration::Good as u8));
     (found != Configuration::Good).then_some((Fault::Configuration, value, wanted))
 }
 
-fn current_sensors(input: &Input, settings: &Settings) -> Option<Violation> {
+fn current_sensors(input: &Situation, settings: &Settings) -> Option<Violation> {
     let offsets = input.feedback.offsets_a;
     let offset_a = OFFSET_SHARE * settings.ratings.max_current_a;
     let offset =
@@ -49,10 +50,11 @@ fn current_sensors(input: &Input, settings: &Settings) -> Option<Violation> {
 }
 
 /// No current flows: for where the gates have been off for a while.
-pub(super) fn resting_current(input: &Input, settings: &Settings) -> Option<Violation> {
+#[inline(never)]
+pub(super) fn resting_current(input: &Situation, settings: &Settings) -> Option<Violation> {
     let (ratings, observed) = (settings.ratings, input.observed);
     // A machine that turns fast, or whose link is empty, lets current flow through the diodes.
-    let open = protection::safe_state(observed.omega, observed.udc_v, ratings) == SafeState::GatesOff;
+    let open = protection::safe_state(observed.emf_omega, observed.udc_v, ratings) == SafeState::GatesOff;
     let resting_a = if open { RESTING_SHARE * ratings.max_current_a } else { ratings.trip_current_a };
     let current = observed.current_a;
     is_beyond(current, resting_a).then_some((Fault::CurrentOffset, current, resting_a))
@@ -63,7 +65,7 @@ fn is_beyond(value: f32, limit: f32) -> bool {
     value.is_nan() || value > limit
 }
 
-fn link(input: &Input, settings: &Settings) -> Option<Violation> {
+fn link(input: &Situation, settings: &Settings) -> Option<Violation> {
     let (udc_v, ratings) = (input.observed.udc_v, settings.ratings);
     let lowest_v = -NEGATIVE_LINK_SHARE * ratings.dc_link_nominal_v;
     if !udc_v.is_finite() || udc_v < lowest_v {
@@ -73,26 +75,28 @@ fn link(input: &Input, settings: &Settings) -> Option<Violation> {
 }
 
 /// The sensor answers; at standstill its speed settles at zero, turning at a speed.
-pub(super) fn position(input: &Input) -> Option<Violation> {
+pub(super) fn position(input: &Situation) -> Option<Violation> {
     let alive = input.feedback.sensor_alive && input.observed.omega.is_finite();
     (!alive).then_some((Fault::PositionSensor, 0.0, 1.0))
 }
 
 /// Below the overspeed trip.
-fn speed(input: &Input, settings: &Settings) -> Option<Violation> {
+fn speed(input: &Situation, settings: &Settings) -> Option<Violation> {
     protection::check_speed(input.observed.omega, settings.ratings)
 }
 
 /// Whether the machine's EMF stays below the link, or below a link of nominal voltage, with the gates off: faster, the diodes
 /// would rectify it.
-pub(super) fn open_is_safe(input: &Input, settings: &Settings) -> bool {
+#[inline(never)]
+pub(super) fn open_is_safe(input: &Situation, settings: &Settings) -> bool {
     let (udc_v, nominal_v) = (input.observed.udc_v, settings.ratings.dc_link_nominal_v);
     let link_v = if udc_v > nominal_v { udc_v } else { nominal_v };
-    protection::safe_state(input.observed.omega, link_v, settings.ratings) == SafeState::GatesOff
+    protection::safe_state(input.observed.emf_omega, link_v, settings.ratings) == SafeState::GatesOff
 }
 
 /// What must stay in order while the gates may pulse.
-pub(super) fn while_pulsing(input: &Input, main_closed: bool) -> Option<Violation> {
+#[inline(never)]
+pub(super) fn while_pulsing(input: &Situation, main_closed: bool) -> Option<Violation> {
     hardware(input)
         .or_else(|| position(input))
         .or_else(|| (!input.feedback.position_known).then_some((Fault::PositionSensor, 0.0, 1.0)))
@@ -100,7 +104,8 @@ pub(super) fn while_pulsing(input: &Input, main_closed: bool) -> Option<Violatio
 }
 
 /// Contactors do what they were told.
-pub(super) fn contactors(input: &Input, main_closed: bool, precharge_closed: bool) -> Option<Violation> {
+#[inline(never)]
+pub(super) fn contactors(input: &Situation, main_closed: bool, precharge_closed: bool) -> Option<Violation> {
     const MAIN: f32 = 1.0;
     const PRECHARGE: f32 = 2.0;
     let feedback = input.feedback;

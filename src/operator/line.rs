@@ -2,7 +2,7 @@
 
 use super::health::contactors;
 use super::settings::Line;
-use super::{Input, Settings, Switches};
+use super::{Settings, Situation, Switches};
 use crate::protection::{Fault, Violation};
 
 /// Link voltage below which it counts as empty, in V: the limit of extra-low voltage.
@@ -60,7 +60,8 @@ impl Precharge {
 
     /// One slot. The main contactor closes when the source is at most [`GAP_SHARE`] away: by the link's own rate times the time
     /// constant, so the source need not be measured.
-    pub(super) fn step(&mut self, input: &Input, line: &Line, settings: &Settings) -> Outcome {
+    #[inline(never)]
+    pub(super) fn step(&mut self, input: &Situation, line: &Line, settings: &Settings) -> Outcome {
         self.slots = self.slots.saturating_add(1);
         let passed_s = self.slots as f32 * settings.slot_s;
         let udc_v = input.observed.udc_v;
@@ -127,7 +128,7 @@ impl Discharge {
     }
 
     /// One slot.
-    pub(super) fn step(&mut self, input: &Input, line: &Line, settings: &Settings) -> Outcome {
+    pub(super) fn step(&mut self, input: &Situation, line: &Line, settings: &Settings) -> Outcome {
         self.slots = self.slots.saturating_add(1);
         let passed_s = self.slots as f32 * settings.slot_s;
         let udc_v = input.observed.udc_v;

@@ -1,6 +1,7 @@
 //! The torque demand's way: limited in its rate (slew) and in how fast the rate changes (jerk). What passengers and couplings feel
 //! is shaped here; the drive's own slew limit behind it is the inverter's.
 
+use super::Settings;
 use crate::frames::{limit, sqrt};
 
 /// Slew and jerk.
@@ -12,6 +13,15 @@ pub struct Rates {
     pub slew_nm_s: f32,
     /// Largest change of the rate, in N·m/s².
     pub jerk_nm_s2: f32,
+}
+
+impl Rates {
+    /// Those of the settings.
+    #[inline]
+    pub(super) const fn of(settings: &Settings) -> Self {
+        let Settings { slot_s, slew_nm_s, jerk_nm_s2, .. } = *settings;
+        Self { step_s: slot_s, slew_nm_s, jerk_nm_s2 }
+    }
 }
 
 /// The demand on its way.
@@ -27,6 +37,11 @@ impl Ramp {
         Self { torque_nm: 0.0, rate_nm_s: 0.0 }
     }
 
+    /// At rest at a torque, in N·m.
+    pub const fn at(torque_nm: f32) -> Self {
+        Self { torque_nm, rate_nm_s: 0.0 }
+    }
+
     /// Where it is, in N·m.
     pub const fn torque_nm(&self) -> f32 {
         self.torque_nm
@@ -34,6 +49,7 @@ impl Ramp {
 
     /// One step towards a target, in N·m. The target is reached exactly; it is passed only where it came nearer, or turned
     /// back, faster than the jerk limit lets the rate follow.
+    #[inline(never)]
     pub fn step(&mut self, target_nm: f32, rates: &Rates) -> f32 {
         let Rates { step_s, slew_nm_s, jerk_nm_s2 } = *rates;
         let change = jerk_nm_s2 * step_s;

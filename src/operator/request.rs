@@ -50,6 +50,25 @@ impl Request {
     }
 }
 
+/// The levels that every drive's request has; see [`Request`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Levels {
+    /// Rising edge: enable. `false`: stop.
+    pub enable: bool,
+    /// Whether the enabling edge may come with a demand other than zero.
+    pub with_torque: bool,
+    /// Gates off at once.
+    pub off: bool,
+    /// Coast.
+    pub coast: bool,
+    /// Rising edge: charge.
+    pub charge: bool,
+    /// Rising edge: discharge.
+    pub discharge: bool,
+    /// Rising edge: acknowledge.
+    pub acknowledge: bool,
+}
+
 /// Limits that the command's sender may set, each within the machine's ratings: outside of them they are refused, and the limits
 /// that held before go on.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -123,6 +142,27 @@ pub struct Feedback {
     pub parameters_open: bool,
     /// What keeps the gates off in hardware, while its cause lasts.
     pub hardware: Option<Fault>,
+}
+
+/// What every drive says of itself.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Seen {
+    /// The control instant.
+    pub at: Instant,
+    /// Voltage of the capacitors, in V, as the settings' ratings count it.
+    pub udc_v: f32,
+    /// Largest magnitude of a phase current, in A.
+    pub current_a: f32,
+    /// Electrical angular speed, of the faster motor, in rad/s.
+    pub omega: f32,
+    /// The electrical speed whose EMF the diodes see, in rad/s: of two motors the sum, because one bridge has them in series.
+    pub emf_omega: f32,
+    /// Whether all speeds have been followed long enough to be used.
+    pub speed_known: bool,
+    /// The fault that either side has latched.
+    pub trip: Option<Trip>,
+    /// Number of the last acknowledge that both sides have carried out.
+    pub acknowledged: u8,
 }
 
 /// What the drive says of itself: words of one control interrupt.

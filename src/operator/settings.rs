@@ -28,6 +28,11 @@ impl Line {
             chopper_full_v: above_highest_v(ratings, CHOPPER_FULL),
         }
     }
+
+    /// The same for a source that takes back what is braked.
+    pub const fn without_chopper(self) -> Self {
+        Self { chopper_from_v: f32::INFINITY, chopper_full_v: f32::INFINITY, ..self }
+    }
 }
 
 /// Places between the highest operating voltage (0) and the overvoltage trip (1).

@@ -1,5 +1,7 @@
 //! What the operator is told.
 
+use crate::board::MotorDemand;
+use crate::control::Demand;
 use crate::drive::{trip_from_words, trip_to_words};
 use crate::protection::Trip;
 
@@ -115,7 +117,7 @@ pub struct Switches {
 
 /// What is told after each step.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Status {
+pub struct Status<T = f32> {
     /// The state.
     pub state: State,
     /// The fault that is not acknowledged yet.
@@ -124,29 +126,70 @@ pub struct Status {
     pub refusal: Option<Refusal>,
     /// Commands refused so far; wraps.
     pub refusals: u32,
-    /// Torque demand after limits, slew and jerk, in N·m.
-    pub torque_nm: f32,
+    /// Torque demand after limits, slew and jerk, in N·m; of the ZS9 each motor's demand.
+    pub torque_nm: T,
     /// What is switched.
     pub switches: Switches,
 }
 
 const NONE: u32 = 0xFF;
 
-impl Status {
-    /// As eight words.
-    pub fn to_words(self) -> [u32; 8] {
+/// What the ZS9's operator tells.
+pub type DualStatus = Status<[MotorDemand; 2]>;
+
+/// What is told of demands, as two words.
+pub trait Told: Copy {
+    /// As words.
+    fn to_words(self) -> [u32; 2];
+    /// The inverse.
+    fn from_words(words: [u32; 2]) -> Self;
+}
+
+impl Told for f32 {
+    #[inline]
+    fn to_words(self) -> [u32; 2] {
+        [self.to_bits(), 0]
+    }
+
+    #[inline]
+    fn from_words([torque, _]: [u32; 2]) -> Self {
+        Self::from_bits(torque)
+    }
+}
+
+/// Bits of the first word's lowest place that say what the demands are: the last bit of a mantissa is nothing to a demand.
+impl Told for [MotorDemand; 2] {
+    fn to_words(self) -> [u32; 2] {
+        self.map(|demand| match demand {
+            MotorDemand::Torque(demand) => demand.torque_nm.to_bits() & !1,
+            MotorDemand::Speed(speed) => speed.to_bits() | 1,
+        })
+    }
+
+    fn from_words(words: [u32; 2]) -> Self {
+        words.map(|word| match word & 1 {
+            0 => MotorDemand::Torque(Demand { torque_nm: f32::from_bits(word), slew_limited: true }),
+            _ => MotorDemand::Speed(f32::from_bits(word & !1)),
+        })
+    }
+}
+
+impl<T: Told> Status<T> {
+    /// As nine words.
+    pub fn to_words(self) -> [u32; 9] {
         let Self { state, trip, refusal, refusals, torque_nm, switches } = self;
         let refusal = refusal.map_or(NONE, |refusal| refusal.code().into());
         let Switches { precharge, main, discharge, chopper } = switches;
         let flags = u32::from(precharge) | u32::from(main) << 1 | u32::from(discharge) << 2;
         let [fault, value, limit, at] = trip_to_words(trip);
         let codes = u32::from(state.code()) | refusal << 8 | flags << 16;
-        [codes, refusals, torque_nm.to_bits(), chopper.to_bits(), fault, value, limit, at]
+        let [first, second] = torque_nm.to_words();
+        [codes, refusals, first, second, chopper.to_bits(), fault, value, limit, at]
     }
 
     /// The inverse of [`Self::to_words`]; `None` for words that are none of ours.
-    pub fn from_words(words: [u32; 8]) -> Option<Self> {
-        let [codes, refusals, torque, chopper, trip @ ..] = words;
+    pub fn from_words(words: [u32; 9]) -> Option<Self> {
+        let [codes, refusals, first, second, chopper, trip @ ..] = words;
         let refusal = match codes >> 8 & 0xFF {
             NONE => None,
             code => Some(Refusal::from_code(code)?),
@@ -157,7 +200,7 @@ impl Status {
             trip: trip_from_words(trip),
             refusal,
             refusals,
-            torque_nm: f32::from_bits(torque),
+            torque_nm: T::from_words([first, second]),
             switches: Switches {
                 precharge: flag(0),
                 main: flag(1),
@@ -193,8 +236,14 @@ mod tests {
             ] {
                 let status = Status { state, trip, refusal, refusals: 3, torque_nm: -20.0, switches };
                 assert_eq!(Status::from_words(status.to_words()), Some(status));
+                let torque_nm = [
+                    MotorDemand::Torque(Demand { torque_nm: -20.0, slew_limited: true }),
+                    MotorDemand::Speed(104.5),
+                ];
+                let status = DualStatus { state, trip, refusal, refusals: 3, torque_nm, switches };
+                assert_eq!(Status::from_words(status.to_words()), Some(status));
             }
         }
-        assert_eq!(Status::from_words([0xFE; 8]), None);
+        assert_eq!(Status::<f32>::from_words([0xFE; 9]), None);
     }
 }

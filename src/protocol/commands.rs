@@ -2,6 +2,7 @@
 
 use super::message::Message;
 use super::signal::{OutOfRange, Payload, Signal};
+use crate::operator::Levels;
 
 /// Range of every torque, in N·m.
 pub(super) const TORQUE_NM: [f32; 2] = [-3_000.0, 3_000.0];
@@ -10,25 +11,25 @@ const LIMIT_RPM: [f32; 2] = [0.5, 30_000.0];
 /// Range of every link voltage, in V.
 pub(super) const LINK_V: [f32; 2] = [0.0, 6_500.0];
 
-const ENABLE: Signal = Signal::flag("enable", 12);
-const WITH_TORQUE: Signal = Signal::flag("with_torque", 13);
-const OFF: Signal = Signal::flag("off", 14);
-const COAST: Signal = Signal::flag("coast", 15);
+pub(super) const ENABLE: Signal = Signal::flag("enable", 12);
+pub(super) const WITH_TORQUE: Signal = Signal::flag("with_torque", 13);
+pub(super) const OFF: Signal = Signal::flag("off", 14);
+pub(super) const COAST: Signal = Signal::flag("coast", 15);
 const TORQUE: Signal = Signal::physical("torque_nm", "N.m", 16, 0.1, TORQUE_NM);
-const CHARGE: Signal = Signal::flag("charge", 32);
-const DISCHARGE: Signal = Signal::flag("discharge", 33);
-const ACKNOWLEDGE: Signal = Signal::flag("acknowledge", 34);
+pub(super) const CHARGE: Signal = Signal::flag("charge", 32);
+pub(super) const DISCHARGE: Signal = Signal::flag("discharge", 33);
+pub(super) const ACKNOWLEDGE: Signal = Signal::flag("acknowledge", 34);
 
-const MOTORING: Signal = Signal::physical("motoring_nm", "N.m", 16, 0.1, LIMIT_NM);
-const BRAKING: Signal = Signal::physical("braking_nm", "N.m", 32, 0.1, LIMIT_NM);
-const SPEED: Signal = Signal::physical("speed_rpm", "r/min", 48, 0.5, LIMIT_RPM);
+pub(super) const MOTORING: Signal = Signal::physical("motoring_nm", "N.m", 16, 0.1, LIMIT_NM);
+pub(super) const BRAKING: Signal = Signal::physical("braking_nm", "N.m", 32, 0.1, LIMIT_NM);
+pub(super) const SPEED: Signal = Signal::physical("speed_rpm", "r/min", 48, 0.5, LIMIT_RPM);
 
 const LINK_LOW: Signal = Signal::physical("link_low_v", "V", 16, 0.1, LINK_V);
 const LINK_HIGH: Signal = Signal::physical("link_high_v", "V", 32, 0.1, LINK_V);
 
-const WRITE: Signal = Signal::flag("write", 12);
-const PARAMETER: Signal = Signal::number("parameter", 16, 8, 0xFF);
-const VALUE: Signal = Signal::float("value", 32);
+pub(super) const WRITE: Signal = Signal::flag("write", 12);
+pub(super) const PARAMETER: Signal = Signal::number("parameter", 16, 8, 0xFF);
+pub(super) const VALUE: Signal = Signal::float("value", 32);
 
 /// Levels and torque. Without it the drive does nothing.
 pub const COMMAND: Message = Message::new(
@@ -48,6 +49,37 @@ pub const LINK_LIMITS: Message = Message::new("LINK_LIMITS", 0x103, 3, 100, &[LI
 /// Reads a parameter, or writes it.
 pub const PARAMETER_REQUEST: Message =
     Message::new("PARAMETER_REQUEST", 0x104, 4, 0, &[WRITE, PARAMETER, VALUE]);
+
+/// A command's levels.
+#[inline(never)]
+pub(super) fn put_levels(levels: &Levels) -> Payload {
+    let mut payload = Payload::default();
+    for (signal, level) in [
+        (&ENABLE, levels.enable),
+        (&WITH_TORQUE, levels.with_torque),
+        (&OFF, levels.off),
+        (&COAST, levels.coast),
+        (&CHARGE, levels.charge),
+        (&DISCHARGE, levels.discharge),
+        (&ACKNOWLEDGE, levels.acknowledge),
+    ] {
+        signal.put_raw(&mut payload, level.into());
+    }
+    payload
+}
+
+/// The inverse of [`put_levels`].
+pub(super) fn levels(payload: Payload) -> Levels {
+    Levels {
+        enable: ENABLE.is_set(payload),
+        with_torque: WITH_TORQUE.is_set(payload),
+        off: OFF.is_set(payload),
+        coast: COAST.is_set(payload),
+        charge: CHARGE.is_set(payload),
+        discharge: DISCHARGE.is_set(payload),
+        acknowledge: ACKNOWLEDGE.is_set(payload),
+    }
+}
 
 /// Content of [`COMMAND`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -73,18 +105,9 @@ pub struct Command {
 impl Command {
     /// As a frame's content.
     pub fn encode(&self) -> Result<Payload, OutOfRange> {
-        let mut payload = Payload::default();
-        for (signal, level) in [
-            (&ENABLE, self.enable),
-            (&WITH_TORQUE, self.with_torque),
-            (&OFF, self.off),
-            (&COAST, self.coast),
-            (&CHARGE, self.charge),
-            (&DISCHARGE, self.discharge),
-            (&ACKNOWLEDGE, self.acknowledge),
-        ] {
-            signal.put_raw(&mut payload, level.into());
-        }
+        let Self { enable, with_torque, off, coast, charge, discharge, acknowledge, .. } = *self;
+        let levels = Levels { enable, with_torque, off, coast, charge, discharge, acknowledge };
+        let mut payload = put_levels(&levels);
         TORQUE.put(&mut payload, self.torque_nm)?;
         Ok(payload)
     }
@@ -92,16 +115,9 @@ impl Command {
     /// From a frame's content; `None` if a value is out of its range or an unused bit is set.
     pub fn decode(payload: Payload) -> Option<Self> {
         COMMAND.is_tidy(payload).then_some(())?;
-        Some(Self {
-            enable: ENABLE.is_set(payload),
-            with_torque: WITH_TORQUE.is_set(payload),
-            off: OFF.is_set(payload),
-            coast: COAST.is_set(payload),
-            charge: CHARGE.is_set(payload),
-            discharge: DISCHARGE.is_set(payload),
-            acknowledge: ACKNOWLEDGE.is_set(payload),
-            torque_nm: TORQUE.get(payload)?,
-        })
+        let Levels { enable, with_torque, off, coast, charge, discharge, acknowledge } = levels(payload);
+        let torque_nm = TORQUE.get(payload)?;
+        Some(Self { enable, with_torque, off, coast, charge, discharge, acknowledge, torque_nm })
     }
 }
 
@@ -128,6 +144,7 @@ impl TorqueLimits {
 
     /// From a frame's content; `None` if a value is out of its range or an unused bit is set.
     pub fn decode(payload: Payload) -> Option<Self> {
+        // Of the ZS9's motors the same signals.
         LIMITS.is_tidy(payload).then_some(())?;
         Some(Self {
             motoring_nm: MOTORING.get(payload)?,

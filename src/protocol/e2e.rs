@@ -11,13 +11,14 @@ pub type DataIds = [u8; 16];
 /// Largest step of the counter that is taken: up to two frames may be lost in a row.
 pub const MAX_DELTA: u8 = 3;
 
-/// The data identifiers of the message with this number, 1 ..= 15: number in the upper half, counter in the lower, so no
-/// two messages share one.
+/// The data identifiers of the message with this number, 1 ..= 31: the number's lower half in the upper half, in the lower one the
+/// counter, with its highest bit turned from number 16 on. So at one counter no two messages share one.
 pub const fn data_ids(number: u8) -> DataIds {
+    let turned = if number & 0x10 != 0 { 8 } else { 0 };
     let mut list = [0; 16];
     let mut counter = 0;
     while counter < 16 {
-        list[counter] = number << 4 | counter as u8;
+        list[counter] = number << 4 | counter as u8 ^ turned;
         counter += 1;
     }
     list

@@ -11,6 +11,7 @@
 
 mod commands;
 pub mod crc;
+mod dialect;
 pub mod e2e;
 mod frame;
 mod message;
@@ -21,21 +22,21 @@ mod session;
 mod signal;
 mod station;
 mod telemetry;
+mod traction;
+mod zs9;
 
 pub use commands::{
     COMMAND, Command, LIMITS, LINK_LIMITS, LinkLimits, PARAMETER_REQUEST, ParameterRequest, TorqueLimits,
 };
+pub use dialect::{Dialect, Taken};
 pub use frame::{Frame, LENGTH};
 pub use message::{COUNTER, CRC, Message};
 pub use parameters::{PARAMETERS, Parameter, Parameters, RPM_PER_RAD_S, WriteError};
-pub use receiver::{Content, Receiver, Reject};
-pub use sender::Sender;
-pub use session::{Session, Told};
+pub use receiver::Reject;
 pub use signal::{Kind, OutOfRange, Payload, Signal};
-pub use station::Station;
 pub use telemetry::{
     COUNTERS, CURRENTS, Counts, FAULT_LIMIT, FAULT_VALUE, Listening, MOTION, Measured, Outcome,
-    PARAMETER_ANSWER, ParameterAnswer, STATUS, StatusFrame, VOLTAGES, trip_frames, trip_number,
+    PARAMETER_ANSWER, ParameterAnswer, Pattern, STATUS, StatusFrame, VOLTAGES, trip_frames, trip_number,
 };
 
 /// What is sent to the drive.
@@ -44,3 +45,24 @@ pub const TO_DRIVE: [&Message; 4] = [&COMMAND, &LIMITS, &LINK_LIMITS, &PARAMETER
 /// What the drive sends.
 pub const FROM_DRIVE: [&Message; 8] =
     [&STATUS, &MOTION, &CURRENTS, &VOLTAGES, &FAULT_VALUE, &FAULT_LIMIT, &COUNTERS, &PARAMETER_ANSWER];
+
+pub use traction::{Content, Traction};
+pub use zs9::{
+    FROM_ZS9, MotorMeasured, TO_ZS9, ZS9_COMMAND, ZS9_LIMITS, ZS9_LINK, ZS9_PARAMETER_REQUEST, ZS9_STATUS,
+    Zs9, Zs9Command, Zs9Content, Zs9Demands, Zs9Link, Zs9Measured,
+};
+
+/// What takes effect of what is sent to the PMaSynRM drive.
+pub type Receiver = receiver::Receiver<Traction>;
+/// The PMaSynRM drive's end.
+pub type Session = session::Session<Traction>;
+/// What the PMaSynRM drive's telemetry is made of.
+pub type Told<'a> = session::Told<'a, Traction>;
+/// The PMaSynRM drive's end beside its operator.
+pub type Station = station::Station<Traction>;
+/// The ZS9's end.
+pub type Zs9Session = session::Session<Zs9>;
+/// What the ZS9's telemetry is made of.
+pub type Zs9Told<'a> = session::Told<'a, Zs9>;
+/// The ZS9's end beside its operator.
+pub type Zs9Station = station::Station<Zs9>;

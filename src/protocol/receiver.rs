@@ -1,12 +1,9 @@
 //! Which frames take effect. A frame is judged in this order: identifier, length, CRC, counter, content; the first that is wrong
 //! rejects it whole, and is counted.
 
-use super::commands::{
-    COMMAND, Command, LIMITS, LINK_LIMITS, LinkLimits, PARAMETER_REQUEST, ParameterRequest, TorqueLimits,
-};
+use super::dialect::Dialect;
 use super::e2e::{self, Order, Sequence};
 use super::frame::{Frame, LENGTH};
-use super::message::Message;
 use super::signal::Payload;
 use super::telemetry::Counts;
 
@@ -25,21 +22,6 @@ pub enum Reject {
     Disordered,
     /// A value is out of its range, or an unused bit is set.
     OutOfRange,
-}
-
-/// What a frame that was taken says.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Content {
-    /// The first of its message, or the first after a silence: it only set the counter.
-    Greeting,
-    /// A command.
-    Command(Command),
-    /// Limits of torque and speed.
-    Limits(TorqueLimits),
-    /// Limits of the link.
-    LinkLimits(LinkLimits),
-    /// A parameter is to be read or written.
-    Parameter(ParameterRequest),
 }
 
 /// One message's place in its sequence.
@@ -72,20 +54,22 @@ impl Channel {
 /// After this silence a message other than the command begins anew, in ms.
 const SILENCE_MS: u32 = 1_000;
 
-/// The receiver of all messages.
+/// Messages to a drive, at most.
+const MOST: usize = 5;
+
+/// The receiver of all messages to a drive.
 #[derive(Clone, Copy, Debug)]
-pub struct Receiver {
-    command: Channel,
-    limits: Channel,
-    link_limits: Channel,
-    parameter: Channel,
+pub struct Receiver<D> {
+    /// In the order of [`Dialect::TO_DRIVE`].
+    channels: [Channel; MOST],
     counts: Counts,
+    dialect: core::marker::PhantomData<D>,
 }
 
-impl Receiver {
+impl<D: Dialect> Receiver<D> {
     /// Nothing received yet.
     pub const fn new() -> Self {
-        let [command, limits, link_limits, parameter] = [Channel::NEW; 4];
+        const { assert!(D::TO_DRIVE.len() <= MOST) };
         let zero = [0; 9];
         let [received, taken, lost, unknown, truncated, corrupted, repeated, disordered, out_of_range] = zero;
         let counts = Counts {
@@ -99,14 +83,15 @@ impl Receiver {
             disordered,
             out_of_range,
         };
-        Self { command, limits, link_limits, parameter, counts }
+        Self { channels: [Channel::NEW; MOST], counts, dialect: core::marker::PhantomData }
     }
 
     /// A millisecond passes; the command begins anew after a silence of `command_ms`.
     pub fn wait(&mut self, command_ms: u32) {
-        self.command.age(command_ms);
-        for channel in [&mut self.limits, &mut self.link_limits, &mut self.parameter] {
-            channel.age(SILENCE_MS);
+        let mut longest_ms = command_ms;
+        for channel in &mut self.channels {
+            channel.age(longest_ms);
+            longest_ms = SILENCE_MS;
         }
     }
 
@@ -116,7 +101,7 @@ impl Receiver {
     }
 
     /// A frame.
-    pub fn receive(&mut self, frame: &Frame) -> Result<Content, Reject> {
+    pub fn receive(&mut self, frame: &Frame) -> Result<D::Content, Reject> {
         let verdict = self.judge(frame);
         let counts = &mut self.counts;
         counts.received = counts.received.wrapping_add(1);
@@ -133,14 +118,9 @@ impl Receiver {
         verdict
     }
 
-    fn judge(&mut self, frame: &Frame) -> Result<Content, Reject> {
-        let (message, channel): (&Message, _) = match frame.id {
-            id if id == COMMAND.id => (&COMMAND, &mut self.command),
-            id if id == LIMITS.id => (&LIMITS, &mut self.limits),
-            id if id == LINK_LIMITS.id => (&LINK_LIMITS, &mut self.link_limits),
-            id if id == PARAMETER_REQUEST.id => (&PARAMETER_REQUEST, &mut self.parameter),
-            _ => return Err(Reject::Unknown),
-        };
+    fn judge(&mut self, frame: &Frame) -> Result<D::Content, Reject> {
+        let known = D::TO_DRIVE.iter().zip(&mut self.channels).find(|(message, _)| message.id == frame.id);
+        let Some((message, channel)) = known else { return Err(Reject::Unknown) };
         if frame.length != LENGTH {
             return Err(Reject::Truncated);
         }
@@ -148,26 +128,17 @@ impl Receiver {
             return Err(Reject::Corrupted);
         }
         match channel.judge(e2e::counter(&frame.data)) {
-            Order::First => return Ok(Content::Greeting),
+            Order::First => return Ok(D::GREETING),
             Order::Next { lost } => self.counts.lost = self.counts.lost.wrapping_add(lost.into()),
             Order::Repeated => return Err(Reject::Repeated),
             Order::Wrong => return Err(Reject::Disordered),
         }
-        decode(frame.id, Payload(u64::from_le_bytes(frame.data))).ok_or(Reject::OutOfRange)
+        D::decode(frame.id, Payload(u64::from_le_bytes(frame.data))).ok_or(Reject::OutOfRange)
     }
 }
 
-impl Default for Receiver {
+impl<D: Dialect> Default for Receiver<D> {
     fn default() -> Self {
         Self::new()
     }
-}
-
-fn decode(id: u16, payload: Payload) -> Option<Content> {
-    Some(match id {
-        id if id == COMMAND.id => Content::Command(Command::decode(payload)?),
-        id if id == LIMITS.id => Content::Limits(TorqueLimits::decode(payload)?),
-        id if id == LINK_LIMITS.id => Content::LinkLimits(LinkLimits::decode(payload)?),
-        _ => Content::Parameter(ParameterRequest::decode(payload)?),
-    })
 }

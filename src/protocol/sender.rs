@@ -1,47 +1,41 @@
 //! Which frame is sent in which slot: fixed places in a cycle of 100 ms, so that the bus load is the same whatever happens.
 
+use super::dialect::Dialect;
 use super::e2e::Counter;
 use super::frame::Frame;
-use super::telemetry::{
-    COUNTERS, CURRENTS, Counts, FAULT_LIMIT, FAULT_VALUE, MOTION, Measured, PARAMETER_ANSWER,
-    ParameterAnswer, STATUS, StatusFrame, VOLTAGES, trip_frames,
-};
+use super::signal::Payload;
+use super::telemetry::{Counts, ParameterAnswer, StatusFrame, trip_frames};
 use crate::protection::Trip;
 
 /// Slots in a cycle.
 const CYCLE: u32 = 100;
 
+/// Places in [`Dialect::FROM_DRIVE`].
+const STATUS: usize = 0;
+const FAULT_VALUE: usize = 4;
+const FAULT_LIMIT: usize = 5;
+const COUNTERS: usize = 6;
+const ANSWER: usize = 7;
+
 /// Counters of all messages, and the place in the cycle.
 #[derive(Clone, Copy, Debug)]
-pub struct Sender {
+pub struct Sender<D> {
     slot: u32,
     page: u32,
     answer: Option<ParameterAnswer>,
-    status: Counter,
-    motion: Counter,
-    currents: Counter,
-    voltages: Counter,
-    fault_value: Counter,
-    fault_limit: Counter,
-    counters: Counter,
-    parameter: Counter,
+    counters: [Counter; 8],
+    dialect: core::marker::PhantomData<D>,
 }
 
-impl Sender {
+impl<D: Dialect> Sender<D> {
     /// At the cycle's beginning.
     pub const fn new() -> Self {
         Self {
             slot: 0,
             page: 0,
             answer: None,
-            status: Counter::new(),
-            motion: Counter::new(),
-            currents: Counter::new(),
-            voltages: Counter::new(),
-            fault_value: Counter::new(),
-            fault_limit: Counter::new(),
-            counters: Counter::new(),
-            parameter: Counter::new(),
+            counters: [Counter::new(); 8],
+            dialect: core::marker::PhantomData,
         }
     }
 
@@ -53,38 +47,43 @@ impl Sender {
     /// One slot.
     pub fn step(
         &mut self,
-        status: &StatusFrame,
-        measured: &Measured,
+        status: &StatusFrame<D::Pattern>,
+        measured: &D::Measured,
         trip: Option<&Trip>,
         counts: &Counts,
     ) -> Option<Frame> {
         let slot = self.slot;
         self.slot = (slot + 1) % CYCLE;
-        match (slot % 10, slot / 10) {
-            (0, _) => Some(STATUS.frame(status.encode(), &mut self.status)),
-            (2, _) => Some(MOTION.frame(measured.motion(), &mut self.motion)),
-            (4, _) => Some(CURRENTS.frame(measured.currents(), &mut self.currents)),
-            (6, _) => Some(VOLTAGES.frame(measured.voltages(), &mut self.voltages)),
+        let (place, content) = match (slot % 10, slot / 10) {
+            (0, _) => (STATUS, status.encode()),
+            (2, _) => (1, D::measured(measured, 0)),
+            (4, _) => (2, D::measured(measured, 1)),
+            (6, _) => (3, D::measured(measured, 2)),
             (8, 0) => {
                 let content = counts.encode(self.page);
                 self.page = Counts::page_after(self.page);
-                Some(COUNTERS.frame(content, &mut self.counters))
+                (COUNTERS, content)
             }
             (8, 3) => {
                 let [value, _] = trip_frames(trip?);
-                Some(FAULT_VALUE.frame(value, &mut self.fault_value))
+                (FAULT_VALUE, value)
             }
             (8, 6) => {
                 let [_, limit] = trip_frames(trip?);
-                Some(FAULT_LIMIT.frame(limit, &mut self.fault_limit))
+                (FAULT_LIMIT, limit)
             }
-            (8, _) => None,
-            _ => Some(PARAMETER_ANSWER.frame(self.answer.take()?.encode(), &mut self.parameter)),
-        }
+            (8, _) => return None,
+            _ => (ANSWER, self.answer.take()?.encode()),
+        };
+        self.frame(place, content)
+    }
+
+    fn frame(&mut self, place: usize, content: Payload) -> Option<Frame> {
+        Some(D::FROM_DRIVE.get(place)?.frame(content, self.counters.get_mut(place)?))
     }
 }
 
-impl Default for Sender {
+impl<D: Dialect> Default for Sender<D> {
     fn default() -> Self {
         Self::new()
     }

@@ -1,71 +1,69 @@
 //! The drive's end: frames in, a request out; a status in, frames out. One step a slot of 1 ms, one frame a slot at most each way.
 
-use super::commands::{Command, LinkLimits, ParameterRequest, TorqueLimits};
+use super::commands::ParameterRequest;
+use super::dialect::{Dialect, Request, Taken, Told as DriveTold};
 use super::frame::Frame;
-use super::parameters::{Parameters, RPM_PER_RAD_S, WriteError};
-use super::receiver::{Content, Receiver};
+use super::parameters::{Parameters, WriteError};
+use super::receiver::Receiver;
 use super::sender::Sender;
-use super::telemetry::{Counts, Listening, Measured, Outcome, ParameterAnswer, StatusFrame};
+use super::telemetry::{Counts, Listening, Outcome, ParameterAnswer, StatusFrame};
 use crate::machine::Ratings;
-use crate::modulation::Mode;
-use crate::operator::{Limits, Request, State, Status};
+use crate::operator::{State, Status};
 
 /// What is sent of.
 #[derive(Clone, Copy, Debug)]
-pub struct Told<'a> {
+pub struct Told<'a, D: Dialect> {
     /// The operator's status.
-    pub status: &'a Status,
+    pub status: &'a Status<DriveTold<D>>,
     /// Measurements.
-    pub measured: &'a Measured,
+    pub measured: &'a D::Measured,
     /// Pulse pattern.
-    pub mode: Mode,
+    pub mode: D::Pattern,
 }
 
 /// The drive's end of the protocol.
 #[derive(Clone, Copy, Debug)]
-pub struct Session {
+pub struct Session<D: Dialect> {
     ratings: &'static Ratings,
-    receiver: Receiver,
+    receiver: Receiver<D>,
     parameters: Parameters,
-    command: Command,
+    /// What was said last.
+    said: D,
     /// Slots since the newest command; `None` before the first, and after the time-out to off.
     age_ms: Option<u32>,
     /// Whether a command at rest has come since the drive went off: before it no level counts.
     armed: bool,
-    torque_limits: Option<TorqueLimits>,
-    link_limits: Option<LinkLimits>,
     state: State,
-    sender: Sender,
+    sender: Sender<D>,
 }
 
-impl Session {
+impl<D: Dialect> Session<D> {
     /// Nothing received yet.
     pub const fn new(ratings: &'static Ratings) -> Self {
         Self {
             ratings,
             receiver: Receiver::new(),
             parameters: Parameters::rated(ratings),
-            command: AT_REST,
+            said: D::SILENT,
             age_ms: None,
             armed: false,
-            torque_limits: None,
-            link_limits: None,
             state: State::Init,
             sender: Sender::new(),
         }
     }
 
     /// The slot's first half: what has come, and what is asked of the drive now.
-    pub fn listen(&mut self, received: Option<&Frame>) -> Request {
+    pub fn listen(&mut self, received: Option<&Frame>) -> Request<D> {
         self.wait();
         if let Some(Ok(content)) = received.map(|frame| self.receiver.receive(frame)) {
             self.take(content);
         }
-        self.request()
+        let fresh = self.listening() == Listening::Fresh;
+        self.said.request(self.armed, fresh, &self.parameters, self.ratings)
     }
 
     /// The slot's second half: the frame to send, if one is due.
-    pub fn tell(&mut self, told: &Told) -> Option<Frame> {
+    pub fn tell(&mut self, told: &Told<D>) -> Option<Frame> {
         self.state = told.status.state;
         let status = StatusFrame::new(told.status, told.mode, self.listening(), self.receiver.counts());
         self.sender.step(&status, told.measured, told.status.trip.as_ref(), self.receiver.counts())
@@ -96,21 +94,18 @@ impl Session {
         if self.age_ms.is_some_and(|age_ms| age_ms as f32 >= self.parameters.command_off_ms) {
             self.age_ms = None;
             self.armed = false;
-            self.command = AT_REST;
+            self.said.rest();
         }
     }
 
-    fn take(&mut self, content: Content) {
-        match content {
-            Content::Greeting => (),
-            Content::Command(command) => {
-                self.armed |= Command { torque_nm: 0.0, off: false, ..command } == AT_REST;
-                self.command = command;
+    fn take(&mut self, content: D::Content) {
+        match self.said.take(content) {
+            Taken::Kept => (),
+            Taken::Command { at_rest } => {
+                self.armed |= at_rest;
                 self.age_ms = Some(0);
             }
-            Content::Limits(limits) => self.torque_limits = Some(limits),
-            Content::LinkLimits(limits) => self.link_limits = Some(limits),
-            Content::Parameter(request) => {
+            Taken::Parameter(request) => {
                 let answer = self.serve(&request);
                 self.sender.answer(answer);
             }
@@ -131,75 +126,7 @@ impl Session {
         };
         ParameterAnswer { outcome, parameter, value: self.parameters.read(parameter) }
     }
-
-    fn request(&self) -> Request {
-        let idle = Request { limits: self.limits(), ..Request::idle(self.ratings) };
-        let command = &self.command;
-        if !self.armed {
-            return Request { off: command.off, ..idle };
-        }
-        let fresh = self.listening() == Listening::Fresh;
-        Request {
-            enable: command.enable,
-            with_torque: command.with_torque,
-            off: command.off,
-            coast: command.coast,
-            charge: command.charge,
-            discharge: command.discharge,
-            acknowledge: command.acknowledge,
-            torque_nm: if fresh { command.torque_nm } else { 0.0 },
-            ..idle
-        }
-    }
-
-    /// The lower of the sender's limits and the parameters; as rated where nothing is said.
-    fn limits(&self) -> Limits {
-        let (ratings, parameters) = (self.ratings, &self.parameters);
-        let mut limits = Limits {
-            motoring_nm: parameters.torque_limit_nm,
-            braking_nm: parameters.torque_limit_nm,
-            speed_rad_s: parameters.speed_limit_rpm / RPM_PER_RAD_S,
-            ..Limits::rated(ratings)
-        };
-        if let Some(sent) = &self.torque_limits {
-            limits.motoring_nm = beyond(sent.motoring_nm, parameters.torque_limit_nm, ratings.max_torque_nm);
-            limits.braking_nm = beyond(sent.braking_nm, parameters.torque_limit_nm, ratings.max_torque_nm);
-            let rated_rpm = ratings.max_speed_rad_s * RPM_PER_RAD_S;
-            limits.speed_rad_s =
-                beyond(sent.speed_rpm, parameters.speed_limit_rpm, rated_rpm) / RPM_PER_RAD_S;
-        }
-        if let Some(sent) = &self.link_limits {
-            limits.link_low_v = sent.low_v;
-            limits.link_high_v = sent.high_v;
-        }
-        // Rounding to the signal's step and back must not make the rating itself look higher than it is.
-        if limits.speed_rad_s > ratings.max_speed_rad_s
-            && limits.speed_rad_s < ratings.max_speed_rad_s * (1.0 + STEP_SHARE)
-        {
-            limits.speed_rad_s = ratings.max_speed_rad_s;
-        }
-        limits
-    }
 }
-
-/// Rounding that is forgiven at a rating, as a share of it.
-const STEP_SHARE: f32 = 1e-4;
-
-/// What is sent beyond the rating stays, so that it is refused with a reason; within it the parameter holds.
-fn beyond(sent: f32, parameter: f32, rated: f32) -> f32 {
-    if sent > rated * (1.0 + STEP_SHARE) || sent < parameter { sent } else { parameter }
-}
-
-const AT_REST: Command = Command {
-    enable: false,
-    with_torque: false,
-    off: false,
-    coast: false,
-    charge: false,
-    discharge: false,
-    acknowledge: false,
-    torque_nm: 0.0,
-};
 
 /// Whether the gates pulse in a state, or may begin to without a further command.
 fn may_pulse(state: State) -> bool {

@@ -1,23 +1,22 @@
 //! The drive's end of the protocol beside the operator: what the observations become in telemetry, the parameters in settings.
 
+use super::dialect::{Dialect, Observation, Request, Told as DriveTold};
 use super::frame::Frame;
-use super::parameters::{Parameters, RPM_PER_RAD_S};
+use super::parameters::Parameters;
 use super::session::{Session, Told};
-use super::telemetry::Measured;
 use crate::machine::Ratings;
-use crate::modulation::Mode;
-use crate::operator::{Observation, Request, Settings, Status};
+use crate::operator::{Settings, Status};
 
 /// The drive's end of the protocol. A board calls [`Station::listen`] where the operator asks, [`Station::tell`] where it tells.
 #[derive(Clone, Copy, Debug)]
-pub struct Station {
-    session: Session,
+pub struct Station<D: Dialect> {
+    session: Session<D>,
     ratings: &'static Ratings,
     /// The slot's observation.
-    observed: Option<Observation>,
+    observed: Option<Observation<D>>,
 }
 
-impl Station {
+impl<D: Dialect> Station<D> {
     /// At power-up.
     pub const fn new(ratings: &'static Ratings) -> Self {
         Self { session: Session::new(ratings), ratings, observed: None }
@@ -30,31 +29,14 @@ impl Station {
     }
 
     /// What is asked in a slot, after a frame that may have come; and what the drive said of itself at the slot's beginning.
-    pub fn listen(&mut self, observed: Option<Observation>, frame: Option<&Frame>) -> Request {
+    pub fn listen(&mut self, observed: Option<Observation<D>>, frame: Option<&Frame>) -> Request<D> {
         self.observed = observed;
         self.session.listen(frame)
     }
 
     /// The frame to send after the slot, if one is due.
-    pub fn tell(&mut self, status: &Status) -> Option<Frame> {
-        let (measured, mode) = match &self.observed {
-            Some(observed) => (measured(observed, self.ratings), observed.mode),
-            None => (Measured::default(), Mode::Off),
-        };
+    pub fn tell(&mut self, status: &Status<DriveTold<D>>) -> Option<Frame> {
+        let (measured, mode) = D::observed(self.observed.as_ref(), self.ratings);
         self.session.tell(&Told { status, measured: &measured, mode })
-    }
-}
-
-fn measured(observed: &Observation, ratings: &Ratings) -> Measured {
-    Measured {
-        speed_rpm: observed.speed_known.then_some(observed.omega / ratings.pole_pairs * RPM_PER_RAD_S),
-        torque_nm: Some(observed.torque_nm),
-        link_v: Some(observed.udc_v),
-        current_a: Some(observed.current_a),
-        id_ref_a: Some(observed.id_ref_a),
-        iq_ref_a: Some(observed.iq_ref_a),
-        voltage_v: Some(observed.voltage_v),
-        frequency_hz: Some(observed.omega / core::f32::consts::TAU),
-        temperature_c: None,
     }
 }

@@ -3,24 +3,27 @@
 use super::commands::{LINK_V, TORQUE_NM};
 use super::message::Message;
 use super::signal::{Payload, Signal};
+use crate::drive::dual::scheme_from_code;
 use crate::modulation::Mode;
+use crate::nine_switch::Scheme;
 use crate::operator::{Refusal, State, Status};
 use crate::protection::Trip;
 
 const CURRENT_A: [f32; 2] = [-3_000.0, 3_000.0];
-const SPEED_RPM: [f32; 2] = [-16_000.0, 16_000.0];
+pub(super) const SPEED_RPM: [f32; 2] = [-16_000.0, 16_000.0];
 
-const STATE: Signal = Signal::number("state", 12, 4, 0xF);
-const FAULT: Signal = Signal::number("fault", 16, 8, 0xFF);
-const REFUSAL: Signal = Signal::number("refusal", 24, 8, 0xFF);
-const REFUSALS: Signal = Signal::number("refusals", 32, 8, 0xFF);
+pub(super) const STATE: Signal = Signal::number("state", 12, 4, 0xF);
+pub(super) const FAULT: Signal = Signal::number("fault", 16, 8, 0xFF);
+pub(super) const REFUSAL: Signal = Signal::number("refusal", 24, 8, 0xFF);
+pub(super) const REFUSALS: Signal = Signal::number("refusals", 32, 8, 0xFF);
 const MODE: Signal = Signal::number("mode", 40, 3, 7);
-const LISTENING: Signal = Signal::number("listening", 43, 2, 3);
-const PRECHARGE: Signal = Signal::flag("precharge", 45);
-const MAIN: Signal = Signal::flag("main", 46);
-const DISCHARGE: Signal = Signal::flag("discharge", 47);
-const CHOPPER: Signal = Signal { bits: 8, ..Signal::physical("chopper_percent", "%", 48, 0.5, [0.0, 100.0]) };
-const TAKEN: Signal = Signal::number("taken", 56, 8, 0xFF);
+pub(super) const LISTENING: Signal = Signal::number("listening", 43, 2, 3);
+pub(super) const PRECHARGE: Signal = Signal::flag("precharge", 45);
+pub(super) const MAIN: Signal = Signal::flag("main", 46);
+pub(super) const DISCHARGE: Signal = Signal::flag("discharge", 47);
+pub(super) const CHOPPER: Signal =
+    Signal { bits: 8, ..Signal::physical("chopper_percent", "%", 48, 0.5, [0.0, 100.0]) };
+pub(super) const TAKEN: Signal = Signal::number("taken", 56, 8, 0xFF);
 
 const SPEED: Signal = Signal::physical("speed_rpm", "r/min", 16, 0.5, SPEED_RPM);
 const TORQUE: Signal = Signal::physical("torque_nm", "N.m", 32, 0.1, TORQUE_NM);
@@ -34,13 +37,13 @@ const VOLTAGE: Signal = Signal::physical("voltage_v", "V", 16, 0.1, LINK_V);
 const FREQUENCY: Signal = Signal::physical("frequency_hz", "Hz", 32, 0.05, [-1_600.0, 1_600.0]);
 const TEMPERATURE: Signal = Signal::physical("temperature_c", "degC", 48, 0.1, [-100.0, 300.0]);
 
-const TRIP_FAULT: Signal = Signal::number("fault", 16, 8, 0xFF);
-const TRIP_VALUE: Signal = Signal::float("value", 32);
-const TRIP_LIMIT: Signal = Signal::float("limit", 32);
+pub(super) const TRIP_FAULT: Signal = Signal::number("fault", 16, 8, 0xFF);
+pub(super) const TRIP_VALUE: Signal = Signal::float("value", 32);
+pub(super) const TRIP_LIMIT: Signal = Signal::float("limit", 32);
 
-const ANSWER_RESULT: Signal = Signal::number("result", 12, 4, 0xF);
-const ANSWER_PARAMETER: Signal = Signal::number("parameter", 16, 8, 0xFF);
-const ANSWER_VALUE: Signal = Signal::float("value", 32);
+pub(super) const ANSWER_RESULT: Signal = Signal::number("result", 12, 4, 0xF);
+pub(super) const ANSWER_PARAMETER: Signal = Signal::number("parameter", 16, 8, 0xFF);
+pub(super) const ANSWER_VALUE: Signal = Signal::float("value", 32);
 
 const PAGE: Signal = Signal::number("page", 12, 4, 2);
 const fn counter(name: &'static str, index: u32) -> Signal {
@@ -48,7 +51,7 @@ const fn counter(name: &'static str, index: u32) -> Signal {
 }
 
 /// The page's number, then the counters in the order of [`Counts::to_array`].
-const COUNTER_SIGNALS: [Signal; 10] = [
+pub(super) const COUNTER_SIGNALS: [Signal; 10] = [
     PAGE,
     counter("received", 0),
     counter("taken", 1),
@@ -178,9 +181,41 @@ impl Counts {
     }
 }
 
-/// Content of [`STATUS`].
+/// How the gates are played, as the status has it.
+pub trait Pattern: Copy {
+    /// Its code, 0 ..= 7.
+    fn code(self) -> u32;
+    /// The one with this code; the default one for a code that is none.
+    fn from_code(code: u32) -> Self;
+}
+
+impl Pattern for Mode {
+    #[inline]
+    fn code(self) -> u32 {
+        self as u32
+    }
+
+    #[inline]
+    fn from_code(code: u32) -> Self {
+        Self::from_code(code)
+    }
+}
+
+impl Pattern for Scheme {
+    #[inline]
+    fn code(self) -> u32 {
+        self as u32
+    }
+
+    #[inline]
+    fn from_code(code: u32) -> Self {
+        scheme_from_code(code)
+    }
+}
+
+/// Content of [`STATUS`], and of [`super::ZS9_STATUS`].
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct StatusFrame {
+pub struct StatusFrame<P = Mode> {
     /// The state; `None` for a code that is none.
     pub state: Option<State>,
     /// Code of the fault, 0 for none.
@@ -189,8 +224,8 @@ pub struct StatusFrame {
     pub refusal: Option<Refusal>,
     /// Commands refused, modulo 256.
     pub refusals: u8,
-    /// Pulse pattern.
-    pub mode: Mode,
+    /// Pulse pattern, or where the zero vectors lie.
+    pub mode: P,
     /// What becomes of the newest command.
     pub listening: Listening,
     /// Precharge relay, main contactor, discharge resistor.
@@ -201,9 +236,9 @@ pub struct StatusFrame {
     pub taken: u8,
 }
 
-impl StatusFrame {
+impl<P: Pattern> StatusFrame<P> {
     /// Of the drive's status.
-    pub fn new(status: &Status, mode: Mode, listening: Listening, counts: &Counts) -> Self {
+    pub fn new<T>(status: &Status<T>, mode: P, listening: Listening, counts: &Counts) -> Self {
         Self {
             state: Some(status.state),
             fault: status.trip.map_or(0, |trip| trip.fault as u8),
@@ -227,7 +262,7 @@ impl StatusFrame {
             (&FAULT, self.fault.into()),
             (&REFUSAL, refusal),
             (&REFUSALS, self.refusals.into()),
-            (&MODE, self.mode as u32),
+            (&MODE, self.mode.code()),
             (&LISTENING, self.listening as u32),
             (&PRECHARGE, precharge.into()),
             (&MAIN, main.into()),
@@ -252,7 +287,7 @@ impl StatusFrame {
             fault: FAULT.raw(payload) as u8,
             refusal: REFUSAL.raw(payload).checked_sub(1).and_then(Refusal::from_code),
             refusals: REFUSALS.raw(payload) as u8,
-            mode: Mode::from_code(MODE.raw(payload)),
+            mode: P::from_code(MODE.raw(payload)),
             listening,
             switches: [&PRECHARGE, &MAIN, &DISCHARGE].map(|signal| signal.is_set(payload)),
             chopper_percent: CHOPPER.get(payload),
@@ -284,29 +319,31 @@ pub struct Measured {
     pub temperature_c: Option<f32>,
 }
 
-impl Measured {
-    fn encode(signals: [(&Signal, Option<f32>); 3]) -> Payload {
-        let mut payload = Payload::default();
-        for (signal, value) in signals {
-            signal.put_measured(&mut payload, value);
-        }
-        payload
+/// Three measurements.
+#[inline(never)]
+pub(super) fn encode(signals: [(&Signal, Option<f32>); 3]) -> Payload {
+    let mut payload = Payload::default();
+    for (signal, value) in signals {
+        signal.put_measured(&mut payload, value);
     }
+    payload
+}
 
+impl Measured {
     /// Content of [`MOTION`].
     pub fn motion(&self) -> Payload {
-        Self::encode([(&SPEED, self.speed_rpm), (&TORQUE, self.torque_nm), (&LINK, self.link_v)])
+        encode([(&SPEED, self.speed_rpm), (&TORQUE, self.torque_nm), (&LINK, self.link_v)])
     }
 
     /// Content of [`CURRENTS`].
     pub fn currents(&self) -> Payload {
-        Self::encode([(&CURRENT, self.current_a), (&ID_REF, self.id_ref_a), (&IQ_REF, self.iq_ref_a)])
+        encode([(&CURRENT, self.current_a), (&ID_REF, self.id_ref_a), (&IQ_REF, self.iq_ref_a)])
     }
 
     /// Content of [`VOLTAGES`].
     pub fn voltages(&self) -> Payload {
         let temperature = (&TEMPERATURE, self.temperature_c);
-        Self::encode([(&VOLTAGE, self.voltage_v), (&FREQUENCY, self.frequency_hz), temperature])
+        encode([(&VOLTAGE, self.voltage_v), (&FREQUENCY, self.frequency_hz), temperature])
     }
 
     /// Takes over what a message of these three says.

@@ -1,6 +1,7 @@
 //! The operator's state machine: every transition, every refusal, every fault of its own, and what no sequence may do.
 
 mod document;
+mod dual;
 mod faults;
 mod properties;
 mod ramp;

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 use tractive::operator::{Refusal, State};
-use tractive::protocol::{FROM_DRIVE, Message, PARAMETERS, TO_DRIVE};
+use tractive::protocol::{FROM_DRIVE, FROM_ZS9, Message, PARAMETERS, TO_DRIVE, TO_ZS9};
 
 fn text() -> String {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/protocol.md");
@@ -35,6 +35,8 @@ fn row(message: &Message, direction: &str) -> String {
 fn the_messages_are_listed() {
     let commands = TO_DRIVE.map(|message| row(message, "in"));
     has(&[&commands[..], &FROM_DRIVE.map(|message| row(message, "out"))[..]].concat());
+    let commands = TO_ZS9.map(|message| row(message, "in"));
+    has(&[&commands[..], &FROM_ZS9.map(|message| row(message, "out"))[..]].concat());
 }
 
 #[test]

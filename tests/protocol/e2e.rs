@@ -5,7 +5,7 @@ use autosar_e2e::{E2EProfile, E2EStatus};
 use proptest::prelude::*;
 use tractive::protocol::crc::crc8_h2f;
 use tractive::protocol::e2e::{Counter, MAX_DELTA, Order, Sequence, data_ids, is_intact, protect};
-use tractive::protocol::{FROM_DRIVE, TO_DRIVE};
+use tractive::protocol::{FROM_DRIVE, FROM_ZS9, Message, TO_DRIVE, TO_ZS9};
 
 /// AUTOSAR's Specification of CRC Routines, table of `Crc_CalculateCRC8H2F`.
 #[test]
@@ -39,17 +39,21 @@ fn the_protection_gives_the_specifications_values() {
     }
 }
 
+fn all() -> impl Iterator<Item = &'static Message> {
+    TO_DRIVE.into_iter().chain(FROM_DRIVE).chain(TO_ZS9).chain(FROM_ZS9)
+}
+
 #[test]
-fn no_two_messages_share_a_data_identifier() {
+fn no_two_messages_share_a_data_identifier_at_one_counter() {
     let mut seen = std::collections::BTreeSet::new();
-    for message in TO_DRIVE.into_iter().chain(FROM_DRIVE) {
-        assert!((1..=15).contains(&message.number) && message.id < 0x800, "{}", message.name);
+    for message in all() {
+        assert!((1..=31).contains(&message.number) && message.id < 0x800, "{}", message.name);
         assert_eq!(*message.data_ids(), data_ids(message.number));
-        assert!(message.data_ids().iter().all(|id| seen.insert(*id)), "{}", message.name);
+        let ids = message.data_ids().iter().enumerate();
+        assert!(ids.into_iter().all(|place| seen.insert((place.0, *place.1))), "{}", message.name);
     }
-    let ids: std::collections::BTreeSet<_> =
-        TO_DRIVE.into_iter().chain(FROM_DRIVE).map(|message| message.id).collect();
-    assert_eq!(ids.len(), TO_DRIVE.len() + FROM_DRIVE.len());
+    let ids: std::collections::BTreeSet<_> = all().map(|message| message.id).collect();
+    assert_eq!(ids.len(), all().count());
 }
 
 #[test]
@@ -88,7 +92,7 @@ proptest! {
     }
 
     #[test]
-    fn another_implementation_takes_our_frames_and_we_take_its(content: [u8; 8], number in 1_u8..=15) {
+    fn another_implementation_takes_our_frames_and_we_take_its(content: [u8; 8], number in 1_u8..=31) {
         let ids = data_ids(number);
         let settings = Profile22Config { data_id_list: ids, ..Profile22Config::default() };
         let mut other = Profile22::new(settings.clone()).unwrap();
@@ -121,10 +125,10 @@ proptest! {
 
     #[test]
     fn a_frame_under_another_messages_identifier_is_found(content: [u8; 8], counter in 0_u8..16) {
-        for message in TO_DRIVE {
+        for message in TO_DRIVE.into_iter().chain(TO_ZS9) {
             let mut data = content;
             protect(&mut data, counter, message.data_ids());
-            for other in TO_DRIVE.into_iter().chain(FROM_DRIVE) {
+            for other in all() {
                 prop_assert_eq!(is_intact(&data, other.data_ids()), other.id == message.id);
             }
         }

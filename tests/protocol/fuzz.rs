@@ -153,6 +153,7 @@ proptest! {
 
     #[test]
     fn any_telemetry_is_decoded_without_a_panic(bits: u64) {
+        use tractive::modulation::Mode;
         use tractive::protocol::{FROM_DRIVE, ParameterAnswer, StatusFrame, trip_number};
         let payload = Payload(bits);
         let (mut measured, mut counts) = (Measured::default(), Counts::default());
@@ -160,7 +161,7 @@ proptest! {
             measured.merge(message, payload);
         }
         counts.merge(payload);
-        let status = StatusFrame::decode(payload);
+        let status = StatusFrame::<Mode>::decode(payload);
         prop_assert_eq!(StatusFrame::decode(status.encode()), status);
         let _ = (ParameterAnswer::decode(payload), trip_number(payload));
     }

@@ -7,6 +7,7 @@ mod e2e;
 mod fuzz;
 mod receiver;
 mod session;
+mod zs9;
 
 use tractive::protocol::e2e::Counter;
 use tractive::protocol::{Frame, Message, Payload};

@@ -286,7 +286,7 @@ fn what_is_told_is_what_arrives() {
         let message = FROM_DRIVE.iter().find(|message| message.id == frame.id).unwrap();
         measured.merge(message, payload);
         if frame.id == STATUS.id {
-            told = told.or(Some(StatusFrame::decode(payload)));
+            told = told.or(Some(StatusFrame::<Mode>::decode(payload)));
         } else if frame.id == COUNTERS.id {
             counts.merge(payload);
         }

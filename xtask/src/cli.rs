@@ -44,6 +44,7 @@ Every other option goes to the rig as it is: `cargo rig run --help` lists them."
 
 const TALK_HELP: &str = "\
   SCRIPT                 what to say [default: rig/scripts/round-trip.talk]; - for lines from standard input
+  --system zs9           talk to the ZS9 [default script: rig/scripts/zs9.talk]
   --on qemu|host         the firmware's image in QEMU, or its code on this machine [default: qemu]
   --out DIR              where the files go [default: target/tractive/talk]
 

@@ -23,6 +23,8 @@ enum On {
 
 /// The script that is run when none is named.
 const SCRIPT: &str = "rig/scripts/round-trip.talk";
+/// The same for the ZS9.
+const ZS9_SCRIPT: &str = "rig/scripts/zs9.talk";
 
 /// The rig's command that is meant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -88,9 +90,20 @@ impl Request {
         };
         let scenario = scenario.unwrap_or_else(|| match verb {
             Verb::Run => "sweep".to_owned(),
-            Verb::Talk => build::root().join(SCRIPT).to_string_lossy().into_owned(),
+            Verb::Talk => {
+                let script = if talks_to_zs9(&rest) { ZS9_SCRIPT } else { SCRIPT };
+                build::root().join(script).to_string_lossy().into_owned()
+            }
         });
         Ok(Self { scenario, on, out, machine, help, rest })
+    }
+
+    fn system(&self, verb: Verb) -> System {
+        match verb {
+            Verb::Run => System::of_scenario(&self.scenario),
+            Verb::Talk if talks_to_zs9(&self.rest) => System::Zs9,
+            Verb::Talk => System::Traction,
+        }
     }
 
     fn has(&self, option: &str) -> bool {
@@ -117,6 +130,12 @@ impl Request {
         args.extend(self.rest.iter().map(OsString::from));
         args
     }
+}
+
+/// Whether the rig's options have it talk to the ZS9.
+fn talks_to_zs9(words: &[String]) -> bool {
+    words.iter().any(|word| word == "--system=zs9")
+        || words.windows(2).any(|pair| pair == ["--system".to_owned(), "zs9".to_owned()])
 }
 
 /// The command; its exit code is the rig's.
@@ -153,11 +172,7 @@ fn hand_over(words: &[String], verb: Verb) -> Result<u8> {
             qemu = Some(setup.qemu()?);
         }
         if !request.has("--image") {
-            image = Some(build::image(
-                &setup.toolchain()?,
-                System::of_scenario(&request.scenario),
-                machine.as_ref(),
-            )?);
+            image = Some(build::image(&setup.toolchain()?, request.system(verb), machine.as_ref())?);
         }
     }
     let mut rig = Command::new(build::rig()?);
@@ -286,6 +301,12 @@ mod tests {
         let shipped = build::root().join(SCRIPT);
         assert!(shipped.is_file());
         assert_eq!(args(""), format!("talk {} --on qemu --out o", shipped.display()));
+        let zs9 = build::root().join(ZS9_SCRIPT);
+        assert!(zs9.is_file());
+        for option in ["--system zs9", "--system=zs9"] {
+            assert_eq!(args(option), format!("talk {} --on qemu --out o {option}", zs9.display()));
+            assert_eq!(Request::parse(&words(option), Verb::Talk).unwrap().system(Verb::Talk), System::Zs9);
+        }
         assert_eq!(args("- --on host"), "talk --on host --out o");
         assert_eq!(args("my.talk --inertia 5"), "talk my.talk --on qemu --out o --inertia 5");
     }

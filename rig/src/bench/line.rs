@@ -1,17 +1,11 @@
-//! The line side in the timers' time: contactors that take their time, a chopper that switches, and whoever commands the drive.
+//! The line side in the timers' time: contactors, a chopper that switches, and whoever commands the drive.
 
-use super::Tick;
+use super::{Switchgear, Tick};
 use crate::plant::{DcLink, DcLinkSettings, LinkEnergies, LinkSwitches};
 use crate::trace::LinkBalance;
-use std::collections::VecDeque;
-use tractive::frames::Abc;
-use tractive::operator::{Configuration, Feedback, Request, SLOT_PERIODS, Status, Switches};
+use tractive::operator::{Feedback, Request, SLOT_PERIODS, Status, Switches};
 use tractive::protection::Fault;
-use tractive::time::{Clock, Instant};
-
-/// Time in which a contactor closes, and opens, in s.
-const CLOSES_S: f64 = 0.04;
-const OPENS_S: f64 = 0.02;
+use tractive::time::Clock;
 
 /// Who commands: the request at `t_s` seconds after the recording begins.
 pub type Commander = Box<dyn Fn(f64) -> Request + Send>;
@@ -32,30 +26,6 @@ pub struct LinePlan {
     pub reversible: Vec<(f64, bool)>,
 }
 
-/// A contactor: told, and where it is.
-#[derive(Clone, Copy, Debug, Default)]
-struct Contactor {
-    told: bool,
-    closed: bool,
-    moves: Option<Tick>,
-}
-
-impl Contactor {
-    fn tell(&mut self, told: bool, now: Tick, tick_s: f64) {
-        if told != self.told {
-            self.told = told;
-            let takes_s = if told { CLOSES_S } else { OPENS_S };
-            self.moves = (told != self.closed).then(|| now + (takes_s / tick_s).round() as Tick);
-        }
-    }
-
-    fn act(&mut self, now: Tick) {
-        if self.moves.is_some_and(|at| at <= now) {
-            (self.closed, self.moves) = (self.told, None);
-        }
-    }
-}
-
 /// What the operator did in one slot, for the trace.
 #[derive(Clone, Copy, Debug)]
 pub struct SlotRow {
@@ -71,20 +41,13 @@ pub struct LineSide {
     pub link: DcLink,
     stored_before_j: f64,
     plan: LinePlan,
-    tick_s: f64,
     slot_ticks: Tick,
-    main: Contactor,
-    precharge: Contactor,
+    gear: Switchgear<Request, f32>,
     discharge: bool,
     duty: f64,
     /// The running chopper period's end, and where in it the chopper goes off.
     chopper_period: Tick,
     chopper_off: Option<Tick>,
-    /// What the operator told, and from when on it holds.
-    told: VecDeque<(Tick, Status)>,
-    /// What the operator will ask for, by the slot's beginning.
-    asked: VecDeque<(Tick, Request, Feedback)>,
-    samples: u32,
     status: Option<Status>,
 }
 
@@ -99,17 +62,12 @@ impl LineSide {
             stored_before_j: link.stored_j(),
             link,
             plan,
-            tick_s: f64::from(clock.ticks_per_s).recip(),
             slot_ticks: Tick::from(SLOT_PERIODS * clock.control_ticks),
-            main: Contactor::default(),
-            precharge: Contactor::default(),
+            gear: Switchgear::new(clock),
             discharge: false,
             duty: 0.0,
             chopper_period: 0,
             chopper_off: None,
-            told: VecDeque::new(),
-            asked: VecDeque::new(),
-            samples: 0,
             status: None,
         }
     }
@@ -139,67 +97,38 @@ impl LineSide {
 
     /// A control sample at `now`, `t_s`: every [`SLOT_PERIODS`]th begins a slot. Returns whether the operator has fallen behind.
     pub fn sampled(&mut self, now: Tick, t_s: f64) -> bool {
-        let begins = self.samples.is_multiple_of(SLOT_PERIODS);
-        self.samples = self.samples.wrapping_add(1);
-        if begins {
-            let feedback = Feedback {
-                precharge_closed: self.precharge.closed,
-                main_closed: self.main.closed,
-                driver_ready: self.hardware(t_s) != Some(Fault::GateDriver),
-                enable_input: true,
-                sensor_alive: true,
-                position_known: true,
-                offsets_a: Abc::default(),
-                configuration: Configuration::Good,
-                parameters_open: false,
-                hardware: self.hardware(t_s),
-            };
-            self.asked.push_back((now, (self.plan.commander)(t_s), feedback));
-        }
-        self.asked.len() > 2
+        let hardware = self.hardware(t_s);
+        let Self { gear, plan, .. } = self;
+        gear.sampled(now, hardware, || (plan.commander)(t_s))
     }
 
     /// What is asked in the slot that began at `tick`, and what the board says.
     pub fn ask(&mut self, tick: Tick) -> Option<(Request, Feedback)> {
-        while let Some((at, request, feedback)) = self.asked.pop_front() {
-            if at == tick {
-                return Some((request, feedback));
-            }
-        }
-        None
+        self.gear.ask(tick)
     }
 
     /// What the operator told; it holds from `from` on.
     pub fn tell(&mut self, from: Tick, status: Status) {
-        self.told.push_back((from, status));
+        self.gear.tell(from, status);
     }
 
     /// The next instant at which something changes.
     pub fn next_event(&self) -> Option<Tick> {
-        let told = self.told.front().map(|(at, _)| *at);
         let period = (self.duty > 0.0 || self.chopper_off.is_some()).then_some(self.chopper_period);
-        [told, period, self.chopper_off, self.main.moves, self.precharge.moves].into_iter().flatten().min()
+        [self.gear.next_event(), period, self.chopper_off].into_iter().flatten().min()
     }
 
     /// Does what is due at `now`, `t_s`; returns the operator's word if it takes effect here.
     pub fn act(&mut self, now: Tick, t_s: f64) -> Option<SlotRow> {
-        let mut row = None;
-        while let Some((at, status)) = self.told.front().copied()
-            && at <= now
-        {
-            self.told.pop_front();
+        let row = self.gear.act(now).map(|status| SlotRow { t_s, status });
+        if let Some(SlotRow { status, .. }) = row {
             self.status = Some(status);
-            let Switches { precharge, main, discharge, chopper } = status.switches;
-            self.precharge.tell(precharge, now, self.tick_s);
-            self.main.tell(main, now, self.tick_s);
+            let Switches { discharge, chopper, .. } = status.switches;
             self.discharge = discharge;
             self.duty = f64::from(chopper);
             // The chopper's period is the slot.
             self.chopper_period = now;
-            row = Some(SlotRow { t_s, status });
         }
-        self.main.act(now);
-        self.precharge.act(now);
         if self.chopper_off.is_some_and(|at| at <= now) {
             self.chopper_off = None;
         }
@@ -209,8 +138,8 @@ impl LineSide {
             self.chopper_off = (on > 0).then_some(now + on);
         }
         self.link.switches = LinkSwitches {
-            precharge: self.precharge.closed,
-            main: self.main.closed,
+            precharge: self.gear.precharge_closed(),
+            main: self.gear.main_closed(),
             discharge: self.discharge,
             chopper: self.chopper_off.is_some(),
         };
@@ -223,10 +152,5 @@ impl LineSide {
             self.link.source_mut().reversible = *reversible;
         }
         row
-    }
-
-    /// The tick of an instant near to `now`.
-    pub fn widen(now: Tick, instant: Instant) -> Tick {
-        now.saturating_add_signed(i64::from(instant.since(Instant(now as u32))))
     }
 }

@@ -11,6 +11,7 @@ mod line;
 mod link;
 mod observe;
 mod sensors;
+mod switchgear;
 
 pub use inject::Injection;
 pub use inverter::{Edge, GATES, Inverter, Stuck};
@@ -18,6 +19,7 @@ pub use line::{Commander, LinePlan, LineSide, SlotRow};
 pub use link::{LineFilter, Supply};
 pub use observe::{Limits, Observed, Peaks, Stored};
 pub use sensors::{Converter, Flaws, Sensors};
+pub use switchgear::Switchgear;
 
 use crate::benchmark::in_plant;
 use crate::plant::Plant;

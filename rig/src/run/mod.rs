@@ -46,18 +46,46 @@ pub trait Supervisor {
 pub struct Turn {
     /// For the drive.
     pub frame: Option<Frame>,
-    /// The rotor's load from the next slot on, in N·m.
-    pub load_nm: f64,
+    /// The rotors' loads from the next slot on, in N·m; of one rotor the first.
+    pub loads_nm: [f64; 2],
     /// Whether the run ends with this slot.
     pub done: bool,
 }
 
+/// A bench that a supervisor acts on.
+pub(crate) trait Supervised {
+    /// An instant near to now, in s from the recording's beginning.
+    fn instant_s(&self, instant: Instant) -> f64;
+    /// The rotors' loads from `instant` on, in N·m.
+    fn loads_from(&mut self, instant: Instant, loads_nm: [f64; 2]);
+    /// Ends the recording at `instant`.
+    fn end_at(&mut self, instant: Instant);
+}
+
+impl Supervised for Bench {
+    fn instant_s(&self, instant: Instant) -> f64 {
+        self.instant_s(instant)
+    }
+
+    fn loads_from(&mut self, instant: Instant, [load_nm, _]: [f64; 2]) {
+        self.load_from(instant, load_nm);
+    }
+
+    fn end_at(&mut self, instant: Instant) {
+        self.end_at(instant);
+    }
+}
+
 /// A supervisor's turn in the slot that began at `at`. What it does to the bench, it does at the next slot's beginning, whenever the slot
 /// is served.
-fn turn(supervisor: &mut dyn Supervisor, bench: &mut Bench, at: Instant) -> anyhow::Result<Option<Frame>> {
+pub(crate) fn turn(
+    supervisor: &mut dyn Supervisor,
+    bench: &mut impl Supervised,
+    at: Instant,
+) -> anyhow::Result<Option<Frame>> {
     let turn = supervisor.slot(bench.instant_s(at))?;
     let next = at.after(SLOT_PERIODS * CLOCK.control_ticks);
-    bench.load_from(next, turn.load_nm);
+    bench.loads_from(next, turn.loads_nm);
     if turn.done {
         bench.end_at(next);
     }

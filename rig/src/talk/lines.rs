@@ -1,6 +1,6 @@
 //! Where the lines come from: a script, read whole before anything runs, or standard input, a line when it is wanted.
 
-use super::listener::COLUMNS;
+use super::System;
 use super::script::{self, Line};
 use anyhow::{Context, Result};
 use std::collections::VecDeque;
@@ -20,9 +20,9 @@ impl Lines {
     ///
     /// # Errors
     /// Names the file, the line and the word.
-    pub fn of_script(path: &Path) -> Result<Self> {
+    pub fn of_script(path: &Path, system: System) -> Result<Self> {
         let text = std::fs::read_to_string(path).with_context(|| path.display().to_string())?;
-        let lines = script::script(&text, &COLUMNS).with_context(|| path.display().to_string())?;
+        let lines = script::script(&text, system).with_context(|| path.display().to_string())?;
         Ok(Self::Script(lines.into()))
     }
 
@@ -35,7 +35,7 @@ impl Lines {
     ///
     /// # Errors
     /// A line that cannot be understood; on a terminal it is said and the next one is read.
-    pub fn take(&mut self) -> Result<Option<Line>> {
+    pub fn take(&mut self, system: System) -> Result<Option<Line>> {
         let count = match self {
             Self::Script(lines) => return Ok(lines.pop_front()),
             Self::Typed(count) => count,
@@ -51,7 +51,7 @@ impl Lines {
                 return Ok(None);
             }
             *count += 1;
-            match script::line(&text, *count, &COLUMNS) {
+            match script::line(&text, *count, system) {
                 Ok(Some(line)) => return Ok(Some(line)),
                 Ok(None) => {}
                 Err(error) if input.is_terminal() => eprintln!("{error:#}"),

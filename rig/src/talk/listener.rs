@@ -1,11 +1,60 @@
 //! The telemetry's receiver: frames in, rows of telemetry.csv out.
 
+use super::System;
+use tractive::modulation::Mode;
+use tractive::nine_switch::Scheme;
 use tractive::protection::Fault;
 use tractive::protocol::e2e::{Order, Sequence, counter};
 use tractive::protocol::{
-    COUNTERS, Counts, FAULT_LIMIT, FAULT_VALUE, FROM_DRIVE, Frame, Listening, Measured, Outcome,
-    PARAMETER_ANSWER, ParameterAnswer, Payload, STATUS, StatusFrame, trip_number,
+    Counts, FROM_DRIVE, FROM_ZS9, Frame, Listening, Measured, Message, Outcome, ParameterAnswer, Pattern,
+    Payload, StatusFrame, Zs9Measured, trip_number,
 };
+
+/// Places of the messages in the lists of both systems.
+const STATUS: usize = 0;
+const FAULT_VALUE: usize = 4;
+const FAULT_LIMIT: usize = 5;
+const COUNTERS: usize = 6;
+const PARAMETER_ANSWER: usize = 7;
+
+/// The columns of telemetry.csv of the ZS9.
+pub const ZS9_COLUMNS: [&str; 35] = [
+    "t_s",
+    "state",
+    "scheme",
+    "listening",
+    "fault",
+    "fault_value",
+    "fault_limit",
+    "refusal",
+    "refusals",
+    "precharge",
+    "main",
+    "discharge",
+    "chopper_percent",
+    "speed1_rpm",
+    "torque1_nm",
+    "current1_a",
+    "speed2_rpm",
+    "torque2_nm",
+    "current2_a",
+    "link_v",
+    "capacitor_v",
+    "duty_percent",
+    "received",
+    "taken",
+    "lost",
+    "unknown",
+    "truncated",
+    "corrupted",
+    "repeated",
+    "disordered",
+    "out_of_range",
+    "parameter",
+    "parameter_value",
+    "parameter_result",
+    "telemetry_errors",
+];
 
 /// The columns of telemetry.csv.
 pub const COLUMNS: [&str; 35] = [
@@ -46,13 +95,30 @@ pub const COLUMNS: [&str; 35] = [
     "telemetry_errors",
 ];
 
+/// How the gates are played, by its code.
+#[derive(Clone, Copy, Debug)]
+struct Code(u32);
+
+impl Pattern for Code {
+    fn code(self) -> u32 {
+        self.0
+    }
+
+    fn from_code(code: u32) -> Self {
+        Self(code)
+    }
+}
+
 /// All that the telemetry has said.
 #[derive(Clone, Debug, Default)]
 pub struct Listener {
+    system: System,
     sequences: [Sequence; FROM_DRIVE.len()],
-    status: Option<StatusFrame>,
-    /// Measurements.
-    pub measured: Measured,
+    status: Option<StatusFrame<Code>>,
+    /// Measurements of the PMaSynRM drive.
+    measured: Measured,
+    /// Measurements of the ZS9.
+    zs9: Zs9Measured,
     /// What became of the frames sent.
     pub counts: Counts,
     fault_value: Option<f32>,
@@ -63,13 +129,26 @@ pub struct Listener {
 }
 
 impl Listener {
+    /// To a system, before its first frame.
+    pub fn new(system: System) -> Self {
+        Self { system, ..Self::default() }
+    }
+
+    /// What the system sends.
+    fn messages(&self) -> [&'static Message; 8] {
+        match self.system {
+            System::Pmasynrm => FROM_DRIVE,
+            System::Zs9 => FROM_ZS9,
+        }
+    }
+
     /// A frame from the drive; `true` if it was a status, which makes a row.
     pub fn receive(&mut self, frame: &Frame) -> bool {
-        let Some(index) = FROM_DRIVE.iter().position(|message| message.id == frame.id) else {
+        let Some(index) = self.messages().iter().position(|message| message.id == frame.id) else {
             self.errors += 1;
             return false;
         };
-        let message = FROM_DRIVE[index];
+        let message = self.messages()[index];
         let intact = frame.length == 8 && message.is_intact(frame);
         let in_order = intact
             && matches!(
@@ -81,9 +160,12 @@ impl Listener {
             return false;
         }
         let payload = Payload(u64::from_le_bytes(frame.data));
-        self.measured.merge(message, payload);
-        match frame.id {
-            id if id == STATUS.id => {
+        match self.system {
+            System::Pmasynrm => self.measured.merge(message, payload),
+            System::Zs9 => self.zs9.merge(message, payload),
+        }
+        match index {
+            STATUS => {
                 let status = StatusFrame::decode(payload);
                 if status.fault == 0 {
                     (self.fault_value, self.fault_limit) = (None, None);
@@ -91,69 +173,95 @@ impl Listener {
                 self.status = Some(status);
                 return true;
             }
-            id if id == COUNTERS.id => self.counts.merge(payload),
-            id if id == FAULT_VALUE.id => (_, self.fault_value) = trip_number(payload),
-            id if id == FAULT_LIMIT.id => (_, self.fault_limit) = trip_number(payload),
-            id if id == PARAMETER_ANSWER.id => self.answer = ParameterAnswer::decode(payload),
+            COUNTERS => self.counts.merge(payload),
+            FAULT_VALUE => (_, self.fault_value) = trip_number(payload),
+            FAULT_LIMIT => (_, self.fault_limit) = trip_number(payload),
+            PARAMETER_ANSWER => self.answer = ParameterAnswer::decode(payload),
             _ => {}
         }
         false
     }
 
-    /// The newest row, at a time in s; columns as [`COLUMNS`].
-    pub fn row(&self, t_s: f64) -> [String; COLUMNS.len()] {
+    /// The rotors' speeds as told, in r/min; of one rotor the first.
+    pub fn speeds_rpm(&self) -> [Option<f32>; 2] {
+        match self.system {
+            System::Pmasynrm => [self.measured.speed_rpm, None],
+            System::Zs9 => self.zs9.motors.map(|motor| motor.speed_rpm),
+        }
+    }
+
+    /// The newest row, at a time in s; columns as [`System::columns`].
+    pub fn row(&self, t_s: f64) -> Vec<String> {
         let number = |value: Option<f32>| value.map_or(String::new(), |value| value.to_string());
         let text = |value: Option<&str>| value.unwrap_or_default().to_owned();
         let flag = |value: bool| u8::from(value).to_string();
         let status = self.status;
-        let [precharge, main, discharge] = status.map_or([false; 3], |status| status.switches);
+        let switches = status.map_or([false; 3], |status| status.switches);
         let listening = status.map_or(Listening::Off, |status| status.listening);
-        let measured = &self.measured;
-        let [received, taken, lost, unknown, truncated, corrupted, repeated, disordered, out_of_range] =
-            self.counts.to_array().map(|count| count.to_string());
+        let pattern = status.map(|status| match self.system {
+            System::Pmasynrm => Mode::from_code(status.mode.0).name(),
+            System::Zs9 => <Scheme as Pattern>::from_code(status.mode.0).name(),
+        });
         let outcome = self.answer.map(|answer| answer.outcome);
-        [
+        let mut row = vec![
             format!("{t_s:.4}"),
             text(status.and_then(|status| status.state).map(|state| state.name())),
-            text(status.map(|status| status.mode.name())),
+            text(pattern),
             text(Listening::ALL.iter().find(|(code, _)| *code == listening).map(|(_, name)| *name)),
             text(status.and_then(|status| Fault::from_code(status.fault.into())).map(Fault::name)),
             number(self.fault_value),
             number(self.fault_limit),
             text(status.and_then(|status| status.refusal).map(|refusal| refusal.name())),
             status.map_or(String::new(), |status| status.refusals.to_string()),
-            flag(precharge),
-            flag(main),
-            flag(discharge),
-            number(status.and_then(|status| status.chopper_percent)),
-            number(measured.speed_rpm),
-            number(measured.torque_nm),
-            number(measured.link_v),
-            number(measured.current_a),
-            number(measured.id_ref_a),
-            number(measured.iq_ref_a),
-            number(measured.voltage_v),
-            number(measured.frequency_hz),
-            number(measured.temperature_c),
-            received,
-            taken,
-            lost,
-            unknown,
-            truncated,
-            corrupted,
-            repeated,
-            disordered,
-            out_of_range,
+        ];
+        row.extend(switches.map(flag));
+        row.push(number(status.and_then(|status| status.chopper_percent)));
+        row.extend(self.measurements().map(number));
+        row.extend(self.counts.to_array().map(|count| count.to_string()));
+        row.extend([
             self.answer.map_or(String::new(), |answer| answer.parameter.to_string()),
             number(self.answer.and_then(|answer| answer.value)),
             text(Outcome::ALL.iter().find(|(code, _)| Some(*code) == outcome).map(|(_, name)| *name)),
             self.errors.to_string(),
-        ]
+        ]);
+        row
+    }
+
+    /// Measurements in the order of their columns.
+    fn measurements(&self) -> [Option<f32>; 9] {
+        let measured = &self.measured;
+        match self.system {
+            System::Pmasynrm => [
+                measured.speed_rpm,
+                measured.torque_nm,
+                measured.link_v,
+                measured.current_a,
+                measured.id_ref_a,
+                measured.iq_ref_a,
+                measured.voltage_v,
+                measured.frequency_hz,
+                measured.temperature_c,
+            ],
+            System::Zs9 => {
+                let [first, second] = &self.zs9.motors;
+                [
+                    first.speed_rpm,
+                    first.torque_nm,
+                    first.current_a,
+                    second.speed_rpm,
+                    second.torque_nm,
+                    second.current_a,
+                    self.zs9.link_v,
+                    self.zs9.capacitor_v,
+                    self.zs9.duty_percent,
+                ]
+            }
+        }
     }
 
     /// What a column says now.
     pub fn value(&self, column: &str) -> String {
-        let index = COLUMNS.iter().position(|name| *name == column);
+        let index = self.system.columns().iter().position(|name| *name == column);
         index.map_or(String::new(), |index| self.row(0.0)[index].clone())
     }
 }

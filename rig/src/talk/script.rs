@@ -1,5 +1,6 @@
 //! The script: a command a line, `[SECONDS] COMMAND …`.
 
+use super::System;
 use anyhow::{Context, Result, bail};
 use tractive::protocol::{LinkLimits, TorqueLimits};
 
@@ -23,14 +24,17 @@ pub enum Action {
     Discharge,
     /// Acknowledges the fault.
     Acknowledge,
-    /// Torque, in N·m, along a straight line of this many seconds.
-    Torque(f64, f64),
-    /// Speed in r/min, held by a speed loop here, along a straight line of so many r/min per second.
-    Speed(f64, f64),
-    /// The machine's load against forward rotation, in N·m.
-    Load(f64),
-    /// Limits of torque and speed.
-    Limits(TorqueLimits),
+    /// Torques, in N·m, along straight lines of this many seconds; of one motor the first.
+    Torque([f64; 2], f64),
+    /// Speeds in r/min, along straight lines of so many r/min per second: of one motor the first, held by a speed loop here; of two
+    /// held by the drive's own.
+    Speed([f64; 2], f64),
+    /// The machines' loads against forward rotation, in N·m.
+    Load([f64; 2]),
+    /// Limits of torque and speed, of motor 0 or 1.
+    Limits(usize, TorqueLimits),
+    /// Link voltage outside shoot-through, in V.
+    Link(f64),
     /// Limits of the link.
     LinkLimits(LinkLimits),
     /// Reads a parameter.
@@ -101,6 +105,16 @@ impl<'a> Words<'a> {
         }
     }
 
+    /// A number for each motor.
+    fn each(&mut self, what: &str, system: System, [low, high]: [f64; 2]) -> Result<[f64; 2]> {
+        let first = self.number(what, low, high)?;
+        let second = match system {
+            System::Pmasynrm => 0.0,
+            System::Zs9 => self.number(what, low, high)?,
+        };
+        Ok([first, second])
+    }
+
     fn count(&mut self, what: &str) -> Result<u32> {
         Ok(self.number(what, 1.0, 1e6)?.round() as u32)
     }
@@ -122,6 +136,15 @@ impl<'a> Words<'a> {
         }
     }
 }
+
+/// What the ZS9 has in the place of the PMaSynRM drive's.
+pub const ZS9_COMMANDS: [&str; 5] = [
+    "torque NM NM [over SECONDS]",
+    "speed RPM RPM [at RPM_PER_SECOND]",
+    "load NM NM",
+    "limits 1|2 MOTORING_NM BRAKING_NM SPEED_RPM",
+    "link VOLTS",
+];
 
 /// Every command with what follows it, as the help shows it.
 pub const COMMANDS: [&str; 24] = [
@@ -154,8 +177,8 @@ pub const COMMANDS: [&str; 24] = [
 const TORQUE: [f64; 2] = [-3_000.0, 3_000.0];
 const SPEED: [f64; 2] = [-16_000.0, 16_000.0];
 
-fn action(name: &str, words: &mut Words) -> Result<Action> {
-    let [low_nm, high_nm] = TORQUE;
+fn action(name: &str, words: &mut Words, system: System) -> Result<Action> {
+    let [_, high_nm] = TORQUE;
     Ok(match name {
         "enable" => match words.rest.next() {
             None => Action::Enable { with_torque: false },
@@ -169,18 +192,26 @@ fn action(name: &str, words: &mut Words) -> Result<Action> {
         "discharge" => Action::Discharge,
         "acknowledge" => Action::Acknowledge,
         "torque" => {
-            Action::Torque(words.number("torque", low_nm, high_nm)?, words.after("over", 0.0, 0.0, 1e4)?)
+            Action::Torque(words.each("torque", system, TORQUE)?, words.after("over", 0.0, 0.0, 1e4)?)
         }
-        "speed" => {
-            let [low, high] = SPEED;
-            Action::Speed(words.number("speed", low, high)?, words.after("at", 500.0, 1.0, 1e5)?)
+        "speed" => Action::Speed(words.each("speed", system, SPEED)?, words.after("at", 500.0, 1.0, 1e5)?),
+        "load" => Action::Load(words.each("load", system, TORQUE)?),
+        "limits" => {
+            let motor = match system {
+                System::Pmasynrm => 1,
+                System::Zs9 => words.number("motor", 1.0, 2.0)?.round() as usize,
+            };
+            let limits = TorqueLimits {
+                motoring_nm: words.number("motoring torque", 0.0, high_nm)? as f32,
+                braking_nm: words.number("braking torque", 0.0, high_nm)? as f32,
+                speed_rpm: words.number("speed", 0.5, 30_000.0)? as f32,
+            };
+            Action::Limits(motor - 1, limits)
         }
-        "load" => Action::Load(words.number("load", low_nm, high_nm)?),
-        "limits" => Action::Limits(TorqueLimits {
-            motoring_nm: words.number("motoring torque", 0.0, high_nm)? as f32,
-            braking_nm: words.number("braking torque", 0.0, high_nm)? as f32,
-            speed_rpm: words.number("speed", 0.5, 30_000.0)? as f32,
-        }),
+        "link" if system == System::Zs9 => Action::Link(words.number("link voltage", 0.0, 6_500.0)?),
+        "link-limits" if system == System::Zs9 => {
+            bail!("link-limits: the ZS9 has none; `link` is its voltage")
+        }
         "link-limits" => {
             let low_v = words.number("low voltage", 0.0, 6_500.0)?;
             let high_v = words.number("high voltage", 0.0, 6_500.0)?;
@@ -216,7 +247,8 @@ fn action(name: &str, words: &mut Words) -> Result<Action> {
 ///
 /// # Errors
 /// Names the line, the word, and what is allowed.
-pub fn line(text: &str, number: usize, columns: &[&str]) -> Result<Option<Line>> {
+pub fn line(text: &str, number: usize, system: System) -> Result<Option<Line>> {
+    let columns = system.columns();
     let text = text.split('#').next().unwrap_or_default().trim();
     let mut words = Words { rest: text.split_whitespace() };
     let Some(first) = words.rest.next() else { return Ok(None) };
@@ -226,7 +258,7 @@ pub fn line(text: &str, number: usize, columns: &[&str]) -> Result<Option<Line>>
             bail!("time {first}: must be 0 to 1000000 s");
         }
         let name = if at_s.is_some() { words.next("a command")? } else { first };
-        let action = action(name, &mut words)?;
+        let action = action(name, &mut words, system)?;
         if let Some(extra) = words.rest.next() {
             bail!("{extra}: nothing more is allowed here");
         }
@@ -244,11 +276,11 @@ pub fn line(text: &str, number: usize, columns: &[&str]) -> Result<Option<Line>>
 ///
 /// # Errors
 /// As [`line()`], and times that go back.
-pub fn script(text: &str, columns: &[&str]) -> Result<Vec<Line>> {
+pub fn script(text: &str, system: System) -> Result<Vec<Line>> {
     let mut lines = Vec::new();
     let mut last_s = 0.0;
     for (index, text) in text.lines().enumerate() {
-        let Some(line) = line(text, index + 1, columns)? else { continue };
+        let Some(line) = line(text, index + 1, system)? else { continue };
         if let Some(at_s) = line.at_s {
             if at_s < last_s {
                 bail!("line {}: time {at_s} is before {last_s}", line.number);
@@ -264,14 +296,14 @@ pub fn script(text: &str, columns: &[&str]) -> Result<Vec<Line>> {
 mod tests {
     use super::*;
 
-    const COLUMNS: [&str; 2] = ["state", "speed_rpm"];
-
     #[test]
     fn every_command_of_the_help_is_understood() {
-        for usage in COMMANDS {
+        let all = COMMANDS.map(|usage| (usage, System::Pmasynrm));
+        for (usage, system) in all.into_iter().chain(ZS9_COMMANDS.map(|usage| (usage, System::Zs9))) {
             let full = usage
                 .replace(['[', ']'], "")
                 .replace("on|off", "on")
+                .replace("1|2", "2")
                 .replace("LOW_V HIGH_V", "900 1800")
                 .replace("COLUMN VALUE", "state running");
             let words = full.split_whitespace().map(|word| {
@@ -279,22 +311,34 @@ mod tests {
                 if is_value { "7" } else { word }
             });
             let text = words.collect::<Vec<_>>().join(" ");
-            assert!(line(&text, 1, &COLUMNS).unwrap().is_some(), "{text}");
+            assert!(line(&text, 1, system).unwrap().is_some(), "{text}");
         }
     }
 
     #[test]
     fn times_comments_and_empty_lines() {
-        let script = script("# begin\n\n0.5 enable\ntorque 100 over 2 # pull\n1 end\n", &COLUMNS).unwrap();
+        let script =
+            script("# begin\n\n0.5 enable\ntorque 100 over 2 # pull\n1 end\n", System::Pmasynrm).unwrap();
         let got: Vec<_> = script.iter().map(|line| (line.number, line.at_s, line.action.clone())).collect();
         assert_eq!(
             got,
             [
                 (3, Some(0.5), Action::Enable { with_torque: false }),
-                (4, None, Action::Torque(100.0, 2.0)),
+                (4, None, Action::Torque([100.0, 0.0], 2.0)),
                 (5, Some(1.0), Action::End),
             ]
         );
+    }
+
+    #[test]
+    fn two_motors_have_two_numbers() {
+        let got = |text| line(text, 1, System::Zs9).map(|line| line.map(|line| line.action));
+        assert_eq!(got("torque 20 -30 over 1").unwrap(), Some(Action::Torque([20.0, -30.0], 1.0)));
+        assert_eq!(got("speed 800 -800").unwrap(), Some(Action::Speed([800.0, -800.0], 500.0)));
+        for wrong in ["torque 20", "limits 3 1 1 1", "link-limits 300 400", "expect speed_rpm 0"] {
+            assert!(got(wrong).is_err(), "{wrong}");
+        }
+        assert!(line("link 667", 1, System::Pmasynrm).is_err());
     }
 
     #[test]
@@ -308,11 +352,11 @@ mod tests {
             ("torque 1 for 2", "line 1: for: only `over` may stand here"),
             ("-1 enable", "line 1: time -1: must be 0 to 1000000 s"),
             ("2 end\n1 end", "line 2: time 1 is before 2"),
-            ("expect colour red", "line 1: colour: must be one of state, speed_rpm"),
+            ("expect colour red", "line 1: colour: must be one of t_s, state,"),
             ("end now", "line 1: now: nothing more is allowed here"),
             ("link-limits 1800 900", "line 1: link limits 1800 and 900: the first must be lower"),
         ] {
-            let error = format!("{:#}", script(text, &COLUMNS).unwrap_err());
+            let error = format!("{:#}", script(text, System::Pmasynrm).unwrap_err());
             assert!(error.starts_with(message), "{error}");
         }
     }

@@ -1,11 +1,44 @@
 //! What is sent to the drive in which slot, and what is done to it on the way.
 
+use super::System;
 use std::collections::VecDeque;
+use tractive::operator::Levels;
 use tractive::protocol::e2e::Counter;
 use tractive::protocol::{
-    COMMAND, Command, Frame, LIMITS, LINK_LIMITS, LinkLimits, OutOfRange, PARAMETER_REQUEST,
-    ParameterRequest, Payload, TorqueLimits,
+    COMMAND, Command, Frame, LIMITS, LINK_LIMITS, LinkLimits, Message, OutOfRange, PARAMETER_REQUEST,
+    ParameterRequest, Payload, TO_ZS9, TorqueLimits, ZS9_COMMAND, ZS9_LINK, ZS9_PARAMETER_REQUEST,
+    Zs9Command, Zs9Demands, Zs9Link,
 };
+
+/// What is commanded.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Spoken {
+    /// Levels.
+    pub levels: Levels,
+    /// Torques, in N·m; of one motor the first.
+    pub torques_nm: [f32; 2],
+    /// Speeds in r/min, in the torques' place.
+    pub speeds_rpm: Option<[f32; 2]>,
+}
+
+impl Spoken {
+    fn encode(&self, system: System) -> Result<Payload, OutOfRange> {
+        let levels = self.levels;
+        match system {
+            System::Pmasynrm => {
+                let Levels { enable, with_torque, off, coast, charge, discharge, acknowledge } = levels;
+                let [torque_nm, _] = self.torques_nm;
+                Command { enable, with_torque, off, coast, charge, discharge, acknowledge, torque_nm }
+                    .encode()
+            }
+            System::Zs9 => {
+                let demands =
+                    self.speeds_rpm.map_or(Zs9Demands::Torques(self.torques_nm), Zs9Demands::Speeds);
+                Zs9Command { levels, demands }.encode()
+            }
+        }
+    }
+}
 
 /// Slots between two commands.
 pub const COMMAND_SLOTS: u64 = 10;
@@ -32,14 +65,17 @@ enum Extra {
 /// Frames with their counters.
 #[derive(Debug, Default)]
 pub struct Sender {
+    system: System,
     command: Counter,
-    limits: Counter,
+    limits: [Counter; 2],
     link_limits: Counter,
     parameter: Counter,
-    /// Limits to repeat.
-    pub torque_limits: Option<TorqueLimits>,
+    /// Limits to repeat, of either motor.
+    pub torque_limits: [Option<TorqueLimits>; 2],
     /// Limits to repeat.
     pub link: Option<LinkLimits>,
+    /// Link voltage to repeat.
+    pub link_ref: Option<Zs9Link>,
     requests: VecDeque<ParameterRequest>,
     kept: VecDeque<Frame>,
     /// Frames to send besides.
@@ -54,6 +90,39 @@ pub struct Sender {
 }
 
 impl Sender {
+    /// To a system, nothing sent yet.
+    pub fn new(system: System) -> Self {
+        Self { system, ..Self::default() }
+    }
+
+    /// Messages of a command, of a parameter.
+    fn messages(&self) -> [&'static Message; 2] {
+        match self.system {
+            System::Pmasynrm => [&COMMAND, &PARAMETER_REQUEST],
+            System::Zs9 => [&ZS9_COMMAND, &ZS9_PARAMETER_REQUEST],
+        }
+    }
+
+    /// Limits of a motor.
+    fn motor_limits(&mut self, motor: usize) -> Result<Option<Frame>, OutOfRange> {
+        let message = match self.system {
+            System::Pmasynrm => &LIMITS,
+            System::Zs9 => TO_ZS9[1 + motor],
+        };
+        let Some(limits) = &self.torque_limits[motor] else { return Ok(None) };
+        Ok(Some(message.frame(limits.encode()?, &mut self.limits[motor])))
+    }
+
+    /// Limits of the link, or its voltage.
+    fn link(&mut self) -> Result<Option<Frame>, OutOfRange> {
+        let (message, content) = match (&self.link, &self.link_ref) {
+            (Some(limits), _) => (&LINK_LIMITS, limits.encode()?),
+            (None, Some(link)) => (&ZS9_LINK, link.encode()?),
+            (None, None) => return Ok(None),
+        };
+        Ok(Some(message.frame(content, &mut self.link_limits)))
+    }
+
     /// Asks for a parameter.
     pub fn request(&mut self, request: ParameterRequest) {
         self.requests.push_back(request);
@@ -99,31 +168,29 @@ impl Sender {
     ///
     /// # Errors
     /// A value that its signal cannot carry.
-    pub fn step(&mut self, slot: u64, command: &Command) -> Result<Option<Frame>, OutOfRange> {
+    pub fn step(&mut self, slot: u64, command: &Spoken) -> Result<Option<Frame>, OutOfRange> {
         if slot < self.silent_until {
             return Ok(None);
         }
+        let [command_message, parameter_message] = self.messages();
         Ok(match (slot % COMMAND_SLOTS, slot % LIMIT_SLOTS) {
             (1, _) => {
-                let frame = COMMAND.frame(command.encode()?, &mut self.command);
+                let frame = command_message.frame(command.encode(self.system)?, &mut self.command);
                 self.mistreated(frame)
             }
-            (3, 3) => match &self.torque_limits {
-                Some(limits) => Some(LIMITS.frame(limits.encode()?, &mut self.limits)),
-                None => None,
-            },
-            (3, 13) => match &self.link {
-                Some(limits) => Some(LINK_LIMITS.frame(limits.encode()?, &mut self.link_limits)),
-                None => None,
-            },
+            (3, 3) => self.motor_limits(0)?,
+            (3, 13) => self.link()?,
+            (3, 23) => self.motor_limits(1)?,
             (5, _) => match self.requests.pop_front() {
-                Some(request) => Some(PARAMETER_REQUEST.frame(request.encode()?, &mut self.parameter)),
+                Some(request) => Some(parameter_message.frame(request.encode()?, &mut self.parameter)),
                 None => None,
             },
             (2 | 4 | 6 | 8, _) => match self.extra.pop_front() {
                 Some(Extra::Frame(frame)) => Some(frame),
                 Some(Extra::Old(back)) => self.kept.iter().rev().nth(back).copied(),
-                Some(Extra::OutOfRange) => Some(COMMAND.frame(TORQUE_OUT_OF_RANGE, &mut self.command)),
+                Some(Extra::OutOfRange) => {
+                    Some(command_message.frame(TORQUE_OUT_OF_RANGE, &mut self.command))
+                }
                 None => None,
             },
             _ => None,

@@ -1,14 +1,15 @@
 //! The vehicle's computer: does what the lines say, slot by slot.
 
+use super::System;
 use super::lines::Lines;
-use super::listener::{COLUMNS, Listener};
+use super::listener::Listener;
 use super::script::{Action, Expectation, Line};
-use super::sender::{COMMAND_SLOTS, Sender};
+use super::sender::{COMMAND_SLOTS, Sender, Spoken};
 use super::speed_loop::SpeedLoop;
 use crate::run::{Supervisor, Turn};
 use anyhow::{Result, anyhow};
 use std::fmt::Write as _;
-use tractive::protocol::{Command, Frame, ParameterRequest};
+use tractive::protocol::{Frame, ParameterRequest, Zs9Link};
 
 /// Slots for which a level stands whose edge counts: more than may be lost in a row.
 const EDGE_SLOTS: u64 = 5 * COMMAND_SLOTS;
@@ -19,45 +20,47 @@ const SLOT_S: f64 = 1e-3;
 /// Half of it: what is due in a slot.
 const DUE_S: f64 = 0.5 * SLOT_S;
 
-/// The torque's straight line.
-#[derive(Clone, Copy, Debug)]
+/// Straight lines of both demands.
+#[derive(Clone, Copy, Debug, Default)]
 struct Ramp {
-    from_nm: f64,
-    to_nm: f64,
+    from: [f64; 2],
+    to: [f64; 2],
     begin_s: f64,
     over_s: f64,
 }
 
 impl Ramp {
-    fn at(&self, t_s: f64) -> f64 {
+    fn at(&self, t_s: f64) -> [f64; 2] {
         if t_s >= self.begin_s + self.over_s {
-            return self.to_nm;
+            return self.to;
         }
-        self.from_nm + (self.to_nm - self.from_nm) * (t_s - self.begin_s) / self.over_s
+        let share = (t_s - self.begin_s) / self.over_s;
+        [0, 1].map(|k| self.from[k] + (self.to[k] - self.from[k]) * share)
     }
 }
 
 /// The computer's state.
 pub struct Talk {
+    system: System,
     lines: Lines,
     next: Option<Line>,
     ended: bool,
     /// Before this time no line is done.
     wait_until_s: f64,
     slot: u64,
-    command: Command,
+    command: Spoken,
     /// Slots in which charge, discharge and acknowledge are taken back.
     edges: [u64; 3],
     ramp: Ramp,
     speed_loop: Option<SpeedLoop>,
     inertia_kg_m2: f64,
     largest_nm: f64,
-    load_nm: f64,
+    loads_nm: [f64; 2],
     sender: Sender,
     /// What the telemetry says.
     pub listener: Listener,
     /// Rows of telemetry.csv.
-    pub rows: Vec<[String; COLUMNS.len()]>,
+    pub rows: Vec<Vec<String>>,
     /// Lines of frames.log.
     pub frames: String,
     /// Frames sent.
@@ -72,22 +75,23 @@ pub struct Talk {
 
 impl Talk {
     /// At rest; the speed loop is made for this inertia and torque.
-    pub fn new(lines: Lines, inertia_kg_m2: f64, largest_nm: f64) -> Self {
+    pub fn new(system: System, lines: Lines, inertia_kg_m2: f64, largest_nm: f64) -> Self {
         Self {
+            system,
             lines,
             next: None,
             ended: false,
             wait_until_s: 0.0,
             slot: 0,
-            command: Command::default(),
+            command: Spoken::default(),
             edges: [0; 3],
-            ramp: Ramp { from_nm: 0.0, to_nm: 0.0, begin_s: 0.0, over_s: 0.0 },
+            ramp: Ramp::default(),
             speed_loop: None,
             inertia_kg_m2,
             largest_nm,
-            load_nm: 0.0,
-            sender: Sender::default(),
-            listener: Listener::default(),
+            loads_nm: [0.0; 2],
+            sender: Sender::new(system),
+            listener: Listener::new(system),
             rows: Vec::new(),
             frames: String::new(),
             sent: 0,
@@ -108,7 +112,7 @@ impl Talk {
     fn read(&mut self, t_s: f64) -> Result<()> {
         while !self.ended && t_s + DUE_S >= self.wait_until_s {
             if self.next.is_none() {
-                self.next = self.lines.take()?;
+                self.next = self.lines.take(self.system)?;
             }
             let Some(line) = self.next.take() else {
                 self.ended = true;
@@ -127,33 +131,48 @@ impl Talk {
     }
 
     fn act(&mut self, t_s: f64, line: &Line) {
-        let command = &mut self.command;
+        let levels = &mut self.command.levels;
         match &line.action {
             Action::Enable { with_torque } => {
-                (command.enable, command.with_torque) = (true, *with_torque);
+                (levels.enable, levels.with_torque) = (true, *with_torque);
             }
-            Action::Disable => command.enable = false,
-            Action::Off(level) => command.off = *level,
-            Action::Coast(level) => command.coast = *level,
+            Action::Disable => levels.enable = false,
+            Action::Off(level) => levels.off = *level,
+            Action::Coast(level) => levels.coast = *level,
             Action::Charge => self.raise(0),
             Action::Discharge => self.raise(1),
             Action::Acknowledge => self.raise(2),
-            Action::Torque(to_nm, over_s) => {
-                let from_nm = f64::from(command.torque_nm);
-                self.ramp = Ramp { from_nm, to_nm: *to_nm, begin_s: t_s, over_s: *over_s };
+            Action::Torque(to, over_s) => {
+                let from = self.command.torques_nm.map(f64::from);
+                self.ramp = Ramp { from, to: *to, begin_s: t_s, over_s: *over_s };
                 self.speed_loop = None;
+                self.command.speeds_rpm = None;
             }
-            Action::Speed(target_rpm, slope_rpm_s) => {
-                let measured = self.listener.measured.speed_rpm.map_or(0.0, f64::from);
-                let torque_nm = f64::from(command.torque_nm);
+            Action::Speed(targets_rpm, slope_rpm_s) if self.system == System::Zs9 => {
+                let from = match self.command.speeds_rpm {
+                    Some(speeds_rpm) => speeds_rpm.map(f64::from),
+                    None => self.listener.speeds_rpm().map(|speed_rpm| speed_rpm.map_or(0.0, f64::from)),
+                };
+                let way = (0..2).map(|k| (targets_rpm[k] - from[k]).abs()).fold(0.0, f64::max);
+                self.ramp = Ramp { from, to: *targets_rpm, begin_s: t_s, over_s: way / slope_rpm_s };
+                self.command.speeds_rpm = Some(from.map(|speed_rpm| speed_rpm as f32));
+                self.command.torques_nm = [0.0; 2];
+            }
+            Action::Speed([target_rpm, _], slope_rpm_s) => {
+                let [speed_rpm, _] = self.listener.speeds_rpm();
+                let measured = speed_rpm.map_or(0.0, f64::from);
+                let torque_nm = f64::from(self.command.torques_nm[0]);
                 let (inertia, largest) = (self.inertia_kg_m2, self.largest_nm);
                 let held = self.speed_loop.take();
                 let mut held = held.unwrap_or_else(|| SpeedLoop::new(inertia, largest, measured, torque_nm));
                 held.aim(*target_rpm, *slope_rpm_s);
                 self.speed_loop = Some(held);
             }
-            Action::Load(load_nm) => self.load_nm = *load_nm,
-            Action::Limits(limits) => self.sender.torque_limits = Some(*limits),
+            Action::Load(loads_nm) => self.loads_nm = *loads_nm,
+            Action::Limits(motor, limits) => self.sender.torque_limits[*motor] = Some(*limits),
+            Action::Link(link_ref_v) => {
+                self.sender.link_ref = Some(Zs9Link { link_ref_v: *link_ref_v as f32 });
+            }
             Action::LinkLimits(limits) => self.sender.link = Some(*limits),
             Action::Read(parameter) => self.ask(ParameterRequest { parameter: *parameter, write: None }),
             Action::Write(parameter, value) => {
@@ -201,29 +220,38 @@ impl Talk {
     /// Torque and levels of this slot.
     fn shape(&mut self, t_s: f64) {
         if self.slot % COMMAND_SLOTS == 1 {
-            let torque_nm = match &mut self.speed_loop {
-                Some(held) => {
-                    let measured = self.listener.measured.speed_rpm.map_or(0.0, f64::from);
-                    held.step(measured, COMMAND_SLOTS as f64 * SLOT_S)
+            match (&mut self.speed_loop, &mut self.command) {
+                (Some(held), command) => {
+                    let [speed_rpm, _] = self.listener.speeds_rpm();
+                    let measured = speed_rpm.map_or(0.0, f64::from);
+                    command.torques_nm[0] = held.step(measured, COMMAND_SLOTS as f64 * SLOT_S) as f32;
                 }
-                None => self.ramp.at(t_s),
-            };
-            self.command.torque_nm = torque_nm as f32;
+                (None, Spoken { speeds_rpm: Some(speeds_rpm), .. }) => {
+                    *speeds_rpm = self.ramp.at(t_s).map(|rpm| rpm as f32);
+                }
+                (None, command) => command.torques_nm = self.ramp.at(t_s).map(|nm| nm as f32),
+            }
         }
         let [charge, discharge, acknowledge] = self.edges.map(|until| self.slot < until);
-        let command = &mut self.command;
-        (command.charge, command.discharge, command.acknowledge) = (charge, discharge, acknowledge);
+        let levels = &mut self.command.levels;
+        (levels.charge, levels.discharge, levels.acknowledge) = (charge, discharge, acknowledge);
     }
 
     /// One line about the drive.
     pub fn state(&self, t_s: f64) -> String {
         let say = |column: &str| self.listener.value(column);
+        let both = |what: &str, unit: &str| match self.system {
+            System::Pmasynrm => say(&format!("{what}_{unit}")),
+            System::Zs9 => {
+                format!("{}, {}", say(&format!("{what}1_{unit}")), say(&format!("{what}2_{unit}")))
+            }
+        };
         format!(
             "{t_s:8.3} s  {:<9} {:<11} {:>8} r/min  {:>8} N·m  {:>7} V  {} {}",
             say("state"),
             say("listening"),
-            say("speed_rpm"),
-            say("torque_nm"),
+            both("speed", "rpm"),
+            both("torque", "nm"),
             say("link_v"),
             say("fault"),
             say("refusal"),
@@ -261,7 +289,7 @@ impl Supervisor for Talk {
             self.log(t_s, frame, 'T');
         }
         self.slot += 1;
-        Ok(Turn { frame, load_nm: self.load_nm, done: self.ended })
+        Ok(Turn { frame, loads_nm: self.loads_nm, done: self.ended })
     }
 
     fn is_typed(&self) -> bool {

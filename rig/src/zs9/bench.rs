@@ -5,19 +5,23 @@
 //! its nominal instant.
 
 use super::inject::{Injection, Kind, Spoiler};
+use super::line::{LineSide, LineTimes};
 use super::operator::{Operator, Orders};
 use super::sensors::Sensors;
-use super::trace::{Edge, MotorRow, Row};
-use crate::bench::{Converter, Flaws, Limits, Observed, Peaks, Stored};
+use super::trace::{Edge, MotorRow, Recording, Row};
+use crate::bench::{Converter, Flaws, Limits, Observed, Peaks, Stored, Tick};
 use crate::benchmark::in_plant;
-use crate::plant::zs9::{IllegalState, LegGates, Source, Zs9Plant};
+use crate::plant::zs9::{IllegalState, LegGates, NetworkState, Source, Zs9Plant};
+use crate::run::Supervised;
 use crate::steps::held;
 use std::collections::VecDeque;
-use tractive::board::{DualSample, GateFeedback, PlayedPeriod, PowerSample};
+use tractive::board::{DualSample, GateFeedback, HardwareBreak, PlayedPeriod, PowerSample};
 use tractive::drive::dual::{COMPARE_STEPS, DualReport};
 use tractive::frames::Abc;
 use tractive::nine_switch::Scheme;
-use tractive::protection::SafeState;
+use tractive::operator::{DualStatus, Feedback};
+use tractive::protection::{Fault, SafeState};
+use tractive::recorder::DualRecord;
 use tractive::time::{Clock, Instant};
 
 /// Compare steps since the run's beginning.
@@ -49,6 +53,12 @@ pub enum BenchError {
     /// Control fell behind.
     #[error("at {0:.6} s the control interrupt has not reported within its period")]
     ControlLate(f64),
+    /// The operator asked for a slot that is not there.
+    #[error("the operator's slot of tick {0} was asked for and is not kept")]
+    NoSlot(Tick),
+    /// The operator fell behind.
+    #[error("at {0:.6} s the operator has not finished its slot before the next one")]
+    OperatorLate(f64),
     /// The gates asked for what the bridge must not have.
     #[error(transparent)]
     Illegal(#[from] IllegalState),
@@ -129,7 +139,12 @@ pub struct Bench {
     turn_on: [Option<Steps>; 9],
     dead_time: Steps,
     off: bool,
-    off_at: Option<Steps>,
+    /// When the gates go off (true) or may be played again (false).
+    off_at: Option<(Steps, bool)>,
+    line: Option<LineSide>,
+    /// Loads to come, by their steps.
+    loads: VecDeque<(Steps, [f64; 2])>,
+    loads_nm: Option<[f64; 2]>,
     observed: Observed,
     feedback: GateFeedback,
     orders: Orders,
@@ -176,6 +191,9 @@ impl Bench {
             dead_time: steps(settings.dead_time_s),
             off: false,
             off_at: None,
+            line: None,
+            loads: VecDeque::new(),
+            loads_nm: None,
             observed: Observed::new(from, settings.limits),
             feedback: GateFeedback::default(),
             samples: VecDeque::new(),
@@ -184,10 +202,49 @@ impl Bench {
             report: DualReport::default(),
             next_row: lead,
             sums: Sums::default(),
-            rows: Vec::with_capacity(rows_wanted),
+            rows: Vec::with_capacity(rows_wanted.min(1 << 20)),
             edges: Vec::new(),
             settings,
         }
+    }
+
+    /// The same with a line side: the network is empty, behind open contactors, and the drive has an operator.
+    pub fn with_line(mut self, times: LineTimes) -> Self {
+        self.line = Some(LineSide::new(times, &self.settings.clock));
+        self.plant.set_network(NetworkState::even(0.0, LineSide::EMPTY_V));
+        self
+    }
+
+    /// Whether the drive has an operator.
+    pub fn is_operated(&self) -> bool {
+        self.line.is_some()
+    }
+
+    /// What the board says to the operator in the slot that began at `instant`.
+    pub fn ask(&mut self, instant: Instant) -> Result<Feedback, BenchError> {
+        let tick = self.widen(instant) / Steps::from(COMPARE_STEPS);
+        self.line
+            .as_mut()
+            .and_then(|line| line.gear.ask(tick))
+            .map(|(_, feedback)| feedback)
+            .ok_or(BenchError::NoSlot(tick))
+    }
+
+    /// What the operator told; it holds from `from` on.
+    pub fn told(&mut self, from: Instant, status: DualStatus) -> Result<(), BenchError> {
+        let step = self.widen(from);
+        if step < self.now {
+            return Err(BenchError::OperatorLate(self.seconds(step)));
+        }
+        if let Some(line) = &mut self.line {
+            line.gear.tell(step / Steps::from(COMPARE_STEPS), status);
+        }
+        Ok(())
+    }
+
+    /// What holds the gates off in hardware now.
+    fn hardware(&self) -> Option<Fault> {
+        self.spoiler.hardware(self.seconds(self.now))
     }
 
     /// The same beginning at another tick than 0, with tasks of [`super::run::Tasks::beginning_at`] the same: where instants wrap.
@@ -224,9 +281,11 @@ impl Bench {
         ((self.now - self.origin) as f64 * self.step_s / end_s).min(1.0)
     }
 
-    /// What was recorded: the rows of the trace, and the edges.
-    pub fn into_recording(self) -> (Vec<Row>, Vec<Edge>) {
-        (self.rows, self.edges)
+    /// What was recorded: what the bench saw, and what the drive's own recorder holds; instants in seconds from its beginning.
+    pub fn into_recording(self, records: Vec<DualRecord>) -> Recording {
+        let recorded =
+            records.into_iter().map(|record| (self.seconds(self.widen(record.at)), record)).collect();
+        Recording { rows: self.rows, edges: self.edges, recorded }
     }
 
     /// The conversions that the control timer triggered at `instant`.
@@ -251,6 +310,10 @@ impl Bench {
         self.advance(at)?;
         let feedback = std::mem::take(&mut self.feedback);
         let mut sample = self.sensors.power(&self.plant, feedback);
+        if self.line.is_some() {
+            // The source's sensor is in front of the contactors.
+            sample.source_v = self.nominal_source_v as f32;
+        }
         let true_a = sample.currents_a;
         self.spoiler.power(self.seconds(at), &mut sample);
         self.compare(true_a, sample.currents_a);
@@ -280,7 +343,19 @@ impl Bench {
         let is_control = (from - self.origin).is_multiple_of(control);
         let delay = if is_control { CONTROL_OFF_TICKS } else { PWM_OFF_TICKS };
         let at = from + Steps::from(delay * COMPARE_STEPS);
-        self.off_at = Some(self.off_at.map_or(at, |earlier| earlier.min(at)));
+        self.off_at = match self.off_at {
+            Some((earlier, true)) => Some((earlier.min(at), true)),
+            _ => Some((at, true)),
+        };
+    }
+
+    /// The PWM interrupt at `instant` lets the gates be played again.
+    pub fn leave(&mut self, instant: Instant) {
+        let at = self.widen(instant) + Steps::from(PWM_OFF_TICKS * COMPARE_STEPS);
+        // An order to turn them off that comes meanwhile stands.
+        if self.off_at.is_none() {
+            self.off_at = Some((at, false));
+        }
     }
 
     /// By how much the control interrupt is late, in ticks.
@@ -393,8 +468,14 @@ impl Bench {
             if let Some((toggle, _)) = self.toggles.last() {
                 due = due.min(*toggle);
             }
-            if let Some(off_at) = self.off_at {
+            if let Some((off_at, _)) = self.off_at {
                 due = due.min(off_at.max(self.now));
+            }
+            if let Some(event) = self.line.as_ref().and_then(|line| line.gear.next_event()) {
+                due = due.min((event * Steps::from(COMPARE_STEPS)).max(self.now + 1));
+            }
+            if let Some((at, _)) = self.loads.front() {
+                due = due.min((*at).max(self.now + 1));
             }
             if let Some(turn_on) = self.turn_on.iter().flatten().min() {
                 due = due.min(*turn_on);
@@ -431,6 +512,9 @@ impl Bench {
 
     fn integrate_fed(&mut self, to: Steps) -> Result<(), BenchError> {
         let steps = (to - self.now) as f64;
+        if let Some(line) = &self.line {
+            line.feed(&mut self.plant, self.nominal_source_v, steps * self.step_s);
+        }
         let real = self.real_levels();
         let [uh, vh, wh, um, vm, wm, ul, vl, wl] = real;
         let gates = [(uh, um, ul), (vh, vm, vl), (wh, wm, wl)].map(|(high, middle, low)| LegGates {
@@ -464,12 +548,31 @@ impl Bench {
     }
 
     fn act(&mut self) -> Result<(), BenchError> {
-        if self.off_at.is_some_and(|at| at <= self.now) {
-            self.off_at = None;
-            self.off = true;
-            self.toggles.clear();
-            self.order([false; 9]);
-            self.observed.enters(self.now, SafeState::GatesOff, self.stored());
+        match self.off_at {
+            Some((at, true)) if at <= self.now => {
+                self.off_at = None;
+                self.off = true;
+                self.toggles.clear();
+                self.order([false; 9]);
+                self.observed.enters(self.now, SafeState::GatesOff, self.stored());
+            }
+            Some((at, false)) if at <= self.now => {
+                self.off_at = None;
+                self.off = false;
+            }
+            _ => {}
+        }
+        if let Some(line) = &mut self.line {
+            line.act(self.now / Steps::from(COMPARE_STEPS));
+        }
+        while let Some((at, loads_nm)) = self.loads.front().copied()
+            && at <= self.now
+        {
+            self.loads.pop_front();
+            self.loads_nm = Some(loads_nm);
+            for (motor, load_nm) in self.plant.motors_mut().iter_mut().zip(loads_nm) {
+                motor.set_load_nm(load_nm);
+            }
         }
         let mut ordered = self.ordered;
         while let Some((at, gate)) = self.toggles.last().copied()
@@ -602,6 +705,9 @@ impl Bench {
         let t_s = self.seconds(self.now);
         let speeds = self.plant.motors().each_ref().map(|motor| motor.speed_rpm());
         self.orders = self.operator.orders(t_s, speeds);
+        if let Some(loads_nm) = self.loads_nm {
+            self.orders.loads_nm = loads_nm;
+        }
         for (motor, load_nm) in self.plant.motors_mut().iter_mut().zip(self.orders.loads_nm) {
             motor.set_load_nm(load_nm);
         }
@@ -613,7 +719,16 @@ impl Bench {
         } else {
             self.spoiler.source_v(t_s, supply_v)
         };
-        self.plant.set_source_v(source_v);
+        let hardware = self.hardware();
+        match &mut self.line {
+            None => self.plant.set_source_v(source_v),
+            Some(line) => {
+                let tick = self.now / Steps::from(COMPARE_STEPS);
+                if line.gear.sampled(tick, hardware, || ()) {
+                    return Err(BenchError::OperatorLate(t_s));
+                }
+            }
+        }
         let network = self.plant.network();
         let mut sample = DualSample {
             currents_a: self.sensors.currents(&self.plant),
@@ -624,7 +739,10 @@ impl Bench {
             demands: self.orders.demands,
             link_ref_v: self.settings.link_ref_v as f32,
             scheme: held(&self.course.schemes, t_s).unwrap_or(self.settings.scheme),
-            enable: self.orders.enable,
+            enable: self.orders.enable && hardware.is_none(),
+            speed_torque_nm: DualSample::UNLIMITED_NM,
+            acknowledge: 0,
+            hardware: hardware.map(|fault| HardwareBreak { fault, seen: 1 }),
         };
         let true_a = sample.currents_a;
         self.spoiler.control(t_s, &mut sample);
@@ -684,5 +802,20 @@ impl Bench {
         let end_s = (self.rows.len() + 1) as f64 * self.settings.trace_step_s;
         self.next_row = self.lead + ((end_s / self.step_s).round() as Steps).max(self.now + 1 - self.lead);
         self.show_reports();
+    }
+}
+
+impl Supervised for Bench {
+    fn instant_s(&self, instant: Instant) -> f64 {
+        self.seconds(self.widen(instant))
+    }
+
+    fn loads_from(&mut self, instant: Instant, loads_nm: [f64; 2]) {
+        self.loads.push_back((self.widen(instant), loads_nm));
+    }
+
+    fn end_at(&mut self, instant: Instant) {
+        let end_s = self.seconds(self.widen(instant));
+        self.rows_wanted = self.rows_wanted.min((end_s / self.settings.trace_step_s).round() as usize);
     }
 }

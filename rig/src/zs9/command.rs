@@ -1,5 +1,6 @@
 //! `run zs9-…`: drives a scenario of the ZS9 and writes its files.
 
+use super::figures;
 use super::scenario::{self, Scenario};
 use super::trace::Recording;
 use crate::analysis::Figures;
@@ -59,14 +60,16 @@ pub fn drive(scenario: &dyn Scenario, options: &RunOptions) -> Result<Outcome> {
 /// # Errors
 /// Where a file cannot be written.
 pub fn write(scenario: &dyn Scenario, options: &RunOptions, outcome: &Outcome, out: &Path) -> Result<()> {
-    let Outcome { recording, figures, summary } = outcome;
+    let Outcome { recording, figures: found, summary } = outcome;
     recording.write_trace(&out.join("trace.csv"))?;
+    recording.write_recorder(&out.join("recorder.csv"))?;
     if scenario.edges(options) {
         recording.write_edges(&out.join("edges.csv"))?;
     }
     write_text(&out.join("summary.json"), &(serde_json::to_string_pretty(summary)? + "\n"))?;
     let mut page = Page::new(scenario.name(), scenario.title());
+    figures::recorder(&mut page, recording);
     scenario.plots(recording, &mut page);
     let subtitle = format!("tractive {}, run on {}", env!("CARGO_PKG_VERSION"), options.on.name());
-    write_text(&out.join("report.html"), &page.finish(&subtitle, figures)?)
+    write_text(&out.join("report.html"), &page.finish(&subtitle, found)?)
 }

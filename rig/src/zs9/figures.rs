@@ -5,6 +5,7 @@ use crate::analysis::Figures;
 use crate::options::RunOptions;
 use crate::report::Page;
 use core::f64::consts::TAU;
+use tractive::recorder::DualRecord;
 
 /// A curve: its name and what it shows.
 pub type Curve<'a> = (&'a str, fn(&Row) -> f64);
@@ -137,4 +138,49 @@ fn heading(figure: &str, title: &str) -> String {
         _ => "figure ",
     };
     format!("The paper's {kind}{figure} · {title}")
+}
+
+/// What the drive's flight recorder holds of a fault; nothing if there was none.
+pub fn recorder(page: &mut Page, recording: &Recording) {
+    page.recorded(
+        &recording.recorded,
+        |record| record.state.fault,
+        &[
+            (
+                "the upper motor's currents as sampled",
+                "A",
+                &[
+                    ("ia", |record: &DualRecord| record.currents_a[0].a),
+                    ("ib", |record| record.currents_a[0].b),
+                    ("ic", |record| record.currents_a[0].c),
+                ],
+            ),
+            (
+                "the lower motor's currents as sampled",
+                "A",
+                &[
+                    ("ia", |record| record.currents_a[1].a),
+                    ("ib", |record| record.currents_a[1].b),
+                    ("ic", |record| record.currents_a[1].c),
+                ],
+            ),
+            (
+                "torque references",
+                "N·m",
+                &[
+                    ("upper motor", |record| record.torque_nm[0]),
+                    ("lower motor", |record| record.torque_nm[1]),
+                ],
+            ),
+            (
+                "link, capacitors, source as sampled",
+                "V",
+                &[
+                    ("U_in", |record| record.link_v()),
+                    ("U_c", |record| record.capacitor_v),
+                    ("U_dc", |record| record.source_v),
+                ],
+            ),
+        ],
+    );
 }

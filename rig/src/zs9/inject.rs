@@ -4,6 +4,7 @@ use crate::sensor_faults::{AngleFault, AngleSpoiler, CurrentFault, CurrentSpoile
 use std::str::FromStr;
 use tractive::board::{DualSample, MotorDemand, PowerSample};
 use tractive::frames::Abc;
+use tractive::protection::Fault;
 
 /// What goes wrong.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
@@ -58,11 +59,13 @@ pub enum Kind {
     DemandNotFinite,
     /// A link voltage is wanted that needs too much shoot-through.
     LinkOutOfRange,
+    /// The gate drivers are not ready for 50 ms.
+    GateDriver,
     /// Nothing on the bench: what is wrong lies elsewhere.
     Elsewhere,
 }
 
-const NAMES: [(&str, Kind); 12] = [
+const NAMES: [(&str, Kind); 13] = [
     ("source-short", Kind::SourceShort),
     ("source-low", Kind::SourceLow),
     ("source-high", Kind::SourceHigh),
@@ -75,6 +78,7 @@ const NAMES: [(&str, Kind); 12] = [
     ("not-finite", Kind::NotFinite),
     ("leg-stuck-on", Kind::LegStuckOn),
     ("leg-stuck-off", Kind::LegStuckOff),
+    ("gate-driver", Kind::GateDriver),
 ];
 
 /// What goes wrong, and when: written `NAME@S`.
@@ -110,6 +114,9 @@ pub struct Spoiler {
     angle: Option<(usize, AngleSpoiler)>,
 }
 
+/// How long the gate drivers are not ready, in s.
+const DRIVER_FAULT_S: f64 = 0.05;
+
 /// Seed of a sensor's noise.
 const SEED: u64 = 1;
 
@@ -140,6 +147,12 @@ impl Spoiler {
     /// What is wrong at an instant, if anything is.
     pub fn kind(&self, t_s: f64) -> Option<Kind> {
         self.injection.filter(|injection| t_s >= injection.at_s - 1e-9).map(|injection| injection.kind)
+    }
+
+    /// What holds the gates off in hardware at an instant.
+    pub fn hardware(&self, t_s: f64) -> Option<Fault> {
+        let injection = self.injection.filter(|injection| injection.kind == Kind::GateDriver)?;
+        (0.0..DRIVER_FAULT_S).contains(&(t_s - injection.at_s)).then_some(Fault::GateDriver)
     }
 
     /// The source's true voltage, in V.

@@ -4,6 +4,7 @@ pub mod bench;
 pub mod command;
 pub mod figures;
 pub mod inject;
+pub mod line;
 mod operator;
 mod patterns;
 pub mod run;

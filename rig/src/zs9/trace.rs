@@ -1,10 +1,12 @@
 //! What a run of the ZS9 leaves behind. Files are written whole or not at all.
 
-use crate::trace::write_whole;
+use crate::bench::degrees;
+use crate::trace::{forget, write_whole};
 use anyhow::Result;
 use std::path::Path;
 use tractive::nine_switch::Scheme;
 use tractive::protection::Trip;
+use tractive::recorder::DualRecord;
 
 /// Names of the gates in edges.csv, in the order of the modulator's.
 const GATES: [&str; 9] = ["uh", "vh", "wh", "um", "vm", "wm", "ul", "vl", "wl"];
@@ -78,6 +80,8 @@ pub struct Recording {
     pub rows: Vec<Row>,
     /// Gate edges, if they were kept.
     pub edges: Vec<Edge>,
+    /// What the drive's flight recorder holds, with its times in s from the recording's beginning; empty without a fault.
+    pub recorded: Vec<(f64, DualRecord)>,
 }
 
 const COLUMNS: [&str; 26] = [
@@ -106,6 +110,30 @@ const COLUMNS: [&str; 26] = [
     "scheme",
     "tl1_nm",
     "tl2_nm",
+    "fault",
+];
+
+/// Columns of recorder.csv.
+const RECORDER: [&str; 20] = [
+    "t_s",
+    "ia1_a",
+    "ib1_a",
+    "ic1_a",
+    "ia2_a",
+    "ib2_a",
+    "ic2_a",
+    "angle1_deg",
+    "angle2_deg",
+    "uin_v",
+    "vc_v",
+    "udc_v",
+    "il_a",
+    "te1_ref_nm",
+    "te2_ref_nm",
+    "d_sh",
+    "scheme",
+    "enabled",
+    "pulsing",
     "fault",
 ];
 
@@ -163,6 +191,36 @@ impl Recording {
             out.write_record(COLUMNS)?;
             for row in &self.rows {
                 out.write_record(row.fields())?;
+            }
+            Ok(())
+        })
+    }
+
+    /// Writes recorder.csv, if a fault has frozen the flight recorder; else takes away what an earlier run has left.
+    pub fn write_recorder(&self, path: &Path) -> Result<()> {
+        if self.recorded.is_empty() {
+            return forget(path);
+        }
+        write_whole(path, |out| {
+            out.write_record(RECORDER)?;
+            for (t_s, record) in &self.recorded {
+                let DualRecord { currents_a, angles, torque_nm, state, .. } = record;
+                let numbers = currents_a
+                    .iter()
+                    .flat_map(|currents| [currents.a, currents.b, currents.c])
+                    .chain(angles.map(|angle| degrees(angle) as f32))
+                    .chain([record.link_v(), record.capacitor_v, record.source_v, record.inductor_a])
+                    .chain(*torque_nm)
+                    .chain([record.duty]);
+                let flags = [state.enabled, state.pulsing].map(|flag| u8::from(flag).to_string());
+                out.write_record(
+                    [short(*t_s, 1e9)]
+                        .into_iter()
+                        .chain(numbers.map(|number| number.to_string()))
+                        .chain([state.scheme.name().to_owned()])
+                        .chain(flags)
+                        .chain([state.fault.map_or("", |fault| fault.name()).to_owned()]),
+                )?;
             }
             Ok(())
         })

@@ -5,7 +5,7 @@
 //! pass the filters; remote frames and 29-bit identifiers never do.
 
 use super::start::{StartError, Wait};
-use crate::protocol::{Frame, TO_DRIVE};
+use crate::protocol::{Frame, Message};
 use stm32_metapac as pac;
 use stm32_metapac::can::vals::{Anfe, Anfs, Pdiv, Tfqm};
 use stm32_metapac::rcc::vals::Fdcansel;
@@ -60,8 +60,6 @@ pub const TIMING: BitTiming = match BitTiming::exact(CLOCK_HZ, BIT_RATE, SAMPLE_
 const ELEMENT: usize = 18;
 /// Elements of a FIFO.
 const ELEMENTS: usize = 3;
-/// Two identifiers share a filter.
-const FILTERS: usize = TO_DRIVE.len().div_ceil(2);
 /// Slots after a bus-off until it is left, in ms: a bus that is shorted is not stormed.
 pub const BUS_OFF_MS: u32 = 100;
 
@@ -93,8 +91,13 @@ impl Can {
         Self { can, ram, health: Health { dropped: 0, bus_offs: 0 }, waits_ms: None }
     }
 
-    /// Clock, timing, filters; then it joins the bus. Its pins follow, so that nothing dominant is sent before.
-    pub fn configure(&self, rcc: &pac::rcc::Rcc, wait: &mut dyn Wait) -> Result<(), StartError> {
+    /// Clock, timing, filters for these messages; then it joins the bus. Its pins follow, so that nothing dominant is sent before.
+    pub fn configure(
+        &self,
+        messages: &[&Message],
+        rcc: &pac::rcc::Rcc,
+        wait: &mut dyn Wait,
+    ) -> Result<(), StartError> {
         rcc.ccipr().modify(|w| w.set_fdcansel(Fdcansel::HSE));
         rcc.apb1enr1().modify(|w| w.set_fdcanen(true));
         let can = self.can;
@@ -125,10 +128,11 @@ impl Can {
             w.set_anfs(Anfs::REJECT);
             // A full FIFO keeps what it has: the sequence's gap is seen by the counters.
             w.set_f0om(false);
-            w.set_lss(FILTERS as u8);
+            // Two identifiers share a filter.
+            w.set_lss(messages.len().div_ceil(2) as u8);
             w.set_lse(0);
         });
-        for (index, pair) in TO_DRIVE.chunks(2).enumerate().take(FILTERS) {
+        for (index, pair) in messages.chunks(2).enumerate() {
             if let (Some(first), Some(last)) = (pair.first(), pair.last()) {
                 self.ram.flssa(index).write_value(dual_filter(first.id, last.id));
             }

@@ -3,7 +3,7 @@
 
 use super::can::Can;
 use super::operator::Operator;
-use super::pins;
+use super::pins::{self, Pin};
 use super::power_stage::CORE_HZ;
 use super::registers::Registers;
 use super::serve::Serve;
@@ -15,7 +15,7 @@ use crate::configuration::Refused;
 use crate::drive::Report;
 use crate::machine::BUILT_IN;
 use crate::operator::{self, Configuration, Line, Slot, slot_s};
-use crate::protocol::Station;
+use crate::protocol::{Message, Station, TO_DRIVE};
 use crate::recorder::{Record, Recorder};
 use cortex_m::peripheral::NVIC;
 use defmt_rtt as _;
@@ -85,13 +85,18 @@ pub fn prepare(plan: Plan) -> Result<Found, StartError> {
     if let Err(error) = &found {
         defmt::error!("no start: {}", error);
     }
+    join_bus(&TO_DRIVE, &pins::PINS);
+    found
+}
+
+/// Joins the bus for these messages.
+pub(super) fn join_bus(messages: &[&Message], of: &[Pin]) {
     let registers = Registers::CHIP;
-    match Can::CHIP.configure(&registers.rcc, &mut Cycles) {
-        Ok(()) => pins::configure_bus(&registers, &pins::PINS),
+    match Can::CHIP.configure(messages, &registers.rcc, &mut Cycles) {
+        Ok(()) => pins::configure_bus(&registers, of),
         // Nobody can command the drive then; it rests.
         Err(error) => defmt::error!("no bus: {}", error),
     }
-    found
 }
 
 /// Does not start: the reset has left every gate's pin floating and every interrupt masked, and so they stay.

@@ -1,7 +1,7 @@
 //! What holds the gates off without software, and its name.
 
 use super::comparators::WATCHING;
-use super::legs::SoftwareBreak;
+use super::outputs::{Outputs, SoftwareBreak};
 use super::pins;
 use super::registers::Registers;
 use crate::protection::Fault;
@@ -11,15 +11,20 @@ use crate::protection::Fault;
 /// well it was a comparator.
 #[inline]
 pub fn latched_by(registers: &Registers) -> Option<Fault> {
-    let legs = &registers.legs;
-    if !legs.is_tripped() {
+    cause(&registers.legs.outputs(), || held_by(registers))
+}
+
+/// The same for any system's timers, with what holds the gates now.
+#[inline]
+pub fn cause<const N: usize>(outputs: &Outputs<N>, held: impl FnOnce() -> Option<Fault>) -> Option<Fault> {
+    if !outputs.is_tripped() {
         return None;
     }
-    match legs.software_break() {
+    match outputs.software_break() {
         Some(SoftwareBreak::Drive) => None,
         Some(SoftwareBreak::Late) => Some(Fault::PwmDeadline),
-        None if legs.is_system_break() => Some(Fault::ClockFailure),
-        None => held_by(registers).or(Some(Fault::HardwareOvercurrent)),
+        None if outputs.is_system_break() => Some(Fault::ClockFailure),
+        None => held().or(Some(Fault::HardwareOvercurrent)),
     }
 }
 
@@ -28,9 +33,15 @@ pub fn held_by(registers: &Registers) -> Option<Fault> {
     if !pins::drivers_ready(registers) {
         return Some(Fault::GateDriver);
     }
-    let seen = WATCHING.iter().any(|number| {
-        let comparator = registers.comparators.get(number - 1);
-        comparator.is_some_and(|comparator| comparator.csr().read().value())
-    });
-    seen.then_some(Fault::HardwareOvercurrent)
+    (seen_by(registers, &WATCHING) != 0).then_some(Fault::HardwareOvercurrent)
+}
+
+/// Which of these comparators see their threshold crossed, a bit each, bit 0 that of COMP1.
+pub fn seen_by(registers: &Registers, numbers: &[usize]) -> u16 {
+    numbers.iter().fold(0, |bits, number| {
+        let index = number.wrapping_sub(1);
+        let comparator = registers.comparators.get(index);
+        let crossed = comparator.is_some_and(|comparator| comparator.csr().read().value());
+        bits | u16::from(crossed) << (index & 0xF)
+    })
 }

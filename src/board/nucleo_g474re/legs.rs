@@ -25,25 +25,13 @@
 use super::comparators;
 use super::dead_time::DeadTime;
 use super::half::{HalfRegisters, LegCompares, NEVER};
+pub use super::outputs::SoftwareBreak;
 use super::outputs::{BreakSources, Outputs};
 use stm32_metapac::timer::{TimAdv, regs, vals};
 
 /// A leg's channel pair.
 const FIRST_PAIR: usize = 0;
 const SECOND_PAIR: usize = 1;
-
-/// The channel of TIM8 whose compare says on whose account software has broken.
-const NOTE: usize = 3;
-
-/// A break made by software.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u16)]
-pub enum SoftwareBreak {
-    /// The drive has a fault of its own.
-    Drive = 1,
-    /// The PWM interrupt ended after its half.
-    Late,
-}
 
 /// The two timers.
 #[derive(Clone, Copy)]
@@ -86,7 +74,8 @@ impl Legs {
         self.outputs().lock(dead_time, [sources; 2]);
     }
 
-    const fn outputs(&self) -> Outputs<2> {
+    /// The timers' main outputs.
+    pub const fn outputs(&self) -> Outputs<2> {
         Outputs([self.tim1, self.tim8])
     }
 
@@ -160,29 +149,16 @@ impl Legs {
         self.outputs().trip();
     }
 
-    /// The same on software's own account, which is kept in the compare of TIM8's fourth channel: it has no output.
+    /// The same on software's own account.
     #[inline]
     pub fn trip_by(&self, software: SoftwareBreak) {
-        if !self.is_tripped() {
-            self.tim8.ccr(NOTE).write(|w| w.set_ccr(software as u16));
-        }
-        self.trip();
+        self.outputs().trip_by(software);
     }
 
     /// On whose account software has broken; `None` where the hardware was first.
     #[inline]
     pub fn software_break(&self) -> Option<SoftwareBreak> {
-        match self.tim8.ccr(NOTE).read().ccr() {
-            1 => Some(SoftwareBreak::Drive),
-            2 => Some(SoftwareBreak::Late),
-            _ => None,
-        }
-    }
-
-    /// Whether the chip's own break was there: crystal, lock-up, memory.
-    #[inline]
-    pub fn is_system_break(&self) -> bool {
-        self.tim1.sr().read().sbif() || self.tim8.sr().read().sbif()
+        self.outputs().software_break()
     }
 
     /// Whether a break, from hardware or software, has switched the outputs off.
@@ -196,14 +172,10 @@ impl Legs {
     #[inline]
     pub fn leave(&self) -> bool {
         self.outputs().switch_off();
-        self.tim8.ccr(NOTE).write(|w| w.set_ccr(0));
         self.tim1.ccmr_output(FIRST_PAIR).write_value(combined());
         self.tim1.ccmr_output(SECOND_PAIR).write_value(combined());
         self.tim8.ccmr_output(FIRST_PAIR).write_value(combined());
-        for timer in [self.tim1, self.tim8] {
-            timer.sr().write_value(all_but_breaks());
-        }
-        !self.is_tripped()
+        self.outputs().leave()
     }
 
     /// The three lower devices on for good, unless a break is latched. The dead time passes first, in hardware.
@@ -256,13 +228,4 @@ fn driven(channels: &[usize]) -> regs::CcerAdv {
 /// Status flags are cleared by writing 0 and left alone by writing 1.
 const fn all_but_update() -> regs::SrAdv {
     regs::SrAdv(!1)
-}
-
-/// Likewise, of the breaks' flags.
-fn all_but_breaks() -> regs::SrAdv {
-    let mut flags = regs::SrAdv(u32::MAX);
-    flags.set_bif(0, false);
-    flags.set_bif(1, false);
-    flags.set_sbif(false);
-    flags
 }

@@ -16,6 +16,16 @@ pub struct BreakSources {
     pub comparators: &'static [usize],
 }
 
+/// On whose account software has broken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u16)]
+pub enum SoftwareBreak {
+    /// The drive has named a fault.
+    Drive = 1,
+    /// The PWM interrupt ended too late, or was missed.
+    Late = 2,
+}
+
 /// The PWM timers of a system.
 #[derive(Clone, Copy)]
 pub struct Outputs<const N: usize>(pub [TimAdv; N]);
@@ -66,6 +76,58 @@ impl<const N: usize> Outputs<N> {
         }
     }
 
+    /// The same on software's own account, which is kept in the last timer's sixth compare: it has no output.
+    #[inline]
+    pub fn trip_by(&self, software: SoftwareBreak) {
+        if !self.is_tripped() {
+            self.note(software as u16);
+        }
+        self.trip();
+    }
+
+    /// On whose account software has broken; `None` where the hardware was first.
+    #[inline]
+    pub fn software_break(&self) -> Option<SoftwareBreak> {
+        match self.0.last()?.ccr6().read().ccr() {
+            1 => Some(SoftwareBreak::Drive),
+            2 => Some(SoftwareBreak::Late),
+            _ => None,
+        }
+    }
+
+    #[inline]
+    fn note(&self, value: u16) {
+        if let Some(timer) = self.0.last() {
+            timer.ccr6().write(|w| w.set_ccr(value));
+        }
+    }
+
+    /// Whether the chip's own break was there: crystal, lock-up, memory.
+    #[inline]
+    pub fn is_system_break(&self) -> bool {
+        self.0.into_iter().any(|timer| timer.sr().read().sbif())
+    }
+
+    /// Which timers have latched a break, a bit each from the first on.
+    #[inline]
+    pub fn broken(&self) -> u16 {
+        self.0.into_iter().rev().fold(0, |bits, timer| {
+            let status = timer.sr().read();
+            bits << 1 | u16::from(status.bif(0) || status.bif(1) || status.sbif())
+        })
+    }
+
+    /// Forgets a break, outputs off. `false` while the cause lasts, which sets its flag again.
+    #[inline]
+    pub fn leave(&self) -> bool {
+        self.switch_off();
+        self.note(0);
+        for timer in self.0 {
+            timer.sr().write_value(all_but_breaks());
+        }
+        !self.is_tripped()
+    }
+
     /// Whether any output is on.
     pub fn is_on(&self) -> bool {
         self.0.into_iter().any(|timer| timer.bdtr().read().moe())
@@ -96,4 +158,13 @@ impl<const N: usize> Outputs<N> {
             timer.bdtr().modify(|w| w.set_moe(on));
         }
     }
+}
+
+/// Status flags are cleared by writing 0 and left alone by writing 1; of the breaks' flags.
+fn all_but_breaks() -> regs::SrAdv {
+    let mut flags = regs::SrAdv(u32::MAX);
+    flags.set_bif(0, false);
+    flags.set_bif(1, false);
+    flags.set_sbif(false);
+    flags
 }

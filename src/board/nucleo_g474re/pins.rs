@@ -1,6 +1,7 @@
 //! Which pin does what: the one table, from which the pins are configured and with which the documentation is compared.
 
 use super::registers::Registers;
+use super::switchgear::Wires;
 use stm32_metapac::gpio::Gpio;
 use stm32_metapac::gpio::vals::{Idr, Moder, Ospeedr, Pupdr};
 
@@ -97,12 +98,20 @@ pub(super) struct Wire {
     pub(super) number: usize,
 }
 
+/// The PMaSynRM drive's switchgear.
+pub const SWITCHGEAR: Wires = Wires {
+    precharge: Wire::new(Port::C, 8),
+    main: Wire::new(Port::C, 9),
+    discharge: Wire::new(Port::C, 11),
+    precharge_contact: Wire::new(Port::C, 4),
+    main_contact: Wire::new(Port::C, 5),
+};
+
 impl Wire {
-    pub(super) const PRECHARGE: Self = Self { port: Port::C, number: 8 };
-    pub(super) const MAIN: Self = Self { port: Port::C, number: 9 };
-    pub(super) const DISCHARGE: Self = Self { port: Port::C, number: 11 };
-    pub(super) const PRECHARGE_CONTACT: Self = Self { port: Port::C, number: 4 };
-    pub(super) const MAIN_CONTACT: Self = Self { port: Port::C, number: 5 };
+    /// A pin.
+    pub(super) const fn new(port: Port, number: usize) -> Self {
+        Self { port, number }
+    }
 
     pub(super) const fn port(self, registers: &Registers) -> Gpio {
         self.port.of(registers)

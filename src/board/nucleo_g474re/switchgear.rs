@@ -3,7 +3,7 @@
 //! Relays and contactors are plain outputs, high to close, with an input each for their auxiliary contacts. The chopper is TIM16's
 //! channel 1, edge-aligned, 1 kHz: one period an operator's slot. Its compare is preloaded, so a duty holds for whole periods.
 
-use super::pins::{CHOPPER_OFF, Wire, is_high};
+use super::pins::{self, CHOPPER_OFF, Wire, is_high};
 use super::power_stage::CORE_HZ;
 use super::registers::Registers;
 use crate::link::LineTimes;
@@ -37,23 +37,38 @@ pub fn configure(registers: &Registers) {
     });
 }
 
+/// The wires of a system's switchgear.
+#[derive(Clone, Copy, Debug)]
+pub struct Wires {
+    pub(super) precharge: Wire,
+    pub(super) main: Wire,
+    pub(super) discharge: Wire,
+    pub(super) precharge_contact: Wire,
+    pub(super) main_contact: Wire,
+}
+
 /// Sets all of them. From the idle loop only.
 pub fn set(registers: &Registers, switches: &Switches) {
-    let Switches { precharge, main, discharge, chopper } = *switches;
+    set_wires(registers, &pins::SWITCHGEAR, switches);
+    registers.tim16.ccr(0).write(|w| w.set_ccr(counts(switches.chopper)));
+}
+
+/// The same of any system, without a chopper.
+pub fn set_wires(registers: &Registers, of: &Wires, switches: &Switches) {
+    let Switches { precharge, main, discharge, .. } = *switches;
     // What opens before what closes: a contactor is never still told to be closed when the discharge resistor goes on.
-    let wires = [(Wire::PRECHARGE, precharge), (Wire::MAIN, main), (Wire::DISCHARGE, discharge)];
+    let wires = [(of.precharge, precharge), (of.main, main), (of.discharge, discharge)];
     for closes in [false, true] {
         for (wire, _) in wires.iter().filter(|(_, closed)| *closed == closes) {
             wire.set(registers, closes);
         }
     }
-    registers.tim16.ccr(0).write(|w| w.set_ccr(counts(chopper)));
 }
 
 /// What the auxiliary contacts of precharge relay and main contactor say: closed.
-pub fn contacts(registers: &Registers) -> (bool, bool) {
+pub fn contacts(registers: &Registers, of: &Wires) -> (bool, bool) {
     let closed = |wire: Wire| is_high(wire.port(registers), wire.number);
-    (closed(Wire::PRECHARGE_CONTACT), closed(Wire::MAIN_CONTACT))
+    (closed(of.precharge_contact), closed(of.main_contact))
 }
 
 /// A duty as a compare; what is no number is none.

@@ -3,17 +3,29 @@
 //! The PWM timer comes at the carrier's peaks, the control timer at its valleys.
 
 use super::{
-    CLOCK, CONTROL_TIMER, Control, PWM_TIMER, Pwm, enable_interrupts, exchange, read_register, start_timers,
-    stop, write_register,
+    CLOCK, CONTROL_TIMER, Control, OPERATED, PWM_TIMER, Pwm, enable_interrupts, exchange, read_register,
+    start_timers, stop, write_register,
 };
 use crate::board::{DualControlPort, DualPwmPort, DualSample, PlayedPeriod, PowerSample};
 use crate::drive::dual::{DualReport, Settings};
 use crate::link::DualSetup;
+use crate::operator::{DualDemands, DualDesk, DualRequest, DualStatus, Feedback, OperatorPort};
+use crate::protocol::Zs9Station;
+use crate::recorder::DualRecorder;
 use crate::time::Instant;
+use core::sync::atomic::Ordering;
+
+/// Between the ZS9's operator in the idle loop and its control.
+pub static DUAL_DESK: DualDesk = DualDesk::new();
+
+/// The ZS9's flight recorder. The rig reads it when the run is over.
+pub static DUAL_RECORDER: DualRecorder = DualRecorder::new();
 
 /// Opens the link and fetches the set-up. Call once, before [`start_dual`].
 pub fn connect_dual() -> DualSetup {
-    exchange::open_dual()
+    let setup = exchange::open_dual();
+    OPERATED.store(setup.line.is_some(), Ordering::Relaxed);
+    setup
 }
 
 /// Starts both timers: the first PWM interrupt comes at the first peak, the first control interrupt after one control period.
@@ -28,7 +40,11 @@ pub fn start_dual(settings: &Settings) {
 
 impl DualControlPort for Control {
     fn sample(&mut self, now: Instant) -> DualSample {
-        exchange::sample_dual(now)
+        let mut sample = exchange::sample_dual(now);
+        if OPERATED.load(Ordering::Relaxed) {
+            DUAL_DESK.permit(now).apply(&mut sample);
+        }
+        sample
     }
 
     fn gates_off(&mut self, now: Instant) {
@@ -44,6 +60,9 @@ impl DualControlPort for Control {
     }
 
     fn report(&mut self, now: Instant, report: &DualReport) {
+        if OPERATED.load(Ordering::Relaxed) {
+            DUAL_DESK.tell(now, report);
+        }
         exchange::report_dual(now, report);
     }
 }
@@ -59,6 +78,29 @@ impl DualPwmPort for Pwm {
 
     fn gates_off(&mut self, now: Instant) {
         exchange::gates_off(now);
+    }
+
+    fn leave(&mut self, now: Instant) -> bool {
+        exchange::leave_dual(now);
+        true
+    }
+}
+
+/// The idle loop's side of the board, for the ZS9.
+pub struct DualIdle {
+    /// The protocol.
+    pub station: Zs9Station,
+}
+
+impl OperatorPort<DualDemands> for DualIdle {
+    fn ask(&mut self, at: Instant) -> (DualRequest, Feedback) {
+        let (feedback, frame) = exchange::ask_dual(at);
+        (self.station.listen(DUAL_DESK.observed(), frame.as_ref()), feedback)
+    }
+
+    fn tell(&mut self, from: Instant, status: &DualStatus) {
+        let frame = self.station.tell(status);
+        exchange::tell_dual(from, status, frame);
     }
 }
 

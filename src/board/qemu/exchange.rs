@@ -5,7 +5,10 @@ mod dual;
 #[cfg(feature = "saboteur")]
 pub mod file;
 
-pub use dual::{dead_dual, gates_off, open_dual, play_dual, power_sample, report_dual, sample_dual};
+pub use dual::{
+    ask_dual, dead_dual, gates_off, leave_dual, open_dual, play_dual, power_sample, report_dual, sample_dual,
+    tell_dual,
+};
 
 use super::{RECORDER, saboteur, stop};
 use crate::board::Sample;
@@ -65,14 +68,18 @@ pub fn control_sample(now: Instant) -> Sample {
 
 /// Tells what the flight recorder holds, if a fault has frozen it, and ends the emulation.
 fn finish() -> ! {
-    // The rig's time stands still from here on: no interrupt may ask it for samples.
-    cortex_m::interrupt::disable();
+    stand_still();
     saboteur::finish();
     for record in (0..).map_while(|index| RECORDER.read(index)) {
         send(&Request::Recorded(record).to_block());
     }
     send(&Request::End.to_block());
     stop(true)
+}
+
+/// The rig's time stands still from here on: no interrupt may ask it for samples.
+fn stand_still() {
+    cortex_m::interrupt::disable();
 }
 
 /// Phase currents at a carrier boundary.

@@ -38,6 +38,8 @@ pub struct Axis {
 pub struct AxisInput<'a> {
     pub measured: &'a Measurements,
     pub demand: &'a MotorDemand,
+    /// Largest torque that a speed demand may take, in N·m.
+    pub speed_torque_nm: f32,
     /// What the modulator has committed for the carrier period that begins at the sample.
     pub applied: Option<MotorShare>,
     /// Measured link voltage outside shoot-through, in V.
@@ -140,7 +142,7 @@ impl Axis {
             ripple_share: 1.0,
             settled: true,
         };
-        let demand = self.demand(input.demand, omega, settings, tables);
+        let demand = self.demand(input, omega, settings, tables);
         let law = Law { gains: &settings.gains, clock: &settings.clock, tables };
         let control = Input {
             measured: input.measured,
@@ -163,14 +165,20 @@ impl Axis {
     }
 
     /// The torque that is asked for, by the operator or by the speed loop.
-    fn demand(&mut self, demand: &MotorDemand, omega: f32, settings: &Settings, tables: &Tables) -> Demand {
-        match demand {
-            MotorDemand::Torque(demand) => *demand,
+    fn demand(&mut self, input: &AxisInput, omega: f32, settings: &Settings, tables: &Tables) -> Demand {
+        let rated_nm = tables.ratings.max_torque_nm;
+        let largest_nm = if input.speed_torque_nm < rated_nm { input.speed_torque_nm } else { rated_nm };
+        match input.demand {
+            MotorDemand::Torque(demand) => {
+                // A speed loop that follows goes on from here.
+                self.speed_loop = SpeedLoop::at(demand.torque_nm);
+                *demand
+            }
             MotorDemand::Speed(wanted_rad_s) => {
                 let input = SpeedInput {
                     wanted_rad_s: *wanted_rad_s,
                     measured_rad_s: omega / tables.ratings.pole_pairs,
-                    largest_nm: tables.ratings.max_torque_nm,
+                    largest_nm,
                 };
                 let torque_nm = self.speed_loop.step(&input, &settings.speed);
                 Demand { torque_nm, slew_limited: false }

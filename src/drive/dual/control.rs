@@ -2,12 +2,13 @@
 
 use super::axis::{self, Axis, AxisInput, AxisOutput};
 use super::{DualApplied, DualCommand, DualReport, MotorCommand, MotorShare, Settings, Shared};
-use crate::board::{DualControlPort, DualSample, MotorDemand};
+use crate::board::{DualControlPort, DualSample, HardwareBreak, MotorDemand};
 use crate::control::{Measurements, ZSource, ZSourceError, ZSourceInput};
 use crate::drive::Gates;
 use crate::frames::{Angle, SQRT_3};
 use crate::machine::{Machine, Tables};
 use crate::protection::{self, Disarmed, Fault, SafeState, Trip, Violation};
+use crate::recorder::{DualRecord, DualState};
 use crate::time::Instant;
 use core::f32::consts::{FRAC_PI_4, TAU};
 use core::sync::atomic::Ordering;
@@ -15,7 +16,7 @@ use core::sync::atomic::Ordering;
 /// Corner of the filter on the voltage limit, in Hz: fed by the link as it is, the limit would make it oscillate.
 const LIMIT_FILTER_HZ: f32 = 10.0;
 /// A motor has at most U_c/(2√3). The link of a two-level inverter whose six-step fundamental is as large, as a share of U_c.
-const TWO_LEVEL_SHARE: f32 = FRAC_PI_4 / SQRT_3;
+pub(super) const TWO_LEVEL_SHARE: f32 = FRAC_PI_4 / SQRT_3;
 /// What a lost sensor is called, by motor.
 const SENSOR_LOST: [Fault; 2] = [Fault::SensorLost1, Fault::SensorLost2];
 
@@ -31,6 +32,8 @@ pub struct ControlTask<M = &'static Tables> {
     now: Instant,
     disarmed: Disarmed,
     trip: Option<Trip>,
+    /// Number of the acknowledge that both interrupts have carried out.
+    acknowledged: u8,
 }
 
 impl<M: Machine> ControlTask<M> {
@@ -45,6 +48,7 @@ impl<M: Machine> ControlTask<M> {
             now: Instant(settings.clock.control_ticks),
             disarmed: Disarmed::NONE,
             trip: None,
+            acknowledged: 0,
         }
     }
 
@@ -71,16 +75,38 @@ impl<M: Machine> ControlTask<M> {
         let newest = shared.applied.read();
         let applied = newest.filter(|applied| now.reached(applied.at));
         let sample = port.sample(now);
+        // Once the PWM interrupt has: what it told before that cannot come back.
+        if sample.acknowledge != self.acknowledged
+            && applied.as_ref().is_some_and(|applied| applied.acknowledged == sample.acknowledge)
+        {
+            self.acknowledged = sample.acknowledge;
+            self.trip = None;
+        }
         if self.trip.is_none() {
             // Also from beyond this call: only where calls of it have been lost.
             self.trip = newest.and_then(|newest| newest.trip);
+        }
+        if let Some(HardwareBreak { fault, seen }) = sample.hardware {
+            // That the gates are held, or did not do what they were told, is only what comes of it.
+            self.trip = self.trip.filter(|trip| !matches!(trip.fault, Fault::GatesHeld | Fault::LegStuck));
+            self.check(Some((fault, f32::from(seen), 0.0)), port);
         }
         self.check(applied.and_then(|applied| self.overdue(&applied, now)), port);
         let angles = self.track(&sample, port);
         let measured = self.measured(&sample, angles);
         self.check_measurements(&sample, &measured, port);
         let known = self.axes.iter().all(Axis::speed_is_known);
-        let mut report = DualReport { scheme: sample.scheme, ..DualReport::default() };
+        let [upper, lower] = &self.axes;
+        let mut report = DualReport {
+            scheme: sample.scheme,
+            omega: [upper.omega(), lower.omega()],
+            current_a: sample.currents_a.map(|currents| currents.peak()),
+            capacitor_v: sample.capacitor_v,
+            source_v: sample.source_v,
+            speed_known: known,
+            acknowledged: self.acknowledged,
+            ..DualReport::default()
+        };
         let mut command = DualCommand {
             motors: [MotorCommand::default(); 2],
             at: now,
@@ -88,6 +114,7 @@ impl<M: Machine> ControlTask<M> {
             duty: 0.0,
             scheme: sample.scheme,
             gates: Gates::Off,
+            acknowledge: sample.acknowledge,
         };
         if self.trip.is_none() && sample.enable && known {
             self.check_frozen(&measured, port);
@@ -105,7 +132,31 @@ impl<M: Machine> ControlTask<M> {
         }
         shared.command.publish(command);
         report.trip = self.trip;
+        if let Some(recorder) = shared.recorder {
+            recorder.record(self.entry(now, &sample, &report, command.gates), self.trip.is_some());
+        }
         port.report(now, &report);
+    }
+
+    /// The period's entry in the flight recorder.
+    #[inline(always)]
+    fn entry(&self, at: Instant, sample: &DualSample, report: &DualReport, gates: Gates) -> DualRecord {
+        DualRecord {
+            at,
+            currents_a: sample.currents_a,
+            angles: sample.angles.map(|angle| angle.unwrap_or(Angle::ZERO)),
+            capacitor_v: sample.capacitor_v,
+            source_v: sample.source_v,
+            inductor_a: sample.inductor_a,
+            torque_nm: report.torque_nm,
+            duty: report.duty,
+            state: DualState {
+                scheme: sample.scheme,
+                enabled: sample.enable,
+                pulsing: gates == Gates::Pulse,
+                fault: self.trip.map(|trip| trip.fault),
+            },
+        }
     }
 
     /// Nominal instant of the next call.
@@ -208,10 +259,11 @@ impl<M: Machine> ControlTask<M> {
         let ([m1, m2], [d1, d2]) = (measured, &sample.demands);
         let (a1, a2) = applied.map_or((None, None), |[a1, a2]| (Some(a1), Some(a2)));
         let (settings, tables) = (&self.settings, self.machine.tables());
-        let step = |axis: &mut Axis, measured, demand, applied| {
-            axis.step(&AxisInput { measured, demand, applied, link_v }, settings, tables)
+        let [l1, l2] = sample.speed_torque_nm;
+        let step = |axis: &mut Axis, measured, demand, speed_torque_nm, applied| {
+            axis.step(&AxisInput { measured, demand, speed_torque_nm, applied, link_v }, settings, tables)
         };
-        let motors = [step(first, m1, d1, a1), step(second, m2, d2, a2)];
+        let motors = [step(first, m1, d1, l1, a1), step(second, m2, d2, l2, a2)];
         let [o1, o2] = &motors;
         let link = ZSourceInput {
             capacitor_v: sample.capacitor_v,

@@ -33,6 +33,8 @@ pub struct DualCommand {
     pub scheme: Scheme,
     /// Whether to make pulses at all.
     pub gates: Gates,
+    /// Number of the operator's last acknowledge.
+    pub acknowledge: u8,
 }
 
 impl DualCommand {
@@ -56,7 +58,9 @@ impl Words<10> for DualCommand {
             self.at.0,
             self.valid_from.0,
             self.duty.to_bits(),
-            u32::from(self.gates == Gates::Pulse) | (self.scheme as u32) << 8,
+            u32::from(self.gates == Gates::Pulse)
+                | (self.scheme as u32) << 8
+                | u32::from(self.acknowledge) << 16,
         ]
     }
 
@@ -72,7 +76,8 @@ impl Words<10> for DualCommand {
             at: Instant(at),
             valid_from: Instant(valid_from),
             duty: f32::from_bits(duty),
-            scheme: scheme_from_code(flags >> 8),
+            scheme: scheme_from_code(flags >> 8 & 0xFF),
+            acknowledge: (flags >> 16) as u8,
             gates: if flags & 1 == 1 { Gates::Pulse } else { Gates::Off },
         }
     }
@@ -101,6 +106,8 @@ pub struct DualApplied {
     pub next: Option<[MotorShare; 2]>,
     /// A fault that the PWM interrupt found.
     pub trip: Option<Trip>,
+    /// Number of the acknowledge that it carried out last.
+    pub acknowledged: u8,
 }
 
 impl Words<10> for DualApplied {
@@ -109,7 +116,7 @@ impl Words<10> for DualApplied {
         let [code, value, limit, at] = trip_to_words(self.trip);
         [
             self.at.0,
-            u32::from(self.next.is_some()),
+            u32::from(self.next.is_some()) | u32::from(self.acknowledged) << 8,
             upper.depth.to_bits(),
             upper.angle.0,
             lower.depth.to_bits(),
@@ -126,7 +133,8 @@ impl Words<10> for DualApplied {
         let share = |depth, angle| MotorShare { depth: f32::from_bits(depth), angle: Angle(angle) };
         Self {
             at: Instant(at),
-            next: (pulsing == 1).then_some([share(d1, a1), share(d2, a2)]),
+            acknowledged: (pulsing >> 8) as u8,
+            next: (pulsing & 1 == 1).then_some([share(d1, a1), share(d2, a2)]),
             trip: trip_from_words(trip),
         }
     }
@@ -149,28 +157,69 @@ pub struct DualReport {
     pub scheme: Scheme,
     /// The latched fault, if any.
     pub trip: Option<Trip>,
+    /// Electrical speeds, in rad/s.
+    pub omega: [f32; 2],
+    /// Largest magnitudes of a phase current, in A.
+    pub current_a: [f32; 2],
+    /// Capacitor voltage, in V.
+    pub capacitor_v: f32,
+    /// Source voltage, in V.
+    pub source_v: f32,
+    /// Whether both speeds have been followed long enough to be used.
+    pub speed_known: bool,
+    /// Number of the acknowledge that both interrupts have carried out.
+    pub acknowledged: u8,
 }
 
-impl Words<11> for DualReport {
-    fn to_words(self) -> [u32; 11] {
+impl DualReport {
+    /// Link voltage outside shoot-through, in V.
+    pub const fn link_v(&self) -> f32 {
+        2.0 * self.capacitor_v - self.source_v
+    }
+}
+
+const SPEED_KNOWN: u32 = 1 << 24;
+const WEAKENING: [u32; 2] = [1 << 25, 1 << 26];
+const SCHEME: u32 = 27;
+
+impl Words<16> for DualReport {
+    #[inline]
+    fn to_words(self) -> [u32; 16] {
         let [t1, t2] = self.torque_nm.map(f32::to_bits);
         let [v1, v2] = self.voltage_v.map(f32::to_bits);
-        let [w1, w2] = self.weakening.map(u32::from);
+        let [w1, w2] = self.omega.map(f32::to_bits);
+        let [i1, i2] = self.current_a.map(f32::to_bits);
         let [code, value, limit, at] = trip_to_words(self.trip);
-        let flags = w1 | w2 << 1 | (self.scheme as u32) << 8;
-        [t1, t2, v1, v2, flags, self.duty.to_bits(), self.inductor_ref_a.to_bits(), code, value, limit, at]
+        let flag = |set: bool, bit: u32| if set { bit } else { 0 };
+        let ([weak1, weak2], [first, second]) = (self.weakening, WEAKENING);
+        let code = code
+            | u32::from(self.acknowledged) << 16
+            | flag(self.speed_known, SPEED_KNOWN)
+            | flag(weak1, first)
+            | flag(weak2, second)
+            | (self.scheme as u32) << SCHEME;
+        let [duty, inductor, capacitor, source] =
+            [self.duty, self.inductor_ref_a, self.capacitor_v, self.source_v].map(f32::to_bits);
+        [t1, t2, v1, v2, duty, inductor, code, value, limit, at, w1, w2, i1, i2, capacitor, source]
     }
 
-    fn from_words(words: [u32; 11]) -> Self {
-        let [t1, t2, v1, v2, flags, duty, inductor, trip @ ..] = words;
+    fn from_words(words: [u32; 16]) -> Self {
+        let [t1, t2, v1, v2, duty, inductor, code, value, limit, at, measured @ ..] = words;
+        let [w1, w2, i1, i2, capacitor_v, source_v] = measured.map(f32::from_bits);
         Self {
-            torque_nm: [f32::from_bits(t1), f32::from_bits(t2)],
-            voltage_v: [f32::from_bits(v1), f32::from_bits(v2)],
-            weakening: [flags & 1 != 0, flags & 2 != 0],
+            torque_nm: [t1, t2].map(f32::from_bits),
+            voltage_v: [v1, v2].map(f32::from_bits),
+            weakening: WEAKENING.map(|bit| code & bit != 0),
             duty: f32::from_bits(duty),
             inductor_ref_a: f32::from_bits(inductor),
-            scheme: scheme_from_code(flags >> 8),
-            trip: trip_from_words(trip),
+            scheme: scheme_from_code(code >> SCHEME & 7),
+            trip: trip_from_words([code, value, limit, at]),
+            omega: [w1, w2],
+            current_a: [i1, i2],
+            capacitor_v,
+            source_v,
+            speed_known: code & SPEED_KNOWN != 0,
+            acknowledged: (code >> 16) as u8,
         }
     }
 }

@@ -24,7 +24,9 @@ mod pwm;
 
 use crate::cell::{Downlink, Uplink};
 use crate::control::{Gains, SpeedDesign, ZSourceDesign, ZSourceGains};
+use crate::machine::Ratings;
 use crate::protection::LinkLimits;
+use crate::recorder::DualRecorder;
 use crate::time::Clock;
 use core::sync::atomic::AtomicU32;
 
@@ -35,6 +37,10 @@ pub use pwm::PwmTask;
 /// Steps of the compare registers in one tick of the timers' clock: 1.25 ns at 25 MHz, as high-resolution timers have them. With
 /// whole ticks the rounding alone would shake each motor's torque by some hundredths of a N·m.
 pub const COMPARE_STEPS: u32 = 32;
+
+/// Share of the nominal source's voltage from which on the capacitors count as charged: at rest they have the source's, which may be
+/// that low.
+pub const LOWEST_SHARE: f32 = 0.9;
 
 /// What both tasks are built with.
 #[derive(Clone, Copy, Debug)]
@@ -73,6 +79,27 @@ impl Settings {
         }
     }
 
+    /// The ratings as the operator looks at them: link voltages are those of the capacitors, and its trip levels the drive's own.
+    pub const fn operator_ratings(&self, ratings: &Ratings) -> Ratings {
+        Ratings {
+            dc_link_min_v: LOWEST_SHARE * ratings.dc_link_min_v / control::TWO_LEVEL_SHARE,
+            dc_link_nominal_v: ratings.dc_link_nominal_v / control::TWO_LEVEL_SHARE,
+            dc_link_max_v: ratings.dc_link_max_v / control::TWO_LEVEL_SHARE,
+            trip_dc_over_v: self.limits.capacitor_max_v,
+            // Once the gates go off, what is above the source's voltage swings as far below it; a source that is lost has a limit
+            // of its own.
+            trip_dc_under_v: 0.5 * self.limits.source_min_v,
+            ..*ratings
+        }
+    }
+
+    /// The lowest and the highest link voltage outside shoot-through that an operator may ask for, and what holds until it does, in V,
+    /// by such ratings.
+    pub const fn link_range_v(ratings: &Ratings) -> [f32; 3] {
+        let source_v = ratings.dc_link_min_v / LOWEST_SHARE;
+        [source_v, 2.0 * ratings.dc_link_max_v - source_v, 2.0 * ratings.dc_link_nominal_v - source_v]
+    }
+
     /// Instant of the first PWM interrupt, in ticks: the first peak.
     pub const fn first_peak_ticks(&self) -> u32 {
         self.carrier_ticks / 2
@@ -97,24 +124,31 @@ impl Settings {
     }
 }
 
-/// The cells between the two interrupts.
-pub struct Shared {
+/// The cells between the two interrupts, and the flight recorder, if there is one.
+pub struct Shared<'a> {
     command: Downlink<DualCommand, 10>,
     applied: Uplink<DualApplied, 10>,
     /// Instant of the newest control interrupt, from its beginning on.
     began: AtomicU32,
+    recorder: Option<&'a DualRecorder>,
 }
 
-impl Shared {
+impl<'a> Shared<'a> {
     /// Empty cells.
     #[cfg(not(loom))]
     pub const fn new() -> Self {
-        Self { command: Downlink::new(), applied: Uplink::new(), began: AtomicU32::new(0) }
+        Self { command: Downlink::new(), applied: Uplink::new(), began: AtomicU32::new(0), recorder: None }
+    }
+
+    /// The same with a flight recorder, which the control interrupt fills.
+    #[cfg(not(loom))]
+    pub const fn recorded_by(recorder: &'a DualRecorder) -> Self {
+        Self { recorder: Some(recorder), ..Self::new() }
     }
 }
 
 #[cfg(not(loom))]
-impl Default for Shared {
+impl Default for Shared<'_> {
     fn default() -> Self {
         Self::new()
     }

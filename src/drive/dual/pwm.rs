@@ -31,6 +31,8 @@ pub struct PwmTask<M = &'static Tables> {
     trip: Option<Trip>,
     /// Link voltage at the last peak, in V.
     last_link_v: Option<f32>,
+    /// Number of the acknowledge that was carried out last.
+    acknowledged: u8,
 }
 
 impl<M: Machine> PwmTask<M> {
@@ -44,6 +46,7 @@ impl<M: Machine> PwmTask<M> {
             disarmed: Disarmed::NONE,
             trip: None,
             last_link_v: None,
+            acknowledged: 0,
         }
     }
 
@@ -65,6 +68,11 @@ impl<M: Machine> PwmTask<M> {
         self.now = now.after(self.settings.carrier_ticks);
         let sample = port.sample(now);
         let command = shared.command.newest(|command| now.reached(DualCommand::valid_from(command)));
+        if let Some(command) = &command
+            && command.acknowledge != self.acknowledged
+        {
+            self.forget_acknowledged(command, port);
+        }
         let began = Instant(shared.began.load(Ordering::Relaxed));
         let stale = stale(now, began, &self.settings.clock);
         let violation = self.violation(&sample, command.as_ref(), stale);
@@ -90,7 +98,12 @@ impl<M: Machine> PwmTask<M> {
         let [_, running] = self.expected;
         self.expected = [running, expected];
         port.play(now, &next);
-        shared.applied.publish(DualApplied { at: now, next: given, trip: self.trip });
+        shared.applied.publish(DualApplied {
+            at: now,
+            next: given,
+            trip: self.trip,
+            acknowledged: self.acknowledged,
+        });
     }
 
     /// Nominal instant of the next call.
@@ -150,6 +163,22 @@ impl<M: Machine> PwmTask<M> {
         let never_off = (before.is_off | running.is_off) ^ seen.off;
         let wrong = (missing | surplus | never_off) & ALL_GATES;
         (wrong != 0).then_some((Fault::LegStuck, f32::from(wrong), 0.0))
+    }
+
+    /// Forgets the fault that is acknowledged and lets the gates go. Each acknowledge does so once: while pulses are wanted there is
+    /// nothing to forget.
+    #[cold]
+    #[inline(never)]
+    fn forget_acknowledged(&mut self, command: &DualCommand, port: &mut impl DualPwmPort) {
+        self.acknowledged = command.acknowledge;
+        if command.gates == Gates::Pulse {
+            return;
+        }
+        self.trip = None;
+        let at = self.now.before(self.settings.carrier_ticks);
+        if !port.leave(at) {
+            self.check(Some((Fault::GatesHeld, 1.0, 0.0)), port);
+        }
     }
 
     fn check(&mut self, violation: Option<Violation>, port: &mut impl DualPwmPort) {

@@ -1,13 +1,13 @@
 //! The drive's own two tasks on the board in memory.
 
 use super::bridge::Rig;
-use super::ports::{control, converted, make_ready};
+use super::ports::{control, converted, make_ready, permitted};
 use tractive::board::nucleo_g474re::zs9::feedback::encoded;
-use tractive::board::nucleo_g474re::zs9::operator::Operator;
 use tractive::board::nucleo_g474re::zs9::{CARRIER_TICKS, CLOCK, CYCLES_PER_TICK, settings};
 use tractive::board::{DualPwmPort, GateFeedback, PlayedPeriod, PowerSample};
 use tractive::drive::dual::{ControlTask, PwmTask, Shared};
 use tractive::machine::zs9::BUILT_IN;
+use tractive::operator::DualDesk;
 use tractive::time::Instant;
 
 /// The board's port, with the driver board's latches in place of the serial words, which memory cannot shift.
@@ -29,6 +29,10 @@ impl DualPwmPort for Port<'_> {
     fn gates_off(&mut self, now: Instant) {
         self.pwm.gates_off(now);
     }
+
+    fn leave(&mut self, now: Instant) -> bool {
+        self.pwm.leave(now)
+    }
 }
 
 #[test]
@@ -36,12 +40,12 @@ fn the_drive_pulses_two_turning_motors_through_the_registers() {
     let mut rig = Rig::new();
     rig.pwm = tractive::board::nucleo_g474re::zs9::Pwm::new(rig.model.registers, super::ports::zeros());
     let registers = rig.model.registers;
-    let (shared, operator) = (Shared::new(), Operator::new(500.0));
-    let mut control = control(registers, &operator);
+    let (shared, desk) = (Shared::new(), DualDesk::new());
+    let mut control = control(registers, &desk);
     let mut control_task = ControlTask::new(&BUILT_IN, settings());
     let mut pwm_task = PwmTask::new(&BUILT_IN, settings());
     make_ready(&registers);
-    operator.ask([10.0, 10.0]);
+    desk.allow_from(permitted([10.0, 10.0], 500.0), Instant(0));
     // 500 V of link from 400 V of source.
     let codes = [(6, 1_843), (9, 1_638)];
     let control_cycles = u64::from(CLOCK.control_ticks * CYCLES_PER_TICK);
@@ -73,7 +77,7 @@ fn the_drive_pulses_two_turning_motors_through_the_registers() {
         shorted = rig.model.shorted[1];
     }
     assert_eq!(control_task.trip().or(pwm_task.trip()), None);
-    assert_eq!(operator.report().unwrap().trip, None);
+    assert_eq!(desk.observed().unwrap().report.trip, None);
     let beats = 400 * CLOCK.control_ticks / CARRIER_TICKS;
     assert!(on > 100 * control_cycles && shorted > 1_000, "{beats} periods: {on} {shorted}");
 }

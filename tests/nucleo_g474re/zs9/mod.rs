@@ -3,5 +3,6 @@
 mod bridge;
 mod drive;
 mod model;
+mod operator;
 mod ports;
 mod start;

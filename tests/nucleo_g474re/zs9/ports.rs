@@ -6,13 +6,13 @@ use stm32_metapac::gpio::regs::Idr;
 use tractive::board::nucleo_g474re::position::Encoder;
 use tractive::board::nucleo_g474re::power_stage::AdcCode;
 use tractive::board::nucleo_g474re::registers::Registers;
-use tractive::board::nucleo_g474re::zs9::operator::Operator;
 use tractive::board::nucleo_g474re::zs9::sampling::Zeros;
 use tractive::board::nucleo_g474re::zs9::stage::STAGE;
 use tractive::board::nucleo_g474re::zs9::{CLOCK, Control, Pwm, start};
 use tractive::board::{DualControlPort, DualPwmPort, GateFeedback, MotorDemand};
 use tractive::control::Demand;
 use tractive::frames::Angle;
+use tractive::operator::{DualDesk, DualPermit};
 use tractive::time::Instant;
 
 const NOW: Instant = Instant(0);
@@ -21,17 +21,34 @@ pub fn zeros() -> Zeros {
     Zeros { motors: [[AdcCode(2_048); 3]; 2], inductor: AdcCode(2_048) }
 }
 
-pub fn control<'a>(registers: Registers, operator: &'a Operator) -> Control<'a, Encoder> {
+pub fn control<'a>(registers: Registers, desk: &'a DualDesk) -> Control<'a, Encoder> {
     let encoders = [registers.tim4, registers.tim3].map(|timer| Encoder::new(timer, &STAGE.common, 4));
-    Control::new(registers, zeros(), encoders, operator)
+    Control::new(registers, zeros(), encoders, desk)
 }
 
-/// Enable input and indices.
+/// Gates may pulse.
+pub fn permitted(torques_nm: [f32; 2], link_ref_v: f32) -> DualPermit {
+    let torque = |torque_nm| MotorDemand::Torque(Demand { torque_nm, slew_limited: true });
+    DualPermit { enable: true, demands: torques_nm.map(torque), link_ref_v, ..DualPermit::NONE }
+}
+
+/// Enable input, drivers and indices.
 pub fn make_ready(registers: &Registers) {
     // SAFETY: IDR is word 4 of the port's block of memory; bit 4 is the enable input.
     unsafe { registers.gpioc.as_ptr().cast::<Idr>().add(4).write_volatile(Idr(1 << 4)) };
+    drivers_ready(registers, true);
     for timer in [registers.tim3, registers.tim4] {
         timer.sr().write(|w| w.set_idxif(true));
+    }
+}
+
+/// The gate drivers' ready wire at both break inputs.
+pub fn drivers_ready(registers: &Registers, ready: bool) {
+    let [b, a] = [u32::from(ready) << 12, u32::from(ready) << 6];
+    // SAFETY: IDR is word 4 of the ports' blocks of memory.
+    unsafe {
+        registers.gpiob.as_ptr().cast::<Idr>().add(4).write_volatile(Idr(b));
+        registers.gpioa.as_ptr().cast::<Idr>().add(4).write_volatile(Idr(a));
     }
 }
 
@@ -49,8 +66,8 @@ pub fn converted(codes: &[(usize, u16)], registers: Registers) {
 #[test]
 fn a_sample_has_both_motors_and_the_link_in_si_units() {
     let registers = Model::started().registers;
-    let operator = Operator::new(600.0);
-    let mut control = control(registers, &operator);
+    let desk = DualDesk::new();
+    let mut control = control(registers, &desk);
     // Channels of U, V, W: 2, 7, 14 and 15, 5, 4; capacitors 6, source 9, inductor 1.
     converted(
         &[
@@ -69,7 +86,7 @@ fn a_sample_has_both_motors_and_the_link_in_si_units() {
     make_ready(&registers);
     registers.tim4.cnt().write(|w| w.set_cnt(256));
     registers.tim3.cnt().write(|w| w.set_cnt(512));
-    operator.ask([50.0, -20.0]);
+    desk.allow_from(permitted([50.0, -20.0], 600.0), NOW);
     let sample = control.sample(NOW);
     let unit = 150.0 / 2_048.0;
     let [upper, lower] = sample.currents_a;
@@ -96,8 +113,9 @@ fn the_gates_wait_for_both_indices_the_enable_input_and_quiet_breaks() {
     ];
     for (enabled, spoil) in cases {
         let registers = Model::started().registers;
-        let operator = Operator::new(600.0);
-        let mut control = control(registers, &operator);
+        let desk = DualDesk::new();
+        let mut control = control(registers, &desk);
+        desk.allow_from(permitted([0.0; 2], 600.0), NOW);
         converted(&[], registers);
         make_ready(&registers);
         spoil(&registers);
@@ -110,8 +128,8 @@ fn the_gates_wait_for_both_indices_the_enable_input_and_quiet_breaks() {
 #[test]
 fn an_index_at_the_wrong_count_is_a_lost_sensor() {
     let registers = Model::started().registers;
-    let operator = Operator::new(600.0);
-    let mut control = control(registers, &operator);
+    let desk = DualDesk::new();
+    let mut control = control(registers, &desk);
     let mut sample = |count, index| {
         registers.tim3.cnt().write(|w| w.set_cnt(count));
         registers.tim3.sr().write(|w| w.set_idxif(index));
@@ -133,8 +151,8 @@ fn converters_that_are_silent_give_no_number() {
     }
     let sample = Pwm::new(registers, zeros()).sample(NOW);
     assert!(sample.currents_a.iter().all(|current| current.a.is_nan()) && sample.source_v.is_nan());
-    let operator = Operator::new(600.0);
-    assert!(control(registers, &operator).sample(NOW).inductor_a.is_nan());
+    let desk = DualDesk::new();
+    assert!(control(registers, &desk).sample(NOW).inductor_a.is_nan());
 }
 
 #[test]
@@ -174,12 +192,24 @@ fn two_marked_words_are_what_the_gates_did() {
 #[test]
 fn an_overrun_is_counted_from_the_deadline() {
     let registers = Model::started().registers;
-    let operator = Operator::new(600.0);
-    let mut control = control(registers, &operator);
+    let desk = DualDesk::new();
+    let mut control = control(registers, &desk);
     let deadline = CLOCK.control_ticks / 2;
     for (count, again, late) in [(deadline, false, 0), (deadline + 7, false, 7), (3, true, deadline + 3)] {
         registers.tim2.cnt().write_value(count);
         registers.tim2.sr().write(|w| w.set_uif(again));
         assert_eq!(control.overrun_ticks(NOW, deadline), late);
     }
+}
+
+#[test]
+fn nothing_is_permitted_before_the_operator_says_so() {
+    let registers = Model::started().registers;
+    let desk = DualDesk::new();
+    let mut control = control(registers, &desk);
+    converted(&[], registers);
+    make_ready(&registers);
+    let sample = control.sample(NOW);
+    assert_eq!((sample.enable, sample.link_ref_v), (false, STAGE.link_ref_v));
+    assert_eq!(sample.demands, permitted([0.0; 2], 0.0).demands);
 }

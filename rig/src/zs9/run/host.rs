@@ -1,21 +1,35 @@
 //! On the host: the firmware's own tasks, called in the order in which their interrupts would come.
 
 use crate::campaign::without::Without;
-use crate::run::Progress;
-use crate::zs9::bench::{Bench, BenchError};
+use crate::run::{Progress, Supervised, Supervisor, turn};
+use crate::zs9::bench::Bench;
 use crate::zs9::trace::Recording;
 use tractive::board::{DualControlPort, DualPwmPort, DualSample, MotorDemand, PlayedPeriod, PowerSample};
 use tractive::drive::dual::{ControlTask, DualReport, PwmTask, Settings, Shared};
 use tractive::frames::Abc;
-use tractive::machine::Tables;
+use tractive::machine::{Ratings, Tables};
 use tractive::nine_switch::Scheme;
+use tractive::operator::{
+    self, DualDemands, DualDesk, DualRequest, DualSlot, DualStatus, Feedback, Line, OperatorPort, slot_s,
+};
 use tractive::protection::Trip;
-use tractive::time::Instant;
+use tractive::protocol::Zs9Station;
+use tractive::recorder::DualRecorder;
+use tractive::time::{Clock, Instant};
 
 /// The bench behind a board's ports; the first error ends the run.
 struct Port<'a> {
     bench: &'a mut Bench,
-    error: Option<BenchError>,
+    desk: &'a DualDesk,
+    error: Option<anyhow::Error>,
+}
+
+/// The drive's end of the protocol, its operator, and who is at the other end.
+struct Wire<'w> {
+    station: Zs9Station,
+    slot: DualSlot,
+    operator: operator::Settings<'static>,
+    supervisor: &'w mut dyn Supervisor,
 }
 
 /// What is sampled when there is nothing left to sample.
@@ -29,14 +43,21 @@ const NOTHING: DualSample = DualSample {
     link_ref_v: 0.0,
     scheme: Scheme::S,
     enable: false,
+    speed_torque_nm: DualSample::UNLIMITED_NM,
+    acknowledge: 0,
+    hardware: None,
 };
 
 impl DualControlPort for Port<'_> {
     fn sample(&mut self, now: Instant) -> DualSample {
-        self.bench.control_sample(now).unwrap_or_else(|error| {
-            self.error = Some(error);
+        let mut sample = self.bench.control_sample(now).unwrap_or_else(|error| {
+            self.error = Some(error.into());
             NOTHING
-        })
+        });
+        if self.bench.is_operated() {
+            self.desk.permit(now).apply(&mut sample);
+        }
+        sample
     }
 
     fn gates_off(&mut self, now: Instant) {
@@ -48,6 +69,7 @@ impl DualControlPort for Port<'_> {
     }
 
     fn report(&mut self, now: Instant, report: &DualReport) {
+        self.desk.tell(now, report);
         self.bench.control_report(now, *report);
     }
 }
@@ -55,7 +77,7 @@ impl DualControlPort for Port<'_> {
 impl DualPwmPort for Port<'_> {
     fn sample(&mut self, now: Instant) -> PowerSample {
         self.bench.power_sample(now).unwrap_or_else(|error| {
-            self.error = Some(error);
+            self.error = Some(error.into());
             PowerSample::default()
         })
     }
@@ -66,6 +88,41 @@ impl DualPwmPort for Port<'_> {
 
     fn gates_off(&mut self, now: Instant) {
         self.bench.gates_off(now);
+    }
+
+    fn leave(&mut self, now: Instant) -> bool {
+        self.bench.leave(now);
+        true
+    }
+}
+
+/// The operator's port, with its station apart.
+struct Idle<'a, 'b> {
+    port: &'a mut Port<'b>,
+    station: &'a mut Zs9Station,
+    supervisor: &'a mut dyn Supervisor,
+}
+
+impl OperatorPort<DualDemands> for Idle<'_, '_> {
+    fn ask(&mut self, at: Instant) -> (DualRequest, Feedback) {
+        let feedback = self.port.bench.ask(at).unwrap_or_else(|error| {
+            self.port.error = Some(error.into());
+            Feedback::default()
+        });
+        let frame = turn(self.supervisor, self.port.bench, at).unwrap_or_else(|error| {
+            self.port.error = Some(error);
+            None
+        });
+        (self.station.listen(self.port.desk.observed(), frame.as_ref()), feedback)
+    }
+
+    fn tell(&mut self, from: Instant, status: &DualStatus) {
+        if let Err(error) = self.port.bench.told(from, *status) {
+            self.port.error = Some(error.into());
+        }
+        if let Some(frame) = self.station.tell(status) {
+            self.supervisor.hear(Supervised::instant_s(self.port.bench, from), &frame);
+        }
     }
 }
 
@@ -78,24 +135,62 @@ pub fn run_on_host(
     mut bench: Bench,
     tables: &'static Tables,
     settings: Settings,
-) -> Result<Recording, BenchError> {
+) -> anyhow::Result<Recording> {
+    let recorder = DualRecorder::new();
+    run(name, &mut bench, Tasks::new(tables, settings).recorded_by(&recorder))?;
+    Ok(recording(bench, &recorder))
+}
+
+/// The same, commanded over the protocol.
+///
+/// # Errors
+/// Where the bench or the supervisor cannot go on.
+pub fn run_supervised_on_host(
+    name: &str,
+    mut bench: Bench,
+    tables: &'static Tables,
+    settings: Settings,
+    line: Line,
+    supervisor: &mut dyn Supervisor,
+) -> anyhow::Result<Recording> {
+    let recorder = DualRecorder::new();
+    // One a run, for as long as the program lasts, as the tables are.
+    let ratings: &'static Ratings = Box::leak(Box::new(settings.operator_ratings(&tables.ratings)));
+    let mut tasks = Tasks::new(tables, settings).recorded_by(&recorder);
+    tasks.wire = Some(Wire {
+        station: Zs9Station::new(ratings),
+        slot: DualSlot::new(),
+        operator: operator::Settings::rated(ratings, slot_s(&settings.clock), Some(line)),
+        supervisor,
+    });
+    run(name, &mut bench, tasks)?;
+    Ok(recording(bench, &recorder))
+}
+
+fn run(name: &str, bench: &mut Bench, mut tasks: Tasks) -> anyhow::Result<()> {
     let mut progress = Progress::new(name);
-    Tasks::new(tables, settings).drive(&mut bench, |bench| {
+    tasks.drive(bench, |bench| {
         progress.show(bench.progress());
         true
-    })?;
-    let (rows, edges) = bench.into_recording();
-    Ok(Recording { rows, edges })
+    })
+}
+
+fn recording(bench: Bench, recorder: &DualRecorder) -> Recording {
+    bench.into_recording((0..).map_while(|index| recorder.read(index)).collect())
 }
 
 /// Both tasks and the cells between them.
-pub struct Tasks {
+pub struct Tasks<'a> {
     control: ControlTask,
     pwm: PwmTask,
-    shared: Shared,
+    shared: Shared<'a>,
+    desk: DualDesk,
+    clock: Clock,
+    /// Over the protocol, if there is a supervisor.
+    wire: Option<Wire<'a>>,
 }
 
-impl Tasks {
+impl<'a> Tasks<'a> {
     /// Before their first interrupts.
     pub fn new(tables: &'static Tables, settings: Settings) -> Self {
         Self::beginning_at(Instant(0), tables, settings)
@@ -107,7 +202,16 @@ impl Tasks {
             control: ControlTask::new(tables, settings).beginning_at(origin),
             pwm: PwmTask::new(tables, settings).beginning_at(origin),
             shared: Shared::new(),
+            desk: DualDesk::new(),
+            clock: settings.clock,
+            wire: None,
         }
+    }
+
+    /// The same with a flight recorder.
+    pub fn recorded_by(mut self, recorder: &'a DualRecorder) -> Self {
+        self.shared = Shared::recorded_by(recorder);
+        self
     }
 
     /// The same with a protection off; its levels are the tables' and the settings' business.
@@ -124,21 +228,27 @@ impl Tasks {
     /// Until the bench's recording is complete, or nobody wants to see more of it.
     ///
     /// # Errors
-    /// Where the bench cannot go on.
+    /// Where the bench or the supervisor cannot go on.
     pub fn drive(
         &mut self,
         bench: &mut Bench,
         mut goes_on: impl FnMut(&Bench) -> bool,
-    ) -> Result<(), BenchError> {
+    ) -> anyhow::Result<()> {
         while !bench.is_done() {
             let (control_at, pwm_at) = (self.control.next_call(), self.pwm.next_call());
             let has_control = bench.has_control(control_at);
-            let mut port = Port { bench, error: None };
+            let mut port = Port { bench, desk: &self.desk, error: None };
             // They never meet: control comes at valleys, PWM at peaks.
             if control_at.reached(pwm_at) || !has_control {
                 self.pwm.run(&mut port, &self.shared);
             } else {
                 self.control.run(&mut port, &self.shared);
+                // The idle loop goes on where the interrupt ends.
+                if let Some(Wire { station, slot, operator, supervisor }) = &mut self.wire {
+                    let settings = station.settings(operator);
+                    let mut idle = Idle { port: &mut port, station, supervisor: *supervisor };
+                    slot.run(&self.desk, &mut idle, &settings, &self.clock);
+                }
             }
             if let Some(error) = port.error {
                 return Err(error);

@@ -1,19 +1,25 @@
 //! In QEMU: the image's own interrupts, in lockstep with the bench.
 
-use crate::run::{Emulator, Progress, emulate};
+use crate::run::{Emulator, Progress, Supervised, Supervisor, emulate, turn};
 use crate::zs9::bench::Bench;
 use crate::zs9::trace::Recording;
 use anyhow::{Context, Result, bail};
 use tractive::drive::dual::DualReport;
 use tractive::link::{self, DualRequest, DualSetup};
 
-/// Runs until the recording is complete.
+/// Runs until the recording is complete; a supervisor commands over the protocol.
 ///
 /// # Errors
 /// Where the bench cannot go on, or the emulator ends early.
-pub fn run_in_qemu(name: &str, mut bench: Bench, setup: DualSetup, emulator: &Emulator) -> Result<Recording> {
+pub fn run_in_qemu(
+    name: &str,
+    mut bench: Bench,
+    setup: DualSetup,
+    emulator: &Emulator,
+    mut supervisor: Option<&mut dyn Supervisor>,
+) -> Result<Recording> {
     let mut progress = Progress::new(name);
-    let mut calls = Calls::default();
+    let (mut calls, mut records) = (Calls::default(), Vec::new());
     let outcome = emulate(emulator, |block, answers| {
         let Some(request) = DualRequest::from_block(block) else {
             bail!("the firmware sent a request that is none: {block:?}");
@@ -24,9 +30,6 @@ pub fn run_in_qemu(name: &str, mut bench: Bench, setup: DualSetup, emulator: &Em
                 let sample = bench.control_sample(at)?;
                 let done = bench.is_done();
                 answers.control(&link::dual_sample_to_block(&sample, done))?;
-                if done {
-                    return Ok(true);
-                }
             }
             DualRequest::ControlReport(at, report) => {
                 calls.control(&report, bench.speeds_rpm());
@@ -38,6 +41,23 @@ pub fn run_in_qemu(name: &str, mut bench: Bench, setup: DualSetup, emulator: &Em
                 bench.play(next);
             }
             DualRequest::GatesOff(at) => bench.gates_off(at),
+            DualRequest::Leave(at) => bench.leave(at),
+            DualRequest::Ask(at) => {
+                let feedback = bench.ask(at)?;
+                let frame = match &mut supervisor {
+                    Some(supervisor) => turn(*supervisor, &mut bench, at)?,
+                    None => None,
+                };
+                answers.idle(&link::dual_asked_to_block(&feedback, frame))?;
+            }
+            DualRequest::Tell(from, status, frame) => {
+                bench.told(from, status)?;
+                if let (Some(supervisor), Some(frame)) = (&mut supervisor, frame) {
+                    supervisor.hear(bench.instant_s(from), &frame);
+                }
+            }
+            DualRequest::Recorded(record) => records.push(record),
+            DualRequest::End => return Ok(true),
             DualRequest::Dead => bail!("the firmware stopped in a panic or a HardFault, gates off"),
         }
         progress.show(bench.progress());
@@ -47,8 +67,7 @@ pub fn run_in_qemu(name: &str, mut bench: Bench, setup: DualSetup, emulator: &Em
         std::fs::write(path, &calls.lines).with_context(|| path.display().to_string())?;
     }
     outcome?;
-    let (rows, edges) = bench.into_recording();
-    Ok(Recording { rows, edges })
+    Ok(bench.into_recording(records))
 }
 
 /// What every interrupt was about, in the order in which they ended: the scheme and what the motors do, as `rthd-braking`.

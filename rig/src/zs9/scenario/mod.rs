@@ -9,9 +9,9 @@ mod timing;
 pub use load_step::INERTIA_KG_M2;
 
 use super::bench::{Bench, BenchSettings};
-use super::operator::Operator;
+use super::operator::{Operator, Orders, SeenMotors};
 use super::trace::Recording;
-use super::{run, settings};
+use super::{line, run, settings};
 use crate::analysis::Figures;
 use crate::bench::Limits;
 use crate::machine::Machine;
@@ -19,10 +19,12 @@ use crate::options::{On, RunOptions};
 use crate::plant::zs9::{NetworkState, Zs9Plant, Zs9Settings};
 use crate::plant::{PlantSettings, SpeedSource};
 use crate::report::Page;
-use crate::run::{CLOCK, refused};
+use crate::run::{CLOCK, Emulator, Supervisor, refused};
 use anyhow::{Result, bail};
 use core::f64::consts::TAU;
+use tractive::board::MotorDemand;
 use tractive::link::DualSetup;
+use tractive::operator::Line;
 
 pub use steady::SPEEDS_RPM as STEADY_SPEEDS_RPM;
 
@@ -91,13 +93,79 @@ pub fn drive(scenario: &dyn Scenario, options: &RunOptions, machine: &Machine) -
     match options.on {
         On::Host => {
             settings.check(machine.tables).map_err(refused)?;
-            Ok(run::run_on_host(scenario.name(), bench, machine.tables, settings)?)
+            run::run_on_host(scenario.name(), bench, machine.tables, settings)
         }
         On::Qemu => {
-            let setup = DualSetup { carrier_ticks: settings.carrier_ticks };
-            run::run_in_qemu(scenario.name(), bench, setup, &options.emulator()?)
+            let setup = DualSetup { carrier_ticks: settings.carrier_ticks, line: None };
+            run::run_in_qemu(scenario.name(), bench, setup, &options.emulator()?, None)
         }
     }
+}
+
+/// Drives free rotors from an empty network over the protocol, without an end until the supervisor says so.
+pub(crate) fn drive_supervised(
+    supervisor: &mut dyn Supervisor,
+    inertia_kg_m2: f64,
+    options: &RunOptions,
+    machine: &Machine,
+) -> Result<Recording> {
+    let bench = bench(&Supervised(inertia_kg_m2), options, machine)?.with_line(line::TIMES);
+    let settings = settings::drive(CLOCK, options.zs9.carrier_hz);
+    match options.on {
+        On::Host => {
+            settings.check(machine.tables).map_err(refused)?;
+            let ratings = settings.operator_ratings(&machine.tables.ratings);
+            let line =
+                Line::rated(&ratings, line::TIMES.precharge_s, line::TIMES.discharge_s).without_chopper();
+            run::run_supervised_on_host("talk", bench, machine.tables, settings, line, supervisor)
+        }
+        On::Qemu => {
+            let setup = DualSetup { carrier_ticks: settings.carrier_ticks, line: Some(line::TIMES) };
+            let emulator = Emulator { patient: supervisor.is_typed(), ..options.emulator()? };
+            run::run_in_qemu("talk", bench, setup, &emulator, Some(supervisor))
+        }
+    }
+}
+
+/// Free rotors of this inertia, in kg·m²; what is driven the supervisor says.
+struct Supervised(f64);
+
+/// Longest talk, in s.
+const LONGEST_S: f64 = 86_400.0;
+
+impl Scenario for Supervised {
+    fn name(&self) -> &'static str {
+        "talk"
+    }
+
+    fn title(&self) -> &'static str {
+        "commanded over the protocol"
+    }
+
+    fn trace_step_s(&self, _options: &RunOptions) -> f64 {
+        1e-3
+    }
+
+    fn edges(&self, _options: &RunOptions) -> bool {
+        false
+    }
+
+    fn plan(&self, _options: &RunOptions) -> Plan {
+        // What the operator permits takes the place of the demands.
+        let operator = |_: f64, _: SeenMotors| Orders {
+            demands: [MotorDemand::Speed(0.0); 2],
+            loads_nm: [0.0; 2],
+            enable: true,
+        };
+        let speeds = [free(self.0), free(self.0)];
+        Plan { lead_s: 0.0, duration_s: LONGEST_S, speeds, from_rpm: [0.0; 2], operator: Box::new(operator) }
+    }
+
+    fn figures(&self, _recording: &Recording, _options: &RunOptions) -> Figures {
+        Figures::default()
+    }
+
+    fn plots(&self, _recording: &Recording, _page: &mut Page) {}
 }
 
 fn bench(scenario: &dyn Scenario, options: &RunOptions, machine: &Machine) -> Result<Bench> {

@@ -10,7 +10,7 @@
 pub mod bridge;
 pub mod control_timer;
 pub mod feedback;
-pub mod operator;
+pub mod hardware;
 pub mod period;
 pub mod pins;
 mod ports;
@@ -27,6 +27,9 @@ pub use ports::{Control, Pwm};
 
 use super::power_stage::CORE_HZ;
 use crate::drive::dual::Settings;
+use crate::link::LineTimes;
+use crate::machine::Ratings;
+use crate::machine::zs9::BUILT_IN;
 use crate::time::Clock;
 
 /// Cycles of the timers' clock in a tick of the drive's.
@@ -63,3 +66,9 @@ pub const HALF_CYCLES: u16 = {
 pub const fn settings() -> Settings {
     Settings::new(CLOCK, CARRIER_TICKS)
 }
+
+/// The ratings as the operator looks at them.
+pub static RATINGS: Ratings = settings().operator_ratings(&BUILT_IN.ratings);
+
+/// Time constants of the line side that this board file is for: 50 ohm and 500 ohm on both capacitors of 500 µF.
+pub const TIMES: LineTimes = LineTimes { precharge_s: 0.05, discharge_s: 0.5 };

@@ -1,10 +1,11 @@
 //! The ZS9's wiring: the one table, from which the pins are configured and with which the documentation is compared.
 
-use crate::board::nucleo_g474re::pins::{Function, Pin, Port, is_high, pin};
+use crate::board::nucleo_g474re::pins::{Function, Pin, Port, Wire, is_high, pin};
 use crate::board::nucleo_g474re::registers::Registers;
+use crate::board::nucleo_g474re::switchgear::Wires;
 
 /// Every pin the ZS9's drive uses.
-pub const PINS: [Pin; 31] = [
+pub const PINS: [Pin; 38] = [
     pin(Port::A, 8, Function::Gate(6), &["TIM1_CH1"], "gate UH"),
     pin(Port::A, 10, Function::Gate(6), &["TIM1_CH3"], "gate UM"),
     pin(Port::A, 9, Function::Gate(6), &["TIM1_CH2"], "gate UL"),
@@ -36,7 +37,23 @@ pub const PINS: [Pin; 31] = [
     pin(Port::C, 11, Function::Alternate(6), &["SPI3_MISO"], "gate feedback, data"),
     pin(Port::A, 15, Function::Output, &[], "gate feedback, select, low while it is read"),
     pin(Port::C, 4, Function::Input, &[], "enable: high lets the gates pulse"),
+    pin(Port::B, 10, Function::Switch, &[], "precharge relay, high closes"),
+    pin(Port::B, 15, Function::Switch, &[], "main contactor, high closes"),
+    pin(Port::C, 9, Function::Switch, &[], "discharge resistor, high switches it on"),
+    pin(Port::C, 5, Function::Input, &[], "precharge relay's auxiliary contact, high: closed"),
+    pin(Port::C, 12, Function::Input, &[], "main contactor's auxiliary contact, high: closed"),
+    pin(Port::A, 11, Function::Bus(9), &["FDCAN1_RX"], "CAN transceiver, RXD"),
+    pin(Port::A, 12, Function::Bus(9), &["FDCAN1_TX"], "CAN transceiver, TXD"),
 ];
+
+/// The ZS9's switchgear.
+pub const SWITCHGEAR: Wires = Wires {
+    precharge: Wire::new(Port::B, 10),
+    main: Wire::new(Port::B, 15),
+    discharge: Wire::new(Port::C, 9),
+    precharge_contact: Wire::new(Port::C, 5),
+    main_contact: Wire::new(Port::C, 12),
+};
 
 /// Whether the enable input is high.
 #[inline]

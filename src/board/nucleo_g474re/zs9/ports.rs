@@ -3,18 +3,19 @@
 use super::bridge::{Beat, Bridge};
 use super::control_timer::ControlTimer;
 use super::feedback::Feedback;
-use super::operator::Operator;
 use super::period::PeriodCompares;
 use super::sampling::{Samplers, Zeros};
 use super::stage::STAGE;
 use super::start::{bridge, feedback};
-use super::{CLOCK, pins};
+use super::{CLOCK, hardware, pins};
+use crate::board::nucleo_g474re::outputs::SoftwareBreak;
 use crate::board::nucleo_g474re::position::Position;
 use crate::board::nucleo_g474re::registers::Registers;
 use crate::board::{DualControlPort, DualPwmPort, DualSample, PlayedPeriod, PowerSample};
 use crate::drive::dual::DualReport;
 use crate::frames::Angle;
 use crate::nine_switch::Scheme;
+use crate::operator::{DualDesk, DualPermit};
 use crate::time::Instant;
 
 /// Where the zero vectors lie: the least harmonics in the motors' currents.
@@ -33,19 +34,19 @@ pub struct Control<'a, P> {
     samplers: Samplers,
     zeros: Zeros,
     positions: [P; 2],
-    operator: &'a Operator,
+    desk: &'a DualDesk,
 }
 
 impl<'a, P: Position> Control<'a, P> {
     /// With the zeros that the start measured; positions of the upper and the lower motor.
-    pub const fn new(registers: Registers, zeros: Zeros, positions: [P; 2], operator: &'a Operator) -> Self {
+    pub const fn new(registers: Registers, zeros: Zeros, positions: [P; 2], desk: &'a DualDesk) -> Self {
         Self {
             registers,
             timer: ControlTimer(registers.tim2),
             samplers: Samplers::new(&registers),
             zeros,
             positions,
-            operator,
+            desk,
         }
     }
 
@@ -59,37 +60,43 @@ impl<'a, P: Position> Control<'a, P> {
 impl<P: Position> DualControlPort for Control<'_, P> {
     /// Positions first: they are read, not sampled, and move on while the conversions end. A position that is not known yet is
     /// none that is lost: until both are known the gates stay off.
-    fn sample(&mut self, _now: Instant) -> DualSample {
+    fn sample(&mut self, now: Instant) -> DualSample {
         let [first, second] = &mut self.positions;
         let angles = [first.angle(), second.angle()];
         let converted = self.samplers.read(&self.zeros);
         let ([first_angle, second_angle], [first_lost, second_lost]) =
             (angles, [first.is_lost(), second.is_lost()]);
         let known = angles.iter().all(Option::is_some);
+        let hardware = hardware::latched_by(&self.registers);
         let healthy = known && !bridge(&self.registers).outputs().is_tripped();
-        DualSample {
+        let mut sample = DualSample {
             currents_a: converted.currents_a,
             angles: [reported(first_angle, first_lost), reported(second_angle, second_lost)],
             capacitor_v: converted.capacitor_v,
             inductor_a: self.samplers.inductor_a(&self.zeros),
             source_v: converted.source_v,
-            demands: self.operator.demands(),
-            link_ref_v: self.operator.link_v(),
+            demands: DualPermit::NONE.demands,
+            link_ref_v: STAGE.link_ref_v,
             scheme: SCHEME,
             enable: healthy && pins::is_enabled(&self.registers),
-        }
+            speed_torque_nm: DualSample::UNLIMITED_NM,
+            acknowledge: 0,
+            hardware,
+        };
+        self.desk.permit(now).apply(&mut sample);
+        sample
     }
 
     fn gates_off(&mut self, _now: Instant) {
-        bridge(&self.registers).outputs().trip();
+        bridge(&self.registers).outputs().trip_by(SoftwareBreak::Drive);
     }
 
     fn overrun_ticks(&mut self, _now: Instant, deadline_ticks: u32) -> u32 {
         self.timer.overrun_ticks(deadline_ticks, CLOCK.control_ticks)
     }
 
-    fn report(&mut self, _now: Instant, report: &DualReport) {
-        self.operator.tell(report);
+    fn report(&mut self, now: Instant, report: &DualReport) {
+        self.desk.tell(now, report);
     }
 }
 
@@ -137,7 +144,7 @@ impl Pwm {
         match self.bridge.beat() {
             Beat::Valley => {
                 if !self.served {
-                    self.bridge.outputs().trip();
+                    self.bridge.outputs().trip_by(SoftwareBreak::Late);
                 }
                 self.served = false;
                 false
@@ -173,12 +180,12 @@ impl DualPwmPort for Pwm {
     fn play(&mut self, _now: Instant, next: &PlayedPeriod) {
         let outputs = self.bridge.outputs();
         let Some(compares) = PeriodCompares::new(next, DEAD_CYCLES) else {
-            outputs.trip();
+            outputs.trip_by(SoftwareBreak::Drive);
             return;
         };
         self.bridge.play(&compares);
         if self.bridge.is_late() {
-            outputs.trip();
+            outputs.trip_by(SoftwareBreak::Late);
         }
         let pulses = compares != PeriodCompares::OFF;
         if pulses {
@@ -192,6 +199,10 @@ impl DualPwmPort for Pwm {
     }
 
     fn gates_off(&mut self, _now: Instant) {
-        self.bridge.outputs().trip();
+        self.bridge.outputs().trip_by(SoftwareBreak::Drive);
+    }
+
+    fn leave(&mut self, _now: Instant) -> bool {
+        self.bridge.outputs().leave()
     }
 }

@@ -1,10 +1,12 @@
 //! The same for the ZS9.
 
-use super::{CONTROL_ANSWERS, PWM_ANSWERS, open_files, receive, send};
-use crate::board::qemu::{saboteur, stop};
+use super::{CONTROL_ANSWERS, IDLE_ANSWERS, PWM_ANSWERS, open_files, receive, send, stand_still};
+use crate::board::qemu::{DUAL_RECORDER, saboteur, stop};
 use crate::board::{DualSample, PlayedPeriod, PowerSample};
 use crate::drive::dual::DualReport;
 use crate::link::{self, DualRequest, DualSetup};
+use crate::operator::{DualStatus, Feedback};
+use crate::protocol::Frame;
 use crate::time::Instant;
 
 /// Opens the files and fetches the set-up.
@@ -21,7 +23,12 @@ pub fn sample_dual(now: Instant) -> DualSample {
     send(&DualRequest::ControlSample(now).to_block());
     let (sample, end) = link::dual_sample_from_block(&receive(CONTROL_ANSWERS));
     if end {
+        stand_still();
         saboteur::finish();
+        for record in (0..).map_while(|index| DUAL_RECORDER.read(index)) {
+            send(&DualRequest::Recorded(record).to_block());
+        }
+        send(&DualRequest::End.to_block());
         stop(true);
     }
     saboteur::sampled();
@@ -52,6 +59,25 @@ pub fn report_dual(now: Instant, report: &DualReport) {
 pub fn gates_off(now: Instant) {
     saboteur::gates_off();
     send(&DualRequest::GatesOff(now).to_block());
+}
+
+/// The gates may be played again.
+#[inline(never)]
+pub fn leave_dual(now: Instant) {
+    send(&DualRequest::Leave(now).to_block());
+}
+
+/// The frame that has come, and what the board says.
+#[inline(never)]
+pub fn ask_dual(at: Instant) -> (Feedback, Option<Frame>) {
+    send(&DualRequest::Ask(at).to_block());
+    link::dual_asked_from_block(&receive(IDLE_ANSWERS))
+}
+
+/// What the operator told, and the frame that says so.
+#[inline(never)]
+pub fn tell_dual(from: Instant, status: &DualStatus, frame: Option<Frame>) {
+    send(&DualRequest::Tell(from, *status, frame).to_block());
 }
 
 /// The processor stops, gates off.

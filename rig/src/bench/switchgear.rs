@@ -1,0 +1,132 @@
+//! Contactors that take their time, and the operator's slots: what is asked of it, and what it has told.
+
+use super::Tick;
+use std::collections::VecDeque;
+use tractive::frames::Abc;
+use tractive::operator::{Configuration, Feedback, SLOT_PERIODS, Status};
+use tractive::protection::Fault;
+use tractive::time::Clock;
+
+/// Time in which a contactor closes, and opens, in s.
+const CLOSES_S: f64 = 0.04;
+const OPENS_S: f64 = 0.02;
+
+/// A contactor: told, and where it is.
+#[derive(Clone, Copy, Debug, Default)]
+struct Contactor {
+    told: bool,
+    closed: bool,
+    moves: Option<Tick>,
+}
+
+impl Contactor {
+    fn tell(&mut self, told: bool, now: Tick, tick_s: f64) {
+        if told != self.told {
+            self.told = told;
+            let takes_s = if told { CLOSES_S } else { OPENS_S };
+            self.moves = (told != self.closed).then(|| now + (takes_s / tick_s).round() as Tick);
+        }
+    }
+
+    fn act(&mut self, now: Tick) {
+        if self.moves.is_some_and(|at| at <= now) {
+            (self.closed, self.moves) = (self.told, None);
+        }
+    }
+}
+
+/// Contactors and slots; `A` is what is asked besides the board's word, `T` what is told of the demands.
+pub struct Switchgear<A, T> {
+    tick_s: f64,
+    main: Contactor,
+    precharge: Contactor,
+    /// What the operator told, and from when on it holds.
+    told: VecDeque<(Tick, Status<T>)>,
+    /// What the operator will ask for, by the slot's beginning.
+    asked: VecDeque<(Tick, A, Feedback)>,
+    samples: u32,
+}
+
+impl<A, T: Copy> Switchgear<A, T> {
+    /// At tick 0, everything open.
+    pub fn new(clock: &Clock) -> Self {
+        Self {
+            tick_s: f64::from(clock.ticks_per_s).recip(),
+            main: Contactor::default(),
+            precharge: Contactor::default(),
+            told: VecDeque::new(),
+            asked: VecDeque::new(),
+            samples: 0,
+        }
+    }
+
+    /// Whether the precharge relay is closed.
+    pub fn precharge_closed(&self) -> bool {
+        self.precharge.closed
+    }
+
+    /// Whether the main contactor is closed.
+    pub fn main_closed(&self) -> bool {
+        self.main.closed
+    }
+
+    /// A control sample at `now`, with what holds the gates off in hardware: every [`SLOT_PERIODS`]th begins a slot, in which this is
+    /// asked. Returns whether the operator has fallen behind.
+    pub fn sampled(&mut self, now: Tick, hardware: Option<Fault>, ask: impl FnOnce() -> A) -> bool {
+        let begins = self.samples.is_multiple_of(SLOT_PERIODS);
+        self.samples = self.samples.wrapping_add(1);
+        if begins {
+            let feedback = Feedback {
+                precharge_closed: self.precharge.closed,
+                main_closed: self.main.closed,
+                driver_ready: hardware != Some(Fault::GateDriver),
+                enable_input: true,
+                sensor_alive: true,
+                position_known: true,
+                offsets_a: Abc::default(),
+                configuration: Configuration::Good,
+                parameters_open: false,
+                hardware,
+            };
+            self.asked.push_back((now, ask(), feedback));
+        }
+        self.asked.len() > 2
+    }
+
+    /// What is asked in the slot that began at `tick`, and what the board says.
+    pub fn ask(&mut self, tick: Tick) -> Option<(A, Feedback)> {
+        while let Some((at, request, feedback)) = self.asked.pop_front() {
+            if at == tick {
+                return Some((request, feedback));
+            }
+        }
+        None
+    }
+
+    /// What the operator told; it holds from `from` on.
+    pub fn tell(&mut self, from: Tick, status: Status<T>) {
+        self.told.push_back((from, status));
+    }
+
+    /// The next instant at which something changes.
+    pub fn next_event(&self) -> Option<Tick> {
+        let told = self.told.front().map(|(at, _)| *at);
+        [told, self.main.moves, self.precharge.moves].into_iter().flatten().min()
+    }
+
+    /// Does what is due at `now`; returns the operator's word if it takes effect here.
+    pub fn act(&mut self, now: Tick) -> Option<Status<T>> {
+        let mut newest = None;
+        while let Some((at, status)) = self.told.front().copied()
+            && at <= now
+        {
+            self.told.pop_front();
+            self.precharge.tell(status.switches.precharge, now, self.tick_s);
+            self.main.tell(status.switches.main, now, self.tick_s);
+            newest = Some(status);
+        }
+        self.main.act(now);
+        self.precharge.act(now);
+        newest
+    }
+}

@@ -1,0 +1,65 @@
+//! The ZS9's line side: contactors, precharge and discharge resistors between the source and the Z-network.
+//!
+//! While the main contactor is open the gates are off, and what charges or discharges the capacitors is slow against the network's own
+//! oscillation: both follow as one, and the inductors are without current.
+
+use crate::bench::{Switchgear, Tick};
+use crate::plant::zs9::{NetworkState, Zs9Plant};
+use tractive::operator::DualStatus;
+use tractive::time::Clock;
+
+pub use tractive::link::LineTimes;
+
+/// Time constants unless told otherwise, in s: 50 Ω and 500 Ω on both capacitors of 500 µF.
+pub const TIMES: LineTimes = LineTimes { precharge_s: 0.05, discharge_s: 0.5 };
+
+/// The line side of a bench.
+pub struct LineSide {
+    times: LineTimes,
+    /// Contactors and slots.
+    pub gear: Switchgear<(), [tractive::board::MotorDemand; 2]>,
+    discharge: bool,
+    status: Option<DualStatus>,
+}
+
+impl LineSide {
+    /// What is left in capacitors that are empty, in V: the plant is made for a network that is charged.
+    pub const EMPTY_V: f64 = 1.0;
+
+    /// At tick 0, everything open.
+    pub fn new(times: LineTimes, clock: &Clock) -> Self {
+        Self { times, gear: Switchgear::new(clock), discharge: false, status: None }
+    }
+
+    /// Does what is due at `now`.
+    pub fn act(&mut self, now: Tick) {
+        if let Some(status) = self.gear.act(now) {
+            self.discharge = status.switches.discharge;
+            self.status = Some(status);
+        }
+    }
+
+    /// The operator's last word that has taken effect.
+    pub fn status(&self) -> Option<DualStatus> {
+        self.status
+    }
+
+    /// What the source does to the network over the next `dt_s`.
+    pub fn feed(&self, plant: &mut Zs9Plant, source_v: f64, dt_s: f64) {
+        if self.gear.main_closed() {
+            plant.set_source_v(source_v);
+            return;
+        }
+        let mut capacitor_v = plant.network().capacitor_v();
+        if self.gear.precharge_closed() {
+            capacitor_v += (source_v - capacitor_v) * -(-dt_s / f64::from(self.times.precharge_s)).exp_m1();
+        }
+        if self.discharge {
+            capacitor_v *= (-dt_s / f64::from(self.times.discharge_s)).exp();
+        }
+        let capacitor_v = capacitor_v.max(Self::EMPTY_V);
+        plant.set_network(NetworkState::even(0.0, capacitor_v));
+        // Nothing flows between a source and capacitors of one voltage.
+        plant.set_source_v(capacitor_v);
+    }
+}

@@ -1,0 +1,323 @@
+//! What is asked of the ZS9: of each motor a torque or a speed, of the link its voltage. One state machine, so one fault, one stop and
+//! one enabling edge are both motors'.
+
+use super::demand::wanted_nm;
+use super::{Demands, Levels, Ramp, Rates, Refusal, Seen, Settings};
+use crate::board::{DualSample, MotorDemand};
+use crate::control::Demand;
+use crate::drive::dual::{self, DualReport};
+use crate::frames::limit;
+use crate::machine::Ratings;
+use crate::time::Instant;
+
+/// Time in which a speed demand goes from standstill to the largest speed, in s.
+const SPEED_RISE_S: f32 = 0.5;
+
+/// Share of the source's voltage by which the link may be above it when the gates go off at the end of a stop: what is more swings
+/// back into the source through the inductors.
+const RESTING_SHARE: f32 = 0.05;
+
+/// What one motor is asked for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Wanted {
+    /// A torque, in N·m; positive turns the rotor forward.
+    Torque(f32),
+    /// A mechanical speed, in rad/s.
+    Speed(f32),
+}
+
+impl Wanted {
+    const fn value(self) -> f32 {
+        match self {
+            Self::Torque(value) | Self::Speed(value) => value,
+        }
+    }
+}
+
+/// Limits of one motor, each within its ratings.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MotorLimits {
+    /// Largest motoring torque, in N·m, 0 ..= the rated largest.
+    pub motoring_nm: f32,
+    /// Largest braking torque, in N·m, 0 ..= the rated largest. At a speed demand the smaller of both holds.
+    pub braking_nm: f32,
+    /// Mechanical speed at which torque that would raise it further is zero, and the largest speed demand, in rad/s, above 0, at
+    /// most the rated largest.
+    pub speed_rad_s: f32,
+}
+
+impl MotorLimits {
+    /// As the machine is rated.
+    pub const fn rated(ratings: &Ratings) -> Self {
+        let Ratings { max_torque_nm, max_speed_rad_s, .. } = *ratings;
+        Self { motoring_nm: max_torque_nm, braking_nm: max_torque_nm, speed_rad_s: max_speed_rad_s }
+    }
+
+    fn are_within(&self, ratings: &Ratings) -> bool {
+        let rated = Self::rated(ratings);
+        (0.0..=rated.motoring_nm).contains(&self.motoring_nm)
+            && (0.0..=rated.braking_nm).contains(&self.braking_nm)
+            && (0.0..=rated.speed_rad_s).contains(&self.speed_rad_s)
+            && self.speed_rad_s > 0.0
+    }
+}
+
+/// What is asked of one motor.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MotorRequest {
+    /// The demand.
+    pub wanted: Wanted,
+    /// Its limits.
+    pub limits: MotorLimits,
+}
+
+/// What is asked of the ZS9, as levels; see [`super::Request`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DualRequest {
+    /// Levels.
+    pub levels: Levels,
+    /// Upper motor, lower motor.
+    pub motors: [MotorRequest; 2],
+    /// Link voltage wanted outside shoot-through, in V, from the lowest to what the network's highest voltage gives.
+    pub link_ref_v: f32,
+}
+
+impl DualRequest {
+    /// Nothing wanted, limits as rated; the link at this voltage.
+    pub const fn idle(ratings: &Ratings, link_ref_v: f32) -> Self {
+        let motor = MotorRequest { wanted: Wanted::Torque(0.0), limits: MotorLimits::rated(ratings) };
+        let levels = Levels {
+            enable: false,
+            with_torque: false,
+            off: false,
+            coast: false,
+            charge: false,
+            discharge: false,
+            acknowledge: false,
+        };
+        Self { levels, motors: [motor; 2], link_ref_v }
+    }
+}
+
+/// What the ZS9 says of itself: words of one control interrupt.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DualObservation {
+    /// The control instant.
+    pub at: Instant,
+    /// What it did.
+    pub report: DualReport,
+}
+
+/// What the ZS9 may do.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DualPermit {
+    /// Gates may pulse.
+    pub enable: bool,
+    /// Demands.
+    pub demands: [MotorDemand; 2],
+    /// Largest torques that a speed demand may take, in N·m.
+    pub speed_torque_nm: [f32; 2],
+    /// Link voltage outside shoot-through, in V; 0 leaves it to the board.
+    pub link_ref_v: f32,
+    /// Number of the last acknowledge.
+    pub acknowledge: u8,
+}
+
+impl DualPermit {
+    /// Nothing.
+    pub const NONE: Self = Self {
+        enable: false,
+        demands: [MotorDemand::Torque(Demand { torque_nm: 0.0, slew_limited: true }); 2],
+        speed_torque_nm: [0.0; 2],
+        link_ref_v: 0.0,
+        acknowledge: 0,
+    };
+
+    /// What the drive gets: the board may hold the gates off, never more than that.
+    #[inline]
+    pub fn apply(&self, sample: &mut DualSample) {
+        sample.enable &= self.enable;
+        sample.demands = self.demands;
+        sample.speed_torque_nm = self.speed_torque_nm;
+        sample.acknowledge = self.acknowledge;
+        if self.link_ref_v > 0.0 {
+            sample.link_ref_v = self.link_ref_v;
+        }
+    }
+}
+
+/// One motor's demand on its way.
+#[derive(Clone, Copy, Debug)]
+enum Way {
+    Torque(Ramp),
+    /// The speed's reference, in rad/s.
+    Speed(f32),
+}
+
+/// What is known of one motor in a slot.
+struct Motor {
+    /// Mechanical speed, in rad/s.
+    speed: f32,
+    /// Torque reference, in N·m.
+    torque_nm: f32,
+}
+
+impl Way {
+    const AT_REST: Self = Self::Torque(Ramp::new());
+
+    fn is_at_rest(&self) -> bool {
+        matches!(self, Self::Torque(ramp) if ramp.torque_nm() == 0.0)
+    }
+
+    /// One slot. A demand of the other kind begins where the motor is: torque at its torque, speed at its speed.
+    fn step(&mut self, wanted: Wanted, motor: &Motor, limits: &MotorLimits, settings: &Settings) {
+        *self = match (wanted, *self) {
+            (Wanted::Torque(torque_nm), way) => {
+                let mut ramp = match way {
+                    Self::Torque(ramp) => ramp,
+                    Self::Speed(_) => Ramp::at(motor.torque_nm),
+                };
+                ramp.step(wanted_nm(torque_nm, motor.speed, limits), &Rates::of(settings));
+                Self::Torque(ramp)
+            }
+            (Wanted::Speed(target), way) => {
+                let from = match way {
+                    Self::Speed(from) => from,
+                    Self::Torque(_) => motor.speed,
+                };
+                let target = limit(target, -limits.speed_rad_s, limits.speed_rad_s);
+                let step = settings.ratings.max_speed_rad_s * settings.slot_s / SPEED_RISE_S;
+                Self::Speed(limit(target, from - step, from + step))
+            }
+        };
+    }
+
+    fn demand(&self) -> MotorDemand {
+        match self {
+            Self::Torque(ramp) => {
+                MotorDemand::Torque(Demand { torque_nm: ramp.torque_nm(), slew_limited: true })
+            }
+            Self::Speed(speed) => MotorDemand::Speed(*speed),
+        }
+    }
+}
+
+/// The ZS9's demands: a torque or a speed of each motor, and the link's voltage.
+#[derive(Clone, Copy, Debug)]
+pub struct DualDemands {
+    ways: [Way; 2],
+    /// The limits that hold; `None`: as rated.
+    limits: Option<[MotorLimits; 2]>,
+    link_ref_v: f32,
+    /// While it stops the link goes down to the source's voltage.
+    resting_v: Option<f32>,
+}
+
+impl DualDemands {
+    fn limits(&self, settings: &Settings) -> [MotorLimits; 2] {
+        self.limits.unwrap_or([MotorLimits::rated(settings.ratings); 2])
+    }
+}
+
+impl Demands for DualDemands {
+    type Request = DualRequest;
+    type Observation = DualObservation;
+    type Permit = DualPermit;
+    type Told = [MotorDemand; 2];
+
+    const AT_REST: Self = Self { ways: [Way::AT_REST; 2], limits: None, link_ref_v: 0.0, resting_v: None };
+
+    fn levels(request: &DualRequest) -> Levels {
+        request.levels
+    }
+
+    fn seen(observed: &DualObservation) -> Seen {
+        let DualObservation { at, report } = observed;
+        let ([w1, w2], [i1, i2]) = (report.omega, report.current_a);
+        Seen {
+            at: *at,
+            udc_v: report.capacitor_v,
+            current_a: larger(i1, i2),
+            omega: larger(w1.abs(), w2.abs()),
+            emf_omega: w1.abs() + w2.abs(),
+            speed_known: report.speed_known,
+            trip: report.trip,
+            acknowledged: report.acknowledged,
+        }
+    }
+
+    fn wrong_with(request: &DualRequest, settings: &Settings) -> Option<Refusal> {
+        let ratings = settings.ratings;
+        let [m1, m2] = &request.motors;
+        let sum = |motor: &MotorRequest| {
+            let MotorLimits { motoring_nm, braking_nm, speed_rad_s } = motor.limits;
+            motor.wanted.value() + motoring_nm + braking_nm + speed_rad_s
+        };
+        if !(sum(m1) + sum(m2) + request.link_ref_v).is_finite() {
+            return Some(Refusal::RequestNotFinite);
+        }
+        let [low_v, high_v, _] = dual::Settings::link_range_v(ratings);
+        let inside = m1.limits.are_within(ratings)
+            && m2.limits.are_within(ratings)
+            && (low_v..=high_v).contains(&request.link_ref_v);
+        (!inside).then_some(Refusal::LimitOutOfRange)
+    }
+
+    fn asks_torque(request: &DualRequest) -> bool {
+        request.motors.iter().any(|motor| motor.wanted.value() != 0.0)
+    }
+
+    fn take_limits(&mut self, request: &DualRequest) {
+        self.limits = Some(request.motors.map(|motor| motor.limits));
+        self.link_ref_v = request.link_ref_v;
+    }
+
+    fn are_at_rest(&self) -> bool {
+        self.ways.iter().all(Way::is_at_rest)
+    }
+
+    fn drop(&mut self) {
+        self.ways = [Way::AT_REST; 2];
+    }
+
+    fn step(&mut self, request: Option<&DualRequest>, observed: &DualObservation, settings: &Settings) {
+        let limits = self.limits(settings);
+        let wanted = request.map_or([Wanted::Torque(0.0); 2], |request| request.motors.map(|m| m.wanted));
+        let DualReport { omega, torque_nm, source_v, .. } = observed.report;
+        self.resting_v = if request.is_none() { Some(source_v) } else { None };
+        let motors = omega.into_iter().zip(torque_nm);
+        for (((way, wanted), limits), (omega, torque_nm)) in
+            self.ways.iter_mut().zip(wanted).zip(&limits).zip(motors)
+        {
+            let motor = Motor { speed: omega / settings.ratings.pole_pairs, torque_nm };
+            way.step(wanted, &motor, limits, settings);
+        }
+    }
+
+    fn link_may_rest(observed: &DualObservation) -> bool {
+        let DualReport { source_v, .. } = observed.report;
+        observed.report.link_v() < (1.0 + RESTING_SHARE) * source_v
+    }
+
+    fn told(&self) -> [MotorDemand; 2] {
+        self.ways.each_ref().map(Way::demand)
+    }
+
+    fn permit(&self, enable: bool, acknowledge: u8, settings: &Settings) -> DualPermit {
+        let smaller = |limits: MotorLimits| {
+            if limits.motoring_nm < limits.braking_nm { limits.motoring_nm } else { limits.braking_nm }
+        };
+        DualPermit {
+            enable,
+            demands: self.told(),
+            speed_torque_nm: self.limits(settings).map(smaller),
+            link_ref_v: self.resting_v.unwrap_or(self.link_ref_v),
+            acknowledge,
+        }
+    }
+}
+
+/// The larger of two magnitudes; not a number is larger than everything.
+fn larger(a: f32, b: f32) -> f32 {
+    if a > b || a.is_nan() { a } else { b }
+}

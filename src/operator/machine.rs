@@ -1,0 +1,439 @@
+//! The state machine, one for every drive.
+
+use super::demand;
+use super::line::{Discharge, Outcome, Precharge};
+use super::{
+    ACKNOWLEDGE_S, Configuration, Demands, Input, Levels, Output, Refusal, SELF_TEST_S, Settings, Situation,
+    State, Status, Switches, health, line,
+};
+use crate::protection::{Fault, SafeState, Trip, Violation};
+
+/// Where the machine stands, with what each state has to remember.
+#[derive(Clone, Copy, Debug)]
+enum Phase {
+    Init,
+    SelfTest {
+        slots: u32,
+    },
+    Ready,
+    Precharge(Precharge),
+    Charged,
+    /// Enabled or running.
+    Pulsing,
+    /// `off` once torque is gone and open gates are safe.
+    Coasting {
+        off: bool,
+    },
+    Stopping,
+    Discharge(Discharge),
+    Fault {
+        trip: Trip,
+        /// Slots since the acknowledge was handed on; `None` before.
+        asked: Option<u32>,
+    },
+}
+
+/// The state machine's state, over the demands of a drive.
+#[derive(Clone, Copy, Debug)]
+pub struct Operator<D> {
+    phase: Phase,
+    demands: D,
+    /// The last request's levels, for edges.
+    last: Edges,
+    /// What is wrong with the values of the request that is repeated.
+    bad_values: Option<Refusal>,
+    refusal: Option<Refusal>,
+    refusals: u32,
+    /// Number of the last acknowledge that was handed on.
+    acknowledge: u8,
+}
+
+/// Levels whose rise is a command.
+#[derive(Clone, Copy, Debug)]
+struct Edges {
+    enable: bool,
+    charge: bool,
+    discharge: bool,
+    acknowledge: bool,
+}
+
+impl<D: Demands> Operator<D> {
+    /// At power-up.
+    pub const fn new() -> Self {
+        Self {
+            phase: Phase::Init,
+            demands: D::AT_REST,
+            // A level that stands from the beginning is no edge.
+            last: Edges { enable: true, charge: true, discharge: true, acknowledge: true },
+            bad_values: None,
+            refusal: None,
+            refusals: 0,
+            acknowledge: 0,
+        }
+    }
+
+    /// The state.
+    pub fn state(&self) -> State {
+        match self.phase {
+            Phase::Init => State::Init,
+            Phase::SelfTest { .. } => State::SelfTest,
+            Phase::Ready => State::Ready,
+            Phase::Precharge(_) => State::Precharge,
+            Phase::Charged => State::Charged,
+            Phase::Pulsing if self.demands.are_at_rest() => State::Enabled,
+            Phase::Pulsing => State::Running,
+            Phase::Coasting { .. } => State::Coasting,
+            Phase::Stopping => State::Stopping,
+            Phase::Discharge(_) => State::Discharge,
+            Phase::Fault { .. } => State::Fault,
+        }
+    }
+
+    /// One slot.
+    pub fn step(
+        &mut self,
+        input: &Input<D::Request, D::Observation>,
+        settings: &Settings,
+    ) -> Output<D::Permit, D::Told> {
+        let seen = D::seen(input.observed);
+        let situation = Situation { observed: &seen, feedback: input.feedback };
+        self.look_at_values(input.request, settings);
+        self.supervise(&situation, settings);
+        self.advance(&situation, settings);
+        self.obey(input, &situation, settings);
+        self.shape(input, settings);
+        let (enable, switches) = self.outputs(&situation, settings);
+        Output {
+            permit: self.demands.permit(enable, self.acknowledge, settings),
+            status: Status {
+                state: self.state(),
+                trip: match self.phase {
+                    Phase::Fault { trip, .. } => Some(trip),
+                    _ => None,
+                },
+                refusal: self.refusal,
+                refusals: self.refusals,
+                torque_nm: self.demands.told(),
+                switches,
+            },
+        }
+    }
+
+    fn refuse(&mut self, reason: Refusal) {
+        self.refusal = Some(reason);
+        self.refusals = self.refusals.wrapping_add(1);
+    }
+
+    /// Takes over limits that are good; what is wrong is refused once, not in every slot in which it is repeated.
+    fn look_at_values(&mut self, request: &D::Request, settings: &Settings) {
+        let wrong = D::wrong_with(request, settings);
+        match wrong {
+            None => self.demands.take_limits(request),
+            Some(reason) if self.bad_values != Some(reason) => self.refuse(reason),
+            Some(_) => {}
+        }
+        self.bad_values = wrong;
+    }
+
+    /// Whether the main contactor is told to be closed while the gates pulse.
+    const fn main_closed(settings: &Settings) -> bool {
+        settings.line.is_some()
+    }
+
+    #[inline(never)]
+    fn trip(&mut self, (fault, value, limit): Violation, input: &Situation) {
+        let at = input.observed.at;
+        self.fail(Trip { fault, value, limit, at, safe: SafeState::GatesOff });
+    }
+
+    #[inline(never)]
+    fn fail(&mut self, trip: Trip) {
+        self.phase = Phase::Fault { trip, asked: None };
+        self.demands.drop();
+    }
+
+    /// What ends a state whatever is asked: the drive's faults, and what the board and the link say.
+    #[inline(never)]
+    fn supervise(&mut self, input: &Situation, settings: &Settings) {
+        if matches!(self.phase, Phase::Fault { .. }) {
+            return;
+        }
+        if let Some(trip) = input.observed.trip {
+            return self.fail(trip);
+        }
+        let violation = match self.phase {
+            Phase::Init | Phase::Fault { .. } => None,
+            Phase::SelfTest { .. } => {
+                health::cause(input, false, settings).or_else(|| health::resting_current(input, settings))
+            }
+            Phase::Ready => health::cause(input, false, settings),
+            Phase::Precharge(_) | Phase::Discharge(_) => health::hardware(input),
+            Phase::Charged => health::cause(input, Self::main_closed(settings), settings)
+                .or_else(|| demand::link_lost(input, settings)),
+            Phase::Pulsing | Phase::Coasting { .. } | Phase::Stopping => {
+                health::while_pulsing(input, Self::main_closed(settings))
+                    .or_else(|| demand::link_lost(input, settings))
+            }
+        };
+        if let Some(violation) = violation {
+            self.trip(violation, input);
+        }
+    }
+
+    /// What goes on by itself.
+    fn advance(&mut self, input: &Situation, settings: &Settings) {
+        match &mut self.phase {
+            Phase::Init => {
+                if input.feedback.configuration != Configuration::Unchecked {
+                    self.phase = Phase::SelfTest { slots: 0 };
+                }
+            }
+            Phase::SelfTest { slots } => {
+                *slots = slots.saturating_add(1);
+                if *slots as f32 * settings.slot_s >= SELF_TEST_S {
+                    if input.observed.speed_known {
+                        self.phase = Phase::Ready;
+                    } else {
+                        self.trip((Fault::PositionSensor, 0.0, 1.0), input);
+                    }
+                }
+            }
+            Phase::Precharge(sequence) => {
+                let Some(line) = &settings.line else {
+                    self.phase = Phase::Ready;
+                    return;
+                };
+                match sequence.step(input, line, settings) {
+                    Outcome::Going => {}
+                    Outcome::Done => self.phase = Phase::Charged,
+                    Outcome::Failed(violation) => self.trip(violation, input),
+                }
+            }
+            Phase::Discharge(sequence) => {
+                let Some(line) = &settings.line else {
+                    self.phase = Phase::Ready;
+                    return;
+                };
+                match sequence.step(input, line, settings) {
+                    Outcome::Going => {}
+                    Outcome::Done => self.phase = Phase::Ready,
+                    Outcome::Failed(violation) => self.trip(violation, input),
+                }
+            }
+            Phase::Fault { trip, asked: Some(slots) } => {
+                *slots = slots.saturating_add(1);
+                let waited_s = *slots as f32 * settings.slot_s;
+                if input.observed.acknowledged == self.acknowledge {
+                    match input.observed.trip {
+                        None => self.phase = Phase::SelfTest { slots: 0 },
+                        Some(again) => {
+                            self.fail(again);
+                            self.refuse(Refusal::CauseStillPresent);
+                        }
+                    }
+                } else if waited_s > ACKNOWLEDGE_S {
+                    let trip =
+                        Trip { fault: Fault::GatesHeld, value: waited_s, limit: ACKNOWLEDGE_S, ..*trip };
+                    self.fail(trip);
+                    self.refuse(Refusal::CauseStillPresent);
+                }
+            }
+            Phase::Ready
+            | Phase::Charged
+            | Phase::Pulsing
+            | Phase::Coasting { .. }
+            | Phase::Stopping
+            | Phase::Fault { .. } => {}
+        }
+    }
+
+    /// Commands: levels that stop first, then edges.
+    fn obey(
+        &mut self,
+        Input { request, observed, .. }: &Input<D::Request, D::Observation>,
+        input: &Situation,
+        settings: &Settings,
+    ) {
+        let levels = D::levels(request);
+        let Levels { enable, charge, discharge, acknowledge, .. } = levels;
+        let last = core::mem::replace(&mut self.last, Edges { enable, charge, discharge, acknowledge });
+        self.obey_levels(&levels, D::link_may_rest(observed), input, settings);
+        if acknowledge && !last.acknowledge {
+            self.acknowledge(input, settings);
+        }
+        if discharge && !last.discharge {
+            self.discharge(input, settings);
+        }
+        if charge && !last.charge {
+            self.charge(settings);
+        }
+        if enable && !last.enable {
+            self.enable(request, &levels, input, settings);
+        }
+    }
+
+    /// Off, stop, coast.
+    #[inline(never)]
+    fn obey_levels(&mut self, request: &Levels, link_may_rest: bool, input: &Situation, settings: &Settings) {
+        let rest = if settings.line.is_some() { Phase::Charged } else { Phase::Ready };
+        let resting = self.demands.are_at_rest();
+        let may_open = resting && link_may_rest && health::open_is_safe(input, settings);
+        let off = request.off || !input.feedback.enable_input;
+        match self.phase {
+            Phase::Pulsing | Phase::Coasting { .. } | Phase::Stopping if off => self.rest(rest),
+            Phase::Stopping if may_open => self.rest(rest),
+            Phase::Coasting { off: true } if !request.enable => self.rest(rest),
+            Phase::Pulsing | Phase::Coasting { .. } if !request.enable => self.phase = Phase::Stopping,
+            Phase::Pulsing if request.coast => self.phase = Phase::Coasting { off: false },
+            Phase::Coasting { .. } if !request.coast => self.phase = Phase::Pulsing,
+            Phase::Coasting { off: false } if may_open => self.phase = Phase::Coasting { off: true },
+            _ => {}
+        }
+    }
+
+    fn rest(&mut self, phase: Phase) {
+        self.phase = phase;
+        self.demands.drop();
+    }
+
+    fn follow(&mut self, phase: Phase) {
+        self.phase = phase;
+        self.refusal = None;
+    }
+
+    fn acknowledge(&mut self, input: &Situation, settings: &Settings) {
+        let Phase::Fault { trip, asked: None } = self.phase else {
+            let waiting = matches!(self.phase, Phase::Fault { .. });
+            return self.refuse(if waiting { Refusal::FaultNotAcknowledged } else { Refusal::NoFault });
+        };
+        let shorted = trip.safe != SafeState::GatesOff;
+        let held = shorted && !health::open_is_safe(input, settings);
+        let cause =
+            health::cause(input, false, settings).or_else(|| health::resting_current(input, settings));
+        if held || cause.is_some() {
+            return self.refuse(Refusal::CauseStillPresent);
+        }
+        // Zero is what both interrupts begin with.
+        self.acknowledge = match self.acknowledge.wrapping_add(1) {
+            0 => 1,
+            number => number,
+        };
+        self.follow(Phase::Fault { trip, asked: Some(0) });
+    }
+
+    fn enable(&mut self, request: &D::Request, levels: &Levels, input: &Situation, settings: &Settings) {
+        match self.why_not_enable(request, levels, input, settings) {
+            Some(reason) => self.refuse(reason),
+            None => self.follow(Phase::Pulsing),
+        }
+    }
+
+    fn why_not_enable(
+        &self,
+        request: &D::Request,
+        levels: &Levels,
+        input: &Situation,
+        settings: &Settings,
+    ) -> Option<Refusal> {
+        let Situation { observed, feedback } = *input;
+        match self.phase {
+            Phase::Init | Phase::SelfTest { .. } => return Some(Refusal::NotReady),
+            Phase::Fault { .. } => return Some(Refusal::FaultNotAcknowledged),
+            Phase::Precharge(_) => return Some(Refusal::LinkNotCharged),
+            Phase::Discharge(_) => return Some(Refusal::Discharging),
+            Phase::Pulsing | Phase::Coasting { .. } | Phase::Stopping => return Some(Refusal::NotStopped),
+            Phase::Ready if settings.line.is_some() => return Some(Refusal::LinkNotCharged),
+            Phase::Ready | Phase::Charged => {}
+        }
+        let refusals = [
+            (levels.off, Refusal::OffRequested),
+            (feedback.parameters_open, Refusal::ParametersOpen),
+            (!feedback.enable_input, Refusal::EnableInputLow),
+            // Not a number is no voltage.
+            (
+                observed.udc_v.is_nan() || observed.udc_v < settings.ratings.dc_link_min_v,
+                Refusal::LinkNotCharged,
+            ),
+            (!feedback.position_known || !observed.speed_known, Refusal::PositionUnknown),
+            (self.bad_values == Some(Refusal::RequestNotFinite), Refusal::RequestNotFinite),
+            (health::resting_current(input, settings).is_some(), Refusal::CauseStillPresent),
+            (D::asks_torque(request) && !levels.with_torque, Refusal::TorqueNotZero),
+        ];
+        refusals.into_iter().find_map(|(refused, reason)| refused.then_some(reason))
+    }
+
+    fn charge(&mut self, settings: &Settings) {
+        let reason = match self.phase {
+            Phase::Ready if settings.line.is_some() => {
+                return self.follow(Phase::Precharge(Precharge::new()));
+            }
+            Phase::Ready => Refusal::NoContactors,
+            Phase::Init | Phase::SelfTest { .. } => Refusal::NotReady,
+            Phase::Fault { .. } => Refusal::FaultNotAcknowledged,
+            Phase::Discharge(_) => Refusal::Discharging,
+            Phase::Precharge(_)
+            | Phase::Charged
+            | Phase::Pulsing
+            | Phase::Coasting { .. }
+            | Phase::Stopping => Refusal::AlreadyCharged,
+        };
+        self.refuse(reason);
+    }
+
+    fn discharge(&mut self, input: &Situation, settings: &Settings) {
+        let reason = match self.phase {
+            Phase::Init | Phase::SelfTest { .. } => Refusal::NotReady,
+            Phase::Fault { .. } => Refusal::FaultNotAcknowledged,
+            Phase::Discharge(_) => Refusal::Discharging,
+            Phase::Pulsing | Phase::Coasting { .. } | Phase::Stopping => Refusal::NotStopped,
+            Phase::Ready | Phase::Precharge(_) | Phase::Charged if settings.line.is_none() => {
+                Refusal::NoContactors
+            }
+            Phase::Ready | Phase::Precharge(_) | Phase::Charged
+                if demand::emf_v(input, settings.ratings) > line::EMPTY_V =>
+            {
+                Refusal::MachineTurning
+            }
+            Phase::Ready | Phase::Precharge(_) | Phase::Charged => {
+                return self.follow(Phase::Discharge(Discharge::new()));
+            }
+        };
+        self.refuse(reason);
+    }
+
+    /// The demands after limits, slew and jerk.
+    fn shape(&mut self, input: &Input<D::Request, D::Observation>, settings: &Settings) {
+        match self.phase {
+            Phase::Pulsing if self.bad_values != Some(Refusal::RequestNotFinite) => {
+                self.demands.step(Some(input.request), input.observed, settings);
+            }
+            Phase::Pulsing | Phase::Coasting { .. } | Phase::Stopping => {
+                self.demands.step(None, input.observed, settings);
+            }
+            _ => self.demands.drop(),
+        }
+    }
+
+    /// Whether the gates may pulse, and the switches.
+    fn outputs(&self, input: &Situation, settings: &Settings) -> (bool, Switches) {
+        let enable = matches!(self.phase, Phase::Pulsing | Phase::Stopping | Phase::Coasting { off: false });
+        let Some(line) = &settings.line else {
+            return (enable, Switches::default());
+        };
+        let switches = match &self.phase {
+            Phase::Precharge(sequence) => sequence.switches(),
+            Phase::Discharge(sequence) => sequence.switches(),
+            Phase::Charged | Phase::Pulsing | Phase::Coasting { .. } | Phase::Stopping => {
+                Switches { main: true, ..Switches::default() }
+            }
+            Phase::Init | Phase::SelfTest { .. } | Phase::Ready | Phase::Fault { .. } => Switches::default(),
+        };
+        (enable, Switches { chopper: line::chopper(input.observed.udc_v, line), ..switches })
+    }
+}
+
+impl<D: Demands> Default for Operator<D> {
+    fn default() -> Self {
+        Self::new()
+    }
+}

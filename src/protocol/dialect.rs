@@ -1,0 +1,100 @@
+//! What a drive's messages are: the rest of the protocol is the same for all.
+
+use super::commands::ParameterRequest;
+use super::commands::TorqueLimits;
+use super::message::Message;
+use super::parameters::{Parameters, RPM_PER_RAD_S};
+use super::signal::Payload;
+use super::telemetry::Pattern;
+use crate::machine::Ratings;
+use crate::operator::{Demands, MotorLimits};
+
+/// A drive's messages, and, as a value, what was said last.
+pub trait Dialect: Copy + 'static {
+    /// What its operator asks for and sees.
+    type Demands: Demands;
+    /// What a frame that was taken says.
+    type Content: Copy;
+    /// Measurements of its telemetry.
+    type Measured: Copy;
+    /// How its gates are played.
+    type Pattern: Pattern;
+
+    /// What is sent to it: the command first.
+    const TO_DRIVE: &'static [&'static Message];
+    /// What it sends: status, three of measurements, the fault's value and limit, counters, the answer about a parameter.
+    const FROM_DRIVE: [&'static Message; 8];
+    /// The first frame of a message, or the first after a silence: it only sets the counter.
+    const GREETING: Self::Content;
+    /// Nothing said.
+    const SILENT: Self;
+
+    /// What a frame of [`Self::TO_DRIVE`] says; `None` if a value is out of its range or an unused bit is set.
+    fn decode(id: u16, payload: Payload) -> Option<Self::Content>;
+    /// Keeps what is said.
+    fn take(&mut self, content: Self::Content) -> Taken;
+    /// The command is forgotten, as if nothing were asked.
+    fn rest(&mut self);
+    /// What is asked of the operator: nothing but off before it is `armed`, no torque unless the command is `fresh`.
+    fn request(&self, armed: bool, fresh: bool, parameters: &Parameters, ratings: &Ratings) -> Request<Self>;
+    /// What is sent of an observation.
+    fn observed(observed: Option<&Observation<Self>>, ratings: &Ratings) -> (Self::Measured, Self::Pattern);
+    /// Content of one of the three messages of measurements.
+    fn measured(measured: &Self::Measured, message: usize) -> Payload;
+}
+
+/// What is asked of a drive.
+pub type Request<D> = <<D as Dialect>::Demands as Demands>::Request;
+/// What a drive says of itself.
+pub type Observation<D> = <<D as Dialect>::Demands as Demands>::Observation;
+/// What its operator tells of the demands.
+pub type Told<D> = <<D as Dialect>::Demands as Demands>::Told;
+
+/// What became of a frame's content.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Taken {
+    /// Nothing more is to be done.
+    Kept,
+    /// A command has come; whether nothing is asked in it.
+    Command {
+        /// All levels but off are low.
+        at_rest: bool,
+    },
+    /// A parameter is to be read or written.
+    Parameter(ParameterRequest),
+}
+
+/// Rounding that is forgiven at a rating, as a share of it.
+const STEP_SHARE: f32 = 1e-4;
+
+/// What is sent beyond the rating stays, so that it is refused with a reason; within it the parameter holds.
+fn beyond(sent: f32, parameter: f32, rated: f32) -> f32 {
+    if sent > rated * (1.0 + STEP_SHARE) || sent < parameter { sent } else { parameter }
+}
+
+/// The lower of the sender's limits and the parameters, of one motor.
+#[inline(never)]
+pub(super) fn motor_limits(
+    sent: Option<&TorqueLimits>,
+    parameters: &Parameters,
+    ratings: &Ratings,
+) -> MotorLimits {
+    let mut limits = MotorLimits {
+        motoring_nm: parameters.torque_limit_nm,
+        braking_nm: parameters.torque_limit_nm,
+        speed_rad_s: parameters.speed_limit_rpm / RPM_PER_RAD_S,
+    };
+    if let Some(sent) = sent {
+        limits.motoring_nm = beyond(sent.motoring_nm, parameters.torque_limit_nm, ratings.max_torque_nm);
+        limits.braking_nm = beyond(sent.braking_nm, parameters.torque_limit_nm, ratings.max_torque_nm);
+        let rated_rpm = ratings.max_speed_rad_s * RPM_PER_RAD_S;
+        limits.speed_rad_s = beyond(sent.speed_rpm, parameters.speed_limit_rpm, rated_rpm) / RPM_PER_RAD_S;
+    }
+    // Rounding to the signal's step and back must not make the rating itself look higher than it is.
+    if limits.speed_rad_s > ratings.max_speed_rad_s
+        && limits.speed_rad_s < ratings.max_speed_rad_s * (1.0 + STEP_SHARE)
+    {
+        limits.speed_rad_s = ratings.max_speed_rad_s;
+    }
+    limits
+}

@@ -1,0 +1,148 @@
+//! The PMaSynRM drive's messages.
+
+use super::commands::{
+    COMMAND, Command, LIMITS, LINK_LIMITS, LinkLimits, PARAMETER_REQUEST, ParameterRequest, TorqueLimits,
+};
+use super::dialect::{Dialect, Taken, motor_limits};
+use super::message::Message;
+use super::parameters::{Parameters, RPM_PER_RAD_S};
+use super::signal::Payload;
+use super::telemetry::Measured;
+use super::{FROM_DRIVE, TO_DRIVE};
+use crate::machine::Ratings;
+use crate::modulation::Mode;
+use crate::operator::{Limits, MotorLimits, Observation, Request, TorqueDemand};
+
+/// What a frame that was taken says.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Content {
+    /// The first of its message, or the first after a silence: it only set the counter.
+    Greeting,
+    /// A command.
+    Command(Command),
+    /// Limits of torque and speed.
+    Limits(TorqueLimits),
+    /// Limits of the link.
+    LinkLimits(LinkLimits),
+    /// A parameter is to be read or written.
+    Parameter(ParameterRequest),
+}
+
+const AT_REST: Command = Command {
+    enable: false,
+    with_torque: false,
+    off: false,
+    coast: false,
+    charge: false,
+    discharge: false,
+    acknowledge: false,
+    torque_nm: 0.0,
+};
+
+/// What was said to the PMaSynRM drive last.
+#[derive(Clone, Copy, Debug)]
+pub struct Traction {
+    command: Command,
+    torque_limits: Option<TorqueLimits>,
+    link_limits: Option<LinkLimits>,
+}
+
+impl Traction {
+    /// The lower of the sender's limits and the parameters; as rated where nothing is said.
+    fn limits(&self, parameters: &Parameters, ratings: &Ratings) -> Limits {
+        let motor = motor_limits(self.torque_limits.as_ref(), parameters, ratings);
+        let MotorLimits { motoring_nm, braking_nm, speed_rad_s } = motor;
+        let mut limits = Limits { motoring_nm, braking_nm, speed_rad_s, ..Limits::rated(ratings) };
+        if let Some(sent) = &self.link_limits {
+            limits.link_low_v = sent.low_v;
+            limits.link_high_v = sent.high_v;
+        }
+        limits
+    }
+}
+
+impl Dialect for Traction {
+    type Demands = TorqueDemand;
+    type Content = Content;
+    type Measured = Measured;
+    type Pattern = Mode;
+
+    const TO_DRIVE: &'static [&'static Message] = &TO_DRIVE;
+    const FROM_DRIVE: [&'static Message; 8] = FROM_DRIVE;
+    const GREETING: Content = Content::Greeting;
+    const SILENT: Self = Self { command: AT_REST, torque_limits: None, link_limits: None };
+
+    fn decode(id: u16, payload: Payload) -> Option<Content> {
+        Some(match id {
+            id if id == COMMAND.id => Content::Command(Command::decode(payload)?),
+            id if id == LIMITS.id => Content::Limits(TorqueLimits::decode(payload)?),
+            id if id == LINK_LIMITS.id => Content::LinkLimits(LinkLimits::decode(payload)?),
+            id if id == PARAMETER_REQUEST.id => Content::Parameter(ParameterRequest::decode(payload)?),
+            _ => return None,
+        })
+    }
+
+    fn take(&mut self, content: Content) -> Taken {
+        match content {
+            Content::Greeting => {}
+            Content::Command(command) => {
+                self.command = command;
+                let at_rest = Command { torque_nm: 0.0, off: false, ..command } == AT_REST;
+                return Taken::Command { at_rest };
+            }
+            Content::Limits(limits) => self.torque_limits = Some(limits),
+            Content::LinkLimits(limits) => self.link_limits = Some(limits),
+            Content::Parameter(request) => return Taken::Parameter(request),
+        }
+        Taken::Kept
+    }
+
+    fn rest(&mut self) {
+        self.command = AT_REST;
+    }
+
+    fn request(&self, armed: bool, fresh: bool, parameters: &Parameters, ratings: &Ratings) -> Request {
+        let idle = Request { limits: self.limits(parameters, ratings), ..Request::idle(ratings) };
+        let command = &self.command;
+        if !armed {
+            return Request { off: command.off, ..idle };
+        }
+        Request {
+            enable: command.enable,
+            with_torque: command.with_torque,
+            off: command.off,
+            coast: command.coast,
+            charge: command.charge,
+            discharge: command.discharge,
+            acknowledge: command.acknowledge,
+            torque_nm: if fresh { command.torque_nm } else { 0.0 },
+            ..idle
+        }
+    }
+
+    fn observed(observed: Option<&Observation>, ratings: &Ratings) -> (Measured, Mode) {
+        let Some(observed) = observed else {
+            return (Measured::default(), Mode::Off);
+        };
+        let measured = Measured {
+            speed_rpm: observed.speed_known.then_some(observed.omega / ratings.pole_pairs * RPM_PER_RAD_S),
+            torque_nm: Some(observed.torque_nm),
+            link_v: Some(observed.udc_v),
+            current_a: Some(observed.current_a),
+            id_ref_a: Some(observed.id_ref_a),
+            iq_ref_a: Some(observed.iq_ref_a),
+            voltage_v: Some(observed.voltage_v),
+            frequency_hz: Some(observed.omega / core::f32::consts::TAU),
+            temperature_c: None,
+        };
+        (measured, observed.mode)
+    }
+
+    fn measured(measured: &Measured, message: usize) -> Payload {
+        match message {
+            0 => measured.motion(),
+            1 => measured.currents(),
+            _ => measured.voltages(),
+        }
+    }
+}

@@ -1,0 +1,346 @@
+//! The ZS9's messages: those of the PMaSynRM drive, with two motors' demands, limits and measurements, and the link's.
+
+use super::commands::{
+    ACKNOWLEDGE, BRAKING, CHARGE, COAST, DISCHARGE as DISCHARGE_COMMAND, ENABLE, LINK_V, MOTORING, OFF,
+    PARAMETER, ParameterRequest, SPEED as SPEED_LIMIT, TORQUE_NM, TorqueLimits, VALUE, WITH_TORQUE, WRITE,
+    levels, put_levels,
+};
+use super::dialect::{Dialect, Taken, motor_limits};
+use super::message::Message;
+use super::parameters::{Parameters, RPM_PER_RAD_S};
+use super::signal::{OutOfRange, Payload, Signal};
+use super::telemetry::{
+    ANSWER_PARAMETER, ANSWER_RESULT, ANSWER_VALUE, CHOPPER, COUNTER_SIGNALS, DISCHARGE, FAULT, LISTENING,
+    MAIN, PRECHARGE, REFUSAL, REFUSALS, SPEED_RPM, STATE, TAKEN, TRIP_FAULT, TRIP_LIMIT, TRIP_VALUE, encode,
+};
+use crate::drive::dual;
+use crate::machine::Ratings;
+use crate::nine_switch::Scheme;
+use crate::operator::{DualDemands, DualObservation, DualRequest, Levels, MotorRequest, Wanted};
+
+const KIND: Signal = Signal::number("page", 35, 1, 1);
+const TORQUES: [Signal; 2] = [
+    Signal::physical("torque1_nm", "N.m", 16, 0.1, TORQUE_NM).on_page(0),
+    Signal::physical("torque2_nm", "N.m", 48, 0.1, TORQUE_NM).on_page(0),
+];
+const SPEEDS: [Signal; 2] = [
+    Signal::physical("speed1_rpm", "r/min", 16, 0.5, SPEED_RPM).on_page(1),
+    Signal::physical("speed2_rpm", "r/min", 48, 0.5, SPEED_RPM).on_page(1),
+];
+const LINK_REF: Signal = Signal::physical("link_ref_v", "V", 16, 0.1, LINK_V);
+
+const SCHEME: Signal = Signal::number("scheme", 40, 3, 7);
+const SPEED: Signal = Signal::physical("speed_rpm", "r/min", 16, 0.5, SPEED_RPM);
+const TORQUE: Signal = Signal::physical("torque_nm", "N.m", 32, 0.1, TORQUE_NM);
+const CURRENT: Signal = Signal::physical("current_a", "A", 48, 0.1, [0.0, 3_000.0]);
+const LINK: Signal = Signal::physical("link_v", "V", 16, 0.1, LINK_V);
+const CAPACITOR: Signal = Signal::physical("capacitor_v", "V", 32, 0.1, LINK_V);
+const DUTY: Signal = Signal::physical("duty_percent", "%", 48, 0.01, [0.0, 100.0]);
+
+/// Levels and demands: on page 0 torques, on page 1 speeds. Without it the drive does nothing.
+pub const ZS9_COMMAND: Message = Message::new(
+    "ZS9_COMMAND",
+    0x111,
+    17,
+    10,
+    &[
+        ENABLE,
+        WITH_TORQUE,
+        OFF,
+        COAST,
+        CHARGE,
+        DISCHARGE_COMMAND,
+        ACKNOWLEDGE,
+        KIND,
+        TORQUES[0],
+        TORQUES[1],
+        SPEEDS[0],
+        SPEEDS[1],
+    ],
+);
+/// Limits of torque and speed of the upper motor, of the lower one; as rated until they come.
+pub const ZS9_LIMITS: [Message; 2] = [
+    Message::new("ZS9_LIMITS_1", 0x112, 18, 100, &[MOTORING, BRAKING, SPEED_LIMIT]),
+    Message::new("ZS9_LIMITS_2", 0x113, 19, 100, &[MOTORING, BRAKING, SPEED_LIMIT]),
+];
+/// The link's voltage outside shoot-through; the nominal one until it comes.
+pub const ZS9_LINK: Message = Message::new("ZS9_LINK", 0x114, 20, 100, &[LINK_REF]);
+/// Reads a parameter, or writes it.
+pub const ZS9_PARAMETER_REQUEST: Message =
+    Message::new("ZS9_PARAMETER_REQUEST", 0x115, 21, 0, &[WRITE, PARAMETER, VALUE]);
+
+/// State, fault, refusal, switches.
+pub const ZS9_STATUS: Message = Message::new(
+    "ZS9_STATUS",
+    0x191,
+    22,
+    10,
+    &[STATE, FAULT, REFUSAL, REFUSALS, SCHEME, LISTENING, PRECHARGE, MAIN, DISCHARGE, CHOPPER, TAKEN],
+);
+const MOTOR_1: Message = Message::new("ZS9_MOTOR_1", 0x192, 23, 10, &[SPEED, TORQUE, CURRENT]);
+const MOTOR_2: Message = Message::new("ZS9_MOTOR_2", 0x193, 24, 10, &[SPEED, TORQUE, CURRENT]);
+const LINK_STATE: Message = Message::new("ZS9_LINK_STATE", 0x194, 25, 10, &[LINK, CAPACITOR, DUTY]);
+const FAULT_VALUE: Message = Message::new("ZS9_FAULT_VALUE", 0x195, 26, 100, &[TRIP_FAULT, TRIP_VALUE]);
+const FAULT_LIMIT: Message = Message::new("ZS9_FAULT_LIMIT", 0x196, 27, 100, &[TRIP_FAULT, TRIP_LIMIT]);
+const COUNTERS: Message = Message::new("ZS9_COUNTERS", 0x197, 28, 100, &COUNTER_SIGNALS);
+const PARAMETER_ANSWER: Message =
+    Message::new("ZS9_PARAMETER_ANSWER", 0x198, 29, 0, &[ANSWER_RESULT, ANSWER_PARAMETER, ANSWER_VALUE]);
+
+/// What is sent to the ZS9.
+pub const TO_ZS9: [&Message; 5] =
+    [&ZS9_COMMAND, &ZS9_LIMITS[0], &ZS9_LIMITS[1], &ZS9_LINK, &ZS9_PARAMETER_REQUEST];
+
+/// What the ZS9 sends.
+pub const FROM_ZS9: [&Message; 8] =
+    [&ZS9_STATUS, &MOTOR_1, &MOTOR_2, &LINK_STATE, &FAULT_VALUE, &FAULT_LIMIT, &COUNTERS, &PARAMETER_ANSWER];
+
+/// Demands of the upper motor and of the lower one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Zs9Demands {
+    /// Torques, in N·m.
+    Torques([f32; 2]),
+    /// Mechanical speeds, in r/min.
+    Speeds([f32; 2]),
+}
+
+/// Content of [`ZS9_COMMAND`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Zs9Command {
+    /// Levels.
+    pub levels: Levels,
+    /// Demands.
+    pub demands: Zs9Demands,
+}
+
+impl Zs9Command {
+    /// Nothing asked.
+    pub const AT_REST: Self = Self {
+        levels: Levels {
+            enable: false,
+            with_torque: false,
+            off: false,
+            coast: false,
+            charge: false,
+            discharge: false,
+            acknowledge: false,
+        },
+        demands: Zs9Demands::Torques([0.0; 2]),
+    };
+
+    /// As a frame's content.
+    pub fn encode(&self) -> Result<Payload, OutOfRange> {
+        let mut payload = put_levels(&self.levels);
+        let (kind, signals, values) = match self.demands {
+            Zs9Demands::Torques(values) => (0, &TORQUES, values),
+            Zs9Demands::Speeds(values) => (1, &SPEEDS, values),
+        };
+        KIND.put_raw(&mut payload, kind);
+        for (signal, value) in signals.iter().zip(values) {
+            signal.put(&mut payload, value)?;
+        }
+        Ok(payload)
+    }
+
+    /// From a frame's content; `None` if a value is out of its range or an unused bit is set.
+    pub fn decode(payload: Payload) -> Option<Self> {
+        ZS9_COMMAND.is_tidy(payload).then_some(())?;
+        let is_speed = KIND.is_set(payload);
+        let [first, second] = if is_speed { &SPEEDS } else { &TORQUES };
+        let values = [first.get(payload)?, second.get(payload)?];
+        let demands = if is_speed { Zs9Demands::Speeds(values) } else { Zs9Demands::Torques(values) };
+        Some(Self { levels: levels(payload), demands })
+    }
+}
+
+/// Content of [`ZS9_LINK`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Zs9Link {
+    /// Link voltage wanted outside shoot-through, in V.
+    pub link_ref_v: f32,
+}
+
+impl Zs9Link {
+    /// As a frame's content.
+    pub fn encode(&self) -> Result<Payload, OutOfRange> {
+        let mut payload = Payload::default();
+        LINK_REF.put(&mut payload, self.link_ref_v)?;
+        Ok(payload)
+    }
+
+    /// From a frame's content; `None` if the value is out of its range or an unused bit is set.
+    pub fn decode(payload: Payload) -> Option<Self> {
+        ZS9_LINK.is_tidy(payload).then_some(())?;
+        Some(Self { link_ref_v: LINK_REF.get(payload)? })
+    }
+}
+
+/// What a frame that was taken says.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Zs9Content {
+    /// The first of its message, or the first after a silence: it only set the counter.
+    Greeting,
+    /// A command.
+    Command(Zs9Command),
+    /// Limits of torque and speed of the upper motor (0) or of the lower one (1).
+    Limits(usize, TorqueLimits),
+    /// The link's voltage.
+    Link(Zs9Link),
+    /// A parameter is to be read or written.
+    Parameter(ParameterRequest),
+}
+
+/// What is measured of one motor. `None`: not available.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct MotorMeasured {
+    /// Mechanical speed, in r/min.
+    pub speed_rpm: Option<f32>,
+    /// Torque reference after all limits, in N·m.
+    pub torque_nm: Option<f32>,
+    /// Largest magnitude of a phase current, in A.
+    pub current_a: Option<f32>,
+}
+
+/// What is measured. `None`: not available.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Zs9Measured {
+    /// Upper motor, lower motor.
+    pub motors: [MotorMeasured; 2],
+    /// Link voltage outside shoot-through, U_in, in V.
+    pub link_v: Option<f32>,
+    /// Capacitor voltage, U_c, in V.
+    pub capacitor_v: Option<f32>,
+    /// Shoot-through duty, in percent.
+    pub duty_percent: Option<f32>,
+}
+
+impl Zs9Measured {
+    /// Takes over what a message of the three says.
+    pub fn merge(&mut self, message: &Message, payload: Payload) {
+        let [first, second] = &mut self.motors;
+        let motor = match message.id {
+            id if id == MOTOR_1.id => first,
+            id if id == MOTOR_2.id => second,
+            id if id == LINK_STATE.id => {
+                self.link_v = LINK.get(payload);
+                self.capacitor_v = CAPACITOR.get(payload);
+                self.duty_percent = DUTY.get(payload);
+                return;
+            }
+            _ => return,
+        };
+        motor.speed_rpm = SPEED.get(payload);
+        motor.torque_nm = TORQUE.get(payload);
+        motor.current_a = CURRENT.get(payload);
+    }
+}
+
+/// What was said to the ZS9 last.
+#[derive(Clone, Copy, Debug)]
+pub struct Zs9 {
+    command: Zs9Command,
+    limits: [Option<TorqueLimits>; 2],
+    link: Option<Zs9Link>,
+}
+
+impl Dialect for Zs9 {
+    type Demands = DualDemands;
+    type Content = Zs9Content;
+    type Measured = Zs9Measured;
+    type Pattern = Scheme;
+
+    const TO_DRIVE: &'static [&'static Message] = &TO_ZS9;
+    const FROM_DRIVE: [&'static Message; 8] = FROM_ZS9;
+    const GREETING: Zs9Content = Zs9Content::Greeting;
+    const SILENT: Self = Self { command: Zs9Command::AT_REST, limits: [None; 2], link: None };
+
+    fn decode(id: u16, payload: Payload) -> Option<Zs9Content> {
+        let [first, second] = &ZS9_LIMITS;
+        Some(match id {
+            id if id == ZS9_COMMAND.id => Zs9Content::Command(Zs9Command::decode(payload)?),
+            id if id == first.id => Zs9Content::Limits(0, TorqueLimits::decode(payload)?),
+            id if id == second.id => Zs9Content::Limits(1, TorqueLimits::decode(payload)?),
+            id if id == ZS9_LINK.id => Zs9Content::Link(Zs9Link::decode(payload)?),
+            id if id == ZS9_PARAMETER_REQUEST.id => Zs9Content::Parameter(ParameterRequest::decode(payload)?),
+            _ => return None,
+        })
+    }
+
+    fn take(&mut self, content: Zs9Content) -> Taken {
+        match content {
+            Zs9Content::Greeting => {}
+            Zs9Content::Command(command) => {
+                self.command = command;
+                let levels = Levels { off: false, ..command.levels };
+                return Taken::Command { at_rest: levels == Zs9Command::AT_REST.levels };
+            }
+            Zs9Content::Limits(motor, limits) => {
+                if let Some(kept) = self.limits.get_mut(motor) {
+                    *kept = Some(limits);
+                }
+            }
+            Zs9Content::Link(link) => self.link = Some(link),
+            Zs9Content::Parameter(request) => return Taken::Parameter(request),
+        }
+        Taken::Kept
+    }
+
+    fn rest(&mut self) {
+        self.command = Zs9Command::AT_REST;
+    }
+
+    /// Once the command is old, a speed demand becomes no torque.
+    fn request(&self, armed: bool, fresh: bool, parameters: &Parameters, ratings: &Ratings) -> DualRequest {
+        let Zs9Command { levels, demands } = self.command;
+        let wanted = match demands {
+            _ if !armed || !fresh => [Wanted::Torque(0.0); 2],
+            Zs9Demands::Torques(torques_nm) => torques_nm.map(Wanted::Torque),
+            Zs9Demands::Speeds(speeds_rpm) => speeds_rpm.map(|rpm| Wanted::Speed(rpm / RPM_PER_RAD_S)),
+        };
+        let ([first, second], [limits1, limits2]) = (wanted, &self.limits);
+        let motor = |wanted, sent: &Option<TorqueLimits>| MotorRequest {
+            wanted,
+            limits: motor_limits(sent.as_ref(), parameters, ratings),
+        };
+        let [_, _, nominal_v] = dual::Settings::link_range_v(ratings);
+        DualRequest {
+            levels: if armed { levels } else { Levels { off: levels.off, ..Zs9Command::AT_REST.levels } },
+            motors: [motor(first, limits1), motor(second, limits2)],
+            link_ref_v: self.link.map_or(nominal_v, |link| link.link_ref_v),
+        }
+    }
+
+    fn observed(observed: Option<&DualObservation>, ratings: &Ratings) -> (Zs9Measured, Scheme) {
+        let Some(DualObservation { report, .. }) = observed else {
+            return (Zs9Measured::default(), Scheme::default());
+        };
+        let motor = |omega: f32, torque_nm, current_a| MotorMeasured {
+            speed_rpm: report.speed_known.then_some(omega / ratings.pole_pairs * RPM_PER_RAD_S),
+            torque_nm: Some(torque_nm),
+            current_a: Some(current_a),
+        };
+        let ([w1, w2], [t1, t2], [i1, i2]) = (report.omega, report.torque_nm, report.current_a);
+        let measured = Zs9Measured {
+            motors: [motor(w1, t1, i1), motor(w2, t2, i2)],
+            link_v: Some(report.link_v()),
+            capacitor_v: Some(report.capacitor_v),
+            duty_percent: Some(100.0 * report.duty),
+        };
+        (measured, report.scheme)
+    }
+
+    fn measured(measured: &Zs9Measured, message: usize) -> Payload {
+        let [first, second] = &measured.motors;
+        let motor = match message {
+            0 => first,
+            1 => second,
+            _ => {
+                return encode([
+                    (&LINK, measured.link_v),
+                    (&CAPACITOR, measured.capacitor_v),
+                    (&DUTY, measured.duty_percent),
+                ]);
+            }
+        };
+        encode([(&SPEED, motor.speed_rpm), (&TORQUE, motor.torque_nm), (&CURRENT, motor.current_a)])
+    }
+}

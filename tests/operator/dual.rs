@@ -1,0 +1,240 @@
+//! The same state machine over the ZS9's two motors.
+
+use tractive::board::MotorDemand;
+use tractive::drive::dual::{self, DualReport};
+use tractive::machine::Ratings;
+use tractive::machine::zs9::BUILT_IN;
+use tractive::operator::{
+    Configuration, DualObservation, DualOperator, DualPermit, DualRequest, DualStatus, Feedback, Input, Line,
+    MotorLimits, Output, Refusal, Settings, State, Wanted,
+};
+use tractive::protection::{Fault, SafeState, Trip};
+use tractive::time::{Clock, Instant};
+
+const CLOCK: Clock = Clock::new(25_000_000, 2_500);
+
+struct World {
+    operator: DualOperator,
+    ratings: Ratings,
+    request: DualRequest,
+    observed: DualObservation,
+    feedback: Feedback,
+    last: Option<Output<DualPermit, [MotorDemand; 2]>>,
+}
+
+impl World {
+    fn new() -> Self {
+        let ratings = dual::Settings::new(CLOCK, 2_500).operator_ratings(&BUILT_IN.ratings);
+        let report = DualReport { source_v: 400.0, speed_known: true, ..DualReport::default() };
+        Self {
+            operator: DualOperator::new(),
+            request: DualRequest::idle(&ratings, 667.0),
+            ratings,
+            observed: DualObservation { at: Instant(0), report },
+            feedback: Feedback {
+                driver_ready: true,
+                enable_input: true,
+                sensor_alive: true,
+                position_known: true,
+                configuration: Configuration::Good,
+                ..Feedback::default()
+            },
+            last: None,
+        }
+    }
+
+    /// A slot in which contactors, capacitors and drive do what they are told.
+    fn slot(&mut self) -> DualStatus {
+        let line = Line::rated(&self.ratings, 0.05, 0.5).without_chopper();
+        let settings = Settings::rated(&self.ratings, 1e-3, Some(line));
+        let input = Input { request: &self.request, observed: &self.observed, feedback: &self.feedback };
+        let output = self.operator.step(&input, &settings);
+        let (switches, report) = (output.status.switches, &mut self.observed.report);
+        assert_eq!(switches.chopper, 0.0);
+        (self.feedback.precharge_closed, self.feedback.main_closed) = (switches.precharge, switches.main);
+        if switches.precharge || switches.main {
+            let towards = if output.permit.enable { 0.5 * (output.permit.link_ref_v + 400.0) } else { 400.0 };
+            report.capacitor_v += (towards - report.capacitor_v) * 0.02;
+        }
+        if let Some(last) = self.last.replace(output)
+            && last.permit.acknowledge != report.acknowledged
+        {
+            (report.acknowledged, report.trip) = (last.permit.acknowledge, None);
+        }
+        for (torque_nm, demand) in report.torque_nm.iter_mut().zip(output.permit.demands) {
+            if let MotorDemand::Torque(demand) = demand {
+                *torque_nm = demand.torque_nm;
+            }
+        }
+        self.observed.at = self.observed.at.after(25_000);
+        output.status
+    }
+
+    fn slots(&mut self, count: u32) -> DualStatus {
+        (0..count).map(|_| self.slot()).last().unwrap()
+    }
+
+    fn until(&mut self, state: State) {
+        assert!((0..5_000).any(|_| self.slot().state == state), "{state:?}: {:?}", self.last);
+    }
+
+    fn permit(&self) -> DualPermit {
+        self.last.unwrap().permit
+    }
+
+    fn torques_nm(&self) -> [f32; 2] {
+        self.permit().demands.map(|demand| match demand {
+            MotorDemand::Torque(demand) => demand.torque_nm,
+            MotorDemand::Speed(speed) => panic!("a speed: {speed}"),
+        })
+    }
+
+    fn enabled() -> Self {
+        let mut world = Self::new();
+        world.until(State::Ready);
+        world.request.levels.charge = true;
+        world.until(State::Charged);
+        world.request.levels.enable = true;
+        assert_eq!(world.slot().state, State::Enabled, "{:?}", world.last);
+        world
+    }
+
+    fn want(&mut self, wanted: [Wanted; 2]) {
+        for (motor, wanted) in self.request.motors.iter_mut().zip(wanted) {
+            motor.wanted = wanted;
+        }
+    }
+}
+
+#[test]
+fn precharge_enable_run_stop_discharge() {
+    let mut world = World::new();
+    assert_eq!(world.slot().state, State::SelfTest);
+    world.until(State::Ready);
+    world.request.levels.enable = true;
+    assert_eq!(world.slot().refusal, Some(Refusal::LinkNotCharged));
+    let mut world = World::enabled();
+    world.want([Wanted::Torque(60.0), Wanted::Torque(-20.0)]);
+    let mut before = [0.0; 2];
+    for _ in 0..400 {
+        world.slot();
+        let now = world.torques_nm();
+        // 80 % of 4,000 N.m/s.
+        assert!(
+            now.iter().zip(before).all(|(now, before)| (now - before).abs() <= 3.2001),
+            "{now:?} {before:?}"
+        );
+        before = now;
+    }
+    assert_eq!((world.torques_nm(), world.operator.state()), ([60.0, -20.0], State::Running));
+    assert_eq!(world.permit().link_ref_v, 667.0);
+    world.request.levels.enable = false;
+    assert_eq!(world.slot().state, State::Stopping);
+    // The link goes down to the source's voltage before the gates go off.
+    while world.slot().state == State::Stopping {
+        assert!(world.permit().enable && world.permit().link_ref_v == 400.0);
+    }
+    assert_eq!((world.operator.state(), world.permit().enable), (State::Charged, false));
+    assert!(world.observed.report.link_v() < 420.0);
+    world.request.levels.discharge = true;
+    world.until(State::Discharge);
+    world.slots(3);
+    assert!(world.last.unwrap().status.switches.discharge);
+    world.observed.report.capacitor_v = 50.0;
+    world.until(State::Ready);
+}
+
+#[test]
+fn a_speed_begins_where_the_motor_is_and_a_torque_where_its_torque_is() {
+    let mut world = World::enabled();
+    world.observed.report.omega = [4.0 * 10.0, 0.0];
+    world.want([Wanted::Speed(100.0), Wanted::Torque(10.0)]);
+    let rise = world.ratings.max_speed_rad_s / 500.0;
+    world.slot();
+    let [MotorDemand::Speed(speed), MotorDemand::Torque(_)] = world.permit().demands else { panic!() };
+    assert!((speed - 10.0 - rise).abs() < 1e-3, "{speed}");
+    assert_eq!(world.slots(2_000).state, State::Running);
+    assert_eq!(world.permit().demands[0], MotorDemand::Speed(100.0));
+    world.observed.report.torque_nm[0] = 30.0;
+    world.want([Wanted::Torque(0.0); 2]);
+    world.slot();
+    let [first, _] = world.torques_nm();
+    assert!((29.0..30.0).contains(&first), "{first}");
+    assert_eq!(world.slots(500).state, State::Enabled);
+}
+
+#[test]
+fn limits_are_each_motors_own() {
+    let mut world = World::enabled();
+    let rated = MotorLimits::rated(&world.ratings);
+    world.request.motors[1].limits = MotorLimits { motoring_nm: 15.0, braking_nm: 12.0, speed_rad_s: 50.0 };
+    world.want([Wanted::Torque(60.0), Wanted::Torque(60.0)]);
+    world.slots(500);
+    assert_eq!(world.torques_nm(), [60.0, 15.0]);
+    assert_eq!(world.permit().speed_torque_nm, [rated.motoring_nm, 12.0]);
+    world.want([Wanted::Speed(100.0), Wanted::Speed(100.0)]);
+    world.slots(1_000);
+    assert_eq!(world.permit().demands, [MotorDemand::Speed(100.0), MotorDemand::Speed(50.0)]);
+    // Beyond the ratings: refused once, those before go on.
+    world.request.motors[0].limits.motoring_nm = 121.0;
+    assert_eq!(world.slots(3).refusal, Some(Refusal::LimitOutOfRange));
+    assert_eq!(world.permit().speed_torque_nm, [rated.motoring_nm, 12.0]);
+    world.request.motors[0].limits = rated;
+    world.slot();
+    for link_ref_v in [350.0, 801.0] {
+        world.request.link_ref_v = link_ref_v;
+        let refusals = world.last.unwrap().status.refusals;
+        assert_eq!(world.slot().refusals, refusals + 1, "{link_ref_v}");
+        assert_eq!(world.permit().link_ref_v, 667.0);
+        world.request.link_ref_v = 667.0;
+        world.slot();
+    }
+}
+
+#[test]
+fn what_is_no_number_asks_for_nothing() {
+    let mut world = World::enabled();
+    world.want([Wanted::Torque(20.0), Wanted::Torque(20.0)]);
+    world.slots(300);
+    world.want([Wanted::Torque(20.0), Wanted::Torque(f32::NAN)]);
+    assert_eq!(world.slots(300).refusal, Some(Refusal::RequestNotFinite));
+    assert_eq!(world.torques_nm(), [0.0; 2]);
+}
+
+#[test]
+fn one_fault_stops_both_motors_and_is_left_by_an_acknowledge() {
+    let mut world = World::enabled();
+    world.want([Wanted::Speed(50.0), Wanted::Torque(20.0)]);
+    world.slots(300);
+    let trip = Trip {
+        fault: Fault::SensorLost2,
+        value: 1.0,
+        limit: 0.0,
+        at: world.observed.at,
+        safe: SafeState::GatesOff,
+    };
+    world.observed.report.trip = Some(trip);
+    let status = world.slot();
+    assert_eq!((status.state, status.trip), (State::Fault, Some(trip)));
+    assert_eq!((world.permit().enable, world.torques_nm()), (false, [0.0; 2]));
+    assert!(!status.switches.main);
+    world.request.levels.enable = false;
+    world.slots(5);
+    world.request.levels.acknowledge = true;
+    world.until(State::SelfTest);
+    world.until(State::Ready);
+    assert_eq!(world.last.unwrap().status.trip, None);
+}
+
+/// Both motors' EMFs are in series for the diodes: each alone would be slow enough.
+#[test]
+fn two_turning_motors_keep_the_gates_on_without_torque() {
+    let mut world = World::enabled();
+    let pole_pairs = world.ratings.pole_pairs;
+    let omega = 0.7 * world.ratings.max_speed_rad_s * pole_pairs;
+    world.observed.report.omega = [omega, -omega];
+    world.request.levels.enable = false;
+    assert_eq!(world.slots(1_000).state, State::Stopping);
+    world.observed.report.omega = [omega, 0.0];
+    world.until(State::Charged);
+}
