@@ -88,7 +88,7 @@ pub struct RunOptions {
     /// A folder of tables/, or the path of any machine folder; default pmasynrm-180kw, of the ZS9's scenarios ipm-zs9.
     #[arg(long)]
     pub machine: Option<String>,
-    /// Step of trace.csv, in s; default 50e-6, of the ZS9's scenarios one carrier period, of zs9-cycle 1e-3.
+    /// Step of trace.csv, in s; default 50e-6, of steady 5e-6, of the ZS9's scenarios one carrier period, of zs9-cycle 1e-3.
     #[arg(long, value_parser = positive)]
     pub dt: Option<f64>,
     /// Seed of the noise.

@@ -34,14 +34,14 @@ impl Scenario for FullStep {
         .plan()
     }
 
-    fn figures(&self, recording: &Recording, _options: &RunOptions, machine: &Machine) -> Figures {
+    fn figures(&self, recording: &Recording, options: &RunOptions, machine: &Machine) -> Figures {
         let most = machine.folder.parameters.max_torque_nm;
         let steps = [(BEGIN_S, 0.0, most), (BEGIN_S + HOLD_S, most, 0.0)].map(|(at_s, from_nm, to_nm)| {
             let step = analysis::Step { at_s, from_nm, to_nm, until_s: at_s + HOLD_S };
             analysis::step_response(recording, &step)
         });
         let mut figures = analysis::common(recording);
-        figures.set("verdicts", verdicts(&steps));
+        figures.set("verdicts", verdicts(&steps, options));
         figures.set("steps", steps);
         figures
     }
