@@ -69,7 +69,7 @@ impl<M: Machine> ControlTask<M> {
         }
     }
 
-    /// Whether [`PwmTask::revise`] is to run before the next [`ControlTask::run`], at the same instant: first thing in the interrupt,
+    /// Whether [`PwmTask::revise`](super::PwmTask::revise) is to run before the next [`ControlTask::run`], at the same instant: first thing in the interrupt,
     /// the handler makes the PWM interrupt pending.
     pub fn wants_revision(&self) -> bool {
         self.revises

@@ -94,7 +94,7 @@ impl<M: Machine> PwmTask<M> {
         shared.applied.publish(self.newest.to_words());
     }
 
-    /// The PWM interrupt when it is no boundary that it comes for, but control's [`ControlTask::wants_revision`]: makes the next half
+    /// The PWM interrupt when it is no boundary that it comes for, but control's [`ControlTask::wants_revision`](super::ControlTask::wants_revision): makes the next half
     /// anew from the newest command, if its boundary is still ahead.
     pub fn revise(&mut self, port: &mut impl PwmPort, shared: &Shared) {
         let Committal { at, begins, half, tripped, .. } = self.newest;
