@@ -5,6 +5,7 @@ use clap::{Parser, Subcommand, ValueEnum};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
+use tractive::machine::BUILT_IN;
 use tractive_rig::analysis::Figures;
 use tractive_rig::campaign::{self, command::CampaignOptions};
 use tractive_rig::machine::Machine;
@@ -206,7 +207,9 @@ fn run(name: &str, options: &RunOptions) -> Result<ExitCode> {
     if let Some(trip) = recording.trip() {
         eprintln!("fault {}: {} (limit {})", trip.fault.name(), trip.value, trip.limit);
     }
-    let kept = recording.trip().is_none() && !figures.fall_short();
+    // The bounds are those of the machine that is built in.
+    let judged = machine.tables.name == BUILT_IN.name;
+    let kept = recording.trip().is_none() && !(judged && figures.fall_short());
     Ok(if kept { ExitCode::SUCCESS } else { ExitCode::from(1) })
 }
 

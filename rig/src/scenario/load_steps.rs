@@ -17,9 +17,10 @@ const STEP_S: f64 = 0.1;
 const LEVELS_NM: [f64; 13] =
     [0.0, 200.0, 400.0, 600.0, 800.0, 1000.0, 1235.0, 1000.0, 800.0, 600.0, 400.0, 200.0, 0.0];
 
-fn level_nm(t_s: f64) -> f64 {
-    let index = (t_s / STEP_S).max(0.0) as usize;
-    LEVELS_NM[index.min(LEVELS_NM.len() - 1)]
+/// The levels as shares of this machine's largest torque.
+fn levels_nm(machine: &Machine) -> [f64; 13] {
+    let scale = machine.folder.parameters.max_torque_nm / worst(LEVELS_NM.into_iter());
+    LEVELS_NM.map(|level| level * scale)
 }
 
 impl Scenario for LoadSteps {
@@ -31,23 +32,29 @@ impl Scenario for LoadSteps {
         "figure 8: load steps at 200 r/min"
     }
 
-    fn plan(&self, _options: &RunOptions, _machine: &Machine) -> Plan {
+    fn plan(&self, _options: &RunOptions, machine: &Machine) -> Plan {
+        let levels_nm = levels_nm(machine);
+        let level_nm = move |t_s: f64| {
+            let index = (t_s / STEP_S).max(0.0) as usize;
+            levels_nm[index.min(levels_nm.len() - 1)]
+        };
         Plan {
             lead_s: LEAD_S,
             duration_s: STEP_S * LEVELS_NM.len() as f64,
             speed: vec![(0.0, SPEED_RPM)],
             link: Vec::new(),
-            operator: Box::new(|t_s: f64| {
+            operator: Box::new(move |t_s: f64| {
                 (Demand { torque_nm: level_nm(t_s + 1e-9) as f32, slew_limited: false }, true)
             }),
         }
     }
 
-    fn figures(&self, recording: &Recording, options: &RunOptions, _machine: &Machine) -> Figures {
+    fn figures(&self, recording: &Recording, options: &RunOptions, machine: &Machine) -> Figures {
+        let levels_nm = levels_nm(machine);
         let steps = (1..LEVELS_NM.len()).map(|index| analysis::Step {
             at_s: index as f64 * STEP_S,
-            from_nm: LEVELS_NM[index - 1],
-            to_nm: LEVELS_NM[index],
+            from_nm: levels_nm[index - 1],
+            to_nm: levels_nm[index],
             until_s: (index + 1) as f64 * STEP_S,
         });
         let steps: Vec<_> = steps.map(|step| analysis::step_response(recording, &step)).collect();

@@ -116,6 +116,7 @@ pub fn with_step(scenario: &dyn Scenario, options: &RunOptions) -> RunOptions {
 /// Drives a scenario.
 pub fn drive(scenario: &dyn Scenario, options: &RunOptions, machine: &Machine) -> Result<Recording> {
     let options = &with_step(scenario, options);
+    options.check(machine)?;
     let plan = scenario.plan(options, machine);
     let line = scenario.line(options, machine);
     let speed = plan.speed.iter().map(|(t_s, rpm)| (t_s + plan.lead_s, *rpm)).collect();

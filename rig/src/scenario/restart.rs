@@ -39,12 +39,10 @@ impl Scenario for Restart {
             duration_s: begins_s(SPEEDS_RPM.len()),
             ..Script::default()
         };
-        let parameters = &machine.folder.parameters;
         for (slot, speed_rpm) in SPEEDS_RPM.into_iter().enumerate() {
             let begin = begins_s(slot);
             let (catch, release) = (begin + COAST_S, begin + SLOT_S - RELEASE_S);
-            let omega = speed_rpm * core::f64::consts::TAU / 60.0;
-            let envelope_nm = (parameters.max_power_w / omega.max(1.0)).min(parameters.max_torque_nm);
+            let envelope_nm = machine.envelope_nm(speed_rpm);
             // The speed changes in the first part of the coasting.
             script.speed.extend([(begin + 0.1, speed_rpm), (begin + SLOT_S, speed_rpm)]);
             script.enable.extend([(catch, true), (begin + SLOT_S, false)]);

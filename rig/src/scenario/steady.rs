@@ -10,6 +10,7 @@ use crate::options::RunOptions;
 use crate::report::Page;
 use crate::trace::Recording;
 use crate::verdict::Verdict;
+use tractive::modulation::Mode;
 
 /// `--speed` and `--torque`.
 pub struct Steady;
@@ -50,13 +51,14 @@ impl Scenario for Steady {
         let mut figures = analysis::common(recording);
         let steady = analysis::steady_point(recording, window, torque_nm, &machine.folder);
         let measured = distortion::of_recording(recording, window, &machine.folder);
-        figures.set("point", vec![steady]);
         figures.set("harmonics", measured.harmonics());
         let beside: Vec<_> = bound::beside(recording, window, options, machine).into_iter().collect();
         let mut verdicts = bound::verdicts(&beside, options).to_vec();
-        if options.dead_time_us > 0.0 {
+        // Under a carrier the pulses have none of these harmonics, so that what there is comes from the dead time.
+        if options.dead_time_us > 0.0 && steady.mode == Mode::Async.name() {
             verdicts.extend(dead_time_verdicts(&measured));
         }
+        figures.set("point", vec![steady]);
         figures.set("verdicts", verdicts);
         figures.set("distortion", beside);
         figures
