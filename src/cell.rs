@@ -124,6 +124,14 @@ impl<T: Words<N>, const N: usize> Default for Downlink<T, N> {
     }
 }
 
+/// Counts a try that a write has overtaken; says whether there is another one. Out of line: so a read is there once, not once a try.
+#[cold]
+#[inline(never)]
+fn overtaken(tries: &mut usize) -> bool {
+    *tries = tries.saturating_sub(1);
+    *tries > 0
+}
+
 /// How often [`Uplink::read`] tries. Two writes within one read are half a carrier apart, so the second try succeeds;
 /// the third is margin.
 const READ_TRIES: usize = 3;
@@ -176,7 +184,8 @@ impl<T: Words<N>, const N: usize> Uplink<T, N> {
     /// Reader's side: the newest value, whole; `None` before the first, or when every try was overtaken by a write.
     #[inline]
     pub fn read(&self) -> Option<T> {
-        for _ in 0..READ_TRIES {
+        let mut tries = READ_TRIES;
+        loop {
             let before = self.sequence.load(Ordering::Acquire);
             let words = load(&self.words);
             fence(Ordering::Acquire);
@@ -184,8 +193,10 @@ impl<T: Words<N>, const N: usize> Uplink<T, N> {
             if before == after && before & 1 == 0 {
                 return if before == 0 { None } else { Some(T::from_words(words)) };
             }
+            if !overtaken(&mut tries) {
+                return None;
+            }
         }
-        None
     }
 }
 

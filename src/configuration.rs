@@ -3,7 +3,8 @@
 //! Each `check` takes its structure apart whole, so that a new field does not compile before it is checked. First every scalar by
 //! itself, then how they stand to each other; the first that is wrong is told by its name. What passes divides nothing by zero and
 //! bounds every loop of the interrupts: the only one whose length is configured runs over the carriers of a control period.
-//! The table generator refuses the same when an image is built.
+//! The table generator refuses the same when an image is built; and what an image holds from then on, its tables, the compiler
+//! itself checks, so that only the settings are left for the start-up.
 
 #![forbid(unsafe_code)]
 
@@ -43,14 +44,26 @@ const ROUNDING: f32 = 1e-3;
 struct Bound(&'static str, f32, f32, f32);
 
 /// The first scalar out of its bounds. What is not a number is out of any.
-fn within(bounds: &[Bound]) -> Result<(), Refused> {
-    for Bound(name, value, least, most) in bounds {
-        if !(*least..=*most).contains(value) {
+const fn within(bounds: &[Bound]) -> Result<(), Refused> {
+    let mut rest = bounds;
+    while let [Bound(name, value, least, most), others @ ..] = rest {
+        if !(*least <= *value && *value <= *most) {
             return Err(Refused { name, value: *value, least: *least, most: *most });
         }
+        rest = others;
     }
     Ok(())
 }
+
+/// `?`, which a constant function has not.
+macro_rules! checked {
+    ($check:expr) => {
+        if let Err(refused) = $check {
+            return Err(refused);
+        }
+    };
+}
+use checked;
 
 impl Clock {
     /// Whether a drive can run on it.

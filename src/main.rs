@@ -47,7 +47,7 @@ mod firmware {
         let setup = qemu::connect();
         MIN_PULSE_TICKS.store(setup.min_pulse_ticks, Ordering::Relaxed);
         DEAD_TIME_TICKS.store(setup.dead_time_ticks, Ordering::Relaxed);
-        if let Err(refused) = settings().check(&BUILT_IN) {
+        if let Err(refused) = const { BUILT_IN.check() }.and_then(|()| settings().check_settings()) {
             qemu::refuse(&refused);
         }
         let first_half_ticks = settings().devices.shortest_half_ticks.saturating_add(setup.pwm_delay_ticks);
@@ -89,10 +89,10 @@ mod firmware {
     fn DUALTIMER() {
         static mut TASK: Option<PwmTask<BuiltIn>> = None;
         let mut board = qemu::Pwm;
-        let settings = settings();
-        let first = Instant(FIRST_HALF_TICKS.load(Ordering::Relaxed));
-        let task = || PwmTask::new(BuiltIn, settings, first).after_halves_of(first.0);
-        let task = TASK.get_or_insert_with(task);
+        let task = TASK.get_or_insert_with(|| {
+            let first = Instant(FIRST_HALF_TICKS.load(Ordering::Relaxed));
+            PwmTask::new(BuiltIn, settings(), first).after_halves_of(first.0)
+        });
         if board.is_boundary() {
             board.acknowledge();
             task.run(&mut board, &SHARED);

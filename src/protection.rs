@@ -229,6 +229,7 @@ const RECTIFYING_MARGIN: f32 = 0.9;
 /// The safe state for an electrical angular speed in rad/s: gates off below `0.9 udc/(√3 ψ_f)`, short circuit above. What is not
 /// finite counts as slow, because a short circuit at speed zero would be safe as well, but open gates need no gate supply.
 /// A link above its nominal voltage counts as nominal: it will not stay there.
+#[inline(never)]
 pub fn safe_state(omega: f32, udc_v: f32, ratings: &Ratings) -> SafeState {
     let nominal_v = ratings.dc_link_nominal_v;
     let udc_v = if udc_v < nominal_v { udc_v } else { nominal_v };
@@ -444,9 +445,9 @@ impl FrozenWatch {
         ratings: &Ratings,
     ) -> Option<Violation> {
         let last = self.last.replace(*measured)?;
-        let flowing = measured.currents_a.peak() > FROZEN_CURRENT_SHARE * ratings.max_current_a;
+        let flowing = || measured.currents_a.peak() > FROZEN_CURRENT_SHARE * ratings.max_current_a;
         let same_currents = last.currents_a == measured.currents_a;
-        self.currents_for = if flowing && same_currents { self.currents_for + 1 } else { 0 };
+        self.currents_for = if same_currents && flowing() { self.currents_for + 1 } else { 0 };
         if last.angle == measured.angle {
             self.angle_for += 1;
             self.turned_rad += self.moving * period_s;

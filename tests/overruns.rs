@@ -249,6 +249,9 @@ fn zs9(mishap: Mishap, carrier_ticks: u32) -> (Option<Trip>, Option<u32>) {
             _ => {}
         }
     }
+    // What the PWM interrupt tripped on, control reports as well, if it comes at all.
+    let gone = matches!(mishap, Mishap::ControlLost(count) if count > 10);
+    assert!(gone || board.trip.is_some() || pwm.trip().is_none(), "{mishap:?} is not reported");
     let plays_on = matches!(mishap, Mishap::PwmLost(count) if count > 10);
     let pulses = board.periods[1] != off;
     assert_eq!(pulses, board.entered.is_none() || plays_on, "pulses without a fault, none with one");
@@ -323,5 +326,54 @@ fn a_delayed_pwm_interrupt_is_noticed_by_the_control_interrupt() {
         let (trip, entered) = zs9(Mishap::PwmLate(late), carrier_ticks);
         assert_eq!(trip.map(|trip| trip.fault), Some(Fault::PwmDeadline));
         assert!(entered.unwrap() - SETTLED <= CLOCK.control_ticks + carrier_ticks);
+    }
+}
+
+/// A board in whose control interrupt the PWM interrupt lands once: behind its samples.
+struct Landing<'a> {
+    board: Board,
+    pwm: Option<&'a mut traction::PwmTask>,
+    shared: &'a traction::Shared<'a>,
+}
+
+impl ControlPort for Landing<'_> {
+    fn sample(&mut self, now: Instant) -> Sample {
+        if let Some(pwm) = self.pwm.take() {
+            pwm.run(&mut self.board, self.shared);
+        }
+        ControlPort::sample(&mut self.board, now)
+    }
+
+    fn enter(&mut self, safe: SafeState, now: Instant) {
+        ControlPort::enter(&mut self.board, safe, now);
+    }
+
+    fn overrun_ticks(&mut self, _now: Instant) -> u32 {
+        0
+    }
+
+    fn report(&mut self, now: Instant, report: &Report) {
+        ControlPort::report(&mut self.board, now, report);
+    }
+}
+
+/// What control sees is what stood at its instant: before the first boundary there was nothing, and nothing is not late.
+#[test]
+fn the_first_boundary_may_land_in_a_control_interrupt() {
+    let devices = Devices::new(250, 0, 900.0, &CLOCK);
+    let settings = traction::Settings { clock: CLOCK, devices, gains: Gains::DEFAULT };
+    for first in [CLOCK.control_ticks + 1, 5 * CLOCK.control_ticks + 400] {
+        let shared = traction::Shared::new();
+        let mut control = traction::ControlTask::new(&BUILT_IN, settings, Instant(CLOCK.control_ticks));
+        let mut pwm = traction::PwmTask::new(&BUILT_IN, settings, Instant(first));
+        let mut board = Board::new(CarrierPeriod::off(first), PlayedPeriod::off(0));
+        while control.next_call().0 + CLOCK.control_ticks < first {
+            board.now = control.next_call().0;
+            control.run(&mut board, &shared);
+        }
+        board.now = control.next_call().0;
+        let mut landing = Landing { board, pwm: Some(&mut pwm), shared: &shared };
+        control.run(&mut landing, &shared);
+        assert_eq!((landing.board.trip, landing.board.entered), (None, None));
     }
 }

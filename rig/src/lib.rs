@@ -25,6 +25,7 @@ pub mod run;
 pub mod scenario;
 pub mod sensor_faults;
 pub mod spectrum;
+mod steps;
 pub mod talk;
 pub mod trace;
 pub mod verdict;

@@ -3,9 +3,10 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 use tractive::protection::Fault;
+use tractive_rig::bench::Flaws;
 use tractive_rig::campaign::judge::Verdict;
 use tractive_rig::campaign::without::Without;
-use tractive_rig::campaign::{Campaign, Outcome, cases, healthy, report, traction};
+use tractive_rig::campaign::{Campaign, Outcome, cases, dual, healthy, report, traction};
 
 /// Runs the cases whose names have all these words.
 fn run(campaign: &Campaign, fast: bool, words: &str) -> Vec<Outcome> {
@@ -118,8 +119,22 @@ fn the_document_has_every_case() {
 #[test]
 fn a_random_ride_is_the_same_every_time() {
     let drive = traction::Drive::new(None).unwrap();
-    let [a, b] = [0, 1].map(|_| healthy::drive(&drive, 2.0, 7, false).unwrap());
+    let [a, b] = [0, 1].map(|_| healthy::traction::drive(&drive, 2.0, 7, false).unwrap());
     assert_eq!(a.rows.len(), b.rows.len());
     assert!(a.rows.iter().zip(&b.rows).all(|(a, b)| a.te_nm == b.te_nm));
     assert!(a.trip.is_none(), "{:?}", a.trip);
+}
+
+#[test]
+fn a_random_ride_of_the_zs9_trips_only_where_its_source_is_out_of_range() {
+    let drive = dual::Drive::new(None).unwrap();
+    let driven = |ride| drive.ride(ride, Flaws::default(), 1e-3, 0).unwrap();
+    let healthy = healthy::dual::ride(&drive, 2.0, 7);
+    let [a, b] = [0, 1].map(|_| driven(healthy.clone()));
+    assert_eq!(format!("{:?}", a.rows), format!("{:?}", b.rows));
+    assert!(a.trip.is_none(), "{:?}", a.trip);
+    let mut low = healthy;
+    low.course.source_v = vec![(1.0, 270.0)];
+    let trip = driven(low).trip.expect("a source below its limit");
+    assert_eq!(trip.fault, Fault::SourceUndervoltage);
 }

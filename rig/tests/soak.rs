@@ -5,12 +5,16 @@
 use tractive::control::{Demand, Gains};
 use tractive::drive::traction::Settings;
 use tractive::modulation::Devices;
+use tractive::nine_switch::Scheme;
 use tractive::time::Instant;
 use tractive_rig::bench::{self, Bench, Flaws, Limits, Supply, Tick};
+use tractive_rig::campaign::dual::{self, Ridden, Ride, Script};
 use tractive_rig::machine::Machine;
 use tractive_rig::plant::{Plant, PlantSettings, SpeedSource};
 use tractive_rig::run::{CLOCK, Tasks};
 use tractive_rig::trace::Row;
+use tractive_rig::zs9;
+use tractive_rig::zs9::bench::Course;
 
 const LEAD_S: f64 = 0.1;
 /// Where instants wrap, and where their differences from 0 would change sign.
@@ -91,10 +95,15 @@ fn figures(rows: &[Row]) -> Figures {
     }
 }
 
+/// Periods to drive: what is asked for, or four.
+fn periods() -> f64 {
+    let asked = std::env::var("TRACTIVE_SOAK_S").ok().and_then(|seconds| seconds.parse().ok());
+    (asked.unwrap_or(20.0_f64) / PERIOD_S).ceil().max(3.0)
+}
+
 #[test]
 fn nothing_drifts_however_long_it_drives() {
-    let asked = std::env::var("TRACTIVE_SOAK_S").ok().and_then(|seconds| seconds.parse().ok());
-    let periods = (asked.unwrap_or(20.0_f64) / PERIOD_S).ceil().max(3.0);
+    let periods = periods();
     let step_s = 1e-3;
     let before = (7.3 * f64::from(CLOCK.ticks_per_s)) as Tick;
     let bench = drive(WRAP - before, periods * PERIOD_S, step_s, |_| true);
@@ -114,6 +123,89 @@ fn nothing_drifts_however_long_it_drives() {
         ] {
             // Carriers meet the cycle in another phase each time.
             assert!((is / was - 1.0).abs() < 0.05, "{name} in period {number}: {is}, at first {was}");
+        }
+    }
+}
+
+/// The ZS9's cycle, once in a period: the one motor is led up and down and back in torque control, the other one wants a speed that
+/// reverses, with a load that changes its sign; source and scheme change.
+fn dual_ride(periods: f64) -> Ride {
+    let (mut speed_rpm, mut torque_nm, mut wanted_rpm, mut load_nm) =
+        (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+    let mut course = Course::default();
+    for period in 0..=periods.ceil() as u32 {
+        let begins_s = f64::from(period) * PERIOD_S;
+        let at = |share: f64| begins_s + share * PERIOD_S;
+        speed_rpm.extend([(at(0.0), 0.0), (at(0.25), 1_300.0), (at(0.5), 0.0), (at(0.75), -1_300.0)]);
+        torque_nm.extend([(at(0.0), (100.0, true)), (at(0.2), (-100.0, false)), (at(0.6), (100.0, false))]);
+        wanted_rpm.extend([(at(0.0), 0.0), (at(0.1), 1_000.0), (at(0.4), 1_000.0), (at(0.8), -1_000.0)]);
+        load_nm.extend([(at(0.15), 40.0), (at(0.55), -40.0)]);
+        course.source_v.extend([(at(0.1), 370.0), (at(0.7), 430.0)]);
+        for (share, scheme) in [0.05, 0.3, 0.55, 0.8].into_iter().zip(SCHEMES) {
+            course.schemes.push((at(share), scheme));
+        }
+    }
+    let motors = [Script::Torque { speed_rpm, torque_nm }, Script::Speed { wanted_rpm, load_nm }];
+    Ride { motors, course, duration_s: periods * PERIOD_S }
+}
+
+const SCHEMES: [Scheme; 4] = [Scheme::S, Scheme::Rs, Scheme::Rthd, Scheme::Zvo];
+const DUAL_STEP_S: f64 = 5e-3;
+
+fn dual_drive(ride: Ride, origin: Tick) -> Ridden {
+    let ridden = dual::Drive::new(None).unwrap().ride(ride, Flaws::default(), DUAL_STEP_S, origin).unwrap();
+    assert!(ridden.trip.is_none(), "{:?} at {} s", ridden.trip, ridden.ended_s);
+    ridden
+}
+
+#[test]
+fn the_wrap_around_changes_nothing_for_the_zs9() {
+    let trace = |origin| {
+        let ride = Ride { duration_s: 1.4, ..dual_ride(1.0) };
+        format!("{:?}", dual_drive(ride, origin).rows)
+    };
+    let plain = trace(0);
+    let before = (0.9 * f64::from(CLOCK.ticks_per_s)) as Tick;
+    for origin in [WRAP - before, HALF_WRAP - before, WRAP - 1, WRAP - Tick::from(CLOCK.control_ticks)] {
+        assert!(trace(origin) == plain, "begun at tick {origin}");
+    }
+}
+
+/// The same figures of both motors of the ZS9, and its link.
+fn dual_figures(rows: &[zs9::trace::Row]) -> Vec<(&'static str, f64)> {
+    let mean =
+        |value: &dyn Fn(&zs9::trace::Row) -> f64| rows.iter().map(value).sum::<f64>() / rows.len() as f64;
+    let motor = |k: usize| {
+        let error = mean(&|row| (row.motors[k].torque_nm - row.motors[k].torque_ref_nm).abs());
+        (error, mean(&|row| row.motors[k].id_a.hypot(row.motors[k].iq_a)))
+    };
+    let ((error_1, current_1), (error_2, current_2)) = (motor(0), motor(1));
+    let capacitor_v = mean(&|row| row.capacitor_v);
+    let ripple_v = mean(&|row| (row.capacitor_v - capacitor_v).powi(2)).sqrt();
+    vec![
+        ("torque error 1", error_1),
+        ("current 1", current_1),
+        ("torque error 2", error_2),
+        ("current 2", current_2),
+        ("capacitor voltage", capacitor_v),
+        ("its ripple", ripple_v),
+        ("duty", mean(&|row| row.duty)),
+        ("speed", mean(&|row| row.motors[1].speed_rpm.abs())),
+    ]
+}
+
+#[test]
+fn nothing_drifts_however_long_the_zs9_drives() {
+    let periods = periods();
+    let before = (7.3 * f64::from(CLOCK.ticks_per_s)) as Tick;
+    let rows = dual_drive(dual_ride(periods), WRAP - before).rows;
+    let per_period = (PERIOD_S / DUAL_STEP_S).round() as usize;
+    let of = |number: usize| dual_figures(&rows[number * per_period..(number + 1) * per_period]);
+    let reference = of(1);
+    println!("{reference:?}");
+    for number in 2..periods as usize {
+        for ((name, is), (_, was)) in of(number).into_iter().zip(&reference) {
+            assert!((is / was - 1.0).abs() < 0.02, "{name} in period {number}: {is}, at first {was}");
         }
     }
 }

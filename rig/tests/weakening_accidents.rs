@@ -49,6 +49,21 @@ fn demand_released_in_deep_weakening() {
     }
 }
 
+/// Braking has been let go in square wave, and then the line rises until the voltage forces more flux upon the machine than its
+/// magnets have: the machine stays on the side of the flux circle on which it is.
+#[test]
+fn line_rises_in_square_wave_without_torque() {
+    for torque_nm in [FULL_NM, -FULL_NM] {
+        let line = vec![(0.0, 1500.0), (0.5, 1660.0)];
+        let ridden = drive(Ride { line, ..steady(4370.0, &[(-0.05, torque_nm), (0.2, 0.0)], 0.7) });
+        let before = ridden.rows.iter().find(|row| row.t_s > 0.49).map(|row| row.mode);
+        let current_a = ridden.observed.until.current_a;
+        println!("{before:?}, {current_a:.0} A");
+        assert_eq!(before, Some(Mode::Square));
+        assert!(ridden.trip.is_none() && current_a < 0.8 * TRIP_A, "{:?}", ridden.trip);
+    }
+}
+
 #[test]
 fn sensor_lost_in_weakening() {
     for (kind, names) in [

@@ -53,6 +53,33 @@ fn steady_state_is_that_of_the_averaged_network() {
     }
 }
 
+/// The diodes of a bridge whose gates are off hold the link at nothing where the source is gone: the motors are shorted, and no energy
+/// comes from nowhere.
+#[test]
+fn a_shorted_source_shorts_the_motors() {
+    let mut plant = plant_at([1300.0, 1000.0], &Zs9Settings::default());
+    plant.set_network(NetworkState::even(30.0, 533.0));
+    for motor in plant.motors_mut() {
+        motor.set_currents(-10.0, 30.0);
+    }
+    plant.set_source_v(1.0);
+    let stored = plant.stored_j();
+    let peak_a = plant.motors().iter().map(|motor| motor.short_circuit_peak_a()).fold(0.0, f64::max);
+    let (mut lowest_v, mut most_a, mut clamped) = (f64::INFINITY, 0.0_f64, false);
+    for _ in 0..4_000 {
+        plant.advance([LegGates::OFF; 3], 10e-6).unwrap();
+        lowest_v = lowest_v.min(plant.link_v());
+        clamped |= plant.link_v() < 1e-3;
+        let currents = plant.motors().iter().flat_map(|motor| motor.currents_abc());
+        most_a = currents.fold(most_a, |most, current| most.max(current.abs()));
+    }
+    let residual = plant.residual_j(stored);
+    println!("{lowest_v:.1e} V, {most_a:.0} A of {peak_a:.0} A, {residual:.1e} of {stored:.0} J");
+    assert!(clamped && lowest_v > -1e-3, "{lowest_v}");
+    assert!(most_a > 100.0 && most_a < 1.01 * peak_a, "{most_a} of {peak_a}");
+    assert!(residual.abs() < 1e-3 * stored, "{residual} of {stored}");
+}
+
 #[test]
 fn energy_is_kept() {
     let machine = machine();

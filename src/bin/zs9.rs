@@ -19,8 +19,7 @@ mod firmware {
     use cortex_m_rt::{entry, exception, interrupt};
     use tractive::board::qemu::{self, CLOCK, Interrupt as interrupt};
     use tractive::drive::dual::{ControlTask, PwmTask, Settings, Shared};
-    use tractive::machine::Machine;
-    use tractive::machine::zs9::BuiltIn;
+    use tractive::machine::zs9::{BUILT_IN, BuiltIn};
 
     static SHARED: Shared = Shared::new();
     static CARRIER_TICKS: AtomicU32 = AtomicU32::new(0);
@@ -33,7 +32,8 @@ mod firmware {
     fn main() -> ! {
         let setup = qemu::connect_dual();
         CARRIER_TICKS.store(setup.carrier_ticks, Ordering::Relaxed);
-        if let Err(refused) = settings().check(BuiltIn.tables()) {
+        let settings_alone = || settings().check_settings(&BUILT_IN.ratings);
+        if let Err(refused) = const { BUILT_IN.check() }.and_then(|()| settings_alone()) {
             qemu::refuse(&refused);
         }
         qemu::start_dual(&settings());

@@ -7,6 +7,9 @@ pub mod nucleo_g474re;
 #[cfg(all(target_os = "none", not(feature = "board-nucleo-g474re")))]
 pub mod qemu;
 
+#[cfg(all(target_os = "none", feature = "saboteur", feature = "board-nucleo-g474re"))]
+compile_error!("the feature `saboteur` is for the emulated board alone");
+
 mod dual;
 
 use crate::control::{Demand, LinkWindow, Measurements};

@@ -9,6 +9,8 @@
 
 mod dual;
 mod exchange;
+#[cfg_attr(not(feature = "saboteur"), path = "qemu/straight.rs")]
+mod saboteur;
 
 pub use dual::{connect_dual, die_dual, start_dual};
 
@@ -47,6 +49,9 @@ const PWM_TIMER: usize = 0x4000_2000;
 pub enum Interrupt {
     /// CMSDK timer 0: control.
     TIMER0 = 8,
+    /// CMSDK timer 1: ends what the saboteur has begun.
+    #[cfg(feature = "saboteur")]
+    TIMER1 = 9,
     /// CMSDK dual timer: PWM.
     DUALTIMER = 10,
 }
@@ -76,8 +81,12 @@ unsafe extern "C" {
 pub static __INTERRUPTS: [Vector; 11] = {
     const NONE: Vector = Vector { reserved: 0 };
     let mut table = [NONE; 11];
-    table[Interrupt::TIMER0 as usize] = Vector { handler: TIMER0 };
-    table[Interrupt::DUALTIMER as usize] = Vector { handler: DUALTIMER };
+    table[Interrupt::TIMER0 as usize] = Vector { handler: saboteur::control };
+    table[Interrupt::DUALTIMER as usize] = Vector { handler: saboteur::pwm };
+    #[cfg(feature = "saboteur")]
+    {
+        table[Interrupt::TIMER1 as usize] = Vector { handler: saboteur::delay_ends };
+    }
     table
 };
 
@@ -127,6 +136,7 @@ fn enable_interrupts() {
 }
 
 fn start_timers() {
+    saboteur::start();
     const ENABLE_PERIODIC_INTERRUPT_32_BIT: u32 = 0b1110_0010;
     const ENABLE_INTERRUPT: u32 = 0b1001;
     write_register(PWM_TIMER + 8, ENABLE_PERIODIC_INTERRUPT_32_BIT);

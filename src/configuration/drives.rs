@@ -3,7 +3,7 @@
 use super::{ABOVE_ZERO, Bound, ROUNDING, Refused, within};
 use crate::control::{Gains, SpeedDesign, ZSourceDesign, ZSourceGains};
 use crate::drive::{dual, traction};
-use crate::machine::Tables;
+use crate::machine::{Ratings, Tables};
 use crate::protection::LinkLimits;
 
 /// Largest torque that a speed error of 1 rad/s may ask for, as a multiple of the largest.
@@ -35,8 +35,16 @@ impl traction::Settings {
     /// # Errors
     /// The first scalar that makes no sense, of the machine or of the settings.
     pub fn check(&self, tables: &Tables) -> Result<(), Refused> {
-        let Self { clock, devices, gains } = self;
         tables.check()?;
+        self.check_settings()
+    }
+
+    /// The same for a machine that is checked already.
+    ///
+    /// # Errors
+    /// The first scalar that makes no sense.
+    pub fn check_settings(&self) -> Result<(), Refused> {
+        let Self { clock, devices, gains } = self;
         clock.check()?;
         devices.check(clock)?;
         gains.check()
@@ -49,8 +57,16 @@ impl dual::Settings {
     /// # Errors
     /// The first scalar that makes no sense, of the machine or of the settings.
     pub fn check(&self, tables: &Tables) -> Result<(), Refused> {
-        let Self { clock, carrier_ticks, gains, speed, link, link_gains, limits } = self;
         tables.check()?;
+        self.check_settings(&tables.ratings)
+    }
+
+    /// The same for a machine that is checked already.
+    ///
+    /// # Errors
+    /// The first scalar that makes no sense.
+    pub fn check_settings(&self, ratings: &Ratings) -> Result<(), Refused> {
+        let Self { clock, carrier_ticks, gains, speed, link, link_gains, limits } = self;
         clock.check()?;
         let control = clock.control_ticks as f32;
         let carrier = *carrier_ticks as f32;
@@ -62,16 +78,16 @@ impl dual::Settings {
             return Err(Refused { name: "carrier_ticks", value: carrier, least: control, most: control });
         }
         gains.check()?;
-        check_speed(speed, clock.control_s(), tables)?;
+        check_speed(speed, clock.control_s(), ratings)?;
         check_link(link, clock.control_s())?;
         check_link_gains(link_gains, link)?;
         check_limits(limits)
     }
 }
 
-fn check_speed(speed: &SpeedDesign, control_s: f32, tables: &Tables) -> Result<(), Refused> {
+fn check_speed(speed: &SpeedDesign, control_s: f32, ratings: &Ratings) -> Result<(), Refused> {
     let SpeedDesign { inertia_kg_m2, natural_rad_s, period_s } = *speed;
-    let most_nm = STIFFEST * tables.ratings.max_torque_nm;
+    let most_nm = STIFFEST * ratings.max_torque_nm;
     within(&[
         Bound("speed.period_s", period_s, (1.0 - ROUNDING) * control_s, (1.0 + ROUNDING) * control_s),
         Bound("speed.natural_rad_s", natural_rad_s, ABOVE_ZERO, 0.5 / control_s),

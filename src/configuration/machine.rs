@@ -1,7 +1,6 @@
 //! Ratings and tables of a machine.
 
-use super::{ABOVE_ZERO, Bound, ROUNDING, Refused, within};
-use crate::frames::Dq;
+use super::{ABOVE_ZERO, Bound, ROUNDING, Refused, checked, within};
 use crate::machine::{Curve, Grid, Mtpa, Ratings, Tables, Weakening};
 use core::f32::consts::FRAC_2_PI;
 
@@ -20,7 +19,7 @@ impl Ratings {
     ///
     /// # Errors
     /// The first scalar that does not.
-    pub fn check(&self) -> Result<(), Refused> {
+    pub const fn check(&self) -> Result<(), Refused> {
         let Self {
             pole_pairs,
             stator_resistance_ohm,
@@ -39,7 +38,7 @@ impl Ratings {
             trip_speed_rad_s,
             torque_slew_nm_s,
         } = *self;
-        within(&[
+        checked!(within(&[
             Bound("ratings.pole_pairs", pole_pairs, 1.0, 100.0),
             Bound("ratings.stator_resistance_ohm", stator_resistance_ohm, 0.0, 1e3),
             Bound("ratings.max_torque_nm", max_torque_nm, ABOVE_ZERO, 1e7),
@@ -56,7 +55,7 @@ impl Ratings {
             Bound("ratings.trip_dc_under_v", trip_dc_under_v, 0.0, 1e6),
             Bound("ratings.trip_speed_rad_s", trip_speed_rad_s, ABOVE_ZERO, 1.1e6),
             Bound("ratings.torque_slew_nm_s", torque_slew_nm_s, ABOVE_ZERO, 1e9),
-        ])?;
+        ]));
         let whole = pole_pairs as u32 as f32;
         let ohm = RESISTIVE_SHARE * dc_link_nominal_v / max_current_a;
         let (slowest, quickest) = SLEW_PER_S;
@@ -90,7 +89,7 @@ impl Ratings {
 }
 
 /// The largest number below one that is above 0.
-fn below(value: f32) -> f32 {
+const fn below(value: f32) -> f32 {
     f32::from_bits(value.to_bits().saturating_sub(1))
 }
 
@@ -102,7 +101,7 @@ struct Axis {
 }
 
 impl Axis {
-    fn check(&self, first: f32, inverse_step: f32, count: usize) -> Result<(), Refused> {
+    const fn check(&self, first: f32, inverse_step: f32, count: usize) -> Result<(), Refused> {
         let [first_name, step_name, count_name] = self.names;
         let steps = count.saturating_sub(1) as f32;
         let (least, most) = self.last;
@@ -116,18 +115,22 @@ impl Axis {
 }
 
 /// As many nodes as there are said to be, every one a number.
-fn nodes<const N: usize>(
+const fn nodes<const N: usize>(
     name: &'static str,
     nodes: &[[f32; N]],
     count: usize,
     least: f32,
 ) -> Result<(), Refused> {
-    let length = nodes.len() as f32;
-    within(&[Bound(name, length, count as f32, count as f32)])?;
-    nodes.iter().flatten().try_for_each(|value| within(&[Bound(name, *value, least, f32::MAX)]))
+    checked!(near(name, nodes.len() as f32, count as f32, 0.0));
+    let mut rest = nodes.as_flattened();
+    while let [value, others @ ..] = rest {
+        checked!(within(&[Bound(name, *value, least, f32::MAX)]));
+        rest = others;
+    }
+    Ok(())
 }
 
-fn near(name: &'static str, value: f32, wanted: f32, off: f32) -> Result<(), Refused> {
+const fn near(name: &'static str, value: f32, wanted: f32, off: f32) -> Result<(), Refused> {
     within(&[Bound(name, value, wanted - off, wanted + off)])
 }
 
@@ -136,22 +139,43 @@ impl Tables {
     ///
     /// # Errors
     /// The first scalar that does not.
-    pub fn check(&self) -> Result<(), Refused> {
+    pub const fn check(&self) -> Result<(), Refused> {
         let Self { name: _, ratings, flux, mtpa, weakening } = self;
-        ratings.check()?;
-        check_flux(flux, ratings)?;
-        check_weakening(weakening, ratings)?;
-        let [_, most_nm] = weakening.torque.at(weakening.torque.last());
-        within(&[Bound("ratings.max_torque_nm", ratings.max_torque_nm, ABOVE_ZERO, 1.02 * most_nm)])?;
+        checked!(ratings.check());
+        checked!(check_flux(flux, ratings));
+        checked!(check_weakening(weakening, ratings));
+        let most_nm = match weakening.torque.nodes {
+            [.., [_, most_nm]] => *most_nm,
+            [] => 0.0,
+        };
+        checked!(within(&[Bound(
+            "ratings.max_torque_nm",
+            ratings.max_torque_nm,
+            ABOVE_ZERO,
+            1.02 * most_nm
+        )]));
         // The table's nodes lie a little off the map, so that it is right on average.
-        let rest = crate::control::flux_linkage(self, Dq::default());
         let off = 0.05 * weakening.torque.last();
-        near("ratings.magnet_flux_wb", ratings.magnet_flux_wb, if rest.d > 0.0 { rest.d } else { 0.0 }, off)?;
+        checked!(near("ratings.magnet_flux_wb", ratings.magnet_flux_wb, rest_wb(flux), off));
         check_mtpa(mtpa, flux, ratings)
     }
 }
 
-fn check_flux(flux: &Grid<2>, ratings: &Ratings) -> Result<(), Refused> {
+/// Flux linkage of a checked map without current, at least 0.
+const fn rest_wb(flux: &Grid<2>) -> f32 {
+    let place = -flux.first_row * flux.inverse_row_step;
+    let (row, last) = (place as usize, flux.rows.saturating_sub(2));
+    let row = if row < last { row } else { last };
+    let (low, high) = (row * flux.columns, (row + 1) * flux.columns);
+    if high >= flux.nodes.len() {
+        return f32::NAN;
+    }
+    let ([low, _], [high, _]) = (flux.nodes[low], flux.nodes[high]);
+    let rest = low + (high - low) * (place - row as f32);
+    if rest > 0.0 { rest } else { 0.0 }
+}
+
+const fn check_flux(flux: &Grid<2>, ratings: &Ratings) -> Result<(), Refused> {
     let Grid { first_row, inverse_row_step, rows, first_column, inverse_column_step, columns, nodes: fluxes } =
         *flux;
     let reach = ratings.max_current_a;
@@ -160,17 +184,17 @@ fn check_flux(flux: &Grid<2>, ratings: &Ratings) -> Result<(), Refused> {
         first: (-4.0 * reach, -(1.0 - ROUNDING) * reach),
         last: (-ROUNDING * reach, 4.0 * reach),
     };
-    rows_of.check(first_row, inverse_row_step, rows)?;
+    checked!(rows_of.check(first_row, inverse_row_step, rows));
     let columns_of = Axis {
         names: ["flux.first_column", "flux.inverse_column_step", "flux.columns"],
         first: (0.0, 0.0),
         last: ((1.0 - ROUNDING) * reach, 4.0 * reach),
     };
-    columns_of.check(first_column, inverse_column_step, columns)?;
+    checked!(columns_of.check(first_column, inverse_column_step, columns));
     nodes("flux.nodes", fluxes, rows.saturating_mul(columns), f32::MIN)
 }
 
-fn check_mtpa(mtpa: &Mtpa, flux: &Grid<2>, ratings: &Ratings) -> Result<(), Refused> {
+const fn check_mtpa(mtpa: &Mtpa, flux: &Grid<2>, ratings: &Ratings) -> Result<(), Refused> {
     let Mtpa { universal, parameters, start } = mtpa;
     let Curve { first, inverse_step, nodes: values } = *universal;
     let axis = Axis {
@@ -178,30 +202,30 @@ fn check_mtpa(mtpa: &Mtpa, flux: &Grid<2>, ratings: &Ratings) -> Result<(), Refu
         first: (0.0, 0.0),
         last: (1.0 - ROUNDING, 1.0 + ROUNDING),
     };
-    axis.check(first, inverse_step, values.len())?;
-    nodes("mtpa.universal.nodes", values, values.len(), 0.0)?;
+    checked!(axis.check(first, inverse_step, values.len()));
+    checked!(nodes("mtpa.universal.nodes", values, values.len(), 0.0));
     let Grid { first_row, inverse_row_step, rows, first_column, inverse_column_step, columns, nodes: values } =
         *parameters;
     // The same axes as the flux's.
-    near("mtpa.parameters.first_row", first_row, flux.first_row, 0.0)?;
-    near("mtpa.parameters.inverse_row_step", inverse_row_step, flux.inverse_row_step, 0.0)?;
-    near("mtpa.parameters.rows", rows as f32, flux.rows as f32, 0.0)?;
-    near("mtpa.parameters.first_column", first_column, flux.first_column, 0.0)?;
-    near("mtpa.parameters.inverse_column_step", inverse_column_step, flux.inverse_column_step, 0.0)?;
-    near("mtpa.parameters.columns", columns as f32, flux.columns as f32, 0.0)?;
+    checked!(near("mtpa.parameters.first_row", first_row, flux.first_row, 0.0));
+    checked!(near("mtpa.parameters.inverse_row_step", inverse_row_step, flux.inverse_row_step, 0.0));
+    checked!(near("mtpa.parameters.rows", rows as f32, flux.rows as f32, 0.0));
+    checked!(near("mtpa.parameters.first_column", first_column, flux.first_column, 0.0));
+    checked!(near("mtpa.parameters.inverse_column_step", inverse_column_step, flux.inverse_column_step, 0.0));
+    checked!(near("mtpa.parameters.columns", columns as f32, flux.columns as f32, 0.0));
     // Both are divided by.
-    nodes("mtpa.parameters.nodes", values, rows.saturating_mul(columns), f32::MIN_POSITIVE)?;
+    checked!(nodes("mtpa.parameters.nodes", values, rows.saturating_mul(columns), f32::MIN_POSITIVE));
     let Curve { first, inverse_step, nodes: values } = *start;
     let axis = Axis {
         names: ["mtpa.start.first", "mtpa.start.inverse_step", "mtpa.start.nodes"],
         first: (0.0, 0.0),
         last: ((1.0 - ROUNDING) * ratings.max_torque_nm, 1.2 * ratings.max_torque_nm),
     };
-    axis.check(first, inverse_step, values.len())?;
+    checked!(axis.check(first, inverse_step, values.len()));
     nodes("mtpa.start.nodes", values, values.len(), f32::MIN)
 }
 
-fn check_weakening(weakening: &Weakening, ratings: &Ratings) -> Result<(), Refused> {
+const fn check_weakening(weakening: &Weakening, ratings: &Ratings) -> Result<(), Refused> {
     let Weakening { currents, torque } = weakening;
     let Curve { first, inverse_step, nodes: values } = *torque;
     // The flux that the lowest link leaves at the highest speed is on the table, and a good deal more.
@@ -211,13 +235,13 @@ fn check_weakening(weakening: &Weakening, ratings: &Ratings) -> Result<(), Refus
         first: (ABOVE_ZERO, least_wb),
         last: (1.4 * first, 1e3 * first),
     };
-    axis.check(first, inverse_step, values.len())?;
-    nodes("weakening.torque.nodes", values, values.len(), 0.0)?;
+    checked!(axis.check(first, inverse_step, values.len()));
+    checked!(nodes("weakening.torque.nodes", values, values.len(), 0.0));
     let Grid { first_row, inverse_row_step, rows, first_column, inverse_column_step, columns, nodes: pairs } =
         *currents;
-    near("weakening.currents.first_row", first_row, first, 0.0)?;
-    near("weakening.currents.inverse_row_step", inverse_row_step, inverse_step, 0.0)?;
-    near("weakening.currents.rows", rows as f32, values.len() as f32, 0.0)?;
+    checked!(near("weakening.currents.first_row", first_row, first, 0.0));
+    checked!(near("weakening.currents.inverse_row_step", inverse_row_step, inverse_step, 0.0));
+    checked!(near("weakening.currents.rows", rows as f32, values.len() as f32, 0.0));
     let axis = Axis {
         names: [
             "weakening.currents.first_column",
@@ -227,6 +251,6 @@ fn check_weakening(weakening: &Weakening, ratings: &Ratings) -> Result<(), Refus
         first: (0.0, 0.0),
         last: (1.0 - ROUNDING, 1.0 + ROUNDING),
     };
-    axis.check(first_column, inverse_column_step, columns)?;
+    checked!(axis.check(first_column, inverse_column_step, columns));
     nodes("weakening.currents.nodes", pairs, rows.saturating_mul(columns), f32::MIN)
 }

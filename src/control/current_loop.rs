@@ -117,7 +117,7 @@ fn mean_voltage(input: &Input, reference: Dq, predicted: Dq, gains: &Gains) -> D
         None => chord,
         Some(ripple) => {
             let middle = Angle::within_half_turn(input.omega * committed.horizon_s + x);
-            chord + (ripple.after_wb - ripple.at_horizon_wb).park((input.angle + middle).sin_cos())
+            chord + ripple.led_wb.park((input.angle + middle).sin_cos())
         }
     };
     led * (1.0 / committed.interval_s)

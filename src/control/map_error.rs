@@ -43,7 +43,7 @@ impl MapError {
         1.0 + limit(sure, -MOST, MOST)
     }
 
-    /// One control period, with the mean disturbance in V and the flux linkage aimed at in Wb.
+    /// So much time has passed, with the mean disturbance in V and the flux linkage aimed at in Wb.
     pub fn step(&mut self, disturbance: Dq, flux: Dq, omega: f32, period_s: f32) {
         if omega.abs() < FROM_RAD_S {
             return;

@@ -89,8 +89,9 @@ pub struct Committed {
 pub struct Ripple {
     /// At the boundary where the next voltage begins to act.
     pub at_horizon_wb: AlphaBeta,
-    /// What is wanted at the end of the half that begins there: the next pattern's, if it is to begin.
-    pub after_wb: AlphaBeta,
+    /// By how much the mean voltage of the half that begins there is to change it: from the ripple that an old pattern leaves to the
+    /// one where the next pattern begins. Where a pattern is running nothing of it is led.
+    pub led_wb: AlphaBeta,
 }
 
 /// A carrier boundary that has passed since the last step.
@@ -241,6 +242,13 @@ impl Controller {
         let Input { measured, demand, window, committed, boundary } = *input;
         let Law { gains, clock, tables } = *law;
         let omega = self.speed.omega();
+        // First of all: nothing else is to be kept meanwhile.
+        if let Some(boundary) = boundary {
+            let angle = measured.angle - Angle::within_half_turn(omega * boundary.age_s);
+            let sixth =
+                committed.follows == Follows::Mean && 6.0 * omega.abs() * boundary.length_s < SIXTH_TURN_RAD;
+            self.disturbance.step(&disturbance::Input { boundary, angle, omega, sixth }, gains, tables);
+        }
         let frame = measured.angle.sin_cos();
         let current = measured.currents_a.clarke().park(frame);
         let flux = flux_linkage(tables, current);
@@ -274,12 +282,6 @@ impl Controller {
             period_s: clock.control_s(),
         });
         let resistance = tables.ratings.stator_resistance_ohm;
-        if let Some(boundary) = boundary {
-            let angle = measured.angle - Angle::within_half_turn(omega * boundary.age_s);
-            let sixth =
-                committed.follows == Follows::Mean && 6.0 * omega.abs() * boundary.length_s < SIXTH_TURN_RAD;
-            self.disturbance.step(&disturbance::Input { boundary, angle, omega, sixth }, gains, tables);
-        }
         let ahead = |seconds: f32| measured.angle + Angle::within_half_turn(omega * seconds);
         let disturbance = self.disturbance.voltage(ahead(committed.horizon_s + 0.5 * committed.interval_s));
         let until_then = self.disturbance.voltage(ahead(0.5 * committed.horizon_s));
@@ -303,7 +305,9 @@ impl Controller {
             gains,
         );
         let current_loop::Output { voltage, steady } = voltage;
-        self.map_error.step(self.disturbance.mean(), target, omega, clock.control_s());
+        if let Some(boundary) = boundary {
+            self.map_error.step(self.disturbance.mean(), target, omega, boundary.length_s);
+        }
         let regulates_by_pulses = committed.follows == Follows::Mean;
         Output {
             voltage: VoltageVector {

@@ -80,17 +80,18 @@ pub fn operating_point(torque_nm: f32, omega: f32, limit: &VoltageLimit, tables:
     let Some(psi) = flux_limit(torque_nm, best.squared(), omega, limit, tables) else {
         return unweakened;
     };
-    let on_circle = weakened(torque_nm, psi, tables);
-    if on_circle.region == Region::Weakening && on_circle.current.d >= best.d && !limit.filled {
+    // Less torque leaves less resistive drop, and so more flux: where it ends, the flux is that of the torque that is left.
+    let [_, most] = tables.weakening.torque.at(psi);
+    let left_nm = crate::frames::limit(torque_nm, -most, most);
+    let psi = if left_nm == torque_nm {
+        psi
+    } else {
+        flux_limit(left_nm, best.squared(), omega, limit, tables).unwrap_or(psi)
+    };
+    let Weakened { current, torque_nm, region } = weakened(torque_nm, psi, tables);
+    if region == Region::Weakening && current.d >= best.d && !limit.filled {
         return unweakened;
     }
-    let Weakened { current, torque_nm, region } = if on_circle.region == Region::Limit {
-        // Less torque leaves less resistive drop: once more with the torque that is left.
-        let left = flux_limit(on_circle.torque_nm, on_circle.current.squared(), omega, limit, tables);
-        weakened(torque_nm, left.unwrap_or(psi), tables)
-    } else {
-        on_circle
-    };
     OperatingPoint { current, flux: flux_linkage(tables, current), torque_nm, region, depth }
 }
 

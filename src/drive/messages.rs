@@ -204,6 +204,12 @@ impl HalfKind {
         Mode::from_code(self.0 >> 8 & 0xFF)
     }
 
+    /// Whether the gates are off in it.
+    #[inline]
+    pub fn is_off(self) -> bool {
+        self.0 >> 8 & 0xFF == Mode::Off as u32
+    }
+
     /// See [`CarrierPeriod::is_free`].
     #[inline]
     pub fn is_free(self) -> bool {
@@ -217,10 +223,16 @@ impl HalfKind {
         self.0 >> 16 & 0xFF
     }
 
-    /// Modes of the two halves that follow.
+    /// Mode of the half that follows.
     #[inline]
-    pub fn ahead(self) -> [Mode; 2] {
-        [Mode::from_code(self.0 >> 24 & 0xF), Mode::from_code(self.0 >> 28)]
+    pub fn next_mode(self) -> Mode {
+        Mode::from_code(self.0 >> 24 & 0xF)
+    }
+
+    /// Mode of the half after that.
+    #[inline]
+    pub fn next_but_one_mode(self) -> Mode {
+        Mode::from_code(self.0 >> 28)
     }
 
     /// See [`Committal::mirrored`].

@@ -74,7 +74,7 @@ impl<const N: usize> Curve<N> {
 
     /// Axis value of the last node.
     #[inline]
-    pub fn last(&self) -> f32 {
+    pub const fn last(&self) -> f32 {
         self.first + self.nodes.len().saturating_sub(1) as f32 / self.inverse_step
     }
 }

@@ -4,7 +4,7 @@
 //! reference is sampled in the middle of its half, where the mean of a turning vector over the half stands.
 
 use super::{CarrierPeriod, Devices, Reference};
-use crate::frames::{Abc, AlphaBeta, limit};
+use crate::frames::{Abc, AlphaBeta};
 use crate::time::Instant;
 
 /// A half of the asynchronous carrier.
@@ -63,7 +63,7 @@ pub fn synchronous(
 fn on_shares(voltage: AlphaBeta, all_on: f32) -> Abc {
     let phase = voltage.abc();
     let high = max(phase.a, max(phase.b, phase.c));
-    let low = -max(-phase.a, max(-phase.b, -phase.c));
+    let low = min(phase.a, min(phase.b, phase.c));
     let centre = all_on * (1.0 - high) - (1.0 - all_on) * low;
     Abc { a: phase.a + centre, b: phase.b + centre, c: phase.c + centre }
 }
@@ -72,18 +72,23 @@ fn max(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
 }
 
+fn min(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
+}
+
 /// The on-time in ticks. A pulse spans two halves, so a half may hold half the shortest pulse; what is shorter is
 /// left out or filled up, whichever is nearer.
 fn whole_pulse(share: f32, period_ticks: u32, min_pulse_ticks: u32) -> u32 {
-    let on = (limit(share, 0.0, 1.0) * period_ticks as f32 + 0.5) as u32;
+    // What is below 0, or no number, the conversion makes 0.
+    let on = ((share * period_ticks as f32 + 0.5) as u32).min(period_ticks);
+    let pause = period_ticks - on;
     let shortest = min_pulse_ticks.div_ceil(2);
     if on < shortest {
         if on * 2 < shortest { 0 } else { shortest.min(period_ticks) }
-    } else if period_ticks - on.min(period_ticks) < shortest {
-        let pause = period_ticks - on.min(period_ticks);
+    } else if pause < shortest {
         if pause * 2 < shortest { period_ticks } else { period_ticks.saturating_sub(shortest) }
     } else {
-        on.min(period_ticks)
+        on
     }
 }
 

@@ -5,7 +5,7 @@
 //! falling one when it is negative, and the other edges come at once. Those that would come late are commanded earlier.
 
 use super::{CarrierPeriod, Devices};
-use crate::frames::{Abc, limit};
+use crate::frames::Abc;
 
 /// The half as the timer must play it so that the legs do what `half` says; `currents_a` are the phase currents that are
 /// expected in it. Currents below `small_a` may have either sign by their ripple: they count in proportion. Edges at the half's
@@ -17,7 +17,9 @@ pub fn compensated(half: &CarrierPeriod, currents_a: &Abc, small_a: f32, devices
     for ((compare, start_level), current) in phases.zip([currents_a.a, currents_a.b, currents_a.c]) {
         let against = if start_level { -current } else { current };
         if *compare < half.period_ticks {
-            let late = dead_ticks * limit(against / small_a, 0.0, 1.0);
+            let share = against / small_a;
+            // What is below 0 the conversion makes 0.
+            let late = dead_ticks * if share > 1.0 { 1.0 } else { share };
             *compare = compare.saturating_sub((late + 0.5) as u32);
         }
     }

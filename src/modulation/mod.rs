@@ -155,12 +155,12 @@ impl CarrierPeriod {
 
     /// For how many ticks each phase is at the upper level, from `from` ticks after the start to the end.
     pub fn on_ticks(&self, from: u32) -> [u32; 3] {
-        let mut on = [0; 3];
+        let (mut on, end) = ([0; 3], self.period_ticks);
+        let from = from.min(end);
         let phases = on.iter_mut().zip(self.compare_ticks).zip(self.start_levels);
         for ((ticks, compare), level) in phases {
-            let toggle = compare.min(self.period_ticks).max(from);
-            let (before, after) = (toggle.saturating_sub(from), self.period_ticks.saturating_sub(toggle));
-            *ticks = if level { before } else { after };
+            let toggle = compare.min(end).max(from);
+            *ticks = if level { toggle - from } else { end - toggle };
         }
         on
     }
@@ -375,6 +375,7 @@ impl Modulator {
     }
 
     /// All gates off; where a reference is known, with the mode that it would begin with announced.
+    #[inline(never)]
     pub fn rest(&mut self, start: Instant, reference: Option<&Reference>) -> CarrierPeriod {
         self.mode = Mode::Off;
         self.plan = None;

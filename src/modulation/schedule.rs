@@ -137,9 +137,8 @@ pub fn may_switch(from: Mode, to: Mode, next_half: u32) -> bool {
     if from.carriers() == 0 || to.carriers() == 0 {
         return true;
     }
-    let common = gcd(from.carriers(), to.carriers());
-    let carriers_between = from.carriers() / common;
-    (next_half / 2).is_multiple_of(carriers_between)
+    // So many of the new mode's carriers have passed, if that is a whole number.
+    (next_half / 2 * to.carriers()).is_multiple_of(from.carriers())
 }
 
 /// The number of the new mode's first half. Between locked modes it begins at the very angle; from a free carrier
@@ -153,18 +152,6 @@ pub fn first_half(from: Mode, to: Mode, next_half: u32, pulse: Angle) -> u32 {
         }
         (old, new) => next_half * new / old,
     }
-}
-
-fn gcd(a: u32, b: u32) -> u32 {
-    let (mut a, mut b) = (a, b);
-    // Euclid on carrier numbers below 32 takes at most seven steps.
-    for _ in 0..8 {
-        if b == 0 {
-            break;
-        }
-        (a, b) = (b, a.checked_rem(b).unwrap_or(0));
-    }
-    a
 }
 
 #[cfg(test)]

@@ -104,6 +104,18 @@ pub fn image(toolchain: &Toolchain, system: System, machine: Option<&OsString>) 
     executable(&mut command, name, machine.is_some()).context("the image was not built")
 }
 
+/// The same with a feature of the emulated board.
+pub fn image_with(toolchain: &Toolchain, system: System, feature: &str) -> Result<PathBuf> {
+    let name = system.image();
+    let args = ["build", "--profile", "firmware", "--target", TARGET, "--package", "tractive", "--bin", name];
+    let mut command = toolchain.cargo(&args);
+    command.args(["--features", feature]);
+    for other in System::ALL {
+        command.env_remove(other.machine_variable());
+    }
+    executable(&mut command, name, false).context("the image was not built")
+}
+
 /// Builds one of the bench's images: `tractive-bench`, the building blocks, or `cell_stress`.
 pub fn bench(toolchain: &Toolchain, name: &str) -> Result<PathBuf> {
     let package = "tractive-bench";

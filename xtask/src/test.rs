@@ -31,6 +31,10 @@ pub enum Step {
     Miri,
     /// The lock-free cells in QEMU, interrupted on every instruction
     Cells,
+    /// Interrupts slow, late and lost, in QEMU
+    Overruns,
+    /// The PWM interrupt on every instruction of the control interrupt, in QEMU
+    Landings,
     /// The image builds
     Image,
     /// No panic within an interrupt's reach, no double precision
@@ -105,7 +109,8 @@ fn perform(step: Step, setup: &mut Setup) -> Result<Outcome> {
             }
             let what = ["--target", TARGET, "--package", "tractive", "--lib", "--bins"];
             let nucleo = [&what[..], &["--features", Board::NucleoG474re.feature()]].concat();
-            lint(&mut cargo(), &what)? && lint(&mut cargo(), &nucleo)?
+            let saboteur = [&what[..], &["--features", crate::saboteur::FEATURE]].concat();
+            lint(&mut cargo(), &what)? && lint(&mut cargo(), &nucleo)? && lint(&mut cargo(), &saboteur)?
         }
         Step::Doc => {
             let boards = format!("tractive/{}", Board::NucleoG474re.feature());
@@ -128,6 +133,8 @@ fn perform(step: Step, setup: &mut Setup) -> Result<Outcome> {
             succeeds(&mut command)?
         }
         Step::Cells => crate::cells::check(setup)?,
+        Step::Landings => crate::landings::check(setup)?,
+        Step::Overruns => crate::overruns::check(setup)?,
         Step::Image => {
             for system in System::ALL {
                 println!("{}", build::image(&setup.toolchain()?, system, None)?.display());

@@ -38,6 +38,8 @@ pub struct Limits {
     pub udc_v: (f64, f64),
     /// Highest capacitor voltage of the ZS9, in V.
     pub uc_v: f64,
+    /// Lowest voltage of the ZS9's source, in V.
+    pub source_v: f64,
     /// Highest speed, in r/min.
     pub speed_rpm: f64,
 }
@@ -48,6 +50,7 @@ impl Limits {
         current_a: f64::INFINITY,
         udc_v: (f64::NEG_INFINITY, f64::INFINITY),
         uc_v: f64::INFINITY,
+        source_v: f64::NEG_INFINITY,
         speed_rpm: f64::INFINITY,
     };
 

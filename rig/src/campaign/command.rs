@@ -2,7 +2,7 @@
 
 use super::judge::Verdict;
 use super::without::Without;
-use super::{Campaign, healthy, report, traction};
+use super::{Campaign, dual, healthy, report, traction};
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -16,7 +16,7 @@ pub struct CampaignOptions {
     /// Each fault of each kind once in each mode, instead of every case.
     #[arg(long)]
     pub fast: bool,
-    /// Only cases whose name (system, fault, speed in r/min, action) has each of these words.
+    /// Only cases whose name (system, fault, speed in r/min, the ZS9's scheme, action) has each of these words.
     #[arg(long, value_name = "WORD", num_args = 1..)]
     pub only: Vec<String>,
     /// One protection off: a fault's name, short_circuit or leg_safe_state. The cases that are lost are then listed.
@@ -25,8 +25,8 @@ pub struct CampaignOptions {
     /// Folder for cases.csv, summary.json and report.html.
     #[arg(long, default_value = "target/tractive/campaign")]
     pub out: PathBuf,
-    /// A document whose generated part is written anew.
-    #[arg(long, value_name = "FILE")]
+    /// A document whose generated part is written anew: the tables of the fast campaign, the totals of the full one.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["only", "without"])]
     pub doc: Option<PathBuf>,
     /// The document is not written: whether it is up to date decides on the exit code.
     #[arg(long, requires = "doc")]
@@ -93,7 +93,8 @@ pub fn run(options: &CampaignOptions) -> Result<ExitCode> {
     }
     let mut good = lost.is_empty();
     if let Some(path) = &options.doc {
-        let same = report::renew(path, &outcomes, options.check_doc)?;
+        let part = if options.fast { report::Part::Tables } else { report::Part::Sentences };
+        let same = report::renew(path, &outcomes, part, options.check_doc)?;
         if options.check_doc && !same {
             eprintln!("{}: not up to date", path.display());
             good = false;
@@ -107,30 +108,40 @@ const PIECE_MIN: f64 = 0.5;
 
 fn drive_healthy(minutes: f64, options: &CampaignOptions) -> Result<ExitCode> {
     let drive = traction::Drive::new(options.without)?;
+    let dual = dual::Drive::new(options.without)?;
     let pieces = (minutes / PIECE_MIN).ceil() as u64;
     let piece_s = minutes * 60.0 / pieces as f64;
     let seeds: Vec<_> = (0..pieces).map(|piece| options.seed + piece).collect();
-    let ridden =
-        seeds.par_iter().map(|seed| Ok((*seed, healthy::drive(&drive, piece_s, *seed, options.blocks)?)));
-    let ridden: Vec<_> = ridden.collect::<Result<_>>()?;
-    let mut trips = 0;
-    let (mut current_a, mut udc_v) = (0.0_f64, 0.0_f64);
-    for (seed, ridden) in &ridden {
-        current_a = current_a.max(ridden.observed.until.current_a);
-        udc_v = udc_v.max(ridden.observed.until.udc_v);
-        if let (Some(trip), Some(row)) = (ridden.trip, ridden.rows.iter().find(|row| row.trip.is_some())) {
-            trips += 1;
-            let (name, at_s, rpm) = (trip.fault.name(), row.t_s, row.speed_rpm);
-            let before =
-                ridden.rows.iter().rev().find(|row| row.trip.is_none()).map_or("", |row| row.mode.name());
-            eprintln!(
-                "seed {seed}: {name} {} (limit {}) at {at_s:.3} s, {rpm:.0} r/min, {before}",
-                trip.value, trip.limit
-            );
-        }
+    let mut systems = report::SYSTEMS.map(|(system, _)| system).to_vec();
+    systems.retain(|system| options.only.iter().all(|word| system.contains(word.as_str())));
+    if systems.is_empty() {
+        bail!("--only {}: no system has all of these words", options.only.join(" "));
     }
-    println!(
-        "{minutes} min of driving in {pieces} pieces: {trips} trips, {current_a:.0} A and {udc_v:.0} V at most"
-    );
-    Ok(if trips == 0 { ExitCode::SUCCESS } else { ExitCode::from(1) })
+    let rides: Vec<_> =
+        systems.iter().flat_map(|system| seeds.iter().map(move |seed| (*system, *seed))).collect();
+    let ridden = rides.par_iter().map(|(system, seed)| {
+        let driven = match *system {
+            "zs9" => healthy::dual::drive(&dual, piece_s, *seed)?.into(),
+            _ => healthy::traction::drive(&drive, piece_s, *seed, options.blocks)?.into(),
+        };
+        Ok((*system, *seed, driven))
+    });
+    let ridden: Vec<(&str, u64, healthy::Driven)> = ridden.collect::<Result<_>>()?;
+    let mut good = true;
+    for system in &systems {
+        let (mut trips, mut current_a, mut udc_v) = (0, 0.0_f64, 0.0_f64);
+        for (_, seed, driven) in ridden.iter().filter(|(of, _, _)| of == system) {
+            current_a = current_a.max(driven.peaks.current_a);
+            udc_v = udc_v.max(driven.peaks.udc_v);
+            if let Some(tripped) = &driven.tripped {
+                trips += 1;
+                eprintln!("{system}, seed {seed}: {tripped}");
+            }
+        }
+        println!(
+            "{system}: {minutes} min of driving in {pieces} pieces: {trips} trips, {current_a:.0} A and {udc_v:.0} V at most"
+        );
+        good &= trips == 0;
+    }
+    Ok(if good { ExitCode::SUCCESS } else { ExitCode::from(1) })
 }

@@ -3,16 +3,17 @@
 use super::judge::{self, Bounded, CURRENT_SHARE, Rule};
 use super::without::Without;
 use super::{Action, Outcome};
-use crate::bench::{Flaws, Limits, Observed};
+use crate::bench::{Flaws, Limits, Observed, Tick};
 use crate::machine::Machine;
 use crate::plant::zs9::{NetworkState, ZNetwork, Zs9Plant, Zs9Settings};
-use crate::plant::{PlantSettings, SpeedSource};
+use crate::plant::{PlantSettings, SpeedSource, profile_speed};
 use crate::run::CLOCK;
 use crate::sensor_faults::{AngleFault, CurrentFault};
-use crate::zs9::bench::{Bench, BenchSettings};
+use crate::steps::held;
+use crate::zs9::bench::{Bench, BenchSettings, Course};
 use crate::zs9::inject::{Injection, Kind};
 use crate::zs9::run::Tasks;
-use crate::zs9::scenario::SOURCE_V;
+use crate::zs9::scenario::{INERTIA_KG_M2, SOURCE_V};
 use crate::zs9::trace::Row;
 use crate::zs9::{Orders, SeenMotors, command, settings};
 use anyhow::Result;
@@ -23,6 +24,7 @@ use tractive::drive::dual::Settings;
 use tractive::machine::Tables;
 use tractive::nine_switch::{GATES, Scheme};
 use tractive::protection::{Fault, Trip};
+use tractive::time::Instant;
 
 /// Speeds of the upper and the lower motor, in r/min.
 #[derive(Clone, Copy, Debug)]
@@ -43,7 +45,7 @@ const POINTS: [Point; 5] = [
     point(1300.0, 1300.0, true),
 ];
 
-/// Schemes, one after the other: each fault meets all of them.
+/// Schemes of the fast campaign, one after the other; the full one has every scheme.
 const SCHEMES: [Scheme; 4] = [Scheme::S, Scheme::Rs, Scheme::Rthd, Scheme::Zvo];
 
 const LINK_V: f64 = 667.0;
@@ -67,8 +69,8 @@ enum Cause {
     Bench(Kind),
     /// True flux linkage over the map's.
     Flux(f64),
-    /// The upper rotor runs away.
-    Runaway,
+    /// The rotor of motor 0 or 1 runs away.
+    Runaway(usize),
 }
 
 #[derive(Clone, Debug)]
@@ -92,7 +94,8 @@ pub struct Case {
 impl Case {
     /// What a filter searches.
     pub fn name(&self) -> String {
-        format!("zs9 {} {} {}", self.fault.name, self.point.speeds_rpm[0], self.action.name())
+        let Self { fault, point, action, scheme, .. } = self;
+        format!("zs9 {} {} {} {}", fault.name, point.speeds_rpm[0], scheme.name(), action.name())
     }
 }
 
@@ -149,6 +152,10 @@ fn faults() -> Vec<Named> {
     add("source-low", Cause::Bench(Kind::SourceLow), SOURCE, None, true);
     const HIGH: &[Fault] = &[Fault::CapacitorOvervoltage, Fault::DutyRange];
     add("source-high", Cause::Bench(Kind::SourceHigh), HIGH, None, true);
+    const CUT: &[Fault] = &[Fault::SourceUndervoltage, Fault::CapacitorOvervoltage, Fault::DutyRange];
+    // Where a motor gives what the other losses take, nothing changes.
+    add("source-lost", Cause::Bench(Kind::SourceLost), CUT, Some(UNFELT), true);
+    add("source-shorted", Cause::Bench(Kind::SourceShort), SOURCE, None, true);
     add("source-swings", Cause::Bench(Kind::SourceSwings(30.0, 50.0)), HIGH, Some(UNFELT), true);
     add("source-switch-open", Cause::Bench(Kind::SourceSwitchOpen), HIGH, Some(UNFELT), true);
     add("capacitors-halved", Cause::Bench(Kind::CapacitorsHalved), HIGH, Some(UNFELT), true);
@@ -170,7 +177,10 @@ fn faults() -> Vec<Named> {
     add("control-late", late, &[Fault::ControlDeadline], None, true);
     add("commands-lost", Cause::Bench(Kind::ControlStopped), &[Fault::StaleCommand], None, true);
     add("demand-not-finite", Cause::Bench(Kind::DemandNotFinite), &[Fault::NotFinite], None, true);
-    add("overspeed", Cause::Runaway, &[Fault::Overspeed], None, true);
+    for motor in [0, 1] {
+        let name = format!("overspeed-{}", motor + 1);
+        add(&name, Cause::Runaway(motor), &[Fault::Overspeed], None, true);
+    }
     const CURRENT: &[Fault] = &[Fault::Overcurrent];
     add("flux-20%-more", Cause::Flux(1.2), CURRENT, Some(ANOTHER_MACHINE), true);
     add("flux-20%-less", Cause::Flux(0.8), CURRENT, Some(ANOTHER_MACHINE), true);
@@ -187,17 +197,19 @@ pub fn cases(fast: bool) -> Vec<Case> {
         for point in POINTS {
             for action in Action::ALL {
                 let count = list.len();
-                if (fault.cause == Cause::Runaway && point.speeds_rpm[0] < RUNAWAY_FROM_RPM)
+                if (matches!(fault.cause, Cause::Runaway(_)) && point.speeds_rpm[0] < RUNAWAY_FROM_RPM)
                     || (fast && !(fault.fast && point.fast))
                 {
                     continue;
                 }
-                let at_s = match fault.cause {
-                    Cause::Flux(_) => -LEAD_S,
-                    _ => FAULT_S + LATER_S * (count % LATER_STEPS) as f64,
-                };
-                let scheme = SCHEMES[count % SCHEMES.len()];
-                list.push(Case { fault: fault.clone(), point, action, scheme, at_s });
+                let schemes = if fast { &SCHEMES[count % SCHEMES.len()..][..1] } else { &Scheme::ALL[..] };
+                for (number, scheme) in (count..).zip(schemes) {
+                    let at_s = match fault.cause {
+                        Cause::Flux(_) => -LEAD_S,
+                        _ => FAULT_S + LATER_S * (number % LATER_STEPS) as f64,
+                    };
+                    list.push(Case { fault: fault.clone(), point, action, scheme: *scheme, at_s });
+                }
             }
         }
     }
@@ -207,6 +219,64 @@ pub fn cases(fast: bool) -> Vec<Case> {
 /// From where a rotor runs away, in r/min, and how fast it gets faster, in r/min per s.
 const RUNAWAY_FROM_RPM: f64 = 1_200.0;
 const RUNAWAY_RPM_S: f64 = 6_000.0;
+
+/// What one motor does, times in s from the recording's beginning.
+#[derive(Clone, Debug)]
+pub enum Script {
+    /// It follows torques, each from its time on (N·m, and whether the rate is limited), at a prescribed speed.
+    Torque {
+        /// In r/min, straight lines between.
+        speed_rpm: Vec<(f64, f64)>,
+        /// Demands.
+        torque_nm: Vec<(f64, (f64, bool))>,
+    },
+    /// It follows a speed, its rotor free and loaded.
+    Speed {
+        /// Wanted, in r/min, straight lines between.
+        wanted_rpm: Vec<(f64, f64)>,
+        /// Against forward rotation, each from its time on.
+        load_nm: Vec<(f64, f64)>,
+    },
+}
+
+impl Script {
+    /// The demand at a time, and the load in N·m.
+    fn order(&self, t_s: f64) -> (MotorDemand, f64) {
+        match self {
+            Self::Torque { torque_nm, .. } => {
+                let (torque_nm, slew_limited) = held(torque_nm, t_s).unwrap_or((0.0, true));
+                (MotorDemand::Torque(Demand { torque_nm: torque_nm as f32, slew_limited }), 0.0)
+            }
+            Self::Speed { wanted_rpm, load_nm } => {
+                let wanted_rad_s = profile_speed(wanted_rpm, t_s);
+                (MotorDemand::Speed(wanted_rad_s as f32), held(load_nm, t_s).unwrap_or(0.0))
+            }
+        }
+    }
+}
+
+/// A drive written down as what happens when.
+#[derive(Clone, Debug)]
+pub struct Ride {
+    /// The upper motor, the lower one.
+    pub motors: [Script; 2],
+    /// Source and schemes.
+    pub course: Course,
+    /// Length, in s.
+    pub duration_s: f64,
+}
+
+/// What a ride left.
+pub struct Ridden {
+    /// The trace.
+    pub rows: Vec<Row>,
+    /// What was seen.
+    pub observed: Observed,
+    /// The latched fault.
+    pub trip: Option<Trip>,
+    /// When the ride ended, in s.
+    pub ended_s: f64,
+}
 
 /// The drive, with one protection off or none.
 pub struct Drive {
@@ -286,41 +356,98 @@ impl Drive {
         let (kind, flux_scale) = match case.fault.cause {
             Cause::Bench(kind) => (kind, 1.0),
             Cause::Flux(flux_scale) => (Kind::Elsewhere, flux_scale),
-            Cause::Runaway => (Kind::Elsewhere, 1.0),
+            Cause::Runaway(_) => (Kind::Elsewhere, 1.0),
         };
-        let [upper, lower] = point.speeds_rpm.map(|speed_rpm| vec![(0.0, speed_rpm)]);
-        let upper = if case.fault.cause == Cause::Runaway {
-            let from_rpm = point.speeds_rpm[0];
-            vec![(LEAD_S + at_s, from_rpm), (LEAD_S + END_S, from_rpm + RUNAWAY_RPM_S * (END_S - at_s))]
-        } else {
-            upper
-        };
+        let speeds = [0, 1].map(|motor| {
+            let from_rpm = point.speeds_rpm[motor];
+            let faster = (case.fault.cause == Cause::Runaway(motor))
+                .then_some((LEAD_S + END_S, from_rpm + RUNAWAY_RPM_S * (END_S - at_s)));
+            SpeedSource::profile([(LEAD_S + at_s, from_rpm)].into_iter().chain(faster).collect())
+        });
         let motor = PlantSettings { flux_scale, ..PlantSettings::default() };
-        let plant_settings = Zs9Settings { source_v: SOURCE_V, motors: [motor; 2], ..Zs9Settings::default() };
-        let speeds = [SpeedSource::profile(upper), SpeedSource::profile(lower)];
-        let mut plant = Zs9Plant::new([&self.machine.folder; 2], speeds, &plant_settings);
-        plant.set_network(NetworkState::even(0.0, 0.5 * (LINK_V + SOURCE_V)));
         let limits = settings::drive(CLOCK, CARRIER_HZ).limits;
         let bench = BenchSettings {
-            clock: CLOCK,
-            carrier_ticks: settings::carrier_ticks(&CLOCK, CARRIER_HZ),
-            lead_s: LEAD_S,
-            duration_s: END_S,
-            trace_step_s: f64::from(CARRIER_HZ).recip(),
-            link_ref_v: LINK_V,
             scheme,
-            flaws: Flaws::default(),
             injection: Some(Injection { kind, at_s }),
             limits: Limits {
                 current_a: parameters.trip_current_a,
                 uc_v: f64::from(limits.capacitor_max_v),
+                source_v: f64::from(limits.source_min_v),
                 speed_rpm: parameters.trip_speed_rpm,
                 ..Limits::NONE
             },
+            ..self.bench_settings(END_S, Flaws::default())
+        };
+        Bench::new(self.plant(speeds, motor), Box::new(operator), bench)
+    }
+
+    /// Both motors on a network that is charged.
+    fn plant(&self, speeds: [SpeedSource; 2], motor: PlantSettings) -> Zs9Plant {
+        let settings = Zs9Settings { source_v: SOURCE_V, motors: [motor; 2], ..Zs9Settings::default() };
+        let mut plant = Zs9Plant::new([&self.machine.folder; 2], speeds, &settings);
+        plant.set_network(NetworkState::even(0.0, 0.5 * (LINK_V + SOURCE_V)));
+        plant
+    }
+
+    /// A sound bench.
+    fn bench_settings(&self, duration_s: f64, flaws: Flaws) -> BenchSettings {
+        BenchSettings {
+            clock: CLOCK,
+            carrier_ticks: settings::carrier_ticks(&CLOCK, CARRIER_HZ),
+            lead_s: LEAD_S,
+            duration_s,
+            trace_step_s: f64::from(CARRIER_HZ).recip(),
+            link_ref_v: LINK_V,
+            scheme: SCHEMES[0],
+            flaws,
+            injection: Some(Injection { kind: Kind::Elsewhere, at_s: -LEAD_S }),
+            limits: Limits::NONE,
             edges: false,
             dead_time_s: 0.0,
+        }
+    }
+
+    /// Drives a script instead of a case; the timers start at a tick.
+    ///
+    /// # Errors
+    /// A drive that breaks the bench's rules.
+    pub fn ride(&self, ride: Ride, flaws: Flaws, trace_step_s: f64, origin: Tick) -> Result<Ridden> {
+        let Ride { motors, course, duration_s } = ride;
+        let later = |steps: &[(f64, f64)]| -> Vec<_> {
+            steps.iter().map(|(t_s, rpm)| (t_s + LEAD_S, *rpm)).collect()
         };
-        Bench::new(plant, Box::new(operator), bench)
+        let speeds = motors.each_ref().map(|motor| match motor {
+            Script::Torque { speed_rpm, .. } => SpeedSource::profile(later(speed_rpm)),
+            Script::Speed { .. } => SpeedSource::Inertia { inertia_kg_m2: INERTIA_KG_M2, load_nm: 0.0 },
+        });
+        let operator = move |t_s: f64, _: SeenMotors| {
+            let orders = motors.each_ref().map(|motor| motor.order(t_s));
+            Orders {
+                demands: orders.map(|(demand, _)| demand),
+                loads_nm: orders.map(|(_, load_nm)| load_nm),
+                enable: true,
+            }
+        };
+        let settings = BenchSettings { trace_step_s, ..self.bench_settings(duration_s, flaws) };
+        let bench = Bench::new(self.plant(speeds, PlantSettings::default()), Box::new(operator), settings);
+        let mut bench = bench.following(course).beginning_at(origin);
+        let mut tasks = Tasks::beginning_at(Instant(origin as u32), self.tables, self.settings);
+        if let Some(without) = self.without {
+            tasks = tasks.without(without);
+        }
+        // Once it has stopped there is nothing to see.
+        tasks.drive(&mut bench, |bench| bench.observed().safe.is_none())?;
+        Ok(Ridden {
+            observed: *bench.observed(),
+            trip: tasks.trip(),
+            ended_s: bench.time_s(),
+            rows: bench.rows().to_vec(),
+        })
+    }
+
+    /// The machine's folder.
+    pub fn machine(&self) -> &Machine {
+        &self.machine
     }
 
     fn judged(&self, case: &Case, seen: &Seen, step_s: f64) -> Outcome {
@@ -329,7 +456,13 @@ impl Drive {
         let time_s = observed.ticks_to_safe().map(|ticks| ticks as f64 * step_s);
         let carrier_s = f64::from(CARRIER_HZ).recip();
         let trip_a = parameters.trip_current_a;
-        let current_limit_a = CURRENT_SHARE * trip_a;
+        let current_limit_a = match case.fault.cause {
+            // The diodes of a bridge on a shorted source short the motors, whatever the gates do.
+            Cause::Bench(Kind::SourceShort) => {
+                (CURRENT_SHARE * trip_a).max(FORCED * observed.stored.short_circuit_a)
+            }
+            _ => CURRENT_SHARE * trip_a,
+        };
         let highest_v = f64::from(settings::drive(CLOCK, CARRIER_HZ).limits.capacitor_max_v);
         let uc_limit_v = forced_uc_v(observed).max(highest_v);
         // The source is what it is; the capacitors decide.
@@ -395,7 +528,7 @@ impl Drive {
             }
             Cause::Bench(Kind::Gate(..)) => STUCK_S,
             Cause::Bench(Kind::ControlStopped) => carriers_s + STALE_S,
-            Cause::Runaway => carriers_s + TRACKING_S,
+            Cause::Runaway(_) => carriers_s + TRACKING_S,
             _ => carriers_s,
         }
     }

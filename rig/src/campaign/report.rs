@@ -42,8 +42,27 @@ pub struct Line {
     pub udc_until_v: f64,
     /// And after that.
     pub udc_after_v: f64,
-    /// The ZS9's largest capacitor voltage, in V.
-    pub uc_v: Option<f64>,
+    /// The ZS9's largest capacitor voltage until the gates were safe, in V, or over the whole case.
+    pub uc_until_v: Option<f64>,
+    /// And after that.
+    pub uc_after_v: Option<f64>,
+    /// The largest phase current over what it may be, of all cases.
+    pub current_share: f64,
+    /// The highest voltage with safe gates over what is forced then, or over the trip level where that is more; the ZS9's of a capacitor.
+    pub voltage_share: f64,
+}
+
+impl Outcome {
+    fn current_share(&self) -> f64 {
+        self.current_until_a.max(self.current_after_a) / self.current_limit_a
+    }
+
+    fn voltage_share(&self) -> f64 {
+        match (self.uc_after_v, self.uc_limit_v) {
+            (Some(uc_v), Some(limit_v)) => uc_v / limit_v,
+            _ => self.udc_after_v / self.udc_limit_v,
+        }
+    }
 }
 
 /// Lines of the outcomes in groups, in the order in which they first come.
@@ -67,7 +86,6 @@ fn line(system: &'static str, what: String, members: &[&Outcome]) -> Line {
             members.iter().map(|outcome| value(outcome)).filter(|text| !text.is_empty()).collect();
         texts.into_iter().collect::<Vec<_>>().join(", ")
     };
-    let capacitors = members.iter().filter_map(|outcome| Some(outcome.uc_until_v?.max(outcome.uc_after_v?)));
     Line {
         system,
         what,
@@ -83,7 +101,10 @@ fn line(system: &'static str, what: String, members: &[&Outcome]) -> Line {
         current_after_a: most(|outcome| outcome.current_after_a),
         udc_until_v: most(|outcome| outcome.udc_until_v),
         udc_after_v: most(|outcome| outcome.udc_after_v),
-        uc_v: capacitors.reduce(f64::max),
+        uc_until_v: members.iter().filter_map(|outcome| outcome.uc_until_v).reduce(f64::max),
+        uc_after_v: members.iter().filter_map(|outcome| outcome.uc_after_v).reduce(f64::max),
+        current_share: most(Outcome::current_share),
+        voltage_share: most(Outcome::voltage_share),
     }
 }
 
@@ -123,7 +144,10 @@ pub fn table(heading: &str, lines: &[Line]) -> String {
         "A after",
         "V until",
         "V after",
-        "U_c",
+        "U_c until",
+        "U_c after",
+        "A share",
+        "V share",
         "named",
         "safe state",
     ];
@@ -144,7 +168,10 @@ pub fn table(heading: &str, lines: &[Line]) -> String {
             number(line.current_after_a),
             number(line.udc_until_v),
             number(line.udc_after_v),
-            line.uc_v.map_or("–".to_owned(), number),
+            line.uc_until_v.map_or("–".to_owned(), number),
+            line.uc_after_v.map_or("–".to_owned(), number),
+            fine(line.current_share),
+            fine(line.voltage_share),
             text(&line.named),
             text(&line.safe_states),
         ]);
@@ -154,13 +181,13 @@ pub fn table(heading: &str, lines: &[Line]) -> String {
     let mut out = String::new();
     for (index, row) in rows.iter().enumerate() {
         let cells = row.iter().zip(&widths).enumerate().map(|(k, (cell, width))| {
-            let left = k == 0 || k > 11;
+            let left = k == 0 || k > 14;
             if left { format!("{cell:<width$}") } else { format!("{cell:>width$}") }
         });
         let _ = writeln!(out, "| {} |", cells.collect::<Vec<_>>().join(" | "));
         if index == 0 {
             let rules = widths.iter().enumerate().map(|(k, width)| {
-                if k == 0 || k > 11 { "-".repeat(*width) } else { "-".repeat(width - 1) + ":" }
+                if k == 0 || k > 14 { "-".repeat(*width) } else { "-".repeat(width - 1) + ":" }
             });
             let _ = writeln!(out, "| {} |", rules.collect::<Vec<_>>().join(" | "));
         }
@@ -193,6 +220,10 @@ pub struct Total {
     pub worst_udc_v: Worst,
     /// The ZS9's highest capacitor voltage, in V.
     pub worst_uc_v: Worst,
+    /// The largest phase current over what it may be.
+    pub worst_current_share: Worst,
+    /// The highest voltage with safe gates over what is forced then, or over the trip level.
+    pub worst_voltage_share: Worst,
 }
 
 /// The largest value and where it was; nothing where there is none.
@@ -236,6 +267,8 @@ pub fn total(outcomes: &[Outcome], system: &str) -> Option<Total> {
         }),
         worst_udc_v: worst(of(), |outcome| Some(outcome.udc_until_v.max(outcome.udc_after_v))),
         worst_uc_v: worst(of(), |outcome| Some(outcome.uc_until_v?.max(outcome.uc_after_v?))),
+        worst_current_share: worst(of(), |outcome| Some(outcome.current_share())),
+        worst_voltage_share: worst(of(), |outcome| Some(outcome.voltage_share())),
     })
 }
 
@@ -249,16 +282,29 @@ pub fn sentences(total: &Total) -> String {
         format!("{cases} cases: {caught} caught, {ridden_through} ridden through, {uncaught} uncaught.\n");
     let mut add = |what: &str, worst: &Worst, unit: &str, after: &str| {
         if worst.value > 0.0 {
-            let _ = writeln!(text, "- {what}: {:.2} {unit}{after} ({})", worst.value, worst.case);
+            let _ = writeln!(
+                text,
+                "- {what}: {:.2}{}{unit}{after} ({})",
+                worst.value,
+                if unit.is_empty() { "" } else { " " },
+                worst.case
+            );
         }
     };
     add("longest until the gates were safe", &total.worst_carrier_periods, "carrier periods", "");
     add("longest until the gates were safe", &total.worst_time_ms, "ms", "");
     let allowed = format!(" of {:.0} A allowed", total.current_limit_a);
     add("largest phase current", &total.worst_current_a, "A", &allowed);
-    add("largest phase current where a device has failed short", &total.worst_forced_current_a, "A", "");
+    add(
+        "largest phase current where a device or the source is shorted",
+        &total.worst_forced_current_a,
+        "A",
+        "",
+    );
     add("highest DC voltage", &total.worst_udc_v, "V", "");
     add("highest capacitor voltage", &total.worst_uc_v, "V", "");
+    add("largest phase current over what it may be", &total.worst_current_share, "", "");
+    add("highest voltage with safe gates over what is forced", &total.worst_voltage_share, "", "");
     text
 }
 
@@ -340,31 +386,59 @@ fn worst_by_speed(outcomes: &[Outcome], state: &str, value: fn(&Outcome) -> f64)
     points
 }
 
-/// Where the generated part of the document begins and ends.
-const MARKERS: [&str; 2] = ["<!-- campaign: begin -->\n", "<!-- campaign: end -->"];
+/// What is written into a document.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Part {
+    /// The tables of the fast campaign.
+    Tables,
+    /// What the full campaign comes to, in sentences.
+    Sentences,
+}
+
+impl Part {
+    /// Where it begins and ends.
+    const fn markers(self) -> [&'static str; 2] {
+        match self {
+            Self::Tables => ["<!-- campaign: begin -->\n", "<!-- campaign: end -->"],
+            Self::Sentences => ["<!-- full campaign: begin -->\n", "<!-- full campaign: end -->"],
+        }
+    }
+
+    fn text(self, outcomes: &[Outcome]) -> String {
+        if self == Self::Tables {
+            return text(outcomes);
+        }
+        let mut out = String::new();
+        for (system, heading) in SYSTEMS {
+            let Some(total) = total(outcomes, system) else { continue };
+            let _ = write!(out, "\n{heading}: {}", sentences(&total));
+        }
+        out
+    }
+}
 
 /// The document with its generated part replaced.
 ///
 /// # Errors
 /// Without its markers.
-pub fn document(text: &str, outcomes: &[Outcome]) -> Result<String> {
-    let [begin, end] = MARKERS;
+pub fn document(text: &str, outcomes: &[Outcome], part: Part) -> Result<String> {
+    let [begin, end] = part.markers();
     let (Some(from), Some(to)) = (text.find(begin), text.find(end)) else {
         bail!("must have the lines {} and {end}", begin.trim());
     };
     let before = text.get(..from + begin.len()).unwrap_or_default();
     let after = text.get(to..).unwrap_or_default();
-    Ok(format!("{before}{}\n{after}", self::text(outcomes)))
+    Ok(format!("{before}{}\n{after}", part.text(outcomes)))
 }
 
 /// Renews the generated part of a document, or says whether it is as it would be written.
 ///
 /// # Errors
 /// A document that cannot be read or written, or without its markers.
-pub fn renew(path: &Path, outcomes: &[Outcome], only_check: bool) -> Result<bool> {
+pub fn renew(path: &Path, outcomes: &[Outcome], part: Part, only_check: bool) -> Result<bool> {
     let named = || path.display().to_string();
     let before = std::fs::read_to_string(path).with_context(named)?;
-    let after = document(&before, outcomes).with_context(named)?;
+    let after = document(&before, outcomes, part).with_context(named)?;
     let same = before == after;
     if !only_check && !same {
         write_text(path, &after)?;

@@ -9,6 +9,7 @@ use crate::machine::Machine;
 use crate::plant::{Plant, PlantSettings, SpeedSource};
 use crate::run::{CLOCK, Tasks};
 use crate::sensor_faults::{AngleFault, CurrentFault};
+use crate::steps::held;
 use crate::trace::Row;
 use anyhow::Result;
 use core::f64::consts::TAU;
@@ -277,12 +278,6 @@ pub struct Ridden {
     pub observed: Observed,
     /// The latched fault.
     pub trip: Option<Trip>,
-}
-
-/// The value that holds at a time.
-fn held<T: Copy>(steps: &[(f64, T)], t_s: f64) -> Option<T> {
-    let after = steps.partition_point(|(at_s, _)| *at_s <= t_s + 1e-9);
-    after.checked_sub(1).and_then(|last| steps.get(last)).map(|(_, value)| *value)
 }
 
 /// What a run left.

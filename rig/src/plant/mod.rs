@@ -14,7 +14,7 @@ pub mod zs9;
 pub use dc_link::{DcLink, DcLinkSettings, LinkEnergies, LinkSwitches, Source};
 pub use legs::Leg;
 pub use rotor::{Rotor, Turning};
-pub use speed::SpeedSource;
+pub use speed::{SpeedSource, profile_speed};
 pub use stator::{Stator, StatorSlopes};
 
 use core::f64::consts::TAU;

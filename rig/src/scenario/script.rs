@@ -1,6 +1,7 @@
 //! A run written down as what happens when.
 
 use super::{LEAD_S, Plan};
+use crate::steps::held;
 use tractive::control::Demand;
 
 /// Time before the first event, in s.
@@ -23,19 +24,13 @@ pub struct Script {
     pub duration_s: f64,
 }
 
-/// The value that holds at a time.
-fn held<T: Copy>(steps: &[(f64, T)], t_s: f64, before: T) -> T {
-    let passed = steps.iter().rev().find(|(at_s, _)| t_s + 1e-9 >= *at_s);
-    passed.map_or(before, |(_, value)| *value)
-}
-
 impl Script {
     /// The plan of a scenario that follows the script.
     pub fn plan(self) -> Plan {
         let Self { speed, torque, enable, link, slew_limited, duration_s } = self;
         let operator = move |t_s: f64| {
-            let torque_nm = held(&torque, t_s, 0.0) as f32;
-            (Demand { torque_nm, slew_limited }, held(&enable, t_s, true))
+            let torque_nm = held(&torque, t_s).unwrap_or(0.0) as f32;
+            (Demand { torque_nm, slew_limited }, held(&enable, t_s).unwrap_or(true))
         };
         Plan { lead_s: LEAD_S, duration_s, speed, link, operator: Box::new(operator) }
     }

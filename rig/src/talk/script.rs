@@ -243,7 +243,7 @@ pub fn line(text: &str, number: usize, columns: &[&str]) -> Result<Option<Line>>
 /// A whole script.
 ///
 /// # Errors
-/// As [`line`], and times that go back.
+/// As [`line()`], and times that go back.
 pub fn script(text: &str, columns: &[&str]) -> Result<Vec<Line>> {
     let mut lines = Vec::new();
     let mut last_s = 0.0;

@@ -11,6 +11,7 @@ use super::trace::{Edge, MotorRow, Row};
 use crate::bench::{Converter, Flaws, Limits, Observed, Peaks, Stored};
 use crate::benchmark::in_plant;
 use crate::plant::zs9::{IllegalState, LegGates, Source, Zs9Plant};
+use crate::steps::held;
 use std::collections::VecDeque;
 use tractive::board::{DualSample, GateFeedback, PlayedPeriod, PowerSample};
 use tractive::drive::dual::{COMPARE_STEPS, DualReport};
@@ -30,6 +31,11 @@ const PWM_OFF_TICKS: u32 = 625;
 
 /// How far a current's reading may be off without making a difference that counts, in A: a tenth of a machine's largest current.
 const MUCH_A: f32 = 8.49;
+
+/// The capacitor behind the source's contactor, in F: as large as the network's.
+const INPUT_F: f64 = 500e-6;
+/// Longest step of its voltage, in s.
+const LONGEST_LOST_S: f64 = 10e-6;
 
 /// Why the bench cannot go on.
 #[derive(Debug, thiserror::Error)]
@@ -77,6 +83,15 @@ pub struct BenchSettings {
     pub dead_time_s: f64,
 }
 
+/// What changes by itself while it drives: times in s from the recording's beginning, each value from its time on.
+#[derive(Clone, Debug, Default)]
+pub struct Course {
+    /// Voltages of the source, in V; the plant's own before the first.
+    pub source_v: Vec<(f64, f64)>,
+    /// Schemes; the settings' before the first.
+    pub schemes: Vec<(f64, Scheme)>,
+}
+
 /// What is summed up over a step of the trace, each value times its time, in steps.
 #[derive(Clone, Copy, Debug, Default)]
 struct Sums {
@@ -96,8 +111,11 @@ pub struct Bench {
     spoiler: Spoiler,
     nominal_source_v: f64,
     step_s: f64,
+    /// Where the timers started.
+    origin: Steps,
     now: Steps,
     lead: Steps,
+    course: Course,
     rows_wanted: usize,
     /// Beginning of the carrier period that is played, and its length.
     begun: Steps,
@@ -143,8 +161,10 @@ impl Bench {
             sensors: Sensors::new(Converter::new(settings.flaws)),
             spoiler: Spoiler::new(settings.injection),
             step_s,
+            origin: 0,
             now: 0,
             lead,
+            course: Course::default(),
             rows_wanted,
             begun: 0,
             period: Steps::from(settings.carrier_ticks * COMPARE_STEPS),
@@ -170,6 +190,24 @@ impl Bench {
         }
     }
 
+    /// The same beginning at another tick than 0, with tasks of [`super::run::Tasks::beginning_at`] the same: where instants wrap.
+    pub fn beginning_at(mut self, origin_ticks: u64) -> Self {
+        self.origin = origin_ticks * Steps::from(COMPARE_STEPS);
+        for step in
+            [&mut self.now, &mut self.lead, &mut self.begun, &mut self.next_sample, &mut self.next_row]
+        {
+            *step += self.origin;
+        }
+        self.observed.from = self.observed.from.saturating_add(self.origin);
+        self
+    }
+
+    /// The same with a source and schemes that change.
+    pub fn following(mut self, course: Course) -> Self {
+        self.course = course;
+        self
+    }
+
     /// The motors' true speeds, in r/min.
     pub fn speeds_rpm(&self) -> [f64; 2] {
         self.plant.motors().each_ref().map(|motor| motor.speed_rpm())
@@ -183,7 +221,7 @@ impl Bench {
     /// Share of the run that is done, 0 ..= 1.
     pub fn progress(&self) -> f64 {
         let end_s = self.settings.lead_s + self.settings.duration_s;
-        (self.now as f64 * self.step_s / end_s).min(1.0)
+        ((self.now - self.origin) as f64 * self.step_s / end_s).min(1.0)
     }
 
     /// What was recorded: the rows of the trace, and the edges.
@@ -237,9 +275,11 @@ impl Bench {
 
     /// An interrupt at `instant` turns all gates off.
     pub fn gates_off(&mut self, instant: Instant) {
-        let is_control = instant.0.is_multiple_of(self.settings.clock.control_ticks);
+        let from = self.widen(instant);
+        let control = Steps::from(self.settings.clock.control_ticks * COMPARE_STEPS);
+        let is_control = (from - self.origin).is_multiple_of(control);
         let delay = if is_control { CONTROL_OFF_TICKS } else { PWM_OFF_TICKS };
-        let at = self.widen(instant) + Steps::from(delay * COMPARE_STEPS);
+        let at = from + Steps::from(delay * COMPARE_STEPS);
         self.off_at = Some(self.off_at.map_or(at, |earlier| earlier.min(at)));
     }
 
@@ -310,7 +350,7 @@ impl Bench {
         let peaks = Peaks::at(&[a, b, c, d, e, f], self.plant.link_v(), v1.max(v2));
         let speeds = self.plant.motors().each_ref().map(|motor| motor.speed_rpm().abs());
         self.observed.note(self.now, &peaks, speeds[0].max(speeds[1]));
-        if self.real_levels() != self.levels {
+        if self.real_levels() != self.levels || self.plant.source_v() < self.settings.limits.source_v {
             self.observed.makes_a_difference(self.now);
         }
     }
@@ -325,7 +365,7 @@ impl Bench {
             unloaded_v: source_v + (network.capacitor_v() - source_v).hypot(surge_v),
             field_j: motors.iter().map(|motor| motor.field_j()).sum(),
             braked_j: motors.iter().map(|motor| motor.braked_j(link_v)).sum(),
-            short_circuit_a: 0.0,
+            short_circuit_a: motors.iter().map(|motor| motor.short_circuit_peak_a()).fold(0.0, f64::max),
         }
     }
 
@@ -342,7 +382,7 @@ impl Bench {
 
     /// Runs to `to`, doing on the way all that is due, and at `to` itself too.
     fn advance(&mut self, to: Steps) -> Result<(), BenchError> {
-        if self.now == 0 && self.next.is_some() {
+        if self.now == self.origin && self.next.is_some() {
             self.begin_period()?;
         }
         while self.now < to {
@@ -369,6 +409,27 @@ impl Bench {
         if to <= self.now {
             return Ok(());
         }
+        if self.spoiler.kind(self.seconds(self.now)) == Some(Kind::SourceLost) {
+            let longest = (LONGEST_LOST_S / self.step_s).round() as Steps;
+            while self.now + longest < to {
+                self.integrate_lost(self.now + longest)?;
+            }
+            return self.integrate_lost(to);
+        }
+        self.integrate_fed(to)
+    }
+
+    /// With the source cut off: what its capacitor gives it loses.
+    fn integrate_lost(&mut self, to: Steps) -> Result<(), BenchError> {
+        let before_j = self.plant.energies().source_j;
+        self.integrate_fed(to)?;
+        let given_j = self.plant.energies().source_j - before_j;
+        let square = self.plant.source_v().powi(2) - 2.0 * given_j / INPUT_F;
+        self.plant.set_source_v(square.max(1.0).sqrt());
+        Ok(())
+    }
+
+    fn integrate_fed(&mut self, to: Steps) -> Result<(), BenchError> {
         let steps = (to - self.now) as f64;
         let real = self.real_levels();
         let [uh, vh, wh, um, vm, wm, ul, vl, wl] = real;
@@ -544,8 +605,14 @@ impl Bench {
         for (motor, load_nm) in self.plant.motors_mut().iter_mut().zip(self.orders.loads_nm) {
             motor.set_load_nm(load_nm);
         }
-        let supply_v = self.nominal_source_v + self.sensors.ripple_v(t_s);
-        let source_v = self.spoiler.source_v(t_s, supply_v);
+        let healthy_v = held(&self.course.source_v, t_s).unwrap_or(self.nominal_source_v);
+        let supply_v = healthy_v + self.sensors.ripple_v(t_s);
+        // What is cut off is its capacitor's.
+        let source_v = if self.spoiler.kind(t_s) == Some(Kind::SourceLost) {
+            self.plant.source_v()
+        } else {
+            self.spoiler.source_v(t_s, supply_v)
+        };
         self.plant.set_source_v(source_v);
         let network = self.plant.network();
         let mut sample = DualSample {
@@ -556,7 +623,7 @@ impl Bench {
             source_v: source_v as f32,
             demands: self.orders.demands,
             link_ref_v: self.settings.link_ref_v as f32,
-            scheme: self.settings.scheme,
+            scheme: held(&self.course.schemes, t_s).unwrap_or(self.settings.scheme),
             enable: self.orders.enable,
         };
         let true_a = sample.currents_a;

@@ -11,6 +11,8 @@ use tractive::frames::Abc;
 pub enum Kind {
     /// The source is shorted.
     SourceShort,
+    /// The source is cut off: what feeds the network is the capacitor behind its contactor.
+    SourceLost,
     /// The source falls to 250 V.
     SourceLow,
     /// The source jumps to 900 V and charges the capacitors.

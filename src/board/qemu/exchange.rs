@@ -2,10 +2,12 @@
 //! these functions by their module and does not count them, so they stay out of line and take what they tell by reference.
 
 mod dual;
+#[cfg(feature = "saboteur")]
+pub mod file;
 
 pub use dual::{dead_dual, gates_off, open_dual, play_dual, power_sample, report_dual, sample_dual};
 
-use super::{RECORDER, stop};
+use super::{RECORDER, saboteur, stop};
 use crate::board::Sample;
 use crate::drive::Report;
 use crate::frames::Abc;
@@ -46,6 +48,7 @@ fn open_files() {
         }
         file.store(handle as u32, Ordering::Relaxed);
     }
+    saboteur::connect();
 }
 
 /// The control timer's conversions; ends the emulation when the rig says so.
@@ -56,6 +59,7 @@ pub fn control_sample(now: Instant) -> Sample {
     if end {
         finish();
     }
+    saboteur::sampled();
     sample
 }
 
@@ -63,6 +67,7 @@ pub fn control_sample(now: Instant) -> Sample {
 fn finish() -> ! {
     // The rig's time stands still from here on: no interrupt may ask it for samples.
     cortex_m::interrupt::disable();
+    saboteur::finish();
     for record in (0..).map_while(|index| RECORDER.read(index)) {
         send(&Request::Recorded(record).to_block());
     }
@@ -83,6 +88,19 @@ pub fn play(now: Instant, next: &CarrierPeriod) {
     send(&Request::Play(now, *next).to_block());
 }
 
+/// The same as before once more: what timers do that nobody reloads.
+#[cfg(feature = "saboteur")]
+pub fn play_again() {
+    send(&saboteur::played());
+}
+
+/// Lets the rig's time catch up with the real one, which the tasks do not know.
+#[cfg(feature = "saboteur")]
+pub fn catch_up(real: Instant) -> Block {
+    send(&Request::PwmSample(real).to_block());
+    receive(PWM_ANSWERS)
+}
+
 /// The end of a control interrupt.
 #[inline(never)]
 pub fn report(now: Instant, report: &Report) {
@@ -92,6 +110,7 @@ pub fn report(now: Instant, report: &Report) {
 /// An order to enter the safe state.
 #[inline(never)]
 pub fn enter(safe: SafeState, now: Instant) {
+    saboteur::gates_off();
     send(&Request::Enter(now, safe).to_block());
 }
 
@@ -141,7 +160,9 @@ fn file(index: usize) -> usize {
     }
 }
 
+#[inline(never)]
 fn send(block: &Block) {
+    saboteur::sent(block);
     // SAFETY: SYS_WRITE reads exactly the block, which outlives the call.
     let missing = unsafe { syscall!(WRITE, file(REQUESTS), block.as_ptr(), BLOCK_BYTES) };
     if missing != 0 {
@@ -149,6 +170,7 @@ fn send(block: &Block) {
     }
 }
 
+#[inline(never)]
 fn receive(answers: usize) -> Block {
     let mut block: Block = [0; link::BLOCK_WORDS];
     // SAFETY: SYS_READ writes at most the block's bytes, and the block is ours until it returns.

@@ -48,6 +48,12 @@ impl<M: Machine> ControlTask<M> {
         }
     }
 
+    /// The same where the timers start at another instant than 0.
+    pub fn beginning_at(mut self, origin: Instant) -> Self {
+        self.now = origin.after(self.settings.clock.control_ticks);
+        self
+    }
+
     /// The same without a check.
     pub const fn without(mut self, disarmed: Disarmed) -> Self {
         self.disarmed = disarmed;
@@ -66,10 +72,8 @@ impl<M: Machine> ControlTask<M> {
         let applied = newest.filter(|applied| now.reached(applied.at));
         let sample = port.sample(now);
         if self.trip.is_none() {
-            // From beyond the next call only if calls of this one have been lost.
-            let latest = self.now;
-            let known = newest.filter(|newest| now.reached(newest.at) || !latest.reached(newest.at));
-            self.trip = known.and_then(|known| known.trip);
+            // Also from beyond this call: only where calls of it have been lost.
+            self.trip = newest.and_then(|newest| newest.trip);
         }
         self.check(applied.and_then(|applied| self.overdue(&applied, now)), port);
         let angles = self.track(&sample, port);

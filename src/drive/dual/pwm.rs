@@ -47,6 +47,12 @@ impl<M: Machine> PwmTask<M> {
         }
     }
 
+    /// The same where the timers start at another instant than 0.
+    pub fn beginning_at(mut self, origin: Instant) -> Self {
+        self.now = origin.after(self.settings.first_peak_ticks());
+        self
+    }
+
     /// The same without a check.
     pub const fn without(mut self, disarmed: Disarmed) -> Self {
         self.disarmed = disarmed;

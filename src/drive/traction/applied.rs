@@ -46,7 +46,7 @@ pub(super) struct Next {
 impl Applied {
     /// Mode of the half that this period's command is made for.
     pub(super) fn decided(&self) -> Mode {
-        self.next.kind.ahead()[0]
+        self.next.kind.next_mode()
     }
 
     /// The PWM interrupt that should have come by `now` and has not: since when, in s.
@@ -63,8 +63,8 @@ impl Applied {
         if now.reached(newest.at()) {
             return Some(Self::of([newest, one, two], now));
         }
-        // Words that were never written say instant 0, of which there is none.
-        now.reached(one.at()).then(|| Self::of([one, two, three], now))
+        // A half that was written has a length.
+        (one.period_ticks() > 0 && now.reached(one.at())).then(|| Self::of([one, two, three], now))
     }
 
     #[inline]
@@ -74,9 +74,9 @@ impl Applied {
             (newest.begins(), newest.period_ticks(), newest.volt_ticks());
         let next = Next { begins, period_ticks, volt_ticks, kind };
         let mode = one.kind().mode();
-        let off = mode == Mode::Off || kind.mode() == Mode::Off;
+        let off = one.kind().is_off() || kind.is_off();
         let running = (!off).then(|| one.volt_ticks_from(now.since(at).max(0) as u32));
-        let passed = (two.kind().mode() != Mode::Off).then(|| two.volt_ticks());
+        let passed = (!two.kind().is_off()).then(|| two.volt_ticks());
         Self {
             at,
             before: one.at(),
@@ -120,18 +120,19 @@ pub(super) fn nothing_committed(settings: &Settings) -> Committed {
 }
 
 impl Applied {
-    /// What the modulator will do from `now` until a command of this period can act; with `revises` only the running half stands.
+    /// What the modulator will do from `now` until a command of this period can act, which is for the mode `decided`; with `revises`
+    /// only the running half stands.
     pub(super) fn committed(
         &self,
         now: Instant,
         steady: &Steady,
         glide: &mut Glide,
         settings: &Settings,
+        decided: Mode,
         revises: bool,
     ) -> Committed {
         let Settings { clock, devices, .. } = settings;
         let next = &self.next;
-        let decided = self.decided();
         let largest = depth_limit(decided, clock.angle_rate(steady.omega), devices);
         let largest = if decided == Mode::Square { largest } else { REGULATION_ROOM * largest };
         let (depth_limit, filled) = glide.fill(decided, largest, steady.depth, clock.control_s());
@@ -153,7 +154,7 @@ impl Applied {
         Committed {
             horizon_s: clock.seconds(left as i32),
             volt_seconds: volt_ticks.map(|ticks| ticks * (steady.udc_v * clock.tick_s)),
-            ripple: next.kind.ripple(steady),
+            ripple: next.kind.ripple(decided, steady),
             interval_s,
             follows,
             depth_limit,
@@ -186,26 +187,32 @@ impl Applied {
 }
 
 impl HalfKind {
-    /// Ripple flux at the end of this half, which is committed, and the one wanted at the end of the half after it. Where a
-    /// pattern begins at the first of these, its own ripple is expected; where a carrier begins, what the old pattern leaves.
-    fn ripple(self, steady: &Steady) -> Option<Ripple> {
-        let (mode, [decided, after]) = (self.mode(), self.ahead());
-        let flux = |mode: Mode| RippleFlux::new(mode, steady.voltage_v, steady.udc_v, steady.omega.abs());
-        let seen = |ripple: AlphaBeta| AlphaBeta {
-            beta: if self.is_mirrored() { -ripple.beta } else { ripple.beta },
-            ..ripple
-        };
-        let end = self.half() + 1;
-        if mode == decided && decided == after {
-            let flux = flux(mode)?;
-            return Some(Ripple { at_horizon_wb: seen(flux.at(end)), after_wb: seen(flux.at(end + 1)) });
+    /// Ripple flux at the end of this half, which is committed, and what the half after it, of the mode `decided`, is to change of it.
+    /// Where a pattern begins at the first of these, its own ripple is expected; where a carrier begins, what the old pattern leaves.
+    fn ripple(self, decided: Mode, steady: &Steady) -> Option<Ripple> {
+        let (mode, end) = (self.mode(), self.half() + 1);
+        if decided.is_pattern() {
+            let at_horizon_wb = self.ripple_at(decided, number(mode, decided, end), steady);
+            return Some(Ripple { at_horizon_wb, led_wb: AlphaBeta::default() });
         }
-        let number = |from: Mode, to: Mode, half: u32| {
-            if from == to { half } else { first_half(from, to, half, Angle::ZERO) }
-        };
-        let at = |mode: Mode, half: u32| flux(mode).map_or(AlphaBeta::default(), |flux| seen(flux.at(half)));
-        let begins = number(mode, decided, end);
-        let at_horizon_wb = if decided.is_carrier() { at(mode, end) } else { at(decided, begins) };
-        Some(Ripple { at_horizon_wb, after_wb: at(after, number(decided, after, begins + 1)) })
+        let after = self.next_but_one_mode();
+        if !mode.is_pattern() && !after.is_pattern() {
+            return None;
+        }
+        let at_horizon_wb = self.ripple_at(mode, end, steady);
+        let after_wb = self.ripple_at(after, number(decided, after, number(mode, decided, end) + 1), steady);
+        Some(Ripple { at_horizon_wb, led_wb: after_wb - at_horizon_wb })
     }
+
+    /// A mode's ripple where half number `half` begins, seen in the mirror if the half is: nothing under a carrier.
+    fn ripple_at(self, mode: Mode, half: u32, steady: &Steady) -> AlphaBeta {
+        let flux = RippleFlux::new(mode, steady.voltage_v, steady.udc_v, steady.omega.abs());
+        let ripple = flux.map_or(AlphaBeta::default(), |flux| flux.at(half));
+        AlphaBeta { beta: if self.is_mirrored() { -ripple.beta } else { ripple.beta }, ..ripple }
+    }
+}
+
+/// What half number `half` of a mode is in the mode that follows.
+fn number(from: Mode, to: Mode, half: u32) -> u32 {
+    if from == to { half } else { first_half(from, to, half, Angle::ZERO) }
 }

@@ -6,7 +6,7 @@ use super::{Settings, Shared};
 use crate::board::{ControlPort, Sample};
 use crate::control::{Boundary, Committed, Controller, Demand, Input, Law};
 use crate::drive::messages::{Gates, Report, VoltageCommand};
-use crate::frames::AlphaBeta;
+use crate::frames::{AlphaBeta, Angle, Dq};
 use crate::machine::{Machine, Tables};
 use crate::modulation::{Mode, Reference};
 use crate::protection::{self, Disarmed, Fault, FrozenWatch, Trip, Violation};
@@ -47,6 +47,23 @@ pub struct ControlTask<M = &'static Tables> {
     acknowledged: u8,
 }
 
+/// What a period's control law makes; nothing while no pulses are made.
+#[derive(Clone, Copy, Default)]
+struct Driven {
+    /// The command, as in [`Reference`].
+    voltage_v: f32,
+    vector: AlphaBeta,
+    carrier_angle: Angle,
+    depth: f32,
+    /// Whether it is for the half that is already committed.
+    revises: bool,
+    /// What is told of it, as in [`Report`].
+    torque_nm: f32,
+    current: Dq,
+    map_error: f32,
+    mode: Mode,
+}
+
 impl<M: Machine> ControlTask<M> {
     /// A task whose first call is the control timer's first interrupt, at `first`.
     pub const fn new(machine: M, settings: Settings, first: Instant) -> Self {
@@ -69,8 +86,8 @@ impl<M: Machine> ControlTask<M> {
         }
     }
 
-    /// Whether [`PwmTask::revise`](super::PwmTask::revise) is to run before the next [`ControlTask::run`], at the same instant: first thing in the interrupt,
-    /// the handler makes the PWM interrupt pending.
+    /// Whether [`PwmTask::revise`](super::PwmTask::revise) is to run before the next [`ControlTask::run`], at the same
+    /// instant: first thing in the interrupt, the handler makes the PWM interrupt pending.
     pub fn wants_revision(&self) -> bool {
         self.revises
     }
@@ -97,48 +114,14 @@ impl<M: Machine> ControlTask<M> {
             self.trip = self.trip.filter(|trip| trip.fault != Fault::GatesHeld);
             self.check(Some((fault, 1.0, 0.0)), &sample, port);
         }
-        let overdue = applied.as_ref().and_then(|applied| applied.overdue(now, &self.settings.clock));
-        self.check(overdue, &sample, port);
         self.check_legs(&sample, port);
-        let omega = self.track(&sample, port);
-        self.check(
-            protection::check_measurements(&sample.measured, omega, &self.machine.tables().ratings),
-            &sample,
-            port,
-        );
-        if sample.enable {
-            self.check(
-                protection::check_undervoltage(sample.measured.udc_v, &self.machine.tables().ratings),
-                &sample,
-                port,
-            );
-        }
-        self.check(protection::check_demand(&sample.demand), &sample, port);
+        let overdue = applied.as_ref().and_then(|applied| applied.overdue(now, &self.settings.clock));
+        let (omega, lost) = self.track(sample.measured.angle);
+        let violation =
+            self.armed(overdue).or_else(|| self.armed(lost)).or_else(|| self.judge(&sample, omega));
+        self.check(violation, &sample, port);
         let pulsing = self.trip.is_none() && sample.enable && self.controller.speed_is_known();
-        let mut report = Report {
-            frequency_hz: omega / core::f32::consts::TAU,
-            udc_v: sample.measured.udc_v,
-            current_a: sample.measured.currents_a.peak(),
-            speed_known: self.controller.speed_is_known(),
-            acknowledged: self.acknowledged,
-            ..Report::default()
-        };
-        let mut command = VoltageCommand {
-            reference: Reference {
-                voltage_v: 0.0,
-                vector: AlphaBeta::default(),
-                carrier_angle: sample.measured.angle,
-                rate: self.settings.clock.angle_rate(omega),
-                at: now,
-                udc_v: sample.measured.udc_v,
-                depth: 0.0,
-            },
-            valid_from: self.now,
-            gates: Gates::Off,
-            revises: false,
-            acknowledge: sample.acknowledge,
-        };
-        if pulsing {
+        let driven = if pulsing {
             let frozen = self.watch.check(
                 &sample.measured,
                 omega,
@@ -146,34 +129,63 @@ impl<M: Machine> ControlTask<M> {
                 &self.machine.tables().ratings,
             );
             self.check(frozen, &sample, port);
-            self.pulse(&sample, applied.as_ref(), omega, &mut command, &mut report);
+            self.pulse(&sample, applied.as_ref(), omega, now)
         } else {
-            self.controller.idle();
-            self.watch = FrozenWatch::new();
-            self.boundary = None;
-            self.steady_v = 0.0;
-            self.glide.forget_side();
-        }
-        let finite = command.reference.voltage_v.is_finite() && command.reference.rate.is_finite();
-        self.check(
-            (!finite).then_some((Fault::NotFinite, command.reference.voltage_v, f32::MAX)),
-            &sample,
-            port,
-        );
+            self.rest(sample.measured.angle)
+        };
+        let rate = self.settings.clock.angle_rate(omega);
+        // Not finite if either is not.
+        let finite = (driven.voltage_v + rate).is_finite();
+        self.check((!finite).then_some((Fault::NotFinite, driven.voltage_v, f32::MAX)), &sample, port);
         let late = port.overrun_ticks(now);
         let late_s = self.settings.clock.seconds(late as i32);
         self.check((late > 0).then_some((Fault::ControlDeadline, late_s, 0.0)), &sample, port);
-        if self.trip.is_some() {
-            command.gates = Gates::Off;
-        }
-        self.revises = command.revises && command.gates == Gates::Pulse;
-        shared.command.publish(command);
-        report.trip = self.trip;
+        let gates = if pulsing && self.trip.is_none() { Gates::Pulse } else { Gates::Off };
+        self.revises = driven.revises && gates == Gates::Pulse;
+        shared.command.publish(VoltageCommand {
+            reference: Reference {
+                voltage_v: driven.voltage_v,
+                vector: driven.vector,
+                carrier_angle: driven.carrier_angle,
+                rate,
+                at: now,
+                udc_v: sample.measured.udc_v,
+                depth: driven.depth,
+            },
+            valid_from: self.now,
+            gates,
+            revises: driven.revises,
+            acknowledge: sample.acknowledge,
+        });
+        let report = Report {
+            torque_nm: driven.torque_nm,
+            id_a: driven.current.d,
+            iq_a: driven.current.q,
+            voltage_v: driven.voltage_v,
+            frequency_hz: omega / core::f32::consts::TAU,
+            map_error: driven.map_error,
+            trip: self.trip,
+            udc_v: sample.measured.udc_v,
+            current_a: sample.measured.currents_a.peak(),
+            speed_known: self.controller.speed_is_known(),
+            acknowledged: self.acknowledged,
+            mode: driven.mode,
+        };
         if let Some(recorder) = shared.recorder {
             let mode = applied.as_ref().map_or(Mode::Off, |applied| applied.mode);
-            recorder.record(self.entry(now, &sample, &report, mode, command.gates), self.trip.is_some());
+            recorder.record(self.entry(now, &sample, &report, mode, gates), self.trip.is_some());
         }
         port.report(now, &report);
+    }
+
+    /// No pulses: the control law begins anew.
+    fn rest(&mut self, angle: Angle) -> Driven {
+        self.controller.idle();
+        self.watch = FrozenWatch::new();
+        self.boundary = None;
+        self.steady_v = 0.0;
+        self.glide.forget_side();
+        Driven { carrier_angle: angle, ..Driven::default() }
     }
 
     /// The period's entry in the flight recorder.
@@ -207,44 +219,51 @@ impl<M: Machine> ControlTask<M> {
     }
 
     /// Follows the angle; returns the electrical speed, in rad/s. An angle that cannot be leaves the speed as it was.
-    fn track(&mut self, sample: &Sample, port: &mut impl ControlPort) -> f32 {
+    fn track(&mut self, angle: Angle) -> (f32, Option<Violation>) {
         let clock = self.settings.clock;
         if self.controller.speed_is_known() {
-            let surprise_rad = self.controller.surprise_rad(sample.measured.angle, &clock);
-            let lost = protection::check_angle(surprise_rad);
-            if lost.is_some() && !self.disarmed.has(Fault::AngleLost) {
-                self.check(lost, sample, port);
-                return self.controller.omega();
+            let lost = protection::check_angle(self.controller.surprise_rad(angle, &clock));
+            if self.armed(lost).is_some() {
+                return (self.controller.omega(), lost);
             }
         }
-        self.controller.track(sample.measured.angle, &clock)
+        (self.controller.track(angle, &clock), None)
+    }
+
+    /// What is wrong with a sample by itself.
+    fn judge(&self, sample: &Sample, omega: f32) -> Option<Violation> {
+        let (measured, ratings) = (&sample.measured, &self.machine.tables().ratings);
+        let empty =
+            || if sample.enable { protection::check_undervoltage(measured.udc_v, ratings) } else { None };
+        self.armed(protection::check_measurements(measured, omega, ratings))
+            .or_else(|| self.armed(empty()))
+            .or_else(|| protection::check_demand(&sample.demand))
+    }
+
+    /// Nothing where the check that found it is switched off.
+    fn armed(&self, violation: Option<Violation>) -> Option<Violation> {
+        violation.filter(|(fault, _, _)| !self.disarmed.has(*fault))
     }
 
     /// Control law and its surroundings, while pulses are made.
-    fn pulse(
-        &mut self,
-        sample: &Sample,
-        applied: Option<&Applied>,
-        omega: f32,
-        command: &mut VoltageCommand,
-        report: &mut Report,
-    ) {
-        let now = command.reference.at;
-        command.revises = applied.is_some_and(|applied| self.is_to_revise(applied, now, &sample.demand));
+    #[inline(always)]
+    fn pulse(&mut self, sample: &Sample, applied: Option<&Applied>, omega: f32, now: Instant) -> Driven {
+        let revises = applied.is_some_and(|applied| self.is_to_revise(applied, now, &sample.demand));
         let udc_v = sample.measured.udc_v;
         let steady = Steady { omega, udc_v, voltage_v: self.steady_v, depth: self.depth };
+        let decided = applied.map_or(Mode::Off, Applied::decided);
         let committed = match applied {
             Some(applied) => {
-                applied.committed(now, &steady, &mut self.glide, &self.settings, command.revises)
+                applied.committed(now, &steady, &mut self.glide, &self.settings, decided, revises)
             }
             None => nothing_committed(&self.settings),
         };
         let boundary = self.new_boundary(applied, now, udc_v);
-        let decided = applied.map_or(Mode::Off, Applied::decided);
         let settled = self.glide.is_settled(decided, boundary.is_some());
         let committed = Committed { settled, ..committed };
         let ratings = &self.machine.tables().ratings;
-        let demand = self.glide.one_sided(&sample.demand, omega, udc_v, ratings);
+        let torque_nm = self.glide.one_sided(sample.demand.torque_nm, omega, udc_v, ratings);
+        let demand = Demand { torque_nm, ..sample.demand };
         let input = Input {
             measured: &sample.measured,
             demand: &demand,
@@ -257,17 +276,17 @@ impl<M: Machine> ControlTask<M> {
         self.steady_v = output.voltage.steady_v;
         self.depth = output.voltage.depth;
         self.glide.drove(output.torque_nm);
-        command.reference.voltage_v = output.voltage.voltage_v;
-        command.reference.vector = output.voltage.vector;
-        command.reference.carrier_angle = output.voltage.carrier.angle();
-        command.reference.depth = output.voltage.depth;
-        command.gates = Gates::Pulse;
-        report.torque_nm = output.torque_nm;
-        report.id_a = output.point.current.d;
-        report.iq_a = output.point.current.q;
-        report.voltage_v = output.voltage.voltage_v;
-        report.map_error = output.map_error;
-        report.mode = decided;
+        Driven {
+            voltage_v: output.voltage.voltage_v,
+            vector: output.voltage.vector,
+            carrier_angle: output.voltage.carrier.angle(),
+            depth: output.voltage.depth,
+            torque_nm: output.torque_nm,
+            current: output.point.current,
+            map_error: output.map_error,
+            mode: decided,
+            revises,
+        }
     }
 
     /// The newest boundary, once.

@@ -1,6 +1,6 @@
 //! Voltage and torque after square wave.
 
-use crate::control::{Demand, six_step_v};
+use crate::control::six_step_v;
 use crate::machine::Ratings;
 use crate::modulation::Mode;
 
@@ -17,7 +17,8 @@ const ONE_SIDED_SHARE: f32 = 0.001;
 pub(super) struct Glide {
     /// Fundamental to which the voltage has glided after square wave, as a share of six-step; 0 otherwise.
     filled_to: f32,
-    /// The last torque that was not zero, in N·m: its sign is the side of the flux circle on which the machine is.
+    /// The last torque, in N·m, none as the least positive one; 0 before the first. Its sign is the side of the flux circle on which the
+    /// machine is: no torque lies with the positive ones there.
     side_nm: f32,
     /// Mode that the newest command was made for, and the halves for which its flux hexagon still changes its size.
     unsettled: (Mode, u32),
@@ -35,9 +36,7 @@ impl Glide {
 
     /// Remembers the side of a torque, in N·m.
     pub(super) fn drove(&mut self, torque_nm: f32) {
-        if torque_nm != 0.0 {
-            self.side_nm = torque_nm;
-        }
+        self.side_nm = if torque_nm == 0.0 { f32::MIN_POSITIVE } else { torque_nm };
     }
 
     /// The largest fundamental as a share of six-step, and whether it is to be used whatever the torque needs: in square wave, and
@@ -55,19 +54,21 @@ impl Glide {
         (if self.filled_to < largest { self.filled_to } else { largest }, true)
     }
 
-    /// The demand, which keeps its sign for as long as the voltage forces much more flux upon the machine than its magnets have: near
+    /// The torque demanded, in N·m, which keeps its sign for as long as the voltage forces much more flux upon the machine than its magnets have: near
     /// no torque the two signs then lie far apart on the circle of flux linkage, and the way between them goes past currents
     /// beyond the largest. The voltage is on its way down meanwhile, so this lasts tens of milliseconds.
-    pub(super) fn one_sided(&self, demand: &Demand, omega: f32, udc_v: f32, ratings: &Ratings) -> Demand {
-        let forced_v = self.filled_to * six_step_v(udc_v);
-        let forces = forced_v > ONE_SIDED_FLUX * omega.abs() * ratings.magnet_flux_wb;
+    pub(super) fn one_sided(&self, torque_nm: f32, omega: f32, udc_v: f32, ratings: &Ratings) -> f32 {
         let least_nm = ONE_SIDED_SHARE * ratings.max_torque_nm;
-        let (side, along_nm) =
-            if self.side_nm < 0.0 { (-1.0, -demand.torque_nm) } else { (1.0, demand.torque_nm) };
-        if forces && self.side_nm != 0.0 && along_nm < least_nm {
-            return Demand { torque_nm: side * least_nm, ..*demand };
+        let (least_nm, ends) = if self.side_nm < 0.0 {
+            (-least_nm, torque_nm > -least_nm)
+        } else {
+            (least_nm, torque_nm < least_nm && self.side_nm > 0.0)
+        };
+        let forced_v = self.filled_to * six_step_v(udc_v);
+        if ends && forced_v > ONE_SIDED_FLUX * omega.abs() * ratings.magnet_flux_wb {
+            return least_nm;
         }
-        *demand
+        torque_nm
     }
 
     /// Whether two sectors have passed since the square wave gave way to a pattern or the other way round: so long the flux

@@ -73,29 +73,27 @@ impl<M: Machine> PwmTask<M> {
         self.check(&currents_a, &command, port, shared);
         let begins = now.after(self.newest.half.period_ticks);
         let pulsing = self.trip.is_none();
-        let half = match &command {
+        // Field by field: the half goes where it stays.
+        self.newest.half = match &command {
             Some(command) if command.gates == Gates::Pulse && pulsing => {
                 self.modulator.step(begins, Some(&command.reference))
             }
             resting => self.modulator.rest(begins, resting.as_ref().map(|command| &command.reference)),
         };
-        let mirrored = self.modulator.is_mirrored();
-        self.newest = Committal {
-            at: now,
-            currents_a,
-            begins,
-            half,
-            mirrored,
-            tripped: !pulsing,
-            acknowledged: self.acknowledged,
-        };
+        self.newest.at = now;
+        self.newest.currents_a = currents_a;
+        self.newest.begins = begins;
+        self.newest.mirrored = self.modulator.is_mirrored();
+        self.newest.tripped = !pulsing;
+        self.newest.acknowledged = self.acknowledged;
         self.play(port);
         self.check_late(port, shared);
         shared.applied.publish(self.newest.to_words());
     }
 
-    /// The PWM interrupt when it is no boundary that it comes for, but control's [`ControlTask::wants_revision`](super::ControlTask::wants_revision): makes the next half
-    /// anew from the newest command, if its boundary is still ahead.
+    /// The PWM interrupt when it is no boundary that it comes for, but control's
+    /// [`ControlTask::wants_revision`](super::ControlTask::wants_revision): makes the next half anew from the newest command, if
+    /// its boundary is still ahead.
     pub fn revise(&mut self, port: &mut impl PwmPort, shared: &Shared) {
         let Committal { at, begins, half, tripped, .. } = self.newest;
         // A command from before the last boundary was for the half that runs by now.

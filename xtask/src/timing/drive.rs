@@ -10,7 +10,7 @@ use std::time::Duration;
 use anyhow::{Context, Result, bail};
 
 use super::log::{ARGUMENTS, event};
-use super::meter::{Call, Meter};
+use super::meter::{Call, Meter, Path as Executed};
 use super::tally::Tally;
 use crate::elf::Image;
 use crate::process;
@@ -28,12 +28,16 @@ pub struct Bench {
     pub scenario: &'static str,
     pub path: PathBuf,
     pub image: Image,
+    /// Whether what each interrupt executed is wanted.
+    pub keeps_paths: bool,
 }
 
 /// What one drive gave.
 #[derive(Debug, Default)]
 pub struct Drive {
     pub calls: Vec<Call>,
+    /// What each of them executed; empty unless it was wanted.
+    pub paths: Vec<Executed>,
     pub hits: Tally,
     pub behind: Tally,
     pub stack_bytes: i32,
@@ -86,6 +90,7 @@ impl Bench {
         let link = self.image.functions.iter();
         let link = link.filter(|(_, function)| is_link(&function.names)).map(|(start, _)| *start).collect();
         let mut meter = Meter::new(&self.image, &link);
+        meter.keeps_paths = self.keeps_paths;
         let mut log = BufReader::with_capacity(1 << 20, Unhurried(log));
         let (mut line, mut outcome) = (Vec::new(), Ok(()));
         while log.read_until(b'\n', &mut line)? > 0 {
@@ -98,8 +103,8 @@ impl Bench {
             line.clear();
         }
         outcome?;
-        let Meter { calls, hits, behind, stack_bytes, longest, .. } = meter;
-        Ok(Drive { calls, hits, behind, stack_bytes, longest, modes: Vec::new() })
+        let Meter { calls, paths, hits, behind, stack_bytes, longest, .. } = meter;
+        Ok(Drive { calls, paths, hits, behind, stack_bytes, longest, modes: Vec::new() })
     }
 }
 

@@ -25,6 +25,14 @@ pub struct Call {
     pub depth: usize,
 }
 
+/// What one interrupt executed, in its order, without the link.
+#[derive(Clone, Debug, Default)]
+pub struct Path {
+    pub addresses: Vec<u32>,
+    /// How many of them before the link was first called.
+    pub linked: usize,
+}
+
 /// Follows the log.
 pub struct Meter<'a> {
     image: &'a Image,
@@ -37,6 +45,10 @@ pub struct Meter<'a> {
     known: HashMap<u32, Instruction>,
     /// Every interrupt that has returned, in the order of their returns.
     pub calls: Vec<Call>,
+    /// Whether what each of them executed is kept.
+    pub keeps_paths: bool,
+    /// What each of them executed, if it is kept.
+    pub paths: Vec<Path>,
     /// How often each address was executed.
     pub hits: Tally,
     /// What was executed behind each call, by its return address.
@@ -68,6 +80,8 @@ struct Handler {
     next: Option<u32>,
     /// What was executed.
     addresses: Vec<u32>,
+    /// How much of it before the link was first called.
+    linked: Option<usize>,
 }
 
 impl<'a> Meter<'a> {
@@ -81,6 +95,8 @@ impl<'a> Meter<'a> {
             announced: None,
             known: HashMap::new(),
             calls: Vec::new(),
+            keeps_paths: false,
+            paths: Vec::new(),
             hits: Tally::default(),
             behind: Tally::default(),
             stack_bytes: 0,
@@ -119,6 +135,7 @@ impl<'a> Meter<'a> {
             resumes: None,
             next: None,
             addresses: Vec::new(),
+            linked: None,
         });
         let depth = self.active.len();
         for handler in &mut self.active {
@@ -130,6 +147,10 @@ impl<'a> Meter<'a> {
         match self.active.pop() {
             Some(handler) if handler.call.exception == exception => {
                 self.calls.push(handler.call);
+                if self.keeps_paths {
+                    let linked = handler.linked.unwrap_or(handler.addresses.len());
+                    self.paths.push(Path { addresses: handler.addresses.clone(), linked });
+                }
                 let longest = self.longest.entry(exception).or_default();
                 if handler.addresses.len() > longest.len() {
                     *longest = handler.addresses;
@@ -175,6 +196,7 @@ impl<'a> Meter<'a> {
         let Flow::To(target) = instruction.flow else { return };
         let back = address + instruction.length;
         if self.link.contains(&target) {
+            handler.linked = handler.linked.or(Some(handler.addresses.len()));
             // There and back. Without a link the caller's caller is where it goes on, or nobody.
             let callers = handler.within.last().map_or(u32::MAX, |(back, _)| *back);
             handler.resumes = Some(if instruction.links { back } else { callers });

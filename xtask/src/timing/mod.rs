@@ -12,14 +12,14 @@
 mod blocks;
 mod budget;
 mod cost;
-mod drive;
+pub mod drive;
 mod kept;
 mod log;
-mod meter;
+pub mod meter;
 mod parts;
 mod profile;
 mod report;
-mod statistics;
+pub mod statistics;
 mod system;
 mod table;
 mod tally;

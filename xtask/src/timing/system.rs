@@ -91,6 +91,7 @@ impl System {
             scenario: self.scenario,
             image: image.clone(),
             path: path.clone(),
+            keeps_paths: false,
         };
         let mut sum = Sum::default();
         match self.build {

@@ -188,8 +188,9 @@ them is a thing that the drive would have to give up:
 
 What is left is without detours: the tables are constants of the image that the compiler knows, directions come from a table with
 one turn to the very angle, half-way angles are turned instead of computed anew, a point's flux is looked up once, records are read
-where they lie, and where a mode needs no ripple none is made. The longest control interrupt is one at the current limit in field
-weakening in which the mode changes: there the point on the voltage limit is found twice.
+where they lie, where a mode leads no ripple none is made, and what changes at a carrier's boundary alone is computed there. The
+longest control interrupt is one at the current limit in field weakening in which the mode changes: there the flux that the voltage
+allows is found twice, the second time for the torque that is left.
 
 In the ZS9 the same law runs twice, once a motor, beside the link's control.
 ";

@@ -1,9 +1,9 @@
 //! The accesses of the low-priority side, which the PWM interrupt lands in, each a function of its own: `cargo xtask test` finds them
 //! by this module and wants every executed instruction of theirs hit. Sizes are those of the drives' cells.
 
-use crate::broken::{Eager, Plain};
+use crate::broken::{Eager, Plain, Unfrozen};
 use crate::message::Message;
-use tractive::cell::{Downlink, SEEN, Trail, Uplink, Words};
+use tractive::cell::{Downlink, Ring, SEEN, Trail, Uplink, Words};
 
 pub static DOWNLINK_10: Downlink<Message<10>, 10> = Downlink::new();
 pub static UPLINK_4: Uplink<Message<4>, 4> = Uplink::new();
@@ -14,6 +14,12 @@ pub static TRAIL_REVISED: Trail<13> = Trail::new();
 pub static EMPTY_13: Trail<13> = Trail::new();
 pub static EMPTY_4: Uplink<Message<4>, 4> = Uplink::new();
 pub static EMPTY_10: Uplink<Message<10>, 10> = Uplink::new();
+/// Between the idle loop's operator and control.
+pub static DOWNLINK_7: Downlink<Message<7>, 7> = Downlink::new();
+pub static UPLINK_12: Uplink<Message<12>, 12> = Uplink::new();
+/// A flight recorder of eight records; in the image it is filled by control and read by the idle loop.
+pub static RING: Ring<Message<10>, 10, 8> = Ring::new();
+pub static UNFROZEN: Unfrozen<10, 8> = Unfrozen::new();
 pub static PLAIN_DOWN: Plain<10> = Plain::new();
 pub static PLAIN_UP: Plain<13> = Plain::new();
 pub static EAGER: Eager<10> = Eager::new();
@@ -21,6 +27,27 @@ pub static EAGER: Eager<10> = Eager::new();
 #[inline(never)]
 pub fn downlink_10_publish(message: &Message<10>) {
     DOWNLINK_10.publish(*message);
+}
+
+#[inline(never)]
+pub fn downlink_7_publish(message: &Message<7>) {
+    DOWNLINK_7.publish(*message);
+}
+
+#[inline(never)]
+pub fn uplink_12_read() -> Option<Message<12>> {
+    UPLINK_12.read()
+}
+
+/// The newest record.
+#[inline(never)]
+pub fn ring_read() -> Option<Message<10>> {
+    RING.read(7)
+}
+
+#[inline(never)]
+pub fn unfrozen_read() -> Option<Message<10>> {
+    UNFROZEN.read(7)
 }
 
 #[inline(never)]

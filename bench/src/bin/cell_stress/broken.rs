@@ -28,6 +28,39 @@ impl<const N: usize> Plain<N> {
     }
 }
 
+/// A ring that is read while it is written.
+pub struct Unfrozen<const N: usize, const R: usize> {
+    slots: [[AtomicU32; N]; R],
+    written: AtomicU32,
+}
+
+impl<const N: usize, const R: usize> Unfrozen<N, R> {
+    pub const fn new() -> Self {
+        Self { slots: [const { [const { AtomicU32::new(0) }; N] }; R], written: AtomicU32::new(0) }
+    }
+
+    pub fn record(&self, value: Message<N>) {
+        let written = self.written.load(Ordering::Relaxed);
+        if let Some(slot) = self.slots.get(written as usize % R) {
+            for (cell, word) in slot.iter().zip(value.to_words()) {
+                cell.store(word, Ordering::Relaxed);
+            }
+        }
+        self.written.store(written.wrapping_add(1), Ordering::Release);
+    }
+
+    /// The value number `index`, 0 the oldest.
+    pub fn read(&self, index: usize) -> Option<Message<N>> {
+        let written = self.written.load(Ordering::Acquire) as usize;
+        let slot = self.slots.get((written + index) % R)?;
+        let mut words = [0; N];
+        for (word, cell) in words.iter_mut().zip(slot) {
+            *word = cell.load(Ordering::Relaxed);
+        }
+        (written >= R).then(|| Message::from_words(words))
+    }
+}
+
 /// A double buffer that names the slot before it is filled: what was in it is read once more, or half of it.
 pub struct Eager<const N: usize> {
     slots: [[AtomicU32; N]; 2],

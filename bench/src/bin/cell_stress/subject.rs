@@ -31,7 +31,10 @@ impl Subject {
     }
 }
 
-pub static SUBJECTS: [Subject; 11] = [
+/// Records that a ring holds: one from the fault on freezes it.
+const RING_RECORDS: u32 = 8;
+
+pub static SUBJECTS: [Subject; 15] = [
     Subject::new(
         "downlink-10",
         |c| c.publish(downlink_10_publish),
@@ -51,6 +54,26 @@ pub static SUBJECTS: [Subject; 11] = [
         |c| c.publish(|m| UPLINK_10.publish(*m)),
     ),
     Subject::new(
+        "downlink-7",
+        |c| c.publish(downlink_7_publish),
+        |c| {
+            c.read(|| DOWNLINK_7.newest(|_| true));
+            c.read_before(|not| DOWNLINK_7.newest(|message| message.word::<0>() != not));
+        },
+    ),
+    Subject::new("uplink-12", |c| c.read(uplink_12_read), |c| c.publish(|m| UPLINK_12.publish(*m))),
+    // Released and frozen again under the reader's hands: then it gets nothing.
+    Subject::new(
+        "ring-10",
+        |c| c.read(ring_read),
+        |c| {
+            c.publish(|m| {
+                RING.release();
+                (1..=RING_RECORDS).for_each(|number| RING.record(*m, number == RING_RECORDS));
+            });
+        },
+    ),
+    Subject::new(
         "trail-13",
         |c| c.read_trail(|| trail_13_read(&TRAIL_13)),
         |c| c.publish(|m| TRAIL_13.publish(m.to_words())),
@@ -68,6 +91,11 @@ pub static SUBJECTS: [Subject; 11] = [
     Subject::new("trail-13-empty", |c| c.read_empty(trail_13_read(&EMPTY_13).is_some()), |_| ()),
     Subject::new("broken-plain-down", |c| c.publish(plain_publish), |c| c.read(|| Some(PLAIN_DOWN.read()))),
     Subject::new("broken-plain-up", |c| c.read(plain_read), |c| c.publish(|m| PLAIN_UP.publish(*m))),
+    Subject::new(
+        "broken-ring",
+        |c| c.read(unfrozen_read),
+        |c| c.publish(|m| (0..RING_RECORDS).for_each(|_| UNFROZEN.record(*m))),
+    ),
     Subject::new("broken-eager-down", |c| c.publish(eager_publish), |c| c.read(|| EAGER.read())),
 ];
 

@@ -3,6 +3,9 @@
 //! With `x = i1 + i2 − i_demand`, the source gives x while x > 0. While x < 0 the bridge cannot get what its gates ask for:
 //! its own diodes conduct from rail to rail and short the link, which feeds the inductors from the capacitors until
 //! x = 0. There the link's voltage is what holds x, between 0 and its voltage under the source.
+//!
+//! Under a source of both directions the link can only fall to nothing: where `v1 + v2` would fall below the source, the diodes of
+//! the bridge conduct from rail to rail until the inductors raise it again.
 
 use super::bridge::Bridge;
 use super::step::{Feed, Trial};
@@ -10,6 +13,8 @@ use super::{Source, Zs9Plant};
 
 /// Excess that counts as none, in A.
 const NONE_A: f64 = 1e-6;
+/// Link voltage that counts as none, in V.
+const NONE_V: f64 = 1e-6;
 /// Longest step while neither source nor diodes conduct, in s: the voltage that holds is followed so closely.
 const LONGEST_BLOCKED_S: f64 = 5e-6;
 /// Shortest step, in s, so that time goes on where conduction changes at once.
@@ -23,10 +28,12 @@ impl Zs9Plant {
         if *bridge == Bridge::Short {
             return self.step_with(bridge, Feed::Short, longest_s);
         }
-        match self.source {
-            Source::Bidirectional => self.step_with(bridge, Feed::Source, longest_s),
-            Source::Diode => self.step_to_change(bridge, longest_s),
-        }
+        let feed = match self.source {
+            Source::Bidirectional if self.link_v() > NONE_V || self.rising_a(bridge) > 0.0 => Feed::Source,
+            Source::Bidirectional => Feed::Clamped,
+            Source::Diode => self.feed(bridge),
+        };
+        self.step_to_change(bridge, feed, longest_s)
     }
 
     fn step_with(&mut self, bridge: &Bridge, feed: Feed, dt_s: f64) -> f64 {
@@ -35,8 +42,7 @@ impl Zs9Plant {
         dt_s
     }
 
-    fn step_to_change(&mut self, bridge: &Bridge, longest_s: f64) -> f64 {
-        let feed = self.feed(bridge);
+    fn step_to_change(&mut self, bridge: &Bridge, feed: Feed, longest_s: f64) -> f64 {
         let longest_s = if feed == Feed::Blocked { longest_s.min(LONGEST_BLOCKED_S) } else { longest_s };
         let trial = self.try_step(bridge, feed, longest_s);
         if self.holds(bridge, feed, &trial) {
@@ -72,6 +78,8 @@ impl Zs9Plant {
     /// Whether the same still conducts after a step.
     fn holds(&self, bridge: &Bridge, feed: Feed, trial: &Trial) -> bool {
         match feed {
+            Feed::Source if self.source == Source::Bidirectional => self.link_after_v(trial) >= -NONE_V,
+            Feed::Clamped => self.rising_after(bridge, trial) <= NONE_A,
             Feed::Source => self.excess_after(bridge, trial) >= -0.5 * NONE_A,
             Feed::Short => self.excess_after(bridge, trial) <= 0.5 * NONE_A,
             Feed::Blocked => true,

@@ -11,7 +11,7 @@
 //! `u = U_in s`; so what leaves the network enters the motors, also while the diodes of a bridge without gates decide on s.
 //! In shoot-through the source is apart, and `U_in = 0`.
 //!
-//! Valid while `v1 + v2 > U_dc`: a network charged to less than half the source would be charged through the bridge's diodes.
+//! Where the network would be charged to less than half the source, the bridge's diodes hold `U_in` at 0.
 
 mod bridge;
 mod diode;
@@ -33,6 +33,9 @@ use bridge::Bridge;
 use core::f64::consts::TAU;
 use means::Adder;
 use tractive_tablegen::{MachineFolder, SmoothMap};
+
+/// Link voltage for which steps are short enough at least, in V.
+const LEAST_LINK_V: f64 = 50.0;
 
 /// What connects the source with the network.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -230,6 +233,7 @@ impl Zs9Plant {
     fn open_step_s(&self) -> f64 {
         let [upper, lower] = self.motors.each_ref().map(Motor::currents_abc);
         let near = upper.iter().zip(&lower).map(|(u, l)| u.abs().min(l.abs()).min((u + l).abs()));
-        self.clamp.step_near_s(self.link_v().abs(), near.fold(f64::INFINITY, f64::min))
+        // A link that is shorted by the diodes may rise within the step.
+        self.clamp.step_near_s(self.link_v().max(LEAST_LINK_V), near.fold(f64::INFINITY, f64::min))
     }
 }

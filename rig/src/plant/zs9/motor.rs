@@ -79,6 +79,12 @@ impl Motor {
         self.energies
     }
 
+    /// Largest current of the motor if it is short-circuited now, or once its current is gone, in A.
+    pub fn short_circuit_peak_a(&self) -> f64 {
+        let peak_a = |id_a, iq_a| self.stator.peak_on_flux_circle_a(id_a, iq_a);
+        peak_a(self.id_a, self.iq_a).max(peak_a(0.0, 0.0))
+    }
+
     /// Energy of the field, in J.
     pub fn field_j(&self) -> f64 {
         self.stator.field_j(self.id_a, self.iq_a)

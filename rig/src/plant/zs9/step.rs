@@ -16,6 +16,9 @@ pub enum Feed {
     Short,
     /// Nothing, while the bridge takes all of the inductors' current: u_s is what keeps `i1 + i2 = i_in`.
     Blocked,
+    /// The source, while the bridge's diodes keep the link from turning round: `U_in = 0`, so `v1 + v2 = U_dc` stays as it is, and
+    /// the bridge takes half of the inductors' current.
+    Clamped,
 }
 
 /// id and iq of the upper motor, of the lower one; i1, i2; v1, v2.
@@ -119,6 +122,23 @@ impl Zs9Plant {
         y[4] + y[5] - self.demand(y, &self.shares(y, &trial.end, bridge))
     }
 
+    /// How far half of the inductors' current is above what the bridge's gates ask for, in A: the link rises; below zero it falls.
+    pub(super) fn rising_a(&self, bridge: &Bridge) -> f64 {
+        let y = self.state();
+        0.5 * (y[4] + y[5]) - self.demand(&y, &self.shares(&y, &self.still(bridge), bridge))
+    }
+
+    /// That after a step.
+    pub(super) fn rising_after(&self, bridge: &Bridge, trial: &Trial) -> f64 {
+        let y = &trial.state;
+        0.5 * (y[4] + y[5]) - self.demand(y, &self.shares(y, &trial.end, bridge))
+    }
+
+    /// `U_in` after a step that the source fed, in V.
+    pub(super) fn link_after_v(&self, trial: &Trial) -> f64 {
+        trial.state[6] + trial.state[7] - self.source_v
+    }
+
     /// The link voltage at which that excess stays as it is, in V, as a share of the link's voltage under the source.
     pub(super) fn holding_share(&self, bridge: &Bridge) -> f64 {
         let y = self.state();
@@ -143,6 +163,7 @@ impl Zs9Plant {
             Feed::Source => (self.source_v, self.demand(y, &shares)),
             Feed::Short => (capacitors_v, inductors_a),
             Feed::Blocked => (self.holding_feed_v(y, frames, &shares), inductors_a),
+            Feed::Clamped => (self.source_v, 0.5 * inductors_a),
         };
         let link_v = capacitors_v - feed_v;
         let [upper, lower] = [0, 1].map(|k| self.motor_slopes(k, y, frames, &shares, link_v));

@@ -98,9 +98,14 @@ pub struct Tasks {
 impl Tasks {
     /// Before their first interrupts.
     pub fn new(tables: &'static Tables, settings: Settings) -> Self {
+        Self::beginning_at(Instant(0), tables, settings)
+    }
+
+    /// The same for timers that start at another instant.
+    pub fn beginning_at(origin: Instant, tables: &'static Tables, settings: Settings) -> Self {
         Self {
-            control: ControlTask::new(tables, settings),
-            pwm: PwmTask::new(tables, settings),
+            control: ControlTask::new(tables, settings).beginning_at(origin),
+            pwm: PwmTask::new(tables, settings).beginning_at(origin),
             shared: Shared::new(),
         }
     }

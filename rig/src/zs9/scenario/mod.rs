@@ -6,6 +6,8 @@ mod reverse;
 mod steady;
 mod timing;
 
+pub use load_step::INERTIA_KG_M2;
+
 use super::bench::{Bench, BenchSettings};
 use super::operator::Operator;
 use super::trace::Recording;

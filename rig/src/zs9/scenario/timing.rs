@@ -13,10 +13,10 @@ use tractive::board::MotorDemand;
 /// Full torque by the speed loops at prescribed speeds: motoring at low and at high speed, then braking from there.
 pub struct Timing;
 
-/// The motors turn opposite ways: time in s, r/min.
-const PROFILE: [(f64, f64); 4] = [(0.0, 300.0), (0.02, 300.0), (0.04, 1450.0), (0.08, 1450.0)];
-const BRAKES_FROM_S: f64 = 0.06;
-const DURATION_S: f64 = 0.08;
+/// The motors turn opposite ways: time in s, r/min. A quicker ramp would count as a lost angle.
+const PROFILE: [(f64, f64); 4] = [(0.0, 700.0), (0.01, 700.0), (0.11, 1450.0), (0.14, 1450.0)];
+const BRAKES_FROM_S: f64 = 0.125;
+const DURATION_S: f64 = 0.14;
 const LEAD_S: f64 = 0.03;
 /// A speed out of reach, in r/min: the loop asks for all the torque there is.
 const FAR_RPM: f64 = 20_000.0;

@@ -1,7 +1,7 @@
 //! The same for the ZS9.
 
 use super::{CONTROL_ANSWERS, PWM_ANSWERS, open_files, receive, send};
-use crate::board::qemu::stop;
+use crate::board::qemu::{saboteur, stop};
 use crate::board::{DualSample, PlayedPeriod, PowerSample};
 use crate::drive::dual::DualReport;
 use crate::link::{self, DualRequest, DualSetup};
@@ -21,8 +21,10 @@ pub fn sample_dual(now: Instant) -> DualSample {
     send(&DualRequest::ControlSample(now).to_block());
     let (sample, end) = link::dual_sample_from_block(&receive(CONTROL_ANSWERS));
     if end {
+        saboteur::finish();
         stop(true);
     }
+    saboteur::sampled();
     sample
 }
 
@@ -30,7 +32,7 @@ pub fn sample_dual(now: Instant) -> DualSample {
 #[inline(never)]
 pub fn power_sample(now: Instant) -> PowerSample {
     send(&DualRequest::PowerSample(now).to_block());
-    link::power_from_block(&receive(PWM_ANSWERS))
+    link::power_from_block(&saboteur::completed(receive(PWM_ANSWERS)))
 }
 
 /// What was loaded into the shadow registers.
@@ -48,6 +50,7 @@ pub fn report_dual(now: Instant, report: &DualReport) {
 /// An order to turn all gates off.
 #[inline(never)]
 pub fn gates_off(now: Instant) {
+    saboteur::gates_off();
     send(&DualRequest::GatesOff(now).to_block());
 }
 

@@ -1,10 +1,11 @@
-//! Hard but healthy driving, at random: what must not trip.
+//! Random rides of the PMaSynRM drive.
 
-use super::traction::{Drive, Ridden, Ride};
-use crate::bench::Flaws;
+use super::{Driven, flaws, named};
+use crate::campaign::traction::{Drive, Ridden, Ride};
 use anyhow::Result;
 use rand::rngs::StdRng;
 use rand::{Rng, SeedableRng};
+use tractive::modulation::Mode;
 
 /// Steepest change of speed, in r/min per s: what the machine does to its own rotor.
 const STEEPEST_RPM_S: f64 = 3_000.0;
@@ -54,16 +55,27 @@ pub fn ride(drive: &Drive, duration_s: f64, seed: u64, blocks: bool) -> Ride {
     ride
 }
 
-/// Sensors as they are: 12 bits, half an ampere of noise.
-pub fn flaws(drive: &Drive, seed: u64) -> Flaws {
-    let adc_full_scale_a = 1.25 * drive.machine().folder.parameters.trip_current_a;
-    Flaws { adc_bits: Some(12), adc_full_scale_a, noise_a: 0.5, seed, ..Flaws::default() }
-}
+/// Noise of the current sensors, in A rms.
+const NOISE_A: f64 = 0.5;
 
 /// Drives it; the trip in the end is what must not be.
 ///
 /// # Errors
 /// A drive that breaks the bench's rules.
 pub fn drive(drive: &Drive, duration_s: f64, seed: u64, blocks: bool) -> Result<Ridden> {
-    drive.ride(ride(drive, duration_s, seed, blocks), flaws(drive, seed))
+    let trip_current_a = drive.machine().folder.parameters.trip_current_a;
+    drive.ride(ride(drive, duration_s, seed, blocks), flaws(trip_current_a, NOISE_A, seed))
+}
+
+impl From<Ridden> for Driven {
+    fn from(ridden: Ridden) -> Self {
+        let tripped = ridden.trip.map(|trip| {
+            let at = ridden.rows.iter().find(|row| row.trip.is_some());
+            let (at_s, rpm) = at.map_or((f64::NAN, f64::NAN), |row| (row.t_s, row.speed_rpm));
+            let before = ridden.rows.iter().rev().find(|row| row.trip.is_none() && row.mode != Mode::Off);
+            let mode = before.map_or("", |row| row.mode.name());
+            format!("{} at {at_s:.3} s, {rpm:.0} r/min, {mode}", named(trip))
+        });
+        Self { peaks: ridden.observed.until, tripped }
+    }
 }

@@ -1,0 +1,117 @@
+//! Random rides of the ZS9.
+
+use super::{Driven, flaws, named};
+use crate::campaign::dual::{Drive, Ridden, Ride, Script};
+use crate::zs9::bench::Course;
+use anyhow::Result;
+use rand::rngs::StdRng;
+use rand::{Rng, SeedableRng};
+use tractive::nine_switch::Scheme;
+use tractive_tablegen::Parameters;
+
+/// Highest speed, in r/min: the cycle's cruise.
+const MOST_RPM: f64 = 1_300.0;
+/// Steepest change of speed where the torque is wanted, in r/min per s.
+const STEEPEST_RPM_S: f64 = 3_000.0;
+/// Steepest change of a speed that is wanted, in r/min per s: half of what full torque does to the rotor.
+const WANTED_RPM_S: f64 = 5_000.0;
+/// Largest load, in N·m: half of what is there at the highest speed.
+const LOAD_NM: f64 = 45.0;
+/// Range of the source, in V: a tenth to either side; and its largest jump.
+const SOURCE_V: (f64, f64) = (320.0, 460.0);
+const SOURCE_JUMP_V: f64 = 80.0;
+/// Noise of the current sensors, in A rms.
+const NOISE_A: f64 = 0.2;
+
+/// A random ride: each motor follows torques that jump or are slewed from one sign to the other at a speed that goes up and down, or
+/// follows a speed with a load that jumps; the source jumps and the scheme changes.
+pub fn ride(drive: &Drive, duration_s: f64, seed: u64) -> Ride {
+    let parameters = &drive.machine().folder.parameters;
+    let mut random = StdRng::seed_from_u64(seed);
+    let motors = [0, 1].map(|_| {
+        if random.random_bool(0.5) {
+            by_torque(&mut random, parameters, duration_s)
+        } else {
+            by_speed(&mut random, duration_s)
+        }
+    });
+    let mut course = Course::default();
+    let mut t_s = 0.0;
+    let mut source_v: f64 = 400.0;
+    while t_s < duration_s {
+        t_s += random.random_range(0.1..1.5);
+        let (least, most) = SOURCE_V;
+        source_v =
+            random.random_range((source_v - SOURCE_JUMP_V).max(least)..(source_v + SOURCE_JUMP_V).min(most));
+        course.source_v.push((t_s, source_v));
+    }
+    t_s = 0.0;
+    while t_s < duration_s {
+        t_s += random.random_range(0.3..3.0);
+        course.schemes.push((t_s, Scheme::ALL[random.random_range(0..Scheme::ALL.len())]));
+    }
+    Ride { motors, course, duration_s }
+}
+
+/// Corners of a speed that goes up and down.
+fn corners(random: &mut StdRng, steepest_rpm_s: f64, duration_s: f64) -> Vec<(f64, f64)> {
+    let (mut t_s, mut rpm) = (0.0, 0.0);
+    let mut corners = vec![(t_s, rpm)];
+    while t_s < duration_s {
+        let next_rpm: f64 = random.random_range(-MOST_RPM..MOST_RPM);
+        t_s += (next_rpm - rpm).abs() / (random.random_range(0.1..1.0) * steepest_rpm_s);
+        rpm = next_rpm;
+        corners.push((t_s, rpm));
+        t_s += random.random_range(0.0..1.0);
+        corners.push((t_s, rpm));
+    }
+    corners
+}
+
+fn by_torque(random: &mut StdRng, parameters: &Parameters, duration_s: f64) -> Script {
+    let speed_rpm = corners(random, STEEPEST_RPM_S, duration_s);
+    let mut torque_nm = Vec::new();
+    let mut t_s = 0.0;
+    while t_s < duration_s {
+        let share: f64 = if random.random_bool(0.2) { 0.0 } else { random.random_range(-1.0..1.0) };
+        torque_nm.push((t_s, (share * parameters.max_torque_nm, random.random_bool(0.5))));
+        t_s += random.random_range(0.02..0.8);
+    }
+    Script::Torque { speed_rpm, torque_nm }
+}
+
+fn by_speed(random: &mut StdRng, duration_s: f64) -> Script {
+    let wanted_rpm = corners(random, WANTED_RPM_S, duration_s);
+    let mut load_nm = Vec::new();
+    let mut t_s = 0.0;
+    while t_s < duration_s {
+        load_nm.push((t_s, random.random_range(-LOAD_NM..LOAD_NM)));
+        t_s += random.random_range(0.05..1.0);
+    }
+    Script::Speed { wanted_rpm, load_nm }
+}
+
+/// Step of the trace, in s.
+const STEP_S: f64 = 1e-3;
+
+/// Drives it; the trip in the end is what must not be.
+///
+/// # Errors
+/// A drive that breaks the bench's rules.
+pub fn drive(drive: &Drive, duration_s: f64, seed: u64) -> Result<Ridden> {
+    let trip_current_a = drive.machine().folder.parameters.trip_current_a;
+    drive.ride(ride(drive, duration_s, seed), flaws(trip_current_a, NOISE_A, seed), STEP_S, 0)
+}
+
+impl From<Ridden> for Driven {
+    fn from(ridden: Ridden) -> Self {
+        let tripped = ridden.trip.map(|trip| {
+            let last = ridden.rows.last();
+            let [upper, lower] =
+                last.map_or([f64::NAN; 2], |row| row.motors.each_ref().map(|motor| motor.speed_rpm));
+            let scheme = last.map_or("", |row| row.scheme.name());
+            format!("{} at {:.3} s, {upper:.0} and {lower:.0} r/min, {scheme}", named(trip), ridden.ended_s)
+        });
+        Self { peaks: ridden.observed.until, tripped }
+    }
+}
