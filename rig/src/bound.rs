@@ -6,11 +6,12 @@
 //! reach with these pulses.
 
 use crate::analysis;
-use crate::distortion::{Distortion, Samples};
+use crate::distortion::{self, Distortion, Samples};
 use crate::machine::Machine;
 use crate::options::RunOptions;
 use crate::pattern::{self, Wanted};
 use crate::trace::Recording;
+use crate::verdict::{Verdict, bound};
 use core::f64::consts::TAU;
 use serde::Serialize;
 use tractive::modulation::Mode;
@@ -19,6 +20,8 @@ use tractive_tablegen::SmoothMap;
 /// A measured distortion beside its bound.
 #[derive(Clone, Debug, Serialize)]
 pub struct Beside {
+    /// Mechanical speed, in r/min.
+    pub speed_rpm: f64,
     /// Mode.
     pub mode: &'static str,
     /// Current distortion, in percent.
@@ -43,18 +46,19 @@ pub struct Beside {
 
 /// The bound of the operating point that a window of a recording holds.
 pub fn beside(
-    measured: &Distortion,
     recording: &Recording,
     window: (f64, f64),
     options: &RunOptions,
     machine: &Machine,
 ) -> Option<Beside> {
     let rows = analysis::window(recording, window.0, window.1);
-    let mode = rows.last()?.mode;
+    let last = rows.last()?;
+    let measured = distortion::of_recording(recording, window, &machine.folder);
     let bound = Distortion::of(&ideal(rows, options, machine)?);
     let excess = |value: f64, bound: f64| (value / bound - 1.0) * 100.0;
     Some(Beside {
-        mode: mode.name(),
+        speed_rpm: last.speed_rpm,
+        mode: last.mode.name(),
         thd_percent: measured.thd_percent,
         thd_bound_percent: bound.thd_percent,
         thd_excess_percent: excess(measured.thd_percent, bound.thd_percent),
@@ -75,8 +79,26 @@ const fn cycles(mode: Mode) -> u32 {
     if matches!(mode, Mode::Async) { 20 } else { 1 }
 }
 
+/// What is wanted of distortion and torque ripple: of an ideal inverter, no more than a little over the bound.
+pub fn verdicts(points: &[Beside], options: &RunOptions) -> [Verdict; 3] {
+    let most = |value: fn(&Beside) -> f64| points.iter().map(value).fold(f64::NEG_INFINITY, f64::max);
+    let judged = |what: &str, value: fn(&Beside) -> f64, at_most: f64, others: &'static str| {
+        Verdict::at_most(what, most(value), bound(options, at_most, f64::INFINITY), others)
+    };
+    [
+        judged("current THD over its bound in %", |point| point.thd_excess_percent, 2.0, "–"),
+        judged("rms torque ripple over its bound in %", |point| point.ripple_rms_excess_percent, 2.0, "1"),
+        judged(
+            "peak-to-peak torque over its bound in %",
+            |point| point.ripple_peak_to_peak_excess_percent,
+            8.0,
+            "8",
+        ),
+    ]
+}
+
 /// The ideal samples at the operating point of these rows.
-fn ideal(rows: &[crate::trace::Row], options: &RunOptions, machine: &Machine) -> Option<Samples> {
+pub fn ideal(rows: &[crate::trace::Row], options: &RunOptions, machine: &Machine) -> Option<Samples> {
     let last = rows.last()?;
     let parameters = &machine.folder.parameters;
     let map = SmoothMap::new(&machine.folder.map);

@@ -43,20 +43,36 @@ pub struct Harmonic {
 /// Orders that are reported.
 const ORDERS: [u32; 10] = [5, 7, 8, 10, 11, 13, 14, 16, 17, 19];
 
+impl Samples {
+    /// Amplitude of the current's fundamental in A, and the current without it. The fundamental is fitted by least squares: whole
+    /// turns are seldom a whole number of samples, and what a mere projection leaves of it then would count as distortion.
+    pub fn without_fundamental(&self) -> (f64, Vec<f64>) {
+        let terms = || self.angle.iter().map(|angle| angle.sin_cos()).zip(&self.current_a);
+        let (mut ss, mut sc, mut cc, mut s, mut c) = (0.0, 0.0, 0.0, 0.0, 0.0);
+        for ((sin, cos), current) in terms() {
+            (ss, sc, cc) = (ss + sin * sin, sc + sin * cos, cc + cos * cos);
+            (s, c) = (s + sin * current, c + cos * current);
+        }
+        let determinant = ss * cc - sc * sc;
+        let (a, b) = ((s * cc - c * sc) / determinant, (c * ss - s * sc) / determinant);
+        (a.hypot(b), terms().map(|((sin, cos), current)| current - a * sin - b * cos).collect())
+    }
+}
+
 impl Distortion {
     /// Analyses samples.
     pub fn of(samples: &Samples) -> Self {
         let count = samples.current_a.len().max(1) as f64;
+        let (fundamental_a, rest) = samples.without_fundamental();
         let amplitude = |order: u32| {
-            let terms = samples.angle.iter().zip(&samples.current_a);
+            let terms = samples.angle.iter().zip(&rest);
             let (cos, sin) = terms.fold((0.0, 0.0), |(cos, sin), (angle, current)| {
                 let phase = f64::from(order) * angle;
                 (cos + current * phase.cos(), sin + current * phase.sin())
             });
             2.0 * cos.hypot(sin) / count
         };
-        let fundamental_a = amplitude(1);
-        let mean_square = samples.current_a.iter().map(|current| current * current).sum::<f64>() / count;
+        let rest_square = rest.iter().map(|current| current * current).sum::<f64>() / count;
         let fundamental_square = 0.5 * fundamental_a * fundamental_a;
         let mean_torque = samples.torque_nm.iter().sum::<f64>() / count;
         let torque_square =
@@ -65,7 +81,7 @@ impl Distortion {
         let high = samples.torque_nm.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         Self {
             fundamental_a,
-            thd_percent: ((mean_square - fundamental_square).max(0.0) / fundamental_square).sqrt() * 100.0,
+            thd_percent: (rest_square / fundamental_square).sqrt() * 100.0,
             torque_rms_nm: (torque_square / count).sqrt(),
             torque_peak_to_peak_nm: high - low,
             shares: ORDERS.iter().map(|order| (*order, 100.0 * amplitude(*order) / fundamental_a)).collect(),
@@ -92,13 +108,18 @@ pub fn of_recording(
     (from_s, to_s): (f64, f64),
     machine: &MachineFolder,
 ) -> Distortion {
+    Distortion::of(&samples(recording, (from_s, to_s), machine))
+}
+
+/// Samples of a window of a recording at constant speed, shortened to whole turns of the stator field.
+pub fn samples(recording: &Recording, (from_s, to_s): (f64, f64), machine: &MachineFolder) -> Samples {
     let speed_rpm = analysis::window(recording, from_s, to_s).last().map_or(0.0, |row| row.speed_rpm);
     let f1_hz = (speed_rpm * f64::from(machine.parameters.pole_pairs) / 60.0).abs().max(1e-3);
     let turns = ((to_s - from_s) * f1_hz).floor().max(1.0);
     let rows = analysis::window(recording, to_s - turns / f1_hz, to_s);
-    Distortion::of(&Samples {
+    Samples {
         angle: rows.iter().map(|row| TAU * f1_hz * row.t_s).collect(),
         current_a: rows.iter().map(|row| row.ia_a).collect(),
         torque_nm: rows.iter().map(|row| row.te_nm).collect(),
-    })
+    }
 }

@@ -1,16 +1,23 @@
 //! The paper's figures of the machine and of the modes, drawn from our own tables and pulses.
 
+use crate::analysis::SteadyPoint;
 use crate::machine::Machine;
 use crate::pattern::{self, Wanted};
 use crate::report::Page;
+use crate::scenario::characteristic;
+use crate::trace::Recording;
+use crate::verdict::worst;
 use tractive::control::{VoltageLimit, mtpa, operating_point};
 use tractive::modulation::Mode;
 use tractive_tablegen::SmoothMap;
 
-type Series = Vec<(String, Vec<(f64, f64)>)>;
+type Series = Vec<(String, Curve)>;
 
-/// Figures 1, 3, 4, 6 and 7 beside ours.
-pub fn draw(page: &mut Page, machine: &Machine) {
+/// Figures 1, 3, 4, 6, 7 and 10 beside ours.
+pub fn draw(page: &mut Page, recording: &Recording, machine: &Machine) {
+    for (title, unit, curve) in accuracy(recording, machine) {
+        page.draw_xy("figure 10", title, ("speed in r/min", unit), &[(title.to_owned(), curve)]);
+    }
     page.draw_xy(
         "figure 1",
         "currents of MTPA and of full power in weakening",
@@ -33,7 +40,7 @@ pub fn draw(page: &mut Page, machine: &Machine) {
         "figure 6",
         "the modes: pulses per fundamental period over frequency, going up at full torque",
         ("stator frequency in Hz", "turn-ons per period"),
-        &strategy(),
+        &strategy(recording, machine),
     );
     for (mode, f1_hz, share) in [(Mode::Mid7, 90.0, 0.7), (Mode::Mid3, 120.0, 0.9)] {
         let title =
@@ -45,6 +52,23 @@ pub fn draw(page: &mut Page, machine: &Machine) {
             &legs(machine, mode, f1_hz, share),
         );
     }
+}
+
+type Curve = Vec<(f64, f64)>;
+
+/// Torque over its demand, efficiency and current of the characteristic points, over speed: full torque, then full power.
+fn accuracy(recording: &Recording, machine: &Machine) -> [(&'static str, &'static str, Curve); 3] {
+    let points = characteristic::points(recording, machine);
+    let rated_nm = machine.folder.parameters.rated_torque_nm;
+    let curve = |value: fn(&SteadyPoint) -> f64| {
+        let along = points.iter().filter(|point| point.demand_nm > rated_nm);
+        along.map(|point| (point.speed_rpm, value(point))).collect()
+    };
+    [
+        ("torque accuracy", "100 % less the error", curve(|point| 100.0 - point.torque_error_percent.abs())),
+        ("efficiency", "%", curve(|point| point.efficiency_percent)),
+        ("phase current", "A rms", curve(|point| point.current_rms_a)),
+    ]
 }
 
 /// MTPA over torque, and full power over speed.
@@ -97,21 +121,36 @@ fn inductances(machine: &Machine, d_axis: bool) -> Series {
         .collect()
 }
 
-/// Turn-ons a period of each mode in its range at full torque; the asynchronous carrier's fall with frequency.
-fn strategy() -> Series {
-    let ranges = [
-        (Mode::Sync15, 40.0, 59.5, 15.0),
-        (Mode::Sync12, 59.5, 74.5, 12.0),
-        (Mode::Mid7, 74.5, 116.0, 7.0),
-        (Mode::Mid3, 116.0, 126.0, 3.0),
-        (Mode::Square, 126.0, 200.0, 1.0),
-    ];
-    let free = (10..=40).map(|hz| (f64::from(hz), 900.0 / f64::from(hz)));
-    let mut series = vec![("async".to_owned(), free.collect())];
-    series.extend(
-        ranges.map(|(mode, from, to, pulses)| (mode.name().to_owned(), vec![(from, pulses), (to, pulses)])),
-    );
+/// Turn-ons a period of each mode over the frequencies at which the drive used it at full torque.
+fn strategy(recording: &Recording, machine: &Machine) -> Series {
+    let full_nm = worst(recording.rows.iter().map(|row| row.te_ref_nm));
+    let full = recording.rows.iter().filter(|row| row.te_ref_nm > 0.999 * full_nm && row.f1_hz > 0.0);
+    let mut series = Series::new();
+    for row in full {
+        let turn_ons = match row.mode {
+            Mode::Off => continue,
+            Mode::Async => f64::from(machine.tables.ratings.max_switching_hz) / row.f1_hz,
+            Mode::Sync15 => 15.0,
+            Mode::Sync12 => 12.0,
+            Mode::Mid7 => 7.0,
+            Mode::Mid3 => 3.0,
+            Mode::Square => 1.0,
+        };
+        let name = row.mode.name();
+        match series.iter_mut().find(|(known, _)| known == name) {
+            Some((_, points)) => points.push((row.f1_hz, turn_ons)),
+            None => series.push((name.to_owned(), vec![(row.f1_hz, turn_ons)])),
+        }
+    }
+    series.iter_mut().for_each(|(_, points)| thin(points));
     series
+}
+
+/// Every so-manieth point, and the last.
+fn thin(points: &mut Vec<(f64, f64)>) {
+    const KEPT: usize = 200;
+    let (every, last) = (points.len().div_ceil(KEPT).max(1), points.len() - 1);
+    *points = (0..points.len()).filter(|k| k % every == 0 || *k == last).map(|k| points[k]).collect();
 }
 
 /// The three legs over a period, one above the other.

@@ -24,6 +24,7 @@ pub mod report;
 pub mod run;
 pub mod scenario;
 pub mod sensor_faults;
+pub mod spectrum;
 mod steps;
 pub mod talk;
 pub mod trace;

@@ -20,6 +20,13 @@ impl Machine {
         let tables = Box::leak(Box::new(keep(Generated::new(&folder)?)));
         Ok(Self { folder, tables })
     }
+
+    /// Largest torque at a mechanical speed in r/min, in N·m: the machine's largest, or what its largest power leaves.
+    pub fn envelope_nm(&self, speed_rpm: f64) -> f64 {
+        let parameters = &self.folder.parameters;
+        let omega = speed_rpm.abs() * core::f64::consts::TAU / 60.0;
+        (parameters.max_power_w / omega.max(1e-3)).min(parameters.max_torque_nm)
+    }
 }
 
 fn find(name_or_path: &str) -> Result<PathBuf> {

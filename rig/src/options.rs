@@ -1,7 +1,8 @@
 //! Options that all runs share.
 
 use crate::bench::Flaws;
-use crate::run::Emulator;
+use crate::machine::Machine;
+use crate::run::{CLOCK, Emulator};
 use crate::zs9::inject::Injection;
 use clap::{Args, ValueEnum};
 use serde::Serialize;
@@ -88,7 +89,7 @@ pub struct RunOptions {
     /// A folder of tables/, or the path of any machine folder; default pmasynrm-180kw, of the ZS9's scenarios ipm-zs9.
     #[arg(long)]
     pub machine: Option<String>,
-    /// Step of trace.csv, in s; default 50e-6, of the ZS9's scenarios one carrier period, of zs9-cycle 1e-3.
+    /// Step of trace.csv, in s; default 50e-6, of steady 5e-6, of the ZS9's scenarios one carrier period, of zs9-cycle 1e-3.
     #[arg(long, value_parser = positive)]
     pub dt: Option<f64>,
     /// Seed of the noise.
@@ -162,7 +163,7 @@ pub struct RunOptions {
     /// sweep, timing: share of the full torque.
     #[arg(long, default_value_t = 1.0, value_parser = finite, allow_negative_numbers = true)]
     pub torque_scale: f64,
-    /// steady, mode-borders, reversal: speed, in r/min.
+    /// full-step, steady, mode-borders, reversal: speed, in r/min.
     #[arg(long, value_parser = finite, allow_negative_numbers = true)]
     pub speed: Option<f64>,
     /// steady: torque, in N·m.
@@ -234,6 +235,38 @@ impl RunOptions {
     pub fn is_ideal(&self) -> bool {
         let flaws = [self.dead_time_us, self.noise_a, self.map_error, self.rs_error, self.angle_error];
         flaws.iter().all(|flaw| *flaw == 0.0) && self.adc_bits.is_none() && self.udc_ripple.is_none()
+    }
+
+    /// Whether a run with these options and this machine makes sense, and ends.
+    ///
+    /// # Errors
+    /// The first option that is out of its range, by name.
+    pub fn check(&self, machine: &Machine) -> anyhow::Result<()> {
+        let parameters = &machine.folder.parameters;
+        let (fastest_rpm, most_nm) = (3.0 * parameters.max_speed_rpm, 10.0 * parameters.max_torque_nm);
+        let udc_v = self.udc.unwrap_or(parameters.dc_link_nominal_v);
+        let ripple = self.udc_ripple.unwrap_or(Ripple { amplitude_v: 0.0, frequency_hz: 1.0 });
+        let ranges = [
+            ("--dt", self.dt_s(), f64::from(CLOCK.ticks_per_s).recip(), 0.1),
+            ("--udc", udc_v, 0.0, 10.0 * parameters.dc_link_max_v),
+            ("--noise-a", self.noise_a, 0.0, 10.0 * parameters.trip_current_a),
+            ("--udc-ripple", ripple.amplitude_v, 0.0, udc_v),
+            ("--udc-ripple", ripple.frequency_hz, 0.0, 1e5),
+            ("--map-error", self.map_error, -90.0, 900.0),
+            ("--rs-error", self.rs_error, -100.0, 1e4),
+            ("--angle-error", self.angle_error, -360.0, 360.0),
+            ("--torque-scale", self.torque_scale, -10.0, 10.0),
+            ("--speed", self.speed.unwrap_or(0.0), -fastest_rpm, fastest_rpm),
+            ("--torque", self.torque.unwrap_or(0.0), -most_nm, most_nm),
+            ("--to", self.to, -fastest_rpm, fastest_rpm),
+        ];
+        for (name, value, low, high) in ranges {
+            anyhow::ensure!(
+                (low..=high).contains(&value),
+                "{name} {value}: must be from {low} to {high} for this machine"
+            );
+        }
+        Ok(())
     }
 
     /// The emulator with the image that was handed over.

@@ -34,6 +34,12 @@ pub struct Wanted {
 /// An upper device that changes: time in s, leg 0 ..= 2, on.
 pub type LegEdge = (f64, usize, bool);
 
+/// Longest pattern, in s.
+const LONGEST_S: f64 = 100.0;
+
+/// Highest stator frequency, in Hz: far beyond what any mode is for.
+const HIGHEST_HZ: f64 = 1_000.0;
+
 /// The upper devices' changes over whole fundamental periods, and at their beginning their levels.
 pub fn edges(wanted: &Wanted) -> Result<Vec<LegEdge>> {
     let tick_s = f64::from(CLOCK.ticks_per_s).recip();
@@ -41,6 +47,17 @@ pub fn edges(wanted: &Wanted) -> Result<Vec<LegEdge>> {
     let devices =
         Devices::new(ticks(wanted.min_pulse_us), ticks(wanted.dead_time_us), wanted.max_switching_hz, &CLOCK);
     let rate = (wanted.f1_hz * tick_s * 4_294_967_296.0) as f32;
+    let length_s = f64::from(wanted.cycles) / wanted.f1_hz;
+    if wanted.cycles == 0 || length_s > LONGEST_S {
+        bail!(
+            "--cycles {}: must be from 1 to {:.0} at this frequency",
+            wanted.cycles,
+            LONGEST_S * wanted.f1_hz
+        );
+    }
+    if wanted.f1_hz > HIGHEST_HZ {
+        bail!("--f1 {}: must be at most {HIGHEST_HZ}", wanted.f1_hz);
+    }
     let six_step_v = wanted.udc_v * core::f64::consts::FRAC_2_PI;
     let most = f64::from(depth_limit(wanted.mode, rate, &devices)) * six_step_v;
     if wanted.mode != Mode::Square && wanted.voltage_v > most * 1.000_001 {

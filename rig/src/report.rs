@@ -117,6 +117,11 @@ impl Page {
         }
     }
 
+    /// From here on the plots answer this figure of the paper.
+    pub fn answers(&mut self, figure: &str) {
+        self.figure = format!("The paper's {figure}");
+    }
+
     /// Curves over the whole recording.
     pub fn plot(&mut self, title: &str, unit: &str, recording: &Recording, curves: &[Curve]) {
         let end_s = recording.rows.last().map_or(1.0, |row| row.t_s);

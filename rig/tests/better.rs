@@ -40,7 +40,7 @@ fn keeps_its_bounds(line: &str) {
     assert!(!verdicts.is_empty(), "{line}");
     for verdict in verdicts {
         println!("{line}: {}: {} of {}", verdict["what"], verdict["found"], verdict["at_most"]);
-        assert_eq!(verdict["verdict"], "pass", "{line}: {verdict}");
+        assert_ne!(verdict["verdict"], "falls short", "{line}: {verdict}");
     }
 }
 
@@ -83,13 +83,7 @@ fn power_is_reversed_released_and_applied_again() {
 
 #[test]
 fn a_coasting_machine_is_caught_at_any_speed_in_the_mode_that_it_needs() {
-    let figures = run("restart");
-    for catch in list(&figures, "catches") {
-        println!("{catch}");
-        assert_eq!(catch["first_mode"], catch["then_mode"]);
-        let coasting = number(catch, "coasting_current_a");
-        assert!(number(catch, "catching_current_a") < (1.02 * coasting).max(235.0), "{catch}");
-    }
+    keeps_its_bounds("restart");
 }
 
 #[test]
@@ -139,7 +133,12 @@ fn flaws_leave_the_switches_without_shock_and_torque_in_its_bounds() {
         keeps_its_bounds(&format!("sweep --down {flaws}"));
     }
     keeps_its_bounds(&format!("sweep --down --brake --to 2300 {ALL}"));
-    keeps_its_bounds(&format!("characteristic {ALL}"));
+    for scenario in ["characteristic", "load-steps", "sweep --to 6000", "sweep --down --torque-scale 0.5"] {
+        keeps_its_bounds(&format!("{scenario} {ALL}"));
+    }
+    for scenario in ["mode-borders --speed 1895", "reversal", "reversal --speed 6000", "restart"] {
+        keeps_its_bounds(&format!("{scenario} {ALL}"));
+    }
 }
 
 #[test]
@@ -162,7 +161,7 @@ fn the_link_may_be_anywhere_and_may_step() {
     for udc in [1000, 1200, 1800] {
         run(&format!("sweep --down --to 3000 --udc {udc}"));
     }
-    run("link-steps");
+    keeps_its_bounds("link-steps");
 }
 
 #[test]

@@ -36,6 +36,16 @@ fn bad_usage_is_refused() {
     refused("run sweep --dt nan", &["nan"]);
     refused("run sweep --noise-a inf", &["inf"]);
     refused("run sweep --adc-bits 99", &["99"]);
+    refused_in_one_line("run sweep --to 1e9", &["--to 1000000000", "-18000 to 18000"]);
+    refused_in_one_line("run sweep --dt 1e-9", &["--dt", "0.00000004 to 0.1"]);
+    refused_in_one_line("run sweep --udc 1e9", &["--udc", "must be from"]);
+    refused_in_one_line("run steady --speed 1e12", &["--speed", "must be from"]);
+    refused_in_one_line("run sweep --map-error -100", &["--map-error -100", "-90"]);
+    for (bad, word) in
+        [("--f1 100 --cycles 0", "--cycles 0"), ("--f1 1e-9", "--cycles 1"), ("--f1 1e5", "--f1 100000")]
+    {
+        refused_in_one_line(&format!("pattern --mode mid7 --u 1 --udc 2 {bad} --out x"), &[word, "must be"]);
+    }
     refused("pattern --mode mid9 --u 1 --udc 2 --f1 3 --out x", &["mid9"]);
 }
 
@@ -101,6 +111,16 @@ fn a_run_leaves_whole_files_with_the_columns_promised() {
     assert!(page.contains("igure 9") && !page.contains("http://www.example") && !page.contains("src="));
     let others = std::fs::read_dir(&out).unwrap().count();
     assert_eq!(others, 5, "no temporary file is left");
+}
+
+#[test]
+fn a_bound_that_is_not_kept_is_exit_code_1() {
+    let folder = tempfile::tempdir().unwrap();
+    // The link's voltage allows no such step in 2.5 ms.
+    let output = rig(&format!("run full-step --udc 1000 --out {}", folder.path().display()));
+    assert_eq!(output.status.code(), Some(1));
+    assert!(String::from_utf8_lossy(&output.stdout).contains("falls short"));
+    assert!(folder.path().join("report.html").exists(), "the report says what");
 }
 
 #[test]

@@ -1,13 +1,14 @@
 //! Torque accuracy, efficiency and current at the characteristic points: the paper's figure 10.
 
 use super::{LEAD_S, Plan, Scenario};
-use crate::analysis::{self, Figures};
+use crate::analysis::{self, Figures, SteadyPoint};
+use crate::bound;
 use crate::machine::Machine;
 use crate::mtpa_methods;
 use crate::options::RunOptions;
 use crate::report::Page;
 use crate::trace::Recording;
-use crate::verdict::{Verdict, bound, worst};
+use crate::verdict::{Verdict, torque_bound, worst};
 use tractive::control::Demand;
 
 /// The points one after another in one run: ramp, settle, measure.
@@ -50,6 +51,15 @@ fn slots() -> Vec<Slot> {
         .collect()
 }
 
+/// What was measured at each point.
+pub fn points(recording: &Recording, machine: &Machine) -> Vec<SteadyPoint> {
+    let point = |slot: Slot| {
+        let window = (slot.ends_s - MEASURE_S, slot.ends_s);
+        analysis::steady_point(recording, window, slot.torque_nm, &machine.folder)
+    };
+    slots().into_iter().map(point).collect()
+}
+
 impl Scenario for Characteristic {
     fn name(&self) -> &'static str {
         "characteristic"
@@ -74,25 +84,31 @@ impl Scenario for Characteristic {
     }
 
     fn figures(&self, recording: &Recording, options: &RunOptions, machine: &Machine) -> Figures {
-        let points = slots().into_iter().map(|slot| {
+        let points = points(recording, machine);
+        let beside = slots().into_iter().map(|slot| {
             let window = (slot.ends_s - MEASURE_S, slot.ends_s);
-            analysis::steady_point(recording, window, slot.torque_nm, &machine.folder)
+            bound::beside(recording, window, options, machine)
         });
-        let points: Vec<_> = points.collect();
+        let beside: Vec<_> = beside.flatten().collect();
         let mut figures = analysis::common(recording);
         let error = worst(points.iter().map(|point| point.torque_error_percent.abs()));
-        figures.set(
-            "verdicts",
-            vec![Verdict::at_most(
-                "mean torque error in %",
-                error,
-                bound(options, 0.3, 1.5),
-                "0.4; the paper 5",
-            )],
-        );
+        let others = "0.4; the paper 5";
+        let most = torque_bound(options, 0.3, 1.5);
+        let mut verdicts = vec![Verdict::at_most("mean torque error in %", error, most, others)];
+        verdicts.extend(bound::verdicts(&beside, options));
+        figures.set("verdicts", verdicts);
         figures.set("points", points);
+        figures.set("distortion", beside);
         figures.set("mtpa_methods", mtpa_methods::compare(machine));
         figures
+    }
+
+    fn spectra(&self, _recording: &Recording) -> Vec<(String, (f64, f64))> {
+        let window = |slot: &Slot| (slot.ends_s - MEASURE_S, slot.ends_s);
+        slots()
+            .iter()
+            .map(|slot| (format!("{} r/min, {} N·m", slot.speed_rpm, slot.torque_nm), window(slot)))
+            .collect()
     }
 
     fn plots(&self, recording: &Recording, page: &mut Page) {

@@ -25,23 +25,28 @@ impl Scenario for FullStep {
     }
 
     fn plan(&self, options: &RunOptions, machine: &Machine) -> Plan {
+        let speed_rpm = options.speed.unwrap_or(SPEED_RPM);
         Script {
-            speed: vec![(0.0, options.speed.unwrap_or(SPEED_RPM))],
-            torque: vec![(BEGIN_S, machine.folder.parameters.max_torque_nm), (BEGIN_S + HOLD_S, 0.0)],
+            speed: vec![(0.0, speed_rpm)],
+            torque: vec![(BEGIN_S, machine.envelope_nm(speed_rpm)), (BEGIN_S + HOLD_S, 0.0)],
             duration_s: BEGIN_S + 2.0 * HOLD_S,
             ..Script::default()
         }
         .plan()
     }
 
-    fn figures(&self, recording: &Recording, _options: &RunOptions, machine: &Machine) -> Figures {
-        let most = machine.folder.parameters.max_torque_nm;
+    fn figures(&self, recording: &Recording, options: &RunOptions, machine: &Machine) -> Figures {
+        let most = machine.envelope_nm(options.speed.unwrap_or(SPEED_RPM));
         let steps = [(BEGIN_S, 0.0, most), (BEGIN_S + HOLD_S, most, 0.0)].map(|(at_s, from_nm, to_nm)| {
             let step = analysis::Step { at_s, from_nm, to_nm, until_s: at_s + HOLD_S };
             analysis::step_response(recording, &step)
         });
         let mut figures = analysis::common(recording);
-        figures.set("verdicts", verdicts(&steps));
+        // Where pulses are few the demand has a slew limit: there is no step to judge.
+        let carrier = recording.rows.iter().all(|row| row.mode.is_carrier());
+        if carrier {
+            figures.set("verdicts", verdicts(&steps, options));
+        }
         figures.set("steps", steps);
         figures
     }

@@ -6,7 +6,8 @@ use crate::analysis::{self, Figures};
 use crate::machine::Machine;
 use crate::options::RunOptions;
 use crate::report::Page;
-use crate::trace::Recording;
+use crate::trace::{Recording, Row};
+use crate::verdict::{Verdict, worst};
 
 /// At several speeds: the link falls by 200 V, comes back, rises by 200 V, comes back.
 pub struct LinkSteps;
@@ -50,11 +51,29 @@ impl Scenario for LinkSteps {
         script.plan()
     }
 
-    fn figures(&self, recording: &Recording, _options: &RunOptions, _machine: &Machine) -> Figures {
+    fn figures(&self, recording: &Recording, _options: &RunOptions, machine: &Machine) -> Figures {
         let mut figures = analysis::common(recording);
         let steps = (0..SPEEDS_RPM.len())
             .flat_map(|slot| (0..SHARES.len()).map(move |k| begins_s(slot) + SETTLE_S + k as f64 * HOLD_S));
         let steps: Vec<_> = steps.map(|at| analysis::transition(recording, at, at + HOLD_S)).collect();
+        let trip_a = machine.folder.parameters.trip_current_a;
+        figures.set(
+            "verdicts",
+            vec![
+                Verdict::at_most(
+                    "peak current over the trip level",
+                    worst(recording.rows.iter().map(Row::peak_current_a)) / trip_a,
+                    1.0,
+                    "–",
+                ),
+                Verdict::at_most(
+                    "peak current over the larger steady peak",
+                    worst(steps.iter().map(|step| step.peak_ratio)),
+                    f64::INFINITY,
+                    "–",
+                ),
+            ],
+        );
         figures.set("transitions", steps);
         figures
     }

@@ -1,7 +1,7 @@
 //! What is driven, and what is to be seen.
 
 mod acknowledge;
-mod characteristic;
+pub mod characteristic;
 mod chopper;
 mod full_step;
 mod line;
@@ -65,6 +65,14 @@ pub trait Scenario {
     }
     /// The figures to report.
     fn figures(&self, recording: &Recording, options: &RunOptions, machine: &Machine) -> Figures;
+    /// Step of the trace unless the options say another, in s.
+    fn trace_step_s(&self) -> f64 {
+        50e-6
+    }
+    /// The steady states whose spectrum is to be drawn beside its bound: a title, and from when to when, in s.
+    fn spectra(&self, _recording: &Recording) -> Vec<(String, (f64, f64))> {
+        Vec::new()
+    }
     /// The plots to draw.
     fn plots(&self, recording: &Recording, page: &mut Page);
 }
@@ -100,8 +108,15 @@ pub fn find(name: &str) -> Result<Box<dyn Scenario>> {
         .with_context(|| format!("scenario {name}: must be one of {}", names.join(", ")))
 }
 
+/// The options with the step of the trace that the scenario takes where none was given.
+pub fn with_step(scenario: &dyn Scenario, options: &RunOptions) -> RunOptions {
+    RunOptions { dt: Some(options.dt.unwrap_or_else(|| scenario.trace_step_s())), ..options.clone() }
+}
+
 /// Drives a scenario.
 pub fn drive(scenario: &dyn Scenario, options: &RunOptions, machine: &Machine) -> Result<Recording> {
+    let options = &with_step(scenario, options);
+    options.check(machine)?;
     let plan = scenario.plan(options, machine);
     let line = scenario.line(options, machine);
     let speed = plan.speed.iter().map(|(t_s, rpm)| (t_s + plan.lead_s, *rpm)).collect();

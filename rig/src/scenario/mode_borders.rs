@@ -12,7 +12,8 @@ use crate::trace::Recording;
 pub struct ModeBorders;
 
 const SPEED_RPM: f64 = 1860.0;
-const LEVELS: usize = 200;
+const LEVELS: usize = 800;
+/// So slow that the envelopes beside a switch, 100 ms away, are those of its torque within a percent.
 const LEVEL_S: f64 = 0.01;
 /// At the envelope, in s.
 const HOLD_S: f64 = 0.6;

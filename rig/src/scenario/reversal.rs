@@ -7,7 +7,7 @@ use crate::machine::Machine;
 use crate::options::RunOptions;
 use crate::report::Page;
 use crate::trace::Recording;
-use crate::verdict::{Verdict, worst};
+use crate::verdict::{Verdict, torque_bound, worst};
 
 /// At `--speed`: full power, full braking power, nothing, full power; each for 0.4 s, in steps.
 pub struct Reversal;
@@ -38,7 +38,7 @@ impl Scenario for Reversal {
         .plan()
     }
 
-    fn figures(&self, recording: &Recording, _options: &RunOptions, machine: &Machine) -> Figures {
+    fn figures(&self, recording: &Recording, options: &RunOptions, machine: &Machine) -> Figures {
         let at = |k: usize| BEGIN_S + k as f64 * HOLD_S;
         let steps = (0..SHARES.len()).map(|k| analysis::transition(recording, at(k), at(k + 1)));
         let holds = (0..SHARES.len()).filter(|k| SHARES[*k] != 0.0).map(|k| {
@@ -51,16 +51,29 @@ impl Scenario for Reversal {
         let mut figures = analysis::common(recording);
         figures.set(
             "verdicts",
-            vec![Verdict::at_most(
-                "peak current over the larger steady peak",
-                worst(steps.iter().map(|step| step.peak_ratio)),
-                1.15,
-                "–",
-            )],
+            vec![
+                Verdict::at_most(
+                    "peak current over the larger steady peak",
+                    worst(steps.iter().map(|step| step.peak_ratio)),
+                    1.15,
+                    "–",
+                ),
+                Verdict::at_most(
+                    "mean torque error at full power in %",
+                    worst(holds.iter().map(|hold| hold.torque_error_percent.abs())),
+                    torque_bound(options, 0.5, 1.5),
+                    "0.5; 14 to 33 with an id trim",
+                ),
+            ],
         );
         figures.set("transitions", steps);
         figures.set("points", holds);
         figures
+    }
+
+    fn spectra(&self, _recording: &Recording) -> Vec<(String, (f64, f64))> {
+        let end_s = BEGIN_S + HOLD_S;
+        vec![("full power".to_owned(), (end_s - 0.5 * HOLD_S, end_s))]
     }
 
     fn plots(&self, recording: &Recording, page: &mut Page) {

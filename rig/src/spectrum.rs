@@ -1,0 +1,65 @@
+//! The current's spectrum in steady state beside that of the bound.
+
+use crate::analysis;
+use crate::bound;
+use crate::distortion::{self, Samples};
+use crate::machine::Machine;
+use crate::options::RunOptions;
+use crate::report::Page;
+use crate::trace::Recording;
+use core::f64::consts::TAU;
+use rustfft::FftPlanner;
+use rustfft::num_complex::Complex;
+
+/// Highest frequency that is drawn, in Hz: a little above twice 900 Hz.
+const HIGHEST_HZ: f64 = 3_000.0;
+/// Smallest line that is drawn, in percent of the fundamental.
+const SMALLEST_PERCENT: f64 = 0.02;
+/// By how much the bound's lines stand beside the measured ones, in Hz.
+const BESIDE_HZ: f64 = 8.0;
+
+/// Draws the spectrum in a window of a recording and that of its bound, without the fundamental.
+pub fn draw(
+    page: &mut Page,
+    title: &str,
+    recording: &Recording,
+    window: (f64, f64),
+    options: &RunOptions,
+    machine: &Machine,
+) {
+    let rows = analysis::window(recording, window.0, window.1);
+    let Some(f1_hz) =
+        rows.last().map(|row| row.speed_rpm.abs() * f64::from(machine.folder.parameters.pole_pairs) / 60.0)
+    else {
+        return;
+    };
+    let measured = distortion::samples(recording, window, &machine.folder);
+    let mut series = vec![("measured", lines(&measured, f1_hz, 0.0))];
+    if let Some(ideal) = bound::ideal(rows, options, machine) {
+        series.push(("bound", lines(&ideal, f1_hz, BESIDE_HZ)));
+    }
+    let heading = format!("Spectrum of phase current u without its fundamental · {title}");
+    page.curves(&heading, "frequency in Hz", "% of the fundamental", &series);
+}
+
+/// A spectrum as lines that stand on the axis.
+fn lines(samples: &Samples, f1_hz: f64, beside_hz: f64) -> Vec<(f64, f64)> {
+    let (fundamental_a, rest) = samples.without_fundamental();
+    let count = rest.len();
+    let mut bins: Vec<_> = rest.into_iter().map(|current_a| Complex::new(current_a, 0.0)).collect();
+    FftPlanner::new().plan_fft_forward(count).process(&mut bins);
+    let turned = samples.angle.last().zip(samples.angle.first()).map_or(0.0, |(last, first)| last - first);
+    // One more sample would complete the last turn.
+    let turns = turned / TAU * count as f64 / (count.max(2) - 1) as f64;
+    let mut points = vec![(0.0, 0.0)];
+    for (bin, value) in bins.iter().enumerate().take(count / 2).skip(1) {
+        let hertz = bin as f64 / turns.abs() * f1_hz;
+        let percent = 200.0 * value.norm() / count as f64 / fundamental_a;
+        if hertz < HIGHEST_HZ && percent > SMALLEST_PERCENT {
+            let at = hertz + beside_hz;
+            points.extend([(at, 0.0), (at, percent), (at, 0.0)]);
+        }
+    }
+    points.push((HIGHEST_HZ, 0.0));
+    points
+}
