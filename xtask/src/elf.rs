@@ -133,7 +133,7 @@ impl Image {
             if name.contains("tractive::machine") && is_read_only_data(file, &symbol) {
                 self.sizes.tables += symbol.size();
             }
-            if name.starts_with("tractive::") && name.ends_with("::RECORDER") {
+            if name.starts_with("tractive::") && name.ends_with("RECORDER") {
                 self.sizes.recorder += symbol.size();
             }
             self.symbols.insert(name);

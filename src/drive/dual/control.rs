@@ -1,6 +1,6 @@
 //! The control interrupt's task.
 
-use super::axis::{self, Axis, AxisInput, AxisOutput};
+use super::axis::{self, Axis, AxisInput};
 use super::{DualApplied, DualCommand, DualReport, MotorCommand, MotorShare, Settings, Shared};
 use crate::board::{DualControlPort, DualSample, HardwareBreak, MotorDemand};
 use crate::control::{Measurements, ZSource, ZSourceError, ZSourceInput};
@@ -34,6 +34,17 @@ pub struct ControlTask<M = &'static Tables> {
     trip: Option<Trip>,
     /// Number of the acknowledge that both interrupts have carried out.
     acknowledged: u8,
+}
+
+/// What a control period makes of its sample.
+#[derive(Default)]
+struct Driven {
+    motors: [MotorCommand; 2],
+    /// What is told of it, as in [`DualReport`].
+    torque_nm: [f32; 2],
+    weakening: [bool; 2],
+    duty: f32,
+    inductor_ref_a: f32,
 }
 
 impl<M: Machine> ControlTask<M> {
@@ -96,51 +107,54 @@ impl<M: Machine> ControlTask<M> {
         let measured = self.measured(&sample, angles);
         self.check_measurements(&sample, &measured, port);
         let known = self.axes.iter().all(Axis::speed_is_known);
-        let [upper, lower] = &self.axes;
-        let mut report = DualReport {
+        let pulsing = self.trip.is_none() && sample.enable && known;
+        let driven = if pulsing {
+            self.check_frozen(&measured, port);
+            let next = applied.and_then(|applied| applied.next);
+            self.pulse(&sample, &measured, next, port)
+        } else {
+            self.axes.iter_mut().for_each(Axis::idle);
+            self.link = ZSource::new();
+            Driven::default()
+        };
+        let late = port.overrun_ticks(now, deadline_ticks);
+        let late_s = self.settings.clock.seconds(late as i32);
+        self.check((late > 0).then_some((Fault::ControlDeadline, late_s, 0.0)), port);
+        let gates = if pulsing && self.trip.is_none() { Gates::Pulse } else { Gates::Off };
+        shared.command.publish(DualCommand {
+            motors: driven.motors,
+            at: now,
+            valid_from: now.after(deadline_ticks),
+            duty: driven.duty,
             scheme: sample.scheme,
+            gates,
+            acknowledge: sample.acknowledge,
+        });
+        if let Some(recorder) = shared.recorder {
+            recorder.record(self.entry(now, &sample, &driven, gates), self.trip.is_some());
+        }
+        let [upper, lower] = &self.axes;
+        let report = DualReport {
+            torque_nm: driven.torque_nm,
+            voltage_v: driven.motors.map(|motor| motor.voltage_v),
+            weakening: driven.weakening,
+            duty: driven.duty,
+            inductor_ref_a: driven.inductor_ref_a,
+            scheme: sample.scheme,
+            trip: self.trip,
             omega: [upper.omega(), lower.omega()],
             current_a: sample.currents_a.map(|currents| currents.peak()),
             capacitor_v: sample.capacitor_v,
             source_v: sample.source_v,
             speed_known: known,
             acknowledged: self.acknowledged,
-            ..DualReport::default()
         };
-        let mut command = DualCommand {
-            motors: [MotorCommand::default(); 2],
-            at: now,
-            valid_from: now.after(deadline_ticks),
-            duty: 0.0,
-            scheme: sample.scheme,
-            gates: Gates::Off,
-            acknowledge: sample.acknowledge,
-        };
-        if self.trip.is_none() && sample.enable && known {
-            self.check_frozen(&measured, port);
-            let next = applied.and_then(|applied| applied.next);
-            self.pulse(&sample, &measured, next, &mut command, &mut report, port);
-        } else {
-            self.axes.iter_mut().for_each(Axis::idle);
-            self.link = ZSource::new();
-        }
-        let late = port.overrun_ticks(now, deadline_ticks);
-        let late_s = self.settings.clock.seconds(late as i32);
-        self.check((late > 0).then_some((Fault::ControlDeadline, late_s, 0.0)), port);
-        if self.trip.is_some() {
-            command.gates = Gates::Off;
-        }
-        shared.command.publish(command);
-        report.trip = self.trip;
-        if let Some(recorder) = shared.recorder {
-            recorder.record(self.entry(now, &sample, &report, command.gates), self.trip.is_some());
-        }
         port.report(now, &report);
     }
 
     /// The period's entry in the flight recorder.
     #[inline(always)]
-    fn entry(&self, at: Instant, sample: &DualSample, report: &DualReport, gates: Gates) -> DualRecord {
+    fn entry(&self, at: Instant, sample: &DualSample, driven: &Driven, gates: Gates) -> DualRecord {
         DualRecord {
             at,
             currents_a: sample.currents_a,
@@ -148,8 +162,8 @@ impl<M: Machine> ControlTask<M> {
             capacitor_v: sample.capacitor_v,
             source_v: sample.source_v,
             inductor_a: sample.inductor_a,
-            torque_nm: report.torque_nm,
-            duty: report.duty,
+            torque_nm: driven.torque_nm,
+            duty: driven.duty,
             state: DualState {
                 scheme: sample.scheme,
                 enabled: sample.enable,
@@ -250,10 +264,8 @@ impl<M: Machine> ControlTask<M> {
         sample: &DualSample,
         measured: &[Measurements; 2],
         applied: Option<[MotorShare; 2]>,
-        command: &mut DualCommand,
-        report: &mut DualReport,
         port: &mut impl DualControlPort,
-    ) {
+    ) -> Driven {
         let link_v = 2.0 * sample.capacitor_v - sample.source_v;
         let [first, second] = &mut self.axes;
         let ([m1, m2], [d1, d2]) = (measured, &sample.demands);
@@ -273,33 +285,36 @@ impl<M: Machine> ControlTask<M> {
             link_ref_v: sample.link_ref_v,
             duty_room: 1.0,
         };
-        match self.link.step(&link, &self.settings.link, &self.settings.link_gains) {
-            Ok(output) => {
-                command.duty = output.duty;
-                report.inductor_ref_a = output.inductor_ref_a;
-            }
-            Err(ZSourceError::NotFinite) => {
-                self.check(Some((Fault::NotFinite, link.power_w, f32::MAX)), port)
-            }
-            Err(ZSourceError::NoSource(volts)) => {
-                self.check(Some((Fault::SourceUndervoltage, volts, 0.0)), port);
-            }
-        }
+        let (duty, inductor_ref_a, refused) =
+            match self.link.step(&link, &self.settings.link, &self.settings.link_gains) {
+                Ok(output) => (output.duty, output.inductor_ref_a, None),
+                Err(ZSourceError::NotFinite) => (0.0, 0.0, Some((Fault::NotFinite, link.power_w, f32::MAX))),
+                Err(ZSourceError::NoSource(volts)) => {
+                    (0.0, 0.0, Some((Fault::SourceUndervoltage, volts, 0.0)))
+                }
+            };
         let odd = motors.iter().map(|motor| motor.command.voltage_v + motor.command.rate);
         let odd = odd.fold(None, |found, sum| found.or((!sum.is_finite()).then_some(sum)));
-        self.check(odd.map(|sum| (Fault::NotFinite, sum, f32::MAX)), port);
-        command.motors = motors.each_ref().map(|motor: &AxisOutput| motor.command);
-        command.gates = Gates::Pulse;
-        report.torque_nm = [o1.torque_nm, o2.torque_nm];
-        report.voltage_v = [o1.command.voltage_v, o2.command.voltage_v];
-        report.weakening = [o1.weakening, o2.weakening];
-        report.duty = command.duty;
+        self.check(refused.or(odd.map(|sum| (Fault::NotFinite, sum, f32::MAX))), port);
+        Driven {
+            motors: [o1.command, o2.command],
+            torque_nm: [o1.torque_nm, o2.torque_nm],
+            weakening: [o1.weakening, o2.weakening],
+            duty,
+            inductor_ref_a,
+        }
     }
 
     fn check(&mut self, violation: Option<Violation>, port: &mut impl DualControlPort) {
-        let (Some((fault, value, limit)), None) = (violation, self.trip) else {
-            return;
-        };
+        if let (Some(violation), None) = (violation, self.trip) {
+            self.trip_on(violation, port);
+        }
+    }
+
+    /// Out of line: it happens once, and there are many checks.
+    #[cold]
+    #[inline(never)]
+    fn trip_on(&mut self, (fault, value, limit): Violation, port: &mut impl DualControlPort) {
         if self.disarmed.has(fault) {
             return;
         }
