@@ -85,29 +85,34 @@ pub enum Request {
     End,
 }
 
+/// A request's block. Not in every caller: images are small.
+#[inline(never)]
+fn block(tag: u32, at: Instant, payload: &[u32]) -> Block {
+    let mut block = [0; BLOCK_WORDS];
+    let words = [tag, at.0].into_iter().chain(payload.iter().copied());
+    for (slot, word) in block.iter_mut().zip(words) {
+        *slot = word;
+    }
+    block
+}
+
 impl Request {
     /// As a block.
     pub fn to_block(self) -> Block {
-        let mut block = [0; BLOCK_WORDS];
-        let (tag, at, payload): (u32, Instant, &[u32]) = match &self {
-            Self::Hello => (1, Instant(0), &[]),
-            Self::ControlSample(at) => (2, *at, &[]),
-            Self::ControlReport(at, report) => (3, *at, &report.to_words()),
-            Self::PwmSample(at) => (4, *at, &[]),
-            Self::Play(at, half) => (5, *at, &half_to_words(*half)),
-            Self::Enter(at, safe) => (6, *at, &[*safe as u32]),
-            Self::Dead => (7, Instant(0), &[]),
-            Self::Recorded(record) => (8, record.at, &record.to_words()),
-            Self::End => (9, Instant(0), &[]),
-            Self::Leave(at) => (10, *at, &[]),
-            Self::Ask(at) => (11, *at, &[]),
-            Self::Tell(from, status, frame) => (12, *from, &told_to_words(status, *frame)),
-        };
-        let words = [tag, at.0].into_iter().chain(payload.iter().copied());
-        for (slot, word) in block.iter_mut().zip(words) {
-            *slot = word;
+        match &self {
+            Self::Hello => block(1, Instant(0), &[]),
+            Self::ControlSample(at) => block(2, *at, &[]),
+            Self::ControlReport(at, report) => block(3, *at, &report.to_words()),
+            Self::PwmSample(at) => block(4, *at, &[]),
+            Self::Play(at, half) => block(5, *at, &half_to_words(*half)),
+            Self::Enter(at, safe) => block(6, *at, &[*safe as u32]),
+            Self::Dead => block(7, Instant(0), &[]),
+            Self::Recorded(record) => block(8, record.at, &record.to_words()),
+            Self::End => block(9, Instant(0), &[]),
+            Self::Leave(at) => block(10, *at, &[]),
+            Self::Ask(at) => block(11, *at, &[]),
+            Self::Tell(from, status, frame) => block(12, *from, &told_to_words(status, *frame)),
         }
-        block
     }
 
     /// From a block; `None` if it is none of ours.

@@ -59,18 +59,18 @@ const WORTH: [(Without, &str); 18] = [
     (Without::Check(Fault::DriverBlocked), "pmasynrm uh-stuck-on 850"),
     (Without::ShortCircuit, "pmasynrm current-u-offset 6000"),
     (Without::LegSafeState, "pmasynrm uh-shorted 2800"),
-    (Without::Check(Fault::SourceUndervoltage), "zs9 source-low 1000"),
-    (Without::Check(Fault::CapacitorOvervoltage), "zs9 source-high 1000"),
-    (Without::Check(Fault::DutyRange), "zs9 link-out-of-range 1000"),
-    (Without::Check(Fault::SensorLost1), "zs9 angle-1-jump 1000"),
+    (Without::Check(Fault::SourceUndervoltage), "zs9 zvo source-low 1000"),
+    (Without::Check(Fault::CapacitorOvervoltage), "zs9 zvo source-high 1000"),
+    (Without::Check(Fault::DutyRange), "zs9 zvo link-out-of-range 1000"),
+    (Without::Check(Fault::SensorLost1), "zs9 zvo angle-1-jump 1000"),
 ];
 
 #[test]
 fn without_a_protection_cases_are_lost() {
     let also = [
-        (Without::Check(Fault::SensorLost2), "zs9 angle-2-jump 1000"),
-        (Without::Check(Fault::LegStuck), "zs9 um-stuck-on 1000"),
-        (Without::Check(Fault::StaleCommand), "zs9 commands-lost 1000"),
+        (Without::Check(Fault::SensorLost2), "zs9 zvo angle-2-jump 1000"),
+        (Without::Check(Fault::LegStuck), "zs9 zvo um-stuck-on 1000"),
+        (Without::Check(Fault::StaleCommand), "zs9 zvo commands-lost 1000"),
     ];
     let all = WORTH.into_iter().chain(also);
     let sound = Campaign::new(None).unwrap();

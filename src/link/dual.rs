@@ -1,6 +1,8 @@
 //! The ZS9's blocks: the same three streams and the same tags, other contents.
 
-use super::{BLOCK_WORDS, Block, LineTimes, line_from_words, line_to_words, told_from_words, told_to_words};
+use super::{
+    BLOCK_WORDS, Block, LineTimes, block, line_from_words, line_to_words, told_from_words, told_to_words,
+};
 use crate::board::{DualSample, GateFeedback, HardwareBreak, MotorDemand, PlayedPeriod, PowerSample};
 use crate::cell::Words;
 use crate::control::Demand;
@@ -54,31 +56,24 @@ pub enum DualRequest {
 impl DualRequest {
     /// As a block.
     pub fn to_block(self) -> Block {
-        let mut block = [0; BLOCK_WORDS];
-        let recorded;
-        let (tag, at, payload): (u32, Instant, &[u32]) = match &self {
-            Self::Hello => (1, Instant(0), &[]),
-            Self::ControlSample(at) => (2, *at, &[]),
-            Self::ControlReport(at, report) => (3, *at, &told_of(report)),
-            Self::PowerSample(at) => (4, *at, &[]),
+        match &self {
+            Self::Hello => block(1, Instant(0), &[]),
+            Self::ControlSample(at) => block(2, *at, &[]),
+            Self::ControlReport(at, report) => block(3, *at, &told_of(report)),
+            Self::PowerSample(at) => block(4, *at, &[]),
             // Both ends of a pause in one word: a half has at most 65,535 compare steps.
-            Self::Play(at, period) => (5, *at, &period.gates.map(|gate| gate.off_from | gate.off_to << 16)),
-            Self::GatesOff(at) => (6, *at, &[]),
-            Self::Dead => (7, Instant(0), &[]),
-            Self::Recorded(record) => {
-                recorded = record.to_words();
-                (8, record.at, recorded.split_at(1).1)
+            Self::Play(at, period) => {
+                block(5, *at, &period.gates.map(|gate| gate.off_from | gate.off_to << 16))
             }
-            Self::End => (9, Instant(0), &[]),
-            Self::Leave(at) => (10, *at, &[]),
-            Self::Ask(at) => (11, *at, &[]),
-            Self::Tell(from, status, frame) => (12, *from, &told_to_words(status, *frame)),
-        };
-        let words = [tag, at.0].into_iter().chain(payload.iter().copied());
-        for (slot, word) in block.iter_mut().zip(words) {
-            *slot = word;
+            Self::GatesOff(at) => block(6, *at, &[]),
+            Self::Dead => block(7, Instant(0), &[]),
+            // Its first word is the instant.
+            Self::Recorded(record) => block(8, record.at, record.to_words().split_at(1).1),
+            Self::End => block(9, Instant(0), &[]),
+            Self::Leave(at) => block(10, *at, &[]),
+            Self::Ask(at) => block(11, *at, &[]),
+            Self::Tell(from, status, frame) => block(12, *from, &told_to_words(status, *frame)),
         }
-        block
     }
 
     /// From a block; `None` if it is none of ours.
