@@ -98,6 +98,7 @@ fn block(tag: u32, at: Instant, payload: &[u32]) -> Block {
 
 impl Request {
     /// As a block.
+    #[inline(always)]
     pub fn to_block(self) -> Block {
         match &self {
             Self::Hello => block(1, Instant(0), &[]),

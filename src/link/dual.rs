@@ -55,6 +55,7 @@ pub enum DualRequest {
 
 impl DualRequest {
     /// As a block.
+    #[inline(always)]
     pub fn to_block(self) -> Block {
         match &self {
             Self::Hello => block(1, Instant(0), &[]),

@@ -34,8 +34,9 @@ const IDLE_ANSWERS: usize = 3;
 #[inline(never)]
 pub fn open() -> Setup {
     open_files();
-    send(&Request::Hello.to_block());
-    link::setup_from_block(&receive(CONTROL_ANSWERS))
+    let mut block = Request::Hello.to_block();
+    exchange(&mut block, CONTROL_ANSWERS);
+    link::setup_from_block(&block)
 }
 
 fn open_files() {
@@ -57,8 +58,9 @@ fn open_files() {
 /// The control timer's conversions; ends the emulation when the rig says so.
 #[inline(never)]
 pub fn control_sample(now: Instant) -> Sample {
-    send(&Request::ControlSample(now).to_block());
-    let (sample, end) = link::sample_from_block(&receive(CONTROL_ANSWERS));
+    let mut block = Request::ControlSample(now).to_block();
+    exchange(&mut block, CONTROL_ANSWERS);
+    let (sample, end) = link::sample_from_block(&block);
     if end {
         finish();
     }
@@ -67,6 +69,7 @@ pub fn control_sample(now: Instant) -> Sample {
 }
 
 /// Tells what the flight recorder holds, if a fault has frozen it, and ends the emulation.
+#[inline(never)]
 fn finish() -> ! {
     stand_still();
     saboteur::finish();
@@ -85,8 +88,9 @@ fn stand_still() {
 /// Phase currents at a carrier boundary.
 #[inline(never)]
 pub fn pwm_sample(now: Instant) -> Abc {
-    send(&Request::PwmSample(now).to_block());
-    link::currents_from_block(&receive(PWM_ANSWERS))
+    let mut block = Request::PwmSample(now).to_block();
+    exchange(&mut block, PWM_ANSWERS);
+    link::currents_from_block(&block)
 }
 
 /// What was loaded into the shadow registers.
@@ -104,8 +108,9 @@ pub fn play_again() {
 /// Lets the rig's time catch up with the real one, which the tasks do not know.
 #[cfg(feature = "saboteur")]
 pub fn catch_up(real: Instant) -> Block {
-    send(&Request::PwmSample(real).to_block());
-    receive(PWM_ANSWERS)
+    let mut block = Request::PwmSample(real).to_block();
+    exchange(&mut block, PWM_ANSWERS);
+    block
 }
 
 /// The end of a control interrupt.
@@ -130,8 +135,9 @@ pub fn leave(now: Instant) {
 /// What is asked of the operator. The idle loop's answers have a stream of their own: an interrupt may ask while it waits.
 #[inline(never)]
 pub fn ask(at: Instant) -> (operator::Request, Feedback, Option<Frame>) {
-    send(&Request::Ask(at).to_block());
-    link::asked_from_block(&receive(IDLE_ANSWERS))
+    let mut block = Request::Ask(at).to_block();
+    exchange(&mut block, IDLE_ANSWERS);
+    link::asked_from_block(&block)
 }
 
 /// What the operator told, and the frame that says so.
@@ -177,13 +183,13 @@ fn send(block: &Block) {
     }
 }
 
+/// Sends a request and puts the answer in its place.
 #[inline(never)]
-fn receive(answers: usize) -> Block {
-    let mut block: Block = [0; link::BLOCK_WORDS];
-    // SAFETY: SYS_READ writes at most the block's bytes, and the block is ours until it returns.
+fn exchange(block: &mut Block, answers: usize) {
+    send(block);
+    // SAFETY: SYS_READ writes at most the block's bytes, and the block is ours until this returns.
     let missing = unsafe { syscall!(READ, file(answers), block.as_mut_ptr(), BLOCK_BYTES) };
     if missing != 0 {
         stop(false);
     }
-    block
 }

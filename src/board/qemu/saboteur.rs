@@ -257,12 +257,11 @@ fn latch(gates: u32) {
     LATCHED.store(LATCHED.load(Relaxed) | gates, Relaxed);
 }
 
-/// A power sample with all that the gates have shown.
-pub fn completed(mut block: Block) -> Block {
+/// Adds to a power sample all that the gates have shown.
+pub fn complete(block: &mut Block) {
     if let Some(gates) = block.get_mut(GATES) {
         *gates |= LATCHED.swap(0, Relaxed);
     }
-    block
 }
 
 /// The newest half.

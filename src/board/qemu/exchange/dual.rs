@@ -1,6 +1,6 @@
 //! The same for the ZS9.
 
-use super::{CONTROL_ANSWERS, IDLE_ANSWERS, PWM_ANSWERS, open_files, receive, send, stand_still};
+use super::{CONTROL_ANSWERS, IDLE_ANSWERS, PWM_ANSWERS, exchange, open_files, send, stand_still};
 use crate::board::qemu::{DUAL_RECORDER, saboteur, stop};
 use crate::board::{DualSample, PlayedPeriod, PowerSample};
 use crate::drive::dual::DualReport;
@@ -13,33 +13,43 @@ use crate::time::Instant;
 #[inline(never)]
 pub fn open_dual() -> DualSetup {
     open_files();
-    send(&DualRequest::Hello.to_block());
-    link::dual_setup_from_block(&receive(CONTROL_ANSWERS))
+    let mut block = DualRequest::Hello.to_block();
+    exchange(&mut block, CONTROL_ANSWERS);
+    link::dual_setup_from_block(&block)
 }
 
 /// The control timer's conversions; ends the emulation when the rig says so.
 #[inline(never)]
 pub fn sample_dual(now: Instant) -> DualSample {
-    send(&DualRequest::ControlSample(now).to_block());
-    let (sample, end) = link::dual_sample_from_block(&receive(CONTROL_ANSWERS));
+    let mut block = DualRequest::ControlSample(now).to_block();
+    exchange(&mut block, CONTROL_ANSWERS);
+    let (sample, end) = link::dual_sample_from_block(&block);
     if end {
-        stand_still();
-        saboteur::finish();
-        for record in (0..).map_while(|index| DUAL_RECORDER.read(index)) {
-            send(&DualRequest::Recorded(record).to_block());
-        }
-        send(&DualRequest::End.to_block());
-        stop(true);
+        finish();
     }
     saboteur::sampled();
     sample
 }
 
+/// Tells what the flight recorder holds, if a fault has frozen it, and ends the emulation.
+#[inline(never)]
+fn finish() -> ! {
+    stand_still();
+    saboteur::finish();
+    for record in (0..).map_while(|index| DUAL_RECORDER.read(index)) {
+        send(&DualRequest::Recorded(record).to_block());
+    }
+    send(&DualRequest::End.to_block());
+    stop(true)
+}
+
 /// The conversions at a peak of the carrier.
 #[inline(never)]
 pub fn power_sample(now: Instant) -> PowerSample {
-    send(&DualRequest::PowerSample(now).to_block());
-    link::power_from_block(&saboteur::completed(receive(PWM_ANSWERS)))
+    let mut block = DualRequest::PowerSample(now).to_block();
+    exchange(&mut block, PWM_ANSWERS);
+    saboteur::complete(&mut block);
+    link::power_from_block(&block)
 }
 
 /// What was loaded into the shadow registers.
@@ -70,8 +80,9 @@ pub fn leave_dual(now: Instant) {
 /// The frame that has come, and what the board says.
 #[inline(never)]
 pub fn ask_dual(at: Instant) -> (Feedback, Option<Frame>) {
-    send(&DualRequest::Ask(at).to_block());
-    link::dual_asked_from_block(&receive(IDLE_ANSWERS))
+    let mut block = DualRequest::Ask(at).to_block();
+    exchange(&mut block, IDLE_ANSWERS);
+    link::dual_asked_from_block(&block)
 }
 
 /// What the operator told, and the frame that says so.
