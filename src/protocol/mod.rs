@@ -3,7 +3,7 @@
 //! Every message is a [`Message`] of eight bytes: CRC and counter first ([`e2e`], AUTOSAR's profile 2), then [`Signal`]s as the
 //! DBC file publishes them. The drive's end is a [`Session`]: it judges what comes ([`Receiver`]: a frame takes effect whole
 //! or not at all, and every rejected one is counted by its cause), makes a request of it that ages (torque zero, then off), and
-//! sends telemetry in fixed slots ([`Sender`]).
+//! sends telemetry in fixed slots (`Sender`).
 //!
 //! Pure, without a clock: one step a slot of 1 ms, in the idle loop.
 
