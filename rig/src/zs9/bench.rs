@@ -16,7 +16,7 @@ use crate::run::Supervised;
 use crate::steps::held;
 use std::collections::VecDeque;
 use tractive::board::{DualSample, GateFeedback, HardwareBreak, PlayedPeriod, PowerSample};
-use tractive::drive::dual::{COMPARE_STEPS, DualReport};
+use tractive::drive::dual::{COMPARE_STEPS, DualReport, Settings};
 use tractive::frames::Abc;
 use tractive::nine_switch::Scheme;
 use tractive::operator::{DualStatus, Feedback};
@@ -35,9 +35,6 @@ const PWM_OFF_TICKS: u32 = 625;
 
 /// How far a current's reading may be off without making a difference that counts, in A: a tenth of a machine's largest current.
 const MUCH_A: f32 = 8.49;
-
-/// Shorter pulses in a half of a carrier period need not appear, in s: a dead time of 5 µs, less a tick.
-const SHORTEST_PULSE_S: f64 = 4.95e-6;
 
 /// The capacitor behind the source's contactor, in F: as large as the network's.
 const INPUT_F: f64 = 500e-6;
@@ -149,8 +146,6 @@ pub struct Bench {
     loads: VecDeque<(Steps, [f64; 2])>,
     loads_nm: Option<[f64; 2]>,
     observed: Observed,
-    /// Since when the gates are not as they are told.
-    differ_since: Option<Steps>,
     feedback: GateFeedback,
     orders: Orders,
     samples: VecDeque<(Steps, DualSample)>,
@@ -200,7 +195,6 @@ impl Bench {
             loads: VecDeque::new(),
             loads_nm: None,
             observed: Observed::new(from, settings.limits),
-            differ_since: None,
             feedback: GateFeedback::default(),
             samples: VecDeque::new(),
             next_sample: control,
@@ -431,27 +425,10 @@ impl Bench {
         let peaks = Peaks::at(&[a, b, c, d, e, f], self.plant.link_v(), v1.max(v2));
         let speeds = self.plant.motors().each_ref().map(|motor| motor.speed_rpm().abs());
         self.observed.note(self.now, &peaks, speeds[0].max(speeds[1]));
-        if self.plant.source_v() < self.settings.limits.source_v {
+        // Of a gate that stays off, [`Self::begin_period`] knows which pulses count.
+        let disobey = !matches!(kind, Some(Kind::Gate(_, false))) && self.real_levels() != self.levels;
+        if disobey || self.plant.source_v() < self.settings.limits.source_v {
             self.observed.makes_a_difference(self.now);
-        }
-    }
-
-    /// Whether the gates do as they are told until `to`. Of a gate that stays off, a pulse makes no difference that dead times may
-    /// swallow in its half of the carrier, nor does one in the period in which it was still on: the latches of the feedback cannot tell.
-    fn watch_gates(&mut self, differ: bool, to: Steps) {
-        if !differ {
-            self.differ_since = None;
-            return;
-        }
-        let half = self.period / 2;
-        let half_began = self.begun + (self.now - self.begun) / half * half;
-        let since = self.differ_since.map_or(self.now, |since| since.max(half_began));
-        self.differ_since = Some(since);
-        let stays_off = matches!(self.spoiler.kind(self.seconds(self.now)), Some(Kind::Gate(_, false)));
-        let counts =
-            (to - since) as f64 * self.step_s > SHORTEST_PULSE_S && since >= self.observed.from + self.period;
-        if counts || !stays_off {
-            self.observed.makes_a_difference(since);
         }
     }
 
@@ -567,7 +544,6 @@ impl Bench {
         if gates.contains(&LegGates::SHOOT_THROUGH) {
             sums.shorted += steps;
         }
-        self.watch_gates(real != self.levels, to);
         self.now = to;
         self.watch();
         Ok(())
@@ -633,6 +609,14 @@ impl Bench {
         self.toggles.clear();
         if self.off {
             return Ok(());
+        }
+        if let Some(Kind::Gate(gate, false)) = self.spoiler.kind(self.seconds(self.now)) {
+            let pause = &period.gates[usize::from(gate)];
+            let drive = Settings::new(self.settings.clock, self.settings.carrier_ticks);
+            // Dead times may swallow a shorter pulse.
+            if pause.off_to - pause.off_from < drive.longest_pause_steps() {
+                self.observed.makes_a_difference(self.now);
+            }
         }
         let half = self.period / 2;
         let mut ordered = self.ordered;

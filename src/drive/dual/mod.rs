@@ -42,6 +42,9 @@ pub const COMPARE_STEPS: u32 = 32;
 /// that low.
 pub const LOWEST_SHARE: f32 = 0.9;
 
+/// Longest dead time that the gates' hardware may insert, in s.
+const DEAD_TIME_S: f32 = 5e-6;
+
 /// What both tasks are built with.
 #[derive(Clone, Copy, Debug)]
 pub struct Settings {
@@ -113,6 +116,12 @@ impl Settings {
     /// Compare steps of a carrier half.
     pub const fn half_steps(&self) -> u32 {
         self.carrier_ticks / 2 * COMPARE_STEPS
+    }
+
+    /// Compare steps for which a gate may pause in a carrier half and yet must be seen on: what a dead time leaves of the half.
+    pub const fn longest_pause_steps(&self) -> u32 {
+        let dead_steps = (DEAD_TIME_S * self.clock.ticks_per_s) as u32 * COMPARE_STEPS;
+        self.half_steps().saturating_sub(dead_steps)
     }
 
     /// Carrier periods in a control period.

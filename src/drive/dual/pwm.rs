@@ -1,6 +1,6 @@
 //! The PWM interrupt's task.
 
-use super::{COMPARE_STEPS, DualApplied, DualCommand, MotorShare, Settings, Shared};
+use super::{DualApplied, DualCommand, MotorShare, Settings, Shared};
 use crate::board::{DualPwmPort, GateFeedback, PlayedPeriod, PowerSample};
 use crate::drive::Gates;
 use crate::drive::traction::stale;
@@ -10,9 +10,6 @@ use crate::nine_switch::{self, GateTicks, MotorVoltage, Period, Refused, Request
 use crate::protection::{self, Disarmed, Fault, SafeState, Trip, Violation};
 use crate::time::Instant;
 use core::sync::atomic::Ordering;
-
-/// Longest dead time that the gates' hardware may insert, in s.
-const DEAD_TIME_S: f32 = 5e-6;
 
 /// How far the link is believed to move in a carrier period, in V; more is an error of the measurement.
 const MOST_MOVED_V: f32 = 10.0;
@@ -223,10 +220,7 @@ impl Expected {
     const OFF: Self = Self { must_be_on: 0, may_be_on: 0, is_off: ALL_GATES };
 
     fn of(period: &PlayedPeriod, settings: &Settings) -> Self {
-        let half = settings.half_steps();
-        let shortest = (DEAD_TIME_S * settings.clock.ticks_per_s) as u32 * COMPARE_STEPS;
-        // As a pause: what is left of the half after the shortest time.
-        let longest_pause = half.saturating_sub(shortest);
+        let (half, longest_pause) = (settings.half_steps(), settings.longest_pause_steps());
         let mut expected = Self { must_be_on: 0, may_be_on: 0, is_off: 0 };
         let mut bit = 1;
         for gate in &period.gates {
