@@ -42,7 +42,7 @@ fn find(name_or_path: &str) -> Result<PathBuf> {
 fn keep(made: Generated) -> Tables {
     let ratings = &made.ratings;
     let (rows, columns) = made.current_axes;
-    let (psi, share) = made.weakening_axes;
+    let (psi, share) = made.weakening.axes;
     let universal =
         Axis { first: 0.0, inverse_step: (made.universal.len() - 1) as f32, count: made.universal.len() };
     Tables {
@@ -72,8 +72,10 @@ fn keep(made: Generated) -> Tables {
             start: curve(made.start, made.torque_axis),
         },
         weakening: Weakening {
-            currents: grid(made.weakening, psi, share),
-            torque: curve(made.weakening_torque, psi),
+            currents: grid(made.weakening.currents, psi, share),
+            torque: curve(made.weakening.torque, psi),
+            flux_knee_wb: made.weakening.flux_knee_wb,
+            share_knee: made.weakening.share_knee,
         },
     }
 }

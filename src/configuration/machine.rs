@@ -145,7 +145,7 @@ impl Tables {
         checked!(check_flux(flux, ratings));
         checked!(check_weakening(weakening, ratings));
         let most_nm = match weakening.torque.nodes {
-            [.., [_, most_nm]] => *most_nm,
+            [.., [_, most_nm, ..]] => *most_nm,
             [] => 0.0,
         };
         checked!(within(&[Bound(
@@ -155,7 +155,7 @@ impl Tables {
             1.02 * most_nm
         )]));
         // The table's nodes lie a little off the map, so that it is right on average.
-        let off = 0.05 * weakening.torque.last();
+        let off = 0.05 * largest_wb(weakening);
         checked!(near("ratings.magnet_flux_wb", ratings.magnet_flux_wb, rest_wb(flux), off));
         check_mtpa(mtpa, flux, ratings)
     }
@@ -225,15 +225,27 @@ const fn check_mtpa(mtpa: &Mtpa, flux: &Grid<2>, ratings: &Ratings) -> Result<()
     nodes("mtpa.start.nodes", values, values.len(), f32::MIN)
 }
 
+/// Flux linkage at a position of a weakening table's axis.
+const fn flux_wb(place: f32, weakening: &Weakening) -> f32 {
+    weakening.flux_knee_wb * place / (1.0 - place)
+}
+
+/// The widest circle's flux linkage.
+const fn largest_wb(weakening: &Weakening) -> f32 {
+    flux_wb(weakening.torque.last(), weakening)
+}
+
 const fn check_weakening(weakening: &Weakening, ratings: &Ratings) -> Result<(), Refused> {
-    let Weakening { currents, torque } = weakening;
+    let Weakening { currents, torque, flux_knee_wb: knee_wb, share_knee } = weakening;
     let Curve { first, inverse_step, nodes: values } = *torque;
     // The flux that the lowest link leaves at the highest speed is on the table, and a good deal more.
     let least_wb = FRAC_2_PI * ratings.dc_link_min_v / (ratings.max_speed_rad_s * ratings.pole_pairs);
+    checked!(within(&[Bound("weakening.flux_knee_wb", *knee_wb, 0.03 * least_wb, 1e3 * least_wb)]));
+    checked!(within(&[Bound("weakening.share_knee", *share_knee, 0.03, 30.0)]));
     let axis = Axis {
         names: ["weakening.torque.first", "weakening.torque.inverse_step", "weakening.torque.nodes"],
-        first: (ABOVE_ZERO, least_wb),
-        last: (1.4 * first, 1e3 * first),
+        first: (ABOVE_ZERO, least_wb / (least_wb + *knee_wb)),
+        last: (1.05 * first, 1.0 - ROUNDING),
     };
     checked!(axis.check(first, inverse_step, values.len()));
     checked!(nodes("weakening.torque.nodes", values, values.len(), 0.0));
@@ -249,7 +261,7 @@ const fn check_weakening(weakening: &Weakening, ratings: &Ratings) -> Result<(),
             "weakening.currents.columns",
         ],
         first: (0.0, 0.0),
-        last: (1.0 - ROUNDING, 1.0 + ROUNDING),
+        last: ((1.0 - ROUNDING) / (1.0 + *share_knee), (1.0 + ROUNDING) / (1.0 + *share_knee)),
     };
     checked!(axis.check(first_column, inverse_column_step, columns));
     nodes("weakening.currents.nodes", pairs, rows.saturating_mul(columns), f32::MIN)

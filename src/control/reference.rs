@@ -6,7 +6,7 @@
 
 use super::{flux_linkage, mtpa};
 use crate::frames::{Dq, sqrt};
-use crate::machine::Tables;
+use crate::machine::{Tables, Weakening};
 
 /// Where an operating point comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -61,6 +61,13 @@ pub fn six_step_v(udc_v: f32) -> f32 {
     udc_v * (2.0 * core::f32::consts::FRAC_1_PI)
 }
 
+/// Below this share of the voltage limit the MTPA point needs no weakening, by the flux map that the target has; above, the
+/// circles decide.
+const SURELY_WITHIN: f32 = 0.98;
+/// A point on the circle of the voltage limit counts as left of the MTPA point until it is right of it by this share of the
+/// largest current: as much as the MTPA point may be off. Near the optimum the magnitude hardly changes.
+const MTPA_OFF: f32 = 0.002;
+
 /// The current for a torque in N·m at an electrical angular speed in rad/s. The voltage is that of equation (3) on the flux map.
 pub fn operating_point(torque_nm: f32, omega: f32, limit: &VoltageLimit, tables: &Tables) -> OperatingPoint {
     // The torque axis ends where the current does.
@@ -74,49 +81,16 @@ pub fn operating_point(torque_nm: f32, omega: f32, limit: &VoltageLimit, tables:
     let steady_v = (flux.j() * omega + best * resistance).length();
     let depth = steady_v / six_step_v(limit.udc_v);
     let unweakened = OperatingPoint { current: best, flux, torque_nm, region, depth };
-    if depth <= limit.depth && !limit.filled {
+    if depth <= SURELY_WITHIN * limit.depth && !limit.filled {
         return unweakened;
     }
-    let Some(psi) = flux_limit(torque_nm, best.squared(), omega, limit, tables) else {
-        return unweakened;
-    };
-    // Less torque leaves less resistive drop, and so more flux: where it ends, the flux is that of the torque that is left.
-    let [_, most] = tables.weakening.torque.at(psi);
-    let left_nm = crate::frames::limit(torque_nm, -most, most);
-    let psi = if left_nm == torque_nm {
-        psi
-    } else {
-        flux_limit(left_nm, best.squared(), omega, limit, tables).unwrap_or(psi)
-    };
-    let Weakened { current, torque_nm, region } = weakened(torque_nm, psi, tables);
-    if region == Region::Weakening && current.d >= best.d && !limit.filled {
+    let Weakened { current, torque_nm, region, inside } =
+        weakened(torque_nm, best.squared(), omega, limit, tables);
+    let right = current.d - best.d >= MTPA_OFF * tables.ratings.max_current_a;
+    if region == Region::Weakening && (right || inside) && !limit.filled {
         return unweakened;
     }
     OperatingPoint { current, flux: flux_linkage(tables, current), torque_nm, region, depth }
-}
-
-/// Largest flux linkage that the voltage allows, in Wb; `None` where it lies beyond the tables, so that no weakening
-/// is needed. From `u² = (ωψ)² + 2 R ω T/(1.5 n_p) + R² i²`, which is (3) squared.
-fn flux_limit(
-    torque_nm: f32,
-    current_squared: f32,
-    omega: f32,
-    limit: &VoltageLimit,
-    tables: &Tables,
-) -> Option<f32> {
-    let resistance = tables.ratings.stator_resistance_ohm;
-    let voltage = limit.depth * six_step_v(limit.udc_v);
-    let copper_power = torque_nm * omega / (1.5 * tables.ratings.pole_pairs);
-    let left =
-        voltage * voltage - 2.0 * resistance * copper_power - resistance * resistance * current_squared;
-    let speed = omega.abs();
-    let largest = tables.weakening.torque.last();
-    let reach = speed * largest;
-    if left >= reach * reach && !limit.filled {
-        return None;
-    }
-    let psi = sqrt(left) / speed;
-    Some(if psi > largest { largest } else { psi })
 }
 
 /// A point on a circle of flux linkage.
@@ -124,21 +98,57 @@ struct Weakened {
     current: Dq,
     torque_nm: f32,
     region: Region,
+    /// Whether the torque is too large for the circle, but not for what is inside it.
+    inside: bool,
 }
 
-/// The point on the circle of flux linkage `psi`, for either sign of torque. Inlined, so that the compiler knows the tables.
+/// The point on the circle of flux linkage that the voltage allows, for either sign of torque. From (3) squared,
+/// `u² = (ωψ)² + 2 R ω T/(1.5 n_p) + R² i²`, all of it taken times 1/ω². Inlined, so that the compiler knows the tables.
 #[inline(always)]
-fn weakened(torque_nm: f32, psi: f32, tables: &Tables) -> Weakened {
-    let [circle, most] = tables.weakening.torque.at(psi);
-    let torque = torque_nm.abs();
-    let limited = torque > most;
-    let torque = if limited { most } else { torque };
-    let share = if torque > circle { 1.0 } else { torque / circle };
-    let [d, q] = tables.weakening.currents.at(psi, 1.0 - sqrt(1.0 - share));
-    let negative = torque_nm < 0.0;
+fn weakened(
+    torque_nm: f32,
+    mtpa_squared: f32,
+    omega: f32,
+    limit: &VoltageLimit,
+    tables: &Tables,
+) -> Weakened {
+    let Weakening { currents, torque, flux_knee_wb, share_knee } = &tables.weakening;
+    let ratings = &tables.ratings;
+    let factor = 1.5 * ratings.pole_pairs;
+    let speed = omega.abs();
+    let voltage = limit.depth * six_step_v(limit.udc_v);
+    let last = torque.last();
+    // Position on the tables' axis of the flux linkage √square/ω.
+    let place = |square: f32| {
+        let root = sqrt(square);
+        let place = root / (root + flux_knee_wb * speed);
+        if place > last { last } else { place }
+    };
+    let resistance_squared = ratings.stator_resistance_ohm * ratings.stator_resistance_ohm;
+    let largest_squared = ratings.max_current_a * ratings.max_current_a;
+    // Without torque and with the largest current. From there the most torque along its slope: its own drop leaves less flux, or
+    // more when braking. As the slope is the least one, the flux comes out too small rather than too large.
+    let square = voltage * voltage - resistance_squared * largest_squared;
+    let [_, most, slope, above, rise] = torque.at(place(square));
+    let drop = torque_nm.signum() * omega * (2.0 * ratings.stator_resistance_ohm / factor);
+    let most = most * speed * speed / (speed * speed + drop * slope);
+    let magnitude = torque_nm.abs();
+    let flowing = if magnitude > most { most } else { magnitude };
+    let squared = mtpa_squared + above + rise * (1.0 - sqrt(1.0 - flowing / most));
+    let below = if squared < largest_squared { largest_squared - squared } else { 0.0 };
+    let at = place(square + resistance_squared * below - drop * flowing);
+    let [circle, most, ..] = torque.at(at);
+    let limited = magnitude > most;
+    let inside = magnitude > circle;
+    let share = if inside { 1.0 } else { magnitude / circle };
+    let given = share * circle;
+    let root = sqrt(1.0 - share);
+    let [d, effective] = currents.at(at, (1.0 - root) / ((1.0 + share_knee) - root));
+    let torque_nm = if torque_nm < 0.0 { -given } else { given };
     Weakened {
-        current: Dq { d, q: if negative { -q } else { q } },
-        torque_nm: if negative { -torque } else { torque },
+        current: Dq { d, q: torque_nm / (factor * effective) },
+        torque_nm,
         region: if limited { Region::Limit } else { Region::Weakening },
+        inside,
     }
 }

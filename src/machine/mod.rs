@@ -64,13 +64,23 @@ pub struct Mtpa {
 }
 
 /// Field-weakening tables: the constant-torque curves cut with circles of constant flux linkage.
+///
+/// A circle stands at `x = psi / (psi + flux_knee_wb)`, a torque on it at `y = w / (w + share_knee)` with
+/// `w = 1 − √(1 − |T|/T_circle)`: nodes stand closer where there is little flux, and where there is little torque. What is read
+/// between the nodes has no more flux linkage and no more current than was asked for.
 #[derive(Clone, Copy, Debug)]
 pub struct Weakening {
-    /// `[i_d, i_q]`, in A, over (|psi| in Wb, s) with `s = 1 − √(1 − |T|/T_circle(psi))`, `s` in 0..=1.
+    /// `[i_d, psi_T]`, in A and Wb, over (`x`, `y`): with the effective flux linkage `psi_T = T/(1.5 n_p i_q)`, above zero, i_q
+    /// follows from the torque itself.
     pub currents: Grid<2>,
-    /// `[T_circle, T_limit]`, in N·m, over |psi|: the most torque on that circle, and the most torque
-    /// on it or inside it, both within the current limit.
-    pub torque: Curve<2>,
+    /// `[T_circle, T_limit, dT_limit/dpsi², a, b]`, in N·m, N·m/Wb² and A², over `x`: the most torque on that circle;
+    /// the most on it or inside it, both within the current limit; how fast that grows, at least; and the square of a
+    /// current on that circle exceeds that of the MTPA point of the same torque by `a + b w` at most.
+    pub torque: Curve<5>,
+    /// Flux linkage where `x` is one half, in Wb.
+    pub flux_knee_wb: f32,
+    /// `w` where `y` is one half.
+    pub share_knee: f32,
 }
 
 /// Everything the control task knows of a machine.

@@ -1,6 +1,6 @@
 //! The tables, as numbers.
 
-use crate::weakening::circle;
+use crate::weakening_tables::{MtpaCurrents, WeakeningTables};
 use crate::{FluxMap, InputError, MachineFolder, Optimum, Parameters, SmoothMap};
 
 /// An even axis: first value, step, number of nodes.
@@ -15,7 +15,7 @@ pub struct Axis {
 }
 
 impl Axis {
-    fn new(first: f64, last: f64, count: usize) -> Self {
+    pub(crate) fn new(first: f64, last: f64, count: usize) -> Self {
         Self { first: first as f32, inverse_step: ((count - 1) as f64 / (last - first)) as f32, count }
     }
 }
@@ -61,12 +61,8 @@ pub struct Generated {
     pub torque_axis: Axis,
     /// `[id, iq, id trim, iq trim]`, in A.
     pub start: Vec<[f32; 4]>,
-    /// Axes of `weakening`: |psi| in Wb, s.
-    pub weakening_axes: (Axis, Axis),
-    /// `[id, iq]`, in A, row-major.
-    pub weakening: Vec<[f32; 2]>,
-    /// `[T_circle, T_limit]`, in N·m, over |psi|.
-    pub weakening_torque: Vec<[f32; 2]>,
+    /// Field weakening.
+    pub weakening: WeakeningTables,
 }
 
 /// Nodes of the universal curve.
@@ -75,9 +71,6 @@ const UNIVERSAL_NODES: usize = 65;
 const TORQUE_NODES: usize = 125;
 /// Reach of the torque axis over the largest torque, where current allows: room for a trim.
 const TORQUE_ROOM: f64 = 1.06;
-/// Nodes of the weakening tables.
-const PSI_NODES: usize = 81;
-const SHARE_NODES: usize = 65;
 /// Least magnet flux and saliency of the MTPA parameters, as shares of flux and inductance at full torque.
 const REGULAR_SHARE: f64 = 0.02;
 
@@ -101,16 +94,20 @@ impl Generated {
         let universal = universal();
         let factor = 1.5 * f64::from(parameters.pole_pairs);
         let last_torque = (TORQUE_ROOM * parameters.max_torque_nm).min(optimum.most_torque_nm());
-        let start = (0..TORQUE_NODES)
-            .map(|k| {
-                let torque = last_torque * k as f64 / (TORQUE_NODES - 1) as f64;
-                let best = optimum.least_current(torque);
-                let passed = mtpa.two_passes(torque / factor, best, &universal);
-                [best.0, best.1, best.0 - passed.0, best.1 - passed.1].map(|value| value as f32)
-            })
+        let best: Vec<_> = (0..TORQUE_NODES)
+            .map(|k| last_torque * k as f64 / (TORQUE_NODES - 1) as f64)
+            .map(|torque| (torque, optimum.least_current(torque)))
             .collect();
-        let (weakening_axes, weakening, weakening_torque) =
-            weakening(machine, &smooth, top_flux.psi_d_wb.hypot(top_flux.psi_q_wb));
+        let start = best.iter().map(|(torque, best)| {
+            let passed = mtpa.two_passes(torque / factor, *best, &universal);
+            [best.0, best.1, best.0 - passed.0, best.1 - passed.1].map(|value| value as f32)
+        });
+        let start = start.collect();
+        let currents = MtpaCurrents {
+            last_torque_nm: last_torque,
+            currents_a: best.iter().map(|(_, current)| *current).collect(),
+        };
+        let top_flux_wb = top_flux.psi_d_wb.hypot(top_flux.psi_q_wb);
         Ok(Self {
             name: parameters.name.clone(),
             ratings: ratings(parameters, smooth.at(0.0, 0.0).psi_d_wb),
@@ -120,9 +117,7 @@ impl Generated {
             universal: universal.iter().map(|value| [*value as f32]).collect(),
             torque_axis: Axis::new(0.0, last_torque, TORQUE_NODES),
             start,
-            weakening_axes,
-            weakening,
-            weakening_torque,
+            weakening: WeakeningTables::new(machine, &smooth, top_flux_wb, &currents),
         })
     }
 }
@@ -268,28 +263,6 @@ fn universal() -> Vec<f64> {
             0.5 * (low + high) / s
         })
         .collect()
-}
-
-type WeakeningTables = ((Axis, Axis), Vec<[f32; 2]>, Vec<[f32; 2]>);
-
-fn weakening(machine: &MachineFolder, smooth: &SmoothMap, top_flux_wb: f64) -> WeakeningTables {
-    let parameters = &machine.parameters;
-    let max_omega =
-        parameters.max_speed_rpm * std::f64::consts::TAU / 60.0 * f64::from(parameters.pole_pairs);
-    // Below what the lowest link gives at the highest speed, and above what full torque needs.
-    let low = 0.8 * std::f64::consts::FRAC_2_PI * parameters.dc_link_min_v / max_omega;
-    let high = (1.15 * top_flux_wb).max(1.5 * low);
-    let last = (SHARE_NODES - 1) as f64;
-    let shares: Vec<_> = (0..SHARE_NODES).map(|k| 1.0 - (1.0 - k as f64 / last).powi(2)).collect();
-    let (mut currents, mut torque, mut most) = (Vec::new(), Vec::new(), 0.0_f64);
-    for k in 0..PSI_NODES {
-        let psi = low + (high - low) * k as f64 / (PSI_NODES - 1) as f64;
-        let circle = circle(psi, &shares, smooth, &machine.map, parameters);
-        most = most.max(circle.torque_nm);
-        currents.extend(circle.currents_a.iter().map(|(id, iq)| [*id as f32, *iq as f32]));
-        torque.push([circle.torque_nm as f32, most as f32]);
-    }
-    ((Axis::new(low, high, PSI_NODES), Axis::new(0.0, 1.0, SHARE_NODES)), currents, torque)
 }
 
 fn ratings(parameters: &Parameters, magnet_flux_wb: f64) -> RatingsF32 {

@@ -11,6 +11,7 @@ mod parameters;
 mod rust_source;
 mod smooth;
 mod weakening;
+mod weakening_tables;
 
 use std::path::Path;
 
@@ -20,6 +21,7 @@ pub use map::FluxMap;
 pub use optimum::Optimum;
 pub use parameters::Parameters;
 pub use smooth::{FluxPoint, SmoothMap};
+pub use weakening_tables::WeakeningTables;
 
 /// A machine folder: `machine.toml` and `flux_map.csv`.
 #[derive(Clone, Debug)]

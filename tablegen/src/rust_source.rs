@@ -9,13 +9,13 @@ impl Generated {
     pub fn rust_source(&self) -> String {
         let mut out = String::new();
         let (rows, columns) = (&self.current_axes.0, &self.current_axes.1);
-        let (psi, share) = (&self.weakening_axes.0, &self.weakening_axes.1);
+        let (psi, share) = (&self.weakening.axes.0, &self.weakening.axes.1);
         array(&mut out, "FLUX", &self.flux);
         array(&mut out, "MTPA_PARAMETERS", &self.parameters);
         array(&mut out, "MTPA_UNIVERSAL", &self.universal);
         array(&mut out, "MTPA_START", &self.start);
-        array(&mut out, "WEAKENING_CURRENTS", &self.weakening);
-        array(&mut out, "WEAKENING_TORQUE", &self.weakening_torque);
+        array(&mut out, "WEAKENING_CURRENTS", &self.weakening.currents);
+        array(&mut out, "WEAKENING_TORQUE", &self.weakening.torque);
         let universal_axis = Axis { first: 0.0, inverse_step: (self.universal.len() - 1) as f32, count: 0 };
         // The struct's own debug form is its literal, under the target's name.
         let ratings = format!("{:#?}", self.ratings).replacen("RatingsF32", "Ratings", 1);
@@ -25,7 +25,7 @@ impl Generated {
             "/// The machine of the folder that was chosen at build time.\n\
              pub static BUILT_IN: Tables = Tables {{\n    name: {:?},\n    ratings: {ratings},\n    \
              flux: {},\n    mtpa: Mtpa {{\n        universal: {},\n        parameters: {},\n        start: {},\n    }},\n    \
-             weakening: Weakening {{\n        currents: {},\n        torque: {},\n    }},\n}};\n",
+             weakening: Weakening {{\n        currents: {},\n        torque: {},\n        flux_knee_wb: {:?},\n        share_knee: {:?},\n    }},\n}};\n",
             self.name,
             grid("FLUX", rows, columns),
             curve("MTPA_UNIVERSAL", &universal_axis),
@@ -33,6 +33,8 @@ impl Generated {
             curve("MTPA_START", &self.torque_axis),
             grid("WEAKENING_CURRENTS", psi, share),
             curve("WEAKENING_TORQUE", psi),
+            self.weakening.flux_knee_wb,
+            self.weakening.share_knee,
         );
         out
     }

@@ -22,20 +22,21 @@ struct Point {
     torque: f64,
 }
 
-/// The circle of flux linkage `psi_wb`, with currents at `torque · shares`.
+/// The circle of flux linkage `psi_wb` within a current limit, with currents at `torque · shares`.
 pub fn circle(
     psi_wb: f64,
     shares: &[f64],
     map: &SmoothMap,
     nodes: &FluxMap,
     parameters: &Parameters,
+    max_current_a: f64,
 ) -> Circle {
     let optimum = Optimum::new(map, parameters);
     let highest_id = nodes.id_a[nodes.id_a.len() - 1];
-    let arc = rising_arc(psi_wb, map, &optimum, parameters.max_current_a);
+    let arc = rising_arc(psi_wb, map, &optimum, max_current_a);
     let Some(top) = arc.last().copied() else {
         // No current within the limit has this flux: nothing to give, and the current that comes nearest.
-        let nearest = (-parameters.max_current_a, 0.0);
+        let nearest = (-max_current_a, 0.0);
         return Circle { torque_nm: TINY_TORQUE_NM, currents_a: vec![nearest; shares.len()] };
     };
     let torque_nm = top.torque.max(TINY_TORQUE_NM);
@@ -45,12 +46,12 @@ pub fn circle(
             let wanted = share * torque_nm;
             let (id, iq) = if wanted < arc[0].torque {
                 // The circle enters the current limit with more torque than that; inside it there is less.
-                at_id(arc[0].id, wanted, &optimum, parameters.max_current_a)
+                at_id(arc[0].id, wanted, &optimum, max_current_a)
             } else {
                 on_arc(&arc, wanted, psi_wb, map, &optimum)
             };
             if id > highest_id {
-                at_id(highest_id, wanted, &optimum, parameters.max_current_a)
+                at_id(highest_id, wanted, &optimum, max_current_a)
             } else {
                 (id, iq)
             }
