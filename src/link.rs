@@ -45,6 +45,8 @@ pub struct Setup {
     pub line: Option<LineTimes>,
     /// Whether the operator is asked over the protocol, by frames, and not by the words of the answers.
     pub over_protocol: bool,
+    /// Whether nothing compensates the dead time.
+    pub uncompensated: bool,
 }
 
 /// Time constants of the line side.
@@ -159,6 +161,7 @@ pub fn setup_to_block(setup: Setup) -> Block {
     [block[0], block[1], block[2]] = [setup.min_pulse_ticks, setup.dead_time_ticks, setup.pwm_delay_ticks];
     [block[3], block[4], block[5]] = line_to_words(setup.line);
     block[6] = setup.over_protocol.into();
+    block[7] = setup.uncompensated.into();
     block
 }
 
@@ -186,10 +189,17 @@ fn told_from_words<T: Told>(words: [u32; 14]) -> Option<(Status<T>, Option<Frame
 
 /// The inverse of [`setup_to_block`].
 pub fn setup_from_block(block: &Block) -> Setup {
-    let [min_pulse_ticks, dead_time_ticks, pwm_delay_ticks, operated, precharge, discharge, frames, ..] =
-        *block;
+    let [min_pulse_ticks, dead_time_ticks, pwm_delay_ticks, ..] = *block;
+    let [_, _, _, operated, precharge, discharge, frames, uncompensated, ..] = *block;
     let line = line_from_words([operated, precharge, discharge]);
-    Setup { min_pulse_ticks, dead_time_ticks, pwm_delay_ticks, line, over_protocol: frames != 0 }
+    Setup {
+        min_pulse_ticks,
+        dead_time_ticks,
+        pwm_delay_ticks,
+        line,
+        over_protocol: frames != 0,
+        uncompensated: uncompensated != 0,
+    }
 }
 
 /// The answer to [`Request::ControlSample`]; `stop` ends the run.

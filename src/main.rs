@@ -13,7 +13,7 @@ mod firmware;
 
 #[cfg(all(target_os = "none", not(feature = "board-nucleo-g474re")))]
 mod firmware {
-    use core::sync::atomic::{AtomicU32, Ordering};
+    use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
     use cortex_m_rt::{entry, exception, interrupt};
     use tractive::board::qemu::{self, CLOCK, Interrupt as interrupt};
     use tractive::control::Gains;
@@ -28,6 +28,7 @@ mod firmware {
     static MIN_PULSE_TICKS: AtomicU32 = AtomicU32::new(0);
     static DEAD_TIME_TICKS: AtomicU32 = AtomicU32::new(0);
     static FIRST_HALF_TICKS: AtomicU32 = AtomicU32::new(0);
+    static UNCOMPENSATED: AtomicBool = AtomicBool::new(false);
 
     fn settings() -> Settings {
         Settings {
@@ -38,7 +39,7 @@ mod firmware {
                 BUILT_IN.ratings.max_switching_hz,
                 &CLOCK,
             ),
-            gains: Gains::DEFAULT,
+            gains: if UNCOMPENSATED.load(Ordering::Relaxed) { Gains::WITHOUT_SIXTH } else { Gains::DEFAULT },
         }
     }
 
@@ -47,6 +48,7 @@ mod firmware {
         let setup = qemu::connect();
         MIN_PULSE_TICKS.store(setup.min_pulse_ticks, Ordering::Relaxed);
         DEAD_TIME_TICKS.store(setup.dead_time_ticks, Ordering::Relaxed);
+        UNCOMPENSATED.store(setup.uncompensated, Ordering::Relaxed);
         if let Err(refused) = const { BUILT_IN.check() }.and_then(|()| settings().check_settings()) {
             qemu::refuse(&refused);
         }

@@ -61,13 +61,14 @@ macro_rules! whole_scalars {
 whole_scalars!(u16, u32, usize);
 
 /// Scalars for which 0 is a value like any other: what is ideal, what is not there, where an axis begins.
-const MAY_BE_ZERO: [&str; 6] = [
+const MAY_BE_ZERO: [&str; 7] = [
     "ratings.stator_resistance_ohm",
     "ratings.magnet_flux_wb",
     "ratings.trip_dc_under_v",
     "devices.min_pulse_ticks",
     "devices.dead_time_ticks",
     "link.resistance_ohm",
+    "gains.sixth_turn_rad",
 ];
 
 /// Puts all nonsense into the fields of a part, one at a time.
@@ -105,8 +106,11 @@ fn try_tables(good: &'static Tables, check: impl Fn(&Tables) -> Result<(), Refus
     #[allow(dead_code, reason = "for the compiler to see that no table is left out")]
     fn is_whole(Tables { name: _, ratings: _, flux: _, mtpa, weakening }: Tables) {
         let Mtpa { universal: _, parameters: _, start: _ } = mtpa;
-        let Weakening { currents: _, torque: _ } = weakening;
+        let Weakening { currents: _, torque: _, flux_knee_wb: _, share_knee: _ } = weakening;
     }
+    let knees: [Field<Weakening, f32>; 2] =
+        [("flux_knee_wb", |part| &mut part.flux_knee_wb), ("share_knee", |part| &mut part.share_knee)];
+    try_all(*good, "weakening.", &knees, |tables| &mut tables.weakening, check);
     try_grid(good, "flux.", |tables| &mut tables.flux, check);
     try_grid(good, "mtpa.parameters.", |tables| &mut tables.mtpa.parameters, check);
     try_grid(good, "weakening.currents.", |tables| &mut tables.weakening.currents, check);
@@ -190,7 +194,8 @@ fn every_scalar_of_the_traction_drive() {
     let devices =
         fields!(Devices as Devices { min_pulse_ticks, dead_time_ticks, shortest_half_ticks | }: u32);
     try_all(settings, "devices.", devices, |settings| &mut settings.devices, check);
-    let gains = fields!(Gains as Gains { carrier, pattern_rad_s, square_damping, observer | }: f32);
+    let gains =
+        fields!(Gains as Gains { carrier, pattern_rad_s, square_damping, observer, sixth_turn_rad | }: f32);
     try_all(settings, "gains.", gains, |settings| &mut settings.gains, check);
 }
 
@@ -205,7 +210,8 @@ fn every_scalar_of_the_zs9() {
         carrier_ticks | clock, gains, speed, link, link_gains, limits
     }: u32);
     try_all(settings, "", own, |settings| settings, check);
-    let gains = fields!(Gains as Gains { carrier, pattern_rad_s, square_damping, observer | }: f32);
+    let gains =
+        fields!(Gains as Gains { carrier, pattern_rad_s, square_damping, observer, sixth_turn_rad | }: f32);
     try_all(settings, "gains.", gains, |settings| &mut settings.gains, check);
     let speed = fields!(SpeedDesign as SpeedDesign { inertia_kg_m2, natural_rad_s, period_s | }: f32);
     try_all(settings, "speed.", speed, |settings| &mut settings.speed, check);

@@ -22,7 +22,7 @@ pub struct MethodFigures {
 /// Torques as shares of the largest: 200, 600, 859 and 1,235 N·m of the reference machine.
 const SHARES: [f64; 4] = [200.0 / 1235.0, 600.0 / 1235.0, 859.0 / 1235.0, 1.0];
 
-/// One pass and two passes from zero current, and two passes as our tables start and trim them.
+/// One pass and two passes from zero current, two passes as our tables start them, and the same as they trim them.
 pub fn compare(machine: &Machine) -> Vec<MethodFigures> {
     let tables = machine.tables;
     let map = SmoothMap::new(&machine.folder.map);
@@ -32,10 +32,13 @@ pub fn compare(machine: &Machine) -> Vec<MethodFigures> {
     for share in SHARES {
         let torque_nm = share * machine.folder.parameters.max_torque_nm;
         let wanted = torque_nm as f32;
+        let [start_d, start_q, ..] = tables.mtpa.start.at(wanted);
+        let started = Dq { d: start_d, q: start_q };
         let methods = [
             ("one pass from L(0, 0)", mtpa_passes::<1>(wanted, zero, tables)),
             ("two passes from L(0, 0), the paper's", mtpa_passes::<2>(wanted, zero, tables)),
-            ("two passes, ours", mtpa(wanted, tables)),
+            ("two passes as we start them", mtpa_passes::<2>(wanted, started, tables)),
+            ("the same, trimmed: ours", mtpa(wanted, tables)),
         ];
         figures.extend(methods.map(|(method, current)| {
             let (id, iq) = (f64::from(current.d), f64::from(current.q));

@@ -105,7 +105,7 @@ pub struct RunOptions {
     /// Dead time, in µs.
     #[arg(long, default_value_t = 0.0, value_parser = not_negative)]
     pub dead_time_us: f64,
-    /// Leave the dead time uncompensated.
+    /// Leave the dead time uncompensated: neither the pulses are corrected nor is the sixth harmonic of the voltage followed.
     #[arg(long)]
     pub uncompensated: bool,
     /// Shortest pulse, in µs.

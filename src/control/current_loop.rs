@@ -29,12 +29,22 @@ pub struct Gains {
     pub square_damping: f32,
     /// Share of an unexplained voltage that one carrier half moves into the integral part.
     pub observer: f32,
+    /// Turn in a carrier half, in rad, up to which the integral part follows six times the stator frequency (what dead time
+    /// leaves); 0: never.
+    pub sixth_turn_rad: f32,
 }
 
 impl Gains {
     /// Gains that suit carrier halves of 0.2 to 0.8 ms.
-    pub const DEFAULT: Self =
-        Self { carrier: 0.75, pattern_rad_s: 350.0, square_damping: 0.5, observer: 0.02 };
+    pub const DEFAULT: Self = Self {
+        carrier: 0.75,
+        pattern_rad_s: 350.0,
+        square_damping: 0.5,
+        observer: 0.02,
+        sixth_turn_rad: 1.0,
+    };
+    /// The same without what would compensate a dead time's harmonics.
+    pub const WITHOUT_SIXTH: Self = Self { sixth_turn_rad: 0.0, ..Self::DEFAULT };
 }
 
 pub struct Input<'a> {

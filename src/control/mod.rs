@@ -181,9 +181,6 @@ pub struct Controller {
 /// toggle the other. What the modulator divides by is the link as it is.
 const LINK_RAD_S: f32 = 100.0;
 
-/// Six times the stator frequency is followed while it turns less than this in a carrier half, in rad.
-const SIXTH_TURN_RAD: f32 = 1.0;
-
 impl Controller {
     /// At rest, with nothing known of the machine's angle.
     pub const fn new() -> Self {
@@ -245,8 +242,8 @@ impl Controller {
         // First of all: nothing else is to be kept meanwhile.
         if let Some(boundary) = boundary {
             let angle = measured.angle - Angle::within_half_turn(omega * boundary.age_s);
-            let sixth =
-                committed.follows == Follows::Mean && 6.0 * omega.abs() * boundary.length_s < SIXTH_TURN_RAD;
+            let turn_rad = 6.0 * omega.abs() * boundary.length_s;
+            let sixth = committed.follows == Follows::Mean && turn_rad < gains.sixth_turn_rad;
             self.disturbance.step(&disturbance::Input { boundary, angle, omega, sixth }, gains, tables);
         }
         let frame = measured.angle.sin_cos();

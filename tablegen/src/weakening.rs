@@ -50,11 +50,7 @@ pub fn circle(
             } else {
                 on_arc(&arc, wanted, psi_wb, map, &optimum)
             };
-            if id > highest_id {
-                at_id(highest_id, wanted, &optimum, max_current_a)
-            } else {
-                (id, iq)
-            }
+            if id > highest_id { at_id(highest_id, wanted, &optimum, max_current_a) } else { (id, iq) }
         })
         .collect();
     Circle { torque_nm, currents_a }

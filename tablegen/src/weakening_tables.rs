@@ -9,7 +9,7 @@ use crate::{MachineFolder, SmoothMap};
 use std::f64::consts::{FRAC_2_PI, TAU};
 
 /// Rows and columns.
-const ROWS: usize = 121;
+const ROWS: usize = 119;
 const COLUMNS: usize = 49;
 /// Knee of the row axis as a share of the largest flux linkage, and of the column axis: where they are half-way through. Rows
 /// stand closer where little flux is left, columns where little torque is.
@@ -72,12 +72,7 @@ struct Row {
 
 impl WeakeningTables {
     /// For a machine whose MTPA currents are known.
-    pub fn new(
-        machine: &MachineFolder,
-        smooth: &SmoothMap,
-        top_flux_wb: f64,
-        mtpa: &MtpaCurrents,
-    ) -> Self {
+    pub fn new(machine: &MachineFolder, smooth: &SmoothMap, top_flux_wb: f64, mtpa: &MtpaCurrents) -> Self {
         let mut circles = Circles::new(machine, smooth, top_flux_wb);
         for _ in 0..ROUNDS {
             if !circles.narrow() {
@@ -161,8 +156,14 @@ impl<'a> Circles<'a> {
         let wide_wb = self.flux_wb(k as f64 / (ROWS - 1) as f64);
         let psi_wb = wide_wb * (1.0 - flux[COLUMNS - 1]);
         let max_current_a = self.machine.parameters.max_current_a * (1.0 - current);
-        let Circle { torque_nm, currents_a } =
-            circle(psi_wb, &self.shares, self.smooth, &self.machine.map, &self.machine.parameters, max_current_a);
+        let Circle { torque_nm, currents_a } = circle(
+            psi_wb,
+            &self.shares,
+            self.smooth,
+            &self.machine.map,
+            &self.machine.parameters,
+            max_current_a,
+        );
         let least = LEAST_EFFECTIVE * self.flux_wb(1.0);
         let nodes = currents_a.iter().zip(&self.shares).zip(flux).map(|((start, share), margin)| {
             let wanted_nm = share * torque_nm;
@@ -183,6 +184,7 @@ impl<'a> Circles<'a> {
     /// gives it there, as it is.
     fn moved(&self, start: (f64, f64), torque_nm: f64, from_wb: f64, to_wb: f64) -> (f64, f64) {
         let (mut id, mut iq) = start;
+        let highest_id = self.machine.map.id_a[self.machine.map.id_a.len() - 1];
         let at = self.smooth.at(id, iq);
         if from_wb == to_wb || (at.psi_d_wb.hypot(at.psi_q_wb) / from_wb - 1.0).abs() > 1e-9 {
             return start;
@@ -191,8 +193,10 @@ impl<'a> Circles<'a> {
             let at = self.smooth.at(id, iq);
             let torque = self.factor * (at.psi_d_wb * iq - at.psi_q_wb * id) - torque_nm;
             let square = at.psi_d_wb.powi(2) + at.psi_q_wb.powi(2) - to_wb * to_wb;
-            if torque.abs() < 1e-9 * self.machine.parameters.max_torque_nm && square.abs() < 1e-12 * to_wb * to_wb {
-                return (id, iq);
+            if torque.abs() < 1e-9 * self.machine.parameters.max_torque_nm
+                && square.abs() < 1e-12 * to_wb * to_wb
+            {
+                return if id > highest_id { start } else { (id, iq) };
             }
             let torque_by_id = self.factor * (at.ldd_h * iq - at.lqd_h * id - at.psi_q_wb);
             let torque_by_iq = self.factor * (at.psi_d_wb + at.ldq_h * iq - at.lqq_h * id);

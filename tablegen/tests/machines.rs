@@ -21,9 +21,11 @@ fn check(name: &str, machine: MachineFolder, bounds: &Bounds) {
     let (mtpa, weakening) = (judge.mtpa(), judge.weakening());
     println!("{name}: MTPA {mtpa:?}");
     println!("{name}: weakening {weakening:?}");
-    let most = 1.0005 * judge.machine.parameters.max_current_a;
+    let most = 1.000_001 * judge.machine.parameters.max_current_a;
     assert!(mtpa.torque < bounds.mtpa.0 && mtpa.other < bounds.mtpa.1, "{name}");
     assert!(weakening.torque < bounds.weakening.0 && weakening.other < bounds.weakening.1, "{name}");
+    // Of single precision.
+    assert!(weakening.above < 1e-6, "{name}: more flux linkage than asked for");
     assert!(mtpa.torque_of_largest < 1e-3 && weakening.torque_of_largest < 1e-3, "{name}");
     assert!(mtpa.current_a < most && weakening.current_a < most, "{name}");
 }
@@ -35,12 +37,12 @@ fn check_nodes(name: &str, judge: &Judge) {
     let positive = |node: &[f32; 2]| node.iter().all(|value| value.is_finite() && *value > 0.0);
     assert!(tables.parameters.iter().all(positive), "{name}: nothing to divide by zero with");
     let last_id = *map.id_a.last().unwrap();
-    for [id, iq] in &tables.weakening {
+    for [id, effective] in &tables.weakening.currents {
         assert!(f64::from(*id) < last_id + 1e-4, "{name}: id {id} beyond the map");
-        let current = f64::from(*id).hypot(f64::from(*iq));
-        assert!(current < 1.0005 * parameters.max_current_a, "{name}: {id}, {iq}");
+        assert!(f64::from(*id) > -1.0005 * parameters.max_current_a, "{name}: id {id}");
+        assert!(*effective > 0.0, "{name}: nothing to divide by zero with");
     }
-    for pair in tables.weakening_torque.windows(2) {
+    for pair in tables.weakening.torque.windows(2) {
         assert!(pair[1][1] >= pair[0][1], "{name}: a wider circle allows no less");
     }
     let (_, iq_axis) = &tables.current_axes;

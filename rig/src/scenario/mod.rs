@@ -170,6 +170,7 @@ fn run_plan(
         pwm_delay_ticks: ticks(options.pwm_delay_us),
         line: line_plan.as_ref().map(|plan| times(&plan.link)),
         over_protocol: supervisor.is_some(),
+        uncompensated: options.uncompensated,
     };
     let devices = Devices::new(
         setup.min_pulse_ticks,
@@ -206,7 +207,8 @@ fn run_plan(
     };
     match options.on {
         On::Host => {
-            let settings = Settings { clock: CLOCK, devices, gains: Gains::DEFAULT };
+            let gains = if options.uncompensated { Gains::WITHOUT_SIXTH } else { Gains::DEFAULT };
+            let settings = Settings { clock: CLOCK, devices, gains };
             settings.check(machine.tables).map_err(run::refused)?;
             run::run_on_host(name, bench, machine.tables, settings, first_half_ticks, line, supervisor)
         }

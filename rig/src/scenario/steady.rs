@@ -6,7 +6,7 @@ use crate::analysis::{self, Figures};
 use crate::bound;
 use crate::distortion::{self, Distortion};
 use crate::machine::Machine;
-use crate::options::RunOptions;
+use crate::options::{On, RunOptions};
 use crate::report::Page;
 use crate::trace::Recording;
 use crate::verdict::Verdict;
@@ -56,8 +56,15 @@ impl Scenario for Steady {
         let beside: Vec<_> = bound::beside(recording, window, options, machine).into_iter().collect();
         let mut verdicts = bound::verdicts(&beside, options).to_vec();
         if options.dead_time_us > 0.0 {
-            let judged = (steady.speed_rpm.abs(), torque_nm.abs()) == DEAD_TIME_POINT;
-            verdicts.extend(dead_time_verdicts(&measured, if judged { 0.5 } else { f64::INFINITY }));
+            let judged =
+                !options.uncompensated && (steady.speed_rpm.abs(), torque_nm.abs()) == DEAD_TIME_POINT;
+            verdicts.extend(dead_time_verdicts(&measured, if judged { 0.5 } else { f64::INFINITY }, ""));
+            if !options.uncompensated
+                && let Ok(without) = self.without_compensation(window, options, machine)
+            {
+                verdicts.extend(dead_time_verdicts(&without, f64::INFINITY, ", without compensation"));
+                figures.set("harmonics_without_compensation", without.harmonics());
+            }
         }
         figures.set("point", vec![steady]);
         figures.set("verdicts", verdicts);
@@ -88,10 +95,24 @@ impl Scenario for Steady {
     }
 }
 
+impl Steady {
+    /// The same on the host with nothing that compensates the dead time.
+    fn without_compensation(
+        &self,
+        window: (f64, f64),
+        options: &RunOptions,
+        machine: &Machine,
+    ) -> anyhow::Result<Distortion> {
+        let options = RunOptions { on: On::Host, uncompensated: true, ..options.clone() };
+        let recording = super::drive(self, &options, machine)?;
+        Ok(distortion::of_recording(&recording, window, &machine.folder))
+    }
+}
+
 /// What the dead time leaves of the harmonics that it makes.
-fn dead_time_verdicts(measured: &Distortion, at_most: f64) -> [Verdict; 2] {
+fn dead_time_verdicts(measured: &Distortion, at_most: f64, how: &str) -> [Verdict; 2] {
     [5, 7].map(|order| {
         let share = measured.share_percent(order);
-        Verdict::at_most(&format!("harmonic {order} in % of the fundamental"), share, at_most, "–")
+        Verdict::at_most(&format!("harmonic {order} in % of the fundamental{how}"), share, at_most, "–")
     })
 }

@@ -125,7 +125,8 @@ impl Truth {
         let step = self.max_current_a / f64::from(SEARCH_STEPS);
         let coarse = (0..=SEARCH_STEPS).map(|k| -step * f64::from(k));
         let best = |ids: &mut dyn Iterator<Item = f64>| {
-            ids.map(|id| (self.most_at(id, step, sign, supply), id)).fold((0.0, 0.0), |a, b| if b.0 > a.0 { b } else { a })
+            ids.map(|id| (self.most_at(id, step, sign, supply), id))
+                .fold((0.0, 0.0), |a, b| if b.0 > a.0 { b } else { a })
         };
         let (_, near) = best(&mut coarse.into_iter());
         let fine = (-100..=100).map(|k| (near + 0.01 * step * f64::from(k)).clamp(-self.max_current_a, 0.0));
@@ -134,8 +135,7 @@ impl Truth {
 
     /// The most torque at an id: from the current limit towards zero, the first iq that the voltage allows.
     fn most_at(&self, id: f64, step: f64, sign: f64, supply: &Supply) -> f64 {
-        let allowed =
-            |iq: f64| self.voltage_v(&self.point(id, sign * iq), supply.omega) <= supply.voltage_v;
+        let allowed = |iq: f64| self.voltage_v(&self.point(id, sign * iq), supply.omega) <= supply.voltage_v;
         let mut outer = self.edge_iq(id);
         if allowed(outer) {
             return self.torque_nm(&self.point(id, outer));

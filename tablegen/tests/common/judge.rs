@@ -19,6 +19,8 @@ pub struct Worst {
     pub torque_of_largest: f64,
     /// Current above the optimum (MTPA), flux linkage off its circle (weakening); for at least 2 % of the largest torque.
     pub other: f64,
+    /// Flux linkage above its circle's, as a share.
+    pub above: f64,
     /// Largest current, in A.
     pub current_a: f64,
 }
@@ -98,15 +100,17 @@ impl Judge {
 
     /// Weakening over all circles and torques whose currents have id ≤ 0; above it, only square wave goes.
     pub fn weakening(&self) -> Worst {
-        let (tables, largest) = (&self.tables, self.machine.parameters.max_torque_nm);
-        let psi_axis = &tables.weakening_axes.0;
+        let (tables, largest) = (&self.tables.weakening, self.machine.parameters.max_torque_nm);
+        let factor = 1.5 * self.tables.ratings.pole_pairs;
+        let axis = &tables.axes.0;
         let mut worst = Worst::default();
-        for row in 0..=8 * (psi_axis.count - 1) {
-            let psi = psi_axis.first + row as f32 / (8.0 * psi_axis.inverse_step);
-            let [circle, limit] = curve(psi_axis, &tables.weakening_torque, psi);
+        for row in 0..=8 * (axis.count - 1) {
+            let place = axis.first + row as f32 / (8.0 * axis.inverse_step);
+            let psi = tables.flux_knee_wb * place / (1.0 - place);
+            let [circle, limit, ..] = curve(axis, &tables.torque, place);
             // No current within the limit has as little flux linkage as a row that gives nothing.
-            let (k, _) = cell(psi_axis, psi);
-            if tables.weakening_torque[k][0] < 0.01 {
+            let (k, _) = cell(axis, place);
+            if tables.torque[k][0] < 0.01 {
                 continue;
             }
             for step in 1..=80 {
@@ -114,20 +118,23 @@ impl Judge {
                 if torque > circle {
                     continue;
                 }
-                let s = 1.0 - (1.0 - torque / circle).sqrt();
-                let [id, iq] = grid(&tables.weakening_axes, &tables.weakening, psi, s);
-                worst.current_a = worst.current_a.max(f64::from(id).hypot(iq.into()));
+                let w = 1.0 - (1.0 - torque / circle).sqrt();
+                let [id, effective] =
+                    grid(&tables.axes, &tables.currents, place, w / (w + tables.share_knee));
+                let iq = torque / (factor * effective);
                 if id > 0.0 {
                     continue;
                 }
+                worst.current_a = worst.current_a.max(f64::from(id).hypot(iq.into()));
                 let error = (self.torque_nm([id, iq]) - f64::from(torque)).abs();
                 worst.torque_of_largest = worst.torque_of_largest.max(error / largest);
                 if f64::from(torque) >= 0.25 * largest {
                     worst.torque = worst.torque.max(error / f64::from(torque));
                 }
+                let at = self.map.at(id.into(), iq.into());
+                let off = at.psi_d_wb.hypot(at.psi_q_wb) / f64::from(psi) - 1.0;
+                worst.above = worst.above.max(off);
                 if f64::from(torque) >= 0.02 * largest {
-                    let at = self.map.at(id.into(), iq.into());
-                    let off = at.psi_d_wb.hypot(at.psi_q_wb) / f64::from(psi) - 1.0;
                     worst.other = worst.other.max(off.abs());
                 }
             }
