@@ -192,6 +192,12 @@ impl Neg for Angle {
     }
 }
 
+/// Square root of a number that is known not to be negative, correctly rounded; NaN stays NaN.
+#[inline]
+pub fn root(x: f32) -> f32 {
+    crate::board::fpu::sqrt(x)
+}
+
 /// Square root, correctly rounded; a negative number gives zero, NaN stays NaN.
 #[inline]
 pub fn sqrt(x: f32) -> f32 {

@@ -1,6 +1,7 @@
 //! The paper's MTPA beside ours, judged on the smooth flux map.
 
 use crate::machine::Machine;
+use crate::verdict::{Verdict, worst};
 use serde::Serialize;
 use tractive::control::{mtpa, mtpa_passes};
 use tractive::frames::Dq;
@@ -17,6 +18,28 @@ pub struct MethodFigures {
     pub torque_error_percent: f64,
     /// Current above the least that gives the delivered torque, in percent.
     pub excess_current_percent: f64,
+}
+
+/// The method that the firmware runs.
+const OURS: &str = "the same, trimmed: ours";
+/// Its bounds: torque off, and current above the least, in percent.
+const BOUNDS: (f64, f64) = (0.3, 0.05);
+
+/// The worst of every method; ours is judged, the others are reported.
+pub fn verdicts(figures: &[MethodFigures]) -> Vec<Verdict> {
+    let methods = figures.iter().map(|one| one.method).take(figures.len() / SHARES.len());
+    let of = |method: &'static str| {
+        let own = move || figures.iter().filter(move |one| one.method == method);
+        let (torque, current) = if method == OURS { BOUNDS } else { (f64::INFINITY, f64::INFINITY) };
+        [
+            ("torque error", worst(own().map(|one| one.torque_error_percent.abs())), torque),
+            ("current above the least", worst(own().map(|one| one.excess_current_percent)), current),
+        ]
+        .map(|(what, found, at_most)| {
+            Verdict::at_most(&format!("MTPA {what} in %, {method}"), found, at_most, "–")
+        })
+    };
+    methods.flat_map(of).collect()
 }
 
 /// Torques as shares of the largest: 200, 600, 859 and 1,235 N·m of the reference machine.
@@ -38,7 +61,7 @@ pub fn compare(machine: &Machine) -> Vec<MethodFigures> {
             ("one pass from L(0, 0)", mtpa_passes::<1>(wanted, zero, tables)),
             ("two passes from L(0, 0), the paper's", mtpa_passes::<2>(wanted, zero, tables)),
             ("two passes as we start them", mtpa_passes::<2>(wanted, started, tables)),
-            ("the same, trimmed: ours", mtpa(wanted, tables)),
+            (OURS, mtpa(wanted, tables)),
         ];
         figures.extend(methods.map(|(method, current)| {
             let (id, iq) = (f64::from(current.d), f64::from(current.q));

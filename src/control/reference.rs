@@ -5,7 +5,7 @@
 //! wave the voltage is what it is, so the point lies on the circle on either side of MTPA.
 
 use super::{flux_linkage, mtpa};
-use crate::frames::{Dq, sqrt};
+use crate::frames::{Dq, root, sqrt};
 use crate::machine::{Tables, Weakening};
 
 /// Where an operating point comes from.
@@ -121,8 +121,7 @@ fn weakened(
     // Position on the tables' axis of the flux linkage √square/ω.
     let place = |square: f32| {
         let root = sqrt(square);
-        let place = root / (root + flux_knee_wb * speed);
-        if place > last { last } else { place }
+        root / (root + flux_knee_wb * speed)
     };
     let resistance_squared = ratings.stator_resistance_ohm * ratings.stator_resistance_ohm;
     let largest_squared = ratings.max_current_a * ratings.max_current_a;
@@ -134,16 +133,17 @@ fn weakened(
     let most = most * speed * speed / (speed * speed + drop * slope);
     let magnitude = torque_nm.abs();
     let flowing = if magnitude > most { most } else { magnitude };
-    let squared = mtpa_squared + above + rise * (1.0 - sqrt(1.0 - flowing / most));
+    let squared = mtpa_squared + above + rise * (1.0 - root(1.0 - flowing / most));
     let below = if squared < largest_squared { largest_squared - squared } else { 0.0 };
     let at = place(square + resistance_squared * below - drop * flowing);
+    let at = if at > last { last } else { at };
     let [circle, most, ..] = torque.at(at);
     let limited = magnitude > most;
     let inside = magnitude > circle;
     let share = if inside { 1.0 } else { magnitude / circle };
     let given = share * circle;
-    let root = sqrt(1.0 - share);
-    let [d, effective] = currents.at(at, (1.0 - root) / ((1.0 + share_knee) - root));
+    let left = root(1.0 - share);
+    let [d, effective] = currents.at(at, (1.0 - left) / ((1.0 + share_knee) - left));
     let torque_nm = if torque_nm < 0.0 { -given } else { given };
     Weakened {
         current: Dq { d, q: torque_nm / (factor * effective) },

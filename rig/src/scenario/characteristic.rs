@@ -96,10 +96,12 @@ impl Scenario for Characteristic {
         let most = torque_bound(options, 0.3, 1.5);
         let mut verdicts = vec![Verdict::at_most("mean torque error in %", error, most, others)];
         verdicts.extend(bound::verdicts(&beside, options));
+        let methods = mtpa_methods::compare(machine);
+        verdicts.extend(mtpa_methods::verdicts(&methods));
         figures.set("verdicts", verdicts);
         figures.set("points", points);
         figures.set("distortion", beside);
-        figures.set("mtpa_methods", mtpa_methods::compare(machine));
+        figures.set("mtpa_methods", methods);
         figures
     }
 
