@@ -4,6 +4,7 @@ use super::cases::Case;
 use super::faults::Cause;
 use super::{CARRIER_HZ, Drive};
 use crate::bench::Observed;
+use crate::bench::injected::ControlFault;
 use crate::campaign::judge::{Bounded, CURRENT_SHARE, FORCED, half_turn_s};
 use crate::campaign::outcome::{Allowed, Seen};
 use crate::plant::zs9::ZNetwork;
@@ -57,7 +58,7 @@ impl Drive {
                 carriers_s.max(half_turn_s(case.point.speeds_rpm[motor], pole_pairs))
             }
             Cause::Bench(Kind::Gate(..)) => STUCK_S,
-            Cause::Bench(Kind::ControlStopped) => carriers_s + STALE_S,
+            Cause::Bench(Kind::Control(ControlFault::Stopped)) => carriers_s + STALE_S,
             Cause::Runaway(_) => carriers_s + TRACKING_S,
             _ => carriers_s,
         }

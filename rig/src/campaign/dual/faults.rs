@@ -1,5 +1,6 @@
 //! What can go wrong with the ZS9.
 
+use crate::bench::injected::ControlFault;
 use crate::campaign::fault::{BENT, Named, SensorErrors, UNFELT};
 use crate::sensor_faults::{AngleFault, CurrentFault};
 use crate::zs9::inject::Kind;
@@ -81,9 +82,15 @@ pub(super) fn faults() -> Vec<Named<Cause>> {
     }
     add("leg-v-feedback", Cause::Bench(Kind::LegStuckOn), STUCK, None, true);
     add("leg-w-feedback", Cause::Bench(Kind::LegStuckOff), STUCK, None, true);
-    let late = Cause::Bench(Kind::ControlLate(100));
+    let late = Cause::Bench(Kind::Control(ControlFault::Late(100)));
     add("control-late", late, &[Fault::ControlDeadline], None, true);
-    add("commands-lost", Cause::Bench(Kind::ControlStopped), &[Fault::StaleCommand], None, true);
+    add(
+        "commands-lost",
+        Cause::Bench(Kind::Control(ControlFault::Stopped)),
+        &[Fault::StaleCommand],
+        None,
+        true,
+    );
     add("demand-not-finite", Cause::Bench(Kind::DemandNotFinite), &[Fault::NotFinite], None, true);
     for motor in [0, 1] {
         let name = format!("overspeed-{}", motor + 1);

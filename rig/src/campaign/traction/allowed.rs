@@ -3,10 +3,11 @@
 use super::cases::Case;
 use super::faults::Cause;
 use super::{Drive, STAGES};
+use crate::bench::Observed;
 use crate::bench::inject::Kind;
-use crate::bench::{LineFilter, Observed};
 use crate::campaign::judge::{Bounded, CURRENT_SHARE, FORCED, half_turn_s};
 use crate::campaign::outcome::{Allowed, Seen};
+use crate::plant::LineFilter;
 use crate::run::CLOCK;
 use core::f64::consts::TAU;
 

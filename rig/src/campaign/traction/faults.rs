@@ -2,6 +2,7 @@
 
 use crate::bench::GATES;
 use crate::bench::inject::{Kind, SupplyFault};
+use crate::bench::injected::ControlFault;
 use crate::campaign::fault::{BENT, Named, SensorErrors, UNFELT};
 use crate::sensor_faults::{AngleFault, CurrentFault};
 use tractive::protection::Fault;
@@ -83,9 +84,15 @@ pub(super) fn faults() -> Vec<Named<Cause>> {
         let cause = Cause::Bench(Kind::Feedback(leg));
         add(&format!("leg-{letter}-feedback"), cause, &[Fault::LegStuck], None, leg == 0);
     }
-    let late = Cause::Bench(Kind::ControlLate(100));
+    let late = Cause::Bench(Kind::Control(ControlFault::Late(100)));
     add("control-late", late, &[Fault::ControlDeadline], None, true);
-    add("commands-lost", Cause::Bench(Kind::ControlStopped), &[Fault::StaleCommand], None, true);
+    add(
+        "commands-lost",
+        Cause::Bench(Kind::Control(ControlFault::Stopped)),
+        &[Fault::StaleCommand],
+        None,
+        true,
+    );
     add("demand-not-finite", Cause::Bench(Kind::DemandNotFinite), &[Fault::NotFinite], None, true);
     const CURRENT: &[Fault] = &[Fault::Overcurrent];
     add("flux-20%-more", Cause::Machine(1.2, 1.0), CURRENT, Some(ANOTHER_MACHINE), true);

@@ -13,9 +13,9 @@ use super::action::{FAULT_S, LEAD_S, Stages};
 use super::outcome::{Seen, Setting};
 use super::without::Without;
 use crate::bench::inject::{Injection, Kind};
-use crate::bench::{self, Bench, Flaws, Limits, LineFilter, Supply};
+use crate::bench::{self, Bench, Flaws, Limits, Supply};
 use crate::machine::Machine;
-use crate::plant::{Plant, PlantSettings, SpeedSource};
+use crate::plant::{LineFilter, Plant, PlantSettings, SpeedSource};
 use crate::run::{CLOCK, Tasks};
 use crate::trace::Row;
 use anyhow::Result;
@@ -121,7 +121,7 @@ impl Drive {
             link_steps: Vec::new(),
             flaws: Flaws::default(),
             supply: Supply::Line(LineFilter::TRACTION),
-            injection: Some(Injection { kind: Kind::Elsewhere, at_s: -LEAD_S, seed: 1 }),
+            injection: Some(Injection { kind: Kind::Elsewhere, at_s: -LEAD_S }),
             limits: Limits::NONE,
         }
     }
@@ -150,7 +150,7 @@ impl Drive {
             Cause::Runaway => (Kind::Elsewhere, PlantSettings::default(), faster(RUNAWAY_RPM_S)),
         };
         let settings = bench::Settings {
-            injection: Some(Injection { kind, at_s, seed: 1 }),
+            injection: Some(Injection { kind, at_s }),
             limits: Limits {
                 current_a: parameters.trip_current_a,
                 udc_v: (parameters.trip_dc_under_v, parameters.trip_dc_over_v),

@@ -1,7 +1,8 @@
 //! Drives that are written down as what happens when, instead of cases.
 
 use super::{Drive, STAGES};
-use crate::bench::{self, Bench, Flaws, Injection, Observed};
+use crate::bench::inject::{Injection, Kind};
+use crate::bench::{self, Bench, Flaws, Observed};
 use crate::campaign::action::LEAD_S;
 use crate::plant::{Plant, PlantSettings, SpeedSource};
 use crate::steps::held;
@@ -22,7 +23,7 @@ pub struct Ride {
     /// Voltages of the line, each from its time on.
     pub line: Vec<(f64, f64)>,
     /// What goes wrong.
-    pub injection: Option<Injection>,
+    pub injection: Option<Injection<Kind>>,
     /// Length, in s.
     pub duration_s: f64,
 }
