@@ -24,7 +24,7 @@ pub enum DcSide {
     /// A capacitor behind a choke.
     Filtered(FilteredLink),
     /// A capacitor behind contactors.
-    Operated(LineSide),
+    Operated(Box<LineSide>),
 }
 
 impl DcSide {

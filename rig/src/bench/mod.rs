@@ -130,7 +130,7 @@ impl Bench {
 
     /// The same with a line side: the link's voltage is its capacitor's, and the drive has an operator.
     pub fn with_line(mut self, plan: LinePlan) -> Self {
-        self.dc = DcSide::Operated(LineSide::new(plan, &self.clock));
+        self.dc = DcSide::Operated(Box::new(LineSide::new(plan, &self.clock)));
         self
     }
 
