@@ -1,7 +1,6 @@
 //! What the firmware's converters see of the machine.
 
 use crate::plant::Plant;
-use crate::steps::held;
 use rand::SeedableRng;
 use rand::rngs::StdRng;
 use rand_distr::{Distribution, Normal};
@@ -83,7 +82,8 @@ impl Sensors {
 
     /// The voltage of a healthy supply, which a stiff link has, in V.
     pub fn supply_v(&self, t_s: f64) -> f64 {
-        held(&self.link_steps, t_s).unwrap_or(self.udc_v) + self.converter.ripple_v(t_s)
+        let passed = self.link_steps.iter().rev().find(|(at_s, _)| t_s >= *at_s);
+        passed.map_or(self.udc_v, |(_, udc_v)| *udc_v) + self.converter.ripple_v(t_s)
     }
 
     /// The phase currents as converted now.
