@@ -286,6 +286,12 @@ impl AlphaBeta {
         Angle::of_vector(self.alpha, self.beta)
     }
 
+    /// Square of the length.
+    #[inline]
+    pub fn squared(self) -> f32 {
+        self.alpha * self.alpha + self.beta * self.beta
+    }
+
     /// Turned by the angle of a direction.
     #[inline]
     pub fn turned(self, by: SinCos) -> Self {
