@@ -10,7 +10,7 @@ use crate::frames::{AlphaBeta, Angle, SQRT_3};
 /// Least angle of the first half, 15°: as short as a half gets that catches up with its angle.
 const LEAST: Angle = Angle(178_956_971);
 
-/// Ends of the first half that are considered, 30° apart.
+/// Ends of the first half that are considered, 20° apart in middle 60° with 7 pulses, 30° in the others.
 const ENDS: u32 = 5;
 
 /// The first half of a pattern.
@@ -28,10 +28,10 @@ impl Catch {
     /// Begun at pulse angle `pulse` with an EMF in V. It ends at the first boundary which the voltage of a carrier can reach.
     pub fn new(mode: Mode, pulse: Angle, emf: AlphaBeta, seen: &Reference) -> Self {
         let largest_v = seen.udc_v * (1.0 / SQRT_3);
-        let step = mode.sector_halves() / 2;
+        let step = if mode == Mode::Mid7 { 2 } else { 1 };
         let turn = 6 * mode.sector_halves();
         let place = ((u64::from((pulse + LEAST).0) * u64::from(turn)) >> 32) as u32;
-        let first = (place.checked_div(step).unwrap_or(0) + 1) * step;
+        let first = place + 1;
         let mut catch = Self::ending(mode, first, pulse, emf, seen);
         for later in 1..ENDS {
             if catch.voltage.squared() <= largest_v * largest_v {

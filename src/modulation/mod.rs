@@ -495,9 +495,9 @@ impl Modulator {
             let zeros = self.zeros();
             return carrier::synchronous(self.next_half, start, period_ticks, zeros, seen, &self.devices);
         }
-        if let Some(Catch { voltage, turn_rad, .. }) = self.catch.take() {
-            let period_ticks = self.whole_ticks(turn_rad * UNITS_PER_RADIAN * ticks_per_unit);
-            let seen = Reference { vector: voltage, rate: 0.0, ..*seen };
+        if let Some(catch) = self.catch.take() {
+            let period_ticks = self.whole_ticks(catch.turn_rad * UNITS_PER_RADIAN * ticks_per_unit);
+            let seen = Reference { vector: catch.voltage, rate: 0.0, ..*seen };
             let zeros = Zeros::Early;
             return carrier::synchronous(self.next_half, start, period_ticks, zeros, &seen, &self.devices);
         }

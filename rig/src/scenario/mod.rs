@@ -51,6 +51,15 @@ pub struct Plan {
     pub operator: Box<dyn Operator + Send>,
 }
 
+impl Plan {
+    /// For a drive with a line side, whose operator permits what is driven.
+    fn operated(duration_s: f64, speed: Vec<(f64, f64)>) -> Self {
+        // What the operator permits takes the place of this.
+        let operator = Box::new(|_: f64| (Demand::default(), true));
+        Self { lead_s: 0.0, duration_s, speed, link: Vec::new(), operator }
+    }
+}
+
 /// A scenario.
 pub trait Scenario {
     /// Its name on the command line.
@@ -131,24 +140,10 @@ pub(crate) fn drive_supervised(
     options: &RunOptions,
     machine: &Machine,
 ) -> Result<Recording> {
-    let plan = Plan {
-        lead_s: 0.0,
-        duration_s: LONGEST_S,
-        speed: Vec::new(),
-        link: Vec::new(),
-        // What the operator permits takes the place of this.
-        operator: Box::new(|_: f64| (Demand::default(), true)),
-    };
+    let plan = Plan::operated(LONGEST_S, Vec::new());
     let idle = Request::idle(&machine.tables.ratings);
-    let line_plan = LinePlan {
-        link: line::scaled(machine),
-        starts_charged: false,
-        // The frames ask, not this.
-        commander: Box::new(move |_| idle),
-        hardware: Vec::new(),
-        chopper_ohm: Vec::new(),
-        reversible: Vec::new(),
-    };
+    // The frames ask, not this.
+    let line_plan = LinePlan::new(line::scaled(machine), Box::new(move |_| idle));
     let rotor = SpeedSource::Inertia { inertia_kg_m2, load_nm: 0.0 };
     run_plan(name, plan, rotor, Some(line_plan), Some(supervisor), options, machine)
 }
