@@ -26,20 +26,21 @@ pub struct Catch {
 
 impl Catch {
     /// Begun at pulse angle `pulse` with an EMF in V. It ends at the first boundary which the voltage of a carrier can reach.
+    #[cold]
     pub fn new(mode: Mode, pulse: Angle, emf: AlphaBeta, seen: &Reference) -> Self {
         let largest_v = seen.udc_v * (1.0 / SQRT_3);
         let step = if mode == Mode::Mid7 { 2 } else { 1 };
         let turn = 6 * mode.sector_halves();
         let place = ((u64::from((pulse + LEAST).0) * u64::from(turn)) >> 32) as u32;
         let first = place + 1;
-        let mut catch = Self::ending(mode, first, pulse, emf, seen);
-        for later in 1..ENDS {
-            if catch.voltage.squared() <= largest_v * largest_v {
-                break;
+        let mut later = 0;
+        loop {
+            let catch = Self::ending(mode, first + later * step, pulse, emf, seen);
+            later += 1;
+            if later == ENDS || catch.voltage.squared() <= largest_v * largest_v {
+                return catch;
             }
-            catch = Self::ending(mode, first + later * step, pulse, emf, seen);
         }
-        catch
     }
 
     /// The one that ends where half number `end` begins (it may be beyond the turn).

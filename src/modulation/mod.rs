@@ -493,16 +493,20 @@ impl Modulator {
         let ticks_per_unit = 1.0 / seen.rate;
         let nominal = boundary(1, carriers).0 as f32 * ticks_per_unit;
         let wanted = (end - pulse).signed() as f32 * ticks_per_unit;
-        if self.mode.is_carrier() {
-            let (shortest, longest) = CARRIER_STRETCH;
-            let period_ticks = self.whole_ticks(limit(wanted, shortest * nominal, longest * nominal));
-            let zeros = self.zeros();
-            return carrier::synchronous(self.next_half, start, period_ticks, zeros, seen, &self.devices);
-        }
-        if let Some(catch) = self.catch.take() {
-            let period_ticks = self.whole_ticks(catch.turn_rad * UNITS_PER_RADIAN * ticks_per_unit);
-            let seen = Reference { vector: catch.voltage, rate: 0.0, ..*seen };
-            let zeros = Zeros::Early;
+        let catch = self.catch.take();
+        if self.mode.is_carrier() || catch.is_some() {
+            let (turn, zeros, seen) = match catch {
+                None => {
+                    let (shortest, longest) = CARRIER_STRETCH;
+                    (limit(wanted, shortest * nominal, longest * nominal), self.zeros(), *seen)
+                }
+                Some(Catch { turn_rad, voltage, .. }) => (
+                    turn_rad * UNITS_PER_RADIAN * ticks_per_unit,
+                    Zeros::Early,
+                    Reference { vector: voltage, rate: 0.0, ..*seen },
+                ),
+            };
+            let period_ticks = self.whole_ticks(turn);
             return carrier::synchronous(self.next_half, start, period_ticks, zeros, &seen, &self.devices);
         }
         let notches = self.mode.notches() as f32;
