@@ -1,7 +1,7 @@
 //! The same for the ZS9.
 
 use super::{CONTROL_ANSWERS, IDLE_ANSWERS, PWM_ANSWERS, exchange, open_files, send, stand_still};
-use crate::board::qemu::{DUAL_RECORDER, saboteur, stop};
+use crate::board::qemu::{DUAL_RECORDER, saboteur, stop, watch};
 use crate::board::{DualSample, PlayedPeriod, PowerSample};
 use crate::drive::dual::DualReport;
 use crate::link::{self, DualRequest, DualSetup};
@@ -35,6 +35,7 @@ pub fn sample_dual(now: Instant) -> DualSample {
 #[inline(never)]
 fn finish() -> ! {
     stand_still();
+    watch::stop();
     saboteur::finish();
     for record in (0..).map_while(|index| DUAL_RECORDER.read(index)) {
         send(&DualRequest::Recorded(record).to_block());
