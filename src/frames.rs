@@ -249,6 +249,18 @@ impl Abc {
         }
     }
 
+    /// As words: the bits of each.
+    #[inline(always)]
+    pub const fn to_bits(self) -> [u32; 3] {
+        [self.a.to_bits(), self.b.to_bits(), self.c.to_bits()]
+    }
+
+    /// The inverse of [`Self::to_bits`].
+    #[inline(always)]
+    pub const fn from_bits([a, b, c]: [u32; 3]) -> Self {
+        Self { a: f32::from_bits(a), b: f32::from_bits(b), c: f32::from_bits(c) }
+    }
+
     /// The largest magnitude of the three.
     #[inline]
     pub fn peak(self) -> f32 {
@@ -272,6 +284,12 @@ impl AlphaBeta {
     #[inline]
     pub fn angle(self) -> Angle {
         Angle::of_vector(self.alpha, self.beta)
+    }
+
+    /// Square of the length.
+    #[inline]
+    pub fn squared(self) -> f32 {
+        self.alpha * self.alpha + self.beta * self.beta
     }
 
     /// Turned by the angle of a direction.

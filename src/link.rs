@@ -88,8 +88,12 @@ pub enum Request {
 /// A request's block. Not in every caller: images are small.
 #[inline(never)]
 fn block(tag: u32, at: Instant, payload: &[u32]) -> Block {
+    filled([tag, at.0].into_iter().chain(payload.iter().copied()))
+}
+
+/// A block that begins with these words; zeros after them.
+fn filled(words: impl IntoIterator<Item = u32>) -> Block {
     let mut block = [0; BLOCK_WORDS];
-    let words = [tag, at.0].into_iter().chain(payload.iter().copied());
     for (slot, word) in block.iter_mut().zip(words) {
         *slot = word;
     }
@@ -155,11 +159,8 @@ impl Request {
 
 /// The answer to [`Request::Hello`].
 pub fn setup_to_block(setup: Setup) -> Block {
-    let mut block = [0; BLOCK_WORDS];
-    [block[0], block[1], block[2]] = [setup.min_pulse_ticks, setup.dead_time_ticks, setup.pwm_delay_ticks];
-    [block[3], block[4], block[5]] = line_to_words(setup.line);
-    block[6] = setup.over_protocol.into();
-    block
+    let ticks = [setup.min_pulse_ticks, setup.dead_time_ticks, setup.pwm_delay_ticks];
+    filled(ticks.into_iter().chain(line_to_words(setup.line)).chain([setup.over_protocol.into()]))
 }
 
 fn line_to_words(line: Option<LineTimes>) -> [u32; 3] {
@@ -196,7 +197,7 @@ pub fn setup_from_block(block: &Block) -> Setup {
 pub fn sample_to_block(sample: &Sample, stop: bool) -> Block {
     let measured = &sample.measured;
     let flags = u32::from(sample.enable) | u32::from(sample.demand.slew_limited) << 1 | u32::from(stop) << 2;
-    let [a, b, c] = currents_to_words(measured.currents_a);
+    let [a, b, c] = measured.currents_a.to_bits();
     let torque = sample.demand.torque_nm.to_bits();
     let hardware = sample.hardware.map_or(0, |fault| fault as u32);
     [a, b, c, measured.udc_v.to_bits(), measured.angle.0, torque, flags, hardware, 0, 0, 0, 0, 0, 0, 0, 0]
@@ -207,7 +208,7 @@ pub fn sample_from_block(block: &Block) -> (Sample, bool) {
     let [a, b, c, udc, angle, torque, flags, hardware, ..] = *block;
     let sample = Sample {
         measured: Measurements {
-            currents_a: currents_from_words(a, b, c),
+            currents_a: Abc::from_bits([a, b, c]),
             udc_v: f32::from_bits(udc),
             angle: Angle(angle),
         },
@@ -222,12 +223,7 @@ pub fn sample_from_block(block: &Block) -> (Sample, bool) {
 
 /// The answer to [`Request::Ask`]; over the protocol the frame asks, not the words.
 pub fn asked_to_block(asked: &operator::Request, feedback: &Feedback, frame: Option<Frame>) -> Block {
-    let mut block = [0; BLOCK_WORDS];
-    let words = asked.to_words().into_iter().chain(feedback.to_words()).chain(frame.to_words());
-    for (slot, word) in block.iter_mut().zip(words) {
-        *slot = word;
-    }
-    block
+    filled(asked.to_words().into_iter().chain(feedback.to_words()).chain(frame.to_words()))
 }
 
 /// The inverse of [`asked_to_block`].
@@ -239,21 +235,11 @@ pub fn asked_from_block(block: &Block) -> (operator::Request, Feedback, Option<F
 
 /// The answer to [`Request::PwmSample`].
 pub fn currents_to_block(currents_a: Abc) -> Block {
-    let mut block = [0; BLOCK_WORDS];
-    [block[0], block[1], block[2]] = currents_to_words(currents_a);
-    block
+    filled(currents_a.to_bits())
 }
 
 /// The inverse of [`currents_to_block`].
 pub fn currents_from_block(block: &Block) -> Abc {
     let [a, b, c, ..] = *block;
-    currents_from_words(a, b, c)
-}
-
-fn currents_to_words(currents_a: Abc) -> [u32; 3] {
-    [currents_a.a.to_bits(), currents_a.b.to_bits(), currents_a.c.to_bits()]
-}
-
-fn currents_from_words(a: u32, b: u32, c: u32) -> Abc {
-    Abc { a: f32::from_bits(a), b: f32::from_bits(b), c: f32::from_bits(c) }
+    Abc::from_bits([a, b, c])
 }

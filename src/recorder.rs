@@ -81,12 +81,12 @@ impl State {
 impl Words<RECORD_WORDS> for Record {
     #[inline(always)]
     fn to_words(self) -> [u32; RECORD_WORDS] {
-        let Abc { a, b, c } = self.currents_a;
+        let [a, b, c] = self.currents_a.to_bits();
         [
             self.at.0,
-            a.to_bits(),
-            b.to_bits(),
-            c.to_bits(),
+            a,
+            b,
+            c,
             self.udc_v.to_bits(),
             self.angle.0,
             self.id_a.to_bits(),
@@ -100,7 +100,7 @@ impl Words<RECORD_WORDS> for Record {
         let [at, a, b, c, udc, angle, id, iq, voltage, state] = words;
         Self {
             at: Instant(at),
-            currents_a: Abc { a: f32::from_bits(a), b: f32::from_bits(b), c: f32::from_bits(c) },
+            currents_a: Abc::from_bits([a, b, c]),
             udc_v: f32::from_bits(udc),
             angle: Angle(angle),
             id_a: f32::from_bits(id),
@@ -169,7 +169,7 @@ const DUAL_DUTY: u32 = 16;
 impl Words<DUAL_WORDS> for DualRecord {
     #[inline(always)]
     fn to_words(self) -> [u32; DUAL_WORDS] {
-        let [Abc { a: a1, b: b1, c: c1 }, Abc { a: a2, b: b2, c: c2 }] = self.currents_a;
+        let [[a1, b1, c1], [a2, b2, c2]] = self.currents_a.map(Abc::to_bits);
         let [first, second] = self.angles;
         let [t1, t2] = self.torque_nm;
         let DualState { scheme, enabled, pulsing, fault } = self.state;
@@ -180,12 +180,12 @@ impl Words<DUAL_WORDS> for DualRecord {
             | ((self.duty * DUTY_STEPS) as u32) << DUAL_DUTY;
         [
             self.at.0,
-            a1.to_bits(),
-            b1.to_bits(),
-            c1.to_bits(),
-            a2.to_bits(),
-            b2.to_bits(),
-            c2.to_bits(),
+            a1,
+            b1,
+            c1,
+            a2,
+            b2,
+            c2,
             first.0,
             second.0,
             self.capacitor_v.to_bits(),
@@ -199,11 +199,9 @@ impl Words<DUAL_WORDS> for DualRecord {
 
     fn from_words(words: [u32; DUAL_WORDS]) -> Self {
         let [at, a1, b1, c1, a2, b2, c2, first, second, capacitor, source, inductor, t1, t2, state] = words;
-        let currents =
-            |[a, b, c]: [u32; 3]| Abc { a: f32::from_bits(a), b: f32::from_bits(b), c: f32::from_bits(c) };
         Self {
             at: Instant(at),
-            currents_a: [currents([a1, b1, c1]), currents([a2, b2, c2])],
+            currents_a: [Abc::from_bits([a1, b1, c1]), Abc::from_bits([a2, b2, c2])],
             angles: [Angle(first), Angle(second)],
             capacitor_v: f32::from_bits(capacitor),
             source_v: f32::from_bits(source),

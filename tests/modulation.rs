@@ -107,3 +107,46 @@ fn mean_voltage_of_every_carrier_half_is_the_reference() {
         }
     }
 }
+
+/// Where the centre of a pattern's flux stands in the turn after its first half, in parts of the fundamental flux. Begun at
+/// `begin` turns with an EMF of a share of the voltage, `lead` turns ahead of it.
+fn centre_after_catch((mode, hz, depth): (Mode, f32, f32), begin: f32, share: f32, lead: f32) -> f64 {
+    const UDC_V: f32 = 1500.0;
+    let voltage_v = depth * UDC_V * std::f32::consts::FRAC_2_PI;
+    let omega = f64::from(hz) * std::f64::consts::TAU;
+    let asked = |volts: f32, turns: f32, now: Instant| {
+        let angle = Angle::from_turns(turns) + Angle((f64::from(rate(hz)) * f64::from(now.0)) as u64 as u32);
+        Reference::turning(volts, angle, rate(hz), now, UDC_V)
+    };
+    let mut modulator = Modulator::new(devices(), Schedule::fixed(mode, &CLOCK));
+    let emf = asked(share * voltage_v, begin + lead, Instant(0)).vector;
+    let mut flux = [f64::from(emf.beta) / omega, -f64::from(emf.alpha) / omega];
+    let (mut now, mut centre) = (Instant(0), [0.0; 2]);
+    let turn = 6 * mode.sector_halves();
+    for number in 0..=turn {
+        let pattern = asked(voltage_v, begin, now);
+        let reference = if number == 0 { Reference { vector: emf, ..pattern } } else { pattern };
+        let half = modulator.step(now, Some(&reference));
+        assert_eq!(half.mode, mode);
+        let [a, b, c] = half.on_ticks(0).map(|on| f64::from(on) / 25e6 * f64::from(UDC_V));
+        flux = [flux[0] + (2.0 * a - b - c) / 3.0, flux[1] + (b - c) / 3_f64.sqrt()];
+        if number > 0 {
+            centre = [0, 1].map(|axis: usize| centre[axis] + flux[axis] / f64::from(turn));
+        }
+        now = now.after(half.period_ticks);
+    }
+    centre[0].hypot(centre[1]) * omega / f64::from(voltage_v)
+}
+
+#[test]
+fn a_pattern_that_catches_a_machine_stands_on_its_centre_at_once() {
+    let patterns = [(Mode::Mid7, 100.0, 0.9), (Mode::Mid3, 200.0, 0.95), (Mode::Square, 300.0, 1.0)];
+    let magnets = [(0.4, 0.0), (0.7, 0.0), (0.9, 0.0), (0.7, -0.1), (0.7, 0.1)];
+    for (pattern, (share, lead)) in patterns.into_iter().flat_map(|pattern| magnets.map(|own| (pattern, own)))
+    {
+        for begin in 0..72 {
+            let off = centre_after_catch(pattern, begin as f32 / 72.0, share, lead);
+            assert!(off < 0.01, "{pattern:?} {begin} {share} {lead}: {off}");
+        }
+    }
+}

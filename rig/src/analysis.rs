@@ -1,6 +1,7 @@
 //! Figures from a recording.
 
 use crate::options::RunOptions;
+use crate::rows::{between, mean};
 use crate::trace::{Recording, Row, Switch};
 use crate::verdict::{FALLS_SHORT, Verdict, bound, torque_bound, worst};
 use serde::Serialize;
@@ -54,14 +55,7 @@ pub fn common(recording: &Recording) -> Figures {
 
 /// The rows from `from_s` (included) to `to_s` (excluded).
 pub fn window(recording: &Recording, from_s: f64, to_s: f64) -> &[Row] {
-    let rows = &recording.rows;
-    let first = rows.partition_point(|row| row.t_s < from_s - 1e-9);
-    let last = rows.partition_point(|row| row.t_s < to_s - 1e-9);
-    &rows[first..last.max(first)]
-}
-
-fn mean(rows: &[Row], value: impl Fn(&Row) -> f64) -> f64 {
-    rows.iter().map(value).sum::<f64>() / rows.len().max(1) as f64
+    between(&recording.rows, from_s, to_s)
 }
 
 /// The largest number of times that any one device turns on in any window of this length.

@@ -21,6 +21,7 @@ pub mod pattern;
 pub mod plant;
 pub mod points;
 pub mod report;
+pub mod rows;
 pub mod run;
 pub mod scenario;
 pub mod sensor_faults;

@@ -1,9 +1,10 @@
 //! Options that all runs share.
 
 use crate::bench::Flaws;
+use crate::bench::injected::Injection;
 use crate::machine::Machine;
 use crate::run::{CLOCK, Emulator};
-use crate::zs9::inject::Injection;
+use crate::zs9::inject::Kind;
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 use std::path::PathBuf;
@@ -210,7 +211,7 @@ pub struct Zs9Options {
     /// ZS9: something that goes wrong, NAME@SECONDS: source-short, source-low, source-high, sensor-lost-1, sensor-lost-2,
     /// sensor-frozen-1, sensor-frozen-2, sensor-jump-2, overcurrent, not-finite, leg-stuck-on, leg-stuck-off.
     #[arg(long)]
-    pub inject: Option<Injection>,
+    pub inject: Option<Injection<Kind>>,
 }
 
 fn scheme(text: &str) -> Result<Scheme, String> {

@@ -128,6 +128,37 @@ impl Page {
         self.plot_window(title, unit, recording, (0.0, end_s), curves);
     }
 
+    /// Torque and demand.
+    pub fn torque(&mut self, recording: &Recording) {
+        self.plot(
+            "Torque",
+            "N·m",
+            recording,
+            &[("torque", |row| row.te_nm), ("demand", |row| row.te_ref_nm)],
+        );
+    }
+
+    /// The current of phase u.
+    pub fn phase_current(&mut self, recording: &Recording) {
+        self.plot("Phase current u", "A", recording, &[("ia", |row| row.ia_a)]);
+    }
+
+    /// The current of phase u over a part of the recording.
+    pub fn phase_current_in(&mut self, title: &str, recording: &Recording, window: (f64, f64)) {
+        self.plot_window(title, "A", recording, window, &[("ia", |row| row.ia_a)]);
+    }
+
+    /// Currents in the rotor's frame, and what is wanted of them.
+    pub fn rotor_currents(&mut self, recording: &Recording) {
+        let curves: [Curve; 4] = [
+            ("id", |row| row.id_a),
+            ("iq", |row| row.iq_a),
+            ("id*", |row| row.id_ref_a),
+            ("iq*", |row| row.iq_ref_a),
+        ];
+        self.plot("Currents, rotor frame", "A", recording, &curves);
+    }
+
     /// The whole run in one picture.
     pub fn overview(&mut self, recording: &Recording) {
         match overview(recording) {

@@ -31,8 +31,8 @@ fn mean_nm(rows: &[Row], from_s: f64, to_s: f64) -> f64 {
     window.iter().map(|row| row.te_nm).sum::<f64>() / window.len() as f64
 }
 
-fn injected(kind: Kind) -> Option<Injection> {
-    Some(Injection { kind, at_s: 0.2037, seed: 1 })
+fn injected(kind: Kind) -> Option<Injection<Kind>> {
+    Some(Injection { kind, at_s: 0.2037 })
 }
 
 #[test]

@@ -3,6 +3,7 @@
 use clap::Parser;
 use serde_json::Value;
 use tractive_rig::options::RunOptions;
+use tractive_rig::rows::mean;
 use tractive_rig::zs9::command::{self, Outcome};
 use tractive_rig::zs9::figures;
 use tractive_rig::zs9::scenario;
@@ -103,7 +104,7 @@ fn the_cycle_goes_up_and_back_and_returns_energy() {
     assert!((figure(&outcome, "end_speed_rpm") - 10.0).abs() < 0.1);
     let full = figures::window(recording, 1.0, 5.0);
     for k in 0..2 {
-        let torque = figures::mean(full, |row| row.motors[k].torque_nm);
+        let torque = mean(full, |row| row.motors[k].torque_nm);
         assert!((torque - 120.0).abs() < 0.1, "{torque} N·m");
     }
     assert!(figure(&outcome, "accelerated_s") <= 9.2);

@@ -59,6 +59,9 @@ fn share(x: f32, span: f32) -> f32 {
     if x > 0.0 { x / span } else { 0.0 }
 }
 
+/// Torque of what flows while the gates are off without the diodes rectifying, as a share of the largest: none.
+const LEAKAGE_SHARE: f32 = 0.01;
+
 #[derive(Clone, Copy, Debug)]
 pub struct Shaper {
     /// `None` until pulses are made.
@@ -84,6 +87,10 @@ impl Shaper {
         Self { torque_nm: None }
     }
 
+    pub const fn without_torque() -> Self {
+        Self { torque_nm: Some(0.0) }
+    }
+
     /// The shaped demand, in N·m.
     pub fn step(&mut self, input: &Input, ratings: &Ratings) -> f32 {
         let largest = envelope_nm(input.omega, ratings);
@@ -91,6 +98,7 @@ impl Shaper {
         let last = match self.torque_nm {
             Some(last) => last,
             None if input.can_step => 0.0,
+            None if input.flowing_nm.abs() < LEAKAGE_SHARE * ratings.max_torque_nm => 0.0,
             None => input.flowing_nm,
         };
         // A pattern of few pulses cannot follow a step: its flux hexagon has to be turned against the rotor, and faster it would be

@@ -138,7 +138,8 @@ pub struct Law<'a> {
 pub struct VoltageVector {
     /// Fundamental, peak phase, in V.
     pub voltage_v: f32,
-    /// The same as a vector at the sample, as if it acted there already, in V; it turns with `omega`.
+    /// The same as a vector at the sample, as if it acted there already, in V; it turns with `omega`. While the gates are off and a
+    /// pattern follows, the EMF: what the pattern starts from.
     pub vector: AlphaBeta,
     /// Likewise what a locked carrier keeps its angle to: the steady fundamental where pulses can regulate
     /// without it, the vector itself where the angle is what regulates.
@@ -228,6 +229,11 @@ impl Controller {
         self.speed.omega()
     }
 
+    /// The machine's flux linkage over the map's, as far as an error of it is believed.
+    pub fn map_scale(&self) -> f32 {
+        self.map_error.scale()
+    }
+
     /// Forgets demand and disturbance, as the gates are off.
     pub fn idle(&mut self) {
         self.demand = demand::Shaper::new();
@@ -235,6 +241,11 @@ impl Controller {
         self.trim = torque_trim::TorqueTrim::new();
         self.link_v = None;
         self.path = flux_path::FluxPath::new();
+    }
+
+    /// After [`Controller::idle`]: the next torque begins at none, whatever flows.
+    pub fn begin_without_torque(&mut self) {
+        self.demand = demand::Shaper::without_torque();
     }
 
     /// One control period: the voltage for the carrier half that begins at the horizon.
@@ -309,10 +320,12 @@ impl Controller {
             self.map_error.step(self.disturbance.mean(), target, omega, boundary.length_s);
         }
         let regulates_by_pulses = committed.follows == Follows::Mean;
+        let catches = committed.volt_seconds.is_none() && !regulates_by_pulses;
+        let vector = if catches { flux.j() * omega } else { voltage };
         Output {
             voltage: VoltageVector {
                 voltage_v: voltage.length(),
-                vector: voltage.unpark(frame),
+                vector: vector.unpark(frame),
                 carrier: if regulates_by_pulses { steady } else { voltage }.unpark(frame),
                 steady_v: steady.length(),
                 omega,

@@ -111,7 +111,7 @@ impl Committal {
         let [period, u, v, w, packed] = half_to_words(self.half);
         // What never toggles does so at the end.
         let [u, v, w] = [u, v, w].map(|compare| compare.min(period));
-        let [a, b, c] = currents_to_words(self.currents_a);
+        let [a, b, c] = self.currents_a.to_bits();
         let flags = (u32::from(self.mirrored) * MIRRORED) | (u32::from(self.tripped) * TRIPPED);
         let (alpha, beta) = (on.alpha.to_bits(), on.beta.to_bits());
         let acknowledged = self.acknowledged.into();
@@ -183,7 +183,7 @@ impl CommittalRecord<'_> {
     /// Phase currents at the boundary, in A.
     #[inline]
     pub fn currents_a(&self) -> Abc {
-        currents_from_words([self.0.word::<9>(), self.0.word::<10>(), self.0.word::<11>()])
+        Abc::from_bits([self.0.word::<9>(), self.0.word::<10>(), self.0.word::<11>()])
     }
 
     /// See [`Committal::acknowledged`].
@@ -297,15 +297,6 @@ pub fn half_from_words(words: [u32; 5]) -> CarrierPeriod {
         half: (packed >> 16) as u8,
         ahead: [Mode::from_code(packed >> 24 & 0xF), Mode::from_code(packed >> 28)],
     }
-}
-
-fn currents_to_words(currents: Abc) -> [u32; 3] {
-    [currents.a.to_bits(), currents.b.to_bits(), currents.c.to_bits()]
-}
-
-fn currents_from_words(words: [u32; 3]) -> Abc {
-    let [a, b, c] = words;
-    Abc { a: f32::from_bits(a), b: f32::from_bits(b), c: f32::from_bits(c) }
 }
 
 /// A latched fault as four words: fault and safe state, value, limit, instant; zeros for none.

@@ -1,7 +1,7 @@
 //! The ZS9's blocks: the same three streams and the same tags, other contents.
 
 use super::{
-    BLOCK_WORDS, Block, LineTimes, block, line_from_words, line_to_words, told_from_words, told_to_words,
+    Block, LineTimes, block, filled, line_from_words, line_to_words, told_from_words, told_to_words,
 };
 use crate::board::{DualSample, GateFeedback, HardwareBreak, MotorDemand, PlayedPeriod, PowerSample};
 use crate::cell::Words;
@@ -123,10 +123,7 @@ fn told_of(report: &DualReport) -> [u32; 10] {
 
 /// The answer to [`DualRequest::Hello`].
 pub fn dual_setup_to_block(setup: DualSetup) -> Block {
-    let mut block = [0; BLOCK_WORDS];
-    block[0] = setup.carrier_ticks;
-    [block[1], block[2], block[3]] = line_to_words(setup.line);
-    block
+    filled([setup.carrier_ticks].into_iter().chain(line_to_words(setup.line)))
 }
 
 /// The inverse of [`dual_setup_to_block`].
@@ -137,11 +134,7 @@ pub fn dual_setup_from_block(block: &Block) -> DualSetup {
 
 /// The answer to [`DualRequest::Ask`].
 pub fn dual_asked_to_block(feedback: &Feedback, frame: Option<Frame>) -> Block {
-    let mut block = [0; BLOCK_WORDS];
-    for (slot, word) in block.iter_mut().zip(feedback.to_words().into_iter().chain(frame.to_words())) {
-        *slot = word;
-    }
-    block
+    filled(feedback.to_words().into_iter().chain(frame.to_words()))
 }
 
 /// The inverse of [`dual_asked_to_block`].
@@ -152,7 +145,7 @@ pub fn dual_asked_from_block(block: &Block) -> (Feedback, Option<Frame>) {
 
 /// The answer to [`DualRequest::ControlSample`]; `stop` ends the run.
 pub fn dual_sample_to_block(sample: &DualSample, stop: bool) -> Block {
-    let [[a1, b1, c1], [a2, b2, c2]] = sample.currents_a.map(current_words);
+    let [[a1, b1, c1], [a2, b2, c2]] = sample.currents_a.map(Abc::to_bits);
     let [first, second] = sample.angles.map(|angle| angle.unwrap_or(Angle::ZERO).0);
     let [lost1, lost2] = sample.angles.map(|angle| u32::from(angle.is_none()));
     let [(kind1, demand1), (kind2, demand2)] = sample.demands.map(demand_words);
@@ -194,7 +187,7 @@ pub fn dual_sample_from_block(block: &Block) -> (DualSample, bool) {
     ] = *block;
     let angle = |word, lost| (flags & lost == 0).then_some(Angle(word));
     let sample = DualSample {
-        currents_a: [currents([a1, b1, c1]), currents([a2, b2, c2])],
+        currents_a: [Abc::from_bits([a1, b1, c1]), Abc::from_bits([a2, b2, c2])],
         angles: [angle(first, 4), angle(second, 8)],
         capacitor_v: f32::from_bits(capacitor),
         inductor_a: f32::from_bits(inductor),
@@ -213,7 +206,7 @@ pub fn dual_sample_from_block(block: &Block) -> (DualSample, bool) {
 
 /// The answer to [`DualRequest::PowerSample`].
 pub fn power_to_block(sample: &PowerSample) -> Block {
-    let [[a1, b1, c1], [a2, b2, c2]] = sample.currents_a.map(current_words);
+    let [[a1, b1, c1], [a2, b2, c2]] = sample.currents_a.map(Abc::to_bits);
     let gates = u32::from(sample.gates.on) | u32::from(sample.gates.off) << 16;
     let (capacitor, source) = (sample.capacitor_v.to_bits(), sample.source_v.to_bits());
     [a1, b1, c1, a2, b2, c2, capacitor, source, gates, 0, 0, 0, 0, 0, 0, 0]
@@ -223,19 +216,11 @@ pub fn power_to_block(sample: &PowerSample) -> Block {
 pub fn power_from_block(block: &Block) -> PowerSample {
     let [a1, b1, c1, a2, b2, c2, capacitor, source, gates, ..] = *block;
     PowerSample {
-        currents_a: [currents([a1, b1, c1]), currents([a2, b2, c2])],
+        currents_a: [Abc::from_bits([a1, b1, c1]), Abc::from_bits([a2, b2, c2])],
         capacitor_v: f32::from_bits(capacitor),
         source_v: f32::from_bits(source),
         gates: GateFeedback { on: gates as u16, off: (gates >> 16) as u16 },
     }
-}
-
-fn current_words(current: Abc) -> [u32; 3] {
-    [current.a.to_bits(), current.b.to_bits(), current.c.to_bits()]
-}
-
-fn currents([a, b, c]: [u32; 3]) -> Abc {
-    Abc { a: f32::from_bits(a), b: f32::from_bits(b), c: f32::from_bits(c) }
 }
 
 /// Kind (0 torque, 1 torque with slew, 2 speed) and value.
@@ -256,6 +241,7 @@ fn demand(kind: u32, value: u32) -> MotorDemand {
 
 #[cfg(test)]
 mod tests {
+    use super::super::BLOCK_WORDS;
     use super::*;
     use crate::nine_switch::Scheme;
     use crate::operator::{State, Switches};

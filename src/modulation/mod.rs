@@ -11,15 +11,17 @@
 #![forbid(unsafe_code)]
 
 mod carrier;
+mod catch;
 mod dead_time;
 mod middle60;
 mod ripple;
 mod schedule;
 
-use crate::frames::{AlphaBeta, Angle, limit};
+use crate::frames::{AlphaBeta, Angle, UNITS_PER_RADIAN, limit};
 use crate::time::{Clock, Instant};
 
 use carrier::Zeros;
+use catch::Catch;
 pub use dead_time::compensated;
 pub use ripple::{RippleFlux, ripple_share};
 pub use schedule::{Schedule, depth_limit, first_half};
@@ -270,6 +272,8 @@ pub struct Modulator {
     after_pattern: bool,
     /// Half the zero voltage of the present pattern's sectors, as an angle in rad.
     zero_rad: f32,
+    /// What leads the flux of a machine that is caught to where its pattern begins; in the first half only.
+    catch: Option<Catch>,
 }
 
 /// A new pattern growing out of an old one.
@@ -326,6 +330,7 @@ impl Modulator {
             growth: None,
             after_pattern: false,
             zero_rad: 0.0,
+            catch: None,
         }
     }
 
@@ -400,7 +405,7 @@ impl Modulator {
     fn choose_mode(&mut self, start: Instant, pulse: Angle, seen: &Reference) {
         if let Some(plan) = self.plan {
             if plan.at == self.next_half {
-                self.switch_to(start, plan.to, pulse);
+                self.switch_to(start, plan.to, pulse, seen);
             }
             return;
         }
@@ -415,7 +420,7 @@ impl Modulator {
                 self.plan = Some(Plan { to: wanted, at });
             }
         } else if schedule::may_switch(self.mode, wanted, self.next_half) {
-            self.switch_to(start, wanted, pulse);
+            self.switch_to(start, wanted, pulse, seen);
         }
     }
 
@@ -425,9 +430,14 @@ impl Modulator {
         (boundary(self.next_half, self.mode.carriers()) - pulse).signed().unsigned_abs() < KEPT_ANGLE.0
     }
 
-    fn switch_to(&mut self, start: Instant, mode: Mode, pulse: Angle) {
+    fn switch_to(&mut self, start: Instant, mode: Mode, pulse: Angle, seen: &Reference) {
         let from = self.mode;
         self.next_half = first_half(from, mode, self.next_half, pulse);
+        if from == Mode::Off && mode.is_pattern() {
+            let catch = Catch::new(mode, pulse, seen.vector_at(start), seen);
+            self.next_half = catch.half;
+            self.catch = Some(catch);
+        }
         self.mode = mode;
         self.plan = None;
         self.after_pattern = from.is_pattern() && mode.is_carrier();
@@ -484,6 +494,12 @@ impl Modulator {
             let period_ticks = self.whole_ticks(limit(wanted, shortest * nominal, longest * nominal));
             let zeros = self.zeros();
             return carrier::synchronous(self.next_half, start, period_ticks, zeros, seen, &self.devices);
+        }
+        if let Some(catch) = self.catch.take() {
+            let period_ticks = self.whole_ticks(catch.turn_rad * UNITS_PER_RADIAN * ticks_per_unit);
+            let seen = Reference { vector: catch.voltage, rate: 0.0, ..*seen };
+            let zeros = Zeros::Early;
+            return carrier::synchronous(self.next_half, start, period_ticks, zeros, &seen, &self.devices);
         }
         let notches = self.mode.notches() as f32;
         let own_rad = if self.mode == Mode::Square {

@@ -86,16 +86,7 @@ impl DualRequest {
     /// Nothing wanted, limits as rated; the link at this voltage.
     pub const fn idle(ratings: &Ratings, link_ref_v: f32) -> Self {
         let motor = MotorRequest { wanted: Wanted::Torque(0.0), limits: MotorLimits::rated(ratings) };
-        let levels = Levels {
-            enable: false,
-            with_torque: false,
-            off: false,
-            coast: false,
-            charge: false,
-            discharge: false,
-            acknowledge: false,
-        };
-        Self { levels, motors: [motor; 2], link_ref_v }
+        Self { levels: Levels::NONE, motors: [motor; 2], link_ref_v }
     }
 }
 

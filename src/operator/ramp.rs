@@ -58,10 +58,14 @@ impl Ramp {
         let able = change * (sqrt(0.25 + 2.0 * error.abs() / (change * step_s)) - 0.5);
         let rate = if able < slew_nm_s { able } else { slew_nm_s };
         let wanted = if error < 0.0 { -rate } else { rate };
+        let before_nm_s = self.rate_nm_s;
         self.rate_nm_s = limit(wanted, self.rate_nm_s - change, self.rate_nm_s + change);
         self.torque_nm += self.rate_nm_s * step_s;
         let passed = (target_nm - self.torque_nm) * error <= 0.0;
-        if passed && self.rate_nm_s.abs() <= 2.0 * change {
+        // Landing on it is a step at the rate that just takes it there, and rest after it.
+        let landing_nm_s = error / step_s;
+        let softly = landing_nm_s.abs() <= 2.0 * change && (landing_nm_s - before_nm_s).abs() <= 2.0 * change;
+        if passed && softly {
             *self = Self { torque_nm: target_nm, rate_nm_s: 0.0 };
         }
         self.torque_nm

@@ -69,6 +69,19 @@ pub struct Levels {
     pub acknowledge: bool,
 }
 
+impl Levels {
+    /// Nothing wanted.
+    pub const NONE: Self = Self {
+        enable: false,
+        with_torque: false,
+        off: false,
+        coast: false,
+        charge: false,
+        discharge: false,
+        acknowledge: false,
+    };
+}
+
 /// Limits that the command's sender may set, each within the machine's ratings: outside of them they are refused, and the limits
 /// that held before go on.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -241,13 +254,12 @@ impl Words<4> for Feedback {
             self.parameters_open,
         ]);
         let hardware = self.hardware.map_or(0, |fault| fault as u32);
-        let Abc { a, b, c } = self.offsets_a;
-        [flags | (self.configuration as u32) << 8 | hardware << 16, a.to_bits(), b.to_bits(), c.to_bits()]
+        let [a, b, c] = self.offsets_a.to_bits();
+        [flags | (self.configuration as u32) << 8 | hardware << 16, a, b, c]
     }
 
     fn from_words(words: [u32; 4]) -> Self {
         let [flags, offsets @ ..] = words;
-        let [a, b, c] = offsets.map(f32::from_bits);
         let flag = |bit: u32| flags >> bit & 1 != 0;
         Self {
             precharge_closed: flag(0),
@@ -257,7 +269,7 @@ impl Words<4> for Feedback {
             sensor_alive: flag(4),
             position_known: flag(5),
             parameters_open: flag(6),
-            offsets_a: Abc { a, b, c },
+            offsets_a: Abc::from_bits(offsets),
             configuration: match flags >> 8 & 0xFF {
                 1 => Configuration::Good,
                 2 => Configuration::Bad,

@@ -103,6 +103,18 @@ pub struct Command {
 }
 
 impl Command {
+    /// Nothing asked.
+    pub const AT_REST: Self = Self {
+        enable: false,
+        with_torque: false,
+        off: false,
+        coast: false,
+        charge: false,
+        discharge: false,
+        acknowledge: false,
+        torque_nm: 0.0,
+    };
+
     /// As a frame's content.
     pub fn encode(&self) -> Result<Payload, OutOfRange> {
         let Self { enable, with_torque, off, coast, charge, discharge, acknowledge, .. } = *self;

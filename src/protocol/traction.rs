@@ -28,17 +28,6 @@ pub enum Content {
     Parameter(ParameterRequest),
 }
 
-const AT_REST: Command = Command {
-    enable: false,
-    with_torque: false,
-    off: false,
-    coast: false,
-    charge: false,
-    discharge: false,
-    acknowledge: false,
-    torque_nm: 0.0,
-};
-
 /// What was said to the PMaSynRM drive last.
 #[derive(Clone, Copy, Debug)]
 pub struct Traction {
@@ -70,7 +59,7 @@ impl Dialect for Traction {
     const TO_DRIVE: &'static [&'static Message] = &TO_DRIVE;
     const FROM_DRIVE: [&'static Message; 8] = FROM_DRIVE;
     const GREETING: Content = Content::Greeting;
-    const SILENT: Self = Self { command: AT_REST, torque_limits: None, link_limits: None };
+    const SILENT: Self = Self { command: Command::AT_REST, torque_limits: None, link_limits: None };
 
     fn decode(id: u16, payload: Payload) -> Option<Content> {
         Some(match id {
@@ -87,7 +76,7 @@ impl Dialect for Traction {
             Content::Greeting => {}
             Content::Command(command) => {
                 self.command = command;
-                let at_rest = Command { torque_nm: 0.0, off: false, ..command } == AT_REST;
+                let at_rest = Command { torque_nm: 0.0, off: false, ..command } == Command::AT_REST;
                 return Taken::Command { at_rest };
             }
             Content::Limits(limits) => self.torque_limits = Some(limits),
@@ -98,7 +87,7 @@ impl Dialect for Traction {
     }
 
     fn rest(&mut self) {
-        self.command = AT_REST;
+        self.command = Command::AT_REST;
     }
 
     fn request(&self, armed: bool, fresh: bool, parameters: &Parameters, ratings: &Ratings) -> Request {

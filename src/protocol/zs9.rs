@@ -114,18 +114,7 @@ pub struct Zs9Command {
 
 impl Zs9Command {
     /// Nothing asked.
-    pub const AT_REST: Self = Self {
-        levels: Levels {
-            enable: false,
-            with_torque: false,
-            off: false,
-            coast: false,
-            charge: false,
-            discharge: false,
-            acknowledge: false,
-        },
-        demands: Zs9Demands::Torques([0.0; 2]),
-    };
+    pub const AT_REST: Self = Self { levels: Levels::NONE, demands: Zs9Demands::Torques([0.0; 2]) };
 
     /// As a frame's content.
     pub fn encode(&self) -> Result<Payload, OutOfRange> {

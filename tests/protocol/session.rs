@@ -74,16 +74,7 @@ impl Bench {
     }
 }
 
-const PULL: Command = Command {
-    enable: true,
-    with_torque: false,
-    off: false,
-    coast: false,
-    charge: false,
-    discharge: false,
-    acknowledge: false,
-    torque_nm: 100.0,
-};
+const PULL: Command = Command { enable: true, torque_nm: 100.0, ..Command::AT_REST };
 
 #[test]
 fn silence_takes_the_torque_and_then_the_enable() {

@@ -2,6 +2,7 @@
 
 use super::{Switchgear, Tick};
 use crate::plant::{DcLink, DcLinkSettings, LinkEnergies, LinkSwitches};
+use crate::steps::held;
 use crate::trace::LinkBalance;
 use tractive::operator::{Feedback, Request, SLOT_PERIODS, Status, Switches};
 use tractive::protection::Fault;
@@ -24,6 +25,20 @@ pub struct LinePlan {
     pub chopper_ohm: Vec<(f64, f64)>,
     /// Whether the source takes energy back from these times on (s).
     pub reversible: Vec<(f64, bool)>,
+}
+
+impl LinePlan {
+    /// An empty link on which nothing happens.
+    pub fn new(link: DcLinkSettings, commander: Commander) -> Self {
+        Self {
+            link,
+            starts_charged: false,
+            commander,
+            hardware: Vec::new(),
+            chopper_ohm: Vec::new(),
+            reversible: Vec::new(),
+        }
+    }
 }
 
 /// What the operator did in one slot, for the trace.
@@ -143,13 +158,11 @@ impl LineSide {
             discharge: self.discharge,
             chopper: self.chopper_off.is_some(),
         };
-        let held =
-            |steps: &[(f64, f64)]| steps.iter().rev().find(|(at, _)| t_s >= *at).map(|(_, value)| *value);
-        if let Some(ohm) = held(&self.plan.chopper_ohm) {
+        if let Some(ohm) = held(&self.plan.chopper_ohm, t_s) {
             self.link.set_chopper_ohm(ohm);
         }
-        if let Some((_, reversible)) = self.plan.reversible.iter().rev().find(|(at, _)| t_s >= *at) {
-            self.link.source_mut().reversible = *reversible;
+        if let Some(reversible) = held(&self.plan.reversible, t_s) {
+            self.link.source_mut().reversible = reversible;
         }
         row
     }

@@ -65,7 +65,7 @@ impl Converter {
     }
 }
 
-/// Sensors, and the stiff DC link behind the inverter.
+/// Sensors, and what the supply's voltage is where nothing is wrong with it.
 pub struct Sensors {
     udc_v: f64,
     link_steps: Vec<(f64, f64)>,
@@ -80,8 +80,8 @@ impl Sensors {
         Self { udc_v, link_steps, converter: Converter::new(flaws), told_a: Abc::default() }
     }
 
-    /// The link's true voltage, in V.
-    pub fn udc_v(&self, t_s: f64) -> f64 {
+    /// The voltage of a healthy supply, which a stiff link has, in V.
+    pub fn supply_v(&self, t_s: f64) -> f64 {
         let passed = self.link_steps.iter().rev().find(|(at_s, _)| t_s >= *at_s);
         passed.map_or(self.udc_v, |(_, udc_v)| *udc_v) + self.converter.ripple_v(t_s)
     }

@@ -37,6 +37,14 @@ impl Verdict {
 /// Largest phase current after any single fault, over the trip level.
 pub const CURRENT_SHARE: f64 = 1.5;
 
+/// Room for the rounding of what is forced, and for what happens between two instants at which it is looked at.
+pub const FORCED: f64 = 1.01;
+
+/// How long a fault that shows with the rotor's angle may take, in s: half an electrical turn, at the longest a tenth of a second.
+pub fn half_turn_s(speed_rpm: f64, pole_pairs: u32) -> f64 {
+    (0.5 / (speed_rpm.abs() / 60.0 * f64::from(pole_pairs))).min(0.1)
+}
+
 /// What a fault may be called, and what may come of it otherwise.
 #[derive(Clone, Copy, Debug)]
 pub struct Rule {

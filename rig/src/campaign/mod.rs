@@ -5,103 +5,23 @@
 //! another torque is wanted, so that nothing stays hidden. [`judge`] says what is good enough, [`without`] switches one
 //! protection off to see which cases are lost.
 
+mod action;
 pub mod command;
 pub mod dual;
+mod fault;
 pub mod healthy;
 pub mod judge;
+mod outcome;
 pub mod report;
 pub mod traction;
 pub mod without;
 
+pub use action::Action;
+pub use outcome::Outcome;
+
 use anyhow::{Context, Result};
-use judge::Verdict;
 use rayon::prelude::*;
-use serde::Serialize;
 use without::Without;
-
-/// What the drive does when the fault comes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Action {
-    /// Torque along the speed.
-    Motoring,
-    /// Torque against the speed.
-    Braking,
-    /// Pulses, and no torque.
-    Coasting,
-}
-
-impl Action {
-    /// All three.
-    pub const ALL: [Self; 3] = [Self::Motoring, Self::Braking, Self::Coasting];
-
-    /// The name in tables.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Motoring => "motoring",
-            Self::Braking => "braking",
-            Self::Coasting => "coasting",
-        }
-    }
-
-    /// Sign of the torque.
-    pub const fn sign(self) -> f64 {
-        match self {
-            Self::Motoring => 1.0,
-            Self::Braking => -1.0,
-            Self::Coasting => 0.0,
-        }
-    }
-}
-
-/// One line of the table.
-#[derive(Clone, Debug, Serialize)]
-pub struct Outcome {
-    /// `pmasynrm` or `zs9`.
-    pub system: &'static str,
-    /// What went wrong.
-    pub fault: String,
-    /// Mode of the pulses when it did; the ZS9's scheme.
-    pub mode: String,
-    /// Speed then, in r/min.
-    pub speed_rpm: f64,
-    /// What the drive did.
-    pub action: Action,
-    /// How it ended.
-    pub verdict: Verdict,
-    /// The fault that the drive named; empty if none.
-    pub named: String,
-    /// The safe state that it chose; empty if none.
-    pub safe_state: String,
-    /// Carrier periods from the fault's first effect until the gates were safe.
-    pub carrier_periods: Option<f64>,
-    /// The same time, in ms.
-    pub time_ms: Option<f64>,
-    /// From the fault itself, in ms: a sensor that is stuck shows where the current goes elsewhere.
-    pub since_fault_ms: Option<f64>,
-    /// Largest phase current from the fault until the gates were safe, in A.
-    pub current_until_a: f64,
-    /// And after that.
-    pub current_after_a: f64,
-    /// What is allowed: 1.5 times the trip level.
-    pub current_limit_a: f64,
-    /// Largest DC voltage until the gates were safe, in V; the ZS9's link outside shoot-through.
-    pub udc_until_v: f64,
-    /// And after that.
-    pub udc_after_v: f64,
-    /// What is allowed after that: what the stored energies and the supply force.
-    pub udc_limit_v: f64,
-    /// The ZS9's largest capacitor voltage until the gates were safe, in V.
-    pub uc_until_v: Option<f64>,
-    /// And after that.
-    pub uc_after_v: Option<f64>,
-    /// What is allowed.
-    pub uc_limit_v: Option<f64>,
-    /// Mean torque less demand where the drive went on, in N·m: the worst of both demands, and for the ZS9 of both motors.
-    pub torque_error_nm: f64,
-    /// Why it is uncaught; empty otherwise.
-    pub why: String,
-}
 
 /// One case of either system.
 #[derive(Clone, Debug)]

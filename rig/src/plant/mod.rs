@@ -6,6 +6,7 @@
 
 mod dc_link;
 mod legs;
+mod line_filter;
 mod rotor;
 mod speed;
 mod stator;
@@ -13,6 +14,7 @@ pub mod zs9;
 
 pub use dc_link::{DcLink, DcLinkSettings, LinkEnergies, LinkSwitches, Source};
 pub use legs::Leg;
+pub use line_filter::{FilteredLink, LineFilter};
 pub use rotor::{Rotor, Turning};
 pub use speed::{SpeedSource, profile_speed};
 pub use stator::{Stator, StatorSlopes};

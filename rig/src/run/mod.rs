@@ -1,9 +1,11 @@
 //! Runs the drive against a bench, on the host or in QEMU.
 
+mod calls;
 mod emulator;
 mod host;
 mod qemu;
 
+pub(crate) use calls::Calls;
 pub use emulator::Emulator;
 pub(crate) use emulator::emulate;
 pub use host::{Tasks, run_on_host};

@@ -1,11 +1,11 @@
 //! The drive in QEMU: the image's own interrupts, in lockstep with the bench over four FIFOs.
 
+use super::calls::Calls;
 use super::emulator::{Emulator, emulate};
 use super::{Progress, Supervisor};
 use crate::bench::Bench;
 use crate::trace::Recording;
-use anyhow::{Context, Result, bail};
-use tractive::drive::Report;
+use anyhow::{Result, bail};
 use tractive::link::{self, Request, Setup};
 use tractive::modulation::Mode;
 
@@ -17,7 +17,7 @@ pub fn run_in_qemu(
     emulator: &Emulator,
     mut supervisor: Option<&mut dyn Supervisor>,
 ) -> Result<Recording> {
-    let (mut calls, mut records) = (Calls::default(), Vec::new());
+    let (mut calls, mut records) = (Calls::new(Mode::default().name()), Vec::new());
     let mut progress = Progress::new(name);
     let outcome = emulate(emulator, |block, answers| {
         let Some(request) = Request::from_block(block) else {
@@ -31,12 +31,13 @@ pub fn run_in_qemu(
                 answers.control(&link::sample_to_block(&sample, done))?;
             }
             Request::ControlReport(at, report) => {
-                calls.control(&report);
+                calls.control(&report.frequency_hz.to_string());
                 bench.control_report(at, report);
             }
             Request::PwmSample(at) => answers.pwm(&link::currents_to_block(bench.pwm_sample(at)?))?,
             Request::Play(at, half) => {
-                calls.pwm(half.mode);
+                calls.mode = half.mode.name().to_owned();
+                calls.pwm();
                 bench.play(at, half);
             }
             Request::Enter(at, safe) => bench.enter(at, safe),
@@ -62,30 +63,7 @@ pub fn run_in_qemu(
         progress.show(bench.progress());
         Ok(false)
     });
-    if let Some(path) = &emulator.calls {
-        std::fs::write(path, &calls.lines).with_context(|| path.display().to_string())?;
-    }
+    calls.write(emulator.calls.as_deref())?;
     outcome?;
     Ok(bench.into_recording(records))
-}
-
-/// What every interrupt was about, in the order in which they ended.
-#[derive(Default)]
-struct Calls {
-    /// Of the newest half.
-    mode: Mode,
-    lines: String,
-}
-
-impl Calls {
-    /// A control interrupt: the mode that it works for, and the stator frequency.
-    fn control(&mut self, report: &Report) {
-        self.lines += &format!("control,{},{}\n", self.mode.name(), report.frequency_hz);
-    }
-
-    /// A PWM interrupt, which made a half of this mode.
-    fn pwm(&mut self, mode: Mode) {
-        self.mode = mode;
-        self.lines += &format!("pwm,{},\n", mode.name());
-    }
 }

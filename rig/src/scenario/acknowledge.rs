@@ -1,15 +1,16 @@
 //! A gate driver fails under torque: the fault, what is refused meanwhile, the acknowledge, and the machine caught again.
 
-use super::line::{self, held, within};
+use super::line::{self, within};
 use super::{Plan, Scenario};
 use crate::analysis::{self, Figures};
 use crate::bench::LinePlan;
 use crate::machine::Machine;
 use crate::options::RunOptions;
 use crate::report::Page;
+use crate::rows::mean;
+use crate::steps::held;
 use crate::trace::Recording;
 use crate::verdict::Verdict;
-use tractive::control::Demand;
 use tractive::machine::Ratings;
 use tractive::operator::Request;
 use tractive::protection::Fault;
@@ -48,7 +49,7 @@ fn request(t_s: f64, ratings: &Ratings) -> Request {
         enable: within(&ENABLE, t_s),
         charge: within(&CHARGE, t_s),
         acknowledge: within(&ACKNOWLEDGE, t_s),
-        torque_nm: held(&TORQUE, t_s, 0.0) as f32 * ratings.max_torque_nm,
+        torque_nm: held(&TORQUE, t_s).unwrap_or(0.0) as f32 * ratings.max_torque_nm,
         ..Request::idle(ratings)
     }
 }
@@ -64,24 +65,15 @@ impl Scenario for Acknowledge {
 
     fn plan(&self, options: &RunOptions, machine: &Machine) -> Plan {
         let scale = machine.folder.parameters.rated_speed_rpm / 2_000.0;
-        Plan {
-            lead_s: 0.0,
-            duration_s: DURATION_S,
-            speed: vec![(0.0, options.speed.unwrap_or(SPEED_RPM * scale))],
-            link: Vec::new(),
-            operator: Box::new(|_| (Demand::default(), true)),
-        }
+        Plan::operated(DURATION_S, vec![(0.0, options.speed.unwrap_or(SPEED_RPM * scale))])
     }
 
     fn line(&self, _options: &RunOptions, machine: &Machine) -> Option<LinePlan> {
         let ratings = &machine.tables.ratings;
         Some(LinePlan {
-            link: line::scaled(machine),
             starts_charged: true,
-            commander: Box::new(|t_s| request(t_s, ratings)),
             hardware: vec![(FAILS_S.0, FAILS_S.1, Fault::GateDriver)],
-            chopper_ohm: Vec::new(),
-            reversible: Vec::new(),
+            ..LinePlan::new(line::scaled(machine), Box::new(|t_s| request(t_s, ratings)))
         })
     }
 
@@ -93,7 +85,7 @@ impl Scenario for Acknowledge {
         let dead = analysis::window(recording, FAILS_S.0 + 0.05, 2.3);
         let current_a = crate::verdict::worst(dead.iter().map(crate::trace::Row::peak_current_a));
         let after = analysis::window(recording, 2.8, DURATION_S);
-        let torque_nm = after.iter().map(|row| row.te_nm).sum::<f64>() / after.len().max(1) as f64;
+        let torque_nm = mean(after, |row| row.te_nm);
         let error = (torque_nm / (0.5 * machine.folder.parameters.max_torque_nm) - 1.0).abs();
         let mut verdicts = line::verdicts(recording, &REFUSALS);
         verdicts.extend([
@@ -119,19 +111,11 @@ impl Scenario for Acknowledge {
 
     fn plots(&self, recording: &Recording, page: &mut Page) {
         line::plots(page, recording);
-        page.plot_window(
+        page.phase_current_in(
             "the gate driver fails: phase current u",
-            "A",
             recording,
             (FAILS_S.0 - 0.02, FAILS_S.0 + 0.05),
-            &[("ia", |row| row.ia_a)],
         );
-        page.plot_window(
-            "the machine is caught: phase current u",
-            "A",
-            recording,
-            (2.28, 2.6),
-            &[("ia", |row| row.ia_a)],
-        );
+        page.phase_current_in("the machine is caught: phase current u", recording, (2.28, 2.6));
     }
 }

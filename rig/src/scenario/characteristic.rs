@@ -112,18 +112,13 @@ impl Scenario for Characteristic {
     }
 
     fn plots(&self, recording: &Recording, page: &mut Page) {
-        page.plot(
-            "Torque",
-            "N·m",
-            recording,
-            &[("torque", |row| row.te_nm), ("demand", |row| row.te_ref_nm)],
-        );
+        page.torque(recording);
         page.plot("Speed", "r/min", recording, &[("speed", |row| row.speed_rpm)]);
-        page.plot("Phase current u", "A", recording, &[("ia", |row| row.ia_a)]);
+        page.phase_current(recording);
         for slot in slots() {
             let window = (slot.ends_s - 0.04, slot.ends_s);
             let title = format!("{} r/min, {} N·m: phase current u", slot.speed_rpm, slot.torque_nm);
-            page.plot_window(&title, "A", recording, window, &[("ia", |row| row.ia_a)]);
+            page.phase_current_in(&title, recording, window);
         }
     }
 }

@@ -8,10 +8,10 @@ use crate::bench::LinePlan;
 use crate::machine::Machine;
 use crate::options::RunOptions;
 use crate::report::Page;
+use crate::rows::mean;
 use crate::trace::{Recording, Row};
 use crate::verdict::{Verdict, worst};
 use serde::Serialize;
-use tractive::control::Demand;
 use tractive::machine::Ratings;
 use tractive::operator::Request;
 
@@ -67,18 +67,15 @@ fn stretches(recording: &Recording) -> Vec<Stretch> {
         .map(|(what, from, until)| {
             let rows = analysis::window(recording, from, until);
             let steady = &rows[rows.len() / 2..];
-            let mean = |value: &dyn Fn(&Row) -> f64| {
-                steady.iter().map(value).sum::<f64>() / steady.len().max(1) as f64
-            };
             let power = |row: &Row| -row.te_nm * row.speed_rpm * core::f64::consts::TAU / 60e3;
             Stretch {
                 what,
-                link_v: mean(&|row| row.udc_v),
-                torque_nm: mean(&|row| row.te_nm),
-                chopper_duty: mean(&|row| {
+                link_v: mean(steady, |row| row.udc_v),
+                torque_nm: mean(steady, |row| row.te_nm),
+                chopper_duty: mean(steady, |row| {
                     row.status.map_or(0.0, |status| f64::from(status.switches.chopper))
                 }),
-                braking_kw: mean(&power),
+                braking_kw: mean(steady, power),
                 link_peak_v: worst(rows.iter().map(|row| row.udc_v)),
                 current_peak_a: worst(rows.iter().map(Row::peak_current_a)),
             }
@@ -99,21 +96,16 @@ impl Scenario for Chopper {
         let scale = machine.folder.parameters.rated_speed_rpm / 2_000.0;
         let fast = options.speed.unwrap_or(FAST_RPM * scale);
         let slow = fast * SLOW_RPM / FAST_RPM;
-        Plan {
-            lead_s: 0.0,
-            duration_s: DURATION_S,
-            speed: vec![
-                (1.0, fast),
-                (1.3, slow),
-                (1.5, slow),
-                (HALF_S, fast),
-                (TAKES_S, fast),
-                (BRAKE.1, slow),
-                (DURATION_S, slow),
-            ],
-            link: Vec::new(),
-            operator: Box::new(|_| (Demand::default(), true)),
-        }
+        let speed = vec![
+            (1.0, fast),
+            (1.3, slow),
+            (1.5, slow),
+            (HALF_S, fast),
+            (TAKES_S, fast),
+            (BRAKE.1, slow),
+            (DURATION_S, slow),
+        ];
+        Plan::operated(DURATION_S, speed)
     }
 
     fn line(&self, _options: &RunOptions, machine: &Machine) -> Option<LinePlan> {
@@ -121,12 +113,10 @@ impl Scenario for Chopper {
         let link = line::scaled(machine);
         let ohm = link.chopper_ohm;
         Some(LinePlan {
-            link,
             starts_charged: true,
-            commander: Box::new(|t_s| request(t_s, ratings)),
-            hardware: Vec::new(),
             chopper_ohm: vec![(HALF_S, 2.0 * ohm), (NONE_S, LOST * ohm)],
             reversible: vec![(TAKES_S, true)],
+            ..LinePlan::new(link, Box::new(|t_s| request(t_s, ratings)))
         })
     }
 

@@ -52,12 +52,7 @@ impl Scenario for FullStep {
     }
 
     fn plots(&self, recording: &Recording, page: &mut Page) {
-        page.plot("Phase current u", "A", recording, &[("ia", |row| row.ia_a)]);
-        page.plot(
-            "Torque",
-            "N·m",
-            recording,
-            &[("torque", |row| row.te_nm), ("demand", |row| row.te_ref_nm)],
-        );
+        page.phase_current(recording);
+        page.torque(recording);
     }
 }

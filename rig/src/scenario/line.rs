@@ -22,11 +22,6 @@ pub const LINK: DcLinkSettings = DcLinkSettings {
 /// Largest power of the drive that these parts are for, in W.
 const POWER_W: f64 = 246.4e3;
 
-/// What holds at a time: the last of the steps that has begun, or `before`.
-pub fn held<T: Copy>(steps: &[(f64, T)], t_s: f64, before: T) -> T {
-    steps.iter().rev().find(|(at_s, _)| t_s + 1e-9 >= *at_s).map_or(before, |(_, value)| *value)
-}
-
 /// Whether a time lies in one of some windows (from, until).
 pub fn within(windows: &[(f64, f64)], t_s: f64) -> bool {
     windows.iter().any(|(from, until)| (from - 1e-9..until - 1e-9).contains(&t_s))

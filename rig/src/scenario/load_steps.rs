@@ -67,24 +67,9 @@ impl Scenario for LoadSteps {
     fn plots(&self, recording: &Recording, page: &mut Page) {
         page.plot("DC-link voltage", "V", recording, &[("udc", |row| row.udc_v)]);
         page.line_voltage("Line voltage u-v", recording, (0.0, 0.3));
-        page.plot("Phase current u", "A", recording, &[("ia", |row| row.ia_a)]);
-        page.plot(
-            "Torque",
-            "N·m",
-            recording,
-            &[("torque", |row| row.te_nm), ("demand", |row| row.te_ref_nm)],
-        );
-        page.plot(
-            "Currents, rotor frame",
-            "A",
-            recording,
-            &[
-                ("id", |row| row.id_a),
-                ("iq", |row| row.iq_a),
-                ("id*", |row| row.id_ref_a),
-                ("iq*", |row| row.iq_ref_a),
-            ],
-        );
+        page.phase_current(recording);
+        page.torque(recording);
+        page.rotor_currents(recording);
     }
 }
 

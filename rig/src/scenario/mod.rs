@@ -18,7 +18,8 @@ mod sweep;
 mod timing;
 
 use crate::analysis::Figures;
-use crate::bench::{self, Bench, Injection, Limits, LinePlan, Operator, Supply, inject};
+use crate::bench::injected::Injection;
+use crate::bench::{self, Bench, Limits, LinePlan, Operator, Supply, inject};
 use crate::machine::Machine;
 use crate::options::{On, RunOptions};
 use crate::plant::{DcLinkSettings, Plant, PlantSettings, SpeedSource};
@@ -53,6 +54,15 @@ pub struct Plan {
     pub link: Vec<(f64, f64)>,
     /// The operator.
     pub operator: Box<dyn Operator + Send>,
+}
+
+impl Plan {
+    /// For a drive with a line side, whose operator permits what is driven.
+    fn operated(duration_s: f64, speed: Vec<(f64, f64)>) -> Self {
+        // What the operator permits takes the place of this.
+        let operator = Box::new(|_: f64| (Demand::default(), true));
+        Self { lead_s: 0.0, duration_s, speed, link: Vec::new(), operator }
+    }
 }
 
 /// A scenario.
@@ -136,24 +146,10 @@ pub(crate) fn drive_supervised(
     options: &RunOptions,
     machine: &Machine,
 ) -> Result<Recording> {
-    let plan = Plan {
-        lead_s: 0.0,
-        duration_s: LONGEST_S,
-        speed: Vec::new(),
-        link: Vec::new(),
-        // What the operator permits takes the place of this.
-        operator: Box::new(|_: f64| (Demand::default(), true)),
-    };
+    let plan = Plan::operated(LONGEST_S, Vec::new());
     let idle = Request::idle(&machine.tables.ratings);
-    let line_plan = LinePlan {
-        link: line::scaled(machine),
-        starts_charged: false,
-        // The frames ask, not this.
-        commander: Box::new(move |_| idle),
-        hardware: Vec::new(),
-        chopper_ohm: Vec::new(),
-        reversible: Vec::new(),
-    };
+    // The frames ask, not this.
+    let line_plan = LinePlan::new(line::scaled(machine), Box::new(move |_| idle));
     let rotor = SpeedSource::Inertia { inertia_kg_m2, load_nm: 0.0 };
     run_plan(name, plan, rotor, Some(line_plan), Some(supervisor), options, machine)
 }
@@ -201,7 +197,7 @@ fn run_plan(
             supply: Supply::Stiff,
             injection: options.offset_at.map(|at_s| {
                 let fault = CurrentFault::Offset(OFFSET * parameters.max_current_a);
-                Injection { kind: inject::Kind::Current(0, fault), at_s, seed: options.seed }
+                Injection { kind: inject::Kind::Current(0, fault), at_s }
             }),
             limits: Limits::NONE,
         },

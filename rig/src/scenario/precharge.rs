@@ -1,15 +1,16 @@
 //! From power-up to running and back to an empty link, by command, with commands on the way that are refused.
 
-use super::line::{self, held, within};
+use super::line::{self, within};
 use super::{Plan, Scenario};
 use crate::analysis::{self, Figures};
 use crate::bench::LinePlan;
 use crate::machine::Machine;
 use crate::options::RunOptions;
 use crate::report::Page;
+use crate::rows::mean;
+use crate::steps::held;
 use crate::trace::Recording;
 use crate::verdict::Verdict;
-use tractive::control::Demand;
 use tractive::machine::Ratings;
 use tractive::operator::{Request, State};
 
@@ -46,7 +47,7 @@ fn request(t_s: f64, ratings: &Ratings) -> Request {
         charge: within(&CHARGE, t_s),
         discharge: within(&DISCHARGE, t_s),
         coast: within(&[COAST], t_s),
-        torque_nm: held(&TORQUE, t_s, 0.0) as f32 * ratings.max_torque_nm,
+        torque_nm: held(&TORQUE, t_s).unwrap_or(0.0) as f32 * ratings.max_torque_nm,
         ..Request::idle(ratings)
     }
 }
@@ -61,26 +62,12 @@ impl Scenario for Precharge {
     }
 
     fn plan(&self, _options: &RunOptions, _machine: &Machine) -> Plan {
-        Plan {
-            lead_s: 0.0,
-            duration_s: DURATION_S,
-            speed: SPEED.to_vec(),
-            link: Vec::new(),
-            // What the operator permits takes the place of this.
-            operator: Box::new(|_| (Demand::default(), true)),
-        }
+        Plan::operated(DURATION_S, SPEED.to_vec())
     }
 
     fn line(&self, _options: &RunOptions, machine: &Machine) -> Option<LinePlan> {
         let ratings = &machine.tables.ratings;
-        Some(LinePlan {
-            link: line::scaled(machine),
-            starts_charged: false,
-            commander: Box::new(|t_s| request(t_s, ratings)),
-            hardware: Vec::new(),
-            chopper_ohm: Vec::new(),
-            reversible: Vec::new(),
-        })
+        Some(LinePlan::new(line::scaled(machine), Box::new(|t_s| request(t_s, ratings))))
     }
 
     fn figures(&self, recording: &Recording, _options: &RunOptions, machine: &Machine) -> Figures {
@@ -94,10 +81,8 @@ impl Scenario for Precharge {
         let ends_v = recording.rows.last().map_or(f64::NAN, |row| row.udc_v);
         let ends = recording.slots.last().is_some_and(|slot| slot.status.state == State::Ready);
         let torque = analysis::window(recording, 2.6, 2.9);
-        let mean = |value: fn(&crate::trace::Row) -> f64| {
-            torque.iter().map(value).sum::<f64>() / torque.len().max(1) as f64
-        };
-        let error = (mean(|row| row.te_nm) / (0.65 * machine.folder.parameters.max_torque_nm) - 1.0).abs();
+        let torque_nm = mean(torque, |row| row.te_nm);
+        let error = (torque_nm / (0.65 * machine.folder.parameters.max_torque_nm) - 1.0).abs();
         let mut verdicts = line::verdicts(recording, &REFUSALS);
         verdicts.extend([
             Verdict::at_most(
@@ -117,12 +102,6 @@ impl Scenario for Precharge {
 
     fn plots(&self, recording: &Recording, page: &mut Page) {
         line::plots(page, recording);
-        page.plot_window(
-            "coasting and catching: phase current u",
-            "A",
-            recording,
-            (COAST.0, COAST.1 + 0.3),
-            &[("ia", |row| row.ia_a)],
-        );
+        page.phase_current_in("coasting and catching: phase current u", recording, (COAST.0, COAST.1 + 0.3));
     }
 }

@@ -68,7 +68,7 @@ impl Scenario for Restart {
         for (slot, speed_rpm) in SPEEDS_RPM.iter().enumerate() {
             let at_s = begins_s(slot) + COAST_S;
             let title = format!("{speed_rpm} r/min caught: phase current u");
-            page.plot_window(&title, "A", recording, (at_s - 0.01, at_s + 0.06), &[("ia", |row| row.ia_a)]);
+            page.phase_current_in(&title, recording, (at_s - 0.01, at_s + 0.06));
         }
     }
 }

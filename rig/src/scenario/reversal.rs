@@ -78,21 +78,11 @@ impl Scenario for Reversal {
 
     fn plots(&self, recording: &Recording, page: &mut Page) {
         page.overview(recording);
-        page.plot(
-            "Currents, rotor frame",
-            "A",
-            recording,
-            &[
-                ("id", |row| row.id_a),
-                ("iq", |row| row.iq_a),
-                ("id*", |row| row.id_ref_a),
-                ("iq*", |row| row.iq_ref_a),
-            ],
-        );
+        page.rotor_currents(recording);
         for k in 0..SHARES.len() {
             let at_s = BEGIN_S + k as f64 * HOLD_S;
             let title = format!("phase current u at {at_s:.1} s");
-            page.plot_window(&title, "A", recording, (at_s - 0.01, at_s + 0.05), &[("ia", |row| row.ia_a)]);
+            page.phase_current_in(&title, recording, (at_s - 0.01, at_s + 0.05));
         }
     }
 }

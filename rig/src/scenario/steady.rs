@@ -77,7 +77,7 @@ impl Scenario for Steady {
     fn plots(&self, recording: &Recording, page: &mut Page) {
         let window = (SETTLE_S, SETTLE_S + 0.04);
         page.line_voltage("line voltage u-v", recording, window);
-        page.plot_window("phase current u", "A", recording, window, &[("ia", |row| row.ia_a)]);
+        page.phase_current_in("phase current u", recording, window);
         page.plot_window(
             "torque",
             "N·m",

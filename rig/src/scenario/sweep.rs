@@ -65,13 +65,8 @@ impl Scenario for Sweep {
 
     fn plots(&self, recording: &Recording, page: &mut Page) {
         page.overview(recording);
-        page.plot(
-            "Torque",
-            "N·m",
-            recording,
-            &[("torque", |row| row.te_nm), ("demand", |row| row.te_ref_nm)],
-        );
-        page.plot("Phase current u", "A", recording, &[("ia", |row| row.ia_a)]);
+        page.torque(recording);
+        page.phase_current(recording);
         page.plot("Commanded fundamental", "V", recording, &[("u", |row| row.u_v)]);
         page.plot(
             "Mode (0 off, 1 async, 2 sync 15, 3 sync 12, 4 mid 7, 5 mid 3, 6 square)",
@@ -79,29 +74,13 @@ impl Scenario for Sweep {
             recording,
             &[("mode", |row| f64::from(row.mode as u8))],
         );
-        page.plot(
-            "Currents, rotor frame",
-            "A",
-            recording,
-            &[
-                ("id", |row| row.id_a),
-                ("iq", |row| row.iq_a),
-                ("id*", |row| row.id_ref_a),
-                ("iq*", |row| row.iq_ref_a),
-            ],
-        );
+        page.rotor_currents(recording);
         for switch in recording.switches.iter().filter(|switch| switch.t_s > 0.0) {
             let title = format!("{} → {}", switch.from.name(), switch.to.name());
             page.answers(figure_of(switch.from, switch.to));
             let window = (switch.t_s - 0.03, switch.t_s + 0.04);
             page.line_voltage(&format!("{title}, line voltage u-v"), recording, window);
-            page.plot_window(
-                &format!("{title}, phase current u"),
-                "A",
-                recording,
-                window,
-                &[("ia", |row| row.ia_a)],
-            );
+            page.phase_current_in(&format!("{title}, phase current u"), recording, window);
         }
     }
 }

@@ -4,6 +4,7 @@ use super::trace::{Recording, Row};
 use crate::analysis::Figures;
 use crate::options::RunOptions;
 use crate::report::Page;
+use crate::rows::{between, mean};
 use core::f64::consts::TAU;
 use tractive::recorder::DualRecord;
 
@@ -49,15 +50,7 @@ pub fn step_s(recording: &Recording) -> f64 {
 
 /// The rows from `from_s` (included) to `to_s` (excluded).
 pub fn window(recording: &Recording, from_s: f64, to_s: f64) -> &[Row] {
-    let rows = &recording.rows;
-    let first = rows.partition_point(|row| row.t_s < from_s - 1e-9);
-    let last = rows.partition_point(|row| row.t_s < to_s - 1e-9);
-    &rows[first..last.max(first)]
-}
-
-/// Mean over rows.
-pub fn mean(rows: &[Row], value: impl Fn(&Row) -> f64) -> f64 {
-    rows.iter().map(value).sum::<f64>() / rows.len().max(1) as f64
+    between(&recording.rows, from_s, to_s)
 }
 
 /// Largest value over rows.

@@ -1,5 +1,6 @@
 //! Things that go wrong on purpose.
 
+use crate::bench::injected::{ControlFault, GoesWrong, Injected, Injection};
 use crate::sensor_faults::{AngleFault, AngleSpoiler, CurrentFault, CurrentSpoiler};
 use std::str::FromStr;
 use tractive::board::{DualSample, MotorDemand, PowerSample};
@@ -51,10 +52,8 @@ pub enum Kind {
     SourceSwings(f64, f64),
     /// The capacitors lose half of their capacitance.
     CapacitorsHalved,
-    /// The control interrupt ends this many ticks after its deadline.
-    ControlLate(u32),
-    /// The control interrupt comes no more: no new commands.
-    ControlStopped,
+    /// The control interrupt.
+    Control(ControlFault),
     /// A torque demand is NaN.
     DemandNotFinite,
     /// A link voltage is wanted that needs too much shoot-through.
@@ -81,16 +80,17 @@ const NAMES: [(&str, Kind); 13] = [
     ("gate-driver", Kind::GateDriver),
 ];
 
-/// What goes wrong, and when: written `NAME@S`.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
-pub struct Injection {
-    /// What.
-    pub kind: Kind,
-    /// From this instant of the recording on, in s.
-    pub at_s: f64,
+impl GoesWrong for Kind {
+    fn control(self) -> Option<ControlFault> {
+        match self {
+            Self::Control(fault) => Some(fault),
+            _ => None,
+        }
+    }
 }
 
-impl FromStr for Injection {
+/// Written `NAME@S`.
+impl FromStr for Injection<Kind> {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
@@ -108,7 +108,8 @@ impl FromStr for Injection {
 /// Holds what a fault does to the samples.
 #[derive(Clone, Debug, Default)]
 pub struct Spoiler {
-    injection: Option<Injection>,
+    /// What goes wrong.
+    pub injected: Injected<Kind>,
     before: Option<DualSample>,
     current: Option<(usize, CurrentSpoiler)>,
     angle: Option<(usize, AngleSpoiler)>,
@@ -117,26 +118,23 @@ pub struct Spoiler {
 /// How long the gate drivers are not ready, in s.
 const DRIVER_FAULT_S: f64 = 0.05;
 
-/// Seed of a sensor's noise.
-const SEED: u64 = 1;
-
 impl Spoiler {
     /// Spoils from the injection's instant on.
-    pub fn new(injection: Option<Injection>) -> Self {
+    pub fn new(injection: Option<Injection<Kind>>) -> Self {
         let (mut current, mut angle) = (None, None);
         match injection.map(|injection| injection.kind) {
             Some(Kind::Current(motor, phase, fault)) => {
-                current = Some((motor, CurrentSpoiler::new(phase, fault, SEED)));
+                current = Some((motor, CurrentSpoiler::new(phase, fault)));
             }
             Some(Kind::Angle(motor, fault)) => angle = Some((motor, AngleSpoiler::new(fault))),
             _ => {}
         }
-        Self { injection, before: None, current, angle }
+        Self { injected: Injected(injection), before: None, current, angle }
     }
 
     /// What the converters make of the phase currents.
     fn currents(&mut self, t_s: f64, currents_a: &mut [Abc; 2]) {
-        let broken = self.kind(t_s).is_some();
+        let broken = self.injected.kind(t_s).is_some();
         if let Some((motor, sensor)) = &mut self.current
             && let Some(currents_a) = currents_a.get_mut(*motor)
         {
@@ -144,25 +142,20 @@ impl Spoiler {
         }
     }
 
-    /// What is wrong at an instant, if anything is.
-    pub fn kind(&self, t_s: f64) -> Option<Kind> {
-        self.injection.filter(|injection| t_s >= injection.at_s - 1e-9).map(|injection| injection.kind)
-    }
-
     /// What holds the gates off in hardware at an instant.
     pub fn hardware(&self, t_s: f64) -> Option<Fault> {
-        let injection = self.injection.filter(|injection| injection.kind == Kind::GateDriver)?;
+        let injection = self.injected.0.filter(|injection| injection.kind == Kind::GateDriver)?;
         (0.0..DRIVER_FAULT_S).contains(&(t_s - injection.at_s)).then_some(Fault::GateDriver)
     }
 
     /// The source's true voltage, in V.
     pub fn source_v(&self, t_s: f64, source_v: f64) -> f64 {
-        match self.kind(t_s) {
+        match self.injected.kind(t_s) {
             Some(Kind::SourceShort) => 1.0,
             Some(Kind::SourceLow) => 250.0,
             Some(Kind::SourceHigh) => 900.0,
             Some(Kind::SourceSwings(amplitude_v, hz)) => {
-                let since_s = t_s - self.injection.map_or(0.0, |injection| injection.at_s);
+                let since_s = self.injected.since_s(t_s);
                 source_v + amplitude_v * (core::f64::consts::TAU * hz * since_s).sin()
             }
             _ => source_v,
@@ -173,14 +166,14 @@ impl Spoiler {
     pub fn control(&mut self, t_s: f64, sample: &mut DualSample) {
         let before = self.before.replace(*sample).unwrap_or(*sample);
         self.currents(t_s, &mut sample.currents_a);
-        let kind = self.kind(t_s);
+        let kind = self.injected.kind(t_s);
         if let Some((motor, sensor)) = &mut self.angle
             && let Some(Some(angle)) = sample.angles.get_mut(*motor)
         {
             *angle = sensor.read(kind.is_some(), *angle);
         }
         let [first, second] = &mut sample.angles;
-        match self.kind(t_s) {
+        match self.injected.kind(t_s) {
             Some(Kind::SensorLost1) => *first = None,
             Some(Kind::SensorLost2) => *second = None,
             Some(Kind::SensorFrozen1) => {
@@ -206,7 +199,7 @@ impl Spoiler {
     /// What the PWM interrupt sees.
     pub fn power(&mut self, t_s: f64, sample: &mut PowerSample) {
         self.currents(t_s, &mut sample.currents_a);
-        match self.kind(t_s) {
+        match self.injected.kind(t_s) {
             Some(Kind::Overcurrent) => {
                 let current = &mut sample.currents_a[0].a;
                 *current = 200.0_f32.copysign(*current);

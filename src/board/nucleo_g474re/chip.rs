@@ -1,7 +1,8 @@
-//! What only the chip has: the vector table, the interrupt controller, waiting, the log.
+//! What only the chip has: the vector table, the interrupt controller, waiting, the idle loop.
 #![allow(unsafe_code)]
 
 use super::can::Can;
+use super::log::Log;
 use super::operator::Operator;
 use super::pins::{self, Pin};
 use super::power_stage::CORE_HZ;
@@ -16,7 +17,7 @@ use crate::drive::Report;
 use crate::machine::BUILT_IN;
 use crate::operator::{self, Configuration, Line, Slot, slot_s};
 use crate::protocol::{Message, Station, TO_DRIVE};
-use crate::recorder::{Record, Recorder};
+use crate::recorder::Recorder;
 use cortex_m::peripheral::NVIC;
 use defmt_rtt as _;
 pub use stm32_metapac::Interrupt;
@@ -82,21 +83,25 @@ impl Wait for Cycles {
 /// Configures everything, gates off. Call it once.
 pub fn prepare(plan: Plan) -> Result<Found, StartError> {
     let found = start::prepare(&Registers::CHIP, &mut Cycles, plan);
+    join_bus(found, &TO_DRIVE, &pins::PINS)
+}
+
+/// Joins the bus for these messages, started or not: there it is said why not.
+pub(super) fn join_bus<T>(
+    found: Result<T, StartError>,
+    messages: &[&Message],
+    of: &[Pin],
+) -> Result<T, StartError> {
     if let Err(error) = &found {
         defmt::error!("no start: {}", error);
     }
-    join_bus(&TO_DRIVE, &pins::PINS);
-    found
-}
-
-/// Joins the bus for these messages.
-pub(super) fn join_bus(messages: &[&Message], of: &[Pin]) {
     let registers = Registers::CHIP;
     match Can::CHIP.configure(messages, &registers.rcc, &mut Cycles) {
         Ok(()) => pins::configure_bus(&registers, of),
         // Nobody can command the drive then; it rests.
         Err(error) => defmt::error!("no bus: {}", error),
     }
+    found
 }
 
 /// Does not start: the reset has left every gate's pin floating and every interrupt masked, and so they stay.
@@ -110,13 +115,11 @@ pub fn refuse(refused: &Refused) -> ! {
 
 /// Starts both timers and unmasks their interrupts: PWM preempts control.
 pub fn run() {
-    unmask(Interrupt::TIM1_UP_TIM16, Interrupt::TIM3);
-    start::run(&Registers::CHIP);
-    defmt::info!("running");
+    run_with(Interrupt::TIM1_UP_TIM16, Interrupt::TIM3, start::run);
 }
 
-/// Lets both interrupts come. Call it once.
-pub(super) fn unmask(pwm: Interrupt, control: Interrupt) {
+/// Lets both interrupts come and starts their timers. Call it once.
+pub(super) fn run_with(pwm: Interrupt, control: Interrupt, start: fn(&Registers)) {
     // SAFETY: the only use of the core peripherals, before any interrupt is unmasked.
     let mut core = unsafe { cortex_m::Peripherals::steal() };
     // SAFETY: priorities are changed while both interrupts are masked; no code relies on a priority ceiling. After that
@@ -127,6 +130,8 @@ pub(super) fn unmask(pwm: Interrupt, control: Interrupt) {
         NVIC::unmask(pwm);
         NVIC::unmask(control);
     }
+    start(&Registers::CHIP);
+    defmt::info!("running");
 }
 
 /// Makes the PWM interrupt come at once, between two boundaries.
@@ -150,55 +155,19 @@ fn configuration() -> Configuration {
 
 /// The idle loop, forever: serves the bus and the operator, feeds the watchdog, tells what has changed, and after a fault what the flight recorder holds.
 pub fn idle() -> ! {
-    let (mut told, mut records_told) = (None, 0);
     let line = Line::rated(&BUILT_IN.ratings, TIMES.precharge_s, TIMES.discharge_s);
     let rated = operator::Settings::rated(&BUILT_IN.ratings, slot_s(&CLOCK), Some(line));
     let station = Station::new(&BUILT_IN.ratings);
     let mut serve = Serve::new(Registers::CHIP, Can::CHIP, station, &OPERATOR.desk, configuration());
-    let mut slot = Slot::new();
+    let (mut slot, mut log) = (Slot::new(), Log::new());
     loop {
         let settings = serve.station.settings(&rated);
         slot.run(&OPERATOR.desk, &mut serve, &settings, &CLOCK);
-        // One record a meal: a log that nobody hurries to read holds few.
         if PULSE.feed_if_both_ran(&Registers::CHIP) {
-            match RECORDER.read(records_told) {
-                Some(record) => {
-                    tell(&record);
-                    records_told += 1;
-                }
-                None if !RECORDER.is_frozen() => records_told = 0,
-                None => {}
-            }
+            log.record(&RECORDER);
         }
-        let trip = OPERATOR.report().and_then(|report: Report| report.trip);
-        if trip != told {
-            match trip {
-                Some(trip) => {
-                    defmt::error!("fault {}: {} beyond {}", trip.fault.name(), trip.value, trip.limit);
-                }
-                None => defmt::info!("fault acknowledged"),
-            }
-            told = trip;
-        }
+        log.trip(OPERATOR.report().and_then(|report: Report| report.trip));
     }
-}
-
-fn tell(record: &Record) {
-    let Record { at, currents_a, udc_v, angle, id_a, iq_a, voltage_v, state } = *record;
-    defmt::info!(
-        "{} ticks: {} {} {} A, {} V, angle {=u32:#x}; wanted {} {} A, {} V; {} {}",
-        at.0,
-        currents_a.a,
-        currents_a.b,
-        currents_a.c,
-        udc_v,
-        angle.0,
-        id_a,
-        iq_a,
-        voltage_v,
-        state.mode.name(),
-        state.fault.map_or("", |fault| fault.name()),
-    );
 }
 
 /// Gates off for good, whatever state the program is in, then nothing more; the watchdog resets the chip if it runs.

@@ -11,7 +11,7 @@
 //! * [`zs9`] is the same for the nine-switch inverter.
 //! * [`pins`] is the wiring, [`power_stage`] the scales, [`mod@start`] the order of the start.
 //!
-//! Everything here but `chip` takes its registers as values, so tests on the host run it against blocks of memory.
+//! Everything here but `chip` and `log` takes its registers as values, so tests on the host run it against blocks of memory.
 
 pub mod can;
 pub mod clock;
@@ -37,6 +37,8 @@ pub mod zs9;
 
 #[cfg(target_os = "none")]
 mod chip;
+#[cfg(target_os = "none")]
+mod log;
 
 #[cfg(target_os = "none")]
 pub use chip::*;

@@ -12,6 +12,7 @@ pub use dual::{
 
 use super::{RECORDER, saboteur, stop};
 use crate::board::Sample;
+use crate::cell::{Ring, Words};
 use crate::drive::Report;
 use crate::frames::Abc;
 use crate::link::{self, BLOCK_BYTES, Block, Request, Setup};
@@ -62,27 +63,26 @@ pub fn control_sample(now: Instant) -> Sample {
     exchange(&mut block, CONTROL_ANSWERS);
     let (sample, end) = link::sample_from_block(&block);
     if end {
-        finish();
+        finish(&RECORDER, |record| Request::Recorded(record).to_block());
     }
     saboteur::sampled();
     sample
 }
 
-/// Tells what the flight recorder holds, if a fault has frozen it, and ends the emulation.
+/// Tells what a flight recorder holds, if a fault has frozen it, and ends the emulation.
 #[inline(never)]
-fn finish() -> ! {
-    stand_still();
+fn finish<T: Words<N>, const N: usize, const RECORDS: usize>(
+    recorder: &Ring<T, N, RECORDS>,
+    recorded: fn(T) -> Block,
+) -> ! {
+    // The rig's time stands still from here on: no interrupt may ask it for samples.
+    cortex_m::interrupt::disable();
     saboteur::finish();
-    for record in (0..).map_while(|index| RECORDER.read(index)) {
-        send(&Request::Recorded(record).to_block());
+    for record in (0..).map_while(|index| recorder.read(index)) {
+        send(&recorded(record));
     }
     send(&Request::End.to_block());
     stop(true)
-}
-
-/// The rig's time stands still from here on: no interrupt may ask it for samples.
-fn stand_still() {
-    cortex_m::interrupt::disable();
 }
 
 /// Phase currents at a carrier boundary.

@@ -130,22 +130,8 @@ impl<M: Machine> ControlTask<M> {
             gates,
             acknowledge: sample.acknowledge,
         });
-        self.tell(now, &sample, &driven, gates, port, shared);
-    }
-
-    /// Records and reports what the period did. Out of line: its stack is not needed while the control law runs.
-    #[inline(never)]
-    fn tell(
-        &self,
-        now: Instant,
-        sample: &DualSample,
-        driven: &Driven,
-        gates: Gates,
-        port: &mut impl DualControlPort,
-        shared: &Shared,
-    ) {
         if let Some(recorder) = shared.recorder {
-            recorder.record(self.entry(now, sample, driven, gates), self.trip.is_some());
+            recorder.record(self.entry(now, &sample, &driven, gates), self.trip.is_some());
         }
         let [upper, lower] = &self.axes;
         let report = DualReport {
@@ -160,7 +146,7 @@ impl<M: Machine> ControlTask<M> {
             current_a: sample.currents_a.map(|currents| currents.peak()),
             capacitor_v: sample.capacitor_v,
             source_v: sample.source_v,
-            speed_known: self.axes.iter().all(Axis::speed_is_known),
+            speed_known: known,
             acknowledged: self.acknowledged,
         };
         port.report(now, &report);

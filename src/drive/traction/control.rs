@@ -120,7 +120,8 @@ impl<M: Machine> ControlTask<M> {
         let violation =
             self.armed(overdue).or_else(|| self.armed(lost)).or_else(|| self.judge(&sample, omega));
         self.check(violation, &sample, port);
-        let pulsing = self.trip.is_none() && sample.enable && self.controller.speed_is_known();
+        let pulsing =
+            self.trip.is_none() && sample.enable && self.controller.speed_is_known() && !self.glide.crosses();
         let driven = if pulsing {
             let frozen = self.watch.check(
                 &sample.measured,
@@ -181,10 +182,13 @@ impl<M: Machine> ControlTask<M> {
     /// No pulses: the control law begins anew.
     fn rest(&mut self, angle: Angle) -> Driven {
         self.controller.idle();
+        if self.glide.crosses() {
+            self.controller.begin_without_torque();
+        }
         self.watch = FrozenWatch::new();
         self.boundary = None;
         self.steady_v = 0.0;
-        self.glide.forget_side();
+        self.glide.rest(self.settings.clock.control_s());
         Driven { carrier_angle: angle, ..Driven::default() }
     }
 
@@ -262,7 +266,8 @@ impl<M: Machine> ControlTask<M> {
         let settled = self.glide.is_settled(decided, boundary.is_some());
         let committed = Committed { settled, ..committed };
         let ratings = &self.machine.tables().ratings;
-        let torque_nm = self.glide.one_sided(sample.demand.torque_nm, omega, udc_v, ratings);
+        let emf_v = omega.abs() * ratings.magnet_flux_wb * self.controller.map_scale();
+        let torque_nm = self.glide.one_sided(sample.demand.torque_nm, emf_v, udc_v, ratings);
         let demand = Demand { torque_nm, ..sample.demand };
         let input = Input {
             measured: &sample.measured,

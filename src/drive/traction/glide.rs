@@ -7,11 +7,15 @@ use crate::modulation::Mode;
 /// How fast the voltage glides from square wave to what the torque needs, in shares of six-step per second.
 const GLIDE_PER_S: f32 = 12.0;
 
-/// Flux linkage that the voltage forces, over the magnets', above which torque keeps its sign.
-const ONE_SIDED_FLUX: f32 = 1.2;
+/// Flux linkage that the voltage forces, over the magnets', above which torque does not pass through zero.
+const ONE_SIDED_FLUX: f32 = 1.1;
 
 /// What is left of torque that keeps its sign, as a share of the largest.
 const ONE_SIDED_SHARE: f32 = 0.001;
+
+/// Length of the pause in which torque changes its sign in square wave, in s: two committed halves, then the machine's currents
+/// decay against the link.
+const CROSSING_S: f32 = 2e-3;
 
 /// What square wave leaves behind: voltage and torque on their way to what the torque needs, and a flux hexagon off its centre.
 pub(super) struct Glide {
@@ -22,16 +26,24 @@ pub(super) struct Glide {
     side_nm: f32,
     /// Mode that the newest command was made for, and the halves for which its flux hexagon still changes its size.
     unsettled: (Mode, u32),
+    /// How long the gates are still off for torque to change its sign, in s.
+    crossing_s: f32,
 }
 
 impl Glide {
     pub(super) const fn new() -> Self {
-        Self { filled_to: 0.0, side_nm: 0.0, unsettled: (Mode::Off, 0) }
+        Self { filled_to: 0.0, side_nm: 0.0, unsettled: (Mode::Off, 0), crossing_s: 0.0 }
     }
 
-    /// No torque, and no side.
-    pub(super) fn forget_side(&mut self) {
+    /// No pulses for a control period, no torque, and no side.
+    pub(super) fn rest(&mut self, period_s: f32) {
         self.side_nm = 0.0;
+        self.crossing_s -= period_s;
+    }
+
+    /// Whether the gates are to be off until torque has another sign.
+    pub(super) fn crosses(&self) -> bool {
+        self.crossing_s > 0.0
     }
 
     /// Remembers the side of a torque, in N·m.
@@ -54,21 +66,26 @@ impl Glide {
         (if self.filled_to < largest { self.filled_to } else { largest }, true)
     }
 
-    /// The torque demanded, in N·m, which keeps its sign for as long as the voltage forces much more flux upon the machine than its magnets have: near
-    /// no torque the two signs then lie far apart on the circle of flux linkage, and the way between them goes past currents
-    /// beyond the largest. The voltage is on its way down meanwhile, so this lasts tens of milliseconds.
-    pub(super) fn one_sided(&self, torque_nm: f32, omega: f32, udc_v: f32, ratings: &Ratings) -> f32 {
+    /// The torque demanded, in N·m, which keeps its sign for as long as the voltage forces more flux upon the machine than its magnets
+    /// have, whose EMF is given in V: near no torque the two signs then lie far apart on the circle of flux linkage, and the way
+    /// between them goes past currents beyond the largest. So once there is no torque left the gates pause: the flux falls to
+    /// that of the magnets, and the pattern catches the machine on the other side.
+    pub(super) fn one_sided(&mut self, torque_nm: f32, emf_v: f32, udc_v: f32, ratings: &Ratings) -> f32 {
         let least_nm = ONE_SIDED_SHARE * ratings.max_torque_nm;
-        let (least_nm, ends) = if self.side_nm < 0.0 {
+        let (sided_nm, ends) = if self.side_nm < 0.0 {
             (-least_nm, torque_nm > -least_nm)
         } else {
             (least_nm, torque_nm < least_nm && self.side_nm > 0.0)
         };
         let forced_v = self.filled_to * six_step_v(udc_v);
-        if ends && forced_v > ONE_SIDED_FLUX * omega.abs() * ratings.magnet_flux_wb {
-            return least_nm;
+        if !ends || forced_v <= ONE_SIDED_FLUX * emf_v {
+            return torque_nm;
         }
-        torque_nm
+        let turns_over = torque_nm * sided_nm < -least_nm * least_nm;
+        if turns_over && self.side_nm.abs() <= least_nm {
+            self.crossing_s = CROSSING_S;
+        }
+        sided_nm
     }
 
     /// Whether two sectors have passed since the square wave gave way to a pattern or the other way round: so long the flux

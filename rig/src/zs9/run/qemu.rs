@@ -1,9 +1,9 @@
 //! In QEMU: the image's own interrupts, in lockstep with the bench.
 
-use crate::run::{Emulator, Progress, Supervised, Supervisor, emulate, turn};
+use crate::run::{Calls, Emulator, Progress, Supervised, Supervisor, emulate, turn};
 use crate::zs9::bench::Bench;
 use crate::zs9::trace::Recording;
-use anyhow::{Context, Result, bail};
+use anyhow::{Result, bail};
 use tractive::drive::dual::DualReport;
 use tractive::link::{self, DualRequest, DualSetup};
 
@@ -19,7 +19,7 @@ pub fn run_in_qemu(
     mut supervisor: Option<&mut dyn Supervisor>,
 ) -> Result<Recording> {
     let mut progress = Progress::new(name);
-    let (mut calls, mut records) = (Calls::default(), Vec::new());
+    let (mut calls, mut records) = (Calls::new(""), Vec::new());
     let outcome = emulate(emulator, |block, answers| {
         let Some(request) = DualRequest::from_block(block) else {
             bail!("the firmware sent a request that is none: {block:?}");
@@ -32,7 +32,8 @@ pub fn run_in_qemu(
                 answers.control(&link::dual_sample_to_block(&sample, done))?;
             }
             DualRequest::ControlReport(at, report) => {
-                calls.control(&report, bench.speeds_rpm());
+                calls.mode = what(&report, bench.speeds_rpm());
+                calls.control("");
                 bench.control_report(at, report);
             }
             DualRequest::PowerSample(at) => answers.pwm(&link::power_to_block(&bench.power_sample(at)?))?,
@@ -63,36 +64,19 @@ pub fn run_in_qemu(
         progress.show(bench.progress());
         Ok(false)
     });
-    if let Some(path) = &emulator.calls {
-        std::fs::write(path, &calls.lines).with_context(|| path.display().to_string())?;
-    }
+    calls.write(emulator.calls.as_deref())?;
     outcome?;
     Ok(bench.into_recording(records))
 }
 
-/// What every interrupt was about, in the order in which they ended: the scheme and what the motors do, as `rthd-braking`.
-#[derive(Default)]
-struct Calls {
-    mode: String,
-    lines: String,
-}
-
-impl Calls {
-    /// A control interrupt, at these speeds.
-    fn control(&mut self, report: &DualReport, speeds_rpm: [f64; 2]) {
-        let braking = report.torque_nm.iter().zip(speeds_rpm).any(|(nm, rpm)| f64::from(*nm) * rpm < 0.0);
-        let does = match report {
-            _ if report.voltage_v == [0.0; 2] => None,
-            _ if braking => Some("braking"),
-            _ if report.weakening.contains(&true) => Some("weakening"),
-            _ => Some("motoring"),
-        };
-        self.mode = does.map_or("off".to_owned(), |does| format!("{}-{does}", report.scheme.name()));
-        self.lines += &format!("control,{},\n", self.mode);
-    }
-
-    /// A PWM interrupt.
-    fn pwm(&mut self) {
-        self.lines += &format!("pwm,{},\n", self.mode);
-    }
+/// What a control interrupt was about: the scheme and what the motors do, as `rthd-braking`.
+fn what(report: &DualReport, speeds_rpm: [f64; 2]) -> String {
+    let braking = report.torque_nm.iter().zip(speeds_rpm).any(|(nm, rpm)| f64::from(*nm) * rpm < 0.0);
+    let does = match report {
+        _ if report.voltage_v == [0.0; 2] => None,
+        _ if braking => Some("braking"),
+        _ if report.weakening.contains(&true) => Some("weakening"),
+        _ => Some("motoring"),
+    };
+    does.map_or("off".to_owned(), |does| format!("{}-{does}", report.scheme.name()))
 }

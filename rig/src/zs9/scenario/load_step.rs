@@ -4,6 +4,7 @@ use super::{Plan, Scenario, free, rad_s, ramp};
 use crate::analysis::Figures;
 use crate::options::RunOptions;
 use crate::report::Page;
+use crate::rows::mean;
 use crate::zs9::figures;
 use crate::zs9::trace::{Recording, Row};
 use crate::zs9::{Orders, SeenMotors};
@@ -54,8 +55,8 @@ impl Scenario for LoadStep {
         let mut figures = figures::common(recording, options);
         let (steady, after) =
             (figures::window(recording, 0.3, STEP_S), figures::window(recording, STEP_S, DURATION_S));
-        let speed1 = figures::mean(steady, |row| row.motors[0].speed_rpm);
-        let torque1 = figures::mean(steady, |row| row.motors[0].torque_nm);
+        let speed1 = mean(steady, |row| row.motors[0].speed_rpm);
+        let torque1 = mean(steady, |row| row.motors[0].torque_nm);
         let motor1 = |what: &dyn Fn(&Row) -> f64| figures::largest(after, |row| what(row).abs());
         figures.set("motor1_torque_deviation_nm", motor1(&|row| row.motors[0].torque_nm - torque1));
         figures.set("motor1_speed_deviation_rpm", motor1(&|row| row.motors[0].speed_rpm - speed1));

@@ -4,6 +4,7 @@ use super::{Plan, Scenario, free, rad_s, ramp};
 use crate::analysis::Figures;
 use crate::options::RunOptions;
 use crate::report::Page;
+use crate::rows::mean;
 use crate::zs9::figures;
 use crate::zs9::trace::{Recording, Row};
 use crate::zs9::{Orders, SeenMotors};
@@ -62,13 +63,13 @@ impl Scenario for Reverse {
                 let wanted = wanted_rpm(row.t_s + half_s, reverses)[k];
                 (row.motors[k].speed_rpm - wanted).powi(2)
             };
-            figures::mean(&recording.rows, off).sqrt()
+            mean(&recording.rows, off).sqrt()
         };
         figures.set("motor1_speed_error_rms_rpm", error(0));
         figures.set("motor2_speed_error_rms_rpm", error(1));
         let last = figures::window(recording, DURATION_S - 0.1, DURATION_S);
-        figures.set("motor1_speed_rpm", figures::mean(last, |row| row.motors[0].speed_rpm));
-        figures.set("motor2_speed_rpm", figures::mean(last, |row| row.motors[1].speed_rpm));
+        figures.set("motor1_speed_rpm", mean(last, |row| row.motors[0].speed_rpm));
+        figures.set("motor2_speed_rpm", mean(last, |row| row.motors[1].speed_rpm));
         figures::link(&mut figures, &recording.rows, options);
         figures
     }

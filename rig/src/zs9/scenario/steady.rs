@@ -5,6 +5,7 @@ use crate::analysis::Figures;
 use crate::options::RunOptions;
 use crate::plant::SpeedSource;
 use crate::report::Page;
+use crate::rows::mean;
 use crate::zs9::figures;
 use crate::zs9::patterns;
 use crate::zs9::trace::Recording;
@@ -61,7 +62,7 @@ impl Scenario for Steady {
                 .set(name, figures::thd_percent(recording, cycles.round(), |row| row.motors[k].phases_a[0]));
         }
         for (k, name) in ["torque1_nm", "torque2_nm"].into_iter().enumerate() {
-            figures.set(name, figures::mean(&recording.rows, |row| row.motors[k].torque_nm));
+            figures.set(name, mean(&recording.rows, |row| row.motors[k].torque_nm));
         }
         let currents = || recording.rows.iter().map(|row| row.inductor_a);
         let (low, high) = currents().fold((f64::MAX, f64::MIN), |(low, high), i| (low.min(i), high.max(i)));

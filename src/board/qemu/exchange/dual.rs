@@ -1,7 +1,7 @@
 //! The same for the ZS9.
 
-use super::{CONTROL_ANSWERS, IDLE_ANSWERS, PWM_ANSWERS, exchange, open_files, send, stand_still};
-use crate::board::qemu::{DUAL_RECORDER, saboteur, stop, watch};
+use super::{CONTROL_ANSWERS, IDLE_ANSWERS, PWM_ANSWERS, exchange, finish, open_files, send};
+use crate::board::qemu::{DUAL_RECORDER, saboteur, watch};
 use crate::board::{DualSample, PlayedPeriod, PowerSample};
 use crate::drive::dual::DualReport;
 use crate::link::{self, DualRequest, DualSetup};
@@ -25,23 +25,11 @@ pub fn sample_dual(now: Instant) -> DualSample {
     exchange(&mut block, CONTROL_ANSWERS);
     let (sample, end) = link::dual_sample_from_block(&block);
     if end {
-        finish();
+        watch::stop();
+        finish(&DUAL_RECORDER, |record| DualRequest::Recorded(record).to_block());
     }
     saboteur::sampled();
     sample
-}
-
-/// Tells what the flight recorder holds, if a fault has frozen it, and ends the emulation.
-#[inline(never)]
-fn finish() -> ! {
-    stand_still();
-    watch::stop();
-    saboteur::finish();
-    for record in (0..).map_while(|index| DUAL_RECORDER.read(index)) {
-        send(&DualRequest::Recorded(record).to_block());
-    }
-    send(&DualRequest::End.to_block());
-    stop(true)
 }
 
 /// The conversions at a peak of the carrier.

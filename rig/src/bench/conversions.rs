@@ -1,0 +1,71 @@
+//! What passes between a bench and the control interrupt: samples that wait to be asked for, and reports that show once what they
+//! command takes effect.
+
+use super::due::Due;
+use super::{BenchError, Tick, Timeline};
+use std::collections::VecDeque;
+use tractive::time::Instant;
+
+/// Samples on the one way, reports on the other.
+#[derive(Clone, Debug)]
+pub struct Conversions<S, R> {
+    samples: VecDeque<(Tick, S)>,
+    /// When the next sample is taken.
+    pub next: Tick,
+    reports: Due<R>,
+    /// The report whose command has taken effect.
+    pub report: R,
+}
+
+impl<S, R: Default> Conversions<S, R> {
+    /// Nothing sampled yet.
+    pub fn new(time: &Timeline) -> Self {
+        Self { samples: VecDeque::new(), next: time.control(), reports: Due::default(), report: R::default() }
+    }
+
+    /// A sample is taken now. The report of the period before last must be there, because its command takes effect now; unless control
+    /// does not come.
+    ///
+    /// # Errors
+    /// Where it is not.
+    pub fn begin(&mut self, time: &Timeline, has_control: bool) -> Result<(), BenchError> {
+        if self.samples.len() > 1 {
+            if has_control {
+                return Err(BenchError::ControlLate(time.now_s()));
+            }
+            self.samples.clear();
+        }
+        self.next = time.now + time.control();
+        Ok(())
+    }
+
+    /// What was sampled now.
+    pub fn put(&mut self, now: Tick, sample: S) {
+        self.samples.push_back((now, sample));
+    }
+
+    /// What was sampled at a step.
+    ///
+    /// # Errors
+    /// Where nothing was.
+    pub fn ask(&mut self, asked: Tick) -> Result<S, BenchError> {
+        while let Some((at, sample)) = self.samples.pop_front() {
+            if at == asked {
+                return Ok(sample);
+            }
+        }
+        Err(BenchError::NoSample(asked))
+    }
+
+    /// The report of the period that began at `instant`.
+    pub fn tell(&mut self, time: &Timeline, instant: Instant, report: R) {
+        self.reports.push(time.widen(instant) + time.control(), report);
+    }
+
+    /// Takes over the reports whose commands have taken effect.
+    pub fn show(&mut self, now: Tick) {
+        while let Some(report) = self.reports.take(now) {
+            self.report = report;
+        }
+    }
+}

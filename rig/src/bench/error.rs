@@ -1,0 +1,32 @@
+//! Why a bench cannot go on.
+
+use super::Tick;
+use crate::plant::zs9::IllegalState;
+
+/// The firmware broke the protocol, or asked for what an inverter must not have.
+#[derive(Debug, thiserror::Error)]
+pub enum BenchError {
+    /// What was played ended and nothing follows.
+    #[error("at {at_s:.6} s the {what} ended and no next one had been loaded")]
+    NothingToPlay {
+        /// A carrier half or period.
+        what: &'static str,
+        /// When, in s.
+        at_s: f64,
+    },
+    /// A sample was asked for that is not there.
+    #[error("the control sample of step {0} was asked for and is not there")]
+    NoSample(Tick),
+    /// The operator asked for a slot that is not there.
+    #[error("the operator's slot of tick {0} was asked for and is not kept")]
+    NoSlot(Tick),
+    /// The operator fell behind.
+    #[error("at {0:.6} s the operator has not finished its slot before the next one")]
+    OperatorLate(f64),
+    /// Control fell behind.
+    #[error("at {0:.6} s the control interrupt has not reported within its period")]
+    ControlLate(f64),
+    /// The gates asked for what the bridge must not have.
+    #[error(transparent)]
+    Illegal(#[from] IllegalState),
+}

@@ -1,0 +1,105 @@
+//! Lets time pass, and does what is due on the way.
+
+use super::inject::Kind;
+use super::{Bench, BenchError, LineSide, Peaks, Stored, Stuck, Tick};
+use tractive::protection::LegFaults;
+
+impl Bench {
+    /// Runs to `tick`, doing on the way all that is due, and at `tick` itself too.
+    pub(super) fn advance(&mut self, tick: Tick) -> Result<(), BenchError> {
+        while self.time.now < tick {
+            let now = self.time.now;
+            let fault = Some(self.observed.from).filter(|from| *from > now);
+            let line = self.dc.operated().and_then(LineSide::next_event);
+            let load = self.loads.next().map(|at| at.max(now));
+            let events = [fault, self.inverter.next_event(), self.orders.next(), load, line];
+            let regular = [self.inverter.half_end(), self.control.next, self.next_row];
+            let due = events.into_iter().flatten().chain(regular).fold(tick, Tick::min);
+            self.integrate(due);
+            self.act()?;
+        }
+        Ok(())
+    }
+
+    fn integrate(&mut self, tick: Tick) {
+        let now = self.time.now;
+        if tick > now {
+            let t_s = self.time.now_s();
+            let dt_s = (tick - now) as f64 * self.time.step_s();
+            let (sensors, spoiler) = (&self.sensors, &self.spoiler);
+            self.dc.advance(&mut self.plant, self.inverter.legs(), dt_s, || {
+                (sensors.supply_v(t_s), spoiler.supply(t_s))
+            });
+            self.inverter.monitor(self.plant.currents_abc(), now, tick);
+            if self.inverter.leg_faults() != LegFaults::default() {
+                self.observed.makes_a_difference(now);
+            }
+            self.time.now = tick;
+            let udc_v = self.udc_v(self.time.now_s());
+            let peaks = Peaks::at(&self.plant.currents_abc(), udc_v, 0.0);
+            self.observed.note(tick, &peaks, self.plant.speed_rpm());
+        }
+    }
+
+    /// The link's true voltage, in V.
+    pub(super) fn udc_v(&self, t_s: f64) -> f64 {
+        self.dc.udc_v(|| self.sensors.supply_v(t_s))
+    }
+
+    /// What is stored, and what of it the link must take.
+    fn stored(&self) -> Stored {
+        let now_s = self.time.now_s();
+        let unloaded_v = self.dc.unloaded_v(|ahead_s| {
+            let t_s = now_s + ahead_s;
+            (self.sensors.supply_v(t_s), self.spoiler.supply(t_s))
+        });
+        Stored::of(&self.plant, self.udc_v(now_s), unloaded_v)
+    }
+
+    fn act(&mut self) -> Result<(), BenchError> {
+        let now = self.time.now;
+        let t_s = self.time.now_s();
+        if let Some(row) = self.dc.operated_mut().and_then(|line| line.act(now, t_s))
+            && now >= self.time.lead
+            && now <= self.end
+        {
+            self.slots.push(row);
+        }
+        if now == self.observed.from {
+            self.observed.carrier_ticks = 2 * Tick::from(self.inverter.half().period_ticks);
+            match self.spoiler.injected.kind(t_s) {
+                Some(Kind::Gate(gate, on)) => {
+                    self.inverter.stick(gate, if on { Stuck::On } else { Stuck::Off })
+                }
+                Some(Kind::Device(gate)) => self.inverter.stick(gate, Stuck::Shorted),
+                _ => {}
+            }
+        }
+        while let Some(order) = self.orders.take(now) {
+            match order {
+                Some(safe) => {
+                    self.inverter.enter(safe, now);
+                    self.observed.enters(now, safe, self.stored());
+                }
+                None => self.inverter.leave(now),
+            }
+        }
+        while let Some(load_nm) = self.loads.take(now) {
+            self.plant.set_load_nm(load_nm);
+        }
+        self.inverter.act(now);
+        if now == self.inverter.half_end() {
+            let nothing = BenchError::NothingToPlay { what: "carrier half", at_s: t_s };
+            let next = self.next.take().ok_or(nothing)?;
+            self.note_switch(&next);
+            self.inverter.begin(next, now);
+        }
+        if now == self.control.next {
+            self.take_sample()?;
+        }
+        if now == self.next_row {
+            self.record();
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,46 @@
+//! What a bench is made of, and who commands it.
+
+use super::inject::{Injection, Kind};
+use super::{Flaws, Limits, Supply};
+use tractive::control::Demand;
+use tractive::time::Clock;
+
+/// What the operator does, as a function of time.
+pub trait Operator {
+    /// Demand and enable at `t_s` seconds after the recording begins (negative before).
+    fn demand(&self, t_s: f64) -> (Demand, bool);
+}
+
+impl<F: Fn(f64) -> (Demand, bool)> Operator for F {
+    fn demand(&self, t_s: f64) -> (Demand, bool) {
+        self(t_s)
+    }
+}
+
+/// Fixed properties of a bench.
+pub struct Settings {
+    /// The firmware's clock.
+    pub clock: Clock,
+    /// The first half that the PWM timer plays, gates off.
+    pub first_half_ticks: u32,
+    /// Dead time, in ticks.
+    pub dead_time_ticks: u32,
+    /// Before the recording: time in which the drive settles, in s.
+    pub lead_s: f64,
+    /// Length of the recording, in s.
+    pub duration_s: f64,
+    /// Step of the trace, in s.
+    pub trace_step_s: f64,
+    /// DC-link voltage, in V.
+    pub udc_v: f64,
+    /// Other DC-link voltages: (time from the recording's beginning in s, V), each from its time on.
+    pub link_steps: Vec<(f64, f64)>,
+    /// Imperfections of the sensors.
+    pub flaws: Flaws,
+    /// What feeds the inverter.
+    pub supply: Supply,
+    /// What goes wrong.
+    pub injection: Option<Injection<Kind>>,
+    /// Beyond what it is said to make a difference.
+    pub limits: Limits,
+}

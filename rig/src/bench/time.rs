@@ -1,0 +1,99 @@
+//! A bench's time: steps of the firmware's timers, or of what divides them finer.
+
+use super::BenchError;
+use tractive::time::{Clock, Instant};
+
+/// Ticks since the run's beginning; on a bench that counts finer, its steps.
+pub type Tick = u64;
+
+/// Where a run stands.
+#[derive(Clone, Debug)]
+pub struct Timeline {
+    clock: Clock,
+    per_tick: Tick,
+    step_s: f64,
+    /// Where the timers started.
+    pub origin: Tick,
+    /// Now.
+    pub now: Tick,
+    /// Where the recording begins.
+    pub lead: Tick,
+}
+
+impl Timeline {
+    /// At the first instant, with so many steps in a tick of the clock.
+    pub fn new(clock: Clock, per_tick: u32, lead_s: f64) -> Self {
+        let step_s = f64::from(clock.ticks_per_s).recip() / f64::from(per_tick);
+        let mut new = Self { clock, per_tick: per_tick.into(), step_s, origin: 0, now: 0, lead: 0 };
+        new.lead = new.steps(lead_s);
+        new
+    }
+
+    /// The same beginning at another step than 0.
+    pub fn beginning_at(self, origin: Tick) -> Self {
+        Self { origin: self.origin + origin, now: self.now + origin, lead: self.lead + origin, ..self }
+    }
+
+    /// Length of a step, in s.
+    pub fn step_s(&self) -> f64 {
+        self.step_s
+    }
+
+    /// Steps in so much time, in s.
+    pub fn steps(&self, seconds: f64) -> Tick {
+        (seconds / self.step_s).round() as Tick
+    }
+
+    /// Steps of so many ticks of the clock.
+    pub fn of_ticks(&self, ticks: impl Into<Tick>) -> Tick {
+        ticks.into() * self.per_tick
+    }
+
+    /// The clock's tick now.
+    pub fn tick(&self) -> Tick {
+        self.now / self.per_tick
+    }
+
+    /// Now as the firmware has it.
+    pub fn instant(&self) -> Instant {
+        Instant(self.tick() as u32)
+    }
+
+    /// Steps from one control sample to the next.
+    pub fn control(&self) -> Tick {
+        self.of_ticks(self.clock.control_ticks)
+    }
+
+    /// The step of an instant near to now.
+    pub fn widen(&self, instant: Instant) -> Tick {
+        let ahead = i64::from(instant.since(self.instant()));
+        self.tick().saturating_add_signed(ahead) * self.per_tick
+    }
+
+    /// The tick of an instant near to now from which on something is to hold.
+    ///
+    /// # Errors
+    /// Where that is over.
+    pub fn coming(&self, from: Instant) -> Result<Tick, BenchError> {
+        let step = self.widen(from);
+        if step < self.now {
+            return Err(BenchError::OperatorLate(self.seconds(step)));
+        }
+        Ok(step / self.per_tick)
+    }
+
+    /// Time of a step since the recording's beginning, in s.
+    pub fn seconds(&self, at: Tick) -> f64 {
+        (at as f64 - self.lead as f64) * self.step_s
+    }
+
+    /// The same of now.
+    pub fn now_s(&self) -> f64 {
+        self.seconds(self.now)
+    }
+
+    /// The step at which a row of the trace ends, by its time, in s; later than now.
+    pub fn row_end(&self, end_s: f64) -> Tick {
+        self.lead + self.steps(end_s).max(self.now + 1 - self.lead)
+    }
+}

@@ -1,0 +1,161 @@
+//! What came of one case.
+
+use super::Action;
+use super::fault::Named;
+use super::judge::{self, Bounded, Verdict};
+use crate::bench::Observed;
+use serde::Serialize;
+use tractive::protection::{Fault, SafeState, Trip};
+
+/// One line of the table.
+#[derive(Clone, Debug, Serialize)]
+pub struct Outcome {
+    /// `pmasynrm` or `zs9`.
+    pub system: &'static str,
+    /// What went wrong.
+    pub fault: String,
+    /// Mode of the pulses when it did; the ZS9's scheme.
+    pub mode: String,
+    /// Speed then, in r/min.
+    pub speed_rpm: f64,
+    /// What the drive did.
+    pub action: Action,
+    /// How it ended.
+    pub verdict: Verdict,
+    /// The fault that the drive named; empty if none.
+    pub named: String,
+    /// The safe state that it chose; empty if none.
+    pub safe_state: String,
+    /// Carrier periods from the fault's first effect until the gates were safe.
+    pub carrier_periods: Option<f64>,
+    /// The same time, in ms.
+    pub time_ms: Option<f64>,
+    /// From the fault itself, in ms: a sensor that is stuck shows where the current goes elsewhere.
+    pub since_fault_ms: Option<f64>,
+    /// Largest phase current from the fault until the gates were safe, in A.
+    pub current_until_a: f64,
+    /// And after that.
+    pub current_after_a: f64,
+    /// What is allowed: 1.5 times the trip level.
+    pub current_limit_a: f64,
+    /// Largest DC voltage until the gates were safe, in V; the ZS9's link outside shoot-through.
+    pub udc_until_v: f64,
+    /// And after that.
+    pub udc_after_v: f64,
+    /// What is allowed after that: what the stored energies and the supply force.
+    pub udc_limit_v: f64,
+    /// The ZS9's largest capacitor voltage until the gates were safe, in V.
+    pub uc_until_v: Option<f64>,
+    /// And after that.
+    pub uc_after_v: Option<f64>,
+    /// What is allowed.
+    pub uc_limit_v: Option<f64>,
+    /// Mean torque less demand where the drive went on, in N·m: the worst of both demands, and for the ZS9 of both motors.
+    pub torque_error_nm: f64,
+    /// Why it is uncaught; empty otherwise.
+    pub why: String,
+}
+
+/// Which case a line is of.
+#[derive(Clone, Debug)]
+pub struct Setting {
+    /// `pmasynrm` or `zs9`.
+    pub system: &'static str,
+    /// Mode of the pulses, or the scheme.
+    pub mode: &'static str,
+    /// In r/min.
+    pub speed_rpm: f64,
+    /// What the drive did.
+    pub action: Action,
+}
+
+/// What a run left.
+#[derive(Clone, Debug)]
+pub struct Seen {
+    /// On the bench.
+    pub observed: Observed,
+    /// The latched fault.
+    pub trip: Option<Trip>,
+    /// Mean torque less demand, in N·m: the worst of both demands, and for the ZS9 of both motors.
+    pub torque_error_nm: f64,
+    /// Length of a tick of what was observed, in s.
+    pub tick_s: f64,
+    /// Length of a carrier at the fault's instant, in s.
+    pub carrier_s: f64,
+}
+
+/// What may come of it.
+#[derive(Clone, Debug)]
+pub struct Allowed {
+    /// The longest time from a fault's first effect until the gates are safe, in s.
+    pub longest_s: f64,
+    /// Phase current, in A.
+    pub current_a: f64,
+    /// DC voltage with safe gates, in V.
+    pub udc_v: f64,
+    /// The ZS9's capacitor voltage with safe gates, in V.
+    pub uc_v: Option<f64>,
+    /// Mean torque error where a share of it is allowed, in N·m.
+    pub torque_nm: f64,
+    /// Further bounds where the drive stopped.
+    pub stopped: Vec<Bounded>,
+    /// Further bounds where it went on.
+    pub went_on: Vec<Bounded>,
+}
+
+impl Outcome {
+    /// The line of a case.
+    pub fn new<C>(setting: &Setting, fault: &Named<C>, seen: &Seen, allowed: Allowed) -> Self {
+        let Seen { observed, trip, torque_error_nm, tick_s, carrier_s } = seen;
+        let time_s = observed.ticks_to_safe().map(|ticks| ticks as f64 * tick_s);
+        let mut stopped = vec![
+            Bounded::new(
+                "ms until the gates are safe",
+                time_s.map_or(f64::NAN, |time_s| time_s * 1e3),
+                allowed.longest_s * 1e3,
+            ),
+            Bounded::new("A until the gates are safe", observed.until.current_a, allowed.current_a),
+            Bounded::new("A with safe gates", observed.after.current_a, allowed.current_a),
+        ];
+        stopped.extend(allowed.stopped);
+        let mut went_on = allowed.went_on;
+        let torque_share = fault.rule.torque_share.unwrap_or(0.0);
+        went_on.push(Bounded::new("N·m off", *torque_error_nm, torque_share * allowed.torque_nm));
+        let named = trip.map(|trip| trip.fault);
+        let (verdict, why) = judge::verdict(&fault.rule, named, &stopped, &went_on);
+        let since_ticks = observed.safe.map(|(safe, _)| safe as f64 - observed.from as f64);
+        Self {
+            system: setting.system,
+            fault: fault.name.clone(),
+            mode: setting.mode.to_owned(),
+            speed_rpm: setting.speed_rpm,
+            action: setting.action,
+            verdict,
+            named: named.map_or("", Fault::name).to_owned(),
+            safe_state: observed.safe.map_or("", |(_, safe)| safe_state_name(safe)).to_owned(),
+            carrier_periods: time_s.map(|time_s| time_s / carrier_s),
+            time_ms: time_s.map(|time_s| time_s * 1e3),
+            since_fault_ms: since_ticks.map(|ticks| ticks * tick_s * 1e3),
+            current_until_a: observed.until.current_a,
+            current_after_a: observed.after.current_a,
+            current_limit_a: allowed.current_a,
+            udc_until_v: observed.until.udc_v,
+            udc_after_v: observed.after.udc_v,
+            udc_limit_v: allowed.udc_v,
+            uc_until_v: allowed.uc_v.map(|_| observed.until.uc_v),
+            uc_after_v: allowed.uc_v.map(|_| observed.after.uc_v),
+            uc_limit_v: allowed.uc_v,
+            torque_error_nm: *torque_error_nm,
+            why,
+        }
+    }
+}
+
+/// The name in tables.
+fn safe_state_name(safe: SafeState) -> &'static str {
+    match safe {
+        SafeState::GatesOff => "gates off",
+        SafeState::ShortCircuit => "short circuit, lower",
+        SafeState::UpperShortCircuit => "short circuit, upper",
+    }
+}

@@ -1,0 +1,68 @@
+//! The generated part of a document.
+
+use super::{SYSTEMS, sentences, text, total};
+use crate::campaign::Outcome;
+use crate::trace::write_text;
+use anyhow::{Context, Result, bail};
+use std::fmt::Write as _;
+use std::path::Path;
+
+/// What is written into a document.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Part {
+    /// The tables of the fast campaign.
+    Tables,
+    /// What the full campaign comes to, in sentences.
+    Sentences,
+}
+
+impl Part {
+    /// Where it begins and ends.
+    const fn markers(self) -> [&'static str; 2] {
+        match self {
+            Self::Tables => ["<!-- campaign: begin -->\n", "<!-- campaign: end -->"],
+            Self::Sentences => ["<!-- full campaign: begin -->\n", "<!-- full campaign: end -->"],
+        }
+    }
+
+    fn text(self, outcomes: &[Outcome]) -> String {
+        if self == Self::Tables {
+            return text(outcomes);
+        }
+        let mut out = String::new();
+        for (system, heading) in SYSTEMS {
+            let Some(total) = total(outcomes, system) else { continue };
+            let _ = write!(out, "\n{heading}: {}", sentences(&total));
+        }
+        out
+    }
+}
+
+/// The document with its generated part replaced.
+///
+/// # Errors
+/// Without its markers.
+pub fn document(text: &str, outcomes: &[Outcome], part: Part) -> Result<String> {
+    let [begin, end] = part.markers();
+    let (Some(from), Some(to)) = (text.find(begin), text.find(end)) else {
+        bail!("must have the lines {} and {end}", begin.trim());
+    };
+    let before = text.get(..from + begin.len()).unwrap_or_default();
+    let after = text.get(to..).unwrap_or_default();
+    Ok(format!("{before}{}\n{after}", part.text(outcomes)))
+}
+
+/// Renews the generated part of a document, or says whether it is as it would be written.
+///
+/// # Errors
+/// A document that cannot be read or written, or without its markers.
+pub fn renew(path: &Path, outcomes: &[Outcome], part: Part, only_check: bool) -> Result<bool> {
+    let named = || path.display().to_string();
+    let before = std::fs::read_to_string(path).with_context(named)?;
+    let after = document(&before, outcomes, part).with_context(named)?;
+    let same = before == after;
+    if !only_check && !same {
+        write_text(path, &after)?;
+    }
+    Ok(same)
+}

@@ -1,0 +1,101 @@
+//! What a fault of the PMaSynRM drive may come to.
+
+use super::cases::Case;
+use super::faults::Cause;
+use super::{Drive, STAGES};
+use crate::bench::Observed;
+use crate::bench::inject::Kind;
+use crate::campaign::judge::{Bounded, CURRENT_SHARE, FORCED, half_turn_s};
+use crate::campaign::outcome::{Allowed, Seen};
+use crate::plant::LineFilter;
+use crate::run::CLOCK;
+use core::f64::consts::TAU;
+
+impl Drive {
+    pub(super) fn allowed(&self, case: &Case, seen: &Seen, safe_torque_nm: f64) -> Allowed {
+        let parameters = &self.machine.folder.parameters;
+        let observed = &seen.observed;
+        let (trip_a, over_v) = (parameters.trip_current_a, parameters.trip_dc_over_v);
+        let current_a = match case.fault.cause {
+            // Flux linkage that is there when a device fails cannot leave a machine that is shorted; nothing the gates do is better.
+            Cause::Bench(Kind::Device(_)) => {
+                (CURRENT_SHARE * trip_a).max(FORCED * observed.stored.short_circuit_a)
+            }
+            _ => CURRENT_SHARE * trip_a,
+        };
+        let udc_v = self.forced_udc_v(case, observed);
+        Allowed {
+            longest_s: self.longest_s(case, seen.carrier_s),
+            current_a,
+            udc_v,
+            uc_v: None,
+            torque_nm: parameters.max_torque_nm,
+            stopped: vec![
+                Bounded::new("V until the gates are safe", observed.until.udc_v, over_v + self.link_rise_v()),
+                Bounded::new("V with safe gates", observed.after.udc_v, udc_v),
+                Bounded::new("N·m with safe gates", safe_torque_nm.abs(), self.safe_torque_limit_nm(case)),
+            ],
+            went_on: vec![
+                Bounded::new("A", observed.until.current_a, BETWEEN_SAMPLES * trip_a),
+                Bounded::new("V", observed.until.udc_v, over_v),
+            ],
+        }
+    }
+
+    /// The longest time from a fault's first effect until the gates are safe, in s: three carriers, or, where a fault shows with the
+    /// rotor's angle, half an electrical turn.
+    fn longest_s(&self, case: &Case, carrier_s: f64) -> f64 {
+        let carriers_s = 3.0 * carrier_s;
+        if case.fault.needs_rest() {
+            return STAGES.end_s;
+        }
+        match case.fault.cause {
+            Cause::Bench(Kind::Current(..) | Kind::Angle(_)) => {
+                let pole_pairs = self.machine.folder.parameters.pole_pairs;
+                carriers_s.max(half_turn_s(case.point.speed_rpm, pole_pairs))
+            }
+            Cause::Runaway => carriers_s + TRACKING_S,
+            _ => carriers_s,
+        }
+    }
+
+    /// The most torque that safe gates may leave, in N·m: a tenth of the largest, so that nobody is braked who did not ask for it. A
+    /// leg that is stuck has no such choice, and the short circuit's torque has its peak at a few per cent of the speed.
+    fn safe_torque_limit_nm(&self, case: &Case) -> f64 {
+        match case.fault.cause {
+            // A line that goes on falling after the gates are off comes below the EMF in the end.
+            Cause::Bench(Kind::Gate(..) | Kind::Device(_) | Kind::Supply(_)) => f64::INFINITY,
+            _ => 0.1 * self.machine.folder.parameters.max_torque_nm,
+        }
+    }
+
+    /// How far the link can rise between a sample at the trip level and safe gates, in V.
+    fn link_rise_v(&self) -> f64 {
+        let LineFilter { capacitance_f, .. } = LineFilter::TRACTION;
+        let most_a = 2.0 * CURRENT_SHARE * self.machine.folder.parameters.trip_current_a;
+        let time_s = f64::from(CLOCK.control_s()) + SAFE_STATE_S;
+        most_a / capacitance_f * time_s
+    }
+
+    /// The highest link voltage that must be expected once the gates are safe, in V: where the line and its choke take the capacitor,
+    /// with the energy on top that is in the machine's field, and that its rotor gives while the field decays; or what the diodes
+    /// rectify. Below its trip level the link may do what it likes.
+    fn forced_udc_v(&self, case: &Case, observed: &Observed) -> f64 {
+        let pole_pairs = f64::from(self.machine.folder.parameters.pole_pairs);
+        let omega = case.point.speed_rpm.abs() * TAU / 60.0 * pole_pairs;
+        let rectified_v = 3.0_f64.sqrt() * omega * f64::from(self.machine.tables.ratings.magnet_flux_wb);
+        let capacitance_f = LineFilter::TRACTION.capacitance_f;
+        let field_v = (2.0 * observed.stored.field_j / capacitance_f).sqrt();
+        let braked_v = (2.0 * observed.stored.braked_j / capacitance_f).sqrt();
+        let charged_v = observed.stored.unloaded_v.hypot(field_v).hypot(braked_v);
+        let highest_v = self.machine.folder.parameters.trip_dc_over_v;
+        (FORCED * charged_v.max(rectified_v)).max(highest_v)
+    }
+}
+
+/// How far the speed tracker lags behind, in s: 2/500 rad/s.
+const TRACKING_S: f64 = 4e-3;
+/// What a current that no sample finds above the trip level may reach between two samples, over that level.
+const BETWEEN_SAMPLES: f64 = 1.1;
+/// From an interrupt's instant to the gates, in s.
+const SAFE_STATE_S: f64 = 25e-6;

@@ -1,0 +1,106 @@
+//! Where the faults of the PMaSynRM drive come.
+
+use super::faults::{Cause, faults};
+use crate::bench::inject::Kind;
+use crate::campaign::Action;
+use crate::campaign::action::{LEAD_S, fault_s};
+use crate::campaign::fault::Named;
+use crate::sensor_faults::AngleFault;
+
+/// A speed, and how much of the torque envelope is asked for there.
+#[derive(Clone, Copy, Debug)]
+pub struct Point {
+    /// In r/min.
+    pub speed_rpm: f64,
+    /// Share of the envelope, motoring and braking.
+    pub share: f64,
+    /// Whether it is one of the fast campaign's.
+    pub fast: bool,
+}
+
+const fn point(speed_rpm: f64, share: f64, fast: bool) -> Point {
+    Point { speed_rpm, share, fast }
+}
+
+/// Where the faults come: every mode at several speeds. Patterns of square wave need torque below 4,455 r/min.
+const POINTS: [Point; 18] = [
+    point(0.0, 0.8, false),
+    point(100.0, 0.8, false),
+    point(300.0, 0.8, true),
+    point(550.0, 0.8, false),
+    point(640.0, 0.8, false),
+    point(850.0, 0.8, true),
+    point(930.0, 0.5, false),
+    point(1080.0, 0.5, true),
+    point(1200.0, 0.5, false),
+    point(1700.0, 0.5, true),
+    point(-1700.0, 0.5, false),
+    point(1950.0, 0.4, false),
+    point(2800.0, 0.4, true),
+    point(2000.0, 1.0, false),
+    point(3000.0, 0.8, false),
+    point(4500.0, 0.8, false),
+    point(5500.0, 0.8, false),
+    point(6000.0, 0.8, true),
+];
+
+/// From where a rotor runs away, in r/min: it must be above 6,600 in time.
+const RUNAWAY_FROM_RPM: f64 = 5_000.0;
+
+impl Named<Cause> {
+    /// Whether it comes at rest, and the rotor is pushed off.
+    pub(super) fn needs_rest(&self) -> bool {
+        self.name.ends_with("at-rest")
+    }
+
+    /// Whether it can come there.
+    fn fits(&self, point: &Point) -> bool {
+        let speed_rpm = point.speed_rpm.abs();
+        match self.cause {
+            Cause::Runaway => speed_rpm >= RUNAWAY_FROM_RPM,
+            Cause::Bench(Kind::Angle(AngleFault::Frozen | AngleFault::Reversed)) => {
+                self.needs_rest() == (speed_rpm == 0.0)
+            }
+            _ => true,
+        }
+    }
+}
+
+/// One run.
+#[derive(Clone, Debug)]
+pub struct Case {
+    pub(super) fault: Named<Cause>,
+    pub(super) point: Point,
+    pub(super) action: Action,
+    /// When the fault comes, in s.
+    pub(super) at_s: f64,
+}
+
+impl Case {
+    /// What a filter searches.
+    pub fn name(&self) -> String {
+        format!("pmasynrm {} {} {}", self.fault.name, self.point.speed_rpm, self.action.name())
+    }
+}
+
+/// Every case; of the fast ones each fault of each kind in each mode.
+pub fn cases(fast: bool) -> Vec<Case> {
+    let mut list = Vec::new();
+    for fault in faults() {
+        for point in POINTS {
+            for action in Action::ALL {
+                let slow = fault.needs_rest() || fault.cause == Cause::Runaway;
+                if !fault.fits(&point) || (fast && !(fault.fast && (point.fast || slow))) {
+                    continue;
+                }
+                let at_s = match fault.cause {
+                    // The machine is another one from the beginning.
+                    Cause::Machine(..) => -LEAD_S,
+                    _ => fault_s(list.len()),
+                };
+                list.push(Case { fault: fault.clone(), point, action, at_s });
+            }
+        }
+    }
+    list
+}

@@ -1,0 +1,181 @@
+//! Cases of the PMaSynRM drive.
+
+mod allowed;
+mod cases;
+mod faults;
+mod ride;
+
+pub use cases::{Case, cases};
+pub use ride::{Ridden, Ride};
+
+use super::Outcome;
+use super::action::{FAULT_S, LEAD_S, Stages};
+use super::outcome::{Seen, Setting};
+use super::without::Without;
+use crate::bench::inject::{Injection, Kind};
+use crate::bench::{self, Bench, Flaws, Limits, Supply};
+use crate::machine::Machine;
+use crate::plant::{LineFilter, Plant, PlantSettings, SpeedSource};
+use crate::run::{CLOCK, Tasks};
+use crate::trace::Row;
+use anyhow::Result;
+use faults::Cause;
+use tractive::control::{Demand, Gains};
+use tractive::drive::traction::Settings;
+use tractive::machine::Tables;
+use tractive::modulation::{Devices, Mode};
+
+/// Full torque is reversed in 0.15 s where it cannot step; the aftermath is several electrical turns, and the link's oscillation.
+const STAGES: Stages = Stages { torque_s: -0.09, turn_s: 0.1, end_s: 0.3, aftermath_s: 0.06 };
+/// Means of the torque are over this much time, in s.
+const MEAN_S: f64 = 0.04;
+/// Step of a case's trace, in s.
+const TRACE_STEP_S: f64 = 50e-6;
+/// How fast a rotor that is pushed off gets faster, in r/min per s.
+const PUSH_RPM_S: f64 = 2_000.0;
+/// How fast a rotor that runs away gets faster, in r/min per s: twice what the machine itself can do.
+const RUNAWAY_RPM_S: f64 = 12_000.0;
+
+/// The drive, with one protection off or none.
+pub struct Drive {
+    machine: Machine,
+    tables: &'static Tables,
+    without: Option<Without>,
+}
+
+impl Drive {
+    /// For the 180 kW machine.
+    ///
+    /// # Errors
+    /// Where its folder is not there.
+    pub fn new(without: Option<Without>) -> Result<Self> {
+        let machine = Machine::load("pmasynrm-180kw")?;
+        let tables = without.map_or(machine.tables, |without| without.tables(machine.tables));
+        Ok(Self { machine, tables, without })
+    }
+
+    /// The machine's folder.
+    pub fn machine(&self) -> &Machine {
+        &self.machine
+    }
+
+    /// Runs one case.
+    ///
+    /// # Errors
+    /// A drive that breaks the bench's rules.
+    pub fn run(&self, case: &Case) -> Result<Outcome> {
+        let mut bench = self.bench(case);
+        let mut tasks = self.tasks();
+        let tick_s = f64::from(CLOCK.tick_s);
+        tasks.drive(&mut bench, |bench| {
+            let safe_s = bench.observed().safe.map(|(at, _)| at as f64 * tick_s - LEAD_S);
+            safe_s.is_none_or(|safe_s| bench.time_s() < safe_s + STAGES.aftermath_s)
+        })?;
+        let rows = bench.rows();
+        let before = rows.iter().take_while(|row| row.t_s < case.at_s.max(FAULT_S));
+        let observed = *bench.observed();
+        let seen = Seen {
+            observed,
+            trip: tasks.trip(),
+            torque_error_nm: torque_error_nm(rows, STAGES.turn_s).max(torque_error_nm(rows, STAGES.end_s)),
+            tick_s,
+            carrier_s: match observed.carrier_ticks {
+                0 => 2.0 * f64::from(self.devices().shortest_half_ticks) * tick_s,
+                ticks => ticks as f64 * tick_s,
+            },
+        };
+        let setting = Setting {
+            system: "pmasynrm",
+            mode: before.last().map_or(Mode::Off, |row| row.mode).name(),
+            speed_rpm: case.point.speed_rpm,
+            action: case.action,
+        };
+        let allowed = self.allowed(case, &seen, last_torque_nm(rows));
+        Ok(Outcome::new(&setting, &case.fault, &seen, allowed))
+    }
+
+    fn devices(&self) -> Devices {
+        Devices::new(250, 0, self.tables.ratings.max_switching_hz, &CLOCK)
+    }
+
+    fn tasks(&self) -> Tasks<'static> {
+        let devices = self.devices();
+        let settings = Settings { clock: CLOCK, devices, gains: Gains::DEFAULT };
+        let tasks = Tasks::new(self.tables, settings, devices.shortest_half_ticks);
+        match self.without {
+            Some(without) => tasks.without(without),
+            None => tasks,
+        }
+    }
+
+    /// A sound bench.
+    fn bench_settings(&self, duration_s: f64, trace_step_s: f64) -> bench::Settings {
+        bench::Settings {
+            clock: CLOCK,
+            first_half_ticks: self.devices().shortest_half_ticks,
+            dead_time_ticks: 0,
+            lead_s: LEAD_S,
+            duration_s,
+            trace_step_s,
+            udc_v: self.machine.folder.parameters.dc_link_nominal_v,
+            link_steps: Vec::new(),
+            flaws: Flaws::default(),
+            supply: Supply::Line(LineFilter::TRACTION),
+            injection: Some(Injection { kind: Kind::Elsewhere, at_s: -LEAD_S }),
+            limits: Limits::NONE,
+        }
+    }
+
+    fn bench(&self, case: &Case) -> Bench {
+        let parameters = &self.machine.folder.parameters;
+        let Case { point, action, at_s, .. } = *case;
+        let full_nm = (point.share * self.machine.envelope_nm(point.speed_rpm)).copysign(point.speed_rpm);
+        let operator = move |t_s: f64| {
+            let torque_nm = action.share(&STAGES, t_s) * full_nm;
+            (Demand { torque_nm: torque_nm as f32, slew_limited: false }, true)
+        };
+        let steady = vec![(0.0, point.speed_rpm)];
+        let faster = |rpm_s: f64| {
+            let end_rpm = point.speed_rpm + rpm_s * (STAGES.end_s - at_s);
+            vec![(LEAD_S + at_s, point.speed_rpm), (LEAD_S + STAGES.end_s, end_rpm)]
+        };
+        let (kind, machine, speed) = match case.fault.cause {
+            Cause::Bench(kind) if case.fault.needs_rest() => {
+                (kind, PlantSettings::default(), faster(PUSH_RPM_S))
+            }
+            Cause::Bench(kind) => (kind, PlantSettings::default(), steady),
+            Cause::Machine(flux_scale, resistance_scale) => {
+                (Kind::Elsewhere, PlantSettings { flux_scale, resistance_scale }, steady)
+            }
+            Cause::Runaway => (Kind::Elsewhere, PlantSettings::default(), faster(RUNAWAY_RPM_S)),
+        };
+        let settings = bench::Settings {
+            injection: Some(Injection { kind, at_s }),
+            limits: Limits {
+                current_a: parameters.trip_current_a,
+                udc_v: (parameters.trip_dc_under_v, parameters.trip_dc_over_v),
+                speed_rpm: parameters.trip_speed_rpm,
+                ..Limits::NONE
+            },
+            ..self.bench_settings(STAGES.end_s, TRACE_STEP_S)
+        };
+        let plant = Plant::new(&self.machine.folder, SpeedSource::profile(speed), &machine);
+        Bench::new(plant, Box::new(operator), &settings)
+    }
+}
+
+/// Mean torque less demand before an instant, in N·m.
+fn torque_error_nm(rows: &[Row], before_s: f64) -> f64 {
+    let window = rows.iter().filter(|row| row.t_s < before_s && row.t_s > before_s - MEAN_S);
+    let (count, sum) =
+        window.fold((0.0_f64, 0.0), |(count, sum), row| (count + 1.0, sum + row.te_nm - row.te_ref_nm));
+    (sum / count.max(1.0)).abs()
+}
+
+/// Mean torque over the last half of the aftermath, in N·m.
+fn last_torque_nm(rows: &[Row]) -> f64 {
+    let end_s = rows.last().map_or(0.0, |row| row.t_s);
+    let window = rows.iter().filter(|row| row.t_s > end_s - 0.5 * STAGES.aftermath_s);
+    let (count, sum) = window.fold((0.0_f64, 0.0), |(count, sum), row| (count + 1.0, sum + row.te_nm));
+    sum / count.max(1.0)
+}

@@ -1,0 +1,73 @@
+//! Drives that are written down as what happens when, instead of cases.
+
+use super::{Drive, STAGES};
+use crate::bench::inject::{Injection, Kind};
+use crate::bench::{self, Bench, Flaws, Observed};
+use crate::campaign::action::LEAD_S;
+use crate::plant::{Plant, PlantSettings, SpeedSource};
+use crate::steps::held;
+use crate::trace::Row;
+use anyhow::Result;
+use tractive::control::Demand;
+use tractive::protection::Trip;
+
+/// A drive written down as what happens when; times in s from the recording's beginning.
+#[derive(Clone, Debug, Default)]
+pub struct Ride {
+    /// Speeds in r/min, straight lines between.
+    pub speed: Vec<(f64, f64)>,
+    /// Torques in N·m, each from its time on, and whether the demand's rate is limited.
+    pub torque: Vec<(f64, (f64, bool))>,
+    /// Whether the drive is enabled, each from its time on.
+    pub enable: Vec<(f64, bool)>,
+    /// Voltages of the line, each from its time on.
+    pub line: Vec<(f64, f64)>,
+    /// What goes wrong.
+    pub injection: Option<Injection<Kind>>,
+    /// Length, in s.
+    pub duration_s: f64,
+}
+
+/// What a ride left.
+pub struct Ridden {
+    /// The trace.
+    pub rows: Vec<Row>,
+    /// What a fault did.
+    pub observed: Observed,
+    /// The latched fault.
+    pub trip: Option<Trip>,
+}
+
+/// Step of a ride's trace, in s.
+const TRACE_STEP_S: f64 = 100e-6;
+
+impl Drive {
+    /// Drives a script instead of a case.
+    ///
+    /// # Errors
+    /// A drive that breaks the bench's rules.
+    pub fn ride(&self, ride: Ride, flaws: Flaws) -> Result<Ridden> {
+        let Ride { speed, torque, enable, line, injection, duration_s } = ride;
+        let operator = move |t_s: f64| {
+            let (torque_nm, slew_limited) = held(&torque, t_s).unwrap_or((0.0, true));
+            let demand = Demand { torque_nm: torque_nm as f32, slew_limited };
+            (demand, held(&enable, t_s).unwrap_or(true))
+        };
+        let speed = speed.into_iter().map(|(t_s, rpm)| (t_s + LEAD_S, rpm)).collect();
+        let sound = self.bench_settings(duration_s, TRACE_STEP_S);
+        let injection = injection.or(sound.injection);
+        let settings = bench::Settings { link_steps: line, flaws, injection, ..sound };
+        let plant = Plant::new(&self.machine.folder, SpeedSource::profile(speed), &PlantSettings::default());
+        let mut bench = Bench::new(plant, Box::new(operator), &settings);
+        let mut tasks = self.tasks();
+        let mut tripped_s = None;
+        tasks.drive(&mut bench, |bench| {
+            // Once it has stopped there is little to see.
+            if bench.observed().safe.is_some() {
+                tripped_s.get_or_insert(bench.time_s());
+            }
+            tripped_s.is_none_or(|tripped_s| bench.time_s() < tripped_s + STAGES.aftermath_s)
+        })?;
+        Ok(Ridden { rows: bench.rows().to_vec(), observed: *bench.observed(), trip: tasks.trip() })
+    }
+}

@@ -1,0 +1,138 @@
+//! The nine gates: what they are ordered to be, and what they are once dead times have passed.
+
+use crate::bench::Tick;
+use crate::plant::zs9::LegGates;
+
+/// Orders and levels, in the order of [`tractive::nine_switch::GATES`].
+pub struct Gates {
+    ordered: [bool; 9],
+    levels: [bool; 9],
+    /// When those that wait for the dead time turn on.
+    turn_on: [Option<Tick>; 9],
+    dead_time: Tick,
+    /// From when on edges are kept, if they are; and those kept.
+    edges_from: Option<Tick>,
+    edges: Vec<(Tick, u8, bool)>,
+}
+
+impl Gates {
+    /// All off.
+    pub fn new(dead_time: Tick, edges_from: Option<Tick>) -> Self {
+        Self {
+            ordered: [false; 9],
+            levels: [false; 9],
+            turn_on: [None; 9],
+            dead_time,
+            edges_from,
+            edges: Vec::new(),
+        }
+    }
+
+    /// The same on a bench that begins at another step than 0.
+    pub fn beginning_at(self, origin: Tick) -> Self {
+        Self { edges_from: self.edges_from.map(|from| from + origin), ..self }
+    }
+
+    /// What they are ordered to be.
+    pub fn ordered(&self) -> [bool; 9] {
+        self.ordered
+    }
+
+    /// What they are.
+    pub fn levels(&self) -> [bool; 9] {
+        self.levels
+    }
+
+    /// Edges that were kept: when, which gate, on or off.
+    pub fn edges(&self) -> &[(Tick, u8, bool)] {
+        &self.edges
+    }
+
+    /// When the next one turns on.
+    pub fn next_event(&self) -> Option<Tick> {
+        self.turn_on.iter().flatten().min().copied()
+    }
+
+    /// Turns on those that have waited long enough.
+    pub fn act(&mut self, now: Tick) {
+        for gate in 0..9 {
+            if self.turn_on[usize::from(gate)].is_some_and(|at| at <= now) {
+                self.turn_on[usize::from(gate)] = None;
+                self.set(now, gate, true);
+            }
+        }
+    }
+
+    /// New orders to the gates. One that turns on where another one of its leg turns off waits for the dead time; one that
+    /// turns on alone shorts its leg on purpose, at once.
+    pub fn order(&mut self, now: Tick, ordered: [bool; 9]) {
+        if ordered == self.ordered {
+            return;
+        }
+        for leg in 0..3_u8 {
+            let gates = [leg, leg + 3, leg + 6];
+            let changes = |gate: u8, to: bool| {
+                ordered[usize::from(gate)] == to && self.ordered[usize::from(gate)] != to
+            };
+            let turns_off = gates.map(|gate| changes(gate, false));
+            let turns_on = gates.map(|gate| changes(gate, true));
+            let waits = self.dead_time > 0 && turns_off.contains(&true);
+            for (gate, _) in gates.into_iter().zip(turns_off).filter(|(_, turns)| *turns) {
+                self.turn_on[usize::from(gate)] = None;
+                self.set(now, gate, false);
+                // Whoever waits already waits for this one too.
+                for other in gates.map(usize::from) {
+                    self.turn_on[other] = self.turn_on[other].map(|_| now + self.dead_time);
+                }
+            }
+            for (gate, _) in gates.into_iter().zip(turns_on).filter(|(_, turns)| *turns) {
+                if waits {
+                    self.turn_on[usize::from(gate)] = Some(now + self.dead_time);
+                } else {
+                    self.set(now, gate, true);
+                }
+            }
+        }
+        self.ordered = ordered;
+    }
+
+    /// The legs of a bridge that pulses, with the states that the diodes give those which wait for a gate: the current of a node that is not tied to a rail
+    /// chooses it. Out of the node it flows through a diode from below, into it through one from above.
+    pub fn as_diodes_have_it(
+        &self,
+        gates: [LegGates; 3],
+        currents_a: impl FnOnce() -> [[f64; 3]; 2],
+    ) -> [LegGates; 3] {
+        if self.dead_time == 0 {
+            return gates;
+        }
+        let [upper, lower] = currents_a();
+        core::array::from_fn(|leg| {
+            let choose =
+                |current_a: f64, out: LegGates, into: LegGates| if current_a > 0.0 { out } else { into };
+            match (gates[leg].high, gates[leg].middle, gates[leg].low) {
+                (false, false, true) => choose(upper[leg], LegGates::ZERO, LegGates::ONE),
+                (true, false, false) => choose(lower[leg], LegGates::ONE, LegGates::MINUS_ONE),
+                (false, true, false) => choose(upper[leg] + lower[leg], LegGates::ZERO, LegGates::MINUS_ONE),
+                // Two exchanges within a dead time: both nodes are free; where their currents pull them together, the sum chooses.
+                (false, false, false) if upper[leg] <= 0.0 => {
+                    choose(lower[leg], LegGates::ONE, LegGates::MINUS_ONE)
+                }
+                (false, false, false) => {
+                    choose(upper[leg] + lower[leg].min(0.0), LegGates::ZERO, LegGates::MINUS_ONE)
+                }
+                _ => gates[leg],
+            }
+        })
+    }
+
+    fn set(&mut self, now: Tick, gate: u8, on: bool) {
+        let level = &mut self.levels[usize::from(gate)];
+        if *level != on {
+            *level = on;
+            if self.edges_from.is_some_and(|from| now >= from) {
+                self.edges.push((now, gate, on));
+            }
+        }
+    }
+}

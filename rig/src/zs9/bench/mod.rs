@@ -1,0 +1,231 @@
+//! The ZS9's bench: plant, gates and sensors in the timers' time, sampled and recorded.
+//!
+//! Time is counted in compare steps of the firmware's timers, so both sides agree on every edge. As on the first
+//! system's bench nothing runs ahead of what is decided, and what an interrupt orders takes effect at a fixed delay after
+//! its nominal instant.
+
+mod carrier;
+mod gates;
+mod record;
+mod run;
+mod sampling;
+mod settings;
+mod watch;
+
+pub use crate::bench::BenchError;
+pub use settings::{BenchSettings, Course};
+
+use super::inject::Spoiler;
+use super::line::{LineSide, LineTimes};
+use super::operator::{Operator, Orders};
+use super::sensors::Sensors;
+use super::trace::Row;
+use crate::bench::{Conversions, Converter, Due, Observed, Tick, Timeline};
+use crate::plant::zs9::{NetworkState, Zs9Plant};
+use crate::run::Supervised;
+use gates::Gates;
+use record::Sums;
+use tractive::board::{DualSample, GateFeedback, PlayedPeriod};
+use tractive::drive::dual::{COMPARE_STEPS, DualReport};
+use tractive::operator::{DualStatus, Feedback};
+use tractive::time::Instant;
+
+/// How long after its nominal instant the control interrupt's order to turn the gates off reaches them, in ticks (75 µs): its
+/// latest deadline.
+const CONTROL_OFF_TICKS: u32 = 1875;
+/// The same for the PWM interrupt (25 µs), as a bound on its length.
+const PWM_OFF_TICKS: u32 = 625;
+
+/// Plant, gates, sensors and recorder. Its time counts in compare steps.
+pub struct Bench {
+    plant: Zs9Plant,
+    operator: Box<dyn Operator + Send>,
+    settings: BenchSettings,
+    sensors: Sensors,
+    spoiler: Spoiler,
+    nominal_source_v: f64,
+    time: Timeline,
+    course: Course,
+    rows_wanted: usize,
+    /// Beginning of the carrier period that is played, and its length.
+    begun: Tick,
+    period: Tick,
+    next: Option<PlayedPeriod>,
+    /// Toggles of the running period that are still to come, the last one first.
+    toggles: Vec<(Tick, u8)>,
+    gates: Gates,
+    off: bool,
+    /// When the gates go off (true) or may be played again (false).
+    off_at: Option<(Tick, bool)>,
+    line: Option<LineSide>,
+    loads: Due<[f64; 2]>,
+    loads_nm: Option<[f64; 2]>,
+    observed: Observed,
+    feedback: GateFeedback,
+    orders: Orders,
+    control: Conversions<DualSample, DualReport>,
+    next_row: Tick,
+    sums: Sums,
+    rows: Vec<Row>,
+}
+
+impl Bench {
+    /// A bench at its first instant, gates off.
+    pub fn new(plant: Zs9Plant, mut operator: Box<dyn Operator + Send>, settings: BenchSettings) -> Self {
+        let time = Timeline::new(settings.clock, COMPARE_STEPS, settings.lead_s);
+        let rows_wanted = (settings.duration_s / settings.trace_step_s).round() as usize;
+        let speeds = plant.motors().each_ref().map(|motor| motor.speed_rpm());
+        let fault_s = settings.injection.map(|injection| settings.lead_s + injection.at_s);
+        Self {
+            orders: operator.orders(-settings.lead_s, speeds),
+            nominal_source_v: plant.source_v(),
+            plant,
+            operator,
+            sensors: Sensors::new(Converter::new(settings.flaws)),
+            spoiler: Spoiler::new(settings.injection),
+            course: Course::default(),
+            rows_wanted,
+            begun: 0,
+            period: time.of_ticks(settings.carrier_ticks),
+            next: Some(PlayedPeriod::off(settings.carrier_ticks / 2 * COMPARE_STEPS)),
+            toggles: Vec::with_capacity(36),
+            gates: Gates::new(time.steps(settings.dead_time_s), settings.edges.then_some(time.lead)),
+            off: false,
+            off_at: None,
+            line: None,
+            loads: Due::default(),
+            loads_nm: None,
+            observed: Observed::new(fault_s.map_or(Tick::MAX, |at_s| time.steps(at_s)), settings.limits),
+            feedback: GateFeedback::default(),
+            control: Conversions::new(&time),
+            next_row: time.lead,
+            sums: Sums::default(),
+            rows: Vec::with_capacity(rows_wanted.min(1 << 20)),
+            time,
+            settings,
+        }
+    }
+
+    /// The same with a line side: the network is empty, behind open contactors, and the drive has an operator.
+    pub fn with_line(mut self, times: LineTimes) -> Self {
+        self.line = Some(LineSide::new(times, &self.settings.clock));
+        self.plant.set_network(NetworkState::even(0.0, LineSide::EMPTY_V));
+        self
+    }
+
+    /// The same beginning at another tick than 0, with tasks of [`super::run::Tasks::beginning_at`] the same: where instants wrap.
+    pub fn beginning_at(mut self, origin_ticks: u64) -> Self {
+        let origin = origin_ticks * Tick::from(COMPARE_STEPS);
+        self.time = self.time.beginning_at(origin);
+        self.gates = self.gates.beginning_at(origin);
+        for step in [&mut self.begun, &mut self.control.next, &mut self.next_row] {
+            *step += origin;
+        }
+        self.observed.from = self.observed.from.saturating_add(origin);
+        self
+    }
+
+    /// The same with a source and schemes that change.
+    pub fn following(mut self, course: Course) -> Self {
+        self.course = course;
+        self
+    }
+
+    /// Whether the drive has an operator.
+    pub fn is_operated(&self) -> bool {
+        self.line.is_some()
+    }
+
+    /// What the board says to the operator in the slot that began at `instant`.
+    pub fn ask(&mut self, instant: Instant) -> Result<Feedback, BenchError> {
+        let tick = self.time.widen(instant) / Tick::from(COMPARE_STEPS);
+        let asked = self.line.as_mut().and_then(|line| line.gear.ask(tick));
+        asked.map(|(_, feedback)| feedback).ok_or(BenchError::NoSlot(tick))
+    }
+
+    /// What the operator told; it holds from `from` on.
+    pub fn told(&mut self, from: Instant, status: DualStatus) -> Result<(), BenchError> {
+        let tick = self.time.coming(from)?;
+        if let Some(line) = &mut self.line {
+            line.gear.tell(tick, status);
+        }
+        Ok(())
+    }
+
+    /// The motors' true speeds, in r/min.
+    pub fn speeds_rpm(&self) -> [f64; 2] {
+        self.plant.motors().each_ref().map(|motor| motor.speed_rpm())
+    }
+
+    /// Whether the recording is complete.
+    pub fn is_done(&self) -> bool {
+        self.rows.len() >= self.rows_wanted
+    }
+
+    /// Share of the run that is done, 0 ..= 1.
+    pub fn progress(&self) -> f64 {
+        let end_s = self.settings.lead_s + self.settings.duration_s;
+        ((self.time.now - self.time.origin) as f64 * self.time.step_s() / end_s).min(1.0)
+    }
+
+    /// Time since the recording's beginning, in s.
+    pub fn time_s(&self) -> f64 {
+        self.time.now_s()
+    }
+
+    /// Length of a compare step, in s.
+    pub fn step_s(&self) -> f64 {
+        self.time.step_s()
+    }
+
+    /// The trace so far.
+    pub fn rows(&self) -> &[Row] {
+        &self.rows
+    }
+
+    /// What a fault did.
+    pub fn observed(&self) -> &Observed {
+        &self.observed
+    }
+
+    /// The period to play from the next valley on.
+    pub fn play(&mut self, next: PlayedPeriod) {
+        self.next = Some(next);
+    }
+
+    /// An interrupt at `instant` turns all gates off.
+    pub fn gates_off(&mut self, instant: Instant) {
+        let from = self.time.widen(instant);
+        let is_control = (from - self.time.origin).is_multiple_of(self.time.control());
+        let delay = if is_control { CONTROL_OFF_TICKS } else { PWM_OFF_TICKS };
+        let at = from + self.time.of_ticks(delay);
+        self.off_at = match self.off_at {
+            Some((earlier, true)) => Some((earlier.min(at), true)),
+            _ => Some((at, true)),
+        };
+    }
+
+    /// The PWM interrupt at `instant` lets the gates be played again.
+    pub fn leave(&mut self, instant: Instant) {
+        let at = self.time.widen(instant) + self.time.of_ticks(PWM_OFF_TICKS);
+        // An order to turn them off that comes meanwhile stands.
+        if self.off_at.is_none() {
+            self.off_at = Some((at, false));
+        }
+    }
+}
+
+impl Supervised for Bench {
+    fn instant_s(&self, instant: Instant) -> f64 {
+        self.time.seconds(self.time.widen(instant))
+    }
+
+    fn loads_from(&mut self, instant: Instant, loads_nm: [f64; 2]) {
+        self.loads.push(self.time.widen(instant), loads_nm);
+    }
+
+    fn end_at(&mut self, instant: Instant) {
+        let end_s = self.time.seconds(self.time.widen(instant));
+        self.rows_wanted = self.rows_wanted.min((end_s / self.settings.trace_step_s).round() as usize);
+    }
+}

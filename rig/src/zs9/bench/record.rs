@@ -1,0 +1,72 @@
+//! The trace.
+
+use super::Bench;
+use crate::bench::Tick;
+use crate::zs9::trace::{Edge, MotorRow, Recording, Row};
+use tractive::recorder::DualRecord;
+
+/// What is summed up over a step of the trace, each value times its time, in steps.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Sums {
+    pub steps: f64,
+    pub torque_refs: [f64; 2],
+    pub loads: [f64; 2],
+    pub source_v: f64,
+    pub shorted: f64,
+}
+
+impl Bench {
+    /// What was recorded: what the bench saw, and what the drive's own recorder holds; instants in seconds from its beginning.
+    pub fn into_recording(self, records: Vec<DualRecord>) -> Recording {
+        let recorded = records
+            .into_iter()
+            .map(|record| (self.time.seconds(self.time.widen(record.at)), record))
+            .collect();
+        let edge =
+            |(at, gate, on): &(Tick, u8, bool)| Edge { t_s: self.time.seconds(*at), gate: *gate, on: *on };
+        let edges = self.gates.edges().iter().map(edge).collect();
+        Recording { rows: self.rows, edges, recorded }
+    }
+
+    /// Ends the row that ends now, if one has begun.
+    pub(super) fn record(&mut self) {
+        let sums = std::mem::take(&mut self.sums);
+        let means = self.plant.take_means();
+        if self.time.now > self.time.lead
+            && !self.is_done()
+            && let Some(means) = means
+        {
+            let motors = [0, 1].map(|k| {
+                let motor = &means.motors[k];
+                MotorRow {
+                    speed_rpm: motor.speed_rpm,
+                    torque_ref_nm: sums.torque_refs[k] / sums.steps,
+                    torque_nm: motor.torque_nm,
+                    id_a: motor.id_a,
+                    iq_a: motor.iq_a,
+                    phases_a: motor.phases_a,
+                    load_nm: sums.loads[k] / sums.steps,
+                    voltage_v: self.control.report.voltage_v[k].into(),
+                    weakening: self.control.report.weakening[k],
+                }
+            });
+            self.rows.push(Row {
+                t_s: self.rows.len() as f64 * self.settings.trace_step_s,
+                motors,
+                link_v: means.link_v,
+                capacitor_v: means.capacitor_v,
+                inductor_a: means.inductor_a,
+                source_v: sums.source_v / sums.steps,
+                duty: sums.shorted / sums.steps,
+                scheme: self.control.report.scheme,
+                trip: self.control.report.trip,
+                source_j: self.plant.energies().source_j,
+                kinetic_speed_rpm: self.speeds_rpm(),
+                explained_j: self.plant.energies().source_j - self.plant.residual_j(0.0),
+            });
+        }
+        let end_s = (self.rows.len() + 1) as f64 * self.settings.trace_step_s;
+        self.next_row = self.time.row_end(end_s);
+        self.control.show(self.time.now);
+    }
+}

@@ -1,0 +1,156 @@
+//! Lets time pass, and does what is due on the way.
+
+use super::{Bench, BenchError};
+use crate::bench::Tick;
+use crate::benchmark::in_plant;
+use crate::plant::zs9::LegGates;
+use crate::zs9::inject::Kind;
+use tractive::protection::SafeState;
+
+/// The capacitor behind the source's contactor, in F: as large as the network's.
+const INPUT_F: f64 = 500e-6;
+/// Longest step of its voltage, in s.
+const LONGEST_LOST_S: f64 = 10e-6;
+
+impl Bench {
+    /// Runs to `to`, doing on the way all that is due, and at `to` itself too.
+    pub(super) fn advance(&mut self, to: Tick) -> Result<(), BenchError> {
+        if self.time.now == self.time.origin && self.next.is_some() {
+            self.begin_period()?;
+        }
+        while self.time.now < to {
+            let now = self.time.now;
+            let fault = Some(self.observed.from).filter(|from| *from > now);
+            let toggle = self.toggles.last().map(|(at, _)| *at);
+            let off = self.off_at.map(|(at, _)| at.max(now));
+            let line = self.line.as_ref().and_then(|line| line.gear.next_event());
+            let line = line.map(|tick| self.time.of_ticks(tick).max(now + 1));
+            let load = self.loads.next().map(|at| at.max(now + 1));
+            let events = [fault, toggle, off, line, load, self.gates.next_event()];
+            let regular = [self.begun + self.period, self.control.next, self.next_row];
+            let due = events.into_iter().flatten().chain(regular).fold(to, Tick::min);
+            self.integrate(due)?;
+            self.act()?;
+        }
+        Ok(())
+    }
+
+    fn integrate(&mut self, to: Tick) -> Result<(), BenchError> {
+        if to <= self.time.now {
+            return Ok(());
+        }
+        if self.spoiler.injected.kind(self.time.now_s()) == Some(Kind::SourceLost) {
+            let longest = (LONGEST_LOST_S / self.time.step_s()).round() as Tick;
+            while self.time.now + longest < to {
+                self.integrate_lost(self.time.now + longest)?;
+            }
+            return self.integrate_lost(to);
+        }
+        self.integrate_fed(to)
+    }
+
+    /// With the source cut off: what its capacitor gives it loses.
+    fn integrate_lost(&mut self, to: Tick) -> Result<(), BenchError> {
+        let before_j = self.plant.energies().source_j;
+        self.integrate_fed(to)?;
+        let given_j = self.plant.energies().source_j - before_j;
+        let square = self.plant.source_v().powi(2) - 2.0 * given_j / INPUT_F;
+        self.plant.set_source_v(square.max(1.0).sqrt());
+        Ok(())
+    }
+
+    fn integrate_fed(&mut self, to: Tick) -> Result<(), BenchError> {
+        let steps = (to - self.time.now) as f64;
+        if let Some(line) = &self.line {
+            line.feed(&mut self.plant, self.nominal_source_v, steps * self.time.step_s());
+        }
+        let real = self.real_levels();
+        let [uh, vh, wh, um, vm, wm, ul, vl, wl] = real;
+        let gates = [(uh, um, ul), (vh, vm, vl), (wh, wm, wl)].map(|(high, middle, low)| LegGates {
+            high,
+            middle,
+            low,
+        });
+        let dt_s = steps * self.time.step_s();
+        if real == self.gates.levels() {
+            let gates =
+                if self.off { gates } else { self.gates.as_diodes_have_it(gates, || self.currents_a()) };
+            in_plant(|| self.plant.advance(gates, dt_s))?;
+        } else {
+            self.plant.advance_any(gates, dt_s);
+        }
+        for (gate, on) in real.into_iter().enumerate() {
+            let latch = if on { &mut self.feedback.on } else { &mut self.feedback.off };
+            *latch |= 1 << gate;
+        }
+        let sums = &mut self.sums;
+        sums.steps += steps;
+        sums.source_v += steps * self.plant.source_v();
+        for k in 0..2 {
+            sums.torque_refs[k] += steps * f64::from(self.control.report.torque_nm[k]);
+            sums.loads[k] += steps * self.orders.loads_nm[k];
+        }
+        if gates.contains(&LegGates::SHOOT_THROUGH) {
+            sums.shorted += steps;
+        }
+        self.time.now = to;
+        self.watch();
+        Ok(())
+    }
+
+    fn act(&mut self) -> Result<(), BenchError> {
+        match self.off_at {
+            Some((at, true)) if at <= self.time.now => {
+                self.off_at = None;
+                self.off = true;
+                self.toggles.clear();
+                self.gates.order(self.time.now, [false; 9]);
+                self.observed.enters(self.time.now, SafeState::GatesOff, self.stored());
+            }
+            Some((at, false)) if at <= self.time.now => {
+                self.off_at = None;
+                self.off = false;
+            }
+            _ => {}
+        }
+        if let Some(line) = &mut self.line {
+            line.act(self.time.tick());
+        }
+        while let Some(loads_nm) = self.loads.take(self.time.now) {
+            self.loads_nm = Some(loads_nm);
+            self.set_loads_nm(loads_nm);
+        }
+        let mut ordered = self.gates.ordered();
+        while let Some((at, gate)) = self.toggles.last().copied()
+            && at <= self.time.now
+        {
+            self.toggles.pop();
+            ordered[usize::from(gate)] ^= true;
+        }
+        self.gates.order(self.time.now, ordered);
+        self.gates.act(self.time.now);
+        if self.time.now == self.begun + self.period {
+            self.begun = self.time.now;
+            self.begin_period()?;
+        }
+        if self.time.now == self.next_row {
+            self.record();
+        }
+        if self.time.now == self.control.next {
+            self.take_sample()?;
+        }
+        Ok(())
+    }
+
+    /// Phase currents of both motors, in A.
+    pub(super) fn currents_a(&self) -> [[f64; 3]; 2] {
+        self.plant.motors().each_ref().map(|motor| motor.currents_abc())
+    }
+
+    /// Loads of both rotors, in N·m.
+    pub(super) fn set_loads_nm(&mut self, loads_nm: [f64; 2]) {
+        for (motor, load_nm) in self.plant.motors_mut().iter_mut().zip(loads_nm) {
+            motor.set_load_nm(load_nm);
+        }
+    }
+}

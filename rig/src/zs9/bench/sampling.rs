@@ -1,0 +1,111 @@
+//! What the drive's interrupts are told, and what control reports.
+
+use super::{Bench, BenchError};
+use crate::steps::held;
+use crate::zs9::inject::Kind;
+use tractive::board::{DualSample, HardwareBreak, PowerSample};
+use tractive::drive::dual::DualReport;
+use tractive::frames::Abc;
+use tractive::time::Instant;
+
+/// How far a current's reading may be off without making a difference that counts, in A: a tenth of a machine's largest current.
+const MUCH_A: f32 = 8.49;
+
+impl Bench {
+    /// The conversions that the control timer triggered at `instant`.
+    pub fn control_sample(&mut self, instant: Instant) -> Result<DualSample, BenchError> {
+        let at = self.time.widen(instant);
+        self.advance(at)?;
+        self.control.ask(at)
+    }
+
+    /// The control interrupt's report; it shows in the trace when the command takes effect.
+    pub fn control_report(&mut self, instant: Instant, report: DualReport) {
+        self.control.tell(&self.time, instant, report);
+    }
+
+    /// By how much the control interrupt is late, in ticks.
+    pub fn control_late_ticks(&self) -> u32 {
+        self.spoiler.injected.late_ticks(self.time.now_s())
+    }
+
+    /// Whether the control interrupt comes at this instant at all.
+    pub fn has_control(&self, instant: Instant) -> bool {
+        self.spoiler.injected.has_control(self.time.seconds(self.time.widen(instant)))
+    }
+
+    /// What the PWM interrupt converts at the peak `instant`.
+    pub fn power_sample(&mut self, instant: Instant) -> Result<PowerSample, BenchError> {
+        let at = self.time.widen(instant);
+        self.advance(at)?;
+        let feedback = std::mem::take(&mut self.feedback);
+        let mut sample = self.sensors.power(&self.plant, feedback);
+        if self.line.is_some() {
+            // The source's sensor is in front of the contactors.
+            sample.source_v = self.nominal_source_v as f32;
+        }
+        let true_a = sample.currents_a;
+        self.spoiler.power(self.time.seconds(at), &mut sample);
+        self.compare(true_a, sample.currents_a);
+        Ok(sample)
+    }
+
+    /// Notes readings that are off by more than a little.
+    fn compare(&mut self, true_a: [Abc; 2], read_a: [Abc; 2]) {
+        let off = |(read, told): (Abc, Abc)| {
+            (read.a - told.a).abs().max((read.b - told.b).abs()).max((read.c - told.c).abs())
+        };
+        let most_a = read_a.into_iter().zip(true_a).map(off).fold(0.0, f32::max);
+        if most_a > MUCH_A {
+            self.observed.makes_a_difference(self.time.now);
+        }
+    }
+
+    pub(super) fn take_sample(&mut self) -> Result<(), BenchError> {
+        let t_s = self.time.now_s();
+        self.control.begin(&self.time, self.spoiler.injected.has_control(t_s))?;
+        self.orders = self.operator.orders(t_s, self.speeds_rpm());
+        if let Some(loads_nm) = self.loads_nm {
+            self.orders.loads_nm = loads_nm;
+        }
+        self.set_loads_nm(self.orders.loads_nm);
+        let healthy_v = held(&self.course.source_v, t_s).unwrap_or(self.nominal_source_v);
+        let supply_v = healthy_v + self.sensors.ripple_v(t_s);
+        // What is cut off is its capacitor's.
+        let source_v = if self.spoiler.injected.kind(t_s) == Some(Kind::SourceLost) {
+            self.plant.source_v()
+        } else {
+            self.spoiler.source_v(t_s, supply_v)
+        };
+        let hardware = self.spoiler.hardware(t_s);
+        match &mut self.line {
+            None => self.plant.set_source_v(source_v),
+            Some(line) => {
+                if line.gear.sampled(self.time.tick(), hardware, || ()) {
+                    return Err(BenchError::OperatorLate(t_s));
+                }
+            }
+        }
+        let network = self.plant.network();
+        let mut sample = DualSample {
+            currents_a: self.sensors.currents(&self.plant),
+            angles: self.plant.motors().each_ref().map(|motor| Some(self.sensors.angle(motor))),
+            capacitor_v: network.capacitor_v() as f32,
+            inductor_a: network.inductor_a() as f32,
+            source_v: source_v as f32,
+            demands: self.orders.demands,
+            link_ref_v: self.settings.link_ref_v as f32,
+            scheme: held(&self.course.schemes, t_s).unwrap_or(self.settings.scheme),
+            enable: self.orders.enable && hardware.is_none(),
+            speed_torque_nm: DualSample::UNLIMITED_NM,
+            acknowledge: 0,
+            hardware: hardware.map(|fault| HardwareBreak { fault, seen: 1 }),
+        };
+        let true_a = sample.currents_a;
+        self.spoiler.control(t_s, &mut sample);
+        self.compare(true_a, sample.currents_a);
+        self.control.put(self.time.now, sample);
+        self.control.show(self.time.now);
+        Ok(())
+    }
+}

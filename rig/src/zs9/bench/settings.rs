@@ -1,0 +1,45 @@
+//! What the ZS9's bench is made of.
+
+use crate::bench::injected::Injection;
+use crate::bench::{Flaws, Limits};
+use crate::zs9::inject::Kind;
+use tractive::nine_switch::Scheme;
+use tractive::time::Clock;
+
+/// Fixed properties of a bench.
+#[derive(Clone, Copy, Debug)]
+pub struct BenchSettings {
+    /// The firmware's clock.
+    pub clock: Clock,
+    /// Carrier period, in ticks.
+    pub carrier_ticks: u32,
+    /// Before the recording, in s.
+    pub lead_s: f64,
+    /// Length of the recording, in s.
+    pub duration_s: f64,
+    /// Step of the trace, in s.
+    pub trace_step_s: f64,
+    /// Link voltage wanted, in V.
+    pub link_ref_v: f64,
+    /// Where the zero vectors lie.
+    pub scheme: Scheme,
+    /// Imperfections of the sensors and of the source.
+    pub flaws: Flaws,
+    /// What goes wrong.
+    pub injection: Option<Injection<Kind>>,
+    /// Beyond what it is said to make a difference.
+    pub limits: Limits,
+    /// Whether edges are kept.
+    pub edges: bool,
+    /// Time for which a gate that turns on where another one of its leg turns off has to wait, in s.
+    pub dead_time_s: f64,
+}
+
+/// What changes by itself while it drives: times in s from the recording's beginning, each value from its time on.
+#[derive(Clone, Debug, Default)]
+pub struct Course {
+    /// Voltages of the source, in V; the plant's own before the first.
+    pub source_v: Vec<(f64, f64)>,
+    /// Schemes; the settings' before the first.
+    pub schemes: Vec<(f64, Scheme)>,
+}
