@@ -9,6 +9,9 @@ use crate::saboteur::Seen;
 /// By how many instructions a landing may be off the first guess.
 const NEAR: u32 = 2 * INSTRUCTIONS_PER_TICK;
 
+/// Whether it was hit in another mode; mode and instruction.
+type Wanted<'a> = (bool, &'a str, u32);
+
 /// The control interrupts of a run, and what is known of them.
 pub struct Hunt<'a> {
     pub stands: Vec<Stand<'a>>,
@@ -38,7 +41,7 @@ impl<'a> Hunt<'a> {
     /// no mode, of them those first that the fewest reach. `None`: there is nothing that was hit in no mode.
     pub fn delays(&self, calls: usize, passes: usize, reached: &Reached) -> Option<Vec<Vec<u16>>> {
         let hit = reached.hit_in_any();
-        let mut ways: HashMap<(bool, &str, u32), Vec<(usize, u16)>> = HashMap::new();
+        let mut ways: HashMap<Wanted, Vec<(usize, u16)>> = HashMap::new();
         for (index, stand) in self.stands.iter().enumerate() {
             let mode = stand.call.mode.as_str();
             for (address, before) in &stand.call.path {
