@@ -3,11 +3,8 @@
 use std::collections::{HashMap, HashSet};
 
 use super::INSTRUCTIONS_PER_TICK;
-use super::reach::{Reached, Stand};
+use super::reach::{NEAR, Reached, Stand};
 use crate::saboteur::Seen;
-
-/// By how many instructions a landing may be off the first guess.
-const NEAR: u32 = 2 * INSTRUCTIONS_PER_TICK;
 
 /// Whether it was hit in another mode; mode and instruction.
 type Wanted<'a> = (bool, &'a str, u32);

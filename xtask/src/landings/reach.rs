@@ -11,6 +11,8 @@ const CONTROL_TICKS: u32 = 2_500;
 /// A control interrupt samples at once. One that has not begun a sixteenth of its period after its timer counts as lost, so no delay puts
 /// a boundary before the samples that comes later than that, less a little.
 const BEGUN_TICKS: u32 = 140;
+/// By how many instructions a landing may be off the ticks that are left.
+pub const NEAR: u32 = 2 * INSTRUCTIONS_PER_TICK;
 /// What the PWM interrupts within a control interrupt execute at most, with their link, and a little for control's own way.
 const ALLOWANCE: u32 = 6_000;
 
@@ -33,6 +35,8 @@ pub struct Stand<'a> {
 pub enum Why {
     /// It is the first one behind a boundary, and the next boundary comes after its period.
     BehindBoundary,
+    /// A boundary has come in the same control interrupt already, and the next one comes after its period.
+    BehindLanding,
     /// It comes before the first boundary, by more than its period.
     BeforeFirst,
     /// It has no samples yet, which it takes at once, and the boundary comes later.
@@ -44,6 +48,9 @@ impl Why {
         match self {
             Self::BehindBoundary => {
                 "only in the first control interrupt behind a boundary, and the next boundary comes after its period"
+            }
+            Self::BehindLanding => {
+                "only where a boundary has come in the same control interrupt already, and the next comes after its period"
             }
             Self::BeforeFirst => "only before the first boundary of all",
             Self::BeforeSamples => {
@@ -81,6 +88,9 @@ impl<'a> Stand<'a> {
     /// Why no boundary can come here, so many instructions behind its beginning.
     pub fn why(&self, before: u32) -> Option<Why> {
         let far = self.left_ticks > CONTROL_TICKS;
+        if before > self.left_ticks * INSTRUCTIONS_PER_TICK + NEAR {
+            return Some(Why::BehindLanding);
+        }
         match self.since_ticks {
             None if far => Some(Why::BeforeFirst),
             Some(since) if far && since < CONTROL_TICKS => Some(Why::BehindBoundary),

@@ -167,11 +167,11 @@ mod tests {
     #[test]
     fn neither_the_idle_loop_nor_the_link_is_logged() {
         let functions: [(&str, u32, &[u16]); 5] = [
-            ("tractive::board::qemu::idle", 0xF0, &[0xBF00, 0x4770]),
             ("TIMER0", 0x100, &[0x4770]),
             ("main", 0x110, &[0x4770]),
             ("tractive::board::qemu::exchange::play", 0x120, &[0x4770]),
             ("memcpy", 0x130, &[0x4770, 0xBF00]),
+            ("tractive::board::qemu::idle", 0x140, &[0xBF00, 0x4770]),
         ];
         let image = Image::parse(&small_elf(0x100, &functions)).unwrap();
         assert_eq!(filter(&image, false), "0x100+0x2,0x130+0x4");
