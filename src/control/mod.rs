@@ -13,6 +13,7 @@ mod current_loop;
 mod demand;
 mod disturbance;
 mod flux_path;
+mod link_filter;
 mod map_error;
 mod mtpa;
 mod reference;
@@ -172,15 +173,10 @@ pub struct Controller {
     demand: demand::Shaper,
     disturbance: disturbance::Observer,
     trim: torque_trim::TorqueTrim,
-    /// DC-link voltage without its ripple, in V; `None` before the first step.
-    link_v: Option<f32>,
+    link: link_filter::LinkFilter,
     path: flux_path::FluxPath,
     map_error: map_error::MapError,
 }
-
-/// Bandwidth at which operating point and mode follow the DC link, in rad/s: a rectifier's ripple must neither shake the one nor
-/// toggle the other. What the modulator divides by is the link as it is.
-const LINK_RAD_S: f32 = 100.0;
 
 /// Six times the stator frequency is followed while it turns less than this in a carrier half, in rad.
 const SIXTH_TURN_RAD: f32 = 1.0;
@@ -202,7 +198,7 @@ impl Controller {
             demand: demand::Shaper::new(),
             disturbance: disturbance::Observer::new(),
             trim: torque_trim::TorqueTrim::new(),
-            link_v: None,
+            link: link_filter::LinkFilter::new(),
             path: flux_path::FluxPath::new(),
             map_error: map_error::MapError::new(),
         }
@@ -239,7 +235,7 @@ impl Controller {
         self.demand = demand::Shaper::new();
         self.disturbance = disturbance::Observer::new();
         self.trim = torque_trim::TorqueTrim::new();
-        self.link_v = None;
+        self.link = link_filter::LinkFilter::new();
         self.path = flux_path::FluxPath::new();
     }
 
@@ -275,11 +271,9 @@ impl Controller {
             period_s: clock.control_s(),
         };
         let torque_nm = self.demand.step(&shaping, &tables.ratings);
-        let before = self.link_v.unwrap_or(measured.udc_v);
-        let link_v = before + LINK_RAD_S * clock.control_s() * (measured.udc_v - before);
-        self.link_v = Some(link_v);
+        let link = self.link.step(measured.udc_v, clock.control_s());
         let depth = committed.depth_limit * committed.steady_share;
-        let limit = VoltageLimit { udc_v: link_v / scale, depth, filled: committed.filled };
+        let limit = VoltageLimit { udc_v: link.slow_v / scale, depth, filled: committed.filled };
         let trimmed_nm = self.trim.apply(torque_nm, committed.ripple_share, tables.ratings.max_torque_nm);
         let point = operating_point(trimmed_nm / scale, omega, &limit, tables);
         let point = OperatingPoint { torque_nm: point.torque_nm * scale, ..point };
@@ -311,7 +305,7 @@ impl Controller {
                 disturbance,
                 disturbance_until_then: until_then,
                 resistance,
-                voltage_limit_v: committed.depth_limit * six_step_v(measured.udc_v),
+                voltage_limit_v: committed.depth_limit * six_step_v(link.usable_v),
             },
             gains,
         );

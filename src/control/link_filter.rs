@@ -1,0 +1,43 @@
+//! The DC link, as the operating point sees it.
+//!
+//! Operating point and mode follow the link slowly: a rectifier's ripple must neither shake the one nor toggle the other. What the modulator
+//! divides by is the link as it is. Square wave divides by nothing: there a link that jumps up would throw the flux outward at
+//! once, so until the operating point has followed, no more is made of the link than before.
+
+/// Bandwidth at which the link is followed, in rad/s.
+const LINK_RAD_S: f32 = 100.0;
+
+/// The link over its slow value, from which it has jumped and until which: a ripple stays below the one, a notch of the shortest pulse
+/// takes the other.
+const JUMPED: (f32, f32) = (1.04, 1.015);
+
+#[derive(Clone, Copy, Debug)]
+pub struct LinkFilter {
+    /// In V; `None` before the first step.
+    slow_v: Option<f32>,
+    jumped: bool,
+}
+
+/// The link, in V.
+pub struct Link {
+    /// Without its ripple.
+    pub slow_v: f32,
+    /// What may be made use of: all there is, unless it has jumped up.
+    pub usable_v: f32,
+}
+
+impl LinkFilter {
+    pub const fn new() -> Self {
+        Self { slow_v: None, jumped: false }
+    }
+
+    /// One control period, with the link as it is measured.
+    pub fn step(&mut self, udc_v: f32, period_s: f32) -> Link {
+        let before = self.slow_v.unwrap_or(udc_v);
+        let slow_v = before + LINK_RAD_S * period_s * (udc_v - before);
+        self.slow_v = Some(slow_v);
+        let (from, until) = JUMPED;
+        self.jumped = udc_v > if self.jumped { until * slow_v } else { from * slow_v };
+        Link { slow_v, usable_v: if self.jumped { slow_v } else { udc_v } }
+    }
+}
