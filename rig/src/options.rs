@@ -155,6 +155,12 @@ pub struct RunOptions {
     /// timing: control is told the same currents again and again from this time on, in s.
     #[arg(long, value_parser = not_negative, hide = true)]
     pub freeze_at: Option<f64>,
+    /// timing: a current sensor reads too much from this time on, in s.
+    #[arg(long, value_parser = not_negative, hide = true)]
+    pub offset_at: Option<f64>,
+    /// timing: the operator commands the drive, and the speeds come later by what that takes.
+    #[arg(long, hide = true)]
+    pub operated: bool,
     /// sweep: add the way back.
     #[arg(long)]
     pub down: bool,

@@ -66,13 +66,19 @@ mod firmware {
         TASK.get_or_insert_with(|| ControlTask::new(BuiltIn, settings())).run(&mut board, &SHARED);
     }
 
-    /// Deadline: the next valley, where the shadow registers take over.
+    /// Deadline: the next valley, where the shadow registers take over. Missed: the watch's.
     #[interrupt]
     fn DUALTIMER() {
         static mut TASK: Option<PwmTask<BuiltIn>> = None;
         let mut board = qemu::Pwm;
         board.acknowledge();
         TASK.get_or_insert_with(|| PwmTask::new(BuiltIn, settings())).run(&mut board, &SHARED);
+    }
+
+    /// The watch over the carrier periods: one was not written in time. Fault `pwm_deadline`, all gates off.
+    #[exception]
+    unsafe fn NonMaskableInt() {
+        qemu::watch_ends();
     }
 
     #[exception]

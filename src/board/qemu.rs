@@ -11,8 +11,10 @@ mod dual;
 mod exchange;
 #[cfg_attr(not(feature = "saboteur"), path = "qemu/straight.rs")]
 mod saboteur;
+mod watch;
 
 pub use dual::{DUAL_DESK, DUAL_RECORDER, DualIdle, connect_dual, die_dual, start_dual};
+pub use watch::ends as watch_ends;
 
 use super::{ControlPort, PwmPort, Sample};
 use crate::configuration::Refused;

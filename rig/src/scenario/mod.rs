@@ -1,6 +1,7 @@
 //! What is driven, and what is to be seen.
 
 mod acknowledge;
+mod borders_timing;
 pub mod characteristic;
 mod chopper;
 mod full_step;
@@ -17,12 +18,14 @@ mod sweep;
 mod timing;
 
 use crate::analysis::Figures;
-use crate::bench::{self, Bench, Limits, LinePlan, Operator, Supply};
+use crate::bench::injected::Injection;
+use crate::bench::{self, Bench, Limits, LinePlan, Operator, Supply, inject};
 use crate::machine::Machine;
 use crate::options::{On, RunOptions};
 use crate::plant::{DcLinkSettings, Plant, PlantSettings, SpeedSource};
 use crate::report::Page;
 use crate::run::{self, CLOCK, Emulator, Supervisor};
+use crate::sensor_faults::CurrentFault;
 use crate::trace::Recording;
 use anyhow::{Context, Result};
 use tractive::control::{Demand, Gains};
@@ -33,6 +36,8 @@ use tractive::operator::{Line, Request};
 
 /// The usual lead, in s.
 const LEAD_S: f64 = 0.1;
+/// What `--offset-at` adds to a phase current, as a share of the largest: more than the sum of the phases may be.
+const OFFSET: f64 = 0.2;
 
 /// Longest run of a supervisor's, in s.
 const LONGEST_S: f64 = 1e5;
@@ -102,6 +107,7 @@ pub fn all() -> Vec<Box<dyn Scenario>> {
         Box::new(chopper::Chopper),
         Box::new(acknowledge::Acknowledge),
         Box::new(timing::Timing),
+        Box::new(borders_timing::BordersTiming),
     ]
 }
 
@@ -190,7 +196,10 @@ fn run_plan(
             link_steps: plan.link,
             flaws: options.flaws(parameters.trip_current_a),
             supply: Supply::Stiff,
-            injection: None,
+            injection: options.offset_at.map(|at_s| {
+                let fault = CurrentFault::Offset(OFFSET * parameters.max_current_a);
+                Injection { kind: inject::Kind::Current(0, fault), at_s }
+            }),
             limits: Limits::NONE,
         },
     );

@@ -1,13 +1,16 @@
 //! A short drive through every mode and up to the highest speed, for `cargo xtask timing`: every instruction of the
 //! interrupts is logged there, so a second of it takes the emulator ten.
 
-use super::{Plan, Scenario};
+use super::{Plan, Scenario, line};
 use crate::analysis::{self, Figures};
+use crate::bench::LinePlan;
 use crate::machine::Machine;
 use crate::options::RunOptions;
 use crate::report::Page;
 use crate::trace::Recording;
 use tractive::control::Demand;
+use tractive::machine::Ratings;
+use tractive::operator::Request;
 
 /// Full torque at a speed in the middle of each mode's range, then at `--to`.
 pub struct Timing;
@@ -22,6 +25,21 @@ const HOLD_S: f64 = 0.03;
 const AFTER_FAULT_S: f64 = 0.005;
 const LEAD_S: f64 = 0.01;
 
+/// When the operator charges, enables and wants all the torque, in s, and when the speeds begin.
+const CHARGES_S: (f64, f64) = (0.1, 0.2);
+const ENABLES_S: f64 = 0.5;
+const PULLS_S: f64 = 0.6;
+const OPERATED_S: f64 = 0.7;
+
+fn request(t_s: f64, ratings: &Ratings) -> Request {
+    Request {
+        enable: t_s >= ENABLES_S,
+        charge: (CHARGES_S.0..CHARGES_S.1).contains(&t_s),
+        torque_nm: if t_s < PULLS_S { 0.0 } else { ratings.max_torque_nm },
+        ..Request::idle(ratings)
+    }
+}
+
 impl Scenario for Timing {
     fn name(&self) -> &'static str {
         "timing"
@@ -33,7 +51,7 @@ impl Scenario for Timing {
 
     fn plan(&self, options: &RunOptions, machine: &Machine) -> Plan {
         let turn = options.to.signum();
-        let (mut speed, mut t_s) = (Vec::new(), 0.0);
+        let (mut speed, mut t_s) = (Vec::new(), if options.operated { OPERATED_S } else { 0.0 });
         for rpm in SPEEDS_RPM {
             speed.extend([(t_s, rpm * turn), (t_s + HOLD_S, rpm * turn)]);
             t_s += HOLD_S + RAMP_S;
@@ -54,6 +72,18 @@ impl Scenario for Timing {
         let freeze_s = options.freeze_at.unwrap_or(f64::INFINITY);
         let duration_s = t_s.min(fault_s.min(freeze_s) + AFTER_FAULT_S);
         Plan { lead_s: LEAD_S, duration_s, speed, link: Vec::new(), operator: Box::new(operator) }
+    }
+
+    fn line(&self, options: &RunOptions, machine: &Machine) -> Option<LinePlan> {
+        let ratings = &machine.tables.ratings;
+        options.operated.then(|| LinePlan {
+            link: line::scaled(machine),
+            starts_charged: true,
+            commander: Box::new(|t_s| request(t_s, ratings)),
+            hardware: Vec::new(),
+            chopper_ohm: Vec::new(),
+            reversible: Vec::new(),
+        })
     }
 
     fn figures(&self, recording: &Recording, _options: &RunOptions, _machine: &Machine) -> Figures {

@@ -1,10 +1,11 @@
 //! The emulated board for the ZS9. The nine gates' compare registers are words on the link: the emulator has none.
 //!
-//! The PWM timer comes at the carrier's peaks, the control timer at its valleys.
+//! The PWM timer comes at the carrier's peaks, the control timer at its valleys. A carrier period that is not written in time turns the
+//! gates off ([`watch`]).
 
 use super::{
     CLOCK, CONTROL_TIMER, Control, OPERATED, PWM_TIMER, Pwm, enable_interrupts, exchange, read_register,
-    start_timers, stop, write_register,
+    start_timers, stop, watch, write_register,
 };
 use crate::board::{DualControlPort, DualPwmPort, DualSample, PlayedPeriod, PowerSample};
 use crate::drive::dual::{DualReport, Settings};
@@ -34,6 +35,7 @@ pub fn start_dual(settings: &Settings) {
     write_register(PWM_TIMER, settings.first_peak_ticks().saturating_sub(1));
     write_register(CONTROL_TIMER + 8, CLOCK.control_ticks - 1);
     start_timers();
+    watch::start(settings.first_peak_ticks());
     // The shadow register takes over at the first peak.
     write_register(PWM_TIMER + 0x18, settings.carrier_ticks.saturating_sub(1));
 }
@@ -41,6 +43,7 @@ pub fn start_dual(settings: &Settings) {
 impl DualControlPort for Control {
     fn sample(&mut self, now: Instant) -> DualSample {
         let mut sample = exchange::sample_dual(now);
+        sample.hardware = sample.hardware.or(watch::found());
         if OPERATED.load(Ordering::Relaxed) {
             DUAL_DESK.permit(now).apply(&mut sample);
         }
@@ -73,6 +76,7 @@ impl DualPwmPort for Pwm {
     }
 
     fn play(&mut self, now: Instant, next: &PlayedPeriod) {
+        watch::written(now);
         exchange::play_dual(now, next);
     }
 
@@ -81,6 +85,7 @@ impl DualPwmPort for Pwm {
     }
 
     fn leave(&mut self, now: Instant) -> bool {
+        watch::forget();
         exchange::leave_dual(now);
         true
     }

@@ -1,4 +1,5 @@
-//! With the feature `saboteur`: interrupts that are late, lost or slow, and a PWM interrupt that lands where it is wanted in control's.
+//! With the feature `saboteur`: interrupts that are late, lost or slow, and control's that begin later, so that the PWM interrupt
+//! lands in them where it is wanted.
 //!
 //! The firmware and its interrupts are the ordinary ones. Their entries in the vector table lead through here, and the exchange tells
 //! what it does. What is to go wrong stands on the emulator's command line, `-append "KIND AT AMOUNT FILE"`; what came of it is written
@@ -27,7 +28,7 @@ enum Kind {
     PwmLate,
     /// `amount` PWM ticks pass without their interrupt: the shadow registers are played once more.
     PwmLost,
-    /// Control waits so that the PWM interrupt lands in it where the file wants it that then takes what came of it.
+    /// Each control interrupt begins later by as many instructions as the file says that then takes what came of it.
     Landing,
 }
 
@@ -57,13 +58,13 @@ static LATCHED: AtomicU32 = AtomicU32::new(0);
 const GATES: usize = 8;
 /// Number of the present control interrupt, from 0.
 static CALL: AtomicU32 = AtomicU32::new(0);
-/// For each control interrupt, how many instructions later the PWM interrupt is to land in it: counted from its samples on, or with
-/// [`AT_ENTRY`] from its entry; `u16::MAX`: anywhere.
-static WANTED: [AtomicU16; CALLS] = [const { AtomicU16::new(u16::MAX) }; CALLS];
-const AT_ENTRY: u16 = 1 << 15;
+/// For each control interrupt, by how many instructions later than it comes it begins.
+static DELAYS: [AtomicU16; CALLS] = [const { AtomicU16::new(0) }; CALLS];
+/// For each control interrupt, how many ticks before the next carrier boundary it came.
+static LEFT: [AtomicU16; CALLS] = [const { AtomicU16::new(u16::MAX) }; CALLS];
 /// For each control interrupt, where one landed in it; 0: none did.
 static LANDED: [AtomicU32; CALLS] = [const { AtomicU32::new(0) }; CALLS];
-const CALLS: usize = 8_192;
+const CALLS: usize = 10_240;
 /// The newest half, as it went to the rig.
 static PLAYED: [AtomicU32; BLOCK_WORDS] = [const { AtomicU32::new(0) }; BLOCK_WORDS];
 static FOUND: File = File::closed();
@@ -89,7 +90,7 @@ pub fn connect() {
     AT.store(at.parse().unwrap_or(0), Relaxed);
     AMOUNT.store(amount.parse().unwrap_or(0), Relaxed);
     if is(Kind::Landing) {
-        super::exchange::file::read_half_words(file, &WANTED);
+        super::exchange::file::read_half_words(file, &DELAYS);
     }
     FOUND.create(file);
 }
@@ -136,7 +137,9 @@ pub unsafe extern "C" fn control() {
         Control.acknowledge();
         return;
     }
-    wait_for_boundary(true);
+    if is(Kind::Landing) {
+        wait_before_control();
+    }
     // SAFETY: called as the vector table would have it.
     unsafe { TIMER0() }
     CALL.store(CALL.load(Relaxed) + 1, Relaxed);
@@ -201,36 +204,27 @@ fn land(frame: &[u32; 8]) {
     }
 }
 
-/// Ticks before a boundary from which on control waits at its entry, and behind its samples: it must still end in time.
-const MOST_BEFORE_TICKS: u32 = 140;
-const MOST_SAMPLED_TICKS: u32 = 1_600;
-/// A tick is five instructions.
-const INSTRUCTIONS_PER_TICK: u32 = 5;
+/// Notes how far the next carrier boundary is, and waits for as many instructions as the present control interrupt is to be late by.
+fn wait_before_control() {
+    let call = CALL.load(Relaxed) as usize;
+    let (Some(left), Some(delay)) = (LEFT.get(call), DELAYS.get(call)) else { return };
+    left.store(u16::try_from(read_register(PWM_TIMER + 4)).unwrap_or(u16::MAX), Relaxed);
+    spend(delay.load(Relaxed).into());
+}
 
-/// Waits until the next carrier boundary is as far ahead as the present control interrupt wants it, if it is near enough.
-fn wait_for_boundary(at_entry: bool) {
-    let most_ticks = if at_entry { MOST_BEFORE_TICKS } else { MOST_SAMPLED_TICKS };
-    let wanted = WANTED.get(CALL.load(Relaxed) as usize).map_or(u16::MAX, |wanted| wanted.load(Relaxed));
-    if !is(Kind::Landing) || wanted == u16::MAX || (wanted & AT_ENTRY != 0) != at_entry {
-        return;
-    }
-    let wanted = u32::from(wanted & !AT_ENTRY);
-    let left = || read_register(PWM_TIMER + 4);
-    let mut last = left();
-    if last >= most_ticks {
-        return;
-    }
-    loop {
-        let now = left();
-        // Once the boundary is past it is too late.
-        if now <= wanted / INSTRUCTIONS_PER_TICK || now > last {
-            break;
-        }
-        last = now;
-    }
-    // What is left of a tick has passed before what is wanted.
-    for _ in 0..INSTRUCTIONS_PER_TICK - 1 - wanted % INSTRUCTIONS_PER_TICK {
-        cortex_m::asm::nop();
+/// Executes exactly so many instructions more than with 0. A loop that asks a timer would do so once in several instructions only.
+#[inline(never)]
+fn spend(instructions: u32) {
+    // SAFETY: the instructions read and write nothing but a register of their own and the flags.
+    unsafe {
+        core::arch::asm!(
+            "lsrs {pairs}, {pairs}, #1", "bcc 2f", "nop",
+            "2: cmp {pairs}, #0", "beq 4f",
+            "3: subs {pairs}, {pairs}, #1", "bne 3b",
+            "4:",
+            pairs = inout(reg) instructions => _,
+            options(nomem, nostack)
+        )
     }
 }
 
@@ -240,7 +234,6 @@ pub fn sampled() {
         let begun = now();
         while now().wrapping_sub(begun) < AMOUNT.load(Relaxed) {}
     }
-    wait_for_boundary(false);
 }
 
 /// A block went to the rig.
@@ -274,17 +267,18 @@ pub fn gates_off() {
     if !SAFE.swap(true, Relaxed) {
         let after = now().wrapping_sub(STRUCK_AT.load(Relaxed));
         let (struck, loaded) = (STRUCK.load(Relaxed), LOADED.load(Relaxed));
-        let _ = writeln!(&FOUND, "struck {struck} loaded {loaded} safe-after {after}");
+        let call = CALL.load(Relaxed);
+        let _ = writeln!(&FOUND, "struck {struck} loaded {loaded} safe-after {after} in {call}");
     }
 }
 
 /// The run is over.
 pub fn finish() {
     cortex_m::interrupt::disable();
-    for (call, landed) in LANDED.iter().enumerate() {
-        let address = landed.load(Relaxed);
-        if address != 0 {
-            let _ = writeln!(&FOUND, "landed {call} {address:x}");
+    for (call, (left, landed)) in LEFT.iter().zip(&LANDED).enumerate() {
+        let (left, landed) = (left.load(Relaxed), landed.load(Relaxed));
+        if left != u16::MAX {
+            let _ = writeln!(&FOUND, "call {call} left {left} landed {landed:x}");
         }
     }
     let _ = writeln!(&FOUND, "end");

@@ -17,6 +17,8 @@ use crate::process;
 
 /// Modules whose functions are the link to the rig.
 const LINK: [&str; 2] = ["tractive::board::qemu::exchange::", "tractive::link::"];
+/// Ends of the names of what the idle loop runs through all the time.
+const IDLE: [&str; 2] = ["main", "board::qemu::idle"];
 /// Ends the log when the emulator has.
 const END: &[u8] = b"end of the log";
 
@@ -24,8 +26,8 @@ const END: &[u8] = b"end of the log";
 pub struct Bench {
     pub rig: PathBuf,
     pub qemu: PathBuf,
-    /// The rig's scenario.
-    pub scenario: &'static str,
+    /// The rig's command: its scenario, or whom it talks to.
+    pub command: Vec<String>,
     pub path: PathBuf,
     pub image: Image,
     /// Whether what each interrupt executed is wanted.
@@ -40,7 +42,8 @@ pub struct Drive {
     pub paths: Vec<Executed>,
     pub hits: Tally,
     pub behind: Tally,
-    pub stack_bytes: i32,
+    /// Bytes of stack that each exception takes at most.
+    pub deepest: BTreeMap<u32, i32>,
     /// Of each exception the addresses that its longest interrupt executed.
     pub longest: BTreeMap<u32, Vec<u32>>,
     /// Interrupt, mode and stator frequency, in the order in which the rig served them.
@@ -61,9 +64,9 @@ impl Bench {
         let (log, modes) = (folder.join("log"), folder.join("calls"));
         let (reader, mut end) = fifo(&log)?;
         let mut rig = Command::new(&self.rig);
-        rig.args(["run", self.scenario, "--on", "qemu", "--dt", "1e-3", "--out"]).arg(folder.join("out"));
+        rig.args(&self.command).args(["--on", "qemu", "--dt", "1e-3", "--out"]).arg(folder.join("out"));
         rig.arg("--image").arg(&self.path).arg("--qemu").arg(&self.qemu).arg("--calls").arg(&modes);
-        let (filter, log) = (filter(&self.image), log.to_string_lossy().into_owned());
+        let (filter, log) = (filter(&self.image, self.keeps_paths), log.to_string_lossy().into_owned());
         for argument in ARGUMENTS.into_iter().chain(["-dfilter", &filter, "-D", &log]) {
             rig.arg(format!("--qemu-arg={argument}"));
         }
@@ -103,8 +106,8 @@ impl Bench {
             line.clear();
         }
         outcome?;
-        let Meter { calls, paths, hits, behind, stack_bytes, longest, .. } = meter;
-        Ok(Drive { calls, paths, hits, behind, stack_bytes, longest, modes: Vec::new() })
+        let Meter { calls, paths, hits, behind, deepest, longest, .. } = meter;
+        Ok(Drive { calls, paths, hits, behind, deepest, longest, modes: Vec::new() })
     }
 }
 
@@ -118,13 +121,15 @@ impl Read for Unhurried {
     }
 }
 
-fn is_link(names: &[String]) -> bool {
+/// Whether a function of these names is the link to the rig.
+pub fn is_link(names: &[String]) -> bool {
     names.iter().any(|name| LINK.iter().any(|module| name.contains(module)))
 }
 
-/// The addresses to log: all but the idle loop, which is most of the time, and the link.
-fn filter(image: &Image) -> String {
-    let skipped = |names: &[String]| is_link(names) || names.iter().any(|name| name.ends_with("main"));
+/// The addresses to log: all but the idle loop, which is most of the time, and the link if it is not wanted.
+fn filter(image: &Image, link: bool) -> String {
+    let idles = |name: &String| IDLE.iter().any(|end| name.ends_with(end));
+    let skipped = |names: &[String]| (is_link(names) && !link) || names.iter().any(idles);
     let logged = image.functions.iter().filter(|(_, function)| !skipped(&function.names));
     let ranges: Vec<_> =
         logged.map(|(start, function)| format!("{start:#x}+{:#x}", function.size.max(1))).collect();
@@ -161,14 +166,16 @@ mod tests {
 
     #[test]
     fn neither_the_idle_loop_nor_the_link_is_logged() {
-        let functions: [(&str, u32, &[u16]); 4] = [
+        let functions: [(&str, u32, &[u16]); 5] = [
             ("TIMER0", 0x100, &[0x4770]),
             ("main", 0x110, &[0x4770]),
             ("tractive::board::qemu::exchange::play", 0x120, &[0x4770]),
             ("memcpy", 0x130, &[0x4770, 0xBF00]),
+            ("tractive::board::qemu::idle", 0x140, &[0xBF00, 0x4770]),
         ];
         let image = Image::parse(&small_elf(0x100, &functions)).unwrap();
-        assert_eq!(filter(&image), "0x100+0x2,0x130+0x4");
+        assert_eq!(filter(&image, false), "0x100+0x2,0x130+0x4");
+        assert_eq!(filter(&image, true), "0x100+0x2,0x120+0x2,0x130+0x4");
     }
 
     #[test]

@@ -39,7 +39,7 @@ fn sizes(report: &Report) -> String {
     );
     for measured in report.systems {
         let sizes = &measured.image.sizes;
-        let stack = u64::from(measured.statistics.stack_bytes.unsigned_abs());
+        let stack = u64::from(measured.statistics.stack_bytes().unsigned_abs());
         let _ = writeln!(text, "\n[{}]", measured.system.name);
         for (name, bytes) in
             [("code", sizes.code), ("tables", sizes.tables), ("ram", sizes.ram), ("stack", stack)]

@@ -27,7 +27,8 @@ pub fn event(line: &[u8]) -> Option<Event> {
     if line.starts_with(b"Trace ") {
         return program_counter(line).map(Event::Step);
     }
-    if line.starts_with(b"Stopped ") {
+    // An access to a peripheral's register is announced, withdrawn and announced anew.
+    if line.starts_with(b"Stopped ") || line.starts_with(b"cpu_io_recompile") {
         return Some(Event::Withdrawn);
     }
     let is_enabled = || line.windows(10).any(|part| part == b"enabled: 1");
@@ -70,6 +71,8 @@ mod tests {
         assert_eq!(read(step), Some(Event::Step(0x428C)));
         let stopped = "Stopped execution of TB chain before 0x7f5604007100 [0000428c] DUALTIMER";
         assert_eq!(read(stopped), Some(Event::Withdrawn));
+        let rewound = "cpu_io_recompile: rewound execution of TB to 0000123c";
+        assert_eq!(read(rewound), Some(Event::Withdrawn));
         let pending = "nvic_set_pending NVIC set pending irq 24 secure-bank 0 targets_secure 0 derived 0 ";
         assert_eq!(read(&format!("{pending}(enabled: 1 priority 128)")), Some(Event::Pending(24)));
         assert_eq!(read(&format!("{pending}(enabled: 0 priority 0)")), None);

@@ -23,14 +23,16 @@ pub struct Call {
     pub latency: u32,
     /// Handlers that were active with it.
     pub depth: usize,
+    /// The exception whose handler it came into; `None`: the idle loop.
+    pub within: Option<u32>,
 }
 
 /// What one interrupt executed, in its order, without the link.
 #[derive(Clone, Debug, Default)]
 pub struct Path {
     pub addresses: Vec<u32>,
-    /// How many of them before the link was first called.
-    pub linked: usize,
+    /// Instructions before each of them, with the link's where the log has them.
+    pub elapsed: Vec<u32>,
 }
 
 /// Follows the log.
@@ -53,8 +55,8 @@ pub struct Meter<'a> {
     pub hits: Tally,
     /// What was executed behind each call, by its return address.
     pub behind: Tally,
-    /// Bytes of stack below the idle loop's, at most.
-    pub stack_bytes: i32,
+    /// Bytes of stack that each exception takes at most, with its frame.
+    pub deepest: BTreeMap<u32, i32>,
     /// Of each exception the addresses that its longest interrupt executed.
     pub longest: BTreeMap<u32, Vec<u32>>,
 }
@@ -73,6 +75,8 @@ struct Handler {
     call: Call,
     /// Return address and stack of the functions it is in.
     within: Vec<(u32, i32)>,
+    /// What lay on the stack before it, and what lies there now.
+    base: i32,
     stack: i32,
     /// In the link, until this address.
     resumes: Option<u32>,
@@ -80,8 +84,9 @@ struct Handler {
     next: Option<u32>,
     /// What was executed.
     addresses: Vec<u32>,
-    /// How much of it before the link was first called.
-    linked: Option<usize>,
+    /// Instructions before each of them, and by now, with the link's where the log has them.
+    elapsed: Vec<u32>,
+    by_now: u32,
 }
 
 impl<'a> Meter<'a> {
@@ -99,7 +104,7 @@ impl<'a> Meter<'a> {
             paths: Vec::new(),
             hits: Tally::default(),
             behind: Tally::default(),
-            stack_bytes: 0,
+            deepest: BTreeMap::new(),
             longest: BTreeMap::new(),
         }
     }
@@ -121,9 +126,10 @@ impl<'a> Meter<'a> {
     }
 
     fn enter(&mut self, exception: u32) {
-        let stack = self.active.last().map_or(0, |handler| handler.stack) + EXCEPTION_FRAME;
+        let base = self.active.last().map_or(0, |handler| handler.stack);
         let call = Call {
             exception,
+            within: self.active.last().map(|handler| handler.call.exception),
             latency: self.pending.remove(&exception).unwrap_or(0),
             cycles: ENTRY_AND_RETURN,
             ..Call::default()
@@ -131,11 +137,13 @@ impl<'a> Meter<'a> {
         self.active.push(Handler {
             call,
             within: Vec::new(),
-            stack,
+            base,
+            stack: base + EXCEPTION_FRAME,
             resumes: None,
             next: None,
             addresses: Vec::new(),
-            linked: None,
+            elapsed: Vec::new(),
+            by_now: 0,
         });
         let depth = self.active.len();
         for handler in &mut self.active {
@@ -148,8 +156,7 @@ impl<'a> Meter<'a> {
             Some(handler) if handler.call.exception == exception => {
                 self.calls.push(handler.call);
                 if self.keeps_paths {
-                    let linked = handler.linked.unwrap_or(handler.addresses.len());
-                    self.paths.push(Path { addresses: handler.addresses.clone(), linked });
+                    self.paths.push(Path { addresses: handler.addresses.clone(), elapsed: handler.elapsed });
                 }
                 let longest = self.longest.entry(exception).or_default();
                 if handler.addresses.len() > longest.len() {
@@ -164,6 +171,8 @@ impl<'a> Meter<'a> {
 
     fn step(&mut self, address: u32) {
         let Some(handler) = self.active.last_mut() else { return };
+        let before = handler.by_now;
+        handler.by_now += 1;
         if let Some(resumes) = handler.resumes {
             if resumes != address {
                 return;
@@ -183,9 +192,13 @@ impl<'a> Meter<'a> {
         handler.next = Some(address + instruction.length);
         handler.call.instructions += 1;
         handler.addresses.push(address);
+        if self.keeps_paths {
+            handler.elapsed.push(before);
+        }
         handler.call.cycles += instruction.cycles;
         handler.stack -= instruction.stack_move;
-        self.stack_bytes = self.stack_bytes.max(handler.stack);
+        let deepest = self.deepest.entry(handler.call.exception).or_default();
+        *deepest = (*deepest).max(handler.stack - handler.base);
         self.hits.add(handler.call.exception, address);
         for (back, _) in &handler.within {
             self.behind.add(handler.call.exception, *back);
@@ -196,7 +209,6 @@ impl<'a> Meter<'a> {
         let Flow::To(target) = instruction.flow else { return };
         let back = address + instruction.length;
         if self.link.contains(&target) {
-            handler.linked = handler.linked.or(Some(handler.addresses.len()));
             // There and back. Without a link the caller's caller is where it goes on, or nobody.
             let callers = handler.within.last().map_or(u32::MAX, |(back, _)| *back);
             handler.resumes = Some(if instruction.links { back } else { callers });
@@ -255,7 +267,8 @@ mod tests {
             };
             meter.take(event(line.as_bytes()).unwrap())?;
         }
-        Ok((meter.calls, meter.hits, meter.stack_bytes))
+        let stack_bytes = meter.deepest.values().sum();
+        Ok((meter.calls, meter.hits, stack_bytes))
     }
 
     #[test]

@@ -7,12 +7,13 @@
 //!
 //! [`system`] says what is driven, [`drive`] runs the rig, [`log`] reads a line, [`meter`] assigns instructions to interrupts,
 //! [`cost`] prices them, [`statistics`] and [`tally`] sum them up, [`parts`] and [`profile`] say whose they are, [`blocks`] counts
-//! building blocks by themselves, [`budget`] judges, [`report`] and [`table`] tell, [`kept`] compares with what the repository holds.
+//! building blocks by themselves, [`entry`] what could delay an entry, [`budget`] judges, [`report`] and [`table`] tell, [`kept`] compares with what the repository holds.
 
 mod blocks;
 mod budget;
 mod cost;
 pub mod drive;
+mod entry;
 mod kept;
 mod log;
 pub mod meter;
@@ -29,7 +30,6 @@ use anyhow::{Context, Result};
 use crate::build;
 use crate::cli::TimingArgs;
 use crate::setup::Setup;
-use blocks::Block;
 use report::Report;
 use system::{Measured, System};
 
@@ -46,8 +46,7 @@ pub fn run(args: &TimingArgs) -> Result<u8> {
     }
     let budgets = build::root().join("budgets.toml");
     let text = std::fs::read_to_string(&budgets).with_context(|| budgets.display().to_string())?;
-    let values: Vec<_> =
-        systems.iter().flat_map(values).chain([("bench.core-tick".to_owned(), core_tick(&blocks))]).collect();
+    let values: Vec<_> = systems.iter().flat_map(values).chain(report::blocks(&blocks)).collect();
     let judged = budget::judge(&text, &values)?;
     let report = Report { systems: &systems, blocks: &blocks, judged: &judged };
     if args.json {
@@ -72,10 +71,6 @@ pub fn run(args: &TimingArgs) -> Result<u8> {
     Ok(budget::exit_code(&judged).max(u8::from(!complaints.is_empty())))
 }
 
-fn core_tick(blocks: &[Block]) -> f64 {
-    report::core_tick(blocks).map_or(f64::NAN, f64::from)
-}
-
 /// What has a budget in a system.
 fn values(measured: &Measured) -> Vec<(String, f64)> {
     let statistics = &measured.statistics;
@@ -89,8 +84,10 @@ fn values(measured: &Measured) -> Vec<(String, f64)> {
         ("pwm-max", worst("pwm", |row| row.instructions.max.into())),
         ("control-latency-max", worst("control", |row| row.latency.max.into())),
         ("pwm-latency-max", worst("pwm", |row| row.latency.max.into())),
+        ("pwm-entry-spread", statistics.entry_spread("pwm").into()),
+        ("masking-functions", measured.masking.len() as f64),
         ("load-percent", statistics.worst_load()),
-        ("stack-bytes", statistics.stack_bytes.into()),
+        ("stack-bytes", statistics.stack_bytes().into()),
         ("code-bytes", sizes.code as f64),
         ("table-bytes", sizes.tables as f64),
         ("ram-bytes", sizes.ram as f64),

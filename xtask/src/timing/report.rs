@@ -4,7 +4,7 @@ use serde_json::{Value, json};
 
 use super::blocks::Block;
 use super::budget::Judged;
-use super::statistics::Row;
+use super::statistics::{Entry, Row};
 use super::system::Measured;
 
 const INTERRUPTS: [&str; 2] = ["control", "pwm"];
@@ -14,6 +14,27 @@ pub struct Report<'a> {
     pub systems: &'a [Measured],
     pub blocks: &'a [Block],
     pub judged: &'a [Judged],
+}
+
+/// What every block has besides its work.
+pub const CALL: &str = "call/nothing";
+
+/// Instructions of a block's work on its dearest input.
+pub fn net(blocks: &[Block], block: &Block) -> u32 {
+    let call = blocks.iter().find(|block| block.name == CALL).map_or(0, |block| block.max);
+    block.max.saturating_sub(call)
+}
+
+/// What has a budget among the blocks.
+pub fn blocks(blocks: &[Block]) -> Vec<(String, f64)> {
+    let ours = |work: &str| blocks.iter().find(|block| block.name == format!("{work}/tractive"));
+    let count =
+        |block: Option<&Block>, of: &dyn Fn(&Block) -> u32| block.map_or(f64::NAN, |block| of(block).into());
+    vec![
+        ("bench.core-tick".to_owned(), count(ours("core_tick"), &|block| block.max)),
+        ("bench.sin-cos".to_owned(), count(ours("sin_cos"), &|block| block.max)),
+        ("bench.lookup-2d-net".to_owned(), count(ours("lookup_2d"), &|block| net(blocks, block))),
+    ]
 }
 
 /// Instructions of our own core tick.
@@ -44,6 +65,16 @@ impl Measured {
             .collect()
     }
 
+    fn json_entries(&self) -> Vec<Value> {
+        let entry = |entry: &Entry| {
+            json!({
+                "system": self.system.name, "interrupt": entry.interrupt, "from": entry.from,
+                "times": entry.latency.count, "min": entry.latency.min, "max": entry.latency.max,
+            })
+        };
+        self.statistics.entries.iter().map(entry).collect()
+    }
+
     fn json_load(&self) -> Vec<Value> {
         let load = |mode: &&'static str| {
             let load = self.statistics.load(mode)?;
@@ -72,7 +103,7 @@ impl Measured {
         json!({
             "code_bytes": sizes.code, "table_bytes": sizes.tables, "ram_bytes": sizes.ram,
             "recorder_bytes": sizes.recorder,
-            "stack_bytes": self.statistics.stack_bytes, "stack_left_bytes": sizes.stack,
+            "stack_bytes": self.statistics.stack_bytes(), "stack_left_bytes": sizes.stack,
         })
     }
 }
@@ -86,7 +117,7 @@ impl Report<'_> {
             .iter()
             .map(|block| {
                 json!({
-                    "name": block.name, "instructions": block.max, "mean": block.mean, "cycles": block.cycles,
+                    "name": block.name, "instructions": block.max, "net": net(self.blocks, block), "mean": block.mean, "cycles": block.cycles,
                     "max_error": block.max_error,
                 })
             })
@@ -108,6 +139,7 @@ impl Report<'_> {
         json!({
             "interrupts": all(Measured::json_rows),
             "parts": all(Measured::json_parts),
+            "entries": all(Measured::json_entries),
             "load_at_170_mhz": all(Measured::json_load),
             "cycles_per_instruction": first.map(|measured| measured.statistics.cycles_per_instruction()),
             "max_stator_frequency_hz": first.map(|measured| measured.statistics.hertz),

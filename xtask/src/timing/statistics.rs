@@ -51,6 +51,16 @@ pub struct Row {
     pub depth: usize,
 }
 
+/// How an interrupt is entered from somewhere.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Entry {
+    pub interrupt: &'static str,
+    /// `idle`, or the interrupt that it came into.
+    pub from: &'static str,
+    /// Instructions from its event to the first of its handler.
+    pub latency: Spread,
+}
+
 /// Share of the processor, in percent.
 #[derive(Clone, Copy, Debug)]
 pub struct Load {
@@ -65,7 +75,9 @@ pub struct Statistics {
     pub rows: BTreeMap<(String, String), Row>,
     /// Largest stator frequency, in Hz.
     pub hertz: f64,
-    pub stack_bytes: i32,
+    /// Bytes of stack that each exception takes at most, with its frame.
+    deepest: BTreeMap<u32, i32>,
+    pub entries: Vec<Entry>,
 }
 
 impl Statistics {
@@ -84,10 +96,41 @@ impl Statistics {
                 row.latency.add(call.latency);
                 row.depth = row.depth.max(call.depth);
                 self.hertz = self.hertz.max(hertz.abs());
+                self.enter(name, call);
             }
         }
-        self.stack_bytes = self.stack_bytes.max(drive.stack_bytes);
+        for (exception, bytes) in &drive.deepest {
+            let deepest = self.deepest.entry(*exception).or_default();
+            *deepest = (*deepest).max(*bytes);
+        }
         Ok(())
+    }
+
+    /// Bytes of stack below the idle loop's, if the higher interrupt comes where control's is deepest.
+    pub fn stack_bytes(&self) -> i32 {
+        self.deepest.values().sum()
+    }
+
+    fn enter(&mut self, interrupt: &'static str, call: &Call) {
+        let named = |exception| INTERRUPTS.iter().find(|(_, number)| *number == exception);
+        let from = call.within.map_or("idle", |exception| named(exception).map_or("other", |(name, _)| name));
+        let known = self.entries.iter_mut().find(|entry| entry.interrupt == interrupt && entry.from == from);
+        match known {
+            Some(entry) => entry.latency.add(call.latency),
+            None => {
+                let mut latency = Spread::default();
+                latency.add(call.latency);
+                self.entries.push(Entry { interrupt, from, latency });
+            }
+        }
+    }
+
+    /// By how many instructions the entries of an interrupt differ, wherever it comes.
+    pub fn entry_spread(&self, interrupt: &str) -> u32 {
+        let entries = || self.entries.iter().filter(|entry| entry.interrupt == interrupt);
+        let latest = entries().map(|entry| entry.latency.max).max();
+        let first = entries().map(|entry| entry.latency.min).min();
+        latest.unwrap_or(u32::MAX) - first.unwrap_or(0)
     }
 
     /// One interrupt in one mode, if it was seen there.
@@ -119,9 +162,8 @@ impl Statistics {
         sum(|row| &row.cycles) / sum(|row| &row.instructions).max(1.0)
     }
 
-    /// The rows of one interrupt over all modes in which pulses are made.
+    /// The rows of one interrupt over all modes. A PWM interrupt that finds a fault makes no pulses any more, so it is among `off`.
     pub fn of<'a>(&'a self, interrupt: &'a str) -> impl Iterator<Item = &'a Row> {
-        let pulsing = self.rows.iter().filter(move |((mode, name), _)| name == interrupt && mode != "off");
-        pulsing.map(|(_, row)| row)
+        self.rows.iter().filter(move |((_, name), _)| name == interrupt).map(|(_, row)| row)
     }
 }

@@ -1,11 +1,12 @@
 //! The systems, and what they are driven through.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 
-use super::drive::{Bench, Drive};
+use super::drive::{Bench, Drive, is_link};
+use super::entry;
 use super::parts::{self, Part};
 use super::profile::{self, Profile};
 use super::statistics::{INTERRUPTS, Statistics};
@@ -30,15 +31,20 @@ const FROZEN_PERIODS: f64 = 19.0;
 
 /// The ZS9 in every scheme; each drive motors, weakens the field and brakes. With two carrier periods a control period, and
 /// with a fault of either interrupt at the end.
-const DUAL_DRIVES: [&str; 7] = [
+/// The faults come where both motors weaken the field at their limits.
+const DUAL_DRIVES: [&str; 8] = [
     "--scheme=s",
     "--scheme=rs",
     "--scheme=rthd",
     "--scheme=zvo",
     "--scheme=s --carrier-hz=20000 --uin=800",
-    "--scheme=s --inject=sensor-frozen-2@0.05",
-    "--scheme=s --inject=leg-stuck-on@0.05",
+    "--scheme=s --inject=sensor-frozen-2@0.115",
+    "--scheme=zvo --inject=leg-stuck-on@0.115",
+    "--scheme=zvo --carrier-hz=20000 --uin=800 --inject=leg-stuck-on@0.115",
 ];
+
+/// Up to full torque and weakening with an operator.
+const DUAL_TALK: &str = "rig/scripts/zs9-timing.talk";
 
 /// A system of the repository.
 #[derive(Clone, Copy, Debug)]
@@ -88,7 +94,7 @@ impl System {
         let bench = Bench {
             rig: rig.to_owned(),
             qemu: qemu.to_owned(),
-            scenario: self.scenario,
+            command: vec!["run".to_owned(), self.scenario.to_owned()],
             image: image.clone(),
             path: path.clone(),
             keeps_paths: false,
@@ -101,6 +107,10 @@ impl System {
                     let drive = sum.add(&bench, options)?;
                     sum.profile(&drive);
                 }
+                // Commanded over the protocol.
+                let talk = build::root().join(DUAL_TALK);
+                let bench = Bench { command: vec!["talk".to_owned(), talk.display().to_string()], ..bench };
+                sum.add(&bench, "--system=zs9 --inertia=0.02")?;
             }
         }
         Measured::new(self, path, image, sum)
@@ -108,11 +118,14 @@ impl System {
 }
 
 fn traction(bench: &Bench, sum: &mut Sum) -> Result<()> {
-    let mut switch_s = None;
+    let (mut switch_s, mut boundaries_s) = (None, Vec::new());
     for options in DRIVES {
         let drive = sum.add(bench, options)?;
         sum.profile(&drive);
-        switch_s = switch_s.or(first_switch_s(&drive));
+        if switch_s.is_none() {
+            switch_s = first_switch_s(&drive);
+            boundaries_s = switching_boundaries_s(&drive);
+        }
     }
     for phase_us in PHASES_US {
         sum.add(bench, &format!("--to=6000 --pwm-delay-us={phase_us} --fault-at={SHORT_S}"))?;
@@ -122,7 +135,35 @@ fn traction(bench: &Bench, sum: &mut Sum) -> Result<()> {
     let switch_s = switch_s.context("the drive never switched its mode")?;
     let freeze_s = switch_s - FROZEN_PERIODS * CONTROL_S;
     sum.add(bench, &format!("--to=6000 --freeze-at={freeze_s:.6}"))?;
+    // The same for the PWM interrupt, at each switch: phase currents that are wrong for the first time at the boundary itself.
+    for boundary_s in boundaries_s {
+        sum.add(bench, &format!("--to=6000 --dead-time-us=3 --offset-at={boundary_s:.6}"))?;
+    }
+    // With an operator who commands.
+    sum.add(bench, "--to=6000 --operated")?;
     Ok(())
+}
+
+/// For each boundary where the modulator changes from one mode with pulses to another, a moment behind the last control sample before it,
+/// in the scenario's time: there only the PWM interrupt sees what comes.
+fn switching_boundaries_s(drive: &Drive) -> Vec<f64> {
+    let [(_, control), _] = INTERRUPTS;
+    let depths: Vec<_> =
+        drive.calls.iter().filter(|call| call.exception == control).map(|call| call.depth).collect();
+    let (mut samples, mut last, mut found) = (0, "off", Vec::new());
+    for (name, mode, _) in &drive.modes {
+        if name == "control" {
+            samples += 1;
+            continue;
+        }
+        if last != "off" && mode != "off" && mode != last {
+            // The list is in the order of the interrupts' ends: one that it came into has sampled before.
+            let sampled = samples + usize::from(depths.get(samples).is_some_and(|depth| *depth > 1));
+            found.push((sampled as f64 + 0.02 - LEAD_PERIODS as f64) * CONTROL_S);
+        }
+        last = mode;
+    }
+    found
 }
 
 /// When control first works for another mode with pulses than before, in the scenario's time: the middle of the period
@@ -147,7 +188,7 @@ struct Sum {
 
 impl Sum {
     fn add(&mut self, bench: &Bench, options: &str) -> Result<Drive> {
-        eprintln!("{} {options}", bench.scenario);
+        eprintln!("{} {options}", bench.command.join(" "));
         let drive = bench.drive(&options.split(' ').collect::<Vec<_>>())?;
         self.statistics.add(&drive)?;
         for (exception, addresses) in &drive.longest {
@@ -176,6 +217,10 @@ pub struct Measured {
     pub statistics: Statistics,
     /// Of each interrupt.
     pub parts: Vec<(&'static str, Vec<Part>)>,
+    /// Functions that mask interrupts.
+    pub masking: BTreeSet<String>,
+    /// Control's longest instruction: its address and its cycles.
+    pub longest: Option<(u32, u32)>,
     path: PathBuf,
     sum: Sum,
 }
@@ -190,7 +235,11 @@ impl Measured {
             let calls = sum.calls.get(&exception).copied().unwrap_or(0);
             parts.push((name, parts::parts(&profile, exception, &sum.hits, calls, longest)?));
         }
-        Ok(Self { system, image, statistics: sum.statistics.clone(), parts, path, sum })
+        let masking = entry::masking(&image, is_link);
+        let [(_, control), _] = INTERRUPTS;
+        let longest = entry::longest(&image, &sum.hits, control);
+        let statistics = sum.statistics.clone();
+        Ok(Self { system, image, statistics, parts, masking, longest, path, sum })
     }
 
     /// The dearest functions of each interrupt.
@@ -221,7 +270,7 @@ pub mod tests {
         let drive = Drive {
             calls: vec![call(26, 7), call(24, 10), call(24, 20)],
             modes: vec![served("pwm"), served("control"), served("control")],
-            stack_bytes: 640,
+            deepest: BTreeMap::from([(24, 440), (26, 200)]),
             ..Drive::default()
         };
         let mut statistics = Statistics::default();
@@ -233,6 +282,8 @@ pub mod tests {
             image: Image { sizes, ..Image::default() },
             statistics,
             parts: vec![("control", vec![part])],
+            masking: BTreeSet::new(),
+            longest: Some((0x100, 14)),
             path: PathBuf::new(),
             sum: Sum::default(),
         }

@@ -3,7 +3,8 @@
 use std::fmt::Write as _;
 
 use super::blocks::Block;
-use super::report::Report;
+use super::report::{Report, net};
+use super::statistics::Spread;
 use super::system::Measured;
 
 /// For a terminal.
@@ -11,15 +12,21 @@ pub fn plain(report: &Report) -> String {
     let mut text = String::new();
     for measured in report.systems {
         interrupts(&mut text, measured);
+        entries(&mut text, measured);
         parts(&mut text, measured);
     }
-    let _ = writeln!(text, "\n{:<24} {:>6} {:>8} {:>7} {:>10}", "block", "max", "mean", "cycles", "error");
+    let _ = writeln!(
+        text,
+        "\n{:<24} {:>6} {:>6} {:>8} {:>7} {:>10}",
+        "block", "max", "net", "mean", "cycles", "error"
+    );
     for block in report.blocks {
         let _ = writeln!(
             text,
-            "{:<24} {:>6} {:>8.1} {:>7} {:>10}",
+            "{:<24} {:>6} {:>6} {:>8.1} {:>7} {:>10}",
             block.name,
             block.max,
+            net(report.blocks, block),
             block.mean,
             block.cycles,
             error(block)
@@ -91,6 +98,26 @@ fn interrupts(text: &mut String, measured: &Measured) {
     }
 }
 
+fn entries(text: &mut String, measured: &Measured) {
+    let _ = writeln!(text, "\n{:<8} {:<10} {:>6} {:>6} {:>6}", "entered", "from", "times", "min", "max");
+    for entry in &measured.statistics.entries {
+        let Spread { min, max, count, .. } = entry.latency;
+        let _ = writeln!(text, "{:<8} {:<10} {count:>6} {min:>6} {max:>6}", entry.interrupt, entry.from);
+    }
+    for function in &measured.masking {
+        let _ = writeln!(text, "masks interrupts: {function}");
+    }
+    let _ = writeln!(text, "{}", longest(measured));
+}
+
+/// Which instruction the PWM interrupt may have to wait for.
+fn longest(measured: &Measured) -> String {
+    let Some((address, cycles)) = measured.longest else { return String::new() };
+    let function = measured.image.function_at(address).and_then(|start| measured.image.functions.get(&start));
+    let name = function.and_then(|function| function.names.first()).map_or("?", String::as_str);
+    format!("control's longest instruction: {cycles} cycles, at {address:#x} in {name}")
+}
+
 fn parts(text: &mut String, measured: &Measured) {
     for (name, parts) in &measured.parts {
         let _ = writeln!(
@@ -115,10 +142,17 @@ fn totals(parts: &[super::parts::Part]) -> (f64, u32) {
 /// `docs/cost.md`.
 pub fn page(report: &Report) -> String {
     let mut text = String::from(PAGE);
-    text +=
-        "\n## Building blocks\n\n| block | instructions | cycles | largest error |\n|---|---:|---:|---:|\n";
+    text += "\n## Building blocks\n\n| block | instructions | net | cycles | largest error |\n|---|---:|---:|---:|---:|\n";
     for block in report.blocks {
-        let _ = writeln!(text, "| {} | {} | {} | {} |", block.name, block.max, block.cycles, error(block));
+        let net = net(report.blocks, block);
+        let _ = writeln!(
+            text,
+            "| {} | {} | {net} | {} | {} |",
+            block.name,
+            block.max,
+            block.cycles,
+            error(block)
+        );
     }
     for measured in report.systems {
         let _ = writeln!(
@@ -147,6 +181,28 @@ pub fn page(report: &Report) -> String {
             let _ = writeln!(text, "| together | {mean:.0} | {longest} |");
         }
     }
+    text += ENTRY;
+    text +=
+        "\n| | interrupt | comes into | times | waits at least | at most |\n|---|---|---|---:|---:|---:|\n";
+    for measured in report.systems {
+        for entry in &measured.statistics.entries {
+            let (system, Spread { min, max, count, .. }) = (measured.system.name, entry.latency);
+            let _ = writeln!(
+                text,
+                "| {system} | {} | {} | {count} | {min} | {max} |",
+                entry.interrupt, entry.from
+            );
+        }
+    }
+    text += "\n";
+    for measured in report.systems {
+        let cycles = measured.longest.map_or(0, |(_, cycles)| cycles);
+        let _ = writeln!(
+            text,
+            "- `{}`: control's longest instruction takes {cycles} cycles.",
+            measured.system.name
+        );
+    }
     text += "\n## Budgets\n\n| | value | target | |\n|---|---:|---:|---|\n";
     for judged in report.judged {
         let (name, target) = (&judged.name, judged.budget.target);
@@ -154,6 +210,22 @@ pub fn page(report: &Report) -> String {
     }
     text
 }
+
+const ENTRY: &str = "
+## Entry
+
+Instructions from the timer's event, when the interrupt becomes pending, to the first of the handler.
+
+- The PWM interrupt waits for none, wherever it comes: `pwm-entry-spread`, the difference between its latest and its earliest entry, and
+  `pwm-latency-max` are 0, or the command fails. It has the highest priority that is used, so it is never chained behind another handler.
+- Nothing holds it off: no function of the image outside the link to the rig has an instruction that masks interrupts (CPSID, or MSR to
+  PRIMASK, BASEPRI or FAULTMASK). `masking-functions` counts them; one is enough to fail.
+- What is left is the instruction under way, which QEMU does not see, since an instruction is its unit of time: on a processor the entry
+  moves by up to the cycles of the longest one less one, below. A load or store of several registers is broken off or continued later.
+  `cargo xtask test --only landings` has it come at every instruction of control.
+- Control waits where a PWM interrupt runs or comes at the same instant: at most the whole of it, and that is its jitter. In the ZS9
+  control comes at valleys and the PWM interrupt at peaks, so they never meet there.
+";
 
 const PAGE: &str = "# What a tick costs
 
@@ -164,14 +236,18 @@ higher interrupt executed in between. Cycles are the Cortex-M4's documented timi
 worst: no load pipelined behind another, three cycles for every branch that is taken, every result of the floating-point unit
 wanted by the next instruction.
 
-The PWM interrupt waits for nothing: no handler stands above it, and nothing in the image masks interrupts or holds a lock.
-So its entry has no jitter beyond the instruction under way. The control interrupt waits while the PWM interrupt runs: at most
-one whole PWM interrupt, and that is its jitter. Preemption is two deep: idle, control, PWM.
+The worst cases are provoked: a switch of mode, a fault and the limit of the current in one control interrupt; phase currents that are
+wrong for the first time at the very boundary where the modulator switches, at every switch of the drive; in the ZS9 a fault of either
+interrupt with both motors at their limits in field weakening; an operator who commands. The flight recorder is always on. A scheme of
+the ZS9 is a number in each command, so its change is nothing of its own.
+
+Preemption is two deep: idle, control, PWM; [Entry](#entry) says who waits for whom. The stack is what control takes at most and what the
+PWM interrupt takes at most, as if one came where the other is deepest.
 
 Blocks stand beside those of crates one could pick instead, built into the same image and run on the same inputs. Of
 `core_tick` ours has a saturated flux map in it (three duties from phase currents and angle); `foc` is fixed point, and neither
-it nor `fluxkit` has a map. `call/nothing` is what every block has besides its work; a `lookup_2d` is two bilinear look-ups at one
-point.
+it nor `fluxkit` has a map. `call/nothing` is what every block has besides its work, the net number is without it; a `lookup_2d` is two
+bilinear look-ups at one point, which in the interrupts are never calls.
 
 ## What stands between the interrupts and their targets
 

@@ -1,7 +1,7 @@
 //! The same for the ZS9.
 
 use super::{CONTROL_ANSWERS, IDLE_ANSWERS, PWM_ANSWERS, exchange, finish, open_files, send};
-use crate::board::qemu::{DUAL_RECORDER, saboteur};
+use crate::board::qemu::{DUAL_RECORDER, saboteur, watch};
 use crate::board::{DualSample, PlayedPeriod, PowerSample};
 use crate::drive::dual::DualReport;
 use crate::link::{self, DualRequest, DualSetup};
@@ -25,6 +25,7 @@ pub fn sample_dual(now: Instant) -> DualSample {
     exchange(&mut block, CONTROL_ANSWERS);
     let (sample, end) = link::dual_sample_from_block(&block);
     if end {
+        watch::stop();
         finish(&DUAL_RECORDER, |record| DualRequest::Recorded(record).to_block());
     }
     saboteur::sampled();

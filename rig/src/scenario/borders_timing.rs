@@ -1,0 +1,69 @@
+//! A short drive to and fro across each border between two modes, and in and out of pulses, for `cargo xtask test --only landings`: what
+//! control executes while a mode changes and no longer.
+
+use super::script::Script;
+use super::{Plan, Scenario};
+use crate::analysis::{self, Figures};
+use crate::machine::Machine;
+use crate::options::RunOptions;
+use crate::report::Page;
+use crate::trace::Recording;
+
+/// Full torque, at speeds that swing across a border, and an enable that comes and goes.
+pub struct BordersTiming;
+
+/// Where the mode has changed going up and down at full torque, with a little room, in r/min.
+const SWINGS_RPM: [(f64, f64); 5] =
+    [(555.0, 615.0), (840.0, 910.0), (1065.0, 1135.0), (1665.0, 1750.0), (1850.0, 1900.0)];
+const SWINGS: usize = 8;
+/// From one end of a swing to the other, and from one border to the next, in s. A quicker ramp would count as a lost angle.
+const HALF_SWING_S: f64 = 0.008;
+const RAMP_S: f64 = 0.02;
+/// Long enough for what control does now and then; then the enable goes and comes, in s. It comes once in nine halves of the asynchronous
+/// carrier, so always as near before a boundary as here the first time.
+const FIRST_S: f64 = 0.0403;
+const PAUSES: usize = 24;
+const PAUSE_S: f64 = 0.0025;
+
+impl Scenario for BordersTiming {
+    fn name(&self) -> &'static str {
+        "borders-timing"
+    }
+
+    fn figure(&self) -> &'static str {
+        "no figure: modes that change again and again, for `cargo xtask test`"
+    }
+
+    fn plan(&self, _options: &RunOptions, machine: &Machine) -> Plan {
+        let (first_rpm, _) = SWINGS_RPM[0];
+        let mut speed = vec![(0.0, first_rpm)];
+        let enable = (0..2 * PAUSES).map(|k| (FIRST_S + k as f64 * PAUSE_S, k % 2 == 1)).collect();
+        let mut t_s = FIRST_S + 2.0 * PAUSES as f64 * PAUSE_S;
+        for (low_rpm, high_rpm) in SWINGS_RPM {
+            for swing in 0..SWINGS {
+                let swing_s = t_s + 2.0 * swing as f64 * HALF_SWING_S;
+                speed.extend([(swing_s, low_rpm), (swing_s + HALF_SWING_S, high_rpm)]);
+            }
+            t_s += (2 * SWINGS - 1) as f64 * HALF_SWING_S + RAMP_S;
+        }
+        let torque_nm = machine.folder.parameters.max_torque_nm;
+        Script {
+            speed,
+            torque: vec![(0.0, torque_nm)],
+            enable,
+            duration_s: t_s - RAMP_S,
+            ..Script::default()
+        }
+        .plan()
+    }
+
+    fn figures(&self, recording: &Recording, _options: &RunOptions, _machine: &Machine) -> Figures {
+        let mut figures = analysis::common(recording);
+        figures.set("modes", analysis::modes(recording));
+        figures
+    }
+
+    fn plots(&self, recording: &Recording, page: &mut Page) {
+        page.overview(recording);
+    }
+}

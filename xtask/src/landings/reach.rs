@@ -1,0 +1,183 @@
+//! Where a carrier boundary can come in a control interrupt, and what was hit there.
+
+use std::collections::{BTreeMap, BTreeSet, HashSet};
+
+use super::{Call, INSTRUCTIONS_PER_TICK};
+use crate::elf::Image;
+use crate::saboteur::Seen;
+
+/// From one control interrupt to the next.
+const CONTROL_TICKS: u32 = 2_500;
+/// A control interrupt samples at once. One that has not begun a sixteenth of its period after its timer counts as lost, so no delay puts
+/// a boundary before the samples that comes later than that, less a little.
+const BEGUN_TICKS: u32 = 140;
+/// By how many instructions a landing may be off the ticks that are left.
+pub const NEAR: u32 = 2 * INSTRUCTIONS_PER_TICK;
+/// What the PWM interrupts within a control interrupt execute at most, with their link, and a little for control's own way.
+const ALLOWANCE: u32 = 6_000;
+
+/// A control interrupt of a run, between its boundaries.
+pub struct Stand<'a> {
+    pub number: usize,
+    pub call: &'a Call,
+    /// From its coming to the next carrier boundary, in ticks.
+    pub left_ticks: u32,
+    /// Since the last one; `None` before the first.
+    pub since_ticks: Option<u32>,
+    /// By how many instructions it may begin later and still end in time.
+    pub most: u32,
+    /// Instructions that it has executed when the boundary comes, if it does not wait; not known before one has landed in it.
+    pub boundary: Option<u32>,
+}
+
+/// Why no boundary can come at an instruction of a control interrupt.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Why {
+    /// It is the first one behind a boundary, and the next boundary comes after its period.
+    BehindBoundary,
+    /// A boundary has come in the same control interrupt already, and the next one comes after its period.
+    BehindLanding,
+    /// It comes before the first boundary, by more than its period.
+    BeforeFirst,
+    /// It has no samples yet, which it takes at once, and the boundary comes later.
+    BeforeSamples,
+}
+
+impl Why {
+    const fn text(self) -> &'static str {
+        match self {
+            Self::BehindBoundary => {
+                "only in the first control interrupt behind a boundary, and the next boundary comes after its period"
+            }
+            Self::BehindLanding => {
+                "only where a boundary has come in the same control interrupt already, and the next comes after its period"
+            }
+            Self::BeforeFirst => "only before the first boundary of all",
+            Self::BeforeSamples => {
+                "before the samples, which are taken at once, and every boundary comes later"
+            }
+        }
+    }
+}
+
+impl<'a> Stand<'a> {
+    /// Of each control interrupt that was seen.
+    pub fn all(calls: &'a [Call], seen: &[Seen], deadline_ticks: u32) -> Vec<Self> {
+        let (mut last, mut next): (Option<u32>, Option<u32>) = (None, None);
+        let stand = |seen: &Seen| {
+            let call = calls.get(seen.number)?;
+            let comes = CONTROL_TICKS * seen.number as u32;
+            let boundary = comes + seen.left_ticks;
+            if next.is_some_and(|next| next != boundary) {
+                last = next;
+            }
+            next = Some(boundary);
+            let length = call.path.last().map_or(0, |(_, before)| *before) + ALLOWANCE;
+            Some(Self {
+                number: seen.number,
+                call,
+                left_ticks: seen.left_ticks,
+                since_ticks: last.map(|last| comes.saturating_sub(last)),
+                most: (deadline_ticks * INSTRUCTIONS_PER_TICK).saturating_sub(length),
+                boundary: None,
+            })
+        };
+        seen.iter().filter_map(stand).collect()
+    }
+
+    /// Why no boundary can come here, so many instructions behind its beginning.
+    pub fn why(&self, before: u32) -> Option<Why> {
+        let far = self.left_ticks > CONTROL_TICKS;
+        if before > self.left_ticks * INSTRUCTIONS_PER_TICK + NEAR {
+            return Some(Why::BehindLanding);
+        }
+        match self.since_ticks {
+            None if far => Some(Why::BeforeFirst),
+            Some(since) if far && since < CONTROL_TICKS => Some(Why::BehindBoundary),
+            _ if before < self.call.sampled && self.left_ticks > BEGUN_TICKS => Some(Why::BeforeSamples),
+            _ => None,
+        }
+    }
+}
+
+/// What the runs of a course have hit.
+#[derive(Default)]
+pub struct Reached {
+    /// Modes and instructions.
+    all: BTreeSet<(String, u32)>,
+    hit: BTreeSet<(String, u32)>,
+    /// Why no boundary can come at an instruction, in each control interrupt that executes it; `None` where in some one could.
+    whys: BTreeMap<u32, Option<Why>>,
+    pub landings: usize,
+    pub passes: usize,
+}
+
+impl Reached {
+    pub fn add(&mut self, mode: &str, address: u32) {
+        self.landings += 1;
+        self.hit.insert((mode.to_owned(), address));
+    }
+
+    pub fn has(&self, mode: &str, address: u32) -> bool {
+        self.hit.contains(&(mode.to_owned(), address))
+    }
+
+    /// Instructions that were hit in any mode.
+    pub fn hit_in_any(&self) -> HashSet<u32> {
+        self.hit.iter().map(|(_, address)| *address).collect()
+    }
+
+    /// Takes what a run has executed.
+    pub fn judge(&mut self, stands: &[Stand]) {
+        for stand in stands {
+            for (address, before) in &stand.call.path {
+                self.all.insert((stand.call.mode.clone(), *address));
+                let why = stand.why(*before);
+                self.whys.entry(*address).and_modify(|of| *of = of.and(why)).or_insert(why);
+            }
+        }
+    }
+
+    /// Executed and hit, by mode, and those that no boundary can come at.
+    pub fn table(&self) -> String {
+        let mut counts: BTreeMap<&str, [usize; 2]> = BTreeMap::new();
+        for place in &self.all {
+            let [all, hit] = counts.entry(&place.0).or_default();
+            *all += 1;
+            *hit += usize::from(self.hit.contains(place));
+        }
+        let any = [self.whys.len(), self.whys.keys().filter(|at| self.hit_in_any().contains(at)).count()];
+        let mut text = format!("{:<16} {:>12} {:>6} {:>6}\n", "mode", "instructions", "hit", "%");
+        for (mode, [all, hit]) in counts.into_iter().chain([("any", any)]) {
+            let percent = 100.0 * hit as f64 / all.max(1) as f64;
+            text += &format!("{mode:<16} {all:>12} {hit:>6} {percent:>6.1}\n");
+        }
+        let mut whys: BTreeMap<Why, usize> = BTreeMap::new();
+        let hit = self.hit_in_any();
+        for (_, why) in self.whys.iter().filter(|(address, _)| !hit.contains(address)) {
+            if let Some(why) = why {
+                *whys.entry(*why).or_default() += 1;
+            }
+        }
+        for (why, count) in whys {
+            text += &format!("{count} cannot be hit: {}\n", why.text());
+        }
+        text
+    }
+
+    /// Instructions that could have been hit and were not.
+    pub fn missing(&self) -> impl Iterator<Item = u32> {
+        let hit = self.hit_in_any();
+        let could = self.whys.iter().filter(|(_, why)| why.is_none()).map(|(address, _)| *address);
+        could.filter(move |address| !hit.contains(address))
+    }
+
+    /// A line for each of them.
+    pub fn findings(&self, image: &Image) -> Vec<String> {
+        let name = |address: u32| {
+            let function = image.function_at(address).and_then(|start| image.functions.get(&start));
+            function.and_then(|function| function.names.first()).map_or("?", String::as_str)
+        };
+        self.missing().map(|address| format!("{address:x} in {} was not hit", name(address))).collect()
+    }
+}
