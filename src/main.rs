@@ -30,6 +30,13 @@ mod firmware {
     static FIRST_HALF_TICKS: AtomicU32 = AtomicU32::new(0);
     static UNCOMPENSATED: AtomicBool = AtomicBool::new(false);
 
+    /// Until the host has told its own.
+    const DEFAULTS: Settings = Settings {
+        clock: CLOCK,
+        devices: Devices::new(0, 0, BUILT_IN.ratings.max_switching_hz, &CLOCK),
+        gains: Gains::DEFAULT,
+    };
+
     fn settings() -> Settings {
         Settings {
             clock: CLOCK,
@@ -75,15 +82,19 @@ mod firmware {
     /// Deadline: the next control interrupt. Missed: fault `control_deadline`, gates into the safe state.
     #[interrupt]
     fn TIMER0() {
-        static mut TASK: Option<ControlTask<BuiltIn>> = None;
+        static mut TASK: ControlTask<BuiltIn> =
+            ControlTask::new(BuiltIn, DEFAULTS, Instant(CLOCK.control_ticks));
+        static mut IS_SET_UP: bool = false;
         let mut board = qemu::Control;
         board.acknowledge();
-        let first = Instant(CLOCK.control_ticks);
-        let task = TASK.get_or_insert_with(|| ControlTask::new(BuiltIn, settings(), first));
-        if task.wants_revision() {
+        if !*IS_SET_UP {
+            TASK.set_up(settings());
+            *IS_SET_UP = true;
+        }
+        if TASK.wants_revision() {
             board.revise_pulses();
         }
-        task.run(&mut board, &SHARED);
+        TASK.run(&mut board, &SHARED);
     }
 
     /// Deadline: the next carrier boundary, where the shadow registers take over.

@@ -15,7 +15,8 @@ const JUMPED: (f32, f32) = (1.04, 1.015);
 pub struct LinkFilter {
     /// In V; `None` before the first step.
     slow_v: Option<f32>,
-    jumped: bool,
+    /// The link over that, above which it has jumped.
+    jump: f32,
 }
 
 /// The link, in V.
@@ -28,7 +29,7 @@ pub struct Link {
 
 impl LinkFilter {
     pub const fn new() -> Self {
-        Self { slow_v: None, jumped: false }
+        Self { slow_v: None, jump: JUMPED.0 }
     }
 
     /// One control period, with the link as it is measured.
@@ -37,7 +38,8 @@ impl LinkFilter {
         let slow_v = before + LINK_RAD_S * period_s * (udc_v - before);
         self.slow_v = Some(slow_v);
         let (from, until) = JUMPED;
-        self.jumped = udc_v > if self.jumped { until * slow_v } else { from * slow_v };
-        Link { slow_v, usable_v: if self.jumped { slow_v } else { udc_v } }
+        let jumped = udc_v > self.jump * slow_v;
+        self.jump = if jumped { until } else { from };
+        Link { slow_v, usable_v: if jumped { slow_v } else { udc_v } }
     }
 }

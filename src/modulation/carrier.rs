@@ -9,7 +9,8 @@ use crate::time::Instant;
 
 /// A half of the asynchronous carrier.
 pub fn asynchronous(half: u32, start: Instant, seen: &Reference, devices: &Devices) -> CarrierPeriod {
-    synchronous(half, start, devices.shortest_half_ticks, Zeros::Even, seen, devices)
+    let period_ticks = devices.shortest_half_ticks;
+    synchronous(half, period_ticks, Zeros::Even, seen.share_within(start, period_ticks), devices)
 }
 
 /// How a half divides its zero vectors between its start and its end.
@@ -36,20 +37,18 @@ impl Zeros {
     }
 }
 
-/// A half of a given length, wherever it lies in the turn.
+/// A half of a given length, wherever it lies in the turn, whose mean voltage is a share of the link's.
 pub fn synchronous(
     half: u32,
-    start: Instant,
     period_ticks: u32,
     zeros: Zeros,
-    seen: &Reference,
+    voltage: AlphaBeta,
     devices: &Devices,
 ) -> CarrierPeriod {
-    let middle = seen.vector_at(start.after(period_ticks / 2));
     let rising = half & 1 == 0;
     // A rising half starts with all upper devices on.
     let all_on = if rising { zeros.at_start() } else { 1.0 - zeros.at_start() };
-    let shares = on_shares(middle * (1.0 / seen.udc_v), all_on);
+    let shares = on_shares(voltage, all_on);
     let mut out = CarrierPeriod { period_ticks, start_levels: [rising; 3], ..CarrierPeriod::default() };
     for (compare, share) in out.compare_ticks.iter_mut().zip([shares.a, shares.b, shares.c]) {
         let on = whole_pulse(share, period_ticks, devices.min_pulse_ticks);

@@ -19,6 +19,7 @@ pub fn notch_sum(mode: Mode) -> f32 {
 
 /// β/2 in rad for a fundamental of `voltage_v` (peak phase) on a link of `udc_v`: equations (16) and (17), which
 /// are one: `sin(β/2) = (1 − π u/(2 udc)) / sum`. A voltage beyond six-step gives 0.
+#[inline(never)]
 pub fn half_notch_rad(mode: Mode, voltage_v: f32, udc_v: f32) -> f32 {
     let depth = core::f32::consts::FRAC_PI_2 * voltage_v / udc_v;
     asin_up_to_30_degrees(limit((1.0 - depth) / notch_sum(mode), 0.0, 0.5))

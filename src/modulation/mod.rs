@@ -18,7 +18,7 @@ mod ripple;
 mod schedule;
 
 use crate::control::six_step_v;
-use crate::frames::{AlphaBeta, Angle, UNITS_PER_RADIAN, limit};
+use crate::frames::{AlphaBeta, Angle, limit};
 use crate::time::{Clock, Instant};
 
 use carrier::Zeros;
@@ -211,6 +211,12 @@ impl Reference {
         self.vector.turned(self.turned(instant).sin_cos())
     }
 
+    /// The vector in the middle of a half, as a share of the link's voltage: there the mean of a turning vector stands.
+    #[inline(never)]
+    fn share_within(&self, start: Instant, period_ticks: u32) -> AlphaBeta {
+        self.vector_at(start.after(period_ticks / 2)) * (1.0 / self.udc_v)
+    }
+
     /// The pulse angle at an instant: that of the carrier's vector and 90°.
     fn pulse_at(&self, instant: Instant) -> Angle {
         self.carrier_angle + self.turned(instant) + Angle::DEG_90
@@ -273,8 +279,6 @@ pub struct Modulator {
     after_pattern: bool,
     /// Half the zero voltage of the present pattern's sectors, as an angle in rad.
     zero_rad: f32,
-    /// What leads the flux of a machine that is caught to where its pattern begins; in the first half only.
-    catch: Option<Catch>,
 }
 
 /// A new pattern growing out of an old one.
@@ -334,7 +338,6 @@ impl Modulator {
             growth: None,
             after_pattern: false,
             zero_rad: 0.0,
-            catch: None,
         }
     }
 
@@ -352,8 +355,11 @@ impl Modulator {
         self.turn_mirror(reference.rate);
         let seen = if self.mirrored { reference.mirrored() } else { *reference };
         let pulse = seen.pulse_at(start);
+        let from = self.mode;
         self.choose_mode(start, pulse, &seen);
-        let mut half = if self.mode == Mode::Async {
+        let mut half = if from == Mode::Off && self.mode.is_pattern() {
+            self.catch(start, pulse, &seen)
+        } else if self.mode == Mode::Async {
             carrier::asynchronous(self.next_half, start, &seen, &self.devices)
         } else {
             self.locked(start, pulse, &seen)
@@ -409,7 +415,7 @@ impl Modulator {
     fn choose_mode(&mut self, start: Instant, pulse: Angle, seen: &Reference) {
         if let Some(plan) = self.plan {
             if plan.at == self.next_half {
-                self.switch_to(start, plan.to, pulse, seen);
+                self.switch_to(start, plan.to, pulse);
             }
             return;
         }
@@ -424,7 +430,7 @@ impl Modulator {
                 self.plan = Some(Plan { to: wanted, at });
             }
         } else if schedule::may_switch(self.mode, wanted, self.next_half) {
-            self.switch_to(start, wanted, pulse, seen);
+            self.switch_to(start, wanted, pulse);
         }
     }
 
@@ -434,14 +440,9 @@ impl Modulator {
         (boundary(self.next_half, self.mode.carriers()) - pulse).signed().unsigned_abs() < KEPT_ANGLE.0
     }
 
-    fn switch_to(&mut self, start: Instant, mode: Mode, pulse: Angle, seen: &Reference) {
+    fn switch_to(&mut self, start: Instant, mode: Mode, pulse: Angle) {
         let from = self.mode;
         self.next_half = first_half(from, mode, self.next_half, pulse);
-        if from == Mode::Off && mode.is_pattern() {
-            let catch = Catch::new(mode, pulse, seen.vector_at(start), seen);
-            self.next_half = catch.half;
-            self.catch = Some(catch);
-        }
         self.mode = mode;
         self.plan = None;
         self.after_pattern = from.is_pattern() && mode.is_carrier();
@@ -486,6 +487,16 @@ impl Modulator {
         }
     }
 
+    /// The first half of a pattern after none: one of a carrier, which leads the machine's flux to where the pattern begins.
+    #[cold]
+    #[inline(never)]
+    fn catch(&mut self, start: Instant, pulse: Angle, seen: &Reference) -> CarrierPeriod {
+        let Catch { half, turned, share } = Catch::new(self.mode, pulse, seen.share_within(start, 0), seen);
+        self.next_half = half;
+        let period_ticks = self.whole_ticks(turned.0 as f32 / seen.rate);
+        carrier::synchronous(half, period_ticks, Zeros::Early, share, &self.devices)
+    }
+
     /// One half of a carrier that is locked to the pulse angle.
     fn locked(&mut self, start: Instant, pulse: Angle, seen: &Reference) -> CarrierPeriod {
         let carriers = self.mode.carriers();
@@ -493,21 +504,11 @@ impl Modulator {
         let ticks_per_unit = 1.0 / seen.rate;
         let nominal = boundary(1, carriers).0 as f32 * ticks_per_unit;
         let wanted = (end - pulse).signed() as f32 * ticks_per_unit;
-        let catch = self.catch.take();
-        if self.mode.is_carrier() || catch.is_some() {
-            let (turn, zeros, seen) = match catch {
-                None => {
-                    let (shortest, longest) = CARRIER_STRETCH;
-                    (limit(wanted, shortest * nominal, longest * nominal), self.zeros(), *seen)
-                }
-                Some(Catch { turn_rad, voltage, .. }) => (
-                    turn_rad * UNITS_PER_RADIAN * ticks_per_unit,
-                    Zeros::Early,
-                    Reference { vector: voltage, rate: 0.0, ..*seen },
-                ),
-            };
-            let period_ticks = self.whole_ticks(turn);
-            return carrier::synchronous(self.next_half, start, period_ticks, zeros, &seen, &self.devices);
+        if self.mode.is_carrier() {
+            let (shortest, longest) = CARRIER_STRETCH;
+            let period_ticks = self.whole_ticks(limit(wanted, shortest * nominal, longest * nominal));
+            let share = seen.share_within(start, period_ticks);
+            return carrier::synchronous(self.next_half, period_ticks, self.zeros(), share, &self.devices);
         }
         let notches = self.mode.notches() as f32;
         // Square wave has notches only where less voltage is asked for than a link has that has jumped.
@@ -554,6 +555,7 @@ impl Modulator {
 
     /// A length in whole ticks. Slower than the async mode's range there is nothing to lock to: the length stays that
     /// of a stopped carrier.
+    #[inline(never)]
     fn whole_ticks(&self, period: f32) -> u32 {
         ((period + 0.5) as u32).min(self.devices.shortest_half_ticks * 4).max(1)
     }

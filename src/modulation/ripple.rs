@@ -37,17 +37,40 @@ impl RippleFlux {
     /// At half i of N the flux stands at `D (1 + (i/N)(e^{j60°} − 1))`, turned by the sector, with the edge D; from that the
     /// fundamental at `i/N · 60°` is taken away. The flux lags the voltage by 90°, and that the pulse angle by 90°.
     pub fn at(&self, half: u32) -> AlphaBeta {
+        let Some((start, place)) = self.place(half) else {
+            return AlphaBeta::default();
+        };
+        let Some(round) = PLACES.get(place as usize) else {
+            return AlphaBeta::default();
+        };
+        let round = AlphaBeta { alpha: round.cos, beta: round.sin };
+        (round * self.fundamental_wb - self.along_edge(place)).turned(*start)
+    }
+
+    /// The flux itself where half number `half` begins, which is that of the hexagon, in Wb, in the stationary frame of the (mirrored)
+    /// turn.
+    pub fn hexagon(&self, half: u32) -> AlphaBeta {
+        match self.place(half) {
+            Some((start, place)) => self.along_edge(place).turned(*start) * -1.0,
+            None => AlphaBeta::default(),
+        }
+    }
+
+    /// The beginning of a half's sector, and its place there in 10°.
+    #[inline(always)]
+    fn place(&self, half: u32) -> Option<(&'static SinCos, u32)> {
         let turn = 6 * self.sector_halves;
         let half = if half >= turn { half - turn } else { half };
         let sector = half.checked_div(self.sector_halves).unwrap_or(0);
         let place = (half - sector * self.sector_halves) * if self.sector_halves == 2 { 3 } else { 1 };
-        let (Some(start), Some(round)) = (SECTORS.get(sector as usize), PLACES.get(place as usize)) else {
-            return AlphaBeta::default();
-        };
+        Some((SECTORS.get(sector as usize)?, place))
+    }
+
+    /// How far along the edge of the first sector a place is, seen from the centre.
+    #[inline(always)]
+    fn along_edge(&self, place: u32) -> AlphaBeta {
         let part = place as f32 * (1.0 / 6.0);
-        let chord = AlphaBeta { alpha: 1.0 - 0.5 * part, beta: part * (0.5 * crate::frames::SQRT_3) };
-        let round = AlphaBeta { alpha: round.cos, beta: round.sin };
-        (round * self.fundamental_wb - chord * self.edge_wb).turned(*start)
+        AlphaBeta { alpha: 1.0 - 0.5 * part, beta: part * (0.5 * crate::frames::SQRT_3) } * self.edge_wb
     }
 }
 

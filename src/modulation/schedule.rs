@@ -64,6 +64,7 @@ impl Schedule {
     }
 
     /// The mode that this reference should have, given the present one; the dwell time is respected.
+    #[inline(never)]
     pub fn wanted(&mut self, now: Instant, mode: Mode, seen: &Reference, devices: &Devices) -> Mode {
         if let Some(fixed) = self.fixed {
             return fixed;

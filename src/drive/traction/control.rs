@@ -98,6 +98,11 @@ impl<M: Machine> ControlTask<M> {
         self
     }
 
+    /// Other settings than those it was built with, before the first call.
+    pub fn set_up(&mut self, settings: Settings) {
+        self.settings = settings;
+    }
+
     /// The control timer's interrupt. Deadline: one control period after its nominal instant; a missed one is a fault.
     pub fn run(&mut self, port: &mut impl ControlPort, shared: &Shared) {
         let now = self.now;
