@@ -6,6 +6,7 @@
 //! and each half sets its own part anew.
 
 use super::{CarrierPeriod, Devices, Mode};
+use crate::control::six_step_v;
 use crate::frames::limit;
 
 /// 4 sin 70° + 2 of equation (17): three notches at 70°, 90°, 110°.
@@ -17,12 +18,24 @@ pub fn notch_sum(mode: Mode) -> f32 {
     if matches!(mode, Mode::Mid7) { SEVEN_PULSE_SUM } else { THREE_PULSE_SUM }
 }
 
+/// Share of six-step from which square wave needs no notch.
+const WHOLE: f32 = 0.99;
+
 /// β/2 in rad for a fundamental of `voltage_v` (peak phase) on a link of `udc_v`: equations (16) and (17), which
 /// are one: `sin(β/2) = (1 − π u/(2 udc)) / sum`. A voltage beyond six-step gives 0.
-#[inline(never)]
 pub fn half_notch_rad(mode: Mode, voltage_v: f32, udc_v: f32) -> f32 {
     let depth = core::f32::consts::FRAC_PI_2 * voltage_v / udc_v;
     asin_up_to_30_degrees(limit((1.0 - depth) / notch_sum(mode), 0.0, 0.5))
+}
+
+/// Half the zero voltage of a sector, as an angle in rad. Square wave has some only where less voltage is asked for than a link has that
+/// has jumped.
+#[inline(never)]
+pub fn zero_rad(mode: Mode, voltage_v: f32, udc_v: f32) -> f32 {
+    if mode == Mode::Square && voltage_v > WHOLE * six_step_v(udc_v) {
+        return 0.0;
+    }
+    half_notch_rad(mode, voltage_v, udc_v) * mode.notches() as f32
 }
 
 /// asin on 0 ..= 0.5, error below 2e-7 rad (the notch is at most 60° wide, its half 30°).

@@ -17,7 +17,6 @@ mod middle60;
 mod ripple;
 mod schedule;
 
-use crate::control::six_step_v;
 use crate::frames::{AlphaBeta, Angle, limit};
 use crate::time::{Clock, Instant};
 
@@ -313,9 +312,6 @@ struct Plan {
 /// How far a carrier may be from its angle when it gives way to a pattern: 6°, less than half of its shortest half.
 const KEPT_ANGLE: Angle = Angle(71_582_788);
 
-/// Share of six-step from which square wave needs no notch.
-const WHOLE: f32 = 0.99;
-
 /// Halves by which a switch between locked modes is announced.
 const AHEAD: u32 = 2;
 
@@ -511,16 +507,10 @@ impl Modulator {
             return carrier::synchronous(self.next_half, period_ticks, self.zeros(), share, &self.devices);
         }
         let notches = self.mode.notches() as f32;
-        // Square wave has notches only where less voltage is asked for than a link has that has jumped.
-        let whole = self.mode == Mode::Square && seen.voltage_v > WHOLE * six_step_v(seen.udc_v);
-        let own_rad = if whole {
-            0.0
-        } else {
-            middle60::half_notch_rad(self.mode, seen.voltage_v, seen.udc_v) * notches
-        };
+        let own_rad = middle60::zero_rad(self.mode, seen.voltage_v, seen.udc_v);
         self.zero_rad = own_rad;
         let (zero_rad, has_notch) = match self.growth_share() {
-            None => (own_rad, !whole),
+            None => (own_rad, self.mode != Mode::Square || own_rad > 0.0),
             Some((old_rad, share)) => {
                 let zero_rad = old_rad + share * (own_rad - old_rad);
                 (zero_rad, zero_rad > 0.0)

@@ -26,7 +26,7 @@ impl RippleFlux {
             return None;
         }
         let sector_halves = mode.sector_halves();
-        let zero = sector_halves as f32 * middle60::half_notch_rad(mode, voltage_v, udc_v);
+        let zero = 2.0 * middle60::zero_rad(mode, voltage_v, udc_v);
         let per_omega = 1.0 / omega;
         let edge_wb = (2.0 / 3.0) * udc_v * (core::f32::consts::FRAC_PI_3 - zero) * per_omega;
         Some(Self { sector_halves, edge_wb, fundamental_wb: voltage_v * per_omega })
