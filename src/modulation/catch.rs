@@ -28,13 +28,15 @@ pub struct Catch {
 }
 
 impl Catch {
-    /// Begun at pulse angle `pulse` with an EMF as a share of the link's voltage. It ends at the first boundary which the voltage of a carrier can reach.
+    /// Begun at pulse angle `pulse` with an EMF as a share of the link's voltage. It ends at the first boundary which the voltage of a
+    /// carrier can reach.
     pub fn new(mode: Mode, pulse: Angle, emf: AlphaBeta, seen: &Reference) -> Self {
         // Flux times frequency is a voltage, here as a share of the link's.
         let hexagon = RippleFlux::new(mode, seen.voltage_v, seen.udc_v, seen.udc_v);
         let present = AlphaBeta { alpha: emf.beta, beta: -emf.alpha };
         let turn = 2 * mode.carriers();
         let mut end = ((u64::from((pulse + LEAST).0) * u64::from(turn)) >> 32) as u32 + 1;
+        // Each end is 10° farther at least, so the farthest comes within 14.
         loop {
             if end >= turn {
                 end -= turn;
