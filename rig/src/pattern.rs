@@ -6,6 +6,7 @@ use crate::run::CLOCK;
 use crate::trace;
 use anyhow::{Result, bail};
 use std::path::Path;
+use tractive::control::six_step_v;
 use tractive::frames::Angle;
 use tractive::modulation::{Devices, Mode, Modulator, Reference, Schedule, depth_limit};
 use tractive::time::Instant;
@@ -98,7 +99,9 @@ fn reference(wanted: &Wanted, rate: f32, tick: u64) -> Reference {
     let turned = (f64::from(rate) * tick as f64).rem_euclid(4_294_967_296.0);
     let angle = Angle(turned as u64 as u32) - Angle::DEG_90;
     let udc_v = wanted.udc_v as f32;
-    Reference::turning(wanted.voltage_v as f32, angle, rate, Instant(tick as u32), udc_v)
+    // Square wave gives what the link has; asked for less, it would have notches, as after a jump of the link.
+    let voltage_v = if wanted.mode == Mode::Square { six_step_v(udc_v) } else { wanted.voltage_v as f32 };
+    Reference::turning(voltage_v, angle, rate, Instant(tick as u32), udc_v)
 }
 
 /// Levels at `begin`, then every change until `end`.
