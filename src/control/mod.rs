@@ -288,7 +288,8 @@ impl Controller {
         let disturbance = self.disturbance.voltage(ahead(committed.horizon_s + 0.5 * committed.interval_s));
         let until_then = self.disturbance.voltage(ahead(0.5 * committed.horizon_s));
         let target = point.flux;
-        let reference = self.path.step(target, shaping.can_step, clock.control_s());
+        let way = (shaping.can_step, !committed.settled);
+        let reference = self.path.step(target, way, omega, clock.control_s());
         let voltage = current_loop::step(
             &current_loop::Input {
                 angle: measured.angle,
