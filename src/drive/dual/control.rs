@@ -75,6 +75,12 @@ impl<M: Machine> ControlTask<M> {
         self
     }
 
+    /// Other settings than those it was built with, before the first call.
+    pub fn set_up(&mut self, settings: Settings) {
+        self.now = Instant(settings.clock.control_ticks);
+        self.settings = settings;
+    }
+
     /// The control timer's interrupt, at a valley of the carrier. Deadline: [`Settings::deadline_ticks`] after its nominal instant,
     /// when the command must be there; a missed one is a fault.
     pub fn run(&mut self, port: &mut impl DualControlPort, shared: &Shared) {

@@ -59,6 +59,12 @@ impl<M: Machine> PwmTask<M> {
         self
     }
 
+    /// Other settings than those it was built with, before the first call.
+    pub fn set_up(&mut self, settings: Settings) {
+        self.now = Instant(settings.first_peak_ticks());
+        self.settings = settings;
+    }
+
     /// The PWM timer's interrupt, at the carrier's peak. Deadline: the next valley, where the shadow registers take over.
     pub fn run(&mut self, port: &mut impl DualPwmPort, shared: &Shared) {
         let now = self.now;
