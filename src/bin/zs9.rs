@@ -67,7 +67,7 @@ mod firmware {
         let mut board = qemu::Control;
         board.acknowledge();
         if !*IS_SET_UP {
-            TASK.set_up(settings());
+            TASK.set_carrier(CARRIER_TICKS.load(Ordering::Relaxed));
             *IS_SET_UP = true;
         }
         TASK.run(&mut board, &SHARED);
@@ -81,7 +81,7 @@ mod firmware {
         let mut board = qemu::Pwm;
         board.acknowledge();
         if !*IS_SET_UP {
-            TASK.set_up(settings());
+            TASK.set_carrier(CARRIER_TICKS.load(Ordering::Relaxed));
             *IS_SET_UP = true;
         }
         TASK.run(&mut board, &SHARED);

@@ -75,10 +75,9 @@ impl<M: Machine> ControlTask<M> {
         self
     }
 
-    /// Other settings than those it was built with, before the first call.
-    pub fn set_up(&mut self, settings: Settings) {
-        self.now = Instant(settings.clock.control_ticks);
-        self.settings = settings;
+    /// Another carrier period than that of the settings it was built with, in ticks; before the first call.
+    pub fn set_carrier(&mut self, carrier_ticks: u32) {
+        self.settings.carrier_ticks = carrier_ticks;
     }
 
     /// The control timer's interrupt, at a valley of the carrier. Deadline: [`Settings::deadline_ticks`] after its nominal instant,
@@ -136,8 +135,23 @@ impl<M: Machine> ControlTask<M> {
             gates,
             acknowledge: sample.acknowledge,
         });
+        self.tell(&sample, &driven, gates, port, shared);
+    }
+
+    /// The period as the flight recorder and whoever watches see it. Out of line: nothing of it is on the stack while the control
+    /// laws are.
+    #[inline(never)]
+    fn tell(
+        &self,
+        sample: &DualSample,
+        driven: &Driven,
+        gates: Gates,
+        port: &mut impl DualControlPort,
+        shared: &Shared,
+    ) {
+        let now = self.now.before(self.settings.clock.control_ticks);
         if let Some(recorder) = shared.recorder {
-            recorder.record(self.entry(now, &sample, &driven, gates), self.trip.is_some());
+            recorder.record(self.entry(now, sample, driven, gates), self.trip.is_some());
         }
         let [upper, lower] = &self.axes;
         let report = DualReport {
@@ -152,7 +166,7 @@ impl<M: Machine> ControlTask<M> {
             current_a: sample.currents_a.map(|currents| currents.peak()),
             capacitor_v: sample.capacitor_v,
             source_v: sample.source_v,
-            speed_known: known,
+            speed_known: upper.speed_is_known() && lower.speed_is_known(),
             acknowledged: self.acknowledged,
         };
         port.report(now, &report);

@@ -59,10 +59,10 @@ impl<M: Machine> PwmTask<M> {
         self
     }
 
-    /// Other settings than those it was built with, before the first call.
-    pub fn set_up(&mut self, settings: Settings) {
-        self.now = Instant(settings.first_peak_ticks());
-        self.settings = settings;
+    /// Another carrier period than that of the settings it was built with, in ticks; before the first call.
+    pub fn set_carrier(&mut self, carrier_ticks: u32) {
+        self.settings.carrier_ticks = carrier_ticks;
+        self.now = Instant(self.settings.first_peak_ticks());
     }
 
     /// The PWM timer's interrupt, at the carrier's peak. Deadline: the next valley, where the shadow registers take over.
