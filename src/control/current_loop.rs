@@ -4,7 +4,8 @@
 //! current into flux and back. Proportional part: the flux error predicted for the boundary where the voltage begins
 //! to act. Decoupling: `jωψ`. Integral part: [`super::disturbance`].
 
-use super::Committed;
+use super::disturbance::Observer;
+use super::{Committed, Seen};
 use crate::frames::{Angle, Dq, SinCos};
 
 /// What of a voltage command the modulator's mode can follow.
@@ -47,21 +48,25 @@ impl Gains {
     pub const WITHOUT_SIXTH: Self = Self { sixth_turn_rad: 0.0, ..Self::DEFAULT };
 }
 
-pub struct Input<'a> {
-    /// Rotor angle at the sample, and its direction.
-    pub angle: Angle,
-    pub frame: SinCos,
-    /// Measured current and the flux linkage that belongs to it.
-    pub current: Dq,
+/// What lies ahead, without what is wanted.
+pub struct Ahead {
+    /// Flux linkage at the horizon less the pattern's ripple, in the rotor frame there; while the gates are off, as it is.
     pub flux: Dq,
+    /// The disturbance in the interval behind the horizon, in V.
+    disturbance: Dq,
+    /// By how much the voltage there is to change the ripple, in Wb, in the rotor frame in the middle of the interval.
+    led_wb: Option<Dq>,
+    /// The rotor's turn in half the interval.
+    half_turn: SinCos,
+}
+
+pub struct Input<'a> {
+    pub ahead: &'a Ahead,
     pub current_reference: Dq,
     /// Flux linkage of that reference, as [`super::flux_path`] leads there.
     pub reference: Dq,
     pub omega: f32,
     pub committed: &'a Committed,
-    /// Disturbance in the half that begins at the horizon, and on the way there.
-    pub disturbance: Dq,
-    pub disturbance_until_then: Dq,
     pub resistance: f32,
     pub voltage_limit_v: f32,
 }
@@ -81,8 +86,8 @@ const TRANSIENT_REACH: f32 = 1.154_7;
 /// One step of the loop.
 pub fn step(input: &Input, gains: &Gains) -> Output {
     let reference = input.reference;
-    let predicted = predicted_flux(input);
-    let drop = input.current_reference * input.resistance - input.disturbance;
+    let predicted = input.ahead.flux;
+    let drop = input.current_reference * input.resistance - input.ahead.disturbance;
     let steady = reference.j() * input.omega + drop;
     let limit = input.voltage_limit_v;
     match input.committed.follows {
@@ -117,37 +122,51 @@ pub fn step(input: &Input, gains: &Gains) -> Output {
 fn mean_voltage(input: &Input, reference: Dq, predicted: Dq, gains: &Gains) -> Dq {
     let committed = input.committed;
     let x = 0.5 * input.omega * committed.interval_s;
-    let half_turn = Angle::within_half_turn(x).sin_cos();
+    let half_turn = input.ahead.half_turn;
     let error = predicted - reference * (1.0 + x * x * (1.0 / 6.0));
     let remaining = 1.0 - gains.carrier;
     let chord = reference.j() * (2.0 * x)
         + error * ((remaining - 1.0) * half_turn.cos)
         + error.j() * ((remaining + 1.0) * half_turn.sin);
-    let led = match &committed.ripple {
+    let led = match input.ahead.led_wb {
         None => chord,
-        Some(ripple) => {
-            let middle = Angle::within_half_turn(input.omega * committed.horizon_s + x);
-            chord + ripple.led_wb.park((input.angle + middle).sin_cos())
-        }
+        Some(led_wb) => chord + led_wb,
     };
     led * (1.0 / committed.interval_s)
 }
 
-/// Flux linkage at the horizon less the pattern's ripple, in the rotor frame there.
-fn predicted_flux(input: &Input) -> Dq {
-    let committed = input.committed;
-    let Some(volt_seconds) = committed.volt_seconds else {
-        return input.flux;
-    };
-    let moved = match &committed.ripple {
-        None => volt_seconds,
-        Some(ripple) => volt_seconds - ripple.at_horizon_wb,
-    };
+/// Looks ahead from what is seen now.
+#[inline(always)]
+pub fn ahead(
+    seen: &Seen,
+    omega: f32,
+    resistance: f32,
+    committed: &Committed,
+    disturbance: &Observer,
+) -> Ahead {
+    let half_turn = Angle::within_half_turn(0.5 * omega * committed.interval_s).sin_cos();
     // By half the way to the horizon, and by that once more.
-    let half_way = Angle::within_half_turn(0.5 * input.omega * committed.horizon_s).sin_cos();
-    let drop = (input.disturbance_until_then - input.current * input.resistance) * committed.horizon_s;
-    let in_the_middle = input.flux.turned(half_way.back()) + moved.park(input.frame.turned(half_way)) + drop;
-    in_the_middle.turned(half_way.back())
+    let half_way = Angle::within_half_turn(0.5 * omega * committed.horizon_s).sin_cos();
+    let on_the_way = seen.frame.turned(half_way);
+    let in_the_interval = on_the_way.turned(half_way).turned(half_turn);
+    let flux = match committed.volt_seconds {
+        None => seen.flux,
+        Some(volt_seconds) => {
+            let moved = match &committed.ripple {
+                None => volt_seconds,
+                Some(ripple) => volt_seconds - ripple.at_horizon_wb,
+            };
+            let drop = (disturbance.voltage(on_the_way) - seen.current * resistance) * committed.horizon_s;
+            let back = half_way.back();
+            (seen.flux.turned(back) + moved.park(on_the_way) + drop).turned(back)
+        }
+    };
+    Ahead {
+        flux,
+        disturbance: disturbance.voltage(in_the_interval),
+        led_wb: committed.ripple.as_ref().map(|ripple| ripple.led_wb.park(in_the_interval)),
+        half_turn,
+    }
 }
 
 /// The vector, no longer than `limit_v`, its direction kept.

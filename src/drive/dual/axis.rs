@@ -30,7 +30,7 @@ pub struct Axis {
     watch: FrozenWatch,
     /// Electrical speed behind a filter, in rad/s.
     slow: f32,
-    /// Volt-seconds of the period that began at the last sample, per volt of link, in s; and the link's voltage there.
+    /// Mean voltage of the period that began at the last sample, per volt of link; and the link's voltage there.
     acting: Option<(AlphaBeta, f32)>,
 }
 
@@ -51,7 +51,7 @@ pub struct AxisOutput {
     pub command: MotorCommand,
     pub torque_nm: f32,
     pub weakening: bool,
-    /// Electrical power drawn now, in W.
+    /// Electrical power drawn from now on, in W.
     pub power_w: f32,
 }
 
@@ -119,18 +119,17 @@ impl Axis {
     pub fn step(&mut self, input: &AxisInput, settings: &Settings, tables: &Tables) -> AxisOutput {
         let omega = self.controller.omega();
         let period_s = settings.clock.control_s();
-        let share = input.applied.map(|share| self.volt_seconds_share(&share, settings));
-        let before = core::mem::replace(&mut self.acting, share.map(|share| (share, input.link_v)));
+        let begins = input.applied.map(|share| self.mean_per_volt(&share, settings));
+        let before = core::mem::replace(&mut self.acting, begins.map(|mean| (mean, input.link_v)));
         let boundary = Boundary {
-            currents_a: input.measured.currents_a,
-            age_s: 0.0,
+            earlier: None,
             // The link moves along a straight line in between.
-            volt_seconds: before.map(|(share, link_v)| share * (0.5 * (link_v + input.link_v))),
+            volt_seconds: before.map(|(mean, link_v)| mean * (0.5 * (link_v + input.link_v) * period_s)),
             length_s: period_s,
         };
         let committed = Committed {
             horizon_s: period_s,
-            volt_seconds: share.map(|share| share * input.link_v),
+            volt_seconds: begins.map(|mean| mean * (input.link_v * period_s)),
             // A period is its own mirror image, so at its ends the ripple is nothing.
             ripple: None,
             interval_s: period_s,
@@ -160,7 +159,10 @@ impl Axis {
             },
             torque_nm: output.torque_nm,
             weakening: output.point.region != Region::Mtpa,
-            power_w: power_w(input),
+            // Of the voltage that begins to act now, as the modulator really gives it, at the measured current.
+            power_w: begins.map_or(0.0, |mean| {
+                1.5 * input.link_v * mean.dot(input.measured.currents_a.clarke())
+            }),
         }
     }
 
@@ -186,28 +188,20 @@ impl Axis {
         }
     }
 
-    /// Volt-seconds of a control period per volt of link, in s: its carrier periods, the first of which is known, each turned
-    /// on by one carrier period.
-    fn volt_seconds_share(&self, share: &MotorShare, settings: &Settings) -> AlphaBeta {
+    /// Mean voltage of a control period per volt of link: of its carrier periods, the first of which is known, each turned on by one
+    /// carrier period.
+    fn mean_per_volt(&self, share: &MotorShare, settings: &Settings) -> AlphaBeta {
+        let carriers = settings.carriers_per_control();
         let carrier_s = settings.clock.seconds(settings.carrier_ticks as i32);
         let turn = Angle::within_half_turn(self.controller.omega() * carrier_s);
         let (mut sum, mut angle) = (AlphaBeta::default(), share.angle);
-        for _ in 0..settings.carriers_per_control() {
+        for _ in 0..carriers {
             let direction = angle.sin_cos();
             sum = sum + AlphaBeta { alpha: direction.cos, beta: direction.sin };
             angle = angle + turn;
         }
-        sum * (0.5 * share.depth * carrier_s)
+        sum * (0.5 * share.depth / carriers as f32)
     }
-}
-
-/// The power of the voltage that begins to act now, as the modulator really gives it, at the measured current, in W.
-fn power_w(input: &AxisInput) -> f32 {
-    let Some(MotorShare { depth, angle }) = input.applied else {
-        return 0.0;
-    };
-    let current = input.measured.currents_a.clarke().park(angle.sin_cos());
-    0.75 * depth * input.link_v * current.d
 }
 
 /// Phase currents and speed of one motor.
