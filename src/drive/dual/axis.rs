@@ -189,18 +189,16 @@ impl Axis {
     }
 
     /// Mean voltage of a control period per volt of link: of its carrier periods, the first of which is known, each turned on by one
-    /// carrier period.
+    /// carrier period. Together they have the direction of their middle, and the chord's length instead of the arc's: its square
+    /// term is short of it by less than 3e-6 at 400 Hz.
     fn mean_per_volt(&self, share: &MotorShare, settings: &Settings) -> AlphaBeta {
-        let carriers = settings.carriers_per_control();
+        let (omega, control_s) = (self.controller.omega(), settings.clock.control_s());
         let carrier_s = settings.clock.seconds(settings.carrier_ticks as i32);
-        let turn = Angle::within_half_turn(self.controller.omega() * carrier_s);
-        let (mut sum, mut angle) = (AlphaBeta::default(), share.angle);
-        for _ in 0..carriers {
-            let direction = angle.sin_cos();
-            sum = sum + AlphaBeta { alpha: direction.cos, beta: direction.sin };
-            angle = angle + turn;
-        }
-        sum * (0.5 * share.depth / carriers as f32)
+        let to_middle = 0.5 * (control_s - carrier_s);
+        let between = omega * omega * (control_s * control_s - carrier_s * carrier_s);
+        let middle = (share.angle + Angle::within_half_turn(omega * to_middle)).sin_cos();
+        let length = 0.5 * share.depth * (1.0 - between * (1.0 / 24.0));
+        AlphaBeta { alpha: middle.cos, beta: middle.sin } * length
     }
 }
 
