@@ -60,8 +60,8 @@ impl Observer {
     pub fn step(&mut self, input: &Input, gains: &Gains) {
         let Input { boundary, seen, omega, .. } = *input;
         let flux = seen.flux.unpark(seen.frame);
+        let half_turn = Angle::within_half_turn(0.5 * omega * boundary.length_s).sin_cos();
         if let (Some(last), Some(volt_seconds)) = (self.last_flux, boundary.volt_seconds) {
-            let half_turn = Angle::within_half_turn(0.5 * omega * boundary.length_s).sin_cos();
             let middle = seen.frame.turned(half_turn.back());
             let unexplained = (flux - last - volt_seconds).park(middle) * (1.0 / boundary.length_s);
             self.learn(unexplained + seen.current * input.resistance, middle, input.sixth, gains.observer);
@@ -69,6 +69,7 @@ impl Observer {
         self.last_flux = Some(flux);
     }
 
+    #[inline(always)]
     fn learn(&mut self, voltage: Dq, rotor: SinCos, follow_sixth: bool, gain: f32) {
         self.follows_sixth = follow_sixth;
         if !follow_sixth {
