@@ -49,10 +49,21 @@ pub struct AxisInput<'a> {
 /// A motor's step.
 pub struct AxisOutput {
     pub command: MotorCommand,
+    /// What is told of it, as in [`DualReport`](super::DualReport).
     pub torque_nm: f32,
     pub weakening: bool,
     /// Electrical power drawn from now on, in W.
     pub power_w: f32,
+}
+
+impl AxisOutput {
+    /// While no pulses are made.
+    pub const NOTHING: Self = Self {
+        command: MotorCommand { voltage_v: 0.0, angle: Angle::ZERO, rate: 0.0 },
+        torque_nm: 0.0,
+        weakening: false,
+        power_w: 0.0,
+    };
 }
 
 impl Axis {
