@@ -299,8 +299,10 @@ impl<M: Machine> ControlTask<M> {
         let step = |axis: &mut Axis, measured, demand, speed_torque_nm, applied| {
             axis.step(&AxisInput { measured, demand, speed_torque_nm, applied, link_v }, settings, tables)
         };
-        self.driven.motors = [step(first, m1, d1, l1, a1), step(second, m2, d2, l2, a2)];
-        let motors = &self.driven.motors;
+        let motors = &mut self.driven.motors;
+        let [o1, o2] = motors;
+        *o1 = step(first, m1, d1, l1, a1);
+        *o2 = step(second, m2, d2, l2, a2);
         let link = ZSourceInput {
             capacitor_v: sample.capacitor_v,
             inductor_a: sample.inductor_a,
