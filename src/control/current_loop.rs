@@ -149,6 +149,7 @@ pub fn ahead(
     let half_way = Angle::within_half_turn(0.5 * omega * committed.horizon_s).sin_cos();
     let on_the_way = seen.frame.turned(half_way);
     let in_the_interval = on_the_way.turned(half_way).turned(half_turn);
+    let [until_then, behind] = disturbance.voltages([on_the_way, in_the_interval]);
     let flux = match committed.volt_seconds {
         None => seen.flux,
         Some(volt_seconds) => {
@@ -156,14 +157,14 @@ pub fn ahead(
                 None => volt_seconds,
                 Some(ripple) => volt_seconds - ripple.at_horizon_wb,
             };
-            let drop = (disturbance.voltage(on_the_way) - seen.current * resistance) * committed.horizon_s;
+            let drop = (until_then - seen.current * resistance) * committed.horizon_s;
             let back = half_way.back();
             (seen.flux.turned(back) + moved.park(on_the_way) + drop).turned(back)
         }
     };
     Ahead {
         flux,
-        disturbance: disturbance.voltage(in_the_interval),
+        disturbance: behind,
         led_wb: committed.ripple.as_ref().map(|ripple| ripple.led_wb.park(in_the_interval)),
         half_turn,
     }

@@ -42,13 +42,13 @@ impl Observer {
         self.mean
     }
 
-    /// The disturbance with the rotor at the angle of a direction, in V.
+    /// The disturbance with the rotor at the angles of two directions, in V.
     #[inline]
-    pub fn voltage(&self, rotor: SinCos) -> Dq {
+    pub fn voltages(&self, rotor: [SinCos; 2]) -> [Dq; 2] {
         if !self.follows_sixth {
-            return self.mean;
+            return [self.mean; 2];
         }
-        self.at(rotor.sixfold())
+        rotor.map(|rotor| self.at(rotor.sixfold()))
     }
 
     fn at(&self, sixth: SinCos) -> Dq {

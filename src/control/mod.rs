@@ -122,8 +122,8 @@ pub struct Input<'a> {
     pub measured: &'a Measurements,
     /// The operator's demand.
     pub demand: &'a Demand,
-    /// Where the link ends it.
-    pub window: &'a LinkWindow,
+    /// Where the link ends it; `None`: nowhere.
+    pub window: Option<&'a LinkWindow>,
     /// What the modulator will do meanwhile.
     pub committed: &'a Committed,
     /// The carrier boundary that has passed since the last step, if one has.

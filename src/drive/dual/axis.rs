@@ -3,7 +3,7 @@
 use super::{MotorCommand, MotorShare, Settings};
 use crate::board::MotorDemand;
 use crate::control::{
-    Boundary, Committed, Controller, Demand, Follows, Input, Law, LinkWindow, Measurements, Region,
+    Boundary, Committed, Controller, Demand, Follows, Input, Law, Measurements, Region,
     SpeedInput, SpeedLoop,
 };
 use crate::frames::{AlphaBeta, Angle};
@@ -157,7 +157,7 @@ impl Axis {
         let control = Input {
             measured: input.measured,
             demand: &demand,
-            window: &LinkWindow::OPEN,
+            window: None,
             committed: &committed,
             boundary: Some(&boundary),
         };
