@@ -6,7 +6,7 @@
 
 use super::disturbance::Observer;
 use super::{Committed, Seen};
-use crate::frames::{Angle, Dq, SinCos};
+use crate::frames::{Angle, Dq, SinCos, root};
 
 /// What of a voltage command the modulator's mode can follow.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -90,26 +90,15 @@ pub fn step(input: &Input, gains: &Gains) -> Output {
     let drop = input.current_reference * input.resistance - input.ahead.disturbance;
     let steady = reference.j() * input.omega + drop;
     let limit = input.voltage_limit_v;
-    match input.committed.follows {
-        Follows::Mean => {
-            let regulated = mean_voltage(input, reference, predicted, gains) + drop;
-            Output {
-                voltage: shortened(regulated, limit * TRANSIENT_REACH),
-                steady: shortened(steady, limit),
-            }
-        }
-        Follows::Fundamental => {
-            let gain = if input.committed.settled { gains.pattern_rad_s } else { 0.0 };
-            let regulated = steady - (predicted - reference) * gain;
-            Output { voltage: shortened(regulated, limit), steady: shortened(steady, limit) }
-        }
-        Follows::Angle => {
-            let damping =
-                if input.committed.settled { gains.square_damping * input.omega.abs() } else { 0.0 };
-            let regulated = steady - (predicted - reference) * damping;
-            Output { voltage: lengthened(regulated, limit), steady: lengthened(steady, limit) }
-        }
-    }
+    let towards = |gain: f32| steady - (predicted - reference) * gain;
+    let settled = |gain: f32| if input.committed.settled { gain } else { 0.0 };
+    let (regulated, reach) = match input.committed.follows {
+        Follows::Mean => (mean_voltage(input, reference, predicted, gains) + drop, limit * TRANSIENT_REACH),
+        Follows::Fundamental => (towards(settled(gains.pattern_rad_s)), limit),
+        Follows::Angle => (towards(settled(gains.square_damping * input.omega.abs())), limit),
+    };
+    let fills = input.committed.follows == Follows::Angle;
+    Output { voltage: fitted(regulated, reach, fills), steady: fitted(steady, limit, fills) }
 }
 
 /// The mean voltage of a carrier half that moves the flux from where it is predicted to where it should be, without the
@@ -135,16 +124,16 @@ fn mean_voltage(input: &Input, reference: Dq, predicted: Dq, gains: &Gains) -> D
     led * (1.0 / committed.interval_s)
 }
 
-/// Looks ahead from what is seen now.
+/// Looks ahead from what is seen now; `half_turn` as in [`Ahead`].
 #[inline(always)]
 pub fn ahead(
     seen: &Seen,
     omega: f32,
-    resistance: f32,
+    half_turn: SinCos,
     committed: &Committed,
     disturbance: &Observer,
+    resistance: f32,
 ) -> Ahead {
-    let half_turn = Angle::within_half_turn(0.5 * omega * committed.interval_s).sin_cos();
     // By half the way to the horizon, and by that once more.
     let half_way = Angle::within_half_turn(0.5 * omega * committed.horizon_s).sin_cos();
     let on_the_way = seen.frame.turned(half_way);
@@ -170,13 +159,9 @@ pub fn ahead(
     }
 }
 
-/// The vector, no longer than `limit_v`, its direction kept.
-fn shortened(voltage: Dq, limit_v: f32) -> Dq {
-    if voltage.squared() > limit_v * limit_v { lengthened(voltage, limit_v) } else { voltage }
-}
-
-/// The vector's direction with a given length; the zero vector stays.
-fn lengthened(voltage: Dq, length_v: f32) -> Dq {
-    let length = voltage.length();
-    if length > 0.0 { voltage * (length_v / length) } else { voltage }
+/// The vector, no longer than `limit_v`, its direction kept; where it `fills` that, neither shorter. The zero vector stays.
+fn fitted(voltage: Dq, limit_v: f32, fills: bool) -> Dq {
+    let squared = voltage.squared();
+    let exceeds = squared > limit_v * limit_v;
+    if exceeds || (fills && squared > 0.0) { voltage * (limit_v / root(squared)) } else { voltage }
 }

@@ -272,6 +272,7 @@ impl Controller {
         let Law { gains, clock, tables } = *law;
         let omega = self.speed.omega();
         let resistance = tables.ratings.stator_resistance_ohm;
+        let half_turn = Angle::within_half_turn(0.5 * omega * committed.interval_s).sin_cos();
         // First of all: nothing else is to be kept meanwhile.
         let earlier = boundary.and_then(|boundary| boundary.earlier);
         if let (Some(boundary), Some(earlier)) = (boundary, earlier) {
@@ -284,7 +285,7 @@ impl Controller {
         }
         let scale = self.map_error.scale();
         let measured_nm = self::torque_nm(tables, seen.flux, seen.current) * scale;
-        let ahead = current_loop::ahead(&seen, omega, resistance, committed, &self.disturbance);
+        let ahead = current_loop::ahead(&seen, omega, half_turn, committed, &self.disturbance, resistance);
         let frame = seen.frame;
         let shaping = demand::Input {
             demand,
@@ -356,8 +357,7 @@ impl Controller {
         let turn_rad = 6.0 * omega.abs() * boundary.length_s;
         let sixth = follows == Follows::Mean && turn_rad < law.gains.sixth_turn_rad;
         let resistance = law.tables.ratings.stator_resistance_ohm;
-        self.disturbance
-            .step(&disturbance::Input { boundary, seen, omega, resistance, sixth }, law.gains);
+        self.disturbance.step(&disturbance::Input { boundary, seen, omega, resistance, sixth }, law.gains);
     }
 }
 

@@ -107,13 +107,7 @@ struct Weakened {
 /// The point on the circle of flux linkage that the voltage allows, for either sign of torque. From (3) squared,
 /// `u² = (ωψ)² + 2 R ω T/(1.5 n_p) + R² i²`, all of it taken times 1/ω². Inlined, so that the compiler knows the tables.
 #[inline(always)]
-fn weakened(
-    torque_nm: f32,
-    mtpa_squared: f32,
-    omega: f32,
-    voltage_v: f32,
-    tables: &Tables,
-) -> Weakened {
+fn weakened(torque_nm: f32, mtpa_squared: f32, omega: f32, voltage_v: f32, tables: &Tables) -> Weakened {
     let Weakening { currents, torque, flux_knee_wb, share_knee } = &tables.weakening;
     let ratings = &tables.ratings;
     let factor = 1.5 * ratings.pole_pairs;

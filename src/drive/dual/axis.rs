@@ -3,8 +3,7 @@
 use super::{MotorCommand, MotorShare, Settings};
 use crate::board::MotorDemand;
 use crate::control::{
-    Boundary, Committed, Controller, Demand, Follows, Input, Law, Measurements, Region,
-    SpeedInput, SpeedLoop,
+    Boundary, Committed, Controller, Demand, Follows, Input, Law, Measurements, Region, SpeedInput, SpeedLoop,
 };
 use crate::frames::{AlphaBeta, Angle};
 use crate::machine::Tables;
@@ -171,9 +170,8 @@ impl Axis {
             torque_nm: output.torque_nm,
             weakening: output.point.region != Region::Mtpa,
             // Of the voltage that begins to act now, as the modulator really gives it, at the measured current.
-            power_w: begins.map_or(0.0, |mean| {
-                1.5 * input.link_v * mean.dot(input.measured.currents_a.clarke())
-            }),
+            power_w: begins
+                .map_or(0.0, |mean| 1.5 * input.link_v * mean.dot(input.measured.currents_a.clarke())),
         }
     }
 

@@ -146,13 +146,7 @@ impl<M: Machine> ControlTask<M> {
     /// The period as the flight recorder and whoever watches see it. Out of line: nothing of it is on the stack while the control
     /// laws are.
     #[inline(never)]
-    fn tell(
-        &self,
-        sample: &DualSample,
-        gates: Gates,
-        port: &mut impl DualControlPort,
-        shared: &Shared,
-    ) {
+    fn tell(&self, sample: &DualSample, gates: Gates, port: &mut impl DualControlPort, shared: &Shared) {
         let now = self.now.before(self.settings.clock.control_ticks);
         if let Some(recorder) = shared.recorder {
             recorder.record(self.entry(now, sample, gates), self.trip.is_some());

@@ -178,10 +178,7 @@ impl Applied {
         }
         let passed = if used == Some(self.before) { self.passed } else { None };
         Some(Boundary {
-            earlier: Some(Earlier {
-                currents_a: self.currents_a,
-                age_s: clock.seconds(now.since(self.at)),
-            }),
+            earlier: Some(Earlier { currents_a: self.currents_a, age_s: clock.seconds(now.since(self.at)) }),
             volt_seconds: passed.map(|ticks| ticks * (udc_v * clock.tick_s)),
             length_s: clock.seconds(self.at.since(self.before)),
         })
