@@ -52,16 +52,13 @@ impl Gains {
 pub struct Ahead {
     /// Flux linkage at the horizon less the pattern's ripple, in the rotor frame there; while the gates are off, as it is.
     pub flux: Dq,
-    /// The disturbance in the interval behind the horizon, in V.
-    disturbance: Dq,
-    /// By how much the voltage there is to change the ripple, in Wb, in the rotor frame in the middle of the interval.
-    led_wb: Option<Dq>,
-    /// The rotor's turn in half the interval.
-    half_turn: SinCos,
+    /// That frame.
+    frame: SinCos,
 }
 
 pub struct Input<'a> {
     pub ahead: &'a Ahead,
+    pub disturbance: &'a Observer,
     pub current_reference: Dq,
     /// Flux linkage of that reference, as [`super::flux_path`] leads there.
     pub reference: Dq,
@@ -86,16 +83,21 @@ const TRANSIENT_REACH: f32 = 1.154_7;
 /// One step of the loop.
 pub fn step(input: &Input, gains: &Gains) -> Output {
     let reference = input.reference;
-    let predicted = input.ahead.flux;
-    let drop = input.current_reference * input.resistance - input.ahead.disturbance;
-    let steady = reference.j() * input.omega + drop;
+    let resistive = input.current_reference * input.resistance;
+    let steady = reference.j() * input.omega + resistive;
     let limit = input.voltage_limit_v;
-    let towards = |gain: f32| steady - (predicted - reference) * gain;
-    let settled = |gain: f32| if input.committed.settled { gain } else { 0.0 };
-    let (regulated, reach) = match input.committed.follows {
-        Follows::Mean => (mean_voltage(input, reference, predicted, gains) + drop, limit * TRANSIENT_REACH),
-        Follows::Fundamental => (towards(settled(gains.pattern_rad_s)), limit),
-        Follows::Angle => (towards(settled(gains.square_damping * input.omega.abs())), limit),
+    let towards = |gain: f32| {
+        let gain = if input.committed.settled { gain } else { 0.0 };
+        let steady = steady - input.disturbance.mean();
+        (steady - (input.ahead.flux - reference) * gain, steady, limit)
+    };
+    let (regulated, steady, reach) = match input.committed.follows {
+        Follows::Mean => {
+            let (mean, disturbance) = mean_voltage(input, reference, gains);
+            (mean + resistive - disturbance, steady - disturbance, limit * TRANSIENT_REACH)
+        }
+        Follows::Fundamental => towards(gains.pattern_rad_s),
+        Follows::Angle => towards(gains.square_damping * input.omega.abs()),
     };
     let fills = input.committed.follows == Follows::Angle;
     Output { voltage: fitted(regulated, reach, fills), steady: fitted(steady, limit, fills) }
@@ -107,38 +109,34 @@ pub fn step(input: &Input, gains: &Gains) -> Output {
 /// Voltages that hold for a half move the flux along chords, so at the boundaries it stands outside the circle of its
 /// fundamental by x/sin x. The error e goes to (1 − g) e at the half's end, both in the rotor frame that turns by 2x
 /// meanwhile; all is seen from the frame in the middle of the half. Where a pattern gives way to another, the flux is
-/// led from the ripple of the one to the ripple of the other.
-fn mean_voltage(input: &Input, reference: Dq, predicted: Dq, gains: &Gains) -> Dq {
+/// led from the ripple of the one to the ripple of the other. With it comes the disturbance in the middle of the half.
+fn mean_voltage(input: &Input, reference: Dq, gains: &Gains) -> (Dq, Dq) {
     let committed = input.committed;
     let x = 0.5 * input.omega * committed.interval_s;
-    let half_turn = input.ahead.half_turn;
-    let error = predicted - reference * (1.0 + x * x * (1.0 / 6.0));
+    let half_turn = Angle::within_half_turn(x).sin_cos();
+    let middle = input.ahead.frame.turned(half_turn);
+    let error = input.ahead.flux - reference * (1.0 + x * x * (1.0 / 6.0));
     let remaining = 1.0 - gains.carrier;
     let chord = reference.j() * (2.0 * x)
         + error * ((remaining - 1.0) * half_turn.cos)
         + error.j() * ((remaining + 1.0) * half_turn.sin);
-    let led = match input.ahead.led_wb {
+    let led = match &committed.ripple {
         None => chord,
-        Some(led_wb) => chord + led_wb,
+        Some(ripple) => chord + ripple.led_wb.park(middle),
     };
-    led * (1.0 / committed.interval_s)
+    (led * (1.0 / committed.interval_s), input.disturbance.voltage(middle))
 }
 
-/// Looks ahead from what is seen now; `half_turn` as in [`Ahead`].
+/// Looks ahead from what is seen now; `half_way` is the rotor's turn in half the time to the horizon.
 #[inline(always)]
 pub fn ahead(
     seen: &Seen,
-    omega: f32,
-    half_turn: SinCos,
+    half_way: SinCos,
     committed: &Committed,
     disturbance: &Observer,
     resistance: f32,
 ) -> Ahead {
-    // By half the way to the horizon, and by that once more.
-    let half_way = Angle::within_half_turn(0.5 * omega * committed.horizon_s).sin_cos();
     let on_the_way = seen.frame.turned(half_way);
-    let in_the_interval = on_the_way.turned(half_way).turned(half_turn);
-    let [until_then, behind] = disturbance.voltages([on_the_way, in_the_interval]);
     let flux = match committed.volt_seconds {
         None => seen.flux,
         Some(volt_seconds) => {
@@ -146,17 +144,13 @@ pub fn ahead(
                 None => volt_seconds,
                 Some(ripple) => volt_seconds - ripple.at_horizon_wb,
             };
-            let drop = (until_then - seen.current * resistance) * committed.horizon_s;
+            let unexplained = disturbance.voltage(on_the_way) - seen.current * resistance;
+            // By half the way, and by that once more.
             let back = half_way.back();
-            (seen.flux.turned(back) + moved.park(on_the_way) + drop).turned(back)
+            (seen.flux.turned(back) + moved.park(on_the_way) + unexplained * committed.horizon_s).turned(back)
         }
     };
-    Ahead {
-        flux,
-        disturbance: behind,
-        led_wb: committed.ripple.as_ref().map(|ripple| ripple.led_wb.park(in_the_interval)),
-        half_turn,
-    }
+    Ahead { flux, frame: on_the_way.turned(half_way) }
 }
 
 /// The vector, no longer than `limit_v`, its direction kept; where it `fills` that, neither shorter. The zero vector stays.

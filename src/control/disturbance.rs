@@ -42,13 +42,13 @@ impl Observer {
         self.mean
     }
 
-    /// The disturbance with the rotor at the angles of two directions, in V.
+    /// The disturbance with the rotor at the angle of a direction, in V.
     #[inline]
-    pub fn voltages(&self, rotor: [SinCos; 2]) -> [Dq; 2] {
+    pub fn voltage(&self, rotor: SinCos) -> Dq {
         if !self.follows_sixth {
-            return [self.mean; 2];
+            return self.mean;
         }
-        rotor.map(|rotor| self.at(rotor.sixfold()))
+        self.at(rotor.sixfold())
     }
 
     fn at(&self, sixth: SinCos) -> Dq {

@@ -272,7 +272,7 @@ impl Controller {
         let Law { gains, clock, tables } = *law;
         let omega = self.speed.omega();
         let resistance = tables.ratings.stator_resistance_ohm;
-        let half_turn = Angle::within_half_turn(0.5 * omega * committed.interval_s).sin_cos();
+        let half_way = Angle::within_half_turn(0.5 * omega * committed.horizon_s).sin_cos();
         // First of all: nothing else is to be kept meanwhile.
         let earlier = boundary.and_then(|boundary| boundary.earlier);
         if let (Some(boundary), Some(earlier)) = (boundary, earlier) {
@@ -285,7 +285,7 @@ impl Controller {
         }
         let scale = self.map_error.scale();
         let measured_nm = self::torque_nm(tables, seen.flux, seen.current) * scale;
-        let ahead = current_loop::ahead(&seen, omega, half_turn, committed, &self.disturbance, resistance);
+        let ahead = current_loop::ahead(&seen, half_way, committed, &self.disturbance, resistance);
         let frame = seen.frame;
         let shaping = demand::Input {
             demand,
@@ -317,6 +317,7 @@ impl Controller {
         let voltage = current_loop::step(
             &current_loop::Input {
                 ahead: &ahead,
+                disturbance: &self.disturbance,
                 current_reference: point.current,
                 reference,
                 omega,
