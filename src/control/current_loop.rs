@@ -6,7 +6,7 @@
 
 use super::disturbance::Observer;
 use super::{Committed, Seen};
-use crate::frames::{Angle, Dq, SinCos, root};
+use crate::frames::{Angle, Dq, SinCos};
 
 /// What of a voltage command the modulator's mode can follow.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -71,9 +71,15 @@ pub struct Input<'a> {
 /// Voltages for the carrier half that begins at the horizon, in V, in the rotor frame that turns with it.
 pub struct Output {
     /// To be made; limited.
-    pub voltage: Dq,
+    pub voltage: Voltage,
     /// Of the operating point alone; limited likewise.
-    pub steady: Dq,
+    pub steady: Voltage,
+}
+
+/// A vector and its length, in V.
+pub struct Voltage {
+    pub vector: Dq,
+    pub length_v: f32,
 }
 
 /// What a carrier gives at most, in the corners of its hexagon, over what it gives in every direction: 2/√3. Transients may
@@ -100,7 +106,10 @@ pub fn step(input: &Input, gains: &Gains) -> Output {
         Follows::Angle => towards(gains.square_damping * input.omega.abs()),
     };
     let fills = input.committed.follows == Follows::Angle;
-    Output { voltage: fitted(regulated, reach, fills), steady: fitted(steady, limit, fills) }
+    Output {
+        voltage: Voltage::fitted(regulated, reach, fills),
+        steady: Voltage::fitted(steady, limit, fills),
+    }
 }
 
 /// The mean voltage of a carrier half that moves the flux from where it is predicted to where it should be, without the
@@ -153,9 +162,16 @@ pub fn ahead(
     Ahead { flux, frame: on_the_way.turned(half_way) }
 }
 
-/// The vector, no longer than `limit_v`, its direction kept; where it `fills` that, neither shorter. The zero vector stays.
-fn fitted(voltage: Dq, limit_v: f32, fills: bool) -> Dq {
-    let squared = voltage.squared();
-    let exceeds = squared > limit_v * limit_v;
-    if exceeds || (fills && squared > 0.0) { voltage * (limit_v / root(squared)) } else { voltage }
+impl Voltage {
+    /// The vector, no longer than `limit_v`, its direction kept; where it `fills` that, neither shorter. The zero vector stays.
+    #[inline(always)]
+    fn fitted(vector: Dq, limit_v: f32, fills: bool) -> Self {
+        let length_v = vector.length();
+        let fits = length_v <= limit_v && !fills;
+        if fits || length_v == 0.0 {
+            Self { vector, length_v }
+        } else {
+            Self { vector: vector * (limit_v / length_v), length_v: limit_v }
+        }
+    }
 }

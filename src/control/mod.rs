@@ -333,13 +333,13 @@ impl Controller {
         }
         let regulates_by_pulses = committed.follows == Follows::Mean;
         let catches = committed.volt_seconds.is_none() && !regulates_by_pulses;
-        let vector = if catches { ahead.flux.j() * omega } else { voltage };
+        let vector = if catches { ahead.flux.j() * omega } else { voltage.vector };
         Output {
             voltage: VoltageVector {
-                voltage_v: voltage.length(),
+                voltage_v: voltage.length_v,
                 vector: vector.unpark(frame),
-                carrier: if regulates_by_pulses { steady } else { voltage }.unpark(frame),
-                steady_v: steady.length(),
+                carrier: if regulates_by_pulses { steady.vector } else { voltage.vector }.unpark(frame),
+                steady_v: steady.length_v,
                 omega,
                 depth: point.depth,
             },
