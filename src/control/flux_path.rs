@@ -9,8 +9,8 @@ use crate::frames::Dq;
 /// Rate at which the reference turns at most, in rad/s, against the rotor.
 const TURN_RAD_S: f32 = 120.0;
 
-/// Part of its way that it turns in a radian of the stator's turn while a pattern grows out of another: the load angle changes with
-/// the flux, which takes four sectors.
+/// Part of its way that it turns in a radian of the stator's turn while a pattern and square wave take over from each other: the voltage,
+/// and so the flux, is given, and the load angle changes with it, which takes four sectors.
 const GROWING_PER_RAD: f32 = 0.7;
 
 #[derive(Clone, Copy, Debug)]
@@ -23,7 +23,7 @@ impl FluxPath {
         Self { last: None }
     }
 
-    /// The reference on its way to `target`; at once there where a carrier follows (`can_step`), slowly while a pattern grows (`growing`)
+    /// The reference on its way to `target`; at once there where a carrier follows (`can_step`), slowly while a pattern grows with a given voltage (`growing`)
     /// at a stator frequency of `omega` in rad/s.
     pub fn step(&mut self, target: Dq, (can_step, growing): (bool, bool), omega: f32, period_s: f32) -> Dq {
         let reference = match self.last {

@@ -313,7 +313,7 @@ impl Controller {
             period_s: clock.control_s(),
         });
         let target = point.flux;
-        let way = (shaping.can_step, !committed.settled);
+        let way = (shaping.can_step, committed.filled && !committed.settled);
         let reference = self.path.step(target, way, omega, clock.control_s());
         let voltage = current_loop::step(
             &current_loop::Input {
