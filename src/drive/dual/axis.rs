@@ -85,7 +85,7 @@ impl Axis {
         }
         self.controller.track(angle, &settings.clock);
         let gone_astray = (self.omega() - self.slow) * SLOW_S;
-        self.slow += (self.omega() - self.slow) * (settings.clock.control_s() / SLOW_S);
+        self.slow += (self.omega() - self.slow) * (settings.clock.control_s() * (1.0 / SLOW_S));
         if !known || trusted {
             self.slow = self.omega();
             return None;
