@@ -299,10 +299,9 @@ impl Controller {
         let torque_nm = self.demand.step(&shaping, &tables.ratings);
         let link = self.link.step(measured.udc_v, clock.control_s());
         let depth = committed.depth_limit * committed.steady_share;
-        let per_scale = 1.0 / scale;
-        let limit = VoltageLimit { udc_v: link.slow_v * per_scale, depth, filled: committed.filled };
+        let limit = VoltageLimit { udc_v: link.slow_v / scale, depth, filled: committed.filled };
         let trimmed_nm = self.trim.apply(torque_nm, committed.ripple_share, tables.ratings.max_torque_nm);
-        let point = operating_point(trimmed_nm * per_scale, omega, &limit, tables);
+        let point = operating_point(trimmed_nm / scale, omega, &limit, tables);
         let point = OperatingPoint { torque_nm: point.torque_nm * scale, ..point };
         let limited = point.region == Region::Limit;
         self.trim.step(&torque_trim::Input {
