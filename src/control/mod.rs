@@ -313,7 +313,8 @@ impl Controller {
             period_s: clock.control_s(),
         });
         let target = point.flux;
-        let reference = self.path.step(target, shaping.can_step, clock.control_s());
+        let way = (shaping.can_step, !committed.settled);
+        let reference = self.path.step(target, way, omega, clock.control_s());
         let voltage = current_loop::step(
             &current_loop::Input {
                 ahead: &ahead,
