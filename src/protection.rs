@@ -412,7 +412,8 @@ const BELIEVED_S: f32 = 0.02;
 /// Looks for measurements that no longer move.
 #[derive(Clone, Copy, Debug)]
 pub struct FrozenWatch {
-    last: Option<Measurements>,
+    /// Currents and angle of the last period.
+    last: Option<(Abc, Angle)>,
     currents_for: u32,
     angle_for: u32,
     /// Electrical speed while the angle last moved, fading, in rad/s: the tracker soon believes a sensor that stands still.
@@ -431,9 +432,9 @@ impl FrozenWatch {
         (self.turned_rad, FROZEN_TURN_RAD)
     }
 
-    /// The angle of the last period.
-    pub fn last_angle(&self) -> Option<Angle> {
-        self.last.map(|last| last.angle)
+    /// Whether the angle was the same in the last two periods.
+    pub fn angle_stands(&self) -> bool {
+        self.angle_for > 0
     }
 
     /// One control period; `omega` is the electrical speed, in rad/s. Call it while pulses are made.
@@ -444,11 +445,11 @@ impl FrozenWatch {
         period_s: f32,
         ratings: &Ratings,
     ) -> Option<Violation> {
-        let last = self.last.replace(*measured)?;
+        let (currents_a, angle) = self.last.replace((measured.currents_a, measured.angle))?;
         let flowing = || measured.currents_a.peak() > FROZEN_CURRENT_SHARE * ratings.max_current_a;
-        let same_currents = last.currents_a == measured.currents_a;
+        let same_currents = currents_a == measured.currents_a;
         self.currents_for = if same_currents && flowing() { self.currents_for + 1 } else { 0 };
-        if last.angle == measured.angle {
+        if angle == measured.angle {
             self.angle_for += 1;
             self.turned_rad += self.moving * period_s;
             self.moving -= self.moving * (period_s / BELIEVED_S);

@@ -61,9 +61,10 @@ impl Observer {
         let Input { boundary, seen, omega, .. } = *input;
         let flux = seen.flux.unpark(seen.frame);
         let half_turn = Angle::within_half_turn(0.5 * omega * boundary.length_s).sin_cos();
+        let per_length = 1.0 / boundary.length_s;
         if let (Some(last), Some(volt_seconds)) = (self.last_flux, boundary.volt_seconds) {
             let middle = seen.frame.turned(half_turn.back());
-            let unexplained = (flux - last - volt_seconds).park(middle) * (1.0 / boundary.length_s);
+            let unexplained = (flux - last - volt_seconds).park(middle) * per_length;
             self.learn(unexplained + seen.current * input.resistance, middle, input.sixth, gains.observer);
         }
         self.last_flux = Some(flux);

@@ -29,7 +29,7 @@ pub fn mtpa_passes<const PASSES: usize>(torque_nm: f32, start: Dq, tables: &Tabl
 #[inline(always)]
 fn pass(torque: f32, at: Dq, tables: &Tables) -> Dq {
     let [psi_f, saliency] = tables.mtpa.parameters.at(at.d, at.q);
-    let torque_per_flux = torque / (1.5 * tables.ratings.pole_pairs);
+    let torque_per_flux = torque * (1.0 / (1.5 * tables.ratings.pole_pairs));
     // t_en = T/t_eb with t_eb = 1.5 n_p psi_f i_b (9) and i_b = psi_f/(L_q − L_d) (10).
     // √t_en is root/psi_f, and i_dn the share of it.
     let root = sqrt(torque_per_flux * saliency);

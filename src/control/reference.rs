@@ -78,12 +78,13 @@ pub fn operating_point(torque_nm: f32, omega: f32, limit: &VoltageLimit, tables:
     let best = mtpa(torque_nm, tables);
     let flux = flux_linkage(tables, best);
     let resistance = tables.ratings.stator_resistance_ohm;
-    let steady_v = (flux.j() * omega + best * resistance).length();
+    let steady_v = flux.j() * omega + best * resistance;
     let six_step_v = six_step_v(limit.udc_v);
     let voltage_v = limit.depth * six_step_v;
-    let depth = steady_v / six_step_v;
+    let depth = steady_v.length() / six_step_v;
     let unweakened = OperatingPoint { current: best, flux, torque_nm, region, depth };
-    if steady_v <= SURELY_WITHIN * voltage_v && !limit.filled {
+    let within_v = SURELY_WITHIN * voltage_v;
+    if steady_v.squared() <= within_v * within_v && !limit.filled {
         return unweakened;
     }
     let Weakened { current, torque_nm, region, inside } =

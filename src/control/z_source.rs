@@ -172,14 +172,15 @@ impl ZSource {
         let from_v = self.link_ref_v.unwrap_or(link_v);
         let most_v = design.link_slew_v_s * design.period_s;
         let led_v = at_least(from_v + limit(link_ref_v - from_v, -most_v, most_v), source_v);
-        let ratio = led_v / source_v;
+        let per_source = 1.0 / source_v;
+        let ratio = led_v * per_source;
 
         // Outer loop. While the reference moves, the capacitors' charging current is known beforehand.
         let error_v = 0.5 * (led_v + source_v) - capacitor_v;
         let moving_v_s = 0.5 * (led_v - at_least(from_v, source_v)) / design.period_s;
         let charging_a = design.capacitance_f * moving_v_s;
         let into_capacitor_a = gains.outer_s * error_v;
-        let wanted_a = power_w / source_v + ratio * (charging_a + into_capacitor_a) + self.integral_a;
+        let wanted_a = power_w * per_source + ratio * (charging_a + into_capacitor_a) + self.integral_a;
         let inductor_ref_a = limit(wanted_a, -design.inductor_max_a, design.inductor_max_a);
 
         // Inner loop.

@@ -85,7 +85,7 @@ impl Axis {
         }
         self.controller.track(angle, &settings.clock);
         let gone_astray = (self.omega() - self.slow) * SLOW_S;
-        self.slow += (self.omega() - self.slow) * (settings.clock.control_s() / SLOW_S);
+        self.slow += (self.omega() - self.slow) * (settings.clock.control_s() * (1.0 / SLOW_S));
         if !known || trusted {
             self.slow = self.omega();
             return None;
@@ -118,11 +118,10 @@ impl Axis {
         settings: &Settings,
         tables: &Tables,
     ) -> Option<Violation> {
-        let stands = self.watch.last_angle() == Some(measured.angle);
         let period_s = settings.clock.control_s();
         let violation = self.watch.check(measured, self.omega(), period_s, &tables.ratings)?;
         let (turned_rad, limit_rad) = self.watch.turned_rad();
-        if stands { Some((lost, turned_rad, limit_rad)) } else { Some(violation) }
+        if self.watch.angle_stands() { Some((lost, turned_rad, limit_rad)) } else { Some(violation) }
     }
 
     /// One control period.

@@ -131,10 +131,11 @@ impl<M: Machine> PwmTask<M> {
         let moved_v = limit(link_v - self.last_link_v.unwrap_or(link_v), -MOST_MOVED_V, MOST_MOVED_V);
         let link_v = link_v + moved_v;
         let link_v = if link_v > LEAST_LINK_V { link_v } else { LEAST_LINK_V };
+        let depth_per_volt = 2.0 / link_v;
         let ahead = self.now.since(command.at) as f32;
         let [upper, lower] = command.motors.map(|motor| MotorVoltage {
             angle: motor.angle + Angle((motor.rate * ahead) as i32 as u32),
-            depth: 2.0 * motor.voltage_v / link_v,
+            depth: motor.voltage_v * depth_per_volt,
         });
         Request { scheme: command.scheme, upper, lower, shoot_through: command.duty }
     }

@@ -263,13 +263,14 @@ them is a thing that the drive would have to give up:
 - the protections, the flight recorder, and cells that no preemption tears.
 
 What is left is without detours: the tables are constants of the image that the compiler knows, directions come from a table with
-one turn to the very angle, half-way angles are turned instead of computed anew, a point's flux is looked up once, records are read
-where they lie, where a mode leads no ripple none is made, and what changes at a carrier's boundary alone is computed there. The
+one turn to the very angle, half-way angles and six times an angle are turned instead of computed anew, a point's flux is looked up
+once, as is a boundary that is the sample, records are read where they lie, where a mode leads no ripple none is made, what changes at
+a carrier's boundary alone is computed there, square roots go from register to register, and a voltage comes with its length. The
 longest control interrupt is one at the current limit in field weakening in which the mode changes.
 
 The worst cases are provoked: wrong phase currents at every boundary where the mode switches, faults of the ZS9 in weakening, an operator
-who commands. Since then, and since the operating point keeps its limits to single precision and a pattern catches a turning
-machine, the ceilings are higher than they were: 2,293 where 2,169 were counted, 4,197 of the ZS9 where 3,995 were.
+who commands. The longest so provoked was 2,293 and 4,197 of the ZS9 before these detours were gone; 2,264 and 3,688 are left.
 
-In the ZS9 the same law runs twice, once a motor, beside the link's control.
+In the ZS9 the same law runs twice, once a motor, beside the link's control. What both interrupts make is made in the tasks' own memory,
+and what is told afterwards is put together out of line: so the stack holds either the control law or the report.
 ";
