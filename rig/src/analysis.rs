@@ -191,13 +191,9 @@ pub fn mode_switches(recording: &Recording) -> Vec<SwitchFigures> {
     recording
         .switches
         .iter()
-        .filter(|switch| is_counted(switch))
+        .filter(|switch| switch.is_between_pulses())
         .map(|switch| at_switch(recording, switch))
         .collect()
-}
-
-fn is_counted(switch: &Switch) -> bool {
-    switch.t_s > 0.0 && switch.from != Mode::Off && switch.to != Mode::Off
 }
 
 fn at_switch(recording: &Recording, switch: &Switch) -> SwitchFigures {
@@ -443,7 +439,7 @@ pub fn switch_verdicts(
 fn hunts(recording: &Recording) -> usize {
     const SPEED_SHARE: f64 = 0.005;
     const DEMAND_SHARE: f64 = 0.01;
-    let counted: Vec<_> = recording.switches.iter().filter(|switch| is_counted(switch)).collect();
+    let counted: Vec<_> = recording.switches.iter().filter(|switch| switch.is_between_pulses()).collect();
     let taken_back = counted.windows(2).filter(|pair| pair[0].from == pair[1].to);
     let without_cause = taken_back.filter(|pair| {
         let between = window(recording, pair[0].t_s, pair[1].t_s);

@@ -40,7 +40,7 @@ fn keeps_its_bounds(line: &str) {
     assert!(!verdicts.is_empty(), "{line}");
     for verdict in verdicts {
         println!("{line}: {}: {} of {}", verdict["what"], verdict["found"], verdict["at_most"]);
-        assert_ne!(verdict["verdict"], "falls short", "{line}: {verdict}");
+        assert!(["pass", "reported"].contains(&verdict["verdict"].as_str().unwrap()), "{line}: {verdict}");
     }
 }
 
@@ -63,7 +63,8 @@ fn switches_of_mode_are_without_shock() {
     keeps_its_bounds("sweep --down");
     keeps_its_bounds("sweep --down --brake --to 2300");
     keeps_its_bounds("sweep --down --torque-scale 0.5");
-    for speed in [1700, 1885, 1890, 1900, 1950, 2200] {
+    keeps_its_bounds("mode-borders");
+    for speed in [1800, 1890, 1900, 1950, 2200] {
         keeps_its_bounds(&format!("mode-borders --speed {speed}"));
     }
 }

@@ -1,13 +1,12 @@
 //! Full torque from standstill through every mode: the paper's figure 9.
 
-use super::{LEAD_S, Plan, Scenario};
+use super::{LEAD_S, Plan, Scenario, switches};
 use crate::analysis::{self, Figures};
 use crate::machine::Machine;
 use crate::options::RunOptions;
 use crate::report::Page;
 use crate::trace::Recording;
 use tractive::control::Demand;
-use tractive::modulation::Mode;
 
 /// 0 → 2,000 r/min in 8 s and 1 s hold, at the torque envelope.
 pub struct Sweep;
@@ -75,23 +74,6 @@ impl Scenario for Sweep {
             &[("mode", |row| f64::from(row.mode as u8))],
         );
         page.rotor_currents(recording);
-        for switch in recording.switches.iter().filter(|switch| switch.t_s > 0.0) {
-            let title = format!("{} → {}", switch.from.name(), switch.to.name());
-            page.answers(figure_of(switch.from, switch.to));
-            let window = (switch.t_s - 0.03, switch.t_s + 0.04);
-            page.line_voltage(&format!("{title}, line voltage u-v"), recording, window);
-            page.phase_current_in(&format!("{title}, phase current u"), recording, window);
-        }
-    }
-}
-
-/// The paper's figure of a change of mode; it shows those on the way up.
-fn figure_of(from: Mode, to: Mode) -> &'static str {
-    match (from, to) {
-        (Mode::Sync15, Mode::Sync12) => "figure 9a",
-        (Mode::Sync12, Mode::Mid7) => "figure 9b",
-        (Mode::Mid7, Mode::Mid3) => "figure 9c",
-        (Mode::Mid3, Mode::Square) => "figure 9d",
-        _ => "figure 9",
+        switches::plots(recording, page);
     }
 }

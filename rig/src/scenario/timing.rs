@@ -2,12 +2,9 @@
 //! interrupts is logged there, so a second of it takes the emulator ten.
 
 use super::{Plan, Scenario, line};
-use crate::analysis::{self, Figures};
 use crate::bench::LinePlan;
 use crate::machine::Machine;
 use crate::options::RunOptions;
-use crate::report::Page;
-use crate::trace::Recording;
 use tractive::control::Demand;
 use tractive::machine::Ratings;
 use tractive::operator::Request;
@@ -84,15 +81,5 @@ impl Scenario for Timing {
             chopper_ohm: Vec::new(),
             reversible: Vec::new(),
         })
-    }
-
-    fn figures(&self, recording: &Recording, _options: &RunOptions, _machine: &Machine) -> Figures {
-        let mut figures = analysis::common(recording);
-        figures.set("modes", analysis::modes(recording));
-        figures
-    }
-
-    fn plots(&self, recording: &Recording, page: &mut Page) {
-        page.overview(recording);
     }
 }
