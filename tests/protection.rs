@@ -324,7 +324,7 @@ fn a_short_circuit_of_devices_decides_the_rail() {
     const LOWER: SafeState = SafeState::ShortCircuit;
     const OFF: SafeState = SafeState::GatesOff;
     // Slow; so fast that the diodes rectify; so fast that the link does not stand it.
-    let omegas = [500.0, 1_900.0, 2_513.0];
+    let omegas = [500.0, 1_900.0, 2_900.0];
     for (blocked, low, high, safe) in [
         (0, 0, 0, [OFF, LOWER, LOWER]),
         (0b00_0001, 0, 0, [LOWER; 3]),
