@@ -285,18 +285,25 @@ pub struct SteadyPoint {
     pub mode: &'static str,
 }
 
+/// The rows of a window at constant speed, shortened to whole turns of the stator field where one fits.
+pub fn whole_turns(recording: &Recording, (from_s, to_s): (f64, f64), pole_pairs: u32) -> &[Row] {
+    let rows = window(recording, from_s, to_s);
+    let speed_rpm = rows.last().map_or(0.0, |row| row.speed_rpm);
+    let turn_s = 60.0 / (speed_rpm.abs() * f64::from(pole_pairs));
+    let turns = ((to_s - from_s) / turn_s).floor();
+    if turns >= 1.0 { window(recording, to_s - turns * turn_s, to_s) } else { rows }
+}
+
 /// Averages over a window, shortened to whole turns of the stator field.
 pub fn steady_point(
     recording: &Recording,
-    (from_s, to_s): (f64, f64),
+    within: (f64, f64),
     demand_nm: f64,
     machine: &MachineFolder,
 ) -> SteadyPoint {
     let parameters = &machine.parameters;
-    let speed_rpm = window(recording, from_s, to_s).last().map_or(0.0, |row| row.speed_rpm);
-    let turn_s = 60.0 / (speed_rpm.abs().max(1.0) * f64::from(parameters.pole_pairs));
-    let turns = ((to_s - from_s) / turn_s).floor().max(1.0);
-    let rows = window(recording, to_s - turns * turn_s, to_s);
+    let rows = whole_turns(recording, within, parameters.pole_pairs);
+    let speed_rpm = rows.last().map_or(0.0, |row| row.speed_rpm);
     let torque_nm = mean(rows, |row| row.te_nm);
     let current_squared = mean(rows, |row| row.id_a * row.id_a + row.iq_a * row.iq_a);
     let omega = speed_rpm * core::f64::consts::TAU / 60.0;

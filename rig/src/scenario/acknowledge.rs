@@ -63,6 +63,10 @@ impl Scenario for Acknowledge {
         "no figure: a gate driver fails, and the fault is acknowledged"
     }
 
+    fn own_options(&self) -> &'static [&'static str] {
+        &["speed"]
+    }
+
     fn plan(&self, options: &RunOptions, machine: &Machine) -> Plan {
         let scale = machine.folder.parameters.rated_speed_rpm / 2_000.0;
         Plan::operated(DURATION_S, vec![(0.0, options.speed.unwrap_or(SPEED_RPM * scale))])

@@ -92,6 +92,10 @@ impl Scenario for Chopper {
         "no figure: full braking into a link that cannot take the energy"
     }
 
+    fn own_options(&self) -> &'static [&'static str] {
+        &["speed"]
+    }
+
     fn plan(&self, options: &RunOptions, machine: &Machine) -> Plan {
         let scale = machine.folder.parameters.rated_speed_rpm / 2_000.0;
         let fast = options.speed.unwrap_or(FAST_RPM * scale);

@@ -72,6 +72,10 @@ pub trait Scenario {
     fn name(&self) -> &'static str;
     /// The paper's figure that it answers.
     fn figure(&self) -> &'static str;
+    /// Which of [`crate::options::OWN`] it knows.
+    fn own_options(&self) -> &'static [&'static str] {
+        &[]
+    }
     /// What is driven.
     fn plan(&self, options: &RunOptions, machine: &Machine) -> Plan;
     /// The line side, where the scenario is about it; otherwise the link is stiff and the drive is commanded directly.

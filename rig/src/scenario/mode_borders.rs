@@ -32,6 +32,10 @@ impl Scenario for ModeBorders {
         "figure 9: changes of pulse pattern, here at constant speed by torque alone"
     }
 
+    fn own_options(&self) -> &'static [&'static str] {
+        &["speed"]
+    }
+
     fn plan(&self, options: &RunOptions, machine: &Machine) -> Plan {
         let most = machine.folder.parameters.max_torque_nm;
         let speeds = options.speed.map_or(SPEEDS_RPM.to_vec(), |speed_rpm| vec![speed_rpm]);

@@ -23,6 +23,10 @@ impl Scenario for Sweep {
         "figure 9: sweep at full torque, and its changes of pulse pattern"
     }
 
+    fn own_options(&self) -> &'static [&'static str] {
+        &["down", "brake", "torque_scale", "to"]
+    }
+
     fn plan(&self, options: &RunOptions, machine: &Machine) -> Plan {
         let ramp_s = options.to.abs() / SLOPE_RPM_S;
         let mut speed = vec![(0.0, 0.0), (ramp_s, options.to)];

@@ -46,6 +46,10 @@ impl Scenario for Timing {
         "no figure: every mode in half a second, for `cargo xtask timing`"
     }
 
+    fn own_options(&self) -> &'static [&'static str] {
+        &["brake", "torque_scale", "to", "fault_at", "freeze_at", "offset_at", "operated"]
+    }
+
     fn plan(&self, options: &RunOptions, machine: &Machine) -> Plan {
         let turn = options.to.signum();
         let (mut speed, mut t_s) = (Vec::new(), if options.operated { OPERATED_S } else { 0.0 });
