@@ -271,10 +271,14 @@ pub struct SteadyPoint {
     pub speed_rpm: f64,
     /// Torque demanded, in N·m.
     pub demand_nm: f64,
+    /// What the drive says that it gives of it, in N·m: less where current or voltage do not allow more.
+    pub reference_nm: f64,
     /// Mean air-gap torque, in N·m.
     pub torque_nm: f64,
     /// Its error, in percent of the demand.
     pub torque_error_percent: f64,
+    /// Its error, in percent of what the drive says.
+    pub reference_error_percent: f64,
     /// Phase current, rms, in A.
     pub current_rms_a: f64,
     /// Peak to peak torque ripple, in N·m.
@@ -305,6 +309,7 @@ pub fn steady_point(
     let rows = whole_turns(recording, within, parameters.pole_pairs);
     let speed_rpm = rows.last().map_or(0.0, |row| row.speed_rpm);
     let torque_nm = mean(rows, |row| row.te_nm);
+    let reference_nm = mean(rows, |row| row.te_ref_nm);
     let current_squared = mean(rows, |row| row.id_a * row.id_a + row.iq_a * row.iq_a);
     let omega = speed_rpm * core::f64::consts::TAU / 60.0;
     let air_gap_w = torque_nm * omega;
@@ -315,8 +320,10 @@ pub fn steady_point(
     SteadyPoint {
         speed_rpm,
         demand_nm,
+        reference_nm,
         torque_nm,
         torque_error_percent: (torque_nm / demand_nm - 1.0) * 100.0,
+        reference_error_percent: (torque_nm / reference_nm - 1.0) * 100.0,
         current_rms_a: (current_squared / 2.0).sqrt(),
         torque_ripple_nm: high - low,
         efficiency_percent: shaft_w / (air_gap_w + copper_w) * 100.0,

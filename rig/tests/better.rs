@@ -2,9 +2,10 @@
 
 use clap::Parser;
 use serde_json::Value;
-use tractive_rig::analysis::Figures;
+use tractive_rig::analysis::{self, Figures};
 use tractive_rig::machine::Machine;
 use tractive_rig::options::RunOptions;
+use tractive_rig::rows::mean;
 use tractive_rig::scenario;
 
 #[derive(Parser)]
@@ -56,6 +57,15 @@ fn load_steps_are_quick_and_exact() {
 #[test]
 fn torque_is_exact_at_the_characteristic_points() {
     keeps_its_bounds("characteristic");
+    // On a low link two to four of them are not to be had.
+    for (udc_v, limited) in [(1000, 4), (1200, 2), (1800, 0)] {
+        let line = format!("characteristic --udc {udc_v}");
+        keeps_its_bounds(&line);
+        let figures = run(&line);
+        let points = list(&figures, "points").iter();
+        let less = points.filter(|point| number(point, "reference_nm") < 0.999 * number(point, "demand_nm"));
+        assert_eq!(less.count(), limited, "{line}");
+    }
 }
 
 #[test]
@@ -232,4 +242,30 @@ fn our_two_passes_beat_the_papers() {
     println!("trimmed: torque {torque:.3?} %, current {current:.4?} %");
     assert!(started.len() == 4 && torque.len() == 4);
     assert!(worst(&torque) < 0.3 && worst(&current) < 0.05);
+}
+
+/// Where the link does not give the torque, the drive says so all the time, and what it gives is what it says.
+#[test]
+fn a_torque_that_is_not_to_be_had_is_reported() {
+    for (line, most_nm) in [
+        ("steady --speed 2000 --torque 859.4 --udc 1000", 851.0),
+        ("steady --speed 2000 --torque -1000 --udc 1000", 902.0),
+        ("steady --speed 1500 --torque 1235 --udc 1000", 1116.0),
+    ] {
+        let parsed = Line::parse_from(std::iter::once("test").chain(line.split(' ')));
+        let machine = Machine::load(parsed.options.machine()).unwrap();
+        let scenario = scenario::find(&parsed.scenario).unwrap();
+        let recording = scenario::drive(scenario.as_ref(), &parsed.options, &machine).unwrap();
+        let steady = analysis::window(&recording, 0.6, 1.1);
+        let given_nm = mean(steady, |row| row.te_nm);
+        for row in steady {
+            assert!(row.te_ref_nm.abs() < most_nm, "{line}: {} N·m at {} s", row.te_ref_nm, row.t_s);
+            assert!(
+                (row.te_ref_nm / given_nm - 1.0).abs() < 0.002,
+                "{line}: {} of {given_nm}",
+                row.te_ref_nm
+            );
+        }
+        println!("{line}: {given_nm}");
+    }
 }

@@ -275,10 +275,11 @@ impl Controller {
         let point = operating_point(trimmed_nm / scale, omega, &limit, tables);
         let point = OperatingPoint { torque_nm: point.torque_nm * scale, ..point };
         let limited = point.region == Region::Limit;
+        let given_nm = if limited { nearer_zero(point.torque_nm, torque_nm) } else { torque_nm };
         self.trim.step(&torque_trim::Input {
             demand_nm: torque_nm,
             measured_nm,
-            limited,
+            limited: given_nm != torque_nm,
             ripple_share: committed.ripple_share,
             largest_nm: tables.ratings.max_torque_nm,
             period_s: clock.control_s(),
@@ -323,7 +324,7 @@ impl Controller {
                 depth: point.depth,
             },
             map_error: self.map_error.share(),
-            torque_nm: if limited { nearer_zero(point.torque_nm, torque_nm) } else { torque_nm },
+            torque_nm: given_nm,
             point,
         }
     }
