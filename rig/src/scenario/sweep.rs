@@ -3,9 +3,10 @@
 use super::{LEAD_S, Plan, Scenario, switches};
 use crate::analysis::{self, Figures};
 use crate::machine::Machine;
-use crate::options::RunOptions;
+use crate::options::{On, RunOptions};
 use crate::report::Page;
-use crate::trace::Recording;
+use crate::trace::{Recording, Row};
+use crate::verdict::{Verdict, worst};
 use tractive::control::Demand;
 
 /// 0 → 2,000 r/min in 8 s and 1 s hold, at the torque envelope.
@@ -44,11 +45,14 @@ impl Scenario for Sweep {
         Plan { lead_s: LEAD_S, duration_s, speed, link: Vec::new(), operator: Box::new(operator) }
     }
 
-    fn figures(&self, recording: &Recording, options: &RunOptions, _machine: &Machine) -> Figures {
+    fn figures(&self, recording: &Recording, options: &RunOptions, machine: &Machine) -> Figures {
         let mut figures = analysis::common(recording);
         let switches = analysis::mode_switches(recording);
         let mut verdicts = analysis::switch_verdicts(&switches, recording, options);
         verdicts.extend(analysis::square_verdict(recording, options));
+        if options.map_error != 0.0 {
+            verdicts.extend(self.map_verdicts(recording, options, machine));
+        }
         figures.set("verdicts", verdicts);
         figures.set("mode_switches", switches);
         figures.set("modes", analysis::modes(recording));
@@ -79,5 +83,22 @@ impl Scenario for Sweep {
         );
         page.rotor_currents(recording);
         switches::plots(recording, page);
+    }
+}
+
+impl Sweep {
+    /// What is wanted where the flux map is wrong: little more current than with the right one, and that the drive notices.
+    fn map_verdicts(&self, recording: &Recording, options: &RunOptions, machine: &Machine) -> [Verdict; 2] {
+        let right = RunOptions { on: On::Host, map_error: 0.0, ..options.clone() };
+        let peak_a = |recording: &Recording| worst(recording.rows.iter().map(Row::peak_current_a));
+        let with_the_right_one = super::drive(self, &right, machine).ok();
+        let ratio = with_the_right_one.and_then(|run| Some(peak_a(recording)? / peak_a(&run)?));
+        let told = recording.rows.last().map(|row| (100.0 * row.map_error - options.map_error).abs());
+        // A wrong resistance or angle looks like a wrong map, too.
+        let told_within = if right.is_ideal() { 1.0 } else { f64::INFINITY };
+        [
+            Verdict::at_most("peak current over that with the right map", ratio, 1.1, "408 A of 247"),
+            Verdict::at_most("map error told less the true one in % of the flux", told, told_within, "–"),
+        ]
     }
 }
