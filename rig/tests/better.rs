@@ -7,6 +7,7 @@ use tractive_rig::machine::Machine;
 use tractive_rig::options::RunOptions;
 use tractive_rig::rows::mean;
 use tractive_rig::scenario;
+use tractive_rig::trace::Recording;
 
 #[derive(Parser)]
 struct Line {
@@ -16,13 +17,18 @@ struct Line {
 }
 
 /// Runs a scenario as on the command line, without a fault.
-fn run(line: &str) -> Figures {
+fn driven(line: &str) -> (Recording, Figures) {
     let parsed = Line::parse_from(std::iter::once("test").chain(line.split(' ')));
     let machine = Machine::load(parsed.options.machine()).unwrap();
     let scenario = scenario::find(&parsed.scenario).unwrap();
     let recording = scenario::drive(scenario.as_ref(), &parsed.options, &machine).unwrap();
     assert!(recording.trip().is_none(), "{line}: {:?}", recording.trip());
-    scenario.figures(&recording, &parsed.options, &machine)
+    let figures = scenario.figures(&recording, &parsed.options, &machine);
+    (recording, figures)
+}
+
+fn run(line: &str) -> Figures {
+    driven(line).1
 }
 
 fn list<'a>(figures: &'a Figures, name: &str) -> &'a Vec<Value> {
@@ -35,14 +41,15 @@ fn number(figures: &Value, name: &str) -> f64 {
 
 /// Every bound of the scenario is kept.
 #[track_caller]
-fn keeps_its_bounds(line: &str) {
-    let figures = run(line);
+fn keeps_its_bounds(line: &str) -> Recording {
+    let (recording, figures) = driven(line);
     let verdicts = list(&figures, "verdicts");
     assert!(!verdicts.is_empty(), "{line}");
     for verdict in verdicts {
         println!("{line}: {}: {} of {}", verdict["what"], verdict["found"], verdict["at_most"]);
         assert!(["pass", "reported"].contains(&verdict["verdict"].as_str().unwrap()), "{line}: {verdict}");
     }
+    recording
 }
 
 #[test]
@@ -81,8 +88,20 @@ fn switches_of_mode_are_without_shock() {
 
 #[test]
 fn square_wave_gives_its_power_to_the_highest_speed() {
-    keeps_its_bounds("sweep --to 6000");
-    keeps_its_bounds("sweep --to 6000 --brake");
+    for (line, from_rpm, power_w) in
+        [("sweep --to 6000", 1_905.0, 246.4e3), ("sweep --to 6000 --brake", 2_300.0, -246.4e3)]
+    {
+        // By the power itself, too, not only by what the drive makes of the demand.
+        let recording = keeps_its_bounds(line);
+        let tenths =
+            (0..250).map(|k| analysis::window(&recording, 0.1 * f64::from(k), 0.1 * f64::from(k + 1)));
+        let fast: Vec<_> = tenths.filter(|rows| rows.iter().all(|row| row.speed_rpm >= from_rpm)).collect();
+        assert!(fast.len() > 150, "{line}");
+        for rows in fast {
+            let found_w = mean(rows, |row| row.te_nm * row.speed_rpm * std::f64::consts::TAU / 60.0);
+            assert!((found_w / power_w - 1.0).abs() < 0.005, "{line}: {found_w} W at {} s", rows[0].t_s);
+        }
+    }
 }
 
 #[test]
@@ -264,10 +283,7 @@ fn a_torque_that_is_not_to_be_had_is_reported() {
         ("steady --speed 2000 --torque -1000 --udc 1000", 902.0),
         ("steady --speed 1500 --torque 1235 --udc 1000", 1116.0),
     ] {
-        let parsed = Line::parse_from(std::iter::once("test").chain(line.split(' ')));
-        let machine = Machine::load(parsed.options.machine()).unwrap();
-        let scenario = scenario::find(&parsed.scenario).unwrap();
-        let recording = scenario::drive(scenario.as_ref(), &parsed.options, &machine).unwrap();
+        let (recording, _) = driven(line);
         let steady = analysis::window(&recording, 0.6, 1.1);
         let given_nm = mean(steady, |row| row.te_nm);
         for row in steady {
