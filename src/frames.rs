@@ -147,6 +147,13 @@ impl SinCos {
         Self { sin: self.sin * by.cos + self.cos * by.sin, cos: self.cos * by.cos - self.sin * by.sin }
     }
 
+    /// The direction of six times the angle.
+    #[inline]
+    pub fn sixfold(self) -> Self {
+        let threefold = self.turned(self).turned(self);
+        threefold.turned(threefold)
+    }
+
     /// The direction of the opposite angle.
     #[inline]
     pub fn back(self) -> Self {
@@ -296,6 +303,12 @@ impl AlphaBeta {
     #[inline]
     pub fn squared(self) -> f32 {
         self.alpha * self.alpha + self.beta * self.beta
+    }
+
+    /// Scalar product.
+    #[inline]
+    pub fn dot(self, other: Self) -> f32 {
+        self.alpha * other.alpha + self.beta * other.beta
     }
 
     /// Turned by the angle of a direction.

@@ -176,3 +176,62 @@ fn a_mode_is_kept_for_its_dwell_time() {
         assert!((0.03..0.05).contains(&shortest_s), "{swings}: {shortest_s} s");
     }
 }
+
+/// How far a pattern's flux hexagon moves while another pattern takes over, in parts of the fundamental flux, and the modes before and
+/// after: at a frequency, from one share of six-step to another.
+fn moved_by_a_switch(hz: f32, before: f32, after: f32) -> (Mode, Mode, f64) {
+    const UDC_V: f32 = 1500.0;
+    let mut modulator = Modulator::new(devices(), Schedule::new(&CLOCK));
+    let (mut now, mut flux, mut halves) = (Instant(0), [0.0_f64; 2], Vec::<(Mode, _)>::new());
+    let mut next = Mode::Off;
+    for number in 0..400 {
+        // The voltage changes with the mode, which is announced.
+        let depth = if number < 200 || next == halves[199].0 { before } else { after };
+        let turned = Angle((f64::from(rate(hz)) * f64::from(now.0)) as u64 as u32);
+        let voltage_v = depth * UDC_V * std::f32::consts::FRAC_2_PI;
+        let reference = Reference::turning(voltage_v, turned, rate(hz), now, UDC_V);
+        let beyond = 0.02 * (after - before).signum();
+        let wanted = if number < 200 { before - beyond } else { after + beyond };
+        let half = modulator.step(now, Some(&Reference { depth: wanted, ..reference }));
+        next = half.ahead[0];
+        halves.push((half.mode, flux));
+        let [a, b, c] = half.on_ticks(0).map(|on| f64::from(on) / 25e6 * f64::from(UDC_V));
+        flux = [flux[0] + (2.0 * a - b - c) / 3.0, flux[1] + (b - c) / 3_f64.sqrt()];
+        now = now.after(half.period_ticks);
+    }
+    let (old, new) = (halves[199].0, halves[399].0);
+    let switch = halves.iter().position(|(mode, _)| *mode == new && *mode != old).unwrap_or(200);
+    let centre = |from: usize, mode: Mode| {
+        let turn = &halves[from..from + 6 * mode.sector_halves() as usize];
+        [0, 1].map(|axis: usize| turn.iter().map(|(_, flux)| flux[axis]).sum::<f64>() / turn.len() as f64)
+    };
+    let from = centre(switch - 6 * old.sector_halves() as usize, old);
+    let to = centre(switch + 5 * new.sector_halves() as usize, new);
+    let unit = f64::from(after * UDC_V * std::f32::consts::FRAC_2_PI / hz) / std::f64::consts::TAU;
+    (old, new, (to[0] - from[0]).hypot(to[1] - from[1]) / unit)
+}
+
+#[test]
+fn a_pattern_that_grows_out_of_another_stands_on_the_same_centre() {
+    let cases = [
+        (Mode::Mid7, Mode::Mid3, [(100.0, 0.86, 0.93), (110.0, 0.88, 0.92), (120.0, 0.8, 0.94)].as_slice()),
+        (
+            Mode::Mid3,
+            Mode::Square,
+            &[(130.0, 0.98, 1.0), (167.0, 0.985, 1.0), (200.0, 0.97, 1.0), (240.0, 0.94, 1.0)],
+        ),
+    ];
+    for (low, high, switches) in cases {
+        for &(hz, below, above) in switches {
+            for (from, to, before, after) in [(low, high, below, above), (high, low, above, below)] {
+                // What square wave is ahead or behind, by half the shortest notch at most, only a longer or shorter edge can catch up with.
+                let caught_up_rad = std::f64::consts::PI * f64::from(hz * MIN_PULSE as f32 / 25e6);
+                let most = 0.002
+                    + if to == Mode::Square { std::f64::consts::FRAC_PI_3 * caught_up_rad } else { 0.0 };
+                let (old, new, moved) = moved_by_a_switch(hz, before, after);
+                assert_eq!((old, new), (from, to), "{hz} Hz");
+                assert!(moved < most, "{hz} Hz, {from:?} {before} to {to:?} {after}: {moved} of {most}");
+            }
+        }
+    }
+}

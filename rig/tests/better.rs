@@ -79,9 +79,10 @@ fn torque_is_exact_at_the_characteristic_points() {
 fn switches_of_mode_are_without_shock() {
     keeps_its_bounds("sweep --down");
     keeps_its_bounds("sweep --down --brake --to 2300");
-    keeps_its_bounds("sweep --down --torque-scale 0.5");
+    keeps_its_bounds("sweep --down --torque-scale 0.5 --to 6000");
+    keeps_its_bounds("sweep --down --torque-scale 0.5 --brake --to 2800");
     keeps_its_bounds("mode-borders");
-    for speed in [1800, 1890, 1900, 1950, 2200] {
+    for speed in [1800, 1890, 1900, 1950, 2200, 2500, 3000, 3500] {
         keeps_its_bounds(&format!("mode-borders --speed {speed}"));
     }
 }

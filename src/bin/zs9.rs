@@ -25,8 +25,10 @@ mod firmware {
     use tractive::protocol::Zs9Station;
 
     static SHARED: Shared = Shared::recorded_by(&qemu::DUAL_RECORDER);
+    /// Until the host has told its carrier.
+    const DEFAULTS: Settings = Settings::new(CLOCK, CLOCK.control_ticks);
     /// As the operator looks at them.
-    static RATINGS: Ratings = Settings::new(CLOCK, CLOCK.control_ticks).operator_ratings(&BUILT_IN.ratings);
+    static RATINGS: Ratings = DEFAULTS.operator_ratings(&BUILT_IN.ratings);
     static CARRIER_TICKS: AtomicU32 = AtomicU32::new(0);
 
     fn settings() -> Settings {
@@ -38,7 +40,7 @@ mod firmware {
         let setup = qemu::connect_dual();
         CARRIER_TICKS.store(setup.carrier_ticks, Ordering::Relaxed);
         // All but the carrier are constants of the image.
-        let constants = const { Settings::new(CLOCK, CLOCK.control_ticks).check(&BUILT_IN) };
+        let constants = const { DEFAULTS.check(&BUILT_IN) };
         if let Err(refused) = constants.and_then(|()| settings().check_carrier()) {
             qemu::refuse(&refused);
         }
@@ -60,19 +62,29 @@ mod firmware {
     /// Deadline: the last peak before the next control interrupt. Missed: fault `control_deadline`, all gates off.
     #[interrupt]
     fn TIMER0() {
-        static mut TASK: Option<ControlTask<BuiltIn>> = None;
+        static mut TASK: ControlTask<BuiltIn> = ControlTask::new(BuiltIn, DEFAULTS);
+        static mut IS_SET_UP: bool = false;
         let mut board = qemu::Control;
         board.acknowledge();
-        TASK.get_or_insert_with(|| ControlTask::new(BuiltIn, settings())).run(&mut board, &SHARED);
+        if !*IS_SET_UP {
+            TASK.set_carrier(CARRIER_TICKS.load(Ordering::Relaxed));
+            *IS_SET_UP = true;
+        }
+        TASK.run(&mut board, &SHARED);
     }
 
     /// Deadline: the next valley, where the shadow registers take over. Missed: the watch's.
     #[interrupt]
     fn DUALTIMER() {
-        static mut TASK: Option<PwmTask<BuiltIn>> = None;
+        static mut TASK: PwmTask<BuiltIn> = PwmTask::new(BuiltIn, DEFAULTS);
+        static mut IS_SET_UP: bool = false;
         let mut board = qemu::Pwm;
         board.acknowledge();
-        TASK.get_or_insert_with(|| PwmTask::new(BuiltIn, settings())).run(&mut board, &SHARED);
+        if !*IS_SET_UP {
+            TASK.set_carrier(CARRIER_TICKS.load(Ordering::Relaxed));
+            *IS_SET_UP = true;
+        }
+        TASK.run(&mut board, &SHARED);
     }
 
     /// The watch over the carrier periods: one was not written in time. Fault `pwm_deadline`, all gates off.

@@ -3,8 +3,17 @@
 /// Square root of a number that is not negative, correctly rounded; NaN stays NaN.
 #[cfg(target_arch = "arm")]
 #[inline(always)]
-#[allow(unsafe_code)]
 pub fn sqrt(x: f32) -> f32 {
+    sqrtf(x)
+}
+
+/// C's function. The compiler knows what a pure function of this name does and puts the processor's instruction where it is called,
+/// from register to register; assembly has to go by way of the core's registers, because Rust does not offer it the others.
+#[cfg(target_arch = "arm")]
+#[allow(unsafe_code)]
+#[unsafe(no_mangle)]
+#[inline(never)]
+extern "C" fn sqrtf(x: f32) -> f32 {
     let root: u32;
     // SAFETY: from register to register by way of s0, which is declared lost; the target has a floating-point unit
     // (thumbv7em-none-eabihf).

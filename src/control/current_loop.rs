@@ -4,7 +4,8 @@
 //! current into flux and back. Proportional part: the flux error predicted for the boundary where the voltage begins
 //! to act. Decoupling: `jωψ`. Integral part: [`super::disturbance`].
 
-use super::Committed;
+use super::disturbance::Observer;
+use super::{Committed, Seen};
 use crate::frames::{Angle, Dq, SinCos};
 
 /// What of a voltage command the modulator's mode can follow.
@@ -47,21 +48,22 @@ impl Gains {
     pub const WITHOUT_SIXTH: Self = Self { sixth_turn_rad: 0.0, ..Self::DEFAULT };
 }
 
-pub struct Input<'a> {
-    /// Rotor angle at the sample, and its direction.
-    pub angle: Angle,
-    pub frame: SinCos,
-    /// Measured current and the flux linkage that belongs to it.
-    pub current: Dq,
+/// What lies ahead, without what is wanted.
+pub struct Ahead {
+    /// Flux linkage at the horizon less the pattern's ripple, in the rotor frame there; while the gates are off, as it is.
     pub flux: Dq,
+    /// That frame.
+    frame: SinCos,
+}
+
+pub struct Input<'a> {
+    pub ahead: &'a Ahead,
+    pub disturbance: &'a Observer,
     pub current_reference: Dq,
     /// Flux linkage of that reference, as [`super::flux_path`] leads there.
     pub reference: Dq,
     pub omega: f32,
     pub committed: &'a Committed,
-    /// Disturbance in the half that begins at the horizon, and on the way there.
-    pub disturbance: Dq,
-    pub disturbance_until_then: Dq,
     pub resistance: f32,
     pub voltage_limit_v: f32,
 }
@@ -69,9 +71,15 @@ pub struct Input<'a> {
 /// Voltages for the carrier half that begins at the horizon, in V, in the rotor frame that turns with it.
 pub struct Output {
     /// To be made; limited.
-    pub voltage: Dq,
+    pub voltage: Voltage,
     /// Of the operating point alone; limited likewise.
-    pub steady: Dq,
+    pub steady: Voltage,
+}
+
+/// A vector and its length, in V.
+pub struct Voltage {
+    pub vector: Dq,
+    pub length_v: f32,
 }
 
 /// What a carrier gives at most, in the corners of its hexagon, over what it gives in every direction: 2/√3. Transients may
@@ -81,29 +89,26 @@ const TRANSIENT_REACH: f32 = 1.154_7;
 /// One step of the loop.
 pub fn step(input: &Input, gains: &Gains) -> Output {
     let reference = input.reference;
-    let predicted = predicted_flux(input);
-    let drop = input.current_reference * input.resistance - input.disturbance;
-    let steady = reference.j() * input.omega + drop;
+    let resistive = input.current_reference * input.resistance;
+    let steady = reference.j() * input.omega + resistive;
     let limit = input.voltage_limit_v;
-    match input.committed.follows {
+    let towards = |gain: f32| {
+        let gain = if input.committed.settled { gain } else { 0.0 };
+        let steady = steady - input.disturbance.mean();
+        (steady - (input.ahead.flux - reference) * gain, steady, limit)
+    };
+    let (regulated, steady, reach) = match input.committed.follows {
         Follows::Mean => {
-            let regulated = mean_voltage(input, reference, predicted, gains) + drop;
-            Output {
-                voltage: shortened(regulated, limit * TRANSIENT_REACH),
-                steady: shortened(steady, limit),
-            }
+            let (mean, disturbance) = mean_voltage(input, reference, gains);
+            (mean + resistive - disturbance, steady - disturbance, limit * TRANSIENT_REACH)
         }
-        Follows::Fundamental => {
-            let gain = if input.committed.settled { gains.pattern_rad_s } else { 0.0 };
-            let regulated = steady - (predicted - reference) * gain;
-            Output { voltage: shortened(regulated, limit), steady: shortened(steady, limit) }
-        }
-        Follows::Angle => {
-            let damping =
-                if input.committed.settled { gains.square_damping * input.omega.abs() } else { 0.0 };
-            let regulated = steady - (predicted - reference) * damping;
-            Output { voltage: lengthened(regulated, limit), steady: lengthened(steady, limit) }
-        }
+        Follows::Fundamental => towards(gains.pattern_rad_s),
+        Follows::Angle => towards(gains.square_damping * input.omega.abs()),
+    };
+    let fills = input.committed.follows == Follows::Angle;
+    Output {
+        voltage: Voltage::fitted(regulated, reach, fills),
+        steady: Voltage::fitted(steady, limit, fills),
     }
 }
 
@@ -113,50 +118,60 @@ pub fn step(input: &Input, gains: &Gains) -> Output {
 /// Voltages that hold for a half move the flux along chords, so at the boundaries it stands outside the circle of its
 /// fundamental by x/sin x. The error e goes to (1 − g) e at the half's end, both in the rotor frame that turns by 2x
 /// meanwhile; all is seen from the frame in the middle of the half. Where a pattern gives way to another, the flux is
-/// led from the ripple of the one to the ripple of the other.
-fn mean_voltage(input: &Input, reference: Dq, predicted: Dq, gains: &Gains) -> Dq {
+/// led from the ripple of the one to the ripple of the other. With it comes the disturbance in the middle of the half.
+fn mean_voltage(input: &Input, reference: Dq, gains: &Gains) -> (Dq, Dq) {
     let committed = input.committed;
     let x = 0.5 * input.omega * committed.interval_s;
     let half_turn = Angle::within_half_turn(x).sin_cos();
-    let error = predicted - reference * (1.0 + x * x * (1.0 / 6.0));
+    let middle = input.ahead.frame.turned(half_turn);
+    let error = input.ahead.flux - reference * (1.0 + x * x * (1.0 / 6.0));
     let remaining = 1.0 - gains.carrier;
     let chord = reference.j() * (2.0 * x)
         + error * ((remaining - 1.0) * half_turn.cos)
         + error.j() * ((remaining + 1.0) * half_turn.sin);
     let led = match &committed.ripple {
         None => chord,
-        Some(ripple) => {
-            let middle = Angle::within_half_turn(input.omega * committed.horizon_s + x);
-            chord + ripple.led_wb.park((input.angle + middle).sin_cos())
+        Some(ripple) => chord + ripple.led_wb.park(middle),
+    };
+    (led * (1.0 / committed.interval_s), input.disturbance.voltage(middle))
+}
+
+/// Looks ahead from what is seen now; `half_way` is the rotor's turn in half the time to the horizon.
+#[inline(always)]
+pub fn ahead(
+    seen: &Seen,
+    half_way: SinCos,
+    committed: &Committed,
+    disturbance: &Observer,
+    resistance: f32,
+) -> Ahead {
+    let on_the_way = seen.frame.turned(half_way);
+    let flux = match committed.volt_seconds {
+        None => seen.flux,
+        Some(volt_seconds) => {
+            let moved = match &committed.ripple {
+                None => volt_seconds,
+                Some(ripple) => volt_seconds - ripple.at_horizon_wb,
+            };
+            let unexplained = disturbance.voltage(on_the_way) - seen.current * resistance;
+            // By half the way, and by that once more.
+            let back = half_way.back();
+            (seen.flux.turned(back) + moved.park(on_the_way) + unexplained * committed.horizon_s).turned(back)
         }
     };
-    led * (1.0 / committed.interval_s)
+    Ahead { flux, frame: on_the_way.turned(half_way) }
 }
 
-/// Flux linkage at the horizon less the pattern's ripple, in the rotor frame there.
-fn predicted_flux(input: &Input) -> Dq {
-    let committed = input.committed;
-    let Some(volt_seconds) = committed.volt_seconds else {
-        return input.flux;
-    };
-    let moved = match &committed.ripple {
-        None => volt_seconds,
-        Some(ripple) => volt_seconds - ripple.at_horizon_wb,
-    };
-    // By half the way to the horizon, and by that once more.
-    let half_way = Angle::within_half_turn(0.5 * input.omega * committed.horizon_s).sin_cos();
-    let drop = (input.disturbance_until_then - input.current * input.resistance) * committed.horizon_s;
-    let in_the_middle = input.flux.turned(half_way.back()) + moved.park(input.frame.turned(half_way)) + drop;
-    in_the_middle.turned(half_way.back())
-}
-
-/// The vector, no longer than `limit_v`, its direction kept.
-fn shortened(voltage: Dq, limit_v: f32) -> Dq {
-    if voltage.squared() > limit_v * limit_v { lengthened(voltage, limit_v) } else { voltage }
-}
-
-/// The vector's direction with a given length; the zero vector stays.
-fn lengthened(voltage: Dq, length_v: f32) -> Dq {
-    let length = voltage.length();
-    if length > 0.0 { voltage * (length_v / length) } else { voltage }
+impl Voltage {
+    /// The vector, no longer than `limit_v`, its direction kept; where it `fills` that, neither shorter. The zero vector stays.
+    #[inline(always)]
+    fn fitted(vector: Dq, limit_v: f32, fills: bool) -> Self {
+        let length_v = vector.length();
+        let fits = length_v <= limit_v && !fills;
+        if fits || length_v == 0.0 {
+            Self { vector, length_v }
+        } else {
+            Self { vector: vector * (limit_v / length_v), length_v: limit_v }
+        }
+    }
 }

@@ -71,7 +71,7 @@ pub struct Shaper {
 /// What shapes a demand.
 pub struct Input<'a> {
     pub demand: &'a Demand,
-    pub window: &'a LinkWindow,
+    pub window: Option<&'a LinkWindow>,
     pub udc_v: f32,
     /// Electrical angular speed, in rad/s.
     pub omega: f32,
@@ -110,7 +110,10 @@ impl Shaper {
             wanted
         };
         // The link is not slewed: its capacitor is full in milliseconds. A pattern follows torque towards zero at any rate.
-        let (lowest, highest) = input.window.bounds_nm(input.udc_v, largest, input.omega);
+        let (lowest, highest) = match input.window {
+            Some(window) => window.bounds_nm(input.udc_v, largest, input.omega),
+            None => (-largest, largest),
+        };
         let shaped = limit(shaped, lowest, highest);
         self.torque_nm = Some(shaped);
         shaped

@@ -6,9 +6,8 @@
 //! (dead time: the fifth and seventh harmonic). Because it compares with voltages that acted, not with voltages that were asked
 //! for, limits and reference steps do not wind it up.
 
-use super::{Boundary, Gains, flux_linkage};
+use super::{Boundary, Gains, Seen};
 use crate::frames::{AlphaBeta, Angle, Dq, SinCos};
-use crate::machine::Tables;
 
 #[derive(Clone, Copy, Debug)]
 pub struct Observer {
@@ -21,13 +20,13 @@ pub struct Observer {
     follows_sixth: bool,
 }
 
-/// A boundary, and where the rotor was.
+/// A boundary, and what was seen there.
 pub struct Input<'a> {
     pub boundary: &'a Boundary,
-    /// At the boundary.
-    pub angle: Angle,
+    pub seen: &'a Seen,
     /// Electrical, in rad/s.
     pub omega: f32,
+    pub resistance: f32,
     /// Whether the sixth harmonic is slow enough to be followed.
     pub sixth: bool,
 }
@@ -43,12 +42,13 @@ impl Observer {
         self.mean
     }
 
-    /// The disturbance with the rotor at an angle, in V.
-    pub fn voltage(&self, angle: Angle) -> Dq {
+    /// The disturbance with the rotor at the angle of a direction, in V.
+    #[inline]
+    pub fn voltage(&self, rotor: SinCos) -> Dq {
         if !self.follows_sixth {
             return self.mean;
         }
-        self.at(sixth(angle))
+        self.at(rotor.sixfold())
     }
 
     fn at(&self, sixth: SinCos) -> Dq {
@@ -56,21 +56,21 @@ impl Observer {
     }
 
     /// A boundary has passed.
-    pub fn step(&mut self, input: &Input, gains: &Gains, tables: &Tables) {
-        let Input { boundary, angle, omega, .. } = *input;
-        let frame = angle.sin_cos();
-        let current = boundary.currents_a.clarke().park(frame);
-        let flux = flux_linkage(tables, current).unpark(frame);
+    #[inline(always)]
+    pub fn step(&mut self, input: &Input, gains: &Gains) {
+        let Input { boundary, seen, omega, .. } = *input;
+        let flux = seen.flux.unpark(seen.frame);
+        let half_turn = Angle::within_half_turn(0.5 * omega * boundary.length_s).sin_cos();
         if let (Some(last), Some(volt_seconds)) = (self.last_flux, boundary.volt_seconds) {
-            let middle = angle - Angle::within_half_turn(0.5 * omega * boundary.length_s);
-            let unexplained = (flux - last - volt_seconds).park(middle.sin_cos()) * (1.0 / boundary.length_s);
-            let drop = current * tables.ratings.stator_resistance_ohm;
-            self.learn(unexplained + drop, middle, input.sixth, gains.observer);
+            let middle = seen.frame.turned(half_turn.back());
+            let unexplained = (flux - last - volt_seconds).park(middle) * (1.0 / boundary.length_s);
+            self.learn(unexplained + seen.current * input.resistance, middle, input.sixth, gains.observer);
         }
         self.last_flux = Some(flux);
     }
 
-    fn learn(&mut self, voltage: Dq, angle: Angle, follow_sixth: bool, gain: f32) {
+    #[inline(always)]
+    fn learn(&mut self, voltage: Dq, rotor: SinCos, follow_sixth: bool, gain: f32) {
         self.follows_sixth = follow_sixth;
         if !follow_sixth {
             self.cosine = Dq::default();
@@ -78,16 +78,11 @@ impl Observer {
             self.mean = self.mean + (voltage - self.mean) * gain;
             return;
         }
-        let sixth = sixth(angle);
+        let sixth = rotor.sixfold();
         let error = (voltage - self.at(sixth)) * gain;
         self.mean = self.mean + error;
         // Either part moves by the error: the one that turns with the angle, and the one against it.
         self.cosine = self.cosine + error * (2.0 * sixth.cos);
         self.sine = self.sine + error * (2.0 * sixth.sin);
     }
-}
-
-/// Direction of six times an angle.
-fn sixth(angle: Angle) -> SinCos {
-    Angle(angle.0.wrapping_mul(6)).sin_cos()
 }

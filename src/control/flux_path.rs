@@ -9,6 +9,10 @@ use crate::frames::Dq;
 /// Rate at which the reference turns at most, in rad/s, against the rotor.
 const TURN_RAD_S: f32 = 120.0;
 
+/// Part of its way that it turns in a radian of the stator's turn while a pattern grows out of another: the load angle changes with
+/// the flux, which takes four sectors.
+const GROWING_PER_RAD: f32 = 0.7;
+
 #[derive(Clone, Copy, Debug)]
 pub struct FluxPath {
     last: Option<Dq>,
@@ -19,13 +23,16 @@ impl FluxPath {
         Self { last: None }
     }
 
-    /// The reference on its way to `target`; at once there where a carrier follows (`can_step`).
-    pub fn step(&mut self, target: Dq, can_step: bool, period_s: f32) -> Dq {
+    /// The reference on its way to `target`; at once there where a carrier follows (`can_step`), slowly while a pattern grows (`growing`)
+    /// at a stator frequency of `omega` in rad/s.
+    pub fn step(&mut self, target: Dq, (can_step, growing): (bool, bool), omega: f32, period_s: f32) -> Dq {
         let reference = match self.last {
             Some(last) if !can_step => {
                 let size = target.length();
                 let (change, most) = (target - last, TURN_RAD_S * period_s * size);
                 let length = change.length();
+                let slow = GROWING_PER_RAD * omega.abs() * period_s * length;
+                let most = if growing && slow < most { slow } else { most };
                 if length > most {
                     let moved = last + change * (most / length);
                     // On the circle of the target, not on the chord.

@@ -22,7 +22,7 @@ mod speed_loop;
 mod torque_trim;
 mod z_source;
 
-use crate::frames::{Abc, AlphaBeta, Angle, Dq};
+use crate::frames::{Abc, AlphaBeta, Angle, Dq, SinCos};
 use crate::machine::Tables;
 use crate::time::Clock;
 
@@ -98,14 +98,21 @@ pub struct Ripple {
 /// A carrier boundary that has passed since the last step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Boundary {
-    /// Phase currents sampled there, in A.
-    pub currents_a: Abc,
-    /// Time from the boundary to the present sample, in s, not negative.
-    pub age_s: f32,
+    /// Its own sample; `None` where the present one was taken there.
+    pub earlier: Option<Earlier>,
     /// Volt-seconds of the carrier half that ended there, in V·s; `None` when the gates were off in it.
     pub volt_seconds: Option<AlphaBeta>,
     /// Length of that half, in s, greater than zero.
     pub length_s: f32,
+}
+
+/// A sample before the present one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Earlier {
+    /// Phase currents, in A.
+    pub currents_a: Abc,
+    /// Time from there to the present sample, in s, not negative.
+    pub age_s: f32,
 }
 
 /// What a step works on.
@@ -115,8 +122,8 @@ pub struct Input<'a> {
     pub measured: &'a Measurements,
     /// The operator's demand.
     pub demand: &'a Demand,
-    /// Where the link ends it.
-    pub window: &'a LinkWindow,
+    /// Where the link ends it; `None`: nowhere.
+    pub window: Option<&'a LinkWindow>,
     /// What the modulator will do meanwhile.
     pub committed: &'a Committed,
     /// The carrier boundary that has passed since the last step, if one has.
@@ -164,6 +171,24 @@ pub struct Output {
     pub point: OperatingPoint,
     /// By how much the machine's flux linkage seems to exceed the map's, as a share; 0 where it turns too slowly to tell.
     pub map_error: f32,
+}
+
+/// A sample as the rotor sees it.
+#[derive(Clone, Copy)]
+struct Seen {
+    frame: SinCos,
+    current: Dq,
+    /// Flux linkage that belongs to the current.
+    flux: Dq,
+}
+
+impl Seen {
+    #[inline(always)]
+    fn new(currents_a: Abc, angle: Angle, tables: &Tables) -> Self {
+        let frame = angle.sin_cos();
+        let current = currents_a.clarke().park(frame);
+        Self { frame, current, flux: flux_linkage(tables, current) }
+    }
 }
 
 /// The control law's state between two steps.
@@ -246,18 +271,22 @@ impl Controller {
         let Input { measured, demand, window, committed, boundary } = *input;
         let Law { gains, clock, tables } = *law;
         let omega = self.speed.omega();
+        let resistance = tables.ratings.stator_resistance_ohm;
+        let half_way = Angle::within_half_turn(0.5 * omega * committed.horizon_s).sin_cos();
         // First of all: nothing else is to be kept meanwhile.
-        if let Some(boundary) = boundary {
-            let angle = measured.angle - Angle::within_half_turn(omega * boundary.age_s);
-            let turn_rad = 6.0 * omega.abs() * boundary.length_s;
-            let sixth = committed.follows == Follows::Mean && turn_rad < gains.sixth_turn_rad;
-            self.disturbance.step(&disturbance::Input { boundary, angle, omega, sixth }, gains, tables);
+        let earlier = boundary.and_then(|boundary| boundary.earlier);
+        if let (Some(boundary), Some(earlier)) = (boundary, earlier) {
+            let angle = measured.angle - Angle::within_half_turn(omega * earlier.age_s);
+            self.observe(boundary, &Seen::new(earlier.currents_a, angle, tables), committed.follows, law);
         }
-        let frame = measured.angle.sin_cos();
-        let current = measured.currents_a.clarke().park(frame);
-        let flux = flux_linkage(tables, current);
+        let seen = Seen::new(measured.currents_a, measured.angle, tables);
+        if let (Some(boundary), None) = (boundary, earlier) {
+            self.observe(boundary, &seen, committed.follows, law);
+        }
         let scale = self.map_error.scale();
-        let measured_nm = self::torque_nm(tables, flux, current) * scale;
+        let measured_nm = self::torque_nm(tables, seen.flux, seen.current) * scale;
+        let ahead = current_loop::ahead(&seen, half_way, committed, &self.disturbance, resistance);
+        let frame = seen.frame;
         let shaping = demand::Input {
             demand,
             window,
@@ -284,24 +313,17 @@ impl Controller {
             largest_nm: tables.ratings.max_torque_nm,
             period_s: clock.control_s(),
         });
-        let resistance = tables.ratings.stator_resistance_ohm;
-        let ahead = |seconds: f32| measured.angle + Angle::within_half_turn(omega * seconds);
-        let disturbance = self.disturbance.voltage(ahead(committed.horizon_s + 0.5 * committed.interval_s));
-        let until_then = self.disturbance.voltage(ahead(0.5 * committed.horizon_s));
         let target = point.flux;
-        let reference = self.path.step(target, shaping.can_step, clock.control_s());
+        let way = (shaping.can_step, !committed.settled);
+        let reference = self.path.step(target, way, omega, clock.control_s());
         let voltage = current_loop::step(
             &current_loop::Input {
-                angle: measured.angle,
-                frame,
-                current,
-                flux,
+                ahead: &ahead,
+                disturbance: &self.disturbance,
                 current_reference: point.current,
                 reference,
                 omega,
                 committed,
-                disturbance,
-                disturbance_until_then: until_then,
                 resistance,
                 voltage_limit_v: committed.depth_limit * six_step_v(link.usable_v),
             },
@@ -313,13 +335,13 @@ impl Controller {
         }
         let regulates_by_pulses = committed.follows == Follows::Mean;
         let catches = committed.volt_seconds.is_none() && !regulates_by_pulses;
-        let vector = if catches { flux.j() * omega } else { voltage };
+        let vector = if catches { ahead.flux.j() * omega } else { voltage.vector };
         Output {
             voltage: VoltageVector {
-                voltage_v: voltage.length(),
+                voltage_v: voltage.length_v,
                 vector: vector.unpark(frame),
-                carrier: if regulates_by_pulses { steady } else { voltage }.unpark(frame),
-                steady_v: steady.length(),
+                carrier: if regulates_by_pulses { steady.vector } else { voltage.vector }.unpark(frame),
+                steady_v: steady.length_v,
                 omega,
                 depth: point.depth,
             },
@@ -327,6 +349,18 @@ impl Controller {
             torque_nm: given_nm,
             point,
         }
+    }
+}
+
+impl Controller {
+    /// What a boundary tells of the disturbance.
+    #[inline(always)]
+    fn observe(&mut self, boundary: &Boundary, seen: &Seen, follows: Follows, law: &Law) {
+        let omega = self.speed.omega();
+        let turn_rad = 6.0 * omega.abs() * boundary.length_s;
+        let sixth = follows == Follows::Mean && turn_rad < law.gains.sixth_turn_rad;
+        let resistance = law.tables.ratings.stator_resistance_ohm;
+        self.disturbance.step(&disturbance::Input { boundary, seen, omega, resistance, sixth }, law.gains);
     }
 }
 

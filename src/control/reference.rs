@@ -79,13 +79,15 @@ pub fn operating_point(torque_nm: f32, omega: f32, limit: &VoltageLimit, tables:
     let flux = flux_linkage(tables, best);
     let resistance = tables.ratings.stator_resistance_ohm;
     let steady_v = (flux.j() * omega + best * resistance).length();
-    let depth = steady_v / six_step_v(limit.udc_v);
+    let six_step_v = six_step_v(limit.udc_v);
+    let voltage_v = limit.depth * six_step_v;
+    let depth = steady_v / six_step_v;
     let unweakened = OperatingPoint { current: best, flux, torque_nm, region, depth };
-    if depth <= SURELY_WITHIN * limit.depth && !limit.filled {
+    if steady_v <= SURELY_WITHIN * voltage_v && !limit.filled {
         return unweakened;
     }
     let Weakened { current, torque_nm, region, inside } =
-        weakened(torque_nm, best.squared(), omega, limit, tables);
+        weakened(torque_nm, best.squared(), omega, voltage_v, tables);
     let right = current.d - best.d >= MTPA_OFF * tables.ratings.max_current_a;
     if region == Region::Weakening && (right || inside) && !limit.filled {
         return unweakened;
@@ -105,18 +107,11 @@ struct Weakened {
 /// The point on the circle of flux linkage that the voltage allows, for either sign of torque. From (3) squared,
 /// `u² = (ωψ)² + 2 R ω T/(1.5 n_p) + R² i²`, all of it taken times 1/ω². Inlined, so that the compiler knows the tables.
 #[inline(always)]
-fn weakened(
-    torque_nm: f32,
-    mtpa_squared: f32,
-    omega: f32,
-    limit: &VoltageLimit,
-    tables: &Tables,
-) -> Weakened {
+fn weakened(torque_nm: f32, mtpa_squared: f32, omega: f32, voltage_v: f32, tables: &Tables) -> Weakened {
     let Weakening { currents, torque, flux_knee_wb, share_knee } = &tables.weakening;
     let ratings = &tables.ratings;
     let factor = 1.5 * ratings.pole_pairs;
     let speed = omega.abs();
-    let voltage = limit.depth * six_step_v(limit.udc_v);
     let last = torque.last();
     // Position on the tables' axis of the flux linkage √square/ω.
     let place = |square: f32| {
@@ -127,7 +122,7 @@ fn weakened(
     let largest_squared = ratings.max_current_a * ratings.max_current_a;
     // Without torque and with the largest current. From there the most torque along its slope: its own drop leaves less flux, or
     // more when braking. As the slope is the least one, the flux comes out too small rather than too large.
-    let square = voltage * voltage - resistance_squared * largest_squared;
+    let square = voltage_v * voltage_v - resistance_squared * largest_squared;
     let [_, most, slope, above, rise] = torque.at(place(square));
     let drop = torque_nm.signum() * omega * (2.0 * ratings.stator_resistance_ohm / factor);
     let most = most * speed * speed / (speed * speed + drop * slope);

@@ -158,8 +158,8 @@ impl ZSource {
         gains: &ZSourceGains,
     ) -> Result<ZSourceOutput, ZSourceError> {
         let ZSourceInput { capacitor_v, inductor_a, source_v, power_w, link_ref_v, duty_room } = *input;
-        let inputs = [capacitor_v, inductor_a, source_v, power_w, link_ref_v, duty_room];
-        if !inputs.iter().all(|value| value.is_finite()) {
+        // Not finite if one of them is not.
+        if !(capacitor_v + inductor_a + source_v + power_w + link_ref_v + duty_room).is_finite() {
             return Err(ZSourceError::NotFinite);
         }
         if source_v <= 0.0 {
@@ -202,7 +202,7 @@ impl ZSource {
         };
         let step_a = if holds_back { 0.0 } else { gains.integral_share * ratio * into_capacitor_a };
         let integral_a = limit(self.integral_a + step_a, -design.inductor_max_a, design.inductor_max_a);
-        if ![duty, link_v, led_v, inductor_ref_a, integral_a].iter().all(|value| value.is_finite()) {
+        if !(duty + link_v + led_v + inductor_ref_a + integral_a).is_finite() {
             return Err(ZSourceError::NotFinite);
         }
         (self.link_ref_v, self.integral_a) = (Some(led_v), integral_a);

@@ -59,24 +59,21 @@ fn sector_levels(sector: u32) -> ([bool; 3], usize) {
     }
 }
 
-/// A half of a pattern's carrier, `period_ticks` long, with notches of half-width `half_notch_rad` if it were as long as
-/// `nominal_ticks`; what it is longer or shorter, the notch is. No notch at all makes square wave.
+/// A half of a pattern's carrier, `period_ticks` long, of which the last part or, in the second half, the first is a notch of
+/// `notch_ticks`. No notch at all makes square wave.
 pub fn half(
     mode: Mode,
     half: u32,
-    (period_ticks, nominal_ticks): (u32, f32),
-    half_notch_rad: Option<f32>,
+    period_ticks: u32,
+    notch_ticks: Option<f32>,
     devices: &Devices,
 ) -> CarrierPeriod {
-    let per_sector = mode.sector_halves().max(1);
-    let (mut levels, switching) = sector_levels(half / per_sector);
+    let (mut levels, switching) = sector_levels(half / mode.sector_halves().max(1));
     let mut compare_ticks = [u32::MAX; 3];
-    if let (Some(compare), Some(level), Some(half_notch_rad)) =
-        (compare_ticks.get_mut(switching), levels.get_mut(switching), half_notch_rad)
+    if let (Some(compare), Some(level), Some(notch_ticks)) =
+        (compare_ticks.get_mut(switching), levels.get_mut(switching), notch_ticks)
     {
-        let share = half_notch_rad * per_sector as f32 / core::f32::consts::FRAC_PI_3;
-        let wanted = limit(share, 0.0, 1.0) * nominal_ticks + (period_ticks as f32 - nominal_ticks);
-        let notch = whole_notch(wanted, period_ticks, devices.min_pulse_ticks);
+        let notch = whole_notch(notch_ticks, period_ticks, devices.min_pulse_ticks);
         let opening = half & 1 == 0;
         if opening {
             *compare = period_ticks - notch;

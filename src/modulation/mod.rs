@@ -13,16 +13,19 @@
 mod carrier;
 mod catch;
 mod dead_time;
+mod growth;
 mod middle60;
 mod ripple;
 mod schedule;
 
-use crate::frames::{AlphaBeta, Angle, limit};
+use crate::frames::{AlphaBeta, Angle, UNITS_PER_RADIAN, limit};
 use crate::time::{Clock, Instant};
 
 use carrier::Zeros;
 use catch::Catch;
 pub use dead_time::compensated;
+pub use growth::GROWTH_SECTORS;
+use growth::Growth;
 pub use ripple::{RippleFlux, ripple_share};
 pub use schedule::{Schedule, depth_limit, first_half};
 
@@ -273,33 +276,15 @@ pub struct Modulator {
     next_half: u32,
     mirrored: bool,
     plan: Option<Plan>,
-    growth: Option<Growth>,
+    growth: Growth,
     /// Whether the half before was a pattern's and the next one is a carrier's.
     after_pattern: bool,
     /// Half the zero voltage of the present pattern's sectors, as an angle in rad.
     zero_rad: f32,
 }
 
-/// A new pattern growing out of an old one.
-///
-/// In each sector of 60° the flux goes along one edge of a hexagon, the shorter the more zero voltage there is in the sector. If
-/// the edges changed their length at once, the hexagon would be left off its centre, by a flux that turns in the machine
-/// until it has decayed. Every change of length moves the centre towards the corner where it happens; so changes of three
-/// corners 120° apart, or of one corner, its neighbour back, and the next one, leave it where it is.
-#[derive(Clone, Copy, Debug)]
-struct Growth {
-    /// Half the zero voltage of a sector of the old pattern, as an angle in rad.
-    old_zero_rad: f32,
-    /// How much of the way to the new zero voltage each sector has gone; from the last on all of it.
-    shares: &'static [f32],
-    /// Halves since the switch.
-    halves: u32,
-}
-
-/// Between notched patterns.
-const BY_THIRDS: &[f32] = &[1.0 / 3.0, 1.0 / 3.0, 2.0 / 3.0, 2.0 / 3.0];
-/// To and from square wave, where a notch cannot be arbitrarily narrow: the second sector echoes the old pattern.
-const WITH_ECHO: &[f32] = &[1.0, 0.0];
+/// Share of a half that is zero voltage, over half the zero voltage of a sector of 60° as an angle in rad.
+const ZERO_OF_HALF: f32 = 1.0 / core::f32::consts::FRAC_PI_6;
 
 /// A switch between locked modes that has been announced.
 #[derive(Clone, Copy, Debug)]
@@ -331,7 +316,7 @@ impl Modulator {
             next_half: 0,
             mirrored: false,
             plan: None,
-            growth: None,
+            growth: Growth::DONE,
             after_pattern: false,
             zero_rad: 0.0,
         }
@@ -365,7 +350,6 @@ impl Modulator {
         half.ahead = self.ahead(self.next_half);
         self.next_half = self.half_after(self.next_half, 1);
         self.after_pattern = false;
-        self.grow();
         if self.mirrored {
             half.compare_ticks.swap(1, 2);
             half.start_levels.swap(1, 2);
@@ -390,7 +374,6 @@ impl Modulator {
     pub fn rest(&mut self, start: Instant, reference: Option<&Reference>) -> CarrierPeriod {
         self.mode = Mode::Off;
         self.plan = None;
-        self.growth = None;
         let mut half = CarrierPeriod::off(self.devices.shortest_half_ticks);
         if let Some(reference) = reference {
             let seen = if reference.rate < 0.0 { reference.mirrored() } else { *reference };
@@ -442,11 +425,7 @@ impl Modulator {
         self.mode = mode;
         self.plan = None;
         self.after_pattern = from.is_pattern() && mode.is_carrier();
-        self.growth = (from.is_pattern() && mode.is_pattern()).then_some(Growth {
-            old_zero_rad: self.zero_rad,
-            shares: if from == Mode::Square || mode == Mode::Square { WITH_ECHO } else { BY_THIRDS },
-            halves: 0,
-        });
+        self.growth = if from.is_pattern() { Growth::begun(self.zero_rad) } else { Growth::DONE };
         self.schedule.switched(start);
     }
 
@@ -500,47 +479,31 @@ impl Modulator {
         let ticks_per_unit = 1.0 / seen.rate;
         let nominal = boundary(1, carriers).0 as f32 * ticks_per_unit;
         let wanted = (end - pulse).signed() as f32 * ticks_per_unit;
-        if self.mode.is_carrier() {
-            let (shortest, longest) = CARRIER_STRETCH;
-            let period_ticks = self.whole_ticks(limit(wanted, shortest * nominal, longest * nominal));
+        let is_carrier = self.mode.is_carrier();
+        let (shortest, longest) = if is_carrier { CARRIER_STRETCH } else { PATTERN_STRETCH };
+        let wanted = limit(wanted, shortest * nominal, longest * nominal);
+        if is_carrier {
+            let period_ticks = self.whole_ticks(wanted);
             let share = seen.share_within(start, period_ticks);
             return carrier::synchronous(self.next_half, period_ticks, self.zeros(), share, &self.devices);
         }
-        let notches = self.mode.notches() as f32;
         let own_rad = middle60::zero_rad(self.mode, seen.voltage_v, seen.udc_v);
         self.zero_rad = own_rad;
-        let (zero_rad, has_notch) = match self.growth_share() {
-            None => (own_rad, self.mode != Mode::Square || own_rad > 0.0),
-            Some((old_rad, share)) => {
-                let zero_rad = old_rad + share * (own_rad - old_rad);
-                (zero_rad, zero_rad > 0.0)
+        let (period, notch) = match self.growth.sector(own_rad, self.mode.sector_halves()) {
+            Some(sector) => {
+                // The edge has the length that it should have, and whatever time is left is zero voltage.
+                let zero = nominal * (sector.zero_rad * ZERO_OF_HALF);
+                let edge = nominal - zero;
+                let left = wanted - sector.lead_rad * UNITS_PER_RADIAN * ticks_per_unit - edge;
+                let notch = self.growth.notch(left, zero, self.devices.min_pulse_ticks as f32);
+                (edge + notch.unwrap_or(0.0), notch)
+            }
+            None => {
+                let notched = self.mode != Mode::Square || own_rad > 0.0;
+                (wanted, notched.then_some(wanted * (own_rad * ZERO_OF_HALF)))
             }
         };
-        let notch = has_notch.then_some(zero_rad / notches);
-        // While the hexagon changes its size, what a half is longer than its angle is zero voltage: that turns the
-        // pattern without moving the hexagon. Where there is no notch, the length stays.
-        let growing = self.growth.is_some();
-        let (shortest, longest) = if growing && !has_notch { (1.0, 1.0) } else { PATTERN_STRETCH };
-        let period_ticks = self.whole_ticks(limit(wanted, shortest * nominal, longest * nominal));
-        let nominal_ticks = if growing { nominal } else { period_ticks as f32 };
-        middle60::half(self.mode, self.next_half, (period_ticks, nominal_ticks), notch, &self.devices)
-    }
-
-    /// The old pattern's zero voltage and the share of the way from there, while one pattern grows out of another.
-    fn growth_share(&self) -> Option<(f32, f32)> {
-        let growth = self.growth?;
-        let sector = growth.halves.checked_div(self.mode.sector_halves())?;
-        growth.shares.get(sector as usize).map(|share| (growth.old_zero_rad, *share))
-    }
-
-    /// One half more has been made.
-    fn grow(&mut self) {
-        if let Some(growth) = &mut self.growth {
-            growth.halves += 1;
-        }
-        if self.growth_share().is_none() {
-            self.growth = None;
-        }
+        middle60::half(self.mode, self.next_half, self.whole_ticks(period), notch, &self.devices)
     }
 
     /// A length in whole ticks. Slower than the async mode's range there is nothing to lock to: the length stays that

@@ -3,8 +3,7 @@
 use super::{MotorCommand, MotorShare, Settings};
 use crate::board::MotorDemand;
 use crate::control::{
-    Boundary, Committed, Controller, Demand, Follows, Input, Law, LinkWindow, Measurements, Region,
-    SpeedInput, SpeedLoop,
+    Boundary, Committed, Controller, Demand, Follows, Input, Law, Measurements, Region, SpeedInput, SpeedLoop,
 };
 use crate::frames::{AlphaBeta, Angle};
 use crate::machine::Tables;
@@ -30,7 +29,7 @@ pub struct Axis {
     watch: FrozenWatch,
     /// Electrical speed behind a filter, in rad/s.
     slow: f32,
-    /// Volt-seconds of the period that began at the last sample, per volt of link, in s; and the link's voltage there.
+    /// Mean voltage of the period that began at the last sample, per volt of link; and the link's voltage there.
     acting: Option<(AlphaBeta, f32)>,
 }
 
@@ -49,10 +48,21 @@ pub struct AxisInput<'a> {
 /// A motor's step.
 pub struct AxisOutput {
     pub command: MotorCommand,
+    /// What is told of it, as in [`DualReport`](super::DualReport).
     pub torque_nm: f32,
     pub weakening: bool,
-    /// Electrical power drawn now, in W.
+    /// Electrical power drawn from now on, in W.
     pub power_w: f32,
+}
+
+impl AxisOutput {
+    /// While no pulses are made.
+    pub const NOTHING: Self = Self {
+        command: MotorCommand { voltage_v: 0.0, angle: Angle::ZERO, rate: 0.0 },
+        torque_nm: 0.0,
+        weakening: false,
+        power_w: 0.0,
+    };
 }
 
 impl Axis {
@@ -119,18 +129,17 @@ impl Axis {
     pub fn step(&mut self, input: &AxisInput, settings: &Settings, tables: &Tables) -> AxisOutput {
         let omega = self.controller.omega();
         let period_s = settings.clock.control_s();
-        let share = input.applied.map(|share| self.volt_seconds_share(&share, settings));
-        let before = core::mem::replace(&mut self.acting, share.map(|share| (share, input.link_v)));
+        let begins = input.applied.map(|share| self.mean_per_volt(&share, settings));
+        let before = core::mem::replace(&mut self.acting, begins.map(|mean| (mean, input.link_v)));
         let boundary = Boundary {
-            currents_a: input.measured.currents_a,
-            age_s: 0.0,
+            earlier: None,
             // The link moves along a straight line in between.
-            volt_seconds: before.map(|(share, link_v)| share * (0.5 * (link_v + input.link_v))),
+            volt_seconds: before.map(|(mean, link_v)| mean * (0.5 * (link_v + input.link_v) * period_s)),
             length_s: period_s,
         };
         let committed = Committed {
             horizon_s: period_s,
-            volt_seconds: share.map(|share| share * input.link_v),
+            volt_seconds: begins.map(|mean| mean * (input.link_v * period_s)),
             // A period is its own mirror image, so at its ends the ripple is nothing.
             ripple: None,
             interval_s: period_s,
@@ -147,7 +156,7 @@ impl Axis {
         let control = Input {
             measured: input.measured,
             demand: &demand,
-            window: &LinkWindow::OPEN,
+            window: None,
             committed: &committed,
             boundary: Some(&boundary),
         };
@@ -160,7 +169,9 @@ impl Axis {
             },
             torque_nm: output.torque_nm,
             weakening: output.point.region != Region::Mtpa,
-            power_w: power_w(input),
+            // Of the voltage that begins to act now, as the modulator really gives it, at the measured current.
+            power_w: begins
+                .map_or(0.0, |mean| 1.5 * input.link_v * mean.dot(input.measured.currents_a.clarke())),
         }
     }
 
@@ -186,28 +197,18 @@ impl Axis {
         }
     }
 
-    /// Volt-seconds of a control period per volt of link, in s: its carrier periods, the first of which is known, each turned
-    /// on by one carrier period.
-    fn volt_seconds_share(&self, share: &MotorShare, settings: &Settings) -> AlphaBeta {
+    /// Mean voltage of a control period per volt of link: of its carrier periods, the first of which is known, each turned on by one
+    /// carrier period. Together they have the direction of their middle, and the chord's length instead of the arc's: its square
+    /// term is short of it by less than 3e-6 at 400 Hz.
+    fn mean_per_volt(&self, share: &MotorShare, settings: &Settings) -> AlphaBeta {
+        let (omega, control_s) = (self.controller.omega(), settings.clock.control_s());
         let carrier_s = settings.clock.seconds(settings.carrier_ticks as i32);
-        let turn = Angle::within_half_turn(self.controller.omega() * carrier_s);
-        let (mut sum, mut angle) = (AlphaBeta::default(), share.angle);
-        for _ in 0..settings.carriers_per_control() {
-            let direction = angle.sin_cos();
-            sum = sum + AlphaBeta { alpha: direction.cos, beta: direction.sin };
-            angle = angle + turn;
-        }
-        sum * (0.5 * share.depth * carrier_s)
+        let to_middle = 0.5 * (control_s - carrier_s);
+        let between = omega * omega * (control_s * control_s - carrier_s * carrier_s);
+        let middle = (share.angle + Angle::within_half_turn(omega * to_middle)).sin_cos();
+        let length = 0.5 * share.depth * (1.0 - between * (1.0 / 24.0));
+        AlphaBeta { alpha: middle.cos, beta: middle.sin } * length
     }
-}
-
-/// The power of the voltage that begins to act now, as the modulator really gives it, at the measured current, in W.
-fn power_w(input: &AxisInput) -> f32 {
-    let Some(MotorShare { depth, angle }) = input.applied else {
-        return 0.0;
-    };
-    let current = input.measured.currents_a.clarke().park(angle.sin_cos());
-    0.75 * depth * input.link_v * current.d
 }
 
 /// Phase currents and speed of one motor.

@@ -1,7 +1,7 @@
 //! The control interrupt's task.
 
-use super::axis::{self, Axis, AxisInput};
-use super::{DualApplied, DualCommand, DualReport, MotorCommand, MotorShare, Settings, Shared};
+use super::axis::{self, Axis, AxisInput, AxisOutput};
+use super::{DualApplied, DualCommand, DualReport, MotorShare, Settings, Shared};
 use crate::board::{DualControlPort, DualSample, HardwareBreak, MotorDemand};
 use crate::control::{Measurements, ZSource, ZSourceError, ZSourceInput};
 use crate::drive::Gates;
@@ -26,6 +26,8 @@ pub struct ControlTask<M = &'static Tables> {
     settings: Settings,
     axes: [Axis; 2],
     link: ZSource,
+    /// What the last period made.
+    driven: Driven,
     /// Capacitor voltage behind the filter, in V; `None` before the first sample.
     filtered_v: Option<f32>,
     /// Nominal instant of the next call.
@@ -37,14 +39,16 @@ pub struct ControlTask<M = &'static Tables> {
 }
 
 /// What a control period makes of its sample.
-#[derive(Default)]
 struct Driven {
-    motors: [MotorCommand; 2],
-    /// What is told of it, as in [`DualReport`].
-    torque_nm: [f32; 2],
-    weakening: [bool; 2],
+    motors: [AxisOutput; 2],
     duty: f32,
+    /// What is told of it, as in [`DualReport`].
     inductor_ref_a: f32,
+}
+
+impl Driven {
+    /// While no pulses are made.
+    const NOTHING: Self = Self { motors: [AxisOutput::NOTHING; 2], duty: 0.0, inductor_ref_a: 0.0 };
 }
 
 impl<M: Machine> ControlTask<M> {
@@ -55,6 +59,7 @@ impl<M: Machine> ControlTask<M> {
             settings,
             axes: [Axis::new(), Axis::new()],
             link: ZSource::new(),
+            driven: Driven::NOTHING,
             filtered_v: None,
             now: Instant(settings.clock.control_ticks),
             disarmed: Disarmed::NONE,
@@ -73,6 +78,11 @@ impl<M: Machine> ControlTask<M> {
     pub const fn without(mut self, disarmed: Disarmed) -> Self {
         self.disarmed = disarmed;
         self
+    }
+
+    /// Another carrier period than that of the settings it was built with, in ticks; before the first call.
+    pub fn set_carrier(&mut self, carrier_ticks: u32) {
+        self.settings.carrier_ticks = carrier_ticks;
     }
 
     /// The control timer's interrupt, at a valley of the carrier. Deadline: [`Settings::deadline_ticks`] after its nominal instant,
@@ -108,36 +118,44 @@ impl<M: Machine> ControlTask<M> {
         self.check_measurements(&sample, &measured, port);
         let known = self.axes.iter().all(Axis::speed_is_known);
         let pulsing = self.trip.is_none() && sample.enable && known;
-        let driven = if pulsing {
+        if pulsing {
             self.check_frozen(&measured, port);
             let next = applied.and_then(|applied| applied.next);
-            self.pulse(&sample, &measured, next, port)
+            self.pulse(&sample, &measured, next, port);
         } else {
             self.axes.iter_mut().for_each(Axis::idle);
             self.link = ZSource::new();
-            Driven::default()
-        };
+            self.driven = Driven::NOTHING;
+        }
         let late = port.overrun_ticks(now, deadline_ticks);
         let late_s = self.settings.clock.seconds(late as i32);
         self.check((late > 0).then_some((Fault::ControlDeadline, late_s, 0.0)), port);
         let gates = if pulsing && self.trip.is_none() { Gates::Pulse } else { Gates::Off };
         shared.command.publish(DualCommand {
-            motors: driven.motors,
+            motors: self.driven.motors.each_ref().map(|motor| motor.command),
             at: now,
             valid_from: now.after(deadline_ticks),
-            duty: driven.duty,
+            duty: self.driven.duty,
             scheme: sample.scheme,
             gates,
             acknowledge: sample.acknowledge,
         });
+        self.tell(&sample, gates, port, shared);
+    }
+
+    /// The period as the flight recorder and whoever watches see it. Out of line: nothing of it is on the stack while the control
+    /// laws are.
+    #[inline(never)]
+    fn tell(&self, sample: &DualSample, gates: Gates, port: &mut impl DualControlPort, shared: &Shared) {
+        let now = self.now.before(self.settings.clock.control_ticks);
         if let Some(recorder) = shared.recorder {
-            recorder.record(self.entry(now, &sample, &driven, gates), self.trip.is_some());
+            recorder.record(self.entry(now, sample, gates), self.trip.is_some());
         }
-        let [upper, lower] = &self.axes;
+        let ([upper, lower], driven) = (&self.axes, &self.driven);
         let report = DualReport {
-            torque_nm: driven.torque_nm,
-            voltage_v: driven.motors.map(|motor| motor.voltage_v),
-            weakening: driven.weakening,
+            torque_nm: driven.motors.each_ref().map(|motor| motor.torque_nm),
+            voltage_v: driven.motors.each_ref().map(|motor| motor.command.voltage_v),
+            weakening: driven.motors.each_ref().map(|motor| motor.weakening),
             duty: driven.duty,
             inductor_ref_a: driven.inductor_ref_a,
             scheme: sample.scheme,
@@ -146,7 +164,7 @@ impl<M: Machine> ControlTask<M> {
             current_a: sample.currents_a.map(|currents| currents.peak()),
             capacitor_v: sample.capacitor_v,
             source_v: sample.source_v,
-            speed_known: known,
+            speed_known: upper.speed_is_known() && lower.speed_is_known(),
             acknowledged: self.acknowledged,
         };
         port.report(now, &report);
@@ -154,7 +172,7 @@ impl<M: Machine> ControlTask<M> {
 
     /// The period's entry in the flight recorder.
     #[inline(always)]
-    fn entry(&self, at: Instant, sample: &DualSample, driven: &Driven, gates: Gates) -> DualRecord {
+    fn entry(&self, at: Instant, sample: &DualSample, gates: Gates) -> DualRecord {
         DualRecord {
             at,
             currents_a: sample.currents_a,
@@ -162,8 +180,8 @@ impl<M: Machine> ControlTask<M> {
             capacitor_v: sample.capacitor_v,
             source_v: sample.source_v,
             inductor_a: sample.inductor_a,
-            torque_nm: driven.torque_nm,
-            duty: driven.duty,
+            torque_nm: self.driven.motors.each_ref().map(|motor| motor.torque_nm),
+            duty: self.driven.duty,
             state: DualState {
                 scheme: sample.scheme,
                 enabled: sample.enable,
@@ -265,7 +283,7 @@ impl<M: Machine> ControlTask<M> {
         measured: &[Measurements; 2],
         applied: Option<[MotorShare; 2]>,
         port: &mut impl DualControlPort,
-    ) -> Driven {
+    ) {
         let link_v = 2.0 * sample.capacitor_v - sample.source_v;
         let [first, second] = &mut self.axes;
         let ([m1, m2], [d1, d2]) = (measured, &sample.demands);
@@ -275,13 +293,15 @@ impl<M: Machine> ControlTask<M> {
         let step = |axis: &mut Axis, measured, demand, speed_torque_nm, applied| {
             axis.step(&AxisInput { measured, demand, speed_torque_nm, applied, link_v }, settings, tables)
         };
-        let motors = [step(first, m1, d1, l1, a1), step(second, m2, d2, l2, a2)];
-        let [o1, o2] = &motors;
+        let motors = &mut self.driven.motors;
+        let [o1, o2] = motors;
+        *o1 = step(first, m1, d1, l1, a1);
+        *o2 = step(second, m2, d2, l2, a2);
         let link = ZSourceInput {
             capacitor_v: sample.capacitor_v,
             inductor_a: sample.inductor_a,
             source_v: sample.source_v,
-            power_w: o1.power_w + o2.power_w,
+            power_w: motors.iter().map(|motor| motor.power_w).sum(),
             link_ref_v: sample.link_ref_v,
             duty_room: 1.0,
         };
@@ -296,13 +316,7 @@ impl<M: Machine> ControlTask<M> {
         let odd = motors.iter().map(|motor| motor.command.voltage_v + motor.command.rate);
         let odd = odd.fold(None, |found, sum| found.or((!sum.is_finite()).then_some(sum)));
         self.check(refused.or(odd.map(|sum| (Fault::NotFinite, sum, f32::MAX))), port);
-        Driven {
-            motors: [o1.command, o2.command],
-            torque_nm: [o1.torque_nm, o2.torque_nm],
-            weakening: [o1.weakening, o2.weakening],
-            duty,
-            inductor_ref_a,
-        }
+        (self.driven.duty, self.driven.inductor_ref_a) = (duty, inductor_ref_a);
     }
 
     fn check(&mut self, violation: Option<Violation>, port: &mut impl DualControlPort) {

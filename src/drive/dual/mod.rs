@@ -123,14 +123,6 @@ impl Settings {
         let dead_steps = (DEAD_TIME_S * self.clock.ticks_per_s) as u32 * COMPARE_STEPS;
         self.half_steps().saturating_sub(dead_steps)
     }
-
-    /// Carrier periods in a control period.
-    pub const fn carriers_per_control(&self) -> u32 {
-        match self.clock.control_ticks.checked_div(self.carrier_ticks) {
-            Some(count) => count,
-            None => 1,
-        }
-    }
 }
 
 /// The cells between the two interrupts, and the flight recorder, if there is one.

@@ -22,6 +22,8 @@ pub struct PwmTask<M = &'static Tables> {
     settings: Settings,
     /// Nominal instant of the next call: a peak.
     now: Instant,
+    /// The period that begins at the next valley; made where it stays.
+    next: PlayedPeriod,
     /// What the gates should have shown in the period that was played before, and in the one that is played.
     expected: [Expected; 2],
     disarmed: Disarmed,
@@ -39,6 +41,7 @@ impl<M: Machine> PwmTask<M> {
             machine,
             settings,
             now: Instant(settings.first_peak_ticks()),
+            next: PlayedPeriod::off(settings.half_steps()),
             expected: [Expected::OFF; 2],
             disarmed: Disarmed::NONE,
             trip: None,
@@ -59,6 +62,12 @@ impl<M: Machine> PwmTask<M> {
         self
     }
 
+    /// Another carrier period than that of the settings it was built with, in ticks; before the first call.
+    pub fn set_carrier(&mut self, carrier_ticks: u32) {
+        self.settings.carrier_ticks = carrier_ticks;
+        self.now = Instant(self.settings.first_peak_ticks());
+    }
+
     /// The PWM timer's interrupt, at the carrier's peak. Deadline: the next valley, where the shadow registers take over.
     pub fn run(&mut self, port: &mut impl DualPwmPort, shared: &Shared) {
         let now = self.now;
@@ -75,26 +84,28 @@ impl<M: Machine> PwmTask<M> {
         let violation = self.violation(&sample, command.as_ref(), stale);
         self.check(violation, port);
         let mut given = None;
-        let mut next = PlayedPeriod::off(self.settings.half_steps());
+        let half_steps = self.settings.half_steps();
         let mut expected = Expected::OFF;
-        if let Some(command) = command.filter(|command| command.gates == Gates::Pulse && self.trip.is_none())
-        {
-            let request = self.request(&command, &sample);
-            match nine_switch::step(&request) {
-                Ok(period) => {
-                    for (ticks, gate) in next.gates.iter_mut().zip(&period.gates) {
-                        *ticks = gate.ticks(self.settings.half_steps());
-                    }
-                    expected = Expected::of(&next, &self.settings);
-                    given = Some(shares(&request, &period));
+        let pulsing = command.filter(|command| command.gates == Gates::Pulse && self.trip.is_none());
+        let request = pulsing.map(|command| self.request(&command, &sample));
+        match request.as_ref().map(|request| (nine_switch::step(request), request)) {
+            Some((Ok(period), request)) => {
+                for (ticks, gate) in self.next.gates.iter_mut().zip(&period.gates) {
+                    *ticks = gate.ticks(half_steps);
                 }
-                Err(refused) => self.check(Some(refusal(refused, &request)), port),
+                expected = Expected::of(&self.next, &self.settings);
+                given = Some(shares(request, &period));
             }
+            Some((Err(refused), request)) => {
+                self.check(Some(refusal(refused, request)), port);
+                self.next = PlayedPeriod::off(half_steps);
+            }
+            None => self.next = PlayedPeriod::off(half_steps),
         }
         self.last_link_v = Some(link_v(&sample));
         let [_, running] = self.expected;
         self.expected = [running, expected];
-        port.play(now, &next);
+        port.play(now, &self.next);
         shared.applied.publish(DualApplied {
             at: now,
             next: given,
@@ -224,7 +235,8 @@ impl Expected {
         let mut expected = Self { must_be_on: 0, may_be_on: 0, is_off: 0 };
         let mut bit = 1;
         for gate in &period.gates {
-            let pause = gate.off_to.saturating_sub(gate.off_from);
+            // Never the other way round: rounding keeps order.
+            let pause = gate.off_to.wrapping_sub(gate.off_from);
             expected.must_be_on |= if pause < longest_pause { bit } else { 0 };
             expected.may_be_on |= if pause < half { bit } else { 0 };
             expected.is_off |= if pause > 0 { bit } else { 0 };

@@ -3,7 +3,7 @@
 use super::Settings;
 use super::glide::Glide;
 use crate::cell::{Record, SEEN};
-use crate::control::{Boundary, Committed, Follows, Ripple};
+use crate::control::{Boundary, Committed, Earlier, Follows, Ripple};
 use crate::drive::messages::{COMMITTAL_WORDS, CommittalRecord, HalfKind};
 use crate::frames::{Abc, AlphaBeta, Angle};
 use crate::modulation::{Mode, RippleFlux, depth_limit, first_half, ripple_share};
@@ -178,8 +178,7 @@ impl Applied {
         }
         let passed = if used == Some(self.before) { self.passed } else { None };
         Some(Boundary {
-            currents_a: self.currents_a,
-            age_s: clock.seconds(now.since(self.at)),
+            earlier: Some(Earlier { currents_a: self.currents_a, age_s: clock.seconds(now.since(self.at)) }),
             volt_seconds: passed.map(|ticks| ticks * (udc_v * clock.tick_s)),
             length_s: clock.seconds(self.at.since(self.before)),
         })

@@ -277,7 +277,7 @@ impl<M: Machine> ControlTask<M> {
         let input = Input {
             measured: &sample.measured,
             demand: &demand,
-            window: &sample.window,
+            window: Some(&sample.window),
             committed: &committed,
             boundary: boundary.as_ref(),
         };

@@ -2,7 +2,7 @@
 
 use crate::control::six_step_v;
 use crate::machine::Ratings;
-use crate::modulation::Mode;
+use crate::modulation::{GROWTH_SECTORS, Mode};
 
 /// How fast the voltage glides from square wave to what the torque needs, in shares of six-step per second.
 const GLIDE_PER_S: f32 = 12.0;
@@ -52,13 +52,16 @@ impl Glide {
     }
 
     /// The largest fundamental as a share of six-step, and whether it is to be used whatever the torque needs: in square wave, and
-    /// after it for as long as the voltage glides from there to what the torque `needed` in the last period.
+    /// after it for as long as the voltage glides from there to what the torque `needed` in the last period: once the pattern has
+    /// grown.
     pub(super) fn fill(&mut self, decided: Mode, largest: f32, needed: f32, period_s: f32) -> (f32, bool) {
         if decided == Mode::Square {
             self.filled_to = 1.0;
             return (largest, true);
         }
-        self.filled_to -= GLIDE_PER_S * period_s;
+        if self.unsettled.1 == 0 {
+            self.filled_to -= GLIDE_PER_S * period_s;
+        }
         if !decided.is_pattern() || self.filled_to < needed {
             self.filled_to = 0.0;
             return (largest, false);
@@ -88,14 +91,12 @@ impl Glide {
         sided_nm
     }
 
-    /// Whether two sectors have passed since the square wave gave way to a pattern or the other way round: so long the flux
-    /// hexagon is off its centre, on its way to another size.
+    /// Whether a pattern has grown out of another: until then the flux hexagon is off its centre, on its way to another size.
     pub(super) fn is_settled(&mut self, decided: Mode, boundary_passed: bool) -> bool {
         let (mode, halves) = &mut self.unsettled;
         if decided != *mode {
-            let echoes = (decided == Mode::Square && mode.is_pattern())
-                || (*mode == Mode::Square && decided.is_pattern());
-            *halves = if echoes { 2 * decided.sector_halves() } else { 0 };
+            let grows = decided.is_pattern() && mode.is_pattern();
+            *halves = if grows { GROWTH_SECTORS * decided.sector_halves() } else { 0 };
             *mode = decided;
         } else if boundary_passed {
             *halves = halves.saturating_sub(1);
