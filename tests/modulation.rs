@@ -163,7 +163,7 @@ fn a_pattern_that_catches_a_machine_stands_on_its_centre_at_once() {
 #[test]
 fn a_mode_is_kept_for_its_dwell_time() {
     for swings in [3, 5, 20] {
-        let reference = |k: usize| (0.3, if k / swings % 2 == 0 { 36.0 } else { 44.0 }, 1500.0);
+        let reference = |k: usize| (0.3, if (k / swings).is_multiple_of(2) { 36.0 } else { 44.0 }, 1500.0);
         let halves = by_halves(&(0..2_000).map(reference).collect::<Vec<_>>());
         let (mut now_s, mut last_s, mut shortest_s) = (0.0, None, f64::INFINITY);
         for pair in halves.windows(2) {

@@ -6,8 +6,7 @@ use crate::run::{CLOCK, refused};
 use crate::trace;
 use anyhow::{Result, bail};
 use std::path::Path;
-use tractive::control::six_step_v;
-use tractive::frames::Angle;
+use tractive::frames::{Angle, six_step_v};
 use tractive::modulation::{Devices, Mode, Modulator, Reference, Schedule, depth_limit};
 use tractive::time::Instant;
 

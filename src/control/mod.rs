@@ -22,14 +22,14 @@ mod speed_loop;
 mod torque_trim;
 mod z_source;
 
-use crate::frames::{Abc, AlphaBeta, Angle, Dq, SinCos};
+use crate::frames::{Abc, AlphaBeta, Angle, Dq, SinCos, six_step_v};
 use crate::machine::Tables;
 use crate::time::Clock;
 
 pub use current_loop::{Follows, Gains};
 pub use demand::{Demand, LinkWindow};
 pub use mtpa::{mtpa, mtpa_passes};
-pub use reference::{OperatingPoint, Region, VoltageLimit, operating_point, six_step_v};
+pub use reference::{OperatingPoint, Region, VoltageLimit, operating_point};
 pub use speed_loop::{SpeedDesign, SpeedInput, SpeedLoop};
 pub use z_source::{
     Limited, ZSource, ZSourceDesign, ZSourceError, ZSourceGains, ZSourceInput, ZSourceOutput,
