@@ -211,6 +211,11 @@ pub fn sqrt(x: f32) -> f32 {
     if x < 0.0 { 0.0 } else { crate::board::fpu::sqrt(x) }
 }
 
+/// Peak phase voltage of the six-step fundamental, 2 udc/π, in V, of a link of `udc_v`.
+pub fn six_step_v(udc_v: f32) -> f32 {
+    udc_v * (2.0 * core::f32::consts::FRAC_1_PI)
+}
+
 /// `x` held between `low` and `high`; NaN stays NaN. (`f32::clamp` panics on a bad range; this cannot.)
 #[inline]
 pub fn limit(x: f32, low: f32, high: f32) -> f32 {

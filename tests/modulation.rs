@@ -17,22 +17,26 @@ fn rate(hz: f32) -> f32 {
     hz * 4_294_967_296.0 / 25e6
 }
 
-/// Steps through halves with references drawn by the test.
-fn play(references: &[(f32, f32, f32)]) -> Vec<CarrierPeriod> {
+/// Steps through halves with references drawn by the test: depth, Hz, V.
+fn by_halves(references: &[(f32, f32, f32)]) -> Vec<CarrierPeriod> {
     let mut modulator = Modulator::new(devices(), Schedule::new(&CLOCK));
     let (mut now, mut angle) = (Instant(u32::MAX - 1_000_000), Angle::ZERO);
     let mut halves = Vec::new();
     for (depth, hz, udc_v) in references {
-        for _ in 0..40 {
-            let voltage_v = depth * udc_v * std::f32::consts::FRAC_2_PI;
-            let reference = Reference::turning(voltage_v, angle, rate(*hz), now, *udc_v);
-            let half = modulator.step(now, Some(&reference));
-            now = now.after(half.period_ticks);
-            angle = angle + Angle((rate(*hz) * half.period_ticks as f32) as i32 as u32);
-            halves.push(half);
-        }
+        let voltage_v = depth * udc_v * std::f32::consts::FRAC_2_PI;
+        let reference = Reference::turning(voltage_v, angle, rate(*hz), now, *udc_v);
+        let half = modulator.step(now, Some(&reference));
+        now = now.after(half.period_ticks);
+        angle = angle + Angle((rate(*hz) * half.period_ticks as f32) as i32 as u32);
+        halves.push(half);
     }
     halves
+}
+
+/// The same with each reference for 40 halves.
+fn play(references: &[(f32, f32, f32)]) -> Vec<CarrierPeriod> {
+    let held = references.iter().flat_map(|reference| [*reference; 40]);
+    by_halves(&held.collect::<Vec<_>>())
 }
 
 proptest! {
@@ -152,6 +156,24 @@ fn a_pattern_that_catches_a_machine_stands_on_its_centre_at_once() {
             let off = centre_after_catch(pattern, begin as f32 / 72.0, share, lead);
             assert!(off < 0.01, "{pattern:?} {begin} {share} {lead}: {off}");
         }
+    }
+}
+
+/// However quickly a frequency swings across a border, a mode is kept for 30 ms.
+#[test]
+fn a_mode_is_kept_for_its_dwell_time() {
+    for swings in [3, 5, 20] {
+        let reference = |k: usize| (0.3, if (k / swings).is_multiple_of(2) { 36.0 } else { 44.0 }, 1500.0);
+        let halves = by_halves(&(0..2_000).map(reference).collect::<Vec<_>>());
+        let (mut now_s, mut last_s, mut shortest_s) = (0.0, None, f64::INFINITY);
+        for pair in halves.windows(2) {
+            now_s += f64::from(pair[0].period_ticks) / 25e6;
+            if pair[0].mode != pair[1].mode {
+                shortest_s = shortest_s.min(last_s.map_or(f64::INFINITY, |last_s| now_s - last_s));
+                last_s = Some(now_s);
+            }
+        }
+        assert!((0.03..0.05).contains(&shortest_s), "{swings}: {shortest_s} s");
     }
 }
 

@@ -7,7 +7,7 @@ use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
 use tractive::frames::{Abc, Angle, Dq};
 use tractive::machine::BUILT_IN;
 use tractive::modulation::{CarrierPeriod, Devices, Mode};
-use tractive::protection::{Fault, SafeState, Trip};
+use tractive::protection::{Fault, LegFaults, SafeState, Trip};
 use tractive::time::{Clock, Instant};
 
 const CLOCK: Clock = Clock::new(25_000_000, 2_500);
@@ -295,9 +295,11 @@ fn the_pwm_interrupt_finds_overcurrent_too() {
 #[test]
 fn overspeed_is_found_and_short_circuits() {
     let fast = BUILT_IN.ratings.trip_speed_rad_s * BUILT_IN.ratings.pole_pairs * 1.01;
-    let mut fake = Fake::turning(fast);
-    let trip = drive(&mut fake, END, u32::MAX).unwrap();
-    assert_eq!((trip.fault, trip.safe), (Fault::Overspeed, SafeState::ShortCircuit));
+    for omega in [fast, -fast] {
+        let mut fake = Fake::turning(omega);
+        let trip = drive(&mut fake, END, u32::MAX).unwrap();
+        assert_eq!((trip.fault, trip.safe), (Fault::Overspeed, SafeState::ShortCircuit), "{omega}");
+    }
 }
 
 #[test]
@@ -313,6 +315,30 @@ fn the_safe_state_follows_the_emf() {
     }
     // On a lower link the diodes rectify earlier.
     assert_eq!(tractive::protection::safe_state(1300.0, 1000.0, &BUILT_IN.ratings), SafeState::ShortCircuit);
+}
+
+/// A leg whose one driver blocks has the other device conducting: that one's rail is safe at every speed. Bits uh ul vh vl wh wl.
+#[test]
+fn a_short_circuit_of_devices_decides_the_rail() {
+    const UPPER: SafeState = SafeState::UpperShortCircuit;
+    const LOWER: SafeState = SafeState::ShortCircuit;
+    const OFF: SafeState = SafeState::GatesOff;
+    // Slow; so fast that the diodes rectify; so fast that the link does not stand it.
+    let omegas = [500.0, 1_900.0, 2_900.0];
+    for (blocked, low, high, safe) in [
+        (0, 0, 0, [OFF, LOWER, LOWER]),
+        (0b00_0001, 0, 0, [LOWER; 3]),
+        (0b00_0100, 0, 0, [LOWER; 3]),
+        (0b00_0010, 0, 0, [UPPER; 3]),
+        (0b10_0000, 0, 0, [UPPER; 3]),
+        (0b00_0011, 0, 0, [OFF, OFF, LOWER]),
+        (0, 0, 0b100, [OFF, UPPER, UPPER]),
+        (0, 0b001, 0, [OFF, LOWER, LOWER]),
+    ] {
+        let legs = LegFaults { blocked, low, high };
+        let found = omegas.map(|omega| legs.safe_state(omega, 1500.0, &BUILT_IN.ratings));
+        assert_eq!(found, safe, "{legs:?}");
+    }
 }
 
 /// When a passing cause is over.

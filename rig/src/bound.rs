@@ -11,7 +11,7 @@ use crate::machine::Machine;
 use crate::options::RunOptions;
 use crate::pattern::{self, Wanted};
 use crate::trace::Recording;
-use crate::verdict::{Verdict, bound};
+use crate::verdict::{Verdict, bound, worst};
 use core::f64::consts::TAU;
 use serde::Serialize;
 use tractive::modulation::Mode;
@@ -81,9 +81,9 @@ const fn cycles(mode: Mode) -> u32 {
 
 /// What is wanted of distortion and torque ripple: of an ideal inverter, no more than a little over the bound.
 pub fn verdicts(points: &[Beside], options: &RunOptions) -> [Verdict; 3] {
-    let most = |value: fn(&Beside) -> f64| points.iter().map(value).fold(f64::NEG_INFINITY, f64::max);
     let judged = |what: &str, value: fn(&Beside) -> f64, at_most: f64, others: &'static str| {
-        Verdict::at_most(what, most(value), bound(options, at_most, f64::INFINITY), others)
+        let found = worst(points.iter().map(value));
+        Verdict::at_most(what, found, bound(options, at_most, f64::INFINITY), others)
     };
     [
         judged("current THD over its bound in %", |point| point.thd_excess_percent, 2.0, "–"),

@@ -112,11 +112,10 @@ pub fn of_recording(
 }
 
 /// Samples of a window of a recording at constant speed, shortened to whole turns of the stator field.
-pub fn samples(recording: &Recording, (from_s, to_s): (f64, f64), machine: &MachineFolder) -> Samples {
-    let speed_rpm = analysis::window(recording, from_s, to_s).last().map_or(0.0, |row| row.speed_rpm);
-    let f1_hz = (speed_rpm * f64::from(machine.parameters.pole_pairs) / 60.0).abs().max(1e-3);
-    let turns = ((to_s - from_s) * f1_hz).floor().max(1.0);
-    let rows = analysis::window(recording, to_s - turns / f1_hz, to_s);
+pub fn samples(recording: &Recording, within: (f64, f64), machine: &MachineFolder) -> Samples {
+    let pole_pairs = machine.parameters.pole_pairs;
+    let rows = analysis::whole_turns(recording, within, pole_pairs);
+    let f1_hz = rows.last().map_or(0.0, |row| row.speed_rpm.abs() * f64::from(pole_pairs) / 60.0);
     Samples {
         angle: rows.iter().map(|row| TAU * f1_hz * row.t_s).collect(),
         current_a: rows.iter().map(|row| row.ia_a).collect(),

@@ -123,7 +123,7 @@ fn inductances(machine: &Machine, d_axis: bool) -> Series {
 
 /// Turn-ons a period of each mode over the frequencies at which the drive used it at full torque.
 fn strategy(recording: &Recording, machine: &Machine) -> Series {
-    let full_nm = worst(recording.rows.iter().map(|row| row.te_ref_nm));
+    let full_nm = worst(recording.rows.iter().map(|row| row.te_ref_nm)).unwrap_or(0.0);
     let full = recording.rows.iter().filter(|row| row.te_ref_nm > 0.999 * full_nm && row.f1_hz > 0.0);
     let mut series = Series::new();
     for row in full {

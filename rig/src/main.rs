@@ -1,7 +1,8 @@
 //! The rig's command line.
 
 use anyhow::{Context, Result};
-use clap::{Parser, Subcommand, ValueEnum};
+use clap::parser::ValueSource;
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand, ValueEnum};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
@@ -9,7 +10,7 @@ use tractive::machine::BUILT_IN;
 use tractive_rig::analysis::Figures;
 use tractive_rig::campaign::{self, command::CampaignOptions};
 use tractive_rig::machine::Machine;
-use tractive_rig::options::{RunOptions, not_negative, positive};
+use tractive_rig::options::{OF_THE_ZS9, RunOptions, check_own, not_negative, positive};
 use tractive_rig::report::{self, Page};
 use tractive_rig::scenario::{self, Scenario};
 use tractive_rig::trace::{self, Recording};
@@ -73,25 +74,25 @@ struct PatternOptions {
     #[arg(long, value_enum)]
     mode: ModeName,
     /// Fundamental, peak phase, in V.
-    #[arg(long, value_parser = not_negative)]
+    #[arg(long, value_parser = not_negative, allow_negative_numbers = true)]
     u: f64,
     /// DC link, in V.
-    #[arg(long, value_parser = positive)]
+    #[arg(long, value_parser = positive, allow_negative_numbers = true)]
     udc: f64,
     /// Stator frequency, in Hz.
-    #[arg(long, value_parser = positive)]
+    #[arg(long, value_parser = positive, allow_negative_numbers = true)]
     f1: f64,
     /// Fundamental periods.
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 1, allow_negative_numbers = true)]
     cycles: u32,
     /// The file to write: t_s,leg,level.
     #[arg(long)]
     out: PathBuf,
     /// Dead time, in µs.
-    #[arg(long, default_value_t = 0.0, value_parser = not_negative)]
+    #[arg(long, default_value_t = 0.0, value_parser = not_negative, allow_negative_numbers = true)]
     dead_time_us: f64,
     /// Shortest pulse, in µs.
-    #[arg(long, default_value_t = 0.0, value_parser = not_negative)]
+    #[arg(long, default_value_t = 0.0, value_parser = not_negative, allow_negative_numbers = true)]
     min_pulse_us: f64,
     /// A folder of tables/, or the path of any machine folder.
     #[arg(long, default_value = "pmasynrm-180kw")]
@@ -122,7 +123,13 @@ impl From<ModeName> for tractive::modulation::Mode {
 }
 
 fn main() -> ExitCode {
-    match command(Cli::parse().command) {
+    let matches = Cli::command().get_matches();
+    let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
+    let given = |name: &str| {
+        let own = matches.subcommand().map(|(_, own)| own);
+        own.and_then(|own| own.value_source(name)) == Some(ValueSource::CommandLine)
+    };
+    match command(cli.command, &given) {
         Ok(code) => code,
         Err(error) => {
             // One line: what was wrong, and where.
@@ -132,9 +139,9 @@ fn main() -> ExitCode {
     }
 }
 
-fn command(command: Command) -> Result<ExitCode> {
+fn command(command: Command, given: &dyn Fn(&str) -> bool) -> Result<ExitCode> {
     match command {
-        Command::Run { scenario, options } => run(&scenario, &options),
+        Command::Run { scenario, options } => run(&scenario, &options, given),
         Command::Bench { scenarios, options } => {
             benchmark::run(&scenarios, &options)?;
             Ok(ExitCode::SUCCESS)
@@ -167,11 +174,13 @@ fn command(command: Command) -> Result<ExitCode> {
     }
 }
 
-fn run(name: &str, options: &RunOptions) -> Result<ExitCode> {
+fn run(name: &str, options: &RunOptions, given: &dyn Fn(&str) -> bool) -> Result<ExitCode> {
     if let Some(scenario) = zs9::scenario::find(name) {
+        check_own(name, &[scenario.own_options(), &OF_THE_ZS9].concat(), given)?;
         return run_zs9(scenario.as_ref(), options);
     }
     let scenario = scenario::find(name)?;
+    check_own(name, scenario.own_options(), given)?;
     // The summary shows what was used, not that nothing was said.
     let options = &RunOptions {
         machine: Some(options.machine().to_owned()),

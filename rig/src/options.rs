@@ -77,6 +77,40 @@ pub fn finite(text: &str) -> Result<f64, String> {
     }
 }
 
+/// Options that are for some scenarios only, by the names of their fields.
+pub const OWN: [&str; 13] = [
+    "down",
+    "brake",
+    "torque_scale",
+    "to",
+    "speed",
+    "torque",
+    "fault_at",
+    "freeze_at",
+    "offset_at",
+    "operated",
+    "step",
+    "no_reverse",
+    "edges",
+];
+/// Options that all of the ZS9's scenarios know, and no others.
+pub const OF_THE_ZS9: [&str; 4] = ["carrier_hz", "uin", "scheme", "inject"];
+
+/// Refuses an option that was given to a scenario that does not know it: it would change nothing.
+///
+/// # Errors
+/// The first such option, by name.
+pub fn check_own(scenario: &str, knows: &[&str], given: impl Fn(&str) -> bool) -> anyhow::Result<()> {
+    for name in OWN.into_iter().chain(OF_THE_ZS9) {
+        anyhow::ensure!(
+            knows.contains(&name) || !given(name),
+            "--{}: scenario {scenario} does not have this option",
+            name.replace('_', "-")
+        );
+    }
+    Ok(())
+}
+
 /// Options of a run.
 #[derive(Clone, Debug, Args, Serialize)]
 pub struct RunOptions {
@@ -91,32 +125,32 @@ pub struct RunOptions {
     #[arg(long)]
     pub machine: Option<String>,
     /// Step of trace.csv, in s; default 50e-6, of steady 5e-6, of the ZS9's scenarios one carrier period, of zs9-cycle 1e-3.
-    #[arg(long, value_parser = positive)]
+    #[arg(long, value_parser = positive, allow_negative_numbers = true)]
     pub dt: Option<f64>,
     /// Seed of the noise.
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 1, allow_negative_numbers = true)]
     pub seed: u64,
     /// Print the summary as JSON.
     #[serde(skip)]
     #[arg(long)]
     pub json: bool,
     /// DC-link voltage, in V; default the machine's nominal one.
-    #[arg(long, value_parser = positive)]
+    #[arg(long, value_parser = positive, allow_negative_numbers = true)]
     pub udc: Option<f64>,
     /// Dead time, in µs.
-    #[arg(long, default_value_t = 0.0, value_parser = not_negative)]
+    #[arg(long, default_value_t = 0.0, value_parser = not_negative, allow_negative_numbers = true)]
     pub dead_time_us: f64,
     /// Leave the dead time uncompensated: neither the pulses are corrected nor is the sixth harmonic of the voltage followed.
     #[arg(long)]
     pub uncompensated: bool,
     /// Shortest pulse, in µs.
-    #[arg(long, default_value_t = 10.0, value_parser = not_negative)]
+    #[arg(long, default_value_t = 10.0, value_parser = not_negative, allow_negative_numbers = true)]
     pub min_pulse_us: f64,
     /// Resolution of the current converters, in bits.
-    #[arg(long, value_parser = clap::value_parser!(u32).range(4..=24))]
+    #[arg(long, value_parser = clap::value_parser!(u32).range(4..=24), allow_negative_numbers = true)]
     pub adc_bits: Option<u32>,
     /// Current noise, rms, in A.
-    #[arg(long, default_value_t = 0.0, value_parser = not_negative)]
+    #[arg(long, default_value_t = 0.0, value_parser = not_negative, allow_negative_numbers = true)]
     pub noise_a: f64,
     /// DC-link ripple, V@HZ.
     #[arg(long)]
@@ -147,16 +181,16 @@ pub struct RunOptions {
     #[arg(long, value_name = "FILE", hide = true)]
     pub calls: Option<PathBuf>,
     /// By how much the PWM timer starts later, in µs.
-    #[arg(long, default_value_t = 0.0, value_parser = not_negative, hide = true)]
+    #[arg(long, default_value_t = 0.0, value_parser = not_negative, allow_negative_numbers = true, hide = true)]
     pub pwm_delay_us: f64,
     /// timing: the demand is not finite from this time on, in s.
-    #[arg(long, value_parser = not_negative, hide = true)]
+    #[arg(long, value_parser = not_negative, allow_negative_numbers = true, hide = true)]
     pub fault_at: Option<f64>,
     /// timing: control is told the same currents again and again from this time on, in s.
-    #[arg(long, value_parser = not_negative, hide = true)]
+    #[arg(long, value_parser = not_negative, allow_negative_numbers = true, hide = true)]
     pub freeze_at: Option<f64>,
     /// timing: a current sensor reads too much from this time on, in s.
-    #[arg(long, value_parser = not_negative, hide = true)]
+    #[arg(long, value_parser = not_negative, allow_negative_numbers = true, hide = true)]
     pub offset_at: Option<f64>,
     /// timing: the operator commands the drive, and the speeds come later by what that takes.
     #[arg(long, hide = true)]
@@ -170,7 +204,7 @@ pub struct RunOptions {
     /// sweep, timing: share of the full torque.
     #[arg(long, default_value_t = 1.0, value_parser = finite, allow_negative_numbers = true)]
     pub torque_scale: f64,
-    /// full-step, steady, mode-borders, reversal: speed, in r/min.
+    /// full-step, steady, mode-borders, reversal, chopper, acknowledge: speed, in r/min.
     #[arg(long, value_parser = finite, allow_negative_numbers = true)]
     pub speed: Option<f64>,
     /// steady: torque, in N·m.
@@ -199,10 +233,10 @@ pub struct Zs9Options {
     #[arg(long)]
     pub edges: bool,
     /// ZS9: carrier frequency, in Hz, 10000 or 20000.
-    #[arg(long, default_value_t = 10_000, value_parser = carrier_hz)]
+    #[arg(long, default_value_t = 10_000, value_parser = carrier_hz, allow_negative_numbers = true)]
     pub carrier_hz: u32,
     /// ZS9: link voltage outside shoot-through, in V: 667 is a shoot-through duty of 0.2, 800 of 0.25.
-    #[arg(long, default_value_t = 667.0, value_parser = positive)]
+    #[arg(long, default_value_t = 667.0, value_parser = positive, allow_negative_numbers = true)]
     pub uin: f64,
     /// ZS9: where the zero vectors lie: s, rs, rthd, zvo, rthd-central or rthd-slide.
     #[serde(serialize_with = "scheme_name")]
@@ -237,6 +271,17 @@ fn carrier_hz(text: &str) -> Result<u32, String> {
     }
 }
 
+/// Options by name, each with its value, least and most.
+fn within(ranges: &[(&str, f64, f64, f64)]) -> anyhow::Result<()> {
+    for (name, value, low, high) in ranges {
+        anyhow::ensure!(
+            (low..=high).contains(&value),
+            "{name} {value:?}: must be from {low} to {high} for this machine"
+        );
+    }
+    Ok(())
+}
+
 impl RunOptions {
     /// Whether inverter, sensors and machine are as control believes them to be.
     pub fn is_ideal(&self) -> bool {
@@ -252,28 +297,31 @@ impl RunOptions {
         let parameters = &machine.folder.parameters;
         let (fastest_rpm, most_nm) = (3.0 * parameters.max_speed_rpm, 10.0 * parameters.max_torque_nm);
         let udc_v = self.udc.unwrap_or(parameters.dc_link_nominal_v);
-        let ripple = self.udc_ripple.unwrap_or(Ripple { amplitude_v: 0.0, frequency_hz: 1.0 });
-        let ranges = [
+        within(&[
             ("--dt", self.dt_s(), f64::from(CLOCK.ticks_per_s).recip(), 0.1),
             ("--udc", udc_v, 0.0, 10.0 * parameters.dc_link_max_v),
-            ("--noise-a", self.noise_a, 0.0, 10.0 * parameters.trip_current_a),
-            ("--udc-ripple", ripple.amplitude_v, 0.0, udc_v),
-            ("--udc-ripple", ripple.frequency_hz, 0.0, 1e5),
-            ("--map-error", self.map_error, -90.0, 900.0),
-            ("--rs-error", self.rs_error, -100.0, 1e4),
-            ("--angle-error", self.angle_error, -360.0, 360.0),
             ("--torque-scale", self.torque_scale, -10.0, 10.0),
             ("--speed", self.speed.unwrap_or(0.0), -fastest_rpm, fastest_rpm),
             ("--torque", self.torque.unwrap_or(0.0), -most_nm, most_nm),
             ("--to", self.to, -fastest_rpm, fastest_rpm),
-        ];
-        for (name, value, low, high) in ranges {
-            anyhow::ensure!(
-                (low..=high).contains(&value),
-                "{name} {value}: must be from {low} to {high} for this machine"
-            );
-        }
-        Ok(())
+        ])?;
+        self.check_flaws(machine, udc_v)
+    }
+
+    /// Whether the flaws make sense with this machine and source, of either system.
+    ///
+    /// # Errors
+    /// The first option that is out of its range, by name.
+    pub fn check_flaws(&self, machine: &Machine, source_v: f64) -> anyhow::Result<()> {
+        let ripple = self.udc_ripple.unwrap_or(Ripple { amplitude_v: 0.0, frequency_hz: 1.0 });
+        within(&[
+            ("--noise-a", self.noise_a, 0.0, 10.0 * machine.folder.parameters.trip_current_a),
+            ("--udc-ripple", ripple.amplitude_v, 0.0, source_v),
+            ("--udc-ripple", ripple.frequency_hz, 0.0, 1e5),
+            ("--map-error", self.map_error, -90.0, 900.0),
+            ("--rs-error", self.rs_error, -100.0, 1e4),
+            ("--angle-error", self.angle_error, -360.0, 360.0),
+        ])
     }
 
     /// The emulator with the image that was handed over.

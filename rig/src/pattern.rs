@@ -2,12 +2,11 @@
 
 use crate::bench::Inverter;
 use crate::plant::Leg;
-use crate::run::CLOCK;
+use crate::run::{CLOCK, refused};
 use crate::trace;
 use anyhow::{Result, bail};
 use std::path::Path;
-use tractive::control::six_step_v;
-use tractive::frames::Angle;
+use tractive::frames::{Angle, six_step_v};
 use tractive::modulation::{Devices, Mode, Modulator, Reference, Schedule, depth_limit};
 use tractive::time::Instant;
 
@@ -47,17 +46,15 @@ pub fn edges(wanted: &Wanted) -> Result<Vec<LegEdge>> {
     let ticks = |microseconds: f64| (microseconds * 1e-6 / tick_s).round() as u32;
     let devices =
         Devices::new(ticks(wanted.min_pulse_us), ticks(wanted.dead_time_us), wanted.max_switching_hz, &CLOCK);
+    devices.check(&CLOCK).map_err(refused)?;
     let rate = (wanted.f1_hz * tick_s * 4_294_967_296.0) as f32;
-    let length_s = f64::from(wanted.cycles) / wanted.f1_hz;
-    if wanted.cycles == 0 || length_s > LONGEST_S {
-        bail!(
-            "--cycles {}: must be from 1 to {:.0} at this frequency",
-            wanted.cycles,
-            LONGEST_S * wanted.f1_hz
-        );
+    let lowest_hz = LONGEST_S.recip();
+    if !(lowest_hz..=HIGHEST_HZ).contains(&wanted.f1_hz) {
+        bail!("--f1 {}: must be from {lowest_hz} to {HIGHEST_HZ}", wanted.f1_hz);
     }
-    if wanted.f1_hz > HIGHEST_HZ {
-        bail!("--f1 {}: must be at most {HIGHEST_HZ}", wanted.f1_hz);
+    let most = (LONGEST_S * wanted.f1_hz).floor();
+    if wanted.cycles == 0 || f64::from(wanted.cycles) > most {
+        bail!("--cycles {}: must be from 1 to {most} at this frequency", wanted.cycles);
     }
     let six_step_v = wanted.udc_v * core::f64::consts::FRAC_2_PI;
     let most = f64::from(depth_limit(wanted.mode, rate, &devices)) * six_step_v;

@@ -73,6 +73,13 @@ pub struct Switch {
     pub speed_rpm: f64,
 }
 
+impl Switch {
+    /// Whether both modes make pulses, and it is within the recording.
+    pub fn is_between_pulses(&self) -> bool {
+        self.t_s > 0.0 && self.from != Mode::Off && self.to != Mode::Off
+    }
+}
+
 /// Where a link's energy went.
 #[derive(Clone, Copy, Debug)]
 pub struct LinkBalance {

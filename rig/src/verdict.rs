@@ -5,38 +5,41 @@ use serde::Serialize;
 
 /// What a verdict says where the bound is not kept.
 pub const FALLS_SHORT: &str = "falls short";
+/// What it says where the run held nothing of the kind: that is no pass.
+pub const NOT_SEEN: &str = "not seen";
 
 /// A figure, its bound, and whether it is kept.
 #[derive(Clone, Debug, Serialize)]
 pub struct Verdict {
     /// What is judged, with its unit.
     pub what: String,
-    /// Found.
-    pub found: f64,
+    /// Found; nothing where the run held nothing of the kind.
+    pub found: Option<f64>,
     /// Wanted at most; nothing where the figure is only reported.
     pub at_most: Option<f64>,
-    /// `pass`, `falls short` or `reported`.
+    /// `pass`, `falls short`, `reported` or `not seen`.
     pub verdict: &'static str,
     /// What the paper, or an ordinary controller in simulation, reached.
     pub others: &'static str,
 }
 
 impl Verdict {
-    /// Judges a figure that should be at most so large; with an infinite bound it is reported.
-    pub fn at_most(what: &str, found: f64, at_most: f64, others: &'static str) -> Self {
-        let at_most = at_most.is_finite().then_some(at_most);
-        let verdict = match at_most {
-            None => "reported",
-            Some(at_most) if found <= at_most => "pass",
-            Some(_) => FALLS_SHORT,
+    /// Judges a figure that should be at most so large; with an infinite bound it is reported. What is no number falls short.
+    pub fn at_most(what: &str, found: impl Into<Option<f64>>, at_most: f64, others: &'static str) -> Self {
+        let (found, at_most) = (found.into(), at_most.is_finite().then_some(at_most));
+        let verdict = match (found, at_most) {
+            (None, _) => NOT_SEEN,
+            (_, None) => "reported",
+            (Some(found), Some(at_most)) if found <= at_most => "pass",
+            _ => FALLS_SHORT,
         };
         Self { what: what.to_owned(), found, at_most, verdict, others }
     }
 }
 
-/// The largest of some values; 0 of none.
-pub fn worst(values: impl Iterator<Item = f64>) -> f64 {
-    values.fold(0.0, f64::max)
+/// The largest of some values; nothing of none, and no number where one of them is none.
+pub fn worst(values: impl Iterator<Item = f64>) -> Option<f64> {
+    values.reduce(|worst, value| if worst.is_nan() || worst > value { worst } else { value })
 }
 
 /// A bound for ideal inverter and sensors, and one for flaws.
@@ -48,4 +51,33 @@ pub fn bound(options: &RunOptions, ideal: f64, with_flaws: f64) -> f64 {
 pub fn torque_bound(options: &RunOptions, ideal: f64, with_flaws: f64) -> f64 {
     let misled = options.angle_error != 0.0 || options.map_error != 0.0;
     if misled { f64::INFINITY } else { bound(options, ideal, with_flaws) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn verdict(found: Option<f64>, at_most: f64) -> &'static str {
+        Verdict::at_most("", found, at_most, "–").verdict
+    }
+
+    #[test]
+    fn only_a_number_within_its_bound_passes() {
+        assert_eq!(verdict(Some(1.0), 1.0), "pass");
+        assert_eq!(verdict(Some(1.1), 1.0), FALLS_SHORT);
+        assert_eq!(verdict(Some(f64::NAN), 1.0), FALLS_SHORT);
+        assert_eq!(verdict(Some(f64::INFINITY), 1.0), FALLS_SHORT);
+        assert_eq!(verdict(Some(f64::NAN), f64::INFINITY), "reported");
+        assert_eq!(verdict(None, 1.0), NOT_SEEN);
+        assert_eq!(verdict(None, f64::INFINITY), NOT_SEEN);
+    }
+
+    #[test]
+    fn the_worst_hides_nothing() {
+        assert_eq!(worst([].into_iter()), None);
+        assert_eq!(worst([-3.0, -1.0, -2.0].into_iter()), Some(-1.0));
+        for values in [[f64::NAN, 1.0, 2.0], [1.0, f64::NAN, 2.0], [1.0, 2.0, f64::NAN]] {
+            assert!(worst(values.into_iter()).is_some_and(f64::is_nan), "{values:?}");
+        }
+    }
 }

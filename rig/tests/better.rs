@@ -2,10 +2,12 @@
 
 use clap::Parser;
 use serde_json::Value;
-use tractive_rig::analysis::Figures;
+use tractive_rig::analysis::{self, Figures};
 use tractive_rig::machine::Machine;
 use tractive_rig::options::RunOptions;
+use tractive_rig::rows::mean;
 use tractive_rig::scenario;
+use tractive_rig::trace::Recording;
 
 #[derive(Parser)]
 struct Line {
@@ -15,13 +17,18 @@ struct Line {
 }
 
 /// Runs a scenario as on the command line, without a fault.
-fn run(line: &str) -> Figures {
+fn driven(line: &str) -> (Recording, Figures) {
     let parsed = Line::parse_from(std::iter::once("test").chain(line.split(' ')));
     let machine = Machine::load(parsed.options.machine()).unwrap();
     let scenario = scenario::find(&parsed.scenario).unwrap();
     let recording = scenario::drive(scenario.as_ref(), &parsed.options, &machine).unwrap();
     assert!(recording.trip().is_none(), "{line}: {:?}", recording.trip());
-    scenario.figures(&recording, &parsed.options, &machine)
+    let figures = scenario.figures(&recording, &parsed.options, &machine);
+    (recording, figures)
+}
+
+fn run(line: &str) -> Figures {
+    driven(line).1
 }
 
 fn list<'a>(figures: &'a Figures, name: &str) -> &'a Vec<Value> {
@@ -34,14 +41,15 @@ fn number(figures: &Value, name: &str) -> f64 {
 
 /// Every bound of the scenario is kept.
 #[track_caller]
-fn keeps_its_bounds(line: &str) {
-    let figures = run(line);
+fn keeps_its_bounds(line: &str) -> Recording {
+    let (recording, figures) = driven(line);
     let verdicts = list(&figures, "verdicts");
     assert!(!verdicts.is_empty(), "{line}");
     for verdict in verdicts {
         println!("{line}: {}: {} of {}", verdict["what"], verdict["found"], verdict["at_most"]);
-        assert_ne!(verdict["verdict"], "falls short", "{line}: {verdict}");
+        assert!(["pass", "reported"].contains(&verdict["verdict"].as_str().unwrap()), "{line}: {verdict}");
     }
+    recording
 }
 
 #[test]
@@ -56,6 +64,15 @@ fn load_steps_are_quick_and_exact() {
 #[test]
 fn torque_is_exact_at_the_characteristic_points() {
     keeps_its_bounds("characteristic");
+    // On a low link two to four of them are not to be had.
+    for (udc_v, limited) in [(1000, 4), (1200, 2), (1800, 0)] {
+        let line = format!("characteristic --udc {udc_v}");
+        keeps_its_bounds(&line);
+        let figures = run(&line);
+        let points = list(&figures, "points").iter();
+        let less = points.filter(|point| number(point, "reference_nm") < 0.999 * number(point, "demand_nm"));
+        assert_eq!(less.count(), limited, "{line}");
+    }
 }
 
 #[test]
@@ -64,15 +81,28 @@ fn switches_of_mode_are_without_shock() {
     keeps_its_bounds("sweep --down --brake --to 2300");
     keeps_its_bounds("sweep --down --torque-scale 0.5 --to 6000");
     keeps_its_bounds("sweep --down --torque-scale 0.5 --brake --to 2800");
-    for speed in [1700, 1885, 1890, 1900, 1950, 2200, 2500, 3000, 3500] {
+    keeps_its_bounds("mode-borders");
+    for speed in [1800, 1890, 1900, 1950, 2200, 2500, 3000, 3500] {
         keeps_its_bounds(&format!("mode-borders --speed {speed}"));
     }
 }
 
 #[test]
 fn square_wave_gives_its_power_to_the_highest_speed() {
-    keeps_its_bounds("sweep --to 6000");
-    keeps_its_bounds("sweep --to 6000 --brake");
+    for (line, from_rpm, power_w) in
+        [("sweep --to 6000", 1_905.0, 246.4e3), ("sweep --to 6000 --brake", 2_300.0, -246.4e3)]
+    {
+        // By the power itself, too, not only by what the drive makes of the demand.
+        let recording = keeps_its_bounds(line);
+        let tenths =
+            (0..250).map(|k| analysis::window(&recording, 0.1 * f64::from(k), 0.1 * f64::from(k + 1)));
+        let fast: Vec<_> = tenths.filter(|rows| rows.iter().all(|row| row.speed_rpm >= from_rpm)).collect();
+        assert!(fast.len() > 150, "{line}");
+        for rows in fast {
+            let found_w = mean(rows, |row| row.te_nm * row.speed_rpm * std::f64::consts::TAU / 60.0);
+            assert!((found_w / power_w - 1.0).abs() < 0.005, "{line}: {found_w} W at {} s", rows[0].t_s);
+        }
+    }
 }
 
 #[test]
@@ -138,6 +168,16 @@ fn dead_time_leaves_no_harmonics() {
     }
 }
 
+/// Where the zero crossings of the current are slow its sign is not enough: the rest is the sixth harmonic that is followed. Without it
+/// 3.4 and 4.1 % were left.
+#[test]
+fn what_the_currents_sign_does_not_tell_of_the_dead_time_is_followed() {
+    let figures = run("steady --speed 100 --torque 100 --dead-time-us 5");
+    for harmonic in list(&figures, "harmonics").iter().filter(|one| one["order"] == 5 || one["order"] == 7) {
+        assert!(number(harmonic, "percent_of_fundamental") < 0.5, "{harmonic}");
+    }
+}
+
 #[test]
 fn flaws_leave_the_switches_without_shock_and_torque_in_its_bounds() {
     const ALL: &str = "--dead-time-us 5 --adc-bits 12 --noise-a 0.5 --udc-ripple 30@300 --rs-error 50";
@@ -157,14 +197,16 @@ fn flaws_leave_the_switches_without_shock_and_torque_in_its_bounds() {
 
 #[test]
 fn a_wrong_map_is_noticed() {
-    const NOMINAL_PEAK_A: f64 = 247.0;
     for percent in [10.0, -10.0, 5.0, -5.0] {
-        let figures = run(&format!("sweep --to 3000 --map-error {percent}"));
-        let value = |name: &str| figures.get(name).and_then(Value::as_f64).unwrap();
-        let (told, peak) = (value("map_error_estimate_percent"), value("peak_current_a"));
-        println!("{percent} %: told {told} %, peak {peak} A");
-        assert!((told - percent).abs() < 1.0, "{told} % for {percent} %");
-        assert!(peak < 1.1 * NOMINAL_PEAK_A, "{peak} A");
+        let line = format!("sweep --to 3000 --map-error {percent}");
+        let figures = run(&line);
+        let judged = |what: &str| {
+            let verdicts = list(&figures, "verdicts").iter();
+            verdicts
+                .filter(|one| one["what"].as_str().unwrap().starts_with(what) && one["verdict"] == "pass")
+                .count()
+        };
+        assert_eq!((judged("peak current over that"), judged("map error told")), (1, 1), "{line}");
     }
     for percent in [10, -10] {
         for scenario in ["restart", "reversal", "link-steps", "load-steps", "mode-borders"] {
@@ -232,4 +274,27 @@ fn our_two_passes_beat_the_papers() {
     println!("trimmed: torque {torque:.3?} %, current {current:.4?} %");
     assert!(started.len() == 4 && torque.len() == 4);
     assert!(worst(&torque) < 0.3 && worst(&current) < 0.05);
+}
+
+/// Where the link does not give the torque, the drive says so all the time, and what it gives is what it says.
+#[test]
+fn a_torque_that_is_not_to_be_had_is_reported() {
+    for (line, most_nm) in [
+        ("steady --speed 2000 --torque 859.4 --udc 1000", 851.0),
+        ("steady --speed 2000 --torque -1000 --udc 1000", 902.0),
+        ("steady --speed 1500 --torque 1235 --udc 1000", 1116.0),
+    ] {
+        let (recording, _) = driven(line);
+        let steady = analysis::window(&recording, 0.6, 1.1);
+        let given_nm = mean(steady, |row| row.te_nm);
+        for row in steady {
+            assert!(row.te_ref_nm.abs() < most_nm, "{line}: {} N·m at {} s", row.te_ref_nm, row.t_s);
+            assert!(
+                (row.te_ref_nm / given_nm - 1.0).abs() < 0.002,
+                "{line}: {} of {given_nm}",
+                row.te_ref_nm
+            );
+        }
+        println!("{line}: {given_nm}");
+    }
 }

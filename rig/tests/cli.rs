@@ -41,12 +41,46 @@ fn bad_usage_is_refused() {
     refused_in_one_line("run sweep --udc 1e9", &["--udc", "must be from"]);
     refused_in_one_line("run steady --speed 1e12", &["--speed", "must be from"]);
     refused_in_one_line("run sweep --map-error -100", &["--map-error -100", "-90"]);
-    for (bad, word) in
-        [("--f1 100 --cycles 0", "--cycles 0"), ("--f1 1e-9", "--cycles 1"), ("--f1 1e5", "--f1 100000")]
-    {
+    refused("run sweep --udc -5", &["'-5'", "'--udc <UDC>'", "must be a number above 0"]);
+    for (bad, word) in [
+        ("--f1 100 --cycles 0", "--cycles 0"),
+        ("--f1 100 --cycles 10001", "1 to 10000"),
+        ("--f1 1e-9", "--f1 0.000000001"),
+        ("--f1 1e5", "--f1 100000"),
+        ("--f1 100 --dead-time-us 1e6", "dead_time_ticks: 25000000"),
+    ] {
         refused_in_one_line(&format!("pattern --mode mid7 --u 1 --udc 2 {bad} --out x"), &[word, "must be"]);
     }
     refused("pattern --mode mid9 --u 1 --udc 2 --f1 3 --out x", &["mid9"]);
+}
+
+/// What would change nothing, or never happen.
+#[test]
+fn options_that_do_nothing_are_refused() {
+    refused_in_one_line("run load-steps --down", &["--down", "load-steps"]);
+    refused_in_one_line("run zs9-load-step --torque-scale 0.5", &["--torque-scale", "zs9-load-step"]);
+    refused_in_one_line("run zs9-reverse --step 40", &["--step", "zs9-reverse"]);
+    refused_in_one_line("run sweep --uin 667", &["--uin", "sweep"]);
+    refused_in_one_line("run zs9-load-step --inject source-short@1.3", &["--inject", "1.3 s", "1.2 s"]);
+}
+
+#[test]
+fn the_zs9_refuses_flaws_out_of_range_too() {
+    refused_in_one_line("run zs9-load-step --map-error -100", &["--map-error -100", "-90"]);
+    refused_in_one_line("run zs9-load-step --udc-ripple 500@300", &["--udc-ripple 500", "400"]);
+}
+
+/// A window shorter than a turn of the field is taken as it is; it was lengthened into the time before.
+#[test]
+fn a_machine_that_stands_has_its_torque() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = rig(&format!("run steady --speed 0 --json --out {}", folder.path().display()));
+    let summary: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let torque_nm = summary["figures"]["point"][0]["torque_nm"].as_f64().unwrap();
+    assert!((torque_nm - 1235.0).abs() < 2.0, "{torque_nm}");
+    for verdict in summary["figures"]["verdicts"].as_array().unwrap() {
+        assert_ne!(verdict["verdict"], "pass", "{verdict}");
+    }
 }
 
 #[test]

@@ -6,7 +6,7 @@ mod folders;
 mod linear;
 
 use brute_force::{Supply, TorqueCurve, Truth};
-use folders::{Analytic, CoEnergy, REFERENCE};
+use folders::{Analytic, CoEnergy, REFERENCE, SMALL};
 use linear::Linear;
 use rayon::prelude::*;
 use std::fmt;
@@ -220,27 +220,6 @@ fn at_place(case: &Case, torques: &[(f64, TorqueCurve)], speed_rpm: f64, udc_v: 
     found
 }
 
-/// Another small one, which saturates.
-const SATURATING: Analytic = Analytic {
-    truth: CoEnergy {
-        ldl_h: 0.003,
-        lql_h: 0.006,
-        psi_m_wb: 0.15,
-        a_j: 0.6,
-        im_a: 10.0,
-        ida_a: 6.0,
-        iqa_a: 8.0,
-        b_j: 0.5,
-        iqb_a: 5.0,
-    },
-    pole_pairs: 3,
-    max_torque_nm: 20.0,
-    max_current_a: 20.0,
-    max_speed_rpm: 6000.0,
-    dc_link_v: 560.0,
-    step_a: 1.0,
-};
-
 /// The machines of other kinds. Those with magnets alone are asked for three times the speed that they drive at elsewhere, so
 /// that they must be weakened too.
 fn others() -> Vec<Case> {
@@ -249,7 +228,7 @@ fn others() -> Vec<Case> {
         let (speed_rpm, power_w) = (times * machine.speed_rpm, times * machine.power_w);
         Case::linear(&Linear { speed_rpm, power_w, ..*machine })
     });
-    linear.chain([Case::analytic("small, saturating", &SATURATING)]).collect()
+    linear.chain([Case::analytic("small, saturating", &SMALL)]).collect()
 }
 
 /// What a folder's nodes leave open: by how much the flux linkage between them differs from the machine's, as a share, at most,

@@ -296,8 +296,7 @@ fn the_folder_weakens_the_field_where_the_inverter_runs_out_of_voltage() {
     let capacitor_v = [400.0, 533.333, 600.0_f32];
     let links_v = [ratings.dc_link_min_v, ratings.dc_link_nominal_v, ratings.dc_link_max_v];
     for (link_v, capacitor_v) in links_v.into_iter().zip(capacitor_v) {
-        let (six_step_v, available_v) =
-            (tractive::control::six_step_v(link_v), capacitor_v / 12.0_f32.sqrt());
+        let (six_step_v, available_v) = (tractive::frames::six_step_v(link_v), capacitor_v / 12.0_f32.sqrt());
         assert!((six_step_v / available_v - 1.0).abs() < 1e-3, "{six_step_v} {available_v}");
     }
 }

@@ -125,3 +125,29 @@ fn envelope_nm(omega: f32, ratings: &Ratings) -> f32 {
     let (speed, power) = (omega.abs(), ratings.max_power_w * ratings.pole_pairs);
     if ratings.max_torque_nm * speed > power { power / speed } else { ratings.max_torque_nm }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_link_ends_motoring_and_braking_whichever_way_it_turns() {
+        let window = LinkWindow {
+            motoring_none_v: 900.0,
+            motoring_full_v: 1000.0,
+            braking_full_v: 1800.0,
+            braking_none_v: 1900.0,
+        };
+        for (udc_v, motoring, braking) in [
+            (850.0, 0.0, 100.0),
+            (950.0, 50.0, 100.0),
+            (1500.0, 100.0, 100.0),
+            (1850.0, 100.0, 50.0),
+            (2000.0, 100.0, 0.0),
+        ] {
+            assert_eq!(window.bounds_nm(udc_v, 100.0, 300.0), (-braking, motoring), "{udc_v} V forward");
+            assert_eq!(window.bounds_nm(udc_v, 100.0, -300.0), (-motoring, braking), "{udc_v} V backward");
+        }
+        assert_eq!(LinkWindow::OPEN.bounds_nm(1e6, 100.0, 300.0), (-100.0, 100.0));
+    }
+}

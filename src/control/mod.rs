@@ -22,14 +22,14 @@ mod speed_loop;
 mod torque_trim;
 mod z_source;
 
-use crate::frames::{Abc, AlphaBeta, Angle, Dq, SinCos};
+use crate::frames::{Abc, AlphaBeta, Angle, Dq, SinCos, six_step_v};
 use crate::machine::Tables;
 use crate::time::Clock;
 
 pub use current_loop::{Follows, Gains};
 pub use demand::{Demand, LinkWindow};
 pub use mtpa::{mtpa, mtpa_passes};
-pub use reference::{OperatingPoint, Region, VoltageLimit, operating_point, six_step_v};
+pub use reference::{OperatingPoint, Region, VoltageLimit, operating_point};
 pub use speed_loop::{SpeedDesign, SpeedInput, SpeedLoop};
 pub use z_source::{
     Limited, ZSource, ZSourceDesign, ZSourceError, ZSourceGains, ZSourceInput, ZSourceOutput,
@@ -304,10 +304,11 @@ impl Controller {
         let point = operating_point(trimmed_nm / scale, omega, &limit, tables);
         let point = OperatingPoint { torque_nm: point.torque_nm * scale, ..point };
         let limited = point.region == Region::Limit;
+        let given_nm = if limited { nearer_zero(point.torque_nm, torque_nm) } else { torque_nm };
         self.trim.step(&torque_trim::Input {
             demand_nm: torque_nm,
             measured_nm,
-            limited,
+            limited: given_nm != torque_nm,
             ripple_share: committed.ripple_share,
             largest_nm: tables.ratings.max_torque_nm,
             period_s: clock.control_s(),
@@ -345,7 +346,7 @@ impl Controller {
                 depth: point.depth,
             },
             map_error: self.map_error.share(),
-            torque_nm: if limited { nearer_zero(point.torque_nm, torque_nm) } else { torque_nm },
+            torque_nm: given_nm,
             point,
         }
     }

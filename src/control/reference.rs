@@ -5,7 +5,7 @@
 //! wave the voltage is what it is, so the point lies on the circle on either side of MTPA.
 
 use super::{flux_linkage, mtpa};
-use crate::frames::{Dq, root, sqrt};
+use crate::frames::{Dq, root, six_step_v, sqrt};
 use crate::machine::{Tables, Weakening};
 
 /// Where an operating point comes from.
@@ -54,11 +54,6 @@ pub struct OperatingPoint {
     pub region: Region,
     /// Voltage of the MTPA point at this speed, as a share of six-step (above 1 where weakening is needed).
     pub depth: f32,
-}
-
-/// Peak phase voltage of the six-step fundamental, 2 udc/π, in V.
-pub fn six_step_v(udc_v: f32) -> f32 {
-    udc_v * (2.0 * core::f32::consts::FRAC_1_PI)
 }
 
 /// Below this share of the voltage limit the MTPA point needs no weakening, by the flux map that the target has; above, the

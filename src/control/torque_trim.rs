@@ -32,7 +32,7 @@ pub struct Input {
     pub demand_nm: f32,
     /// Torque of the measured currents, in N·m.
     pub measured_nm: f32,
-    /// Whether more torque is not to be had.
+    /// Whether less torque is given than demanded.
     pub limited: bool,
     /// Flux ripple over fundamental flux, greater than zero.
     pub ripple_share: f32,
@@ -64,11 +64,12 @@ impl TorqueTrim {
             self.hold_s -= input.period_s;
             return;
         }
-        let missing = input.demand_nm - input.measured_nm;
-        let missing = if input.demand_nm < 0.0 { -missing } else { missing };
-        if input.limited && missing > 0.0 {
+        // Not by either sign: the crests of the ripple alone would take the trim down until the limit seemed kept.
+        if input.limited {
             return;
         }
+        let missing = input.demand_nm - input.measured_nm;
+        let missing = if input.demand_nm < 0.0 { -missing } else { missing };
         let step = BANDWIDTH_RAD_S * input.period_s * missing / scale(input.demand_nm, input.largest_nm);
         let square = input.ripple_share * input.ripple_share;
         self.curvature = limit(self.curvature * square + step, -MOST, MOST) / square;

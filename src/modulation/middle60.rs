@@ -6,8 +6,7 @@
 //! and each half sets its own part anew.
 
 use super::{CarrierPeriod, Devices, Mode};
-use crate::control::six_step_v;
-use crate::frames::limit;
+use crate::frames::{limit, six_step_v};
 
 /// 4 sin 70° + 2 of equation (17): three notches at 70°, 90°, 110°.
 const SEVEN_PULSE_SUM: f32 = 5.758_77;

@@ -1,6 +1,7 @@
 //! `flux_map.csv`: the nodes of the flux map, and what a flux map must be.
 
 use crate::InputError;
+use std::cmp::Ordering;
 use std::path::Path;
 
 /// Flux linkage over a full, even grid of currents, both signs of iq.
@@ -37,15 +38,24 @@ struct Node {
     psi_q: f64,
 }
 
+impl Node {
+    /// Which of two comes first in the grid, iq running faster.
+    fn place(&self, other: &Self) -> Ordering {
+        self.id.total_cmp(&other.id).then(self.iq.total_cmp(&other.iq))
+    }
+}
+
 impl FluxMap {
     /// Reads and checks the file.
     ///
     /// # Errors
     /// Names the line, the column, the value and what is allowed.
     pub fn read(file: &Path) -> Result<Self, InputError> {
-        let nodes = read_nodes(file)?;
+        let mut nodes = read_nodes(file)?;
         let (id_a, iq_a) = axes(&nodes, file)?;
-        check_order(&nodes, &id_a, &iq_a, file)?;
+        let sorted = nodes.is_sorted_by(|a, b| a.place(b).is_le());
+        nodes.sort_by(Node::place);
+        check_grid(&nodes, &id_a, &iq_a, sorted, file)?;
         check_monotone(&nodes, iq_a.len(), file)?;
         let whole =
             if iq_a[0] < 0.0 { check_even(&nodes, &iq_a, file)? } else { mirror(&nodes, &iq_a, file)? };
@@ -106,7 +116,8 @@ fn read_nodes(file: &Path) -> Result<Vec<Node>, InputError> {
         for ((value, field), column) in values.iter_mut().zip(&record).zip(COLUMNS) {
             let largest = if column.ends_with("_a") { LARGEST_CURRENT_A } else { LARGEST_FLUX_WB };
             *value = match field.parse::<f64>() {
-                Ok(number) if number.is_finite() && number.abs() <= largest => number,
+                // There is one zero.
+                Ok(number) if number.is_finite() && number.abs() <= largest => number + 0.0,
                 Ok(number) if number.is_finite() => {
                     let problem = format!("{column}: {field}: must be from {} to {largest}", -largest);
                     return Err(refuse(Some(line), problem));
@@ -160,37 +171,28 @@ fn axes(nodes: &[Node], file: &Path) -> Result<(Vec<f64>, Vec<f64>), InputError>
     Ok((id, iq))
 }
 
-/// Every node once, iq running faster.
-fn check_order(nodes: &[Node], id: &[f64], iq: &[f64], file: &Path) -> Result<(), InputError> {
-    let expected = id.iter().flat_map(|d| iq.iter().map(move |q| (*d, *q)));
-    let mut found = nodes.iter();
-    for (d, q) in expected {
-        let Some(node) = found.next() else {
-            return Err(InputError::new(file, None, format!("id_a,iq_a: {d},{q}: missing: must be there")));
-        };
-        if (node.id, node.iq) == (d, q) {
-            continue;
-        }
-        let here = format!("id_a,iq_a: {},{}", node.id, node.iq);
-        let earlier = nodes.iter().find(|other| (other.id, other.iq) == (node.id, node.iq));
-        let problem = match earlier {
-            Some(other) if other.line < node.line => {
-                format!("{here}: duplicate of line {}: must be there once", other.line)
-            }
-            _ if nodes.iter().any(|other| (other.id, other.iq) == (d, q)) => {
-                format!("{here}: unsorted: must be {d},{q} (id ascending, iq ascending within)")
-            }
-            _ => format!("id_a,iq_a: {d},{q}: missing before this line: must be there"),
-        };
-        return Err(InputError::new(file, Some(node.line), problem));
+/// Every node once; they come in the grid's order, iq running faster, and were `sorted` so in the file or not.
+fn check_grid(nodes: &[Node], id: &[f64], iq: &[f64], sorted: bool, file: &Path) -> Result<(), InputError> {
+    if let Some(twins) = nodes.windows(2).find(|pair| pair[0].place(&pair[1]).is_eq()) {
+        let (Node { id, iq, line, .. }, earlier) = (twins[1], twins[0].line);
+        let problem = format!("id_a,iq_a: {id},{iq}: duplicate of line {earlier}: must be there once");
+        return Err(InputError::new(file, Some(line), problem));
     }
-    match found.next() {
-        Some(node) => Err(InputError::new(
-            file,
-            Some(node.line),
-            format!("id_a,iq_a: {},{}: duplicate: must be there once", node.id, node.iq),
-        )),
+    let mut expected = id.iter().flat_map(|d| iq.iter().map(move |q| (*d, *q)));
+    let mut found = nodes.iter();
+    let missing = expected.find_map(|(d, q)| match found.next() {
+        Some(node) if (node.id, node.iq) == (d, q) => None,
+        next => Some((d, q, next.filter(|_| sorted))),
+    });
+    match missing {
         None => Ok(()),
+        Some((d, q, None)) => {
+            Err(InputError::new(file, None, format!("id_a,iq_a: {d},{q}: missing: must be there")))
+        }
+        Some((d, q, Some(next))) => {
+            let problem = format!("id_a,iq_a: {d},{q}: missing before this line: must be there");
+            Err(InputError::new(file, Some(next.line), problem))
+        }
     }
 }
 

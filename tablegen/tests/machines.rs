@@ -5,7 +5,7 @@ mod common;
 #[path = "common/judge.rs"]
 mod judge;
 
-use common::{Analytic, CoEnergy, Folder, REFERENCE, axis, good_toml, linear, reference_folder};
+use common::{Analytic, Folder, REFERENCE, SMALL, axis, good_toml, linear, reference_folder};
 use judge::Judge;
 use tractive_tablegen::MachineFolder;
 
@@ -104,26 +104,7 @@ fn a_reluctance_machine_without_magnets() {
 
 #[test]
 fn a_small_machine_on_a_fine_grid() {
-    let machine = Analytic {
-        truth: CoEnergy {
-            ldl_h: 0.003,
-            lql_h: 0.006,
-            psi_m_wb: 0.15,
-            a_j: 0.6,
-            im_a: 10.0,
-            ida_a: 6.0,
-            iqa_a: 8.0,
-            b_j: 0.5,
-            iqb_a: 5.0,
-        },
-        pole_pairs: 3,
-        max_torque_nm: 20.0,
-        max_current_a: 20.0,
-        max_speed_rpm: 6000.0,
-        dc_link_v: 560.0,
-        step_a: 1.0,
-    };
-    check("small", machine.folder().read().unwrap(), &TIGHT);
+    check("small", SMALL.folder().read().unwrap(), &TIGHT);
 }
 
 #[test]

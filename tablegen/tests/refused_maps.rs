@@ -160,13 +160,25 @@ fn a_node_twice() {
 }
 
 #[test]
-fn an_unsorted_grid() {
-    let mut map = Map::good();
-    map.lines.swap(Map::line(7, 9) - 1, Map::line(7, 10) - 1);
-    says(&map.text(), "flux_map.csv:193: id_a,iq_a: -180,100: unsorted:", "must be -180,90");
-    let mut map = Map::good();
-    map.lines[1..].reverse();
-    says(&map.text(), "flux_map.csv:2: id_a,iq_a: 50,250: unsorted:", "must be -250,0");
+fn the_order_of_the_nodes_does_not_matter() {
+    let read = |map: &Map| Folder::new(&good_toml(), &map.text()).read().unwrap().map;
+    let sorted = read(&Map::good());
+    let mut backward = Map::good();
+    backward.lines[1..].reverse();
+    assert_eq!(read(&backward), sorted);
+    // id running faster.
+    let mut other = Map::good();
+    let rows = (other.lines.len() - 1) / COLUMNS;
+    let nodes = (0..COLUMNS).flat_map(|column| (0..rows).map(move |row| Map::line(row, column) - 1));
+    other.lines = std::iter::once(0).chain(nodes).map(|k| Map::good().lines[k].clone()).collect();
+    assert_eq!(read(&other), sorted);
+    // What is wrong in it is named all the same.
+    let last = other.lines.len();
+    other.lines[last - 1] = other.lines[last - 2].clone();
+    let begin = format!("flux_map.csv:{last}: id_a,iq_a: 40,250: duplicate of line {}:", last - 1);
+    says(&other.text(), &begin, "must be there once");
+    other.lines.pop();
+    says(&other.text(), "flux_map.csv: id_a,iq_a: 50,250: missing:", "must be there");
 }
 
 #[test]

@@ -10,7 +10,7 @@ use crate::report::Page;
 use crate::rows::mean;
 use crate::steps::held;
 use crate::trace::Recording;
-use crate::verdict::Verdict;
+use crate::verdict::{Verdict, worst};
 use tractive::machine::Ratings;
 use tractive::operator::Request;
 use tractive::protection::Fault;
@@ -63,6 +63,10 @@ impl Scenario for Acknowledge {
         "no figure: a gate driver fails, and the fault is acknowledged"
     }
 
+    fn own_options(&self) -> &'static [&'static str] {
+        &["speed"]
+    }
+
     fn plan(&self, options: &RunOptions, machine: &Machine) -> Plan {
         let scale = machine.folder.parameters.rated_speed_rpm / 2_000.0;
         Plan::operated(DURATION_S, vec![(0.0, options.speed.unwrap_or(SPEED_RPM * scale))])
@@ -83,7 +87,8 @@ impl Scenario for Acknowledge {
         let named = recording.trip().is_some_and(|trip| trip.fault == Fault::GateDriver);
         // Current flows on through the diodes until the field is empty.
         let dead = analysis::window(recording, FAILS_S.0 + 0.05, 2.3);
-        let current_a = crate::verdict::worst(dead.iter().map(crate::trace::Row::peak_current_a));
+        let largest_a = machine.folder.parameters.max_current_a;
+        let current = worst(dead.iter().map(|row| row.peak_current_a() / largest_a));
         let after = analysis::window(recording, 2.8, DURATION_S);
         let torque_nm = mean(after, |row| row.te_nm);
         let error = (torque_nm / (0.5 * machine.folder.parameters.max_torque_nm) - 1.0).abs();
@@ -96,12 +101,7 @@ impl Scenario for Acknowledge {
                 "–",
             ),
             Verdict::at_most("fault with another name", f64::from(u8::from(!named)), 0.0, "–"),
-            Verdict::at_most(
-                "current between fault and enable (of the largest)",
-                current_a / machine.folder.parameters.max_current_a,
-                0.02,
-                "–",
-            ),
+            Verdict::at_most("current between fault and enable (of the largest)", current, 0.02, "–"),
             Verdict::at_most("mean torque off the demand at the end (share)", error, 0.01, "–"),
         ]);
         line::figures(&mut figures, recording);

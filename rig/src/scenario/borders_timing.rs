@@ -3,11 +3,8 @@
 
 use super::script::Script;
 use super::{Plan, Scenario};
-use crate::analysis::{self, Figures};
 use crate::machine::Machine;
 use crate::options::RunOptions;
-use crate::report::Page;
-use crate::trace::Recording;
 
 /// Full torque, at speeds that swing across a border, and an enable that comes and goes.
 pub struct BordersTiming;
@@ -55,15 +52,5 @@ impl Scenario for BordersTiming {
             ..Script::default()
         }
         .plan()
-    }
-
-    fn figures(&self, recording: &Recording, _options: &RunOptions, _machine: &Machine) -> Figures {
-        let mut figures = analysis::common(recording);
-        figures.set("modes", analysis::modes(recording));
-        figures
-    }
-
-    fn plots(&self, recording: &Recording, page: &mut Page) {
-        page.overview(recording);
     }
 }

@@ -76,8 +76,8 @@ fn stretches(recording: &Recording) -> Vec<Stretch> {
                     row.status.map_or(0.0, |status| f64::from(status.switches.chopper))
                 }),
                 braking_kw: mean(steady, power),
-                link_peak_v: worst(rows.iter().map(|row| row.udc_v)),
-                current_peak_a: worst(rows.iter().map(Row::peak_current_a)),
+                link_peak_v: worst(rows.iter().map(|row| row.udc_v)).unwrap_or(f64::NAN),
+                current_peak_a: worst(rows.iter().map(Row::peak_current_a)).unwrap_or(f64::NAN),
             }
         })
         .collect()
@@ -90,6 +90,10 @@ impl Scenario for Chopper {
 
     fn figure(&self) -> &'static str {
         "no figure: full braking into a link that cannot take the energy"
+    }
+
+    fn own_options(&self) -> &'static [&'static str] {
+        &["speed"]
     }
 
     fn plan(&self, options: &RunOptions, machine: &Machine) -> Plan {
@@ -128,6 +132,7 @@ impl Scenario for Chopper {
         let (trip_v, highest_v) = (f64::from(ratings.trip_dc_over_v), f64::from(ratings.dc_link_max_v));
         // Where the link's rise ends, between its highest operating voltage (0) and the trip (1).
         let rise = |stretch: &Stretch| (stretch.link_peak_v - highest_v) / (trip_v - highest_v);
+        let largest_a = f64::from(ratings.max_current_a);
         let most_kw = machine.folder.parameters.max_power_w / 1e3;
         let mut verdicts = line::verdicts(recording, &[]);
         verdicts.extend([
@@ -150,8 +155,7 @@ impl Scenario for Chopper {
             Verdict::at_most("braking power without it (of all)", none.braking_kw / most_kw, 0.1, "–"),
             Verdict::at_most(
                 "peak current over the largest one",
-                worst(stretches.iter().map(|stretch| stretch.current_peak_a))
-                    / f64::from(ratings.max_current_a),
+                worst(stretches.iter().map(|stretch| stretch.current_peak_a / largest_a)),
                 1.15,
                 "–",
             ),

@@ -24,6 +24,10 @@ impl Scenario for FullStep {
         "figure 8: load steps, here all of them in one"
     }
 
+    fn own_options(&self) -> &'static [&'static str] {
+        &["speed"]
+    }
+
     fn plan(&self, options: &RunOptions, machine: &Machine) -> Plan {
         let speed_rpm = options.speed.unwrap_or(SPEED_RPM);
         Script {

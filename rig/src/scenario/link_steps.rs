@@ -62,7 +62,7 @@ impl Scenario for LinkSteps {
             vec![
                 Verdict::at_most(
                     "peak current over the trip level",
-                    worst(recording.rows.iter().map(Row::peak_current_a)) / trip_a,
+                    worst(recording.rows.iter().map(Row::peak_current_a)).map(|peak_a| peak_a / trip_a),
                     1.0,
                     "–",
                 ),

@@ -19,7 +19,7 @@ const LEVELS_NM: [f64; 13] =
 
 /// The levels as shares of this machine's largest torque.
 fn levels_nm(machine: &Machine) -> [f64; 13] {
-    let scale = machine.folder.parameters.max_torque_nm / worst(LEVELS_NM.into_iter());
+    let scale = machine.folder.parameters.max_torque_nm / LEVELS_NM[LEVELS_NM.len() / 2];
     LEVELS_NM.map(|level| level * scale)
 }
 

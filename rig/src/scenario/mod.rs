@@ -15,9 +15,10 @@ mod reversal;
 mod script;
 mod steady;
 mod sweep;
+mod switches;
 mod timing;
 
-use crate::analysis::Figures;
+use crate::analysis::{self, Figures};
 use crate::bench::injected::Injection;
 use crate::bench::{self, Bench, Limits, LinePlan, Operator, Supply, inject};
 use crate::machine::Machine;
@@ -71,14 +72,22 @@ pub trait Scenario {
     fn name(&self) -> &'static str;
     /// The paper's figure that it answers.
     fn figure(&self) -> &'static str;
+    /// Which of [`crate::options::OWN`] it knows.
+    fn own_options(&self) -> &'static [&'static str] {
+        &[]
+    }
     /// What is driven.
     fn plan(&self, options: &RunOptions, machine: &Machine) -> Plan;
     /// The line side, where the scenario is about it; otherwise the link is stiff and the drive is commanded directly.
     fn line(&self, _options: &RunOptions, _machine: &Machine) -> Option<LinePlan> {
         None
     }
-    /// The figures to report.
-    fn figures(&self, recording: &Recording, options: &RunOptions, machine: &Machine) -> Figures;
+    /// The figures to report; those that all have, and the modes, unless the scenario is about something.
+    fn figures(&self, recording: &Recording, _options: &RunOptions, _machine: &Machine) -> Figures {
+        let mut figures = analysis::common(recording);
+        figures.set("modes", analysis::modes(recording));
+        figures
+    }
     /// Step of the trace unless the options say another, in s.
     fn trace_step_s(&self) -> f64 {
         50e-6
@@ -87,8 +96,10 @@ pub trait Scenario {
     fn spectra(&self, _recording: &Recording) -> Vec<(String, (f64, f64))> {
         Vec::new()
     }
-    /// The plots to draw.
-    fn plots(&self, recording: &Recording, page: &mut Page);
+    /// The plots to draw; the whole run unless the scenario is about something.
+    fn plots(&self, recording: &Recording, page: &mut Page) {
+        page.overview(recording);
+    }
 }
 
 /// Every scenario.

@@ -1,22 +1,27 @@
 //! Mode borders crossed at constant speed, by torque alone.
 
 use super::script::{BEGIN_S, Script};
-use super::{Plan, Scenario};
+use super::{Plan, Scenario, switches};
 use crate::analysis::{self, Figures};
 use crate::machine::Machine;
 use crate::options::RunOptions;
 use crate::report::Page;
 use crate::trace::Recording;
 
-/// Torque up to the envelope and back at `--speed`, slowly: small steps that the slew limit smooths.
+/// Torque up to the envelope and back, slowly: small steps that the slew limit smooths. At `--speed`, or at two speeds one after the
+/// other.
 pub struct ModeBorders;
 
-const SPEED_RPM: f64 = 1860.0;
+/// Where torque alone leads from 7 to 3 pulses and back, and where it leads from 7 by 3 into square wave and out of it.
+const SPEEDS_RPM: [f64; 2] = [1750.0, 1885.0];
 const LEVELS: usize = 800;
 /// So slow that the envelopes beside a switch, 100 ms away, are those of its torque within a percent.
 const LEVEL_S: f64 = 0.01;
 /// At the envelope, in s.
 const HOLD_S: f64 = 0.6;
+/// Up, hold, down, and a little without torque, in s; and from one speed to the next.
+const SLOT_S: f64 = 2.0 * LEVELS as f64 * LEVEL_S + HOLD_S + 0.2;
+const RAMP_S: f64 = 0.3;
 
 impl Scenario for ModeBorders {
     fn name(&self) -> &'static str {
@@ -27,21 +32,26 @@ impl Scenario for ModeBorders {
         "figure 9: changes of pulse pattern, here at constant speed by torque alone"
     }
 
+    fn own_options(&self) -> &'static [&'static str] {
+        &["speed"]
+    }
+
     fn plan(&self, options: &RunOptions, machine: &Machine) -> Plan {
         let most = machine.folder.parameters.max_torque_nm;
-        let share = |level: usize| level as f64 / LEVELS as f64;
-        let up = (0..=LEVELS).map(|k| (BEGIN_S + k as f64 * LEVEL_S, most * share(k)));
-        let down_s = BEGIN_S + LEVELS as f64 * LEVEL_S + HOLD_S;
-        let down = (0..=LEVELS).map(|k| (down_s + k as f64 * LEVEL_S, most * share(LEVELS - k)));
-        let torque = up.chain(down);
-        Script {
-            speed: vec![(0.0, options.speed.unwrap_or(SPEED_RPM))],
-            torque: torque.collect(),
-            slew_limited: true,
-            duration_s: down_s + (LEVELS + 20) as f64 * LEVEL_S,
-            ..Script::default()
+        let speeds = options.speed.map_or(SPEEDS_RPM.to_vec(), |speed_rpm| vec![speed_rpm]);
+        let mut script = Script { slew_limited: true, ..Script::default() };
+        for (slot, speed_rpm) in speeds.iter().enumerate() {
+            let begin_s = BEGIN_S + slot as f64 * (SLOT_S + RAMP_S);
+            let level = |from_s: f64, k: usize, level: usize| {
+                (from_s + k as f64 * LEVEL_S, most * level as f64 / LEVELS as f64)
+            };
+            let down_s = begin_s + LEVELS as f64 * LEVEL_S + HOLD_S;
+            script.torque.extend((0..=LEVELS).map(|k| level(begin_s, k, k)));
+            script.torque.extend((0..=LEVELS).map(|k| level(down_s, k, LEVELS - k)));
+            script.speed.extend([(begin_s, *speed_rpm), (begin_s + SLOT_S, *speed_rpm)]);
+            script.duration_s = begin_s + SLOT_S;
         }
-        .plan()
+        script.plan()
     }
 
     fn figures(&self, recording: &Recording, options: &RunOptions, _machine: &Machine) -> Figures {
@@ -56,5 +66,6 @@ impl Scenario for ModeBorders {
 
     fn plots(&self, recording: &Recording, page: &mut Page) {
         page.overview(recording);
+        switches::plots(recording, page);
     }
 }

@@ -25,6 +25,10 @@ impl Scenario for Reversal {
         "figure 9d: square wave, here with its torque reversed"
     }
 
+    fn own_options(&self) -> &'static [&'static str] {
+        &["speed"]
+    }
+
     fn plan(&self, options: &RunOptions, machine: &Machine) -> Plan {
         // The envelope makes full power of full torque.
         let most = machine.folder.parameters.max_torque_nm;

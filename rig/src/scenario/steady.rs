@@ -34,6 +34,10 @@ impl Scenario for Steady {
         "figures 6 and 7: current and spectrum of the mode in steady state"
     }
 
+    fn own_options(&self) -> &'static [&'static str] {
+        &["speed", "torque"]
+    }
+
     fn plan(&self, options: &RunOptions, machine: &Machine) -> Plan {
         let (speed_rpm, torque_nm) = point(options, machine);
         Script {

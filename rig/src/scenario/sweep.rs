@@ -1,13 +1,13 @@
 //! Full torque from standstill through every mode: the paper's figure 9.
 
-use super::{LEAD_S, Plan, Scenario};
+use super::{LEAD_S, Plan, Scenario, switches};
 use crate::analysis::{self, Figures};
 use crate::machine::Machine;
-use crate::options::RunOptions;
+use crate::options::{On, RunOptions};
 use crate::report::Page;
-use crate::trace::Recording;
+use crate::trace::{Recording, Row};
+use crate::verdict::{Verdict, worst};
 use tractive::control::Demand;
-use tractive::modulation::Mode;
 
 /// 0 → 2,000 r/min in 8 s and 1 s hold, at the torque envelope.
 pub struct Sweep;
@@ -22,6 +22,10 @@ impl Scenario for Sweep {
 
     fn figure(&self) -> &'static str {
         "figure 9: sweep at full torque, and its changes of pulse pattern"
+    }
+
+    fn own_options(&self) -> &'static [&'static str] {
+        &["down", "brake", "torque_scale", "to"]
     }
 
     fn plan(&self, options: &RunOptions, machine: &Machine) -> Plan {
@@ -41,11 +45,14 @@ impl Scenario for Sweep {
         Plan { lead_s: LEAD_S, duration_s, speed, link: Vec::new(), operator: Box::new(operator) }
     }
 
-    fn figures(&self, recording: &Recording, options: &RunOptions, _machine: &Machine) -> Figures {
+    fn figures(&self, recording: &Recording, options: &RunOptions, machine: &Machine) -> Figures {
         let mut figures = analysis::common(recording);
         let switches = analysis::mode_switches(recording);
         let mut verdicts = analysis::switch_verdicts(&switches, recording, options);
         verdicts.extend(analysis::square_verdict(recording, options));
+        if options.map_error != 0.0 {
+            verdicts.extend(self.map_verdicts(recording, options, machine));
+        }
         figures.set("verdicts", verdicts);
         figures.set("mode_switches", switches);
         figures.set("modes", analysis::modes(recording));
@@ -75,23 +82,23 @@ impl Scenario for Sweep {
             &[("mode", |row| f64::from(row.mode as u8))],
         );
         page.rotor_currents(recording);
-        for switch in recording.switches.iter().filter(|switch| switch.t_s > 0.0) {
-            let title = format!("{} → {}", switch.from.name(), switch.to.name());
-            page.answers(figure_of(switch.from, switch.to));
-            let window = (switch.t_s - 0.03, switch.t_s + 0.04);
-            page.line_voltage(&format!("{title}, line voltage u-v"), recording, window);
-            page.phase_current_in(&format!("{title}, phase current u"), recording, window);
-        }
+        switches::plots(recording, page);
     }
 }
 
-/// The paper's figure of a change of mode; it shows those on the way up.
-fn figure_of(from: Mode, to: Mode) -> &'static str {
-    match (from, to) {
-        (Mode::Sync15, Mode::Sync12) => "figure 9a",
-        (Mode::Sync12, Mode::Mid7) => "figure 9b",
-        (Mode::Mid7, Mode::Mid3) => "figure 9c",
-        (Mode::Mid3, Mode::Square) => "figure 9d",
-        _ => "figure 9",
+impl Sweep {
+    /// What is wanted where the flux map is wrong: little more current than with the right one, and that the drive notices.
+    fn map_verdicts(&self, recording: &Recording, options: &RunOptions, machine: &Machine) -> [Verdict; 2] {
+        let right = RunOptions { on: On::Host, map_error: 0.0, ..options.clone() };
+        let peak_a = |recording: &Recording| worst(recording.rows.iter().map(Row::peak_current_a));
+        let with_the_right_one = super::drive(self, &right, machine).ok();
+        let ratio = with_the_right_one.and_then(|run| Some(peak_a(recording)? / peak_a(&run)?));
+        let told = recording.rows.last().map(|row| (100.0 * row.map_error - options.map_error).abs());
+        // A wrong resistance or angle looks like a wrong map, too.
+        let told_within = if right.is_ideal() { 1.0 } else { f64::INFINITY };
+        [
+            Verdict::at_most("peak current over that with the right map", ratio, 1.1, "408 A of 247"),
+            Verdict::at_most("map error told less the true one in % of the flux", told, told_within, "–"),
+        ]
     }
 }

@@ -2,12 +2,9 @@
 //! interrupts is logged there, so a second of it takes the emulator ten.
 
 use super::{Plan, Scenario, line};
-use crate::analysis::{self, Figures};
 use crate::bench::LinePlan;
 use crate::machine::Machine;
 use crate::options::RunOptions;
-use crate::report::Page;
-use crate::trace::Recording;
 use tractive::control::Demand;
 use tractive::machine::Ratings;
 use tractive::operator::Request;
@@ -49,6 +46,10 @@ impl Scenario for Timing {
         "no figure: every mode in half a second, for `cargo xtask timing`"
     }
 
+    fn own_options(&self) -> &'static [&'static str] {
+        &["brake", "torque_scale", "to", "fault_at", "freeze_at", "offset_at", "operated"]
+    }
+
     fn plan(&self, options: &RunOptions, machine: &Machine) -> Plan {
         let turn = options.to.signum();
         let (mut speed, mut t_s) = (Vec::new(), if options.operated { OPERATED_S } else { 0.0 });
@@ -84,15 +85,5 @@ impl Scenario for Timing {
             chopper_ohm: Vec::new(),
             reversible: Vec::new(),
         })
-    }
-
-    fn figures(&self, recording: &Recording, _options: &RunOptions, _machine: &Machine) -> Figures {
-        let mut figures = analysis::common(recording);
-        figures.set("modes", analysis::modes(recording));
-        figures
-    }
-
-    fn plots(&self, recording: &Recording, page: &mut Page) {
-        page.overview(recording);
     }
 }

@@ -1,6 +1,6 @@
 //! Voltage and torque after square wave.
 
-use crate::control::six_step_v;
+use crate::frames::six_step_v;
 use crate::machine::Ratings;
 use crate::modulation::{GROWTH_SECTORS, Mode};
 

@@ -153,6 +153,27 @@ pub struct Analytic {
     pub step_a: f64,
 }
 
+/// A small machine that saturates, on a fine grid.
+pub const SMALL: Analytic = Analytic {
+    truth: CoEnergy {
+        ldl_h: 0.003,
+        lql_h: 0.006,
+        psi_m_wb: 0.15,
+        a_j: 0.6,
+        im_a: 10.0,
+        ida_a: 6.0,
+        iqa_a: 8.0,
+        b_j: 0.5,
+        iqb_a: 5.0,
+    },
+    pole_pairs: 3,
+    max_torque_nm: 20.0,
+    max_current_a: 20.0,
+    max_speed_rpm: 6000.0,
+    dc_link_v: 560.0,
+    step_a: 1.0,
+};
+
 impl Analytic {
     /// `machine.toml` with only what is required, in tidy proportions.
     pub fn toml(&self) -> String {

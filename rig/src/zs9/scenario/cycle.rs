@@ -78,6 +78,10 @@ impl Scenario for Cycle {
         options.zs9.edges
     }
 
+    fn own_options(&self) -> &'static [&'static str] {
+        &["edges"]
+    }
+
     fn plan(&self, _options: &RunOptions) -> Plan {
         let mut phases = [Phase::Before; 2];
         let operator = move |t_s: f64, speeds: SeenMotors| {

@@ -30,6 +30,10 @@ impl Scenario for LoadStep {
         "figures 14 to 19: motor 2's load steps, motor 1 goes on"
     }
 
+    fn own_options(&self) -> &'static [&'static str] {
+        &["step"]
+    }
+
     fn plan(&self, options: &RunOptions) -> Plan {
         let step_nm = options.zs9.step;
         let operator = move |t_s: f64, _: SeenMotors| {

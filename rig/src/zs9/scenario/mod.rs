@@ -54,6 +54,10 @@ pub trait Scenario {
     fn name(&self) -> &'static str;
     /// The paper's figures that it answers, and what it is.
     fn title(&self) -> &'static str;
+    /// Which of [`crate::options::OWN`] it knows besides those of the ZS9.
+    fn own_options(&self) -> &'static [&'static str] {
+        &[]
+    }
     /// Step of the trace unless another is asked for, in s.
     fn trace_step_s(&self, options: &RunOptions) -> f64 {
         f64::from(options.zs9.carrier_hz).recip()
@@ -182,6 +186,16 @@ fn bench(scenario: &dyn Scenario, options: &RunOptions, machine: &Machine) -> Re
     }
     if !(source_v..=LARGEST_V).contains(&link_ref_v) {
         bail!("--uin {link_ref_v}: must be from the source's {source_v} V to {LARGEST_V} V");
+    }
+    options.check_flaws(machine, source_v)?;
+    if let Some(injection) = options.zs9.inject
+        && injection.at_s > plan.duration_s
+    {
+        bail!(
+            "--inject at {} s: must be within the run, which ends at {} s",
+            injection.at_s,
+            plan.duration_s
+        );
     }
     let plant_settings = Zs9Settings { source_v, motors: [motor; 2], ..Zs9Settings::default() };
     let folders = [&machine.folder; 2];

@@ -35,6 +35,10 @@ impl Scenario for Reverse {
         "figures 20 to 23: motor 2 reverses, motor 1 goes on"
     }
 
+    fn own_options(&self) -> &'static [&'static str] {
+        &["no_reverse"]
+    }
+
     fn plan(&self, options: &RunOptions) -> Plan {
         let reverses = !options.zs9.no_reverse;
         let operator = move |t_s: f64, speeds: SeenMotors| {

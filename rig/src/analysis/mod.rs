@@ -1,0 +1,146 @@
+//! Figures from a recording.
+
+mod steady;
+mod step;
+mod switches;
+mod transition;
+
+pub use steady::{SteadyPoint, square_verdict, steady_point};
+pub use step::{Step, StepResponse, step_response};
+pub use switches::{SwitchFigures, mode_switches, switch_verdicts};
+pub use transition::{Catch, Transition, catch, transition};
+
+use crate::rows::{between, mean};
+use crate::trace::{Recording, Row};
+use crate::verdict::FALLS_SHORT;
+use serde::Serialize;
+use serde_json::{Map, Value};
+
+/// A scenario's figures, each with its unit in its name.
+#[derive(Clone, Debug, Default)]
+pub struct Figures(Map<String, Value>);
+
+impl Figures {
+    /// Adds a figure.
+    pub fn set(&mut self, name: &str, value: impl Serialize) {
+        self.0.insert(name.to_owned(), serde_json::to_value(value).unwrap_or(Value::Null));
+    }
+
+    /// A figure by name.
+    pub fn get(&self, name: &str) -> Option<&Value> {
+        self.0.get(name)
+    }
+
+    /// All figures.
+    pub fn values(&self) -> &Map<String, Value> {
+        &self.0
+    }
+
+    /// Whether one of the verdicts says that a bound is not kept.
+    pub fn fall_short(&self) -> bool {
+        let verdicts = self.get("verdicts").and_then(Value::as_array);
+        verdicts.is_some_and(|verdicts| verdicts.iter().any(|one| one["verdict"] == FALLS_SHORT))
+    }
+}
+
+/// What every scenario reports.
+pub fn common(recording: &Recording) -> Figures {
+    let mut figures = Figures::default();
+    let rows = &recording.rows;
+    figures.set("simulated_s", rows.last().map_or(0.0, |row| row.t_s));
+    figures.set("fault", recording.trip().map_or("", |trip| trip.fault.name()));
+    if let Some(trip) = recording.trip() {
+        figures.set("fault_value", trip.value);
+        figures.set("fault_limit", trip.limit);
+    }
+    figures.set("peak_current_a", rows.iter().map(Row::peak_current_a).fold(0.0, f64::max));
+    let told: Vec<_> = rows.iter().map(|row| row.map_error).filter(|share| *share != 0.0).collect();
+    figures.set("map_error_estimate_percent", 100.0 * told.iter().sum::<f64>() / told.len().max(1) as f64);
+    figures.set("most_turn_ons_in_100_ms", most_turn_ons(recording, 0.1));
+    figures
+}
+
+/// The rows from `from_s` (included) to `to_s` (excluded).
+pub fn window(recording: &Recording, from_s: f64, to_s: f64) -> &[Row] {
+    between(&recording.rows, from_s, to_s)
+}
+
+/// The largest number of times that any one device turns on in any window of this length.
+pub fn most_turn_ons(recording: &Recording, length_s: f64) -> usize {
+    let length = (length_s / recording.tick_s).round() as u64;
+    (0..6)
+        .map(|gate| {
+            let ons: Vec<_> = recording
+                .edges
+                .iter()
+                .filter(|edge| edge.on && edge.gate == gate)
+                .map(|edge| edge.tick)
+                .collect();
+            let mut first = 0;
+            let mut most = 0;
+            for (last, tick) in ons.iter().enumerate() {
+                while tick - ons[first] > length {
+                    first += 1;
+                }
+                most = most.max(last + 1 - first);
+            }
+            most
+        })
+        .max()
+        .unwrap_or(0)
+}
+
+/// A quantity averaged over one carrier period (1/900 s) around each row of the window.
+fn carrier_averaged(
+    recording: &Recording,
+    from_s: f64,
+    to_s: f64,
+    value: impl Fn(&Row) -> f64,
+) -> Vec<(f64, f64)> {
+    const HALF_WIDTH_S: f64 = 0.5 / 900.0;
+    let rows = &recording.rows;
+    let step_s = if rows.len() > 1 { rows[1].t_s - rows[0].t_s } else { HALF_WIDTH_S };
+    let reach = (HALF_WIDTH_S / step_s).round() as usize;
+    let first = rows.partition_point(|row| row.t_s < from_s);
+    let last = rows.partition_point(|row| row.t_s < to_s - HALF_WIDTH_S);
+    (first..last)
+        .map(|k| {
+            let around = &rows[k.saturating_sub(reach)..(k + reach + 1).min(rows.len())];
+            (rows[k].t_s, mean(around, &value))
+        })
+        .collect()
+}
+
+/// The rows of a window at constant speed, shortened to whole turns of the stator field where one fits.
+pub fn whole_turns(recording: &Recording, (from_s, to_s): (f64, f64), pole_pairs: u32) -> &[Row] {
+    let rows = window(recording, from_s, to_s);
+    let speed_rpm = rows.last().map_or(0.0, |row| row.speed_rpm);
+    let turn_s = 60.0 / (speed_rpm.abs() * f64::from(pole_pairs));
+    let turns = ((to_s - from_s) / turn_s).floor();
+    if turns >= 1.0 { window(recording, to_s - turns * turn_s, to_s) } else { rows }
+}
+
+/// How long each mode was in use, in s, in order of first use.
+#[derive(Clone, Debug, Serialize)]
+pub struct ModeUse {
+    /// The mode.
+    pub mode: &'static str,
+    /// First instant, in s.
+    pub first_s: f64,
+    /// Total, in s.
+    pub total_s: f64,
+}
+
+/// The use of the modes.
+pub fn modes(recording: &Recording) -> Vec<ModeUse> {
+    let mut uses: Vec<ModeUse> = Vec::new();
+    for pair in recording.rows.windows(2) {
+        let name = pair[0].mode.name();
+        let length_s = pair[1].t_s - pair[0].t_s;
+        match uses.iter_mut().find(|found| found.mode == name) {
+            Some(found) => found.total_s += length_s,
+            None => uses.push(ModeUse { mode: name, first_s: pair[0].t_s, total_s: length_s }),
+        }
+    }
+    uses
+}

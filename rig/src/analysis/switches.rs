@@ -1,0 +1,138 @@
+//! Changes of mode, and whether there are more than there should be.
+
+use super::{carrier_averaged, most_turn_ons, window};
+use crate::options::RunOptions;
+use crate::trace::{Recording, Row, Switch};
+use crate::verdict::{Verdict, bound, worst};
+use serde::Serialize;
+
+/// What a switch of mode did to the current.
+#[derive(Clone, Debug, Serialize)]
+pub struct SwitchFigures {
+    /// When, in s.
+    pub t_s: f64,
+    /// The mode that ended.
+    pub from: &'static str,
+    /// The mode that began.
+    pub to: &'static str,
+    /// Mechanical speed, in r/min.
+    pub speed_rpm: f64,
+    /// Pulse angle, in degrees; absent where the old carrier was not locked.
+    pub pulse_angle_deg: Option<f64>,
+    /// Largest |phase current| from 2 ms before to 30 ms after, in A.
+    pub peak_current_a: f64,
+    /// Larger of the largest |phase current| 100 to 20 ms before and 60 to 140 ms after, in A.
+    pub steady_current_a: f64,
+    /// By how much the first exceeds the second, in percent.
+    pub excess_percent: f64,
+    /// Torque beyond the steady ripple band of the same windows, from 2 ms before to 30 ms after, in N·m.
+    pub torque_excursion_nm: f64,
+    /// The same for torque averaged over 1/900 s. That is not a whole number of ripple periods in every mode, so where the ripple
+    /// changes its shape this shows more than there is.
+    pub averaged_torque_excursion_nm: f64,
+}
+
+/// Every switch between pulsing modes in the recording.
+pub fn mode_switches(recording: &Recording) -> Vec<SwitchFigures> {
+    recording
+        .switches
+        .iter()
+        .filter(|switch| switch.is_between_pulses())
+        .map(|switch| at_switch(recording, switch))
+        .collect()
+}
+
+fn at_switch(recording: &Recording, switch: &Switch) -> SwitchFigures {
+    let peak = |from_s: f64, to_s: f64| {
+        let rows = window(recording, switch.t_s + from_s, switch.t_s + to_s);
+        rows.iter().map(Row::peak_current_a).fold(0.0, f64::max)
+    };
+    let steady = peak(-0.1, -0.02).max(peak(0.06, 0.14));
+    let now = peak(-0.002, 0.03);
+    let instantaneous = |from_s: f64, to_s: f64| {
+        let rows = window(recording, switch.t_s + from_s, switch.t_s + to_s);
+        rows.iter().map(|row| row.te_nm - row.te_ref_nm).collect()
+    };
+    let averaged = |from_s: f64, to_s: f64| {
+        carrier_averaged(recording, switch.t_s + from_s, switch.t_s + to_s, |row| row.te_nm - row.te_ref_nm)
+            .into_iter()
+            .map(|(_, error)| error)
+            .collect()
+    };
+    SwitchFigures {
+        t_s: switch.t_s,
+        from: switch.from.name(),
+        to: switch.to.name(),
+        speed_rpm: switch.speed_rpm,
+        pulse_angle_deg: switch.pulse_angle_deg,
+        peak_current_a: now,
+        steady_current_a: steady,
+        excess_percent: (now / steady - 1.0) * 100.0,
+        torque_excursion_nm: excursion(instantaneous),
+        averaged_torque_excursion_nm: excursion(averaged),
+    }
+}
+
+/// How far a torque error at a switch goes beyond its steady band before and after.
+fn excursion(error_nm: impl Fn(f64, f64) -> Vec<f64>) -> f64 {
+    let extent = |from_s: f64, to_s: f64| {
+        let errors = error_nm(from_s, to_s);
+        let low = errors.iter().copied().fold(f64::INFINITY, f64::min);
+        (low, errors.iter().copied().fold(f64::NEG_INFINITY, f64::max))
+    };
+    let (before, after, during) = (extent(-0.1, -0.02), extent(0.06, 0.14), extent(-0.002, 0.03));
+    let (low, high) = (before.0.min(after.0), before.1.max(after.1));
+    (low - during.0).max(during.1 - high).max(0.0)
+}
+
+/// What is wanted of every switch of mode.
+pub fn switch_verdicts(
+    switches: &[SwitchFigures],
+    recording: &Recording,
+    options: &RunOptions,
+) -> Vec<Verdict> {
+    let excess = worst(switches.iter().map(|switch| switch.excess_percent));
+    let torque_nm = worst(switches.iter().map(|switch| switch.torque_excursion_nm));
+    vec![
+        Verdict::at_most(
+            "current over the larger steady envelope in %",
+            excess,
+            // Of a wrong map it is asked that nothing trips.
+            if options.map_error == 0.0 { bound(options, 1.5, 3.0) } else { f64::INFINITY },
+            "3.3 at 12 to 7, 2.35 at 3 to square",
+        ),
+        Verdict::at_most(
+            "torque beyond the steady ripple band in N·m",
+            torque_nm,
+            bound(options, 25.0, f64::INFINITY),
+            "31 up, 71 braking",
+        ),
+        Verdict::at_most(
+            "hunting: switches back without a cause",
+            hunts(recording) as f64,
+            0.0,
+            "41 switches in a sweep",
+        ),
+        Verdict::at_most("turn-ons in 100 ms", most_turn_ons(recording, 0.1) as f64, 91.0, "900 Hz"),
+    ]
+}
+
+/// Switches that take the one before back although neither speed nor demand has come back in between. At the power limit
+/// the demand falls while the speed rises: that is no cause.
+fn hunts(recording: &Recording) -> usize {
+    const SPEED_SHARE: f64 = 0.005;
+    const DEMAND_SHARE: f64 = 0.01;
+    let counted: Vec<_> = recording.switches.iter().filter(|switch| switch.is_between_pulses()).collect();
+    let taken_back = counted.windows(2).filter(|pair| pair[0].from == pair[1].to);
+    let without_cause = taken_back.filter(|pair| {
+        let between = window(recording, pair[0].t_s, pair[1].t_s);
+        let (Some(first), Some(last)) = (between.first(), between.last()) else { return true };
+        // How far each has gone the way that the second switch goes, as a share.
+        let sign = if pair[1].to > pair[1].from { 1.0 } else { -1.0 };
+        let gone = |value: fn(&Row) -> f64| sign * (value(last) / value(first) - 1.0);
+        let (speed, demand) = (gone(|row| row.speed_rpm.abs()), gone(|row| row.te_ref_nm));
+        let demand_alone = demand > DEMAND_SHARE && speed > -SPEED_SHARE;
+        speed <= SPEED_SHARE && !demand_alone
+    });
+    without_cause.count()
+}
