@@ -269,7 +269,7 @@ a carrier's boundary alone is computed there, square roots go from register to r
 longest control interrupt is one at the current limit in field weakening in which the mode changes.
 
 The worst cases are provoked: wrong phase currents at every boundary where the mode switches, faults of the ZS9 in weakening, an operator
-who commands. The longest so provoked was 2,293 and 4,197 of the ZS9 before these detours were gone; 2,264 and 3,688 are left.
+who commands. The longest so provoked was 2,293 and 4,197 of the ZS9 before these detours were gone; 2,276 and 3,668 are left.
 
 In the ZS9 the same law runs twice, once a motor, beside the link's control. What both interrupts make is made in the tasks' own memory,
 and what is told afterwards is put together out of line: so the stack holds either the control law or the report.
