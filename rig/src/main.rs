@@ -27,7 +27,8 @@ struct Cli {
 enum Command {
     /// Runs a scenario and writes its files.
     Run {
-        /// load-steps, sweep, characteristic, zs9-load-step, zs9-reverse, zs9-cycle or zs9-steady.
+        /// load-steps, sweep, characteristic, full-step, steady, mode-borders, reversal, restart, link-steps, precharge, chopper,
+        /// acknowledge, zs9-load-step, zs9-reverse, zs9-cycle or zs9-steady.
         #[arg(default_value = "sweep")]
         scenario: String,
         #[command(flatten)]
