@@ -11,10 +11,11 @@ pub struct BordersTiming;
 
 /// Where the mode has changed going up and down at full torque, with a little room, in r/min.
 const SWINGS_RPM: [(f64, f64); 5] =
-    [(555.0, 615.0), (840.0, 910.0), (1065.0, 1135.0), (1665.0, 1750.0), (1850.0, 1900.0)];
-const SWINGS: usize = 8;
-/// From one end of a swing to the other, and from one border to the next, in s. A quicker ramp would count as a lost angle.
-const HALF_SWING_S: f64 = 0.008;
+    [(550.0, 620.0), (835.0, 915.0), (1050.0, 1145.0), (1650.0, 1760.0), (1835.0, 1910.0)];
+const SWINGS: usize = 4;
+/// From one end of a swing to the other, longer than a mode stays at least, and from one border to the next, in s. A quicker ramp would
+/// count as a lost angle.
+const HALF_SWING_S: f64 = 0.034;
 const RAMP_S: f64 = 0.02;
 /// Long enough for what control does now and then; then the enable goes and comes, in s. It comes once in nine halves of the asynchronous
 /// carrier, so always as near before a boundary as here the first time.
