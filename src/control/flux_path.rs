@@ -10,7 +10,8 @@ use crate::frames::Dq;
 const TURN_RAD_S: f32 = 120.0;
 
 /// Part of its way that it turns in a radian of the stator's turn while a pattern and square wave take over from each other: the voltage,
-/// and so the flux, is given, and the load angle changes with it, which takes four sectors.
+/// and so the flux, is given, and the load angle changes with it, which takes four sectors. Chosen by trial: 0.35 does as
+/// well, and at once is worst.
 const GROWING_PER_RAD: f32 = 0.7;
 
 #[derive(Clone, Copy, Debug)]

@@ -9,7 +9,9 @@
 //! pulses lag or lead by as much. That also is what lets a notch be left out that would be too short: a sector without one is over sooner,
 //! the next ones have longer notches, and every edge has its length.
 
-/// Change of the hexagon, and lead of the pulses at its end over the whole change of zero voltage, sector by sector.
+/// Share of the whole change that the hexagon has, and lead of the pulses at the sector's end over that change in zero voltage, sector by
+/// sector. The first sector's lead is half of what its end would have, since its notch comes before that: chosen by trial, with all of it
+/// braking at half torque has 1.7 % of current too much at 7 to 3 pulses, with none of it 30 N·m are missing at the end of square wave.
 const SECTORS: [(f32, f32); 4] =
     [(1.0 / 3.0, 0.5 * LEAD), (1.0 / 3.0, LEAD), (2.0 / 3.0, LEAD), (2.0 / 3.0, 0.0)];
 
