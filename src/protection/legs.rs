@@ -1,0 +1,52 @@
+//! What the power stage tells of its legs: the fault, and the safe state with such legs.
+
+use super::safe::emf_v;
+use super::{Fault, SafeState, Violation, safe_state};
+use crate::machine::Ratings;
+
+/// What the power stage tells of itself: nothing, mostly.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct LegFaults {
+    /// Devices whose drivers have found a short circuit and block, a bit each, from bit 0 on uh ul vh vl wh wl.
+    pub blocked: u8,
+    /// Legs whose output stayed at the lower rail while the upper device was to conduct, a bit each from u on.
+    pub low: u8,
+    /// Legs whose output stayed at the upper rail while the lower device was to conduct.
+    pub high: u8,
+}
+
+impl LegFaults {
+    /// The fault, if there is one.
+    pub fn check(&self) -> Option<Violation> {
+        if self.blocked != 0 {
+            return Some((Fault::DriverBlocked, f32::from(self.blocked), 0.0));
+        }
+        let astray = self.low | self.high;
+        (astray != 0).then_some((Fault::LegStuck, f32::from(astray), 0.0))
+    }
+
+    /// The safe state with such legs, for an electrical angular speed in rad/s; with sound ones that of [`safe_state`].
+    ///
+    /// - A driver that blocks alone has found the other device of its leg conducting: then the short circuit at that one's rail is
+    ///   safe at every speed. With the gates off this leg and the diodes of the others would rectify the EMF into one half-wave
+    ///   of several times the short circuit's current; and at the other rail the machine would have the whole link across it.
+    /// - A leg without both devices makes the short circuit lopsided: gates off for as long as the link stands the EMF.
+    /// - A leg without one of its devices takes part in the short circuit at the rail where it was seen.
+    pub fn safe_state(&self, omega: f32, udc_v: f32, ratings: &Ratings) -> SafeState {
+        const UPPER: u8 = 0b01_0101;
+        let (upper, lower) = (self.blocked & UPPER, self.blocked >> 1 & UPPER);
+        if lower & !upper != 0 {
+            return SafeState::UpperShortCircuit;
+        }
+        if upper & !lower != 0 {
+            return SafeState::ShortCircuit;
+        }
+        let usual = safe_state(omega, udc_v, ratings);
+        let stands_emf = emf_v(omega, ratings) < ratings.trip_dc_over_v;
+        match usual {
+            SafeState::ShortCircuit if self.blocked != 0 && stands_emf => SafeState::GatesOff,
+            SafeState::ShortCircuit if self.high != 0 => SafeState::UpperShortCircuit,
+            usual => usual,
+        }
+    }
+}

@@ -1,0 +1,25 @@
+//! Faults, limits, and the safe state.
+//!
+//! A fault is named, latched with the value and the limit that it broke, and puts the gates into the safe state in the
+//! very interrupt that finds it.
+
+#![forbid(unsafe_code)]
+
+mod checks;
+mod disarmed;
+mod fault;
+mod frozen;
+mod legs;
+mod link;
+mod safe;
+
+pub use checks::{
+    SURPRISE_RAD, check_angle, check_currents, check_demand, check_measurements, check_speed,
+    check_undervoltage,
+};
+pub use disarmed::Disarmed;
+pub use fault::{Fault, Trip, Violation};
+pub use frozen::FrozenWatch;
+pub use legs::LegFaults;
+pub use link::LinkLimits;
+pub use safe::{SafeState, safe_state};
