@@ -4,7 +4,8 @@
 //! and the machine with a current that decays slowly. So the first half is a carrier's, as long as it takes to lead the
 //! flux to the hexagon, to the corner or the middle of an edge where it will be at that time by the pattern's angle.
 
-use super::{Mode, Reference, RippleFlux, boundary};
+use super::period::boundary;
+use super::{Mode, Reference, RippleFlux};
 use crate::frames::{AlphaBeta, Angle, SQRT_3, UNITS_PER_RADIAN};
 
 /// What a carrier gives in every direction, as a share of the link's voltage.

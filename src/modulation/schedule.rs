@@ -159,7 +159,7 @@ pub fn first_half(from: Mode, to: Mode, next_half: u32, pulse: Angle) -> u32 {
 mod tests {
     extern crate std;
 
-    use super::super::boundary;
+    use super::super::period::boundary;
     use super::*;
     use std::{vec, vec::Vec};
 

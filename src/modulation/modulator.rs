@@ -1,0 +1,257 @@
+//! The modulator: one half after the other, and the switches between modes.
+
+use super::carrier::{self, Zeros};
+use super::catch::Catch;
+use super::growth::Growth;
+use super::period::boundary;
+use super::{CarrierPeriod, Devices, Mode, Reference, Schedule, first_half, middle60, schedule};
+use crate::frames::{Angle, UNITS_PER_RADIAN, limit};
+use crate::time::Instant;
+
+/// The modulator's state.
+#[derive(Clone, Copy, Debug)]
+pub struct Modulator {
+    devices: Devices,
+    schedule: Schedule,
+    mode: Mode,
+    /// Number of the half that comes next, in the numbering of [`CarrierPeriod::half`].
+    next_half: u32,
+    mirrored: bool,
+    plan: Option<Plan>,
+    growth: Growth,
+    /// Whether the half before was a pattern's and the next one is a carrier's.
+    after_pattern: bool,
+    /// Half the zero voltage of the present pattern's sectors, as an angle in rad.
+    zero_rad: f32,
+}
+
+/// Share of a half that is zero voltage, over half the zero voltage of a sector of 60° as an angle in rad.
+const ZERO_OF_HALF: f32 = 1.0 / core::f32::consts::FRAC_PI_6;
+
+/// A switch between locked modes that has been announced.
+#[derive(Clone, Copy, Debug)]
+struct Plan {
+    to: Mode,
+    /// Number, in the present mode, of the half that is the new mode's first.
+    at: u32,
+}
+
+/// How far a carrier may be from its angle when it gives way to a pattern: 6°, less than half of its shortest half.
+const KEPT_ANGLE: Angle = Angle(71_582_788);
+
+/// Halves by which a switch between locked modes is announced.
+const AHEAD: u32 = 2;
+
+/// How much shorter or longer than nominal a locked half may be while it catches up with its angle. A triangular
+/// carrier's voltage has the right angle wherever its carrier stands, so it may take its time, and its ripple stays
+/// small; a pattern's angle is that of its boundaries.
+const CARRIER_STRETCH: (f32, f32) = (0.95, 1.05);
+const PATTERN_STRETCH: (f32, f32) = (0.5, 2.0);
+
+impl Modulator {
+    /// A modulator at rest: its first half is `Off`.
+    pub const fn new(devices: Devices, schedule: Schedule) -> Self {
+        Self {
+            devices,
+            schedule,
+            mode: Mode::Off,
+            next_half: 0,
+            mirrored: false,
+            plan: None,
+            growth: Growth::DONE,
+            after_pattern: false,
+            zero_rad: 0.0,
+        }
+    }
+
+    /// Whether the machine is seen in the mirror, because it turns backward.
+    pub const fn is_mirrored(&self) -> bool {
+        self.mirrored
+    }
+
+    /// The half carrier that begins at `start`; `None` as reference: all gates off. Inlined: the stack of a call is not needed twice.
+    #[inline(always)]
+    pub fn step(&mut self, start: Instant, reference: Option<&Reference>) -> CarrierPeriod {
+        let Some(reference) = reference else {
+            return self.rest(start, None);
+        };
+        self.turn_mirror(reference.rate);
+        let seen = if self.mirrored { reference.mirrored() } else { *reference };
+        let pulse = seen.pulse_at(start);
+        let from = self.mode;
+        self.choose_mode(start, pulse, &seen);
+        let mut half = if from == Mode::Off && self.mode.is_pattern() {
+            self.catch(start, pulse, &seen)
+        } else if self.mode == Mode::Async {
+            carrier::asynchronous(self.next_half, start, &seen, &self.devices)
+        } else {
+            self.locked(start, pulse, &seen)
+        };
+        half.mode = self.mode;
+        half.half = self.next_half as u8;
+        half.ahead = self.ahead(self.next_half);
+        self.next_half = self.half_after(self.next_half, 1);
+        self.after_pattern = false;
+        if self.mirrored {
+            half.compare_ticks.swap(1, 2);
+            half.start_levels.swap(1, 2);
+        }
+        half
+    }
+
+    /// A free half ([`CarrierPeriod::is_free`]) that begins at `start`, made anew from a newer reference.
+    pub fn revised(&self, half: &CarrierPeriod, start: Instant, reference: &Reference) -> CarrierPeriod {
+        let seen = if self.mirrored { reference.mirrored() } else { *reference };
+        let mut revised = carrier::asynchronous(half.half.into(), start, &seen, &self.devices);
+        (revised.mode, revised.half, revised.ahead) = (half.mode, half.half, half.ahead);
+        if self.mirrored {
+            revised.compare_ticks.swap(1, 2);
+            revised.start_levels.swap(1, 2);
+        }
+        revised
+    }
+
+    /// All gates off; where a reference is known, with the mode that it would begin with announced.
+    #[inline(never)]
+    pub fn rest(&mut self, start: Instant, reference: Option<&Reference>) -> CarrierPeriod {
+        self.mode = Mode::Off;
+        self.plan = None;
+        let mut half = CarrierPeriod::off(self.devices.shortest_half_ticks);
+        if let Some(reference) = reference {
+            let seen = if reference.rate < 0.0 { reference.mirrored() } else { *reference };
+            half.ahead = [self.schedule.wanted(start, Mode::Off, &seen, &self.devices); 2];
+        }
+        half
+    }
+
+    /// The mirror follows the sign of rotation, but only where the carrier is not locked to the angle.
+    fn turn_mirror(&mut self, rate: f32) {
+        if matches!(self.mode, Mode::Off | Mode::Async) {
+            self.mirrored = rate < 0.0;
+        }
+    }
+
+    /// The mode of the half that begins at `start`. Between locked modes a switch is announced two halves ahead, so that
+    /// control can lead the flux to where the new pattern begins.
+    fn choose_mode(&mut self, start: Instant, pulse: Angle, seen: &Reference) {
+        if let Some(plan) = self.plan {
+            if plan.at == self.next_half {
+                self.switch_to(start, plan.to, pulse);
+            }
+            return;
+        }
+        let wanted = self.schedule.wanted(start, self.mode, seen, &self.devices);
+        if wanted == self.mode {
+            return;
+        }
+        if self.mode.carriers() > 0 && wanted.carriers() > 0 {
+            let at = self.half_after(self.next_half, AHEAD);
+            let keeps_angle = wanted.is_carrier() || self.keeps_its_angle(pulse);
+            if keeps_angle && schedule::may_switch(self.mode, wanted, at) {
+                self.plan = Some(Plan { to: wanted, at });
+            }
+        } else if schedule::may_switch(self.mode, wanted, self.next_half) {
+            self.switch_to(start, wanted, pulse);
+        }
+    }
+
+    /// Whether the locked half that begins at pulse angle `pulse` begins where it should. After a step of torque a carrier catches up
+    /// with its angle over many halves; a pattern that began then would have its pulses in the wrong place.
+    fn keeps_its_angle(&self, pulse: Angle) -> bool {
+        (boundary(self.next_half, self.mode.carriers()) - pulse).signed().unsigned_abs() < KEPT_ANGLE.0
+    }
+
+    fn switch_to(&mut self, start: Instant, mode: Mode, pulse: Angle) {
+        let from = self.mode;
+        self.next_half = first_half(from, mode, self.next_half, pulse);
+        self.mode = mode;
+        self.plan = None;
+        self.after_pattern = from.is_pattern() && mode.is_carrier();
+        self.growth = if from.is_pattern() { Growth::begun(self.zero_rad) } else { Growth::DONE };
+        self.schedule.switched(start);
+    }
+
+    /// Modes of the two halves that follow half number `half` of the present mode.
+    fn ahead(&self, half: u32) -> [Mode; 2] {
+        let Some(plan) = self.plan else {
+            return [self.mode; 2];
+        };
+        let next = plan.at == self.half_after(half, 1);
+        let next_but_one = next || plan.at == self.half_after(half, AHEAD);
+        [if next { plan.to } else { self.mode }, if next_but_one { plan.to } else { self.mode }]
+    }
+
+    /// The number of the half that comes `later` halves (fewer than a turn) after number `half`.
+    const fn half_after(&self, half: u32, later: u32) -> u32 {
+        let (sum, turn) = (half + later, self.halves());
+        if sum >= turn { sum - turn } else { sum }
+    }
+
+    /// Halves after which the numbering begins anew: a turn of a locked carrier, a period of a free one.
+    const fn halves(&self) -> u32 {
+        match self.mode.carriers() {
+            0 => 2,
+            carriers => carriers * 2,
+        }
+    }
+
+    /// Where the zero vectors of the next half belong.
+    fn zeros(&self) -> Zeros {
+        match self.ahead(self.next_half) {
+            [next, _] if !next.is_carrier() => Zeros::Early,
+            _ if self.after_pattern => Zeros::Late,
+            _ => Zeros::Even,
+        }
+    }
+
+    /// The first half of a pattern after none: one of a carrier, which leads the machine's flux to where the pattern begins.
+    #[cold]
+    #[inline(never)]
+    fn catch(&mut self, start: Instant, pulse: Angle, seen: &Reference) -> CarrierPeriod {
+        let Catch { half, turned, share } = Catch::new(self.mode, pulse, seen.share_within(start, 0), seen);
+        self.next_half = half;
+        let period_ticks = self.whole_ticks(turned.0 as f32 / seen.rate);
+        carrier::synchronous(half, period_ticks, Zeros::Early, share, &self.devices)
+    }
+
+    /// One half of a carrier that is locked to the pulse angle.
+    fn locked(&mut self, start: Instant, pulse: Angle, seen: &Reference) -> CarrierPeriod {
+        let carriers = self.mode.carriers();
+        let end = boundary(self.next_half + 1, carriers);
+        let ticks_per_unit = 1.0 / seen.rate;
+        let nominal = boundary(1, carriers).0 as f32 * ticks_per_unit;
+        let wanted = (end - pulse).signed() as f32 * ticks_per_unit;
+        let is_carrier = self.mode.is_carrier();
+        let (shortest, longest) = if is_carrier { CARRIER_STRETCH } else { PATTERN_STRETCH };
+        let wanted = limit(wanted, shortest * nominal, longest * nominal);
+        if is_carrier {
+            let period_ticks = self.whole_ticks(wanted);
+            let share = seen.share_within(start, period_ticks);
+            return carrier::synchronous(self.next_half, period_ticks, self.zeros(), share, &self.devices);
+        }
+        let own_rad = middle60::zero_rad(self.mode, seen.voltage_v, seen.udc_v);
+        self.zero_rad = own_rad;
+        let (period, notch) = match self.growth.sector(own_rad, self.mode.sector_halves()) {
+            Some(sector) => {
+                // The edge has the length that it should have, and whatever time is left is zero voltage.
+                let zero = nominal * (sector.zero_rad * ZERO_OF_HALF);
+                let edge = nominal - zero;
+                let left = wanted - sector.lead_rad * UNITS_PER_RADIAN * ticks_per_unit - edge;
+                let notch = self.growth.notch(left, zero, self.devices.min_pulse_ticks as f32);
+                (edge + notch.unwrap_or(0.0), notch)
+            }
+            None => {
+                let notched = self.mode != Mode::Square || own_rad > 0.0;
+                (wanted, notched.then_some(wanted * (own_rad * ZERO_OF_HALF)))
+            }
+        };
+        middle60::half(self.mode, self.next_half, self.whole_ticks(period), notch, &self.devices)
+    }
+
+    /// A length in whole ticks. Slower than the async mode's range there is nothing to lock to: the length stays that
+    /// of a stopped carrier.
+    #[inline(never)]
+    fn whole_ticks(&self, period: f32) -> u32 {
+        ((period + 0.5) as u32).min(self.devices.shortest_half_ticks * 4).max(1)
+    }
+}

@@ -1,0 +1,59 @@
+//! What the modulator is asked for.
+
+use crate::frames::{AlphaBeta, Angle};
+use crate::time::Instant;
+
+/// What the modulator is asked for: a fundamental that turns on by itself from one control period to the next.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Reference {
+    /// Fundamental phase voltage, peak, in V.
+    pub voltage_v: f32,
+    /// The same as a vector at `at`, in V.
+    pub vector: AlphaBeta,
+    /// Angle of the vector to which a locked carrier keeps, at `at`: without what regulation adds for one half only.
+    pub carrier_angle: Angle,
+    /// Angle units (2⁻³² turn) per tick by which it turns; negative backward.
+    pub rate: f32,
+    /// The instant of `vector`.
+    pub at: Instant,
+    /// DC-link voltage, in V, greater than zero.
+    pub udc_v: f32,
+    /// Fundamental that the operating point asks for, as a share of the six-step voltage 2 udc/π: chooses the mode.
+    pub depth: f32,
+}
+
+impl Reference {
+    /// A fundamental with its vector and its carrier at one angle, and a mode by its own depth.
+    pub fn turning(voltage_v: f32, angle: Angle, rate: f32, at: Instant, udc_v: f32) -> Self {
+        let direction = angle.sin_cos();
+        let vector = AlphaBeta { alpha: direction.cos, beta: direction.sin } * voltage_v;
+        let depth = voltage_v / (udc_v * (2.0 * core::f32::consts::FRAC_1_PI));
+        Self { voltage_v, vector, carrier_angle: angle, rate, at, udc_v, depth }
+    }
+
+    /// The vector at an instant, turned on at constant rate.
+    fn vector_at(&self, instant: Instant) -> AlphaBeta {
+        self.vector.turned(self.turned(instant).sin_cos())
+    }
+
+    /// The vector in the middle of a half, as a share of the link's voltage: there the mean of a turning vector stands.
+    #[inline(never)]
+    pub(super) fn share_within(&self, start: Instant, period_ticks: u32) -> AlphaBeta {
+        self.vector_at(start.after(period_ticks / 2)) * (1.0 / self.udc_v)
+    }
+
+    /// The pulse angle at an instant: that of the carrier's vector and 90°.
+    pub(super) fn pulse_at(&self, instant: Instant) -> Angle {
+        self.carrier_angle + self.turned(instant) + Angle::DEG_90
+    }
+
+    fn turned(&self, instant: Instant) -> Angle {
+        Angle((self.rate * instant.since(self.at) as f32) as i32 as u32)
+    }
+
+    /// The same fundamental in the mirror: turning forward.
+    pub(super) fn mirrored(self) -> Self {
+        let vector = AlphaBeta { beta: -self.vector.beta, ..self.vector };
+        Self { vector, carrier_angle: -self.carrier_angle, rate: -self.rate, ..self }
+    }
+}
