@@ -1,0 +1,100 @@
+//! What is measured: motion, currents, voltages.
+
+use crate::protocol::commands::{LINK_V, TORQUE_NM};
+use crate::protocol::message::Message;
+use crate::protocol::signal::{Payload, Signal};
+
+const CURRENT_A: [f32; 2] = [-3_000.0, 3_000.0];
+pub(in crate::protocol) const SPEED_RPM: [f32; 2] = [-16_000.0, 16_000.0];
+
+const SPEED: Signal = Signal::physical("speed_rpm", "r/min", 16, 0.5, SPEED_RPM);
+const TORQUE: Signal = Signal::physical("torque_nm", "N.m", 32, 0.1, TORQUE_NM);
+const LINK: Signal = Signal::physical("link_v", "V", 48, 0.1, LINK_V);
+
+const CURRENT: Signal = Signal::physical("current_a", "A", 16, 0.1, [0.0, 3_000.0]);
+const ID_REF: Signal = Signal::physical("id_ref_a", "A", 32, 0.1, CURRENT_A);
+const IQ_REF: Signal = Signal::physical("iq_ref_a", "A", 48, 0.1, CURRENT_A);
+
+const VOLTAGE: Signal = Signal::physical("voltage_v", "V", 16, 0.1, LINK_V);
+const FREQUENCY: Signal = Signal::physical("frequency_hz", "Hz", 32, 0.05, [-1_600.0, 1_600.0]);
+const TEMPERATURE: Signal = Signal::physical("temperature_c", "degC", 48, 0.1, [-100.0, 300.0]);
+
+/// Speed, torque, link.
+pub const MOTION: Message = Message::new("MOTION", 0x182, 6, 10, &[SPEED, TORQUE, LINK]);
+/// Currents.
+pub const CURRENTS: Message = Message::new("CURRENTS", 0x183, 7, 10, &[CURRENT, ID_REF, IQ_REF]);
+/// Voltage, frequency, temperature.
+pub const VOLTAGES: Message = Message::new("VOLTAGES", 0x184, 8, 10, &[VOLTAGE, FREQUENCY, TEMPERATURE]);
+
+/// What is measured, and what control makes of it. `None`: not available.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Measured {
+    /// Mechanical speed, in r/min.
+    pub speed_rpm: Option<f32>,
+    /// Torque demand after envelope, slew and limits, in N·m.
+    pub torque_nm: Option<f32>,
+    /// DC-link voltage, in V.
+    pub link_v: Option<f32>,
+    /// Largest magnitude of a phase current, in A.
+    pub current_a: Option<f32>,
+    /// Current reference, d, in A.
+    pub id_ref_a: Option<f32>,
+    /// Current reference, q, in A.
+    pub iq_ref_a: Option<f32>,
+    /// Commanded fundamental, peak phase, in V.
+    pub voltage_v: Option<f32>,
+    /// Stator frequency, in Hz, negative backward.
+    pub frequency_hz: Option<f32>,
+    /// Temperature, in °C.
+    pub temperature_c: Option<f32>,
+}
+
+/// Three measurements.
+#[inline(never)]
+pub(in crate::protocol) fn encode(signals: [(&Signal, Option<f32>); 3]) -> Payload {
+    let mut payload = Payload::default();
+    for (signal, value) in signals {
+        signal.put_measured(&mut payload, value);
+    }
+    payload
+}
+
+impl Measured {
+    /// Content of [`MOTION`].
+    pub fn motion(&self) -> Payload {
+        encode([(&SPEED, self.speed_rpm), (&TORQUE, self.torque_nm), (&LINK, self.link_v)])
+    }
+
+    /// Content of [`CURRENTS`].
+    pub fn currents(&self) -> Payload {
+        encode([(&CURRENT, self.current_a), (&ID_REF, self.id_ref_a), (&IQ_REF, self.iq_ref_a)])
+    }
+
+    /// Content of [`VOLTAGES`].
+    pub fn voltages(&self) -> Payload {
+        let temperature = (&TEMPERATURE, self.temperature_c);
+        encode([(&VOLTAGE, self.voltage_v), (&FREQUENCY, self.frequency_hz), temperature])
+    }
+
+    /// Takes over what a message of these three says.
+    pub fn merge(&mut self, message: &Message, payload: Payload) {
+        match message.id {
+            id if id == MOTION.id => {
+                self.speed_rpm = SPEED.get(payload);
+                self.torque_nm = TORQUE.get(payload);
+                self.link_v = LINK.get(payload);
+            }
+            id if id == CURRENTS.id => {
+                self.current_a = CURRENT.get(payload);
+                self.id_ref_a = ID_REF.get(payload);
+                self.iq_ref_a = IQ_REF.get(payload);
+            }
+            id if id == VOLTAGES.id => {
+                self.voltage_v = VOLTAGE.get(payload);
+                self.frequency_hz = FREQUENCY.get(payload);
+                self.temperature_c = TEMPERATURE.get(payload);
+            }
+            _ => (),
+        }
+    }
+}

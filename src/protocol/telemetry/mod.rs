@@ -1,0 +1,21 @@
+//! What the drive sends, by message.
+
+mod answer;
+mod counters;
+mod measured;
+mod status;
+mod trip;
+
+pub use answer::{Outcome, PARAMETER_ANSWER, ParameterAnswer};
+pub use counters::{COUNTERS, Counts};
+pub use measured::{CURRENTS, MOTION, Measured, VOLTAGES};
+pub use status::{Listening, Pattern, STATUS, StatusFrame};
+pub use trip::{FAULT_LIMIT, FAULT_VALUE, trip_frames, trip_number};
+
+pub(super) use answer::{ANSWER_PARAMETER, ANSWER_RESULT, ANSWER_VALUE};
+pub(super) use counters::COUNTER_SIGNALS;
+pub(super) use measured::{SPEED_RPM, encode};
+pub(super) use status::{
+    CHOPPER, DISCHARGE, FAULT, LISTENING, MAIN, PRECHARGE, REFUSAL, REFUSALS, STATE, TAKEN,
+};
+pub(super) use trip::{TRIP_FAULT, TRIP_LIMIT, TRIP_VALUE};
