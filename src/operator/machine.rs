@@ -1,10 +1,12 @@
-//! The state machine, one for every drive.
+//! The state machine, one for every drive: its states, what ends them, what goes on by itself, and what comes out.
+
+mod commands;
 
 use super::demand;
 use super::line::{Discharge, Outcome, Precharge};
 use super::{
-    ACKNOWLEDGE_S, Configuration, Demands, Input, Levels, Output, Refusal, SELF_TEST_S, Settings, Situation,
-    State, Status, Switches, health, line,
+    ACKNOWLEDGE_S, Configuration, Demands, Input, Output, Refusal, SELF_TEST_S, Settings, Situation, State,
+    Status, Switches, health, line,
 };
 use crate::protection::{Fault, SafeState, Trip, Violation};
 
@@ -245,160 +247,6 @@ impl<D: Demands> Operator<D> {
             | Phase::Stopping
             | Phase::Fault { .. } => {}
         }
-    }
-
-    /// Commands: levels that stop first, then edges.
-    fn obey(
-        &mut self,
-        Input { request, observed, .. }: &Input<D::Request, D::Observation>,
-        input: &Situation,
-        settings: &Settings,
-    ) {
-        let levels = D::levels(request);
-        let Levels { enable, charge, discharge, acknowledge, .. } = levels;
-        let last = core::mem::replace(&mut self.last, Edges { enable, charge, discharge, acknowledge });
-        self.obey_levels(&levels, D::link_may_rest(observed), input, settings);
-        if acknowledge && !last.acknowledge {
-            self.acknowledge(input, settings);
-        }
-        if discharge && !last.discharge {
-            self.discharge(input, settings);
-        }
-        if charge && !last.charge {
-            self.charge(settings);
-        }
-        if enable && !last.enable {
-            self.enable(request, &levels, input, settings);
-        }
-    }
-
-    /// Off, stop, coast.
-    #[inline(never)]
-    fn obey_levels(&mut self, request: &Levels, link_may_rest: bool, input: &Situation, settings: &Settings) {
-        let rest = if settings.line.is_some() { Phase::Charged } else { Phase::Ready };
-        let resting = self.demands.are_at_rest();
-        let may_open = resting && link_may_rest && health::open_is_safe(input, settings);
-        let off = request.off || !input.feedback.enable_input;
-        match self.phase {
-            Phase::Pulsing | Phase::Coasting { .. } | Phase::Stopping if off => self.rest(rest),
-            Phase::Stopping if may_open => self.rest(rest),
-            Phase::Coasting { off: true } if !request.enable => self.rest(rest),
-            Phase::Pulsing | Phase::Coasting { .. } if !request.enable => self.phase = Phase::Stopping,
-            Phase::Pulsing if request.coast => self.phase = Phase::Coasting { off: false },
-            Phase::Coasting { .. } if !request.coast => self.phase = Phase::Pulsing,
-            Phase::Coasting { off: false } if may_open => self.phase = Phase::Coasting { off: true },
-            _ => {}
-        }
-    }
-
-    fn rest(&mut self, phase: Phase) {
-        self.phase = phase;
-        self.demands.drop();
-    }
-
-    fn follow(&mut self, phase: Phase) {
-        self.phase = phase;
-        self.refusal = None;
-    }
-
-    fn acknowledge(&mut self, input: &Situation, settings: &Settings) {
-        let Phase::Fault { trip, asked: None } = self.phase else {
-            let waiting = matches!(self.phase, Phase::Fault { .. });
-            return self.refuse(if waiting { Refusal::FaultNotAcknowledged } else { Refusal::NoFault });
-        };
-        let shorted = trip.safe != SafeState::GatesOff;
-        let held = shorted && !health::open_is_safe(input, settings);
-        let cause =
-            health::cause(input, false, settings).or_else(|| health::resting_current(input, settings));
-        if held || cause.is_some() {
-            return self.refuse(Refusal::CauseStillPresent);
-        }
-        // Zero is what both interrupts begin with.
-        self.acknowledge = match self.acknowledge.wrapping_add(1) {
-            0 => 1,
-            number => number,
-        };
-        self.follow(Phase::Fault { trip, asked: Some(0) });
-    }
-
-    fn enable(&mut self, request: &D::Request, levels: &Levels, input: &Situation, settings: &Settings) {
-        match self.why_not_enable(request, levels, input, settings) {
-            Some(reason) => self.refuse(reason),
-            None => self.follow(Phase::Pulsing),
-        }
-    }
-
-    fn why_not_enable(
-        &self,
-        request: &D::Request,
-        levels: &Levels,
-        input: &Situation,
-        settings: &Settings,
-    ) -> Option<Refusal> {
-        let Situation { observed, feedback } = *input;
-        match self.phase {
-            Phase::Init | Phase::SelfTest { .. } => return Some(Refusal::NotReady),
-            Phase::Fault { .. } => return Some(Refusal::FaultNotAcknowledged),
-            Phase::Precharge(_) => return Some(Refusal::LinkNotCharged),
-            Phase::Discharge(_) => return Some(Refusal::Discharging),
-            Phase::Pulsing | Phase::Coasting { .. } | Phase::Stopping => return Some(Refusal::NotStopped),
-            Phase::Ready if settings.line.is_some() => return Some(Refusal::LinkNotCharged),
-            Phase::Ready | Phase::Charged => {}
-        }
-        let refusals = [
-            (levels.off, Refusal::OffRequested),
-            (feedback.parameters_open, Refusal::ParametersOpen),
-            (!feedback.enable_input, Refusal::EnableInputLow),
-            // Not a number is no voltage.
-            (
-                observed.udc_v.is_nan() || observed.udc_v < settings.ratings.dc_link_min_v,
-                Refusal::LinkNotCharged,
-            ),
-            (!feedback.position_known || !observed.speed_known, Refusal::PositionUnknown),
-            (self.bad_values == Some(Refusal::RequestNotFinite), Refusal::RequestNotFinite),
-            (health::resting_current(input, settings).is_some(), Refusal::CauseStillPresent),
-            (D::asks_torque(request) && !levels.with_torque, Refusal::TorqueNotZero),
-        ];
-        refusals.into_iter().find_map(|(refused, reason)| refused.then_some(reason))
-    }
-
-    fn charge(&mut self, settings: &Settings) {
-        let reason = match self.phase {
-            Phase::Ready if settings.line.is_some() => {
-                return self.follow(Phase::Precharge(Precharge::new()));
-            }
-            Phase::Ready => Refusal::NoContactors,
-            Phase::Init | Phase::SelfTest { .. } => Refusal::NotReady,
-            Phase::Fault { .. } => Refusal::FaultNotAcknowledged,
-            Phase::Discharge(_) => Refusal::Discharging,
-            Phase::Precharge(_)
-            | Phase::Charged
-            | Phase::Pulsing
-            | Phase::Coasting { .. }
-            | Phase::Stopping => Refusal::AlreadyCharged,
-        };
-        self.refuse(reason);
-    }
-
-    fn discharge(&mut self, input: &Situation, settings: &Settings) {
-        let reason = match self.phase {
-            Phase::Init | Phase::SelfTest { .. } => Refusal::NotReady,
-            Phase::Fault { .. } => Refusal::FaultNotAcknowledged,
-            Phase::Discharge(_) => Refusal::Discharging,
-            Phase::Pulsing | Phase::Coasting { .. } | Phase::Stopping => Refusal::NotStopped,
-            Phase::Ready | Phase::Precharge(_) | Phase::Charged if settings.line.is_none() => {
-                Refusal::NoContactors
-            }
-            Phase::Ready | Phase::Precharge(_) | Phase::Charged
-                if demand::emf_v(input, settings.ratings) > line::EMPTY_V =>
-            {
-                Refusal::MachineTurning
-            }
-            Phase::Ready | Phase::Precharge(_) | Phase::Charged => {
-                return self.follow(Phase::Discharge(Discharge::new()));
-            }
-        };
-        self.refuse(reason);
     }
 
     /// The demands after limits, slew and jerk.
