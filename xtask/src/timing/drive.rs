@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use anyhow::{Context, Result, bail};
 
-use super::log::{ARGUMENTS, event};
+use super::log::{ARGUMENTS, Log};
 use super::meter::{Call, Meter, Path as Executed};
 use super::tally::Tally;
 use crate::elf::Image;
@@ -94,14 +94,14 @@ impl Bench {
         let link = link.filter(|(_, function)| is_link(&function.names)).map(|(start, _)| *start).collect();
         let mut meter = Meter::new(&self.image, &link);
         meter.keeps_paths = self.keeps_paths;
-        let mut log = BufReader::with_capacity(1 << 20, Unhurried(log));
-        let (mut line, mut outcome) = (Vec::new(), Ok(()));
-        while log.read_until(b'\n', &mut line)? > 0 {
+        let mut lines = BufReader::with_capacity(1 << 20, Unhurried(log));
+        let (mut log, mut line, mut outcome) = (Log::new(&self.image), Vec::new(), Ok(()));
+        while lines.read_until(b'\n', &mut line)? > 0 {
             if line.starts_with(END) {
                 break;
             }
-            if let (Some(event), Ok(())) = (event(&line), &outcome) {
-                outcome = meter.take(event);
+            if outcome.is_ok() {
+                outcome = log.take(&line, |event| meter.take(event));
             }
             line.clear();
         }
