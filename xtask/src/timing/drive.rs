@@ -23,6 +23,7 @@ const IDLE: [&str; 2] = ["main", "board::qemu::idle"];
 const END: &[u8] = b"end of the log";
 
 /// What it takes to drive.
+#[derive(Clone)]
 pub struct Bench {
     pub rig: PathBuf,
     pub qemu: PathBuf,
@@ -53,11 +54,8 @@ pub struct Drive {
 impl Bench {
     /// Runs the scenario with these options.
     pub fn drive(&self, options: &[&str]) -> Result<Drive> {
-        let folder = std::env::temp_dir().join(format!("tractive-timing-{}", std::process::id()));
-        std::fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
-        let outcome = self.drive_in(&folder, options);
-        let _ = std::fs::remove_dir_all(&folder);
-        outcome
+        let folder = tempfile::tempdir().context("no temporary folder")?;
+        self.drive_in(folder.path(), options)
     }
 
     fn drive_in(&self, folder: &Path, options: &[&str]) -> Result<Drive> {

@@ -4,6 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
+use indicatif::ParallelProgressIterator;
+use rayon::prelude::*;
 
 use super::drive::{Bench, Drive, is_link};
 use super::entry;
@@ -13,7 +15,7 @@ use super::statistics::{INTERRUPTS, Statistics};
 use super::tally::Tally;
 use crate::elf::Image;
 use crate::setup::Toolchain;
-use crate::{build, image};
+use crate::{build, image, process};
 
 /// Both directions of torque and of rotation through every mode, up to the highest stator frequency; once with dead time
 /// that is to be compensated.
@@ -103,14 +105,17 @@ impl System {
         match self.build {
             build::System::Traction => traction(&bench, &mut sum)?,
             build::System::Zs9 => {
-                for options in DUAL_DRIVES {
-                    let drive = sum.add(&bench, options)?;
-                    sum.profile(&drive);
-                }
                 // Commanded over the protocol.
                 let talk = build::root().join(DUAL_TALK);
-                let bench = Bench { command: vec!["talk".to_owned(), talk.display().to_string()], ..bench };
-                sum.add(&bench, "--system=zs9 --inertia=0.02")?;
+                let talked =
+                    Bench { command: vec!["talk".to_owned(), talk.display().to_string()], ..bench.clone() };
+                let driven = DUAL_DRIVES.map(|options| (&bench, options.to_owned()));
+                let talked = (&talked, "--system=zs9 --inertia=0.02".to_owned());
+                let drives = drive_all("zs9", &[&driven[..], &[talked]].concat())?;
+                for drive in &drives {
+                    sum.add(drive)?;
+                }
+                drives.iter().take(DUAL_DRIVES.len()).for_each(|drive| sum.profile(drive));
             }
         }
         Measured::new(self, path, image, sum)
@@ -118,30 +123,40 @@ impl System {
 }
 
 fn traction(bench: &Bench, sum: &mut Sum) -> Result<()> {
-    let (mut switch_s, mut boundaries_s) = (None, Vec::new());
-    for options in DRIVES {
-        let drive = sum.add(bench, options)?;
-        sum.profile(&drive);
-        if switch_s.is_none() {
-            switch_s = first_switch_s(&drive);
-            boundaries_s = switching_boundaries_s(&drive);
-        }
-    }
-    for phase_us in PHASES_US {
-        sum.add(bench, &format!("--to=6000 --pwm-delay-us={phase_us} --fault-at={SHORT_S}"))?;
-    }
+    let mut plan: Vec<_> = DRIVES.map(str::to_owned).into();
+    plan.extend(
+        PHASES_US.map(|phase_us| format!("--to=6000 --pwm-delay-us={phase_us} --fault-at={SHORT_S}")),
+    );
+    let of = |plan: Vec<String>| plan.into_iter().map(|options| (bench, options)).collect::<Vec<_>>();
+    let drives = drive_all("pmasynrm", &of(plan))?;
+    let first = drives.first().context("nothing was driven")?;
     // A switch of mode, a fault and full torque at the limit of the current, all in one tick. Frozen currents are found
     // after a number of periods, and of all faults they cost the most: the whole control law is executed besides.
-    let switch_s = switch_s.context("the drive never switched its mode")?;
+    let switch_s = first_switch_s(first).context("the drive never switched its mode")?;
     let freeze_s = switch_s - FROZEN_PERIODS * CONTROL_S;
-    sum.add(bench, &format!("--to=6000 --freeze-at={freeze_s:.6}"))?;
+    let mut plan = vec![format!("--to=6000 --freeze-at={freeze_s:.6}")];
     // The same for the PWM interrupt, at each switch: phase currents that are wrong for the first time at the boundary itself.
-    for boundary_s in boundaries_s {
-        sum.add(bench, &format!("--to=6000 --dead-time-us=3 --offset-at={boundary_s:.6}"))?;
-    }
+    plan.extend(
+        switching_boundaries_s(first)
+            .iter()
+            .map(|boundary_s| format!("--to=6000 --dead-time-us=3 --offset-at={boundary_s:.6}")),
+    );
     // With an operator who commands.
-    sum.add(bench, "--to=6000 --operated")?;
+    plan.push("--to=6000 --operated".to_owned());
+    for drive in drives.iter().chain(&drive_all("pmasynrm", &of(plan))?) {
+        sum.add(drive)?;
+    }
+    drives.iter().take(DRIVES.len()).for_each(|drive| sum.profile(drive));
     Ok(())
+}
+
+/// Each of them with its options, as many at once as there are processors; in their order.
+fn drive_all(system: &'static str, plan: &[(&Bench, String)]) -> Result<Vec<Drive>> {
+    let drives = plan.par_iter().progress_with(process::bar(system, plan.len())).map(|(bench, options)| {
+        let drive = bench.drive(&options.split(' ').collect::<Vec<_>>());
+        drive.with_context(|| format!("{} {options}", bench.command.join(" ")))
+    });
+    drives.collect()
 }
 
 /// For each boundary where the modulator changes from one mode with pulses to another, a moment behind the last control sample before it,
@@ -187,17 +202,15 @@ struct Sum {
 }
 
 impl Sum {
-    fn add(&mut self, bench: &Bench, options: &str) -> Result<Drive> {
-        eprintln!("{} {options}", bench.command.join(" "));
-        let drive = bench.drive(&options.split(' ').collect::<Vec<_>>())?;
-        self.statistics.add(&drive)?;
+    fn add(&mut self, drive: &Drive) -> Result<()> {
+        self.statistics.add(drive)?;
         for (exception, addresses) in &drive.longest {
             let longest = self.longest.entry(*exception).or_default();
             if addresses.len() > longest.len() {
                 longest.clone_from(addresses);
             }
         }
-        Ok(drive)
+        Ok(())
     }
 
     /// Takes it into the profile; the short drives would shift the means.
