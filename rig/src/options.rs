@@ -176,7 +176,7 @@ pub struct RunOptions {
     #[serde(skip)]
     #[arg(long, value_name = "ARG", allow_hyphen_values = true, hide = true)]
     pub qemu_arg: Vec<String>,
-    /// With --on qemu: a file for the mode of every interrupt, in their order.
+    /// With --on qemu: a file for what every interrupt was about, in their order.
     #[serde(skip)]
     #[arg(long, value_name = "FILE", hide = true)]
     pub calls: Option<PathBuf>,

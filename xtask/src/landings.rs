@@ -212,7 +212,8 @@ impl Run<'_> {
         let drive = bench.drive(&options)?;
         let [(control, exception), _] = INTERRUPTS;
         let paths = drive.calls.iter().zip(drive.paths).filter(|(call, _)| call.exception == exception);
-        let modes = drive.modes.into_iter().filter(|(name, ..)| name == control).map(|(_, mode, _)| mode);
+        let served = drive.served.into_iter().filter(|served| served.interrupt == control);
+        let modes = served.map(|served| served.mode);
         let foreign = foreign(self.image);
         let calls = paths.zip(modes).map(|((_, path), mode)| {
             let steps = path.addresses.into_iter().zip(path.elapsed);

@@ -27,6 +27,11 @@ pub struct Block {
     pub max_error: Option<f64>,
 }
 
+/// Its largest error as in the tables.
+pub fn error(block: &Block) -> String {
+    block.max_error.map_or_else(String::new, |error| format!("{error:.1e}"))
+}
+
 /// Builds the bench for the board and for the host, runs both.
 pub fn measure(toolchain: &Toolchain, qemu: &Path) -> Result<Vec<Block>> {
     let path = build::bench(toolchain, "tractive-bench")?;

@@ -7,7 +7,7 @@ use anyhow::{Context, Result};
 use indicatif::ParallelProgressIterator;
 use rayon::prelude::*;
 
-use super::drive::{Bench, Drive, is_link};
+use super::drive::{Bench, Drive, Served, is_link};
 use super::entry;
 use super::parts::{self, Part};
 use super::profile::{self, Profile};
@@ -166,8 +166,8 @@ fn switching_boundaries_s(drive: &Drive) -> Vec<f64> {
     let depths: Vec<_> =
         drive.calls.iter().filter(|call| call.exception == control).map(|call| call.depth).collect();
     let (mut samples, mut last, mut found) = (0, "off", Vec::new());
-    for (name, mode, _) in &drive.modes {
-        if name == "control" {
+    for Served { interrupt, mode, .. } in &drive.served {
+        if interrupt == "control" {
             samples += 1;
             continue;
         }
@@ -184,8 +184,8 @@ fn switching_boundaries_s(drive: &Drive) -> Vec<f64> {
 /// When control first works for another mode with pulses than before, in the scenario's time: the middle of the period
 /// before that tick.
 fn first_switch_s(drive: &Drive) -> Option<f64> {
-    let modes: Vec<&str> =
-        drive.modes.iter().filter(|(name, ..)| name == "control").map(|(_, mode, _)| mode.as_str()).collect();
+    let served = drive.served.iter().filter(|served| served.interrupt == "control");
+    let modes: Vec<_> = served.map(|served| served.mode.as_str()).collect();
     let index = modes.windows(2).position(|pair| pair[0] != "off" && pair[1] != pair[0])? + 1;
     // The first interrupt, number 0, comes one period after the beginning.
     Some((index as f64 + 0.5 - LEAD_PERIODS as f64) * CONTROL_S)
@@ -246,7 +246,7 @@ impl Measured {
         for (name, exception) in INTERRUPTS {
             let longest = sum.longest.get(&exception).map_or(&[][..], Vec::as_slice);
             let calls = sum.calls.get(&exception).copied().unwrap_or(0);
-            parts.push((name, parts::parts(&profile, exception, &sum.hits, calls, longest)?));
+            parts.push((name, parts::parts(&profile, (name, exception), &sum.hits, calls, longest)?));
         }
         let masking = entry::masking(&image, is_link);
         let [(_, control), _] = INTERRUPTS;
@@ -273,23 +273,30 @@ impl Measured {
 pub mod tests {
     use super::*;
     use crate::elf::Sizes;
+    use crate::timing::drive::Direction::{Braking, Motoring};
     use crate::timing::meter::Call;
+    use crate::timing::parts::Group;
 
     /// A PWM interrupt and two of control, of the first system.
     pub fn example() -> Measured {
         let call =
             |exception, instructions| Call { exception, instructions, cycles: 1_700, ..Call::default() };
-        let served = |name: &str| (name.to_owned(), "mid7".to_owned(), 100.0);
+        let served = |interrupt: &str, direction| Served {
+            interrupt: interrupt.to_owned(),
+            mode: "mid7".to_owned(),
+            direction: Some(direction),
+            hertz: 100.0,
+        };
         let drive = Drive {
             calls: vec![call(26, 7), call(24, 10), call(24, 20)],
-            modes: vec![served("pwm"), served("control"), served("control")],
+            served: vec![served("pwm", Motoring), served("control", Motoring), served("control", Braking)],
             deepest: BTreeMap::from([(24, 440), (26, 200)]),
             ..Drive::default()
         };
         let mut statistics = Statistics::default();
         statistics.add(&drive).unwrap();
         let sizes = Sizes { code: 1, tables: 2, rodata: 3, ram: 4, recorder: 6, stack: 5 };
-        let part = Part { name: "MTPA, two passes", mean: 12.0, longest: 20 };
+        let part = Part { name: "MTPA, two passes", group: Group::Named, mean: 12.0, longest: 20 };
         Measured {
             system: System::ALL[0],
             image: Image { sizes, ..Image::default() },
@@ -306,17 +313,24 @@ pub mod tests {
     fn the_load_is_that_of_both_interrupts() {
         // 1,700 cycles ten thousand times a second are a tenth of 170 MHz; one PWM interrupt comes for two of control.
         let statistics = example().statistics;
-        let load = statistics.load("mid7").unwrap();
+        let load = statistics.load("mid7", None).unwrap();
         assert!((load.mean - 15.0).abs() < 1e-9 && (load.max - 15.0).abs() < 1e-9);
-        assert!(statistics.load("square").is_none());
+        assert!(statistics.load("square", None).is_none());
+        // Motoring it comes for each of control; braking it was never seen.
+        assert!((statistics.load("mid7", Some(Motoring)).unwrap().max - 20.0).abs() < 1e-9);
+        assert!(statistics.load("mid7", Some(Braking)).is_none());
     }
 
     #[test]
     fn the_first_switch_is_found_in_the_middle_of_a_period() {
-        let served = |(name, mode): &(&str, &str)| ((*name).to_owned(), (*mode).to_owned(), 0.0);
+        let served = |(interrupt, mode): &(&str, &str)| Served {
+            interrupt: (*interrupt).to_owned(),
+            mode: (*mode).to_owned(),
+            ..Served::default()
+        };
         let mut modes = vec![("control", "off"); 100];
         modes.extend([("pwm", "async"), ("control", "async"), ("pwm", "sync15"), ("control", "sync15")]);
-        let drive = Drive { modes: modes.iter().map(served).collect(), ..Drive::default() };
+        let drive = Drive { served: modes.iter().map(served).collect(), ..Drive::default() };
         // Interrupt number 101 comes 102 periods after the run's beginning, 2 after the scenario's.
         assert!((first_switch_s(&drive).unwrap() - 1.5e-4).abs() < 1e-12);
         assert!(first_switch_s(&Drive::default()).is_none());
