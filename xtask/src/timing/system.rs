@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use indicatif::ParallelProgressIterator;
 use rayon::prelude::*;
 
@@ -17,9 +17,11 @@ use crate::elf::Image;
 use crate::setup::Toolchain;
 use crate::{build, image, process};
 
-/// Both directions of torque and of rotation through every mode, up to the highest stator frequency; once with dead time
-/// that is to be compensated.
-const DRIVES: [&str; 2] = ["--to=6000 --dead-time-us=3", "--to=-6000 --brake"];
+/// Both directions of torque and of rotation through every mode, up to the highest stator frequency, with dead time that is to be
+/// compensated.
+const DRIVES: [&str; 2] = ["--to=6000 --dead-time-us=3", "--to=-6000 --brake --dead-time-us=3"];
+/// An operator who commands, motoring and braking.
+const OPERATED: [&str; 2] = ["--to=6000 --operated", "--to=6000 --brake --operated"];
 /// Then short ones: the PWM timer starts this much later against the control timer, in µs. Halves of the asynchronous
 /// carrier last five control periods and five ninths, so they meet nine phases, 11 µs apart; these fall between.
 /// A demand that is no number ends them.
@@ -123,27 +125,25 @@ impl System {
 }
 
 fn traction(bench: &Bench, sum: &mut Sum) -> Result<()> {
-    let mut plan: Vec<_> = DRIVES.map(str::to_owned).into();
-    plan.extend(
-        PHASES_US.map(|phase_us| format!("--to=6000 --pwm-delay-us={phase_us} --fault-at={SHORT_S}")),
-    );
-    let of = |plan: Vec<String>| plan.into_iter().map(|options| (bench, options)).collect::<Vec<_>>();
-    let drives = drive_all("pmasynrm", &of(plan))?;
-    let first = drives.first().context("nothing was driven")?;
-    // A switch of mode, a fault and full torque at the limit of the current, all in one tick. Frozen currents are found
-    // after a number of periods, and of all faults they cost the most: the whole control law is executed besides.
-    let switch_s = first_switch_s(first).context("the drive never switched its mode")?;
-    let freeze_s = switch_s - FROZEN_PERIODS * CONTROL_S;
-    let mut plan = vec![format!("--to=6000 --freeze-at={freeze_s:.6}")];
-    // The same for the PWM interrupt, at each switch: phase currents that are wrong for the first time at the boundary itself.
-    plan.extend(
-        switching_boundaries_s(first)
-            .iter()
-            .map(|boundary_s| format!("--to=6000 --dead-time-us=3 --offset-at={boundary_s:.6}")),
-    );
-    // With an operator who commands.
-    plan.push("--to=6000 --operated".to_owned());
-    for drive in drives.iter().chain(&drive_all("pmasynrm", &of(plan))?) {
+    let phases =
+        PHASES_US.map(|phase_us| format!("--to=6000 --pwm-delay-us={phase_us} --fault-at={SHORT_S}"));
+    let plan = |options: Vec<String>| options.into_iter().map(|options| (bench, options)).collect::<Vec<_>>();
+    let ordinary = DRIVES.iter().chain(&OPERATED).map(|options| (*options).to_owned());
+    let drives = drive_all("pmasynrm", &plan(ordinary.chain(phases).collect()))?;
+    let mut provoked = Vec::new();
+    for (options, drive) in DRIVES.iter().zip(&drives) {
+        // A switch of mode, a fault and full torque at the limit of the current, all in one tick. Frozen currents are found
+        // after a number of periods, and of all faults they cost the most: the whole control law is executed besides.
+        let freezes_s = switches_s(drive).into_iter().map(|switch_s| switch_s - FROZEN_PERIODS * CONTROL_S);
+        provoked.extend(freezes_s.map(|freeze_s| format!("{options} --freeze-at={freeze_s:.6}")));
+        // The same for the PWM interrupt: phase currents that are wrong for the first time at the boundary itself.
+        let boundaries_s = switching_boundaries_s(drive).into_iter();
+        provoked.extend(boundaries_s.map(|boundary_s| format!("{options} --offset-at={boundary_s:.6}")));
+    }
+    if provoked.is_empty() {
+        bail!("the drive never switched its mode");
+    }
+    for drive in drives.iter().chain(&drive_all("pmasynrm", &plan(provoked))?) {
         sum.add(drive)?;
     }
     drives.iter().take(DRIVES.len()).for_each(|drive| sum.profile(drive));
@@ -181,14 +181,15 @@ fn switching_boundaries_s(drive: &Drive) -> Vec<f64> {
     found
 }
 
-/// When control first works for another mode with pulses than before, in the scenario's time: the middle of the period
+/// When control works for another mode with pulses than before, from one with pulses, in the scenario's time: the middle of the period
 /// before that tick.
-fn first_switch_s(drive: &Drive) -> Option<f64> {
+fn switches_s(drive: &Drive) -> Vec<f64> {
     let served = drive.served.iter().filter(|served| served.interrupt == "control");
     let modes: Vec<_> = served.map(|served| served.mode.as_str()).collect();
-    let index = modes.windows(2).position(|pair| pair[0] != "off" && pair[1] != pair[0])? + 1;
+    let is_switch = |pair: &[&str]| pair[0] != pair[1] && !pair.contains(&"off");
+    let ends = modes.windows(2).enumerate().filter(|(_, pair)| is_switch(pair)).map(|(index, _)| index + 1);
     // The first interrupt, number 0, comes one period after the beginning.
-    Some((index as f64 + 0.5 - LEAD_PERIODS as f64) * CONTROL_S)
+    ends.map(|index| (index as f64 + 0.5 - LEAD_PERIODS as f64) * CONTROL_S).collect()
 }
 
 /// All drives of a system together.
@@ -322,7 +323,7 @@ pub mod tests {
     }
 
     #[test]
-    fn the_first_switch_is_found_in_the_middle_of_a_period() {
+    fn switches_are_found_in_the_middle_of_a_period() {
         let served = |(interrupt, mode): &(&str, &str)| Served {
             interrupt: (*interrupt).to_owned(),
             mode: (*mode).to_owned(),
@@ -332,7 +333,7 @@ pub mod tests {
         modes.extend([("pwm", "async"), ("control", "async"), ("pwm", "sync15"), ("control", "sync15")]);
         let drive = Drive { served: modes.iter().map(served).collect(), ..Drive::default() };
         // Interrupt number 101 comes 102 periods after the run's beginning, 2 after the scenario's.
-        assert!((first_switch_s(&drive).unwrap() - 1.5e-4).abs() < 1e-12);
-        assert!(first_switch_s(&Drive::default()).is_none());
+        let switches_s = switches_s(&drive);
+        assert!(switches_s.len() == 1 && (switches_s[0] - 1.5e-4).abs() < 1e-12, "{switches_s:?}");
     }
 }
