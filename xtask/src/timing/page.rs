@@ -39,7 +39,7 @@ fn targets(text: &mut String, report: &Report) {
     let [named, beyond, around] = Group::ALL.map(Group::name);
     let _ = writeln!(
         text,
-        "| | target | longest | in mode | {named} | {beyond} | {around} |\n|---|---:|---:|---|---:|---:|---:|"
+        "| | target | longest | {named} | {beyond} | {around} |\n|---|---:|---:|---:|---:|---:|"
     );
     for measured in report.systems {
         for (name, parts) in &measured.parts {
@@ -49,10 +49,9 @@ fn targets(text: &mut String, report: &Report) {
             let of = |group| together(parts.iter().filter(|part| part.group == group)).1;
             let (_, longest) = together(parts.iter());
             let [named, beyond, around] = Group::ALL.map(of);
-            let mode = measured.dearest(name).unwrap_or_default();
             let _ = writeln!(
                 text,
-                "| {} {name} | {target} | {longest} | {mode} | {named} | {beyond} | {around} |",
+                "| {} {name} | {target} | {longest} | {named} | {beyond} | {around} |",
                 measured.system.name
             );
         }

@@ -83,18 +83,6 @@ impl Measured {
         Direction::BOTH.into_iter().filter_map(row)
     }
 
-    /// Where an interrupt's longest one was.
-    pub fn dearest(&self, interrupt: &str) -> Option<String> {
-        let rows = self.rows().filter(|(name, ..)| *name == interrupt);
-        let rows = rows.flat_map(|(name, mode, row)| {
-            let directed = self.directed(name, mode);
-            directed.chain([(mode.to_owned(), row)])
-        });
-        // The first of equals: with its direction, where it has one.
-        rows.reduce(|one, other| if other.1.instructions.max > one.1.instructions.max { other } else { one })
-            .map(|(mode, _)| mode)
-    }
-
     /// Modes, each with its directions behind it, and the load.
     pub fn loads(&self) -> impl Iterator<Item = (String, Load)> {
         self.system.modes.iter().flat_map(|mode| {
@@ -255,7 +243,7 @@ mod tests {
         }
         assert!(plain.contains("MTPA, two passes 12.0 20 what the target names 12.0 20 "), "{plain}");
         let page = page::text(&report);
-        assert!(page.contains("| pmasynrm control | 1 | 20 | mid7, braking | 20 | 0 | 0 |"), "{page}");
+        assert!(page.contains("| pmasynrm control | 1 | 20 | 20 | 0 | 0 |"), "{page}");
         assert!(page.contains("| control | mid7, motoring | 10 | 10 | 10 | 1700 | 0 |"), "{page}");
         assert!(page.contains("| control | mid7, braking | 20 | 20 | 20 | 1700 | 0 |"), "{page}");
     }
