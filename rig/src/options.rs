@@ -78,7 +78,7 @@ pub fn finite(text: &str) -> Result<f64, String> {
 }
 
 /// Options that are for some scenarios only, by the names of their fields.
-pub const OWN: [&str; 13] = [
+pub const OWN: [&str; 14] = [
     "down",
     "brake",
     "torque_scale",
@@ -92,6 +92,7 @@ pub const OWN: [&str; 13] = [
     "step",
     "no_reverse",
     "edges",
+    "cruise",
 ];
 /// Options that all of the ZS9's scenarios know, and no others.
 pub const OF_THE_ZS9: [&str; 4] = ["carrier_hz", "uin", "scheme", "inject"];
@@ -176,7 +177,7 @@ pub struct RunOptions {
     #[serde(skip)]
     #[arg(long, value_name = "ARG", allow_hyphen_values = true, hide = true)]
     pub qemu_arg: Vec<String>,
-    /// With --on qemu: a file for the mode of every interrupt, in their order.
+    /// With --on qemu: a file for what every interrupt was about, in their order.
     #[serde(skip)]
     #[arg(long, value_name = "FILE", hide = true)]
     pub calls: Option<PathBuf>,
@@ -228,6 +229,9 @@ pub struct Zs9Options {
     /// zs9-reverse: motor 2 keeps its direction, for comparison.
     #[arg(long)]
     pub no_reverse: bool,
+    /// zs9-cycle: how long it cruises, in s, up to 3600.
+    #[arg(long, default_value_t = 20.0, value_parser = cruise, allow_negative_numbers = true)]
+    pub cruise: f64,
     /// zs9-cycle: write edges.csv.
     #[serde(skip)]
     #[arg(long)]
@@ -261,6 +265,13 @@ fn load_step(text: &str) -> Result<f64, String> {
     match finite(text) {
         Ok(step) if step.abs() <= 500.0 => Ok(step),
         _ => Err("must be a number from -500 to 500".to_owned()),
+    }
+}
+
+fn cruise(text: &str) -> Result<f64, String> {
+    match positive(text) {
+        Ok(seconds) if seconds <= 3600.0 => Ok(seconds),
+        _ => Err("must be a number above 0, at most 3600".to_owned()),
     }
 }
 

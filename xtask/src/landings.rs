@@ -13,12 +13,13 @@ mod reach;
 use std::collections::HashSet;
 use std::path::Path;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result};
+use rayon::prelude::*;
 
 use crate::build::System;
 use crate::elf::Image;
 use crate::image;
-use crate::saboteur::{Folder, Found, Saboteur};
+use crate::saboteur::{Found, Saboteur};
 use crate::setup::Setup;
 use crate::timing::drive::Bench;
 use crate::timing::statistics::INTERRUPTS;
@@ -77,17 +78,22 @@ struct Call {
 
 /// The step of the tests; what is wrong is printed, `true` is good.
 pub fn check(setup: &mut Setup) -> Result<bool> {
-    let folder = Folder::new("landings");
+    let folder = tempfile::tempdir().context("no temporary folder")?;
+    let built = COURSES.iter().map(|course| Ok((course, Saboteur::build(setup, course.system)?)));
+    let built: Vec<_> = built.collect::<Result<_>>()?;
+    let courses = built.into_par_iter().map(|(course, saboteur)| course.check(saboteur, folder.path()));
     let mut good = true;
-    for course in &COURSES {
-        good &= course.check(setup, &folder.0)?;
+    for (text, is_good) in courses.collect::<Result<Vec<_>>>()? {
+        print!("{text}");
+        good &= is_good;
     }
     Ok(good)
 }
 
 impl Course {
-    fn check(&self, setup: &mut Setup, folder: &Path) -> Result<bool> {
-        let mut saboteur = Saboteur::build(setup, self.system)?;
+    /// What is to be printed, and whether it is good.
+    fn check(&self, mut saboteur: Saboteur, folder: &Path) -> Result<(String, bool)> {
+        let folder = folder.join(self.system.image());
         let image = image::read(&saboteur.image)?;
         let mut reached = Reached::default();
         let mut findings = Vec::new();
@@ -95,19 +101,25 @@ impl Course {
             let is_last = number + 1 == self.runs.len();
             saboteur.scenario = scenario;
             let options = [&QUICK, *options].concat();
-            let run = Run { course: self, saboteur: &saboteur, image: &image, options, folder, is_last };
+            let run =
+                Run { course: self, saboteur: &saboteur, image: &image, options, folder: &folder, is_last };
             findings.extend(run.check(&mut reached)?);
         }
-        println!("{}: {} landings in {} passes", self.system.image(), reached.landings, reached.passes);
-        print!("{}", reached.table());
+        let mut text = format!(
+            "{}: {} landings in {} passes\n{}",
+            self.system.image(),
+            reached.landings,
+            reached.passes,
+            reached.table()
+        );
         let missing = reached.findings(&image);
         if missing.len() > self.most_missing {
             findings.push(format!("{} were not hit, more than {}", missing.len(), self.most_missing));
         }
         for finding in missing.iter().chain(&findings) {
-            println!("{finding}");
+            text += &format!("{finding}\n");
         }
-        Ok(findings.is_empty())
+        Ok((text, findings.is_empty()))
     }
 }
 
@@ -124,11 +136,18 @@ struct Run<'a> {
 impl Run<'_> {
     /// Adds what it reaches; what it finds.
     fn check(&self, reached: &mut Reached) -> Result<Vec<String>> {
-        let calls = self.calls()?;
-        let undisturbed = self.saboteur.run(("none", 0, 0), &self.options, self.folder)?;
-        let undisturbed_files = files(self.folder)?;
+        let folder = |name: &str| self.folder.join(name);
+        let (calls, (undisturbed, seen)) = rayon::join(
+            || self.calls(&folder("logged")),
+            || {
+                rayon::join(
+                    || self.undisturbed(&folder("undisturbed")),
+                    || self.saboteur.delay(&[], &self.options, &folder("prompt")),
+                )
+            },
+        );
+        let (calls, (undisturbed, undisturbed_files), seen) = (calls?, undisturbed?, seen?.seen);
         let prompt = vec![0; calls.len()];
-        let seen = self.saboteur.delay(&prompt, &self.options, self.folder)?.seen;
         let mut hunt = Hunt::new(Stand::all(&calls, &seen, self.course.deadline_ticks));
         hunt.take(&prompt, &seen, &mut Reached::default());
         let mut findings = Vec::new();
@@ -158,24 +177,23 @@ impl Run<'_> {
 
     /// Runs with these delays, all at once, and what must not change of each.
     fn passes(&self, delays: &[Vec<u16>]) -> Result<Vec<(Found, [Vec<u8>; 2])>> {
-        let pass = |number: usize, delays: &[u16]| {
+        let passes = delays.par_iter().enumerate().map(|(number, delays)| {
             let folder = self.folder.join(number.to_string());
             let found = self.saboteur.delay(delays, &self.options, &folder)?;
             Ok((found, files(&folder)?))
-        };
-        std::thread::scope(|scope| {
-            let passes = delays.iter().enumerate();
-            let passes: Vec<_> =
-                passes.map(|(number, delays)| scope.spawn(move || pass(number, delays))).collect();
-            let ended =
-                passes.into_iter().map(|pass| pass.join().unwrap_or_else(|_| bail!("a pass panicked")));
-            ended.collect()
-        })
+        });
+        passes.collect()
+    }
+
+    /// What came of a run in which nothing is done to the interrupts, and what must not change.
+    fn undisturbed(&self, folder: &Path) -> Result<(Found, [Vec<u8>; 2])> {
+        let found = self.saboteur.run(("none", 0, 0), &self.options, folder)?;
+        Ok((found, files(folder)?))
     }
 
     /// The control interrupts of an undisturbed run.
-    fn calls(&self) -> Result<Vec<Call>> {
-        let (saboteur, folder) = (self.saboteur, self.folder);
+    fn calls(&self, folder: &Path) -> Result<Vec<Call>> {
+        let saboteur = self.saboteur;
         let bench = Bench {
             rig: saboteur.rig.clone(),
             qemu: saboteur.qemu.clone(),
@@ -194,7 +212,8 @@ impl Run<'_> {
         let drive = bench.drive(&options)?;
         let [(control, exception), _] = INTERRUPTS;
         let paths = drive.calls.iter().zip(drive.paths).filter(|(call, _)| call.exception == exception);
-        let modes = drive.modes.into_iter().filter(|(name, ..)| name == control).map(|(_, mode, _)| mode);
+        let served = drive.served.into_iter().filter(|served| served.interrupt == control);
+        let modes = served.map(|served| served.mode);
         let foreign = foreign(self.image);
         let calls = paths.zip(modes).map(|((_, path), mode)| {
             let steps = path.addresses.into_iter().zip(path.elapsed);

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use std::process::{Command, Stdio};
 
 use anyhow::{Context, Result};
+use indicatif::{ProgressBar, ProgressStyle};
 
 /// Runs it with this process's own input and output; whether it succeeded.
 pub fn succeeds(command: &mut Command) -> Result<bool> {
@@ -27,6 +28,16 @@ pub fn output_of(command: &mut Command) -> Option<String> {
 /// The message for a program that does not start.
 pub fn cannot_start(command: &Command) -> String {
     format!("cannot start {}", command.get_program().to_string_lossy())
+}
+
+/// A bar for so many runs, on a terminal; in a pipe indicatif draws none.
+pub fn bar(name: &'static str, runs: usize) -> ProgressBar {
+    let bar = ProgressBar::new(runs as u64).with_message(name);
+    match ProgressStyle::with_template("{msg:16} [{bar:40}] {pos}/{len} {elapsed} (left {eta})") {
+        Ok(style) => bar.with_style(style),
+        Err(_) => bar,
+    }
+    .with_finish(indicatif::ProgressFinish::AndClear)
 }
 
 /// Where a program stands on the PATH.

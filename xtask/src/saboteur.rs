@@ -141,21 +141,6 @@ fn read(text: &str) -> Result<Found> {
     Ok(found)
 }
 
-/// A folder that is gone when this is.
-pub struct Folder(pub PathBuf);
-
-impl Folder {
-    pub fn new(name: &str) -> Self {
-        Self(std::env::temp_dir().join(format!("tractive-{name}-{}", std::process::id())))
-    }
-}
-
-impl Drop for Folder {
-    fn drop(&mut self) {
-        let _ = std::fs::remove_dir_all(&self.0);
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -1,30 +1,45 @@
-//! What every interrupt was about, in the order in which they ended: a line each.
+//! What every interrupt was about, in the order in which they ended: a line `interrupt,mode,direction,frequency` each.
 
 use anyhow::{Context, Result};
 use std::fmt::Write as _;
 use std::path::Path;
+use tractive::drive::Report;
+use tractive::modulation::Mode;
 
 /// The lines so far.
 pub(crate) struct Calls {
     /// What the interrupts are about now.
     pub(crate) mode: String,
+    direction: &'static str,
     lines: String,
 }
 
 impl Calls {
     /// None yet.
     pub(crate) fn new(mode: &str) -> Self {
-        Self { mode: mode.to_owned(), lines: String::new() }
+        Self { mode: mode.to_owned(), direction: "", lines: String::new() }
     }
 
-    /// A control interrupt, and what else there is to say of it.
-    pub(crate) fn control(&mut self, detail: &str) {
-        let _ = writeln!(self.lines, "control,{},{detail}", self.mode);
+    /// A control interrupt of the first system: the direction is its own and that of the PWM interrupts behind it.
+    pub(crate) fn traction(&mut self, report: &Report) {
+        self.direction = direction(report, self.direction);
+        self.line("control", &report.frequency_hz.to_string());
+    }
+
+    /// A control interrupt whose mode says everything.
+    pub(crate) fn control(&mut self) {
+        self.line("control", "");
     }
 
     /// A PWM interrupt.
     pub(crate) fn pwm(&mut self) {
-        let _ = writeln!(self.lines, "pwm,{},", self.mode);
+        self.line("pwm", "");
+    }
+
+    /// Without pulses there is no direction.
+    fn line(&mut self, interrupt: &str, frequency_hz: &str) {
+        let direction = if self.mode == Mode::Off.name() { "" } else { self.direction };
+        let _ = writeln!(self.lines, "{interrupt},{},{direction},{frequency_hz}", self.mode);
     }
 
     /// Writes them, if somebody wants them.
@@ -33,5 +48,39 @@ impl Calls {
             Some(path) => std::fs::write(path, &self.lines).with_context(|| path.display().to_string()),
             None => Ok(()),
         }
+    }
+}
+
+/// By the sign of the mechanical power, torque by speed. Where that is nothing (no torque, standstill, a fault) it is the direction
+/// before, at first motoring.
+fn direction(report: &Report, before: &'static str) -> &'static str {
+    let power = report.torque_nm * report.frequency_hz;
+    match before {
+        _ if power > 0.0 => "motoring",
+        _ if power < 0.0 => "braking",
+        "" => "motoring",
+        _ => before,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_direction_is_that_of_the_power_and_stays_where_there_is_none() {
+        let mut calls = Calls::new("async");
+        for (torque_nm, frequency_hz) in [(0.0, 0.0), (9.0, -1.0), (f32::NAN, -1.0), (-9.0, -1.0), (9.0, 0.0)]
+        {
+            calls.traction(&Report { torque_nm, frequency_hz, ..Report::default() });
+        }
+        calls.pwm();
+        calls.mode = Mode::Off.name().to_owned();
+        calls.pwm();
+        assert_eq!(
+            calls.lines,
+            "control,async,motoring,0\ncontrol,async,braking,-1\ncontrol,async,braking,-1\n\
+             control,async,motoring,-1\ncontrol,async,motoring,0\npwm,async,motoring,\npwm,off,,\n"
+        );
     }
 }

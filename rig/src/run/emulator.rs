@@ -19,7 +19,7 @@ pub struct Emulator {
     pub image: PathBuf,
     /// Further arguments.
     pub arguments: Vec<String>,
-    /// Where the mode of every interrupt is written, a line `control,MODE` or `pwm,MODE` each.
+    /// Where it is written what every interrupt was about, a line each.
     pub calls: Option<PathBuf>,
     /// Whether the run may stand still for as long as somebody types.
     pub patient: bool,

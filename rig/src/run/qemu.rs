@@ -31,7 +31,7 @@ pub fn run_in_qemu(
                 answers.control(&link::sample_to_block(&sample, done))?;
             }
             Request::ControlReport(at, report) => {
-                calls.control(&report.frequency_hz.to_string());
+                calls.traction(&report);
                 bench.control_report(at, report);
             }
             Request::PwmSample(at) => answers.pwm(&link::currents_to_block(bench.pwm_sample(at)?))?,

@@ -28,11 +28,11 @@ const ENABLES_S: f64 = 0.5;
 const PULLS_S: f64 = 0.6;
 const OPERATED_S: f64 = 0.7;
 
-fn request(t_s: f64, ratings: &Ratings) -> Request {
+fn request(t_s: f64, torque_nm: f32, ratings: &Ratings) -> Request {
     Request {
         enable: t_s >= ENABLES_S,
         charge: (CHARGES_S.0..CHARGES_S.1).contains(&t_s),
-        torque_nm: if t_s < PULLS_S { 0.0 } else { ratings.max_torque_nm },
+        torque_nm: if t_s < PULLS_S { 0.0 } else { torque_nm },
         ..Request::idle(ratings)
     }
 }
@@ -77,10 +77,11 @@ impl Scenario for Timing {
 
     fn line(&self, options: &RunOptions, machine: &Machine) -> Option<LinePlan> {
         let ratings = &machine.tables.ratings;
+        let torque_nm = if options.brake { -ratings.max_torque_nm } else { ratings.max_torque_nm };
         options.operated.then(|| LinePlan {
             link: line::scaled(machine),
             starts_charged: true,
-            commander: Box::new(|t_s| request(t_s, ratings)),
+            commander: Box::new(move |t_s| request(t_s, torque_nm, ratings)),
             hardware: Vec::new(),
             chopper_ohm: Vec::new(),
             reversible: Vec::new(),

@@ -1,6 +1,6 @@
 //! Where a carrier boundary can come in a control interrupt, and what was hit there.
 
-use std::collections::{BTreeMap, BTreeSet, HashSet};
+use std::collections::{BTreeMap, HashSet};
 
 use super::{Call, INSTRUCTIONS_PER_TICK};
 use crate::elf::Image;
@@ -103,9 +103,9 @@ impl<'a> Stand<'a> {
 /// What the runs of a course have hit.
 #[derive(Default)]
 pub struct Reached {
-    /// Modes and instructions.
-    all: BTreeSet<(String, u32)>,
-    hit: BTreeSet<(String, u32)>,
+    /// Of each mode the instructions that were executed, and those that were hit.
+    all: BTreeMap<String, HashSet<u32>>,
+    hit: BTreeMap<String, HashSet<u32>>,
     /// Why no boundary can come at an instruction, in each control interrupt that executes it; `None` where in some one could.
     whys: BTreeMap<u32, Option<Why>>,
     pub landings: usize,
@@ -115,23 +115,24 @@ pub struct Reached {
 impl Reached {
     pub fn add(&mut self, mode: &str, address: u32) {
         self.landings += 1;
-        self.hit.insert((mode.to_owned(), address));
+        self.hit.entry(mode.to_owned()).or_default().insert(address);
     }
 
     pub fn has(&self, mode: &str, address: u32) -> bool {
-        self.hit.contains(&(mode.to_owned(), address))
+        self.hit.get(mode).is_some_and(|hit| hit.contains(&address))
     }
 
     /// Instructions that were hit in any mode.
     pub fn hit_in_any(&self) -> HashSet<u32> {
-        self.hit.iter().map(|(_, address)| *address).collect()
+        self.hit.values().flatten().copied().collect()
     }
 
     /// Takes what a run has executed.
     pub fn judge(&mut self, stands: &[Stand]) {
         for stand in stands {
+            let all = self.all.entry(stand.call.mode.clone()).or_default();
             for (address, before) in &stand.call.path {
-                self.all.insert((stand.call.mode.clone(), *address));
+                all.insert(*address);
                 let why = stand.why(*before);
                 self.whys.entry(*address).and_modify(|of| *of = of.and(why)).or_insert(why);
             }
@@ -140,20 +141,18 @@ impl Reached {
 
     /// Executed and hit, by mode, and those that no boundary can come at.
     pub fn table(&self) -> String {
-        let mut counts: BTreeMap<&str, [usize; 2]> = BTreeMap::new();
-        for place in &self.all {
-            let [all, hit] = counts.entry(&place.0).or_default();
-            *all += 1;
-            *hit += usize::from(self.hit.contains(place));
-        }
-        let any = [self.whys.len(), self.whys.keys().filter(|at| self.hit_in_any().contains(at)).count()];
+        let hit = self.hit_in_any();
+        let counts = self.all.iter().map(|(mode, all)| {
+            let hit = all.iter().filter(|address| self.has(mode, **address)).count();
+            (mode.as_str(), [all.len(), hit])
+        });
+        let any = [self.whys.len(), self.whys.keys().filter(|address| hit.contains(address)).count()];
         let mut text = format!("{:<16} {:>12} {:>6} {:>6}\n", "mode", "instructions", "hit", "%");
-        for (mode, [all, hit]) in counts.into_iter().chain([("any", any)]) {
+        for (mode, [all, hit]) in counts.chain([("any", any)]) {
             let percent = 100.0 * hit as f64 / all.max(1) as f64;
             text += &format!("{mode:<16} {all:>12} {hit:>6} {percent:>6.1}\n");
         }
         let mut whys: BTreeMap<Why, usize> = BTreeMap::new();
-        let hit = self.hit_in_any();
         for (_, why) in self.whys.iter().filter(|(address, _)| !hit.contains(address)) {
             if let Some(why) = why {
                 *whys.entry(*why).or_default() += 1;

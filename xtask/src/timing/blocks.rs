@@ -6,7 +6,7 @@ use std::path::Path;
 use anyhow::{Context, Result, bail};
 
 use super::cost::{self, REFILL};
-use super::log::{Event, event};
+use super::log::{Event, Log};
 use crate::build::{self, cargo};
 use crate::elf::Image;
 use crate::setup::Toolchain;
@@ -27,11 +27,16 @@ pub struct Block {
     pub max_error: Option<f64>,
 }
 
+/// Its largest error as in the tables.
+pub fn error(block: &Block) -> String {
+    block.max_error.map_or_else(String::new, |error| format!("{error:.1e}"))
+}
+
 /// Builds the bench for the board and for the host, runs both.
 pub fn measure(toolchain: &Toolchain, qemu: &Path) -> Result<Vec<Block>> {
     let path = build::bench(toolchain, "tractive-bench")?;
     let image = image::read(&path)?;
-    let counts = counts(&image, &run(qemu, &path)?);
+    let counts = counts(&image, &executed(&image, &run(qemu, &path)?)?);
     let mut host = cargo();
     host.args(["run", "--quiet", "--release", "--package", "tractive-bench"]);
     let errors = process::output_of(&mut host).context("the bench does not run on this machine")?;
@@ -51,7 +56,7 @@ fn run(qemu: &Path, path: &Path) -> Result<Vec<u8>> {
 }
 
 /// Instructions of each call of each function `tractive_bench::blocks::…`, from its first instruction to its return.
-fn counts(image: &Image, log: &[u8]) -> BTreeMap<String, Vec<Count>> {
+fn counts(image: &Image, executed: &[u32]) -> BTreeMap<String, Vec<Count>> {
     let named = image.functions.iter().filter_map(|(start, function)| {
         let name = function.names.iter().find_map(|name| name.strip_prefix("tractive_bench::blocks::"))?;
         Some((*start, name.to_owned()))
@@ -61,7 +66,7 @@ fn counts(image: &Image, log: &[u8]) -> BTreeMap<String, Vec<Count>> {
     // Where the running block returns to, and how far it is.
     let mut running: Option<(&String, u32, Count)> = None;
     let mut last = 0;
-    for address in executed(log) {
+    for &address in executed {
         running = match running {
             Some((name, back, count)) if address == back => {
                 counts.entry(name.clone()).or_default().push(count.after(0, REFILL));
@@ -80,17 +85,18 @@ fn counts(image: &Image, log: &[u8]) -> BTreeMap<String, Vec<Count>> {
     counts
 }
 
-/// The addresses of the instructions that were executed; an announced one that is withdrawn was not.
-fn executed(log: &[u8]) -> Vec<u32> {
-    let mut addresses = Vec::new();
+/// The addresses of the instructions that were executed.
+fn executed(image: &Image, log: &[u8]) -> Result<Vec<u32>> {
+    let (mut reader, mut addresses) = (Log::new(image), Vec::new());
     for line in log.split(|byte| *byte == b'\n') {
-        match event(line) {
-            Some(Event::Step(address)) => addresses.push(address),
-            Some(Event::Withdrawn) => _ = addresses.pop(),
-            _ => {}
-        }
+        reader.take(line, |event| {
+            if let Event::Step(address) = event {
+                addresses.push(address);
+            }
+            Ok(())
+        })?;
     }
-    addresses
+    Ok(addresses)
 }
 
 /// What a call took.
@@ -145,9 +151,7 @@ mod tests {
         );
         let image = Image::parse(&image).unwrap();
         let steps = [0x100, 0x110, 0x120, 0x114, 0x102, 0x110, 0x114, 0x104];
-        let log: String =
-            steps.iter().map(|at| format!("Trace 0: 0x7f [00800400/{at:08x}/0/0] x\n")).collect();
-        let counts = counts(&image, log.as_bytes());
+        let counts = counts(&image, &steps);
         // Two branches and the return; the return alone.
         let count = |instructions, cycles| Count { instructions, cycles };
         assert_eq!(counts["sqrt_libm"], [count(3, 3 + 3 * REFILL), count(2, 2 + REFILL)]);

@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use anyhow::{Context, Result, bail};
 
-use super::log::{ARGUMENTS, event};
+use super::log::{ARGUMENTS, Log};
 use super::meter::{Call, Meter, Path as Executed};
 use super::tally::Tally;
 use crate::elf::Image;
@@ -23,6 +23,7 @@ const IDLE: [&str; 2] = ["main", "board::qemu::idle"];
 const END: &[u8] = b"end of the log";
 
 /// What it takes to drive.
+#[derive(Clone)]
 pub struct Bench {
     pub rig: PathBuf,
     pub qemu: PathBuf,
@@ -46,26 +47,53 @@ pub struct Drive {
     pub deepest: BTreeMap<u32, i32>,
     /// Of each exception the addresses that its longest interrupt executed.
     pub longest: BTreeMap<u32, Vec<u32>>,
-    /// Interrupt, mode and stator frequency, in the order in which the rig served them.
-    pub modes: Vec<(String, String, f64)>,
+    /// In the order in which the rig served them.
+    pub served: Vec<Served>,
+}
+
+/// What the rig says of an interrupt.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Served {
+    pub interrupt: String,
+    pub mode: String,
+    /// `None` where the mode says it, and without pulses.
+    pub direction: Option<Direction>,
+    /// Stator frequency; 0 where it is not told.
+    pub hertz: f64,
+}
+
+/// Which way the mechanical power goes: the sign of torque by speed. Where it is nothing it is the direction before.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Direction {
+    Motoring,
+    Braking,
+}
+
+impl Direction {
+    pub const BOTH: [Self; 2] = [Self::Motoring, Self::Braking];
+
+    /// As the rig and the tables call it.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Motoring => "motoring",
+            Self::Braking => "braking",
+        }
+    }
 }
 
 impl Bench {
     /// Runs the scenario with these options.
     pub fn drive(&self, options: &[&str]) -> Result<Drive> {
-        let folder = std::env::temp_dir().join(format!("tractive-timing-{}", std::process::id()));
-        std::fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
-        let outcome = self.drive_in(&folder, options);
-        let _ = std::fs::remove_dir_all(&folder);
-        outcome
+        let folder = tempfile::tempdir().context("no temporary folder")?;
+        self.drive_in(folder.path(), options)
     }
 
     fn drive_in(&self, folder: &Path, options: &[&str]) -> Result<Drive> {
-        let (log, modes) = (folder.join("log"), folder.join("calls"));
+        let (log, served) = (folder.join("log"), folder.join("calls"));
         let (reader, mut end) = fifo(&log)?;
         let mut rig = Command::new(&self.rig);
         rig.args(&self.command).args(["--on", "qemu", "--dt", "1e-3", "--out"]).arg(folder.join("out"));
-        rig.arg("--image").arg(&self.path).arg("--qemu").arg(&self.qemu).arg("--calls").arg(&modes);
+        rig.arg("--image").arg(&self.path).arg("--qemu").arg(&self.qemu).arg("--calls").arg(&served);
         let (filter, log) = (filter(&self.image, self.keeps_paths), log.to_string_lossy().into_owned());
         for argument in ARGUMENTS.into_iter().chain(["-dfilter", &filter, "-D", &log]) {
             rig.arg(format!("--qemu-arg={argument}"));
@@ -84,8 +112,8 @@ impl Bench {
         if !matches!(output.status.code(), Some(0 | 1)) {
             bail!("the rig failed: {}", String::from_utf8_lossy(&output.stderr).trim());
         }
-        let text = std::fs::read_to_string(&modes).with_context(|| modes.display().to_string())?;
-        Ok(Drive { modes: read_modes(&text)?, ..drive? })
+        let text = std::fs::read_to_string(&served).with_context(|| served.display().to_string())?;
+        Ok(Drive { served: read_served(&text)?, ..drive? })
     }
 
     /// Reads to the end whatever happens, so that nobody waits for a reader.
@@ -94,20 +122,20 @@ impl Bench {
         let link = link.filter(|(_, function)| is_link(&function.names)).map(|(start, _)| *start).collect();
         let mut meter = Meter::new(&self.image, &link);
         meter.keeps_paths = self.keeps_paths;
-        let mut log = BufReader::with_capacity(1 << 20, Unhurried(log));
-        let (mut line, mut outcome) = (Vec::new(), Ok(()));
-        while log.read_until(b'\n', &mut line)? > 0 {
+        let mut lines = BufReader::with_capacity(1 << 20, Unhurried(log));
+        let (mut log, mut line, mut outcome) = (Log::new(&self.image), Vec::new(), Ok(()));
+        while lines.read_until(b'\n', &mut line)? > 0 {
             if line.starts_with(END) {
                 break;
             }
-            if let (Some(event), Ok(())) = (event(&line), &outcome) {
-                outcome = meter.take(event);
+            if outcome.is_ok() {
+                outcome = log.take(&line, |event| meter.take(event));
             }
             line.clear();
         }
         outcome?;
         let Meter { calls, paths, hits, behind, deepest, longest, .. } = meter;
-        Ok(Drive { calls, paths, hits, behind, deepest, longest, modes: Vec::new() })
+        Ok(Drive { calls, paths, hits, behind, deepest, longest, served: Vec::new() })
     }
 }
 
@@ -148,15 +176,23 @@ fn fifo(path: &Path) -> Result<(File, File)> {
     Ok((both, writer))
 }
 
-fn read_modes(text: &str) -> Result<Vec<(String, String, f64)>> {
-    let mut modes = Vec::new();
-    for line in text.lines() {
-        let [interrupt, mode, hertz] = line.split(',').collect::<Vec<_>>()[..] else {
+fn read_served(text: &str) -> Result<Vec<Served>> {
+    let served = |line: &str| {
+        let [interrupt, mode, direction, hertz] = line.split(',').collect::<Vec<_>>()[..] else {
             bail!("the rig's list of interrupts holds `{line}`");
         };
-        modes.push((interrupt.to_owned(), mode.to_owned(), hertz.parse().unwrap_or(0.0)));
-    }
-    Ok(modes)
+        let known = Direction::BOTH.into_iter().find(|known| known.name() == direction);
+        if known.is_none() && !direction.is_empty() {
+            bail!("the rig's list of interrupts holds the direction `{direction}`");
+        }
+        Ok(Served {
+            interrupt: interrupt.to_owned(),
+            mode: mode.to_owned(),
+            direction: known,
+            hertz: hertz.parse().unwrap_or(0.0),
+        })
+    };
+    text.lines().map(served).collect()
 }
 
 #[cfg(test)]
@@ -180,9 +216,11 @@ mod tests {
 
     #[test]
     fn the_rigs_list_is_read() {
-        let modes = read_modes("control,async,12.5\npwm,square,\n").unwrap();
-        assert_eq!(modes[0], ("control".to_owned(), "async".to_owned(), 12.5));
-        assert_eq!(modes[1], ("pwm".to_owned(), "square".to_owned(), 0.0));
-        assert!(read_modes("control").is_err());
+        let served = read_served("control,async,braking,12.5\npwm,square,,\n").unwrap();
+        let (interrupt, mode) = ("control".to_owned(), "async".to_owned());
+        assert_eq!(served[0], Served { interrupt, mode, direction: Some(Direction::Braking), hertz: 12.5 });
+        assert_eq!((served[1].direction, served[1].hertz), (None, 0.0));
+        assert!(read_served("control").is_err());
+        assert!(read_served("control,async,sideways,").is_err());
     }
 }

@@ -5,8 +5,8 @@ use std::path::PathBuf;
 
 use anyhow::{Context, Result};
 
+use super::page;
 use super::report::Report;
-use super::table;
 use crate::build;
 
 /// By how much a number of the page may have moved: this share, or this much.
@@ -27,7 +27,7 @@ pub struct Kept {
 pub fn files(report: &Report) -> [Kept; 2] {
     let file = |name: &str| build::root().join(name);
     [
-        Kept { path: file("docs/cost.md"), text: table::page(report), falls: false },
+        Kept { path: file("docs/cost.md"), text: page::text(report), falls: false },
         Kept { path: file("sizes.toml"), text: sizes(report), falls: true },
     ]
 }

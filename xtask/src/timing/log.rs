@@ -1,19 +1,26 @@
 //! The emulator's log, line by line: executed instructions and what the interrupt controller did between them.
+//!
+//! QEMU runs blocks, straight runs of instructions. It lists what is in a block before it runs it for the first time, and announces each
+//! run. What is announced counts when the next line has come: it may be withdrawn as a whole, or end early where an access to a
+//! peripheral's register has to be the last of its block; then the next block begins with that.
 
-/// How the emulator is asked for that log: one instruction a block, no block chained to the next.
-pub const ARGUMENTS: [&str; 3] = [
-    "-singlestep",
-    "-d",
-    "exec,nochain,trace:nvic_set_pending,trace:nvic_acknowledge_irq,trace:nvic_complete_irq",
-];
+use std::collections::HashMap;
+use std::rc::Rc;
 
-/// What a line says.
+use anyhow::{Context, Result, bail};
+
+use crate::elf::Image;
+use crate::thumb::decode;
+
+/// How the emulator is asked for that log, with no block chained to the next.
+pub const ARGUMENTS: [&str; 2] =
+    ["-d", "in_asm,exec,nochain,trace:nvic_set_pending,trace:nvic_acknowledge_irq,trace:nvic_complete_irq"];
+
+/// What has happened.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Event {
-    /// The instruction at this address is about to be executed.
+    /// The instruction at this address was executed.
     Step(u32),
-    /// The one announced last is not executed yet, but later.
-    Withdrawn,
     /// An enabled exception of this number became pending.
     Pending(u32),
     /// Its handler is entered.
@@ -22,15 +29,84 @@ pub enum Event {
     Returned(u32),
 }
 
-/// The event in a line; `None` for a line about something else.
-pub fn event(line: &[u8]) -> Option<Event> {
-    if line.starts_with(b"Trace ") {
-        return program_counter(line).map(Event::Step);
+/// Reads the log.
+pub struct Log<'a> {
+    image: &'a Image,
+    /// The instructions of each block, by where the emulator keeps it.
+    blocks: HashMap<u64, Rc<[u32]>>,
+    /// First and last instruction of the block that was listed last.
+    listed: Option<(u32, u32)>,
+    /// What is about to be executed.
+    announced: Rc<[u32]>,
+    /// Whether it ends where the next block begins.
+    ends_early: bool,
+}
+
+impl<'a> Log<'a> {
+    /// Of a run of the image, from its beginning.
+    pub fn new(image: &'a Image) -> Self {
+        Self { image, blocks: HashMap::new(), listed: None, announced: Rc::new([]), ends_early: false }
     }
-    // An access to a peripheral's register is announced, withdrawn and announced anew.
-    if line.starts_with(b"Stopped ") || line.starts_with(b"cpu_io_recompile") {
-        return Some(Event::Withdrawn);
+
+    /// Takes the next line and hands on what has happened by then.
+    pub fn take(&mut self, line: &[u8], mut happened: impl FnMut(Event) -> Result<()>) -> Result<()> {
+        if line.starts_with(b"Trace ") {
+            let Some((block, start)) = announcement(line) else { return Ok(()) };
+            self.commit(Some(start), &mut happened)?;
+            self.announced = self.block(block, start)?;
+        } else if line.starts_with(b"IN:") {
+            self.listed = None;
+        } else if let Some(address) = line.strip_prefix(b"0x").and_then(|digits| number(digits, 16)) {
+            let first = self.listed.map_or(address, |(first, _)| first);
+            self.listed = Some((first, address));
+        } else if line.starts_with(b"Stopped ") {
+            self.announced = Rc::new([]);
+        } else if line.starts_with(b"cpu_io_recompile") {
+            self.ends_early = true;
+        } else if let Some(event) = of_controller(line) {
+            self.commit(None, &mut happened)?;
+            happened(event)?;
+        }
+        Ok(())
     }
+
+    /// What was announced has been executed by now.
+    fn commit(&mut self, next: Option<u32>, happened: &mut impl FnMut(Event) -> Result<()>) -> Result<()> {
+        let announced = std::mem::replace(&mut self.announced, Rc::new([]));
+        let mut executed = &*announced;
+        if std::mem::take(&mut self.ends_early) {
+            let end = announced.iter().position(|address| Some(*address) == next);
+            let end = end.context("the emulator's log does not go on where a block ended early")?;
+            executed = &announced[..end];
+        }
+        executed.iter().try_for_each(|address| happened(Event::Step(*address)))
+    }
+
+    /// The instructions of a block that is announced. One that is listed is announced next.
+    fn block(&mut self, block: u64, start: u32) -> Result<Rc<[u32]>> {
+        if let Some((first, last)) = self.listed.take() {
+            let half = |at| self.image.half_word(at).unwrap_or(0);
+            let behind = |at: &u32| at + decode(*at, half(*at), half(at + 2)).1;
+            let next = |at: &u32| Some(behind(at)).filter(|at| *at <= last);
+            self.blocks.insert(block, std::iter::successors(Some(first), next).collect());
+        }
+        match self.blocks.get(&block) {
+            Some(instructions) if instructions.first() == Some(&start) => Ok(Rc::clone(instructions)),
+            _ => bail!("the emulator's log does not list what is in the block at {start:#x}"),
+        }
+    }
+}
+
+/// `Trace 0: 0x7f… [cs_base/pc/flags/…] name`: where the emulator keeps the block, and its first instruction.
+fn announcement(line: &[u8]) -> Option<(u64, u32)> {
+    let mut words = line.split(|byte| *byte == b' ').skip(2);
+    let block = number(words.next()?.strip_prefix(b"0x")?, 16)?;
+    let mut numbers = words.next()?.strip_prefix(b"[")?.split(|byte| *byte == b'/');
+    Some((block, number(numbers.nth(1)?, 16)?))
+}
+
+/// What the interrupt controller says; `None` for a line about something else.
+fn of_controller(line: &[u8]) -> Option<Event> {
     let is_enabled = || line.windows(10).any(|part| part == b"enabled: 1");
     let (known, event): (&[u8], fn(u32) -> Event) = match line {
         _ if line.starts_with(b"nvic_set_pending ") && is_enabled() => (b" irq ", Event::Pending),
@@ -42,50 +118,93 @@ pub fn event(line: &[u8]) -> Option<Event> {
     number(line.get(at..)?, 10).map(event)
 }
 
-/// `Trace 0: 0x… [cs_base/pc/flags/…] name`: the second of the numbers in brackets.
-fn program_counter(line: &[u8]) -> Option<u32> {
-    let bracket = line.iter().position(|byte| *byte == b'[')?;
-    let rest = line.get(bracket..)?;
-    let slash = rest.iter().position(|byte| *byte == b'/')?;
-    number(rest.get(slash + 1..)?, 16)
-}
-
-/// The number that the text begins with.
-fn number(text: &[u8], radix: u32) -> Option<u32> {
+/// The number that the text begins with, if it is one of this size.
+fn number<T: TryFrom<u64>>(text: &[u8], radix: u32) -> Option<T> {
     let mut value = None;
     for byte in text {
         let Some(digit) = char::from(*byte).to_digit(radix) else { break };
-        value = Some(value.unwrap_or(0_u32).checked_mul(radix)?.checked_add(digit)?);
+        value = Some(value.unwrap_or(0_u64).checked_mul(radix.into())?.checked_add(digit.into())?);
     }
-    value
+    T::try_from(value?).ok()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::elf::tests::small_elf;
+
+    /// push {r4, lr}, bl, str, pop {r4, pc}.
+    fn image() -> Image {
+        Image::parse(&small_elf(0x100, &[("handler", 0x100, &[0xB510, 0xF000, 0xF805, 0x6002, 0xBD10])]))
+            .unwrap()
+    }
+
+    /// What has happened by the last of these lines.
+    fn read(lines: &[&str]) -> Result<Vec<Event>> {
+        let image = image();
+        let (mut log, mut events) = (Log::new(&image), Vec::new());
+        for line in lines {
+            log.take(line.as_bytes(), |event| {
+                events.push(event);
+                Ok(())
+            })?;
+        }
+        Ok(events)
+    }
+
+    const LISTED: [&str; 6] = [
+        "IN: handler",
+        "0x00000100:  b510       push     {r4, lr}",
+        "0x00000102:  f000 f805  bl       #0x110",
+        "0x00000106:  6002       str      r2, [r0]",
+        "0x00000108:  bd10       pop      {r4, pc}",
+        "",
+    ];
+    const ANNOUNCED: &str = "Trace 0: 0x7f5604007100 [00800408/00000100/00000010/ff020200] handler";
+    const REWOUND: &str = "cpu_io_recompile: rewound execution of TB to 00000106";
+    const PENDING: &str = "nvic_set_pending NVIC set pending irq 24 secure-bank 0 targets_secure 0 derived 0";
+    const ENTERED: &str = "nvic_acknowledge_irq NVIC acknowledge IRQ: 26 now active (prio 64)";
+    const RETURNED: &str = "nvic_complete_irq NVIC complete IRQ 26 (secure 0)";
 
     #[test]
-    fn recorded_lines() {
-        let read = |line: &str| event(line.as_bytes());
-        let step = "Trace 0: 0x7f5604007100 [00800408/0000428c/00000010/ff020201] _ZN8tractive4link7Request";
-        assert_eq!(read(step), Some(Event::Step(0x428C)));
-        let stopped = "Stopped execution of TB chain before 0x7f5604007100 [0000428c] DUALTIMER";
-        assert_eq!(read(stopped), Some(Event::Withdrawn));
-        let rewound = "cpu_io_recompile: rewound execution of TB to 0000123c";
-        assert_eq!(read(rewound), Some(Event::Withdrawn));
-        let pending = "nvic_set_pending NVIC set pending irq 24 secure-bank 0 targets_secure 0 derived 0 ";
-        assert_eq!(read(&format!("{pending}(enabled: 1 priority 128)")), Some(Event::Pending(24)));
-        assert_eq!(read(&format!("{pending}(enabled: 0 priority 0)")), None);
-        let entered = "nvic_acknowledge_irq NVIC acknowledge IRQ: 26 now active (prio 64)";
-        assert_eq!(read(entered), Some(Event::Entered(26)));
-        assert_eq!(read("nvic_complete_irq NVIC complete IRQ 26 (secure 0)"), Some(Event::Returned(26)));
+    fn a_block_counts_when_the_next_line_has_come() {
+        let steps = [0x100, 0x102, 0x106, 0x108].map(Event::Step);
+        let run = [&LISTED[..], &[ANNOUNCED]].concat();
+        assert_eq!(read(&run).unwrap(), []);
+        let again = [&run[..], &[ANNOUNCED, ENTERED, RETURNED]].concat();
+        let expected = [&steps[..], &steps, &[Event::Entered(26), Event::Returned(26)]].concat();
+        assert_eq!(read(&again).unwrap(), expected);
     }
 
     #[test]
-    fn other_lines_and_broken_ones_are_nothing() {
-        for line in ["", "Trace ", "Trace 0: 0x7f [00800408]", "IN: main", "nvic_complete_irq NVIC"] {
-            assert_eq!(event(line.as_bytes()), None, "{line}");
-        }
-        assert_eq!(event(b"Trace 0: 0x7f [0/fffffffff/0/0] x"), None);
+    fn what_is_withdrawn_does_not_count() {
+        let stopped = "Stopped execution of TB chain before 0x7f5604007100 [00000100] handler";
+        let run = [&LISTED[..], &[ANNOUNCED, stopped, ENTERED]].concat();
+        assert_eq!(read(&run).unwrap(), [Event::Entered(26)]);
+    }
+
+    #[test]
+    fn a_block_that_ends_early_counts_as_far_as_the_next_one() {
+        let next = ["IN: handler", "0x00000106:  6002", "Trace 0: 0x7f9 [0/00000106/0/0] handler", ENTERED];
+        let run = [&LISTED[..], &[ANNOUNCED, REWOUND], &next].concat();
+        let steps = [0x100, 0x102, 0x106].map(Event::Step);
+        assert_eq!(read(&run).unwrap(), [&steps[..], &[Event::Entered(26)]].concat());
+        assert!(read(&[&LISTED[..], &[ANNOUNCED, REWOUND, ENTERED]].concat()).is_err());
+    }
+
+    #[test]
+    fn only_an_enabled_exception_becomes_pending() {
+        let read = |enabled: u32| read(&[&format!("{PENDING} (enabled: {enabled} priority 128)")]).unwrap();
+        assert_eq!(read(1), [Event::Pending(24)]);
+        assert_eq!(read(0), []);
+    }
+
+    #[test]
+    fn a_block_that_is_not_listed_is_refused_and_other_lines_are_nothing() {
+        assert!(read(&[ANNOUNCED]).is_err());
+        assert!(read(&[&LISTED[..], &["Trace 0: 0x7f5604007100 [0/00000102/0/0] x"]].concat()).is_err());
+        let lines = ["", "Trace ", "Trace 0: 0x7f [00800408]", "IN: main", "nvic_complete_irq NVIC"];
+        assert_eq!(read(&lines).unwrap(), []);
+        assert_eq!(read(&["Trace 0: 0x7f [0/fffffffff/0/0] x", ENTERED]).unwrap(), [Event::Entered(26)]);
     }
 }

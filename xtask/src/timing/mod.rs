@@ -7,7 +7,7 @@
 //!
 //! [`system`] says what is driven, [`drive`] runs the rig, [`log`] reads a line, [`meter`] assigns instructions to interrupts,
 //! [`cost`] prices them, [`statistics`] and [`tally`] sum them up, [`parts`] and [`profile`] say whose they are, [`blocks`] counts
-//! building blocks by themselves, [`entry`] what could delay an entry, [`budget`] judges, [`report`] and [`table`] tell, [`kept`] compares with what the repository holds.
+//! building blocks by themselves, [`entry`] what could delay an entry, [`budget`] judges, [`report`], [`plain`] and [`page`] tell, [`kept`] compares with what the repository holds.
 
 mod blocks;
 mod budget;
@@ -17,12 +17,13 @@ mod entry;
 mod kept;
 mod log;
 pub mod meter;
+mod page;
 mod parts;
+mod plain;
 mod profile;
 mod report;
 pub mod statistics;
 mod system;
-mod table;
 mod tally;
 
 use anyhow::{Context, Result};
@@ -52,7 +53,7 @@ pub fn run(args: &TimingArgs) -> Result<u8> {
     if args.json {
         println!("{}", report.json());
     } else {
-        print!("{}", table::plain(&report));
+        print!("{}", plain::text(&report));
     }
     if let Some(count) = args.profile {
         for measured in &systems {

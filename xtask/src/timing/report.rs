@@ -1,10 +1,11 @@
 //! What was measured and judged, and the same as JSON.
 
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 
 use super::blocks::Block;
 use super::budget::Judged;
-use super::statistics::{Entry, Row};
+use super::drive::Direction;
+use super::statistics::{Entry, Load, Row};
 use super::system::Measured;
 
 const INTERRUPTS: [&str; 2] = ["control", "pwm"];
@@ -42,27 +43,70 @@ pub fn core_tick(blocks: &[Block]) -> Option<u32> {
     blocks.iter().find(|block| block.name == "core_tick/tractive").map(|block| block.max)
 }
 
+fn in_direction(mode: &str, direction: Direction) -> String {
+    format!("{mode}, {}", direction.name())
+}
+
+fn fields<const N: usize>(fields: [(&str, Value); N]) -> Map<String, Value> {
+    fields.into_iter().map(|(name, value)| (name.to_owned(), value)).collect()
+}
+
+fn counts(row: &Row) -> Map<String, Value> {
+    let Row { instructions, cycles, latency, depth } = row;
+    fields([
+        ("calls", instructions.count.into()),
+        ("min", instructions.min.into()),
+        ("mean", instructions.mean().into()),
+        ("max", instructions.max.into()),
+        ("cycles_mean", cycles.mean().into()),
+        ("cycles_max", cycles.max.into()),
+        ("latency_min", latency.min.into()),
+        ("latency_max", latency.max.into()),
+        ("jitter", (latency.max - latency.min).into()),
+        ("depth", (*depth).into()),
+    ])
+}
+
 impl Measured {
-    /// Interrupt, mode and what was counted, in the order of the tables.
+    /// Interrupt, mode and what was counted in both directions together, in the order of the tables.
     pub fn rows(&self) -> impl Iterator<Item = (&'static str, &'static str, &Row)> {
         let pairs =
             INTERRUPTS.into_iter().flat_map(|name| self.system.modes.iter().map(move |mode| (name, *mode)));
-        pairs.filter_map(|(name, mode)| Some((name, mode, self.statistics.row(mode, name)?)))
+        pairs.filter_map(|(name, mode)| Some((name, mode, self.statistics.row(mode, None, name)?)))
+    }
+
+    /// Mode with direction, and what was counted there; nothing where the rig names no direction.
+    pub fn directed(&self, interrupt: &str, mode: &str) -> impl Iterator<Item = (String, &Row)> {
+        let row = move |direction| {
+            Some((in_direction(mode, direction), self.statistics.row(mode, Some(direction), interrupt)?))
+        };
+        Direction::BOTH.into_iter().filter_map(row)
+    }
+
+    /// Modes, each with its directions behind it, and the load.
+    pub fn loads(&self) -> impl Iterator<Item = (String, Load)> {
+        self.system.modes.iter().flat_map(|mode| {
+            let whole = self.statistics.load(mode, None).map(|load| ((*mode).to_owned(), load));
+            let directed = Direction::BOTH.into_iter().filter_map(|direction| {
+                let load = self.statistics.load(mode, Some(direction))?;
+                Some((in_direction(mode, direction), load))
+            });
+            whole.into_iter().chain(directed)
+        })
     }
 
     fn json_rows(&self) -> Vec<Value> {
-        let system = self.system.name;
-        self.rows()
-            .map(|(name, mode, row)| {
-                json!({
-                    "system": system, "name": name, "mode": mode, "calls": row.instructions.count,
-                    "min": row.instructions.min, "mean": row.instructions.mean(), "max": row.instructions.max,
-                    "cycles_mean": row.cycles.mean(), "cycles_max": row.cycles.max,
-                    "latency_min": row.latency.min, "latency_max": row.latency.max,
-                    "jitter": row.latency.max - row.latency.min, "depth": row.depth,
-                })
-            })
-            .collect()
+        let row = |(name, mode, row): (&'static str, &'static str, &Row)| {
+            let mut fields = counts(row);
+            let named = [("system", self.system.name), ("name", name), ("mode", mode)];
+            fields.extend(named.map(|(field, value)| (field.to_owned(), value.into())));
+            for direction in Direction::BOTH {
+                let row = self.statistics.row(mode, Some(direction), name);
+                fields.extend(row.map(|row| (direction.name().to_owned(), counts(row).into())));
+            }
+            fields.into()
+        };
+        self.rows().map(row).collect()
     }
 
     fn json_entries(&self) -> Vec<Value> {
@@ -76,12 +120,19 @@ impl Measured {
     }
 
     fn json_load(&self) -> Vec<Value> {
+        let percent = |mode, direction| {
+            let Load { mean, max } = self.statistics.load(mode, direction)?;
+            Some(fields([("mean_percent", mean.into()), ("max_percent", max.into())]))
+        };
         let load = |mode: &&'static str| {
-            let load = self.statistics.load(mode)?;
-            let system = self.system.name;
-            Some(
-                json!({ "system": system, "mode": mode, "mean_percent": load.mean, "max_percent": load.max }),
-            )
+            let mut load = percent(mode, None)?;
+            load.extend(fields([("system", self.system.name.into()), ("mode", (*mode).into())]));
+            for direction in Direction::BOTH {
+                load.extend(
+                    percent(mode, Some(direction)).map(|of| (direction.name().to_owned(), of.into())),
+                );
+            }
+            Some(load.into())
         };
         self.system.modes.iter().filter_map(load).collect()
     }
@@ -91,7 +142,7 @@ impl Measured {
         parts
             .map(|(name, part)| {
                 json!({
-                    "system": self.system.name, "interrupt": name, "part": part.name,
+                    "system": self.system.name, "interrupt": name, "part": part.name, "group": part.group.name(),
                     "mean": part.mean, "in_longest": part.longest,
                 })
             })
@@ -134,8 +185,7 @@ impl Report<'_> {
             .collect();
         let first = self.systems.first();
         let images = self.systems.iter().map(|measured| (measured.system.name, measured.json_image()));
-        let images: serde_json::Map<String, Value> =
-            images.map(|(name, image)| (name.to_owned(), image)).collect();
+        let images: Map<String, Value> = images.map(|(name, image)| (name.to_owned(), image)).collect();
         json!({
             "interrupts": all(Measured::json_rows),
             "parts": all(Measured::json_parts),
@@ -157,11 +207,12 @@ mod tests {
     use super::*;
     use crate::timing::budget::judge;
     use crate::timing::system::tests::example;
-    use crate::timing::table;
+    use crate::timing::{page, plain};
 
     #[test]
     fn the_json_holds_what_the_contract_names() {
-        let judged = judge("[a]\nb = { target = 1 }", &[("a.b", 2.0)]).unwrap();
+        let judged =
+            judge("[pmasynrm]\ncontrol-max = { target = 1 }", &[("pmasynrm.control-max", 2.0)]).unwrap();
         let name = "core_tick/tractive".to_owned();
         let block = Block { name, max: 120, mean: 110.0, cycles: 250, max_error: Some(1e-7) };
         let report = Report { systems: &[example()], blocks: &[block], judged: &judged };
@@ -172,7 +223,11 @@ mod tests {
             (&json!("pmasynrm"), &json!("control"), &json!("mid7"))
         );
         assert_eq!((&row["min"], &row["mean"], &row["max"]), (&json!(10), &json!(15.0), &json!(20)));
+        assert_eq!((&row["motoring"]["max"], &row["braking"]["min"]), (&json!(10), &json!(20)));
         assert_eq!(json["interrupts"][1]["name"], "pwm");
+        assert!(json["interrupts"][1]["braking"].is_null());
+        let load = &json["load_at_170_mhz"][0];
+        assert!(load["max_percent"].is_number() && load["motoring"]["max_percent"].is_number());
         assert_eq!(json["core_tick"]["instructions"], 120);
         let block = &json["blocks"][0];
         assert_eq!((&block["instructions"], &block["max_error"]), (&json!(120), &json!(1e-7)));
@@ -180,7 +235,16 @@ mod tests {
         assert_eq!([&image["code_bytes"], &image["table_bytes"], &image["ram_bytes"]], [1, 2, 4]);
         assert_eq!(image["stack_bytes"], 640);
         assert_eq!(json["parts"][0]["in_longest"], 20);
-        assert!(table::plain(&report).contains("OVER"));
-        assert!(table::page(&report).contains("| control | mid7 | 15 | 20 | 1700 | 0 |"));
+        let plain = plain::text(&report);
+        assert!(plain.contains("OVER"));
+        let plain = plain.split_whitespace().collect::<Vec<_>>().join(" ");
+        for row in ["mid7 2 10 15.0 20 ", "mid7, motoring 1 10 10.0 10 ", "mid7, braking 1 20 20.0 20 "] {
+            assert!(plain.contains(&format!("control {row}")), "{plain}");
+        }
+        assert!(plain.contains("MTPA, two passes 12.0 20 what the target names 12.0 20 "), "{plain}");
+        let page = page::text(&report);
+        assert!(page.contains("| pmasynrm control | 1 | 20 | 20 | 0 | 0 |"), "{page}");
+        assert!(page.contains("| control | mid7, motoring | 10 | 10 | 10 | 1700 | 0 |"), "{page}");
+        assert!(page.contains("| control | mid7, braking | 20 | 20 | 20 | 1700 | 0 |"), "{page}");
     }
 }

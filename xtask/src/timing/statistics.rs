@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use anyhow::{Result, bail};
 
-use super::drive::Drive;
+use super::drive::{Direction, Drive};
 use super::meter::Call;
 
 /// The interrupts by the numbers of their exceptions on the emulated board: sixteen more than the interrupt's.
@@ -51,6 +51,15 @@ pub struct Row {
     pub depth: usize,
 }
 
+impl Row {
+    fn add(&mut self, call: &Call) {
+        self.instructions.add(call.instructions);
+        self.cycles.add(call.cycles);
+        self.latency.add(call.latency);
+        self.depth = self.depth.max(call.depth);
+    }
+}
+
 /// How an interrupt is entered from somewhere.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Entry {
@@ -69,10 +78,13 @@ pub struct Load {
     pub max: f64,
 }
 
-/// By mode and interrupt.
+/// Mode, direction and interrupt; without a direction: all of the mode's interrupts.
+type Key = (String, Option<Direction>, String);
+
+/// By mode, direction and interrupt.
 #[derive(Clone, Debug, Default)]
 pub struct Statistics {
-    pub rows: BTreeMap<(String, String), Row>,
+    rows: BTreeMap<Key, Row>,
     /// Largest stator frequency, in Hz.
     pub hertz: f64,
     /// Bytes of stack that each exception takes at most, with its frame.
@@ -85,17 +97,16 @@ impl Statistics {
     pub fn add(&mut self, drive: &Drive) -> Result<()> {
         for (name, exception) in INTERRUPTS {
             let calls: Vec<&Call> = drive.calls.iter().filter(|call| call.exception == exception).collect();
-            let served: Vec<_> = drive.modes.iter().filter(|(interrupt, ..)| interrupt == name).collect();
+            let served: Vec<_> = drive.served.iter().filter(|served| served.interrupt == name).collect();
             if calls.len() != served.len() || calls.is_empty() {
                 bail!("the log holds {} {name} interrupts, the rig served {}", calls.len(), served.len());
             }
-            for (call, (_, mode, hertz)) in calls.into_iter().zip(served) {
-                let row = self.rows.entry((mode.clone(), name.to_owned())).or_default();
-                row.instructions.add(call.instructions);
-                row.cycles.add(call.cycles);
-                row.latency.add(call.latency);
-                row.depth = row.depth.max(call.depth);
-                self.hertz = self.hertz.max(hertz.abs());
+            for (call, served) in calls.into_iter().zip(served) {
+                for direction in [None].into_iter().chain(served.direction.map(Some)) {
+                    let key = (served.mode.clone(), direction, name.to_owned());
+                    self.rows.entry(key).or_default().add(call);
+                }
+                self.hertz = self.hertz.max(served.hertz.abs());
                 self.enter(name, call);
             }
         }
@@ -133,14 +144,15 @@ impl Statistics {
         latest.unwrap_or(u32::MAX) - first.unwrap_or(0)
     }
 
-    /// One interrupt in one mode, if it was seen there.
-    pub fn row(&self, mode: &str, interrupt: &str) -> Option<&Row> {
-        self.rows.get(&(mode.to_owned(), interrupt.to_owned()))
+    /// One interrupt in one mode, and in one direction if one is named, if it was seen there.
+    pub fn row(&self, mode: &str, direction: Option<Direction>, interrupt: &str) -> Option<&Row> {
+        self.rows.get(&(mode.to_owned(), direction, interrupt.to_owned()))
     }
 
-    /// Share of the processor that both interrupts take in a mode.
-    pub fn load(&self, mode: &str) -> Option<Load> {
-        let (control, pwm) = (self.row(mode, "control")?, self.row(mode, "pwm")?);
+    /// Share of the processor that both interrupts take in a mode, and in one direction if one is named.
+    pub fn load(&self, mode: &str, direction: Option<Direction>) -> Option<Load> {
+        let row = |interrupt| self.row(mode, direction, interrupt);
+        let (control, pwm) = (row("control")?, row("pwm")?);
         let pwm_hertz = CONTROL_HZ * pwm.cycles.count as f64 / control.cycles.count as f64;
         let percent =
             |control: f64, pwm: f64| 100.0 * (control * CONTROL_HZ + pwm * pwm_hertz) / PROCESSOR_HZ;
@@ -152,18 +164,23 @@ impl Statistics {
 
     /// The dearest mode's largest load, in percent.
     pub fn worst_load(&self) -> f64 {
-        let modes = self.rows.keys().map(|(mode, _)| mode).filter(|mode| *mode != "off");
-        modes.filter_map(|mode| self.load(mode)).map(|load| load.max).fold(0.0, f64::max)
+        let modes = self.rows.keys().map(|(mode, ..)| mode).filter(|mode| *mode != "off");
+        modes.filter_map(|mode| self.load(mode, None)).map(|load| load.max).fold(0.0, f64::max)
     }
 
     /// Over everything that was counted; entries and returns are among the cycles.
     pub fn cycles_per_instruction(&self) -> f64 {
-        let sum = |of: fn(&Row) -> &Spread| self.rows.values().map(|row| of(row).sum).sum::<u64>() as f64;
+        let sum = |of: fn(&Row) -> &Spread| self.whole().map(|(_, row)| of(row).sum).sum::<u64>() as f64;
         sum(|row| &row.cycles) / sum(|row| &row.instructions).max(1.0)
     }
 
     /// The rows of one interrupt over all modes. A PWM interrupt that finds a fault makes no pulses any more, so it is among `off`.
     pub fn of<'a>(&'a self, interrupt: &'a str) -> impl Iterator<Item = &'a Row> {
-        self.rows.iter().filter(move |((_, name), _)| name == interrupt).map(|(_, row)| row)
+        self.whole().filter(move |((.., name), _)| name == interrupt).map(|(_, row)| row)
+    }
+
+    /// The rows of all directions together.
+    fn whole(&self) -> impl Iterator<Item = (&Key, &Row)> {
+        self.rows.iter().filter(|((_, direction, _), _)| direction.is_none())
     }
 }

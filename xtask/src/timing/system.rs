@@ -3,9 +3,11 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
+use indicatif::ParallelProgressIterator;
+use rayon::prelude::*;
 
-use super::drive::{Bench, Drive, is_link};
+use super::drive::{Bench, Drive, Served, is_link};
 use super::entry;
 use super::parts::{self, Part};
 use super::profile::{self, Profile};
@@ -13,11 +15,13 @@ use super::statistics::{INTERRUPTS, Statistics};
 use super::tally::Tally;
 use crate::elf::Image;
 use crate::setup::Toolchain;
-use crate::{build, image};
+use crate::{build, image, process};
 
-/// Both directions of torque and of rotation through every mode, up to the highest stator frequency; once with dead time
-/// that is to be compensated.
-const DRIVES: [&str; 2] = ["--to=6000 --dead-time-us=3", "--to=-6000 --brake"];
+/// Both directions of torque and of rotation through every mode, up to the highest stator frequency, with dead time that is to be
+/// compensated.
+const DRIVES: [&str; 2] = ["--to=6000 --dead-time-us=3", "--to=-6000 --brake --dead-time-us=3"];
+/// An operator who commands, motoring and braking.
+const OPERATED: [&str; 2] = ["--to=6000 --operated", "--to=6000 --brake --operated"];
 /// Then short ones: the PWM timer starts this much later against the control timer, in µs. Halves of the asynchronous
 /// carrier last five control periods and five ninths, so they meet nine phases, 11 µs apart; these fall between.
 /// A demand that is no number ends them.
@@ -103,14 +107,17 @@ impl System {
         match self.build {
             build::System::Traction => traction(&bench, &mut sum)?,
             build::System::Zs9 => {
-                for options in DUAL_DRIVES {
-                    let drive = sum.add(&bench, options)?;
-                    sum.profile(&drive);
-                }
                 // Commanded over the protocol.
                 let talk = build::root().join(DUAL_TALK);
-                let bench = Bench { command: vec!["talk".to_owned(), talk.display().to_string()], ..bench };
-                sum.add(&bench, "--system=zs9 --inertia=0.02")?;
+                let talked =
+                    Bench { command: vec!["talk".to_owned(), talk.display().to_string()], ..bench.clone() };
+                let driven = DUAL_DRIVES.map(|options| (&bench, options.to_owned()));
+                let talked = (&talked, "--system=zs9 --inertia=0.02".to_owned());
+                let drives = drive_all("zs9", &[&driven[..], &[talked]].concat())?;
+                for drive in &drives {
+                    sum.add(drive)?;
+                }
+                drives.iter().take(DUAL_DRIVES.len()).for_each(|drive| sum.profile(drive));
             }
         }
         Measured::new(self, path, image, sum)
@@ -118,30 +125,38 @@ impl System {
 }
 
 fn traction(bench: &Bench, sum: &mut Sum) -> Result<()> {
-    let (mut switch_s, mut boundaries_s) = (None, Vec::new());
-    for options in DRIVES {
-        let drive = sum.add(bench, options)?;
-        sum.profile(&drive);
-        if switch_s.is_none() {
-            switch_s = first_switch_s(&drive);
-            boundaries_s = switching_boundaries_s(&drive);
-        }
+    let phases =
+        PHASES_US.map(|phase_us| format!("--to=6000 --pwm-delay-us={phase_us} --fault-at={SHORT_S}"));
+    let plan = |options: Vec<String>| options.into_iter().map(|options| (bench, options)).collect::<Vec<_>>();
+    let ordinary = DRIVES.iter().chain(&OPERATED).map(|options| (*options).to_owned());
+    let drives = drive_all("pmasynrm", &plan(ordinary.chain(phases).collect()))?;
+    let mut provoked = Vec::new();
+    for (options, drive) in DRIVES.iter().zip(&drives) {
+        // A switch of mode, a fault and full torque at the limit of the current, all in one tick. Frozen currents are found
+        // after a number of periods, and of all faults they cost the most: the whole control law is executed besides.
+        let freezes_s = switches_s(drive).into_iter().map(|switch_s| switch_s - FROZEN_PERIODS * CONTROL_S);
+        provoked.extend(freezes_s.map(|freeze_s| format!("{options} --freeze-at={freeze_s:.6}")));
+        // The same for the PWM interrupt: phase currents that are wrong for the first time at the boundary itself.
+        let boundaries_s = switching_boundaries_s(drive).into_iter();
+        provoked.extend(boundaries_s.map(|boundary_s| format!("{options} --offset-at={boundary_s:.6}")));
     }
-    for phase_us in PHASES_US {
-        sum.add(bench, &format!("--to=6000 --pwm-delay-us={phase_us} --fault-at={SHORT_S}"))?;
+    if provoked.is_empty() {
+        bail!("the drive never switched its mode");
     }
-    // A switch of mode, a fault and full torque at the limit of the current, all in one tick. Frozen currents are found
-    // after a number of periods, and of all faults they cost the most: the whole control law is executed besides.
-    let switch_s = switch_s.context("the drive never switched its mode")?;
-    let freeze_s = switch_s - FROZEN_PERIODS * CONTROL_S;
-    sum.add(bench, &format!("--to=6000 --freeze-at={freeze_s:.6}"))?;
-    // The same for the PWM interrupt, at each switch: phase currents that are wrong for the first time at the boundary itself.
-    for boundary_s in boundaries_s {
-        sum.add(bench, &format!("--to=6000 --dead-time-us=3 --offset-at={boundary_s:.6}"))?;
+    for drive in drives.iter().chain(&drive_all("pmasynrm", &plan(provoked))?) {
+        sum.add(drive)?;
     }
-    // With an operator who commands.
-    sum.add(bench, "--to=6000 --operated")?;
+    drives.iter().take(DRIVES.len()).for_each(|drive| sum.profile(drive));
     Ok(())
+}
+
+/// Each of them with its options, as many at once as there are processors; in their order.
+fn drive_all(system: &'static str, plan: &[(&Bench, String)]) -> Result<Vec<Drive>> {
+    let drives = plan.par_iter().progress_with(process::bar(system, plan.len())).map(|(bench, options)| {
+        let drive = bench.drive(&options.split(' ').collect::<Vec<_>>());
+        drive.with_context(|| format!("{} {options}", bench.command.join(" ")))
+    });
+    drives.collect()
 }
 
 /// For each boundary where the modulator changes from one mode with pulses to another, a moment behind the last control sample before it,
@@ -151,8 +166,8 @@ fn switching_boundaries_s(drive: &Drive) -> Vec<f64> {
     let depths: Vec<_> =
         drive.calls.iter().filter(|call| call.exception == control).map(|call| call.depth).collect();
     let (mut samples, mut last, mut found) = (0, "off", Vec::new());
-    for (name, mode, _) in &drive.modes {
-        if name == "control" {
+    for Served { interrupt, mode, .. } in &drive.served {
+        if interrupt == "control" {
             samples += 1;
             continue;
         }
@@ -166,14 +181,15 @@ fn switching_boundaries_s(drive: &Drive) -> Vec<f64> {
     found
 }
 
-/// When control first works for another mode with pulses than before, in the scenario's time: the middle of the period
+/// When control works for another mode with pulses than before, from one with pulses, in the scenario's time: the middle of the period
 /// before that tick.
-fn first_switch_s(drive: &Drive) -> Option<f64> {
-    let modes: Vec<&str> =
-        drive.modes.iter().filter(|(name, ..)| name == "control").map(|(_, mode, _)| mode.as_str()).collect();
-    let index = modes.windows(2).position(|pair| pair[0] != "off" && pair[1] != pair[0])? + 1;
+fn switches_s(drive: &Drive) -> Vec<f64> {
+    let served = drive.served.iter().filter(|served| served.interrupt == "control");
+    let modes: Vec<_> = served.map(|served| served.mode.as_str()).collect();
+    let is_switch = |pair: &[&str]| pair[0] != pair[1] && !pair.contains(&"off");
+    let ends = modes.windows(2).enumerate().filter(|(_, pair)| is_switch(pair)).map(|(index, _)| index + 1);
     // The first interrupt, number 0, comes one period after the beginning.
-    Some((index as f64 + 0.5 - LEAD_PERIODS as f64) * CONTROL_S)
+    ends.map(|index| (index as f64 + 0.5 - LEAD_PERIODS as f64) * CONTROL_S).collect()
 }
 
 /// All drives of a system together.
@@ -187,17 +203,15 @@ struct Sum {
 }
 
 impl Sum {
-    fn add(&mut self, bench: &Bench, options: &str) -> Result<Drive> {
-        eprintln!("{} {options}", bench.command.join(" "));
-        let drive = bench.drive(&options.split(' ').collect::<Vec<_>>())?;
-        self.statistics.add(&drive)?;
+    fn add(&mut self, drive: &Drive) -> Result<()> {
+        self.statistics.add(drive)?;
         for (exception, addresses) in &drive.longest {
             let longest = self.longest.entry(*exception).or_default();
             if addresses.len() > longest.len() {
                 longest.clone_from(addresses);
             }
         }
-        Ok(drive)
+        Ok(())
     }
 
     /// Takes it into the profile; the short drives would shift the means.
@@ -233,7 +247,7 @@ impl Measured {
         for (name, exception) in INTERRUPTS {
             let longest = sum.longest.get(&exception).map_or(&[][..], Vec::as_slice);
             let calls = sum.calls.get(&exception).copied().unwrap_or(0);
-            parts.push((name, parts::parts(&profile, exception, &sum.hits, calls, longest)?));
+            parts.push((name, parts::parts(&profile, (name, exception), &sum.hits, calls, longest)?));
         }
         let masking = entry::masking(&image, is_link);
         let [(_, control), _] = INTERRUPTS;
@@ -260,23 +274,30 @@ impl Measured {
 pub mod tests {
     use super::*;
     use crate::elf::Sizes;
+    use crate::timing::drive::Direction::{Braking, Motoring};
     use crate::timing::meter::Call;
+    use crate::timing::parts::Group;
 
     /// A PWM interrupt and two of control, of the first system.
     pub fn example() -> Measured {
         let call =
             |exception, instructions| Call { exception, instructions, cycles: 1_700, ..Call::default() };
-        let served = |name: &str| (name.to_owned(), "mid7".to_owned(), 100.0);
+        let served = |interrupt: &str, direction| Served {
+            interrupt: interrupt.to_owned(),
+            mode: "mid7".to_owned(),
+            direction: Some(direction),
+            hertz: 100.0,
+        };
         let drive = Drive {
             calls: vec![call(26, 7), call(24, 10), call(24, 20)],
-            modes: vec![served("pwm"), served("control"), served("control")],
+            served: vec![served("pwm", Motoring), served("control", Motoring), served("control", Braking)],
             deepest: BTreeMap::from([(24, 440), (26, 200)]),
             ..Drive::default()
         };
         let mut statistics = Statistics::default();
         statistics.add(&drive).unwrap();
         let sizes = Sizes { code: 1, tables: 2, rodata: 3, ram: 4, recorder: 6, stack: 5 };
-        let part = Part { name: "MTPA, two passes", mean: 12.0, longest: 20 };
+        let part = Part { name: "MTPA, two passes", group: Group::Named, mean: 12.0, longest: 20 };
         Measured {
             system: System::ALL[0],
             image: Image { sizes, ..Image::default() },
@@ -293,19 +314,26 @@ pub mod tests {
     fn the_load_is_that_of_both_interrupts() {
         // 1,700 cycles ten thousand times a second are a tenth of 170 MHz; one PWM interrupt comes for two of control.
         let statistics = example().statistics;
-        let load = statistics.load("mid7").unwrap();
+        let load = statistics.load("mid7", None).unwrap();
         assert!((load.mean - 15.0).abs() < 1e-9 && (load.max - 15.0).abs() < 1e-9);
-        assert!(statistics.load("square").is_none());
+        assert!(statistics.load("square", None).is_none());
+        // Motoring it comes for each of control; braking it was never seen.
+        assert!((statistics.load("mid7", Some(Motoring)).unwrap().max - 20.0).abs() < 1e-9);
+        assert!(statistics.load("mid7", Some(Braking)).is_none());
     }
 
     #[test]
-    fn the_first_switch_is_found_in_the_middle_of_a_period() {
-        let served = |(name, mode): &(&str, &str)| ((*name).to_owned(), (*mode).to_owned(), 0.0);
+    fn switches_are_found_in_the_middle_of_a_period() {
+        let served = |(interrupt, mode): &(&str, &str)| Served {
+            interrupt: (*interrupt).to_owned(),
+            mode: (*mode).to_owned(),
+            ..Served::default()
+        };
         let mut modes = vec![("control", "off"); 100];
         modes.extend([("pwm", "async"), ("control", "async"), ("pwm", "sync15"), ("control", "sync15")]);
-        let drive = Drive { modes: modes.iter().map(served).collect(), ..Drive::default() };
+        let drive = Drive { served: modes.iter().map(served).collect(), ..Drive::default() };
         // Interrupt number 101 comes 102 periods after the run's beginning, 2 after the scenario's.
-        assert!((first_switch_s(&drive).unwrap() - 1.5e-4).abs() < 1e-12);
-        assert!(first_switch_s(&Drive::default()).is_none());
+        let switches_s = switches_s(&drive);
+        assert!(switches_s.len() == 1 && (switches_s[0] - 1.5e-4).abs() < 1e-12, "{switches_s:?}");
     }
 }

@@ -33,7 +33,7 @@ pub fn run_in_qemu(
             }
             DualRequest::ControlReport(at, report) => {
                 calls.mode = what(&report, bench.speeds_rpm());
-                calls.control("");
+                calls.control();
                 bench.control_report(at, report);
             }
             DualRequest::PowerSample(at) => answers.pwm(&link::power_to_block(&bench.power_sample(at)?))?,

@@ -11,7 +11,7 @@ use crate::zs9::{Orders, SeenMotors};
 use tractive::board::MotorDemand;
 use tractive::control::Demand;
 
-/// 10 to 1,300 r/min at full torque, 20 s there, and back.
+/// 10 to 1,300 r/min at full torque, a cruise there, and back.
 pub struct Cycle;
 
 const LOW_RPM: f64 = 10.0;
@@ -20,11 +20,11 @@ const FULL_NM: f64 = 120.0;
 /// Above it power is constant.
 const CORNER_RPM: f64 = 850.0;
 const CRUISE_NM: f64 = 60.0;
-const CRUISE_S: f64 = 20.0;
 const MOVING_LOAD_NM: f64 = 20.0;
 const INERTIA_KG_M2: f64 = 6.0;
 const LEAD_S: f64 = 0.2;
-const DURATION_S: f64 = 36.5;
+/// Without the cruise.
+const MOVING_S: f64 = 16.5;
 
 /// The torque needs time to go, in which the speed still falls: half of `T/slew · T/J`, here with 4,000 N·m/s.
 const STOPPING_RPM: f64 = 2.9;
@@ -45,10 +45,10 @@ fn full_nm(rpm: f64) -> f64 {
     FULL_NM * (CORNER_RPM / rpm.abs().max(CORNER_RPM))
 }
 
-fn orders(phase: &mut Phase, t_s: f64, rpm: f64) -> (f64, f64) {
+fn orders(phase: &mut Phase, t_s: f64, rpm: f64, cruise_s: f64) -> (f64, f64) {
     *phase = match *phase {
         Phase::Before if t_s >= -1e-9 => Phase::Accelerates,
-        Phase::Accelerates if rpm >= HIGH_RPM => Phase::Cruises(t_s + CRUISE_S),
+        Phase::Accelerates if rpm >= HIGH_RPM => Phase::Cruises(t_s + cruise_s),
         Phase::Cruises(until_s) if t_s >= until_s => Phase::Brakes,
         Phase::Brakes if rpm <= LOW_RPM + STOPPING_RPM => Phase::Done,
         same => same,
@@ -79,13 +79,14 @@ impl Scenario for Cycle {
     }
 
     fn own_options(&self) -> &'static [&'static str] {
-        &["edges"]
+        &["edges", "cruise"]
     }
 
-    fn plan(&self, _options: &RunOptions) -> Plan {
+    fn plan(&self, options: &RunOptions) -> Plan {
+        let cruise_s = options.zs9.cruise;
         let mut phases = [Phase::Before; 2];
         let operator = move |t_s: f64, speeds: SeenMotors| {
-            let [one, two] = [0, 1].map(|k| orders(&mut phases[k], t_s, speeds[k]));
+            let [one, two] = [0, 1].map(|k| orders(&mut phases[k], t_s, speeds[k], cruise_s));
             let torque = |torque_nm: f64| {
                 MotorDemand::Torque(Demand { torque_nm: torque_nm as f32, slew_limited: true })
             };
@@ -93,7 +94,7 @@ impl Scenario for Cycle {
         };
         Plan {
             lead_s: LEAD_S,
-            duration_s: DURATION_S,
+            duration_s: MOVING_S + cruise_s,
             speeds: [free(INERTIA_KG_M2), free(INERTIA_KG_M2)],
             from_rpm: [LOW_RPM; 2],
             operator: Box::new(operator),
@@ -136,7 +137,7 @@ impl Scenario for Cycle {
     }
 
     fn plots(&self, recording: &Recording, page: &mut Page) {
-        let all = (0.0, DURATION_S);
+        let all = (0.0, recording.rows.last().map_or(MOVING_S, |row| row.t_s));
         let plot = |page: &mut Page, figure, title, unit, curves: &[figures::Curve]| {
             figures::plot(page, figure, title, unit, recording, all, curves);
         };
