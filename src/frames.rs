@@ -228,6 +228,12 @@ pub fn limit(x: f32, low: f32, high: f32) -> f32 {
     }
 }
 
+/// `x` held between `-most` and `most`, which is not negative; NaN stays NaN.
+#[inline]
+pub fn limit_magnitude(x: f32, most: f32) -> f32 {
+    if x.abs() > most { most.copysign(x) } else { x }
+}
+
 /// Three phase quantities.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Abc {
@@ -411,6 +417,16 @@ vector_arithmetic!(Dq, d, q);
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn limits_hold_both_ends_and_leave_nan() {
+        for (x, held) in
+            [(0.4, 0.4), (-0.4, -0.4), (1.0, 1.0), (7.0, 1.0), (-7.0, -1.0), (f32::INFINITY, 1.0)]
+        {
+            assert_eq!((limit(x, -1.0, 1.0), limit_magnitude(x, 1.0)), (held, held), "{x}");
+        }
+        assert!(limit(f32::NAN, -1.0, 1.0).is_nan() && limit_magnitude(f32::NAN, 1.0).is_nan());
+    }
 
     #[test]
     fn sine_and_cosine_keep_their_documented_error() {

@@ -194,8 +194,8 @@ fn flaws_leave_the_switches_without_shock_and_torque_in_its_bounds() {
 
 #[test]
 fn a_wrong_map_is_noticed() {
-    for percent in [10.0, -10.0, 5.0, -5.0] {
-        let line = format!("sweep --to 3000 --map-error {percent}");
+    for (scale, percent) in [(1.0, 10.0), (1.0, -10.0), (1.0, 5.0), (1.0, -5.0), (0.8, -10.0)] {
+        let line = format!("sweep --to 3000 --torque-scale {scale} --map-error {percent}");
         let figures = run(&line);
         let judged = |what: &str| {
             let verdicts = list(&figures, "verdicts").iter();
@@ -203,7 +203,9 @@ fn a_wrong_map_is_noticed() {
                 .filter(|one| one["what"].as_str().unwrap().starts_with(what) && one["verdict"] == "pass")
                 .count()
         };
-        assert_eq!((judged("peak current over that"), judged("map error told")), (1, 1), "{line}");
+        for what in ["peak current over that", "map error told", "hunting"] {
+            assert_eq!(judged(what), 1, "{line}: {what}");
+        }
     }
     for percent in [10, -10] {
         for scenario in ["restart", "reversal", "link-steps", "load-steps", "mode-borders"] {

@@ -1,4 +1,4 @@
-//! The torque demand: envelope first, then slew, so that the demand never asks for what the drive may not give.
+//! The torque demand: slew, then envelope and link. What is remembered is what was given, so the next slew begins where the drive is.
 
 use crate::frames::limit;
 use crate::machine::Ratings;
@@ -93,8 +93,7 @@ impl Shaper {
 
     /// The shaped demand, in N·m.
     pub fn step(&mut self, input: &Input, ratings: &Ratings) -> f32 {
-        let largest = envelope_nm(input.omega, ratings);
-        let wanted = limit(input.demand.torque_nm, -largest, largest);
+        let wanted = input.demand.torque_nm;
         let last = match self.torque_nm {
             Some(last) => last,
             None if input.can_step => 0.0,
@@ -109,6 +108,7 @@ impl Shaper {
         } else {
             wanted
         };
+        let largest = envelope_nm(input.omega, ratings);
         // The link is not slewed: its capacitor is full in milliseconds. A pattern follows torque towards zero at any rate.
         let (lowest, highest) = match input.window {
             Some(window) => window.bounds_nm(input.udc_v, largest, input.omega),

@@ -4,7 +4,7 @@
 //! beyond what a wrong resistance can feign, the operating point takes it into account: such a machine needs for a torque the
 //! current that the map gives for T/(1 + ε), and the voltage that it gives on a link of udc/(1 + ε).
 
-use crate::frames::{Dq, limit};
+use crate::frames::{Dq, limit_magnitude};
 
 /// Electrical speed from which the disturbance tells something of the map, in rad/s: the EMF is then well above the resistive
 /// drop.
@@ -19,11 +19,12 @@ const MOST: f32 = 0.15;
 #[derive(Clone, Copy, Debug)]
 pub struct MapError {
     share: f32,
+    scale: f32,
 }
 
 impl MapError {
     pub const fn new() -> Self {
-        Self { share: 0.0 }
+        Self { share: 0.0, scale: 1.0 }
     }
 
     /// ε, as far as it is known.
@@ -33,14 +34,7 @@ impl MapError {
 
     /// 1 + ε, as far as it is believed.
     pub fn scale(&self) -> f32 {
-        let sure = if self.share > LEFT_ALONE {
-            self.share - LEFT_ALONE
-        } else if self.share < -LEFT_ALONE {
-            self.share + LEFT_ALONE
-        } else {
-            0.0
-        };
-        1.0 + limit(sure, -MOST, MOST)
+        self.scale
     }
 
     /// So much time has passed, with the mean disturbance in V and the flux linkage aimed at in Wb.
@@ -51,5 +45,10 @@ impl MapError {
         let emf = flux.j();
         let seen = -(disturbance.d * emf.d + disturbance.q * emf.q) / (omega * flux.squared());
         self.share += BANDWIDTH_RAD_S * period_s * (seen - self.share);
+        self.scale = if self.share.abs() > LEFT_ALONE {
+            1.0 + limit_magnitude(self.share - LEFT_ALONE.copysign(self.share), MOST)
+        } else {
+            1.0
+        };
     }
 }

@@ -156,9 +156,14 @@ pub struct VoltageVector {
     pub steady_v: f32,
     /// Electrical angular speed, in rad/s, signed.
     pub omega: f32,
-    /// Fundamental that the MTPA point asks for at this speed, as a share of six-step.
+    /// Fundamental that the MTPA point asks for at this speed, as a share of six-step. Without what the torque's trim adds: that is
+    /// each mode's own, and a mode chosen by it would not last.
     pub depth: f32,
 }
+
+/// Change of an MTPA point's voltage over that of its torque, as shares of six-step and of the largest torque: that of a machine with
+/// some magnets and much reluctance.
+const DEPTH_PER_TORQUE: f32 = 0.4;
 
 /// A step's result.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -300,8 +305,10 @@ impl Controller {
         let link = self.link.step(measured.udc_v, clock.control_s());
         let depth = committed.depth_limit * committed.steady_share;
         let limit = VoltageLimit { udc_v: link.slow_v / scale, depth, filled: committed.filled };
-        let trimmed_nm = self.trim.apply(torque_nm, committed.ripple_share, tables.ratings.max_torque_nm);
+        let trim_nm = self.trim.trim_nm(torque_nm, committed.ripple_share, tables.ratings.max_torque_nm);
+        let trimmed_nm = if torque_nm < 0.0 { torque_nm - trim_nm } else { torque_nm + trim_nm };
         let point = operating_point(trimmed_nm / scale, omega, &limit, tables);
+        let depth = point.depth - DEPTH_PER_TORQUE / tables.ratings.max_torque_nm * trim_nm;
         let point = OperatingPoint { torque_nm: point.torque_nm * scale, ..point };
         let limited = point.region == Region::Limit;
         let given_nm = if limited { nearer_zero(point.torque_nm, torque_nm) } else { torque_nm };
@@ -343,7 +350,7 @@ impl Controller {
                 carrier: if regulates_by_pulses { steady.vector } else { voltage.vector }.unpark(frame),
                 steady_v: steady.length_v,
                 omega,
-                depth: point.depth,
+                depth,
             },
             map_error: self.map_error.share(),
             torque_nm: given_nm,

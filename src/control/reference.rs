@@ -67,9 +67,9 @@ const MTPA_OFF: f32 = 0.002;
 pub fn operating_point(torque_nm: f32, omega: f32, limit: &VoltageLimit, tables: &Tables) -> OperatingPoint {
     // The torque axis ends where the current does.
     let most = tables.mtpa.start.last();
-    let wanted_nm = torque_nm;
-    let torque_nm = crate::frames::limit(wanted_nm, -most, most);
-    let region = if torque_nm == wanted_nm { Region::Mtpa } else { Region::Limit };
+    let beyond = torque_nm.abs() > most;
+    let torque_nm = if beyond { most.copysign(torque_nm) } else { torque_nm };
+    let region = if beyond { Region::Limit } else { Region::Mtpa };
     let best = mtpa(torque_nm, tables);
     let flux = flux_linkage(tables, best);
     let resistance = tables.ratings.stator_resistance_ohm;

@@ -5,7 +5,7 @@
 //! flux does it. The torque of the measured currents tells; what is missing on average is added to the demand. What was
 //! learned under one pattern so holds for the next one.
 
-use crate::frames::limit;
+use crate::frames::limit_magnitude;
 
 /// Bandwidth, in rad/s: the torque ripple at six times the stator frequency must not come through.
 const BANDWIDTH_RAD_S: f32 = 60.0;
@@ -45,12 +45,10 @@ impl TorqueTrim {
         Self { curvature: 0.0, last_demand_nm: 0.0, hold_s: HOLD_S }
     }
 
-    /// The demand with its trim, in N·m.
-    pub fn apply(&self, demand_nm: f32, ripple_share: f32, largest_nm: f32) -> f32 {
+    /// By how much the magnitude of the demand is to grow, in N·m.
+    pub fn trim_nm(&self, demand_nm: f32, ripple_share: f32, largest_nm: f32) -> f32 {
         let most = MOST * demand_nm.abs();
-        let trim =
-            limit(self.curvature * ripple_share * ripple_share * scale(demand_nm, largest_nm), -most, most);
-        if demand_nm < 0.0 { demand_nm - trim } else { demand_nm + trim }
+        limit_magnitude(self.curvature * ripple_share * ripple_share * scale(demand_nm, largest_nm), most)
     }
 
     pub fn step(&mut self, input: &Input) {
@@ -72,7 +70,7 @@ impl TorqueTrim {
         let missing = if input.demand_nm < 0.0 { -missing } else { missing };
         let step = BANDWIDTH_RAD_S * input.period_s * missing / scale(input.demand_nm, input.largest_nm);
         let square = input.ripple_share * input.ripple_share;
-        self.curvature = limit(self.curvature * square + step, -MOST, MOST) / square;
+        self.curvature = limit_magnitude(self.curvature * square + step, MOST) / square;
     }
 }
 
