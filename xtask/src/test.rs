@@ -117,7 +117,7 @@ fn perform(step: Step, setup: &mut Setup) -> Result<Outcome> {
             if !setup.toolchain()?.has_clippy {
                 return Ok(Outcome::Skipped(format!("clippy needs rustup's target {TARGET}")));
             }
-            let what = ["--target", TARGET, "--package", "tractive", "--lib", "--bins"];
+            let what = ["--release", "--target", TARGET, "--package", "tractive", "--lib", "--bins"];
             let nucleo = [&what[..], &["--features", Board::NucleoG474re.feature()]].concat();
             let saboteur = [&what[..], &["--features", crate::saboteur::FEATURE]].concat();
             lint(&mut cargo(), &what)? && lint(&mut cargo(), &nucleo)? && lint(&mut cargo(), &saboteur)?
