@@ -315,7 +315,8 @@ impl Controller {
         self.trim.step(&torque_trim::Input {
             demand_nm: torque_nm,
             measured_nm,
-            limited: given_nm != torque_nm,
+            limited,
+            short: given_nm != torque_nm,
             ripple_share: committed.ripple_share,
             largest_nm: tables.ratings.max_torque_nm,
             period_s: clock.control_s(),

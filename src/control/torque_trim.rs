@@ -32,8 +32,9 @@ pub struct Input {
     pub demand_nm: f32,
     /// Torque of the measured currents, in N·m.
     pub measured_nm: f32,
-    /// Whether less torque is given than demanded.
+    /// Whether a limit is reached, and whether the demand itself lies beyond it.
     pub limited: bool,
+    pub short: bool,
     /// Flux ripple over fundamental flux, greater than zero.
     pub ripple_share: f32,
     pub largest_nm: f32,
@@ -62,12 +63,13 @@ impl TorqueTrim {
             self.hold_s -= input.period_s;
             return;
         }
-        // Not by either sign: the crests of the ripple alone would take the trim down until the limit seemed kept.
-        if input.limited {
-            return;
-        }
         let missing = input.demand_nm - input.measured_nm;
         let missing = if input.demand_nm < 0.0 { -missing } else { missing };
+        // More trim would be of no use. Where the demand is beyond the limit less of it neither: the crests of the ripple alone would
+        // take the trim down until the limit seemed kept.
+        if input.limited && (input.short || missing > 0.0) {
+            return;
+        }
         let step = BANDWIDTH_RAD_S * input.period_s * missing / scale(input.demand_nm, input.largest_nm);
         let square = input.ripple_share * input.ripple_share;
         self.curvature = limit_magnitude(self.curvature * square + step, MOST) / square;
@@ -78,4 +80,42 @@ impl TorqueTrim {
 fn scale(demand_nm: f32, largest_nm: f32) -> f32 {
     let (magnitude, least) = (demand_nm.abs(), CONSTANT_BELOW * largest_nm);
     if magnitude > least { magnitude } else { least }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LARGEST_NM: f32 = 1_000.0;
+    const RIPPLE_SHARE: f32 = 0.05;
+
+    /// Trim after 10 ms of holding and 100 ms of an error of torque that nothing changes.
+    fn learned_nm(measured_nm: f32, limited: bool, short: bool) -> f32 {
+        let (mut trim, demand_nm) = (TorqueTrim::new(), 900.0);
+        for _ in 0..1_100 {
+            trim.step(&Input {
+                demand_nm,
+                measured_nm,
+                limited,
+                short,
+                ripple_share: RIPPLE_SHARE,
+                largest_nm: LARGEST_NM,
+                period_s: 1e-4,
+            });
+        }
+        trim.trim_nm(demand_nm, RIPPLE_SHARE, LARGEST_NM)
+    }
+
+    #[test]
+    fn what_is_missing_is_added() {
+        assert!((learned_nm(890.0, false, false) - 54.0).abs() < 0.01, "all that is allowed");
+        assert!((learned_nm(910.0, false, false) + 54.0).abs() < 0.01);
+    }
+
+    #[test]
+    fn nothing_is_wound_up_at_a_limit() {
+        assert_eq!(learned_nm(890.0, true, false), 0.0, "more would be of no use");
+        assert!(learned_nm(910.0, true, false) < -10.0, "less is possible");
+        assert_eq!(learned_nm(910.0, true, true), 0.0, "crests of the ripple");
+    }
 }

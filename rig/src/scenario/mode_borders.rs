@@ -13,7 +13,7 @@ use crate::trace::Recording;
 pub struct ModeBorders;
 
 /// Where torque alone leads from 7 to 3 pulses and back, and where it leads from 7 by 3 into square wave and out of it.
-const SPEEDS_RPM: [f64; 2] = [1750.0, 1885.0];
+const SPEEDS_RPM: [f64; 2] = [1750.0, 1888.0];
 const LEVELS: usize = 800;
 /// So slow that the envelopes beside a switch, 100 ms away, are those of its torque within a percent.
 const LEVEL_S: f64 = 0.01;
