@@ -2,10 +2,12 @@
 
 use anyhow::{Result, bail};
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 use tractive::machine::{Curve, Grid, Mtpa, Ratings, Tables, Weakening};
 use tractive_tablegen::{Axis, Generated, MachineFolder};
 
 /// A machine folder and the tables made from it.
+#[derive(Clone)]
 pub struct Machine {
     /// What was read.
     pub folder: MachineFolder,
@@ -14,11 +16,18 @@ pub struct Machine {
 }
 
 impl Machine {
-    /// Reads a machine: a path to a folder, or the name of one in `tables/`.
+    /// Reads a machine: a path to a folder, or the name of one in `tables/`. Its tables are made once, however often it is read.
     pub fn load(name_or_path: &str) -> Result<Self> {
-        let folder = MachineFolder::read(&find(name_or_path)?)?;
+        let source = Source::read(find(name_or_path)?);
+        let loaded = || LOADED.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, machine)) = loaded().iter().find(|(other, _)| *other == source) {
+            return Ok(machine.clone());
+        }
+        let folder = MachineFolder::read(&source.folder)?;
         let tables = Box::leak(Box::new(keep(Generated::new(&folder)?)));
-        Ok(Self { folder, tables })
+        let machine = Self { folder, tables };
+        loaded().push((source, machine.clone()));
+        Ok(machine)
     }
 
     /// Largest torque at a mechanical speed in r/min, in N·m: the machine's largest, or what its largest power leaves.
@@ -28,6 +37,24 @@ impl Machine {
         (parameters.max_power_w / omega.max(1e-3)).min(parameters.max_torque_nm)
     }
 }
+
+/// Where a machine comes from, and what stood there.
+#[derive(PartialEq)]
+struct Source {
+    folder: PathBuf,
+    /// `None` for a file that cannot be read: then there is no machine.
+    files: [Option<Vec<u8>>; 2],
+}
+
+impl Source {
+    fn read(folder: PathBuf) -> Self {
+        let files = ["machine.toml", "flux_map.csv"].map(|name| std::fs::read(folder.join(name)).ok());
+        Self { folder, files }
+    }
+}
+
+/// The machines that this program has read.
+static LOADED: Mutex<Vec<(Source, Machine)>> = Mutex::new(Vec::new());
 
 fn find(name_or_path: &str) -> Result<PathBuf> {
     let tables = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tables");
@@ -93,5 +120,29 @@ fn grid<const N: usize>(nodes: Vec<[f32; N]>, rows: Axis, columns: Axis) -> Grid
         inverse_column_step: columns.inverse_step,
         columns: columns.count,
         nodes: nodes.leak(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_machine_is_made_anew_when_its_folder_has_changed_and_only_then() {
+        let folder = tempfile::tempdir().unwrap();
+        let name = folder.path().display().to_string();
+        for file in ["machine.toml", "flux_map.csv"] {
+            std::fs::copy(find("pmasynrm-180kw").unwrap().join(file), folder.path().join(file)).unwrap();
+        }
+        let [first, again] = [(); 2].map(|()| Machine::load(&name).unwrap());
+        assert!(std::ptr::eq(first.tables, again.tables));
+        let toml = folder.path().join("machine.toml");
+        let text = std::fs::read_to_string(&toml).unwrap();
+        std::fs::write(&toml, text.replace("max_torque_nm = 1235.0", "max_torque_nm = 1000.0")).unwrap();
+        let changed = Machine::load(&name).unwrap();
+        assert_eq!(changed.tables.ratings.max_torque_nm, 1000.0);
+        assert_eq!(changed.folder.parameters.max_torque_nm, 1000.0);
+        std::fs::write(&toml, "nonsense").unwrap();
+        assert!(Machine::load(&name).is_err());
     }
 }

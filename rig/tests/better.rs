@@ -41,7 +41,7 @@ fn number(figures: &Value, name: &str) -> f64 {
 
 /// Every bound of the scenario is kept.
 #[track_caller]
-fn keeps_its_bounds(line: &str) -> Recording {
+fn keeps_its_bounds(line: &str) -> (Recording, Figures) {
     let (recording, figures) = driven(line);
     let verdicts = list(&figures, "verdicts");
     assert!(!verdicts.is_empty(), "{line}");
@@ -49,7 +49,7 @@ fn keeps_its_bounds(line: &str) -> Recording {
         println!("{line}: {}: {} of {}", verdict["what"], verdict["found"], verdict["at_most"]);
         assert!(["pass", "reported"].contains(&verdict["verdict"].as_str().unwrap()), "{line}: {verdict}");
     }
-    recording
+    (recording, figures)
 }
 
 #[test]
@@ -67,8 +67,7 @@ fn torque_is_exact_at_the_characteristic_points() {
     // On a low link two to four of them are not to be had.
     for (udc_v, limited) in [(1000, 4), (1200, 2), (1800, 0)] {
         let line = format!("characteristic --udc {udc_v}");
-        keeps_its_bounds(&line);
-        let figures = run(&line);
+        let (_, figures) = keeps_its_bounds(&line);
         let points = list(&figures, "points").iter();
         let less = points.filter(|point| number(point, "reference_nm") < 0.999 * number(point, "demand_nm"));
         assert_eq!(less.count(), limited, "{line}");
@@ -91,7 +90,7 @@ fn switches_of_mode_are_without_shock() {
 fn square_wave_gives_its_power_to_the_highest_speed() {
     for (line, power_w) in [("sweep --to 6000", 246.4e3), ("sweep --to 6000 --brake", -246.4e3)] {
         // By the power itself, too, not only by what the drive makes of the demand.
-        let recording = keeps_its_bounds(line);
+        let (recording, _) = keeps_its_bounds(line);
         let tenths =
             (0..250).map(|k| analysis::window(&recording, 0.1 * f64::from(k), 0.1 * f64::from(k + 1)));
         let fast: Vec<_> = tenths.filter(|rows| rows.iter().all(|row| row.speed_rpm >= 1_905.0)).collect();

@@ -4,6 +4,7 @@ mod linear;
 
 use clap::Parser;
 use linear::MACHINES;
+use rayon::prelude::*;
 use tractive_rig::machine::Machine;
 use tractive_rig::options::RunOptions;
 use tractive_rig::scenario;
@@ -17,7 +18,7 @@ struct Line {
 
 #[test]
 fn any_machine_folder_drives() {
-    for linear in MACHINES {
+    MACHINES.par_iter().for_each(|linear| {
         let folder = tempfile::tempdir().unwrap();
         linear.write(folder.path());
         let path = folder.path().display().to_string();
@@ -39,5 +40,5 @@ fn any_machine_folder_drives() {
             assert!(error.abs() < 0.5, "{}: {error} % at {speed} r/min, {torque} N·m", linear.name);
         }
         run(&format!("sweep --down --to {}", linear.speed_rpm));
-    }
+    });
 }

@@ -2,6 +2,7 @@
 //!
 //! They are the lines of the `sh` blocks in the chapters of `docs/SUMMARY.md`. A line that ends in `# exits with N` has to; all
 //! others have to succeed. What would touch a board is given `--dry-run`: the image is built, and nobody is asked to flash it.
+//! Tests are built, and steps of `cargo xtask test` looked up: to run them is those steps' own business.
 
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -82,6 +83,13 @@ fn command(chapter: &str, line: &str) -> Line {
     {
         command += " --dry-run";
     }
+    if command.starts_with("cargo test") {
+        let (cargos, tests) = command.split_once(" -- ").unwrap_or((&command, ""));
+        command = format!("{cargos} --no-run -- {tests}").trim_end_matches(" -- ").to_owned();
+    }
+    if command.starts_with("cargo xtask test") {
+        command += " --list";
+    }
     Line { chapter: chapter.to_owned(), command, code }
 }
 
@@ -100,6 +108,16 @@ mod tests {
         let line = |command: &str, code| Line { chapter: "c".to_owned(), command: command.to_owned(), code };
         let wanted = [line("cargo rig run sweep", 1), line("cargo xtask flash --log --dry-run", 0)];
         assert_eq!(commands("c", text), wanted);
+    }
+
+    #[test]
+    fn what_other_steps_run_is_not_run_again() {
+        assert_eq!(command("c", "cargo test -p x --test y").command, "cargo test -p x --test y --no-run");
+        assert_eq!(command("c", "cargo test -- --nocapture").command, "cargo test --no-run -- --nocapture");
+        assert_eq!(
+            command("c", "cargo xtask test --only qemu").command,
+            "cargo xtask test --only qemu --list"
+        );
     }
 
     #[test]

@@ -53,6 +53,15 @@ pub enum Step {
     Timing,
 }
 
+/// The packages by the commands that test them. Cargo unites the features of what it is asked for at once: with all of them in one
+/// command the rig and this program would be compiled anew, since `cargo rig` and `cargo xtask` ask for one package.
+const TOGETHER: [&[&str]; 4] = [
+    &["tractive", "tractive-tablegen"],
+    &["tractive-rig"],
+    &["xtask"],
+    &["tractive-bench", "tractive-cells"],
+];
+
 /// How a step ended.
 #[derive(Clone, Debug, PartialEq, Eq)]
 enum Outcome {
@@ -101,13 +110,14 @@ fn perform(step: Step, setup: &mut Setup) -> Result<Outcome> {
         Step::Fmt if !setup.component("fmt", "rustfmt") => return Ok(no_component("rustfmt")),
         Step::Fmt => succeeds(cargo().args(["fmt", "--all", "--", "--check"]))?,
         Step::ClippyHost if !setup.component("clippy", "clippy") => return Ok(no_component("clippy")),
-        Step::ClippyHost => lint(&mut cargo(), &["--workspace", "--all-targets"])?,
+        // As released, like all that is built for this machine: macros and build scripts are then compiled once.
+        Step::ClippyHost => lint(&mut cargo(), &["--release", "--workspace", "--all-targets"])?,
         Step::ClippyTarget if !setup.component("clippy", "clippy") => return Ok(no_component("clippy")),
         Step::ClippyTarget => {
             if !setup.toolchain()?.has_clippy {
                 return Ok(Outcome::Skipped(format!("clippy needs rustup's target {TARGET}")));
             }
-            let what = ["--target", TARGET, "--package", "tractive", "--lib", "--bins"];
+            let what = ["--release", "--target", TARGET, "--package", "tractive", "--lib", "--bins"];
             let nucleo = [&what[..], &["--features", Board::NucleoG474re.feature()]].concat();
             let saboteur = [&what[..], &["--features", crate::saboteur::FEATURE]].concat();
             lint(&mut cargo(), &what)? && lint(&mut cargo(), &nucleo)? && lint(&mut cargo(), &saboteur)?
@@ -116,21 +126,27 @@ fn perform(step: Step, setup: &mut Setup) -> Result<Outcome> {
             let boards = format!("tractive/{}", Board::NucleoG474re.feature());
             let mut command = cargo();
             command.env("RUSTDOCFLAGS", "-D warnings");
-            succeeds(command.args(["doc", "--no-deps", "--workspace", "--features", &boards]))?
+            succeeds(command.args(["doc", "--release", "--no-deps", "--workspace", "--features", &boards]))?
         }
-        Step::Host => succeeds(cargo().args(["test", "--workspace", "--release"]))?,
+        Step::Host => {
+            let mut good = true;
+            for packages in TOGETHER {
+                let named = packages.iter().flat_map(|package| ["--package", package]);
+                good &= succeeds(cargo().args(["test", "--release"]).args(named))?;
+            }
+            good
+        }
         Step::Loom => {
             let mut command = cargo();
-            command.env("RUSTFLAGS", "--cfg loom").args(["test", "--release", "--package", "tractive"]);
-            command.args(["--test", "loom_cells", "--target-dir", "target/loom"]);
-            succeeds(&mut command)?
+            command.env("RUSTFLAGS", "--cfg loom").args(["test", "--profile", "loom"]);
+            succeeds(command.args(["--package", "tractive-cells", "--test", "interleavings"]))?
         }
         Step::Miri => {
             let Some(mut command) = miri() else {
                 return Ok(Outcome::Skipped("cargo miri is not installed".to_owned()));
             };
-            command.args(["test", "--package", "tractive", "--test", "cells", "--target-dir", "target/miri"]);
-            succeeds(&mut command)?
+            command.args(["test", "--package", "tractive-cells", "--test", "threads"]);
+            succeeds(command.args(["--target-dir", "target/miri"]))?
         }
         Step::Cells => crate::cells::check(setup)?,
         Step::Landings => crate::landings::check(setup)?,
@@ -264,6 +280,19 @@ mod tests {
         assert_eq!(lines[1], "step           result    seconds");
         assert_eq!(lines[3], "clippy-target  skipped       1.2  no clippy");
         assert_eq!(lines[4], "image-check    FAILED        1.2");
+    }
+
+    #[test]
+    fn every_package_is_tested_once() {
+        let mut command = cargo();
+        let metadata = command.args(["metadata", "--format-version", "1", "--no-deps"]).output().unwrap();
+        let metadata: serde_json::Value = serde_json::from_slice(&metadata.stdout).unwrap();
+        let packages = metadata["packages"].as_array().unwrap();
+        let mut there: Vec<_> = packages.iter().map(|package| package["name"].as_str().unwrap()).collect();
+        let mut tested = TOGETHER.concat();
+        there.sort_unstable();
+        tested.sort_unstable();
+        assert_eq!(tested, there);
     }
 
     #[test]
