@@ -120,9 +120,15 @@ pub fn measure(name: &str, options: &RunOptions) -> Result<Measured> {
 pub fn run(scenarios: &[String], options: &RunOptions) -> Result<()> {
     let scenarios = if scenarios.is_empty() { names() } else { scenarios.to_vec() };
     if !options.json {
-        println!(
+        crate::say!(
             "{:<16} {:>12} {:>8} {:>12} {:>8} {:>12} {:>8}",
-            "scenario", "simulated s", "wall s", "processor s", "ratio", "plant steps", "plant %"
+            "scenario",
+            "simulated s",
+            "wall s",
+            "processor s",
+            "ratio",
+            "plant steps",
+            "plant %"
         );
     }
     let mut all = Vec::new();
@@ -131,7 +137,7 @@ pub fn run(scenarios: &[String], options: &RunOptions) -> Result<()> {
         if options.json {
             all.push(measured);
         } else {
-            println!(
+            crate::say!(
                 "{:<16} {:>12.2} {:>8.3} {:>12.3} {:>8.1} {:>12} {:>8.1}",
                 measured.scenario,
                 measured.simulated_s,
@@ -144,7 +150,7 @@ pub fn run(scenarios: &[String], options: &RunOptions) -> Result<()> {
         }
     }
     if options.json {
-        println!("{}", serde_json::to_string(&all)?);
+        crate::say!("{}", serde_json::to_string(&all)?);
     }
     Ok(())
 }

@@ -17,6 +17,7 @@ pub mod machine;
 pub mod mtpa_methods;
 pub mod nine_switch;
 pub mod options;
+pub mod output;
 pub mod pattern;
 pub mod plant;
 pub mod points;

@@ -14,7 +14,7 @@ use tractive_rig::options::{OF_THE_ZS9, RunOptions, check_own, not_negative, pos
 use tractive_rig::report::{self, Page};
 use tractive_rig::scenario::{self, Scenario};
 use tractive_rig::trace::{self, Recording};
-use tractive_rig::{benchmark, figures, nine_switch, pattern, points, spectrum, talk, zs9};
+use tractive_rig::{benchmark, figures, nine_switch, pattern, points, say, spectrum, talk, zs9};
 
 #[derive(Parser)]
 #[command(name = "tractive-rig", about = "Plays the motor to the drive, and shows what happened", version)]
@@ -207,12 +207,12 @@ fn run(name: &str, options: &RunOptions, given: &dyn Fn(&str) -> bool) -> Result
         &page(scenario.as_ref(), options, &recording, &machine, &figures)?,
     )?;
     if options.json {
-        println!("{}", serde_json::to_string(&summary)?);
+        say!("{}", serde_json::to_string(&summary)?);
     } else {
         print(&figures);
         let ratio = recording.rows.last().map_or(0.0, |row| row.t_s) / wall_s;
-        println!("simulated {ratio:.1} times as fast as real time ({})", options.on.name());
-        println!("report: {}", out.join("report.html").display());
+        say!("simulated {ratio:.1} times as fast as real time ({})", options.on.name());
+        say!("report: {}", out.join("report.html").display());
     }
     if let Some(trip) = recording.trip() {
         eprintln!("fault {}: {} (limit {})", trip.fault.name(), trip.value, trip.limit);
@@ -243,10 +243,10 @@ fn run_talk(options: &talk::TalkOptions) -> Result<ExitCode> {
     let out = out("talk", &options.run)?;
     talk::write(options, &outcome, &out)?;
     if options.run.json {
-        println!("{}", serde_json::to_string(outcome.figures.values())?);
+        say!("{}", serde_json::to_string(outcome.figures.values())?);
     } else {
         print(&outcome.figures);
-        println!("report: {}", out.join("report.html").display());
+        say!("report: {}", out.join("report.html").display());
     }
     for failure in &outcome.talk.failures {
         eprintln!("{failure}");
@@ -261,12 +261,12 @@ fn run_zs9(scenario: &dyn zs9::scenario::Scenario, options: &RunOptions) -> Resu
     let wall_s = began.elapsed().as_secs_f64();
     zs9::command::write(scenario, options, &outcome, &out)?;
     if options.json {
-        println!("{}", serde_json::to_string(&outcome.summary)?);
+        say!("{}", serde_json::to_string(&outcome.summary)?);
     } else {
         print(&outcome.figures);
         let ratio = outcome.recording.rows.last().map_or(0.0, |row| row.t_s) / wall_s;
-        println!("simulated {ratio:.1} times as fast as real time ({})", options.on.name());
-        println!("report: {}", out.join("report.html").display());
+        say!("simulated {ratio:.1} times as fast as real time ({})", options.on.name());
+        say!("report: {}", out.join("report.html").display());
     }
     if let Some(trip) = outcome.recording.trip() {
         eprintln!("fault {}: {} (limit {})", trip.fault.name(), trip.value, trip.limit);
@@ -314,14 +314,14 @@ fn print(figures: &Figures) {
     for (name, value) in figures.values() {
         match value {
             serde_json::Value::Array(rows) => {
-                println!("{name}:");
+                say!("{name}:");
                 for row in rows.iter().filter_map(serde_json::Value::as_object) {
                     let cells: Vec<_> =
                         row.iter().map(|(key, value)| format!("{key} {}", report::cell(value))).collect();
-                    println!("  {}", cells.join("  "));
+                    say!("  {}", cells.join("  "));
                 }
             }
-            other => println!("{name} {}", report::cell(other)),
+            other => say!("{name} {}", report::cell(other)),
         }
     }
 }

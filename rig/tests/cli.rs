@@ -1,6 +1,6 @@
 //! The command line: what it refuses, and what it leaves behind.
 
-use std::process::{Command, Output};
+use std::process::{Command, Output, Stdio};
 
 fn rig(line: &str) -> Output {
     let root = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
@@ -25,6 +25,23 @@ fn refused(line: &str, words: &[&str]) -> String {
 /// The same, and nothing but one line.
 fn refused_in_one_line(line: &str, words: &[&str]) {
     assert_eq!(refused(line, words).trim().lines().count(), 1, "{line}");
+}
+
+#[test]
+fn a_reader_who_leaves_changes_nothing() {
+    let out = std::env::temp_dir().join(format!("tractive-reader-{}", std::process::id()));
+    let mut child = Command::new(env!("CARGO_BIN_EXE_tractive-rig"))
+        .args(["run", "sweep", "--to", "100", "--out"])
+        .arg(&out)
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    drop(child.stdout.take());
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    assert!(out.join("report.html").exists());
+    std::fs::remove_dir_all(out).unwrap();
 }
 
 #[test]

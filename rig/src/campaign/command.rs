@@ -77,13 +77,13 @@ pub fn run(options: &CampaignOptions) -> Result<ExitCode> {
     report::write(&outcomes, given, &options.out)?;
     if options.json {
         let totals = report::SYSTEMS.map(|(system, _)| (system.to_owned(), report::total(&outcomes, system)));
-        println!(
+        crate::say!(
             "{}",
             serde_json::to_string(&totals.into_iter().collect::<std::collections::BTreeMap<_, _>>())?
         );
     } else {
-        println!("{}", report::text(&outcomes).trim_start());
-        println!("report: {}", options.out.join("report.html").display());
+        crate::say!("{}", report::text(&outcomes).trim_start());
+        crate::say!("report: {}", options.out.join("report.html").display());
     }
     let lost: Vec<_> = outcomes.iter().filter(|outcome| outcome.verdict == Verdict::Uncaught).collect();
     for outcome in &lost {
@@ -138,7 +138,7 @@ fn drive_healthy(minutes: f64, options: &CampaignOptions) -> Result<ExitCode> {
                 eprintln!("{system}, seed {seed}: {tripped}");
             }
         }
-        println!(
+        crate::say!(
             "{system}: {minutes} min of driving in {pieces} pieces: {trips} trips, {current_a:.0} A and {udc_v:.0} V at most"
         );
         good &= trips == 0;

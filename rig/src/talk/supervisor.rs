@@ -272,12 +272,12 @@ impl Supervisor for Talk {
         let done = self.expectations;
         let waited = self.lines.are_typed() && t_s + DUE_S >= self.wait_until_s;
         if waited && self.slot > 0 {
-            println!("{}", self.state(t_s));
+            crate::say!("{}", self.state(t_s));
         }
         self.read(t_s)?;
         if self.lines.are_typed() && self.expectations > done {
             let outcome = self.failures.last().map_or("as expected", String::as_str);
-            println!("{outcome}");
+            crate::say!("{outcome}");
         }
         self.shape(t_s);
         let frame = self
