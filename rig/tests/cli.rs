@@ -29,10 +29,10 @@ fn refused_in_one_line(line: &str, words: &[&str]) {
 
 #[test]
 fn a_reader_who_leaves_changes_nothing() {
-    let out = std::env::temp_dir().join(format!("tractive-reader-{}", std::process::id()));
+    let out = tempfile::tempdir().unwrap();
     let mut child = Command::new(env!("CARGO_BIN_EXE_tractive-rig"))
         .args(["run", "sweep", "--to", "100", "--out"])
-        .arg(&out)
+        .arg(out.path())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()
@@ -40,8 +40,7 @@ fn a_reader_who_leaves_changes_nothing() {
     drop(child.stdout.take());
     let output = child.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
-    assert!(out.join("report.html").exists());
-    std::fs::remove_dir_all(out).unwrap();
+    assert!(out.path().join("report.html").exists());
 }
 
 #[test]

@@ -19,6 +19,7 @@ const MOST: f32 = 0.15;
 #[derive(Clone, Copy, Debug)]
 pub struct MapError {
     share: f32,
+    /// Of `share`: made where that changes, since it is wanted far more often.
     scale: f32,
 }
 

@@ -161,8 +161,8 @@ pub struct VoltageVector {
     pub depth: f32,
 }
 
-/// Change of an MTPA point's voltage over that of its torque, as shares of six-step and of the largest torque: that of a machine with
-/// some magnets and much reluctance.
+/// What the trim is taken to add to an MTPA point's voltage, as shares of six-step and of the largest torque. Chosen by trial: by the maps of the
+/// 180 kW machine it adds 0.55 at half torque and 0.76 at full torque; with none the mode hunts on a wrong map.
 const DEPTH_PER_TORQUE: f32 = 0.4;
 
 /// A step's result.

@@ -32,8 +32,9 @@ pub struct Input {
     pub demand_nm: f32,
     /// Torque of the measured currents, in N·m.
     pub measured_nm: f32,
-    /// Whether a limit is reached, and whether the demand itself lies beyond it.
+    /// Whether the demand with its trim is beyond what current and voltage allow.
     pub limited: bool,
+    /// Whether the demand itself is.
     pub short: bool,
     /// Flux ripple over fundamental flux, greater than zero.
     pub ripple_share: f32,

@@ -33,7 +33,7 @@ pub struct ControlTask<M = &'static Tables> {
     boundary: Option<Instant>,
     /// The fundamental of the last operating point, in V.
     steady_v: f32,
-    /// Fundamental that the last operating point would have without a limit, as a share of six-step.
+    /// Fundamental that the last operating point would have without a limit and without the trim, as a share of six-step.
     depth: f32,
     glide: Glide,
     /// The last demand, in N·m, and whether it has jumped and no half has been revised for it yet.
