@@ -373,12 +373,12 @@ fn messages_arrive_as_they_were_sent() {
         duty: 0.2,
         scheme: Scheme::RthdSlide,
         gates: Gates::Pulse,
-        acknowledge: 200,
+        release: 200,
     };
     assert_eq!(DualCommand::from_words(command.to_words()), command);
     let share = MotorShare { depth: 0.4, angle: Angle(6) };
     for next in [None, Some([share, MotorShare { depth: 0.3, ..share }])] {
-        let applied = DualApplied { at: Instant(3), next, trip: Some(trip), acknowledged: 7 };
+        let applied = DualApplied { at: Instant(3), next, trip: Some(trip), released: 7 };
         assert_eq!(DualApplied::from_words(applied.to_words()), applied);
     }
     let report = DualReport {

@@ -34,6 +34,8 @@ enum Call {
     Pwm(Option<(u8, u32)>),
     /// What control asks for first thing in its interrupt, whether it wants it or not.
     Revise,
+    /// The operator acknowledges, whatever there is; then as [`Call::Healthy`].
+    Acknowledge(u16),
     /// Both in their order, so many of them.
     Healthy(u16),
     /// The same with the samples of both spoilt.
@@ -65,6 +67,7 @@ fn call() -> impl Strategy<Value = Call> {
         1 => spoilt().prop_map(Call::Control),
         1 => spoilt().prop_map(Call::Pwm),
         1 => Just(Call::Revise),
+        6 => (0..8_u16).prop_map(Call::Acknowledge),
         4 => prop_oneof![3 => 1..20_u16, 1 => 300..900_u16].prop_map(Call::Healthy),
         6 => ((0..16_u8, bits()), 1..12_u16).prop_map(|(spoilt, calls)| Call::Spoilt(spoilt, calls)),
     ]
@@ -94,6 +97,7 @@ fn currents(omega: f32, at: u32, current: Dq) -> Abc {
 struct Board {
     omega: f32,
     spoilt: Option<(u8, u32)>,
+    acknowledge: u8,
     played: Option<CarrierPeriod>,
     periods: Option<PlayedPeriod>,
     entered: bool,
@@ -104,7 +108,16 @@ struct Board {
 
 impl Board {
     fn new(omega: f32) -> Self {
-        Self { omega, spoilt: None, played: None, periods: None, entered: false, trip: None, odd: None }
+        Self {
+            omega,
+            spoilt: None,
+            acknowledge: 0,
+            played: None,
+            periods: None,
+            entered: false,
+            trip: None,
+            odd: None,
+        }
     }
 
     fn see(&mut self, numbers: &[f32], trip: Option<Trip>, report: &dyn std::fmt::Debug) {
@@ -126,7 +139,7 @@ impl ControlPort for Board {
             demand: Demand { torque_nm: 200.0, slew_limited: false },
             enable: true,
             window: LinkWindow::OPEN,
-            acknowledge: 0,
+            acknowledge: self.acknowledge,
             hardware: None,
         };
         let Some((field, bits)) = self.spoilt else { return sample };
@@ -201,7 +214,7 @@ impl DualControlPort for Board {
             scheme: Scheme::Rthd,
             enable: true,
             speed_torque_nm: DualSample::UNLIMITED_NM,
-            acknowledge: 0,
+            acknowledge: self.acknowledge,
             hardware: None,
         };
         let Some((field, bits)) = self.spoilt else { return sample };
@@ -267,18 +280,26 @@ impl DualPwmPort for Board {
     fn gates_off(&mut self, _now: Instant) {
         self.entered = true;
     }
+
+    fn leave(&mut self, _now: Instant) -> bool {
+        self.entered = false;
+        true
+    }
 }
 
 /// Longest half that a 16-bit timer of the board's clock could count is shorter; none may stop the drive for longer.
 const LONGEST_HALF_TICKS: u32 = 100_000;
 
-fn check_half(board: &Board, pwm_trip: Option<Trip>) -> Result<(), TestCaseError> {
+fn check_half(board: &Board, trip: Option<Trip>, pwm_trip: Option<Trip>) -> Result<(), TestCaseError> {
     prop_assert!(board.odd.is_none(), "{:?}", board.odd);
     let Some(half) = board.played else { return Ok(()) };
     prop_assert!(half.period_ticks >= 2 * CLOCK.control_ticks / 2, "{half:?}");
     prop_assert!(half.period_ticks <= LONGEST_HALF_TICKS, "{half:?}");
     prop_assert!(pwm_trip.is_none() || half.mode == Mode::Off, "pulses with {pwm_trip:?}");
-    prop_assert!(half.mode == Mode::Off || !board.entered || board.trip.is_some(), "{half:?}");
+    prop_assert!(
+        !board.entered || trip.is_some() || pwm_trip.is_some(),
+        "safe state without a fault: {half:?}"
+    );
     Ok(())
 }
 
@@ -298,13 +319,14 @@ proptest! {
         let mut pwm = traction::PwmTask::new(&BUILT_IN, settings, Instant(first).after(devices.shortest_half_ticks));
         let mut board = Board::new(omega);
         for call in calls {
-            let healthy = if let Call::Healthy(count) | Call::Spoilt(_, count) = call { count } else { 0 };
+            let healthy = if let Call::Healthy(count) | Call::Acknowledge(count) | Call::Spoilt(_, count) = call { count } else { 0 };
+            board.acknowledge = board.acknowledge.wrapping_add(u8::from(matches!(call, Call::Acknowledge(_))));
             board.spoilt = match call { Call::Control(spoilt) | Call::Pwm(spoilt) => spoilt, Call::Spoilt(spoilt, _) => Some(spoilt), _ => None };
             match call {
                 Call::Control(_) => control.run(&mut board, &shared),
                 Call::Pwm(_) => pwm.run(&mut board, &shared),
                 Call::Revise => pwm.revise(&mut board, &shared),
-                Call::Healthy(_) | Call::Spoilt(..) => {}
+                Call::Healthy(_) | Call::Acknowledge(_) | Call::Spoilt(..) => {}
             }
             for _ in 0..healthy {
                 if control.next_call().reached(pwm.next_call()) {
@@ -312,9 +334,9 @@ proptest! {
                 } else {
                     control.run(&mut board, &shared);
                 }
-                check_half(&board, pwm.trip())?;
+                check_half(&board, control.trip(), pwm.trip())?;
             }
-            check_half(&board, pwm.trip())?;
+            check_half(&board, control.trip(), pwm.trip())?;
         }
     }
 
@@ -331,7 +353,8 @@ proptest! {
         let mut pwm = dual::PwmTask::new(&zs9::BUILT_IN, settings);
         let mut board = Board::new(omega);
         for call in calls {
-            let healthy = if let Call::Healthy(count) | Call::Spoilt(_, count) = call { count } else { 1 };
+            let healthy = if let Call::Healthy(count) | Call::Acknowledge(count) | Call::Spoilt(_, count) = call { count } else { 1 };
+            board.acknowledge = board.acknowledge.wrapping_add(u8::from(matches!(call, Call::Acknowledge(_))));
             board.spoilt = match call { Call::Control(spoilt) | Call::Pwm(spoilt) => spoilt, Call::Spoilt(spoilt, _) => Some(spoilt), _ => None };
             for _ in 0..healthy {
                 match call {
@@ -341,6 +364,7 @@ proptest! {
                     _ => control.run(&mut board, &shared),
                 }
                 prop_assert!(board.odd.is_none(), "{:?}", board.odd);
+                prop_assert!(!board.entered || control.trip().is_some() || pwm.trip().is_some(), "gates held without a fault");
                 let Some(played) = &board.periods else { continue };
                 let off = *played == PlayedPeriod::off(half);
                 prop_assert!(off || pwm.trip().is_none(), "pulses with {:?}", pwm.trip());

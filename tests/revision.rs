@@ -112,7 +112,7 @@ impl Pulsing {
             valid_from,
             gates: Gates::Pulse,
             revises,
-            acknowledge: 0,
+            release: 0,
         });
     }
 

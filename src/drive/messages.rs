@@ -26,8 +26,8 @@ pub struct VoltageCommand {
     pub gates: Gates,
     /// Whether it is for the half that is already committed, not for the one after it.
     pub revises: bool,
-    /// Number of the operator's last acknowledge.
-    pub acknowledge: u8,
+    /// Number of the last release: a new one makes the PWM interrupt forget its fault and leave the safe state.
+    pub release: u8,
 }
 
 impl VoltageCommand {
@@ -53,7 +53,7 @@ impl Words<10> for VoltageCommand {
             self.valid_from.0,
             u32::from(self.gates == Gates::Pulse)
                 | u32::from(self.revises) << 1
-                | u32::from(self.acknowledge) << 8,
+                | u32::from(self.release) << 8,
         ]
     }
 
@@ -72,7 +72,7 @@ impl Words<10> for VoltageCommand {
             valid_from: Instant(valid_from),
             gates: if flags & 1 != 0 { Gates::Pulse } else { Gates::Off },
             revises: flags & 2 != 0,
-            acknowledge: (flags >> 8) as u8,
+            release: (flags >> 8) as u8,
         }
     }
 }
@@ -93,8 +93,8 @@ pub struct Committal {
     pub mirrored: bool,
     /// Whether the PWM interrupt has found a fault; it then stands in a cell of its own.
     pub tripped: bool,
-    /// Number of the acknowledge that it carried out last.
-    pub acknowledged: u8,
+    /// Number of the release that it carried out last.
+    pub released: u8,
 }
 
 /// Words of a [`Committal`] in its cell.
@@ -114,8 +114,8 @@ impl Committal {
         let [a, b, c] = self.currents_a.to_bits();
         let flags = (u32::from(self.mirrored) * MIRRORED) | (u32::from(self.tripped) * TRIPPED);
         let (alpha, beta) = (on.alpha.to_bits(), on.beta.to_bits());
-        let acknowledged = self.acknowledged.into();
-        [self.at.0, self.begins.0, period, u, v, w, packed | flags, alpha, beta, a, b, c, acknowledged]
+        let released = self.released.into();
+        [self.at.0, self.begins.0, period, u, v, w, packed | flags, alpha, beta, a, b, c, released]
     }
 }
 
@@ -129,7 +129,7 @@ impl Committal {
             half: CarrierPeriod::off(off_ticks),
             mirrored: false,
             tripped: false,
-            acknowledged: 0,
+            released: 0,
         }
     }
 }
@@ -186,9 +186,9 @@ impl CommittalRecord<'_> {
         Abc::from_bits([self.0.word::<9>(), self.0.word::<10>(), self.0.word::<11>()])
     }
 
-    /// See [`Committal::acknowledged`].
+    /// See [`Committal::released`].
     #[inline]
-    pub fn acknowledged(&self) -> u8 {
+    pub fn released(&self) -> u8 {
         self.0.word::<12>() as u8
     }
 }

@@ -3,6 +3,7 @@
 
 #![forbid(unsafe_code)]
 
+mod acknowledge;
 pub mod dual;
 mod messages;
 pub mod traction;

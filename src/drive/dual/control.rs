@@ -5,6 +5,7 @@ use super::{DualApplied, DualCommand, DualReport, MotorShare, Settings, Shared};
 use crate::board::{DualControlPort, DualSample, HardwareBreak, MotorDemand};
 use crate::control::{Measurements, ZSource, ZSourceError, ZSourceInput};
 use crate::drive::Gates;
+use crate::drive::acknowledge::Acknowledge;
 use crate::frames::{Angle, SQRT_3};
 use crate::machine::{Machine, Tables};
 use crate::protection::{self, Disarmed, Fault, SafeState, Trip, Violation};
@@ -34,8 +35,7 @@ pub struct ControlTask<M = &'static Tables> {
     now: Instant,
     disarmed: Disarmed,
     trip: Option<Trip>,
-    /// Number of the acknowledge that both interrupts have carried out.
-    acknowledged: u8,
+    acknowledge: Acknowledge,
 }
 
 /// What a control period makes of its sample.
@@ -64,7 +64,7 @@ impl<M: Machine> ControlTask<M> {
             now: Instant(settings.clock.control_ticks),
             disarmed: Disarmed::NONE,
             trip: None,
-            acknowledged: 0,
+            acknowledge: Acknowledge::new(),
         }
     }
 
@@ -97,10 +97,8 @@ impl<M: Machine> ControlTask<M> {
         let applied = newest.filter(|applied| now.reached(applied.at));
         let sample = port.sample(now);
         // Once the PWM interrupt has: what it told before that cannot come back.
-        if sample.acknowledge != self.acknowledged
-            && applied.as_ref().is_some_and(|applied| applied.acknowledged == sample.acknowledge)
-        {
-            self.acknowledged = sample.acknowledge;
+        let released = applied.as_ref().map(|applied| applied.released);
+        if self.acknowledge.step(sample.acknowledge, self.trip.is_some(), released) {
             self.trip = None;
         }
         if self.trip.is_none() {
@@ -138,7 +136,7 @@ impl<M: Machine> ControlTask<M> {
             duty: self.driven.duty,
             scheme: sample.scheme,
             gates,
-            acknowledge: sample.acknowledge,
+            release: self.acknowledge.release(),
         });
         self.tell(&sample, gates, port, shared);
     }
@@ -165,7 +163,7 @@ impl<M: Machine> ControlTask<M> {
             capacitor_v: sample.capacitor_v,
             source_v: sample.source_v,
             speed_known: upper.speed_is_known() && lower.speed_is_known(),
-            acknowledged: self.acknowledged,
+            acknowledged: self.acknowledge.answered(),
         };
         port.report(now, &report);
     }

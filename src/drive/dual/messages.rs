@@ -33,8 +33,8 @@ pub struct DualCommand {
     pub scheme: Scheme,
     /// Whether to make pulses at all.
     pub gates: Gates,
-    /// Number of the operator's last acknowledge.
-    pub acknowledge: u8,
+    /// Number of the last release: a new one makes the PWM interrupt forget its fault and let the gates go.
+    pub release: u8,
 }
 
 impl DualCommand {
@@ -58,9 +58,7 @@ impl Words<10> for DualCommand {
             self.at.0,
             self.valid_from.0,
             self.duty.to_bits(),
-            u32::from(self.gates == Gates::Pulse)
-                | (self.scheme as u32) << 8
-                | u32::from(self.acknowledge) << 16,
+            u32::from(self.gates == Gates::Pulse) | (self.scheme as u32) << 8 | u32::from(self.release) << 16,
         ]
     }
 
@@ -77,7 +75,7 @@ impl Words<10> for DualCommand {
             valid_from: Instant(valid_from),
             duty: f32::from_bits(duty),
             scheme: scheme_from_code(flags >> 8 & 0xFF),
-            acknowledge: (flags >> 16) as u8,
+            release: (flags >> 16) as u8,
             gates: if flags & 1 == 1 { Gates::Pulse } else { Gates::Off },
         }
     }
@@ -106,8 +104,8 @@ pub struct DualApplied {
     pub next: Option<[MotorShare; 2]>,
     /// A fault that the PWM interrupt found.
     pub trip: Option<Trip>,
-    /// Number of the acknowledge that it carried out last.
-    pub acknowledged: u8,
+    /// Number of the release that it carried out last.
+    pub released: u8,
 }
 
 impl Words<10> for DualApplied {
@@ -116,7 +114,7 @@ impl Words<10> for DualApplied {
         let [code, value, limit, at] = trip_to_words(self.trip);
         [
             self.at.0,
-            u32::from(self.next.is_some()) | u32::from(self.acknowledged) << 8,
+            u32::from(self.next.is_some()) | u32::from(self.released) << 8,
             upper.depth.to_bits(),
             upper.angle.0,
             lower.depth.to_bits(),
@@ -133,7 +131,7 @@ impl Words<10> for DualApplied {
         let share = |depth, angle| MotorShare { depth: f32::from_bits(depth), angle: Angle(angle) };
         Self {
             at: Instant(at),
-            acknowledged: (pulsing >> 8) as u8,
+            released: (pulsing >> 8) as u8,
             next: (pulsing & 1 == 1).then_some([share(d1, a1), share(d2, a2)]),
             trip: trip_from_words(trip),
         }

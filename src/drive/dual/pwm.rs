@@ -30,8 +30,8 @@ pub struct PwmTask<M = &'static Tables> {
     trip: Option<Trip>,
     /// Link voltage at the last peak, in V.
     last_link_v: Option<f32>,
-    /// Number of the acknowledge that was carried out last.
-    acknowledged: u8,
+    /// Number of the release that was carried out last.
+    released: u8,
 }
 
 impl<M: Machine> PwmTask<M> {
@@ -46,7 +46,7 @@ impl<M: Machine> PwmTask<M> {
             disarmed: Disarmed::NONE,
             trip: None,
             last_link_v: None,
-            acknowledged: 0,
+            released: 0,
         }
     }
 
@@ -75,9 +75,10 @@ impl<M: Machine> PwmTask<M> {
         let sample = port.sample(now);
         let command = shared.command.newest(|command| now.reached(DualCommand::valid_from(command)));
         if let Some(command) = &command
-            && command.acknowledge != self.acknowledged
+            && command.release != self.released
         {
-            self.forget_acknowledged(command, port);
+            self.released = command.release;
+            self.release(port);
         }
         let began = Instant(shared.began.load(Ordering::Relaxed));
         let stale = stale(now, began, &self.settings.clock);
@@ -110,7 +111,7 @@ impl<M: Machine> PwmTask<M> {
             at: now,
             next: given,
             trip: self.trip,
-            acknowledged: self.acknowledged,
+            released: self.released,
         });
     }
 
@@ -174,15 +175,10 @@ impl<M: Machine> PwmTask<M> {
         (wrong != 0).then_some((Fault::LegStuck, f32::from(wrong), 0.0))
     }
 
-    /// Forgets the fault that is acknowledged and lets the gates go. Each acknowledge does so once: while pulses are wanted there is
-    /// nothing to forget.
+    /// Forgets the fault and lets the gates go, once for each release that control asks for.
     #[cold]
     #[inline(never)]
-    fn forget_acknowledged(&mut self, command: &DualCommand, port: &mut impl DualPwmPort) {
-        self.acknowledged = command.acknowledge;
-        if command.gates == Gates::Pulse {
-            return;
-        }
+    fn release(&mut self, port: &mut impl DualPwmPort) {
         self.trip = None;
         let at = self.now.before(self.settings.carrier_ticks);
         if !port.leave(at) {

@@ -31,8 +31,8 @@ pub(super) struct Applied {
     /// Mode of the running half.
     pub mode: Mode,
     pub next: Next,
-    /// Number of the acknowledge that the PWM interrupt had carried out.
-    pub acknowledged: u8,
+    /// Number of the release that the PWM interrupt had carried out.
+    pub released: u8,
 }
 
 /// The half after the running one.
@@ -85,7 +85,7 @@ impl Applied {
             running,
             mode,
             next,
-            acknowledged: newest.acknowledged(),
+            released: newest.released(),
         }
     }
 }

@@ -5,6 +5,7 @@ use super::glide::Glide;
 use super::{Settings, Shared};
 use crate::board::{ControlPort, Sample};
 use crate::control::{Boundary, Committed, Controller, Demand, Input, Law};
+use crate::drive::acknowledge::Acknowledge;
 use crate::drive::messages::{Gates, Report, VoltageCommand};
 use crate::frames::{AlphaBeta, Angle, Dq};
 use crate::machine::{Machine, Tables};
@@ -43,8 +44,7 @@ pub struct ControlTask<M = &'static Tables> {
     revises: bool,
     disarmed: Disarmed,
     trip: Option<Trip>,
-    /// Number of the acknowledge that both interrupts have carried out.
-    acknowledged: u8,
+    acknowledge: Acknowledge,
 }
 
 /// What a period's control law makes; nothing while no pulses are made.
@@ -82,7 +82,7 @@ impl<M: Machine> ControlTask<M> {
             revises: false,
             disarmed: Disarmed::NONE,
             trip: None,
-            acknowledged: 0,
+            acknowledge: Acknowledge::new(),
         }
     }
 
@@ -110,7 +110,10 @@ impl<M: Machine> ControlTask<M> {
         shared.began.store(now.0, Ordering::Relaxed);
         let sample = port.sample(now);
         let applied = shared.applied.read(|records| Applied::seen(records, now)).flatten();
-        self.forget_acknowledged(sample.acknowledge, applied.as_ref());
+        let released = applied.as_ref().map(|applied| applied.released);
+        if self.acknowledge.step(sample.acknowledge, self.trip.is_some(), released) {
+            self.trip = None;
+        }
         if self.trip.is_none() && applied.as_ref().is_some_and(|applied| applied.next.kind.is_tripped()) {
             self.trip = shared.trip.read();
         }
@@ -161,7 +164,7 @@ impl<M: Machine> ControlTask<M> {
             valid_from: self.now,
             gates,
             revises: driven.revises,
-            acknowledge: sample.acknowledge,
+            release: self.acknowledge.release(),
         });
         let report = Report {
             torque_nm: driven.torque_nm,
@@ -174,7 +177,7 @@ impl<M: Machine> ControlTask<M> {
             udc_v: sample.measured.udc_v,
             current_a: sample.measured.currents_a.peak(),
             speed_known: self.controller.speed_is_known(),
-            acknowledged: self.acknowledged,
+            acknowledged: self.acknowledge.answered(),
             mode: driven.mode,
         };
         if let Some(recorder) = shared.recorder {
@@ -341,17 +344,6 @@ impl<M: Machine> ControlTask<M> {
         );
         port.enter(safe, at);
         self.trip = Some(Trip { fault, value, limit, at, safe });
-    }
-
-    /// Forgets the fault that is acknowledged once the PWM interrupt has: what it told before that cannot come back, and
-    /// the safe state that it has left is not entered again for the old fault's sake.
-    fn forget_acknowledged(&mut self, acknowledge: u8, applied: Option<&Applied>) {
-        if acknowledge != self.acknowledged
-            && applied.is_some_and(|applied| applied.acknowledged == acknowledge)
-        {
-            self.acknowledged = acknowledge;
-            self.trip = None;
-        }
     }
 
     /// First of all checks: a leg that is stuck decides on the safe state.

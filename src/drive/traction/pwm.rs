@@ -27,8 +27,8 @@ pub struct PwmTask<M = &'static Tables> {
     currents_before_a: Abc,
     trip: Option<Trip>,
     disarmed: Disarmed,
-    /// Number of the acknowledge that was carried out last.
-    acknowledged: u8,
+    /// Number of the release that was carried out last.
+    released: u8,
 }
 
 impl<M: Machine> PwmTask<M> {
@@ -47,7 +47,7 @@ impl<M: Machine> PwmTask<M> {
             currents_before_a: Abc { a: 0.0, b: 0.0, c: 0.0 },
             trip: None,
             disarmed: Disarmed::NONE,
-            acknowledged: 0,
+            released: 0,
         }
     }
 
@@ -69,7 +69,7 @@ impl<M: Machine> PwmTask<M> {
         let currents_a = port.sample(now);
         self.currents_before_a = self.newest.currents_a;
         let command = shared.command.newest(|command| now.reached(VoltageCommand::valid_from(command)));
-        self.forget_acknowledged(&command, now, port, shared);
+        self.release(&command, now, port, shared);
         self.check(&currents_a, &command, port, shared);
         let begins = now.after(self.newest.half.period_ticks);
         let pulsing = self.trip.is_none();
@@ -85,7 +85,7 @@ impl<M: Machine> PwmTask<M> {
         self.newest.begins = begins;
         self.newest.mirrored = self.modulator.is_mirrored();
         self.newest.tripped = !pulsing;
-        self.newest.acknowledged = self.acknowledged;
+        self.newest.released = self.released;
         self.play(port);
         self.check_late(port, shared);
         shared.applied.publish(self.newest.to_words());
@@ -139,9 +139,8 @@ impl<M: Machine> PwmTask<M> {
         self.trip
     }
 
-    /// Forgets the fault that is acknowledged and leaves the safe state, gates off. Each acknowledge does so once: while pulses are
-    /// made there is nothing to forget.
-    fn forget_acknowledged(
+    /// Forgets the fault and leaves the safe state, gates off, once for each release that control asks for.
+    fn release(
         &mut self,
         command: &Option<VoltageCommand>,
         now: Instant,
@@ -151,13 +150,10 @@ impl<M: Machine> PwmTask<M> {
         let Some(command) = command else {
             return;
         };
-        if command.acknowledge == self.acknowledged {
+        if command.release == self.released {
             return;
         }
-        self.acknowledged = command.acknowledge;
-        if command.gates == Gates::Pulse {
-            return;
-        }
+        self.released = command.release;
         self.trip = None;
         if !port.leave(now) {
             let (fault, safe) = (Fault::GatesHeld, SafeState::GatesOff);
