@@ -1,14 +1,22 @@
 //! `tractive`: the controller of a railway traction inverter.
 //!
-//! A timer interrupt decides WHICH voltage ([`control`]), a PWM interrupt decides WHICH pulses ([`modulation`] for two-level
-//! inverters, [`nine_switch`] for the one that feeds two motors),
-//! lock-free cells carry the few words between them ([`cell`]), a board knows the hardware ([`board`]), and a rig on the
-//! host plays the motor. [`drive`] puts them together, once for each system ([`drive::traction`], [`drive::dual`]): its tasks are
-//! what the two interrupts call, on any board and on the host. [`machine`] holds the tables made offline, [`protection`] the faults and the safe state,
-//! [`recorder`] what led to one.
+//! A timer interrupt decides which voltage ([`control`]), a PWM interrupt decides which pulses ([`modulation`] for two-level
+//! inverters, [`nine_switch`] for the one that feeds two motors), lock-free cells carry the few words between them ([`cell`]), a
+//! board gives samples and takes pulses ([`ports`]), and a rig on the host plays the motor. [`drive`] puts them together, once for
+//! each system ([`drive::traction`], [`drive::dual`]): its tasks are what the two interrupts call, on any board and on the host.
+//! [`machine`] has the types of the tables made offline, [`protection`] the faults and the safe state, [`recorder`] what led to one.
+//! [`operator`] switches the drive on and off, [`protocol`] is how it is asked over CAN.
 //!
-//! Who knows whom: [`frames`], [`time`] and [`machine`] know nobody; control and modulation know these, never each other;
-//! neither knows the cells; only the drive knows all of them; only a board knows registers.
+//! [`control`], [`modulation`], [`nine_switch`], [`machine`], [`frames`] and [`time`](mod@time) are those of the crate
+//! `tractive-control`, which is usable alone. Neither control nor modulation knows the cells; only the drive knows all of them;
+//! only a board knows registers.
+//!
+//! # Features
+//! None is on by default, and without one there is no build script's work, no table, no vector, no linker file.
+//! * `built-in`: the module `built_in` with the tables of the machines that `TRACTIVE_MACHINE` and `TRACTIVE_ZS9_MACHINE` name.
+//! * `wire`: the module `wire`, the words between an emulated board and the rig.
+//! * `qemu`: what the reference images on QEMU's board need; with the two above.
+//! * `saboteur`: the same with faults injected, for tests.
 //!
 //! # Conventions
 //! * Pure steps: `step(&input, &mut state) -> output`; no clock, no peripheral, no global inside.
@@ -22,17 +30,17 @@
 #![cfg_attr(target_os = "none", deny(unsafe_code))]
 
 pub mod board;
+#[cfg(feature = "built-in")]
+pub mod built_in;
 pub mod cell;
 pub mod configuration;
-pub mod control;
 pub mod drive;
-pub mod frames;
-pub mod link;
-pub mod machine;
-pub mod modulation;
-pub mod nine_switch;
 pub mod operator;
+pub mod ports;
 pub mod protection;
 pub mod protocol;
 pub mod recorder;
-pub mod time;
+#[cfg(feature = "wire")]
+pub mod wire;
+
+pub use tractive_control::{control, frames, machine, modulation, nine_switch, time};

@@ -7,18 +7,21 @@ fn main() {
     println!("This is the firmware. `cargo xtask run` builds it for its board and runs it in QEMU.");
 }
 
+#[cfg(all(target_os = "none", not(any(feature = "qemu", feature = "board-nucleo-g474re"))))]
+compile_error!("the reference images need the feature `qemu`");
+
 #[cfg(all(target_os = "none", feature = "board-nucleo-g474re"))]
 #[path = "firmware/nucleo_g474re.rs"]
 mod firmware;
 
-#[cfg(all(target_os = "none", not(feature = "board-nucleo-g474re")))]
+#[cfg(all(target_os = "none", feature = "qemu", not(feature = "board-nucleo-g474re")))]
 mod firmware {
     use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
     use cortex_m_rt::{entry, exception, interrupt};
     use tractive::board::qemu::{self, CLOCK, Interrupt as interrupt};
+    use tractive::built_in::traction::{BUILT_IN, BuiltIn};
     use tractive::control::Gains;
     use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
-    use tractive::machine::{BUILT_IN, BuiltIn};
     use tractive::modulation::Devices;
     use tractive::operator::{self, Line, Slot, slot_s};
     use tractive::protocol::Station;

@@ -3,17 +3,17 @@
 //! after a fault was told makes the drive forget it.
 
 use std::cell::Cell;
-use tractive::board::{
-    ControlPort, DualControlPort, DualPwmPort, DualSample, GateFeedback, HardwareBreak, MotorDemand,
-    PlayedPeriod, PowerSample, PwmPort, Sample,
-};
+use tractive::built_in::{traction::BUILT_IN, zs9};
 use tractive::control::{Demand, Gains, LinkWindow, Measurements};
 use tractive::drive::dual::{self, DualReport};
 use tractive::drive::{Report, traction};
 use tractive::frames::{Abc, Angle, Dq};
-use tractive::machine::{BUILT_IN, zs9};
 use tractive::modulation::{CarrierPeriod, Devices, Mode};
 use tractive::nine_switch::Scheme;
+use tractive::ports::{
+    ControlPort, DualControlPort, DualPwmPort, DualSample, GateFeedback, HardwareBreak, MotorDemand,
+    PlayedPeriod, PowerSample, PwmPort, Sample,
+};
 use tractive::protection::{Fault, SafeState, Trip};
 use tractive::time::{Clock, Instant};
 

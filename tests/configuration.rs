@@ -2,10 +2,11 @@
 //! The lists below take the structures apart whole: a new field does not compile until it is listed, and fails until it is checked.
 
 use tractive::board::nucleo_g474re::power_stage::{POWER_STAGE, PowerStage};
+use tractive::built_in::{traction::BUILT_IN, zs9};
 use tractive::configuration::Refused;
 use tractive::control::{Gains, SpeedDesign, ZSourceDesign, ZSourceGains};
 use tractive::drive::{dual, traction};
-use tractive::machine::{BUILT_IN, Curve, Grid, Mtpa, Ratings, Tables, Weakening, zs9};
+use tractive::machine::{Curve, Grid, Mtpa, Ratings, Tables, Weakening};
 use tractive::modulation::Devices;
 use tractive::protection::LinkLimits;
 use tractive::time::Clock;

@@ -1,9 +1,6 @@
 //! The ZS9's two tasks by themselves: faults, words, and what they play when the measurements make no sense.
 
-use tractive::board::{
-    DualControlPort, DualPwmPort, DualSample, GateFeedback, HardwareBreak, MotorDemand, PlayedPeriod,
-    PowerSample,
-};
+use tractive::built_in::zs9::BUILT_IN;
 use tractive::cell::Words;
 use tractive::control::Demand;
 use tractive::drive::Gates;
@@ -11,8 +8,11 @@ use tractive::drive::dual::{
     ControlTask, DualApplied, DualCommand, DualReport, MotorCommand, MotorShare, PwmTask, Settings, Shared,
 };
 use tractive::frames::{Abc, Angle, Dq};
-use tractive::machine::zs9::BUILT_IN;
 use tractive::nine_switch::{LegState, Scheme};
+use tractive::ports::{
+    DualControlPort, DualPwmPort, DualSample, GateFeedback, HardwareBreak, MotorDemand, PlayedPeriod,
+    PowerSample,
+};
 use tractive::protection::{Fault, SafeState, Trip};
 use tractive::recorder::DualRecorder;
 use tractive::time::{Clock, Instant};

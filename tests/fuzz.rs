@@ -4,18 +4,18 @@
 //! `TRACTIVE_FUZZ_CASES=100000 cargo test --release --test fuzz` tries longer.
 
 use proptest::prelude::*;
-use tractive::board::{
-    ControlPort, DualControlPort, DualPwmPort, DualSample, GateFeedback, MotorDemand, PlayedPeriod,
-    PowerSample, PwmPort, Sample,
-};
+use tractive::built_in::{traction::BUILT_IN, zs9};
 use tractive::control::{Demand, Gains, LinkWindow, Measurements};
 use tractive::drive::Report;
 use tractive::drive::dual::{self, DualReport};
 use tractive::drive::traction;
 use tractive::frames::{Abc, Angle, Dq};
-use tractive::machine::{BUILT_IN, zs9};
 use tractive::modulation::{CarrierPeriod, Devices, Mode};
 use tractive::nine_switch::{LegState, Scheme};
+use tractive::ports::{
+    ControlPort, DualControlPort, DualPwmPort, DualSample, GateFeedback, MotorDemand, PlayedPeriod,
+    PowerSample, PwmPort, Sample,
+};
 use tractive::protection::{Fault, SafeState, Trip};
 use tractive::time::{Clock, Instant};
 

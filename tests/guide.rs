@@ -3,13 +3,13 @@
 use std::path::Path;
 use tractive::board::nucleo_g474re::power_stage::{CORE_HZ, POWER_STAGE, cycles_to_ticks, ns_to_cycles};
 use tractive::board::nucleo_g474re::{self, PRESCALER, sampling};
-use tractive::board::{ControlPort, PwmPort, Sample};
+use tractive::built_in::traction::BUILT_IN;
 use tractive::control::{Demand, Gains, LinkWindow, Measurements};
 use tractive::drive::Report;
 use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
 use tractive::frames::{Abc, Angle};
-use tractive::machine::BUILT_IN;
 use tractive::modulation::{CarrierPeriod, Devices, Mode};
+use tractive::ports::{ControlPort, PwmPort, Sample};
 use tractive::protection::{Fault, SafeState};
 use tractive::time::{Clock, Instant};
 

@@ -1,18 +1,18 @@
 //! Interrupts that are late or lost, in both drives: each side notices what the other one misses, by its first interrupt that can, and
 //! turns the gates off in it. Instants here are real ones; the tasks count theirs, and fall behind with every interrupt they miss.
 
-use tractive::board::{
-    ControlPort, DualControlPort, DualPwmPort, DualSample, GateFeedback, MotorDemand, PlayedPeriod,
-    PowerSample, PwmPort, Sample,
-};
+use tractive::built_in::{traction::BUILT_IN, zs9};
 use tractive::control::{Demand, Gains, LinkWindow, Measurements};
 use tractive::drive::Report;
 use tractive::drive::dual::{self, DualReport};
 use tractive::drive::traction;
 use tractive::frames::{Abc, Angle, Dq};
-use tractive::machine::{BUILT_IN, zs9};
 use tractive::modulation::{CarrierPeriod, Devices, Mode};
 use tractive::nine_switch::Scheme;
+use tractive::ports::{
+    ControlPort, DualControlPort, DualPwmPort, DualSample, GateFeedback, MotorDemand, PlayedPeriod,
+    PowerSample, PwmPort, Sample,
+};
 use tractive::protection::{Disarmed, Fault, SafeState, Trip};
 use tractive::time::{Clock, Instant};
 

@@ -1,12 +1,12 @@
 //! Every fault, by name, with value and limit, and the gates in the safe state in the same interrupt.
 
-use tractive::board::{ControlPort, PwmPort, Sample};
+use tractive::built_in::traction::BUILT_IN;
 use tractive::control::{Demand, Gains, LinkWindow, Measurements};
 use tractive::drive::Report;
 use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
 use tractive::frames::{Abc, Angle, Dq};
-use tractive::machine::BUILT_IN;
 use tractive::modulation::{CarrierPeriod, Devices, Mode};
+use tractive::ports::{ControlPort, PwmPort, Sample};
 use tractive::protection::{Fault, LegFaults, SafeState, Trip};
 use tractive::time::{Clock, Instant};
 

@@ -1,11 +1,11 @@
 //! A demand that jumps revises the half that is already committed, and nothing else does.
 
-use tractive::board::PwmPort;
+use tractive::built_in::traction::BUILT_IN;
 use tractive::drive::traction::{PwmTask, Settings, Shared};
 use tractive::drive::{CommittalRecord, Gates, VoltageCommand, volt_ticks};
 use tractive::frames::{Abc, AlphaBeta, Angle};
-use tractive::machine::BUILT_IN;
 use tractive::modulation::{CarrierPeriod, Devices, Mode, Modulator, Reference, Schedule};
+use tractive::ports::PwmPort;
 use tractive::protection::SafeState;
 use tractive::time::{Clock, Instant};
 

@@ -2,8 +2,9 @@
 #![allow(missing_docs)]
 
 use std::path::Path;
-use tractive::machine::{BUILT_IN, Tables};
-use tractive_tablegen::{Generated, MachineFolder, SmoothMap};
+use tractive::built_in::traction::BUILT_IN;
+use tractive::machine::Tables;
+use tractive_tablegen::{MachineFolder, SmoothMap, rust_source};
 
 /// The machine that is built in, in f64.
 struct Judge {
@@ -175,7 +176,7 @@ fn the_limit_is_all_the_torque_there_is() {
 
 #[test]
 fn the_built_in_tables_are_what_the_folder_gives_byte_for_byte() {
-    let text = || Generated::new(&MachineFolder::read(&folder()).unwrap()).unwrap().rust_source();
+    let text = || rust_source(&MachineFolder::read(&folder()).unwrap().tables(), "tractive_control::machine");
     let first = text();
     assert!(first == text());
     assert!(first == include_str!(concat!(env!("OUT_DIR"), "/machine_tables.rs")));

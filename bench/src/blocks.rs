@@ -3,9 +3,9 @@
 use crate::{Block, Input, Output, exact};
 use fixed::types::I16F16;
 use micromath::F32Ext;
+use tractive::built_in::traction::BUILT_IN;
 use tractive::control::{flux_linkage, mtpa};
 use tractive::frames::{self, Abc, Angle, Dq};
-use tractive::machine::BUILT_IN;
 
 /// Every block; of those with the same word before the stroke the first is ours.
 pub const ALL: [Block; 19] = [

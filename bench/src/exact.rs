@@ -2,7 +2,8 @@
 
 use crate::Input;
 use core::f64::consts::TAU;
-use tractive::machine::{BUILT_IN, Grid};
+use tractive::built_in::traction::BUILT_IN;
+use tractive::machine::Grid;
 
 /// Sine and cosine of the angle.
 pub fn sin_cos(input: &Input) -> [f64; 2] {

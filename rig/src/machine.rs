@@ -3,8 +3,8 @@
 use anyhow::{Result, bail};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
-use tractive::machine::{Curve, Grid, Mtpa, Ratings, Tables, Weakening};
-use tractive_tablegen::{Axis, Generated, MachineFolder};
+use tractive::machine::Tables;
+use tractive_tablegen::MachineFolder;
 
 /// A machine folder and the tables made from it.
 #[derive(Clone)]
@@ -24,7 +24,7 @@ impl Machine {
             return Ok(machine.clone());
         }
         let folder = MachineFolder::read(&source.folder)?;
-        let tables = Box::leak(Box::new(keep(Generated::new(&folder)?)));
+        let tables = Box::leak(Box::new(folder.tables()));
         let machine = Self { folder, tables };
         loaded().push((source, machine.clone()));
         Ok(machine)
@@ -62,64 +62,6 @@ fn find(name_or_path: &str) -> Result<PathBuf> {
     match candidates.iter().find(|path| path.is_dir()) {
         Some(path) => Ok(path.clone()),
         None => bail!("--machine {name_or_path}: must be a folder, or the name of one in tables/"),
-    }
-}
-
-/// The generated tables as the target's types; they live as long as the program.
-fn keep(made: Generated) -> Tables {
-    let ratings = &made.ratings;
-    let (rows, columns) = made.current_axes;
-    let (psi, share) = made.weakening.axes;
-    let universal =
-        Axis { first: 0.0, inverse_step: (made.universal.len() - 1) as f32, count: made.universal.len() };
-    Tables {
-        name: made.name.leak(),
-        ratings: Ratings {
-            pole_pairs: ratings.pole_pairs,
-            stator_resistance_ohm: ratings.stator_resistance_ohm,
-            max_torque_nm: ratings.max_torque_nm,
-            max_power_w: ratings.max_power_w,
-            max_current_a: ratings.max_current_a,
-            max_speed_rad_s: ratings.max_speed_rad_s,
-            magnet_flux_wb: ratings.magnet_flux_wb,
-            dc_link_min_v: ratings.dc_link_min_v,
-            dc_link_nominal_v: ratings.dc_link_nominal_v,
-            dc_link_max_v: ratings.dc_link_max_v,
-            max_switching_hz: ratings.max_switching_hz,
-            trip_current_a: ratings.trip_current_a,
-            trip_dc_over_v: ratings.trip_dc_over_v,
-            trip_dc_under_v: ratings.trip_dc_under_v,
-            trip_speed_rad_s: ratings.trip_speed_rad_s,
-            torque_slew_nm_s: ratings.torque_slew_nm_s,
-        },
-        flux: grid(made.flux, rows, columns),
-        mtpa: Mtpa {
-            universal: curve(made.universal, universal),
-            parameters: grid(made.parameters, rows, columns),
-            start: curve(made.start, made.torque_axis),
-        },
-        weakening: Weakening {
-            currents: grid(made.weakening.currents, psi, share),
-            torque: curve(made.weakening.torque, psi),
-            flux_knee_wb: made.weakening.flux_knee_wb,
-            share_knee: made.weakening.share_knee,
-        },
-    }
-}
-
-fn curve<const N: usize>(nodes: Vec<[f32; N]>, axis: Axis) -> Curve<N> {
-    Curve { first: axis.first, inverse_step: axis.inverse_step, nodes: nodes.leak() }
-}
-
-fn grid<const N: usize>(nodes: Vec<[f32; N]>, rows: Axis, columns: Axis) -> Grid<N> {
-    Grid {
-        first_row: rows.first,
-        inverse_row_step: rows.inverse_step,
-        rows: rows.count,
-        first_column: columns.first,
-        inverse_column_step: columns.inverse_step,
-        columns: columns.count,
-        nodes: nodes.leak(),
     }
 }
 

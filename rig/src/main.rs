@@ -6,7 +6,7 @@ use clap::{CommandFactory, FromArgMatches, Parser, Subcommand, ValueEnum};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
-use tractive::machine::BUILT_IN;
+use tractive::built_in::traction::BUILT_IN;
 use tractive_rig::analysis::Figures;
 use tractive_rig::campaign::{self, command::CampaignOptions};
 use tractive_rig::machine::Machine;

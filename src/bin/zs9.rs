@@ -9,18 +9,21 @@ fn main() {
     );
 }
 
+#[cfg(all(target_os = "none", not(any(feature = "qemu", feature = "board-nucleo-g474re"))))]
+compile_error!("the reference images need the feature `qemu`");
+
 #[cfg(all(target_os = "none", feature = "board-nucleo-g474re"))]
 #[path = "../firmware/zs9_nucleo_g474re.rs"]
 mod firmware;
 
-#[cfg(all(target_os = "none", not(feature = "board-nucleo-g474re")))]
+#[cfg(all(target_os = "none", feature = "qemu", not(feature = "board-nucleo-g474re")))]
 mod firmware {
     use core::sync::atomic::{AtomicU32, Ordering};
     use cortex_m_rt::{entry, exception, interrupt};
     use tractive::board::qemu::{self, CLOCK, Interrupt as interrupt};
+    use tractive::built_in::zs9::{BUILT_IN, BuiltIn};
     use tractive::drive::dual::{ControlTask, PwmTask, Settings, Shared};
     use tractive::machine::Ratings;
-    use tractive::machine::zs9::{BUILT_IN, BuiltIn};
     use tractive::operator::{self, DualSlot, Line, slot_s};
     use tractive::protocol::Zs9Station;
 

@@ -1,10 +1,11 @@
 //! Settings of the two systems.
 
-use super::{ABOVE_ZERO, Bound, ROUNDING, Refused, checked, within};
-use crate::control::{Gains, SpeedDesign, ZSourceDesign, ZSourceGains};
+use crate::control::{SpeedDesign, ZSourceDesign, ZSourceGains};
 use crate::drive::{dual, traction};
 use crate::machine::{Ratings, Tables};
 use crate::protection::LinkLimits;
+use tractive_control::checked;
+use tractive_control::configuration::{ABOVE_ZERO, Bound, ROUNDING, Refused, within};
 
 /// Largest torque that a speed error of 1 rad/s may ask for, as a multiple of the largest.
 const STIFFEST: f32 = 10.0;
@@ -12,23 +13,6 @@ const STIFFEST: f32 = 10.0;
 const MOST_CARRIERS: f32 = 8.0;
 /// What the compare units count in a carrier period, in ticks: sixteen bits hold a half of it in compare steps.
 const LONGEST_CARRIER: f32 = 4_000.0;
-
-impl Gains {
-    /// Whether they make sense.
-    ///
-    /// # Errors
-    /// The first scalar that does not.
-    pub const fn check(&self) -> Result<(), Refused> {
-        let Self { carrier, pattern_rad_s, square_damping, observer, sixth_turn_rad } = *self;
-        within(&[
-            Bound("gains.carrier", carrier, ABOVE_ZERO, 1.0),
-            Bound("gains.pattern_rad_s", pattern_rad_s, ABOVE_ZERO, 1e4),
-            Bound("gains.square_damping", square_damping, ABOVE_ZERO, 10.0),
-            Bound("gains.observer", observer, ABOVE_ZERO, 0.5),
-            Bound("gains.sixth_turn_rad", sixth_turn_rad, 0.0, 3.0),
-        ])
-    }
-}
 
 impl traction::Settings {
     /// Whether a drive may start with them and this machine.

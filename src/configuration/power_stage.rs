@@ -1,8 +1,8 @@
 //! The board's power stage, against the machine that it is to feed.
 
-use super::{Bound, Refused, within};
 use crate::board::nucleo_g474re::power_stage::PowerStage;
 use crate::machine::Ratings;
+use tractive_control::configuration::{Bound, Refused, within};
 
 /// Codes of the 12-bit converters, and those of either sign around the middle.
 const CODES: f32 = 4_095.0;

@@ -10,9 +10,9 @@ use tractive::board::nucleo_g474re::start::Plan;
 use tractive::board::nucleo_g474re::{
     self as board, CLOCK, Control, Interrupt as interrupt, OPERATOR, PRESCALER, PULSE, Pwm, RECORDER,
 };
+use tractive::built_in::traction::{BUILT_IN, BuiltIn};
 use tractive::control::Gains;
 use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
-use tractive::machine::{BUILT_IN, BuiltIn};
 use tractive::modulation::Devices;
 use tractive::time::Instant;
 

@@ -9,8 +9,8 @@ use tractive::board::nucleo_g474re::zs9::sampling::Zeros;
 use tractive::board::nucleo_g474re::zs9::stage::STAGE;
 use tractive::board::nucleo_g474re::zs9::{self as board, Control, DESK, Pwm, RECORDER, settings};
 use tractive::board::nucleo_g474re::{Interrupt as interrupt, PULSE, die, refuse};
+use tractive::built_in::zs9::{BUILT_IN, BuiltIn};
 use tractive::drive::dual::{ControlTask, PwmTask, Shared};
-use tractive::machine::zs9::{BUILT_IN, BuiltIn};
 
 static SHARED: Shared = Shared::recorded_by(&RECORDER);
 /// What the start measured, written before the interrupts are unmasked.

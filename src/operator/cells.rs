@@ -2,12 +2,12 @@
 //! permit wherever the idle loop stood.
 
 use super::{DualObservation, DualPermit, Observation, Permit, SLOT_PERIODS};
-use crate::board::MotorDemand;
 use crate::cell::{Downlink, Uplink, Words};
 use crate::control::{Demand, LinkWindow};
 use crate::drive::dual::DualReport;
 use crate::drive::{Report, trip_from_words, trip_to_words};
 use crate::modulation::Mode;
+use crate::ports::MotorDemand;
 use crate::time::{Clock, Instant};
 use core::sync::atomic::{AtomicU32, Ordering};
 

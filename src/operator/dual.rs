@@ -3,11 +3,11 @@
 
 use super::demand::wanted_nm;
 use super::{Demands, Levels, Ramp, Rates, Refusal, Seen, Settings};
-use crate::board::{DualSample, MotorDemand};
 use crate::control::Demand;
 use crate::drive::dual::{self, DualReport};
 use crate::frames::limit;
 use crate::machine::Ratings;
+use crate::ports::{DualSample, MotorDemand};
 use crate::time::Instant;
 
 /// Time in which a speed demand goes from standstill to the largest speed, in s.

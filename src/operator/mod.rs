@@ -32,8 +32,8 @@ pub use settings::{Line, Settings};
 pub use slot::OperatorPort;
 pub use status::{DualStatus, Refusal, State, Status, Switches, Told};
 
-use crate::board::Sample;
 use crate::control::{Demand, LinkWindow};
+use crate::ports::Sample;
 use crate::time::Clock;
 
 /// The PMaSynRM drive's state machine.

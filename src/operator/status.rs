@@ -1,8 +1,8 @@
 //! What the operator is told.
 
-use crate::board::MotorDemand;
 use crate::control::Demand;
 use crate::drive::{trip_from_words, trip_to_words};
+use crate::ports::MotorDemand;
 use crate::protection::Trip;
 
 macro_rules! named {

@@ -1,27 +1,48 @@
 //! Reads a machine folder, refuses what is wrong, and makes the tables that `tractive` runs on.
 //!
-//! Used by `build.rs`, which writes the tables out as Rust, and by the rig, which makes them at run time.
+//! A build script writes the tables out as Rust:
+//!
+//! ```no_run
+//! # fn main() -> Result<(), tractive_tablegen::InputError> {
+//! let out = std::env::var_os("OUT_DIR").unwrap_or_default();
+//! tractive_tablegen::build("machine", std::path::Path::new(&out).join("machine.rs"), "tractive::machine")
+//! # }
+//! ```
+//!
+//! and the firmware takes them in with `mod machine { include!(concat!(env!("OUT_DIR"), "/machine.rs")); }`. A program on a host
+//! makes them at run time, with [`MachineFolder::tables`].
 #![forbid(unsafe_code)]
 
 mod error;
-mod generated;
 mod map;
 mod optimum;
 mod parameters;
 mod rust_source;
 mod smooth;
+mod tables;
 mod weakening;
 mod weakening_tables;
 
 use std::path::Path;
 
 pub use error::InputError;
-pub use generated::{Axis, Generated, RatingsF32};
 pub use map::FluxMap;
 pub use optimum::Optimum;
 pub use parameters::Parameters;
+pub use rust_source::rust_source;
 pub use smooth::{FluxPoint, SmoothMap};
-pub use weakening_tables::WeakeningTables;
+
+/// Reads and checks the machine `folder`, writes its tables as Rust into `file`, and has cargo build them anew when the folder changes.
+/// For build scripts; `types` is as in [`rust_source`].
+///
+/// # Errors
+/// As [`MachineFolder::read`], or why the file could not be written.
+pub fn build(folder: impl AsRef<Path>, file: impl AsRef<Path>, types: &str) -> Result<(), InputError> {
+    let (folder, file) = (folder.as_ref(), file.as_ref());
+    println!("cargo:rerun-if-changed={}", folder.display());
+    let source = rust_source(&MachineFolder::read(folder)?.tables(), types);
+    std::fs::write(file, source).map_err(|error| InputError::new(file, None, error.to_string()))
+}
 
 /// A machine folder: `machine.toml` and `flux_map.csv`.
 #[derive(Clone, Debug)]

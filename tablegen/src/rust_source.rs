@@ -1,43 +1,57 @@
-//! The tables as Rust, for `include!` in the target's `machine` module.
+//! The tables as Rust, for `include!` in a module of a firmware.
 
-use crate::{Axis, Generated};
 use std::fmt::Write as _;
+use tractive_control::machine::{Curve, Grid, Tables};
 
-impl Generated {
-    /// The source of `pub static BUILT_IN: Tables`. The same tables give the same text, byte for byte; every number is
-    /// the nearest f32, printed so that it reads back as itself.
-    pub fn rust_source(&self) -> String {
-        let mut out = String::new();
-        let (rows, columns) = (&self.current_axes.0, &self.current_axes.1);
-        let (psi, share) = (&self.weakening.axes.0, &self.weakening.axes.1);
-        array(&mut out, "FLUX", &self.flux);
-        array(&mut out, "MTPA_PARAMETERS", &self.parameters);
-        array(&mut out, "MTPA_UNIVERSAL", &self.universal);
-        array(&mut out, "MTPA_START", &self.start);
-        array(&mut out, "WEAKENING_CURRENTS", &self.weakening.currents);
-        array(&mut out, "WEAKENING_TORQUE", &self.weakening.torque);
-        let universal_axis = Axis { first: 0.0, inverse_step: (self.universal.len() - 1) as f32, count: 0 };
-        // The struct's own debug form is its literal, under the target's name.
-        let ratings = format!("{:#?}", self.ratings).replacen("RatingsF32", "Ratings", 1);
-        let ratings = ratings.replace('\n', "\n    ");
-        let _ = write!(
-            out,
-            "/// The machine of the folder that was chosen at build time.\n\
-             pub static BUILT_IN: Tables = Tables {{\n    name: {:?},\n    ratings: {ratings},\n    \
-             flux: {},\n    mtpa: Mtpa {{\n        universal: {},\n        parameters: {},\n        start: {},\n    }},\n    \
-             weakening: Weakening {{\n        currents: {},\n        torque: {},\n        flux_knee_wb: {:?},\n        share_knee: {:?},\n    }},\n}};\n",
-            self.name,
-            grid("FLUX", rows, columns),
-            curve("MTPA_UNIVERSAL", &universal_axis),
-            grid("MTPA_PARAMETERS", rows, columns),
-            curve("MTPA_START", &self.torque_axis),
-            grid("WEAKENING_CURRENTS", psi, share),
-            curve("WEAKENING_TORQUE", psi),
-            self.weakening.flux_knee_wb,
-            self.weakening.share_knee,
-        );
-        out
-    }
+/// The source of a machine's tables: `pub static BUILT_IN: Tables`, and `pub struct BuiltIn`, by which the compiler knows every number of
+/// them where a task is generic over its machine. `types` is the path of tractive-control's module `machine`, for example
+/// `tractive::machine`. The same tables give the same text, byte for byte; every number is the nearest f32, printed so that it
+/// reads back as itself.
+pub fn rust_source(tables: &Tables, types: &str) -> String {
+    let Tables { name, ratings, flux, mtpa, weakening } = tables;
+    let mut out = format!("use {types}::{{Curve, Grid, Machine, Mtpa, Ratings, Tables, Weakening}};\n\n");
+    let flux = grid(&mut out, "FLUX", flux);
+    let parameters = grid(&mut out, "MTPA_PARAMETERS", &mtpa.parameters);
+    let universal = curve(&mut out, "MTPA_UNIVERSAL", &mtpa.universal);
+    let start = curve(&mut out, "MTPA_START", &mtpa.start);
+    let currents = grid(&mut out, "WEAKENING_CURRENTS", &weakening.currents);
+    let torque = curve(&mut out, "WEAKENING_TORQUE", &weakening.torque);
+    let (flux_knee_wb, share_knee) = (weakening.flux_knee_wb, weakening.share_knee);
+    // The struct's own debug form is its literal.
+    let ratings = format!("{ratings:#?}").replace('\n', "\n    ");
+    let _ = write!(
+        out,
+        "/// The tables of the machine that was chosen at build time.
+pub static BUILT_IN: Tables = Tables {{
+    name: {name:?},
+    ratings: {ratings},
+    flux: {flux},
+    mtpa: Mtpa {{
+        universal: {universal},
+        parameters: {parameters},
+        start: {start},
+    }},
+    weakening: Weakening {{
+        currents: {currents},
+        torque: {torque},
+        flux_knee_wb: {flux_knee_wb:?},
+        share_knee: {share_knee:?},
+    }},
+}};
+
+/// The machine of [`BUILT_IN`].
+#[derive(Clone, Copy, Debug)]
+pub struct BuiltIn;
+
+impl Machine for BuiltIn {{
+    #[inline(always)]
+    fn tables(self) -> &'static Tables {{
+        &BUILT_IN
+    }}
+}}
+"
+    );
+    out
 }
 
 fn array<const N: usize>(out: &mut String, name: &str, nodes: &[[f32; N]]) {
@@ -53,15 +67,24 @@ fn array<const N: usize>(out: &mut String, name: &str, nodes: &[[f32; N]]) {
     out.push_str("];\n");
 }
 
-fn curve(name: &str, axis: &Axis) -> String {
-    format!("Curve {{ first: {:?}, inverse_step: {:?}, nodes: &{name} }}", axis.first, axis.inverse_step)
+fn curve<const N: usize>(out: &mut String, name: &str, curve: &Curve<N>) -> String {
+    array(out, name, curve.nodes);
+    format!("Curve {{ first: {:?}, inverse_step: {:?}, nodes: &{name} }}", curve.first, curve.inverse_step)
 }
 
-fn grid(name: &str, rows: &Axis, columns: &Axis) -> String {
+fn grid<const N: usize>(out: &mut String, name: &str, grid: &Grid<N>) -> String {
+    array(out, name, grid.nodes);
+    let Grid { first_row, inverse_row_step, rows, first_column, inverse_column_step, columns, nodes: _ } =
+        grid;
     format!(
-        "Grid {{\n            first_row: {:?},\n            inverse_row_step: {:?},\n            rows: {},\n            \
-         first_column: {:?},\n            inverse_column_step: {:?},\n            columns: {},\n            \
-         nodes: &{name},\n        }}",
-        rows.first, rows.inverse_step, rows.count, columns.first, columns.inverse_step, columns.count
+        "Grid {{
+            first_row: {first_row:?},
+            inverse_row_step: {inverse_row_step:?},
+            rows: {rows},
+            first_column: {first_column:?},
+            inverse_column_step: {inverse_column_step:?},
+            columns: {columns},
+            nodes: &{name},
+        }}"
     )
 }

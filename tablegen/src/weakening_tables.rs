@@ -3,10 +3,11 @@
 //! The target interpolates. So that what it reads never has more flux linkage or current than it asked for, every circle is
 //! made a little narrower than its row says: by the most that interpolation beside it would exceed.
 
-use crate::generated::Axis;
+use crate::tables::{Axis, curve, grid};
 use crate::weakening::{Circle, circle};
 use crate::{MachineFolder, SmoothMap};
 use std::f64::consts::{FRAC_2_PI, TAU};
+use tractive_control::machine::Weakening;
 
 /// Rows and columns.
 const ROWS: usize = 119;
@@ -24,22 +25,6 @@ const NO_TORQUE_NM: f64 = 0.01;
 /// Samples per cell and axis at which interpolation is judged, and how often circles are made anew after it.
 const SAMPLES: usize = 8;
 const ROUNDS: usize = 6;
-
-/// What the target's `Weakening` holds.
-#[derive(Clone, Debug, PartialEq)]
-pub struct WeakeningTables {
-    /// `c` of the row axis `x = psi / (psi + c)`, in Wb.
-    pub flux_knee_wb: f32,
-    /// `c` of the column axis `x = w / (w + c)`, `w = 1 − √(1 − |T|/T_circle)`.
-    pub share_knee: f32,
-    /// Rows and columns.
-    pub axes: (Axis, Axis),
-    /// `[id, effective flux linkage]`, in A and Wb, row-major.
-    pub currents: Vec<[f32; 2]>,
-    /// `[T_circle, T_limit, dT_limit/dψ², i² above MTPA's without torque, its rise to the most torque]` over the rows, in
-    /// N·m, N·m/Wb² and A².
-    pub torque: Vec<[f32; 5]>,
-}
 
 /// Circles beside each other, in f64.
 struct Circles<'a> {
@@ -70,24 +55,28 @@ struct Row {
     nodes: Vec<(f64, f64)>,
 }
 
-impl WeakeningTables {
-    /// For a machine whose MTPA currents are known.
-    pub fn new(machine: &MachineFolder, smooth: &SmoothMap, top_flux_wb: f64, mtpa: &MtpaCurrents) -> Self {
-        let mut circles = Circles::new(machine, smooth, top_flux_wb);
-        for _ in 0..ROUNDS {
-            if !circles.narrow() {
-                break;
-            }
+/// The weakening tables of a machine whose MTPA currents are known.
+pub(crate) fn weakening_tables(
+    machine: &MachineFolder,
+    smooth: &SmoothMap,
+    top_flux_wb: f64,
+    mtpa: &MtpaCurrents,
+) -> Weakening {
+    let mut circles = Circles::new(machine, smooth, top_flux_wb);
+    for _ in 0..ROUNDS {
+        if !circles.narrow() {
+            break;
         }
-        let axis = |ends: (f64, f64), count| Axis::new(ends.0, ends.1, count);
-        let currents = circles.rows.iter().flat_map(|row| &row.nodes);
-        Self {
-            flux_knee_wb: circles.knee_wb as f32,
-            share_knee: SHARE_KNEE as f32,
-            axes: (axis(circles.ends, ROWS), axis((0.0, 1.0 / (1.0 + SHARE_KNEE)), COLUMNS)),
-            currents: currents.map(|(id, effective)| [*id as f32, *effective as f32]).collect(),
-            torque: circles.torque(mtpa),
-        }
+    }
+    let rows = Axis::new(circles.ends.0, circles.ends.1, ROWS);
+    let columns = Axis::new(0.0, 1.0 / (1.0 + SHARE_KNEE), COLUMNS);
+    let currents = circles.rows.iter().flat_map(|row| &row.nodes);
+    let currents = currents.map(|(id, effective)| [*id as f32, *effective as f32]).collect();
+    Weakening {
+        currents: grid(rows, columns, currents),
+        torque: curve(rows, circles.torque(mtpa)),
+        flux_knee_wb: circles.knee_wb as f32,
+        share_knee: SHARE_KNEE as f32,
     }
 }
 

@@ -8,7 +8,7 @@ mod common;
 use common::{Folder, good_map, good_toml};
 use proptest::prelude::*;
 use std::sync::LazyLock;
-use tractive_tablegen::Generated;
+use tractive_tablegen::rust_source;
 
 static TOML: LazyLock<String> = LazyLock::new(good_toml);
 static MAP: LazyLock<String> = LazyLock::new(good_map);
@@ -24,10 +24,10 @@ fn try_bytes(machine: &[u8], map: &[u8]) -> Result<(), TestCaseError> {
     let folder = Folder::new("", "");
     std::fs::write(folder.path().join("machine.toml"), machine)?;
     std::fs::write(folder.path().join("flux_map.csv"), map)?;
-    let refused = match folder.read().and_then(|machine| Generated::new(&machine)) {
+    let refused = match folder.read() {
         Err(error) => error.to_string(),
-        Ok(made) => {
-            let source = made.rust_source();
+        Ok(machine) => {
+            let source = rust_source(&machine.tables(), "tractive_control::machine");
             prop_assert!(!source.contains("NaN") && !source.contains("inf,") && !source.contains("inf]"));
             return Ok(());
         }

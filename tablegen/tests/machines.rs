@@ -35,20 +35,21 @@ fn check_nodes(name: &str, judge: &Judge) {
     let (tables, map) = (&judge.tables, &judge.machine.map);
     let parameters = &judge.machine.parameters;
     let positive = |node: &[f32; 2]| node.iter().all(|value| value.is_finite() && *value > 0.0);
-    assert!(tables.parameters.iter().all(positive), "{name}: nothing to divide by zero with");
+    assert!(tables.mtpa.parameters.nodes.iter().all(positive), "{name}: nothing to divide by zero with");
     let last_id = *map.id_a.last().unwrap();
-    for [id, effective] in &tables.weakening.currents {
+    for [id, effective] in tables.weakening.currents.nodes {
         assert!(f64::from(*id) < last_id + 1e-4, "{name}: id {id} beyond the map");
         assert!(f64::from(*id) > -1.0005 * parameters.max_current_a, "{name}: id {id}");
         assert!(*effective > 0.0, "{name}: nothing to divide by zero with");
     }
-    for pair in tables.weakening.torque.windows(2) {
+    for pair in tables.weakening.torque.nodes.windows(2) {
         assert!(pair[1][1] >= pair[0][1], "{name}: a wider circle allows no less");
     }
-    let (_, iq_axis) = &tables.current_axes;
-    let last_iq = f64::from(iq_axis.first) + (iq_axis.count - 1) as f64 / f64::from(iq_axis.inverse_step);
+    let flux = &tables.flux;
+    let last_iq =
+        f64::from(flux.first_column) + (flux.columns - 1) as f64 / f64::from(flux.inverse_column_step);
     assert!((last_iq - map.iq_a.last().unwrap()).abs() < 1e-3, "{name}: ends at {last_iq}");
-    assert!((20..=65).contains(&iq_axis.count), "{name}: {} columns", iq_axis.count);
+    assert!((20..=65).contains(&flux.columns), "{name}: {} columns", flux.columns);
 }
 
 const TIGHT: Bounds = Bounds { mtpa: (0.003, 5e-4), weakening: (0.003, 0.003) };

@@ -4,10 +4,11 @@
 mod common;
 
 use common::reference_folder;
-use tractive_tablegen::{Generated, MachineFolder};
+use tractive_control::machine::Tables;
+use tractive_tablegen::{MachineFolder, rust_source};
 
-fn reference() -> Generated {
-    Generated::new(&MachineFolder::read(&reference_folder()).unwrap()).unwrap()
+fn reference() -> Tables {
+    MachineFolder::read(&reference_folder()).unwrap().tables()
 }
 
 /// The numbers of one static array, in order.
@@ -21,33 +22,38 @@ fn numbers(source: &str, name: &str) -> Vec<f32> {
 
 #[test]
 fn twice_the_same() {
-    assert_eq!(reference(), reference());
-    assert!(reference().rust_source() == reference().rust_source());
+    let [first, second] = [(); 2].map(|()| rust_source(&reference(), "tractive_control::machine"));
+    assert!(first == second);
 }
 
 #[test]
 fn every_number_reads_back_as_itself() {
     let made = reference();
-    let source = made.rust_source();
-    assert_eq!(numbers(&source, "FLUX"), made.flux.as_flattened());
-    assert_eq!(numbers(&source, "MTPA_PARAMETERS"), made.parameters.as_flattened());
-    assert_eq!(numbers(&source, "MTPA_UNIVERSAL"), made.universal.as_flattened());
-    assert_eq!(numbers(&source, "MTPA_START"), made.start.as_flattened());
-    assert_eq!(numbers(&source, "WEAKENING_CURRENTS"), made.weakening.currents.as_flattened());
-    assert_eq!(numbers(&source, "WEAKENING_TORQUE"), made.weakening.torque.as_flattened());
-    let all = [made.flux.as_flattened(), made.start.as_flattened(), made.weakening.currents.as_flattened()];
+    let source = rust_source(&made, "tractive_control::machine");
+    assert_eq!(numbers(&source, "FLUX"), made.flux.nodes.as_flattened());
+    assert_eq!(numbers(&source, "MTPA_PARAMETERS"), made.mtpa.parameters.nodes.as_flattened());
+    assert_eq!(numbers(&source, "MTPA_UNIVERSAL"), made.mtpa.universal.nodes.as_flattened());
+    assert_eq!(numbers(&source, "MTPA_START"), made.mtpa.start.nodes.as_flattened());
+    assert_eq!(numbers(&source, "WEAKENING_CURRENTS"), made.weakening.currents.nodes.as_flattened());
+    assert_eq!(numbers(&source, "WEAKENING_TORQUE"), made.weakening.torque.nodes.as_flattened());
+    let all = [
+        made.flux.nodes.as_flattened(),
+        made.mtpa.start.nodes.as_flattened(),
+        made.weakening.currents.nodes.as_flattened(),
+    ];
     assert!(all.into_iter().flatten().all(|value| value.is_finite()));
 }
 
 #[test]
 fn lines_are_short_and_tables_small() {
     let made = reference();
-    let source = made.rust_source();
+    let source = rust_source(&made, "tractive_control::machine");
     let longest = source.lines().map(str::len).max().unwrap();
-    let nodes = 2 * (made.flux.len() + made.parameters.len() + made.weakening.currents.len())
-        + 5 * made.weakening.torque.len()
-        + made.universal.len()
-        + 4 * made.start.len();
+    let nodes = 2
+        * (made.flux.nodes.len() + made.mtpa.parameters.nodes.len() + made.weakening.currents.nodes.len())
+        + 5 * made.weakening.torque.nodes.len()
+        + made.mtpa.universal.nodes.len()
+        + 4 * made.mtpa.start.nodes.len();
     println!("longest line {longest}, tables {} bytes", 4 * nodes);
     assert!(longest <= 130);
     assert!(4 * nodes < 80_000);
@@ -56,9 +62,9 @@ fn lines_are_short_and_tables_small() {
 #[test]
 fn the_universal_curve_solves_its_equation() {
     // With x = s/(1+s), s = √t_en and i_dn = −s·node: t_en² = i_dn (i_dn − 1)³.
-    let made = reference();
-    assert_eq!((made.universal[0], made.universal[64]), ([0.0], [1.0]));
-    for (k, [node]) in made.universal.iter().enumerate().take(64).skip(1) {
+    let universal = reference().mtpa.universal.nodes;
+    assert_eq!((universal[0], universal[64]), ([0.0], [1.0]));
+    for (k, [node]) in universal.iter().enumerate().take(64).skip(1) {
         let x = k as f64 / 64.0;
         let s = x / (1.0 - x);
         let i_dn = -s * f64::from(*node);

@@ -6,9 +6,9 @@ use tractive::board::nucleo_g474re::operator::Operator;
 use tractive::board::nucleo_g474re::position::Encoder;
 use tractive::board::nucleo_g474re::power_stage::{AdcCode, POWER_STAGE};
 use tractive::board::nucleo_g474re::{CLOCK, Control, Pwm};
+use tractive::built_in::traction::BUILT_IN;
 use tractive::control::Gains;
 use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
-use tractive::machine::BUILT_IN;
 use tractive::operator::Permit;
 use tractive::time::Instant;
 

@@ -3,12 +3,12 @@
 use crate::bench::Bench;
 use crate::{devices, plan};
 use proptest::prelude::*;
-use tractive::board::PwmPort;
 use tractive::board::nucleo_g474re::half::reload;
 use tractive::board::nucleo_g474re::sampling::Zeros;
 use tractive::board::nucleo_g474re::{CLOCK, Pwm};
 use tractive::frames::Angle;
 use tractive::modulation::{CarrierPeriod, Mode, Modulator, Reference, Schedule};
+use tractive::ports::PwmPort;
 use tractive::protection::SafeState;
 use tractive::time::Instant;
 

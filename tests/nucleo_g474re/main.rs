@@ -12,7 +12,7 @@ mod zs9;
 use tractive::board::nucleo_g474re::CLOCK;
 use tractive::board::nucleo_g474re::power_stage::{POWER_STAGE, cycles_to_ticks, ns_to_cycles};
 use tractive::board::nucleo_g474re::start::Plan;
-use tractive::machine::BUILT_IN;
+use tractive::built_in::traction::BUILT_IN;
 use tractive::modulation::Devices;
 
 /// The carrier of the machine that is built in.

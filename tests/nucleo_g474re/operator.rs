@@ -3,16 +3,16 @@
 use crate::bench::Bench;
 use crate::plan;
 use stm32_metapac::gpio::{self, regs::Idr};
-use tractive::board::PwmPort;
 use tractive::board::nucleo_g474re::can::Can;
 use tractive::board::nucleo_g474re::pins::{Function, PINS};
 use tractive::board::nucleo_g474re::power_stage::AdcCode;
 use tractive::board::nucleo_g474re::registers::Registers;
 use tractive::board::nucleo_g474re::serve::Serve;
 use tractive::board::nucleo_g474re::{Pwm, hardware, switchgear};
-use tractive::machine::BUILT_IN;
+use tractive::built_in::traction::BUILT_IN;
 use tractive::modulation::{CarrierPeriod, Mode};
 use tractive::operator::{Configuration, Desk, Feedback, Switches};
+use tractive::ports::PwmPort;
 use tractive::protection::{Fault, SafeState};
 use tractive::protocol::Station;
 use tractive::time::Instant;

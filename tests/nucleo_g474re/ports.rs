@@ -11,11 +11,11 @@ use tractive::board::nucleo_g474re::registers::Registers;
 use tractive::board::nucleo_g474re::sampling::Zeros;
 use tractive::board::nucleo_g474re::watchdog::Pulse;
 use tractive::board::nucleo_g474re::{Control, Pwm};
-use tractive::board::{ControlPort, PwmPort};
 use tractive::control::Demand;
 use tractive::drive::Report;
 use tractive::frames::Angle;
 use tractive::operator::Permit;
+use tractive::ports::{ControlPort, PwmPort};
 use tractive::protection::{Fault, SafeState};
 use tractive::time::Instant;
 

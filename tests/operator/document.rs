@@ -1,7 +1,7 @@
 //! docs/operator.md has every state, refusal and fault that the code has, and no other.
 
 use std::path::Path;
-use tractive::machine::BUILT_IN;
+use tractive::built_in::traction::BUILT_IN;
 use tractive::operator::{Limits, Line, Refusal, State};
 use tractive::protection::Fault;
 

@@ -1,7 +1,7 @@
 //! A board, a link and a drive that do what they are told, unless a test says otherwise.
 
+use tractive::built_in::traction::BUILT_IN;
 use tractive::frames::Abc;
-use tractive::machine::BUILT_IN;
 use tractive::operator::{
     Configuration, Feedback, Input, Line, Observation, Operator, Output, Refusal, Request, Settings, State,
     Switches,

@@ -1,8 +1,8 @@
 //! Whatever may come: nothing panics, only valid frames take effect, the counters add up.
 
 use proptest::prelude::*;
+use tractive::built_in::traction::BUILT_IN;
 use tractive::cell::Words;
-use tractive::machine::BUILT_IN;
 use tractive::protocol::e2e::Counter;
 use tractive::protocol::{
     COMMAND, Command, Content, Counts, Frame, LIMITS, LINK_LIMITS, Listening, Measured, PARAMETER_REQUEST,

@@ -1,7 +1,7 @@
 //! The drive's end: requests that age, parameters, telemetry.
 
 use crate::Stream;
-use tractive::machine::BUILT_IN;
+use tractive::built_in::traction::BUILT_IN;
 use tractive::modulation::Mode;
 use tractive::operator::{Limits, Refusal, Request, State, Status, Switches};
 use tractive::protection::{Fault, SafeState, Trip};

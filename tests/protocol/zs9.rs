@@ -1,8 +1,8 @@
 //! The ZS9's end: two motors' demands, limits and measurements in the same session.
 
 use super::Stream;
+use tractive::built_in::zs9::BUILT_IN;
 use tractive::drive::dual::{DualReport, Settings};
-use tractive::machine::zs9::BUILT_IN;
 use tractive::nine_switch::Scheme;
 use tractive::operator::{DualObservation, DualRequest, DualStatus, Levels, State, Switches, Wanted};
 use tractive::protocol::{

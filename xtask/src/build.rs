@@ -13,6 +13,9 @@ use crate::setup::Toolchain;
 /// What the image runs on.
 pub const TARGET: &str = "thumbv7em-none-eabihf";
 
+/// The feature of the reference images, on the emulated board.
+pub const QEMU: &str = "qemu";
+
 /// The boards of real hardware, by their feature `board-NAME`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Board {
@@ -97,6 +100,7 @@ pub fn image(toolchain: &Toolchain, system: System, machine: Option<&OsString>) 
     let name = system.image();
     let args = ["build", "--profile", "firmware", "--target", TARGET, "--package", "tractive", "--bin", name];
     let mut command = toolchain.cargo(&args);
+    command.args(["--features", QEMU]);
     for other in System::ALL {
         command.env_remove(other.machine_variable());
     }

@@ -235,7 +235,7 @@ pub mod tests {
         for (name, at, code_words) in functions {
             add_symbol(name, elf::STT_FUNC, code, at | 1, code_words.len() as u64 * 2);
         }
-        add_symbol("tractive::machine::BUILT_IN", elf::STT_OBJECT, data, 0x8000, 48);
+        add_symbol("tractive::built_in::traction::BUILT_IN", elf::STT_OBJECT, data, 0x8000, 48);
         for (name, kind, flags) in [
             (".symtab", elf::SHT_SYMTAB, 0),
             (".strtab", elf::SHT_STRTAB, 0),

@@ -56,7 +56,7 @@ pub enum Step {
 /// The packages by the commands that test them. Cargo unites the features of what it is asked for at once: with all of them in one
 /// command the rig and this program would be compiled anew, since `cargo rig` and `cargo xtask` ask for one package.
 const TOGETHER: [&[&str]; 4] = [
-    &["tractive", "tractive-tablegen"],
+    &["tractive", "tractive-control", "tractive-tablegen"],
     &["tractive-rig"],
     &["xtask"],
     &["tractive-bench", "tractive-cells"],
@@ -120,7 +120,12 @@ fn perform(step: Step, setup: &mut Setup) -> Result<Outcome> {
             let what = ["--release", "--target", TARGET, "--package", "tractive", "--lib", "--bins"];
             let nucleo = [&what[..], &["--features", Board::NucleoG474re.feature()]].concat();
             let saboteur = [&what[..], &["--features", crate::saboteur::FEATURE]].concat();
-            lint(&mut cargo(), &what)? && lint(&mut cargo(), &nucleo)? && lint(&mut cargo(), &saboteur)?
+            let qemu = [&what[..], &["--features", build::QEMU]].concat();
+            let library = ["--release", "--target", TARGET, "--package", "tractive", "--lib"];
+            let builds = [&library[..], &qemu, &nucleo, &saboteur];
+            builds
+                .into_iter()
+                .try_fold(true, |good, what| Ok::<_, anyhow::Error>(good & lint(&mut cargo(), what)?))?
         }
         Step::Doc => {
             let boards = format!("tractive/{}", Board::NucleoG474re.feature());

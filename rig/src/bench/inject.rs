@@ -2,8 +2,8 @@
 
 use super::injected::{ControlFault, GoesWrong, Injected};
 use crate::sensor_faults::{AngleFault, AngleSpoiler, CurrentFault, CurrentSpoiler};
-use tractive::board::Sample;
 use tractive::frames::Abc;
+use tractive::ports::Sample;
 
 pub use super::injected::Injection;
 

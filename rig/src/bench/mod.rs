@@ -39,10 +39,10 @@ use crate::plant::Plant;
 use crate::trace::{Row, Switch};
 use dc_side::DcSide;
 use inject::Spoiler;
-use tractive::board::Sample;
 use tractive::drive::Report;
 use tractive::modulation::CarrierPeriod;
 use tractive::operator::{Feedback, Request, Status};
+use tractive::ports::Sample;
 use tractive::protection::SafeState;
 use tractive::time::{Clock, Instant};
 

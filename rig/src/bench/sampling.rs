@@ -2,10 +2,10 @@
 
 use super::inject::Kind;
 use super::{Bench, BenchError};
-use tractive::board::Sample;
 use tractive::control::LinkWindow;
 use tractive::drive::Report;
 use tractive::frames::Abc;
+use tractive::ports::Sample;
 use tractive::protection::LegFaults;
 use tractive::time::Instant;
 

@@ -8,7 +8,7 @@ use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
-use tractive::link::{BLOCK_BYTES, BLOCK_WORDS, Block};
+use tractive::wire::{BLOCK_BYTES, BLOCK_WORDS, Block};
 
 /// Which emulator runs which image.
 #[derive(Clone, Debug)]

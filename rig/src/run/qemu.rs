@@ -6,8 +6,8 @@ use super::{Progress, Supervisor};
 use crate::bench::Bench;
 use crate::trace::Recording;
 use anyhow::{Result, bail};
-use tractive::link::{self, Request, Setup};
 use tractive::modulation::Mode;
+use tractive::wire::{self, Request, Setup};
 
 /// Runs until the recording is complete; a supervisor commands over the protocol.
 pub fn run_in_qemu(
@@ -24,17 +24,17 @@ pub fn run_in_qemu(
             bail!("the firmware sent a request that is none: {block:?}");
         };
         match request {
-            Request::Hello => answers.control(&link::setup_to_block(setup))?,
+            Request::Hello => answers.control(&wire::setup_to_block(setup))?,
             Request::ControlSample(at) => {
                 let sample = bench.control_sample(at)?;
                 let done = bench.is_done();
-                answers.control(&link::sample_to_block(&sample, done))?;
+                answers.control(&wire::sample_to_block(&sample, done))?;
             }
             Request::ControlReport(at, report) => {
                 calls.traction(&report);
                 bench.control_report(at, report);
             }
-            Request::PwmSample(at) => answers.pwm(&link::currents_to_block(bench.pwm_sample(at)?))?,
+            Request::PwmSample(at) => answers.pwm(&wire::currents_to_block(bench.pwm_sample(at)?))?,
             Request::Play(at, half) => {
                 calls.mode = half.mode.name().to_owned();
                 calls.pwm();
@@ -48,7 +48,7 @@ pub fn run_in_qemu(
                     Some(supervisor) => super::turn(*supervisor, &mut bench, at)?,
                     None => None,
                 };
-                answers.idle(&link::asked_to_block(&asked, &feedback, frame))?;
+                answers.idle(&wire::asked_to_block(&asked, &feedback, frame))?;
             }
             Request::Tell(from, status, frame) => {
                 bench.told(from, status)?;

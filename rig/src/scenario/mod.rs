@@ -31,9 +31,9 @@ use crate::trace::Recording;
 use anyhow::{Context, Result};
 use tractive::control::{Demand, Gains};
 use tractive::drive::traction::Settings;
-use tractive::link::{LineTimes, Setup};
 use tractive::modulation::Devices;
 use tractive::operator::{Line, Request};
+use tractive::wire::{LineTimes, Setup};
 
 /// The usual lead, in s.
 const LEAD_S: f64 = 0.1;

@@ -3,8 +3,8 @@
 use crate::bench::injected::{ControlFault, GoesWrong, Injected, Injection};
 use crate::sensor_faults::{AngleFault, AngleSpoiler, CurrentFault, CurrentSpoiler};
 use std::str::FromStr;
-use tractive::board::{DualSample, MotorDemand, PowerSample};
 use tractive::frames::Abc;
+use tractive::ports::{DualSample, MotorDemand, PowerSample};
 use tractive::protection::Fault;
 
 /// What goes wrong.

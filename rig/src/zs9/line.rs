@@ -8,7 +8,7 @@ use crate::plant::zs9::{NetworkState, Zs9Plant};
 use tractive::operator::DualStatus;
 use tractive::time::Clock;
 
-pub use tractive::link::LineTimes;
+pub use tractive::wire::LineTimes;
 
 /// Time constants unless told otherwise, in s: 50 Ω and 500 Ω on both capacitors of 500 µF.
 pub const TIMES: LineTimes = LineTimes { precharge_s: 0.05, discharge_s: 0.5 };
@@ -17,7 +17,7 @@ pub const TIMES: LineTimes = LineTimes { precharge_s: 0.05, discharge_s: 0.5 };
 pub struct LineSide {
     times: LineTimes,
     /// Contactors and slots.
-    pub gear: Switchgear<(), [tractive::board::MotorDemand; 2]>,
+    pub gear: Switchgear<(), [tractive::ports::MotorDemand; 2]>,
     discharge: bool,
     status: Option<DualStatus>,
 }

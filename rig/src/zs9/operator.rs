@@ -1,6 +1,6 @@
 //! What the operator and the loads do.
 
-use tractive::board::MotorDemand;
+use tractive::ports::MotorDemand;
 
 /// Orders for one control period. Motors in the order upper, lower.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -2,8 +2,8 @@
 
 use crate::bench::Converter;
 use crate::plant::zs9::{Motor, Zs9Plant};
-use tractive::board::{GateFeedback, PowerSample};
 use tractive::frames::{Abc, Angle};
+use tractive::ports::{GateFeedback, PowerSample};
 
 /// Converters and angle sensors.
 pub struct Sensors {

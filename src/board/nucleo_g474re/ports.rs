@@ -10,11 +10,11 @@ use super::position::Position;
 use super::registers::Registers;
 use super::sampling::{Sampler, Zeros, currents_a};
 use super::start::{control_sampler, pwm_sampler};
-use crate::board::{ControlPort, PwmPort, Sample};
 use crate::control::{Demand, LinkWindow, Measurements};
 use crate::drive::Report;
 use crate::frames::{Abc, Angle};
 use crate::modulation::{CarrierPeriod, Mode};
+use crate::ports::{ControlPort, PwmPort, Sample};
 use crate::protection::{Fault, SafeState};
 use crate::time::Instant;
 

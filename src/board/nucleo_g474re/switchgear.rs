@@ -6,8 +6,8 @@
 use super::pins::{self, CHOPPER_OFF, Wire, is_high};
 use super::power_stage::CORE_HZ;
 use super::registers::Registers;
-use crate::link::LineTimes;
 use crate::operator::Switches;
+use crate::wire::LineTimes;
 use stm32_metapac::timer::vals::Ocm;
 
 /// Time constants of the line side that this board file is for: 50 ohm, 100 ohm and 6 mF.

@@ -7,13 +7,13 @@ use super::{
     CLOCK, CONTROL_TIMER, Control, OPERATED, PWM_TIMER, Pwm, enable_interrupts, exchange, read_register,
     start_timers, stop, watch, write_register,
 };
-use crate::board::{DualControlPort, DualPwmPort, DualSample, PlayedPeriod, PowerSample};
 use crate::drive::dual::{DualReport, Settings};
-use crate::link::DualSetup;
 use crate::operator::{DualDemands, DualDesk, DualRequest, DualStatus, Feedback, OperatorPort};
+use crate::ports::{DualControlPort, DualPwmPort, DualSample, PlayedPeriod, PowerSample};
 use crate::protocol::Zs9Station;
 use crate::recorder::DualRecorder;
 use crate::time::Instant;
+use crate::wire::DualSetup;
 use core::sync::atomic::Ordering;
 
 /// Between the ZS9's operator in the idle loop and its control.

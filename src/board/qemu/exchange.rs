@@ -11,16 +11,16 @@ pub use dual::{
 };
 
 use super::{RECORDER, saboteur, stop};
-use crate::board::Sample;
 use crate::cell::{Ring, Words};
 use crate::drive::Report;
 use crate::frames::Abc;
-use crate::link::{self, BLOCK_BYTES, Block, Request, Setup};
 use crate::modulation::CarrierPeriod;
 use crate::operator::{self, Feedback, Status};
+use crate::ports::Sample;
 use crate::protection::SafeState;
 use crate::protocol::Frame;
 use crate::time::Instant;
+use crate::wire::{self, BLOCK_BYTES, Block, Request, Setup};
 use core::sync::atomic::{AtomicU32, Ordering};
 use cortex_m_semihosting::syscall;
 
@@ -37,7 +37,7 @@ pub fn open() -> Setup {
     open_files();
     let mut block = Request::Hello.to_block();
     exchange(&mut block, CONTROL_ANSWERS);
-    link::setup_from_block(&block)
+    wire::setup_from_block(&block)
 }
 
 fn open_files() {
@@ -61,7 +61,7 @@ fn open_files() {
 pub fn control_sample(now: Instant) -> Sample {
     let mut block = Request::ControlSample(now).to_block();
     exchange(&mut block, CONTROL_ANSWERS);
-    let (sample, end) = link::sample_from_block(&block);
+    let (sample, end) = wire::sample_from_block(&block);
     if end {
         finish(&RECORDER, |record| Request::Recorded(record).to_block());
     }
@@ -90,7 +90,7 @@ fn finish<T: Words<N>, const N: usize, const RECORDS: usize>(
 pub fn pwm_sample(now: Instant) -> Abc {
     let mut block = Request::PwmSample(now).to_block();
     exchange(&mut block, PWM_ANSWERS);
-    link::currents_from_block(&block)
+    wire::currents_from_block(&block)
 }
 
 /// What was loaded into the shadow registers.
@@ -137,7 +137,7 @@ pub fn leave(now: Instant) {
 pub fn ask(at: Instant) -> (operator::Request, Feedback, Option<Frame>) {
     let mut block = Request::Ask(at).to_block();
     exchange(&mut block, IDLE_ANSWERS);
-    link::asked_from_block(&block)
+    wire::asked_from_block(&block)
 }
 
 /// What the operator told, and the frame that says so.

@@ -8,8 +8,8 @@
 
 use super::exchange::file::File;
 use super::{Control, DUALTIMER, Interrupt, PWM_TIMER, Pwm, TIMER0, read_register, write_register};
-use crate::link::{BLOCK_WORDS, Block};
 use crate::time::Instant;
+use crate::wire::{BLOCK_WORDS, Block};
 use core::fmt::Write;
 use core::sync::atomic::{AtomicBool, AtomicU16, AtomicU32, Ordering::Relaxed};
 use cortex_m::peripheral::NVIC;

@@ -1,7 +1,7 @@
 //! What stands in for the saboteur in every image that is not built with it: nothing.
 
 pub(super) use super::{DUALTIMER as pwm, TIMER0 as control};
-use crate::link::Block;
+use crate::wire::Block;
 
 #[inline(always)]
 pub fn connect() {}

@@ -2,7 +2,7 @@
 //! go off, whatever the tasks know. A watchdog of the board's counts from each write to that valley; its interrupt cannot be masked.
 
 use super::{PWM_TIMER, exchange, read_register, write_register};
-use crate::board::HardwareBreak;
+use crate::ports::HardwareBreak;
 use crate::protection::Fault;
 use crate::time::Instant;
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering::Relaxed};

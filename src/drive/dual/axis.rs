@@ -1,12 +1,12 @@
 //! One of the two motors in the control task: the same control law as the PMaSynRM's, with its own tables.
 
 use super::{MotorCommand, MotorShare, Settings};
-use crate::board::MotorDemand;
 use crate::control::{
     Boundary, Committed, Controller, Demand, Follows, Input, Law, Measurements, Region, SpeedInput, SpeedLoop,
 };
 use crate::frames::{AlphaBeta, Angle};
 use crate::machine::Tables;
+use crate::ports::MotorDemand;
 use crate::protection::{self, Fault, FrozenWatch, Violation};
 
 /// Natural frequency of the speed tracker, in rad/s: the speed loop's phase needs it quick.

@@ -1,12 +1,12 @@
 //! The PWM interrupt's task.
 
 use super::{DualApplied, DualCommand, MotorShare, Settings, Shared};
-use crate::board::{DualPwmPort, GateFeedback, PlayedPeriod, PowerSample};
 use crate::drive::Gates;
 use crate::drive::traction::stale;
 use crate::frames::{Angle, limit};
 use crate::machine::{Machine, Tables};
 use crate::nine_switch::{self, GateTicks, MotorVoltage, Period, Refused, Request};
+use crate::ports::{DualPwmPort, GateFeedback, PlayedPeriod, PowerSample};
 use crate::protection::{self, Disarmed, Fault, SafeState, Trip, Violation};
 use crate::time::Instant;
 use core::sync::atomic::Ordering;

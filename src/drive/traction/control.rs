@@ -3,13 +3,13 @@
 use super::applied::{Applied, Steady, nothing_committed};
 use super::glide::Glide;
 use super::{Settings, Shared};
-use crate::board::{ControlPort, Sample};
 use crate::control::{Boundary, Committed, Controller, Demand, Input, Law};
 use crate::drive::acknowledge::Acknowledge;
 use crate::drive::messages::{Gates, Report, VoltageCommand};
 use crate::frames::{AlphaBeta, Angle, Dq};
 use crate::machine::{Machine, Tables};
 use crate::modulation::{Mode, Reference};
+use crate::ports::{ControlPort, Sample};
 use crate::protection::{self, Disarmed, Fault, FrozenWatch, Trip, Violation};
 use crate::recorder::{Record, State};
 use crate::time::Instant;

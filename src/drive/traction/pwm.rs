@@ -1,11 +1,11 @@
 //! The PWM interrupt's task.
 
 use super::{Settings, Shared};
-use crate::board::PwmPort;
 use crate::drive::messages::{Committal, Gates, VoltageCommand};
 use crate::frames::{Abc, UNITS_PER_RADIAN};
 use crate::machine::{Machine, Tables};
 use crate::modulation::{Modulator, Schedule, compensated};
+use crate::ports::PwmPort;
 use crate::protection::{self, Disarmed, Fault, SafeState, Trip, Violation};
 use crate::time::{Clock, Instant};
 use core::sync::atomic::Ordering;

@@ -1,13 +1,14 @@
-//! Reads generated tables as the target does, in f32, and judges them on the smooth map.
+//! Reads the tables as the drive does and judges them on the smooth map.
 #![allow(dead_code)] // each test file uses its part
 
-use tractive_tablegen::{Axis, Generated, MachineFolder, Optimum, SmoothMap};
+use tractive_control::machine::Tables;
+use tractive_tablegen::{MachineFolder, Optimum, SmoothMap};
 
 /// A machine and its tables.
 pub struct Judge {
     pub machine: MachineFolder,
     pub map: SmoothMap,
-    pub tables: Generated,
+    pub tables: Tables,
 }
 
 /// The largest deviations found.
@@ -25,31 +26,10 @@ pub struct Worst {
     pub current_a: f64,
 }
 
-fn cell(axis: &Axis, value: f32) -> (usize, f32) {
-    let position = (value - axis.first) * axis.inverse_step;
-    let index = (position.max(0.0) as usize).min(axis.count - 2);
-    (index, position - index as f32)
-}
-
-fn mix<const N: usize>(a: [f32; N], b: [f32; N], share: f32) -> [f32; N] {
-    std::array::from_fn(|k| a[k] + (b[k] - a[k]) * share)
-}
-
-fn curve<const N: usize>(axis: &Axis, nodes: &[[f32; N]], x: f32) -> [f32; N] {
-    let (k, share) = cell(axis, x);
-    mix(nodes[k], nodes[k + 1], share)
-}
-
-fn grid<const N: usize>(axes: &(Axis, Axis), nodes: &[[f32; N]], row: f32, column: f32) -> [f32; N] {
-    let ((r, x), (c, y)) = (cell(&axes.0, row), cell(&axes.1, column));
-    let at = |dr: usize, dc: usize| nodes[(r + dr) * axes.1.count + c + dc];
-    mix(mix(at(0, 0), at(0, 1), y), mix(at(1, 0), at(1, 1), y), x)
-}
-
 impl Judge {
     pub fn new(machine: MachineFolder) -> Self {
         let map = SmoothMap::new(&machine.map);
-        let tables = Generated::new(&machine).unwrap();
+        let tables = machine.tables();
         Self { machine, map, tables }
     }
 
@@ -59,18 +39,13 @@ impl Judge {
 
     /// The target's two passes.
     pub fn two_passes(&self, torque: f32) -> [f32; 2] {
-        let tables = &self.tables;
-        let universal = Axis {
-            first: 0.0,
-            inverse_step: (tables.universal.len() - 1) as f32,
-            count: tables.universal.len(),
-        };
-        let [mut id, mut iq, id_trim, iq_trim] = curve(&tables.torque_axis, &tables.start, torque);
-        let per_flux = torque / (1.5 * tables.ratings.pole_pairs);
+        let mtpa = &self.tables.mtpa;
+        let [mut id, mut iq, id_trim, iq_trim] = mtpa.start.at(torque);
+        let per_flux = torque / (1.5 * self.tables.ratings.pole_pairs);
         for _ in 0..2 {
-            let [psi_f, saliency] = grid(&tables.current_axes, &tables.parameters, id, iq);
+            let [psi_f, saliency] = mtpa.parameters.at(id, iq);
             let s = (per_flux * saliency).sqrt() / psi_f;
-            let [share] = curve(&universal, &tables.universal, s / (1.0 + s));
+            let [share] = mtpa.universal.at(s / (1.0 + s));
             id = -(psi_f / saliency) * s * share;
             iq = per_flux / (psi_f - saliency * id);
         }
@@ -102,15 +77,13 @@ impl Judge {
     pub fn weakening(&self) -> Worst {
         let (tables, largest) = (&self.tables.weakening, self.machine.parameters.max_torque_nm);
         let factor = 1.5 * self.tables.ratings.pole_pairs;
-        let axis = &tables.axes.0;
         let mut worst = Worst::default();
-        for row in 0..=8 * (axis.count - 1) {
-            let place = axis.first + row as f32 / (8.0 * axis.inverse_step);
+        for row in 0..=8 * (tables.currents.rows - 1) {
+            let place = tables.torque.first + row as f32 / (8.0 * tables.torque.inverse_step);
             let psi = tables.flux_knee_wb * place / (1.0 - place);
-            let [circle, limit, ..] = curve(axis, &tables.torque, place);
+            let [circle, limit, ..] = tables.torque.at(place);
             // No current within the limit has as little flux linkage as a row that gives nothing.
-            let (k, _) = cell(axis, place);
-            if tables.torque[k][0] < 0.01 {
+            if tables.torque.nodes[(row / 8).min(tables.currents.rows - 2)][0] < 0.01 {
                 continue;
             }
             for step in 1..=80 {
@@ -119,8 +92,7 @@ impl Judge {
                     continue;
                 }
                 let w = 1.0 - (1.0 - torque / circle).sqrt();
-                let [id, effective] =
-                    grid(&tables.axes, &tables.currents, place, w / (w + tables.share_knee));
+                let [id, effective] = tables.currents.at(place, w / (w + tables.share_knee));
                 let iq = torque / (factor * effective);
                 if id > 0.0 {
                     continue;

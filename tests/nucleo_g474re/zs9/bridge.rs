@@ -5,10 +5,10 @@ use proptest::prelude::*;
 use tractive::board::nucleo_g474re::zs9::period::PeriodCompares;
 use tractive::board::nucleo_g474re::zs9::sampling::Zeros;
 use tractive::board::nucleo_g474re::zs9::{CYCLES_PER_TICK, HALF_CYCLES, Pwm, settings};
-use tractive::board::{DualPwmPort, PlayedPeriod};
 use tractive::drive::dual::COMPARE_STEPS;
 use tractive::frames::Angle;
 use tractive::nine_switch::{self, LegState, MotorVoltage, Request, Scheme};
+use tractive::ports::{DualPwmPort, PlayedPeriod};
 use tractive::time::Instant;
 
 const NOW: Instant = Instant(0);

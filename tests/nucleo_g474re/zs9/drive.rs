@@ -4,10 +4,10 @@ use super::bridge::Rig;
 use super::ports::{control, converted, make_ready, permitted};
 use tractive::board::nucleo_g474re::zs9::feedback::encoded;
 use tractive::board::nucleo_g474re::zs9::{CARRIER_TICKS, CLOCK, CYCLES_PER_TICK, settings};
-use tractive::board::{DualPwmPort, GateFeedback, PlayedPeriod, PowerSample};
+use tractive::built_in::zs9::BUILT_IN;
 use tractive::drive::dual::{ControlTask, PwmTask, Shared};
-use tractive::machine::zs9::BUILT_IN;
 use tractive::operator::DualDesk;
+use tractive::ports::{DualPwmPort, GateFeedback, PlayedPeriod, PowerSample};
 use tractive::time::Instant;
 
 /// The board's port, with the driver board's latches in place of the serial words, which memory cannot shift.

@@ -9,10 +9,10 @@ use tractive::board::nucleo_g474re::registers::Registers;
 use tractive::board::nucleo_g474re::zs9::sampling::Zeros;
 use tractive::board::nucleo_g474re::zs9::stage::STAGE;
 use tractive::board::nucleo_g474re::zs9::{CLOCK, Control, Pwm, start};
-use tractive::board::{DualControlPort, DualPwmPort, GateFeedback, MotorDemand};
 use tractive::control::Demand;
 use tractive::frames::Angle;
 use tractive::operator::{DualDesk, DualPermit};
+use tractive::ports::{DualControlPort, DualPwmPort, GateFeedback, MotorDemand};
 use tractive::time::Instant;
 
 const NOW: Instant = Instant(0);

@@ -16,7 +16,7 @@ use crate::elf::Image;
 use crate::process;
 
 /// Modules whose functions are the link to the rig.
-const LINK: [&str; 2] = ["tractive::board::qemu::exchange::", "tractive::link::"];
+const LINK: [&str; 2] = ["tractive::board::qemu::exchange::", "tractive::wire::"];
 /// Ends of the names of what the idle loop runs through all the time.
 const IDLE: [&str; 2] = ["main", "board::qemu::idle"];
 /// Ends the log when the emulator has.

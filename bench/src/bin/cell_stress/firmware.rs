@@ -5,8 +5,8 @@ use crate::subject::{BURST_SUBJECTS, SUBJECTS, Subject};
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering::SeqCst};
 use cortex_m_rt::{entry, exception, interrupt};
 use cortex_m_semihosting::hprintln;
-use tractive::board::ControlPort;
 use tractive::board::qemu::{self, Interrupt as interrupt};
+use tractive::ports::ControlPort;
 use tractive::time::Instant;
 
 /// Control timer's period: room for the longest control interrupt and four PWM interrupts, and a whole number of instructions (of 1.6

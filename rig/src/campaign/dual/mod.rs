@@ -26,10 +26,10 @@ use crate::zs9::trace::Row;
 use crate::zs9::{Orders, SeenMotors, command, settings};
 use anyhow::Result;
 use faults::Cause;
-use tractive::board::MotorDemand;
 use tractive::control::Demand;
 use tractive::drive::dual::Settings;
 use tractive::machine::Tables;
+use tractive::ports::MotorDemand;
 use tractive::time::Instant;
 
 const LINK_V: f64 = 667.0;

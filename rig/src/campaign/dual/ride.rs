@@ -10,8 +10,8 @@ use crate::zs9::scenario::INERTIA_KG_M2;
 use crate::zs9::trace::Row;
 use crate::zs9::{Orders, SeenMotors};
 use anyhow::Result;
-use tractive::board::MotorDemand;
 use tractive::control::Demand;
+use tractive::ports::MotorDemand;
 use tractive::protection::Trip;
 use tractive::time::Instant;
 

@@ -25,9 +25,9 @@ use crate::plant::zs9::{NetworkState, Zs9Plant};
 use crate::run::Supervised;
 use gates::Gates;
 use record::Sums;
-use tractive::board::{DualSample, GateFeedback, PlayedPeriod};
 use tractive::drive::dual::{COMPARE_STEPS, DualReport};
 use tractive::operator::{DualStatus, Feedback};
+use tractive::ports::{DualSample, GateFeedback, PlayedPeriod};
 use tractive::time::Instant;
 
 /// How long after its nominal instant the control interrupt's order to turn the gates off reaches them, in ticks (75 µs): its

@@ -3,9 +3,9 @@
 use super::{Bench, BenchError};
 use crate::steps::held;
 use crate::zs9::inject::Kind;
-use tractive::board::{DualSample, HardwareBreak, PowerSample};
 use tractive::drive::dual::DualReport;
 use tractive::frames::Abc;
+use tractive::ports::{DualSample, HardwareBreak, PowerSample};
 use tractive::time::Instant;
 
 /// How far a current's reading may be off without making a difference that counts, in A: a tenth of a machine's largest current.

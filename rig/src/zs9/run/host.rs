@@ -4,7 +4,6 @@ use crate::campaign::without::Without;
 use crate::run::{Progress, Supervised, Supervisor, turn};
 use crate::zs9::bench::Bench;
 use crate::zs9::trace::Recording;
-use tractive::board::{DualControlPort, DualPwmPort, DualSample, MotorDemand, PlayedPeriod, PowerSample};
 use tractive::drive::dual::{ControlTask, DualReport, PwmTask, Settings, Shared};
 use tractive::frames::Abc;
 use tractive::machine::{Ratings, Tables};
@@ -12,6 +11,7 @@ use tractive::nine_switch::Scheme;
 use tractive::operator::{
     self, DualDemands, DualDesk, DualRequest, DualSlot, DualStatus, Feedback, Line, OperatorPort, slot_s,
 };
+use tractive::ports::{DualControlPort, DualPwmPort, DualSample, MotorDemand, PlayedPeriod, PowerSample};
 use tractive::protection::Trip;
 use tractive::protocol::Zs9Station;
 use tractive::recorder::DualRecorder;

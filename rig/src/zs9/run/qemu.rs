@@ -5,7 +5,7 @@ use crate::zs9::bench::Bench;
 use crate::zs9::trace::Recording;
 use anyhow::{Result, bail};
 use tractive::drive::dual::DualReport;
-use tractive::link::{self, DualRequest, DualSetup};
+use tractive::wire::{self, DualRequest, DualSetup};
 
 /// Runs until the recording is complete; a supervisor commands over the protocol.
 ///
@@ -25,18 +25,18 @@ pub fn run_in_qemu(
             bail!("the firmware sent a request that is none: {block:?}");
         };
         match request {
-            DualRequest::Hello => answers.control(&link::dual_setup_to_block(setup))?,
+            DualRequest::Hello => answers.control(&wire::dual_setup_to_block(setup))?,
             DualRequest::ControlSample(at) => {
                 let sample = bench.control_sample(at)?;
                 let done = bench.is_done();
-                answers.control(&link::dual_sample_to_block(&sample, done))?;
+                answers.control(&wire::dual_sample_to_block(&sample, done))?;
             }
             DualRequest::ControlReport(at, report) => {
                 calls.mode = what(&report, bench.speeds_rpm());
                 calls.control();
                 bench.control_report(at, report);
             }
-            DualRequest::PowerSample(at) => answers.pwm(&link::power_to_block(&bench.power_sample(at)?))?,
+            DualRequest::PowerSample(at) => answers.pwm(&wire::power_to_block(&bench.power_sample(at)?))?,
             DualRequest::Play(_, next) => {
                 calls.pwm();
                 bench.play(next);
@@ -49,7 +49,7 @@ pub fn run_in_qemu(
                     Some(supervisor) => turn(*supervisor, &mut bench, at)?,
                     None => None,
                 };
-                answers.idle(&link::dual_asked_to_block(&feedback, frame))?;
+                answers.idle(&wire::dual_asked_to_block(&feedback, frame))?;
             }
             DualRequest::Tell(from, status, frame) => {
                 bench.told(from, status)?;

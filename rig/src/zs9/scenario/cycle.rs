@@ -8,8 +8,8 @@ use crate::report::Page;
 use crate::zs9::figures;
 use crate::zs9::trace::{Recording, Row};
 use crate::zs9::{Orders, SeenMotors};
-use tractive::board::MotorDemand;
 use tractive::control::Demand;
+use tractive::ports::MotorDemand;
 
 /// 10 to 1,300 r/min at full torque, a cruise there, and back.
 pub struct Cycle;

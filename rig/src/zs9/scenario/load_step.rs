@@ -8,7 +8,7 @@ use crate::rows::mean;
 use crate::zs9::figures;
 use crate::zs9::trace::{Recording, Row};
 use crate::zs9::{Orders, SeenMotors};
-use tractive::board::MotorDemand;
+use tractive::ports::MotorDemand;
 
 /// Both at 1,000 r/min with 60 N·m; motor 2's load steps at 0.6 s.
 pub struct LoadStep;

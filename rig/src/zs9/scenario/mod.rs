@@ -22,9 +22,9 @@ use crate::report::Page;
 use crate::run::{CLOCK, Emulator, Supervisor, refused};
 use anyhow::{Result, bail};
 use core::f64::consts::TAU;
-use tractive::board::MotorDemand;
-use tractive::link::DualSetup;
 use tractive::operator::Line;
+use tractive::ports::MotorDemand;
+use tractive::wire::DualSetup;
 
 pub use steady::SPEEDS_RPM as STEADY_SPEEDS_RPM;
 

@@ -8,7 +8,7 @@ use crate::rows::mean;
 use crate::zs9::figures;
 use crate::zs9::trace::{Recording, Row};
 use crate::zs9::{Orders, SeenMotors};
-use tractive::board::MotorDemand;
+use tractive::ports::MotorDemand;
 
 /// Both at 800 r/min; motor 2 goes to −800 r/min from 0.5 s to 1.5 s.
 pub struct Reverse;

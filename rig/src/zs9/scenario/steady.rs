@@ -10,8 +10,8 @@ use crate::zs9::figures;
 use crate::zs9::patterns;
 use crate::zs9::trace::Recording;
 use crate::zs9::{Orders, SeenMotors};
-use tractive::board::MotorDemand;
 use tractive::control::Demand;
+use tractive::ports::MotorDemand;
 
 /// 60 N·m each at prescribed speeds.
 pub struct Steady;

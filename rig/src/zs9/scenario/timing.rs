@@ -8,7 +8,7 @@ use crate::report::Page;
 use crate::zs9::figures;
 use crate::zs9::trace::Recording;
 use crate::zs9::{Orders, SeenMotors};
-use tractive::board::MotorDemand;
+use tractive::ports::MotorDemand;
 
 /// Full torque by the speed loops at prescribed speeds: motoring at low and at high speed, then braking from there.
 pub struct Timing;

@@ -9,7 +9,7 @@ use crate::board::nucleo_g474re::registers::Registers;
 use crate::board::nucleo_g474re::serve::DualServe;
 use crate::board::nucleo_g474re::start::StartError;
 use crate::board::nucleo_g474re::{Cycles, Interrupt, PULSE, join_bus, run_with};
-use crate::machine::zs9::BUILT_IN;
+use crate::built_in::zs9::BUILT_IN;
 use crate::operator::{self, DualDesk, DualSlot, Line, slot_s};
 use crate::protocol::{TO_ZS9, Zs9Station};
 use crate::recorder::DualRecorder;

@@ -10,7 +10,7 @@
 //!
 //! Other bits on top are a broken wire: then no gate counts as seen, which is a fault as soon as pulses are wanted.
 
-use crate::board::GateFeedback;
+use crate::ports::GateFeedback;
 use stm32_metapac::gpio::Gpio;
 use stm32_metapac::spi::{Spi, vals};
 

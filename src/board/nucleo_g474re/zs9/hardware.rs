@@ -2,10 +2,10 @@
 
 use super::bridge::BREAKING;
 use super::start::bridge;
-use crate::board::HardwareBreak;
 use crate::board::nucleo_g474re::hardware::{cause, seen_by};
 use crate::board::nucleo_g474re::pins;
 use crate::board::nucleo_g474re::registers::Registers;
+use crate::ports::HardwareBreak;
 use crate::protection::Fault;
 
 /// The comparator on the gate drivers' ready wire, a bit as [`seen_by`] has it.

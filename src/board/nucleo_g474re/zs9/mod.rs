@@ -26,11 +26,11 @@ pub use chip::*;
 pub use ports::{Control, Pwm};
 
 use super::power_stage::CORE_HZ;
+use crate::built_in::zs9::BUILT_IN;
 use crate::drive::dual::Settings;
-use crate::link::LineTimes;
 use crate::machine::Ratings;
-use crate::machine::zs9::BUILT_IN;
 use crate::time::Clock;
+use crate::wire::LineTimes;
 
 /// Cycles of the timers' clock in a tick of the drive's.
 pub const CYCLES_PER_TICK: u32 = 5;

@@ -10,9 +10,9 @@
 //! | M | below `middle_from`, or at `middle_to` or beyond | 3, 4 |
 
 use super::HALF_CYCLES;
-use crate::board::PlayedPeriod;
 use crate::drive::dual::COMPARE_STEPS;
 use crate::nine_switch::GateTicks;
+use crate::ports::PlayedPeriod;
 
 /// The compares of a leg, in cycles since the valley, 0 ..= [`HALF_CYCLES`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

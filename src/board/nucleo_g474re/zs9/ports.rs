@@ -11,11 +11,11 @@ use super::{CLOCK, hardware, pins};
 use crate::board::nucleo_g474re::outputs::SoftwareBreak;
 use crate::board::nucleo_g474re::position::Position;
 use crate::board::nucleo_g474re::registers::Registers;
-use crate::board::{DualControlPort, DualPwmPort, DualSample, PlayedPeriod, PowerSample};
 use crate::drive::dual::DualReport;
 use crate::frames::Angle;
 use crate::nine_switch::Scheme;
 use crate::operator::{DualDesk, DualPermit};
+use crate::ports::{DualControlPort, DualPwmPort, DualSample, PlayedPeriod, PowerSample};
 use crate::time::Instant;
 
 /// Where the zero vectors lie: the least harmonics in the motors' currents.

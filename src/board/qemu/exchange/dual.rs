@@ -2,12 +2,12 @@
 
 use super::{CONTROL_ANSWERS, IDLE_ANSWERS, PWM_ANSWERS, exchange, finish, open_files, send};
 use crate::board::qemu::{DUAL_RECORDER, saboteur, watch};
-use crate::board::{DualSample, PlayedPeriod, PowerSample};
 use crate::drive::dual::DualReport;
-use crate::link::{self, DualRequest, DualSetup};
 use crate::operator::{DualStatus, Feedback};
+use crate::ports::{DualSample, PlayedPeriod, PowerSample};
 use crate::protocol::Frame;
 use crate::time::Instant;
+use crate::wire::{self, DualRequest, DualSetup};
 
 /// Opens the files and fetches the set-up.
 #[inline(never)]
@@ -15,7 +15,7 @@ pub fn open_dual() -> DualSetup {
     open_files();
     let mut block = DualRequest::Hello.to_block();
     exchange(&mut block, CONTROL_ANSWERS);
-    link::dual_setup_from_block(&block)
+    wire::dual_setup_from_block(&block)
 }
 
 /// The control timer's conversions; ends the emulation when the rig says so.
@@ -23,7 +23,7 @@ pub fn open_dual() -> DualSetup {
 pub fn sample_dual(now: Instant) -> DualSample {
     let mut block = DualRequest::ControlSample(now).to_block();
     exchange(&mut block, CONTROL_ANSWERS);
-    let (sample, end) = link::dual_sample_from_block(&block);
+    let (sample, end) = wire::dual_sample_from_block(&block);
     if end {
         watch::stop();
         finish(&DUAL_RECORDER, |record| DualRequest::Recorded(record).to_block());
@@ -38,7 +38,7 @@ pub fn power_sample(now: Instant) -> PowerSample {
     let mut block = DualRequest::PowerSample(now).to_block();
     exchange(&mut block, PWM_ANSWERS);
     saboteur::complete(&mut block);
-    link::power_from_block(&block)
+    wire::power_from_block(&block)
 }
 
 /// What was loaded into the shadow registers.
@@ -71,7 +71,7 @@ pub fn leave_dual(now: Instant) {
 pub fn ask_dual(at: Instant) -> (Feedback, Option<Frame>) {
     let mut block = DualRequest::Ask(at).to_block();
     exchange(&mut block, IDLE_ANSWERS);
-    link::dual_asked_from_block(&block)
+    wire::dual_asked_from_block(&block)
 }
 
 /// What the operator told, and the frame that says so.

@@ -1,7 +1,7 @@
 //! The machine as the control task knows it: ratings, and tables made offline by `tractive-tablegen`.
 //!
-//! The target code takes `&Tables` and does not care who made them: `build.rs` writes the machine folder
-//! chosen at build time out as read-only data ([`BUILT_IN`]); the rig builds them at run time from any folder.
+//! A drive takes `&'static Tables` and does not care who made them: `tractive-tablegen` writes a machine folder out as read-only
+//! data in a build script, or makes the tables at run time.
 //!
 //! Convention: d along the magnet flux, amplitude-invariant peak values, electrical angles,
 //! `Te = 1.5 n_p (psi_d i_q − psi_q i_d)`.
@@ -98,7 +98,7 @@ pub struct Tables {
     pub weakening: Weakening,
 }
 
-/// Where a task finds its tables: behind a reference where they are made at run time; in an image in [`BuiltIn`], so that the
+/// Where a task finds its tables: behind a reference where they are made at run time; in an image behind a type without fields, so that the
 /// compiler knows every number of them.
 pub trait Machine: Copy {
     /// The tables.
@@ -110,35 +110,4 @@ impl Machine for &'static Tables {
     fn tables(self) -> &'static Tables {
         self
     }
-}
-
-/// The machine of [`BUILT_IN`].
-#[derive(Clone, Copy, Debug)]
-pub struct BuiltIn;
-
-impl Machine for BuiltIn {
-    #[inline(always)]
-    fn tables(self) -> &'static Tables {
-        &BUILT_IN
-    }
-}
-
-include!(concat!(env!("OUT_DIR"), "/machine_tables.rs"));
-
-/// The machine that drives the ZS9, both motors alike.
-pub mod zs9 {
-    use super::{Curve, Grid, Machine, Mtpa, Ratings, Tables, Weakening};
-
-    /// The machine of [`BUILT_IN`].
-    #[derive(Clone, Copy, Debug)]
-    pub struct BuiltIn;
-
-    impl Machine for BuiltIn {
-        #[inline(always)]
-        fn tables(self) -> &'static Tables {
-            &BUILT_IN
-        }
-    }
-
-    include!(concat!(env!("OUT_DIR"), "/zs9_tables.rs"));
 }

@@ -3,7 +3,7 @@
 /// Square root of a number that is not negative, correctly rounded; NaN stays NaN.
 #[cfg(target_arch = "arm")]
 #[inline(always)]
-pub fn sqrt(x: f32) -> f32 {
+pub(super) fn sqrt(x: f32) -> f32 {
     sqrtf(x)
 }
 
@@ -34,6 +34,6 @@ extern "C" fn sqrtf(x: f32) -> f32 {
 /// The same where the processor is not known: the same bits.
 #[cfg(not(target_arch = "arm"))]
 #[inline]
-pub fn sqrt(x: f32) -> f32 {
+pub(super) fn sqrt(x: f32) -> f32 {
     libm::sqrtf(x)
 }

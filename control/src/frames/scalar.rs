@@ -3,13 +3,13 @@
 /// Square root of a number that is known not to be negative, correctly rounded; NaN stays NaN.
 #[inline]
 pub fn root(x: f32) -> f32 {
-    crate::board::fpu::sqrt(x)
+    super::fpu::sqrt(x)
 }
 
 /// Square root, correctly rounded; a negative number gives zero, NaN stays NaN.
 #[inline]
 pub fn sqrt(x: f32) -> f32 {
-    if x < 0.0 { 0.0 } else { crate::board::fpu::sqrt(x) }
+    if x < 0.0 { 0.0 } else { super::fpu::sqrt(x) }
 }
 
 /// Peak phase voltage of the six-step fundamental, 2 udc/π, in V, of a link of `udc_v`.

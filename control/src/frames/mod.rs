@@ -4,10 +4,11 @@
 //! All angles are electrical. [`Angle`] is a 32-bit fraction of a turn, so it wraps by itself and loses no
 //! precision however long the drive runs.
 
-#![forbid(unsafe_code)]
+#![cfg_attr(not(target_arch = "arm"), forbid(unsafe_code))]
 
 mod angle;
 mod direction;
+mod fpu;
 mod scalar;
 mod vector;
 

@@ -3,13 +3,13 @@
 use super::{
     Block, LineTimes, block, filled, line_from_words, line_to_words, told_from_words, told_to_words,
 };
-use crate::board::{DualSample, GateFeedback, HardwareBreak, MotorDemand, PlayedPeriod, PowerSample};
 use crate::cell::Words;
 use crate::control::Demand;
 use crate::drive::dual::{DualReport, scheme_from_code};
 use crate::frames::{Abc, Angle};
 use crate::nine_switch::GateTicks;
 use crate::operator::{DualStatus, Feedback};
+use crate::ports::{DualSample, GateFeedback, HardwareBreak, MotorDemand, PlayedPeriod, PowerSample};
 use crate::protection::Fault;
 use crate::protocol::Frame;
 use crate::recorder::DualRecord;

@@ -1,17 +1,15 @@
-//! The tables, as numbers.
+//! The tables of a machine, from its flux map.
 
-use crate::weakening_tables::{MtpaCurrents, WeakeningTables};
-use crate::{FluxMap, InputError, MachineFolder, Optimum, Parameters, SmoothMap};
+use crate::weakening_tables::{MtpaCurrents, weakening_tables};
+use crate::{FluxMap, MachineFolder, Optimum, Parameters, SmoothMap};
+use tractive_control::machine::{Curve, Grid, Mtpa, Ratings, Tables};
 
-/// An even axis: first value, step, number of nodes.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Axis {
-    /// Value of the first node.
-    pub first: f32,
-    /// Nodes per unit.
-    pub inverse_step: f32,
-    /// Number of nodes.
-    pub count: usize,
+/// An even axis: first value, nodes per unit, number of nodes.
+#[derive(Clone, Copy)]
+pub(crate) struct Axis {
+    first: f32,
+    inverse_step: f32,
+    count: usize,
 }
 
 impl Axis {
@@ -20,49 +18,22 @@ impl Axis {
     }
 }
 
-/// The scalars of the target's `Ratings`, in its units; the fields mean what they mean there.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[allow(missing_docs, reason = "documented at the target's `Ratings`, field by field")]
-pub struct RatingsF32 {
-    pub pole_pairs: f32,
-    pub stator_resistance_ohm: f32,
-    pub max_torque_nm: f32,
-    pub max_power_w: f32,
-    pub max_current_a: f32,
-    pub max_speed_rad_s: f32,
-    pub magnet_flux_wb: f32,
-    pub dc_link_min_v: f32,
-    pub dc_link_nominal_v: f32,
-    pub dc_link_max_v: f32,
-    pub max_switching_hz: f32,
-    pub trip_current_a: f32,
-    pub trip_dc_over_v: f32,
-    pub trip_dc_under_v: f32,
-    pub trip_speed_rad_s: f32,
-    pub torque_slew_nm_s: f32,
+/// A table over one axis; its nodes live as long as the program.
+pub(crate) fn curve<const N: usize>(axis: Axis, nodes: Vec<[f32; N]>) -> Curve<N> {
+    Curve { first: axis.first, inverse_step: axis.inverse_step, nodes: nodes.leak() }
 }
 
-/// All tables of a machine; see the target's `machine` module for their meaning.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Generated {
-    /// Name of the machine.
-    pub name: String,
-    /// Ratings.
-    pub ratings: RatingsF32,
-    /// Axes of the flux and parameter grids: id, |iq|, in A.
-    pub current_axes: (Axis, Axis),
-    /// `[psi_d, psi_q]`, in Wb, row-major.
-    pub flux: Vec<[f32; 2]>,
-    /// `[psi_f, L_q − L_d]`, in Wb and H, row-major.
-    pub parameters: Vec<[f32; 2]>,
-    /// `−i_dn/s` over `s/(1+s)`.
-    pub universal: Vec<[f32; 1]>,
-    /// Axis of `start`: |T|, in N·m.
-    pub torque_axis: Axis,
-    /// `[id, iq, id trim, iq trim]`, in A.
-    pub start: Vec<[f32; 4]>,
-    /// Field weakening.
-    pub weakening: WeakeningTables,
+/// A table over two axes, row-major; its nodes live as long as the program.
+pub(crate) fn grid<const N: usize>(rows: Axis, columns: Axis, nodes: Vec<[f32; N]>) -> Grid<N> {
+    Grid {
+        first_row: rows.first,
+        inverse_row_step: rows.inverse_step,
+        rows: rows.count,
+        first_column: columns.first,
+        inverse_column_step: columns.inverse_step,
+        columns: columns.count,
+        nodes: nodes.leak(),
+    }
 }
 
 /// Nodes of the universal curve.
@@ -74,51 +45,71 @@ const TORQUE_ROOM: f64 = 1.06;
 /// Least magnet flux and saliency of the MTPA parameters, as shares of flux and inductance at full torque.
 const REGULAR_SHARE: f64 = 0.02;
 
-impl Generated {
-    /// Makes the tables.
-    ///
-    /// # Errors
-    /// None that [`MachineFolder::read`] has not refused already; kept for maps whose optimum cannot be tabulated.
-    pub fn new(machine: &MachineFolder) -> Result<Self, InputError> {
-        let MachineFolder { parameters, map } = machine;
+impl MachineFolder {
+    /// The tables that a drive runs on; they live as long as the program.
+    pub fn tables(&self) -> Tables {
+        let Self { parameters, map } = self;
         let smooth = SmoothMap::new(map);
         let optimum = Optimum::new(&smooth, parameters);
-        let grid = CurrentGrid::new(map);
+        let currents = CurrentGrid::new(map);
         let top = optimum.least_current(parameters.max_torque_nm);
         let top_flux = smooth.at(top.0, top.1);
+        let top_flux_wb = top_flux.psi_d_wb.hypot(top_flux.psi_q_wb);
         let regular = Regular {
-            psi_f_wb: REGULAR_SHARE * top_flux.psi_d_wb.hypot(top_flux.psi_q_wb),
+            psi_f_wb: REGULAR_SHARE * top_flux_wb,
             saliency_h: REGULAR_SHARE * top_flux.psi_q_wb.abs() / top.1.abs().max(1e-9),
         };
-        let mtpa = ParameterGrid::new(&grid, &smooth, &regular);
+        let parameter_grid = ParameterGrid::new(&currents, &smooth, &regular);
         let universal = universal();
-        let factor = 1.5 * f64::from(parameters.pole_pairs);
-        let last_torque = (TORQUE_ROOM * parameters.max_torque_nm).min(optimum.most_torque_nm());
-        let best: Vec<_> = (0..TORQUE_NODES)
-            .map(|k| last_torque * k as f64 / (TORQUE_NODES - 1) as f64)
-            .map(|torque| (torque, optimum.least_current(torque)))
-            .collect();
-        let start = best.iter().map(|(torque, best)| {
-            let passed = mtpa.two_passes(torque / factor, *best, &universal);
-            [best.0, best.1, best.0 - passed.0, best.1 - passed.1].map(|value| value as f32)
-        });
-        let start = start.collect();
-        let currents = MtpaCurrents {
-            last_torque_nm: last_torque,
-            currents_a: best.iter().map(|(_, current)| *current).collect(),
+        let best = BestCurrents::new(&optimum, parameters);
+        let start = best.start(&parameter_grid, &universal, 1.5 * f64::from(parameters.pole_pairs));
+        let (rows, columns) = (axis_of(&currents.id_a), axis_of(&currents.iq_a));
+        let nodes = |(psi, saliency): &(f64, f64)| [*psi as f32, *saliency as f32];
+        let parameter_nodes = parameter_grid.nodes.iter().map(nodes).collect();
+        let universal_nodes = universal.iter().map(|value| [*value as f32]).collect();
+        let mtpa = Mtpa {
+            universal: curve(Axis::new(0.0, 1.0, UNIVERSAL_NODES), universal_nodes),
+            parameters: grid(rows, columns, parameter_nodes),
+            start: curve(Axis::new(0.0, best.last_torque_nm(), TORQUE_NODES), start),
         };
-        let top_flux_wb = top_flux.psi_d_wb.hypot(top_flux.psi_q_wb);
-        Ok(Self {
-            name: parameters.name.clone(),
+        Tables {
+            name: parameters.name.clone().leak(),
             ratings: ratings(parameters, smooth.at(0.0, 0.0).psi_d_wb),
-            current_axes: (axis_of(&grid.id_a), axis_of(&grid.iq_a)),
-            flux: grid.flux(&smooth),
-            parameters: mtpa.nodes.iter().map(|(psi, saliency)| [*psi as f32, *saliency as f32]).collect(),
-            universal: universal.iter().map(|value| [*value as f32]).collect(),
-            torque_axis: Axis::new(0.0, last_torque, TORQUE_NODES),
-            start,
-            weakening: WeakeningTables::new(machine, &smooth, top_flux_wb, &currents),
-        })
+            flux: grid(rows, columns, currents.flux(&smooth)),
+            mtpa,
+            weakening: weakening_tables(self, &smooth, top_flux_wb, &best.currents()),
+        }
+    }
+}
+
+/// The currents of least magnitude over torque: (torque in N·m, (id, iq) in A).
+struct BestCurrents(Vec<(f64, (f64, f64))>);
+
+impl BestCurrents {
+    fn new(optimum: &Optimum, parameters: &Parameters) -> Self {
+        let last_torque = (TORQUE_ROOM * parameters.max_torque_nm).min(optimum.most_torque_nm());
+        let torques = (0..TORQUE_NODES).map(|k| last_torque * k as f64 / (TORQUE_NODES - 1) as f64);
+        Self(torques.map(|torque| (torque, optimum.least_current(torque))).collect())
+    }
+
+    fn last_torque_nm(&self) -> f64 {
+        self.0[TORQUE_NODES - 1].0
+    }
+
+    /// `[id, iq, id trim, iq trim]`, in A: where the first pass begins, and what the second one leaves.
+    fn start(&self, grid: &ParameterGrid, universal: &[f64], factor: f64) -> Vec<[f32; 4]> {
+        let node = |(torque, best): &(f64, (f64, f64))| {
+            let passed = grid.two_passes(torque / factor, *best, universal);
+            [best.0, best.1, best.0 - passed.0, best.1 - passed.1].map(|value| value as f32)
+        };
+        self.0.iter().map(node).collect()
+    }
+
+    fn currents(&self) -> MtpaCurrents {
+        MtpaCurrents {
+            last_torque_nm: self.last_torque_nm(),
+            currents_a: self.0.iter().map(|(_, current)| *current).collect(),
+        }
     }
 }
 
@@ -265,9 +256,9 @@ fn universal() -> Vec<f64> {
         .collect()
 }
 
-fn ratings(parameters: &Parameters, magnet_flux_wb: f64) -> RatingsF32 {
+fn ratings(parameters: &Parameters, magnet_flux_wb: f64) -> Ratings {
     let rad_s = std::f64::consts::TAU / 60.0;
-    RatingsF32 {
+    Ratings {
         pole_pairs: parameters.pole_pairs as f32,
         stator_resistance_ohm: parameters.stator_resistance_ohm as f32,
         max_torque_nm: parameters.max_torque_nm as f32,

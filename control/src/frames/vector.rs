@@ -137,7 +137,7 @@ impl Dq {
     /// Length.
     #[inline]
     pub fn length(self) -> f32 {
-        crate::board::fpu::sqrt(self.squared())
+        super::fpu::sqrt(self.squared())
     }
 
     /// Turned by the angle of a direction.

@@ -8,13 +8,13 @@
 
 mod dual;
 
-use crate::board::Sample;
 use crate::cell::Words;
 use crate::control::{Demand, LinkWindow, Measurements};
 use crate::drive::{Report, half_from_words, half_to_words};
 use crate::frames::{Abc, Angle};
 use crate::modulation::CarrierPeriod;
 use crate::operator::{self, Feedback, Status, Told};
+use crate::ports::Sample;
 use crate::protection::{Fault, SafeState};
 use crate::protocol::Frame;
 use crate::recorder::Record;

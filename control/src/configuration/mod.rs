@@ -1,0 +1,103 @@
+//! The checks of a configuration at start-up: whatever made it, a drive does not start with a scalar that makes no sense.
+//!
+//! Each `check` takes its structure apart whole, so that a new field does not compile before it is checked. First every scalar by
+//! itself, then how they stand to each other; the first that is wrong is told by its name. What passes divides nothing by zero. The
+//! checks are constant functions: what an image holds as constants its compiler checks.
+
+#![forbid(unsafe_code)]
+
+mod gains;
+mod machine;
+
+use crate::modulation::Devices;
+use crate::time::Clock;
+
+/// A scalar that makes no sense, and what is allowed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Refused {
+    /// The scalar, by its path in the configuration.
+    pub name: &'static str,
+    /// What it is.
+    pub value: f32,
+    /// The least that is allowed.
+    pub least: f32,
+    /// The most that is allowed.
+    pub most: f32,
+}
+
+impl core::fmt::Display for Refused {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        write!(f, "{}: {}: must be from {} to {}", self.name, self.value, self.least, self.most)
+    }
+}
+
+/// The least number that counts as above 0.
+pub const ABOVE_ZERO: f32 = 1e-9;
+/// What rounding may make of a relation, as a share.
+pub const ROUNDING: f32 = 1e-3;
+
+/// A scalar by its name, its value, and the least and the most that it may be.
+pub struct Bound(pub &'static str, pub f32, pub f32, pub f32);
+
+/// The first scalar out of its bounds. What is not a number is out of any.
+pub const fn within(bounds: &[Bound]) -> Result<(), Refused> {
+    let mut rest = bounds;
+    while let [Bound(name, value, least, most), others @ ..] = rest {
+        if !(*least <= *value && *value <= *most) {
+            return Err(Refused { name, value: *value, least: *least, most: *most });
+        }
+        rest = others;
+    }
+    Ok(())
+}
+
+/// Leaves a constant function with what a check has refused: `?`, which such a function has not.
+#[macro_export]
+macro_rules! checked {
+    ($check:expr) => {
+        if let Err(refused) = $check {
+            return Err(refused);
+        }
+    };
+}
+use checked;
+
+impl Clock {
+    /// Whether a drive can run on it.
+    ///
+    /// # Errors
+    /// The first scalar that makes no sense.
+    pub const fn check(&self) -> Result<(), Refused> {
+        let Self { tick_s, ticks_per_s, control_ticks, control_s } = *self;
+        let period_s = control_ticks as f32 / ticks_per_s;
+        within(&[
+            Bound("clock.ticks_per_s", ticks_per_s, 1e5, 1e9),
+            Bound("clock.tick_s", tick_s, (1.0 - ROUNDING) / ticks_per_s, (1.0 + ROUNDING) / ticks_per_s),
+            // From 100 kHz to 1 kHz.
+            Bound("clock.control_ticks", control_ticks as f32, 1e-5 * ticks_per_s, 1e-3 * ticks_per_s),
+            Bound("clock.control_s", control_s, (1.0 - ROUNDING) * period_s, (1.0 + ROUNDING) * period_s),
+        ])
+    }
+}
+
+impl Devices {
+    /// Whether they suit a clock.
+    ///
+    /// # Errors
+    /// The first scalar that makes no sense.
+    pub const fn check(&self, clock: &Clock) -> Result<(), Refused> {
+        let Self { min_pulse_ticks, dead_time_ticks, shortest_half_ticks } = *self;
+        let half = shortest_half_ticks as f32;
+        within(&[
+            // From two control periods, each of which has a command of its own, to a carrier of 50 Hz.
+            Bound(
+                "devices.shortest_half_ticks",
+                half,
+                2.0 * clock.control_ticks as f32,
+                0.01 * clock.ticks_per_s + 1.0,
+            ),
+            Bound("devices.min_pulse_ticks", min_pulse_ticks as f32, 0.0, 0.5 * half),
+            Bound("devices.dead_time_ticks", dead_time_ticks as f32, 0.0, 0.25 * half),
+        ])
+    }
+}

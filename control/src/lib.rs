@@ -1,0 +1,28 @@
+//! `tractive-control`: the arithmetic of a traction drive, for use by itself.
+//!
+//! * [`control`] decides which voltage: MTPA on saturated flux maps, field weakening, a current loop in flux linkage.
+//! * [`modulation`] decides which pulses of a two-level inverter: asynchronous, synchronous, middle-60° and square wave.
+//! * [`nine_switch`] decides which pulses of the inverter that feeds two motors.
+//! * [`machine`] holds the types of the tables made offline, [`frames`] angles and vectors, [`time`](mod@time) instants,
+//!   [`configuration`] the checks before a start.
+//!
+//! Control and modulation never know each other; all know [`frames`], [`time`](mod@time) and [`machine`], which know nobody.
+//! Interrupts, cells between them, protection and boards are `tractive`'s.
+//!
+//! # Conventions
+//! * Pure steps: `step(&input, &mut state) -> output`; no clock, no peripheral, no global inside.
+//! * SI units, with the unit in the name where a type does not say it (`udc_v`, `period_ticks`).
+//! * d along the magnet flux, L_d < L_q; amplitude-invariant transforms, peak values, electrical angles and speeds.
+//!   Motoring forward: i_d < 0, i_q > 0.
+//! * f32 only; no heap; nothing panics, locks, or loops without a bound.
+#![no_std]
+#![cfg_attr(not(target_arch = "arm"), forbid(unsafe_code))]
+#![cfg_attr(target_arch = "arm", deny(unsafe_code))]
+
+pub mod configuration;
+pub mod control;
+pub mod frames;
+pub mod machine;
+pub mod modulation;
+pub mod nine_switch;
+pub mod time;
