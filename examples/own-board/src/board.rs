@@ -1,0 +1,126 @@
+//! The board: registers on the one side, the library's ports on the other. The addresses are placeholders for your chip's.
+
+use tractive::control::{Demand, LinkWindow, Measurements};
+use tractive::drive::Report;
+use tractive::frames::{Abc, Angle};
+use tractive::modulation::CarrierPeriod;
+use tractive::ports::{ControlPort, PwmPort, Sample};
+use tractive::protection::SafeState;
+use tractive::time::{Clock, Instant};
+
+/// 21 MHz ticks; control at 10 kHz.
+pub const CLOCK: Clock = Clock::new(21_000_000, 2_100);
+/// The switches' shortest pulse, 3 µs.
+pub const MIN_PULSE_TICKS: u32 = 63;
+
+/// Amperes per converter code, and the code of no current.
+const AMPERE_PER_CODE: f32 = 0.05;
+const ZERO_CODE: i32 = 2_048;
+/// Volts of the DC link per converter code.
+const VOLT_PER_CODE: f32 = 0.2;
+/// Counts of the encoder's turn, electrical.
+const COUNTS: u32 = 4_096;
+
+/// Data registers of the converters, the encoder's count, three compare registers, the gates' enable.
+const CONVERTERS: *const u32 = 0x4001_2000 as *const u32;
+const ENCODER: *const u32 = 0x4000_0824 as *const u32;
+const COMPARES: *mut u32 = 0x4001_0034 as *mut u32;
+const RELOAD: *mut u32 = 0x4001_002C as *mut u32;
+const STATUS: *mut u32 = 0x4001_0010 as *mut u32;
+const GATES: *mut u32 = 0x4001_0044 as *mut u32;
+const PEND: *mut u32 = 0xE000_E200 as *mut u32;
+const CONTROL_STATUS: *mut u32 = 0x4000_0010 as *mut u32;
+
+fn read(register: *const u32) -> u32 {
+    // SAFETY: one of the addresses above, which the chip maps to a register that may be read at any time.
+    unsafe { register.read_volatile() }
+}
+
+fn write(register: *mut u32, value: u32) {
+    // SAFETY: one of the addresses above, which the chip maps to a register that may be written at any time.
+    unsafe { register.write_volatile(value) }
+}
+
+/// The phase currents that a converter holds, in A.
+fn currents_a(converter: usize) -> Abc {
+    let phase = |channel: usize| {
+        let code = read(CONVERTERS.wrapping_add(8 * converter + channel)) as i32;
+        (code - ZERO_CODE) as f32 * AMPERE_PER_CODE
+    };
+    Abc { a: phase(0), b: phase(1), c: phase(2) }
+}
+
+/// Turns the gates off.
+pub fn gates_off() {
+    write(GATES, 0);
+}
+
+/// Clears the control timer's flag.
+pub fn acknowledge_control() {
+    write(CONTROL_STATUS, 0);
+}
+
+/// Makes the PWM interrupt pending.
+pub fn pend_pwm() {
+    write(PEND, 1 << 25);
+}
+
+/// Clears the PWM timer's flag; whether it was set, so that a boundary has come.
+pub fn acknowledge_boundary() -> bool {
+    let came = read(STATUS) & 1 != 0;
+    write(STATUS, 0);
+    came
+}
+
+/// Clocks, pins, converters and timers, in the order that your chip asks for, gates off.
+pub fn start() {
+    gates_off();
+}
+
+/// The board as both tasks see it.
+pub struct Board;
+
+impl ControlPort for Board {
+    fn sample(&mut self, _now: Instant) -> Sample {
+        let count = read(ENCODER) % COUNTS;
+        Sample {
+            measured: Measurements {
+                currents_a: currents_a(0),
+                udc_v: read(CONVERTERS.wrapping_add(3)) as f32 * VOLT_PER_CODE,
+                angle: Angle(count * (u32::MAX / COUNTS + 1)),
+            },
+            demand: Demand { torque_nm: 0.0, slew_limited: true },
+            enable: true,
+            window: LinkWindow::OPEN,
+            acknowledge: 0,
+            hardware: None,
+        }
+    }
+
+    fn enter(&mut self, _safe: SafeState, _now: Instant) {
+        gates_off();
+    }
+
+    fn overrun_ticks(&mut self, _now: Instant) -> u32 {
+        0
+    }
+
+    fn report(&mut self, _now: Instant, _report: &Report) {}
+}
+
+impl PwmPort for Board {
+    fn sample(&mut self, _now: Instant) -> Abc {
+        currents_a(1)
+    }
+
+    fn play(&mut self, _now: Instant, next: &CarrierPeriod) {
+        write(RELOAD, next.period_ticks);
+        for (leg, ticks) in next.compare_ticks.iter().enumerate() {
+            write(COMPARES.wrapping_add(leg), *ticks);
+        }
+    }
+
+    fn enter(&mut self, _safe: SafeState, _now: Instant) {
+        gates_off();
+    }
+}

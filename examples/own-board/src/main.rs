@@ -1,0 +1,89 @@
+//! A firmware with a board of its own: what a user of the library writes. Two interrupts, their vector table, a board that implements
+//! the two ports, and the tables of the machine in `machine/`.
+//!
+//! The registers in [`board`] are an example's: pulses go to three compare registers, samples come from the converters' data
+//! registers. Put your chip's in their place; everything else stays.
+#![no_std]
+#![no_main]
+
+mod board;
+mod vectors;
+
+/// The machine's tables, made by the build script.
+mod machine {
+    include!(concat!(env!("OUT_DIR"), "/machine.rs"));
+}
+
+use board::{Board, CLOCK, MIN_PULSE_TICKS};
+use core::cell::UnsafeCell;
+use machine::{BUILT_IN, BuiltIn};
+use tractive::control::Gains;
+use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
+use tractive::modulation::Devices;
+use tractive::time::Instant;
+
+/// Both tasks' settings: the clock, the switches' limits, the current loop's gains.
+const SETTINGS: Settings = Settings {
+    clock: CLOCK,
+    devices: Devices::new(MIN_PULSE_TICKS, 0, BUILT_IN.ratings.max_switching_hz, &CLOCK),
+    gains: Gains::DEFAULT,
+};
+
+/// The tables and the settings are refused by name when this does not compile.
+const _: () = assert!(SETTINGS.check(&BUILT_IN).is_ok());
+
+static SHARED: Shared = Shared::new();
+
+/// A value that one interrupt alone uses.
+struct Own<T>(UnsafeCell<T>);
+
+// SAFETY: each is touched by the one interrupt that names it, which does not preempt itself.
+unsafe impl<T> Sync for Own<T> {}
+
+static CONTROL: Own<ControlTask<BuiltIn>> =
+    Own(UnsafeCell::new(ControlTask::new(BuiltIn, SETTINGS, Instant(CLOCK.control_ticks))));
+static PWM: Own<PwmTask<BuiltIn>> = Own(UnsafeCell::new(PwmTask::new(
+    BuiltIn,
+    SETTINGS,
+    Instant(SETTINGS.devices.shortest_half_ticks),
+)));
+
+#[cortex_m_rt::entry]
+fn main() -> ! {
+    board::start();
+    loop {
+        core::hint::spin_loop();
+    }
+}
+
+/// The control timer's interrupt, of low priority.
+#[unsafe(no_mangle)]
+extern "C" fn TIM2() {
+    // SAFETY: this interrupt alone uses it.
+    let task = unsafe { &mut *CONTROL.0.get() };
+    board::acknowledge_control();
+    if task.wants_revision() {
+        board::pend_pwm();
+    }
+    task.run(&mut Board, &SHARED);
+}
+
+/// The PWM timer's interrupt, of high priority: at each carrier boundary, and when control asks for a revision.
+#[unsafe(no_mangle)]
+extern "C" fn TIM1_UP() {
+    // SAFETY: this interrupt alone uses it.
+    let task = unsafe { &mut *PWM.0.get() };
+    if board::acknowledge_boundary() {
+        task.run(&mut Board, &SHARED);
+    } else {
+        task.revise(&mut Board, &SHARED);
+    }
+}
+
+#[panic_handler]
+fn panic(_info: &core::panic::PanicInfo) -> ! {
+    board::gates_off();
+    loop {
+        core::hint::spin_loop();
+    }
+}
