@@ -90,7 +90,7 @@ impl Bench {
             gpiod: at_memory!(pac::gpio::Gpio),
             legs,
             tim20: at_memory!(pac::timer::TimAdv),
-            tim16: at_memory!(pac::timer::Tim1chCmp),
+            tim17: at_memory!(pac::timer::Tim1chCmp),
             tim2: at_memory!(pac::timer::TimGp32),
             tim3: at_memory!(pac::timer::TimGp16),
             tim4: at_memory!(pac::timer::TimGp16),
@@ -105,9 +105,15 @@ impl Bench {
             dac4: at_memory!(pac::dac::Dac),
             iwdg: at_memory!(pac::iwdg::Iwdg),
         };
-        // Pins are analog after a reset.
-        for port in [registers.gpioa, registers.gpiob, registers.gpioc, registers.gpiod] {
-            port.moder().write_value(pac::gpio::regs::Moder(u32::MAX));
+        // Pins are analog after a reset, but for the debug port's (RM0440, GPIOx_MODER and GPIOx_PUPDR).
+        for (port, mode, pulls) in [
+            (registers.gpioa, 0xABFF_FFFF, 0x6400_0000),
+            (registers.gpiob, 0xFFFF_FEBF, 0x0000_0100),
+            (registers.gpioc, u32::MAX, 0),
+            (registers.gpiod, u32::MAX, 0),
+        ] {
+            port.moder().write_value(pac::gpio::regs::Moder(mode));
+            port.pupdr().write_value(pac::gpio::regs::Pupdr(pulls));
         }
         Self {
             registers,

@@ -104,7 +104,7 @@ pub(super) fn join_bus<T>(
     found
 }
 
-/// Does not start: the reset has left every gate's pin floating and every interrupt masked, and so they stay.
+/// Does not start: the reset has left every output's pin floating and every interrupt masked, and so they stay.
 pub fn refuse(refused: &Refused) -> ! {
     let Refused { name, value, least, most } = refused;
     defmt::error!("no start: {=str} = {=f32}, must be from {=f32} to {=f32}", name, value, least, most);
@@ -170,10 +170,11 @@ pub fn idle() -> ! {
     }
 }
 
-/// Gates off for good, whatever state the program is in, then nothing more; the watchdog resets the chip if it runs.
+/// All outputs off for good, whatever state the program is in, then nothing more; the watchdog resets the chip if it runs.
 pub fn die() -> ! {
-    // All timers that may have gates, of whichever drive.
-    zs9::start::bridge(&Registers::CHIP).outputs().trip();
+    // Of whichever drive.
+    start::switch_off(&Registers::CHIP, &pins::PINS);
+    start::switch_off(&Registers::CHIP, &zs9::pins::PINS);
     loop {
         cortex_m::asm::nop();
     }

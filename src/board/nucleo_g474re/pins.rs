@@ -83,7 +83,7 @@ pub const PINS: [Pin; 27] = [
     pin(Port::C, 8, Function::Switch, &[], "precharge relay, high closes"),
     pin(Port::C, 9, Function::Switch, &[], "main contactor, high closes"),
     pin(Port::C, 11, Function::Switch, &[], "discharge resistor, high switches it on"),
-    pin(Port::B, 4, Function::Gate(1), &["TIM16_CH1"], "braking chopper, high conducts"),
+    pin(Port::B, 9, Function::Gate(1), &["TIM17_CH1"], "braking chopper, high conducts"),
     pin(Port::C, 4, Function::Input, &[], "precharge relay's auxiliary contact, high: closed"),
     pin(Port::C, 5, Function::Input, &[], "main contactor's auxiliary contact, high: closed"),
     pin(Port::A, 11, Function::Bus(9), &["FDCAN1_RX"], "CAN transceiver, RXD"),
@@ -178,6 +178,16 @@ pub fn configure_bus(registers: &Registers, pins: &[Pin]) {
 /// after a reset: each gate driver needs a pull-down of its own.
 pub fn configure_gates(registers: &Registers, pins: &[Pin]) {
     pins.iter().filter(|pin| pin.is_gate()).for_each(|pin| configure(registers, pin));
+}
+
+/// Takes the switches' pins from software for good: inputs with pull-down, as the external pull-downs have them after a reset, so that
+/// nothing that is commanded later reaches what they switch.
+pub fn release_switches(registers: &Registers, pins: &[Pin]) {
+    for pin in pins.iter().filter(|pin| pin.function == Function::Switch) {
+        let (port, number) = (pin.port.of(registers), usize::from(pin.number));
+        port.pupdr().modify(|w| w.set_pupdr(number, Pupdr::PULL_DOWN));
+        port.moder().modify(|w| w.set_moder(number, Moder::INPUT));
+    }
 }
 
 /// Whether the enable input is high.

@@ -3,11 +3,12 @@
 use super::comparators;
 use super::control_timer::ControlTimer;
 use super::half;
+use super::pins::{self, Pin};
 use super::position::Encoder;
 use super::power_stage::{POWER_STAGE, PowerStage};
 use super::registers::Registers;
 use super::sampling::{self, Sampler, Zeros};
-use super::{CLOCK, PRESCALER, clock, pins, switchgear, watchdog};
+use super::{CLOCK, PRESCALER, clock, switchgear, watchdog, zs9};
 
 /// Waiting for the hardware: on the chip a loop with a bound, in a test the hardware's turn.
 pub trait Wait {
@@ -21,7 +22,7 @@ pub trait Wait {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Timeout;
 
-/// Why the board did not start. The gates are off and stay off.
+/// Why the board did not start. All outputs are off and stay off.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(target_os = "none", derive(defmt::Format))]
 pub enum StartError {
@@ -94,7 +95,11 @@ pub type Step = fn(&mut Start) -> Result<(), StartError>;
 
 /// The steps in their order. The PWM timers are locked into their safe configuration before any gate pin is theirs,
 /// and break inputs and comparators watch before that; nothing counts until [`run`].
-pub const STEPS: [(&str, Step); 12] = [
+pub const STEPS: [(&str, Step); 13] = [
+    ("dead-battery pull-downs", |start| {
+        clock::release_dead_battery(start.registers, start.wait);
+        Ok(())
+    }),
     ("reset cause", |start| watchdog::refuse_after_bite(start.registers)),
     ("clock tree", |start| clock::configure(start.registers, start.wait)),
     ("peripheral clocks", |start| {
@@ -133,13 +138,19 @@ pub const STEPS: [(&str, Step); 12] = [
     ("watchdog", |start| watchdog::start(start.registers, start.wait)),
 ];
 
-/// All steps.
+/// All steps; after one that fails all outputs are off for good.
 pub fn prepare(registers: &Registers, wait: &mut dyn Wait, plan: Plan) -> Result<Found, StartError> {
     let mut start = Start { registers, wait, stage: &POWER_STAGE, plan, found: Found::default() };
-    for (_, step) in STEPS {
-        step(&mut start)?;
-    }
-    Ok(start.found)
+    let done = STEPS.iter().try_for_each(|(_, step)| step(&mut start));
+    done.inspect_err(|_| switch_off(registers, &pins::PINS)).and(Ok(start.found))
+}
+
+/// Switches off for good, until the next reset, whatever is commanded: all gates, the chopper, and what these pins switch.
+pub fn switch_off(registers: &Registers, pins: &[Pin]) {
+    // All timers that may have gates, of whichever drive.
+    zs9::start::bridge(registers).outputs().trip();
+    switchgear::stop_chopper(registers);
+    pins::release_switches(registers, pins);
 }
 
 /// Both timers count from this instant on; from their next updates on the converters follow them. Everything must be

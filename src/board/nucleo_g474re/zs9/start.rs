@@ -9,7 +9,7 @@ use super::{CLOCK, CYCLES_PER_TICK, pins};
 use crate::board::nucleo_g474re::comparators::{self, Watch};
 use crate::board::nucleo_g474re::position::Encoder;
 use crate::board::nucleo_g474re::registers::Registers;
-use crate::board::nucleo_g474re::start::{StartError, Wait};
+use crate::board::nucleo_g474re::start::{StartError, Wait, switch_off};
 use crate::board::nucleo_g474re::{clock, pins as all_pins, watchdog};
 use stm32_metapac::comp::vals::Inm;
 
@@ -42,7 +42,11 @@ pub type Step = fn(&mut Start) -> Result<(), StartError>;
 
 /// The steps in their order. The PWM timers are locked into their safe configuration before any gate pin is theirs,
 /// and break inputs and comparators watch before that; nothing counts until [`run`].
-pub const STEPS: [(&str, Step); 11] = [
+pub const STEPS: [(&str, Step); 12] = [
+    ("dead-battery pull-downs", |start| {
+        clock::release_dead_battery(start.registers, start.wait);
+        Ok(())
+    }),
     ("reset cause", |start| watchdog::refuse_after_bite(start.registers)),
     ("clock tree", |start| clock::configure(start.registers, start.wait)),
     ("peripheral clocks", |start| {
@@ -89,13 +93,11 @@ pub const STEPS: [(&str, Step); 11] = [
     ("watchdog", |start| watchdog::start(start.registers, start.wait)),
 ];
 
-/// All steps; gives the zeros of the current sensors.
+/// All steps; gives the zeros of the current sensors. After one that fails all outputs are off for good.
 pub fn prepare(registers: &Registers, wait: &mut dyn Wait) -> Result<Zeros, StartError> {
     let mut start = Start { registers, wait, stage: &STAGE, zeros: Zeros::default() };
-    for (_, step) in STEPS {
-        step(&mut start)?;
-    }
-    Ok(start.zeros)
+    let done = STEPS.iter().try_for_each(|(_, step)| step(&mut start));
+    done.inspect_err(|_| switch_off(registers, &pins::PINS)).and(Ok(start.zeros))
 }
 
 /// All timers count from this instant on, a valley; from their next beat on the converters follow them. Everything must be
