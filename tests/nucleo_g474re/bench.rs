@@ -11,6 +11,28 @@ fn block() -> *mut () {
     Box::leak(vec![0_u32; 0x100].into_boxed_slice()).as_mut_ptr().cast()
 }
 
+/// The control timer's update, TIM3's or, with the ZS9, TIM2's: its TRGO captures the count of an encoder timer whose channel 3 is mapped on
+/// TRC and enabled, and whose TS selects that timer. Internal triggers by the reference manual: 0, 1, 2, 3 are TIM1, TIM2, TIM3,
+/// TIM4 for each of TIM3 and TIM4, its own number left out.
+pub fn control_update(registers: &Registers) {
+    use pac::timer::vals::{CcmrInputCcs, Mms, Sms};
+    let Registers { tim2, tim3, tim4, .. } = *registers;
+    let (number, master) =
+        if tim2.dier().read().uie() { (2, tim2.cr2().read()) } else { (3, tim3.cr2().read()) };
+    if master.mms() != Mms::UPDATE {
+        return;
+    }
+    for (timer, own) in [(tim3, 3), (tim4, 4)] {
+        let (slave, input) = (timer.smcr().read(), timer.ccmr_input(1).read());
+        let selected = own != number && slave.ts().to_bits() == number - 1;
+        let maps = input.ccs(0) == CcmrInputCcs::TRC && timer.ccer().read().cce(2);
+        if selected && maps && slave.sms() == Sms::ENCODER_MODE_3 && timer.cr1().read().cen() {
+            let count = timer.cnt().read().cnt();
+            timer.ccr(2).write(|w| w.set_ccr(count));
+        }
+    }
+}
+
 macro_rules! at_memory {
     ($kind:ty) => {
         // SAFETY: a block is aligned, larger than every peripheral used here, never freed, and only this thread has it.

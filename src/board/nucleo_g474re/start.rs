@@ -4,7 +4,7 @@ use super::comparators;
 use super::control_timer::ControlTimer;
 use super::half;
 use super::pins::{self, Pin};
-use super::position::Encoder;
+use super::position::{Encoder, TIM4_BY_TIM3};
 use super::power_stage::{POWER_STAGE, PowerStage};
 use super::registers::Registers;
 use super::sampling::{self, Sampler, Zeros};
@@ -117,7 +117,7 @@ pub const STEPS: [(&str, Step); 13] = [
     ("PWM timers", configure_legs),
     ("control timer and encoder", |start| {
         ControlTimer(start.registers.tim3).configure(PRESCALER, CLOCK.control_ticks);
-        Encoder::configure(start.registers.tim4, start.stage);
+        Encoder::configure(start.registers.tim4, start.stage, TIM4_BY_TIM3);
         Ok(())
     }),
     ("switchgear", |start| {

@@ -91,6 +91,7 @@ fn the_control_timer_keeps_step_with_the_carrier() {
     let slave = control.smcr().read();
     assert_eq!((slave.ts(), slave.sms()), (timer::vals::Ts::ITR0, timer::vals::Sms::TRIGGER_MODE));
     assert!(control.dier().read().uie());
+    assert_eq!(control.cr2().read().mms(), timer::vals::Mms::UPDATE, "it captures the encoders");
 }
 
 #[test]

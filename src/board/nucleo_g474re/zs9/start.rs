@@ -7,7 +7,7 @@ use super::sampling::{Samplers, Zeros};
 use super::stage::{STAGE, Zs9Stage};
 use super::{CLOCK, CYCLES_PER_TICK, pins};
 use crate::board::nucleo_g474re::comparators::{self, Watch};
-use crate::board::nucleo_g474re::position::Encoder;
+use crate::board::nucleo_g474re::position::{BY_TIM2, Encoder};
 use crate::board::nucleo_g474re::registers::Registers;
 use crate::board::nucleo_g474re::start::{StartError, Wait, switch_off};
 use crate::board::nucleo_g474re::{clock, pins as all_pins, watchdog};
@@ -70,8 +70,8 @@ pub const STEPS: [(&str, Step); 12] = [
     ("control timer, encoders, gate feedback", |start| {
         let Registers { tim2, tim3, tim4, .. } = *start.registers;
         ControlTimer(tim2).configure(CYCLES_PER_TICK as u16, CLOCK.control_ticks);
-        Encoder::configure(tim4, &start.stage.common);
-        Encoder::configure(tim3, &start.stage.common);
+        Encoder::configure(tim4, &start.stage.common, BY_TIM2);
+        Encoder::configure(tim3, &start.stage.common, BY_TIM2);
         feedback(start.registers).configure();
         Ok(())
     }),
