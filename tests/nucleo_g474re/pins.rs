@@ -6,6 +6,7 @@ use std::path::Path;
 use stm32_metapac::gpio::vals::Moder;
 use stm32_metapac::metadata::METADATA;
 use tractive::board::nucleo_g474re::pins::{Function, PINS, Pin, Port};
+use tractive::board::nucleo_g474re::sampling::{CONTROL, PWM};
 use tractive::board::nucleo_g474re::zs9;
 
 /// The wiring of each drive, with its page.
@@ -78,6 +79,29 @@ fn what_switches_something_on_when_high_floats_from_reset_on() {
         for pin in pins.iter().filter(|pin| matches!(pin.function, Function::Gate(_) | Function::Switch)) {
             let reason = NOT_FLOATING.iter().find(|(taken, _)| *taken == name(pin));
             assert_eq!(reason, None, "{}", pin.purpose);
+        }
+    }
+}
+
+/// Two converters that sample one pin at a time disturb each other.
+#[test]
+fn no_pin_belongs_to_two_converters() {
+    for pin in TABLES.iter().flat_map(|(_, pins)| *pins) {
+        let converters = pin.signals.iter().filter(|signal| signal.starts_with("ADC")).count();
+        assert!(converters <= 1, "{} {:?}", name(pin), pin.signals);
+    }
+}
+
+#[test]
+fn the_sequences_convert_what_the_table_says() {
+    let purposes = ["current of U", "current of V", "current of W", "DC-link voltage"];
+    for (converter, sequence, wanted) in [("ADC1", CONTROL, 4), ("ADC2", PWM, 3)] {
+        let converted = sequence.channels.iter().take(sequence.count.into()).skip(sequence.rejected);
+        assert_eq!(converted.len(), wanted);
+        for (channel, purpose) in converted.zip(purposes) {
+            let signal = format!("{converter}_IN{channel}");
+            let pin = PINS.iter().find(|pin| pin.signals.contains(&signal.as_str())).unwrap();
+            assert!(pin.purpose.starts_with(purpose), "{signal}: {}", pin.purpose);
         }
     }
 }

@@ -9,6 +9,7 @@ use tractive::board::nucleo_g474re::position::{Encoder, Position};
 use tractive::board::nucleo_g474re::power_stage::{AdcCode, POWER_STAGE};
 use tractive::board::nucleo_g474re::registers::Registers;
 use tractive::board::nucleo_g474re::sampling::Zeros;
+use tractive::board::nucleo_g474re::start::{self, Wait};
 use tractive::board::nucleo_g474re::watchdog::Pulse;
 use tractive::board::nucleo_g474re::{Control, Pwm};
 use tractive::board::{ControlPort, PwmPort};
@@ -77,7 +78,7 @@ fn a_sample_has_currents_link_voltage_and_angle_in_si_units() {
     let operator = Operator::new();
     let mut control =
         Control::new(registers, ZEROS, Encoder::new(registers.tim4, &POWER_STAGE, 4), &operator);
-    (bench.codes[2], bench.codes[7], bench.codes[14], bench.codes[6]) =
+    (bench.codes[2], bench.codes[15], bench.codes[5], bench.codes[6]) =
         (2_048 + 512, 2_050 - 256, 2_040 - 256, 2_457);
     bench.finish_sequence(registers.adc1);
     pass_index(&mut control, &registers);
@@ -116,6 +117,37 @@ fn the_gates_wait_for_the_index_the_enable_input_and_quiet_break_inputs() {
         bench.finish_sequence(registers.adc1);
         assert!(!control.sample(NOW).enable);
     }
+}
+
+/// Square wave below 83 Hz has more than 1 ms between two carrier boundaries.
+#[test]
+fn a_late_conversion_is_thrown_away() {
+    let mut bench = Bench::started(plan());
+    let registers = bench.registers;
+    let mut pwm = Pwm::new(registers, [AdcCode(2_048); 3]);
+    (bench.codes[4], bench.codes[7], bench.codes[14]) = (2_048 + 512, 2_048 - 256, 2_048 - 256);
+    for wait_us in [500, 1_500, 2_200] {
+        bench.microseconds(wait_us);
+        bench.finish_sequence(registers.adc2);
+        let currents = pwm.sample(NOW);
+        assert_eq!((currents.a, currents.b, currents.c), (125.0, -62.5, -62.5), "after {wait_us} µs");
+    }
+}
+
+#[test]
+fn the_first_samples_are_right_however_long_the_start_takes() {
+    let mut bench = Bench::new();
+    let registers = bench.registers;
+    start::prepare(&registers, &mut bench, plan()).unwrap();
+    bench.microseconds(50_000);
+    start::run(&registers, &mut bench);
+    bench.microseconds(100);
+    bench.finish_sequence(registers.adc1);
+    let operator = Operator::new();
+    let encoder = Encoder::new(registers.tim4, &POWER_STAGE, 4);
+    let currents =
+        Control::new(registers, [AdcCode(2_048); 3], encoder, &operator).sample(NOW).measured.currents_a;
+    assert_eq!((currents.a, currents.b, currents.c), (0.0, 0.0, 0.0));
 }
 
 #[test]
@@ -198,12 +230,13 @@ fn the_idle_loop_hears_what_control_did() {
 
 /// An encoder whose index is at count 0, turning by `step` counts a control period from `from` on.
 fn turn(encoder: &mut Encoder, registers: &Registers, from: i32, step: i32, periods: i32, slip: i32) {
-    let mut before = from;
+    let (mut before, mut right) = (from, false);
     for period in 1..=periods {
         let now = from + period * step;
         let passed = now.div_euclid(4_096) != before.div_euclid(4_096);
         // The index sets the count right, whatever was lost until then.
-        let count = now.rem_euclid(4_096) + if passed || period * step.abs() > 4_096 { 0 } else { slip };
+        right |= passed;
+        let count = now.rem_euclid(4_096) + if right { 0 } else { slip };
         registers.tim4.cnt().write(|w| w.set_cnt(count.rem_euclid(4_096) as u16));
         control_update(registers);
         registers.tim4.sr().write(|w| w.set_idxif(passed));

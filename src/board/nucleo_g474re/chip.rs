@@ -119,7 +119,7 @@ pub fn run() {
 }
 
 /// Lets both interrupts come and starts their timers. Call it once.
-pub(super) fn run_with(pwm: Interrupt, control: Interrupt, start: fn(&Registers)) {
+pub(super) fn run_with(pwm: Interrupt, control: Interrupt, start: fn(&Registers, &mut dyn Wait)) {
     // SAFETY: the only use of the core peripherals, before any interrupt is unmasked.
     let mut core = unsafe { cortex_m::Peripherals::steal() };
     // SAFETY: priorities are changed while both interrupts are masked; no code relies on a priority ceiling. After that
@@ -130,7 +130,7 @@ pub(super) fn run_with(pwm: Interrupt, control: Interrupt, start: fn(&Registers)
         NVIC::unmask(pwm);
         NVIC::unmask(control);
     }
-    start(&Registers::CHIP);
+    start(&Registers::CHIP, &mut Cycles);
     defmt::info!("running");
 }
 

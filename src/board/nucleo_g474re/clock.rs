@@ -4,6 +4,10 @@ use super::registers::Registers;
 use super::start::{StartError, Wait};
 use stm32_metapac::{flash, rcc};
 
+/// PWR_CR2.PLS of the supply below which the gates go off, some 2.9 V: the highest one. Comparators and converters have the supply as
+/// their reference.
+const SUPPLY_THRESHOLD: u8 = 6;
+
 /// Takes USB's dead-battery pull-downs of 5.1 kΩ off PB4 and PB6. They are there from reset on, switched by PA9 and PA10, all of
 /// which have other uses here (RM0440, PWR_CR3.UCPD1_DBDIS). The power controller is clocked from here on.
 pub fn release_dead_battery(registers: &Registers, wait: &mut dyn Wait) {
@@ -17,6 +21,10 @@ pub fn release_dead_battery(registers: &Registers, wait: &mut dyn Wait) {
 /// security system breaks the PWM timers in hardware.
 pub fn configure(registers: &Registers, wait: &mut dyn Wait) -> Result<(), StartError> {
     let Registers { rcc, pwr, flash, .. } = *registers;
+    pwr.cr2().modify(|w| {
+        w.set_pls(SUPPLY_THRESHOLD);
+        w.set_pvde(true);
+    });
     // Boost: range 1 without it ends at 150 MHz. The bit's name says normal mode.
     pwr.cr5().modify(|w| w.set_r1mode(false));
     flash.acr().modify(|w| {
@@ -51,9 +59,9 @@ pub fn configure(registers: &Registers, wait: &mut dyn Wait) -> Result<(), Start
 }
 
 /// Clocks of the peripherals; timers and processor stop together under a debugger, and stopped PWM and chopper timers have their
-/// outputs off. The watchdog goes on: it resets a halted chip, which opens the contactors too. A locked-up processor or a bad
-/// memory word breaks the timers.
-pub fn enable_peripherals(registers: &Registers) {
+/// outputs off. The watchdog goes on: it resets a halted chip, which opens the contactors too. A locked-up processor, a bad
+/// memory word or a low supply breaks the timers.
+pub fn enable_peripherals(registers: &Registers, wait: &mut dyn Wait) {
     let Registers { rcc, syscfg, dbgmcu, .. } = *registers;
     rcc.ahb2enr().modify(|w| {
         w.set_gpioaen(true);
@@ -78,6 +86,7 @@ pub fn enable_peripherals(registers: &Registers) {
         w.set_tim17en(true);
         w.set_tim20en(true);
     });
+    wait.microseconds(1);
     dbgmcu.apb2fzr().modify(|w| {
         w.set_tim1(true);
         w.set_tim8(true);
@@ -91,5 +100,6 @@ pub fn enable_peripherals(registers: &Registers) {
     syscfg.cfgr2().modify(|w| {
         w.set_cll(true);
         w.set_eccl(true);
+        w.set_pvdl(true);
     });
 }

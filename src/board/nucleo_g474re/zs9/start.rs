@@ -9,7 +9,7 @@ use super::{CLOCK, CYCLES_PER_TICK, pins};
 use crate::board::nucleo_g474re::comparators::{self, Watch};
 use crate::board::nucleo_g474re::position::{BY_TIM2, Encoder};
 use crate::board::nucleo_g474re::registers::Registers;
-use crate::board::nucleo_g474re::start::{StartError, Wait, switch_off};
+use crate::board::nucleo_g474re::start::{StartError, Wait, settle_breaks, switch_off};
 use crate::board::nucleo_g474re::{clock, pins as all_pins, watchdog};
 use stm32_metapac::comp::vals::Inm;
 
@@ -47,12 +47,13 @@ pub const STEPS: [(&str, Step); 12] = [
         clock::release_dead_battery(start.registers, start.wait);
         Ok(())
     }),
-    ("reset cause", |start| watchdog::refuse_after_bite(start.registers)),
     ("clock tree", |start| clock::configure(start.registers, start.wait)),
     ("peripheral clocks", |start| {
-        clock::enable_peripherals(start.registers);
+        clock::enable_peripherals(start.registers, start.wait);
         Ok(())
     }),
+    // Not earlier: what is refused is told over the bus, which needs the crystal and its pins.
+    ("reset cause", |start| watchdog::refuse_after_bite(start.registers)),
     ("inputs", |start| {
         all_pins::configure_inputs(start.registers, &pins::PINS);
         Ok(())
@@ -84,11 +85,8 @@ pub const STEPS: [(&str, Step); 12] = [
         Ok(())
     }),
     ("break inputs", |start| {
-        let outputs = bridge(start.registers).outputs();
-        outputs.forget_breaks();
-        start.wait.microseconds(10);
-        // A flag whose cause is still there cannot be cleared.
-        if outputs.is_tripped() { Err(StartError::BreakInput) } else { Ok(()) }
+        settle_breaks(&bridge(start.registers).outputs(), start.wait);
+        Ok(())
     }),
     ("watchdog", |start| watchdog::start(start.registers, start.wait)),
 ];
@@ -102,9 +100,11 @@ pub fn prepare(registers: &Registers, wait: &mut dyn Wait) -> Result<Zeros, Star
 
 /// All timers count from this instant on, a valley; from their next beat on the converters follow them. Everything must be
 /// prepared, and the interrupts be ready.
-pub fn run(registers: &Registers) {
+pub fn run(registers: &Registers, wait: &mut dyn Wait) {
+    let samplers = Samplers::new(registers);
+    samplers.refresh(wait);
     bridge(registers).start();
-    Samplers::new(registers).follow_timer();
+    samplers.follow_timer();
 }
 
 /// The nine gates' timers.
