@@ -13,7 +13,7 @@ use crate::control::{Demand, LinkWindow, Measurements};
 use crate::drive::{Report, half_from_words, half_to_words};
 use crate::frames::{Abc, Angle};
 use crate::modulation::CarrierPeriod;
-use crate::operator::{self, Feedback, Status, Told};
+use crate::operator::{self, Feedback, LineTimes, Status, Told};
 use crate::ports::Sample;
 use crate::protection::{Fault, SafeState};
 use crate::protocol::Frame;
@@ -47,15 +47,6 @@ pub struct Setup {
     pub over_protocol: bool,
     /// Whether nothing compensates the dead time.
     pub uncompensated: bool,
-}
-
-/// Time constants of the line side.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LineTimes {
-    /// Of precharge resistor and link capacitor, in s.
-    pub precharge_s: f32,
-    /// Of discharge resistor and link capacitor, in s.
-    pub discharge_s: f32,
 }
 
 /// From the firmware to the rig.

@@ -99,6 +99,27 @@ impl Wait for Never {
     fn microseconds(&mut self, _us: u32) {}
 }
 
+/// A wait that looks at the controller's clock and its CCCR.
+struct Watching<'a>(&'a Bench, bool);
+
+impl Wait for Watching<'_> {
+    fn until(&mut self, done: &mut dyn FnMut() -> bool) -> Result<(), Timeout> {
+        Once.until(done)
+    }
+
+    fn microseconds(&mut self, _us: u32) {
+        self.1 |= self.0.rcc.apb1enr1().read().fdcanen() && self.0.read(CCCR) == 0;
+    }
+}
+
+#[test]
+fn the_controllers_clock_has_come_before_it_is_written_to() {
+    let bench = Bench::new();
+    let mut wait = Watching(&bench, false);
+    bench.can.configure(&TO_DRIVE, &bench.rcc, &mut wait).unwrap();
+    assert!(wait.1);
+}
+
 #[test]
 fn the_bit_timing_comes_out_exactly() {
     assert_eq!(CLOCK_HZ % (TIMING.prescaler * TIMING.quanta()), 0);

@@ -28,7 +28,7 @@ pub use demand::{Demands, TorqueDemand};
 pub use dual::{DualDemands, DualObservation, DualPermit, DualRequest, MotorLimits, MotorRequest, Wanted};
 pub use ramp::{Ramp, Rates};
 pub use request::{Configuration, Feedback, Levels, Limits, Observation, Request, Seen};
-pub use settings::{Line, Settings};
+pub use settings::{Line, LineTimes, Settings};
 pub use slot::OperatorPort;
 pub use status::{DualStatus, Refusal, State, Status, Switches, Told};
 

@@ -2,6 +2,15 @@
 
 use crate::machine::Ratings;
 
+/// Time constants of the line side.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LineTimes {
+    /// Of precharge resistor and link capacitor, in s.
+    pub precharge_s: f32,
+    /// Of discharge resistor and link capacitor, in s.
+    pub discharge_s: f32,
+}
+
 /// The line side: what stands between the source and the link.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Line {

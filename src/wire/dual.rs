@@ -1,14 +1,12 @@
 //! The ZS9's blocks: the same three streams and the same tags, other contents.
 
-use super::{
-    Block, LineTimes, block, filled, line_from_words, line_to_words, told_from_words, told_to_words,
-};
+use super::{Block, block, filled, line_from_words, line_to_words, told_from_words, told_to_words};
 use crate::cell::Words;
 use crate::control::Demand;
 use crate::drive::dual::{DualReport, scheme_from_code};
 use crate::frames::{Abc, Angle};
 use crate::nine_switch::GateTicks;
-use crate::operator::{DualStatus, Feedback};
+use crate::operator::{DualStatus, Feedback, LineTimes};
 use crate::ports::{DualSample, GateFeedback, HardwareBreak, MotorDemand, PlayedPeriod, PowerSample};
 use crate::protection::Fault;
 use crate::protocol::Frame;

@@ -1,6 +1,7 @@
 //! Register blocks in ordinary memory, and as much of the hardware behind them as the board relies on: preload, update events,
 //! the combined PWM modes, the dead-time generator, the main output, breaks. After the reference manual, not the board.
 
+use std::cell::Cell;
 use stm32_metapac as pac;
 use tractive::board::nucleo_g474re::legs::Legs;
 use tractive::board::nucleo_g474re::registers::Registers;
@@ -9,6 +10,28 @@ use tractive::board::nucleo_g474re::start::{Timeout, Wait};
 /// A block of registers that is never freed, so that handles to it stay good.
 fn block() -> *mut () {
     Box::leak(vec![0_u32; 0x100].into_boxed_slice()).as_mut_ptr().cast()
+}
+
+/// The control timer's update, TIM3's or, with the ZS9, TIM2's: its TRGO captures the count of an encoder timer whose channel 3 is mapped on
+/// TRC and enabled, and whose TS selects that timer. Internal triggers by the reference manual: 0, 1, 2, 3 are TIM1, TIM2, TIM3,
+/// TIM4 for each of TIM3 and TIM4, its own number left out.
+pub fn control_update(registers: &Registers) {
+    use pac::timer::vals::{CcmrInputCcs, Mms, Sms};
+    let Registers { tim2, tim3, tim4, .. } = *registers;
+    let (number, master) =
+        if tim2.dier().read().uie() { (2, tim2.cr2().read()) } else { (3, tim3.cr2().read()) };
+    if master.mms() != Mms::UPDATE {
+        return;
+    }
+    for (timer, own) in [(tim3, 3), (tim4, 4)] {
+        let (slave, input) = (timer.smcr().read(), timer.ccmr_input(1).read());
+        let selected = own != number && slave.ts().to_bits() == number - 1;
+        let maps = input.ccs(0) == CcmrInputCcs::TRC && timer.ccer().read().cce(2);
+        if selected && maps && slave.sms() == Sms::ENCODER_MODE_3 && timer.cr1().read().cen() {
+            let count = timer.cnt().read().cnt();
+            timer.ccr(2).write(|w| w.set_ccr(count));
+        }
+    }
 }
 
 macro_rules! at_memory {
@@ -71,6 +94,12 @@ pub struct Bench {
     count: [u32; 2],
     /// The timers play a two-level inverter; otherwise the bench leaves them alone but for their break inputs.
     pub two_level: bool,
+    /// Time, in ns: ticks of the timers, and waits.
+    pub time_ns: u64,
+    /// Instant at which the break inputs become quiet, in ns.
+    pub quiet_from_ns: Option<u64>,
+    /// Instant of the last conversion of ADC1, ADC2, ADC3, in ns.
+    converted_ns: [Cell<u64>; 3],
     /// Called at each wait.
     pub watch: fn(&Registers),
 }
@@ -90,7 +119,7 @@ impl Bench {
             gpiod: at_memory!(pac::gpio::Gpio),
             legs,
             tim20: at_memory!(pac::timer::TimAdv),
-            tim16: at_memory!(pac::timer::Tim1chCmp),
+            tim17: at_memory!(pac::timer::Tim1chCmp),
             tim2: at_memory!(pac::timer::TimGp32),
             tim3: at_memory!(pac::timer::TimGp16),
             tim4: at_memory!(pac::timer::TimGp16),
@@ -105,9 +134,15 @@ impl Bench {
             dac4: at_memory!(pac::dac::Dac),
             iwdg: at_memory!(pac::iwdg::Iwdg),
         };
-        // Pins are analog after a reset.
-        for port in [registers.gpioa, registers.gpiob, registers.gpioc, registers.gpiod] {
-            port.moder().write_value(pac::gpio::regs::Moder(u32::MAX));
+        // Pins are analog after a reset, but for the debug port's (RM0440, GPIOx_MODER and GPIOx_PUPDR).
+        for (port, mode, pulls) in [
+            (registers.gpioa, 0xABFF_FFFF, 0x6400_0000),
+            (registers.gpiob, 0xFFFF_FEBF, 0x0000_0100),
+            (registers.gpioc, u32::MAX, 0),
+            (registers.gpiod, u32::MAX, 0),
+        ] {
+            port.moder().write_value(pac::gpio::regs::Moder(mode));
+            port.pupdr().write_value(pac::gpio::regs::Pupdr(pulls));
         }
         Self {
             registers,
@@ -120,6 +155,9 @@ impl Bench {
             shadows: [Shadow::default(); 2],
             count: [0; 2],
             two_level: true,
+            time_ns: 0,
+            quiet_from_ns: None,
+            converted_ns: Default::default(),
             watch: |_| (),
         }
     }
@@ -135,7 +173,7 @@ impl Bench {
         let mut bench = Self::new();
         let registers = bench.registers;
         start::prepare(&registers, &mut bench, plan).unwrap();
-        start::run(&registers);
+        start::run(&registers, &mut bench);
         bench.settle();
         bench
     }
@@ -203,6 +241,7 @@ impl Bench {
     pub fn tick(&mut self) -> bool {
         self.settle();
         self.now += 1;
+        self.time_ns += 47;
         let mut updated = false;
         // TIM8 first: what TIM1 resets has not counted in the same tick.
         for (index, timer) in self.timers().into_iter().enumerate().rev() {
@@ -329,8 +368,12 @@ impl Wait for Bench {
         if done() { Ok(()) } else { Err(Timeout) }
     }
 
-    fn microseconds(&mut self, _us: u32) {
+    fn microseconds(&mut self, us: u32) {
         (self.watch)(&self.registers);
+        self.time_ns += u64::from(us) * 1_000;
+        if self.quiet_from_ns.is_some_and(|from| self.time_ns >= from) {
+            self.fault = [false; 2];
+        }
         self.settle();
     }
 }
@@ -347,11 +390,17 @@ impl Bench {
         }
     }
 
-    /// A sequence has ended.
+    /// A sequence has ended. Its first conversion is wrong if the last one was more than 1 ms ago (ES0430, "wrong ADC result if
+    /// conversion done late after calibration or previous conversion").
     pub fn finish_sequence(&self, adc: pac::adc::Adc) {
         let sequence = adc.jsqr().read();
+        let Registers { adc1, adc2, adc3, .. } = self.registers;
+        let index = [adc1, adc2, adc3].iter().position(|own| own.as_ptr() == adc.as_ptr());
+        let last_ns = index.map(|index| self.converted_ns[index].replace(self.time_ns));
+        let late = last_ns.is_some_and(|last_ns| self.time_ns > last_ns + 1_000_000);
         for rank in 0..usize::from(sequence.jl()) + 1 {
-            let code = self.codes[usize::from(sequence.jsq(rank))];
+            let code =
+                self.codes[usize::from(sequence.jsq(rank))] ^ if late && rank == 0 { 0x100 } else { 0 };
             // SAFETY: JDR1 is word 32 of the converter's block; the board only reads it.
             unsafe { adc.as_ptr().cast::<u32>().add(32 + rank).write_volatile(u32::from(code)) };
         }

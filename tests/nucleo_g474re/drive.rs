@@ -1,6 +1,6 @@
 //! The drive's own two tasks on the board in memory.
 
-use crate::bench::Bench;
+use crate::bench::{Bench, control_update};
 use crate::{devices, plan};
 use tractive::board::nucleo_g474re::operator::Operator;
 use tractive::board::nucleo_g474re::position::Encoder;
@@ -45,6 +45,7 @@ fn the_drive_pulses_a_turning_machine_through_the_registers() {
         }
         if tick.is_multiple_of(u64::from(CLOCK.control_ticks)) {
             registers.tim4.cnt().write(|w| w.set_cnt((tick / TICKS_PER_COUNT % 4_096) as u16));
+            control_update(&registers);
             bench.finish_sequence(registers.adc1);
             control_task.run(&mut control, &shared);
         }

@@ -4,6 +4,7 @@ mod bench;
 mod drive;
 mod legs;
 mod operator;
+mod outputs;
 mod pins;
 mod ports;
 mod start;

@@ -52,12 +52,12 @@ fn the_switchgear_is_off_before_its_pins_are_outputs() {
         let mode = registers.gpioc.moder().read().moder(usize::from(pin.number));
         assert_eq!(mode, gpio::vals::Moder::OUTPUT, "{}", pin.purpose);
     }
-    let chopper = registers.tim16;
+    let chopper = registers.tim17;
     assert_eq!(chopper.ccr(0).read().ccr(), 0);
     assert!(chopper.ccmr_output(0).read().ocpe(0) && chopper.cr1().read().cen());
     // 170 MHz / 170 / 1,000 counts = 1 kHz.
     assert_eq!((chopper.psc().read(), chopper.arr().read().arr()), (169, 999));
-    assert!(registers.rcc.apb2enr().read().tim16en());
+    assert!(registers.rcc.apb2enr().read().tim17en());
 }
 
 #[test]
@@ -75,7 +75,7 @@ fn each_switch_has_its_pin_and_the_chopper_its_duty() {
     }
     for (chopper, counts) in [(0.25, 250), (1.0, 1_000), (0.0, 0)] {
         switchgear::set(&registers, &Switches { chopper, ..Switches::default() });
-        assert_eq!(registers.tim16.ccr(0).read().ccr(), counts);
+        assert_eq!(registers.tim17.ccr(0).read().ccr(), counts);
     }
 }
 

@@ -1,9 +1,12 @@
 //! The pin table against the chip's own data and against the documentation.
 
+use crate::bench::Bench;
 use std::collections::BTreeSet;
 use std::path::Path;
+use stm32_metapac::gpio::vals::Moder;
 use stm32_metapac::metadata::METADATA;
-use tractive::board::nucleo_g474re::pins::{Function, PINS, Pin};
+use tractive::board::nucleo_g474re::pins::{Function, PINS, Pin, Port};
+use tractive::board::nucleo_g474re::sampling::{CONTROL, PWM};
 use tractive::board::nucleo_g474re::zs9;
 
 /// The wiring of each drive, with its page.
@@ -42,6 +45,63 @@ fn no_pin_is_used_twice_and_none_belongs_to_the_debugger_or_the_crystal() {
         assert_eq!(names.len(), pins.len());
         for taken in ["PA13", "PA14", "PA2", "PA3", "PF0", "PF1"] {
             assert!(!names.contains(taken), "{taken}");
+        }
+    }
+}
+
+/// What a pin does from a reset until the start: by the data sheet all are analog inputs without a pull, but for these.
+const NOT_FLOATING: [(&str, &str); 6] = [
+    ("PA13", "SWDIO/JTMS: pull-up"),
+    ("PA14", "SWCLK/JTCK: pull-down"),
+    ("PA15", "JTDI: pull-up"),
+    ("PB3", "JTDO: the debug port's output"),
+    ("PB4", "NJTRST: pull-up; UCPD1_CC2: dead-battery pull-down of 5.1 kΩ"),
+    ("PB6", "UCPD1_CC1: dead-battery pull-down of 5.1 kΩ"),
+];
+
+#[test]
+fn the_pins_that_do_not_float_are_those_of_the_reset_values_and_the_chips_data() {
+    let registers = Bench::new().registers;
+    let ports = [Port::A, Port::B, Port::C, Port::D];
+    let debug = ports.into_iter().flat_map(|port| {
+        let modes = port.of(&registers).moder().read();
+        (0..16).filter(move |n| modes.moder(*n) != Moder::ANALOG).map(move |n| format!("P{port:?}{n}"))
+    });
+    let usb = METADATA.peripherals.iter().find(|found| found.name == "UCPD1").unwrap();
+    let battery = usb.pins.iter().filter(|pin| ["CC1", "CC2"].contains(&pin.signal));
+    let found: BTreeSet<_> = debug.chain(battery.map(|pin| pin.pin.to_owned())).collect();
+    assert_eq!(found, NOT_FLOATING.map(|(pin, _)| pin.to_owned()).into_iter().collect());
+}
+
+#[test]
+fn what_switches_something_on_when_high_floats_from_reset_on() {
+    for (_, pins) in TABLES {
+        for pin in pins.iter().filter(|pin| matches!(pin.function, Function::Gate(_) | Function::Switch)) {
+            let reason = NOT_FLOATING.iter().find(|(taken, _)| *taken == name(pin));
+            assert_eq!(reason, None, "{}", pin.purpose);
+        }
+    }
+}
+
+/// Two converters that sample one pin at a time disturb each other.
+#[test]
+fn no_pin_belongs_to_two_converters() {
+    for pin in TABLES.iter().flat_map(|(_, pins)| *pins) {
+        let converters = pin.signals.iter().filter(|signal| signal.starts_with("ADC")).count();
+        assert!(converters <= 1, "{} {:?}", name(pin), pin.signals);
+    }
+}
+
+#[test]
+fn the_sequences_convert_what_the_table_says() {
+    let purposes = ["current of U", "current of V", "current of W", "DC-link voltage"];
+    for (converter, sequence, wanted) in [("ADC1", CONTROL, 4), ("ADC2", PWM, 3)] {
+        let converted = sequence.channels.iter().take(sequence.count.into()).skip(sequence.rejected);
+        assert_eq!(converted.len(), wanted);
+        for (channel, purpose) in converted.zip(purposes) {
+            let signal = format!("{converter}_IN{channel}");
+            let pin = PINS.iter().find(|pin| pin.signals.contains(&signal.as_str())).unwrap();
+            assert!(pin.purpose.starts_with(purpose), "{signal}: {}", pin.purpose);
         }
     }
 }

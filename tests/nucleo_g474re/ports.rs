@@ -1,6 +1,6 @@
 //! What the interrupts see of the board.
 
-use crate::bench::Bench;
+use crate::bench::{Bench, control_update};
 use crate::plan;
 use stm32_metapac::gpio::regs::Idr;
 use tractive::board::nucleo_g474re::legs::SoftwareBreak;
@@ -9,6 +9,7 @@ use tractive::board::nucleo_g474re::position::{Encoder, Position};
 use tractive::board::nucleo_g474re::power_stage::{AdcCode, POWER_STAGE};
 use tractive::board::nucleo_g474re::registers::Registers;
 use tractive::board::nucleo_g474re::sampling::Zeros;
+use tractive::board::nucleo_g474re::start::{self, Wait};
 use tractive::board::nucleo_g474re::watchdog::Pulse;
 use tractive::board::nucleo_g474re::{Control, Pwm};
 use tractive::control::Demand;
@@ -28,6 +29,48 @@ fn write_input(port: stm32_metapac::gpio::Gpio, levels: u32) {
     unsafe { port.as_ptr().cast::<Idr>().add(4).write_volatile(Idr(levels)) };
 }
 
+/// The index passes; the angle is known from the next sample on.
+fn pass_index<P: Position>(control: &mut Control<P>, registers: &Registers) {
+    registers.tim4.sr().write(|w| w.set_idxif(true));
+    assert!(!control.sample(NOW).enable, "its count may be older than the index");
+}
+
+/// What the encoder counts after the trigger, while a more urgent interrupt runs, does not reach the angle.
+#[test]
+fn the_angle_is_that_of_the_trigger_however_late_it_is_read() {
+    let registers = Bench::started(plan()).registers;
+    let mut encoder = Encoder::new(registers.tim4, &POWER_STAGE, 4);
+    registers.tim4.sr().write(|w| w.set_idxif(true));
+    encoder.angle();
+    for late in [0, 1, 40, 1_000] {
+        registers.tim4.cnt().write(|w| w.set_cnt(256));
+        control_update(&registers);
+        registers.tim4.cnt().write(|w| w.set_cnt(256 + late));
+        assert_eq!(encoder.angle(), Some(Angle(1 << 30)), "{late} counts later");
+    }
+}
+
+/// An index between the trigger and the reading: flag and count are not of one instant.
+#[test]
+fn an_index_just_after_the_trigger_makes_no_false_angle() {
+    let registers = Bench::started(plan()).registers;
+    let mut encoder = Encoder::new(registers.tim4, &POWER_STAGE, 4);
+    let mut at = |captured: u16, index: bool| {
+        registers.tim4.cnt().write(|w| w.set_cnt(captured));
+        control_update(&registers);
+        registers.tim4.sr().write(|w| w.set_idxif(index));
+        (encoder.angle().map(|angle| angle.0 >> 22), encoder.is_lost())
+    };
+    // Counted from nowhere until the index; the flag comes one capture early.
+    assert_eq!(at(2_990, false), (None, false));
+    assert_eq!(at(3_000, true), (None, false), "a count from before the index");
+    assert_eq!(at(5, false), (Some(5), false));
+    assert_eq!(at(15, false), (Some(15), false));
+    // The same with counts lost on the way: told one capture later.
+    assert_eq!(at(25, true), (Some(25), false));
+    assert_eq!(at(1_005, false), (Some(1_005), true));
+}
+
 #[test]
 fn a_sample_has_currents_link_voltage_and_angle_in_si_units() {
     let mut bench = Bench::started(plan());
@@ -35,11 +78,13 @@ fn a_sample_has_currents_link_voltage_and_angle_in_si_units() {
     let operator = Operator::new();
     let mut control =
         Control::new(registers, ZEROS, Encoder::new(registers.tim4, &POWER_STAGE, 4), &operator);
-    (bench.codes[2], bench.codes[7], bench.codes[14], bench.codes[6]) =
+    (bench.codes[2], bench.codes[15], bench.codes[5], bench.codes[6]) =
         (2_048 + 512, 2_050 - 256, 2_040 - 256, 2_457);
     bench.finish_sequence(registers.adc1);
+    pass_index(&mut control, &registers);
+    bench.finish_sequence(registers.adc1);
     registers.tim4.cnt().write(|w| w.set_cnt(256));
-    registers.tim4.sr().write(|w| w.set_idxif(true));
+    control_update(&registers);
     write_input(registers.gpioc, 1 << 2);
     let demand = Demand { torque_nm: 120.0, slew_limited: true };
     operator.desk.allow_from(Permit { enable: true, demand, ..Permit::NONE }, NOW);
@@ -63,6 +108,7 @@ fn the_gates_wait_for_the_index_the_enable_input_and_quiet_break_inputs() {
         operator.desk.allow_from(Permit { enable: true, ..Permit::NONE }, NOW);
         let mut control = Control::new(registers, ZEROS, encoder, &operator);
         registers.tim4.sr().write(|w| w.set_idxif(index));
+        control.sample(NOW);
         write_input(registers.gpioc, u32::from(enable) << 2);
         if trip {
             control.enter(SafeState::GatesOff, NOW);
@@ -71,6 +117,37 @@ fn the_gates_wait_for_the_index_the_enable_input_and_quiet_break_inputs() {
         bench.finish_sequence(registers.adc1);
         assert!(!control.sample(NOW).enable);
     }
+}
+
+/// Square wave below 83 Hz has more than 1 ms between two carrier boundaries.
+#[test]
+fn a_late_conversion_is_thrown_away() {
+    let mut bench = Bench::started(plan());
+    let registers = bench.registers;
+    let mut pwm = Pwm::new(registers, [AdcCode(2_048); 3]);
+    (bench.codes[4], bench.codes[7], bench.codes[14]) = (2_048 + 512, 2_048 - 256, 2_048 - 256);
+    for wait_us in [500, 1_500, 2_200] {
+        bench.microseconds(wait_us);
+        bench.finish_sequence(registers.adc2);
+        let currents = pwm.sample(NOW);
+        assert_eq!((currents.a, currents.b, currents.c), (125.0, -62.5, -62.5), "after {wait_us} µs");
+    }
+}
+
+#[test]
+fn the_first_samples_are_right_however_long_the_start_takes() {
+    let mut bench = Bench::new();
+    let registers = bench.registers;
+    start::prepare(&registers, &mut bench, plan()).unwrap();
+    bench.microseconds(50_000);
+    start::run(&registers, &mut bench);
+    bench.microseconds(100);
+    bench.finish_sequence(registers.adc1);
+    let operator = Operator::new();
+    let encoder = Encoder::new(registers.tim4, &POWER_STAGE, 4);
+    let currents =
+        Control::new(registers, [AdcCode(2_048); 3], encoder, &operator).sample(NOW).measured.currents_a;
+    assert_eq!((currents.a, currents.b, currents.c), (0.0, 0.0, 0.0));
 }
 
 #[test]
@@ -153,13 +230,15 @@ fn the_idle_loop_hears_what_control_did() {
 
 /// An encoder whose index is at count 0, turning by `step` counts a control period from `from` on.
 fn turn(encoder: &mut Encoder, registers: &Registers, from: i32, step: i32, periods: i32, slip: i32) {
-    let mut before = from;
+    let (mut before, mut right) = (from, false);
     for period in 1..=periods {
         let now = from + period * step;
         let passed = now.div_euclid(4_096) != before.div_euclid(4_096);
         // The index sets the count right, whatever was lost until then.
-        let count = now.rem_euclid(4_096) + if passed || period * step.abs() > 4_096 { 0 } else { slip };
+        right |= passed;
+        let count = now.rem_euclid(4_096) + if right { 0 } else { slip };
         registers.tim4.cnt().write(|w| w.set_cnt(count.rem_euclid(4_096) as u16));
+        control_update(registers);
         registers.tim4.sr().write(|w| w.set_idxif(passed));
         encoder.angle();
         before = now;
@@ -183,8 +262,10 @@ fn an_index_must_find_the_count_where_it_is_expected() {
         assert_eq!(encoder.angle(), None, "no index yet");
         registers.tim4.sr().write(|w| w.set_idxif(true));
         registers.tim4.cnt().write(|w| w.set_cnt(2_000));
-        assert!(encoder.angle().is_some());
+        control_update(&registers);
+        assert_eq!(encoder.angle(), None, "its count may be older than the index");
         assert!(!registers.tim4.sr().read().idxif(), "acknowledged");
+        assert!(encoder.angle().is_some());
         turn(&mut encoder, &registers, 2_000, step, 2_500 / step.abs(), slip);
         assert_eq!(encoder.is_lost(), lost, "{step} {slip}");
     }

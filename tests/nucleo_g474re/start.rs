@@ -52,7 +52,7 @@ fn the_gates_are_off_until_everything_is_configured() {
         println!("{name}");
         gates_are_off(&registers);
     }
-    run(&registers);
+    run(&registers, &mut bench);
     bench.settle();
     for timer in [registers.legs.tim1, registers.legs.tim8] {
         assert!(timer.cr1().read().cen());
@@ -78,6 +78,7 @@ fn the_pwm_timers_are_shadowed_dead_timed_and_breakable() {
         // 5 µs of 170 MHz are 850 cycles; the nearest code from there on stands for 2 (64 + 43) · 4 = 856.
         assert_eq!((main.dtg(), control.ckd()), (0x80 | 43, timer::vals::Ckd::DIV4));
         assert!(main.bke(0));
+        assert_eq!(main.bkf(0), timer::vals::FilterValue::NO_FILTER, "a break needs no clock");
         assert_eq!(main.bkp(0), timer::vals::Bkp::ACTIVE_HIGH);
         let sources = timer.af1().read();
         assert!(sources.bkine());
@@ -114,7 +115,7 @@ fn the_control_timer_has_its_period_and_triggers_its_converter() {
     assert_eq!(tim3.cr2().read().mms(), timer::vals::Mms::UPDATE);
     assert!(tim3.dier().read().uie());
     for (converter, trigger, channels) in
-        [(registers.adc1, 12, &[2, 7, 14, 6][..]), (registers.adc2, 8, &[2, 7, 14][..])]
+        [(registers.adc1, 12, &[2, 15, 5, 6][..]), (registers.adc2, 8, &[14, 4, 7, 14][..])]
     {
         let sequence = converter.jsqr().read();
         assert_eq!((sequence.jextsel(), sequence.jexten()), (trigger, adc::vals::Exten::RISING_EDGE));
@@ -139,6 +140,10 @@ fn the_clock_tree_is_170_mhz() {
     assert!(registers.rcc.cr().read().csson());
     assert_eq!(registers.flash.acr().read().latency(), stm32_metapac::flash::vals::Latency::WS4);
     assert!(!registers.pwr.cr5().read().r1mode(), "boost");
+    let supply = registers.pwr.cr2().read();
+    assert!(supply.pvde() && supply.pls() == 6, "2.9 V");
+    let breaking = registers.syscfg.cfgr2().read();
+    assert!(breaking.pvdl() && breaking.cll() && breaking.eccl(), "a low supply breaks the timers");
 }
 
 #[test]
@@ -166,12 +171,11 @@ fn each_comparator_watches_one_sign_of_one_current() {
 #[test]
 fn what_is_not_in_order_is_told_and_leaves_the_gates_off() {
     type Spoil = fn(&mut Bench);
-    let cases: [(Spoil, StartError); 5] = [
+    let cases: [(Spoil, StartError); 4] = [
         (|bench| bench.registers.rcc.csr().write(|w| w.set_iwdgrstf(true)), StartError::WatchdogReset),
         (|bench| bench.broken = true, StartError::FlashLatency),
         (|bench| bench.codes[14] = 3_000, StartError::CurrentSensor { code: 3_000 }),
         (|bench| bench.codes[2] = 0, StartError::CurrentSensor { code: 0 }),
-        (|bench| bench.fault[1] = true, StartError::BreakInput),
     ];
     for (spoil, error) in cases {
         let mut bench = Bench::new();
@@ -187,12 +191,68 @@ fn what_is_not_in_order_is_told_and_leaves_the_gates_off() {
     assert_eq!(prepare(&registers, &mut bench, too_long), Err(error));
 }
 
+/// Gate drivers come up some time after the chip, and one that never does needs no reset by hand.
+#[test]
+fn a_gate_driver_may_be_late() {
+    for (quiet_ms, tripped) in [(Some(50), false), (Some(150), false), (None, true)] {
+        let mut bench = Bench::new();
+        bench.fault = [true; 2];
+        bench.quiet_from_ns = quiet_ms.map(|ms: u64| ms * 1_000_000);
+        bench.watch = gates_are_off;
+        let registers = bench.registers;
+        prepare(&registers, &mut bench, plan()).unwrap();
+        run(&registers, &mut bench);
+        bench.settle();
+        assert_eq!(registers.legs.is_tripped(), tripped, "{quiet_ms:?}");
+        // The latch holds the gates; once the driver is ready it is left as any fault is.
+        registers.legs.switch_on();
+        bench.settle();
+        assert_eq!(registers.legs.is_on(), !tripped);
+        bench.fault = [false; 2];
+        assert!(registers.legs.leave());
+        bench.settle();
+        registers.legs.switch_on();
+        assert!(registers.legs.is_on());
+    }
+}
+
+#[test]
+fn a_refusal_can_be_told_over_the_bus() {
+    let mut bench = Bench::new();
+    let registers = bench.registers;
+    registers.rcc.csr().write(|w| w.set_iwdgrstf(true));
+    assert_eq!(prepare(&registers, &mut bench, plan()), Err(StartError::WatchdogReset));
+    assert!(registers.rcc.cr().read().hseon(), "the bus's clock");
+    assert!(registers.rcc.ahb2enr().read().gpioaen(), "its pins'");
+}
+
+#[test]
+fn a_peripheral_is_written_to_only_after_its_clock_has_come() {
+    thread_local! {
+        static SEEN: std::cell::Cell<[bool; 2]> = const { std::cell::Cell::new([false; 2]) };
+    }
+    let mut bench = Bench::new();
+    let registers = bench.registers;
+    registers.pwr.cr5().modify(|w| w.set_r1mode(true));
+    bench.watch = |registers| {
+        let [power, system] = SEEN.get();
+        let untouched = !registers.pwr.cr3().read().ucpd1_dbdis() && registers.pwr.cr5().read().r1mode();
+        SEEN.set([
+            power || (registers.rcc.apb1enr1().read().pwren() && untouched),
+            system || (registers.rcc.apb2enr().read().syscfgen() && registers.syscfg.cfgr2().read().0 == 0),
+        ]);
+    };
+    prepare(&registers, &mut bench, plan()).unwrap();
+    assert_eq!(SEEN.get(), [true; 2], "a wait between clock and first write, of PWR and SYSCFG");
+}
+
 #[test]
 fn the_zeros_are_means_of_what_each_converter_sees() {
     let mut bench = Bench::new();
-    (bench.codes[2], bench.codes[7], bench.codes[14]) = (2_040, 2_050, 2_100);
+    (bench.codes[2], bench.codes[15], bench.codes[5]) = (2_040, 2_050, 2_100);
+    (bench.codes[4], bench.codes[7], bench.codes[14]) = (2_041, 2_051, 2_101);
     let registers = bench.registers;
     let found = prepare(&registers, &mut bench, plan()).unwrap();
     assert_eq!(found.control_zeros.map(|zero| zero.0), [2_040, 2_050, 2_100]);
-    assert_eq!(found.pwm_zeros, found.control_zeros);
+    assert_eq!(found.pwm_zeros.map(|zero| zero.0), [2_041, 2_051, 2_101]);
 }

@@ -32,8 +32,9 @@ use anyhow::{Context, Result};
 use tractive::control::{Demand, Gains};
 use tractive::drive::traction::Settings;
 use tractive::modulation::Devices;
+use tractive::operator::LineTimes;
 use tractive::operator::{Line, Request};
-use tractive::wire::{LineTimes, Setup};
+use tractive::wire::Setup;
 
 /// The usual lead, in s.
 const LEAD_S: f64 = 0.1;

@@ -8,7 +8,7 @@ use crate::plant::zs9::{NetworkState, Zs9Plant};
 use tractive::operator::DualStatus;
 use tractive::time::Clock;
 
-pub use tractive::wire::LineTimes;
+pub use tractive::operator::LineTimes;
 
 /// Time constants unless told otherwise, in s: 50 Ω and 500 Ω on both capacitors of 500 µF.
 pub const TIMES: LineTimes = LineTimes { precharge_s: 0.05, discharge_s: 0.5 };

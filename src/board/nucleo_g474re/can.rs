@@ -100,6 +100,8 @@ impl Can {
     ) -> Result<(), StartError> {
         rcc.ccipr().modify(|w| w.set_fdcansel(Fdcansel::HSE));
         rcc.apb1enr1().modify(|w| w.set_fdcanen(true));
+        // A peripheral takes writes only some cycles after its clock has been enabled.
+        wait.microseconds(1);
         let can = self.can;
         can.cccr().modify(|w| w.set_init(true));
         wait.until(&mut || can.cccr().read().init()).or(Err(StartError::Can))?;

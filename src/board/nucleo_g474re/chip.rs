@@ -104,7 +104,7 @@ pub(super) fn join_bus<T>(
     found
 }
 
-/// Does not start: the reset has left every gate's pin floating and every interrupt masked, and so they stay.
+/// Does not start: the reset has left every output's pin floating and every interrupt masked, and so they stay.
 pub fn refuse(refused: &Refused) -> ! {
     let Refused { name, value, least, most } = refused;
     defmt::error!("no start: {=str} = {=f32}, must be from {=f32} to {=f32}", name, value, least, most);
@@ -119,7 +119,7 @@ pub fn run() {
 }
 
 /// Lets both interrupts come and starts their timers. Call it once.
-pub(super) fn run_with(pwm: Interrupt, control: Interrupt, start: fn(&Registers)) {
+pub(super) fn run_with(pwm: Interrupt, control: Interrupt, start: fn(&Registers, &mut dyn Wait)) {
     // SAFETY: the only use of the core peripherals, before any interrupt is unmasked.
     let mut core = unsafe { cortex_m::Peripherals::steal() };
     // SAFETY: priorities are changed while both interrupts are masked; no code relies on a priority ceiling. After that
@@ -130,7 +130,7 @@ pub(super) fn run_with(pwm: Interrupt, control: Interrupt, start: fn(&Registers)
         NVIC::unmask(pwm);
         NVIC::unmask(control);
     }
-    start(&Registers::CHIP);
+    start(&Registers::CHIP, &mut Cycles);
     defmt::info!("running");
 }
 
@@ -170,10 +170,11 @@ pub fn idle() -> ! {
     }
 }
 
-/// Gates off for good, whatever state the program is in, then nothing more; the watchdog resets the chip if it runs.
+/// All outputs off for good, whatever state the program is in, then nothing more; the watchdog resets the chip if it runs.
 pub fn die() -> ! {
-    // All timers that may have gates, of whichever drive.
-    zs9::start::bridge(&Registers::CHIP).outputs().trip();
+    // Of whichever drive.
+    start::switch_off(&Registers::CHIP, &pins::PINS);
+    start::switch_off(&Registers::CHIP, &zs9::pins::PINS);
     loop {
         cortex_m::asm::nop();
     }

@@ -4,11 +4,27 @@ use super::registers::Registers;
 use super::start::{StartError, Wait};
 use stm32_metapac::{flash, rcc};
 
+/// PWR_CR2.PLS of the supply below which the gates go off, some 2.9 V: the highest one. Comparators and converters have the supply as
+/// their reference.
+const SUPPLY_THRESHOLD: u8 = 6;
+
+/// Takes USB's dead-battery pull-downs of 5.1 kΩ off PB4 and PB6. They are there from reset on, switched by PA9 and PA10, all of
+/// which have other uses here (RM0440, PWR_CR3.UCPD1_DBDIS). The power controller is clocked from here on.
+pub fn release_dead_battery(registers: &Registers, wait: &mut dyn Wait) {
+    registers.rcc.apb1enr1().modify(|w| w.set_pwren(true));
+    // A peripheral takes writes only some cycles after its clock has been enabled.
+    wait.microseconds(1);
+    registers.pwr.cr3().modify(|w| w.set_ucpd1_dbdis(true));
+}
+
 /// 24 MHz / 6 · 85 / 2 = 170 MHz, with the wait states and the core voltage that this needs. If the crystal stops later, the clock
 /// security system breaks the PWM timers in hardware.
 pub fn configure(registers: &Registers, wait: &mut dyn Wait) -> Result<(), StartError> {
     let Registers { rcc, pwr, flash, .. } = *registers;
-    rcc.apb1enr1().modify(|w| w.set_pwren(true));
+    pwr.cr2().modify(|w| {
+        w.set_pls(SUPPLY_THRESHOLD);
+        w.set_pvde(true);
+    });
     // Boost: range 1 without it ends at 150 MHz. The bit's name says normal mode.
     pwr.cr5().modify(|w| w.set_r1mode(false));
     flash.acr().modify(|w| {
@@ -42,9 +58,10 @@ pub fn configure(registers: &Registers, wait: &mut dyn Wait) -> Result<(), Start
     Ok(())
 }
 
-/// Clocks of the peripherals; timers and processor stop together under a debugger, and stopped PWM timers have their
-/// outputs off. A locked-up processor or a bad memory word breaks them too.
-pub fn enable_peripherals(registers: &Registers) {
+/// Clocks of the peripherals; timers and processor stop together under a debugger, and stopped PWM and chopper timers have their
+/// outputs off. The watchdog goes on: it resets a halted chip, which opens the contactors too. A locked-up processor, a bad
+/// memory word or a low supply breaks the timers.
+pub fn enable_peripherals(registers: &Registers, wait: &mut dyn Wait) {
     let Registers { rcc, syscfg, dbgmcu, .. } = *registers;
     rcc.ahb2enr().modify(|w| {
         w.set_gpioaen(true);
@@ -66,21 +83,23 @@ pub fn enable_peripherals(registers: &Registers) {
         w.set_syscfgen(true);
         w.set_tim1en(true);
         w.set_tim8en(true);
-        w.set_tim16en(true);
+        w.set_tim17en(true);
         w.set_tim20en(true);
     });
+    wait.microseconds(1);
     dbgmcu.apb2fzr().modify(|w| {
         w.set_tim1(true);
         w.set_tim8(true);
+        w.set_tim17(true);
         w.set_tim20(true);
     });
     dbgmcu.apb1lfzr().modify(|w| {
         w.set_tim2(true);
         w.set_tim3(true);
-        w.set_iwdg(true);
     });
     syscfg.cfgr2().modify(|w| {
         w.set_cll(true);
         w.set_eccl(true);
+        w.set_pvdl(true);
     });
 }

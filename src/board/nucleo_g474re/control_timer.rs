@@ -1,4 +1,4 @@
-//! TIM3, the control timer: its update is the control interrupt and, as TRGO, what starts ADC1.
+//! TIM3, the control timer: its update is the control interrupt and, as TRGO, what starts ADC1 and captures the encoder.
 
 use stm32_metapac::timer::{TimGp16, regs, vals};
 

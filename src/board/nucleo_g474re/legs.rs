@@ -79,11 +79,6 @@ impl Legs {
         Outputs([self.tim1, self.tim8])
     }
 
-    /// Forgets what the break inputs saw before they were wired up. Only for the start, with the outputs off.
-    pub fn forget_breaks(&self) {
-        self.outputs().forget_breaks();
-    }
-
     /// Starts to count: TIM1's update by software takes over what is preloaded, and its TRGO starts whoever waits for it.
     pub fn start(&self) {
         self.tim1.dier().write(|w| w.set_uie(true));

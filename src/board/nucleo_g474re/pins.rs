@@ -69,13 +69,13 @@ pub const PINS: [Pin; 27] = [
     pin(Port::C, 10, Function::Gate(4), &["TIM8_CH1N"], "gate W, lower device"),
     pin(Port::B, 12, Function::Alternate(6), &["TIM1_BKIN"], "gate drivers ready, low turns U and V off"),
     pin(Port::A, 6, Function::Alternate(4), &["TIM8_BKIN"], "the same wire, low turns W off"),
-    pin(Port::A, 1, Function::Analog, &["ADC1_IN2", "ADC2_IN2", "COMP1_INP"], "current of U"),
-    pin(Port::A, 7, Function::Analog, &["COMP2_INP"], "current of U, the same wire"),
-    pin(Port::C, 1, Function::Analog, &["ADC1_IN7", "ADC2_IN7", "COMP3_INP"], "current of V"),
-    pin(Port::B, 0, Function::Analog, &["COMP4_INP"], "current of V, the same wire"),
-    pin(Port::B, 11, Function::Analog, &["ADC1_IN14", "ADC2_IN14", "COMP6_INP"], "current of W"),
-    pin(Port::B, 14, Function::Analog, &["COMP7_INP"], "current of W, the same wire"),
-    pin(Port::C, 0, Function::Analog, &["ADC1_IN6", "ADC2_IN6"], "DC-link voltage"),
+    pin(Port::A, 1, Function::Analog, &["ADC1_IN2", "COMP1_INP"], "current of U"),
+    pin(Port::A, 7, Function::Analog, &["ADC2_IN4", "COMP2_INP"], "current of U, the same wire"),
+    pin(Port::C, 1, Function::Analog, &["ADC2_IN7", "COMP3_INP"], "current of V"),
+    pin(Port::B, 0, Function::Analog, &["ADC1_IN15", "COMP4_INP"], "current of V, the same wire"),
+    pin(Port::B, 11, Function::Analog, &["ADC2_IN14", "COMP6_INP"], "current of W"),
+    pin(Port::B, 14, Function::Analog, &["ADC1_IN5", "COMP7_INP"], "current of W, the same wire"),
+    pin(Port::C, 0, Function::Analog, &["ADC1_IN6"], "DC-link voltage"),
     pin(Port::B, 6, Function::Alternate(2), &["TIM4_CH1"], "encoder, track A"),
     pin(Port::B, 7, Function::Alternate(2), &["TIM4_CH2"], "encoder, track B"),
     pin(Port::B, 3, Function::Alternate(2), &["TIM4_ETR"], "encoder, index"),
@@ -83,7 +83,7 @@ pub const PINS: [Pin; 27] = [
     pin(Port::C, 8, Function::Switch, &[], "precharge relay, high closes"),
     pin(Port::C, 9, Function::Switch, &[], "main contactor, high closes"),
     pin(Port::C, 11, Function::Switch, &[], "discharge resistor, high switches it on"),
-    pin(Port::B, 4, Function::Gate(1), &["TIM16_CH1"], "braking chopper, high conducts"),
+    pin(Port::B, 9, Function::Gate(1), &["TIM17_CH1"], "braking chopper, high conducts"),
     pin(Port::C, 4, Function::Input, &[], "precharge relay's auxiliary contact, high: closed"),
     pin(Port::C, 5, Function::Input, &[], "main contactor's auxiliary contact, high: closed"),
     pin(Port::A, 11, Function::Bus(9), &["FDCAN1_RX"], "CAN transceiver, RXD"),
@@ -178,6 +178,16 @@ pub fn configure_bus(registers: &Registers, pins: &[Pin]) {
 /// after a reset: each gate driver needs a pull-down of its own.
 pub fn configure_gates(registers: &Registers, pins: &[Pin]) {
     pins.iter().filter(|pin| pin.is_gate()).for_each(|pin| configure(registers, pin));
+}
+
+/// Takes the switches' pins from software for good: inputs with pull-down, as the external pull-downs have them after a reset, so that
+/// nothing that is commanded later reaches what they switch.
+pub fn release_switches(registers: &Registers, pins: &[Pin]) {
+    for pin in pins.iter().filter(|pin| pin.function == Function::Switch) {
+        let (port, number) = (pin.port.of(registers), usize::from(pin.number));
+        port.pupdr().modify(|w| w.set_pupdr(number, Pupdr::PULL_DOWN));
+        port.moder().modify(|w| w.set_moder(number, Moder::INPUT));
+    }
 }
 
 /// Whether the enable input is high.

@@ -52,7 +52,7 @@ impl<'a, P: Position> Control<'a, P> {
 }
 
 impl<P: Position> ControlPort for Control<'_, P> {
-    /// Position first: it is read, not sampled, and moves on while the conversions end.
+    /// Position first: it has been captured, and the conversions are still under way.
     fn sample(&mut self, now: Instant) -> Sample {
         let angle = self.position.angle();
         if let Some(angle) = angle {

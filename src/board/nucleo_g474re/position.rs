@@ -1,4 +1,8 @@
 //! The rotor's position.
+//!
+//! The encoder's count is captured by hardware at the control timer's update, the instant at which the currents are sampled: channel 3 of the
+//! encoder's timer captures the internal trigger TRC, which TS selects; the encoder mode leaves TS free (RM0440, general-purpose timers:
+//! encoder interface, "latching the counter value into a third input capture register", and TIMx_CCMR2.CC3S = 11).
 
 use super::power_stage::PowerStage;
 use crate::frames::Angle;
@@ -7,7 +11,7 @@ use stm32_metapac::timer::{TimGp16, regs, vals};
 /// A source of the electrical angle. The board has the encoder; a resolver or an absolute encoder (SSI) implements this
 /// and takes its place in [`super::Control`].
 pub trait Position {
-    /// The angle now; `None` while it is not known, which keeps the gates off. Called in the control interrupt: it may not wait.
+    /// The angle at the control timer's update; `None` while it is not known, which keeps the gates off. Called in the control interrupt: it may not wait.
     fn angle(&mut self) -> Option<Angle>;
 
     /// Whether the sensor has noticed that it lost its rotor: a fault, and for good.
@@ -25,8 +29,18 @@ pub struct Encoder {
     zero: Angle,
     /// Count of the last call and counts since the one before, once the index has passed.
     last: Option<(u32, u32)>,
+    /// The last call has seen the index. Its count may be older than that: the next one is not.
+    passed: bool,
     lost: bool,
 }
+
+/// The channel that captures the count, from 0.
+const CAPTURE: usize = 2;
+
+/// TS of an encoder on TIM4 captured by TIM3; of encoders on TIM3 and TIM4 captured by TIM2 (RM0440, internal trigger connection).
+pub const TIM4_BY_TIM3: vals::Ts = vals::Ts::ITR2;
+/// See [`TIM4_BY_TIM3`].
+pub const BY_TIM2: vals::Ts = vals::Ts::ITR1;
 
 /// By how many counts an index pulse may be off: acceleration within a control period, and the filters' delays.
 const INDEX_TOLERANCE: u32 = 8;
@@ -40,49 +54,58 @@ impl Encoder {
             counts: stage.encoder_counts.max(1),
             zero: stage.encoder_zero,
             last: None,
+            passed: false,
             lost: false,
         }
     }
 
-    /// Counts every edge of both tracks, 0 ..= counts − 1 a turn; the index sets it to 0 in either direction.
-    pub fn configure(timer: TimGp16, stage: &PowerStage) {
+    /// Counts every edge of both tracks, 0 ..= counts − 1 a turn; the index sets it to 0 in either direction. Each `trigger`, the control
+    /// timer's TRGO, captures the count.
+    pub fn configure(timer: TimGp16, stage: &PowerStage, trigger: vals::Ts) {
         timer.ccmr_input(0).write(|w| {
             for channel in [0, 1] {
                 w.set_ccs(channel, vals::CcmrInputCcs::TI4);
                 w.set_icf(channel, vals::FilterValue::FCK_INT_N8);
             }
         });
+        timer.ccmr_input(1).write(|w| w.set_ccs(0, vals::CcmrInputCcs::TRC));
         timer.arr().write(|w| w.set_arr((stage.encoder_counts - 1) as u16));
-        timer.smcr().write(|w| {
+        // TS changes only while no mode uses it.
+        timer.smcr().write(|w| w.set_ts(trigger));
+        timer.smcr().modify(|w| {
             w.set_sms(vals::Sms::ENCODER_MODE_3);
             w.set_etf(vals::FilterValue::FCK_INT_N8);
         });
         timer.ecr().write(|w| w.set_ie(true));
+        timer.ccer().write(|w| w.set_cce(CAPTURE, true));
         timer.cr1().write(|w| w.set_cen(true));
     }
 }
 
 impl Position for Encoder {
-    /// Known once the index has passed. Called every control period: each further index must find the count where the speed lets it
+    /// Known from the second call after the index on: the flag is read, not captured, and an index between the capture and the
+    /// reading is in the next count. Called every control period: each further index must find the count where the speed lets it
     /// be expected, else counts were lost or invented on the way, and the angle is lost for good.
     #[inline]
     fn angle(&mut self) -> Option<Angle> {
         let index = self.timer.sr().read().idxif();
-        let count = u32::from(self.timer.cnt().read().cnt());
+        let count = u32::from(self.timer.ccr(CAPTURE).read().ccr());
         if index {
             // Status flags are cleared by writing 0 and left alone by writing 1.
             let mut all_but_index = regs::SrGp16(u32::MAX);
             all_but_index.set_idxif(false);
             self.timer.sr().write_value(all_but_index);
         }
+        let passed = core::mem::replace(&mut self.passed, index);
         self.last = match self.last {
-            None if !index => return None,
+            None if !passed => return None,
             None => Some((count, 0)),
             Some((before, moved)) => {
                 let moves = self.wrapped(count + self.counts - before);
                 let off = self.wrapped(moves + self.counts - moved);
-                self.lost |=
-                    index && off > INDEX_TOLERANCE && off < self.counts.saturating_sub(INDEX_TOLERANCE);
+                self.lost |= (index || passed)
+                    && off > INDEX_TOLERANCE
+                    && off < self.counts.saturating_sub(INDEX_TOLERANCE);
                 Some((count, moves))
             }
         };

@@ -21,7 +21,7 @@ pub struct Registers {
     /// The ZS9's third leg.
     pub tim20: pac::timer::TimAdv,
     /// The braking chopper's.
-    pub tim16: pac::timer::Tim1chCmp,
+    pub tim17: pac::timer::Tim1chCmp,
     /// The ZS9's control timer.
     pub tim2: pac::timer::TimGp32,
     /// Control timer; the ZS9's second encoder.
@@ -59,7 +59,7 @@ impl Registers {
         gpiod: pac::GPIOD,
         legs: Legs { tim1: pac::TIM1, tim8: pac::TIM8 },
         tim20: pac::TIM20,
-        tim16: pac::TIM16,
+        tim17: pac::TIM17,
         tim2: pac::TIM2,
         tim3: pac::TIM3,
         tim4: pac::TIM4,

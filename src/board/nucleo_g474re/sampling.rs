@@ -1,7 +1,12 @@
 //! The converters: injected sequences that a timer's update triggers, and the zeros of the current sensors.
 //!
-//! ADC1 belongs to the control interrupt, ADC2 to the PWM interrupt. Both have the currents on the same pins, so each interrupt
-//! has samples of its own instant. A sequence's conversions follow each other within 0.6 µs.
+//! ADC1 belongs to the control interrupt, ADC2 to the PWM interrupt, so each has samples of its own instant. Each current is wired to two pins,
+//! one a converter: two converters that sample one pin at a time would disturb each other. A sequence's conversions follow each
+//! other within 0.6 µs.
+//!
+//! A conversion more than 1 ms after the one before it may be wrong (ES0430). ADC1 converts every 100 µs; ADC2 at carrier boundaries, up to
+//! 2.2 ms apart, so the first conversion of its sequence is thrown away. So are the first of the zeros and the last before the timers
+//! take over.
 
 use super::power_stage::{AdcCode, PowerStage};
 use super::start::{StartError, Wait};
@@ -11,22 +16,21 @@ use stm32_metapac::{adc, adccommon};
 /// A sequence's channels, and the timer event that starts it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Sequence {
-    /// Channels of the currents of U, V, W, and of the link voltage.
+    /// Channels, in the order of their conversion.
     pub channels: [u8; 4],
-    /// How many of them are converted.
+    /// The number of channels that are converted.
     pub count: u8,
+    /// The number of conversions at the beginning that are thrown away.
+    pub rejected: usize,
     /// JSQR.JEXTSEL.
     pub trigger: u8,
 }
 
-/// PA1, PC1, PB11, PC0: the same numbers on ADC1 and ADC2.
-const CHANNELS: [u8; 4] = [2, 7, 14, 6];
+/// ADC1: currents (PA1, PB0, PB14) and link voltage (PC0) at TIM3's update (its TRGO).
+pub const CONTROL: Sequence = Sequence { channels: [2, 15, 5, 6], count: 4, rejected: 0, trigger: 12 };
 
-/// ADC1: currents and link voltage at TIM3's update (its TRGO).
-pub const CONTROL: Sequence = Sequence { channels: CHANNELS, count: 4, trigger: 12 };
-
-/// ADC2: currents at TIM1's update (its TRGO2).
-pub const PWM: Sequence = Sequence { channels: CHANNELS, count: 3, trigger: 8 };
+/// ADC2: W once for nothing, then the currents (PA7, PC1, PB11) at TIM1's update (its TRGO2).
+pub const PWM: Sequence = Sequence { channels: [14, 4, 7, 14], count: 4, rejected: 1, trigger: 8 };
 
 /// Core cycles of a conversion: 12.5 cycles to sample and 12.5 to convert, at a quarter of the core's clock.
 pub const CONVERSION_CYCLES: u32 = 100;
@@ -73,7 +77,7 @@ impl Sampler {
         Ok(())
     }
 
-    /// The mean code of each current, converted on command. The gates are off, so no current flows.
+    /// The mean code of each current of a sequence that begins with them, converted on command. The gates are off, so no current flows.
     pub fn zeros(&self, stage: &PowerStage, wait: &mut dyn Wait) -> Result<Zeros, StartError> {
         let [a, b, c, _] = self.means(wait)?;
         Ok([stage.check_zero(a)?, stage.check_zero(b)?, stage.check_zero(c)?])
@@ -83,14 +87,26 @@ impl Sampler {
     pub fn means(&self, wait: &mut dyn Wait) -> Result<[AdcCode; 4], StartError> {
         self.write_sequence(adc::vals::Exten::DISABLED);
         let mut sums = [0; 4];
+        self.convert(wait)?;
         for _ in 0..ZERO_SAMPLES {
-            self.arm();
-            wait.until(&mut || self.is_done()).or(Err(StartError::Converter))?;
+            self.convert(wait)?;
             for (sum, code) in sums.iter_mut().zip(self.take()) {
                 *sum += u32::from(code.0);
             }
         }
         Ok(sums.map(|sum| AdcCode(((sum + ZERO_SAMPLES / 2) / ZERO_SAMPLES) as u16)))
+    }
+
+    /// Converts once on command, for nothing: what the timer starts within 1 ms from now on is right.
+    pub fn refresh(&self, wait: &mut dyn Wait) {
+        self.write_sequence(adc::vals::Exten::DISABLED);
+        // Its failure is that of the conversions that follow, which is told.
+        let _ = self.convert(wait);
+    }
+
+    fn convert(&self, wait: &mut dyn Wait) -> Result<(), StartError> {
+        self.arm();
+        wait.until(&mut || self.is_done()).or(Err(StartError::Converter))
     }
 
     /// From now on the timer starts the sequence.
@@ -126,10 +142,11 @@ impl Sampler {
         self.adc.isr().read().jeos()
     }
 
-    /// Reads the results and acknowledges them: flags of this register are cleared by writing 1.
+    /// Reads the results, those that count first, and acknowledges them: flags of this register are cleared by writing 1.
     #[inline]
     fn take(&self) -> [AdcCode; 4] {
-        let codes = [0, 1, 2, 3].map(|rank| AdcCode(self.adc.jdr(rank).read().jdata()));
+        let rejected = self.sequence.rejected;
+        let codes = [0, 1, 2, 3].map(|rank| AdcCode(self.adc.jdr((rank + rejected) % 4).read().jdata()));
         self.adc.isr().write(|w| w.set_jeos(true));
         codes
     }

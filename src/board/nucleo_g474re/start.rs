@@ -3,11 +3,13 @@
 use super::comparators;
 use super::control_timer::ControlTimer;
 use super::half;
-use super::position::Encoder;
+use super::outputs::Outputs;
+use super::pins::{self, Pin};
+use super::position::{Encoder, TIM4_BY_TIM3};
 use super::power_stage::{POWER_STAGE, PowerStage};
 use super::registers::Registers;
 use super::sampling::{self, Sampler, Zeros};
-use super::{CLOCK, PRESCALER, clock, pins, switchgear, watchdog};
+use super::{CLOCK, PRESCALER, clock, switchgear, watchdog, zs9};
 
 /// Waiting for the hardware: on the chip a loop with a bound, in a test the hardware's turn.
 pub trait Wait {
@@ -21,7 +23,7 @@ pub trait Wait {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Timeout;
 
-/// Why the board did not start. The gates are off and stay off.
+/// Why the board did not start. All outputs are off and stay off.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(target_os = "none", derive(defmt::Format))]
 pub enum StartError {
@@ -51,8 +53,6 @@ pub enum StartError {
         /// What it gives at no current.
         code: u16,
     },
-    /// A break input is active: a gate driver is not ready, or a comparator sees an overcurrent.
-    BreakInput,
     /// The CAN controller does not answer.
     Can,
     /// The watchdog does not take its settings.
@@ -94,13 +94,18 @@ pub type Step = fn(&mut Start) -> Result<(), StartError>;
 
 /// The steps in their order. The PWM timers are locked into their safe configuration before any gate pin is theirs,
 /// and break inputs and comparators watch before that; nothing counts until [`run`].
-pub const STEPS: [(&str, Step); 12] = [
-    ("reset cause", |start| watchdog::refuse_after_bite(start.registers)),
-    ("clock tree", |start| clock::configure(start.registers, start.wait)),
-    ("peripheral clocks", |start| {
-        clock::enable_peripherals(start.registers);
+pub const STEPS: [(&str, Step); 13] = [
+    ("dead-battery pull-downs", |start| {
+        clock::release_dead_battery(start.registers, start.wait);
         Ok(())
     }),
+    ("clock tree", |start| clock::configure(start.registers, start.wait)),
+    ("peripheral clocks", |start| {
+        clock::enable_peripherals(start.registers, start.wait);
+        Ok(())
+    }),
+    // Not earlier: what is refused is told over the bus, which needs the crystal and its pins.
+    ("reset cause", |start| watchdog::refuse_after_bite(start.registers)),
     ("inputs", |start| {
         pins::configure_inputs(start.registers, &pins::PINS);
         Ok(())
@@ -112,7 +117,7 @@ pub const STEPS: [(&str, Step); 12] = [
     ("PWM timers", configure_legs),
     ("control timer and encoder", |start| {
         ControlTimer(start.registers.tim3).configure(PRESCALER, CLOCK.control_ticks);
-        Encoder::configure(start.registers.tim4, start.stage);
+        Encoder::configure(start.registers.tim4, start.stage, TIM4_BY_TIM3);
         Ok(())
     }),
     ("switchgear", |start| {
@@ -125,29 +130,50 @@ pub const STEPS: [(&str, Step); 12] = [
         Ok(())
     }),
     ("break inputs", |start| {
-        start.registers.legs.forget_breaks();
-        start.wait.microseconds(10);
-        // A flag whose cause is still there cannot be cleared.
-        if start.registers.legs.is_tripped() { Err(StartError::BreakInput) } else { Ok(()) }
+        settle_breaks(&start.registers.legs.outputs(), start.wait);
+        Ok(())
     }),
     ("watchdog", |start| watchdog::start(start.registers, start.wait)),
 ];
 
-/// All steps.
+/// All steps; after one that fails all outputs are off for good.
 pub fn prepare(registers: &Registers, wait: &mut dyn Wait, plan: Plan) -> Result<Found, StartError> {
     let mut start = Start { registers, wait, stage: &POWER_STAGE, plan, found: Found::default() };
-    for (_, step) in STEPS {
-        step(&mut start)?;
+    let done = STEPS.iter().try_for_each(|(_, step)| step(&mut start));
+    done.inspect_err(|_| switch_off(registers, &pins::PINS)).and(Ok(start.found))
+}
+
+/// Time for which the start waits for gate drivers that come up later than the chip, in ms.
+const DRIVERS_MS: u32 = 200;
+
+/// Forgets what the break inputs saw before they were wired up. A driver that is not ready by the end is a fault of the drive as it is later
+/// on: its latch holds the gates until it is acknowledged.
+pub(super) fn settle_breaks<const N: usize>(outputs: &Outputs<N>, wait: &mut dyn Wait) {
+    for _ in 0..DRIVERS_MS {
+        outputs.forget_breaks();
+        wait.microseconds(1_000);
+        // A flag whose cause is still there cannot be cleared.
+        if !outputs.is_tripped() {
+            return;
+        }
     }
-    Ok(start.found)
+}
+
+/// Switches off for good, until the next reset, whatever is commanded: all gates, the chopper, and what these pins switch.
+pub fn switch_off(registers: &Registers, pins: &[Pin]) {
+    // All timers that may have gates, of whichever drive.
+    zs9::start::bridge(registers).outputs().trip();
+    switchgear::stop_chopper(registers);
+    pins::release_switches(registers, pins);
 }
 
 /// Both timers count from this instant on; from their next updates on the converters follow them. Everything must be
 /// prepared, and the interrupts be ready.
-pub fn run(registers: &Registers) {
+pub fn run(registers: &Registers, wait: &mut dyn Wait) {
+    let samplers = [control_sampler(registers), pwm_sampler(registers)];
+    samplers.iter().for_each(|sampler| sampler.refresh(wait));
     registers.legs.start();
-    control_sampler(registers).follow_timer();
-    pwm_sampler(registers).follow_timer();
+    samplers.iter().for_each(Sampler::follow_timer);
 }
 
 /// The control interrupt's converter.

@@ -1,14 +1,14 @@
 //! Contactors, discharge resistor and braking chopper.
 //!
-//! Relays and contactors are plain outputs, high to close, with an input each for their auxiliary contacts. The chopper is TIM16's
-//! channel 1, edge-aligned, 1 kHz: one period an operator's slot. Its compare is preloaded, so a duty holds for whole periods.
+//! Relays and contactors are plain outputs, high to close, with an input each for their auxiliary contacts. The chopper is TIM17's
+//! channel 1, edge-aligned, 1 kHz: one period an operator's slot. Its compare is preloaded, so a duty holds for whole periods. Its main
+//! output works as the gates' ([`super::outputs`]): off, the pin is driven low, and the chip's own break switches it off.
 
 use super::pins::{self, CHOPPER_OFF, Wire, is_high};
 use super::power_stage::CORE_HZ;
 use super::registers::Registers;
-use crate::operator::Switches;
-use crate::wire::LineTimes;
-use stm32_metapac::timer::vals::Ocm;
+use crate::operator::{LineTimes, Switches};
+use stm32_metapac::timer::vals;
 
 /// Time constants of the line side that this board file is for: 50 ohm, 100 ohm and 6 mF.
 pub const TIMES: LineTimes = LineTimes { precharge_s: 0.3, discharge_s: 0.6 };
@@ -20,21 +20,34 @@ const CHOPPER_HZ: u32 = 1_000;
 
 /// Outputs low, the chopper off and counting. Its pin is still an input then.
 pub fn configure(registers: &Registers) {
-    let timer = registers.tim16;
+    let timer = registers.tim17;
     timer.psc().write_value((CORE_HZ / CHOPPER_HZ / u32::from(CHOPPER_COUNTS) - 1) as u16);
     timer.arr().write(|w| w.set_arr(CHOPPER_COUNTS - 1));
     timer.ccr(0).write(|w| w.set_ccr(CHOPPER_OFF));
     timer.ccmr_output(0).write(|w| {
-        w.set_ocm(0, Ocm::PWM_MODE1);
+        w.set_ocm(0, vals::Ocm::PWM_MODE1);
         w.set_ocpe(0, true);
     });
     timer.ccer().write(|w| w.set_cce(0, true));
     timer.egr().write(|w| w.set_ug(true));
-    timer.bdtr().write(|w| w.set_moe(true));
+    // No break pin is wired; the chip's own break (crystal, lock-up, memory, supply) remains.
+    timer.af1().write(|w| w.set_bkine(false));
+    timer.bdtr().write(|w| {
+        w.set_ossi(vals::Ossi::IDLE_LEVEL);
+        w.set_bke(0, true);
+        w.set_bkp(0, vals::Bkp::ACTIVE_HIGH);
+        w.set_lock(vals::Lock::LEVEL2);
+        w.set_moe(true);
+    });
     timer.cr1().write(|w| {
         w.set_arpe(true);
         w.set_cen(true);
     });
+}
+
+/// Switches the chopper off for good: no duty reaches its pin any more.
+pub fn stop_chopper(registers: &Registers) {
+    registers.tim17.bdtr().modify(|w| w.set_moe(false));
 }
 
 /// The wires of a system's switchgear.
@@ -50,7 +63,7 @@ pub struct Wires {
 /// Sets all of them. From the idle loop only.
 pub fn set(registers: &Registers, switches: &Switches) {
     set_wires(registers, &pins::SWITCHGEAR, switches);
-    registers.tim16.ccr(0).write(|w| w.set_ccr(counts(switches.chopper)));
+    registers.tim17.ccr(0).write(|w| w.set_ccr(counts(switches.chopper)));
 }
 
 /// The same of any system, without a chopper.

@@ -2,6 +2,7 @@
 
 use super::bridge::Rig;
 use super::ports::{control, converted, make_ready, permitted};
+use crate::bench::control_update;
 use tractive::board::nucleo_g474re::zs9::feedback::encoded;
 use tractive::board::nucleo_g474re::zs9::{CARRIER_TICKS, CLOCK, CYCLES_PER_TICK, settings};
 use tractive::built_in::zs9::BUILT_IN;
@@ -70,6 +71,7 @@ fn the_drive_pulses_two_turning_motors_through_the_registers() {
             let counts = cycle * 4_096 / 17_000_000;
             registers.tim4.cnt().write(|w| w.set_cnt((counts % 4_096) as u16));
             registers.tim3.cnt().write(|w| w.set_cnt((counts / 2 % 4_096) as u16));
+            control_update(&registers);
             converted(&codes, registers);
             control_task.run(&mut control, &shared);
             rig.model.settle();

@@ -63,7 +63,7 @@ impl Model {
         for (index, timer) in model.pac().into_iter().enumerate().skip(1) {
             assert!(timer.egr().read_update(), "timer {index} starts with what a reset left");
         }
-        start::run(&registers);
+        start::run(&registers, &mut bench);
         model.settle();
         model
     }

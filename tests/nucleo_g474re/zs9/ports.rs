@@ -1,7 +1,7 @@
 //! What the interrupts see of the board.
 
 use super::model::Model;
-use crate::bench::Bench;
+use crate::bench::{Bench, control_update};
 use stm32_metapac::gpio::regs::Idr;
 use tractive::board::nucleo_g474re::position::Encoder;
 use tractive::board::nucleo_g474re::power_stage::AdcCode;
@@ -69,23 +69,27 @@ fn a_sample_has_both_motors_and_the_link_in_si_units() {
     let desk = DualDesk::new();
     let mut control = control(registers, &desk);
     // Channels of U, V, W: 2, 7, 14 and 15, 5, 4; capacitors 6, source 9, inductor 1.
-    converted(
-        &[
-            (2, 2_148),
-            (7, 1_948),
-            (14, 2_048),
-            (15, 1_848),
-            (5, 2_048),
-            (4, 2_248),
-            (6, 2_184),
-            (9, 1_638),
-            (1, 3_048),
-        ],
-        registers,
-    );
+    let codes = [
+        (2, 2_148),
+        (7, 1_948),
+        (14, 2_048),
+        (15, 1_848),
+        (5, 2_048),
+        (4, 2_248),
+        (6, 2_184),
+        (9, 1_638),
+        (1, 3_048),
+    ];
+    converted(&codes, registers);
     make_ready(&registers);
+    control.sample(NOW);
     registers.tim4.cnt().write(|w| w.set_cnt(256));
     registers.tim3.cnt().write(|w| w.set_cnt(512));
+    control_update(&registers);
+    // What is counted after the trigger does not reach the angles.
+    registers.tim4.cnt().write(|w| w.set_cnt(299));
+    registers.tim3.cnt().write(|w| w.set_cnt(599));
+    converted(&codes, registers);
     desk.allow_from(permitted([50.0, -20.0], 600.0), NOW);
     let sample = control.sample(NOW);
     let unit = 150.0 / 2_048.0;
@@ -119,6 +123,8 @@ fn the_gates_wait_for_both_indices_the_enable_input_and_quiet_breaks() {
         converted(&[], registers);
         make_ready(&registers);
         spoil(&registers);
+        control.sample(NOW);
+        converted(&[], registers);
         let sample = control.sample(NOW);
         assert_eq!(sample.enable, enabled);
         assert!(sample.angles.iter().all(Option::is_some), "an angle not known yet is none that is lost");
@@ -132,11 +138,13 @@ fn an_index_at_the_wrong_count_is_a_lost_sensor() {
     let mut control = control(registers, &desk);
     let mut sample = |count, index| {
         registers.tim3.cnt().write(|w| w.set_cnt(count));
+        control_update(&registers);
         registers.tim3.sr().write(|w| w.set_idxif(index));
         converted(&[], registers);
         control.sample(NOW).angles.map(|angle| angle.is_some())
     };
     assert_eq!(sample(0, true), [true, true]);
+    assert_eq!(sample(0, false), [true, true]);
     assert_eq!(sample(4_000, false), [true, true]);
     assert_eq!(sample(3_904, false), [true, true]);
     assert_eq!(sample(5, true), [true, false], "96 counts back, then 197 forward");

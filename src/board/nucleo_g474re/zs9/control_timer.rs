@@ -1,4 +1,4 @@
-//! TIM2, the control timer: its update is the control interrupt.
+//! TIM2, the control timer: its update is the control interrupt and, as TRGO, what captures both encoders.
 
 use stm32_metapac::timer::{TimGp32, regs, vals};
 
@@ -18,6 +18,7 @@ impl ControlTimer {
         timer.arr().write_value(period_ticks - 1);
         // The prescaler is taken over at an update; none comes with the start.
         timer.egr().write(|w| w.set_ug(true));
+        timer.cr2().write(|w| w.set_mms(vals::Mms::UPDATE));
         timer.smcr().write(|w| {
             w.set_ts(vals::Ts::ITR0);
             w.set_sms(vals::Sms::TRIGGER_MODE);

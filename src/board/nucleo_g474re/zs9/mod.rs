@@ -29,8 +29,8 @@ use super::power_stage::CORE_HZ;
 use crate::built_in::zs9::BUILT_IN;
 use crate::drive::dual::Settings;
 use crate::machine::Ratings;
+use crate::operator::LineTimes;
 use crate::time::Clock;
-use crate::wire::LineTimes;
 
 /// Cycles of the timers' clock in a tick of the drive's.
 pub const CYCLES_PER_TICK: u32 = 5;

@@ -58,7 +58,7 @@ impl<'a, P: Position> Control<'a, P> {
 }
 
 impl<P: Position> DualControlPort for Control<'_, P> {
-    /// Positions first: they are read, not sampled, and move on while the conversions end. A position that is not known yet is
+    /// Positions first: they have been captured, and the conversions are still under way. A position that is not known yet is
     /// none that is lost: until both are known the gates stay off.
     fn sample(&mut self, now: Instant) -> DualSample {
         let [first, second] = &mut self.positions;

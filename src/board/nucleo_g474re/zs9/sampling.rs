@@ -20,9 +20,9 @@ use crate::frames::Abc;
 /// JSQR.JEXTSEL: TIM1_TRGO2, of all three converters.
 const TRIGGER: u8 = 8;
 
-const FIRST: Sequence = Sequence { channels: [2, 7, 15, 5], count: 4, trigger: TRIGGER };
-const SECOND: Sequence = Sequence { channels: [14, 4, 6, 9], count: 4, trigger: TRIGGER };
-const THIRD: Sequence = Sequence { channels: [1; 4], count: 1, trigger: TRIGGER };
+const FIRST: Sequence = Sequence { channels: [2, 7, 15, 5], count: 4, rejected: 0, trigger: TRIGGER };
+const SECOND: Sequence = Sequence { channels: [14, 4, 6, 9], count: 4, rejected: 0, trigger: TRIGGER };
+const THIRD: Sequence = Sequence { channels: [1; 4], count: 1, rejected: 0, trigger: TRIGGER };
 
 /// Codes at no current: U, V, W of the upper motor, of the lower motor, inductor.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -86,6 +86,11 @@ impl Samplers {
             motors: [[zero(u1)?, zero(v1)?, zero(w1)?], [zero(u2)?, zero(v2)?, zero(w2)?]],
             inductor: zero(inductor)?,
         })
+    }
+
+    /// Converts once on command, for nothing, see [`Sampler::refresh`].
+    pub fn refresh(&self, wait: &mut dyn Wait) {
+        self.all().iter().for_each(|sampler| sampler.refresh(wait));
     }
 
     /// From now on the carrier starts the conversions.

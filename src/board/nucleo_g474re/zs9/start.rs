@@ -7,9 +7,9 @@ use super::sampling::{Samplers, Zeros};
 use super::stage::{STAGE, Zs9Stage};
 use super::{CLOCK, CYCLES_PER_TICK, pins};
 use crate::board::nucleo_g474re::comparators::{self, Watch};
-use crate::board::nucleo_g474re::position::Encoder;
+use crate::board::nucleo_g474re::position::{BY_TIM2, Encoder};
 use crate::board::nucleo_g474re::registers::Registers;
-use crate::board::nucleo_g474re::start::{StartError, Wait};
+use crate::board::nucleo_g474re::start::{StartError, Wait, settle_breaks, switch_off};
 use crate::board::nucleo_g474re::{clock, pins as all_pins, watchdog};
 use stm32_metapac::comp::vals::Inm;
 
@@ -42,13 +42,18 @@ pub type Step = fn(&mut Start) -> Result<(), StartError>;
 
 /// The steps in their order. The PWM timers are locked into their safe configuration before any gate pin is theirs,
 /// and break inputs and comparators watch before that; nothing counts until [`run`].
-pub const STEPS: [(&str, Step); 11] = [
-    ("reset cause", |start| watchdog::refuse_after_bite(start.registers)),
-    ("clock tree", |start| clock::configure(start.registers, start.wait)),
-    ("peripheral clocks", |start| {
-        clock::enable_peripherals(start.registers);
+pub const STEPS: [(&str, Step); 12] = [
+    ("dead-battery pull-downs", |start| {
+        clock::release_dead_battery(start.registers, start.wait);
         Ok(())
     }),
+    ("clock tree", |start| clock::configure(start.registers, start.wait)),
+    ("peripheral clocks", |start| {
+        clock::enable_peripherals(start.registers, start.wait);
+        Ok(())
+    }),
+    // Not earlier: what is refused is told over the bus, which needs the crystal and its pins.
+    ("reset cause", |start| watchdog::refuse_after_bite(start.registers)),
     ("inputs", |start| {
         all_pins::configure_inputs(start.registers, &pins::PINS);
         Ok(())
@@ -66,8 +71,8 @@ pub const STEPS: [(&str, Step); 11] = [
     ("control timer, encoders, gate feedback", |start| {
         let Registers { tim2, tim3, tim4, .. } = *start.registers;
         ControlTimer(tim2).configure(CYCLES_PER_TICK as u16, CLOCK.control_ticks);
-        Encoder::configure(tim4, &start.stage.common);
-        Encoder::configure(tim3, &start.stage.common);
+        Encoder::configure(tim4, &start.stage.common, BY_TIM2);
+        Encoder::configure(tim3, &start.stage.common, BY_TIM2);
         feedback(start.registers).configure();
         Ok(())
     }),
@@ -80,29 +85,26 @@ pub const STEPS: [(&str, Step); 11] = [
         Ok(())
     }),
     ("break inputs", |start| {
-        let outputs = bridge(start.registers).outputs();
-        outputs.forget_breaks();
-        start.wait.microseconds(10);
-        // A flag whose cause is still there cannot be cleared.
-        if outputs.is_tripped() { Err(StartError::BreakInput) } else { Ok(()) }
+        settle_breaks(&bridge(start.registers).outputs(), start.wait);
+        Ok(())
     }),
     ("watchdog", |start| watchdog::start(start.registers, start.wait)),
 ];
 
-/// All steps; gives the zeros of the current sensors.
+/// All steps; gives the zeros of the current sensors. After one that fails all outputs are off for good.
 pub fn prepare(registers: &Registers, wait: &mut dyn Wait) -> Result<Zeros, StartError> {
     let mut start = Start { registers, wait, stage: &STAGE, zeros: Zeros::default() };
-    for (_, step) in STEPS {
-        step(&mut start)?;
-    }
-    Ok(start.zeros)
+    let done = STEPS.iter().try_for_each(|(_, step)| step(&mut start));
+    done.inspect_err(|_| switch_off(registers, &pins::PINS)).and(Ok(start.zeros))
 }
 
 /// All timers count from this instant on, a valley; from their next beat on the converters follow them. Everything must be
 /// prepared, and the interrupts be ready.
-pub fn run(registers: &Registers) {
+pub fn run(registers: &Registers, wait: &mut dyn Wait) {
+    let samplers = Samplers::new(registers);
+    samplers.refresh(wait);
     bridge(registers).start();
-    Samplers::new(registers).follow_timer();
+    samplers.follow_timer();
 }
 
 /// The nine gates' timers.
