@@ -5,7 +5,7 @@ use tractive::board::{
     ControlPort, DualControlPort, DualPwmPort, DualSample, GateFeedback, MotorDemand, PlayedPeriod,
     PowerSample, PwmPort, Sample,
 };
-use tractive::control::{Demand, Gains, LinkWindow, Measurements};
+use tractive::control::{Demand, Gains, LinkWindow};
 use tractive::drive::Report;
 use tractive::drive::dual::{self, DualReport};
 use tractive::drive::traction;
@@ -65,11 +65,9 @@ impl Board {
 impl ControlPort for Board {
     fn sample(&mut self, _now: Instant) -> Sample {
         Sample {
-            measured: Measurements {
-                currents_a: currents(self.now, Dq { d: -30.0, q: 40.0 }),
-                udc_v: 1500.0,
-                angle: angle(self.now),
-            },
+            currents_a: currents(self.now, Dq { d: -30.0, q: 40.0 }),
+            udc_v: 1500.0,
+            angle: Some(angle(self.now)),
             demand: Demand { torque_nm: 200.0, slew_limited: false },
             enable: true,
             window: LinkWindow::OPEN,

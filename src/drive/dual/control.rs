@@ -96,12 +96,16 @@ impl<M: Machine> ControlTask<M> {
         let newest = shared.applied.read();
         let applied = newest.filter(|applied| now.reached(applied.at));
         let sample = port.sample(now);
+        let before = self.acknowledged;
         // Once the PWM interrupt has: what it told before that cannot come back.
         if sample.acknowledge != self.acknowledged
             && applied.as_ref().is_some_and(|applied| applied.acknowledged == sample.acknowledge)
         {
             self.acknowledged = sample.acknowledge;
             self.trip = None;
+        }
+        if self.acknowledged != before {
+            self.axes.iter_mut().for_each(Axis::recover_angle);
         }
         if self.trip.is_none() {
             // Also from beyond this call: only where calls of it have been lost.
@@ -220,7 +224,7 @@ impl<M: Machine> ControlTask<M> {
                     axis.track(measured, trusted, &self.settings)
                 }
                 None => {
-                    violation = violation.or(Some((fault, 1.0, 0.0)));
+                    violation = violation.or(axis.lose_angle(fault, sample.enable));
                     None
                 }
             };
