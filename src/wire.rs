@@ -9,7 +9,7 @@
 mod dual;
 
 use crate::cell::Words;
-use crate::control::{Demand, LinkWindow, Measurements};
+use crate::control::{Demand, LinkWindow};
 use crate::drive::{Report, half_from_words, half_to_words};
 use crate::frames::{Abc, Angle};
 use crate::modulation::CarrierPeriod;
@@ -196,23 +196,21 @@ pub fn setup_from_block(block: &Block) -> Setup {
 
 /// The answer to [`Request::ControlSample`]; `stop` ends the run.
 pub fn sample_to_block(sample: &Sample, stop: bool) -> Block {
-    let measured = &sample.measured;
     let flags = u32::from(sample.enable) | u32::from(sample.demand.slew_limited) << 1 | u32::from(stop) << 2;
-    let [a, b, c] = measured.currents_a.to_bits();
+    let [a, b, c] = sample.currents_a.to_bits();
     let torque = sample.demand.torque_nm.to_bits();
     let hardware = sample.hardware.map_or(0, |fault| fault as u32);
-    [a, b, c, measured.udc_v.to_bits(), measured.angle.0, torque, flags, hardware, 0, 0, 0, 0, 0, 0, 0, 0]
+    let angle = sample.measured().angle.0;
+    [a, b, c, sample.udc_v.to_bits(), angle, torque, flags, hardware, 0, 0, 0, 0, 0, 0, 0, 0]
 }
 
 /// The inverse of [`sample_to_block`].
 pub fn sample_from_block(block: &Block) -> (Sample, bool) {
     let [a, b, c, udc, angle, torque, flags, hardware, ..] = *block;
     let sample = Sample {
-        measured: Measurements {
-            currents_a: Abc::from_bits([a, b, c]),
-            udc_v: f32::from_bits(udc),
-            angle: Angle(angle),
-        },
+        currents_a: Abc::from_bits([a, b, c]),
+        udc_v: f32::from_bits(udc),
+        angle: Some(Angle(angle)),
         demand: Demand { torque_nm: f32::from_bits(torque), slew_limited: flags & 2 != 0 },
         enable: flags & 1 != 0,
         window: LinkWindow::OPEN,

@@ -5,7 +5,7 @@
 
 use proptest::prelude::*;
 use tractive::built_in::{traction::BUILT_IN, zs9};
-use tractive::control::{Demand, Gains, LinkWindow, Measurements};
+use tractive::control::{Demand, Gains, LinkWindow};
 use tractive::drive::Report;
 use tractive::drive::dual::{self, DualReport};
 use tractive::drive::traction;
@@ -131,11 +131,9 @@ impl Board {
 impl ControlPort for Board {
     fn sample(&mut self, now: Instant) -> Sample {
         let mut sample = Sample {
-            measured: Measurements {
-                currents_a: currents(self.omega, now.0, Dq { d: -30.0, q: 40.0 }),
-                udc_v: 1500.0,
-                angle: angle(self.omega, now.0),
-            },
+            currents_a: currents(self.omega, now.0, Dq { d: -30.0, q: 40.0 }),
+            udc_v: 1500.0,
+            angle: Some(angle(self.omega, now.0)),
             demand: Demand { torque_nm: 200.0, slew_limited: false },
             enable: true,
             window: LinkWindow::OPEN,
@@ -145,11 +143,11 @@ impl ControlPort for Board {
         let Some((field, bits)) = self.spoilt else { return sample };
         let value = f32::from_bits(bits);
         match field {
-            0 => sample.measured.currents_a.a = value,
-            1 => sample.measured.currents_a.b = value,
-            2 => sample.measured.currents_a.c = value,
-            3 => sample.measured.udc_v = value,
-            4 => sample.measured.angle = Angle(bits),
+            0 => sample.currents_a.a = value,
+            1 => sample.currents_a.b = value,
+            2 => sample.currents_a.c = value,
+            3 => sample.udc_v = value,
+            4 => sample.angle = Angle(bits),
             5 => sample.demand.torque_nm = value,
             6 => sample.demand.slew_limited = true,
             7 => sample.enable = false,

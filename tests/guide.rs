@@ -4,7 +4,7 @@ use std::path::Path;
 use tractive::board::nucleo_g474re::power_stage::{CORE_HZ, POWER_STAGE, cycles_to_ticks, ns_to_cycles};
 use tractive::board::nucleo_g474re::{self, PRESCALER, sampling};
 use tractive::built_in::traction::BUILT_IN;
-use tractive::control::{Demand, Gains, LinkWindow, Measurements};
+use tractive::control::{Demand, Gains, LinkWindow};
 use tractive::drive::Report;
 use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
 use tractive::frames::{Abc, Angle};
@@ -48,7 +48,9 @@ impl ControlPort for Bench {
         let turns = f64::from(now.0) / f64::from(self.clock.ticks_per_s) * 2.0;
         let angle = Angle((turns.rem_euclid(1.0) * 4_294_967_296.0) as u32);
         Sample {
-            measured: Measurements { currents_a: Abc::default(), udc_v: 1_500.0, angle },
+            currents_a: Abc::default(),
+            udc_v: 1_500.0,
+            angle: Some(angle),
             demand: Demand::default(),
             enable: now.reached(self.enabled_at),
             window: LinkWindow::OPEN,

@@ -44,7 +44,14 @@ impl Bench {
                 pac::rcc::Rcc::from_ptr(rcc.cast()),
             )
         };
+        rcc.cr().modify(|w| w.set_hserdy(true));
         Self { registers, ram, rcc, can: Can::new(can, memory) }
+    }
+
+    /// The only frame that has come.
+    fn receive(&mut self) -> Option<Frame> {
+        let mut frames = [Frame::default(); 1];
+        (self.can.receive(&mut frames) == 1).then_some(frames[0])
     }
 
     fn configured() -> Self {
@@ -172,7 +179,7 @@ fn the_protocols_commands_pass_the_filters_and_nothing_else_does() {
 #[test]
 fn a_frame_is_read_from_the_element_that_the_controller_names_and_given_back() {
     let mut bench = Bench::configured();
-    assert_eq!(bench.can.receive(), None);
+    assert_eq!(bench.receive(), None);
     for index in 0..3_u32 {
         let base = RX_FIFO_0 + index as usize * ELEMENT;
         bench.put(base, 0x101 << 18);
@@ -181,10 +188,33 @@ fn a_frame_is_read_from_the_element_that_the_controller_names_and_given_back() {
         bench.put(base + 3, 0x0807_0605);
         bench.write(RXF0S, 1 | index << 8);
         bench.write(RXF0A, 0xFF);
-        let frame = bench.can.receive().unwrap();
+        let frame = bench.receive().unwrap();
         let data = [1 + index as u8, 2, 3, 4, 5, 6, 7, 8];
         assert_eq!(frame, Frame { id: 0x101, length: 8, data });
         assert_eq!(bench.read(RXF0A), index, "acknowledged");
+    }
+}
+
+#[test]
+fn all_that_wait_are_read_in_their_order_and_given_back_together() {
+    let mut bench = Bench::configured();
+    for index in 0..3_u32 {
+        let base = RX_FIFO_0 + index as usize * ELEMENT;
+        bench.put(base, (0x100 + index) << 18);
+        bench.put(base + 1, 8 << 16);
+    }
+    for (level, first, room, ids, last) in [
+        (3, 1, 8, &[0x101, 0x102, 0x100][..], 0),
+        (2, 2, 8, &[0x102, 0x100], 0),
+        (3, 0, 2, &[0x100, 0x101], 1),
+        (1, 1, 0, &[], 0xFF),
+    ] {
+        bench.write(RXF0S, level | first << 8);
+        bench.write(RXF0A, 0xFF);
+        let mut frames = [Frame::default(); 8];
+        let taken = bench.can.receive(&mut frames[..room]);
+        assert_eq!(frames[..taken].iter().map(|frame| frame.id).collect::<Vec<_>>(), ids);
+        assert_eq!(bench.read(RXF0A), last, "acknowledged");
     }
 }
 
@@ -197,7 +227,7 @@ fn bytes_that_were_not_sent_are_zero_and_codes_above_eight_mean_eight() {
         bench.put(RX_FIFO_0 + 2, u32::MAX);
         bench.put(RX_FIFO_0 + 3, u32::MAX);
         bench.write(RXF0S, 1);
-        let frame = bench.can.receive().unwrap();
+        let frame = bench.receive().unwrap();
         let length = code.min(8) as u8;
         assert_eq!((frame.id, frame.length), (0x7FF, length));
         assert!(frame.data.iter().enumerate().all(|(k, byte)| (*byte == 0xFF) == (k < usize::from(length))));

@@ -2,7 +2,7 @@
 //! turns the gates off in it. Instants here are real ones; the tasks count theirs, and fall behind with every interrupt they miss.
 
 use tractive::built_in::{traction::BUILT_IN, zs9};
-use tractive::control::{Demand, Gains, LinkWindow, Measurements};
+use tractive::control::{Demand, Gains, LinkWindow};
 use tractive::drive::Report;
 use tractive::drive::dual::{self, DualReport};
 use tractive::drive::traction;
@@ -65,11 +65,9 @@ impl Board {
 impl ControlPort for Board {
     fn sample(&mut self, _now: Instant) -> Sample {
         Sample {
-            measured: Measurements {
-                currents_a: currents(self.now, Dq { d: -30.0, q: 40.0 }),
-                udc_v: 1500.0,
-                angle: angle(self.now),
-            },
+            currents_a: currents(self.now, Dq { d: -30.0, q: 40.0 }),
+            udc_v: 1500.0,
+            angle: Some(angle(self.now)),
             demand: Demand { torque_nm: 200.0, slew_limited: false },
             enable: true,
             window: LinkWindow::OPEN,

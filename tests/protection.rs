@@ -1,7 +1,7 @@
 //! Every fault, by name, with value and limit, and the gates in the safe state in the same interrupt.
 
 use tractive::built_in::traction::BUILT_IN;
-use tractive::control::{Demand, Gains, LinkWindow, Measurements};
+use tractive::control::{Demand, Gains, LinkWindow};
 use tractive::drive::Report;
 use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
 use tractive::frames::{Abc, Angle, Dq};
@@ -86,11 +86,9 @@ impl Fake {
 impl ControlPort for Fake {
     fn sample(&mut self, now: Instant) -> Sample {
         let mut sample = Sample {
-            measured: Measurements {
-                currents_a: self.currents(now),
-                udc_v: self.udc_v,
-                angle: self.angle(now),
-            },
+            currents_a: self.currents(now),
+            udc_v: self.udc_v,
+            angle: Some(self.angle(now)),
             demand: Demand { torque_nm: 200.0, slew_limited: false },
             enable: true,
             window: LinkWindow::OPEN,
@@ -213,7 +211,7 @@ fn found_at(omega: f32, fault: Fault, periods: u32, spoil: fn(&mut Sample)) -> T
 #[test]
 fn overcurrent_is_found_in_one_period() {
     let trip = found_by_control(Fault::Overcurrent, 1, |sample| {
-        sample.measured.currents_a = Abc { a: 320.0, b: -160.0, c: -160.0 };
+        sample.currents_a = Abc { a: 320.0, b: -160.0, c: -160.0 };
     });
     assert_eq!((trip.value, trip.limit), (320.0, BUILT_IN.ratings.trip_current_a));
     assert_eq!(trip.safe, SafeState::GatesOff);
@@ -221,43 +219,43 @@ fn overcurrent_is_found_in_one_period() {
 
 #[test]
 fn the_link_is_watched() {
-    let over = found_by_control(Fault::DcOvervoltage, 1, |sample| sample.measured.udc_v = 2200.0);
+    let over = found_by_control(Fault::DcOvervoltage, 1, |sample| sample.udc_v = 2200.0);
     assert_eq!((over.value, over.limit), (2200.0, BUILT_IN.ratings.trip_dc_over_v));
-    found_by_control(Fault::DcUndervoltage, 1, |sample| sample.measured.udc_v = 700.0);
+    found_by_control(Fault::DcUndervoltage, 1, |sample| sample.udc_v = 700.0);
 }
 
 #[test]
 fn what_is_not_finite_is_a_fault() {
-    found_by_control(Fault::NotFinite, 1, |sample| sample.measured.udc_v = f32::NAN);
-    found_by_control(Fault::NotFinite, 1, |sample| sample.measured.udc_v = f32::INFINITY);
-    found_by_control(Fault::NotFinite, 1, |sample| sample.measured.currents_a.b = f32::NAN);
-    found_by_control(Fault::NotFinite, 1, |sample| sample.measured.currents_a.c = f32::NEG_INFINITY);
+    found_by_control(Fault::NotFinite, 1, |sample| sample.udc_v = f32::NAN);
+    found_by_control(Fault::NotFinite, 1, |sample| sample.udc_v = f32::INFINITY);
+    found_by_control(Fault::NotFinite, 1, |sample| sample.currents_a.b = f32::NAN);
+    found_by_control(Fault::NotFinite, 1, |sample| sample.currents_a.c = f32::NEG_INFINITY);
     found_by_control(Fault::NotFinite, 1, |sample| sample.demand.torque_nm = f32::NAN);
 }
 
 #[test]
 fn phases_must_add_up() {
-    found_by_control(Fault::PhaseSum, 1, |sample| sample.measured.currents_a.a += 30.0);
+    found_by_control(Fault::PhaseSum, 1, |sample| sample.currents_a.a += 30.0);
 }
 
 #[test]
 fn frozen_measurements_are_found() {
     found_by_control(Fault::Frozen, 21, |sample| {
-        sample.measured.currents_a = Abc { a: 50.0, b: -20.0, c: -30.0 };
+        sample.currents_a = Abc { a: 50.0, b: -20.0, c: -30.0 };
     });
     // Too slow for a surprise.
     found_at(20.0, Fault::Frozen, 140, |sample| {
-        sample.measured.angle = Fake::turning(20.0).angle(Instant(SETTLED));
+        sample.angle = Some(Fake::turning(20.0).angle(Instant(SETTLED)));
     });
     found_by_control(Fault::AngleLost, 2, |sample| {
-        sample.measured.angle = Fake::turning(400.0).angle(Instant(SETTLED));
+        sample.angle = Some(Fake::turning(400.0).angle(Instant(SETTLED)));
     });
 }
 
 #[test]
 fn an_angle_that_cannot_be_is_found_at_once() {
     let trip = found_by_control(Fault::AngleLost, 1, |sample| {
-        sample.measured.angle = sample.measured.angle + Angle::from_radians(0.06);
+        sample.angle = sample.angle.map(|angle| angle + Angle::from_radians(0.06));
     });
     assert!((trip.value - 0.06).abs() < 1e-3, "{trip:?}");
 }
@@ -352,7 +350,7 @@ fn passing(spoil: fn(&mut Sample), acknowledge_from: u32) -> Fake {
 }
 
 fn overvoltage(sample: &mut Sample) {
-    sample.measured.udc_v = 2200.0;
+    sample.udc_v = 2200.0;
 }
 
 #[test]
@@ -432,7 +430,7 @@ fn what_holds_the_gates_in_hardware_has_its_name() {
 fn an_empty_link_is_a_fault_only_where_the_gates_may_be_on() {
     let mut fake = Fake {
         spoil: |sample| {
-            sample.measured.udc_v = 3.0;
+            sample.udc_v = 3.0;
             sample.enable = false;
         },
         ..Fake::turning(0.0)
@@ -473,4 +471,44 @@ fn a_cause_in_hardware_names_the_fault_where_the_gates_are_held() {
     let trip = drive(&mut fake, END, u32::MAX).unwrap();
     assert_eq!(trip.fault, Fault::GateDriver);
     assert!(trip.at.0 >= SETTLED + 100_000, "the one after the acknowledge");
+}
+
+/// Long enough for a speed to be followed until it is used, and for pulses to follow.
+const FOLLOWED: u32 = 600_000;
+
+#[test]
+fn an_angle_that_has_jumped_is_lost_once_and_followed_anew_after_an_acknowledge() {
+    let jumped: fn(&mut Sample) =
+        |sample| sample.angle = sample.angle.map(|angle| angle + Angle::from_radians(1.571));
+    let forever = |acknowledge_from| Fake { spoil_until: u32::MAX, ..passing(jumped, acknowledge_from) };
+    let trip = drive(&mut forever(u32::MAX), END, u32::MAX);
+    assert_eq!(trip.map(|trip| trip.fault), Some(Fault::AngleLost));
+    let acknowledged = SETTLED + 100_000;
+    let mut fake = forever(acknowledged);
+    assert_eq!(drive(&mut fake, acknowledged + FOLLOWED, u32::MAX), None);
+    assert_eq!(
+        fake.faults.iter().map(|(fault, _)| *fault).collect::<Vec<_>>(),
+        [Some(Fault::AngleLost), None]
+    );
+    assert!(fake.pulsed > acknowledged + FOLLOWED - 40_000, "the machine is caught");
+}
+
+#[test]
+fn an_angle_that_is_not_known_yet_is_no_fault_until_pulses_are_wanted() {
+    let unknown: fn(&mut Sample) = |sample| (sample.angle, sample.enable) = (None, false);
+    let mut fake = Fake { spoil: unknown, spoil_from: 0, spoil_until: SETTLED, ..Fake::turning(400.0) };
+    assert_eq!(drive(&mut fake, SETTLED - 1, u32::MAX), None);
+    assert!(!fake.report.speed_known && fake.pulsed == 0);
+    let mut fake = Fake { spoil_from: 0, ..fake };
+    assert_eq!(drive(&mut fake, SETTLED + FOLLOWED, u32::MAX), None, "it is followed from where it is");
+    assert!(fake.report.speed_known && fake.pulsed > SETTLED + FOLLOWED - 40_000);
+    // Wanted, or known before.
+    for (from, spoil) in
+        [(0, (|sample: &mut Sample| sample.angle = None) as fn(&mut Sample)), (SETTLED, unknown)]
+    {
+        let mut fake = Fake { spoil, spoil_from: from, ..Fake::turning(400.0) };
+        let trip = drive(&mut fake, END, u32::MAX);
+        assert_eq!(trip.map(|trip| trip.fault), Some(Fault::PositionSensor));
+        assert!(fake.pulsed < from + 20_000, "and no pulse");
+    }
 }

@@ -263,10 +263,10 @@ pub struct Idle {
 }
 
 impl OperatorPort for Idle {
-    fn ask(&mut self, at: Instant) -> (operator::Request, Feedback) {
+    fn ask(&mut self, at: Instant, slots: u32) -> (operator::Request, Feedback) {
         let (request, feedback, frame) = exchange::ask(at);
         let request = match &mut self.station {
-            Some(station) => station.listen(DESK.observed(), frame.as_ref()),
+            Some(station) => station.listen(DESK.observed(), slots, frame.as_ref()),
             None => request,
         };
         (request, feedback)

@@ -14,6 +14,7 @@ use tractive::built_in::traction::{BUILT_IN, BuiltIn};
 use tractive::control::Gains;
 use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
 use tractive::modulation::Devices;
+use tractive::protection::Violation;
 use tractive::time::Instant;
 
 static SHARED: Shared = Shared::recorded_by(&RECORDER);
@@ -47,16 +48,19 @@ fn kept(cells: &[AtomicU32; 3]) -> Zeros {
 
 #[entry]
 fn main() -> ! {
+    board::idle(start().err())
+}
+
+/// Starts the drive; the error is why it is refused.
+fn start() -> Result<(), Violation> {
     let checked = settings().check(&BUILT_IN).and_then(|()| POWER_STAGE.check(&BUILT_IN.ratings));
-    if let Err(refused) = checked {
-        board::refuse(&refused);
-    }
-    if let Ok(found) = board::prepare(Plan { shortest_half_ticks: settings().devices.shortest_half_ticks }) {
-        keep(&CONTROL_ZEROS, found.control_zeros);
-        keep(&PWM_ZEROS, found.pwm_zeros);
-        board::run();
-    }
-    board::idle()
+    checked.map_err(|refused| board::refuse(&refused))?;
+    let plan = Plan { shortest_half_ticks: settings().devices.shortest_half_ticks };
+    let found = board::prepare(plan).map_err(|error| error.violation())?;
+    keep(&CONTROL_ZEROS, found.control_zeros);
+    keep(&PWM_ZEROS, found.pwm_zeros);
+    board::run();
+    Ok(())
 }
 
 /// Deadline: the next control interrupt. Missed: fault `control_deadline`, gates into the safe state.

@@ -7,10 +7,11 @@ use tractive::board::nucleo_g474re::power_stage::{AdcCode, PowerStage};
 use tractive::board::nucleo_g474re::registers::Registers;
 use tractive::board::nucleo_g474re::zs9::sampling::Zeros;
 use tractive::board::nucleo_g474re::zs9::stage::STAGE;
-use tractive::board::nucleo_g474re::zs9::{self as board, Control, DESK, Pwm, RECORDER, settings};
-use tractive::board::nucleo_g474re::{Interrupt as interrupt, PULSE, die, refuse};
+use tractive::board::nucleo_g474re::zs9::{self as board, Control, OPERATOR, Pwm, RECORDER, settings};
+use tractive::board::nucleo_g474re::{Interrupt as interrupt, PULSE, die};
 use tractive::built_in::zs9::{BUILT_IN, BuiltIn};
 use tractive::drive::dual::{ControlTask, PwmTask, Shared};
+use tractive::protection::Violation;
 
 static SHARED: Shared = Shared::recorded_by(&RECORDER);
 /// What the start measured, written before the interrupts are unmasked.
@@ -31,14 +32,15 @@ fn kept() -> Zeros {
 
 #[entry]
 fn main() -> ! {
-    if let Err(refused) = settings().check(&BUILT_IN) {
-        refuse(&refused);
-    }
-    if let Ok(zeros) = board::prepare() {
-        keep(&zeros);
-        board::run();
-    }
-    board::idle()
+    board::idle(start().err())
+}
+
+/// Starts the drive; the error is why it is refused.
+fn start() -> Result<(), Violation> {
+    settings().check(&BUILT_IN).map_err(|refused| board::refuse(&refused))?;
+    keep(&board::prepare().map_err(|error| error.violation())?);
+    board::run();
+    Ok(())
 }
 
 /// Deadline: the last peak before the next control interrupt. Missed: fault `control_deadline`, all gates off.
@@ -54,7 +56,7 @@ fn TIM2() {
             Encoder::new(timer, &stage, BUILT_IN.ratings.pole_pairs as u32)
         };
         let encoders = [encoder(registers.tim4, first), encoder(registers.tim3, second)];
-        Control::new(registers, kept(), encoders, &DESK)
+        Control::new(registers, kept(), encoders, &OPERATOR)
     });
     board.acknowledge();
     TASK.get_or_insert_with(|| ControlTask::new(BuiltIn, settings())).run(board, &SHARED);

@@ -8,6 +8,7 @@ use crate::drive::dual::DualReport;
 use crate::drive::{Report, trip_from_words, trip_to_words};
 use crate::modulation::Mode;
 use crate::ports::MotorDemand;
+use crate::protection::Trip;
 use crate::time::{Clock, Instant};
 use core::sync::atomic::{AtomicU32, Ordering};
 
@@ -33,6 +34,8 @@ pub trait Slotted: Copy {
     fn of(at: Instant, report: &Self::Report) -> Self;
     /// That instant.
     fn at(&self) -> Instant;
+    /// The word of a drive that has not started: the fault that says why, and no measurement.
+    fn refused(at: Instant, trip: Trip) -> Self;
 }
 
 impl Slotted for Observation {
@@ -60,6 +63,11 @@ impl Slotted for Observation {
     fn at(&self) -> Instant {
         self.at
     }
+
+    fn refused(at: Instant, trip: Trip) -> Self {
+        let report = Report { udc_v: f32::NAN, trip: Some(trip), ..Report::default() };
+        Self::of(at, &report)
+    }
 }
 
 impl Slotted for DualObservation {
@@ -73,6 +81,11 @@ impl Slotted for DualObservation {
     #[inline]
     fn at(&self) -> Instant {
         self.at
+    }
+
+    fn refused(at: Instant, trip: Trip) -> Self {
+        let (capacitor_v, source_v) = (f32::NAN, f32::NAN);
+        Self { at, report: DualReport { capacitor_v, source_v, trip: Some(trip), ..DualReport::default() } }
     }
 }
 
@@ -256,23 +269,6 @@ where
     }
 }
 
-/// Somewhere to look what a drive says of itself.
-pub trait Watched<O> {
-    /// The newest slot's words; `None` before the first.
-    fn observed(&self) -> Option<O>;
-}
-
-impl<P, O, const PERMIT: usize, const OBSERVATION: usize> Watched<O> for Desk<P, O, PERMIT, OBSERVATION>
-where
-    P: Grant,
-    O: Slotted + Words<OBSERVATION>,
-    Timed<P>: Words<PERMIT>,
-{
-    fn observed(&self) -> Option<O> {
-        self.observed()
-    }
-}
-
 #[cfg(not(loom))]
 impl<P, O, const PERMIT: usize, const OBSERVATION: usize> Default for Desk<P, O, PERMIT, OBSERVATION>
 where
@@ -286,6 +282,12 @@ where
 }
 
 /// The slot after the one that begins at `at`.
-fn next_slot(at: Instant, clock: &Clock) -> Instant {
+pub(super) fn next_slot(at: Instant, clock: &Clock) -> Instant {
     at.after(SLOT_PERIODS.wrapping_mul(clock.control_ticks))
+}
+
+/// Slots from the one that began at `done` to the one at `at`, 1 at least.
+pub(super) fn slots_between(done: Instant, at: Instant, clock: &Clock) -> u32 {
+    let ticks = at.since(done).unsigned_abs();
+    (ticks / SLOT_PERIODS.wrapping_mul(clock.control_ticks).max(1)).max(1)
 }

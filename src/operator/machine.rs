@@ -193,7 +193,8 @@ impl<D: Demands> Operator<D> {
             Phase::SelfTest { slots } => {
                 *slots = slots.saturating_add(1);
                 if *slots as f32 * settings.slot_s >= SELF_TEST_S {
-                    if input.observed.speed_known {
+                    // A position that is not known yet has no speed; the drive cannot be enabled before it is.
+                    if input.observed.speed_known || !input.feedback.position_known {
                         self.phase = Phase::Ready;
                     } else {
                         self.trip((Fault::PositionSensor, 0.0, 1.0), input);

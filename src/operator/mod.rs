@@ -23,7 +23,7 @@ mod settings;
 mod slot;
 mod status;
 
-pub use cells::{Grant, Slotted, Timed, Watched};
+pub use cells::{Grant, Slotted, Timed};
 pub use demand::{Demands, TorqueDemand};
 pub use dual::{DualDemands, DualObservation, DualPermit, DualRequest, MotorLimits, MotorRequest, Wanted};
 pub use ramp::{Ramp, Rates};

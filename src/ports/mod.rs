@@ -6,7 +6,7 @@ mod dual;
 
 use crate::control::{Demand, LinkWindow, Measurements};
 use crate::drive::Report;
-use crate::frames::Abc;
+use crate::frames::{Abc, Angle};
 use crate::modulation::CarrierPeriod;
 use crate::protection::{Fault, LegFaults, SafeState};
 use crate::time::Instant;
@@ -19,8 +19,12 @@ pub use dual::{
 /// A control sample: what the converters hold, and what the operator wants.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sample {
-    /// Currents, DC-link voltage and angle at the control timer's nominal instant.
-    pub measured: Measurements,
+    /// Phase currents at the control timer's nominal instant, positive into the machine, in A.
+    pub currents_a: Abc,
+    /// DC-link voltage at that instant, in V.
+    pub udc_v: f32,
+    /// Rotor angle at that instant, electrical; `None` while it is not known, or no longer.
+    pub angle: Option<Angle>,
     /// The torque demand.
     pub demand: Demand,
     /// Whether the gates may be on.
@@ -31,6 +35,15 @@ pub struct Sample {
     pub acknowledge: u8,
     /// What holds the gates off in hardware.
     pub hardware: Option<Fault>,
+}
+
+impl Sample {
+    /// The control law's measurements. An angle that is not known counts as 0; no pulses are made of it.
+    #[inline]
+    pub fn measured(&self) -> Measurements {
+        let Self { currents_a, udc_v, angle, .. } = *self;
+        Measurements { currents_a, udc_v, angle: angle.unwrap_or(Angle::ZERO) }
+    }
 }
 
 /// What the control interrupt needs of a board.

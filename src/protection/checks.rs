@@ -15,6 +15,11 @@ pub fn check_angle(surprise_rad: f32) -> Option<Violation> {
     (off_rad > SURPRISE_RAD).then_some((Fault::AngleLost, off_rad, SURPRISE_RAD))
 }
 
+/// An angle that is not known, where it is `needed`.
+pub fn check_known(needed: bool) -> Option<Violation> {
+    needed.then_some((Fault::PositionSensor, 0.0, 1.0))
+}
+
 /// Share of the largest current that the sum of the phases may reach.
 const PHASE_SUM_SHARE: f32 = 0.1;
 

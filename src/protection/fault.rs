@@ -67,11 +67,13 @@ pub enum Fault {
     AngleLost,
     /// Drivers found their devices short-circuited and block them; the value has a bit for each, from bit 0 on uh ul vh vl wh wl.
     DriverBlocked,
+    /// The board refused to start; the value is the number of its reason.
+    StartRefused,
 }
 
 impl Fault {
     /// All of them, in the order of their codes, which begin at 1.
-    pub const ALL: [Self; 29] = [
+    pub const ALL: [Self; 30] = [
         Self::Overcurrent,
         Self::DcOvervoltage,
         Self::DcUndervoltage,
@@ -101,6 +103,7 @@ impl Fault {
         Self::DischargeTimeout,
         Self::AngleLost,
         Self::DriverBlocked,
+        Self::StartRefused,
     ];
 
     /// The fault with this code; `None` for 0 or an unknown number.
@@ -140,6 +143,7 @@ impl Fault {
             Self::DischargeTimeout => "discharge_timeout",
             Self::AngleLost => "angle_lost",
             Self::DriverBlocked => "driver_blocked",
+            Self::StartRefused => "start_refused",
         }
     }
 }

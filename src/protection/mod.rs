@@ -14,7 +14,7 @@ mod link;
 mod safe;
 
 pub use checks::{
-    SURPRISE_RAD, check_angle, check_currents, check_demand, check_measurements, check_speed,
+    SURPRISE_RAD, check_angle, check_currents, check_demand, check_known, check_measurements, check_speed,
     check_undervoltage,
 };
 pub use disarmed::Disarmed;

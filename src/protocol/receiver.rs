@@ -35,8 +35,8 @@ struct Channel {
 impl Channel {
     const NEW: Self = Self { sequence: Sequence::new(), silent_ms: 0 };
 
-    fn age(&mut self, longest_ms: u32) {
-        self.silent_ms = self.silent_ms.saturating_add(1);
+    fn age(&mut self, slots: u32, longest_ms: u32) {
+        self.silent_ms = self.silent_ms.saturating_add(slots);
         if self.silent_ms >= longest_ms {
             self.sequence.forget();
         }
@@ -86,11 +86,11 @@ impl<D: Dialect> Receiver<D> {
         Self { channels: [Channel::NEW; MOST], counts, dialect: core::marker::PhantomData }
     }
 
-    /// A millisecond passes; the command begins anew after a silence of `command_ms`.
-    pub fn wait(&mut self, command_ms: u32) {
+    /// So many slots of a millisecond pass; the command begins anew after a silence of `command_ms`.
+    pub fn wait(&mut self, slots: u32, command_ms: u32) {
         let mut longest_ms = command_ms;
         for channel in &mut self.channels {
-            channel.age(longest_ms);
+            channel.age(slots, longest_ms);
             longest_ms = SILENCE_MS;
         }
     }

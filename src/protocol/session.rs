@@ -1,4 +1,4 @@
-//! The drive's end: frames in, a request out; a status in, frames out. One step a slot of 1 ms, one frame a slot at most each way.
+//! The drive's end: frames in, a request out; a status in, frames out. One step a slot of 1 ms, one frame a slot is sent at most.
 
 use super::commands::ParameterRequest;
 use super::dialect::{Dialect, Request, Taken, Told as DriveTold};
@@ -9,6 +9,7 @@ use super::sender::Sender;
 use super::telemetry::{Counts, Listening, Outcome, ParameterAnswer, StatusFrame};
 use crate::machine::Ratings;
 use crate::operator::{State, Status};
+use core::borrow::Borrow;
 
 /// What is sent of.
 #[derive(Clone, Copy, Debug)]
@@ -52,11 +53,17 @@ impl<D: Dialect> Session<D> {
         }
     }
 
-    /// The slot's first half: what has come, and what is asked of the drive now.
-    pub fn listen(&mut self, received: Option<&Frame>) -> Request<D> {
-        self.wait();
-        if let Some(Ok(content)) = received.map(|frame| self.receiver.receive(frame)) {
-            self.take(content);
+    /// The slot's first half, `slots` after the last one that was listened in: what has come since, and what is asked of the drive now.
+    pub fn listen<F: Borrow<Frame>>(
+        &mut self,
+        slots: u32,
+        received: impl IntoIterator<Item = F>,
+    ) -> Request<D> {
+        self.wait(slots);
+        for frame in received {
+            if let Ok(content) = self.receiver.receive(frame.borrow()) {
+                self.take(content);
+            }
         }
         let fresh = self.listening() == Listening::Fresh;
         self.said.request(self.armed, fresh, &self.parameters, self.ratings)
@@ -88,9 +95,9 @@ impl<D: Dialect> Session<D> {
         }
     }
 
-    fn wait(&mut self) {
-        self.receiver.wait(self.parameters.command_zero_ms as u32);
-        self.age_ms = self.age_ms.map(|age_ms| age_ms.saturating_add(1));
+    fn wait(&mut self, slots: u32) {
+        self.receiver.wait(slots, self.parameters.command_zero_ms as u32);
+        self.age_ms = self.age_ms.map(|age_ms| age_ms.saturating_add(slots));
         if self.age_ms.is_some_and(|age_ms| age_ms as f32 >= self.parameters.command_off_ms) {
             self.age_ms = None;
             self.armed = false;

@@ -4,8 +4,10 @@ use super::dialect::{Dialect, Observation, Request, Told as DriveTold};
 use super::frame::Frame;
 use super::parameters::Parameters;
 use super::session::{Session, Told};
+use super::telemetry::Counts;
 use crate::machine::Ratings;
 use crate::operator::{Settings, Status};
+use core::borrow::Borrow;
 
 /// The drive's end of the protocol. A board calls [`Station::listen`] where the operator asks, [`Station::tell`] where it tells.
 #[derive(Clone, Copy, Debug)]
@@ -28,10 +30,21 @@ impl<D: Dialect> Station<D> {
         Settings { slew_nm_s: torque_slew_nm_s, jerk_nm_s2: torque_jerk_nm_s2, ..*settings }
     }
 
-    /// What is asked in a slot, after a frame that may have come; and what the drive said of itself at the slot's beginning.
-    pub fn listen(&mut self, observed: Option<Observation<D>>, frame: Option<&Frame>) -> Request<D> {
+    /// What is asked in a slot, `slots` after the last one, after the frames that have come since; and what the drive said of itself
+    /// at the slot's beginning.
+    pub fn listen<F: Borrow<Frame>>(
+        &mut self,
+        observed: Option<Observation<D>>,
+        slots: u32,
+        frames: impl IntoIterator<Item = F>,
+    ) -> Request<D> {
         self.observed = observed;
-        self.session.listen(frame)
+        self.session.listen(slots, frames)
+    }
+
+    /// The counts of what became of the frames received.
+    pub fn counts(&self) -> &Counts {
+        self.session.counts()
     }
 
     /// The frame to send after the slot, if one is due.

@@ -9,7 +9,7 @@ use tractive::board::nucleo_g474re::{CLOCK, Control, Pwm};
 use tractive::built_in::traction::BUILT_IN;
 use tractive::control::Gains;
 use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
-use tractive::operator::Permit;
+use tractive::operator::{Desk, Permit};
 use tractive::time::Instant;
 
 /// Ticks from one encoder count to the next at 200 r/min.
@@ -20,7 +20,7 @@ fn the_drive_pulses_a_turning_machine_through_the_registers() {
     let mut bench = Bench::started(plan());
     bench.codes[6] = (1_500.0 / POWER_STAGE.udc_v_per_code) as u16;
     let registers = bench.registers;
-    let (shared, operator) = (Shared::new(), Operator::new());
+    let (shared, operator) = (Shared::new(), Operator::new(Desk::new()));
     let settings = Settings { clock: CLOCK, devices: devices(), gains: Gains::DEFAULT };
     operator.desk.allow_from(Permit { enable: true, ..Permit::NONE }, Instant(0));
     let zeros = [AdcCode(2_048); 3];
@@ -54,7 +54,7 @@ fn the_drive_pulses_a_turning_machine_through_the_registers() {
         changes += u32::from(now != gates);
         gates = now;
     }
-    assert_eq!(operator.report().unwrap().trip, None);
+    assert_eq!(operator.desk.observed().unwrap().trip, None);
     assert_eq!(pwm_task.trip(), None);
     // 20 ms pass until the speed is known, 13 ms remain: 23 halves, in each of which three legs toggle once, one device going
     // off and, the dead time later, the other on.

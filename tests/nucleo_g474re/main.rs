@@ -1,7 +1,9 @@
 //! The NUCLEO-G474RE's registers: the board's own functions against blocks of memory, with a model of the timers behind.
 
 mod bench;
+mod bus;
 mod drive;
+mod image;
 mod legs;
 mod operator;
 mod outputs;

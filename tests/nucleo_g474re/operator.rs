@@ -4,6 +4,7 @@ use crate::bench::Bench;
 use crate::plan;
 use stm32_metapac::gpio::{self, regs::Idr};
 use tractive::board::nucleo_g474re::can::Can;
+use tractive::board::nucleo_g474re::operator::Operator;
 use tractive::board::nucleo_g474re::pins::{Function, PINS};
 use tractive::board::nucleo_g474re::power_stage::AdcCode;
 use tractive::board::nucleo_g474re::registers::Registers;
@@ -82,10 +83,10 @@ fn each_switch_has_its_pin_and_the_chopper_its_duty() {
 #[test]
 fn the_operator_hears_of_contacts_drivers_and_inputs() {
     let registers = Bench::started(plan()).registers;
-    let desk = Desk::new();
+    let operator = Operator::new(Desk::new());
     let station = Station::new(&BUILT_IN.ratings);
     // The bus is not touched by what is tested here.
-    let serve = Serve::new(registers, Can::CHIP, station, &desk, Configuration::Good);
+    let serve = Serve::new(registers, Can::CHIP, station, &operator, Configuration::Good);
     drivers_ready(&registers, true);
     let healthy = Feedback {
         driver_ready: true,

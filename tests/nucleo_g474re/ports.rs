@@ -15,7 +15,7 @@ use tractive::board::nucleo_g474re::{Control, Pwm};
 use tractive::control::Demand;
 use tractive::drive::Report;
 use tractive::frames::Angle;
-use tractive::operator::Permit;
+use tractive::operator::{Desk, Permit};
 use tractive::ports::{ControlPort, PwmPort};
 use tractive::protection::{Fault, SafeState};
 use tractive::time::Instant;
@@ -75,7 +75,7 @@ fn an_index_just_after_the_trigger_makes_no_false_angle() {
 fn a_sample_has_currents_link_voltage_and_angle_in_si_units() {
     let mut bench = Bench::started(plan());
     let registers = bench.registers;
-    let operator = Operator::new();
+    let operator = Operator::new(Desk::new());
     let mut control =
         Control::new(registers, ZEROS, Encoder::new(registers.tim4, &POWER_STAGE, 4), &operator);
     (bench.codes[2], bench.codes[15], bench.codes[5], bench.codes[6]) =
@@ -89,11 +89,11 @@ fn a_sample_has_currents_link_voltage_and_angle_in_si_units() {
     let demand = Demand { torque_nm: 120.0, slew_limited: true };
     operator.desk.allow_from(Permit { enable: true, demand, ..Permit::NONE }, NOW);
     let sample = control.sample(NOW);
-    let currents = sample.measured.currents_a;
+    let currents = sample.currents_a;
     assert_eq!((currents.a, currents.b, currents.c), (125.0, -62.5, -62.5));
-    assert!((sample.measured.udc_v - 1_500.0).abs() < 0.5);
+    assert!((sample.udc_v - 1_500.0).abs() < 0.5);
     // A sixteenth of a turn of the shaft, four pole pairs.
-    assert_eq!(sample.measured.angle, Angle(1 << 30));
+    assert_eq!(sample.angle, Some(Angle(1 << 30)));
     assert!(sample.enable && sample.demand.slew_limited);
     assert_eq!(sample.demand.torque_nm, 120.0);
 }
@@ -103,7 +103,7 @@ fn the_gates_wait_for_the_index_the_enable_input_and_quiet_break_inputs() {
     for (index, enable, trip) in [(false, true, false), (true, false, false), (true, true, true)] {
         let mut bench = Bench::started(plan());
         let registers = bench.registers;
-        let operator = Operator::new();
+        let operator = Operator::new(Desk::new());
         let encoder = Encoder::new(registers.tim4, &POWER_STAGE, 4);
         operator.desk.allow_from(Permit { enable: true, ..Permit::NONE }, NOW);
         let mut control = Control::new(registers, ZEROS, encoder, &operator);
@@ -115,7 +115,10 @@ fn the_gates_wait_for_the_index_the_enable_input_and_quiet_break_inputs() {
             bench.settle();
         }
         bench.finish_sequence(registers.adc1);
-        assert!(!control.sample(NOW).enable);
+        let sample = control.sample(NOW);
+        assert_eq!(sample.angle.is_some(), index, "an angle that is not known is none");
+        assert_eq!(operator.position.is_known(), index);
+        assert!(!(sample.enable && sample.angle.is_some()));
     }
 }
 
@@ -143,10 +146,9 @@ fn the_first_samples_are_right_however_long_the_start_takes() {
     start::run(&registers, &mut bench);
     bench.microseconds(100);
     bench.finish_sequence(registers.adc1);
-    let operator = Operator::new();
+    let operator = Operator::new(Desk::new());
     let encoder = Encoder::new(registers.tim4, &POWER_STAGE, 4);
-    let currents =
-        Control::new(registers, [AdcCode(2_048); 3], encoder, &operator).sample(NOW).measured.currents_a;
+    let currents = Control::new(registers, [AdcCode(2_048); 3], encoder, &operator).sample(NOW).currents_a;
     assert_eq!((currents.a, currents.b, currents.c), (0.0, 0.0, 0.0));
 }
 
@@ -169,17 +171,17 @@ fn an_absolute_sensor_takes_the_encoders_place() {
         }
     }
     let bench = Bench::started(plan());
-    let operator = Operator::new();
+    let operator = Operator::new(Desk::new());
     let mut control = Control::new(bench.registers, ZEROS, Resolver, &operator);
     bench.finish_sequence(bench.registers.adc1);
-    assert_eq!(control.sample(NOW).measured.angle, Angle::DEG_90);
+    assert_eq!(control.sample(NOW).angle, Some(Angle::DEG_90));
 }
 
 #[test]
 fn an_overrun_is_counted_from_the_next_period() {
     let bench = Bench::started(plan());
     let registers = bench.registers;
-    let operator = Operator::new();
+    let operator = Operator::new(Desk::new());
     let encoder = Encoder::new(registers.tim4, &POWER_STAGE, 4);
     let mut control = Control::new(registers, ZEROS, encoder, &operator);
     registers.tim3.sr().write(|_| ());
@@ -220,12 +222,12 @@ fn the_watchdog_is_fed_only_when_both_interrupts_ran() {
 fn the_idle_loop_hears_what_control_did() {
     let bench = Bench::started(plan());
     let registers = bench.registers;
-    let operator = Operator::new();
-    assert!(operator.report().is_none());
+    let operator = Operator::new(Desk::new());
+    assert!(operator.desk.observed().is_none());
     let encoder = Encoder::new(registers.tim4, &POWER_STAGE, 4);
     let report = Report { torque_nm: 7.0, ..Report::default() };
     Control::new(registers, ZEROS, encoder, &operator).report(NOW, &report);
-    assert_eq!(operator.report(), Some(report));
+    assert_eq!(operator.desk.observed().map(|observed| observed.torque_nm), Some(7.0));
 }
 
 /// An encoder whose index is at count 0, turning by `step` counts a control period from `from` on.
@@ -308,7 +310,7 @@ fn what_holds_the_gates_has_a_name() {
     for (what, spoil, ready, fault) in cases {
         let bench = Bench::started(plan());
         let registers = bench.registers;
-        let operator = Operator::new();
+        let operator = Operator::new(Desk::new());
         let encoder = Encoder::new(registers.tim4, &POWER_STAGE, 4);
         let mut control = Control::new(registers, ZEROS, encoder, &operator);
         write_input(registers.gpiob, u32::from(ready) << 12);

@@ -92,9 +92,9 @@ proptest! {
         let mut received = 0;
         for event in &events {
             if let Event::Silence(ms) = event {
-                (0..*ms).for_each(|_| receiver.wait(50));
+                (0..*ms).for_each(|_| receiver.wait(1, 50));
             }
-            receiver.wait(50);
+            receiver.wait(1, 50);
             let Some(frame) = bus.frame(event) else { continue };
             received += 1;
             let before = *receiver.counts();
@@ -128,13 +128,13 @@ proptest! {
             let ms = if let Event::Silence(ms) = event { *ms } else { 1 };
             let frame = bus.frame(event);
             for slot in 0..ms {
-                judge.wait(50);
+                judge.wait(1, 50);
                 age_ms = age_ms.saturating_add(1);
                 let frame = frame.as_ref().filter(|_| slot == 0);
                 if let Some(Ok(Content::Command(command))) = frame.map(|frame| judge.receive(frame)) {
                     (torque_nm, age_ms) = (command.torque_nm, 0);
                 }
-                let request = session.listen(frame);
+                let request = session.listen(1, frame);
                 prop_assert!(request.torque_nm == 0.0 || (request.torque_nm == torque_nm && age_ms < 50));
                 prop_assert!(!(request.enable && age_ms >= 500));
                 prop_assert_eq!(session.listening() == Listening::Fresh, age_ms < 50);

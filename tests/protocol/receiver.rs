@@ -93,7 +93,7 @@ fn up_to_two_lost_frames_are_forgiven_and_counted_more_wait_for_the_silence() {
         let verdict = receiver.receive(&stream.frame(command(5.0)));
         assert_eq!(verdict.is_ok(), lost <= 2, "{lost}");
         assert_eq!(receiver.counts().lost, if lost <= 2 { lost } else { 0 });
-        (0..50).for_each(|_| receiver.wait(50));
+        (0..50).for_each(|_| receiver.wait(1, 50));
         assert_eq!(receiver.receive(&stream.frame(command(6.0))), Ok(Content::Greeting), "after the silence");
         assert_eq!(torque(receiver.receive(&stream.frame(command(7.0)))), Some(7.0));
     }

@@ -40,7 +40,7 @@ impl Bench {
     }
 
     fn slot(&mut self, received: Option<Frame>) -> Request {
-        let request = self.session.listen(received.as_ref());
+        let request = self.session.listen(1, received.as_ref());
         let told = Told { status: &self.status, measured: &self.measured, mode: Mode::Off };
         self.sent.extend(self.session.tell(&told));
         request
@@ -296,4 +296,41 @@ fn what_is_told_is_what_arrives() {
     assert!(near(measured.voltage_v, 700.0, 0.1) && near(measured.frequency_hz, -82.3, 0.05));
     assert_eq!((measured.link_v, measured.iq_ref_a, measured.temperature_c), (None, None, None));
     assert!(bench.sent.iter().any(|frame| frame.id == MOTION.id));
+}
+
+#[test]
+fn silence_is_measured_by_the_clock_however_seldom_anybody_looks() {
+    for slots in [1, 5, 25] {
+        let mut bench = Bench::armed();
+        bench.command(PULL);
+        let mut at_ms = |wanted: Listening| {
+            let looks = (1..2_000).find(|_| {
+                bench.session.listen(slots, None::<Frame>);
+                bench.session.listening() == wanted
+            });
+            looks.unwrap() * slots
+        };
+        assert_eq!(at_ms(Listening::ZeroTorque), 50, "{slots} slots at a time");
+        assert_eq!(50 + at_ms(Listening::Off), 500, "{slots} slots at a time");
+    }
+}
+
+#[test]
+fn all_frames_of_a_slot_are_taken() {
+    let mut bench = Bench::armed();
+    let (mut torque, mut link) = (Stream::of(&LIMITS), Stream::of(&LINK_LIMITS));
+    let content = TorqueLimits { motoring_nm: 50.0, braking_nm: 40.0, speed_rpm: 600.0 }.encode().unwrap();
+    let at_link = LinkLimits { low_v: 1_100.0, high_v: 1_750.0 }.encode().unwrap();
+    let frames = [
+        torque.frame(content),
+        torque.frame(content),
+        link.frame(at_link),
+        link.frame(at_link),
+        bench.commands.frame(PULL.encode().unwrap()),
+    ];
+    let request = bench.session.listen(1, &frames);
+    assert_eq!(
+        (request.torque_nm, request.limits.braking_nm, request.limits.link_low_v),
+        (100.0, 40.0, 1_100.0)
+    );
 }

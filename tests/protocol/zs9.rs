@@ -25,7 +25,7 @@ fn command(enable: bool, demands: Zs9Demands) -> Payload {
 fn armed(stream: &mut Stream) -> Zs9Session {
     let mut session = Zs9Session::new(ratings());
     for _ in 0..2 {
-        session.listen(Some(&stream.frame(command(false, Zs9Demands::Torques([0.0; 2])))));
+        session.listen(1, Some(&stream.frame(command(false, Zs9Demands::Torques([0.0; 2])))));
     }
     session
 }
@@ -38,16 +38,16 @@ fn wanted(request: &DualRequest) -> [Wanted; 2] {
 fn each_motor_has_its_demand_and_silence_takes_both() {
     let mut stream = Stream::of(&ZS9_COMMAND);
     let mut session = armed(&mut stream);
-    let request = session.listen(Some(&stream.frame(command(true, Zs9Demands::Torques([20.0, -30.0])))));
+    let request = session.listen(1, Some(&stream.frame(command(true, Zs9Demands::Torques([20.0, -30.0])))));
     assert_eq!(wanted(&request), [Wanted::Torque(20.0), Wanted::Torque(-30.0)]);
     assert!(request.levels.enable);
-    let request = session.listen(Some(&stream.frame(command(true, Zs9Demands::Speeds([600.0, -300.0])))));
+    let request = session.listen(1, Some(&stream.frame(command(true, Zs9Demands::Speeds([600.0, -300.0])))));
     let [Wanted::Speed(first), Wanted::Speed(second)] = wanted(&request) else { panic!("{request:?}") };
     assert!((first - 62.832).abs() < 0.01 && (second + 31.416).abs() < 0.01);
     // 50 ms: no torque of either, still enabled; 500 ms: off.
-    let request = (0..50).map(|_| session.listen(None)).last().unwrap();
+    let request = (0..50).map(|_| session.listen(1, None::<Frame>)).last().unwrap();
     assert_eq!((wanted(&request), request.levels.enable), ([Wanted::Torque(0.0); 2], true));
-    let request = (0..450).map(|_| session.listen(None)).last().unwrap();
+    let request = (0..450).map(|_| session.listen(1, None::<Frame>)).last().unwrap();
     assert!(!request.levels.enable);
 }
 
@@ -55,7 +55,7 @@ fn each_motor_has_its_demand_and_silence_takes_both() {
 fn nothing_counts_before_a_command_at_rest() {
     let (mut session, mut stream) = (Zs9Session::new(ratings()), Stream::of(&ZS9_COMMAND));
     for _ in 0..3 {
-        let request = session.listen(Some(&stream.frame(command(true, Zs9Demands::Torques([5.0; 2])))));
+        let request = session.listen(1, Some(&stream.frame(command(true, Zs9Demands::Torques([5.0; 2])))));
         assert_eq!((wanted(&request), request.levels), ([Wanted::Torque(0.0); 2], Levels::default()));
     }
 }
@@ -64,7 +64,7 @@ fn nothing_counts_before_a_command_at_rest() {
 fn each_motor_has_its_limits_and_the_link_its_voltage() {
     let mut command_stream = Stream::of(&ZS9_COMMAND);
     let mut session = armed(&mut command_stream);
-    let nominal = session.listen(None);
+    let nominal = session.listen(1, None::<Frame>);
     assert!((nominal.link_ref_v - 666.7).abs() < 1.0, "{}", nominal.link_ref_v);
     let limits = TorqueLimits { motoring_nm: 50.0, braking_nm: 40.0, speed_rpm: 900.0 };
     for (motor, message) in [(0, TO_ZS9[1]), (1, TO_ZS9[2])] {
@@ -72,18 +72,18 @@ fn each_motor_has_its_limits_and_the_link_its_voltage() {
         let mut stream = Stream::of(message);
         let mut session = session;
         for _ in 0..2 {
-            session.listen(Some(&stream.frame(limits.encode().unwrap())));
+            session.listen(1, Some(&stream.frame(limits.encode().unwrap())));
         }
-        let request = session.listen(None);
+        let request = session.listen(1, None::<Frame>);
         let [limited, other] = [motor, 1 - motor].map(|motor| request.motors[motor].limits);
         assert_eq!((limited.motoring_nm, limited.braking_nm), (50.0, 40.0));
         assert_eq!(other, nominal.motors[0].limits);
     }
     let mut stream = Stream::of(&ZS9_LINK);
     for _ in 0..2 {
-        session.listen(Some(&stream.frame(Zs9Link { link_ref_v: 700.0 }.encode().unwrap())));
+        session.listen(1, Some(&stream.frame(Zs9Link { link_ref_v: 700.0 }.encode().unwrap())));
     }
-    assert_eq!(session.listen(None).link_ref_v, 700.0);
+    assert_eq!(session.listen(1, None::<Frame>).link_ref_v, 700.0);
 }
 
 #[test]
@@ -91,7 +91,7 @@ fn hostile_frames_are_rejected_and_counted() {
     let mut stream = Stream::of(&ZS9_COMMAND);
     let mut session = armed(&mut stream);
     let good = stream.frame(command(true, Zs9Demands::Torques([20.0, -30.0])));
-    let request = session.listen(Some(&good));
+    let request = session.listen(1, Some(&good));
     let mut corrupted = stream.frame(command(false, Zs9Demands::Torques([0.0; 2])));
     corrupted.data[7] ^= 4;
     // A torque out of range, an unused bit.
@@ -100,7 +100,7 @@ fn hostile_frames_are_rejected_and_counted() {
     let truncated = Frame { length: 5, ..good };
     let misrouted = Frame { id: ZS9_LINK.id, ..good };
     for frame in [good, corrupted, beyond, untidy, truncated, misrouted, Frame { id: 0x101, ..good }] {
-        assert_eq!(session.listen(Some(&frame)), request, "{frame:?}");
+        assert_eq!(session.listen(1, Some(&frame)), request, "{frame:?}");
     }
     let counts = session.counts();
     let rejected = [counts.repeated, counts.corrupted, counts.out_of_range, counts.truncated, counts.unknown];
@@ -131,7 +131,7 @@ fn the_telemetry_says_what_is_measured() {
     };
     let (mut measured, mut told) = (Zs9Measured::default(), None);
     for _ in 0..10 {
-        station.listen(Some(DualObservation { at: Instant(0), report }), None);
+        station.listen(Some(DualObservation { at: Instant(0), report }), 1, None::<Frame>);
         let Some(frame) = station.tell(&status) else { continue };
         let message = FROM_ZS9.into_iter().find(|message| message.id == frame.id).unwrap();
         assert!(message.is_intact(&frame));

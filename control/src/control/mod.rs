@@ -242,6 +242,21 @@ impl Controller {
         (angle - self.speed.predicted(clock.control_s())).signed_radians()
     }
 
+    /// The angle cannot be followed: it is not known, or far off. The speed stays as it was.
+    pub fn lose_angle(&mut self) {
+        self.speed.lose();
+    }
+
+    /// Follows the angle anew, where it was lost; call once its fault is acknowledged. The speed is not known until it has settled again.
+    pub fn recover_angle(&mut self) {
+        self.speed.recover();
+    }
+
+    /// Whether an angle has been followed since the start, or since it was recovered.
+    pub fn is_following(&self) -> bool {
+        self.speed.is_following()
+    }
+
     /// Whether the speed has been followed long enough to be used.
     pub fn speed_is_known(&self) -> bool {
         self.speed.is_settled()

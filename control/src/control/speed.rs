@@ -13,6 +13,8 @@ pub struct SpeedTracker {
     omega: f32,
     steps: u32,
     natural_rad_s: f32,
+    /// Whether an angle was not followed.
+    lost: bool,
 }
 
 impl SpeedTracker {
@@ -22,7 +24,7 @@ impl SpeedTracker {
 
     /// With another natural frequency, in rad/s; well below the sampling rate.
     pub const fn with_natural(natural_rad_s: f32) -> Self {
-        Self { angle: Angle::ZERO, omega: 0.0, steps: 0, natural_rad_s }
+        Self { angle: Angle::ZERO, omega: 0.0, steps: 0, natural_rad_s, lost: false }
     }
 
     /// The angle that the next sample should show.
@@ -46,6 +48,22 @@ impl SpeedTracker {
         }
         self.steps = self.steps.saturating_add(1);
         self.omega
+    }
+
+    /// An angle was not followed.
+    pub fn lose(&mut self) {
+        self.lost = true;
+    }
+
+    /// Starts anew if an angle was lost. Until then the last speed stays.
+    pub fn recover(&mut self) {
+        if self.lost {
+            (self.steps, self.lost) = (0, false);
+        }
+    }
+
+    pub fn is_following(&self) -> bool {
+        self.steps > 0
     }
 
     pub fn omega(&self) -> f32 {

@@ -92,7 +92,7 @@ impl Spoiler {
     pub fn control(&mut self, t_s: f64, sample: &mut Sample) {
         let kind = self.injected.kind(t_s);
         if let Some(sensor) = &mut self.angle {
-            sample.measured.angle = sensor.read(kind.is_some(), sample.measured.angle);
+            sample.angle = sample.angle.map(|angle| sensor.read(kind.is_some(), angle));
         }
         if kind == Some(Kind::DemandNotFinite) {
             sample.demand.torque_nm = f32::NAN;

@@ -2,7 +2,7 @@
 
 use super::inject::Kind;
 use super::{Bench, BenchError};
-use tractive::control::LinkWindow;
+use tractive::control::{LinkWindow, Measurements};
 use tractive::drive::Report;
 use tractive::frames::Abc;
 use tractive::ports::Sample;
@@ -68,14 +68,14 @@ impl Bench {
         self.control.begin(&self.time, self.spoiler.injected.has_control(t_s))?;
         let (demand, enable) = self.operator.demand(t_s);
         let udc_v = self.udc_v(t_s);
-        let mut measured = self.sensors.measure(&self.plant, udc_v, t_s);
-        measured.currents_a = self.read_currents(measured.currents_a);
+        let Measurements { currents_a, udc_v, angle } = self.sensors.measure(&self.plant, udc_v, t_s);
+        let (currents_a, angle, window) = (self.read_currents(currents_a), Some(angle), LinkWindow::OPEN);
         let hardware = self.dc.operated().and_then(|line| line.hardware(t_s));
         if self.dc.operated_mut().is_some_and(|line| line.sampled(now, t_s)) {
             return Err(BenchError::OperatorLate(t_s));
         }
         let mut sample =
-            Sample { measured, demand, enable, window: LinkWindow::OPEN, acknowledge: 0, hardware };
+            Sample { currents_a, udc_v, angle, demand, enable, window, acknowledge: 0, hardware };
         self.spoiler.control(t_s, &mut sample);
         self.control.put(now, sample);
         Ok(())

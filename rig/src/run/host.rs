@@ -4,10 +4,10 @@ use super::{Progress, Supervisor};
 use crate::bench::Bench;
 use crate::campaign::without::Without;
 use crate::trace::Recording;
-use tractive::control::{Demand, LinkWindow, Measurements};
+use tractive::control::{Demand, LinkWindow};
 use tractive::drive::Report;
 use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
-use tractive::frames::{Abc, Angle};
+use tractive::frames::Abc;
 use tractive::machine::{Ratings, Tables};
 use tractive::modulation::CarrierPeriod;
 use tractive::operator::{self, Desk, Feedback, Line, OperatorPort, Request, Slot, Status, slot_s};
@@ -43,9 +43,10 @@ impl ControlPort for Port<'_, '_> {
         }
         sample.unwrap_or_else(|error| {
             self.error = Some(error.into());
-            let measured = Measurements { currents_a: Abc::default(), udc_v: 0.0, angle: Angle::ZERO };
             Sample {
-                measured,
+                currents_a: Abc::default(),
+                udc_v: 0.0,
+                angle: None,
                 demand: Demand::default(),
                 enable: false,
                 window: LinkWindow::OPEN,
@@ -102,7 +103,7 @@ impl PwmPort for Port<'_, '_> {
 }
 
 impl OperatorPort for Port<'_, '_> {
-    fn ask(&mut self, at: Instant) -> (Request, Feedback) {
+    fn ask(&mut self, at: Instant, slots: u32) -> (Request, Feedback) {
         let (request, feedback) = self.bench.ask(at).unwrap_or_else(|error| {
             self.error = Some(error.into());
             (Request::idle(self.ratings), Feedback::default())
@@ -112,7 +113,7 @@ impl OperatorPort for Port<'_, '_> {
             self.error = Some(error);
             None
         });
-        (wire.station.listen(self.desk.observed(), frame.as_ref()), feedback)
+        (wire.station.listen(self.desk.observed(), slots, frame.as_ref()), feedback)
     }
 
     fn tell(&mut self, from: Instant, status: &Status) {

@@ -91,13 +91,16 @@ impl Can {
         Self { can, ram, health: Health { dropped: 0, bus_offs: 0 }, waits_ms: None }
     }
 
-    /// Clock, timing, filters for these messages; then it joins the bus. Its pins follow, so that nothing dominant is sent before.
+    /// Clock, timing, filters for these messages; then it joins the bus. Its pins follow, so that nothing dominant is sent before. The
+    /// crystal is its clock, whatever the start has come to.
     pub fn configure(
         &self,
         messages: &[&Message],
         rcc: &pac::rcc::Rcc,
         wait: &mut dyn Wait,
     ) -> Result<(), StartError> {
+        rcc.cr().modify(|w| w.set_hseon(true));
+        wait.until(&mut || rcc.cr().read().hserdy()).or(Err(StartError::Can))?;
         rcc.ccipr().modify(|w| w.set_fdcansel(Fdcansel::HSE));
         rcc.apb1enr1().modify(|w| w.set_fdcanen(true));
         // A peripheral takes writes only some cycles after its clock has been enabled.
@@ -152,23 +155,32 @@ impl Can {
         });
     }
 
-    /// The oldest frame that has come.
-    pub fn receive(&mut self) -> Option<Frame> {
+    /// Takes the frames that have come, the oldest first, as many as there is room for; gives their number.
+    pub fn receive(&mut self, into: &mut [Frame]) -> usize {
         let status = self.can.rxfs(0).read();
-        if status.ffl() == 0 {
-            return None;
+        let taken = usize::from(status.ffl()).min(ELEMENTS).min(into.len());
+        for (frame, element) in into.iter_mut().zip(0..taken) {
+            *frame = self.element((usize::from(status.fgi()) + element) % ELEMENTS);
         }
-        let index = status.fgi();
-        let base = usize::from(index).min(ELEMENTS - 1) * ELEMENT;
+        if taken > 0 {
+            // The last one that was read: with it those before it are given back.
+            let last = (usize::from(status.fgi()) + taken - 1) % ELEMENTS;
+            self.can.rxfa(0).write(|w| w.set_fai(last as u8));
+        }
+        taken
+    }
+
+    /// An element of the receive FIFO.
+    fn element(&self, index: usize) -> Frame {
+        let base = index * ELEMENT;
         let [id, length, low, high] = [0, 1, 2, 3].map(|word| self.ram.rxfifo0(base + word).read());
-        self.can.rxfa(0).write(|w| w.set_fai(index));
         // Codes above 8 stand for eight bytes.
         let length = (length >> 16 & 0xF).min(8) as u8;
         let [a, b, c, d] = low.to_le_bytes();
         let [e, f, g, h] = high.to_le_bytes();
         let mut data = [a, b, c, d, e, f, g, h];
         data.iter_mut().skip(usize::from(length)).for_each(|byte| *byte = 0);
-        Some(Frame { id: (id >> 18 & 0x7FF) as u16, length, data })
+        Frame { id: (id >> 18 & 0x7FF) as u16, length, data }
     }
 
     /// Sends a frame, or drops it if three wait already: the newest telemetry comes again, and a bus that nobody listens to fills no memory.

@@ -11,19 +11,20 @@ use super::serve::Serve;
 use super::start::{self, Found, Plan, StartError, Timeout, Wait};
 use super::switchgear::TIMES;
 use super::watchdog::Pulse;
-use super::{CLOCK, zs9};
+use super::{CLOCK, clock, zs9};
 use crate::built_in::traction::BUILT_IN;
 use crate::configuration::Refused;
-use crate::drive::Report;
-use crate::operator::{self, Configuration, Line, Slot, slot_s};
+use crate::operator::{self, Configuration, Desk, Line, Slot, slot_s};
+use crate::protection::{Fault, Violation};
 use crate::protocol::{Message, Station, TO_DRIVE};
 use crate::recorder::Recorder;
 use cortex_m::peripheral::NVIC;
 use defmt_rtt as _;
 pub use stm32_metapac::Interrupt;
+use stm32_metapac::rcc::vals::Sw;
 
 /// The drive's operator.
-pub static OPERATOR: Operator = Operator::new();
+pub static OPERATOR: Operator = Operator::new(Desk::new());
 
 /// The drive's flight recorder.
 pub static RECORDER: Recorder = Recorder::new();
@@ -80,6 +81,18 @@ impl Wait for Cycles {
     }
 }
 
+/// Frequency of the internal oscillator, the core's from a reset until it is switched to the PLL, in Hz.
+const RESET_HZ: u32 = 16_000_000;
+
+/// Waits a slot's time where no interrupt beats, on whatever clock the start has left the core.
+pub(super) fn pause_a_slot() {
+    let core_hz = match Registers::CHIP.rcc.cfgr().read().sws() {
+        Sw::PLL1_R => CORE_HZ,
+        _ => RESET_HZ,
+    };
+    cortex_m::asm::delay(core_hz / 1_000);
+}
+
 /// Configures everything, gates off. Call it once.
 pub fn prepare(plan: Plan) -> Result<Found, StartError> {
     let found = start::prepare(&Registers::CHIP, &mut Cycles, plan);
@@ -96,6 +109,8 @@ pub(super) fn join_bus<T>(
         defmt::error!("no start: {}", error);
     }
     let registers = Registers::CHIP;
+    // The ports of the bus's pins among them: the start may not have come so far.
+    clock::enable_peripherals(&registers);
     match Can::CHIP.configure(messages, &registers.rcc, &mut Cycles) {
         Ok(()) => pins::configure_bus(&registers, of),
         // Nobody can command the drive then; it rests.
@@ -104,13 +119,18 @@ pub(super) fn join_bus<T>(
     found
 }
 
-/// Does not start: the reset has left every output's pin floating and every interrupt masked, and so they stay.
-pub fn refuse(refused: &Refused) -> ! {
-    let Refused { name, value, least, most } = refused;
+/// A configuration that is not started with: the reset has left every gate's pin floating and every interrupt masked, and so they stay.
+/// Gives what [`idle`] tells of it.
+pub fn refuse(refused: &Refused) -> Violation {
+    refuse_on(refused, &TO_DRIVE, &pins::PINS)
+}
+
+/// The same for a system's messages and pins.
+pub(super) fn refuse_on(refused: &Refused, messages: &[&Message], of: &[Pin]) -> Violation {
+    let Refused { name, value, least, most } = *refused;
     defmt::error!("no start: {=str} = {=f32}, must be from {=f32} to {=f32}", name, value, least, most);
-    loop {
-        cortex_m::asm::wfi();
-    }
+    let _ = join_bus(Ok(()), messages, of);
+    (Fault::Configuration, value, if value > most { most } else { least })
 }
 
 /// Starts both timers and unmasks their interrupts: PWM preempts control.
@@ -153,20 +173,24 @@ fn configuration() -> Configuration {
     }
 }
 
-/// The idle loop, forever: serves the bus and the operator, feeds the watchdog, tells what has changed, and after a fault what the flight recorder holds.
-pub fn idle() -> ! {
+/// The idle loop, forever: serves the bus and the operator, feeds the watchdog, tells what has changed, and after a fault what the flight recorder
+/// holds. Where the start was `refused` it says why to whoever asks on the bus.
+pub fn idle(refused: Option<Violation>) -> ! {
     let line = Line::rated(&BUILT_IN.ratings, TIMES.precharge_s, TIMES.discharge_s);
     let rated = operator::Settings::rated(&BUILT_IN.ratings, slot_s(&CLOCK), Some(line));
     let station = Station::new(&BUILT_IN.ratings);
-    let mut serve = Serve::new(Registers::CHIP, Can::CHIP, station, &OPERATOR.desk, configuration());
+    let mut serve = Serve::new(Registers::CHIP, Can::CHIP, station, &OPERATOR, configuration());
     let (mut slot, mut log) = (Slot::new(), Log::new());
+    while let Some(why) = refused {
+        pause_a_slot();
+        serve.refuse(&mut slot, why, &rated);
+    }
     loop {
-        let settings = serve.station.settings(&rated);
-        slot.run(&OPERATOR.desk, &mut serve, &settings, &CLOCK);
+        serve.pass(&mut slot, &rated);
         if PULSE.feed_if_both_ran(&Registers::CHIP) {
             log.record(&RECORDER);
         }
-        log.trip(OPERATOR.report().and_then(|report: Report| report.trip));
+        log.trip(OPERATOR.desk.observed().and_then(|observed| observed.trip));
     }
 }
 

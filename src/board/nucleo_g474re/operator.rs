@@ -1,38 +1,22 @@
-//! What the operator permits, and what is told. Words between the idle loop, which serves the bus, and the control interrupt.
+//! What passes between the idle loop, which serves the bus, and the control interrupt.
 
-use crate::cell::Uplink;
-use crate::drive::Report;
-use crate::operator::Desk;
+use super::position::PositionState;
+use crate::operator::{Desk, DualDesk};
 
-/// Permit in, observations and report out.
-pub struct Operator {
+/// Permit in, observations and the position sensors' state out.
+pub struct Operator<D = Desk> {
     /// Permit in, observations out.
-    pub desk: Desk,
-    report: Uplink<Report, 12>,
+    pub desk: D,
+    /// The position sensors' word of themselves.
+    pub position: PositionState,
 }
 
-impl Operator {
-    /// Nothing permitted.
-    #[cfg(not(loom))]
-    pub const fn new() -> Self {
-        Self { desk: Desk::new(), report: Uplink::new() }
-    }
+/// The same for the ZS9.
+pub type DualOperator = Operator<DualDesk>;
 
-    /// From the control interrupt, which nothing that reads this can interrupt.
-    #[inline]
-    pub(super) fn tell(&self, report: &Report) {
-        self.report.publish(*report);
-    }
-
-    /// What the control interrupt did last; `None` before its first time.
-    pub fn report(&self) -> Option<Report> {
-        self.report.read()
-    }
-}
-
-#[cfg(not(loom))]
-impl Default for Operator {
-    fn default() -> Self {
-        Self::new()
+impl<D> Operator<D> {
+    /// Over a desk at which nothing is permitted yet.
+    pub const fn new(desk: D) -> Self {
+        Self { desk, position: PositionState::new() }
     }
 }

@@ -6,16 +6,16 @@ use super::hardware;
 use super::legs::SoftwareBreak;
 use super::operator::Operator;
 use super::pins;
-use super::position::Position;
+use super::position::{Position, reported};
 use super::registers::Registers;
 use super::sampling::{Sampler, Zeros, currents_a};
 use super::start::{control_sampler, pwm_sampler};
-use crate::control::{Demand, LinkWindow, Measurements};
+use crate::control::{Demand, LinkWindow};
 use crate::drive::Report;
-use crate::frames::{Abc, Angle};
+use crate::frames::Abc;
 use crate::modulation::{CarrierPeriod, Mode};
 use crate::ports::{ControlPort, PwmPort, Sample};
-use crate::protection::{Fault, SafeState};
+use crate::protection::SafeState;
 use crate::time::Instant;
 
 /// The control interrupt's side.
@@ -25,8 +25,6 @@ pub struct Control<'a, P> {
     sampler: Sampler,
     zeros: Zeros,
     position: P,
-    /// The last known angle.
-    angle: Angle,
     operator: &'a Operator,
 }
 
@@ -39,7 +37,6 @@ impl<'a, P: Position> Control<'a, P> {
             sampler: control_sampler(&registers),
             zeros,
             position,
-            angle: Angle::ZERO,
             operator,
         }
     }
@@ -55,19 +52,20 @@ impl<P: Position> ControlPort for Control<'_, P> {
     /// Position first: it has been captured, and the conversions are still under way.
     fn sample(&mut self, now: Instant) -> Sample {
         let angle = self.position.angle();
-        if let Some(angle) = angle {
-            self.angle = angle;
-        }
         let lost = self.position.is_lost();
+        let angle = reported(angle, lost);
+        self.operator.position.tell(&[angle], &[lost]);
         let codes = self.sampler.read();
         let udc_v = match codes {
             Some([_, _, _, udc]) => udc.udc_v(),
             None => f32::NAN,
         };
-        let hardware = if lost { Some(Fault::PositionSensor) } else { hardware::latched_by(&self.registers) };
-        let healthy = angle.is_some() && hardware.is_none() && !self.registers.legs.is_tripped();
+        let hardware = hardware::latched_by(&self.registers);
+        let healthy = hardware.is_none() && !self.registers.legs.is_tripped();
         let mut sample = Sample {
-            measured: Measurements { currents_a: currents_a(codes, &self.zeros), udc_v, angle: self.angle },
+            currents_a: currents_a(codes, &self.zeros),
+            udc_v,
+            angle,
             demand: Demand::default(),
             enable: healthy && pins::is_enabled(&self.registers),
             window: LinkWindow::OPEN,
@@ -88,7 +86,6 @@ impl<P: Position> ControlPort for Control<'_, P> {
 
     fn report(&mut self, now: Instant, report: &Report) {
         self.operator.desk.tell(now, report);
-        self.operator.tell(report);
     }
 }
 

@@ -6,6 +6,7 @@
 
 use super::power_stage::PowerStage;
 use crate::frames::Angle;
+use core::sync::atomic::{AtomicU32, Ordering};
 use stm32_metapac::timer::{TimGp16, regs, vals};
 
 /// A source of the electrical angle. The board has the encoder; a resolver or an absolute encoder (SSI) implements this
@@ -18,6 +19,50 @@ pub trait Position {
     fn is_lost(&self) -> bool {
         false
     }
+}
+
+/// The state of a drive's position sensors, one word from the control interrupt, which reads them, to the idle loop.
+#[derive(Debug)]
+pub struct PositionState(AtomicU32);
+
+impl PositionState {
+    const KNOWN: u32 = 1;
+    const LOST: u32 = 2;
+
+    /// Nothing read yet.
+    pub const fn new() -> Self {
+        Self(AtomicU32::new(0))
+    }
+
+    /// In the control interrupt: the angles that its sensors gave, and whether each has lost its rotor.
+    #[inline]
+    pub(super) fn tell<const N: usize>(&self, angles: &[Option<Angle>; N], lost: &[bool; N]) {
+        let known = if angles.iter().all(Option::is_some) { Self::KNOWN } else { 0 };
+        let lost = if lost.contains(&true) { Self::LOST } else { 0 };
+        self.0.store(known | lost, Ordering::Relaxed);
+    }
+
+    /// Whether all angles are known.
+    pub fn is_known(&self) -> bool {
+        self.0.load(Ordering::Relaxed) & Self::KNOWN != 0
+    }
+
+    /// Whether a sensor has noticed that it lost its rotor.
+    pub fn is_lost(&self) -> bool {
+        self.0.load(Ordering::Relaxed) & Self::LOST != 0
+    }
+}
+
+impl Default for PositionState {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// An angle as the drive is told of it: none where the sensor has lost its rotor.
+#[inline]
+pub(super) fn reported(angle: Option<Angle>, lost: bool) -> Option<Angle> {
+    if lost { None } else { angle }
 }
 
 /// An incremental encoder with an index, counted by TIM4.

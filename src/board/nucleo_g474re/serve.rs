@@ -1,42 +1,51 @@
 //! The idle loop's operator: asked over CAN, answered by what the board says of itself.
 
 use super::can::Can;
+use super::operator::Operator;
 use super::registers::Registers;
 use super::switchgear::Wires;
 use super::zs9;
-use super::{hardware, pins, switchgear};
+use super::{CLOCK, hardware, pins, switchgear};
 use crate::frames::Abc;
 use crate::operator::{
-    Configuration, DualDemands, DualObservation, DualRequest, DualStatus, Feedback, Observation,
-    OperatorPort, Request, Status, TorqueDemand, Watched,
+    Configuration, Desk, DualDemands, DualDesk, DualRequest, DualSlot, DualStatus, Feedback, OperatorPort,
+    Request, Settings, Slot, Status, TorqueDemand,
 };
+use crate::protection::Violation;
 use crate::protocol::{Frame, Station, Zs9Station};
 use crate::time::Instant;
 
+/// Frames kept for a slot: more than the bus can carry in its millisecond, which is 4.5.
+const INBOX: usize = 8;
+
 /// The operator's side of the board, over a protocol's station and what the drive says of itself.
-pub struct Serve<'a, S = Station, O = Observation> {
+pub struct Serve<'a, S = Station, D = Desk> {
     registers: Registers,
     /// The bus.
     pub can: Can,
     /// The protocol.
     pub station: S,
-    desk: &'a dyn Watched<O>,
+    operator: &'a Operator<D>,
     configuration: Configuration,
+    /// Frames that have come since the last slot, and how many.
+    inbox: [Frame; INBOX],
+    waiting: usize,
 }
 
 /// The same for the ZS9.
-pub type DualServe<'a> = Serve<'a, Zs9Station, DualObservation>;
+pub type DualServe<'a> = Serve<'a, Zs9Station, DualDesk>;
 
-impl<'a, S, O> Serve<'a, S, O> {
+impl<'a, S, D> Serve<'a, S, D> {
     /// At power-up; the configuration has been checked, or not.
-    pub const fn new(
+    pub fn new(
         registers: Registers,
         can: Can,
         station: S,
-        desk: &'a dyn Watched<O>,
+        operator: &'a Operator<D>,
         configuration: Configuration,
     ) -> Self {
-        Self { registers, can, station, desk, configuration }
+        let (inbox, waiting) = ([Frame::default(); INBOX], 0);
+        Self { registers, can, station, operator, configuration, inbox, waiting }
     }
 
     /// What every board says of itself.
@@ -46,8 +55,9 @@ impl<'a, S, O> Serve<'a, S, O> {
             precharge_closed,
             main_closed,
             driver_ready: pins::drivers_ready(&self.registers),
-            // An incremental encoder cannot tell at standstill; while it turns, the drive looks at its angle.
-            sensor_alive: true,
+            position_known: self.operator.position.is_known(),
+            // An incremental encoder cannot tell at standstill; while it turns, it looks at its index, and the drive at its angle.
+            sensor_alive: !self.operator.position.is_lost(),
             // The start has refused sensors whose zero is too far off, and taken the rest away.
             offsets_a: Abc::default(),
             configuration: self.configuration,
@@ -55,9 +65,16 @@ impl<'a, S, O> Serve<'a, S, O> {
         }
     }
 
-    fn hear(&mut self) -> Option<Frame> {
+    /// Empties the controller's FIFO, which holds three frames, into the inbox. Called in every pass of the idle loop.
+    fn collect(&mut self) {
+        let room = self.inbox.get_mut(self.waiting..).unwrap_or_default();
+        self.waiting += self.can.receive(room);
+    }
+
+    /// The frames that have come since the last slot.
+    fn hear(&mut self) -> impl Iterator<Item = Frame> + use<S, D> {
         self.can.tend();
-        self.can.receive()
+        self.inbox.into_iter().take(core::mem::take(&mut self.waiting))
     }
 
     fn say(&mut self, frame: Option<Frame>) {
@@ -72,33 +89,54 @@ impl Serve<'_> {
     pub fn feedback(&self) -> Feedback {
         Feedback {
             enable_input: pins::is_enabled(&self.registers),
-            // The encoder's index has passed.
-            position_known: self.registers.tim4.sr().read().idxif(),
             hardware: hardware::held_by(&self.registers),
             ..self.common(&pins::SWITCHGEAR)
         }
+    }
+
+    /// A pass of the idle loop: takes what has come, and does the newest slot if it is not done yet. Says whether it did one.
+    pub fn pass(&mut self, slot: &mut Slot, rated: &Settings) -> bool {
+        self.collect();
+        let (desk, settings) = (&self.operator.desk, self.station.settings(rated));
+        slot.run(desk, self, &settings, &CLOCK)
+    }
+
+    /// The same where the start was refused, and `why`; once in a slot's time.
+    pub fn refuse(&mut self, slot: &mut Slot, why: Violation, rated: &Settings) {
+        self.collect();
+        slot.refuse(why, self, rated, &CLOCK);
     }
 }
 
 impl DualServe<'_> {
     /// What the board says of itself.
     pub fn feedback(&self) -> Feedback {
-        let Registers { tim3, tim4, .. } = self.registers;
         Feedback {
             enable_input: zs9::pins::is_enabled(&self.registers),
-            // Both encoders' indices have passed.
-            position_known: [tim3, tim4].into_iter().all(|timer| timer.sr().read().idxif()),
             hardware: zs9::hardware::held_by(&self.registers),
             ..self.common(&zs9::pins::SWITCHGEAR)
         }
+    }
+
+    /// As [`Serve::pass`].
+    pub fn pass(&mut self, slot: &mut DualSlot, rated: &Settings) -> bool {
+        self.collect();
+        let (desk, settings) = (&self.operator.desk, self.station.settings(rated));
+        slot.run(desk, self, &settings, &zs9::CLOCK)
+    }
+
+    /// As [`Serve::refuse`].
+    pub fn refuse(&mut self, slot: &mut DualSlot, why: Violation, rated: &Settings) {
+        self.collect();
+        slot.refuse(why, self, rated, &zs9::CLOCK);
     }
 }
 
 /// The switches at once: a slot earlier or later is nothing to a contactor, and the chopper's compare is preloaded.
 impl OperatorPort<TorqueDemand> for Serve<'_> {
-    fn ask(&mut self, _at: Instant) -> (Request, Feedback) {
-        let frame = self.hear();
-        (self.station.listen(self.desk.observed(), frame.as_ref()), self.feedback())
+    fn ask(&mut self, _at: Instant, slots: u32) -> (Request, Feedback) {
+        let frames = self.hear();
+        (self.station.listen(self.operator.desk.observed(), slots, frames), self.feedback())
     }
 
     fn tell(&mut self, _from: Instant, status: &Status) {
@@ -109,9 +147,9 @@ impl OperatorPort<TorqueDemand> for Serve<'_> {
 }
 
 impl OperatorPort<DualDemands> for DualServe<'_> {
-    fn ask(&mut self, _at: Instant) -> (DualRequest, Feedback) {
-        let frame = self.hear();
-        (self.station.listen(self.desk.observed(), frame.as_ref()), self.feedback())
+    fn ask(&mut self, _at: Instant, slots: u32) -> (DualRequest, Feedback) {
+        let frames = self.hear();
+        (self.station.listen(self.operator.desk.observed(), slots, frames), self.feedback())
     }
 
     fn tell(&mut self, _from: Instant, status: &DualStatus) {

@@ -10,6 +10,7 @@ use super::power_stage::{POWER_STAGE, PowerStage};
 use super::registers::Registers;
 use super::sampling::{self, Sampler, Zeros};
 use super::{CLOCK, PRESCALER, clock, switchgear, watchdog, zs9};
+use crate::protection::{Fault, Violation};
 
 /// Waiting for the hardware: on the chip a loop with a bound, in a test the hardware's turn.
 pub trait Wait {
@@ -57,6 +58,27 @@ pub enum StartError {
     Can,
     /// The watchdog does not take its settings.
     Watchdog,
+}
+
+impl StartError {
+    /// The fault that a drive tells which was refused to start for this: [`Fault::StartRefused`], and the reason's number.
+    pub const fn violation(&self) -> Violation {
+        let number = match self {
+            Self::WatchdogReset => 1.0,
+            Self::FlashLatency => 2.0,
+            Self::Crystal => 3.0,
+            Self::Pll => 4.0,
+            Self::ClockSwitch => 5.0,
+            Self::DeadTime => 6.0,
+            Self::Carrier { .. } => 7.0,
+            Self::ConverterCalibration => 8.0,
+            Self::Converter => 9.0,
+            Self::CurrentSensor { .. } => 10.0,
+            Self::Can => 12.0,
+            Self::Watchdog => 13.0,
+        };
+        (Fault::StartRefused, number, 0.0)
+    }
 }
 
 /// How long the first carrier half is, and what the machine needs.

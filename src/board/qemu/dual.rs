@@ -98,9 +98,9 @@ pub struct DualIdle {
 }
 
 impl OperatorPort<DualDemands> for DualIdle {
-    fn ask(&mut self, at: Instant) -> (DualRequest, Feedback) {
+    fn ask(&mut self, at: Instant, slots: u32) -> (DualRequest, Feedback) {
         let (feedback, frame) = exchange::ask_dual(at);
-        (self.station.listen(DUAL_DESK.observed(), frame.as_ref()), feedback)
+        (self.station.listen(DUAL_DESK.observed(), slots, frame.as_ref()), feedback)
     }
 
     fn tell(&mut self, from: Instant, status: &DualStatus) {

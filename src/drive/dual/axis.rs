@@ -81,6 +81,7 @@ impl Axis {
         let surprise = self.controller.surprise_rad(angle, &settings.clock);
         let known = self.controller.speed_is_known();
         if known && surprise.abs() > SURPRISE_RAD && !trusted {
+            self.controller.lose_angle();
             return Some(surprise);
         }
         self.controller.track(angle, &settings.clock);
@@ -90,7 +91,22 @@ impl Axis {
             self.slow = self.omega();
             return None;
         }
-        (gone_astray.abs() > ASTRAY_RAD).then_some(gone_astray)
+        if gone_astray.abs() > ASTRAY_RAD {
+            self.controller.lose_angle();
+            return Some(gone_astray);
+        }
+        None
+    }
+
+    /// The angle is not known: its sensor has `lost` the rotor if it was known before; and nobody may want pulses.
+    pub fn lose_angle(&mut self, lost: Fault, enable: bool) -> Option<Violation> {
+        self.controller.lose_angle();
+        if self.controller.is_following() { Some((lost, 1.0, 0.0)) } else { protection::check_known(enable) }
+    }
+
+    /// As [`Controller::recover_angle`].
+    pub fn recover_angle(&mut self) {
+        self.controller.recover_angle();
     }
 
     /// Electrical speed, in rad/s.

@@ -100,6 +100,7 @@ impl<M: Machine> ControlTask<M> {
         let released = applied.as_ref().map(|applied| applied.released);
         if self.acknowledge.step(sample.acknowledge, self.trip.is_some(), released) {
             self.trip = None;
+            self.axes.iter_mut().for_each(Axis::recover_angle);
         }
         if self.trip.is_none() {
             // Also from beyond this call: only where calls of it have been lost.
@@ -218,7 +219,7 @@ impl<M: Machine> ControlTask<M> {
                     axis.track(measured, trusted, &self.settings)
                 }
                 None => {
-                    violation = violation.or(Some((fault, 1.0, 0.0)));
+                    violation = violation.or(axis.lose_angle(fault, sample.enable));
                     None
                 }
             };

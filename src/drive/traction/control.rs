@@ -113,6 +113,7 @@ impl<M: Machine> ControlTask<M> {
         let released = applied.as_ref().map(|applied| applied.released);
         if self.acknowledge.step(sample.acknowledge, self.trip.is_some(), released) {
             self.trip = None;
+            self.controller.recover_angle();
         }
         if self.trip.is_none() && applied.as_ref().is_some_and(|applied| applied.next.kind.is_tripped()) {
             self.trip = shared.trip.read();
@@ -124,7 +125,7 @@ impl<M: Machine> ControlTask<M> {
         }
         self.check_legs(&sample, port);
         let overdue = applied.as_ref().and_then(|applied| applied.overdue(now, &self.settings.clock));
-        let (omega, lost) = self.track(sample.measured.angle);
+        let (omega, lost) = self.track(&sample);
         let violation =
             self.armed(overdue).or_else(|| self.armed(lost)).or_else(|| self.judge(&sample, omega));
         self.check(violation, &sample, port);
@@ -132,7 +133,7 @@ impl<M: Machine> ControlTask<M> {
             self.trip.is_none() && sample.enable && self.controller.speed_is_known() && !self.glide.crosses();
         let driven = if pulsing {
             let frozen = self.watch.check(
-                &sample.measured,
+                &sample.measured(),
                 omega,
                 self.settings.clock.control_s(),
                 &self.machine.tables().ratings,
@@ -140,7 +141,7 @@ impl<M: Machine> ControlTask<M> {
             self.check(frozen, &sample, port);
             self.pulse(&sample, applied.as_ref(), omega, now)
         } else {
-            self.rest(sample.measured.angle)
+            self.rest(sample.measured().angle)
         };
         let rate = self.settings.clock.angle_rate(omega);
         // Not finite if either is not.
@@ -158,7 +159,7 @@ impl<M: Machine> ControlTask<M> {
                 carrier_angle: driven.carrier_angle,
                 rate,
                 at: now,
-                udc_v: sample.measured.udc_v,
+                udc_v: sample.udc_v,
                 depth: driven.depth,
             },
             valid_from: self.now,
@@ -174,8 +175,8 @@ impl<M: Machine> ControlTask<M> {
             frequency_hz: omega / core::f32::consts::TAU,
             map_error: driven.map_error,
             trip: self.trip,
-            udc_v: sample.measured.udc_v,
-            current_a: sample.measured.currents_a.peak(),
+            udc_v: sample.udc_v,
+            current_a: sample.currents_a.peak(),
             speed_known: self.controller.speed_is_known(),
             acknowledged: self.acknowledge.answered(),
             mode: driven.mode,
@@ -205,9 +206,9 @@ impl<M: Machine> ControlTask<M> {
     fn entry(&self, at: Instant, sample: &Sample, report: &Report, mode: Mode, gates: Gates) -> Record {
         Record {
             at,
-            currents_a: sample.measured.currents_a,
-            udc_v: sample.measured.udc_v,
-            angle: sample.measured.angle,
+            currents_a: sample.currents_a,
+            udc_v: sample.udc_v,
+            angle: sample.measured().angle,
             id_a: report.id_a,
             iq_a: report.iq_a,
             voltage_v: report.voltage_v,
@@ -230,24 +231,32 @@ impl<M: Machine> ControlTask<M> {
         self.trip
     }
 
-    /// Follows the angle; returns the electrical speed, in rad/s. An angle that cannot be leaves the speed as it was.
-    fn track(&mut self, angle: Angle) -> (f32, Option<Violation>) {
+    /// Follows the angle; returns the electrical speed, in rad/s. An angle that cannot be, or is not known, leaves the speed as it was. It
+    /// may be unknown until it is known for the first time, while nobody wants pulses.
+    fn track(&mut self, sample: &Sample) -> (f32, Option<Violation>) {
         let clock = self.settings.clock;
-        if self.controller.speed_is_known() {
-            let lost = protection::check_angle(self.controller.surprise_rad(angle, &clock));
-            if self.armed(lost).is_some() {
-                return (self.controller.omega(), lost);
+        let lost = match sample.angle {
+            Some(angle) if self.controller.speed_is_known() => {
+                protection::check_angle(self.controller.surprise_rad(angle, &clock))
+            }
+            Some(_) => None,
+            None => protection::check_known(sample.enable || self.controller.is_following()),
+        };
+        match (sample.angle, self.armed(lost)) {
+            (Some(angle), None) => (self.controller.track(angle, &clock), None),
+            (_, lost) => {
+                self.controller.lose_angle();
+                (self.controller.omega(), lost)
             }
         }
-        (self.controller.track(angle, &clock), None)
     }
 
     /// What is wrong with a sample by itself.
     fn judge(&self, sample: &Sample, omega: f32) -> Option<Violation> {
-        let (measured, ratings) = (&sample.measured, &self.machine.tables().ratings);
+        let (measured, ratings) = (sample.measured(), &self.machine.tables().ratings);
         let empty =
             || if sample.enable { protection::check_undervoltage(measured.udc_v, ratings) } else { None };
-        self.armed(protection::check_measurements(measured, omega, ratings))
+        self.armed(protection::check_measurements(&measured, omega, ratings))
             .or_else(|| self.armed(empty()))
             .or_else(|| protection::check_demand(&sample.demand))
     }
@@ -261,7 +270,7 @@ impl<M: Machine> ControlTask<M> {
     #[inline(always)]
     fn pulse(&mut self, sample: &Sample, applied: Option<&Applied>, omega: f32, now: Instant) -> Driven {
         let revises = applied.is_some_and(|applied| self.is_to_revise(applied, now, &sample.demand));
-        let udc_v = sample.measured.udc_v;
+        let udc_v = sample.udc_v;
         let steady = Steady { omega, udc_v, voltage_v: self.steady_v, depth: self.depth };
         let decided = applied.map_or(Mode::Off, Applied::decided);
         let committed = match applied {
@@ -278,7 +287,7 @@ impl<M: Machine> ControlTask<M> {
         let torque_nm = self.glide.one_sided(sample.demand.torque_nm, emf_v, udc_v, ratings);
         let demand = Demand { torque_nm, ..sample.demand };
         let input = Input {
-            measured: &sample.measured,
+            measured: &sample.measured(),
             demand: &demand,
             window: Some(&sample.window),
             committed: &committed,
@@ -337,11 +346,8 @@ impl<M: Machine> ControlTask<M> {
             return;
         }
         let at = self.now.before(self.settings.clock.control_ticks);
-        let safe = protection::safe_state(
-            self.controller.omega(),
-            sample.measured.udc_v,
-            &self.machine.tables().ratings,
-        );
+        let safe =
+            protection::safe_state(self.controller.omega(), sample.udc_v, &self.machine.tables().ratings);
         port.enter(safe, at);
         self.trip = Some(Trip { fault, value, limit, at, safe });
     }
@@ -352,7 +358,7 @@ impl<M: Machine> ControlTask<M> {
         if let (Some((fault, value, limit)), None) = (found.check(), self.trip) {
             let at = self.now.before(self.settings.clock.control_ticks);
             let (omega, ratings) = (self.controller.omega(), &self.machine.tables().ratings);
-            let safe = found.safe_state(omega, sample.measured.udc_v, ratings);
+            let safe = found.safe_state(omega, sample.udc_v, ratings);
             port.enter(safe, at);
             self.trip = Some(Trip { fault, value, limit, at, safe });
         }

@@ -3,6 +3,7 @@
 use super::bridge::Rig;
 use super::ports::{control, converted, make_ready, permitted};
 use crate::bench::control_update;
+use tractive::board::nucleo_g474re::operator::DualOperator;
 use tractive::board::nucleo_g474re::zs9::feedback::encoded;
 use tractive::board::nucleo_g474re::zs9::{CARRIER_TICKS, CLOCK, CYCLES_PER_TICK, settings};
 use tractive::built_in::zs9::BUILT_IN;
@@ -41,12 +42,12 @@ fn the_drive_pulses_two_turning_motors_through_the_registers() {
     let mut rig = Rig::new();
     rig.pwm = tractive::board::nucleo_g474re::zs9::Pwm::new(rig.model.registers, super::ports::zeros());
     let registers = rig.model.registers;
-    let (shared, desk) = (Shared::new(), DualDesk::new());
-    let mut control = control(registers, &desk);
+    let (shared, operator) = (Shared::new(), DualOperator::new(DualDesk::new()));
+    let mut control = control(registers, &operator);
     let mut control_task = ControlTask::new(&BUILT_IN, settings());
     let mut pwm_task = PwmTask::new(&BUILT_IN, settings());
     make_ready(&registers);
-    desk.allow_from(permitted([10.0, 10.0], 500.0), Instant(0));
+    operator.desk.allow_from(permitted([10.0, 10.0], 500.0), Instant(0));
     // 500 V of link from 400 V of source.
     let codes = [(6, 1_843), (9, 1_638)];
     let control_cycles = u64::from(CLOCK.control_ticks * CYCLES_PER_TICK);
@@ -79,7 +80,7 @@ fn the_drive_pulses_two_turning_motors_through_the_registers() {
         shorted = rig.model.shorted[1];
     }
     assert_eq!(control_task.trip().or(pwm_task.trip()), None);
-    assert_eq!(desk.observed().unwrap().report.trip, None);
+    assert_eq!(operator.desk.observed().unwrap().report.trip, None);
     let beats = 400 * CLOCK.control_ticks / CARRIER_TICKS;
     assert!(on > 100 * control_cycles && shorted > 1_000, "{beats} periods: {on} {shorted}");
 }

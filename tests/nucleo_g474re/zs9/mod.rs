@@ -2,6 +2,7 @@
 
 mod bridge;
 mod drive;
+mod image;
 mod model;
 mod operator;
 mod ports;

@@ -4,6 +4,7 @@ use super::model::Model;
 use super::ports::{control, converted, drivers_ready, make_ready, permitted, zeros};
 use stm32_metapac::gpio::regs::Idr;
 use tractive::board::nucleo_g474re::can::Can;
+use tractive::board::nucleo_g474re::operator::DualOperator;
 use tractive::board::nucleo_g474re::outputs::SoftwareBreak;
 use tractive::board::nucleo_g474re::registers::Registers;
 use tractive::board::nucleo_g474re::serve::DualServe;
@@ -81,9 +82,9 @@ fn softwares_own_breaks_are_told_apart_and_are_left() {
 #[test]
 fn the_control_interrupt_is_told_of_a_break() {
     let registers = Model::started().registers;
-    let desk = DualDesk::new();
-    desk.allow_from(permitted([0.0; 2], 600.0), NOW);
-    let mut control = control(registers, &desk);
+    let operator = DualOperator::new(DualDesk::new());
+    operator.desk.allow_from(permitted([0.0; 2], 600.0), NOW);
+    let mut control = control(registers, &operator);
     make_ready(&registers);
     converted(&[], registers);
     assert_eq!(control.sample(NOW).hardware, None);
@@ -96,10 +97,10 @@ fn the_control_interrupt_is_told_of_a_break() {
 #[test]
 fn the_operator_hears_of_contacts_drivers_and_inputs() {
     let registers = Model::started().registers;
-    let desk = DualDesk::new();
+    let operator = DualOperator::new(DualDesk::new());
     // The bus is not touched by what is tested here.
     let station = Zs9Station::new(&RATINGS);
-    let serve = DualServe::new(registers, Can::CHIP, station, &desk, Configuration::Good);
+    let serve = DualServe::new(registers, Can::CHIP, station, &operator, Configuration::Good);
     drivers_ready(&registers, true);
     let healthy = Feedback {
         driver_ready: true,
@@ -119,11 +120,16 @@ fn the_operator_hears_of_contacts_drivers_and_inputs() {
         inputs(levels);
         assert_eq!(serve.feedback(), wanted, "{levels:#b}");
     }
-    // The position is known once both indices have passed.
+    // The position is known once both indices have passed, and stays so when control has cleared their flags.
     inputs(0);
+    let mut control = control(registers, &operator);
     for (timer, known) in [(registers.tim3, false), (registers.tim4, true)] {
         timer.sr().write(|w| w.set_idxif(true));
-        assert_eq!(serve.feedback().position_known, known);
+        for _ in 0..2 {
+            converted(&[], registers);
+            control.sample(NOW);
+            assert_eq!(serve.feedback().position_known, known);
+        }
     }
     drivers_ready(&registers, false);
     let feedback = serve.feedback();

@@ -3,6 +3,7 @@
 use super::model::Model;
 use crate::bench::{Bench, control_update};
 use stm32_metapac::gpio::regs::Idr;
+use tractive::board::nucleo_g474re::operator::DualOperator;
 use tractive::board::nucleo_g474re::position::Encoder;
 use tractive::board::nucleo_g474re::power_stage::AdcCode;
 use tractive::board::nucleo_g474re::registers::Registers;
@@ -21,9 +22,9 @@ pub fn zeros() -> Zeros {
     Zeros { motors: [[AdcCode(2_048); 3]; 2], inductor: AdcCode(2_048) }
 }
 
-pub fn control<'a>(registers: Registers, desk: &'a DualDesk) -> Control<'a, Encoder> {
+pub fn control<'a>(registers: Registers, operator: &'a DualOperator) -> Control<'a, Encoder> {
     let encoders = [registers.tim4, registers.tim3].map(|timer| Encoder::new(timer, &STAGE.common, 4));
-    Control::new(registers, zeros(), encoders, desk)
+    Control::new(registers, zeros(), encoders, operator)
 }
 
 /// Gates may pulse.
@@ -66,8 +67,8 @@ pub fn converted(codes: &[(usize, u16)], registers: Registers) {
 #[test]
 fn a_sample_has_both_motors_and_the_link_in_si_units() {
     let registers = Model::started().registers;
-    let desk = DualDesk::new();
-    let mut control = control(registers, &desk);
+    let operator = DualOperator::new(DualDesk::new());
+    let mut control = control(registers, &operator);
     // Channels of U, V, W: 2, 7, 14 and 15, 5, 4; capacitors 6, source 9, inductor 1.
     let codes = [
         (2, 2_148),
@@ -90,7 +91,7 @@ fn a_sample_has_both_motors_and_the_link_in_si_units() {
     registers.tim4.cnt().write(|w| w.set_cnt(299));
     registers.tim3.cnt().write(|w| w.set_cnt(599));
     converted(&codes, registers);
-    desk.allow_from(permitted([50.0, -20.0], 600.0), NOW);
+    operator.desk.allow_from(permitted([50.0, -20.0], 600.0), NOW);
     let sample = control.sample(NOW);
     let unit = 150.0 / 2_048.0;
     let [upper, lower] = sample.currents_a;
@@ -117,25 +118,26 @@ fn the_gates_wait_for_both_indices_the_enable_input_and_quiet_breaks() {
     ];
     for (enabled, spoil) in cases {
         let registers = Model::started().registers;
-        let desk = DualDesk::new();
-        let mut control = control(registers, &desk);
-        desk.allow_from(permitted([0.0; 2], 600.0), NOW);
+        let operator = DualOperator::new(DualDesk::new());
+        let mut control = control(registers, &operator);
+        operator.desk.allow_from(permitted([0.0; 2], 600.0), NOW);
         converted(&[], registers);
         make_ready(&registers);
         spoil(&registers);
         control.sample(NOW);
         converted(&[], registers);
         let sample = control.sample(NOW);
-        assert_eq!(sample.enable, enabled);
-        assert!(sample.angles.iter().all(Option::is_some), "an angle not known yet is none that is lost");
+        let known = sample.angles.iter().all(Option::is_some);
+        assert_eq!(sample.enable && known, enabled);
+        assert_eq!(operator.position.is_known(), known, "an angle that is not known is none");
     }
 }
 
 #[test]
 fn an_index_at_the_wrong_count_is_a_lost_sensor() {
     let registers = Model::started().registers;
-    let desk = DualDesk::new();
-    let mut control = control(registers, &desk);
+    let operator = DualOperator::new(DualDesk::new());
+    let mut control = control(registers, &operator);
     let mut sample = |count, index| {
         registers.tim3.cnt().write(|w| w.set_cnt(count));
         control_update(&registers);
@@ -143,12 +145,14 @@ fn an_index_at_the_wrong_count_is_a_lost_sensor() {
         converted(&[], registers);
         control.sample(NOW).angles.map(|angle| angle.is_some())
     };
+    registers.tim4.sr().write(|w| w.set_idxif(true));
     assert_eq!(sample(0, true), [true, true]);
     assert_eq!(sample(0, false), [true, true]);
     assert_eq!(sample(4_000, false), [true, true]);
     assert_eq!(sample(3_904, false), [true, true]);
     assert_eq!(sample(5, true), [true, false], "96 counts back, then 197 forward");
     assert_eq!(sample(0, false), [true, false], "for good");
+    assert!(operator.position.is_lost() && !operator.position.is_known());
 }
 
 #[test]
@@ -159,8 +163,8 @@ fn converters_that_are_silent_give_no_number() {
     }
     let sample = Pwm::new(registers, zeros()).sample(NOW);
     assert!(sample.currents_a.iter().all(|current| current.a.is_nan()) && sample.source_v.is_nan());
-    let desk = DualDesk::new();
-    assert!(control(registers, &desk).sample(NOW).inductor_a.is_nan());
+    let operator = DualOperator::new(DualDesk::new());
+    assert!(control(registers, &operator).sample(NOW).inductor_a.is_nan());
 }
 
 #[test]
@@ -200,8 +204,8 @@ fn two_marked_words_are_what_the_gates_did() {
 #[test]
 fn an_overrun_is_counted_from_the_deadline() {
     let registers = Model::started().registers;
-    let desk = DualDesk::new();
-    let mut control = control(registers, &desk);
+    let operator = DualOperator::new(DualDesk::new());
+    let mut control = control(registers, &operator);
     let deadline = CLOCK.control_ticks / 2;
     for (count, again, late) in [(deadline, false, 0), (deadline + 7, false, 7), (3, true, deadline + 3)] {
         registers.tim2.cnt().write_value(count);
@@ -213,8 +217,8 @@ fn an_overrun_is_counted_from_the_deadline() {
 #[test]
 fn nothing_is_permitted_before_the_operator_says_so() {
     let registers = Model::started().registers;
-    let desk = DualDesk::new();
-    let mut control = control(registers, &desk);
+    let operator = DualOperator::new(DualDesk::new());
+    let mut control = control(registers, &operator);
     converted(&[], registers);
     make_ready(&registers);
     let sample = control.sample(NOW);

@@ -104,7 +104,7 @@ struct Idle<'a, 'b> {
 }
 
 impl OperatorPort<DualDemands> for Idle<'_, '_> {
-    fn ask(&mut self, at: Instant) -> (DualRequest, Feedback) {
+    fn ask(&mut self, at: Instant, slots: u32) -> (DualRequest, Feedback) {
         let feedback = self.port.bench.ask(at).unwrap_or_else(|error| {
             self.port.error = Some(error.into());
             Feedback::default()
@@ -113,7 +113,7 @@ impl OperatorPort<DualDemands> for Idle<'_, '_> {
             self.port.error = Some(error);
             None
         });
-        (self.station.listen(self.port.desk.observed(), frame.as_ref()), feedback)
+        (self.station.listen(self.port.desk.observed(), slots, frame.as_ref()), feedback)
     }
 
     fn tell(&mut self, from: Instant, status: &DualStatus) {

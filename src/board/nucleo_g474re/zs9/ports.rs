@@ -8,13 +8,13 @@ use super::sampling::{Samplers, Zeros};
 use super::stage::STAGE;
 use super::start::{bridge, feedback};
 use super::{CLOCK, hardware, pins};
+use crate::board::nucleo_g474re::operator::DualOperator;
 use crate::board::nucleo_g474re::outputs::SoftwareBreak;
-use crate::board::nucleo_g474re::position::Position;
+use crate::board::nucleo_g474re::position::{Position, reported};
 use crate::board::nucleo_g474re::registers::Registers;
 use crate::drive::dual::DualReport;
-use crate::frames::Angle;
 use crate::nine_switch::Scheme;
-use crate::operator::{DualDesk, DualPermit};
+use crate::operator::DualPermit;
 use crate::ports::{DualControlPort, DualPwmPort, DualSample, PlayedPeriod, PowerSample};
 use crate::time::Instant;
 
@@ -34,19 +34,24 @@ pub struct Control<'a, P> {
     samplers: Samplers,
     zeros: Zeros,
     positions: [P; 2],
-    desk: &'a DualDesk,
+    operator: &'a DualOperator,
 }
 
 impl<'a, P: Position> Control<'a, P> {
     /// With the zeros that the start measured; positions of the upper and the lower motor.
-    pub const fn new(registers: Registers, zeros: Zeros, positions: [P; 2], desk: &'a DualDesk) -> Self {
+    pub const fn new(
+        registers: Registers,
+        zeros: Zeros,
+        positions: [P; 2],
+        operator: &'a DualOperator,
+    ) -> Self {
         Self {
             registers,
             timer: ControlTimer(registers.tim2),
             samplers: Samplers::new(&registers),
             zeros,
             positions,
-            desk,
+            operator,
         }
     }
 
@@ -58,20 +63,20 @@ impl<'a, P: Position> Control<'a, P> {
 }
 
 impl<P: Position> DualControlPort for Control<'_, P> {
-    /// Positions first: they have been captured, and the conversions are still under way. A position that is not known yet is
-    /// none that is lost: until both are known the gates stay off.
+    /// Positions first: they have been captured, and the conversions are still under way.
     fn sample(&mut self, now: Instant) -> DualSample {
         let [first, second] = &mut self.positions;
         let angles = [first.angle(), second.angle()];
         let converted = self.samplers.read(&self.zeros);
-        let ([first_angle, second_angle], [first_lost, second_lost]) =
-            (angles, [first.is_lost(), second.is_lost()]);
-        let known = angles.iter().all(Option::is_some);
+        let lost = [first.is_lost(), second.is_lost()];
+        let ([a1, a2], [lost1, lost2]) = (angles, lost);
+        let angles = [reported(a1, lost1), reported(a2, lost2)];
+        self.operator.position.tell(&angles, &lost);
         let hardware = hardware::latched_by(&self.registers);
-        let healthy = known && !bridge(&self.registers).outputs().is_tripped();
+        let healthy = !bridge(&self.registers).outputs().is_tripped();
         let mut sample = DualSample {
             currents_a: converted.currents_a,
-            angles: [reported(first_angle, first_lost), reported(second_angle, second_lost)],
+            angles,
             capacitor_v: converted.capacitor_v,
             inductor_a: self.samplers.inductor_a(&self.zeros),
             source_v: converted.source_v,
@@ -83,7 +88,7 @@ impl<P: Position> DualControlPort for Control<'_, P> {
             acknowledge: 0,
             hardware,
         };
-        self.desk.permit(now).apply(&mut sample);
+        self.operator.desk.permit(now).apply(&mut sample);
         sample
     }
 
@@ -96,14 +101,8 @@ impl<P: Position> DualControlPort for Control<'_, P> {
     }
 
     fn report(&mut self, now: Instant, report: &DualReport) {
-        self.desk.tell(now, report);
+        self.operator.desk.tell(now, report);
     }
-}
-
-/// What the drive is told of an angle: nothing where the sensor itself has lost its rotor.
-#[inline]
-fn reported(angle: Option<Angle>, lost: bool) -> Option<Angle> {
-    if lost { None } else { Some(angle.unwrap_or(Angle::ZERO)) }
 }
 
 /// The PWM interrupt's side.

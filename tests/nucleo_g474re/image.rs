@@ -1,0 +1,479 @@
+//! The PMaSynRM's whole image on the board in memory, with a machine, an encoder, contactors and a vehicle's computer around it.
+
+use crate::bench::Bench;
+use crate::bus::{Bus, Sender};
+use crate::{devices, plan};
+use stm32_metapac::timer::regs::SrGp16;
+use tractive::board::nucleo_g474re::operator::Operator;
+use tractive::board::nucleo_g474re::position::Encoder;
+use tractive::board::nucleo_g474re::power_stage::{POWER_STAGE, PowerStage};
+use tractive::board::nucleo_g474re::serve::Serve;
+use tractive::board::nucleo_g474re::watchdog::Pulse;
+use tractive::board::nucleo_g474re::{CLOCK, Control, Pwm, start};
+use tractive::built_in::traction::BUILT_IN;
+use tractive::control::{Gains, flux_linkage, torque_nm};
+use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
+use tractive::frames::{Abc, AlphaBeta, Angle, Dq};
+use tractive::modulation::{CarrierPeriod, Mode};
+use tractive::operator::{self, Configuration, Desk, Line, Refusal, Slot, State, slot_s};
+use tractive::ports::PwmPort;
+use tractive::protection::{Fault, SafeState};
+use tractive::protocol::{COMMAND, Command, Frame, Payload, STATUS, Station, StatusFrame, TO_DRIVE};
+use tractive::time::Instant;
+
+const SOURCE_V: f32 = 1_500.0;
+/// Time constants of the line side, in s.
+const PRECHARGE_S: f32 = 0.05;
+const DISCHARGE_S: f32 = 0.1;
+/// Time in which a contactor answers, in control periods.
+const CONTACTOR_PERIODS: u64 = 200;
+/// Longest time between two meals of the watchdog, in control periods: 20 ms.
+const HUNGER: u64 = 200;
+/// Ticks of a step of the machine.
+const STEP_TICKS: u64 = 50;
+
+/// The rotor, its windings, and the encoder on its shaft.
+struct Machine {
+    /// Mechanical position from the index on, in turns; and speed, in r/min.
+    turns: f64,
+    rpm: f64,
+    /// Electrical angle at the index.
+    zero: Angle,
+    /// Counts of the encoder since the reset, or since the index set them to 0.
+    count: f64,
+    flux: AlphaBeta,
+    current: Dq,
+    /// Level of each leg, summed up over a step.
+    levels: [u64; 3],
+    pulsed: bool,
+}
+
+impl Machine {
+    fn angle(&self) -> Angle {
+        let turns = self.turns * f64::from(BUILT_IN.ratings.pole_pairs);
+        Angle((turns.rem_euclid(1.0) * 4_294_967_296.0) as u64 as u32) + self.zero
+    }
+
+    fn torque_nm(&self) -> f32 {
+        torque_nm(&BUILT_IN, flux_linkage(&BUILT_IN, self.current), self.current)
+    }
+
+    /// The windings over a step: the flux that the legs make, and the current of that flux on the map's slopes near no current.
+    fn step(&mut self, udc_v: f32, seconds: f32) {
+        let frame = self.angle().sin_cos();
+        let rest = flux_linkage(&BUILT_IN, Dq::default());
+        if !self.pulsed {
+            (self.flux, self.current) = (rest.unpark(frame), Dq::default());
+            return;
+        }
+        let small = BUILT_IN.ratings.max_current_a / 20.0;
+        let ld = (rest.d - flux_linkage(&BUILT_IN, Dq { d: -small, q: 0.0 }).d) / small;
+        let lq = flux_linkage(&BUILT_IN, Dq { d: 0.0, q: small }).q / small;
+        let [u, v, w] = self.levels.map(|on| on as f32 / STEP_TICKS as f32 * udc_v);
+        let voltage = Abc { a: u, b: v, c: w }.clarke();
+        let resistive = self.current.unpark(frame) * BUILT_IN.ratings.stator_resistance_ohm;
+        self.flux = self.flux + (voltage - resistive) * seconds;
+        let flux = self.flux.park(frame);
+        self.current = Dq { d: (flux.d - rest.d) / ld, q: flux.q / lq };
+    }
+}
+
+/// The PWM interrupt's port, with the hardware's turn after a flag is cleared: in memory a flag that is written 1 would be set.
+struct Port<'a> {
+    pwm: &'a mut Pwm,
+    bench: &'a mut Bench,
+}
+
+impl PwmPort for Port<'_> {
+    fn sample(&mut self, now: Instant) -> Abc {
+        self.pwm.sample(now)
+    }
+
+    fn play(&mut self, now: Instant, next: &CarrierPeriod) {
+        self.pwm.play(now, next);
+    }
+
+    fn enter(&mut self, safe: SafeState, now: Instant) {
+        self.pwm.enter(safe, now);
+    }
+
+    fn is_late(&mut self) -> bool {
+        self.pwm.is_late()
+    }
+
+    fn leave(&mut self, now: Instant) -> bool {
+        let left = self.pwm.leave(now);
+        self.bench.settle();
+        left
+    }
+}
+
+/// What the vehicle's computer has heard last.
+type Heard = StatusFrame<Mode>;
+
+struct Image {
+    bench: Bench,
+    machine: Machine,
+    udc_v: f32,
+    /// Precharge relay and main contactor: told, and since when.
+    told: [(bool, Option<u64>); 2],
+    drivers_ready: bool,
+    shared: Shared<'static>,
+    operator: &'static Operator,
+    control: Control<'static, Encoder>,
+    pwm: Pwm,
+    control_task: ControlTask<&'static tractive::machine::Tables>,
+    pwm_task: PwmTask<&'static tractive::machine::Tables>,
+    serve: Serve<'static>,
+    slot: Slot,
+    pulse: Pulse,
+    bus: Bus,
+    commands: Sender,
+    command: Command,
+    heard: Option<Heard>,
+    periods: u64,
+    fed: u64,
+    /// Control periods between two passes of the idle loop.
+    idle_every: u64,
+    /// Whether the vehicle's computer is on the bus.
+    speaks: bool,
+}
+
+impl Image {
+    /// From a reset on, with the rotor there and this fast.
+    fn reset(turns: f64, rpm: f64, zero: Angle) -> Self {
+        let mut bench = Bench::new();
+        let registers = bench.registers;
+        let found = start::prepare(&registers, &mut bench, plan()).unwrap();
+        let bus = Bus::new(&TO_DRIVE, &registers, &mut bench);
+        start::run(&registers, &mut bench);
+        bench.settle();
+        let operator: &'static Operator = Box::leak(Box::new(Operator::new(Desk::new())));
+        let stage = PowerStage { encoder_zero: zero, ..POWER_STAGE };
+        let encoder = Encoder::new(registers.tim4, &stage, BUILT_IN.ratings.pole_pairs as u32);
+        let settings = Settings { clock: CLOCK, devices: devices(), gains: Gains::DEFAULT };
+        let station = Station::new(&BUILT_IN.ratings);
+        let mut image = Self {
+            machine: Machine {
+                turns,
+                rpm,
+                zero,
+                count: 0.0,
+                flux: AlphaBeta::default(),
+                current: Dq::default(),
+                levels: [0; 3],
+                pulsed: false,
+            },
+            udc_v: 0.0,
+            told: [(false, None); 2],
+            drivers_ready: true,
+            shared: Shared::new(),
+            operator,
+            control: Control::new(registers, found.control_zeros, encoder, operator),
+            pwm: Pwm::new(registers, found.pwm_zeros),
+            control_task: ControlTask::new(&BUILT_IN, settings, Instant(CLOCK.control_ticks)),
+            pwm_task: PwmTask::new(&BUILT_IN, settings, Instant(plan().shortest_half_ticks)),
+            serve: Serve::new(registers, bus.can, station, operator, Configuration::Good),
+            slot: Slot::new(),
+            pulse: Pulse::new(),
+            bus,
+            commands: Sender::of(&COMMAND),
+            command: Command::AT_REST,
+            heard: None,
+            periods: 0,
+            fed: 0,
+            idle_every: 1,
+            speaks: true,
+            bench,
+        };
+        image.wire();
+        image
+    }
+
+    /// The inputs' levels and the converters' codes.
+    fn wire(&mut self) {
+        let registers = self.bench.registers;
+        let ready = u32::from(self.drivers_ready);
+        let closed = |(told, since): (bool, Option<u64>)| {
+            since.is_some_and(|since| told == (self.periods >= since + CONTACTOR_PERIODS))
+        };
+        let [precharge, main] = self.told.map(|contact| u32::from(closed(contact)));
+        for (port, levels) in [
+            (registers.gpioa, ready << 6),
+            (registers.gpiob, ready << 12),
+            (registers.gpioc, 1 << 2 | precharge << 4 | main << 5),
+        ] {
+            // SAFETY: IDR is word 4 of the port's block of memory, which only the hardware writes.
+            unsafe { port.as_ptr().cast::<u32>().add(4).write_volatile(levels) };
+        }
+        self.bench.fault = [!self.drivers_ready; 2];
+        let current = self.machine.current.unpark(self.machine.angle().sin_cos()).abc();
+        for (channel, current_a) in [(2, current.a), (7, current.b), (14, current.c)] {
+            self.bench.codes[channel] = (2_048.0 + current_a / POWER_STAGE.current_a_per_code).round() as u16;
+        }
+        self.bench.codes[6] = (self.udc_v / POWER_STAGE.udc_v_per_code).round() as u16;
+    }
+
+    /// The line side over a control period. Memory keeps only the last of several writes to a set-and-reset register: the contactors go by the
+    /// drive's own status, and the tests of the switchgear look at the pins.
+    fn line(&mut self) {
+        let [precharge, main, discharge] = self.heard.map_or([false; 3], |heard| heard.switches);
+        for (contact, told) in self.told.iter_mut().zip([precharge, main]) {
+            if contact.0 != told {
+                *contact = (told, Some(self.periods));
+            }
+        }
+        let (period_s, [precharge, main]) = (CLOCK.control_s(), [precharge, main]);
+        if main {
+            self.udc_v = SOURCE_V;
+        } else if precharge {
+            self.udc_v += (SOURCE_V - self.udc_v) * period_s / PRECHARGE_S;
+        } else if discharge {
+            self.udc_v -= self.udc_v * period_s / DISCHARGE_S;
+        }
+    }
+
+    /// The shaft over a control period, and the timer that counts its encoder.
+    fn turn(&mut self) {
+        let moved = self.machine.rpm / 60.0 * f64::from(CLOCK.control_s());
+        let before = self.machine.turns;
+        self.machine.turns += moved;
+        let counts = f64::from(POWER_STAGE.encoder_counts);
+        self.machine.count += moved * counts;
+        let passed = before.floor() != self.machine.turns.floor();
+        if passed {
+            self.machine.count = self.machine.turns.rem_euclid(1.0) * counts;
+        }
+        let timer = self.bench.registers.tim4;
+        timer.cnt().write(|w| w.set_cnt(self.machine.count.rem_euclid(counts) as u16));
+        // Flags are cleared by writing 0; writing 1 does nothing. The hardware sets them.
+        let mut status = SrGp16(0);
+        status.set_idxif(passed && timer.ecr().read().ie());
+        timer.sr().write_value(status);
+    }
+
+    /// A control period: the timers' ticks with the carrier's interrupts, the control interrupt, the idle loop.
+    fn period(&mut self) {
+        for tick in 1..=u64::from(CLOCK.control_ticks) {
+            if self.bench.tick() {
+                self.pwm.acknowledge();
+                self.bench.settle();
+                self.pwm.begin_half();
+                self.bench.finish_sequence(self.bench.registers.adc2);
+                let mut port = Port { pwm: &mut self.pwm, bench: &mut self.bench };
+                self.pwm_task.run(&mut port, &self.shared);
+                self.pulse.pwm_ran();
+                self.bench.settle();
+            }
+            for (sum, leg) in self.machine.levels.iter_mut().zip(&self.bench.legs) {
+                let (upper, lower) = leg.gates();
+                self.machine.pulsed |= upper || lower;
+                *sum += u64::from(upper || !lower && leg.reference());
+            }
+            if tick % STEP_TICKS == 0 {
+                self.machine.step(self.udc_v, STEP_TICKS as f32 * CLOCK.tick_s);
+                (self.machine.levels, self.machine.pulsed) = ([0; 3], false);
+            }
+        }
+        self.periods += 1;
+        self.turn();
+        self.line();
+        self.wire();
+        self.bench.settle();
+        self.bench.finish_sequence(self.bench.registers.adc1);
+        self.control_task.run(&mut self.control, &self.shared);
+        self.pulse.control_ran();
+        self.bench.settle();
+        if self.speaks && self.periods % 100 == 0 {
+            let frame = self.commands.frame(self.command.encode().unwrap());
+            self.bus.arrive(frame);
+        }
+        if self.periods % self.idle_every == 0 {
+            self.idle();
+        }
+        assert!(self.periods < self.fed + HUNGER, "the watchdog bites");
+    }
+
+    fn idle(&mut self) {
+        let line = Line::rated(&BUILT_IN.ratings, PRECHARGE_S, DISCHARGE_S);
+        let rated = operator::Settings::rated(&BUILT_IN.ratings, slot_s(&CLOCK), Some(line));
+        self.serve.pass(&mut self.slot, &rated);
+        if let Some(Frame { id, data, .. }) = self.bus.settle()
+            && id == STATUS.id
+        {
+            self.heard = Some(StatusFrame::decode(Payload(u64::from_le_bytes(data))));
+        }
+        if self.pulse.feed_if_both_ran(&self.bench.registers) {
+            self.fed = self.periods;
+        }
+    }
+
+    fn run_ms(&mut self, ms: u64) {
+        (0..ms * 10).for_each(|_| self.period());
+    }
+
+    fn state(&self) -> Option<State> {
+        self.heard.and_then(|heard| heard.state)
+    }
+
+    /// Commands and waits for a state.
+    fn until(&mut self, command: Command, wanted: State, ms: u64) {
+        self.command = command;
+        for _ in 0..ms {
+            self.run_ms(1);
+            if self.state() == Some(wanted) {
+                return;
+            }
+        }
+        panic!("{wanted:?} not reached: {:?}, {:?}", self.heard, self.control_task.trip());
+    }
+
+    fn fault(&self) -> Option<Fault> {
+        self.heard.and_then(|heard| Fault::from_code(heard.fault.into()))
+    }
+
+    fn gates_are_off(&self) -> bool {
+        self.bench.legs.iter().all(|leg| leg.gates() == (false, false))
+    }
+}
+
+const REST: Command = Command::AT_REST;
+const CHARGE: Command = Command { charge: true, ..REST };
+const ENABLE: Command = Command { enable: true, ..REST };
+const PULL: Command = Command { torque_nm: 200.0, ..ENABLE };
+const ACKNOWLEDGE: Command = Command { acknowledge: true, ..REST };
+
+/// From enable to torque, and a fault.
+fn works(image: &mut Image) {
+    image.until(ENABLE, State::Enabled, 100);
+    image.until(PULL, State::Running, 100);
+    image.run_ms(100);
+    let torque_nm = image.machine.torque_nm();
+    // These windings do not saturate as the map says.
+    assert!((100.0..400.0).contains(&torque_nm), "{torque_nm} N·m");
+    image.drivers_ready = false;
+    image.run_ms(1);
+    assert!(image.gates_are_off());
+    image.until(PULL, State::Fault, 30);
+    assert_eq!(image.fault(), Some(Fault::GateDriver));
+    image.drivers_ready = true;
+    image.run_ms(20);
+    assert!(image.gates_are_off(), "until it is acknowledged");
+}
+
+#[test]
+fn a_drive_that_is_reset_while_its_machine_turns_works() {
+    for (rpm, zero) in [(1_500.0, Angle::ZERO), (-300.0, Angle::DEG_90), (600.0, Angle(0xB123_4567))] {
+        let mut image = Image::reset(0.3, rpm, zero);
+        image.until(REST, State::Ready, 200);
+        image.until(CHARGE, State::Charged, 2_000);
+        assert!(image.operator.position.is_known());
+        works(&mut image);
+    }
+}
+
+#[test]
+fn a_drive_that_is_reset_at_standstill_waits_for_its_index() {
+    for zero in [Angle::ZERO, Angle::DEG_90] {
+        let mut image = Image::reset(0.6, 0.0, zero);
+        image.until(REST, State::Ready, 200);
+        image.until(CHARGE, State::Charged, 2_000);
+        image.command = PULL;
+        image.run_ms(100);
+        assert_eq!(image.heard.unwrap().refusal, Some(Refusal::PositionUnknown));
+        assert_eq!(image.state(), Some(State::Charged));
+        // Somebody pushes the vehicle, its lever still set: the index comes, and nothing else.
+        image.machine.rpm = 30.0;
+        image.run_ms(1_000);
+        assert!(image.operator.position.is_known());
+        assert_eq!((image.state(), image.fault()), (Some(State::Charged), None));
+        assert!(image.gates_are_off());
+        image.command = REST;
+        image.run_ms(50);
+        works(&mut image);
+    }
+}
+
+#[test]
+fn an_idle_loop_that_is_slow_takes_torque_and_gates_in_time() {
+    let mut image = Image::reset(0.3, 600.0, Angle::ZERO);
+    image.until(REST, State::Ready, 200);
+    image.until(CHARGE, State::Charged, 2_000);
+    image.until(ENABLE, State::Enabled, 100);
+    image.until(PULL, State::Running, 100);
+    image.run_ms(100);
+    (image.idle_every, image.speaks) = (50, false);
+    let told = |image: &Image| image.operator.desk.observed().unwrap();
+    let silent_ms = (0..1_000).find(|_| {
+        image.run_ms(1);
+        told(&image).torque_nm.abs() < 150.0
+    });
+    assert!((40..90).contains(&silent_ms.unwrap()), "torque after {silent_ms:?} ms");
+    let off_ms = (silent_ms.unwrap()..2_000).find(|_| {
+        image.run_ms(1);
+        image.gates_are_off()
+    });
+    assert!((480..560).contains(&off_ms.unwrap()), "gates after {off_ms:?} ms");
+}
+
+#[test]
+fn five_messages_back_to_back_are_all_taken() {
+    use tractive::protocol::{
+        LIMITS, LINK_LIMITS, LinkLimits, PARAMETER_REQUEST, ParameterRequest, TorqueLimits,
+    };
+    let mut image = Image::reset(0.3, 600.0, Angle::ZERO);
+    image.run_ms(20);
+    let torque = TorqueLimits { motoring_nm: 500.0, braking_nm: 400.0, speed_rpm: 2_000.0 }.encode().unwrap();
+    let link = LinkLimits { low_v: 1_100.0, high_v: 1_750.0 }.encode().unwrap();
+    let request = ParameterRequest { parameter: 3, write: None }.encode().unwrap();
+    let mut senders = [&LIMITS, &LINK_LIMITS, &PARAMETER_REQUEST, &LIMITS, &LINK_LIMITS].map(Sender::of);
+    for _ in 0..20 {
+        let before = *image.serve.station.counts();
+        // 111 bits each at 500 kbit/s, two control periods and a little.
+        for (sender, content) in senders.iter_mut().zip([torque, link, request, torque, link]) {
+            let frame = sender.frame(content);
+            image.bus.arrive(frame);
+            image.period();
+            image.period();
+        }
+        image.run_ms(2);
+        let counts = image.serve.station.counts();
+        assert!(counts.received - before.received >= 5 && image.bus.lost == 0, "{counts:?}");
+    }
+}
+
+#[test]
+fn a_start_that_is_refused_is_told_on_the_bus_and_every_command_is_answered() {
+    use tractive::board::nucleo_g474re::start::StartError;
+    let mut image = Image::reset(0.3, 0.0, Angle::ZERO);
+    let line = Line::rated(&BUILT_IN.ratings, PRECHARGE_S, DISCHARGE_S);
+    let rated = operator::Settings::rated(&BUILT_IN.ratings, slot_s(&CLOCK), Some(line));
+    let why = StartError::WatchdogReset.violation();
+    let mut value = None;
+    for (command, refusal) in [
+        (REST, None),
+        (ENABLE, Some(Refusal::FaultNotAcknowledged)),
+        (CHARGE, Some(Refusal::FaultNotAcknowledged)),
+        (ACKNOWLEDGE, Some(Refusal::CauseStillPresent)),
+    ] {
+        for slot in 0..200_u32 {
+            if slot % 10 == 0 {
+                let frame = image.commands.frame(command.encode().unwrap());
+                image.bus.arrive(frame);
+            }
+            image.serve.refuse(&mut image.slot, why, &rated);
+            let Some(Frame { id, data, .. }) = image.bus.settle() else { continue };
+            let payload = Payload(u64::from_le_bytes(data));
+            if id == STATUS.id {
+                image.heard = Some(StatusFrame::decode(payload));
+            } else if id == tractive::protocol::FAULT_VALUE.id {
+                value = tractive::protocol::trip_number(payload).1;
+            }
+        }
+        let heard = image.heard.expect("it speaks");
+        assert_eq!((heard.state, image.fault()), (Some(State::Fault), Some(Fault::StartRefused)));
+        assert_eq!((heard.refusal, heard.switches), (refusal, [false; 3]));
+        image.command = REST;
+    }
+    assert_eq!(value, Some(1.0), "the watchdog's reset");
+}
