@@ -4,7 +4,7 @@
 
 use std::cell::Cell;
 use tractive::built_in::{traction::BUILT_IN, zs9};
-use tractive::control::{Demand, Gains, LinkWindow, Measurements};
+use tractive::control::{Demand, Gains, LinkWindow};
 use tractive::drive::dual::{self, DualReport};
 use tractive::drive::{Report, traction};
 use tractive::frames::{Abc, Angle, Dq};
@@ -208,7 +208,9 @@ impl ControlPort for Board<'_> {
     fn sample(&mut self, now: Instant) -> Sample {
         let udc_v = if self.case.control_finds(now) { 5_000.0 } else { 1_500.0 };
         Sample {
-            measured: Measurements { currents_a: currents(now, 1.0), udc_v, angle: angle(now) },
+            currents_a: currents(now, 1.0),
+            udc_v,
+            angle: Some(angle(now)),
             demand: Demand { torque_nm: 100.0, slew_limited: false },
             enable: true,
             window: LinkWindow::OPEN,

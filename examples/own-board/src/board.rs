@@ -1,6 +1,6 @@
 //! The board: registers on the one side, the library's ports on the other. The addresses are placeholders for your chip's.
 
-use tractive::control::{Demand, LinkWindow, Measurements};
+use tractive::control::{Demand, LinkWindow};
 use tractive::drive::Report;
 use tractive::frames::{Abc, Angle};
 use tractive::modulation::CarrierPeriod;
@@ -84,11 +84,9 @@ impl ControlPort for Board {
     fn sample(&mut self, _now: Instant) -> Sample {
         let count = read(ENCODER) % COUNTS;
         Sample {
-            measured: Measurements {
-                currents_a: currents_a(0),
-                udc_v: read(CONVERTERS.wrapping_add(3)) as f32 * VOLT_PER_CODE,
-                angle: Angle(count * (u32::MAX / COUNTS + 1)),
-            },
+            currents_a: currents_a(0),
+            udc_v: read(CONVERTERS.wrapping_add(3)) as f32 * VOLT_PER_CODE,
+            angle: Some(Angle(count * (u32::MAX / COUNTS + 1))),
             demand: Demand { torque_nm: 0.0, slew_limited: true },
             enable: true,
             window: LinkWindow::OPEN,
