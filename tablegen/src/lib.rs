@@ -5,6 +5,7 @@
 
 mod error;
 mod generated;
+mod input;
 mod map;
 mod optimum;
 mod parameters;
@@ -17,6 +18,7 @@ use std::path::Path;
 
 pub use error::InputError;
 pub use generated::{Axis, Generated, RatingsF32};
+pub use input::read_bounded;
 pub use map::FluxMap;
 pub use optimum::Optimum;
 pub use parameters::Parameters;
