@@ -147,7 +147,7 @@ impl ControlPort for Board {
             1 => sample.currents_a.b = value,
             2 => sample.currents_a.c = value,
             3 => sample.udc_v = value,
-            4 => sample.angle = Angle(bits),
+            4 => sample.angle = (bits % 5 != 0).then_some(Angle(bits)),
             5 => sample.demand.torque_nm = value,
             6 => sample.demand.slew_limited = true,
             7 => sample.enable = false,

@@ -1,13 +1,13 @@
 //! Every fault, by name, with value and limit, and the gates in the safe state in the same interrupt.
 
 use tractive::built_in::traction::BUILT_IN;
-use tractive::control::{Demand, Gains, LinkWindow};
+use tractive::control::{Demand, Gains, LinkWindow, Measurements};
 use tractive::drive::Report;
 use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
-use tractive::frames::{Abc, Angle, Dq};
+use tractive::frames::{Abc, AlphaBeta, Angle, Dq};
 use tractive::modulation::{CarrierPeriod, Devices, Mode};
 use tractive::ports::{ControlPort, PwmPort, Sample};
-use tractive::protection::{Fault, LegFaults, SafeState, Trip};
+use tractive::protection::{Fault, FrozenWatch, LegFaults, SafeState, Trip};
 use tractive::time::{Clock, Instant};
 
 const CLOCK: Clock = Clock::new(25_000_000, 2_500);
@@ -249,6 +249,42 @@ fn frozen_measurements_are_found() {
     });
     found_by_control(Fault::AngleLost, 2, |sample| {
         sample.angle = Some(Fake::turning(400.0).angle(Instant(SETTLED)));
+    });
+}
+
+#[test]
+fn currents_may_repeat_until_something_should_move_them() {
+    let ratings = &BUILT_IN.ratings;
+    let period_s = CLOCK.control_s();
+    let mut watch = FrozenWatch::new();
+    let mut angle = Angle(0);
+    let mut repeat = |omega: f32, voltage_v: f32| {
+        watch.command(AlphaBeta { alpha: voltage_v, beta: 0.0 });
+        angle = angle + Angle::from_radians(omega * period_s);
+        let currents_a = Abc { a: 20.0, b: -10.0, c: -10.0 };
+        watch.check(&Measurements { currents_a, udc_v: 1500.0, angle }, omega, period_s, ratings)
+    };
+    // A rotor that stands under a voltage that stays, and one that trembles by a volt.
+    for k in 0..100_000_u32 {
+        assert_eq!(repeat(0.0, 5.0 + (k % 2) as f32), None, "period {k}");
+    }
+    let periods = (1..).find(|_| repeat(0.0, 30.0).is_some()).unwrap();
+    assert!((20..200).contains(&periods), "25 V more and the same current: {periods} periods");
+    let mut watch = FrozenWatch::new();
+    let turning = |k: u32| {
+        let (omega, currents_a) = (84.0, Abc { a: 20.0, b: -10.0, c: -10.0 });
+        let angle = Angle::from_radians(omega * period_s * k as f32);
+        let measured = Measurements { currents_a, udc_v: 1500.0, angle };
+        watch.check(&measured, omega, period_s, ratings).is_some()
+    };
+    let periods = (0..).map(turning).position(|found| found).unwrap();
+    assert!((20..40).contains(&periods), "200 r/min: {periods} periods");
+}
+
+#[test]
+fn currents_that_freeze_at_rest_are_found() {
+    found_at(0.0, Fault::Frozen, 300, |sample| {
+        sample.measured.currents_a = Abc { a: 50.0, b: -20.0, c: -30.0 };
     });
 }
 

@@ -48,7 +48,8 @@ struct Source {
 
 impl Source {
     fn read(folder: PathBuf) -> Self {
-        let files = ["machine.toml", "flux_map.csv"].map(|name| std::fs::read(folder.join(name)).ok());
+        let files = ["machine.toml", "flux_map.csv"]
+            .map(|name| tractive_tablegen::read_bounded(&folder.join(name)).ok());
         Self { folder, files }
     }
 }

@@ -1,18 +1,28 @@
 //! The watch for measurements that no longer move.
+//!
+//! A healthy current may repeat to the last bit for as long as nothing moves it by a converter's step: near standstill a
+//! coarse converter shows the same value for seconds. So currents that repeat are suspicious only once they should have
+//! changed: because the rotor has turned them, or because the commanded voltage is no longer the one that went with them.
 
 use super::{Fault, Violation};
 use crate::control::Measurements;
-use crate::frames::{Abc, Angle};
+use crate::frames::{Abc, AlphaBeta, Angle};
 use crate::machine::Ratings;
 
 /// Control periods for which a measurement may repeat to the last bit.
 const FROZEN_PERIODS: u32 = 20;
 /// Share of the largest current above which a current that never changes is suspicious.
 const FROZEN_CURRENT_SHARE: f32 = 0.05;
+/// By how much the rotor must have turned a repeated current, as a share of the largest current: more than a step of a
+/// converter of 8 bits.
+const TURNED_SHARE: f32 = 0.02;
+/// By how much the voltage must have moved the flux linkage that goes with a repeated current, as a share of the machine's own at its
+/// largest torque. Chosen by trial, beyond what the dead time's error near a current of zero feigns.
+const PUSHED_SHARE: f32 = 0.25;
 /// What the rotor must have turned, by its last known speed, before an unmoving angle is suspicious, in electrical rad.
 const FROZEN_TURN_RAD: f32 = 0.2;
 /// How long that speed is believed, in s: a sensor that stands still is found above 10 rad/s, and a rotor that stops within a count
-/// of its encoder is not taken for one.
+/// of its encoder is not taken for one. As long a voltage counts.
 const BELIEVED_S: f32 = 0.02;
 
 /// Looks for measurements that no longer move.
@@ -20,17 +30,66 @@ const BELIEVED_S: f32 = 0.02;
 pub struct FrozenWatch {
     /// Currents and angle of the last period.
     last: Option<(Abc, Angle)>,
-    currents_for: u32,
+    /// Voltage commanded last, stationary frame, in V.
+    commanded_v: AlphaBeta,
+    currents: Repeated,
     angle_for: u32,
     /// Electrical speed while the angle last moved, fading, in rad/s: the tracker soon believes a sensor that stands still.
     moving: f32,
     turned_rad: f32,
 }
 
+/// What has happened while the currents repeated.
+#[derive(Clone, Copy, Debug)]
+struct Repeated {
+    periods: u32,
+    /// Voltage commanded when they last changed, in V.
+    from_v: AlphaBeta,
+    /// By how much the rotor has turned since, in electrical rad.
+    turned_rad: f32,
+    /// What the change of the voltage since has added to the flux linkage, fading, in V·s.
+    pushed_wb: AlphaBeta,
+}
+
+impl Repeated {
+    const fn since(from_v: AlphaBeta) -> Self {
+        Self { periods: 0, from_v, turned_rad: 0.0, pushed_wb: AlphaBeta { alpha: 0.0, beta: 0.0 } }
+    }
+
+    /// One more period of the same currents.
+    fn step(&mut self, commanded_v: AlphaBeta, omega: f32, period_s: f32) {
+        self.periods += 1;
+        self.turned_rad += omega * period_s;
+        let pushed = (commanded_v - self.from_v) * period_s;
+        self.pushed_wb = self.pushed_wb * (1.0 - period_s / BELIEVED_S) + pushed;
+    }
+
+    /// Whether a peak current of `peak_a` should have changed.
+    fn is_suspicious(&self, peak_a: f32, ratings: &Ratings) -> bool {
+        if self.periods < FROZEN_PERIODS {
+            return false;
+        }
+        let largest_a = ratings.max_current_a;
+        // Flux linkage and current of the largest torque, at right angles.
+        let flux_wb = ratings.max_torque_nm / (1.5 * ratings.pole_pairs * largest_a);
+        let limit_wb = PUSHED_SHARE * flux_wb;
+        self.turned_rad.abs() * peak_a > TURNED_SHARE * largest_a
+            || self.pushed_wb.squared() > limit_wb * limit_wb
+    }
+}
+
 impl FrozenWatch {
     /// Nothing seen yet.
     pub const fn new() -> Self {
-        Self { last: None, currents_for: 0, angle_for: 0, moving: 0.0, turned_rad: 0.0 }
+        const NONE: AlphaBeta = AlphaBeta { alpha: 0.0, beta: 0.0 };
+        Self {
+            last: None,
+            commanded_v: NONE,
+            currents: Repeated::since(NONE),
+            angle_for: 0,
+            moving: 0.0,
+            turned_rad: 0.0,
+        }
     }
 
     /// What the rotor should have turned while its angle stood still, and how much of that is a fault, in electrical rad.
@@ -43,6 +102,11 @@ impl FrozenWatch {
         self.angle_for > 0
     }
 
+    /// Voltage that control has commanded, stationary frame, in V.
+    pub fn command(&mut self, voltage_v: AlphaBeta) {
+        self.commanded_v = voltage_v;
+    }
+
     /// One control period; `omega` is the electrical speed, in rad/s. Call it while pulses are made.
     pub fn check(
         &mut self,
@@ -52,9 +116,12 @@ impl FrozenWatch {
         ratings: &Ratings,
     ) -> Option<Violation> {
         let (currents_a, angle) = self.last.replace((measured.currents_a, measured.angle))?;
-        let flowing = || measured.currents_a.peak() > FROZEN_CURRENT_SHARE * ratings.max_current_a;
-        let same_currents = currents_a == measured.currents_a;
-        self.currents_for = if same_currents && flowing() { self.currents_for + 1 } else { 0 };
+        let peak_a = measured.currents_a.peak();
+        if currents_a == measured.currents_a && peak_a > FROZEN_CURRENT_SHARE * ratings.max_current_a {
+            self.currents.step(self.commanded_v, omega, period_s);
+        } else {
+            self.currents = Repeated::since(self.commanded_v);
+        }
         if angle == measured.angle {
             self.angle_for += 1;
             self.turned_rad += self.moving * period_s;
@@ -65,8 +132,8 @@ impl FrozenWatch {
             self.turned_rad = 0.0;
         }
         let frozen_angle = self.turned_rad > FROZEN_TURN_RAD;
-        let periods = if frozen_angle { self.angle_for } else { self.currents_for };
-        if frozen_angle || self.currents_for >= FROZEN_PERIODS {
+        let periods = if frozen_angle { self.angle_for } else { self.currents.periods };
+        if frozen_angle || self.currents.is_suspicious(peak_a, ratings) {
             return Some((Fault::Frozen, periods as f32, FROZEN_PERIODS as f32));
         }
         None

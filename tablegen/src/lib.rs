@@ -14,6 +14,7 @@
 #![forbid(unsafe_code)]
 
 mod error;
+mod input;
 mod map;
 mod optimum;
 mod parameters;
@@ -26,6 +27,7 @@ mod weakening_tables;
 use std::path::Path;
 
 pub use error::InputError;
+pub use input::read_bounded;
 pub use map::FluxMap;
 pub use optimum::Optimum;
 pub use parameters::Parameters;

@@ -87,7 +87,7 @@ impl FluxMap {
 
 fn read_nodes(file: &Path) -> Result<Vec<Node>, InputError> {
     let refuse = |line: Option<u64>, problem: String| InputError::new(file, line, problem);
-    let text = std::fs::read(file).map_err(|error| refuse(None, format!("cannot be read: {error}")))?;
+    let text = crate::read_bounded(file).map_err(|error| refuse(None, format!("cannot be read: {error}")))?;
     let line_of = |position: &csv::Position| line_of(&text, position);
     let mut reader = csv::ReaderBuilder::new()
         .comment(Some(b'#'))

@@ -2,6 +2,7 @@
 
 use crate::InputError;
 use std::collections::BTreeMap;
+use std::fmt::Display;
 use std::path::Path;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
@@ -67,8 +68,9 @@ impl Parameters {
     /// # Errors
     /// Names the line, the key, its value and what is allowed.
     pub fn read(file: &Path) -> Result<Self, InputError> {
-        let text = std::fs::read_to_string(file)
-            .map_err(|error| InputError::new(file, None, format!("cannot be read: {error}")))?;
+        let refuse = |error: &dyn Display| InputError::new(file, None, format!("cannot be read: {error}"));
+        let bytes = crate::read_bounded(file).map_err(|error| refuse(&error))?;
+        let text = String::from_utf8(bytes).map_err(|error| refuse(&error))?;
         let table = DeTable::parse(&text).map_err(|error| {
             let line = error.span().map(|span| line_at(&text, span.start));
             InputError::new(file, line, format!("not TOML: {}", error.message()))
@@ -160,9 +162,30 @@ impl Parameters {
                 ));
             }
         }
-        Ok(())
+        self.check_switching(file)
+    }
+
+    /// The devices must switch often enough for the ripple of the currents: at the highest link voltage, what it adds to the largest
+    /// current must stay below the trip level.
+    fn check_switching(&self, file: &Path) -> Result<(), InputError> {
+        // Flux linkage over current, at the largest torque with both at right angles.
+        let flux_wb = self.max_torque_nm / (1.5 * f64::from(self.pole_pairs) * self.max_current_a);
+        let ripple_wb = (self.trip_current_a - self.max_current_a) * flux_wb / self.max_current_a;
+        let least_hz = RIPPLE_SHARE * self.dc_link_max_v / ripple_wb;
+        if self.max_switching_hz >= least_hz {
+            return Ok(());
+        }
+        let problem = format!(
+            "max_switching_hz: {}: must be at least {least_hz:.0}: with less the ripple at dc_link_max_v {} reaches trip_current_a {}",
+            self.max_switching_hz, self.dc_link_max_v, self.trip_current_a
+        );
+        Err(InputError::new(file, self.line_of("max_switching_hz"), problem))
     }
 }
+
+/// Largest ripple flux of a phase times switching frequency, over the link's voltage: a carrier's is 1/24 of its period, and where
+/// three pulses begin they switch at 0.42 of the highest frequency.
+const RIPPLE_SHARE: f64 = 0.1;
 
 const REQUIRED: [&str; 13] = [
     "name",

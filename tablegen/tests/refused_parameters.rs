@@ -132,6 +132,36 @@ fn integers_with_underscores_are_numbers() {
 }
 
 #[test]
+fn devices_that_switch_too_seldom() {
+    says("max_switching_hz", "max_switching_hz = 60.0", "max_switching_hz: 60: must be at least 680");
+    says("max_switching_hz", "max_switching_hz = 600.0", "reaches trip_current_a 303.3485");
+    let folder = Folder::new(&toml_with("max_switching_hz", "max_switching_hz = 700.0"), &good_map());
+    assert!(folder.read().is_ok());
+}
+
+/// Neither a device without end nor a pipe without a writer is waited for.
+#[test]
+fn what_is_no_file() {
+    for name in ["machine.toml", "flux_map.csv"] {
+        for device in ["/dev/zero", "/dev/tty", "/"] {
+            let folder = Folder::new(&good_toml(), &good_map());
+            let path = folder.path().join(name);
+            std::fs::remove_file(&path).unwrap();
+            std::os::unix::fs::symlink(device, &path).unwrap();
+            let text = folder.refusal();
+            assert!(text.ends_with(&format!("{name}: cannot be read: must be a regular file")), "{text}");
+        }
+        let folder = Folder::new(&good_toml(), &good_map());
+        std::fs::File::create(folder.path().join(name)).unwrap().set_len((16 << 20) + 1).unwrap();
+        let text = folder.refusal();
+        assert!(
+            text.ends_with(&format!("{name}: cannot be read: must be at most 16777216 bytes long")),
+            "{text}"
+        );
+    }
+}
+
+#[test]
 fn limits_that_contradict_each_other() {
     says("rated_torque_nm", "rated_torque_nm = 1300.0", "must be at most max_torque_nm, 1235");
     says("rated_speed_rpm", "rated_speed_rpm = 7000.0", "must be at most max_speed_rpm, 6000");

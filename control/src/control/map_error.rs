@@ -38,6 +38,11 @@ impl MapError {
         self.scale
     }
 
+    /// 1 + ε with nothing of a believed ε left alone: for the flux linkage of the magnets in a machine that is caught.
+    pub fn caught_scale(&self) -> f32 {
+        if self.scale == 1.0 { 1.0 } else { 1.0 + limit_magnitude(self.share, MOST) }
+    }
+
     /// So much time has passed, with the mean disturbance in V and the flux linkage aimed at in Wb.
     pub fn step(&mut self, disturbance: Dq, flux: Dq, omega: f32, period_s: f32) {
         if omega.abs() < FROM_RAD_S {

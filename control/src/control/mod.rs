@@ -358,7 +358,8 @@ impl Controller {
         }
         let regulates_by_pulses = committed.follows == Follows::Mean;
         let catches = committed.volt_seconds.is_none() && !regulates_by_pulses;
-        let vector = if catches { ahead.flux.j() * omega } else { voltage.vector };
+        let caught = omega * self.map_error.caught_scale();
+        let vector = if catches { ahead.flux.j() * caught } else { voltage.vector };
         Output {
             voltage: VoltageVector {
                 voltage_v: voltage.length_v,

@@ -176,6 +176,7 @@ impl Axis {
             boundary: Some(&boundary),
         };
         let output = self.controller.step(&control, &law);
+        self.watch.command(output.voltage.vector);
         AxisOutput {
             command: MotorCommand {
                 voltage_v: output.voltage.voltage_v,

@@ -297,6 +297,7 @@ impl<M: Machine> ControlTask<M> {
         let output = self.controller.step(&input, &Law { gains, clock, tables: self.machine.tables() });
         self.steady_v = output.voltage.steady_v;
         self.depth = output.voltage.depth;
+        self.watch.command(output.voltage.vector);
         self.glide.drove(output.torque_nm);
         Driven {
             voltage_v: output.voltage.voltage_v,
