@@ -104,8 +104,7 @@ impl Image {
         self.instructions.range(start..start.saturating_add(size)).map(|(at, instruction)| (*at, instruction))
     }
 
-    /// Functions by what the vector table's entries are called: `interrupt 8` and `TIMER0`.
-    #[cfg(test)]
+    /// The names of the handlers by the vector table's entries, as `TIMER0` by `interrupt 8`; none where no function is.
     pub fn vectors(&self) -> BTreeMap<&str, &[String]> {
         let names = |address| self.functions.get(address).map_or(&[][..], |function| &function.names);
         self.handlers.iter().map(|(entry, address)| (entry.as_str(), names(address))).collect()
