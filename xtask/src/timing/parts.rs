@@ -64,7 +64,7 @@ const PARTS: [(&str, [Group; 2], &[&str]); 28] = [
     ("cells and messages", [Around, Around], &["cell.rs", "drive/messages.rs", "drive/dual/messages.rs"]),
     ("choice of the mode", [Beyond, Named], &["modulation/schedule.rs"]),
     ("dead-time compensation", [Beyond, Beyond], &["modulation/dead_time.rs"]),
-    ("growth of a pattern, catching", [Beyond, Beyond], &["modulation/growth.rs", "modulation/catch.rs"]),
+    ("growth of a pattern", [Beyond, Beyond], &["modulation/growth.rs"]),
     ("shoot-through", [Named, Named], &["nine_switch/shoot_through.rs"]),
     ("pulses", [Beyond, Named], &["modulation/", "nine_switch/"]),
     ("axis of a motor", [Around, Around], &["drive/dual/axis.rs"]),
