@@ -86,6 +86,14 @@ impl System {
         }
     }
 
+    /// The folder of tables/ that the image is built with unless another is named.
+    pub const fn machine(self) -> &'static str {
+        match self {
+            Self::Traction => "pmasynrm-180kw",
+            Self::Zs9 => "ipm-zs9",
+        }
+    }
+
     /// The variable that names the machine to the build script.
     const fn machine_variable(self) -> &'static str {
         match self {
@@ -97,35 +105,12 @@ impl System {
 
 /// Builds a system's image, with the tables of `machine` if one is named (a name or an absolute path).
 pub fn image(toolchain: &Toolchain, system: System, machine: Option<&OsString>) -> Result<PathBuf> {
-    let name = system.image();
-    let args = ["build", "--profile", "firmware", "--target", TARGET, "--package", "tractive", "--bin", name];
-    let mut command = toolchain.cargo(&args);
-    command.args(["--features", QEMU]);
-    for other in System::ALL {
-        command.env_remove(other.machine_variable());
-    }
-    command.envs(machine.map(|machine| (system.machine_variable(), machine)));
-    executable(&mut command, name, machine.is_some()).context("the image was not built")
+    firmware(toolchain, system, QEMU, machine)
 }
 
 /// The same with a feature of the emulated board.
 pub fn image_with(toolchain: &Toolchain, system: System, feature: &str) -> Result<PathBuf> {
-    let name = system.image();
-    let args = ["build", "--profile", "firmware", "--target", TARGET, "--package", "tractive", "--bin", name];
-    let mut command = toolchain.cargo(&args);
-    command.args(["--features", feature]);
-    for other in System::ALL {
-        command.env_remove(other.machine_variable());
-    }
-    executable(&mut command, name, false).context("the image was not built")
-}
-
-/// Builds one of the bench's images: `tractive-bench`, the building blocks, or `cell_stress`.
-pub fn bench(toolchain: &Toolchain, name: &str) -> Result<PathBuf> {
-    let package = "tractive-bench";
-    let args = ["build", "--profile", "firmware", "--target", TARGET, "--package", package, "--bin", name];
-    executable(toolchain.cargo(&args).env_remove("TRACTIVE_MACHINE"), name, false)
-        .context("the bench was not built")
+    firmware(toolchain, system, feature, None)
 }
 
 /// Builds a system's image for a board of real hardware, with the tables of `machine` if one is named.
@@ -135,19 +120,41 @@ pub fn board_image(
     system: System,
     machine: Option<&OsString>,
 ) -> Result<PathBuf> {
-    let name = system.image();
-    let args = ["build", "--profile", "firmware", "--target", TARGET, "--package", "tractive", "--bin", name];
-    let mut command = toolchain.cargo(&args);
-    command.args(["--features", board.feature()]);
-    for other in System::ALL {
-        command.env_remove(other.machine_variable());
-    }
+    firmware(toolchain, system, board.feature(), machine)
+}
+
+fn firmware(
+    toolchain: &Toolchain,
+    system: System,
+    feature: &str,
+    machine: Option<&OsString>,
+) -> Result<PathBuf> {
+    let mut command = on_target(toolchain, "tractive", system.image());
+    command.args(["--features", feature]);
     command.envs(machine.map(|machine| (system.machine_variable(), machine)));
-    executable(&mut command, name, machine.is_some()).context("the image was not built")
+    executable(&mut command, system.image(), machine.is_some()).context("the image was not built")
+}
+
+/// Builds one of the bench's images: `tractive-bench`, the building blocks, or `cell_stress`.
+pub fn bench(toolchain: &Toolchain, name: &str) -> Result<PathBuf> {
+    executable(&mut on_target(toolchain, "tractive-bench", name), name, false)
+        .context("the bench was not built")
+}
+
+/// The build of a package's image with its built-in machines.
+fn on_target(toolchain: &Toolchain, package: &str, name: &str) -> Command {
+    let args = ["build", "--profile", "firmware", "--target", TARGET, "--package", package, "--bin", name];
+    process::say(&format!("building the image `{name}` …"));
+    let mut command = toolchain.cargo(&args);
+    for system in System::ALL {
+        command.env_remove(system.machine_variable());
+    }
+    command
 }
 
 /// Builds the rig's program.
 pub fn rig() -> Result<PathBuf> {
+    process::say("building the rig …");
     let mut command = cargo();
     command.args(["build", "--release", "--package", "tractive-rig", "--bin", "tractive-rig"]);
     executable(&mut command, "tractive-rig", false).context("the rig was not built")
@@ -211,6 +218,18 @@ mod tests {
         );
         assert_eq!(artifact(messages, "tractive"), Some(PathBuf::from("/t/firmware/tractive")));
         assert_eq!(artifact(messages, "absent"), None);
+    }
+
+    #[test]
+    fn the_machines_are_those_of_the_build_script() {
+        let script = include_str!("../../build.rs");
+        for system in System::ALL {
+            assert!(script.contains(&format!(
+                "(\"{}\", \"{}\"",
+                system.machine_variable(),
+                system.machine()
+            )));
+        }
     }
 
     #[test]

@@ -11,7 +11,6 @@ use anyhow::{Context, Result, bail};
 
 use crate::elf::Image;
 use crate::setup::Setup;
-use crate::thumb::decode;
 use crate::{build, emulator, image, process};
 
 /// The image's name, and its module of accesses.
@@ -90,25 +89,9 @@ fn said(text: &str) -> Result<Said> {
 fn extents(image: &Image) -> BTreeMap<String, Vec<u32>> {
     let named = image.functions.iter().filter_map(|(start, function)| {
         let name = function.names.iter().find_map(|name| name.strip_prefix(ACCESSES))?;
-        Some((name.to_owned(), instructions(image, *start, function.size)))
+        Some((name.to_owned(), image.instructions_of(*start).map(|(at, _)| at).collect()))
     });
     named.collect()
-}
-
-fn instructions(image: &Image, start: u32, size: u32) -> Vec<u32> {
-    let half = |at| image.half_word(at).unwrap_or(0);
-    let is_code = |at: &u32| image.mapping.range(..=at).next_back().is_none_or(|(_, code)| *code);
-    let mut found = Vec::new();
-    let mut at = start;
-    while at < start + size {
-        if is_code(&at) {
-            found.push(at);
-            at += decode(at, half(at), half(at + 2)).1;
-        } else {
-            at += 2;
-        }
-    }
-    found
 }
 
 fn is_broken(name: &str) -> bool {

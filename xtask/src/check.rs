@@ -111,71 +111,33 @@ mod tests {
     use super::*;
     use crate::elf::tests::small_elf;
 
-    #[test]
-    fn double_helpers_are_found_under_all_their_names() {
-        for name in [
-            "__aeabi_dadd",
-            "__aeabi_dmul",
-            "__aeabi_ddiv",
-            "__aeabi_dcmplt",
-            "__aeabi_cdcmpeq",
-            "__aeabi_d2f",
-            "__aeabi_d2uiz",
-            "__aeabi_f2d",
-            "__aeabi_i2d",
-            "__aeabi_ui2d",
-            "__aeabi_ul2d",
-            "__adddf3",
-            "__muldf3",
-            "__divdf3",
-            "__ltdf2",
-            "__extendsfdf2",
-            "__truncdfsf2",
-            "__fixunsdfsi",
-            "__floatunsidf",
-            "compiler_builtins::float::mul::__muldf3",
-        ] {
-            assert!(is_soft_double(name), "{name}");
+    /// Whether all of these names, or none of them, are what is looked for.
+    fn all(names: &str, expected: bool, is: fn(&str) -> bool) {
+        for name in names.split_whitespace() {
+            assert_eq!(is(name), expected, "{name}");
         }
     }
 
     #[test]
-    fn single_precision_and_integers_are_welcome() {
-        for name in [
-            "__aeabi_memcpy4",
-            "__aeabi_uldivmod",
-            "__aeabi_f2iz",
-            "__aeabi_fadd",
-            "__aeabi_l2f",
-            "__addsf3",
-            "__udivdi3",
-            "__INTERRUPTS",
-            "tractive::control::df",
-            "__cortex_m_rt_DUALTIMER",
-            "sdf",
-        ] {
-            assert!(!is_soft_double(name), "{name}");
-        }
+    fn double_helpers_are_found_under_all_their_names() {
+        let helpers = "__aeabi_dadd __aeabi_dmul __aeabi_ddiv __aeabi_dcmplt __aeabi_cdcmpeq __aeabi_d2f \
+            __aeabi_d2uiz __aeabi_f2d __aeabi_i2d __aeabi_ui2d __aeabi_ul2d __adddf3 __muldf3 __divdf3 __ltdf2 \
+            __extendsfdf2 __truncdfsf2 __fixunsdfsi __floatunsidf compiler_builtins::float::mul::__muldf3";
+        all(helpers, true, is_soft_double);
+        let welcome = "__aeabi_memcpy4 __aeabi_uldivmod __aeabi_f2iz __aeabi_fadd __aeabi_l2f __addsf3 \
+            __udivdi3 __INTERRUPTS tractive::control::df __cortex_m_rt_DUALTIMER sdf";
+        all(welcome, false, is_soft_double);
     }
 
     #[test]
     fn panics_are_known_by_their_names() {
-        for name in [
-            "core::panicking::panic_bounds_check",
-            "core::panicking::panic_const::panic_const_div_by_zero",
-            "core::option::unwrap_failed",
-            "core::result::unwrap_failed",
-            "core::option::expect_failed",
-            "core::slice::index::slice_end_index_len_fail",
-            "core::slice::copy_from_slice_impl::len_mismatch_fail",
-            "rust_begin_unwind",
-            "__rustc::rust_begin_unwind",
-        ] {
-            assert!(is_panic(name), "{name}");
-        }
-        for name in ["TIMER0", "tractive::board::qemu::die", "tractive::protection::fail_safe", "HardFault"] {
-            assert!(!is_panic(name), "{name}");
-        }
+        let panics = "core::panicking::panic_bounds_check core::panicking::panic_const::panic_const_div_by_zero \
+            core::option::unwrap_failed core::result::unwrap_failed core::option::expect_failed \
+            core::slice::index::slice_end_index_len_fail core::slice::copy_from_slice_impl::len_mismatch_fail \
+            rust_begin_unwind __rustc::rust_begin_unwind";
+        all(panics, true, is_panic);
+        let others = "TIMER0 tractive::board::qemu::die tractive::protection::fail_safe HardFault";
+        all(others, false, is_panic);
     }
 
     /// handler: bl step, bx lr; step: b.w the third; the panic besides, called by nobody here.

@@ -5,6 +5,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use anyhow::{Context, Result, bail};
 use object::{Object, ObjectSection, ObjectSymbol, SectionKind, SymbolKind};
 
+use crate::thumb::{self, Instruction};
+
 /// A function. Several names may stand at one address.
 #[derive(Clone, Debug, Default)]
 pub struct Function {
@@ -42,6 +44,8 @@ pub struct Image {
     pub code: BTreeMap<u32, Vec<u8>>,
     /// From this address on: `true` instructions, `false` literals.
     pub mapping: BTreeMap<u32, bool>,
+    /// By address.
+    pub instructions: BTreeMap<u32, Instruction>,
     /// Name and address of what the vector table leads to, but for the reset.
     pub handlers: Vec<(String, u32)>,
     /// Where the vector table lies.
@@ -62,20 +66,60 @@ impl Image {
         image.read_sections(&file)?;
         image.read_symbols(&file)?;
         image.read_handlers(&file)?;
+        image.read_instructions()?;
         Ok(image)
     }
 
-    /// The half-word of code at this address.
-    pub fn half_word(&self, address: u32) -> Option<u16> {
+    /// Decodes the code anew, between literals.
+    pub fn read_instructions(&mut self) -> Result<()> {
+        let mut instructions = BTreeMap::new();
+        for (&start, bytes) in &self.code {
+            let end = start + bytes.len() as u32;
+            let changes = self.mapping.range(start + 1..end).map(|(at, _)| *at);
+            let bounds: Vec<u32> = [start].into_iter().chain(changes).chain([end]).collect();
+            for piece in bounds.windows(2).filter(|piece| self.is_code(piece[0])) {
+                let [from, to] = [piece[0], piece[1]].map(|at| (at - start) as usize);
+                instructions.extend(thumb::decode(piece[0], &bytes[from..to])?);
+            }
+        }
+        self.instructions = instructions;
+        Ok(())
+    }
+
+    /// The word among the code at this address.
+    pub fn word(&self, address: u32) -> Option<u32> {
         let (start, bytes) = self.code.range(..=address).next_back()?;
         let at = (address - start) as usize;
-        Some(u16::from_le_bytes(bytes.get(at..at + 2)?.try_into().ok()?))
+        Some(u32::from_le_bytes(bytes.get(at..at + 4)?.try_into().ok()?))
+    }
+
+    /// Whether the code at this address is instructions, not literals.
+    pub fn is_code(&self, address: u32) -> bool {
+        self.mapping.range(..=address).next_back().is_none_or(|(_, is_code)| *is_code)
+    }
+
+    /// The instructions of the function that starts here.
+    pub fn instructions_of(&self, start: u32) -> impl Iterator<Item = (u32, &Instruction)> {
+        let size = self.functions.get(&start).map_or(0, |function| function.size);
+        self.instructions.range(start..start.saturating_add(size)).map(|(at, instruction)| (*at, instruction))
+    }
+
+    /// The names of the handlers by the vector table's entries, as `TIMER0` by `interrupt 8`; none where no function is.
+    pub fn vectors(&self) -> BTreeMap<&str, &[String]> {
+        let names = |address| self.functions.get(address).map_or(&[][..], |function| &function.names);
+        self.handlers.iter().map(|(entry, address)| (entry.as_str(), names(address))).collect()
     }
 
     /// The function that holds this address.
     pub fn function_at(&self, address: u32) -> Option<u32> {
         let (&start, function) = self.functions.range(..=address).next_back()?;
         (address - start < function.size.max(1)).then_some(start)
+    }
+
+    /// The first name of the function that holds this address.
+    pub fn name_at(&self, address: u32) -> &str {
+        let function = self.function_at(address).and_then(|start| self.functions.get(&start));
+        function.and_then(|function| function.names.first()).map_or("?", String::as_str)
     }
 
     fn read_sections(&mut self, file: &object::File) -> Result<()> {
@@ -130,10 +174,13 @@ impl Image {
                 function.size = function.size.max(address(symbol.size())?);
                 function.names.push(name.clone());
             }
-            if name.contains("tractive::machine") && is_read_only_data(file, &symbol) {
+            if name.starts_with("tractive")
+                && name.contains("::machine::")
+                && is_read_only_data(file, &symbol)
+            {
                 self.sizes.tables += symbol.size();
             }
-            if name.starts_with("tractive::") && name.ends_with("RECORDER") {
+            if name.starts_with("tractive") && name.ends_with("RECORDER") {
                 self.sizes.recorder += symbol.size();
             }
             self.symbols.insert(name);
@@ -279,8 +326,10 @@ pub mod tests {
         assert_eq!(image.functions[&0x100].names, ["handler"]);
         assert_eq!((image.function_at(0x103), image.function_at(0x104)), (Some(0x100), Some(0x104)));
         assert_eq!(image.function_at(0x106), None);
-        assert_eq!(image.half_word(0x104), Some(0x4770));
-        assert_eq!(image.half_word(0x106), None);
+        assert_eq!(image.word(0x100), Some(0xBF00_4770));
+        assert_eq!(image.word(0x106), None);
+        assert_eq!(image.instructions.keys().copied().collect::<Vec<_>>(), [0x100, 0x102, 0x104]);
+        assert_eq!(image.vectors()["interrupt 0"], ["handler"]);
         let sizes = Sizes { code: 68 + 6, tables: 48, rodata: 64, ram: 0, recorder: 0, stack: 0 };
         assert_eq!(image.sizes, sizes);
     }

@@ -5,7 +5,7 @@
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
 use crate::elf::Image;
-use crate::thumb::{Flow, decode};
+use crate::thumb::Flow;
 
 /// The calls of an image, by the addresses of its functions.
 #[derive(Debug, Default)]
@@ -22,18 +22,16 @@ impl CallGraph {
             image.data_words.iter().filter_map(|word| pointed_function(image, *word)).collect();
         let mut graph = Self::default();
         for (&start, function) in &image.functions {
-            let mut walk =
-                Walk { image, goes_to: BTreeSet::new(), holds: BTreeSet::new(), is_indirect: false };
-            walk.read(start, start.saturating_add(function.size));
-            let mut calls = walk.holds;
-            for target in walk.goes_to {
-                match image.function_at(target) {
-                    Some(function) => _ = calls.insert(function),
-                    None => graph.astray.push((start, target)),
+            let mut calls = held(image, start, function.size);
+            for (_, instruction) in image.instructions_of(start) {
+                match instruction.flow {
+                    Flow::To(target) => match image.function_at(target) {
+                        Some(function) => _ = calls.insert(function),
+                        None => graph.astray.push((start, target)),
+                    },
+                    Flow::Indirect => calls.extend(&in_data),
+                    _ => {}
                 }
-            }
-            if walk.is_indirect {
-                calls.extend(&in_data);
             }
             calls.remove(&start);
             graph.calls.insert(start, calls);
@@ -63,47 +61,23 @@ fn pointed_function(image: &Image, word: u32) -> Option<u32> {
     (word & 1 == 1 && image.functions.contains_key(&start)).then_some(start)
 }
 
-struct Walk<'a> {
-    image: &'a Image,
-    goes_to: BTreeSet<u32>,
-    holds: BTreeSet<u32>,
-    is_indirect: bool,
-}
-
-impl Walk<'_> {
-    fn read(&mut self, start: u32, end: u32) {
-        let mut low_halves = [None; 16];
-        let mut at = start;
-        while at < end {
-            let Some(first) = self.image.half_word(at) else { return };
-            let is_code = self.image.mapping.range(..=at).next_back().is_none_or(|(_, is_code)| *is_code);
-            let second = self.image.half_word(at.wrapping_add(2)).unwrap_or(0);
-            if !is_code {
-                if at.is_multiple_of(4) {
-                    self.hold(u32::from(second) << 16 | u32::from(first));
-                }
-                at += 2;
-                continue;
+/// The functions whose addresses a function holds: from halves, or as literals.
+fn held(image: &Image, start: u32, size: u32) -> BTreeSet<u32> {
+    let literals = (start.next_multiple_of(4)..start.saturating_add(size)).step_by(4);
+    let mut words: Vec<u32> =
+        literals.filter(|at| !image.is_code(*at)).filter_map(|at| image.word(at)).collect();
+    let mut low_halves = BTreeMap::new();
+    for (_, instruction) in image.instructions_of(start) {
+        match instruction.flow {
+            Flow::Low { register, half } => _ = low_halves.insert(register, half),
+            Flow::High { register, half } => {
+                let low = low_halves.get(&register);
+                words.extend(low.map(|low| u32::from(half) << 16 | u32::from(*low)));
             }
-            let (flow, length) = decode(at, first, second);
-            match flow {
-                Flow::To(target) => _ = self.goes_to.insert(target),
-                Flow::Indirect => self.is_indirect = true,
-                Flow::Low { register, half } => low_halves[usize::from(register & 15)] = Some(half),
-                Flow::High { register, half } => {
-                    if let Some(low) = low_halves[usize::from(register & 15)] {
-                        self.hold(u32::from(half) << 16 | u32::from(low));
-                    }
-                }
-                Flow::Other => {}
-            }
-            at += length;
+            _ => {}
         }
     }
-
-    fn hold(&mut self, word: u32) {
-        self.holds.extend(pointed_function(self.image, word));
-    }
+    words.into_iter().filter_map(|word| pointed_function(image, word)).collect()
 }
 
 #[cfg(test)]
@@ -141,6 +115,7 @@ mod tests {
             ("c", 0x120, &[0x4770]),
         ]);
         image.mapping = BTreeMap::from([(0x100, true), (0x114, false), (0x120, true)]);
+        image.read_instructions().unwrap();
         assert_eq!(graph(&image, 0x100), [0x100, 0x120]);
         assert_eq!(graph(&image, 0x110), [0x110, 0x120]);
     }
@@ -163,6 +138,7 @@ mod tests {
         let mut image = image(&[("a", 0x100, &[0x4770, 0xBF00, 0xF000, 0xF804]), ("b", 0x110, &[0x4770])]);
         assert_eq!(graph(&image, 0x100), [0x100, 0x110]);
         image.mapping = BTreeMap::from([(0x100, true), (0x104, false), (0x110, true)]);
+        image.read_instructions().unwrap();
         assert_eq!(graph(&image, 0x100), [0x100]);
     }
 

@@ -25,6 +25,19 @@ pub fn output_of(command: &mut Command) -> Option<String> {
     Some(String::from_utf8_lossy(&text).trim().to_owned())
 }
 
+/// Tells what begins now, on a line of its own.
+pub fn say(what: &str) {
+    eprintln!("xtask: {what}");
+}
+
+/// Processor time of this process and of all that it has waited for, in s; 0 where the system does not tell.
+pub fn processor_s() -> f64 {
+    let stat = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
+    // Behind the name in brackets: utime, stime, cutime and cstime, in hundredths of a second.
+    let fields = stat.rsplit_once(") ").map_or("", |(_, fields)| fields).split(' ');
+    fields.skip(11).take(4).filter_map(|ticks| ticks.parse::<f64>().ok()).sum::<f64>() / 100.0
+}
+
 /// The message for a program that does not start.
 pub fn cannot_start(command: &Command) -> String {
     format!("cannot start {}", command.get_program().to_string_lossy())
@@ -61,6 +74,16 @@ mod tests {
         let folder = test.parent().unwrap();
         assert_eq!(find_in(name, folder.as_os_str()), Some(test.clone()));
         assert_eq!(find_in("no-such-program", folder.as_os_str()), None);
+    }
+
+    #[test]
+    #[cfg(target_os = "linux")]
+    fn the_time_of_children_counts() {
+        let before = processor_s();
+        assert!(quietly(
+            Command::new("sh").args(["-c", "i=0; while [ $i -lt 100000 ]; do i=$((i+1)); done"])
+        ));
+        assert!(processor_s() > before);
     }
 
     #[test]

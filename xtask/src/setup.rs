@@ -7,7 +7,7 @@ use std::process::Command;
 use anyhow::{Result, bail};
 
 use crate::build::{TARGET, root};
-use crate::process::{find, output_of, quietly};
+use crate::process::{find, output_of, quietly, say};
 
 /// The emulated board.
 const QEMU_MACHINE: &str = "mps2-an386";
@@ -15,6 +15,9 @@ const QEMU_MACHINE: &str = "mps2-an386";
 const DEBIAN_PACKAGES: [&str; 3] = ["rustc-web", "cargo-web", "rust-web-src"];
 const DEBIAN_CARGO: &str = "/usr/bin/cargo";
 const DEBIAN_RUSTC: &str = "/usr/bin/rustc";
+
+/// The toolchain that Miri belongs to.
+const NIGHTLY: &str = "nightly";
 
 /// How cargo is called for the board's target.
 #[derive(Debug, PartialEq, Eq)]
@@ -74,11 +77,11 @@ impl Setup {
             return Ok(Toolchain::installed());
         }
         if find("rustup").is_some() {
-            tell(&format!("adding the target {TARGET} with rustup"));
+            say(&format!("adding the target {TARGET} with rustup"));
             if quietly(Command::new("rustup").args(["target", "add", TARGET])) && has_target() {
                 return Ok(Toolchain::installed());
             }
-            tell(&format!("rustup cannot add {TARGET}; Debian's toolchain is tried instead"));
+            say(&format!("rustup cannot add {TARGET}; Debian's toolchain is tried instead"));
         }
         if !debian_is_usable() {
             self.apt_install(&DEBIAN_PACKAGES);
@@ -120,8 +123,27 @@ impl Setup {
         if find("rustup").is_none() {
             return false;
         }
-        tell(&format!("adding {component} with rustup"));
+        say(&format!("adding {component} with rustup"));
         quietly(Command::new("rustup").args(["component", "add", component])) && usable()
+    }
+
+    /// `cargo miri` of the toolchain in use, else of nightly, which it is added to.
+    pub fn miri(&mut self) -> Option<Command> {
+        let nightly = || {
+            let mut command = Command::new("rustup");
+            command.current_dir(root()).args(["run", NIGHTLY, "cargo"]);
+            command
+        };
+        let usable = |candidate: &mut Command| quietly(candidate.args(["miri", "--version"]));
+        if usable(&mut crate::build::cargo()) {
+            return Some(crate::build::cargo());
+        }
+        if !usable(&mut nightly()) && quietly(nightly().arg("--version")) {
+            say("adding miri to nightly with rustup");
+            let components = ["component", "add", "miri", "rust-src", "--toolchain", NIGHTLY];
+            quietly(Command::new("rustup").args(components));
+        }
+        usable(&mut nightly()).then(nightly)
     }
 
     /// Installs packages with apt-get where that is there and allowed; whoever calls looks whether it helped.
@@ -130,22 +152,18 @@ impl Setup {
             return;
         }
         if !self.apt_updated {
-            tell("updating the list of packages (apt-get update)");
+            say("updating the list of packages (apt-get update)");
             quietly(&mut privileged(&["apt-get", "update"]));
             self.apt_updated = true;
         }
-        tell(&format!("installing {} (apt-get install)", packages.join(" ")));
+        say(&format!("installing {} (apt-get install)", packages.join(" ")));
         let mut args = vec!["env", "DEBIAN_FRONTEND=noninteractive", "apt-get", "install", "--yes"];
         args.push("--no-install-recommends");
         args.extend(packages);
         if !quietly(&mut privileged(&args)) {
-            tell(&format!("apt-get could not install {}", packages.join(" ")));
+            say(&format!("apt-get could not install {}", packages.join(" ")));
         }
     }
-}
-
-fn tell(what: &str) {
-    eprintln!("set-up: {what}");
 }
 
 fn is_root() -> bool {

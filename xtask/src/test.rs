@@ -8,7 +8,7 @@ use clap::ValueEnum;
 
 use crate::build::{Board, System, TARGET, cargo};
 use crate::cli::{TestArgs, TimingArgs};
-use crate::process::{find, quietly, succeeds};
+use crate::process::{find, processor_s, succeeds};
 use crate::setup::Setup;
 use crate::{build, image};
 
@@ -45,12 +45,12 @@ pub enum Step {
     Guide,
     /// The engineer's guide as a book
     Book,
-    /// The image builds for every folder of tables/
-    Machines,
     /// The image in QEMU
     Qemu,
     /// The interrupts within their budgets
     Timing,
+    /// The image builds for every folder of tables/
+    Machines,
 }
 
 /// The packages by the commands that test them. Cargo unites the features of what it is asked for at once: with all of them in one
@@ -69,6 +69,14 @@ enum Outcome {
     Failed,
     /// Why it could not be done.
     Skipped(String),
+}
+
+/// What became of a step.
+struct Done {
+    step: Step,
+    outcome: Outcome,
+    took: Duration,
+    processor_s: f64,
 }
 
 impl From<bool> for Outcome {
@@ -91,7 +99,7 @@ pub fn run(args: &TestArgs) -> Result<u8> {
     let mut done = Vec::new();
     for step in steps {
         println!("\n== {}: {}", name(step), about(step));
-        let start = Instant::now();
+        let (start, start_s) = (Instant::now(), processor_s());
         let outcome = perform(step, &mut setup).unwrap_or_else(|error| {
             eprintln!("error: {error:#}");
             Outcome::Failed
@@ -99,10 +107,10 @@ pub fn run(args: &TestArgs) -> Result<u8> {
         if let Outcome::Skipped(reason) = &outcome {
             println!("skipped: {reason}");
         }
-        done.push((step, outcome, start.elapsed()));
+        done.push(Done { step, outcome, took: start.elapsed(), processor_s: processor_s() - start_s });
     }
     print!("{}", summary(&done));
-    Ok(u8::from(done.iter().any(|(_, outcome, _)| *outcome == Outcome::Failed)))
+    Ok(u8::from(done.iter().any(|done| done.outcome == Outcome::Failed)))
 }
 
 fn perform(step: Step, setup: &mut Setup) -> Result<Outcome> {
@@ -147,10 +155,10 @@ fn perform(step: Step, setup: &mut Setup) -> Result<Outcome> {
             succeeds(command.args(["--package", "tractive-cells", "--test", "interleavings"]))?
         }
         Step::Miri => {
-            let Some(mut command) = miri() else {
-                return Ok(Outcome::Skipped("cargo miri is not installed".to_owned()));
+            let Some(mut command) = setup.miri() else {
+                return Ok(Outcome::Skipped("cargo miri is not installed and cannot be added".to_owned()));
             };
-            command.args(["test", "--package", "tractive-cells", "--test", "threads"]);
+            command.args(["miri", "test", "--package", "tractive-cells", "--test", "threads"]);
             succeeds(command.args(["--target-dir", "target/miri"]))?
         }
         Step::Cells => crate::cells::check(setup)?,
@@ -190,14 +198,6 @@ fn perform(step: Step, setup: &mut Setup) -> Result<Outcome> {
             let docs = build::root().join("docs");
             succeeds(Command::new("mdbook").arg("build").arg(docs))?
         }
-        Step::Machines => {
-            let toolchain = setup.toolchain()?;
-            for machine in crate::run::machine_names(build::root()) {
-                build::image(&toolchain, System::Traction, Some(&machine.clone().into()))?;
-                println!("{machine}");
-            }
-            true
-        }
         Step::Qemu => {
             let qemu = setup.qemu()?;
             let toolchain = setup.toolchain()?;
@@ -218,26 +218,22 @@ fn perform(step: Step, setup: &mut Setup) -> Result<Outcome> {
             succeeds(&mut command)?
         }
         Step::Timing => crate::timing::run(&TimingArgs::default())? == 0,
+        // Behind all that takes the built-in machine, since each change of machine builds the image anew.
+        Step::Machines => {
+            let toolchain = setup.toolchain()?;
+            for machine in crate::run::machine_names(build::root()) {
+                let named = Some(machine.clone().into()).filter(|_| machine != System::Traction.machine());
+                build::image(&toolchain, System::Traction, named.as_ref())?;
+                println!("{machine}");
+            }
+            true
+        }
     };
     Ok(good.into())
 }
 
 fn lint(command: &mut Command, what: &[&str]) -> Result<bool> {
     succeeds(command.arg("clippy").args(what).args(["--", "--deny", "warnings"]))
-}
-
-/// `cargo miri` of the toolchain in use, else of nightly.
-fn miri() -> Option<Command> {
-    let nightly = || {
-        let mut command = Command::new("rustup");
-        command.current_dir(build::root()).args(["run", "nightly", "cargo"]);
-        command
-    };
-    [cargo, nightly].into_iter().find_map(|candidate| {
-        let mut command = candidate();
-        command.arg("miri");
-        quietly(candidate().args(["miri", "--version"])).then_some(command)
-    })
 }
 
 fn no_component(component: &str) -> Outcome {
@@ -252,18 +248,21 @@ fn about(step: Step) -> String {
     step.to_possible_value().and_then(|value| Some(value.get_help()?.to_string())).unwrap_or_default()
 }
 
-fn summary(done: &[(Step, Outcome, Duration)]) -> String {
-    let mut text = format!("\n{:<14} {:<8} {:>8}\n", "step", "result", "seconds");
-    for (step, outcome, took) in done {
+fn summary(done: &[Done]) -> String {
+    let mut text = format!("\n{:<14} {:<8} {:>8} {:>10}\n", "step", "result", "seconds", "processor");
+    for Done { step, outcome, took, processor_s } in done {
         let (result, note) = match outcome {
             Outcome::Passed => ("passed", String::new()),
             Outcome::Failed => ("FAILED", String::new()),
             Outcome::Skipped(reason) => ("skipped", format!("  {reason}")),
         };
-        text += &format!("{:<14} {result:<8} {:>8.1}{note}\n", name(*step), took.as_secs_f64());
+        let seconds = took.as_secs_f64();
+        text += &format!("{:<14} {result:<8} {seconds:>8.1} {processor_s:>10.1}{note}\n", name(*step));
     }
-    let count = |wanted: Outcome| done.iter().filter(|(_, outcome, _)| *outcome == wanted).count();
-    text + &format!("\n{} passed, {} failed\n", count(Outcome::Passed), count(Outcome::Failed))
+    let minutes = done.iter().map(|done| done.processor_s).sum::<f64>() / 60.0;
+    let count = |wanted: Outcome| done.iter().filter(|done| done.outcome == wanted).count();
+    text += &format!("\n{minutes:.1} min of processor time\n");
+    text + &format!("{} passed, {} failed\n", count(Outcome::Passed), count(Outcome::Failed))
 }
 
 #[cfg(test)]
@@ -272,19 +271,21 @@ mod tests {
 
     #[test]
     fn the_summary_ends_with_the_count_alone_on_its_line() {
-        let second = Duration::from_millis(1_250);
         let done = [
-            (Step::Fmt, Outcome::Passed, second),
-            (Step::ClippyTarget, Outcome::Skipped("no clippy".to_owned()), second),
-            (Step::ImageCheck, Outcome::Failed, second),
-            (Step::Qemu, Outcome::Passed, second),
+            (Step::Fmt, Outcome::Passed),
+            (Step::ClippyTarget, Outcome::Skipped("no clippy".to_owned())),
+            (Step::ImageCheck, Outcome::Failed),
+            (Step::Qemu, Outcome::Passed),
         ];
+        let took = Duration::from_millis(1_250);
+        let done = done.map(|(step, outcome)| Done { step, outcome, took, processor_s: 30.0 });
         let text = summary(&done);
         let lines: Vec<_> = text.lines().collect();
         assert_eq!(lines.last(), Some(&"2 passed, 1 failed"));
-        assert_eq!(lines[1], "step           result    seconds");
-        assert_eq!(lines[3], "clippy-target  skipped       1.2  no clippy");
-        assert_eq!(lines[4], "image-check    FAILED        1.2");
+        assert_eq!(lines[1], "step           result    seconds  processor");
+        assert_eq!(lines[3], "clippy-target  skipped       1.2       30.0  no clippy");
+        assert_eq!(lines[4], "image-check    FAILED        1.2       30.0");
+        assert_eq!(lines[lines.len() - 2], "2.0 min of processor time");
     }
 
     #[test]

@@ -173,10 +173,8 @@ impl Reached {
 
     /// A line for each of them.
     pub fn findings(&self, image: &Image) -> Vec<String> {
-        let name = |address: u32| {
-            let function = image.function_at(address).and_then(|start| image.functions.get(&start));
-            function.and_then(|function| function.names.first()).map_or("?", String::as_str)
-        };
-        self.missing().map(|address| format!("{address:x} in {} was not hit", name(address))).collect()
+        self.missing()
+            .map(|address| format!("{address:x} in {} was not hit", image.name_at(address)))
+            .collect()
     }
 }

@@ -5,12 +5,11 @@ use std::path::Path;
 
 use anyhow::{Context, Result, bail};
 
-use super::cost::{self, REFILL};
+use super::cost::REFILL;
 use super::log::{Event, Log};
 use crate::build::{self, cargo};
 use crate::elf::Image;
 use crate::setup::Toolchain;
-use crate::thumb::decode;
 use crate::{emulator, image, process};
 
 /// A building block.
@@ -38,7 +37,7 @@ pub fn measure(toolchain: &Toolchain, qemu: &Path) -> Result<Vec<Block>> {
     let image = image::read(&path)?;
     let counts = counts(&image, &executed(&image, &run(qemu, &path)?)?);
     let mut host = cargo();
-    host.args(["run", "--quiet", "--release", "--package", "tractive-bench"]);
+    host.args(["run", "--quiet", "--release", "--package", "tractive-bench", "--bin", "tractive-bench"]);
     let errors = process::output_of(&mut host).context("the bench does not run on this machine")?;
     errors.lines().map(|line| block(line, &counts)).collect()
 }
@@ -113,14 +112,12 @@ impl Count {
 }
 
 fn cycles(image: &Image, address: u32) -> u32 {
-    let half = |at| image.half_word(at).unwrap_or(0);
-    cost::cycles(half(address), half(address + 2))
+    image.instructions.get(&address).map_or(0, |instruction| instruction.cycles)
 }
 
 /// The address behind the instruction at this one.
 fn behind(image: &Image, address: u32) -> u32 {
-    let half = |at| image.half_word(at).unwrap_or(0);
-    address + decode(address, half(address), half(address + 2)).1
+    address + image.instructions.get(&address).map_or(0, |instruction| instruction.length)
 }
 
 /// One of the host's lines, `name,error`, with its counts.

@@ -4,6 +4,11 @@
 //! worst: memory without wait states, no load pipelined behind another, three cycles to refill the pipeline after every
 //! branch that is taken, and every result of the floating-point unit wanted by the very next instruction.
 
+use capstone::RegId;
+use capstone::arch::arm::ArmReg;
+
+use crate::thumb::{Operand, SP};
+
 /// To refill the pipeline.
 pub const REFILL: u32 = 3;
 /// Into a handler and out of it again, and for the floating-point registers that its first such instruction stacks.
@@ -14,115 +19,78 @@ pub const EXCEPTION_FRAME: i32 = 4 * (8 + 18 + 1);
 const DIVIDE: u32 = 12;
 const BARRIER: u32 = 4;
 
-/// Cycles of the instruction with these half-words, without the refill where it branches.
-pub fn cycles(first: u16, second: u16) -> u32 {
-    if first >> 11 < 0b11101 { narrow(first) } else { wide(first, second) }
-}
-
-fn narrow(op: u16) -> u32 {
-    match op >> 8 {
-        // PUSH; POP; STM, LDM.
-        0xB4 | 0xB5 | 0xBC | 0xBD => 1 + (op & 0x1FF).count_ones(),
-        0xC0..=0xCF => 1 + (op & 0xFF).count_ones(),
-        // LDR from a literal; loads and stores of one value.
-        0x48..=0x9F => 2,
+/// Cycles of the instruction of this name, without the refill where it branches.
+pub fn cycles(name: &str, operands: &[Operand]) -> u32 {
+    match name {
+        "push" | "pop" | "vpush" | "vpop" => 1 + words(operands),
+        // The first operand is the base.
+        _ if ["ldm", "stm", "vldm", "vstm"].iter().any(|many| name.starts_with(many)) => {
+            1 + words(&operands[1..])
+        }
+        "ldrd" | "strd" | "tbb" | "tbh" => 3,
+        _ if name.starts_with("ldrex") || name.starts_with("strex") => 3,
+        _ if name.starts_with("ldr") || name.starts_with("str") => 2,
+        "vldr" | "vstr" => 1 + words(&operands[..1]),
+        "sdiv" | "udiv" => DIVIDE,
+        "mla" | "mls" | "msr" | "mrs" => 2,
+        "dmb" | "dsb" | "isb" => BARRIER,
+        _ if name.starts_with('v') => float(name, operands),
         _ => 1,
     }
 }
 
-fn wide(first: u16, second: u16) -> u32 {
-    match first {
-        // LDM, STM; two words, exclusives and TBB.
-        _ if first & 0xFE40 == 0xE800 => 1 + second.count_ones(),
-        _ if first & 0xFE40 == 0xE840 => 3,
-        0xEC00..=0xEFFF => float(first, second),
-        0xF800..=0xF9FF => 2,
-        0xFB90 | 0xFBB0..=0xFBBF | 0xFB91..=0xFB9F => DIVIDE,
-        // MLA and MLS; MUL has no addend.
-        _ if first & 0xFFF0 == 0xFB00 && second >> 12 != 15 => 2,
-        // Barriers and the like; MSR, MRS.
-        0xF3BF => BARRIER,
-        0xF380..=0xF38F | 0xF3EF if second & 0xD000 == 0x8000 => 2,
-        _ => 1,
-    }
-}
-
-fn float(first: u16, second: u16) -> u32 {
+fn float(name: &str, operands: &[Operand]) -> u32 {
     const CONSUMED: u32 = 1;
-    let words = u32::from(second & 0xFF);
-    match first & 0xFF00 {
-        // Two core registers; VLDM, VSTM, VPUSH, VPOP.
-        0xEC00 if first & 0x00E0 == 0x0040 => 2,
-        0xEC00 => 1 + words,
-        0xED00 if first & 0x0020 != 0 => 1 + words,
-        // VLDR, VSTR of one word or two.
-        0xED00 => {
-            if second & 0x0100 == 0 {
-                2
-            } else {
-                3
-            }
-        }
-        // One core register, or the flags.
-        _ if second & 0x10 != 0 => 1,
-        _ => {
-            CONSUMED
-                + match first >> 4 & 0xB {
-                    // With addend, fused or not; VDIV.
-                    0b0000 | 0b0001 | 0b1001 | 0b1010 => 3,
-                    0b1000 => 14,
-                    // VSQRT among those of one operand.
-                    0b1011 if first & 0xF == 1 && second >> 6 & 3 == 3 => 14,
-                    _ => 1,
-                }
-        }
+    let cores = operands.iter().filter(|operand| is_core(operand)).count() as u32;
+    match name {
+        // The flags; core registers, one or two.
+        "vmrs" | "vmsr" => 1,
+        "vmov" if cores > 0 => cores,
+        "vmla" | "vmls" | "vnmla" | "vnmls" | "vfma" | "vfms" | "vfnma" | "vfnms" => CONSUMED + 3,
+        "vdiv" | "vsqrt" => CONSUMED + 14,
+        _ => CONSUMED + 1,
     }
 }
 
 /// By how many bytes it moves the stack pointer.
-pub fn stack_move(first: u16, second: u16) -> i32 {
-    let words = |count: u32| 4 * count as i32;
-    match first {
-        _ if first & 0xFE00 == 0xB400 => -words((first & 0x1FF).count_ones()),
-        _ if first & 0xFE00 == 0xBC00 => words((first & 0x1FF).count_ones()),
-        _ if first & 0xFF80 == 0xB000 => words(u32::from(first & 0x7F)),
-        _ if first & 0xFF80 == 0xB080 => -words(u32::from(first & 0x7F)),
-        0xE92D => -words(second.count_ones()),
-        0xE8BD => words(second.count_ones()),
-        // VPUSH, VPOP.
-        _ if first & 0xFFBF == 0xED2D => -words(u32::from(second & 0xFF)),
-        _ if first & 0xFFBF == 0xECBD => words(u32::from(second & 0xFF)),
-        // One register.
-        0xF84D if second & 0x0FFF == 0x0D04 => -4,
-        0xF85D if second & 0x0FFF == 0x0B04 => 4,
-        // ADD, SUB of a constant: modified, or of twelve bits.
-        _ if second >> 8 & 0xF == 13 && second >> 15 == 0 => match first & 0xFBFF {
-            0xF10D => modified(first, second),
-            0xF1AD => -modified(first, second),
-            0xF20D => plain(first, second),
-            0xF2AD => -plain(first, second),
-            _ => 0,
-        },
+pub fn stack_move(name: &str, operands: &[Operand], writes_back: bool) -> i32 {
+    match (name, operands) {
+        ("push" | "vpush", _) => -4 * words(operands).cast_signed(),
+        ("pop" | "vpop", _) => 4 * words(operands).cast_signed(),
+        ("str" | "ldr", [_, Operand::Mem(memory), rest @ ..]) if Operand::Reg(memory.base()) == SP => {
+            match rest {
+                // Behind the access.
+                [Operand::Imm(by)] => *by,
+                _ if writes_back => memory.disp(),
+                _ => 0,
+            }
+        }
+        ("add" | "addw", [SP, Operand::Imm(by)] | [SP, SP, Operand::Imm(by)]) => *by,
+        ("sub" | "subw", [SP, Operand::Imm(by)] | [SP, SP, Operand::Imm(by)]) => -*by,
         _ => 0,
     }
 }
 
-fn plain(first: u16, second: u16) -> i32 {
-    i32::from(first >> 10 & 1) << 11 | i32::from(second >> 12 & 7) << 8 | i32::from(second & 0xFF)
+/// Words that registers hold: two where they are double.
+fn words(registers: &[Operand]) -> u32 {
+    registers.iter().map(|register| if is_double(register) { 2 } else { 1 }).sum()
 }
 
-/// A byte at any place in a word; the repeated patterns are no stack sizes.
-fn modified(first: u16, second: u16) -> i32 {
-    let field = plain(first, second) as u32;
-    if field < 0x400 {
-        return (field & 0xFF) as i32;
-    }
-    (0x80 | field & 0x7F).rotate_right(field >> 7) as i32
+fn is_double(register: &Operand) -> bool {
+    let of = |register: &RegId| u32::from(register.0);
+    matches!(register, Operand::Reg(found) if (ArmReg::ARM_REG_D0..=ArmReg::ARM_REG_D31).contains(&of(found)))
+}
+
+fn is_core(register: &Operand) -> bool {
+    let of = |register: &RegId| u32::from(register.0);
+    let is_general =
+        |number| (ArmReg::ARM_REG_R0..=ArmReg::ARM_REG_R12).contains(&number) || number == ArmReg::ARM_REG_LR;
+    matches!(register, Operand::Reg(found) if is_general(of(found)))
 }
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use crate::thumb::tests::one;
 
     #[test]
     fn cycles_by_the_manual() {
@@ -152,7 +120,7 @@ mod tests {
             (0xED90, 0x0A00, 2),  // vldr s0, [r0]
             (0xED2D, 0x8B04, 5),  // vpush {d8, d9}
         ] {
-            assert_eq!(cycles(first, second), expected, "{first:04x} {second:04x}");
+            assert_eq!(one(0, first, second).cycles, expected, "{first:04x} {second:04x}");
         }
     }
 
@@ -174,7 +142,7 @@ mod tests {
             (0xF1A0, 0x0D04, 0),      // sub.w sp, r0, #4
             (0x6801, 0, 0),
         ] {
-            assert_eq!(stack_move(first, second), expected, "{first:04x} {second:04x}");
+            assert_eq!(one(0, first, second).stack_move, expected, "{first:04x} {second:04x}");
         }
     }
 }

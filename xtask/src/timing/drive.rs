@@ -1,6 +1,6 @@
 //! Drives the image in the emulator and follows its log while it runs.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{File, OpenOptions};
 use std::io::{BufRead, BufReader, Read, Write};
 use std::path::{Path, PathBuf};
@@ -119,7 +119,14 @@ impl Bench {
     /// Reads to the end whatever happens, so that nobody waits for a reader.
     fn follow(&self, log: File) -> Result<Drive> {
         let link = self.image.functions.iter();
-        let link = link.filter(|(_, function)| is_link(&function.names)).map(|(start, _)| *start).collect();
+        let link: BTreeSet<u32> =
+            link.filter(|(_, function)| is_link(&function.names)).map(|(start, _)| *start).collect();
+        if link.is_empty() {
+            bail!(
+                "the image has no function of {}, which would be left out of the counts",
+                LINK.join(" or ")
+            );
+        }
         let mut meter = Meter::new(&self.image, &link);
         meter.keeps_paths = self.keeps_paths;
         let mut lines = BufReader::with_capacity(1 << 20, Unhurried(log));

@@ -2,46 +2,20 @@
 
 use std::collections::BTreeSet;
 
-use super::cost;
 use super::tally::Tally;
 use crate::elf::Image;
-use crate::thumb::decode;
 
 /// The functions outside the link in which an instruction masks interrupts.
 pub fn masking(image: &Image, is_link: impl Fn(&[String]) -> bool) -> BTreeSet<String> {
-    let mut found = BTreeSet::new();
-    for (&start, function) in image.functions.iter().filter(|(_, function)| !is_link(&function.names)) {
-        let mut at = start;
-        while at < start + function.size {
-            let Some(first) = image.half_word(at) else { break };
-            let second = image.half_word(at + 2).unwrap_or(0);
-            let is_code = image.mapping.range(..=at).next_back().is_none_or(|(_, is_code)| *is_code);
-            if !is_code {
-                at += 2;
-                continue;
-            }
-            if masks(first, second) {
-                found.insert(function.names.first().cloned().unwrap_or_default());
-            }
-            at += decode(at, first, second).1;
-        }
-    }
-    found
-}
-
-/// CPSID; MSR to PRIMASK, BASEPRI, BASEPRI_MAX or FAULTMASK.
-fn masks(first: u16, second: u16) -> bool {
-    let cpsid = first & 0xFFF8 == 0xB670;
-    let msr = first & 0xFFF0 == 0xF380 && second & 0xFF00 == 0x8800;
-    cpsid || msr && (16..=19).contains(&(second & 0xFF))
+    let functions = image.functions.iter().filter(|(_, function)| !is_link(&function.names));
+    let masking = functions.filter(|(start, _)| image.instructions_of(**start).any(|(_, of)| of.masks));
+    masking.map(|(_, function)| function.names.first().cloned().unwrap_or_default()).collect()
 }
 
 /// Of the instructions that an exception executed the one of the most cycles, which the next interrupt may have to wait for, and these.
 pub fn longest(image: &Image, hits: &Tally, exception: u32) -> Option<(u32, u32)> {
-    let priced = hits.of(exception).map(|(address, _)| {
-        let halves = [address, address + 2].map(|at| image.half_word(at).unwrap_or(0));
-        (cost::cycles(halves[0], halves[1]), address)
-    });
+    let executed = hits.of(exception).filter_map(|(address, _)| image.instructions.get_key_value(&address));
+    let priced = executed.map(|(address, instruction)| (instruction.cycles, *address));
     priced.max().map(|(cycles, address)| (address, cycles))
 }
 

@@ -10,7 +10,6 @@ use std::rc::Rc;
 use anyhow::{Context, Result, bail};
 
 use crate::elf::Image;
-use crate::thumb::decode;
 
 /// How the emulator is asked for that log, with no block chained to the next.
 pub const ARGUMENTS: [&str; 2] =
@@ -85,10 +84,8 @@ impl<'a> Log<'a> {
     /// The instructions of a block that is announced. One that is listed is announced next.
     fn block(&mut self, block: u64, start: u32) -> Result<Rc<[u32]>> {
         if let Some((first, last)) = self.listed.take() {
-            let half = |at| self.image.half_word(at).unwrap_or(0);
-            let behind = |at: &u32| at + decode(*at, half(*at), half(at + 2)).1;
-            let next = |at: &u32| Some(behind(at)).filter(|at| *at <= last);
-            self.blocks.insert(block, std::iter::successors(Some(first), next).collect());
+            let listed = self.image.instructions.range(first..=last);
+            self.blocks.insert(block, listed.map(|(address, _)| *address).collect());
         }
         match self.blocks.get(&block) {
             Some(instructions) if instructions.first() == Some(&start) => Ok(Rc::clone(instructions)),

@@ -1,14 +1,14 @@
 //! From the emulator's log to the interrupts: which instruction belongs to which handler.
 
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::{BTreeMap, BTreeSet};
 
 use anyhow::{Result, bail};
 
-use super::cost::{self, ENTRY_AND_RETURN, EXCEPTION_FRAME, REFILL};
+use super::cost::{ENTRY_AND_RETURN, EXCEPTION_FRAME, REFILL};
 use super::log::Event;
 use super::tally::Tally;
 use crate::elf::Image;
-use crate::thumb::{Flow, decode};
+use crate::thumb::{Flow, Instruction};
 
 /// One interrupt, from the first instruction of its handler to its return.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -37,13 +37,13 @@ pub struct Path {
 
 /// Follows the log.
 pub struct Meter<'a> {
-    image: &'a Image,
+    /// By half-words, quick to look up.
+    code: Vec<Instruction>,
     /// Starts of the functions that are not counted.
     link: &'a BTreeSet<u32>,
     active: Vec<Handler>,
     /// Instructions since the exception became pending.
     pending: BTreeMap<u32, u32>,
-    known: HashMap<u32, Instruction>,
     /// Every interrupt that has returned, in the order of their returns.
     pub calls: Vec<Call>,
     /// Whether what each of them executed is kept.
@@ -58,15 +58,6 @@ pub struct Meter<'a> {
     pub deepest: BTreeMap<u32, i32>,
     /// Of each exception the addresses that its longest interrupt executed.
     pub longest: BTreeMap<u32, Vec<u32>>,
-}
-
-#[derive(Clone, Copy)]
-struct Instruction {
-    flow: Flow,
-    length: u32,
-    links: bool,
-    cycles: u32,
-    stack_move: i32,
 }
 
 /// A handler on its way.
@@ -90,13 +81,17 @@ struct Handler {
 
 impl<'a> Meter<'a> {
     /// A meter for an image; functions that start at `link` are not counted.
-    pub fn new(image: &'a Image, link: &'a BTreeSet<u32>) -> Self {
+    pub fn new(image: &Image, link: &'a BTreeSet<u32>) -> Self {
+        let end = image.instructions.keys().next_back().map_or(0, |last| last / 2 + 1);
+        let mut code = vec![Instruction::default(); end as usize];
+        for (address, instruction) in &image.instructions {
+            code[(address / 2) as usize] = *instruction;
+        }
         Self {
-            image,
+            code,
             link,
             active: Vec::new(),
             pending: BTreeMap::new(),
-            known: HashMap::new(),
             calls: Vec::new(),
             keeps_paths: false,
             paths: Vec::new(),
@@ -178,7 +173,7 @@ impl<'a> Meter<'a> {
             handler.within.pop();
             handler.stack = stack;
         }
-        let instruction = *self.known.entry(address).or_insert_with(|| read(self.image, address));
+        let instruction = self.code.get((address / 2) as usize).copied().unwrap_or_default();
         if handler.next.is_some_and(|next| next != address) {
             handler.call.cycles += REFILL;
         }
@@ -209,21 +204,6 @@ impl<'a> Meter<'a> {
         } else if instruction.links {
             handler.within.push((back, handler.stack));
         }
-    }
-}
-
-fn read(image: &Image, address: u32) -> Instruction {
-    let first = image.half_word(address).unwrap_or(0);
-    let second = image.half_word(address + 2).unwrap_or(0);
-    let (flow, length) = decode(address, first, second);
-    // BL, the only direct branch that keeps the way back.
-    let links = length == 4 && first >> 11 == 0b11110 && second >> 14 == 0b11 && second >> 12 & 1 == 1;
-    Instruction {
-        flow,
-        length,
-        links,
-        cycles: cost::cycles(first, second),
-        stack_move: cost::stack_move(first, second),
     }
 }
 

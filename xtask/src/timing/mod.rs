@@ -7,11 +7,11 @@
 //!
 //! [`system`] says what is driven, [`drive`] runs the rig, [`log`] reads a line, [`meter`] assigns instructions to interrupts,
 //! [`cost`] prices them, [`statistics`] and [`tally`] sum them up, [`parts`] and [`profile`] say whose they are, [`blocks`] counts
-//! building blocks by themselves, [`entry`] what could delay an entry, [`budget`] judges, [`report`], [`plain`] and [`page`] tell, [`kept`] compares with what the repository holds.
+//! building blocks by themselves, [`entry`] what could delay an entry, [`budget`] judges, [`report`], [`tables`] and [`page`] tell, [`kept`] compares with what the repository holds.
 
 mod blocks;
 mod budget;
-mod cost;
+pub mod cost;
 pub mod drive;
 mod entry;
 mod kept;
@@ -19,11 +19,11 @@ mod log;
 pub mod meter;
 mod page;
 mod parts;
-mod plain;
 mod profile;
 mod report;
 pub mod statistics;
 mod system;
+mod tables;
 mod tally;
 
 use anyhow::{Context, Result};
@@ -45,6 +45,7 @@ pub fn run(args: &TimingArgs) -> Result<u8> {
     for system in System::ALL {
         systems.push(system.measure(&toolchain, &rig, &qemu)?);
     }
+    parts::all_found(&systems.iter().flat_map(|measured| &measured.sources).copied().collect())?;
     let budgets = build::root().join("budgets.toml");
     let text = std::fs::read_to_string(&budgets).with_context(|| budgets.display().to_string())?;
     let values: Vec<_> = systems.iter().flat_map(values).chain(report::blocks(&blocks)).collect();
@@ -53,7 +54,7 @@ pub fn run(args: &TimingArgs) -> Result<u8> {
     if args.json {
         println!("{}", report.json());
     } else {
-        print!("{}", plain::text(&report));
+        print!("{}", page::plain(&report));
     }
     if let Some(count) = args.profile {
         for measured in &systems {

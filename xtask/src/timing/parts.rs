@@ -1,11 +1,12 @@
 //! What the parts of an interrupt cost: every executed instruction belongs to one part, so they add up to the interrupt.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
-use anyhow::Result;
+use anyhow::{Result, bail};
 
-use super::profile::Profile;
+use super::profile::{Place, Profile};
 use super::tally::Tally;
+use crate::build;
 
 /// Whether an interrupt could do without a part and still be what its target is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -33,66 +34,42 @@ impl Group {
 
 use Group::{Around, Beyond, Named};
 
-/// Parts, what they are in the control interrupt and in the PWM interrupt, and what the names of their functions contain. Whose an
-/// instruction is, is asked of the innermost function first, and then of those that it was inlined into.
-const PARTS: [(&str, [Group; 2], &[&str]); 30] = [
-    (
-        "sine and cosine, Clarke, Park, angles",
-        [Named, Named],
-        &[
-            "Angle::sin_cos",
-            "Angle::of_vector",
-            "Angle::from_",
-            "Angle::within_half_turn",
-            "frames::angle::octant_atan",
-            "::clarke",
-            "::park",
-            "::unpark",
-            "::turned",
-            "frames::vector::Abc::peak",
-        ],
-    ),
-    ("flux map", [Named, Named], &["control::flux_linkage"]),
-    ("MTPA, two passes", [Named, Named], &["control::mtpa::"]),
-    ("operating point: weakening, limits", [Named, Named], &["control::reference::"]),
-    ("link's window", [Beyond, Beyond], &["control::link_filter::", "demand::LinkWindow"]),
-    ("torque demand: envelope, slew", [Named, Named], &["control::demand::"]),
-    ("trim of mean torque", [Beyond, Beyond], &["control::torque_trim::"]),
-    ("speed from the angle", [Beyond, Beyond], &["control::speed::"]),
-    ("speed loop", [Beyond, Beyond], &["control::speed_loop::"]),
-    ("disturbance, its sixth harmonic", [Beyond, Beyond], &["control::disturbance::"]),
-    ("map error", [Beyond, Beyond], &["control::map_error::"]),
-    ("current loop", [Named, Named], &["control::current_loop::", "control::flux_path::"]),
-    ("Z-source", [Beyond, Beyond], &["control::z_source::"]),
-    ("control law, the rest", [Named, Named], &["tractive::control::"]),
-    ("ripple of the pattern", [Named, Named], &["modulation::ripple::", "::ripple"]),
-    ("revision of a committed half", [Beyond, Beyond], &["::is_to_revise", "::revise"]),
+/// Parts, what they are in the control interrupt and in the PWM interrupt, and their sources: files and folders below `src/` of one of
+/// the repository's crates, whichever it is; behind a `#` a word of the function's name. Of the sources that an instruction's file lies
+/// in the longest decides. First the innermost function is asked, then those that it was inlined into.
+const PARTS: [(&str, [Group; 2], &[&str]); 28] = [
+    ("sine and cosine, Clarke, Park, angles", [Named, Named], &["frames/"]),
+    ("look-up in flux map and tables", [Named, Named], &["machine/lookup.rs"]),
+    ("MTPA, two passes", [Named, Named], &["control/mtpa.rs"]),
+    ("operating point: weakening, limits", [Named, Named], &["control/reference.rs"]),
+    ("link's filter", [Beyond, Beyond], &["control/link_filter.rs"]),
+    ("torque demand: envelope, slew, link's window", [Named, Named], &["control/demand.rs"]),
+    ("trim of mean torque", [Beyond, Beyond], &["control/torque_trim.rs"]),
+    ("speed from the angle", [Beyond, Beyond], &["control/speed.rs"]),
+    ("speed loop", [Beyond, Beyond], &["control/speed_loop.rs"]),
+    ("disturbance, its sixth harmonic", [Beyond, Beyond], &["control/disturbance.rs"]),
+    ("map error", [Beyond, Beyond], &["control/map_error.rs"]),
+    ("current loop", [Named, Named], &["control/current_loop.rs", "control/flux_path.rs"]),
+    ("Z-source", [Beyond, Beyond], &["control/z_source.rs"]),
+    ("control law, the rest", [Named, Named], &["control/"]),
+    ("ripple of the pattern", [Named, Named], &["modulation/ripple.rs"]),
     (
         "flux predicted from committed pulses",
         [Beyond, Beyond],
-        &["committed", "traction::glide::", "::boundary", "::new_boundary", "volt_seconds", "volt_ticks"],
+        &["drive/traction/applied.rs", "drive/traction/glide.rs"],
     ),
-    ("gates read back", [Beyond, Beyond], &["dual::pwm::Expected", "::stuck"]),
-    ("protection", [Named, Named], &["tractive::protection::", "Task<M>::check", "::stale", "::violation"]),
-    ("scaling", [Named, Named], &["ControlTask<M>::measured"]),
-    ("flight recorder", [Beyond, Beyond], &["tractive::recorder::", "cell::ring::", "ControlTask<M>::entry"]),
-    (
-        "cells and messages",
-        [Around, Around],
-        &["cell::Downlink", "cell::Uplink", "cell::Trail", "messages::", "::Applied::"],
-    ),
-    ("choice of the mode", [Beyond, Named], &["modulation::schedule::", "::choose_mode", "::switch_to"]),
-    ("dead-time compensation", [Beyond, Beyond], &["modulation::dead_time::"]),
-    ("growth of a pattern, catching", [Beyond, Beyond], &["modulation::growth::", "modulation::catch::"]),
-    ("shoot-through", [Named, Named], &["nine_switch::shoot_through::"]),
-    ("pulses", [Beyond, Named], &["tractive::modulation::", "tractive::nine_switch::"]),
-    ("axis of a motor", [Around, Around], &["dual::axis::"]),
-    ("task", [Around, Around], &["tractive::drive::"]),
-    (
-        "entry and board",
-        [Around, Around],
-        &["tractive::firmware", "zs9::firmware", "tractive::board::", "TIMER"],
-    ),
+    ("gates read back", [Beyond, Beyond], &["drive/dual/pwm.rs#Expected", "drive/dual/pwm.rs#stuck"]),
+    ("protection", [Named, Named], &["protection/"]),
+    ("flight recorder", [Beyond, Beyond], &["recorder.rs", "cell/ring.rs"]),
+    ("cells and messages", [Around, Around], &["cell.rs", "drive/messages.rs", "drive/dual/messages.rs"]),
+    ("choice of the mode", [Beyond, Named], &["modulation/schedule.rs"]),
+    ("dead-time compensation", [Beyond, Beyond], &["modulation/dead_time.rs"]),
+    ("growth of a pattern", [Beyond, Beyond], &["modulation/growth.rs"]),
+    ("shoot-through", [Named, Named], &["nine_switch/shoot_through.rs"]),
+    ("pulses", [Beyond, Named], &["modulation/", "nine_switch/"]),
+    ("axis of a motor", [Around, Around], &["drive/dual/axis.rs"]),
+    ("task", [Around, Around], &["drive/"]),
+    ("entry and board", [Around, Around], &["main.rs", "bin/zs9.rs", "board/"]),
 ];
 /// What no part owns: copies and the like.
 const REST: &str = "library";
@@ -112,20 +89,24 @@ pub fn together<'a>(parts: impl Iterator<Item = &'a Part>) -> (f64, u32) {
     parts.fold((0.0, 0), |(mean, longest), part| (mean + part.mean, longest + part.longest))
 }
 
-/// The parts of an interrupt that came `calls` times, by their groups, the dearest first.
+/// The parts of an interrupt that came `calls` times, by their groups, the dearest first. The sources that instructions came from are
+/// added to `sources`.
 pub fn parts(
     profile: &Profile,
     (interrupt, exception): (&str, u32),
     hits: &Tally,
     calls: usize,
     longest: &[u32],
+    sources: &mut BTreeSet<&'static str>,
 ) -> Result<Vec<Part>> {
     let mut known = BTreeMap::new();
     let mut part = |address: u32| -> Result<&'static str> {
         if let Some(name) = known.get(&address) {
             return Ok(*name);
         }
-        let name = owner(&profile.chain(address)?);
+        let owner = owner(&profile.places(address)?);
+        sources.extend(owner.map(|(_, source)| source));
+        let name = owner.map_or(REST, |(name, _)| name);
         known.insert(address, name);
         Ok(name)
     };
@@ -150,13 +131,39 @@ pub fn parts(
     Ok(parts)
 }
 
-/// The part of an instruction by its functions, the innermost first.
-fn owner(chain: &[String]) -> &'static str {
-    let of = |name: &String| {
-        let owns = |patterns: &&[&str]| patterns.iter().any(|pattern| name.contains(pattern));
-        PARTS.iter().find(|(.., patterns)| owns(patterns)).map(|(part, ..)| *part)
+/// The part of an instruction and the source that says so, by its functions, the innermost first.
+fn owner(places: &[Place]) -> Option<(&'static str, &'static str)> {
+    let sources =
+        || PARTS.iter().flat_map(|(part, _, sources)| sources.iter().map(move |source| (*part, *source)));
+    let of = |place: &Place| {
+        let owns = |(_, source): &(&str, &str)| lies_in(place, source);
+        sources().filter(owns).max_by_key(|(_, source)| source.len())
     };
-    chain.iter().find_map(of).unwrap_or(REST)
+    places.iter().find_map(of)
+}
+
+fn lies_in(place: &Place, source: &str) -> bool {
+    let (path, word) = source.split_once('#').unwrap_or((source, ""));
+    let mut words = place.function.split(|c: char| !c.is_alphanumeric() && c != '_');
+    below_src(&place.file).is_some_and(|file| file == path || path.ends_with('/') && file.starts_with(path))
+        && (word.is_empty() || words.any(|of_name| of_name == word))
+}
+
+/// The path below `src/` of one of the repository's crates; `None` for a library's file.
+fn below_src(file: &str) -> Option<&str> {
+    let inside = file.strip_prefix(build::root().to_str()?)?;
+    inside.split_once("/src/").map(|(_, path)| path)
+}
+
+/// Refuses a list of parts of which a source is in no interrupt: it was renamed, and what it costs is counted elsewhere.
+pub fn all_found(sources: &BTreeSet<&str>) -> Result<()> {
+    let listed = PARTS.iter().flat_map(|(part, _, listed)| listed.iter().map(move |source| (part, source)));
+    let missing = listed.filter(|(_, source)| !sources.contains(**source));
+    let missing: Vec<_> = missing.map(|(part, source)| format!("`{source}` ({part})")).collect();
+    if !missing.is_empty() {
+        bail!("timing/parts.rs: no interrupt executes anything of {}; was it renamed?", missing.join(", "));
+    }
+    Ok(())
 }
 
 fn group(interrupt: &str, part: &str) -> Group {
@@ -168,20 +175,45 @@ fn group(interrupt: &str, part: &str) -> Group {
 mod tests {
     use super::*;
 
+    fn place(file: &str, function: &str) -> Place {
+        let file = format!("{}/{file}", build::root().display());
+        Place { function: function.to_owned(), file }
+    }
+
     #[test]
-    fn the_innermost_function_that_a_part_knows_decides() {
-        let of = |names: &[&str]| owner(&names.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>());
-        let lookup = "tractive::machine::lookup::Grid<_>::at";
-        let [mtpa, point] =
-            ["tractive::control::mtpa::pass", "tractive::control::reference::operating_point"];
-        assert_eq!(of(&[lookup, mtpa, point, "TIMER0"]), "MTPA, two passes");
-        assert_eq!(of(&[lookup, point, "TIMER0"]), "operating point: weakening, limits");
-        assert_eq!(of(&["tractive::control::Controller::step"]), "control law, the rest");
-        let [store, ring] = ["tractive::cell::store", "tractive::cell::ring::Ring<T,_,_>::record"];
-        assert_eq!(of(&[store, ring, "TIMER0"]), "flight recorder");
-        assert_eq!(of(&[store, "tractive::cell::Downlink<T,_>::publish", "TIMER0"]), "cells and messages");
-        assert_eq!(of(&["memcpy"]), "library");
-        assert_eq!(of(&["DUALTIMER"]), "entry and board");
+    fn the_innermost_file_that_a_part_knows_decides() {
+        let of = |files: &[&str]| {
+            owner(&files.iter().map(|file| place(file, "f")).collect::<Vec<_>>()).map(|(part, _)| part)
+        };
+        let [mtpa, point] = ["src/control/mtpa.rs", "src/control/reference.rs"];
+        assert_eq!(of(&[mtpa, point, "src/main.rs"]), Some("MTPA, two passes"));
+        assert_eq!(of(&["src/time.rs", point, "src/main.rs"]), Some("operating point: weakening, limits"));
+        // Whichever crate it is in.
+        assert_eq!(of(&["control/src/control/mtpa.rs"]), Some("MTPA, two passes"));
+        assert_eq!(of(&["control/src/modulation/mode.rs"]), Some("pulses"));
+        assert_eq!(of(&["src/control/mod.rs"]), Some("control law, the rest"));
+        assert_eq!(of(&["src/drive/traction/control.rs"]), Some("task"));
+        assert_eq!(of(&["src/bin/zs9.rs"]), Some("entry and board"));
+        assert_eq!(of(&["target/firmware/build/x/out/tables.rs"]), None);
+        let library = |file: &str| Place { file: file.to_owned(), function: "f".to_owned() };
+        assert_eq!(owner(&[library("/rustc/1/library/core/src/cell.rs")]), None);
+    }
+
+    #[test]
+    fn a_word_tells_functions_of_a_file_apart() {
+        let of = |function: &str| owner(&[place("src/drive/dual/pwm.rs", function)]).unwrap().0;
+        assert_eq!(of("tractive::drive::dual::pwm::PwmTask<M>::stuck"), "gates read back");
+        assert_eq!(of("tractive::drive::dual::pwm::PwmTask<M>::unstuck"), "task");
+    }
+
+    #[test]
+    fn a_source_that_is_gone_is_told() {
+        let mut sources: BTreeSet<_> = PARTS.iter().flat_map(|(.., sources)| *sources).copied().collect();
+        assert!(all_found(&sources).is_ok());
+        sources.remove("control/mtpa.rs");
+        assert!(
+            all_found(&sources).unwrap_err().to_string().contains("`control/mtpa.rs` (MTPA, two passes)")
+        );
     }
 
     #[test]

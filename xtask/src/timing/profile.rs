@@ -18,6 +18,15 @@ pub struct Share {
     pub with_callees: u64,
 }
 
+/// Where an instruction comes from.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Place {
+    /// Demangled.
+    pub function: String,
+    /// Its path on the machine that built the image; empty where the debug information names none.
+    pub file: String,
+}
+
 /// What is known about a drive's instructions.
 pub struct Profile<'a> {
     lines: Lines<Reader<'a>>,
@@ -57,15 +66,21 @@ impl<'a> Profile<'a> {
     }
 
     /// The function at an address and those that it was inlined into, the innermost first.
-    pub fn chain(&self, address: u32) -> Result<Vec<String>> {
+    fn chain(&self, address: u32) -> Result<Vec<String>> {
+        Ok(self.places(address)?.into_iter().map(|place| place.function).collect())
+    }
+
+    /// The same with their source files.
+    pub fn places(&self, address: u32) -> Result<Vec<Place>> {
         let mut frames = self.lines.find_frames(address.into()).skip_all_loads()?;
-        let mut chain = Vec::new();
+        let mut places = Vec::new();
         while let Some(frame) = frames.next()? {
-            if let Some(function) = frame.function {
-                chain.push(format!("{:#}", rustc_demangle::demangle(&function.raw_name()?)));
-            }
+            let Some(function) = frame.function else { continue };
+            let function = format!("{:#}", rustc_demangle::demangle(&function.raw_name()?));
+            let file = frame.location.and_then(|location| location.file).unwrap_or_default().to_owned();
+            places.push(Place { function, file });
         }
-        Ok(chain)
+        Ok(places)
     }
 }
 

@@ -163,29 +163,22 @@ impl Report<'_> {
     /// As the contract of `timing --json` has it, and more. `image` is the first system's.
     pub fn json(&self) -> Value {
         let all = |of: fn(&Measured) -> Vec<Value>| self.systems.iter().flat_map(of).collect::<Vec<_>>();
-        let blocks: Vec<Value> = self
-            .blocks
-            .iter()
-            .map(|block| {
-                json!({
-                    "name": block.name, "instructions": block.max, "net": net(self.blocks, block), "mean": block.mean, "cycles": block.cycles,
-                    "max_error": block.max_error,
-                })
+        let block = |block: &Block| {
+            let net = net(self.blocks, block);
+            json!({
+                "name": block.name, "instructions": block.max, "net": net, "mean": block.mean,
+                "cycles": block.cycles, "max_error": block.max_error,
             })
-            .collect();
-        let budgets: Vec<Value> = self
-            .judged
-            .iter()
-            .map(|judged| {
-                json!({
-                    "name": judged.name, "value": judged.value, "target": judged.budget.target,
-                    "ceiling": judged.budget.bound(), "verdict": judged.verdict().name(),
-                })
+        };
+        let judged = |judged: &Judged| {
+            let Judged { name, value, budget } = judged;
+            json!({
+                "name": name, "value": value, "target": budget.target, "ceiling": budget.bound(),
+                "verdict": judged.verdict().name(),
             })
-            .collect();
+        };
         let first = self.systems.first();
         let images = self.systems.iter().map(|measured| (measured.system.name, measured.json_image()));
-        let images: Map<String, Value> = images.map(|(name, image)| (name.to_owned(), image)).collect();
         json!({
             "interrupts": all(Measured::json_rows),
             "parts": all(Measured::json_parts),
@@ -194,10 +187,10 @@ impl Report<'_> {
             "cycles_per_instruction": first.map(|measured| measured.statistics.cycles_per_instruction()),
             "max_stator_frequency_hz": first.map(|measured| measured.statistics.hertz),
             "core_tick": { "instructions": core_tick(self.blocks) },
-            "blocks": blocks,
+            "blocks": self.blocks.iter().map(block).collect::<Vec<_>>(),
             "image": first.map(Measured::json_image),
-            "images": images,
-            "budgets": budgets,
+            "images": images.collect::<std::collections::BTreeMap<_, _>>(),
+            "budgets": self.judged.iter().map(judged).collect::<Vec<_>>(),
         })
     }
 }
@@ -206,8 +199,8 @@ impl Report<'_> {
 mod tests {
     use super::*;
     use crate::timing::budget::judge;
+    use crate::timing::page;
     use crate::timing::system::tests::example;
-    use crate::timing::{page, plain};
 
     #[test]
     fn the_json_holds_what_the_contract_names() {
@@ -235,13 +228,13 @@ mod tests {
         assert_eq!([&image["code_bytes"], &image["table_bytes"], &image["ram_bytes"]], [1, 2, 4]);
         assert_eq!(image["stack_bytes"], 640);
         assert_eq!(json["parts"][0]["in_longest"], 20);
-        let plain = plain::text(&report);
+        let plain = page::plain(&report);
         assert!(plain.contains("OVER"));
         let plain = plain.split_whitespace().collect::<Vec<_>>().join(" ");
-        for row in ["mid7 2 10 15.0 20 ", "mid7, motoring 1 10 10.0 10 ", "mid7, braking 1 20 20.0 20 "] {
+        for row in ["mid7, motoring 10 10 10 1700 0", "mid7, braking 20 20 20 1700 0"] {
             assert!(plain.contains(&format!("control {row}")), "{plain}");
         }
-        assert!(plain.contains("MTPA, two passes 12.0 20 what the target names 12.0 20 "), "{plain}");
+        assert!(plain.contains("what the target names 12 20 MTPA, two passes 12 20 "), "{plain}");
         let page = page::text(&report);
         assert!(page.contains("| pmasynrm control | 1 | 20 | 20 | 0 | 0 |"), "{page}");
         assert!(page.contains("| control | mid7, motoring | 10 | 10 | 10 | 1700 | 0 |"), "{page}");

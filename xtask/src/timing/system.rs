@@ -231,6 +231,8 @@ pub struct Measured {
     pub statistics: Statistics,
     /// Of each interrupt.
     pub parts: Vec<(&'static str, Vec<Part>)>,
+    /// The parts' sources that were executed.
+    pub sources: BTreeSet<&'static str>,
     /// Functions that mask interrupts.
     pub masking: BTreeSet<String>,
     /// Control's longest instruction: its address and its cycles.
@@ -241,19 +243,25 @@ pub struct Measured {
 
 impl Measured {
     fn new(system: System, path: PathBuf, image: Image, sum: Sum) -> Result<Self> {
+        if image.sizes.tables == 0 || image.sizes.recorder == 0 {
+            bail!("{}: no table or no recorder has the name that its size is known by", path.display());
+        }
         let bytes = profile::bytes(&path)?;
         let profile = Profile::new(&bytes)?;
-        let mut parts = Vec::new();
+        let (mut parts, mut sources) = (Vec::new(), BTreeSet::new());
         for (name, exception) in INTERRUPTS {
             let longest = sum.longest.get(&exception).map_or(&[][..], Vec::as_slice);
             let calls = sum.calls.get(&exception).copied().unwrap_or(0);
-            parts.push((name, parts::parts(&profile, (name, exception), &sum.hits, calls, longest)?));
+            parts.push((
+                name,
+                parts::parts(&profile, (name, exception), &sum.hits, calls, longest, &mut sources)?,
+            ));
         }
         let masking = entry::masking(&image, is_link);
         let [(_, control), _] = INTERRUPTS;
         let longest = entry::longest(&image, &sum.hits, control);
         let statistics = sum.statistics.clone();
-        Ok(Self { system, image, statistics, parts, masking, longest, path, sum })
+        Ok(Self { system, image, statistics, parts, sources, masking, longest, path, sum })
     }
 
     /// The dearest functions of each interrupt.
@@ -303,6 +311,7 @@ pub mod tests {
             image: Image { sizes, ..Image::default() },
             statistics,
             parts: vec![("control", vec![part])],
+            sources: BTreeSet::new(),
             masking: BTreeSet::new(),
             longest: Some((0x100, 14)),
             path: PathBuf::new(),
