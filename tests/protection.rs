@@ -284,7 +284,7 @@ fn currents_may_repeat_until_something_should_move_them() {
 #[test]
 fn currents_that_freeze_at_rest_are_found() {
     found_at(0.0, Fault::Frozen, 300, |sample| {
-        sample.measured.currents_a = Abc { a: 50.0, b: -20.0, c: -30.0 };
+        sample.currents_a = Abc { a: 50.0, b: -20.0, c: -30.0 };
     });
 }
 

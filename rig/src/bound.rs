@@ -76,7 +76,7 @@ pub fn beside(
 
 /// Fundamental periods of a pattern: the asynchronous carrier repeats only after several.
 const fn cycles(mode: Mode) -> u32 {
-    if matches!(mode, Mode::Async) { 20 } else { 1 }
+    if mode.carriers() == 0 { 20 } else { 1 }
 }
 
 /// What is wanted of distortion and torque ripple: of an ideal inverter, no more than a little over the bound.
@@ -117,11 +117,7 @@ pub fn ideal(rows: &[crate::trace::Row], options: &RunOptions, machine: &Machine
     let voltage_v = ud.hypot(uq);
     let wanted = Wanted {
         mode: last.mode,
-        voltage_v: if last.mode == Mode::Square {
-            last.udc_v * core::f64::consts::FRAC_2_PI
-        } else {
-            voltage_v
-        },
+        voltage_v: if last.mode.is_whole() { last.udc_v * core::f64::consts::FRAC_2_PI } else { voltage_v },
         udc_v: last.udc_v,
         f1_hz,
         cycles: cycles(last.mode),

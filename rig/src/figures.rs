@@ -42,7 +42,9 @@ pub fn draw(page: &mut Page, recording: &Recording, machine: &Machine) {
         ("stator frequency in Hz", "turn-ons per period"),
         &strategy(recording, machine),
     );
-    for (mode, f1_hz, share) in [(Mode::Mid7, 90.0, 0.7), (Mode::Mid3, 120.0, 0.9)] {
+    for mode in Mode::ALL.into_iter().filter(|mode| mode.is_pattern() && !mode.is_whole()) {
+        // Notches of much the same width: 70 % for 7 pulses, 90 % for 3.
+        let (f1_hz, share) = (100.0, 1.0 - 0.05 * f64::from(mode.turn_ons() - 1));
         let title =
             format!("middle 60°, {}: legs u, v, w at {:.0} % of six-step", mode.name(), 100.0 * share);
         page.draw_xy(
@@ -124,17 +126,13 @@ fn inductances(machine: &Machine, d_axis: bool) -> Series {
 /// Turn-ons a period of each mode over the frequencies at which the drive used it at full torque.
 fn strategy(recording: &Recording, machine: &Machine) -> Series {
     let full_nm = worst(recording.rows.iter().map(|row| row.te_ref_nm)).unwrap_or(0.0);
-    let full = recording.rows.iter().filter(|row| row.te_ref_nm > 0.999 * full_nm && row.f1_hz > 0.0);
+    let pulsing = recording.rows.iter().filter(|row| row.mode != Mode::Off && row.f1_hz > 0.0);
+    let full = pulsing.filter(|row| row.te_ref_nm > 0.999 * full_nm);
     let mut series = Series::new();
     for row in full {
-        let turn_ons = match row.mode {
-            Mode::Off => continue,
-            Mode::Async => f64::from(machine.tables.ratings.max_switching_hz) / row.f1_hz,
-            Mode::Sync15 => 15.0,
-            Mode::Sync12 => 12.0,
-            Mode::Mid7 => 7.0,
-            Mode::Mid3 => 3.0,
-            Mode::Square => 1.0,
+        let turn_ons = match row.mode.turn_ons() {
+            0 => f64::from(machine.tables.ratings.max_switching_hz) / row.f1_hz,
+            locked => f64::from(locked),
         };
         let name = row.mode.name();
         match series.iter_mut().find(|(known, _)| known == name) {

@@ -1,12 +1,14 @@
 //! The rig's command line.
 
 use anyhow::{Context, Result};
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::parser::ValueSource;
-use clap::{CommandFactory, FromArgMatches, Parser, Subcommand, ValueEnum};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 use tractive::built_in::traction::BUILT_IN;
+use tractive::modulation::Mode;
 use tractive_rig::analysis::Figures;
 use tractive_rig::campaign::{self, command::CampaignOptions};
 use tractive_rig::machine::Machine;
@@ -72,8 +74,8 @@ enum Command {
 #[derive(clap::Args)]
 struct PatternOptions {
     /// Mode.
-    #[arg(long, value_enum)]
-    mode: ModeName,
+    #[arg(long, value_parser = modes())]
+    mode: Mode,
     /// Fundamental, peak phase, in V.
     #[arg(long, value_parser = not_negative, allow_negative_numbers = true)]
     u: f64,
@@ -100,27 +102,10 @@ struct PatternOptions {
     machine: String,
 }
 
-#[derive(Clone, Copy, ValueEnum)]
-enum ModeName {
-    Async,
-    Sync15,
-    Sync12,
-    Mid7,
-    Mid3,
-    Square,
-}
-
-impl From<ModeName> for tractive::modulation::Mode {
-    fn from(name: ModeName) -> Self {
-        match name {
-            ModeName::Async => Self::Async,
-            ModeName::Sync15 => Self::Sync15,
-            ModeName::Sync12 => Self::Sync12,
-            ModeName::Mid7 => Self::Mid7,
-            ModeName::Mid3 => Self::Mid3,
-            ModeName::Square => Self::Square,
-        }
-    }
+/// The modes with pulses, by their names.
+fn modes() -> impl TypedValueParser<Value = Mode> {
+    let pulsing = Mode::ALL.into_iter().filter(|mode| *mode != Mode::Off);
+    PossibleValuesParser::new(pulsing.map(Mode::name)).map(|name| Mode::named(&name).unwrap_or_default())
 }
 
 fn main() -> ExitCode {
@@ -160,7 +145,7 @@ fn command(command: Command, given: &dyn Fn(&str) -> bool) -> Result<ExitCode> {
         Command::Pattern(options) => {
             let machine = Machine::load(&options.machine)?;
             let wanted = pattern::Wanted {
-                mode: options.mode.into(),
+                mode: options.mode,
                 voltage_v: options.u,
                 udc_v: options.udc,
                 f1_hz: options.f1,

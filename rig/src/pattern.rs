@@ -58,7 +58,7 @@ pub fn edges(wanted: &Wanted) -> Result<Vec<LegEdge>> {
     }
     let six_step_v = wanted.udc_v * core::f64::consts::FRAC_2_PI;
     let most = f64::from(depth_limit(wanted.mode, rate, &devices)) * six_step_v;
-    if wanted.mode != Mode::Square && wanted.voltage_v > most * 1.000_001 {
+    if !wanted.mode.is_whole() && wanted.voltage_v > most * 1.000_001 {
         bail!("--u {}: mode {} gives at most {most:.3} V here", wanted.voltage_v, wanted.mode.name());
     }
     let mut modulator = Modulator::new(devices, Schedule::fixed(wanted.mode, &CLOCK));
@@ -96,8 +96,8 @@ fn reference(wanted: &Wanted, rate: f32, tick: u64) -> Reference {
     let turned = (f64::from(rate) * tick as f64).rem_euclid(4_294_967_296.0);
     let angle = Angle(turned as u64 as u32) - Angle::DEG_90;
     let udc_v = wanted.udc_v as f32;
-    // Square wave gives what the link has; asked for less, it would have notches, as after a jump of the link.
-    let voltage_v = if wanted.mode == Mode::Square { six_step_v(udc_v) } else { wanted.voltage_v as f32 };
+    // A whole mode gives what the link has; asked for less, it would have notches, as after a jump of the link.
+    let voltage_v = if wanted.mode.is_whole() { six_step_v(udc_v) } else { wanted.voltage_v as f32 };
     Reference::turning(voltage_v, angle, rate, Instant(tick as u32), udc_v)
 }
 

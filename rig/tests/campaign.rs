@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 use std::path::Path;
+use tractive::modulation::{Ladder, Mode};
 use tractive::protection::Fault;
 use tractive_rig::bench::Flaws;
 use tractive_rig::campaign::judge::Verdict;
@@ -28,7 +29,7 @@ fn nothing_escapes_the_fast_campaign() {
     assert!(lost.is_empty(), "{lost:#?}");
     assert!(outcomes.len() >= 500, "{}", outcomes.len());
     let modes: BTreeSet<_> = outcomes.iter().map(|outcome| (outcome.system, outcome.mode.as_str())).collect();
-    for mode in ["async", "sync15", "sync12", "mid7", "mid3", "square"] {
+    for mode in Ladder::PAPER.modes().map(Mode::name) {
         assert!(modes.contains(&("pmasynrm", mode)), "{mode}");
     }
     for scheme in ["s", "rs", "rthd-slide", "zvo"] {

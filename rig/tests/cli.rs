@@ -1,6 +1,7 @@
 //! The command line: what it refuses, and what it leaves behind.
 
 use std::process::{Command, Output, Stdio};
+use tractive::modulation::Mode;
 
 fn rig(line: &str) -> Output {
     let root = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
@@ -110,6 +111,18 @@ fn a_pattern_beyond_its_mode_is_refused_and_leaves_nothing() {
     assert!(!out.exists());
     assert_eq!(rig(&line("sync15", 800.0)).status.code(), Some(0));
     assert!(std::fs::read_to_string(&out).unwrap().starts_with("t_s,leg,level\n0.000000000,u,"));
+}
+
+#[test]
+fn the_pattern_of_every_mode_can_be_had_by_its_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("p.csv");
+    let line =
+        |mode: &str| format!("pattern --mode {mode} --u 500 --udc 1500 --f1 50 --out {}", out.display());
+    for mode in Mode::ALL {
+        let wanted = if mode == Mode::Off { 2 } else { 0 };
+        assert_eq!(rig(&line(mode.name())).status.code(), Some(wanted), "{}", mode.name());
+    }
 }
 
 #[test]

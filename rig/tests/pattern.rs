@@ -80,6 +80,7 @@ fn every_mode_makes_the_fundamental_that_it_is_asked_for() {
         (Mode::Sync15, 50.0, 4, [0.05, 0.3, 0.6, 0.88]),
         (Mode::Sync12, 70.0, 4, [0.05, 0.3, 0.6, 0.88]),
         (Mode::Mid7, 100.0, 4, [0.5, 0.7, 0.9, 0.97]),
+        (Mode::Mid5, 150.0, 4, [0.4, 0.7, 0.9, 0.97]),
         (Mode::Mid3, 120.0, 4, [0.3, 0.7, 0.9, 0.98]),
         (Mode::Square, 130.0, 4, [1.0, 1.0, 1.0, 1.0]),
     ];
@@ -102,8 +103,10 @@ fn weighted_distortion_is_that_of_the_literature() {
         (Mode::Sync15, 450.0, 55.0, 1, 3.62),
         (Mode::Sync12, 450.0, 70.0, 1, 4.53),
         (Mode::Mid7, 0.7 * six_step, 100.0, 1, 5.28),
+        (Mode::Mid5, 0.7 * six_step, 150.0, 1, 5.99),
         (Mode::Mid3, 0.7 * six_step, 120.0, 1, 9.07),
         (Mode::Mid7, 0.9 * six_step, 100.0, 1, 4.65),
+        (Mode::Mid5, 0.9 * six_step, 150.0, 1, 4.67),
         (Mode::Mid3, 0.9 * six_step, 120.0, 1, 4.96),
         (Mode::Square, six_step, 130.0, 1, 4.64),
     ];
@@ -116,22 +119,21 @@ fn weighted_distortion_is_that_of_the_literature() {
 
 #[test]
 fn locked_modes_switch_as_often_as_they_say() {
-    for (mode, pulses) in [
-        (Mode::Sync15, 15.0),
-        (Mode::Sync12, 12.0),
-        (Mode::Mid7, 7.0),
-        (Mode::Mid3, 3.0),
-        (Mode::Square, 1.0),
-    ] {
+    for mode in Mode::ALL.into_iter().filter(|mode| mode.carriers() > 0) {
+        let pulses = f64::from(mode.turn_ons());
         assert_eq!(Pattern::new(mode, 600.0, 100.0, 6).pulses(), pulses, "{}", mode.name());
     }
 }
 
 #[test]
 fn patterns_keep_half_wave_symmetry_where_they_should() {
-    for (mode, symmetric) in
-        [(Mode::Sync15, true), (Mode::Sync12, false), (Mode::Mid7, true), (Mode::Mid3, true)]
-    {
+    for (mode, symmetric) in [
+        (Mode::Sync15, true),
+        (Mode::Sync12, false),
+        (Mode::Mid7, true),
+        (Mode::Mid5, true),
+        (Mode::Mid3, true),
+    ] {
         let pattern = Pattern::new(mode, 500.0, 100.0, 2);
         let even: f64 = [8.0, 10.0, 14.0, 16.0]
             .iter()

@@ -2,7 +2,7 @@
 
 use crate::cell::{Record, Words};
 use crate::frames::{Abc, AlphaBeta, Angle, SQRT_3};
-use crate::modulation::{CarrierPeriod, Mode, Reference};
+use crate::modulation::{CarrierPeriod, MODE_CODES, Mode, Reference};
 use crate::protection::{Fault, SafeState, Trip};
 use crate::time::Instant;
 
@@ -103,6 +103,21 @@ pub const COMMITTAL_WORDS: usize = 13;
 const MIRRORED: u32 = 1 << 3;
 const TRIPPED: u32 = 1 << 4;
 
+/// Places of modes and number in the word of a half, above its flags; a mode's code has six bits.
+const MODE: u32 = 5;
+const NUMBER: u32 = 11;
+const NEXT: u32 = 19;
+const NEXT_BUT_ONE: u32 = 25;
+const _: () =
+    assert!(TRIPPED < 1 << MODE && MODE_CODES << MODE <= 1 << NUMBER && 1 << (NUMBER + 8) <= 1 << NEXT);
+const _: () = assert!(MODE_CODES << NEXT <= 1 << NEXT_BUT_ONE && MODE_CODES << (NEXT_BUT_ONE - 1) <= 1 << 31);
+
+/// The mode at a place of a word.
+#[inline(always)]
+const fn mode_at(word: u32, place: u32) -> u32 {
+    word >> place & (MODE_CODES - 1)
+}
+
 impl Committal {
     /// As a record.
     #[inline]
@@ -201,38 +216,38 @@ impl HalfKind {
     /// The mode that made it.
     #[inline]
     pub fn mode(self) -> Mode {
-        Mode::from_code(self.0 >> 8 & 0xFF)
+        Mode::from_code(mode_at(self.0, MODE))
     }
 
     /// Whether the gates are off in it.
     #[inline]
     pub fn is_off(self) -> bool {
-        self.0 >> 8 & 0xFF == Mode::Off as u32
+        mode_at(self.0, MODE) == Mode::Off as u32
     }
 
     /// See [`CarrierPeriod::is_free`].
     #[inline]
     pub fn is_free(self) -> bool {
-        const FREE: u32 = (Mode::Async as u32) << 8 | (Mode::Async as u32) << 24 | (Mode::Async as u32) << 28;
-        self.0 & 0xFF00_FF00 == FREE
+        const MODES: u32 = 1 << MODE | 1 << NEXT | 1 << NEXT_BUT_ONE;
+        self.0 & MODES * (MODE_CODES - 1) == MODES * Mode::Async as u32
     }
 
     /// Its number within the turn.
     #[inline]
     pub fn half(self) -> u32 {
-        self.0 >> 16 & 0xFF
+        self.0 >> NUMBER & 0xFF
     }
 
     /// Mode of the half that follows.
     #[inline]
     pub fn next_mode(self) -> Mode {
-        Mode::from_code(self.0 >> 24 & 0xF)
+        Mode::from_code(mode_at(self.0, NEXT))
     }
 
     /// Mode of the half after that.
     #[inline]
     pub fn next_but_one_mode(self) -> Mode {
-        Mode::from_code(self.0 >> 28)
+        Mode::from_code(mode_at(self.0, NEXT_BUT_ONE))
     }
 
     /// See [`Committal::mirrored`].
@@ -281,8 +296,8 @@ pub fn half_to_words(half: CarrierPeriod) -> [u32; 5] {
     let [u, v, w] = half.compare_ticks;
     let [lu, lv, lw] = half.start_levels.map(u32::from);
     let [first, second] = half.ahead.map(|mode| mode as u32);
-    let packed = lu | lv << 1 | lw << 2 | (half.mode as u32) << 8 | u32::from(half.half) << 16;
-    let packed = packed | first << 24 | second << 28;
+    let packed = lu | lv << 1 | lw << 2 | (half.mode as u32) << MODE | u32::from(half.half) << NUMBER;
+    let packed = packed | first << NEXT | second << NEXT_BUT_ONE;
     [half.period_ticks, u, v, w, packed]
 }
 
@@ -293,9 +308,9 @@ pub fn half_from_words(words: [u32; 5]) -> CarrierPeriod {
         period_ticks,
         compare_ticks: [u, v, w],
         start_levels: [packed & 1 != 0, packed & 2 != 0, packed & 4 != 0],
-        mode: Mode::from_code(packed >> 8 & 0xFF),
-        half: (packed >> 16) as u8,
-        ahead: [Mode::from_code(packed >> 24 & 0xF), Mode::from_code(packed >> 28)],
+        mode: Mode::from_code(mode_at(packed, MODE)),
+        half: (packed >> NUMBER) as u8,
+        ahead: [NEXT, NEXT_BUT_ONE].map(|place| Mode::from_code(mode_at(packed, place))),
     }
 }
 
@@ -357,7 +372,7 @@ impl Words<12> for Report {
     fn to_words(self) -> [u32; 12] {
         let [code, value, limit, at] = trip_to_words(self.trip);
         let flags = u32::from(self.acknowledged) | u32::from(self.speed_known) << 8;
-        let code = code | flags << 16 | (self.mode as u32) << 28;
+        let code = code | flags << 16 | (self.mode as u32) << 26;
         [
             self.torque_nm.to_bits(),
             self.id_a.to_bits(),
@@ -388,7 +403,7 @@ impl Words<12> for Report {
             current_a: f32::from_bits(current),
             speed_known: code >> 24 & 1 != 0,
             acknowledged: (code >> 16) as u8,
-            mode: Mode::from_code(code >> 28),
+            mode: Mode::from_code(code >> 26),
         }
     }
 }

@@ -169,7 +169,7 @@ impl Words<12> for Observation {
     fn to_words(self) -> [u32; 12] {
         let [code, value, limit, tripped_at] = trip_to_words(self.trip);
         let flags = u32::from(self.acknowledged) | u32::from(self.speed_known) << 8;
-        let code = code | flags << 16 | (self.mode as u32) << 28;
+        let code = code | flags << 16 | (self.mode as u32) << 26;
         let measured = [self.udc_v, self.current_a, self.omega, self.torque_nm].map(f32::to_bits);
         let [udc, current, omega, torque] = measured;
         let [id, iq, voltage] = [self.id_ref_a, self.iq_ref_a, self.voltage_v].map(f32::to_bits);
@@ -190,7 +190,7 @@ impl Words<12> for Observation {
             id_ref_a: f32::from_bits(id),
             iq_ref_a: f32::from_bits(iq),
             voltage_v: f32::from_bits(voltage),
-            mode: Mode::from_code(code >> 28),
+            mode: Mode::from_code(code >> 26),
         }
     }
 }

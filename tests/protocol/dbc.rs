@@ -64,7 +64,7 @@ fn names(signal: &Signal) -> BTreeMap<u32, &'static str> {
             refusals.chain([(0, "none")]).collect()
         }
         "scheme" => Scheme::ALL.iter().map(|scheme| scheme.name()).enumerate().map(numbered).collect(),
-        "mode" => (0..7).map(|code| (code, Mode::from_code(code).name())).collect(),
+        "mode" => Mode::ALL.iter().map(|mode| (*mode as u32, mode.name())).collect(),
         "listening" => Listening::ALL.iter().map(|(code, name)| (*code as u32, *name)).collect(),
         "result" => Outcome::ALL.iter().map(|(code, name)| (*code as u32, *name)).collect(),
         _ => BTreeMap::new(),

@@ -8,15 +8,6 @@
 use super::{CarrierPeriod, Devices, Mode};
 use crate::frames::{limit, six_step_v};
 
-/// 4 sin 70° + 2 of equation (17): three notches at 70°, 90°, 110°.
-const SEVEN_PULSE_SUM: f32 = 5.758_77;
-/// Two of equation (15): one notch at 90°.
-const THREE_PULSE_SUM: f32 = 2.0;
-/// Loss of the fundamental, as a share of six-step, per sin(β/2).
-pub fn notch_sum(mode: Mode) -> f32 {
-    if matches!(mode, Mode::Mid7) { SEVEN_PULSE_SUM } else { THREE_PULSE_SUM }
-}
-
 /// Share of six-step from which square wave needs no notch.
 const WHOLE: f32 = 0.99;
 
@@ -24,14 +15,14 @@ const WHOLE: f32 = 0.99;
 /// are one: `sin(β/2) = (1 − π u/(2 udc)) / sum`. A voltage beyond six-step gives 0.
 pub fn half_notch_rad(mode: Mode, voltage_v: f32, udc_v: f32) -> f32 {
     let depth = core::f32::consts::FRAC_PI_2 * voltage_v / udc_v;
-    asin_up_to_30_degrees(limit((1.0 - depth) / notch_sum(mode), 0.0, 0.5))
+    asin_up_to_30_degrees(limit((1.0 - depth) / mode.row().notch_sum, 0.0, 0.5))
 }
 
-/// Half the zero voltage of a sector, as an angle in rad. Square wave has some only where less voltage is asked for than a link has that
-/// has jumped.
+/// Half the zero voltage of a sector, as an angle in rad. A mode that gives all that the link has (square wave) has some only where less
+/// voltage is asked for, after a jump of the link.
 #[inline(never)]
 pub fn zero_rad(mode: Mode, voltage_v: f32, udc_v: f32) -> f32 {
-    if mode == Mode::Square && voltage_v > WHOLE * six_step_v(udc_v) {
+    if mode.is_whole() && voltage_v > WHOLE * six_step_v(udc_v) {
         return 0.0;
     }
     half_notch_rad(mode, voltage_v, udc_v) * mode.notches() as f32

@@ -1,74 +1,210 @@
-//! The modes: how the pulses are made.
+//! The modes: one row of a table each.
+//!
+//! A new pattern is a new row at the table's end and its tests. Whatever asks about modes (modulator, schedule, control, wire,
+//! traces, reports and command line) reads the rows; whoever wants the drive to use it names it in a [`Ladder`](super::Ladder).
 
-/// How the pulses are made.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
-#[repr(u8)]
-pub enum Mode {
-    /// All gates off.
-    #[default]
-    Off,
-    /// Asynchronous SPWM with zero sequence at the highest switching frequency.
-    Async,
-    /// Synchronous, 15 carriers per turn.
-    Sync15,
-    /// Synchronous, 12 carriers per turn.
-    Sync12,
-    /// Middle 60°, 7 pulses: 18 carriers per turn with one notch each.
-    Mid7,
-    /// Middle 60°, 3 pulses: 6 carriers per turn with one notch each.
-    Mid3,
-    /// Square wave: 6 carriers per turn without a notch.
-    Square,
+use super::schedule::Border;
+
+/// What makes the pulses of a mode.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Kind {
+    /// Nothing: all gates off.
+    Rest,
+    /// A triangular carrier: the mean voltage of each of its halves follows the command.
+    Carrier,
+    /// Middle 60°: whole edges of a flux hexagon, with a notch in each carrier.
+    Pattern,
 }
 
-impl Mode {
-    /// Every mode, in the order of its discriminant.
-    pub const ALL: [Self; 7] =
-        [Self::Off, Self::Async, Self::Sync15, Self::Sync12, Self::Mid7, Self::Mid3, Self::Square];
+/// What control can regulate with a mode's pulses.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Regulation {
+    /// The mean voltage of each carrier half.
+    Mean,
+    /// Amplitude and angle of the fundamental, by the notches' width and the boundaries' instants.
+    Fundamental,
+    /// The angle alone: the amplitude is all that the link gives.
+    Angle,
+}
 
-    /// The mode with this discriminant; `Off` for any other number.
-    pub fn from_code(code: u32) -> Self {
-        match code {
-            1 => Self::Async,
-            2 => Self::Sync15,
-            3 => Self::Sync12,
-            4 => Self::Mid7,
-            5 => Self::Mid3,
-            6 => Self::Square,
-            _ => Self::Off,
+/// A mode's flux ripple as a share of the fundamental flux, over the share of six-step that its fundamental lacks.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct RippleShare {
+    /// At six-step.
+    pub least: f32,
+    /// Per missing share.
+    pub linear: f32,
+    /// Per missing share squared.
+    pub square: f32,
+}
+
+/// A mode as data, found in the table by one shift.
+#[derive(Clone, Copy, Debug)]
+#[repr(align(64))]
+pub(super) struct Row {
+    name: &'static str,
+    kind: Kind,
+    pub regulation: Regulation,
+    carriers: u8,
+    turn_ons: u8,
+    /// Largest fundamental without a notch, as a share of six-step: (1/√3)/(2/π) of a carrier.
+    pub largest: f32,
+    /// Loss of the fundamental as a share of six-step per sin(β/2), `2 Σ sin` of the notches' phase angles; 0 without notches.
+    pub notch_sum: f32,
+    /// The flux ripple that the pulses leave.
+    pub ripple: RippleShare,
+    /// Where the mode ends on the way up.
+    pub until: Border,
+}
+
+/// Ripple of square wave, and of every pattern whose notches have gone.
+const WHOLE_RIPPLE: f32 = 0.046_4;
+
+impl Row {
+    /// A row of no pulses.
+    const REST: Self = Self {
+        name: "off",
+        kind: Kind::Rest,
+        regulation: Regulation::Mean,
+        carriers: 0,
+        turn_ons: 0,
+        largest: 0.906_899_7,
+        notch_sum: 0.0,
+        ripple: RippleShare { least: 0.045_3, linear: 0.0, square: 0.0 },
+        until: Border::NEVER,
+    };
+
+    /// A triangular carrier with min-max zero sequence, whose fundamental ends at udc/√3; so many carriers a turn, 0 for a free
+    /// one. Its ripple counts as that of 12.
+    const fn carrier(name: &'static str, carriers: u8, until: Border) -> Self {
+        Self { name, kind: Kind::Carrier, carriers, turn_ons: carriers, until, ..Self::REST }
+    }
+
+    /// Middle 60° with so many notches a sector, each in the middle of its carrier, and so long a carrier half that it is a multiple
+    /// of 5°.
+    const fn middle60(
+        name: &'static str,
+        notches: u8,
+        notch_sum: f32,
+        [linear, square]: [f32; 2],
+        until: Border,
+    ) -> Self {
+        assert!(60 / 5 % (2 * notches) == 0);
+        Self {
+            name,
+            kind: Kind::Pattern,
+            regulation: Regulation::Fundamental,
+            carriers: 6 * notches,
+            turn_ons: 2 * notches + 1,
+            largest: 1.0,
+            notch_sum,
+            ripple: RippleShare { least: WHOLE_RIPPLE, linear, square },
+            until,
         }
+    }
+}
+
+/// The modes and their rows from one list. A mode's place in it is its code on every wire: rows are added at the end.
+macro_rules! modes {
+    ($($(#[$about:meta])* $mode:ident: $row:expr;)*) => {
+        /// How the pulses are made.
+        #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+        #[repr(u8)]
+        pub enum Mode { $($(#[$about])* $mode,)* }
+
+        impl Mode {
+            /// Every mode, in the order of their codes.
+            pub const ALL: [Self; [$(Self::$mode),*].len()] = [$(Self::$mode),*];
+        }
+
+        static ROWS: [Row; Mode::ALL.len()] = [$($row),*];
+    };
+}
+
+// The frequencies of borders lie a little below what devices of 900 Hz allow (60, 75, 128.6, 180, 300 Hz), so that waiting for a legal
+// angle on the steepest ramp stays within it. Depth alone does not end the asynchronous mode: at a low frequency a pattern of few
+// pulses would leave more ripple than the tenth of voltage is worth that it adds.
+modes! {
+    /// All gates off.
+    #[default]
+    Off: Row::REST;
+    /// Asynchronous SPWM with zero sequence at the highest switching frequency.
+    Async: Row::carrier("async", 0, Border::new((40.0, 38.0), (f32::INFINITY, f32::INFINITY)));
+    /// Synchronous, 15 carriers per turn.
+    Sync15: Row::carrier("sync15", 15, Border::new((59.5, 57.0), (0.88, 0.84)));
+    /// Synchronous, 12 carriers per turn.
+    Sync12: Row::carrier("sync12", 12, Border::new((74.5, 72.0), (0.88, 0.84)));
+    /// Middle 60°, 7 pulses: 18 carriers per turn with one notch each; 4 sin 70° + 2 of equation (17).
+    Mid7: Row::middle60("mid7", 3, 5.758_77, [0.02, 0.0], Border::new((126.0, 121.0), (0.913, 0.885)));
+    /// Middle 60°, 3 pulses: 6 carriers per turn with one notch each; 2 of equation (15).
+    Mid3: Row::middle60("mid3", 1, 2.0, [0.0, 0.49], Border::new((297.0, 290.0), (0.990, 0.978)));
+    /// Square wave: 6 carriers per turn without a notch, or with one where a link has jumped and less voltage is asked for.
+    Square: Row {
+        regulation: Regulation::Angle,
+        turn_ons: 1,
+        ..Row::middle60("square", 1, 2.0, [0.0, 0.0], Border::NEVER)
+    };
+    /// Middle 60°, 5 pulses: 12 carriers per turn with one notch each; 4 sin 75°. Not one of the paper's.
+    Mid5: Row::middle60("mid5", 2, 3.863_703, [0.0, 0.13], Border::new((176.0, 171.0), (0.955, 0.935)));
+}
+
+/// Room for modes on every wire: their codes have six bits.
+pub const MODE_CODES: u32 = 64;
+const _: () = assert!(Mode::ALL.len() <= MODE_CODES as usize);
+
+impl Mode {
+    #[inline(always)]
+    pub(super) const fn row(self) -> &'static Row {
+        &ROWS[self as usize]
+    }
+
+    /// The mode with this code; `Off` for any other number.
+    #[inline]
+    pub fn from_code(code: u32) -> Self {
+        Self::ALL.get(code as usize).copied().unwrap_or_default()
+    }
+
+    /// The mode with this name; `None` for any other text.
+    pub fn named(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|mode| mode.name() == name)
     }
 
     /// The name in traces and on the command line.
     pub const fn name(self) -> &'static str {
-        match self {
-            Self::Off => "off",
-            Self::Async => "async",
-            Self::Sync15 => "sync15",
-            Self::Sync12 => "sync12",
-            Self::Mid7 => "mid7",
-            Self::Mid3 => "mid3",
-            Self::Square => "square",
-        }
+        self.row().name
     }
 
     /// Carriers per turn of the pulse angle; 0 where the carrier is not locked to it.
+    #[inline]
     pub const fn carriers(self) -> u32 {
-        match self {
-            Self::Off | Self::Async => 0,
-            Self::Sync15 => 15,
-            Self::Sync12 => 12,
-            Self::Mid7 => 18,
-            Self::Mid3 | Self::Square => 6,
-        }
+        self.row().carriers as u32
+    }
+
+    /// Turn-ons of a device per turn of the pulse angle; 0 where the carrier is not locked to it.
+    pub const fn turn_ons(self) -> u32 {
+        self.row().turn_ons as u32
+    }
+
+    /// What control can regulate with its pulses.
+    #[inline]
+    pub const fn regulation(self) -> Regulation {
+        self.row().regulation
+    }
+
+    /// Whether its fundamental is all that the link gives.
+    #[inline]
+    pub const fn is_whole(self) -> bool {
+        matches!(self.regulation(), Regulation::Angle)
     }
 
     /// Whether it is a pattern of whole edges of a flux hexagon: middle 60° or square wave.
+    #[inline]
     pub const fn is_pattern(self) -> bool {
-        matches!(self, Self::Mid7 | Self::Mid3 | Self::Square)
+        matches!(self.row().kind, Kind::Pattern)
     }
 
     /// Halves in a sector of 60° of a pattern.
+    #[inline]
     pub const fn sector_halves(self) -> u32 {
         self.carriers() / 3
     }
@@ -79,7 +215,8 @@ impl Mode {
     }
 
     /// Whether the mean voltage of each carrier half follows the command: the modes with a triangular carrier.
+    #[inline]
     pub const fn is_carrier(self) -> bool {
-        matches!(self, Self::Async | Self::Sync15 | Self::Sync12)
+        matches!(self.row().kind, Kind::Carrier)
     }
 }

@@ -241,7 +241,7 @@ impl Modulator {
                 (edge + notch.unwrap_or(0.0), notch)
             }
             None => {
-                let notched = self.mode != Mode::Square || own_rad > 0.0;
+                let notched = !self.mode.is_whole() || own_rad > 0.0;
                 (wanted, notched.then_some(wanted * (own_rad * ZERO_OF_HALF)))
             }
         };

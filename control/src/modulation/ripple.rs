@@ -11,6 +11,8 @@ use crate::frames::{AlphaBeta, SinCos};
 #[derive(Clone, Copy, Debug)]
 pub struct RippleFlux {
     sector_halves: u32,
+    /// A half's length, in 5°.
+    half_places: u32,
     /// Length of the hexagon's edge, `(2/3) udc (π/3 − N β/2)/ω`, in Wb.
     edge_wb: f32,
     /// Fundamental, `u/ω`, in Wb.
@@ -29,7 +31,8 @@ impl RippleFlux {
         let zero = 2.0 * middle60::zero_rad(mode, voltage_v, udc_v);
         let per_omega = 1.0 / omega;
         let edge_wb = (2.0 / 3.0) * udc_v * (core::f32::consts::FRAC_PI_3 - zero) * per_omega;
-        Some(Self { sector_halves, edge_wb, fundamental_wb: voltage_v * per_omega })
+        let half_places = PLACES.len() as u32 / sector_halves.max(1);
+        Some(Self { sector_halves, half_places, edge_wb, fundamental_wb: voltage_v * per_omega })
     }
 
     /// At the boundary where half number `half` begins, in Wb, in the stationary frame of the (mirrored) turn.
@@ -56,32 +59,32 @@ impl RippleFlux {
         }
     }
 
-    /// The beginning of a half's sector, and its place there in 10°.
+    /// The beginning of a half's sector, and its place there in 5°.
     #[inline(always)]
     fn place(&self, half: u32) -> Option<(&'static SinCos, u32)> {
         let turn = 6 * self.sector_halves;
         let half = if half >= turn { half - turn } else { half };
         let sector = half.checked_div(self.sector_halves).unwrap_or(0);
-        let place = (half - sector * self.sector_halves) * if self.sector_halves == 2 { 3 } else { 1 };
+        let place = (half - sector * self.sector_halves) * self.half_places;
         Some((SECTORS.get(sector as usize)?, place))
     }
 
     /// How far along the edge of the first sector a place is, seen from the centre.
     #[inline(always)]
     fn along_edge(&self, place: u32) -> AlphaBeta {
-        let part = place as f32 * (1.0 / 6.0);
+        let part = place as f32 * (1.0 / PLACES.len() as f32);
         AlphaBeta { alpha: 1.0 - 0.5 * part, beta: part * (0.5 * crate::frames::SQRT_3) } * self.edge_wb
     }
 }
 
 /// The sectors' beginnings.
 static SECTORS: [SinCos; 6] = directions(6);
-/// The places of 10° in a sector where a boundary may lie.
-static PLACES: [SinCos; 6] = directions(36);
+/// The places of 5° in a sector, where a boundary may lie.
+static PLACES: [SinCos; 12] = directions(72);
 
-/// The first six directions of so many that are evenly spread over the turn.
-const fn directions(count: u32) -> [SinCos; 6] {
-    let mut directions = [SinCos { sin: 0.0, cos: 1.0 }; 6];
+/// The first directions of so many that are evenly spread over the turn.
+const fn directions<const N: usize>(count: u32) -> [SinCos; N] {
+    let mut directions = [SinCos { sin: 0.0, cos: 1.0 }; N];
     let mut k = 0;
     while k < directions.len() {
         directions[k] = SinCos::of_turns(k as f64 / count as f64);
@@ -93,14 +96,9 @@ const fn directions(count: u32) -> [SinCos; 6] {
 /// The flux ripple of a mode as a share of the fundamental flux (its weighted distortion), for a fundamental of `depth` of
 /// six-step: within a tenth of what the pulses have. The carriers count as one, that of 12 carriers a turn.
 pub fn ripple_share(mode: Mode, depth: f32) -> f32 {
-    const SQUARE: f32 = 0.046_4;
     let missing = if depth < 1.0 { 1.0 - depth } else { 0.0 };
-    match mode {
-        Mode::Square => SQUARE,
-        Mode::Mid3 => SQUARE + 0.49 * missing * missing,
-        Mode::Mid7 => SQUARE + 0.02 * missing,
-        _ => 0.045_3,
-    }
+    let share = mode.row().ripple;
+    share.least + share.linear * missing + share.square * missing * missing
 }
 
 #[cfg(test)]
@@ -112,7 +110,7 @@ mod tests {
     /// The flux of the pulses themselves, summed up over a turn, less its fundamental.
     #[test]
     fn the_ripple_is_that_of_a_hexagon() {
-        for (mode, halves) in [(Mode::Mid7, 36), (Mode::Mid3, 12), (Mode::Square, 12)] {
+        for (mode, halves) in [(Mode::Mid7, 36), (Mode::Mid5, 24), (Mode::Mid3, 12), (Mode::Square, 12)] {
             let (omega, udc_v) = (600.0_f32, 1500.0_f32);
             let voltage_v = if mode == Mode::Square { 954.93 } else { 900.0 };
             let ripple = RippleFlux::new(mode, voltage_v, udc_v, omega).unwrap();

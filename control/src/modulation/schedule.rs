@@ -1,40 +1,52 @@
-//! WHICH mode, and at which angle it may change.
+//! Which mode, and at which angle it may change.
 //!
-//! The modes stand in a row; each border between two neighbours has a frequency and a modulation depth. Above
+//! The modes of a ladder stand in a row; each border between two neighbours has a frequency and a modulation depth. Above
 //! either the drive goes up, below both, less a hysteresis, it comes down, and no sooner than a dwell time after
 //! the last switch. A switch waits for the end of a whole carrier at an angle where both modes' carriers end.
 
-use super::{Devices, Mode, Reference, middle60::notch_sum};
+use super::mode::{Regulation, Row};
+use super::{Devices, Mode, Reference};
 use crate::frames::{Angle, UNITS_PER_RADIAN};
 use crate::time::{Clock, Instant};
 
-/// A border between a mode and the next one up. Frequencies are shares of the highest switching frequency; each of the pair
+/// Where a mode gives way to the next one up. Frequencies are shares of the highest switching frequency; each of the pair
 /// is for going up and for coming down.
 #[derive(Clone, Copy, Debug)]
-struct Border {
-    below: Mode,
-    above: Mode,
+pub struct Border {
     shares: (f32, f32),
     depths: (f32, f32),
 }
 
-/// A border given in Hz for devices of 900 Hz.
-const fn border(below: Mode, above: Mode, hz: (f32, f32), depths: (f32, f32)) -> Border {
-    Border { below, above, shares: (hz.0 / 900.0, hz.1 / 900.0), depths }
+impl Border {
+    /// Of a mode that gives way to none.
+    pub(super) const NEVER: Self =
+        Self { shares: (f32::INFINITY, f32::INFINITY), depths: (f32::INFINITY, f32::INFINITY) };
+
+    /// Given in Hz for devices of 900 Hz.
+    pub(super) const fn new(hz: (f32, f32), depths: (f32, f32)) -> Self {
+        Self { shares: (hz.0 / 900.0, hz.1 / 900.0), depths }
+    }
 }
 
-/// Carrier modes end at udc/√3 = 0.907 of six-step. The frequencies lie a little below what the devices allow (for
-/// 900 Hz: 60, 75, 128.6, 300 Hz), so that waiting for a legal angle on the steepest ramp stays within it. Depth alone does not
-/// end the asynchronous mode: at a low frequency a pattern of few pulses would leave more ripple than the tenth of voltage is
-/// worth that it adds.
-const BORDERS: [Border; 4] = [
-    border(Mode::Mid3, Mode::Square, (297.0, 290.0), (0.990, 0.978)),
-    border(Mode::Mid7, Mode::Mid3, (126.0, 121.0), (0.913, 0.885)),
-    border(Mode::Sync12, Mode::Mid7, (74.5, 72.0), (0.88, 0.84)),
-    border(Mode::Sync15, Mode::Sync12, (59.5, 57.0), (0.88, 0.84)),
-];
-/// Where the asynchronous mode ends.
-const FREE_SHARES: (f32, f32) = (40.0 / 900.0, 38.0 / 900.0);
+/// The locked modes that a drive uses above the asynchronous one, from the lowest frequency up. It leaves each of them where that
+/// mode's row says.
+#[derive(Clone, Copy, Debug)]
+pub struct Ladder(&'static [Mode]);
+
+impl Ladder {
+    /// The paper's modes.
+    pub const PAPER: Self = Self::of(&[Mode::Sync15, Mode::Sync12, Mode::Mid7, Mode::Mid3, Mode::Square]);
+
+    /// Of these modes; without one the asynchronous mode serves at every frequency.
+    pub const fn of(locked: &'static [Mode]) -> Self {
+        Self(locked)
+    }
+
+    /// The modes, from the lowest frequency up.
+    pub fn modes(&self) -> impl Iterator<Item = Mode> {
+        [Mode::Async].into_iter().chain(self.0.iter().copied())
+    }
+}
 
 /// Room kept between a mode's largest depth and the border above it, and the hysteresis kept below a border that
 /// the shortest pulse has lowered; shares of six-step.
@@ -47,15 +59,21 @@ const DWELL_S: f32 = 0.03;
 /// The choice of mode.
 #[derive(Clone, Copy, Debug)]
 pub struct Schedule {
+    ladder: Ladder,
     fixed: Option<Mode>,
     last_switch: Option<Instant>,
     dwell_ticks: i32,
 }
 
 impl Schedule {
-    /// By frequency and modulation depth.
+    /// The paper's modes by frequency and modulation depth.
     pub const fn new(clock: &Clock) -> Self {
-        Self { fixed: None, last_switch: None, dwell_ticks: (DWELL_S * clock.ticks_per_s) as i32 }
+        Self::on(Ladder::PAPER, clock)
+    }
+
+    /// The modes of a ladder, by frequency and modulation depth.
+    pub const fn on(ladder: Ladder, clock: &Clock) -> Self {
+        Self { ladder, fixed: None, last_switch: None, dwell_ticks: (DWELL_S * clock.ticks_per_s) as i32 }
     }
 
     /// Always the same mode, wherever its pulses lead.
@@ -79,17 +97,21 @@ impl Schedule {
         }
         let share = seen.rate * (2.0 / 4_294_967_296.0) * devices.shortest_half_ticks as f32;
         // Whoever passes a border passes those of lower frequencies as well, so the highest one decides.
-        if share < pick(FREE_SHARES, mode > Mode::Async) {
+        let Ladder([lowest, higher @ ..]) = self.ladder else { return Mode::Async };
+        if share < pick(Mode::Async.row().until.shares, mode.carriers() > 0) {
             return Mode::Async;
         }
-        for border in &BORDERS {
-            let from_above = mode > border.below;
-            let fast = share >= pick(border.shares, from_above);
-            if fast || seen.depth >= pick(reached(border, seen.rate, devices), from_above) {
-                return border.above;
+        let notch = shortest_notch(seen.rate, devices);
+        let mut from_above = false;
+        for (below, above) in self.ladder.0.iter().zip(higher).rev() {
+            from_above |= mode == *above;
+            let row = below.row();
+            let fast = share >= pick(row.until.shares, from_above);
+            if fast || seen.depth >= pick(reached(row, notch), from_above) {
+                return *above;
             }
         }
-        Mode::Sync15
+        *lowest
     }
 
     /// Tells the schedule that the mode changed at this instant.
@@ -103,27 +125,32 @@ fn pick((up, down): (f32, f32), from_above: bool) -> f32 {
     if from_above { down } else { up }
 }
 
-/// A border's depths, lowered where the mode below does not reach them because of the shortest pulse.
-fn reached(border: &Border, rate: f32, devices: &Devices) -> (f32, f32) {
-    let reach = depth_limit(border.below, rate, devices) - DEPTH_ROOM;
-    if reach < border.depths.0 { (reach, reach - DEPTH_HYSTERESIS) } else { border.depths }
+/// The depths of a mode's border, lowered where the mode does not reach them because of the shortest pulse.
+fn reached(row: &Row, notch: f32) -> (f32, f32) {
+    let (reach, depths) = (largest(row, notch) - DEPTH_ROOM, row.until.depths);
+    if reach < depths.0 { (reach, reach - DEPTH_HYSTERESIS) } else { depths }
+}
+
+/// Sine of half the shortest notch, with `rate` in angle units per tick: an angle of a few degrees.
+#[inline(always)]
+fn shortest_notch(rate: f32, devices: &Devices) -> f32 {
+    let half_notch_rad = rate.abs() * (0.5 / UNITS_PER_RADIAN) * devices.min_pulse_ticks as f32;
+    half_notch_rad - half_notch_rad * half_notch_rad * half_notch_rad * (1.0 / 6.0)
+}
+
+/// The largest fundamental of a mode whose notches are not shorter than that.
+#[inline(always)]
+fn largest(row: &Row, notch: f32) -> f32 {
+    match row.regulation {
+        Regulation::Fundamental => row.largest - row.notch_sum * notch,
+        Regulation::Mean | Regulation::Angle => row.largest,
+    }
 }
 
 /// The largest fundamental of a mode as a share of six-step 2 udc/π, with `rate` in angle units per tick: udc/√3 for
 /// the carriers, what the shortest notch leaves for middle 60°, 1 for the square wave.
 pub fn depth_limit(mode: Mode, rate: f32, devices: &Devices) -> f32 {
-    /// (1/√3) / (2/π).
-    const CARRIER: f32 = 0.906_899_7;
-    match mode {
-        Mode::Square => 1.0,
-        Mode::Mid7 | Mode::Mid3 => {
-            let half_notch_rad = rate.abs() * (0.5 / UNITS_PER_RADIAN) * devices.min_pulse_ticks as f32;
-            // The sine of an angle of a few degrees.
-            let sine = half_notch_rad - half_notch_rad * half_notch_rad * half_notch_rad * (1.0 / 6.0);
-            1.0 - notch_sum(mode) * sine
-        }
-        _ => CARRIER,
-    }
+    largest(mode.row(), shortest_notch(rate, devices))
 }
 
 /// Whether the carrier that ends where half number `next_half` begins may give way to `to`: a locked carrier must have

@@ -6,7 +6,6 @@ use crate::rows::mean;
 use crate::trace::Recording;
 use crate::verdict::{Verdict, torque_bound};
 use serde::Serialize;
-use tractive::modulation::Mode;
 use tractive_tablegen::MachineFolder;
 
 /// A steady operating point, averaged.
@@ -81,7 +80,7 @@ fn square_torque_error_percent(recording: &Recording) -> Option<f64> {
     let end_s = recording.rows.last().map_or(0.0, |row| row.t_s);
     let windows = (0..(end_s / WINDOW_S) as usize)
         .map(|k| window(recording, k as f64 * WINDOW_S, (k + 1) as f64 * WINDOW_S));
-    let square = windows.filter(|rows| !rows.is_empty() && rows.iter().all(|row| row.mode == Mode::Square));
+    let square = windows.filter(|rows| !rows.is_empty() && rows.iter().all(|row| row.mode.is_whole()));
     square
         .map(|rows| (mean(rows, |row| row.te_nm) / mean(rows, |row| row.te_ref_nm) - 1.0).abs() * 100.0)
         .reduce(f64::max)

@@ -5,6 +5,7 @@ use crate::options::RunOptions;
 use crate::trace::{Recording, Row, Switch};
 use crate::verdict::{Verdict, bound, worst};
 use serde::Serialize;
+use tractive::modulation::Mode;
 
 /// What a switch of mode did to the current.
 #[derive(Clone, Debug, Serialize)]
@@ -128,7 +129,9 @@ fn hunts(recording: &Recording) -> usize {
         let between = window(recording, pair[0].t_s, pair[1].t_s);
         let (Some(first), Some(last)) = (between.first(), between.last()) else { return true };
         // How far each has gone the way that the second switch goes, as a share.
-        let sign = if pair[1].to > pair[1].from { 1.0 } else { -1.0 };
+        // Up the ladder there are fewer and fewer turn-ons; a free carrier, which counts none, is at its foot.
+        let turn_ons = |mode: Mode| mode.turn_ons().wrapping_sub(1);
+        let sign = if turn_ons(pair[1].to) < turn_ons(pair[1].from) { 1.0 } else { -1.0 };
         let gone = |value: fn(&Row) -> f64| sign * (value(last) / value(first) - 1.0);
         let (speed, demand) = (gone(|row| row.speed_rpm.abs()), gone(|row| row.te_ref_nm));
         let demand_alone = demand > DEMAND_SHARE && speed > -SPEED_SHARE;

@@ -48,7 +48,7 @@ pub fn chart((x_label, y_label): (&str, &str), series: &[(&str, Vec<(f64, f64)>)
             .light_line_style(TRANSPARENT)
             .draw()
             .map_err(|error| failed(&error))?;
-        for ((_, points), colour) in series.iter().zip(COLOURS) {
+        for ((_, points), colour) in series.iter().zip(COLOURS.into_iter().cycle()) {
             chart
                 .draw_series(LineSeries::new(points.iter().copied(), &colour))
                 .map_err(|error| failed(&error))?;
@@ -62,7 +62,7 @@ pub fn chart((x_label, y_label): (&str, &str), series: &[(&str, Vec<(f64, f64)>)
 pub fn legend(series: &[(&str, Vec<(f64, f64)>)]) -> String {
     let mut text = String::new();
     if series.len() > 1 {
-        for ((name, _), colour) in series.iter().zip(COLOURS) {
+        for ((name, _), colour) in series.iter().zip(COLOURS.into_iter().cycle()) {
             let _ = write!(
                 text,
                 " <span style=\"color:rgb({},{},{})\">■ {}</span>",

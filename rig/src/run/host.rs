@@ -9,7 +9,7 @@ use tractive::drive::Report;
 use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
 use tractive::frames::Abc;
 use tractive::machine::{Ratings, Tables};
-use tractive::modulation::CarrierPeriod;
+use tractive::modulation::{CarrierPeriod, Ladder, Schedule};
 use tractive::operator::{self, Desk, Feedback, Line, OperatorPort, Request, Slot, Status, slot_s};
 use tractive::ports::{ControlPort, PwmPort, Sample};
 use tractive::protection::{LegFaults, SafeState, Trip};
@@ -201,6 +201,11 @@ impl<'a> Tasks<'a> {
     pub fn recorded_by(mut self, recorder: &'a Recorder) -> Self {
         self.shared = Shared::recorded_by(recorder);
         self
+    }
+
+    /// The same with the modes of another ladder.
+    pub fn on(self, ladder: Ladder) -> Self {
+        Self { pwm: self.pwm.scheduled(Schedule::on(ladder, &self.clock)), ..self }
     }
 
     /// The same with a protection off; its levels are the tables' business.

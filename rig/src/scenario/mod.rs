@@ -15,7 +15,7 @@ mod reversal;
 mod script;
 mod steady;
 mod sweep;
-mod switches;
+pub mod switches;
 mod timing;
 
 use crate::analysis::{self, Figures};

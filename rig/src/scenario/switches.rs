@@ -20,11 +20,12 @@ pub fn plots(recording: &Recording, page: &mut Page) {
 
 /// The paper's figure of a change of mode; it shows those on the way up.
 fn figure_of(from: Mode, to: Mode) -> &'static str {
-    match (from, to) {
-        (Mode::Sync15, Mode::Sync12) => "figure 9a",
-        (Mode::Sync12, Mode::Mid7) => "figure 9b",
-        (Mode::Mid7, Mode::Mid3) => "figure 9c",
-        (Mode::Mid3, Mode::Square) => "figure 9d",
-        _ => "figure 9",
-    }
+    const FIGURES: [(Mode, Mode, &str); 4] = [
+        (Mode::Sync15, Mode::Sync12, "figure 9a"),
+        (Mode::Sync12, Mode::Mid7, "figure 9b"),
+        (Mode::Mid7, Mode::Mid3, "figure 9c"),
+        (Mode::Mid3, Mode::Square, "figure 9d"),
+    ];
+    let known = FIGURES.iter().find(|(below, above, _)| (*below, *above) == (from, to));
+    known.map_or("figure 9", |(_, _, figure)| figure)
 }

@@ -6,7 +6,7 @@ use crate::cell::{Record, SEEN};
 use crate::control::{Boundary, Committed, Earlier, Follows, Ripple};
 use crate::drive::messages::{COMMITTAL_WORDS, CommittalRecord, HalfKind};
 use crate::frames::{Abc, AlphaBeta, Angle};
-use crate::modulation::{Mode, RippleFlux, depth_limit, first_half, ripple_share};
+use crate::modulation::{Mode, Regulation, RippleFlux, depth_limit, first_half, ripple_share};
 use crate::protection::{Fault, Violation};
 use crate::time::{Clock, Instant};
 
@@ -134,22 +134,19 @@ impl Applied {
         let Settings { clock, devices, .. } = settings;
         let next = &self.next;
         let largest = depth_limit(decided, clock.angle_rate(steady.omega), devices);
-        let largest = if decided == Mode::Square { largest } else { REGULATION_ROOM * largest };
+        let largest = if decided.is_whole() { largest } else { REGULATION_ROOM * largest };
         let (depth_limit, filled) = glide.fill(decided, largest, steady.depth, clock.control_s());
         let running = next.begins.since(now).max(0) as u32;
         let left = running + if revises { 0 } else { next.period_ticks };
         let volt_ticks = self.running.map(|ticks| if revises { ticks } else { ticks + next.volt_ticks });
-        let (interval_s, follows) = match decided.carriers() {
-            0 => (clock.seconds(devices.shortest_half_ticks as i32), Follows::Mean),
-            carriers => {
-                let interval_s = core::f32::consts::PI / (carriers as f32 * steady.omega.abs());
-                let follows = match decided {
-                    Mode::Mid7 | Mode::Mid3 => Follows::Fundamental,
-                    Mode::Square => Follows::Angle,
-                    _ => Follows::Mean,
-                };
-                (interval_s, follows)
-            }
+        let interval_s = match decided.carriers() {
+            0 => clock.seconds(devices.shortest_half_ticks as i32),
+            carriers => core::f32::consts::PI / (carriers as f32 * steady.omega.abs()),
+        };
+        let follows = match decided.regulation() {
+            Regulation::Mean => Follows::Mean,
+            Regulation::Fundamental => Follows::Fundamental,
+            Regulation::Angle => Follows::Angle,
         };
         Committed {
             horizon_s: clock.seconds(left as i32),

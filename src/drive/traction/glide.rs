@@ -55,7 +55,7 @@ impl Glide {
     /// after it for as long as the voltage glides from there to what the torque `needed` in the last period: once the pattern has
     /// grown.
     pub(super) fn fill(&mut self, decided: Mode, largest: f32, needed: f32, period_s: f32) -> (f32, bool) {
-        if decided == Mode::Square {
+        if decided.is_whole() {
             self.filled_to = 1.0;
             return (largest, true);
         }

@@ -34,21 +34,22 @@ pub struct PwmTask<M = &'static Tables> {
 impl<M: Machine> PwmTask<M> {
     /// A task whose first call is at `first`, with all gates off until then and for one half more.
     pub const fn new(machine: M, settings: Settings, first: Instant) -> Self {
-        Self::with_schedule(machine, settings, first, Schedule::new(&settings.clock))
-    }
-
-    /// The same with a schedule of one's own.
-    pub const fn with_schedule(machine: M, settings: Settings, first: Instant, schedule: Schedule) -> Self {
         Self {
             machine,
             settings,
-            modulator: Modulator::new(settings.devices, schedule),
+            modulator: Modulator::new(settings.devices, Schedule::new(&settings.clock)),
             newest: Committal::at_rest(first, settings.devices.shortest_half_ticks),
             currents_before_a: Abc { a: 0.0, b: 0.0, c: 0.0 },
             trip: None,
             disarmed: Disarmed::NONE,
             released: 0,
         }
+    }
+
+    /// The same with a schedule of one's own.
+    pub const fn scheduled(mut self, schedule: Schedule) -> Self {
+        self.modulator = Modulator::new(self.settings.devices, schedule);
+        self
     }
 
     /// The same without a check.

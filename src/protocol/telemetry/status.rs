@@ -13,6 +13,7 @@ pub(in crate::protocol) const FAULT: Signal = Signal::number("fault", 16, 8, 0xF
 pub(in crate::protocol) const REFUSAL: Signal = Signal::number("refusal", 24, 8, 0xFF);
 pub(in crate::protocol) const REFUSALS: Signal = Signal::number("refusals", 32, 8, 0xFF);
 const MODE: Signal = Signal::number("mode", 40, 3, 7);
+const _: () = assert!(Mode::ALL.len() <= 1 << MODE.bits, "another mode needs a wider signal");
 pub(in crate::protocol) const LISTENING: Signal = Signal::number("listening", 43, 2, 3);
 pub(in crate::protocol) const PRECHARGE: Signal = Signal::flag("precharge", 45);
 pub(in crate::protocol) const MAIN: Signal = Signal::flag("main", 46);

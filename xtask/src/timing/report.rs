@@ -68,10 +68,14 @@ fn counts(row: &Row) -> Map<String, Value> {
 }
 
 impl Measured {
+    fn modes(&self) -> Vec<&str> {
+        self.statistics.modes(self.system.first_modes)
+    }
+
     /// Interrupt, mode and what was counted in both directions together, in the order of the tables.
-    pub fn rows(&self) -> impl Iterator<Item = (&'static str, &'static str, &Row)> {
+    pub fn rows(&self) -> impl Iterator<Item = (&'static str, &str, &Row)> {
         let pairs =
-            INTERRUPTS.into_iter().flat_map(|name| self.system.modes.iter().map(move |mode| (name, *mode)));
+            INTERRUPTS.into_iter().flat_map(|name| self.modes().into_iter().map(move |mode| (name, mode)));
         pairs.filter_map(|(name, mode)| Some((name, mode, self.statistics.row(mode, None, name)?)))
     }
 
@@ -85,8 +89,8 @@ impl Measured {
 
     /// Modes, each with its directions behind it, and the load.
     pub fn loads(&self) -> impl Iterator<Item = (String, Load)> {
-        self.system.modes.iter().flat_map(|mode| {
-            let whole = self.statistics.load(mode, None).map(|load| ((*mode).to_owned(), load));
+        self.modes().into_iter().flat_map(|mode| {
+            let whole = self.statistics.load(mode, None).map(|load| (mode.to_owned(), load));
             let directed = Direction::BOTH.into_iter().filter_map(|direction| {
                 let load = self.statistics.load(mode, Some(direction))?;
                 Some((in_direction(mode, direction), load))
@@ -96,7 +100,7 @@ impl Measured {
     }
 
     fn json_rows(&self) -> Vec<Value> {
-        let row = |(name, mode, row): (&'static str, &'static str, &Row)| {
+        let row = |(name, mode, row): (&'static str, &str, &Row)| {
             let mut fields = counts(row);
             let named = [("system", self.system.name), ("name", name), ("mode", mode)];
             fields.extend(named.map(|(field, value)| (field.to_owned(), value.into())));
@@ -124,9 +128,9 @@ impl Measured {
             let Load { mean, max } = self.statistics.load(mode, direction)?;
             Some(fields([("mean_percent", mean.into()), ("max_percent", max.into())]))
         };
-        let load = |mode: &&'static str| {
+        let load = |mode: &str| {
             let mut load = percent(mode, None)?;
-            load.extend(fields([("system", self.system.name.into()), ("mode", (*mode).into())]));
+            load.extend(fields([("system", self.system.name.into()), ("mode", mode.into())]));
             for direction in Direction::BOTH {
                 load.extend(
                     percent(mode, Some(direction)).map(|of| (direction.name().to_owned(), of.into())),
@@ -134,7 +138,7 @@ impl Measured {
             }
             Some(load.into())
         };
-        self.system.modes.iter().filter_map(load).collect()
+        self.modes().into_iter().filter_map(load).collect()
     }
 
     fn json_parts(&self) -> Vec<Value> {

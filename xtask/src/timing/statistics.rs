@@ -85,6 +85,8 @@ type Key = (String, Option<Direction>, String);
 #[derive(Clone, Debug, Default)]
 pub struct Statistics {
     rows: BTreeMap<Key, Row>,
+    /// Modes as they came.
+    seen: Vec<String>,
     /// Largest stator frequency, in Hz.
     pub hertz: f64,
     /// Bytes of stack that each exception takes at most, with its frame.
@@ -102,6 +104,9 @@ impl Statistics {
                 bail!("the log holds {} {name} interrupts, the rig served {}", calls.len(), served.len());
             }
             for (call, served) in calls.into_iter().zip(served) {
+                if !self.seen.contains(&served.mode) {
+                    self.seen.push(served.mode.clone());
+                }
                 for direction in [None].into_iter().chain(served.direction.map(Some)) {
                     let key = (served.mode.clone(), direction, name.to_owned());
                     self.rows.entry(key).or_default().add(call);
@@ -115,6 +120,14 @@ impl Statistics {
             *deepest = (*deepest).max(*bytes);
         }
         Ok(())
+    }
+
+    /// The modes that were seen: first those of a list in its order, then the others as they came, without pulses last.
+    pub fn modes(&self, first: &[&str]) -> Vec<&str> {
+        let mut modes: Vec<_> = self.seen.iter().map(String::as_str).collect();
+        let place = |mode: &str| first.iter().position(|known| *known == mode).unwrap_or(first.len());
+        modes.sort_by_key(|mode| (*mode == "off", place(mode)));
+        modes
     }
 
     /// Bytes of stack below the idle loop's, if the higher interrupt comes where control's is deepest.

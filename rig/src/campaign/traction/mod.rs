@@ -23,7 +23,7 @@ use faults::Cause;
 use tractive::control::{Demand, Gains};
 use tractive::drive::traction::Settings;
 use tractive::machine::Tables;
-use tractive::modulation::{Devices, Mode};
+use tractive::modulation::{Devices, Ladder, Mode};
 
 /// Full torque is reversed in 0.15 s where it cannot step; the aftermath is several electrical turns, and the link's oscillation.
 const STAGES: Stages = Stages { torque_s: -0.09, turn_s: 0.1, end_s: 0.3, aftermath_s: 0.06 };
@@ -41,6 +41,7 @@ pub struct Drive {
     machine: Machine,
     tables: &'static Tables,
     without: Option<Without>,
+    ladder: Ladder,
 }
 
 impl Drive {
@@ -51,7 +52,12 @@ impl Drive {
     pub fn new(without: Option<Without>) -> Result<Self> {
         let machine = Machine::load("pmasynrm-180kw")?;
         let tables = without.map_or(machine.tables, |without| without.tables(machine.tables));
-        Ok(Self { machine, tables, without })
+        Ok(Self { machine, tables, without, ladder: Ladder::PAPER })
+    }
+
+    /// The same with the modes of another ladder.
+    pub fn on(self, ladder: Ladder) -> Self {
+        Self { ladder, ..self }
     }
 
     /// The machine's folder.
@@ -101,7 +107,7 @@ impl Drive {
     fn tasks(&self) -> Tasks<'static> {
         let devices = self.devices();
         let settings = Settings { clock: CLOCK, devices, gains: Gains::DEFAULT };
-        let tasks = Tasks::new(self.tables, settings, devices.shortest_half_ticks);
+        let tasks = Tasks::new(self.tables, settings, devices.shortest_half_ticks).on(self.ladder);
         match self.without {
             Some(without) => tasks.without(without),
             None => tasks,
