@@ -38,7 +38,7 @@ use Group::{Around, Beyond, Named};
 /// the repository's crates, whichever it is; behind a `#` a word of the function's name. Of the sources that an instruction's file lies
 /// in the longest decides. First the innermost function is asked, then those that it was inlined into.
 const PARTS: [(&str, [Group; 2], &[&str]); 28] = [
-    ("sine and cosine, Clarke, Park, angles", [Named, Named], &["frames/"]),
+    ("frames: vectors, angles, sine and cosine", [Named, Named], &["frames/"]),
     ("look-up in flux map and tables", [Named, Named], &["machine/lookup.rs"]),
     ("MTPA, two passes", [Named, Named], &["control/mtpa.rs"]),
     ("operating point: weakening, limits", [Named, Named], &["control/reference.rs"]),
