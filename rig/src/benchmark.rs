@@ -2,40 +2,10 @@
 
 use crate::machine::Machine;
 use crate::options::RunOptions;
+use crate::plant::stopwatch::{self, processor_s};
 use crate::{scenario, zs9};
 use anyhow::Result;
-use std::cell::Cell;
 use std::time::Instant;
-
-/// Of so many steps of the plant one is timed.
-const TIMED: u64 = 16;
-
-thread_local! {
-    static STEPS: Cell<u64> = const { Cell::new(0) };
-    static IN_PLANT: Cell<f64> = const { Cell::new(0.0) };
-    /// What taking the time takes, in s.
-    static TAKING: Cell<f64> = const { Cell::new(0.0) };
-}
-
-/// Does a step of the plant, and once in a while takes its time.
-#[inline]
-pub(crate) fn in_plant<R>(step: impl FnOnce() -> R) -> R {
-    let count = STEPS.get();
-    STEPS.set(count + 1);
-    if !count.is_multiple_of(TIMED) {
-        return step();
-    }
-    let began = processor_s();
-    let result = step();
-    IN_PLANT.set(IN_PLANT.get() + processor_s() - began - TAKING.get());
-    result
-}
-
-/// What this thread has had of the processor, in s: other programs do not count.
-fn processor_s() -> f64 {
-    let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
-    time.tv_sec as f64 + time.tv_nsec as f64 * 1e-9
-}
 
 /// Drives a scenario; the recorded time, in s.
 type Drive = Box<dyn FnOnce(&RunOptions, &Machine) -> Result<f64>>;
@@ -72,14 +42,7 @@ pub fn names() -> Vec<String> {
 /// # Errors
 /// An unknown scenario, bad input, or a drive that breaks the bench's rules.
 pub fn measure(name: &str, options: &RunOptions) -> Result<Measured> {
-    STEPS.set(0);
-    IN_PLANT.set(0.0);
-    const TRIES: u32 = 10_000;
-    let began_s = processor_s();
-    for _ in 0..TRIES {
-        std::hint::black_box(processor_s());
-    }
-    TAKING.set((processor_s() - began_s) / f64::from(TRIES));
+    stopwatch::begin();
     let (drive, tables): (Drive, Machine) = match zs9::scenario::find(name) {
         Some(scenario) => {
             let machine = Machine::load(options.machine.as_deref().unwrap_or(zs9::command::MACHINE))?;
@@ -101,14 +64,14 @@ pub fn measure(name: &str, options: &RunOptions) -> Result<Measured> {
     let (began, began_s) = (Instant::now(), processor_s());
     let simulated_s = drive(options, &tables)?;
     let (wall_s, processor_s) = (began.elapsed().as_secs_f64(), processor_s() - began_s);
-    let in_plant_s = IN_PLANT.get() * TIMED as f64;
+    let (plant_steps, in_plant_s) = stopwatch::taken();
     Ok(Measured {
         scenario: name.to_owned(),
         simulated_s,
         wall_s,
         processor_s,
         ratio: simulated_s / processor_s,
-        plant_steps: STEPS.get(),
+        plant_steps,
         plant_percent: 100.0 * in_plant_s / processor_s,
     })
 }

@@ -13,8 +13,8 @@ use tractive_rig::machine::Machine;
 use tractive_rig::options::{OF_THE_ZS9, RunOptions, check_own, not_negative, positive};
 use tractive_rig::report::{self, Page};
 use tractive_rig::scenario::{self, Scenario};
-use tractive_rig::trace::{self, Recording};
-use tractive_rig::{benchmark, figures, nine_switch, pattern, points, say, spectrum, talk, zs9};
+use tractive_rig::trace::Recording;
+use tractive_rig::{benchmark, figures, files, nine_switch, pattern, points, say, spectrum, talk, zs9};
 
 #[derive(Parser)]
 #[command(name = "tractive-rig", about = "Plays the motor to the drive, and shows what happened", version)]
@@ -200,9 +200,9 @@ fn run(name: &str, options: &RunOptions, given: &dyn Fn(&str) -> bool) -> Result
         recording.write_slots(&out.join("operator.csv"))?;
     }
     let summary = summary(scenario.as_ref(), options, &figures, &machine);
-    trace::write_text(&out.join("summary.json"), &(serde_json::to_string_pretty(&summary)? + "\n"))?;
-    trace::write_text(&out.join("overview.svg"), &report::overview(&recording)?)?;
-    trace::write_text(
+    files::write_text(&out.join("summary.json"), &(serde_json::to_string_pretty(&summary)? + "\n"))?;
+    files::write_text(&out.join("overview.svg"), &report::overview(&recording)?)?;
+    files::write_text(
         &out.join("report.html"),
         &page(scenario.as_ref(), options, &recording, &machine, &figures)?,
     )?;

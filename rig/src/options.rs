@@ -1,10 +1,10 @@
 //! Options that all runs share.
 
 use crate::bench::Flaws;
-use crate::bench::injected::Injection;
+use crate::inject::Injection;
+use crate::inject::zs9::Kind;
 use crate::machine::Machine;
 use crate::run::{CLOCK, Emulator};
-use crate::zs9::inject::Kind;
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 use std::path::PathBuf;

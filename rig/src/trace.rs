@@ -1,14 +1,41 @@
 //! What a run leaves behind: trace, edges, switches of mode. Files are written whole or not at all.
 
-use crate::bench::{Edge, GATES, SlotRow, Tick, degrees};
+use crate::files::{forget, short_time, write_whole};
 use crate::plant::LinkEnergies;
-use anyhow::{Context, Result};
-use std::io::Write;
+use crate::rows::Timed;
+use anyhow::Result;
 use std::path::Path;
+use tractive::frames::Angle;
 use tractive::modulation::Mode;
 use tractive::operator::Status;
 use tractive::protection::Trip;
 use tractive::recorder::Record;
+
+/// Ticks since the run's beginning; on a bench that counts finer, its steps.
+pub type Tick = u64;
+
+/// A gate edge: device 0 ..= 5 is uh ul vh vl wh wl.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Edge {
+    /// When.
+    pub tick: Tick,
+    /// Which device, as an index into [`GATES`].
+    pub gate: u8,
+    /// On or off.
+    pub on: bool,
+}
+
+/// Names of the gates, in the order of [`Edge::gate`].
+pub const GATES: [&str; 6] = ["uh", "ul", "vh", "vl", "wh", "wl"];
+
+/// What the operator did in one slot, for the trace.
+#[derive(Clone, Copy, Debug)]
+pub struct SlotRow {
+    /// When it took effect, in s from the recording's beginning.
+    pub t_s: f64,
+    /// What it told.
+    pub status: Status,
+}
 
 /// One line of trace.csv: the plant's true values, and control's intentions at that instant.
 #[derive(Clone, Copy, Debug)]
@@ -49,6 +76,12 @@ pub struct Row {
     pub trip: Option<Trip>,
     /// The operator's last word, if there is one.
     pub status: Option<Status>,
+}
+
+impl Timed for Row {
+    fn t_s(&self) -> f64 {
+        self.t_s
+    }
 }
 
 impl Row {
@@ -270,48 +303,7 @@ impl Recording {
     }
 }
 
-/// Takes away a file that an earlier run has left.
-pub(crate) fn forget(path: &Path) -> Result<()> {
-    match std::fs::remove_file(path) {
-        Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
-            Err(error).with_context(|| path.display().to_string())
-        }
-        _ => Ok(()),
-    }
-}
-
-/// A time rounded to a nanosecond, so that it prints short; ticks are 40 ns.
-fn short_time(t_s: f64) -> f64 {
-    (t_s * 1e9).round() / 1e9
-}
-
-/// Writes a CSV beside its place and moves it there when it is complete.
-pub(crate) fn write_whole(
-    path: &Path,
-    fill: impl FnOnce(&mut csv::Writer<std::io::BufWriter<&std::fs::File>>) -> Result<()>,
-) -> Result<()> {
-    let folder = path.parent().unwrap_or(Path::new("."));
-    let file = tempfile::NamedTempFile::new_in(folder).with_context(|| format!("{}", folder.display()))?;
-    {
-        let mut out = csv::Writer::from_writer(std::io::BufWriter::with_capacity(1 << 16, file.as_file()));
-        fill(&mut out)?;
-        out.flush()?;
-    }
-    publish(file, path)
-}
-
-/// Writes a text file whole or not at all.
-pub fn write_text(path: &Path, text: &str) -> Result<()> {
-    let folder = path.parent().unwrap_or(Path::new("."));
-    let mut file =
-        tempfile::NamedTempFile::new_in(folder).with_context(|| format!("{}", folder.display()))?;
-    file.write_all(text.as_bytes())?;
-    publish(file, path)
-}
-
-fn publish(file: tempfile::NamedTempFile, path: &Path) -> Result<()> {
-    use std::os::unix::fs::PermissionsExt;
-    file.as_file().set_permissions(std::fs::Permissions::from_mode(0o644))?;
-    file.persist(path).with_context(|| format!("{}", path.display()))?;
-    Ok(())
+/// An angle in degrees, 0 ≤ x < 360.
+pub fn degrees(angle: Angle) -> f64 {
+    f64::from(angle.0) / 4_294_967_296.0 * 360.0
 }

@@ -9,8 +9,6 @@ mod conversions;
 mod dc_side;
 mod due;
 mod error;
-pub mod inject;
-pub mod injected;
 mod inverter;
 mod line;
 mod observe;
@@ -22,23 +20,24 @@ mod settings;
 mod switchgear;
 mod time;
 
+pub use crate::trace::Tick;
 pub use conversions::Conversions;
 pub use dc_side::Supply;
 pub use due::Due;
 pub use error::BenchError;
-pub use inverter::{Edge, GATES, Inverter, Stuck};
-pub use line::{Commander, LinePlan, LineSide, SlotRow};
+pub use inverter::{Inverter, Stuck};
+pub use line::{Commander, LinePlan, LineSide};
 pub use observe::{Limits, Observed, Peaks, Stored};
-pub use record::degrees;
 pub use sensors::{Converter, Flaws, Sensors};
 pub use settings::{Operator, Settings};
 pub use switchgear::Switchgear;
-pub use time::{Tick, Timeline};
+pub use time::Timeline;
 
+use crate::inject::Injection;
+use crate::inject::traction::{Kind, Spoiler};
 use crate::plant::Plant;
-use crate::trace::{Row, Switch};
+use crate::trace::{Row, SlotRow, Switch};
 use dc_side::DcSide;
-use inject::Spoiler;
 use tractive::board::Sample;
 use tractive::drive::Report;
 use tractive::modulation::CarrierPeriod;
@@ -83,7 +82,7 @@ impl Bench {
     pub fn new(plant: Plant, operator: Box<dyn Operator + Send>, settings: &Settings) -> Self {
         let time = Timeline::new(settings.clock, 1, settings.lead_s);
         let first = CarrierPeriod::off(settings.first_half_ticks);
-        let at = |injection: inject::Injection<inject::Kind>| time.steps(settings.lead_s + injection.at_s);
+        let at = |injection: Injection<Kind>| time.steps(settings.lead_s + injection.at_s);
         let from = settings.injection.map_or(Tick::MAX, at);
         Self {
             plant,

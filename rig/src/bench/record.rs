@@ -1,8 +1,7 @@
 //! The trace.
 
 use super::{Bench, LineSide};
-use crate::trace::{Recording, Row, Switch};
-use tractive::frames::Angle;
+use crate::trace::{Recording, Row, Switch, degrees};
 use tractive::modulation::{CarrierPeriod, Mode};
 use tractive::recorder::Record;
 
@@ -71,9 +70,4 @@ impl Bench {
         let next_s = self.rows_done as f64 * self.trace_step_s;
         self.next_row = self.time.row_end(next_s);
     }
-}
-
-/// An angle in degrees, 0 ≤ x < 360.
-pub fn degrees(angle: Angle) -> f64 {
-    f64::from(angle.0) / 4_294_967_296.0 * 360.0
 }

@@ -1,7 +1,7 @@
 //! What the drive's interrupts are told, and what control reports.
 
-use super::inject::Kind;
 use super::{Bench, BenchError};
+use crate::inject::traction::Kind;
 use tractive::board::Sample;
 use tractive::control::LinkWindow;
 use tractive::drive::Report;

@@ -8,7 +8,7 @@ pub use overview::overview;
 pub use table::cell;
 
 use crate::analysis::Figures;
-use crate::bench::GATES;
+use crate::trace::GATES;
 use crate::trace::{Recording, Row};
 use anyhow::Result;
 use chart::{chart, legend, thinned};

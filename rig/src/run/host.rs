@@ -2,8 +2,8 @@
 
 use super::{Progress, Supervisor};
 use crate::bench::Bench;
-use crate::campaign::without::Without;
 use crate::trace::Recording;
+use crate::without::Without;
 use tractive::board::{ControlPort, PwmPort, Sample};
 use tractive::control::{Demand, LinkWindow, Measurements};
 use tractive::drive::Report;

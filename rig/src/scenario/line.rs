@@ -1,11 +1,11 @@
 //! What the scenarios with a line side share: its parts, and what is judged in all of them.
 
 use crate::analysis::Figures;
-use crate::bench::{SlotRow, Tick};
 use crate::machine::Machine;
 use crate::plant::{DcLinkSettings, Source};
 use crate::report::Page;
 use crate::trace::Recording;
+use crate::trace::{SlotRow, Tick};
 use crate::verdict::Verdict;
 use serde::Serialize;
 use tractive::operator::State;

@@ -19,14 +19,15 @@ mod switches;
 mod timing;
 
 use crate::analysis::{self, Figures};
-use crate::bench::injected::Injection;
-use crate::bench::{self, Bench, Limits, LinePlan, Operator, Supply, inject};
+use crate::bench::{self, Bench, Limits, LinePlan, Operator, Supply};
+use crate::inject::Injection;
+use crate::inject::sensor::CurrentFault;
+use crate::inject::traction::Kind;
 use crate::machine::Machine;
 use crate::options::{On, RunOptions};
 use crate::plant::{DcLinkSettings, Plant, PlantSettings, SpeedSource};
 use crate::report::Page;
 use crate::run::{self, CLOCK, Emulator, Supervisor};
-use crate::sensor_faults::CurrentFault;
 use crate::trace::Recording;
 use anyhow::{Context, Result};
 use tractive::control::{Demand, Gains};
@@ -209,7 +210,7 @@ fn run_plan(
             supply: Supply::Stiff,
             injection: options.offset_at.map(|at_s| {
                 let fault = CurrentFault::Offset(OFFSET * parameters.max_current_a);
-                Injection { kind: inject::Kind::Current(0, fault), at_s }
+                Injection { kind: Kind::Current(0, fault), at_s }
             }),
             limits: Limits::NONE,
         },

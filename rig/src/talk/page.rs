@@ -1,6 +1,7 @@
 //! The page of a talk: what the telemetry said beside what really happened.
 
-use super::{Outcome, Recorded, System, TalkOptions};
+use super::outcome::{Outcome, Recorded, TalkOptions};
+use super::system::System;
 use crate::report::Page;
 use crate::zs9::{self, trace::MotorRow};
 use anyhow::Result;

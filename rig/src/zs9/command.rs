@@ -4,10 +4,10 @@ use super::figures;
 use super::scenario::{self, Scenario};
 use super::trace::Recording;
 use crate::analysis::Figures;
+use crate::files::write_text;
 use crate::machine::Machine;
 use crate::options::RunOptions;
 use crate::report::Page;
-use crate::trace::write_text;
 use anyhow::Result;
 use std::path::Path;
 

@@ -3,7 +3,6 @@
 pub mod bench;
 pub mod command;
 pub mod figures;
-pub mod inject;
 pub mod line;
 mod operator;
 mod patterns;

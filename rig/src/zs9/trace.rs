@@ -1,7 +1,8 @@
 //! What a run of the ZS9 leaves behind. Files are written whole or not at all.
 
-use crate::bench::degrees;
-use crate::trace::{forget, write_whole};
+use crate::files::{forget, write_whole};
+use crate::rows::Timed;
+use crate::trace::degrees;
 use anyhow::Result;
 use std::path::Path;
 use tractive::nine_switch::Scheme;
@@ -136,6 +137,12 @@ const RECORDER: [&str; 20] = [
     "pulsing",
     "fault",
 ];
+
+impl Timed for Row {
+    fn t_s(&self) -> f64 {
+        self.t_s
+    }
+}
 
 impl Row {
     fn fields(&self) -> [String; 26] {

@@ -10,21 +10,22 @@ mod record;
 mod run;
 mod sampling;
 mod settings;
+mod sums;
 mod watch;
 
 pub use crate::bench::BenchError;
 pub use settings::{BenchSettings, Course};
 
-use super::inject::Spoiler;
 use super::line::{LineSide, LineTimes};
 use super::operator::{Operator, Orders};
 use super::sensors::Sensors;
 use super::trace::Row;
 use crate::bench::{Conversions, Converter, Due, Observed, Tick, Timeline};
+use crate::inject::zs9::Spoiler;
 use crate::plant::zs9::{NetworkState, Zs9Plant};
 use crate::run::Supervised;
 use gates::Gates;
-use record::Sums;
+use sums::Sums;
 use tractive::board::{DualSample, GateFeedback, PlayedPeriod};
 use tractive::drive::dual::{COMPARE_STEPS, DualReport};
 use tractive::operator::{DualStatus, Feedback};

@@ -5,16 +5,6 @@ use crate::bench::Tick;
 use crate::zs9::trace::{Edge, MotorRow, Recording, Row};
 use tractive::recorder::DualRecord;
 
-/// What is summed up over a step of the trace, each value times its time, in steps.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Sums {
-    pub steps: f64,
-    pub torque_refs: [f64; 2],
-    pub loads: [f64; 2],
-    pub source_v: f64,
-    pub shorted: f64,
-}
-
 impl Bench {
     /// What was recorded: what the bench saw, and what the drive's own recorder holds; instants in seconds from its beginning.
     pub fn into_recording(self, records: Vec<DualRecord>) -> Recording {

@@ -1,8 +1,8 @@
 //! What the drive's interrupts are told, and what control reports.
 
 use super::{Bench, BenchError};
+use crate::inject::zs9::Kind;
 use crate::steps::held;
-use crate::zs9::inject::Kind;
 use tractive::board::{DualSample, HardwareBreak, PowerSample};
 use tractive::drive::dual::DualReport;
 use tractive::frames::Abc;

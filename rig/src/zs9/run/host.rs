@@ -1,7 +1,7 @@
 //! On the host: the firmware's own tasks, called in the order in which their interrupts would come.
 
-use crate::campaign::without::Without;
 use crate::run::{Progress, Supervised, Supervisor, turn};
+use crate::without::Without;
 use crate::zs9::bench::Bench;
 use crate::zs9::trace::Recording;
 use tractive::board::{DualControlPort, DualPwmPort, DualSample, MotorDemand, PlayedPeriod, PowerSample};

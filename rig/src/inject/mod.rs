@@ -1,4 +1,8 @@
-//! What goes wrong and when, whatever can.
+//! What goes wrong and when: what is the same of both systems here, the kinds of each beside it.
+
+pub mod sensor;
+pub mod traction;
+pub mod zs9;
 
 /// What goes wrong, and when.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]

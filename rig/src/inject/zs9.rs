@@ -1,7 +1,7 @@
 //! Things that go wrong on purpose.
 
-use crate::bench::injected::{ControlFault, GoesWrong, Injected, Injection};
-use crate::sensor_faults::{AngleFault, AngleSpoiler, CurrentFault, CurrentSpoiler};
+use super::sensor::{AngleFault, AngleSpoiler, CurrentFault, CurrentSpoiler};
+use super::{ControlFault, GoesWrong, Injected, Injection};
 use std::str::FromStr;
 use tractive::board::{DualSample, MotorDemand, PowerSample};
 use tractive::frames::Abc;

@@ -1,11 +1,9 @@
 //! Things that go wrong on purpose.
 
-use super::injected::{ControlFault, GoesWrong, Injected};
-use crate::sensor_faults::{AngleFault, AngleSpoiler, CurrentFault, CurrentSpoiler};
+use super::sensor::{AngleFault, AngleSpoiler, CurrentFault, CurrentSpoiler};
+use super::{ControlFault, GoesWrong, Injected, Injection};
 use tractive::board::Sample;
 use tractive::frames::Abc;
-
-pub use super::injected::Injection;
 
 /// What goes wrong.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -16,9 +14,9 @@ pub enum Kind {
     Angle(AngleFault),
     /// The supply.
     Supply(SupplyFault),
-    /// A gate, in the order of [`super::GATES`], is stuck: on (true) or off.
+    /// A gate, in the order of [`crate::trace::GATES`], is stuck: on (true) or off.
     Gate(u8, bool),
-    /// A device, in the order of [`super::GATES`], has failed and conducts for good.
+    /// A device, in the order of [`crate::trace::GATES`], has failed and conducts for good.
     Device(u8),
     /// The monitor of leg 0 ..= 2 tells of an output at the lower rail.
     Feedback(usize),
