@@ -17,6 +17,7 @@ pub mod files;
 pub mod inject;
 pub mod machine;
 pub mod mtpa_methods;
+pub mod needs;
 pub mod nine_switch;
 pub mod options;
 pub mod output;

@@ -17,6 +17,7 @@ mod run;
 mod sampling;
 mod sensors;
 mod settings;
+mod simulated;
 mod switchgear;
 mod time;
 
@@ -30,6 +31,7 @@ pub use line::{Commander, LinePlan, LineSide};
 pub use observe::{Limits, Observed, Peaks, Stored};
 pub use sensors::{Converter, Flaws, Sensors};
 pub use settings::{Operator, Settings};
+pub use simulated::Simulated;
 pub use switchgear::Switchgear;
 pub use time::Timeline;
 
@@ -110,7 +112,7 @@ impl Bench {
         }
     }
 
-    /// The same beginning at another tick than 0, with tasks of [`crate::run::Tasks::beginning_at`] the same: where instants wrap.
+    /// The same beginning at another tick than 0, with tasks of [`crate::run::traction::Tasks::beginning_at`] the same: where instants wrap.
     pub fn beginning_at(mut self, origin: Tick) -> Self {
         self.time = self.time.beginning_at(origin);
         for tick in [&mut self.end, &mut self.control.next, &mut self.next_row] {
@@ -153,24 +155,9 @@ impl Bench {
         Ok(())
     }
 
-    /// Whether the recording is complete.
-    pub fn is_done(&self) -> bool {
-        self.time.now > self.end
-    }
-
-    /// Share of the run that is done, 0 ..= 1.
-    pub fn progress(&self) -> f64 {
-        self.time.now as f64 / self.end as f64
-    }
-
     /// Time since the recording's beginning, in s.
     pub fn time_s(&self) -> f64 {
         self.time.now_s()
-    }
-
-    /// An instant near to now, in s from the recording's beginning.
-    pub fn instant_s(&self, instant: Instant) -> f64 {
-        self.time.seconds(self.time.widen(instant))
     }
 
     /// The trace so far.
@@ -181,16 +168,6 @@ impl Bench {
     /// What a fault did.
     pub fn observed(&self) -> &Observed {
         &self.observed
-    }
-
-    /// A free rotor's load from `instant` on, in N·m.
-    pub fn load_from(&mut self, instant: Instant, load_nm: f64) {
-        self.loads.push(self.time.widen(instant), load_nm);
-    }
-
-    /// Ends the recording at `instant`.
-    pub fn end_at(&mut self, instant: Instant) {
-        self.end = self.end.min(self.time.widen(instant));
     }
 
     /// The half to play after the one that begins at `instant`.

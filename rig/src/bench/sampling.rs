@@ -31,11 +31,6 @@ impl Bench {
         self.spoiler.injected.late_ticks(self.time.now_s())
     }
 
-    /// Whether the control interrupt comes at this instant at all.
-    pub fn has_control(&self, instant: Instant) -> bool {
-        self.spoiler.injected.has_control(self.instant_s(instant))
-    }
-
     /// Phase currents at the carrier boundary `instant`.
     pub fn pwm_sample(&mut self, instant: Instant) -> Result<Abc, BenchError> {
         self.advance(self.time.widen(instant))?;

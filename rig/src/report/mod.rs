@@ -3,9 +3,10 @@
 mod chart;
 mod overview;
 mod table;
+mod text;
 
 pub use overview::overview;
-pub use table::cell;
+pub use text::{headline, text};
 
 use crate::analysis::Figures;
 use crate::trace::GATES;

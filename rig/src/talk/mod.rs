@@ -12,21 +12,32 @@ mod system;
 
 pub use lines::Lines;
 pub use listener::Listener;
-pub use outcome::{Outcome, Recorded, TalkOptions};
+pub use outcome::{Happened, Outcome, TalkOptions};
 pub use supervisor::Talk;
 pub use system::System;
 
 use crate::analysis::Figures;
+use crate::bench::LinePlan;
 use crate::files;
 use crate::machine::Machine;
-use crate::options::RunOptions;
-use crate::scenario;
+use crate::options::{Options, RunOptions};
+use crate::plant::SpeedSource;
+use crate::scenario::System as _;
+use crate::scenario::traction::{self, Traction, scaled_link};
+use crate::scenario::zs9::{self as dual, Zs9};
+use crate::trace::{Recording, name_of};
 use crate::zs9;
 use anyhow::Result;
+use serde_json::Map;
 use std::path::Path;
+use tractive::board::MotorDemand;
+use tractive::operator::Request;
 
 /// Step of trace.csv unless told otherwise, in s.
 const TRACE_STEP_S: f64 = 1e-3;
+
+/// Longest talk, in s.
+const LONGEST_S: f64 = 86_400.0;
 
 /// Talks.
 ///
@@ -34,29 +45,61 @@ const TRACE_STEP_S: f64 = 1e-3;
 /// A bad script, or a run that could not go on.
 pub fn run(options: &TalkOptions) -> Result<Outcome> {
     let system = options.system;
-    let lines = match &options.script {
-        Some(path) => Lines::of_script(path, system)?,
-        None => Lines::Typed(0),
+    let lines = match options.script.as_deref() {
+        Some(path) if path != Path::new("-") => Lines::of_script(path, system)?,
+        _ => Lines::Typed(0),
     };
-    let machine = match system {
-        System::Pmasynrm => options.run.machine(),
-        System::Zs9 => options.run.machine.as_deref().unwrap_or(zs9::command::MACHINE),
-    };
-    let machine = Machine::load(machine)?;
-    let inertia = options.inertia();
-    let mut talk = Talk::new(system, lines, inertia, machine.folder.parameters.max_torque_nm);
-    let run = RunOptions { dt: Some(options.run.dt.unwrap_or(TRACE_STEP_S)), ..options.run.clone() };
+    let machine = Machine::load(options.machine_name())?;
+    let mut talk = Talk::new(system, lines, options.inertia(), machine.folder.parameters.max_torque_nm);
     let recording = match system {
-        System::Pmasynrm => {
-            Recorded::Pmasynrm(scenario::drive_supervised("talk", &mut talk, inertia, &run, &machine)?)
-        }
-        System::Zs9 => Recorded::Zs9(zs9::scenario::drive_supervised(&mut talk, inertia, &run, &machine)?),
+        System::Pmasynrm => Happened::Pmasynrm(with_traction(options, &machine, &mut talk)?),
+        System::Zs9 => Happened::Zs9(with_zs9(options, &machine, &mut talk)?),
     };
     let figures = figures(&talk, &recording);
     Ok(Outcome { talk, system, recording, figures })
 }
 
-fn figures(talk: &Talk, recording: &Recorded) -> Figures {
+fn run_options(options: &TalkOptions) -> RunOptions {
+    RunOptions { dt: Some(options.run.dt.unwrap_or(TRACE_STEP_S)), ..options.run.clone() }
+}
+
+/// A rotor on a link, commanded over the protocol.
+fn with_traction(options: &TalkOptions, machine: &Machine, talk: &mut Talk) -> Result<Recording> {
+    let own = Options { run: run_options(options), own: options.traction.clone() };
+    Traction::check(&own, &Map::new(), machine)?;
+    let idle = Request::idle(&machine.tables.ratings);
+    // The frames ask, not this.
+    let line = LinePlan::new(scaled_link(machine), Box::new(move |_| idle));
+    let plan = traction::Plan {
+        speed: SpeedSource::Inertia { inertia_kg_m2: options.inertia(), load_nm: 0.0 },
+        ..traction::Plan::operated(LONGEST_S, vec![(0.0, 0.0)], line)
+    };
+    Traction::run("talk", plan, &own, machine, Some(talk))
+}
+
+/// Two rotors on an empty network, commanded over the protocol.
+fn with_zs9(options: &TalkOptions, machine: &Machine, talk: &mut Talk) -> Result<zs9::trace::Recording> {
+    let own = Options { run: run_options(options), own: options.zs9.clone() };
+    Zs9::check(&own, &Map::new(), machine)?;
+    // What the operator permits takes the place of the demands.
+    let operator = |_: f64, _: zs9::SeenMotors| zs9::Orders {
+        demands: [MotorDemand::Speed(0.0); 2],
+        loads_nm: [0.0; 2],
+        enable: true,
+    };
+    let plan = dual::Plan {
+        lead_s: 0.0,
+        duration_s: LONGEST_S,
+        speeds: [dual::free(options.inertia()), dual::free(options.inertia())],
+        from_rpm: [0.0; 2],
+        operator: Box::new(operator),
+        edges: false,
+        line: Some(zs9::line::TIMES),
+    };
+    Zs9::run("talk", plan, &own, machine, Some(talk))
+}
+
+fn figures(talk: &Talk, recording: &Happened) -> Figures {
     let mut figures = Figures::default();
     let speeds = recording.speeds_rpm();
     let (last_s, last_rpm) = speeds.last().copied().unwrap_or_default();
@@ -67,18 +110,18 @@ fn figures(talk: &Talk, recording: &Recorded) -> Figures {
     figures.set("telemetry_errors", talk.listener.errors);
     figures.set("frames_rejected", talk.listener.counts.rejected());
     match recording {
-        Recorded::Pmasynrm(_) => {
+        Happened::Pmasynrm(_) => {
             figures.set("highest_speed_rpm", highest(0));
             figures.set("last_speed_rpm", last_rpm[0]);
         }
-        Recorded::Zs9(_) => {
+        Happened::Zs9(_) => {
             for (k, motor) in ["1", "2"].into_iter().enumerate() {
                 figures.set(&format!("highest_speed{motor}_rpm"), highest(k));
                 figures.set(&format!("last_speed{motor}_rpm"), last_rpm[k]);
             }
         }
     }
-    figures.set("fault", recording.trip().map_or("", |trip| trip.fault.name()));
+    figures.set("fault", name_of(recording.common().trip()));
     figures.set("expectations", talk.expectations);
     figures.set("not_met", &talk.failures);
     figures
@@ -98,26 +141,14 @@ pub fn write(options: &TalkOptions, outcome: &Outcome, out: &Path) -> Result<()>
         Ok(())
     })?;
     files::write_text(&out.join("frames.log"), &talk.frames)?;
-    let (trace, recorder) = (out.join("trace.csv"), out.join("recorder.csv"));
-    match recording {
-        Recorded::Pmasynrm(recording) => {
-            recording.write_trace(&trace)?;
-            recording.write_recorder(&recorder)?;
-        }
-        Recorded::Zs9(recording) => {
-            recording.write_trace(&trace)?;
-            recording.write_recorder(&recorder)?;
-        }
-    }
+    recording.common().write_trace(&out.join("trace.csv"))?;
+    recording.common().write_recorder(&out.join("recorder.csv"))?;
     let summary = serde_json::json!({
         "scenario": "talk",
         "script": options.script,
         "version": env!("CARGO_PKG_VERSION"),
         "system": system.name(),
-        "machine": options.run.machine.as_deref().unwrap_or(match system {
-            System::Pmasynrm => options.run.machine(),
-            System::Zs9 => zs9::command::MACHINE,
-        }),
+        "machine": options.machine_name(),
         "on": options.run.on.name(),
         "inertia_kg_m2": options.inertia(),
         "figures": figures.values(),

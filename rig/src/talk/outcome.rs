@@ -4,10 +4,12 @@ use super::supervisor::Talk;
 use super::system::System;
 use crate::analysis::Figures;
 use crate::options::RunOptions;
-use crate::trace::Recording;
+use crate::scenario::System as _;
+use crate::scenario::traction::{Traction, TractionOptions};
+use crate::scenario::zs9::{Zs9, Zs9Options};
+use crate::trace::{Recorded, Recording};
 use crate::zs9;
 use std::path::PathBuf;
-use tractive::protection::Trip;
 
 /// What is wanted.
 #[derive(Clone, Debug, clap::Args)]
@@ -23,21 +25,28 @@ pub struct TalkOptions {
     /// What all runs share.
     #[command(flatten)]
     pub run: RunOptions,
+    /// What only the PMaSynRM drive has.
+    #[command(flatten)]
+    pub traction: TractionOptions,
+    /// What only the ZS9 has.
+    #[command(flatten)]
+    pub zs9: Zs9Options,
 }
 
 /// What really happened, by system.
-pub enum Recorded {
+pub enum Happened {
     /// Of the PMaSynRM drive.
     Pmasynrm(Recording),
     /// Of the ZS9.
     Zs9(zs9::trace::Recording),
 }
 
-impl Recorded {
-    pub(super) fn trip(&self) -> Option<Trip> {
+impl Happened {
+    /// What both systems have.
+    pub fn common(&self) -> &dyn Recorded {
         match self {
-            Self::Pmasynrm(recording) => recording.trip(),
-            Self::Zs9(recording) => recording.trip(),
+            Self::Pmasynrm(recording) => recording,
+            Self::Zs9(recording) => recording,
         }
     }
 
@@ -62,12 +71,21 @@ pub struct Outcome {
     /// Who was talked to.
     pub system: System,
     /// What really happened.
-    pub recording: Recorded,
+    pub recording: Happened,
     /// The figures.
     pub figures: Figures,
 }
 
 impl TalkOptions {
+    /// The machine's name, or its folder.
+    pub fn machine_name(&self) -> &str {
+        let usual = match self.system {
+            System::Pmasynrm => Traction::MACHINE,
+            System::Zs9 => Zs9::MACHINE,
+        };
+        self.run.machine.as_deref().unwrap_or(usual)
+    }
+
     /// The inertia, in kg·m².
     pub fn inertia(&self) -> f64 {
         self.inertia.unwrap_or(self.system.inertia_kg_m2())

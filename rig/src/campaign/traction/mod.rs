@@ -16,7 +16,10 @@ use crate::inject::Injection;
 use crate::inject::traction::Kind;
 use crate::machine::Machine;
 use crate::plant::{LineFilter, Plant, PlantSettings, SpeedSource};
-use crate::run::{CLOCK, Tasks};
+use crate::run::traction::Tasks;
+use crate::run::{CLOCK, Interrupts};
+use crate::scenario::System;
+use crate::scenario::traction::Traction;
 use crate::trace::Row;
 use crate::without::Without;
 use anyhow::Result;
@@ -50,7 +53,7 @@ impl Drive {
     /// # Errors
     /// Where its folder is not there.
     pub fn new(without: Option<Without>) -> Result<Self> {
-        let machine = Machine::load("pmasynrm-180kw")?;
+        let machine = Machine::load(Traction::MACHINE)?;
         let tables = without.map_or(machine.tables, |without| without.tables(machine.tables));
         Ok(Self { machine, tables, without })
     }

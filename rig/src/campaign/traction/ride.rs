@@ -6,6 +6,7 @@ use crate::campaign::action::LEAD_S;
 use crate::inject::Injection;
 use crate::inject::traction::Kind;
 use crate::plant::{Plant, PlantSettings, SpeedSource};
+use crate::run::Interrupts;
 use crate::steps::held;
 use crate::trace::Row;
 use anyhow::Result;

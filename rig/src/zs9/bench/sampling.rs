@@ -29,11 +29,6 @@ impl Bench {
         self.spoiler.injected.late_ticks(self.time.now_s())
     }
 
-    /// Whether the control interrupt comes at this instant at all.
-    pub fn has_control(&self, instant: Instant) -> bool {
-        self.spoiler.injected.has_control(self.time.seconds(self.time.widen(instant)))
-    }
-
     /// What the PWM interrupt converts at the peak `instant`.
     pub fn power_sample(&mut self, instant: Instant) -> Result<PowerSample, BenchError> {
         let at = self.time.widen(instant);

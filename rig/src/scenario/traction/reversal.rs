@@ -1,40 +1,37 @@
 //! Full power reversed in one step in square wave, released in deep weakening, and applied again.
 
 use super::script::{BEGIN_S, Script};
-use super::{Plan, Scenario};
+use super::{Options, Plan, Traction};
 use crate::analysis::{self, Figures};
 use crate::machine::Machine;
-use crate::options::RunOptions;
+use crate::options::finite;
 use crate::report::Page;
+use crate::scenario::Scenario;
+use crate::spectrum;
 use crate::trace::Recording;
 use crate::verdict::{Verdict, torque_bound, worst};
+use clap::Args;
+use serde::Serialize;
 
 /// At `--speed`: full power, full braking power, nothing, full power; each for 0.4 s, in steps.
-pub struct Reversal;
+#[derive(Clone, Copy, Debug, Args, Serialize)]
+pub struct Reversal {
+    /// Speed, in r/min.
+    #[arg(long, value_parser = finite, allow_negative_numbers = true)]
+    speed: Option<f64>,
+}
 
 const SPEED_RPM: f64 = 4000.0;
 const HOLD_S: f64 = 0.4;
 const SHARES: [f64; 4] = [1.0, -1.0, 0.0, 1.0];
 
-impl Scenario for Reversal {
-    fn name(&self) -> &'static str {
-        "reversal"
-    }
-
-    fn figure(&self) -> &'static str {
-        "figure 9d: square wave, here with its torque reversed"
-    }
-
-    fn own_options(&self) -> &'static [&'static str] {
-        &["speed"]
-    }
-
-    fn plan(&self, options: &RunOptions, machine: &Machine) -> Plan {
+impl Scenario<Traction> for Reversal {
+    fn plan(&self, _options: &Options, machine: &Machine) -> Plan {
         // The envelope makes full power of full torque.
         let most = machine.folder.parameters.max_torque_nm;
         let torque = SHARES.iter().enumerate().map(|(k, share)| (BEGIN_S + k as f64 * HOLD_S, share * most));
         Script {
-            speed: vec![(0.0, options.speed.unwrap_or(SPEED_RPM))],
+            speed: vec![(0.0, self.speed.unwrap_or(SPEED_RPM))],
             torque: torque.collect(),
             duration_s: BEGIN_S + SHARES.len() as f64 * HOLD_S,
             ..Script::default()
@@ -42,7 +39,7 @@ impl Scenario for Reversal {
         .plan()
     }
 
-    fn figures(&self, recording: &Recording, options: &RunOptions, machine: &Machine) -> Figures {
+    fn figures(&self, recording: &Recording, options: &Options, machine: &Machine) -> Figures {
         let at = |k: usize| BEGIN_S + k as f64 * HOLD_S;
         let steps = (0..SHARES.len()).map(|k| analysis::transition(recording, at(k), at(k + 1)));
         let holds = (0..SHARES.len()).filter(|k| SHARES[*k] != 0.0).map(|k| {
@@ -75,9 +72,9 @@ impl Scenario for Reversal {
         figures
     }
 
-    fn spectra(&self, _recording: &Recording) -> Vec<(String, (f64, f64))> {
+    fn plots_beside(&self, recording: &Recording, options: &Options, machine: &Machine, page: &mut Page) {
         let end_s = BEGIN_S + HOLD_S;
-        vec![("full power".to_owned(), (end_s - 0.5 * HOLD_S, end_s))]
+        spectrum::draw(page, "full power", recording, (end_s - 0.5 * HOLD_S, end_s), options, machine);
     }
 
     fn plots(&self, recording: &Recording, page: &mut Page) {

@@ -1,20 +1,23 @@
 //! From power-up to running and back to an empty link, by command, with commands on the way that are refused.
 
 use super::line::{self, within};
-use super::{Plan, Scenario};
+use super::{Options, Plan, Traction};
 use crate::analysis::{self, Figures};
 use crate::bench::LinePlan;
 use crate::machine::Machine;
-use crate::options::RunOptions;
 use crate::report::Page;
 use crate::rows::mean;
+use crate::scenario::Scenario;
 use crate::steps::held;
 use crate::trace::Recording;
 use crate::verdict::Verdict;
+use clap::Args;
+use serde::Serialize;
 use tractive::machine::Ratings;
 use tractive::operator::{Request, State};
 
 /// Power-up, self-test, precharge, main contactor, enable, run, coast, catch, stop, discharge.
+#[derive(Clone, Copy, Debug, Args, Serialize)]
 pub struct Precharge;
 
 const DURATION_S: f64 = 7.0;
@@ -52,25 +55,14 @@ fn request(t_s: f64, ratings: &Ratings) -> Request {
     }
 }
 
-impl Scenario for Precharge {
-    fn name(&self) -> &'static str {
-        "precharge"
-    }
-
-    fn figure(&self) -> &'static str {
-        "no figure: from power-up to running and back to an empty link"
-    }
-
-    fn plan(&self, _options: &RunOptions, _machine: &Machine) -> Plan {
-        Plan::operated(DURATION_S, SPEED.to_vec())
-    }
-
-    fn line(&self, _options: &RunOptions, machine: &Machine) -> Option<LinePlan> {
+impl Scenario<Traction> for Precharge {
+    fn plan(&self, _options: &Options, machine: &Machine) -> Plan {
         let ratings = &machine.tables.ratings;
-        Some(LinePlan::new(line::scaled(machine), Box::new(|t_s| request(t_s, ratings))))
+        let line = LinePlan::new(line::scaled(machine), Box::new(|t_s| request(t_s, ratings)));
+        Plan::operated(DURATION_S, SPEED.to_vec(), line)
     }
 
-    fn figures(&self, recording: &Recording, _options: &RunOptions, machine: &Machine) -> Figures {
+    fn figures(&self, recording: &Recording, _options: &Options, machine: &Machine) -> Figures {
         let mut figures = analysis::common(recording);
         let closes_s = recording.slots.iter().find(|slot| slot.status.switches.main).map(|slot| slot.t_s);
         let source_v = line::scaled(machine).source.voltage_v;

@@ -1,16 +1,24 @@
 //! Mode borders crossed at constant speed, by torque alone.
 
 use super::script::{BEGIN_S, Script};
-use super::{Plan, Scenario, switches};
+use super::{Options, Plan, Traction, switches};
 use crate::analysis::{self, Figures};
 use crate::machine::Machine;
-use crate::options::RunOptions;
+use crate::options::finite;
 use crate::report::Page;
+use crate::scenario::Scenario;
 use crate::trace::Recording;
+use clap::Args;
+use serde::Serialize;
 
 /// Torque up to the envelope and back, slowly: small steps that the slew limit smooths. At `--speed`, or at two speeds one after the
 /// other.
-pub struct ModeBorders;
+#[derive(Clone, Copy, Debug, Args, Serialize)]
+pub struct ModeBorders {
+    /// Speed, in r/min.
+    #[arg(long, value_parser = finite, allow_negative_numbers = true)]
+    speed: Option<f64>,
+}
 
 /// Where torque alone leads from 7 to 3 pulses and back, and where it leads from 7 by 3 into square wave and out of it.
 const SPEEDS_RPM: [f64; 2] = [1750.0, 1888.0];
@@ -23,22 +31,10 @@ const HOLD_S: f64 = 0.6;
 const SLOT_S: f64 = 2.0 * LEVELS as f64 * LEVEL_S + HOLD_S + 0.2;
 const RAMP_S: f64 = 0.3;
 
-impl Scenario for ModeBorders {
-    fn name(&self) -> &'static str {
-        "mode-borders"
-    }
-
-    fn figure(&self) -> &'static str {
-        "figure 9: changes of pulse pattern, here at constant speed by torque alone"
-    }
-
-    fn own_options(&self) -> &'static [&'static str] {
-        &["speed"]
-    }
-
-    fn plan(&self, options: &RunOptions, machine: &Machine) -> Plan {
+impl Scenario<Traction> for ModeBorders {
+    fn plan(&self, _options: &Options, machine: &Machine) -> Plan {
         let most = machine.folder.parameters.max_torque_nm;
-        let speeds = options.speed.map_or(SPEEDS_RPM.to_vec(), |speed_rpm| vec![speed_rpm]);
+        let speeds = self.speed.map_or(SPEEDS_RPM.to_vec(), |speed_rpm| vec![speed_rpm]);
         let mut script = Script { slew_limited: true, ..Script::default() };
         for (slot, speed_rpm) in speeds.iter().enumerate() {
             let begin_s = BEGIN_S + slot as f64 * (SLOT_S + RAMP_S);
@@ -54,7 +50,7 @@ impl Scenario for ModeBorders {
         script.plan()
     }
 
-    fn figures(&self, recording: &Recording, options: &RunOptions, _machine: &Machine) -> Figures {
+    fn figures(&self, recording: &Recording, options: &Options, _machine: &Machine) -> Figures {
         let mut figures = analysis::common(recording);
         let switches = analysis::mode_switches(recording);
         let verdicts = analysis::switch_verdicts(&switches, recording, options);

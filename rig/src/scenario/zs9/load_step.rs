@@ -1,17 +1,26 @@
 //! Motor 2's load steps while motor 1 goes on: the paper's figures 14 to 19.
 
-use super::{Plan, Scenario, free, rad_s, ramp};
+use super::{Options, Plan, Zs9, free, rad_s, ramp};
 use crate::analysis::Figures;
-use crate::options::RunOptions;
+use crate::machine::Machine;
+use crate::options::finite;
 use crate::report::Page;
 use crate::rows::mean;
+use crate::scenario::Scenario;
 use crate::zs9::figures;
 use crate::zs9::trace::{Recording, Row};
 use crate::zs9::{Orders, SeenMotors};
+use clap::Args;
+use serde::Serialize;
 use tractive::board::MotorDemand;
 
 /// Both at 1,000 r/min with 60 N·m; motor 2's load steps at 0.6 s.
-pub struct LoadStep;
+#[derive(Clone, Copy, Debug, Args, Serialize)]
+pub struct LoadStep {
+    /// By how much motor 2's load steps, in N·m, −500 to 500.
+    #[arg(long, default_value_t = 40.0, value_parser = load_step, allow_negative_numbers = true)]
+    step: f64,
+}
 
 const SPEED_RPM: f64 = 1000.0;
 const LOAD_NM: f64 = 60.0;
@@ -21,21 +30,9 @@ const LEAD_S: f64 = 0.6;
 /// Inertia of either motor, in kg·m².
 pub const INERTIA_KG_M2: f64 = 0.1;
 
-impl Scenario for LoadStep {
-    fn name(&self) -> &'static str {
-        "zs9-load-step"
-    }
-
-    fn title(&self) -> &'static str {
-        "figures 14 to 19: motor 2's load steps, motor 1 goes on"
-    }
-
-    fn own_options(&self) -> &'static [&'static str] {
-        &["step"]
-    }
-
-    fn plan(&self, options: &RunOptions) -> Plan {
-        let step_nm = options.zs9.step;
+impl Scenario<Zs9> for LoadStep {
+    fn plan(&self, _options: &Options, _machine: &Machine) -> Plan {
+        let step_nm = self.step;
         let operator = move |t_s: f64, _: SeenMotors| {
             // The drive finds the speeds first; then the loads come.
             let load_nm = LOAD_NM * ramp(t_s, -0.5, -0.4);
@@ -52,11 +49,13 @@ impl Scenario for LoadStep {
             speeds: [free(INERTIA_KG_M2), free(INERTIA_KG_M2)],
             from_rpm: [SPEED_RPM; 2],
             operator: Box::new(operator),
+            edges: true,
+            line: None,
         }
     }
 
-    fn figures(&self, recording: &Recording, options: &RunOptions) -> Figures {
-        let mut figures = figures::common(recording, options);
+    fn figures(&self, recording: &Recording, options: &Options, _machine: &Machine) -> Figures {
+        let mut figures = figures::common(recording);
         let (steady, after) =
             (figures::window(recording, 0.3, STEP_S), figures::window(recording, STEP_S, DURATION_S));
         let speed1 = mean(steady, |row| row.motors[0].speed_rpm);
@@ -71,7 +70,7 @@ impl Scenario for LoadStep {
         let back_s = outside.map_or(0.0, |row| row.t_s + step_s - STEP_S);
         figures.set("motor2_back_within_0p2_percent_ms", back_s * 1e3);
         figures.set("motor2_peak_torque_nm", figures::largest(after, |row| row.motors[1].torque_nm));
-        figures::link(&mut figures, after, options);
+        figures::link(&mut figures, after, options.own.uin);
         figures
     }
 
@@ -91,5 +90,12 @@ impl Scenario for LoadStep {
         plot(page, "17", "speed of motor 2", "r/min", &[("motor 2", |row| row.motors[1].speed_rpm)]);
         plot(page, "18", "speed of motor 1", "r/min", &[("motor 1", |row| row.motors[0].speed_rpm)]);
         figures::phases(page, "19", recording, (STEP_S - 0.03, STEP_S + 0.05));
+    }
+}
+
+fn load_step(text: &str) -> Result<f64, String> {
+    match finite(text) {
+        Ok(step) if step.abs() <= 500.0 => Ok(step),
+        _ => Err("must be a number from -500 to 500".to_owned()),
     }
 }

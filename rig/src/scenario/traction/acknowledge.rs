@@ -1,22 +1,30 @@
 //! A gate driver fails under torque: the fault, what is refused meanwhile, the acknowledge, and the machine caught again.
 
 use super::line::{self, within};
-use super::{Plan, Scenario};
+use super::{Options, Plan, Traction};
 use crate::analysis::{self, Figures};
 use crate::bench::LinePlan;
 use crate::machine::Machine;
-use crate::options::RunOptions;
+use crate::options::finite;
 use crate::report::Page;
 use crate::rows::mean;
+use crate::scenario::Scenario;
 use crate::steps::held;
 use crate::trace::Recording;
 use crate::verdict::{Verdict, worst};
+use clap::Args;
+use serde::Serialize;
 use tractive::machine::Ratings;
 use tractive::operator::Request;
 use tractive::protection::Fault;
 
 /// See the module. The run ends with exit code 1, because the drive has tripped.
-pub struct Acknowledge;
+#[derive(Clone, Copy, Debug, Args, Serialize)]
+pub struct Acknowledge {
+    /// Speed, in r/min.
+    #[arg(long, value_parser = finite, allow_negative_numbers = true)]
+    speed: Option<f64>,
+}
 
 const SPEED_RPM: f64 = 1_500.0;
 const FAILS_S: (f64, f64) = (1.0, 1.5);
@@ -54,34 +62,19 @@ fn request(t_s: f64, ratings: &Ratings) -> Request {
     }
 }
 
-impl Scenario for Acknowledge {
-    fn name(&self) -> &'static str {
-        "acknowledge"
-    }
-
-    fn figure(&self) -> &'static str {
-        "no figure: a gate driver fails, and the fault is acknowledged"
-    }
-
-    fn own_options(&self) -> &'static [&'static str] {
-        &["speed"]
-    }
-
-    fn plan(&self, options: &RunOptions, machine: &Machine) -> Plan {
+impl Scenario<Traction> for Acknowledge {
+    fn plan(&self, _options: &Options, machine: &Machine) -> Plan {
         let scale = machine.folder.parameters.rated_speed_rpm / 2_000.0;
-        Plan::operated(DURATION_S, vec![(0.0, options.speed.unwrap_or(SPEED_RPM * scale))])
-    }
-
-    fn line(&self, _options: &RunOptions, machine: &Machine) -> Option<LinePlan> {
         let ratings = &machine.tables.ratings;
-        Some(LinePlan {
+        let line = LinePlan {
             starts_charged: true,
             hardware: vec![(FAILS_S.0, FAILS_S.1, Fault::GateDriver)],
             ..LinePlan::new(line::scaled(machine), Box::new(|t_s| request(t_s, ratings)))
-        })
+        };
+        Plan::operated(DURATION_S, vec![(0.0, self.speed.unwrap_or(SPEED_RPM * scale))], line)
     }
 
-    fn figures(&self, recording: &Recording, _options: &RunOptions, machine: &Machine) -> Figures {
+    fn figures(&self, recording: &Recording, _options: &Options, machine: &Machine) -> Figures {
         let mut figures = analysis::common(recording);
         let found: Vec<_> = line::states(recording).iter().map(|entered| entered.state).collect();
         let named = recording.trip().is_some_and(|trip| trip.fault == Fault::GateDriver);

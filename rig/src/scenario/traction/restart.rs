@@ -1,15 +1,19 @@
 //! Coasting with the gates off, and flying restart.
 
 use super::script::{BEGIN_S, Script};
-use super::{Plan, Scenario};
+use super::{Options, Plan, Traction};
 use crate::analysis::{self, Catch, Figures};
 use crate::machine::Machine;
 use crate::options::RunOptions;
 use crate::report::Page;
+use crate::scenario::Scenario;
 use crate::trace::Recording;
 use crate::verdict::{Verdict, torque_bound, worst};
+use clap::Args;
+use serde::Serialize;
 
 /// At each speed: coast, catch the machine, half of the envelope's torque, release, coast.
+#[derive(Clone, Copy, Debug, Args, Serialize)]
 pub struct Restart;
 
 const SPEEDS_RPM: [f64; 9] = [0.0, 300.0, 800.0, 1050.0, 1500.0, 2000.0, 3000.0, 4500.0, 6000.0];
@@ -23,16 +27,8 @@ fn begins_s(slot: usize) -> f64 {
     BEGIN_S + slot as f64 * SLOT_S
 }
 
-impl Scenario for Restart {
-    fn name(&self) -> &'static str {
-        "restart"
-    }
-
-    fn figure(&self) -> &'static str {
-        "figure 9: the modes, here each caught from coasting"
-    }
-
-    fn plan(&self, _options: &RunOptions, machine: &Machine) -> Plan {
+impl Scenario<Traction> for Restart {
+    fn plan(&self, _options: &Options, machine: &Machine) -> Plan {
         let mut script = Script {
             enable: vec![(0.0, false)],
             slew_limited: true,
@@ -51,7 +47,7 @@ impl Scenario for Restart {
         script.plan()
     }
 
-    fn figures(&self, recording: &Recording, options: &RunOptions, machine: &Machine) -> Figures {
+    fn figures(&self, recording: &Recording, options: &Options, machine: &Machine) -> Figures {
         let catches = SPEEDS_RPM.iter().enumerate().map(|(slot, _)| {
             let driven = (begins_s(slot) + COAST_S, begins_s(slot) + SLOT_S - RELEASE_S);
             analysis::catch(recording, driven, machine.folder.parameters.max_current_a)

@@ -1,18 +1,31 @@
 //! One operating point in steady state: distortion and torque ripple beside what the pulses allow.
 
 use super::script::Script;
-use super::{Plan, Scenario};
+use super::{Options, Plan, Traction, TractionOptions};
 use crate::analysis::{self, Figures};
 use crate::bound;
 use crate::distortion::{self, Distortion};
 use crate::machine::Machine;
+use crate::options::finite;
 use crate::options::{On, RunOptions};
 use crate::report::Page;
+use crate::scenario::{self, Scenario};
+use crate::spectrum;
 use crate::trace::Recording;
 use crate::verdict::Verdict;
+use clap::Args;
+use serde::Serialize;
 
 /// `--speed` and `--torque`.
-pub struct Steady;
+#[derive(Clone, Copy, Debug, Args, Serialize)]
+pub struct Steady {
+    /// Speed, in r/min.
+    #[arg(long, value_parser = finite, allow_negative_numbers = true)]
+    speed: Option<f64>,
+    /// Torque, in N·m; default the machine's largest.
+    #[arg(long, value_parser = finite, allow_negative_numbers = true)]
+    torque: Option<f64>,
+}
 
 const SPEED_RPM: f64 = 1000.0;
 /// Speed in r/min and torque in N·m at which the harmonics of the dead time are judged.
@@ -20,26 +33,9 @@ const DEAD_TIME_POINT: (f64, f64) = (200.0, 100.0);
 const SETTLE_S: f64 = 0.6;
 const MEASURE_S: f64 = 0.5;
 
-fn point(options: &RunOptions, machine: &Machine) -> (f64, f64) {
-    let torque_nm = options.torque.unwrap_or(machine.folder.parameters.max_torque_nm);
-    (options.speed.unwrap_or(SPEED_RPM), torque_nm)
-}
-
-impl Scenario for Steady {
-    fn name(&self) -> &'static str {
-        "steady"
-    }
-
-    fn figure(&self) -> &'static str {
-        "figures 6 and 7: current and spectrum of the mode in steady state"
-    }
-
-    fn own_options(&self) -> &'static [&'static str] {
-        &["speed", "torque"]
-    }
-
-    fn plan(&self, options: &RunOptions, machine: &Machine) -> Plan {
-        let (speed_rpm, torque_nm) = point(options, machine);
+impl Scenario<Traction> for Steady {
+    fn plan(&self, _options: &Options, machine: &Machine) -> Plan {
+        let (speed_rpm, torque_nm) = self.point(machine);
         Script {
             speed: vec![(0.0, speed_rpm)],
             torque: vec![(0.0, torque_nm)],
@@ -50,8 +46,8 @@ impl Scenario for Steady {
         .plan()
     }
 
-    fn figures(&self, recording: &Recording, options: &RunOptions, machine: &Machine) -> Figures {
-        let (_, torque_nm) = point(options, machine);
+    fn figures(&self, recording: &Recording, options: &Options, machine: &Machine) -> Figures {
+        let (_, torque_nm) = self.point(machine);
         let window = (SETTLE_S, SETTLE_S + MEASURE_S);
         let mut figures = analysis::common(recording);
         let steady = analysis::steady_point(recording, window, torque_nm, &machine.folder);
@@ -61,9 +57,9 @@ impl Scenario for Steady {
         let mut verdicts = bound::verdicts(&beside, options).to_vec();
         if options.dead_time_us > 0.0 {
             let judged =
-                !options.uncompensated && (steady.speed_rpm.abs(), torque_nm.abs()) == DEAD_TIME_POINT;
+                !options.own.uncompensated && (steady.speed_rpm.abs(), torque_nm.abs()) == DEAD_TIME_POINT;
             verdicts.extend(dead_time_verdicts(&measured, if judged { 0.5 } else { f64::INFINITY }, ""));
-            if !options.uncompensated
+            if !options.own.uncompensated
                 && let Ok(without) = self.without_compensation(window, options, machine)
             {
                 verdicts.extend(dead_time_verdicts(&without, f64::INFINITY, ", without compensation"));
@@ -77,12 +73,13 @@ impl Scenario for Steady {
     }
 
     /// The pulses' edges fall where they like between the samples: coarser ones would show more or less ripple than there is.
-    fn trace_step_s(&self) -> f64 {
+    fn trace_step_s(&self, _own: &TractionOptions) -> f64 {
         5e-6
     }
 
-    fn spectra(&self, _recording: &Recording) -> Vec<(String, (f64, f64))> {
-        vec![("steady state".to_owned(), (SETTLE_S, SETTLE_S + MEASURE_S))]
+    fn plots_beside(&self, recording: &Recording, options: &Options, machine: &Machine, page: &mut Page) {
+        let window = (SETTLE_S, SETTLE_S + MEASURE_S);
+        spectrum::draw(page, "steady state", recording, window, options, machine);
     }
 
     fn plots(&self, recording: &Recording, page: &mut Page) {
@@ -100,15 +97,22 @@ impl Scenario for Steady {
 }
 
 impl Steady {
+    /// Speed in r/min and torque in N·m.
+    fn point(&self, machine: &Machine) -> (f64, f64) {
+        let torque_nm = self.torque.unwrap_or(machine.folder.parameters.max_torque_nm);
+        (self.speed.unwrap_or(SPEED_RPM), torque_nm)
+    }
+
     /// The same on the host with nothing that compensates the dead time.
     fn without_compensation(
         &self,
         window: (f64, f64),
-        options: &RunOptions,
+        options: &Options,
         machine: &Machine,
     ) -> anyhow::Result<Distortion> {
-        let options = RunOptions { on: On::Host, uncompensated: true, ..options.clone() };
-        let recording = super::drive(self, &options, machine)?;
+        let run = RunOptions { on: On::Host, ..options.run.clone() };
+        let own = TractionOptions { uncompensated: true, ..options.own.clone() };
+        let recording = scenario::drive("steady", self, &Options { run, own }, machine)?;
         Ok(distortion::of_recording(&recording, window, &machine.folder))
     }
 }

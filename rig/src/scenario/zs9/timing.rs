@@ -1,16 +1,20 @@
 //! A short drive of both motors for `cargo xtask timing`: every instruction of the interrupts is logged there.
 
-use super::{Plan, Scenario, rad_s};
+use super::{Options, Plan, Zs9, rad_s};
 use crate::analysis::Figures;
-use crate::options::RunOptions;
+use crate::machine::Machine;
 use crate::plant::SpeedSource;
 use crate::report::Page;
+use crate::scenario::Scenario;
 use crate::zs9::figures;
 use crate::zs9::trace::Recording;
 use crate::zs9::{Orders, SeenMotors};
+use clap::Args;
+use serde::Serialize;
 use tractive::board::MotorDemand;
 
 /// Full torque by the speed loops at prescribed speeds: motoring at low and at high speed, then braking from there.
+#[derive(Clone, Copy, Debug, Args, Serialize)]
 pub struct Timing;
 
 /// The motors turn opposite ways: time in s, r/min. A quicker ramp would count as a lost angle.
@@ -21,16 +25,8 @@ const LEAD_S: f64 = 0.03;
 /// A speed out of reach, in r/min: the loop asks for all the torque there is.
 const FAR_RPM: f64 = 20_000.0;
 
-impl Scenario for Timing {
-    fn name(&self) -> &'static str {
-        "zs9-timing"
-    }
-
-    fn title(&self) -> &'static str {
-        "no figure: motoring, weakening and braking in a tenth of a second, for `cargo xtask timing`"
-    }
-
-    fn plan(&self, _options: &RunOptions) -> Plan {
+impl Scenario<Zs9> for Timing {
+    fn plan(&self, _options: &Options, _machine: &Machine) -> Plan {
         let operator = |t_s: f64, _: SeenMotors| {
             let towards = if t_s < BRAKES_FROM_S { FAR_RPM } else { -FAR_RPM };
             let wanted = |rpm: f64| MotorDemand::Speed(rad_s(rpm) as f32);
@@ -46,11 +42,13 @@ impl Scenario for Timing {
             speeds: [turning(1.0), turning(-1.0)],
             from_rpm: [0.0; 2],
             operator: Box::new(operator),
+            edges: true,
+            line: None,
         }
     }
 
-    fn figures(&self, recording: &Recording, options: &RunOptions) -> Figures {
-        figures::common(recording, options)
+    fn figures(&self, recording: &Recording, _options: &Options, _machine: &Machine) -> Figures {
+        figures::common(recording)
     }
 
     fn plots(&self, recording: &Recording, page: &mut Page) {

@@ -2,34 +2,30 @@
 
 use super::load_steps::verdicts;
 use super::script::{BEGIN_S, Script};
-use super::{Plan, Scenario};
+use super::{Options, Plan, Traction};
 use crate::analysis::{self, Figures};
 use crate::machine::Machine;
-use crate::options::RunOptions;
+use crate::options::finite;
 use crate::report::Page;
+use crate::scenario::Scenario;
 use crate::trace::Recording;
+use clap::Args;
+use serde::Serialize;
 
 /// 0 → full torque → 0 at `--speed`.
-pub struct FullStep;
+#[derive(Clone, Copy, Debug, Args, Serialize)]
+pub struct FullStep {
+    /// Speed, in r/min.
+    #[arg(long, value_parser = finite, allow_negative_numbers = true)]
+    speed: Option<f64>,
+}
 
 const SPEED_RPM: f64 = 200.0;
 const HOLD_S: f64 = 0.1;
 
-impl Scenario for FullStep {
-    fn name(&self) -> &'static str {
-        "full-step"
-    }
-
-    fn figure(&self) -> &'static str {
-        "figure 8: load steps, here all of them in one"
-    }
-
-    fn own_options(&self) -> &'static [&'static str] {
-        &["speed"]
-    }
-
-    fn plan(&self, options: &RunOptions, machine: &Machine) -> Plan {
-        let speed_rpm = options.speed.unwrap_or(SPEED_RPM);
+impl Scenario<Traction> for FullStep {
+    fn plan(&self, _options: &Options, machine: &Machine) -> Plan {
+        let speed_rpm = self.speed.unwrap_or(SPEED_RPM);
         Script {
             speed: vec![(0.0, speed_rpm)],
             torque: vec![(BEGIN_S, machine.envelope_nm(speed_rpm)), (BEGIN_S + HOLD_S, 0.0)],
@@ -39,8 +35,8 @@ impl Scenario for FullStep {
         .plan()
     }
 
-    fn figures(&self, recording: &Recording, options: &RunOptions, machine: &Machine) -> Figures {
-        let most = machine.envelope_nm(options.speed.unwrap_or(SPEED_RPM));
+    fn figures(&self, recording: &Recording, options: &Options, machine: &Machine) -> Figures {
+        let most = machine.envelope_nm(self.speed.unwrap_or(SPEED_RPM));
         let steps = [(BEGIN_S, 0.0, most), (BEGIN_S + HOLD_S, most, 0.0)].map(|(at_s, from_nm, to_nm)| {
             let step = analysis::Step { at_s, from_nm, to_nm, until_s: at_s + HOLD_S };
             analysis::step_response(recording, &step)

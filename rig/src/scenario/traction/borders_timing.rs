@@ -2,11 +2,16 @@
 //! control executes while a mode changes and no longer.
 
 use super::script::Script;
-use super::{Plan, Scenario};
+use super::{Options, Plan, Traction};
 use crate::machine::Machine;
-use crate::options::RunOptions;
+use crate::report::Page;
+use crate::scenario::Scenario;
+use crate::trace::Recording;
+use clap::Args;
+use serde::Serialize;
 
 /// Full torque, at speeds that swing across a border, and an enable that comes and goes.
+#[derive(Clone, Copy, Debug, Args, Serialize)]
 pub struct BordersTiming;
 
 /// Where the mode has changed going up and down at full torque, with a little room, in r/min.
@@ -23,16 +28,8 @@ const FIRST_S: f64 = 0.0403;
 const PAUSES: usize = 24;
 const PAUSE_S: f64 = 0.0025;
 
-impl Scenario for BordersTiming {
-    fn name(&self) -> &'static str {
-        "borders-timing"
-    }
-
-    fn figure(&self) -> &'static str {
-        "no figure: modes that change again and again, for `cargo xtask test`"
-    }
-
-    fn plan(&self, _options: &RunOptions, machine: &Machine) -> Plan {
+impl Scenario<Traction> for BordersTiming {
+    fn plan(&self, _options: &Options, machine: &Machine) -> Plan {
         let (first_rpm, _) = SWINGS_RPM[0];
         let mut speed = vec![(0.0, first_rpm)];
         let enable = (0..2 * PAUSES).map(|k| (FIRST_S + k as f64 * PAUSE_S, k % 2 == 1)).collect();
@@ -53,5 +50,9 @@ impl Scenario for BordersTiming {
             ..Script::default()
         }
         .plan()
+    }
+
+    fn plots(&self, recording: &Recording, page: &mut Page) {
+        page.overview(recording);
     }
 }

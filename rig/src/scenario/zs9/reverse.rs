@@ -1,17 +1,25 @@
 //! The motors turn opposite ways: the paper's figures 20 to 23.
 
-use super::{Plan, Scenario, free, rad_s, ramp};
+use super::{Options, Plan, Zs9, free, rad_s, ramp};
 use crate::analysis::Figures;
-use crate::options::RunOptions;
+use crate::machine::Machine;
 use crate::report::Page;
 use crate::rows::mean;
+use crate::scenario::Scenario;
 use crate::zs9::figures;
 use crate::zs9::trace::{Recording, Row};
 use crate::zs9::{Orders, SeenMotors};
+use clap::Args;
+use serde::Serialize;
 use tractive::board::MotorDemand;
 
 /// Both at 800 r/min; motor 2 goes to −800 r/min from 0.5 s to 1.5 s.
-pub struct Reverse;
+#[derive(Clone, Copy, Debug, Args, Serialize)]
+pub struct Reverse {
+    /// Motor 2 keeps its direction, for comparison.
+    #[arg(long)]
+    no_reverse: bool,
+}
 
 const SPEED_RPM: f64 = 800.0;
 /// Load at that speed, in N·m; it goes with the speed and its sign.
@@ -26,21 +34,9 @@ fn wanted_rpm(t_s: f64, reverses: bool) -> [f64; 2] {
     [SPEED_RPM, SPEED_RPM * (1.0 - turned)]
 }
 
-impl Scenario for Reverse {
-    fn name(&self) -> &'static str {
-        "zs9-reverse"
-    }
-
-    fn title(&self) -> &'static str {
-        "figures 20 to 23: motor 2 reverses, motor 1 goes on"
-    }
-
-    fn own_options(&self) -> &'static [&'static str] {
-        &["no_reverse"]
-    }
-
-    fn plan(&self, options: &RunOptions) -> Plan {
-        let reverses = !options.zs9.no_reverse;
+impl Scenario<Zs9> for Reverse {
+    fn plan(&self, _options: &Options, _machine: &Machine) -> Plan {
+        let reverses = !self.no_reverse;
         let operator = move |t_s: f64, speeds: SeenMotors| {
             let loaded = ramp(t_s, -0.5, -0.4);
             Orders {
@@ -55,12 +51,14 @@ impl Scenario for Reverse {
             speeds: [free(super::load_step::INERTIA_KG_M2), free(super::load_step::INERTIA_KG_M2)],
             from_rpm: [SPEED_RPM; 2],
             operator: Box::new(operator),
+            edges: true,
+            line: None,
         }
     }
 
-    fn figures(&self, recording: &Recording, options: &RunOptions) -> Figures {
-        let mut figures = figures::common(recording, options);
-        let reverses = !options.zs9.no_reverse;
+    fn figures(&self, recording: &Recording, options: &Options, _machine: &Machine) -> Figures {
+        let mut figures = figures::common(recording);
+        let reverses = !self.no_reverse;
         let half_s = 0.5 * figures::step_s(recording);
         let error = |k: usize| {
             let off = |row: &Row| {
@@ -74,7 +72,7 @@ impl Scenario for Reverse {
         let last = figures::window(recording, DURATION_S - 0.1, DURATION_S);
         figures.set("motor1_speed_rpm", mean(last, |row| row.motors[0].speed_rpm));
         figures.set("motor2_speed_rpm", mean(last, |row| row.motors[1].speed_rpm));
-        figures::link(&mut figures, &recording.rows, options);
+        figures::link(&mut figures, &recording.rows, options.own.uin);
         figures
     }
 

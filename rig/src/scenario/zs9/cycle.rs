@@ -1,18 +1,31 @@
 //! The whole traction cycle under torque control: the paper's figures 24 to 36.
 
-use super::{Plan, Scenario, free, rad_s};
+use super::{Options, Plan, Zs9, Zs9Options, free, rad_s};
 use crate::analysis::Figures;
-use crate::options::RunOptions;
+use crate::machine::Machine;
+use crate::options::positive;
 use crate::plant::zs9::ZNetwork;
 use crate::report::Page;
+use crate::scenario::Scenario;
 use crate::zs9::figures;
 use crate::zs9::trace::{Recording, Row};
 use crate::zs9::{Orders, SeenMotors};
+use clap::Args;
+use serde::Serialize;
 use tractive::board::MotorDemand;
 use tractive::control::Demand;
 
 /// 10 to 1,300 r/min at full torque, a cruise there, and back.
-pub struct Cycle;
+#[derive(Clone, Copy, Debug, Args, Serialize)]
+pub struct Cycle {
+    /// How long it cruises, in s, up to 3600.
+    #[arg(long, default_value_t = 20.0, value_parser = cruise, allow_negative_numbers = true)]
+    cruise: f64,
+    /// Write edges.csv.
+    #[serde(skip)]
+    #[arg(long)]
+    edges: bool,
+}
 
 const LOW_RPM: f64 = 10.0;
 const HIGH_RPM: f64 = 1300.0;
@@ -61,29 +74,13 @@ fn orders(phase: &mut Phase, t_s: f64, rpm: f64, cruise_s: f64) -> (f64, f64) {
     }
 }
 
-impl Scenario for Cycle {
-    fn name(&self) -> &'static str {
-        "zs9-cycle"
-    }
-
-    fn title(&self) -> &'static str {
-        "figures 24 to 36: the whole cycle, full torque, constant power, cruise, brake"
-    }
-
-    fn trace_step_s(&self, _options: &RunOptions) -> f64 {
+impl Scenario<Zs9> for Cycle {
+    fn trace_step_s(&self, _own: &Zs9Options) -> f64 {
         1e-3
     }
 
-    fn edges(&self, options: &RunOptions) -> bool {
-        options.zs9.edges
-    }
-
-    fn own_options(&self) -> &'static [&'static str] {
-        &["edges", "cruise"]
-    }
-
-    fn plan(&self, options: &RunOptions) -> Plan {
-        let cruise_s = options.zs9.cruise;
+    fn plan(&self, _options: &Options, _machine: &Machine) -> Plan {
+        let cruise_s = self.cruise;
         let mut phases = [Phase::Before; 2];
         let operator = move |t_s: f64, speeds: SeenMotors| {
             let [one, two] = [0, 1].map(|k| orders(&mut phases[k], t_s, speeds[k], cruise_s));
@@ -98,11 +95,13 @@ impl Scenario for Cycle {
             speeds: [free(INERTIA_KG_M2), free(INERTIA_KG_M2)],
             from_rpm: [LOW_RPM; 2],
             operator: Box::new(operator),
+            edges: self.edges,
+            line: None,
         }
     }
 
-    fn figures(&self, recording: &Recording, options: &RunOptions) -> Figures {
-        let mut figures = figures::common(recording, options);
+    fn figures(&self, recording: &Recording, options: &Options, _machine: &Machine) -> Figures {
+        let mut figures = figures::common(recording);
         let rows = &recording.rows;
         let reached = rows.iter().position(|row| row.motors[0].speed_rpm >= HIGH_RPM - 0.5);
         figures.set("accelerated_s", reached.map(|k| rows[k].t_s));
@@ -126,9 +125,9 @@ impl Scenario for Cycle {
             figures.set("returned_percent", returned_j / (had_j - left_j) * 100.0);
         }
         figures.set("end_speed_rpm", rows.last().map(|row| row.motors[0].speed_rpm));
-        figures::link(&mut figures, rows, options);
+        figures::link(&mut figures, rows, options.own.uin);
         let source_v = super::SOURCE_V;
-        let wanted_v = 0.5 * (options.zs9.uin + options.udc.unwrap_or(source_v));
+        let wanted_v = 0.5 * (options.own.uin + options.udc.unwrap_or(source_v));
         let highest_v = figures::largest(rows, |row| row.capacitor_v);
         figures.set("capacitor_overshoot_percent", (highest_v / wanted_v - 1.0) * 100.0);
         figures.set("power_residual_percent", residual_percent(rows));
@@ -185,5 +184,12 @@ fn residual_percent(rows: &[Row]) -> f64 {
             (taken_j - explained_j).abs() / through_j * 100.0
         }
         _ => 0.0,
+    }
+}
+
+fn cruise(text: &str) -> Result<f64, String> {
+    match positive(text) {
+        Ok(seconds) if seconds <= 3600.0 => Ok(seconds),
+        _ => Err("must be a number above 0, at most 3600".to_owned()),
     }
 }

@@ -1,17 +1,22 @@
 //! Torque accuracy, efficiency and current at the characteristic points: the paper's figure 10.
 
-use super::{LEAD_S, Plan, Scenario};
+use super::{LEAD_S, Options, Plan, Traction};
 use crate::analysis::{self, Figures, SteadyPoint};
 use crate::bound;
 use crate::machine::Machine;
 use crate::mtpa_methods;
 use crate::options::RunOptions;
 use crate::report::Page;
+use crate::scenario::Scenario;
 use crate::trace::Recording;
 use crate::verdict::{Verdict, torque_bound, worst};
+use crate::{figures, spectrum};
+use clap::Args;
+use serde::Serialize;
 use tractive::control::Demand;
 
 /// The points one after another in one run: ramp, settle, measure.
+#[derive(Clone, Copy, Debug, Args, Serialize)]
 pub struct Characteristic;
 
 /// Speed in r/min and torque in N·m.
@@ -52,7 +57,7 @@ fn slots() -> Vec<Slot> {
 }
 
 /// What was measured at each point.
-pub fn points(recording: &Recording, machine: &Machine) -> Vec<SteadyPoint> {
+fn points(recording: &Recording, machine: &Machine) -> Vec<SteadyPoint> {
     let point = |slot: Slot| {
         let window = (slot.ends_s - MEASURE_S, slot.ends_s);
         analysis::steady_point(recording, window, slot.torque_nm, &machine.folder)
@@ -60,16 +65,8 @@ pub fn points(recording: &Recording, machine: &Machine) -> Vec<SteadyPoint> {
     slots().into_iter().map(point).collect()
 }
 
-impl Scenario for Characteristic {
-    fn name(&self) -> &'static str {
-        "characteristic"
-    }
-
-    fn figure(&self) -> &'static str {
-        "figure 10: torque accuracy and efficiency at the characteristic points"
-    }
-
-    fn plan(&self, _options: &RunOptions, _machine: &Machine) -> Plan {
+impl Scenario<Traction> for Characteristic {
+    fn plan(&self, _options: &Options, _machine: &Machine) -> Plan {
         let slots = slots();
         let speed =
             slots.iter().flat_map(|slot| [(slot.steady_s, slot.speed_rpm), (slot.ends_s, slot.speed_rpm)]);
@@ -80,10 +77,10 @@ impl Scenario for Characteristic {
             let torque_nm = slot.map_or(0.0, |slot| slot.torque_nm as f32);
             (Demand { torque_nm, slew_limited: true }, true)
         };
-        Plan { lead_s: LEAD_S, duration_s, speed, link: Vec::new(), operator: Box::new(operator) }
+        Plan::driven(LEAD_S, duration_s, speed, operator)
     }
 
-    fn figures(&self, recording: &Recording, options: &RunOptions, machine: &Machine) -> Figures {
+    fn figures(&self, recording: &Recording, options: &Options, machine: &Machine) -> Figures {
         let points = points(recording, machine);
         let beside = slots().into_iter().map(|slot| {
             let window = (slot.ends_s - MEASURE_S, slot.ends_s);
@@ -102,12 +99,13 @@ impl Scenario for Characteristic {
         figures
     }
 
-    fn spectra(&self, _recording: &Recording) -> Vec<(String, (f64, f64))> {
-        let window = |slot: &Slot| (slot.ends_s - MEASURE_S, slot.ends_s);
-        slots()
-            .iter()
-            .map(|slot| (format!("{} r/min, {} N·m", slot.speed_rpm, slot.torque_nm), window(slot)))
-            .collect()
+    fn plots_beside(&self, recording: &Recording, options: &Options, machine: &Machine, page: &mut Page) {
+        for slot in slots() {
+            let title = format!("{} r/min, {} N·m", slot.speed_rpm, slot.torque_nm);
+            let window = (slot.ends_s - MEASURE_S, slot.ends_s);
+            spectrum::draw(page, &title, recording, window, options, machine);
+        }
+        figures::draw(page, recording, &points(recording, machine), machine);
     }
 
     fn plots(&self, recording: &Recording, page: &mut Page) {

@@ -1,15 +1,19 @@
 //! Load steps at 200 r/min: the paper's figure 8.
 
-use super::{LEAD_S, Plan, Scenario};
+use super::{LEAD_S, Options, Plan, Traction};
 use crate::analysis::{self, Figures, StepResponse};
 use crate::machine::Machine;
 use crate::options::RunOptions;
 use crate::report::Page;
+use crate::scenario::Scenario;
 use crate::trace::Recording;
 use crate::verdict::{Verdict, bound, torque_bound, worst};
+use clap::Args;
+use serde::Serialize;
 use tractive::control::Demand;
 
 /// 0 → 200 → … → 1,235 N·m and back, 100 ms each.
+#[derive(Clone, Copy, Debug, Args, Serialize)]
 pub struct LoadSteps;
 
 const SPEED_RPM: f64 = 200.0;
@@ -23,33 +27,19 @@ fn levels_nm(machine: &Machine) -> [f64; 13] {
     LEVELS_NM.map(|level| level * scale)
 }
 
-impl Scenario for LoadSteps {
-    fn name(&self) -> &'static str {
-        "load-steps"
-    }
-
-    fn figure(&self) -> &'static str {
-        "figure 8: load steps at 200 r/min"
-    }
-
-    fn plan(&self, _options: &RunOptions, machine: &Machine) -> Plan {
+impl Scenario<Traction> for LoadSteps {
+    fn plan(&self, _options: &Options, machine: &Machine) -> Plan {
         let levels_nm = levels_nm(machine);
         let level_nm = move |t_s: f64| {
             let index = (t_s / STEP_S).max(0.0) as usize;
             levels_nm[index.min(levels_nm.len() - 1)]
         };
-        Plan {
-            lead_s: LEAD_S,
-            duration_s: STEP_S * LEVELS_NM.len() as f64,
-            speed: vec![(0.0, SPEED_RPM)],
-            link: Vec::new(),
-            operator: Box::new(move |t_s: f64| {
-                (Demand { torque_nm: level_nm(t_s + 1e-9) as f32, slew_limited: false }, true)
-            }),
-        }
+        let operator =
+            move |t_s: f64| (Demand { torque_nm: level_nm(t_s + 1e-9) as f32, slew_limited: false }, true);
+        Plan::driven(LEAD_S, STEP_S * LEVELS_NM.len() as f64, vec![(0.0, SPEED_RPM)], operator)
     }
 
-    fn figures(&self, recording: &Recording, options: &RunOptions, machine: &Machine) -> Figures {
+    fn figures(&self, recording: &Recording, options: &Options, machine: &Machine) -> Figures {
         let levels_nm = levels_nm(machine);
         let steps = (1..LEVELS_NM.len()).map(|index| analysis::Step {
             at_s: index as f64 * STEP_S,

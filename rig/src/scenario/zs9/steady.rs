@@ -1,19 +1,23 @@
 //! Harmonics in steady state: what the schemes of the nine-switch modulator differ in.
 
-use super::{Plan, Scenario, ramp};
+use super::{Options, Plan, Zs9, Zs9Options, ramp};
 use crate::analysis::Figures;
-use crate::options::RunOptions;
+use crate::machine::Machine;
 use crate::plant::SpeedSource;
 use crate::report::Page;
 use crate::rows::mean;
+use crate::scenario::Scenario;
 use crate::zs9::figures;
 use crate::zs9::patterns;
 use crate::zs9::trace::Recording;
 use crate::zs9::{Orders, SeenMotors};
+use clap::Args;
+use serde::Serialize;
 use tractive::board::MotorDemand;
 use tractive::control::Demand;
 
 /// 60 N·m each at prescribed speeds.
+#[derive(Clone, Copy, Debug, Args, Serialize)]
 pub struct Steady;
 
 /// Speeds of the upper and the lower motor, in r/min: 20 and 14 periods of the currents in 0.3 s.
@@ -23,20 +27,12 @@ const TORQUE_NM: f64 = 60.0;
 const DURATION_S: f64 = 0.3;
 const LEAD_S: f64 = 0.5;
 
-impl Scenario for Steady {
-    fn name(&self) -> &'static str {
-        "zs9-steady"
-    }
-
-    fn title(&self) -> &'static str {
-        "table 1: harmonics of both motors' currents by scheme"
-    }
-
-    fn trace_step_s(&self, _options: &RunOptions) -> f64 {
+impl Scenario<Zs9> for Steady {
+    fn trace_step_s(&self, _own: &Zs9Options) -> f64 {
         1e-6
     }
 
-    fn plan(&self, _options: &RunOptions) -> Plan {
+    fn plan(&self, _options: &Options, _machine: &Machine) -> Plan {
         let operator = |t_s: f64, _: SeenMotors| {
             let torque_nm = (TORQUE_NM * ramp(t_s, -0.45, -0.35)) as f32;
             Orders {
@@ -51,11 +47,13 @@ impl Scenario for Steady {
             speeds: SPEEDS_RPM.map(|rpm| SpeedSource::profile(vec![(0.0, rpm)])),
             from_rpm: SPEEDS_RPM,
             operator: Box::new(operator),
+            edges: true,
+            line: None,
         }
     }
 
-    fn figures(&self, recording: &Recording, options: &RunOptions) -> Figures {
-        let mut figures = figures::common(recording, options);
+    fn figures(&self, recording: &Recording, options: &Options, _machine: &Machine) -> Figures {
+        let mut figures = figures::common(recording);
         for (k, name) in ["thd1_percent", "thd2_percent"].into_iter().enumerate() {
             let cycles = SPEEDS_RPM[k] / 60.0 * POLE_PAIRS * DURATION_S;
             figures
@@ -67,7 +65,7 @@ impl Scenario for Steady {
         let currents = || recording.rows.iter().map(|row| row.inductor_a);
         let (low, high) = currents().fold((f64::MAX, f64::MIN), |(low, high), i| (low.min(i), high.max(i)));
         figures.set("inductor_ripple_a", high - low);
-        figures::link(&mut figures, &recording.rows, options);
+        figures::link(&mut figures, &recording.rows, options.own.uin);
         figures
     }
 

@@ -2,21 +2,28 @@
 //! is folded back; then the source takes energy back and all of the torque returns.
 
 use super::line::{self, within};
-use super::{Plan, Scenario};
+use super::{Options, Plan, Traction};
 use crate::analysis::{self, Figures};
 use crate::bench::LinePlan;
 use crate::machine::Machine;
-use crate::options::RunOptions;
+use crate::options::finite;
 use crate::report::Page;
 use crate::rows::mean;
+use crate::scenario::Scenario;
 use crate::trace::{Recording, Row};
 use crate::verdict::{Verdict, worst};
+use clap::Args;
 use serde::Serialize;
 use tractive::machine::Ratings;
 use tractive::operator::Request;
 
 /// See the module.
-pub struct Chopper;
+#[derive(Clone, Copy, Debug, Args, Serialize)]
+pub struct Chopper {
+    /// Speed, in r/min.
+    #[arg(long, value_parser = finite, allow_negative_numbers = true)]
+    speed: Option<f64>,
+}
 
 const ENABLE: (f64, f64) = (0.5, 4.4);
 const BRAKE: (f64, f64) = (0.7, 4.0);
@@ -83,22 +90,10 @@ fn stretches(recording: &Recording) -> Vec<Stretch> {
         .collect()
 }
 
-impl Scenario for Chopper {
-    fn name(&self) -> &'static str {
-        "chopper"
-    }
-
-    fn figure(&self) -> &'static str {
-        "no figure: full braking into a link that cannot take the energy"
-    }
-
-    fn own_options(&self) -> &'static [&'static str] {
-        &["speed"]
-    }
-
-    fn plan(&self, options: &RunOptions, machine: &Machine) -> Plan {
+impl Scenario<Traction> for Chopper {
+    fn plan(&self, _options: &Options, machine: &Machine) -> Plan {
         let scale = machine.folder.parameters.rated_speed_rpm / 2_000.0;
-        let fast = options.speed.unwrap_or(FAST_RPM * scale);
+        let fast = self.speed.unwrap_or(FAST_RPM * scale);
         let slow = fast * SLOW_RPM / FAST_RPM;
         let speed = vec![
             (1.0, fast),
@@ -109,22 +104,19 @@ impl Scenario for Chopper {
             (BRAKE.1, slow),
             (DURATION_S, slow),
         ];
-        Plan::operated(DURATION_S, speed)
-    }
-
-    fn line(&self, _options: &RunOptions, machine: &Machine) -> Option<LinePlan> {
         let ratings = &machine.tables.ratings;
         let link = line::scaled(machine);
         let ohm = link.chopper_ohm;
-        Some(LinePlan {
+        let line = LinePlan {
             starts_charged: true,
             chopper_ohm: vec![(HALF_S, 2.0 * ohm), (NONE_S, LOST * ohm)],
             reversible: vec![(TAKES_S, true)],
             ..LinePlan::new(link, Box::new(|t_s| request(t_s, ratings)))
-        })
+        };
+        Plan::operated(DURATION_S, speed, line)
     }
 
-    fn figures(&self, recording: &Recording, _options: &RunOptions, machine: &Machine) -> Figures {
+    fn figures(&self, recording: &Recording, _options: &Options, machine: &Machine) -> Figures {
         let mut figures = analysis::common(recording);
         let ratings = &machine.tables.ratings;
         let stretches = stretches(recording);

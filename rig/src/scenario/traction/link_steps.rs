@@ -1,15 +1,18 @@
 //! Steps of the DC link under full load.
 
 use super::script::{BEGIN_S, Script};
-use super::{Plan, Scenario};
+use super::{Options, Plan, Traction};
 use crate::analysis::{self, Figures};
 use crate::machine::Machine;
-use crate::options::RunOptions;
 use crate::report::Page;
+use crate::scenario::Scenario;
 use crate::trace::{Recording, Row};
 use crate::verdict::{Verdict, worst};
+use clap::Args;
+use serde::Serialize;
 
 /// At several speeds: the link falls by 200 V, comes back, rises by 200 V, comes back.
+#[derive(Clone, Copy, Debug, Args, Serialize)]
 pub struct LinkSteps;
 
 const SPEEDS_RPM: [f64; 5] = [300.0, 1000.0, 1500.0, 1800.0, 3000.0];
@@ -23,16 +26,8 @@ fn begins_s(slot: usize) -> f64 {
     BEGIN_S + slot as f64 * SLOT_S
 }
 
-impl Scenario for LinkSteps {
-    fn name(&self) -> &'static str {
-        "link-steps"
-    }
-
-    fn figure(&self) -> &'static str {
-        "figure 9: the modes, here with a DC link that steps"
-    }
-
-    fn plan(&self, options: &RunOptions, machine: &Machine) -> Plan {
+impl Scenario<Traction> for LinkSteps {
+    fn plan(&self, options: &Options, machine: &Machine) -> Plan {
         let nominal_v = options.udc.unwrap_or(machine.folder.parameters.dc_link_nominal_v);
         let mut script = Script {
             torque: vec![(0.0, machine.folder.parameters.max_torque_nm)],
@@ -51,7 +46,7 @@ impl Scenario for LinkSteps {
         script.plan()
     }
 
-    fn figures(&self, recording: &Recording, _options: &RunOptions, machine: &Machine) -> Figures {
+    fn figures(&self, recording: &Recording, _options: &Options, machine: &Machine) -> Figures {
         let mut figures = analysis::common(recording);
         let steps = (0..SPEEDS_RPM.len())
             .flat_map(|slot| (0..SHARES.len()).map(move |k| begins_s(slot) + SETTLE_S + k as f64 * HOLD_S));

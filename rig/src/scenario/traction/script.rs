@@ -32,6 +32,6 @@ impl Script {
             let torque_nm = held(&torque, t_s).unwrap_or(0.0) as f32;
             (Demand { torque_nm, slew_limited }, held(&enable, t_s).unwrap_or(true))
         };
-        Plan { lead_s: LEAD_S, duration_s, speed, link, operator: Box::new(operator) }
+        Plan { link, ..Plan::driven(LEAD_S, duration_s, speed, operator) }
     }
 }
