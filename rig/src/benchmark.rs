@@ -1,44 +1,30 @@
 //! `cargo rig bench`: how fast scenarios are simulated on one thread, and where the time goes.
 
-use crate::machine::Machine;
-use crate::options::RunOptions;
-use crate::{scenario, zs9};
+use crate::options::{Options, RunOptions};
+use crate::plant::stopwatch::{self, processor_s};
+use crate::scenario::catalogue::{self, Chosen};
+use crate::scenario::traction::TractionOptions;
+use crate::scenario::zs9::Zs9Options;
+use crate::scenario::{Choice, System};
+use crate::trace::Recorded;
 use anyhow::Result;
-use std::cell::Cell;
 use std::time::Instant;
 
-/// Of so many steps of the plant one is timed.
-const TIMED: u64 = 16;
-
-thread_local! {
-    static STEPS: Cell<u64> = const { Cell::new(0) };
-    static IN_PLANT: Cell<f64> = const { Cell::new(0.0) };
-    /// What taking the time takes, in s.
-    static TAKING: Cell<f64> = const { Cell::new(0.0) };
+/// What to measure.
+#[derive(Clone, Debug, clap::Args)]
+pub struct BenchOptions {
+    /// All scenarios unless some are named.
+    pub scenarios: Vec<String>,
+    /// What all runs share.
+    #[command(flatten)]
+    pub run: RunOptions,
+    /// What the PMaSynRM drive's scenarios share.
+    #[command(flatten)]
+    pub traction: TractionOptions,
+    /// What the ZS9's share.
+    #[command(flatten)]
+    pub zs9: Zs9Options,
 }
-
-/// Does a step of the plant, and once in a while takes its time.
-#[inline]
-pub(crate) fn in_plant<R>(step: impl FnOnce() -> R) -> R {
-    let count = STEPS.get();
-    STEPS.set(count + 1);
-    if !count.is_multiple_of(TIMED) {
-        return step();
-    }
-    let began = processor_s();
-    let result = step();
-    IN_PLANT.set(IN_PLANT.get() + processor_s() - began - TAKING.get());
-    result
-}
-
-/// What this thread has had of the processor, in s: other programs do not count.
-fn processor_s() -> f64 {
-    let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
-    time.tv_sec as f64 + time.tv_nsec as f64 * 1e-9
-}
-
-/// Drives a scenario; the recorded time, in s.
-type Drive = Box<dyn FnOnce(&RunOptions, &Machine) -> Result<f64>>;
 
 /// What a scenario took.
 #[derive(Clone, Debug, serde::Serialize)]
@@ -59,56 +45,36 @@ pub struct Measured {
     pub plant_percent: f64,
 }
 
-/// Every scenario but those that are short on purpose.
-pub fn names() -> Vec<String> {
-    let own = scenario::all();
-    let dual = zs9::scenario::all();
-    let names = own.iter().map(|scenario| scenario.name()).chain(dual.iter().map(|scenario| scenario.name()));
-    names.filter(|name| !name.ends_with("timing")).map(str::to_owned).collect()
-}
-
 /// Drives a scenario on the host, on this thread, with the options' machine and flaws.
 ///
 /// # Errors
 /// An unknown scenario, bad input, or a drive that breaks the bench's rules.
-pub fn measure(name: &str, options: &RunOptions) -> Result<Measured> {
-    STEPS.set(0);
-    IN_PLANT.set(0.0);
-    const TRIES: u32 = 10_000;
-    let began_s = processor_s();
-    for _ in 0..TRIES {
-        std::hint::black_box(processor_s());
+pub fn measure(name: &str, options: &BenchOptions) -> Result<Measured> {
+    let run = options.run.clone();
+    match catalogue::choose([name])? {
+        Chosen::Traction(choice) => {
+            measured(&Choice { options: Options { run, own: options.traction.clone() }, ..choice })
+        }
+        Chosen::Zs9(choice) => {
+            measured(&Choice { options: Options { run, own: options.zs9.clone() }, ..choice })
+        }
     }
-    TAKING.set((processor_s() - began_s) / f64::from(TRIES));
-    let (drive, tables): (Drive, Machine) = match zs9::scenario::find(name) {
-        Some(scenario) => {
-            let machine = Machine::load(options.machine.as_deref().unwrap_or(zs9::command::MACHINE))?;
-            let drive: Drive = Box::new(move |options, machine| {
-                let recording = zs9::scenario::drive(scenario.as_ref(), options, machine)?;
-                Ok(recording.rows.last().map_or(0.0, |row| row.t_s))
-            });
-            (drive, machine)
-        }
-        None => {
-            let scenario = scenario::find(name)?;
-            let drive: Drive = Box::new(move |options, machine| {
-                let recording = scenario::drive(scenario.as_ref(), options, machine)?;
-                Ok(recording.rows.last().map_or(0.0, |row| row.t_s))
-            });
-            (drive, Machine::load(options.machine())?)
-        }
-    };
+}
+
+fn measured<S: System>(choice: &Choice<S>) -> Result<Measured> {
+    let machine = choice.machine()?;
+    stopwatch::begin();
     let (began, began_s) = (Instant::now(), processor_s());
-    let simulated_s = drive(options, &tables)?;
+    let simulated_s = choice.drive(&machine)?.end_s();
     let (wall_s, processor_s) = (began.elapsed().as_secs_f64(), processor_s() - began_s);
-    let in_plant_s = IN_PLANT.get() * TIMED as f64;
+    let (plant_steps, in_plant_s) = stopwatch::taken();
     Ok(Measured {
-        scenario: name.to_owned(),
+        scenario: choice.name.to_owned(),
         simulated_s,
         wall_s,
         processor_s,
         ratio: simulated_s / processor_s,
-        plant_steps: STEPS.get(),
+        plant_steps,
         plant_percent: 100.0 * in_plant_s / processor_s,
     })
 }
@@ -117,9 +83,13 @@ pub fn measure(name: &str, options: &RunOptions) -> Result<Measured> {
 ///
 /// # Errors
 /// As [`measure`].
-pub fn run(scenarios: &[String], options: &RunOptions) -> Result<()> {
-    let scenarios = if scenarios.is_empty() { names() } else { scenarios.to_vec() };
-    if !options.json {
+pub fn run(options: &BenchOptions) -> Result<()> {
+    let mut scenarios = options.scenarios.clone();
+    if scenarios.is_empty() {
+        scenarios.extend(catalogue::listed().map(|(name, _)| name.to_owned()));
+    }
+    let json = options.run.json;
+    if !json {
         crate::say!(
             "{:<16} {:>12} {:>8} {:>12} {:>8} {:>12} {:>8}",
             "scenario",
@@ -134,7 +104,7 @@ pub fn run(scenarios: &[String], options: &RunOptions) -> Result<()> {
     let mut all = Vec::new();
     for name in &scenarios {
         let measured = measure(name, options)?;
-        if options.json {
+        if json {
             all.push(measured);
         } else {
             crate::say!(
@@ -149,7 +119,7 @@ pub fn run(scenarios: &[String], options: &RunOptions) -> Result<()> {
             );
         }
     }
-    if options.json {
+    if json {
         crate::say!("{}", serde_json::to_string(&all)?);
     }
     Ok(())

@@ -4,7 +4,6 @@ use crate::analysis::SteadyPoint;
 use crate::machine::Machine;
 use crate::pattern::{self, Wanted};
 use crate::report::Page;
-use crate::scenario::characteristic;
 use crate::trace::Recording;
 use crate::verdict::worst;
 use tractive::control::{VoltageLimit, mtpa, operating_point};
@@ -14,8 +13,8 @@ use tractive_tablegen::SmoothMap;
 type Series = Vec<(String, Curve)>;
 
 /// Figures 1, 3, 4, 6, 7 and 10 beside ours.
-pub fn draw(page: &mut Page, recording: &Recording, machine: &Machine) {
-    for (title, unit, curve) in accuracy(recording, machine) {
+pub fn draw(page: &mut Page, recording: &Recording, points: &[SteadyPoint], machine: &Machine) {
+    for (title, unit, curve) in accuracy(points, machine) {
         page.draw_xy("figure 10", title, ("speed in r/min", unit), &[(title.to_owned(), curve)]);
     }
     page.draw_xy(
@@ -59,8 +58,7 @@ pub fn draw(page: &mut Page, recording: &Recording, machine: &Machine) {
 type Curve = Vec<(f64, f64)>;
 
 /// Torque over its demand, efficiency and current of the characteristic points, over speed: full torque, then full power.
-fn accuracy(recording: &Recording, machine: &Machine) -> [(&'static str, &'static str, Curve); 3] {
-    let points = characteristic::points(recording, machine);
+fn accuracy(points: &[SteadyPoint], machine: &Machine) -> [(&'static str, &'static str, Curve); 3] {
     let rated_nm = machine.folder.parameters.rated_torque_nm;
     let curve = |value: fn(&SteadyPoint) -> f64| {
         let along = points.iter().filter(|point| point.demand_nm > rated_nm);

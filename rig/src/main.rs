@@ -1,22 +1,19 @@
 //! The rig's command line.
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
-use clap::parser::ValueSource;
-use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
-use std::path::{Path, PathBuf};
+use clap::{Parser, Subcommand};
+use std::ffi::OsString;
+use std::path::PathBuf;
 use std::process::ExitCode;
-use std::time::Instant;
-use tractive::built_in::traction::BUILT_IN;
 use tractive::modulation::Mode;
-use tractive_rig::analysis::Figures;
+use tractive_rig::benchmark::{self, BenchOptions};
 use tractive_rig::campaign::{self, command::CampaignOptions};
 use tractive_rig::machine::Machine;
-use tractive_rig::options::{OF_THE_ZS9, RunOptions, check_own, not_negative, positive};
-use tractive_rig::report::{self, Page};
-use tractive_rig::scenario::{self, Scenario};
-use tractive_rig::trace::{self, Recording};
-use tractive_rig::{benchmark, figures, nine_switch, pattern, points, say, spectrum, talk, zs9};
+use tractive_rig::needs::Needs;
+use tractive_rig::options::{not_negative, positive};
+use tractive_rig::scenario::command::folder;
+use tractive_rig::{nine_switch, pattern, points, report, say, scenario, talk};
 
 #[derive(Parser)]
 #[command(name = "tractive-rig", about = "Plays the motor to the drive, and shows what happened", version)]
@@ -27,22 +24,21 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Runs a scenario and writes its files.
+    /// Runs a scenario and writes its files; `run --help` lists the scenarios.
+    #[command(disable_help_flag = true, override_usage = "tractive-rig run [SCENARIO] [OPTIONS]")]
     Run {
-        /// load-steps, sweep, characteristic, full-step, steady, mode-borders, reversal, restart, link-steps, precharge, chopper,
-        /// acknowledge, zs9-load-step, zs9-reverse, zs9-cycle or zs9-steady.
-        #[arg(default_value = "sweep")]
-        scenario: String,
-        #[command(flatten)]
-        options: Box<RunOptions>,
+        // Each scenario has a command line of its own.
+        #[arg(hide = true, trailing_var_arg = true, allow_hyphen_values = true)]
+        words: Vec<OsString>,
+    },
+    /// What `run` or `talk` would need for these words, as JSON, for whoever makes it ready.
+    #[command(hide = true, disable_help_flag = true)]
+    Needs {
+        #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+        words: Vec<OsString>,
     },
     /// Simulated seconds per second of each scenario, on one thread of this machine, and where the time goes.
-    Bench {
-        /// All of them unless some are named.
-        scenarios: Vec<String>,
-        #[command(flatten)]
-        options: Box<RunOptions>,
-    },
+    Bench(Box<BenchOptions>),
     /// Commands the drive over the protocol, by a script or line by line, and logs its telemetry.
     #[command(after_help = talk_help())]
     Talk(Box<talk::TalkOptions>),
@@ -109,15 +105,12 @@ fn modes() -> impl TypedValueParser<Value = Mode> {
 }
 
 fn main() -> ExitCode {
-    let matches = Cli::command().get_matches();
-    let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
-    let given = |name: &str| {
-        let own = matches.subcommand().map(|(_, own)| own);
-        own.and_then(|own| own.value_source(name)) == Some(ValueSource::CommandLine)
-    };
-    match command(cli.command, &given) {
+    match command(Cli::parse().command) {
         Ok(code) => code,
         Err(error) => {
+            if let Some(usage) = error.downcast_ref::<clap::Error>() {
+                usage.exit();
+            }
             // One line: what was wrong, and where.
             eprintln!("{error:#}");
             ExitCode::from(2)
@@ -125,22 +118,20 @@ fn main() -> ExitCode {
     }
 }
 
-fn command(command: Command, given: &dyn Fn(&str) -> bool) -> Result<ExitCode> {
+fn done(result: Result<()>) -> Result<ExitCode> {
+    result.map(|()| ExitCode::SUCCESS)
+}
+
+fn command(command: Command) -> Result<ExitCode> {
     match command {
-        Command::Run { scenario, options } => run(&scenario, &options, given),
-        Command::Bench { scenarios, options } => {
-            benchmark::run(&scenarios, &options)?;
-            Ok(ExitCode::SUCCESS)
-        }
+        Command::Run { words } => scenario::command::run(words),
+        Command::Needs { words } => needs(words),
+        Command::Bench(options) => done(benchmark::run(&options)),
         Command::Talk(options) => run_talk(&options),
         Command::Points { input, output, machine } => {
-            points::run(&input, &output, &Machine::load(&machine)?)?;
-            Ok(ExitCode::SUCCESS)
+            done(points::run(&input, &output, &Machine::load(&machine)?))
         }
-        Command::NineSwitch { input, output } => {
-            nine_switch::run(&input, &output)?;
-            Ok(ExitCode::SUCCESS)
-        }
+        Command::NineSwitch { input, output } => done(nine_switch::run(&input, &output)),
         Command::Campaign(options) => campaign::command::run(&options),
         Command::Pattern(options) => {
             let machine = Machine::load(&options.machine)?;
@@ -154,65 +145,20 @@ fn command(command: Command, given: &dyn Fn(&str) -> bool) -> Result<ExitCode> {
                 min_pulse_us: options.min_pulse_us,
                 max_switching_hz: machine.tables.ratings.max_switching_hz,
             };
-            pattern::write(&wanted, &options.out)?;
-            Ok(ExitCode::SUCCESS)
+            done(pattern::write(&wanted, &options.out))
         }
     }
 }
 
-fn run(name: &str, options: &RunOptions, given: &dyn Fn(&str) -> bool) -> Result<ExitCode> {
-    if let Some(scenario) = zs9::scenario::find(name) {
-        check_own(name, &[scenario.own_options(), &OF_THE_ZS9].concat(), given)?;
-        return run_zs9(scenario.as_ref(), options);
-    }
-    let scenario = scenario::find(name)?;
-    check_own(name, scenario.own_options(), given)?;
-    // The summary shows what was used, not that nothing was said.
-    let options = &RunOptions {
-        machine: Some(options.machine().to_owned()),
-        ..scenario::with_step(scenario.as_ref(), options)
+/// Says what is needed for the words, without doing anything.
+fn needs(words: Vec<OsString>) -> Result<ExitCode> {
+    let needs = match Cli::try_parse_from(std::iter::once("tractive-rig".into()).chain(words))?.command {
+        Command::Run { words } => Needs::of_run(words)?,
+        Command::Talk(options) => Needs::of_talk(&options),
+        _ => anyhow::bail!("needs: must be followed by run or talk"),
     };
-    let machine = Machine::load(options.machine())?;
-    let out = out(name, options)?;
-    let began = Instant::now();
-    let recording = scenario::drive(scenario.as_ref(), options, &machine)?;
-    let wall_s = began.elapsed().as_secs_f64();
-    let figures = scenario.figures(&recording, options, &machine);
-    recording.write_trace(&out.join("trace.csv"))?;
-    recording.write_edges(&out.join("edges.csv"))?;
-    recording.write_recorder(&out.join("recorder.csv"))?;
-    if !recording.slots.is_empty() {
-        recording.write_slots(&out.join("operator.csv"))?;
-    }
-    let summary = summary(scenario.as_ref(), options, &figures, &machine);
-    trace::write_text(&out.join("summary.json"), &(serde_json::to_string_pretty(&summary)? + "\n"))?;
-    trace::write_text(&out.join("overview.svg"), &report::overview(&recording)?)?;
-    trace::write_text(
-        &out.join("report.html"),
-        &page(scenario.as_ref(), options, &recording, &machine, &figures)?,
-    )?;
-    if options.json {
-        say!("{}", serde_json::to_string(&summary)?);
-    } else {
-        print(&figures);
-        let ratio = recording.rows.last().map_or(0.0, |row| row.t_s) / wall_s;
-        say!("simulated {ratio:.1} times as fast as real time ({})", options.on.name());
-        say!("report: {}", out.join("report.html").display());
-    }
-    if let Some(trip) = recording.trip() {
-        eprintln!("fault {}: {} (limit {})", trip.fault.name(), trip.value, trip.limit);
-    }
-    // The bounds are those of the machine that is built in.
-    let judged = machine.tables.name == BUILT_IN.name;
-    let kept = recording.trip().is_none() && !(judged && figures.fall_short());
-    Ok(if kept { ExitCode::SUCCESS } else { ExitCode::from(1) })
-}
-
-/// The folder for the files, made.
-fn out(name: &str, options: &RunOptions) -> Result<PathBuf> {
-    let out = options.out.clone().unwrap_or_else(|| Path::new("target/tractive").join(name));
-    std::fs::create_dir_all(&out).with_context(|| format!("--out {}", out.display()))?;
-    Ok(out)
+    say!("{}", serde_json::to_string(&needs)?);
+    Ok(ExitCode::SUCCESS)
 }
 
 /// The commands of a script, for the help.
@@ -225,88 +171,16 @@ fn talk_help() -> String {
 
 fn run_talk(options: &talk::TalkOptions) -> Result<ExitCode> {
     let outcome = talk::run(options)?;
-    let out = out("talk", &options.run)?;
+    let out = folder("talk", &options.run)?;
     talk::write(options, &outcome, &out)?;
     if options.run.json {
         say!("{}", serde_json::to_string(outcome.figures.values())?);
     } else {
-        print(&outcome.figures);
+        say!("{}\n", report::text(&outcome.figures));
         say!("report: {}", out.join("report.html").display());
     }
     for failure in &outcome.talk.failures {
         eprintln!("{failure}");
     }
     Ok(if outcome.talk.failures.is_empty() { ExitCode::SUCCESS } else { ExitCode::from(1) })
-}
-
-fn run_zs9(scenario: &dyn zs9::scenario::Scenario, options: &RunOptions) -> Result<ExitCode> {
-    let out = out(scenario.name(), options)?;
-    let began = Instant::now();
-    let outcome = zs9::command::drive(scenario, options)?;
-    let wall_s = began.elapsed().as_secs_f64();
-    zs9::command::write(scenario, options, &outcome, &out)?;
-    if options.json {
-        say!("{}", serde_json::to_string(&outcome.summary)?);
-    } else {
-        print(&outcome.figures);
-        let ratio = outcome.recording.rows.last().map_or(0.0, |row| row.t_s) / wall_s;
-        say!("simulated {ratio:.1} times as fast as real time ({})", options.on.name());
-        say!("report: {}", out.join("report.html").display());
-    }
-    if let Some(trip) = outcome.recording.trip() {
-        eprintln!("fault {}: {} (limit {})", trip.fault.name(), trip.value, trip.limit);
-        return Ok(ExitCode::from(1));
-    }
-    Ok(ExitCode::SUCCESS)
-}
-
-fn summary(
-    scenario: &dyn Scenario,
-    options: &RunOptions,
-    figures: &Figures,
-    machine: &Machine,
-) -> serde_json::Value {
-    serde_json::json!({
-        "scenario": scenario.name(),
-        "version": env!("CARGO_PKG_VERSION"),
-        "machine": machine.tables.name,
-        "on": options.on.name(),
-        "options": options,
-        "figures": figures.values(),
-    })
-}
-
-fn page(
-    scenario: &dyn Scenario,
-    options: &RunOptions,
-    recording: &Recording,
-    machine: &Machine,
-    measured: &Figures,
-) -> Result<String> {
-    let mut page = Page::new(scenario.name(), scenario.figure());
-    page.recorder(recording);
-    scenario.plots(recording, &mut page);
-    for (title, window) in scenario.spectra(recording) {
-        spectrum::draw(&mut page, &title, recording, window, options, machine);
-    }
-    if scenario.name() == "characteristic" {
-        figures::draw(&mut page, recording, machine);
-    }
-    page.finish(&format!("tractive {}, run on {}", env!("CARGO_PKG_VERSION"), options.on.name()), measured)
-}
-
-fn print(figures: &Figures) {
-    for (name, value) in figures.values() {
-        match value {
-            serde_json::Value::Array(rows) => {
-                say!("{name}:");
-                for row in rows.iter().filter_map(serde_json::Value::as_object) {
-                    let cells: Vec<_> =
-                        row.iter().map(|(key, value)| format!("{key} {}", report::cell(value))).collect();
-                    say!("  {}", cells.join("  "));
-                }
-            }
-            other => say!("{name} {}", report::cell(other)),
-        }
-    }
 }

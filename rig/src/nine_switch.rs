@@ -1,7 +1,7 @@
 //! `cargo rig nine-switch`: the nine-switch modulator's own gates for one carrier period.
 
 use crate::columns::{Columns, Field};
-use crate::trace;
+use crate::files;
 use anyhow::Result;
 use rayon::prelude::*;
 use std::path::Path;
@@ -19,7 +19,7 @@ pub fn run(input: &Path, output: &Path) -> Result<()> {
     let lines = rows.par_iter().map(line).collect::<Result<Vec<String>>>()?;
     let gates = GATES.map(|gate| format!("{gate}_init,{gate}_edges"));
     let header = format!("{},{},{ADDED}\n", COLUMNS.join(","), gates.join(","));
-    trace::write_text(output, &(header + &lines.concat()))
+    files::write_text(output, &(header + &lines.concat()))
 }
 
 fn line(fields: &[Field; 6]) -> Result<String> {

@@ -1,9 +1,9 @@
 //! `cargo rig pattern`: the modulator's own pulses in steady state.
 
 use crate::bench::Inverter;
+use crate::files;
 use crate::plant::Leg;
 use crate::run::{CLOCK, refused};
-use crate::trace;
 use anyhow::{Result, bail};
 use std::path::Path;
 use tractive::frames::{Angle, six_step_v};
@@ -123,5 +123,5 @@ pub fn write(wanted: &Wanted, out: &Path) -> Result<()> {
     for (t_s, leg, on) in edges(wanted)? {
         text += &format!("{:.9},{},{}\n", t_s, ["u", "v", "w"][leg], u8::from(on));
     }
-    trace::write_text(out, &text)
+    files::write_text(out, &text)
 }

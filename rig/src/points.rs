@@ -1,8 +1,8 @@
 //! `cargo rig points`: operating points by the firmware's own code.
 
 use crate::columns::Columns;
+use crate::files;
 use crate::machine::Machine;
-use crate::trace;
 use anyhow::Result;
 use rayon::prelude::*;
 use std::path::Path;
@@ -38,7 +38,7 @@ pub fn run(input: &Path, output: &Path, machine: &Machine) -> Result<()> {
             )
         })
         .collect();
-    trace::write_text(output, &format!("{},id_a,iq_a,region\n{}", COLUMNS.join(","), lines.concat()))
+    files::write_text(output, &format!("{},id_a,iq_a,region\n{}", COLUMNS.join(","), lines.concat()))
 }
 
 fn read(input: &Path) -> Result<Vec<Wanted>> {

@@ -6,18 +6,6 @@ pub trait Timed {
     fn t_s(&self) -> f64;
 }
 
-impl Timed for crate::trace::Row {
-    fn t_s(&self) -> f64 {
-        self.t_s
-    }
-}
-
-impl Timed for crate::zs9::trace::Row {
-    fn t_s(&self) -> f64 {
-        self.t_s
-    }
-}
-
 /// The rows from `from_s` (included) to `to_s` (excluded).
 pub fn between<R: Timed>(rows: &[R], from_s: f64, to_s: f64) -> &[R] {
     let first = rows.partition_point(|row| row.t_s() < from_s - 1e-9);

@@ -1,14 +1,41 @@
 //! What a run leaves behind: trace, edges, switches of mode. Files are written whole or not at all.
 
-use crate::bench::{Edge, GATES, SlotRow, Tick, degrees};
+use crate::files::{Cell, Columns, write_edges, write_recorder, write_rows};
 use crate::plant::LinkEnergies;
-use anyhow::{Context, Result};
-use std::io::Write;
+use crate::rows::Timed;
+use anyhow::Result;
 use std::path::Path;
+use tractive::frames::Angle;
 use tractive::modulation::Mode;
 use tractive::operator::Status;
 use tractive::protection::Trip;
 use tractive::recorder::Record;
+
+/// Ticks since the run's beginning; on a bench that counts finer, its steps.
+pub type Tick = u64;
+
+/// A gate edge: device 0 ..= 5 is uh ul vh vl wh wl.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Edge {
+    /// When.
+    pub tick: Tick,
+    /// Which device, as an index into [`GATES`].
+    pub gate: u8,
+    /// On or off.
+    pub on: bool,
+}
+
+/// Names of the gates, in the order of [`Edge::gate`].
+pub const GATES: [&str; 6] = ["uh", "ul", "vh", "vl", "wh", "wl"];
+
+/// What the operator did in one slot, for the trace.
+#[derive(Clone, Copy, Debug)]
+pub struct SlotRow {
+    /// When it took effect, in s from the recording's beginning.
+    pub t_s: f64,
+    /// What it told.
+    pub status: Status,
+}
 
 /// One line of trace.csv: the plant's true values, and control's intentions at that instant.
 #[derive(Clone, Copy, Debug)]
@@ -49,6 +76,12 @@ pub struct Row {
     pub trip: Option<Trip>,
     /// The operator's last word, if there is one.
     pub status: Option<Status>,
+}
+
+impl Timed for Row {
+    fn t_s(&self) -> f64 {
+        self.t_s
+    }
 }
 
 impl Row {
@@ -112,206 +145,139 @@ pub struct Recording {
 }
 
 impl Recording {
-    /// Time of a tick from the recording's beginning, in s.
-    pub fn seconds(&self, tick: Tick) -> f64 {
-        (tick as f64 - self.lead as f64) * self.tick_s
-    }
-
     /// The first fault, if the drive tripped.
     pub fn trip(&self) -> Option<Trip> {
         self.rows.iter().find_map(|row| row.trip)
     }
 
+    /// Time of a tick from the recording's beginning, in s.
+    pub fn seconds(&self, tick: Tick) -> f64 {
+        (tick as f64 - self.lead as f64) * self.tick_s
+    }
+}
+
+impl Row {
+    fn columns(&self) -> Columns<16> {
+        Columns([
+            ("t_s", Cell::Time(self.t_s)),
+            ("speed_rpm", self.speed_rpm.into()),
+            ("te_ref_nm", self.te_ref_nm.into()),
+            ("te_nm", self.te_nm.into()),
+            ("id_ref_a", self.id_ref_a.into()),
+            ("iq_ref_a", self.iq_ref_a.into()),
+            ("id_a", self.id_a.into()),
+            ("iq_a", self.iq_a.into()),
+            ("ia_a", self.ia_a.into()),
+            ("ib_a", self.ib_a.into()),
+            ("ic_a", self.ic_a.into()),
+            ("u_v", self.u_v.into()),
+            ("udc_v", self.udc_v.into()),
+            ("f1_hz", self.f1_hz.into()),
+            ("mode", self.mode.name().into()),
+            ("fault", name_of(self.trip).into()),
+        ])
+    }
+}
+
+impl SlotRow {
+    fn columns(&self) -> Columns<10> {
+        let Self { t_s, status } = self;
+        let switches = status.switches;
+        Columns([
+            ("t_s", Cell::Time(*t_s)),
+            ("state", status.state.name().into()),
+            ("fault", name_of(status.trip).into()),
+            ("refusal", status.refusal.map_or("", |refusal| refusal.name()).into()),
+            ("refusals", Cell::Count(status.refusals)),
+            ("torque_nm", status.torque_nm.into()),
+            ("precharge", switches.precharge.into()),
+            ("main", switches.main.into()),
+            ("discharge", switches.discharge.into()),
+            ("chopper", switches.chopper.into()),
+        ])
+    }
+}
+
+fn recorder_columns((t_s, record): &(f64, Record)) -> Columns<13> {
+    let state = record.state;
+    Columns([
+        ("t_s", Cell::Time(*t_s)),
+        ("ia_a", record.currents_a.a.into()),
+        ("ib_a", record.currents_a.b.into()),
+        ("ic_a", record.currents_a.c.into()),
+        ("udc_v", record.udc_v.into()),
+        ("angle_deg", degrees(record.angle).into()),
+        ("id_ref_a", record.id_a.into()),
+        ("iq_ref_a", record.iq_a.into()),
+        ("u_v", record.voltage_v.into()),
+        ("mode", state.mode.name().into()),
+        ("enabled", state.enabled.into()),
+        ("pulsing", state.pulsing.into()),
+        ("fault", state.fault.map_or("", |fault| fault.name()).into()),
+    ])
+}
+
+/// A trip's name; empty without one.
+pub fn name_of(trip: Option<Trip>) -> &'static str {
+    trip.map_or("", |trip| trip.fault.name())
+}
+
+/// What a run leaves, of either system.
+pub trait Recorded {
+    /// The first fault, if the drive tripped.
+    fn trip(&self) -> Option<Trip>;
+    /// The last row's time, in s.
+    fn end_s(&self) -> f64;
     /// Writes trace.csv.
-    pub fn write_trace(&self, path: &Path) -> Result<()> {
-        write_whole(path, |out| {
-            out.write_record([
-                "t_s",
-                "speed_rpm",
-                "te_ref_nm",
-                "te_nm",
-                "id_ref_a",
-                "iq_ref_a",
-                "id_a",
-                "iq_a",
-                "ia_a",
-                "ib_a",
-                "ic_a",
-                "u_v",
-                "udc_v",
-                "f1_hz",
-                "mode",
-                "fault",
-            ])?;
-            for row in &self.rows {
-                out.serialize((
-                    (
-                        short_time(row.t_s),
-                        row.speed_rpm as f32,
-                        row.te_ref_nm as f32,
-                        row.te_nm as f32,
-                        row.id_ref_a as f32,
-                        row.iq_ref_a as f32,
-                        row.id_a as f32,
-                        row.iq_a as f32,
-                    ),
-                    (
-                        row.ia_a as f32,
-                        row.ib_a as f32,
-                        row.ic_a as f32,
-                        row.u_v as f32,
-                        row.udc_v as f32,
-                        row.f1_hz as f32,
-                        row.mode.name(),
-                        row.trip.map_or("", |trip| trip.fault.name()),
-                    ),
-                ))?;
-            }
-            Ok(())
-        })
-    }
-
-    /// Writes operator.csv: a line for every slot from whose beginning on the operator's words differ from those before.
-    pub fn write_slots(&self, path: &Path) -> Result<()> {
-        write_whole(path, |out| {
-            out.write_record([
-                "t_s",
-                "state",
-                "fault",
-                "refusal",
-                "refusals",
-                "torque_nm",
-                "precharge",
-                "main",
-                "discharge",
-                "chopper",
-            ])?;
-            let mut last = None;
-            for SlotRow { t_s, status } in &self.slots {
-                if last == Some(*status) {
-                    continue;
-                }
-                last = Some(*status);
-                out.serialize((
-                    short_time(*t_s),
-                    status.state.name(),
-                    status.trip.map_or("", |trip| trip.fault.name()),
-                    status.refusal.map_or("", |refusal| refusal.name()),
-                    status.refusals,
-                    status.torque_nm,
-                    u8::from(status.switches.precharge),
-                    u8::from(status.switches.main),
-                    u8::from(status.switches.discharge),
-                    status.switches.chopper,
-                ))?;
-            }
-            Ok(())
-        })
-    }
-
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    fn write_trace(&self, path: &Path) -> Result<()>;
     /// Writes recorder.csv, if a fault has frozen the flight recorder; else takes away what an earlier run has left.
-    pub fn write_recorder(&self, path: &Path) -> Result<()> {
-        if self.recorded.is_empty() {
-            return forget(path);
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    fn write_recorder(&self, path: &Path) -> Result<()>;
+    /// Writes what else there is into a folder: edges.csv, operator.csv.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    fn write_events(&self, folder: &Path) -> Result<()>;
+}
+
+impl Recorded for Recording {
+    fn trip(&self) -> Option<Trip> {
+        self.trip()
+    }
+
+    fn end_s(&self) -> f64 {
+        self.rows.last().map_or(0.0, |row| row.t_s)
+    }
+
+    fn write_trace(&self, path: &Path) -> Result<()> {
+        write_rows(path, self.rows.iter().map(Row::columns))
+    }
+
+    fn write_recorder(&self, path: &Path) -> Result<()> {
+        write_recorder(path, &self.recorded, recorder_columns)
+    }
+
+    /// Edges within the recording; of the operator's slots those in which its words differ from those before.
+    fn write_events(&self, folder: &Path) -> Result<()> {
+        let edges = self.edges.iter().filter(|edge| edge.tick >= self.lead);
+        let edge =
+            |edge: &Edge| (Cell::Time(self.seconds(edge.tick)), GATES[usize::from(edge.gate)], edge.on);
+        write_edges(&folder.join("edges.csv"), edges.map(edge))?;
+        if self.slots.is_empty() {
+            return Ok(());
         }
-        write_whole(path, |out| {
-            out.write_record([
-                "t_s",
-                "ia_a",
-                "ib_a",
-                "ic_a",
-                "udc_v",
-                "angle_deg",
-                "id_ref_a",
-                "iq_ref_a",
-                "u_v",
-                "mode",
-                "enabled",
-                "pulsing",
-                "fault",
-            ])?;
-            for (t_s, record) in &self.recorded {
-                let state = record.state;
-                out.serialize((
-                    short_time(*t_s),
-                    record.currents_a.a,
-                    record.currents_a.b,
-                    record.currents_a.c,
-                    record.udc_v,
-                    degrees(record.angle) as f32,
-                    record.id_a,
-                    record.iq_a,
-                    record.voltage_v,
-                    state.mode.name(),
-                    u8::from(state.enabled),
-                    u8::from(state.pulsing),
-                    state.fault.map_or("", |fault| fault.name()),
-                ))?;
-            }
-            Ok(())
-        })
-    }
-
-    /// Writes edges.csv: edges within the recording.
-    pub fn write_edges(&self, path: &Path) -> Result<()> {
-        write_whole(path, |out| {
-            out.write_record(["t_s", "gate", "level"])?;
-            for edge in &self.edges {
-                if edge.tick >= self.lead {
-                    out.serialize((
-                        short_time(self.seconds(edge.tick)),
-                        GATES[usize::from(edge.gate)],
-                        u8::from(edge.on),
-                    ))?;
-                }
-            }
-            Ok(())
-        })
+        let mut last = None;
+        let slots = self.slots.iter().filter(|slot| last.replace(slot.status) != Some(slot.status));
+        write_rows(&folder.join("operator.csv"), slots.map(SlotRow::columns))
     }
 }
 
-/// Takes away a file that an earlier run has left.
-pub(crate) fn forget(path: &Path) -> Result<()> {
-    match std::fs::remove_file(path) {
-        Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
-            Err(error).with_context(|| path.display().to_string())
-        }
-        _ => Ok(()),
-    }
-}
-
-/// A time rounded to a nanosecond, so that it prints short; ticks are 40 ns.
-fn short_time(t_s: f64) -> f64 {
-    (t_s * 1e9).round() / 1e9
-}
-
-/// Writes a CSV beside its place and moves it there when it is complete.
-pub(crate) fn write_whole(
-    path: &Path,
-    fill: impl FnOnce(&mut csv::Writer<std::io::BufWriter<&std::fs::File>>) -> Result<()>,
-) -> Result<()> {
-    let folder = path.parent().unwrap_or(Path::new("."));
-    let file = tempfile::NamedTempFile::new_in(folder).with_context(|| format!("{}", folder.display()))?;
-    {
-        let mut out = csv::Writer::from_writer(std::io::BufWriter::with_capacity(1 << 16, file.as_file()));
-        fill(&mut out)?;
-        out.flush()?;
-    }
-    publish(file, path)
-}
-
-/// Writes a text file whole or not at all.
-pub fn write_text(path: &Path, text: &str) -> Result<()> {
-    let folder = path.parent().unwrap_or(Path::new("."));
-    let mut file =
-        tempfile::NamedTempFile::new_in(folder).with_context(|| format!("{}", folder.display()))?;
-    file.write_all(text.as_bytes())?;
-    publish(file, path)
-}
-
-fn publish(file: tempfile::NamedTempFile, path: &Path) -> Result<()> {
-    use std::os::unix::fs::PermissionsExt;
-    file.as_file().set_permissions(std::fs::Permissions::from_mode(0o644))?;
-    file.persist(path).with_context(|| format!("{}", path.display()))?;
-    Ok(())
+/// An angle in degrees, 0 ≤ x < 360.
+pub fn degrees(angle: Angle) -> f64 {
+    f64::from(angle.0) / 4_294_967_296.0 * 360.0
 }

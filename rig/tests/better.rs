@@ -1,29 +1,18 @@
 //! The numbers that the drive is to reach, on the host: ideal, and with a real inverter's flaws.
 
-use clap::Parser;
 use serde_json::Value;
 use tractive_rig::analysis::{self, Figures};
-use tractive_rig::machine::Machine;
-use tractive_rig::options::RunOptions;
 use tractive_rig::rows::mean;
-use tractive_rig::scenario;
+use tractive_rig::scenario::catalogue;
 use tractive_rig::trace::Recording;
-
-#[derive(Parser)]
-struct Line {
-    scenario: String,
-    #[command(flatten)]
-    options: RunOptions,
-}
 
 /// Runs a scenario as on the command line, without a fault.
 fn driven(line: &str) -> (Recording, Figures) {
-    let parsed = Line::parse_from(std::iter::once("test").chain(line.split(' ')));
-    let machine = Machine::load(parsed.options.machine()).unwrap();
-    let scenario = scenario::find(&parsed.scenario).unwrap();
-    let recording = scenario::drive(scenario.as_ref(), &parsed.options, &machine).unwrap();
+    let chosen = catalogue::of_traction(line).unwrap();
+    let machine = chosen.machine().unwrap();
+    let recording = chosen.drive(&machine).unwrap();
     assert!(recording.trip().is_none(), "{line}: {:?}", recording.trip());
-    let figures = scenario.figures(&recording, &parsed.options, &machine);
+    let figures = chosen.figures(&recording, &machine);
     (recording, figures)
 }
 

@@ -7,8 +7,8 @@ use tractive::modulation::{Ladder, Mode};
 use tractive::protection::Fault;
 use tractive_rig::bench::Flaws;
 use tractive_rig::campaign::judge::Verdict;
-use tractive_rig::campaign::without::Without;
 use tractive_rig::campaign::{Campaign, Case, Outcome, cases, dual, healthy, report, traction};
+use tractive_rig::without::Without;
 
 /// The cases whose names have all these words.
 fn named(words: &str) -> Vec<Case> {

@@ -78,7 +78,55 @@ fn options_that_do_nothing_are_refused() {
     refused_in_one_line("run zs9-load-step --torque-scale 0.5", &["--torque-scale", "zs9-load-step"]);
     refused_in_one_line("run zs9-reverse --step 40", &["--step", "zs9-reverse"]);
     refused_in_one_line("run sweep --uin 667", &["--uin", "sweep"]);
+    refused_in_one_line("run sweep --step 40", &["--step", "sweep"]);
+    refused_in_one_line("run zs9-load-step --uncompensated", &["--uncompensated", "zs9-load-step"]);
     refused_in_one_line("run zs9-load-step --inject source-short@1.3", &["--inject", "1.3 s", "1.2 s"]);
+}
+
+/// Each scenario's help has its own options and no others.
+#[test]
+fn help_shows_what_the_scenario_takes() {
+    let help = |line: &str| {
+        let output = rig(line);
+        assert_eq!(output.status.code(), Some(0), "{line}");
+        String::from_utf8_lossy(&output.stdout).into_owned()
+    };
+    let sweep = help("run sweep --help");
+    assert!(sweep.contains("--torque-scale") && sweep.contains("figure 9: sweep"), "{sweep}");
+    assert!(!sweep.contains("--step") && !sweep.contains("--scheme"), "{sweep}");
+    let zs9 = help("run zs9-load-step -h");
+    assert!(zs9.contains("--step") && zs9.contains("--scheme") && !zs9.contains("--down"), "{zs9}");
+    let all = help("run --help");
+    assert!(all.contains("zs9-cycle") && all.contains("--dead-time-us") && !all.contains("--down"), "{all}");
+}
+
+/// Options stand before or after the scenario's name, which is found among their values; without one it is the sweep.
+#[test]
+fn the_scenario_is_found_wherever_it_stands() {
+    for (line, wanted) in [
+        ("--uncompensated load-steps", r#"{"system":"pmasynrm","on":"host","#),
+        ("--down --to 100 --on qemu", r#"{"system":"pmasynrm","on":"qemu","#),
+        ("--dt 1e-4 zs9-cycle --cruise 1", r#"{"system":"zs9","on":"host","#),
+    ] {
+        let output = rig(&format!("needs run {line}"));
+        let said = String::from_utf8_lossy(&output.stdout);
+        assert!(said.starts_with(wanted), "{line}: {said}{}", String::from_utf8_lossy(&output.stderr));
+    }
+    refused_in_one_line("run --dt 1e-4 --down load-steps", &["--down", "load-steps"]);
+    refused_in_one_line("needs run a/b", &["scenario a/b", "must be one of"]);
+    refused("needs run --on moon", &["moon", "qemu"]);
+}
+
+#[test]
+fn a_run_ends_with_a_headline_and_a_table_with_units() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = rig(&format!("run load-steps --out {}", folder.path().display()));
+    let said = String::from_utf8_lossy(&output.stdout);
+    assert!(said.starts_with("PASS: 4 of 4 bounds kept · load-steps · figure 8"), "{said}");
+    let row = said.lines().find(|line| line.contains(" t90 ")).unwrap();
+    assert!(row.trim_start().starts_with("pass") && row.contains(" ms  2.500 ms"), "{said}");
+    let peak = said.lines().find(|line| line.contains("peak current")).unwrap();
+    assert!(peak.trim_end().ends_with(" A"), "{said}");
 }
 
 #[test]

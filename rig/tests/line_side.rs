@@ -1,25 +1,14 @@
 //! The scenarios with a line side: every verdict is kept, on the built-in machine and where things are harder.
 
-use clap::Parser;
-use tractive_rig::machine::Machine;
-use tractive_rig::options::RunOptions;
-use tractive_rig::scenario;
+use tractive_rig::scenario::catalogue;
 use tractive_rig::trace::Recording;
-
-#[derive(Parser)]
-struct Line {
-    scenario: String,
-    #[command(flatten)]
-    options: RunOptions,
-}
 
 /// Runs a scenario as on the command line; its recording and the verdicts that fall short.
 fn run(line: &str) -> (Recording, Vec<String>) {
-    let line = Line::parse_from(std::iter::once("test").chain(line.split(' ')));
-    let machine = Machine::load(line.options.machine()).unwrap();
-    let scenario = scenario::find(&line.scenario).unwrap();
-    let recording = scenario::drive(scenario.as_ref(), &line.options, &machine).unwrap();
-    let figures = scenario.figures(&recording, &line.options, &machine);
+    let chosen = catalogue::of_traction(line).unwrap();
+    let machine = chosen.machine().unwrap();
+    let recording = chosen.drive(&machine).unwrap();
+    let figures = chosen.figures(&recording, &machine);
     let (_, verdicts) = figures.values().iter().find(|(name, _)| *name == "verdicts").unwrap();
     let verdicts = verdicts.as_array().unwrap();
     assert!(verdicts.len() > 6);

@@ -2,19 +2,9 @@
 
 mod linear;
 
-use clap::Parser;
 use linear::MACHINES;
 use rayon::prelude::*;
-use tractive_rig::machine::Machine;
-use tractive_rig::options::RunOptions;
-use tractive_rig::scenario;
-
-#[derive(Parser)]
-struct Line {
-    scenario: String,
-    #[command(flatten)]
-    options: RunOptions,
-}
+use tractive_rig::scenario::catalogue;
 
 #[test]
 fn any_machine_folder_drives() {
@@ -23,13 +13,11 @@ fn any_machine_folder_drives() {
         linear.write(folder.path());
         let path = folder.path().display().to_string();
         let run = |line: &str| {
-            let words = ["test"].into_iter().chain(line.split(' ')).chain(["--machine", &path]);
-            let parsed = Line::parse_from(words);
-            let machine = Machine::load(&path).unwrap();
-            let scenario = scenario::find(&parsed.scenario).unwrap();
-            let recording = scenario::drive(scenario.as_ref(), &parsed.options, &machine).unwrap();
+            let chosen = catalogue::of_traction(&format!("{line} --machine {path}")).unwrap();
+            let machine = chosen.machine().unwrap();
+            let recording = chosen.drive(&machine).unwrap();
             assert!(recording.trip().is_none(), "{}: {line}: {:?}", linear.name, recording.trip());
-            scenario.figures(&recording, &parsed.options, &machine)
+            chosen.figures(&recording, &machine)
         };
         for (speed_share, torque_share) in [(0.1, 1.0), (0.1, -0.5), (0.35, 0.9), (1.0, 0.3), (-0.6, 0.5)] {
             let (speed, torque) = (speed_share * linear.speed_rpm, torque_share * linear.torque_nm);

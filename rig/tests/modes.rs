@@ -5,16 +5,17 @@ use tractive::control::{Demand, Gains};
 use tractive::drive::traction::Settings;
 use tractive::modulation::{Devices, Ladder, Mode};
 use tractive_rig::analysis::{self, Figures};
-use tractive_rig::bench::{self, Bench, Flaws, Limits, Supply};
+use tractive_rig::bench::{self, Bench, Flaws, Limits, Simulated, Supply};
 use tractive_rig::campaign::judge::Verdict;
 use tractive_rig::campaign::{report, traction};
 use tractive_rig::figures;
 use tractive_rig::machine::Machine;
 use tractive_rig::plant::{Plant, PlantSettings, SpeedSource};
 use tractive_rig::report::Page;
-use tractive_rig::run::{CLOCK, Tasks};
-use tractive_rig::scenario::switches;
-use tractive_rig::trace::Recording;
+use tractive_rig::run::traction::Tasks;
+use tractive_rig::run::{CLOCK, Interrupts};
+use tractive_rig::scenario::traction::switches;
+use tractive_rig::trace::{Recorded, Recording};
 
 /// The paper's modes and that one.
 const WITH_MID5: Ladder =
@@ -79,7 +80,7 @@ fn the_drive_goes_up_and_down_its_ladder() {
     recording.write_trace(&path).unwrap();
     assert!(std::fs::read_to_string(&path).unwrap().contains(",mid5,"));
     let mut page = Page::new("modes", "no figure: a ladder of its own");
-    figures::draw(&mut page, &recording, &machine);
+    figures::draw(&mut page, &recording, &[], &machine);
     switches::plots(&recording, &mut page);
     let page = page.finish("", &Figures::default()).unwrap();
     for part in ["middle 60°, mid5: legs", "mid7 → mid5", "mid5 → mid3", "■ mid5<", "■ square<"] {

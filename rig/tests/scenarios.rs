@@ -1,28 +1,17 @@
 //! The scenarios on the host, held against their bounds.
 
-use clap::Parser;
 use tractive::modulation::Mode;
 use tractive_rig::analysis::{self, SwitchFigures};
-use tractive_rig::machine::Machine;
-use tractive_rig::options::RunOptions;
-use tractive_rig::scenario;
+use tractive_rig::scenario::catalogue;
 use tractive_rig::trace::Recording;
-
-#[derive(Parser)]
-struct Line {
-    scenario: String,
-    #[command(flatten)]
-    options: RunOptions,
-}
 
 /// Runs a scenario as on the command line; its figures and what was recorded.
 fn run(line: &str) -> (analysis::Figures, Recording) {
-    let line = Line::parse_from(std::iter::once("test").chain(line.split(' ')));
-    let machine = Machine::load(line.options.machine()).unwrap();
-    let scenario = scenario::find(&line.scenario).unwrap();
-    let recording = scenario::drive(scenario.as_ref(), &line.options, &machine).unwrap();
+    let chosen = catalogue::of_traction(line).unwrap();
+    let machine = chosen.machine().unwrap();
+    let recording = chosen.drive(&machine).unwrap();
     assert!(recording.trip().is_none(), "{:?}", recording.trip());
-    (scenario.figures(&recording, &line.options, &machine), recording)
+    (chosen.figures(&recording, &machine), recording)
 }
 
 /// The modes in order of use, without repetition.
@@ -106,10 +95,9 @@ fn characteristic_currents_are_the_ratings() {
 #[test]
 fn a_link_out_of_range_trips_at_once_and_by_name() {
     for (line, name) in [("sweep --udc 2200", "dc_overvoltage"), ("sweep --udc 700", "dc_undervoltage")] {
-        let line = Line::parse_from(std::iter::once("test").chain(line.split(' ')));
-        let machine = Machine::load(line.options.machine()).unwrap();
-        let scenario = scenario::find(&line.scenario).unwrap();
-        let recording = scenario::drive(scenario.as_ref(), &line.options, &machine).unwrap();
+        let chosen = catalogue::of_traction(line).unwrap();
+        let machine = chosen.machine().unwrap();
+        let recording = chosen.drive(&machine).unwrap();
         assert_eq!(recording.trip().unwrap().fault.name(), name);
         assert!(recording.rows.iter().all(|row| row.mode == Mode::Off));
         assert!(recording.edges.is_empty(), "no gate ever moves");
@@ -118,10 +106,8 @@ fn a_link_out_of_range_trips_at_once_and_by_name() {
 
 #[test]
 fn overspeed_trips_into_the_short_circuit() {
-    let line = Line::parse_from("test sweep --to 6900".split(' '));
-    let machine = Machine::load(line.options.machine()).unwrap();
-    let scenario = scenario::find(&line.scenario).unwrap();
-    let recording = scenario::drive(scenario.as_ref(), &line.options, &machine).unwrap();
+    let chosen = catalogue::of_traction("sweep --to 6900").unwrap();
+    let recording = chosen.drive(&chosen.machine().unwrap()).unwrap();
     let trip = recording.trip().unwrap();
     assert_eq!(trip.fault.name(), "overspeed");
     assert!((trip.value - trip.limit).abs() < 0.1, "{trip:?}");

@@ -3,9 +3,10 @@
 use tractive::modulation::Mode;
 use tractive::protection::{Fault, SafeState};
 use tractive_rig::bench::Flaws;
-use tractive_rig::bench::inject::{Injection, Kind, SupplyFault};
 use tractive_rig::campaign::traction::{Drive, Ridden, Ride};
-use tractive_rig::sensor_faults::{AngleFault, CurrentFault};
+use tractive_rig::inject::Injection;
+use tractive_rig::inject::sensor::{AngleFault, CurrentFault};
+use tractive_rig::inject::traction::{Kind, SupplyFault};
 use tractive_rig::trace::Row;
 
 const TRIP_A: f64 = 303.35;

@@ -1,26 +1,25 @@
 //! The ZS9's scenarios on the host, held against their bounds.
 
-use clap::Parser;
 use serde_json::Value;
-use tractive_rig::options::RunOptions;
+use tractive_rig::analysis::Figures;
 use tractive_rig::rows::mean;
-use tractive_rig::zs9::command::{self, Outcome};
+use tractive_rig::scenario::{catalogue, command};
 use tractive_rig::zs9::figures;
-use tractive_rig::zs9::scenario;
 use tractive_rig::zs9::trace::{Recording, Row};
 
-#[derive(Parser)]
-struct Line {
-    scenario: String,
-    #[command(flatten)]
-    options: RunOptions,
+/// What a run gave.
+struct Outcome {
+    recording: Recording,
+    figures: Figures,
 }
 
 /// Runs a scenario as on the command line.
 fn run(line: &str) -> Outcome {
-    let line = Line::parse_from(std::iter::once("test").chain(line.split(' ')));
-    let scenario = scenario::find(&line.scenario).unwrap();
-    command::drive(scenario.as_ref(), &line.options).unwrap()
+    let chosen = catalogue::of_zs9(line).unwrap();
+    let machine = chosen.machine().unwrap();
+    let recording = chosen.drive(&machine).unwrap();
+    let figures = chosen.figures(&recording, &machine);
+    Outcome { recording, figures }
 }
 
 fn figure(outcome: &Outcome, name: &str) -> f64 {
@@ -238,10 +237,8 @@ fn exchanges_that_wait(recording: &Recording, dead_time_s: f64) -> usize {
 #[test]
 fn the_trace_has_its_columns_and_is_written_whole() {
     let folder = tempfile::tempdir().unwrap();
-    let line = Line::parse_from(["test", "zs9-reverse", "--dt", "1e-3"]);
-    let scenario = scenario::find(&line.scenario).unwrap();
-    let outcome = command::drive(scenario.as_ref(), &line.options).unwrap();
-    command::write(scenario.as_ref(), &line.options, &outcome, folder.path()).unwrap();
+    let words = ["zs9-reverse", "--dt", "1e-3", "--out", folder.path().to_str().unwrap()];
+    command::run(words.map(Into::into).to_vec()).unwrap();
     let trace = std::fs::read_to_string(folder.path().join("trace.csv")).unwrap();
     let mut lines = trace.lines();
     assert_eq!(

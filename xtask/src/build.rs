@@ -73,11 +73,6 @@ impl System {
     /// All of them.
     pub const ALL: [Self; 2] = [Self::Traction, Self::Zs9];
 
-    /// The system that a scenario drives.
-    pub fn of_scenario(scenario: &str) -> Self {
-        if scenario.starts_with("zs9-") { Self::Zs9 } else { Self::Traction }
-    }
-
     /// The image's name.
     pub const fn image(self) -> &'static str {
         match self {

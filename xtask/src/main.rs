@@ -45,8 +45,8 @@ use clap::Parser;
 
 fn main() -> ExitCode {
     let result = match cli::Cli::parse().command {
-        cli::Command::Run(args) => run::run(&args.words),
-        cli::Command::Talk(args) => run::talk(&args.words),
+        cli::Command::Run(args) => run::run(&args.words, run::Verb::Run),
+        cli::Command::Talk(args) => run::run(&args.words, run::Verb::Talk),
         cli::Command::Test(args) => test::run(&args),
         cli::Command::Image(args) => image::run(&args),
         cli::Command::Timing(args) => timing::run(&args),

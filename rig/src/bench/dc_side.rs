@@ -1,8 +1,8 @@
 //! The inverter's DC side: a stiff link, one behind a line filter, or one that an operator switches.
 
 use super::LineSide;
-use super::inject::SupplyFault;
-use crate::benchmark::in_plant;
+use crate::inject::traction::SupplyFault;
+use crate::plant::stopwatch::in_plant;
 use crate::plant::{FilteredLink, Leg, LineFilter, Plant};
 
 /// What feeds the inverter.

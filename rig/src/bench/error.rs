@@ -1,7 +1,7 @@
 //! Why a bench cannot go on.
 
-use super::Tick;
 use crate::plant::zs9::IllegalState;
+use crate::trace::Tick;
 
 /// The firmware broke the protocol, or asked for what an inverter must not have.
 #[derive(Debug, thiserror::Error)]

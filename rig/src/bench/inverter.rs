@@ -1,23 +1,9 @@
 //! The two-level inverter: carrier halves in, gate edges and leg states out, every edge at its exact tick.
 
-use super::Tick;
 use crate::plant::Leg;
+use crate::trace::{Edge, Tick};
 use tractive::modulation::{CarrierPeriod, Mode};
 use tractive::protection::{LegFaults, SafeState};
-
-/// A gate edge: device 0 ..= 5 is uh ul vh vl wh wl.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Edge {
-    /// When.
-    pub tick: Tick,
-    /// Which device, as an index into [`GATES`].
-    pub gate: u8,
-    /// On or off.
-    pub on: bool,
-}
-
-/// Names of the gates, in the order of [`Edge::gate`].
-pub const GATES: [&str; 6] = ["uh", "ul", "vh", "vl", "wh", "wl"];
 
 /// What is wrong with a gate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

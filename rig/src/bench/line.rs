@@ -3,7 +3,7 @@
 use super::{Switchgear, Tick};
 use crate::plant::{DcLink, DcLinkSettings, LinkEnergies, LinkSwitches};
 use crate::steps::held;
-use crate::trace::LinkBalance;
+use crate::trace::{LinkBalance, SlotRow};
 use tractive::operator::{Feedback, Request, SLOT_PERIODS, Status, Switches};
 use tractive::protection::Fault;
 use tractive::time::Clock;
@@ -39,15 +39,6 @@ impl LinePlan {
             reversible: Vec::new(),
         }
     }
-}
-
-/// What the operator did in one slot, for the trace.
-#[derive(Clone, Copy, Debug)]
-pub struct SlotRow {
-    /// When it took effect, in s from the recording's beginning.
-    pub t_s: f64,
-    /// What it told.
-    pub status: Status,
 }
 
 /// The line side of a bench.

@@ -9,8 +9,6 @@ mod conversions;
 mod dc_side;
 mod due;
 mod error;
-pub mod inject;
-pub mod injected;
 mod inverter;
 mod line;
 mod observe;
@@ -19,26 +17,29 @@ mod run;
 mod sampling;
 mod sensors;
 mod settings;
+mod simulated;
 mod switchgear;
 mod time;
 
+pub use crate::trace::Tick;
 pub use conversions::Conversions;
 pub use dc_side::Supply;
 pub use due::Due;
 pub use error::BenchError;
-pub use inverter::{Edge, GATES, Inverter, Stuck};
-pub use line::{Commander, LinePlan, LineSide, SlotRow};
+pub use inverter::{Inverter, Stuck};
+pub use line::{Commander, LinePlan, LineSide};
 pub use observe::{Limits, Observed, Peaks, Stored};
-pub use record::degrees;
 pub use sensors::{Converter, Flaws, Sensors};
 pub use settings::{Operator, Settings};
+pub use simulated::Simulated;
 pub use switchgear::Switchgear;
-pub use time::{Tick, Timeline};
+pub use time::Timeline;
 
+use crate::inject::Injection;
+use crate::inject::traction::{Kind, Spoiler};
 use crate::plant::Plant;
-use crate::trace::{Row, Switch};
+use crate::trace::{Row, SlotRow, Switch};
 use dc_side::DcSide;
-use inject::Spoiler;
 use tractive::drive::Report;
 use tractive::modulation::CarrierPeriod;
 use tractive::operator::{Feedback, Request, Status};
@@ -83,7 +84,7 @@ impl Bench {
     pub fn new(plant: Plant, operator: Box<dyn Operator + Send>, settings: &Settings) -> Self {
         let time = Timeline::new(settings.clock, 1, settings.lead_s);
         let first = CarrierPeriod::off(settings.first_half_ticks);
-        let at = |injection: inject::Injection<inject::Kind>| time.steps(settings.lead_s + injection.at_s);
+        let at = |injection: Injection<Kind>| time.steps(settings.lead_s + injection.at_s);
         let from = settings.injection.map_or(Tick::MAX, at);
         Self {
             plant,
@@ -111,7 +112,7 @@ impl Bench {
         }
     }
 
-    /// The same beginning at another tick than 0, with tasks of [`crate::run::Tasks::beginning_at`] the same: where instants wrap.
+    /// The same beginning at another tick than 0, with tasks of [`crate::run::traction::Tasks::beginning_at`] the same: where instants wrap.
     pub fn beginning_at(mut self, origin: Tick) -> Self {
         self.time = self.time.beginning_at(origin);
         for tick in [&mut self.end, &mut self.control.next, &mut self.next_row] {
@@ -154,24 +155,9 @@ impl Bench {
         Ok(())
     }
 
-    /// Whether the recording is complete.
-    pub fn is_done(&self) -> bool {
-        self.time.now > self.end
-    }
-
-    /// Share of the run that is done, 0 ..= 1.
-    pub fn progress(&self) -> f64 {
-        self.time.now as f64 / self.end as f64
-    }
-
     /// Time since the recording's beginning, in s.
     pub fn time_s(&self) -> f64 {
         self.time.now_s()
-    }
-
-    /// An instant near to now, in s from the recording's beginning.
-    pub fn instant_s(&self, instant: Instant) -> f64 {
-        self.time.seconds(self.time.widen(instant))
     }
 
     /// The trace so far.
@@ -182,16 +168,6 @@ impl Bench {
     /// What a fault did.
     pub fn observed(&self) -> &Observed {
         &self.observed
-    }
-
-    /// A free rotor's load from `instant` on, in N·m.
-    pub fn load_from(&mut self, instant: Instant, load_nm: f64) {
-        self.loads.push(self.time.widen(instant), load_nm);
-    }
-
-    /// Ends the recording at `instant`.
-    pub fn end_at(&mut self, instant: Instant) {
-        self.end = self.end.min(self.time.widen(instant));
     }
 
     /// The half to play after the one that begins at `instant`.

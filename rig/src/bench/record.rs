@@ -1,14 +1,40 @@
 //! The trace.
 
-use super::{Bench, LineSide};
-use crate::trace::{Recording, Row, Switch};
-use tractive::frames::Angle;
+use super::{Bench, LineSide, Simulated};
+use crate::trace::{Recording, Row, Switch, degrees};
 use tractive::modulation::{CarrierPeriod, Mode};
 use tractive::recorder::Record;
+use tractive::time::Instant;
 
-impl Bench {
-    /// The recording: what the bench saw, and what the drive's own recorder holds; instants in seconds from its beginning.
-    pub fn into_recording(self, records: Vec<Record>) -> Recording {
+impl Simulated for Bench {
+    type Record = Record;
+    type Recording = Recording;
+
+    fn is_done(&self) -> bool {
+        self.time.now > self.end
+    }
+
+    fn progress(&self) -> f64 {
+        self.time.now as f64 / self.end as f64
+    }
+
+    fn has_control(&self, instant: Instant) -> bool {
+        self.spoiler.injected.has_control(self.instant_s(instant))
+    }
+
+    fn instant_s(&self, instant: Instant) -> f64 {
+        self.time.seconds(self.time.widen(instant))
+    }
+
+    fn loads_from(&mut self, instant: Instant, [load_nm, _]: [f64; 2]) {
+        self.loads.push(self.time.widen(instant), load_nm);
+    }
+
+    fn end_at(&mut self, instant: Instant) {
+        self.end = self.end.min(self.time.widen(instant));
+    }
+
+    fn into_recording(self, records: Vec<Record>) -> Recording {
         let recorded = records.into_iter().map(|record| (self.instant_s(record.at), record)).collect();
         let edges = self.inverter.edges().to_vec();
         Recording {
@@ -22,7 +48,9 @@ impl Bench {
             tick_s: self.time.step_s(),
         }
     }
+}
 
+impl Bench {
     pub(super) fn note_switch(&mut self, next: &CarrierPeriod) {
         let from = self.inverter.half().mode;
         if next.mode != from {
@@ -71,9 +99,4 @@ impl Bench {
         let next_s = self.rows_done as f64 * self.trace_step_s;
         self.next_row = self.time.row_end(next_s);
     }
-}
-
-/// An angle in degrees, 0 ≤ x < 360.
-pub fn degrees(angle: Angle) -> f64 {
-    f64::from(angle.0) / 4_294_967_296.0 * 360.0
 }

@@ -1,7 +1,7 @@
 //! Lets time pass, and does what is due on the way.
 
-use super::inject::Kind;
 use super::{Bench, BenchError, LineSide, Peaks, Stored, Stuck, Tick};
+use crate::inject::traction::Kind;
 use tractive::protection::LegFaults;
 
 impl Bench {

@@ -1,7 +1,7 @@
 //! What the drive's interrupts are told, and what control reports.
 
-use super::inject::Kind;
 use super::{Bench, BenchError};
+use crate::inject::traction::Kind;
 use tractive::control::{LinkWindow, Measurements};
 use tractive::drive::Report;
 use tractive::frames::Abc;
@@ -29,11 +29,6 @@ impl Bench {
     /// By how much the control interrupt is late, in ticks.
     pub fn control_late_ticks(&self) -> u32 {
         self.spoiler.injected.late_ticks(self.time.now_s())
-    }
-
-    /// Whether the control interrupt comes at this instant at all.
-    pub fn has_control(&self, instant: Instant) -> bool {
-        self.spoiler.injected.has_control(self.instant_s(instant))
     }
 
     /// Phase currents at the carrier boundary `instant`.

@@ -1,7 +1,8 @@
 //! What a bench is made of, and who commands it.
 
-use super::inject::{Injection, Kind};
 use super::{Flaws, Limits, Supply};
+use crate::inject::Injection;
+use crate::inject::traction::Kind;
 use tractive::control::Demand;
 use tractive::time::Clock;
 

@@ -1,10 +1,8 @@
 //! A bench's time: steps of the firmware's timers, or of what divides them finer.
 
 use super::BenchError;
+use crate::trace::Tick;
 use tractive::time::{Clock, Instant};
-
-/// Ticks since the run's beginning; on a bench that counts finer, its steps.
-pub type Tick = u64;
 
 /// Where a run stands.
 #[derive(Clone, Debug)]

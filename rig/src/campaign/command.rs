@@ -1,8 +1,8 @@
 //! `campaign`: runs cases, prints the table and writes it.
 
 use super::judge::Verdict;
-use super::without::Without;
 use super::{Campaign, dual, healthy, report, traction};
+use crate::without::Without;
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};

@@ -1,7 +1,7 @@
 //! Faults with their names and rules, whatever a drive's faults are made of.
 
 use super::judge::Rule;
-use crate::sensor_faults::CurrentFault;
+use crate::inject::sensor::CurrentFault;
 use tractive::protection::Fault;
 
 /// A fault with its name and its rule.

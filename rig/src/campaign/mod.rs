@@ -2,7 +2,7 @@
 //! made of it, and whether that is good enough.
 //!
 //! A case is one run of a drive's own tasks on its bench: it settles, the fault comes, and if the drive has not stopped by then,
-//! another torque is wanted, so that nothing stays hidden. [`judge`] says what is good enough, [`without`] switches one
+//! another torque is wanted, so that nothing stays hidden. [`judge`] says what is good enough, [`crate::without`] switches one
 //! protection off to see which cases are lost.
 
 mod action;
@@ -14,14 +14,13 @@ pub mod judge;
 mod outcome;
 pub mod report;
 pub mod traction;
-pub mod without;
 
 pub use action::Action;
 pub use outcome::Outcome;
 
+use crate::without::Without;
 use anyhow::{Context, Result};
 use rayon::prelude::*;
-use without::Without;
 
 /// One case of either system.
 #[derive(Clone, Debug)]

@@ -2,6 +2,9 @@
 
 use tractive_tablegen::SmoothMap;
 
+/// Longest integration step, in s: a tenth of a radian at 400 Hz leaves Runge–Kutta's error near 1e-7.
+pub(super) const LONGEST_STEP_S: f64 = 40e-6;
+
 /// State of an inverter leg.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Leg {
@@ -80,6 +83,6 @@ impl Clamp {
         let stiff = STIFF_SHARE * self.least_inductance_h / slope_ohm;
         // No current moves faster than the whole link across the least inductance.
         let away = (nearest_a - self.small_current_a) * self.least_inductance_h / (1.5 * udc_v);
-        away.clamp(stiff, super::LONGEST_STEP_S.max(stiff))
+        away.clamp(stiff, LONGEST_STEP_S.max(stiff))
     }
 }

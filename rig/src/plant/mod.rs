@@ -10,6 +10,7 @@ mod line_filter;
 mod rotor;
 mod speed;
 mod stator;
+pub mod stopwatch;
 pub mod zs9;
 
 pub use dc_link::{DcLink, DcLinkSettings, LinkEnergies, LinkSwitches, Source};
@@ -20,7 +21,7 @@ pub use speed::{SpeedSource, profile_speed};
 pub use stator::{Stator, StatorSlopes};
 
 use core::f64::consts::TAU;
-use legs::Clamp;
+use legs::{Clamp, LONGEST_STEP_S};
 use tractive_tablegen::{MachineFolder, SmoothMap};
 
 /// How the true machine differs from its folder.
@@ -48,9 +49,6 @@ pub struct Energies {
     /// Given to the rotor by the air-gap torque.
     pub mechanical_j: f64,
 }
-
-/// Longest integration step, in s: a tenth of a radian at 400 Hz leaves Runge–Kutta's error near 1e-7.
-const LONGEST_STEP_S: f64 = 40e-6;
 
 /// Machine and legs.
 pub struct Plant {

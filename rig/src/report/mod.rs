@@ -3,12 +3,13 @@
 mod chart;
 mod overview;
 mod table;
+mod text;
 
 pub use overview::overview;
-pub use table::cell;
+pub use text::{headline, text};
 
 use crate::analysis::Figures;
-use crate::bench::GATES;
+use crate::trace::GATES;
 use crate::trace::{Recording, Row};
 use anyhow::Result;
 use chart::{chart, legend, thinned};

@@ -1,256 +1,44 @@
-//! The drive on the host: the firmware's own tasks, called in the order in which their interrupts would come.
+//! A drive on the host: the firmware's own tasks, called in the order in which their interrupts would come.
 
-use super::{Progress, Supervisor};
-use crate::bench::Bench;
-use crate::campaign::without::Without;
-use crate::trace::Recording;
-use tractive::control::{Demand, LinkWindow};
-use tractive::drive::Report;
-use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
-use tractive::frames::Abc;
-use tractive::machine::{Ratings, Tables};
-use tractive::modulation::{CarrierPeriod, Ladder, Schedule};
-use tractive::operator::{self, Desk, Feedback, Line, OperatorPort, Request, Slot, Status, slot_s};
-use tractive::ports::{ControlPort, PwmPort, Sample};
-use tractive::protection::{LegFaults, SafeState, Trip};
-use tractive::protocol::Station;
-use tractive::recorder::Recorder;
-use tractive::time::{Clock, Instant};
+use super::Progress;
+use crate::bench::Simulated;
+use anyhow::Result;
+use tractive::time::Instant;
 
-/// The bench behind a board's ports; the first error ends the run.
-struct Port<'a, 'w> {
-    bench: &'a mut Bench,
-    without: Option<Without>,
-    desk: &'a Desk,
-    ratings: &'a Ratings,
-    wire: Option<&'a mut Wire<'w>>,
-    error: Option<anyhow::Error>,
-}
+/// The two interrupts of a drive, with the cells between them.
+pub trait Interrupts {
+    /// What they run on.
+    type Bench: Simulated;
 
-/// The drive's end of the protocol, and who is at the other end.
-struct Wire<'w> {
-    station: Station,
-    supervisor: &'w mut dyn Supervisor,
-}
-
-impl ControlPort for Port<'_, '_> {
-    fn sample(&mut self, now: Instant) -> Sample {
-        let mut sample = self.bench.control_sample(now);
-        if self.bench.is_operated()
-            && let Ok(sample) = &mut sample
-        {
-            self.desk.permit(now).apply(sample);
-        }
-        sample.unwrap_or_else(|error| {
-            self.error = Some(error.into());
-            Sample {
-                currents_a: Abc::default(),
-                udc_v: 0.0,
-                angle: None,
-                demand: Demand::default(),
-                enable: false,
-                window: LinkWindow::OPEN,
-                acknowledge: 0,
-                hardware: None,
-            }
-        })
-    }
-
-    fn enter(&mut self, safe: SafeState, now: Instant) {
-        self.bench.enter(now, safe);
-    }
-
-    fn overrun_ticks(&mut self, _now: Instant) -> u32 {
-        self.bench.control_late_ticks()
-    }
-
-    fn report(&mut self, now: Instant, report: &Report) {
-        self.desk.tell(now, report);
-        self.bench.control_report(now, *report);
-    }
-
-    fn leg_faults(&mut self) -> LegFaults {
-        let found = self.bench.leg_faults();
-        self.without.map_or(found, |without| without.leg_faults(found))
-    }
-}
-
-impl PwmPort for Port<'_, '_> {
-    fn sample(&mut self, now: Instant) -> Abc {
-        self.bench.pwm_sample(now).unwrap_or_else(|error| {
-            self.error = Some(error.into());
-            Abc::default()
-        })
-    }
-
-    fn play(&mut self, now: Instant, next: &CarrierPeriod) {
-        self.bench.play(now, *next);
-    }
-
-    fn enter(&mut self, safe: SafeState, now: Instant) {
-        self.bench.enter(now, safe);
-    }
-
-    fn leave(&mut self, now: Instant) -> bool {
-        self.bench.leave(now);
-        true
-    }
-
-    fn leg_faults(&mut self) -> LegFaults {
-        let found = self.bench.leg_faults();
-        self.without.map_or(found, |without| without.leg_faults(found))
-    }
-}
-
-impl OperatorPort for Port<'_, '_> {
-    fn ask(&mut self, at: Instant, slots: u32) -> (Request, Feedback) {
-        let (request, feedback) = self.bench.ask(at).unwrap_or_else(|error| {
-            self.error = Some(error.into());
-            (Request::idle(self.ratings), Feedback::default())
-        });
-        let Some(wire) = &mut self.wire else { return (request, feedback) };
-        let frame = super::turn(wire.supervisor, self.bench, at).unwrap_or_else(|error| {
-            self.error = Some(error);
-            None
-        });
-        (wire.station.listen(self.desk.observed(), slots, frame.as_ref()), feedback)
-    }
-
-    fn tell(&mut self, from: Instant, status: &Status) {
-        if let Err(error) = self.bench.told(from, *status) {
-            self.error = Some(error.into());
-        }
-        let Some(wire) = &mut self.wire else { return };
-        if let Some(frame) = wire.station.tell(status) {
-            wire.supervisor.hear(self.bench.instant_s(from), &frame);
-        }
-    }
-}
-
-/// Runs until the recording is complete; a supervisor commands over the protocol.
-pub fn run_on_host(
-    name: &str,
-    mut bench: Bench,
-    tables: &'static Tables,
-    settings: Settings,
-    first_half_ticks: u32,
-    line: Option<Line>,
-    supervisor: Option<&mut dyn Supervisor>,
-) -> anyhow::Result<Recording> {
-    let recorder = Recorder::new();
-    let mut progress = Progress::new(name);
-    let mut tasks = Tasks::new(tables, settings, first_half_ticks).recorded_by(&recorder).operated_on(line);
-    tasks.wire = supervisor.map(|supervisor| Wire { station: Station::new(&tables.ratings), supervisor });
-    tasks.drive(&mut bench, |bench| {
-        progress.show(bench.progress());
-        true
-    })?;
-    let records = (0..).map_while(|index| recorder.read(index)).collect();
-    Ok(bench.into_recording(records))
-}
-
-/// Both tasks and the cells between them.
-pub struct Tasks<'a> {
-    control: ControlTask,
-    pwm: PwmTask,
-    shared: Shared<'a>,
-    desk: Desk,
-    slot: Slot,
-    operator: operator::Settings<'static>,
-    clock: Clock,
-    /// Over the protocol, if there is a supervisor.
-    wire: Option<Wire<'a>>,
-    without: Option<Without>,
-}
-
-impl<'a> Tasks<'a> {
-    /// Before their first interrupts.
-    pub fn new(tables: &'static Tables, settings: Settings, first_half_ticks: u32) -> Self {
-        Self::beginning_at(Instant(0), tables, settings, first_half_ticks)
-    }
-
-    /// The same for timers that start at another instant.
-    pub fn beginning_at(
-        origin: Instant,
-        tables: &'static Tables,
-        settings: Settings,
-        first_half_ticks: u32,
-    ) -> Self {
-        let first_control = origin.after(settings.clock.control_ticks);
-        let first_pwm = origin.after(first_half_ticks);
-        Self {
-            control: ControlTask::new(tables, settings, first_control),
-            pwm: PwmTask::new(tables, settings, first_pwm).after_halves_of(first_half_ticks),
-            shared: Shared::new(),
-            desk: Desk::new(),
-            slot: Slot::new(),
-            operator: operator::Settings::rated(&tables.ratings, slot_s(&settings.clock), None),
-            clock: settings.clock,
-            wire: None,
-            without: None,
-        }
-    }
-
-    /// The same with an operator who switches the line side, if the bench has one to ask.
-    pub fn operated_on(mut self, line: Option<Line>) -> Self {
-        self.operator.line = line;
-        self
-    }
-
-    /// The same with a flight recorder.
-    pub fn recorded_by(mut self, recorder: &'a Recorder) -> Self {
-        self.shared = Shared::recorded_by(recorder);
-        self
-    }
-
-    /// The same with the modes of another ladder.
-    pub fn on(self, ladder: Ladder) -> Self {
-        Self { pwm: self.pwm.scheduled(Schedule::on(ladder, &self.clock)), ..self }
-    }
-
-    /// The same with a protection off; its levels are the tables' business.
-    pub fn without(self, without: Without) -> Self {
-        let disarmed = without.disarmed();
-        let (control, pwm) = (self.control.without(disarmed), self.pwm.without(disarmed));
-        Self { control, pwm, without: Some(without), ..self }
-    }
-
-    /// The latched fault.
-    pub fn trip(&self) -> Option<Trip> {
-        self.control.trip().or(self.pwm.trip())
-    }
+    /// When control and PWM come next.
+    fn next_calls(&self) -> [Instant; 2];
+    /// The PWM interrupt.
+    ///
+    /// # Errors
+    /// Where the bench cannot go on.
+    fn pwm(&mut self, bench: &mut Self::Bench) -> Result<()>;
+    /// The control interrupt, and the idle loop where it ends.
+    ///
+    /// # Errors
+    /// Where the bench or the supervisor cannot go on.
+    fn control(&mut self, bench: &mut Self::Bench) -> Result<()>;
 
     /// Until the bench's recording is complete, or nobody wants to see more of it.
-    pub fn drive(
+    ///
+    /// # Errors
+    /// Where the bench or the supervisor cannot go on.
+    fn drive(
         &mut self,
-        bench: &mut Bench,
-        mut goes_on: impl FnMut(&Bench) -> bool,
-    ) -> anyhow::Result<()> {
+        bench: &mut Self::Bench,
+        mut goes_on: impl FnMut(&Self::Bench) -> bool,
+    ) -> Result<()> {
         while !bench.is_done() {
-            let (control_at, pwm_at) = (self.control.next_call(), self.pwm.next_call());
-            let has_control = bench.has_control(control_at);
-            let operator = match &self.wire {
-                Some(wire) => wire.station.settings(&self.operator),
-                None => self.operator,
-            };
-            let (desk, ratings) = (&self.desk, self.operator.ratings);
-            let mut port =
-                Port { bench, desk, ratings, without: self.without, wire: self.wire.as_mut(), error: None };
+            let [control_at, pwm_at] = self.next_calls();
             // At equal instants the PWM interrupt comes first: it has the higher priority.
-            if control_at.reached(pwm_at) || !has_control {
-                self.pwm.run(&mut port, &self.shared);
+            if control_at.reached(pwm_at) || !bench.has_control(control_at) {
+                self.pwm(bench)?;
             } else {
-                if self.control.wants_revision() {
-                    self.pwm.revise(&mut port, &self.shared);
-                }
-                self.control.run(&mut port, &self.shared);
-                // The idle loop goes on where the interrupt ends.
-                if port.bench.is_operated() {
-                    self.slot.run(&self.desk, &mut port, &operator, &self.clock);
-                }
-            }
-            if let Some(error) = port.error {
-                return Err(error);
+                self.control(bench)?;
             }
             if !goes_on(bench) {
                 break;
@@ -258,4 +46,19 @@ impl<'a> Tasks<'a> {
         }
         Ok(())
     }
+}
+
+/// Runs until the recording is complete; `record` reads the flight recorder.
+pub(crate) fn on_host<T: Interrupts>(
+    name: &str,
+    mut bench: T::Bench,
+    mut tasks: T,
+    record: impl FnMut(usize) -> Option<<T::Bench as Simulated>::Record>,
+) -> Result<<T::Bench as Simulated>::Recording> {
+    let mut progress = Progress::new(name);
+    tasks.drive(&mut bench, |bench| {
+        progress.show(bench.progress());
+        true
+    })?;
+    Ok(bench.into_recording((0..).map_while(record).collect()))
 }

@@ -4,14 +4,14 @@ mod calls;
 mod emulator;
 mod host;
 mod qemu;
+pub mod traction;
 
-pub(crate) use calls::Calls;
 pub use emulator::Emulator;
-pub(crate) use emulator::emulate;
-pub use host::{Tasks, run_on_host};
-pub use qemu::run_in_qemu;
+pub use host::Interrupts;
+pub(crate) use host::on_host;
+pub(crate) use qemu::in_qemu;
 
-use crate::bench::Bench;
+use crate::bench::Simulated;
 use indicatif::{ProgressBar, ProgressStyle};
 use tractive::configuration::Refused;
 use tractive::operator::SLOT_PERIODS;
@@ -54,35 +54,11 @@ pub struct Turn {
     pub done: bool,
 }
 
-/// A bench that a supervisor acts on.
-pub(crate) trait Supervised {
-    /// An instant near to now, in s from the recording's beginning.
-    fn instant_s(&self, instant: Instant) -> f64;
-    /// The rotors' loads from `instant` on, in N·m.
-    fn loads_from(&mut self, instant: Instant, loads_nm: [f64; 2]);
-    /// Ends the recording at `instant`.
-    fn end_at(&mut self, instant: Instant);
-}
-
-impl Supervised for Bench {
-    fn instant_s(&self, instant: Instant) -> f64 {
-        self.instant_s(instant)
-    }
-
-    fn loads_from(&mut self, instant: Instant, [load_nm, _]: [f64; 2]) {
-        self.load_from(instant, load_nm);
-    }
-
-    fn end_at(&mut self, instant: Instant) {
-        self.end_at(instant);
-    }
-}
-
 /// A supervisor's turn in the slot that began at `at`. What it does to the bench, it does at the next slot's beginning, whenever the slot
 /// is served.
 pub(crate) fn turn(
     supervisor: &mut dyn Supervisor,
-    bench: &mut impl Supervised,
+    bench: &mut impl Simulated,
     at: Instant,
 ) -> anyhow::Result<Option<Frame>> {
     let turn = supervisor.slot(bench.instant_s(at))?;

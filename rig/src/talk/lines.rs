@@ -1,7 +1,7 @@
 //! Where the lines come from: a script, read whole before anything runs, or standard input, a line when it is wanted.
 
-use super::System;
 use super::script::{self, Line};
+use super::system::System;
 use anyhow::{Context, Result};
 use std::collections::VecDeque;
 use std::io::{BufRead, IsTerminal, Write};

@@ -1,6 +1,6 @@
 //! The telemetry's receiver: frames in, rows of telemetry.csv out.
 
-use super::System;
+use super::system::System;
 use tractive::modulation::Mode;
 use tractive::nine_switch::Scheme;
 use tractive::protection::Fault;
@@ -16,80 +16,6 @@ const FAULT_VALUE: usize = 4;
 const FAULT_LIMIT: usize = 5;
 const COUNTERS: usize = 6;
 const PARAMETER_ANSWER: usize = 7;
-
-/// The columns of telemetry.csv of the ZS9.
-pub const ZS9_COLUMNS: [&str; 35] = columns(
-    "scheme",
-    [
-        "speed1_rpm",
-        "torque1_nm",
-        "current1_a",
-        "speed2_rpm",
-        "torque2_nm",
-        "current2_a",
-        "link_v",
-        "capacitor_v",
-        "duty_percent",
-    ],
-);
-
-/// The columns of telemetry.csv.
-pub const COLUMNS: [&str; 35] = columns(
-    "mode",
-    [
-        "speed_rpm",
-        "torque_nm",
-        "link_v",
-        "current_a",
-        "id_ref_a",
-        "iq_ref_a",
-        "voltage_v",
-        "frequency_hz",
-        "temperature_c",
-    ],
-);
-
-/// The columns with a system's name of how the gates are played, and what it measures.
-const fn columns(pattern: &'static str, measured: [&'static str; 9]) -> [&'static str; 35] {
-    let [a, b, c, d, e, f, g, h, i] = measured;
-    [
-        "t_s",
-        "state",
-        pattern,
-        "listening",
-        "fault",
-        "fault_value",
-        "fault_limit",
-        "refusal",
-        "refusals",
-        "precharge",
-        "main",
-        "discharge",
-        "chopper_percent",
-        a,
-        b,
-        c,
-        d,
-        e,
-        f,
-        g,
-        h,
-        i,
-        "received",
-        "taken",
-        "lost",
-        "unknown",
-        "truncated",
-        "corrupted",
-        "repeated",
-        "disordered",
-        "out_of_range",
-        "parameter",
-        "parameter_value",
-        "parameter_result",
-        "telemetry_errors",
-    ]
-}
 
 /// How the gates are played, by its code.
 #[derive(Clone, Copy, Debug)]

@@ -1,7 +1,9 @@
 //! The page of a talk: what the telemetry said beside what really happened.
 
-use super::{Outcome, Recorded, System, TalkOptions};
+use super::outcome::{Happened, Outcome, TalkOptions};
+use super::system::System;
 use crate::report::Page;
+use crate::trace::{Recording, Row};
 use crate::zs9::{self, trace::MotorRow};
 use anyhow::Result;
 
@@ -28,76 +30,60 @@ fn listed(names: &[&str]) -> String {
     list.join(", ")
 }
 
+const TIME: &str = "time in s";
+
+/// The PMaSynRM drive's speed and torque.
+fn traction(page: &mut Page, outcome: &Outcome, recording: &Recording) {
+    page.recorder(recording);
+    let of = |value: fn(&Row) -> f64| recording.rows.iter().map(|row| (row.t_s, value(row))).collect();
+    let speeds = [("telemetry", told(outcome, "speed_rpm")), ("machine", of(|row| row.speed_rpm))];
+    page.curves("Speed", TIME, "r/min", &speeds);
+    let torques = [("telemetry", told(outcome, "torque_nm")), ("machine", of(|row| row.te_nm))];
+    page.curves("Torque: demand as told, and the machine's", TIME, "N·m", &torques);
+}
+
+/// The ZS9's speeds, torques and duty.
+fn dual(page: &mut Page, outcome: &Outcome, recording: &zs9::trace::Recording) {
+    zs9::figures::recorder(page, recording);
+    let both = |what: (&str, &str), value: fn(&MotorRow) -> f64| {
+        let of = |k: usize| recording.rows.iter().map(|row| (row.t_s, value(&row.motors[k]))).collect();
+        [
+            ("telemetry 1", told(outcome, &format!("{}1_{}", what.0, what.1))),
+            ("telemetry 2", told(outcome, &format!("{}2_{}", what.0, what.1))),
+            ("upper motor", of(0)),
+            ("lower motor", of(1)),
+        ]
+    };
+    page.curves("Speeds", TIME, "r/min", &both(("speed", "rpm"), |motor| motor.speed_rpm));
+    let torques = both(("torque", "nm"), |motor| motor.torque_nm);
+    page.curves("Torques: references as told, and the machines'", TIME, "N·m", &torques);
+    page.curves("Shoot-through duty", TIME, "%", &[("telemetry", told(outcome, "duty_percent"))]);
+}
+
 /// The whole page.
 pub(super) fn page(options: &TalkOptions, outcome: &Outcome) -> Result<String> {
     let mut page = Page::new("talk", "commanded over the protocol");
-    let time = "time in s";
     match &outcome.recording {
-        Recorded::Pmasynrm(recording) => {
-            page.recorder(recording);
-            let rows = &recording.rows;
-            let speed = rows.iter().map(|row| (row.t_s, row.speed_rpm)).collect();
-            page.curves(
-                "Speed",
-                time,
-                "r/min",
-                &[("telemetry", told(outcome, "speed_rpm")), ("machine", speed)],
-            );
-            let torque = rows.iter().map(|row| (row.t_s, row.te_nm)).collect();
-            page.curves(
-                "Torque: demand as told, and the machine's",
-                time,
-                "N·m",
-                &[("telemetry", told(outcome, "torque_nm")), ("machine", torque)],
-            );
-        }
-        Recorded::Zs9(recording) => {
-            zs9::figures::recorder(&mut page, recording);
-            let of = |value: fn(&MotorRow) -> f64, k: usize| -> Points {
-                recording.rows.iter().map(|row| (row.t_s, value(&row.motors[k]))).collect()
-            };
-            page.curves(
-                "Speeds",
-                time,
-                "r/min",
-                &[
-                    ("telemetry 1", told(outcome, "speed1_rpm")),
-                    ("telemetry 2", told(outcome, "speed2_rpm")),
-                    ("upper motor", of(|motor| motor.speed_rpm, 0)),
-                    ("lower motor", of(|motor| motor.speed_rpm, 1)),
-                ],
-            );
-            page.curves(
-                "Torques: references as told, and the machines'",
-                time,
-                "N·m",
-                &[
-                    ("telemetry 1", told(outcome, "torque1_nm")),
-                    ("telemetry 2", told(outcome, "torque2_nm")),
-                    ("upper motor", of(|motor| motor.torque_nm, 0)),
-                    ("lower motor", of(|motor| motor.torque_nm, 1)),
-                ],
-            );
-            page.curves("Shoot-through duty", time, "%", &[("telemetry", told(outcome, "duty_percent"))]);
-        }
+        Happened::Pmasynrm(recording) => traction(&mut page, outcome, recording),
+        Happened::Zs9(recording) => dual(&mut page, outcome, recording),
     }
     let states: Vec<_> = tractive::operator::State::ALL.iter().map(|state| state.name()).collect();
     page.curves(
         &format!("State ({})", listed(&states)),
-        time,
+        TIME,
         "",
         &[("state", named(outcome, "state", &states))],
     );
     let listening: Vec<_> = tractive::protocol::Listening::ALL.iter().map(|(_, name)| *name).collect();
     page.curves(
         &format!("Commands ({})", listed(&listening)),
-        time,
+        TIME,
         "",
         &[("listening", named(outcome, "listening", &listening))],
     );
     let causes = ["unknown", "truncated", "corrupted", "repeated", "disordered", "out_of_range"];
     let rejected: Vec<_> = causes.iter().map(|cause| (*cause, told(outcome, cause))).collect();
-    page.curves("Frames rejected", time, "", &rejected);
+    page.curves("Frames rejected", TIME, "", &rejected);
     let curves = |columns: &[&'static str]| -> Vec<(&'static str, Points)> {
         columns.iter().map(|column| (*column, told(outcome, column))).collect()
     };
@@ -105,8 +91,8 @@ pub(super) fn page(options: &TalkOptions, outcome: &Outcome) -> Result<String> {
         System::Pmasynrm => (&["link_v"], &["current_a", "id_ref_a", "iq_ref_a"]),
         System::Zs9 => (&["link_v", "capacitor_v"], &["current1_a", "current2_a"]),
     };
-    page.curves("Link", time, "V", &curves(link));
-    page.curves("Currents", time, "A", &curves(currents));
+    page.curves("Link", TIME, "V", &curves(link));
+    page.curves("Currents", TIME, "A", &curves(currents));
     let script =
         options.script.as_ref().map_or("standard input".to_owned(), |path| path.display().to_string());
     let subtitle =

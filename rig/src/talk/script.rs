@@ -1,6 +1,6 @@
 //! The script: a command a line, `[SECONDS] COMMAND …`.
 
-use super::System;
+use super::system::System;
 use anyhow::{Context, Result, bail};
 use tractive::protocol::{LinkLimits, TorqueLimits};
 

@@ -1,6 +1,6 @@
 //! What is sent to the drive in which slot, and what is done to it on the way.
 
-use super::System;
+use super::system::System;
 use std::collections::VecDeque;
 use tractive::operator::Levels;
 use tractive::protocol::e2e::Counter;

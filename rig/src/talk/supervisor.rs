@@ -1,11 +1,11 @@
 //! The vehicle's computer: does what the lines say, slot by slot.
 
-use super::System;
 use super::lines::Lines;
 use super::listener::Listener;
 use super::script::{Action, Expectation, Line};
 use super::sender::{COMMAND_SLOTS, Sender, Spoken};
 use super::speed_loop::SpeedLoop;
+use super::system::System;
 use crate::run::{Supervisor, Turn};
 use anyhow::{Result, anyhow};
 use std::fmt::Write as _;

@@ -2,7 +2,6 @@
 
 use super::trace::{Recording, Row};
 use crate::analysis::Figures;
-use crate::options::RunOptions;
 use crate::report::Page;
 use crate::rows::{between, mean};
 use core::f64::consts::TAU;
@@ -12,7 +11,7 @@ use tractive::recorder::DualRecord;
 pub type Curve<'a> = (&'a str, fn(&Row) -> f64);
 
 /// What every scenario reports.
-pub fn common(recording: &Recording, _options: &RunOptions) -> Figures {
+pub fn common(recording: &Recording) -> Figures {
     let mut figures = Figures::default();
     let rows = &recording.rows;
     figures.set("simulated_s", rows.last().map_or(0.0, |row| row.t_s + step_s(recording)));
@@ -29,9 +28,8 @@ pub fn common(recording: &Recording, _options: &RunOptions) -> Figures {
     figures
 }
 
-/// The link's range in some rows.
-pub fn link(figures: &mut Figures, rows: &[Row], options: &RunOptions) {
-    let wanted_v = options.zs9.uin;
+/// The link's range in some rows, in which `wanted_v` (V) is wanted.
+pub fn link(figures: &mut Figures, rows: &[Row], wanted_v: f64) {
     let high = largest(rows, |row| row.link_v - wanted_v);
     let low = -largest(rows, |row| wanted_v - row.link_v);
     figures.set("link_above_v", high);

@@ -1,14 +1,11 @@
 //! The rig of the ZS9: two motors, the nine-switch bridge and the Z-source network, behind the drive's ports.
 
 pub mod bench;
-pub mod command;
 pub mod figures;
-pub mod inject;
 pub mod line;
 mod operator;
-mod patterns;
+pub mod patterns;
 pub mod run;
-pub mod scenario;
 mod sensors;
 pub mod settings;
 pub mod trace;

@@ -1,7 +1,8 @@
 //! What a run of the ZS9 leaves behind. Files are written whole or not at all.
 
-use crate::bench::degrees;
-use crate::trace::{forget, write_whole};
+use crate::files::{Cell, Columns, write_edges, write_recorder, write_rows};
+use crate::rows::Timed;
+use crate::trace::{Recorded, degrees, name_of};
 use anyhow::Result;
 use std::path::Path;
 use tractive::nine_switch::Scheme;
@@ -78,105 +79,82 @@ pub struct Row {
 pub struct Recording {
     /// Rows of the trace.
     pub rows: Vec<Row>,
-    /// Gate edges, if they were kept.
+    /// Whether edges were kept.
+    pub keeps_edges: bool,
+    /// Those edges.
     pub edges: Vec<Edge>,
     /// What the drive's flight recorder holds, with its times in s from the recording's beginning; empty without a fault.
     pub recorded: Vec<(f64, DualRecord)>,
 }
 
-const COLUMNS: [&str; 26] = [
-    "t_s",
-    "speed1_rpm",
-    "speed2_rpm",
-    "te1_ref_nm",
-    "te2_ref_nm",
-    "te1_nm",
-    "te2_nm",
-    "id1_a",
-    "iq1_a",
-    "id2_a",
-    "iq2_a",
-    "ia1_a",
-    "ib1_a",
-    "ic1_a",
-    "ia2_a",
-    "ib2_a",
-    "ic2_a",
-    "uin_v",
-    "vc_v",
-    "il_a",
-    "udc_v",
-    "d_sh",
-    "scheme",
-    "tl1_nm",
-    "tl2_nm",
-    "fault",
-];
-
-/// Columns of recorder.csv.
-const RECORDER: [&str; 20] = [
-    "t_s",
-    "ia1_a",
-    "ib1_a",
-    "ic1_a",
-    "ia2_a",
-    "ib2_a",
-    "ic2_a",
-    "angle1_deg",
-    "angle2_deg",
-    "uin_v",
-    "vc_v",
-    "udc_v",
-    "il_a",
-    "te1_ref_nm",
-    "te2_ref_nm",
-    "d_sh",
-    "scheme",
-    "enabled",
-    "pulsing",
-    "fault",
-];
-
-impl Row {
-    fn fields(&self) -> [String; 26] {
-        let [one, two] = &self.motors;
-        let number = |value: f64| (value as f32).to_string();
-        let [a1, b1, c1] = one.phases_a.map(number);
-        let [a2, b2, c2] = two.phases_a.map(number);
-        [
-            short(self.t_s, 1e9),
-            number(one.speed_rpm),
-            number(two.speed_rpm),
-            number(one.torque_ref_nm),
-            number(two.torque_ref_nm),
-            number(one.torque_nm),
-            number(two.torque_nm),
-            number(one.id_a),
-            number(one.iq_a),
-            number(two.id_a),
-            number(two.iq_a),
-            a1,
-            b1,
-            c1,
-            a2,
-            b2,
-            c2,
-            number(self.link_v),
-            number(self.capacitor_v),
-            number(self.inductor_a),
-            number(self.source_v),
-            number(self.duty),
-            self.scheme.name().to_owned(),
-            number(one.load_nm),
-            number(two.load_nm),
-            self.trip.map_or("", |trip| trip.fault.name()).to_owned(),
-        ]
+impl Timed for Row {
+    fn t_s(&self) -> f64 {
+        self.t_s
     }
 }
 
-/// A number rounded to one of so many parts, so that it prints short.
-fn short(value: f64, parts: f64) -> String {
-    ((value * parts).round() / parts).to_string()
+impl Row {
+    fn columns(&self) -> Columns<26> {
+        let [one, two] = &self.motors;
+        let number = |value: f64| Cell::plain(value as f32);
+        let [a1, b1, c1] = one.phases_a.map(number);
+        let [a2, b2, c2] = two.phases_a.map(number);
+        Columns([
+            ("t_s", Cell::short(self.t_s, 1e9)),
+            ("speed1_rpm", number(one.speed_rpm)),
+            ("speed2_rpm", number(two.speed_rpm)),
+            ("te1_ref_nm", number(one.torque_ref_nm)),
+            ("te2_ref_nm", number(two.torque_ref_nm)),
+            ("te1_nm", number(one.torque_nm)),
+            ("te2_nm", number(two.torque_nm)),
+            ("id1_a", number(one.id_a)),
+            ("iq1_a", number(one.iq_a)),
+            ("id2_a", number(two.id_a)),
+            ("iq2_a", number(two.iq_a)),
+            ("ia1_a", a1),
+            ("ib1_a", b1),
+            ("ic1_a", c1),
+            ("ia2_a", a2),
+            ("ib2_a", b2),
+            ("ic2_a", c2),
+            ("uin_v", number(self.link_v)),
+            ("vc_v", number(self.capacitor_v)),
+            ("il_a", number(self.inductor_a)),
+            ("udc_v", number(self.source_v)),
+            ("d_sh", number(self.duty)),
+            ("scheme", self.scheme.name().into()),
+            ("tl1_nm", number(one.load_nm)),
+            ("tl2_nm", number(two.load_nm)),
+            ("fault", name_of(self.trip).into()),
+        ])
+    }
+}
+
+fn recorder_columns((t_s, record): &(f64, DualRecord)) -> Columns<20> {
+    let DualRecord { currents_a: [one, two], angles: [angle1, angle2], torque_nm, state, .. } = record;
+    let [angle1, angle2] = [angle1, angle2].map(|angle| Cell::plain(degrees(*angle) as f32));
+    Columns([
+        ("t_s", Cell::short(*t_s, 1e9)),
+        ("ia1_a", Cell::plain(one.a)),
+        ("ib1_a", Cell::plain(one.b)),
+        ("ic1_a", Cell::plain(one.c)),
+        ("ia2_a", Cell::plain(two.a)),
+        ("ib2_a", Cell::plain(two.b)),
+        ("ic2_a", Cell::plain(two.c)),
+        ("angle1_deg", angle1),
+        ("angle2_deg", angle2),
+        ("uin_v", Cell::plain(record.link_v())),
+        ("vc_v", Cell::plain(record.capacitor_v)),
+        ("udc_v", Cell::plain(record.source_v)),
+        ("il_a", Cell::plain(record.inductor_a)),
+        ("te1_ref_nm", Cell::plain(torque_nm[0])),
+        ("te2_ref_nm", Cell::plain(torque_nm[1])),
+        ("d_sh", Cell::plain(record.duty)),
+        ("scheme", state.scheme.name().into()),
+        ("enabled", state.enabled.into()),
+        ("pulsing", state.pulsing.into()),
+        ("fault", state.fault.map_or("", |fault| fault.name()).into()),
+    ])
 }
 
 impl Recording {
@@ -184,57 +162,31 @@ impl Recording {
     pub fn trip(&self) -> Option<Trip> {
         self.rows.iter().find_map(|row| row.trip)
     }
+}
 
-    /// Writes trace.csv.
-    pub fn write_trace(&self, path: &Path) -> Result<()> {
-        write_whole(path, |out| {
-            out.write_record(COLUMNS)?;
-            for row in &self.rows {
-                out.write_record(row.fields())?;
-            }
-            Ok(())
-        })
+impl Recorded for Recording {
+    fn trip(&self) -> Option<Trip> {
+        self.trip()
     }
 
-    /// Writes recorder.csv, if a fault has frozen the flight recorder; else takes away what an earlier run has left.
-    pub fn write_recorder(&self, path: &Path) -> Result<()> {
-        if self.recorded.is_empty() {
-            return forget(path);
+    fn end_s(&self) -> f64 {
+        self.rows.last().map_or(0.0, |row| row.t_s)
+    }
+
+    fn write_trace(&self, path: &Path) -> Result<()> {
+        write_rows(path, self.rows.iter().map(Row::columns))
+    }
+
+    fn write_recorder(&self, path: &Path) -> Result<()> {
+        write_recorder(path, &self.recorded, recorder_columns)
+    }
+
+    /// Edges lie on a grid of 1.25 ns, and are written to a hundredth of a nanosecond.
+    fn write_events(&self, folder: &Path) -> Result<()> {
+        let edge = |edge: &Edge| (Cell::short(edge.t_s, 1e11), GATES[usize::from(edge.gate)], edge.on);
+        if !self.keeps_edges {
+            return Ok(());
         }
-        write_whole(path, |out| {
-            out.write_record(RECORDER)?;
-            for (t_s, record) in &self.recorded {
-                let DualRecord { currents_a, angles, torque_nm, state, .. } = record;
-                let numbers = currents_a
-                    .iter()
-                    .flat_map(|currents| [currents.a, currents.b, currents.c])
-                    .chain(angles.map(|angle| degrees(angle) as f32))
-                    .chain([record.link_v(), record.capacitor_v, record.source_v, record.inductor_a])
-                    .chain(*torque_nm)
-                    .chain([record.duty]);
-                let flags = [state.enabled, state.pulsing].map(|flag| u8::from(flag).to_string());
-                out.write_record(
-                    [short(*t_s, 1e9)]
-                        .into_iter()
-                        .chain(numbers.map(|number| number.to_string()))
-                        .chain([state.scheme.name().to_owned()])
-                        .chain(flags)
-                        .chain([state.fault.map_or("", |fault| fault.name()).to_owned()]),
-                )?;
-            }
-            Ok(())
-        })
-    }
-
-    /// Writes edges.csv. Edges lie on a grid of 1.25 ns, and are written to a hundredth of a nanosecond.
-    pub fn write_edges(&self, path: &Path) -> Result<()> {
-        write_whole(path, |out| {
-            out.write_record(["t_s", "gate", "level"])?;
-            for edge in &self.edges {
-                let level = if edge.on { "1" } else { "0" };
-                out.write_record([&short(edge.t_s, 1e11), GATES[usize::from(edge.gate)], level])?;
-            }
-            Ok(())
-        })
+        write_edges(&folder.join("edges.csv"), self.edges.iter().map(edge))
     }
 }

@@ -4,12 +4,12 @@ use super::cases::Case;
 use super::faults::Cause;
 use super::{CARRIER_HZ, Drive};
 use crate::bench::Observed;
-use crate::bench::injected::ControlFault;
 use crate::campaign::judge::{Bounded, CURRENT_SHARE, FORCED, half_turn_s};
 use crate::campaign::outcome::{Allowed, Seen};
+use crate::inject::ControlFault;
+use crate::inject::zs9::Kind;
 use crate::plant::zs9::ZNetwork;
 use crate::run::CLOCK;
-use crate::zs9::inject::Kind;
 use crate::zs9::settings;
 
 impl Drive {

@@ -1,9 +1,9 @@
 //! What can go wrong with the ZS9.
 
-use crate::bench::injected::ControlFault;
 use crate::campaign::fault::{BENT, Named, SensorErrors, UNFELT};
-use crate::sensor_faults::{AngleFault, CurrentFault};
-use crate::zs9::inject::Kind;
+use crate::inject::ControlFault;
+use crate::inject::sensor::{AngleFault, CurrentFault};
+use crate::inject::zs9::Kind;
 use tractive::nine_switch::GATES;
 use tractive::protection::Fault;
 

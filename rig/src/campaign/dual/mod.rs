@@ -11,19 +11,21 @@ pub use ride::{Ridden, Ride, Script};
 use super::Outcome;
 use super::action::{LEAD_S, Stages};
 use super::outcome::{Seen, Setting};
-use super::without::Without;
-use crate::bench::injected::Injection;
 use crate::bench::{Flaws, Limits};
+use crate::inject::Injection;
+use crate::inject::zs9::Kind;
 use crate::machine::Machine;
 use crate::plant::zs9::{NetworkState, Zs9Plant, Zs9Settings};
 use crate::plant::{PlantSettings, SpeedSource};
-use crate::run::CLOCK;
+use crate::run::{CLOCK, Interrupts};
+use crate::scenario::System;
+use crate::scenario::zs9::SOURCE_V;
+use crate::scenario::zs9::Zs9;
+use crate::without::Without;
 use crate::zs9::bench::{Bench, BenchSettings};
-use crate::zs9::inject::Kind;
 use crate::zs9::run::Tasks;
-use crate::zs9::scenario::SOURCE_V;
 use crate::zs9::trace::Row;
-use crate::zs9::{Orders, SeenMotors, command, settings};
+use crate::zs9::{Orders, SeenMotors, settings};
 use anyhow::Result;
 use faults::Cause;
 use tractive::control::Demand;
@@ -57,7 +59,7 @@ impl Drive {
     /// # Errors
     /// Where their folder is not there.
     pub fn new(without: Option<Without>) -> Result<Self> {
-        let machine = Machine::load(command::MACHINE)?;
+        let machine = Machine::load(Zs9::MACHINE)?;
         let mut settings = settings::drive(CLOCK, CARRIER_HZ);
         let mut tables = machine.tables;
         if let Some(without) = without {

@@ -2,7 +2,7 @@
 
 use super::{SYSTEMS, sentences, text, total};
 use crate::campaign::Outcome;
-use crate::trace::write_text;
+use crate::files::write_text;
 use anyhow::{Context, Result, bail};
 use std::fmt::Write as _;
 use std::path::Path;

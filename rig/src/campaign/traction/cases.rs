@@ -1,11 +1,11 @@
 //! Where the faults of the PMaSynRM drive come.
 
 use super::faults::{Cause, faults};
-use crate::bench::inject::Kind;
 use crate::campaign::Action;
 use crate::campaign::action::{LEAD_S, fault_s};
 use crate::campaign::fault::Named;
-use crate::sensor_faults::AngleFault;
+use crate::inject::sensor::AngleFault;
+use crate::inject::traction::Kind;
 
 /// A speed, and how much of the torque envelope is asked for there.
 #[derive(Clone, Copy, Debug)]

@@ -1,10 +1,10 @@
 //! What can go wrong with the PMaSynRM drive.
 
-use crate::bench::GATES;
-use crate::bench::inject::{Kind, SupplyFault};
-use crate::bench::injected::ControlFault;
 use crate::campaign::fault::{BENT, Named, SensorErrors, UNFELT};
-use crate::sensor_faults::{AngleFault, CurrentFault};
+use crate::inject::ControlFault;
+use crate::inject::sensor::{AngleFault, CurrentFault};
+use crate::inject::traction::{Kind, SupplyFault};
+use crate::trace::GATES;
 use tractive::protection::Fault;
 
 /// What a fault is made of.

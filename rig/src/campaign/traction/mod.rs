@@ -11,13 +11,17 @@ pub use ride::{Ridden, Ride};
 use super::Outcome;
 use super::action::{FAULT_S, LEAD_S, Stages};
 use super::outcome::{Seen, Setting};
-use super::without::Without;
-use crate::bench::inject::{Injection, Kind};
 use crate::bench::{self, Bench, Flaws, Limits, Supply};
+use crate::inject::Injection;
+use crate::inject::traction::Kind;
 use crate::machine::Machine;
 use crate::plant::{LineFilter, Plant, PlantSettings, SpeedSource};
-use crate::run::{CLOCK, Tasks};
+use crate::run::traction::Tasks;
+use crate::run::{CLOCK, Interrupts};
+use crate::scenario::System;
+use crate::scenario::traction::Traction;
 use crate::trace::Row;
+use crate::without::Without;
 use anyhow::Result;
 use faults::Cause;
 use tractive::control::{Demand, Gains};
@@ -50,7 +54,7 @@ impl Drive {
     /// # Errors
     /// Where its folder is not there.
     pub fn new(without: Option<Without>) -> Result<Self> {
-        let machine = Machine::load("pmasynrm-180kw")?;
+        let machine = Machine::load(Traction::MACHINE)?;
         let tables = without.map_or(machine.tables, |without| without.tables(machine.tables));
         Ok(Self { machine, tables, without, ladder: Ladder::PAPER })
     }

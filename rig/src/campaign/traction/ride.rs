@@ -1,10 +1,12 @@
 //! Drives that are written down as what happens when, instead of cases.
 
 use super::{Drive, STAGES};
-use crate::bench::inject::{Injection, Kind};
 use crate::bench::{self, Bench, Flaws, Observed};
 use crate::campaign::action::LEAD_S;
+use crate::inject::Injection;
+use crate::inject::traction::Kind;
 use crate::plant::{Plant, PlantSettings, SpeedSource};
+use crate::run::Interrupts;
 use crate::steps::held;
 use crate::trace::Row;
 use anyhow::Result;

@@ -27,8 +27,8 @@ pub use motor::{Motor, MotorEnergies};
 pub use network::{NetworkState, ZNetwork};
 pub use vector::Vector;
 
-use super::legs::Clamp;
-use super::{LONGEST_STEP_S, PlantSettings, SpeedSource};
+use super::legs::{Clamp, LONGEST_STEP_S};
+use super::{PlantSettings, SpeedSource};
 use bridge::Bridge;
 use core::f64::consts::TAU;
 use means::Adder;

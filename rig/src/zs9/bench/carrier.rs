@@ -2,7 +2,7 @@
 
 use super::{Bench, BenchError};
 use crate::bench::Tick;
-use crate::zs9::inject::Kind;
+use crate::inject::zs9::Kind;
 use tractive::drive::dual::Settings;
 
 impl Bench {

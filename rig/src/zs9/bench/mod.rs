@@ -10,21 +10,21 @@ mod record;
 mod run;
 mod sampling;
 mod settings;
+mod sums;
 mod watch;
 
 pub use crate::bench::BenchError;
 pub use settings::{BenchSettings, Course};
 
-use super::inject::Spoiler;
 use super::line::{LineSide, LineTimes};
 use super::operator::{Operator, Orders};
 use super::sensors::Sensors;
 use super::trace::Row;
 use crate::bench::{Conversions, Converter, Due, Observed, Tick, Timeline};
+use crate::inject::zs9::Spoiler;
 use crate::plant::zs9::{NetworkState, Zs9Plant};
-use crate::run::Supervised;
 use gates::Gates;
-use record::Sums;
+use sums::Sums;
 use tractive::drive::dual::{COMPARE_STEPS, DualReport};
 use tractive::operator::{DualStatus, Feedback};
 use tractive::ports::{DualSample, GateFeedback, PlayedPeriod};
@@ -157,17 +157,6 @@ impl Bench {
         self.plant.motors().each_ref().map(|motor| motor.speed_rpm())
     }
 
-    /// Whether the recording is complete.
-    pub fn is_done(&self) -> bool {
-        self.rows.len() >= self.rows_wanted
-    }
-
-    /// Share of the run that is done, 0 ..= 1.
-    pub fn progress(&self) -> f64 {
-        let end_s = self.settings.lead_s + self.settings.duration_s;
-        ((self.time.now - self.time.origin) as f64 * self.time.step_s() / end_s).min(1.0)
-    }
-
     /// Time since the recording's beginning, in s.
     pub fn time_s(&self) -> f64 {
         self.time.now_s()
@@ -212,20 +201,5 @@ impl Bench {
         if self.off_at.is_none() {
             self.off_at = Some((at, false));
         }
-    }
-}
-
-impl Supervised for Bench {
-    fn instant_s(&self, instant: Instant) -> f64 {
-        self.time.seconds(self.time.widen(instant))
-    }
-
-    fn loads_from(&mut self, instant: Instant, loads_nm: [f64; 2]) {
-        self.loads.push(self.time.widen(instant), loads_nm);
-    }
-
-    fn end_at(&mut self, instant: Instant) {
-        let end_s = self.time.seconds(self.time.widen(instant));
-        self.rows_wanted = self.rows_wanted.min((end_s / self.settings.trace_step_s).round() as usize);
     }
 }

@@ -1,23 +1,42 @@
 //! The trace.
 
 use super::Bench;
-use crate::bench::Tick;
+use crate::bench::{Simulated, Tick};
 use crate::zs9::trace::{Edge, MotorRow, Recording, Row};
 use tractive::recorder::DualRecord;
+use tractive::time::Instant;
 
-/// What is summed up over a step of the trace, each value times its time, in steps.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Sums {
-    pub steps: f64,
-    pub torque_refs: [f64; 2],
-    pub loads: [f64; 2],
-    pub source_v: f64,
-    pub shorted: f64,
-}
+impl Simulated for Bench {
+    type Record = DualRecord;
+    type Recording = Recording;
 
-impl Bench {
-    /// What was recorded: what the bench saw, and what the drive's own recorder holds; instants in seconds from its beginning.
-    pub fn into_recording(self, records: Vec<DualRecord>) -> Recording {
+    fn is_done(&self) -> bool {
+        self.rows.len() >= self.rows_wanted
+    }
+
+    fn progress(&self) -> f64 {
+        let end_s = self.settings.lead_s + self.settings.duration_s;
+        ((self.time.now - self.time.origin) as f64 * self.time.step_s() / end_s).min(1.0)
+    }
+
+    fn has_control(&self, instant: Instant) -> bool {
+        self.spoiler.injected.has_control(self.time.seconds(self.time.widen(instant)))
+    }
+
+    fn instant_s(&self, instant: Instant) -> f64 {
+        self.time.seconds(self.time.widen(instant))
+    }
+
+    fn loads_from(&mut self, instant: Instant, loads_nm: [f64; 2]) {
+        self.loads.push(self.time.widen(instant), loads_nm);
+    }
+
+    fn end_at(&mut self, instant: Instant) {
+        let end_s = self.time.seconds(self.time.widen(instant));
+        self.rows_wanted = self.rows_wanted.min((end_s / self.settings.trace_step_s).round() as usize);
+    }
+
+    fn into_recording(self, records: Vec<DualRecord>) -> Recording {
         let recorded = records
             .into_iter()
             .map(|record| (self.time.seconds(self.time.widen(record.at)), record))
@@ -25,9 +44,11 @@ impl Bench {
         let edge =
             |(at, gate, on): &(Tick, u8, bool)| Edge { t_s: self.time.seconds(*at), gate: *gate, on: *on };
         let edges = self.gates.edges().iter().map(edge).collect();
-        Recording { rows: self.rows, edges, recorded }
+        Recording { rows: self.rows, keeps_edges: self.settings.edges, edges, recorded }
     }
+}
 
+impl Bench {
     /// Ends the row that ends now, if one has begun.
     pub(super) fn record(&mut self) {
         let sums = std::mem::take(&mut self.sums);

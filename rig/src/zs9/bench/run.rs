@@ -2,9 +2,9 @@
 
 use super::{Bench, BenchError};
 use crate::bench::Tick;
-use crate::benchmark::in_plant;
+use crate::inject::zs9::Kind;
+use crate::plant::stopwatch::in_plant;
 use crate::plant::zs9::LegGates;
-use crate::zs9::inject::Kind;
 use tractive::protection::SafeState;
 
 /// The capacitor behind the source's contactor, in F: as large as the network's.

@@ -1,8 +1,8 @@
 //! What the drive's interrupts are told, and what control reports.
 
 use super::{Bench, BenchError};
+use crate::inject::zs9::Kind;
 use crate::steps::held;
-use crate::zs9::inject::Kind;
 use tractive::drive::dual::DualReport;
 use tractive::frames::Abc;
 use tractive::ports::{DualSample, HardwareBreak, PowerSample};
@@ -27,11 +27,6 @@ impl Bench {
     /// By how much the control interrupt is late, in ticks.
     pub fn control_late_ticks(&self) -> u32 {
         self.spoiler.injected.late_ticks(self.time.now_s())
-    }
-
-    /// Whether the control interrupt comes at this instant at all.
-    pub fn has_control(&self, instant: Instant) -> bool {
-        self.spoiler.injected.has_control(self.time.seconds(self.time.widen(instant)))
     }
 
     /// What the PWM interrupt converts at the peak `instant`.

@@ -1,8 +1,8 @@
 //! What the ZS9's bench is made of.
 
-use crate::bench::injected::Injection;
 use crate::bench::{Flaws, Limits};
-use crate::zs9::inject::Kind;
+use crate::inject::Injection;
+use crate::inject::zs9::Kind;
 use tractive::nine_switch::Scheme;
 use tractive::time::Clock;
 

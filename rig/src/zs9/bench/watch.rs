@@ -2,8 +2,8 @@
 
 use super::Bench;
 use crate::bench::{Peaks, Stored};
+use crate::inject::zs9::Kind;
 use crate::plant::zs9::Source;
-use crate::zs9::inject::Kind;
 
 impl Bench {
     /// What happens to source and network, and what the plant shows.

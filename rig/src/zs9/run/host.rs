@@ -1,9 +1,11 @@
-//! On the host: the firmware's own tasks, called in the order in which their interrupts would come.
+//! The ZS9's tasks on its bench.
 
-use crate::campaign::without::Without;
-use crate::run::{Progress, Supervised, Supervisor, turn};
+use crate::bench::Simulated;
+use crate::run::{Interrupts, Supervisor, on_host, turn};
+use crate::without::Without;
 use crate::zs9::bench::Bench;
 use crate::zs9::trace::Recording;
+use anyhow::Result;
 use tractive::drive::dual::{ControlTask, DualReport, PwmTask, Settings, Shared};
 use tractive::frames::Abc;
 use tractive::machine::{Ratings, Tables};
@@ -121,62 +123,32 @@ impl OperatorPort<DualDemands> for Idle<'_, '_> {
             self.port.error = Some(error.into());
         }
         if let Some(frame) = self.station.tell(status) {
-            self.supervisor.hear(Supervised::instant_s(self.port.bench, from), &frame);
+            self.supervisor.hear(self.port.bench.instant_s(from), &frame);
         }
     }
 }
 
-/// Runs until the recording is complete.
-///
-/// # Errors
-/// Where the bench cannot go on.
-pub fn run_on_host(
-    name: &str,
-    mut bench: Bench,
-    tables: &'static Tables,
-    settings: Settings,
-) -> anyhow::Result<Recording> {
-    let recorder = DualRecorder::new();
-    run(name, &mut bench, Tasks::new(tables, settings).recorded_by(&recorder))?;
-    Ok(recording(bench, &recorder))
-}
-
-/// The same, commanded over the protocol.
+/// Runs until the recording is complete; a supervisor commands over the protocol, on this line side.
 ///
 /// # Errors
 /// Where the bench or the supervisor cannot go on.
-pub fn run_supervised_on_host(
+pub fn run_on_host(
     name: &str,
-    mut bench: Bench,
+    bench: Bench,
     tables: &'static Tables,
     settings: Settings,
-    line: Line,
-    supervisor: &mut dyn Supervisor,
-) -> anyhow::Result<Recording> {
+    line: Option<Line>,
+    supervisor: Option<&mut dyn Supervisor>,
+) -> Result<Recording> {
     let recorder = DualRecorder::new();
-    // One a run, for as long as the program lasts, as the tables are.
-    let ratings: &'static Ratings = Box::leak(Box::new(settings.operator_ratings(&tables.ratings)));
     let mut tasks = Tasks::new(tables, settings).recorded_by(&recorder);
-    tasks.wire = Some(Wire {
-        station: Zs9Station::new(ratings),
-        slot: DualSlot::new(),
-        operator: operator::Settings::rated(ratings, slot_s(&settings.clock), Some(line)),
-        supervisor,
+    tasks.wire = supervisor.map(|supervisor| {
+        // One a run, for as long as the program lasts, as the tables are.
+        let ratings: &'static Ratings = Box::leak(Box::new(settings.operator_ratings(&tables.ratings)));
+        let operator = operator::Settings::rated(ratings, slot_s(&settings.clock), line);
+        Wire { station: Zs9Station::new(ratings), slot: DualSlot::new(), operator, supervisor }
     });
-    run(name, &mut bench, tasks)?;
-    Ok(recording(bench, &recorder))
-}
-
-fn run(name: &str, bench: &mut Bench, mut tasks: Tasks) -> anyhow::Result<()> {
-    let mut progress = Progress::new(name);
-    tasks.drive(bench, |bench| {
-        progress.show(bench.progress());
-        true
-    })
-}
-
-fn recording(bench: Bench, recorder: &DualRecorder) -> Recording {
-    bench.into_recording((0..).map_while(|index| recorder.read(index)).collect())
+    on_host(name, bench, tasks, |index| recorder.read(index))
 }
 
 /// Both tasks and the cells between them.
@@ -224,39 +196,31 @@ impl<'a> Tasks<'a> {
     pub fn trip(&self) -> Option<Trip> {
         self.control.trip().or(self.pwm.trip())
     }
+}
 
-    /// Until the bench's recording is complete, or nobody wants to see more of it.
-    ///
-    /// # Errors
-    /// Where the bench or the supervisor cannot go on.
-    pub fn drive(
-        &mut self,
-        bench: &mut Bench,
-        mut goes_on: impl FnMut(&Bench) -> bool,
-    ) -> anyhow::Result<()> {
-        while !bench.is_done() {
-            let (control_at, pwm_at) = (self.control.next_call(), self.pwm.next_call());
-            let has_control = bench.has_control(control_at);
-            let mut port = Port { bench, desk: &self.desk, error: None };
-            // They never meet: control comes at valleys, PWM at peaks.
-            if control_at.reached(pwm_at) || !has_control {
-                self.pwm.run(&mut port, &self.shared);
-            } else {
-                self.control.run(&mut port, &self.shared);
-                // The idle loop goes on where the interrupt ends.
-                if let Some(Wire { station, slot, operator, supervisor }) = &mut self.wire {
-                    let settings = station.settings(operator);
-                    let mut idle = Idle { port: &mut port, station, supervisor: *supervisor };
-                    slot.run(&self.desk, &mut idle, &settings, &self.clock);
-                }
-            }
-            if let Some(error) = port.error {
-                return Err(error);
-            }
-            if !goes_on(bench) {
-                break;
-            }
+impl Interrupts for Tasks<'_> {
+    type Bench = Bench;
+
+    /// They never meet: control comes at valleys, PWM at peaks.
+    fn next_calls(&self) -> [Instant; 2] {
+        [self.control.next_call(), self.pwm.next_call()]
+    }
+
+    fn pwm(&mut self, bench: &mut Bench) -> Result<()> {
+        let mut port = Port { bench, desk: &self.desk, error: None };
+        self.pwm.run(&mut port, &self.shared);
+        port.error.map_or(Ok(()), Err)
+    }
+
+    fn control(&mut self, bench: &mut Bench) -> Result<()> {
+        let mut port = Port { bench, desk: &self.desk, error: None };
+        self.control.run(&mut port, &self.shared);
+        // The idle loop goes on where the interrupt ends.
+        if let Some(Wire { station, slot, operator, supervisor }) = &mut self.wire {
+            let settings = station.settings(operator);
+            let mut idle = Idle { port: &mut port, station, supervisor: *supervisor };
+            slot.run(&self.desk, &mut idle, &settings, &self.clock);
         }
-        Ok(())
+        port.error.map_or(Ok(()), Err)
     }
 }

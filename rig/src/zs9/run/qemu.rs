@@ -1,6 +1,7 @@
-//! In QEMU: the image's own interrupts, in lockstep with the bench.
+//! The ZS9's image in QEMU.
 
-use crate::run::{Calls, Emulator, Progress, Supervised, Supervisor, emulate, turn};
+use crate::bench::Simulated;
+use crate::run::{Emulator, Supervisor, in_qemu};
 use crate::zs9::bench::Bench;
 use crate::zs9::trace::Recording;
 use anyhow::{Result, bail};
@@ -13,17 +14,16 @@ use tractive::wire::{self, DualRequest, DualSetup};
 /// Where the bench cannot go on, or the emulator ends early.
 pub fn run_in_qemu(
     name: &str,
-    mut bench: Bench,
+    bench: Bench,
     setup: DualSetup,
     emulator: &Emulator,
-    mut supervisor: Option<&mut dyn Supervisor>,
+    supervisor: Option<&mut dyn Supervisor>,
 ) -> Result<Recording> {
-    let mut progress = Progress::new(name);
-    let (mut calls, mut records) = (Calls::new(""), Vec::new());
-    let outcome = emulate(emulator, |block, answers| {
+    in_qemu((name, ""), bench, emulator, supervisor, |block, answers, served| {
         let Some(request) = DualRequest::from_block(block) else {
             bail!("the firmware sent a request that is none: {block:?}");
         };
+        let bench = &mut served.bench;
         match request {
             DualRequest::Hello => answers.control(&wire::dual_setup_to_block(setup))?,
             DualRequest::ControlSample(at) => {
@@ -32,41 +32,32 @@ pub fn run_in_qemu(
                 answers.control(&wire::dual_sample_to_block(&sample, done))?;
             }
             DualRequest::ControlReport(at, report) => {
-                calls.mode = what(&report, bench.speeds_rpm());
-                calls.control();
+                served.calls.mode = what(&report, bench.speeds_rpm());
+                served.calls.control();
                 bench.control_report(at, report);
             }
             DualRequest::PowerSample(at) => answers.pwm(&wire::power_to_block(&bench.power_sample(at)?))?,
             DualRequest::Play(_, next) => {
-                calls.pwm();
+                served.calls.pwm();
                 bench.play(next);
             }
             DualRequest::GatesOff(at) => bench.gates_off(at),
             DualRequest::Leave(at) => bench.leave(at),
             DualRequest::Ask(at) => {
                 let feedback = bench.ask(at)?;
-                let frame = match &mut supervisor {
-                    Some(supervisor) => turn(*supervisor, &mut bench, at)?,
-                    None => None,
-                };
+                let frame = served.turn(at)?;
                 answers.idle(&wire::dual_asked_to_block(&feedback, frame))?;
             }
             DualRequest::Tell(from, status, frame) => {
                 bench.told(from, status)?;
-                if let (Some(supervisor), Some(frame)) = (&mut supervisor, frame) {
-                    supervisor.hear(bench.instant_s(from), &frame);
-                }
+                served.hear(from, frame);
             }
-            DualRequest::Recorded(record) => records.push(record),
+            DualRequest::Recorded(record) => served.records.push(record),
             DualRequest::End => return Ok(true),
             DualRequest::Dead => bail!("the firmware stopped in a panic or a HardFault, gates off"),
         }
-        progress.show(bench.progress());
         Ok(false)
-    });
-    calls.write(emulator.calls.as_deref())?;
-    outcome?;
-    Ok(bench.into_recording(records))
+    })
 }
 
 /// What a control interrupt was about: the scheme and what the motors do, as `rthd-braking`.

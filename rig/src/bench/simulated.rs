@@ -1,0 +1,26 @@
+//! A bench, as whoever runs a drive on it sees it.
+
+use tractive::time::Instant;
+
+/// A bench of either system.
+pub trait Simulated {
+    /// What the drive's flight recorder holds.
+    type Record;
+    /// What a run leaves.
+    type Recording;
+
+    /// Whether the recording is complete.
+    fn is_done(&self) -> bool;
+    /// Share of the run that is done, 0 ..= 1.
+    fn progress(&self) -> f64;
+    /// Whether the control interrupt comes at this instant at all.
+    fn has_control(&self, instant: Instant) -> bool;
+    /// An instant near to now, in s from the recording's beginning.
+    fn instant_s(&self, instant: Instant) -> f64;
+    /// The rotors' loads from `instant` on, in N·m; of one rotor the first.
+    fn loads_from(&mut self, instant: Instant, loads_nm: [f64; 2]);
+    /// Ends the recording at `instant`.
+    fn end_at(&mut self, instant: Instant);
+    /// The recording: what the bench saw, and what the drive's own recorder holds; instants in seconds from its beginning.
+    fn into_recording(self, records: Vec<Self::Record>) -> Self::Recording;
+}

@@ -1,0 +1,65 @@
+//! What goes wrong and when: what is the same of both systems here, the kinds of each beside it.
+
+pub mod sensor;
+pub mod traction;
+pub mod zs9;
+
+/// What goes wrong, and when.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct Injection<K> {
+    /// What.
+    pub kind: K,
+    /// From this instant of the recording on, in s.
+    pub at_s: f64,
+}
+
+/// What the control interrupt does wrong.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ControlFault {
+    /// It ends this many ticks after its deadline.
+    Late(u32),
+    /// It comes no more: no new commands.
+    Stopped,
+}
+
+/// Something that goes wrong.
+pub trait GoesWrong: Copy {
+    /// With the control interrupt.
+    fn control(self) -> Option<ControlFault>;
+}
+
+/// An injection, or none.
+#[derive(Clone, Copy, Debug)]
+pub struct Injected<K>(pub Option<Injection<K>>);
+
+impl<K> Default for Injected<K> {
+    fn default() -> Self {
+        Self(None)
+    }
+}
+
+impl<K: GoesWrong> Injected<K> {
+    /// What is wrong at an instant, if anything is.
+    pub fn kind(&self, t_s: f64) -> Option<K> {
+        self.0.as_ref().filter(|injection| t_s >= injection.at_s - 1e-9).map(|injection| injection.kind)
+    }
+
+    /// Time since it went wrong, in s; since the recording's beginning where nothing does.
+    pub fn since_s(&self, t_s: f64) -> f64 {
+        t_s - self.0.as_ref().map_or(0.0, |injection| injection.at_s)
+    }
+
+    /// By how much the control interrupt is late, in ticks.
+    pub fn late_ticks(&self, t_s: f64) -> u32 {
+        match self.kind(t_s).and_then(K::control) {
+            Some(ControlFault::Late(ticks)) => ticks,
+            _ => 0,
+        }
+    }
+
+    /// Whether the control interrupt comes at all.
+    pub fn has_control(&self, t_s: f64) -> bool {
+        self.kind(t_s).and_then(K::control) != Some(ControlFault::Stopped)
+    }
+}

@@ -1,0 +1,212 @@
+//! Things that go wrong on purpose.
+
+use super::sensor::{AngleFault, AngleSpoiler, CurrentFault, CurrentSpoiler};
+use super::{ControlFault, GoesWrong, Injected, Injection};
+use std::str::FromStr;
+use tractive::frames::Abc;
+use tractive::ports::{DualSample, MotorDemand, PowerSample};
+use tractive::protection::Fault;
+
+/// What goes wrong.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Kind {
+    /// The source is shorted.
+    SourceShort,
+    /// The source is cut off: what feeds the network is the capacitor behind its contactor.
+    SourceLost,
+    /// The source falls to 250 V.
+    SourceLow,
+    /// The source jumps to 900 V and charges the capacitors.
+    SourceHigh,
+    /// The upper motor's sensor reports that it has lost the rotor.
+    SensorLost1,
+    /// The lower motor's.
+    SensorLost2,
+    /// The upper motor's angle stands still.
+    SensorFrozen1,
+    /// The lower motor's.
+    SensorFrozen2,
+    /// The lower motor's angle jumps by 90 degrees.
+    SensorJump2,
+    /// A phase current reads three times its size.
+    Overcurrent,
+    /// A phase current reads as not a number.
+    NotFinite,
+    /// The leg v, middle gate: is never seen off.
+    LegStuckOn,
+    /// The leg w, upper gate: is never seen on.
+    LegStuckOff,
+    /// The current sensor of phase 0 ..= 2 of motor 0 or 1.
+    Current(usize, usize, CurrentFault),
+    /// The angle sensor of motor 0 or 1.
+    Angle(usize, AngleFault),
+    /// A gate's order, in the order of [`tractive::nine_switch::GATES`], is stuck, on (true) or off, until the gates are turned off
+    /// for good.
+    Gate(u8, bool),
+    /// All gates of leg 0 ..= 2 are on, until the gates are turned off for good.
+    ShootThrough(u8),
+    /// The source's switch does not turn on any more: its diode is left.
+    SourceSwitchOpen,
+    /// The source swings by this amplitude (V) at this frequency (Hz).
+    SourceSwings(f64, f64),
+    /// The capacitors lose half of their capacitance.
+    CapacitorsHalved,
+    /// The control interrupt.
+    Control(ControlFault),
+    /// A torque demand is NaN.
+    DemandNotFinite,
+    /// A link voltage is wanted that needs too much shoot-through.
+    LinkOutOfRange,
+    /// The gate drivers are not ready for 50 ms.
+    GateDriver,
+    /// Nothing on the bench: what is wrong lies elsewhere.
+    Elsewhere,
+}
+
+const NAMES: [(&str, Kind); 13] = [
+    ("source-short", Kind::SourceShort),
+    ("source-low", Kind::SourceLow),
+    ("source-high", Kind::SourceHigh),
+    ("sensor-lost-1", Kind::SensorLost1),
+    ("sensor-lost-2", Kind::SensorLost2),
+    ("sensor-frozen-1", Kind::SensorFrozen1),
+    ("sensor-frozen-2", Kind::SensorFrozen2),
+    ("sensor-jump-2", Kind::SensorJump2),
+    ("overcurrent", Kind::Overcurrent),
+    ("not-finite", Kind::NotFinite),
+    ("leg-stuck-on", Kind::LegStuckOn),
+    ("leg-stuck-off", Kind::LegStuckOff),
+    ("gate-driver", Kind::GateDriver),
+];
+
+impl GoesWrong for Kind {
+    fn control(self) -> Option<ControlFault> {
+        match self {
+            Self::Control(fault) => Some(fault),
+            _ => None,
+        }
+    }
+}
+
+/// Written `NAME@S`.
+impl FromStr for Injection<Kind> {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let parse = || {
+            let (name, at) = text.split_once('@')?;
+            let (_, kind) = NAMES.into_iter().find(|(known, _)| *known == name)?;
+            let at_s = at.parse::<f64>().ok().filter(|at_s| at_s.is_finite())?;
+            Some(Self { kind, at_s })
+        };
+        let names = NAMES.map(|(name, _)| name).join(", ");
+        parse().ok_or_else(|| format!("must be NAME@SECONDS, NAME one of {names}"))
+    }
+}
+
+/// Holds what a fault does to the samples.
+#[derive(Clone, Debug, Default)]
+pub struct Spoiler {
+    /// What goes wrong.
+    pub injected: Injected<Kind>,
+    before: Option<DualSample>,
+    current: Option<(usize, CurrentSpoiler)>,
+    angle: Option<(usize, AngleSpoiler)>,
+}
+
+/// How long the gate drivers are not ready, in s.
+const DRIVER_FAULT_S: f64 = 0.05;
+
+impl Spoiler {
+    /// Spoils from the injection's instant on.
+    pub fn new(injection: Option<Injection<Kind>>) -> Self {
+        let (mut current, mut angle) = (None, None);
+        match injection.map(|injection| injection.kind) {
+            Some(Kind::Current(motor, phase, fault)) => {
+                current = Some((motor, CurrentSpoiler::new(phase, fault)));
+            }
+            Some(Kind::Angle(motor, fault)) => angle = Some((motor, AngleSpoiler::new(fault))),
+            _ => {}
+        }
+        Self { injected: Injected(injection), before: None, current, angle }
+    }
+
+    /// What the converters make of the phase currents.
+    fn currents(&mut self, t_s: f64, currents_a: &mut [Abc; 2]) {
+        let broken = self.injected.kind(t_s).is_some();
+        if let Some((motor, sensor)) = &mut self.current
+            && let Some(currents_a) = currents_a.get_mut(*motor)
+        {
+            *currents_a = sensor.read(broken, *currents_a);
+        }
+    }
+
+    /// What holds the gates off in hardware at an instant.
+    pub fn hardware(&self, t_s: f64) -> Option<Fault> {
+        let injection = self.injected.0.filter(|injection| injection.kind == Kind::GateDriver)?;
+        (0.0..DRIVER_FAULT_S).contains(&(t_s - injection.at_s)).then_some(Fault::GateDriver)
+    }
+
+    /// The source's true voltage, in V.
+    pub fn source_v(&self, t_s: f64, source_v: f64) -> f64 {
+        match self.injected.kind(t_s) {
+            Some(Kind::SourceShort) => 1.0,
+            Some(Kind::SourceLow) => 250.0,
+            Some(Kind::SourceHigh) => 900.0,
+            Some(Kind::SourceSwings(amplitude_v, hz)) => {
+                let since_s = self.injected.since_s(t_s);
+                source_v + amplitude_v * (core::f64::consts::TAU * hz * since_s).sin()
+            }
+            _ => source_v,
+        }
+    }
+
+    /// What control sees.
+    pub fn control(&mut self, t_s: f64, sample: &mut DualSample) {
+        let before = self.before.replace(*sample).unwrap_or(*sample);
+        self.currents(t_s, &mut sample.currents_a);
+        let kind = self.injected.kind(t_s);
+        if let Some((motor, sensor)) = &mut self.angle
+            && let Some(Some(angle)) = sample.angles.get_mut(*motor)
+        {
+            *angle = sensor.read(kind.is_some(), *angle);
+        }
+        let [first, second] = &mut sample.angles;
+        match self.injected.kind(t_s) {
+            Some(Kind::SensorLost1) => *first = None,
+            Some(Kind::SensorLost2) => *second = None,
+            Some(Kind::SensorFrozen1) => {
+                *first = before.angles[0];
+                self.before = Some(*sample);
+            }
+            Some(Kind::SensorFrozen2) => {
+                *second = before.angles[1];
+                self.before = Some(*sample);
+            }
+            Some(Kind::SensorJump2) => {
+                if let Some(angle) = second {
+                    angle.0 = angle.0.wrapping_add(1 << 30);
+                }
+            }
+            Some(Kind::NotFinite) => sample.currents_a[1].b = f32::NAN,
+            Some(Kind::DemandNotFinite) => sample.demands[1] = MotorDemand::Speed(f32::NAN),
+            Some(Kind::LinkOutOfRange) => sample.link_ref_v *= 2.0,
+            _ => {}
+        }
+    }
+
+    /// What the PWM interrupt sees.
+    pub fn power(&mut self, t_s: f64, sample: &mut PowerSample) {
+        self.currents(t_s, &mut sample.currents_a);
+        match self.injected.kind(t_s) {
+            Some(Kind::Overcurrent) => {
+                let current = &mut sample.currents_a[0].a;
+                *current = 200.0_f32.copysign(*current);
+            }
+            Some(Kind::LegStuckOn) => sample.gates.off &= !(1 << 4),
+            Some(Kind::LegStuckOff) => sample.gates.on &= !(1 << 2),
+            _ => {}
+        }
+    }
+}

@@ -1,0 +1,63 @@
+//! What has to be made ready for a run, for whoever builds images and sets up the emulator.
+
+use crate::options::{On, RunOptions};
+use crate::scenario::System;
+use crate::scenario::catalogue::{self, Chosen};
+use crate::scenario::traction::Traction;
+use crate::scenario::zs9::Zs9;
+use crate::talk::{self, TalkOptions};
+use anyhow::Result;
+use serde::Serialize;
+use std::ffi::OsString;
+use std::path::PathBuf;
+
+/// What a command line asks for.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Needs {
+    /// `pmasynrm` or `zs9`.
+    pub system: &'static str,
+    /// Where the drive runs.
+    pub on: On,
+    /// The machine that was named.
+    pub machine: Option<String>,
+    /// Whether the image is still to be built.
+    pub image: bool,
+    /// Whether the emulator is still to be found.
+    pub emulator: bool,
+    /// The script of a talk that was named.
+    pub script: Option<PathBuf>,
+}
+
+impl Needs {
+    fn of(system: &'static str, options: &RunOptions) -> Self {
+        let in_qemu = options.on == On::Qemu;
+        Self {
+            system,
+            on: options.on,
+            machine: options.machine.clone(),
+            image: in_qemu && options.image.is_none(),
+            emulator: in_qemu && options.qemu.as_os_str() == "qemu-system-arm",
+            script: None,
+        }
+    }
+
+    /// Of the words behind `run`.
+    ///
+    /// # Errors
+    /// Bad usage.
+    pub fn of_run(words: Vec<OsString>) -> Result<Self> {
+        Ok(match catalogue::choose(words)? {
+            Chosen::Traction(choice) => Self::of(Traction::NAME, &choice.options),
+            Chosen::Zs9(choice) => Self::of(Zs9::NAME, &choice.options),
+        })
+    }
+
+    /// Of a talk.
+    pub fn of_talk(options: &TalkOptions) -> Self {
+        let system = match options.system {
+            talk::System::Pmasynrm => Traction::NAME,
+            talk::System::Zs9 => Zs9::NAME,
+        };
+        Self { script: options.script.clone(), ..Self::of(system, &options.run) }
+    }
+}

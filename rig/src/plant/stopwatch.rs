@@ -1,0 +1,50 @@
+//! How long the plant's steps take, of all that a thread does.
+
+use std::cell::Cell;
+
+/// Of so many steps of the plant one is timed.
+const TIMED: u64 = 16;
+
+thread_local! {
+    static STEPS: Cell<u64> = const { Cell::new(0) };
+    static IN_PLANT: Cell<f64> = const { Cell::new(0.0) };
+    /// What taking the time takes, in s.
+    static TAKING: Cell<f64> = const { Cell::new(0.0) };
+}
+
+/// Does a step of the plant, and once in a while takes its time.
+#[inline]
+pub fn in_plant<R>(step: impl FnOnce() -> R) -> R {
+    let count = STEPS.get();
+    STEPS.set(count + 1);
+    if !count.is_multiple_of(TIMED) {
+        return step();
+    }
+    let began = processor_s();
+    let result = step();
+    IN_PLANT.set(IN_PLANT.get() + processor_s() - began - TAKING.get());
+    result
+}
+
+/// What this thread has had of the processor, in s: other programs do not count.
+pub fn processor_s() -> f64 {
+    let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
+    time.tv_sec as f64 + time.tv_nsec as f64 * 1e-9
+}
+
+/// Begins to count on this thread.
+pub fn begin() {
+    STEPS.set(0);
+    IN_PLANT.set(0.0);
+    const TRIES: u32 = 10_000;
+    let began_s = processor_s();
+    for _ in 0..TRIES {
+        std::hint::black_box(processor_s());
+    }
+    TAKING.set((processor_s() - began_s) / f64::from(TRIES));
+}
+
+/// Steps of the plant since [`begin`], and what they took, in s.
+pub fn taken() -> (u64, f64) {
+    (STEPS.get(), IN_PLANT.get() * TIMED as f64)
+}

@@ -1,0 +1,252 @@
+//! The PMaSynRM drive's tasks on its bench.
+
+use crate::bench::{Bench, Simulated};
+use crate::run::{Interrupts, Supervisor, on_host, turn};
+use crate::trace::Recording;
+use crate::without::Without;
+use anyhow::Result;
+use tractive::control::{Demand, LinkWindow};
+use tractive::drive::Report;
+use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
+use tractive::frames::Abc;
+use tractive::machine::{Ratings, Tables};
+use tractive::modulation::{CarrierPeriod, Ladder, Schedule};
+use tractive::operator::{self, Desk, Feedback, Line, OperatorPort, Request, Slot, Status, slot_s};
+use tractive::ports::{ControlPort, PwmPort, Sample};
+use tractive::protection::{LegFaults, SafeState, Trip};
+use tractive::protocol::Station;
+use tractive::recorder::Recorder;
+use tractive::time::{Clock, Instant};
+
+/// The bench behind a board's ports; the first error ends the run.
+struct Port<'a, 'w> {
+    bench: &'a mut Bench,
+    without: Option<Without>,
+    desk: &'a Desk,
+    ratings: &'a Ratings,
+    wire: Option<&'a mut Wire<'w>>,
+    error: Option<anyhow::Error>,
+}
+
+/// The drive's end of the protocol, and who is at the other end.
+struct Wire<'w> {
+    station: Station,
+    supervisor: &'w mut dyn Supervisor,
+}
+
+impl ControlPort for Port<'_, '_> {
+    fn sample(&mut self, now: Instant) -> Sample {
+        let mut sample = self.bench.control_sample(now);
+        if self.bench.is_operated()
+            && let Ok(sample) = &mut sample
+        {
+            self.desk.permit(now).apply(sample);
+        }
+        sample.unwrap_or_else(|error| {
+            self.error = Some(error.into());
+            Sample {
+                currents_a: Abc::default(),
+                udc_v: 0.0,
+                angle: None,
+                demand: Demand::default(),
+                enable: false,
+                window: LinkWindow::OPEN,
+                acknowledge: 0,
+                hardware: None,
+            }
+        })
+    }
+
+    fn enter(&mut self, safe: SafeState, now: Instant) {
+        self.bench.enter(now, safe);
+    }
+
+    fn overrun_ticks(&mut self, _now: Instant) -> u32 {
+        self.bench.control_late_ticks()
+    }
+
+    fn report(&mut self, now: Instant, report: &Report) {
+        self.desk.tell(now, report);
+        self.bench.control_report(now, *report);
+    }
+
+    fn leg_faults(&mut self) -> LegFaults {
+        let found = self.bench.leg_faults();
+        self.without.map_or(found, |without| without.leg_faults(found))
+    }
+}
+
+impl PwmPort for Port<'_, '_> {
+    fn sample(&mut self, now: Instant) -> Abc {
+        self.bench.pwm_sample(now).unwrap_or_else(|error| {
+            self.error = Some(error.into());
+            Abc::default()
+        })
+    }
+
+    fn play(&mut self, now: Instant, next: &CarrierPeriod) {
+        self.bench.play(now, *next);
+    }
+
+    fn enter(&mut self, safe: SafeState, now: Instant) {
+        self.bench.enter(now, safe);
+    }
+
+    fn leave(&mut self, now: Instant) -> bool {
+        self.bench.leave(now);
+        true
+    }
+
+    fn leg_faults(&mut self) -> LegFaults {
+        let found = self.bench.leg_faults();
+        self.without.map_or(found, |without| without.leg_faults(found))
+    }
+}
+
+impl OperatorPort for Port<'_, '_> {
+    fn ask(&mut self, at: Instant, slots: u32) -> (Request, Feedback) {
+        let (request, feedback) = self.bench.ask(at).unwrap_or_else(|error| {
+            self.error = Some(error.into());
+            (Request::idle(self.ratings), Feedback::default())
+        });
+        let Some(wire) = &mut self.wire else { return (request, feedback) };
+        let frame = turn(wire.supervisor, self.bench, at).unwrap_or_else(|error| {
+            self.error = Some(error);
+            None
+        });
+        (wire.station.listen(self.desk.observed(), slots, frame.as_ref()), feedback)
+    }
+
+    fn tell(&mut self, from: Instant, status: &Status) {
+        if let Err(error) = self.bench.told(from, *status) {
+            self.error = Some(error.into());
+        }
+        let Some(wire) = &mut self.wire else { return };
+        if let Some(frame) = wire.station.tell(status) {
+            wire.supervisor.hear(self.bench.instant_s(from), &frame);
+        }
+    }
+}
+
+/// Runs until the recording is complete; a supervisor commands over the protocol.
+pub fn run_on_host(
+    name: &str,
+    bench: Bench,
+    tables: &'static Tables,
+    settings: Settings,
+    first_half_ticks: u32,
+    line: Option<Line>,
+    supervisor: Option<&mut dyn Supervisor>,
+) -> Result<Recording> {
+    let recorder = Recorder::new();
+    let mut tasks = Tasks::new(tables, settings, first_half_ticks).recorded_by(&recorder).operated_on(line);
+    tasks.wire = supervisor.map(|supervisor| Wire { station: Station::new(&tables.ratings), supervisor });
+    on_host(name, bench, tasks, |index| recorder.read(index))
+}
+
+/// Both tasks and the cells between them.
+pub struct Tasks<'a> {
+    control: ControlTask,
+    pwm: PwmTask,
+    shared: Shared<'a>,
+    desk: Desk,
+    slot: Slot,
+    operator: operator::Settings<'static>,
+    clock: Clock,
+    /// Over the protocol, if there is a supervisor.
+    wire: Option<Wire<'a>>,
+    without: Option<Without>,
+}
+
+impl<'a> Tasks<'a> {
+    /// Before their first interrupts.
+    pub fn new(tables: &'static Tables, settings: Settings, first_half_ticks: u32) -> Self {
+        Self::beginning_at(Instant(0), tables, settings, first_half_ticks)
+    }
+
+    /// The same for timers that start at another instant.
+    pub fn beginning_at(
+        origin: Instant,
+        tables: &'static Tables,
+        settings: Settings,
+        first_half_ticks: u32,
+    ) -> Self {
+        let first_control = origin.after(settings.clock.control_ticks);
+        let first_pwm = origin.after(first_half_ticks);
+        Self {
+            control: ControlTask::new(tables, settings, first_control),
+            pwm: PwmTask::new(tables, settings, first_pwm).after_halves_of(first_half_ticks),
+            shared: Shared::new(),
+            desk: Desk::new(),
+            slot: Slot::new(),
+            operator: operator::Settings::rated(&tables.ratings, slot_s(&settings.clock), None),
+            clock: settings.clock,
+            wire: None,
+            without: None,
+        }
+    }
+
+    /// The same with an operator who switches the line side, if the bench has one to ask.
+    pub fn operated_on(mut self, line: Option<Line>) -> Self {
+        self.operator.line = line;
+        self
+    }
+
+    /// The same with a flight recorder.
+    pub fn recorded_by(mut self, recorder: &'a Recorder) -> Self {
+        self.shared = Shared::recorded_by(recorder);
+        self
+    }
+
+    /// The same with the modes of another ladder.
+    pub fn on(self, ladder: Ladder) -> Self {
+        Self { pwm: self.pwm.scheduled(Schedule::on(ladder, &self.clock)), ..self }
+    }
+
+    /// The same with a protection off; its levels are the tables' business.
+    pub fn without(self, without: Without) -> Self {
+        let disarmed = without.disarmed();
+        let (control, pwm) = (self.control.without(disarmed), self.pwm.without(disarmed));
+        Self { control, pwm, without: Some(without), ..self }
+    }
+
+    /// The latched fault.
+    pub fn trip(&self) -> Option<Trip> {
+        self.control.trip().or(self.pwm.trip())
+    }
+}
+
+impl Interrupts for Tasks<'_> {
+    type Bench = Bench;
+
+    fn next_calls(&self) -> [Instant; 2] {
+        [self.control.next_call(), self.pwm.next_call()]
+    }
+
+    fn pwm(&mut self, bench: &mut Bench) -> Result<()> {
+        let (desk, ratings) = (&self.desk, self.operator.ratings);
+        let mut port =
+            Port { bench, desk, ratings, without: self.without, wire: self.wire.as_mut(), error: None };
+        self.pwm.run(&mut port, &self.shared);
+        port.error.map_or(Ok(()), Err)
+    }
+
+    fn control(&mut self, bench: &mut Bench) -> Result<()> {
+        let operator = match &self.wire {
+            Some(wire) => wire.station.settings(&self.operator),
+            None => self.operator,
+        };
+        let (desk, ratings) = (&self.desk, self.operator.ratings);
+        let mut port =
+            Port { bench, desk, ratings, without: self.without, wire: self.wire.as_mut(), error: None };
+        if self.control.wants_revision() {
+            self.pwm.revise(&mut port, &self.shared);
+        }
+        self.control.run(&mut port, &self.shared);
+        // The idle loop goes on where the interrupt ends.
+        if port.bench.is_operated() {
+            self.slot.run(&self.desk, &mut port, &operator, &self.clock);
+        }
+        port.error.map_or(Ok(()), Err)
+    }
+}

@@ -1,0 +1,7 @@
+//! The PMaSynRM drive on the host and in QEMU.
+
+mod host;
+mod qemu;
+
+pub use host::{Tasks, run_on_host};
+pub use qemu::run_in_qemu;

@@ -1,0 +1,60 @@
+//! The PMaSynRM drive's image in QEMU.
+
+use crate::bench::{Bench, Simulated};
+use crate::run::{Emulator, Supervisor, in_qemu};
+use crate::trace::Recording;
+use anyhow::{Result, bail};
+use tractive::modulation::Mode;
+use tractive::wire::{self, Request, Setup};
+
+/// Runs until the recording is complete; a supervisor commands over the protocol.
+///
+/// # Errors
+/// Where the bench cannot go on, or the emulator ends early.
+pub fn run_in_qemu(
+    name: &str,
+    bench: Bench,
+    setup: Setup,
+    emulator: &Emulator,
+    supervisor: Option<&mut dyn Supervisor>,
+) -> Result<Recording> {
+    in_qemu((name, Mode::default().name()), bench, emulator, supervisor, |block, answers, served| {
+        let Some(request) = Request::from_block(block) else {
+            bail!("the firmware sent a request that is none: {block:?}");
+        };
+        let bench = &mut served.bench;
+        match request {
+            Request::Hello => answers.control(&wire::setup_to_block(setup))?,
+            Request::ControlSample(at) => {
+                let sample = bench.control_sample(at)?;
+                let done = bench.is_done();
+                answers.control(&wire::sample_to_block(&sample, done))?;
+            }
+            Request::ControlReport(at, report) => {
+                served.calls.traction(&report);
+                bench.control_report(at, report);
+            }
+            Request::PwmSample(at) => answers.pwm(&wire::currents_to_block(bench.pwm_sample(at)?))?,
+            Request::Play(at, half) => {
+                served.calls.mode = half.mode.name().to_owned();
+                served.calls.pwm();
+                bench.play(at, half);
+            }
+            Request::Enter(at, safe) => bench.enter(at, safe),
+            Request::Leave(at) => bench.leave(at),
+            Request::Ask(at) => {
+                let (asked, feedback) = bench.ask(at)?;
+                let frame = served.turn(at)?;
+                answers.idle(&wire::asked_to_block(&asked, &feedback, frame))?;
+            }
+            Request::Tell(from, status, frame) => {
+                bench.told(from, status)?;
+                served.hear(from, frame);
+            }
+            Request::Recorded(record) => served.records.push(record),
+            Request::End => return Ok(true),
+            Request::Dead => bail!("the firmware stopped in a panic or a HardFault, gates off"),
+        }
+        Ok(false)
+    })
+}

@@ -1,0 +1,229 @@
+//! Every scenario by name, and the command line of each.
+//!
+//! A command line is read twice: at first by one that knows the options of all scenarios, only to find the scenario's name
+//! among their values; then by the scenario's own, which knows nothing else.
+
+use super::traction::{self as traction, Traction};
+use super::zs9::{self as zs9, Zs9};
+use super::{Choice, Scenario, System};
+use crate::options::{Options, RunOptions};
+use anyhow::{Result, anyhow, bail};
+use clap::error::{ContextKind, ErrorKind};
+use clap::{Arg, ArgAction, ArgMatches, Args, Command, FromArgMatches};
+use serde::Serialize;
+use serde_json::{Map, Value};
+use std::ffi::OsString;
+
+/// The scenario that is meant where none is named.
+pub const DEFAULT: &str = "sweep";
+
+/// A scenario of either system that was chosen.
+pub enum Chosen {
+    /// Of the PMaSynRM drive.
+    Traction(Choice<Traction>),
+    /// Of the ZS9.
+    Zs9(Choice<Zs9>),
+}
+
+/// A scenario's own part of the command line, read.
+type Own<S> = (Box<dyn Scenario<S>>, Map<String, Value>);
+
+/// A scenario: its name, the paper's figure that it answers, and its options.
+pub struct Entry<S: System> {
+    name: &'static str,
+    figure: &'static str,
+    arguments: fn(Command) -> Command,
+    read: fn(&ArgMatches) -> Result<Own<S>, clap::Error>,
+}
+
+impl<S: System> Entry<S> {
+    const fn of<T: Scenario<S> + Args + Serialize + 'static>(
+        name: &'static str,
+        figure: &'static str,
+    ) -> Self {
+        let read = |matches: &ArgMatches| -> Result<Own<S>, clap::Error> {
+            let scenario = T::from_arg_matches(matches)?;
+            let own = match serde_json::to_value(&scenario) {
+                Ok(Value::Object(own)) => own,
+                _ => Map::new(),
+            };
+            Ok((Box::new(scenario), own))
+        };
+        Self { name, figure, arguments: T::augment_args, read }
+    }
+
+    /// Its command line.
+    fn command(&self) -> Command {
+        let command = Command::new("run").arg(scenario_argument());
+        let command = (self.arguments)(Options::<S::Own>::augment_args(command));
+        command.about(self.figure).long_about(None)
+    }
+
+    fn choose(&self, matches: &ArgMatches) -> Result<Choice<S>, clap::Error> {
+        let (scenario, own) = (self.read)(matches)?;
+        let options = Options::from_arg_matches(matches)?;
+        Ok(Choice { name: self.name, figure: self.figure, scenario, own, options })
+    }
+}
+
+/// The PMaSynRM drive's.
+const TRACTION: [Entry<Traction>; 14] = [
+    Entry::of::<traction::LoadSteps>("load-steps", "figure 8: load steps at 200 r/min"),
+    Entry::of::<traction::Sweep>("sweep", "figure 9: sweep at full torque, and its changes of pulse pattern"),
+    Entry::of::<traction::Characteristic>(
+        "characteristic",
+        "figure 10: torque accuracy and efficiency at the characteristic points",
+    ),
+    Entry::of::<traction::FullStep>("full-step", "figure 8: load steps, here all of them in one"),
+    Entry::of::<traction::Steady>(
+        "steady",
+        "figures 6 and 7: current and spectrum of the mode in steady state",
+    ),
+    Entry::of::<traction::ModeBorders>(
+        "mode-borders",
+        "figure 9: changes of pulse pattern, here at constant speed by torque alone",
+    ),
+    Entry::of::<traction::Reversal>("reversal", "figure 9d: square wave, here with its torque reversed"),
+    Entry::of::<traction::Restart>("restart", "figure 9: the modes, here each caught from coasting"),
+    Entry::of::<traction::LinkSteps>("link-steps", "figure 9: the modes, here with a DC link that steps"),
+    Entry::of::<traction::Precharge>(
+        "precharge",
+        "no figure: from power-up to running and back to an empty link",
+    ),
+    Entry::of::<traction::Chopper>(
+        "chopper",
+        "no figure: full braking into a link that cannot take the energy",
+    ),
+    Entry::of::<traction::Acknowledge>(
+        "acknowledge",
+        "no figure: a gate driver fails, and the fault is acknowledged",
+    ),
+    Entry::of::<traction::Timing>(
+        "timing",
+        "no figure: every mode in half a second, for `cargo xtask timing`",
+    ),
+    Entry::of::<traction::BordersTiming>(
+        "borders-timing",
+        "no figure: modes that change again and again, for `cargo xtask test`",
+    ),
+];
+
+/// The ZS9's.
+const ZS9: [Entry<Zs9>; 5] = [
+    Entry::of::<zs9::LoadStep>("zs9-load-step", "figures 14 to 19: motor 2's load steps, motor 1 goes on"),
+    Entry::of::<zs9::Reverse>("zs9-reverse", "figures 20 to 23: motor 2 reverses, motor 1 goes on"),
+    Entry::of::<zs9::Cycle>(
+        "zs9-cycle",
+        "figures 24 to 36: the whole cycle, full torque, constant power, cruise, brake",
+    ),
+    Entry::of::<zs9::Steady>("zs9-steady", "table 1: harmonics of both motors' currents by scheme"),
+    Entry::of::<zs9::Timing>(
+        "zs9-timing",
+        "no figure: motoring, weakening and braking in a tenth of a second, for `cargo xtask timing`",
+    ),
+];
+
+/// The names of all, and what they are.
+pub fn names() -> impl Iterator<Item = (&'static str, &'static str)> {
+    let traction = TRACTION.iter().map(|entry| (entry.name, entry.figure));
+    traction.chain(ZS9.iter().map(|entry| (entry.name, entry.figure)))
+}
+
+/// Those that are not short on purpose, for what counts instructions.
+pub fn listed() -> impl Iterator<Item = (&'static str, &'static str)> {
+    names().filter(|(name, _)| !name.ends_with("timing"))
+}
+
+fn scenario_argument() -> Arg {
+    Arg::new("scenario").value_name("SCENARIO").default_value(DEFAULT).help("What to run")
+}
+
+/// The name among the words, or the default; `None` where there is no name and help is asked for.
+fn name(words: &[OsString]) -> Option<String> {
+    let help = Arg::new("help").long("help").short('h').action(ArgAction::SetTrue);
+    let all = TRACTION.iter().map(Entry::command).chain(ZS9.iter().map(Entry::command));
+    let mut any = Command::new("any").disable_help_flag(true).ignore_errors(true).arg(help);
+    for command in all {
+        for argument in command.get_arguments() {
+            if any.get_arguments().all(|known| known.get_id() != argument.get_id()) {
+                let required_not = argument.clone().required(false);
+                any = any.arg(required_not);
+            }
+        }
+    }
+    let matches = any.get_matches_from(std::iter::once(&OsString::from("any")).chain(words));
+    let named = matches.value_source("scenario") == Some(clap::parser::ValueSource::CommandLine);
+    let is_help = matches.try_get_one::<bool>("help").ok().flatten() == Some(&true);
+    if is_help && !named {
+        return None;
+    }
+    // What follows a value that is none is not read: the scenario's own command line says what is wrong.
+    Some(matches.get_one::<String>("scenario").map_or(DEFAULT, String::as_str).to_owned())
+}
+
+/// The help of all scenarios.
+fn help() -> clap::Error {
+    let list: Vec<_> = listed().map(|(name, figure)| format!("  {name:<16} {figure}")).collect();
+    let list = format!("Scenarios:\n{}\n\n`run SCENARIO --help` lists the options of each.", list.join("\n"));
+    let command = Command::new("run").bin_name(program()).arg(scenario_argument());
+    let command = RunOptions::augment_args(command).after_help(list);
+    let command = command.about("Runs a scenario and writes its files").long_about(None);
+    let asked = command.try_get_matches_from(["run", "--help"]);
+    asked.expect_err("help is no match")
+}
+
+/// What the usage calls this program; who calls it for others says so.
+fn program() -> String {
+    std::env::var("TRACTIVE_PROGRAM").unwrap_or("cargo rig".to_owned()) + " run"
+}
+
+/// Reads the words behind `run`.
+///
+/// # Errors
+/// Bad usage: clap's own where it says more than a line, or help that was asked for.
+pub fn choose<W: Into<OsString>>(words: impl IntoIterator<Item = W>) -> Result<Chosen> {
+    let words: Vec<_> = words.into_iter().map(Into::into).collect();
+    let Some(name) = name(&words) else { return Err(help().into()) };
+    if let Some(entry) = TRACTION.iter().find(|entry| entry.name == name) {
+        return Ok(Chosen::Traction(entry.choose(&matches(entry.command(), &name, &words)?)?));
+    }
+    if let Some(entry) = ZS9.iter().find(|entry| entry.name == name) {
+        return Ok(Chosen::Zs9(entry.choose(&matches(entry.command(), &name, &words)?)?));
+    }
+    let names: Vec<_> = listed().map(|(name, _)| name).collect();
+    bail!("scenario {name}: must be one of {}", names.join(", "))
+}
+
+fn matches(command: Command, name: &str, words: &[OsString]) -> Result<ArgMatches> {
+    let words = std::iter::once(OsString::from("run")).chain(words.iter().cloned());
+    command.bin_name(program()).try_get_matches_from(words).map_err(|error| {
+        match (error.kind(), error.get(ContextKind::InvalidArg)) {
+            (ErrorKind::UnknownArgument, Some(argument)) => {
+                anyhow!("{argument}: scenario {name} does not have this option")
+            }
+            _ => error.into(),
+        }
+    })
+}
+
+/// A scenario of the PMaSynRM drive, by the words behind `run`.
+///
+/// # Errors
+/// Bad usage, or a scenario of the other system.
+pub fn of_traction(line: &str) -> Result<Choice<Traction>> {
+    match choose(line.split_whitespace())? {
+        Chosen::Traction(choice) => Ok(choice),
+        Chosen::Zs9(choice) => bail!("{} is a scenario of the ZS9", choice.name),
+    }
+}
+
+/// A scenario of the ZS9, by the words behind `run`.
+///
+/// # Errors
+/// Bad usage, or a scenario of the other system.
+pub fn of_zs9(line: &str) -> Result<Choice<Zs9>> {
+    match choose(line.split_whitespace())? {
+        Chosen::Zs9(choice) => Ok(choice),
+        Chosen::Traction(choice) => bail!("{} is a scenario of the PMaSynRM drive", choice.name),
+    }
+}

@@ -1,0 +1,114 @@
+//! `run`: drives a scenario, writes its files and says what came of it.
+
+use super::catalogue::{self, Chosen};
+use super::{Choice, System};
+use crate::analysis::Figures;
+use crate::files::write_text;
+use crate::machine::Machine;
+use crate::options::RunOptions;
+use crate::report::{self, Page};
+use crate::trace::Recorded;
+use anyhow::{Context, Result};
+use serde_json::{Value, json};
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::time::Instant;
+
+/// Runs what the words behind `run` say. Exit code 1 where the drive tripped or a bound is not kept.
+///
+/// # Errors
+/// Bad usage, bad input, or a run that cannot go on.
+pub fn run(words: Vec<OsString>) -> Result<ExitCode> {
+    match catalogue::choose(words)? {
+        Chosen::Traction(choice) => run_choice(&choice),
+        Chosen::Zs9(choice) => run_choice(&choice),
+    }
+}
+
+fn run_choice<S: System>(choice: &Choice<S>) -> Result<ExitCode> {
+    let options = &choice.options.run;
+    let machine = choice.machine()?;
+    let out = folder(choice.name, options)?;
+    let began = Instant::now();
+    let recording = choice.drive(&machine)?;
+    let wall_s = began.elapsed().as_secs_f64();
+    let figures = choice.figures(&recording, &machine);
+    let summary = summary(choice, &figures, &machine)?;
+    write(choice, &recording, &machine, &figures, &out)?;
+    write_text(&out.join("summary.json"), &(serde_json::to_string_pretty(&summary)? + "\n"))?;
+    // The bounds are those of the machine that is built in.
+    let judged = machine.tables.name == S::MACHINE;
+    let trip = recording.trip();
+    if options.json {
+        crate::say!("{}", serde_json::to_string(&summary)?);
+    } else {
+        let headline = report::headline(&figures, trip, judged);
+        crate::say!("{headline} · {} · {}\n\n{}", choice.name, choice.figure, report::text(&figures));
+        let ratio = recording.end_s() / wall_s;
+        crate::say!("simulated {ratio:.1} times as fast as real time ({})", options.on.name());
+        crate::say!("report: {}", out.join("report.html").display());
+    }
+    if let Some(trip) = trip {
+        eprintln!("fault {}: {} (limit {})", trip.fault.name(), trip.value, trip.limit);
+    }
+    let kept = trip.is_none() && !(judged && figures.fall_short());
+    Ok(if kept { ExitCode::SUCCESS } else { ExitCode::from(1) })
+}
+
+/// The folder for the files of a run, made.
+///
+/// # Errors
+/// A folder that cannot be made.
+pub fn folder(name: &str, options: &RunOptions) -> Result<PathBuf> {
+    let usual = || std::env::var_os("TRACTIVE_OUT").map_or("target/tractive".into(), PathBuf::from);
+    let out = options.out.clone().unwrap_or_else(|| usual().join(name));
+    std::fs::create_dir_all(&out).with_context(|| format!("--out {}", out.display()))?;
+    Ok(out)
+}
+
+/// What produced the figures, and the figures.
+///
+/// # Errors
+/// Options that are no JSON.
+pub fn summary<S: System>(choice: &Choice<S>, figures: &Figures, machine: &Machine) -> Result<Value> {
+    // The summary shows what was used, not that nothing was said.
+    let mut options = serde_json::to_value(choice.with_step())?;
+    if let Value::Object(options) = &mut options {
+        options.insert("machine".to_owned(), choice.machine_name().into());
+        options.extend(choice.own.clone());
+    }
+    Ok(json!({
+        "scenario": choice.name,
+        "version": env!("CARGO_PKG_VERSION"),
+        "machine": machine.tables.name,
+        "on": choice.options.on.name(),
+        "options": options,
+        "figures": figures.values(),
+    }))
+}
+
+/// Writes the recording's files and the report.
+///
+/// # Errors
+/// A file that cannot be written.
+pub fn write<S: System>(
+    choice: &Choice<S>,
+    recording: &S::Recording,
+    machine: &Machine,
+    figures: &Figures,
+    out: &Path,
+) -> Result<()> {
+    recording.write_trace(&out.join("trace.csv"))?;
+    recording.write_events(out)?;
+    recording.write_recorder(&out.join("recorder.csv"))?;
+    if let Some(overview) = S::overview(recording)? {
+        write_text(&out.join("overview.svg"), &overview)?;
+    }
+    let mut page = Page::new(choice.name, choice.figure);
+    S::draw_recorder(recording, &mut page);
+    choice.scenario.plots(recording, &mut page);
+    choice.scenario.plots_beside(recording, &choice.with_step(), machine, &mut page);
+    let subtitle = format!("tractive {}, run on {}", env!("CARGO_PKG_VERSION"), choice.options.on.name());
+    write_text(&out.join("report.html"), &page.finish(&subtitle, figures)?)
+}

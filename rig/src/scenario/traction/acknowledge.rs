@@ -1,0 +1,114 @@
+//! A gate driver fails under torque: the fault, what is refused meanwhile, the acknowledge, and the machine caught again.
+
+use super::line::{self, within};
+use super::{Options, Plan, Traction};
+use crate::analysis::{self, Figures};
+use crate::bench::LinePlan;
+use crate::machine::Machine;
+use crate::options::finite;
+use crate::report::Page;
+use crate::rows::mean;
+use crate::scenario::Scenario;
+use crate::steps::held;
+use crate::trace::Recording;
+use crate::verdict::{Verdict, worst};
+use clap::Args;
+use serde::Serialize;
+use tractive::machine::Ratings;
+use tractive::operator::Request;
+use tractive::protection::Fault;
+
+/// See the module. The run ends with exit code 1, because the drive has tripped.
+#[derive(Clone, Copy, Debug, Args, Serialize)]
+pub struct Acknowledge {
+    /// Speed, in r/min.
+    #[arg(long, value_parser = finite, allow_negative_numbers = true)]
+    speed: Option<f64>,
+}
+
+const SPEED_RPM: f64 = 1_500.0;
+const FAILS_S: (f64, f64) = (1.0, 1.5);
+const CHARGE: [(f64, f64); 3] = [(0.1, 0.2), (1.35, 1.38) /* fault_not_acknowledged */, (1.9, 2.0)];
+const ENABLE: [(f64, f64); 3] = [(0.5, 1.25), (1.3, 1.33) /* fault_not_acknowledged */, (2.3, 3.0)];
+const ACKNOWLEDGE: [(f64, f64); 3] =
+    [(0.7, 0.75) /* no_fault */, (1.2, 1.25) /* cause_still_present */, (1.7, 1.75)];
+const REFUSALS: [&str; 4] =
+    ["no_fault", "cause_still_present", "fault_not_acknowledged", "fault_not_acknowledged"];
+const STATES: [&str; 13] = [
+    "self_test",
+    "ready",
+    "precharge",
+    "charged",
+    "enabled",
+    "running",
+    "fault",
+    "self_test",
+    "ready",
+    "precharge",
+    "charged",
+    "enabled",
+    "running",
+];
+const TORQUE: [(f64, f64); 3] = [(0.6, 0.5), (1.1, 0.0), (2.4, 0.5)];
+const DURATION_S: f64 = 3.0;
+
+fn request(t_s: f64, ratings: &Ratings) -> Request {
+    Request {
+        enable: within(&ENABLE, t_s),
+        charge: within(&CHARGE, t_s),
+        acknowledge: within(&ACKNOWLEDGE, t_s),
+        torque_nm: held(&TORQUE, t_s).unwrap_or(0.0) as f32 * ratings.max_torque_nm,
+        ..Request::idle(ratings)
+    }
+}
+
+impl Scenario<Traction> for Acknowledge {
+    fn plan(&self, _options: &Options, machine: &Machine) -> Plan {
+        let scale = machine.folder.parameters.rated_speed_rpm / 2_000.0;
+        let ratings = &machine.tables.ratings;
+        let line = LinePlan {
+            starts_charged: true,
+            hardware: vec![(FAILS_S.0, FAILS_S.1, Fault::GateDriver)],
+            ..LinePlan::new(line::scaled(machine), Box::new(|t_s| request(t_s, ratings)))
+        };
+        Plan::operated(DURATION_S, vec![(0.0, self.speed.unwrap_or(SPEED_RPM * scale))], line)
+    }
+
+    fn figures(&self, recording: &Recording, _options: &Options, machine: &Machine) -> Figures {
+        let mut figures = analysis::common(recording);
+        let found: Vec<_> = line::states(recording).iter().map(|entered| entered.state).collect();
+        let named = recording.trip().is_some_and(|trip| trip.fault == Fault::GateDriver);
+        // Current flows on through the diodes until the field is empty.
+        let dead = analysis::window(recording, FAILS_S.0 + 0.05, 2.3);
+        let largest_a = machine.folder.parameters.max_current_a;
+        let current = worst(dead.iter().map(|row| row.peak_current_a() / largest_a));
+        let after = analysis::window(recording, 2.8, DURATION_S);
+        let torque_nm = mean(after, |row| row.te_nm);
+        let error = (torque_nm / (0.5 * machine.folder.parameters.max_torque_nm) - 1.0).abs();
+        let mut verdicts = line::verdicts(recording, &REFUSALS);
+        verdicts.extend([
+            Verdict::at_most(
+                "states that are not the expected ones",
+                f64::from(u8::from(found != STATES)),
+                0.0,
+                "–",
+            ),
+            Verdict::at_most("fault with another name", f64::from(u8::from(!named)), 0.0, "–"),
+            Verdict::at_most("current between fault and enable (of the largest)", current, 0.02, "–"),
+            Verdict::at_most("mean torque off the demand at the end (share)", error, 0.01, "–"),
+        ]);
+        line::figures(&mut figures, recording);
+        figures.set("verdicts", verdicts);
+        figures
+    }
+
+    fn plots(&self, recording: &Recording, page: &mut Page) {
+        line::plots(page, recording);
+        page.phase_current_in(
+            "the gate driver fails: phase current u",
+            recording,
+            (FAILS_S.0 - 0.02, FAILS_S.0 + 0.05),
+        );
+        page.phase_current_in("the machine is caught: phase current u", recording, (2.28, 2.6));
+    }
+}

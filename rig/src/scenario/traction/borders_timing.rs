@@ -1,0 +1,58 @@
+//! A short drive to and fro across each border between two modes, and in and out of pulses, for `cargo xtask test --only landings`: what
+//! control executes while a mode changes and no longer.
+
+use super::script::Script;
+use super::{Options, Plan, Traction};
+use crate::machine::Machine;
+use crate::report::Page;
+use crate::scenario::Scenario;
+use crate::trace::Recording;
+use clap::Args;
+use serde::Serialize;
+
+/// Full torque, at speeds that swing across a border, and an enable that comes and goes.
+#[derive(Clone, Copy, Debug, Args, Serialize)]
+pub struct BordersTiming;
+
+/// Where the mode has changed going up and down at full torque, with a little room, in r/min.
+const SWINGS_RPM: [(f64, f64); 5] =
+    [(550.0, 620.0), (835.0, 915.0), (1050.0, 1145.0), (1650.0, 1760.0), (1835.0, 1910.0)];
+const SWINGS: usize = 4;
+/// From one end of a swing to the other, longer than a mode stays at least, and from one border to the next, in s. A quicker ramp would
+/// count as a lost angle.
+const HALF_SWING_S: f64 = 0.034;
+const RAMP_S: f64 = 0.02;
+/// Long enough for what control does now and then; then the enable goes and comes, in s. It comes once in nine halves of the asynchronous
+/// carrier, so always as near before a boundary as here the first time.
+const FIRST_S: f64 = 0.0403;
+const PAUSES: usize = 24;
+const PAUSE_S: f64 = 0.0025;
+
+impl Scenario<Traction> for BordersTiming {
+    fn plan(&self, _options: &Options, machine: &Machine) -> Plan {
+        let (first_rpm, _) = SWINGS_RPM[0];
+        let mut speed = vec![(0.0, first_rpm)];
+        let enable = (0..2 * PAUSES).map(|k| (FIRST_S + k as f64 * PAUSE_S, k % 2 == 1)).collect();
+        let mut t_s = FIRST_S + 2.0 * PAUSES as f64 * PAUSE_S;
+        for (low_rpm, high_rpm) in SWINGS_RPM {
+            for swing in 0..SWINGS {
+                let swing_s = t_s + 2.0 * swing as f64 * HALF_SWING_S;
+                speed.extend([(swing_s, low_rpm), (swing_s + HALF_SWING_S, high_rpm)]);
+            }
+            t_s += (2 * SWINGS - 1) as f64 * HALF_SWING_S + RAMP_S;
+        }
+        let torque_nm = machine.folder.parameters.max_torque_nm;
+        Script {
+            speed,
+            torque: vec![(0.0, torque_nm)],
+            enable,
+            duration_s: t_s - RAMP_S,
+            ..Script::default()
+        }
+        .plan()
+    }
+
+    fn plots(&self, recording: &Recording, page: &mut Page) {
+        page.overview(recording);
+    }
+}

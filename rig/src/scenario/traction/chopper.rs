@@ -1,0 +1,178 @@
+//! Full braking into a link that cannot take the energy: the chopper takes it; half the resistor is lost, then all of it, and the torque
+//! is folded back; then the source takes energy back and all of the torque returns.
+
+use super::line::{self, within};
+use super::{Options, Plan, Traction};
+use crate::analysis::{self, Figures};
+use crate::bench::LinePlan;
+use crate::machine::Machine;
+use crate::options::finite;
+use crate::report::Page;
+use crate::rows::mean;
+use crate::scenario::Scenario;
+use crate::trace::{Recording, Row};
+use crate::verdict::{Verdict, worst};
+use clap::Args;
+use serde::Serialize;
+use tractive::machine::Ratings;
+use tractive::operator::Request;
+
+/// See the module.
+#[derive(Clone, Copy, Debug, Args, Serialize)]
+pub struct Chopper {
+    /// Speed, in r/min.
+    #[arg(long, value_parser = finite, allow_negative_numbers = true)]
+    speed: Option<f64>,
+}
+
+const ENABLE: (f64, f64) = (0.5, 4.4);
+const BRAKE: (f64, f64) = (0.7, 4.0);
+/// The rotor is held at this speed, in r/min, but for the braking to `SLOW_RPM` with the whole chopper.
+const FAST_RPM: f64 = 2_000.0;
+const SLOW_RPM: f64 = 1_200.0;
+/// From when on half of the braking resistor is lost, then all of it, and the source takes energy back.
+const HALF_S: f64 = 1.7;
+const NONE_S: f64 = 2.4;
+const TAKES_S: f64 = 3.1;
+const DURATION_S: f64 = 4.8;
+/// What is left of a resistor that is lost, over the whole one.
+const LOST: f64 = 1e6;
+
+/// A stretch of the run.
+#[derive(Clone, Debug, Serialize)]
+struct Stretch {
+    what: &'static str,
+    /// Means over its second half.
+    link_v: f64,
+    torque_nm: f64,
+    chopper_duty: f64,
+    braking_kw: f64,
+    /// Over all of it.
+    link_peak_v: f64,
+    current_peak_a: f64,
+}
+
+fn request(t_s: f64, ratings: &Ratings) -> Request {
+    let braking = within(&[BRAKE], t_s);
+    Request {
+        enable: within(&[ENABLE], t_s),
+        charge: t_s >= 0.1,
+        torque_nm: if braking { -ratings.max_torque_nm } else { 0.0 },
+        ..Request::idle(ratings)
+    }
+}
+
+fn stretches(recording: &Recording) -> Vec<Stretch> {
+    let windows = [
+        ("the chopper takes it", BRAKE.0, HALF_S),
+        ("half of the resistor", HALF_S, NONE_S),
+        ("no resistor", NONE_S, TAKES_S),
+        ("the source takes it", TAKES_S, BRAKE.1),
+    ];
+    windows
+        .into_iter()
+        .map(|(what, from, until)| {
+            let rows = analysis::window(recording, from, until);
+            let steady = &rows[rows.len() / 2..];
+            let power = |row: &Row| -row.te_nm * row.speed_rpm * core::f64::consts::TAU / 60e3;
+            Stretch {
+                what,
+                link_v: mean(steady, |row| row.udc_v),
+                torque_nm: mean(steady, |row| row.te_nm),
+                chopper_duty: mean(steady, |row| {
+                    row.status.map_or(0.0, |status| f64::from(status.switches.chopper))
+                }),
+                braking_kw: mean(steady, power),
+                link_peak_v: worst(rows.iter().map(|row| row.udc_v)).unwrap_or(f64::NAN),
+                current_peak_a: worst(rows.iter().map(Row::peak_current_a)).unwrap_or(f64::NAN),
+            }
+        })
+        .collect()
+}
+
+impl Scenario<Traction> for Chopper {
+    fn plan(&self, _options: &Options, machine: &Machine) -> Plan {
+        let scale = machine.folder.parameters.rated_speed_rpm / 2_000.0;
+        let fast = self.speed.unwrap_or(FAST_RPM * scale);
+        let slow = fast * SLOW_RPM / FAST_RPM;
+        let speed = vec![
+            (1.0, fast),
+            (1.3, slow),
+            (1.5, slow),
+            (HALF_S, fast),
+            (TAKES_S, fast),
+            (BRAKE.1, slow),
+            (DURATION_S, slow),
+        ];
+        let ratings = &machine.tables.ratings;
+        let link = line::scaled(machine);
+        let ohm = link.chopper_ohm;
+        let line = LinePlan {
+            starts_charged: true,
+            chopper_ohm: vec![(HALF_S, 2.0 * ohm), (NONE_S, LOST * ohm)],
+            reversible: vec![(TAKES_S, true)],
+            ..LinePlan::new(link, Box::new(|t_s| request(t_s, ratings)))
+        };
+        Plan::operated(DURATION_S, speed, line)
+    }
+
+    fn figures(&self, recording: &Recording, _options: &Options, machine: &Machine) -> Figures {
+        let mut figures = analysis::common(recording);
+        let ratings = &machine.tables.ratings;
+        let stretches = stretches(recording);
+        let [whole, half, none, source] = &stretches[..] else { unreachable!("four stretches") };
+        let (trip_v, highest_v) = (f64::from(ratings.trip_dc_over_v), f64::from(ratings.dc_link_max_v));
+        // Where the link's rise ends, between its highest operating voltage (0) and the trip (1).
+        let rise = |stretch: &Stretch| (stretch.link_peak_v - highest_v) / (trip_v - highest_v);
+        let largest_a = f64::from(ratings.max_current_a);
+        let most_kw = machine.folder.parameters.max_power_w / 1e3;
+        let mut verdicts = line::verdicts(recording, &[]);
+        verdicts.extend([
+            Verdict::at_most("drive tripped", f64::from(u8::from(recording.trip().is_some())), 0.0, "–"),
+            Verdict::at_most("link's rise, of the way to its trip: chopper", rise(whole), 0.3, "–"),
+            Verdict::at_most("link's rise, of the way to its trip: half of it", rise(half), 0.7, "–"),
+            Verdict::at_most("link's rise, of the way to its trip: none", rise(none), 0.9, "–"),
+            Verdict::at_most(
+                "torque folded back while the chopper takes it (share)",
+                1.0 - whole.torque_nm / source.torque_nm,
+                0.02,
+                "–",
+            ),
+            Verdict::at_most(
+                "braking power with half of the resistor (of all)",
+                half.braking_kw / most_kw,
+                0.7,
+                "–",
+            ),
+            Verdict::at_most("braking power without it (of all)", none.braking_kw / most_kw, 0.1, "–"),
+            Verdict::at_most(
+                "peak current over the largest one",
+                worst(stretches.iter().map(|stretch| stretch.current_peak_a / largest_a)),
+                1.15,
+                "–",
+            ),
+        ]);
+        line::figures(&mut figures, recording);
+        figures.set("stretches", stretches);
+        figures.set("verdicts", verdicts);
+        figures
+    }
+
+    fn plots(&self, recording: &Recording, page: &mut Page) {
+        line::plots(page, recording);
+        page.plot_window(
+            "the braking resistor is lost: DC link",
+            "V",
+            recording,
+            (NONE_S - 0.02, NONE_S + 0.1),
+            &[("udc", |row| row.udc_v)],
+        );
+        page.plot_window(
+            "the braking resistor is lost: torque",
+            "N·m",
+            recording,
+            (NONE_S - 0.02, NONE_S + 0.1),
+            &[("after limits", |row| row.te_ref_nm), ("torque", |row| row.te_nm)],
+        );
+    }
+}

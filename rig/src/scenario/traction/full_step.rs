@@ -1,0 +1,58 @@
+//! Full torque in one step, and back.
+
+use super::load_steps::verdicts;
+use super::script::{BEGIN_S, Script};
+use super::{Options, Plan, Traction};
+use crate::analysis::{self, Figures};
+use crate::machine::Machine;
+use crate::options::finite;
+use crate::report::Page;
+use crate::scenario::Scenario;
+use crate::trace::Recording;
+use clap::Args;
+use serde::Serialize;
+
+/// 0 → full torque → 0 at `--speed`.
+#[derive(Clone, Copy, Debug, Args, Serialize)]
+pub struct FullStep {
+    /// Speed, in r/min.
+    #[arg(long, value_parser = finite, allow_negative_numbers = true)]
+    speed: Option<f64>,
+}
+
+const SPEED_RPM: f64 = 200.0;
+const HOLD_S: f64 = 0.1;
+
+impl Scenario<Traction> for FullStep {
+    fn plan(&self, _options: &Options, machine: &Machine) -> Plan {
+        let speed_rpm = self.speed.unwrap_or(SPEED_RPM);
+        Script {
+            speed: vec![(0.0, speed_rpm)],
+            torque: vec![(BEGIN_S, machine.envelope_nm(speed_rpm)), (BEGIN_S + HOLD_S, 0.0)],
+            duration_s: BEGIN_S + 2.0 * HOLD_S,
+            ..Script::default()
+        }
+        .plan()
+    }
+
+    fn figures(&self, recording: &Recording, options: &Options, machine: &Machine) -> Figures {
+        let most = machine.envelope_nm(self.speed.unwrap_or(SPEED_RPM));
+        let steps = [(BEGIN_S, 0.0, most), (BEGIN_S + HOLD_S, most, 0.0)].map(|(at_s, from_nm, to_nm)| {
+            let step = analysis::Step { at_s, from_nm, to_nm, until_s: at_s + HOLD_S };
+            analysis::step_response(recording, &step)
+        });
+        let mut figures = analysis::common(recording);
+        // Where pulses are few the demand has a slew limit: there is no step to judge.
+        let carrier = recording.rows.iter().all(|row| row.mode.is_carrier());
+        if carrier {
+            figures.set("verdicts", verdicts(&steps, options));
+        }
+        figures.set("steps", steps);
+        figures
+    }
+
+    fn plots(&self, recording: &Recording, page: &mut Page) {
+        page.phase_current(recording);
+        page.torque(recording);
+    }
+}

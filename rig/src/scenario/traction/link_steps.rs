@@ -1,0 +1,80 @@
+//! Steps of the DC link under full load.
+
+use super::script::{BEGIN_S, Script};
+use super::{Options, Plan, Traction};
+use crate::analysis::{self, Figures};
+use crate::machine::Machine;
+use crate::report::Page;
+use crate::scenario::Scenario;
+use crate::trace::{Recording, Row};
+use crate::verdict::{Verdict, worst};
+use clap::Args;
+use serde::Serialize;
+
+/// At several speeds: the link falls by 200 V, comes back, rises by 200 V, comes back.
+#[derive(Clone, Copy, Debug, Args, Serialize)]
+pub struct LinkSteps;
+
+const SPEEDS_RPM: [f64; 5] = [300.0, 1000.0, 1500.0, 1800.0, 3000.0];
+const SETTLE_S: f64 = 0.5;
+const HOLD_S: f64 = 0.15;
+const STEP_V: f64 = 200.0;
+const SHARES: [f64; 4] = [-1.0, 0.0, 1.0, 0.0];
+const SLOT_S: f64 = SETTLE_S + SHARES.len() as f64 * HOLD_S;
+
+fn begins_s(slot: usize) -> f64 {
+    BEGIN_S + slot as f64 * SLOT_S
+}
+
+impl Scenario<Traction> for LinkSteps {
+    fn plan(&self, options: &Options, machine: &Machine) -> Plan {
+        let nominal_v = options.udc.unwrap_or(machine.folder.parameters.dc_link_nominal_v);
+        let mut script = Script {
+            torque: vec![(0.0, machine.folder.parameters.max_torque_nm)],
+            slew_limited: true,
+            duration_s: begins_s(SPEEDS_RPM.len()),
+            ..Script::default()
+        };
+        for (slot, speed_rpm) in SPEEDS_RPM.into_iter().enumerate() {
+            let begin = begins_s(slot);
+            script.speed.extend([(begin + 0.5 * SETTLE_S, speed_rpm), (begin + SLOT_S, speed_rpm)]);
+            let steps = SHARES.iter().enumerate();
+            script.link.extend(
+                steps.map(|(k, share)| (begin + SETTLE_S + k as f64 * HOLD_S, nominal_v + share * STEP_V)),
+            );
+        }
+        script.plan()
+    }
+
+    fn figures(&self, recording: &Recording, _options: &Options, machine: &Machine) -> Figures {
+        let mut figures = analysis::common(recording);
+        let steps = (0..SPEEDS_RPM.len())
+            .flat_map(|slot| (0..SHARES.len()).map(move |k| begins_s(slot) + SETTLE_S + k as f64 * HOLD_S));
+        let steps: Vec<_> = steps.map(|at| analysis::transition(recording, at, at + HOLD_S)).collect();
+        let trip_a = machine.folder.parameters.trip_current_a;
+        figures.set(
+            "verdicts",
+            vec![
+                Verdict::at_most(
+                    "peak current over the trip level",
+                    worst(recording.rows.iter().map(Row::peak_current_a)).map(|peak_a| peak_a / trip_a),
+                    1.0,
+                    "–",
+                ),
+                Verdict::at_most(
+                    "peak current over the larger steady peak",
+                    worst(steps.iter().map(|step| step.peak_ratio)),
+                    f64::INFINITY,
+                    "–",
+                ),
+            ],
+        );
+        figures.set("transitions", steps);
+        figures
+    }
+
+    fn plots(&self, recording: &Recording, page: &mut Page) {
+        page.overview(recording);
+        page.plot("DC link", "V", recording, &[("udc", |row| row.udc_v)]);
+    }
+}

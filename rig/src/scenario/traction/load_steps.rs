@@ -1,0 +1,95 @@
+//! Load steps at 200 r/min: the paper's figure 8.
+
+use super::{LEAD_S, Options, Plan, Traction};
+use crate::analysis::{self, Figures, StepResponse};
+use crate::machine::Machine;
+use crate::options::RunOptions;
+use crate::report::Page;
+use crate::scenario::Scenario;
+use crate::trace::Recording;
+use crate::verdict::{Verdict, bound, torque_bound, worst};
+use clap::Args;
+use serde::Serialize;
+use tractive::control::Demand;
+
+/// 0 → 200 → … → 1,235 N·m and back, 100 ms each.
+#[derive(Clone, Copy, Debug, Args, Serialize)]
+pub struct LoadSteps;
+
+const SPEED_RPM: f64 = 200.0;
+const STEP_S: f64 = 0.1;
+const LEVELS_NM: [f64; 13] =
+    [0.0, 200.0, 400.0, 600.0, 800.0, 1000.0, 1235.0, 1000.0, 800.0, 600.0, 400.0, 200.0, 0.0];
+
+/// The levels as shares of this machine's largest torque.
+fn levels_nm(machine: &Machine) -> [f64; 13] {
+    let scale = machine.folder.parameters.max_torque_nm / LEVELS_NM[LEVELS_NM.len() / 2];
+    LEVELS_NM.map(|level| level * scale)
+}
+
+impl Scenario<Traction> for LoadSteps {
+    fn plan(&self, _options: &Options, machine: &Machine) -> Plan {
+        let levels_nm = levels_nm(machine);
+        let level_nm = move |t_s: f64| {
+            let index = (t_s / STEP_S).max(0.0) as usize;
+            levels_nm[index.min(levels_nm.len() - 1)]
+        };
+        let operator =
+            move |t_s: f64| (Demand { torque_nm: level_nm(t_s + 1e-9) as f32, slew_limited: false }, true);
+        Plan::driven(LEAD_S, STEP_S * LEVELS_NM.len() as f64, vec![(0.0, SPEED_RPM)], operator)
+    }
+
+    fn figures(&self, recording: &Recording, options: &Options, machine: &Machine) -> Figures {
+        let levels_nm = levels_nm(machine);
+        let steps = (1..LEVELS_NM.len()).map(|index| analysis::Step {
+            at_s: index as f64 * STEP_S,
+            from_nm: levels_nm[index - 1],
+            to_nm: levels_nm[index],
+            until_s: (index + 1) as f64 * STEP_S,
+        });
+        let steps: Vec<_> = steps.map(|step| analysis::step_response(recording, &step)).collect();
+        let mut figures = analysis::common(recording);
+        figures.set("verdicts", verdicts(&steps, options));
+        figures.set("steps", steps);
+        figures
+    }
+
+    fn plots(&self, recording: &Recording, page: &mut Page) {
+        page.plot("DC-link voltage", "V", recording, &[("udc", |row| row.udc_v)]);
+        page.line_voltage("Line voltage u-v", recording, (0.0, 0.3));
+        page.phase_current(recording);
+        page.torque(recording);
+        page.rotor_currents(recording);
+    }
+}
+
+/// What is wanted of every step. Of a drive with flaws it is the final mean alone: what noise and ripple do to the torque is no
+/// part of the step.
+pub fn verdicts(steps: &[StepResponse], options: &RunOptions) -> Vec<Verdict> {
+    let most = |value: fn(&StepResponse) -> f64| worst(steps.iter().map(value));
+    // 0.3 % of the command (1.5 % with flaws) or 2 N·m, whichever is more, counts as one.
+    let percent = bound(options, 0.3, 1.5);
+    let error = |step: &StepResponse| step.final_error_nm.abs() / (0.01 * percent * step.to_nm).max(2.0);
+    let ideal = |at_most: f64| bound(options, at_most, f64::INFINITY);
+    vec![
+        Verdict::at_most("t90 in ms", most(|step| step.t90_ms), ideal(2.5), "3.0 to 3.6; the paper about 2"),
+        Verdict::at_most(
+            "overshoot in % of the step",
+            most(|step| step.overshoot_percent),
+            ideal(2.0),
+            "1.7",
+        ),
+        Verdict::at_most(
+            "settled within 2 % in ms",
+            most(|step| step.settling_2_percent_ms),
+            ideal(5.0),
+            "5 % in 4.2 ms",
+        ),
+        Verdict::at_most(
+            &format!("final mean over {percent} % or 2 N·m"),
+            worst(steps.iter().map(error)),
+            torque_bound(options, 1.0, 1.0),
+            "0.02 to 0.4 %",
+        ),
+    ]
+}

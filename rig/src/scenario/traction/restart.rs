@@ -1,0 +1,96 @@
+//! Coasting with the gates off, and flying restart.
+
+use super::script::{BEGIN_S, Script};
+use super::{Options, Plan, Traction};
+use crate::analysis::{self, Catch, Figures};
+use crate::machine::Machine;
+use crate::options::RunOptions;
+use crate::report::Page;
+use crate::scenario::Scenario;
+use crate::trace::Recording;
+use crate::verdict::{Verdict, torque_bound, worst};
+use clap::Args;
+use serde::Serialize;
+
+/// At each speed: coast, catch the machine, half of the envelope's torque, release, coast.
+#[derive(Clone, Copy, Debug, Args, Serialize)]
+pub struct Restart;
+
+const SPEEDS_RPM: [f64; 9] = [0.0, 300.0, 800.0, 1050.0, 1500.0, 2000.0, 3000.0, 4500.0, 6000.0];
+const COAST_S: f64 = 0.25;
+const DRIVE_S: f64 = 0.25;
+const SLOT_S: f64 = COAST_S + DRIVE_S;
+/// Without torque before coasting, in s.
+const RELEASE_S: f64 = 0.06;
+
+fn begins_s(slot: usize) -> f64 {
+    BEGIN_S + slot as f64 * SLOT_S
+}
+
+impl Scenario<Traction> for Restart {
+    fn plan(&self, _options: &Options, machine: &Machine) -> Plan {
+        let mut script = Script {
+            enable: vec![(0.0, false)],
+            slew_limited: true,
+            duration_s: begins_s(SPEEDS_RPM.len()),
+            ..Script::default()
+        };
+        for (slot, speed_rpm) in SPEEDS_RPM.into_iter().enumerate() {
+            let begin = begins_s(slot);
+            let (catch, release) = (begin + COAST_S, begin + SLOT_S - RELEASE_S);
+            let envelope_nm = machine.envelope_nm(speed_rpm);
+            // The speed changes in the first part of the coasting.
+            script.speed.extend([(begin + 0.1, speed_rpm), (begin + SLOT_S, speed_rpm)]);
+            script.enable.extend([(catch, true), (begin + SLOT_S, false)]);
+            script.torque.extend([(catch + 0.03, 0.5 * envelope_nm), (release, 0.0)]);
+        }
+        script.plan()
+    }
+
+    fn figures(&self, recording: &Recording, options: &Options, machine: &Machine) -> Figures {
+        let catches = SPEEDS_RPM.iter().enumerate().map(|(slot, _)| {
+            let driven = (begins_s(slot) + COAST_S, begins_s(slot) + SLOT_S - RELEASE_S);
+            analysis::catch(recording, driven, machine.folder.parameters.max_current_a)
+        });
+        let catches: Vec<_> = catches.collect();
+        let mut figures = analysis::common(recording);
+        figures.set("verdicts", verdicts(&catches, options));
+        figures.set("catches", catches);
+        figures
+    }
+
+    fn plots(&self, recording: &Recording, page: &mut Page) {
+        page.overview(recording);
+        for (slot, speed_rpm) in SPEEDS_RPM.iter().enumerate() {
+            let at_s = begins_s(slot) + COAST_S;
+            let title = format!("{speed_rpm} r/min caught: phase current u");
+            page.phase_current_in(&title, recording, (at_s - 0.01, at_s + 0.06));
+        }
+    }
+}
+
+fn verdicts(catches: &[Catch], options: &RunOptions) -> Vec<Verdict> {
+    let other_mode = catches.iter().filter(|catch| catch.first_mode != catch.then_mode).count();
+    // Coasting fast, the diodes' current may be beyond the largest.
+    let over = |catch: &Catch| {
+        let allowed_a = (catch.catching_current_a / catch.share_of_largest).max(catch.coasting_current_a);
+        if catch.catching_current_a > 0.0 { catch.catching_current_a / allowed_a } else { 0.0 }
+    };
+    let error = |catch: &Catch| (catch.final_error_nm / catch.demand_nm).abs() * 100.0;
+    let driven = catches.iter().filter(|catch| catch.demand_nm != 0.0);
+    vec![
+        Verdict::at_most("catches in another mode than the speed needs", other_mode as f64, 0.0, "–"),
+        Verdict::at_most(
+            "current at a catch over the larger of the machine's and the diodes'",
+            worst(catches.iter().map(over)),
+            1.02,
+            "–",
+        ),
+        Verdict::at_most(
+            "mean torque error after a catch in %",
+            worst(driven.map(error)),
+            torque_bound(options, 0.5, 1.5),
+            "–",
+        ),
+    ]
+}

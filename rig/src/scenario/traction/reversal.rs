@@ -1,0 +1,89 @@
+//! Full power reversed in one step in square wave, released in deep weakening, and applied again.
+
+use super::script::{BEGIN_S, Script};
+use super::{Options, Plan, Traction};
+use crate::analysis::{self, Figures};
+use crate::machine::Machine;
+use crate::options::finite;
+use crate::report::Page;
+use crate::scenario::Scenario;
+use crate::spectrum;
+use crate::trace::Recording;
+use crate::verdict::{Verdict, torque_bound, worst};
+use clap::Args;
+use serde::Serialize;
+
+/// At `--speed`: full power, full braking power, nothing, full power; each for 0.4 s, in steps.
+#[derive(Clone, Copy, Debug, Args, Serialize)]
+pub struct Reversal {
+    /// Speed, in r/min.
+    #[arg(long, value_parser = finite, allow_negative_numbers = true)]
+    speed: Option<f64>,
+}
+
+const SPEED_RPM: f64 = 4000.0;
+const HOLD_S: f64 = 0.4;
+const SHARES: [f64; 4] = [1.0, -1.0, 0.0, 1.0];
+
+impl Scenario<Traction> for Reversal {
+    fn plan(&self, _options: &Options, machine: &Machine) -> Plan {
+        // The envelope makes full power of full torque.
+        let most = machine.folder.parameters.max_torque_nm;
+        let torque = SHARES.iter().enumerate().map(|(k, share)| (BEGIN_S + k as f64 * HOLD_S, share * most));
+        Script {
+            speed: vec![(0.0, self.speed.unwrap_or(SPEED_RPM))],
+            torque: torque.collect(),
+            duration_s: BEGIN_S + SHARES.len() as f64 * HOLD_S,
+            ..Script::default()
+        }
+        .plan()
+    }
+
+    fn figures(&self, recording: &Recording, options: &Options, machine: &Machine) -> Figures {
+        let at = |k: usize| BEGIN_S + k as f64 * HOLD_S;
+        let steps = (0..SHARES.len()).map(|k| analysis::transition(recording, at(k), at(k + 1)));
+        let holds = (0..SHARES.len()).filter(|k| SHARES[*k] != 0.0).map(|k| {
+            let window = (at(k + 1) - 0.5 * HOLD_S, at(k + 1));
+            let demand_nm =
+                analysis::window(recording, window.0, window.1).last().map_or(0.0, |row| row.te_ref_nm);
+            analysis::steady_point(recording, window, demand_nm, &machine.folder)
+        });
+        let (steps, holds): (Vec<_>, Vec<_>) = (steps.collect(), holds.collect());
+        let mut figures = analysis::common(recording);
+        figures.set(
+            "verdicts",
+            vec![
+                Verdict::at_most(
+                    "peak current over the larger steady peak",
+                    worst(steps.iter().map(|step| step.peak_ratio)),
+                    1.15,
+                    "–",
+                ),
+                Verdict::at_most(
+                    "mean torque error at full power in %",
+                    worst(holds.iter().map(|hold| hold.torque_error_percent.abs())),
+                    torque_bound(options, 0.5, 1.5),
+                    "0.5; 14 to 33 with an id trim",
+                ),
+            ],
+        );
+        figures.set("transitions", steps);
+        figures.set("points", holds);
+        figures
+    }
+
+    fn plots_beside(&self, recording: &Recording, options: &Options, machine: &Machine, page: &mut Page) {
+        let end_s = BEGIN_S + HOLD_S;
+        spectrum::draw(page, "full power", recording, (end_s - 0.5 * HOLD_S, end_s), options, machine);
+    }
+
+    fn plots(&self, recording: &Recording, page: &mut Page) {
+        page.overview(recording);
+        page.rotor_currents(recording);
+        for k in 0..SHARES.len() {
+            let at_s = BEGIN_S + k as f64 * HOLD_S;
+            let title = format!("phase current u at {at_s:.1} s");
+            page.phase_current_in(&title, recording, (at_s - 0.01, at_s + 0.05));
+        }
+    }
+}

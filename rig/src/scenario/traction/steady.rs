@@ -1,0 +1,126 @@
+//! One operating point in steady state: distortion and torque ripple beside what the pulses allow.
+
+use super::script::Script;
+use super::{Options, Plan, Traction, TractionOptions};
+use crate::analysis::{self, Figures};
+use crate::bound;
+use crate::distortion::{self, Distortion};
+use crate::machine::Machine;
+use crate::options::finite;
+use crate::options::{On, RunOptions};
+use crate::report::Page;
+use crate::scenario::{self, Scenario};
+use crate::spectrum;
+use crate::trace::Recording;
+use crate::verdict::Verdict;
+use clap::Args;
+use serde::Serialize;
+
+/// `--speed` and `--torque`.
+#[derive(Clone, Copy, Debug, Args, Serialize)]
+pub struct Steady {
+    /// Speed, in r/min.
+    #[arg(long, value_parser = finite, allow_negative_numbers = true)]
+    speed: Option<f64>,
+    /// Torque, in N·m; default the machine's largest.
+    #[arg(long, value_parser = finite, allow_negative_numbers = true)]
+    torque: Option<f64>,
+}
+
+const SPEED_RPM: f64 = 1000.0;
+/// Speed in r/min and torque in N·m at which the harmonics of the dead time are judged.
+const DEAD_TIME_POINT: (f64, f64) = (200.0, 100.0);
+const SETTLE_S: f64 = 0.6;
+const MEASURE_S: f64 = 0.5;
+
+impl Scenario<Traction> for Steady {
+    fn plan(&self, _options: &Options, machine: &Machine) -> Plan {
+        let (speed_rpm, torque_nm) = self.point(machine);
+        Script {
+            speed: vec![(0.0, speed_rpm)],
+            torque: vec![(0.0, torque_nm)],
+            slew_limited: true,
+            duration_s: SETTLE_S + MEASURE_S,
+            ..Script::default()
+        }
+        .plan()
+    }
+
+    fn figures(&self, recording: &Recording, options: &Options, machine: &Machine) -> Figures {
+        let (_, torque_nm) = self.point(machine);
+        let window = (SETTLE_S, SETTLE_S + MEASURE_S);
+        let mut figures = analysis::common(recording);
+        let steady = analysis::steady_point(recording, window, torque_nm, &machine.folder);
+        let measured = distortion::of_recording(recording, window, &machine.folder);
+        figures.set("harmonics", measured.harmonics());
+        let beside: Vec<_> = bound::beside(recording, window, options, machine).into_iter().collect();
+        let mut verdicts = bound::verdicts(&beside, options).to_vec();
+        if options.dead_time_us > 0.0 {
+            let judged =
+                !options.own.uncompensated && (steady.speed_rpm.abs(), torque_nm.abs()) == DEAD_TIME_POINT;
+            verdicts.extend(dead_time_verdicts(&measured, if judged { 0.5 } else { f64::INFINITY }, ""));
+            if !options.own.uncompensated
+                && let Ok(without) = self.without_compensation(window, options, machine)
+            {
+                verdicts.extend(dead_time_verdicts(&without, f64::INFINITY, ", without compensation"));
+                figures.set("harmonics_without_compensation", without.harmonics());
+            }
+        }
+        figures.set("point", vec![steady]);
+        figures.set("verdicts", verdicts);
+        figures.set("distortion", beside);
+        figures
+    }
+
+    /// The pulses' edges fall where they like between the samples: coarser ones would show more or less ripple than there is.
+    fn trace_step_s(&self, _own: &TractionOptions) -> f64 {
+        5e-6
+    }
+
+    fn plots_beside(&self, recording: &Recording, options: &Options, machine: &Machine, page: &mut Page) {
+        let window = (SETTLE_S, SETTLE_S + MEASURE_S);
+        spectrum::draw(page, "steady state", recording, window, options, machine);
+    }
+
+    fn plots(&self, recording: &Recording, page: &mut Page) {
+        let window = (SETTLE_S, SETTLE_S + 0.04);
+        page.line_voltage("line voltage u-v", recording, window);
+        page.phase_current_in("phase current u", recording, window);
+        page.plot_window(
+            "torque",
+            "N·m",
+            recording,
+            window,
+            &[("torque", |row| row.te_nm), ("demand", |row| row.te_ref_nm)],
+        );
+    }
+}
+
+impl Steady {
+    /// Speed in r/min and torque in N·m.
+    fn point(&self, machine: &Machine) -> (f64, f64) {
+        let torque_nm = self.torque.unwrap_or(machine.folder.parameters.max_torque_nm);
+        (self.speed.unwrap_or(SPEED_RPM), torque_nm)
+    }
+
+    /// The same on the host with nothing that compensates the dead time.
+    fn without_compensation(
+        &self,
+        window: (f64, f64),
+        options: &Options,
+        machine: &Machine,
+    ) -> anyhow::Result<Distortion> {
+        let run = RunOptions { on: On::Host, ..options.run.clone() };
+        let own = TractionOptions { uncompensated: true, ..options.own.clone() };
+        let recording = scenario::drive("steady", self, &Options { run, own }, machine)?;
+        Ok(distortion::of_recording(&recording, window, &machine.folder))
+    }
+}
+
+/// What the dead time leaves of the harmonics that it makes.
+fn dead_time_verdicts(measured: &Distortion, at_most: f64, how: &str) -> [Verdict; 2] {
+    [5, 7].map(|order| {
+        let share = measured.share_percent(order);
+        Verdict::at_most(&format!("harmonic {order} in % of the fundamental{how}"), share, at_most, "–")
+    })
+}

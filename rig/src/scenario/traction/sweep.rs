@@ -1,0 +1,111 @@
+//! Full torque from standstill through every mode: the paper's figure 9.
+
+use super::{LEAD_S, Options, Plan, Traction, switches};
+use crate::analysis::{self, Figures};
+use crate::machine::Machine;
+use crate::options::finite;
+use crate::options::{On, RunOptions};
+use crate::report::Page;
+use crate::scenario::{self, Scenario};
+use crate::spectrum;
+use crate::trace::{Recording, Row};
+use crate::verdict::{Verdict, worst};
+use clap::Args;
+use serde::Serialize;
+use tractive::control::Demand;
+
+/// 0 → 2,000 r/min in 8 s and 1 s hold, at the torque envelope.
+#[derive(Clone, Copy, Debug, Args, Serialize)]
+pub struct Sweep {
+    /// Add the way back.
+    #[arg(long)]
+    down: bool,
+    /// Brake instead of pulling.
+    #[arg(long)]
+    brake: bool,
+    /// Share of the full torque.
+    #[arg(long, default_value_t = 1.0, value_parser = finite, allow_negative_numbers = true)]
+    torque_scale: f64,
+    /// Last speed, in r/min.
+    #[arg(long, default_value_t = 2000.0, value_parser = finite, allow_negative_numbers = true)]
+    to: f64,
+}
+
+const SLOPE_RPM_S: f64 = 250.0;
+const HOLD_S: f64 = 1.0;
+
+impl Scenario<Traction> for Sweep {
+    fn plan(&self, _options: &Options, machine: &Machine) -> Plan {
+        let ramp_s = self.to.abs() / SLOPE_RPM_S;
+        let mut speed = vec![(0.0, 0.0), (ramp_s, self.to)];
+        let mut duration_s = ramp_s + HOLD_S;
+        if self.down {
+            speed.extend([(duration_s, self.to), (duration_s + ramp_s, 0.0)]);
+            duration_s += ramp_s;
+        }
+        let direction = if self.brake { -1.0 } else { 1.0 } * self.to.signum();
+        let torque_nm = machine.folder.parameters.max_torque_nm * self.torque_scale * direction;
+        let operator = move |t_s: f64| {
+            let torque_nm = if t_s < 0.0 { 0.0 } else { torque_nm as f32 };
+            (Demand { torque_nm, slew_limited: true }, true)
+        };
+        Plan::driven(LEAD_S, duration_s, speed, operator)
+    }
+
+    fn figures(&self, recording: &Recording, options: &Options, machine: &Machine) -> Figures {
+        let mut figures = analysis::common(recording);
+        let switches = analysis::mode_switches(recording);
+        let mut verdicts = analysis::switch_verdicts(&switches, recording, options);
+        verdicts.extend(analysis::square_verdict(recording, options));
+        if options.map_error != 0.0 {
+            verdicts.extend(self.map_verdicts(recording, options, machine));
+        }
+        figures.set("verdicts", verdicts);
+        figures.set("mode_switches", switches);
+        figures.set("modes", analysis::modes(recording));
+        figures
+    }
+
+    fn plots_beside(&self, recording: &Recording, options: &Options, machine: &Machine, page: &mut Page) {
+        // The hold at the last speed, wherever it is.
+        let fastest = recording.rows.iter().map(|row| row.speed_rpm.abs()).fold(0.0, f64::max);
+        let hold = |row: &&Row| fastest > 0.0 && row.speed_rpm.abs() > 0.999_999 * fastest;
+        if let Some(end) = recording.rows.iter().rev().find(hold) {
+            let (title, window) = (format!("{fastest:.0} r/min"), (end.t_s - 0.5 * HOLD_S, end.t_s));
+            spectrum::draw(page, &title, recording, window, options, machine);
+        }
+    }
+
+    fn plots(&self, recording: &Recording, page: &mut Page) {
+        page.overview(recording);
+        page.torque(recording);
+        page.phase_current(recording);
+        page.plot("Commanded fundamental", "V", recording, &[("u", |row| row.u_v)]);
+        page.plot(
+            "Mode (0 off, 1 async, 2 sync 15, 3 sync 12, 4 mid 7, 5 mid 3, 6 square)",
+            "",
+            recording,
+            &[("mode", |row| f64::from(row.mode as u8))],
+        );
+        page.rotor_currents(recording);
+        switches::plots(recording, page);
+    }
+}
+
+impl Sweep {
+    /// What is wanted where the flux map is wrong: little more current than with the right one, and that the drive notices.
+    fn map_verdicts(&self, recording: &Recording, options: &Options, machine: &Machine) -> [Verdict; 2] {
+        let run = RunOptions { on: On::Host, map_error: 0.0, ..options.run.clone() };
+        let right = Options { run, own: options.own.clone() };
+        let peak_a = |recording: &Recording| worst(recording.rows.iter().map(Row::peak_current_a));
+        let with_the_right_one = scenario::drive("sweep", self, &right, machine).ok();
+        let ratio = with_the_right_one.and_then(|run| Some(peak_a(recording)? / peak_a(&run)?));
+        let told = recording.rows.last().map(|row| (100.0 * row.map_error - options.map_error).abs());
+        // A wrong resistance or angle looks like a wrong map, too.
+        let told_within = if right.is_ideal() { 1.0 } else { f64::INFINITY };
+        [
+            Verdict::at_most("peak current over that with the right map", ratio, 1.1, "408 A of 247"),
+            Verdict::at_most("map error told less the true one in % of the flux", told, told_within, "–"),
+        ]
+    }
+}

@@ -1,0 +1,119 @@
+//! A short drive through every mode and up to the highest speed, for `cargo xtask timing`: every instruction of the
+//! interrupts is logged there, so a second of it takes the emulator ten.
+
+use super::{Options, Plan, Traction, line};
+use crate::bench::LinePlan;
+use crate::inject::Injection;
+use crate::inject::sensor::CurrentFault;
+use crate::inject::traction::Kind;
+use crate::machine::Machine;
+use crate::options::{finite, not_negative};
+use crate::report::Page;
+use crate::scenario::Scenario;
+use crate::trace::Recording;
+use clap::Args;
+use serde::Serialize;
+use tractive::control::Demand;
+use tractive::machine::Ratings;
+use tractive::operator::Request;
+
+/// Full torque at a speed in the middle of each mode's range, then at `--to`.
+#[derive(Clone, Copy, Debug, Args, Serialize)]
+pub struct Timing {
+    /// Brake instead of pulling.
+    #[arg(long)]
+    brake: bool,
+    /// Share of the full torque.
+    #[arg(long, default_value_t = 1.0, value_parser = finite, allow_negative_numbers = true)]
+    torque_scale: f64,
+    /// Last speed, in r/min.
+    #[arg(long, default_value_t = 2000.0, value_parser = finite, allow_negative_numbers = true)]
+    to: f64,
+    /// The demand is not finite from this time on, in s.
+    #[arg(long, value_parser = not_negative, allow_negative_numbers = true)]
+    fault_at: Option<f64>,
+    /// Control is told the same currents again and again from this time on, in s.
+    #[arg(long, value_parser = not_negative, allow_negative_numbers = true)]
+    freeze_at: Option<f64>,
+    /// A current sensor reads too much from this time on, in s.
+    #[arg(long, value_parser = not_negative, allow_negative_numbers = true)]
+    offset_at: Option<f64>,
+    /// The operator commands the drive, and the speeds come later by what that takes.
+    #[arg(long)]
+    operated: bool,
+}
+
+/// Speeds where async, sync 15, sync 12, middle 7, middle 3 and square are used, in r/min.
+const SPEEDS_RPM: [f64; 6] = [150.0, 750.0, 1000.0, 1450.0, 1800.0, 2200.0];
+/// From one speed to the next, to the last one, and at each, in s. A quicker ramp would count as a lost angle.
+const RAMP_S: f64 = 0.03;
+const LAST_RAMP_S: f64 = 0.16;
+const HOLD_S: f64 = 0.03;
+/// What is left of the run behind the fault, in s.
+const AFTER_FAULT_S: f64 = 0.005;
+const LEAD_S: f64 = 0.01;
+/// What `--offset-at` adds to a phase current, as a share of the largest: more than the sum of the phases may be.
+const OFFSET: f64 = 0.2;
+
+/// When the operator charges, enables and wants all the torque, in s, and when the speeds begin.
+const CHARGES_S: (f64, f64) = (0.1, 0.2);
+const ENABLES_S: f64 = 0.5;
+const PULLS_S: f64 = 0.6;
+const OPERATED_S: f64 = 0.7;
+
+fn request(t_s: f64, torque_nm: f32, ratings: &Ratings) -> Request {
+    Request {
+        enable: t_s >= ENABLES_S,
+        charge: (CHARGES_S.0..CHARGES_S.1).contains(&t_s),
+        torque_nm: if t_s < PULLS_S { 0.0 } else { torque_nm },
+        ..Request::idle(ratings)
+    }
+}
+
+impl Scenario<Traction> for Timing {
+    fn plan(&self, _options: &Options, machine: &Machine) -> Plan {
+        let turn = self.to.signum();
+        let (mut speed, mut t_s) = (Vec::new(), if self.operated { OPERATED_S } else { 0.0 });
+        for rpm in SPEEDS_RPM {
+            speed.extend([(t_s, rpm * turn), (t_s + HOLD_S, rpm * turn)]);
+            t_s += HOLD_S + RAMP_S;
+        }
+        t_s += LAST_RAMP_S - RAMP_S;
+        speed.extend([(t_s, self.to), (t_s + HOLD_S, self.to)]);
+        t_s += HOLD_S + RAMP_S;
+        let direction = if self.brake { -turn } else { turn };
+        let torque_nm = (machine.folder.parameters.max_torque_nm * self.torque_scale * direction) as f32;
+        let fault_s = self.fault_at.unwrap_or(f64::INFINITY);
+        let operator = move |t_s: f64| {
+            let torque_nm = if t_s < 0.0 { 0.0 } else { torque_nm };
+            (
+                Demand { torque_nm: if t_s < fault_s { torque_nm } else { f32::NAN }, slew_limited: false },
+                true,
+            )
+        };
+        let freeze_s = self.freeze_at.unwrap_or(f64::INFINITY);
+        let duration_s = t_s.min(fault_s.min(freeze_s) + AFTER_FAULT_S);
+        Plan {
+            line: self.operated.then(|| self.line(machine)),
+            freeze_at_s: self.freeze_at,
+            injection: self.offset_at.map(|at_s| {
+                let fault = CurrentFault::Offset(OFFSET * machine.folder.parameters.max_current_a);
+                Injection { kind: Kind::Current(0, fault), at_s }
+            }),
+            ..Plan::driven(LEAD_S, duration_s, speed, operator)
+        }
+    }
+
+    fn plots(&self, recording: &Recording, page: &mut Page) {
+        page.overview(recording);
+    }
+}
+
+impl Timing {
+    fn line(&self, machine: &Machine) -> LinePlan {
+        let ratings = &machine.tables.ratings;
+        let torque_nm = if self.brake { -ratings.max_torque_nm } else { ratings.max_torque_nm };
+        let commander = Box::new(move |t_s| request(t_s, torque_nm, ratings));
+        LinePlan { starts_charged: true, ..LinePlan::new(line::scaled(machine), commander) }
+    }
+}

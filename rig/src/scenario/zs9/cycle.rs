@@ -1,0 +1,195 @@
+//! The whole traction cycle under torque control: the paper's figures 24 to 36.
+
+use super::{Options, Plan, Zs9, Zs9Options, free, rad_s};
+use crate::analysis::Figures;
+use crate::machine::Machine;
+use crate::options::positive;
+use crate::plant::zs9::ZNetwork;
+use crate::report::Page;
+use crate::scenario::Scenario;
+use crate::zs9::figures;
+use crate::zs9::trace::{Recording, Row};
+use crate::zs9::{Orders, SeenMotors};
+use clap::Args;
+use serde::Serialize;
+use tractive::control::Demand;
+use tractive::ports::MotorDemand;
+
+/// 10 to 1,300 r/min at full torque, a cruise there, and back.
+#[derive(Clone, Copy, Debug, Args, Serialize)]
+pub struct Cycle {
+    /// How long it cruises, in s, up to 3600.
+    #[arg(long, default_value_t = 20.0, value_parser = cruise, allow_negative_numbers = true)]
+    cruise: f64,
+    /// Write edges.csv.
+    #[serde(skip)]
+    #[arg(long)]
+    edges: bool,
+}
+
+const LOW_RPM: f64 = 10.0;
+const HIGH_RPM: f64 = 1300.0;
+const FULL_NM: f64 = 120.0;
+/// Above it power is constant.
+const CORNER_RPM: f64 = 850.0;
+const CRUISE_NM: f64 = 60.0;
+const MOVING_LOAD_NM: f64 = 20.0;
+const INERTIA_KG_M2: f64 = 6.0;
+const LEAD_S: f64 = 0.2;
+/// Without the cruise.
+const MOVING_S: f64 = 16.5;
+
+/// The torque needs time to go, in which the speed still falls: half of `T/slew · T/J`, here with 4,000 N·m/s.
+const STOPPING_RPM: f64 = 2.9;
+
+/// What a motor is at.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Phase {
+    Before,
+    Accelerates,
+    /// Until an instant, in s.
+    Cruises(f64),
+    Brakes,
+    Done,
+}
+
+/// Full torque, or full power, at a speed.
+fn full_nm(rpm: f64) -> f64 {
+    FULL_NM * (CORNER_RPM / rpm.abs().max(CORNER_RPM))
+}
+
+fn orders(phase: &mut Phase, t_s: f64, rpm: f64, cruise_s: f64) -> (f64, f64) {
+    *phase = match *phase {
+        Phase::Before if t_s >= -1e-9 => Phase::Accelerates,
+        Phase::Accelerates if rpm >= HIGH_RPM => Phase::Cruises(t_s + cruise_s),
+        Phase::Cruises(until_s) if t_s >= until_s => Phase::Brakes,
+        Phase::Brakes if rpm <= LOW_RPM + STOPPING_RPM => Phase::Done,
+        same => same,
+    };
+    match phase {
+        Phase::Before | Phase::Done => (0.0, 0.0),
+        Phase::Accelerates => (full_nm(rpm), MOVING_LOAD_NM),
+        Phase::Cruises(_) => (CRUISE_NM, CRUISE_NM),
+        Phase::Brakes => (-full_nm(rpm), MOVING_LOAD_NM),
+    }
+}
+
+impl Scenario<Zs9> for Cycle {
+    fn trace_step_s(&self, _own: &Zs9Options) -> f64 {
+        1e-3
+    }
+
+    fn plan(&self, _options: &Options, _machine: &Machine) -> Plan {
+        let cruise_s = self.cruise;
+        let mut phases = [Phase::Before; 2];
+        let operator = move |t_s: f64, speeds: SeenMotors| {
+            let [one, two] = [0, 1].map(|k| orders(&mut phases[k], t_s, speeds[k], cruise_s));
+            let torque = |torque_nm: f64| {
+                MotorDemand::Torque(Demand { torque_nm: torque_nm as f32, slew_limited: true })
+            };
+            Orders { demands: [torque(one.0), torque(two.0)], loads_nm: [one.1, two.1], enable: true }
+        };
+        Plan {
+            lead_s: LEAD_S,
+            duration_s: MOVING_S + cruise_s,
+            speeds: [free(INERTIA_KG_M2), free(INERTIA_KG_M2)],
+            from_rpm: [LOW_RPM; 2],
+            operator: Box::new(operator),
+            edges: self.edges,
+            line: None,
+        }
+    }
+
+    fn figures(&self, recording: &Recording, options: &Options, _machine: &Machine) -> Figures {
+        let mut figures = figures::common(recording);
+        let rows = &recording.rows;
+        let reached = rows.iter().position(|row| row.motors[0].speed_rpm >= HIGH_RPM - 0.5);
+        figures.set("accelerated_s", reached.map(|k| rows[k].t_s));
+        let weakening = rows.iter().find(|row| row.motors[0].weakening);
+        figures.set("weakening_from_rpm", weakening.map(|row| row.motors[0].speed_rpm));
+        let brakes = rows.iter().position(|row| row.motors[0].torque_ref_nm < -1.0);
+        let stops = brakes.and_then(|first| {
+            let low = |row: &Row| row.motors[0].speed_rpm <= LOW_RPM + 0.2;
+            rows[first..].iter().position(low).map(|k| first + k)
+        });
+        if let (Some(first), Some(last)) = (brakes, stops) {
+            let kinetic_j = |row: &Row| -> f64 {
+                row.kinetic_speed_rpm.iter().map(|rpm| 0.5 * INERTIA_KG_M2 * rad_s(*rpm).powi(2)).sum()
+            };
+            let start = first.saturating_sub(1);
+            let (had_j, left_j) = (kinetic_j(&rows[start]), kinetic_j(&rows[last]));
+            let returned_j = rows[start].source_j - rows[last].source_j;
+            figures.set("braked_s", rows[last].t_s - rows[start].t_s);
+            figures.set("kinetic_energy_kj", (had_j - left_j) * 1e-3);
+            figures.set("returned_to_source_kj", returned_j * 1e-3);
+            figures.set("returned_percent", returned_j / (had_j - left_j) * 100.0);
+        }
+        figures.set("end_speed_rpm", rows.last().map(|row| row.motors[0].speed_rpm));
+        figures::link(&mut figures, rows, options.own.uin);
+        let source_v = super::SOURCE_V;
+        let wanted_v = 0.5 * (options.own.uin + options.udc.unwrap_or(source_v));
+        let highest_v = figures::largest(rows, |row| row.capacitor_v);
+        figures.set("capacitor_overshoot_percent", (highest_v / wanted_v - 1.0) * 100.0);
+        figures.set("power_residual_percent", residual_percent(rows));
+        figures.set("network_stored_j", ZNetwork::ZS9.capacitance_f * wanted_v * wanted_v);
+        figures
+    }
+
+    fn plots(&self, recording: &Recording, page: &mut Page) {
+        let all = (0.0, recording.rows.last().map_or(MOVING_S, |row| row.t_s));
+        let plot = |page: &mut Page, figure, title, unit, curves: &[figures::Curve]| {
+            figures::plot(page, figure, title, unit, recording, all, curves);
+        };
+        plot(page, "24 and 30", "link voltage U_in", "V", &[("U_in", |row| row.link_v)]);
+        plot(page, "25 and 31", "capacitor voltage", "V", &[("U_c", |row| row.capacitor_v)]);
+        plot(page, "26 and 32", "inductor current", "A", &[("i_L", |row| row.inductor_a)]);
+        plot(
+            page,
+            "27 and 33",
+            "torque",
+            "N·m",
+            &[("motor 1", |row| row.motors[0].torque_nm), ("motor 2", |row| row.motors[1].torque_nm)],
+        );
+        plot(
+            page,
+            "28 and 34",
+            "speed",
+            "r/min",
+            &[("motor 1", |row| row.motors[0].speed_rpm), ("motor 2", |row| row.motors[1].speed_rpm)],
+        );
+        plot(
+            page,
+            "29 and 35",
+            "d and q currents of motor 1",
+            "A",
+            &[("id", |row| row.motors[0].id_a), ("iq", |row| row.motors[0].iq_a)],
+        );
+        plot(page, "29 and 35", "phase voltage, peak", "V", &[("motor 1", |row| row.motors[0].voltage_v)]);
+        figures::over_speed(page, "36", "torque over speed", "N·m", recording, |row| {
+            row.motors[0].torque_nm
+        });
+        figures::over_speed(page, "36", "phase voltage over speed", "V", recording, |row| {
+            row.motors[0].voltage_v
+        });
+    }
+}
+
+/// What the energies of all rows leave unexplained, of the energy that went through the source either way, in percent.
+fn residual_percent(rows: &[Row]) -> f64 {
+    let through_j: f64 = rows.windows(2).map(|pair| (pair[1].source_j - pair[0].source_j).abs()).sum();
+    match (rows.first(), rows.last()) {
+        (Some(first), Some(last)) => {
+            let taken_j = last.source_j - first.source_j;
+            let explained_j = last.explained_j - first.explained_j;
+            (taken_j - explained_j).abs() / through_j * 100.0
+        }
+        _ => 0.0,
+    }
+}
+
+fn cruise(text: &str) -> Result<f64, String> {
+    match positive(text) {
+        Ok(seconds) if seconds <= 3600.0 => Ok(seconds),
+        _ => Err("must be a number above 0, at most 3600".to_owned()),
+    }
+}

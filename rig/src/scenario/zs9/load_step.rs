@@ -1,0 +1,101 @@
+//! Motor 2's load steps while motor 1 goes on: the paper's figures 14 to 19.
+
+use super::{Options, Plan, Zs9, free, rad_s, ramp};
+use crate::analysis::Figures;
+use crate::machine::Machine;
+use crate::options::finite;
+use crate::report::Page;
+use crate::rows::mean;
+use crate::scenario::Scenario;
+use crate::zs9::figures;
+use crate::zs9::trace::{Recording, Row};
+use crate::zs9::{Orders, SeenMotors};
+use clap::Args;
+use serde::Serialize;
+use tractive::ports::MotorDemand;
+
+/// Both at 1,000 r/min with 60 N·m; motor 2's load steps at 0.6 s.
+#[derive(Clone, Copy, Debug, Args, Serialize)]
+pub struct LoadStep {
+    /// By how much motor 2's load steps, in N·m, −500 to 500.
+    #[arg(long, default_value_t = 40.0, value_parser = load_step, allow_negative_numbers = true)]
+    step: f64,
+}
+
+const SPEED_RPM: f64 = 1000.0;
+const LOAD_NM: f64 = 60.0;
+const STEP_S: f64 = 0.6;
+const DURATION_S: f64 = 1.2;
+const LEAD_S: f64 = 0.6;
+/// Inertia of either motor, in kg·m².
+pub const INERTIA_KG_M2: f64 = 0.1;
+
+impl Scenario<Zs9> for LoadStep {
+    fn plan(&self, _options: &Options, _machine: &Machine) -> Plan {
+        let step_nm = self.step;
+        let operator = move |t_s: f64, _: SeenMotors| {
+            // The drive finds the speeds first; then the loads come.
+            let load_nm = LOAD_NM * ramp(t_s, -0.5, -0.4);
+            let stepped = if t_s >= STEP_S - 1e-9 { step_nm } else { 0.0 };
+            Orders {
+                demands: [MotorDemand::Speed(rad_s(SPEED_RPM) as f32); 2],
+                loads_nm: [load_nm, load_nm + stepped],
+                enable: true,
+            }
+        };
+        Plan {
+            lead_s: LEAD_S,
+            duration_s: DURATION_S,
+            speeds: [free(INERTIA_KG_M2), free(INERTIA_KG_M2)],
+            from_rpm: [SPEED_RPM; 2],
+            operator: Box::new(operator),
+            edges: true,
+            line: None,
+        }
+    }
+
+    fn figures(&self, recording: &Recording, options: &Options, _machine: &Machine) -> Figures {
+        let mut figures = figures::common(recording);
+        let (steady, after) =
+            (figures::window(recording, 0.3, STEP_S), figures::window(recording, STEP_S, DURATION_S));
+        let speed1 = mean(steady, |row| row.motors[0].speed_rpm);
+        let torque1 = mean(steady, |row| row.motors[0].torque_nm);
+        let motor1 = |what: &dyn Fn(&Row) -> f64| figures::largest(after, |row| what(row).abs());
+        figures.set("motor1_torque_deviation_nm", motor1(&|row| row.motors[0].torque_nm - torque1));
+        figures.set("motor1_speed_deviation_rpm", motor1(&|row| row.motors[0].speed_rpm - speed1));
+        let off = |row: &Row| (row.motors[1].speed_rpm - SPEED_RPM).abs();
+        figures.set("motor2_speed_deviation_rpm", figures::largest(after, off));
+        let outside = after.iter().rev().find(|row| off(row) > 0.002 * SPEED_RPM);
+        let step_s = figures::step_s(recording);
+        let back_s = outside.map_or(0.0, |row| row.t_s + step_s - STEP_S);
+        figures.set("motor2_back_within_0p2_percent_ms", back_s * 1e3);
+        figures.set("motor2_peak_torque_nm", figures::largest(after, |row| row.motors[1].torque_nm));
+        figures::link(&mut figures, after, options.own.uin);
+        figures
+    }
+
+    fn plots(&self, recording: &Recording, page: &mut Page) {
+        let around = (STEP_S - 0.1, STEP_S + 0.2);
+        let plot = |page: &mut Page, figure, title, unit, curves: &[figures::Curve]| {
+            figures::plot(page, figure, title, unit, recording, around, curves);
+        };
+        plot(page, "14", "link voltage", "V", &[("U_in", |row| row.link_v), ("U_c", |row| row.capacitor_v)]);
+        plot(page, "15", "inductor current", "A", &[("i_L", |row| row.inductor_a)]);
+        let torques: &[figures::Curve] = &[
+            ("motor 1", |row| row.motors[0].torque_nm),
+            ("motor 2", |row| row.motors[1].torque_nm),
+            ("load 2", |row| row.motors[1].load_nm),
+        ];
+        plot(page, "16", "torque", "N·m", torques);
+        plot(page, "17", "speed of motor 2", "r/min", &[("motor 2", |row| row.motors[1].speed_rpm)]);
+        plot(page, "18", "speed of motor 1", "r/min", &[("motor 1", |row| row.motors[0].speed_rpm)]);
+        figures::phases(page, "19", recording, (STEP_S - 0.03, STEP_S + 0.05));
+    }
+}
+
+fn load_step(text: &str) -> Result<f64, String> {
+    match finite(text) {
+        Ok(step) if step.abs() <= 500.0 => Ok(step),
+        _ => Err("must be a number from -500 to 500".to_owned()),
+    }
+}

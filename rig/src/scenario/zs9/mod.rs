@@ -1,0 +1,218 @@
+//! The ZS9's scenarios.
+
+mod cycle;
+mod load_step;
+mod reverse;
+mod steady;
+mod timing;
+
+pub use cycle::Cycle;
+pub use load_step::{INERTIA_KG_M2, LoadStep};
+pub use reverse::Reverse;
+pub use steady::{SPEEDS_RPM as STEADY_SPEEDS_RPM, Steady};
+pub use timing::Timing;
+
+use super::System;
+use crate::analysis::Figures;
+use crate::bench::Limits;
+use crate::inject::Injection;
+use crate::inject::zs9::Kind;
+use crate::machine::Machine;
+use crate::options::{On, positive};
+use crate::plant::SpeedSource;
+use crate::plant::zs9::{NetworkState, Zs9Plant, Zs9Settings};
+use crate::report::Page;
+use crate::run::{CLOCK, Supervisor, refused};
+use crate::zs9::bench::{Bench, BenchSettings};
+use crate::zs9::line::LineTimes;
+use crate::zs9::trace::Recording;
+use crate::zs9::{Operator, figures, run, settings};
+use anyhow::{Result, bail};
+use clap::Args;
+use core::f64::consts::TAU;
+use serde::Serialize;
+use serde_json::{Map, Value};
+use tractive::nine_switch::Scheme;
+use tractive::operator::Line;
+use tractive::wire::DualSetup;
+
+/// Source voltage, in V.
+pub const SOURCE_V: f64 = 400.0;
+
+/// Largest source and link voltage that is simulated, in V: the drive trips long before.
+const LARGEST_V: f64 = 1200.0;
+
+/// Two motors on a Z-source nine-switch inverter.
+#[derive(Clone, Copy, Debug)]
+pub struct Zs9;
+
+/// What all of the ZS9's scenarios know.
+#[derive(Clone, Debug, Args, Serialize)]
+pub struct Zs9Options {
+    /// Carrier frequency, in Hz, 10000 or 20000.
+    #[arg(long, default_value_t = 10_000, value_parser = carrier_hz, allow_negative_numbers = true)]
+    pub carrier_hz: u32,
+    /// Link voltage outside shoot-through, in V: 667 is a shoot-through duty of 0.2, 800 of 0.25.
+    #[arg(long, default_value_t = 667.0, value_parser = positive, allow_negative_numbers = true)]
+    pub uin: f64,
+    /// Where the zero vectors lie: s, rs, rthd, zvo, rthd-central or rthd-slide.
+    #[serde(serialize_with = "scheme_name")]
+    #[arg(long, default_value = "rthd", value_parser = scheme)]
+    pub scheme: Scheme,
+    /// Something that goes wrong, NAME@SECONDS: source-short, source-low, source-high, sensor-lost-1, sensor-lost-2,
+    /// sensor-frozen-1, sensor-frozen-2, sensor-jump-2, overcurrent, not-finite, leg-stuck-on, leg-stuck-off.
+    #[arg(long)]
+    pub inject: Option<Injection<Kind>>,
+}
+
+/// Options of a run.
+pub type Options = crate::options::Options<Zs9Options>;
+
+/// A scenario's inputs.
+pub struct Plan {
+    /// Before the recording, in s: the drive starts and settles.
+    pub lead_s: f64,
+    /// Length of the recording, in s.
+    pub duration_s: f64,
+    /// What turns the rotors.
+    pub speeds: [SpeedSource; 2],
+    /// Speeds of free rotors at the beginning, in r/min.
+    pub from_rpm: [f64; 2],
+    /// Operator and loads.
+    pub operator: Box<dyn Operator + Send>,
+    /// Whether edges are kept.
+    pub edges: bool,
+    /// The line side, where there is one; the network is then empty at first.
+    pub line: Option<LineTimes>,
+}
+
+impl System for Zs9 {
+    const NAME: &'static str = "zs9";
+    const MACHINE: &'static str = "ipm-zs9";
+    type Own = Zs9Options;
+    type Plan = Plan;
+    type Recording = Recording;
+
+    fn trace_step_s(own: &Zs9Options) -> f64 {
+        f64::from(own.carrier_hz).recip()
+    }
+
+    fn check(options: &Options, _scenario: &Map<String, Value>, machine: &Machine) -> Result<()> {
+        let source_v = options.udc.unwrap_or(SOURCE_V);
+        let link_ref_v = options.own.uin;
+        if source_v > LARGEST_V {
+            bail!("--udc {source_v}: must be at most {LARGEST_V} V");
+        }
+        if !(source_v..=LARGEST_V).contains(&link_ref_v) {
+            bail!("--uin {link_ref_v}: must be from the source's {source_v} V to {LARGEST_V} V");
+        }
+        options.check_flaws(machine, source_v)
+    }
+
+    fn run(
+        name: &str,
+        plan: Plan,
+        options: &Options,
+        machine: &Machine,
+        supervisor: Option<&mut dyn Supervisor>,
+    ) -> Result<Recording> {
+        let line = plan.line;
+        let bench = bench(plan, options, machine)?;
+        let settings = settings::drive(CLOCK, options.own.carrier_hz);
+        match options.on {
+            On::Host => {
+                settings.check(machine.tables).map_err(refused)?;
+                let ratings = settings.operator_ratings(&machine.tables.ratings);
+                let line = line.map(|times| {
+                    Line::rated(&ratings, times.precharge_s, times.discharge_s).without_chopper()
+                });
+                run::run_on_host(name, bench, machine.tables, settings, line, supervisor)
+            }
+            On::Qemu => {
+                let setup = DualSetup { carrier_ticks: settings.carrier_ticks, line };
+                let patient = supervisor.as_ref().is_some_and(|supervisor| supervisor.is_typed());
+                run::run_in_qemu(name, bench, setup, &options.emulator(patient)?, supervisor)
+            }
+        }
+    }
+
+    fn figures(recording: &Recording) -> Figures {
+        figures::common(recording)
+    }
+
+    fn draw_recorder(recording: &Recording, page: &mut Page) {
+        figures::recorder(page, recording);
+    }
+}
+
+fn bench(plan: Plan, options: &Options, machine: &Machine) -> Result<Bench> {
+    let Plan { lead_s, duration_s, .. } = plan;
+    let Zs9Options { carrier_hz, uin: link_ref_v, scheme, inject } = options.own;
+    if let Some(injection) = inject
+        && injection.at_s > duration_s
+    {
+        bail!("--inject at {} s: must be within the run, which ends at {duration_s} s", injection.at_s);
+    }
+    let trace_step_s = options.dt.unwrap_or(Zs9::trace_step_s(&options.own));
+    let (shortest_s, longest_s) = (CLOCK.tick_s, duration_s);
+    if trace_step_s < f64::from(shortest_s) || trace_step_s > longest_s {
+        bail!("--dt {trace_step_s}: must be a number from {shortest_s} to {longest_s}");
+    }
+    let source_v = options.udc.unwrap_or(SOURCE_V);
+    let plant_settings = Zs9Settings { source_v, motors: [options.plant(); 2], ..Zs9Settings::default() };
+    let mut plant = Zs9Plant::new([&machine.folder; 2], plan.speeds, &plant_settings);
+    plant.set_network(NetworkState::even(0.0, 0.5 * (link_ref_v + source_v)));
+    for (motor, rpm) in plant.motors_mut().iter_mut().zip(plan.from_rpm) {
+        motor.set_speed_rpm(rpm);
+    }
+    let settings = BenchSettings {
+        clock: CLOCK,
+        carrier_ticks: settings::carrier_ticks(&CLOCK, carrier_hz),
+        lead_s,
+        duration_s,
+        trace_step_s,
+        link_ref_v,
+        scheme,
+        flaws: options.flaws(machine.folder.parameters.trip_current_a),
+        injection: inject,
+        limits: Limits::NONE,
+        edges: plan.edges,
+        dead_time_s: options.dead_time_us * 1e-6,
+    };
+    let bench = Bench::new(plant, plan.operator, settings);
+    Ok(match plan.line {
+        Some(times) => bench.with_line(times),
+        None => bench,
+    })
+}
+
+/// A free rotor, loaded by what the operator says.
+pub fn free(inertia_kg_m2: f64) -> SpeedSource {
+    SpeedSource::Inertia { inertia_kg_m2, load_nm: 0.0 }
+}
+
+/// A speed in rad/s.
+fn rad_s(rpm: f64) -> f64 {
+    rpm * TAU / 60.0
+}
+
+/// 0 before `from`, 1 after `to`, a straight line between.
+fn ramp(t_s: f64, from_s: f64, to_s: f64) -> f64 {
+    ((t_s - from_s) / (to_s - from_s)).clamp(0.0, 1.0)
+}
+
+fn scheme(text: &str) -> Result<Scheme, String> {
+    let found = Scheme::ALL.into_iter().find(|scheme| scheme.name() == text);
+    found.ok_or_else(|| format!("must be one of {}", Scheme::ALL.map(Scheme::name).join(", ")))
+}
+
+fn scheme_name<S: serde::Serializer>(scheme: &Scheme, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(scheme.name())
+}
+
+fn carrier_hz(text: &str) -> Result<u32, String> {
+    match text.parse() {
+        Ok(hz @ (10_000 | 20_000)) => Ok(hz),
+        _ => Err("must be 10000 or 20000".to_owned()),
+    }
+}

@@ -1,0 +1,91 @@
+//! The motors turn opposite ways: the paper's figures 20 to 23.
+
+use super::{Options, Plan, Zs9, free, rad_s, ramp};
+use crate::analysis::Figures;
+use crate::machine::Machine;
+use crate::report::Page;
+use crate::rows::mean;
+use crate::scenario::Scenario;
+use crate::zs9::figures;
+use crate::zs9::trace::{Recording, Row};
+use crate::zs9::{Orders, SeenMotors};
+use clap::Args;
+use serde::Serialize;
+use tractive::ports::MotorDemand;
+
+/// Both at 800 r/min; motor 2 goes to −800 r/min from 0.5 s to 1.5 s.
+#[derive(Clone, Copy, Debug, Args, Serialize)]
+pub struct Reverse {
+    /// Motor 2 keeps its direction, for comparison.
+    #[arg(long)]
+    no_reverse: bool,
+}
+
+const SPEED_RPM: f64 = 800.0;
+/// Load at that speed, in N·m; it goes with the speed and its sign.
+const LOAD_NM: f64 = 20.0;
+const BEGINS_S: f64 = 0.5;
+const ENDS_S: f64 = 1.5;
+const DURATION_S: f64 = 2.0;
+const LEAD_S: f64 = 0.6;
+
+fn wanted_rpm(t_s: f64, reverses: bool) -> [f64; 2] {
+    let turned = if reverses { 2.0 * ramp(t_s, BEGINS_S, ENDS_S) } else { 0.0 };
+    [SPEED_RPM, SPEED_RPM * (1.0 - turned)]
+}
+
+impl Scenario<Zs9> for Reverse {
+    fn plan(&self, _options: &Options, _machine: &Machine) -> Plan {
+        let reverses = !self.no_reverse;
+        let operator = move |t_s: f64, speeds: SeenMotors| {
+            let loaded = ramp(t_s, -0.5, -0.4);
+            Orders {
+                demands: wanted_rpm(t_s, reverses).map(|rpm| MotorDemand::Speed(rad_s(rpm) as f32)),
+                loads_nm: speeds.map(|rpm| loaded * LOAD_NM * rpm / SPEED_RPM),
+                enable: true,
+            }
+        };
+        Plan {
+            lead_s: LEAD_S,
+            duration_s: DURATION_S,
+            speeds: [free(super::load_step::INERTIA_KG_M2), free(super::load_step::INERTIA_KG_M2)],
+            from_rpm: [SPEED_RPM; 2],
+            operator: Box::new(operator),
+            edges: true,
+            line: None,
+        }
+    }
+
+    fn figures(&self, recording: &Recording, options: &Options, _machine: &Machine) -> Figures {
+        let mut figures = figures::common(recording);
+        let reverses = !self.no_reverse;
+        let half_s = 0.5 * figures::step_s(recording);
+        let error = |k: usize| {
+            let off = |row: &Row| {
+                let wanted = wanted_rpm(row.t_s + half_s, reverses)[k];
+                (row.motors[k].speed_rpm - wanted).powi(2)
+            };
+            mean(&recording.rows, off).sqrt()
+        };
+        figures.set("motor1_speed_error_rms_rpm", error(0));
+        figures.set("motor2_speed_error_rms_rpm", error(1));
+        let last = figures::window(recording, DURATION_S - 0.1, DURATION_S);
+        figures.set("motor1_speed_rpm", mean(last, |row| row.motors[0].speed_rpm));
+        figures.set("motor2_speed_rpm", mean(last, |row| row.motors[1].speed_rpm));
+        figures::link(&mut figures, &recording.rows, options.own.uin);
+        figures
+    }
+
+    fn plots(&self, recording: &Recording, page: &mut Page) {
+        let all = (0.0, DURATION_S);
+        let plot = |page: &mut Page, figure, title, unit, curves: &[figures::Curve]| {
+            figures::plot(page, figure, title, unit, recording, all, curves);
+        };
+        plot(page, "20", "torque of motor 1", "N·m", &[("motor 1", |row| row.motors[0].torque_nm)]);
+        plot(page, "21", "speed of motor 1", "r/min", &[("motor 1", |row| row.motors[0].speed_rpm)]);
+        plot(page, "22", "torque of motor 2", "N·m", &[("motor 2", |row| row.motors[1].torque_nm)]);
+        plot(page, "23", "speed of motor 2", "r/min", &[("motor 2", |row| row.motors[1].speed_rpm)]);
+        plot(page, "20–23", "link", "V", &[("U_in", |row| row.link_v), ("U_c", |row| row.capacitor_v)]);
+        figures::phases(page, "20–23", recording, (0.95, 1.05));
+    }
+}

@@ -1,0 +1,79 @@
+//! Harmonics in steady state: what the schemes of the nine-switch modulator differ in.
+
+use super::{Options, Plan, Zs9, Zs9Options, ramp};
+use crate::analysis::Figures;
+use crate::machine::Machine;
+use crate::plant::SpeedSource;
+use crate::report::Page;
+use crate::rows::mean;
+use crate::scenario::Scenario;
+use crate::zs9::figures;
+use crate::zs9::patterns;
+use crate::zs9::trace::Recording;
+use crate::zs9::{Orders, SeenMotors};
+use clap::Args;
+use serde::Serialize;
+use tractive::control::Demand;
+use tractive::ports::MotorDemand;
+
+/// 60 N·m each at prescribed speeds.
+#[derive(Clone, Copy, Debug, Args, Serialize)]
+pub struct Steady;
+
+/// Speeds of the upper and the lower motor, in r/min: 20 and 14 periods of the currents in 0.3 s.
+pub const SPEEDS_RPM: [f64; 2] = [1000.0, 700.0];
+const POLE_PAIRS: f64 = 4.0;
+const TORQUE_NM: f64 = 60.0;
+const DURATION_S: f64 = 0.3;
+const LEAD_S: f64 = 0.5;
+
+impl Scenario<Zs9> for Steady {
+    fn trace_step_s(&self, _own: &Zs9Options) -> f64 {
+        1e-6
+    }
+
+    fn plan(&self, _options: &Options, _machine: &Machine) -> Plan {
+        let operator = |t_s: f64, _: SeenMotors| {
+            let torque_nm = (TORQUE_NM * ramp(t_s, -0.45, -0.35)) as f32;
+            Orders {
+                demands: [MotorDemand::Torque(Demand { torque_nm, slew_limited: true }); 2],
+                loads_nm: [0.0; 2],
+                enable: true,
+            }
+        };
+        Plan {
+            lead_s: LEAD_S,
+            duration_s: DURATION_S,
+            speeds: SPEEDS_RPM.map(|rpm| SpeedSource::profile(vec![(0.0, rpm)])),
+            from_rpm: SPEEDS_RPM,
+            operator: Box::new(operator),
+            edges: true,
+            line: None,
+        }
+    }
+
+    fn figures(&self, recording: &Recording, options: &Options, _machine: &Machine) -> Figures {
+        let mut figures = figures::common(recording);
+        for (k, name) in ["thd1_percent", "thd2_percent"].into_iter().enumerate() {
+            let cycles = SPEEDS_RPM[k] / 60.0 * POLE_PAIRS * DURATION_S;
+            figures
+                .set(name, figures::thd_percent(recording, cycles.round(), |row| row.motors[k].phases_a[0]));
+        }
+        for (k, name) in ["torque1_nm", "torque2_nm"].into_iter().enumerate() {
+            figures.set(name, mean(&recording.rows, |row| row.motors[k].torque_nm));
+        }
+        let currents = || recording.rows.iter().map(|row| row.inductor_a);
+        let (low, high) = currents().fold((f64::MAX, f64::MIN), |(low, high), i| (low.min(i), high.max(i)));
+        figures.set("inductor_ripple_a", high - low);
+        figures::link(&mut figures, &recording.rows, options.own.uin);
+        figures
+    }
+
+    fn plots(&self, recording: &Recording, page: &mut Page) {
+        patterns::draw(page);
+        figures::phases(page, "table 1", recording, (0.0, 0.05));
+        let window = (0.0, 0.001);
+        let curves: &[figures::Curve] = &[("i_L", |row| row.inductor_a)];
+        figures::plot(page, "table 1", "inductor current", "A", recording, window, curves);
+    }
+}

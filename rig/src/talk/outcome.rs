@@ -1,0 +1,93 @@
+//! What a talk is asked for, and what it came to.
+
+use super::supervisor::Talk;
+use super::system::System;
+use crate::analysis::Figures;
+use crate::options::RunOptions;
+use crate::scenario::System as _;
+use crate::scenario::traction::{Traction, TractionOptions};
+use crate::scenario::zs9::{Zs9, Zs9Options};
+use crate::trace::{Recorded, Recording};
+use crate::zs9;
+use std::path::PathBuf;
+
+/// What is wanted.
+#[derive(Clone, Debug, clap::Args)]
+pub struct TalkOptions {
+    /// A script; without one commands are read from standard input, one a line.
+    pub script: Option<PathBuf>,
+    /// Who is talked to.
+    #[arg(long, value_enum, default_value_t)]
+    pub system: System,
+    /// The machine's and its load's inertia, in kg·m²; default 10, of each of the ZS9's 0.1, for which its speed loops are made.
+    #[arg(long, value_parser = crate::options::positive)]
+    pub inertia: Option<f64>,
+    /// What all runs share.
+    #[command(flatten)]
+    pub run: RunOptions,
+    /// What only the PMaSynRM drive has.
+    #[command(flatten)]
+    pub traction: TractionOptions,
+    /// What only the ZS9 has.
+    #[command(flatten)]
+    pub zs9: Zs9Options,
+}
+
+/// What really happened, by system.
+pub enum Happened {
+    /// Of the PMaSynRM drive.
+    Pmasynrm(Recording),
+    /// Of the ZS9.
+    Zs9(zs9::trace::Recording),
+}
+
+impl Happened {
+    /// What both systems have.
+    pub fn common(&self) -> &dyn Recorded {
+        match self {
+            Self::Pmasynrm(recording) => recording,
+            Self::Zs9(recording) => recording,
+        }
+    }
+
+    /// Times, and the speeds then.
+    pub(super) fn speeds_rpm(&self) -> Vec<(f64, [f64; 2])> {
+        match self {
+            Self::Pmasynrm(recording) => {
+                recording.rows.iter().map(|row| (row.t_s, [row.speed_rpm, 0.0])).collect()
+            }
+            Self::Zs9(recording) => {
+                let of = |row: &zs9::trace::Row| row.motors.each_ref().map(|motor| motor.speed_rpm);
+                recording.rows.iter().map(|row| (row.t_s, of(row))).collect()
+            }
+        }
+    }
+}
+
+/// A run that is over.
+pub struct Outcome {
+    /// What was said and heard.
+    pub talk: Talk,
+    /// Who was talked to.
+    pub system: System,
+    /// What really happened.
+    pub recording: Happened,
+    /// The figures.
+    pub figures: Figures,
+}
+
+impl TalkOptions {
+    /// The machine's name, or its folder.
+    pub fn machine_name(&self) -> &str {
+        let usual = match self.system {
+            System::Pmasynrm => Traction::MACHINE,
+            System::Zs9 => Zs9::MACHINE,
+        };
+        self.run.machine.as_deref().unwrap_or(usual)
+    }
+
+    /// The inertia, in kg·m².
+    pub fn inertia(&self) -> f64 {
+        self.inertia.unwrap_or(self.system.inertia_kg_m2())
+    }
+}

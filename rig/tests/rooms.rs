@@ -1,0 +1,184 @@
+//! The rooms of the rig: no module and no folder imports what imports it.
+//!
+//! Every path of every file is read: `use` trees with their braces, and paths in the code and in macros, from `crate`, `super`, `self`
+//! or a child. A name that a module only hands on (`pub use`) counts as an import of where it is defined.
+
+use proc_macro2::{Delimiter, TokenStream, TokenTree};
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+use tractive_rig as _;
+
+/// A module, by its path from the crate on.
+type Module = Vec<String>;
+/// What each module imports.
+type Imports = BTreeMap<Module, BTreeSet<Module>>;
+
+/// A module's paths, and what it hands on by name.
+#[derive(Default)]
+struct Source {
+    paths: Vec<Vec<String>>,
+    handed_on: BTreeMap<String, Vec<String>>,
+}
+
+/// Reads the files of a folder; `main.rs` is another crate.
+fn read(folder: &Path, module: &[String], sources: &mut BTreeMap<Module, Source>) {
+    for entry in std::fs::read_dir(folder).unwrap().map(Result::unwrap) {
+        let (path, mut own) = (entry.path(), module.to_vec());
+        let stem = path.file_stem().unwrap().to_string_lossy().into_owned();
+        if path.is_dir() {
+            own.push(stem);
+            read(&path, &own, sources);
+            continue;
+        }
+        if stem == "main" {
+            continue;
+        }
+        if stem != "mod" && stem != "lib" {
+            own.push(stem);
+        }
+        let text: TokenStream = std::fs::read_to_string(&path).unwrap().parse().unwrap();
+        let mut source = Source::default();
+        source.read(&text.into_iter().collect::<Vec<_>>());
+        sources.insert(own, source);
+    }
+}
+
+fn is(token: Option<&TokenTree>, what: &str) -> bool {
+    token.is_some_and(|token| token.to_string() == what)
+}
+
+impl Source {
+    fn read(&mut self, tokens: &[TokenTree]) {
+        let mut at = 0;
+        while at < tokens.len() {
+            match &tokens[at] {
+                // What is only compiled for tests may look wherever it likes.
+                TokenTree::Group(group) if group.to_string().replace(' ', "") == "[cfg(test)]" => {
+                    let is_block = |token: &TokenTree| matches!(token, TokenTree::Group(group) if group.delimiter() == Delimiter::Brace);
+                    at += tokens[at..].iter().position(is_block).unwrap_or(0);
+                }
+                TokenTree::Group(group) => self.read(&group.stream().into_iter().collect::<Vec<_>>()),
+                TokenTree::Ident(word) if *word == "use" => {
+                    let end = at + tokens[at..].iter().position(|token| is(Some(token), ";")).unwrap();
+                    let hands_on = (at > 0 && is(tokens.get(at - 1), "pub"))
+                        || (at > 1 && is(tokens.get(at - 2), "pub"));
+                    self.tree(&[], &tokens[at + 1..end], hands_on);
+                    at = end;
+                }
+                TokenTree::Ident(word) if is(tokens.get(at + 1), ":") && is(tokens.get(at + 2), ":") => {
+                    let mut path = vec![word.to_string()];
+                    while is(tokens.get(at + 1), ":") && is(tokens.get(at + 2), ":") {
+                        let Some(TokenTree::Ident(word)) = tokens.get(at + 3) else { break };
+                        path.push(word.to_string());
+                        at += 3;
+                    }
+                    self.paths.push(path);
+                }
+                _ => {}
+            }
+            at += 1;
+        }
+    }
+
+    /// A `use` tree behind a prefix.
+    fn tree(&mut self, prefix: &[String], tokens: &[TokenTree], hands_on: bool) {
+        let (mut path, mut name) = (prefix.to_vec(), None);
+        let mut tokens = tokens.iter();
+        while let Some(token) = tokens.next() {
+            match token {
+                TokenTree::Ident(word) if *word == "as" => name = tokens.next().map(TokenTree::to_string),
+                TokenTree::Ident(word) if *word == "self" && !path.is_empty() => {}
+                TokenTree::Ident(word) => path.push(word.to_string()),
+                TokenTree::Group(group) => {
+                    let inner: Vec<_> = group.stream().into_iter().collect();
+                    for part in inner.split(|token| is(Some(token), ",")).filter(|part| !part.is_empty()) {
+                        self.tree(&path, part, hands_on);
+                    }
+                    return;
+                }
+                _ => {}
+            }
+        }
+        match name.or(path.last().cloned()) {
+            Some(name) if hands_on => drop(self.handed_on.insert(name, path)),
+            _ => self.paths.push(path),
+        }
+    }
+}
+
+/// A path as seen from the crate; `None` for what is of another crate.
+fn absolute(module: &[String], path: &[String], sources: &BTreeMap<Module, Source>) -> Option<Vec<String>> {
+    let supers = path.iter().take_while(|word| *word == "super").count();
+    let child = [module, &path[..1]].concat();
+    Some(match path[0].as_str() {
+        "crate" => path[1..].to_vec(),
+        "super" => [&module[..module.len().checked_sub(supers)?], &path[supers..]].concat(),
+        "self" => [module, &path[1..]].concat(),
+        _ if sources.contains_key(&child) => [module, path].concat(),
+        _ => return None,
+    })
+}
+
+/// The module in which what a path names is defined.
+fn defined(path: &[String], sources: &BTreeMap<Module, Source>) -> Option<Module> {
+    let length = (0..=path.len()).rev().find(|length| sources.contains_key(&path[..*length]))?;
+    let (module, rest) = path.split_at(length);
+    let handed = rest.first().and_then(|name| sources[module].handed_on.get(name));
+    match handed {
+        Some(from) => defined(&[absolute(module, from, sources)?, rest[1..].to_vec()].concat(), sources),
+        None => Some(module.to_vec()),
+    }
+}
+
+fn imports(sources: &BTreeMap<Module, Source>) -> Imports {
+    let of = |module: &Module, source: &Source| {
+        let paths = source.paths.iter().filter_map(|path| absolute(module, path, sources));
+        let targets = paths.filter_map(|path| defined(&path, sources));
+        targets.filter(|target| target != module).collect()
+    };
+    sources.iter().map(|(module, source)| (module.clone(), of(module, source))).collect()
+}
+
+/// The same between the rooms right below the crate.
+fn of_rooms(imports: &Imports) -> Imports {
+    let room = |module: &Module| module[..module.len().min(1)].to_vec();
+    let mut rooms = Imports::new();
+    for (module, targets) in imports.iter().filter(|(module, _)| !module.is_empty()) {
+        let other = targets.iter().map(room).filter(|target| *target != room(module));
+        rooms.entry(room(module)).or_default().extend(other);
+    }
+    rooms
+}
+
+/// What is left when those are taken away, again and again, that import nothing of what is left: the cycles, and who imports them.
+fn cyclic(mut imports: Imports) -> Imports {
+    loop {
+        let left: BTreeSet<_> = imports.keys().cloned().collect();
+        let before = imports.len();
+        imports.retain(|_, targets| {
+            targets.retain(|target| left.contains(target));
+            !targets.is_empty()
+        });
+        if imports.len() == before {
+            return imports;
+        }
+    }
+}
+
+#[test]
+fn no_module_and_no_folder_imports_what_imports_it() {
+    let mut sources = BTreeMap::new();
+    read(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src"), &[], &mut sources);
+    assert!(sources.len() > 100, "{} files", sources.len());
+    let imports = imports(&sources);
+    for (what, imports) in [("modules", imports.clone()), ("rooms", of_rooms(&imports))] {
+        let count: usize = imports.values().map(BTreeSet::len).sum();
+        let cycles = cyclic(imports);
+        let list = cycles.iter().map(|(module, targets)| {
+            let targets: Vec<_> = targets.iter().map(|target| target.join("::")).collect();
+            format!("{} -> {}", module.join("::"), targets.join(", "))
+        });
+        assert!(cycles.is_empty(), "cycles between {what}:\n{}", list.collect::<Vec<_>>().join("\n"));
+        println!("{what}: {count} imports, no cycle");
+    }
+}
