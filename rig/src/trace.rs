@@ -188,7 +188,7 @@ impl SlotRow {
             ("state", status.state.name().into()),
             ("fault", name_of(status.trip).into()),
             ("refusal", status.refusal.map_or("", |refusal| refusal.name()).into()),
-            ("refusals", Cell::Count(status.refusals.into())),
+            ("refusals", Cell::Count(status.refusals)),
             ("torque_nm", status.torque_nm.into()),
             ("precharge", switches.precharge.into()),
             ("main", switches.main.into()),
