@@ -17,7 +17,7 @@ const FROZEN_CURRENT_SHARE: f32 = 0.05;
 /// converter of 8 bits.
 const TURNED_SHARE: f32 = 0.02;
 /// By how much the voltage must have moved the flux linkage that goes with a repeated current, as a share of the machine's own at its
-/// largest torque. Chosen by trial, beyond what the dead time's error near a current of zero feigns.
+/// largest torque: a quarter, above what the dead time's error near a current of zero feigns in the runs of the tests.
 const PUSHED_SHARE: f32 = 0.25;
 /// What the rotor must have turned, by its last known speed, before an unmoving angle is suspicious, in electrical rad.
 const FROZEN_TURN_RAD: f32 = 0.2;
@@ -43,7 +43,7 @@ pub struct FrozenWatch {
 #[derive(Clone, Copy, Debug)]
 struct Repeated {
     periods: u32,
-    /// Voltage commanded when they last changed, in V.
+    /// Voltage commanded when they last changed, in V; this and what follows count from the first period of repeated currents on.
     from_v: AlphaBeta,
     /// By how much the rotor has turned since, in electrical rad.
     turned_rad: f32,
@@ -58,6 +58,9 @@ impl Repeated {
 
     /// One more period of the same currents.
     fn step(&mut self, commanded_v: AlphaBeta, omega: f32, period_s: f32) {
+        if self.periods == 0 {
+            *self = Self::since(commanded_v);
+        }
         self.periods += 1;
         self.turned_rad += omega * period_s;
         let pushed = (commanded_v - self.from_v) * period_s;
@@ -65,10 +68,9 @@ impl Repeated {
     }
 
     /// Whether a peak current of `peak_a` should have changed.
+    #[cold]
+    #[inline(never)]
     fn is_suspicious(&self, peak_a: f32, ratings: &Ratings) -> bool {
-        if self.periods < FROZEN_PERIODS {
-            return false;
-        }
         let largest_a = ratings.max_current_a;
         // Flux linkage and current of the largest torque, at right angles.
         let flux_wb = ratings.max_torque_nm / (1.5 * ratings.pole_pairs * largest_a);
@@ -116,11 +118,11 @@ impl FrozenWatch {
         ratings: &Ratings,
     ) -> Option<Violation> {
         let (currents_a, angle) = self.last.replace((measured.currents_a, measured.angle))?;
-        let peak_a = measured.currents_a.peak();
-        if currents_a == measured.currents_a && peak_a > FROZEN_CURRENT_SHARE * ratings.max_current_a {
+        let peak_a = || measured.currents_a.peak();
+        if currents_a == measured.currents_a && peak_a() > FROZEN_CURRENT_SHARE * ratings.max_current_a {
             self.currents.step(self.commanded_v, omega, period_s);
         } else {
-            self.currents = Repeated::since(self.commanded_v);
+            self.currents.periods = 0;
         }
         if angle == measured.angle {
             self.angle_for += 1;
@@ -133,7 +135,8 @@ impl FrozenWatch {
         }
         let frozen_angle = self.turned_rad > FROZEN_TURN_RAD;
         let periods = if frozen_angle { self.angle_for } else { self.currents.periods };
-        if frozen_angle || self.currents.is_suspicious(peak_a, ratings) {
+        let repeated = self.currents.periods >= FROZEN_PERIODS;
+        if frozen_angle || (repeated && self.currents.is_suspicious(peak_a(), ratings)) {
             return Some((Fault::Frozen, periods as f32, FROZEN_PERIODS as f32));
         }
         None

@@ -175,7 +175,7 @@ impl Image {
                 function.names.push(name.clone());
             }
             if name.starts_with("tractive")
-                && name.contains("::machine::")
+                && name.contains("::built_in::")
                 && is_read_only_data(file, &symbol)
             {
                 self.sizes.tables += symbol.size();

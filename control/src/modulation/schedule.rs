@@ -96,22 +96,36 @@ impl Schedule {
             self.last_switch = None;
         }
         let share = seen.rate * (2.0 / 4_294_967_296.0) * devices.shortest_half_ticks as f32;
-        // Whoever passes a border passes those of lower frequencies as well, so the highest one decides.
-        let Ladder([lowest, higher @ ..]) = self.ladder else { return Mode::Async };
+        let Ladder(rungs @ [lowest, ..]) = self.ladder else { return Mode::Async };
         if share < pick(Mode::Async.row().until.shares, mode.carriers() > 0) {
             return Mode::Async;
         }
         let notch = shortest_notch(seen.rate, devices);
-        let mut from_above = false;
-        for (below, above) in self.ladder.0.iter().zip(higher).rev() {
-            from_above |= mode == *above;
+        let passes = |below: Mode, from_above: bool| {
             let row = below.row();
-            let fast = share >= pick(row.until.shares, from_above);
-            if fast || seen.depth >= pick(reached(row, notch), from_above) {
-                return *above;
+            share >= pick(row.until.shares, from_above) || seen.depth >= pick(reached(row, notch), from_above)
+        };
+        // From where the drive stands: up past every border that is passed, else down past those that no longer are.
+        let place = rungs.iter().position(|rung| *rung == mode).unwrap_or(0);
+        let (lower, upper) = rungs.split_at_checked(place).unwrap_or((&[], rungs));
+        let mut wanted = *upper.first().unwrap_or(lowest);
+        for pair in upper.windows(2) {
+            let [below, above] = pair else { break };
+            if !passes(*below, false) {
+                break;
             }
+            wanted = *above;
         }
-        *lowest
+        if wanted != mode {
+            return wanted;
+        }
+        for below in lower.iter().rev() {
+            if passes(*below, true) {
+                break;
+            }
+            wanted = *below;
+        }
+        wanted
     }
 
     /// Tells the schedule that the mode changed at this instant.
@@ -127,8 +141,8 @@ fn pick((up, down): (f32, f32), from_above: bool) -> f32 {
 
 /// The depths of a mode's border, lowered where the mode does not reach them because of the shortest pulse.
 fn reached(row: &Row, notch: f32) -> (f32, f32) {
-    let (reach, depths) = (largest(row, notch) - DEPTH_ROOM, row.until.depths);
-    if reach < depths.0 { (reach, reach - DEPTH_HYSTERESIS) } else { depths }
+    let reach = row.largest - row.notch_sum * notch - DEPTH_ROOM;
+    if reach < row.until.depths.0 { (reach, reach - DEPTH_HYSTERESIS) } else { row.until.depths }
 }
 
 /// Sine of half the shortest notch, with `rate` in angle units per tick: an angle of a few degrees.

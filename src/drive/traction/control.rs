@@ -3,7 +3,7 @@
 use super::applied::{Applied, Steady, nothing_committed};
 use super::glide::Glide;
 use super::{Settings, Shared};
-use crate::control::{Boundary, Committed, Controller, Demand, Input, Law};
+use crate::control::{Boundary, Committed, Controller, Demand, Input, Law, Measurements};
 use crate::drive::acknowledge::Acknowledge;
 use crate::drive::messages::{Gates, Report, VoltageCommand};
 use crate::frames::{AlphaBeta, Angle, Dq};
@@ -109,6 +109,7 @@ impl<M: Machine> ControlTask<M> {
         self.now = now.after(self.settings.clock.control_ticks);
         shared.began.store(now.0, Ordering::Relaxed);
         let sample = port.sample(now);
+        let measured = sample.measured();
         let applied = shared.applied.read(|records| Applied::seen(records, now)).flatten();
         let released = applied.as_ref().map(|applied| applied.released);
         if self.acknowledge.step(sample.acknowledge, self.trip.is_some(), released) {
@@ -126,22 +127,24 @@ impl<M: Machine> ControlTask<M> {
         self.check_legs(&sample, port);
         let overdue = applied.as_ref().and_then(|applied| applied.overdue(now, &self.settings.clock));
         let (omega, lost) = self.track(&sample);
-        let violation =
-            self.armed(overdue).or_else(|| self.armed(lost)).or_else(|| self.judge(&sample, omega));
+        let violation = self
+            .armed(overdue)
+            .or_else(|| self.armed(lost))
+            .or_else(|| self.judge(&sample, &measured, omega));
         self.check(violation, &sample, port);
         let pulsing =
             self.trip.is_none() && sample.enable && self.controller.speed_is_known() && !self.glide.crosses();
         let driven = if pulsing {
             let frozen = self.watch.check(
-                &sample.measured(),
+                &measured,
                 omega,
                 self.settings.clock.control_s(),
                 &self.machine.tables().ratings,
             );
             self.check(frozen, &sample, port);
-            self.pulse(&sample, applied.as_ref(), omega, now)
+            self.pulse(&sample, &measured, applied.as_ref(), omega)
         } else {
-            self.rest(sample.measured().angle)
+            self.rest(measured.angle)
         };
         let rate = self.settings.clock.angle_rate(omega);
         // Not finite if either is not.
@@ -208,7 +211,7 @@ impl<M: Machine> ControlTask<M> {
             at,
             currents_a: sample.currents_a,
             udc_v: sample.udc_v,
-            angle: sample.measured().angle,
+            angle: sample.angle.unwrap_or(Angle::ZERO),
             id_a: report.id_a,
             iq_a: report.iq_a,
             voltage_v: report.voltage_v,
@@ -252,11 +255,11 @@ impl<M: Machine> ControlTask<M> {
     }
 
     /// What is wrong with a sample by itself.
-    fn judge(&self, sample: &Sample, omega: f32) -> Option<Violation> {
-        let (measured, ratings) = (sample.measured(), &self.machine.tables().ratings);
+    fn judge(&self, sample: &Sample, measured: &Measurements, omega: f32) -> Option<Violation> {
+        let ratings = &self.machine.tables().ratings;
         let empty =
             || if sample.enable { protection::check_undervoltage(measured.udc_v, ratings) } else { None };
-        self.armed(protection::check_measurements(&measured, omega, ratings))
+        self.armed(protection::check_measurements(measured, omega, ratings))
             .or_else(|| self.armed(empty()))
             .or_else(|| protection::check_demand(&sample.demand))
     }
@@ -268,7 +271,14 @@ impl<M: Machine> ControlTask<M> {
 
     /// Control law and its surroundings, while pulses are made.
     #[inline(always)]
-    fn pulse(&mut self, sample: &Sample, applied: Option<&Applied>, omega: f32, now: Instant) -> Driven {
+    fn pulse(
+        &mut self,
+        sample: &Sample,
+        measured: &Measurements,
+        applied: Option<&Applied>,
+        omega: f32,
+    ) -> Driven {
+        let now = self.now.before(self.settings.clock.control_ticks);
         let revises = applied.is_some_and(|applied| self.is_to_revise(applied, now, &sample.demand));
         let udc_v = sample.udc_v;
         let steady = Steady { omega, udc_v, voltage_v: self.steady_v, depth: self.depth };
@@ -287,7 +297,7 @@ impl<M: Machine> ControlTask<M> {
         let torque_nm = self.glide.one_sided(sample.demand.torque_nm, emf_v, udc_v, ratings);
         let demand = Demand { torque_nm, ..sample.demand };
         let input = Input {
-            measured: &sample.measured(),
+            measured,
             demand: &demand,
             window: Some(&sample.window),
             committed: &committed,

@@ -124,7 +124,7 @@ impl Measured {
     }
 
     fn json_load(&self) -> Vec<Value> {
-        let percent = |mode, direction| {
+        let percent = |mode: &str, direction| {
             let Load { mean, max } = self.statistics.load(mode, direction)?;
             Some(fields([("mean_percent", mean.into()), ("max_percent", max.into())]))
         };
