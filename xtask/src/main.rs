@@ -31,6 +31,7 @@ mod guide;
 mod image;
 mod landings;
 mod overruns;
+mod own_board;
 mod process;
 mod run;
 mod saboteur;

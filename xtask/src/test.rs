@@ -41,6 +41,8 @@ pub enum Step {
     ImageCheck,
     /// The NUCLEO-G474RE's images build, with no panic within an interrupt's reach and no double precision
     NucleoImage,
+    /// The example's firmware, outside the workspace, holds what is its own and nothing else
+    OwnBoard,
     /// Every command of the engineer's guide
     Guide,
     /// The engineer's guide as a book
@@ -190,6 +192,7 @@ fn perform(step: Step, setup: &mut Setup) -> Result<Outcome> {
             }
             good
         }
+        Step::OwnBoard => crate::own_board::check(setup)?,
         Step::Guide => crate::guide::run(build::root())?,
         Step::Book if find("mdbook").is_none() => {
             return Ok(Outcome::Skipped("mdbook is not installed (cargo install mdbook)".to_owned()));

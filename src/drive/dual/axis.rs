@@ -99,6 +99,8 @@ impl Axis {
     }
 
     /// The angle is not known: its sensor has `lost` the rotor if it was known before; and nobody may want pulses.
+    #[cold]
+    #[inline(never)]
     pub fn lose_angle(&mut self, lost: Fault, enable: bool) -> Option<Violation> {
         self.controller.lose_angle();
         if self.controller.is_following() { Some((lost, 1.0, 0.0)) } else { protection::check_known(enable) }

@@ -212,19 +212,16 @@ impl<M: Machine> ControlTask<M> {
         let mut violation = None;
         let motors = self.axes.iter_mut().zip(&mut angles).zip(sample.angles).zip(SENSOR_LOST);
         for (((axis, angle), measured), fault) in motors {
-            let off_rad = match measured {
+            let found = match measured {
                 Some(measured) => {
                     *angle = measured;
                     let trusted = self.disarmed.has(fault);
-                    axis.track(measured, trusted, &self.settings)
+                    let off_rad = axis.track(measured, trusted, &self.settings);
+                    off_rad.map(|rad| (fault, rad, axis::SURPRISE_RAD))
                 }
-                None => {
-                    violation = violation.or(axis.lose_angle(fault, sample.enable));
-                    None
-                }
+                None => axis.lose_angle(fault, sample.enable),
             };
-            violation = violation.or(off_rad.map(|rad| (fault, rad, axis::SURPRISE_RAD)));
-            violation = violation.filter(|(fault, _, _)| !self.disarmed.has(*fault));
+            violation = violation.or(found.filter(|(fault, _, _)| !self.disarmed.has(*fault)));
         }
         self.check(violation, port);
         angles

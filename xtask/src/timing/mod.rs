@@ -26,6 +26,8 @@ mod system;
 mod tables;
 mod tally;
 
+pub use profile::Profile;
+
 use anyhow::{Context, Result};
 
 use crate::build;
