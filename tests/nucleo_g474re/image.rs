@@ -1,6 +1,6 @@
 //! The PMaSynRM's whole image on the board in memory, with a machine, an encoder, contactors and a vehicle's computer around it.
 
-use crate::bench::Bench;
+use crate::bench::{Bench, control_update};
 use crate::bus::{Bus, Sender};
 use crate::{devices, plan};
 use stm32_metapac::timer::regs::SrGp16;
@@ -208,8 +208,12 @@ impl Image {
         }
         self.bench.fault = [!self.drivers_ready; 2];
         let current = self.machine.current.unpark(self.machine.angle().sin_cos()).abc();
-        for (channel, current_a) in [(2, current.a), (7, current.b), (14, current.c)] {
-            self.bench.codes[channel] = (2_048.0 + current_a / POWER_STAGE.current_a_per_code).round() as u16;
+        // Each current is wired to a pin of either converter.
+        for (channels, current_a) in [([2, 4], current.a), ([15, 7], current.b), ([5, 14], current.c)] {
+            for channel in channels {
+                self.bench.codes[channel] =
+                    (2_048.0 + current_a / POWER_STAGE.current_a_per_code).round() as u16;
+            }
         }
         self.bench.codes[6] = (self.udc_v / POWER_STAGE.udc_v_per_code).round() as u16;
     }
@@ -246,6 +250,7 @@ impl Image {
         }
         let timer = self.bench.registers.tim4;
         timer.cnt().write(|w| w.set_cnt(self.machine.count.rem_euclid(counts) as u16));
+        control_update(&self.bench.registers);
         // Flags are cleared by writing 0; writing 1 does nothing. The hardware sets them.
         let mut status = SrGp16(0);
         status.set_idxif(passed && timer.ecr().read().ie());
@@ -259,6 +264,7 @@ impl Image {
                 self.pwm.acknowledge();
                 self.bench.settle();
                 self.pwm.begin_half();
+                self.bench.settle();
                 self.bench.finish_sequence(self.bench.registers.adc2);
                 let mut port = Port { pwm: &mut self.pwm, bench: &mut self.bench };
                 self.pwm_task.run(&mut port, &self.shared);

@@ -3,7 +3,7 @@
 
 use super::model::Model;
 use super::ports::{converted, drivers_ready};
-use crate::bench::Bench;
+use crate::bench::{Bench, control_update};
 use crate::bus::{Bus, Sender};
 use stm32_metapac::timer::regs::SrGp16;
 use tractive::board::nucleo_g474re::operator::DualOperator;
@@ -175,6 +175,7 @@ impl Image {
             status.set_idxif(passed && timer.ecr().read().ie());
             timer.sr().write_value(status);
         }
+        control_update(&self.model.registers);
     }
 
     fn period(&mut self) {
