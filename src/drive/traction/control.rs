@@ -116,7 +116,6 @@ impl<M: Machine> ControlTask<M> {
         let released = applied.as_ref().map(|applied| applied.released);
         if self.acknowledge.step(sample.acknowledge, self.trip.is_some(), released) {
             (self.trip, self.lost_at) = (None, None);
-            self.controller.recover_angle();
         }
         if self.trip.is_none() && applied.as_ref().is_some_and(|applied| applied.next.kind.is_tripped()) {
             self.trip = shared.trip.read();
