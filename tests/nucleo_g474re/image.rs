@@ -104,7 +104,9 @@ fn current_of(flux: Dq, mut near: Dq) -> Dq {
     near
 }
 
-/// The PWM interrupt's port, with the hardware's turn after a flag is cleared: in memory a flag that is written 1 would be set.
+/// The PWM interrupt's port, with the hardware's turn after each write. Status flags are cleared by writing 0 and left alone by writing 1, and
+/// a break's flag stays set while its input is active (RM0440, TIMx_SR: rc_w0); an event acts before the next write. In memory a flag
+/// would be what was written, and an event would wait.
 struct Port<'a> {
     pwm: &'a mut Pwm,
     bench: &'a mut Bench,
@@ -132,7 +134,7 @@ impl PwmPort for Port<'_> {
     fn leave(&mut self, now: Instant) -> bool {
         let left = self.pwm.leave(now);
         self.bench.settle();
-        left
+        left && !self.bench.registers.legs.is_tripped()
     }
 }
 

@@ -12,7 +12,7 @@ use tractive::board::nucleo_g474re::power_stage::PowerStage;
 use tractive::board::nucleo_g474re::serve::DualServe;
 use tractive::board::nucleo_g474re::watchdog::Pulse;
 use tractive::board::nucleo_g474re::zs9::stage::STAGE;
-use tractive::board::nucleo_g474re::zs9::{CLOCK, CYCLES_PER_TICK, Control, Pwm, RATINGS, settings};
+use tractive::board::nucleo_g474re::zs9::{CLOCK, CYCLES_PER_TICK, Control, Pwm, RATINGS, settings, start};
 use tractive::built_in::zs9::BUILT_IN;
 use tractive::drive::dual::{ControlTask, PwmTask, Shared};
 use tractive::frames::Angle;
@@ -34,7 +34,7 @@ const CONTACTOR_PERIODS: u64 = 50;
 const HUNGER: u64 = 200;
 
 /// The PWM interrupt's port, with the driver board's latches in place of the serial words, which memory cannot shift, and with the hardware's
-/// turn after a flag is cleared: in memory a flag that is written 1 would be set.
+/// turn after each write, as in the other image.
 struct Port<'a> {
     pwm: &'a mut Pwm,
     model: &'a mut Model,
@@ -59,7 +59,7 @@ impl DualPwmPort for Port<'_> {
     fn leave(&mut self, now: Instant) -> bool {
         let left = self.pwm.leave(now);
         self.model.settle();
-        left
+        left && !start::bridge(&self.model.registers).outputs().is_tripped()
     }
 }
 
