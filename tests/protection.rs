@@ -24,7 +24,8 @@ struct Fake {
     pwm_entered: Option<(SafeState, u32)>,
     played: CarrierPeriod,
     report: Report,
-    pwm_currents: Option<Abc>,
+    /// What the PWM interrupt samples instead, and when.
+    pwm_currents: Option<(Abc, core::ops::Range<u32>)>,
     /// From when on nothing is spoilt any more.
     spoil_until: u32,
     /// The operator acknowledges from this instant on.
@@ -122,8 +123,8 @@ impl ControlPort for Fake {
 
 impl PwmPort for Fake {
     fn sample(&mut self, now: Instant) -> Abc {
-        match self.pwm_currents {
-            Some(currents) if self.is_spoilt(now) => currents,
+        match &self.pwm_currents {
+            Some((currents, when)) if when.contains(&now.0) => *currents,
             _ => self.currents(now),
         }
     }
@@ -319,7 +320,7 @@ fn a_lost_control_interrupt_is_found_by_the_other_one() {
 #[test]
 fn the_pwm_interrupt_finds_overcurrent_too() {
     let spoilt = Abc { a: -320.0, b: 160.0, c: 160.0 };
-    let mut fake = Fake { pwm_currents: Some(spoilt), spoil_from: SETTLED, ..Fake::turning(400.0) };
+    let mut fake = Fake { pwm_currents: Some((spoilt, SETTLED..u32::MAX)), ..Fake::turning(400.0) };
     let trip = drive(&mut fake, END, u32::MAX).unwrap();
     assert_eq!((trip.fault, trip.value), (Fault::Overcurrent, 320.0));
     assert_eq!(fake.pwm_entered, Some((trip.safe, trip.at.0)));
@@ -403,7 +404,10 @@ fn an_acknowledged_fault_is_forgotten_by_both_sides_and_pulses_are_made_again() 
     let acknowledged = HEALED + 100_000;
     for fake in [
         passing(overvoltage, acknowledged),
-        Fake { pwm_currents: Some(Abc { a: -320.0, b: 160.0, c: 160.0 }), ..passing(|_| {}, acknowledged) },
+        Fake {
+            pwm_currents: Some((Abc { a: -320.0, b: 160.0, c: 160.0 }, SETTLED..HEALED)),
+            ..passing(|_| {}, acknowledged)
+        },
     ] {
         let mut fake = fake;
         assert_eq!(drive(&mut fake, END, u32::MAX), None);
@@ -527,6 +531,32 @@ fn an_angle_that_has_jumped_is_lost_once_and_followed_anew_after_an_acknowledge(
         [Some(Fault::AngleLost), None]
     );
     assert!(fake.pulsed > acknowledged + FOLLOWED - 40_000, "the machine is caught");
+}
+
+#[test]
+fn a_lost_angle_is_followed_anew_before_the_acknowledge_and_chooses_no_safe_state() {
+    let told_omega = |fake: &Fake| fake.report.frequency_hz * std::f32::consts::TAU;
+    // From a speed that asks for the short circuit to half of it, by a jump.
+    let lost = |pwm_from| Fake {
+        spoil: |sample| sample.angle = sample.angle.map(|angle| angle + angle),
+        spoil_from: 0,
+        spoil_until: SETTLED,
+        pwm_currents: Some((Abc { a: 320.0, b: -160.0, c: -160.0 }, pwm_from..u32::MAX)),
+        ..Fake::turning(1_050.0)
+    };
+    for told_after in [2_500, FOLLOWED] {
+        let mut fake = lost(u32::MAX);
+        let trip = drive(&mut fake, SETTLED + told_after, u32::MAX).unwrap();
+        assert_eq!((trip.fault, trip.safe), (Fault::AngleLost, SafeState::ShortCircuit));
+        assert_eq!(fake.report.speed_known, told_after == FOLLOWED);
+        // What the PWM interrupt finds meanwhile does not open the gates of a machine that may still be fast.
+        let mut fake = lost(SETTLED + told_after);
+        drive(&mut fake, SETTLED + told_after + 100_000, u32::MAX);
+        assert_eq!(fake.pwm_entered.map(|(safe, _)| safe), Some(SafeState::ShortCircuit));
+    }
+    let mut fake = lost(u32::MAX);
+    drive(&mut fake, SETTLED + FOLLOWED, u32::MAX);
+    assert!((told_omega(&fake) - 1_050.0).abs() < 1.0, "{}", told_omega(&fake));
 }
 
 #[test]

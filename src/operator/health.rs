@@ -60,6 +60,14 @@ pub(super) fn resting_current(input: &Situation, settings: &Settings) -> Option<
     is_beyond(current, resting_a).then_some((Fault::CurrentOffset, current, resting_a))
 }
 
+/// The current of a machine that is shorted is one that its EMF drives through its resistance, else it turns faster than its sensor says.
+pub(super) fn shorted_current(input: &Situation, settings: &Settings) -> Option<Violation> {
+    let (ratings, observed) = (settings.ratings, input.observed);
+    let driven_a = observed.emf_omega.abs() * ratings.magnet_flux_wb / ratings.stator_resistance_ohm;
+    let limit_a = driven_a + RESTING_SHARE * ratings.max_current_a;
+    is_beyond(observed.current_a, limit_a).then_some((Fault::CurrentOffset, observed.current_a, limit_a))
+}
+
 /// Not a number is beyond everything.
 fn is_beyond(value: f32, limit: f32) -> bool {
     value.is_nan() || value > limit

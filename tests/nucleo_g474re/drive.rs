@@ -22,7 +22,6 @@ fn the_drive_pulses_a_turning_machine_through_the_registers() {
     let registers = bench.registers;
     let (shared, operator) = (Shared::new(), Operator::new(Desk::new()));
     let settings = Settings { clock: CLOCK, devices: devices(), gains: Gains::DEFAULT };
-    operator.desk.allow_from(Permit { enable: true, ..Permit::NONE }, Instant(0));
     let zeros = [AdcCode(2_048); 3];
     let encoder = Encoder::new(registers.tim4, &POWER_STAGE, 4);
     let mut control = Control::new(registers, zeros, encoder, &operator);
@@ -33,6 +32,7 @@ fn the_drive_pulses_a_turning_machine_through_the_registers() {
     registers.tim4.sr().write(|w| w.set_idxif(true));
     // SAFETY: IDR is word 4 of the port's block of memory; bit 2 is the enable input.
     unsafe { registers.gpioc.as_ptr().cast::<u32>().add(4).write_volatile(1 << 2) };
+    let mut enabled = false;
     let (mut changes, mut gates) = (0, bench.legs.map(|leg| leg.gates()));
     for tick in 1..=700_000_u64 {
         if bench.tick() {
@@ -48,6 +48,10 @@ fn the_drive_pulses_a_turning_machine_through_the_registers() {
             control_update(&registers);
             bench.finish_sequence(registers.adc1);
             control_task.run(&mut control, &shared);
+            if operator.position.is_known() && !enabled {
+                operator.desk.allow_from(Permit { enable: true, ..Permit::NONE }, control_task.next_call());
+                enabled = true;
+            }
         }
         bench.settle();
         let now = bench.legs.map(|leg| leg.gates());

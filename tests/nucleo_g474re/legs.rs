@@ -7,7 +7,7 @@ use tractive::board::nucleo_g474re::half::reload;
 use tractive::board::nucleo_g474re::sampling::Zeros;
 use tractive::board::nucleo_g474re::{CLOCK, Pwm};
 use tractive::frames::Angle;
-use tractive::modulation::{CarrierPeriod, Mode, Modulator, Reference, Schedule};
+use tractive::modulation::{CarrierPeriod, Ladder, Mode, Modulator, Reference, Schedule};
 use tractive::ports::PwmPort;
 use tractive::protection::SafeState;
 use tractive::time::Instant;
@@ -57,7 +57,8 @@ const ALL_OFF: [(bool, bool); 3] = [(false, false); 3];
 
 /// Halves of every mode, from the modulator itself, running up forward or backward.
 fn halves_of_all_modes(direction: f32) -> Vec<CarrierPeriod> {
-    let mut modulator = Modulator::new(devices(), Schedule::new(&CLOCK));
+    let ladder = Ladder::of(&[Mode::Sync15, Mode::Sync12, Mode::Mid7, Mode::Mid5, Mode::Mid3, Mode::Square]);
+    let mut modulator = Modulator::new(devices(), Schedule::on(ladder, &CLOCK));
     let mut found: Vec<CarrierPeriod> = Vec::new();
     let mut start = Instant(0);
     let (mut angle, mut hz) = (Angle::ZERO, 3.0_f32);

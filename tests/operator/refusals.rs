@@ -99,6 +99,14 @@ fn a_short_circuit_stays_while_open_gates_would_rectify() {
     world.observed.omega = 2_000.0;
     refused(&mut world, ACKNOWLEDGE, Refusal::CauseStillPresent);
     world.observed.omega = 1_500.0;
+    world.observed.speed_known = false;
+    refused(&mut world, ACKNOWLEDGE, Refusal::CauseStillPresent);
+    world.observed.speed_known = true;
+    // A shorted machine carries the current that takes the magnets' flux away, and no sensor stands still then.
+    world.observed.current_a = 193.0;
+    world.observed.omega = 0.0;
+    refused(&mut world, ACKNOWLEDGE, Refusal::CauseStillPresent);
+    world.observed.omega = 1_500.0;
     assert_eq!(world.edge(ACKNOWLEDGE).status.refusal, None);
 }
 

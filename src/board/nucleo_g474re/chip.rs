@@ -110,7 +110,7 @@ pub(super) fn join_bus<T>(
     }
     let registers = Registers::CHIP;
     // The ports of the bus's pins among them: the start may not have come so far.
-    clock::enable_peripherals(&registers);
+    clock::enable_peripherals(&registers, &mut Cycles);
     match Can::CHIP.configure(messages, &registers.rcc, &mut Cycles) {
         Ok(()) => pins::configure_bus(&registers, of),
         // Nobody can command the drive then; it rests.

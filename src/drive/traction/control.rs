@@ -45,6 +45,8 @@ pub struct ControlTask<M = &'static Tables> {
     disarmed: Disarmed,
     trip: Option<Trip>,
     acknowledge: Acknowledge,
+    /// Electrical speed at which the angle was lost, in rad/s, until that is acknowledged.
+    lost_at: Option<f32>,
 }
 
 /// What a period's control law makes; nothing while no pulses are made.
@@ -83,6 +85,7 @@ impl<M: Machine> ControlTask<M> {
             disarmed: Disarmed::NONE,
             trip: None,
             acknowledge: Acknowledge::new(),
+            lost_at: None,
         }
     }
 
@@ -113,8 +116,7 @@ impl<M: Machine> ControlTask<M> {
         let applied = shared.applied.read(|records| Applied::seen(records, now)).flatten();
         let released = applied.as_ref().map(|applied| applied.released);
         if self.acknowledge.step(sample.acknowledge, self.trip.is_some(), released) {
-            self.trip = None;
-            self.controller.recover_angle();
+            (self.trip, self.lost_at) = (None, None);
         }
         if self.trip.is_none() && applied.as_ref().is_some_and(|applied| applied.next.kind.is_tripped()) {
             self.trip = shared.trip.read();
@@ -175,7 +177,7 @@ impl<M: Machine> ControlTask<M> {
             id_a: driven.current.d,
             iq_a: driven.current.q,
             voltage_v: driven.voltage_v,
-            frequency_hz: omega / core::f32::consts::TAU,
+            frequency_hz: self.controller.omega() / core::f32::consts::TAU,
             map_error: driven.map_error,
             trip: self.trip,
             udc_v: sample.udc_v,
@@ -235,7 +237,8 @@ impl<M: Machine> ControlTask<M> {
     }
 
     /// Follows the angle; returns the electrical speed, in rad/s. An angle that cannot be, or is not known, leaves the speed as it was. It
-    /// may be unknown until it is known for the first time, while nobody wants pulses.
+    /// may be unknown until it is known for the first time, while nobody wants pulses. After a trip the angle is followed anew and its
+    /// speed told, to leave the safe state by; whatever chooses a safe state keeps to the speed at which the angle was lost.
     fn track(&mut self, sample: &Sample) -> (f32, Option<Violation>) {
         let clock = self.settings.clock;
         let lost = match sample.angle {
@@ -245,13 +248,18 @@ impl<M: Machine> ControlTask<M> {
             Some(_) => None,
             None => protection::check_known(sample.enable || self.controller.is_following()),
         };
-        match (sample.angle, self.armed(lost)) {
-            (Some(angle), None) => (self.controller.track(angle, &clock), None),
-            (_, lost) => {
-                self.controller.lose_angle();
-                (self.controller.omega(), lost)
-            }
+        let lost = self.armed(lost);
+        if lost.is_some() {
+            self.lost_at.get_or_insert(self.controller.omega());
+            self.controller.lose_angle();
         }
+        if self.trip.is_some() {
+            self.controller.recover_angle();
+        }
+        if let Some(angle) = sample.angle.filter(|_| lost.is_none() || self.trip.is_some()) {
+            self.controller.track(angle, &clock);
+        }
+        (self.lost_at.unwrap_or(self.controller.omega()), lost)
     }
 
     /// What is wrong with a sample by itself.

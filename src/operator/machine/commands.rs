@@ -66,10 +66,14 @@ impl<D: Demands> Operator<D> {
             return self.refuse(if waiting { Refusal::FaultNotAcknowledged } else { Refusal::NoFault });
         };
         let shorted = trip.safe != SafeState::GatesOff;
-        let held = shorted && !health::open_is_safe(input, settings);
-        let cause =
-            health::cause(input, false, settings).or_else(|| health::resting_current(input, settings));
-        if held || cause.is_some() {
+        let held = if shorted {
+            health::shorted_current(input, settings).is_some()
+                || !input.observed.speed_known
+                || !health::open_is_safe(input, settings)
+        } else {
+            health::resting_current(input, settings).is_some()
+        };
+        if held || health::cause(input, false, settings).is_some() {
             return self.refuse(Refusal::CauseStillPresent);
         }
         // Zero is what both interrupts begin with.

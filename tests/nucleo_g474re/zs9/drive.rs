@@ -47,7 +47,7 @@ fn the_drive_pulses_two_turning_motors_through_the_registers() {
     let mut control_task = ControlTask::new(&BUILT_IN, settings());
     let mut pwm_task = PwmTask::new(&BUILT_IN, settings());
     make_ready(&registers);
-    operator.desk.allow_from(permitted([10.0, 10.0], 500.0), Instant(0));
+    let mut enabled = false;
     // 500 V of link from 400 V of source.
     let codes = [(6, 1_843), (9, 1_638)];
     let control_cycles = u64::from(CLOCK.control_ticks * CYCLES_PER_TICK);
@@ -76,6 +76,10 @@ fn the_drive_pulses_two_turning_motors_through_the_registers() {
             converted(&codes, registers);
             control_task.run(&mut control, &shared);
             rig.model.settle();
+            if operator.position.is_known() && !enabled {
+                operator.desk.allow_from(permitted([10.0, 10.0], 500.0), control_task.next_call());
+                enabled = true;
+            }
         }
         shorted = rig.model.shorted[1];
     }

@@ -3,7 +3,7 @@
 
 use super::model::Model;
 use super::ports::{converted, drivers_ready};
-use crate::bench::Bench;
+use crate::bench::{Bench, control_update};
 use crate::bus::{Bus, Sender};
 use stm32_metapac::timer::regs::SrGp16;
 use tractive::board::nucleo_g474re::operator::DualOperator;
@@ -12,13 +12,14 @@ use tractive::board::nucleo_g474re::power_stage::PowerStage;
 use tractive::board::nucleo_g474re::serve::DualServe;
 use tractive::board::nucleo_g474re::watchdog::Pulse;
 use tractive::board::nucleo_g474re::zs9::stage::STAGE;
-use tractive::board::nucleo_g474re::zs9::{CLOCK, CYCLES_PER_TICK, Control, Pwm, RATINGS, settings};
+use tractive::board::nucleo_g474re::zs9::{CLOCK, CYCLES_PER_TICK, Control, Pwm, RATINGS, settings, start};
 use tractive::built_in::zs9::BUILT_IN;
 use tractive::drive::dual::{ControlTask, PwmTask, Shared};
 use tractive::frames::Angle;
 use tractive::nine_switch::Scheme;
 use tractive::operator::{self, Configuration, DualDesk, DualSlot, Levels, Line, Refusal, State, slot_s};
 use tractive::ports::{DualPwmPort, GateFeedback, PlayedPeriod, PowerSample};
+use tractive::protection::Fault;
 use tractive::protocol::{
     Frame, Payload, StatusFrame, TO_ZS9, ZS9_COMMAND, ZS9_STATUS, Zs9Command, Zs9Demands, Zs9Station,
 };
@@ -33,7 +34,7 @@ const CONTACTOR_PERIODS: u64 = 50;
 const HUNGER: u64 = 200;
 
 /// The PWM interrupt's port, with the driver board's latches in place of the serial words, which memory cannot shift, and with the hardware's
-/// turn after a flag is cleared: in memory a flag that is written 1 would be set.
+/// turn after each write, as in the other image.
 struct Port<'a> {
     pwm: &'a mut Pwm,
     model: &'a mut Model,
@@ -47,16 +48,18 @@ impl DualPwmPort for Port<'_> {
 
     fn play(&mut self, now: Instant, next: &PlayedPeriod) {
         self.pwm.play(now, next);
+        self.model.settle();
     }
 
     fn gates_off(&mut self, now: Instant) {
         self.pwm.gates_off(now);
+        self.model.settle();
     }
 
     fn leave(&mut self, now: Instant) -> bool {
         let left = self.pwm.leave(now);
         self.model.settle();
-        left
+        left && !start::bridge(&self.model.registers).outputs().is_tripped()
     }
 }
 
@@ -81,6 +84,9 @@ struct Image {
     rpm: [f64; 2],
     counts: [f64; 2],
     capacitor_v: f64,
+    drivers_ready: bool,
+    /// What the sensor of the upper motor's phase U shows too much, in codes.
+    offset: u16,
     told: [(bool, Option<u64>); 2],
     periods: u64,
     fed: u64,
@@ -123,6 +129,8 @@ impl Image {
             rpm,
             counts: [0.0; 2],
             capacitor_v: 0.0,
+            drivers_ready: true,
+            offset: 0,
             told: [(false, None); 2],
             periods: 0,
             fed: 0,
@@ -131,7 +139,8 @@ impl Image {
 
     fn convert(&self) {
         let code = |volts: f64| (volts / f64::from(STAGE.source_v_per_code)).round() as u16;
-        converted(&[(6, code(self.capacitor_v)), (9, code(SOURCE_V))], self.model.registers);
+        let codes = [(6, code(self.capacitor_v)), (9, code(SOURCE_V)), (2, 2_048 + self.offset)];
+        converted(&codes, self.model.registers);
     }
 
     /// The inputs' levels, and the link over a control period. As in the other image the contactors go by the status.
@@ -154,7 +163,8 @@ impl Image {
             let inputs = registers.gpioc.as_ptr().cast::<u32>().add(4);
             inputs.write_volatile(1 << 4 | precharge << 5 | main << 12);
         }
-        drivers_ready(&registers, true);
+        drivers_ready(&registers, self.drivers_ready);
+        self.model.fault = [!self.drivers_ready; 3];
     }
 
     /// Both shafts over a control period, and the timers that count their encoders.
@@ -175,6 +185,7 @@ impl Image {
             status.set_idxif(passed && timer.ecr().read().ie());
             timer.sr().write_value(status);
         }
+        control_update(&self.model.registers);
     }
 
     fn period(&mut self) {
@@ -250,6 +261,10 @@ impl Image {
         panic!("{wanted:?} not reached: {:?}, {:?}", self.heard, self.control_task.trip());
     }
 
+    fn fault(&self) -> Option<Fault> {
+        self.heard.and_then(|heard| Fault::from_code(heard.fault.into()))
+    }
+
     fn gates_are_off(&self) -> bool {
         !self.model.devices().contains(&true)
     }
@@ -263,6 +278,39 @@ const REST: Zs9Command = Zs9Command::AT_REST;
 const CHARGE: Zs9Command = asking(Levels { charge: true, ..Levels::NONE }, 0.0);
 const ENABLE: Zs9Command = asking(Levels { enable: true, ..Levels::NONE }, 0.0);
 const PULL: Zs9Command = asking(Levels { enable: true, ..Levels::NONE }, 10.0);
+const ACKNOWLEDGE: Zs9Command = asking(Levels { acknowledge: true, ..Levels::NONE }, 0.0);
+
+/// From enable to torque of both motors, the other way round each.
+fn pulls(image: &mut Image) {
+    image.until(ENABLE, State::Enabled, 40);
+    image.until(PULL, State::Running, 40);
+    image.run_ms(60);
+    assert!(!image.gates_are_off());
+    let [upper, lower] = image.operator.desk.observed().unwrap().report.torque_nm;
+    assert!((upper - 10.0).abs() < 0.1 && (lower + 10.0).abs() < 0.1, "{upper} and {lower} N·m");
+}
+
+/// A fault, which stays until it is acknowledged, and cannot be while its cause lasts; and from there to torque again.
+fn fails(image: &mut Image, fault: Fault, spoil: fn(&mut Image), mend: fn(&mut Image)) {
+    spoil(image);
+    image.run_ms(1);
+    assert!(image.gates_are_off(), "{fault:?}");
+    image.until(PULL, State::Fault, 30);
+    assert_eq!(image.fault(), Some(fault));
+    image.command = ACKNOWLEDGE;
+    image.run_ms(25);
+    let heard = image.heard.unwrap();
+    assert_eq!((heard.state, heard.refusal), (Some(State::Fault), Some(Refusal::CauseStillPresent)));
+    mend(image);
+    image.command = PULL;
+    image.run_ms(25);
+    assert!(image.gates_are_off() && image.fault() == Some(fault), "until it is acknowledged");
+    image.until(ACKNOWLEDGE, State::Ready, 300);
+    assert_eq!(image.control_task.trip(), None);
+    assert!(image.gates_are_off(), "and enabled");
+    image.until(CHARGE, State::Charged, 200);
+    pulls(image);
+}
 
 #[test]
 fn a_drive_that_is_reset_with_one_motor_turning_waits_for_the_others_index_and_works() {
@@ -274,15 +322,26 @@ fn a_drive_that_is_reset_with_one_motor_turning_waits_for_the_others_index_and_w
     assert_eq!(image.heard.unwrap().refusal, Some(Refusal::PositionUnknown));
     assert_eq!(image.state(), Some(State::Charged));
     // The other one begins to turn, the lever still set: its index comes, and nothing else.
-    image.rpm[1] = -1_500.0;
+    image.rpm[1] = -900.0;
     image.run_ms(70);
     assert!(image.operator.position.is_known() && image.gates_are_off());
     assert_eq!((image.state(), image.control_task.trip()), (Some(State::Charged), None));
     image.command = REST;
     image.run_ms(15);
-    image.until(ENABLE, State::Enabled, 40);
-    image.until(PULL, State::Running, 40);
-    image.run_ms(10);
-    let torque_nm = image.operator.desk.observed().unwrap().report.torque_nm;
-    assert!(torque_nm[0] > 1.0, "{torque_nm:?}");
+    pulls(&mut image);
+    fails(
+        &mut image,
+        Fault::GateDriver,
+        |image| image.drivers_ready = false,
+        |image| image.drivers_ready = true,
+    );
+    fails(&mut image, Fault::PhaseSum, |image| image.offset = 300, |image| image.offset = 0);
+    // Until it is slow: the EMFs of both would rectify.
+    for _ in 0..100 {
+        image.rpm = image.rpm.map(|rpm| 0.985 * rpm);
+        image.run_ms(1);
+    }
+    image.until(REST, State::Charged, 100);
+    image.run_ms(2);
+    assert!(image.gates_are_off() && image.fault().is_none());
 }

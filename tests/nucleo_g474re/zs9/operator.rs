@@ -120,12 +120,12 @@ fn the_operator_hears_of_contacts_drivers_and_inputs() {
         inputs(levels);
         assert_eq!(serve.feedback(), wanted, "{levels:#b}");
     }
-    // The position is known once both indices have passed, and stays so when control has cleared their flags.
+    // The position is known one sample after both indices have passed, and stays so when control has cleared their flags.
     inputs(0);
     let mut control = control(registers, &operator);
-    for (timer, known) in [(registers.tim3, false), (registers.tim4, true)] {
+    for (timer, knows) in [(registers.tim3, [false; 3]), (registers.tim4, [false, true, true])] {
         timer.sr().write(|w| w.set_idxif(true));
-        for _ in 0..2 {
+        for known in knows {
             converted(&[], registers);
             control.sample(NOW);
             assert_eq!(serve.feedback().position_known, known);
