@@ -6,7 +6,6 @@
 #![forbid(unsafe_code)]
 
 use crate::cell::{Ring, Words};
-use crate::drive::dual::scheme_from_code;
 use crate::frames::{Abc, Angle};
 use crate::modulation::Mode;
 use crate::nine_switch::Scheme;
@@ -209,7 +208,7 @@ impl Words<DUAL_WORDS> for DualRecord {
             torque_nm: [t1, t2].map(f32::from_bits),
             duty: (state >> DUAL_DUTY) as f32 / DUTY_STEPS,
             state: DualState {
-                scheme: scheme_from_code(state & 7),
+                scheme: Scheme::from_code(state & 7),
                 enabled: state & DUAL_ENABLED != 0,
                 pulsing: state & DUAL_PULSING != 0,
                 fault: Fault::from_code(state >> DUAL_FAULT & 0xFF),

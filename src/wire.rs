@@ -10,10 +10,11 @@ mod dual;
 
 use crate::cell::Words;
 use crate::control::{Demand, LinkWindow};
-use crate::drive::{Report, half_from_words, half_to_words};
+use crate::drive::{half_from_words, half_to_words};
 use crate::frames::{Abc, Angle};
 use crate::modulation::CarrierPeriod;
 use crate::operator::{self, Feedback, LineTimes, Status, Told};
+use crate::ports::Report;
 use crate::ports::Sample;
 use crate::protection::{Fault, SafeState};
 use crate::protocol::Frame;

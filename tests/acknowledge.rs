@@ -5,11 +5,13 @@
 use std::cell::Cell;
 use tractive::built_in::{traction::BUILT_IN, zs9};
 use tractive::control::{Demand, Gains, LinkWindow};
-use tractive::drive::dual::{self, DualReport};
-use tractive::drive::{Report, traction};
+use tractive::drive::dual::{self};
+use tractive::drive::traction;
 use tractive::frames::{Abc, Angle, Dq};
 use tractive::modulation::{CarrierPeriod, Devices, Mode};
 use tractive::nine_switch::Scheme;
+use tractive::ports::DualReport;
+use tractive::ports::Report;
 use tractive::ports::{
     ControlPort, DualControlPort, DualPwmPort, DualSample, GateFeedback, HardwareBreak, MotorDemand,
     PlayedPeriod, PowerSample, PwmPort, Sample,

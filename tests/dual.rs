@@ -5,10 +5,11 @@ use tractive::cell::Words;
 use tractive::control::Demand;
 use tractive::drive::Gates;
 use tractive::drive::dual::{
-    ControlTask, DualApplied, DualCommand, DualReport, MotorCommand, MotorShare, PwmTask, Settings, Shared,
+    ControlTask, DualApplied, DualCommand, MotorCommand, MotorShare, PwmTask, Settings, Shared,
 };
 use tractive::frames::{Abc, Angle, Dq};
 use tractive::nine_switch::{LegState, Scheme};
+use tractive::ports::DualReport;
 use tractive::ports::{
     DualControlPort, DualPwmPort, DualSample, GateFeedback, HardwareBreak, MotorDemand, PlayedPeriod,
     PowerSample,

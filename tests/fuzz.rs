@@ -6,12 +6,13 @@
 use proptest::prelude::*;
 use tractive::built_in::{traction::BUILT_IN, zs9};
 use tractive::control::{Demand, Gains, LinkWindow};
-use tractive::drive::Report;
-use tractive::drive::dual::{self, DualReport};
+use tractive::drive::dual::{self};
 use tractive::drive::traction;
 use tractive::frames::{Abc, Angle, Dq};
 use tractive::modulation::{CarrierPeriod, Devices, Mode};
 use tractive::nine_switch::{LegState, Scheme};
+use tractive::ports::DualReport;
+use tractive::ports::Report;
 use tractive::ports::{
     ControlPort, DualControlPort, DualPwmPort, DualSample, GateFeedback, MotorDemand, PlayedPeriod,
     PowerSample, PwmPort, Sample,

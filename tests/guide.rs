@@ -5,10 +5,10 @@ use tractive::board::nucleo_g474re::power_stage::{CORE_HZ, POWER_STAGE, cycles_t
 use tractive::board::nucleo_g474re::{self, PRESCALER, sampling};
 use tractive::built_in::traction::BUILT_IN;
 use tractive::control::{Demand, Gains, LinkWindow};
-use tractive::drive::Report;
 use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
 use tractive::frames::{Abc, Angle};
 use tractive::modulation::{CarrierPeriod, Devices, Mode};
+use tractive::ports::Report;
 use tractive::ports::{ControlPort, PwmPort, Sample};
 use tractive::protection::{Fault, SafeState};
 use tractive::time::{Clock, Instant};

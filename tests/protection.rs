@@ -2,10 +2,10 @@
 
 use tractive::built_in::traction::BUILT_IN;
 use tractive::control::{Demand, Gains, LinkWindow, Measurements};
-use tractive::drive::Report;
 use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
 use tractive::frames::{Abc, AlphaBeta, Angle, Dq};
 use tractive::modulation::{CarrierPeriod, Devices, Mode};
+use tractive::ports::Report;
 use tractive::ports::{ControlPort, PwmPort, Sample};
 use tractive::protection::{Fault, FrozenWatch, LegFaults, SafeState, Trip};
 use tractive::time::{Clock, Instant};

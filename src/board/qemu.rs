@@ -17,10 +17,10 @@ pub use dual::{DUAL_DESK, DUAL_RECORDER, DualIdle, connect_dual, die_dual, start
 pub use watch::ends as watch_ends;
 
 use crate::configuration::Refused;
-use crate::drive::Report;
 use crate::frames::Abc;
 use crate::modulation::CarrierPeriod;
 use crate::operator::{self, Desk, Feedback, OperatorPort, Status};
+use crate::ports::Report;
 use crate::ports::{ControlPort, PwmPort, Sample};
 use crate::protection::SafeState;
 use crate::protocol::Station;

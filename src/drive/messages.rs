@@ -3,7 +3,6 @@
 use crate::cell::{Record, Words};
 use crate::frames::{Abc, AlphaBeta, Angle, SQRT_3};
 use crate::modulation::{CarrierPeriod, MODE_CODES, Mode, Reference};
-use crate::protection::{Fault, SafeState, Trip};
 use crate::time::Instant;
 
 /// What control wants of the gates.
@@ -274,23 +273,6 @@ pub fn volt_ticks([a, b, c]: [u32; 3]) -> AlphaBeta {
     }
 }
 
-impl Words<4> for Trip {
-    fn to_words(self) -> [u32; 4] {
-        trip_to_words(Some(self))
-    }
-
-    fn from_words(words: [u32; 4]) -> Self {
-        let unknown = Self {
-            fault: Fault::NotFinite,
-            value: 0.0,
-            limit: 0.0,
-            at: Instant(0),
-            safe: SafeState::GatesOff,
-        };
-        trip_from_words(words).unwrap_or(unknown)
-    }
-}
-
 /// A carrier half as five words: period, three compares, and levels, modes and number packed.
 pub fn half_to_words(half: CarrierPeriod) -> [u32; 5] {
     let [u, v, w] = half.compare_ticks;
@@ -311,99 +293,5 @@ pub fn half_from_words(words: [u32; 5]) -> CarrierPeriod {
         mode: Mode::from_code(mode_at(packed, MODE)),
         half: (packed >> NUMBER) as u8,
         ahead: [NEXT, NEXT_BUT_ONE].map(|place| Mode::from_code(mode_at(packed, place))),
-    }
-}
-
-/// A latched fault as four words: fault and safe state, value, limit, instant; zeros for none.
-pub fn trip_to_words(trip: Option<Trip>) -> [u32; 4] {
-    match trip {
-        None => [0; 4],
-        Some(trip) => [
-            trip.fault as u32 | (trip.safe as u32) << 8,
-            trip.value.to_bits(),
-            trip.limit.to_bits(),
-            trip.at.0,
-        ],
-    }
-}
-
-/// The inverse of [`trip_to_words`].
-pub fn trip_from_words(words: [u32; 4]) -> Option<Trip> {
-    let [code, value, limit, at] = words;
-    Some(Trip {
-        fault: Fault::from_code(code & 0xFF)?,
-        value: f32::from_bits(value),
-        limit: f32::from_bits(limit),
-        at: Instant(at),
-        safe: SafeState::from_code(code >> 8 & 0xFF),
-    })
-}
-
-/// What the control task did in one period, for traces and telemetry.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Report {
-    /// Torque demand after envelope, slew and voltage limit, in N·m.
-    pub torque_nm: f32,
-    /// Current reference, d axis, in A.
-    pub id_a: f32,
-    /// Current reference, q axis, in A.
-    pub iq_a: f32,
-    /// Commanded fundamental, peak phase, in V.
-    pub voltage_v: f32,
-    /// Stator frequency, in Hz, negative backward.
-    pub frequency_hz: f32,
-    /// By how much the machine's flux linkage seems to exceed the map's, as a share; 0 where it turns too slowly to tell.
-    pub map_error: f32,
-    /// The latched fault, if any.
-    pub trip: Option<Trip>,
-    /// DC-link voltage, in V.
-    pub udc_v: f32,
-    /// Largest magnitude of a phase current, in A.
-    pub current_a: f32,
-    /// Whether the speed has been followed long enough to be used.
-    pub speed_known: bool,
-    /// Number of the acknowledge that both interrupts have carried out.
-    pub acknowledged: u8,
-    /// Pulse pattern that the voltage was made for.
-    pub mode: Mode,
-}
-
-impl Words<12> for Report {
-    fn to_words(self) -> [u32; 12] {
-        let [code, value, limit, at] = trip_to_words(self.trip);
-        let flags = u32::from(self.acknowledged) | u32::from(self.speed_known) << 8;
-        let code = code | flags << 16 | (self.mode as u32) << 26;
-        [
-            self.torque_nm.to_bits(),
-            self.id_a.to_bits(),
-            self.iq_a.to_bits(),
-            self.voltage_v.to_bits(),
-            self.frequency_hz.to_bits(),
-            self.map_error.to_bits(),
-            code,
-            value,
-            limit,
-            at,
-            self.udc_v.to_bits(),
-            self.current_a.to_bits(),
-        ]
-    }
-
-    fn from_words(words: [u32; 12]) -> Self {
-        let [torque, id, iq, voltage, frequency, map_error, code, value, limit, at, udc, current] = words;
-        Self {
-            torque_nm: f32::from_bits(torque),
-            id_a: f32::from_bits(id),
-            iq_a: f32::from_bits(iq),
-            voltage_v: f32::from_bits(voltage),
-            frequency_hz: f32::from_bits(frequency),
-            map_error: f32::from_bits(map_error),
-            trip: trip_from_words([code, value, limit, at]),
-            udc_v: f32::from_bits(udc),
-            current_a: f32::from_bits(current),
-            speed_known: code >> 24 & 1 != 0,
-            acknowledged: (code >> 16) as u8,
-            mode: Mode::from_code(code >> 26),
-        }
     }
 }

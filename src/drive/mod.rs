@@ -9,6 +9,6 @@ mod messages;
 pub mod traction;
 
 pub use messages::{
-    COMMITTAL_WORDS, Committal, CommittalRecord, Gates, HalfKind, Report, VoltageCommand, half_from_words,
-    half_to_words, trip_from_words, trip_to_words, volt_ticks,
+    COMMITTAL_WORDS, Committal, CommittalRecord, Gates, HalfKind, VoltageCommand, half_from_words,
+    half_to_words, volt_ticks,
 };

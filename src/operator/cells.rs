@@ -4,11 +4,13 @@
 use super::{DualObservation, DualPermit, Observation, Permit, SLOT_PERIODS};
 use crate::cell::{Downlink, Uplink, Words};
 use crate::control::{Demand, LinkWindow};
-use crate::drive::dual::DualReport;
-use crate::drive::{Report, trip_from_words, trip_to_words};
 use crate::modulation::Mode;
+use crate::ports::DualReport;
 use crate::ports::MotorDemand;
+use crate::ports::Report;
 use crate::protection::Trip;
+use crate::protection::trip_from_words;
+use crate::protection::trip_to_words;
 use crate::time::{Clock, Instant};
 use core::sync::atomic::{AtomicU32, Ordering};
 

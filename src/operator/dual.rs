@@ -4,9 +4,10 @@
 use super::demand::wanted_nm;
 use super::{Demands, Levels, Ramp, Rates, Refusal, Seen, Settings};
 use crate::control::Demand;
-use crate::drive::dual::{self, DualReport};
+use crate::drive::dual::{self};
 use crate::frames::limit;
 use crate::machine::Ratings;
+use crate::ports::DualReport;
 use crate::ports::{DualSample, MotorDemand};
 use crate::time::Instant;
 

@@ -1,9 +1,10 @@
 //! What the operator is told.
 
 use crate::control::Demand;
-use crate::drive::{trip_from_words, trip_to_words};
 use crate::ports::MotorDemand;
 use crate::protection::Trip;
+use crate::protection::trip_from_words;
+use crate::protection::trip_to_words;
 
 macro_rules! named {
     ($(#[$meta:meta])* $name:ident { $($(#[$doc:meta])* $variant:ident = $text:literal),+ $(,)? }) => {

@@ -1,7 +1,7 @@
 //! What a board gives the ZS9's drive.
 
+use super::DualReport;
 use crate::control::Demand;
-use crate::drive::dual::DualReport;
 use crate::frames::{Abc, Angle};
 use crate::nine_switch::{GateTicks, Scheme};
 use crate::protection::Fault;

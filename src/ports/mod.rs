@@ -3,9 +3,9 @@
 #![forbid(unsafe_code)]
 
 mod dual;
+mod report;
 
 use crate::control::{Demand, LinkWindow, Measurements};
-use crate::drive::Report;
 use crate::frames::{Abc, Angle};
 use crate::modulation::CarrierPeriod;
 use crate::protection::{Fault, LegFaults, SafeState};
@@ -15,6 +15,7 @@ pub use dual::{
     DualControlPort, DualPwmPort, DualSample, GateFeedback, HardwareBreak, MotorDemand, PlayedPeriod,
     PowerSample,
 };
+pub use report::{DualReport, Report};
 
 /// A control sample: what the converters hold, and what the operator wants.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -12,6 +12,7 @@ mod frozen;
 mod legs;
 mod link;
 mod safe;
+mod words;
 
 pub use checks::{
     SURPRISE_RAD, check_angle, check_currents, check_demand, check_known, check_measurements, check_speed,
@@ -23,3 +24,4 @@ pub use frozen::FrozenWatch;
 pub use legs::LegFaults;
 pub use link::LinkLimits;
 pub use safe::{SafeState, safe_state};
+pub use words::{trip_from_words, trip_to_words};

@@ -3,10 +3,10 @@
 use super::{Block, block, filled, line_from_words, line_to_words, told_from_words, told_to_words};
 use crate::cell::Words;
 use crate::control::Demand;
-use crate::drive::dual::{DualReport, scheme_from_code};
 use crate::frames::{Abc, Angle};
-use crate::nine_switch::GateTicks;
+use crate::nine_switch::{GateTicks, Scheme};
 use crate::operator::{DualStatus, Feedback, LineTimes};
+use crate::ports::DualReport;
 use crate::ports::{DualSample, GateFeedback, HardwareBreak, MotorDemand, PlayedPeriod, PowerSample};
 use crate::protection::Fault;
 use crate::protocol::Frame;
@@ -192,7 +192,7 @@ pub fn dual_sample_from_block(block: &Block) -> (DualSample, bool) {
         source_v: f32::from_bits(source),
         demands: [demand(flags >> 4 & 3, demand1), demand(flags >> 6 & 3, demand2)],
         link_ref_v: f32::from_bits(link),
-        scheme: scheme_from_code(flags >> 8 & 0xFF),
+        scheme: Scheme::from_code(flags >> 8 & 0xFF),
         speed_torque_nm: DualSample::UNLIMITED_NM,
         acknowledge: 0,
         hardware: Fault::from_code(hardware & 0xFFFF)

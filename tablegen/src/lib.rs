@@ -13,6 +13,7 @@
 //! makes them at run time, with [`MachineFolder::tables`].
 #![forbid(unsafe_code)]
 
+mod axis;
 mod error;
 mod input;
 mod map;

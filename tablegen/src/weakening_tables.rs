@@ -3,7 +3,7 @@
 //! The target interpolates. So that what it reads never has more flux linkage or current than it asked for, every circle is
 //! made a little narrower than its row says: by the most that interpolation beside it would exceed.
 
-use crate::tables::{Axis, curve, grid};
+use crate::axis::{Axis, curve, grid};
 use crate::weakening::{Circle, circle};
 use crate::{MachineFolder, SmoothMap};
 use std::f64::consts::{FRAC_2_PI, TAU};

@@ -1,12 +1,13 @@
 //! The same state machine over the ZS9's two motors.
 
 use tractive::built_in::zs9::BUILT_IN;
-use tractive::drive::dual::{self, DualReport};
+use tractive::drive::dual::{self};
 use tractive::machine::Ratings;
 use tractive::operator::{
     Configuration, DualObservation, DualOperator, DualPermit, DualRequest, DualStatus, Feedback, Input, Line,
     MotorLimits, Output, Refusal, Settings, State, Wanted,
 };
+use tractive::ports::DualReport;
 use tractive::ports::MotorDemand;
 use tractive::protection::{Fault, SafeState, Trip};
 use tractive::time::{Clock, Instant};

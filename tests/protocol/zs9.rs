@@ -2,9 +2,10 @@
 
 use super::Stream;
 use tractive::built_in::zs9::BUILT_IN;
-use tractive::drive::dual::{DualReport, Settings};
+use tractive::drive::dual::Settings;
 use tractive::nine_switch::Scheme;
 use tractive::operator::{DualObservation, DualRequest, DualStatus, Levels, State, Switches, Wanted};
+use tractive::ports::DualReport;
 use tractive::protocol::{
     Dialect, FROM_ZS9, Frame, Payload, StatusFrame, TO_ZS9, TorqueLimits, ZS9_COMMAND, ZS9_LIMITS, ZS9_LINK,
     Zs9, Zs9Command, Zs9Demands, Zs9Link, Zs9Measured, Zs9Session, Zs9Station,

@@ -35,6 +35,11 @@ impl Scheme {
     /// Every scheme, in the order of its discriminant.
     pub const ALL: [Self; 6] = [Self::S, Self::Rs, Self::Rthd, Self::Zvo, Self::RthdCentral, Self::RthdSlide];
 
+    /// The scheme with this discriminant; the default one for an unknown number.
+    pub fn from_code(code: u32) -> Self {
+        Self::ALL.get(code as usize).copied().unwrap_or_default()
+    }
+
     /// The name in traces and on the command line.
     pub const fn name(self) -> &'static str {
         match self {

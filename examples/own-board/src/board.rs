@@ -1,7 +1,7 @@
 //! The board: registers on the one side, the library's ports on the other. The addresses are placeholders for your chip's.
 
 use tractive::control::{Demand, LinkWindow};
-use tractive::drive::Report;
+use tractive::ports::Report;
 use tractive::frames::{Abc, Angle};
 use tractive::modulation::CarrierPeriod;
 use tractive::ports::{ControlPort, PwmPort, Sample};

@@ -3,8 +3,8 @@
 use super::{Bench, BenchError};
 use crate::inject::traction::Kind;
 use tractive::control::{LinkWindow, Measurements};
-use tractive::drive::Report;
 use tractive::frames::Abc;
+use tractive::ports::Report;
 use tractive::ports::Sample;
 use tractive::protection::LegFaults;
 use tractive::time::Instant;

@@ -3,8 +3,8 @@
 use anyhow::{Context, Result};
 use std::fmt::Write as _;
 use std::path::Path;
-use tractive::drive::Report;
 use tractive::modulation::Mode;
+use tractive::ports::Report;
 
 /// The lines so far.
 pub(crate) struct Calls {

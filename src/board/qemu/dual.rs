@@ -7,8 +7,9 @@ use super::{
     CLOCK, CONTROL_TIMER, Control, OPERATED, PWM_TIMER, Pwm, enable_interrupts, exchange, read_register,
     start_timers, stop, watch, write_register,
 };
-use crate::drive::dual::{DualReport, Settings};
+use crate::drive::dual::Settings;
 use crate::operator::{DualDemands, DualDesk, DualRequest, DualStatus, Feedback, OperatorPort};
+use crate::ports::DualReport;
 use crate::ports::{DualControlPort, DualPwmPort, DualSample, PlayedPeriod, PowerSample};
 use crate::protocol::Zs9Station;
 use crate::recorder::DualRecorder;

@@ -12,10 +12,10 @@ pub use dual::{
 
 use super::{RECORDER, saboteur, stop};
 use crate::cell::{Ring, Words};
-use crate::drive::Report;
 use crate::frames::Abc;
 use crate::modulation::CarrierPeriod;
 use crate::operator::{self, Feedback, Status};
+use crate::ports::Report;
 use crate::ports::Sample;
 use crate::protection::SafeState;
 use crate::protocol::Frame;

@@ -1,12 +1,13 @@
 //! The control interrupt's task.
 
 use super::axis::{self, Axis, AxisInput, AxisOutput};
-use super::{DualApplied, DualCommand, DualReport, MotorShare, Settings, Shared};
+use super::{DualApplied, DualCommand, MotorShare, Settings, Shared};
 use crate::control::{Measurements, ZSource, ZSourceError, ZSourceInput};
 use crate::drive::Gates;
 use crate::drive::acknowledge::Acknowledge;
 use crate::frames::{Angle, SQRT_3};
 use crate::machine::{Machine, Tables};
+use crate::ports::DualReport;
 use crate::ports::{DualControlPort, DualSample, HardwareBreak, MotorDemand};
 use crate::protection::{self, Disarmed, Fault, SafeState, Trip, Violation};
 use crate::recorder::{DualRecord, DualState};

@@ -1,10 +1,12 @@
 //! What travels between the ZS9's interrupts, and what control reports.
 
 use crate::cell::{Record, Words};
-use crate::drive::{Gates, trip_from_words, trip_to_words};
+use crate::drive::Gates;
 use crate::frames::Angle;
 use crate::nine_switch::Scheme;
 use crate::protection::Trip;
+use crate::protection::trip_from_words;
+use crate::protection::trip_to_words;
 use crate::time::Instant;
 
 /// One motor's voltage, from control to the modulator.
@@ -74,16 +76,11 @@ impl Words<10> for DualCommand {
             at: Instant(at),
             valid_from: Instant(valid_from),
             duty: f32::from_bits(duty),
-            scheme: scheme_from_code(flags >> 8 & 0xFF),
+            scheme: Scheme::from_code(flags >> 8 & 0xFF),
             release: (flags >> 16) as u8,
             gates: if flags & 1 == 1 { Gates::Pulse } else { Gates::Off },
         }
     }
-}
-
-/// The scheme with this discriminant; the default one for an unknown number.
-pub fn scheme_from_code(code: u32) -> Scheme {
-    Scheme::ALL.get(code as usize).copied().unwrap_or_default()
 }
 
 /// The mean voltage that one motor has in a period, as a share of the link.
@@ -134,90 +131,6 @@ impl Words<10> for DualApplied {
             released: (pulsing >> 8) as u8,
             next: (pulsing & 1 == 1).then_some([share(d1, a1), share(d2, a2)]),
             trip: trip_from_words(trip),
-        }
-    }
-}
-
-/// What the ZS9's control task did in one period, for traces and telemetry.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct DualReport {
-    /// Torque references after all limits, in N·m: upper motor, lower motor.
-    pub torque_nm: [f32; 2],
-    /// Commanded peak phase voltages, in V.
-    pub voltage_v: [f32; 2],
-    /// Whether each motor is on its voltage limit.
-    pub weakening: [bool; 2],
-    /// Shoot-through duty.
-    pub duty: f32,
-    /// Inductor current that is led to, in A.
-    pub inductor_ref_a: f32,
-    /// Where the zero vectors lie.
-    pub scheme: Scheme,
-    /// The latched fault, if any.
-    pub trip: Option<Trip>,
-    /// Electrical speeds, in rad/s.
-    pub omega: [f32; 2],
-    /// Largest magnitudes of a phase current, in A.
-    pub current_a: [f32; 2],
-    /// Capacitor voltage, in V.
-    pub capacitor_v: f32,
-    /// Source voltage, in V.
-    pub source_v: f32,
-    /// Whether both speeds have been followed long enough to be used.
-    pub speed_known: bool,
-    /// Number of the acknowledge that both interrupts have carried out.
-    pub acknowledged: u8,
-}
-
-impl DualReport {
-    /// Link voltage outside shoot-through, in V.
-    pub const fn link_v(&self) -> f32 {
-        2.0 * self.capacitor_v - self.source_v
-    }
-}
-
-const SPEED_KNOWN: u32 = 1 << 24;
-const WEAKENING: [u32; 2] = [1 << 25, 1 << 26];
-const SCHEME: u32 = 27;
-
-impl Words<16> for DualReport {
-    #[inline]
-    fn to_words(self) -> [u32; 16] {
-        let [t1, t2] = self.torque_nm.map(f32::to_bits);
-        let [v1, v2] = self.voltage_v.map(f32::to_bits);
-        let [w1, w2] = self.omega.map(f32::to_bits);
-        let [i1, i2] = self.current_a.map(f32::to_bits);
-        let [code, value, limit, at] = trip_to_words(self.trip);
-        let flag = |set: bool, bit: u32| if set { bit } else { 0 };
-        let ([weak1, weak2], [first, second]) = (self.weakening, WEAKENING);
-        let code = code
-            | u32::from(self.acknowledged) << 16
-            | flag(self.speed_known, SPEED_KNOWN)
-            | flag(weak1, first)
-            | flag(weak2, second)
-            | (self.scheme as u32) << SCHEME;
-        let [duty, inductor, capacitor, source] =
-            [self.duty, self.inductor_ref_a, self.capacitor_v, self.source_v].map(f32::to_bits);
-        [t1, t2, v1, v2, duty, inductor, code, value, limit, at, w1, w2, i1, i2, capacitor, source]
-    }
-
-    fn from_words(words: [u32; 16]) -> Self {
-        let [t1, t2, v1, v2, duty, inductor, code, value, limit, at, measured @ ..] = words;
-        let [w1, w2, i1, i2, capacitor_v, source_v] = measured.map(f32::from_bits);
-        Self {
-            torque_nm: [t1, t2].map(f32::from_bits),
-            voltage_v: [v1, v2].map(f32::from_bits),
-            weakening: WEAKENING.map(|bit| code & bit != 0),
-            duty: f32::from_bits(duty),
-            inductor_ref_a: f32::from_bits(inductor),
-            scheme: scheme_from_code(code >> SCHEME & 7),
-            trip: trip_from_words([code, value, limit, at]),
-            omega: [w1, w2],
-            current_a: [i1, i2],
-            capacitor_v,
-            source_v,
-            speed_known: code & SPEED_KNOWN != 0,
-            acknowledged: (code >> 16) as u8,
         }
     }
 }

@@ -31,7 +31,7 @@ use crate::time::Clock;
 use core::sync::atomic::AtomicU32;
 
 pub use control::ControlTask;
-pub use messages::{DualApplied, DualCommand, DualReport, MotorCommand, MotorShare, scheme_from_code};
+pub use messages::{DualApplied, DualCommand, MotorCommand, MotorShare};
 pub use pwm::PwmTask;
 
 /// Steps of the compare registers in one tick of the timers' clock: 1.25 ns at 25 MHz, as high-resolution timers have them. With

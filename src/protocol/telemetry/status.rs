@@ -1,7 +1,6 @@
 //! The status: state, fault, refusal, switches.
 
 use super::Counts;
-use crate::drive::dual::scheme_from_code;
 use crate::modulation::Mode;
 use crate::nine_switch::Scheme;
 use crate::operator::{Refusal, State, Status};
@@ -78,7 +77,7 @@ impl Pattern for Scheme {
 
     #[inline]
     fn from_code(code: u32) -> Self {
-        scheme_from_code(code)
+        Scheme::from_code(code)
     }
 }
 

@@ -25,8 +25,9 @@ use crate::inject::zs9::Spoiler;
 use crate::plant::zs9::{NetworkState, Zs9Plant};
 use gates::Gates;
 use sums::Sums;
-use tractive::drive::dual::{COMPARE_STEPS, DualReport};
+use tractive::drive::dual::COMPARE_STEPS;
 use tractive::operator::{DualStatus, Feedback};
+use tractive::ports::DualReport;
 use tractive::ports::{DualSample, GateFeedback, PlayedPeriod};
 use tractive::time::Instant;
 

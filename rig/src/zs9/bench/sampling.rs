@@ -3,8 +3,8 @@
 use super::{Bench, BenchError};
 use crate::inject::zs9::Kind;
 use crate::steps::held;
-use tractive::drive::dual::DualReport;
 use tractive::frames::Abc;
+use tractive::ports::DualReport;
 use tractive::ports::{DualSample, HardwareBreak, PowerSample};
 use tractive::time::Instant;
 

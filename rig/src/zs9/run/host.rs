@@ -6,13 +6,14 @@ use crate::without::Without;
 use crate::zs9::bench::Bench;
 use crate::zs9::trace::Recording;
 use anyhow::Result;
-use tractive::drive::dual::{ControlTask, DualReport, PwmTask, Settings, Shared};
+use tractive::drive::dual::{ControlTask, PwmTask, Settings, Shared};
 use tractive::frames::Abc;
 use tractive::machine::{Ratings, Tables};
 use tractive::nine_switch::Scheme;
 use tractive::operator::{
     self, DualDemands, DualDesk, DualRequest, DualSlot, DualStatus, Feedback, Line, OperatorPort, slot_s,
 };
+use tractive::ports::DualReport;
 use tractive::ports::{DualControlPort, DualPwmPort, DualSample, MotorDemand, PlayedPeriod, PowerSample};
 use tractive::protection::Trip;
 use tractive::protocol::Zs9Station;

@@ -5,7 +5,7 @@ use crate::run::{Emulator, Supervisor, in_qemu};
 use crate::zs9::bench::Bench;
 use crate::zs9::trace::Recording;
 use anyhow::{Result, bail};
-use tractive::drive::dual::DualReport;
+use tractive::ports::DualReport;
 use tractive::wire::{self, DualRequest, DualSetup};
 
 /// Runs until the recording is complete; a supervisor commands over the protocol.

@@ -12,9 +12,9 @@ use crate::board::nucleo_g474re::operator::DualOperator;
 use crate::board::nucleo_g474re::outputs::SoftwareBreak;
 use crate::board::nucleo_g474re::position::{Position, reported};
 use crate::board::nucleo_g474re::registers::Registers;
-use crate::drive::dual::DualReport;
 use crate::nine_switch::Scheme;
 use crate::operator::DualPermit;
+use crate::ports::DualReport;
 use crate::ports::{DualControlPort, DualPwmPort, DualSample, PlayedPeriod, PowerSample};
 use crate::time::Instant;
 

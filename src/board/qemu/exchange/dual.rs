@@ -2,8 +2,8 @@
 
 use super::{CONTROL_ANSWERS, IDLE_ANSWERS, PWM_ANSWERS, exchange, finish, open_files, send};
 use crate::board::qemu::{DUAL_RECORDER, saboteur, watch};
-use crate::drive::dual::DualReport;
 use crate::operator::{DualStatus, Feedback};
+use crate::ports::DualReport;
 use crate::ports::{DualSample, PlayedPeriod, PowerSample};
 use crate::protocol::Frame;
 use crate::time::Instant;
