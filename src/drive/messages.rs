@@ -228,7 +228,7 @@ impl HalfKind {
     #[inline]
     pub fn is_free(self) -> bool {
         const MODES: u32 = 1 << MODE | 1 << NEXT | 1 << NEXT_BUT_ONE;
-        self.0 & MODES * (MODE_CODES - 1) == MODES * Mode::Async as u32
+        self.0 & (MODES * (MODE_CODES - 1)) == MODES * Mode::Async as u32
     }
 
     /// Its number within the turn.

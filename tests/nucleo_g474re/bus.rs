@@ -80,7 +80,7 @@ impl Bus {
     pub fn settle(&mut self) -> Option<Frame> {
         let read = self.read(RXF0A);
         if read != NONE {
-            while let Some(_) = self.waiting.pop_front() {
+            while self.waiting.pop_front().is_some() {
                 let index = self.first as u32;
                 self.first = (self.first + 1) % 3;
                 if index == read {

@@ -31,7 +31,7 @@ const CONTACTOR_PERIODS: u64 = 200;
 const HUNGER: u64 = 200;
 /// Ticks of a step of the machine, a whole number of them in a control period.
 const STEP_TICKS: u64 = 25;
-const _: () = assert!(CLOCK.control_ticks as u64 % STEP_TICKS == 0);
+const _: () = assert!((CLOCK.control_ticks as u64).is_multiple_of(STEP_TICKS));
 
 /// The rotor, its windings, and the encoder on its shaft.
 struct Machine {
@@ -332,11 +332,11 @@ impl Image {
         self.control_task.run(&mut self.control, &self.shared);
         self.pulse.control_ran();
         self.bench.settle();
-        if self.speaks && self.periods % 100 == 0 {
+        if self.speaks && self.periods.is_multiple_of(100) {
             let frame = self.commands.frame(self.command.encode().unwrap());
             self.bus.arrive(frame);
         }
-        if self.periods % self.idle_every == 0 {
+        if self.periods.is_multiple_of(self.idle_every) {
             self.idle();
         }
         assert!(self.periods < self.fed + HUNGER, "the watchdog bites");

@@ -328,7 +328,7 @@ fn all_frames_of_a_slot_are_taken() {
         link.frame(at_link),
         bench.commands.frame(PULL.encode().unwrap()),
     ];
-    let request = bench.session.listen(1, &frames);
+    let request = bench.session.listen(1, frames);
     assert_eq!(
         (request.torque_nm, request.limits.braking_nm, request.limits.link_low_v),
         (100.0, 40.0, 1_100.0)

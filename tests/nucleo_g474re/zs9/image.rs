@@ -224,7 +224,7 @@ impl Image {
         self.control_task.run(&mut self.control, &self.shared);
         self.pulse.control_ran();
         self.model.settle();
-        if self.periods % 100 == 0 {
+        if self.periods.is_multiple_of(100) {
             let frame = self.commands.frame(self.command.encode().unwrap());
             self.bus.arrive(frame);
         }
