@@ -1,7 +1,7 @@
 //! How cargo is called: the image for the board, the rig for this machine.
 
 use std::ffi::OsString;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::{Command, Stdio};
 
 use anyhow::{Context, Result, bail};
@@ -9,9 +9,7 @@ use clap::ValueEnum;
 
 use crate::process;
 use crate::setup::Toolchain;
-
-/// What the image runs on.
-pub const TARGET: &str = "thumbv7em-none-eabihf";
+pub use crate::workspace::{TARGET, cargo, root};
 
 /// The feature of the reference images, on the emulated board.
 pub const QEMU: &str = "qemu";
@@ -44,19 +42,6 @@ impl Board {
             Self::NucleoG474re => "STM32G474RETx",
         }
     }
-}
-
-/// The repository's root.
-pub fn root() -> &'static Path {
-    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
-    here.parent().unwrap_or(here)
-}
-
-/// Cargo as this program was started by it, in the repository's root.
-pub fn cargo() -> Command {
-    let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
-    command.current_dir(root());
-    command
 }
 
 /// The systems, each with an image of its own.

@@ -5,7 +5,7 @@ use std::ffi::OsString;
 use clap::{Args, Parser, Subcommand};
 
 use crate::build::{Board, System};
-use crate::test::Step;
+use crate::step::Step;
 
 /// The chores of `tractive`.
 #[derive(Debug, Parser)]

@@ -36,9 +36,11 @@ mod process;
 mod run;
 mod saboteur;
 mod setup;
+mod step;
 mod test;
 mod thumb;
 mod timing;
+mod workspace;
 
 use std::process::ExitCode;
 

@@ -6,8 +6,8 @@ use std::process::Command;
 
 use anyhow::{Result, bail};
 
-use crate::build::{TARGET, root};
 use crate::process::{find, output_of, quietly, say};
+use crate::workspace::{TARGET, cargo, root};
 
 /// The emulated board.
 const QEMU_MACHINE: &str = "mps2-an386";
@@ -116,7 +116,7 @@ impl Setup {
 
     /// A component of the toolchain that cargo calls as a subcommand (`fmt`, `clippy`).
     pub fn component(&mut self, subcommand: &str, component: &str) -> bool {
-        let usable = || quietly(crate::build::cargo().args([subcommand, "--version"]));
+        let usable = || quietly(cargo().args([subcommand, "--version"]));
         if usable() {
             return true;
         }
@@ -135,8 +135,8 @@ impl Setup {
             command
         };
         let usable = |candidate: &mut Command| quietly(candidate.args(["miri", "--version"]));
-        if usable(&mut crate::build::cargo()) {
-            return Some(crate::build::cargo());
+        if usable(&mut cargo()) {
+            return Some(cargo());
         }
         if !usable(&mut nightly()) && quietly(nightly().arg("--version")) {
             say("adding miri to nightly with rustup");

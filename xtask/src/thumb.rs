@@ -1,13 +1,13 @@
 //! The instructions of an image, decoded by Capstone: where each may go, whether it masks interrupts, what it costs.
 
+pub mod cost;
+
 use std::collections::BTreeMap;
 
 use anyhow::{Context, Result};
 use capstone::arch::DetailsArchInsn;
 use capstone::arch::arm::{ArchExtraMode, ArchMode, ArmCC, ArmOperandType, ArmReg};
 use capstone::prelude::*;
-
-use crate::timing::cost;
 
 /// The operands as they are written.
 pub type Operand = ArmOperandType;

@@ -5,11 +5,11 @@ use std::path::Path;
 
 use anyhow::{Context, Result, bail};
 
-use super::cost::REFILL;
 use super::log::{Event, Log};
 use crate::build::{self, cargo};
 use crate::elf::Image;
 use crate::setup::Toolchain;
+use crate::thumb::cost::REFILL;
 use crate::{emulator, image, process};
 
 /// A building block.

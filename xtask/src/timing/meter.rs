@@ -4,10 +4,10 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use anyhow::{Result, bail};
 
-use super::cost::{ENTRY_AND_RETURN, EXCEPTION_FRAME, REFILL};
 use super::log::Event;
 use super::tally::Tally;
 use crate::elf::Image;
+use crate::thumb::cost::{ENTRY_AND_RETURN, EXCEPTION_FRAME, REFILL};
 use crate::thumb::{Flow, Instruction};
 
 /// One interrupt, from the first instruction of its handler to its return.

@@ -6,12 +6,11 @@
 //! the rig knows its mode. All of it is deterministic: two runs give the same numbers.
 //!
 //! [`system`] says what is driven, [`drive`] runs the rig, [`log`] reads a line, [`meter`] assigns instructions to interrupts,
-//! [`cost`] prices them, [`statistics`] and [`tally`] sum them up, [`parts`] and [`profile`] say whose they are, [`blocks`] counts
+//! [`cost`](crate::thumb::cost) prices them, [`statistics`] and [`tally`] sum them up, [`parts`] and [`profile`] say whose they are, [`blocks`] counts
 //! building blocks by themselves, [`entry`] what could delay an entry, [`budget`] judges, [`report`], [`tables`] and [`page`] tell, [`kept`] compares with what the repository holds.
 
 mod blocks;
 mod budget;
-pub mod cost;
 pub mod drive;
 mod entry;
 mod kept;

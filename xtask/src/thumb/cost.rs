@@ -7,7 +7,7 @@
 use capstone::RegId;
 use capstone::arch::arm::ArmReg;
 
-use crate::thumb::{Operand, SP};
+use super::{Operand, SP};
 
 /// To refill the pipeline.
 pub const REFILL: u32 = 3;

@@ -1,0 +1,46 @@
+//! The steps of `cargo xtask test`.
+
+use clap::ValueEnum;
+
+/// The steps, in their order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Step {
+    /// The format of the sources
+    Fmt,
+    /// Lints on the host
+    ClippyHost,
+    /// Lints on the target
+    ClippyTarget,
+    /// The documentation builds without a warning
+    Doc,
+    /// Tests on the host, of every crate
+    Host,
+    /// The lock-free cells under every interleaving
+    Loom,
+    /// The lock-free cells in the interpreter that knows undefined behaviour
+    Miri,
+    /// The lock-free cells in QEMU, interrupted on every instruction
+    Cells,
+    /// Interrupts slow, late and lost, in QEMU
+    Overruns,
+    /// The PWM interrupt on every instruction of the control interrupt, in QEMU
+    Landings,
+    /// The image builds
+    Image,
+    /// No panic within an interrupt's reach, no double precision
+    ImageCheck,
+    /// The NUCLEO-G474RE's images build, with no panic within an interrupt's reach and no double precision
+    NucleoImage,
+    /// The example's firmware, outside the workspace, holds what is its own and nothing else
+    OwnBoard,
+    /// Every command of the engineer's guide
+    Guide,
+    /// The engineer's guide as a book
+    Book,
+    /// The image in QEMU
+    Qemu,
+    /// The interrupts within their budgets
+    Timing,
+    /// The image builds for every folder of tables/
+    Machines,
+}

@@ -1,0 +1,20 @@
+//! The repository, its target, and cargo in it.
+
+use std::path::Path;
+use std::process::Command;
+
+/// What the image runs on.
+pub const TARGET: &str = "thumbv7em-none-eabihf";
+
+/// The repository's root.
+pub fn root() -> &'static Path {
+    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
+    here.parent().unwrap_or(here)
+}
+
+/// Cargo as this program was started by it, in the repository's root.
+pub fn cargo() -> Command {
+    let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+    command.current_dir(root());
+    command
+}
