@@ -168,7 +168,7 @@ fn switched(on: Option<bool>) -> f64 {
     f64::from(u8::from(on.unwrap_or(false)))
 }
 
-/// [`LINK`] for a machine: the same shares of its voltage and power.
+/// The line side's link for a machine: the same shares of its voltage and power as the reference machine has.
 pub fn scaled(machine: &Machine) -> DcLinkSettings {
     let parameters = &machine.folder.parameters;
     let volts = parameters.dc_link_nominal_v / LINK.source.voltage_v;
