@@ -165,27 +165,19 @@ impl Parameters {
         self.check_switching(file)
     }
 
-    /// The devices must switch often enough for the ripple of the currents: at the highest link voltage, what it adds to the largest
-    /// current must stay below the trip level.
+    /// The devices must switch at least as often as the stator's voltage turns: square wave turns each on once a turn.
     fn check_switching(&self, file: &Path) -> Result<(), InputError> {
-        // Flux linkage over current, at the largest torque with both at right angles.
-        let flux_wb = self.max_torque_nm / (1.5 * f64::from(self.pole_pairs) * self.max_current_a);
-        let ripple_wb = (self.trip_current_a - self.max_current_a) * flux_wb / self.max_current_a;
-        let least_hz = RIPPLE_SHARE * self.dc_link_max_v / ripple_wb;
+        let least_hz = self.max_speed_rpm / 60.0 * f64::from(self.pole_pairs);
         if self.max_switching_hz >= least_hz {
             return Ok(());
         }
         let problem = format!(
-            "max_switching_hz: {}: must be at least {least_hz:.0}: with less the ripple at dc_link_max_v {} reaches trip_current_a {}",
-            self.max_switching_hz, self.dc_link_max_v, self.trip_current_a
+            "max_switching_hz: {}: must be at least {least_hz:.0}, the stator frequency at max_speed_rpm {}",
+            self.max_switching_hz, self.max_speed_rpm
         );
         Err(InputError::new(file, self.line_of("max_switching_hz"), problem))
     }
 }
-
-/// Largest ripple flux of a phase times switching frequency, over the link's voltage: a carrier's is 1/24 of its period, and where
-/// three pulses begin they switch at 0.42 of the highest frequency.
-const RIPPLE_SHARE: f64 = 0.1;
 
 const REQUIRED: [&str; 13] = [
     "name",
