@@ -71,6 +71,21 @@ fn bad_usage_is_refused() {
     refused("pattern --mode mid9 --u 1 --udc 2 --f1 3 --out x", &["mid9"]);
 }
 
+/// A folder of which a file never ends.
+#[test]
+fn an_endless_machine_is_refused() {
+    for name in ["machine.toml", "flux_map.csv"] {
+        let folder = tempfile::tempdir().unwrap();
+        for file in ["machine.toml", "flux_map.csv"] {
+            let good = concat!(env!("CARGO_MANIFEST_DIR"), "/../tables/pmasynrm-180kw");
+            let from = if file == name { "/dev/zero".to_owned() } else { format!("{good}/{file}") };
+            std::os::unix::fs::symlink(from, folder.path().join(file)).unwrap();
+        }
+        let line = format!("run sweep --machine {}", folder.path().display());
+        refused_in_one_line(&line, &[name, "must be a regular file"]);
+    }
+}
+
 /// What would change nothing, or never happen.
 #[test]
 fn options_that_do_nothing_are_refused() {

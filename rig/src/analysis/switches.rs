@@ -1,6 +1,7 @@
 //! Changes of mode, and whether there are more than there should be.
 
 use super::{carrier_averaged, most_turn_ons, window};
+use crate::machine::Machine;
 use crate::options::RunOptions;
 use crate::trace::{Recording, Row, Switch};
 use crate::verdict::{Verdict, bound, worst};
@@ -91,7 +92,10 @@ pub fn switch_verdicts(
     switches: &[SwitchFigures],
     recording: &Recording,
     options: &RunOptions,
+    machine: &Machine,
 ) -> Vec<Verdict> {
+    // One more than the frequency gives: both ends of a window may fall on a turn-on.
+    let most = (0.1 * machine.folder.parameters.max_switching_hz).floor() + 1.0;
     let excess = worst(switches.iter().map(|switch| switch.excess_percent));
     let torque_nm = worst(switches.iter().map(|switch| switch.torque_excursion_nm));
     vec![
@@ -114,7 +118,12 @@ pub fn switch_verdicts(
             0.0,
             "41 switches in a sweep",
         ),
-        Verdict::at_most("turn-ons in 100 ms", most_turn_ons(recording, 0.1) as f64, 91.0, "900 Hz"),
+        Verdict::at_most(
+            "turn-ons in 100 ms",
+            most_turn_ons(recording, 0.1) as f64,
+            most,
+            "max_switching_hz",
+        ),
     ]
 }
 

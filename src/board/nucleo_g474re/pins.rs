@@ -184,7 +184,8 @@ pub fn configure_gates(registers: &Registers, pins: &[Pin]) {
 /// nothing that is commanded later reaches what they switch.
 pub fn release_switches(registers: &Registers, pins: &[Pin]) {
     for pin in pins.iter().filter(|pin| pin.function == Function::Switch) {
-        let (port, number) = (pin.port.of(registers), usize::from(pin.number));
+        // A port has sixteen pins: nothing that could panic where the program dies.
+        let (port, number) = (pin.port.of(registers), usize::from(pin.number & 15));
         port.pupdr().modify(|w| w.set_pupdr(number, Pupdr::PULL_DOWN));
         port.moder().modify(|w| w.set_moder(number, Moder::INPUT));
     }

@@ -50,10 +50,10 @@ impl Scenario<Traction> for ModeBorders {
         script.plan()
     }
 
-    fn figures(&self, recording: &Recording, options: &Options, _machine: &Machine) -> Figures {
+    fn figures(&self, recording: &Recording, options: &Options, machine: &Machine) -> Figures {
         let mut figures = analysis::common(recording);
         let switches = analysis::mode_switches(recording);
-        let verdicts = analysis::switch_verdicts(&switches, recording, options);
+        let verdicts = analysis::switch_verdicts(&switches, recording, options, machine);
         figures.set("verdicts", verdicts);
         figures.set("mode_switches", switches);
         figures.set("modes", analysis::modes(recording));

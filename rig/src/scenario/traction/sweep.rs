@@ -55,7 +55,7 @@ impl Scenario<Traction> for Sweep {
     fn figures(&self, recording: &Recording, options: &Options, machine: &Machine) -> Figures {
         let mut figures = analysis::common(recording);
         let switches = analysis::mode_switches(recording);
-        let mut verdicts = analysis::switch_verdicts(&switches, recording, options);
+        let mut verdicts = analysis::switch_verdicts(&switches, recording, options, machine);
         verdicts.extend(analysis::square_verdict(recording, options));
         if options.map_error != 0.0 {
             verdicts.extend(self.map_verdicts(recording, options, machine));
