@@ -17,7 +17,7 @@ fn main() -> ExitCode {
 fn generate() -> Result<(), String> {
     #[cfg(feature = "built-in")]
     tables::write()?;
-    #[cfg(any(feature = "qemu", feature = "board-nucleo-g474re"))]
+    #[cfg(feature = "qemu")]
     linker::write()?;
     Ok(())
 }
@@ -46,49 +46,31 @@ mod tables {
     }
 }
 
-#[cfg(any(feature = "qemu", feature = "board-nucleo-g474re"))]
+#[cfg(feature = "qemu")]
 mod linker {
     use std::path::{Path, PathBuf};
     use std::{env, fs};
 
-    /// What the linker needs to know of a board.
-    struct Board {
-        /// The file in `memory/`, which the root's `memory.x` includes under the name `board-memory.x`: the linker takes the
-        /// root's file, whatever the board.
-        memory: &'static str,
-        /// Interrupt handlers that a firmware may define; the others end in cortex-m-rt's default handler.
-        handlers: &'static [&'static str],
-        scripts: &'static [&'static str],
-    }
-
-    /// QEMU's, unless a feature names another.
-    const QEMU: Board =
-        Board { memory: "mps2-an386.x", handlers: &["TIMER0", "DUALTIMER"], scripts: &["link.x"] };
-    const NUCLEO_G474RE: Board = Board {
-        memory: "nucleo-g474re.x",
-        handlers: &["TIM1_UP_TIM16", "TIM2", "TIM3"],
-        scripts: &["link.x", "defmt.x"],
-    };
+    /// QEMU's memories. The root's `memory.x` includes them as `board-memory.x`: the linker takes the root's file, whatever the board.
+    const MEMORY: &str = "src/board/qemu/memory.x";
+    /// Interrupt handlers that a firmware may define; the others end in cortex-m-rt's default handler.
+    const HANDLERS: [&str; 2] = ["TIMER0", "DUALTIMER"];
 
     pub fn write() -> Result<(), String> {
         let variable = |name: &str| env::var(name).map_err(|error| format!("{name}: {error}"));
         if variable("CARGO_CFG_TARGET_OS")? != "none" {
             return Ok(());
         }
-        let root = PathBuf::from(variable("CARGO_MANIFEST_DIR")?);
         let out = PathBuf::from(variable("OUT_DIR")?);
-        let nucleo = env::var_os("CARGO_FEATURE_BOARD_NUCLEO_G474RE").is_some();
-        let board = if nucleo { NUCLEO_G474RE } else { QEMU };
-        let memory = root.join("memory").join(board.memory);
-        println!("cargo:rerun-if-changed={}", memory.display());
-        put(&out.join("board-memory.x"), &fs::read_to_string(&memory).map_err(|error| error.to_string())?)?;
-        let handlers: String =
-            board.handlers.iter().map(|name| format!("PROVIDE({name} = DefaultHandler);\n")).collect();
-        put(&out.join("device.x"), &handlers)?;
+        println!("cargo:rerun-if-changed={MEMORY}");
+        let memory = fs::read_to_string(MEMORY).map_err(|error| format!("{MEMORY}: {error}"))?;
+        put(&out.join("board-memory.x"), &memory)?;
+        put(
+            &out.join("device.x"),
+            &HANDLERS.map(|name| format!("PROVIDE({name} = DefaultHandler);\n")).concat(),
+        )?;
         println!("cargo:rustc-link-search={}", out.display());
-        for script in board.scripts {
-            println!("cargo:rustc-link-arg-bins=-T{script}");
-        }
+        println!("cargo:rustc-link-arg-bins=-Tlink.x");
         Ok(())
     }
 

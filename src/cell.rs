@@ -4,11 +4,11 @@
 //! can be stale but never undefined, and nothing here needs `unsafe`. One core; the higher-priority interrupt
 //! preempts the lower one and runs to completion.
 //!
-//! * [`Downlink`], low → high: a double buffer. The reader is wait-free because the writer cannot run while
+//! * [`Mailbox`], low → high: a double buffer. The reader is wait-free because the writer cannot run while
 //!   it reads, and never sees a half-written value because the writer fills the slot that nobody reads.
-//! * [`Trail`], high → low: a ring of records. The writer is wait-free and writes each record once; the reader looks at the last
+//! * [`History`], high → low: a ring of records. The writer is wait-free and writes each record once; the reader looks at the last
 //!   few where they lie, and the writer cannot come round to them while it does.
-//! * [`Uplink`], high → low: a sequence counter. The writer is wait-free; the reader tries again when a write
+//! * [`Seqlock`], high → low: a sequence counter. The writer is wait-free; the reader tries again when a write
 //!   came in between, a bounded number of times (a second write within one read takes a carrier half).
 //! * [`Ring`], one interrupt → anybody, afterwards: the flight recorder's memory, read only once a fault has frozen it.
 
@@ -52,17 +52,17 @@ fn load<const N: usize>(slot: &[AtomicU32; N]) -> [u32; N] {
 ///
 /// It holds the two newest values, so that the reader can pick by a rule that does not depend on when the
 /// writer happened to finish: the newest one if `ready`, otherwise the one before it. The older slot is
-/// rewritten only by the next [`Downlink::publish`]; a writer that publishes only once its previous value is
+/// rewritten only by the next [`Mailbox::publish`]; a writer that publishes only once its previous value is
 /// `ready` for every reader (one control period later, by construction) never has the slot in use rewritten.
-pub struct Downlink<T, const N: usize> {
+pub struct Mailbox<T, const N: usize> {
     slots: [[AtomicU32; N]; 2],
     /// Counts the values published, 0 before the first; the newest is in slot `published % 2`.
     published: AtomicU32,
     value: core::marker::PhantomData<fn(T) -> T>,
 }
 
-impl<T: Words<N>, const N: usize> Downlink<T, N> {
-    /// An empty cell: both slots hold zero words, which [`Downlink::newest`] reports as `None` until published.
+impl<T: Words<N>, const N: usize> Mailbox<T, N> {
+    /// An empty cell: both slots hold zero words, which [`Mailbox::newest`] reports as `None` until published.
     #[cfg(not(loom))]
     #[allow(clippy::declare_interior_mutable_const, reason = "an array initialiser, never borrowed")]
     pub const fn new() -> Self {
@@ -118,7 +118,7 @@ impl<T: Words<N>, const N: usize> Downlink<T, N> {
     }
 }
 
-impl<T: Words<N>, const N: usize> Default for Downlink<T, N> {
+impl<T: Words<N>, const N: usize> Default for Mailbox<T, N> {
     fn default() -> Self {
         Self::new()
     }
@@ -132,19 +132,19 @@ fn overtaken(tries: &mut usize) -> bool {
     *tries > 0
 }
 
-/// How often [`Uplink::read`] tries. Two writes within one read are half a carrier apart, so the second try succeeds;
+/// The number of tries of [`Seqlock::read`]. Two writes within one read are half a carrier apart, so the second try succeeds;
 /// the third is margin.
 const READ_TRIES: usize = 3;
 
 /// From the high-priority interrupt (writer) to the low-priority one (reader).
-pub struct Uplink<T, const N: usize> {
+pub struct Seqlock<T, const N: usize> {
     /// Odd while a write is under way.
     sequence: AtomicU32,
     words: [AtomicU32; N],
     value: core::marker::PhantomData<fn(T) -> T>,
 }
 
-impl<T: Words<N>, const N: usize> Uplink<T, N> {
+impl<T: Words<N>, const N: usize> Seqlock<T, N> {
     /// An empty cell.
     #[cfg(not(loom))]
     #[allow(clippy::declare_interior_mutable_const, reason = "an array initialiser, never borrowed")]
@@ -200,23 +200,23 @@ impl<T: Words<N>, const N: usize> Uplink<T, N> {
     }
 }
 
-impl<T: Words<N>, const N: usize> Default for Uplink<T, N> {
+impl<T: Words<N>, const N: usize> Default for Seqlock<T, N> {
     fn default() -> Self {
         Self::new()
     }
 }
 
-/// Records that a [`Trail`] holds.
+/// Records that a [`History`] holds.
 const RECORDS: usize = 8;
 /// Records of them that a reader may look at.
-pub const SEEN: usize = 4;
+pub const SEEN: usize = 6;
 
 /// From the high-priority interrupt (writer) to the low-priority one (reader): the last records of `N` words.
 ///
 /// The reader sees the last [`SEEN`] of the records that were there when it began, and a new one goes into the oldest of the ring:
 /// a read is good unless more than `RECORDS - SEEN` writes come in between, which is noticed. A record that is written anew
 /// makes a reader that it interrupts look again.
-pub struct Trail<const N: usize> {
+pub struct History<const N: usize> {
     records: [[AtomicU32; N]; RECORDS],
     /// Counts the records, 0 before the first; record n is in place `n % RECORDS`.
     published: AtomicU32,
@@ -236,7 +236,7 @@ impl<const N: usize> Record<'_, N> {
     }
 }
 
-impl<const N: usize> Trail<N> {
+impl<const N: usize> History<N> {
     /// An empty cell.
     #[cfg(not(loom))]
     #[allow(clippy::declare_interior_mutable_const, reason = "an array initialiser, never borrowed")]
@@ -298,7 +298,7 @@ impl<const N: usize> Trail<N> {
                 // The count wraps by whole rings.
                 Record(&self.records[published.wrapping_sub(1 + back) as usize % RECORDS])
             };
-            let seen = look([record(0), record(1), record(2), record(3)]);
+            let seen = look([record(0), record(1), record(2), record(3), record(4), record(5)]);
             fence(Ordering::Acquire);
             let written = self.published.load(Ordering::Relaxed).wrapping_sub(published);
             let whole = revised & 1 == 0 && self.revised.load(Ordering::Relaxed) == revised;
@@ -310,7 +310,7 @@ impl<const N: usize> Trail<N> {
     }
 }
 
-impl<const N: usize> Default for Trail<N> {
+impl<const N: usize> Default for History<N> {
     fn default() -> Self {
         Self::new()
     }
@@ -333,7 +333,7 @@ mod tests {
     /// Both counts skip 0, which means "none yet", and keep to the order of the slots.
     #[test]
     fn the_counts_wrap_without_a_gap() {
-        let (down, up) = (Downlink::<u32, 1>::new(), Uplink::<u32, 1>::new());
+        let (down, up) = (Mailbox::<u32, 1>::new(), Seqlock::<u32, 1>::new());
         for n in 1..10 {
             if n == 4 {
                 // As after 2³² publications, less a few; each count in step with what it has come from.

@@ -7,7 +7,5 @@
 #![forbid(unsafe_code)]
 
 mod drives;
-#[cfg(feature = "board-nucleo-g474re")]
-mod power_stage;
 
 pub use tractive_control::configuration::Refused;

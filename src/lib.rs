@@ -13,10 +13,13 @@
 //!
 //! # Features
 //! None is on by default, and without one there is no build script's work, no table, no vector, no linker file.
-//! * `built-in`: the module `built_in` with the tables of the machines that `TRACTIVE_MACHINE` and `TRACTIVE_ZS9_MACHINE` name.
-//! * `wire`: the module `wire`, the words between an emulated board and the rig.
-//! * `qemu`: what the reference images on QEMU's board need; with the two above.
-//! * `saboteur`: the same with faults injected, for tests.
+//!
+//! | feature | what it brings |
+//! |---|---|
+//! | `defmt` | `defmt::Format` for what a firmware logs: measurements, reports, faults, states, requests, frames |
+//! | `built-in` | the module `built_in`: the tables of the machines that `TRACTIVE_MACHINE` and `TRACTIVE_ZS9_MACHINE` name |
+//! | `wire` | the module `wire`: the words between an emulated board and the rig |
+//! | `qemu` | what the reference images on QEMU's board need; with the two above |
 //!
 //! # Conventions
 //! * Pure steps: `step(&input, &mut state) -> output`; no clock, no peripheral, no global inside.

@@ -23,6 +23,7 @@ pub type Recorder = Ring<Record, RECORD_WORDS, RECORDS>;
 
 /// One control period.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Record {
     /// Instant of the sample.
     pub at: Instant,
@@ -42,8 +43,9 @@ pub struct Record {
     pub state: State,
 }
 
-/// What the drive was doing.
+/// The drive's mode, gates and fault.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct State {
     /// Mode of the carrier half in which the sample lies.
     pub mode: Mode,
@@ -118,6 +120,7 @@ pub type DualRecorder = Ring<DualRecord, DUAL_WORDS, RECORDS>;
 
 /// One control period of the ZS9. Motors in the order upper, lower.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct DualRecord {
     /// Instant of the sample.
     pub at: Instant,
@@ -146,10 +149,11 @@ impl DualRecord {
     }
 }
 
-/// What the ZS9 was doing.
+/// The ZS9's scheme, gates and fault.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct DualState {
-    /// Where the zero vectors lie.
+    /// The place of the zero vectors.
     pub scheme: Scheme,
     /// The operator lets the gates pulse.
     pub enabled: bool,

@@ -12,7 +12,7 @@ use crate::cell::Words;
 use crate::control::{Demand, LinkWindow};
 use crate::drive::{half_from_words, half_to_words};
 use crate::frames::{Abc, Angle};
-use crate::modulation::CarrierPeriod;
+use crate::modulation::CarrierHalf;
 use crate::operator::{self, Feedback, LineTimes, Status, Told};
 use crate::ports::Report;
 use crate::ports::Sample;
@@ -33,9 +33,11 @@ pub const BLOCK_BYTES: usize = BLOCK_WORDS * 4;
 /// One block.
 pub type Block = [u32; BLOCK_WORDS];
 
-/// What the timers run on and what the inverter is; the rig tells it before anything starts.
+/// The timers' and the inverter's values that the rig tells before anything starts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Setup {
+    /// Control period, in ticks.
+    pub control_ticks: u32,
     /// Shortest pulse of a device, in ticks.
     pub min_pulse_ticks: u32,
     /// Dead time, in ticks.
@@ -44,9 +46,9 @@ pub struct Setup {
     pub pwm_delay_ticks: u32,
     /// The line side that the operator switches; `None`: no operator, the rig commands the drive directly.
     pub line: Option<LineTimes>,
-    /// Whether the operator is asked over the protocol, by frames, and not by the words of the answers.
+    /// `true` if the operator is asked over the protocol, by frames, and not by the words of the answers.
     pub over_protocol: bool,
-    /// Whether nothing compensates the dead time.
+    /// `true` if nothing compensates the dead time.
     pub uncompensated: bool,
 }
 
@@ -62,14 +64,14 @@ pub enum Request {
     /// Phase currents at a carrier boundary.
     PwmSample(Instant),
     /// Shadow registers: the half that follows the one that begins at the instant.
-    Play(Instant, CarrierPeriod),
+    Play(Instant, CarrierHalf),
     /// Gates into the safe state; `true` from the control interrupt.
     Enter(Instant, SafeState),
     /// The safe state is left.
     Leave(Instant),
-    /// What is asked of the operator, and what the board says, in the slot that began at the instant.
+    /// The question for the operator's request and the board's feedback, in the slot that began at the instant.
     Ask(Instant),
-    /// What the operator told, and the frame that says so; both from the instant on.
+    /// The operator's status, and the frame that carries it; both from the instant on.
     Tell(Instant, Status, Option<Frame>),
     /// The processor has stopped in a panic or a HardFault, gates off.
     Dead,
@@ -155,7 +157,7 @@ impl Request {
 pub fn setup_to_block(setup: Setup) -> Block {
     let ticks = [setup.min_pulse_ticks, setup.dead_time_ticks, setup.pwm_delay_ticks];
     let flags = [setup.over_protocol.into(), setup.uncompensated.into()];
-    filled(ticks.into_iter().chain(line_to_words(setup.line)).chain(flags))
+    filled(ticks.into_iter().chain(line_to_words(setup.line)).chain(flags).chain([setup.control_ticks]))
 }
 
 fn line_to_words(line: Option<LineTimes>) -> [u32; 3] {
@@ -183,9 +185,10 @@ fn told_from_words<T: Told>(words: [u32; 14]) -> Option<(Status<T>, Option<Frame
 /// The inverse of [`setup_to_block`].
 pub fn setup_from_block(block: &Block) -> Setup {
     let [min_pulse_ticks, dead_time_ticks, pwm_delay_ticks, ..] = *block;
-    let [_, _, _, operated, precharge, discharge, frames, uncompensated, ..] = *block;
+    let [_, _, _, operated, precharge, discharge, frames, uncompensated, control_ticks, ..] = *block;
     let line = line_from_words([operated, precharge, discharge]);
     Setup {
+        control_ticks,
         min_pulse_ticks,
         dead_time_ticks,
         pwm_delay_ticks,

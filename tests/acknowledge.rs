@@ -8,13 +8,13 @@ use tractive::control::{Demand, Gains, LinkWindow};
 use tractive::drive::dual::{self};
 use tractive::drive::traction;
 use tractive::frames::{Abc, Angle, Dq};
-use tractive::modulation::{CarrierPeriod, Devices, Mode};
+use tractive::modulation::{CarrierHalf, Mode, SwitchLimits};
 use tractive::nine_switch::Scheme;
 use tractive::ports::DualReport;
 use tractive::ports::Report;
 use tractive::ports::{
-    ControlPort, DualControlPort, DualPwmPort, DualSample, GateFeedback, HardwareBreak, MotorDemand,
-    PlayedPeriod, PowerSample, PwmPort, Sample,
+    ControlPort, Dual, DualSample, GateFeedback, HardwareBreak, MotorDemand, PlayedPeriod, PowerSample,
+    PwmPort, Sample,
 };
 use tractive::protection::{Fault, SafeState, Trip};
 use tractive::time::{Clock, Instant};
@@ -29,7 +29,7 @@ const WINDOW: u32 = 16;
 /// Control periods after that: both interrupts have agreed.
 const AGREED: u32 = 20;
 
-/// Who finds a fault that lasts for one sample.
+/// The finder of a fault that lasts for one sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Finder {
     Control,
@@ -108,9 +108,9 @@ struct Board<'a> {
     /// The fault that was told last, and since when it has been told.
     told: Option<(Trip, Instant)>,
     acknowledged_at: Option<Instant>,
-    /// Whether there was a fault after the drive had forgotten the first one, or before it knew one.
+    /// `true` if there was a fault after the drive had forgotten the first one, or before it knew one.
     again: bool,
-    /// What the ZS9's gates do before and after the last valley.
+    /// The states of the ZS9's gates before and after the last valley.
     periods: Option<[PlayedPeriod; 2]>,
     half_steps: u32,
     wrong: Option<String>,
@@ -151,7 +151,7 @@ impl<'a> Board<'a> {
         number
     }
 
-    /// What the latches hold at a peak: a gate was on, a gate was off.
+    /// The latches at a peak: a gate was on, a gate was off.
     fn feedback(&self) -> GateFeedback {
         let mut seen = GateFeedback { on: 0, off: 0x1FF };
         let half = self.half_steps;
@@ -188,7 +188,7 @@ impl<'a> Board<'a> {
         assert!(!self.entered || !self.pulses || held, "{case:?}: pulses in the safe state");
     }
 
-    /// When both have agreed: the last fault is told unless it was acknowledged.
+    /// The end, once both have agreed: the last fault is told unless it was acknowledged.
     fn check_end(&self, trips: [Option<Trip>; 2]) {
         let Self { case, .. } = self;
         let [control, pwm] = trips;
@@ -225,7 +225,7 @@ impl ControlPort for Board<'_> {
         self.entered = true;
     }
 
-    fn overrun_ticks(&mut self, _now: Instant) -> u32 {
+    fn overrun_ticks(&mut self, _now: Instant, _deadline_ticks: u32) -> u32 {
         0
     }
 
@@ -239,7 +239,7 @@ impl PwmPort for Board<'_> {
         currents(now, if self.case.pwm_finds(now, &self.found) { 100.0 } else { 1.0 })
     }
 
-    fn play(&mut self, _now: Instant, next: &CarrierPeriod) {
+    fn play(&mut self, _now: Instant, next: &CarrierHalf) {
         self.pulses = next.mode != Mode::Off;
     }
 
@@ -253,7 +253,7 @@ impl PwmPort for Board<'_> {
     }
 }
 
-impl DualControlPort for Board<'_> {
+impl ControlPort<Dual> for Board<'_> {
     fn sample(&mut self, now: Instant) -> DualSample {
         let hardware = self.case.hardware(now);
         DualSample {
@@ -272,7 +272,7 @@ impl DualControlPort for Board<'_> {
         }
     }
 
-    fn gates_off(&mut self, _now: Instant) {
+    fn enter(&mut self, _safe: SafeState, _now: Instant) {
         self.entered = true;
     }
 
@@ -285,7 +285,7 @@ impl DualControlPort for Board<'_> {
     }
 }
 
-impl DualPwmPort for Board<'_> {
+impl PwmPort<Dual> for Board<'_> {
     fn sample(&mut self, now: Instant) -> PowerSample {
         let scale = if self.case.pwm_finds(now, &self.found) { 100.0 } else { 1.0 };
         PowerSample {
@@ -301,7 +301,7 @@ impl DualPwmPort for Board<'_> {
         self.periods = Some([self.periods.map_or(*next, |[_, running]| running), *next]);
     }
 
-    fn gates_off(&mut self, _now: Instant) {
+    fn enter(&mut self, _safe: SafeState, _now: Instant) {
         self.entered = true;
     }
 
@@ -315,7 +315,7 @@ const LAST: u32 = (SETTLED + WINDOW + AGREED) * CLOCK.control_ticks;
 
 #[test]
 fn the_traction_drive_forgets_no_fault() {
-    let devices = Devices::new(250, 0, 900.0, &CLOCK);
+    let devices = SwitchLimits::new(250, 0, 900.0, &CLOCK);
     let settings = traction::Settings { clock: CLOCK, devices, gains: Gains::DEFAULT };
     let mut cases = 0;
     Case::each(12, |case| {

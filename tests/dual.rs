@@ -11,8 +11,8 @@ use tractive::frames::{Abc, Angle, Dq};
 use tractive::nine_switch::{LegState, Scheme};
 use tractive::ports::DualReport;
 use tractive::ports::{
-    DualControlPort, DualPwmPort, DualSample, GateFeedback, HardwareBreak, MotorDemand, PlayedPeriod,
-    PowerSample,
+    ControlPort, Dual, DualSample, GateFeedback, HardwareBreak, MotorDemand, PlayedPeriod, PowerSample,
+    PwmPort,
 };
 use tractive::protection::{Fault, SafeState, Trip};
 use tractive::recorder::DualRecorder;
@@ -35,7 +35,7 @@ struct Fake {
     before: PlayedPeriod,
     report: DualReport,
     acknowledge: u8,
-    /// How often the gates were let go, and whether something holds them.
+    /// The number of times that the gates were let go, and whether something holds them.
     left: u32,
     held: bool,
 }
@@ -71,7 +71,7 @@ impl Fake {
         [current.unpark(Self::angle(now).sin_cos()).abc(); 2]
     }
 
-    /// What the latches hold at a peak.
+    /// The latches at a peak.
     fn feedback(&self) -> GateFeedback {
         let half = SETTINGS.half_steps();
         let mut seen = GateFeedback::default();
@@ -85,7 +85,7 @@ impl Fake {
     }
 }
 
-impl DualControlPort for Fake {
+impl ControlPort<Dual> for Fake {
     fn sample(&mut self, now: Instant) -> DualSample {
         let mut sample = DualSample {
             currents_a: Self::currents(now),
@@ -105,7 +105,7 @@ impl DualControlPort for Fake {
         sample
     }
 
-    fn gates_off(&mut self, now: Instant) {
+    fn enter(&mut self, _safe: SafeState, now: Instant) {
         self.off_at = self.off_at.or(Some(now));
     }
 
@@ -118,7 +118,7 @@ impl DualControlPort for Fake {
     }
 }
 
-impl DualPwmPort for Fake {
+impl PwmPort<Dual> for Fake {
     fn sample(&mut self, now: Instant) -> PowerSample {
         let mut sample = PowerSample {
             currents_a: Self::currents(now),
@@ -136,7 +136,7 @@ impl DualPwmPort for Fake {
         self.next = *next;
     }
 
-    fn gates_off(&mut self, now: Instant) {
+    fn enter(&mut self, _safe: SafeState, now: Instant) {
         self.off_at = self.off_at.or(Some(now));
     }
 
@@ -198,7 +198,7 @@ impl Drive {
     }
 }
 
-/// What a test does to a sample, and the fault that it should be.
+/// The injury of a test to a sample, and the fault that it should be.
 type Case<T> = (fn(&mut T), Fault);
 
 #[test]
@@ -400,7 +400,7 @@ fn messages_arrive_as_they_were_sent() {
     assert_eq!(DualReport::from_words(report.to_words()), report);
 }
 
-/// What a test does to both interrupts' samples.
+/// The injury of a test to both interrupts' samples.
 type Spoiled = (fn(&mut DualSample), fn(&mut PowerSample));
 
 /// One fault stops both motors; an acknowledge with its cause gone lets both go on, with its cause there trips anew.

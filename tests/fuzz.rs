@@ -9,13 +9,12 @@ use tractive::control::{Demand, Gains, LinkWindow};
 use tractive::drive::dual::{self};
 use tractive::drive::traction;
 use tractive::frames::{Abc, Angle, Dq};
-use tractive::modulation::{CarrierPeriod, Devices, Mode};
+use tractive::modulation::{CarrierHalf, Mode, SwitchLimits};
 use tractive::nine_switch::{LegState, Scheme};
 use tractive::ports::DualReport;
 use tractive::ports::Report;
 use tractive::ports::{
-    ControlPort, DualControlPort, DualPwmPort, DualSample, GateFeedback, MotorDemand, PlayedPeriod,
-    PowerSample, PwmPort, Sample,
+    ControlPort, Dual, DualSample, GateFeedback, MotorDemand, PlayedPeriod, PowerSample, PwmPort, Sample,
 };
 use tractive::protection::{Fault, SafeState, Trip};
 use tractive::time::{Clock, Instant};
@@ -33,7 +32,7 @@ fn config() -> ProptestConfig {
 enum Call {
     Control(Option<(u8, u32)>),
     Pwm(Option<(u8, u32)>),
-    /// What control asks for first thing in its interrupt, whether it wants it or not.
+    /// The revision that control asks for first thing in its interrupt, whether it wants it or not.
     Revise,
     /// The operator acknowledges, whatever there is; then as [`Call::Healthy`].
     Acknowledge(u16),
@@ -99,7 +98,7 @@ struct Board {
     omega: f32,
     spoilt: Option<(u8, u32)>,
     acknowledge: u8,
-    played: Option<CarrierPeriod>,
+    played: Option<CarrierHalf>,
     periods: Option<PlayedPeriod>,
     entered: bool,
     trip: Option<Trip>,
@@ -163,7 +162,7 @@ impl ControlPort for Board {
         self.entered = true;
     }
 
-    fn overrun_ticks(&mut self, _now: Instant) -> u32 {
+    fn overrun_ticks(&mut self, _now: Instant, _deadline_ticks: u32) -> u32 {
         self.spoilt.filter(|(field, _)| *field == 10).map_or(0, |(_, bits)| bits)
     }
 
@@ -186,7 +185,7 @@ impl PwmPort for Board {
         sampled
     }
 
-    fn play(&mut self, _now: Instant, next: &CarrierPeriod) {
+    fn play(&mut self, _now: Instant, next: &CarrierHalf) {
         self.played = Some(*next);
     }
 
@@ -200,7 +199,7 @@ impl PwmPort for Board {
     }
 }
 
-impl DualControlPort for Board {
+impl ControlPort<Dual> for Board {
     fn sample(&mut self, now: Instant) -> DualSample {
         let mut sample = DualSample {
             currents_a: [currents(self.omega, now.0, Dq { d: -5.0, q: 25.0 }); 2],
@@ -236,7 +235,7 @@ impl DualControlPort for Board {
         sample
     }
 
-    fn gates_off(&mut self, _now: Instant) {
+    fn enter(&mut self, _safe: SafeState, _now: Instant) {
         self.entered = true;
     }
 
@@ -250,7 +249,7 @@ impl DualControlPort for Board {
     }
 }
 
-impl DualPwmPort for Board {
+impl PwmPort<Dual> for Board {
     fn sample(&mut self, now: Instant) -> PowerSample {
         let mut sample = PowerSample {
             currents_a: [currents(self.omega, now.0, Dq { d: -5.0, q: 25.0 }); 2],
@@ -276,7 +275,7 @@ impl DualPwmPort for Board {
         self.periods = Some(*next);
     }
 
-    fn gates_off(&mut self, _now: Instant) {
+    fn enter(&mut self, _safe: SafeState, _now: Instant) {
         self.entered = true;
     }
 
@@ -311,7 +310,7 @@ proptest! {
         first in any::<u32>(),
         calls in calls(),
     ) {
-        let devices = Devices::new(250, 100, 900.0, &CLOCK);
+        let devices = SwitchLimits::new(250, 100, 900.0, &CLOCK);
         let settings = traction::Settings { clock: CLOCK, devices, gains: Gains::DEFAULT };
         let shared = traction::Shared::new();
         let mut control = traction::ControlTask::new(&BUILT_IN, settings, Instant(first).after(2_500));
@@ -323,7 +322,9 @@ proptest! {
             board.spoilt = match call { Call::Control(spoilt) | Call::Pwm(spoilt) => spoilt, Call::Spoilt(spoilt, _) => Some(spoilt), _ => None };
             match call {
                 Call::Control(_) => control.run(&mut board, &shared),
-                Call::Pwm(_) => pwm.run(&mut board, &shared),
+                Call::Pwm(_) => {
+                    pwm.run(&mut board, &shared);
+                }
                 Call::Revise => pwm.revise(&mut board, &shared),
                 Call::Healthy(_) | Call::Acknowledge(_) | Call::Spoilt(..) => {}
             }
@@ -358,8 +359,12 @@ proptest! {
             for _ in 0..healthy {
                 match call {
                     Call::Control(_) => control.run(&mut board, &shared),
-                    Call::Pwm(_) => pwm.run(&mut board, &shared),
-                    _ if control.next_call().reached(pwm.next_call()) => pwm.run(&mut board, &shared),
+                    Call::Pwm(_) => {
+                    pwm.run(&mut board, &shared);
+                }
+                    _ if control.next_call().reached(pwm.next_call()) => {
+                    pwm.run(&mut board, &shared);
+                }
                     _ => control.run(&mut board, &shared),
                 }
                 prop_assert!(board.odd.is_none(), "{:?}", board.odd);

@@ -2,14 +2,14 @@
 
 use proptest::prelude::*;
 use tractive::frames::Angle;
-use tractive::modulation::{CarrierPeriod, Devices, Mode, Modulator, Reference, Schedule};
+use tractive::modulation::{CarrierHalf, Mode, Modulator, Reference, Schedule, SwitchLimits};
 use tractive::time::{Clock, Instant};
 
 const CLOCK: Clock = Clock::new(25_000_000, 2_500);
 const MIN_PULSE: u32 = 250;
 
-fn devices() -> Devices {
-    Devices::new(MIN_PULSE, 0, 900.0, &CLOCK)
+fn devices() -> SwitchLimits {
+    SwitchLimits::new(MIN_PULSE, 0, 900.0, &CLOCK)
 }
 
 /// Angle units per tick of a frequency.
@@ -18,7 +18,7 @@ fn rate(hz: f32) -> f32 {
 }
 
 /// Steps through halves with references drawn by the test: depth, Hz, V.
-fn by_halves(references: &[(f32, f32, f32)]) -> Vec<CarrierPeriod> {
+fn by_halves(references: &[(f32, f32, f32)]) -> Vec<CarrierHalf> {
     let mut modulator = Modulator::new(devices(), Schedule::new(&CLOCK));
     let (mut now, mut angle) = (Instant(u32::MAX - 1_000_000), Angle::ZERO);
     let mut halves = Vec::new();
@@ -34,7 +34,7 @@ fn by_halves(references: &[(f32, f32, f32)]) -> Vec<CarrierPeriod> {
 }
 
 /// The same with each reference for 40 halves.
-fn play(references: &[(f32, f32, f32)]) -> Vec<CarrierPeriod> {
+fn play(references: &[(f32, f32, f32)]) -> Vec<CarrierHalf> {
     let held = references.iter().flat_map(|reference| [*reference; 40]);
     by_halves(&held.collect::<Vec<_>>())
 }
@@ -71,11 +71,11 @@ proptest! {
 
     #[test]
     fn on_time_is_what_levels_say(period in 1..20_000_u32, compare in 0..30_000_u32, level: bool, from in 0..20_000_u32) {
-        let half = CarrierPeriod {
+        let half = CarrierHalf {
             period_ticks: period,
             compare_ticks: [compare; 3],
             start_levels: [level; 3],
-            ..CarrierPeriod::default()
+            ..CarrierHalf::default()
         };
         let brute = (from..period).filter(|tick| level ^ (*tick >= compare)).count();
         prop_assert_eq!(half.on_ticks(from)[0] as usize, brute);
@@ -83,7 +83,7 @@ proptest! {
 
     #[test]
     fn words_come_back_as_they_went(period: u32, compare: [u32; 3], levels: [bool; 3], mode in 0..Mode::ALL.len() as u32, half in 0..60_u8) {
-        let sent = CarrierPeriod { period_ticks: period, compare_ticks: compare, start_levels: levels, mode: Mode::from_code(mode), half, ahead: [Mode::from_code(mode), Mode::Mid3] };
+        let sent = CarrierHalf { period_ticks: period, compare_ticks: compare, start_levels: levels, mode: Mode::from_code(mode), half, ahead: [Mode::from_code(mode), Mode::Mid3] };
         prop_assert_eq!(tractive::drive::half_from_words(tractive::drive::half_to_words(sent)), sent);
     }
 }
@@ -92,7 +92,7 @@ proptest! {
 fn mean_voltage_of_every_carrier_half_is_the_reference() {
     for (mode, hz) in [(Mode::Async, 20.0), (Mode::Sync15, 50.0), (Mode::Sync12, 70.0)] {
         let mut modulator =
-            Modulator::new(Devices { min_pulse_ticks: 0, ..devices() }, Schedule::fixed(mode, &CLOCK));
+            Modulator::new(SwitchLimits { min_pulse_ticks: 0, ..devices() }, Schedule::fixed(mode, &CLOCK));
         let mut now = Instant(0);
         for _ in 0..200 {
             let turned = (f64::from(rate(hz)) * f64::from(now.0)) as u64 as u32;
@@ -112,7 +112,7 @@ fn mean_voltage_of_every_carrier_half_is_the_reference() {
     }
 }
 
-/// Where the centre of a pattern's flux stands in the turn after its first half, in parts of the fundamental flux. Begun at
+/// The centre of a pattern's flux in the turn after its first half, in parts of the fundamental flux. Begun at
 /// `begin` turns with an EMF of a share of the voltage, `lead` turns ahead of it.
 fn centre_after_catch((mode, hz, depth): (Mode, f32, f32), begin: f32, share: f32, lead: f32) -> f64 {
     const UDC_V: f32 = 1500.0;
@@ -182,7 +182,7 @@ fn a_mode_is_kept_for_its_dwell_time() {
     }
 }
 
-/// How far a pattern's flux hexagon moves while another pattern takes over, in parts of the fundamental flux, and the modes before and
+/// The move of a pattern's flux hexagon while another pattern takes over, in parts of the fundamental flux, and the modes before and
 /// after: at a frequency, from one share of six-step to another.
 fn moved_by_a_switch(hz: f32, before: f32, after: f32) -> (Mode, Mode, f64) {
     const UDC_V: f32 = 1500.0;

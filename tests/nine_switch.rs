@@ -24,7 +24,7 @@ struct Stretch {
     legs: [i32; 3],
 }
 
-/// What the gates do.
+/// The gates' work.
 #[derive(Debug)]
 struct Seen {
     stretches: Vec<Stretch>,
@@ -211,7 +211,7 @@ fn shortest(motor: MotorVoltage) -> f64 {
     0.25 * f64::from(motor.depth) * (phases[1] - phases[0]).min(phases[2] - phases[1])
 }
 
-/// Which phase is the largest, and which the smallest.
+/// The largest phase and the smallest.
 fn extremes(angle_deg: f64) -> (usize, usize) {
     let phases = phases(angle_deg);
     let by = |a: &usize, b: &usize| phases[*a].total_cmp(&phases[*b]);

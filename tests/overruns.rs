@@ -6,15 +6,14 @@ use tractive::control::{Demand, Gains, LinkWindow};
 use tractive::drive::dual::{self};
 use tractive::drive::traction;
 use tractive::frames::{Abc, Angle, Dq};
-use tractive::modulation::{CarrierPeriod, Devices, Mode};
+use tractive::modulation::{CarrierHalf, Mode, SwitchLimits};
 use tractive::nine_switch::Scheme;
 use tractive::ports::DualReport;
 use tractive::ports::Report;
 use tractive::ports::{
-    ControlPort, DualControlPort, DualPwmPort, DualSample, GateFeedback, MotorDemand, PlayedPeriod,
-    PowerSample, PwmPort, Sample,
+    ControlPort, Dual, DualSample, GateFeedback, MotorDemand, PlayedPeriod, PowerSample, PwmPort, Sample,
 };
-use tractive::protection::{Disarmed, Fault, SafeState, Trip};
+use tractive::protection::{Fault, MaskedFaults, SafeState, Trip};
 use tractive::time::{Clock, Instant};
 
 const CLOCK: Clock = Clock::new(25_000_000, 2_500);
@@ -23,9 +22,9 @@ const OMEGA: f32 = 84.0;
 /// From here on interrupts go astray.
 const SETTLED: u32 = 2_000_000;
 
-/// What befalls the interrupts from [`SETTLED`] on.
+/// The mishap of the interrupts from [`SETTLED`] on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Mishap {
+enum InjectedFault {
     None,
     /// So many control ticks are lost.
     ControlLost(u32),
@@ -52,13 +51,13 @@ struct Board {
     now: u32,
     late: u32,
     entered: Option<u32>,
-    shadow: CarrierPeriod,
+    shadow: CarrierHalf,
     periods: [PlayedPeriod; 2],
     trip: Option<Trip>,
 }
 
 impl Board {
-    fn new(first: CarrierPeriod, off: PlayedPeriod) -> Self {
+    fn new(first: CarrierHalf, off: PlayedPeriod) -> Self {
         Self { now: 0, late: 0, entered: None, shadow: first, periods: [off; 2], trip: None }
     }
 }
@@ -81,7 +80,7 @@ impl ControlPort for Board {
         self.entered = self.entered.or(Some(self.now));
     }
 
-    fn overrun_ticks(&mut self, _now: Instant) -> u32 {
+    fn overrun_ticks(&mut self, _now: Instant, _deadline_ticks: u32) -> u32 {
         self.late
     }
 
@@ -95,7 +94,7 @@ impl PwmPort for Board {
         currents(self.now, Dq { d: -30.0, q: 40.0 })
     }
 
-    fn play(&mut self, _now: Instant, next: &CarrierPeriod) {
+    fn play(&mut self, _now: Instant, next: &CarrierHalf) {
         self.shadow = *next;
     }
 
@@ -104,7 +103,7 @@ impl PwmPort for Board {
     }
 }
 
-impl DualControlPort for Board {
+impl ControlPort<Dual> for Board {
     fn sample(&mut self, _now: Instant) -> DualSample {
         DualSample {
             currents_a: [currents(self.now, Dq { d: -5.0, q: 25.0 }); 2],
@@ -122,7 +121,7 @@ impl DualControlPort for Board {
         }
     }
 
-    fn gates_off(&mut self, _now: Instant) {
+    fn enter(&mut self, _safe: SafeState, _now: Instant) {
         self.entered = self.entered.or(Some(self.now));
     }
 
@@ -135,7 +134,7 @@ impl DualControlPort for Board {
     }
 }
 
-impl DualPwmPort for Board {
+impl PwmPort<Dual> for Board {
     fn sample(&mut self, _now: Instant) -> PowerSample {
         PowerSample {
             currents_a: [currents(self.now, Dq { d: -5.0, q: 25.0 }); 2],
@@ -149,7 +148,7 @@ impl DualPwmPort for Board {
         self.periods = [self.periods[1], *next];
     }
 
-    fn gates_off(&mut self, _now: Instant) {
+    fn enter(&mut self, _safe: SafeState, _now: Instant) {
         self.entered = self.entered.or(Some(self.now));
     }
 }
@@ -158,7 +157,7 @@ impl DualPwmPort for Board {
 struct Timers {
     control: u32,
     pwm: u32,
-    mishap: Mishap,
+    injected: InjectedFault,
     lost: u32,
 }
 
@@ -170,44 +169,46 @@ enum Turn {
 impl Timers {
     /// The next interrupt, whether it is served, and its real instant; the PWM timer's half lasts `half` from there.
     fn next(&mut self, half: impl Fn() -> u32) -> (Turn, bool, u32) {
-        let delay = if let Mishap::PwmLate(ticks) = self.mishap { ticks } else { 0 };
+        let delay = if let InjectedFault::PwmLate(ticks) = self.injected { ticks } else { 0 };
         let delay = if self.pwm >= SETTLED { delay } else { 0 };
         if self.pwm + delay <= self.control {
             let at = self.pwm + delay;
             self.pwm += half();
-            let lost = matches!(self.mishap, Mishap::PwmLost(count) if at >= SETTLED && self.lost < count);
+            let lost =
+                matches!(self.injected, InjectedFault::PwmLost(count) if at >= SETTLED && self.lost < count);
             self.lost += u32::from(lost);
             (Turn::Pwm, !lost, at)
         } else {
             let at = self.control;
             self.control += CLOCK.control_ticks;
-            let lost =
-                matches!(self.mishap, Mishap::ControlLost(count) if at >= SETTLED && self.lost < count);
+            let lost = matches!(self.injected, InjectedFault::ControlLost(count) if at >= SETTLED && self.lost < count);
             self.lost += u32::from(lost);
             (Turn::Control, !lost, at)
         }
     }
 
     fn overrun(&self, at: u32) -> u32 {
-        match self.mishap {
-            Mishap::ControlLate(ticks) if (SETTLED..SETTLED + CLOCK.control_ticks).contains(&at) => ticks,
+        match self.injected {
+            InjectedFault::ControlLate(ticks) if (SETTLED..SETTLED + CLOCK.control_ticks).contains(&at) => {
+                ticks
+            }
             _ => 0,
         }
     }
 }
 
-/// The PMaSynRM drive for some time after the mishap: the trip, when the gates went off, the longest half meanwhile.
-fn traction(mishap: Mishap) -> (Option<Trip>, Option<u32>, u32) {
-    let devices = Devices::new(250, 0, 900.0, &CLOCK);
+/// The PMaSynRM drive for some time after the injected fault: the trip, when the gates went off, the longest half meanwhile.
+fn traction(injected: InjectedFault) -> (Option<Trip>, Option<u32>, u32) {
+    let devices = SwitchLimits::new(250, 0, 900.0, &CLOCK);
     let settings = traction::Settings { clock: CLOCK, devices, gains: Gains::DEFAULT };
     let first = devices.shortest_half_ticks;
     let shared = traction::Shared::new();
-    let lost = Disarmed::of(Fault::AngleLost);
+    let lost = MaskedFaults::of(Fault::AngleLost);
     let mut control =
         traction::ControlTask::new(&BUILT_IN, settings, Instant(CLOCK.control_ticks)).without(lost);
     let mut pwm = traction::PwmTask::new(&BUILT_IN, settings, Instant(first));
-    let mut board = Board::new(CarrierPeriod::off(first), PlayedPeriod::off(0));
-    let mut timers = Timers { control: CLOCK.control_ticks, pwm: first, mishap, lost: 0 };
+    let mut board = Board::new(CarrierHalf::off(first), PlayedPeriod::off(0));
+    let mut timers = Timers { control: CLOCK.control_ticks, pwm: first, injected, lost: 0 };
     let mut longest = 0;
     while timers.control < SETTLED + 200_000 {
         let half = board.shadow.period_ticks;
@@ -217,96 +218,100 @@ fn traction(mishap: Mishap) -> (Option<Trip>, Option<u32>, u32) {
         board.late = timers.overrun(at);
         match turn {
             Turn::Control if served => control.run(&mut board, &shared),
-            Turn::Pwm if served => pwm.run(&mut board, &shared),
+            Turn::Pwm if served => {
+                pwm.run(&mut board, &shared);
+            }
             _ => {}
         }
         assert!(at < SETTLED || board.entered.is_some() || pwm.trip().is_none());
     }
     // A timer without its interrupt plays on; but the gates are in the safe state.
-    let plays_on = matches!(mishap, Mishap::PwmLost(count) if count > 10);
+    let plays_on = matches!(injected, InjectedFault::PwmLost(count) if count > 10);
     let pulses = board.shadow.mode != Mode::Off;
     assert_eq!(pulses, board.entered.is_none() || plays_on, "pulses without a fault, none with one");
     (board.trip.or(pwm.trip()), board.entered, longest)
 }
 
 /// The same of the ZS9, with a carrier period in ticks.
-fn zs9(mishap: Mishap, carrier_ticks: u32) -> (Option<Trip>, Option<u32>) {
+fn zs9(injected: InjectedFault, carrier_ticks: u32) -> (Option<Trip>, Option<u32>) {
     let settings = dual::Settings::new(CLOCK, carrier_ticks);
     let shared = dual::Shared::new();
     // What the gates do is not played here.
-    let stuck = Disarmed::of(Fault::LegStuck);
+    let stuck = MaskedFaults::of(Fault::LegStuck);
     let mut control = dual::ControlTask::new(&zs9::BUILT_IN, settings);
     let mut pwm = dual::PwmTask::new(&zs9::BUILT_IN, settings).without(stuck);
     let off = PlayedPeriod::off(settings.half_steps());
-    let mut board = Board::new(CarrierPeriod::default(), off);
+    let mut board = Board::new(CarrierHalf::default(), off);
     let first = settings.first_peak_ticks();
-    let mut timers = Timers { control: CLOCK.control_ticks, pwm: first, mishap, lost: 0 };
+    let mut timers = Timers { control: CLOCK.control_ticks, pwm: first, injected, lost: 0 };
     while timers.control < SETTLED + 200_000 {
         let (turn, served, at) = timers.next(|| carrier_ticks);
         board.now = at;
         board.late = timers.overrun(at);
         match turn {
             Turn::Control if served => control.run(&mut board, &shared),
-            Turn::Pwm if served => pwm.run(&mut board, &shared),
+            Turn::Pwm if served => {
+                pwm.run(&mut board, &shared);
+            }
             _ => {}
         }
     }
     // What the PWM interrupt tripped on, control reports as well, if it comes at all.
-    let gone = matches!(mishap, Mishap::ControlLost(count) if count > 10);
-    assert!(gone || board.trip.is_some() || pwm.trip().is_none(), "{mishap:?} is not reported");
-    let plays_on = matches!(mishap, Mishap::PwmLost(count) if count > 10);
+    let gone = matches!(injected, InjectedFault::ControlLost(count) if count > 10);
+    assert!(gone || board.trip.is_some() || pwm.trip().is_none(), "{injected:?} is not reported");
+    let plays_on = matches!(injected, InjectedFault::PwmLost(count) if count > 10);
     let pulses = board.periods[1] != off;
     assert_eq!(pulses, board.entered.is_none() || plays_on, "pulses without a fault, none with one");
     (board.trip.or(pwm.trip()), board.entered)
 }
 
-/// The mishap is told by this name, and the gates are off within this many ticks of its instant.
-fn both_trip(mishap: Mishap, fault: Fault, within: u32) {
-    let (trip, entered, longest) = traction(mishap);
-    assert_eq!(trip.map(|trip| trip.fault), Some(fault), "{mishap:?}");
-    let entered = entered.unwrap_or_else(|| panic!("{mishap:?}: gates are still on"));
+/// The injected fault is told by this name, and the gates are off within this many ticks of its instant.
+fn both_trip(injected: InjectedFault, fault: Fault, within: u32) {
+    let (trip, entered, longest) = traction(injected);
+    assert_eq!(trip.map(|trip| trip.fault), Some(fault), "{injected:?}");
+    let entered = entered.unwrap_or_else(|| panic!("{injected:?}: gates are still on"));
     // One carrier period is two halves; the tick that goes astray is the first after SETTLED.
     let carrier = 2 * longest;
     assert!(
         entered - SETTLED <= within.min(carrier) + longest,
-        "{mishap:?}: after {} ticks",
+        "{injected:?}: after {} ticks",
         entered - SETTLED
     );
     for carrier_ticks in [2_500, 1_250] {
-        let (trip, entered) = zs9(mishap, carrier_ticks);
-        assert_eq!(trip.map(|trip| trip.fault), Some(fault), "ZS9 at {carrier_ticks}: {mishap:?}");
-        let after = entered.unwrap_or_else(|| panic!("{mishap:?}: gates are still on")) - SETTLED;
-        assert!(after <= CLOCK.control_ticks + carrier_ticks, "ZS9: {mishap:?}: after {after} ticks");
+        let (trip, entered) = zs9(injected, carrier_ticks);
+        assert_eq!(trip.map(|trip| trip.fault), Some(fault), "ZS9 at {carrier_ticks}: {injected:?}");
+        let after = entered.unwrap_or_else(|| panic!("{injected:?}: gates are still on")) - SETTLED;
+        assert!(after <= CLOCK.control_ticks + carrier_ticks, "ZS9: {injected:?}: after {after} ticks");
     }
 }
 
 #[test]
 fn nothing_astray_is_no_fault() {
-    let (trip, entered, _) = traction(Mishap::None);
+    let (trip, entered, _) = traction(InjectedFault::None);
     assert_eq!((trip, entered), (None, None));
     for carrier_ticks in [2_500, 1_250] {
-        assert_eq!(zs9(Mishap::None, carrier_ticks), (None, None));
+        assert_eq!(zs9(InjectedFault::None, carrier_ticks), (None, None));
     }
 }
 
 #[test]
 fn a_lost_control_tick_is_noticed_by_the_pwm_interrupt() {
     for count in [1, 2, 5, 1_000] {
-        both_trip(Mishap::ControlLost(count), Fault::StaleCommand, CLOCK.control_ticks);
+        both_trip(InjectedFault::ControlLost(count), Fault::StaleCommand, CLOCK.control_ticks);
     }
 }
 
 #[test]
 fn a_lost_pwm_tick_is_noticed_by_the_control_interrupt() {
     for count in [1, 2, 5, 1_000] {
-        both_trip(Mishap::PwmLost(count), Fault::PwmDeadline, 2 * CLOCK.control_ticks);
+        both_trip(InjectedFault::PwmLost(count), Fault::PwmDeadline, 2 * CLOCK.control_ticks);
     }
 }
 
 #[test]
 fn a_late_control_interrupt_notices_itself() {
     for ticks in [1, 100, 2_400] {
-        both_trip(Mishap::ControlLate(ticks), Fault::ControlDeadline, CLOCK.control_ticks);
+        both_trip(InjectedFault::ControlLate(ticks), Fault::ControlDeadline, CLOCK.control_ticks);
     }
 }
 
@@ -314,18 +319,18 @@ fn a_late_control_interrupt_notices_itself() {
 /// of a control period, with control in between, it counts as lost.
 #[test]
 fn a_delayed_pwm_interrupt_is_noticed_by_the_control_interrupt() {
-    let (trip, entered, _) = traction(Mishap::PwmLate(400));
+    let (trip, entered, _) = traction(InjectedFault::PwmLate(400));
     assert_eq!((trip, entered), (None, None));
     for late in [2_500, 6_000] {
-        let (trip, entered, longest) = traction(Mishap::PwmLate(late));
+        let (trip, entered, longest) = traction(InjectedFault::PwmLate(late));
         let (trip, entered) = (trip.unwrap(), entered.unwrap());
         assert_eq!(trip.fault, Fault::PwmDeadline);
         assert!(trip.value > trip.limit && trip.value < CLOCK.seconds(2 * 2_500), "{trip:?}");
         assert!(entered - SETTLED <= 2 * longest, "{entered}");
     }
     for (carrier_ticks, harmless, late) in [(2_500, 1_200, 1_300), (1_250, 600, 700)] {
-        assert_eq!(zs9(Mishap::PwmLate(harmless), carrier_ticks), (None, None));
-        let (trip, entered) = zs9(Mishap::PwmLate(late), carrier_ticks);
+        assert_eq!(zs9(InjectedFault::PwmLate(harmless), carrier_ticks), (None, None));
+        let (trip, entered) = zs9(InjectedFault::PwmLate(late), carrier_ticks);
         assert_eq!(trip.map(|trip| trip.fault), Some(Fault::PwmDeadline));
         assert!(entered.unwrap() - SETTLED <= CLOCK.control_ticks + carrier_ticks);
     }
@@ -343,32 +348,32 @@ impl ControlPort for Landing<'_> {
         if let Some(pwm) = self.pwm.take() {
             pwm.run(&mut self.board, self.shared);
         }
-        ControlPort::sample(&mut self.board, now)
+        <Board as ControlPort>::sample(&mut self.board, now)
     }
 
     fn enter(&mut self, safe: SafeState, now: Instant) {
-        ControlPort::enter(&mut self.board, safe, now);
+        <Board as ControlPort>::enter(&mut self.board, safe, now);
     }
 
-    fn overrun_ticks(&mut self, _now: Instant) -> u32 {
+    fn overrun_ticks(&mut self, _now: Instant, _deadline_ticks: u32) -> u32 {
         0
     }
 
     fn report(&mut self, now: Instant, report: &Report) {
-        ControlPort::report(&mut self.board, now, report);
+        <Board as ControlPort>::report(&mut self.board, now, report);
     }
 }
 
-/// What control sees is what stood at its instant: before the first boundary there was nothing, and nothing is not late.
+/// The view of control is that of its instant: before the first boundary there was nothing, and nothing is not late.
 #[test]
 fn the_first_boundary_may_land_in_a_control_interrupt() {
-    let devices = Devices::new(250, 0, 900.0, &CLOCK);
+    let devices = SwitchLimits::new(250, 0, 900.0, &CLOCK);
     let settings = traction::Settings { clock: CLOCK, devices, gains: Gains::DEFAULT };
     for first in [CLOCK.control_ticks + 1, 5 * CLOCK.control_ticks + 400] {
         let shared = traction::Shared::new();
         let mut control = traction::ControlTask::new(&BUILT_IN, settings, Instant(CLOCK.control_ticks));
         let mut pwm = traction::PwmTask::new(&BUILT_IN, settings, Instant(first));
-        let mut board = Board::new(CarrierPeriod::off(first), PlayedPeriod::off(0));
+        let mut board = Board::new(CarrierHalf::off(first), PlayedPeriod::off(0));
         while control.next_call().0 + CLOCK.control_ticks < first {
             board.now = control.next_call().0;
             control.run(&mut board, &shared);

@@ -4,7 +4,7 @@ use tractive::built_in::traction::BUILT_IN;
 use tractive::control::{Demand, Gains, LinkWindow, Measurements};
 use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
 use tractive::frames::{Abc, AlphaBeta, Angle, Dq};
-use tractive::modulation::{CarrierPeriod, Devices, Mode};
+use tractive::modulation::{CarrierHalf, Mode, SwitchLimits};
 use tractive::ports::Report;
 use tractive::ports::{ControlPort, PwmPort, Sample};
 use tractive::protection::{Fault, FrozenWatch, LegFaults, SafeState, Trip};
@@ -22,17 +22,17 @@ struct Fake {
     overrun: u32,
     control_entered: Option<(SafeState, u32)>,
     pwm_entered: Option<(SafeState, u32)>,
-    played: CarrierPeriod,
+    played: CarrierHalf,
     report: Report,
-    /// What the PWM interrupt samples instead, and when.
+    /// The sample that the PWM interrupt gets instead, and its time.
     pwm_currents: Option<(Abc, core::ops::Range<u32>)>,
     /// From when on nothing is spoilt any more.
     spoil_until: u32,
     /// The operator acknowledges from this instant on.
     acknowledge_from: u32,
-    /// Whether the board lets the gates go again.
+    /// `true` if the board lets the gates go again.
     lets_go: bool,
-    /// What happened to the safe state, by either interrupt: entered or left, when.
+    /// The entries into the safe state, and the exits, by either interrupt, with their times.
     safe_states: Vec<(Option<SafeState>, u32)>,
     /// Every change of the reported fault.
     faults: Vec<(Option<Fault>, u32)>,
@@ -54,7 +54,7 @@ impl Fake {
             overrun: 0,
             control_entered: None,
             pwm_entered: None,
-            played: CarrierPeriod::default(),
+            played: CarrierHalf::default(),
             report: Report::default(),
             pwm_currents: None,
             spoil_until: u32::MAX,
@@ -108,7 +108,7 @@ impl ControlPort for Fake {
         self.safe_states.push((Some(safe), now.0));
     }
 
-    fn overrun_ticks(&mut self, now: Instant) -> u32 {
+    fn overrun_ticks(&mut self, now: Instant, _deadline_ticks: u32) -> u32 {
         if now.0 >= self.spoil_from { self.overrun } else { 0 }
     }
 
@@ -129,7 +129,7 @@ impl PwmPort for Fake {
         }
     }
 
-    fn play(&mut self, now: Instant, next: &CarrierPeriod) {
+    fn play(&mut self, now: Instant, next: &CarrierHalf) {
         self.played = *next;
         self.played_at = now;
         if next.mode != Mode::Off {
@@ -154,7 +154,7 @@ impl PwmPort for Fake {
 
 /// Both interrupts in their order until `end`; control is lost from `control_until` on.
 fn drive(fake: &mut Fake, end: u32, control_until: u32) -> Option<Trip> {
-    let devices = Devices::new(250, 0, 900.0, &CLOCK);
+    let devices = SwitchLimits::new(250, 0, 900.0, &CLOCK);
     let settings = Settings { clock: CLOCK, devices, gains: Gains::DEFAULT };
     let shared = Shared::new();
     let mut control = ControlTask::new(&BUILT_IN, settings, Instant(2_500));
@@ -376,7 +376,7 @@ fn a_short_circuit_of_devices_decides_the_rail() {
     }
 }
 
-/// When a passing cause is over.
+/// The time at which a passing cause is over.
 const HEALED: u32 = SETTLED + 250_000;
 /// Both sides agree within a control period and the two halves after it.
 const AGREED: u32 = 2_500 + 2 * 20_000;

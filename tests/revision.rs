@@ -4,7 +4,7 @@ use tractive::built_in::traction::BUILT_IN;
 use tractive::drive::traction::{PwmTask, Settings, Shared};
 use tractive::drive::{CommittalRecord, Gates, VoltageCommand, volt_ticks};
 use tractive::frames::{Abc, AlphaBeta, Angle};
-use tractive::modulation::{CarrierPeriod, Devices, Mode, Modulator, Reference, Schedule};
+use tractive::modulation::{CarrierHalf, Mode, Modulator, Reference, Schedule, SwitchLimits};
 use tractive::ports::PwmPort;
 use tractive::protection::SafeState;
 use tractive::time::{Clock, Instant};
@@ -14,7 +14,7 @@ const CLOCK: Clock = Clock::new(25_000_000, 2_500);
 fn settings() -> Settings {
     Settings {
         clock: CLOCK,
-        devices: Devices::new(250, 0, 900.0, &CLOCK),
+        devices: SwitchLimits::new(250, 0, 900.0, &CLOCK),
         gains: tractive::control::Gains::DEFAULT,
     }
 }
@@ -45,16 +45,16 @@ fn a_half_made_anew_from_the_same_reference_is_the_same() {
     }
 }
 
-/// What the PWM interrupt plays.
+/// The halves that the PWM interrupt plays.
 #[derive(Default)]
-struct Played(Vec<(Instant, CarrierPeriod)>);
+struct Played(Vec<(Instant, CarrierHalf)>);
 
 impl PwmPort for Played {
     fn sample(&mut self, _now: Instant) -> Abc {
         Abc::default()
     }
 
-    fn play(&mut self, now: Instant, next: &CarrierPeriod) {
+    fn play(&mut self, now: Instant, next: &CarrierHalf) {
         self.0.push((now, *next));
     }
 
@@ -92,7 +92,7 @@ impl Pulsing {
         pulsing
     }
 
-    fn run(&mut self) -> CarrierPeriod {
+    fn run(&mut self) -> CarrierHalf {
         self.pwm.run(&mut self.played, &self.shared);
         self.played.0.last().unwrap().1
     }
@@ -125,7 +125,7 @@ impl Pulsing {
         told.unwrap()
     }
 
-    fn revise(&mut self) -> Option<CarrierPeriod> {
+    fn revise(&mut self) -> Option<CarrierHalf> {
         let before = self.played.0.len();
         self.pwm.revise(&mut self.played, &self.shared);
         self.played.0.get(before).map(|(at, half)| {

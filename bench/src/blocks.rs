@@ -30,7 +30,7 @@ pub const ALL: [Block; 19] = [
     Block { name: "core_tick/fluxkit", run: core_tick_fluxkit, exact: None },
 ];
 
-/// What every block has besides its work: the call's return, two values read and two written.
+/// The work that every block has besides its own: the call's return, two values read and two written.
 #[inline(never)]
 fn call_nothing(input: &Input, output: &mut Output) {
     *output = input.vector;
@@ -126,7 +126,7 @@ fn mtpa_tractive(input: &Input, output: &mut Output) {
     *output = [point.d, point.q];
 }
 
-/// What every field-oriented controller does in a tick, in this drive's way: Clarke, Park, current to flux by the map, the
+/// The tick of every field-oriented controller, in this drive's way: Clarke, Park, current to flux by the map, the
 /// flux error with its integral part, decoupling, back to the stator, three phases.
 #[inline(never)]
 fn core_tick_tractive(input: &Input, output: &mut Output) {

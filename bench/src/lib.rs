@@ -10,7 +10,7 @@
 pub mod blocks;
 pub mod exact;
 
-/// What every block reads; each picks what it needs.
+/// The input of every block; each picks what it needs.
 #[derive(Clone, Copy, Debug)]
 pub struct Input {
     /// A phase angle, 2⁻³² turn.
@@ -27,17 +27,17 @@ pub struct Input {
     pub positive: f32,
 }
 
-/// What a block computes.
+/// The result of a block.
 pub type Output = [f32; 2];
 
 /// A function under test.
 #[derive(Clone, Copy)]
 pub struct Block {
-    /// What it does and who makes it, as `sin_cos/tractive`.
+    /// Its work and its maker, as `sin_cos/tractive`.
     pub name: &'static str,
     /// The function; stands out of line.
     pub run: fn(&Input, &mut Output),
-    /// What it should compute, in double precision; nothing where the results are not comparable.
+    /// The exact result, in double precision; nothing where the results are not comparable.
     pub exact: Option<fn(&Input) -> [f64; 2]>,
 }
 

@@ -3,7 +3,7 @@
 
 use loom::sync::Arc;
 use loom::thread;
-use tractive::cell::{Downlink, Ring, Trail, Uplink, Words};
+use tractive::cell::{History, Mailbox, Ring, Seqlock, Words};
 
 /// Two words that belong together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -35,7 +35,7 @@ impl Words<2> for Message {
 #[test]
 fn an_uplink_is_never_torn() {
     loom::model(|| {
-        let cell = Arc::new(Uplink::<Message, 2>::new());
+        let cell = Arc::new(Seqlock::<Message, 2>::new());
         cell.publish(Message::number(1));
         let reader = Arc::clone(&cell);
         let thread = thread::spawn(move || reader.read());
@@ -47,14 +47,14 @@ fn an_uplink_is_never_torn() {
 }
 
 /// The newest two records' words, of which both are the record's number.
-fn newest_two(trail: &Trail<2>) -> Option<[[u32; 2]; 2]> {
+fn newest_two(trail: &History<2>) -> Option<[[u32; 2]; 2]> {
     trail.read(|[one, two, ..]| [one, two].map(|record| [record.word::<0>(), record.word::<1>()]))
 }
 
 #[test]
 fn a_trail_is_never_torn_by_the_next_record() {
     loom::model(|| {
-        let trail = Arc::new(Trail::<2>::new());
+        let trail = Arc::new(History::<2>::new());
         trail.publish([1; 2]);
         let reader = Arc::clone(&trail);
         let thread = thread::spawn(move || newest_two(&reader));
@@ -70,7 +70,7 @@ fn a_trail_is_never_torn_by_the_next_record() {
 #[test]
 fn a_trail_is_never_torn_by_a_revision() {
     loom::model(|| {
-        let trail = Arc::new(Trail::<2>::new());
+        let trail = Arc::new(History::<2>::new());
         trail.publish([1; 2]);
         let reader = Arc::clone(&trail);
         let thread = thread::spawn(move || newest_two(&reader));
@@ -86,7 +86,7 @@ fn a_trail_is_never_torn_by_a_revision() {
 #[test]
 fn a_downlink_gives_the_value_that_is_ready_while_the_next_one_is_written() {
     loom::model(|| {
-        let cell = Arc::new(Downlink::<Message, 2>::new());
+        let cell = Arc::new(Mailbox::<Message, 2>::new());
         cell.publish(Message::number(1));
         cell.publish(Message::number(2));
         let reader = Arc::clone(&cell);
@@ -101,7 +101,7 @@ fn a_downlink_gives_the_value_that_is_ready_while_the_next_one_is_written() {
 #[test]
 fn the_newest_of_a_downlink_is_whole() {
     loom::model(|| {
-        let cell = Arc::new(Downlink::<Message, 2>::new());
+        let cell = Arc::new(Mailbox::<Message, 2>::new());
         cell.publish(Message::number(1));
         cell.publish(Message::number(2));
         let reader = Arc::clone(&cell);
@@ -117,7 +117,7 @@ fn the_newest_of_a_downlink_is_whole() {
 #[should_panic(expected = "torn")]
 fn a_downlink_outside_its_protocol_is_torn() {
     loom::model(|| {
-        let cell = Arc::new(Downlink::<Message, 2>::new());
+        let cell = Arc::new(Mailbox::<Message, 2>::new());
         cell.publish(Message::number(1));
         let reader = Arc::clone(&cell);
         let thread = thread::spawn(move || reader.newest(|_| true));
@@ -133,7 +133,7 @@ fn a_downlink_outside_its_protocol_is_torn() {
 #[test]
 fn the_first_value_of_an_uplink_is_whole_or_not_there() {
     loom::model(|| {
-        let cell = Arc::new(Uplink::<Message, 2>::new());
+        let cell = Arc::new(Seqlock::<Message, 2>::new());
         let reader = Arc::clone(&cell);
         let thread = thread::spawn(move || reader.read());
         cell.publish(Message::number(1));
@@ -146,7 +146,7 @@ fn the_first_value_of_an_uplink_is_whole_or_not_there() {
 #[test]
 fn the_first_value_of_a_downlink_is_whole_or_not_there() {
     loom::model(|| {
-        let cell = Arc::new(Downlink::<Message, 2>::new());
+        let cell = Arc::new(Mailbox::<Message, 2>::new());
         let reader = Arc::clone(&cell);
         let thread = thread::spawn(move || reader.newest(|_| true));
         cell.publish(Message::number(1));
@@ -162,7 +162,7 @@ fn an_uplink_goes_forward() {
     let mut model = loom::model::Builder::new();
     model.preemption_bound = Some(2);
     model.check(|| {
-        let cell = Arc::new(Uplink::<Message, 2>::new());
+        let cell = Arc::new(Seqlock::<Message, 2>::new());
         cell.publish(Message::number(1));
         let reader = Arc::clone(&cell);
         let thread = thread::spawn(move || [reader.read(), reader.read()]);
@@ -178,7 +178,7 @@ fn a_downlink_goes_forward() {
     let mut model = loom::model::Builder::new();
     model.preemption_bound = Some(3);
     model.check(|| {
-        let cell = Arc::new(Downlink::<Message, 2>::new());
+        let cell = Arc::new(Mailbox::<Message, 2>::new());
         cell.publish(Message::number(1));
         cell.publish(Message::number(2));
         let reader = Arc::clone(&cell);

@@ -3,7 +3,7 @@
 #![cfg(not(loom))]
 
 use std::sync::Barrier;
-use tractive::cell::{Downlink, Uplink, Words};
+use tractive::cell::{Mailbox, Seqlock, Words};
 
 /// Words that belong together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -35,7 +35,7 @@ const ROUNDS: u32 = if cfg!(miri) { 50 } else { 200_000 };
 /// The writer may overtake every try of a read: then there is nothing, but never anything torn or older than before.
 #[test]
 fn an_uplink_between_threads_is_whole_and_goes_forward() {
-    let cell = Uplink::<Message, 9>::new();
+    let cell = Seqlock::<Message, 9>::new();
     assert_eq!(cell.read(), None);
     cell.publish(Message::number(1));
     std::thread::scope(|scope| {
@@ -56,7 +56,7 @@ fn an_uplink_between_threads_is_whole_and_goes_forward() {
 /// is begun before the reads are over.
 #[test]
 fn a_downlink_between_threads_has_what_is_ready() {
-    let cell = Downlink::<Message, 9>::new();
+    let cell = Mailbox::<Message, 9>::new();
     assert_eq!(cell.newest(|_| true), None);
     cell.publish(Message::number(1));
     let period = Barrier::new(2);
@@ -82,7 +82,7 @@ fn a_downlink_between_threads_has_what_is_ready() {
 
 #[test]
 fn every_value_arrives_in_its_turn() {
-    let (down, up) = (Downlink::<Message, 9>::default(), Uplink::<Message, 9>::default());
+    let (down, up) = (Mailbox::<Message, 9>::default(), Seqlock::<Message, 9>::default());
     for n in 1..ROUNDS {
         down.publish(Message::number(n));
         up.publish(Message::number(n));

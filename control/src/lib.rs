@@ -9,6 +9,13 @@
 //! Control and modulation never know each other; all know [`frames`], [`time`](mod@time) and [`machine`], which know nobody.
 //! Interrupts, cells between them, protection and boards are `tractive`'s.
 //!
+//! # Features
+//! None is on by default.
+//!
+//! | feature | what it brings |
+//! |---|---|
+//! | `defmt` | `defmt::Format` for measurements, voltages, pulses, operating points and errors |
+//!
 //! # Conventions
 //! * Pure steps: `step(&input, &mut state) -> output`; no clock, no peripheral, no global inside.
 //! * SI units, with the unit in the name where a type does not say it (`udc_v`, `period_ticks`).

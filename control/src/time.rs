@@ -7,6 +7,7 @@ use crate::frames::UNITS_PER_RADIAN;
 
 /// An instant, in ticks of the timers' clock, modulo 2³².
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Instant(pub u32);
 
 impl Instant {
@@ -28,7 +29,7 @@ impl Instant {
         self.0.wrapping_sub(earlier.0) as i32
     }
 
-    /// Whether this instant is `other` or later.
+    /// `true` if this instant is `other` or later.
     #[inline]
     pub fn reached(self, other: Self) -> bool {
         self.since(other) >= 0
@@ -37,6 +38,7 @@ impl Instant {
 
 /// The clock both timers count, and the control timer's period on it.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Clock {
     /// Length of one tick, in s.
     pub tick_s: f32,
@@ -53,6 +55,13 @@ impl Clock {
     pub const fn new(hz: u32, control_ticks: u32) -> Self {
         let tick_s = 1.0 / hz as f32;
         Self { tick_s, ticks_per_s: hz as f32, control_ticks, control_s: control_ticks as f32 * tick_s }
+    }
+
+    /// The control rate for devices of a highest switching frequency, in Hz, unless another is asked for: 10 kHz, or 20 kHz where a
+    /// carrier would otherwise have less than one command.
+    pub const fn control_hz(max_switching_hz: f32) -> u32 {
+        const USUAL_HZ: u32 = 10_000;
+        if max_switching_hz > USUAL_HZ as f32 { 2 * USUAL_HZ } else { USUAL_HZ }
     }
 
     /// A number of ticks, in s.

@@ -2,6 +2,7 @@
 
 use crate::options::{Options, RunOptions};
 use crate::plant::stopwatch::{self, processor_s};
+use crate::report;
 use crate::scenario::catalogue::{self, Chosen};
 use crate::scenario::traction::TractionOptions;
 use crate::scenario::zs9::Zs9Options;
@@ -10,23 +11,23 @@ use crate::trace::Recorded;
 use anyhow::Result;
 use std::time::Instant;
 
-/// What to measure.
+/// The options of the measurement.
 #[derive(Clone, Debug, clap::Args)]
 pub struct BenchOptions {
     /// All scenarios unless some are named.
     pub scenarios: Vec<String>,
-    /// What all runs share.
+    /// The options that all runs share.
     #[command(flatten)]
     pub run: RunOptions,
-    /// What the PMaSynRM drive's scenarios share.
+    /// The options that the PMaSynRM drive's scenarios share.
     #[command(flatten)]
     pub traction: TractionOptions,
-    /// What the ZS9's share.
+    /// The options that the ZS9's share.
     #[command(flatten)]
     pub zs9: Zs9Options,
 }
 
-/// What a scenario took.
+/// The time that a scenario took.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct Measured {
     /// The scenario.
@@ -35,7 +36,7 @@ pub struct Measured {
     pub simulated_s: f64,
     /// From the first tick to the last, in s; neither tables nor files are in it.
     pub wall_s: f64,
-    /// What the thread had of a processor in that time, in s: less than that where other programs want it too.
+    /// The processor time of the thread in that time, in s: less than that where other programs want it too.
     pub processor_s: f64,
     /// Simulated seconds in a second of the processor.
     pub ratio: f64,
@@ -88,39 +89,12 @@ pub fn run(options: &BenchOptions) -> Result<()> {
     if scenarios.is_empty() {
         scenarios.extend(catalogue::listed().map(|(name, _)| name.to_owned()));
     }
-    let json = options.run.json;
-    if !json {
-        crate::say!(
-            "{:<16} {:>12} {:>8} {:>12} {:>8} {:>12} {:>8}",
-            "scenario",
-            "simulated s",
-            "wall s",
-            "processor s",
-            "ratio",
-            "plant steps",
-            "plant %"
-        );
-    }
-    let mut all = Vec::new();
-    for name in &scenarios {
-        let measured = measure(name, options)?;
-        if json {
-            all.push(measured);
-        } else {
-            crate::say!(
-                "{:<16} {:>12.2} {:>8.3} {:>12.3} {:>8.1} {:>12} {:>8.1}",
-                measured.scenario,
-                measured.simulated_s,
-                measured.wall_s,
-                measured.processor_s,
-                measured.ratio,
-                measured.plant_steps,
-                measured.plant_percent
-            );
-        }
-    }
-    if json {
-        crate::say!("{}", serde_json::to_string(&all)?);
+    let measured = scenarios.iter().map(|name| measure(name, options)).collect::<Result<Vec<_>>>()?;
+    if options.run.json {
+        crate::say!("{}", serde_json::to_string(&measured)?);
+    } else {
+        let rows = measured.iter().map(serde_json::to_value).collect::<Result<Vec<_>, _>>()?;
+        crate::say!("{}", report::list("bench", &rows));
     }
     Ok(())
 }

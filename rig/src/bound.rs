@@ -1,4 +1,4 @@
-//! What the pulses and the machine's inductances allow: distortion and torque ripple of the modulator's own pattern on the
+//! The bound that pulses and the machine's inductances set: distortion and torque ripple of the modulator's own pattern on the
 //! machine, with no control at all.
 //!
 //! The pattern's volt-seconds are the stationary flux, exactly; less mean and fundamental they are its ripple. Put around the
@@ -79,7 +79,7 @@ const fn cycles(mode: Mode) -> u32 {
     if mode.carriers() == 0 { 20 } else { 1 }
 }
 
-/// What is wanted of distortion and torque ripple: of an ideal inverter, no more than a little over the bound.
+/// The verdicts on distortion and torque ripple: of an ideal inverter, no more than a little over the bound.
 pub fn verdicts(points: &[Beside], options: &RunOptions) -> [Verdict; 3] {
     let judged = |what: &str, value: fn(&Beside) -> f64, at_most: f64, others: &'static str| {
         let found = worst(points.iter().map(value));

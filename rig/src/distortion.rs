@@ -16,11 +16,9 @@ pub struct Samples {
     pub torque_nm: Vec<f64>,
 }
 
-/// What the samples show.
+/// The distortion of the samples.
 #[derive(Clone, Debug)]
 pub struct Distortion {
-    /// Fundamental of the phase current, peak, in A.
-    pub fundamental_a: f64,
     /// Everything but the fundamental, rms over rms of the fundamental, in percent.
     pub thd_percent: f64,
     /// Torque ripple, rms, in N·m.
@@ -80,7 +78,6 @@ impl Distortion {
         let low = samples.torque_nm.iter().copied().fold(f64::INFINITY, f64::min);
         let high = samples.torque_nm.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         Self {
-            fundamental_a,
             thd_percent: (rest_square / fundamental_square).sqrt() * 100.0,
             torque_rms_nm: (torque_square / count).sqrt(),
             torque_peak_to_peak_nm: high - low,

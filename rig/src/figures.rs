@@ -17,41 +17,21 @@ pub fn draw(page: &mut Page, recording: &Recording, points: &[SteadyPoint], mach
     for (title, unit, curve) in accuracy(points, machine) {
         page.draw_xy("figure 10", title, ("speed in r/min", unit), &[(title.to_owned(), curve)]);
     }
-    page.draw_xy(
-        "figure 1",
-        "currents of MTPA and of full power in weakening",
-        ("id in A", "iq in A"),
-        &loci(machine),
-    );
-    page.draw_xy(
-        "figure 3",
-        "Ld over id, for several iq",
-        ("id in A", "Ld in mH"),
-        &inductances(machine, true),
-    );
-    page.draw_xy(
-        "figure 4",
-        "Lq over iq, for several id",
-        ("iq in A", "Lq in mH"),
-        &inductances(machine, false),
-    );
-    page.draw_xy(
-        "figure 6",
-        "the modes: pulses per fundamental period over frequency, going up at full torque",
-        ("stator frequency in Hz", "turn-ons per period"),
-        &strategy(recording, machine),
-    );
+    const LOCI: &str = "currents of MTPA and of full power in weakening";
+    const STRATEGY: &str = "the modes: pulses per fundamental period over frequency, going up at full torque";
+    let frequency = ("stator frequency in Hz", "turn-ons per period");
+    page.draw_xy("figure 1", LOCI, ("id in A", "iq in A"), &loci(machine));
+    let (ld, lq) = (inductances(machine, true), inductances(machine, false));
+    page.draw_xy("figure 3", "Ld over id, for several iq", ("id in A", "Ld in mH"), &ld);
+    page.draw_xy("figure 4", "Lq over iq, for several id", ("iq in A", "Lq in mH"), &lq);
+    page.draw_xy("figure 6", STRATEGY, frequency, &strategy(recording, machine));
     for mode in Mode::ALL.into_iter().filter(|mode| mode.is_pattern() && !mode.is_whole()) {
         // Notches of much the same width: 70 % for 7 pulses, 90 % for 3.
         let (f1_hz, share) = (100.0, 1.0 - 0.05 * f64::from(mode.turn_ons() - 1));
         let title =
             format!("middle 60°, {}: legs u, v, w at {:.0} % of six-step", mode.name(), 100.0 * share);
-        page.draw_xy(
-            "figure 7",
-            &title,
-            ("pulse angle in degrees", "level"),
-            &legs(machine, mode, f1_hz, share),
-        );
+        let axes = ("pulse angle in degrees", "level");
+        page.draw_xy("figure 7", &title, axes, &legs(machine, mode, f1_hz, share));
     }
 }
 

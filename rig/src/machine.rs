@@ -9,7 +9,7 @@ use tractive_tablegen::MachineFolder;
 /// A machine folder and the tables made from it.
 #[derive(Clone)]
 pub struct Machine {
-    /// What was read.
+    /// The folder that was read.
     pub folder: MachineFolder,
     /// The tables that the firmware's code runs on; made once, kept for the program's life.
     pub tables: &'static Tables,
@@ -38,7 +38,7 @@ impl Machine {
     }
 }
 
-/// Where a machine comes from, and what stood there.
+/// The source of a machine, and its contents.
 #[derive(PartialEq)]
 struct Source {
     folder: PathBuf,

@@ -1,17 +1,14 @@
 //! The rig's command line.
 
 use anyhow::Result;
-use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Parser, Subcommand};
 use std::ffi::OsString;
 use std::path::PathBuf;
 use std::process::ExitCode;
-use tractive::modulation::Mode;
 use tractive_rig::benchmark::{self, BenchOptions};
 use tractive_rig::campaign::{self, command::CampaignOptions};
 use tractive_rig::machine::Machine;
 use tractive_rig::needs::Needs;
-use tractive_rig::options::{not_negative, positive};
 use tractive_rig::scenario::command::folder;
 use tractive_rig::{nine_switch, pattern, points, report, say, scenario, talk};
 
@@ -31,7 +28,7 @@ enum Command {
         #[arg(hide = true, trailing_var_arg = true, allow_hyphen_values = true)]
         words: Vec<OsString>,
     },
-    /// What `run` or `talk` would need for these words, as JSON, for whoever makes it ready.
+    /// The needs of `run` or `talk` for these words, as JSON, for whoever makes them ready.
     #[command(hide = true, disable_help_flag = true)]
     Needs {
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
@@ -69,39 +66,14 @@ enum Command {
 
 #[derive(clap::Args)]
 struct PatternOptions {
-    /// Mode.
-    #[arg(long, value_parser = modes())]
-    mode: Mode,
-    /// Fundamental, peak phase, in V.
-    #[arg(long, value_parser = not_negative, allow_negative_numbers = true)]
-    u: f64,
-    /// DC link, in V.
-    #[arg(long, value_parser = positive, allow_negative_numbers = true)]
-    udc: f64,
-    /// Stator frequency, in Hz.
-    #[arg(long, value_parser = positive, allow_negative_numbers = true)]
-    f1: f64,
-    /// Fundamental periods.
-    #[arg(long, default_value_t = 1, allow_negative_numbers = true)]
-    cycles: u32,
+    #[command(flatten)]
+    wanted: pattern::Wanted,
     /// The file to write: t_s,leg,level.
     #[arg(long)]
     out: PathBuf,
-    /// Dead time, in µs.
-    #[arg(long, default_value_t = 0.0, value_parser = not_negative, allow_negative_numbers = true)]
-    dead_time_us: f64,
-    /// Shortest pulse, in µs.
-    #[arg(long, default_value_t = 0.0, value_parser = not_negative, allow_negative_numbers = true)]
-    min_pulse_us: f64,
     /// A folder of tables/, or the path of any machine folder.
     #[arg(long, default_value = "pmasynrm-180kw")]
     machine: String,
-}
-
-/// The modes with pulses, by their names.
-fn modes() -> impl TypedValueParser<Value = Mode> {
-    let pulsing = Mode::ALL.into_iter().filter(|mode| *mode != Mode::Off);
-    PossibleValuesParser::new(pulsing.map(Mode::name)).map(|name| Mode::named(&name).unwrap_or_default())
 }
 
 fn main() -> ExitCode {
@@ -135,16 +107,8 @@ fn command(command: Command) -> Result<ExitCode> {
         Command::Campaign(options) => campaign::command::run(&options),
         Command::Pattern(options) => {
             let machine = Machine::load(&options.machine)?;
-            let wanted = pattern::Wanted {
-                mode: options.mode,
-                voltage_v: options.u,
-                udc_v: options.udc,
-                f1_hz: options.f1,
-                cycles: options.cycles,
-                dead_time_us: options.dead_time_us,
-                min_pulse_us: options.min_pulse_us,
-                max_switching_hz: machine.tables.ratings.max_switching_hz,
-            };
+            let max_switching_hz = machine.tables.ratings.max_switching_hz;
+            let wanted = pattern::Wanted { max_switching_hz, ..options.wanted };
             done(pattern::write(&wanted, &options.out))
         }
     }
@@ -163,9 +127,10 @@ fn needs(words: Vec<OsString>) -> Result<ExitCode> {
 
 /// The commands of a script, for the help.
 fn talk_help() -> String {
-    let commands: Vec<_> = talk::script::COMMANDS.iter().map(|usage| format!("  {usage}")).collect();
-    let zs9: Vec<_> = talk::script::ZS9_COMMANDS.iter().map(|usage| format!("  {usage}")).collect();
-    let [commands, zs9] = [commands, zs9].map(|lines| lines.join("\n"));
+    let list = |commands: &[talk::script::Command]| {
+        commands.iter().map(|(usage, _)| format!("  {usage}")).collect::<Vec<_>>().join("\n")
+    };
+    let [commands, zs9] = [list(&talk::script::COMMANDS), list(&talk::script::ZS9_COMMANDS)];
     format!("A line is [SECONDS] COMMAND; # begins a comment:\n{commands}\nWith --system zs9:\n{zs9}")
 }
 

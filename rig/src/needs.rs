@@ -1,4 +1,4 @@
-//! What has to be made ready for a run, for whoever builds images and sets up the emulator.
+//! The needs of a run, for whoever builds images and sets up the emulator.
 
 use crate::options::{On, RunOptions};
 use crate::scenario::System;
@@ -11,18 +11,18 @@ use serde::Serialize;
 use std::ffi::OsString;
 use std::path::PathBuf;
 
-/// What a command line asks for.
+/// The needs of a command line.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Needs {
     /// `pmasynrm` or `zs9`.
     pub system: &'static str,
-    /// Where the drive runs.
+    /// The place where the drive runs.
     pub on: On,
     /// The machine that was named.
     pub machine: Option<String>,
-    /// Whether the image is still to be built.
+    /// `true` if the image is still to be built.
     pub image: bool,
-    /// Whether the emulator is still to be found.
+    /// `true` if the emulator is still to be found.
     pub emulator: bool,
     /// The script of a talk that was named.
     pub script: Option<PathBuf>,

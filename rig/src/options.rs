@@ -9,7 +9,7 @@ use serde::Serialize;
 use std::path::PathBuf;
 use std::str::FromStr;
 
-/// Where the drive runs.
+/// The place where the drive runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum On {
@@ -78,7 +78,7 @@ pub fn finite(text: &str) -> Result<f64, String> {
 /// Options of every run.
 #[derive(Clone, Debug, Args, Serialize)]
 pub struct RunOptions {
-    /// Where the drive runs; `cargo xtask` means qemu unless told otherwise.
+    /// The place where the drive runs; `cargo xtask` means qemu unless told otherwise.
     #[arg(long, value_enum, env = "TRACTIVE_ON", hide_env = true, default_value = "host")]
     pub on: On,
     /// Folder for the files; default target/tractive/SCENARIO.
@@ -146,11 +146,11 @@ pub struct RunOptions {
 /// Options of a run, with those that only one system has.
 #[derive(Clone, Debug, Args, Serialize)]
 pub struct Options<O: Args> {
-    /// What all have.
+    /// The options that all scenarios have.
     #[serde(flatten)]
     #[command(flatten)]
     pub run: RunOptions,
-    /// What the system has.
+    /// The options that the system has.
     #[serde(flatten)]
     #[command(flatten)]
     pub own: O,
@@ -179,13 +179,13 @@ pub fn within(ranges: &[(&str, f64, f64, f64)]) -> anyhow::Result<()> {
 }
 
 impl RunOptions {
-    /// Whether inverter, sensors and machine are as control believes them to be.
+    /// `true` if inverter, sensors and machine are as control believes them to be.
     pub fn is_ideal(&self) -> bool {
         let flaws = [self.dead_time_us, self.noise_a, self.map_error, self.rs_error, self.angle_error];
         flaws.iter().all(|flaw| *flaw == 0.0) && self.adc_bits.is_none() && self.udc_ripple.is_none()
     }
 
-    /// Whether the flaws make sense with this machine and source, of either system.
+    /// The check that the flaws make sense with this machine and source, of either system.
     ///
     /// # Errors
     /// The first option that is out of its range, by name.
@@ -218,7 +218,7 @@ impl RunOptions {
         })
     }
 
-    /// How the true machine differs from its folder.
+    /// The deviations of the true machine from its folder.
     pub fn plant(&self) -> PlantSettings {
         PlantSettings {
             flux_scale: 1.0 + self.map_error / 100.0,
@@ -234,6 +234,7 @@ impl RunOptions {
             noise_a: self.noise_a,
             udc_ripple: self.udc_ripple.map(|ripple| (ripple.amplitude_v, ripple.frequency_hz)),
             angle_error_deg: self.angle_error,
+            angle_jitter_s: 0.0,
             freeze_at_s: None,
             seed: self.seed,
         }

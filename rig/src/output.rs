@@ -1,4 +1,4 @@
-//! What commands print.
+//! The output of the commands.
 
 use std::fmt::Arguments;
 use std::io::{ErrorKind, Write as _, stdout};

@@ -2,33 +2,49 @@
 
 use crate::bench::Inverter;
 use crate::files;
+use crate::options::{not_negative, positive};
 use crate::plant::Leg;
 use crate::run::{CLOCK, refused};
 use anyhow::{Result, bail};
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use std::path::Path;
 use tractive::frames::{Angle, six_step_v};
-use tractive::modulation::{Devices, Mode, Modulator, Reference, Schedule, depth_limit};
+use tractive::modulation::{Mode, Modulator, Reference, Schedule, SwitchLimits, depth_limit};
 use tractive::time::Instant;
 
-/// What to make.
-#[derive(Clone, Copy, Debug)]
+/// The pattern to make.
+#[derive(Clone, Copy, Debug, clap::Args)]
 pub struct Wanted {
     /// Mode.
+    #[arg(long, value_parser = modes())]
     pub mode: Mode,
     /// Fundamental, peak phase, in V.
+    #[arg(long = "u", id = "u", value_parser = not_negative, allow_negative_numbers = true)]
     pub voltage_v: f64,
     /// DC link, in V.
+    #[arg(long = "udc", id = "udc", value_parser = positive, allow_negative_numbers = true)]
     pub udc_v: f64,
     /// Stator frequency, in Hz.
+    #[arg(long = "f1", id = "f1", value_parser = positive, allow_negative_numbers = true)]
     pub f1_hz: f64,
-    /// Number of fundamental periods.
+    /// Fundamental periods.
+    #[arg(long, default_value_t = 1, allow_negative_numbers = true)]
     pub cycles: u32,
     /// Dead time, in µs.
+    #[arg(long, default_value_t = 0.0, value_parser = not_negative, allow_negative_numbers = true)]
     pub dead_time_us: f64,
     /// Shortest pulse, in µs.
+    #[arg(long, default_value_t = 0.0, value_parser = not_negative, allow_negative_numbers = true)]
     pub min_pulse_us: f64,
     /// Highest switching frequency, in Hz.
+    #[arg(skip)]
     pub max_switching_hz: f32,
+}
+
+/// The modes with pulses, by their names.
+fn modes() -> impl TypedValueParser<Value = Mode> {
+    let pulsing = Mode::ALL.into_iter().filter(|mode| *mode != Mode::Off);
+    PossibleValuesParser::new(pulsing.map(Mode::name)).map(|name| Mode::named(&name).unwrap_or_default())
 }
 
 /// An upper device that changes: time in s, leg 0 ..= 2, on.
@@ -44,8 +60,12 @@ const HIGHEST_HZ: f64 = 1_000.0;
 pub fn edges(wanted: &Wanted) -> Result<Vec<LegEdge>> {
     let tick_s = f64::from(CLOCK.ticks_per_s).recip();
     let ticks = |microseconds: f64| (microseconds * 1e-6 / tick_s).round() as u32;
-    let devices =
-        Devices::new(ticks(wanted.min_pulse_us), ticks(wanted.dead_time_us), wanted.max_switching_hz, &CLOCK);
+    let devices = SwitchLimits::new(
+        ticks(wanted.min_pulse_us),
+        ticks(wanted.dead_time_us),
+        wanted.max_switching_hz,
+        &CLOCK,
+    );
     devices.check(&CLOCK).map_err(refused)?;
     let rate = (wanted.f1_hz * tick_s * 4_294_967_296.0) as f32;
     let lowest_hz = LONGEST_S.recip();

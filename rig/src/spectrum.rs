@@ -18,12 +18,11 @@ const SMALLEST_PERCENT: f64 = 0.02;
 /// By how much the bound's lines stand beside the measured ones, in Hz.
 const BESIDE_HZ: f64 = 8.0;
 
-/// Draws the spectrum in a window of a recording and that of its bound, without the fundamental.
+/// Draws the spectrum in a window of a recording, under a title, and that of its bound, without the fundamental.
 pub fn draw(
     page: &mut Page,
-    title: &str,
     recording: &Recording,
-    window: (f64, f64),
+    (title, window): (&str, (f64, f64)),
     options: &RunOptions,
     machine: &Machine,
 ) {

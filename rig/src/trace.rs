@@ -1,4 +1,4 @@
-//! What a run leaves behind: trace, edges, switches of mode. Files are written whole or not at all.
+//! The files that a run leaves behind: trace, edges, switches of mode. Files are written whole or not at all.
 
 use crate::files::{Cell, Columns, write_edges, write_recorder, write_rows};
 use crate::plant::LinkEnergies;
@@ -17,9 +17,9 @@ pub type Tick = u64;
 /// A gate edge: device 0 ..= 5 is uh ul vh vl wh wl.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Edge {
-    /// When.
+    /// The time.
     pub tick: Tick,
-    /// Which device, as an index into [`GATES`].
+    /// The device, as an index into [`GATES`].
     pub gate: u8,
     /// On or off.
     pub on: bool,
@@ -28,12 +28,12 @@ pub struct Edge {
 /// Names of the gates, in the order of [`Edge::gate`].
 pub const GATES: [&str; 6] = ["uh", "ul", "vh", "vl", "wh", "wl"];
 
-/// What the operator did in one slot, for the trace.
+/// The operator's status of one slot, for the trace.
 #[derive(Clone, Copy, Debug)]
 pub struct SlotRow {
-    /// When it took effect, in s from the recording's beginning.
+    /// The time at which it took effect, in s from the recording's beginning.
     pub t_s: f64,
-    /// What it told.
+    /// The status.
     pub status: Status,
 }
 
@@ -94,7 +94,7 @@ impl Row {
 /// A change of mode.
 #[derive(Clone, Copy, Debug)]
 pub struct Switch {
-    /// When the new mode's first half began, in s.
+    /// The time at which the new mode's first half began, in s.
     pub t_s: f64,
     /// The mode that ended.
     pub from: Mode,
@@ -107,13 +107,13 @@ pub struct Switch {
 }
 
 impl Switch {
-    /// Whether both modes make pulses, and it is within the recording.
+    /// `true` if both modes make pulses, and it is within the recording.
     pub fn is_between_pulses(&self) -> bool {
         self.t_s > 0.0 && self.from != Mode::Off && self.to != Mode::Off
     }
 }
 
-/// Where a link's energy went.
+/// The balance of a link's energy.
 #[derive(Clone, Copy, Debug)]
 pub struct LinkBalance {
     /// By who gave or took it.
@@ -126,11 +126,13 @@ pub struct LinkBalance {
 
 /// A whole run.
 pub struct Recording {
-    /// Rows of the trace.
+    /// Rows of the trace, at the step at which they are judged.
     pub rows: Vec<Row>,
+    /// Rows of trace.csv, where it has another step.
+    pub written: Option<Vec<Row>>,
     /// Changes of mode.
     pub switches: Vec<Switch>,
-    /// What the operator told, slot by slot; empty without one.
+    /// The operator's status, slot by slot; empty without one.
     pub slots: Vec<SlotRow>,
     /// Energies of a link with a capacitor, over the whole run.
     pub link: Option<LinkBalance>,
@@ -140,16 +142,11 @@ pub struct Recording {
     pub lead: Tick,
     /// Length of a tick, in s.
     pub tick_s: f64,
-    /// What the drive's flight recorder holds, with its times in s from the recording's beginning; empty without a fault.
+    /// The records of the drive's flight recorder, with their times in s from the recording's beginning; empty without a fault.
     pub recorded: Vec<(f64, Record)>,
 }
 
 impl Recording {
-    /// The first fault, if the drive tripped.
-    pub fn trip(&self) -> Option<Trip> {
-        self.rows.iter().find_map(|row| row.trip)
-    }
-
     /// Time of a tick from the recording's beginning, in s.
     pub fn seconds(&self, tick: Tick) -> f64 {
         (tick as f64 - self.lead as f64) * self.tick_s
@@ -222,7 +219,7 @@ pub fn name_of(trip: Option<Trip>) -> &'static str {
     trip.map_or("", |trip| trip.fault.name())
 }
 
-/// What a run leaves, of either system.
+/// The recording of a run, of either system.
 pub trait Recorded {
     /// The first fault, if the drive tripped.
     fn trip(&self) -> Option<Trip>;
@@ -247,7 +244,7 @@ pub trait Recorded {
 
 impl Recorded for Recording {
     fn trip(&self) -> Option<Trip> {
-        self.trip()
+        self.rows.iter().find_map(|row| row.trip)
     }
 
     fn end_s(&self) -> f64 {
@@ -255,7 +252,7 @@ impl Recorded for Recording {
     }
 
     fn write_trace(&self, path: &Path) -> Result<()> {
-        write_rows(path, self.rows.iter().map(Row::columns))
+        write_rows(path, self.written.as_ref().unwrap_or(&self.rows).iter().map(Row::columns))
     }
 
     fn write_recorder(&self, path: &Path) -> Result<()> {

@@ -3,15 +3,15 @@
 use crate::options::RunOptions;
 use serde::Serialize;
 
-/// What a verdict says where the bound is not kept.
+/// The words of a verdict where the bound is not kept.
 pub const FALLS_SHORT: &str = "falls short";
-/// What it says where the run held nothing of the kind: that is no pass.
+/// The words of a verdict where the run held nothing of the kind: that is no pass.
 pub const NOT_SEEN: &str = "not seen";
 
 /// A figure, its bound, and whether it is kept.
 #[derive(Clone, Debug, Serialize)]
 pub struct Verdict {
-    /// What is judged, with its unit.
+    /// The quantity that is judged, with its unit.
     pub what: String,
     /// Found; nothing where the run held nothing of the kind.
     pub found: Option<f64>,
@@ -19,7 +19,7 @@ pub struct Verdict {
     pub at_most: Option<f64>,
     /// `pass`, `falls short`, `reported` or `not seen`.
     pub verdict: &'static str,
-    /// What the paper, or an ordinary controller in simulation, reached.
+    /// The value that the paper, or an ordinary controller in simulation, reached.
     pub others: &'static str,
 }
 
@@ -34,6 +34,11 @@ impl Verdict {
             _ => FALLS_SHORT,
         };
         Self { what: what.to_owned(), found, at_most, verdict, others }
+    }
+
+    /// The same of a figure that nobody else has reported.
+    pub fn ours(what: &str, found: impl Into<Option<f64>>, at_most: f64) -> Self {
+        Self::at_most(what, found, at_most, "–")
     }
 }
 

@@ -2,11 +2,11 @@
 
 use std::str::FromStr;
 use tractive::machine::{Ratings, Tables};
-use tractive::protection::{Disarmed, Fault, LegFaults, LinkLimits};
+use tractive::protection::{Fault, LegFaults, LinkLimits, MaskedFaults};
 
-/// What is switched off.
+/// The part that is switched off.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Without {
+pub enum Ablation {
     /// The check that finds this fault.
     Check(Fault),
     /// The short circuit as a safe state: always gates off.
@@ -15,7 +15,7 @@ pub enum Without {
     LegSafeState,
 }
 
-impl Without {
+impl Ablation {
     /// Every protection that the campaign tries.
     pub fn all() -> impl Iterator<Item = Self> {
         /// The rest is found by boards, which have benches of their own.
@@ -80,19 +80,19 @@ impl Without {
         Box::leak(Box::new(Tables { ratings: self.ratings(&tables.ratings), ..*tables }))
     }
 
-    /// What the tasks leave out.
-    pub fn disarmed(self) -> Disarmed {
+    /// The checks that the tasks leave out.
+    pub fn disarmed(self) -> MaskedFaults {
         match self {
             // These are levels: out of reach.
             Self::Check(
                 Fault::Overcurrent | Fault::DcOvervoltage | Fault::DcUndervoltage | Fault::Overspeed,
-            ) => Disarmed::NONE,
-            Self::Check(fault) => Disarmed::of(fault),
-            Self::ShortCircuit | Self::LegSafeState => Disarmed::NONE,
+            ) => MaskedFaults::NONE,
+            Self::Check(fault) => MaskedFaults::of(fault),
+            Self::ShortCircuit | Self::LegSafeState => MaskedFaults::NONE,
         }
     }
 
-    /// What the power stage still tells.
+    /// The reports that the power stage still makes.
     pub fn leg_faults(self, found: LegFaults) -> LegFaults {
         match self {
             Self::Check(Fault::DriverBlocked) => LegFaults { blocked: 0, ..found },
@@ -108,7 +108,7 @@ impl Without {
     }
 }
 
-impl FromStr for Without {
+impl FromStr for Ablation {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {

@@ -4,7 +4,7 @@ use serde_json::Value;
 use tractive_rig::analysis::{self, Figures};
 use tractive_rig::rows::mean;
 use tractive_rig::scenario::catalogue;
-use tractive_rig::trace::Recording;
+use tractive_rig::trace::{Recorded, Recording};
 
 /// Runs a scenario as on the command line, without a fault.
 fn driven(line: &str) -> (Recording, Figures) {
@@ -154,7 +154,7 @@ fn dead_time_leaves_no_harmonics() {
     }
 }
 
-/// Where the zero crossings of the current are slow its sign is not enough: the rest is the sixth harmonic that is followed. Without it
+/// The sixth harmonic of the dead time is followed: where the zero crossings of the current are slow its sign is not enough. Without it
 /// 3.4 and 4.1 % were left.
 #[test]
 fn what_the_currents_sign_does_not_tell_of_the_dead_time_is_followed() {
@@ -264,7 +264,7 @@ fn our_two_passes_beat_the_papers() {
     assert!(worst(&torque) < 0.3 && worst(&current) < 0.05);
 }
 
-/// Where the link does not give the torque, the drive says so all the time, and what it gives is what it says.
+/// The drive says all the time that the link does not give the torque, and what it gives is what it says.
 #[test]
 fn a_torque_that_is_not_to_be_had_is_reported() {
     for (line, most_nm) in [

@@ -8,7 +8,7 @@ use tractive::protection::Fault;
 use tractive_rig::bench::Flaws;
 use tractive_rig::campaign::judge::Verdict;
 use tractive_rig::campaign::{Campaign, Case, Outcome, cases, dual, healthy, report, traction};
-use tractive_rig::without::Without;
+use tractive_rig::without::Ablation;
 
 /// The cases whose names have all these words.
 fn named(words: &str) -> Vec<Case> {
@@ -45,34 +45,34 @@ fn nothing_escapes_the_fast_campaign() {
     }
 }
 
-/// What is switched off, and the cases of which one must then be lost.
-const WORTH: [(Without, &str); 18] = [
-    (Without::Check(Fault::Overcurrent), "pmasynrm current-u-railed 300"),
-    (Without::Check(Fault::DcOvervoltage), "pmasynrm link-over 300"),
-    (Without::Check(Fault::DcUndervoltage), "pmasynrm link-under 850"),
-    (Without::Check(Fault::Overspeed), "pmasynrm overspeed 6000"),
-    (Without::Check(Fault::PhaseSum), "pmasynrm current-u-offset 850"),
-    (Without::Check(Fault::NotFinite), "pmasynrm demand-not-finite 850"),
-    (Without::Check(Fault::Frozen), "pmasynrm angle-frozen 100"),
-    (Without::Check(Fault::ControlDeadline), "pmasynrm control-late 850"),
-    (Without::Check(Fault::StaleCommand), "pmasynrm commands-lost 850"),
-    (Without::Check(Fault::LegStuck), "pmasynrm uh-stuck-off 850 motoring"),
-    (Without::Check(Fault::AngleLost), "pmasynrm angle-jump 850"),
-    (Without::Check(Fault::DriverBlocked), "pmasynrm uh-stuck-on 850"),
-    (Without::ShortCircuit, "pmasynrm current-u-offset 6000"),
-    (Without::LegSafeState, "pmasynrm uh-shorted 2800"),
-    (Without::Check(Fault::SourceUndervoltage), "zs9 zvo source-low 1000"),
-    (Without::Check(Fault::CapacitorOvervoltage), "zs9 zvo source-high 1000"),
-    (Without::Check(Fault::DutyRange), "zs9 zvo link-out-of-range 1000"),
-    (Without::Check(Fault::SensorLost1), "zs9 zvo angle-1-jump 1000"),
+/// The parts that are switched off, and the cases of which one must then be lost.
+const WORTH: [(Ablation, &str); 18] = [
+    (Ablation::Check(Fault::Overcurrent), "pmasynrm current-u-railed 300"),
+    (Ablation::Check(Fault::DcOvervoltage), "pmasynrm link-over 300"),
+    (Ablation::Check(Fault::DcUndervoltage), "pmasynrm link-under 850"),
+    (Ablation::Check(Fault::Overspeed), "pmasynrm overspeed 6000"),
+    (Ablation::Check(Fault::PhaseSum), "pmasynrm current-u-offset 850"),
+    (Ablation::Check(Fault::NotFinite), "pmasynrm demand-not-finite 850"),
+    (Ablation::Check(Fault::Frozen), "pmasynrm angle-frozen 100"),
+    (Ablation::Check(Fault::ControlDeadline), "pmasynrm control-late 850"),
+    (Ablation::Check(Fault::StaleCommand), "pmasynrm commands-lost 850"),
+    (Ablation::Check(Fault::LegStuck), "pmasynrm uh-stuck-off 850 motoring"),
+    (Ablation::Check(Fault::AngleLost), "pmasynrm angle-jump 850"),
+    (Ablation::Check(Fault::DriverBlocked), "pmasynrm uh-stuck-on 850"),
+    (Ablation::ShortCircuit, "pmasynrm current-u-offset 6000"),
+    (Ablation::LegSafeState, "pmasynrm uh-shorted 2800"),
+    (Ablation::Check(Fault::SourceUndervoltage), "zs9 zvo source-low 1000"),
+    (Ablation::Check(Fault::CapacitorOvervoltage), "zs9 zvo source-high 1000"),
+    (Ablation::Check(Fault::DutyRange), "zs9 zvo link-out-of-range 1000"),
+    (Ablation::Check(Fault::SensorLost1), "zs9 zvo angle-1-jump 1000"),
 ];
 
 #[test]
 fn without_a_protection_cases_are_lost() {
     let also = [
-        (Without::Check(Fault::SensorLost2), "zs9 zvo angle-2-jump 1000"),
-        (Without::Check(Fault::LegStuck), "zs9 zvo um-stuck-off 1000"),
-        (Without::Check(Fault::StaleCommand), "zs9 zvo commands-lost 1000"),
+        (Ablation::Check(Fault::SensorLost2), "zs9 zvo angle-2-jump 1000"),
+        (Ablation::Check(Fault::LegStuck), "zs9 zvo um-stuck-off 1000"),
+        (Ablation::Check(Fault::StaleCommand), "zs9 zvo commands-lost 1000"),
     ];
     let all = WORTH.into_iter().chain(also);
     let sound = Campaign::new(None).unwrap();
@@ -87,7 +87,7 @@ fn without_a_protection_cases_are_lost() {
         assert!(!is_lost(&outcome), "{outcome:#?}");
         tried.insert(without.name());
     }
-    for without in Without::all() {
+    for without in Ablation::all() {
         assert!(tried.contains(without.name()), "{} is not tried", without.name());
     }
 }

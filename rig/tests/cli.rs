@@ -86,7 +86,7 @@ fn an_endless_machine_is_refused() {
     }
 }
 
-/// What would change nothing, or never happen.
+/// Options that would change nothing, or never happen, are refused.
 #[test]
 fn options_that_do_nothing_are_refused() {
     refused_in_one_line("run load-steps --down", &["--down", "load-steps"]);

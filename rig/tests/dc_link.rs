@@ -34,13 +34,13 @@ fn precharge_and_discharge_are_exponential() {
     link.switches = LinkSwitches { precharge: true, ..LinkSwitches::default() };
     run(&mut plant, &mut link, 0.5);
     let wanted = 1_500.0 * (1.0 - (-0.5 / (50.05 * 6e-3_f64)).exp());
-    assert!((link.udc_v() - wanted).abs() < 1e-6, "{} V, wanted {wanted} V", link.udc_v());
+    assert!((link.udc_v - wanted).abs() < 1e-6, "{} V, wanted {wanted} V", link.udc_v);
     link.switches = LinkSwitches { discharge: true, ..LinkSwitches::default() };
     run(&mut plant, &mut link, 1.0);
     let wanted = wanted * (-1.0 / 0.6_f64).exp();
-    assert!((link.udc_v() - wanted).abs() < 1e-6, "{} V, wanted {wanted} V", link.udc_v());
+    assert!((link.udc_v - wanted).abs() < 1e-6, "{} V, wanted {wanted} V", link.udc_v);
     // Half of the source's energy stays in the resistor.
-    assert!(link.energies().discharge_j > 0.0);
+    assert!(link.energies.discharge_j > 0.0);
 }
 
 #[test]
@@ -48,16 +48,16 @@ fn a_rectifier_takes_nothing_back_and_a_reversible_source_does() {
     for (reversible, ends_v) in [(false, 1_800.0), (true, 1_500.0)] {
         let settings = DcLinkSettings { source: Source { reversible, ..LINK.source }, ..LINK };
         let (mut plant, mut link) = (plant_at(0.0), DcLink::new(settings));
-        link.set_udc_v(1_800.0);
+        link.udc_v = 1_800.0;
         link.switches = LinkSwitches { main: true, ..LinkSwitches::default() };
         run(&mut plant, &mut link, 0.1);
-        assert!((link.udc_v() - ends_v).abs() < 1e-3, "{} V", link.udc_v());
+        assert!((link.udc_v - ends_v).abs() < 1e-3, "{} V", link.udc_v);
     }
 }
 
-/// What the link has got and not given: source − heat − inverter − what is stored.
+/// The energy that the link has got and not given: source − heat − inverter − what is stored.
 fn missing_j(link: &DcLink, stored_before_j: f64) -> f64 {
-    let energies = link.energies();
+    let energies = link.energies;
     energies.source_j
         - energies.path_j
         - energies.discharge_j
@@ -70,7 +70,7 @@ fn missing_j(link: &DcLink, stored_before_j: f64) -> f64 {
 fn energy_is_kept_between_source_link_chopper_and_machine() {
     // A machine at 1,500 r/min on a square wave that turns with it and slips through every load angle, motoring and braking.
     let (mut plant, mut link) = (plant_at(1_500.0), DcLink::new(LINK));
-    link.set_udc_v(1_500.0);
+    link.udc_v = 1_500.0;
     let stored_j = link.stored_j();
     let mut moved_j: f64 = 0.0;
     for k in 0..60_000_u32 {
@@ -88,14 +88,11 @@ fn energy_is_kept_between_source_link_chopper_and_machine() {
             precharge: false,
         };
         plant.advance_on(&mut link, legs, 10e-6);
-        moved_j = moved_j.max(link.energies().inverter_j.abs());
+        moved_j = moved_j.max(link.energies.inverter_j.abs());
     }
-    let electrical_j = plant.energies().electrical_j;
-    let inverter_j = link.energies().inverter_j;
-    assert!(
-        moved_j > 1_000.0 && link.energies().chopper_j > 1_000.0,
-        "{moved_j} J: too little moved to tell"
-    );
+    let electrical_j = plant.motor.energies.electrical_j;
+    let inverter_j = link.energies.inverter_j;
+    assert!(moved_j > 1_000.0 && link.energies.chopper_j > 1_000.0, "{moved_j} J: too little moved to tell");
     assert!(
         missing_j(&link, stored_j).abs() < 1e-5 * moved_j,
         "{} J of {moved_j} J",
@@ -109,7 +106,7 @@ fn a_stiff_link_is_the_limit_of_a_large_one() {
     let settings = DcLinkSettings { capacitance_f: 1e9, ..LINK };
     let (mut on_link, mut stiff, mut link) = (plant_at(800.0), plant_at(800.0), DcLink::new(settings));
     // So little voltage that the currents stay on the map.
-    link.set_udc_v(250.0);
+    link.udc_v = 250.0;
     for k in 0..20_000_u32 {
         let turns = 53.0 * f64::from(k) * 10e-6;
         let legs = [0.0, 1.0 / 3.0, 2.0 / 3.0]
@@ -117,7 +114,7 @@ fn a_stiff_link_is_the_limit_of_a_large_one() {
         on_link.advance_on(&mut link, legs, 10e-6);
         stiff.advance(legs, 250.0, 10e-6);
     }
-    let (a, b) = (on_link.currents_dq(), stiff.currents_dq());
+    let (a, b) = (on_link.motor.currents_dq(), stiff.motor.currents_dq());
     assert!((a.0 - b.0).abs() < 1e-6 && (a.1 - b.1).abs() < 1e-6, "{a:?} {b:?}");
 }
 
@@ -126,6 +123,6 @@ fn an_emf_above_the_link_charges_it_through_the_diodes() {
     // 0.448 Wb · 2π · 100 Hz · √3 = 488 V; through the machine's inductance an empty capacitor swings to less than twice that.
     let (mut plant, mut link) = (plant_at(1_500.0), DcLink::new(LINK));
     run(&mut plant, &mut link, 2.0);
-    assert!((488.0..976.0).contains(&link.udc_v()), "{} V", link.udc_v());
-    assert!(link.energies().inverter_j < 0.0);
+    assert!((488.0..976.0).contains(&link.udc_v), "{} V", link.udc_v);
+    assert!(link.energies.inverter_j < 0.0);
 }

@@ -1,7 +1,7 @@
 //! The scenarios with a line side: every verdict is kept, on the built-in machine and where things are harder.
 
 use tractive_rig::scenario::catalogue;
-use tractive_rig::trace::Recording;
+use tractive_rig::trace::{Recorded, Recording};
 
 /// Runs a scenario as on the command line; its recording and the verdicts that fall short.
 fn run(line: &str) -> (Recording, Vec<String>) {

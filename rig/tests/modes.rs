@@ -1,19 +1,20 @@
 //! A mode that the paper does not have, 5 pulses between 7 and 3: its row and a ladder that names it are all that drive, campaign and
 //! reports need.
 
-use tractive::control::{Demand, Gains};
-use tractive::drive::traction::Settings;
-use tractive::modulation::{Devices, Ladder, Mode};
+mod stiff;
+
+use tractive::control::Demand;
+use tractive::modulation::{Ladder, Mode};
+use tractive::time::Instant;
 use tractive_rig::analysis::{self, Figures};
-use tractive_rig::bench::{self, Bench, Flaws, Limits, Simulated, Supply};
+use tractive_rig::bench::Simulated;
 use tractive_rig::campaign::judge::Verdict;
 use tractive_rig::campaign::{report, traction};
 use tractive_rig::figures;
 use tractive_rig::machine::Machine;
 use tractive_rig::plant::{Plant, PlantSettings, SpeedSource};
 use tractive_rig::report::Page;
-use tractive_rig::run::traction::Tasks;
-use tractive_rig::run::{CLOCK, Interrupts};
+use tractive_rig::run::Interrupts;
 use tractive_rig::scenario::traction::switches;
 use tractive_rig::trace::{Recorded, Recording};
 
@@ -30,26 +31,11 @@ const TORQUE_NM: f32 = 500.0;
 fn drive(machine: &Machine) -> Recording {
     let speed = vec![(LEAD_S, 0.0), (LEAD_S + RAMP_S, TOP_RPM), (LEAD_S + 2.0 * RAMP_S, 0.0)];
     let plant = Plant::new(&machine.folder, SpeedSource::profile(speed), &PlantSettings::default());
-    let devices = Devices::new(250, 0, machine.tables.ratings.max_switching_hz, &CLOCK);
-    let first_half_ticks = devices.shortest_half_ticks;
-    let settings = bench::Settings {
-        clock: CLOCK,
-        first_half_ticks,
-        dead_time_ticks: 0,
-        lead_s: LEAD_S,
-        duration_s: 2.0 * RAMP_S,
-        trace_step_s: 100e-6,
-        udc_v: machine.folder.parameters.dc_link_nominal_v,
-        link_steps: Vec::new(),
-        flaws: Flaws::default(),
-        supply: Supply::Stiff,
-        limits: Limits::NONE,
-        injection: None,
-    };
     let demand = |_: f64| (Demand { torque_nm: TORQUE_NM, slew_limited: true }, true);
-    let mut bench = Bench::new(plant, Box::new(demand), &settings);
-    let settings = Settings { clock: CLOCK, devices, gains: Gains::DEFAULT };
-    let mut tasks = Tasks::new(machine.tables, settings, first_half_ticks).on(WITH_MID5);
+    let udc_v = machine.folder.parameters.dc_link_nominal_v;
+    let run = stiff::Run { lead_s: LEAD_S, duration_s: 2.0 * RAMP_S, trace_step_s: 100e-6, udc_v };
+    let mut bench = stiff::bench(machine, plant, demand, run);
+    let mut tasks = stiff::tasks(machine, Instant(0)).on(WITH_MID5);
     tasks.drive(&mut bench, |_| true).unwrap();
     bench.into_recording(Vec::new())
 }

@@ -51,17 +51,17 @@ fn energy_is_kept() {
     let map = SmoothMap::new(&machine().map);
     let ((id0, iq0), voltage_turns) = square_point(&map, speed_rpm, 0.2);
     let mut plant = plant_at(speed_rpm);
-    plant.set_currents(id0, iq0);
+    plant.motor.set_currents(id0, iq0);
     let before = stored_j(&map, id0, iq0);
     let dt_s = 1.0 / (speed_rpm / 15.0 * 1200.0);
     let mut largest: f64 = 0.0;
     for k in 0..6000 {
         plant.advance(square((f64::from(k) + 0.5) / 1200.0 + voltage_turns), UDC_V, dt_s);
-        let (id, iq) = plant.currents_dq();
+        let (id, iq) = plant.motor.currents_dq();
         largest = largest.max(id.hypot(iq));
     }
-    let (id, iq) = plant.currents_dq();
-    let energies = plant.energies();
+    let (id, iq) = plant.motor.currents_dq();
+    let energies = plant.motor.energies;
     let change = stored_j(&map, id, iq) - before;
     let residual = energies.electrical_j - energies.copper_j - energies.mechanical_j - change;
     println!("{energies:?}, field {change:.4} J, residual {residual:.2e} J, at most {largest} A");
@@ -80,10 +80,10 @@ fn steady_state_is_that_of_the_algebraic_equations() {
     let flux = map.at(id, iq);
     let (ud, uq) = (0.1 * id - omega * flux.psi_q_wb, 0.1 * iq + omega * flux.psi_d_wb);
     let mut plant = plant_at(speed_rpm);
-    plant.set_currents(id, iq);
+    plant.motor.set_currents(id, iq);
     let period_s = 20e-6;
     for _ in 0..3000 {
-        let angle = plant.angle_turns() * TAU + 0.5 * omega * period_s;
+        let angle = plant.motor.angle_turns() * TAU + 0.5 * omega * period_s;
         let (alpha, beta) = (ud * angle.cos() - uq * angle.sin(), ud * angle.sin() + uq * angle.cos());
         let phases = [alpha, -0.5 * alpha + 0.75_f64.sqrt() * beta, -0.5 * alpha - 0.75_f64.sqrt() * beta];
         let shares = phases.map(|volts| 0.5 + volts / UDC_V);
@@ -100,7 +100,7 @@ fn steady_state_is_that_of_the_algebraic_equations() {
             }
         }
     }
-    let (got_d, got_q) = plant.currents_dq();
+    let (got_d, got_q) = plant.motor.currents_dq();
     assert!((got_d - id).abs() < 0.5 && (got_q - iq).abs() < 0.5, "{got_d} {got_q}");
 }
 
@@ -111,7 +111,7 @@ fn the_short_circuit_settles_at_its_operating_point() {
         for _ in 0..60_000 {
             plant.advance([Leg::Lower; 3], UDC_V, 50e-6);
         }
-        let (id, iq) = plant.currents_dq();
+        let (id, iq) = plant.motor.currents_dq();
         let omega = speed_rpm * TAU / 60.0 * 4.0;
         let flux = SmoothMap::new(&machine().map).at(id, iq);
         assert!((0.1 * id - omega * flux.psi_q_wb).abs() < 0.01, "d axis at {speed_rpm}");
@@ -124,17 +124,18 @@ fn the_short_circuit_settles_at_its_operating_point() {
 fn with_the_gates_off_current_dies_below_and_flows_above_the_link() {
     let run = |speed_rpm: f64, id: f64, iq: f64, seconds: f64| {
         let mut plant = plant_at(speed_rpm);
-        plant.set_currents(id, iq);
+        plant.motor.set_currents(id, iq);
         let mut worst: f64 = 0.0;
         let steps = (seconds / 20e-6) as usize;
         for k in 0..steps {
             plant.advance([Leg::Open; 3], UDC_V, 20e-6);
             if k > steps / 2 {
-                worst =
-                    worst.max(plant.currents_abc().iter().fold(0.0, |most, current| most.max(current.abs())));
+                worst = worst.max(
+                    plant.motor.currents_abc().iter().fold(0.0, |most, current| most.max(current.abs())),
+                );
             }
         }
-        (worst, plant.energies().electrical_j)
+        (worst, plant.motor.energies.electrical_j)
     };
     // Line EMF at 4,000 r/min: 1,301 V, below the link: what flows dies away.
     let (left_a, _) = run(4000.0, -100.0, 150.0, 0.1);
@@ -148,13 +149,13 @@ fn with_the_gates_off_current_dies_below_and_flows_above_the_link() {
 #[test]
 fn dead_time_costs_voltage_against_the_current() {
     let mut plant = plant_at(0.0);
-    plant.set_currents(50.0, 0.0);
+    plant.motor.set_currents(50.0, 0.0);
     // Current out of leg u: while both its devices are off, the lower diode carries it.
     let mut reference = plant_at(0.0);
-    reference.set_currents(50.0, 0.0);
+    reference.motor.set_currents(50.0, 0.0);
     plant.advance([Leg::Open, Leg::Lower, Leg::Lower], UDC_V, 5e-6);
     reference.advance([Leg::Lower, Leg::Lower, Leg::Lower], UDC_V, 5e-6);
-    assert!((plant.currents_dq().0 - reference.currents_dq().0).abs() < 1e-9);
+    assert!((plant.motor.currents_dq().0 - reference.motor.currents_dq().0).abs() < 1e-9);
 }
 
 #[test]
@@ -163,7 +164,7 @@ fn finer_calls_change_nothing() {
     let ((id0, iq0), voltage_turns) = square_point(&SmoothMap::new(&machine().map), speed_rpm, 0.15);
     let run = |pieces: u32| {
         let mut plant = plant_at(speed_rpm);
-        plant.set_currents(id0, iq0);
+        plant.motor.set_currents(id0, iq0);
         // A multiple of six, so that the levels change between two calls.
         const CALLS: u32 = 66;
         let dt_s = 15.0 / speed_rpm / f64::from(CALLS);
@@ -173,7 +174,7 @@ fn finer_calls_change_nothing() {
                 plant.advance(legs, UDC_V, dt_s / f64::from(pieces));
             }
         }
-        plant.currents_dq()
+        plant.motor.currents_dq()
     };
     let ((d1, q1), (d8, q8)) = (run(1), run(8));
     println!("{d1} {q1}, {:.1e} {:.1e}", d1 - d8, q1 - q8);
@@ -188,15 +189,15 @@ fn a_free_rotor_takes_up_the_mechanical_energy() {
     let mut plant = Plant::new(&machine(), source, &PlantSettings::default());
     for _ in 0..500 {
         // 2 % of the link's voltage, 108° ahead of the d axis.
-        plant.advance(square(plant.angle_turns() + 0.3), UDC_V, 2e-6);
+        plant.advance(square(plant.motor.angle_turns() + 0.3), UDC_V, 2e-6);
         plant.advance([Leg::Lower; 3], UDC_V, 98e-6);
     }
-    let speed = plant.speed_rpm() * TAU / 60.0;
+    let speed = plant.motor.speed_rpm() * TAU / 60.0;
     let kinetic = 0.5 * INERTIA_KG_M2 * speed * speed;
-    let mechanical = plant.energies().mechanical_j;
-    let (id, iq) = plant.currents_dq();
+    let mechanical = plant.motor.energies.mechanical_j;
+    let (id, iq) = plant.motor.currents_dq();
     let field = stored_j(&SmoothMap::new(&machine().map), id, iq);
-    let given = plant.energies().electrical_j - plant.energies().copper_j - field;
+    let given = plant.motor.energies.electrical_j - plant.motor.energies.copper_j - field;
     println!("{speed} rad/s, {kinetic} J, {mechanical} J, {given} J");
     assert!(kinetic > 5.0, "{kinetic} J");
     assert!((given - mechanical).abs() < 1e-5 * mechanical, "{given} J, {mechanical} J");

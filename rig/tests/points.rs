@@ -19,7 +19,7 @@ struct Case {
     name: &'static str,
     machine: Machine,
     truth: Truth,
-    /// What the nodes of its folder say of the flux linkage between them: the plant's map.
+    /// The flux linkage between the nodes of its folder: the plant's map.
     map: SmoothMap,
 }
 
@@ -231,7 +231,7 @@ fn others() -> Vec<Case> {
     linear.chain([Case::analytic("small, saturating", &SMALL)]).collect()
 }
 
-/// What a folder's nodes leave open: by how much the flux linkage between them differs from the machine's, as a share, at most,
+/// The freedom that a folder's nodes leave: by how much the flux linkage between them differs from the machine's, as a share, at most,
 /// anywhere within the current limit where there is as much of it as the lowest link leaves.
 fn between_nodes(case: &Case) -> f64 {
     const STEPS: u32 = 200;
@@ -282,7 +282,7 @@ fn other_machines_are_weakened_as_well() {
     }
 }
 
-/// How far torque is off, as a share of its bound, and current off the optimum, as a share, at even steps of torque.
+/// The errors of torque, as a share of its bound, and of current off the optimum, as a share, at even steps of torque.
 fn mtpa(case: &Case, steps: u32) -> (Worst, Worst) {
     let standing = Supply::new(0.0, case.truth.pole_pairs, 1.0);
     let at = |step: u32| {

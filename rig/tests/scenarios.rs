@@ -3,7 +3,7 @@
 use tractive::modulation::Mode;
 use tractive_rig::analysis::{self, SwitchFigures};
 use tractive_rig::scenario::catalogue;
-use tractive_rig::trace::Recording;
+use tractive_rig::trace::{Recorded, Recording};
 
 /// Runs a scenario as on the command line; its figures and what was recorded.
 fn run(line: &str) -> (analysis::Figures, Recording) {
@@ -79,6 +79,35 @@ fn backward_is_the_mirror_image_of_forward() {
     for (a, b) in forward.rows.iter().zip(&backward.rows).step_by(997) {
         assert!((a.te_nm + b.te_nm).abs() < 15.0, "{} {} {}", a.t_s, a.te_nm, b.te_nm);
         assert_eq!(a.mode, b.mode, "{}", a.t_s);
+    }
+}
+
+#[test]
+fn figures_are_the_same_however_densely_the_trace_is_written() {
+    let (figures, recording) = run("load-steps");
+    let (verdicts, rows) = (figures.get("verdicts").unwrap(), recording.rows.len());
+    assert!(recording.written.is_none());
+    for (step_s, every) in [("1e-4", 2), ("3e-4", 6)] {
+        let (figures, recording) = run(&format!("load-steps --dt {step_s}"));
+        assert_eq!(figures.get("verdicts").unwrap(), verdicts, "{step_s} s");
+        let written = recording.written.unwrap();
+        assert_eq!((recording.rows.len(), written.len()), (rows, rows.div_ceil(every)), "{step_s} s");
+        for (written, judged) in written.iter().zip(recording.rows.iter().step_by(every)) {
+            assert_eq!(written.te_nm.to_bits(), judged.te_nm.to_bits(), "at {} s", judged.t_s);
+        }
+    }
+}
+
+#[test]
+fn an_angle_read_late_costs_the_torque_ripple_that_the_page_on_latency_tells() {
+    let page = include_str!("../../docs/latency.md");
+    for (jitter_us, read) in [(0, "0 µs, as captured"), (2, "2 µs"), (8, "8 µs")] {
+        let line = format!("steady --speed 3000 --torque 784 --angle-jitter-us {jitter_us}");
+        let ripple_nm =
+            run(&line).0.get("distortion").unwrap()[0]["ripple_peak_to_peak_nm"].as_f64().unwrap();
+        let told = format!("| {read} | {ripple_nm:.1} N·m |");
+        println!("{told}");
+        assert!(page.contains(&told), "{told}");
     }
 }
 

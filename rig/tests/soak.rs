@@ -2,23 +2,22 @@
 //!
 //! `TRACTIVE_SOAK_S=3600 cargo test --release -p tractive-rig --test soak` drives for an hour.
 
-use tractive::control::{Demand, Gains};
-use tractive::drive::traction::Settings;
-use tractive::modulation::Devices;
+mod stiff;
+
+use tractive::control::Demand;
 use tractive::nine_switch::Scheme;
 use tractive::time::Instant;
-use tractive_rig::bench::{self, Bench, Flaws, Limits, Supply, Tick};
+use tractive_rig::bench::{Bench, Flaws, Tick};
 use tractive_rig::campaign::dual::{self, Ridden, Ride, Script};
 use tractive_rig::machine::Machine;
 use tractive_rig::plant::{Plant, PlantSettings, SpeedSource};
-use tractive_rig::run::traction::Tasks;
 use tractive_rig::run::{CLOCK, Interrupts};
 use tractive_rig::trace::Row;
 use tractive_rig::zs9;
 use tractive_rig::zs9::bench::Course;
 
 const LEAD_S: f64 = 0.1;
-/// Where instants wrap, and where their differences from 0 would change sign.
+/// The instant at which instants wrap, and at which their differences from 0 would change sign.
 const WRAP: Tick = 1 << 32;
 const HALF_WRAP: Tick = 1 << 31;
 
@@ -43,30 +42,15 @@ fn drive(origin: Tick, duration_s: f64, trace_step_s: f64, goes_on: impl FnMut(&
     let machine = Machine::load("pmasynrm-180kw").unwrap();
     let settings = PlantSettings { flux_scale: 1.0, resistance_scale: 1.0 };
     let plant = Plant::new(&machine.folder, SpeedSource::profile(speed(duration_s)), &settings);
-    let devices = Devices::new(250, 0, machine.tables.ratings.max_switching_hz, &CLOCK);
-    let first_half_ticks = devices.shortest_half_ticks;
-    let settings = bench::Settings {
-        clock: CLOCK,
-        first_half_ticks,
-        dead_time_ticks: 0,
-        lead_s: LEAD_S,
-        duration_s,
-        trace_step_s,
-        udc_v: machine.folder.parameters.dc_link_nominal_v,
-        link_steps: Vec::new(),
-        flaws: Flaws::default(),
-        supply: Supply::Stiff,
-        limits: Limits::NONE,
-        injection: None,
-    };
-    let mut bench = Bench::new(plant, Box::new(demand), &settings).beginning_at(origin).without_edges();
-    let settings = Settings { clock: CLOCK, devices, gains: Gains::DEFAULT };
-    let mut tasks = Tasks::beginning_at(Instant(origin as u32), machine.tables, settings, first_half_ticks);
+    let udc_v = machine.folder.parameters.dc_link_nominal_v;
+    let run = stiff::Run { lead_s: LEAD_S, duration_s, trace_step_s, udc_v };
+    let mut bench = stiff::bench(&machine, plant, demand, run).beginning_at(origin).without_edges();
+    let mut tasks = stiff::tasks(&machine, Instant(origin as u32));
     tasks.drive(&mut bench, goes_on).unwrap();
     bench
 }
 
-/// Where the counters stand makes no difference, to the last bit: not at their wrap-around, not at the half of their range.
+/// The counters' values make no difference, to the last bit: not at their wrap-around, not at the half of their range.
 #[test]
 fn the_wrap_around_changes_nothing() {
     let duration_s = 4.0;
@@ -79,7 +63,7 @@ fn the_wrap_around_changes_nothing() {
     }
 }
 
-/// What a period of the drive comes to.
+/// The figures of a period of the drive.
 #[derive(Debug)]
 struct Figures {
     torque_error_nm: f64,

@@ -210,7 +210,7 @@ fn the_start_up_ramp_hardly_overshoots() {
 /// Both motors at full torque at a speed, closed loop: highest capacitor voltage, and the link's band in the last half.
 fn full_torque(rpm: f64, source: Source, seconds: f64) -> (f64, Band, Zs9Plant) {
     let mut plant = plant_at([rpm, -rpm], &Zs9Settings { source, ..Zs9Settings::default() });
-    plant.set_network(NetworkState::even(0.0, 0.5 * (LINK_V + SOURCE_V)));
+    plant.network = NetworkState::even(0.0, 0.5 * (LINK_V + SOURCE_V));
     let mut control = Control::new(true, 0.2);
     let (mut highest, mut band) = (0.0_f64, Band::NONE);
     let periods = (seconds / PERIOD_S) as u32;
@@ -219,17 +219,17 @@ fn full_torque(rpm: f64, source: Source, seconds: f64) -> (f64, Band, Zs9Plant) 
         let share = (f64::from(k) / 100.0).min(1.0);
         let references = [(-18.7 * share, 53.09 * share), (-18.7 * share, -53.09 * share)];
         let power_w: f64 = plant
-            .motors()
+            .motors
             .iter()
             .map(|motor| {
                 let (id, iq) = motor.currents_dq();
                 motor.torque_nm() * motor.speed_rpm() * 0.104_72 + 1.5 * 0.12 * (id * id + iq * iq)
             })
             .sum();
-        let duty = control.duty(&plant.network(), power_w);
+        let duty = control.duty(&plant.network, power_w);
         let depths = regulated(&plant, references);
         period(&mut plant, depths, duty).unwrap();
-        let capacitor_v = plant.network().capacitor_v();
+        let capacitor_v = plant.network.capacitor_v();
         highest = highest.max(capacitor_v);
         if k > periods / 2 {
             band.add(plant.link_v());
@@ -245,7 +245,7 @@ fn full_torque(rpm: f64, source: Source, seconds: f64) -> (f64, Band, Zs9Plant) 
 fn two_motors_at_full_torque_leave_the_link_where_it_is() {
     for rpm in [50.0, 400.0, 800.0] {
         let (highest, band, plant) = full_torque(rpm, Source::Bidirectional, 0.3);
-        let torque = plant.motors()[0].torque_nm();
+        let torque = plant.motors[0].torque_nm();
         println!("{rpm} r/min: {torque:.1} N·m, U_c at most {highest:.1} V, U_in {band:.2?} V");
         assert!((torque - 120.0).abs() < 6.0 && band.0 > -10.0 && band.1 < 10.0, "{rpm} {torque} {band:?}");
     }
@@ -259,7 +259,7 @@ fn a_diode_in_place_of_the_switch_lets_the_link_run_away_at_low_speed() {
         println!("{rpm} r/min: U_c at most {highest:.0} V, U_in {band:.0?} V from 667 V");
         assert!((at_least..at_most).contains(&highest), "{rpm} r/min: {highest} V");
         let stored_j = ZNetwork::ZS9.stored_j(&NetworkState::even(0.0, 0.5 * (LINK_V + SOURCE_V)));
-        let residual = plant.residual_j(stored_j) / plant.energies().source_j;
+        let residual = plant.residual_j(stored_j) / plant.energies.source_j;
         assert!(residual.abs() < 1e-4, "{residual}");
     }
 }
@@ -267,41 +267,41 @@ fn a_diode_in_place_of_the_switch_lets_the_link_run_away_at_low_speed() {
 #[test]
 fn behind_a_diode_the_bridge_gets_no_more_than_the_inductors_have() {
     let mut plant = plant_at([0.0; 2], &Zs9Settings { source: Source::Diode, ..Zs9Settings::default() });
-    plant.set_network(NetworkState::even(5.0, 533.0));
-    let [upper, _] = plant.motors_mut();
+    plant.network = NetworkState::even(5.0, 533.0);
+    let [upper, _] = &mut plant.motors;
     upper.set_currents(40.0, 0.0);
     // V1 asks for phase u's 40 A; the inductors have 10 A. Until they have 40 A, the bridge's diodes short the link.
     let gates = [LegGates::ONE, LegGates::ZERO, LegGates::ZERO];
     plant.advance(gates, 12e-6).unwrap();
-    let electrical_j = plant.motors()[0].energies().electrical_j;
-    let rising_a = plant.network().inductor_a();
+    let electrical_j = plant.motors[0].energies.electrical_j;
+    let rising_a = plant.network.inductor_a();
     assert!((rising_a - (5.0 + 533.0 / 0.5e-3 * 12e-6)).abs() < 0.1, "{rising_a} A");
     assert_eq!(electrical_j, 0.0);
     // Then they have what it asks for, neither more nor less, at a link voltage that keeps it so.
     for _ in 0..20 {
         plant.advance(gates, 5e-6).unwrap();
     }
-    let (drawn_a, had_a) = (plant.motors()[0].currents_abc()[0], 2.0 * plant.network().inductor_a());
+    let (drawn_a, had_a) = (plant.motors[0].currents_abc()[0], 2.0 * plant.network.inductor_a());
     println!(
         "{drawn_a:.3} A drawn, {had_a:.3} A in the inductors, {} J from the source",
-        plant.energies().source_j
+        plant.energies.source_j
     );
     assert!(drawn_a > 42.0 && (drawn_a - had_a).abs() < 1e-5, "{drawn_a} A, {had_a} A");
-    assert!(plant.energies().source_j.abs() < 1e-12, "{:?}", plant.energies());
+    assert!(plant.energies.source_j.abs() < 1e-12, "{:?}", plant.energies);
 }
 
 #[test]
 fn behind_a_diode_braking_pumps_the_link_up() {
     let braked = |source: Source| {
         let mut plant = plant_at([700.0; 2], &Zs9Settings { source, ..Zs9Settings::default() });
-        plant.set_network(NetworkState::even(0.0, 0.5 * (LINK_V + SOURCE_V)));
+        plant.network = NetworkState::even(0.0, 0.5 * (LINK_V + SOURCE_V));
         let mut control = Control::new(false, 0.2);
         for _ in 0..1000 {
-            let duty = control.duty(&plant.network(), 0.0);
+            let duty = control.duty(&plant.network, 0.0);
             let depths = regulated(&plant, [(-5.0, -15.0); 2]);
             period(&mut plant, depths, duty).unwrap();
         }
-        (plant.network().capacitor_v(), plant.energies().source_j)
+        (plant.network.capacitor_v(), plant.energies.source_j)
     };
     let ((kept_v, returned_j), (pumped_v, given_j)) = (braked(Source::Bidirectional), braked(Source::Diode));
     println!("switch: {kept_v:.1} V, {returned_j:.0} J; diode: {pumped_v:.0} V, {given_j:.0} J");

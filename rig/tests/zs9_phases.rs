@@ -117,7 +117,7 @@ fn both_motors_agree_with_the_phase_model() {
     let settings =
         Zs9Settings { network: ZNetwork { capacitance_f: 1e9, ..ZNetwork::ZS9 }, ..Zs9Settings::default() };
     let mut plant = plant_at(rpm, &settings);
-    plant.set_network(NetworkState::even(0.0, 0.5 * (LINK_V + 400.0)));
+    plant.network = NetworkState::even(0.0, 0.5 * (LINK_V + 400.0));
     let mut phases = rpm.map(|rpm| PhaseMotor::new(rpm * TAU / 60.0 * 4.0));
     let depths = [depth_for((-20.0, 50.0), rpm[0], LINK_V), depth_for((-5.0, -35.0), rpm[1], LINK_V)];
     let (mut worst_a, mut worst_nm, mut largest_a) = (0.0_f64, 0.0_f64, 0.0_f64);
@@ -134,7 +134,7 @@ fn both_motors_agree_with_the_phase_model() {
             for (motor, lower) in phases.iter_mut().zip([false, true]) {
                 motor.advance(terminals(gates, lower, LINK_V), share * PERIOD_S);
             }
-            for (dq, abc) in plant.motors().iter().zip(&phases) {
+            for (dq, abc) in plant.motors.iter().zip(&phases) {
                 let pairs = dq.currents_abc().into_iter().zip(abc.currents());
                 worst_a = pairs.map(|(a, b)| (a - b).abs()).fold(worst_a, f64::max);
                 worst_nm = worst_nm.max((dq.torque_nm() - abc.torque_nm()).abs());

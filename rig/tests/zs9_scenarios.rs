@@ -4,10 +4,11 @@ use serde_json::Value;
 use tractive_rig::analysis::Figures;
 use tractive_rig::rows::mean;
 use tractive_rig::scenario::{catalogue, command};
+use tractive_rig::trace::Recorded;
 use tractive_rig::zs9::figures;
 use tractive_rig::zs9::trace::{Recording, Row};
 
-/// What a run gave.
+/// The results of a run.
 struct Outcome {
     recording: Recording,
     figures: Figures,

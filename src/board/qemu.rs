@@ -8,9 +8,7 @@
 #![allow(unsafe_code)]
 
 mod dual;
-mod exchange;
-#[cfg_attr(not(feature = "saboteur"), path = "qemu/straight.rs")]
-mod saboteur;
+pub mod exchange;
 mod watch;
 
 pub use dual::{DUAL_DESK, DUAL_RECORDER, DualIdle, connect_dual, die_dual, start_dual};
@@ -18,12 +16,12 @@ pub use watch::ends as watch_ends;
 
 use crate::configuration::Refused;
 use crate::frames::Abc;
-use crate::modulation::CarrierPeriod;
-use crate::operator::{self, Desk, Feedback, OperatorPort, Status};
+use crate::modulation::CarrierHalf;
+use crate::operator::{self, Feedback, Mailboxes, OperatorPort, Status};
 use crate::ports::Report;
 use crate::ports::{ControlPort, PwmPort, Sample};
 use crate::protection::SafeState;
-use crate::protocol::Station;
+use crate::protocol::CanEndpoint;
 use crate::recorder::Recorder;
 use crate::time::{Clock, Instant};
 use crate::wire::Setup;
@@ -32,7 +30,10 @@ use cortex_m::peripheral::NVIC;
 use cortex_m_semihosting::debug;
 
 /// 25 MHz ticks; control at 10 kHz.
-pub const CLOCK: Clock = Clock::new(25_000_000, 2_500);
+pub const CLOCK: Clock = Clock::new(TICKS_HZ, 2_500);
+
+/// The rate of both timers' counts, in Hz.
+pub const TICKS_HZ: u32 = 25_000_000;
 
 /// The PMaSynRM drive's flight recorder. The rig reads it when the run is over.
 pub static RECORDER: Recorder = Recorder::new();
@@ -51,9 +52,6 @@ const PWM_TIMER: usize = 0x4000_2000;
 pub enum Interrupt {
     /// CMSDK timer 0: control.
     TIMER0 = 8,
-    /// CMSDK timer 1: ends what the saboteur has begun.
-    #[cfg(feature = "saboteur")]
-    TIMER1 = 9,
     /// CMSDK dual timer: PWM.
     DUALTIMER = 10,
 }
@@ -83,12 +81,8 @@ unsafe extern "C" {
 pub static __INTERRUPTS: [Vector; 11] = {
     const NONE: Vector = Vector { reserved: 0 };
     let mut table = [NONE; 11];
-    table[Interrupt::TIMER0 as usize] = Vector { handler: saboteur::control };
-    table[Interrupt::DUALTIMER as usize] = Vector { handler: saboteur::pwm };
-    #[cfg(feature = "saboteur")]
-    {
-        table[Interrupt::TIMER1 as usize] = Vector { handler: saboteur::delay_ends };
-    }
+    table[Interrupt::TIMER0 as usize] = Vector { handler: TIMER0 };
+    table[Interrupt::DUALTIMER as usize] = Vector { handler: DUALTIMER };
     table
 };
 
@@ -103,9 +97,9 @@ fn read_register(address: usize) -> u32 {
 }
 
 /// Between the idle loop's operator and control.
-pub static DESK: Desk = Desk::new();
+pub static DESK: Mailboxes = Mailboxes::new();
 
-/// Whether there is an operator; without one the rig's samples say what the drive may do.
+/// `true` if there is an operator; without one the rig's samples say what the drive may do.
 static OPERATED: AtomicBool = AtomicBool::new(false);
 
 /// Opens the link and fetches the set-up. Call once, before [`start`].
@@ -117,10 +111,10 @@ pub fn connect() -> Setup {
 
 /// Starts both timers; the first PWM interrupt comes after `first_half_ticks`, the first control interrupt after one
 /// control period.
-pub fn start(first_half_ticks: u32) {
+pub fn start(first_half_ticks: u32, control_ticks: u32) {
     enable_interrupts();
     write_register(PWM_TIMER, first_half_ticks - 1);
-    write_register(CONTROL_TIMER + 8, CLOCK.control_ticks - 1);
+    write_register(CONTROL_TIMER + 8, control_ticks - 1);
     start_timers();
 }
 
@@ -138,7 +132,6 @@ fn enable_interrupts() {
 }
 
 fn start_timers() {
-    saboteur::start();
     const ENABLE_PERIODIC_INTERRUPT_32_BIT: u32 = 0b1110_0010;
     const ENABLE_INTERRUPT: u32 = 0b1001;
     write_register(PWM_TIMER + 8, ENABLE_PERIODIC_INTERRUPT_32_BIT);
@@ -181,33 +174,35 @@ pub struct Control;
 pub struct Pwm;
 
 impl Control {
-    /// Acknowledges the timer's interrupt.
+    /// Takes the timer's flag back.
     pub fn acknowledge(&mut self) {
         write_register(CONTROL_TIMER + 0xC, 1);
-    }
-
-    /// Makes the PWM interrupt come at once, between two boundaries.
-    pub fn revise_pulses(&mut self) {
-        NVIC::pend(Interrupt::DUALTIMER);
-        // It has run before anything else is done.
-        cortex_m::asm::dsb();
-        cortex_m::asm::isb();
     }
 }
 
 impl Pwm {
-    /// Whether the interrupt is a carrier boundary's. If not, control wants a revision, and there is nothing to acknowledge.
+    /// The timer's flag, which says that the interrupt is a carrier boundary's.
     pub fn is_boundary(&self) -> bool {
         read_register(PWM_TIMER + 0x10) & 1 != 0
     }
 
-    /// Acknowledges the timer's interrupt.
+    /// Takes that flag back.
     pub fn acknowledge(&mut self) {
         write_register(PWM_TIMER + 0xC, 1);
     }
 }
 
 impl ControlPort for Control {
+    fn begin(&mut self, revises: bool) {
+        self.acknowledge();
+        if revises {
+            NVIC::pend(Interrupt::DUALTIMER);
+            // It has run before anything else is done.
+            cortex_m::asm::dsb();
+            cortex_m::asm::isb();
+        }
+    }
+
     fn sample(&mut self, now: Instant) -> Sample {
         let mut sample = exchange::control_sample(now);
         if OPERATED.load(Ordering::Relaxed) {
@@ -220,12 +215,12 @@ impl ControlPort for Control {
         exchange::enter(safe, now);
     }
 
-    fn overrun_ticks(&mut self, _now: Instant) -> u32 {
+    fn overrun_ticks(&mut self, _now: Instant, _deadline_ticks: u32) -> u32 {
         // The interrupt was acknowledged on entry: if it is pending again, the period is over.
         if read_register(CONTROL_TIMER + 0xC) & 1 == 0 {
             return 0;
         }
-        CLOCK.control_ticks.saturating_sub(read_register(CONTROL_TIMER + 4)).max(1)
+        read_register(CONTROL_TIMER + 8).saturating_sub(read_register(CONTROL_TIMER + 4)).saturating_add(1)
     }
 
     fn report(&mut self, now: Instant, report: &Report) {
@@ -237,11 +232,19 @@ impl ControlPort for Control {
 }
 
 impl PwmPort for Pwm {
+    fn begin(&mut self) -> bool {
+        let boundary = self.is_boundary();
+        if boundary {
+            self.acknowledge();
+        }
+        boundary
+    }
+
     fn sample(&mut self, now: Instant) -> Abc {
         exchange::pwm_sample(now)
     }
 
-    fn play(&mut self, now: Instant, next: &CarrierPeriod) {
+    fn play(&mut self, now: Instant, next: &CarrierHalf) {
         write_register(PWM_TIMER + 0x18, next.period_ticks.saturating_sub(1));
         exchange::play(now, next);
     }
@@ -259,7 +262,7 @@ impl PwmPort for Pwm {
 /// The idle loop's side of the board.
 pub struct Idle {
     /// The protocol, where the operator is asked over it; `None`: the rig asks by words.
-    pub station: Option<Station>,
+    pub station: Option<CanEndpoint>,
 }
 
 impl OperatorPort for Idle {

@@ -17,7 +17,7 @@ pub struct Ring<T, const W: usize, const N: usize> {
     slots: [[AtomicU32; W]; N],
     /// Values ever written. Beyond its largest number it goes on with `N`: the ring stays full.
     written: AtomicU32,
-    /// How many of them a release has forgotten.
+    /// The number of records that a release has forgotten.
     forgotten: AtomicU32,
     /// Values since the fault, the faulty one among them.
     after: AtomicU32,

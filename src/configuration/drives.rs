@@ -11,11 +11,11 @@ use tractive_control::configuration::{ABOVE_ZERO, Bound, ROUNDING, Refused, with
 const STIFFEST: f32 = 10.0;
 /// Carrier periods in a control period.
 const MOST_CARRIERS: f32 = 8.0;
-/// What the compare units count in a carrier period, in ticks: sixteen bits hold a half of it in compare steps.
+/// The longest carrier period, in ticks: sixteen bits hold a half of it in compare steps.
 const LONGEST_CARRIER: f32 = 4_000.0;
 
 impl traction::Settings {
-    /// Whether a drive may start with them and this machine.
+    /// The check that a drive may start with these settings and this machine.
     ///
     /// # Errors
     /// The first scalar that makes no sense, of the machine or of the settings.
@@ -37,7 +37,7 @@ impl traction::Settings {
 }
 
 impl dual::Settings {
-    /// Whether a drive may start with them and this machine.
+    /// The check that a drive may start with these settings and this machine.
     ///
     /// # Errors
     /// The first scalar that makes no sense, of the machine or of the settings.
@@ -53,7 +53,7 @@ impl dual::Settings {
         check_limits(limits)
     }
 
-    /// Whether the carrier suits a clock that is checked already.
+    /// The check that the carrier suits a clock which is checked already.
     ///
     /// # Errors
     /// Its length, if it does not.

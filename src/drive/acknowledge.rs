@@ -8,7 +8,7 @@ pub(super) struct Acknowledge {
     answered: u8,
     /// Number of the release that was asked of the PWM interrupt last.
     release: u8,
-    /// Whether that release has not been carried out yet.
+    /// `true` while that release has not been carried out yet.
     pending: bool,
 }
 

@@ -1,12 +1,13 @@
-//! What travels between the interrupts, and what control reports.
+//! The messages between the interrupts.
 
 use crate::cell::{Record, Words};
 use crate::frames::{Abc, AlphaBeta, Angle, SQRT_3};
-use crate::modulation::{CarrierPeriod, MODE_CODES, Mode, Reference};
+use crate::modulation::{CarrierHalf, MODE_CODES, Mode, Reference};
 use crate::time::Instant;
 
-/// What control wants of the gates.
+/// The order of control to the gates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Gates {
     /// Pulses.
     Pulse,
@@ -16,14 +17,15 @@ pub enum Gates {
 
 /// From control to the modulator.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct VoltageCommand {
     /// The fundamental; its `at` is the sample's instant.
     pub reference: Reference,
     /// From when on the command may be used: a fixed time after its sample, whenever the task really finished.
     pub valid_from: Instant,
-    /// Whether to make pulses at all.
+    /// The order to make pulses at all.
     pub gates: Gates,
-    /// Whether it is for the half that is already committed, not for the one after it.
+    /// `true` if it is for the half that is already committed, not for the one after it.
     pub revises: bool,
     /// Number of the last release: a new one makes the PWM interrupt forget its fault and leave the safe state.
     pub release: u8,
@@ -79,6 +81,7 @@ impl Words<10> for VoltageCommand {
 /// From the modulator to control, one record a boundary: the samples there, and the half that was committed there, which begins
 /// at the next boundary. What is running at a boundary stands in the record before.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Committal {
     /// The boundary.
     pub at: Instant,
@@ -87,10 +90,10 @@ pub struct Committal {
     /// The boundary where `half` begins.
     pub begins: Instant,
     /// The half.
-    pub half: CarrierPeriod,
-    /// Whether the modulator sees the machine in the mirror (turning backward).
+    pub half: CarrierHalf,
+    /// `true` while the modulator sees the machine in the mirror (turning backward).
     pub mirrored: bool,
-    /// Whether the PWM interrupt has found a fault; it then stands in a cell of its own.
+    /// `true` once the PWM interrupt has found a fault; it then stands in a cell of its own.
     pub tripped: bool,
     /// Number of the release that it carried out last.
     pub released: u8,
@@ -140,7 +143,7 @@ impl Committal {
             at,
             currents_a: Abc { a: 0.0, b: 0.0, c: 0.0 },
             begins: at,
-            half: CarrierPeriod::off(off_ticks),
+            half: CarrierHalf::off(off_ticks),
             mirrored: false,
             tripped: false,
             released: 0,
@@ -176,7 +179,7 @@ impl CommittalRecord<'_> {
         HalfKind(self.0.word::<6>())
     }
 
-    /// What the whole half gives, in ticks; see [`volt_ticks`].
+    /// The volt-ticks of the whole half, in ticks; see [`volt_ticks`].
     #[inline]
     pub fn volt_ticks(&self) -> AlphaBeta {
         AlphaBeta { alpha: f32::from_bits(self.0.word::<7>()), beta: f32::from_bits(self.0.word::<8>()) }
@@ -207,8 +210,9 @@ impl CommittalRecord<'_> {
     }
 }
 
-/// What a half is, in one word.
+/// The kind of a half, in one word.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct HalfKind(u32);
 
 impl HalfKind {
@@ -218,13 +222,13 @@ impl HalfKind {
         Mode::from_code(mode_at(self.0, MODE))
     }
 
-    /// Whether the gates are off in it.
+    /// `true` if the gates are off in it.
     #[inline]
     pub fn is_off(self) -> bool {
         mode_at(self.0, MODE) == Mode::Off as u32
     }
 
-    /// See [`CarrierPeriod::is_free`].
+    /// See [`CarrierHalf::is_free`].
     #[inline]
     pub fn is_free(self) -> bool {
         const MODES: u32 = 1 << MODE | 1 << NEXT | 1 << NEXT_BUT_ONE;
@@ -274,7 +278,7 @@ pub fn volt_ticks([a, b, c]: [u32; 3]) -> AlphaBeta {
 }
 
 /// A carrier half as five words: period, three compares, and levels, modes and number packed.
-pub fn half_to_words(half: CarrierPeriod) -> [u32; 5] {
+pub fn half_to_words(half: CarrierHalf) -> [u32; 5] {
     let [u, v, w] = half.compare_ticks;
     let [lu, lv, lw] = half.start_levels.map(u32::from);
     let [first, second] = half.ahead.map(|mode| mode as u32);
@@ -284,9 +288,9 @@ pub fn half_to_words(half: CarrierPeriod) -> [u32; 5] {
 }
 
 /// The inverse of [`half_to_words`].
-pub fn half_from_words(words: [u32; 5]) -> CarrierPeriod {
+pub fn half_from_words(words: [u32; 5]) -> CarrierHalf {
     let [period_ticks, u, v, w, packed] = words;
-    CarrierPeriod {
+    CarrierHalf {
         period_ticks,
         compare_ticks: [u, v, w],
         start_levels: [packed & 1 != 0, packed & 2 != 0, packed & 4 != 0],

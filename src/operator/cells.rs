@@ -1,8 +1,8 @@
 //! Between the operator in the idle loop and the control interrupt: words with instants, so that the same control period sees the same
 //! permit wherever the idle loop stood.
 
-use super::{DualObservation, DualPermit, Observation, Permit, SLOT_PERIODS};
-use crate::cell::{Downlink, Uplink, Words};
+use super::{DriveCommand, DualDriveCommand, DualObservation, Observation, SLOT_PERIODS};
+use crate::cell::{Mailbox, Seqlock, Words};
 use crate::control::{Demand, LinkWindow};
 use crate::modulation::Mode;
 use crate::ports::DualReport;
@@ -14,25 +14,25 @@ use crate::protection::trip_to_words;
 use crate::time::{Clock, Instant};
 use core::sync::atomic::{AtomicU32, Ordering};
 
-/// What a drive may do.
+/// A permit of any drive.
 pub trait Grant: Copy {
     /// Nothing.
     const NONE: Self;
 }
 
-impl Grant for Permit {
+impl Grant for DriveCommand {
     const NONE: Self = Self::NONE;
 }
 
-impl Grant for DualPermit {
+impl Grant for DualDriveCommand {
     const NONE: Self = Self::NONE;
 }
 
-/// What a drive says of itself in the control interrupt that begins a slot.
+/// The observation that a drive makes of itself in the control interrupt that begins a slot.
 pub trait Slotted: Copy {
     /// The control interrupt's report.
     type Report;
-    /// What it says, at its instant.
+    /// The observation of a report, at its instant.
     fn of(at: Instant, report: &Self::Report) -> Self;
     /// That instant.
     fn at(&self) -> Instant;
@@ -101,9 +101,9 @@ pub struct Timed<P> {
 /// The word of [`Timed`] that says from when on it holds.
 const FROM: usize = 0;
 
-impl Words<7> for Timed<Permit> {
+impl Words<7> for Timed<DriveCommand> {
     fn to_words(self) -> [u32; 7] {
-        let Permit { enable, demand, window, acknowledge } = self.permit;
+        let DriveCommand { enable, demand, window, acknowledge } = self.permit;
         let flags = u32::from(enable) | u32::from(demand.slew_limited) << 1 | u32::from(acknowledge) << 8;
         [
             self.from.0,
@@ -119,7 +119,7 @@ impl Words<7> for Timed<Permit> {
     fn from_words(words: [u32; 7]) -> Self {
         let [from, flags, torque, motoring_none, motoring_full, braking_full, braking_none] = words;
         Self {
-            permit: Permit {
+            permit: DriveCommand {
                 enable: flags & 1 != 0,
                 demand: Demand { torque_nm: f32::from_bits(torque), slew_limited: flags & 2 != 0 },
                 window: LinkWindow {
@@ -135,9 +135,9 @@ impl Words<7> for Timed<Permit> {
     }
 }
 
-impl Words<7> for Timed<DualPermit> {
+impl Words<7> for Timed<DualDriveCommand> {
     fn to_words(self) -> [u32; 7] {
-        let DualPermit { enable, demands, speed_torque_nm, link_ref_v, acknowledge } = self.permit;
+        let DualDriveCommand { enable, demands, speed_torque_nm, link_ref_v, acknowledge } = self.permit;
         let word = |demand| match demand {
             MotorDemand::Torque(Demand { torque_nm, .. }) => (0, torque_nm.to_bits()),
             MotorDemand::Speed(speed) => (1, speed.to_bits()),
@@ -155,7 +155,7 @@ impl Words<7> for Timed<DualPermit> {
             _ => MotorDemand::Speed(f32::from_bits(word)),
         };
         Self {
-            permit: DualPermit {
+            permit: DualDriveCommand {
                 enable: flags & 1 != 0,
                 demands: [demand(2, d1), demand(4, d2)],
                 speed_torque_nm: [l1, l2].map(f32::from_bits),
@@ -212,14 +212,14 @@ impl Words<17> for DualObservation {
 }
 
 /// Permit down, observation up.
-pub struct Desk<P, O, const PERMIT: usize, const OBSERVATION: usize> {
-    permit: Downlink<Timed<P>, PERMIT>,
-    observed: Uplink<O, OBSERVATION>,
+pub struct Mailboxes<P, O, const PERMIT: usize, const OBSERVATION: usize> {
+    permit: Mailbox<Timed<P>, PERMIT>,
+    observed: Seqlock<O, OBSERVATION>,
     /// Control periods until the next slot.
     left: AtomicU32,
 }
 
-impl<P, O, const PERMIT: usize, const OBSERVATION: usize> Desk<P, O, PERMIT, OBSERVATION>
+impl<P, O, const PERMIT: usize, const OBSERVATION: usize> Mailboxes<P, O, PERMIT, OBSERVATION>
 where
     P: Grant,
     O: Slotted + Words<OBSERVATION>,
@@ -228,7 +228,7 @@ where
     /// Nothing permitted, nothing seen.
     #[cfg(not(loom))]
     pub const fn new() -> Self {
-        Self { permit: Downlink::new(), observed: Uplink::new(), left: AtomicU32::new(0) }
+        Self { permit: Mailbox::new(), observed: Seqlock::new(), left: AtomicU32::new(0) }
     }
 
     /// In the control interrupt: what is permitted at `now`; nothing before the first permit.
@@ -272,7 +272,7 @@ where
 }
 
 #[cfg(not(loom))]
-impl<P, O, const PERMIT: usize, const OBSERVATION: usize> Default for Desk<P, O, PERMIT, OBSERVATION>
+impl<P, O, const PERMIT: usize, const OBSERVATION: usize> Default for Mailboxes<P, O, PERMIT, OBSERVATION>
 where
     P: Grant,
     O: Slotted + Words<OBSERVATION>,

@@ -1,8 +1,8 @@
-//! What a request comes to: its values checked, its torque within its limits, on its way to the drive.
+//! From a request to demands: its values checked, its torque within its limits, on its way to the drive.
 
 use super::settings::Ends;
 use super::{
-    Levels, Limits, MotorLimits, Observation, Permit, Ramp, Rates, Refusal, Request, Seen, Settings,
+    DriveCommand, Levels, Limits, MotorLimits, Observation, Ramp, Rates, Refusal, Request, Seen, Settings,
     Situation,
 };
 use crate::control::{Demand, LinkWindow};
@@ -10,15 +10,15 @@ use crate::frames::{SQRT_3, limit};
 use crate::machine::Ratings;
 use crate::protection::{self, Violation};
 
-/// What the state machine has to know of a drive: what is asked of it, what it says, and its demands on their way.
+/// The drive's part of the state machine: its request, its observation, and its demands on their way.
 pub trait Demands: Copy {
-    /// What is asked.
+    /// The request.
     type Request: Copy;
-    /// What the drive says.
+    /// The drive's observation of itself.
     type Observation: Copy + core::fmt::Debug;
-    /// What the drive may do.
-    type Permit: Copy;
-    /// What is told of the demands.
+    /// The permit for the drive.
+    type DriveCommand: Copy;
+    /// The status of the demands.
     type Told: Copy + core::fmt::Debug;
 
     /// Nothing asked for.
@@ -26,29 +26,29 @@ pub trait Demands: Copy {
 
     /// The request's levels.
     fn levels(request: &Self::Request) -> Levels;
-    /// What of the observation is the same for every drive.
+    /// The part of the observation that is the same for every drive.
     fn seen(observed: &Self::Observation) -> Seen;
-    /// Why the request's values cannot be used as they are.
+    /// The reason why the request's values cannot be used as they are.
     fn wrong_with(request: &Self::Request, settings: &Settings) -> Option<Refusal>;
-    /// Whether more is asked for than nothing.
+    /// `true` if more is asked for than nothing.
     fn asks_torque(request: &Self::Request) -> bool;
     /// Takes over limits that are good.
     fn take_limits(&mut self, request: &Self::Request);
-    /// Whether nothing is asked for any more.
+    /// `true` if nothing is asked for any more.
     fn are_at_rest(&self) -> bool;
     /// At rest at once.
     fn drop(&mut self);
     /// One slot towards what is asked; towards nothing without a request.
     fn step(&mut self, request: Option<&Self::Request>, observed: &Self::Observation, settings: &Settings);
-    /// Whether the gates may go off at the end of a stop, as far as the link is concerned.
+    /// `true` if the gates may go off at the end of a stop, as far as the link is concerned.
     #[inline]
     fn link_may_rest(_observed: &Self::Observation) -> bool {
         true
     }
-    /// Where they are.
+    /// The demands as they stand.
     fn told(&self) -> Self::Told;
-    /// What the drive gets.
-    fn permit(&self, enable: bool, acknowledge: u8, settings: &Settings) -> Self::Permit;
+    /// The permit for the drive.
+    fn permit(&self, enable: bool, acknowledge: u8, settings: &Settings) -> Self::DriveCommand;
 }
 
 /// The PMaSynRM drive's demand: a torque.
@@ -68,7 +68,7 @@ impl TorqueDemand {
 impl Demands for TorqueDemand {
     type Request = Request;
     type Observation = Observation;
-    type Permit = Permit;
+    type DriveCommand = DriveCommand;
     type Told = f32;
 
     const AT_REST: Self = Self { ramp: Ramp::new(), limits: None };
@@ -130,8 +130,8 @@ impl Demands for TorqueDemand {
     }
 
     #[inline]
-    fn permit(&self, enable: bool, acknowledge: u8, settings: &Settings) -> Permit {
-        Permit {
+    fn permit(&self, enable: bool, acknowledge: u8, settings: &Settings) -> DriveCommand {
+        DriveCommand {
             enable,
             demand: Demand { torque_nm: self.ramp.torque_nm(), slew_limited: true },
             window: window(&self.limits(settings), settings.ratings),
@@ -143,7 +143,7 @@ impl Demands for TorqueDemand {
 /// Share of the speed limit below it over which torque that raises the speed fades.
 const SPEED_SPAN: f32 = 0.05;
 
-/// Why the request's values cannot be used as they are.
+/// The reason why the request's values cannot be used as they are.
 #[inline(never)]
 fn wrong_with(request: &Request, ratings: &Ratings) -> Option<Refusal> {
     let Limits { motoring_nm, braking_nm, speed_rad_s, link_low_v, link_high_v } = request.limits;
@@ -171,7 +171,7 @@ pub(super) fn wanted_nm(torque_nm: f32, speed: f32, limits: &MotorLimits) -> f32
     limit(torque_nm, lowest, highest)
 }
 
-/// Where the link ends torque, for the control interrupt.
+/// The window of link voltage in which torque ends, for the control interrupt.
 fn window(limits: &Limits, ratings: &Ratings) -> LinkWindow {
     let ends = Ends::rated(ratings);
     LinkWindow {

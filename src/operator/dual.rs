@@ -1,4 +1,4 @@
-//! What is asked of the ZS9: of each motor a torque or a speed, of the link its voltage. One state machine, so one fault, one stop and
+//! The ZS9's request: of each motor a torque or a speed, of the link its voltage. One state machine, so one fault, one stop and
 //! one enabling edge are both motors'.
 
 use super::demand::wanted_nm;
@@ -18,8 +18,9 @@ const SPEED_RISE_S: f32 = 0.5;
 /// back into the source through the inductors.
 const RESTING_SHARE: f32 = 0.05;
 
-/// What one motor is asked for.
+/// The demand on one motor.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Wanted {
     /// A torque, in N·m; positive turns the rotor forward.
     Torque(f32),
@@ -37,6 +38,7 @@ impl Wanted {
 
 /// Limits of one motor, each within its ratings.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct MotorLimits {
     /// Largest motoring torque, in N·m, 0 ..= the rated largest.
     pub motoring_nm: f32,
@@ -63,8 +65,9 @@ impl MotorLimits {
     }
 }
 
-/// What is asked of one motor.
+/// The request to one motor.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct MotorRequest {
     /// The demand.
     pub wanted: Wanted,
@@ -72,8 +75,9 @@ pub struct MotorRequest {
     pub limits: MotorLimits,
 }
 
-/// What is asked of the ZS9, as levels; see [`super::Request`].
+/// The request to the ZS9, as levels; see [`super::Request`].
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct DualRequest {
     /// Levels.
     pub levels: Levels,
@@ -91,18 +95,20 @@ impl DualRequest {
     }
 }
 
-/// What the ZS9 says of itself: words of one control interrupt.
+/// The ZS9's observation of itself: words of one control interrupt.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct DualObservation {
     /// The control instant.
     pub at: Instant,
-    /// What it did.
+    /// The report of its control task.
     pub report: DualReport,
 }
 
-/// What the ZS9 may do.
+/// The permit for the ZS9.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct DualPermit {
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct DualDriveCommand {
     /// Gates may pulse.
     pub enable: bool,
     /// Demands.
@@ -115,7 +121,7 @@ pub struct DualPermit {
     pub acknowledge: u8,
 }
 
-impl DualPermit {
+impl DualDriveCommand {
     /// Nothing.
     pub const NONE: Self = Self {
         enable: false,
@@ -125,7 +131,7 @@ impl DualPermit {
         acknowledge: 0,
     };
 
-    /// What the drive gets: the board may hold the gates off, never more than that.
+    /// Applies the permit to a sample: the board may hold the gates off, never more than that.
     #[inline]
     pub fn apply(&self, sample: &mut DualSample) {
         sample.enable &= self.enable;
@@ -146,7 +152,7 @@ enum Way {
     Speed(f32),
 }
 
-/// What is known of one motor in a slot.
+/// One motor's measurements in a slot.
 struct Motor {
     /// Mechanical speed, in rad/s.
     speed: f32,
@@ -214,7 +220,7 @@ impl DualDemands {
 impl Demands for DualDemands {
     type Request = DualRequest;
     type Observation = DualObservation;
-    type Permit = DualPermit;
+    type DriveCommand = DualDriveCommand;
     type Told = [MotorDemand; 2];
 
     const AT_REST: Self = Self { ways: [Way::AT_REST; 2], limits: None, link_ref_v: 0.0, resting_v: None };
@@ -295,11 +301,11 @@ impl Demands for DualDemands {
         self.ways.each_ref().map(Way::demand)
     }
 
-    fn permit(&self, enable: bool, acknowledge: u8, settings: &Settings) -> DualPermit {
+    fn permit(&self, enable: bool, acknowledge: u8, settings: &Settings) -> DualDriveCommand {
         let smaller = |limits: MotorLimits| {
             if limits.motoring_nm < limits.braking_nm { limits.motoring_nm } else { limits.braking_nm }
         };
-        DualPermit {
+        DualDriveCommand {
             enable,
             demands: self.told(),
             speed_torque_nm: self.limits(settings).map(smaller),

@@ -1,4 +1,4 @@
-//! What must be in order before the gates may come on, and before a fault may be left: sensors, gate drivers, link, configuration,
+//! The conditions for the gates to come on, and for a fault to be left: sensors, gate drivers, link, configuration,
 //! contactors.
 
 use super::{Configuration, Settings, Situation};
@@ -93,7 +93,7 @@ fn speed(input: &Situation, settings: &Settings) -> Option<Violation> {
     protection::check_speed(input.observed.omega, settings.ratings)
 }
 
-/// Whether the machine's EMF stays below the link, or below a link of nominal voltage, with the gates off: faster, the diodes
+/// `true` if the machine's EMF stays below the link, or below a link of nominal voltage, with the gates off: faster, the diodes
 /// would rectify it.
 #[inline(never)]
 pub(super) fn open_is_safe(input: &Situation, settings: &Settings) -> bool {
@@ -102,7 +102,7 @@ pub(super) fn open_is_safe(input: &Situation, settings: &Settings) -> bool {
     protection::safe_state(input.observed.emf_omega, link_v, settings.ratings) == SafeState::GatesOff
 }
 
-/// What must stay in order while the gates may pulse.
+/// The first of the conditions that is not kept while the gates may pulse.
 #[inline(never)]
 pub(super) fn while_pulsing(input: &Situation, main_closed: bool) -> Option<Violation> {
     hardware(input)

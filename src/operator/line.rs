@@ -14,7 +14,7 @@ const GAP_SHARE: f32 = 0.02;
 /// Slots over which the link's rate is taken.
 const RATE_SLOTS: u32 = 20;
 
-/// What a sequence has come to.
+/// The outcome of a sequence.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Outcome {
     /// Not there yet.
@@ -98,7 +98,7 @@ impl Precharge {
         *self = Self { stage, slots: 0, before_v: udc_v };
     }
 
-    /// Whether the source is near, looked at every [`RATE_SLOTS`] slots.
+    /// `true` if the source is near, looked at every [`RATE_SLOTS`] slots.
     fn is_near(&mut self, udc_v: f32, line: &Line, settings: &Settings) -> bool {
         if !self.slots.is_multiple_of(RATE_SLOTS) {
             return false;

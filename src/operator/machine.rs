@@ -10,7 +10,7 @@ use super::{
 };
 use crate::protection::{Fault, SafeState, Trip, Violation};
 
-/// Where the machine stands, with what each state has to remember.
+/// The state, with the memory that each state has.
 #[derive(Clone, Copy, Debug)]
 enum Phase {
     Init,
@@ -42,7 +42,7 @@ pub struct Operator<D> {
     demands: D,
     /// The last request's levels, for edges.
     last: Edges,
-    /// What is wrong with the values of the request that is repeated.
+    /// The fault in the values of the request that is repeated.
     bad_values: Option<Refusal>,
     refusal: Option<Refusal>,
     refusals: u32,
@@ -96,7 +96,7 @@ impl<D: Demands> Operator<D> {
         &mut self,
         input: &Input<D::Request, D::Observation>,
         settings: &Settings,
-    ) -> Output<D::Permit, D::Told> {
+    ) -> Output<D::DriveCommand, D::Told> {
         let seen = D::seen(input.observed);
         let situation = Situation { observed: &seen, feedback: input.feedback };
         self.look_at_values(input.request, settings);
@@ -137,7 +137,7 @@ impl<D: Demands> Operator<D> {
         self.bad_values = wrong;
     }
 
-    /// Whether the main contactor is told to be closed while the gates pulse.
+    /// The command to the main contactor while the gates pulse: `true` for closed.
     const fn main_closed(settings: &Settings) -> bool {
         settings.line.is_some()
     }
@@ -154,7 +154,7 @@ impl<D: Demands> Operator<D> {
         self.demands.drop();
     }
 
-    /// What ends a state whatever is asked: the drive's faults, and what the board and the link say.
+    /// Ends a state whatever is asked: by the drive's faults, by the board's feedback, by the link.
     #[inline(never)]
     fn supervise(&mut self, input: &Situation, settings: &Settings) {
         if matches!(self.phase, Phase::Fault { .. }) {
@@ -182,7 +182,7 @@ impl<D: Demands> Operator<D> {
         }
     }
 
-    /// What goes on by itself.
+    /// Steps of the state that come by themselves.
     fn advance(&mut self, input: &Situation, settings: &Settings) {
         match &mut self.phase {
             Phase::Init => {
@@ -263,7 +263,7 @@ impl<D: Demands> Operator<D> {
         }
     }
 
-    /// Whether the gates may pulse, and the switches.
+    /// The permission to pulse, and the switches.
     fn outputs(&self, input: &Situation, settings: &Settings) -> (bool, Switches) {
         let enable = matches!(self.phase, Phase::Pulsing | Phase::Stopping | Phase::Coasting { off: false });
         let Some(line) = &settings.line else {

@@ -1,11 +1,11 @@
-//! WHETHER the drive may: the state machine between those who command and the drive.
+//! The permission to pulse: the state machine between those who command and the drive.
 //!
 //! init → self-test → ready → precharge → charged → enabled → running, with coasting, stopping, discharge and fault. Gates
 //! come on by an explicit edge only; a fault is left by an acknowledge and with a healthy cause only; a command that is not followed
 //! has a reason.
 //!
 //! One pure step per slot of [`SLOT_PERIODS`] control periods, in the idle loop: what it looks at is the drive's word of the slot's
-//! beginning, what it decides holds from the next slot's beginning on ([`Desk`]). So when the idle loop really ran changes nothing.
+//! beginning, what it decides holds from the next slot's beginning on ([`Mailboxes`]). So when the idle loop really ran changes nothing.
 //!
 //! The drive's own protection does not wait for any of this: it trips in its interrupts, and tells.
 
@@ -25,7 +25,9 @@ mod status;
 
 pub use cells::{Grant, Slotted, Timed};
 pub use demand::{Demands, TorqueDemand};
-pub use dual::{DualDemands, DualObservation, DualPermit, DualRequest, MotorLimits, MotorRequest, Wanted};
+pub use dual::{
+    DualDemands, DualDriveCommand, DualObservation, DualRequest, MotorLimits, MotorRequest, Wanted,
+};
 pub use ramp::{Ramp, Rates};
 pub use request::{Configuration, Feedback, Levels, Limits, Observation, Request, Seen};
 pub use settings::{Line, LineTimes, Settings};
@@ -45,9 +47,9 @@ pub type Slot = slot::Slot<TorqueDemand>;
 /// The ZS9's.
 pub type DualSlot = slot::Slot<DualDemands>;
 /// Between the PMaSynRM drive's operator and its control interrupt.
-pub type Desk = cells::Desk<Permit, Observation, 7, 12>;
+pub type Mailboxes = cells::Mailboxes<DriveCommand, Observation, 7, 12>;
 /// Between the ZS9's operator and its control interrupt.
-pub type DualDesk = cells::Desk<DualPermit, DualObservation, 7, 17>;
+pub type DualMailboxes = cells::Mailboxes<DualDriveCommand, DualObservation, 7, 17>;
 
 /// Control periods in a slot.
 pub const SLOT_PERIODS: u32 = 10;
@@ -62,39 +64,40 @@ const SELF_TEST_S: f32 = 0.05;
 /// Longest time in which both interrupts carry out an acknowledge, in s.
 const ACKNOWLEDGE_S: f32 = 0.05;
 
-/// What a step looks at.
+/// Everything that a step works on.
 #[derive(Clone, Copy, Debug)]
 pub struct Input<'a, Q = Request, O = Observation> {
-    /// What is asked.
+    /// The request.
     pub request: &'a Q,
-    /// What the drive says.
+    /// The drive's observation of itself.
     pub observed: &'a O,
-    /// What the board says.
+    /// The board's feedback.
     pub feedback: &'a Feedback,
 }
 
-/// What the state machine itself looks at, of whatever drive.
+/// Everything that the state machine itself works on, of whatever drive.
 #[derive(Clone, Copy, Debug)]
 struct Situation<'a> {
     observed: &'a Seen,
     feedback: &'a Feedback,
 }
 
-/// What the drive may do.
+/// The permit for the drive.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Permit {
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct DriveCommand {
     /// Gates may pulse.
     pub enable: bool,
     /// Torque.
     pub demand: Demand,
-    /// Where the link ends it.
+    /// The window of link voltage in which it ends.
     pub window: LinkWindow,
     /// Number of the last acknowledge: a new number, with the gates off, makes both interrupts forget their fault.
     pub acknowledge: u8,
 }
 
-impl Permit {
-    /// What the drive gets: the board may hold the gates off, never more than that.
+impl DriveCommand {
+    /// Applies the permit to a sample: the board may hold the gates off, never more than that.
     #[inline]
     pub fn apply(&self, sample: &mut Sample) {
         sample.enable &= self.enable;
@@ -114,9 +117,10 @@ impl Permit {
 
 /// A step's result.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Output<P = Permit, T = f32> {
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Output<P = DriveCommand, T = f32> {
     /// For the drive.
     pub permit: P,
-    /// What is told; its [`Switches`] are for the board.
+    /// The status; its [`Switches`] are for the board.
     pub status: Status<T>,
 }

@@ -42,7 +42,7 @@ impl Ramp {
         Self { torque_nm, rate_nm_s: 0.0 }
     }
 
-    /// Where it is, in N·m.
+    /// The present torque, in N·m.
     pub const fn torque_nm(&self) -> f32 {
         self.torque_nm
     }

@@ -1,4 +1,4 @@
-//! What is asked of the drive, and what the board says of itself.
+//! The request to the drive, and the feedback of the board.
 
 use super::settings::Ends;
 use crate::cell::Words;
@@ -9,13 +9,14 @@ use crate::modulation::Mode;
 use crate::protection::{Fault, Trip};
 use crate::time::Instant;
 
-/// What the command's sender wants, as levels: a frame that is lost or repeated changes nothing. Where a command is an edge, it is
+/// The request of the command's sender, as levels: a frame that is lost or repeated changes nothing. Where a command is an edge, it is
 /// the change from `false` to `true` between two steps; at power-up every level counts as having been `true`.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Request {
     /// Rising edge: enable. `false`: stop, torque ramped to zero, then gates off.
     pub enable: bool,
-    /// Whether the enabling edge may come with a torque demand other than zero.
+    /// The permission for the enabling edge to come with a torque demand other than zero.
     pub with_torque: bool,
     /// `true`: gates off at once, without a ramp; as a stop it needs a new enabling edge.
     pub off: bool,
@@ -52,10 +53,11 @@ impl Request {
 
 /// The levels that every drive's request has; see [`Request`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Levels {
     /// Rising edge: enable. `false`: stop.
     pub enable: bool,
-    /// Whether the enabling edge may come with a demand other than zero.
+    /// The permission for the enabling edge to come with a demand other than zero.
     pub with_torque: bool,
     /// Gates off at once.
     pub off: bool,
@@ -85,6 +87,7 @@ impl Levels {
 /// Limits that the command's sender may set, each within the machine's ratings: outside of them they are refused, and the limits
 /// that held before go on.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Limits {
     /// Largest motoring torque, in N·m, 0 ..= the rated largest.
     pub motoring_nm: f32,
@@ -115,6 +118,7 @@ impl Limits {
 
 /// The check of the configuration ([`crate::configuration`]).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u8)]
 pub enum Configuration {
     /// Not checked yet.
@@ -132,8 +136,9 @@ impl From<Result<(), Refused>> for Configuration {
     }
 }
 
-/// What the board says of itself.
+/// The board's feedback on itself.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Feedback {
     /// The precharge relay's auxiliary contact: closed.
     pub precharge_closed: bool,
@@ -153,12 +158,13 @@ pub struct Feedback {
     pub configuration: Configuration,
     /// Parameters are being written.
     pub parameters_open: bool,
-    /// What keeps the gates off in hardware, while its cause lasts.
+    /// The cause that keeps the gates off in hardware, while it lasts.
     pub hardware: Option<Fault>,
 }
 
-/// What every drive says of itself.
+/// The part of an observation that every drive has.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Seen {
     /// The control instant.
     pub at: Instant,
@@ -170,7 +176,7 @@ pub struct Seen {
     pub omega: f32,
     /// The electrical speed whose EMF the diodes see, in rad/s: of two motors the sum, because one bridge has them in series.
     pub emf_omega: f32,
-    /// Whether all speeds have been followed long enough to be used.
+    /// `true` once all speeds have been followed long enough to be used.
     pub speed_known: bool,
     /// The fault that either side has latched.
     pub trip: Option<Trip>,
@@ -178,8 +184,9 @@ pub struct Seen {
     pub acknowledged: u8,
 }
 
-/// What the drive says of itself: words of one control interrupt.
+/// The drive's observation of itself: words of one control interrupt.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Observation {
     /// The control instant.
     pub at: Instant,
@@ -189,7 +196,7 @@ pub struct Observation {
     pub current_a: f32,
     /// Electrical angular speed, in rad/s.
     pub omega: f32,
-    /// Whether the speed has been followed long enough to be used.
+    /// `true` once the speed has been followed long enough to be used.
     pub speed_known: bool,
     /// Torque demand after envelope, slew and limits, in N·m.
     pub torque_nm: f32,

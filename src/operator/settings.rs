@@ -1,9 +1,10 @@
-//! What the operator's step is built with.
+//! The settings of the operator's step.
 
 use crate::machine::Ratings;
 
 /// Time constants of the line side.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct LineTimes {
     /// Of precharge resistor and link capacitor, in s.
     pub precharge_s: f32,
@@ -13,6 +14,7 @@ pub struct LineTimes {
 
 /// The line side: what stands between the source and the link.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Line {
     /// Time constant of precharge resistor and link capacitor, in s.
     pub precharge_s: f32,
@@ -79,6 +81,8 @@ impl Ends {
 
 /// Everything that does not change while it runs.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub struct Settings<'a> {
     /// The machine.
     pub ratings: &'a Ratings,

@@ -7,11 +7,11 @@ use crate::cell::Words;
 use crate::protection::{SafeState, Trip, Violation};
 use crate::time::{Clock, Instant};
 
-/// What the operator needs of a board and of whoever commands it.
+/// The port between the operator, its board and whoever commands it.
 pub trait OperatorPort<D: Demands = super::TorqueDemand> {
-    /// What is asked, and what the board says, in the slot that began at `at`, so many `slots` after the last one that was done.
+    /// The request and the board's feedback in the slot that began at `at`, so many `slots` after the last one that was done.
     fn ask(&mut self, at: Instant, slots: u32) -> (D::Request, Feedback);
-    /// What came of it; its switches are to be set at `from`, or as soon as the board can.
+    /// Tells the status after the step; its switches are to be set at `from`, or as soon as the board can.
     fn tell(&mut self, from: Instant, status: &Status<D::Told>);
 }
 
@@ -34,15 +34,15 @@ impl<D: Demands> Slot<D> {
     /// As often as the idle loop likes: does the newest slot if it is not done yet. Returns whether it did one.
     pub fn run<const PERMIT: usize, const OBSERVATION: usize>(
         &mut self,
-        desk: &cells::Desk<D::Permit, D::Observation, PERMIT, OBSERVATION>,
+        desk: &cells::Mailboxes<D::DriveCommand, D::Observation, PERMIT, OBSERVATION>,
         port: &mut impl OperatorPort<D>,
         settings: &Settings,
         clock: &Clock,
     ) -> bool
     where
-        D::Permit: Grant,
+        D::DriveCommand: Grant,
         D::Observation: Slotted + Words<OBSERVATION>,
-        Timed<D::Permit>: Words<PERMIT>,
+        Timed<D::DriveCommand>: Words<PERMIT>,
     {
         let Some(observed) = desk.observed() else {
             return false;
@@ -84,7 +84,7 @@ impl<D: Demands> Slot<D> {
         slots: u32,
         port: &mut impl OperatorPort<D>,
         settings: &Settings,
-    ) -> Output<D::Permit, D::Told>
+    ) -> Output<D::DriveCommand, D::Told>
     where
         D::Observation: Slotted,
     {

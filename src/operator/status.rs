@@ -1,4 +1,4 @@
-//! What the operator is told.
+//! The operator's status.
 
 use crate::control::Demand;
 use crate::ports::MotorDemand;
@@ -10,7 +10,9 @@ macro_rules! named {
     ($(#[$meta:meta])* $name:ident { $($(#[$doc:meta])* $variant:ident = $text:literal),+ $(,)? }) => {
         $(#[$meta])*
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        #[cfg_attr(feature = "defmt", derive(defmt::Format))]
         #[repr(u8)]
+        #[non_exhaustive]
         pub enum $name { $($(#[$doc])* $variant),+ }
 
         impl $name {
@@ -36,7 +38,7 @@ macro_rules! named {
 }
 
 named! {
-    /// What the drive is doing.
+    /// The state of the drive.
     State {
         /// Waiting for the first measurements and for the configuration's check.
         Init = "init",
@@ -64,7 +66,7 @@ named! {
 }
 
 named! {
-    /// Why a command was not followed.
+    /// The reason why a command was not followed.
     Refusal {
         /// The self-test has not been passed.
         NotReady = "not_ready",
@@ -105,6 +107,7 @@ named! {
 
 /// The contactors and the resistors on the link.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Switches {
     /// Precharge relay closed.
     pub precharge: bool,
@@ -116,8 +119,9 @@ pub struct Switches {
     pub chopper: f32,
 }
 
-/// What is told after each step.
+/// The operator's status after each step.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Status<T = f32> {
     /// The state.
     pub state: State,
@@ -129,16 +133,16 @@ pub struct Status<T = f32> {
     pub refusals: u32,
     /// Torque demand after limits, slew and jerk, in N·m; of the ZS9 each motor's demand.
     pub torque_nm: T,
-    /// What is switched.
+    /// The contactors and resistors that are switched.
     pub switches: Switches,
 }
 
 const NONE: u32 = 0xFF;
 
-/// What the ZS9's operator tells.
+/// The status of the ZS9's operator.
 pub type DualStatus = Status<[MotorDemand; 2]>;
 
-/// What is told of demands, as two words.
+/// The demands of a status, as two words.
 pub trait Told: Copy {
     /// As words.
     fn to_words(self) -> [u32; 2];

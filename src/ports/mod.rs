@@ -7,18 +7,16 @@ mod report;
 
 use crate::control::{Demand, LinkWindow, Measurements};
 use crate::frames::{Abc, Angle};
-use crate::modulation::CarrierPeriod;
+use crate::modulation::CarrierHalf;
 use crate::protection::{Fault, LegFaults, SafeState};
 use crate::time::Instant;
 
-pub use dual::{
-    DualControlPort, DualPwmPort, DualSample, GateFeedback, HardwareBreak, MotorDemand, PlayedPeriod,
-    PowerSample,
-};
+pub use dual::{DualSample, GateFeedback, HardwareBreak, MotorDemand, PlayedPeriod, PowerSample};
 pub use report::{DualReport, Report};
 
 /// A control sample: what the converters hold, and what the operator wants.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Sample {
     /// Phase currents at the control timer's nominal instant, positive into the machine, in A.
     pub currents_a: Abc,
@@ -28,13 +26,13 @@ pub struct Sample {
     pub angle: Option<Angle>,
     /// The torque demand.
     pub demand: Demand,
-    /// Whether the gates may be on.
+    /// The permission for the gates to be on.
     pub enable: bool,
     /// DC-link voltages at which torque ends.
     pub window: LinkWindow,
     /// Number of the operator's last acknowledge; a new one makes the drive forget its fault.
     pub acknowledge: u8,
-    /// What holds the gates off in hardware.
+    /// The cause that holds the gates off in hardware.
     pub hardware: Option<Fault>,
 }
 
@@ -47,31 +45,74 @@ impl Sample {
     }
 }
 
-/// What the control interrupt needs of a board.
-pub trait ControlPort {
+/// One of the two drives: what passes through its ports.
+pub trait System {
+    /// The sample of the control interrupt, with the operator's wishes.
+    type Sample;
+    /// The report of the control task.
+    type Report;
+    /// The sample of the PWM interrupt.
+    type PwmSample;
+    /// The pulses that the timers play.
+    type Pulses;
+}
+
+/// The PMaSynRM's two-level inverter.
+#[derive(Clone, Copy, Debug)]
+pub struct Traction;
+
+/// The ZS9 with its two motors.
+#[derive(Clone, Copy, Debug)]
+pub struct Dual;
+
+impl System for Traction {
+    type Sample = Sample;
+    type Report = Report;
+    /// Phase currents, in A.
+    type PwmSample = Abc;
+    type Pulses = CarrierHalf;
+}
+
+impl System for Dual {
+    type Sample = DualSample;
+    type Report = DualReport;
+    type PwmSample = PowerSample;
+    type Pulses = PlayedPeriod;
+}
+
+/// The port of the control interrupt to a board.
+pub trait ControlPort<S: System = Traction> {
+    /// First thing in the interrupt: takes the timer's flag back. Where control `revises` the pulses, the PWM interrupt has come in between
+    /// when this returns.
+    fn begin(&mut self, _revises: bool) {}
     /// The conversions that the control timer triggered at `now`.
-    fn sample(&mut self, now: Instant) -> Sample;
-    /// Puts the gates into the safe state at once, whatever the modulator plays.
+    fn sample(&mut self, now: Instant) -> S::Sample;
+    /// Puts the gates into the safe state at once, until an acknowledge, whatever is played.
     fn enter(&mut self, safe: SafeState, now: Instant);
-    /// By how many ticks the interrupt, begun nominally at `now`, has outlived its period; 0 when in time.
-    fn overrun_ticks(&mut self, now: Instant) -> u32;
-    /// What the control task did, for whoever watches.
-    fn report(&mut self, now: Instant, report: &Report);
-    /// What the power stage tells of itself; nothing where it cannot.
+    /// By how many ticks the interrupt, begun nominally at `now`, has outlived `deadline_ticks`; 0 when in time.
+    fn overrun_ticks(&mut self, now: Instant, deadline_ticks: u32) -> u32;
+    /// The control task's report, for whoever watches.
+    fn report(&mut self, now: Instant, report: &S::Report);
+    /// The faults that the power stage reports of its legs; none where it cannot.
     fn leg_faults(&mut self) -> LegFaults {
         LegFaults::default()
     }
 }
 
-/// What the PWM interrupt needs of a board.
-pub trait PwmPort {
-    /// Phase currents, sampled at the carrier boundary `now`.
-    fn sample(&mut self, now: Instant) -> Abc;
-    /// Loads the shadow registers: `next` takes over when the half that begins `now` ends.
-    fn play(&mut self, now: Instant, next: &CarrierPeriod);
-    /// Puts the gates into the safe state at once, whatever is played.
+/// The port of the PWM interrupt to a board.
+pub trait PwmPort<S: System = Traction> {
+    /// First thing in the interrupt: takes the timer's flag back. `false` when it is no boundary that the interrupt comes for: the PWM
+    /// timer has not asked for it, but control, to revise the pulses; or there is nothing to be done.
+    fn begin(&mut self) -> bool {
+        true
+    }
+    /// The conversions at the carrier boundary `now`; of the ZS9 at the carrier's peak.
+    fn sample(&mut self, now: Instant) -> S::PwmSample;
+    /// Loads the shadow registers: `next` takes over when the half that begins `now` ends; of the ZS9 at the next valley.
+    fn play(&mut self, now: Instant, next: &S::Pulses);
+    /// Puts the gates into the safe state at once, until an acknowledge, whatever is played.
     fn enter(&mut self, safe: SafeState, now: Instant);
-    /// Whether what was played last came after the half that it was for had ended; the gates are off then.
+    /// `true` if what was played last came after the half that it was for had ended; the gates are off then.
     fn is_late(&mut self) -> bool {
         false
     }

@@ -1,12 +1,13 @@
-//! What the control tasks did in a period, for traces, operator and telemetry.
+//! The control tasks' reports of a period, for traces, operator and telemetry.
 
 use crate::cell::Words;
 use crate::modulation::Mode;
 use crate::nine_switch::Scheme;
 use crate::protection::{Trip, trip_from_words, trip_to_words};
 
-/// What the control task did in one period, for traces and telemetry.
+/// The control task's report of one period, for traces and telemetry.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Report {
     /// Torque demand after envelope, slew and voltage limit, in N·m.
     pub torque_nm: f32,
@@ -26,7 +27,7 @@ pub struct Report {
     pub udc_v: f32,
     /// Largest magnitude of a phase current, in A.
     pub current_a: f32,
-    /// Whether the speed has been followed long enough to be used.
+    /// `true` once the speed has been followed long enough to be used.
     pub speed_known: bool,
     /// Number of the acknowledge that both interrupts have carried out.
     pub acknowledged: u8,
@@ -74,20 +75,21 @@ impl Words<12> for Report {
     }
 }
 
-/// What the ZS9's control task did in one period, for traces and telemetry.
+/// The report of the ZS9's control task of one period, for traces and telemetry.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct DualReport {
     /// Torque references after all limits, in N·m: upper motor, lower motor.
     pub torque_nm: [f32; 2],
     /// Commanded peak phase voltages, in V.
     pub voltage_v: [f32; 2],
-    /// Whether each motor is on its voltage limit.
+    /// The motors that are on their voltage limit.
     pub weakening: [bool; 2],
     /// Shoot-through duty.
     pub duty: f32,
     /// Inductor current that is led to, in A.
     pub inductor_ref_a: f32,
-    /// Where the zero vectors lie.
+    /// The place of the zero vectors.
     pub scheme: Scheme,
     /// The latched fault, if any.
     pub trip: Option<Trip>,
@@ -99,7 +101,7 @@ pub struct DualReport {
     pub capacitor_v: f32,
     /// Source voltage, in V.
     pub source_v: f32,
-    /// Whether both speeds have been followed long enough to be used.
+    /// `true` once both speeds have been followed long enough to be used.
     pub speed_known: bool,
     /// Number of the acknowledge that both interrupts have carried out.
     pub acknowledged: u8,

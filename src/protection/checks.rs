@@ -5,14 +5,14 @@ use crate::control::{Demand, Measurements};
 use crate::frames::Abc;
 use crate::machine::Ratings;
 
-/// How far an angle may be off what the speed makes of the one before, in electrical rad. The tracker's lag behind a rotor that
+/// The largest error of an angle against the speed's prediction, in electrical rad. The tracker's lag behind a rotor that
 /// accelerates by itself is a fifth of it.
-pub const SURPRISE_RAD: f32 = 0.05;
+pub const INNOVATION_RAD: f32 = 0.05;
 
-/// The angle, `surprise_rad` off what was expected.
-pub fn check_angle(surprise_rad: f32) -> Option<Violation> {
-    let off_rad = surprise_rad.abs();
-    (off_rad > SURPRISE_RAD).then_some((Fault::AngleLost, off_rad, SURPRISE_RAD))
+/// The angle, `innovation_rad` off what was expected.
+pub fn check_angle(innovation_rad: f32) -> Option<Violation> {
+    let off_rad = innovation_rad.abs();
+    (off_rad > INNOVATION_RAD).then_some((Fault::AngleLost, off_rad, INNOVATION_RAD))
 }
 
 /// An angle that is not known, where it is `needed`.

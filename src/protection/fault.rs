@@ -1,11 +1,13 @@
-//! Why the drive trips: the faults by name and code, and what is told of one.
+//! The faults, by name and code, and the record of one.
 
 use super::SafeState;
 use crate::time::Instant;
 
-/// Why the drive tripped.
+/// The fault that trips the drive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u8)]
+#[non_exhaustive]
 pub enum Fault {
     /// A phase current above its trip level, in A.
     Overcurrent = 1,
@@ -150,16 +152,17 @@ impl Fault {
 
 /// A fault with its circumstances.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Trip {
-    /// What happened.
+    /// The fault.
     pub fault: Fault,
     /// The value that broke the limit, in the fault's unit.
     pub value: f32,
     /// The limit, in the same unit.
     pub limit: f32,
-    /// When it was measured.
+    /// The instant of the measurement.
     pub at: Instant,
-    /// What was done with the gates.
+    /// The state into which the gates were put.
     pub safe: SafeState,
 }
 

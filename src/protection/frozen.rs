@@ -19,9 +19,9 @@ const TURNED_SHARE: f32 = 0.02;
 /// By how much the voltage must have moved the flux linkage that goes with a repeated current, as a share of the machine's own at its
 /// largest torque: a quarter, above what the dead time's error near a current of zero feigns in the runs of the tests.
 const PUSHED_SHARE: f32 = 0.25;
-/// What the rotor must have turned, by its last known speed, before an unmoving angle is suspicious, in electrical rad.
+/// The turn of the rotor, by its last known speed, before an unmoving angle is suspicious, in electrical rad.
 const FROZEN_TURN_RAD: f32 = 0.2;
-/// How long that speed is believed, in s: a sensor that stands still is found above 10 rad/s, and a rotor that stops within a count
+/// The time for which that speed is believed, in s: a sensor that stands still is found above 10 rad/s, and a rotor that stops within a count
 /// of its encoder is not taken for one. As long a voltage counts.
 const BELIEVED_S: f32 = 0.02;
 
@@ -39,7 +39,7 @@ pub struct FrozenWatch {
     turned_rad: f32,
 }
 
-/// What has happened while the currents repeated.
+/// The history since the currents began to repeat.
 #[derive(Clone, Copy, Debug)]
 struct Repeated {
     periods: u32,
@@ -47,7 +47,7 @@ struct Repeated {
     from_v: AlphaBeta,
     /// By how much the rotor has turned since, in electrical rad.
     turned_rad: f32,
-    /// What the change of the voltage since has added to the flux linkage, fading, in V·s.
+    /// The flux linkage that the change of the voltage since has added, fading, in V·s.
     pushed_wb: AlphaBeta,
 }
 
@@ -67,7 +67,7 @@ impl Repeated {
         self.pushed_wb = self.pushed_wb * (1.0 - period_s / BELIEVED_S) + pushed;
     }
 
-    /// Whether a peak current of `peak_a` should have changed.
+    /// `true` if a peak current of `peak_a` should have changed.
     #[cold]
     #[inline(never)]
     fn is_suspicious(&self, peak_a: f32, ratings: &Ratings) -> bool {
@@ -94,12 +94,12 @@ impl FrozenWatch {
         }
     }
 
-    /// What the rotor should have turned while its angle stood still, and how much of that is a fault, in electrical rad.
+    /// The turn that the rotor should have made while its angle stood still, and the part of it that is a fault, in electrical rad.
     pub fn turned_rad(&self) -> (f32, f32) {
         (self.turned_rad, FROZEN_TURN_RAD)
     }
 
-    /// Whether the angle was the same in the last two periods.
+    /// `true` if the angle was the same in the last two periods.
     pub fn angle_stands(&self) -> bool {
         self.angle_for > 0
     }

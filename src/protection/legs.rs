@@ -1,11 +1,12 @@
-//! What the power stage tells of its legs: the fault, and the safe state with such legs.
+//! The power stage's report of its legs: the fault, and the safe state with such legs.
 
 use super::safe::emf_v;
 use super::{Fault, SafeState, Violation, safe_state};
 use crate::machine::Ratings;
 
-/// What the power stage tells of itself: nothing, mostly.
+/// The power stage's report of its legs: no fault, mostly.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct LegFaults {
     /// Devices whose drivers have found a short circuit and block, a bit each, from bit 0 on uh ul vh vl wh wl.
     pub blocked: u8,

@@ -4,6 +4,7 @@ use super::{Fault, Violation};
 
 /// The ZS9's limits besides those of its motors.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct LinkLimits {
     /// Source voltage below which the drive trips, in V.
     pub source_min_v: f32,

@@ -6,22 +6,22 @@
 #![forbid(unsafe_code)]
 
 mod checks;
-mod disarmed;
 mod fault;
 mod frozen;
 mod legs;
 mod link;
+mod masked_faults;
 mod safe;
 mod words;
 
 pub use checks::{
-    SURPRISE_RAD, check_angle, check_currents, check_demand, check_known, check_measurements, check_speed,
+    INNOVATION_RAD, check_angle, check_currents, check_demand, check_known, check_measurements, check_speed,
     check_undervoltage,
 };
-pub use disarmed::Disarmed;
 pub use fault::{Fault, Trip, Violation};
 pub use frozen::FrozenWatch;
 pub use legs::LegFaults;
 pub use link::LinkLimits;
+pub use masked_faults::MaskedFaults;
 pub use safe::{SafeState, safe_state};
 pub use words::{trip_from_words, trip_to_words};

@@ -5,6 +5,7 @@ use crate::machine::Ratings;
 
 /// The inverter's safe states.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u8)]
 pub enum SafeState {
     /// All gates off.

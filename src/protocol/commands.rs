@@ -1,4 +1,4 @@
-//! What is sent to the drive.
+//! The messages to the drive.
 
 use super::message::Message;
 use super::signal::{OutOfRange, Payload, Signal};
@@ -83,6 +83,7 @@ pub(super) fn levels(payload: Payload) -> Levels {
 
 /// Content of [`COMMAND`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Command {
     /// Enable, by its rising edge.
     pub enable: bool,
@@ -135,6 +136,7 @@ impl Command {
 
 /// Content of [`LIMITS`].
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct TorqueLimits {
     /// Largest motoring torque, in N·m.
     pub motoring_nm: f32,
@@ -168,6 +170,7 @@ impl TorqueLimits {
 
 /// Content of [`LINK_LIMITS`].
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct LinkLimits {
     /// Voltage at and below which there is no motoring torque, in V.
     pub low_v: f32,
@@ -194,6 +197,7 @@ impl LinkLimits {
 
 /// Content of [`PARAMETER_REQUEST`].
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ParameterRequest {
     /// The parameter's number.
     pub parameter: u8,

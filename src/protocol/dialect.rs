@@ -1,4 +1,4 @@
-//! What a drive's messages are: the rest of the protocol is the same for all.
+//! A drive's set of messages: the rest of the protocol is the same for all.
 
 use super::commands::ParameterRequest;
 use super::commands::TorqueLimits;
@@ -10,48 +10,49 @@ use crate::machine::Ratings;
 use crate::operator::{Demands, MotorLimits};
 
 /// A drive's messages, and, as a value, what was said last.
-pub trait Dialect: Copy + 'static {
-    /// What its operator asks for and sees.
+pub trait MessageSet: Copy + 'static {
+    /// The demands of its operator.
     type Demands: Demands;
-    /// What a frame that was taken says.
+    /// The content of a frame that was taken.
     type Content: Copy;
     /// Measurements of its telemetry.
     type Measured: Copy;
-    /// How its gates are played.
+    /// The pulse pattern of its gates.
     type Pattern: Pattern;
 
-    /// What is sent to it: the command first.
+    /// The messages to it: the command first.
     const TO_DRIVE: &'static [&'static Message];
-    /// What it sends: status, three of measurements, the fault's value and limit, counters, the answer about a parameter.
+    /// The messages from it: status, three of measurements, the fault's value and limit, counters, the answer about a parameter.
     const FROM_DRIVE: [&'static Message; 8];
     /// The first frame of a message, or the first after a silence: it only sets the counter.
     const GREETING: Self::Content;
     /// Nothing said.
     const SILENT: Self;
 
-    /// What a frame of [`Self::TO_DRIVE`] says; `None` if a value is out of its range or an unused bit is set.
+    /// The content of a frame of [`Self::TO_DRIVE`]; `None` if a value is out of its range or an unused bit is set.
     fn decode(id: u16, payload: Payload) -> Option<Self::Content>;
     /// Keeps what is said.
     fn take(&mut self, content: Self::Content) -> Taken;
     /// The command is forgotten, as if nothing were asked.
     fn rest(&mut self);
-    /// What is asked of the operator: nothing but off before it is `armed`, no torque unless the command is `fresh`.
+    /// The request to the operator: nothing but off before it is `armed`, no torque unless the command is `fresh`.
     fn request(&self, armed: bool, fresh: bool, parameters: &Parameters, ratings: &Ratings) -> Request<Self>;
-    /// What is sent of an observation.
+    /// The measurements and the pattern that are sent of an observation.
     fn observed(observed: Option<&Observation<Self>>, ratings: &Ratings) -> (Self::Measured, Self::Pattern);
     /// Content of one of the three messages of measurements.
     fn measured(measured: &Self::Measured, message: usize) -> Payload;
 }
 
-/// What is asked of a drive.
-pub type Request<D> = <<D as Dialect>::Demands as Demands>::Request;
-/// What a drive says of itself.
-pub type Observation<D> = <<D as Dialect>::Demands as Demands>::Observation;
-/// What its operator tells of the demands.
-pub type Told<D> = <<D as Dialect>::Demands as Demands>::Told;
+/// The request to a drive.
+pub type Request<D> = <<D as MessageSet>::Demands as Demands>::Request;
+/// The drive's observation of itself.
+pub type Observation<D> = <<D as MessageSet>::Demands as Demands>::Observation;
+/// The operator's status of the demands.
+pub type Told<D> = <<D as MessageSet>::Demands as Demands>::Told;
 
-/// What became of a frame's content.
+/// The consequence of a frame's content.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Taken {
     /// Nothing more is to be done.
     Kept,
@@ -67,7 +68,7 @@ pub enum Taken {
 /// Rounding that is forgiven at a rating, as a share of it.
 const STEP_SHARE: f32 = 1e-4;
 
-/// What is sent beyond the rating stays, so that it is refused with a reason; within it the parameter holds.
+/// The value that holds: one sent beyond the rating stays, so that it is refused with a reason; within it the parameter holds.
 fn beyond(sent: f32, parameter: f32, rated: f32) -> f32 {
     if sent > rated * (1.0 + STEP_SHARE) || sent < parameter { sent } else { parameter }
 }

@@ -40,19 +40,21 @@ pub fn protect(data: &mut [u8; 8], counter: u8, ids: &DataIds) {
     data[0] = crc(data, ids);
 }
 
-/// Whether the CRC is right.
+/// `true` if the CRC is right.
 pub fn is_intact(data: &[u8; 8], ids: &DataIds) -> bool {
     data[0] == crc(data, ids)
 }
 
-/// What a counter says about the frame's place in the sequence.
+/// The frame's place in the sequence, by its counter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum Order {
     /// The first one, or the first after a silence: it sets the counter and has no effect.
     First,
     /// In order, after this many lost ones.
     Next {
-        /// How many frames are missing before it.
+        /// The number of frames missing before it.
         lost: u8,
     },
     /// The same counter again.

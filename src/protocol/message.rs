@@ -58,13 +58,13 @@ impl Message {
         Frame { id: self.id, length: LENGTH, data }
     }
 
-    /// Whether a frame of this message has the right CRC.
+    /// `true` if a frame of this message has the right CRC.
     #[inline(never)]
     pub fn is_intact(&self, frame: &Frame) -> bool {
         e2e::is_intact(&frame.data, &self.data_ids)
     }
 
-    /// Whether every bit outside the message's signals is zero.
+    /// `true` if every bit outside the message's signals is zero.
     pub const fn is_tidy(&self, payload: Payload) -> bool {
         payload.0 & !self.used == 0
     }

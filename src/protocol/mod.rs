@@ -28,7 +28,7 @@ mod zs9;
 pub use commands::{
     COMMAND, Command, LIMITS, LINK_LIMITS, LinkLimits, PARAMETER_REQUEST, ParameterRequest, TorqueLimits,
 };
-pub use dialect::{Dialect, Taken};
+pub use dialect::{MessageSet, Taken};
 pub use frame::{Frame, LENGTH};
 pub use message::{COUNTER, CRC, Message};
 pub use parameters::{PARAMETERS, Parameter, Parameters, RPM_PER_RAD_S, WriteError};
@@ -39,10 +39,10 @@ pub use telemetry::{
     PARAMETER_ANSWER, ParameterAnswer, Pattern, STATUS, StatusFrame, VOLTAGES, trip_frames, trip_number,
 };
 
-/// What is sent to the drive.
+/// The messages to the drive.
 pub const TO_DRIVE: [&Message; 4] = [&COMMAND, &LIMITS, &LINK_LIMITS, &PARAMETER_REQUEST];
 
-/// What the drive sends.
+/// The messages from the drive.
 pub const FROM_DRIVE: [&Message; 8] =
     [&STATUS, &MOTION, &CURRENTS, &VOLTAGES, &FAULT_VALUE, &FAULT_LIMIT, &COUNTERS, &PARAMETER_ANSWER];
 
@@ -52,17 +52,17 @@ pub use zs9::{
     Zs9, Zs9Command, Zs9Content, Zs9Demands, Zs9Link, Zs9Measured,
 };
 
-/// What takes effect of what is sent to the PMaSynRM drive.
+/// The receiver of the messages to the PMaSynRM drive.
 pub type Receiver = receiver::Receiver<Traction>;
 /// The PMaSynRM drive's end.
 pub type Session = session::Session<Traction>;
-/// What the PMaSynRM drive's telemetry is made of.
+/// The source of the PMaSynRM drive's telemetry.
 pub type Told<'a> = session::Told<'a, Traction>;
 /// The PMaSynRM drive's end beside its operator.
-pub type Station = station::Station<Traction>;
+pub type CanEndpoint = station::CanEndpoint<Traction>;
 /// The ZS9's end.
 pub type Zs9Session = session::Session<Zs9>;
-/// What the ZS9's telemetry is made of.
+/// The source of the ZS9's telemetry.
 pub type Zs9Told<'a> = session::Told<'a, Zs9>;
 /// The ZS9's end beside its operator.
-pub type Zs9Station = station::Station<Zs9>;
+pub type Zs9CanEndpoint = station::CanEndpoint<Zs9>;

@@ -6,6 +6,7 @@ use core::f32::consts::TAU;
 
 /// A parameter.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Parameter {
     /// Number in the messages.
     pub id: u8,
@@ -17,7 +18,7 @@ pub struct Parameter {
     pub min: f32,
     /// Largest value; the machine's rating may be lower.
     pub max: f32,
-    /// What it does.
+    /// Its purpose.
     pub purpose: &'static str,
 }
 
@@ -46,6 +47,7 @@ pub const RPM_PER_RAD_S: f32 = 60.0 / TAU;
 
 /// The values.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Parameters {
     /// Fastest change of the torque demand, in N·m/s.
     pub torque_slew_nm_s: f32,
@@ -61,8 +63,10 @@ pub struct Parameters {
     pub command_off_ms: f32,
 }
 
-/// Why a value was not written.
+/// The reason why a value was not written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum WriteError {
     /// There is no such parameter.
     Unknown,

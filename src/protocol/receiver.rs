@@ -1,14 +1,16 @@
-//! Which frames take effect. A frame is judged in this order: identifier, length, CRC, counter, content; the first that is wrong
+//! The frames that take effect. A frame is judged in this order: identifier, length, CRC, counter, content; the first that is wrong
 //! rejects it whole, and is counted.
 
-use super::dialect::Dialect;
+use super::dialect::MessageSet;
 use super::e2e::{self, Order, Sequence};
 use super::frame::{Frame, LENGTH};
 use super::signal::Payload;
 use super::telemetry::Counts;
 
-/// Why a frame was rejected.
+/// The reason why a frame was rejected.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum Reject {
     /// Its identifier is none of ours.
     Unknown,
@@ -60,13 +62,13 @@ const MOST: usize = 5;
 /// The receiver of all messages to a drive.
 #[derive(Clone, Copy, Debug)]
 pub struct Receiver<D> {
-    /// In the order of [`Dialect::TO_DRIVE`].
+    /// In the order of [`MessageSet::TO_DRIVE`].
     channels: [Channel; MOST],
     counts: Counts,
     dialect: core::marker::PhantomData<D>,
 }
 
-impl<D: Dialect> Receiver<D> {
+impl<D: MessageSet> Receiver<D> {
     /// Nothing received yet.
     pub const fn new() -> Self {
         const { assert!(D::TO_DRIVE.len() <= MOST) };
@@ -95,7 +97,7 @@ impl<D: Dialect> Receiver<D> {
         }
     }
 
-    /// What became of the frames so far.
+    /// The counts of the frames so far.
     pub fn counts(&self) -> &Counts {
         &self.counts
     }
@@ -137,7 +139,7 @@ impl<D: Dialect> Receiver<D> {
     }
 }
 
-impl<D: Dialect> Default for Receiver<D> {
+impl<D: MessageSet> Default for Receiver<D> {
     fn default() -> Self {
         Self::new()
     }

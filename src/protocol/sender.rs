@@ -1,6 +1,6 @@
-//! Which frame is sent in which slot: fixed places in a cycle of 100 ms, so that the bus load is the same whatever happens.
+//! The slot of each frame: fixed places in a cycle of 100 ms, so that the bus load is the same whatever happens.
 
-use super::dialect::Dialect;
+use super::dialect::MessageSet;
 use super::e2e::Counter;
 use super::frame::Frame;
 use super::signal::Payload;
@@ -10,7 +10,7 @@ use crate::protection::Trip;
 /// Slots in a cycle.
 const CYCLE: u32 = 100;
 
-/// Places in [`Dialect::FROM_DRIVE`].
+/// Places in [`MessageSet::FROM_DRIVE`].
 const STATUS: usize = 0;
 const FAULT_VALUE: usize = 4;
 const FAULT_LIMIT: usize = 5;
@@ -27,7 +27,7 @@ pub struct Sender<D> {
     dialect: core::marker::PhantomData<D>,
 }
 
-impl<D: Dialect> Sender<D> {
+impl<D: MessageSet> Sender<D> {
     /// At the cycle's beginning.
     pub const fn new() -> Self {
         Self {
@@ -83,7 +83,7 @@ impl<D: Dialect> Sender<D> {
     }
 }
 
-impl<D: Dialect> Default for Sender<D> {
+impl<D: MessageSet> Default for Sender<D> {
     fn default() -> Self {
         Self::new()
     }

@@ -1,7 +1,7 @@
 //! The drive's end: frames in, a request out; a status in, frames out. One step a slot of 1 ms, one frame a slot is sent at most.
 
 use super::commands::ParameterRequest;
-use super::dialect::{Dialect, Request, Taken, Told as DriveTold};
+use super::dialect::{MessageSet, Request, Taken, Told as DriveTold};
 use super::frame::Frame;
 use super::parameters::{Parameters, WriteError};
 use super::receiver::Receiver;
@@ -11,9 +11,9 @@ use crate::machine::Ratings;
 use crate::operator::{State, Status};
 use core::borrow::Borrow;
 
-/// What is sent of.
+/// The source of the telemetry.
 #[derive(Clone, Copy, Debug)]
-pub struct Told<'a, D: Dialect> {
+pub struct Told<'a, D: MessageSet> {
     /// The operator's status.
     pub status: &'a Status<DriveTold<D>>,
     /// Measurements.
@@ -24,21 +24,21 @@ pub struct Told<'a, D: Dialect> {
 
 /// The drive's end of the protocol.
 #[derive(Clone, Copy, Debug)]
-pub struct Session<D: Dialect> {
+pub struct Session<D: MessageSet> {
     ratings: &'static Ratings,
     receiver: Receiver<D>,
     parameters: Parameters,
-    /// What was said last.
+    /// The content that was received last.
     said: D,
     /// Slots since the newest command; `None` before the first, and after the time-out to off.
     age_ms: Option<u32>,
-    /// Whether a command at rest has come since the drive went off: before it no level counts.
+    /// `true` once a command at rest has come since the drive went off: before it no level counts.
     armed: bool,
     state: State,
     sender: Sender<D>,
 }
 
-impl<D: Dialect> Session<D> {
+impl<D: MessageSet> Session<D> {
     /// Nothing received yet.
     pub const fn new(ratings: &'static Ratings) -> Self {
         Self {
@@ -81,12 +81,12 @@ impl<D: Dialect> Session<D> {
         &self.parameters
     }
 
-    /// What became of the frames received.
+    /// The counts of the frames received.
     pub fn counts(&self) -> &Counts {
         self.receiver.counts()
     }
 
-    /// What becomes of the newest command.
+    /// The use that is made of the newest command.
     pub fn listening(&self) -> Listening {
         match self.age_ms {
             None => Listening::Off,
@@ -135,7 +135,7 @@ impl<D: Dialect> Session<D> {
     }
 }
 
-/// Whether the gates pulse in a state, or may begin to without a further command.
+/// `true` if the gates pulse in a state, or may begin to without a further command.
 fn may_pulse(state: State) -> bool {
     matches!(state, State::Enabled | State::Running | State::Coasting | State::Stopping)
 }

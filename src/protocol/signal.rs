@@ -2,10 +2,12 @@
 
 /// The eight bytes of a frame as one number: bit 0 is the first byte's lowest.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Payload(pub u64);
 
-/// How a signal's bits are read.
+/// The meaning of a signal's bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Kind {
     /// A number without a sign.
     Unsigned,
@@ -17,6 +19,8 @@ pub enum Kind {
 
 /// A value that its signal cannot carry.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub struct OutOfRange;
 
 /// A signal. Little-endian; its value is `raw · scale + offset`. Its methods stay out of line: nothing here is in a hurry, and
@@ -29,9 +33,9 @@ pub struct Signal {
     pub unit: &'static str,
     /// Number of the lowest bit.
     pub start: u32,
-    /// How many bits.
+    /// The number of bits.
     pub bits: u32,
-    /// How they are read.
+    /// Their meaning.
     pub kind: Kind,
     /// Value of the lowest bit.
     pub scale: f32,
@@ -114,7 +118,7 @@ impl Signal {
         payload.0 = payload.0 & !self.mask() | (raw as u64 & self.ones()).wrapping_shl(self.start);
     }
 
-    /// Whether a flag is set.
+    /// `true` if a flag is set.
     pub const fn is_set(&self, payload: Payload) -> bool {
         self.raw(payload) != 0
     }

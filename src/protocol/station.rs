@@ -1,6 +1,6 @@
 //! The drive's end of the protocol beside the operator: what the observations become in telemetry, the parameters in settings.
 
-use super::dialect::{Dialect, Observation, Request, Told as DriveTold};
+use super::dialect::{MessageSet, Observation, Request, Told as DriveTold};
 use super::frame::Frame;
 use super::parameters::Parameters;
 use super::session::{Session, Told};
@@ -9,16 +9,16 @@ use crate::machine::Ratings;
 use crate::operator::{Settings, Status};
 use core::borrow::Borrow;
 
-/// The drive's end of the protocol. A board calls [`Station::listen`] where the operator asks, [`Station::tell`] where it tells.
+/// The drive's end of the protocol. A board calls [`CanEndpoint::listen`] where the operator asks, [`CanEndpoint::tell`] where it tells.
 #[derive(Clone, Copy, Debug)]
-pub struct Station<D: Dialect> {
+pub struct CanEndpoint<D: MessageSet> {
     session: Session<D>,
     ratings: &'static Ratings,
     /// The slot's observation.
     observed: Option<Observation<D>>,
 }
 
-impl<D: Dialect> Station<D> {
+impl<D: MessageSet> CanEndpoint<D> {
     /// At power-up.
     pub const fn new(ratings: &'static Ratings) -> Self {
         Self { session: Session::new(ratings), ratings, observed: None }
@@ -30,7 +30,7 @@ impl<D: Dialect> Station<D> {
         Settings { slew_nm_s: torque_slew_nm_s, jerk_nm_s2: torque_jerk_nm_s2, ..*settings }
     }
 
-    /// What is asked in a slot, `slots` after the last one, after the frames that have come since; and what the drive said of itself
+    /// The request in a slot, `slots` after the last one, after the frames that have come since; with the drive's observation of itself
     /// at the slot's beginning.
     pub fn listen<F: Borrow<Frame>>(
         &mut self,

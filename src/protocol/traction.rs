@@ -3,7 +3,7 @@
 use super::commands::{
     COMMAND, Command, LIMITS, LINK_LIMITS, LinkLimits, PARAMETER_REQUEST, ParameterRequest, TorqueLimits,
 };
-use super::dialect::{Dialect, Taken, motor_limits};
+use super::dialect::{MessageSet, Taken, motor_limits};
 use super::message::Message;
 use super::parameters::{Parameters, RPM_PER_RAD_S};
 use super::signal::Payload;
@@ -13,8 +13,9 @@ use crate::machine::Ratings;
 use crate::modulation::Mode;
 use crate::operator::{Limits, MotorLimits, Observation, Request, TorqueDemand};
 
-/// What a frame that was taken says.
+/// The content of a frame that was taken.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Content {
     /// The first of its message, or the first after a silence: it only set the counter.
     Greeting,
@@ -28,7 +29,7 @@ pub enum Content {
     Parameter(ParameterRequest),
 }
 
-/// What was said to the PMaSynRM drive last.
+/// The contents that the PMaSynRM drive received last.
 #[derive(Clone, Copy, Debug)]
 pub struct Traction {
     command: Command,
@@ -50,7 +51,7 @@ impl Traction {
     }
 }
 
-impl Dialect for Traction {
+impl MessageSet for Traction {
     type Demands = TorqueDemand;
     type Content = Content;
     type Measured = Measured;

@@ -5,13 +5,14 @@ use super::commands::{
     PARAMETER, ParameterRequest, SPEED as SPEED_LIMIT, TORQUE_NM, TorqueLimits, VALUE, WITH_TORQUE, WRITE,
     levels, put_levels,
 };
-use super::dialect::{Dialect, Taken, motor_limits};
+use super::dialect::{MessageSet, Taken, motor_limits};
 use super::message::Message;
 use super::parameters::{Parameters, RPM_PER_RAD_S};
 use super::signal::{OutOfRange, Payload, Signal};
 use super::telemetry::{
     ANSWER_PARAMETER, ANSWER_RESULT, ANSWER_VALUE, CHOPPER, COUNTER_SIGNALS, DISCHARGE, FAULT, LISTENING,
     MAIN, PRECHARGE, REFUSAL, REFUSALS, SPEED_RPM, STATE, TAKEN, TRIP_FAULT, TRIP_LIMIT, TRIP_VALUE, encode,
+    pattern,
 };
 use crate::drive::dual;
 use crate::machine::Ratings;
@@ -29,7 +30,7 @@ const SPEEDS: [Signal; 2] = [
 ];
 const LINK_REF: Signal = Signal::physical("link_ref_v", "V", 16, 0.1, LINK_V);
 
-const SCHEME: Signal = Signal::number("scheme", 40, 3, 7);
+const SCHEME: Signal = pattern("scheme");
 const SPEED: Signal = Signal::physical("speed_rpm", "r/min", 16, 0.5, SPEED_RPM);
 const TORQUE: Signal = Signal::physical("torque_nm", "N.m", 32, 0.1, TORQUE_NM);
 const CURRENT: Signal = Signal::physical("current_a", "A", 48, 0.1, [0.0, 3_000.0]);
@@ -86,16 +87,17 @@ const COUNTERS: Message = Message::new("ZS9_COUNTERS", 0x197, 28, 100, &COUNTER_
 const PARAMETER_ANSWER: Message =
     Message::new("ZS9_PARAMETER_ANSWER", 0x198, 29, 0, &[ANSWER_RESULT, ANSWER_PARAMETER, ANSWER_VALUE]);
 
-/// What is sent to the ZS9.
+/// The messages to the ZS9.
 pub const TO_ZS9: [&Message; 5] =
     [&ZS9_COMMAND, &ZS9_LIMITS[0], &ZS9_LIMITS[1], &ZS9_LINK, &ZS9_PARAMETER_REQUEST];
 
-/// What the ZS9 sends.
+/// The messages from the ZS9.
 pub const FROM_ZS9: [&Message; 8] =
     [&ZS9_STATUS, &MOTOR_1, &MOTOR_2, &LINK_STATE, &FAULT_VALUE, &FAULT_LIMIT, &COUNTERS, &PARAMETER_ANSWER];
 
 /// Demands of the upper motor and of the lower one.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Zs9Demands {
     /// Torques, in N·m.
     Torques([f32; 2]),
@@ -105,6 +107,7 @@ pub enum Zs9Demands {
 
 /// Content of [`ZS9_COMMAND`].
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Zs9Command {
     /// Levels.
     pub levels: Levels,
@@ -143,6 +146,7 @@ impl Zs9Command {
 
 /// Content of [`ZS9_LINK`].
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Zs9Link {
     /// Link voltage wanted outside shoot-through, in V.
     pub link_ref_v: f32,
@@ -163,8 +167,9 @@ impl Zs9Link {
     }
 }
 
-/// What a frame that was taken says.
+/// The content of a frame that was taken.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Zs9Content {
     /// The first of its message, or the first after a silence: it only set the counter.
     Greeting,
@@ -178,8 +183,9 @@ pub enum Zs9Content {
     Parameter(ParameterRequest),
 }
 
-/// What is measured of one motor. `None`: not available.
+/// The measurements of one motor. `None`: not available.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct MotorMeasured {
     /// Mechanical speed, in r/min.
     pub speed_rpm: Option<f32>,
@@ -189,8 +195,9 @@ pub struct MotorMeasured {
     pub current_a: Option<f32>,
 }
 
-/// What is measured. `None`: not available.
+/// The measurements. `None`: not available.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Zs9Measured {
     /// Upper motor, lower motor.
     pub motors: [MotorMeasured; 2],
@@ -223,7 +230,7 @@ impl Zs9Measured {
     }
 }
 
-/// What was said to the ZS9 last.
+/// The contents that the ZS9 received last.
 #[derive(Clone, Copy, Debug)]
 pub struct Zs9 {
     command: Zs9Command,
@@ -231,7 +238,7 @@ pub struct Zs9 {
     link: Option<Zs9Link>,
 }
 
-impl Dialect for Zs9 {
+impl MessageSet for Zs9 {
     type Demands = DualDemands;
     type Content = Zs9Content;
     type Measured = Zs9Measured;

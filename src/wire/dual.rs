@@ -13,7 +13,7 @@ use crate::protocol::Frame;
 use crate::recorder::DualRecord;
 use crate::time::Instant;
 
-/// What the rig tells the image before anything starts.
+/// The values that the rig tells the image before anything starts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DualSetup {
     /// Carrier period, in ticks.
@@ -47,7 +47,7 @@ pub enum DualRequest {
     Leave(Instant),
     /// The frame that has come, and what the board says, in the slot that began at the instant.
     Ask(Instant),
-    /// What the operator told, and the frame that says so; both from the instant on.
+    /// The operator's status, and the frame that carries it; both from the instant on.
     Tell(Instant, DualStatus, Option<Frame>),
 }
 
@@ -113,7 +113,7 @@ impl DualRequest {
     }
 }
 
-/// What the rig is told of a report: not what it has measured itself.
+/// The words of a report that the rig is told: not what it has measured itself.
 fn told_of(report: &DualReport) -> [u32; 10] {
     let [a, b, c, d, e, f, g, h, i, j, ..] = report.to_words();
     [a, b, c, d, e, f, g, h, i, j]

@@ -1,10 +1,11 @@
-//! What is wrong with a machine folder, in one line.
+//! The error of a machine folder, in one line.
 
 use std::path::{Path, PathBuf};
 
 /// A refusal: file, line, field, value, and what is allowed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{}{}: {problem}", file.display(), line.map_or(String::new(), |line| format!(":{line}")))]
+#[non_exhaustive]
 pub struct InputError {
     /// The file.
     pub file: PathBuf,
@@ -15,8 +16,8 @@ pub struct InputError {
 }
 
 impl InputError {
-    pub(crate) fn new(file: &Path, line: Option<u64>, problem: impl Into<String>) -> Self {
-        // One line, whatever a parser's message looks like.
+    /// A problem in a file, on one line whatever a parser's message looks like; and the number of its line, if it has one.
+    pub fn new(file: &Path, line: Option<u64>, problem: impl Into<String>) -> Self {
         let problem = problem.into().split_whitespace().collect::<Vec<_>>().join(" ");
         Self { file: file.to_owned(), line, problem }
     }

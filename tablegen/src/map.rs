@@ -39,7 +39,7 @@ struct Node {
 }
 
 impl Node {
-    /// Which of two comes first in the grid, iq running faster.
+    /// The order of two in the grid, iq running faster.
     fn place(&self, other: &Self) -> Ordering {
         self.id.total_cmp(&other.id).then(self.iq.total_cmp(&other.iq))
     }

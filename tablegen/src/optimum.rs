@@ -54,7 +54,7 @@ impl<'a> Optimum<'a> {
     }
 }
 
-/// Where a function of one hump is largest.
+/// The place where a function of one hump is largest.
 fn largest(low: f64, high: f64, value: impl Fn(f64) -> f64) -> f64 {
     const RATIO: f64 = 0.618_033_988_749_894_9;
     let (mut a, mut b) = (low, high);

@@ -46,7 +46,7 @@ pub struct Parameters {
     pub trip_speed_rpm: f64,
     /// Slew rate of the torque demand, in N·m/s; default `max_torque_nm` in 0.1 s.
     pub torque_slew_nm_per_s: f64,
-    /// Inertia of the rotor and what it drives, in kg·m²; default 1.
+    /// Inertia of the rotor and what it drives, in kg·m²; by default `max_torque_nm` takes it to `max_speed_rpm` in one second.
     pub rotor_inertia_kg_m2: f64,
     /// Iron and mechanical loss at rated speed, in W; default 0.
     pub loss_rated_w: f64,
@@ -284,6 +284,7 @@ impl<'a> Keys<'a> {
         let max_current_a = above_zero("max_current_a", 1e5, 0.0)?;
         let max_speed_rpm = above_zero("max_speed_rpm", 1e6, 0.0)?;
         let max_torque_nm = above_zero("max_torque_nm", 1e7, 0.0)?;
+        let one_second_kg_m2 = max_torque_nm / (max_speed_rpm * std::f64::consts::TAU / 60.0);
         let dc_link_min_v = above_zero("dc_link_min_v", 1e5, 0.0)?;
         let dc_link_max_v = above_zero("dc_link_max_v", 1e5, 0.0)?;
         Ok(Parameters {
@@ -305,7 +306,7 @@ impl<'a> Keys<'a> {
             trip_dc_under_v: self.number("trip_dc_under_v", 0.0..=1e6, 0.85 * dc_link_min_v)?,
             trip_speed_rpm: above_zero("trip_speed_rpm", 1e7, 1.1 * max_speed_rpm)?,
             torque_slew_nm_per_s: above_zero("torque_slew_nm_per_s", 1e9, 10.0 * max_torque_nm)?,
-            rotor_inertia_kg_m2: above_zero("rotor_inertia_kg_m2", 1e7, 1.0)?,
+            rotor_inertia_kg_m2: above_zero("rotor_inertia_kg_m2", 1e7, one_second_kg_m2)?,
             loss_rated_w: self.number("loss_rated_w", 0.0..=1e8, 0.0)?,
             loss_quadratic_fraction: self.number("loss_quadratic_fraction", 0.0..=1.0, 0.6)?,
             lines: self.values.iter().map(|(key, value)| (key.clone(), value.line)).collect(),

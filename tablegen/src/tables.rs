@@ -189,7 +189,7 @@ impl ParameterGrid {
         (mix(|node| node.0), mix(|node| node.1))
     }
 
-    /// What the firmware does, without trims: two passes from `start` for `torque / (1.5 n_p)`.
+    /// The firmware's own result, without trims: two passes from `start` for `torque / (1.5 n_p)`.
     fn two_passes(&self, torque_per_factor: f64, start: (f64, f64), universal: &[f64]) -> (f64, f64) {
         let mut current = start;
         for _ in 0..2 {

@@ -107,12 +107,17 @@ fn mix(a: f64, b: f64, share: f64) -> f64 {
     a + (b - a) * share
 }
 
+/// The smallest circle at most, as a share of the largest flux linkage.
+const MOST_LOW: f64 = 0.7;
+
 impl<'a> Circles<'a> {
     fn new(machine: &'a MachineFolder, smooth: &'a SmoothMap, top_flux_wb: f64) -> Self {
         let parameters = &machine.parameters;
         let max_omega = parameters.max_speed_rpm * TAU / 60.0 * f64::from(parameters.pole_pairs);
-        // Below what the lowest link gives at the highest speed, and above what full torque needs.
-        let low = LEAST_DEPTH * FRAC_2_PI * parameters.dc_link_min_v / max_omega;
+        // Below what the lowest link gives at the highest speed, and above what full torque needs. Where the link has much voltage in
+        // reserve, the circles still lie where the machine's flux linkage does.
+        let low =
+            (LEAST_DEPTH * FRAC_2_PI * parameters.dc_link_min_v / max_omega).min(MOST_LOW * top_flux_wb);
         let high = (1.15 * top_flux_wb).max(1.5 * low);
         let knee_wb = FLUX_KNEE * high;
         let share = |k: usize| {

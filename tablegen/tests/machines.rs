@@ -30,7 +30,7 @@ fn check(name: &str, machine: MachineFolder, bounds: &Bounds) {
     assert!(mtpa.current_a < most && weakening.current_a < most, "{name}");
 }
 
-/// What holds at every node.
+/// The rules that hold at every node.
 fn check_nodes(name: &str, judge: &Judge) {
     let (tables, map) = (&judge.tables, &judge.machine.map);
     let parameters = &judge.machine.parameters;

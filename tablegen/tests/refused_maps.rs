@@ -42,7 +42,7 @@ impl Map {
     }
 }
 
-/// What reading a folder with this map says, without the folder's path.
+/// The error of reading a folder with this map, without the folder's path.
 #[track_caller]
 fn refusal(map: &str) -> String {
     let folder = Folder::new(&good_toml(), map);

@@ -5,7 +5,7 @@ mod common;
 
 use common::{Folder, good_map, good_toml, toml_with};
 
-/// What reading a folder with this `machine.toml` says, without the folder's path.
+/// The error of reading a folder with this `machine.toml`, without the folder's path.
 #[track_caller]
 fn refusal(machine: &str) -> String {
     let folder = Folder::new(machine, &good_map());

@@ -4,8 +4,8 @@ use tractive::built_in::zs9::BUILT_IN;
 use tractive::drive::dual::{self};
 use tractive::machine::Ratings;
 use tractive::operator::{
-    Configuration, DualObservation, DualOperator, DualPermit, DualRequest, DualStatus, Feedback, Input, Line,
-    MotorLimits, Output, Refusal, Settings, State, Wanted,
+    Configuration, DualDriveCommand, DualObservation, DualOperator, DualRequest, DualStatus, Feedback, Input,
+    Line, MotorLimits, Output, Refusal, Settings, State, Wanted,
 };
 use tractive::ports::DualReport;
 use tractive::ports::MotorDemand;
@@ -20,7 +20,7 @@ struct World {
     request: DualRequest,
     observed: DualObservation,
     feedback: Feedback,
-    last: Option<Output<DualPermit, [MotorDemand; 2]>>,
+    last: Option<Output<DualDriveCommand, [MotorDemand; 2]>>,
 }
 
 impl World {
@@ -79,7 +79,7 @@ impl World {
         assert!((0..5_000).any(|_| self.slot().state == state), "{state:?}: {:?}", self.last);
     }
 
-    fn permit(&self) -> DualPermit {
+    fn permit(&self) -> DualDriveCommand {
         self.last.unwrap().permit
     }
 

@@ -1,4 +1,4 @@
-//! What no sequence of requests, measurements and misbehaviour may do.
+//! The rules that no sequence of requests, measurements and misbehaviour may break.
 
 use crate::world::{World, trip};
 use proptest::prelude::*;
@@ -82,7 +82,7 @@ fn event() -> impl Strategy<Value = Event> {
     ]
 }
 
-/// What an onlooker knows: it has its own idea of what a command is.
+/// The knowledge of an onlooker: it has its own idea of what a command is.
 struct Onlooker {
     enable: bool,
     /// An enabling edge has come, and neither a fault nor the end of a stop since.

@@ -136,7 +136,7 @@ impl World {
         panic!("{state:?} does not come: {:?}", self.output());
     }
 
-    /// What the world makes of an output before the next slot.
+    /// The world's reaction to an output before the next slot.
     fn react(&mut self, output: &Output) {
         let switches = output.status.switches;
         let [relay, main] = &mut self.moving;

@@ -7,12 +7,13 @@ use proptest::prelude::*;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
-use tractive::modulation::Mode;
+use tractive::modulation::{MODE_CODES, Mode};
 use tractive::nine_switch::Scheme;
 use tractive::operator::{Refusal, State};
 use tractive::protection::Fault;
 use tractive::protocol::{
-    COUNTER, CRC, FROM_DRIVE, FROM_ZS9, Kind, Listening, Message, Outcome, Payload, Signal, TO_DRIVE, TO_ZS9,
+    COUNTER, CRC, FROM_DRIVE, FROM_ZS9, Kind, Listening, Message, Outcome, Pattern, Payload, STATUS, Signal,
+    StatusFrame, TO_DRIVE, TO_ZS9, ZS9_STATUS,
 };
 
 fn path() -> PathBuf {
@@ -197,6 +198,33 @@ fn signals_do_not_overlap() {
     }
 }
 
+/// A pulse pattern by its code alone.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Code(u32);
+
+impl Pattern for Code {
+    fn code(self) -> u32 {
+        self.0
+    }
+
+    fn from_code(code: u32) -> Self {
+        Self(code)
+    }
+}
+
+#[test]
+fn the_status_has_room_for_every_code_of_a_mode() {
+    let mut status = StatusFrame { refusals: 0x1F, ..StatusFrame::decode(Payload(0)) };
+    for code in 0..MODE_CODES {
+        status.mode = Code(code);
+        assert_eq!(StatusFrame::decode(status.encode()), status);
+        for (message, name) in [(&STATUS, "mode"), (&ZS9_STATUS, "scheme")] {
+            let signal = message.signals.iter().find(|signal| signal.name == name).unwrap();
+            assert_eq!(signal.get(status.encode()), Some(code as f32), "{}", message.name);
+        }
+    }
+}
+
 /// A signal's raw bits by the file's description alone, bit by bit.
 fn raw_by_file(data: [u8; 8], signal: &can_dbc::Signal) -> i64 {
     let bit = |n: u64| i64::from(data[n as usize / 8] >> (n % 8) & 1);
@@ -252,7 +280,7 @@ proptest! {
         }
     }
 
-    /// What the file's range excludes is no value, whatever its bits.
+    /// The values that the file's range excludes are none, whatever their bits.
     #[test]
     fn nothing_outside_the_files_range_is_decoded(bits: u64) {
         let dbc = parsed();

@@ -9,7 +9,7 @@ use tractive::protocol::{
     Payload, Receiver, Session, TO_DRIVE,
 };
 
-/// What a bus, or somebody on it, does to frames.
+/// The injuries that a bus, or somebody on it, does to frames.
 #[derive(Clone, Debug)]
 enum Event {
     /// Any bytes under any identifier.

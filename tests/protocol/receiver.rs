@@ -1,4 +1,4 @@
-//! Which frames take effect, and how the others are counted.
+//! The frames that take effect, and the counts of the others.
 
 use crate::Stream;
 use tractive::protocol::{

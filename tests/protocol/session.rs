@@ -254,7 +254,7 @@ fn what_is_told_is_what_arrives() {
     bench.command(PULL);
     bench.status = Status {
         refusal: Some(Refusal::LinkNotCharged),
-        refusals: 258,
+        refusals: 290,
         switches: Switches { main: true, chopper: 0.25, ..Switches::default() },
         ..status(State::Charged)
     };

@@ -7,8 +7,8 @@ use tractive::nine_switch::Scheme;
 use tractive::operator::{DualObservation, DualRequest, DualStatus, Levels, State, Switches, Wanted};
 use tractive::ports::DualReport;
 use tractive::protocol::{
-    Dialect, FROM_ZS9, Frame, Payload, StatusFrame, TO_ZS9, TorqueLimits, ZS9_COMMAND, ZS9_LIMITS, ZS9_LINK,
-    Zs9, Zs9Command, Zs9Demands, Zs9Link, Zs9Measured, Zs9Session, Zs9Station,
+    FROM_ZS9, Frame, MessageSet, Payload, StatusFrame, TO_ZS9, TorqueLimits, ZS9_COMMAND, ZS9_LIMITS,
+    ZS9_LINK, Zs9, Zs9CanEndpoint, Zs9Command, Zs9Demands, Zs9Link, Zs9Measured, Zs9Session,
 };
 use tractive::time::{Clock, Instant};
 
@@ -110,7 +110,7 @@ fn hostile_frames_are_rejected_and_counted() {
 
 #[test]
 fn the_telemetry_says_what_is_measured() {
-    let mut station = Zs9Station::new(ratings());
+    let mut station = Zs9CanEndpoint::new(ratings());
     let report = DualReport {
         torque_nm: [60.0, -20.0],
         omega: [418.879, -209.44],
@@ -127,7 +127,7 @@ fn the_telemetry_says_what_is_measured() {
         trip: None,
         refusal: None,
         refusals: 0,
-        torque_nm: tractive::operator::DualPermit::NONE.demands,
+        torque_nm: tractive::operator::DualDriveCommand::NONE.demands,
         switches: Switches { main: true, ..Switches::default() },
     };
     let (mut measured, mut told) = (Zs9Measured::default(), None);

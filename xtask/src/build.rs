@@ -1,4 +1,4 @@
-//! How cargo is called: the image for the board, the rig for this machine.
+//! The calls of cargo: the image for the board, the rig for this machine.
 
 use std::ffi::OsString;
 use std::path::PathBuf;
@@ -7,42 +7,13 @@ use std::process::{Command, Stdio};
 use anyhow::{Context, Result, bail};
 use clap::ValueEnum;
 
+use crate::board::Board;
 use crate::process;
 use crate::setup::Toolchain;
 pub use crate::workspace::{TARGET, cargo, root};
 
 /// The feature of the reference images, on the emulated board.
 pub const QEMU: &str = "qemu";
-
-/// The boards of real hardware, by their feature `board-NAME`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Board {
-    /// ST's NUCLEO-G474RE
-    NucleoG474re,
-}
-
-impl Board {
-    /// The feature of the firmware's crate.
-    pub const fn feature(self) -> &'static str {
-        match self {
-            Self::NucleoG474re => "board-nucleo-g474re",
-        }
-    }
-
-    /// Where its flash memory begins, and with it the image.
-    pub const fn flash_origin(self) -> u32 {
-        match self {
-            Self::NucleoG474re => 0x0800_0000,
-        }
-    }
-
-    /// What probe-rs calls the chip.
-    pub const fn chip(self) -> &'static str {
-        match self {
-            Self::NucleoG474re => "STM32G474RETx",
-        }
-    }
-}
 
 /// The systems, each with an image of its own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -66,6 +37,14 @@ impl System {
         }
     }
 
+    /// The name of a board's image.
+    pub fn image_on(self, board: &Board) -> String {
+        match self {
+            Self::Traction => board.name.clone(),
+            Self::Zs9 => format!("{}-zs9", board.name),
+        }
+    }
+
     /// The folder of tables/ that the image is built with unless another is named.
     pub const fn machine(self) -> &'static str {
         match self {
@@ -85,34 +64,35 @@ impl System {
 
 /// Builds a system's image, with the tables of `machine` if one is named (a name or an absolute path).
 pub fn image(toolchain: &Toolchain, system: System, machine: Option<&OsString>) -> Result<PathBuf> {
-    firmware(toolchain, system, QEMU, machine)
-}
-
-/// The same with a feature of the emulated board.
-pub fn image_with(toolchain: &Toolchain, system: System, feature: &str) -> Result<PathBuf> {
-    firmware(toolchain, system, feature, None)
+    let mut command = on_target(toolchain, "tractive", system.image());
+    command.args(["--features", QEMU]);
+    firmware(command, system.image(), system, machine)
 }
 
 /// Builds a system's image for a board of real hardware, with the tables of `machine` if one is named.
 pub fn board_image(
     toolchain: &Toolchain,
-    board: Board,
+    board: &Board,
     system: System,
     machine: Option<&OsString>,
 ) -> Result<PathBuf> {
-    firmware(toolchain, system, board.feature(), machine)
+    let name = system.image_on(board);
+    firmware(on_target(toolchain, &board.package, &name), &name, system, machine)
 }
 
-fn firmware(
-    toolchain: &Toolchain,
-    system: System,
-    feature: &str,
-    machine: Option<&OsString>,
-) -> Result<PathBuf> {
-    let mut command = on_target(toolchain, "tractive", system.image());
-    command.args(["--features", feature]);
+fn firmware(mut command: Command, name: &str, system: System, machine: Option<&OsString>) -> Result<PathBuf> {
     command.envs(machine.map(|machine| (system.machine_variable(), machine)));
-    executable(&mut command, system.image(), machine.is_some()).context("the image was not built")
+    executable(&mut command, name, machine.is_some()).context("the image was not built")
+}
+
+/// Builds the system's image with the fault injector.
+pub fn fault_injector(toolchain: &Toolchain, system: System) -> Result<PathBuf> {
+    let name = match system {
+        System::Traction => "fault-injector",
+        System::Zs9 => "fault-injector-zs9",
+    };
+    executable(&mut on_target(toolchain, "tractive-fault-injector", name), name, false)
+        .context("the image was not built")
 }
 
 /// Builds one of the bench's images: `tractive-bench`, the building blocks, or `cell_stress`.
@@ -168,7 +148,7 @@ fn artifact(messages: &str, name: &str) -> Option<PathBuf> {
         .next_back()
 }
 
-/// What a failed build script said, on one line: its standard error, else its `cargo::error`s.
+/// The message of a failed build script, on one line: its standard error, else its `cargo::error`s.
 fn complaint(cargo_said: &str) -> Option<String> {
     if !cargo_said.contains("failed to run custom build command") {
         return None;
@@ -202,13 +182,13 @@ mod tests {
 
     #[test]
     fn the_machines_are_those_of_the_build_script() {
-        let script = include_str!("../../build.rs");
-        for system in System::ALL {
-            assert!(script.contains(&format!(
-                "(\"{}\", \"{}\"",
-                system.machine_variable(),
-                system.machine()
-            )));
+        let boards = Board::all().unwrap().into_iter().map(|board| format!("boards/{}", board.name));
+        for package in std::iter::once(String::new()).chain(boards) {
+            let script = std::fs::read_to_string(root().join(&package).join("build.rs")).unwrap();
+            for system in System::ALL {
+                let pair = format!("(\"{}\", \"{}\"", system.machine_variable(), system.machine());
+                assert!(script.contains(&pair), "{package}: {pair}");
+            }
         }
     }
 

@@ -19,18 +19,18 @@ const ACCESSES: &str = "cell_stress::accesses::";
 /// 64 ns an instruction: longer than a tick of the timers, 40 ns, by which the phase moves.
 const NANOSECONDS_SHIFT: u32 = 6;
 
-/// What the image says.
+/// The image's account of a run.
 #[derive(Debug, Default, PartialEq, Eq)]
 struct Said {
     rounds: u32,
     /// Control interrupts that outlived their period: then the sweep was none.
     late: u32,
     cells: BTreeMap<String, Counts>,
-    /// Where interrupts landed.
+    /// The addresses at which interrupts landed.
     landed: BTreeSet<u32>,
 }
 
-/// What was found of a cell.
+/// The findings about a cell.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct Counts {
     reads: u32,

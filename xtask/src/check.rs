@@ -1,4 +1,4 @@
-//! What an image must not hold: double-precision arithmetic in software, and a way from an interrupt into a panic.
+//! The contents that no image may hold: double-precision arithmetic in software, and a way from an interrupt into a panic.
 //!
 //! The second goes by the names of functions. A panic function that was inlined whole leaves no name, so the check
 //! finds what is there and proves only as much as the names tell; the standard library keeps its panic functions
@@ -111,7 +111,7 @@ mod tests {
     use super::*;
     use crate::elf::tests::small_elf;
 
-    /// Whether all of these names, or none of them, are what is looked for.
+    /// `true` if all of these names, or none of them, are what is looked for.
     fn all(names: &str, expected: bool, is: fn(&str) -> bool) {
         for name in names.split_whitespace() {
             assert_eq!(is(name), expected, "{name}");

@@ -1,10 +1,11 @@
-//! What may be typed.
+//! The command line.
 
 use std::ffi::OsString;
 
 use clap::{Args, Parser, Subcommand};
 
-use crate::build::{Board, System};
+use crate::board::Board;
+use crate::build::System;
 use crate::step::Step;
 
 /// The chores of `tractive`.
@@ -72,8 +73,8 @@ pub struct TimingArgs {
 
 #[derive(Args, Debug)]
 pub struct FlashArgs {
-    /// The board
-    #[arg(long, value_enum, default_value = "nucleo-g474re")]
+    /// The board: a folder of boards/
+    #[arg(long, value_parser = Board::named, default_value = "nucleo-g474re")]
     pub board: Board,
     /// The system whose image it is
     #[arg(long, value_enum, default_value = "pmasynrm")]
@@ -113,7 +114,7 @@ mod tests {
             let Command::Flash(args) = Cli::try_parse_from(words).unwrap().command else {
                 panic!("not flash")
             };
-            assert_eq!((args.board, args.system), (Board::NucleoG474re, System::Traction));
+            assert_eq!((args.board.name.as_str(), args.system), ("nucleo-g474re", System::Traction));
         }
         let cli = Cli::try_parse_from(["xtask", "flash", "--system", "zs9", "--dry-run"]).unwrap();
         let Command::Flash(args) = cli.command else { panic!("not flash") };

@@ -29,11 +29,11 @@ pub struct Sizes {
     pub ram: u64,
     /// The flight recorder's ring.
     pub recorder: u64,
-    /// What is left of the memory for the stack.
+    /// The memory that is left for the stack.
     pub stack: u64,
 }
 
-/// What was read out of an ELF file.
+/// The contents of an ELF file.
 #[derive(Clone, Debug, Default)]
 pub struct Image {
     /// By address.
@@ -48,7 +48,7 @@ pub struct Image {
     pub instructions: BTreeMap<u32, Instruction>,
     /// Name and address of what the vector table leads to, but for the reset.
     pub handlers: Vec<(String, u32)>,
-    /// Where the vector table lies.
+    /// The address of the vector table.
     pub origin: u32,
     /// Every aligned word of the data sections.
     pub data_words: BTreeSet<u32>,
@@ -93,7 +93,7 @@ impl Image {
         Some(u32::from_le_bytes(bytes.get(at..at + 4)?.try_into().ok()?))
     }
 
-    /// Whether the code at this address is instructions, not literals.
+    /// `true` if the code at this address is instructions, not literals.
     pub fn is_code(&self, address: u32) -> bool {
         self.mapping.range(..=address).next_back().is_none_or(|(_, is_code)| *is_code)
     }

@@ -5,7 +5,8 @@ use std::process::Command;
 
 use anyhow::{Result, bail};
 
-use crate::build::{self, Board, root};
+use crate::board::Board;
+use crate::build::{self, root};
 use crate::cli::FlashArgs;
 use crate::process::{find, succeeds};
 use crate::run::machine_for_build;
@@ -21,8 +22,8 @@ pub fn run(args: &FlashArgs) -> Result<u8> {
     }
     let machine = args.machine.as_deref().map(|machine| machine_for_build(machine, root())).transpose()?;
     let toolchain = Setup::default().toolchain()?;
-    let image = build::board_image(&toolchain, args.board, args.system, machine.as_ref())?;
-    for mut command in commands(args.board, args.log, &image) {
+    let image = build::board_image(&toolchain, &args.board, args.system, machine.as_ref())?;
+    for mut command in commands(&args.board, args.log, &image) {
         if args.dry_run {
             println!("{}", spelled(&command));
         } else if !succeeds(&mut command)? {
@@ -37,11 +38,11 @@ fn spelled(command: &Command) -> String {
     words.map(|word| word.to_string_lossy().into_owned()).collect::<Vec<_>>().join(" ")
 }
 
-/// What probe-rs is asked for, one after the other.
-fn commands(board: Board, log: bool, image: &Path) -> Vec<Command> {
+/// The calls of probe-rs, one after the other.
+fn commands(board: &Board, log: bool, image: &Path) -> Vec<Command> {
     let probe = |subcommand: &str| {
         let mut command = Command::new(PROGRAM);
-        command.current_dir(root()).args([subcommand, "--chip", board.chip()]);
+        command.current_dir(root()).args([subcommand, "--chip", &board.told.chip]);
         command
     };
     if log {
@@ -59,7 +60,7 @@ mod tests {
     use super::*;
 
     fn words(log: bool) -> Vec<String> {
-        let commands = commands(Board::NucleoG474re, log, Path::new("i.elf"));
+        let commands = commands(&Board::read("nucleo-g474re").unwrap(), log, Path::new("i.elf"));
         commands.iter().map(spelled).collect()
     }
 

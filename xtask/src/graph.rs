@@ -1,4 +1,4 @@
-//! Which function may call which. Direct branches are decoded; where a function holds another one's address (put
+//! The call graph. Direct branches are decoded; where a function holds another one's address (put
 //! together by MOVW and MOVT, or as a literal) it is taken to call it; a function that branches through a register
 //! may besides go to any function whose address stands in the data.
 

@@ -6,7 +6,7 @@ use std::path::Path;
 use anyhow::{Context, Result};
 use serde_json::json;
 
-use crate::build::Board;
+use crate::board::Board;
 use crate::cli::ImageArgs;
 use crate::elf::{Image, Sizes};
 use crate::setup::Setup;
@@ -40,8 +40,8 @@ pub fn check(path: &Path) -> Result<bool> {
 }
 
 /// The same for a board of real hardware, whose image must also lie where its flash memory is.
-pub fn check_board(path: &Path, board: Board) -> Result<bool> {
-    let (origin, wanted) = (read(path)?.origin, board.flash_origin());
+pub fn check_board(path: &Path, board: &Board) -> Result<bool> {
+    let (origin, wanted) = (read(path)?.origin, board.told.flash_origin);
     if origin != wanted {
         println!("the image begins at {origin:#x}, the board's flash memory at {wanted:#x}");
     }

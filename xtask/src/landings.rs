@@ -18,22 +18,23 @@ use rayon::prelude::*;
 
 use crate::build::System;
 use crate::elf::Image;
+use crate::fault_injector::{FaultInjector, Found};
 use crate::image;
-use crate::saboteur::{Found, Saboteur};
 use crate::setup::Setup;
 use crate::timing::drive::Bench;
 use crate::timing::statistics::INTERRUPTS;
 use hunt::Hunt;
 use reach::{Reached, Stand};
 
-/// What one system is driven through.
+/// The course that one system is driven through.
 struct Course {
     system: System,
     /// Scenarios and options of the rig, a run each: the first through every mode.
     runs: &'static [(&'static str, &'static [&'static str])],
-    /// From a control interrupt to its deadline, in ticks.
+    /// The control period, and from a control interrupt to its deadline, in ticks.
+    control_ticks: u32,
     deadline_ticks: u32,
-    /// How many instructions may be left that no reason excuses: what is executed only while a mode changes, far from a boundary in
+    /// The most instructions that may be left and that no reason excuses: what is executed only while a mode changes, far from a boundary in
     /// each of these runs. Each is named.
     most_missing: usize,
 }
@@ -45,16 +46,22 @@ const INSTRUCTIONS_PER_TICK: u32 = 10;
 const COURSES: [Course; 2] = [
     Course {
         system: System::Traction,
-        // At a phase of the timers where a boundary meets what control does every fifty periods.
-        runs: &[("timing", &["--to=6000"]), ("borders-timing", &["--pwm-delay-us=25"])],
-        deadline_ticks: 2_500,
-        // All of them tell control the ripple flux when a pattern gives way to a carrier: 29 were left with two more phases.
-        most_missing: 40,
+        // With control so slow that a carrier half is shorter than two of its periods: all stages of the law run in each, so a boundary
+        // comes at each of them. At a phase of the timers where a boundary meets what control does every fifty periods.
+        runs: &[
+            ("timing", &["--to=2500", "--control-hz=3125"]),
+            ("borders-timing", &["--pwm-delay-us=25", "--control-hz=3125"]),
+        ],
+        control_ticks: 8_000,
+        deadline_ticks: 8_000,
+        // Three are left: they tell control the ripple flux when a pattern gives way to a carrier.
+        most_missing: 8,
     },
     // At 10 kHz the PWM interrupt comes at control's deadline.
     Course {
         system: System::Zs9,
         runs: &[("zs9-timing", &["--scheme=s", "--carrier-hz=20000", "--uin=800"])],
+        control_ticks: 2_500,
         deadline_ticks: 1_875,
         most_missing: 0,
     },
@@ -80,9 +87,9 @@ struct Call {
 /// The step of the tests; what is wrong is printed, `true` is good.
 pub fn check(setup: &mut Setup) -> Result<bool> {
     let folder = tempfile::tempdir().context("no temporary folder")?;
-    let built = COURSES.iter().map(|course| Ok((course, Saboteur::build(setup, course.system)?)));
+    let built = COURSES.iter().map(|course| Ok((course, FaultInjector::build(setup, course.system)?)));
     let built: Vec<_> = built.collect::<Result<_>>()?;
-    let courses = built.into_par_iter().map(|(course, saboteur)| course.check(saboteur, folder.path()));
+    let courses = built.into_par_iter().map(|(course, injector)| course.check(injector, folder.path()));
     let mut good = true;
     for (text, is_good) in courses.collect::<Result<Vec<_>>>()? {
         print!("{text}");
@@ -92,18 +99,18 @@ pub fn check(setup: &mut Setup) -> Result<bool> {
 }
 
 impl Course {
-    /// What is to be printed, and whether it is good.
-    fn check(&self, mut saboteur: Saboteur, folder: &Path) -> Result<(String, bool)> {
+    /// The lines to print, and whether the result is good.
+    fn check(&self, mut injector: FaultInjector, folder: &Path) -> Result<(String, bool)> {
         let folder = folder.join(self.system.image());
-        let image = image::read(&saboteur.image)?;
+        let image = image::read(&injector.image)?;
         let mut reached = Reached::default();
         let mut findings = Vec::new();
         for (number, (scenario, options)) in self.runs.iter().enumerate() {
             let is_last = number + 1 == self.runs.len();
-            saboteur.scenario = scenario;
+            injector.scenario = scenario;
             let options = [&QUICK, *options].concat();
             let run =
-                Run { course: self, saboteur: &saboteur, image: &image, options, folder: &folder, is_last };
+                Run { course: self, injector: &injector, image: &image, options, folder: &folder, is_last };
             findings.extend(run.check(&mut reached)?);
         }
         let mut text = format!(
@@ -127,7 +134,7 @@ impl Course {
 /// A run of a course.
 struct Run<'a> {
     course: &'a Course,
-    saboteur: &'a Saboteur,
+    injector: &'a FaultInjector,
     image: &'a Image,
     options: Vec<&'a str>,
     folder: &'a Path,
@@ -143,13 +150,14 @@ impl Run<'_> {
             || {
                 rayon::join(
                     || self.undisturbed(&folder("undisturbed")),
-                    || self.saboteur.delay(&[], &self.options, &folder("prompt")),
+                    || self.injector.delay(&[], &self.options, &folder("prompt")),
                 )
             },
         );
         let (calls, (undisturbed, undisturbed_files), seen) = (calls?, undisturbed?, seen?.seen);
         let prompt = vec![0; calls.len()];
-        let mut hunt = Hunt::new(Stand::all(&calls, &seen, self.course.deadline_ticks));
+        let mut hunt =
+            Hunt::new(Stand::all(&calls, &seen, self.course.control_ticks, self.course.deadline_ticks));
         hunt.take(&prompt, &seen, &mut Reached::default());
         let mut findings = Vec::new();
         for _ in 0..MOST_ROUNDS {
@@ -180,26 +188,26 @@ impl Run<'_> {
     fn passes(&self, delays: &[Vec<u16>]) -> Result<Vec<(Found, [Vec<u8>; 2])>> {
         let passes = delays.par_iter().enumerate().map(|(number, delays)| {
             let folder = self.folder.join(number.to_string());
-            let found = self.saboteur.delay(delays, &self.options, &folder)?;
+            let found = self.injector.delay(delays, &self.options, &folder)?;
             Ok((found, files(&folder)?))
         });
         passes.collect()
     }
 
-    /// What came of a run in which nothing is done to the interrupts, and what must not change.
+    /// The outcome of a run in which nothing is done to the interrupts, and the files that must not change.
     fn undisturbed(&self, folder: &Path) -> Result<(Found, [Vec<u8>; 2])> {
-        let found = self.saboteur.run(("none", 0, 0), &self.options, folder)?;
+        let found = self.injector.run(("none", 0, 0), &self.options, folder)?;
         Ok((found, files(folder)?))
     }
 
     /// The control interrupts of an undisturbed run.
     fn calls(&self, folder: &Path) -> Result<Vec<Call>> {
-        let saboteur = self.saboteur;
+        let injector = self.injector;
         let bench = Bench {
-            rig: saboteur.rig.clone(),
-            qemu: saboteur.qemu.clone(),
-            command: vec!["run".to_owned(), saboteur.scenario.to_owned()],
-            path: saboteur.image.clone(),
+            rig: injector.rig.clone(),
+            qemu: injector.qemu.clone(),
+            command: vec!["run".to_owned(), injector.scenario.to_owned()],
+            path: injector.image.clone(),
             image: self.image.clone(),
             keeps_paths: true,
         };
@@ -208,7 +216,7 @@ impl Run<'_> {
         // No delays.
         std::fs::write(&log, [])?;
         // The way into control is that of the passes.
-        let orders = Saboteur::orders("landing", 0, 0, &log);
+        let orders = FaultInjector::orders("landing", 0, 0, &log);
         let options: Vec<_> = orders.iter().map(String::as_str).chain(self.options.iter().copied()).collect();
         let drive = bench.drive(&options)?;
         let [(control, exception), _] = INTERRUPTS;
@@ -228,15 +236,18 @@ impl Run<'_> {
     }
 }
 
+/// The beginning of the names of the injector's own functions.
+const INJECTOR: &str = "tractive_fault_injector::";
+
 /// Half-words of what leads to the interrupt and is not its own.
 fn foreign(image: &Image) -> HashSet<u32> {
     let functions = image.functions.iter();
-    let saboteurs =
-        functions.filter(|(_, function)| function.names.iter().any(|name| name.contains("saboteur")));
-    saboteurs.flat_map(|(start, function)| (*start..start + function.size).step_by(2)).collect()
+    let injectors =
+        functions.filter(|(_, function)| function.names.iter().any(|name| name.starts_with(INJECTOR)));
+    injectors.flat_map(|(start, function)| (*start..start + function.size).step_by(2)).collect()
 }
 
-/// What must not change.
+/// The files that must not change.
 fn files(folder: &Path) -> Result<[Vec<u8>; 2]> {
     let read = |name: &str| {
         let path = folder.join(name);

@@ -12,19 +12,21 @@
 //! Results go to standard output, what the command does on the way to standard error. Exit codes: 0 done; 1 it ran
 //! and something failed; 2 it could not run (bad usage, bad input, something missing), with the reason on a line.
 //!
-//! The modules: [`cli`] is what may be typed, [`setup`] what has to be installed, [`build`] how cargo is called,
+//! The modules: [`cli`] is what may be typed, [`setup`] what has to be installed, [`build`] how cargo is called, [`board`] which boards there are,
 //! [`run`], [`mod@test`], [`image`], [`timing`] and [`flash`] the commands; [`guide`] runs those of the documentation. An image is read by [`elf`],
 //! its instructions by [`thumb`]; [`graph`] says which function calls which, [`check`] refuses what an image must not hold, and [`cells`]
 //! looks at what the cells did under the interrupts, in the [`emulator`].
 
 #![forbid(unsafe_code)]
 
+mod board;
 mod build;
 mod cells;
 mod check;
 mod cli;
 mod elf;
 mod emulator;
+mod fault_injector;
 mod flash;
 mod graph;
 mod guide;
@@ -33,8 +35,8 @@ mod landings;
 mod overruns;
 mod own_board;
 mod process;
+mod publish;
 mod run;
-mod saboteur;
 mod setup;
 mod step;
 mod test;

@@ -1,4 +1,4 @@
-//! Interrupts slow, late and lost in the emulator, with the real images: each mishap is called by its name, and the gates are off within
+//! Interrupts slow, late and lost in the emulator, with the real images: each injected fault is called by its name, and the gates are off within
 //! a carrier period.
 
 use anyhow::{Context, Result};
@@ -6,22 +6,22 @@ use indicatif::ParallelProgressIterator;
 use rayon::prelude::*;
 
 use crate::build::System;
+use crate::fault_injector::{FaultInjector, Found};
 use crate::process;
-use crate::saboteur::{Found, Saboteur};
 use crate::setup::Setup;
 
 /// Ticks of 40 ns.
 const TICKS_PER_S: f64 = 25e6;
 const CONTROL_TICKS: u32 = 2_500;
 
-/// A system where it is struck.
+/// A system into which a fault is injected.
 struct Case {
     system: System,
     /// Options of the rig.
     options: &'static [&'static str],
-    /// When, in s from the run's beginning.
+    /// The time, in s from the run's beginning.
     at_s: f64,
-    /// What runs then.
+    /// The name of what runs then.
     name: &'static str,
     /// From a control tick to its deadline.
     deadline_ticks: u32,
@@ -74,48 +74,48 @@ const CASES: [Case; 9] = [
     Case { at_s: 0.060_05, name: "20 kHz", ..QUICK },
 ];
 
-/// A mishap, what it is to be called, and from when on its time counts.
-struct Mishap {
+/// An injected fault, what it is to be called, and from when on its time counts.
+struct InjectedFault {
     kind: &'static str,
     /// In ticks, or interrupts.
     amount: u32,
     fault: &'static str,
-    /// From the tick that is struck to what is amiss, in ticks: 0, or the missed deadline.
+    /// From the tick that the fault is for to what is amiss, in ticks: 0, or the missed deadline.
     amiss_after_ticks: u32,
 }
 
 impl Case {
-    fn mishaps(&self) -> Vec<Mishap> {
-        let mishap = |kind, amount, fault| Mishap { kind, amount, fault, amiss_after_ticks: 0 };
+    fn faults(&self) -> Vec<InjectedFault> {
+        let fault = |kind, amount, fault| InjectedFault { kind, amount, fault, amiss_after_ticks: 0 };
         vec![
-            mishap("none", 0, ""),
-            Mishap {
+            fault("none", 0, ""),
+            InjectedFault {
                 amiss_after_ticks: self.deadline_ticks,
-                ..mishap("control-slow", self.deadline_ticks + 100, "control_deadline")
+                ..fault("control-slow", self.deadline_ticks + 100, "control_deadline")
             },
-            mishap("control-lost", 1, "stale_command"),
-            mishap("pwm-lost", 1, "pwm_deadline"),
-            mishap("pwm-late", self.late_ticks + 100, "pwm_deadline"),
+            fault("control-lost", 1, "stale_command"),
+            fault("pwm-lost", 1, "pwm_deadline"),
+            fault("pwm-late", self.late_ticks + 100, "pwm_deadline"),
         ]
     }
 
     /// A line about the run, and what is wrong with it.
-    fn judge(&self, mishap: &Mishap, found: &Found) -> (String, Vec<String>) {
-        let name = format!("{} {} {}", self.system.image(), self.name, mishap.kind);
+    fn judge(&self, injected: &InjectedFault, found: &Found) -> (String, Vec<String>) {
+        let name = format!("{} {} {}", self.system.image(), self.name, injected.kind);
         let mut findings = Vec::new();
-        if found.fault != mishap.fault {
-            findings.push(format!("{name}: called `{}`, not `{}`", found.fault, mishap.fault));
+        if found.fault != injected.fault {
+            findings.push(format!("{name}: called `{}`, not `{}`", found.fault, injected.fault));
         }
         let line = |after: String, bound: String| {
             format!(
                 "{:<9} {:<7} {:<13} {:<17} {after:>6} {bound:>7}\n",
                 self.system.image(),
                 self.name,
-                mishap.kind,
+                injected.kind,
                 found.fault
             )
         };
-        if mishap.fault.is_empty() {
+        if injected.fault.is_empty() {
             if found.gates_off.is_some() {
                 findings.push(format!("{name}: the gates were turned off"));
             }
@@ -127,9 +127,9 @@ impl Case {
         };
         let bound = self.within_halves * off.loaded_ticks;
         // A slow interrupt does nothing wrong before its deadline.
-        let after = i64::from(off.after_ticks) - i64::from(mishap.amiss_after_ticks);
-        if off.struck != 1 {
-            findings.push(format!("{name}: {} interrupts were struck, not one", off.struck));
+        let after = i64::from(off.after_ticks) - i64::from(injected.amiss_after_ticks);
+        if off.injected != 1 {
+            findings.push(format!("{name}: {} interrupts had a fault injected, not one", off.injected));
         }
         if after < 0 || after > i64::from(bound) {
             findings.push(format!("{name}: gates off after {after} ticks, at most {bound} are allowed"));
@@ -138,7 +138,7 @@ impl Case {
     }
 }
 
-/// A run: where the mishap's time and amount make no difference, they are 0, so that it is the same for many cases.
+/// A run: where the fault's time and amount make no difference, they are 0, so that it is the same for many cases.
 #[derive(Clone, Copy, PartialEq, Eq)]
 struct Run {
     system: System,
@@ -147,13 +147,13 @@ struct Run {
 }
 
 impl Run {
-    fn of(case: &Case, mishap: &Mishap) -> Self {
-        let at_ticks = if mishap.fault.is_empty() { 0 } else { (case.at_s * TICKS_PER_S) as u32 };
-        let orders = (mishap.kind, at_ticks, mishap.amount);
+    fn of(case: &Case, injected: &InjectedFault) -> Self {
+        let at_ticks = if injected.fault.is_empty() { 0 } else { (case.at_s * TICKS_PER_S) as u32 };
+        let orders = (injected.kind, at_ticks, injected.amount);
         Self { system: case.system, options: case.options, orders }
     }
 
-    fn perform(&self, images: &[Saboteur]) -> Result<(Self, Found)> {
+    fn perform(&self, images: &[FaultInjector]) -> Result<(Self, Found)> {
         let image = images.iter().find(|image| image.system == self.system).context("no such image")?;
         let folder = tempfile::tempdir().context("no temporary folder")?;
         Ok((*self, image.run(self.orders, self.options, folder.path())?))
@@ -163,11 +163,13 @@ impl Run {
 /// The step of the tests; what is wrong is printed, `true` is good.
 pub fn check(setup: &mut Setup) -> Result<bool> {
     let images: Vec<_> =
-        System::ALL.into_iter().map(|system| Saboteur::build(setup, system)).collect::<Result<_>>()?;
-    let cases: Vec<_> =
-        CASES.iter().flat_map(|case| case.mishaps().into_iter().map(move |mishap| (case, mishap))).collect();
+        System::ALL.into_iter().map(|system| FaultInjector::build(setup, system)).collect::<Result<_>>()?;
+    let cases: Vec<_> = CASES
+        .iter()
+        .flat_map(|case| case.faults().into_iter().map(move |injected| (case, injected)))
+        .collect();
     let mut runs: Vec<Run> = Vec::new();
-    for run in cases.iter().map(|(case, mishap)| Run::of(case, mishap)) {
+    for run in cases.iter().map(|(case, injected)| Run::of(case, injected)) {
         if !runs.contains(&run) {
             runs.push(run);
         }
@@ -176,11 +178,11 @@ pub fn check(setup: &mut Setup) -> Result<bool> {
     let done = runs.par_iter().progress_with(bar).map(|run| run.perform(&images));
     let done: Vec<_> = done.collect::<Result<_>>()?;
     let mut findings = Vec::new();
-    println!("{:<9} {:<7} {:<13} {:<17} {:>6} {:>7}", "image", "in", "mishap", "fault", "ticks", "allowed");
-    for (case, mishap) in &cases {
-        let run = Run::of(case, mishap);
+    println!("{:<9} {:<7} {:<13} {:<17} {:>6} {:>7}", "image", "in", "injected", "fault", "ticks", "allowed");
+    for (case, injected) in &cases {
+        let run = Run::of(case, injected);
         let (_, found) = done.iter().find(|(of, _)| *of == run).context("a run was left out")?;
-        let (line, wrong) = case.judge(mishap, found);
+        let (line, wrong) = case.judge(injected, found);
         print!("{line}");
         findings.extend(wrong);
     }
@@ -193,14 +195,18 @@ pub fn check(setup: &mut Setup) -> Result<bool> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::saboteur::GatesOff;
+    use crate::fault_injector::GatesOff;
 
     fn judged(kind: &str, fault: &str, off: Option<(u32, u32)>) -> Vec<String> {
         let case = &CASES[0];
-        let mishap = case.mishaps().into_iter().find(|mishap| mishap.kind == kind).unwrap();
-        let gates_off =
-            off.map(|(struck, after_ticks)| GatesOff { struck, loaded_ticks: 5_000, after_ticks, call: 0 });
-        case.judge(&mishap, &Found { fault: fault.to_owned(), gates_off, ..Found::default() }).1
+        let injected = case.faults().into_iter().find(|injected| injected.kind == kind).unwrap();
+        let gates_off = off.map(|(injected, after_ticks)| GatesOff {
+            injected,
+            loaded_ticks: 5_000,
+            after_ticks,
+            call: 0,
+        });
+        case.judge(&injected, &Found { fault: fault.to_owned(), gates_off, ..Found::default() }).1
     }
 
     #[test]
@@ -221,7 +227,7 @@ mod tests {
                 "control-lost",
                 "stale_command",
                 Some((2, 9)),
-                format!("{lost}: 2 interrupts were struck, not one"),
+                format!("{lost}: 2 interrupts had a fault injected, not one"),
             ),
             (
                 "control-lost",

@@ -18,7 +18,7 @@ const INTERRUPTS: [(&str, &str, &str); 2] =
 
 /// Words in the names of what belongs to the reference images alone.
 const FOREIGN: [&str; 7] =
-    ["qemu", "semihosting", "saboteur", "TIMER0", "DUALTIMER", "tractive::built_in", "nucleo"];
+    ["qemu", "semihosting", "injector", "TIMER0", "DUALTIMER", "tractive::built_in", "nucleo"];
 
 /// Crates that `tractive-control` may come with, itself among them.
 const MOST_CRATES: usize = 2;
@@ -74,7 +74,7 @@ fn look_into(path: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Whether a function has instructions of the task's `run`, its own or inlined.
+/// `true` if a function has instructions of the task's `run`, its own or inlined.
 fn comes_to(image: &Image, profile: &Profile, function: u32, task: &str) -> Result<bool> {
     let size = image.functions.get(&function).map_or(0, |function| function.size);
     for (address, _) in image.instructions.range(function..function + size) {

@@ -18,7 +18,7 @@ pub fn quietly(command: &mut Command) -> bool {
     silent.status().is_ok_and(|status| status.success())
 }
 
-/// What it prints, trimmed; `None` if it fails or cannot be started.
+/// The program's standard output, trimmed; `None` if it fails or cannot be started.
 pub fn output_of(command: &mut Command) -> Option<String> {
     let output = command.stdin(Stdio::null()).stderr(Stdio::null()).output().ok()?;
     let text = output.status.success().then_some(output.stdout)?;
@@ -53,7 +53,7 @@ pub fn bar(name: &'static str, runs: usize) -> ProgressBar {
     .with_finish(indicatif::ProgressFinish::AndClear)
 }
 
-/// Where a program stands on the PATH.
+/// The place of a program on the PATH.
 pub fn find(program: &str) -> Option<PathBuf> {
     find_in(program, &std::env::var_os("PATH")?)
 }

@@ -34,14 +34,14 @@ impl Verb {
     }
 }
 
-/// What the words need, as the rig says.
+/// The needs of the words, as the rig says.
 #[derive(Debug, Default, Deserialize, PartialEq, Eq)]
 struct Needs {
     system: String,
     machine: Option<String>,
-    /// Whether the image is still to be built.
+    /// `true` if the image is still to be built.
     image: bool,
-    /// Whether the emulator is still to be found.
+    /// `true` if the emulator is still to be found.
     emulator: bool,
     /// The script of a talk.
     script: Option<PathBuf>,
@@ -52,7 +52,7 @@ impl Needs {
         if self.system == "zs9" { System::Zs9 } else { System::Traction }
     }
 
-    /// What is said besides the words: the shipped script, where a talk names none.
+    /// The script besides the words: the shipped one, where a talk names none.
     fn script(&self, verb: Verb) -> Option<PathBuf> {
         let shipped = if self.system() == System::Zs9 { ZS9_SCRIPT } else { SCRIPT };
         (verb == Verb::Talk && self.script.is_none()).then(|| build::root().join(shipped))

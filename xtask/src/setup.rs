@@ -1,4 +1,4 @@
-//! What has to be installed: the target, QEMU, the lints. Each step only when something is missing, each telling so.
+//! The set-up: the target, QEMU, the lints. Each step only when something is missing, each telling so.
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -19,7 +19,7 @@ const DEBIAN_RUSTC: &str = "/usr/bin/rustc";
 /// The toolchain that Miri belongs to.
 const NIGHTLY: &str = "nightly";
 
-/// How cargo is called for the board's target.
+/// The cargo for the board's target.
 #[derive(Debug, PartialEq, Eq)]
 pub struct Toolchain {
     cargo: OsString,

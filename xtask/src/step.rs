@@ -29,10 +29,12 @@ pub enum Step {
     Image,
     /// No panic within an interrupt's reach, no double precision
     ImageCheck,
-    /// The NUCLEO-G474RE's images build, with no panic within an interrupt's reach and no double precision
+    /// The images of the boards in `boards/` build, with no panic within an interrupt's reach and no double precision
     NucleoImage,
     /// The example's firmware, outside the workspace, holds what is its own and nothing else
     OwnBoard,
+    /// The crates that a user takes, packed and checked from their packages alone
+    Publish,
     /// Every command of the engineer's guide
     Guide,
     /// The engineer's guide as a book

@@ -6,7 +6,8 @@ use std::time::{Duration, Instant};
 use anyhow::Result;
 use clap::ValueEnum;
 
-use crate::build::{Board, System, TARGET, cargo};
+use crate::board::Board;
+use crate::build::{System, TARGET, cargo};
 use crate::cli::{TestArgs, TimingArgs};
 use crate::process::{find, processor_s, succeeds};
 use crate::setup::Setup;
@@ -14,24 +15,25 @@ use crate::step::Step;
 use crate::{build, image};
 
 /// The packages by the commands that test them. Cargo unites the features of what it is asked for at once: with all of them in one
-/// command the rig and this program would be compiled anew, since `cargo rig` and `cargo xtask` ask for one package.
+/// command the rig and this program would be compiled anew, since `cargo rig` and `cargo xtask` ask for one package. The boards go with the
+/// first.
 const TOGETHER: [&[&str]; 4] = [
     &["tractive", "tractive-control", "tractive-tablegen"],
     &["tractive-rig"],
     &["xtask"],
-    &["tractive-bench", "tractive-cells"],
+    &["tractive-bench", "tractive-cells", "tractive-fault-injector"],
 ];
 
-/// How a step ended.
+/// The end of a step.
 #[derive(Clone, Debug, PartialEq, Eq)]
 enum Outcome {
     Passed,
     Failed,
-    /// Why it could not be done.
+    /// The reason why it could not be done.
     Skipped(String),
 }
 
-/// What became of a step.
+/// The outcome of a step.
 struct Done {
     step: Step,
     outcome: Outcome,
@@ -85,26 +87,22 @@ fn perform(step: Step, setup: &mut Setup) -> Result<Outcome> {
             if !setup.toolchain()?.has_clippy {
                 return Ok(Outcome::Skipped(format!("clippy needs rustup's target {TARGET}")));
             }
-            let what = ["--release", "--target", TARGET, "--package", "tractive", "--lib", "--bins"];
-            let nucleo = [&what[..], &["--features", Board::NucleoG474re.feature()]].concat();
-            let saboteur = [&what[..], &["--features", crate::saboteur::FEATURE]].concat();
-            let qemu = [&what[..], &["--features", build::QEMU]].concat();
-            let library = ["--release", "--target", TARGET, "--package", "tractive", "--lib"];
-            let builds = [&library[..], &qemu, &nucleo, &saboteur];
-            builds
-                .into_iter()
-                .try_fold(true, |good, what| Ok::<_, anyhow::Error>(good & lint(&mut cargo(), what)?))?
+            let mut good = true;
+            for (package, what) in on_target()? {
+                let command = ["--release", "--target", TARGET, "--package", &package];
+                good &= lint(&mut cargo(), &[&command[..], what].concat())?;
+            }
+            good
         }
         Step::Doc => {
-            let boards = format!("tractive/{}", Board::NucleoG474re.feature());
             let mut command = cargo();
             command.env("RUSTDOCFLAGS", "-D warnings");
-            succeeds(command.args(["doc", "--release", "--no-deps", "--workspace", "--features", &boards]))?
+            succeeds(command.args(["doc", "--release", "--no-deps", "--workspace"]))?
         }
         Step::Host => {
             let mut good = true;
-            for packages in TOGETHER {
-                let named = packages.iter().flat_map(|package| ["--package", package]);
+            for packages in together()? {
+                let named = packages.iter().flat_map(|package| ["--package", package.as_str()]);
                 good &= succeeds(cargo().args(["test", "--release"]).args(named))?;
             }
             good
@@ -139,18 +137,18 @@ fn perform(step: Step, setup: &mut Setup) -> Result<Outcome> {
             good
         }
         Step::NucleoImage => {
-            let board = Board::NucleoG474re;
             let mut good = true;
-            for system in System::ALL {
-                println!("{}:", system.image());
-                good &= image::check_board(
-                    &build::board_image(&setup.toolchain()?, board, system, None)?,
-                    board,
-                )?;
+            for board in Board::all()? {
+                for system in System::ALL {
+                    println!("{}:", system.image_on(&board));
+                    let path = build::board_image(&setup.toolchain()?, &board, system, None)?;
+                    good &= image::check_board(&path, &board)?;
+                }
             }
             good
         }
         Step::OwnBoard => crate::own_board::check(setup)?,
+        Step::Publish => crate::publish::check()?,
         Step::Guide => crate::guide::run(build::root())?,
         Step::Book if find("mdbook").is_none() => {
             return Ok(Outcome::Skipped("mdbook is not installed (cargo install mdbook)".to_owned()));
@@ -191,6 +189,28 @@ fn perform(step: Step, setup: &mut Setup) -> Result<Outcome> {
         }
     };
     Ok(good.into())
+}
+
+/// The lints on the target: packages, and their parts.
+fn on_target() -> Result<Vec<(String, &'static [&'static str])>> {
+    const IMAGES: &[&str] = &["--lib", "--bins"];
+    let own: [(&str, &[&str]); 3] = [
+        ("tractive", &["--lib", "--features", "defmt"]),
+        ("tractive", &["--lib", "--bins", "--features", build::QEMU]),
+        ("tractive-fault-injector", IMAGES),
+    ];
+    let own = own.map(|(package, what)| (package.to_owned(), what));
+    let boards = Board::all()?.into_iter().map(|board| (board.package, IMAGES));
+    Ok(own.into_iter().chain(boards).collect())
+}
+
+/// [`TOGETHER`], with the boards.
+fn together() -> Result<Vec<Vec<String>>> {
+    let mut groups =
+        TOGETHER.map(|group| group.iter().map(|package| (*package).to_owned()).collect::<Vec<_>>());
+    let boards = Board::all()?.into_iter().map(|board| board.package);
+    groups[0].extend(boards);
+    Ok(groups.into())
 }
 
 fn lint(command: &mut Command, what: &[&str]) -> Result<bool> {
@@ -256,7 +276,7 @@ mod tests {
         let metadata: serde_json::Value = serde_json::from_slice(&metadata.stdout).unwrap();
         let packages = metadata["packages"].as_array().unwrap();
         let mut there: Vec<_> = packages.iter().map(|package| package["name"].as_str().unwrap()).collect();
-        let mut tested = TOGETHER.concat();
+        let mut tested = together().unwrap().concat();
         there.sort_unstable();
         tested.sort_unstable();
         assert_eq!(tested, there);

@@ -12,7 +12,7 @@ use capstone::prelude::*;
 /// The operands as they are written.
 pub type Operand = ArmOperandType;
 
-/// What an instruction means for the flow between functions.
+/// The meaning of an instruction for the flow between functions.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Flow {
     /// A direct branch to this address, conditional or not, with or without a way back.

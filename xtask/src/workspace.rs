@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::process::Command;
 
-/// What the image runs on.
+/// The target that the image runs on.
 pub const TARGET: &str = "thumbv7em-none-eabihf";
 
 /// The repository's root.

@@ -1,4 +1,4 @@
-//! What the program answers to what is typed, as far as that needs no build.
+//! The answers of the program to a command line, as far as that needs no build.
 
 use std::process::{Command, Output};
 

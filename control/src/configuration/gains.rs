@@ -4,7 +4,7 @@ use super::{ABOVE_ZERO, Bound, Refused, within};
 use crate::control::Gains;
 
 impl Gains {
-    /// Whether they make sense.
+    /// The check of the gains by themselves.
     ///
     /// # Errors
     /// The first scalar that does not.

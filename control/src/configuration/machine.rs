@@ -4,7 +4,7 @@ use super::{ABOVE_ZERO, Bound, ROUNDING, Refused, checked, within};
 use crate::machine::{Curve, Grid, Mtpa, Ratings, Tables, Weakening};
 use core::f32::consts::FRAC_2_PI;
 
-/// How far above its limit a trip level may lie, as a multiple: farther it protects nothing.
+/// The largest ratio of a trip level to its limit: farther it protects nothing.
 const TRIP_CURRENT: f32 = 4.0;
 const TRIP_OTHERS: f32 = 3.0;
 /// Full torque in 1 ms at the quickest, in 100 s at the slowest.
@@ -15,7 +15,7 @@ const RESISTIVE_SHARE: f32 = 0.5;
 const NODES: (f32, f32) = (2.0, 1e4);
 
 impl Ratings {
-    /// Whether they make sense, by themselves and together.
+    /// The check of the ratings, by themselves and together.
     ///
     /// # Errors
     /// The first scalar that does not.
@@ -93,7 +93,7 @@ const fn below(value: f32) -> f32 {
     f32::from_bits(value.to_bits().saturating_sub(1))
 }
 
-/// What is allowed of an axis: its first value, its last one.
+/// The bounds of an axis: of its first value, of its last one.
 struct Axis {
     names: [&'static str; 3],
     first: (f32, f32),
@@ -135,7 +135,7 @@ const fn near(name: &'static str, value: f32, wanted: f32, off: f32) -> Result<(
 }
 
 impl Tables {
-    /// Whether ratings and tables make sense, by themselves and together.
+    /// The check of ratings and tables, by themselves and together.
     ///
     /// # Errors
     /// The first scalar that does not.

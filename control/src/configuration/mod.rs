@@ -9,15 +9,16 @@
 mod gains;
 mod machine;
 
-use crate::modulation::Devices;
+use crate::modulation::SwitchLimits;
 use crate::time::Clock;
 
 /// A scalar that makes no sense, and what is allowed.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Refused {
     /// The scalar, by its path in the configuration.
     pub name: &'static str,
-    /// What it is.
+    /// Its value.
     pub value: f32,
     /// The least that is allowed.
     pub least: f32,
@@ -33,7 +34,7 @@ impl core::fmt::Display for Refused {
 
 /// The least number that counts as above 0.
 pub const ABOVE_ZERO: f32 = 1e-9;
-/// What rounding may make of a relation, as a share.
+/// The rounding allowed in a relation, as a share.
 pub const ROUNDING: f32 = 1e-3;
 
 /// A scalar by its name, its value, and the least and the most that it may be.
@@ -63,7 +64,7 @@ macro_rules! checked {
 use checked;
 
 impl Clock {
-    /// Whether a drive can run on it.
+    /// The check that a drive can run on this clock.
     ///
     /// # Errors
     /// The first scalar that makes no sense.
@@ -80,8 +81,8 @@ impl Clock {
     }
 }
 
-impl Devices {
-    /// Whether they suit a clock.
+impl SwitchLimits {
+    /// The check that the limits suit a clock.
     ///
     /// # Errors
     /// The first scalar that makes no sense.
@@ -89,11 +90,11 @@ impl Devices {
         let Self { min_pulse_ticks, dead_time_ticks, shortest_half_ticks } = *self;
         let half = shortest_half_ticks as f32;
         within(&[
-            // From two control periods, each of which has a command of its own, to a carrier of 50 Hz.
+            // From half a control period, a command a carrier, to a carrier of 50 Hz.
             Bound(
                 "devices.shortest_half_ticks",
                 half,
-                2.0 * clock.control_ticks as f32,
+                0.5 * clock.control_ticks as f32,
                 0.01 * clock.ticks_per_s + 1.0,
             ),
             Bound("devices.min_pulse_ticks", min_pulse_ticks as f32, 0.0, 0.5 * half),

@@ -2,15 +2,69 @@
 //!
 //! Written in flux, the stator equation `dψ/dt = u − R i − jωψ` is linear however the machine saturates; the maps turn
 //! current into flux and back. Proportional part: the flux error predicted for the boundary where the voltage begins
-//! to act. Decoupling: `jωψ`. Integral part: [`super::disturbance`].
+//! to act. Decoupling: `jωψ`. Integral part: [`Observer`].
+//!
+//! One carrier half removes three quarters of the flux error, on the saturated map as well:
+//!
+//! ```
+//! use tractive_control::control::{
+//!     Committed, Regulated, Gains, ModeLimits, Observer, Region, RotorSample, Target, current_loop, flux_linkage, mtpa,
+//! };
+//! use tractive_control::frames::{AlphaBeta, Angle};
+//! # fn main() -> Result<(), tractive_tablegen::InputError> {
+//! let folder = std::path::Path::new("../tables/pmasynrm-180kw");
+//! let tables = tractive_tablegen::MachineFolder::read(folder)?.tables();
+//! let resistance = tables.ratings.stator_resistance_ohm;
+//! // From 600 to 700 N·m with the rotor at rest at 40°. The next half begins at once and lasts 0.5 ms.
+//! let (now, wanted) = (mtpa(600.0, &tables), mtpa(700.0, &tables));
+//! let reference = flux_linkage(&tables, wanted);
+//! let (angle, at_rest, none) = (Angle::from_turns(40.0 / 360.0), Angle::ZERO.sin_cos(), Observer::new());
+//! let sample = RotorSample::new(now.unpark(angle.sin_cos()).abc(), angle, &tables);
+//! let volt_seconds = Some(AlphaBeta::default());
+//! let committed = Committed { horizon_s: 0.0, volt_seconds, ripple: None, interval_s: 0.5e-3 };
+//! let limits = ModeLimits {
+//!     follows: Regulated::Mean,
+//!     # depth_limit: 0.9,
+//!     # steady_share: 1.0,
+//!     # filled: false,
+//!     # ripple_share: 0.05,
+//!     # settled: true,
+//!     // …
+//! };
+//! let target = Target {
+//!     current: wanted,
+//!     flux: reference,
+//!     voltage_limit_v: 800.0,
+//!     # torque_nm: 700.0,
+//!     # region: Region::Mtpa,
+//!     # depth: 0.1,
+//!     // …
+//! };
+//! let input = current_loop::Input {
+//!     ahead: &current_loop::ahead(&sample, at_rest, &committed, &none, resistance),
+//!     disturbance: &none,
+//!     target: &target,
+//!     omega: 0.0,
+//!     committed: &committed,
+//!     limits: &limits,
+//!     resistance,
+//! };
+//! let voltage = current_loop::step(&input, &Gains::DEFAULT).voltage.vector;
+//! let flux = sample.flux + (voltage - wanted * resistance) * 0.5e-3;
+//! let left = (flux - reference).length() / (sample.flux - reference).length();
+//! assert!((left - 0.25).abs() < 0.001, "a quarter of the error is left");
+//! # Ok(())
+//! # }
+//! ```
 
 use super::disturbance::Observer;
-use super::{Committed, Seen};
+use super::{Committed, ModeLimits, RotorSample, Target};
 use crate::frames::{Angle, Dq, SinCos};
 
-/// What of a voltage command the modulator's mode can follow.
+/// The part of a voltage command that the modulator's mode can follow.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Follows {
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Regulated {
     /// The mean of every carrier half: triangular carriers.
     Mean,
     /// The fundamental, with a pattern's delay: middle 60°.
@@ -21,6 +75,7 @@ pub enum Follows {
 
 /// Gains of the loop.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Gains {
     /// Share of the predicted flux error that one carrier half removes, 0 ..= 1, for triangular carriers.
     pub carrier: f32,
@@ -48,7 +103,7 @@ impl Gains {
     pub const WITHOUT_SIXTH: Self = Self { sixth_turn_rad: 0.0, ..Self::DEFAULT };
 }
 
-/// What lies ahead, without what is wanted.
+/// The flux to be expected at the horizon, whatever is wanted then.
 pub struct Ahead {
     /// Flux linkage at the horizon less the pattern's ripple, in the rotor frame there; while the gates are off, as it is.
     pub flux: Dq,
@@ -56,16 +111,23 @@ pub struct Ahead {
     frame: SinCos,
 }
 
+/// Everything that a step of the loop works on.
+#[derive(Clone, Copy)]
 pub struct Input<'a> {
+    /// The flux that is predicted for the horizon.
     pub ahead: &'a Ahead,
+    /// The integral part.
     pub disturbance: &'a Observer,
-    pub current_reference: Dq,
-    /// Flux linkage of that reference, as [`super::flux_path`] leads there.
-    pub reference: Dq,
+    /// The operating point: its flux linkage is the reference, and its current's drop in the stator's resistance is fed forward.
+    pub target: &'a Target,
+    /// Electrical angular speed, in rad/s, signed.
     pub omega: f32,
+    /// The modulator's commitments.
     pub committed: &'a Committed,
+    /// The limits of the mode.
+    pub limits: &'a ModeLimits,
+    /// Stator resistance, in ohm.
     pub resistance: f32,
-    pub voltage_limit_v: f32,
 }
 
 /// Voltages for the carrier half that begins at the horizon, in V, in the rotor frame that turns with it.
@@ -78,34 +140,36 @@ pub struct Output {
 
 /// A vector and its length, in V.
 pub struct Voltage {
+    /// The vector, rotor frame, in V.
     pub vector: Dq,
+    /// Its length, in V.
     pub length_v: f32,
 }
 
-/// What a carrier gives at most, in the corners of its hexagon, over what it gives in every direction: 2/√3. Transients may
+/// The largest voltage of a carrier, in the corners of its hexagon, over that in every direction: 2/√3. Transients may
 /// use it; beyond the hexagon's edges the modulator's phases saturate, and the prediction sees that they did.
 const TRANSIENT_REACH: f32 = 1.154_7;
 
 /// One step of the loop.
 pub fn step(input: &Input, gains: &Gains) -> Output {
-    let reference = input.reference;
-    let resistive = input.current_reference * input.resistance;
+    let reference = input.target.flux;
+    let resistive = input.target.current * input.resistance;
     let steady = reference.j() * input.omega + resistive;
-    let limit = input.voltage_limit_v;
+    let limit = input.target.voltage_limit_v;
     let towards = |gain: f32| {
-        let gain = if input.committed.settled { gain } else { 0.0 };
+        let gain = if input.limits.settled { gain } else { 0.0 };
         let steady = steady - input.disturbance.mean();
         (steady - (input.ahead.flux - reference) * gain, steady, limit)
     };
-    let (regulated, steady, reach) = match input.committed.follows {
-        Follows::Mean => {
+    let (regulated, steady, reach) = match input.limits.follows {
+        Regulated::Mean => {
             let (mean, disturbance) = mean_voltage(input, reference, gains);
             (mean + resistive - disturbance, steady - disturbance, limit * TRANSIENT_REACH)
         }
-        Follows::Fundamental => towards(gains.pattern_rad_s),
-        Follows::Angle => towards(gains.square_damping * input.omega.abs()),
+        Regulated::Fundamental => towards(gains.pattern_rad_s),
+        Regulated::Angle => towards(gains.square_damping * input.omega.abs()),
     };
-    let fills = input.committed.follows == Follows::Angle;
+    let fills = input.limits.follows == Regulated::Angle;
     Output {
         voltage: Voltage::fitted(regulated, reach, fills),
         steady: Voltage::fitted(steady, limit, fills),
@@ -139,24 +203,25 @@ fn mean_voltage(input: &Input, reference: Dq, gains: &Gains) -> (Dq, Dq) {
 /// Looks ahead from what is seen now; `half_way` is the rotor's turn in half the time to the horizon.
 #[inline(always)]
 pub fn ahead(
-    seen: &Seen,
+    sample: &RotorSample,
     half_way: SinCos,
     committed: &Committed,
     disturbance: &Observer,
     resistance: f32,
 ) -> Ahead {
-    let on_the_way = seen.frame.turned(half_way);
+    let on_the_way = sample.frame.turned(half_way);
     let flux = match committed.volt_seconds {
-        None => seen.flux,
+        None => sample.flux,
         Some(volt_seconds) => {
             let moved = match &committed.ripple {
                 None => volt_seconds,
                 Some(ripple) => volt_seconds - ripple.at_horizon_wb,
             };
-            let unexplained = disturbance.voltage(on_the_way) - seen.current * resistance;
+            let unexplained = disturbance.voltage(on_the_way) - sample.current * resistance;
             // By half the way, and by that once more.
             let back = half_way.back();
-            (seen.flux.turned(back) + moved.park(on_the_way) + unexplained * committed.horizon_s).turned(back)
+            (sample.flux.turned(back) + moved.park(on_the_way) + unexplained * committed.horizon_s)
+                .turned(back)
         }
     };
     Ahead { flux, frame: on_the_way.turned(half_way) }

@@ -3,18 +3,20 @@
 use crate::frames::limit;
 use crate::machine::Ratings;
 
-/// What the operator asks for.
+/// The operator's demand.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Demand {
     /// Torque, in N·m; positive turns the rotor forward.
     pub torque_nm: f32,
-    /// Whether the demand's rate of change is limited to the machine's slew rate.
+    /// `true` if the demand's rate of change is limited to the machine's slew rate.
     pub slew_limited: bool,
 }
 
 /// DC-link voltages between which torque is given: motoring torque ends where the link is low, braking torque where it is high,
 /// each along a straight line between two voltages. By default there is no such end.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct LinkWindow {
     /// No motoring torque here and below, in V.
     pub motoring_none_v: f32,
@@ -68,7 +70,7 @@ pub struct Shaper {
     torque_nm: Option<f32>,
 }
 
-/// What shapes a demand.
+/// Everything that shapes a demand.
 pub struct Input<'a> {
     pub demand: &'a Demand,
     pub window: Option<&'a LinkWindow>,
@@ -77,7 +79,7 @@ pub struct Input<'a> {
     pub omega: f32,
     /// Torque that flows already, in N·m: where a machine that is caught while turning begins.
     pub flowing_nm: f32,
-    /// Whether a carrier follows, which can step.
+    /// `true` if a carrier follows, which can step.
     pub can_step: bool,
     pub period_s: f32,
 }

@@ -6,9 +6,10 @@
 //! (dead time: the fifth and seventh harmonic). Because it compares with voltages that acted, not with voltages that were asked
 //! for, limits and reference steps do not wind it up.
 
-use super::{Boundary, Gains, Seen};
+use super::{Boundary, Gains, RotorSample};
 use crate::frames::{AlphaBeta, Angle, Dq, SinCos};
 
+/// The disturbance voltage and what it is learnt from.
 #[derive(Clone, Copy, Debug)]
 pub struct Observer {
     /// Flux linkage at the last boundary, stationary frame, in Wb.
@@ -23,18 +24,30 @@ pub struct Observer {
 /// A boundary, and what was seen there.
 pub struct Input<'a> {
     pub boundary: &'a Boundary,
-    pub seen: &'a Seen,
+    pub sample: &'a RotorSample,
     /// Electrical, in rad/s.
     pub omega: f32,
     pub resistance: f32,
-    /// Whether the sixth harmonic is slow enough to be followed.
+    /// `true` if the sixth harmonic is slow enough to be followed.
     pub sixth: bool,
 }
 
+impl Default for Observer {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
 impl Observer {
+    /// No disturbance known yet.
     pub const fn new() -> Self {
         const ZERO: Dq = Dq { d: 0.0, q: 0.0 };
         Self { last_flux: None, mean: ZERO, cosine: ZERO, sine: ZERO, follows_sixth: false }
+    }
+
+    /// A mean disturbance, in V, that is known beforehand.
+    pub fn expect(&mut self, mean: Dq) {
+        self.mean = mean;
     }
 
     /// The mean disturbance, in V, rotor frame: flux rises by it although nobody asked.
@@ -57,15 +70,15 @@ impl Observer {
 
     /// A boundary has passed.
     #[inline(always)]
-    pub fn step(&mut self, input: &Input, gains: &Gains) {
-        let Input { boundary, seen, omega, .. } = *input;
-        let flux = seen.flux.unpark(seen.frame);
+    pub(super) fn step(&mut self, input: &Input, gains: &Gains) {
+        let Input { boundary, sample, omega, .. } = *input;
+        let flux = sample.flux.unpark(sample.frame);
         let half_turn = Angle::within_half_turn(0.5 * omega * boundary.length_s).sin_cos();
         let per_length = 1.0 / boundary.length_s;
         if let (Some(last), Some(volt_seconds)) = (self.last_flux, boundary.volt_seconds) {
-            let middle = seen.frame.turned(half_turn.back());
+            let middle = sample.frame.turned(half_turn.back());
             let unexplained = (flux - last - volt_seconds).park(middle) * per_length;
-            self.learn(unexplained + seen.current * input.resistance, middle, input.sixth, gains.observer);
+            self.learn(unexplained + sample.current * input.resistance, middle, input.sixth, gains.observer);
         }
         self.last_flux = Some(flux);
     }

@@ -23,7 +23,7 @@ pub struct LinkFilter {
 pub struct Link {
     /// Without its ripple.
     pub slow_v: f32,
-    /// What may be made use of: all there is, unless it has jumped up.
+    /// The voltage that may be made use of: all there is, unless it has jumped up.
     pub usable_v: f32,
 }
 

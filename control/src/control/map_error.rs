@@ -1,4 +1,4 @@
-//! How wrong the flux map is, and what is made of it.
+//! The error of the flux map, and its use.
 //!
 //! If the machine's flux linkage is (1 + ε) times the map's, −ε jωψ of the EMF stays unexplained. The estimate is reported;
 //! beyond what a wrong resistance can feign, the operating point takes it into account: such a machine needs for a torque the

@@ -7,6 +7,24 @@ use crate::machine::Tables;
 ///
 /// The first pass reads ψ_f and L_q − L_d at the start point that the tables give for this torque, the second one at the
 /// result of the first. What the start points and trims hold is decided offline.
+///
+/// ```
+/// use tractive_control::control::{flux_linkage, mtpa, torque_nm};
+/// use tractive_control::frames::Angle;
+/// # fn main() -> Result<(), tractive_tablegen::InputError> {
+/// let folder = std::path::Path::new("../tables/pmasynrm-180kw");
+/// let tables = tractive_tablegen::MachineFolder::read(folder)?.tables();
+/// let torque = |current| torque_nm(&tables, flux_linkage(&tables, current), current);
+///
+/// let current = mtpa(1_235.0, &tables);
+/// assert!((torque(current) - 1_235.0).abs() < 12.0, "within 1 % of the demand on the saturated map");
+/// // The same current, turned by 10° either way, gives less: it was the least one.
+/// let ten_degrees = Angle::from_turns(10.0 / 360.0).sin_cos();
+/// assert!(torque(current.turned(ten_degrees)) < 1_235.0);
+/// assert!(torque(current.turned(ten_degrees.back())) < 1_235.0);
+/// # Ok(())
+/// # }
+/// ```
 pub fn mtpa(torque_nm: f32, tables: &Tables) -> Dq {
     let torque = torque_nm.abs();
     let [d_start, q_start, d_trim, q_trim] = tables.mtpa.start.at(torque);

@@ -8,8 +8,10 @@ use super::{flux_linkage, mtpa};
 use crate::frames::{Dq, root, six_step_v, sqrt};
 use crate::machine::{Tables, Weakening};
 
-/// Where an operating point comes from.
+/// The source of an operating point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum Region {
     /// Least current for the torque; the voltage suffices.
     Mtpa,
@@ -30,19 +32,22 @@ impl Region {
     }
 }
 
-/// What the inverter can give.
+/// The limit of the inverter's voltage.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct VoltageLimit {
     /// DC-link voltage, in V.
     pub udc_v: f32,
     /// Largest fundamental, as a share of six-step.
     pub depth: f32,
-    /// Whether the fundamental always is that large (square wave).
+    /// `true` if the fundamental always is that large (square wave).
     pub filled: bool,
 }
 
 /// A current reference and what it stands for.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub struct OperatingPoint {
     /// Current, in A.
     pub current: Dq,
@@ -50,7 +55,7 @@ pub struct OperatingPoint {
     pub flux: Dq,
     /// Torque that it gives, in N·m.
     pub torque_nm: f32,
-    /// Where it comes from.
+    /// Its source.
     pub region: Region,
     /// Voltage of the MTPA point at this speed, as a share of six-step (above 1 where weakening is needed).
     pub depth: f32,
@@ -64,6 +69,25 @@ const SURELY_WITHIN: f32 = 0.98;
 const MTPA_OFF: f32 = 0.002;
 
 /// The current for a torque in N·m at an electrical angular speed in rad/s. The voltage is that of equation (3) on the flux map.
+///
+/// ```
+/// use tractive_control::control::{Region, VoltageLimit, operating_point};
+/// # fn main() -> Result<(), tractive_tablegen::InputError> {
+/// let folder = std::path::Path::new("../tables/pmasynrm-180kw");
+/// let tables = tractive_tablegen::MachineFolder::read(folder)?.tables();
+/// let limit = VoltageLimit { udc_v: 1_500.0, depth: 1.0, filled: false };
+/// let at_rpm = |torque_nm, rpm: f32| {
+///     let omega = rpm / 60.0 * core::f32::consts::TAU * tables.ratings.pole_pairs;
+///     operating_point(torque_nm, omega, &limit, &tables)
+/// };
+/// // At 200 r/min the voltage suffices for the least current; at 1,905 r/min the same torque is held on the voltage limit with
+/// // more negative i_d; at twice that speed the torque is what is left.
+/// let (slow, base, fast) = (at_rpm(1_235.0, 200.0), at_rpm(1_235.0, 1_905.0), at_rpm(1_235.0, 3_810.0));
+/// assert_eq!([slow.region, base.region, fast.region], [Region::Mtpa, Region::Weakening, Region::Limit]);
+/// assert!(base.current.d < slow.current.d && base.torque_nm == 1_235.0 && fast.torque_nm < 900.0);
+/// # Ok(())
+/// # }
+/// ```
 pub fn operating_point(torque_nm: f32, omega: f32, limit: &VoltageLimit, tables: &Tables) -> OperatingPoint {
     // The torque axis ends where the current does.
     let most = tables.mtpa.start.last();
@@ -96,7 +120,7 @@ struct Weakened {
     current: Dq,
     torque_nm: f32,
     region: Region,
-    /// Whether the torque is too large for the circle, but not for what is inside it.
+    /// `true` if the torque is too large for the circle, but not for what is inside it.
     inside: bool,
 }
 

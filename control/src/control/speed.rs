@@ -13,7 +13,7 @@ pub struct SpeedTracker {
     omega: f32,
     steps: u32,
     natural_rad_s: f32,
-    /// Whether an angle was not followed.
+    /// `true` if an angle was not followed.
     lost: bool,
 }
 

@@ -2,8 +2,9 @@
 
 use crate::frames::limit;
 
-/// What the gains follow from.
+/// The quantities that the gains follow from.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct SpeedDesign {
     /// Rotor inertia, in kg·m², above 0.
     pub inertia_kg_m2: f32,
@@ -14,8 +15,9 @@ pub struct SpeedDesign {
     pub period_s: f32,
 }
 
-/// What a step works on; speeds mechanical, in rad/s.
+/// Everything that a step works on; speeds mechanical, in rad/s.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct SpeedInput {
     /// Speed wanted.
     pub wanted_rad_s: f32,

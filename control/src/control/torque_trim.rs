@@ -26,15 +26,15 @@ pub struct TorqueTrim {
     hold_s: f32,
 }
 
-/// What a step of the trim looks at.
+/// Everything that a step of the trim works on.
 pub struct Input {
     /// Torque demanded, in N·m.
     pub demand_nm: f32,
     /// Torque of the measured currents, in N·m.
     pub measured_nm: f32,
-    /// Whether the demand with its trim is beyond what current and voltage allow.
+    /// `true` if the demand with its trim is beyond what current and voltage allow.
     pub limited: bool,
-    /// Whether the demand itself is.
+    /// `true` if the demand itself is.
     pub short: bool,
     /// Flux ripple over fundamental flux, greater than zero.
     pub ripple_share: f32,

@@ -13,6 +13,7 @@ use core::f32::consts::TAU;
 
 /// The network, the bandwidths and the limits: all that the gains follow from.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ZSourceDesign {
     /// Inductance of each inductor, in H, above 0.
     pub inductance_h: f32,
@@ -26,7 +27,7 @@ pub struct ZSourceDesign {
     pub inner_hz: f32,
     /// Bandwidth of the outer loop, in Hz, a few times below that and below the right-half-plane zero.
     pub outer_hz: f32,
-    /// How fast the link's reference moves, in V/s, above 0.
+    /// The slope of the link's reference, in V/s, above 0.
     pub link_slew_v_s: f32,
     /// Largest shoot-through duty, 0 < x < 0.5.
     pub duty_max: f32,
@@ -68,6 +69,7 @@ impl ZSourceDesign {
 
 /// Gains of both loops.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ZSourceGains {
     /// Voltage across an inductor for an error of its current, in V/A.
     pub inner_ohm: f32,
@@ -77,8 +79,9 @@ pub struct ZSourceGains {
     pub integral_share: f32,
 }
 
-/// What is measured and asked for at one instant.
+/// The measurements and demands of one instant.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ZSourceInput {
     /// Capacitor voltage v_C, mean of both, in V.
     pub capacitor_v: f32,
@@ -96,6 +99,8 @@ pub struct ZSourceInput {
 
 /// A step's result; every number is finite.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub struct ZSourceOutput {
     /// Shoot-through duty D_sh, 0 ..= `duty_max`, for the carrier period that comes next.
     pub duty: f32,
@@ -105,12 +110,14 @@ pub struct ZSourceOutput {
     pub link_ref_v: f32,
     /// Inductor current that is led to, in A.
     pub inductor_ref_a: f32,
-    /// Which limit holds the duty or the current.
+    /// The limit that holds the duty or the current.
     pub limited: Limited,
 }
 
-/// Which way the network would go, were it not for a limit.
+/// The direction that the network would take, were it not for a limit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum Limited {
     /// No limit reached.
     Free,
@@ -120,8 +127,9 @@ pub enum Limited {
     Below,
 }
 
-/// Why there is no duty. The state stays what it was.
+/// The reason why there is no duty. The state stays what it was.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum ZSourceError {
     /// A value is NaN or infinite, or so large that the duty would be.
     NotFinite,

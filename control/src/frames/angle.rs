@@ -11,6 +11,7 @@ pub const UNITS_PER_RADIAN: f32 = UNITS_PER_TURN / core::f32::consts::TAU;
 
 /// An angle, or a difference of two, as a fraction of a turn in units of 2⁻³² turn.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Angle(pub u32);
 
 impl Angle {

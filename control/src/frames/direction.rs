@@ -2,6 +2,7 @@
 
 /// Sine and cosine of one angle.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct SinCos {
     /// Sine.
     pub sin: f32,

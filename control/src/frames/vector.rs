@@ -9,6 +9,7 @@ pub const SQRT_3: f32 = 1.732_050_8;
 
 /// Three phase quantities.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Abc {
     /// Phase a (u).
     pub a: f32,
@@ -20,6 +21,7 @@ pub struct Abc {
 
 /// A space vector in the stationary frame; alpha along phase a.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct AlphaBeta {
     /// Along phase a.
     pub alpha: f32,
@@ -29,6 +31,7 @@ pub struct AlphaBeta {
 
 /// A space vector in the rotor frame; d along the magnet flux.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Dq {
     /// Direct axis.
     pub d: f32,

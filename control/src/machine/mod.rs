@@ -14,6 +14,7 @@ pub use lookup::{Curve, Grid};
 
 /// Scalars of a machine folder. SI units, peak values of phase quantities.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Ratings {
     /// Pole pairs, n_p.
     pub pole_pairs: f32,
@@ -98,7 +99,7 @@ pub struct Tables {
     pub weakening: Weakening,
 }
 
-/// Where a task finds its tables: behind a reference where they are made at run time; in an image behind a type without fields, so that the
+/// The source of a task's tables: behind a reference where they are made at run time; in an image behind a type without fields, so that the
 /// compiler knows every number of them.
 pub trait Machine: Copy {
     /// The tables.

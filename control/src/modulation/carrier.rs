@@ -3,17 +3,17 @@
 //! Even halves rise from the valley (all upper devices on) to the peak (all off), odd halves fall. The
 //! reference is sampled in the middle of its half, where the mean of a turning vector over the half stands.
 
-use super::{CarrierPeriod, Devices, Reference};
+use super::{CarrierHalf, Reference, SwitchLimits};
 use crate::frames::{Abc, AlphaBeta};
 use crate::time::Instant;
 
 /// A half of the asynchronous carrier.
-pub fn asynchronous(half: u32, start: Instant, seen: &Reference, devices: &Devices) -> CarrierPeriod {
+pub fn asynchronous(half: u32, start: Instant, seen: &Reference, devices: &SwitchLimits) -> CarrierHalf {
     let period_ticks = devices.shortest_half_ticks;
     synchronous(half, period_ticks, Zeros::Even, seen.share_within(start, period_ticks), devices)
 }
 
-/// How a half divides its zero vectors between its start and its end.
+/// The division of a half's zero vectors between its start and its end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Zeros {
     /// Evenly.
@@ -43,13 +43,13 @@ pub fn synchronous(
     period_ticks: u32,
     zeros: Zeros,
     voltage: AlphaBeta,
-    devices: &Devices,
-) -> CarrierPeriod {
+    devices: &SwitchLimits,
+) -> CarrierHalf {
     let rising = half & 1 == 0;
     // A rising half starts with all upper devices on.
     let all_on = if rising { zeros.at_start() } else { 1.0 - zeros.at_start() };
     let shares = on_shares(voltage, all_on);
-    let mut out = CarrierPeriod { period_ticks, start_levels: [rising; 3], ..CarrierPeriod::default() };
+    let mut out = CarrierHalf { period_ticks, start_levels: [rising; 3], ..CarrierHalf::default() };
     for (compare, share) in out.compare_ticks.iter_mut().zip([shares.a, shares.b, shares.c]) {
         let on = whole_pulse(share, period_ticks, devices.min_pulse_ticks);
         *compare = if rising { on } else { period_ticks - on };

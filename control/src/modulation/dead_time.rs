@@ -4,13 +4,29 @@
 //! diode, into the leg through the upper one. So a rising edge comes late by the dead time when the current is positive, a
 //! falling one when it is negative, and the other edges come at once. Those that would come late are commanded earlier.
 
-use super::{CarrierPeriod, Devices};
+use super::{CarrierHalf, SwitchLimits};
 use crate::frames::Abc;
 
 /// The half as the timer must play it so that the legs do what `half` says; `currents_a` are the phase currents that are
 /// expected in it. Currents below `small_a` may have either sign by their ripple: they count in proportion. Edges at the half's
 /// very start belong to the half before and cannot come earlier.
-pub fn compensated(half: &CarrierPeriod, currents_a: &Abc, small_a: f32, devices: &Devices) -> CarrierPeriod {
+///
+/// ```
+/// use tractive_control::frames::Abc;
+/// use tractive_control::modulation::{CarrierHalf, SwitchLimits, compensated};
+/// let devices = SwitchLimits { min_pulse_ticks: 250, dead_time_ticks: 125, shortest_half_ticks: 10_000 };
+/// // All three phases rise 5,000 ticks after the start; the current flows out of leg a and into the others.
+/// let half = CarrierHalf { period_ticks: 10_000, compare_ticks: [5_000; 3], ..CarrierHalf::default() };
+/// let played = compensated(&half, &Abc { a: 80.0, b: -40.0, c: -40.0 }, 2.0, &devices);
+/// // Leg a alone would rise late, by the dead time: its edge is commanded that much earlier.
+/// assert_eq!(played.compare_ticks, [4_875, 5_000, 5_000]);
+/// ```
+pub fn compensated(
+    half: &CarrierHalf,
+    currents_a: &Abc,
+    small_a: f32,
+    devices: &SwitchLimits,
+) -> CarrierHalf {
     let mut played = *half;
     let dead_ticks = devices.dead_time_ticks as f32;
     let phases = played.compare_ticks.iter_mut().zip(half.start_levels);
@@ -30,13 +46,13 @@ pub fn compensated(half: &CarrierPeriod, currents_a: &Abc, small_a: f32, devices
 mod tests {
     use super::*;
 
-    const DEVICES: Devices =
-        Devices { min_pulse_ticks: 250, dead_time_ticks: 125, shortest_half_ticks: 10_000 };
+    const DEVICES: SwitchLimits =
+        SwitchLimits { min_pulse_ticks: 250, dead_time_ticks: 125, shortest_half_ticks: 10_000 };
 
     fn played(start_levels: [bool; 3], currents: [f32; 3]) -> [u32; 3] {
         let compare_ticks = [5_000, 60, u32::MAX];
         let half =
-            CarrierPeriod { period_ticks: 10_000, compare_ticks, start_levels, ..CarrierPeriod::default() };
+            CarrierHalf { period_ticks: 10_000, compare_ticks, start_levels, ..CarrierHalf::default() };
         let [a, b, c] = currents;
         compensated(&half, &Abc { a, b, c }, 2.0, &DEVICES).compare_ticks
     }

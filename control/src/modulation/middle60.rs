@@ -5,7 +5,7 @@
 //! it lasts all three phases are at one level and the voltage is zero. A notch spans both halves of its carrier,
 //! and each half sets its own part anew.
 
-use super::{CarrierPeriod, Devices, Mode};
+use super::{CarrierHalf, Mode, SwitchLimits};
 use crate::frames::{limit, six_step_v};
 
 /// Share of six-step from which square wave needs no notch.
@@ -56,8 +56,8 @@ pub fn half(
     half: u32,
     period_ticks: u32,
     notch_ticks: Option<f32>,
-    devices: &Devices,
-) -> CarrierPeriod {
+    devices: &SwitchLimits,
+) -> CarrierHalf {
     let (mut levels, switching) = sector_levels(half / mode.sector_halves().max(1));
     let mut compare_ticks = [u32::MAX; 3];
     if let (Some(compare), Some(level), Some(notch_ticks)) =
@@ -72,7 +72,7 @@ pub fn half(
             *level = !*level;
         }
     }
-    CarrierPeriod { period_ticks, compare_ticks, start_levels: levels, ..CarrierPeriod::default() }
+    CarrierHalf { period_ticks, compare_ticks, start_levels: levels, ..CarrierHalf::default() }
 }
 
 /// The notch's part in this half, in ticks: never shorter than half the shortest pulse (the schedule leaves the

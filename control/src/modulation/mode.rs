@@ -5,7 +5,7 @@
 
 use super::schedule::Border;
 
-/// What makes the pulses of a mode.
+/// The maker of a mode's pulses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kind {
     /// Nothing: all gates off.
@@ -16,8 +16,9 @@ enum Kind {
     Pattern,
 }
 
-/// What control can regulate with a mode's pulses.
+/// The quantities that control can regulate with a mode's pulses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Regulation {
     /// The mean voltage of each carrier half.
     Mean,
@@ -53,7 +54,7 @@ pub(super) struct Row {
     pub notch_sum: f32,
     /// The flux ripple that the pulses leave.
     pub ripple: RippleShare,
-    /// Where the mode ends on the way up.
+    /// The border at which the mode ends on the way up.
     pub until: Border,
 }
 
@@ -107,9 +108,11 @@ impl Row {
 /// The modes and their rows from one list. A mode's place in it is its code on every wire: rows are added at the end.
 macro_rules! modes {
     ($($(#[$about:meta])* $mode:ident: $row:expr;)*) => {
-        /// How the pulses are made.
+        /// The pulse mode.
         #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+        #[cfg_attr(feature = "defmt", derive(defmt::Format))]
         #[repr(u8)]
+        #[non_exhaustive]
         pub enum Mode { $($(#[$about])* $mode,)* }
 
         impl Mode {
@@ -185,19 +188,19 @@ impl Mode {
         self.row().turn_ons as u32
     }
 
-    /// What control can regulate with its pulses.
+    /// The quantities that control can regulate with its pulses.
     #[inline]
     pub const fn regulation(self) -> Regulation {
         self.row().regulation
     }
 
-    /// Whether its fundamental is all that the link gives.
+    /// `true` if its fundamental is all that the link gives.
     #[inline]
     pub const fn is_whole(self) -> bool {
         matches!(self.regulation(), Regulation::Angle)
     }
 
-    /// Whether it is a pattern of whole edges of a flux hexagon: middle 60° or square wave.
+    /// `true` for a pattern of whole edges of a flux hexagon: middle 60° or square wave.
     #[inline]
     pub const fn is_pattern(self) -> bool {
         matches!(self.row().kind, Kind::Pattern)
@@ -214,7 +217,7 @@ impl Mode {
         self.carriers() / 6
     }
 
-    /// Whether the mean voltage of each carrier half follows the command: the modes with a triangular carrier.
+    /// `true` if the mean voltage of each carrier half follows the command: the modes with a triangular carrier.
     #[inline]
     pub const fn is_carrier(self) -> bool {
         matches!(self.row().kind, Kind::Carrier)

@@ -1,25 +1,25 @@
 //! The modulator: one half after the other, and the switches between modes.
 
 use super::carrier::{self, Zeros};
-use super::catch::Catch;
-use super::growth::Growth;
-use super::period::boundary;
-use super::{CarrierPeriod, Devices, Mode, Reference, Schedule, first_half, middle60, schedule};
+use super::flying_start::FlyingStart;
+use super::half::boundary;
+use super::pattern_transition::PatternTransition;
+use super::{CarrierHalf, Mode, Reference, Schedule, SwitchLimits, first_half, middle60, schedule};
 use crate::frames::{Angle, UNITS_PER_RADIAN, limit};
 use crate::time::Instant;
 
 /// The modulator's state.
 #[derive(Clone, Copy, Debug)]
 pub struct Modulator {
-    devices: Devices,
+    devices: SwitchLimits,
     schedule: Schedule,
     mode: Mode,
-    /// Number of the half that comes next, in the numbering of [`CarrierPeriod::half`].
+    /// Number of the half that comes next, in the numbering of [`CarrierHalf::half`].
     next_half: u32,
     mirrored: bool,
     plan: Option<Plan>,
-    growth: Growth,
-    /// Whether the half before was a pattern's and the next one is a carrier's.
+    transition: PatternTransition,
+    /// `true` if the half before was a pattern's and the next one is a carrier's.
     after_pattern: bool,
     /// Half the zero voltage of the present pattern's sectors, as an angle in rad.
     zero_rad: f32,
@@ -36,13 +36,13 @@ struct Plan {
     at: u32,
 }
 
-/// How far a carrier may be from its angle when it gives way to a pattern: 6°, less than half of its shortest half.
+/// The largest distance of a carrier from its angle when it gives way to a pattern: 6°, less than half of its shortest half.
 const KEPT_ANGLE: Angle = Angle(71_582_788);
 
 /// Halves by which a switch between locked modes is announced.
 const AHEAD: u32 = 2;
 
-/// How much shorter or longer than nominal a locked half may be while it catches up with its angle. A triangular
+/// Shortest and longest locked half, as shares of the nominal one, while it catches up with its angle. A triangular
 /// carrier's voltage has the right angle wherever its carrier stands, so it may take its time, and its ripple stays
 /// small; a pattern's angle is that of its boundaries.
 const CARRIER_STRETCH: (f32, f32) = (0.95, 1.05);
@@ -50,7 +50,7 @@ const PATTERN_STRETCH: (f32, f32) = (0.5, 2.0);
 
 impl Modulator {
     /// A modulator at rest: its first half is `Off`.
-    pub const fn new(devices: Devices, schedule: Schedule) -> Self {
+    pub const fn new(devices: SwitchLimits, schedule: Schedule) -> Self {
         Self {
             devices,
             schedule,
@@ -58,20 +58,20 @@ impl Modulator {
             next_half: 0,
             mirrored: false,
             plan: None,
-            growth: Growth::DONE,
+            transition: PatternTransition::DONE,
             after_pattern: false,
             zero_rad: 0.0,
         }
     }
 
-    /// Whether the machine is seen in the mirror, because it turns backward.
+    /// `true` while the machine is seen in the mirror, because it turns backward.
     pub const fn is_mirrored(&self) -> bool {
         self.mirrored
     }
 
     /// The half carrier that begins at `start`; `None` as reference: all gates off. Inlined: the stack of a call is not needed twice.
     #[inline(always)]
-    pub fn step(&mut self, start: Instant, reference: Option<&Reference>) -> CarrierPeriod {
+    pub fn step(&mut self, start: Instant, reference: Option<&Reference>) -> CarrierHalf {
         let Some(reference) = reference else {
             return self.rest(start, None);
         };
@@ -81,7 +81,7 @@ impl Modulator {
         let from = self.mode;
         self.choose_mode(start, pulse, &seen);
         let mut half = if from == Mode::Off && self.mode.is_pattern() {
-            self.catch(start, pulse, &seen)
+            self.start_flying(start, pulse, &seen)
         } else if self.mode == Mode::Async {
             carrier::asynchronous(self.next_half, start, &seen, &self.devices)
         } else {
@@ -99,8 +99,8 @@ impl Modulator {
         half
     }
 
-    /// A free half ([`CarrierPeriod::is_free`]) that begins at `start`, made anew from a newer reference.
-    pub fn revised(&self, half: &CarrierPeriod, start: Instant, reference: &Reference) -> CarrierPeriod {
+    /// A free half ([`CarrierHalf::is_free`]) that begins at `start`, made anew from a newer reference.
+    pub fn revised(&self, half: &CarrierHalf, start: Instant, reference: &Reference) -> CarrierHalf {
         let seen = if self.mirrored { reference.mirrored() } else { *reference };
         let mut revised = carrier::asynchronous(half.half.into(), start, &seen, &self.devices);
         (revised.mode, revised.half, revised.ahead) = (half.mode, half.half, half.ahead);
@@ -113,10 +113,10 @@ impl Modulator {
 
     /// All gates off; where a reference is known, with the mode that it would begin with announced.
     #[inline(never)]
-    pub fn rest(&mut self, start: Instant, reference: Option<&Reference>) -> CarrierPeriod {
+    pub fn rest(&mut self, start: Instant, reference: Option<&Reference>) -> CarrierHalf {
         self.mode = Mode::Off;
         self.plan = None;
-        let mut half = CarrierPeriod::off(self.devices.shortest_half_ticks);
+        let mut half = CarrierHalf::off(self.devices.shortest_half_ticks);
         if let Some(reference) = reference {
             let seen = if reference.rate < 0.0 { reference.mirrored() } else { *reference };
             half.ahead = [self.schedule.wanted(start, Mode::Off, &seen, &self.devices); 2];
@@ -155,7 +155,7 @@ impl Modulator {
         }
     }
 
-    /// Whether the locked half that begins at pulse angle `pulse` begins where it should. After a step of torque a carrier catches up
+    /// `true` if the locked half that begins at pulse angle `pulse` begins where it should. After a step of torque a carrier catches up
     /// with its angle over many halves; a pattern that began then would have its pulses in the wrong place.
     fn keeps_its_angle(&self, pulse: Angle) -> bool {
         (boundary(self.next_half, self.mode.carriers()) - pulse).signed().unsigned_abs() < KEPT_ANGLE.0
@@ -167,7 +167,8 @@ impl Modulator {
         self.mode = mode;
         self.plan = None;
         self.after_pattern = from.is_pattern() && mode.is_carrier();
-        self.growth = if from.is_pattern() { Growth::begun(self.zero_rad) } else { Growth::DONE };
+        self.transition =
+            if from.is_pattern() { PatternTransition::begun(self.zero_rad) } else { PatternTransition::DONE };
         self.schedule.switched(start);
     }
 
@@ -195,7 +196,7 @@ impl Modulator {
         }
     }
 
-    /// Where the zero vectors of the next half belong.
+    /// The place of the zero vectors in the next half.
     fn zeros(&self) -> Zeros {
         match self.ahead(self.next_half) {
             [next, _] if !next.is_carrier() => Zeros::Early,
@@ -207,15 +208,16 @@ impl Modulator {
     /// The first half of a pattern after none: one of a carrier, which leads the machine's flux to where the pattern begins.
     #[cold]
     #[inline(never)]
-    fn catch(&mut self, start: Instant, pulse: Angle, seen: &Reference) -> CarrierPeriod {
-        let Catch { half, turned, share } = Catch::new(self.mode, pulse, seen.share_within(start, 0), seen);
+    fn start_flying(&mut self, start: Instant, pulse: Angle, seen: &Reference) -> CarrierHalf {
+        let FlyingStart { half, turned, share } =
+            FlyingStart::new(self.mode, pulse, seen.share_within(start, 0), seen);
         self.next_half = half;
         let period_ticks = self.whole_ticks(turned.0 as f32 / seen.rate);
         carrier::synchronous(half, period_ticks, Zeros::Early, share, &self.devices)
     }
 
     /// One half of a carrier that is locked to the pulse angle.
-    fn locked(&mut self, start: Instant, pulse: Angle, seen: &Reference) -> CarrierPeriod {
+    fn locked(&mut self, start: Instant, pulse: Angle, seen: &Reference) -> CarrierHalf {
         let carriers = self.mode.carriers();
         let end = boundary(self.next_half + 1, carriers);
         let ticks_per_unit = 1.0 / seen.rate;
@@ -231,13 +233,13 @@ impl Modulator {
         }
         let own_rad = middle60::zero_rad(self.mode, seen.voltage_v, seen.udc_v);
         self.zero_rad = own_rad;
-        let (period, notch) = match self.growth.sector(own_rad, self.mode.sector_halves()) {
+        let (period, notch) = match self.transition.sector(own_rad, self.mode.sector_halves()) {
             Some(sector) => {
                 // The edge has the length that it should have, and whatever time is left is zero voltage.
                 let zero = nominal * (sector.zero_rad * ZERO_OF_HALF);
                 let edge = nominal - zero;
                 let left = wanted - sector.lead_rad * UNITS_PER_RADIAN * ticks_per_unit - edge;
-                let notch = self.growth.notch(left, zero, self.devices.min_pulse_ticks as f32);
+                let notch = self.transition.notch(left, zero, self.devices.min_pulse_ticks as f32);
                 (edge + notch.unwrap_or(0.0), notch)
             }
             None => {

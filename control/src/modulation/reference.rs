@@ -1,10 +1,11 @@
-//! What the modulator is asked for.
+//! The modulator's input.
 
 use crate::frames::{AlphaBeta, Angle};
 use crate::time::Instant;
 
-/// What the modulator is asked for: a fundamental that turns on by itself from one control period to the next.
+/// The modulator's input: a fundamental that turns on by itself from one control period to the next.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Reference {
     /// Fundamental phase voltage, peak, in V.
     pub voltage_v: f32,
@@ -23,6 +24,17 @@ pub struct Reference {
 }
 
 impl Reference {
+    /// No voltage, on a link of none.
+    pub const NONE: Self = Self {
+        voltage_v: 0.0,
+        vector: AlphaBeta { alpha: 0.0, beta: 0.0 },
+        carrier_angle: Angle::ZERO,
+        rate: 0.0,
+        at: Instant(0),
+        udc_v: 0.0,
+        depth: 0.0,
+    };
+
     /// A fundamental with its vector and its carrier at one angle, and a mode by its own depth.
     pub fn turning(voltage_v: f32, angle: Angle, rate: f32, at: Instant, udc_v: f32) -> Self {
         let direction = angle.sin_cos();
@@ -31,8 +43,8 @@ impl Reference {
         Self { voltage_v, vector, carrier_angle: angle, rate, at, udc_v, depth }
     }
 
-    /// The vector at an instant, turned on at constant rate.
-    fn vector_at(&self, instant: Instant) -> AlphaBeta {
+    /// The vector at an instant, in V, turned on at constant rate.
+    pub fn vector_at(&self, instant: Instant) -> AlphaBeta {
         self.vector.turned(self.turned(instant).sin_cos())
     }
 

@@ -69,7 +69,7 @@ impl RippleFlux {
         Some((SECTORS.get(sector as usize)?, place))
     }
 
-    /// How far along the edge of the first sector a place is, seen from the centre.
+    /// The distance of a place along the edge of the first sector, seen from the centre.
     #[inline(always)]
     fn along_edge(&self, place: u32) -> AlphaBeta {
         let part = place as f32 * (1.0 / PLACES.len() as f32);

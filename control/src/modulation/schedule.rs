@@ -1,15 +1,15 @@
-//! Which mode, and at which angle it may change.
+//! The choice of the mode, and the angles at which it may change.
 //!
 //! The modes of a ladder stand in a row; each border between two neighbours has a frequency and a modulation depth. Above
 //! either the drive goes up, below both, less a hysteresis, it comes down, and no sooner than a dwell time after
 //! the last switch. A switch waits for the end of a whole carrier at an angle where both modes' carriers end.
 
 use super::mode::{Regulation, Row};
-use super::{Devices, Mode, Reference};
+use super::{Mode, Reference, SwitchLimits};
 use crate::frames::{Angle, UNITS_PER_RADIAN};
 use crate::time::{Clock, Instant};
 
-/// Where a mode gives way to the next one up. Frequencies are shares of the highest switching frequency; each of the pair
+/// The border at which a mode gives way to the next one up. Frequencies are shares of the highest switching frequency; each of the pair
 /// is for going up and for coming down.
 #[derive(Clone, Copy, Debug)]
 pub struct Border {
@@ -83,7 +83,7 @@ impl Schedule {
 
     /// The mode that this reference should have, given the present one; the dwell time is respected.
     #[inline(never)]
-    pub fn wanted(&mut self, now: Instant, mode: Mode, seen: &Reference, devices: &Devices) -> Mode {
+    pub fn wanted(&mut self, now: Instant, mode: Mode, seen: &Reference, devices: &SwitchLimits) -> Mode {
         if let Some(fixed) = self.fixed {
             return fixed;
         }
@@ -147,7 +147,7 @@ fn reached(row: &Row, notch: f32) -> (f32, f32) {
 
 /// Sine of half the shortest notch, with `rate` in angle units per tick: an angle of a few degrees.
 #[inline(always)]
-fn shortest_notch(rate: f32, devices: &Devices) -> f32 {
+fn shortest_notch(rate: f32, devices: &SwitchLimits) -> f32 {
     let half_notch_rad = rate.abs() * (0.5 / UNITS_PER_RADIAN) * devices.min_pulse_ticks as f32;
     half_notch_rad - half_notch_rad * half_notch_rad * half_notch_rad * (1.0 / 6.0)
 }
@@ -163,11 +163,11 @@ fn largest(row: &Row, notch: f32) -> f32 {
 
 /// The largest fundamental of a mode as a share of six-step 2 udc/π, with `rate` in angle units per tick: udc/√3 for
 /// the carriers, what the shortest notch leaves for middle 60°, 1 for the square wave.
-pub fn depth_limit(mode: Mode, rate: f32, devices: &Devices) -> f32 {
+pub fn depth_limit(mode: Mode, rate: f32, devices: &SwitchLimits) -> f32 {
     largest(mode.row(), shortest_notch(rate, devices))
 }
 
-/// Whether the carrier that ends where half number `next_half` begins may give way to `to`: a locked carrier must have
+/// `true` if the carrier that ends where half number `next_half` begins may give way to `to`: a locked carrier must have
 /// ended, at a multiple of 360°/gcd(N1, N2); a free one at its valley.
 pub fn may_switch(from: Mode, to: Mode, next_half: u32) -> bool {
     if from == Mode::Off || to == Mode::Off {
@@ -200,7 +200,7 @@ pub fn first_half(from: Mode, to: Mode, next_half: u32, pulse: Angle) -> u32 {
 mod tests {
     extern crate std;
 
-    use super::super::period::boundary;
+    use super::super::half::boundary;
     use super::*;
     use std::{vec, vec::Vec};
 

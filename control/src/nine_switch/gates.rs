@@ -12,6 +12,7 @@ pub const GATES: [&str; 9] = ["UH", "VH", "WH", "UM", "VM", "WM", "UL", "VL", "W
 /// For an up-down counter these are two compare values: off while it counts between them, either way. The end of a pause
 /// that lies at 0 or 1/2 is no edge: there the pause meets its mirror image.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct GatePattern {
     /// Beginning of the pause, in periods.
     pub off_from: f32,
@@ -20,7 +21,7 @@ pub struct GatePattern {
 }
 
 impl GatePattern {
-    /// Whether the gate is on just after t = 0.
+    /// `true` if the gate is on just after t = 0.
     pub fn starts_on(&self) -> bool {
         self.pause().is_none_or(|(from, _)| from > 0.0)
     }
@@ -53,6 +54,7 @@ impl GatePattern {
 
 /// A gate's pause in ticks since the half's beginning; see [`GatePattern`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct GateTicks {
     /// Beginning of the pause.
     pub off_from: u32,
@@ -61,7 +63,7 @@ pub struct GateTicks {
 }
 
 impl GateTicks {
-    /// Whether the gate is on in the tick that begins `tick` ticks after the rising half.
+    /// `true` if the gate is on in the tick that begins `tick` ticks after the rising half.
     #[inline]
     pub const fn is_on(&self, tick: u32) -> bool {
         tick < self.off_from || tick >= self.off_to
@@ -70,10 +72,12 @@ impl GateTicks {
 
 /// The gates of one carrier period, and what they give.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub struct Period {
     /// In the order of [`GATES`].
     pub gates: [GatePattern; 9],
-    /// What the motors have.
+    /// The voltages that the motors get.
     pub applied: Applied,
 }
 

@@ -1,4 +1,4 @@
-//! WHICH pulses, nine switches: one inverter that feeds two motors, and short-circuits its legs on purpose to boost
+//! The pulses of nine switches: one inverter that feeds two motors, and short-circuits its legs on purpose to boost
 //! its Z-source link.
 //!
 //! Three legs of three switches in series, H, M and L; the upper motor hangs on the H–M nodes, the lower motor
@@ -51,6 +51,7 @@ use vectors::Direction;
 
 /// The mean voltage one motor is to have.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct MotorVoltage {
     /// Angle of the voltage vector.
     pub angle: Angle,
@@ -59,10 +60,11 @@ pub struct MotorVoltage {
     pub depth: f32,
 }
 
-/// What the modulator is asked for.
+/// The modulator's input.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Request {
-    /// Where the zero vectors and the shoot-through lie.
+    /// The place of the zero vectors and of the shoot-through.
     pub scheme: Scheme,
     /// The motor at the H–M nodes.
     pub upper: MotorVoltage,
@@ -72,8 +74,10 @@ pub struct Request {
     pub shoot_through: f32,
 }
 
-/// What the pulses give.
+/// The voltages that the pulses give.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub struct Applied {
     /// The upper motor's modulation depth.
     pub upper_depth: f32,
@@ -94,6 +98,7 @@ impl Applied {
 
 /// A request without meaning: the value that is not finite, or outside its range.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Refused {
     /// The upper motor's depth; must be finite, 0 or more.
     UpperDepth,
@@ -105,7 +110,30 @@ pub enum Refused {
 
 /// The gates of one carrier period. Voltages and shoot-through are exact within 1e-6 U_in and 1e-6 T.
 ///
-/// Fails on a value that is not finite or outside its range, and says which.
+/// # Errors
+/// A value that is not finite or outside its range, by its name.
+///
+/// # Example
+/// ```
+/// use tractive_control::frames::Angle;
+/// use tractive_control::nine_switch::{MotorVoltage, Refused, Request, Scheme, step};
+/// let request = Request {
+///     scheme: Scheme::Rs,
+///     upper: MotorVoltage { angle: Angle::from_turns(0.1), depth: 0.4 },
+///     lower: MotorVoltage { angle: Angle::from_turns(0.7), depth: 0.3 },
+///     shoot_through: 0.2,
+/// };
+/// let period = step(&request)?;
+/// assert!(period.applied.feasible());
+/// // RS-SVPWM toggles 16 gates a period; all three switches of a leg are on for a fifth of it.
+/// assert_eq!(period.gates.iter().map(|gate| gate.toggles().count()).sum::<usize>(), 16);
+/// let gates = period.ticks(10_000);
+/// let shorted = |tick: &u32| (0..3).any(|leg| [0, 3, 6].iter().all(|row| gates[row + leg].is_on(*tick)));
+/// assert_eq!((0..10_000).filter(shorted).count(), 2_000);
+/// // What has no meaning is refused by name.
+/// assert_eq!(step(&Request { shoot_through: 1.5, ..request }), Err(Refused::ShootThrough));
+/// # Ok::<(), Refused>(())
+/// ```
 #[inline]
 pub fn step(request: &Request) -> Result<Period, Refused> {
     check(request)?;

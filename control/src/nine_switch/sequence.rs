@@ -1,4 +1,4 @@
-//! In which order the vectors come: where each scheme puts the zero vectors.
+//! The order of the vectors: the place that each scheme gives the zero vectors.
 //!
 //! Rising half with both motors in sector I; the falling half is its mirror image:
 //!
@@ -12,9 +12,11 @@
 use super::shares::Share;
 use super::vectors::Direction;
 
-/// Where the zero vectors and the shoot-through lie. Toggles a period in brackets, with shoot-through or without.
+/// The place of the zero vectors and of the shoot-through. Toggles a period in brackets, with shoot-through or without.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u8)]
+#[non_exhaustive]
 pub enum Scheme {
     /// S-SVPWM: all three zero vectors (24); the least ripple in the Z-source's inductors.
     S,

@@ -1,16 +1,16 @@
-//! Who has how much of the period: the boundary between the two motors' shares, and the voltages that fit.
+//! The two motors' shares of the period: the boundary between them, and the voltages that fit.
 
 use super::vectors::Direction;
 use super::{Applied, Request};
 
-/// What is kept of a share besides active vectors and shoot-through, in periods, so that rounding never lets one share reach
+/// The part of a share kept free besides active vectors and shoot-through, in periods, so that rounding never lets one share reach
 /// into the other. A voltage less by four times this (two shares' worth, and rounding) is not reported as limited.
 const ROUNDING: f32 = 1.0 / 8_388_608.0;
 
 /// One motor's part of the rising half.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Share {
-    /// Where it meets the other motor's, in periods, 0 ..= 1/2.
+    /// The boundary with the other motor's share, in periods, 0 ..= 1/2.
     pub boundary: f32,
     /// Its other end: 1/2, the peak, for the upper motor; 0, the valley, for the lower one.
     pub end: f32,

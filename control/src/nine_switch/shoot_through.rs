@@ -1,4 +1,4 @@
-//! Where the link is shorted.
+//! The instants at which the link is shorted.
 //!
 //! In each half of the period each motor's share holds D T/4, one leg at a time, at the borders between its zero and its
 //! active vectors: the leg that steps there keeps the gate that turns off on a little longer, or turns on the other

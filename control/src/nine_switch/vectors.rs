@@ -6,8 +6,9 @@
 
 use crate::frames::Angle;
 
-/// What the three switches of a leg make of its two nodes.
+/// The state that the three switches of a leg make of its two nodes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum LegState {
     /// 1: H and L on. Upper node at P, lower node at N.
     One,

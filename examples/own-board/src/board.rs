@@ -3,7 +3,7 @@
 use tractive::control::{Demand, LinkWindow};
 use tractive::ports::Report;
 use tractive::frames::{Abc, Angle};
-use tractive::modulation::CarrierPeriod;
+use tractive::modulation::CarrierHalf;
 use tractive::ports::{ControlPort, PwmPort, Sample};
 use tractive::protection::SafeState;
 use tractive::time::{Clock, Instant};
@@ -55,23 +55,6 @@ pub fn gates_off() {
     write(GATES, 0);
 }
 
-/// Clears the control timer's flag.
-pub fn acknowledge_control() {
-    write(CONTROL_STATUS, 0);
-}
-
-/// Makes the PWM interrupt pending.
-pub fn pend_pwm() {
-    write(PEND, 1 << 25);
-}
-
-/// Clears the PWM timer's flag; whether it was set, so that a boundary has come.
-pub fn acknowledge_boundary() -> bool {
-    let came = read(STATUS) & 1 != 0;
-    write(STATUS, 0);
-    came
-}
-
 /// Clocks, pins, converters and timers, in the order that your chip asks for, gates off.
 pub fn start() {
     gates_off();
@@ -81,6 +64,13 @@ pub fn start() {
 pub struct Board;
 
 impl ControlPort for Board {
+    fn begin(&mut self, revises: bool) {
+        write(CONTROL_STATUS, 0);
+        if revises {
+            write(PEND, 1 << 25);
+        }
+    }
+
     fn sample(&mut self, _now: Instant) -> Sample {
         let count = read(ENCODER) % COUNTS;
         Sample {
@@ -99,7 +89,7 @@ impl ControlPort for Board {
         gates_off();
     }
 
-    fn overrun_ticks(&mut self, _now: Instant) -> u32 {
+    fn overrun_ticks(&mut self, _now: Instant, _deadline_ticks: u32) -> u32 {
         0
     }
 
@@ -107,11 +97,17 @@ impl ControlPort for Board {
 }
 
 impl PwmPort for Board {
+    fn begin(&mut self) -> bool {
+        let boundary = read(STATUS) & 1 != 0;
+        write(STATUS, 0);
+        boundary
+    }
+
     fn sample(&mut self, _now: Instant) -> Abc {
         currents_a(1)
     }
 
-    fn play(&mut self, _now: Instant, next: &CarrierPeriod) {
+    fn play(&mut self, _now: Instant, next: &CarrierHalf) {
         write(RELOAD, next.period_ticks);
         for (leg, ticks) in next.compare_ticks.iter().enumerate() {
             write(COMPARES.wrapping_add(leg), *ticks);

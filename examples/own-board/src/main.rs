@@ -19,13 +19,13 @@ use core::cell::UnsafeCell;
 use machine::{BUILT_IN, BuiltIn};
 use tractive::control::Gains;
 use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
-use tractive::modulation::Devices;
+use tractive::modulation::SwitchLimits;
 use tractive::time::Instant;
 
 /// Both tasks' settings: the clock, the switches' limits, the current loop's gains.
 const SETTINGS: Settings = Settings {
     clock: CLOCK,
-    devices: Devices::new(MIN_PULSE_TICKS, 0, BUILT_IN.ratings.max_switching_hz, &CLOCK),
+    devices: SwitchLimits::new(MIN_PULSE_TICKS, 0, BUILT_IN.ratings.max_switching_hz, &CLOCK),
     gains: Gains::DEFAULT,
 };
 
@@ -61,10 +61,6 @@ fn main() -> ! {
 extern "C" fn TIM2() {
     // SAFETY: this interrupt alone uses it.
     let task = unsafe { &mut *CONTROL.0.get() };
-    board::acknowledge_control();
-    if task.wants_revision() {
-        board::pend_pwm();
-    }
     task.run(&mut Board, &SHARED);
 }
 
@@ -73,11 +69,7 @@ extern "C" fn TIM2() {
 extern "C" fn TIM1_UP() {
     // SAFETY: this interrupt alone uses it.
     let task = unsafe { &mut *PWM.0.get() };
-    if board::acknowledge_boundary() {
-        task.run(&mut Board, &SHARED);
-    } else {
-        task.revise(&mut Board, &SHARED);
-    }
+    task.run(&mut Board, &SHARED);
 }
 
 #[panic_handler]

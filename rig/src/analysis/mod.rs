@@ -8,19 +8,33 @@ mod transition;
 pub use steady::{SteadyPoint, square_verdict, steady_point};
 pub use step::{Step, StepResponse, step_response};
 pub use switches::{SwitchFigures, mode_switches, switch_verdicts};
-pub use transition::{Catch, Transition, catch, transition};
+pub use transition::{FlyingStart, Transition, catch, transition};
 
 use crate::rows::{between, mean};
-use crate::trace::{Recording, Row};
+use crate::trace::{Recorded, Recording, Row, name_of};
 use crate::verdict::FALLS_SHORT;
 use serde::Serialize;
 use serde_json::{Map, Value};
+use tractive::protection::Trip;
 
 /// A scenario's figures, each with its unit in its name.
 #[derive(Clone, Debug, Default)]
 pub struct Figures(Map<String, Value>);
 
 impl Figures {
+    /// Figures of every run of either system: its length in s, the fault, the largest phase current in A.
+    pub fn of_run(simulated_s: f64, trip: Option<Trip>, peak_current_a: f64) -> Self {
+        let mut figures = Self::default();
+        figures.set("simulated_s", simulated_s);
+        figures.set("fault", name_of(trip));
+        if let Some(trip) = trip {
+            figures.set("fault_value", trip.value);
+            figures.set("fault_limit", trip.limit);
+        }
+        figures.set("peak_current_a", peak_current_a);
+        figures
+    }
+
     /// Adds a figure.
     pub fn set(&mut self, name: &str, value: impl Serialize) {
         self.0.insert(name.to_owned(), serde_json::to_value(value).unwrap_or(Value::Null));
@@ -36,24 +50,19 @@ impl Figures {
         &self.0
     }
 
-    /// Whether one of the verdicts says that a bound is not kept.
+    /// `true` if one of the verdicts says that a bound is not kept.
     pub fn fall_short(&self) -> bool {
         let verdicts = self.get("verdicts").and_then(Value::as_array);
         verdicts.is_some_and(|verdicts| verdicts.iter().any(|one| one["verdict"] == FALLS_SHORT))
     }
 }
 
-/// What every scenario reports.
+/// The figures that every scenario reports.
 pub fn common(recording: &Recording) -> Figures {
-    let mut figures = Figures::default();
     let rows = &recording.rows;
-    figures.set("simulated_s", rows.last().map_or(0.0, |row| row.t_s));
-    figures.set("fault", recording.trip().map_or("", |trip| trip.fault.name()));
-    if let Some(trip) = recording.trip() {
-        figures.set("fault_value", trip.value);
-        figures.set("fault_limit", trip.limit);
-    }
-    figures.set("peak_current_a", rows.iter().map(Row::peak_current_a).fold(0.0, f64::max));
+    let simulated_s = rows.last().map_or(0.0, |row| row.t_s);
+    let peak_a = rows.iter().map(Row::peak_current_a).fold(0.0, f64::max);
+    let mut figures = Figures::of_run(simulated_s, recording.trip(), peak_a);
     let told: Vec<_> = rows.iter().map(|row| row.map_error).filter(|share| *share != 0.0).collect();
     figures.set("map_error_estimate_percent", 100.0 * told.iter().sum::<f64>() / told.len().max(1) as f64);
     figures.set("most_turn_ons_in_100_ms", most_turn_ons(recording, 0.1));
@@ -120,7 +129,7 @@ pub fn whole_turns(recording: &Recording, (from_s, to_s): (f64, f64), pole_pairs
     if turns >= 1.0 { window(recording, to_s - turns * turn_s, to_s) } else { rows }
 }
 
-/// How long each mode was in use, in s, in order of first use.
+/// The time for which each mode was in use, in s, in order of first use.
 #[derive(Clone, Debug, Serialize)]
 pub struct ModeUse {
     /// The mode.

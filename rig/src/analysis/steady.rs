@@ -15,7 +15,7 @@ pub struct SteadyPoint {
     pub speed_rpm: f64,
     /// Torque demanded, in N·m.
     pub demand_nm: f64,
-    /// What the drive says that it gives of it, in N·m: less where current or voltage do not allow more.
+    /// The torque that the drive says it gives of it, in N·m: less where current or voltage do not allow more.
     pub reference_nm: f64,
     /// Mean air-gap torque, in N·m.
     pub torque_nm: f64,
@@ -66,7 +66,7 @@ pub fn steady_point(
     }
 }
 
-/// What is wanted of the mean torque in square wave; nothing where there is none.
+/// The verdict on the mean torque in square wave; nothing where there is none.
 pub fn square_verdict(recording: &Recording, options: &RunOptions) -> Option<Verdict> {
     let error = square_torque_error_percent(recording)?;
     let others = "0.5; 14 to 33 with an id trim";

@@ -8,7 +8,7 @@ use serde::Serialize;
 /// A step of the demand.
 #[derive(Clone, Copy, Debug)]
 pub struct Step {
-    /// When, in s.
+    /// The time, in s.
     pub at_s: f64,
     /// Torque before, in N·m.
     pub from_nm: f64,
@@ -18,7 +18,7 @@ pub struct Step {
     pub until_s: f64,
 }
 
-/// What a step did. Torque is averaged over one carrier period (1/900 s, centred).
+/// The response to a step. Torque is averaged over one carrier period (1/900 s, centred).
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct StepResponse {
     /// Torque before, in N·m.

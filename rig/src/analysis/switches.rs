@@ -8,10 +8,10 @@ use crate::verdict::{Verdict, bound, worst};
 use serde::Serialize;
 use tractive::modulation::Mode;
 
-/// What a switch of mode did to the current.
+/// The effect of a switch of mode on the current.
 #[derive(Clone, Debug, Serialize)]
 pub struct SwitchFigures {
-    /// When, in s.
+    /// The time, in s.
     pub t_s: f64,
     /// The mode that ended.
     pub from: &'static str,
@@ -75,7 +75,7 @@ fn at_switch(recording: &Recording, switch: &Switch) -> SwitchFigures {
     }
 }
 
-/// How far a torque error at a switch goes beyond its steady band before and after.
+/// The excursion of a torque error at a switch beyond its steady band before and after.
 fn excursion(error_nm: impl Fn(f64, f64) -> Vec<f64>) -> f64 {
     let extent = |from_s: f64, to_s: f64| {
         let errors = error_nm(from_s, to_s);
@@ -87,7 +87,10 @@ fn excursion(error_nm: impl Fn(f64, f64) -> Vec<f64>) -> f64 {
     (low - during.0).max(during.1 - high).max(0.0)
 }
 
-/// What is wanted of every switch of mode.
+/// Torque beyond the steady ripple band at most, as a share of the largest.
+const EXCURSION: f64 = 25.0 / 1235.0;
+
+/// The verdicts on every switch of mode.
 pub fn switch_verdicts(
     switches: &[SwitchFigures],
     recording: &Recording,
@@ -109,7 +112,7 @@ pub fn switch_verdicts(
         Verdict::at_most(
             "torque beyond the steady ripple band in N·m",
             torque_nm,
-            bound(options, 25.0, f64::INFINITY),
+            bound(options, EXCURSION * machine.folder.parameters.max_torque_nm, f64::INFINITY),
             "31 up, 71 braking",
         ),
         Verdict::at_most(

@@ -6,10 +6,10 @@ use crate::trace::{Recording, Row};
 use serde::Serialize;
 use tractive::modulation::Mode;
 
-/// What a change did to the current, beside the steady states before and after it.
+/// The effect of a change on the current, beside the steady states before and after it.
 #[derive(Clone, Debug, Serialize)]
 pub struct Transition {
-    /// When, in s.
+    /// The time, in s.
     pub at_s: f64,
     /// Mechanical speed, in r/min.
     pub speed_rpm: f64,
@@ -48,9 +48,9 @@ pub fn transition(recording: &Recording, at_s: f64, until_s: f64) -> Transition 
     }
 }
 
-/// How a coasting machine was caught.
+/// The flying start on a coasting machine.
 #[derive(Clone, Debug, Serialize)]
-pub struct Catch {
+pub struct FlyingStart {
     /// Mechanical speed, in r/min.
     pub speed_rpm: f64,
     /// First mode in which pulses were made.
@@ -72,13 +72,13 @@ pub struct Catch {
 }
 
 /// Measures a catch at `at_s`, with no torque demanded until 30 ms later, and what the drive gave until `until_s`.
-pub fn catch(recording: &Recording, (at_s, until_s): (f64, f64), max_current_a: f64) -> Catch {
+pub fn catch(recording: &Recording, (at_s, until_s): (f64, f64), max_current_a: f64) -> FlyingStart {
     const CATCH_S: f64 = 0.03;
     let peak = |rows: &[Row]| rows.iter().map(Row::peak_current_a).fold(0.0, f64::max);
     let rows = window(recording, at_s, at_s + CATCH_S);
     let driven = window(recording, until_s - 0.06, until_s);
     let catching_current_a = peak(rows);
-    Catch {
+    FlyingStart {
         speed_rpm: rows.first().map_or(0.0, |row| row.speed_rpm),
         first_mode: rows.iter().find(|row| row.mode != Mode::Off).map_or("off", |row| row.mode.name()),
         then_mode: rows.last().map_or("off", |row| row.mode.name()),

@@ -1,4 +1,4 @@
-//! What passes between a bench and the control interrupt: samples that wait to be asked for, and reports that show once what they
+//! The exchange between a bench and the control interrupt: samples that wait to be asked for, and reports that show once what they
 //! command takes effect.
 
 use super::due::Due;
@@ -10,7 +10,7 @@ use tractive::time::Instant;
 #[derive(Clone, Debug)]
 pub struct Conversions<S, R> {
     samples: VecDeque<(Tick, S)>,
-    /// When the next sample is taken.
+    /// The time of the next sample.
     pub next: Tick,
     reports: Due<R>,
     /// The report whose command has taken effect.
@@ -39,12 +39,12 @@ impl<S, R: Default> Conversions<S, R> {
         Ok(())
     }
 
-    /// What was sampled now.
+    /// Keeps the sample of this time.
     pub fn put(&mut self, now: Tick, sample: S) {
         self.samples.push_back((now, sample));
     }
 
-    /// What was sampled at a step.
+    /// The sample of a step.
     ///
     /// # Errors
     /// Where nothing was.

@@ -5,7 +5,7 @@ use crate::inject::traction::SupplyFault;
 use crate::plant::stopwatch::in_plant;
 use crate::plant::{FilteredLink, Leg, LineFilter, Plant};
 
-/// What feeds the inverter.
+/// The supply of the inverter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Supply {
     /// A link whose voltage is what it is told to be.
@@ -14,7 +14,7 @@ pub enum Supply {
     Line(LineFilter),
 }
 
-/// What the line does, as a function of time in s: its healthy voltage in V, and what is wrong with it and for how long, in s.
+/// The line as a function of time in s: its healthy voltage in V, its fault and for how long that lasts, in s.
 pub type LineState = (f64, Option<(SupplyFault, f64)>);
 
 /// The link and what is in front of it.
@@ -56,8 +56,8 @@ impl DcSide {
     pub fn udc_v(&self, healthy_v: impl FnOnce() -> f64) -> f64 {
         match self {
             Self::Stiff => healthy_v(),
-            Self::Filtered(link) => link.udc_v(),
-            Self::Operated(line) => line.link.udc_v(),
+            Self::Filtered(link) => link.udc_v,
+            Self::Operated(line) => line.link.udc_v,
         }
     }
 
@@ -72,9 +72,9 @@ impl DcSide {
         match self {
             Self::Stiff => in_plant(|| plant.advance(legs, line().0, dt_s)),
             Self::Filtered(link) => {
-                let before_j = plant.energies().electrical_j;
-                in_plant(|| plant.advance(legs, link.udc_v(), dt_s));
-                let drawn_j = plant.energies().electrical_j - before_j;
+                let before_j = plant.motor.energies.electrical_j;
+                in_plant(|| plant.advance(legs, link.udc_v, dt_s));
+                let drawn_j = plant.motor.energies.electrical_j - before_j;
                 link.advance(drawn_j, dt_s, line_v(line()));
             }
             Self::Operated(line) => in_plant(|| plant.advance_on(&mut line.link, legs, dt_s)),
@@ -89,12 +89,12 @@ impl DcSide {
         let Self::Filtered(mut link) = *self else { return 0.0 };
         (0..STEPS).fold(0.0_f64, |highest_v, k| {
             link.advance(0.0, STEP_S, line_v(line(f64::from(k) * STEP_S)));
-            highest_v.max(link.udc_v())
+            highest_v.max(link.udc_v)
         })
     }
 }
 
-/// Where the line's voltage goes, in V; `None` where it is cut off.
+/// The target of the line's voltage, in V; `None` where it is cut off.
 fn line_v((healthy_v, fault): LineState) -> Option<f64> {
     match fault {
         None => Some(healthy_v),

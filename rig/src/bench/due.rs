@@ -1,4 +1,4 @@
-//! What takes effect later, in its order.
+//! The effects that are due later, in their order.
 
 use super::Tick;
 use std::collections::VecDeque;
@@ -19,7 +19,7 @@ impl<T> Due<T> {
         self.0.push_back((at, value));
     }
 
-    /// When the next one takes effect.
+    /// The time at which the next one takes effect.
     pub fn next(&self) -> Option<Tick> {
         self.0.front().map(|(at, _)| *at)
     }

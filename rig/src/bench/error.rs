@@ -1,4 +1,4 @@
-//! Why a bench cannot go on.
+//! The reasons why a bench cannot go on.
 
 use crate::plant::zs9::IllegalState;
 use crate::trace::Tick;
@@ -6,12 +6,12 @@ use crate::trace::Tick;
 /// The firmware broke the protocol, or asked for what an inverter must not have.
 #[derive(Debug, thiserror::Error)]
 pub enum BenchError {
-    /// What was played ended and nothing follows.
+    /// The pulses that were played ended and nothing follows.
     #[error("at {at_s:.6} s the {what} ended and no next one had been loaded")]
     NothingToPlay {
         /// A carrier half or period.
         what: &'static str,
-        /// When, in s.
+        /// The time, in s.
         at_s: f64,
     },
     /// A sample was asked for that is not there.

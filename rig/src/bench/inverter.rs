@@ -2,10 +2,10 @@
 
 use crate::plant::Leg;
 use crate::trace::{Edge, Tick};
-use tractive::modulation::{CarrierPeriod, Mode};
+use tractive::modulation::{CarrierHalf, Mode};
 use tractive::protection::{LegFaults, SafeState};
 
-/// What is wrong with a gate.
+/// The defect of a gate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stuck {
     /// Its order is on for good; its driver still turns the device off where it desaturates.
@@ -16,10 +16,10 @@ pub enum Stuck {
     Shorted,
 }
 
-/// How long a leg's output may be away from where it should be before its monitor tells, in ticks (10 µs).
+/// The time for which a leg's output may be away from where it should be before its monitor tells, in ticks (10 µs).
 const MONITOR_TICKS: Tick = 250;
 
-/// What a leg is told to do.
+/// The order to a leg.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Order {
     Off,
@@ -33,7 +33,7 @@ struct LegDriver {
     order: Order,
     upper_on: bool,
     lower_on: bool,
-    /// When the device that was ordered on turns on.
+    /// The time at which the device that was ordered on turns on.
     turn_on: Option<Tick>,
 }
 
@@ -42,7 +42,7 @@ struct LegDriver {
 pub struct Inverter {
     legs: [LegDriver; 3],
     dead_time: Tick,
-    half: CarrierPeriod,
+    half: CarrierHalf,
     half_start: Tick,
     /// Next toggle of each leg within the half.
     toggles: [Option<Tick>; 3],
@@ -58,7 +58,7 @@ pub struct Inverter {
 
 impl Inverter {
     /// All gates off, with a dead time in ticks, playing a half from tick 0.
-    pub fn new(dead_time: Tick, first: CarrierPeriod) -> Self {
+    pub fn new(dead_time: Tick, first: CarrierHalf) -> Self {
         let leg = LegDriver { order: Order::Off, upper_on: false, lower_on: false, turn_on: None };
         Self {
             legs: [leg; 3],
@@ -88,7 +88,7 @@ impl Inverter {
     }
 
     /// The half that is played.
-    pub fn half(&self) -> &CarrierPeriod {
+    pub fn half(&self) -> &CarrierHalf {
         &self.half
     }
 
@@ -97,13 +97,13 @@ impl Inverter {
         self.half_start + Tick::from(self.half.period_ticks)
     }
 
-    /// Whether the gates are in a safe state, whatever is played.
+    /// `true` if the gates are in a safe state, whatever is played.
     pub fn is_safe(&self) -> bool {
         self.safe.is_some()
     }
 
     /// The next half takes over at `tick`.
-    pub fn begin(&mut self, half: CarrierPeriod, tick: Tick) {
+    pub fn begin(&mut self, half: CarrierHalf, tick: Tick) {
         self.half = half;
         self.half_start = tick;
         self.toggles = [None; 3];
@@ -203,7 +203,7 @@ impl Inverter {
         }
     }
 
-    /// What drivers and monitors of the legs have found.
+    /// The findings of the legs' drivers and monitors.
     pub fn leg_faults(&self) -> LegFaults {
         self.found
     }

@@ -8,22 +8,22 @@ use tractive::operator::{Feedback, Request, SLOT_PERIODS, Status, Switches};
 use tractive::protection::Fault;
 use tractive::time::Clock;
 
-/// Who commands: the request at `t_s` seconds after the recording begins.
+/// The sender of commands: the request at `t_s` seconds after the recording begins.
 pub type Commander = Box<dyn Fn(f64) -> Request + Send>;
 
-/// What the line side is, and what happens to it.
+/// The line side, and the events on it.
 pub struct LinePlan {
     /// The link.
     pub link: DcLinkSettings,
-    /// Whether the link stands at the source's voltage, main contactor open, when the run begins.
+    /// `true` if the link stands at the source's voltage, main contactor open, when the run begins.
     pub starts_charged: bool,
-    /// Who commands.
+    /// The sender of commands.
     pub commander: Commander,
     /// Causes in hardware that hold the gates off: from, until (s from the recording's beginning), which.
     pub hardware: Vec<(f64, f64, Fault)>,
     /// From these times on (s) the braking resistor has this resistance, in ohm.
     pub chopper_ohm: Vec<(f64, f64)>,
-    /// Whether the source takes energy back from these times on (s).
+    /// The times (s) from which on the source takes energy back, or does not.
     pub reversible: Vec<(f64, bool)>,
 }
 
@@ -54,7 +54,8 @@ pub struct LineSide {
     /// The running chopper period's end, and where in it the chopper goes off.
     chopper_period: Tick,
     chopper_off: Option<Tick>,
-    status: Option<Status>,
+    /// The operator's last word that has taken effect.
+    pub status: Option<Status>,
 }
 
 impl LineSide {
@@ -62,7 +63,7 @@ impl LineSide {
     pub fn new(plan: LinePlan, clock: &Clock) -> Self {
         let mut link = DcLink::new(plan.link);
         if plan.starts_charged {
-            link.set_udc_v(plan.link.source.voltage_v);
+            link.udc_v = plan.link.source.voltage_v;
         }
         Self {
             stored_before_j: link.stored_j(),
@@ -78,9 +79,9 @@ impl LineSide {
         }
     }
 
-    /// Where the link's energy went since tick 0.
+    /// The balance of the link's energy since tick 0.
     pub fn balance(&self) -> LinkBalance {
-        let energies = self.link.energies();
+        let energies = self.link.energies;
         let LinkEnergies { source_j, path_j, discharge_j, chopper_j, inverter_j } = energies;
         let kept_j = self.link.stored_j() - self.stored_before_j;
         LinkBalance {
@@ -90,12 +91,7 @@ impl LineSide {
         }
     }
 
-    /// The operator's last word that has taken effect.
-    pub fn status(&self) -> Option<Status> {
-        self.status
-    }
-
-    /// What holds the gates off in hardware at `t_s`.
+    /// The cause that holds the gates off in hardware at `t_s`.
     pub fn hardware(&self, t_s: f64) -> Option<Fault> {
         let held = self.plan.hardware.iter().find(|(from, until, _)| (*from..*until).contains(&t_s));
         held.map(|(.., fault)| *fault)
@@ -108,12 +104,12 @@ impl LineSide {
         gear.sampled(now, hardware, || (plan.commander)(t_s))
     }
 
-    /// What is asked in the slot that began at `tick`, and what the board says.
+    /// The request in the slot that began at `tick`, and the board's feedback.
     pub fn ask(&mut self, tick: Tick) -> Option<(Request, Feedback)> {
         self.gear.ask(tick)
     }
 
-    /// What the operator told; it holds from `from` on.
+    /// Takes the operator's status; it holds from `from` on.
     pub fn tell(&mut self, from: Tick, status: Status) {
         self.gear.tell(from, status);
     }
@@ -150,10 +146,10 @@ impl LineSide {
             chopper: self.chopper_off.is_some(),
         };
         if let Some(ohm) = held(&self.plan.chopper_ohm, t_s) {
-            self.link.set_chopper_ohm(ohm);
+            self.link.settings.chopper_ohm = ohm;
         }
         if let Some(reversible) = held(&self.plan.reversible, t_s) {
-            self.link.source_mut().reversible = reversible;
+            self.link.settings.source.reversible = reversible;
         }
         row
     }

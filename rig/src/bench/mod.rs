@@ -13,6 +13,7 @@ mod inverter;
 mod line;
 mod observe;
 mod record;
+mod rows;
 mod run;
 mod sampling;
 mod sensors;
@@ -40,19 +41,17 @@ use crate::inject::traction::{Kind, Spoiler};
 use crate::plant::Plant;
 use crate::trace::{Row, SlotRow, Switch};
 use dc_side::DcSide;
-use tractive::modulation::CarrierPeriod;
+use rows::Rows;
+use tractive::modulation::CarrierHalf;
 use tractive::operator::{Feedback, Request, Status};
 use tractive::ports::Report;
 use tractive::ports::Sample;
 use tractive::protection::SafeState;
 use tractive::time::{Clock, Instant};
 
-/// How long after its nominal instant an interrupt's order to enter a safe state reaches the gates, in ticks (25 µs): longer
+/// The delay from an interrupt's nominal instant until its order to enter a safe state reaches the gates, in ticks (25 µs): longer
 /// than both interrupts together take, as a bound that does not depend on which of them came first.
 const SAFE_STATE_DELAY: Tick = 625;
-
-/// Rows for which room is made at once.
-const MOST_ROWS: usize = 1 << 20;
 
 /// Machine, inverter, sensors and recorder.
 pub struct Bench {
@@ -61,21 +60,21 @@ pub struct Bench {
     sensors: Sensors,
     dc: DcSide,
     spoiler: Spoiler,
-    observed: Observed,
+    /// The effects of a fault.
+    pub observed: Observed,
     operator: Box<dyn Operator + Send>,
     clock: Clock,
     time: Timeline,
     end: Tick,
-    next: Option<CarrierPeriod>,
+    next: Option<CarrierHalf>,
     /// Orders to enter a safe state, or to leave it (`None`), and when they reach the gates.
     orders: Due<Option<SafeState>>,
     slots: Vec<SlotRow>,
     control: Conversions<Sample, Report>,
     loads: Due<f64>,
-    next_row: Tick,
-    rows_done: u64,
-    trace_step_s: f64,
-    rows: Vec<Row>,
+    /// The rows that are judged, and the others that are written.
+    rows: Rows,
+    written: Option<Rows>,
     switches: Vec<Switch>,
 }
 
@@ -83,7 +82,7 @@ impl Bench {
     /// A bench at tick 0.
     pub fn new(plant: Plant, operator: Box<dyn Operator + Send>, settings: &Settings) -> Self {
         let time = Timeline::new(settings.clock, 1, settings.lead_s);
-        let first = CarrierPeriod::off(settings.first_half_ticks);
+        let first = CarrierHalf::off(settings.first_half_ticks);
         let at = |injection: Injection<Kind>| time.steps(settings.lead_s + injection.at_s);
         let from = settings.injection.map_or(Tick::MAX, at);
         Self {
@@ -101,12 +100,8 @@ impl Bench {
             slots: Vec::new(),
             control: Conversions::new(&time),
             loads: Due::default(),
-            next_row: time.lead,
-            rows_done: 0,
-            trace_step_s: settings.trace_step_s,
-            rows: Vec::with_capacity(
-                MOST_ROWS.min((settings.duration_s / settings.trace_step_s) as usize + 2),
-            ),
+            rows: Rows::new(settings.trace_step_s, settings.duration_s, &time),
+            written: None,
             switches: Vec::new(),
             time,
         }
@@ -115,7 +110,9 @@ impl Bench {
     /// The same beginning at another tick than 0, with tasks of [`crate::run::traction::Tasks::beginning_at`] the same: where instants wrap.
     pub fn beginning_at(mut self, origin: Tick) -> Self {
         self.time = self.time.beginning_at(origin);
-        for tick in [&mut self.end, &mut self.control.next, &mut self.next_row] {
+        let written = self.written.as_mut().map(|rows| &mut rows.next);
+        let regular = [&mut self.end, &mut self.control.next, &mut self.rows.next];
+        for tick in regular.into_iter().chain(written) {
             *tick += origin;
         }
         self.observed.from = self.observed.from.saturating_add(origin);
@@ -129,24 +126,33 @@ impl Bench {
         self
     }
 
-    /// The same with a line side: the link's voltage is its capacitor's, and the drive has an operator.
-    pub fn with_line(mut self, plan: LinePlan) -> Self {
-        self.dc = DcSide::Operated(Box::new(LineSide::new(plan, &self.clock)));
+    /// The same with a trace that is written at a step of its own, in s, beside the one that is judged.
+    pub fn writing_every(mut self, step_s: f64) -> Self {
+        let duration_s = self.time.seconds(self.end);
+        self.written = Some(Rows::new(step_s, duration_s, &self.time));
         self
     }
 
-    /// Whether the drive has an operator.
+    /// The same with a line side, if there is one: the link's voltage is its capacitor's, and the drive has an operator.
+    pub fn with_line(mut self, plan: Option<LinePlan>) -> Self {
+        if let Some(plan) = plan {
+            self.dc = DcSide::Operated(Box::new(LineSide::new(plan, &self.clock)));
+        }
+        self
+    }
+
+    /// `true` if the drive has an operator.
     pub fn is_operated(&self) -> bool {
         self.dc.operated().is_some()
     }
 
-    /// What is asked of the operator in the slot that began at `instant`, and what the board says.
+    /// The request to the operator in the slot that began at `instant`, and the board's feedback.
     pub fn ask(&mut self, instant: Instant) -> Result<(Request, Feedback), BenchError> {
         let tick = self.time.widen(instant);
         self.dc.operated_mut().and_then(|line| line.ask(tick)).ok_or(BenchError::NoSlot(tick))
     }
 
-    /// What the operator told; it holds from `from` on.
+    /// Takes the operator's status; it holds from `from` on.
     pub fn told(&mut self, from: Instant, status: Status) -> Result<(), BenchError> {
         let tick = self.time.coming(from)?;
         if let Some(line) = self.dc.operated_mut() {
@@ -162,16 +168,11 @@ impl Bench {
 
     /// The trace so far.
     pub fn rows(&self) -> &[Row] {
-        &self.rows
-    }
-
-    /// What a fault did.
-    pub fn observed(&self) -> &Observed {
-        &self.observed
+        self.rows.as_slice()
     }
 
     /// The half to play after the one that begins at `instant`.
-    pub fn play(&mut self, _instant: Instant, half: CarrierPeriod) {
+    pub fn play(&mut self, _instant: Instant, half: CarrierHalf) {
         self.next = Some(half);
     }
 
@@ -193,7 +194,7 @@ impl Bench {
         self.orders.push(self.time.widen(instant) + SAFE_STATE_DELAY, order);
     }
 
-    /// Whether the gates will be in a safe state once every order has reached them.
+    /// `true` if the gates will be in a safe state once every order has reached them.
     fn will_be_safe(&self) -> bool {
         self.orders.last().map_or(self.inverter.is_safe(), Option::is_some)
     }

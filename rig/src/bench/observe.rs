@@ -1,7 +1,7 @@
-//! What a fault did: the extremes of currents and voltages until the gates are safe and after that.
+//! The effects of a fault: the extremes of currents and voltages until the gates are safe and after that.
 
 use super::Tick;
-use crate::plant::Plant;
+use crate::plant::Motor;
 use tractive::protection::SafeState;
 
 /// Largest values, of an instant or over a time.
@@ -29,7 +29,7 @@ impl Peaks {
     }
 }
 
-/// What a sound plant keeps to: beyond it a fault makes a difference.
+/// The limits that a sound plant keeps to: beyond them a fault makes a difference.
 #[derive(Clone, Copy, Debug)]
 pub struct Limits {
     /// Largest phase current, in A.
@@ -63,7 +63,7 @@ impl Limits {
     }
 }
 
-/// What is stored when the gates become safe, and must go somewhere.
+/// The energy that is stored when the gates become safe, and must go somewhere.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Stored {
     /// The highest voltage from then on if the bridge were gone, in V: of the link, or of the ZS9's capacitors.
@@ -77,29 +77,29 @@ pub struct Stored {
 }
 
 impl Stored {
-    /// Of the PMaSynRM at a link of `udc_v`.
-    pub fn of(plant: &Plant, udc_v: f64, unloaded_v: f64) -> Self {
+    /// Of motors against which this voltage (V) stands when the gates are blocked.
+    pub fn of(motors: &[Motor], against_v: f64, unloaded_v: f64) -> Self {
         Self {
-            unloaded_v: unloaded_v.max(udc_v),
-            field_j: plant.field_j(),
-            braked_j: plant.braked_j(udc_v),
-            short_circuit_a: plant.short_circuit_peak_a(),
+            unloaded_v,
+            field_j: motors.iter().map(Motor::field_j).sum(),
+            braked_j: motors.iter().map(|motor| motor.braked_j(against_v)).sum(),
+            short_circuit_a: motors.iter().map(Motor::short_circuit_peak_a).fold(0.0, f64::max),
         }
     }
 }
 
-/// What happened from a fault's instant on.
+/// The events from a fault's instant on.
 #[derive(Clone, Copy, Debug)]
 pub struct Observed {
     /// The fault's instant.
     pub from: Tick,
-    /// When the fault first made a difference that is more than small, if that is known.
+    /// The time at which the fault first made a difference that is more than small, if that is known.
     pub effect: Option<Tick>,
     /// Length of a carrier at the fault's instant, in ticks.
     pub carrier_ticks: Tick,
-    /// When the gates were safe, and how.
+    /// The time at which the gates were safe, and their safe state.
     pub safe: Option<(Tick, SafeState)>,
-    /// What was stored then.
+    /// The energy that was stored then.
     pub stored: Stored,
     /// Extremes until then.
     pub until: Peaks,

@@ -1,8 +1,9 @@
 //! The trace.
 
+use super::rows::Rows;
 use super::{Bench, LineSide, Simulated};
-use crate::trace::{Recording, Row, Switch, degrees};
-use tractive::modulation::{CarrierPeriod, Mode};
+use crate::trace::{Recording, Row, Switch, Tick, degrees};
+use tractive::modulation::{CarrierHalf, Mode};
 use tractive::recorder::Record;
 use tractive::time::Instant;
 
@@ -26,6 +27,10 @@ impl Simulated for Bench {
         self.time.seconds(self.time.widen(instant))
     }
 
+    fn slot_after(&self, slot: Instant) -> Instant {
+        self.time.slot_after(slot)
+    }
+
     fn loads_from(&mut self, instant: Instant, [load_nm, _]: [f64; 2]) {
         self.loads.push(self.time.widen(instant), load_nm);
     }
@@ -38,20 +43,21 @@ impl Simulated for Bench {
         let recorded = records.into_iter().map(|record| (self.instant_s(record.at), record)).collect();
         let edges = self.inverter.edges().to_vec();
         Recording {
-            rows: self.rows,
+            rows: self.rows.into_vec(),
+            written: self.written.map(Rows::into_vec),
             switches: self.switches,
             edges,
             recorded,
             slots: self.slots,
             link: self.dc.operated().map(LineSide::balance),
             lead: self.time.lead,
-            tick_s: self.time.step_s(),
+            tick_s: self.time.step_s,
         }
     }
 }
 
 impl Bench {
-    pub(super) fn note_switch(&mut self, next: &CarrierPeriod) {
+    pub(super) fn note_switch(&mut self, next: &CarrierHalf) {
         let from = self.inverter.half().mode;
         if next.mode != from {
             let boundary = if from.carriers() > 0 { self.inverter.half().end_angle() } else { None };
@@ -60,43 +66,54 @@ impl Bench {
                 from,
                 to: next.mode,
                 pulse_angle_deg: boundary.map(degrees),
-                speed_rpm: self.plant.speed_rpm(),
+                speed_rpm: self.plant.motor.speed_rpm(),
             });
         }
     }
 
+    /// The time at which the next row is due.
+    pub(super) fn next_row(&self) -> Tick {
+        let written = self.written.as_ref().map_or(Tick::MAX, |rows| rows.next);
+        self.rows.next.min(written)
+    }
+
     pub(super) fn record(&mut self) {
         self.control.show(self.time.now);
-        if self.time.now <= self.end {
-            let (id, iq) = self.plant.currents_dq();
-            let [ia, ib, ic] = self.plant.currents_abc();
-            let half = self.inverter.half();
-            let report = &self.control.report;
-            let mode = if self.inverter.is_safe() { Mode::Off } else { half.mode };
-            let t_s = self.rows_done as f64 * self.trace_step_s;
-            self.rows.push(Row {
-                t_s,
-                speed_rpm: self.plant.speed_rpm(),
-                te_ref_nm: report.torque_nm.into(),
-                te_nm: self.plant.torque_nm(),
-                id_ref_a: report.id_a.into(),
-                iq_ref_a: report.iq_a.into(),
-                id_a: id,
-                iq_a: iq,
-                ia_a: ia,
-                ib_a: ib,
-                ic_a: ic,
-                u_v: report.voltage_v.into(),
-                udc_v: self.udc_v(t_s),
-                f1_hz: report.frequency_hz.into(),
-                map_error: report.map_error.into(),
-                mode,
-                trip: report.trip,
-                status: self.dc.operated().and_then(LineSide::status),
-            });
+        let row = |rows: &Rows| (self.time.now <= self.end).then(|| self.row(rows.next_s()));
+        let due = |rows: &Rows| rows.next == self.time.now;
+        let judged = due(&self.rows).then(|| row(&self.rows));
+        let written = self.written.as_ref().filter(|rows| due(rows)).map(row);
+        if let Some(row) = judged {
+            self.rows.push(row, &self.time);
         }
-        self.rows_done += 1;
-        let next_s = self.rows_done as f64 * self.trace_step_s;
-        self.next_row = self.time.row_end(next_s);
+        if let (Some(rows), Some(row)) = (&mut self.written, written) {
+            rows.push(row, &self.time);
+        }
+    }
+
+    fn row(&self, t_s: f64) -> Row {
+        let (id_a, iq_a) = self.plant.motor.currents_dq();
+        let [ia_a, ib_a, ic_a] = self.plant.motor.currents_abc();
+        let report = &self.control.report;
+        Row {
+            t_s,
+            speed_rpm: self.plant.motor.speed_rpm(),
+            te_ref_nm: report.torque_nm.into(),
+            te_nm: self.plant.motor.torque_nm(),
+            id_ref_a: report.id_a.into(),
+            iq_ref_a: report.iq_a.into(),
+            id_a,
+            iq_a,
+            ia_a,
+            ib_a,
+            ic_a,
+            u_v: report.voltage_v.into(),
+            udc_v: self.udc_v(t_s),
+            f1_hz: report.frequency_hz.into(),
+            map_error: report.map_error.into(),
+            mode: if self.inverter.is_safe() { Mode::Off } else { self.inverter.half().mode },
+            trip: report.trip,
+            status: self.dc.operated().and_then(|line| line.status),
+        }
     }
 }

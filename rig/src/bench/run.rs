@@ -13,7 +13,7 @@ impl Bench {
             let line = self.dc.operated().and_then(LineSide::next_event);
             let load = self.loads.next().map(|at| at.max(now));
             let events = [fault, self.inverter.next_event(), self.orders.next(), load, line];
-            let regular = [self.inverter.half_end(), self.control.next, self.next_row];
+            let regular = [self.inverter.half_end(), self.control.next, self.next_row()];
             let due = events.into_iter().flatten().chain(regular).fold(tick, Tick::min);
             self.integrate(due);
             self.act()?;
@@ -25,19 +25,19 @@ impl Bench {
         let now = self.time.now;
         if tick > now {
             let t_s = self.time.now_s();
-            let dt_s = (tick - now) as f64 * self.time.step_s();
+            let dt_s = (tick - now) as f64 * self.time.step_s;
             let (sensors, spoiler) = (&self.sensors, &self.spoiler);
             self.dc.advance(&mut self.plant, self.inverter.legs(), dt_s, || {
                 (sensors.supply_v(t_s), spoiler.supply(t_s))
             });
-            self.inverter.monitor(self.plant.currents_abc(), now, tick);
+            self.inverter.monitor(self.plant.motor.currents_abc(), now, tick);
             if self.inverter.leg_faults() != LegFaults::default() {
                 self.observed.makes_a_difference(now);
             }
             self.time.now = tick;
             let udc_v = self.udc_v(self.time.now_s());
-            let peaks = Peaks::at(&self.plant.currents_abc(), udc_v, 0.0);
-            self.observed.note(tick, &peaks, self.plant.speed_rpm());
+            let peaks = Peaks::at(&self.plant.motor.currents_abc(), udc_v, 0.0);
+            self.observed.note(tick, &peaks, self.plant.motor.speed_rpm());
         }
     }
 
@@ -46,14 +46,16 @@ impl Bench {
         self.dc.udc_v(|| self.sensors.supply_v(t_s))
     }
 
-    /// What is stored, and what of it the link must take.
+    /// The energy that is stored, and the part of it that the link must take.
     fn stored(&self) -> Stored {
         let now_s = self.time.now_s();
         let unloaded_v = self.dc.unloaded_v(|ahead_s| {
             let t_s = now_s + ahead_s;
             (self.sensors.supply_v(t_s), self.spoiler.supply(t_s))
         });
-        Stored::of(&self.plant, self.udc_v(now_s), unloaded_v)
+        let udc_v = self.udc_v(now_s);
+        // Two thirds of the link take the flux linkage away.
+        Stored::of(std::slice::from_ref(&self.plant.motor), 2.0 / 3.0 * udc_v, unloaded_v.max(udc_v))
     }
 
     fn act(&mut self) -> Result<(), BenchError> {
@@ -85,7 +87,7 @@ impl Bench {
             }
         }
         while let Some(load_nm) = self.loads.take(now) {
-            self.plant.set_load_nm(load_nm);
+            self.plant.motor.set_load_nm(load_nm);
         }
         self.inverter.act(now);
         if now == self.inverter.half_end() {
@@ -97,7 +99,7 @@ impl Bench {
         if now == self.control.next {
             self.take_sample()?;
         }
-        if now == self.next_row {
+        if now == self.next_row() {
             self.record();
         }
         Ok(())

@@ -1,10 +1,9 @@
-//! What the firmware's converters see of the machine.
+//! The firmware's converters, as they see the machine.
 
-use crate::plant::Plant;
-use rand::SeedableRng;
+use crate::plant::Motor;
 use rand::rngs::StdRng;
+use rand::{Rng, SeedableRng};
 use rand_distr::{Distribution, Normal};
-use tractive::control::Measurements;
 use tractive::frames::{Abc, Angle};
 
 /// Imperfections of inverter and sensors, all zero or `None` by default.
@@ -20,6 +19,8 @@ pub struct Flaws {
     pub udc_ripple: Option<(f64, f64)>,
     /// Constant error of the angle sensor, electrical, in degrees.
     pub angle_error_deg: f64,
+    /// Time after its sample in which the angle is read, in s; each time at another instant.
+    pub angle_jitter_s: f64,
     /// From this time on control is told the same currents again and again, in s.
     pub freeze_at_s: Option<f64>,
     /// Seed of the noise.
@@ -38,19 +39,20 @@ impl Converter {
         Self { flaws, random: StdRng::seed_from_u64(flaws.seed) }
     }
 
-    /// What is wrong with them.
-    pub fn flaws(&self) -> &Flaws {
-        &self.flaws
-    }
-
     /// Ripple of the supply at an instant, in V.
     pub fn ripple_v(&self, t_s: f64) -> f64 {
         let ripple = self.flaws.udc_ripple;
         ripple.map_or(0.0, |(amplitude_v, hz)| amplitude_v * (core::f64::consts::TAU * hz * t_s).sin())
     }
 
+    /// Turn of an angle that is read late, in turns, at a speed in turns per s.
+    fn late_turns(&mut self, turns_s: f64) -> f64 {
+        let latest_s = self.flaws.angle_jitter_s;
+        if latest_s > 0.0 { turns_s * self.random.random_range(0.0..latest_s) } else { 0.0 }
+    }
+
     /// A current as converted now, in A.
-    pub fn convert(&mut self, current_a: f64) -> f64 {
+    fn convert(&mut self, current_a: f64) -> f64 {
         let mut value = current_a;
         if self.flaws.noise_a > 0.0
             && let Ok(noise) = Normal::new(0.0, self.flaws.noise_a)
@@ -63,6 +65,19 @@ impl Converter {
         }
         value
     }
+
+    /// A motor's phase currents as converted now, in A.
+    pub fn currents(&mut self, motor: &Motor) -> Abc {
+        let [a, b, c] = motor.currents_abc().map(|current| self.convert(current) as f32);
+        Abc { a, b, c }
+    }
+
+    /// A motor's rotor angle as its sensor has it.
+    pub fn angle(&mut self, motor: &Motor) -> Angle {
+        let error_turns = self.flaws.angle_error_deg / 360.0;
+        let turns = motor.angle_turns() + self.late_turns(motor.turns_s()) + error_turns;
+        Angle((turns.rem_euclid(1.0) * 4_294_967_296.0).round() as u64 as u32)
+    }
 }
 
 /// Sensors, and what the supply's voltage is where nothing is wrong with it.
@@ -70,7 +85,7 @@ pub struct Sensors {
     udc_v: f64,
     link_steps: Vec<(f64, f64)>,
     converter: Converter,
-    /// What control was told last.
+    /// The currents that control was told last.
     told_a: Abc,
 }
 
@@ -87,21 +102,15 @@ impl Sensors {
     }
 
     /// The phase currents as converted now.
-    pub fn currents(&mut self, plant: &Plant) -> Abc {
-        let [a, b, c] = plant.currents_abc().map(|current| self.converter.convert(current) as f32);
-        Abc { a, b, c }
+    pub fn currents(&mut self, motor: &Motor) -> Abc {
+        self.converter.currents(motor)
     }
 
-    /// All that control measures, on a link of this true voltage, in V.
-    pub fn measure(&mut self, plant: &Plant, udc_v: f64, t_s: f64) -> Measurements {
-        let turns = plant.angle_turns() + self.converter.flaws.angle_error_deg / 360.0;
+    /// The phase currents that control is told at `t_s`, and the rotor's angle.
+    pub fn measure(&mut self, motor: &Motor, t_s: f64) -> (Abc, Angle) {
         if self.converter.flaws.freeze_at_s.is_none_or(|freeze_s| t_s < freeze_s) {
-            self.told_a = self.currents(plant);
+            self.told_a = self.currents(motor);
         }
-        Measurements {
-            currents_a: self.told_a,
-            udc_v: udc_v as f32,
-            angle: Angle((turns.rem_euclid(1.0) * 4_294_967_296.0).round() as u64 as u32),
-        }
+        (self.told_a, self.converter.angle(motor))
     }
 }

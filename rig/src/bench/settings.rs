@@ -1,4 +1,4 @@
-//! What a bench is made of, and who commands it.
+//! The settings of a bench, and the sender of its commands.
 
 use super::{Flaws, Limits, Supply};
 use crate::inject::Injection;
@@ -6,7 +6,7 @@ use crate::inject::traction::Kind;
 use tractive::control::Demand;
 use tractive::time::Clock;
 
-/// What the operator does, as a function of time.
+/// The operator's demand as a function of time.
 pub trait Operator {
     /// Demand and enable at `t_s` seconds after the recording begins (negative before).
     fn demand(&self, t_s: f64) -> (Demand, bool);
@@ -38,9 +38,9 @@ pub struct Settings {
     pub link_steps: Vec<(f64, f64)>,
     /// Imperfections of the sensors.
     pub flaws: Flaws,
-    /// What feeds the inverter.
+    /// The supply of the inverter.
     pub supply: Supply,
-    /// What goes wrong.
+    /// The fault that is injected.
     pub injection: Option<Injection<Kind>>,
     /// Beyond what it is said to make a difference.
     pub limits: Limits,

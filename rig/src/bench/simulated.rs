@@ -4,19 +4,21 @@ use tractive::time::Instant;
 
 /// A bench of either system.
 pub trait Simulated {
-    /// What the drive's flight recorder holds.
+    /// The record of the drive's flight recorder.
     type Record;
-    /// What a run leaves.
+    /// The recording of a run.
     type Recording;
 
-    /// Whether the recording is complete.
+    /// `true` once the recording is complete.
     fn is_done(&self) -> bool;
     /// Share of the run that is done, 0 ..= 1.
     fn progress(&self) -> f64;
-    /// Whether the control interrupt comes at this instant at all.
+    /// `true` if the control interrupt comes at this instant at all.
     fn has_control(&self, instant: Instant) -> bool;
     /// An instant near to now, in s from the recording's beginning.
     fn instant_s(&self, instant: Instant) -> f64;
+    /// Beginning of the operator's slot after the one that begins at `slot`.
+    fn slot_after(&self, slot: Instant) -> Instant;
     /// The rotors' loads from `instant` on, in N·m; of one rotor the first.
     fn loads_from(&mut self, instant: Instant, loads_nm: [f64; 2]);
     /// Ends the recording at `instant`.

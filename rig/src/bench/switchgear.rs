@@ -40,9 +40,9 @@ pub struct Switchgear<A, T> {
     tick_s: f64,
     main: Contactor,
     precharge: Contactor,
-    /// What the operator told, and from when on it holds.
+    /// The operator's status, and the time from when on it holds.
     told: VecDeque<(Tick, Status<T>)>,
-    /// What the operator will ask for, by the slot's beginning.
+    /// The request that the operator will see, by the slot's beginning.
     asked: VecDeque<(Tick, A, Feedback)>,
     samples: u32,
 }
@@ -60,12 +60,12 @@ impl<A, T: Copy> Switchgear<A, T> {
         }
     }
 
-    /// Whether the precharge relay is closed.
+    /// `true` while the precharge relay is closed.
     pub fn precharge_closed(&self) -> bool {
         self.precharge.closed
     }
 
-    /// Whether the main contactor is closed.
+    /// `true` while the main contactor is closed.
     pub fn main_closed(&self) -> bool {
         self.main.closed
     }
@@ -93,7 +93,7 @@ impl<A, T: Copy> Switchgear<A, T> {
         self.asked.len() > 2
     }
 
-    /// What is asked in the slot that began at `tick`, and what the board says.
+    /// The request in the slot that began at `tick`, and the board's feedback.
     pub fn ask(&mut self, tick: Tick) -> Option<(A, Feedback)> {
         while let Some((at, request, feedback)) = self.asked.pop_front() {
             if at == tick {
@@ -103,7 +103,7 @@ impl<A, T: Copy> Switchgear<A, T> {
         None
     }
 
-    /// What the operator told; it holds from `from` on.
+    /// Takes the operator's status; it holds from `from` on.
     pub fn tell(&mut self, from: Tick, status: Status<T>) {
         self.told.push_back((from, status));
     }

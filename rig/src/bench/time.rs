@@ -2,19 +2,21 @@
 
 use super::BenchError;
 use crate::trace::Tick;
+use tractive::operator::SLOT_PERIODS;
 use tractive::time::{Clock, Instant};
 
-/// Where a run stands.
+/// The times of a run.
 #[derive(Clone, Debug)]
 pub struct Timeline {
     clock: Clock,
     per_tick: Tick,
-    step_s: f64,
-    /// Where the timers started.
+    /// Length of a step, in s.
+    pub step_s: f64,
+    /// The time at which the timers started.
     pub origin: Tick,
     /// Now.
     pub now: Tick,
-    /// Where the recording begins.
+    /// The time at which the recording begins.
     pub lead: Tick,
 }
 
@@ -30,11 +32,6 @@ impl Timeline {
     /// The same beginning at another step than 0.
     pub fn beginning_at(self, origin: Tick) -> Self {
         Self { origin: self.origin + origin, now: self.now + origin, lead: self.lead + origin, ..self }
-    }
-
-    /// Length of a step, in s.
-    pub fn step_s(&self) -> f64 {
-        self.step_s
     }
 
     /// Steps in so much time, in s.
@@ -55,6 +52,11 @@ impl Timeline {
     /// Now as the firmware has it.
     pub fn instant(&self) -> Instant {
         Instant(self.tick() as u32)
+    }
+
+    /// Beginning of the operator's slot after the one that begins at `slot`.
+    pub fn slot_after(&self, slot: Instant) -> Instant {
+        slot.after(SLOT_PERIODS * self.clock.control_ticks)
     }
 
     /// Steps from one control sample to the next.

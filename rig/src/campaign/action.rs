@@ -1,8 +1,8 @@
-//! What the drive does when a fault comes, and when that is.
+//! The drive's action when a fault comes, and the time of it.
 
 use serde::Serialize;
 
-/// What the drive does when the fault comes.
+/// The drive's action when the fault comes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Action {
@@ -50,25 +50,25 @@ impl Action {
 /// The stages of a run, in s from the recording's beginning.
 #[derive(Clone, Copy, Debug)]
 pub struct Stages {
-    /// When the torque comes, before the recording.
+    /// The time at which the torque comes, before the recording.
     pub torque_s: f64,
-    /// When another torque is wanted: a fault that has not shown must not hide for ever.
+    /// The time at which another torque is wanted: a fault that has not shown must not hide for ever.
     pub turn_s: f64,
     /// End.
     pub end_s: f64,
-    /// How long the aftermath is watched, in s.
+    /// The time for which the aftermath is watched, in s.
     pub aftermath_s: f64,
 }
 
 /// Before the recording, in s.
 pub const LEAD_S: f64 = 0.12;
-/// When the first fault comes, in s from the recording's beginning: not at a sample.
+/// The time of the first fault, in s from the recording's beginning: not at a sample.
 pub const FAULT_S: f64 = 0.005_037;
 /// Every case a little later than the one before, in s, so that faults come at all angles.
 const LATER_S: f64 = 0.000_173;
 const LATER_STEPS: usize = 23;
 
-/// When the fault of a case comes, in s, by the case's number.
+/// The time of a case's fault, in s, by the case's number.
 pub fn fault_s(number: usize) -> f64 {
     FAULT_S + LATER_S * (number % LATER_STEPS) as f64
 }

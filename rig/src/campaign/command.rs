@@ -2,7 +2,7 @@
 
 use super::judge::Verdict;
 use super::{Campaign, dual, healthy, report, traction};
-use crate::without::Without;
+use crate::without::Ablation;
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-/// What to run.
+/// The options of a campaign.
 #[derive(Args, Clone, Debug)]
 pub struct CampaignOptions {
     /// Each fault of each kind once in each mode, instead of every case.
@@ -21,7 +21,7 @@ pub struct CampaignOptions {
     pub only: Vec<String>,
     /// One protection off: a fault's name, short_circuit or leg_safe_state. The cases that are lost are then listed.
     #[arg(long, value_name = "PROTECTION")]
-    pub without: Option<Without>,
+    pub without: Option<Ablation>,
     /// Folder for cases.csv, summary.json and report.html.
     #[arg(long, default_value = "target/tractive/campaign")]
     pub out: PathBuf,
@@ -72,7 +72,7 @@ pub fn run(options: &CampaignOptions) -> Result<ExitCode> {
     let given = serde_json::json!({
         "fast": options.fast,
         "only": options.only,
-        "without": options.without.map(Without::name),
+        "without": options.without.map(Ablation::name),
     });
     report::write(&outcomes, given, &options.out)?;
     if options.json {

@@ -1,32 +1,58 @@
 //! Faults with their names and rules, whatever a drive's faults are made of.
 
 use super::judge::Rule;
+use crate::inject::ControlFault;
 use crate::inject::sensor::CurrentFault;
 use tractive::protection::Fault;
 
 /// A fault with its name and its rule.
 #[derive(Clone, Debug)]
 pub struct Named<C> {
-    /// What the tables call it.
+    /// The name in the tables.
     pub name: String,
-    /// What it is made of.
+    /// The cause.
     pub cause: C,
-    /// What may come of it.
+    /// The rule for its consequences.
     pub rule: Rule,
     /// One of its kind is enough for the fast campaign.
     pub fast: bool,
 }
 
-impl<C> Named<C> {
-    /// A fault that the drive may call by these names, or go on with at a mean torque error of this share.
-    pub fn new(name: &str, cause: C, names: &'static [Fault], torque_share: Option<f64>, fast: bool) -> Self {
-        Self { name: name.to_owned(), cause, rule: Rule { names, torque_share }, fast }
+/// Faults in the order in which they come.
+pub struct Faults<C>(pub Vec<Named<C>>);
+
+impl<C> Faults<C> {
+    /// Nothing at all, which nobody may feel; the others come behind it.
+    pub fn beginning_with(nothing: impl Into<C>) -> Self {
+        let mut list = Self(Vec::new());
+        list.add("none", nothing, &[], Some(UNFELT), true);
+        list
+    }
+
+    /// One more, which the drive may call by these names, or go on with at a mean torque error of this share.
+    pub fn add(
+        &mut self,
+        name: &str,
+        cause: impl Into<C>,
+        names: &'static [Fault],
+        torque_share: Option<f64>,
+        fast: bool,
+    ) {
+        let rule = Rule { names, torque_share };
+        self.0.push(Named { name: name.to_owned(), cause: cause.into(), rule, fast });
+    }
+
+    /// Faults of the control interrupt, and a torque demand that is none.
+    pub fn add_control<K: Into<C>>(&mut self, control: fn(ControlFault) -> K, demand_not_finite: K) {
+        self.add("control-late", control(ControlFault::Late(100)), &[Fault::ControlDeadline], None, true);
+        self.add("commands-lost", control(ControlFault::Stopped), &[Fault::StaleCommand], None, true);
+        self.add("demand-not-finite", demand_not_finite, &[Fault::NotFinite], None, true);
     }
 }
 
 /// Mean torque error where a fault must not be felt, as a share of the largest torque.
 pub const UNFELT: f64 = 0.03;
-/// Where a sensor bends the torque.
+/// The share by which a sensor bends the torque.
 pub const BENT: f64 = 0.1;
 
 /// Sizes of what a current sensor does wrong.
@@ -42,11 +68,11 @@ pub struct SensorErrors {
     pub range_a: f64,
 }
 
-/// How a current sensor fails, what that may be called, and the torque error where it may pass.
+/// The failure of a current sensor, the names that it may get, and the torque error where it may pass.
 pub type SensorFailure = (&'static str, CurrentFault, &'static [Fault], Option<f64>);
 
 impl SensorErrors {
-    /// What every phase's sensor can do.
+    /// The failures of every phase's sensor.
     pub const fn failures(&self) -> [SensorFailure; 6] {
         const SUM: &[Fault] = &[Fault::PhaseSum];
         const TOO_MUCH: &[Fault] = &[Fault::PhaseSum, Fault::Overcurrent];

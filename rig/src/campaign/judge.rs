@@ -1,4 +1,4 @@
-//! What counts as good enough.
+//! The bounds of a good outcome.
 //!
 //! - *Caught*: a fault of a name that fits, the gates safe in bounded time, no phase current above 1.5 times the trip level, no DC
 //!   voltage above its trip level by more than a sampling period makes until the gates are safe, and after that none above what
@@ -11,7 +11,7 @@
 use serde::Serialize;
 use tractive::protection::Fault;
 
-/// How a case ended.
+/// The end of a case.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
@@ -23,29 +23,18 @@ pub enum Verdict {
     Uncaught,
 }
 
-impl Verdict {
-    /// The name in tables.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Caught => "caught",
-            Self::RiddenThrough => "ridden through",
-            Self::Uncaught => "uncaught",
-        }
-    }
-}
-
 /// Largest phase current after any single fault, over the trip level.
 pub const CURRENT_SHARE: f64 = 1.5;
 
 /// Room for the rounding of what is forced, and for what happens between two instants at which it is looked at.
 pub const FORCED: f64 = 1.01;
 
-/// How long a fault that shows with the rotor's angle may take, in s: half an electrical turn, at the longest a tenth of a second.
+/// The longest time of a fault that shows with the rotor's angle, in s: half an electrical turn, at most a tenth of a second.
 pub fn half_turn_s(speed_rpm: f64, pole_pairs: u32) -> f64 {
     (0.5 / (speed_rpm.abs() / 60.0 * f64::from(pole_pairs))).min(0.1)
 }
 
-/// What a fault may be called, and what may come of it otherwise.
+/// The names that a fault may get, and the consequences that it may have otherwise.
 #[derive(Clone, Copy, Debug)]
 pub struct Rule {
     /// Names that fit.
@@ -57,7 +46,7 @@ pub struct Rule {
 /// A value, and what it may be.
 #[derive(Clone, Copy, Debug)]
 pub struct Bounded {
-    /// What a message calls it, with its unit.
+    /// The quantity's name in a message, with its unit.
     pub what: &'static str,
     /// It.
     pub value: f64,
@@ -71,7 +60,7 @@ impl Bounded {
         Self { what, value, limit }
     }
 
-    /// What is not a number is not within.
+    /// The message if the value is beyond its bound; one that is no number is.
     fn broken(&self) -> Option<String> {
         let within = self.value <= self.limit;
         (!within).then(|| format!("{} {:.4} over {:.4}", self.what, self.value, self.limit))

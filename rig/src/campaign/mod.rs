@@ -18,7 +18,7 @@ pub mod traction;
 pub use action::Action;
 pub use outcome::Outcome;
 
-use crate::without::Without;
+use crate::without::Ablation;
 use anyhow::{Context, Result};
 use rayon::prelude::*;
 
@@ -52,7 +52,7 @@ impl Campaign {
     ///
     /// # Errors
     /// Machine folders that are not there.
-    pub fn new(without: Option<Without>) -> Result<Self> {
+    pub fn new(without: Option<Ablation>) -> Result<Self> {
         Ok(Self { traction: traction::Drive::new(without)?, dual: dual::Drive::new(without)? })
     }
 

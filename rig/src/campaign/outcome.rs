@@ -1,4 +1,4 @@
-//! What came of one case.
+//! The outcome of one case.
 
 use super::Action;
 use super::fault::Named;
@@ -12,15 +12,15 @@ use tractive::protection::{Fault, SafeState, Trip};
 pub struct Outcome {
     /// `pmasynrm` or `zs9`.
     pub system: &'static str,
-    /// What went wrong.
+    /// The fault.
     pub fault: String,
     /// Mode of the pulses when it did; the ZS9's scheme.
     pub mode: String,
     /// Speed then, in r/min.
     pub speed_rpm: f64,
-    /// What the drive did.
+    /// The drive's action.
     pub action: Action,
-    /// How it ended.
+    /// The verdict.
     pub verdict: Verdict,
     /// The fault that the drive named; empty if none.
     pub named: String,
@@ -36,27 +36,27 @@ pub struct Outcome {
     pub current_until_a: f64,
     /// And after that.
     pub current_after_a: f64,
-    /// What is allowed: 1.5 times the trip level.
+    /// The limit: 1.5 times the trip level.
     pub current_limit_a: f64,
     /// Largest DC voltage until the gates were safe, in V; the ZS9's link outside shoot-through.
     pub udc_until_v: f64,
     /// And after that.
     pub udc_after_v: f64,
-    /// What is allowed after that: what the stored energies and the supply force.
+    /// The limit after that: what the stored energies and the supply force.
     pub udc_limit_v: f64,
     /// The ZS9's largest capacitor voltage until the gates were safe, in V.
     pub uc_until_v: Option<f64>,
     /// And after that.
     pub uc_after_v: Option<f64>,
-    /// What is allowed.
+    /// The limit.
     pub uc_limit_v: Option<f64>,
     /// Mean torque less demand where the drive went on, in N·m: the worst of both demands, and for the ZS9 of both motors.
     pub torque_error_nm: f64,
-    /// Why it is uncaught; empty otherwise.
+    /// The reason why it is uncaught; empty otherwise.
     pub why: String,
 }
 
-/// Which case a line is of.
+/// The case of a line.
 #[derive(Clone, Debug)]
 pub struct Setting {
     /// `pmasynrm` or `zs9`.
@@ -65,11 +65,11 @@ pub struct Setting {
     pub mode: &'static str,
     /// In r/min.
     pub speed_rpm: f64,
-    /// What the drive did.
+    /// The drive's action.
     pub action: Action,
 }
 
-/// What a run left.
+/// The results of a run.
 #[derive(Clone, Debug)]
 pub struct Seen {
     /// On the bench.
@@ -84,7 +84,7 @@ pub struct Seen {
     pub carrier_s: f64,
 }
 
-/// What may come of it.
+/// The consequences that it may have.
 #[derive(Clone, Debug)]
 pub struct Allowed {
     /// The longest time from a fault's first effect until the gates are safe, in s.

@@ -1,19 +1,19 @@
-//! What goes wrong and when: what is the same of both systems here, the kinds of each beside it.
+//! Faults that are injected, and their times: what is the same of both systems here, the kinds of each beside it.
 
 pub mod sensor;
 pub mod traction;
 pub mod zs9;
 
-/// What goes wrong, and when.
+/// A fault to inject, and its time.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Injection<K> {
-    /// What.
+    /// The fault.
     pub kind: K,
     /// From this instant of the recording on, in s.
     pub at_s: f64,
 }
 
-/// What the control interrupt does wrong.
+/// The fault of the control interrupt.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ControlFault {
@@ -40,7 +40,7 @@ impl<K> Default for Injected<K> {
 }
 
 impl<K: GoesWrong> Injected<K> {
-    /// What is wrong at an instant, if anything is.
+    /// The fault at an instant, if there is one.
     pub fn kind(&self, t_s: f64) -> Option<K> {
         self.0.as_ref().filter(|injection| t_s >= injection.at_s - 1e-9).map(|injection| injection.kind)
     }
@@ -58,7 +58,7 @@ impl<K: GoesWrong> Injected<K> {
         }
     }
 
-    /// Whether the control interrupt comes at all.
+    /// `true` if the control interrupt comes at all.
     pub fn has_control(&self, t_s: f64) -> bool {
         self.kind(t_s).and_then(K::control) != Some(ControlFault::Stopped)
     }

@@ -7,7 +7,7 @@ use serde::Serialize;
 use std::collections::VecDeque;
 use tractive::frames::{Abc, Angle};
 
-/// What a current sensor does wrong.
+/// The fault of a current sensor.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum CurrentFault {
@@ -27,7 +27,7 @@ pub enum CurrentFault {
     NotFinite,
 }
 
-/// What an angle sensor does wrong. Angles electrical, in degrees.
+/// The fault of an angle sensor. Angles electrical, in degrees.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum AngleFault {
@@ -61,7 +61,7 @@ impl CurrentSpoiler {
         Self { phase, fault, last_a: 0.0, random: StdRng::seed_from_u64(SEED) }
     }
 
-    /// What is read where `true_a` flows.
+    /// The reading where `true_a` flows.
     pub fn read(&mut self, broken: bool, mut true_a: Abc) -> Abc {
         let reading = match self.phase {
             0 => &mut true_a.a,
@@ -104,7 +104,7 @@ impl AngleSpoiler {
         Self { fault, last: VecDeque::new(), broken_for: 0, broke_at: Angle::ZERO }
     }
 
-    /// What is read where the rotor stands at `angle`; once a sample.
+    /// The reading where the rotor stands at `angle`; once a sample.
     pub fn read(&mut self, broken: bool, angle: Angle) -> Angle {
         let kept = if let AngleFault::Late(samples) = self.fault { samples } else { 0 };
         self.last.push_back(angle);

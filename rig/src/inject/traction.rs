@@ -5,7 +5,7 @@ use super::{ControlFault, GoesWrong, Injected, Injection};
 use tractive::frames::Abc;
 use tractive::ports::Sample;
 
-/// What goes wrong.
+/// The faults of the PMaSynRM drive.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Kind {
     /// The current sensor of phase 0 ..= 2.
@@ -37,7 +37,7 @@ impl GoesWrong for Kind {
     }
 }
 
-/// What the supply does wrong.
+/// The fault of the supply.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum SupplyFault {
     /// The line is cut off.
@@ -51,7 +51,7 @@ pub enum SupplyFault {
 /// Holds what a fault does to the samples.
 #[derive(Clone, Debug, Default)]
 pub struct Spoiler {
-    /// What goes wrong.
+    /// The fault that is injected.
     pub injected: Injected<Kind>,
     current: Option<CurrentSpoiler>,
     angle: Option<AngleSpoiler>,
@@ -69,7 +69,7 @@ impl Spoiler {
         Self { injected: Injected(injection), current, angle }
     }
 
-    /// What is wrong with the supply, and since when, in s.
+    /// The fault of the supply, and the time at which it began, in s.
     pub fn supply(&self, t_s: f64) -> Option<(SupplyFault, f64)> {
         match self.injected.kind(t_s)? {
             Kind::Supply(fault) => Some((fault, self.injected.since_s(t_s))),
@@ -77,7 +77,7 @@ impl Spoiler {
         }
     }
 
-    /// What the converters make of the phase currents.
+    /// The converters' reading of the phase currents.
     pub fn currents(&mut self, t_s: f64, true_a: Abc) -> Abc {
         let broken = self.injected.kind(t_s).is_some();
         match &mut self.current {
@@ -86,7 +86,7 @@ impl Spoiler {
         }
     }
 
-    /// What control sees, the currents apart.
+    /// Spoils control's sample, the currents apart.
     pub fn control(&mut self, t_s: f64, sample: &mut Sample) {
         let kind = self.injected.kind(t_s);
         if let Some(sensor) = &mut self.angle {

@@ -7,7 +7,7 @@ use tractive::frames::Abc;
 use tractive::ports::{DualSample, MotorDemand, PowerSample};
 use tractive::protection::Fault;
 
-/// What goes wrong.
+/// The faults of the ZS9.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Kind {
@@ -108,14 +108,14 @@ impl FromStr for Injection<Kind> {
 /// Holds what a fault does to the samples.
 #[derive(Clone, Debug, Default)]
 pub struct Spoiler {
-    /// What goes wrong.
+    /// The fault that is injected.
     pub injected: Injected<Kind>,
     before: Option<DualSample>,
     current: Option<(usize, CurrentSpoiler)>,
     angle: Option<(usize, AngleSpoiler)>,
 }
 
-/// How long the gate drivers are not ready, in s.
+/// The time for which the gate drivers are not ready, in s.
 const DRIVER_FAULT_S: f64 = 0.05;
 
 impl Spoiler {
@@ -132,7 +132,7 @@ impl Spoiler {
         Self { injected: Injected(injection), before: None, current, angle }
     }
 
-    /// What the converters make of the phase currents.
+    /// The converters' reading of the phase currents.
     fn currents(&mut self, t_s: f64, currents_a: &mut [Abc; 2]) {
         let broken = self.injected.kind(t_s).is_some();
         if let Some((motor, sensor)) = &mut self.current
@@ -142,7 +142,7 @@ impl Spoiler {
         }
     }
 
-    /// What holds the gates off in hardware at an instant.
+    /// The cause that holds the gates off in hardware at an instant.
     pub fn hardware(&self, t_s: f64) -> Option<Fault> {
         let injection = self.injected.0.filter(|injection| injection.kind == Kind::GateDriver)?;
         (0.0..DRIVER_FAULT_S).contains(&(t_s - injection.at_s)).then_some(Fault::GateDriver)
@@ -162,7 +162,7 @@ impl Spoiler {
         }
     }
 
-    /// What control sees.
+    /// Spoils control's sample.
     pub fn control(&mut self, t_s: f64, sample: &mut DualSample) {
         let before = self.before.replace(*sample).unwrap_or(*sample);
         self.currents(t_s, &mut sample.currents_a);
@@ -196,7 +196,7 @@ impl Spoiler {
         }
     }
 
-    /// What the PWM interrupt sees.
+    /// Spoils the PWM interrupt's sample.
     pub fn power(&mut self, t_s: f64, sample: &mut PowerSample) {
         self.currents(t_s, &mut sample.currents_a);
         match self.injected.kind(t_s) {

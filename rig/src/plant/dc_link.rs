@@ -3,18 +3,18 @@
 //! `C du/dt = i_source − u/R_discharge − u/R_chopper − i_inverter`, with `i_source = (U − u)/R` through whatever contactor is
 //! closed; a rectifier gives current only, a reversible source takes it too.
 
-/// Where the link's energy comes from.
+/// The source of the link's energy.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Source {
     /// Voltage without load, in V.
     pub voltage_v: f64,
     /// Inner resistance, in ohm.
     pub resistance_ohm: f64,
-    /// Whether it takes energy back; a rectifier does not.
+    /// `true` if it takes energy back; a rectifier does not.
     pub reversible: bool,
 }
 
-/// What the link is made of.
+/// The parts of the link.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DcLinkSettings {
     /// Capacitance, in F.
@@ -29,7 +29,7 @@ pub struct DcLinkSettings {
     pub chopper_ohm: f64,
 }
 
-/// What is on the link now.
+/// The switches on the link.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LinkSwitches {
     /// The precharge relay is closed.
@@ -60,11 +60,14 @@ pub struct LinkEnergies {
 /// Capacitor and bookkeeping.
 #[derive(Clone, Debug)]
 pub struct DcLink {
-    settings: DcLinkSettings,
-    /// What is closed; set it between two steps.
+    /// Its parts; change them, as all of this, between two steps.
+    pub settings: DcLinkSettings,
+    /// The switches that are closed.
     pub switches: LinkSwitches,
-    udc_v: f64,
-    energies: LinkEnergies,
+    /// Voltage, in V.
+    pub udc_v: f64,
+    /// Energies since the beginning.
+    pub energies: LinkEnergies,
 }
 
 /// Rates of change: the voltage and the energies in their order.
@@ -74,36 +77,6 @@ impl DcLink {
     /// Empty, everything open.
     pub fn new(settings: DcLinkSettings) -> Self {
         Self { settings, switches: LinkSwitches::default(), udc_v: 0.0, energies: LinkEnergies::default() }
-    }
-
-    /// What it is made of.
-    pub fn settings(&self) -> &DcLinkSettings {
-        &self.settings
-    }
-
-    /// The source, which may change during a run.
-    pub fn source_mut(&mut self) -> &mut Source {
-        &mut self.settings.source
-    }
-
-    /// Changes the braking resistor, in ohm.
-    pub fn set_chopper_ohm(&mut self, ohm: f64) {
-        self.settings.chopper_ohm = ohm;
-    }
-
-    /// Voltage, in V.
-    pub fn udc_v(&self) -> f64 {
-        self.udc_v
-    }
-
-    /// Sets the voltage, in V.
-    pub fn set_udc_v(&mut self, udc_v: f64) {
-        self.udc_v = udc_v;
-    }
-
-    /// Energies since the beginning.
-    pub fn energies(&self) -> LinkEnergies {
-        self.energies
     }
 
     /// Energy in the capacitor, in J.

@@ -17,7 +17,7 @@ pub enum Leg {
 }
 
 impl Leg {
-    /// Whether its output is at the upper rail while this current flows out of it, in A: of an open leg the diodes decide.
+    /// `true` if its output is at the upper rail while this current flows out of it, in A: of an open leg the diodes decide.
     pub fn is_high(self, current_a: f64) -> bool {
         match self {
             Self::Upper => true,

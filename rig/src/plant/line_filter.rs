@@ -16,7 +16,7 @@ impl LineFilter {
     pub const TRACTION: Self = Self { inductance_h: 3e-3, resistance_ohm: 0.3, capacitance_f: 4e-3 };
 }
 
-/// How fast a line that fails moves, in V/s.
+/// The slope of a line that fails, in V/s.
 const LINE_SLOPE_V_S: f64 = 50e3;
 /// Longest step of the choke's current, in s.
 const LONGEST_STEP_S: f64 = 20e-6;
@@ -29,18 +29,14 @@ pub struct FilteredLink {
     line_v: f64,
     /// Current out of the line, in A.
     choke_a: f64,
-    udc_v: f64,
+    /// Its voltage, in V.
+    pub udc_v: f64,
 }
 
 impl FilteredLink {
     /// Charged to the line's voltage.
     pub fn new(filter: LineFilter, line_v: f64) -> Self {
         Self { filter, line_v, choke_a: 0.0, udc_v: line_v }
-    }
-
-    /// Its voltage, in V.
-    pub fn udc_v(&self) -> f64 {
-        self.udc_v
     }
 
     /// Lets time pass while the inverter takes an energy, in J, and the line goes to a voltage, in V; `None`: the line is cut off.

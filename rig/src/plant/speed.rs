@@ -1,8 +1,8 @@
-//! What turns the rotor.
+//! The drive of the rotor.
 
 use core::f64::consts::TAU;
 
-/// Where the speed comes from.
+/// The source of the speed.
 #[derive(Clone, Debug)]
 pub enum SpeedSource {
     /// A prescribed speed: (time in s, r/min), straight lines between, constant before and after.

@@ -8,7 +8,8 @@ use tractive_tablegen::{FluxMap, FluxPoint, MachineFolder, SmoothMap};
 pub struct Stator {
     flux: Flux,
     scale: f64,
-    pole_pairs: f64,
+    /// Pole pairs.
+    pub pole_pairs: f64,
     resistance_ohm: f64,
 }
 
@@ -21,7 +22,7 @@ enum Flux {
     Linear { magnet_wb: f64, ld_h: f64, lq_h: f64 },
 }
 
-/// What changes in a stator at one instant.
+/// The rates of change in a stator at one instant.
 #[derive(Clone, Copy, Debug)]
 pub struct StatorSlopes {
     /// di_d/dt, in A/s.
@@ -51,11 +52,6 @@ impl Stator {
             pole_pairs: f64::from(parameters.pole_pairs),
             resistance_ohm: parameters.stator_resistance_ohm * settings.resistance_scale,
         }
-    }
-
-    /// Pole pairs.
-    pub fn pole_pairs(&self) -> f64 {
-        self.pole_pairs
     }
 
     /// Flux linkage and its Jacobian at a current in A.

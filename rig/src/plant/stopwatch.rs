@@ -1,4 +1,4 @@
-//! How long the plant's steps take, of all that a thread does.
+//! The time of the plant's steps, of all that a thread does.
 
 use std::cell::Cell;
 
@@ -8,7 +8,7 @@ const TIMED: u64 = 16;
 thread_local! {
     static STEPS: Cell<u64> = const { Cell::new(0) };
     static IN_PLANT: Cell<f64> = const { Cell::new(0.0) };
-    /// What taking the time takes, in s.
+    /// The cost of taking the time, in s.
     static TAKING: Cell<f64> = const { Cell::new(0.0) };
 }
 
@@ -26,7 +26,7 @@ pub fn in_plant<R>(step: impl FnOnce() -> R) -> R {
     result
 }
 
-/// What this thread has had of the processor, in s: other programs do not count.
+/// The processor time of this thread, in s: other programs do not count.
 pub fn processor_s() -> f64 {
     let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
     time.tv_sec as f64 + time.tv_nsec as f64 * 1e-9

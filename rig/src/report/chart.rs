@@ -1,7 +1,7 @@
 //! Curves as SVG.
 
 use super::table::escape;
-use anyhow::{Result, anyhow};
+use anyhow::Result;
 use plotters::prelude::*;
 use std::fmt::Write as _;
 
@@ -34,26 +34,16 @@ pub fn chart((x_label, y_label): (&str, &str), series: &[(&str, Vec<(f64, f64)>)
     let mut svg = String::new();
     {
         let area = SVGBackend::with_string(&mut svg, SIZE).into_drawing_area();
-        let failed = |error: &dyn std::fmt::Display| anyhow!("plot: {error}");
         let mut chart = ChartBuilder::on(&area)
             .margin(8)
             .x_label_area_size(34)
             .y_label_area_size(64)
-            .build_cartesian_2d(x.0..x.1, y.0 - room..y.1 + room)
-            .map_err(|error| failed(&error))?;
-        chart
-            .configure_mesh()
-            .x_desc(x_label)
-            .y_desc(y_label)
-            .light_line_style(TRANSPARENT)
-            .draw()
-            .map_err(|error| failed(&error))?;
+            .build_cartesian_2d(x.0..x.1, y.0 - room..y.1 + room)?;
+        chart.configure_mesh().x_desc(x_label).y_desc(y_label).light_line_style(TRANSPARENT).draw()?;
         for ((_, points), colour) in series.iter().zip(COLOURS.into_iter().cycle()) {
-            chart
-                .draw_series(LineSeries::new(points.iter().copied(), &colour))
-                .map_err(|error| failed(&error))?;
+            chart.draw_series(LineSeries::new(points.iter().copied(), &colour))?;
         }
-        area.present().map_err(|error| failed(&error))?;
+        area.present()?;
     }
     Ok(svg)
 }

@@ -6,9 +6,10 @@ mod table;
 mod text;
 
 pub use overview::overview;
-pub use text::{headline, text};
+pub use text::{headline, list, text};
 
 use crate::analysis::Figures;
+use crate::rows::Timed;
 use crate::trace::GATES;
 use crate::trace::{Recording, Row};
 use anyhow::Result;
@@ -18,13 +19,13 @@ use table::{escape, tables};
 use tractive::protection::Fault;
 use tractive::recorder::Record;
 
-/// What is drawn of a flight recorder's records: title, unit, and each curve's name and value.
+/// The panel of a flight recorder's records: title, unit, and each curve's name and value.
 pub type Panel<'a, R> = (&'a str, &'a str, &'a [(&'static str, fn(&R) -> f32)]);
 
-/// A curve of a recording: its name and what it shows.
-pub type Curve<'a> = (&'a str, fn(&Row) -> f64);
+/// A curve of a recording of either system: its name and its value in a row.
+pub type Curve<'a, R = Row> = (&'a str, fn(&R) -> f64);
 
-/// What a scenario that answers none of the paper's figures says instead.
+/// The words of a scenario that answers none of the paper's figures.
 const NO_FIGURE: &str = "no figure";
 
 /// A page under construction.
@@ -106,18 +107,17 @@ impl Page {
         window: (f64, f64),
         curves: &[Curve],
     ) {
-        let rows = crate::analysis::window(recording, window.0, window.1);
-        let series = curves
-            .iter()
-            .map(|(name, value)| {
-                let points: Vec<_> = rows.iter().map(|row| (row.t_s, value(row))).collect();
-                (*name, thinned(&points))
-            })
-            .collect::<Vec<_>>();
-        self.draw(title, unit, &series);
+        self.plot_rows(title, unit, crate::analysis::window(recording, window.0, window.1), curves);
     }
 
-    /// What the drive's flight recorder holds of a fault; nothing if there was none.
+    /// Curves over rows of either system.
+    pub fn plot_rows<R: Timed>(&mut self, title: &str, unit: &str, rows: &[R], curves: &[Curve<R>]) {
+        let points = |value: fn(&R) -> f64| rows.iter().map(|row| (row.t_s(), value(row))).collect();
+        let series: Vec<_> = curves.iter().map(|(name, value)| (*name, points(*value))).collect();
+        self.curves(&self.heading(title), "time in s", unit, &series);
+    }
+
+    /// The flight recorder's records of a fault; nothing if there was none.
     pub fn recorder(&mut self, recording: &Recording) {
         self.recorded(
             &recording.recorded,

@@ -3,7 +3,7 @@
 use super::Curve;
 use super::chart::{COLOURS, SIZE, thinned};
 use crate::trace::Recording;
-use anyhow::{Result, anyhow};
+use anyhow::Result;
 use plotters::prelude::*;
 
 /// One picture of a whole run: torque, phase current, fundamental voltage, one above the other, the modes as bands.
@@ -21,7 +21,7 @@ pub fn overview(recording: &Recording) -> Result<String> {
         for (panel, (label, curves)) in area.split_evenly((3, 1)).iter().zip(&panels) {
             draw_panel(panel, label, recording, curves, end_s)?;
         }
-        area.present().map_err(|error| anyhow!("plot: {error}"))?;
+        area.present()?;
     }
     Ok(svg)
 }
@@ -33,7 +33,6 @@ fn draw_panel(
     curves: &[Curve],
     end_s: f64,
 ) -> Result<()> {
-    let failed = |error: &dyn std::fmt::Display| anyhow!("plot: {error}");
     let rows = &recording.rows;
     let values = || rows.iter().flat_map(|row| curves.iter().map(|(_, value)| value(row)));
     let (low, high) =
@@ -43,8 +42,7 @@ fn draw_panel(
         .margin(6)
         .x_label_area_size(24)
         .y_label_area_size(64)
-        .build_cartesian_2d(0.0..end_s, low - 0.2 * room..high + room)
-        .map_err(|error| failed(&error))?;
+        .build_cartesian_2d(0.0..end_s, low - 0.2 * room..high + room)?;
     let mut begin = 0;
     while begin < rows.len() {
         let mode = rows[begin].mode;
@@ -53,23 +51,17 @@ fn draw_panel(
         let shade = RGBColor(225, 232, 240).mix(if (mode as u8).is_multiple_of(2) { 0.9 } else { 0.35 });
         let corners = [(from_s, low - 0.2 * room), (to_s, high + room)];
         let band = Rectangle::new(corners, shade.filled());
-        chart.draw_series(std::iter::once(band)).map_err(|error| failed(&error))?;
+        chart.draw_series(std::iter::once(band))?;
         if to_s - from_s > 0.04 * end_s {
             let name = Text::new(mode.name(), (from_s, high + 0.9 * room), ("sans-serif", 12));
-            chart.draw_series(std::iter::once(name)).map_err(|error| failed(&error))?;
+            chart.draw_series(std::iter::once(name))?;
         }
         begin += length;
     }
-    chart
-        .configure_mesh()
-        .disable_mesh()
-        .x_desc("time in s")
-        .y_desc(label)
-        .draw()
-        .map_err(|error| failed(&error))?;
+    chart.configure_mesh().disable_mesh().x_desc("time in s").y_desc(label).draw()?;
     for ((_, value), colour) in curves.iter().zip(COLOURS) {
         let points: Vec<_> = rows.iter().map(|row| (row.t_s, value(row))).collect();
-        chart.draw_series(LineSeries::new(thinned(&points), &colour)).map_err(|error| failed(&error))?;
+        chart.draw_series(LineSeries::new(thinned(&points), &colour))?;
     }
     Ok(())
 }

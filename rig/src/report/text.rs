@@ -94,7 +94,7 @@ fn quantity(name: &str) -> (String, &'static str) {
 }
 
 /// Rows of a list under the names of their fields.
-fn list(heading: &str, rows: &[Value]) -> String {
+pub fn list(heading: &str, rows: &[Value]) -> String {
     let Some(Value::Object(first)) = rows.first() else {
         let said: Vec<_> = rows.iter().map(|row| format!("  {}", measured(row, ""))).collect();
         return format!("{heading}: {}\n{}", if rows.is_empty() { "none" } else { "" }, said.join("\n"))

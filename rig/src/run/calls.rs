@@ -1,4 +1,4 @@
-//! What every interrupt was about, in the order in which they ended: a line `interrupt,mode,direction,frequency` each.
+//! The list of the interrupts, in the order in which they ended: a line `interrupt,mode,direction,frequency` each.
 
 use anyhow::{Context, Result};
 use std::fmt::Write as _;
@@ -8,7 +8,7 @@ use tractive::ports::Report;
 
 /// The lines so far.
 pub(crate) struct Calls {
-    /// What the interrupts are about now.
+    /// The mode of the present interrupts.
     pub(crate) mode: String,
     direction: &'static str,
     lines: String,

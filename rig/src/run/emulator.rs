@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
 use tractive::wire::{BLOCK_BYTES, BLOCK_WORDS, Block};
 
-/// Which emulator runs which image.
+/// The emulator and its image.
 #[derive(Clone, Debug)]
 pub struct Emulator {
     /// The `qemu-system-arm` program.
@@ -19,9 +19,9 @@ pub struct Emulator {
     pub image: PathBuf,
     /// Further arguments.
     pub arguments: Vec<String>,
-    /// Where it is written what every interrupt was about, a line each.
+    /// The file of the interrupts, a line each.
     pub calls: Option<PathBuf>,
-    /// Whether the run may stand still for as long as somebody types.
+    /// `true` if the run may stand still for as long as somebody types.
     pub patient: bool,
 }
 

@@ -7,10 +7,10 @@ use tractive::time::Instant;
 
 /// The two interrupts of a drive, with the cells between them.
 pub trait Interrupts {
-    /// What they run on.
+    /// The bench that they run on.
     type Bench: Simulated;
 
-    /// When control and PWM come next.
+    /// The instants of the next control and PWM interrupts.
     fn next_calls(&self) -> [Instant; 2];
     /// The PWM interrupt.
     ///

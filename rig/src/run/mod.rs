@@ -14,19 +14,26 @@ pub(crate) use qemu::in_qemu;
 use crate::bench::Simulated;
 use indicatif::{ProgressBar, ProgressStyle};
 use tractive::configuration::Refused;
-use tractive::operator::SLOT_PERIODS;
 use tractive::protocol::Frame;
 use tractive::time::{Clock, Instant};
 
-/// The clock of the emulated board: 25 MHz ticks, control at 10 kHz. The host runs on the same.
-pub const CLOCK: Clock = Clock::new(25_000_000, 2_500);
+/// The rate of the emulated board's timers, in Hz. The host runs on the same.
+const TICKS_HZ: u32 = 25_000_000;
 
-/// What an image says that does not start.
+/// The emulated board's clock, control at 10 kHz.
+pub const CLOCK: Clock = clock(10_000);
+
+/// The same with control at another rate, in Hz.
+pub const fn clock(control_hz: u32) -> Clock {
+    Clock::new(TICKS_HZ, TICKS_HZ / control_hz)
+}
+
+/// The error of an image that does not start.
 pub(crate) fn refused(refused: Refused) -> anyhow::Error {
     anyhow::anyhow!("configuration refused: {refused}")
 }
 
-/// Who commands the drive over the protocol.
+/// The sender of commands over the protocol.
 pub trait Supervisor {
     /// The slot that began at `t_s`: what is sent to the drive, and what happens to it.
     ///
@@ -37,7 +44,7 @@ pub trait Supervisor {
     /// A frame that the drive sends at `t_s`.
     fn hear(&mut self, t_s: f64, frame: &Frame);
 
-    /// Whether a turn may take as long as somebody types.
+    /// `true` if a turn may take as long as somebody types.
     fn is_typed(&self) -> bool {
         false
     }
@@ -50,7 +57,7 @@ pub struct Turn {
     pub frame: Option<Frame>,
     /// The rotors' loads from the next slot on, in N·m; of one rotor the first.
     pub loads_nm: [f64; 2],
-    /// Whether the run ends with this slot.
+    /// `true` if the run ends with this slot.
     pub done: bool,
 }
 
@@ -62,7 +69,7 @@ pub(crate) fn turn(
     at: Instant,
 ) -> anyhow::Result<Option<Frame>> {
     let turn = supervisor.slot(bench.instant_s(at))?;
-    let next = at.after(SLOT_PERIODS * CLOCK.control_ticks);
+    let next = bench.slot_after(at);
     bench.loads_from(next, turn.loads_nm);
     if turn.done {
         bench.end_at(next);

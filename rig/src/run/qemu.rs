@@ -9,11 +9,11 @@ use tractive::protocol::Frame;
 use tractive::time::Instant;
 use tractive::wire::Block;
 
-/// What the image runs on.
+/// The bench that the image runs on, and its records.
 pub(crate) struct Served<'s, B: Simulated> {
     pub(crate) bench: B,
     pub(crate) calls: Calls,
-    /// What the flight recorder has told.
+    /// The records that the flight recorder has told.
     pub(crate) records: Vec<B::Record>,
     supervisor: Option<&'s mut dyn Supervisor>,
 }

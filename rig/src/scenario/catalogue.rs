@@ -172,7 +172,7 @@ fn help() -> clap::Error {
     asked.expect_err("help is no match")
 }
 
-/// What the usage calls this program; who calls it for others says so.
+/// Name of this program in its usage; who calls it for others says so.
 fn program() -> String {
     std::env::var("TRACTIVE_PROGRAM").unwrap_or("cargo rig".to_owned()) + " run"
 }

@@ -67,7 +67,7 @@ pub fn folder(name: &str, options: &RunOptions) -> Result<PathBuf> {
     Ok(out)
 }
 
-/// What produced the figures, and the figures.
+/// The figures, and the run that they come from.
 ///
 /// # Errors
 /// Options that are no JSON.

@@ -1,4 +1,4 @@
-//! What is driven, and what is to be seen: the frame of both systems. Their scenarios stand side by side below.
+//! Scenarios, the frame of both systems: a plan that is driven, and figures that are to be seen. Their scenarios stand side by side below.
 
 pub mod catalogue;
 pub mod command;
@@ -26,12 +26,12 @@ pub trait System: Sized + 'static {
     type Own: Args + Serialize + Clone;
     /// A scenario's inputs.
     type Plan;
-    /// What a run leaves.
+    /// The recording that a run leaves.
     type Recording: Recorded;
 
     /// Step of the trace unless options or scenario say another, in s.
     fn trace_step_s(own: &Self::Own) -> f64;
-    /// Whether options are within their ranges; `scenario` are those of the scenario itself, by name.
+    /// Checks that options are within their ranges; `scenario` are those of the scenario itself, by name.
     ///
     /// # Errors
     /// The first one that is not, by name.
@@ -62,7 +62,7 @@ pub trait System: Sized + 'static {
 
 /// A scenario; its fields are its own options.
 pub trait Scenario<S: System> {
-    /// What is driven.
+    /// The plan that is driven.
     fn plan(&self, options: &Options<S::Own>, machine: &Machine) -> S::Plan;
     /// The figures to report.
     fn figures(&self, recording: &S::Recording, _: &Options<S::Own>, _machine: &Machine) -> Figures {
@@ -84,7 +84,7 @@ pub struct Choice<S: System> {
     pub name: &'static str,
     /// The paper's figure that it answers, and what it is.
     pub figure: &'static str,
-    /// What is driven.
+    /// The plan that is driven.
     pub scenario: Box<dyn Scenario<S>>,
     /// The scenario's own options by name, as they were given.
     pub own: Map<String, Value>,

@@ -1,4 +1,4 @@
-//! Where the lines come from: a script, read whole before anything runs, or standard input, a line when it is wanted.
+//! The source of the lines: a script, read whole before anything runs, or standard input, a line when it is wanted.
 
 use super::script::{self, Line};
 use super::system::System;
@@ -26,7 +26,7 @@ impl Lines {
         Ok(Self::Script(lines.into()))
     }
 
-    /// Whether somebody types them.
+    /// `true` if somebody types them.
     pub fn are_typed(&self) -> bool {
         matches!(self, Self::Typed(_))
     }

@@ -17,7 +17,7 @@ const FAULT_LIMIT: usize = 5;
 const COUNTERS: usize = 6;
 const PARAMETER_ANSWER: usize = 7;
 
-/// How the gates are played, by its code.
+/// The pulse pattern of the gates, by its code.
 #[derive(Clone, Copy, Debug)]
 struct Code(u32);
 
@@ -41,7 +41,7 @@ pub struct Listener {
     measured: Measured,
     /// Measurements of the ZS9.
     zs9: Zs9Measured,
-    /// What became of the frames sent.
+    /// The counts of the frames sent.
     pub counts: Counts,
     fault_value: Option<f32>,
     fault_limit: Option<f32>,
@@ -56,7 +56,7 @@ impl Listener {
         Self { system, ..Self::default() }
     }
 
-    /// What the system sends.
+    /// The messages that the system sends.
     fn messages(&self) -> [&'static Message; 8] {
         match self.system {
             System::Pmasynrm => FROM_DRIVE,
@@ -181,7 +181,7 @@ impl Listener {
         }
     }
 
-    /// What a column says now.
+    /// The present value of a column.
     pub fn value(&self, column: &str) -> String {
         let index = self.system.columns().iter().position(|name| *name == column);
         index.map_or(String::new(), |index| self.row(0.0)[index].clone())

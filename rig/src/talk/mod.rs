@@ -71,6 +71,7 @@ fn with_traction(options: &TalkOptions, machine: &Machine, talk: &mut Talk) -> R
     // The frames ask, not this.
     let line = LinePlan::new(scaled_link(machine), Box::new(move |_| idle));
     let plan = traction::Plan {
+        judged_step_s: own.dt.unwrap_or(TRACE_STEP_S),
         speed: SpeedSource::Inertia { inertia_kg_m2: options.inertia(), load_nm: 0.0 },
         ..traction::Plan::operated(LONGEST_S, vec![(0.0, 0.0)], line)
     };
@@ -87,14 +88,11 @@ fn with_zs9(options: &TalkOptions, machine: &Machine, talk: &mut Talk) -> Result
         loads_nm: [0.0; 2],
         enable: true,
     };
+    let times_s = (0.0, LONGEST_S);
     let plan = dual::Plan {
-        lead_s: 0.0,
-        duration_s: LONGEST_S,
-        speeds: [dual::free(options.inertia()), dual::free(options.inertia())],
-        from_rpm: [0.0; 2],
-        operator: Box::new(operator),
         edges: false,
         line: Some(zs9::line::TIMES),
+        ..dual::Plan::driven(times_s, dual::free(options.inertia()), [0.0; 2], operator)
     };
     Zs9::run("talk", plan, &own, machine, Some(talk))
 }

@@ -1,4 +1,4 @@
-//! What a talk is asked for, and what it came to.
+//! The options of a talk, and its results.
 
 use super::supervisor::Talk;
 use super::system::System;
@@ -11,29 +11,29 @@ use crate::trace::{Recorded, Recording};
 use crate::zs9;
 use std::path::PathBuf;
 
-/// What is wanted.
+/// The options of a talk.
 #[derive(Clone, Debug, clap::Args)]
 pub struct TalkOptions {
     /// A script; without one commands are read from standard input, one a line.
     pub script: Option<PathBuf>,
-    /// Who is talked to.
+    /// The system that is talked to.
     #[arg(long, value_enum, default_value_t)]
     pub system: System,
     /// The machine's and its load's inertia, in kg·m²; default 10, of each of the ZS9's 0.1, for which its speed loops are made.
     #[arg(long, value_parser = crate::options::positive)]
     pub inertia: Option<f64>,
-    /// What all runs share.
+    /// The options that all runs share.
     #[command(flatten)]
     pub run: RunOptions,
-    /// What only the PMaSynRM drive has.
+    /// The options that only the PMaSynRM drive has.
     #[command(flatten)]
     pub traction: TractionOptions,
-    /// What only the ZS9 has.
+    /// The options that only the ZS9 has.
     #[command(flatten)]
     pub zs9: Zs9Options,
 }
 
-/// What really happened, by system.
+/// The recording of what really happened, by system.
 pub enum Happened {
     /// Of the PMaSynRM drive.
     Pmasynrm(Recording),
@@ -42,7 +42,7 @@ pub enum Happened {
 }
 
 impl Happened {
-    /// What both systems have.
+    /// The part that both systems have.
     pub fn common(&self) -> &dyn Recorded {
         match self {
             Self::Pmasynrm(recording) => recording,
@@ -66,11 +66,11 @@ impl Happened {
 
 /// A run that is over.
 pub struct Outcome {
-    /// What was said and heard.
+    /// The talk, as it was said and heard.
     pub talk: Talk,
-    /// Who was talked to.
+    /// The system that was talked to.
     pub system: System,
-    /// What really happened.
+    /// The recording of what really happened.
     pub recording: Happened,
     /// The figures.
     pub figures: Figures,

@@ -4,12 +4,12 @@ use super::system::System;
 use anyhow::{Context, Result, bail};
 use tractive::protocol::{LinkLimits, TorqueLimits};
 
-/// What a line does.
+/// The action of a line.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Action {
     /// Enables; with a torque that may stand already.
     Enable {
-        /// Whether a torque other than zero may come with it.
+        /// The permission for a torque other than zero to come with it.
         with_torque: bool,
     },
     /// Stops: torque to zero, gates off.
@@ -63,12 +63,12 @@ pub enum Action {
     End,
 }
 
-/// What is expected of the telemetry.
+/// The expectation about the telemetry.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Expectation {
     /// A column of telemetry.csv.
     pub name: String,
-    /// What it should be.
+    /// The value that it should have.
     pub value: String,
     /// By how much a number may differ.
     pub within: f64,
@@ -79,16 +79,16 @@ pub struct Expectation {
 pub struct Line {
     /// Its number, from 1 on.
     pub number: usize,
-    /// When it is due, in s; `None`: after the one before.
+    /// The time at which it is due, in s; `None`: after the one before.
     pub at_s: Option<f64>,
-    /// What it does.
+    /// Its action.
     pub action: Action,
     /// The line itself.
     pub text: String,
 }
 
 /// The words of a line.
-struct Words<'a> {
+pub struct Words<'a> {
     rest: std::str::SplitWhitespace<'a>,
 }
 
@@ -105,14 +105,62 @@ impl<'a> Words<'a> {
         }
     }
 
-    /// A number for each motor.
-    fn each(&mut self, what: &str, system: System, [low, high]: [f64; 2]) -> Result<[f64; 2]> {
-        let first = self.number(what, low, high)?;
-        let second = match system {
-            System::Pmasynrm => 0.0,
-            System::Zs9 => self.number(what, low, high)?,
+    /// A number for each of so many motors.
+    fn each(&mut self, what: &str, motors: usize, [low, high]: [f64; 2]) -> Result<[f64; 2]> {
+        let mut each = [0.0; 2];
+        for number in each.iter_mut().take(motors) {
+            *number = self.number(what, low, high)?;
+        }
+        Ok(each)
+    }
+
+    fn torque(&mut self, motors: usize) -> Result<Action> {
+        Ok(Action::Torque(self.each("torque", motors, TORQUE)?, self.after("over", 0.0, 0.0, 1e4)?))
+    }
+
+    fn speed(&mut self, motors: usize) -> Result<Action> {
+        Ok(Action::Speed(self.each("speed", motors, SPEED)?, self.after("at", 500.0, 1.0, 1e5)?))
+    }
+
+    fn load(&mut self, motors: usize) -> Result<Action> {
+        Ok(Action::Load(self.each("load", motors, TORQUE)?))
+    }
+
+    /// Of motor 0 or 1.
+    fn limits(&mut self, motor: usize) -> Result<Action> {
+        let [_, high_nm] = TORQUE;
+        let limits = TorqueLimits {
+            motoring_nm: self.number("motoring torque", 0.0, high_nm)? as f32,
+            braking_nm: self.number("braking torque", 0.0, high_nm)? as f32,
+            speed_rpm: self.number("speed", 0.5, 30_000.0)? as f32,
         };
-        Ok([first, second])
+        Ok(Action::Limits(motor, limits))
+    }
+
+    fn link_limits(&mut self) -> Result<Action> {
+        let [low_v, high_v] =
+            [self.number("low voltage", 0.0, MOST_V)?, self.number("high voltage", 0.0, MOST_V)?];
+        if low_v >= high_v {
+            bail!("link limits {low_v} and {high_v}: the first must be lower");
+        }
+        Ok(Action::LinkLimits(LinkLimits { low_v: low_v as f32, high_v: high_v as f32 }))
+    }
+
+    fn parameter(&mut self) -> Result<u8> {
+        Ok(self.number("parameter", 0.0, 255.0)?.round() as u8)
+    }
+
+    fn enable(&mut self) -> Result<Action> {
+        match self.rest.next() {
+            None => Ok(Action::Enable { with_torque: false }),
+            Some("with-torque") => Ok(Action::Enable { with_torque: true }),
+            Some(other) => bail!("{other}: only `with-torque` may stand here"),
+        }
+    }
+
+    fn expectation(&mut self) -> Result<Expectation> {
+        let (name, value) = (self.next("column")?.to_owned(), self.next("value")?.to_owned());
+        Ok(Expectation { name, value, within: self.after("within", 0.0, 0.0, f64::MAX)? })
     }
 
     fn count(&mut self, what: &str) -> Result<u32> {
@@ -137,110 +185,67 @@ impl<'a> Words<'a> {
     }
 }
 
-/// What the ZS9 has in the place of the PMaSynRM drive's.
-pub const ZS9_COMMANDS: [&str; 5] = [
-    "torque NM NM [over SECONDS]",
-    "speed RPM RPM [at RPM_PER_SECOND]",
-    "load NM NM",
-    "limits 1|2 MOTORING_NM BRAKING_NM SPEED_RPM",
-    "link VOLTS",
+/// A command with what follows it, as the help shows it, and what it is read as.
+pub type Command = (&'static str, fn(&mut Words) -> Result<Action>);
+
+/// The ZS9's commands, in the place of the PMaSynRM drive's.
+pub const ZS9_COMMANDS: [Command; 5] = [
+    ("torque NM NM [over SECONDS]", |words| words.torque(2)),
+    ("speed RPM RPM [at RPM_PER_SECOND]", |words| words.speed(2)),
+    ("load NM NM", |words| words.load(2)),
+    ("limits 1|2 MOTORING_NM BRAKING_NM SPEED_RPM", |words| {
+        let motor = words.number("motor", 1.0, 2.0)?.round() as usize;
+        words.limits(motor - 1)
+    }),
+    ("link VOLTS", |words| Ok(Action::Link(words.number("link voltage", 0.0, MOST_V)?))),
 ];
 
-/// Every command with what follows it, as the help shows it.
-pub const COMMANDS: [&str; 24] = [
-    "enable [with-torque]",
-    "disable",
-    "off on|off",
-    "coast on|off",
-    "charge",
-    "discharge",
-    "acknowledge",
-    "torque NM [over SECONDS]",
-    "speed RPM [at RPM_PER_SECOND]",
-    "load NM",
-    "limits MOTORING_NM BRAKING_NM SPEED_RPM",
-    "link-limits LOW_V HIGH_V",
-    "read PARAMETER",
-    "write PARAMETER VALUE",
-    "corrupt COUNT",
-    "truncate COUNT",
-    "replay COUNT",
-    "reorder",
-    "out-of-range COUNT",
-    "unknown COUNT",
-    "drop MILLISECONDS",
-    "wait SECONDS",
-    "expect COLUMN VALUE [within TOLERANCE]",
-    "end",
+/// Every command.
+pub const COMMANDS: [Command; 24] = [
+    ("enable [with-torque]", |words| words.enable()),
+    ("disable", |_| Ok(Action::Disable)),
+    ("off on|off", |words| Ok(Action::Off(words.switch()?))),
+    ("coast on|off", |words| Ok(Action::Coast(words.switch()?))),
+    ("charge", |_| Ok(Action::Charge)),
+    ("discharge", |_| Ok(Action::Discharge)),
+    ("acknowledge", |_| Ok(Action::Acknowledge)),
+    ("torque NM [over SECONDS]", |words| words.torque(1)),
+    ("speed RPM [at RPM_PER_SECOND]", |words| words.speed(1)),
+    ("load NM", |words| words.load(1)),
+    ("limits MOTORING_NM BRAKING_NM SPEED_RPM", |words| words.limits(0)),
+    ("link-limits LOW_V HIGH_V", |words| words.link_limits()),
+    ("read PARAMETER", |words| Ok(Action::Read(words.parameter()?))),
+    ("write PARAMETER VALUE", |words| {
+        let parameter = words.parameter()?;
+        Ok(Action::Write(parameter, words.number("value", f32::MIN.into(), f32::MAX.into())? as f32))
+    }),
+    ("corrupt COUNT", |words| Ok(Action::Corrupt(words.count("count")?))),
+    ("truncate COUNT", |words| Ok(Action::Truncate(words.count("count")?))),
+    ("replay COUNT", |words| Ok(Action::Replay(words.count("count")?))),
+    ("reorder", |_| Ok(Action::Reorder)),
+    ("out-of-range COUNT", |words| Ok(Action::OutOfRange(words.count("count")?))),
+    ("unknown COUNT", |words| Ok(Action::Unknown(words.count("count")?))),
+    ("drop MILLISECONDS", |words| Ok(Action::Drop(words.count("milliseconds")?))),
+    ("wait SECONDS", |words| Ok(Action::Wait(words.number("seconds", 0.0, 1e5)?))),
+    ("expect COLUMN VALUE [within TOLERANCE]", |words| Ok(Action::Expect(words.expectation()?))),
+    ("end", |_| Ok(Action::End)),
 ];
 
 const TORQUE: [f64; 2] = [-3_000.0, 3_000.0];
 const SPEED: [f64; 2] = [-16_000.0, 16_000.0];
+/// Highest voltage that a signal carries, in V.
+const MOST_V: f64 = 6_500.0;
 
 fn action(name: &str, words: &mut Words, system: System) -> Result<Action> {
-    let [_, high_nm] = TORQUE;
-    Ok(match name {
-        "enable" => match words.rest.next() {
-            None => Action::Enable { with_torque: false },
-            Some("with-torque") => Action::Enable { with_torque: true },
-            Some(other) => bail!("{other}: only `with-torque` may stand here"),
-        },
-        "disable" => Action::Disable,
-        "off" => Action::Off(words.switch()?),
-        "coast" => Action::Coast(words.switch()?),
-        "charge" => Action::Charge,
-        "discharge" => Action::Discharge,
-        "acknowledge" => Action::Acknowledge,
-        "torque" => {
-            Action::Torque(words.each("torque", system, TORQUE)?, words.after("over", 0.0, 0.0, 1e4)?)
-        }
-        "speed" => Action::Speed(words.each("speed", system, SPEED)?, words.after("at", 500.0, 1.0, 1e5)?),
-        "load" => Action::Load(words.each("load", system, TORQUE)?),
-        "limits" => {
-            let motor = match system {
-                System::Pmasynrm => 1,
-                System::Zs9 => words.number("motor", 1.0, 2.0)?.round() as usize,
-            };
-            let limits = TorqueLimits {
-                motoring_nm: words.number("motoring torque", 0.0, high_nm)? as f32,
-                braking_nm: words.number("braking torque", 0.0, high_nm)? as f32,
-                speed_rpm: words.number("speed", 0.5, 30_000.0)? as f32,
-            };
-            Action::Limits(motor - 1, limits)
-        }
-        "link" if system == System::Zs9 => Action::Link(words.number("link voltage", 0.0, 6_500.0)?),
-        "link-limits" if system == System::Zs9 => {
+    let own: &[Command] = if system == System::Zs9 { &ZS9_COMMANDS } else { &[] };
+    let known = own.iter().chain(&COMMANDS).find(|(usage, _)| usage.split(' ').next() == Some(name));
+    match known {
+        Some(_) if system == System::Zs9 && name == "link-limits" => {
             bail!("link-limits: the ZS9 has none; `link` is its voltage")
         }
-        "link-limits" => {
-            let low_v = words.number("low voltage", 0.0, 6_500.0)?;
-            let high_v = words.number("high voltage", 0.0, 6_500.0)?;
-            if low_v >= high_v {
-                bail!("link limits {low_v} and {high_v}: the first must be lower");
-            }
-            Action::LinkLimits(LinkLimits { low_v: low_v as f32, high_v: high_v as f32 })
-        }
-        "read" => Action::Read(words.number("parameter", 0.0, 255.0)?.round() as u8),
-        "write" => {
-            let parameter = words.number("parameter", 0.0, 255.0)?.round() as u8;
-            Action::Write(parameter, words.number("value", f64::from(f32::MIN), f64::from(f32::MAX))? as f32)
-        }
-        "corrupt" => Action::Corrupt(words.count("count")?),
-        "truncate" => Action::Truncate(words.count("count")?),
-        "replay" => Action::Replay(words.count("count")?),
-        "reorder" => Action::Reorder,
-        "out-of-range" => Action::OutOfRange(words.count("count")?),
-        "unknown" => Action::Unknown(words.count("count")?),
-        "drop" => Action::Drop(words.count("milliseconds")?),
-        "wait" => Action::Wait(words.number("seconds", 0.0, 1e5)?),
-        "expect" => Action::Expect(Expectation {
-            name: words.next("column")?.to_owned(),
-            value: words.next("value")?.to_owned(),
-            within: words.after("within", 0.0, 0.0, f64::MAX)?,
-        }),
-        "end" => Action::End,
-        other => bail!("{other}: must be one of: {}", COMMANDS.join(", ")),
-    })
+        Some((_, read)) => read(words),
+        None => bail!("{name}: must be one of: {}", COMMANDS.map(|(usage, _)| usage).join(", ")),
+    }
 }
 
 /// One line; `None` if there is nothing on it.
@@ -298,8 +303,8 @@ mod tests {
 
     #[test]
     fn every_command_of_the_help_is_understood() {
-        let all = COMMANDS.map(|usage| (usage, System::Pmasynrm));
-        for (usage, system) in all.into_iter().chain(ZS9_COMMANDS.map(|usage| (usage, System::Zs9))) {
+        let all = COMMANDS.map(|(usage, _)| (usage, System::Pmasynrm));
+        for (usage, system) in all.into_iter().chain(ZS9_COMMANDS.map(|(usage, _)| (usage, System::Zs9))) {
             let full = usage
                 .replace(['[', ']'], "")
                 .replace("on|off", "on")

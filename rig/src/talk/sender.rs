@@ -1,4 +1,4 @@
-//! What is sent to the drive in which slot, and what is done to it on the way.
+//! The frames to the drive, slot by slot, and the injuries on their way.
 
 use super::system::System;
 use std::collections::VecDeque;
@@ -10,7 +10,7 @@ use tractive::protocol::{
     Zs9Command, Zs9Demands, Zs9Link,
 };
 
-/// What is commanded.
+/// The command that is sent.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Spoken {
     /// Levels.
@@ -197,7 +197,7 @@ impl Sender {
         })
     }
 
-    /// What leaves instead of a command.
+    /// The frame that leaves instead of a command.
     fn mistreated(&mut self, frame: Frame) -> Option<Frame> {
         if self.kept.len() == KEPT {
             self.kept.pop_front();

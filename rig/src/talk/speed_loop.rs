@@ -9,7 +9,7 @@ const INTEGRAL_SHARE: f64 = 0.4;
 
 /// Time in which the reference takes up its slope, in s: the drive's torque is limited in its rate, too.
 const TAKE_UP_S: f64 = 0.3;
-/// How fast the reference lands on its target, in 1/s.
+/// The rate at which the reference lands on its target, in 1/s.
 const LANDING_1_S: f64 = 4.0;
 
 /// Holds a speed.

@@ -13,7 +13,7 @@ use tractive::protocol::{Frame, ParameterRequest, Zs9Link};
 
 /// Slots for which a level stands whose edge counts: more than may be lost in a row.
 const EDGE_SLOTS: u64 = 5 * COMMAND_SLOTS;
-/// What passes after a typed line, so that its effect shows, in s.
+/// The time that passes after a typed line, so that its effect shows, in s.
 const TYPED_S: f64 = 0.1;
 /// Length of a slot, in s.
 const SLOT_S: f64 = 1e-3;
@@ -57,7 +57,7 @@ pub struct Talk {
     largest_nm: f64,
     loads_nm: [f64; 2],
     sender: Sender,
-    /// What the telemetry says.
+    /// The listener to the telemetry.
     pub listener: Listener,
     /// Rows of telemetry.csv.
     pub rows: Vec<Vec<String>>,

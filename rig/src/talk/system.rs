@@ -1,6 +1,6 @@
-//! Who is talked to, and what its telemetry tells.
+//! The system that is talked to, and the columns of its telemetry.
 
-/// Who is talked to.
+/// The system that is talked to.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
 pub enum System {
     /// The PMaSynRM drive.

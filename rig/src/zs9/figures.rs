@@ -2,30 +2,27 @@
 
 use super::trace::{Recording, Row};
 use crate::analysis::Figures;
-use crate::report::Page;
+use crate::report::{self, Page};
 use crate::rows::{between, mean};
+use crate::trace::Recorded;
 use core::f64::consts::TAU;
 use tractive::recorder::DualRecord;
 
 /// A curve: its name and what it shows.
-pub type Curve<'a> = (&'a str, fn(&Row) -> f64);
+pub type Curve<'a> = report::Curve<'a, Row>;
 
-/// What every scenario reports.
+/// The paper's figure that a plot answers, its title, its unit.
+pub type Heading<'a> = (&'a str, &'a str, &'a str);
+
+/// Figures of every scenario.
 pub fn common(recording: &Recording) -> Figures {
-    let mut figures = Figures::default();
     let rows = &recording.rows;
-    figures.set("simulated_s", rows.last().map_or(0.0, |row| row.t_s + step_s(recording)));
-    figures.set("fault", recording.trip().map_or("", |trip| trip.fault.name()));
-    if let Some(trip) = recording.trip() {
-        figures.set("fault_value", trip.value);
-        figures.set("fault_limit", trip.limit);
-    }
     let peak = |row: &Row| {
         let phases = row.motors.iter().flat_map(|motor| motor.phases_a);
         phases.fold(0.0, |most: f64, current| most.max(current.abs()))
     };
-    figures.set("peak_current_a", largest(rows, peak));
-    figures
+    let simulated_s = rows.last().map_or(0.0, |row| row.t_s + step_s(recording));
+    Figures::of_run(simulated_s, recording.trip(), largest(rows, peak))
 }
 
 /// The link's range in some rows, in which `wanted_v` (V) is wanted.
@@ -73,30 +70,16 @@ pub fn thd_percent(recording: &Recording, cycles: f64, value: impl Fn(&Row) -> f
     (squares / count / fundamental - 1.0).max(0.0).sqrt() * 100.0
 }
 
-/// Curves over time.
-pub fn plot(
-    page: &mut Page,
-    figure: &str,
-    title: &str,
-    unit: &str,
-    recording: &Recording,
-    (from_s, to_s): (f64, f64),
-    curves: &[Curve],
-) {
-    let rows = window(recording, from_s, to_s);
-    let points = |value: fn(&Row) -> f64| rows.iter().map(|row| (row.t_s, value(row))).collect();
-    let series: Vec<_> = curves.iter().map(|(name, value)| (*name, points(*value))).collect();
-    page.curves(&heading(figure, title), "time in s", unit, &series);
+/// Curves over time, under what they answer, with their title and unit.
+pub fn plot(page: &mut Page, (figure, title, unit): Heading, rows: &[Row], curves: &[Curve]) {
+    page.answers(figure);
+    page.plot_rows(title, unit, rows, curves);
 }
 
 /// Both motors' phase currents.
-pub fn phases(page: &mut Page, figure: &str, recording: &Recording, window: (f64, f64)) {
-    for (title, curves) in [
-        ("phase currents of motor 1", phase_curves::<0>()),
-        ("phase currents of motor 2", phase_curves::<1>()),
-    ] {
-        plot(page, figure, title, "A", recording, window, &curves);
-    }
+pub fn phases(page: &mut Page, figure: &str, rows: &[Row]) {
+    plot(page, (figure, "phase currents of motor 1", "A"), rows, &phase_curves::<0>());
+    plot(page, (figure, "phase currents of motor 2", "A"), rows, &phase_curves::<1>());
 }
 
 fn phase_curves<const K: usize>() -> [Curve<'static>; 3] {
@@ -108,30 +91,13 @@ fn phase_curves<const K: usize>() -> [Curve<'static>; 3] {
 }
 
 /// A curve of motor 1 over its speed.
-pub fn over_speed(
-    page: &mut Page,
-    figure: &str,
-    title: &str,
-    unit: &str,
-    recording: &Recording,
-    value: fn(&Row) -> f64,
-) {
-    let every = recording.rows.len().div_ceil(1500).max(1);
-    let rows = recording.rows.iter().step_by(every);
-    let points: Vec<_> = rows.map(|row| (row.motors[0].speed_rpm, value(row))).collect();
-    page.curves(&heading(figure, title), "speed in r/min", unit, &[("motor 1", points)]);
+pub fn over_speed(page: &mut Page, (figure, title, unit): Heading, rows: &[Row], value: fn(&Row) -> f64) {
+    let every = rows.len().div_ceil(1500).max(1);
+    let points = rows.iter().step_by(every).map(|row| (row.motors[0].speed_rpm, value(row)));
+    page.draw_xy(figure, title, ("speed in r/min", unit), &[("motor 1".to_owned(), points.collect())]);
 }
 
-fn heading(figure: &str, title: &str) -> String {
-    let kind = match figure {
-        _ if !figure.starts_with(|c: char| c.is_ascii_digit()) => "",
-        _ if figure.contains([' ', '–']) => "figures ",
-        _ => "figure ",
-    };
-    format!("The paper's {kind}{figure} · {title}")
-}
-
-/// What the drive's flight recorder holds of a fault; nothing if there was none.
+/// The flight recorder's records of a fault; nothing if there was none.
 pub fn recorder(page: &mut Page, recording: &Recording) {
     page.recorded(
         &recording.recorded,

@@ -5,7 +5,6 @@
 
 use crate::bench::{Switchgear, Tick};
 use crate::plant::zs9::{NetworkState, Zs9Plant};
-use tractive::operator::DualStatus;
 use tractive::time::Clock;
 
 pub use tractive::operator::LineTimes;
@@ -19,38 +18,31 @@ pub struct LineSide {
     /// Contactors and slots.
     pub gear: Switchgear<(), [tractive::ports::MotorDemand; 2]>,
     discharge: bool,
-    status: Option<DualStatus>,
 }
 
 impl LineSide {
-    /// What is left in capacitors that are empty, in V: the plant is made for a network that is charged.
+    /// The voltage that is left in capacitors that are empty, in V: the plant is made for a network that is charged.
     pub const EMPTY_V: f64 = 1.0;
 
     /// At tick 0, everything open.
     pub fn new(times: LineTimes, clock: &Clock) -> Self {
-        Self { times, gear: Switchgear::new(clock), discharge: false, status: None }
+        Self { times, gear: Switchgear::new(clock), discharge: false }
     }
 
     /// Does what is due at `now`.
     pub fn act(&mut self, now: Tick) {
         if let Some(status) = self.gear.act(now) {
             self.discharge = status.switches.discharge;
-            self.status = Some(status);
         }
     }
 
-    /// The operator's last word that has taken effect.
-    pub fn status(&self) -> Option<DualStatus> {
-        self.status
-    }
-
-    /// What the source does to the network over the next `dt_s`.
+    /// Feeds the network from the source over the next `dt_s`.
     pub fn feed(&self, plant: &mut Zs9Plant, source_v: f64, dt_s: f64) {
         if self.gear.main_closed() {
-            plant.set_source_v(source_v);
+            plant.source_v = source_v;
             return;
         }
-        let mut capacitor_v = plant.network().capacitor_v();
+        let mut capacitor_v = plant.network.capacitor_v();
         if self.gear.precharge_closed() {
             capacitor_v += (source_v - capacitor_v) * -(-dt_s / f64::from(self.times.precharge_s)).exp_m1();
         }
@@ -58,8 +50,8 @@ impl LineSide {
             capacitor_v *= (-dt_s / f64::from(self.times.discharge_s)).exp();
         }
         let capacitor_v = capacitor_v.max(Self::EMPTY_V);
-        plant.set_network(NetworkState::even(0.0, capacitor_v));
+        plant.network = NetworkState::even(0.0, capacitor_v);
         // Nothing flows between a source and capacitors of one voltage.
-        plant.set_source_v(capacitor_v);
+        plant.source_v = capacitor_v;
     }
 }

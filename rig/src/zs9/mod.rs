@@ -6,7 +6,6 @@ pub mod line;
 mod operator;
 pub mod patterns;
 pub mod run;
-mod sensors;
 pub mod settings;
 pub mod trace;
 

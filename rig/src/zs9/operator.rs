@@ -1,15 +1,15 @@
-//! What the operator and the loads do.
+//! The demands of the operator, and the loads.
 
 use tractive::ports::MotorDemand;
 
 /// Orders for one control period. Motors in the order upper, lower.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Orders {
-    /// What the motors are to do.
+    /// The demands on the motors.
     pub demands: [MotorDemand; 2],
     /// Load torques against forward rotation, in N·m.
     pub loads_nm: [f64; 2],
-    /// Whether the gates may be on.
+    /// The permission for the gates to be on.
     pub enable: bool,
 }
 

@@ -1,4 +1,4 @@
-//! What a run of the ZS9 leaves behind. Files are written whole or not at all.
+//! The files that a run of the ZS9 leaves behind. Files are written whole or not at all.
 
 use crate::files::{Cell, Columns, write_edges, write_recorder, write_rows};
 use crate::rows::Timed;
@@ -15,9 +15,9 @@ const GATES: [&str; 9] = ["uh", "vh", "wh", "um", "vm", "wm", "ul", "vl", "wl"];
 /// A gate edge.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Edge {
-    /// When, in s from the recording's beginning.
+    /// The time, in s from the recording's beginning.
     pub t_s: f64,
-    /// Which gate, in the order of [`tractive::nine_switch::GATES`].
+    /// The gate, in the order of [`tractive::nine_switch::GATES`].
     pub gate: u8,
     /// On or off.
     pub on: bool,
@@ -42,7 +42,7 @@ pub struct MotorRow {
     pub load_nm: f64,
     /// Commanded peak phase voltage, in V, at the step's end.
     pub voltage_v: f64,
-    /// Whether the voltage limit holds the operating point.
+    /// `true` if the voltage limit holds the operating point.
     pub weakening: bool,
 }
 
@@ -63,7 +63,7 @@ pub struct Row {
     pub source_v: f64,
     /// Share of the step in which a leg shorted the link.
     pub duty: f64,
-    /// Where the zero vectors lie.
+    /// The place of the zero vectors.
     pub scheme: Scheme,
     /// The latched fault.
     pub trip: Option<Trip>,
@@ -79,11 +79,11 @@ pub struct Row {
 pub struct Recording {
     /// Rows of the trace.
     pub rows: Vec<Row>,
-    /// Whether edges were kept.
+    /// `true` if edges were kept.
     pub keeps_edges: bool,
     /// Those edges.
     pub edges: Vec<Edge>,
-    /// What the drive's flight recorder holds, with its times in s from the recording's beginning; empty without a fault.
+    /// The records of the drive's flight recorder, with their times in s from the recording's beginning; empty without a fault.
     pub recorded: Vec<(f64, DualRecord)>,
 }
 
@@ -157,16 +157,9 @@ fn recorder_columns((t_s, record): &(f64, DualRecord)) -> Columns<20> {
     ])
 }
 
-impl Recording {
-    /// The first fault, if the drive tripped.
-    pub fn trip(&self) -> Option<Trip> {
-        self.rows.iter().find_map(|row| row.trip)
-    }
-}
-
 impl Recorded for Recording {
     fn trip(&self) -> Option<Trip> {
-        self.trip()
+        self.rows.iter().find_map(|row| row.trip)
     }
 
     fn end_s(&self) -> f64 {

@@ -1,4 +1,4 @@
-//! What a machine can give, found by looking everywhere: no table and no solver of the drive's is used, only the machine's own
+//! The optimum of a machine, found by looking everywhere: no table and no solver of the drive's is used, only the machine's own
 //! equations. A current of either sign of iq; the machine is even in iq.
 
 use super::folders::CoEnergy;
@@ -13,7 +13,7 @@ pub struct Truth {
     pub max_current_a: f64,
 }
 
-/// What is asked of it: an electrical speed, and the voltage there is.
+/// The question: an electrical speed, and the voltage there is.
 #[derive(Clone, Copy)]
 pub struct Supply {
     pub omega: f64,

@@ -15,6 +15,7 @@ pub struct Linear {
     pub power_w: f64,
     pub speed_rpm: f64,
     pub link_v: f64,
+    pub switching_hz: f64,
 }
 
 /// Magnets inside, magnets on the surface, none, and a small one with few of them.
@@ -31,6 +32,7 @@ pub const MACHINES: [Linear; 4] = [
         power_w: 14e3,
         speed_rpm: 2000.0,
         link_v: 667.0,
+        switching_hz: 4e3,
     },
     Linear {
         name: "surface magnets, no saliency",
@@ -44,6 +46,7 @@ pub const MACHINES: [Linear; 4] = [
         power_w: 14e3,
         speed_rpm: 2000.0,
         link_v: 667.0,
+        switching_hz: 4e3,
     },
     Linear {
         name: "reluctance alone, no magnets",
@@ -57,6 +60,7 @@ pub const MACHINES: [Linear; 4] = [
         power_w: 5e3,
         speed_rpm: 3000.0,
         link_v: 540.0,
+        switching_hz: 4e3,
     },
     Linear {
         name: "5 kW, reluctance assisted by magnets",
@@ -70,6 +74,7 @@ pub const MACHINES: [Linear; 4] = [
         power_w: 6e3,
         speed_rpm: 3500.0,
         link_v: 540.0,
+        switching_hz: 4e3,
     },
 ];
 
@@ -79,7 +84,7 @@ impl Linear {
         let toml = format!(
             "name = \"{}\"\npole_pairs = {}\nstator_resistance_ohm = {}\nmax_torque_nm = {}\nmax_power_w = {}\n\
              max_current_a = {}\nmax_speed_rpm = {}\nrated_torque_nm = {}\nrated_speed_rpm = {}\ndc_link_min_v = {}\n\
-             dc_link_nominal_v = {}\ndc_link_max_v = {}\nmax_switching_hz = 4000\n",
+             dc_link_nominal_v = {}\ndc_link_max_v = {}\nmax_switching_hz = {}\n",
             self.name,
             self.pole_pairs,
             self.resistance_ohm,
@@ -92,6 +97,7 @@ impl Linear {
             0.8 * self.link_v,
             self.link_v,
             1.2 * self.link_v,
+            self.switching_hz,
         );
         let mut map = String::from("id_a,iq_a,psi_d_wb,psi_q_wb\n");
         let step = self.current_a / 20.0;

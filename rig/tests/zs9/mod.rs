@@ -1,4 +1,4 @@
-//! What the ZS9's tests share: a plain pattern, not the product's, and a plain current control.
+//! The tools that the ZS9's tests share: a plain pattern, not the product's, and a plain current control.
 #![allow(dead_code)]
 
 use std::f64::consts::{PI, TAU};
@@ -64,7 +64,7 @@ pub fn pattern(upper: (f64, f64), lower: (f64, f64), duty: f64) -> Vec<([LegGate
 /// A period of the plant with voltages that keep to the rotor frames: (d, q) depths of both motors.
 pub fn period(plant: &mut Zs9Plant, depths: [(f64, f64); 2], duty: f64) -> Result<(), IllegalState> {
     let [upper, lower] = [0, 1].map(|k| {
-        let motor = &plant.motors()[k];
+        let motor = &plant.motors[k];
         let omega = motor.speed_rpm() * TAU / 60.0 * 4.0;
         let (d, q) = depths[k];
         // Seen from the middle of the motor's own half.
@@ -93,7 +93,7 @@ pub fn regulated(plant: &Zs9Plant, references: [(f64, f64); 2]) -> [(f64, f64); 
     const BANDWIDTH: f64 = 1500.0;
     let link_v = plant.link_v();
     [0, 1].map(|k| {
-        let motor = &plant.motors()[k];
+        let motor = &plant.motors[k];
         let ((id, iq), (rd, rq)) = (motor.currents_dq(), references[k]);
         let (d, q) = depth_for(references[k], motor.speed_rpm(), link_v);
         let (pd, pq) = (BANDWIDTH * 2.5e-3 * (rd - id), BANDWIDTH * 5e-3 * (rq - iq));

@@ -8,17 +8,18 @@ use super::{
     start_timers, stop, watch, write_register,
 };
 use crate::drive::dual::Settings;
-use crate::operator::{DualDemands, DualDesk, DualRequest, DualStatus, Feedback, OperatorPort};
+use crate::operator::{DualDemands, DualMailboxes, DualRequest, DualStatus, Feedback, OperatorPort};
 use crate::ports::DualReport;
-use crate::ports::{DualControlPort, DualPwmPort, DualSample, PlayedPeriod, PowerSample};
-use crate::protocol::Zs9Station;
+use crate::ports::{ControlPort, Dual, DualSample, PlayedPeriod, PowerSample, PwmPort};
+use crate::protection::SafeState;
+use crate::protocol::Zs9CanEndpoint;
 use crate::recorder::DualRecorder;
 use crate::time::Instant;
 use crate::wire::DualSetup;
 use core::sync::atomic::Ordering;
 
 /// Between the ZS9's operator in the idle loop and its control.
-pub static DUAL_DESK: DualDesk = DualDesk::new();
+pub static DUAL_DESK: DualMailboxes = DualMailboxes::new();
 
 /// The ZS9's flight recorder. The rig reads it when the run is over.
 pub static DUAL_RECORDER: DualRecorder = DualRecorder::new();
@@ -41,7 +42,11 @@ pub fn start_dual(settings: &Settings) {
     write_register(PWM_TIMER + 0x18, settings.carrier_ticks.saturating_sub(1));
 }
 
-impl DualControlPort for Control {
+impl ControlPort<Dual> for Control {
+    fn begin(&mut self, _revises: bool) {
+        self.acknowledge();
+    }
+
     fn sample(&mut self, now: Instant) -> DualSample {
         let mut sample = exchange::sample_dual(now);
         sample.hardware = sample.hardware.or(watch::found());
@@ -51,7 +56,7 @@ impl DualControlPort for Control {
         sample
     }
 
-    fn gates_off(&mut self, now: Instant) {
+    fn enter(&mut self, _safe: SafeState, now: Instant) {
         exchange::gates_off(now);
     }
 
@@ -71,7 +76,12 @@ impl DualControlPort for Control {
     }
 }
 
-impl DualPwmPort for Pwm {
+impl PwmPort<Dual> for Pwm {
+    fn begin(&mut self) -> bool {
+        self.acknowledge();
+        true
+    }
+
     fn sample(&mut self, now: Instant) -> PowerSample {
         exchange::power_sample(now)
     }
@@ -81,7 +91,7 @@ impl DualPwmPort for Pwm {
         exchange::play_dual(now, next);
     }
 
-    fn gates_off(&mut self, now: Instant) {
+    fn enter(&mut self, _safe: SafeState, now: Instant) {
         exchange::gates_off(now);
     }
 
@@ -95,7 +105,7 @@ impl DualPwmPort for Pwm {
 /// The idle loop's side of the board, for the ZS9.
 pub struct DualIdle {
     /// The protocol.
-    pub station: Zs9Station,
+    pub station: Zs9CanEndpoint,
 }
 
 impl OperatorPort<DualDemands> for DualIdle {

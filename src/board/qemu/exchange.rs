@@ -2,18 +2,16 @@
 //! these functions by their module and does not count them, so they stay out of line and take what they tell by reference.
 
 mod dual;
-#[cfg(feature = "saboteur")]
-pub mod file;
 
 pub use dual::{
     ask_dual, dead_dual, gates_off, leave_dual, open_dual, play_dual, power_sample, report_dual, sample_dual,
     tell_dual,
 };
 
-use super::{RECORDER, saboteur, stop};
+use super::{RECORDER, stop};
 use crate::cell::{Ring, Words};
 use crate::frames::Abc;
-use crate::modulation::CarrierPeriod;
+use crate::modulation::CarrierHalf;
 use crate::operator::{self, Feedback, Status};
 use crate::ports::Report;
 use crate::ports::Sample;
@@ -28,7 +26,8 @@ use cortex_m_semihosting::syscall;
 static FILES: [AtomicU32; 4] = [const { AtomicU32::new(0) }; 4];
 const REQUESTS: usize = 0;
 const CONTROL_ANSWERS: usize = 1;
-const PWM_ANSWERS: usize = 2;
+/// The answers that the PWM interrupt waits for.
+pub const PWM_ANSWERS: usize = 2;
 const IDLE_ANSWERS: usize = 3;
 
 /// Opens the files and fetches the set-up.
@@ -53,7 +52,6 @@ fn open_files() {
         }
         file.store(handle as u32, Ordering::Relaxed);
     }
-    saboteur::connect();
 }
 
 /// The control timer's conversions; ends the emulation when the rig says so.
@@ -65,7 +63,6 @@ pub fn control_sample(now: Instant) -> Sample {
     if end {
         finish(&RECORDER, |record| Request::Recorded(record).to_block());
     }
-    saboteur::sampled();
     sample
 }
 
@@ -77,7 +74,6 @@ fn finish<T: Words<N>, const N: usize, const RECORDS: usize>(
 ) -> ! {
     // The rig's time stands still from here on: no interrupt may ask it for samples.
     cortex_m::interrupt::disable();
-    saboteur::finish();
     for record in (0..).map_while(|index| recorder.read(index)) {
         send(&recorded(record));
     }
@@ -93,24 +89,10 @@ pub fn pwm_sample(now: Instant) -> Abc {
     wire::currents_from_block(&block)
 }
 
-/// What was loaded into the shadow registers.
+/// The half that was loaded into the shadow registers.
 #[inline(never)]
-pub fn play(now: Instant, next: &CarrierPeriod) {
+pub fn play(now: Instant, next: &CarrierHalf) {
     send(&Request::Play(now, *next).to_block());
-}
-
-/// The same as before once more: what timers do that nobody reloads.
-#[cfg(feature = "saboteur")]
-pub fn play_again() {
-    send(&saboteur::played());
-}
-
-/// Lets the rig's time catch up with the real one, which the tasks do not know.
-#[cfg(feature = "saboteur")]
-pub fn catch_up(real: Instant) -> Block {
-    let mut block = Request::PwmSample(real).to_block();
-    exchange(&mut block, PWM_ANSWERS);
-    block
 }
 
 /// The end of a control interrupt.
@@ -122,7 +104,6 @@ pub fn report(now: Instant, report: &Report) {
 /// An order to enter the safe state.
 #[inline(never)]
 pub fn enter(safe: SafeState, now: Instant) {
-    saboteur::gates_off();
     send(&Request::Enter(now, safe).to_block());
 }
 
@@ -132,7 +113,7 @@ pub fn leave(now: Instant) {
     send(&Request::Leave(now).to_block());
 }
 
-/// What is asked of the operator. The idle loop's answers have a stream of their own: an interrupt may ask while it waits.
+/// The request to the operator. The idle loop's answers have a stream of their own: an interrupt may ask while it waits.
 #[inline(never)]
 pub fn ask(at: Instant) -> (operator::Request, Feedback, Option<Frame>) {
     let mut block = Request::Ask(at).to_block();
@@ -140,7 +121,7 @@ pub fn ask(at: Instant) -> (operator::Request, Feedback, Option<Frame>) {
     wire::asked_from_block(&block)
 }
 
-/// What the operator told, and the frame that says so.
+/// The operator's status, and the frame that carries it.
 #[inline(never)]
 pub fn tell(from: Instant, status: &Status, frame: Option<Frame>) {
     send(&Request::Tell(from, *status, frame).to_block());
@@ -173,9 +154,9 @@ fn file(index: usize) -> usize {
     }
 }
 
+/// Sends a request.
 #[inline(never)]
-fn send(block: &Block) {
-    saboteur::sent(block);
+pub fn send(block: &Block) {
     // SAFETY: SYS_WRITE reads exactly the block, which outlives the call.
     let missing = unsafe { syscall!(WRITE, file(REQUESTS), block.as_ptr(), BLOCK_BYTES) };
     if missing != 0 {
@@ -185,7 +166,7 @@ fn send(block: &Block) {
 
 /// Sends a request and puts the answer in its place.
 #[inline(never)]
-fn exchange(block: &mut Block, answers: usize) {
+pub fn exchange(block: &mut Block, answers: usize) {
     send(block);
     // SAFETY: SYS_READ writes at most the block's bytes, and the block is ours until this returns.
     let missing = unsafe { syscall!(READ, file(answers), block.as_mut_ptr(), BLOCK_BYTES) };

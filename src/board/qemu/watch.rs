@@ -49,7 +49,7 @@ pub fn ends() {
     }
 }
 
-/// What it found; it holds until the gates are let go.
+/// The break that it found; it holds until the gates are let go.
 #[inline]
 pub fn found() -> Option<HardwareBreak> {
     ENDED.load(Relaxed).then_some(HardwareBreak { fault: Fault::PwmDeadline, seen: 1 })

@@ -2,7 +2,8 @@
 
 use super::{MotorCommand, MotorShare, Settings};
 use crate::control::{
-    Boundary, Committed, Controller, Demand, Follows, Input, Law, Measurements, Region, SpeedInput, SpeedLoop,
+    AimInput, Boundary, Committed, Controller, Demand, Law, Measurements, ModeLimits, Region, Regulated,
+    RotorSample, SpeedInput, SpeedLoop,
 };
 use crate::frames::{AlphaBeta, Angle};
 use crate::machine::Tables;
@@ -11,12 +12,12 @@ use crate::protection::{self, Fault, FrozenWatch, Violation};
 
 /// Natural frequency of the speed tracker, in rad/s: the speed loop's phase needs it quick.
 const TRACKING_RAD_S: f32 = 4000.0;
-pub use crate::protection::SURPRISE_RAD;
+pub use crate::protection::INNOVATION_RAD;
 /// Time over which the speed may change, in s, and by how much in that time, as electrical rad: the rotor itself makes half of it. So a
 /// sensor that begins to count the other way is found where it is too slow for a surprise.
 const SLOW_S: f32 = 5e-3;
 const ASTRAY_RAD: f32 = 0.25;
-/// What the loop may ask for, as a share of the largest voltage that is to be had at every angle. The modulator gives what its
+/// The voltage that the loop may ask for, as a share of the largest one that is to be had at every angle. The modulator gives what its
 /// hexagon has at the angle, up to 1.155, and tells.
 const LOOP_SHARE: f32 = 1.15;
 /// Share of the largest voltage at every angle that the operating point may use; the rest regulates.
@@ -33,22 +34,24 @@ pub struct Axis {
     acting: Option<(AlphaBeta, f32)>,
 }
 
-/// What a motor's step works on.
+/// Everything that a motor's step works on.
 pub struct AxisInput<'a> {
     pub measured: &'a Measurements,
     pub demand: &'a MotorDemand,
     /// Largest torque that a speed demand may take, in N·m.
     pub speed_torque_nm: f32,
-    /// What the modulator has committed for the carrier period that begins at the sample.
+    /// The modulator's share for the carrier period that begins at the sample.
     pub applied: Option<MotorShare>,
     /// Measured link voltage outside shoot-through, in V.
     pub link_v: f32,
+    /// `true` if it is this motor's turn for a new operating point.
+    pub aims: bool,
 }
 
 /// A motor's step.
 pub struct AxisOutput {
     pub command: MotorCommand,
-    /// What is told of it, as in [`DualReport`](super::DualReport).
+    /// The torque that is told of it, as in [`DualReport`](super::DualReport).
     pub torque_nm: f32,
     pub weakening: bool,
     /// Electrical power drawn from now on, in W.
@@ -78,9 +81,9 @@ impl Axis {
 
     /// Follows the angle, where it is `trusted` whatever it is. Says by how much, in rad, it is off where that is too much.
     pub fn track(&mut self, angle: Angle, trusted: bool, settings: &Settings) -> Option<f32> {
-        let surprise = self.controller.surprise_rad(angle, &settings.clock);
+        let surprise = self.controller.innovation_rad(angle, &settings.clock);
         let known = self.controller.speed_is_known();
-        if known && surprise.abs() > SURPRISE_RAD && !trusted {
+        if known && surprise.abs() > INNOVATION_RAD && !trusted {
             self.controller.lose_angle();
             return Some(surprise);
         }
@@ -149,7 +152,6 @@ impl Axis {
         let begins = input.applied.map(|share| self.mean_per_volt(&share, settings));
         let before = core::mem::replace(&mut self.acting, begins.map(|mean| (mean, input.link_v)));
         let boundary = Boundary {
-            earlier: None,
             // The link moves along a straight line in between.
             volt_seconds: before.map(|(mean, link_v)| mean * (0.5 * (link_v + input.link_v) * period_s)),
             length_s: period_s,
@@ -160,7 +162,9 @@ impl Axis {
             // A period is its own mirror image, so at its ends the ripple is nothing.
             ripple: None,
             interval_s: period_s,
-            follows: Follows::Mean,
+        };
+        let limits = ModeLimits {
+            follows: Regulated::Mean,
             depth_limit: LOOP_SHARE,
             steady_share: STEADY_SHARE / LOOP_SHARE,
             filled: false,
@@ -170,23 +174,25 @@ impl Axis {
         };
         let demand = self.demand(input, omega, settings, tables);
         let law = Law { gains: &settings.gains, clock: &settings.clock, tables };
-        let control = Input {
-            measured: input.measured,
-            demand: &demand,
-            window: None,
-            committed: &committed,
-            boundary: Some(&boundary),
-        };
-        let output = self.controller.step(&control, &law);
-        self.watch.command(output.voltage.vector);
+        let sample = RotorSample::new(input.measured.currents_a, input.measured.angle, tables);
+        self.controller.observe(&sample, tables);
+        self.controller.learn(&boundary, &sample, limits.follows, &law);
+        if input.aims || before.is_none() {
+            let aim =
+                AimInput { demand: &demand, window: None, udc_v: input.measured.udc_v, limits: &limits };
+            self.controller.aim(&aim, &law);
+        }
+        let voltage = self.controller.regulate(&sample, &committed, &limits, &law);
+        let target = self.controller.target();
+        self.watch.command(voltage.vector);
         AxisOutput {
             command: MotorCommand {
-                voltage_v: output.voltage.voltage_v,
-                angle: output.voltage.vector.angle(),
+                voltage_v: voltage.voltage_v,
+                angle: voltage.vector.angle(),
                 rate: settings.clock.angle_rate(omega),
             },
-            torque_nm: output.torque_nm,
-            weakening: output.point.region != Region::Mtpa,
+            torque_nm: target.torque_nm,
+            weakening: target.region != Region::Mtpa,
             // Of the voltage that begins to act now, as the modulator really gives it, at the measured current.
             power_w: begins
                 .map_or(0.0, |mean| 1.5 * input.link_v * mean.dot(input.measured.currents_a.clarke())),

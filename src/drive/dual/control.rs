@@ -8,8 +8,8 @@ use crate::drive::acknowledge::Acknowledge;
 use crate::frames::{Angle, SQRT_3};
 use crate::machine::{Machine, Tables};
 use crate::ports::DualReport;
-use crate::ports::{DualControlPort, DualSample, HardwareBreak, MotorDemand};
-use crate::protection::{self, Disarmed, Fault, SafeState, Trip, Violation};
+use crate::ports::{ControlPort, Dual, DualSample, HardwareBreak, MotorDemand};
+use crate::protection::{self, Fault, MaskedFaults, SafeState, Trip, Violation};
 use crate::recorder::{DualRecord, DualState};
 use crate::time::Instant;
 use core::f32::consts::{FRAC_PI_4, TAU};
@@ -19,7 +19,7 @@ use core::sync::atomic::Ordering;
 const LIMIT_FILTER_HZ: f32 = 10.0;
 /// A motor has at most U_c/(2√3). The link of a two-level inverter whose six-step fundamental is as large, as a share of U_c.
 pub(super) const TWO_LEVEL_SHARE: f32 = FRAC_PI_4 / SQRT_3;
-/// What a lost sensor is called, by motor.
+/// The name of a lost sensor, by motor.
 const SENSOR_LOST: [Fault; 2] = [Fault::SensorLost1, Fault::SensorLost2];
 
 /// The ZS9's control task.
@@ -28,22 +28,24 @@ pub struct ControlTask<M = &'static Tables> {
     settings: Settings,
     axes: [Axis; 2],
     link: ZSource,
-    /// What the last period made.
+    /// The results of the last period.
     driven: Driven,
+    /// `true` if the upper motor had a new operating point in it.
+    upper_aims: bool,
     /// Capacitor voltage behind the filter, in V; `None` before the first sample.
     filtered_v: Option<f32>,
     /// Nominal instant of the next call.
     now: Instant,
-    disarmed: Disarmed,
+    disarmed: MaskedFaults,
     trip: Option<Trip>,
     acknowledge: Acknowledge,
 }
 
-/// What a control period makes of its sample.
+/// The results of a control period.
 struct Driven {
     motors: [AxisOutput; 2],
     duty: f32,
-    /// What is told of it, as in [`DualReport`].
+    /// The reference that is told of it, as in [`DualReport`].
     inductor_ref_a: f32,
 }
 
@@ -61,9 +63,10 @@ impl<M: Machine> ControlTask<M> {
             axes: [Axis::new(), Axis::new()],
             link: ZSource::new(),
             driven: Driven::NOTHING,
+            upper_aims: false,
             filtered_v: None,
             now: Instant(settings.clock.control_ticks),
-            disarmed: Disarmed::NONE,
+            disarmed: MaskedFaults::NONE,
             trip: None,
             acknowledge: Acknowledge::new(),
         }
@@ -76,7 +79,7 @@ impl<M: Machine> ControlTask<M> {
     }
 
     /// The same without a check.
-    pub const fn without(mut self, disarmed: Disarmed) -> Self {
+    pub const fn without(mut self, disarmed: MaskedFaults) -> Self {
         self.disarmed = disarmed;
         self
     }
@@ -88,9 +91,10 @@ impl<M: Machine> ControlTask<M> {
 
     /// The control timer's interrupt, at a valley of the carrier. Deadline: [`Settings::deadline_ticks`] after its nominal instant,
     /// when the command must be there; a missed one is a fault.
-    pub fn run(&mut self, port: &mut impl DualControlPort, shared: &Shared) {
+    pub fn run(&mut self, port: &mut impl ControlPort<Dual>, shared: &Shared) {
         let now = self.now;
         let deadline_ticks = self.settings.deadline_ticks();
+        port.begin(false);
         self.now = now.after(self.settings.clock.control_ticks);
         shared.began.store(now.0, Ordering::Relaxed);
         // First of all: the next peak writes it again.
@@ -146,7 +150,7 @@ impl<M: Machine> ControlTask<M> {
     /// The period as the flight recorder and whoever watches see it. Out of line: nothing of it is on the stack while the control
     /// laws are.
     #[inline(never)]
-    fn tell(&self, sample: &DualSample, gates: Gates, port: &mut impl DualControlPort, shared: &Shared) {
+    fn tell(&self, sample: &DualSample, gates: Gates, port: &mut impl ControlPort<Dual>, shared: &Shared) {
         let now = self.now.before(self.settings.clock.control_ticks);
         if let Some(recorder) = shared.recorder {
             recorder.record(self.entry(now, sample, gates), self.trip.is_some());
@@ -208,7 +212,7 @@ impl<M: Machine> ControlTask<M> {
     }
 
     /// Follows both rotors.
-    fn track(&mut self, sample: &DualSample, port: &mut impl DualControlPort) -> [Angle; 2] {
+    fn track(&mut self, sample: &DualSample, port: &mut impl ControlPort<Dual>) -> [Angle; 2] {
         let mut angles = [Angle::ZERO; 2];
         let mut violation = None;
         let motors = self.axes.iter_mut().zip(&mut angles).zip(sample.angles).zip(SENSOR_LOST);
@@ -218,7 +222,7 @@ impl<M: Machine> ControlTask<M> {
                     *angle = measured;
                     let trusted = self.disarmed.has(fault);
                     let off_rad = axis.track(measured, trusted, &self.settings);
-                    off_rad.map(|rad| (fault, rad, axis::SURPRISE_RAD))
+                    off_rad.map(|rad| (fault, rad, axis::INNOVATION_RAD))
                 }
                 None => axis.lose_angle(fault, sample.enable),
             };
@@ -228,7 +232,7 @@ impl<M: Machine> ControlTask<M> {
         angles
     }
 
-    /// What the control law takes for measurements: the link as a two-level inverter's that can give as much.
+    /// The measurements for the control law: the link as a two-level inverter's that can give as much.
     fn measured(&mut self, sample: &DualSample, [first, second]: [Angle; 2]) -> [Measurements; 2] {
         let before_v = self.filtered_v.unwrap_or(sample.capacitor_v);
         let share = TAU * LIMIT_FILTER_HZ * self.settings.clock.control_s();
@@ -247,7 +251,7 @@ impl<M: Machine> ControlTask<M> {
         &mut self,
         sample: &DualSample,
         measured: &[Measurements; 2],
-        port: &mut impl DualControlPort,
+        port: &mut impl ControlPort<Dual>,
     ) {
         let limits = &self.settings.limits;
         let armed = |(fault, _, _): &Violation| !self.disarmed.has(*fault);
@@ -264,7 +268,7 @@ impl<M: Machine> ControlTask<M> {
         self.check(violation, port);
     }
 
-    fn check_frozen(&mut self, measured: &[Measurements; 2], port: &mut impl DualControlPort) {
+    fn check_frozen(&mut self, measured: &[Measurements; 2], port: &mut impl ControlPort<Dual>) {
         let mut violation = None;
         for ((axis, measured), lost) in self.axes.iter_mut().zip(measured).zip(SENSOR_LOST) {
             let found = axis.check_frozen(measured, lost, &self.settings, self.machine.tables());
@@ -279,7 +283,7 @@ impl<M: Machine> ControlTask<M> {
         sample: &DualSample,
         measured: &[Measurements; 2],
         applied: Option<[MotorShare; 2]>,
-        port: &mut impl DualControlPort,
+        port: &mut impl ControlPort<Dual>,
     ) {
         let link_v = 2.0 * sample.capacitor_v - sample.source_v;
         let [first, second] = &mut self.axes;
@@ -287,13 +291,20 @@ impl<M: Machine> ControlTask<M> {
         let (a1, a2) = applied.map_or((None, None), |[a1, a2]| (Some(a1), Some(a2)));
         let (settings, tables) = (&self.settings, self.machine.tables());
         let [l1, l2] = sample.speed_torque_nm;
-        let step = |axis: &mut Axis, measured, demand, speed_torque_nm, applied| {
-            axis.step(&AxisInput { measured, demand, speed_torque_nm, applied, link_v }, settings, tables)
+        // The operating points in turn: the lower motor's in the periods between.
+        self.upper_aims = !self.upper_aims;
+        let turns = [self.upper_aims, !self.upper_aims];
+        let step = |axis: &mut Axis, measured, demand, speed_torque_nm, applied, aims| {
+            axis.step(
+                &AxisInput { measured, demand, speed_torque_nm, applied, link_v, aims },
+                settings,
+                tables,
+            )
         };
         let motors = &mut self.driven.motors;
         let [o1, o2] = motors;
-        *o1 = step(first, m1, d1, l1, a1);
-        *o2 = step(second, m2, d2, l2, a2);
+        *o1 = step(first, m1, d1, l1, a1, turns[0]);
+        *o2 = step(second, m2, d2, l2, a2, turns[1]);
         let link = ZSourceInput {
             capacitor_v: sample.capacitor_v,
             inductor_a: sample.inductor_a,
@@ -316,7 +327,7 @@ impl<M: Machine> ControlTask<M> {
         (self.driven.duty, self.driven.inductor_ref_a) = (duty, inductor_ref_a);
     }
 
-    fn check(&mut self, violation: Option<Violation>, port: &mut impl DualControlPort) {
+    fn check(&mut self, violation: Option<Violation>, port: &mut impl ControlPort<Dual>) {
         if let (Some(violation), None) = (violation, self.trip) {
             self.trip_on(violation, port);
         }
@@ -325,12 +336,12 @@ impl<M: Machine> ControlTask<M> {
     /// Out of line: it happens once, and there are many checks.
     #[cold]
     #[inline(never)]
-    fn trip_on(&mut self, (fault, value, limit): Violation, port: &mut impl DualControlPort) {
+    fn trip_on(&mut self, (fault, value, limit): Violation, port: &mut impl ControlPort<Dual>) {
         if self.disarmed.has(fault) {
             return;
         }
         let at = self.now.before(self.settings.clock.control_ticks);
-        port.gates_off(at);
+        port.enter(SafeState::GatesOff, at);
         self.trip = Some(Trip { fault, value, limit, at, safe: SafeState::GatesOff });
     }
 }

@@ -1,4 +1,4 @@
-//! What travels between the ZS9's interrupts, and what control reports.
+//! The messages between the ZS9's interrupts.
 
 use crate::cell::{Record, Words};
 use crate::drive::Gates;
@@ -11,17 +11,19 @@ use crate::time::Instant;
 
 /// One motor's voltage, from control to the modulator.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct MotorCommand {
     /// Peak phase voltage, in V.
     pub voltage_v: f32,
     /// Angle of the vector at the sample.
     pub angle: Angle,
-    /// How fast it turns, in angle units (2⁻³² turn) per tick.
+    /// The rate at which it turns, in angle units (2⁻³² turn) per tick.
     pub rate: f32,
 }
 
 /// From control to the modulator. Motors in the order upper, lower.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct DualCommand {
     /// Voltages.
     pub motors: [MotorCommand; 2],
@@ -31,9 +33,9 @@ pub struct DualCommand {
     pub valid_from: Instant,
     /// Shoot-through duty.
     pub duty: f32,
-    /// Where the zero vectors lie.
+    /// The place of the zero vectors.
     pub scheme: Scheme,
-    /// Whether to make pulses at all.
+    /// The order to make pulses at all.
     pub gates: Gates,
     /// Number of the last release: a new one makes the PWM interrupt forget its fault and let the gates go.
     pub release: u8,
@@ -85,6 +87,7 @@ impl Words<10> for DualCommand {
 
 /// The mean voltage that one motor has in a period, as a share of the link.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct MotorShare {
     /// Modulation depth, 2 |V|/U_in.
     pub depth: f32,
@@ -94,6 +97,7 @@ pub struct MotorShare {
 
 /// From the modulator to control: what the period gives that begins at the next valley.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct DualApplied {
     /// Instant of the interrupt, a peak of the carrier.
     pub at: Instant,

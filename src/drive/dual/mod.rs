@@ -22,7 +22,7 @@ mod control;
 mod messages;
 mod pwm;
 
-use crate::cell::{Downlink, Uplink};
+use crate::cell::{Mailbox, Seqlock};
 use crate::control::{Gains, SpeedDesign, ZSourceDesign, ZSourceGains};
 use crate::machine::Ratings;
 use crate::protection::LinkLimits;
@@ -45,8 +45,9 @@ pub const LOWEST_SHARE: f32 = 0.9;
 /// Longest dead time that the gates' hardware may insert, in s.
 const DEAD_TIME_S: f32 = 5e-6;
 
-/// What both tasks are built with.
+/// The settings of both tasks.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Settings {
     /// The timers' clock and the control period.
     pub clock: Clock,
@@ -127,8 +128,8 @@ impl Settings {
 
 /// The cells between the two interrupts, and the flight recorder, if there is one.
 pub struct Shared<'a> {
-    command: Downlink<DualCommand, 10>,
-    applied: Uplink<DualApplied, 10>,
+    command: Mailbox<DualCommand, 10>,
+    applied: Seqlock<DualApplied, 10>,
     /// Instant of the newest control interrupt, from its beginning on.
     began: AtomicU32,
     recorder: Option<&'a DualRecorder>,
@@ -138,7 +139,7 @@ impl<'a> Shared<'a> {
     /// Empty cells.
     #[cfg(not(loom))]
     pub const fn new() -> Self {
-        Self { command: Downlink::new(), applied: Uplink::new(), began: AtomicU32::new(0), recorder: None }
+        Self { command: Mailbox::new(), applied: Seqlock::new(), began: AtomicU32::new(0), recorder: None }
     }
 
     /// The same with a flight recorder, which the control interrupt fills.

@@ -6,12 +6,12 @@ use crate::drive::traction::stale;
 use crate::frames::{Angle, limit};
 use crate::machine::{Machine, Tables};
 use crate::nine_switch::{self, GateTicks, MotorVoltage, Period, Refused, Request};
-use crate::ports::{DualPwmPort, GateFeedback, PlayedPeriod, PowerSample};
-use crate::protection::{self, Disarmed, Fault, SafeState, Trip, Violation};
+use crate::ports::{Dual, GateFeedback, PlayedPeriod, PowerSample, PwmPort};
+use crate::protection::{self, Fault, MaskedFaults, SafeState, Trip, Violation};
 use crate::time::Instant;
 use core::sync::atomic::Ordering;
 
-/// How far the link is believed to move in a carrier period, in V; more is an error of the measurement.
+/// The largest move of the link in a carrier period that is believed, in V; more is an error of the measurement.
 const MOST_MOVED_V: f32 = 10.0;
 /// Least link voltage that is divided by, in V.
 const LEAST_LINK_V: f32 = 50.0;
@@ -24,9 +24,9 @@ pub struct PwmTask<M = &'static Tables> {
     now: Instant,
     /// The period that begins at the next valley; made where it stays.
     next: PlayedPeriod,
-    /// What the gates should have shown in the period that was played before, and in the one that is played.
+    /// The states that the gates should have shown in the period that was played before, and in the one that is played.
     expected: [Expected; 2],
-    disarmed: Disarmed,
+    disarmed: MaskedFaults,
     trip: Option<Trip>,
     /// Link voltage at the last peak, in V.
     last_link_v: Option<f32>,
@@ -43,7 +43,7 @@ impl<M: Machine> PwmTask<M> {
             now: Instant(settings.first_peak_ticks()),
             next: PlayedPeriod::off(settings.half_steps()),
             expected: [Expected::OFF; 2],
-            disarmed: Disarmed::NONE,
+            disarmed: MaskedFaults::NONE,
             trip: None,
             last_link_v: None,
             released: 0,
@@ -57,7 +57,7 @@ impl<M: Machine> PwmTask<M> {
     }
 
     /// The same without a check.
-    pub const fn without(mut self, disarmed: Disarmed) -> Self {
+    pub const fn without(mut self, disarmed: MaskedFaults) -> Self {
         self.disarmed = disarmed;
         self
     }
@@ -68,8 +68,19 @@ impl<M: Machine> PwmTask<M> {
         self.now = Instant(self.settings.first_peak_ticks());
     }
 
-    /// The PWM timer's interrupt, at the carrier's peak. Deadline: the next valley, where the shadow registers take over.
-    pub fn run(&mut self, port: &mut impl DualPwmPort, shared: &Shared) {
+    /// The PWM timer's interrupt, at the carrier's peak. Deadline: the next valley, where the shadow registers take over. Says whether it
+    /// came for a peak.
+    pub fn run(&mut self, port: &mut impl PwmPort<Dual>, shared: &Shared) -> bool {
+        let peak = port.begin();
+        if peak {
+            self.pass(port, shared);
+        }
+        peak
+    }
+
+    /// A peak.
+    #[inline(always)]
+    fn pass(&mut self, port: &mut impl PwmPort<Dual>, shared: &Shared) {
         let now = self.now;
         self.now = now.after(self.settings.carrier_ticks);
         let sample = port.sample(now);
@@ -178,7 +189,7 @@ impl<M: Machine> PwmTask<M> {
     /// Forgets the fault and lets the gates go, once for each release that control asks for.
     #[cold]
     #[inline(never)]
-    fn release(&mut self, port: &mut impl DualPwmPort) {
+    fn release(&mut self, port: &mut impl PwmPort<Dual>) {
         self.trip = None;
         let at = self.now.before(self.settings.carrier_ticks);
         if !port.leave(at) {
@@ -186,7 +197,7 @@ impl<M: Machine> PwmTask<M> {
         }
     }
 
-    fn check(&mut self, violation: Option<Violation>, port: &mut impl DualPwmPort) {
+    fn check(&mut self, violation: Option<Violation>, port: &mut impl PwmPort<Dual>) {
         let (Some((fault, value, limit)), None) = (violation, self.trip) else {
             return;
         };
@@ -194,7 +205,7 @@ impl<M: Machine> PwmTask<M> {
             return;
         }
         let at = self.now.before(self.settings.carrier_ticks);
-        port.gates_off(at);
+        port.enter(SafeState::GatesOff, at);
         self.trip = Some(Trip { fault, value, limit, at, safe: SafeState::GatesOff });
     }
 }
@@ -214,7 +225,7 @@ fn link_v(sample: &PowerSample) -> f32 {
 /// A bit for each of the nine gates.
 const ALL_GATES: u16 = 0x1FF;
 
-/// What the gates show in a period, a bit each in the order of [`crate::nine_switch::GATES`].
+/// The states of the gates in a period, a bit each in the order of [`crate::nine_switch::GATES`].
 #[derive(Clone, Copy, Debug)]
 struct Expected {
     /// On for longer than a dead time; a gate that is to be on for less may stay off.

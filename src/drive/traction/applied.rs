@@ -1,12 +1,13 @@
-//! What the modulator does, as the control interrupt sees it.
+//! The modulator's work, as the control interrupt sees it.
 
 use super::Settings;
-use super::glide::Glide;
-use crate::cell::{Record, SEEN};
-use crate::control::{Boundary, Committed, Earlier, Follows, Ripple};
+use super::six_step_exit::SixStepExit;
+use super::slot::Decision;
+use crate::cell::{History, Record, SEEN};
+use crate::control::{Boundary, Committed, ModeLimits, Regulated, Ripple};
 use crate::drive::messages::{COMMITTAL_WORDS, CommittalRecord, HalfKind};
 use crate::frames::{Abc, AlphaBeta, Angle};
-use crate::modulation::{Mode, Regulation, RippleFlux, depth_limit, first_half, ripple_share};
+use crate::modulation::{Mode, Reference, Regulation, RippleFlux, depth_limit, first_half, ripple_share};
 use crate::protection::{Fault, Violation};
 use crate::time::{Clock, Instant};
 
@@ -16,81 +17,63 @@ const PWM_LATE_PART: u32 = 4;
 /// Share of a mode's largest fundamental that the operating point may use where the voltage must also regulate.
 const REGULATION_ROOM: f32 = 0.999;
 
-/// What control makes of the modulator's records: the newest boundary and what is committed from there on. Of the voltages only
-/// the ticks for which they act.
+/// The newest boundary, and what is committed from there on, as it stood at a control interrupt.
+#[derive(Clone, Copy)]
 pub(super) struct Applied {
-    /// The newest boundary, and the one before it.
+    /// The newest boundary.
     pub at: Instant,
-    pub before: Instant,
-    /// Phase currents at the newest one, in A.
-    pub currents_a: Abc,
-    /// What the half gave that ended there; `None` while the gates were off.
-    pub passed: Option<AlphaBeta>,
-    /// What the running half gives from now on; `None` if the gates are off in it or in the next one.
-    pub running: Option<AlphaBeta>,
-    /// Mode of the running half.
+    /// The boundary after it, where the half begins that was committed last; that half's length, in ticks, and its kind.
+    pub begins: Instant,
+    pub period_ticks: u32,
+    pub kind: HalfKind,
+    /// Mode of the half that runs until then.
     pub mode: Mode,
-    pub next: Next,
     /// Number of the release that the PWM interrupt had carried out.
     pub released: u8,
 }
 
-/// The half after the running one.
-pub(super) struct Next {
-    pub begins: Instant,
-    pub period_ticks: u32,
-    pub volt_ticks: AlphaBeta,
-    pub kind: HalfKind,
+/// The records as they stood at `now`, even if the PWM interrupt has come since, as it does twice in a control period where a carrier lasts
+/// one: that of the newest boundary, and those before it.
+#[inline(always)]
+fn stood(records: [Record<COMMITTAL_WORDS>; SEEN], now: Instant) -> Option<[CommittalRecord; SEEN - 2]> {
+    let [newest, one, two, three, four, five] = records.map(CommittalRecord);
+    if now.reached(newest.at()) {
+        return Some([newest, one, two, three]);
+    }
+    // A half that was written has a length.
+    let stands = |record: &CommittalRecord| record.period_ticks() > 0 && now.reached(record.at());
+    if stands(&one) {
+        return Some([one, two, three, four]);
+    }
+    stands(&two).then_some([two, three, four, five])
 }
 
 impl Applied {
-    /// Mode of the half that this period's command is made for.
-    pub(super) fn decided(&self) -> Mode {
-        self.next.kind.next_mode()
+    /// As it stood at `now`; `None` before the modulator has told anything.
+    #[inline]
+    pub(super) fn read(trail: &History<COMMITTAL_WORDS>, now: Instant) -> Option<Self> {
+        let look = |records: [Record<COMMITTAL_WORDS>; SEEN]| {
+            stood(records, now).map(|[newest, one, ..]| Self {
+                at: newest.at(),
+                begins: newest.begins(),
+                period_ticks: newest.period_ticks(),
+                kind: newest.kind(),
+                mode: one.kind().mode(),
+                released: newest.released(),
+            })
+        };
+        trail.read(look).flatten()
     }
 
     /// The PWM interrupt that should have come by `now` and has not: since when, in s.
     pub(super) fn overdue(&self, now: Instant, clock: &Clock) -> Option<Violation> {
-        let late = now.since(self.next.begins);
+        let late = now.since(self.begins);
         let limit = (clock.control_ticks / PWM_LATE_PART) as i32;
         (late > limit).then(|| (Fault::PwmDeadline, clock.seconds(late), clock.seconds(limit)))
     }
-
-    /// As it stood at `now`, even if the PWM interrupt has come since.
-    #[inline]
-    pub(super) fn seen(records: [Record<COMMITTAL_WORDS>; SEEN], now: Instant) -> Option<Self> {
-        let [newest, one, two, three] = records.map(CommittalRecord);
-        if now.reached(newest.at()) {
-            return Some(Self::of([newest, one, two], now));
-        }
-        // A half that was written has a length.
-        (one.period_ticks() > 0 && now.reached(one.at())).then(|| Self::of([one, two, three], now))
-    }
-
-    #[inline]
-    fn of([newest, one, two]: [CommittalRecord; 3], now: Instant) -> Self {
-        let (at, kind) = (newest.at(), newest.kind());
-        let (begins, period_ticks, volt_ticks) =
-            (newest.begins(), newest.period_ticks(), newest.volt_ticks());
-        let next = Next { begins, period_ticks, volt_ticks, kind };
-        let mode = one.kind().mode();
-        let off = one.kind().is_off() || kind.is_off();
-        let running = (!off).then(|| one.volt_ticks_from(now.since(at).max(0) as u32));
-        let passed = (!two.kind().is_off()).then(|| two.volt_ticks());
-        Self {
-            at,
-            before: one.at(),
-            currents_a: newest.currents_a(),
-            passed,
-            running,
-            mode,
-            next,
-            released: newest.released(),
-        }
-    }
 }
 
-/// What the voltage is made for, at the instant of a control interrupt.
+/// The voltage at the instant of a control interrupt, with what it is made for.
 pub(super) struct Steady {
     /// Electrical angular speed, in rad/s.
     pub omega: f32,
@@ -102,84 +85,142 @@ pub(super) struct Steady {
     pub depth: f32,
 }
 
-/// What is committed before the modulator has told anything: nothing.
-pub(super) fn nothing_committed(settings: &Settings) -> Committed {
-    let Settings { clock, devices, .. } = settings;
-    Committed {
-        horizon_s: 0.0,
-        volt_seconds: None,
-        ripple: None,
-        interval_s: clock.seconds(devices.shortest_half_ticks as i32),
-        follows: Follows::Mean,
-        depth_limit: depth_limit(Mode::Async, 0.0, devices),
-        steady_share: 1.0,
-        filled: false,
-        ripple_share: ripple_share(Mode::Async, 0.0),
-        settled: true,
-    }
+/// A boundary's own sample, and what the halves gave since the one before that was used.
+pub(super) struct Passed {
+    /// Phase currents, in A.
+    pub currents_a: Abc,
+    /// Time since then, in s.
+    pub age_s: f32,
+    pub boundary: Boundary,
 }
 
-impl Applied {
-    /// What the modulator will do from `now` until a command of this period can act, which is for the mode `decided`; with `revises`
-    /// only the running half stands.
-    pub(super) fn committed(
-        &self,
-        now: Instant,
-        steady: &Steady,
-        glide: &mut Glide,
-        settings: &Settings,
-        decided: Mode,
-        revises: bool,
-    ) -> Committed {
-        let Settings { clock, devices, .. } = settings;
-        let next = &self.next;
-        let largest = depth_limit(decided, clock.angle_rate(steady.omega), devices);
-        let largest = if decided.is_whole() { largest } else { REGULATION_ROOM * largest };
-        let (depth_limit, filled) = glide.fill(decided, largest, steady.depth, clock.control_s());
-        let running = next.begins.since(now).max(0) as u32;
-        let left = running + if revises { 0 } else { next.period_ticks };
-        let volt_ticks = self.running.map(|ticks| if revises { ticks } else { ticks + next.volt_ticks });
-        let interval_s = match decided.carriers() {
-            0 => clock.seconds(devices.shortest_half_ticks as i32),
-            carriers => core::f32::consts::PI / (carriers as f32 * steady.omega.abs()),
-        };
-        let follows = match decided.regulation() {
-            Regulation::Mean => Follows::Mean,
-            Regulation::Fundamental => Follows::Fundamental,
-            Regulation::Angle => Follows::Angle,
-        };
-        Committed {
-            horizon_s: clock.seconds(left as i32),
-            volt_seconds: volt_ticks.map(|ticks| ticks * (steady.udc_v * clock.tick_s)),
-            ripple: next.kind.ripple(decided, steady),
-            interval_s,
-            follows,
-            depth_limit,
-            steady_share: 1.0,
-            filled,
-            ripple_share: ripple_share(decided, steady.depth),
-            settled: true,
-        }
-    }
-
-    /// The newest boundary, unless it is the one that was `used` last.
-    pub(super) fn boundary(
-        &self,
+impl Passed {
+    /// The newest boundary at `now`. The half that ended there counts where its beginning was the boundary that was `used` last, and two
+    /// of them where that was the one before.
+    #[inline(always)]
+    pub(super) fn read(
+        trail: &History<COMMITTAL_WORDS>,
         used: Option<Instant>,
         now: Instant,
         udc_v: f32,
         clock: &Clock,
-    ) -> Option<Boundary> {
-        if used == Some(self.at) {
-            return None;
-        }
-        let passed = if used == Some(self.before) { self.passed } else { None };
-        Some(Boundary {
-            earlier: Some(Earlier { currents_a: self.currents_a, age_s: clock.seconds(now.since(self.at)) }),
-            volt_seconds: passed.map(|ticks| ticks * (udc_v * clock.tick_s)),
-            length_s: clock.seconds(self.at.since(self.before)),
-        })
+    ) -> Option<Self> {
+        let look = |records: [Record<COMMITTAL_WORDS>; SEEN]| {
+            stood(records, now).map(|[newest, one, two, three]| {
+                let at = newest.at();
+                let both = used == Some(two.at());
+                let before = if both { two.at() } else { one.at() };
+                let known = used == Some(before) && !two.kind().is_off() && !(both && three.kind().is_off());
+                let volt_ticks =
+                    || if both { two.volt_ticks() + three.volt_ticks() } else { two.volt_ticks() };
+                Self {
+                    currents_a: newest.currents_a(),
+                    age_s: clock.seconds(now.since(at)),
+                    boundary: Boundary {
+                        volt_seconds: known.then(|| volt_ticks() * (udc_v * clock.tick_s)),
+                        length_s: clock.seconds(at.since(before)),
+                    },
+                }
+            })
+        };
+        trail.read(look).flatten()
     }
+}
+
+/// The quantities that control may regulate in a mode.
+pub(super) const fn follows(mode: Mode) -> Regulated {
+    match mode.regulation() {
+        Regulation::Mean => Regulated::Mean,
+        Regulation::Fundamental => Regulated::Fundamental,
+        Regulation::Angle => Regulated::Angle,
+    }
+}
+
+/// Before the first operating point.
+pub(super) const NO_LIMITS: ModeLimits = ModeLimits {
+    follows: Regulated::Mean,
+    depth_limit: 0.0,
+    steady_share: 1.0,
+    filled: false,
+    ripple_share: 1.0,
+    settled: true,
+};
+
+/// The limits that a decided mode sets to control, so long after the last operating point, in s.
+pub(super) fn limits(
+    decision: &Decision,
+    steady: &Steady,
+    exit: &mut SixStepExit,
+    settings: &Settings,
+    passed_s: f32,
+) -> ModeLimits {
+    let Settings { clock, devices, .. } = settings;
+    let mode = decision.mode;
+    let largest = depth_limit(mode, clock.angle_rate(steady.omega), devices);
+    let largest = if mode.is_whole() { largest } else { REGULATION_ROOM * largest };
+    let (depth_limit, filled) = exit.fill(mode, largest, steady.depth, passed_s);
+    ModeLimits {
+        follows: follows(mode),
+        depth_limit,
+        steady_share: 1.0,
+        filled,
+        ripple_share: ripple_share(mode, steady.depth),
+        settled: exit.is_settled(decision),
+    }
+}
+
+/// The half that a command is made for.
+pub(super) struct Wanted<'a> {
+    /// Mode of the half where it begins to act.
+    pub mode: Mode,
+    /// `true` if it is for the half that is already committed: only the running one stands.
+    pub revises: bool,
+    /// Halves between the committed one and that half, as in [`Slot::between`](super::slot::Slot::between), and the command that they
+    /// are made from.
+    pub between: u32,
+    pub before: &'a Reference,
+}
+
+/// The modulator's pulses from `now` until a command of this period can act.
+#[inline(always)]
+pub(super) fn committed(
+    trail: &History<COMMITTAL_WORDS>,
+    now: Instant,
+    steady: &Steady,
+    settings: &Settings,
+    wanted: &Wanted,
+) -> Committed {
+    let Wanted { mode: decided, revises, between, before } = *wanted;
+    let Settings { clock, devices, .. } = settings;
+    let shortest_s = clock.seconds(devices.shortest_half_ticks as i32);
+    let interval_s = match decided.carriers() {
+        // A command acts for a control period at least.
+        0 if shortest_s < clock.control_s => clock.control_s,
+        0 => shortest_s,
+        carriers => core::f32::consts::PI / (carriers as f32 * steady.omega.abs()),
+    };
+    let look = |records: [Record<COMMITTAL_WORDS>; SEEN]| {
+        stood(records, now).map(|[newest, one, ..]| {
+            let (at, kind) = (newest.at(), newest.kind());
+            let off = one.kind().is_off() || kind.is_off();
+            let running = || one.volt_ticks_from(now.since(at).max(0) as u32);
+            let volt_ticks =
+                (!off).then(|| if revises { running() } else { running() + newest.volt_ticks() });
+            let left =
+                newest.begins().since(now).max(0) as u32 + if revises { 0 } else { newest.period_ticks() };
+            let volt_seconds = volt_ticks.map(|ticks| ticks * (steady.udc_v * clock.tick_s));
+            let gap = between * newest.period_ticks();
+            let made = || before.vector_at(now.after(left + gap / 2)) * clock.seconds(gap as i32);
+            Committed {
+                horizon_s: clock.seconds((left + gap) as i32),
+                volt_seconds: if gap == 0 { volt_seconds } else { volt_seconds.map(|known| known + made()) },
+                ripple: kind.ripple(decided, steady),
+                interval_s,
+            }
+        })
+    };
+    let nothing = Committed { horizon_s: 0.0, volt_seconds: None, ripple: None, interval_s };
+    trail.read(look).flatten().unwrap_or(nothing)
 }
 
 impl HalfKind {
@@ -208,7 +249,29 @@ impl HalfKind {
     }
 }
 
-/// What half number `half` of a mode is in the mode that follows.
+/// The number of half `half` of a mode in the mode that follows.
 fn number(from: Mode, to: Mode, half: u32) -> u32 {
     if from == to { half } else { first_half(from, to, half, Angle::ZERO) }
+}
+
+#[cfg(all(test, not(loom)))]
+mod tests {
+    use super::*;
+    use crate::drive::messages::Committal;
+
+    #[test]
+    fn what_stood_at_an_instant_stands_whatever_the_pwm_interrupt_has_told_since() {
+        const HALF_TICKS: u32 = 625;
+        let history = History::new();
+        let now = Instant(10 * HALF_TICKS + 1);
+        for boundary in 0..=12 {
+            history.publish(Committal::at_rest(Instant(boundary * HALF_TICKS), HALF_TICKS).to_words());
+            let newest = boundary.min(10) * HALF_TICKS;
+            assert_eq!(
+                Applied::read(&history, now).map(|applied| applied.at),
+                Some(Instant(newest)),
+                "{boundary}"
+            );
+        }
+    }
 }

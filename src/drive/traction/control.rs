@@ -1,17 +1,18 @@
 //! The control interrupt's task.
 
-use super::applied::{Applied, Steady, nothing_committed};
-use super::glide::Glide;
+use super::applied::{Applied, NO_LIMITS, Passed, Steady, Wanted, committed, follows, limits};
+use super::six_step_exit::SixStepExit;
+use super::slot::{Decision, Slot};
 use super::{Settings, Shared};
-use crate::control::{Boundary, Committed, Controller, Demand, Input, Law, Measurements};
+use crate::control::{AimInput, Controller, Demand, Law, Measurements, ModeLimits, RotorSample};
 use crate::drive::acknowledge::Acknowledge;
 use crate::drive::messages::{Gates, VoltageCommand};
-use crate::frames::{AlphaBeta, Angle, Dq};
+use crate::frames::Angle;
 use crate::machine::{Machine, Tables};
 use crate::modulation::{Mode, Reference};
 use crate::ports::Report;
 use crate::ports::{ControlPort, Sample};
-use crate::protection::{self, Disarmed, Fault, FrozenWatch, Trip, Violation};
+use crate::protection::{self, Fault, FrozenWatch, MaskedFaults, Trip, Violation};
 use crate::recorder::{Record, State};
 use crate::time::Instant;
 use core::sync::atomic::Ordering;
@@ -33,38 +34,27 @@ pub struct ControlTask<M = &'static Tables> {
     now: Instant,
     /// Instant of the newest carrier boundary that was used.
     boundary: Option<Instant>,
-    /// The fundamental of the last operating point, in V.
+    /// The boundary that the operating point was made for, `None` where none holds, and what the mode decided there allows.
+    aimed: Option<Decision>,
+    limits: ModeLimits,
+    /// The fundamental of the last command's operating point, in V.
     steady_v: f32,
     /// Fundamental that the last operating point would have without a limit and without the trim, as a share of six-step.
     depth: f32,
-    glide: Glide,
+    exit: SixStepExit,
     /// The last demand, in N·m, and whether it has jumped and no half has been revised for it yet.
     demand_nm: f32,
     jumped: bool,
-    /// Whether the newest command is for the half that is already committed.
+    /// The newest command, and whether it is for the half that is already committed.
+    reference: Reference,
     revises: bool,
-    disarmed: Disarmed,
+    /// Mode that it was made for.
+    mode: Mode,
+    disarmed: MaskedFaults,
     trip: Option<Trip>,
     acknowledge: Acknowledge,
     /// Electrical speed at which the angle was lost, in rad/s, until that is acknowledged.
     lost_at: Option<f32>,
-}
-
-/// What a period's control law makes; nothing while no pulses are made.
-#[derive(Clone, Copy, Default)]
-struct Driven {
-    /// The command, as in [`Reference`].
-    voltage_v: f32,
-    vector: AlphaBeta,
-    carrier_angle: Angle,
-    depth: f32,
-    /// Whether it is for the half that is already committed.
-    revises: bool,
-    /// What is told of it, as in [`Report`].
-    torque_nm: f32,
-    current: Dq,
-    map_error: f32,
-    mode: Mode,
 }
 
 impl<M: Machine> ControlTask<M> {
@@ -77,49 +67,55 @@ impl<M: Machine> ControlTask<M> {
             watch: FrozenWatch::new(),
             now: first,
             boundary: None,
+            aimed: None,
+            limits: NO_LIMITS,
             steady_v: 0.0,
             depth: 0.0,
-            glide: Glide::new(),
+            exit: SixStepExit::new(),
             demand_nm: 0.0,
             jumped: false,
+            reference: Reference::NONE,
             revises: false,
-            disarmed: Disarmed::NONE,
+            mode: Mode::Off,
+            disarmed: MaskedFaults::NONE,
             trip: None,
             acknowledge: Acknowledge::new(),
             lost_at: None,
         }
     }
 
-    /// Whether [`PwmTask::revise`](super::PwmTask::revise) is to run before the next [`ControlTask::run`], at the same
+    /// `true` if [`PwmTask::revise`](super::PwmTask::revise) is to run before the next [`ControlTask::run`], at the same
     /// instant: first thing in the interrupt, the handler makes the PWM interrupt pending.
     pub fn wants_revision(&self) -> bool {
         self.revises
     }
 
     /// The same without a check.
-    pub const fn without(mut self, disarmed: Disarmed) -> Self {
+    pub const fn without(mut self, disarmed: MaskedFaults) -> Self {
         self.disarmed = disarmed;
         self
     }
 
-    /// Other settings than those it was built with, before the first call.
-    pub fn set_up(&mut self, settings: Settings) {
-        self.settings = settings;
+    /// Other settings than those it was built with, before the first call, which is at `first`.
+    pub fn set_up(&mut self, settings: Settings, first: Instant) {
+        (self.settings, self.now) = (settings, first);
     }
 
     /// The control timer's interrupt. Deadline: one control period after its nominal instant; a missed one is a fault.
     pub fn run(&mut self, port: &mut impl ControlPort, shared: &Shared) {
         let now = self.now;
-        self.now = now.after(self.settings.clock.control_ticks);
+        let control_ticks = self.settings.clock.control_ticks;
+        port.begin(self.revises);
+        self.now = now.after(control_ticks);
         shared.began.store(now.0, Ordering::Relaxed);
         let sample = port.sample(now);
         let measured = sample.measured();
-        let applied = shared.applied.read(|records| Applied::seen(records, now)).flatten();
-        let released = applied.as_ref().map(|applied| applied.released);
+        let applied = Applied::read(&shared.applied, now);
+        let released = applied.map(|applied| applied.released);
         if self.acknowledge.step(sample.acknowledge, self.trip.is_some(), released) {
             (self.trip, self.lost_at) = (None, None);
         }
-        if self.trip.is_none() && applied.as_ref().is_some_and(|applied| applied.next.kind.is_tripped()) {
+        if self.trip.is_none() && applied.is_some_and(|applied| applied.kind.is_tripped()) {
             self.trip = shared.trip.read();
         }
         if let Some(fault) = sample.hardware {
@@ -128,7 +124,7 @@ impl<M: Machine> ControlTask<M> {
             self.check(Some((fault, 1.0, 0.0)), &sample, port);
         }
         self.check_legs(&sample, port);
-        let overdue = applied.as_ref().and_then(|applied| applied.overdue(now, &self.settings.clock));
+        let overdue = applied.and_then(|applied| applied.overdue(now, &self.settings.clock));
         let (omega, lost) = self.track(&sample);
         let violation = self
             .armed(overdue)
@@ -136,8 +132,9 @@ impl<M: Machine> ControlTask<M> {
             .or_else(|| self.judge(&sample, &measured, omega));
         self.check(violation, &sample, port);
         let pulsing =
-            self.trip.is_none() && sample.enable && self.controller.speed_is_known() && !self.glide.crosses();
-        let driven = if pulsing {
+            self.trip.is_none() && sample.enable && self.controller.speed_is_known() && !self.exit.crosses();
+        let slot = Slot::of(applied.as_ref(), now, &self.settings.clock);
+        if pulsing {
             let frozen = self.watch.check(
                 &measured,
                 omega,
@@ -145,66 +142,69 @@ impl<M: Machine> ControlTask<M> {
                 &self.machine.tables().ratings,
             );
             self.check(frozen, &sample, port);
-            self.pulse(&sample, &measured, applied.as_ref(), omega)
+            self.pulse(&sample, &measured, applied.as_ref(), &slot, shared);
         } else {
-            self.rest(measured.angle)
-        };
-        let rate = self.settings.clock.angle_rate(omega);
+            self.rest(now, omega, &sample);
+        }
         // Not finite if either is not.
-        let finite = (driven.voltage_v + rate).is_finite();
-        self.check((!finite).then_some((Fault::NotFinite, driven.voltage_v, f32::MAX)), &sample, port);
-        let late = port.overrun_ticks(now);
+        let odd = self.reference.voltage_v + omega;
+        self.check((!odd.is_finite()).then_some((Fault::NotFinite, odd, f32::MAX)), &sample, port);
+        let late = port.overrun_ticks(now, control_ticks);
         let late_s = self.settings.clock.seconds(late as i32);
         self.check((late > 0).then_some((Fault::ControlDeadline, late_s, 0.0)), &sample, port);
         let gates = if pulsing && self.trip.is_none() { Gates::Pulse } else { Gates::Off };
-        self.revises = driven.revises && gates == Gates::Pulse;
-        shared.command.publish(VoltageCommand {
-            reference: Reference {
-                voltage_v: driven.voltage_v,
-                vector: driven.vector,
-                carrier_angle: driven.carrier_angle,
-                rate,
-                at: now,
-                udc_v: sample.udc_v,
-                depth: driven.depth,
-            },
-            valid_from: self.now,
-            gates,
-            revises: driven.revises,
-            release: self.acknowledge.release(),
-        });
+        self.revises &= gates == Gates::Pulse;
+        if slot.commands || self.revises {
+            shared.command.publish(VoltageCommand {
+                reference: self.reference,
+                valid_from: self.now,
+                gates,
+                revises: self.revises,
+                release: self.acknowledge.release(),
+            });
+        }
+        let target = self.controller.target();
         let report = Report {
-            torque_nm: driven.torque_nm,
-            id_a: driven.current.d,
-            iq_a: driven.current.q,
-            voltage_v: driven.voltage_v,
+            torque_nm: target.torque_nm,
+            id_a: target.current.d,
+            iq_a: target.current.q,
+            voltage_v: self.reference.voltage_v,
             frequency_hz: self.controller.omega() / core::f32::consts::TAU,
-            map_error: driven.map_error,
+            map_error: self.controller.map_error(),
             trip: self.trip,
             udc_v: sample.udc_v,
             current_a: sample.currents_a.peak(),
             speed_known: self.controller.speed_is_known(),
             acknowledged: self.acknowledge.answered(),
-            mode: driven.mode,
+            mode: self.mode,
         };
         if let Some(recorder) = shared.recorder {
-            let mode = applied.as_ref().map_or(Mode::Off, |applied| applied.mode);
+            let mode = applied.map_or(Mode::Off, |applied| applied.mode);
             recorder.record(self.entry(now, &sample, &report, mode, gates), self.trip.is_some());
         }
         port.report(now, &report);
     }
 
     /// No pulses: the control law begins anew.
-    fn rest(&mut self, angle: Angle) -> Driven {
+    fn rest(&mut self, now: Instant, omega: f32, sample: &Sample) {
         self.controller.idle();
-        if self.glide.crosses() {
+        if self.exit.crosses() {
             self.controller.begin_without_torque();
         }
         self.watch = FrozenWatch::new();
         self.boundary = None;
+        self.aimed = None;
         self.steady_v = 0.0;
-        self.glide.rest(self.settings.clock.control_s());
-        Driven { carrier_angle: angle, ..Driven::default() }
+        self.revises = false;
+        self.mode = Mode::Off;
+        self.exit.rest(self.settings.clock.control_s());
+        self.reference = Reference {
+            carrier_angle: sample.angle.unwrap_or(Angle::ZERO),
+            rate: self.settings.clock.angle_rate(omega),
+            at: now,
+            udc_v: sample.udc_v,
+            ..Reference::NONE
+        };
     }
 
     /// The period's entry in the flight recorder.
@@ -244,7 +244,7 @@ impl<M: Machine> ControlTask<M> {
         let clock = self.settings.clock;
         let lost = match sample.angle {
             Some(angle) if self.controller.speed_is_known() => {
-                protection::check_angle(self.controller.surprise_rad(angle, &clock))
+                protection::check_angle(self.controller.innovation_rad(angle, &clock))
             }
             Some(_) => None,
             None => protection::check_known(sample.enable || self.controller.is_following()),
@@ -263,7 +263,7 @@ impl<M: Machine> ControlTask<M> {
         (self.lost_at.unwrap_or(self.controller.omega()), lost)
     }
 
-    /// What is wrong with a sample by itself.
+    /// The fault of a sample by itself.
     fn judge(&self, sample: &Sample, measured: &Measurements, omega: f32) -> Option<Violation> {
         let ratings = &self.machine.tables().ratings;
         let empty =
@@ -278,76 +278,107 @@ impl<M: Machine> ControlTask<M> {
         violation.filter(|(fault, _, _)| !self.disarmed.has(*fault))
     }
 
-    /// Control law and its surroundings, while pulses are made.
+    /// The control law's stages that this period is for, while pulses are made.
     #[inline(always)]
     fn pulse(
         &mut self,
         sample: &Sample,
         measured: &Measurements,
         applied: Option<&Applied>,
-        omega: f32,
-    ) -> Driven {
+        slot: &Slot,
+        shared: &Shared,
+    ) {
+        let tables = self.machine.tables();
         let now = self.now.before(self.settings.clock.control_ticks);
-        let revises = applied.is_some_and(|applied| self.is_to_revise(applied, now, &sample.demand));
-        let udc_v = sample.udc_v;
-        let steady = Steady { omega, udc_v, voltage_v: self.steady_v, depth: self.depth };
-        let decided = applied.map_or(Mode::Off, Applied::decided);
-        let committed = match applied {
-            Some(applied) => {
-                applied.committed(now, &steady, &mut self.glide, &self.settings, decided, revises)
-            }
-            None => nothing_committed(&self.settings),
-        };
-        let boundary = self.new_boundary(applied, now, udc_v);
-        let settled = self.glide.is_settled(decided, boundary.is_some());
-        let committed = Committed { settled, ..committed };
-        let ratings = &self.machine.tables().ratings;
-        let emf_v = omega.abs() * ratings.magnet_flux_wb * self.controller.map_scale();
-        let torque_nm = self.glide.one_sided(sample.demand.torque_nm, emf_v, udc_v, ratings);
-        let demand = Demand { torque_nm, ..sample.demand };
-        let input = Input {
-            measured,
-            demand: &demand,
-            window: Some(&sample.window),
-            committed: &committed,
-            boundary: boundary.as_ref(),
-        };
-        let Settings { gains, clock, .. } = &self.settings;
-        let output = self.controller.step(&input, &Law { gains, clock, tables: self.machine.tables() });
-        self.steady_v = output.voltage.steady_v;
-        self.depth = output.voltage.depth;
-        self.watch.command(output.voltage.vector);
-        self.glide.drove(output.torque_nm);
-        Driven {
-            voltage_v: output.voltage.voltage_v,
-            vector: output.voltage.vector,
-            carrier_angle: output.voltage.carrier.angle(),
-            depth: output.voltage.depth,
-            torque_nm: output.torque_nm,
-            current: output.point.current,
-            map_error: output.map_error,
-            mode: decided,
-            revises,
+        let here = RotorSample::new(measured.currents_a, measured.angle, tables);
+        self.controller.observe(&here, tables);
+        self.revises = self.is_to_revise(applied, now, &sample.demand);
+        let commands = slot.commands || self.revises;
+        let aims = slot.aims || (commands && self.aimed != Some(slot.key));
+        if let Some(applied) = applied
+            && self.boundary != Some(applied.at)
+            && (aims || !commands)
+        {
+            self.learn(sample, measured.angle, slot.key.mode, now, shared);
+            self.boundary = Some(applied.at);
+        }
+        if aims {
+            self.aim(sample, slot);
+        }
+        if commands {
+            self.command(sample, &here, slot, shared);
         }
     }
 
-    /// The newest boundary, once.
-    fn new_boundary(&mut self, applied: Option<&Applied>, now: Instant, udc_v: f32) -> Option<Boundary> {
-        let applied = applied?;
-        let boundary = applied.boundary(self.boundary, now, udc_v, &self.settings.clock);
-        self.boundary = Some(applied.at);
-        boundary
+    /// Learns from the newest boundary.
+    fn learn(&mut self, sample: &Sample, angle: Angle, decided: Mode, now: Instant, shared: &Shared) {
+        let Settings { gains, clock, .. } = &self.settings;
+        let tables = self.machine.tables();
+        let passed = Passed::read(&shared.applied, self.boundary, now, sample.udc_v, clock);
+        if let Some(Passed { currents_a, age_s, boundary }) = passed {
+            let angle = angle - Angle::within_half_turn(self.controller.omega() * age_s);
+            let there = RotorSample::new(currents_a, angle, tables);
+            self.controller.learn(&boundary, &there, follows(decided), &Law { gains, clock, tables });
+        }
     }
 
-    /// Whether the demand has jumped and the next half can still be changed: the running one lasts long enough, and the next one is
-    /// of the free carrier, whose length is always the same.
-    fn is_to_revise(&mut self, applied: &Applied, now: Instant, demand: &Demand) -> bool {
+    /// The operating point of the command that a boundary will use.
+    fn aim(&mut self, sample: &Sample, slot: &Slot) {
+        let Settings { gains, clock, .. } = &self.settings;
+        let (omega, udc_v) = (self.controller.omega(), sample.udc_v);
+        let tables = self.machine.tables();
+        let steady = Steady { omega, udc_v, voltage_v: self.steady_v, depth: self.depth };
+        self.limits =
+            limits(&slot.key, &steady, &mut self.exit, &self.settings, self.controller.passed_s(clock));
+        let emf_v = omega.abs() * tables.ratings.magnet_flux_wb * self.controller.map_scale();
+        let torque_nm = self.exit.one_sided(sample.demand.torque_nm, emf_v, udc_v, &tables.ratings);
+        let demand = Demand { torque_nm, ..sample.demand };
+        let input = AimInput { demand: &demand, window: Some(&sample.window), udc_v, limits: &self.limits };
+        self.controller.aim(&input, &Law { gains, clock, tables });
+        let target = self.controller.target();
+        self.depth = target.depth;
+        self.exit.drove(target.torque_nm);
+        self.aimed = Some(slot.key);
+    }
+
+    /// The command itself.
+    #[inline(always)]
+    fn command(&mut self, sample: &Sample, here: &RotorSample, slot: &Slot, shared: &Shared) {
+        let Settings { gains, clock, .. } = &self.settings;
+        let now = self.now.before(clock.control_ticks);
+        let (omega, udc_v) = (self.controller.omega(), sample.udc_v);
+        let steady = Steady { omega, udc_v, voltage_v: self.steady_v, depth: self.depth };
+        let (mode, revises) = (slot.key.mode, self.revises);
+        let wanted = Wanted { mode, revises, between: slot.between, before: &self.reference };
+        let committed = committed(&shared.applied, now, &steady, &self.settings, &wanted);
+        let law = Law { gains, clock, tables: self.machine.tables() };
+        let voltage = self.controller.regulate(here, &committed, &self.limits, &law);
+        self.steady_v = voltage.steady_v;
+        self.mode = mode;
+        self.watch.command(voltage.vector);
+        self.reference = Reference {
+            voltage_v: voltage.voltage_v,
+            vector: voltage.vector,
+            carrier_angle: voltage.carrier.angle(),
+            rate: clock.angle_rate(omega),
+            at: now,
+            udc_v,
+            depth: self.depth,
+        };
+    }
+
+    /// `true` if the demand has jumped and the next half can still be changed: the running one lasts long enough, and the next one is
+    /// of the free carrier, whose length is always the same. An operating point from before a jump does not hold.
+    fn is_to_revise(&mut self, applied: Option<&Applied>, now: Instant, demand: &Demand) -> bool {
         let change = demand.torque_nm - self.demand_nm;
         self.demand_nm = demand.torque_nm;
         let largest_nm = self.machine.tables().ratings.max_torque_nm;
-        self.jumped |= !demand.slew_limited && change.abs() > JUMP_SHARE * largest_nm;
+        if !demand.slew_limited && change.abs() > JUMP_SHARE * largest_nm {
+            (self.jumped, self.aimed) = (true, None);
+        }
         let latest = now.after(REVISION_PERIODS * self.settings.clock.control_ticks);
-        let revises = self.jumped && applied.next.kind.is_free() && applied.next.begins.reached(latest);
+        let possible = |applied: &Applied| applied.kind.is_free() && applied.begins.reached(latest);
+        let revises = self.jumped && applied.is_some_and(possible);
         self.jumped &= !revises;
         revises
     }

@@ -6,13 +6,14 @@
 
 mod applied;
 mod control;
-mod glide;
 mod pwm;
+mod six_step_exit;
+mod slot;
 
 use super::messages::{COMMITTAL_WORDS, VoltageCommand};
-use crate::cell::{Downlink, Trail, Uplink};
+use crate::cell::{History, Mailbox, Seqlock};
 use crate::control::Gains;
-use crate::modulation::Devices;
+use crate::modulation::SwitchLimits;
 use crate::protection::Trip;
 use crate::recorder::Recorder;
 use crate::time::Clock;
@@ -22,25 +23,26 @@ pub use control::ControlTask;
 pub use pwm::PwmTask;
 pub(super) use pwm::stale;
 
-/// What both tasks are built with.
+/// The settings of both tasks.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Settings {
     /// The timers' clock.
     pub clock: Clock,
     /// The inverter's devices.
-    pub devices: Devices,
+    pub devices: SwitchLimits,
     /// The current loop's gains.
     pub gains: Gains,
 }
 
 /// The cells between the two interrupts, and the flight recorder, if there is one.
 pub struct Shared<'a> {
-    /// What control wants of the modulator.
-    pub command: Downlink<VoltageCommand, 10>,
-    /// What the modulator does.
-    pub applied: Trail<COMMITTAL_WORDS>,
-    /// What the PWM interrupt tripped on.
-    pub trip: Uplink<Trip, 4>,
+    /// The command of control to the modulator.
+    pub command: Mailbox<VoltageCommand, 10>,
+    /// The work of the modulator.
+    pub applied: History<COMMITTAL_WORDS>,
+    /// The fault that tripped the PWM interrupt.
+    pub trip: Seqlock<Trip, 4>,
     /// Instant of the newest control interrupt, from its beginning on.
     pub began: AtomicU32,
     recorder: Option<&'a Recorder>,
@@ -51,9 +53,9 @@ impl<'a> Shared<'a> {
     #[cfg(not(loom))]
     pub const fn new() -> Self {
         Self {
-            command: Downlink::new(),
-            applied: Trail::new(),
-            trip: Uplink::new(),
+            command: Mailbox::new(),
+            applied: History::new(),
+            trip: Seqlock::new(),
             began: AtomicU32::new(0),
             recorder: None,
         }

@@ -6,7 +6,7 @@ use crate::frames::{Abc, UNITS_PER_RADIAN};
 use crate::machine::{Machine, Tables};
 use crate::modulation::{Modulator, Schedule, compensated};
 use crate::ports::PwmPort;
-use crate::protection::{self, Disarmed, Fault, SafeState, Trip, Violation};
+use crate::protection::{self, Fault, MaskedFaults, SafeState, Trip, Violation};
 use crate::time::{Clock, Instant};
 use core::sync::atomic::Ordering;
 
@@ -21,12 +21,12 @@ pub struct PwmTask<M = &'static Tables> {
     machine: M,
     settings: Settings,
     modulator: Modulator,
-    /// What was decided at the last boundary. Where its half begins is the nominal instant of the next call.
+    /// The decision of the last boundary. The boundary where its half begins is the nominal instant of the next call.
     newest: Committal,
     /// Phase currents at the boundary before, in A.
     currents_before_a: Abc,
     trip: Option<Trip>,
-    disarmed: Disarmed,
+    disarmed: MaskedFaults,
     /// Number of the release that was carried out last.
     released: u8,
 }
@@ -41,7 +41,7 @@ impl<M: Machine> PwmTask<M> {
             newest: Committal::at_rest(first, settings.devices.shortest_half_ticks),
             currents_before_a: Abc { a: 0.0, b: 0.0, c: 0.0 },
             trip: None,
-            disarmed: Disarmed::NONE,
+            disarmed: MaskedFaults::NONE,
             released: 0,
         }
     }
@@ -53,7 +53,7 @@ impl<M: Machine> PwmTask<M> {
     }
 
     /// The same without a check.
-    pub const fn without(mut self, disarmed: Disarmed) -> Self {
+    pub const fn without(mut self, disarmed: MaskedFaults) -> Self {
         self.disarmed = disarmed;
         self
     }
@@ -64,8 +64,21 @@ impl<M: Machine> PwmTask<M> {
         self
     }
 
-    /// The PWM timer's interrupt, at a carrier boundary. Deadline: the next boundary, where the shadow registers take over.
-    pub fn run(&mut self, port: &mut impl PwmPort, shared: &Shared) {
+    /// The PWM timer's interrupt, at a carrier boundary, or where control has pulses to revise. Deadline: the next boundary, where the shadow
+    /// registers take over. Says whether it came for a boundary.
+    pub fn run(&mut self, port: &mut impl PwmPort, shared: &Shared) -> bool {
+        let boundary = port.begin();
+        if boundary {
+            self.pass(port, shared);
+        } else {
+            self.revise(port, shared);
+        }
+        boundary
+    }
+
+    /// A carrier boundary.
+    #[inline(always)]
+    fn pass(&mut self, port: &mut impl PwmPort, shared: &Shared) {
         let now = self.newest.begins;
         let currents_a = port.sample(now);
         self.currents_before_a = self.newest.currents_a;

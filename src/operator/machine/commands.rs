@@ -1,4 +1,4 @@
-//! Which commands are followed, and why the others are not.
+//! The commands that are followed, and the reasons why the others are not.
 
 use super::{Edges, Operator, Phase};
 use crate::operator::line::{Discharge, Precharge};

@@ -11,9 +11,11 @@ pub(in crate::protocol) const ANSWER_VALUE: Signal = Signal::float("value", 32);
 pub const PARAMETER_ANSWER: Message =
     Message::new("PARAMETER_ANSWER", 0x188, 12, 0, &[ANSWER_RESULT, ANSWER_PARAMETER, ANSWER_VALUE]);
 
-/// What became of a parameter request.
+/// The outcome of a parameter request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u8)]
+#[non_exhaustive]
 pub enum Outcome {
     /// Read or written.
     Done = 0,
@@ -37,8 +39,9 @@ impl Outcome {
 
 /// Content of [`PARAMETER_ANSWER`].
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ParameterAnswer {
-    /// What became of the request.
+    /// The outcome of the request.
     pub outcome: Outcome,
     /// The parameter's number.
     pub parameter: u8,

@@ -23,11 +23,12 @@ pub(in crate::protocol) const COUNTER_SIGNALS: [Signal; 10] = [
 ];
 const PAGES: u32 = 3;
 
-/// What became of the frames received, in pages.
+/// The counts of the frames received, in pages.
 pub const COUNTERS: Message = Message::new("COUNTERS", 0x187, 11, 100, &COUNTER_SIGNALS);
 
-/// What became of the frames received. Counts wrap; every frame received is counted once more, in one of the others but `lost`.
+/// The counts of the frames received. Counts wrap; every frame received is counted once more, in one of the others but `lost`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Counts {
     /// Frames received.
     pub received: u32,

@@ -1,4 +1,4 @@
-//! What is measured: motion, currents, voltages.
+//! The measurements: motion, currents, voltages.
 
 use crate::protocol::commands::{LINK_V, TORQUE_NM};
 use crate::protocol::message::Message;
@@ -26,8 +26,9 @@ pub const CURRENTS: Message = Message::new("CURRENTS", 0x183, 7, 10, &[CURRENT, 
 /// Voltage, frequency, temperature.
 pub const VOLTAGES: Message = Message::new("VOLTAGES", 0x184, 8, 10, &[VOLTAGE, FREQUENCY, TEMPERATURE]);
 
-/// What is measured, and what control makes of it. `None`: not available.
+/// The measurements, and what control makes of them. `None`: not available.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Measured {
     /// Mechanical speed, in r/min.
     pub speed_rpm: Option<f32>,

@@ -1,4 +1,4 @@
-//! What the drive sends, by message.
+//! The messages from the drive.
 
 mod answer;
 mod counters;
@@ -16,6 +16,6 @@ pub(super) use answer::{ANSWER_PARAMETER, ANSWER_RESULT, ANSWER_VALUE};
 pub(super) use counters::COUNTER_SIGNALS;
 pub(super) use measured::{SPEED_RPM, encode};
 pub(super) use status::{
-    CHOPPER, DISCHARGE, FAULT, LISTENING, MAIN, PRECHARGE, REFUSAL, REFUSALS, STATE, TAKEN,
+    CHOPPER, DISCHARGE, FAULT, LISTENING, MAIN, PRECHARGE, REFUSAL, REFUSALS, STATE, TAKEN, pattern,
 };
 pub(super) use trip::{TRIP_FAULT, TRIP_LIMIT, TRIP_VALUE};

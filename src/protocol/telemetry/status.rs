@@ -1,7 +1,7 @@
 //! The status: state, fault, refusal, switches.
 
 use super::Counts;
-use crate::modulation::Mode;
+use crate::modulation::{MODE_CODES, Mode};
 use crate::nine_switch::Scheme;
 use crate::operator::{Refusal, State, Status};
 use crate::protocol::message::Message;
@@ -10,9 +10,8 @@ use crate::protocol::signal::{Payload, Signal};
 pub(in crate::protocol) const STATE: Signal = Signal::number("state", 12, 4, 0xF);
 pub(in crate::protocol) const FAULT: Signal = Signal::number("fault", 16, 8, 0xFF);
 pub(in crate::protocol) const REFUSAL: Signal = Signal::number("refusal", 24, 8, 0xFF);
-pub(in crate::protocol) const REFUSALS: Signal = Signal::number("refusals", 32, 8, 0xFF);
-const MODE: Signal = Signal::number("mode", 40, 3, 7);
-const _: () = assert!(Mode::ALL.len() <= 1 << MODE.bits, "another mode needs a wider signal");
+pub(in crate::protocol) const REFUSALS: Signal = Signal::number("refusals", 32, 5, 0x1F);
+const MODE: Signal = pattern("mode");
 pub(in crate::protocol) const LISTENING: Signal = Signal::number("listening", 43, 2, 3);
 pub(in crate::protocol) const PRECHARGE: Signal = Signal::flag("precharge", 45);
 pub(in crate::protocol) const MAIN: Signal = Signal::flag("main", 46);
@@ -20,6 +19,11 @@ pub(in crate::protocol) const DISCHARGE: Signal = Signal::flag("discharge", 47);
 pub(in crate::protocol) const CHOPPER: Signal =
     Signal { bits: 8, ..Signal::physical("chopper_percent", "%", 48, 0.5, [0.0, 100.0]) };
 pub(in crate::protocol) const TAKEN: Signal = Signal::number("taken", 56, 8, 0xFF);
+
+/// The code of a pulse pattern, or of where the zero vectors lie: room for [`MODE_CODES`] of them.
+pub(in crate::protocol) const fn pattern(name: &'static str) -> Signal {
+    Signal::number(name, 37, MODE_CODES.ilog2(), MODE_CODES - 1)
+}
 
 /// State, fault, refusal, switches.
 pub const STATUS: Message = Message::new(
@@ -30,8 +34,9 @@ pub const STATUS: Message = Message::new(
     &[STATE, FAULT, REFUSAL, REFUSALS, MODE, LISTENING, PRECHARGE, MAIN, DISCHARGE, CHOPPER, TAKEN],
 );
 
-/// What becomes of the newest command.
+/// The use that is made of the newest command.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u8)]
 pub enum Listening {
     /// No command has come yet, or it has been silent for so long that the drive is off.
@@ -49,9 +54,9 @@ impl Listening {
         [(Self::Off, "off"), (Self::Fresh, "fresh"), (Self::ZeroTorque, "zero_torque")];
 }
 
-/// How the gates are played, as the status has it.
+/// The pulse pattern of the gates, as the status has it.
 pub trait Pattern: Copy {
-    /// Its code, 0 ..= 7.
+    /// Its code, below [`MODE_CODES`].
     fn code(self) -> u32;
     /// The one with this code; the default one for a code that is none.
     fn from_code(code: u32) -> Self;
@@ -83,6 +88,7 @@ impl Pattern for Scheme {
 
 /// Content of [`STATUS`], and of [`crate::protocol::ZS9_STATUS`].
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct StatusFrame<P = Mode> {
     /// The state; `None` for a code that is none.
     pub state: Option<State>,
@@ -90,11 +96,11 @@ pub struct StatusFrame<P = Mode> {
     pub fault: u8,
     /// The newest refusal.
     pub refusal: Option<Refusal>,
-    /// Commands refused, modulo 256.
+    /// Commands refused, modulo 32.
     pub refusals: u8,
     /// Pulse pattern, or where the zero vectors lie.
     pub mode: P,
-    /// What becomes of the newest command.
+    /// The use that is made of the newest command.
     pub listening: Listening,
     /// Precharge relay, main contactor, discharge resistor.
     pub switches: [bool; 3],
@@ -111,7 +117,7 @@ impl<P: Pattern> StatusFrame<P> {
             state: Some(status.state),
             fault: status.trip.map_or(0, |trip| trip.fault as u8),
             refusal: status.refusal,
-            refusals: status.refusals as u8,
+            refusals: (status.refusals & REFUSALS.not_available()) as u8,
             mode,
             listening,
             switches: [status.switches.precharge, status.switches.main, status.switches.discharge],

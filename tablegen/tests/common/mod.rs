@@ -31,7 +31,7 @@ impl Folder {
         MachineFolder::read(self.path())
     }
 
-    /// What reading says, where it must refuse.
+    /// The error of a reading that must refuse.
     #[track_caller]
     pub fn refusal(&self) -> String {
         match self.read() {

@@ -4,9 +4,9 @@ use std::collections::{HashMap, HashSet};
 
 use super::INSTRUCTIONS_PER_TICK;
 use super::reach::{NEAR, Reached, Stand};
-use crate::saboteur::Seen;
+use crate::fault_injector::Seen;
 
-/// Whether it was hit in another mode; mode and instruction.
+/// The wanted instruction: whether it was hit in another mode; mode and instruction.
 type Wanted<'a> = (bool, &'a str, u32);
 
 /// The control interrupts of a run, and what is known of them.
@@ -104,7 +104,7 @@ mod tests {
         Call { mode: "async".to_owned(), path, sampled: 35 }
     }
 
-    /// What the image would say: it lands where the boundary, this many instructions behind the beginning, comes.
+    /// The image's account if it lands where the boundary, this many instructions behind the beginning, comes.
     fn landed(call: &Call, left_ticks: u32, boundary: u32, delay: u16) -> Seen {
         let before = boundary - u32::from(delay);
         let landed = call.path.iter().find(|(_, at)| *at == before).map(|(address, _)| *address);
@@ -117,7 +117,7 @@ mod tests {
         // 500 ticks are left; entry and the wait's own way take 7 more.
         let (left, boundary) = (500, 5_007);
         let seen = [Seen { number: 0, left_ticks: left, landed: None }];
-        let mut hunt = Hunt::new(Stand::all(&calls, &seen, 2_500));
+        let mut hunt = Hunt::new(Stand::all(&calls, &seen, 2_500, 2_500));
         hunt.usual = 7;
         while let Some(delays) = hunt.delays(1, 1, &reached) {
             hunt.take(&delays[0], &[landed(&calls[0], left, boundary, delays[0][0])], &mut reached);
@@ -132,14 +132,14 @@ mod tests {
     fn what_could_be_hit_and_was_not_is_missing() {
         let (calls, mut reached) = ([call()], Reached::default());
         let seen = [Seen { number: 0, left_ticks: 100, landed: None }];
-        reached.judge(&Hunt::new(Stand::all(&calls, &seen, 2_500)).stands);
+        reached.judge(&Hunt::new(Stand::all(&calls, &seen, 2_500, 2_500)).stands);
         assert_eq!(reached.missing().count(), 10);
         // Just behind a boundary nothing can be.
         let calls = [call(), call()];
         let seen = [(0, 100), (1, 12_000)];
         let seen = seen.map(|(number, left_ticks)| Seen { number, left_ticks, landed: None });
         let mut reached = Reached::default();
-        reached.judge(&Stand::all(&calls, &seen, 2_500)[1..]);
+        reached.judge(&Stand::all(&calls, &seen, 2_500, 2_500)[1..]);
         assert_eq!(reached.missing().count(), 0);
     }
 }

@@ -1,25 +1,25 @@
-//! Where a carrier boundary can come in a control interrupt, and what was hit there.
+//! The instructions of a control interrupt at which a carrier boundary can come, and those that were hit.
 
 use std::collections::{BTreeMap, HashSet};
 
 use super::{Call, INSTRUCTIONS_PER_TICK};
 use crate::elf::Image;
-use crate::saboteur::Seen;
+use crate::fault_injector::Seen;
 
-/// From one control interrupt to the next.
-const CONTROL_TICKS: u32 = 2_500;
 /// A control interrupt samples at once. One that has not begun a sixteenth of its period after its timer counts as lost, so no delay puts
-/// a boundary before the samples that comes later than that, less a little.
-const BEGUN_TICKS: u32 = 140;
+/// a boundary before the samples that comes later than this part of the period, a little less.
+const BEGUN_PART: u32 = 18;
 /// By how many instructions a landing may be off the ticks that are left.
 pub const NEAR: u32 = 2 * INSTRUCTIONS_PER_TICK;
-/// What the PWM interrupts within a control interrupt execute at most, with their link, and a little for control's own way.
+/// The most instructions of the PWM interrupts within a control interrupt, with their link, and a little for control's own way.
 const ALLOWANCE: u32 = 6_000;
 
 /// A control interrupt of a run, between its boundaries.
 pub struct Stand<'a> {
     pub number: usize,
     pub call: &'a Call,
+    /// From one control interrupt to the next, in ticks.
+    control_ticks: u32,
     /// From its coming to the next carrier boundary, in ticks.
     pub left_ticks: u32,
     /// Since the last one; `None` before the first.
@@ -30,7 +30,7 @@ pub struct Stand<'a> {
     pub boundary: Option<u32>,
 }
 
-/// Why no boundary can come at an instruction of a control interrupt.
+/// The reason why no boundary can come at an instruction of a control interrupt.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Why {
     /// It is the first one behind a boundary, and the next boundary comes after its period.
@@ -62,11 +62,11 @@ impl Why {
 
 impl<'a> Stand<'a> {
     /// Of each control interrupt that was seen.
-    pub fn all(calls: &'a [Call], seen: &[Seen], deadline_ticks: u32) -> Vec<Self> {
+    pub fn all(calls: &'a [Call], seen: &[Seen], control_ticks: u32, deadline_ticks: u32) -> Vec<Self> {
         let (mut last, mut next): (Option<u32>, Option<u32>) = (None, None);
         let stand = |seen: &Seen| {
             let call = calls.get(seen.number)?;
-            let comes = CONTROL_TICKS * seen.number as u32;
+            let comes = control_ticks * seen.number as u32;
             let boundary = comes + seen.left_ticks;
             if next.is_some_and(|next| next != boundary) {
                 last = next;
@@ -76,6 +76,7 @@ impl<'a> Stand<'a> {
             Some(Self {
                 number: seen.number,
                 call,
+                control_ticks,
                 left_ticks: seen.left_ticks,
                 since_ticks: last.map(|last| comes.saturating_sub(last)),
                 most: (deadline_ticks * INSTRUCTIONS_PER_TICK).saturating_sub(length),
@@ -85,28 +86,30 @@ impl<'a> Stand<'a> {
         seen.iter().filter_map(stand).collect()
     }
 
-    /// Why no boundary can come here, so many instructions behind its beginning.
+    /// The reason why no boundary can come here, so many instructions behind its beginning.
     pub fn why(&self, before: u32) -> Option<Why> {
-        let far = self.left_ticks > CONTROL_TICKS;
+        let far = self.left_ticks > self.control_ticks;
         if before > self.left_ticks * INSTRUCTIONS_PER_TICK + NEAR {
             return Some(Why::BehindLanding);
         }
         match self.since_ticks {
             None if far => Some(Why::BeforeFirst),
-            Some(since) if far && since < CONTROL_TICKS => Some(Why::BehindBoundary),
-            _ if before < self.call.sampled && self.left_ticks > BEGUN_TICKS => Some(Why::BeforeSamples),
+            Some(since) if far && since < self.control_ticks => Some(Why::BehindBoundary),
+            _ if before < self.call.sampled && self.left_ticks > self.control_ticks / BEGUN_PART => {
+                Some(Why::BeforeSamples)
+            }
             _ => None,
         }
     }
 }
 
-/// What the runs of a course have hit.
+/// The instructions that the runs of a course have hit.
 #[derive(Default)]
 pub struct Reached {
     /// Of each mode the instructions that were executed, and those that were hit.
     all: BTreeMap<String, HashSet<u32>>,
     hit: BTreeMap<String, HashSet<u32>>,
-    /// Why no boundary can come at an instruction, in each control interrupt that executes it; `None` where in some one could.
+    /// The reason why no boundary can come at an instruction, in each control interrupt that executes it; `None` where in some one could.
     whys: BTreeMap<u32, Option<Why>>,
     pub landings: usize,
     pub passes: usize,

@@ -1,4 +1,4 @@
-//! What an instruction costs on a Cortex-M4F, in cycles and in stack.
+//! The cost of an instruction on a Cortex-M4F, in cycles and in stack.
 //!
 //! The cycles are those of the processor's technical reference manual (instruction timings, chapters 3 and 7), each at its
 //! worst: memory without wait states, no load pipelined behind another, three cycles to refill the pipeline after every

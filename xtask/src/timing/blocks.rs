@@ -15,7 +15,7 @@ use crate::{emulator, image, process};
 /// A building block.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Block {
-    /// What it does and who makes it, as `sqrt/libm`.
+    /// Its work and its maker, as `sqrt/libm`.
     pub name: String,
     /// Instructions on the dearest input.
     pub max: u32,
@@ -98,7 +98,7 @@ fn executed(image: &Image, log: &[u8]) -> Result<Vec<u32>> {
     Ok(addresses)
 }
 
-/// What a call took.
+/// The instructions of a call.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct Count {
     instructions: u32,

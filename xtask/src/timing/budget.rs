@@ -5,17 +5,17 @@ use std::collections::BTreeMap;
 use anyhow::{Context, Result, bail};
 use serde::Deserialize;
 
-/// What a value may be.
+/// The bounds of a value.
 #[derive(Clone, Copy, Debug, Deserialize, PartialEq)]
 #[serde(deny_unknown_fields)]
 pub struct Budget {
-    /// What is wanted.
+    /// The value that is wanted.
     pub target: f64,
-    /// What is allowed until then.
+    /// The value that is allowed until then.
     pub ceiling: Option<f64>,
 }
 
-/// How a value keeps its budget.
+/// The verdict on a value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Verdict {
     Kept,
@@ -30,7 +30,7 @@ impl Budget {
         self.ceiling.unwrap_or(self.target)
     }
 
-    /// How this value keeps it; a value that is no number does not.
+    /// The verdict on this value; one that is no number fails.
     pub fn verdict(&self, value: f64) -> Verdict {
         match value {
             _ if value <= self.target => Verdict::Kept,
@@ -60,7 +60,7 @@ pub struct Judged {
 }
 
 impl Judged {
-    /// How it is kept.
+    /// The verdict.
     pub fn verdict(&self) -> Verdict {
         self.budget.verdict(self.value)
     }

@@ -22,7 +22,7 @@ const IDLE: [&str; 2] = ["main", "board::qemu::idle"];
 /// Ends the log when the emulator has.
 const END: &[u8] = b"end of the log";
 
-/// What it takes to drive.
+/// Everything that it takes to drive.
 #[derive(Clone)]
 pub struct Bench {
     pub rig: PathBuf,
@@ -31,15 +31,15 @@ pub struct Bench {
     pub command: Vec<String>,
     pub path: PathBuf,
     pub image: Image,
-    /// Whether what each interrupt executed is wanted.
+    /// `true` if what each interrupt executed is wanted.
     pub keeps_paths: bool,
 }
 
-/// What one drive gave.
+/// The results of one drive.
 #[derive(Debug, Default)]
 pub struct Drive {
     pub calls: Vec<Call>,
-    /// What each of them executed; empty unless it was wanted.
+    /// The instructions that each of them executed; empty unless they were wanted.
     pub paths: Vec<Executed>,
     pub hits: Tally,
     pub behind: Tally,
@@ -51,7 +51,7 @@ pub struct Drive {
     pub served: Vec<Served>,
 }
 
-/// What the rig says of an interrupt.
+/// The rig's account of an interrupt.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Served {
     pub interrupt: String,
@@ -62,7 +62,7 @@ pub struct Served {
     pub hertz: f64,
 }
 
-/// Which way the mechanical power goes: the sign of torque by speed. Where it is nothing it is the direction before.
+/// The direction of the mechanical power: the sign of torque by speed. Where it is nothing it is the direction before.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Direction {
     Motoring,
@@ -156,7 +156,7 @@ impl Read for Unhurried {
     }
 }
 
-/// Whether a function of these names is the link to the rig.
+/// `true` if a function of these names is the link to the rig.
 pub fn is_link(names: &[String]) -> bool {
     names.iter().any(|name| LINK.iter().any(|module| name.contains(module)))
 }

@@ -1,4 +1,4 @@
-//! What could keep an interrupt from being entered at once: instructions that mask it, and the one under way.
+//! The obstacles to an interrupt's entry: instructions that mask it, and the one under way.
 
 use std::collections::BTreeSet;
 

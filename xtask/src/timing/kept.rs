@@ -1,4 +1,4 @@
-//! What the repository holds of the numbers: the page of costs, and the sizes that the images must not outgrow.
+//! The numbers that the repository holds: the page of costs, and the sizes that the images must not outgrow.
 
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -19,7 +19,7 @@ const GRAIN: u64 = 256;
 pub struct Kept {
     path: PathBuf,
     text: String,
-    /// Whether numbers may only fall (sizes), or may move a little either way.
+    /// `true` if numbers may only fall (sizes); if not, they may move a little either way.
     falls: bool,
 }
 
@@ -58,7 +58,7 @@ pub fn write(files: &[Kept]) -> Result<()> {
     Ok(())
 }
 
-/// What does not fit.
+/// The lines that do not fit.
 pub fn complaints(files: &[Kept]) -> Vec<String> {
     let complaint = |file: &Kept| {
         let found = std::fs::read_to_string(&file.path).unwrap_or_default();

@@ -11,11 +11,11 @@ use anyhow::{Context, Result, bail};
 
 use crate::elf::Image;
 
-/// How the emulator is asked for that log, with no block chained to the next.
+/// The emulator's arguments for that log, with no block chained to the next.
 pub const ARGUMENTS: [&str; 2] =
     ["-d", "in_asm,exec,nochain,trace:nvic_set_pending,trace:nvic_acknowledge_irq,trace:nvic_complete_irq"];
 
-/// What has happened.
+/// The event.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Event {
     /// The instruction at this address was executed.
@@ -35,9 +35,9 @@ pub struct Log<'a> {
     blocks: HashMap<u64, Rc<[u32]>>,
     /// First and last instruction of the block that was listed last.
     listed: Option<(u32, u32)>,
-    /// What is about to be executed.
+    /// The instructions that are about to be executed.
     announced: Rc<[u32]>,
-    /// Whether it ends where the next block begins.
+    /// `true` if it ends where the next block begins.
     ends_early: bool,
 }
 
@@ -69,7 +69,7 @@ impl<'a> Log<'a> {
         Ok(())
     }
 
-    /// What was announced has been executed by now.
+    /// Takes the announced instructions as executed.
     fn commit(&mut self, next: Option<u32>, happened: &mut impl FnMut(Event) -> Result<()>) -> Result<()> {
         let announced = std::mem::replace(&mut self.announced, Rc::new([]));
         let mut executed = &*announced;
@@ -102,7 +102,7 @@ fn announcement(line: &[u8]) -> Option<(u64, u32)> {
     Some((block, number(numbers.nth(1)?, 16)?))
 }
 
-/// What the interrupt controller says; `None` for a line about something else.
+/// The interrupt controller's event; `None` for a line about something else.
 fn of_controller(line: &[u8]) -> Option<Event> {
     let is_enabled = || line.windows(10).any(|part| part == b"enabled: 1");
     let (known, event): (&[u8], fn(u32) -> Event) = match line {
@@ -136,7 +136,7 @@ mod tests {
             .unwrap()
     }
 
-    /// What has happened by the last of these lines.
+    /// The events up to the last of these lines.
     fn read(lines: &[&str]) -> Result<Vec<Event>> {
         let image = image();
         let (mut log, mut events) = (Log::new(&image), Vec::new());

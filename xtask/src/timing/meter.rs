@@ -27,7 +27,7 @@ pub struct Call {
     pub within: Option<u32>,
 }
 
-/// What one interrupt executed, in its order, without the link.
+/// The instructions that one interrupt executed, in their order, without the link.
 #[derive(Clone, Debug, Default)]
 pub struct Path {
     pub addresses: Vec<u32>,
@@ -46,13 +46,13 @@ pub struct Meter<'a> {
     pending: BTreeMap<u32, u32>,
     /// Every interrupt that has returned, in the order of their returns.
     pub calls: Vec<Call>,
-    /// Whether what each of them executed is kept.
+    /// `true` if what each of them executed is kept.
     pub keeps_paths: bool,
-    /// What each of them executed, if it is kept.
+    /// The instructions that each of them executed, if they are kept.
     pub paths: Vec<Path>,
-    /// How often each address was executed.
+    /// The number of executions of each address.
     pub hits: Tally,
-    /// What was executed behind each call, by its return address.
+    /// The instructions that were executed behind each call, by its return address.
     pub behind: Tally,
     /// Bytes of stack that each exception takes at most, with its frame.
     pub deepest: BTreeMap<u32, i32>,
@@ -65,14 +65,14 @@ struct Handler {
     call: Call,
     /// Return address and stack of the functions it is in.
     within: Vec<(u32, i32)>,
-    /// What lay on the stack before it, and what lies there now.
+    /// The stack's depth before it, and its depth now.
     base: i32,
     stack: i32,
     /// In the link, until this address.
     resumes: Option<u32>,
-    /// Where the next instruction stands unless the last one branched.
+    /// The address of the next instruction unless the last one branched.
     next: Option<u32>,
-    /// What was executed.
+    /// The addresses that were executed.
     addresses: Vec<u32>,
     /// Instructions before each of them, and by now, with the link's where the log has them.
     elapsed: Vec<u32>,

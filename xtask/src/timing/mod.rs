@@ -74,7 +74,7 @@ pub fn run(args: &TimingArgs) -> Result<u8> {
     Ok(budget::exit_code(&judged).max(u8::from(!complaints.is_empty())))
 }
 
-/// What has a budget in a system.
+/// The values of a system that have a budget.
 fn values(measured: &Measured) -> Vec<(String, f64)> {
     let statistics = &measured.statistics;
     let worst = |interrupt: &str, of: fn(&statistics::Row) -> f64| {

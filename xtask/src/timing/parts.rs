@@ -1,4 +1,4 @@
-//! What the parts of an interrupt cost: every executed instruction belongs to one part, so they add up to the interrupt.
+//! The cost of the parts of an interrupt: every executed instruction belongs to one part, so they add up to the interrupt.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -8,14 +8,14 @@ use super::profile::{Place, Profile};
 use super::tally::Tally;
 use crate::build;
 
-/// Whether an interrupt could do without a part and still be what its target is for.
+/// The group of a part, by whether an interrupt could do without it and still be what its target is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Group {
-    /// What the targets name.
+    /// The part that the targets name.
     Named,
-    /// What the drive does beyond it.
+    /// The part that the drive does beyond it.
     Beyond,
-    /// What carries both.
+    /// The part that carries both.
     Around,
 }
 
@@ -56,7 +56,7 @@ const PARTS: [(&str, [Group; 2], &[&str]); 28] = [
     (
         "flux predicted from committed pulses",
         [Beyond, Beyond],
-        &["drive/traction/applied.rs", "drive/traction/glide.rs"],
+        &["drive/traction/applied.rs", "drive/traction/six_step_exit.rs"],
     ),
     ("gates read back", [Beyond, Beyond], &["drive/dual/pwm.rs#Expected", "drive/dual/pwm.rs#stuck"]),
     ("protection", [Named, Named], &["protection/"]),
@@ -64,14 +64,14 @@ const PARTS: [(&str, [Group; 2], &[&str]); 28] = [
     ("cells and messages", [Around, Around], &["cell.rs", "drive/messages.rs", "drive/dual/messages.rs"]),
     ("choice of the mode", [Beyond, Named], &["modulation/schedule.rs"]),
     ("dead-time compensation", [Beyond, Beyond], &["modulation/dead_time.rs"]),
-    ("growth of a pattern", [Beyond, Beyond], &["modulation/growth.rs"]),
+    ("transition between patterns", [Beyond, Beyond], &["modulation/pattern_transition.rs"]),
     ("shoot-through", [Named, Named], &["nine_switch/shoot_through.rs"]),
     ("pulses", [Beyond, Named], &["modulation/", "nine_switch/"]),
     ("axis of a motor", [Around, Around], &["drive/dual/axis.rs"]),
     ("task", [Around, Around], &["drive/"]),
-    ("entry and board", [Around, Around], &["main.rs", "bin/zs9.rs", "board/"]),
+    ("entry and board", [Around, Around], &["firmware/", "board/"]),
 ];
-/// What no part owns: copies and the like.
+/// The part that nobody owns: copies and the like.
 const REST: &str = "library";
 
 /// A part of an interrupt.
@@ -152,7 +152,9 @@ fn lies_in(place: &Place, source: &str) -> bool {
 /// The path below `src/` of one of the repository's crates; `None` for a library's file.
 fn below_src(file: &str) -> Option<&str> {
     let inside = file.strip_prefix(build::root().to_str()?)?;
-    inside.split_once("/src/").map(|(_, path)| path)
+    let (_, path) = inside.split_once("/src/")?;
+    // A module of another folder's: `bin/../firmware/zs9.rs`.
+    Some(path.rsplit_once("/../").map_or(path, |(_, path)| path))
 }
 
 /// Refuses a list of parts of which a source is in no interrupt: it was renamed, and what it costs is counted elsewhere.
@@ -193,7 +195,8 @@ mod tests {
         assert_eq!(of(&["control/src/modulation/mode.rs"]), Some("pulses"));
         assert_eq!(of(&["src/control/mod.rs"]), Some("control law, the rest"));
         assert_eq!(of(&["src/drive/traction/control.rs"]), Some("task"));
-        assert_eq!(of(&["src/bin/zs9.rs"]), Some("entry and board"));
+        assert_eq!(of(&["src/firmware/pmasynrm.rs"]), Some("entry and board"));
+        assert_eq!(of(&["src/bin/../firmware/zs9.rs"]), Some("entry and board"));
         assert_eq!(of(&["target/firmware/build/x/out/tables.rs"]), None);
         let library = |file: &str| Place { file: file.to_owned(), function: "f".to_owned() };
         assert_eq!(owner(&[library("/rustc/1/library/core/src/cell.rs")]), None);

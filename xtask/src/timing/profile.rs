@@ -1,4 +1,4 @@
-//! Where the instructions go: by function, inlined ones told apart by the debug information.
+//! The places of the instructions: by function, inlined ones told apart by the debug information.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -18,7 +18,7 @@ pub struct Share {
     pub with_callees: u64,
 }
 
-/// Where an instruction comes from.
+/// The origin of an instruction.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Place {
     /// Demangled.
@@ -27,7 +27,7 @@ pub struct Place {
     pub file: String,
 }
 
-/// What is known about a drive's instructions.
+/// The knowledge about a drive's instructions.
 pub struct Profile<'a> {
     lines: Lines<Reader<'a>>,
 }

@@ -1,4 +1,4 @@
-//! What was measured and judged, and the same as JSON.
+//! The report of all that was measured and judged, and the same as JSON.
 
 use serde_json::{Map, Value, json};
 
@@ -10,14 +10,14 @@ use super::system::Measured;
 
 const INTERRUPTS: [&str; 2] = ["control", "pwm"];
 
-/// What was measured and judged.
+/// Everything that was measured and judged.
 pub struct Report<'a> {
     pub systems: &'a [Measured],
     pub blocks: &'a [Block],
     pub judged: &'a [Judged],
 }
 
-/// What every block has besides its work.
+/// The work that every block has besides its own.
 pub const CALL: &str = "call/nothing";
 
 /// Instructions of a block's work on its dearest input.
@@ -26,7 +26,7 @@ pub fn net(blocks: &[Block], block: &Block) -> u32 {
     block.max.saturating_sub(call)
 }
 
-/// What has a budget among the blocks.
+/// The values of the blocks that have a budget.
 pub fn blocks(blocks: &[Block]) -> Vec<(String, f64)> {
     let ours = |work: &str| blocks.iter().find(|block| block.name == format!("{work}/tractive"));
     let count =

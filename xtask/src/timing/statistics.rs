@@ -1,4 +1,4 @@
-//! What all drives together say about each interrupt in each mode.
+//! The statistics of all drives together about each interrupt in each mode.
 
 use std::collections::BTreeMap;
 
@@ -60,7 +60,7 @@ impl Row {
     }
 }
 
-/// How an interrupt is entered from somewhere.
+/// The entry into an interrupt from somewhere.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Entry {
     pub interrupt: &'static str,

@@ -175,7 +175,7 @@ fn switching_boundaries_s(drive: &Drive) -> Vec<f64> {
     found
 }
 
-/// When control works for another mode with pulses than before, from one with pulses, in the scenario's time: the middle of the period
+/// The instants at which control works for another mode with pulses than before, from one with pulses, in the scenario's time: the middle of the period
 /// before that tick.
 fn switches_s(drive: &Drive) -> Vec<f64> {
     let served = drive.served.iter().filter(|served| served.interrupt == "control");
@@ -218,7 +218,7 @@ impl Sum {
     }
 }
 
-/// What a system's drives gave.
+/// The results of a system's drives.
 pub struct Measured {
     pub system: System,
     pub image: Image,

@@ -127,7 +127,7 @@ pub fn entries(report: &Report) -> Table {
     Table::new(&["", "interrupt", "comes into", ">times", ">waits at least", ">at most"], rows)
 }
 
-/// What has a budget, and how it is kept.
+/// The table of what has a budget, and of its verdicts.
 pub fn budgets(report: &Report) -> Table {
     let rows = report.judged.iter().map(|judged| {
         let (value, target) = (format!("{:.0}", judged.value), judged.budget.target.to_string());

@@ -3,23 +3,23 @@
 
 use crate::broken::{Eager, Plain, Unfrozen};
 use crate::message::Message;
-use tractive::cell::{Downlink, Ring, SEEN, Trail, Uplink, Words};
+use tractive::cell::{History, Mailbox, Ring, SEEN, Seqlock, Words};
 
-pub static DOWNLINK_10: Downlink<Message<10>, 10> = Downlink::new();
-pub static UPLINK_4: Uplink<Message<4>, 4> = Uplink::new();
-pub static UPLINK_10: Uplink<Message<10>, 10> = Uplink::new();
-pub static TRAIL_13: Trail<13> = Trail::new();
-pub static TRAIL_REVISED: Trail<13> = Trail::new();
+pub static DOWNLINK_10: Mailbox<Message<10>, 10> = Mailbox::new();
+pub static UPLINK_4: Seqlock<Message<4>, 4> = Seqlock::new();
+pub static UPLINK_10: Seqlock<Message<10>, 10> = Seqlock::new();
+pub static TRAIL_13: History<13> = History::new();
+pub static TRAIL_REVISED: History<13> = History::new();
 /// Never written.
-pub static EMPTY_13: Trail<13> = Trail::new();
+pub static EMPTY_13: History<13> = History::new();
 pub static EMPTY_RING: Ring<Message<10>, 10, 8> = Ring::new();
 pub static EMPTY_UNFROZEN: Unfrozen<10, 8> = Unfrozen::new();
-pub static EMPTY_4: Uplink<Message<4>, 4> = Uplink::new();
-pub static EMPTY_12: Uplink<Message<12>, 12> = Uplink::new();
-pub static EMPTY_10: Uplink<Message<10>, 10> = Uplink::new();
+pub static EMPTY_4: Seqlock<Message<4>, 4> = Seqlock::new();
+pub static EMPTY_12: Seqlock<Message<12>, 12> = Seqlock::new();
+pub static EMPTY_10: Seqlock<Message<10>, 10> = Seqlock::new();
 /// Between the idle loop's operator and control.
-pub static DOWNLINK_7: Downlink<Message<7>, 7> = Downlink::new();
-pub static UPLINK_12: Uplink<Message<12>, 12> = Uplink::new();
+pub static DOWNLINK_7: Mailbox<Message<7>, 7> = Mailbox::new();
+pub static UPLINK_12: Seqlock<Message<12>, 12> = Seqlock::new();
 /// A flight recorder of eight records; in the image it is filled by control and read by the idle loop.
 pub static RING: Ring<Message<10>, 10, 8> = Ring::new();
 pub static UNFROZEN: Unfrozen<10, 8> = Unfrozen::new();
@@ -38,7 +38,7 @@ pub fn downlink_7_publish(message: &Message<7>) {
 }
 
 #[inline(never)]
-pub fn uplink_12_read(cell: &Uplink<Message<12>, 12>) -> Option<Message<12>> {
+pub fn uplink_12_read(cell: &Seqlock<Message<12>, 12>) -> Option<Message<12>> {
     cell.read()
 }
 
@@ -54,18 +54,18 @@ pub fn unfrozen_read(cell: &Unfrozen<10, 8>) -> Option<Message<10>> {
 }
 
 #[inline(never)]
-pub fn uplink_4_read(cell: &Uplink<Message<4>, 4>) -> Option<Message<4>> {
+pub fn uplink_4_read(cell: &Seqlock<Message<4>, 4>) -> Option<Message<4>> {
     cell.read()
 }
 
 #[inline(never)]
-pub fn uplink_10_read(cell: &Uplink<Message<10>, 10>) -> Option<Message<10>> {
+pub fn uplink_10_read(cell: &Seqlock<Message<10>, 10>) -> Option<Message<10>> {
     cell.read()
 }
 
 /// All that a reader may look at, the newest first.
 #[inline(never)]
-pub fn trail_13_read(cell: &Trail<13>) -> Option<[Message<13>; SEEN]> {
+pub fn trail_13_read(cell: &History<13>) -> Option<[Message<13>; SEEN]> {
     cell.read(|records| records.map(|record| Message::from_words(words(&record))))
 }
 

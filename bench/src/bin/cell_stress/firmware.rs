@@ -57,8 +57,6 @@ fn pause_ticks(hits: u32) -> Option<u32> {
     PAUSES_TICKS.get(sweep % PAUSES).copied()
 }
 
-/// Reload register of the control timer.
-const CONTROL_RELOAD: usize = 0x4000_0008;
 /// The PWM timer's masked interrupt status.
 const PWM_STATUS: usize = 0x4000_2014;
 /// The second timer behind the PWM timer's interrupt: load, control, interrupt clear.
@@ -77,8 +75,7 @@ fn read_register(address: usize) -> u32 {
 
 #[entry]
 fn main() -> ! {
-    qemu::start(PWM_TICKS);
-    write_register(CONTROL_RELOAD, CONTROL_TICKS - 1);
+    qemu::start(PWM_TICKS, CONTROL_TICKS);
     while !DONE.load(SeqCst) {
         qemu::idle();
     }
@@ -96,7 +93,7 @@ fn TIMER0() {
     if let Some(subject) = subject() {
         (subject.low)(&subject.counts);
     }
-    if board.overrun_ticks(Instant(0)) > 0 {
+    if <qemu::Control as ControlPort>::overrun_ticks(&mut board, Instant(0), CONTROL_TICKS) > 0 {
         LATE.store(LATE.load(SeqCst) + 1, SeqCst);
     }
     let round = ROUND.load(SeqCst) + 1;
@@ -135,7 +132,7 @@ unsafe extern "C" fn landed(frame: &[u32; 8]) {
     }
 }
 
-/// What was found, a line each, for `cargo xtask test`.
+/// The findings, a line each, for `cargo xtask test`.
 fn report() {
     hprintln!("rounds {} late {}", ROUND.load(SeqCst), LATE.load(SeqCst));
     for Subject { name, counts, .. } in SUBJECTS.iter().chain(&BURST_SUBJECTS) {

@@ -1,4 +1,4 @@
-//! What travels: a number, words that follow from it, and their checksum.
+//! The message: a number, words that follow from it, and their checksum.
 
 use tractive::cell::Words;
 

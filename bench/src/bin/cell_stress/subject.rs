@@ -5,7 +5,7 @@ use crate::message::Message;
 use core::sync::atomic::{AtomicU32, Ordering::SeqCst, compiler_fence};
 use tractive::cell::{SEEN, Words};
 
-/// What was published and what was read.
+/// The numbers of messages published and read.
 pub struct Counts {
     begun: AtomicU32,
     done: AtomicU32,

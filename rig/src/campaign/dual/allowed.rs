@@ -1,4 +1,4 @@
-//! What a fault of the ZS9 may come to.
+//! The consequences that a fault of the ZS9 may have.
 
 use super::cases::Case;
 use super::faults::Cause;
@@ -67,11 +67,11 @@ impl Drive {
 
 /// Until a gate that is stuck has made a difference to the feedback, in s: five carriers.
 const STUCK_S: f64 = 5e-4;
-/// How old a command may become, in s.
+/// The largest age of a command, in s.
 const STALE_S: f64 = 5e-4;
-/// How far the speed tracker lags behind, in s: 2/4000 rad/s.
+/// The speed tracker's lag, in s: 2/4000 rad/s.
 const TRACKING_S: f64 = 0.5e-3;
-/// How far a capacitor rises between a sample at its trip level and gates that are off, in V: 300 A for 175 µs.
+/// The rise of a capacitor between a sample at its trip level and gates that are off, in V: 300 A for 175 µs.
 const RISE_V: f64 = 300.0 * 175e-6 / ZNetwork::ZS9.capacitance_f;
 
 /// The highest capacitor voltage that must be expected once the gates are off, in V: the network's own oscillation with the energies of

@@ -1,4 +1,4 @@
-//! Where the faults of the ZS9 come.
+//! The operating points at which the faults of the ZS9 come.
 
 use super::faults::{Cause, faults};
 use crate::campaign::Action;
@@ -38,12 +38,12 @@ pub struct Case {
     pub(super) point: Point,
     pub(super) action: Action,
     pub(super) scheme: Scheme,
-    /// When the fault comes, in s.
+    /// The time of the fault, in s.
     pub(super) at_s: f64,
 }
 
 impl Case {
-    /// What a filter searches.
+    /// The name that a filter searches.
     pub fn name(&self) -> String {
         let Self { fault, point, action, scheme, .. } = self;
         format!("zs9 {} {} {} {}", fault.name, point.speeds_rpm[0], scheme.name(), action.name())

@@ -21,7 +21,7 @@ use crate::run::{CLOCK, Interrupts};
 use crate::scenario::System;
 use crate::scenario::zs9::SOURCE_V;
 use crate::scenario::zs9::Zs9;
-use crate::without::Without;
+use crate::without::Ablation;
 use crate::zs9::bench::{Bench, BenchSettings};
 use crate::zs9::run::Tasks;
 use crate::zs9::trace::Row;
@@ -42,15 +42,16 @@ const SHARE: f64 = 0.6;
 const STAGES: Stages = Stages { torque_s: -0.08, turn_s: 0.07, end_s: 0.16, aftermath_s: 0.04 };
 /// Means of the torque are over this much time, in s.
 const MEAN_S: f64 = 0.03;
-/// How fast a rotor that runs away gets faster, in r/min per s.
+/// The acceleration of a rotor that runs away, in r/min per s.
 const RUNAWAY_RPM_S: f64 = 6_000.0;
 
 /// The drive, with one protection off or none.
 pub struct Drive {
-    machine: Machine,
+    /// The machine that it drives.
+    pub machine: Machine,
     tables: &'static Tables,
     settings: Settings,
-    without: Option<Without>,
+    without: Option<Ablation>,
 }
 
 impl Drive {
@@ -58,7 +59,7 @@ impl Drive {
     ///
     /// # Errors
     /// Where their folder is not there.
-    pub fn new(without: Option<Without>) -> Result<Self> {
+    pub fn new(without: Option<Ablation>) -> Result<Self> {
         let machine = Machine::load(Zs9::MACHINE)?;
         let mut settings = settings::drive(CLOCK, CARRIER_HZ);
         let mut tables = machine.tables;
@@ -67,11 +68,6 @@ impl Drive {
             tables = without.tables(tables);
         }
         Ok(Self { machine, tables, settings, without })
-    }
-
-    /// The machine's folder.
-    pub fn machine(&self) -> &Machine {
-        &self.machine
     }
 
     /// Runs one case.
@@ -83,12 +79,12 @@ impl Drive {
         let mut tasks = self.tasks(Instant(0));
         let tick_s = bench.step_s();
         tasks.drive(&mut bench, |bench| {
-            let safe_s = bench.observed().safe.map(|(at, _)| at as f64 * tick_s - LEAD_S);
+            let safe_s = bench.observed.safe.map(|(at, _)| at as f64 * tick_s - LEAD_S);
             safe_s.is_none_or(|safe_s| bench.time_s() < safe_s + STAGES.aftermath_s)
         })?;
-        let rows = bench.rows();
+        let rows = &bench.rows;
         let seen = Seen {
-            observed: *bench.observed(),
+            observed: bench.observed,
             trip: tasks.trip(),
             torque_error_nm: torque_error_nm(rows, STAGES.turn_s).max(torque_error_nm(rows, STAGES.end_s)),
             tick_s,
@@ -105,11 +101,7 @@ impl Drive {
     }
 
     fn tasks(&self, origin: Instant) -> Tasks<'static> {
-        let tasks = Tasks::beginning_at(origin, self.tables, self.settings);
-        match self.without {
-            Some(without) => tasks.without(without),
-            None => tasks,
-        }
+        Tasks::beginning_at(origin, self.tables, self.settings).without(self.without)
     }
 
     fn bench(&self, case: &Case) -> Bench {
@@ -159,7 +151,7 @@ impl Drive {
     fn plant(&self, speeds: [SpeedSource; 2], motor: PlantSettings) -> Zs9Plant {
         let settings = Zs9Settings { source_v: SOURCE_V, motors: [motor; 2], ..Zs9Settings::default() };
         let mut plant = Zs9Plant::new([&self.machine.folder; 2], speeds, &settings);
-        plant.set_network(NetworkState::even(0.0, 0.5 * (LINK_V + SOURCE_V)));
+        plant.network = NetworkState::even(0.0, 0.5 * (LINK_V + SOURCE_V));
         plant
     }
 

@@ -16,7 +16,7 @@ use tractive::ports::MotorDemand;
 use tractive::protection::Trip;
 use tractive::time::Instant;
 
-/// What one motor does, times in s from the recording's beginning.
+/// The demand on one motor, times in s from the recording's beginning.
 #[derive(Clone, Debug)]
 pub enum Script {
     /// It follows torques, each from its time on (N·m, and whether the rate is limited), at a prescribed speed.
@@ -62,15 +62,15 @@ pub struct Ride {
     pub duration_s: f64,
 }
 
-/// What a ride left.
+/// The results of a ride.
 pub struct Ridden {
     /// The trace.
     pub rows: Vec<Row>,
-    /// What was seen.
+    /// The observations of the fault.
     pub observed: Observed,
     /// The latched fault.
     pub trip: Option<Trip>,
-    /// When the ride ended, in s.
+    /// The end of the ride, in s.
     pub ended_s: f64,
 }
 
@@ -101,12 +101,7 @@ impl Drive {
         let mut bench = bench.following(course).beginning_at(origin);
         let mut tasks = self.tasks(Instant(origin as u32));
         // Once it has stopped there is nothing to see.
-        tasks.drive(&mut bench, |bench| bench.observed().safe.is_none())?;
-        Ok(Ridden {
-            observed: *bench.observed(),
-            trip: tasks.trip(),
-            ended_s: bench.time_s(),
-            rows: bench.rows().to_vec(),
-        })
+        tasks.drive(&mut bench, |bench| bench.observed.safe.is_none())?;
+        Ok(Ridden { observed: bench.observed, trip: tasks.trip(), ended_s: bench.time_s(), rows: bench.rows })
     }
 }

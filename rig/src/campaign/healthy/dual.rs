@@ -1,13 +1,12 @@
 //! Random rides of the ZS9.
 
-use super::{Driven, flaws, named};
+use super::{Driven, corners, flaws, jumped, named, torques};
 use crate::campaign::dual::{Drive, Ridden, Ride, Script};
 use crate::zs9::bench::Course;
 use anyhow::Result;
 use rand::rngs::StdRng;
 use rand::{Rng, SeedableRng};
 use tractive::nine_switch::Scheme;
-use tractive_tablegen::Parameters;
 
 /// Highest speed, in r/min: the cycle's cruise.
 const MOST_RPM: f64 = 1_300.0;
@@ -26,23 +25,23 @@ const NOISE_A: f64 = 0.2;
 /// A random ride: each motor follows torques that jump or are slewed from one sign to the other at a speed that goes up and down, or
 /// follows a speed with a load that jumps; the source jumps and the scheme changes.
 pub fn ride(drive: &Drive, duration_s: f64, seed: u64) -> Ride {
-    let parameters = &drive.machine().folder.parameters;
+    let parameters = &drive.machine.folder.parameters;
     let mut random = StdRng::seed_from_u64(seed);
     let motors = [0, 1].map(|_| {
         if random.random_bool(0.5) {
-            by_torque(&mut random, parameters, duration_s)
+            Script::Torque {
+                speed_rpm: corners(&mut random, MOST_RPM, STEEPEST_RPM_S, duration_s),
+                torque_nm: torques(&mut random, parameters.max_torque_nm, (0.0, duration_s)),
+            }
         } else {
             by_speed(&mut random, duration_s)
         }
     });
     let mut course = Course::default();
-    let mut t_s = 0.0;
-    let mut source_v: f64 = 400.0;
+    let (mut t_s, mut source_v) = (0.0, 400.0);
     while t_s < duration_s {
         t_s += random.random_range(0.1..1.5);
-        let (least, most) = SOURCE_V;
-        source_v =
-            random.random_range((source_v - SOURCE_JUMP_V).max(least)..(source_v + SOURCE_JUMP_V).min(most));
+        source_v = jumped(&mut random, source_v, SOURCE_V, SOURCE_JUMP_V);
         course.source_v.push((t_s, source_v));
     }
     t_s = 0.0;
@@ -53,35 +52,8 @@ pub fn ride(drive: &Drive, duration_s: f64, seed: u64) -> Ride {
     Ride { motors, course, duration_s }
 }
 
-/// Corners of a speed that goes up and down.
-fn corners(random: &mut StdRng, steepest_rpm_s: f64, duration_s: f64) -> Vec<(f64, f64)> {
-    let (mut t_s, mut rpm) = (0.0, 0.0);
-    let mut corners = vec![(t_s, rpm)];
-    while t_s < duration_s {
-        let next_rpm: f64 = random.random_range(-MOST_RPM..MOST_RPM);
-        t_s += (next_rpm - rpm).abs() / (random.random_range(0.1..1.0) * steepest_rpm_s);
-        rpm = next_rpm;
-        corners.push((t_s, rpm));
-        t_s += random.random_range(0.0..1.0);
-        corners.push((t_s, rpm));
-    }
-    corners
-}
-
-fn by_torque(random: &mut StdRng, parameters: &Parameters, duration_s: f64) -> Script {
-    let speed_rpm = corners(random, STEEPEST_RPM_S, duration_s);
-    let mut torque_nm = Vec::new();
-    let mut t_s = 0.0;
-    while t_s < duration_s {
-        let share: f64 = if random.random_bool(0.2) { 0.0 } else { random.random_range(-1.0..1.0) };
-        torque_nm.push((t_s, (share * parameters.max_torque_nm, random.random_bool(0.5))));
-        t_s += random.random_range(0.02..0.8);
-    }
-    Script::Torque { speed_rpm, torque_nm }
-}
-
 fn by_speed(random: &mut StdRng, duration_s: f64) -> Script {
-    let wanted_rpm = corners(random, WANTED_RPM_S, duration_s);
+    let wanted_rpm = corners(random, MOST_RPM, WANTED_RPM_S, duration_s);
     let mut load_nm = Vec::new();
     let mut t_s = 0.0;
     while t_s < duration_s {
@@ -99,7 +71,7 @@ const STEP_S: f64 = 1e-3;
 /// # Errors
 /// A drive that breaks the bench's rules.
 pub fn drive(drive: &Drive, duration_s: f64, seed: u64) -> Result<Ridden> {
-    let trip_current_a = drive.machine().folder.parameters.trip_current_a;
+    let trip_current_a = drive.machine.folder.parameters.trip_current_a;
     drive.ride(ride(drive, duration_s, seed), flaws(trip_current_a, NOISE_A, seed), STEP_S, 0)
 }
 

@@ -1,6 +1,6 @@
 //! Random rides of the PMaSynRM drive.
 
-use super::{Driven, flaws, named};
+use super::{Driven, corners, flaws, jumped, named, torques};
 use crate::campaign::traction::{Drive, Ridden, Ride};
 use anyhow::Result;
 use rand::rngs::StdRng;
@@ -17,32 +17,17 @@ const LINE_JUMP_V: f64 = 200.0;
 /// A random ride: speeds between both directions' highest, torques that step or are slewed from one sign to the other, a line that
 /// jumps, and, with `blocks`, gates that are blocked now and then.
 pub fn ride(drive: &Drive, duration_s: f64, seed: u64, blocks: bool) -> Ride {
-    let parameters = &drive.machine().folder.parameters;
+    let parameters = &drive.machine.folder.parameters;
     let mut random = StdRng::seed_from_u64(seed);
-    let mut ride = Ride { duration_s, ..Ride::default() };
-    let (mut t_s, mut rpm) = (0.0, 0.0);
-    ride.speed.push((0.0, 0.0));
+    let mut ride = Ride {
+        speed: corners(&mut random, parameters.max_speed_rpm, STEEPEST_RPM_S, duration_s),
+        torque: torques(&mut random, parameters.max_torque_nm, (0.1, duration_s)),
+        duration_s,
+        ..Ride::default()
+    };
+    let (mut t_s, mut line_v) = (0.0, parameters.dc_link_nominal_v);
     while t_s < duration_s {
-        let most_rpm = parameters.max_speed_rpm;
-        let next_rpm: f64 = random.random_range(-most_rpm..most_rpm);
-        let slope_rpm_s = random.random_range(0.1..1.0) * STEEPEST_RPM_S;
-        t_s += (next_rpm - rpm).abs() / slope_rpm_s;
-        rpm = next_rpm;
-        ride.speed.push((t_s, rpm));
-        t_s += random.random_range(0.0..1.0);
-        ride.speed.push((t_s, rpm));
-    }
-    t_s = 0.1;
-    while t_s < duration_s {
-        let share: f64 = if random.random_bool(0.2) { 0.0 } else { random.random_range(-1.0..1.0) };
-        ride.torque.push((t_s, (share * parameters.max_torque_nm, random.random_bool(0.5))));
-        t_s += random.random_range(0.02..0.8);
-    }
-    t_s = 0.0;
-    let mut line_v = parameters.dc_link_nominal_v;
-    while t_s < duration_s {
-        let (least, most) = ((line_v - LINE_JUMP_V).max(LINE_V.0), (line_v + LINE_JUMP_V).min(LINE_V.1));
-        line_v = random.random_range(least..most);
+        line_v = jumped(&mut random, line_v, LINE_V, LINE_JUMP_V);
         ride.line.push((t_s, line_v));
         t_s += random.random_range(0.2..2.0);
     }
@@ -63,7 +48,7 @@ const NOISE_A: f64 = 0.5;
 /// # Errors
 /// A drive that breaks the bench's rules.
 pub fn drive(drive: &Drive, duration_s: f64, seed: u64, blocks: bool) -> Result<Ridden> {
-    let trip_current_a = drive.machine().folder.parameters.trip_current_a;
+    let trip_current_a = drive.machine.folder.parameters.trip_current_a;
     drive.ride(ride(drive, duration_s, seed, blocks), flaws(trip_current_a, NOISE_A, seed))
 }
 

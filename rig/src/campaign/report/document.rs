@@ -7,17 +7,17 @@ use anyhow::{Context, Result, bail};
 use std::fmt::Write as _;
 use std::path::Path;
 
-/// What is written into a document.
+/// The part that is written into a document.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Part {
     /// The tables of the fast campaign.
     Tables,
-    /// What the full campaign comes to, in sentences.
+    /// The results of the full campaign, in sentences.
     Sentences,
 }
 
 impl Part {
-    /// Where it begins and ends.
+    /// The marks of its beginning and its end.
     const fn markers(self) -> [&'static str; 2] {
         match self {
             Self::Tables => ["<!-- campaign: begin -->\n", "<!-- campaign: end -->"],

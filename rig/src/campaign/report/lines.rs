@@ -9,11 +9,11 @@ use std::fmt::Write as _;
 /// All cases of something in one line.
 #[derive(Clone, Debug, Serialize)]
 pub struct Line {
-    /// Which system.
+    /// The system.
     pub system: &'static str,
-    /// What the cases have in common.
+    /// The property that the cases have in common.
     pub what: String,
-    /// How they ended.
+    /// The counts of their ends.
     #[serde(flatten)]
     pub tally: Tally,
     /// The names that the drive gave.
@@ -103,65 +103,58 @@ pub fn by_safe_state(outcomes: &[Outcome]) -> Vec<Line> {
     lines(&stopped, |outcome| format!("{:.0} r/min, {}", outcome.speed_rpm.abs(), outcome.safe_state))
 }
 
+/// A column behind the heading: its head, and what a line has in it.
+type Column = (&'static str, fn(&Line) -> String);
+
+const COLUMNS: [Column; 16] = [
+    ("cases", |line| line.tally.cases.to_string()),
+    ("caught", |line| line.tally.caught.to_string()),
+    ("ridden", |line| line.tally.ridden_through.to_string()),
+    ("uncaught", |line| line.tally.uncaught.to_string()),
+    ("periods", |line| number(line.carrier_periods, 2)),
+    ("ms", |line| number(line.time_ms, 2)),
+    ("A until", |line| number(line.current_until_a, 0)),
+    ("A after", |line| number(line.current_after_a, 0)),
+    ("V until", |line| number(line.udc_until_v, 0)),
+    ("V after", |line| number(line.udc_after_v, 0)),
+    ("U_c until", |line| number(line.uc_until_v.unwrap_or(0.0), 0)),
+    ("U_c after", |line| number(line.uc_after_v.unwrap_or(0.0), 0)),
+    ("A share", |line| number(line.current_share, 2)),
+    ("V share", |line| number(line.voltage_share, 2)),
+    ("named", |line| text(&line.named)),
+    ("safe state", |line| text(&line.safe_states)),
+];
+
+fn number(value: f64, decimals: usize) -> String {
+    if value > 0.0 { format!("{value:.decimals$}") } else { "–".to_owned() }
+}
+
+fn text(text: &str) -> String {
+    if text.is_empty() { "–".to_owned() } else { text.to_owned() }
+}
+
 /// Lines as a table of Markdown, which people read as text as well.
 pub fn table(heading: &str, lines: &[Line]) -> String {
-    let head = [
-        heading,
-        "cases",
-        "caught",
-        "ridden",
-        "uncaught",
-        "periods",
-        "ms",
-        "A until",
-        "A after",
-        "V until",
-        "V after",
-        "U_c until",
-        "U_c after",
-        "A share",
-        "V share",
-        "named",
-        "safe state",
-    ];
-    let mut rows = vec![head.map(str::to_owned)];
-    for line in lines {
-        let number = |value: f64| if value > 0.0 { format!("{value:.0}") } else { "–".to_owned() };
-        let fine = |value: f64| if value > 0.0 { format!("{value:.2}") } else { "–".to_owned() };
-        let text = |text: &str| if text.is_empty() { "–".to_owned() } else { text.to_owned() };
-        rows.push([
-            line.what.clone(),
-            line.tally.cases.to_string(),
-            line.tally.caught.to_string(),
-            line.tally.ridden_through.to_string(),
-            line.tally.uncaught.to_string(),
-            fine(line.carrier_periods),
-            fine(line.time_ms),
-            number(line.current_until_a),
-            number(line.current_after_a),
-            number(line.udc_until_v),
-            number(line.udc_after_v),
-            line.uc_until_v.map_or("–".to_owned(), number),
-            line.uc_after_v.map_or("–".to_owned(), number),
-            fine(line.current_share),
-            fine(line.voltage_share),
-            text(&line.named),
-            text(&line.safe_states),
-        ]);
-    }
+    let heads = COLUMNS.iter().map(|(head, _)| (*head).to_owned());
+    let mut rows: Vec<Vec<_>> = vec![std::iter::once(heading.to_owned()).chain(heads).collect()];
+    rows.extend(lines.iter().map(|line| {
+        let cells = COLUMNS.iter().map(|(_, cell)| cell(line));
+        std::iter::once(line.what.clone()).chain(cells).collect()
+    }));
     let width = |k: usize| rows.iter().map(|row| row[k].chars().count()).max().unwrap_or(0);
-    let widths: Vec<_> = (0..head.len()).map(width).collect();
+    let widths: Vec<_> = (0..=COLUMNS.len()).map(width).collect();
+    let is_text = |k: usize| k == 0 || k + 1 >= COLUMNS.len();
     let mut out = String::new();
     for (index, row) in rows.iter().enumerate() {
         let cells = row.iter().zip(&widths).enumerate().map(|(k, (cell, width))| {
-            let left = k == 0 || k > 14;
-            if left { format!("{cell:<width$}") } else { format!("{cell:>width$}") }
+            if is_text(k) { format!("{cell:<width$}") } else { format!("{cell:>width$}") }
         });
         let _ = writeln!(out, "| {} |", cells.collect::<Vec<_>>().join(" | "));
         if index == 0 {
-            let rules = widths.iter().enumerate().map(|(k, width)| {
-                if k == 0 || k > 14 { "-".repeat(*width) } else { "-".repeat(width - 1) + ":" }
-            });
+            let rules = widths
+                .iter()
+                .enumerate()
+                .map(|(k, width)| if is_text(k) { "-".repeat(*width) } else { "-".repeat(width - 1) + ":" });
             let _ = writeln!(out, "| {} |", rules.collect::<Vec<_>>().join(" | "));
         }
     }

@@ -21,7 +21,7 @@ use std::path::Path;
 /// The systems, with their headings.
 pub const SYSTEMS: [(&str, &str); 2] = [("pmasynrm", "PMaSynRM drive"), ("zs9", "ZS9")];
 
-/// How many cases there are, and how they ended.
+/// The number of cases, by their end.
 #[derive(Clone, Copy, Debug, Default, Serialize)]
 pub struct Tally {
     /// Cases.
@@ -52,6 +52,11 @@ impl Tally {
 impl Outcome {
     fn worst_current_a(&self) -> f64 {
         self.current_until_a.max(self.current_after_a)
+    }
+
+    /// A failed device forces the current: true where it does.
+    fn is_forced(&self) -> bool {
+        self.fault.ends_with("-shorted")
     }
 
     fn current_share(&self) -> f64 {

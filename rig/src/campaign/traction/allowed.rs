@@ -1,4 +1,4 @@
-//! What a fault of the PMaSynRM drive may come to.
+//! The consequences that a fault of the PMaSynRM drive may have.
 
 use super::cases::Case;
 use super::faults::Cause;
@@ -69,7 +69,7 @@ impl Drive {
         }
     }
 
-    /// How far the link can rise between a sample at the trip level and safe gates, in V.
+    /// The rise of the link between a sample at the trip level and safe gates, in V.
     fn link_rise_v(&self) -> f64 {
         let LineFilter { capacitance_f, .. } = LineFilter::TRACTION;
         let most_a = 2.0 * CURRENT_SHARE * self.machine.folder.parameters.trip_current_a;
@@ -93,9 +93,9 @@ impl Drive {
     }
 }
 
-/// How far the speed tracker lags behind, in s: 2/500 rad/s.
+/// The speed tracker's lag, in s: 2/500 rad/s.
 const TRACKING_S: f64 = 4e-3;
-/// What a current that no sample finds above the trip level may reach between two samples, over that level.
+/// The largest current between two samples of which neither is above the trip level, over that level.
 const BETWEEN_SAMPLES: f64 = 1.1;
 /// From an interrupt's instant to the gates, in s.
 const SAFE_STATE_S: f64 = 25e-6;

@@ -1,4 +1,4 @@
-//! Where the faults of the PMaSynRM drive come.
+//! The operating points at which the faults of the PMaSynRM drive come.
 
 use super::faults::{Cause, faults};
 use crate::campaign::Action;
@@ -14,7 +14,7 @@ pub struct Point {
     pub speed_rpm: f64,
     /// Share of the envelope, motoring and braking.
     pub share: f64,
-    /// Whether it is one of the fast campaign's.
+    /// `true` for one of the fast campaign's.
     pub fast: bool,
 }
 
@@ -22,7 +22,7 @@ const fn point(speed_rpm: f64, share: f64, fast: bool) -> Point {
     Point { speed_rpm, share, fast }
 }
 
-/// Where the faults come: every mode at several speeds. Patterns of square wave need torque below 4,455 r/min.
+/// The points at which the faults come: every mode at several speeds. Patterns of square wave need torque below 4,455 r/min.
 const POINTS: [Point; 18] = [
     point(0.0, 0.8, false),
     point(100.0, 0.8, false),
@@ -48,12 +48,12 @@ const POINTS: [Point; 18] = [
 const RUNAWAY_FROM_RPM: f64 = 5_000.0;
 
 impl Named<Cause> {
-    /// Whether it comes at rest, and the rotor is pushed off.
+    /// `true` if it comes at rest, and the rotor is pushed off.
     pub(super) fn needs_rest(&self) -> bool {
         self.name.ends_with("at-rest")
     }
 
-    /// Whether it can come there.
+    /// `true` if it can come there.
     fn fits(&self, point: &Point) -> bool {
         let speed_rpm = point.speed_rpm.abs();
         match self.cause {
@@ -72,12 +72,12 @@ pub struct Case {
     pub(super) fault: Named<Cause>,
     pub(super) point: Point,
     pub(super) action: Action,
-    /// When the fault comes, in s.
+    /// The time of the fault, in s.
     pub(super) at_s: f64,
 }
 
 impl Case {
-    /// What a filter searches.
+    /// The name that a filter searches.
     pub fn name(&self) -> String {
         format!("pmasynrm {} {} {}", self.fault.name, self.point.speed_rpm, self.action.name())
     }

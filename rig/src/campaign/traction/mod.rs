@@ -21,13 +21,13 @@ use crate::run::{CLOCK, Interrupts};
 use crate::scenario::System;
 use crate::scenario::traction::Traction;
 use crate::trace::Row;
-use crate::without::Without;
+use crate::without::Ablation;
 use anyhow::Result;
 use faults::Cause;
 use tractive::control::{Demand, Gains};
 use tractive::drive::traction::Settings;
 use tractive::machine::Tables;
-use tractive::modulation::{Devices, Ladder, Mode};
+use tractive::modulation::{Ladder, Mode, SwitchLimits};
 
 /// Full torque is reversed in 0.15 s where it cannot step; the aftermath is several electrical turns, and the link's oscillation.
 const STAGES: Stages = Stages { torque_s: -0.09, turn_s: 0.1, end_s: 0.3, aftermath_s: 0.06 };
@@ -35,16 +35,17 @@ const STAGES: Stages = Stages { torque_s: -0.09, turn_s: 0.1, end_s: 0.3, afterm
 const MEAN_S: f64 = 0.04;
 /// Step of a case's trace, in s.
 const TRACE_STEP_S: f64 = 50e-6;
-/// How fast a rotor that is pushed off gets faster, in r/min per s.
+/// The acceleration of a rotor that is pushed off, in r/min per s.
 const PUSH_RPM_S: f64 = 2_000.0;
-/// How fast a rotor that runs away gets faster, in r/min per s: twice what the machine itself can do.
+/// The acceleration of a rotor that runs away, in r/min per s: twice what the machine itself can do.
 const RUNAWAY_RPM_S: f64 = 12_000.0;
 
 /// The drive, with one protection off or none.
 pub struct Drive {
-    machine: Machine,
+    /// The machine that it drives.
+    pub machine: Machine,
     tables: &'static Tables,
-    without: Option<Without>,
+    without: Option<Ablation>,
     ladder: Ladder,
 }
 
@@ -53,7 +54,7 @@ impl Drive {
     ///
     /// # Errors
     /// Where its folder is not there.
-    pub fn new(without: Option<Without>) -> Result<Self> {
+    pub fn new(without: Option<Ablation>) -> Result<Self> {
         let machine = Machine::load(Traction::MACHINE)?;
         let tables = without.map_or(machine.tables, |without| without.tables(machine.tables));
         Ok(Self { machine, tables, without, ladder: Ladder::PAPER })
@@ -62,11 +63,6 @@ impl Drive {
     /// The same with the modes of another ladder.
     pub fn on(self, ladder: Ladder) -> Self {
         Self { ladder, ..self }
-    }
-
-    /// The machine's folder.
-    pub fn machine(&self) -> &Machine {
-        &self.machine
     }
 
     /// Runs one case.
@@ -78,12 +74,12 @@ impl Drive {
         let mut tasks = self.tasks();
         let tick_s = f64::from(CLOCK.tick_s);
         tasks.drive(&mut bench, |bench| {
-            let safe_s = bench.observed().safe.map(|(at, _)| at as f64 * tick_s - LEAD_S);
+            let safe_s = bench.observed.safe.map(|(at, _)| at as f64 * tick_s - LEAD_S);
             safe_s.is_none_or(|safe_s| bench.time_s() < safe_s + STAGES.aftermath_s)
         })?;
         let rows = bench.rows();
         let before = rows.iter().take_while(|row| row.t_s < case.at_s.max(FAULT_S));
-        let observed = *bench.observed();
+        let observed = bench.observed;
         let seen = Seen {
             observed,
             trip: tasks.trip(),
@@ -104,18 +100,14 @@ impl Drive {
         Ok(Outcome::new(&setting, &case.fault, &seen, allowed))
     }
 
-    fn devices(&self) -> Devices {
-        Devices::new(250, 0, self.tables.ratings.max_switching_hz, &CLOCK)
+    fn devices(&self) -> SwitchLimits {
+        SwitchLimits::new(250, 0, self.tables.ratings.max_switching_hz, &CLOCK)
     }
 
     fn tasks(&self) -> Tasks<'static> {
         let devices = self.devices();
         let settings = Settings { clock: CLOCK, devices, gains: Gains::DEFAULT };
-        let tasks = Tasks::new(self.tables, settings, devices.shortest_half_ticks).on(self.ladder);
-        match self.without {
-            Some(without) => tasks.without(without),
-            None => tasks,
-        }
+        Tasks::new(self.tables, settings, devices.shortest_half_ticks).on(self.ladder).without(self.without)
     }
 
     /// A sound bench.

@@ -20,21 +20,21 @@ pub struct Ride {
     pub speed: Vec<(f64, f64)>,
     /// Torques in N·m, each from its time on, and whether the demand's rate is limited.
     pub torque: Vec<(f64, (f64, bool))>,
-    /// Whether the drive is enabled, each from its time on.
+    /// The permissions of the drive, each from its time on.
     pub enable: Vec<(f64, bool)>,
     /// Voltages of the line, each from its time on.
     pub line: Vec<(f64, f64)>,
-    /// What goes wrong.
+    /// The fault that is injected.
     pub injection: Option<Injection<Kind>>,
     /// Length, in s.
     pub duration_s: f64,
 }
 
-/// What a ride left.
+/// The results of a ride.
 pub struct Ridden {
     /// The trace.
     pub rows: Vec<Row>,
-    /// What a fault did.
+    /// The effects of a fault.
     pub observed: Observed,
     /// The latched fault.
     pub trip: Option<Trip>,
@@ -65,11 +65,11 @@ impl Drive {
         let mut tripped_s = None;
         tasks.drive(&mut bench, |bench| {
             // Once it has stopped there is little to see.
-            if bench.observed().safe.is_some() {
+            if bench.observed.safe.is_some() {
                 tripped_s.get_or_insert(bench.time_s());
             }
             tripped_s.is_none_or(|tripped_s| bench.time_s() < tripped_s + STAGES.aftermath_s)
         })?;
-        Ok(Ridden { rows: bench.rows().to_vec(), observed: *bench.observed(), trip: tasks.trip() })
+        Ok(Ridden { rows: bench.rows().to_vec(), observed: bench.observed, trip: tasks.trip() })
     }
 }

@@ -27,7 +27,7 @@ impl LegGates {
     /// All three off.
     pub const OFF: Self = Self { high: false, middle: false, low: false };
 
-    /// Whether upper and lower terminal are on the positive rail; `None` unless that is what the leg decides.
+    /// The connection of upper and lower terminal to the positive rail; `None` unless that is what the leg decides.
     fn terminals(self) -> Option<[bool; 2]> {
         match (self.high, self.middle, self.low) {
             (true, false, true) => Some([true, false]),
@@ -52,11 +52,11 @@ pub struct IllegalState {
     pub leg: char,
     /// Its gates, printed in the order high, middle, low.
     pub gates: LegGates,
-    /// When it began, in s.
+    /// The time at which it began, in s.
     pub time_s: f64,
 }
 
-/// What the gates make of the bridge.
+/// The state into which the gates put the bridge.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Bridge {
     /// Every terminal on a rail: for the upper and the lower motor, the terminals' shares of the link as a vector.
@@ -100,7 +100,7 @@ impl Bridge {
         Self::of(gates, 0.0).unwrap_or(Self::Partly(gates))
     }
 
-    /// Whether diodes decide on a terminal.
+    /// `true` if diodes decide on a terminal.
     pub fn is_free(&self) -> bool {
         matches!(self, Self::Off | Self::Partly(_))
     }

@@ -59,7 +59,7 @@ impl Zs9Plant {
         self.step_with(bridge, feed, high.max(SHORTEST_S.min(longest_s)))
     }
 
-    /// What conducts now.
+    /// The path that conducts now.
     fn feed(&self, bridge: &Bridge) -> Feed {
         let excess = self.excess_a(bridge);
         if excess > NONE_A {
@@ -75,7 +75,7 @@ impl Zs9Plant {
         }
     }
 
-    /// Whether the same still conducts after a step.
+    /// `true` if the same path still conducts after a step.
     fn holds(&self, bridge: &Bridge, feed: Feed, trial: &Trial) -> bool {
         match feed {
             Feed::Source if self.source == Source::Bidirectional => self.link_after_v(trial) >= -NONE_V,

@@ -16,16 +16,14 @@
 mod bridge;
 mod diode;
 mod means;
-mod motor;
 mod network;
 mod step;
-mod vector;
 
+pub use super::motor::{Motor, MotorEnergies};
+pub use super::vector::Vector;
 pub use bridge::{IllegalState, LegGates};
 pub use means::{Means, MotorMeans};
-pub use motor::{Motor, MotorEnergies};
 pub use network::{NetworkState, ZNetwork};
-pub use vector::Vector;
 
 use super::legs::{Clamp, LONGEST_STEP_S};
 use super::{PlantSettings, SpeedSource};
@@ -37,7 +35,7 @@ use tractive_tablegen::{MachineFolder, SmoothMap};
 /// Link voltage for which steps are short enough at least, in V.
 const LEAST_LINK_V: f64 = 50.0;
 
-/// What connects the source with the network.
+/// The connection of the source with the network.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Source {
     /// A switch for both directions, on outside shoot-through.
@@ -47,16 +45,16 @@ pub enum Source {
     Diode,
 }
 
-/// What the plant is built with.
+/// The parts of the plant.
 #[derive(Clone, Copy, Debug)]
 pub struct Zs9Settings {
     /// The network.
     pub network: ZNetwork,
-    /// What connects the source with it.
+    /// The connection of the source with it.
     pub source: Source,
     /// Source voltage U_dc, in V, above 0.
     pub source_v: f64,
-    /// How the true machines differ from their folders: the upper motor, the lower one.
+    /// The deviations of the true machines from their folders: the upper motor, the lower one.
     pub motors: [PlantSettings; 2],
 }
 
@@ -83,16 +81,22 @@ pub struct Zs9Energies {
 /// Source, network, bridge, motors.
 #[derive(Clone, Debug)]
 pub struct Zs9Plant {
-    network: ZNetwork,
-    source: Source,
-    source_v: f64,
+    /// Inductances and capacitances of the network; change them, as all of this, between two steps.
+    pub parts: ZNetwork,
+    /// The connection between source and network.
+    pub source: Source,
+    /// Source voltage U_dc, in V, above 0.
+    pub source_v: f64,
     clamp: Clamp,
-    network_state: NetworkState,
-    motors: [Motor; 2],
+    /// Inductor currents and capacitor voltages.
+    pub network: NetworkState,
+    /// The upper motor and the lower one.
+    pub motors: [Motor; 2],
     /// Of the motors' angles.
     sin_cos: [(f64, f64); 2],
     time_s: f64,
-    energies: Zs9Energies,
+    /// Energies since the beginning.
+    pub energies: Zs9Energies,
     means: Adder,
 }
 
@@ -110,11 +114,11 @@ impl Zs9Plant {
             Motor::new(machines[1], lower, &settings.motors[1]),
         ];
         Self {
-            network: settings.network,
+            parts: settings.network,
             source: settings.source,
             source_v: settings.source_v,
             clamp: clamp.of_both(&other),
-            network_state: NetworkState::even(0.0, settings.source_v),
+            network: NetworkState::even(0.0, settings.source_v),
             sin_cos: motors.each_ref().map(|motor| (motor.angle_turns() * TAU).sin_cos()),
             motors,
             time_s: 0.0,
@@ -153,71 +157,21 @@ impl Zs9Plant {
         self.time_s
     }
 
-    /// The upper motor and the lower one.
-    pub fn motors(&self) -> &[Motor; 2] {
-        &self.motors
-    }
-
-    /// The motors, to set loads, currents and speeds.
-    pub fn motors_mut(&mut self) -> &mut [Motor; 2] {
-        &mut self.motors
-    }
-
-    /// Inductor currents and capacitor voltages.
-    pub fn network(&self) -> NetworkState {
-        self.network_state
-    }
-
-    /// Sets inductor currents and capacitor voltages.
-    pub fn set_network(&mut self, state: NetworkState) {
-        self.network_state = state;
-    }
-
-    /// Source voltage U_dc, in V.
-    pub fn source_v(&self) -> f64 {
-        self.source_v
-    }
-
-    /// Sets the source voltage, in V, above 0.
-    pub fn set_source_v(&mut self, source_v: f64) {
-        self.source_v = source_v;
-    }
-
-    /// Another connection between source and network.
-    pub fn set_source(&mut self, source: Source) {
-        self.source = source;
-    }
-
-    /// Another capacitance, in F, above 0; the voltages stay.
-    pub fn set_capacitance_f(&mut self, capacitance_f: f64) {
-        self.network.capacitance_f = capacitance_f;
-    }
-
-    /// Inductance and capacitance of the network.
-    pub fn network_parts(&self) -> &ZNetwork {
-        &self.network
-    }
-
     /// `U_in = v1 + v2 − U_dc`: the link's voltage outside shoot-through, in V.
     pub fn link_v(&self) -> f64 {
-        let [v1, v2] = self.network_state.capacitors_v;
+        let [v1, v2] = self.network.capacitors_v;
         v1 + v2 - self.source_v
-    }
-
-    /// Energies since the beginning.
-    pub fn energies(&self) -> Zs9Energies {
-        self.energies
     }
 
     /// Energy stored in the network and in the motors' fields, in J.
     pub fn stored_j(&self) -> f64 {
-        self.network.stored_j(&self.network_state) + self.motors.iter().map(Motor::field_j).sum::<f64>()
+        self.parts.stored_j(&self.network) + self.motors.iter().map(Motor::field_j).sum::<f64>()
     }
 
-    /// What the energies leave unexplained since a time when `stored_j` was stored, in J, all energies counted from zero:
+    /// The residual of the energies since a time when `stored_j` was stored, in J, all energies counted from zero:
     /// `source − inductors − Σ (copper + mechanical) − change of what is stored`.
     pub fn residual_j(&self, stored_j: f64) -> f64 {
-        let used = |motor: &Motor| motor.energies().copper_j + motor.energies().mechanical_j;
+        let used = |motor: &Motor| motor.energies.copper_j + motor.energies.mechanical_j;
         self.energies.source_j
             - self.energies.inductors_j
             - self.motors.iter().map(used).sum::<f64>()

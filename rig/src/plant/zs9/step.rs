@@ -4,10 +4,11 @@ use super::bridge::{Bridge, LegGates, freewheeling};
 use super::means::Seen;
 use super::network::NetworkState;
 use super::{Vector, Zs9Plant};
+use crate::plant::runge_kutta::{along, rotated};
 use crate::plant::{StatorSlopes, Turning};
 use core::f64::consts::TAU;
 
-/// What feeds the network on the source's side.
+/// The feed of the network on the source's side.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Feed {
     /// The source: `u_s = U_dc`.
@@ -49,7 +50,7 @@ pub struct Trial {
 impl Zs9Plant {
     fn state(&self) -> State {
         let [upper, lower] = &self.motors;
-        let ([i1, i2], [v1, v2]) = (self.network_state.inductors_a, self.network_state.capacitors_v);
+        let ([i1, i2], [v1, v2]) = (self.network.inductors_a, self.network.capacitors_v);
         [upper.id_a, upper.iq_a, lower.id_a, lower.iq_a, i1, i2, v1, v2]
     }
 
@@ -85,21 +86,18 @@ impl Zs9Plant {
         let Trial { dt_s, state, sums, area, .. } = *trial;
         let before = self.seen();
         for (k, motor) in self.motors.iter_mut().enumerate() {
-            (motor.id_a, motor.iq_a) = (state[2 * k], state[2 * k + 1]);
-            motor.energies.electrical_j += sums[3 * k];
-            motor.energies.copper_j += sums[3 * k + 1];
-            motor.energies.mechanical_j += motor.rotor.finish(sums[3 * k + 2], dt_s);
+            let energies = [sums[3 * k], sums[3 * k + 1], sums[3 * k + 2]];
+            motor.finish([state[2 * k], state[2 * k + 1]], energies, dt_s);
             self.sin_cos[k] = (motor.rotor.angle_turns() * TAU).sin_cos();
         }
-        self.network_state =
-            NetworkState { inductors_a: [state[4], state[5]], capacitors_v: [state[6], state[7]] };
+        self.network = NetworkState { inductors_a: [state[4], state[5]], capacitors_v: [state[6], state[7]] };
         self.energies.source_j += sums[6];
         self.energies.inductors_j += sums[7];
         self.time_s += dt_s;
         self.means.add(dt_s, &area, [sums[2], sums[5]], &before, &self.seen());
     }
 
-    /// What the means take from a step's ends.
+    /// The values at a step's end that the means take.
     fn seen(&self) -> [Seen; 2] {
         [0, 1].map(|k| {
             let motor = &self.motors[k];
@@ -108,7 +106,7 @@ impl Zs9Plant {
         })
     }
 
-    /// How far the inductors' current is above what the bridge's gates ask for, in A: the source gives it, or, below zero,
+    /// The excess of the inductors' current over what the bridge's gates ask for, in A: the source gives it, or, below zero,
     /// the bridge's diodes take up the difference.
     pub(super) fn excess_a(&self, bridge: &Bridge) -> f64 {
         let y = self.state();
@@ -122,7 +120,7 @@ impl Zs9Plant {
         y[4] + y[5] - self.demand(y, &self.shares(y, &trial.end, bridge))
     }
 
-    /// How far half of the inductors' current is above what the bridge's gates ask for, in A: the link rises; below zero it falls.
+    /// The excess of half of the inductors' current over what the bridge's gates ask for, in A: the link rises; below zero it falls.
     pub(super) fn rising_a(&self, bridge: &Bridge) -> f64 {
         let y = self.state();
         0.5 * (y[4] + y[5]) - self.demand(&y, &self.shares(&y, &self.still(bridge), bridge))
@@ -167,7 +165,7 @@ impl Zs9Plant {
         };
         let link_v = capacitors_v - feed_v;
         let [upper, lower] = [0, 1].map(|k| self.motor_slopes(k, y, frames, &shares, link_v));
-        let slopes = self.network.slopes(&network, feed_v, bridge_a);
+        let slopes = self.parts.slopes(&network, feed_v, bridge_a);
         let ([di1, di2], [dv1, dv2]) = (slopes.inductors_a, slopes.capacitors_v);
         (
             [upper.id_a_s, upper.iq_a_s, lower.id_a_s, lower.iq_a_s, di1, di2, dv1, dv2],
@@ -179,7 +177,7 @@ impl Zs9Plant {
                 lower.copper_w,
                 lower.torque_nm,
                 feed_v * (inductors_a - bridge_a),
-                self.network.loss_w(&network),
+                self.parts.loss_w(&network),
             ],
         )
     }
@@ -212,7 +210,7 @@ impl Zs9Plant {
         [0, 1].map(|k| stationary[k].to_rotor(frames[k].sin_cos))
     }
 
-    /// What the motors draw from the link, in A: `1.5 (s·i)` of both.
+    /// The current that the motors draw from the link, in A: `1.5 (s·i)` of both.
     #[inline]
     fn demand(&self, y: &State, shares: &Shares) -> f64 {
         let [(d1, q1), (d2, q2)] = *shares;
@@ -238,8 +236,8 @@ impl Zs9Plant {
         let a = draw_rate(0.0);
         let b = draw_rate(1.0) - a;
         let (capacitors_v, inductors_a) = (y[6] + y[7], y[4] + y[5]);
-        let inductance = self.network.inductance_h;
-        (capacitors_v + self.network.resistance_ohm * inductors_a + inductance * (a + b * capacitors_v))
+        let inductance = self.parts.inductance_h;
+        (capacitors_v + self.parts.resistance_ohm * inductors_a + inductance * (a + b * capacitors_v))
             / (2.0 + inductance * b)
     }
 }
@@ -261,20 +259,10 @@ fn frames(bridge: &Bridge, sin_cos: [(f64, f64); 2], turning: &[Turning; 2], t_s
     })
 }
 
-#[inline]
-fn along(y: &State, slope: &State, dt_s: f64) -> State {
-    let mut out = *y;
-    for (value, rate) in out.iter_mut().zip(slope) {
-        *value += dt_s * rate;
-    }
-    out
-}
-
 /// Sine and cosine after turning by an angle in rad.
 #[inline]
-fn turned((sin, cos): (f64, f64), by: f64) -> (f64, f64) {
-    let (s, c) = small_sin_cos(by);
-    (sin * c + cos * s, cos * c - sin * s)
+fn turned(from: (f64, f64), by: f64) -> (f64, f64) {
+    rotated(from, small_sin_cos(by))
 }
 
 /// Sine and cosine; for the small angle of a step by a series that is exact to rounding.

@@ -1,28 +1,27 @@
 //! The PMaSynRM drive's tasks on its bench.
 
 use crate::bench::{Bench, Simulated};
-use crate::run::{Interrupts, Supervisor, on_host, turn};
-use crate::trace::Recording;
-use crate::without::Without;
+use crate::run::{Interrupts, Supervisor, turn};
+use crate::without::Ablation;
 use anyhow::Result;
 use tractive::control::{Demand, LinkWindow};
 use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
 use tractive::frames::Abc;
 use tractive::machine::{Ratings, Tables};
-use tractive::modulation::{CarrierPeriod, Ladder, Schedule};
-use tractive::operator::{self, Desk, Feedback, Line, OperatorPort, Request, Slot, Status, slot_s};
+use tractive::modulation::{CarrierHalf, Ladder, Schedule};
+use tractive::operator::{self, Feedback, Line, Mailboxes, OperatorPort, Request, Slot, Status, slot_s};
 use tractive::ports::Report;
 use tractive::ports::{ControlPort, PwmPort, Sample};
-use tractive::protection::{LegFaults, SafeState, Trip};
-use tractive::protocol::Station;
+use tractive::protection::{LegFaults, MaskedFaults, SafeState, Trip};
+use tractive::protocol::CanEndpoint;
 use tractive::recorder::Recorder;
 use tractive::time::{Clock, Instant};
 
 /// The bench behind a board's ports; the first error ends the run.
 struct Port<'a, 'w> {
     bench: &'a mut Bench,
-    without: Option<Without>,
-    desk: &'a Desk,
+    without: Option<Ablation>,
+    desk: &'a Mailboxes,
     ratings: &'a Ratings,
     wire: Option<&'a mut Wire<'w>>,
     error: Option<anyhow::Error>,
@@ -30,8 +29,16 @@ struct Port<'a, 'w> {
 
 /// The drive's end of the protocol, and who is at the other end.
 struct Wire<'w> {
-    station: Station,
+    station: CanEndpoint,
     supervisor: &'w mut dyn Supervisor,
+}
+
+impl Port<'_, '_> {
+    /// The findings that drivers and monitors of the legs still tell.
+    fn found(&self) -> LegFaults {
+        let found = self.bench.leg_faults();
+        self.without.map_or(found, |without| without.leg_faults(found))
+    }
 }
 
 impl ControlPort for Port<'_, '_> {
@@ -61,7 +68,7 @@ impl ControlPort for Port<'_, '_> {
         self.bench.enter(now, safe);
     }
 
-    fn overrun_ticks(&mut self, _now: Instant) -> u32 {
+    fn overrun_ticks(&mut self, _now: Instant, _deadline_ticks: u32) -> u32 {
         self.bench.control_late_ticks()
     }
 
@@ -71,8 +78,7 @@ impl ControlPort for Port<'_, '_> {
     }
 
     fn leg_faults(&mut self) -> LegFaults {
-        let found = self.bench.leg_faults();
-        self.without.map_or(found, |without| without.leg_faults(found))
+        self.found()
     }
 }
 
@@ -84,7 +90,7 @@ impl PwmPort for Port<'_, '_> {
         })
     }
 
-    fn play(&mut self, now: Instant, next: &CarrierPeriod) {
+    fn play(&mut self, now: Instant, next: &CarrierHalf) {
         self.bench.play(now, *next);
     }
 
@@ -98,8 +104,7 @@ impl PwmPort for Port<'_, '_> {
     }
 
     fn leg_faults(&mut self) -> LegFaults {
-        let found = self.bench.leg_faults();
-        self.without.map_or(found, |without| without.leg_faults(found))
+        self.found()
     }
 }
 
@@ -128,34 +133,18 @@ impl OperatorPort for Port<'_, '_> {
     }
 }
 
-/// Runs until the recording is complete; a supervisor commands over the protocol.
-pub fn run_on_host(
-    name: &str,
-    bench: Bench,
-    tables: &'static Tables,
-    settings: Settings,
-    first_half_ticks: u32,
-    line: Option<Line>,
-    supervisor: Option<&mut dyn Supervisor>,
-) -> Result<Recording> {
-    let recorder = Recorder::new();
-    let mut tasks = Tasks::new(tables, settings, first_half_ticks).recorded_by(&recorder).operated_on(line);
-    tasks.wire = supervisor.map(|supervisor| Wire { station: Station::new(&tables.ratings), supervisor });
-    on_host(name, bench, tasks, |index| recorder.read(index))
-}
-
 /// Both tasks and the cells between them.
 pub struct Tasks<'a> {
     control: ControlTask,
     pwm: PwmTask,
     shared: Shared<'a>,
-    desk: Desk,
+    desk: Mailboxes,
     slot: Slot,
     operator: operator::Settings<'static>,
     clock: Clock,
     /// Over the protocol, if there is a supervisor.
     wire: Option<Wire<'a>>,
-    without: Option<Without>,
+    without: Option<Ablation>,
 }
 
 impl<'a> Tasks<'a> {
@@ -177,7 +166,7 @@ impl<'a> Tasks<'a> {
             control: ControlTask::new(tables, settings, first_control),
             pwm: PwmTask::new(tables, settings, first_pwm).after_halves_of(first_half_ticks),
             shared: Shared::new(),
-            desk: Desk::new(),
+            desk: Mailboxes::new(),
             slot: Slot::new(),
             operator: operator::Settings::rated(&tables.ratings, slot_s(&settings.clock), None),
             clock: settings.clock,
@@ -192,6 +181,13 @@ impl<'a> Tasks<'a> {
         self
     }
 
+    /// The same commanded over the protocol, if there is a supervisor.
+    pub fn commanded_by(mut self, supervisor: Option<&'a mut (dyn Supervisor + '_)>) -> Self {
+        let station = CanEndpoint::new(self.operator.ratings);
+        self.wire = supervisor.map(|supervisor| Wire { station, supervisor });
+        self
+    }
+
     /// The same with a flight recorder.
     pub fn recorded_by(mut self, recorder: &'a Recorder) -> Self {
         self.shared = Shared::recorded_by(recorder);
@@ -203,11 +199,11 @@ impl<'a> Tasks<'a> {
         Self { pwm: self.pwm.scheduled(Schedule::on(ladder, &self.clock)), ..self }
     }
 
-    /// The same with a protection off; its levels are the tables' business.
-    pub fn without(self, without: Without) -> Self {
-        let disarmed = without.disarmed();
+    /// The same with a protection off, or none; its levels are the tables' business.
+    pub fn without(self, without: Option<Ablation>) -> Self {
+        let disarmed = without.map_or(MaskedFaults::NONE, Ablation::disarmed);
         let (control, pwm) = (self.control.without(disarmed), self.pwm.without(disarmed));
-        Self { control, pwm, without: Some(without), ..self }
+        Self { control, pwm, without, ..self }
     }
 
     /// The latched fault.

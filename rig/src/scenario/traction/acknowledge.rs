@@ -1,19 +1,10 @@
 //! A gate driver fails under torque: the fault, what is refused meanwhile, the acknowledge, and the machine caught again.
 
-use super::line::{self, within};
-use super::{Options, Plan, Traction};
-use crate::analysis::{self, Figures};
+use super::line;
+use super::line::within;
+use super::prelude::*;
 use crate::bench::LinePlan;
-use crate::machine::Machine;
-use crate::options::finite;
-use crate::report::Page;
-use crate::rows::mean;
-use crate::scenario::Scenario;
 use crate::steps::held;
-use crate::trace::Recording;
-use crate::verdict::{Verdict, worst};
-use clap::Args;
-use serde::Serialize;
 use tractive::machine::Ratings;
 use tractive::operator::Request;
 use tractive::protection::Fault;
@@ -87,15 +78,10 @@ impl Scenario<Traction> for Acknowledge {
         let error = (torque_nm / (0.5 * machine.folder.parameters.max_torque_nm) - 1.0).abs();
         let mut verdicts = line::verdicts(recording, &REFUSALS);
         verdicts.extend([
-            Verdict::at_most(
-                "states that are not the expected ones",
-                f64::from(u8::from(found != STATES)),
-                0.0,
-                "–",
-            ),
-            Verdict::at_most("fault with another name", f64::from(u8::from(!named)), 0.0, "–"),
-            Verdict::at_most("current between fault and enable (of the largest)", current, 0.02, "–"),
-            Verdict::at_most("mean torque off the demand at the end (share)", error, 0.01, "–"),
+            Verdict::ours("states that are not the expected ones", f64::from(u8::from(found != STATES)), 0.0),
+            Verdict::ours("fault with another name", f64::from(u8::from(!named)), 0.0),
+            Verdict::ours("current between fault and enable (of the largest)", current, 0.02),
+            Verdict::ours("mean torque off the demand at the end (share)", error, 0.01),
         ]);
         line::figures(&mut figures, recording);
         figures.set("verdicts", verdicts);

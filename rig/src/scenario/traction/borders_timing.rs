@@ -1,20 +1,14 @@
 //! A short drive to and fro across each border between two modes, and in and out of pulses, for `cargo xtask test --only landings`: what
 //! control executes while a mode changes and no longer.
 
+use super::prelude::*;
 use super::script::Script;
-use super::{Options, Plan, Traction};
-use crate::machine::Machine;
-use crate::report::Page;
-use crate::scenario::Scenario;
-use crate::trace::Recording;
-use clap::Args;
-use serde::Serialize;
 
 /// Full torque, at speeds that swing across a border, and an enable that comes and goes.
 #[derive(Clone, Copy, Debug, Args, Serialize)]
 pub struct BordersTiming;
 
-/// Where the mode has changed going up and down at full torque, with a little room, in r/min.
+/// Speeds at which the mode has changed going up and down at full torque, with a little room, in r/min.
 const SWINGS_RPM: [(f64, f64); 5] =
     [(550.0, 620.0), (835.0, 915.0), (1050.0, 1145.0), (1650.0, 1760.0), (1835.0, 1910.0)];
 const SWINGS: usize = 4;

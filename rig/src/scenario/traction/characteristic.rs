@@ -1,25 +1,18 @@
 //! Torque accuracy, efficiency and current at the characteristic points: the paper's figure 10.
 
-use super::{LEAD_S, Options, Plan, Traction};
-use crate::analysis::{self, Figures, SteadyPoint};
+use super::prelude::*;
+use super::{LEAD_S, scaled_nm};
+use crate::analysis::SteadyPoint;
 use crate::bound;
-use crate::machine::Machine;
 use crate::mtpa_methods;
 use crate::options::RunOptions;
-use crate::report::Page;
-use crate::scenario::Scenario;
-use crate::trace::Recording;
-use crate::verdict::{Verdict, torque_bound, worst};
 use crate::{figures, spectrum};
-use clap::Args;
-use serde::Serialize;
-use tractive::control::Demand;
 
 /// The points one after another in one run: ramp, settle, measure.
 #[derive(Clone, Copy, Debug, Args, Serialize)]
 pub struct Characteristic;
 
-/// Speed in r/min and torque in N·m.
+/// Speed in r/min and torque in N·m, of a machine rated at 2,000 r/min.
 const POINTS: [(f64, f64); 7] = [
     (200.0, 1235.0),
     (500.0, 1235.0),
@@ -29,6 +22,7 @@ const POINTS: [(f64, f64); 7] = [
     (2000.0, 859.4),
     (2000.0, 1174.6),
 ];
+/// From one of these speeds to the next.
 const SLOPE_RPM_S: f64 = 1000.0;
 const SETTLE_S: f64 = 0.6;
 const MEASURE_S: f64 = 0.3;
@@ -42,7 +36,9 @@ struct Slot {
     ends_s: f64,
 }
 
-fn slots() -> Vec<Slot> {
+/// The points at this machine's own speeds and torques.
+fn slots(machine: &Machine) -> Vec<Slot> {
+    let scale = machine.folder.parameters.rated_speed_rpm / 2_000.0;
     let (mut t_s, mut last_rpm) = (0.0, POINTS[0].0);
     POINTS
         .iter()
@@ -51,23 +47,24 @@ fn slots() -> Vec<Slot> {
             let steady_s = begins_s + (speed_rpm - last_rpm).abs() / SLOPE_RPM_S;
             let ends_s = steady_s + SETTLE_S + MEASURE_S;
             (t_s, last_rpm) = (ends_s, speed_rpm);
-            Slot { speed_rpm, torque_nm, begins_s, steady_s, ends_s }
+            let torque_nm = scaled_nm(torque_nm, machine);
+            Slot { speed_rpm: speed_rpm * scale, torque_nm, begins_s, steady_s, ends_s }
         })
         .collect()
 }
 
-/// What was measured at each point.
+/// Measurements at each point.
 fn points(recording: &Recording, machine: &Machine) -> Vec<SteadyPoint> {
     let point = |slot: Slot| {
         let window = (slot.ends_s - MEASURE_S, slot.ends_s);
         analysis::steady_point(recording, window, slot.torque_nm, &machine.folder)
     };
-    slots().into_iter().map(point).collect()
+    slots(machine).into_iter().map(point).collect()
 }
 
 impl Scenario<Traction> for Characteristic {
-    fn plan(&self, _options: &Options, _machine: &Machine) -> Plan {
-        let slots = slots();
+    fn plan(&self, _options: &Options, machine: &Machine) -> Plan {
+        let slots = slots(machine);
         let speed =
             slots.iter().flat_map(|slot| [(slot.steady_s, slot.speed_rpm), (slot.ends_s, slot.speed_rpm)]);
         let speed = speed.collect();
@@ -82,7 +79,7 @@ impl Scenario<Traction> for Characteristic {
 
     fn figures(&self, recording: &Recording, options: &Options, machine: &Machine) -> Figures {
         let points = points(recording, machine);
-        let beside = slots().into_iter().map(|slot| {
+        let beside = slots(machine).into_iter().map(|slot| {
             let window = (slot.ends_s - MEASURE_S, slot.ends_s);
             bound::beside(recording, window, options, machine)
         });
@@ -100,10 +97,15 @@ impl Scenario<Traction> for Characteristic {
     }
 
     fn plots_beside(&self, recording: &Recording, options: &Options, machine: &Machine, page: &mut Page) {
-        for slot in slots() {
+        for slot in slots(machine) {
+            let window = (slot.ends_s - 0.04, slot.ends_s);
+            let title = format!("{} r/min, {} N·m: phase current u", slot.speed_rpm, slot.torque_nm);
+            page.phase_current_in(&title, recording, window);
+        }
+        for slot in slots(machine) {
             let title = format!("{} r/min, {} N·m", slot.speed_rpm, slot.torque_nm);
             let window = (slot.ends_s - MEASURE_S, slot.ends_s);
-            spectrum::draw(page, &title, recording, window, options, machine);
+            spectrum::draw(page, recording, (&title, window), options, machine);
         }
         figures::draw(page, recording, &points(recording, machine), machine);
     }
@@ -112,18 +114,13 @@ impl Scenario<Traction> for Characteristic {
         page.torque(recording);
         page.plot("Speed", "r/min", recording, &[("speed", |row| row.speed_rpm)]);
         page.phase_current(recording);
-        for slot in slots() {
-            let window = (slot.ends_s - 0.04, slot.ends_s);
-            let title = format!("{} r/min, {} N·m: phase current u", slot.speed_rpm, slot.torque_nm);
-            page.phase_current_in(&title, recording, window);
-        }
     }
 }
 
 /// Above this share of its demand a point is not limited: what is left is single precision.
 const WHOLE: f64 = 0.999;
 
-/// What is wanted of the mean torque: that demanded, and where the link does not give it, what the drive says instead.
+/// Bound of the mean torque: the one demanded, and where the link does not give it, what the drive says instead.
 fn torque_verdicts(points: &[SteadyPoint], options: &RunOptions) -> Vec<Verdict> {
     let most = torque_bound(options, 0.3, 1.5);
     let (given, limited): (Vec<_>, Vec<_>) =
@@ -133,7 +130,7 @@ fn torque_verdicts(points: &[SteadyPoint], options: &RunOptions) -> Vec<Verdict>
     if !limited.is_empty() {
         let error = worst(limited.iter().map(|point| point.reference_error_percent.abs()));
         let what = "mean torque off what the drive says, where the link gives less, in %";
-        verdicts.push(Verdict::at_most(what, error, most, "–"));
+        verdicts.push(Verdict::ours(what, error, most));
     }
     verdicts
 }

@@ -1,19 +1,10 @@
 //! Full braking into a link that cannot take the energy: the chopper takes it; half the resistor is lost, then all of it, and the torque
 //! is folded back; then the source takes energy back and all of the torque returns.
 
-use super::line::{self, within};
-use super::{Options, Plan, Traction};
-use crate::analysis::{self, Figures};
+use super::line;
+use super::line::within;
+use super::prelude::*;
 use crate::bench::LinePlan;
-use crate::machine::Machine;
-use crate::options::finite;
-use crate::report::Page;
-use crate::rows::mean;
-use crate::scenario::Scenario;
-use crate::trace::{Recording, Row};
-use crate::verdict::{Verdict, worst};
-use clap::Args;
-use serde::Serialize;
 use tractive::machine::Ratings;
 use tractive::operator::Request;
 
@@ -35,7 +26,7 @@ const HALF_S: f64 = 1.7;
 const NONE_S: f64 = 2.4;
 const TAKES_S: f64 = 3.1;
 const DURATION_S: f64 = 4.8;
-/// What is left of a resistor that is lost, over the whole one.
+/// Rest of a resistor that is lost, over the whole one.
 const LOST: f64 = 1e6;
 
 /// A stretch of the run.
@@ -128,28 +119,21 @@ impl Scenario<Traction> for Chopper {
         let most_kw = machine.folder.parameters.max_power_w / 1e3;
         let mut verdicts = line::verdicts(recording, &[]);
         verdicts.extend([
-            Verdict::at_most("drive tripped", f64::from(u8::from(recording.trip().is_some())), 0.0, "–"),
-            Verdict::at_most("link's rise, of the way to its trip: chopper", rise(whole), 0.3, "–"),
-            Verdict::at_most("link's rise, of the way to its trip: half of it", rise(half), 0.7, "–"),
-            Verdict::at_most("link's rise, of the way to its trip: none", rise(none), 0.9, "–"),
-            Verdict::at_most(
+            Verdict::ours("drive tripped", f64::from(u8::from(recording.trip().is_some())), 0.0),
+            Verdict::ours("link's rise, of the way to its trip: chopper", rise(whole), 0.3),
+            Verdict::ours("link's rise, of the way to its trip: half of it", rise(half), 0.7),
+            Verdict::ours("link's rise, of the way to its trip: none", rise(none), 0.9),
+            Verdict::ours(
                 "torque folded back while the chopper takes it (share)",
                 1.0 - whole.torque_nm / source.torque_nm,
                 0.02,
-                "–",
             ),
-            Verdict::at_most(
-                "braking power with half of the resistor (of all)",
-                half.braking_kw / most_kw,
-                0.7,
-                "–",
-            ),
-            Verdict::at_most("braking power without it (of all)", none.braking_kw / most_kw, 0.1, "–"),
-            Verdict::at_most(
+            Verdict::ours("braking power with half of the resistor (of all)", half.braking_kw / most_kw, 0.7),
+            Verdict::ours("braking power without it (of all)", none.braking_kw / most_kw, 0.1),
+            Verdict::ours(
                 "peak current over the largest one",
                 worst(stretches.iter().map(|stretch| stretch.current_peak_a / largest_a)),
                 1.15,
-                "–",
             ),
         ]);
         line::figures(&mut figures, recording);

@@ -1,16 +1,8 @@
 //! Full torque in one step, and back.
 
 use super::load_steps::verdicts;
+use super::prelude::*;
 use super::script::{BEGIN_S, Script};
-use super::{Options, Plan, Traction};
-use crate::analysis::{self, Figures};
-use crate::machine::Machine;
-use crate::options::finite;
-use crate::report::Page;
-use crate::scenario::Scenario;
-use crate::trace::Recording;
-use clap::Args;
-use serde::Serialize;
 
 /// 0 → full torque → 0 at `--speed`.
 #[derive(Clone, Copy, Debug, Args, Serialize)]
@@ -45,7 +37,7 @@ impl Scenario<Traction> for FullStep {
         // Where pulses are few the demand has a slew limit: there is no step to judge.
         let carrier = recording.rows.iter().all(|row| row.mode.is_carrier());
         if carrier {
-            figures.set("verdicts", verdicts(&steps, options));
+            figures.set("verdicts", verdicts(&steps, options, machine));
         }
         figures.set("steps", steps);
         figures

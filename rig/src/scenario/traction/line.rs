@@ -1,4 +1,4 @@
-//! What the scenarios with a line side share: its parts, and what is judged in all of them.
+//! Parts and verdicts that all scenarios with a line side share.
 
 use crate::analysis::Figures;
 use crate::machine::Machine;
@@ -22,15 +22,15 @@ pub const LINK: DcLinkSettings = DcLinkSettings {
 /// Largest power of the drive that these parts are for, in W.
 const POWER_W: f64 = 246.4e3;
 
-/// Whether a time lies in one of some windows (from, until).
+/// True of a time that lies in one of some windows (from, until).
 pub fn within(windows: &[(f64, f64)], t_s: f64) -> bool {
     windows.iter().any(|(from, until)| (from - 1e-9..until - 1e-9).contains(&t_s))
 }
 
-/// When a state began.
+/// Beginning of a state.
 #[derive(Clone, Debug, Serialize)]
 pub struct Entered {
-    /// When, in s.
+    /// Time, in s.
     pub at_s: f64,
     /// The state.
     pub state: &'static str,
@@ -54,9 +54,9 @@ pub fn states(recording: &Recording) -> Vec<Entered> {
 /// A command that was not followed.
 #[derive(Clone, Debug, Serialize)]
 pub struct Refused {
-    /// When, in s.
+    /// Time, in s.
     pub at_s: f64,
-    /// Why.
+    /// Reason.
     pub reason: &'static str,
 }
 
@@ -84,15 +84,10 @@ pub fn verdicts(recording: &Recording, expected_refusals: &[&str]) -> Vec<Verdic
         switches.discharge && (switches.main || switches.precharge)
     });
     vec![
-        Verdict::at_most(
-            "gates switched on while none was permitted",
-            stray_edges(recording) as f64,
-            0.0,
-            "–",
-        ),
-        Verdict::at_most("refusals that are not the expected ones", unlike as f64, 0.0, "–"),
-        Verdict::at_most("slots with discharge resistor and a contactor", both.count() as f64, 0.0, "–"),
-        Verdict::at_most("energy of the link not accounted for (share)", unaccounted(recording), 1e-4, "–"),
+        Verdict::ours("gates switched on while none was permitted", stray_edges(recording) as f64, 0.0),
+        Verdict::ours("refusals that are not the expected ones", unlike as f64, 0.0),
+        Verdict::ours("slots with discharge resistor and a contactor", both.count() as f64, 0.0),
+        Verdict::ours("energy of the link not accounted for (share)", unaccounted(recording), 1e-4),
     ]
 }
 

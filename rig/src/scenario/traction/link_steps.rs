@@ -1,7 +1,7 @@
 //! Steps of the DC link under full load.
 
 use super::script::{BEGIN_S, Script};
-use super::{Options, Plan, Traction};
+use super::{Options, Plan, Traction, scaled_rpm, udc_v};
 use crate::analysis::{self, Figures};
 use crate::machine::Machine;
 use crate::report::Page;
@@ -11,13 +11,14 @@ use crate::verdict::{Verdict, worst};
 use clap::Args;
 use serde::Serialize;
 
-/// At several speeds: the link falls by 200 V, comes back, rises by 200 V, comes back.
+/// At several speeds: the link falls by 2/15 of its nominal voltage, comes back, rises by as much, comes back.
 #[derive(Clone, Copy, Debug, Args, Serialize)]
 pub struct LinkSteps;
 
 const SPEEDS_RPM: [f64; 5] = [300.0, 1000.0, 1500.0, 1800.0, 3000.0];
 const SETTLE_S: f64 = 0.5;
 const HOLD_S: f64 = 0.15;
+/// Of a nominal voltage of 1,500 V.
 const STEP_V: f64 = 200.0;
 const SHARES: [f64; 4] = [-1.0, 0.0, 1.0, 0.0];
 const SLOT_S: f64 = SETTLE_S + SHARES.len() as f64 * HOLD_S;
@@ -28,19 +29,21 @@ fn begins_s(slot: usize) -> f64 {
 
 impl Scenario<Traction> for LinkSteps {
     fn plan(&self, options: &Options, machine: &Machine) -> Plan {
-        let nominal_v = options.udc.unwrap_or(machine.folder.parameters.dc_link_nominal_v);
+        let nominal_v = udc_v(options, machine);
+        let step_v = STEP_V * (machine.folder.parameters.dc_link_nominal_v / 1500.0);
         let mut script = Script {
             torque: vec![(0.0, machine.folder.parameters.max_torque_nm)],
             slew_limited: true,
             duration_s: begins_s(SPEEDS_RPM.len()),
             ..Script::default()
         };
-        for (slot, speed_rpm) in SPEEDS_RPM.into_iter().enumerate() {
+        let speeds_rpm = SPEEDS_RPM.map(|speed_rpm| scaled_rpm(speed_rpm, machine));
+        for (slot, speed_rpm) in speeds_rpm.into_iter().enumerate() {
             let begin = begins_s(slot);
             script.speed.extend([(begin + 0.5 * SETTLE_S, speed_rpm), (begin + SLOT_S, speed_rpm)]);
             let steps = SHARES.iter().enumerate();
             script.link.extend(
-                steps.map(|(k, share)| (begin + SETTLE_S + k as f64 * HOLD_S, nominal_v + share * STEP_V)),
+                steps.map(|(k, share)| (begin + SETTLE_S + k as f64 * HOLD_S, nominal_v + share * step_v)),
             );
         }
         script.plan()

@@ -1,6 +1,6 @@
 //! Load steps at 200 r/min: the paper's figure 8.
 
-use super::{LEAD_S, Options, Plan, Traction};
+use super::{LEAD_S, Options, Plan, Traction, scaled_nm};
 use crate::analysis::{self, Figures, StepResponse};
 use crate::machine::Machine;
 use crate::options::RunOptions;
@@ -23,8 +23,7 @@ const LEVELS_NM: [f64; 13] =
 
 /// The levels as shares of this machine's largest torque.
 fn levels_nm(machine: &Machine) -> [f64; 13] {
-    let scale = machine.folder.parameters.max_torque_nm / LEVELS_NM[LEVELS_NM.len() / 2];
-    LEVELS_NM.map(|level| level * scale)
+    LEVELS_NM.map(|level_nm| scaled_nm(level_nm, machine))
 }
 
 impl Scenario<Traction> for LoadSteps {
@@ -49,7 +48,7 @@ impl Scenario<Traction> for LoadSteps {
         });
         let steps: Vec<_> = steps.map(|step| analysis::step_response(recording, &step)).collect();
         let mut figures = analysis::common(recording);
-        figures.set("verdicts", verdicts(&steps, options));
+        figures.set("verdicts", verdicts(&steps, options, machine));
         figures.set("steps", steps);
         figures
     }
@@ -63,13 +62,14 @@ impl Scenario<Traction> for LoadSteps {
     }
 }
 
-/// What is wanted of every step. Of a drive with flaws it is the final mean alone: what noise and ripple do to the torque is no
+/// Bounds of every step. Of a drive with flaws it is the final mean alone: what noise and ripple do to the torque is no
 /// part of the step.
-pub fn verdicts(steps: &[StepResponse], options: &RunOptions) -> Vec<Verdict> {
+pub fn verdicts(steps: &[StepResponse], options: &RunOptions, machine: &Machine) -> Vec<Verdict> {
     let most = |value: fn(&StepResponse) -> f64| worst(steps.iter().map(value));
-    // 0.3 % of the command (1.5 % with flaws) or 2 N·m, whichever is more, counts as one.
+    // 0.3 % of the command (1.5 % with flaws) or 0.16 % of the largest torque, whichever is more, counts as one.
     let percent = bound(options, 0.3, 1.5);
-    let error = |step: &StepResponse| step.final_error_nm.abs() / (0.01 * percent * step.to_nm).max(2.0);
+    let least_nm = scaled_nm(2.0, machine);
+    let error = |step: &StepResponse| step.final_error_nm.abs() / (0.01 * percent * step.to_nm).max(least_nm);
     let ideal = |at_most: f64| bound(options, at_most, f64::INFINITY);
     vec![
         Verdict::at_most("t90 in ms", most(|step| step.t90_ms), ideal(2.5), "3.0 to 3.6; the paper about 2"),
@@ -86,7 +86,7 @@ pub fn verdicts(steps: &[StepResponse], options: &RunOptions) -> Vec<Verdict> {
             "5 % in 4.2 ms",
         ),
         Verdict::at_most(
-            &format!("final mean over {percent} % or 2 N·m"),
+            &format!("final mean over {percent} % or 0.16 % of the largest torque"),
             worst(steps.iter().map(error)),
             torque_bound(options, 1.0, 1.0),
             "0.02 to 0.4 %",

@@ -10,6 +10,7 @@ mod link_steps;
 mod load_steps;
 mod mode_borders;
 mod precharge;
+mod prelude;
 mod restart;
 mod reversal;
 mod script;
@@ -43,6 +44,7 @@ use crate::machine::Machine;
 use crate::options::{On, not_negative, within};
 use crate::plant::{DcLinkSettings, Plant, SpeedSource};
 use crate::report::{self, Page};
+use crate::run::traction::{Tasks, run_in_qemu};
 use crate::run::{self, CLOCK, Supervisor};
 use crate::trace::Recording;
 use anyhow::Result;
@@ -51,24 +53,35 @@ use serde::Serialize;
 use serde_json::{Map, Value};
 use tractive::control::{Demand, Gains};
 use tractive::drive::traction::Settings;
-use tractive::modulation::Devices;
+use tractive::modulation::SwitchLimits;
 use tractive::operator::Line;
 use tractive::operator::LineTimes;
+use tractive::recorder::Recorder;
+use tractive::time::Clock;
 use tractive::wire::Setup;
 
 /// The usual lead, in s.
 const LEAD_S: f64 = 0.1;
 
+/// Step of the trace unless a scenario needs a finer one, in s.
+const STEP_S: f64 = 50e-6;
+
 /// The PMaSynRM drive.
 #[derive(Clone, Copy, Debug)]
 pub struct Traction;
 
-/// What all of its scenarios know.
+/// Options of all its scenarios.
 #[derive(Clone, Debug, Args, Serialize)]
 pub struct TractionOptions {
     /// Leave the dead time uncompensated: neither the pulses are corrected nor is the sixth harmonic of the voltage followed.
     #[arg(long)]
     pub uncompensated: bool,
+    /// Rate of the control interrupt, in Hz; without it 10,000, or 20,000 for a machine whose devices switch faster than 10 kHz.
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1_000..=100_000))]
+    pub control_hz: Option<u32>,
+    /// Time after its sample in which the angle is read, in µs; each time at another instant.
+    #[arg(long, default_value_t = 0.0, value_parser = not_negative, allow_negative_numbers = true, hide = true)]
+    pub angle_jitter_us: f64,
     /// By how much the PWM timer starts later, in µs.
     #[arg(long, default_value_t = 0.0, value_parser = not_negative, allow_negative_numbers = true, hide = true)]
     pub pwm_delay_us: f64,
@@ -83,7 +96,9 @@ pub struct Plan {
     pub lead_s: f64,
     /// Length of the recording, in s.
     pub duration_s: f64,
-    /// What turns the rotor, from the run's beginning on.
+    /// Step of the rows that figures are taken from, in s, however densely the trace is written.
+    pub judged_step_s: f64,
+    /// The rotor's drive, from the run's beginning on.
     pub speed: SpeedSource,
     /// DC-link voltages: (time in s, V), each from its time on; the run's own before the first.
     pub link: Vec<(f64, f64)>,
@@ -91,7 +106,7 @@ pub struct Plan {
     pub operator: Box<dyn Operator + Send>,
     /// The line side, where the scenario is about it; otherwise the link is stiff and the drive is commanded directly.
     pub line: Option<LinePlan>,
-    /// What goes wrong.
+    /// The fault, if there is one.
     pub injection: Option<Injection<Kind>>,
     /// From this time on control is told the same currents again and again, in s.
     pub freeze_at_s: Option<f64>,
@@ -110,6 +125,7 @@ impl Plan {
         Self {
             lead_s,
             duration_s,
+            judged_step_s: STEP_S,
             speed: SpeedSource::profile(later),
             link: Vec::new(),
             operator: Box::new(operator),
@@ -135,16 +151,18 @@ impl System for Traction {
     type Recording = Recording;
 
     fn trace_step_s(_own: &TractionOptions) -> f64 {
-        50e-6
+        STEP_S
     }
 
     fn check(options: &Options, scenario: &Map<String, Value>, machine: &Machine) -> Result<()> {
         let parameters = &machine.folder.parameters;
         let (fastest_rpm, most_nm) = (3.0 * parameters.max_speed_rpm, 10.0 * parameters.max_torque_nm);
-        let udc_v = udc_v(options, machine);
+        let (udc_v, clock) = (udc_v(options, machine), clock(options, machine));
         let own = |name: &str| scenario.get(name).and_then(Value::as_f64).unwrap_or(0.0);
         within(&[
-            ("--dt", options.dt.unwrap_or(0.1), f64::from(CLOCK.ticks_per_s).recip(), 0.1),
+            ("--dt", options.dt.unwrap_or(0.1), f64::from(clock.ticks_per_s).recip(), 0.1),
+            // A carrier lasts a control period at least.
+            ("max_switching_hz", parameters.max_switching_hz, 50.0, f64::from(control_hz(options, machine))),
             ("--udc", udc_v, 0.0, 10.0 * parameters.dc_link_max_v),
             ("--torque-scale", own("torque_scale"), -10.0, 10.0),
             ("--speed", own("speed"), -fastest_rpm, fastest_rpm),
@@ -161,21 +179,25 @@ impl System for Traction {
         machine: &Machine,
         supervisor: Option<&mut dyn Supervisor>,
     ) -> Result<Recording> {
-        let setup = setup(&plan, options, supervisor.is_some());
+        let setup = setup(&plan, options, machine, supervisor.is_some());
         let bench = bench(plan, &setup, options, machine);
         match options.on {
             On::Host => {
                 let gains = if options.own.uncompensated { Gains::WITHOUT_SIXTH } else { Gains::DEFAULT };
-                let settings = Settings { clock: CLOCK, devices: devices(&setup, machine), gains };
+                let clock = clock(options, machine);
+                let settings = Settings { clock, devices: devices(&setup, machine), gains };
                 settings.check(machine.tables).map_err(run::refused)?;
                 let ratings = &machine.tables.ratings;
                 let line = setup.line.map(|times| Line::rated(ratings, times.precharge_s, times.discharge_s));
                 let first = first_half_ticks(&setup, machine);
-                run::traction::run_on_host(name, bench, machine.tables, settings, first, line, supervisor)
+                let recorder = Recorder::new();
+                let tasks = Tasks::new(machine.tables, settings, first).recorded_by(&recorder);
+                let tasks = tasks.operated_on(line).commanded_by(supervisor);
+                run::on_host(name, bench, tasks, |index| recorder.read(index))
             }
             On::Qemu => {
                 let patient = supervisor.as_ref().is_some_and(|supervisor| supervisor.is_typed());
-                run::traction::run_in_qemu(name, bench, setup, &options.emulator(patient)?, supervisor)
+                run_in_qemu(name, bench, setup, &options.emulator(patient)?, supervisor)
             }
         }
     }
@@ -195,6 +217,16 @@ impl System for Traction {
     }
 }
 
+/// A speed of the machine that the scenarios were written for, in r/min, as the same share of this machine's largest one.
+fn scaled_rpm(speed_rpm: f64, machine: &Machine) -> f64 {
+    speed_rpm * (machine.folder.parameters.max_speed_rpm / 6000.0)
+}
+
+/// A torque of that machine, in N·m, as the same share of this machine's largest one.
+fn scaled_nm(torque_nm: f64, machine: &Machine) -> f64 {
+    torque_nm * (machine.folder.parameters.max_torque_nm / 1235.0)
+}
+
 /// The link's voltage, in V.
 fn udc_v(options: &Options, machine: &Machine) -> f64 {
     options.udc.unwrap_or(machine.folder.parameters.dc_link_nominal_v)
@@ -204,9 +236,19 @@ fn ticks(microseconds: f64) -> u32 {
     (microseconds * 1e-6 * f64::from(CLOCK.ticks_per_s)).round() as u32
 }
 
-fn setup(plan: &Plan, options: &Options, over_protocol: bool) -> Setup {
+/// The rate of control, in Hz.
+fn control_hz(options: &Options, machine: &Machine) -> u32 {
+    options.own.control_hz.unwrap_or(Clock::control_hz(machine.tables.ratings.max_switching_hz))
+}
+
+fn clock(options: &Options, machine: &Machine) -> Clock {
+    run::clock(control_hz(options, machine))
+}
+
+fn setup(plan: &Plan, options: &Options, machine: &Machine, over_protocol: bool) -> Setup {
     let uncompensated = options.own.uncompensated;
     Setup {
+        control_ticks: clock(options, machine).control_ticks,
         min_pulse_ticks: ticks(options.min_pulse_us),
         // What the firmware compensates.
         dead_time_ticks: if uncompensated { 0 } else { ticks(options.dead_time_us) },
@@ -217,9 +259,10 @@ fn setup(plan: &Plan, options: &Options, over_protocol: bool) -> Setup {
     }
 }
 
-fn devices(setup: &Setup, machine: &Machine) -> Devices {
-    let Setup { min_pulse_ticks, dead_time_ticks, .. } = *setup;
-    Devices::new(min_pulse_ticks, dead_time_ticks, machine.tables.ratings.max_switching_hz, &CLOCK)
+fn devices(setup: &Setup, machine: &Machine) -> SwitchLimits {
+    let Setup { control_ticks, min_pulse_ticks, dead_time_ticks, .. } = *setup;
+    let clock = Clock { control_ticks, ..CLOCK };
+    SwitchLimits::new(min_pulse_ticks, dead_time_ticks, machine.tables.ratings.max_switching_hz, &clock)
 }
 
 fn first_half_ticks(setup: &Setup, machine: &Machine) -> u32 {
@@ -228,29 +271,30 @@ fn first_half_ticks(setup: &Setup, machine: &Machine) -> u32 {
 
 fn bench(plan: Plan, setup: &Setup, options: &Options, machine: &Machine) -> Bench {
     let flaws = options.flaws(machine.folder.parameters.trip_current_a);
+    let angle_jitter_s = 1e-6 * options.own.angle_jitter_us;
     let settings = bench::Settings {
-        clock: CLOCK,
+        clock: clock(options, machine),
         first_half_ticks: first_half_ticks(setup, machine),
         dead_time_ticks: ticks(options.dead_time_us),
         lead_s: plan.lead_s,
         duration_s: plan.duration_s,
-        trace_step_s: options.dt.unwrap_or(Traction::trace_step_s(&options.own)),
+        trace_step_s: plan.judged_step_s,
         udc_v: udc_v(options, machine),
         link_steps: plan.link,
-        flaws: Flaws { freeze_at_s: plan.freeze_at_s, ..flaws },
+        flaws: Flaws { angle_jitter_s, freeze_at_s: plan.freeze_at_s, ..flaws },
         supply: Supply::Stiff,
         injection: plan.injection,
         limits: Limits::NONE,
     };
     let plant = Plant::new(&machine.folder, plan.speed, &options.plant());
-    let bench = Bench::new(plant, plan.operator, &settings);
-    match plan.line {
-        Some(line) => bench.with_line(line),
-        None => bench,
+    let bench = Bench::new(plant, plan.operator, &settings).with_line(plan.line);
+    match options.dt {
+        Some(dt_s) if dt_s != plan.judged_step_s => bench.writing_every(dt_s),
+        _ => bench,
     }
 }
 
-/// What the operator has to know of a link.
+/// Time constants of a link, as the operator has to know them.
 fn times(link: &DcLinkSettings) -> LineTimes {
     let seconds = |ohm: f64| (ohm * link.capacitance_f) as f32;
     LineTimes { precharge_s: seconds(link.precharge_ohm), discharge_s: seconds(link.discharge_ohm) }

@@ -1,15 +1,8 @@
 //! Mode borders crossed at constant speed, by torque alone.
 
+use super::prelude::*;
 use super::script::{BEGIN_S, Script};
-use super::{Options, Plan, Traction, switches};
-use crate::analysis::{self, Figures};
-use crate::machine::Machine;
-use crate::options::finite;
-use crate::report::Page;
-use crate::scenario::Scenario;
-use crate::trace::Recording;
-use clap::Args;
-use serde::Serialize;
+use super::{scaled_rpm, switches};
 
 /// Torque up to the envelope and back, slowly: small steps that the slew limit smooths. At `--speed`, or at two speeds one after the
 /// other.
@@ -20,7 +13,7 @@ pub struct ModeBorders {
     speed: Option<f64>,
 }
 
-/// Where torque alone leads from 7 to 3 pulses and back, and where it leads from 7 by 3 into square wave and out of it.
+/// Speeds at which torque alone leads from 7 to 3 pulses and back, and at which it leads from 7 by 3 into square wave and out of it.
 const SPEEDS_RPM: [f64; 2] = [1750.0, 1888.0];
 const LEVELS: usize = 800;
 /// So slow that the envelopes beside a switch, 100 ms away, are those of its torque within a percent.
@@ -34,7 +27,8 @@ const RAMP_S: f64 = 0.3;
 impl Scenario<Traction> for ModeBorders {
     fn plan(&self, _options: &Options, machine: &Machine) -> Plan {
         let most = machine.folder.parameters.max_torque_nm;
-        let speeds = self.speed.map_or(SPEEDS_RPM.to_vec(), |speed_rpm| vec![speed_rpm]);
+        let usual = SPEEDS_RPM.map(|speed_rpm| scaled_rpm(speed_rpm, machine));
+        let speeds = self.speed.map_or(usual.to_vec(), |speed_rpm| vec![speed_rpm]);
         let mut script = Script { slew_limited: true, ..Script::default() };
         for (slot, speed_rpm) in speeds.iter().enumerate() {
             let begin_s = BEGIN_S + slot as f64 * (SLOT_S + RAMP_S);

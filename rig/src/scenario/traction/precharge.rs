@@ -1,18 +1,10 @@
 //! From power-up to running and back to an empty link, by command, with commands on the way that are refused.
 
-use super::line::{self, within};
-use super::{Options, Plan, Traction};
-use crate::analysis::{self, Figures};
+use super::line;
+use super::line::within;
+use super::prelude::*;
 use crate::bench::LinePlan;
-use crate::machine::Machine;
-use crate::report::Page;
-use crate::rows::mean;
-use crate::scenario::Scenario;
 use crate::steps::held;
-use crate::trace::Recording;
-use crate::verdict::Verdict;
-use clap::Args;
-use serde::Serialize;
 use tractive::machine::Ratings;
 use tractive::operator::{Request, State};
 
@@ -21,7 +13,7 @@ use tractive::operator::{Request, State};
 pub struct Precharge;
 
 const DURATION_S: f64 = 7.0;
-/// When each command stands; what is refused is said beside it.
+/// Times at which each command stands; refusals are said beside them.
 const ENABLE: [(f64, f64); 4] = [
     (0.1, 0.15), /* link_not_charged */
     (0.5, 0.55), /* again */
@@ -77,15 +69,10 @@ impl Scenario<Traction> for Precharge {
         let error = (torque_nm / (0.65 * machine.folder.parameters.max_torque_nm) - 1.0).abs();
         let mut verdicts = line::verdicts(recording, &REFUSALS);
         verdicts.extend([
-            Verdict::at_most(
-                "source over link when the main contactor closes (share)",
-                gap_v / source_v,
-                0.025,
-                "–",
-            ),
-            Verdict::at_most("link at the end, V", ends_v, 60.0, "–"),
-            Verdict::at_most("not ready at the end", f64::from(u8::from(!ends)), 0.0, "–"),
-            Verdict::at_most("mean torque off the demand while running (share)", error, 0.01, "–"),
+            Verdict::ours("source over link when the main contactor closes (share)", gap_v / source_v, 0.025),
+            Verdict::ours("link at the end, V", ends_v, 60.0),
+            Verdict::ours("not ready at the end", f64::from(u8::from(!ends)), 0.0),
+            Verdict::ours("mean torque off the demand while running (share)", error, 0.01),
         ]);
         line::figures(&mut figures, recording);
         figures.set("verdicts", verdicts);

@@ -1,8 +1,8 @@
 //! Coasting with the gates off, and flying restart.
 
 use super::script::{BEGIN_S, Script};
-use super::{Options, Plan, Traction};
-use crate::analysis::{self, Catch, Figures};
+use super::{Options, Plan, Traction, scaled_rpm};
+use crate::analysis::{self, Figures, FlyingStart};
 use crate::machine::Machine;
 use crate::options::RunOptions;
 use crate::report::Page;
@@ -35,7 +35,8 @@ impl Scenario<Traction> for Restart {
             duration_s: begins_s(SPEEDS_RPM.len()),
             ..Script::default()
         };
-        for (slot, speed_rpm) in SPEEDS_RPM.into_iter().enumerate() {
+        let speeds_rpm = SPEEDS_RPM.map(|speed_rpm| scaled_rpm(speed_rpm, machine));
+        for (slot, speed_rpm) in speeds_rpm.into_iter().enumerate() {
             let begin = begins_s(slot);
             let (catch, release) = (begin + COAST_S, begin + SLOT_S - RELEASE_S);
             let envelope_nm = machine.envelope_nm(speed_rpm);
@@ -61,22 +62,24 @@ impl Scenario<Traction> for Restart {
 
     fn plots(&self, recording: &Recording, page: &mut Page) {
         page.overview(recording);
-        for (slot, speed_rpm) in SPEEDS_RPM.iter().enumerate() {
+        for slot in 0..SPEEDS_RPM.len() {
             let at_s = begins_s(slot) + COAST_S;
-            let title = format!("{speed_rpm} r/min caught: phase current u");
+            let speed_rpm =
+                analysis::window(recording, at_s, at_s + 1.0).first().map_or(0.0, |row| row.speed_rpm);
+            let title = format!("{speed_rpm:.0} r/min caught: phase current u");
             page.phase_current_in(&title, recording, (at_s - 0.01, at_s + 0.06));
         }
     }
 }
 
-fn verdicts(catches: &[Catch], options: &RunOptions) -> Vec<Verdict> {
+fn verdicts(catches: &[FlyingStart], options: &RunOptions) -> Vec<Verdict> {
     let other_mode = catches.iter().filter(|catch| catch.first_mode != catch.then_mode).count();
     // Coasting fast, the diodes' current may be beyond the largest.
-    let over = |catch: &Catch| {
+    let over = |catch: &FlyingStart| {
         let allowed_a = (catch.catching_current_a / catch.share_of_largest).max(catch.coasting_current_a);
         if catch.catching_current_a > 0.0 { catch.catching_current_a / allowed_a } else { 0.0 }
     };
-    let error = |catch: &Catch| (catch.final_error_nm / catch.demand_nm).abs() * 100.0;
+    let error = |catch: &FlyingStart| (catch.final_error_nm / catch.demand_nm).abs() * 100.0;
     let driven = catches.iter().filter(|catch| catch.demand_nm != 0.0);
     vec![
         Verdict::at_most("catches in another mode than the speed needs", other_mode as f64, 0.0, "–"),

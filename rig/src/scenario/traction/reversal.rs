@@ -1,17 +1,9 @@
 //! Full power reversed in one step in square wave, released in deep weakening, and applied again.
 
+use super::prelude::*;
+use super::scaled_rpm;
 use super::script::{BEGIN_S, Script};
-use super::{Options, Plan, Traction};
-use crate::analysis::{self, Figures};
-use crate::machine::Machine;
-use crate::options::finite;
-use crate::report::Page;
-use crate::scenario::Scenario;
 use crate::spectrum;
-use crate::trace::Recording;
-use crate::verdict::{Verdict, torque_bound, worst};
-use clap::Args;
-use serde::Serialize;
 
 /// At `--speed`: full power, full braking power, nothing, full power; each for 0.4 s, in steps.
 #[derive(Clone, Copy, Debug, Args, Serialize)]
@@ -31,7 +23,7 @@ impl Scenario<Traction> for Reversal {
         let most = machine.folder.parameters.max_torque_nm;
         let torque = SHARES.iter().enumerate().map(|(k, share)| (BEGIN_S + k as f64 * HOLD_S, share * most));
         Script {
-            speed: vec![(0.0, self.speed.unwrap_or(SPEED_RPM))],
+            speed: vec![(0.0, self.speed.unwrap_or(scaled_rpm(SPEED_RPM, machine)))],
             torque: torque.collect(),
             duration_s: BEGIN_S + SHARES.len() as f64 * HOLD_S,
             ..Script::default()
@@ -53,11 +45,10 @@ impl Scenario<Traction> for Reversal {
         figures.set(
             "verdicts",
             vec![
-                Verdict::at_most(
+                Verdict::ours(
                     "peak current over the larger steady peak",
                     worst(steps.iter().map(|step| step.peak_ratio)),
                     1.15,
-                    "–",
                 ),
                 Verdict::at_most(
                     "mean torque error at full power in %",
@@ -74,7 +65,8 @@ impl Scenario<Traction> for Reversal {
 
     fn plots_beside(&self, recording: &Recording, options: &Options, machine: &Machine, page: &mut Page) {
         let end_s = BEGIN_S + HOLD_S;
-        spectrum::draw(page, "full power", recording, (end_s - 0.5 * HOLD_S, end_s), options, machine);
+        let window = (end_s - 0.5 * HOLD_S, end_s);
+        spectrum::draw(page, recording, ("full power", window), options, machine);
     }
 
     fn plots(&self, recording: &Recording, page: &mut Page) {

@@ -7,18 +7,18 @@ use tractive::control::Demand;
 /// Time before the first event, in s.
 pub const BEGIN_S: f64 = 0.1;
 
-/// What happens when; times in s from the recording's beginning.
+/// Events; times in s from the recording's beginning.
 #[derive(Clone, Debug, Default)]
 pub struct Script {
     /// Speeds in r/min, straight lines between.
     pub speed: Vec<(f64, f64)>,
     /// Torques demanded in N·m, each from its time on; 0 before the first.
     pub torque: Vec<(f64, f64)>,
-    /// Whether the drive is enabled, each from its time on; enabled before the first.
+    /// Enables, each from its time on; enabled before the first.
     pub enable: Vec<(f64, bool)>,
     /// DC-link voltages in V, each from its time on; the run's own before the first.
     pub link: Vec<(f64, f64)>,
-    /// Whether the demand's rate of change is limited.
+    /// The demand's rate of change is limited.
     pub slew_limited: bool,
     /// Length, in s.
     pub duration_s: f64,

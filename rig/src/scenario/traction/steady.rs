@@ -1,20 +1,15 @@
 //! One operating point in steady state: distortion and torque ripple beside what the pulses allow.
 
+use super::TractionOptions;
+use super::prelude::*;
+use super::scaled_rpm;
 use super::script::Script;
-use super::{Options, Plan, Traction, TractionOptions};
-use crate::analysis::{self, Figures};
 use crate::bound;
-use crate::distortion::{self, Distortion};
-use crate::machine::Machine;
-use crate::options::finite;
+use crate::distortion;
+use crate::distortion::Distortion;
 use crate::options::{On, RunOptions};
-use crate::report::Page;
-use crate::scenario::{self, Scenario};
+use crate::scenario;
 use crate::spectrum;
-use crate::trace::Recording;
-use crate::verdict::Verdict;
-use clap::Args;
-use serde::Serialize;
 
 /// `--speed` and `--torque`.
 #[derive(Clone, Copy, Debug, Args, Serialize)]
@@ -30,20 +25,22 @@ pub struct Steady {
 const SPEED_RPM: f64 = 1000.0;
 /// Speed in r/min and torque in N·m at which the harmonics of the dead time are judged.
 const DEAD_TIME_POINT: (f64, f64) = (200.0, 100.0);
+/// The pulses' edges fall where they like between the samples: coarser ones would show more or less ripple than there is.
+const STEP_S: f64 = 5e-6;
 const SETTLE_S: f64 = 0.6;
 const MEASURE_S: f64 = 0.5;
 
 impl Scenario<Traction> for Steady {
     fn plan(&self, _options: &Options, machine: &Machine) -> Plan {
         let (speed_rpm, torque_nm) = self.point(machine);
-        Script {
+        let script = Script {
             speed: vec![(0.0, speed_rpm)],
             torque: vec![(0.0, torque_nm)],
             slew_limited: true,
             duration_s: SETTLE_S + MEASURE_S,
             ..Script::default()
-        }
-        .plan()
+        };
+        Plan { judged_step_s: STEP_S, ..script.plan() }
     }
 
     fn figures(&self, recording: &Recording, options: &Options, machine: &Machine) -> Figures {
@@ -72,14 +69,13 @@ impl Scenario<Traction> for Steady {
         figures
     }
 
-    /// The pulses' edges fall where they like between the samples: coarser ones would show more or less ripple than there is.
     fn trace_step_s(&self, _own: &TractionOptions) -> f64 {
-        5e-6
+        STEP_S
     }
 
     fn plots_beside(&self, recording: &Recording, options: &Options, machine: &Machine, page: &mut Page) {
         let window = (SETTLE_S, SETTLE_S + MEASURE_S);
-        spectrum::draw(page, "steady state", recording, window, options, machine);
+        spectrum::draw(page, recording, ("steady state", window), options, machine);
     }
 
     fn plots(&self, recording: &Recording, page: &mut Page) {
@@ -100,7 +96,7 @@ impl Steady {
     /// Speed in r/min and torque in N·m.
     fn point(&self, machine: &Machine) -> (f64, f64) {
         let torque_nm = self.torque.unwrap_or(machine.folder.parameters.max_torque_nm);
-        (self.speed.unwrap_or(SPEED_RPM), torque_nm)
+        (self.speed.unwrap_or(scaled_rpm(SPEED_RPM, machine)), torque_nm)
     }
 
     /// The same on the host with nothing that compensates the dead time.
@@ -117,10 +113,10 @@ impl Steady {
     }
 }
 
-/// What the dead time leaves of the harmonics that it makes.
+/// The dead time's harmonics, as far as they are left.
 fn dead_time_verdicts(measured: &Distortion, at_most: f64, how: &str) -> [Verdict; 2] {
     [5, 7].map(|order| {
         let share = measured.share_percent(order);
-        Verdict::at_most(&format!("harmonic {order} in % of the fundamental{how}"), share, at_most, "–")
+        Verdict::ours(&format!("harmonic {order} in % of the fundamental{how}"), share, at_most)
     })
 }

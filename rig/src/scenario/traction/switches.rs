@@ -4,7 +4,7 @@ use crate::report::Page;
 use crate::trace::Recording;
 use tractive::modulation::Mode;
 
-/// What is drawn before a switch and after it, in s.
+/// Time that is drawn before a switch and after it, in s.
 const AROUND_S: (f64, f64) = (0.03, 0.04);
 
 /// Line voltage and phase current around every change between pulsing modes.

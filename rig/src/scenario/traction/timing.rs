@@ -1,19 +1,13 @@
 //! A short drive through every mode and up to the highest speed, for `cargo xtask timing`: every instruction of the
 //! interrupts is logged there, so a second of it takes the emulator ten.
 
-use super::{Options, Plan, Traction, line};
+use super::line;
+use super::prelude::*;
 use crate::bench::LinePlan;
 use crate::inject::Injection;
 use crate::inject::sensor::CurrentFault;
 use crate::inject::traction::Kind;
-use crate::machine::Machine;
-use crate::options::{finite, not_negative};
-use crate::report::Page;
-use crate::scenario::Scenario;
-use crate::trace::Recording;
-use clap::Args;
-use serde::Serialize;
-use tractive::control::Demand;
+use crate::options::not_negative;
 use tractive::machine::Ratings;
 use tractive::operator::Request;
 
@@ -49,13 +43,13 @@ const SPEEDS_RPM: [f64; 6] = [150.0, 750.0, 1000.0, 1450.0, 1800.0, 2200.0];
 const RAMP_S: f64 = 0.03;
 const LAST_RAMP_S: f64 = 0.16;
 const HOLD_S: f64 = 0.03;
-/// What is left of the run behind the fault, in s.
+/// Rest of the run behind the fault, in s.
 const AFTER_FAULT_S: f64 = 0.005;
 const LEAD_S: f64 = 0.01;
-/// What `--offset-at` adds to a phase current, as a share of the largest: more than the sum of the phases may be.
+/// Offset that `--offset-at` adds to a phase current, as a share of the largest: more than the sum of the phases may be.
 const OFFSET: f64 = 0.2;
 
-/// When the operator charges, enables and wants all the torque, in s, and when the speeds begin.
+/// Times at which the operator charges, enables and wants all the torque, in s, and at which the speeds begin.
 const CHARGES_S: (f64, f64) = (0.1, 0.2);
 const ENABLES_S: f64 = 0.5;
 const PULLS_S: f64 = 0.6;

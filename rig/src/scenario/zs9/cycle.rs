@@ -1,24 +1,13 @@
 //! The whole traction cycle under torque control: the paper's figures 24 to 36.
 
-use super::{Options, Plan, Zs9, Zs9Options, free, rad_s};
-use crate::analysis::Figures;
-use crate::machine::Machine;
+use super::prelude::*;
 use crate::options::positive;
 use crate::plant::zs9::ZNetwork;
-use crate::report::Page;
-use crate::scenario::Scenario;
-use crate::zs9::figures;
-use crate::zs9::trace::{Recording, Row};
-use crate::zs9::{Orders, SeenMotors};
-use clap::Args;
-use serde::Serialize;
-use tractive::control::Demand;
-use tractive::ports::MotorDemand;
 
 /// 10 to 1,300 r/min at full torque, a cruise there, and back.
 #[derive(Clone, Copy, Debug, Args, Serialize)]
 pub struct Cycle {
-    /// How long it cruises, in s, up to 3600.
+    /// Time for which it cruises, in s, up to 3600.
     #[arg(long, default_value_t = 20.0, value_parser = cruise, allow_negative_numbers = true)]
     cruise: f64,
     /// Write edges.csv.
@@ -42,7 +31,7 @@ const MOVING_S: f64 = 16.5;
 /// The torque needs time to go, in which the speed still falls: half of `T/slew · T/J`, here with 4,000 N·m/s.
 const STOPPING_RPM: f64 = 2.9;
 
-/// What a motor is at.
+/// Phase of the cycle in which a motor is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Phase {
     Before,
@@ -89,15 +78,8 @@ impl Scenario<Zs9> for Cycle {
             };
             Orders { demands: [torque(one.0), torque(two.0)], loads_nm: [one.1, two.1], enable: true }
         };
-        Plan {
-            lead_s: LEAD_S,
-            duration_s: MOVING_S + cruise_s,
-            speeds: [free(INERTIA_KG_M2), free(INERTIA_KG_M2)],
-            from_rpm: [LOW_RPM; 2],
-            operator: Box::new(operator),
-            edges: self.edges,
-            line: None,
-        }
+        let times_s = (LEAD_S, MOVING_S + cruise_s);
+        Plan { edges: self.edges, ..Plan::driven(times_s, free(INERTIA_KG_M2), [LOW_RPM; 2], operator) }
     }
 
     fn figures(&self, recording: &Recording, options: &Options, _machine: &Machine) -> Figures {
@@ -136,45 +118,44 @@ impl Scenario<Zs9> for Cycle {
     }
 
     fn plots(&self, recording: &Recording, page: &mut Page) {
-        let all = (0.0, recording.rows.last().map_or(MOVING_S, |row| row.t_s));
-        let plot = |page: &mut Page, figure, title, unit, curves: &[figures::Curve]| {
-            figures::plot(page, figure, title, unit, recording, all, curves);
-        };
-        plot(page, "24 and 30", "link voltage U_in", "V", &[("U_in", |row| row.link_v)]);
-        plot(page, "25 and 31", "capacitor voltage", "V", &[("U_c", |row| row.capacitor_v)]);
-        plot(page, "26 and 32", "inductor current", "A", &[("i_L", |row| row.inductor_a)]);
+        let rows = figures::window(recording, 0.0, recording.rows.last().map_or(MOVING_S, |row| row.t_s));
+        plot(page, ("figures 24 and 30", "link voltage U_in", "V"), rows, &[("U_in", |row| row.link_v)]);
+        plot(page, ("figures 25 and 31", "capacitor voltage", "V"), rows, &[("U_c", |row| row.capacitor_v)]);
+        plot(page, ("figures 26 and 32", "inductor current", "A"), rows, &[("i_L", |row| row.inductor_a)]);
         plot(
             page,
-            "27 and 33",
-            "torque",
-            "N·m",
+            ("figures 27 and 33", "torque", "N·m"),
+            rows,
             &[("motor 1", |row| row.motors[0].torque_nm), ("motor 2", |row| row.motors[1].torque_nm)],
         );
         plot(
             page,
-            "28 and 34",
-            "speed",
-            "r/min",
+            ("figures 28 and 34", "speed", "r/min"),
+            rows,
             &[("motor 1", |row| row.motors[0].speed_rpm), ("motor 2", |row| row.motors[1].speed_rpm)],
         );
         plot(
             page,
-            "29 and 35",
-            "d and q currents of motor 1",
-            "A",
+            ("figures 29 and 35", "d and q currents of motor 1", "A"),
+            rows,
             &[("id", |row| row.motors[0].id_a), ("iq", |row| row.motors[0].iq_a)],
         );
-        plot(page, "29 and 35", "phase voltage, peak", "V", &[("motor 1", |row| row.motors[0].voltage_v)]);
-        figures::over_speed(page, "36", "torque over speed", "N·m", recording, |row| {
+        plot(
+            page,
+            ("figures 29 and 35", "phase voltage, peak", "V"),
+            rows,
+            &[("motor 1", |row| row.motors[0].voltage_v)],
+        );
+        figures::over_speed(page, ("figure 36", "torque over speed", "N·m"), &recording.rows, |row| {
             row.motors[0].torque_nm
         });
-        figures::over_speed(page, "36", "phase voltage over speed", "V", recording, |row| {
+        figures::over_speed(page, ("figure 36", "phase voltage over speed", "V"), &recording.rows, |row| {
             row.motors[0].voltage_v
         });
     }
 }
 
-/// What the energies of all rows leave unexplained, of the energy that went through the source either way, in percent.
+/// Energy of all rows that is left unexplained, of the energy that went through the source either way, in percent.
 fn residual_percent(rows: &[Row]) -> f64 {
     let through_j: f64 = rows.windows(2).map(|pair| (pair[1].source_j - pair[0].source_j).abs()).sum();
     match (rows.first(), rows.last()) {

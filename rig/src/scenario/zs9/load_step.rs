@@ -1,18 +1,7 @@
 //! Motor 2's load steps while motor 1 goes on: the paper's figures 14 to 19.
 
-use super::{Options, Plan, Zs9, free, rad_s, ramp};
-use crate::analysis::Figures;
-use crate::machine::Machine;
+use super::prelude::*;
 use crate::options::finite;
-use crate::report::Page;
-use crate::rows::mean;
-use crate::scenario::Scenario;
-use crate::zs9::figures;
-use crate::zs9::trace::{Recording, Row};
-use crate::zs9::{Orders, SeenMotors};
-use clap::Args;
-use serde::Serialize;
-use tractive::ports::MotorDemand;
 
 /// Both at 1,000 r/min with 60 N·m; motor 2's load steps at 0.6 s.
 #[derive(Clone, Copy, Debug, Args, Serialize)]
@@ -43,15 +32,7 @@ impl Scenario<Zs9> for LoadStep {
                 enable: true,
             }
         };
-        Plan {
-            lead_s: LEAD_S,
-            duration_s: DURATION_S,
-            speeds: [free(INERTIA_KG_M2), free(INERTIA_KG_M2)],
-            from_rpm: [SPEED_RPM; 2],
-            operator: Box::new(operator),
-            edges: true,
-            line: None,
-        }
+        Plan::driven((LEAD_S, DURATION_S), free(INERTIA_KG_M2), [SPEED_RPM; 2], operator)
     }
 
     fn figures(&self, recording: &Recording, options: &Options, _machine: &Machine) -> Figures {
@@ -75,21 +56,33 @@ impl Scenario<Zs9> for LoadStep {
     }
 
     fn plots(&self, recording: &Recording, page: &mut Page) {
-        let around = (STEP_S - 0.1, STEP_S + 0.2);
-        let plot = |page: &mut Page, figure, title, unit, curves: &[figures::Curve]| {
-            figures::plot(page, figure, title, unit, recording, around, curves);
-        };
-        plot(page, "14", "link voltage", "V", &[("U_in", |row| row.link_v), ("U_c", |row| row.capacitor_v)]);
-        plot(page, "15", "inductor current", "A", &[("i_L", |row| row.inductor_a)]);
-        let torques: &[figures::Curve] = &[
+        let rows = figures::window(recording, STEP_S - 0.1, STEP_S + 0.2);
+        plot(
+            page,
+            ("figure 14", "link voltage", "V"),
+            rows,
+            &[("U_in", |row| row.link_v), ("U_c", |row| row.capacitor_v)],
+        );
+        plot(page, ("figure 15", "inductor current", "A"), rows, &[("i_L", |row| row.inductor_a)]);
+        let torques: &[Curve] = &[
             ("motor 1", |row| row.motors[0].torque_nm),
             ("motor 2", |row| row.motors[1].torque_nm),
             ("load 2", |row| row.motors[1].load_nm),
         ];
-        plot(page, "16", "torque", "N·m", torques);
-        plot(page, "17", "speed of motor 2", "r/min", &[("motor 2", |row| row.motors[1].speed_rpm)]);
-        plot(page, "18", "speed of motor 1", "r/min", &[("motor 1", |row| row.motors[0].speed_rpm)]);
-        figures::phases(page, "19", recording, (STEP_S - 0.03, STEP_S + 0.05));
+        plot(page, ("figure 16", "torque", "N·m"), rows, torques);
+        plot(
+            page,
+            ("figure 17", "speed of motor 2", "r/min"),
+            rows,
+            &[("motor 2", |row| row.motors[1].speed_rpm)],
+        );
+        plot(
+            page,
+            ("figure 18", "speed of motor 1", "r/min"),
+            rows,
+            &[("motor 1", |row| row.motors[0].speed_rpm)],
+        );
+        figures::phases(page, "figure 19", figures::window(recording, STEP_S - 0.03, STEP_S + 0.05));
     }
 }
 

@@ -2,6 +2,7 @@
 
 mod cycle;
 mod load_step;
+mod prelude;
 mod reverse;
 mod steady;
 mod timing;
@@ -22,11 +23,12 @@ use crate::options::{On, positive};
 use crate::plant::SpeedSource;
 use crate::plant::zs9::{NetworkState, Zs9Plant, Zs9Settings};
 use crate::report::Page;
-use crate::run::{CLOCK, Supervisor, refused};
+use crate::run::{CLOCK, Supervisor, on_host, refused};
 use crate::zs9::bench::{Bench, BenchSettings};
 use crate::zs9::line::LineTimes;
+use crate::zs9::run::{Tasks, run_in_qemu};
 use crate::zs9::trace::Recording;
-use crate::zs9::{Operator, figures, run, settings};
+use crate::zs9::{Operator, figures, settings};
 use anyhow::{Result, bail};
 use clap::Args;
 use core::f64::consts::TAU;
@@ -34,6 +36,7 @@ use serde::Serialize;
 use serde_json::{Map, Value};
 use tractive::nine_switch::Scheme;
 use tractive::operator::Line;
+use tractive::recorder::DualRecorder;
 use tractive::wire::DualSetup;
 
 /// Source voltage, in V.
@@ -46,7 +49,7 @@ const LARGEST_V: f64 = 1200.0;
 #[derive(Clone, Copy, Debug)]
 pub struct Zs9;
 
-/// What all of the ZS9's scenarios know.
+/// Options of all the ZS9's scenarios.
 #[derive(Clone, Debug, Args, Serialize)]
 pub struct Zs9Options {
     /// Carrier frequency, in Hz, 10000 or 20000.
@@ -55,7 +58,7 @@ pub struct Zs9Options {
     /// Link voltage outside shoot-through, in V: 667 is a shoot-through duty of 0.2, 800 of 0.25.
     #[arg(long, default_value_t = 667.0, value_parser = positive, allow_negative_numbers = true)]
     pub uin: f64,
-    /// Where the zero vectors lie: s, rs, rthd, zvo, rthd-central or rthd-slide.
+    /// Place of the zero vectors: s, rs, rthd, zvo, rthd-central or rthd-slide.
     #[serde(serialize_with = "scheme_name")]
     #[arg(long, default_value = "rthd", value_parser = scheme)]
     pub scheme: Scheme,
@@ -74,16 +77,28 @@ pub struct Plan {
     pub lead_s: f64,
     /// Length of the recording, in s.
     pub duration_s: f64,
-    /// What turns the rotors.
+    /// The rotors' drive.
     pub speeds: [SpeedSource; 2],
     /// Speeds of free rotors at the beginning, in r/min.
     pub from_rpm: [f64; 2],
     /// Operator and loads.
     pub operator: Box<dyn Operator + Send>,
-    /// Whether edges are kept.
+    /// Edges are kept.
     pub edges: bool,
     /// The line side, where there is one; the network is then empty at first.
     pub line: Option<LineTimes>,
+}
+
+impl Plan {
+    /// For motors that are commanded directly; lead and length in s, speeds of free rotors at the beginning in r/min.
+    pub fn driven(
+        (lead_s, duration_s): (f64, f64),
+        speeds: [SpeedSource; 2],
+        from_rpm: [f64; 2],
+        operator: impl Operator + Send + 'static,
+    ) -> Self {
+        Self { lead_s, duration_s, speeds, from_rpm, operator: Box::new(operator), edges: true, line: None }
+    }
 }
 
 impl System for Zs9 {
@@ -126,12 +141,15 @@ impl System for Zs9 {
                 let line = line.map(|times| {
                     Line::rated(&ratings, times.precharge_s, times.discharge_s).without_chopper()
                 });
-                run::run_on_host(name, bench, machine.tables, settings, line, supervisor)
+                let recorder = DualRecorder::new();
+                let tasks = Tasks::new(machine.tables, settings).recorded_by(&recorder);
+                let tasks = tasks.commanded_by(supervisor, ratings, line);
+                on_host(name, bench, tasks, |index| recorder.read(index))
             }
             On::Qemu => {
                 let setup = DualSetup { carrier_ticks: settings.carrier_ticks, line };
                 let patient = supervisor.as_ref().is_some_and(|supervisor| supervisor.is_typed());
-                run::run_in_qemu(name, bench, setup, &options.emulator(patient)?, supervisor)
+                run_in_qemu(name, bench, setup, &options.emulator(patient)?, supervisor)
             }
         }
     }
@@ -161,8 +179,8 @@ fn bench(plan: Plan, options: &Options, machine: &Machine) -> Result<Bench> {
     let source_v = options.udc.unwrap_or(SOURCE_V);
     let plant_settings = Zs9Settings { source_v, motors: [options.plant(); 2], ..Zs9Settings::default() };
     let mut plant = Zs9Plant::new([&machine.folder; 2], plan.speeds, &plant_settings);
-    plant.set_network(NetworkState::even(0.0, 0.5 * (link_ref_v + source_v)));
-    for (motor, rpm) in plant.motors_mut().iter_mut().zip(plan.from_rpm) {
+    plant.network = NetworkState::even(0.0, 0.5 * (link_ref_v + source_v));
+    for (motor, rpm) in plant.motors.iter_mut().zip(plan.from_rpm) {
         motor.set_speed_rpm(rpm);
     }
     let settings = BenchSettings {
@@ -179,25 +197,21 @@ fn bench(plan: Plan, options: &Options, machine: &Machine) -> Result<Bench> {
         edges: plan.edges,
         dead_time_s: options.dead_time_us * 1e-6,
     };
-    let bench = Bench::new(plant, plan.operator, settings);
-    Ok(match plan.line {
-        Some(times) => bench.with_line(times),
-        None => bench,
-    })
+    Ok(Bench::new(plant, plan.operator, settings).with_line(plan.line))
 }
 
-/// A free rotor, loaded by what the operator says.
-pub fn free(inertia_kg_m2: f64) -> SpeedSource {
-    SpeedSource::Inertia { inertia_kg_m2, load_nm: 0.0 }
+/// Free rotors, loaded by what the operator says.
+pub fn free(inertia_kg_m2: f64) -> [SpeedSource; 2] {
+    [(); 2].map(|()| SpeedSource::Inertia { inertia_kg_m2, load_nm: 0.0 })
 }
 
 /// A speed in rad/s.
-fn rad_s(rpm: f64) -> f64 {
+pub fn rad_s(rpm: f64) -> f64 {
     rpm * TAU / 60.0
 }
 
 /// 0 before `from`, 1 after `to`, a straight line between.
-fn ramp(t_s: f64, from_s: f64, to_s: f64) -> f64 {
+pub fn ramp(t_s: f64, from_s: f64, to_s: f64) -> f64 {
     ((t_s - from_s) / (to_s - from_s)).clamp(0.0, 1.0)
 }
 

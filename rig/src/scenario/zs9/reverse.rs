@@ -1,17 +1,6 @@
 //! The motors turn opposite ways: the paper's figures 20 to 23.
 
-use super::{Options, Plan, Zs9, free, rad_s, ramp};
-use crate::analysis::Figures;
-use crate::machine::Machine;
-use crate::report::Page;
-use crate::rows::mean;
-use crate::scenario::Scenario;
-use crate::zs9::figures;
-use crate::zs9::trace::{Recording, Row};
-use crate::zs9::{Orders, SeenMotors};
-use clap::Args;
-use serde::Serialize;
-use tractive::ports::MotorDemand;
+use super::prelude::*;
 
 /// Both at 800 r/min; motor 2 goes to −800 r/min from 0.5 s to 1.5 s.
 #[derive(Clone, Copy, Debug, Args, Serialize)]
@@ -45,15 +34,7 @@ impl Scenario<Zs9> for Reverse {
                 enable: true,
             }
         };
-        Plan {
-            lead_s: LEAD_S,
-            duration_s: DURATION_S,
-            speeds: [free(super::load_step::INERTIA_KG_M2), free(super::load_step::INERTIA_KG_M2)],
-            from_rpm: [SPEED_RPM; 2],
-            operator: Box::new(operator),
-            edges: true,
-            line: None,
-        }
+        Plan::driven((LEAD_S, DURATION_S), free(super::load_step::INERTIA_KG_M2), [SPEED_RPM; 2], operator)
     }
 
     fn figures(&self, recording: &Recording, options: &Options, _machine: &Machine) -> Figures {
@@ -77,15 +58,37 @@ impl Scenario<Zs9> for Reverse {
     }
 
     fn plots(&self, recording: &Recording, page: &mut Page) {
-        let all = (0.0, DURATION_S);
-        let plot = |page: &mut Page, figure, title, unit, curves: &[figures::Curve]| {
-            figures::plot(page, figure, title, unit, recording, all, curves);
-        };
-        plot(page, "20", "torque of motor 1", "N·m", &[("motor 1", |row| row.motors[0].torque_nm)]);
-        plot(page, "21", "speed of motor 1", "r/min", &[("motor 1", |row| row.motors[0].speed_rpm)]);
-        plot(page, "22", "torque of motor 2", "N·m", &[("motor 2", |row| row.motors[1].torque_nm)]);
-        plot(page, "23", "speed of motor 2", "r/min", &[("motor 2", |row| row.motors[1].speed_rpm)]);
-        plot(page, "20–23", "link", "V", &[("U_in", |row| row.link_v), ("U_c", |row| row.capacitor_v)]);
-        figures::phases(page, "20–23", recording, (0.95, 1.05));
+        let rows = figures::window(recording, 0.0, DURATION_S);
+        plot(
+            page,
+            ("figure 20", "torque of motor 1", "N·m"),
+            rows,
+            &[("motor 1", |row| row.motors[0].torque_nm)],
+        );
+        plot(
+            page,
+            ("figure 21", "speed of motor 1", "r/min"),
+            rows,
+            &[("motor 1", |row| row.motors[0].speed_rpm)],
+        );
+        plot(
+            page,
+            ("figure 22", "torque of motor 2", "N·m"),
+            rows,
+            &[("motor 2", |row| row.motors[1].torque_nm)],
+        );
+        plot(
+            page,
+            ("figure 23", "speed of motor 2", "r/min"),
+            rows,
+            &[("motor 2", |row| row.motors[1].speed_rpm)],
+        );
+        plot(
+            page,
+            ("figures 20–23", "link", "V"),
+            rows,
+            &[("U_in", |row| row.link_v), ("U_c", |row| row.capacitor_v)],
+        );
+        figures::phases(page, "figures 20–23", figures::window(recording, 0.95, 1.05));
     }
 }

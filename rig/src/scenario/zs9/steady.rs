@@ -1,20 +1,7 @@
 //! Harmonics in steady state: what the schemes of the nine-switch modulator differ in.
 
-use super::{Options, Plan, Zs9, Zs9Options, ramp};
-use crate::analysis::Figures;
-use crate::machine::Machine;
-use crate::plant::SpeedSource;
-use crate::report::Page;
-use crate::rows::mean;
-use crate::scenario::Scenario;
-use crate::zs9::figures;
+use super::prelude::*;
 use crate::zs9::patterns;
-use crate::zs9::trace::Recording;
-use crate::zs9::{Orders, SeenMotors};
-use clap::Args;
-use serde::Serialize;
-use tractive::control::Demand;
-use tractive::ports::MotorDemand;
 
 /// 60 N·m each at prescribed speeds.
 #[derive(Clone, Copy, Debug, Args, Serialize)]
@@ -41,15 +28,8 @@ impl Scenario<Zs9> for Steady {
                 enable: true,
             }
         };
-        Plan {
-            lead_s: LEAD_S,
-            duration_s: DURATION_S,
-            speeds: SPEEDS_RPM.map(|rpm| SpeedSource::profile(vec![(0.0, rpm)])),
-            from_rpm: SPEEDS_RPM,
-            operator: Box::new(operator),
-            edges: true,
-            line: None,
-        }
+        let speeds = SPEEDS_RPM.map(|rpm| SpeedSource::profile(vec![(0.0, rpm)]));
+        Plan::driven((LEAD_S, DURATION_S), speeds, SPEEDS_RPM, operator)
     }
 
     fn figures(&self, recording: &Recording, options: &Options, _machine: &Machine) -> Figures {
@@ -71,9 +51,8 @@ impl Scenario<Zs9> for Steady {
 
     fn plots(&self, recording: &Recording, page: &mut Page) {
         patterns::draw(page);
-        figures::phases(page, "table 1", recording, (0.0, 0.05));
-        let window = (0.0, 0.001);
-        let curves: &[figures::Curve] = &[("i_L", |row| row.inductor_a)];
-        figures::plot(page, "table 1", "inductor current", "A", recording, window, curves);
+        figures::phases(page, "table 1", figures::window(recording, 0.0, 0.05));
+        let rows = figures::window(recording, 0.0, 0.001);
+        figures::plot(page, ("table 1", "inductor current", "A"), rows, &[("i_L", |row| row.inductor_a)]);
     }
 }

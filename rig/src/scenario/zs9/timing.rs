@@ -1,17 +1,6 @@
 //! A short drive of both motors for `cargo xtask timing`: every instruction of the interrupts is logged there.
 
-use super::{Options, Plan, Zs9, rad_s};
-use crate::analysis::Figures;
-use crate::machine::Machine;
-use crate::plant::SpeedSource;
-use crate::report::Page;
-use crate::scenario::Scenario;
-use crate::zs9::figures;
-use crate::zs9::trace::Recording;
-use crate::zs9::{Orders, SeenMotors};
-use clap::Args;
-use serde::Serialize;
-use tractive::ports::MotorDemand;
+use super::prelude::*;
 
 /// Full torque by the speed loops at prescribed speeds: motoring at low and at high speed, then braking from there.
 #[derive(Clone, Copy, Debug, Args, Serialize)]
@@ -36,22 +25,10 @@ impl Scenario<Zs9> for Timing {
             let points = PROFILE.iter().map(|(t_s, rpm)| (LEAD_S + t_s, way * rpm));
             SpeedSource::profile(points.collect())
         };
-        Plan {
-            lead_s: LEAD_S,
-            duration_s: DURATION_S,
-            speeds: [turning(1.0), turning(-1.0)],
-            from_rpm: [0.0; 2],
-            operator: Box::new(operator),
-            edges: true,
-            line: None,
-        }
-    }
-
-    fn figures(&self, recording: &Recording, _options: &Options, _machine: &Machine) -> Figures {
-        figures::common(recording)
+        Plan::driven((LEAD_S, DURATION_S), [turning(1.0), turning(-1.0)], [0.0; 2], operator)
     }
 
     fn plots(&self, recording: &Recording, page: &mut Page) {
-        figures::phases(page, "no figure", recording, (0.0, DURATION_S));
+        figures::phases(page, "no figure", &recording.rows);
     }
 }

@@ -23,7 +23,7 @@ impl Bench {
             }
         }
         let half = self.period / 2;
-        let mut ordered = self.gates.ordered();
+        let mut ordered = self.gates.ordered;
         for (gate, pause) in (0_u8..).zip(&period.gates) {
             let (from, to) = (Tick::from(pause.off_from), Tick::from(pause.off_to));
             let paused = from < to;
@@ -41,7 +41,7 @@ impl Bench {
 
     /// The gates as they are: what is stuck does not do what it is told.
     pub(super) fn real_levels(&self) -> [bool; 9] {
-        let mut levels = self.gates.levels();
+        let mut levels = self.gates.levels;
         match self.spoiler.injected.kind(self.time.now_s()) {
             // What turns the gates off for good holds the drivers, whatever they are ordered.
             Some(Kind::Gate(gate, on)) if !self.off => levels[usize::from(gate)] = on,

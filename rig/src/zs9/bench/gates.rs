@@ -5,14 +5,17 @@ use crate::plant::zs9::LegGates;
 
 /// Orders and levels, in the order of [`tractive::nine_switch::GATES`].
 pub struct Gates {
-    ordered: [bool; 9],
-    levels: [bool; 9],
-    /// When those that wait for the dead time turn on.
+    /// The states that are ordered.
+    pub ordered: [bool; 9],
+    /// The states.
+    pub levels: [bool; 9],
+    /// The times at which those that wait for the dead time turn on.
     turn_on: [Option<Tick>; 9],
     dead_time: Tick,
-    /// From when on edges are kept, if they are; and those kept.
+    /// From when on edges are kept, if they are.
     edges_from: Option<Tick>,
-    edges: Vec<(Tick, u8, bool)>,
+    /// Edges that were kept: when, which gate, on or off.
+    pub edges: Vec<(Tick, u8, bool)>,
 }
 
 impl Gates {
@@ -33,22 +36,7 @@ impl Gates {
         Self { edges_from: self.edges_from.map(|from| from + origin), ..self }
     }
 
-    /// What they are ordered to be.
-    pub fn ordered(&self) -> [bool; 9] {
-        self.ordered
-    }
-
-    /// What they are.
-    pub fn levels(&self) -> [bool; 9] {
-        self.levels
-    }
-
-    /// Edges that were kept: when, which gate, on or off.
-    pub fn edges(&self) -> &[(Tick, u8, bool)] {
-        &self.edges
-    }
-
-    /// When the next one turns on.
+    /// The time at which the next one turns on.
     pub fn next_event(&self) -> Option<Tick> {
         self.turn_on.iter().flatten().min().copied()
     }

@@ -18,7 +18,6 @@ pub use settings::{BenchSettings, Course};
 
 use super::line::{LineSide, LineTimes};
 use super::operator::{Operator, Orders};
-use super::sensors::Sensors;
 use super::trace::Row;
 use crate::bench::{Conversions, Converter, Due, Observed, Tick, Timeline};
 use crate::inject::zs9::Spoiler;
@@ -31,7 +30,7 @@ use tractive::ports::DualReport;
 use tractive::ports::{DualSample, GateFeedback, PlayedPeriod};
 use tractive::time::Instant;
 
-/// How long after its nominal instant the control interrupt's order to turn the gates off reaches them, in ticks (75 µs): its
+/// The delay from the control interrupt's nominal instant until its order to turn the gates off reaches them, in ticks (75 µs): its
 /// latest deadline.
 const CONTROL_OFF_TICKS: u32 = 1875;
 /// The same for the PWM interrupt (25 µs), as a bound on its length.
@@ -42,7 +41,7 @@ pub struct Bench {
     plant: Zs9Plant,
     operator: Box<dyn Operator + Send>,
     settings: BenchSettings,
-    sensors: Sensors,
+    converter: Converter,
     spoiler: Spoiler,
     nominal_source_v: f64,
     time: Timeline,
@@ -56,18 +55,20 @@ pub struct Bench {
     toggles: Vec<(Tick, u8)>,
     gates: Gates,
     off: bool,
-    /// When the gates go off (true) or may be played again (false).
+    /// The time at which the gates go off (true) or may be played again (false).
     off_at: Option<(Tick, bool)>,
     line: Option<LineSide>,
     loads: Due<[f64; 2]>,
     loads_nm: Option<[f64; 2]>,
-    observed: Observed,
+    /// The effects of a fault.
+    pub observed: Observed,
     feedback: GateFeedback,
     orders: Orders,
     control: Conversions<DualSample, DualReport>,
     next_row: Tick,
     sums: Sums,
-    rows: Vec<Row>,
+    /// The trace so far.
+    pub rows: Vec<Row>,
 }
 
 impl Bench {
@@ -75,14 +76,14 @@ impl Bench {
     pub fn new(plant: Zs9Plant, mut operator: Box<dyn Operator + Send>, settings: BenchSettings) -> Self {
         let time = Timeline::new(settings.clock, COMPARE_STEPS, settings.lead_s);
         let rows_wanted = (settings.duration_s / settings.trace_step_s).round() as usize;
-        let speeds = plant.motors().each_ref().map(|motor| motor.speed_rpm());
+        let speeds = plant.motors.each_ref().map(|motor| motor.speed_rpm());
         let fault_s = settings.injection.map(|injection| settings.lead_s + injection.at_s);
         Self {
             orders: operator.orders(-settings.lead_s, speeds),
-            nominal_source_v: plant.source_v(),
+            nominal_source_v: plant.source_v,
             plant,
             operator,
-            sensors: Sensors::new(Converter::new(settings.flaws)),
+            converter: Converter::new(settings.flaws),
             spoiler: Spoiler::new(settings.injection),
             course: Course::default(),
             rows_wanted,
@@ -107,10 +108,12 @@ impl Bench {
         }
     }
 
-    /// The same with a line side: the network is empty, behind open contactors, and the drive has an operator.
-    pub fn with_line(mut self, times: LineTimes) -> Self {
-        self.line = Some(LineSide::new(times, &self.settings.clock));
-        self.plant.set_network(NetworkState::even(0.0, LineSide::EMPTY_V));
+    /// The same with a line side, if there is one: the network is empty, behind open contactors, and the drive has an operator.
+    pub fn with_line(mut self, times: Option<LineTimes>) -> Self {
+        if let Some(times) = times {
+            self.line = Some(LineSide::new(times, &self.settings.clock));
+            self.plant.network = NetworkState::even(0.0, LineSide::EMPTY_V);
+        }
         self
     }
 
@@ -132,19 +135,19 @@ impl Bench {
         self
     }
 
-    /// Whether the drive has an operator.
+    /// `true` if the drive has an operator.
     pub fn is_operated(&self) -> bool {
         self.line.is_some()
     }
 
-    /// What the board says to the operator in the slot that began at `instant`.
+    /// The board's feedback to the operator in the slot that began at `instant`.
     pub fn ask(&mut self, instant: Instant) -> Result<Feedback, BenchError> {
         let tick = self.time.widen(instant) / Tick::from(COMPARE_STEPS);
         let asked = self.line.as_mut().and_then(|line| line.gear.ask(tick));
         asked.map(|(_, feedback)| feedback).ok_or(BenchError::NoSlot(tick))
     }
 
-    /// What the operator told; it holds from `from` on.
+    /// Takes the operator's status; it holds from `from` on.
     pub fn told(&mut self, from: Instant, status: DualStatus) -> Result<(), BenchError> {
         let tick = self.time.coming(from)?;
         if let Some(line) = &mut self.line {
@@ -155,7 +158,7 @@ impl Bench {
 
     /// The motors' true speeds, in r/min.
     pub fn speeds_rpm(&self) -> [f64; 2] {
-        self.plant.motors().each_ref().map(|motor| motor.speed_rpm())
+        self.plant.motors.each_ref().map(|motor| motor.speed_rpm())
     }
 
     /// Time since the recording's beginning, in s.
@@ -165,17 +168,7 @@ impl Bench {
 
     /// Length of a compare step, in s.
     pub fn step_s(&self) -> f64 {
-        self.time.step_s()
-    }
-
-    /// The trace so far.
-    pub fn rows(&self) -> &[Row] {
-        &self.rows
-    }
-
-    /// What a fault did.
-    pub fn observed(&self) -> &Observed {
-        &self.observed
+        self.time.step_s
     }
 
     /// The period to play from the next valley on.

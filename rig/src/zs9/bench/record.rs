@@ -16,7 +16,7 @@ impl Simulated for Bench {
 
     fn progress(&self) -> f64 {
         let end_s = self.settings.lead_s + self.settings.duration_s;
-        ((self.time.now - self.time.origin) as f64 * self.time.step_s() / end_s).min(1.0)
+        ((self.time.now - self.time.origin) as f64 * self.time.step_s / end_s).min(1.0)
     }
 
     fn has_control(&self, instant: Instant) -> bool {
@@ -25,6 +25,10 @@ impl Simulated for Bench {
 
     fn instant_s(&self, instant: Instant) -> f64 {
         self.time.seconds(self.time.widen(instant))
+    }
+
+    fn slot_after(&self, slot: Instant) -> Instant {
+        self.time.slot_after(slot)
     }
 
     fn loads_from(&mut self, instant: Instant, loads_nm: [f64; 2]) {
@@ -43,7 +47,7 @@ impl Simulated for Bench {
             .collect();
         let edge =
             |(at, gate, on): &(Tick, u8, bool)| Edge { t_s: self.time.seconds(*at), gate: *gate, on: *on };
-        let edges = self.gates.edges().iter().map(edge).collect();
+        let edges = self.gates.edges.iter().map(edge).collect();
         Recording { rows: self.rows, keeps_edges: self.settings.edges, edges, recorded }
     }
 }
@@ -81,9 +85,9 @@ impl Bench {
                 duty: sums.shorted / sums.steps,
                 scheme: self.control.report.scheme,
                 trip: self.control.report.trip,
-                source_j: self.plant.energies().source_j,
+                source_j: self.plant.energies.source_j,
                 kinetic_speed_rpm: self.speeds_rpm(),
-                explained_j: self.plant.energies().source_j - self.plant.residual_j(0.0),
+                explained_j: self.plant.energies.source_j - self.plant.residual_j(0.0),
             });
         }
         let end_s = (self.rows.len() + 1) as f64 * self.settings.trace_step_s;

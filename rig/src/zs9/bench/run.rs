@@ -40,7 +40,7 @@ impl Bench {
             return Ok(());
         }
         if self.spoiler.injected.kind(self.time.now_s()) == Some(Kind::SourceLost) {
-            let longest = (LONGEST_LOST_S / self.time.step_s()).round() as Tick;
+            let longest = (LONGEST_LOST_S / self.time.step_s).round() as Tick;
             while self.time.now + longest < to {
                 self.integrate_lost(self.time.now + longest)?;
             }
@@ -51,18 +51,18 @@ impl Bench {
 
     /// With the source cut off: what its capacitor gives it loses.
     fn integrate_lost(&mut self, to: Tick) -> Result<(), BenchError> {
-        let before_j = self.plant.energies().source_j;
+        let before_j = self.plant.energies.source_j;
         self.integrate_fed(to)?;
-        let given_j = self.plant.energies().source_j - before_j;
-        let square = self.plant.source_v().powi(2) - 2.0 * given_j / INPUT_F;
-        self.plant.set_source_v(square.max(1.0).sqrt());
+        let given_j = self.plant.energies.source_j - before_j;
+        let square = self.plant.source_v.powi(2) - 2.0 * given_j / INPUT_F;
+        self.plant.source_v = square.max(1.0).sqrt();
         Ok(())
     }
 
     fn integrate_fed(&mut self, to: Tick) -> Result<(), BenchError> {
         let steps = (to - self.time.now) as f64;
         if let Some(line) = &self.line {
-            line.feed(&mut self.plant, self.nominal_source_v, steps * self.time.step_s());
+            line.feed(&mut self.plant, self.nominal_source_v, steps * self.time.step_s);
         }
         let real = self.real_levels();
         let [uh, vh, wh, um, vm, wm, ul, vl, wl] = real;
@@ -71,8 +71,8 @@ impl Bench {
             middle,
             low,
         });
-        let dt_s = steps * self.time.step_s();
-        if real == self.gates.levels() {
+        let dt_s = steps * self.time.step_s;
+        if real == self.gates.levels {
             let gates =
                 if self.off { gates } else { self.gates.as_diodes_have_it(gates, || self.currents_a()) };
             in_plant(|| self.plant.advance(gates, dt_s))?;
@@ -85,7 +85,7 @@ impl Bench {
         }
         let sums = &mut self.sums;
         sums.steps += steps;
-        sums.source_v += steps * self.plant.source_v();
+        sums.source_v += steps * self.plant.source_v;
         for k in 0..2 {
             sums.torque_refs[k] += steps * f64::from(self.control.report.torque_nm[k]);
             sums.loads[k] += steps * self.orders.loads_nm[k];
@@ -120,7 +120,7 @@ impl Bench {
             self.loads_nm = Some(loads_nm);
             self.set_loads_nm(loads_nm);
         }
-        let mut ordered = self.gates.ordered();
+        let mut ordered = self.gates.ordered;
         while let Some((at, gate)) = self.toggles.last().copied()
             && at <= self.time.now
         {
@@ -144,12 +144,12 @@ impl Bench {
 
     /// Phase currents of both motors, in A.
     pub(super) fn currents_a(&self) -> [[f64; 3]; 2] {
-        self.plant.motors().each_ref().map(|motor| motor.currents_abc())
+        self.plant.motors.each_ref().map(|motor| motor.currents_abc())
     }
 
     /// Loads of both rotors, in N·m.
     pub(super) fn set_loads_nm(&mut self, loads_nm: [f64; 2]) {
-        for (motor, load_nm) in self.plant.motors_mut().iter_mut().zip(loads_nm) {
+        for (motor, load_nm) in self.plant.motors.iter_mut().zip(loads_nm) {
             motor.set_load_nm(load_nm);
         }
     }

@@ -1,4 +1,4 @@
-//! What the drive's interrupts are told, and what control reports.
+//! The samples for the drive's interrupts, and the reports of control.
 
 use super::{Bench, BenchError};
 use crate::inject::zs9::Kind;
@@ -8,7 +8,7 @@ use tractive::ports::DualReport;
 use tractive::ports::{DualSample, HardwareBreak, PowerSample};
 use tractive::time::Instant;
 
-/// How far a current's reading may be off without making a difference that counts, in A: a tenth of a machine's largest current.
+/// The error of a current's reading that makes no difference which counts, in A: a tenth of a machine's largest current.
 const MUCH_A: f32 = 8.49;
 
 impl Bench {
@@ -29,20 +29,28 @@ impl Bench {
         self.spoiler.injected.late_ticks(self.time.now_s())
     }
 
-    /// What the PWM interrupt converts at the peak `instant`.
+    /// The PWM interrupt's conversions at the peak `instant`.
     pub fn power_sample(&mut self, instant: Instant) -> Result<PowerSample, BenchError> {
         let at = self.time.widen(instant);
         self.advance(at)?;
         let feedback = std::mem::take(&mut self.feedback);
-        let mut sample = self.sensors.power(&self.plant, feedback);
-        if self.line.is_some() {
-            // The source's sensor is in front of the contactors.
-            sample.source_v = self.nominal_source_v as f32;
-        }
+        // The source's sensor is in front of the contactors.
+        let source_v = if self.line.is_some() { self.nominal_source_v } else { self.plant.source_v };
+        let mut sample = PowerSample {
+            currents_a: self.converted_a(),
+            capacitor_v: self.plant.network.capacitor_v() as f32,
+            source_v: source_v as f32,
+            gates: feedback,
+        };
         let true_a = sample.currents_a;
         self.spoiler.power(self.time.seconds(at), &mut sample);
         self.compare(true_a, sample.currents_a);
         Ok(sample)
+    }
+
+    /// Phase currents of both motors as converted now, in A.
+    fn converted_a(&mut self) -> [Abc; 2] {
+        self.plant.motors.each_ref().map(|motor| self.converter.currents(motor))
     }
 
     /// Notes readings that are off by more than a little.
@@ -65,26 +73,26 @@ impl Bench {
         }
         self.set_loads_nm(self.orders.loads_nm);
         let healthy_v = held(&self.course.source_v, t_s).unwrap_or(self.nominal_source_v);
-        let supply_v = healthy_v + self.sensors.ripple_v(t_s);
+        let supply_v = healthy_v + self.converter.ripple_v(t_s);
         // What is cut off is its capacitor's.
         let source_v = if self.spoiler.injected.kind(t_s) == Some(Kind::SourceLost) {
-            self.plant.source_v()
+            self.plant.source_v
         } else {
             self.spoiler.source_v(t_s, supply_v)
         };
         let hardware = self.spoiler.hardware(t_s);
         match &mut self.line {
-            None => self.plant.set_source_v(source_v),
+            None => self.plant.source_v = source_v,
             Some(line) => {
                 if line.gear.sampled(self.time.tick(), hardware, || ()) {
                     return Err(BenchError::OperatorLate(t_s));
                 }
             }
         }
-        let network = self.plant.network();
+        let network = self.plant.network;
         let mut sample = DualSample {
-            currents_a: self.sensors.currents(&self.plant),
-            angles: self.plant.motors().each_ref().map(|motor| Some(self.sensors.angle(motor))),
+            currents_a: self.converted_a(),
+            angles: self.plant.motors.each_ref().map(|motor| Some(self.converter.angle(motor))),
             capacitor_v: network.capacitor_v() as f32,
             inductor_a: network.inductor_a() as f32,
             source_v: source_v as f32,

@@ -1,4 +1,4 @@
-//! What the ZS9's bench is made of.
+//! The settings of the ZS9's bench.
 
 use crate::bench::{Flaws, Limits};
 use crate::inject::Injection;
@@ -21,21 +21,21 @@ pub struct BenchSettings {
     pub trace_step_s: f64,
     /// Link voltage wanted, in V.
     pub link_ref_v: f64,
-    /// Where the zero vectors lie.
+    /// The place of the zero vectors.
     pub scheme: Scheme,
     /// Imperfections of the sensors and of the source.
     pub flaws: Flaws,
-    /// What goes wrong.
+    /// The fault that is injected.
     pub injection: Option<Injection<Kind>>,
     /// Beyond what it is said to make a difference.
     pub limits: Limits,
-    /// Whether edges are kept.
+    /// `true` if edges are kept.
     pub edges: bool,
     /// Time for which a gate that turns on where another one of its leg turns off has to wait, in s.
     pub dead_time_s: f64,
 }
 
-/// What changes by itself while it drives: times in s from the recording's beginning, each value from its time on.
+/// The changes that come by themselves while it drives: times in s from the recording's beginning, each value from its time on.
 #[derive(Clone, Debug, Default)]
 pub struct Course {
     /// Voltages of the source, in V; the plant's own before the first.

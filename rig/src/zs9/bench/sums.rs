@@ -1,6 +1,6 @@
-//! What is summed up over a step of the trace.
+//! The sums over a step of the trace.
 
-/// What is summed up over a step of the trace, each value times its time, in steps.
+/// The sums over a step of the trace, each value times its time, in steps.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Sums {
     pub steps: f64,

@@ -1,41 +1,40 @@
 //! The ZS9's tasks on its bench.
 
 use crate::bench::Simulated;
-use crate::run::{Interrupts, Supervisor, on_host, turn};
-use crate::without::Without;
+use crate::run::{Interrupts, Supervisor, turn};
+use crate::without::Ablation;
 use crate::zs9::bench::Bench;
-use crate::zs9::trace::Recording;
 use anyhow::Result;
 use tractive::drive::dual::{ControlTask, PwmTask, Settings, Shared};
 use tractive::frames::Abc;
 use tractive::machine::{Ratings, Tables};
 use tractive::nine_switch::Scheme;
 use tractive::operator::{
-    self, DualDemands, DualDesk, DualRequest, DualSlot, DualStatus, Feedback, Line, OperatorPort, slot_s,
+    self, DualDemands, DualMailboxes, DualRequest, DualSlot, DualStatus, Feedback, Line, OperatorPort, slot_s,
 };
 use tractive::ports::DualReport;
-use tractive::ports::{DualControlPort, DualPwmPort, DualSample, MotorDemand, PlayedPeriod, PowerSample};
-use tractive::protection::Trip;
-use tractive::protocol::Zs9Station;
+use tractive::ports::{ControlPort, Dual, DualSample, MotorDemand, PlayedPeriod, PowerSample, PwmPort};
+use tractive::protection::{MaskedFaults, SafeState, Trip};
+use tractive::protocol::Zs9CanEndpoint;
 use tractive::recorder::DualRecorder;
 use tractive::time::{Clock, Instant};
 
 /// The bench behind a board's ports; the first error ends the run.
 struct Port<'a> {
     bench: &'a mut Bench,
-    desk: &'a DualDesk,
+    desk: &'a DualMailboxes,
     error: Option<anyhow::Error>,
 }
 
 /// The drive's end of the protocol, its operator, and who is at the other end.
 struct Wire<'w> {
-    station: Zs9Station,
+    station: Zs9CanEndpoint,
     slot: DualSlot,
     operator: operator::Settings<'static>,
     supervisor: &'w mut dyn Supervisor,
 }
 
-/// What is sampled when there is nothing left to sample.
+/// The sample when there is nothing left to sample.
 const NOTHING: DualSample = DualSample {
     currents_a: [Abc { a: 0.0, b: 0.0, c: 0.0 }; 2],
     angles: [None; 2],
@@ -51,7 +50,7 @@ const NOTHING: DualSample = DualSample {
     hardware: None,
 };
 
-impl DualControlPort for Port<'_> {
+impl ControlPort<Dual> for Port<'_> {
     fn sample(&mut self, now: Instant) -> DualSample {
         let mut sample = self.bench.control_sample(now).unwrap_or_else(|error| {
             self.error = Some(error.into());
@@ -63,7 +62,7 @@ impl DualControlPort for Port<'_> {
         sample
     }
 
-    fn gates_off(&mut self, now: Instant) {
+    fn enter(&mut self, _safe: SafeState, now: Instant) {
         self.bench.gates_off(now);
     }
 
@@ -77,7 +76,7 @@ impl DualControlPort for Port<'_> {
     }
 }
 
-impl DualPwmPort for Port<'_> {
+impl PwmPort<Dual> for Port<'_> {
     fn sample(&mut self, now: Instant) -> PowerSample {
         self.bench.power_sample(now).unwrap_or_else(|error| {
             self.error = Some(error.into());
@@ -89,7 +88,7 @@ impl DualPwmPort for Port<'_> {
         self.bench.play(*next);
     }
 
-    fn gates_off(&mut self, now: Instant) {
+    fn enter(&mut self, _safe: SafeState, now: Instant) {
         self.bench.gates_off(now);
     }
 
@@ -102,7 +101,7 @@ impl DualPwmPort for Port<'_> {
 /// The operator's port, with its station apart.
 struct Idle<'a, 'b> {
     port: &'a mut Port<'b>,
-    station: &'a mut Zs9Station,
+    station: &'a mut Zs9CanEndpoint,
     supervisor: &'a mut dyn Supervisor,
 }
 
@@ -129,35 +128,12 @@ impl OperatorPort<DualDemands> for Idle<'_, '_> {
     }
 }
 
-/// Runs until the recording is complete; a supervisor commands over the protocol, on this line side.
-///
-/// # Errors
-/// Where the bench or the supervisor cannot go on.
-pub fn run_on_host(
-    name: &str,
-    bench: Bench,
-    tables: &'static Tables,
-    settings: Settings,
-    line: Option<Line>,
-    supervisor: Option<&mut dyn Supervisor>,
-) -> Result<Recording> {
-    let recorder = DualRecorder::new();
-    let mut tasks = Tasks::new(tables, settings).recorded_by(&recorder);
-    tasks.wire = supervisor.map(|supervisor| {
-        // One a run, for as long as the program lasts, as the tables are.
-        let ratings: &'static Ratings = Box::leak(Box::new(settings.operator_ratings(&tables.ratings)));
-        let operator = operator::Settings::rated(ratings, slot_s(&settings.clock), line);
-        Wire { station: Zs9Station::new(ratings), slot: DualSlot::new(), operator, supervisor }
-    });
-    on_host(name, bench, tasks, |index| recorder.read(index))
-}
-
 /// Both tasks and the cells between them.
 pub struct Tasks<'a> {
     control: ControlTask,
     pwm: PwmTask,
     shared: Shared<'a>,
-    desk: DualDesk,
+    desk: DualMailboxes,
     clock: Clock,
     /// Over the protocol, if there is a supervisor.
     wire: Option<Wire<'a>>,
@@ -175,10 +151,26 @@ impl<'a> Tasks<'a> {
             control: ControlTask::new(tables, settings).beginning_at(origin),
             pwm: PwmTask::new(tables, settings).beginning_at(origin),
             shared: Shared::new(),
-            desk: DualDesk::new(),
+            desk: DualMailboxes::new(),
             clock: settings.clock,
             wire: None,
         }
+    }
+
+    /// The same commanded over the protocol on this line side, if there is a supervisor.
+    pub fn commanded_by(
+        mut self,
+        supervisor: Option<&'a mut (dyn Supervisor + '_)>,
+        ratings: Ratings,
+        line: Option<Line>,
+    ) -> Self {
+        self.wire = supervisor.map(|supervisor| {
+            // One a run, for as long as the program lasts, as the tables are.
+            let ratings: &'static Ratings = Box::leak(Box::new(ratings));
+            let operator = operator::Settings::rated(ratings, slot_s(&self.clock), line);
+            Wire { station: Zs9CanEndpoint::new(ratings), slot: DualSlot::new(), operator, supervisor }
+        });
+        self
     }
 
     /// The same with a flight recorder.
@@ -187,9 +179,9 @@ impl<'a> Tasks<'a> {
         self
     }
 
-    /// The same with a protection off; its levels are the tables' and the settings' business.
-    pub fn without(self, without: Without) -> Self {
-        let disarmed = without.disarmed();
+    /// The same with a protection off, or none; its levels are the tables' and the settings' business.
+    pub fn without(self, without: Option<Ablation>) -> Self {
+        let disarmed = without.map_or(MaskedFaults::NONE, Ablation::disarmed);
         Self { control: self.control.without(disarmed), pwm: self.pwm.without(disarmed), ..self }
     }
 

@@ -1,7 +1,7 @@
 //! The same for the ZS9.
 
 use super::{CONTROL_ANSWERS, IDLE_ANSWERS, PWM_ANSWERS, exchange, finish, open_files, send};
-use crate::board::qemu::{DUAL_RECORDER, saboteur, watch};
+use crate::board::qemu::{DUAL_RECORDER, watch};
 use crate::operator::{DualStatus, Feedback};
 use crate::ports::DualReport;
 use crate::ports::{DualSample, PlayedPeriod, PowerSample};
@@ -28,7 +28,6 @@ pub fn sample_dual(now: Instant) -> DualSample {
         watch::stop();
         finish(&DUAL_RECORDER, |record| DualRequest::Recorded(record).to_block());
     }
-    saboteur::sampled();
     sample
 }
 
@@ -37,11 +36,10 @@ pub fn sample_dual(now: Instant) -> DualSample {
 pub fn power_sample(now: Instant) -> PowerSample {
     let mut block = DualRequest::PowerSample(now).to_block();
     exchange(&mut block, PWM_ANSWERS);
-    saboteur::complete(&mut block);
     wire::power_from_block(&block)
 }
 
-/// What was loaded into the shadow registers.
+/// The period that was loaded into the shadow registers.
 #[inline(never)]
 pub fn play_dual(now: Instant, next: &PlayedPeriod) {
     send(&DualRequest::Play(now, *next).to_block());
@@ -56,7 +54,6 @@ pub fn report_dual(now: Instant, report: &DualReport) {
 /// An order to turn all gates off.
 #[inline(never)]
 pub fn gates_off(now: Instant) {
-    saboteur::gates_off();
     send(&DualRequest::GatesOff(now).to_block());
 }
 
@@ -74,7 +71,7 @@ pub fn ask_dual(at: Instant) -> (Feedback, Option<Frame>) {
     wire::dual_asked_from_block(&block)
 }
 
-/// What the operator told, and the frame that says so.
+/// The operator's status, and the frame that carries it.
 #[inline(never)]
 pub fn tell_dual(from: Instant, status: &DualStatus, frame: Option<Frame>) {
     send(&DualRequest::Tell(from, *status, frame).to_block());

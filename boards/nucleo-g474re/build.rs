@@ -1,0 +1,87 @@
+//! Makes the tables of the chosen machines, checks the power stages against them, and gives the linker this board's memories and interrupts.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::{env, fs};
+use tractive_tablegen::{InputError, MachineFolder, rust_source};
+
+#[allow(dead_code, reason = "the image's")]
+#[path = "src/dead_time.rs"]
+mod dead_time;
+#[path = "build/power_stage.rs"]
+mod power_stage;
+#[path = "src/rates.rs"]
+mod rates;
+#[allow(dead_code, reason = "the image's")]
+#[path = "src/zs9/rates.rs"]
+mod zs9_rates;
+
+/// A check of a power stage's file and text against a machine; it gives the constant as Rust.
+type Check = fn(&Path, &str, &power_stage::Machine) -> Result<String, InputError>;
+
+/// For each image: the variable that names its machine, the machine when it names none, the name of its tables, its power stage's name and
+/// check.
+const IMAGES: [(&str, &str, &str, &str, Check); 2] = [
+    ("TRACTIVE_MACHINE", "pmasynrm-180kw", "traction", "power_stage", power_stage::traction),
+    ("TRACTIVE_ZS9_MACHINE", "ipm-zs9", "zs9", "power_stage_zs9", power_stage::zs9),
+];
+
+/// Interrupt handlers that an image may define; the others end in cortex-m-rt's default handler.
+const HANDLERS: [&str; 3] = ["TIM1_UP_TIM16", "TIM2", "TIM3"];
+
+fn main() -> ExitCode {
+    println!("cargo:rerun-if-changed=build.rs");
+    let out = PathBuf::from(env::var_os("OUT_DIR").unwrap_or_default());
+    match images(&out).and_then(|()| linker(&out)) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(problem) => {
+            eprintln!("{problem}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// The tables of each image's machine and the constant of its power stage.
+fn images(out: &Path) -> Result<(), String> {
+    for (variable, default, tables, stage, check) in IMAGES {
+        println!("cargo:rerun-if-env-changed={variable}");
+        let machine = env::var(variable).unwrap_or_else(|_| default.to_owned());
+        // A folder of tables/, or a path as seen from the repository's root.
+        let mut places = ["../../tables", "../.."].into_iter().map(|place| Path::new(place).join(&machine));
+        let folder = places.find(|folder| folder.is_dir()).unwrap_or_else(|| PathBuf::from(&machine));
+        let file = PathBuf::from(format!("{stage}.toml"));
+        for read in [&folder, &file] {
+            println!("cargo:rerun-if-changed={}", read.display());
+        }
+        let told = |error: InputError| error.to_string();
+        let made = MachineFolder::read(&folder).map_err(told)?.tables();
+        let text = fs::read_to_string(&file).map_err(|error| format!("{}: {error}", file.display()))?;
+        let machine = power_stage::Machine { folder: &folder, tables: &made };
+        let constant = check(&file, &text, &machine).map_err(told)?;
+        put(&out.join(format!("{tables}.rs")), &rust_source(&made, "tractive::machine"))?;
+        put(&out.join(format!("{stage}.rs")), &constant)?;
+    }
+    Ok(())
+}
+
+/// The linker looks into the workspace's root before it looks here, and there `memory.x` includes `board-memory.x`.
+fn linker(out: &Path) -> Result<(), String> {
+    println!("cargo:rerun-if-changed=memory.x");
+    if env::var("CARGO_CFG_TARGET_OS").as_deref() != Ok("none") {
+        return Ok(());
+    }
+    let handlers = HANDLERS.map(|name| format!("PROVIDE({name} = DefaultHandler);\n")).concat();
+    let memory = fs::read_to_string("memory.x").map_err(|error| format!("memory.x: {error}"))?;
+    for (file, text) in [("board-memory.x", memory), ("device.x", handlers)] {
+        put(&out.join(file), &text)?;
+    }
+    println!("cargo:rustc-link-search={}", out.display());
+    for script in ["link.x", "defmt.x"] {
+        println!("cargo:rustc-link-arg-bins=-T{script}");
+    }
+    Ok(())
+}
+
+fn put(path: &Path, text: &str) -> Result<(), String> {
+    fs::write(path, text).map_err(|error| format!("{}: {error}", path.display()))
+}

@@ -1,0 +1,316 @@
+//! The power stage beside the package, `power_stage.toml`, against the machine: whatever the image would refuse, measure wrongly or
+//! protect badly is refused here, by key and file. What passes becomes the constants that the image is built with.
+
+use super::dead_time::DeadTime;
+use super::{rates, zs9_rates};
+use serde::Deserialize;
+use std::path::Path;
+use tractive::configuration::Refused;
+use tractive::machine::Tables;
+use tractive_tablegen::InputError;
+
+/// Codes of the 12-bit converters.
+const CODES: f64 = 4_095.0;
+/// Codes of half their range.
+const HALF_CODES: f64 = 2_048.0;
+/// The most by which a range may exceed what it must hold: beyond, the converter resolves nothing.
+const RANGE: f64 = 20.0;
+/// The most by which the comparators' current may exceed the machine's trip current: beyond, they protect another machine.
+const BREAK: f64 = 2.0;
+/// The longest dead time that the ZS9's drive reckons with, in ns.
+const ZS9_DEAD_TIME_NS: f64 = 5_000.0;
+
+/// A machine, and the folder that it was read from.
+pub struct Machine<'a> {
+    /// The folder.
+    pub folder: &'a Path,
+    /// The tables that the image will hold.
+    pub tables: &'a Tables,
+}
+
+/// The keys of the file.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Keys {
+    dead_time_ns: u32,
+    min_pulse_ns: Option<u32>,
+    current_range_a: f64,
+    zero_code: u16,
+    zero_tolerance: u16,
+    dc_link_range_v: f64,
+    break_current_a: f64,
+    encoder_counts: u32,
+    encoder_zeros_deg: Vec<f64>,
+    precharge_s: f64,
+    discharge_s: f64,
+    z_source: Option<ZSource>,
+}
+
+/// The keys that the ZS9's stage has besides.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ZSource {
+    inductor_range_a: f64,
+    source_range_v: f64,
+    link_ref_v: f64,
+}
+
+/// A key, its value, the least and the most that are allowed, and why.
+struct Bound<'a>(&'a str, f64, f64, f64, &'a str);
+
+/// A file that has been read.
+struct Stage<'a> {
+    file: &'a Path,
+    text: &'a str,
+    keys: Keys,
+}
+
+/// Checks the PMaSynRM's power stage; gives its constant as Rust.
+///
+/// # Errors
+/// The first key that does not suit the board or the machine.
+pub fn traction(file: &Path, text: &str, machine: &Machine) -> Result<String, InputError> {
+    let stage = Stage::parse(file, text)?;
+    let Keys { dead_time_ns, min_pulse_ns, z_source, .. } = &stage.keys;
+    if z_source.is_some() {
+        return Err(stage.refuse("z_source", "is the ZS9's".to_owned()));
+    }
+    let Some(min_pulse_ns) = *min_pulse_ns else {
+        return Err(stage.refuse("min_pulse_ns", "is missing".to_owned()));
+    };
+    let ratings = &machine.tables.ratings;
+    stage.check_times(stage.longest_dead_time_ns())?;
+    let settings = rates::settings(min_pulse_ns, *dead_time_ns, ratings.max_switching_hz);
+    // The longest carrier half of a machine that switches slowly.
+    let longest_ticks = settings.devices.shortest_half_ticks.saturating_mul(rates::CARRIER_RANGE);
+    if longest_ticks > rates::LONGEST_HALF_TICKS {
+        let least_hz = f64::from(rates::CLOCK.ticks_per_s) * f64::from(rates::CARRIER_RANGE)
+            / f64::from(2 * (rates::LONGEST_HALF_TICKS - rates::CARRIER_RANGE));
+        return Err(machine.refuse(format!(
+            "max_switching_hz: {}: must be at least {}: the timers' 16 bits hold no longer carrier half",
+            ratings.max_switching_hz,
+            shown(least_hz.ceil()),
+        )));
+    }
+    let half_ns = 1e9 * f64::from(settings.devices.shortest_half_ticks) / f64::from(rates::CLOCK.ticks_per_s);
+    stage.check(&[
+        Bound(
+            "dead_time_ns",
+            f64::from(*dead_time_ns),
+            1.0,
+            (0.25 * half_ns).floor(),
+            "up to a quarter of the shortest carrier half",
+        ),
+        Bound(
+            "min_pulse_ns",
+            f64::from(min_pulse_ns),
+            stage.real_dead_time_ns() + 1.0,
+            (0.5 * half_ns).floor(),
+            "more than the dead time, up to half of the shortest carrier half",
+        ),
+    ])?;
+    stage.check_sensors(machine, f64::from(ratings.trip_dc_over_v), "the machine's trip_dc_over_v", 1)?;
+    settings.check(machine.tables).map_err(|refused| stage.refuse_start(machine, &refused))?;
+    Ok(stage.constant(min_pulse_ns))
+}
+
+/// Checks the ZS9's power stage; gives its constant as Rust.
+///
+/// # Errors
+/// The first key that does not suit the board or the machine.
+pub fn zs9(file: &Path, text: &str, machine: &Machine) -> Result<String, InputError> {
+    let stage = Stage::parse(file, text)?;
+    let Keys { min_pulse_ns, z_source, encoder_zeros_deg, .. } = &stage.keys;
+    if min_pulse_ns.is_some() {
+        return Err(stage.refuse("min_pulse_ns", "the modulator of the nine switches has none".to_owned()));
+    }
+    let Some(ZSource { inductor_range_a, source_range_v, link_ref_v }) = *z_source else {
+        return Err(stage.refuse("z_source", "is missing".to_owned()));
+    };
+    stage.check_times(ZS9_DEAD_TIME_NS)?;
+    let settings = zs9_rates::settings();
+    let operated = settings.operator_ratings(&machine.tables.ratings);
+    let capacitor_v = f64::from(settings.limits.capacitor_max_v);
+    stage.check_sensors(machine, capacitor_v, "the capacitors' highest voltage", 2)?;
+    let inductor_a = f64::from(settings.link.inductor_max_a);
+    let source_v = f64::from(operated.dc_link_max_v);
+    let [least_v, most_v, _] = tractive::drive::dual::Settings::link_range_v(&operated).map(f64::from);
+    stage.check(&[
+        stage.current("inductor_range_a", inductor_range_a, inductor_a, "the inductor's highest current"),
+        stage.voltage("source_range_v", source_range_v, source_v, "the source's highest voltage"),
+        Bound("link_ref_v", link_ref_v, least_v, most_v, "what an operator may ask for with this machine"),
+    ])?;
+    settings.check(machine.tables).map_err(|refused| stage.refuse_start(machine, &refused))?;
+    let zeros: Vec<_> = encoder_zeros_deg.iter().map(|degrees| angle(*degrees)).collect();
+    Ok(format!(
+        "Zs9Stage {{\n    common: {},\n    encoder_zeros: [{}],\n    \
+         inductor_a_per_code: {inductor_range_a:?} / {HALF_CODES:?},\n    \
+         source_v_per_code: {source_range_v:?} / {CODES:?},\n    link_ref_v: {link_ref_v:?},\n}}",
+        // The modulator of the nine switches has no shortest pulse.
+        stage.constant(0),
+        zeros.join(", "),
+    ))
+}
+
+impl<'a> Stage<'a> {
+    fn parse(file: &'a Path, text: &'a str) -> Result<Self, InputError> {
+        let line = |start: usize| 1 + text[..start].matches('\n').count() as u64;
+        let keys = toml::from_str(text).map_err(|error| {
+            InputError::new(file, error.span().map(|span| line(span.start)), error.message())
+        })?;
+        Ok(Self { file, text, keys })
+    }
+
+    /// The error of a key, with the line where it stands.
+    fn refuse(&self, key: &str, problem: String) -> InputError {
+        let is_key =
+            |line: &str| line.split(['=', ']']).next().map(|word| word.trim_matches([' ', '['])) == Some(key);
+        let line = self.text.lines().position(is_key).map(|index| index as u64 + 1);
+        InputError::new(self.file, line, format!("{key}: {problem}"))
+    }
+
+    /// The error of a machine or a stage with which the image itself would refuse to start.
+    fn refuse_start(&self, machine: &Machine, refused: &Refused) -> InputError {
+        let problem = format!("the image would not start: {refused}");
+        match refused.name.starts_with("devices.") {
+            true => InputError::new(self.file, None, problem),
+            false => machine.refuse(problem),
+        }
+    }
+
+    /// The first key out of its bounds. What is not a number is out of any.
+    fn check(&self, bounds: &[Bound]) -> Result<(), InputError> {
+        let outside = bounds.iter().find(|Bound(_, value, least, most, _)| !(least..=most).contains(&value));
+        let Some(Bound(key, value, least, most, why)) = outside else { return Ok(()) };
+        let (least, most) = (shown(*least), shown(*most));
+        Err(self.refuse(key, format!("{value}: must be from {least} to {most}: {why}")))
+    }
+
+    /// The longest dead time that the generator makes, in ns.
+    fn longest_dead_time_ns(&self) -> f64 {
+        (f64::from(DeadTime::LONGEST_CYCLES) * 1e9 / f64::from(rates::CORE_HZ)).floor()
+    }
+
+    /// The dead time that the generator makes of what was asked for, in ns.
+    fn real_dead_time_ns(&self) -> f64 {
+        let cycles =
+            DeadTime::at_least(rates::ns_to_cycles(self.keys.dead_time_ns)).map_or(0, DeadTime::cycles);
+        (f64::from(cycles) * 1e9 / f64::from(rates::CORE_HZ)).ceil()
+    }
+
+    fn check_times(&self, longest_dead_time_ns: f64) -> Result<(), InputError> {
+        let Keys { dead_time_ns, precharge_s, discharge_s, .. } = self.keys;
+        self.check(&[
+            Bound(
+                "dead_time_ns",
+                f64::from(dead_time_ns),
+                1.0,
+                longest_dead_time_ns,
+                "what the drive can have",
+            ),
+            Bound("precharge_s", precharge_s, 1e-3, 60.0, "a time constant of a DC link"),
+            Bound("discharge_s", discharge_s, 1e-3, 600.0, "a time constant of a DC link"),
+        ])
+    }
+
+    /// Currents, voltage and encoders, for a drive that trips at `trip_v`.
+    fn check_sensors(
+        &self,
+        machine: &Machine,
+        trip_v: f64,
+        why_v: &str,
+        encoders: usize,
+    ) -> Result<(), InputError> {
+        let Keys { current_range_a, zero_code, zero_tolerance, dc_link_range_v, break_current_a, .. } =
+            self.keys;
+        let trip_a = f64::from(machine.tables.ratings.trip_current_a);
+        let (zero, tolerance) = (f64::from(zero_code), f64::from(zero_tolerance));
+        let a_per_code = current_range_a / HALF_CODES;
+        // Codes that are left to either side of a zero that is off.
+        let room = zero.min(CODES - zero) - tolerance - 1.0;
+        self.check(&[
+            Bound("zero_code", zero, 1_024.0, 3_072.0, "near the middle of the converter's range"),
+            Bound("zero_tolerance", tolerance, 1.0, 512.0, "what a sensor's offset may be"),
+            self.current("current_range_a", current_range_a, trip_a, "the machine's trip_current_a"),
+            self.voltage("dc_link_range_v", dc_link_range_v, trip_v, why_v),
+            Bound(
+                "break_current_a",
+                break_current_a,
+                trip_a + tolerance * a_per_code,
+                BREAK * trip_a,
+                &format!(
+                    "above the machine's trip_current_a, {}, by a sensor's offset, and at most twice it",
+                    shown(trip_a)
+                ),
+            ),
+            Bound(
+                "break_current_a",
+                break_current_a,
+                0.0,
+                room * a_per_code,
+                "what the converters hold with current_range_a",
+            ),
+            Bound(
+                "encoder_counts",
+                f64::from(self.keys.encoder_counts),
+                4.0,
+                65_536.0,
+                "what the timer counts",
+            ),
+        ])?;
+        let zeros = &self.keys.encoder_zeros_deg;
+        if zeros.len() != encoders {
+            return Err(
+                self.refuse("encoder_zeros_deg", format!("{} angles: must be {encoders}", zeros.len()))
+            );
+        }
+        zeros
+            .iter()
+            .try_for_each(|zero| self.check(&[Bound("encoder_zeros_deg", *zero, -360.0, 360.0, "an angle")]))
+    }
+
+    /// The range of a current's sensor, which has to hold so much to either side of a zero that is off.
+    fn current<'b>(&self, key: &'b str, range_a: f64, holds_a: f64, why: &'b str) -> Bound<'b> {
+        let (zero, tolerance) = (f64::from(self.keys.zero_code), f64::from(self.keys.zero_tolerance));
+        let least = holds_a * HALF_CODES / (zero.min(CODES - zero) - tolerance - 1.0);
+        Bound(key, range_a, least, RANGE * holds_a, why)
+    }
+
+    /// The range of a voltage divider, which has to hold so much.
+    fn voltage<'b>(&self, key: &'b str, range_v: f64, holds_v: f64, why: &'b str) -> Bound<'b> {
+        Bound(key, range_v, holds_v * CODES / (CODES - 1.0), RANGE * holds_v, why)
+    }
+
+    /// The constant's value as Rust.
+    fn constant(&self, min_pulse_ns: u32) -> String {
+        let Keys { dead_time_ns, current_range_a, zero_code, zero_tolerance, dc_link_range_v, .. } =
+            self.keys;
+        let Keys { break_current_a, encoder_counts, precharge_s, discharge_s, .. } = self.keys;
+        let zero = angle(self.keys.encoder_zeros_deg.first().copied().unwrap_or_default());
+        format!(
+            "PowerStage {{\n    dead_time_ns: {dead_time_ns},\n    min_pulse_ns: {min_pulse_ns},\n    \
+             current_a_per_code: {current_range_a:?} / {HALF_CODES:?},\n    zero_code: {zero_code},\n    \
+             zero_tolerance: {zero_tolerance},\n    udc_v_per_code: {dc_link_range_v:?} / {CODES:?},\n    \
+             break_current_a: {break_current_a:?},\n    encoder_counts: {encoder_counts},\n    encoder_zero: {zero},\n    \
+             line: LineTimes {{ precharge_s: {precharge_s:?}, discharge_s: {discharge_s:?} }},\n}}"
+        )
+    }
+}
+
+impl Machine<'_> {
+    fn refuse(&self, problem: String) -> InputError {
+        InputError::new(&self.folder.join("machine.toml"), None, problem)
+    }
+}
+
+/// An angle as Rust.
+fn angle(degrees: f64) -> String {
+    let turns = (degrees / 360.0).rem_euclid(1.0);
+    format!("Angle({})", (turns * 4_294_967_296.0) as u64 as u32)
+}
+
+/// A bound with four digits, as whole as it is.
+fn shown(bound: f64) -> String {
+    let rounded = format!("{bound:.3}");
+    rounded.trim_end_matches('0').trim_end_matches('.').to_owned()
+}

@@ -1,0 +1,105 @@
+//! The ZS9 firmware on the NUCLEO-G474RE: two interrupts and an idle loop, nothing else.
+#![cfg_attr(target_os = "none", no_std, no_main)]
+
+/// The image runs on the board; on the host it names the command that brings it there.
+#[cfg(not(target_os = "none"))]
+fn main() {
+    println!(
+        "This is the firmware. `cargo xtask flash --system zs9` builds it for its board and flashes it."
+    );
+}
+
+#[cfg(target_os = "none")]
+mod firmware {
+    use core::sync::atomic::{AtomicU32, Ordering};
+    use cortex_m_rt::{entry, exception, interrupt};
+    use nucleo_g474re::built_in::zs9::{BUILT_IN, BuiltIn};
+    use nucleo_g474re::position::Encoder;
+    use nucleo_g474re::power_stage::{AdcCode, PowerStage};
+    use nucleo_g474re::registers::Registers;
+    use nucleo_g474re::zs9::sampling::Zeros;
+    use nucleo_g474re::zs9::stage::STAGE;
+    use nucleo_g474re::zs9::{self as board, Control, OPERATOR, Pwm, RECORDER, settings};
+    use nucleo_g474re::{Interrupt as interrupt, PULSE};
+    use tractive::drive::dual::{ControlTask, PwmTask, Shared};
+    use tractive::protection::Violation;
+
+    static SHARED: Shared = Shared::recorded_by(&RECORDER);
+    /// The zeros that the start measured, written before the interrupts are unmasked.
+    static ZEROS: [AtomicU32; 7] = [const { AtomicU32::new(0) }; 7];
+
+    // The build script has said so already, by name: a machine with which the drive would not start makes no image.
+    const _: () = assert!(settings().check(&BUILT_IN).is_ok());
+
+    fn keep(zeros: &Zeros) {
+        let codes = zeros.motors.iter().flatten().chain([&zeros.inductor]);
+        for (cell, zero) in ZEROS.iter().zip(codes) {
+            cell.store(u32::from(zero.0), Ordering::Relaxed);
+        }
+    }
+
+    fn kept() -> Zeros {
+        let [u1, v1, w1, u2, v2, w2, inductor] =
+            ZEROS.each_ref().map(|cell| AdcCode(cell.load(Ordering::Relaxed) as u16));
+        Zeros { motors: [[u1, v1, w1], [u2, v2, w2]], inductor }
+    }
+
+    #[entry]
+    fn main() -> ! {
+        board::idle(start().err())
+    }
+
+    /// Starts the drive; the error is why it is refused.
+    fn start() -> Result<(), Violation> {
+        keep(&board::prepare().map_err(|error| error.violation())?);
+        board::run();
+        Ok(())
+    }
+
+    /// Deadline: the last peak before the next control interrupt. Missed: fault `control_deadline`, all gates off.
+    #[interrupt]
+    fn TIM2() {
+        static mut BOARD: Option<Control<'static, Encoder>> = None;
+        static mut TASK: Option<ControlTask<BuiltIn>> = None;
+        let board = BOARD.get_or_insert_with(|| {
+            let registers = Registers::CHIP;
+            let [first, second] = STAGE.encoder_zeros;
+            let encoder = |timer, encoder_zero| {
+                let stage = PowerStage { encoder_zero, ..STAGE.common };
+                Encoder::new(timer, &stage, BUILT_IN.ratings.pole_pairs as u32)
+            };
+            let encoders = [encoder(registers.tim4, first), encoder(registers.tim3, second)];
+            Control::new(registers, kept(), encoders, &OPERATOR)
+        });
+        TASK.get_or_insert_with(|| ControlTask::new(BuiltIn, settings())).run(board, &SHARED);
+        PULSE.control_ran();
+    }
+
+    /// Comes at peaks and valleys; only the peaks are the drive's. Deadline: the next valley, where the shadow registers take
+    /// over. Missed: a break, gates off for good.
+    #[interrupt]
+    fn TIM1_UP_TIM16() {
+        static mut BOARD: Option<Pwm> = None;
+        static mut TASK: Option<PwmTask<BuiltIn>> = None;
+        let board = BOARD.get_or_insert_with(|| Pwm::new(Registers::CHIP, kept()));
+        if TASK.get_or_insert_with(|| PwmTask::new(BuiltIn, settings())).run(board, &SHARED) {
+            PULSE.pwm_ran();
+        }
+    }
+
+    #[exception]
+    unsafe fn HardFault(_frame: &cortex_m_rt::ExceptionFrame) -> ! {
+        board::die()
+    }
+
+    /// Any other exception or interrupt: there is none that the drive survives (the clock security system's among them).
+    #[exception]
+    unsafe fn DefaultHandler(_number: i16) -> ! {
+        board::die()
+    }
+
+    #[panic_handler]
+    fn panic(_info: &core::panic::PanicInfo) -> ! {
+        board::die()
+    }
+}

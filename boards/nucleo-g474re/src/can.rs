@@ -1,0 +1,239 @@
+//! CAN: FDCAN1 with classic frames at 500 kbit/s, served from the idle loop.
+//!
+//! Its clock is the crystal itself, so the bit rate does not depend on the PLL. The message RAM of this chip has a fixed layout:
+//! filters, two receive FIFOs and a transmit FIFO of three elements each, 18 words an element. Only the protocol's own identifiers
+//! pass the filters; remote frames and 29-bit identifiers never do.
+
+use super::start::{StartError, Wait};
+use stm32_metapac as pac;
+use stm32_metapac::can::vals::{Anfe, Anfs, Pdiv, Tfqm};
+use stm32_metapac::rcc::vals::Fdcansel;
+use tractive::protocol::{Frame, Message};
+
+/// The crystal, in Hz.
+pub const CLOCK_HZ: u32 = 24_000_000;
+/// Bits per second.
+pub const BIT_RATE: u32 = 500_000;
+/// The point in a bit at which it is sampled, in thousandths, as CiA recommends.
+pub const SAMPLE_POINT: u32 = 875;
+
+/// A bit's length, in quanta; each value as it is, not as the register holds it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct BitTiming {
+    /// Clock cycles in a quantum, 1 ..= 512.
+    pub prescaler: u32,
+    /// Quanta from the synchronisation's to the sample point, 1 ..= 256.
+    pub before_sample: u32,
+    /// Quanta after it, 1 ..= 128.
+    pub after_sample: u32,
+}
+
+impl BitTiming {
+    /// Quanta in a bit.
+    pub const fn quanta(&self) -> u32 {
+        1 + self.before_sample + self.after_sample
+    }
+
+    /// The timing with 16 quanta a bit; `None` if clock, rate and sample point do not come out exactly.
+    pub const fn exact(clock_hz: u32, bit_rate: u32, sample_point: u32) -> Option<Self> {
+        const QUANTA: u32 = 16;
+        let quantum_hz = bit_rate * QUANTA;
+        let sampled = QUANTA * sample_point;
+        if quantum_hz == 0 || !clock_hz.is_multiple_of(quantum_hz) || !sampled.is_multiple_of(1_000) {
+            return None;
+        }
+        let (prescaler, sampled) = (clock_hz / quantum_hz, sampled / 1_000);
+        if prescaler == 0 || prescaler > 512 || sampled < 2 || sampled >= QUANTA {
+            return None;
+        }
+        Some(Self { prescaler, before_sample: sampled - 1, after_sample: QUANTA - sampled })
+    }
+}
+
+/// The bus's timing.
+pub const TIMING: BitTiming = match BitTiming::exact(CLOCK_HZ, BIT_RATE, SAMPLE_POINT) {
+    Some(timing) => timing,
+    None => panic!("clock, bit rate and sample point do not come out exactly"),
+};
+
+/// Words of an element of a FIFO.
+const ELEMENT: usize = 18;
+/// Elements of a FIFO.
+const ELEMENTS: usize = 3;
+/// Slots after a bus-off until it is left, in ms: a bus that is shorted is not stormed.
+pub const BUS_OFF_MS: u32 = 100;
+
+/// The state of the bus.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Health {
+    /// Frames that found the transmit FIFO full; wraps.
+    pub dropped: u32,
+    /// The number of times that the controller has left the bus; wraps.
+    pub bus_offs: u32,
+}
+
+/// The controller and its memory.
+#[derive(Clone, Copy)]
+pub struct Can {
+    can: pac::can::Fdcan,
+    ram: pac::fdcanram::Fdcanram,
+    health: Health,
+    /// Slots until the bus is joined again, while it is off.
+    waits_ms: Option<u32>,
+}
+
+impl Can {
+    /// The chip's.
+    pub const CHIP: Self = Self::new(pac::FDCAN1, pac::FDCANRAM1);
+
+    /// Of these blocks.
+    pub const fn new(can: pac::can::Fdcan, ram: pac::fdcanram::Fdcanram) -> Self {
+        Self { can, ram, health: Health { dropped: 0, bus_offs: 0 }, waits_ms: None }
+    }
+
+    /// Clock, timing, filters for these messages; then it joins the bus. Its pins follow, so that nothing dominant is sent before. The
+    /// crystal is its clock, whatever the start has come to.
+    pub fn configure(
+        &self,
+        messages: &[&Message],
+        rcc: &pac::rcc::Rcc,
+        wait: &mut dyn Wait,
+    ) -> Result<(), StartError> {
+        rcc.cr().modify(|w| w.set_hseon(true));
+        wait.until(&mut || rcc.cr().read().hserdy()).or(Err(StartError::Can))?;
+        rcc.ccipr().modify(|w| w.set_fdcansel(Fdcansel::HSE));
+        rcc.apb1enr1().modify(|w| w.set_fdcanen(true));
+        // A peripheral takes writes only some cycles after its clock has been enabled.
+        wait.microseconds(1);
+        let can = self.can;
+        can.cccr().modify(|w| w.set_init(true));
+        wait.until(&mut || can.cccr().read().init()).or(Err(StartError::Can))?;
+        // Everything below is write-protected until this.
+        can.cccr().modify(|w| w.set_cce(true));
+        can.cccr().modify(|w| {
+            w.set_fdoe(false);
+            w.set_brse(false);
+            w.set_dar(false);
+            w.set_mon(false);
+            w.set_asm(false);
+            w.set_test(false);
+        });
+        can.ckdiv().write(|w| w.set_pdiv(Pdiv::DIV_1));
+        can.nbtp().write(|w| {
+            w.set_nbrp((TIMING.prescaler - 1) as u16);
+            w.set_ntseg1((TIMING.before_sample - 1) as u8);
+            w.set_ntseg2((TIMING.after_sample - 1) as u8);
+            // As far as the segment after the sample point goes.
+            w.set_nsjw((TIMING.after_sample - 1) as u8);
+        });
+        can.rxgfc().write(|w| {
+            w.set_rrfe(true);
+            w.set_rrfs(true);
+            w.set_anfe(Anfe::REJECT);
+            w.set_anfs(Anfs::REJECT);
+            // A full FIFO keeps what it has: the sequence's gap is seen by the counters.
+            w.set_f0om(false);
+            // Two identifiers share a filter.
+            w.set_lss(messages.len().div_ceil(2) as u8);
+            w.set_lse(0);
+        });
+        for (index, pair) in messages.chunks(2).enumerate() {
+            if let (Some(first), Some(last)) = (pair.first(), pair.last()) {
+                self.ram.flssa(index).write_value(dual_filter(first.id, last.id));
+            }
+        }
+        can.txbc().write(|w| w.set_tfqm(Tfqm::FIFO));
+        self.join();
+        wait.until(&mut || !can.cccr().read().init()).or(Err(StartError::Can))
+    }
+
+    /// Leaves the initialisation: the controller waits for eleven recessive bits, after a bus-off for 128 times as many.
+    fn join(&self) {
+        self.can.cccr().modify(|w| {
+            w.set_cce(false);
+            w.set_init(false);
+        });
+    }
+
+    /// Takes the frames that have come, the oldest first, as many as there is room for; gives their number.
+    pub fn receive(&mut self, into: &mut [Frame]) -> usize {
+        let status = self.can.rxfs(0).read();
+        let taken = usize::from(status.ffl()).min(ELEMENTS).min(into.len());
+        for (frame, element) in into.iter_mut().zip(0..taken) {
+            *frame = self.element((usize::from(status.fgi()) + element) % ELEMENTS);
+        }
+        if taken > 0 {
+            // The last one that was read: with it those before it are given back.
+            let last = (usize::from(status.fgi()) + taken - 1) % ELEMENTS;
+            self.can.rxfa(0).write(|w| w.set_fai(last as u8));
+        }
+        taken
+    }
+
+    /// An element of the receive FIFO.
+    fn element(&self, index: usize) -> Frame {
+        let base = index * ELEMENT;
+        let [id, length, low, high] = [0, 1, 2, 3].map(|word| self.ram.rxfifo0(base + word).read());
+        // Codes above 8 stand for eight bytes.
+        let length = (length >> 16 & 0xF).min(8) as u8;
+        let [a, b, c, d] = low.to_le_bytes();
+        let [e, f, g, h] = high.to_le_bytes();
+        let mut data = [a, b, c, d, e, f, g, h];
+        data.iter_mut().skip(usize::from(length)).for_each(|byte| *byte = 0);
+        Frame { id: (id >> 18 & 0x7FF) as u16, length, data }
+    }
+
+    /// Sends a frame, or drops it if three wait already: the newest telemetry comes again, and a bus that nobody listens to fills no memory.
+    pub fn send(&mut self, frame: &Frame) {
+        let status = self.can.txfqs().read();
+        if status.tfqf() {
+            self.health.dropped = self.health.dropped.wrapping_add(1);
+            return;
+        }
+        let index = usize::from(status.tfqpi()).min(ELEMENTS - 1);
+        let [a, b, c, d, e, f, g, h] = frame.data;
+        let words = [
+            u32::from(frame.id & 0x7FF) << 18,
+            u32::from(frame.length.min(8)) << 16,
+            u32::from_le_bytes([a, b, c, d]),
+            u32::from_le_bytes([e, f, g, h]),
+        ];
+        for (word, value) in words.into_iter().enumerate() {
+            self.ram.txbuf(index * ELEMENT + word).write_value(value);
+        }
+        self.can.txbar().write(|w| w.set_ar(index, true));
+    }
+
+    /// Once a millisecond: joins the bus again some time after a bus-off.
+    pub fn tend(&mut self) {
+        if !self.can.psr().read().bo() {
+            self.waits_ms = None;
+            return;
+        }
+        match self.waits_ms {
+            None => {
+                self.health.bus_offs = self.health.bus_offs.wrapping_add(1);
+                self.waits_ms = Some(BUS_OFF_MS);
+            }
+            Some(0) => {
+                // The controller has set it itself; the flag stays until the bus was quiet for long enough.
+                if self.can.cccr().read().init() {
+                    self.join();
+                }
+            }
+            Some(left_ms) => self.waits_ms = Some(left_ms - 1),
+        }
+    }
+
+    /// The state of the bus.
+    pub const fn health(&self) -> Health {
+        self.health
+    }
+}
+
+/// A filter that stores frames with one of two identifiers in FIFO 0.
+const fn dual_filter(first: u16, second: u16) -> u32 {
+    const DUAL: u32 = 0b01 << 30;
+    const STORE_IN_FIFO_0: u32 = 0b001 << 27;
+    DUAL | STORE_IN_FIFO_0 | (first as u32) << 16 | second as u32
+}

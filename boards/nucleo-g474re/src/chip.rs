@@ -1,0 +1,181 @@
+//! The parts that only the chip has: the vector table, the interrupt controller, waiting, the idle loop.
+#![allow(unsafe_code)]
+
+use super::can::Can;
+use super::log::Log;
+use super::operator::Operator;
+use super::pins::{self, Pin};
+use super::power_stage::{CORE_HZ, POWER_STAGE};
+use super::registers::Registers;
+use super::serve::Serve;
+use super::start::{self, Found, Plan, StartError, Timeout, Wait};
+use super::watchdog::Pulse;
+use super::{CLOCK, clock};
+use crate::built_in::traction::BUILT_IN;
+use cortex_m::peripheral::NVIC;
+use defmt_rtt as _;
+pub use stm32_metapac::Interrupt;
+use stm32_metapac::rcc::vals::Sw;
+use tractive::operator::{self, Configuration, Line, Mailboxes, Slot, slot_s};
+use tractive::protection::Violation;
+use tractive::protocol::{CanEndpoint, Message, TO_DRIVE};
+use tractive::recorder::Recorder;
+
+/// The drive's operator.
+pub static OPERATOR: Operator = Operator::new(Mailboxes::new());
+
+/// The drive's flight recorder.
+pub static RECORDER: Recorder = Recorder::new();
+
+/// The signs of life that the interrupts give the watchdog.
+pub static PULSE: Pulse = Pulse::new();
+
+unsafe extern "C" {
+    fn TIM1_UP_TIM16();
+    fn TIM2();
+    fn TIM3();
+    fn DefaultHandler();
+}
+
+/// The vector table's device part. Every entry leads somewhere; those that a firmware does not define, and all others, to the
+/// default handler.
+#[unsafe(link_section = ".vector_table.interrupts")]
+#[unsafe(no_mangle)]
+pub static __INTERRUPTS: [unsafe extern "C" fn(); 102] = {
+    let mut table: [unsafe extern "C" fn(); 102] = [DefaultHandler; 102];
+    table[Interrupt::TIM1_UP_TIM16 as usize] = TIM1_UP_TIM16;
+    table[Interrupt::TIM2 as usize] = TIM2;
+    table[Interrupt::TIM3 as usize] = TIM3;
+    table
+};
+
+struct Unlocked;
+critical_section::set_impl!(Unlocked);
+
+// SAFETY: only the log takes critical sections, and only the idle loop logs: there is never a second one to keep out. So
+// nothing is masked, and no interrupt is ever late for a message.
+unsafe impl critical_section::Impl for Unlocked {
+    unsafe fn acquire() -> critical_section::RawRestoreState {}
+    unsafe fn release(_: critical_section::RawRestoreState) {}
+}
+
+/// Waits by counting cycles.
+pub(super) struct Cycles;
+
+impl Wait for Cycles {
+    fn until(&mut self, done: &mut dyn FnMut() -> bool) -> Result<(), Timeout> {
+        // 100 ms and more: the crystal takes a few.
+        for _ in 0..10_000 {
+            if done() {
+                return Ok(());
+            }
+            self.microseconds(10);
+        }
+        Err(Timeout)
+    }
+
+    fn microseconds(&mut self, us: u32) {
+        cortex_m::asm::delay(us.saturating_mul(CORE_HZ / 1_000_000));
+    }
+}
+
+/// Frequency of the internal oscillator, the core's from a reset until it is switched to the PLL, in Hz.
+const RESET_HZ: u32 = 16_000_000;
+
+/// Waits a slot's time where no interrupt beats, on whatever clock the start has left the core.
+pub(super) fn pause_a_slot() {
+    let core_hz = match Registers::CHIP.rcc.cfgr().read().sws() {
+        Sw::PLL1_R => CORE_HZ,
+        _ => RESET_HZ,
+    };
+    cortex_m::asm::delay(core_hz / 1_000);
+}
+
+/// Configures everything, gates off. Call it once.
+pub fn prepare(plan: Plan) -> Result<Found, StartError> {
+    let found = start::prepare(&Registers::CHIP, &mut Cycles, plan);
+    join_bus(found, &TO_DRIVE, &pins::PINS)
+}
+
+/// Joins the bus for these messages, started or not: there it is said why not.
+pub(super) fn join_bus<T>(
+    found: Result<T, StartError>,
+    messages: &[&Message],
+    of: &[Pin],
+) -> Result<T, StartError> {
+    if let Err(error) = &found {
+        defmt::error!("no start: {}", error);
+    }
+    let registers = Registers::CHIP;
+    // The ports of the bus's pins among them: the start may not have come so far.
+    clock::enable_peripherals(&registers, &mut Cycles);
+    match Can::CHIP.configure(messages, &registers.rcc, &mut Cycles) {
+        Ok(()) => pins::configure_bus(&registers, of),
+        // Nobody can command the drive then; it rests.
+        Err(error) => defmt::error!("no bus: {}", error),
+    }
+    found
+}
+
+/// Starts both timers and unmasks their interrupts: PWM preempts control.
+pub fn run() {
+    run_with(Interrupt::TIM1_UP_TIM16, Interrupt::TIM3, start::run);
+}
+
+/// Lets both interrupts come and starts their timers. Call it once.
+pub(super) fn run_with(pwm: Interrupt, control: Interrupt, start: fn(&Registers, &mut dyn Wait)) {
+    // SAFETY: the only use of the core peripherals, before any interrupt is unmasked.
+    let mut core = unsafe { cortex_m::Peripherals::steal() };
+    // SAFETY: priorities are changed while both interrupts are masked; no code relies on a priority ceiling. After that
+    // both may come: their handlers share nothing but cells and registers that each writes as the modules say.
+    unsafe {
+        core.NVIC.set_priority(pwm, 0x40);
+        core.NVIC.set_priority(control, 0x80);
+        NVIC::unmask(pwm);
+        NVIC::unmask(control);
+    }
+    start(&Registers::CHIP, &mut Cycles);
+    defmt::info!("running");
+}
+
+/// Makes the PWM interrupt come at once, between two boundaries.
+pub fn revise_pulses() {
+    NVIC::pend(Interrupt::TIM1_UP_TIM16);
+    // It has run before anything else is done.
+    cortex_m::asm::dsb();
+    cortex_m::asm::isb();
+}
+
+/// The idle loop, forever: serves the bus and the operator, feeds the watchdog, tells what has changed, and after a fault what the flight recorder
+/// holds. Where the start was `refused` it says why to whoever asks on the bus.
+pub fn idle(refused: Option<Violation>) -> ! {
+    let line = Line::rated(&BUILT_IN.ratings, POWER_STAGE.line.precharge_s, POWER_STAGE.line.discharge_s);
+    let rated = operator::Settings::rated(&BUILT_IN.ratings, slot_s(&CLOCK), Some(line));
+    let station = CanEndpoint::new(&BUILT_IN.ratings);
+    let mut serve = Serve::new(Registers::CHIP, Can::CHIP, station, &OPERATOR, Configuration::Good);
+    let (mut slot, mut log) = (Slot::new(), Log::new());
+    while let Some(why) = refused {
+        pause_a_slot();
+        serve.refuse(&mut slot, why, &rated);
+    }
+    loop {
+        serve.pass(&mut slot, &rated);
+        if PULSE.feed_if_both_ran(&Registers::CHIP) {
+            log.record(&RECORDER);
+        }
+        log.trip(OPERATOR.desk.observed().and_then(|observed| observed.trip));
+    }
+}
+
+/// All outputs off for good, whatever state the program is in, then nothing more; the watchdog resets the chip if it runs.
+pub fn die() -> ! {
+    die_on(&pins::PINS)
+}
+
+/// The same for a system's pins.
+pub(super) fn die_on(of: &[Pin]) -> ! {
+    start::switch_off(&Registers::CHIP, of);
+    loop {
+        cortex_m::asm::nop();
+    }
+}

@@ -1,0 +1,192 @@
+//! The rotor's position.
+//!
+//! The encoder's count is captured by hardware at the control timer's update, the instant at which the currents are sampled: channel 3 of the
+//! encoder's timer captures the internal trigger TRC, which TS selects; the encoder mode leaves TS free (RM0440, general-purpose timers:
+//! encoder interface, "latching the counter value into a third input capture register", and TIMx_CCMR2.CC3S = 11).
+
+use super::power_stage::PowerStage;
+use core::sync::atomic::{AtomicU32, Ordering};
+use stm32_metapac::timer::{TimGp16, regs, vals};
+use tractive::frames::Angle;
+
+/// A source of the electrical angle. The board has the encoder; a resolver or an absolute encoder (SSI) implements this
+/// and takes its place in [`super::Control`].
+pub trait Position {
+    /// The angle at the control timer's update; `None` while it is not known, which keeps the gates off. Called in the control interrupt: it may not wait.
+    fn angle(&mut self) -> Option<Angle>;
+
+    /// `true` once the sensor has noticed that it lost its rotor: a fault, and for good.
+    fn is_lost(&self) -> bool {
+        false
+    }
+}
+
+/// The state of a drive's position sensors, one word from the control interrupt, which reads them, to the idle loop.
+#[derive(Debug)]
+pub struct PositionState(AtomicU32);
+
+impl PositionState {
+    const KNOWN: u32 = 1;
+    const LOST: u32 = 2;
+
+    /// Nothing read yet.
+    pub const fn new() -> Self {
+        Self(AtomicU32::new(0))
+    }
+
+    /// In the control interrupt: the angles that its sensors gave, and whether each has lost its rotor.
+    #[inline]
+    pub(super) fn tell<const N: usize>(&self, angles: &[Option<Angle>; N], lost: &[bool; N]) {
+        let known = if angles.iter().all(Option::is_some) { Self::KNOWN } else { 0 };
+        let lost = if lost.contains(&true) { Self::LOST } else { 0 };
+        self.0.store(known | lost, Ordering::Relaxed);
+    }
+
+    /// `true` once all angles are known.
+    pub fn is_known(&self) -> bool {
+        self.0.load(Ordering::Relaxed) & Self::KNOWN != 0
+    }
+
+    /// `true` once a sensor has noticed that it lost its rotor.
+    pub fn is_lost(&self) -> bool {
+        self.0.load(Ordering::Relaxed) & Self::LOST != 0
+    }
+}
+
+impl Default for PositionState {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// An angle as the drive is told of it: none where the sensor has lost its rotor.
+#[inline]
+pub(super) fn reported(angle: Option<Angle>, lost: bool) -> Option<Angle> {
+    if lost { None } else { angle }
+}
+
+/// An incremental encoder with an index, counted by TIM4.
+#[derive(Clone, Copy)]
+pub struct Encoder {
+    timer: TimGp16,
+    units_per_count: u32,
+    counts: u32,
+    zero: Angle,
+    /// Count of the last call and counts since the one before, once the index has passed.
+    last: Option<(u32, u32)>,
+    /// The last call has seen the index. Its count may be older than that: the next one is not.
+    passed: bool,
+    lost: bool,
+}
+
+/// The channel that captures the count, from 0.
+const CAPTURE: usize = 2;
+
+/// TS of an encoder on TIM4 captured by TIM3; of encoders on TIM3 and TIM4 captured by TIM2 (RM0440, internal trigger connection).
+pub const TIM4_BY_TIM3: vals::Ts = vals::Ts::ITR2;
+/// See [`TIM4_BY_TIM3`].
+pub const BY_TIM2: vals::Ts = vals::Ts::ITR1;
+
+/// By how many counts an index pulse may be off: acceleration within a control period, and the filters' delays.
+const INDEX_TOLERANCE: u32 = 8;
+
+impl Encoder {
+    /// The encoder of a machine with this many pole pairs.
+    pub fn new(timer: TimGp16, stage: &PowerStage, pole_pairs: u32) -> Self {
+        Self {
+            timer,
+            units_per_count: units_per_count(stage.encoder_counts, pole_pairs),
+            counts: stage.encoder_counts.max(1),
+            zero: stage.encoder_zero,
+            last: None,
+            passed: false,
+            lost: false,
+        }
+    }
+
+    /// Counts every edge of both tracks, 0 ..= counts − 1 a turn; the index sets it to 0 in either direction. Each `trigger`, the control
+    /// timer's TRGO, captures the count.
+    pub fn configure(timer: TimGp16, stage: &PowerStage, trigger: vals::Ts) {
+        timer.ccmr_input(0).write(|w| {
+            for channel in [0, 1] {
+                w.set_ccs(channel, vals::CcmrInputCcs::TI4);
+                w.set_icf(channel, vals::FilterValue::FCK_INT_N8);
+            }
+        });
+        timer.ccmr_input(1).write(|w| w.set_ccs(0, vals::CcmrInputCcs::TRC));
+        timer.arr().write(|w| w.set_arr((stage.encoder_counts - 1) as u16));
+        // TS changes only while no mode uses it.
+        timer.smcr().write(|w| w.set_ts(trigger));
+        timer.smcr().modify(|w| {
+            w.set_sms(vals::Sms::ENCODER_MODE_3);
+            w.set_etf(vals::FilterValue::FCK_INT_N8);
+        });
+        timer.ecr().write(|w| w.set_ie(true));
+        timer.ccer().write(|w| w.set_cce(CAPTURE, true));
+        timer.cr1().write(|w| w.set_cen(true));
+    }
+}
+
+impl Position for Encoder {
+    /// Known from the second call after the index on: the flag is read, not captured, and an index between the capture and the
+    /// reading is in the next count. Called every control period: each further index must find the count where the speed lets it
+    /// be expected, else counts were lost or invented on the way, and the angle is lost for good.
+    #[inline]
+    fn angle(&mut self) -> Option<Angle> {
+        let index = self.timer.sr().read().idxif();
+        let count = u32::from(self.timer.ccr(CAPTURE).read().ccr());
+        if index {
+            // Status flags are cleared by writing 0 and left alone by writing 1.
+            let mut all_but_index = regs::SrGp16(u32::MAX);
+            all_but_index.set_idxif(false);
+            self.timer.sr().write_value(all_but_index);
+        }
+        let passed = core::mem::replace(&mut self.passed, index);
+        self.last = match self.last {
+            None if !passed => return None,
+            None => Some((count, 0)),
+            Some((before, moved)) => {
+                let moves = self.wrapped(count + self.counts - before);
+                let off = self.wrapped(moves + self.counts - moved);
+                self.lost |= (index || passed)
+                    && off > INDEX_TOLERANCE
+                    && off < self.counts.saturating_sub(INDEX_TOLERANCE);
+                Some((count, moves))
+            }
+        };
+        Some(Angle(count.wrapping_mul(self.units_per_count)) + self.zero)
+    }
+
+    #[inline]
+    fn is_lost(&self) -> bool {
+        self.lost
+    }
+}
+
+impl Encoder {
+    /// Less than a turn, from less than two.
+    #[inline]
+    fn wrapped(&self, counts: u32) -> u32 {
+        if counts >= self.counts { counts - self.counts } else { counts }
+    }
+}
+
+/// Electrical angle units of one count, rounded; over a turn the rounding is 2⁻¹⁷ of a turn at most.
+fn units_per_count(counts: u32, pole_pairs: u32) -> u32 {
+    let turns = u64::from(pole_pairs) << 32;
+    let counts = u64::from(counts.max(1));
+    ((turns + counts / 2) / counts) as u32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_turn_of_the_shaft_is_as_many_electrical_turns_as_pole_pairs() {
+        assert_eq!(units_per_count(4_096, 4), 1 << 22);
+        let units = units_per_count(10_000, 3);
+        let error = (u64::from(units) * 10_000).abs_diff(3 << 32);
+        assert!(error <= 5_000, "{error}");
+    }
+}

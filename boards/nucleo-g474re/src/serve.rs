@@ -1,0 +1,118 @@
+//! The idle loop's operator: asked over CAN, answered by what the board says of itself.
+
+use super::can::Can;
+use super::operator::Operator;
+use super::registers::Registers;
+use super::switchgear::Wires;
+use super::{CLOCK, hardware, pins, switchgear};
+use tractive::frames::Abc;
+use tractive::operator::{
+    Configuration, Feedback, Mailboxes, OperatorPort, Request, Settings, Slot, Status, TorqueDemand,
+};
+use tractive::protection::Violation;
+use tractive::protocol::{CanEndpoint, Frame};
+use tractive::time::Instant;
+
+/// Frames kept for a slot: more than the bus can carry in its millisecond, which is 4.5.
+const INBOX: usize = 8;
+
+/// The operator's side of the board, over a protocol's station and what the drive says of itself.
+pub struct Serve<'a, S = CanEndpoint, D = Mailboxes> {
+    pub(crate) registers: Registers,
+    /// The bus.
+    pub can: Can,
+    /// The protocol.
+    pub station: S,
+    pub(crate) operator: &'a Operator<D>,
+    configuration: Configuration,
+    /// Frames that have come since the last slot, and how many.
+    inbox: [Frame; INBOX],
+    waiting: usize,
+}
+
+impl<'a, S, D> Serve<'a, S, D> {
+    /// At power-up; the configuration has been checked, or not.
+    pub fn new(
+        registers: Registers,
+        can: Can,
+        station: S,
+        operator: &'a Operator<D>,
+        configuration: Configuration,
+    ) -> Self {
+        let (inbox, waiting) = ([Frame::default(); INBOX], 0);
+        Self { registers, can, station, operator, configuration, inbox, waiting }
+    }
+
+    /// The feedback that every board gives.
+    pub(crate) fn common(&self, wires: &Wires) -> Feedback {
+        let (precharge_closed, main_closed) = switchgear::contacts(&self.registers, wires);
+        Feedback {
+            precharge_closed,
+            main_closed,
+            driver_ready: pins::drivers_ready(&self.registers),
+            position_known: self.operator.position.is_known(),
+            // An incremental encoder cannot tell at standstill; while it turns, it looks at its index, and the drive at its angle.
+            sensor_alive: !self.operator.position.is_lost(),
+            // The start has refused sensors whose zero is too far off, and taken the rest away.
+            offsets_a: Abc::default(),
+            configuration: self.configuration,
+            ..Feedback::default()
+        }
+    }
+
+    /// Empties the controller's FIFO, which holds three frames, into the inbox. Called in every pass of the idle loop.
+    pub(crate) fn collect(&mut self) {
+        let room = self.inbox.get_mut(self.waiting..).unwrap_or_default();
+        self.waiting += self.can.receive(room);
+    }
+
+    /// The frames that have come since the last slot.
+    pub(crate) fn hear(&mut self) -> impl Iterator<Item = Frame> + use<S, D> {
+        self.can.tend();
+        self.inbox.into_iter().take(core::mem::take(&mut self.waiting))
+    }
+
+    pub(crate) fn say(&mut self, frame: Option<Frame>) {
+        if let Some(frame) = frame {
+            self.can.send(&frame);
+        }
+    }
+}
+
+impl Serve<'_> {
+    /// The board's feedback.
+    pub fn feedback(&self) -> Feedback {
+        Feedback {
+            enable_input: pins::is_enabled(&self.registers),
+            hardware: hardware::held_by(&self.registers),
+            ..self.common(&pins::SWITCHGEAR)
+        }
+    }
+
+    /// A pass of the idle loop: takes what has come, and does the newest slot if it is not done yet. Says whether it did one.
+    pub fn pass(&mut self, slot: &mut Slot, rated: &Settings) -> bool {
+        self.collect();
+        let (desk, settings) = (&self.operator.desk, self.station.settings(rated));
+        slot.run(desk, self, &settings, &CLOCK)
+    }
+
+    /// The same where the start was refused, and `why`; once in a slot's time.
+    pub fn refuse(&mut self, slot: &mut Slot, why: Violation, rated: &Settings) {
+        self.collect();
+        slot.refuse(why, self, rated, &CLOCK);
+    }
+}
+
+/// The switches at once: a slot earlier or later is nothing to a contactor, and the chopper's compare is preloaded.
+impl OperatorPort<TorqueDemand> for Serve<'_> {
+    fn ask(&mut self, _at: Instant, slots: u32) -> (Request, Feedback) {
+        let frames = self.hear();
+        (self.station.listen(self.operator.desk.observed(), slots, frames), self.feedback())
+    }
+
+    fn tell(&mut self, _from: Instant, status: &Status) {
+        switchgear::set(&self.registers, &status.switches);
+        let frame = self.station.tell(status);
+        self.say(frame);
+    }
+}

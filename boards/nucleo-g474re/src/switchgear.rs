@@ -1,0 +1,97 @@
+//! Contactors, discharge resistor and braking chopper.
+//!
+//! Relays and contactors are plain outputs, high to close, with an input each for their auxiliary contacts. The chopper is TIM17's
+//! channel 1, edge-aligned, 1 kHz: one period an operator's slot. Its compare is preloaded, so a duty holds for whole periods. Its main
+//! output works as the gates' ([`super::outputs`]): off, the pin is driven low, and the chip's own break switches it off.
+
+pub use super::pins::Wires;
+use super::pins::{self, CHOPPER_OFF, Wire, is_high};
+use super::power_stage::CORE_HZ;
+use super::registers::Registers;
+use stm32_metapac::timer::vals;
+use tractive::operator::Switches;
+
+/// Counts of a chopper period.
+pub const CHOPPER_COUNTS: u16 = 1_000;
+/// Chopper periods per second, in Hz.
+const CHOPPER_HZ: u32 = 1_000;
+
+/// Outputs low, the chopper off and counting. Its pin is still an input then.
+pub fn configure(registers: &Registers) {
+    let timer = registers.tim17;
+    timer.psc().write_value((CORE_HZ / CHOPPER_HZ / u32::from(CHOPPER_COUNTS) - 1) as u16);
+    timer.arr().write(|w| w.set_arr(CHOPPER_COUNTS - 1));
+    timer.ccr(0).write(|w| w.set_ccr(CHOPPER_OFF));
+    timer.ccmr_output(0).write(|w| {
+        w.set_ocm(0, vals::Ocm::PWM_MODE1);
+        w.set_ocpe(0, true);
+    });
+    timer.ccer().write(|w| w.set_cce(0, true));
+    timer.egr().write(|w| w.set_ug(true));
+    // No break pin is wired; the chip's own break (crystal, lock-up, memory, supply) remains.
+    timer.af1().write(|w| w.set_bkine(false));
+    timer.bdtr().write(|w| {
+        w.set_ossi(vals::Ossi::IDLE_LEVEL);
+        w.set_bke(0, true);
+        w.set_bkp(0, vals::Bkp::ACTIVE_HIGH);
+        w.set_lock(vals::Lock::LEVEL2);
+        w.set_moe(true);
+    });
+    timer.cr1().write(|w| {
+        w.set_arpe(true);
+        w.set_cen(true);
+    });
+}
+
+/// Switches the chopper off for good: no duty reaches its pin any more.
+pub fn stop_chopper(registers: &Registers) {
+    registers.tim17.bdtr().modify(|w| w.set_moe(false));
+}
+
+/// Sets all of them. From the idle loop only.
+pub fn set(registers: &Registers, switches: &Switches) {
+    set_wires(registers, &pins::SWITCHGEAR, switches);
+    registers.tim17.ccr(0).write(|w| w.set_ccr(counts(switches.chopper)));
+}
+
+/// The same of any system, without a chopper.
+pub fn set_wires(registers: &Registers, of: &Wires, switches: &Switches) {
+    let Switches { precharge, main, discharge, .. } = *switches;
+    // What opens before what closes: a contactor is never still told to be closed when the discharge resistor goes on.
+    let wires = [(of.precharge, precharge), (of.main, main), (of.discharge, discharge)];
+    for closes in [false, true] {
+        for (wire, _) in wires.iter().filter(|(_, closed)| *closed == closes) {
+            wire.set(registers, closes);
+        }
+    }
+}
+
+/// The auxiliary contacts of precharge relay and main contactor: closed.
+pub fn contacts(registers: &Registers, of: &Wires) -> (bool, bool) {
+    let closed = |wire: Wire| is_high(wire.port(registers), wire.number);
+    (closed(of.precharge_contact), closed(of.main_contact))
+}
+
+/// A duty as a compare; what is no number is none.
+fn counts(duty: f32) -> u16 {
+    let counts = duty * f32::from(CHOPPER_COUNTS);
+    if counts >= f32::from(CHOPPER_COUNTS) {
+        CHOPPER_COUNTS
+    } else if counts > 0.0 {
+        counts as u16
+    } else {
+        CHOPPER_OFF
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_duty_is_a_share_of_the_period() {
+        for (duty, wanted) in [(0.0, 0), (0.5, 500), (1.0, 1_000), (2.0, 1_000), (-1.0, 0), (f32::NAN, 0)] {
+            assert_eq!(counts(duty), wanted, "{duty}");
+        }
+    }
+}

@@ -1,0 +1,219 @@
+//! The refusals of the build script: each key of a power stage by its name and line, and each machine that the stage does not suit.
+
+#[path = "../build/power_stage.rs"]
+mod power_stage;
+
+use nucleo_g474re::built_in::{traction, zs9};
+use nucleo_g474re::{dead_time, rates, zs9 as zs9_rates};
+use power_stage::Machine;
+use std::path::Path;
+use tractive::machine::{Ratings, Tables};
+
+/// A system's stage as it is delivered.
+#[derive(Clone, Copy)]
+struct Delivered {
+    file: &'static str,
+    text: &'static str,
+    tables: &'static Tables,
+    check: fn(&Path, &str, &Machine) -> Result<String, tractive_tablegen::InputError>,
+}
+
+const TRACTION: Delivered = Delivered {
+    file: "power_stage.toml",
+    text: include_str!("../power_stage.toml"),
+    tables: &traction::BUILT_IN,
+    check: power_stage::traction,
+};
+
+const ZS9: Delivered = Delivered {
+    file: "power_stage_zs9.toml",
+    text: include_str!("../power_stage_zs9.toml"),
+    tables: &zs9::BUILT_IN,
+    check: power_stage::zs9,
+};
+
+impl Delivered {
+    fn check(&self, text: &str, tables: &Tables) -> Result<String, String> {
+        let machine = Machine { folder: Path::new("machine"), tables };
+        (self.check)(Path::new(self.file), text, &machine).map_err(|error| error.to_string())
+    }
+
+    /// The line of a key, from 1.
+    fn line(&self, key: &str) -> usize {
+        let is_key = |line: &str| line.split_once(" =").is_some_and(|(word, _)| word == key);
+        self.text.lines().position(is_key).unwrap_or_else(|| panic!("no {key}")) + 1
+    }
+
+    /// With another value for a key.
+    fn with(&self, key: &str, value: &str) -> String {
+        let mut lines: Vec<_> = self.text.lines().map(str::to_owned).collect();
+        lines[self.line(key) - 1] = format!("{key} = {value}");
+        lines.join("\n")
+    }
+
+    /// The error of this value; it names file, line and key.
+    fn refused(&self, key: &str, value: &str) -> String {
+        let said = self
+            .check(&self.with(key, value), self.tables)
+            .expect_err(&format!("{key} = {value} is let through"));
+        let start = format!("{}:{}: ", self.file, self.line(key));
+        said.strip_prefix(&start).unwrap_or_else(|| panic!("{key} = {value}: {said}")).to_owned()
+    }
+
+    /// The error of this machine.
+    fn refused_machine(&self, spoil: fn(&mut Ratings)) -> String {
+        let mut tables = *self.tables;
+        spoil(&mut tables.ratings);
+        self.check(self.text, &tables).expect_err("is let through")
+    }
+}
+
+/// All keys of a file, those of its tables among them.
+fn keys(table: &toml::Table) -> Vec<(String, toml::Value)> {
+    let of = |(key, value): (&String, &toml::Value)| match value {
+        toml::Value::Table(table) => keys(table),
+        value => vec![(key.clone(), value.clone())],
+    };
+    table.iter().flat_map(of).collect()
+}
+
+#[test]
+fn every_key_is_refused_by_name_and_line() {
+    for stage in [TRACTION, ZS9] {
+        stage.check(stage.text, stage.tables).unwrap();
+        let keys = keys(&stage.text.parse().unwrap());
+        assert!(keys.len() > 10);
+        for (key, value) in keys {
+            let nonsense: &[&str] = match value {
+                toml::Value::Integer(_) => &["0", "4294967295", "-1", "1.5"],
+                toml::Value::Float(_) => &["0.0", "nan", "inf", "-1.0", "1e9"],
+                _ => &["[]", "[nan]", "[nan, 0.0]", "[0.0, 1e9]", "[0.0, 0.0, 0.0]"],
+            };
+            for bad in nonsense {
+                let said = stage.refused(&key, bad);
+                // What is no such number is told by the parser, with the line alone.
+                assert!(
+                    said.starts_with(&format!("{key}: ")) || said.starts_with("invalid "),
+                    "{key} = {bad}: {said}"
+                );
+            }
+            let without: Vec<_> =
+                stage.text.lines().filter(|line| !line.starts_with(&format!("{key} ="))).collect();
+            let said = stage.check(&without.join("\n"), stage.tables).expect_err(&key);
+            assert!(said.contains(&key) && said.contains("missing"), "{said}");
+        }
+        let unknown = format!("anything = 1\n{}", stage.text);
+        let said = stage.check(&unknown, stage.tables).unwrap_err();
+        assert!(said.starts_with(&format!("{}:1: unknown field `anything`", stage.file)), "{said}");
+    }
+}
+
+#[test]
+fn a_small_machine_needs_small_comparators() {
+    let mut small = *TRACTION.tables;
+    (small.ratings.max_current_a, small.ratings.trip_current_a) = (30.0, 39.0);
+    let said = TRACTION.check(TRACTION.text, &small).unwrap_err();
+    assert_eq!(
+        said,
+        format!(
+            "power_stage.toml:{}: break_current_a: 450: must be from 54.625 to 78: above the machine's trip_current_a, 39, by a sensor's \
+             offset, and at most twice it",
+            TRACTION.line("break_current_a")
+        )
+    );
+    for (break_a, told) in
+        [("54.0", "break_current_a: 54:"), ("79.0", "break_current_a: 79:"), ("60.0", "would not start")]
+    {
+        // 60 A suit; the drive itself refuses a map that is far larger than its machine.
+        let said = TRACTION.check(&TRACTION.with("break_current_a", break_a), &small).unwrap_err();
+        assert!(said.contains(told), "{said}");
+    }
+    // Below that the converters resolve nothing.
+    small.ratings.trip_current_a = 24.0;
+    let said = TRACTION.check(&TRACTION.with("break_current_a", "46.0"), &small).unwrap_err();
+    assert!(said.contains("current_range_a: 500: must be from 24.799 to 480"), "{said}");
+}
+
+#[test]
+fn another_machine_is_built_once_the_comparators_suit_it() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/own-board/machine");
+    let tables = tractive_tablegen::MachineFolder::read(&folder).unwrap().tables();
+    let said = TRACTION.check(TRACTION.text, &tables).unwrap_err();
+    assert!(said.contains("break_current_a: 450: must be from 93.625 to 156"), "{said}");
+    let constant = TRACTION.check(&TRACTION.with("break_current_a", "120.0"), &tables).unwrap();
+    assert!(constant.contains("break_current_a: 120.0"), "{constant}");
+}
+
+#[test]
+fn a_large_machine_needs_large_sensors_and_comparators() {
+    let said = TRACTION.refused_machine(|ratings| ratings.trip_current_a = 600.0);
+    assert!(
+        said.contains("current_range_a: 500: must be from 619.98 to 12000: the machine's trip_current_a"),
+        "{said}"
+    );
+    let said = TRACTION.refused_machine(|ratings| ratings.trip_current_a = 440.0);
+    assert!(said.contains("break_current_a: 450: must be from 455.625 to 880"), "{said}");
+    // Beyond what the converters hold with a zero that is off.
+    let said = TRACTION.refused("break_current_a", "490.0");
+    assert!(said.starts_with("break_current_a: 490: must be from 0 to 483.887"), "{said}");
+    let said = ZS9.refused_machine(|ratings| ratings.trip_current_a = 128.0);
+    assert!(said.contains("break_current_a: 130: must be from 132.688 to 256"), "{said}");
+    let said = TRACTION.refused_machine(|ratings| ratings.trip_dc_over_v = 2_500.0);
+    assert!(
+        said.contains("dc_link_range_v: 2500: must be from 2500.611 to 50000: the machine's trip_dc_over_v"),
+        "{said}"
+    );
+}
+
+#[test]
+fn times_suit_each_other_the_timers_and_the_carrier() {
+    for (key, value) in [
+        // The generator makes 5,036 ns of 5 µs: nothing would be left of such a pulse.
+        ("min_pulse_ns", "5036"),
+        ("min_pulse_ns", "4000"),
+        // Half of the shortest carrier half is 278 µs.
+        ("min_pulse_ns", "280000"),
+        ("dead_time_ns", "23718"),
+    ] {
+        let said = TRACTION.refused(key, value);
+        assert!(said.starts_with("min_pulse_ns: ") || said.starts_with("dead_time_ns: "), "{said}");
+    }
+    TRACTION.check(&TRACTION.with("min_pulse_ns", "5037"), TRACTION.tables).unwrap();
+    let said = TRACTION.check(&TRACTION.with("dead_time_ns", "14995"), TRACTION.tables).unwrap_err();
+    assert!(said.contains("min_pulse_ns: 15000: must be from 15060 "), "{said}");
+    assert!(ZS9.refused("dead_time_ns", "5001").starts_with("dead_time_ns: 5001: must be from 1 to 5000"));
+    let said = TRACTION.refused_machine(|ratings| ratings.max_switching_hz = 600.0);
+    assert!(said.starts_with("machine/machine.toml: max_switching_hz: 600: must be at least 649"), "{said}");
+    let mut slowest = *TRACTION.tables;
+    slowest.ratings.max_switching_hz = 649.0;
+    TRACTION.check(TRACTION.text, &slowest).unwrap();
+}
+
+#[test]
+fn the_zs9s_own_scales_suit_its_link() {
+    assert!(ZS9.refused("dc_link_range_v", "720.0").contains("the capacitors' highest voltage"));
+    assert!(ZS9.refused("inductor_range_a", "90.0").contains("the inductor's highest current"));
+    assert!(ZS9.refused("source_range_v", "600.0").contains("the source's highest voltage"));
+    assert!(ZS9.refused("link_ref_v", "390.0").starts_with("link_ref_v: 390: must be from 39"));
+    let said = ZS9.check(&format!("min_pulse_ns = 1\n{}", ZS9.text), ZS9.tables).unwrap_err();
+    assert!(said.starts_with("power_stage_zs9.toml:1: min_pulse_ns: "), "{said}");
+    let said = TRACTION.check(ZS9.text, TRACTION.tables).unwrap_err();
+    assert!(said.contains("z_source: is the ZS9's"), "{said}");
+}
+
+/// The drive's own check has the last word, as it would have at the start.
+#[test]
+fn a_machine_that_the_image_would_refuse_is_not_built() {
+    for stage in [TRACTION, ZS9] {
+        let said = stage.refused_machine(|ratings| ratings.max_current_a = 2.0 * ratings.trip_current_a);
+        assert!(
+            said.starts_with("machine/machine.toml: the image would not start: ratings.max_current_a: "),
+            "{said}"
+        );
+        let said = stage.refused_machine(|ratings| ratings.pole_pairs = 2.5);
+        assert!(
+            said.starts_with("machine/machine.toml: the image would not start: ratings.pole_pairs: 2.5"),
+            "{said}"
+        );
+    }
+}

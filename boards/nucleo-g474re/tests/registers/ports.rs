@@ -1,0 +1,322 @@
+//! The board as the interrupts see it.
+
+use crate::bench::{Bench, control_update};
+use crate::plan;
+use nucleo_g474re::legs::SoftwareBreak;
+use nucleo_g474re::operator::Operator;
+use nucleo_g474re::position::{Encoder, Position};
+use nucleo_g474re::power_stage::{AdcCode, POWER_STAGE};
+use nucleo_g474re::registers::Registers;
+use nucleo_g474re::sampling::Zeros;
+use nucleo_g474re::start::{self, Wait};
+use nucleo_g474re::watchdog::Pulse;
+use nucleo_g474re::{Control, Pwm};
+use stm32_metapac::gpio::regs::Idr;
+use tractive::control::Demand;
+use tractive::frames::Angle;
+use tractive::operator::{DriveCommand, Mailboxes};
+use tractive::ports::Report;
+use tractive::ports::{ControlPort, PwmPort};
+use tractive::protection::{Fault, SafeState};
+use tractive::time::Instant;
+
+const NOW: Instant = Instant(0);
+const ZEROS: Zeros = [AdcCode(2_048), AdcCode(2_050), AdcCode(2_040)];
+
+/// Writes a register that only the hardware writes.
+fn write_input(port: stm32_metapac::gpio::Gpio, levels: u32) {
+    // SAFETY: IDR is word 4 of the port's block of memory.
+    unsafe { port.as_ptr().cast::<Idr>().add(4).write_volatile(Idr(levels)) };
+}
+
+/// The index passes; the angle is known from the next sample on.
+fn pass_index<P: Position>(control: &mut Control<P>, registers: &Registers) {
+    registers.tim4.sr().write(|w| w.set_idxif(true));
+    assert!(!control.sample(NOW).enable, "its count may be older than the index");
+}
+
+/// The counts of the encoder after the trigger, while a more urgent interrupt runs, do not reach the angle.
+#[test]
+fn the_angle_is_that_of_the_trigger_however_late_it_is_read() {
+    let registers = Bench::started(plan()).registers;
+    let mut encoder = Encoder::new(registers.tim4, &POWER_STAGE, 4);
+    registers.tim4.sr().write(|w| w.set_idxif(true));
+    encoder.angle();
+    for late in [0, 1, 40, 1_000] {
+        registers.tim4.cnt().write(|w| w.set_cnt(256));
+        control_update(&registers);
+        registers.tim4.cnt().write(|w| w.set_cnt(256 + late));
+        assert_eq!(encoder.angle(), Some(Angle(1 << 30)), "{late} counts later");
+    }
+}
+
+/// An index between the trigger and the reading: flag and count are not of one instant.
+#[test]
+fn an_index_just_after_the_trigger_makes_no_false_angle() {
+    let registers = Bench::started(plan()).registers;
+    let mut encoder = Encoder::new(registers.tim4, &POWER_STAGE, 4);
+    let mut at = |captured: u16, index: bool| {
+        registers.tim4.cnt().write(|w| w.set_cnt(captured));
+        control_update(&registers);
+        registers.tim4.sr().write(|w| w.set_idxif(index));
+        (encoder.angle().map(|angle| angle.0 >> 22), encoder.is_lost())
+    };
+    // Counted from nowhere until the index; the flag comes one capture early.
+    assert_eq!(at(2_990, false), (None, false));
+    assert_eq!(at(3_000, true), (None, false), "a count from before the index");
+    assert_eq!(at(5, false), (Some(5), false));
+    assert_eq!(at(15, false), (Some(15), false));
+    // The same with counts lost on the way: told one capture later.
+    assert_eq!(at(25, true), (Some(25), false));
+    assert_eq!(at(1_005, false), (Some(1_005), true));
+}
+
+#[test]
+fn a_sample_has_currents_link_voltage_and_angle_in_si_units() {
+    let mut bench = Bench::started(plan());
+    let registers = bench.registers;
+    let operator = Operator::new(Mailboxes::new());
+    let mut control =
+        Control::new(registers, ZEROS, Encoder::new(registers.tim4, &POWER_STAGE, 4), &operator);
+    (bench.codes[2], bench.codes[15], bench.codes[5], bench.codes[6]) =
+        (2_048 + 512, 2_050 - 256, 2_040 - 256, 2_457);
+    bench.finish_sequence(registers.adc1);
+    pass_index(&mut control, &registers);
+    bench.finish_sequence(registers.adc1);
+    registers.tim4.cnt().write(|w| w.set_cnt(256));
+    control_update(&registers);
+    write_input(registers.gpioc, 1 << 2);
+    let demand = Demand { torque_nm: 120.0, slew_limited: true };
+    operator.desk.allow_from(DriveCommand { enable: true, demand, ..DriveCommand::NONE }, NOW);
+    let sample = control.sample(NOW);
+    let currents = sample.currents_a;
+    assert_eq!((currents.a, currents.b, currents.c), (125.0, -62.5, -62.5));
+    assert!((sample.udc_v - 1_500.0).abs() < 0.5);
+    // A sixteenth of a turn of the shaft, four pole pairs.
+    assert_eq!(sample.angle, Some(Angle(1 << 30)));
+    assert!(sample.enable && sample.demand.slew_limited);
+    assert_eq!(sample.demand.torque_nm, 120.0);
+}
+
+#[test]
+fn the_gates_wait_for_the_index_the_enable_input_and_quiet_break_inputs() {
+    for (index, enable, trip) in [(false, true, false), (true, false, false), (true, true, true)] {
+        let mut bench = Bench::started(plan());
+        let registers = bench.registers;
+        let operator = Operator::new(Mailboxes::new());
+        let encoder = Encoder::new(registers.tim4, &POWER_STAGE, 4);
+        operator.desk.allow_from(DriveCommand { enable: true, ..DriveCommand::NONE }, NOW);
+        let mut control = Control::new(registers, ZEROS, encoder, &operator);
+        registers.tim4.sr().write(|w| w.set_idxif(index));
+        control.sample(NOW);
+        write_input(registers.gpioc, u32::from(enable) << 2);
+        if trip {
+            control.enter(SafeState::GatesOff, NOW);
+            bench.settle();
+        }
+        bench.finish_sequence(registers.adc1);
+        let sample = control.sample(NOW);
+        assert_eq!(sample.angle.is_some(), index, "an angle that is not known is none");
+        assert_eq!(operator.position.is_known(), index);
+        assert!(!(sample.enable && sample.angle.is_some()));
+    }
+}
+
+/// Square wave below 83 Hz has more than 1 ms between two carrier boundaries.
+#[test]
+fn a_late_conversion_is_thrown_away() {
+    let mut bench = Bench::started(plan());
+    let registers = bench.registers;
+    let mut pwm = Pwm::new(registers, [AdcCode(2_048); 3]);
+    (bench.codes[4], bench.codes[7], bench.codes[14]) = (2_048 + 512, 2_048 - 256, 2_048 - 256);
+    for wait_us in [500, 1_500, 2_200] {
+        bench.microseconds(wait_us);
+        bench.finish_sequence(registers.adc2);
+        let currents = pwm.sample(NOW);
+        assert_eq!((currents.a, currents.b, currents.c), (125.0, -62.5, -62.5), "after {wait_us} µs");
+    }
+}
+
+#[test]
+fn the_first_samples_are_right_however_long_the_start_takes() {
+    let mut bench = Bench::new();
+    let registers = bench.registers;
+    start::prepare(&registers, &mut bench, plan()).unwrap();
+    bench.microseconds(50_000);
+    start::run(&registers, &mut bench);
+    bench.microseconds(100);
+    bench.finish_sequence(registers.adc1);
+    let operator = Operator::new(Mailboxes::new());
+    let encoder = Encoder::new(registers.tim4, &POWER_STAGE, 4);
+    let currents = Control::new(registers, [AdcCode(2_048); 3], encoder, &operator).sample(NOW).currents_a;
+    assert_eq!((currents.a, currents.b, currents.c), (0.0, 0.0, 0.0));
+}
+
+#[test]
+fn a_converter_that_is_silent_gives_no_number() {
+    let bench = Bench::started(plan());
+    let registers = bench.registers;
+    // Acknowledged and nothing new.
+    registers.adc2.isr().write(|_| ());
+    let currents = Pwm::new(registers, ZEROS).sample(NOW);
+    assert!(currents.a.is_nan() && currents.b.is_nan() && currents.c.is_nan());
+}
+
+#[test]
+fn an_absolute_sensor_takes_the_encoders_place() {
+    struct Resolver;
+    impl Position for Resolver {
+        fn angle(&mut self) -> Option<Angle> {
+            Some(Angle::DEG_90)
+        }
+    }
+    let bench = Bench::started(plan());
+    let operator = Operator::new(Mailboxes::new());
+    let mut control = Control::new(bench.registers, ZEROS, Resolver, &operator);
+    bench.finish_sequence(bench.registers.adc1);
+    assert_eq!(control.sample(NOW).angle, Some(Angle::DEG_90));
+}
+
+#[test]
+fn an_overrun_is_counted_from_the_next_period() {
+    let bench = Bench::started(plan());
+    let registers = bench.registers;
+    let operator = Operator::new(Mailboxes::new());
+    let encoder = Encoder::new(registers.tim4, &POWER_STAGE, 4);
+    let mut control = Control::new(registers, ZEROS, encoder, &operator);
+    registers.tim3.sr().write(|_| ());
+    registers.tim3.cnt().write(|w| w.set_cnt(77));
+    assert_eq!(control.overrun_ticks(NOW, nucleo_g474re::CLOCK.control_ticks), 0);
+    registers.tim3.sr().write(|w| w.set_uif(true));
+    assert_eq!(control.overrun_ticks(NOW, nucleo_g474re::CLOCK.control_ticks), 77);
+    registers.tim3.cnt().write(|w| w.set_cnt(0));
+    assert_eq!(control.overrun_ticks(NOW, nucleo_g474re::CLOCK.control_ticks), 1);
+}
+
+#[test]
+fn the_watchdog_is_fed_only_when_both_interrupts_ran() {
+    let registers = Bench::started(plan()).registers;
+    // SAFETY: KR is word 0 of the watchdog's block of memory.
+    let fed = || unsafe { registers.iwdg.as_ptr().cast::<u32>().replace(0) == 0xAAAA };
+    assert!(fed(), "at its start");
+    let pulse = Pulse::new();
+    for (control, pwm, food) in [
+        (false, false, false),
+        (true, false, false),
+        (true, false, false),
+        (false, true, true),
+        (false, true, false),
+    ] {
+        if control {
+            pulse.control_ran();
+        }
+        if pwm {
+            pulse.pwm_ran();
+        }
+        pulse.feed_if_both_ran(&registers);
+        assert_eq!(fed(), food, "{control} {pwm}");
+    }
+}
+
+#[test]
+fn the_idle_loop_hears_what_control_did() {
+    let bench = Bench::started(plan());
+    let registers = bench.registers;
+    let operator = Operator::new(Mailboxes::new());
+    assert!(operator.desk.observed().is_none());
+    let encoder = Encoder::new(registers.tim4, &POWER_STAGE, 4);
+    let report = Report { torque_nm: 7.0, ..Report::default() };
+    Control::new(registers, ZEROS, encoder, &operator).report(NOW, &report);
+    assert_eq!(operator.desk.observed().map(|observed| observed.torque_nm), Some(7.0));
+}
+
+/// An encoder whose index is at count 0, turning by `step` counts a control period from `from` on.
+fn turn(encoder: &mut Encoder, registers: &Registers, from: i32, step: i32, periods: i32, slip: i32) {
+    let (mut before, mut right) = (from, false);
+    for period in 1..=periods {
+        let now = from + period * step;
+        let passed = now.div_euclid(4_096) != before.div_euclid(4_096);
+        // The index sets the count right, whatever was lost until then.
+        right |= passed;
+        let count = now.rem_euclid(4_096) + if right { 0 } else { slip };
+        registers.tim4.cnt().write(|w| w.set_cnt(count.rem_euclid(4_096) as u16));
+        control_update(registers);
+        registers.tim4.sr().write(|w| w.set_idxif(passed));
+        encoder.angle();
+        before = now;
+    }
+}
+
+#[test]
+fn an_index_must_find_the_count_where_it_is_expected() {
+    for (step, slip, lost) in [
+        (41, 0, false),
+        (-41, 0, false),
+        (7, 5, false),
+        (41, 40, true),
+        (-41, -40, true),
+        (41, -2_000, true),
+        (3, 9, true),
+    ] {
+        let registers = Bench::started(plan()).registers;
+        let mut encoder = Encoder::new(registers.tim4, &POWER_STAGE, 4);
+        registers.tim4.sr().write(|_| ());
+        assert_eq!(encoder.angle(), None, "no index yet");
+        registers.tim4.sr().write(|w| w.set_idxif(true));
+        registers.tim4.cnt().write(|w| w.set_cnt(2_000));
+        control_update(&registers);
+        assert_eq!(encoder.angle(), None, "its count may be older than the index");
+        assert!(!registers.tim4.sr().read().idxif(), "acknowledged");
+        assert!(encoder.angle().is_some());
+        turn(&mut encoder, &registers, 2_000, step, 2_500 / step.abs(), slip);
+        assert_eq!(encoder.is_lost(), lost, "{step} {slip}");
+    }
+}
+
+#[test]
+fn what_holds_the_gates_has_a_name() {
+    type Spoil = fn(&Registers);
+    let broken: Spoil = |registers| registers.legs.tim8.sr().write(|w| w.set_bif(0, true));
+    let cases: [(&str, Spoil, bool, Option<Fault>); 6] = [
+        ("nothing", |_| (), true, None),
+        ("the ready line", broken, false, Some(Fault::GateDriver)),
+        ("a comparator", broken, true, Some(Fault::HardwareOvercurrent)),
+        (
+            "the crystal",
+            |registers| registers.legs.tim1.sr().write(|w| w.set_sbif(true)),
+            true,
+            Some(Fault::ClockFailure),
+        ),
+        (
+            "a late interrupt",
+            |registers| {
+                registers.legs.trip_by(SoftwareBreak::Late);
+                registers.legs.tim1.sr().write(|w| w.set_bif(0, true));
+            },
+            true,
+            Some(Fault::PwmDeadline),
+        ),
+        (
+            "the drive itself",
+            |registers| {
+                registers.legs.trip_by(SoftwareBreak::Drive);
+                registers.legs.tim1.sr().write(|w| w.set_bif(0, true));
+                registers.legs.trip_by(SoftwareBreak::Late);
+            },
+            true,
+            None,
+        ),
+    ];
+    for (what, spoil, ready, fault) in cases {
+        let bench = Bench::started(plan());
+        let registers = bench.registers;
+        let operator = Operator::new(Mailboxes::new());
+        let encoder = Encoder::new(registers.tim4, &POWER_STAGE, 4);
+        let mut control = Control::new(registers, ZEROS, encoder, &operator);
+        write_input(registers.gpiob, u32::from(ready) << 12);
+        write_input(registers.gpioa, u32::from(ready) << 6);
+        spoil(&registers);
+        bench.finish_sequence(registers.adc1);
+        assert_eq!(control.sample(NOW).hardware, fault, "{what}");
+    }
+}

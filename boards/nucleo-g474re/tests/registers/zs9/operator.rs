@@ -1,0 +1,153 @@
+//! The exchange between the ZS9's operator and the board, and the name and the end of a break.
+
+use super::model::Model;
+use super::ports::{control, converted, drivers_ready, make_ready, permitted, zeros};
+use nucleo_g474re::can::Can;
+use nucleo_g474re::operator::DualOperator;
+use nucleo_g474re::outputs::SoftwareBreak;
+use nucleo_g474re::registers::Registers;
+use nucleo_g474re::switchgear;
+use nucleo_g474re::zs9::hardware::{held_by, latched_by};
+use nucleo_g474re::zs9::serve::DualServe;
+use nucleo_g474re::zs9::{self, Pwm, RATINGS, start};
+use stm32_metapac::gpio::regs::Idr;
+use tractive::operator::{Configuration, DualMailboxes, Feedback, Switches};
+use tractive::ports::{ControlPort, HardwareBreak, PwmPort};
+use tractive::protection::Fault;
+use tractive::protocol::Zs9CanEndpoint;
+use tractive::time::Instant;
+
+const NOW: Instant = Instant(0);
+
+fn crosses(registers: &Registers, number: usize, crossed: bool) {
+    let comparator = registers.comparators[number - 1];
+    comparator.csr().modify(|w| w.set_value(crossed));
+}
+
+#[test]
+fn a_break_has_the_name_of_its_cause_and_where_it_was_seen() {
+    let registers = Model::started().registers;
+    drivers_ready(&registers, true);
+    assert_eq!(latched_by(&registers), None);
+    let timers = [registers.legs.tim1, registers.legs.tim8, registers.tim20];
+    // A comparator that has seen its overcurrent end: the timers' latches are left.
+    for (bit, timer) in timers.into_iter().enumerate() {
+        timer.sr().modify(|w| w.set_bif(0, true));
+        let found = HardwareBreak { fault: Fault::HardwareOvercurrent, seen: 1 << bit };
+        assert_eq!(latched_by(&registers), Some(found));
+        timer.sr().modify(|w| w.set_bif(0, false));
+    }
+    timers[1].sr().modify(|w| w.set_bif(0, true));
+    // One that sees it still.
+    for number in [1, 2, 3, 4, 6, 7] {
+        crosses(&registers, number, true);
+        let seen = 0b010 | 1 << (2 + number);
+        assert_eq!(latched_by(&registers), Some(HardwareBreak { fault: Fault::HardwareOvercurrent, seen }));
+        assert_eq!(held_by(&registers), Some(Fault::HardwareOvercurrent));
+        crosses(&registers, number, false);
+    }
+    // The drivers' ready wire, by its comparator and by the break inputs.
+    crosses(&registers, 5, true);
+    assert_eq!(latched_by(&registers), Some(HardwareBreak { fault: Fault::GateDriver, seen: 0b1000_0010 }));
+    crosses(&registers, 5, false);
+    drivers_ready(&registers, false);
+    assert_eq!(latched_by(&registers).map(|found| found.fault), Some(Fault::GateDriver));
+    drivers_ready(&registers, true);
+    timers[2].sr().modify(|w| w.set_sbif(true));
+    assert_eq!(latched_by(&registers), Some(HardwareBreak { fault: Fault::ClockFailure, seen: 0b110 }));
+}
+
+#[test]
+fn softwares_own_breaks_are_told_apart_and_are_left() {
+    for (software, name) in [(SoftwareBreak::Drive, None), (SoftwareBreak::Late, Some(Fault::PwmDeadline))] {
+        let mut model = Model::started();
+        let registers = model.registers;
+        drivers_ready(&registers, true);
+        let outputs = start::bridge(&registers).outputs();
+        outputs.trip_by(software);
+        model.settle();
+        assert!(outputs.is_tripped());
+        assert_eq!(latched_by(&registers).map(|found| found.fault), name);
+        // The first account stays.
+        outputs.trip_by(SoftwareBreak::Drive);
+        model.settle();
+        assert_eq!(latched_by(&registers).map(|found| found.fault), name);
+        assert!(Pwm::new(registers, zeros()).leave(NOW));
+        model.settle();
+        assert!(!outputs.is_tripped() && !outputs.is_on());
+        assert_eq!((latched_by(&registers), outputs.software_break()), (None, None));
+    }
+}
+
+#[test]
+fn the_control_interrupt_is_told_of_a_break() {
+    let registers = Model::started().registers;
+    let operator = DualOperator::new(DualMailboxes::new());
+    operator.desk.allow_from(permitted([0.0; 2], 600.0), NOW);
+    let mut control = control(registers, &operator);
+    make_ready(&registers);
+    converted(&[], registers);
+    assert_eq!(control.sample(NOW).hardware, None);
+    registers.tim20.sr().modify(|w| w.set_bif(0, true));
+    let sample = control.sample(NOW);
+    let found = HardwareBreak { fault: Fault::HardwareOvercurrent, seen: 0b100 };
+    assert_eq!((sample.hardware, sample.enable), (Some(found), false));
+}
+
+#[test]
+fn the_operator_hears_of_contacts_drivers_and_inputs() {
+    let registers = Model::started().registers;
+    let operator = DualOperator::new(DualMailboxes::new());
+    // The bus is not touched by what is tested here.
+    let station = Zs9CanEndpoint::new(&RATINGS);
+    let serve = DualServe::new(registers, Can::CHIP, station, &operator, Configuration::Good);
+    drivers_ready(&registers, true);
+    let healthy = Feedback {
+        driver_ready: true,
+        sensor_alive: true,
+        configuration: Configuration::Good,
+        ..Feedback::default()
+    };
+    // SAFETY: IDR is word 4 of the port's block of memory.
+    let inputs =
+        |levels| unsafe { registers.gpioc.as_ptr().cast::<Idr>().add(4).write_volatile(Idr(levels)) };
+    for (levels, wanted) in [
+        (0, healthy),
+        (1 << 4, Feedback { enable_input: true, ..healthy }),
+        (1 << 5, Feedback { precharge_closed: true, ..healthy }),
+        (1 << 12, Feedback { main_closed: true, ..healthy }),
+    ] {
+        inputs(levels);
+        assert_eq!(serve.feedback(), wanted, "{levels:#b}");
+    }
+    // The position is known one sample after both indices have passed, and stays so when control has cleared their flags.
+    inputs(0);
+    let mut control = control(registers, &operator);
+    for (timer, knows) in [(registers.tim3, [false; 3]), (registers.tim4, [false, true, true])] {
+        timer.sr().write(|w| w.set_idxif(true));
+        for known in knows {
+            converted(&[], registers);
+            control.sample(NOW);
+            assert_eq!(serve.feedback().position_known, known);
+        }
+    }
+    drivers_ready(&registers, false);
+    let feedback = serve.feedback();
+    assert_eq!((feedback.driver_ready, feedback.hardware), (false, Some(Fault::GateDriver)));
+}
+
+#[test]
+fn each_switch_has_its_pin() {
+    let registers = Model::started().registers;
+    // SAFETY: BSRR is word 6 of the ports' blocks of memory.
+    let written = |port: stm32_metapac::gpio::Gpio| unsafe { port.as_ptr().cast::<u32>().add(6).replace(0) };
+    for (switches, [b, c]) in [
+        (Switches { precharge: true, ..Switches::default() }, [1 << 10, 1 << 25]),
+        (Switches { main: true, ..Switches::default() }, [1 << 15, 1 << 25]),
+        (Switches { discharge: true, ..Switches::default() }, [1 << 31, 1 << 9]),
+    ] {
+        let _ = [registers.gpiob, registers.gpioc].map(written);
+        switchgear::set_wires(&registers, &zs9::pins::SWITCHGEAR, &switches);
+        assert_eq!([registers.gpiob, registers.gpioc].map(written), [b, c], "{switches:?}");
+    }
+}

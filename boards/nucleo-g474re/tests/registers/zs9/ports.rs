@@ -1,0 +1,227 @@
+//! The board as the interrupts see it.
+
+use super::model::Model;
+use crate::bench::{Bench, control_update};
+use nucleo_g474re::operator::DualOperator;
+use nucleo_g474re::position::Encoder;
+use nucleo_g474re::power_stage::AdcCode;
+use nucleo_g474re::registers::Registers;
+use nucleo_g474re::zs9::sampling::Zeros;
+use nucleo_g474re::zs9::stage::STAGE;
+use nucleo_g474re::zs9::{CLOCK, Control, Pwm, start};
+use stm32_metapac::gpio::regs::Idr;
+use tractive::control::Demand;
+use tractive::frames::Angle;
+use tractive::operator::{DualDriveCommand, DualMailboxes};
+use tractive::ports::{ControlPort, GateFeedback, MotorDemand, PwmPort};
+use tractive::time::Instant;
+
+const NOW: Instant = Instant(0);
+
+pub fn zeros() -> Zeros {
+    Zeros { motors: [[AdcCode(2_048); 3]; 2], inductor: AdcCode(2_048) }
+}
+
+pub fn control<'a>(registers: Registers, operator: &'a DualOperator) -> Control<'a, Encoder> {
+    let encoders = [registers.tim4, registers.tim3].map(|timer| Encoder::new(timer, &STAGE.common, 4));
+    Control::new(registers, zeros(), encoders, operator)
+}
+
+/// Gates may pulse.
+pub fn permitted(torques_nm: [f32; 2], link_ref_v: f32) -> DualDriveCommand {
+    let torque = |torque_nm| MotorDemand::Torque(Demand { torque_nm, slew_limited: true });
+    DualDriveCommand { enable: true, demands: torques_nm.map(torque), link_ref_v, ..DualDriveCommand::NONE }
+}
+
+/// Enable input, drivers and indices.
+pub fn make_ready(registers: &Registers) {
+    // SAFETY: IDR is word 4 of the port's block of memory; bit 4 is the enable input.
+    unsafe { registers.gpioc.as_ptr().cast::<Idr>().add(4).write_volatile(Idr(1 << 4)) };
+    drivers_ready(registers, true);
+    for timer in [registers.tim3, registers.tim4] {
+        timer.sr().write(|w| w.set_idxif(true));
+    }
+}
+
+/// The gate drivers' ready wire at both break inputs.
+pub fn drivers_ready(registers: &Registers, ready: bool) {
+    let [b, a] = [u32::from(ready) << 12, u32::from(ready) << 6];
+    // SAFETY: IDR is word 4 of the ports' blocks of memory.
+    unsafe {
+        registers.gpiob.as_ptr().cast::<Idr>().add(4).write_volatile(Idr(b));
+        registers.gpioa.as_ptr().cast::<Idr>().add(4).write_volatile(Idr(a));
+    }
+}
+
+/// A bench whose converters hold these codes by channel.
+pub fn converted(codes: &[(usize, u16)], registers: Registers) {
+    let mut bench = Bench::of_other_inverter();
+    for (channel, code) in codes {
+        bench.codes[*channel] = *code;
+    }
+    for adc in [registers.adc1, registers.adc2, registers.adc3] {
+        bench.finish_sequence(adc);
+    }
+}
+
+#[test]
+fn a_sample_has_both_motors_and_the_link_in_si_units() {
+    let registers = Model::started().registers;
+    let operator = DualOperator::new(DualMailboxes::new());
+    let mut control = control(registers, &operator);
+    // Channels of U, V, W: 2, 7, 14 and 15, 5, 4; capacitors 6, source 9, inductor 1.
+    let codes = [
+        (2, 2_148),
+        (7, 1_948),
+        (14, 2_048),
+        (15, 1_848),
+        (5, 2_048),
+        (4, 2_248),
+        (6, 2_184),
+        (9, 1_638),
+        (1, 3_048),
+    ];
+    converted(&codes, registers);
+    make_ready(&registers);
+    control.sample(NOW);
+    registers.tim4.cnt().write(|w| w.set_cnt(256));
+    registers.tim3.cnt().write(|w| w.set_cnt(512));
+    control_update(&registers);
+    // What is counted after the trigger does not reach the angles.
+    registers.tim4.cnt().write(|w| w.set_cnt(299));
+    registers.tim3.cnt().write(|w| w.set_cnt(599));
+    converted(&codes, registers);
+    operator.desk.allow_from(permitted([50.0, -20.0], 600.0), NOW);
+    let sample = control.sample(NOW);
+    let unit = 150.0 / 2_048.0;
+    let [upper, lower] = sample.currents_a;
+    assert_eq!([upper.a, upper.b, upper.c], [100.0 * unit, -100.0 * unit, 0.0]);
+    assert_eq!([lower.a, lower.b, lower.c], [-200.0 * unit, 0.0, 200.0 * unit]);
+    assert!((sample.capacitor_v - 533.0).abs() < 0.5 && (sample.source_v - 400.0).abs() < 0.5);
+    assert_eq!(sample.inductor_a, 1_000.0 * unit);
+    assert_eq!(sample.angles, [Some(Angle(1 << 30)), Some(Angle(1 << 31))]);
+    let torque = |torque_nm| MotorDemand::Torque(Demand { torque_nm, slew_limited: true });
+    assert_eq!(sample.demands, [torque(50.0), torque(-20.0)]);
+    assert_eq!((sample.link_ref_v, sample.enable), (600.0, true));
+}
+
+#[test]
+fn the_gates_wait_for_both_indices_the_enable_input_and_quiet_breaks() {
+    type Spoil = fn(&Registers);
+    let cases: [(bool, Spoil); 5] = [
+        (true, |_| ()),
+        (false, |registers| registers.tim3.sr().write(|w| w.set_idxif(false))),
+        (false, |registers| registers.tim4.sr().write(|w| w.set_idxif(false))),
+        // SAFETY: IDR is word 4 of the port's block of memory.
+        (false, |registers| unsafe { registers.gpioc.as_ptr().cast::<Idr>().add(4).write_volatile(Idr(0)) }),
+        (false, |registers| registers.tim20.sr().write(|w| w.set_bif(0, true))),
+    ];
+    for (enabled, spoil) in cases {
+        let registers = Model::started().registers;
+        let operator = DualOperator::new(DualMailboxes::new());
+        let mut control = control(registers, &operator);
+        operator.desk.allow_from(permitted([0.0; 2], 600.0), NOW);
+        converted(&[], registers);
+        make_ready(&registers);
+        spoil(&registers);
+        control.sample(NOW);
+        converted(&[], registers);
+        let sample = control.sample(NOW);
+        let known = sample.angles.iter().all(Option::is_some);
+        assert_eq!(sample.enable && known, enabled);
+        assert_eq!(operator.position.is_known(), known, "an angle that is not known is none");
+    }
+}
+
+#[test]
+fn an_index_at_the_wrong_count_is_a_lost_sensor() {
+    let registers = Model::started().registers;
+    let operator = DualOperator::new(DualMailboxes::new());
+    let mut control = control(registers, &operator);
+    let mut sample = |count, index| {
+        registers.tim3.cnt().write(|w| w.set_cnt(count));
+        control_update(&registers);
+        registers.tim3.sr().write(|w| w.set_idxif(index));
+        converted(&[], registers);
+        control.sample(NOW).angles.map(|angle| angle.is_some())
+    };
+    registers.tim4.sr().write(|w| w.set_idxif(true));
+    assert_eq!(sample(0, true), [false, false], "its count may be older than the index");
+    assert_eq!(sample(0, false), [true, true]);
+    assert_eq!(sample(4_000, false), [true, true]);
+    assert_eq!(sample(3_904, false), [true, true]);
+    assert_eq!(sample(5, true), [true, false], "96 counts back, then 197 forward");
+    assert_eq!(sample(0, false), [true, false], "for good");
+    assert!(operator.position.is_lost() && !operator.position.is_known());
+}
+
+#[test]
+fn converters_that_are_silent_give_no_number() {
+    let registers = Model::started().registers;
+    for adc in [registers.adc1, registers.adc2, registers.adc3] {
+        adc.isr().write(|_| ());
+    }
+    let sample = Pwm::new(registers, zeros()).sample(NOW);
+    assert!(sample.currents_a.iter().all(|current| current.a.is_nan()) && sample.source_v.is_nan());
+    let operator = DualOperator::new(DualMailboxes::new());
+    assert!(control(registers, &operator).sample(NOW).inductor_a.is_nan());
+}
+
+#[test]
+fn the_driver_boards_latches_are_two_marked_words() {
+    let read = |words: &[u16]| {
+        let registers = Model::started().registers;
+        let feedback = start::feedback(&registers);
+        feedback.begin();
+        // One word at a time: in memory the second read sees the same register, so each pair is given its own.
+        registers.spi3.sr().write(|w| w.set_rxne(true));
+        registers.spi3.dr16().write_value(words[0]);
+        (feedback, registers)
+    };
+    // The same word twice has one mark wrong: nothing counts as seen.
+    for word in [0b1010101 << 9 | 0x1FF, 0b0101010 << 9 | 0x1FF, 0xFFFF, 0] {
+        let (feedback, _) = read(&[word]);
+        assert_eq!(feedback.end(), GateFeedback::default());
+    }
+    // And none at all.
+    let (feedback, registers) = read(&[0]);
+    registers.spi3.sr().write(|w| w.set_rxne(false));
+    assert_eq!(feedback.end(), GateFeedback::default());
+}
+
+#[test]
+fn two_marked_words_are_what_the_gates_did() {
+    use nucleo_g474re::zs9::feedback::decoded;
+    let (on, off) = (0x1A5, 0x05A);
+    let words = [0b1010101 << 9 | on, 0b0101010 << 9 | off];
+    assert_eq!(decoded(words), GateFeedback { on, off });
+    for bit in 9..16 {
+        assert_eq!(decoded([words[0] ^ 1 << bit, words[1]]), GateFeedback::default());
+        assert_eq!(decoded([words[0], words[1] ^ 1 << bit]), GateFeedback::default());
+    }
+}
+
+#[test]
+fn an_overrun_is_counted_from_the_deadline() {
+    let registers = Model::started().registers;
+    let operator = DualOperator::new(DualMailboxes::new());
+    let mut control = control(registers, &operator);
+    let deadline = CLOCK.control_ticks / 2;
+    for (count, again, late) in [(deadline, false, 0), (deadline + 7, false, 7), (3, true, deadline + 3)] {
+        registers.tim2.cnt().write_value(count);
+        registers.tim2.sr().write(|w| w.set_uif(again));
+        assert_eq!(control.overrun_ticks(NOW, deadline), late);
+    }
+}
+
+#[test]
+fn nothing_is_permitted_before_the_operator_says_so() {
+    let registers = Model::started().registers;
+    let operator = DualOperator::new(DualMailboxes::new());
+    let mut control = control(registers, &operator);
+    converted(&[], registers);
+    make_ready(&registers);
+    let sample = control.sample(NOW);
+    assert_eq!((sample.enable, sample.link_ref_v), (false, STAGE.link_ref_v));
+    assert_eq!(sample.demands, permitted([0.0; 2], 0.0).demands);
+}

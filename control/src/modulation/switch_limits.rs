@@ -1,0 +1,29 @@
+//! Limits of the switches, which every pulse keeps.
+
+use crate::time::Clock;
+
+/// Limits of the inverter's switches, which every pulse keeps.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct SwitchLimits {
+    /// Shortest pulse or pause of a device, in ticks, dead time included.
+    pub min_pulse_ticks: u32,
+    /// Dead time between the two devices of a leg, in ticks; the hardware inserts it.
+    pub dead_time_ticks: u32,
+    /// Length of the shortest carrier half, in ticks: half a period of the highest switching frequency.
+    pub shortest_half_ticks: u32,
+}
+
+impl SwitchLimits {
+    /// From times in ticks and the highest switching frequency in Hz, which is at most the control rate.
+    pub const fn new(
+        min_pulse_ticks: u32,
+        dead_time_ticks: u32,
+        max_switching_hz: f32,
+        clock: &Clock,
+    ) -> Self {
+        // One tick more than the quotient's whole part: never above the highest frequency.
+        let half = (clock.ticks_per_s / (2.0 * max_switching_hz)) as u32 + 1;
+        Self { min_pulse_ticks, dead_time_ticks, shortest_half_ticks: half }
+    }
+}

@@ -1,0 +1,69 @@
+//! Flying starts at every angle, with more and with less flux than the map.
+
+mod stiff;
+
+use rayon::prelude::*;
+use tractive::control::Demand;
+use tractive::time::Instant;
+use tractive_rig::machine::Machine;
+use tractive_rig::plant::{Plant, PlantSettings, SpeedSource};
+use tractive_rig::run::Interrupts;
+use tractive_rig::trace::Row;
+
+const STARTS: usize = 12;
+/// Starts after which a wrong map has been noticed.
+const UNKNOWN: usize = 6;
+const DRIVEN_S: f64 = 0.04;
+const COASTING_S: f64 = 0.02;
+
+struct Case {
+    map_error: f64,
+    udc_v: f64,
+    speed_rpm: f64,
+}
+
+/// Largest phase current of each start without torque, in A; nothing if the drive trips. Each begins a twelfth of a turn of the stator later than the one before.
+fn peaks_a(machine: &Machine, case: &Case) -> Option<[f64; STARTS]> {
+    let turn_s = 60.0 / (case.speed_rpm * f64::from(machine.folder.parameters.pole_pairs));
+    let turns = ((DRIVEN_S + COASTING_S) / turn_s).ceil() + 1.0 / STARTS as f64;
+    let begins = move |start: usize| 0.05 + start as f64 * turns * turn_s;
+    let operator = move |t_s: f64| {
+        let on = (0..STARTS).any(|start| (0.0..DRIVEN_S).contains(&(t_s - begins(start))));
+        (Demand { torque_nm: 0.0, slew_limited: true }, on)
+    };
+    let motor = PlantSettings { flux_scale: 1.0 + case.map_error, resistance_scale: 1.0 };
+    let plant = Plant::new(&machine.folder, SpeedSource::profile(vec![(0.0, case.speed_rpm)]), &motor);
+    let run = stiff::Run { lead_s: 0.0, duration_s: begins(STARTS), trace_step_s: 20e-6, udc_v: case.udc_v };
+    let mut bench = stiff::bench(machine, plant, operator, run).without_edges();
+    let mut tasks = stiff::tasks(machine, Instant(0));
+    tasks.drive(&mut bench, |_| true).unwrap();
+    let tripped = bench.rows().iter().any(|row| row.trip.is_some());
+    let peaks = std::array::from_fn(|start| {
+        let driven = (begins(start), begins(start) + DRIVEN_S);
+        let rows = bench.rows().iter().filter(|row| (driven.0..driven.1).contains(&row.t_s));
+        rows.map(Row::peak_current_a).fold(0.0, f64::max)
+    });
+    (!tripped).then_some(peaks)
+}
+
+/// Once it knows how wrong the map is the drive keeps to the machine's largest current, and before that it does not trip, on any link.
+#[test]
+fn a_machine_with_other_flux_than_the_map_is_caught_within_its_current() {
+    let machine = Machine::load("pmasynrm-180kw").unwrap();
+    let parameters = &machine.folder.parameters;
+    let mut cases = Vec::new();
+    for udc_v in [parameters.dc_link_min_v, parameters.dc_link_nominal_v, parameters.dc_link_max_v] {
+        for speed_rpm in [2000.0, 4500.0] {
+            cases.extend([-0.15, 0.15].map(|map_error| Case { map_error, udc_v, speed_rpm }));
+        }
+    }
+    let found: Vec<_> = cases.par_iter().map(|case| peaks_a(&machine, case)).collect();
+    let most_a = |peaks: &[f64]| peaks.iter().copied().fold(0.0, f64::max);
+    let mut over = 0;
+    for (Case { map_error, udc_v, speed_rpm }, peaks) in cases.iter().zip(found) {
+        let most = peaks.map(|peaks| (most_a(&peaks[..UNKNOWN]), most_a(&peaks[UNKNOWN..])));
+        println!("{map_error:+} {udc_v:.0} V {speed_rpm:.0} r/min: {most:.0?} A unknown and known");
+        over += usize::from(most.is_none_or(|(_, known_a)| known_a > 1.02 * parameters.max_current_a));
+    }
+    assert_eq!(over, 0, "of {} cases", cases.len());
+}

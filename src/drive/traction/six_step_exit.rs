@@ -1,0 +1,111 @@
+//! Voltage and torque after square wave.
+
+use super::slot::Decision;
+use crate::frames::six_step_v;
+use crate::machine::Ratings;
+use crate::modulation::{Mode, TRANSITION_SECTORS};
+use crate::time::Instant;
+
+/// Rate at which the voltage falls from square wave to the one that the torque needs, in shares of six-step per second.
+const EXIT_PER_S: f32 = 12.0;
+
+/// Flux linkage that the voltage forces, over the magnets', above which torque does not pass through zero.
+const ONE_SIDED_FLUX: f32 = 1.1;
+
+/// Rest of a torque that keeps its sign, as a share of the largest.
+const ONE_SIDED_SHARE: f32 = 0.001;
+
+/// Length of the pause in which torque changes its sign in square wave, in s: two committed halves, then the machine's currents
+/// decay against the link.
+const CROSSING_S: f32 = 2e-3;
+
+/// The exit ramp from square wave: voltage and torque on their way to what the torque needs, and a flux hexagon off its centre.
+pub(super) struct SixStepExit {
+    /// Fundamental to which the voltage has fallen after square wave, as a share of six-step; 0 otherwise.
+    filled_to: f32,
+    /// The last torque, in N·m, none as the least positive one; 0 before the first. Its sign is the side of the flux circle on which the
+    /// machine is: no torque lies with the positive ones there.
+    side_nm: f32,
+    /// Mode that the newest command was made for, and the halves for which its flux hexagon still changes its size.
+    unsettled: (Mode, u32),
+    /// The boundary that was counted last.
+    counted: Instant,
+    /// Time for which the gates are still off for torque to change its sign, in s.
+    crossing_s: f32,
+}
+
+impl SixStepExit {
+    pub(super) const fn new() -> Self {
+        Self { filled_to: 0.0, side_nm: 0.0, unsettled: (Mode::Off, 0), counted: Instant(0), crossing_s: 0.0 }
+    }
+
+    /// No pulses for a control period, no torque, and no side.
+    pub(super) fn rest(&mut self, period_s: f32) {
+        self.side_nm = 0.0;
+        self.crossing_s -= period_s;
+    }
+
+    /// True while the gates are to be off until torque has another sign.
+    pub(super) fn crosses(&self) -> bool {
+        self.crossing_s > 0.0
+    }
+
+    /// Remembers the side of a torque, in N·m.
+    pub(super) fn drove(&mut self, torque_nm: f32) {
+        self.side_nm = if torque_nm == 0.0 { f32::MIN_POSITIVE } else { torque_nm };
+    }
+
+    /// The largest fundamental as a share of six-step, and whether it is to be used whatever the torque needs: in square wave, and
+    /// after it for as long as the voltage falls from there to what the torque `needed` in the last period: once the pattern has
+    /// grown.
+    pub(super) fn fill(&mut self, decided: Mode, largest: f32, needed: f32, period_s: f32) -> (f32, bool) {
+        if decided.is_whole() {
+            self.filled_to = 1.0;
+            return (largest, true);
+        }
+        if self.unsettled.1 == 0 {
+            self.filled_to -= EXIT_PER_S * period_s;
+        }
+        if !decided.is_pattern() || self.filled_to < needed {
+            self.filled_to = 0.0;
+            return (largest, false);
+        }
+        (if self.filled_to < largest { self.filled_to } else { largest }, true)
+    }
+
+    /// The torque demanded, in N·m, which keeps its sign, at first the demand's, for as long as the voltage forces more flux upon the
+    /// machine than its magnets have, whose EMF is given in V: near no torque the two signs then lie far apart on the circle of flux
+    /// linkage, and the way between them goes past currents beyond the largest. So once there is no torque left the gates pause: the
+    /// flux falls to that of the magnets, and the pattern catches the machine on the other side.
+    pub(super) fn one_sided(&mut self, torque_nm: f32, emf_v: f32, udc_v: f32, ratings: &Ratings) -> f32 {
+        let least_nm = ONE_SIDED_SHARE * ratings.max_torque_nm;
+        let side_nm = if self.side_nm == 0.0 { torque_nm } else { self.side_nm };
+        let sided_nm = least_nm.copysign(side_nm);
+        let ends = torque_nm * sided_nm < least_nm * least_nm;
+        let forced_v = self.filled_to * six_step_v(udc_v);
+        if !ends || forced_v <= ONE_SIDED_FLUX * emf_v {
+            return torque_nm;
+        }
+        let turns_over = torque_nm * sided_nm < -least_nm * least_nm;
+        if turns_over && self.side_nm.abs() <= least_nm {
+            self.crossing_s = CROSSING_S;
+        }
+        sided_nm
+    }
+
+    /// True once a pattern has grown out of another when a decision is made: until then the flux hexagon is off its centre, on its way to
+    /// another size.
+    pub(super) fn is_settled(&mut self, decision: &Decision) -> bool {
+        let Decision { boundary, mode: decided } = *decision;
+        let (mode, halves) = &mut self.unsettled;
+        if decided != *mode {
+            let grows = decided.is_pattern() && mode.is_pattern();
+            *halves = if grows { TRANSITION_SECTORS * decided.sector_halves() } else { 0 };
+            *mode = decided;
+        } else if self.counted != boundary {
+            *halves = halves.saturating_sub(1);
+        }
+        self.counted = boundary;
+        *halves == 0
+    }
+}

@@ -1,0 +1,60 @@
+//! The boundary that uses the command of a control period, and so the purpose of the period.
+
+use super::applied::Applied;
+use crate::modulation::Mode;
+use crate::time::{Clock, Instant};
+
+/// Halves between, where a carrier lasts a control period.
+const MOST_BETWEEN: u32 = 2;
+
+/// The decision of a boundary: the mode of the half that begins at the one after it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Decision {
+    pub boundary: Instant,
+    pub mode: Mode,
+}
+
+/// The work of a control period. A boundary uses the last command that is valid by then, and of those before it nothing: so each
+/// command is made once, in the period before it is used, and its operating point one period earlier. Where a carrier half is shorter
+/// than two periods, both are made in one.
+pub(super) struct Slot {
+    pub key: Decision,
+    /// `true` if the boundary uses the command of this period.
+    pub commands: bool,
+    /// `true` if it uses that of the next one.
+    pub aims: bool,
+    /// Halves of a free carrier between the one that is committed already and the first of this command: those of the command before.
+    pub between: u32,
+}
+
+impl Slot {
+    /// The period that begins at `now`. While nothing is known of the modulator each one may be the last.
+    #[inline]
+    pub(super) fn of(applied: Option<&Applied>, now: Instant, clock: &Clock) -> Self {
+        let Some(applied) = applied else {
+            let key = Decision { boundary: now, mode: Mode::Off };
+            return Self { key, commands: true, aims: false, between: 0 };
+        };
+        let period = clock.control_ticks;
+        let valid = now.after(period);
+        let later = |halves| applied.begins.after(halves * applied.period_ticks);
+        let halves = if later(0).reached(valid) {
+            0
+        } else if later(1).reached(valid) {
+            1
+        } else {
+            MOST_BETWEEN
+        };
+        let left = later(halves).since(valid);
+        let commands = left < period as i32;
+        // A pattern's half of less than two periods, which is rare, counts as if this command were in time for the next boundary.
+        let between = if commands && !applied.kind.is_free() { 0 } else { halves };
+        let mode = if between == 0 { applied.kind.next_mode() } else { applied.kind.next_but_one_mode() };
+        Self {
+            key: Decision { boundary: later(between), mode },
+            commands,
+            aims: !commands && left < 2 * period as i32,
+            between,
+        }
+    }
+}

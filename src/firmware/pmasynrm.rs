@@ -1,0 +1,106 @@
+//! The PMaSynRM's two interrupts and its idle loop, on whichever `qemu` the image's root names: the board, or the board with faults injected.
+
+use crate::qemu::{self, CLOCK, Interrupt as interrupt};
+use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use cortex_m_rt::{entry, exception, interrupt};
+use tractive::built_in::traction::{BUILT_IN, BuiltIn};
+use tractive::control::Gains;
+use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
+use tractive::modulation::SwitchLimits;
+use tractive::operator::{self, Line, Slot, slot_s};
+use tractive::protocol::CanEndpoint;
+use tractive::time::{Clock, Instant};
+
+static SHARED: Shared = Shared::recorded_by(&qemu::RECORDER);
+static CONTROL_TICKS: AtomicU32 = AtomicU32::new(CLOCK.control_ticks);
+static MIN_PULSE_TICKS: AtomicU32 = AtomicU32::new(0);
+static DEAD_TIME_TICKS: AtomicU32 = AtomicU32::new(0);
+static FIRST_HALF_TICKS: AtomicU32 = AtomicU32::new(0);
+static UNCOMPENSATED: AtomicBool = AtomicBool::new(false);
+
+/// Until the host has told its own.
+const DEFAULTS: Settings = Settings {
+    clock: CLOCK,
+    devices: SwitchLimits::new(0, 0, BUILT_IN.ratings.max_switching_hz, &CLOCK),
+    gains: Gains::DEFAULT,
+};
+
+fn settings() -> Settings {
+    let clock = Clock::new(qemu::TICKS_HZ, CONTROL_TICKS.load(Ordering::Relaxed));
+    Settings {
+        clock,
+        devices: SwitchLimits::new(
+            MIN_PULSE_TICKS.load(Ordering::Relaxed),
+            DEAD_TIME_TICKS.load(Ordering::Relaxed),
+            BUILT_IN.ratings.max_switching_hz,
+            &clock,
+        ),
+        gains: if UNCOMPENSATED.load(Ordering::Relaxed) { Gains::WITHOUT_SIXTH } else { Gains::DEFAULT },
+    }
+}
+
+#[entry]
+fn main() -> ! {
+    let setup = qemu::connect();
+    CONTROL_TICKS.store(setup.control_ticks, Ordering::Relaxed);
+    MIN_PULSE_TICKS.store(setup.min_pulse_ticks, Ordering::Relaxed);
+    DEAD_TIME_TICKS.store(setup.dead_time_ticks, Ordering::Relaxed);
+    UNCOMPENSATED.store(setup.uncompensated, Ordering::Relaxed);
+    if let Err(refused) = const { BUILT_IN.check() }.and_then(|()| settings().check_settings()) {
+        qemu::refuse(&refused);
+    }
+    let Settings { clock, devices, .. } = settings();
+    let first_half_ticks = devices.shortest_half_ticks.saturating_add(setup.pwm_delay_ticks);
+    FIRST_HALF_TICKS.store(first_half_ticks, Ordering::Relaxed);
+    let line = setup.line.map(|times| Line::rated(&BUILT_IN.ratings, times.precharge_s, times.discharge_s));
+    let operator = operator::Settings::rated(&BUILT_IN.ratings, slot_s(&clock), line);
+    let station = setup.over_protocol.then(|| CanEndpoint::new(&BUILT_IN.ratings));
+    let (mut slot, mut idle) = (Slot::new(), qemu::Idle { station });
+    qemu::start(first_half_ticks, clock.control_ticks);
+    loop {
+        if line.is_some() || setup.over_protocol {
+            let settings = match &idle.station {
+                Some(station) => station.settings(&operator),
+                None => operator,
+            };
+            slot.run(&qemu::DESK, &mut idle, &settings, &clock);
+        }
+        qemu::idle();
+    }
+}
+
+/// Deadline: the next control interrupt. Missed: fault `control_deadline`, gates into the safe state.
+#[interrupt]
+fn TIMER0() {
+    static mut TASK: ControlTask<BuiltIn> = ControlTask::new(BuiltIn, DEFAULTS, Instant(CLOCK.control_ticks));
+    static mut IS_SET_UP: bool = false;
+    let mut board = qemu::Control;
+    if !*IS_SET_UP {
+        let settings = settings();
+        TASK.set_up(settings, Instant(settings.clock.control_ticks));
+        *IS_SET_UP = true;
+    }
+    TASK.run(&mut board, &SHARED);
+}
+
+/// Deadline: the next carrier boundary, where the shadow registers take over.
+#[interrupt]
+fn DUALTIMER() {
+    static mut TASK: Option<PwmTask<BuiltIn>> = None;
+    let mut board = qemu::Pwm;
+    let task = TASK.get_or_insert_with(|| {
+        let first = Instant(FIRST_HALF_TICKS.load(Ordering::Relaxed));
+        PwmTask::new(BuiltIn, settings(), first).after_halves_of(first.0)
+    });
+    task.run(&mut board, &SHARED);
+}
+
+#[exception]
+unsafe fn HardFault(_frame: &cortex_m_rt::ExceptionFrame) -> ! {
+    qemu::die()
+}
+
+#[panic_handler]
+fn panic(_info: &core::panic::PanicInfo) -> ! {
+    qemu::die()
+}

@@ -1,0 +1,86 @@
+//! The ZS9's two interrupts and its idle loop, on whichever `qemu` the image's root names: the board, or the board with faults injected.
+
+use crate::qemu::{self, CLOCK, Interrupt as interrupt};
+use core::sync::atomic::{AtomicU32, Ordering};
+use cortex_m_rt::{entry, exception, interrupt};
+use tractive::built_in::zs9::{BUILT_IN, BuiltIn};
+use tractive::drive::dual::{ControlTask, PwmTask, Settings, Shared};
+use tractive::machine::Ratings;
+use tractive::operator::{self, DualSlot, Line, slot_s};
+use tractive::protocol::Zs9CanEndpoint;
+
+static SHARED: Shared = Shared::recorded_by(&qemu::DUAL_RECORDER);
+/// Until the host has told its carrier.
+const DEFAULTS: Settings = Settings::new(CLOCK, CLOCK.control_ticks);
+/// As the operator looks at them.
+static RATINGS: Ratings = DEFAULTS.operator_ratings(&BUILT_IN.ratings);
+static CARRIER_TICKS: AtomicU32 = AtomicU32::new(0);
+
+fn settings() -> Settings {
+    Settings::new(CLOCK, CARRIER_TICKS.load(Ordering::Relaxed))
+}
+
+#[entry]
+fn main() -> ! {
+    let setup = qemu::connect_dual();
+    CARRIER_TICKS.store(setup.carrier_ticks, Ordering::Relaxed);
+    // All but the carrier are constants of the image.
+    let constants = const { DEFAULTS.check(&BUILT_IN) };
+    if let Err(refused) = constants.and_then(|()| settings().check_carrier()) {
+        qemu::refuse(&refused);
+    }
+    let line =
+        setup.line.map(|times| Line::rated(&RATINGS, times.precharge_s, times.discharge_s).without_chopper());
+    let rated = operator::Settings::rated(&RATINGS, slot_s(&CLOCK), line);
+    let (mut slot, mut idle) = (DualSlot::new(), qemu::DualIdle { station: Zs9CanEndpoint::new(&RATINGS) });
+    qemu::start_dual(&settings());
+    loop {
+        if line.is_some() {
+            let settings = idle.station.settings(&rated);
+            slot.run(&qemu::DUAL_DESK, &mut idle, &settings, &CLOCK);
+        }
+        qemu::idle();
+    }
+}
+
+/// Deadline: the last peak before the next control interrupt. Missed: fault `control_deadline`, all gates off.
+#[interrupt]
+fn TIMER0() {
+    static mut TASK: ControlTask<BuiltIn> = ControlTask::new(BuiltIn, DEFAULTS);
+    static mut IS_SET_UP: bool = false;
+    let mut board = qemu::Control;
+    if !*IS_SET_UP {
+        TASK.set_carrier(CARRIER_TICKS.load(Ordering::Relaxed));
+        *IS_SET_UP = true;
+    }
+    TASK.run(&mut board, &SHARED);
+}
+
+/// Deadline: the next valley, where the shadow registers take over. Missed: the watch's.
+#[interrupt]
+fn DUALTIMER() {
+    static mut TASK: PwmTask<BuiltIn> = PwmTask::new(BuiltIn, DEFAULTS);
+    static mut IS_SET_UP: bool = false;
+    let mut board = qemu::Pwm;
+    if !*IS_SET_UP {
+        TASK.set_carrier(CARRIER_TICKS.load(Ordering::Relaxed));
+        *IS_SET_UP = true;
+    }
+    TASK.run(&mut board, &SHARED);
+}
+
+/// The watch over the carrier periods: one was not written in time. Fault `pwm_deadline`, all gates off.
+#[exception]
+unsafe fn NonMaskableInt() {
+    qemu::watch_ends();
+}
+
+#[exception]
+unsafe fn HardFault(_frame: &cortex_m_rt::ExceptionFrame) -> ! {
+    qemu::die_dual()
+}
+
+#[panic_handler]
+fn panic(_info: &core::panic::PanicInfo) -> ! {
+    qemu::die_dual()
+}

@@ -1,0 +1,36 @@
+//! Checks that are switched off on the host.
+
+use super::Fault;
+
+/// Checks that are switched off, to see what is lost without them: on the host, never in a firmware.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct MaskedFaults {
+    /// A bit for each fault's discriminant.
+    #[cfg(not(target_os = "none"))]
+    faults: u32,
+}
+
+impl MaskedFaults {
+    /// Every check is on.
+    pub const NONE: Self = Self {
+        #[cfg(not(target_os = "none"))]
+        faults: 0,
+    };
+
+    /// All but the check that finds this fault.
+    #[cfg(not(target_os = "none"))]
+    pub const fn of(fault: Fault) -> Self {
+        Self { faults: 1 << fault as u32 }
+    }
+
+    /// `true` if the check that finds this fault is off.
+    #[cfg(not(target_os = "none"))]
+    pub(crate) const fn has(&self, fault: Fault) -> bool {
+        self.faults & 1 << fault as u32 != 0
+    }
+
+    #[cfg(target_os = "none")]
+    pub(crate) const fn has(&self, _fault: Fault) -> bool {
+        false
+    }
+}

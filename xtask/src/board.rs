@@ -1,0 +1,95 @@
+//! The boards of real hardware: the packages in `boards/`, each with what this program has to know of it in its own `Cargo.toml`.
+
+use std::path::Path;
+
+use anyhow::{Context, Result};
+use serde::Deserialize;
+
+use crate::workspace::root;
+
+/// A board.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Board {
+    /// Its folder's name, and its images'.
+    pub name: String,
+    /// The package.
+    pub package: String,
+    /// The contents of the package's own file.
+    pub told: Told,
+}
+
+/// The table `package.metadata.board`.
+#[derive(Clone, Debug, Deserialize, PartialEq, Eq)]
+#[serde(deny_unknown_fields)]
+pub struct Told {
+    /// The chip's name in probe-rs.
+    pub chip: String,
+    /// The beginning of its flash memory, and with it of the images.
+    pub flash_origin: u32,
+}
+
+#[derive(Deserialize)]
+struct Manifest {
+    package: Package,
+}
+
+#[derive(Deserialize)]
+struct Package {
+    name: String,
+    metadata: Metadata,
+}
+
+#[derive(Deserialize)]
+struct Metadata {
+    board: Told,
+}
+
+impl Board {
+    /// The board in that folder of `boards/`.
+    pub fn read(name: &str) -> Result<Self> {
+        let file = root().join("boards").join(name).join("Cargo.toml");
+        let text = std::fs::read_to_string(&file).with_context(|| file.display().to_string())?;
+        let Manifest { package } = toml::from_str(&text).with_context(|| file.display().to_string())?;
+        Ok(Self { name: name.to_owned(), package: package.name, told: package.metadata.board })
+    }
+
+    /// The same as it was typed; the error names those that there are.
+    pub fn named(name: &str) -> Result<Self, String> {
+        let names = names();
+        if !names.iter().any(|known| known == name) {
+            return Err(format!("there are: {}", names.join(", ")));
+        }
+        Self::read(name).map_err(|error| format!("{error:#}"))
+    }
+
+    /// All of them, by their names.
+    pub fn all() -> Result<Vec<Self>> {
+        names().iter().map(|name| Self::read(name)).collect()
+    }
+}
+
+/// The folders of `boards/`, by their names.
+fn names() -> Vec<String> {
+    let is_package = |folder: &Path| folder.join("Cargo.toml").is_file();
+    let entries = std::fs::read_dir(root().join("boards")).into_iter().flatten().flatten();
+    let folders = entries.filter(|entry| is_package(&entry.path()));
+    let mut names: Vec<_> = folders.map(|folder| folder.file_name().to_string_lossy().into_owned()).collect();
+    names.sort_unstable();
+    names
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_board_is_what_its_folder_says() {
+        let board = Board::read("nucleo-g474re").unwrap();
+        assert_eq!(board.package, "tractive-nucleo-g474re");
+        assert_eq!(board.told, Told { chip: "STM32G474RETx".to_owned(), flash_origin: 0x0800_0000 });
+        assert!(Board::all().unwrap().contains(&board));
+        assert_eq!(Board::named("nucleo-g474re"), Ok(board));
+        let message = Board::named("none").unwrap_err();
+        assert!(message.starts_with("there are: ") && message.contains("nucleo-g474re"), "{message}");
+    }
+}
