@@ -208,14 +208,12 @@ impl<T: Words<N>, const N: usize> Default for Seqlock<T, N> {
 
 /// Records that a [`History`] holds.
 const RECORDS: usize = 8;
-/// Records of them that a reader may look at.
-pub const SEEN: usize = 6;
 
 /// From the high-priority interrupt (writer) to the low-priority one (reader): the last records of `N` words.
 ///
-/// The reader sees the last [`SEEN`] of the records that were there when it began, and a new one goes into the oldest of the ring:
-/// a read is good unless more than `RECORDS - SEEN` writes come in between, which is noticed. A record that is written anew
-/// makes a reader that it interrupts look again.
+/// The reader finds the record that it wants by what stands in it, then reads that one and those before it as often as it likes. A new
+/// record goes into the oldest of the ring: a read is good until that is one of those that were read, which is noticed. A record that
+/// is written anew makes a reader that it interrupts look again.
 pub struct History<const N: usize> {
     records: [[AtomicU32; N]; RECORDS],
     /// Counts the records, 0 before the first; record n is in place `n % RECORDS`.
@@ -223,6 +221,10 @@ pub struct History<const N: usize> {
     /// Counts twice what was written into the newest record anew; odd while that is under way.
     revised: AtomicU32,
 }
+
+/// The number of a record, counted on past the ring's end.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Place(u32);
 
 /// A record where it lies: each word is loaded when it is asked for. Zeros where nothing was published yet.
 pub struct Record<'a, const N: usize>(&'a [AtomicU32; N]);
@@ -284,29 +286,48 @@ impl<const N: usize> History<N> {
         self.revised.store(revised.wrapping_add(2), Ordering::Release);
     }
 
-    /// Reader's side: what `look` makes of the last records, the newest first; `None` before the first, or when every try was
+    /// Reader's side: the newest record of the last `within` that `fits`; `None` if there is none.
+    #[inline(always)]
+    pub fn find(&self, within: u32, fits: impl Fn(Record<N>) -> bool) -> Option<Place> {
+        let published = self.published.load(Ordering::Acquire);
+        let mut place = Place(published.wrapping_sub(1));
+        for _ in 0..if published == 0 { 0 } else { within } {
+            if fits(self.record(place, 0)) {
+                return Some(place);
+            }
+            place.0 = place.0.wrapping_sub(1);
+        }
+        None
+    }
+
+    /// Reader's side: what `look` makes of the record at a place and of those before it, the newest first; `None` when every try was
     /// overtaken by writes.
     #[inline]
-    pub fn read<R>(&self, look: impl Fn([Record<N>; SEEN]) -> R) -> Option<R> {
-        for _ in 0..READ_TRIES {
+    pub fn read<const COUNT: usize, R>(
+        &self,
+        place: Place,
+        look: impl Fn([Record<N>; COUNT]) -> R,
+    ) -> Option<R> {
+        const { assert!(COUNT < RECORDS) };
+        // A record is written anew at most once, so the second try succeeds.
+        for _ in 0..2 {
             let revised = self.revised.load(Ordering::Acquire);
-            let published = self.published.load(Ordering::Acquire);
-            if published == 0 {
-                return None;
-            }
-            let record = |back: u32| {
-                // The count wraps by whole rings.
-                Record(&self.records[published.wrapping_sub(1 + back) as usize % RECORDS])
-            };
-            let seen = look([record(0), record(1), record(2), record(3), record(4), record(5)]);
+            let seen = look(core::array::from_fn(|back| self.record(place, back as u32)));
             fence(Ordering::Acquire);
-            let written = self.published.load(Ordering::Relaxed).wrapping_sub(published);
+            // The record that is being written now is the oldest of the ring.
+            let written = self.published.load(Ordering::Relaxed).wrapping_sub(place.0);
             let whole = revised & 1 == 0 && self.revised.load(Ordering::Relaxed) == revised;
-            if whole && written <= (RECORDS - SEEN) as u32 {
+            if whole && written <= (RECORDS - COUNT) as u32 {
                 return Some(seen);
             }
         }
         None
+    }
+
+    /// The record so many before a place. The count wraps by whole rings.
+    #[inline(always)]
+    fn record(&self, place: Place, back: u32) -> Record<'_, N> {
+        Record(&self.records[place.0.wrapping_sub(back) as usize % RECORDS])
     }
 }
 

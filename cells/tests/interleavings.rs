@@ -48,7 +48,8 @@ fn an_uplink_is_never_torn() {
 
 /// The newest two records' words, of which both are the record's number.
 fn newest_two(trail: &History<2>) -> Option<[[u32; 2]; 2]> {
-    trail.read(|[one, two, ..]| [one, two].map(|record| [record.word::<0>(), record.word::<1>()]))
+    let place = trail.find(1, |_| true)?;
+    trail.read(place, |records| records.map(|record| [record.word::<0>(), record.word::<1>()]))
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use super::Settings;
 use super::six_step_exit::SixStepExit;
 use super::slot::Decision;
-use crate::cell::{History, Record, SEEN};
+use crate::cell::{History, Place, Record};
 use crate::control::{Boundary, Committed, ModeLimits, Regulated, Ripple};
 use crate::drive::messages::{COMMITTAL_WORDS, CommittalRecord, HalfKind};
 use crate::frames::{Abc, AlphaBeta, Angle};
@@ -14,12 +14,17 @@ use crate::time::{Clock, Instant};
 /// By which part of a control period the PWM interrupt may be late before control calls it lost: more than it takes to enter it.
 const PWM_LATE_PART: u32 = 4;
 
+/// Records of which one is that of the newest boundary at a control interrupt's instant: two may have come since.
+const LATEST: u32 = 3;
+
 /// Share of a mode's largest fundamental that the operating point may use where the voltage must also regulate.
 const REGULATION_ROOM: f32 = 0.999;
 
 /// The newest boundary, and what is committed from there on, as it stood at a control interrupt.
 #[derive(Clone, Copy)]
 pub(super) struct Applied {
+    /// The record of the newest boundary.
+    place: Place,
     /// The newest boundary.
     pub at: Instant,
     /// The boundary after it, where the half begins that was committed last; that half's length, in ticks, and its kind.
@@ -32,37 +37,29 @@ pub(super) struct Applied {
     pub released: u8,
 }
 
-/// The records as they stood at `now`, even if the PWM interrupt has come since, as it does twice in a control period where a carrier lasts
-/// one: that of the newest boundary, and those before it.
-#[inline(always)]
-fn stood(records: [Record<COMMITTAL_WORDS>; SEEN], now: Instant) -> Option<[CommittalRecord; SEEN - 2]> {
-    let [newest, one, two, three, four, five] = records.map(CommittalRecord);
-    if now.reached(newest.at()) {
-        return Some([newest, one, two, three]);
-    }
-    // A half that was written has a length.
-    let stands = |record: &CommittalRecord| record.period_ticks() > 0 && now.reached(record.at());
-    if stands(&one) {
-        return Some([one, two, three, four]);
-    }
-    stands(&two).then_some([two, three, four, five])
-}
-
 impl Applied {
-    /// As it stood at `now`; `None` before the modulator has told anything.
+    /// As it stood at `now`, even if the PWM interrupt has come since, as it does twice in a control period where a carrier lasts one;
+    /// `None` before the modulator has told anything.
     #[inline]
     pub(super) fn read(trail: &History<COMMITTAL_WORDS>, now: Instant) -> Option<Self> {
-        let look = |records: [Record<COMMITTAL_WORDS>; SEEN]| {
-            stood(records, now).map(|[newest, one, ..]| Self {
+        let stands = |record: Record<COMMITTAL_WORDS>| {
+            let record = CommittalRecord(record);
+            // A half that was written has a length.
+            record.period_ticks() > 0 && now.reached(record.at())
+        };
+        let place = trail.find(LATEST, stands)?;
+        trail.read(place, |records: [Record<COMMITTAL_WORDS>; 2]| {
+            let [newest, one] = records.map(CommittalRecord);
+            Self {
+                place,
                 at: newest.at(),
                 begins: newest.begins(),
                 period_ticks: newest.period_ticks(),
                 kind: newest.kind(),
                 mode: one.kind().mode(),
                 released: newest.released(),
-            })
-        };
-        trail.read(look).flatten()
+            }
+        })
     }
 
     /// The PWM interrupt that should have come by `now` and has not: since when, in s.
@@ -95,35 +92,32 @@ pub(super) struct Passed {
 }
 
 impl Passed {
-    /// The newest boundary at `now`. The half that ended there counts where its beginning was the boundary that was `used` last, and two
-    /// of them where that was the one before.
+    /// The newest boundary. The half that ended there counts where its beginning was the boundary that was `used` last, and two of them
+    /// where that was the one before.
     #[inline(always)]
     pub(super) fn read(
         trail: &History<COMMITTAL_WORDS>,
+        applied: &Applied,
         used: Option<Instant>,
         now: Instant,
         udc_v: f32,
         clock: &Clock,
     ) -> Option<Self> {
-        let look = |records: [Record<COMMITTAL_WORDS>; SEEN]| {
-            stood(records, now).map(|[newest, one, two, three]| {
-                let at = newest.at();
-                let both = used == Some(two.at());
-                let before = if both { two.at() } else { one.at() };
-                let known = used == Some(before) && !two.kind().is_off() && !(both && three.kind().is_off());
-                let volt_ticks =
-                    || if both { two.volt_ticks() + three.volt_ticks() } else { two.volt_ticks() };
-                Self {
-                    currents_a: newest.currents_a(),
-                    age_s: clock.seconds(now.since(at)),
-                    boundary: Boundary {
-                        volt_seconds: known.then(|| volt_ticks() * (udc_v * clock.tick_s)),
-                        length_s: clock.seconds(at.since(before)),
-                    },
-                }
-            })
-        };
-        trail.read(look).flatten()
+        trail.read(applied.place, |records: [Record<COMMITTAL_WORDS>; 4]| {
+            let [newest, one, two, three] = records.map(CommittalRecord);
+            let both = used == Some(two.at());
+            let before = if both { two.at() } else { one.at() };
+            let known = used == Some(before) && !two.kind().is_off() && !(both && three.kind().is_off());
+            let volt_ticks = || if both { two.volt_ticks() + three.volt_ticks() } else { two.volt_ticks() };
+            Self {
+                currents_a: newest.currents_a(),
+                age_s: clock.seconds(now.since(applied.at)),
+                boundary: Boundary {
+                    volt_seconds: known.then(|| volt_ticks() * (udc_v * clock.tick_s)),
+                    length_s: clock.seconds(applied.at.since(before)),
+                },
+            }
+        })
     }
 }
 
@@ -185,6 +179,7 @@ pub(super) struct Wanted<'a> {
 #[inline(always)]
 pub(super) fn committed(
     trail: &History<COMMITTAL_WORDS>,
+    applied: Option<&Applied>,
     now: Instant,
     steady: &Steady,
     settings: &Settings,
@@ -199,28 +194,28 @@ pub(super) fn committed(
         0 => shortest_s,
         carriers => core::f32::consts::PI / (carriers as f32 * steady.omega.abs()),
     };
-    let look = |records: [Record<COMMITTAL_WORDS>; SEEN]| {
-        stood(records, now).map(|[newest, one, ..]| {
-            let (at, kind) = (newest.at(), newest.kind());
-            let off = one.kind().is_off() || kind.is_off();
-            let running = || one.volt_ticks_from(now.since(at).max(0) as u32);
+    let look = |applied: &Applied| {
+        trail.read(applied.place, |records: [Record<COMMITTAL_WORDS>; 2]| {
+            let [newest, one] = records.map(CommittalRecord);
+            let off = one.kind().is_off() || applied.kind.is_off();
+            let running = || one.volt_ticks_from(now.since(applied.at).max(0) as u32);
             let volt_ticks =
                 (!off).then(|| if revises { running() } else { running() + newest.volt_ticks() });
             let left =
-                newest.begins().since(now).max(0) as u32 + if revises { 0 } else { newest.period_ticks() };
+                applied.begins.since(now).max(0) as u32 + if revises { 0 } else { applied.period_ticks };
             let volt_seconds = volt_ticks.map(|ticks| ticks * (steady.udc_v * clock.tick_s));
-            let gap = between * newest.period_ticks();
+            let gap = between * applied.period_ticks;
             let made = || before.vector_at(now.after(left + gap / 2)) * clock.seconds(gap as i32);
             Committed {
                 horizon_s: clock.seconds((left + gap) as i32),
                 volt_seconds: if gap == 0 { volt_seconds } else { volt_seconds.map(|known| known + made()) },
-                ripple: kind.ripple(decided, steady),
+                ripple: applied.kind.ripple(decided, steady),
                 interval_s,
             }
         })
     };
     let nothing = Committed { horizon_s: 0.0, volt_seconds: None, ripple: None, interval_s };
-    trail.read(look).flatten().unwrap_or(nothing)
+    applied.and_then(look).unwrap_or(nothing)
 }
 
 impl HalfKind {

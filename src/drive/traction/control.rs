@@ -299,22 +299,23 @@ impl<M: Machine> ControlTask<M> {
             && self.boundary != Some(applied.at)
             && (aims || !commands)
         {
-            self.learn(sample, measured.angle, slot.key.mode, now, shared);
+            self.learn(sample, measured.angle, slot.key.mode, applied, shared);
             self.boundary = Some(applied.at);
         }
         if aims {
             self.aim(sample, slot);
         }
         if commands {
-            self.command(sample, &here, slot, shared);
+            self.command(sample, &here, applied, slot, shared);
         }
     }
 
     /// Learns from the newest boundary.
-    fn learn(&mut self, sample: &Sample, angle: Angle, decided: Mode, now: Instant, shared: &Shared) {
+    fn learn(&mut self, sample: &Sample, angle: Angle, decided: Mode, applied: &Applied, shared: &Shared) {
         let Settings { gains, clock, .. } = &self.settings;
+        let now = self.now.before(clock.control_ticks);
         let tables = self.machine.tables();
-        let passed = Passed::read(&shared.applied, self.boundary, now, sample.udc_v, clock);
+        let passed = Passed::read(&shared.applied, applied, self.boundary, now, sample.udc_v, clock);
         if let Some(Passed { currents_a, age_s, boundary }) = passed {
             let angle = angle - Angle::within_half_turn(self.controller.omega() * age_s);
             let there = RotorSample::new(currents_a, angle, tables);
@@ -343,14 +344,21 @@ impl<M: Machine> ControlTask<M> {
 
     /// The command itself.
     #[inline(always)]
-    fn command(&mut self, sample: &Sample, here: &RotorSample, slot: &Slot, shared: &Shared) {
+    fn command(
+        &mut self,
+        sample: &Sample,
+        here: &RotorSample,
+        applied: Option<&Applied>,
+        slot: &Slot,
+        shared: &Shared,
+    ) {
         let Settings { gains, clock, .. } = &self.settings;
         let now = self.now.before(clock.control_ticks);
         let (omega, udc_v) = (self.controller.omega(), sample.udc_v);
         let steady = Steady { omega, udc_v, voltage_v: self.steady_v, depth: self.depth };
         let (mode, revises) = (slot.key.mode, self.revises);
         let wanted = Wanted { mode, revises, between: slot.between, before: &self.reference };
-        let committed = committed(&shared.applied, now, &steady, &self.settings, &wanted);
+        let committed = committed(&shared.applied, applied, now, &steady, &self.settings, &wanted);
         let law = Law { gains, clock, tables: self.machine.tables() };
         let voltage = self.controller.regulate(here, &committed, &self.limits, &law);
         self.steady_v = voltage.steady_v;

@@ -3,7 +3,7 @@
 
 use crate::broken::{Eager, Plain, Unfrozen};
 use crate::message::Message;
-use tractive::cell::{History, Mailbox, Ring, SEEN, Seqlock, Words};
+use tractive::cell::{History, Mailbox, Ring, Seqlock, Words};
 
 pub static DOWNLINK_10: Mailbox<Message<10>, 10> = Mailbox::new();
 pub static UPLINK_4: Seqlock<Message<4>, 4> = Seqlock::new();
@@ -63,10 +63,10 @@ pub fn uplink_10_read(cell: &Seqlock<Message<10>, 10>) -> Option<Message<10>> {
     cell.read()
 }
 
-/// All that a reader may look at, the newest first.
+/// The last four records, the newest first.
 #[inline(never)]
-pub fn trail_13_read(cell: &History<13>) -> Option<[Message<13>; SEEN]> {
-    cell.read(|records| records.map(|record| Message::from_words(words(&record))))
+pub fn trail_13_read(cell: &History<13>) -> Option<[Message<13>; 4]> {
+    cell.read(cell.find(1, |_| true)?, |records| records.map(|record| Message::from_words(words(&record))))
 }
 
 #[inline(always)]

@@ -3,7 +3,10 @@
 use crate::accesses::*;
 use crate::message::Message;
 use core::sync::atomic::{AtomicU32, Ordering::SeqCst, compiler_fence};
-use tractive::cell::{SEEN, Words};
+use tractive::cell::Words;
+
+/// Records that a reader looks at.
+pub const LAST: usize = 4;
 
 /// The numbers of messages published and read.
 pub struct Counts {
@@ -184,13 +187,13 @@ impl Counts {
     }
 
     /// The newest value as in [`Self::read`]; those before it each older, none skipped by more than a revision.
-    fn read_trail<const N: usize>(&self, read: impl Fn() -> Option<[Message<N>; SEEN]>) {
+    fn read_trail<const N: usize>(&self, read: impl Fn() -> Option<[Message<N>; LAST]>) {
         let oldest = self.done.load(SeqCst);
         compiler_fence(SeqCst);
         let records = read();
         compiler_fence(SeqCst);
         // As many as the reader looks at.
-        if oldest < 2 * SEEN as u32 {
+        if oldest < 2 * LAST as u32 {
             return;
         }
         let Some([newest, before @ ..]) = records else {
