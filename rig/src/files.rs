@@ -82,17 +82,11 @@ impl<const N: usize> Serialize for Columns<N> {
 }
 
 /// Writes rows under the names of their columns; of no rows nothing.
-///
-/// # Errors
-/// A file that cannot be written.
 pub fn write_rows(path: &Path, rows: impl IntoIterator<Item = impl Serialize>) -> Result<()> {
     write_whole(path, |out| Ok(rows.into_iter().try_for_each(|row| out.serialize(row))?))
 }
 
 /// Writes edges.csv: when, which gate, on or off.
-///
-/// # Errors
-/// A file that cannot be written.
 pub fn write_edges(path: &Path, edges: impl Iterator<Item = (Cell, &'static str, bool)>) -> Result<()> {
     let mut rows = edges
         .map(|(t_s, gate, on)| Columns([("t_s", t_s), ("gate", gate.into()), ("level", on.into())]))
@@ -104,9 +98,6 @@ pub fn write_edges(path: &Path, edges: impl Iterator<Item = (Cell, &'static str,
 }
 
 /// Writes what a fault has frozen in the flight recorder; else takes away what an earlier run has left.
-///
-/// # Errors
-/// A file that cannot be written.
 pub fn write_recorder<R, const N: usize>(
     path: &Path,
     recorded: &[R],

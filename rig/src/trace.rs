@@ -226,19 +226,10 @@ pub trait Recorded {
     /// The last row's time, in s.
     fn end_s(&self) -> f64;
     /// Writes trace.csv.
-    ///
-    /// # Errors
-    /// A file that cannot be written.
     fn write_trace(&self, path: &Path) -> Result<()>;
     /// Writes recorder.csv, if a fault has frozen the flight recorder; else takes away what an earlier run has left.
-    ///
-    /// # Errors
-    /// A file that cannot be written.
     fn write_recorder(&self, path: &Path) -> Result<()>;
     /// Writes what else there is into a folder: edges.csv, operator.csv.
-    ///
-    /// # Errors
-    /// A file that cannot be written.
     fn write_events(&self, folder: &Path) -> Result<()>;
 }
 

@@ -7,12 +7,12 @@ use anyhow::Result;
 use clap::ValueEnum;
 
 use crate::board::Board;
-use crate::build::{System, TARGET, cargo};
+use crate::build::{self, System, TARGET, cargo};
 use crate::cli::{TestArgs, TimingArgs};
+use crate::image;
 use crate::process::{find, processor_s, succeeds};
 use crate::setup::Setup;
 use crate::step::Step;
-use crate::{build, image};
 
 /// The packages by the commands that test them. Cargo unites the features of what it is asked for at once: with all of them in one
 /// command the rig and this program would be compiled anew, since `cargo rig` and `cargo xtask` ask for one package. The boards go with the

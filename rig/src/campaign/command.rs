@@ -46,9 +46,6 @@ pub struct CampaignOptions {
 }
 
 /// Runs the campaign. Exit code 1 where a case is uncaught, or the document is not up to date.
-///
-/// # Errors
-/// Bad options, files that cannot be written, or a drive that breaks its bench's rules.
 pub fn run(options: &CampaignOptions) -> Result<ExitCode> {
     if let Some(minutes) = options.healthy {
         return drive_healthy(minutes, options);

@@ -35,10 +35,7 @@ pub(crate) fn refused(refused: Refused) -> anyhow::Error {
 
 /// The sender of commands over the protocol.
 pub trait Supervisor {
-    /// The slot that began at `t_s`: what is sent to the drive, and what happens to it.
-    ///
-    /// # Errors
-    /// Ends the run.
+    /// The slot that began at `t_s`: what is sent to the drive, and what happens to it. An error ends the run.
     fn slot(&mut self, t_s: f64) -> anyhow::Result<Turn>;
 
     /// A frame that the drive sends at `t_s`.

@@ -177,10 +177,7 @@ fn program() -> String {
     std::env::var("TRACTIVE_PROGRAM").unwrap_or("cargo rig".to_owned()) + " run"
 }
 
-/// Reads the words behind `run`.
-///
-/// # Errors
-/// Bad usage: clap's own where it says more than a line, or help that was asked for.
+/// Reads the words behind `run`. The error is clap's own where it says more than a line, or help that was asked for.
 pub fn choose<W: Into<OsString>>(words: impl IntoIterator<Item = W>) -> Result<Chosen> {
     let words: Vec<_> = words.into_iter().map(Into::into).collect();
     let Some(name) = name(&words) else { return Err(help().into()) };
@@ -206,10 +203,7 @@ fn matches(command: Command, name: &str, words: &[OsString]) -> Result<ArgMatche
     })
 }
 
-/// A scenario of the PMaSynRM drive, by the words behind `run`.
-///
-/// # Errors
-/// Bad usage, or a scenario of the other system.
+/// A scenario of the PMaSynRM drive, by the words behind `run`. One of the other system is an error.
 pub fn of_traction(line: &str) -> Result<Choice<Traction>> {
     match choose(line.split_whitespace())? {
         Chosen::Traction(choice) => Ok(choice),
@@ -217,10 +211,7 @@ pub fn of_traction(line: &str) -> Result<Choice<Traction>> {
     }
 }
 
-/// A scenario of the ZS9, by the words behind `run`.
-///
-/// # Errors
-/// Bad usage, or a scenario of the other system.
+/// A scenario of the ZS9, by the words behind `run`. One of the other system is an error.
 pub fn of_zs9(line: &str) -> Result<Choice<Zs9>> {
     match choose(line.split_whitespace())? {
         Chosen::Zs9(choice) => Ok(choice),

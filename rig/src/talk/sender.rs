@@ -164,10 +164,7 @@ impl Sender {
         self.silent_until = slot;
     }
 
-    /// The frame of a slot.
-    ///
-    /// # Errors
-    /// A value that its signal cannot carry.
+    /// The frame of a slot. Fails with a value that its signal cannot carry.
     pub fn step(&mut self, slot: u64, command: &Spoken) -> Result<Option<Frame>, OutOfRange> {
         if slot < self.silent_until {
             return Ok(None);

@@ -45,9 +45,6 @@ const TRACE_STEP_S: f64 = 100e-6;
 
 impl Drive {
     /// Drives a script instead of a case.
-    ///
-    /// # Errors
-    /// A drive that breaks the bench's rules.
     pub fn ride(&self, ride: Ride, flaws: Flaws) -> Result<Ridden> {
         let Ride { speed, torque, enable, line, injection, duration_s } = ride;
         let operator = move |t_s: f64| {

@@ -1,7 +1,6 @@
 //! A gate driver fails under torque: the fault, what is refused meanwhile, the acknowledge, and the machine caught again.
 
-use super::line;
-use super::line::within;
+use super::line::{self, within};
 use super::prelude::*;
 use crate::bench::LinePlan;
 use crate::steps::held;
@@ -78,8 +77,8 @@ impl Scenario<Traction> for Acknowledge {
         let error = (torque_nm / (0.5 * machine.folder.parameters.max_torque_nm) - 1.0).abs();
         let mut verdicts = line::verdicts(recording, &REFUSALS);
         verdicts.extend([
-            Verdict::ours("states that are not the expected ones", f64::from(u8::from(found != STATES)), 0.0),
-            Verdict::ours("fault with another name", f64::from(u8::from(!named)), 0.0),
+            Verdict::never("states that are not the expected ones", found != STATES),
+            Verdict::never("fault with another name", !named),
             Verdict::ours("current between fault and enable (of the largest)", current, 0.02),
             Verdict::ours("mean torque off the demand at the end (share)", error, 0.01),
         ]);

@@ -3,10 +3,7 @@
 use super::prelude::*;
 use super::{LEAD_S, scaled_nm};
 use crate::analysis::SteadyPoint;
-use crate::bound;
-use crate::mtpa_methods;
-use crate::options::RunOptions;
-use crate::{figures, spectrum};
+use crate::{bound, figures, mtpa_methods, spectrum};
 
 /// The points one after another in one run: ramp, settle, measure.
 #[derive(Clone, Copy, Debug, Args, Serialize)]

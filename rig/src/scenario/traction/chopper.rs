@@ -1,8 +1,7 @@
 //! Full braking into a link that cannot take the energy: the chopper takes it; half the resistor is lost, then all of it, and the torque
 //! is folded back; then the source takes energy back and all of the torque returns.
 
-use super::line;
-use super::line::within;
+use super::line::{self, within};
 use super::prelude::*;
 use crate::bench::LinePlan;
 use tractive::machine::Ratings;
@@ -119,7 +118,7 @@ impl Scenario<Traction> for Chopper {
         let most_kw = machine.folder.parameters.max_power_w / 1e3;
         let mut verdicts = line::verdicts(recording, &[]);
         verdicts.extend([
-            Verdict::ours("drive tripped", f64::from(u8::from(recording.trip().is_some())), 0.0),
+            Verdict::never("drive tripped", recording.trip().is_some()),
             Verdict::ours("link's rise, of the way to its trip: chopper", rise(whole), 0.3),
             Verdict::ours("link's rise, of the way to its trip: half of it", rise(half), 0.7),
             Verdict::ours("link's rise, of the way to its trip: none", rise(none), 0.9),

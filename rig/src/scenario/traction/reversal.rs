@@ -42,22 +42,14 @@ impl Scenario<Traction> for Reversal {
         });
         let (steps, holds): (Vec<_>, Vec<_>) = (steps.collect(), holds.collect());
         let mut figures = analysis::common(recording);
-        figures.set(
-            "verdicts",
-            vec![
-                Verdict::ours(
-                    "peak current over the larger steady peak",
-                    worst(steps.iter().map(|step| step.peak_ratio)),
-                    1.15,
-                ),
-                Verdict::at_most(
-                    "mean torque error at full power in %",
-                    worst(holds.iter().map(|hold| hold.torque_error_percent.abs())),
-                    torque_bound(options, 0.5, 1.5),
-                    "0.5; 14 to 33 with an id trim",
-                ),
-            ],
-        );
+        let ratio = worst(steps.iter().map(|step| step.peak_ratio));
+        let error = worst(holds.iter().map(|hold| hold.torque_error_percent.abs()));
+        let (most, others) = (torque_bound(options, 0.5, 1.5), "0.5; 14 to 33 with an id trim");
+        let verdicts = [
+            Verdict::ours("peak current over the larger steady peak", ratio, 1.15),
+            Verdict::at_most("mean torque error at full power in %", error, most, others),
+        ];
+        figures.set("verdicts", verdicts);
         figures.set("transitions", steps);
         figures.set("points", holds);
         figures

@@ -1,15 +1,11 @@
 //! One operating point in steady state: distortion and torque ripple beside what the pulses allow.
 
-use super::TractionOptions;
 use super::prelude::*;
-use super::scaled_rpm;
 use super::script::Script;
-use crate::bound;
-use crate::distortion;
-use crate::distortion::Distortion;
-use crate::options::{On, RunOptions};
-use crate::scenario;
-use crate::spectrum;
+use super::{TractionOptions, scaled_rpm};
+use crate::distortion::{self, Distortion};
+use crate::options::On;
+use crate::{bound, scenario, spectrum};
 
 /// `--speed` and `--torque`.
 #[derive(Clone, Copy, Debug, Args, Serialize)]

@@ -2,9 +2,8 @@
 
 use super::prelude::*;
 use super::{LEAD_S, switches};
-use crate::options::{On, RunOptions};
-use crate::scenario;
-use crate::spectrum;
+use crate::options::On;
+use crate::{scenario, spectrum};
 
 /// 0 → rated speed with 250 r/min a second (2,000 r/min in 8 s) and 1 s hold, at the torque envelope.
 #[derive(Clone, Copy, Debug, Args, Serialize)]

@@ -57,31 +57,13 @@ impl Scenario<Zs9> for LoadStep {
 
     fn plots(&self, recording: &Recording, page: &mut Page) {
         let rows = figures::window(recording, STEP_S - 0.1, STEP_S + 0.2);
-        plot(
-            page,
-            ("figure 14", "link voltage", "V"),
-            rows,
-            &[("U_in", |row| row.link_v), ("U_c", |row| row.capacitor_v)],
-        );
-        plot(page, ("figure 15", "inductor current", "A"), rows, &[("i_L", |row| row.inductor_a)]);
-        let torques: &[Curve] = &[
-            ("motor 1", |row| row.motors[0].torque_nm),
-            ("motor 2", |row| row.motors[1].torque_nm),
-            ("load 2", |row| row.motors[1].load_nm),
-        ];
-        plot(page, ("figure 16", "torque", "N·m"), rows, torques);
-        plot(
-            page,
-            ("figure 17", "speed of motor 2", "r/min"),
-            rows,
-            &[("motor 2", |row| row.motors[1].speed_rpm)],
-        );
-        plot(
-            page,
-            ("figure 18", "speed of motor 1", "r/min"),
-            rows,
-            &[("motor 1", |row| row.motors[0].speed_rpm)],
-        );
+        plot(page, ("figure 14", "link voltage", "V"), rows, &VOLTAGES);
+        plot(page, ("figure 15", "inductor current", "A"), rows, &INDUCTOR);
+        let [one, two] = TORQUES;
+        let torques = [one, two, ("load 2", |row| row.motors[1].load_nm)];
+        plot(page, ("figure 16", "torque", "N·m"), rows, &torques);
+        plot(page, ("figure 17", "speed of motor 2", "r/min"), rows, &SPEEDS[1..]);
+        plot(page, ("figure 18", "speed of motor 1", "r/min"), rows, &SPEEDS[..1]);
         figures::phases(page, "figure 19", figures::window(recording, STEP_S - 0.03, STEP_S + 0.05));
     }
 }

@@ -53,6 +53,6 @@ impl Scenario<Zs9> for Steady {
         patterns::draw(page);
         figures::phases(page, "table 1", figures::window(recording, 0.0, 0.05));
         let rows = figures::window(recording, 0.0, 0.001);
-        figures::plot(page, ("table 1", "inductor current", "A"), rows, &[("i_L", |row| row.inductor_a)]);
+        plot(page, ("table 1", "inductor current", "A"), rows, &INDUCTOR);
     }
 }
