@@ -51,28 +51,25 @@ impl FromStr for Ripple {
     }
 }
 
+/// A number that is good; the error says what is allowed.
+pub fn number(text: &str, allowed: &str, good: impl Fn(f64) -> bool) -> Result<f64, String> {
+    let value = text.parse::<f64>().ok().filter(|value| value.is_finite() && good(*value));
+    value.ok_or_else(|| format!("must be {allowed}"))
+}
+
 /// A finite number that is not negative.
 pub fn not_negative(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(value) if value.is_finite() && value >= 0.0 => Ok(value),
-        _ => Err("must be a number of at least 0".to_owned()),
-    }
+    number(text, "a number of at least 0", |value| value >= 0.0)
 }
 
 /// A finite number above zero.
 pub fn positive(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(value) if value.is_finite() && value > 0.0 => Ok(value),
-        _ => Err("must be a number above 0".to_owned()),
-    }
+    number(text, "a number above 0", |value| value > 0.0)
 }
 
 /// Any finite number.
 pub fn finite(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(value) if value.is_finite() => Ok(value),
-        _ => Err("must be a finite number".to_owned()),
-    }
+    number(text, "a finite number", |_| true)
 }
 
 /// Options of every run.

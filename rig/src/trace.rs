@@ -156,7 +156,7 @@ impl Recording {
 impl Row {
     fn columns(&self) -> Columns<16> {
         Columns([
-            ("t_s", Cell::Time(self.t_s)),
+            ("t_s", Cell::time(self.t_s)),
             ("speed_rpm", self.speed_rpm.into()),
             ("te_ref_nm", self.te_ref_nm.into()),
             ("te_nm", self.te_nm.into()),
@@ -181,7 +181,7 @@ impl SlotRow {
         let Self { t_s, status } = self;
         let switches = status.switches;
         Columns([
-            ("t_s", Cell::Time(*t_s)),
+            ("t_s", Cell::time(*t_s)),
             ("state", status.state.name().into()),
             ("fault", name_of(status.trip).into()),
             ("refusal", status.refusal.map_or("", |refusal| refusal.name()).into()),
@@ -198,7 +198,7 @@ impl SlotRow {
 fn recorder_columns((t_s, record): &(f64, Record)) -> Columns<13> {
     let state = record.state;
     Columns([
-        ("t_s", Cell::Time(*t_s)),
+        ("t_s", Cell::time(*t_s)),
         ("ia_a", record.currents_a.a.into()),
         ("ib_a", record.currents_a.b.into()),
         ("ic_a", record.currents_a.c.into()),
@@ -254,7 +254,7 @@ impl Recorded for Recording {
     fn write_events(&self, folder: &Path) -> Result<()> {
         let edges = self.edges.iter().filter(|edge| edge.tick >= self.lead);
         let edge =
-            |edge: &Edge| (Cell::Time(self.seconds(edge.tick)), GATES[usize::from(edge.gate)], edge.on);
+            |edge: &Edge| (Cell::time(self.seconds(edge.tick)), GATES[usize::from(edge.gate)], edge.on);
         write_edges(&folder.join("edges.csv"), edges.map(edge))?;
         if self.slots.is_empty() {
             return Ok(());

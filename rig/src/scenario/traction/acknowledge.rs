@@ -89,11 +89,8 @@ impl Scenario<Traction> for Acknowledge {
 
     fn plots(&self, recording: &Recording, page: &mut Page) {
         line::plots(page, recording);
-        page.phase_current_in(
-            "the gate driver fails: phase current u",
-            recording,
-            (FAILS_S.0 - 0.02, FAILS_S.0 + 0.05),
-        );
+        let fails = (FAILS_S.0 - 0.02, FAILS_S.0 + 0.05);
+        page.phase_current_in("the gate driver fails: phase current u", recording, fails);
         page.phase_current_in("the machine is caught: phase current u", recording, (2.28, 2.6));
     }
 }

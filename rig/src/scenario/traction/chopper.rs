@@ -116,24 +116,18 @@ impl Scenario<Traction> for Chopper {
         let rise = |stretch: &Stretch| (stretch.link_peak_v - highest_v) / (trip_v - highest_v);
         let largest_a = f64::from(ratings.max_current_a);
         let most_kw = machine.folder.parameters.max_power_w / 1e3;
+        let folded = 1.0 - whole.torque_nm / source.torque_nm;
+        let peak = worst(stretches.iter().map(|stretch| stretch.current_peak_a / largest_a));
         let mut verdicts = line::verdicts(recording, &[]);
         verdicts.extend([
             Verdict::never("drive tripped", recording.trip().is_some()),
             Verdict::ours("link's rise, of the way to its trip: chopper", rise(whole), 0.3),
             Verdict::ours("link's rise, of the way to its trip: half of it", rise(half), 0.7),
             Verdict::ours("link's rise, of the way to its trip: none", rise(none), 0.9),
-            Verdict::ours(
-                "torque folded back while the chopper takes it (share)",
-                1.0 - whole.torque_nm / source.torque_nm,
-                0.02,
-            ),
+            Verdict::ours("torque folded back while the chopper takes it (share)", folded, 0.02),
             Verdict::ours("braking power with half of the resistor (of all)", half.braking_kw / most_kw, 0.7),
             Verdict::ours("braking power without it (of all)", none.braking_kw / most_kw, 0.1),
-            Verdict::ours(
-                "peak current over the largest one",
-                worst(stretches.iter().map(|stretch| stretch.current_peak_a / largest_a)),
-                1.15,
-            ),
+            Verdict::ours("peak current over the largest one", peak, 1.15),
         ]);
         line::figures(&mut figures, recording);
         figures.set("stretches", stretches);
@@ -143,19 +137,10 @@ impl Scenario<Traction> for Chopper {
 
     fn plots(&self, recording: &Recording, page: &mut Page) {
         line::plots(page, recording);
-        page.plot_window(
-            "the braking resistor is lost: DC link",
-            "V",
-            recording,
-            (NONE_S - 0.02, NONE_S + 0.1),
-            &[("udc", |row| row.udc_v)],
-        );
-        page.plot_window(
-            "the braking resistor is lost: torque",
-            "N·m",
-            recording,
-            (NONE_S - 0.02, NONE_S + 0.1),
-            &[("after limits", |row| row.te_ref_nm), ("torque", |row| row.te_nm)],
-        );
+        let window = (NONE_S - 0.02, NONE_S + 0.1);
+        let link: [Curve; 1] = [("udc", |row| row.udc_v)];
+        page.plot_window("the braking resistor is lost: DC link", "V", recording, window, &link);
+        let torque: [Curve; 2] = [("after limits", |row| row.te_ref_nm), ("torque", |row| row.te_nm)];
+        page.plot_window("the braking resistor is lost: torque", "N·m", recording, window, &torque);
     }
 }

@@ -1,39 +1,25 @@
 //! The PMaSynRM drive's scenarios.
 
-mod acknowledge;
-mod borders_timing;
-mod characteristic;
-mod chopper;
-mod full_step;
+pub(super) mod acknowledge;
+pub(super) mod borders_timing;
+pub(super) mod characteristic;
+pub(super) mod chopper;
+pub(super) mod full_step;
 mod line;
-mod link_steps;
-mod load_steps;
-mod mode_borders;
-mod precharge;
+pub(super) mod link_steps;
+pub(super) mod load_steps;
+pub(super) mod mode_borders;
+pub(super) mod precharge;
 mod prelude;
-mod restart;
-mod reversal;
+pub(super) mod restart;
+pub(super) mod reversal;
 mod script;
-mod steady;
-mod sweep;
+pub(super) mod steady;
+pub(super) mod sweep;
 pub mod switches;
-mod timing;
+pub(super) mod timing;
 
-pub use acknowledge::Acknowledge;
-pub use borders_timing::BordersTiming;
-pub use characteristic::Characteristic;
-pub use chopper::Chopper;
-pub use full_step::FullStep;
 pub use line::scaled as scaled_link;
-pub use link_steps::LinkSteps;
-pub use load_steps::LoadSteps;
-pub use mode_borders::ModeBorders;
-pub use precharge::Precharge;
-pub use restart::Restart;
-pub use reversal::Reversal;
-pub use steady::Steady;
-pub use sweep::Sweep;
-pub use timing::Timing;
 
 use super::System;
 use crate::analysis::{self, Figures};

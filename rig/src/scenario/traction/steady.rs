@@ -78,13 +78,8 @@ impl Scenario<Traction> for Steady {
         let window = (SETTLE_S, SETTLE_S + 0.04);
         page.line_voltage("line voltage u-v", recording, window);
         page.phase_current_in("phase current u", recording, window);
-        page.plot_window(
-            "torque",
-            "N·m",
-            recording,
-            window,
-            &[("torque", |row| row.te_nm), ("demand", |row| row.te_ref_nm)],
-        );
+        let torque: [Curve; 2] = [("torque", |row| row.te_nm), ("demand", |row| row.te_ref_nm)];
+        page.plot_window("torque", "N·m", recording, window, &torque);
     }
 }
 

@@ -1,7 +1,7 @@
 //! The whole traction cycle under torque control: the paper's figures 24 to 36.
 
 use super::prelude::*;
-use crate::options::positive;
+use crate::options::number;
 use crate::plant::zs9::ZNetwork;
 
 /// 10 to 1,300 r/min at full torque, a cruise there, and back.
@@ -148,8 +148,5 @@ fn residual_percent(rows: &[Row]) -> f64 {
 }
 
 fn cruise(text: &str) -> Result<f64, String> {
-    match positive(text) {
-        Ok(seconds) if seconds <= 3600.0 => Ok(seconds),
-        _ => Err("must be a number above 0, at most 3600".to_owned()),
-    }
+    number(text, "a number above 0, at most 3600", |seconds| seconds > 0.0 && seconds <= 3600.0)
 }

@@ -1,7 +1,7 @@
 //! Motor 2's load steps while motor 1 goes on: the paper's figures 14 to 19.
 
 use super::prelude::*;
-use crate::options::finite;
+use crate::options::number;
 
 /// Both at 1,000 r/min with 60 N·m; motor 2's load steps at 0.6 s.
 #[derive(Clone, Copy, Debug, Args, Serialize)]
@@ -69,8 +69,5 @@ impl Scenario<Zs9> for LoadStep {
 }
 
 fn load_step(text: &str) -> Result<f64, String> {
-    match finite(text) {
-        Ok(step) if step.abs() <= 500.0 => Ok(step),
-        _ => Err("must be a number from -500 to 500".to_owned()),
-    }
+    number(text, "a number from -500 to 500", |step| step.abs() <= 500.0)
 }
