@@ -1,16 +1,14 @@
 //! `cargo xtask image`: what the image holds.
 
-use std::collections::BTreeSet;
-use std::path::Path;
-
-use anyhow::{Context, Result};
-use serde_json::json;
-
 use crate::board::Board;
 use crate::cli::ImageArgs;
 use crate::elf::{Image, Sizes};
 use crate::setup::Setup;
 use crate::{build, check};
+use anyhow::{Context, Result};
+use serde_json::json;
+use std::collections::BTreeSet;
+use std::path::Path;
 
 /// The command.
 pub fn run(args: &ImageArgs) -> Result<u8> {

@@ -10,12 +10,6 @@
 mod hunt;
 mod reach;
 
-use std::collections::HashSet;
-use std::path::Path;
-
-use anyhow::{Context, Result};
-use rayon::prelude::*;
-
 use crate::build::System;
 use crate::elf::Image;
 use crate::fault_injector::{FaultInjector, Found};
@@ -23,8 +17,12 @@ use crate::image;
 use crate::setup::Setup;
 use crate::timing::drive::Bench;
 use crate::timing::statistics::INTERRUPTS;
+use anyhow::{Context, Result};
 use hunt::Hunt;
+use rayon::prelude::*;
 use reach::{Reached, Stand};
+use std::collections::HashSet;
+use std::path::Path;
 
 /// The course that one system is driven through.
 struct Course {

@@ -1,11 +1,10 @@
 //! Running other programs.
 
+use anyhow::{Context, Result};
+use indicatif::{ProgressBar, ProgressStyle};
 use std::ffi::OsStr;
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
-
-use anyhow::{Context, Result};
-use indicatif::{ProgressBar, ProgressStyle};
 
 /// Runs it with this process's own input and output; whether it succeeded.
 pub fn succeeds(command: &mut Command) -> Result<bool> {

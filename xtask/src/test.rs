@@ -1,18 +1,16 @@
 //! `cargo xtask test`: every check in order, then a table and a count.
 
-use std::process::Command;
-use std::time::{Duration, Instant};
-
-use anyhow::Result;
-use clap::ValueEnum;
-
 use crate::board::Board;
-use crate::build::{self, System, TARGET, cargo};
+use crate::build::{self, System, TARGET, cargo, cargo_with};
 use crate::cli::{TestArgs, TimingArgs};
 use crate::image;
 use crate::process::{find, processor_s, succeeds};
 use crate::setup::Setup;
 use crate::step::Step;
+use anyhow::Result;
+use clap::ValueEnum;
+use std::process::Command;
+use std::time::{Duration, Instant};
 
 /// The packages by the commands that test them. Cargo unites the features of what it is asked for at once: with all of them in one
 /// command the rig and this program would be compiled anew, since `cargo rig` and `cargo xtask` ask for one package. The boards go with the
@@ -78,7 +76,7 @@ pub fn run(args: &TestArgs) -> Result<u8> {
 fn perform(step: Step, setup: &mut Setup) -> Result<Outcome> {
     let good = match step {
         Step::Fmt if !setup.component("fmt", "rustfmt") => return Ok(no_component("rustfmt")),
-        Step::Fmt => succeeds(cargo().args(["fmt", "--all", "--", "--check"]))?,
+        Step::Fmt => succeeds(&mut cargo_with("fmt --all -- --check"))?,
         Step::ClippyHost if !setup.component("clippy", "clippy") => return Ok(no_component("clippy")),
         // As released, like all that is built for this machine: macros and build scripts are then compiled once.
         Step::ClippyHost => lint(&mut cargo(), &["--release", "--workspace", "--all-targets"])?,
@@ -95,9 +93,8 @@ fn perform(step: Step, setup: &mut Setup) -> Result<Outcome> {
             good
         }
         Step::Doc => {
-            let mut command = cargo();
-            command.env("RUSTDOCFLAGS", "-D warnings");
-            succeeds(command.args(["doc", "--release", "--no-deps", "--workspace"]))?
+            let mut command = cargo_with("doc --release --no-deps --workspace");
+            succeeds(command.env("RUSTDOCFLAGS", "-D warnings"))?
         }
         Step::Host => {
             let mut good = true;
@@ -108,16 +105,15 @@ fn perform(step: Step, setup: &mut Setup) -> Result<Outcome> {
             good
         }
         Step::Loom => {
-            let mut command = cargo();
-            command.env("RUSTFLAGS", "--cfg loom").args(["test", "--profile", "loom"]);
-            succeeds(command.args(["--package", "tractive-cells", "--test", "interleavings"]))?
+            let mut command = cargo_with("test --profile loom --package tractive-cells --test interleavings");
+            succeeds(command.env("RUSTFLAGS", "--cfg loom"))?
         }
         Step::Miri => {
             let Some(mut command) = setup.miri() else {
                 return Ok(Outcome::Skipped("cargo miri is not installed and cannot be added".to_owned()));
             };
-            command.args(["miri", "test", "--package", "tractive-cells", "--test", "threads"]);
-            succeeds(command.args(["--target-dir", "target/miri"]))?
+            let words = "miri test --package tractive-cells --test threads --target-dir target/miri";
+            succeeds(command.args(words.split(' ')))?
         }
         Step::Cells => crate::cells::check(setup)?,
         Step::Landings => crate::landings::check(setup)?,
@@ -153,27 +149,13 @@ fn perform(step: Step, setup: &mut Setup) -> Result<Outcome> {
         Step::Book if find("mdbook").is_none() => {
             return Ok(Outcome::Skipped("mdbook is not installed (cargo install mdbook)".to_owned()));
         }
-        Step::Book => {
-            let docs = build::root().join("docs");
-            succeeds(Command::new("mdbook").arg("build").arg(docs))?
-        }
+        Step::Book => succeeds(Command::new("mdbook").arg("build").arg(build::root().join("docs")))?,
         Step::Qemu => {
-            let qemu = setup.qemu()?;
-            let toolchain = setup.toolchain()?;
-            let mut command = cargo();
+            let (qemu, toolchain) = (setup.qemu()?, setup.toolchain()?);
+            let mut command = cargo_with("test --release --package tractive-rig --test qemu -- --ignored");
             command.env("TRACTIVE_QEMU", qemu);
             command.env("TRACTIVE_IMAGE", build::image(&toolchain, System::Traction, None)?);
             command.env("TRACTIVE_ZS9_IMAGE", build::image(&toolchain, System::Zs9, None)?);
-            command.args([
-                "test",
-                "--release",
-                "--package",
-                "tractive-rig",
-                "--test",
-                "qemu",
-                "--",
-                "--ignored",
-            ]);
             succeeds(&mut command)?
         }
         Step::Timing => crate::timing::run(&TimingArgs::default())? == 0,

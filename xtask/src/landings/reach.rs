@@ -1,10 +1,9 @@
 //! The instructions of a control interrupt at which a carrier boundary can come, and those that were hit.
 
-use std::collections::{BTreeMap, HashSet};
-
 use super::{Call, INSTRUCTIONS_PER_TICK};
 use crate::elf::Image;
 use crate::fault_injector::Seen;
+use std::collections::{BTreeMap, HashSet};
 
 /// A control interrupt samples at once. One that has not begun a sixteenth of its period after its timer counts as lost, so no delay puts
 /// a boundary before the samples that comes later than this part of the period, a little less.

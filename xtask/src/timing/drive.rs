@@ -1,19 +1,17 @@
 //! Drives the image in the emulator and follows its log while it runs.
 
+use super::log::{ARGUMENTS, Log};
+use super::meter::{Call, Meter, Path as Executed};
+use super::tally::Tally;
+use crate::elf::Image;
+use crate::process;
+use anyhow::{Context, Result, bail};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{File, OpenOptions};
 use std::io::{BufRead, BufReader, Read, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::Duration;
-
-use anyhow::{Context, Result, bail};
-
-use super::log::{ARGUMENTS, Log};
-use super::meter::{Call, Meter, Path as Executed};
-use super::tally::Tally;
-use crate::elf::Image;
-use crate::process;
 
 /// Modules whose functions are the link to the rig.
 const LINK: [&str; 2] = ["tractive::board::qemu::exchange::", "tractive::wire::"];

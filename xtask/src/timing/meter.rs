@@ -1,14 +1,12 @@
 //! From the emulator's log to the interrupts: which instruction belongs to which handler.
 
-use std::collections::{BTreeMap, BTreeSet};
-
-use anyhow::{Result, bail};
-
 use super::log::Event;
 use super::tally::Tally;
 use crate::elf::Image;
 use crate::thumb::cost::{ENTRY_AND_RETURN, EXCEPTION_FRAME, REFILL};
 use crate::thumb::{Flow, Instruction};
+use anyhow::{Result, bail};
+use std::collections::{BTreeMap, BTreeSet};
 
 /// One interrupt, from the first instruction of its handler to its return.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

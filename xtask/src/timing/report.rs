@@ -1,12 +1,11 @@
 //! The report of all that was measured and judged, and the same as JSON.
 
-use serde_json::{Map, Value, json};
-
 use super::blocks::Block;
 use super::budget::Judged;
 use super::drive::Direction;
 use super::statistics::{Entry, Load, Row};
 use super::system::Measured;
+use serde_json::{Map, Value, json};
 
 const INTERRUPTS: [&str; 2] = ["control", "pwm"];
 

@@ -1,11 +1,9 @@
 //! The statistics of all drives together about each interrupt in each mode.
 
-use std::collections::BTreeMap;
-
-use anyhow::{Result, bail};
-
 use super::drive::{Direction, Drive};
 use super::meter::Call;
+use anyhow::{Result, bail};
+use std::collections::BTreeMap;
 
 /// The interrupts by the numbers of their exceptions on the emulated board: sixteen more than the interrupt's.
 pub const INTERRUPTS: [(&str, u32); 2] = [("control", 16 + 8), ("pwm", 16 + 10)];

@@ -1,12 +1,5 @@
 //! The systems, and what they are driven through.
 
-use std::collections::{BTreeMap, BTreeSet};
-use std::path::{Path, PathBuf};
-
-use anyhow::{Context, Result, bail};
-use indicatif::ParallelProgressIterator;
-use rayon::prelude::*;
-
 use super::drive::{Bench, Drive, Served, is_link};
 use super::entry;
 use super::parts::{self, Part};
@@ -16,6 +9,11 @@ use super::tally::Tally;
 use crate::elf::Image;
 use crate::setup::Toolchain;
 use crate::{build, image, process};
+use anyhow::{Context, Result, bail};
+use indicatif::ParallelProgressIterator;
+use rayon::prelude::*;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
 
 /// Both directions of torque and of rotation through every mode, up to the highest stator frequency, with dead time that is to be
 /// compensated.
