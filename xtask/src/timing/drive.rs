@@ -120,12 +120,10 @@ impl Bench {
         let link: BTreeSet<u32> =
             link.filter(|(_, function)| is_link(&function.names)).map(|(start, _)| *start).collect();
         if link.is_empty() {
-            bail!(
-                "the image has no function of {}, which would be left out of the counts",
-                LINK.join(" or ")
-            );
+            let link = LINK.join(" or ");
+            bail!("the image has no function of {link}, which would be left out of the counts");
         }
-        let mut meter = Meter::new(&self.image, &link);
+        let mut meter = Meter::new(&self.image, link);
         meter.keeps_paths = self.keeps_paths;
         let mut lines = BufReader::with_capacity(1 << 20, Unhurried(log));
         let (mut log, mut line, mut outcome) = (Log::new(&self.image), Vec::new(), Ok(()));

@@ -5,7 +5,7 @@ use super::budget::Judged;
 use super::drive::Direction;
 use super::statistics::{Entry, Load, Row};
 use super::system::Measured;
-use serde_json::{Map, Value, json};
+use serde_json::{Value, json};
 
 const INTERRUPTS: [&str; 2] = ["control", "pwm"];
 
@@ -46,24 +46,13 @@ fn in_direction(mode: &str, direction: Direction) -> String {
     format!("{mode}, {}", direction.name())
 }
 
-fn fields<const N: usize>(fields: [(&str, Value); N]) -> Map<String, Value> {
-    fields.into_iter().map(|(name, value)| (name.to_owned(), value)).collect()
-}
-
-fn counts(row: &Row) -> Map<String, Value> {
+fn counts(row: &Row) -> Value {
     let Row { instructions, cycles, latency, depth } = row;
-    fields([
-        ("calls", instructions.count.into()),
-        ("min", instructions.min.into()),
-        ("mean", instructions.mean().into()),
-        ("max", instructions.max.into()),
-        ("cycles_mean", cycles.mean().into()),
-        ("cycles_max", cycles.max.into()),
-        ("latency_min", latency.min.into()),
-        ("latency_max", latency.max.into()),
-        ("jitter", (latency.max - latency.min).into()),
-        ("depth", (*depth).into()),
-    ])
+    json!({
+        "calls": instructions.count, "min": instructions.min, "mean": instructions.mean(), "max": instructions.max,
+        "cycles_mean": cycles.mean(), "cycles_max": cycles.max, "latency_min": latency.min,
+        "latency_max": latency.max, "jitter": latency.max - latency.min, "depth": depth,
+    })
 }
 
 impl Measured {
@@ -101,13 +90,15 @@ impl Measured {
     fn json_rows(&self) -> Vec<Value> {
         let row = |(name, mode, row): (&'static str, &str, &Row)| {
             let mut fields = counts(row);
-            let named = [("system", self.system.name), ("name", name), ("mode", mode)];
-            fields.extend(named.map(|(field, value)| (field.to_owned(), value.into())));
-            for direction in Direction::BOTH {
-                let row = self.statistics.row(mode, Some(direction), name);
-                fields.extend(row.map(|row| (direction.name().to_owned(), counts(row).into())));
+            for (field, value) in [("system", self.system.name), ("name", name), ("mode", mode)] {
+                fields[field] = value.into();
             }
-            fields.into()
+            for direction in Direction::BOTH {
+                if let Some(row) = self.statistics.row(mode, Some(direction), name) {
+                    fields[direction.name()] = counts(row);
+                }
+            }
+            fields
         };
         self.rows().map(row).collect()
     }
@@ -125,17 +116,17 @@ impl Measured {
     fn json_load(&self) -> Vec<Value> {
         let percent = |mode: &str, direction| {
             let Load { mean, max } = self.statistics.load(mode, direction)?;
-            Some(fields([("mean_percent", mean.into()), ("max_percent", max.into())]))
+            Some(json!({ "mean_percent": mean, "max_percent": max }))
         };
         let load = |mode: &str| {
             let mut load = percent(mode, None)?;
-            load.extend(fields([("system", self.system.name.into()), ("mode", mode.into())]));
+            (load["system"], load["mode"]) = (self.system.name.into(), mode.into());
             for direction in Direction::BOTH {
-                load.extend(
-                    percent(mode, Some(direction)).map(|of| (direction.name().to_owned(), of.into())),
-                );
+                if let Some(of) = percent(mode, Some(direction)) {
+                    load[direction.name()] = of;
+                }
             }
-            Some(load.into())
+            Some(load)
         };
         self.modes().into_iter().filter_map(load).collect()
     }

@@ -28,6 +28,10 @@ impl Default for Spread {
 }
 
 impl Spread {
+    fn of(value: u32) -> Self {
+        Self { min: value, max: value, sum: value.into(), count: 1 }
+    }
+
     fn add(&mut self, value: u32) {
         (self.min, self.max) = (self.min.min(value), self.max.max(value));
         self.sum += u64::from(value);
@@ -121,9 +125,9 @@ impl Statistics {
     }
 
     /// The modes that were seen: first those of a list in its order, then the others as they came, without pulses last.
-    pub fn modes(&self, first: &[&str]) -> Vec<&str> {
+    pub fn modes(&self, first: &str) -> Vec<&str> {
         let mut modes: Vec<_> = self.seen.iter().map(String::as_str).collect();
-        let place = |mode: &str| first.iter().position(|known| *known == mode).unwrap_or(first.len());
+        let place = |mode: &str| first.split(' ').position(|known| known == mode).unwrap_or(usize::MAX);
         modes.sort_by_key(|mode| (*mode == "off", place(mode)));
         modes
     }
@@ -139,11 +143,7 @@ impl Statistics {
         let known = self.entries.iter_mut().find(|entry| entry.interrupt == interrupt && entry.from == from);
         match known {
             Some(entry) => entry.latency.add(call.latency),
-            None => {
-                let mut latency = Spread::default();
-                latency.add(call.latency);
-                self.entries.push(Entry { interrupt, from, latency });
-            }
+            None => self.entries.push(Entry { interrupt, from, latency: Spread::of(call.latency) }),
         }
     }
 

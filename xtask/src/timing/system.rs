@@ -56,30 +56,18 @@ pub struct System {
     pub build: build::System,
     scenario: &'static str,
     /// The modes that its tables begin with; the others follow as the drives came to them.
-    pub first_modes: &'static [&'static str],
+    pub first_modes: &'static str,
 }
 
 impl System {
     pub const ALL: [Self; 2] = [
-        Self { name: "pmasynrm", build: build::System::Traction, scenario: "timing", first_modes: &[] },
+        Self { name: "pmasynrm", build: build::System::Traction, scenario: "timing", first_modes: "" },
         Self {
             name: "zs9",
             build: build::System::Zs9,
             scenario: "zs9-timing",
-            first_modes: &[
-                "s-motoring",
-                "s-weakening",
-                "s-braking",
-                "rs-motoring",
-                "rs-weakening",
-                "rs-braking",
-                "rthd-motoring",
-                "rthd-weakening",
-                "rthd-braking",
-                "zvo-motoring",
-                "zvo-weakening",
-                "zvo-braking",
-            ],
+            first_modes: "s-motoring s-weakening s-braking rs-motoring rs-weakening rs-braking rthd-motoring \
+                rthd-weakening rthd-braking zvo-motoring zvo-weakening zvo-braking",
         },
     ];
 
@@ -244,10 +232,8 @@ impl Measured {
         for (name, exception) in INTERRUPTS {
             let longest = sum.longest.get(&exception).map_or(&[][..], Vec::as_slice);
             let calls = sum.calls.get(&exception).copied().unwrap_or(0);
-            parts.push((
-                name,
-                parts::parts(&profile, (name, exception), &sum.hits, calls, longest, &mut sources)?,
-            ));
+            let of = (name, exception);
+            parts.push((name, parts::parts(&profile, of, &sum.hits, calls, longest, &mut sources)?));
         }
         let masking = entry::masking(&image, is_link);
         let [(_, control), _] = INTERRUPTS;
