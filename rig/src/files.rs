@@ -59,6 +59,14 @@ cells! {
     bool: flag => Self::Count(flag.into());
 }
 
+/// Columns by their names with what is in them.
+#[macro_export]
+macro_rules! columns {
+    ($($name:ident: $value:expr),* $(,)?) => {
+        $crate::files::Columns([$((stringify!($name), $crate::files::Cell::from($value))),*])
+    };
+}
+
 /// A row of a CSV: its columns with their values.
 pub struct Columns<const N: usize>(pub [(&'static str, Cell); N]);
 

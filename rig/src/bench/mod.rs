@@ -160,11 +160,6 @@ impl Bench {
         Ok(())
     }
 
-    /// Time since the recording's beginning, in s.
-    pub fn time_s(&self) -> f64 {
-        self.time.now_s()
-    }
-
     /// The trace so far.
     pub fn rows(&self) -> &[Row] {
         self.rows.as_slice()

@@ -11,7 +11,7 @@ pub use ride::{Ridden, Ride, Script};
 use super::Outcome;
 use super::action::{LEAD_S, Stages};
 use super::outcome::{Seen, Setting};
-use crate::bench::{Flaws, Limits};
+use crate::bench::{Flaws, Limits, Simulated};
 use crate::inject::Injection;
 use crate::inject::zs9::Kind;
 use crate::machine::Machine;

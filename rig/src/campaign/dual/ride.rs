@@ -1,7 +1,7 @@
 //! Drives that are written down as what happens when, instead of cases.
 
 use super::Drive;
-use crate::bench::{Flaws, Observed, Tick};
+use crate::bench::{Flaws, Observed, Simulated, Tick};
 use crate::campaign::action::LEAD_S;
 use crate::plant::{PlantSettings, SpeedSource, profile_speed};
 use crate::run::Interrupts;

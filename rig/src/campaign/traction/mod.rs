@@ -11,7 +11,7 @@ pub use ride::{Ridden, Ride};
 use super::Outcome;
 use super::action::{FAULT_S, LEAD_S, Stages};
 use super::outcome::{Seen, Setting};
-use crate::bench::{self, Bench, Flaws, Limits, Supply};
+use crate::bench::{self, Bench, Flaws, Limits, Simulated, Supply};
 use crate::inject::Injection;
 use crate::inject::traction::Kind;
 use crate::machine::Machine;

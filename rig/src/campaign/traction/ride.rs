@@ -1,7 +1,7 @@
 //! Drives that are written down as what happens when, instead of cases.
 
 use super::{Drive, STAGES};
-use crate::bench::{self, Bench, Flaws, Observed};
+use crate::bench::{self, Bench, Flaws, Observed, Simulated};
 use crate::campaign::action::LEAD_S;
 use crate::inject::Injection;
 use crate::inject::traction::Kind;

@@ -10,7 +10,6 @@ mod record;
 mod run;
 mod sampling;
 mod settings;
-mod sums;
 mod watch;
 
 pub use crate::bench::BenchError;
@@ -23,7 +22,7 @@ use crate::bench::{Conversions, Converter, Due, Observed, Tick, Timeline};
 use crate::inject::zs9::Spoiler;
 use crate::plant::zs9::{NetworkState, Zs9Plant};
 use gates::Gates;
-use sums::Sums;
+use record::Sums;
 use tractive::drive::dual::COMPARE_STEPS;
 use tractive::operator::{DualStatus, Feedback};
 use tractive::ports::{DualReport, DualSample, GateFeedback, PlayedPeriod};
@@ -158,11 +157,6 @@ impl Bench {
     /// The motors' true speeds, in r/min.
     pub fn speeds_rpm(&self) -> [f64; 2] {
         self.plant.motors.each_ref().map(|motor| motor.speed_rpm())
-    }
-
-    /// Time since the recording's beginning, in s.
-    pub fn time_s(&self) -> f64 {
-        self.time.now_s()
     }
 
     /// Length of a compare step, in s.
