@@ -32,13 +32,9 @@ pub struct Stand<'a> {
 /// The reason why no boundary can come at an instruction of a control interrupt.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Why {
-    /// It is the first one behind a boundary, and the next boundary comes after its period.
     BehindBoundary,
-    /// A boundary has come in the same control interrupt already, and the next one comes after its period.
     BehindLanding,
-    /// It comes before the first boundary, by more than its period.
     BeforeFirst,
-    /// It has no samples yet, which it takes at once, and the boundary comes later.
     BeforeSamples,
 }
 

@@ -2,7 +2,7 @@
 
 use super::blocks::Block;
 use super::budget::Judged;
-use super::drive::Direction;
+use super::drive::DIRECTIONS;
 use super::statistics::{Entry, Load, Row};
 use super::system::Measured;
 use serde_json::{Value, json};
@@ -42,10 +42,6 @@ pub fn core_tick(blocks: &[Block]) -> Option<u32> {
     blocks.iter().find(|block| block.name == "core_tick/tractive").map(|block| block.max)
 }
 
-fn in_direction(mode: &str, direction: Direction) -> String {
-    format!("{mode}, {}", direction.name())
-}
-
 fn counts(row: &Row) -> Value {
     let Row { instructions, cycles, latency, depth } = row;
     json!({
@@ -70,18 +66,18 @@ impl Measured {
     /// Mode with direction, and what was counted there; nothing where the rig names no direction.
     pub fn directed(&self, interrupt: &str, mode: &str) -> impl Iterator<Item = (String, &Row)> {
         let row = move |direction| {
-            Some((in_direction(mode, direction), self.statistics.row(mode, Some(direction), interrupt)?))
+            Some((format!("{mode}, {direction}"), self.statistics.row(mode, Some(direction), interrupt)?))
         };
-        Direction::BOTH.into_iter().filter_map(row)
+        DIRECTIONS.into_iter().filter_map(row)
     }
 
     /// Modes, each with its directions behind it, and the load.
     pub fn loads(&self) -> impl Iterator<Item = (String, Load)> {
-        self.modes().into_iter().flat_map(|mode| {
+        self.modes().into_iter().flat_map(move |mode| {
             let whole = self.statistics.load(mode, None).map(|load| (mode.to_owned(), load));
-            let directed = Direction::BOTH.into_iter().filter_map(|direction| {
+            let directed = DIRECTIONS.into_iter().filter_map(move |direction| {
                 let load = self.statistics.load(mode, Some(direction))?;
-                Some((in_direction(mode, direction), load))
+                Some((format!("{mode}, {direction}"), load))
             });
             whole.into_iter().chain(directed)
         })
@@ -93,9 +89,9 @@ impl Measured {
             for (field, value) in [("system", self.system.name), ("name", name), ("mode", mode)] {
                 fields[field] = value.into();
             }
-            for direction in Direction::BOTH {
+            for direction in DIRECTIONS {
                 if let Some(row) = self.statistics.row(mode, Some(direction), name) {
-                    fields[direction.name()] = counts(row);
+                    fields[direction] = counts(row);
                 }
             }
             fields
@@ -121,9 +117,9 @@ impl Measured {
         let load = |mode: &str| {
             let mut load = percent(mode, None)?;
             (load["system"], load["mode"]) = (self.system.name.into(), mode.into());
-            for direction in Direction::BOTH {
+            for direction in DIRECTIONS {
                 if let Some(of) = percent(mode, Some(direction)) {
-                    load[direction.name()] = of;
+                    load[direction] = of;
                 }
             }
             Some(load)

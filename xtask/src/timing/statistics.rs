@@ -1,6 +1,6 @@
 //! The statistics of all drives together about each interrupt in each mode.
 
-use super::drive::{Direction, Drive};
+use super::drive::Drive;
 use super::meter::Call;
 use anyhow::{Result, bail};
 use std::collections::BTreeMap;
@@ -81,7 +81,7 @@ pub struct Load {
 }
 
 /// Mode, direction and interrupt; without a direction: all of the mode's interrupts.
-type Key = (String, Option<Direction>, String);
+type Key = (String, Option<&'static str>, String);
 
 /// By mode, direction and interrupt.
 #[derive(Clone, Debug, Default)]
@@ -156,12 +156,12 @@ impl Statistics {
     }
 
     /// One interrupt in one mode, and in one direction if one is named, if it was seen there.
-    pub fn row(&self, mode: &str, direction: Option<Direction>, interrupt: &str) -> Option<&Row> {
+    pub fn row(&self, mode: &str, direction: Option<&'static str>, interrupt: &str) -> Option<&Row> {
         self.rows.get(&(mode.to_owned(), direction, interrupt.to_owned()))
     }
 
     /// Share of the processor that both interrupts take in a mode, and in one direction if one is named.
-    pub fn load(&self, mode: &str, direction: Option<Direction>) -> Option<Load> {
+    pub fn load(&self, mode: &str, direction: Option<&'static str>) -> Option<Load> {
         let row = |interrupt| self.row(mode, direction, interrupt);
         let (control, pwm) = (row("control")?, row("pwm")?);
         let pwm_hertz = CONTROL_HZ * pwm.cycles.count as f64 / control.cycles.count as f64;
