@@ -95,8 +95,7 @@ pub fn write<S: System>(
     }
     let mut page = Page::new(choice.name, choice.figure);
     S::draw_recorder(recording, &mut page);
-    choice.scenario.plots(recording, &mut page);
-    choice.scenario.plots_beside(recording, &choice.with_step(), machine, &mut page);
+    choice.scenario.plots(recording, &choice.with_step(), machine, &mut page);
     let subtitle = format!("tractive {}, run on {}", env!("CARGO_PKG_VERSION"), choice.options.on.name());
     write_text(&out.join("report.html"), &page.finish(&subtitle, figures)?)
 }

@@ -64,9 +64,7 @@ pub trait Scenario<S: System> {
         S::trace_step_s(own)
     }
     /// The plots to draw.
-    fn plots(&self, recording: &S::Recording, page: &mut Page);
-    /// Plots for which options and machine must be known.
-    fn plots_beside(&self, _: &S::Recording, _: &Options<S::Own>, _: &Machine, _page: &mut Page) {}
+    fn plots(&self, recording: &S::Recording, options: &Options<S::Own>, machine: &Machine, page: &mut Page);
 }
 
 /// A scenario that was chosen, with its options.

@@ -75,7 +75,7 @@ impl Scenario<Traction> for Acknowledge {
         figures
     }
 
-    fn plots(&self, recording: &Recording, page: &mut Page) {
+    fn plots(&self, recording: &Recording, _: &Options, _: &Machine, page: &mut Page) {
         line::plots(page, recording);
         let fails = (FAILS_S.0 - 0.02, FAILS_S.0 + 0.05);
         page.phase_current_in("the gate driver fails: phase current u", recording, fails);

@@ -135,7 +135,7 @@ impl Scenario<Traction> for Chopper {
         figures
     }
 
-    fn plots(&self, recording: &Recording, page: &mut Page) {
+    fn plots(&self, recording: &Recording, _: &Options, _: &Machine, page: &mut Page) {
         line::plots(page, recording);
         let window = (NONE_S - 0.02, NONE_S + 0.1);
         let link: [Curve; 1] = [("udc", |row| row.udc_v)];

@@ -59,7 +59,7 @@ impl Scenario<Traction> for LinkSteps {
         figures
     }
 
-    fn plots(&self, recording: &Recording, page: &mut Page) {
+    fn plots(&self, recording: &Recording, _: &Options, _: &Machine, page: &mut Page) {
         page.overview(recording);
         page.plot("DC link", "V", recording, &[("udc", |row| row.udc_v)]);
     }

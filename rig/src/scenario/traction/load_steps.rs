@@ -46,7 +46,7 @@ impl Scenario<Traction> for LoadSteps {
         figures
     }
 
-    fn plots(&self, recording: &Recording, page: &mut Page) {
+    fn plots(&self, recording: &Recording, _: &Options, _: &Machine, page: &mut Page) {
         page.plot("DC-link voltage", "V", recording, &[("udc", |row| row.udc_v)]);
         page.line_voltage("Line voltage u-v", recording, (0.0, 0.3));
         page.phase_current(recording);

@@ -78,7 +78,7 @@ impl Scenario<Traction> for Precharge {
         figures
     }
 
-    fn plots(&self, recording: &Recording, page: &mut Page) {
+    fn plots(&self, recording: &Recording, _: &Options, _: &Machine, page: &mut Page) {
         line::plots(page, recording);
         page.phase_current_in("coasting and catching: phase current u", recording, (COAST.0, COAST.1 + 0.3));
     }

@@ -53,7 +53,7 @@ impl Scenario<Traction> for Restart {
         figures
     }
 
-    fn plots(&self, recording: &Recording, page: &mut Page) {
+    fn plots(&self, recording: &Recording, _: &Options, _: &Machine, page: &mut Page) {
         page.overview(recording);
         for slot in 0..SPEEDS_RPM.len() {
             let at_s = begins_s(slot) + COAST_S;

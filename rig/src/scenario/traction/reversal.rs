@@ -55,13 +55,7 @@ impl Scenario<Traction> for Reversal {
         figures
     }
 
-    fn plots_beside(&self, recording: &Recording, options: &Options, machine: &Machine, page: &mut Page) {
-        let end_s = BEGIN_S + HOLD_S;
-        let window = (end_s - 0.5 * HOLD_S, end_s);
-        spectrum::draw(page, recording, ("full power", window), options, machine);
-    }
-
-    fn plots(&self, recording: &Recording, page: &mut Page) {
+    fn plots(&self, recording: &Recording, options: &Options, machine: &Machine, page: &mut Page) {
         page.overview(recording);
         page.rotor_currents(recording);
         for k in 0..SHARES.len() {
@@ -69,5 +63,8 @@ impl Scenario<Traction> for Reversal {
             let title = format!("phase current u at {at_s:.1} s");
             page.phase_current_in(&title, recording, (at_s - 0.01, at_s + 0.05));
         }
+        let end_s = BEGIN_S + HOLD_S;
+        let window = (end_s - 0.5 * HOLD_S, end_s);
+        spectrum::draw(page, recording, ("full power", window), options, machine);
     }
 }

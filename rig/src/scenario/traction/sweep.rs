@@ -58,17 +58,7 @@ impl Scenario<Traction> for Sweep {
         figures
     }
 
-    fn plots_beside(&self, recording: &Recording, options: &Options, machine: &Machine, page: &mut Page) {
-        // The hold at the last speed, wherever it is.
-        let fastest = recording.rows.iter().map(|row| row.speed_rpm.abs()).fold(0.0, f64::max);
-        let hold = |row: &&Row| fastest > 0.0 && row.speed_rpm.abs() > 0.999_999 * fastest;
-        if let Some(end) = recording.rows.iter().rev().find(hold) {
-            let (title, window) = (format!("{fastest:.0} r/min"), (end.t_s - 0.5 * HOLD_S, end.t_s));
-            spectrum::draw(page, recording, (&title, window), options, machine);
-        }
-    }
-
-    fn plots(&self, recording: &Recording, page: &mut Page) {
+    fn plots(&self, recording: &Recording, options: &Options, machine: &Machine, page: &mut Page) {
         page.overview(recording);
         page.torque(recording);
         page.phase_current(recording);
@@ -77,6 +67,13 @@ impl Scenario<Traction> for Sweep {
         page.plot(title, "", recording, &[("mode", |row| f64::from(row.mode as u8))]);
         page.rotor_currents(recording);
         switches::plots(recording, page);
+        // The hold at the last speed, wherever it is.
+        let fastest = recording.rows.iter().map(|row| row.speed_rpm.abs()).fold(0.0, f64::max);
+        let hold = |row: &&Row| fastest > 0.0 && row.speed_rpm.abs() > 0.999_999 * fastest;
+        if let Some(end) = recording.rows.iter().rev().find(hold) {
+            let (title, window) = (format!("{fastest:.0} r/min"), (end.t_s - 0.5 * HOLD_S, end.t_s));
+            spectrum::draw(page, recording, (&title, window), options, machine);
+        }
     }
 }
 

@@ -117,7 +117,7 @@ impl Scenario<Zs9> for Cycle {
         figures
     }
 
-    fn plots(&self, recording: &Recording, page: &mut Page) {
+    fn plots(&self, recording: &Recording, _: &Options, _: &Machine, page: &mut Page) {
         let rows = figures::window(recording, 0.0, recording.rows.last().map_or(MOVING_S, |row| row.t_s));
         plot(page, ("figures 24 and 30", "link voltage U_in", "V"), rows, &VOLTAGES[..1]);
         plot(page, ("figures 25 and 31", "capacitor voltage", "V"), rows, &VOLTAGES[1..]);

@@ -55,7 +55,7 @@ impl Scenario<Zs9> for LoadStep {
         figures
     }
 
-    fn plots(&self, recording: &Recording, page: &mut Page) {
+    fn plots(&self, recording: &Recording, _: &Options, _: &Machine, page: &mut Page) {
         let rows = figures::window(recording, STEP_S - 0.1, STEP_S + 0.2);
         plot(page, ("figure 14", "link voltage", "V"), rows, &VOLTAGES);
         plot(page, ("figure 15", "inductor current", "A"), rows, &INDUCTOR);

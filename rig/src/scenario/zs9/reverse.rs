@@ -57,7 +57,7 @@ impl Scenario<Zs9> for Reverse {
         figures
     }
 
-    fn plots(&self, recording: &Recording, page: &mut Page) {
+    fn plots(&self, recording: &Recording, _: &Options, _: &Machine, page: &mut Page) {
         let rows = figures::window(recording, 0.0, DURATION_S);
         plot(page, ("figure 20", "torque of motor 1", "N·m"), rows, &TORQUES[..1]);
         plot(page, ("figure 21", "speed of motor 1", "r/min"), rows, &SPEEDS[..1]);
