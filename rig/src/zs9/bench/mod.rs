@@ -10,6 +10,7 @@ mod record;
 mod run;
 mod sampling;
 mod settings;
+mod sums;
 mod watch;
 
 pub use crate::bench::BenchError;
@@ -22,7 +23,7 @@ use crate::bench::{Conversions, Converter, Due, Observed, Tick, Timeline};
 use crate::inject::zs9::Spoiler;
 use crate::plant::zs9::{NetworkState, Zs9Plant};
 use gates::Gates;
-use record::Sums;
+use sums::Sums;
 use tractive::drive::dual::COMPARE_STEPS;
 use tractive::operator::{DualStatus, Feedback};
 use tractive::ports::{DualReport, DualSample, GateFeedback, PlayedPeriod};
