@@ -44,11 +44,7 @@ pub fn check(setup: &mut Setup) -> Result<bool> {
     let said = said(&run(&qemu, &path)?)?;
     let extents = extents(&image::read(&path)?);
     print!("{}", table(&said, &extents));
-    let findings = findings(&said, &extents);
-    for finding in &findings {
-        println!("{finding}");
-    }
-    Ok(findings.is_empty())
+    Ok(process::is_good(&findings(&said, &extents)))
 }
 
 fn run(qemu: &Path, path: &Path) -> Result<String> {

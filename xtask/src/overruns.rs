@@ -185,10 +185,7 @@ pub fn check(setup: &mut Setup) -> Result<bool> {
         print!("{line}");
         findings.extend(wrong);
     }
-    for finding in &findings {
-        println!("{finding}");
-    }
-    Ok(findings.is_empty())
+    Ok(process::is_good(&findings))
 }
 
 #[cfg(test)]

@@ -29,6 +29,12 @@ pub fn say(what: &str) {
     eprintln!("xtask: {what}");
 }
 
+/// Prints what was found; good is nothing.
+pub fn is_good(findings: &[String]) -> bool {
+    findings.iter().for_each(|finding| println!("{finding}"));
+    findings.is_empty()
+}
+
 /// Processor time of this process and of all that it has waited for, in s; 0 where the system does not tell.
 pub fn processor_s() -> f64 {
     let stat = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();

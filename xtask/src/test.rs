@@ -85,25 +85,19 @@ fn perform(step: Step, setup: &mut Setup) -> Result<Outcome> {
             if !setup.toolchain()?.has_clippy {
                 return Ok(Outcome::Skipped(format!("clippy needs rustup's target {TARGET}")));
             }
-            let mut good = true;
-            for (package, what) in on_target()? {
+            all(on_target()?, |(package, what)| {
                 let command = ["--release", "--target", TARGET, "--package", &package];
-                good &= lint(&mut cargo(), &[&command[..], what].concat())?;
-            }
-            good
+                lint(&mut cargo(), &[&command[..], what].concat())
+            })?
         }
         Step::Doc => {
             let mut command = cargo_with("doc --release --no-deps --workspace");
             succeeds(command.env("RUSTDOCFLAGS", "-D warnings"))?
         }
-        Step::Host => {
-            let mut good = true;
-            for packages in together()? {
-                let named = packages.iter().flat_map(|package| ["--package", package.as_str()]);
-                good &= succeeds(cargo().args(["test", "--release"]).args(named))?;
-            }
-            good
-        }
+        Step::Host => all(together()?, |packages| {
+            let named = packages.iter().flat_map(|package| ["--package", package.as_str()]);
+            succeeds(cargo().args(["test", "--release"]).args(named))
+        })?,
         Step::Loom => {
             let mut command = cargo_with("test --profile loom --package tractive-cells --test interleavings");
             succeeds(command.env("RUSTFLAGS", "--cfg loom"))?
@@ -124,24 +118,18 @@ fn perform(step: Step, setup: &mut Setup) -> Result<Outcome> {
             }
             true
         }
-        Step::ImageCheck => {
-            let mut good = true;
-            for system in System::ALL {
-                println!("{}:", system.image());
-                good &= image::check(&build::image(&setup.toolchain()?, system, None)?)?;
-            }
-            good
-        }
+        Step::ImageCheck => all(System::ALL, |system| {
+            println!("{}:", system.image());
+            image::check(&build::image(&setup.toolchain()?, system, None)?)
+        })?,
         Step::NucleoImage => {
-            let mut good = true;
-            for board in Board::all()? {
-                for system in System::ALL {
-                    println!("{}:", system.image_on(&board));
-                    let path = build::board_image(&setup.toolchain()?, &board, system, None)?;
-                    good &= image::check_board(&path, &board)?;
-                }
-            }
-            good
+            let boards = Board::all()?;
+            let images = boards.iter().flat_map(|board| System::ALL.map(|system| (board, system)));
+            all(images, |(board, system)| {
+                println!("{}:", system.image_on(board));
+                let path = build::board_image(&setup.toolchain()?, board, system, None)?;
+                image::check_board(&path, board)
+            })?
         }
         Step::OwnBoard => crate::own_board::check(setup)?,
         Step::Publish => crate::publish::check()?,
@@ -197,6 +185,11 @@ fn together() -> Result<Vec<Vec<String>>> {
 
 fn lint(command: &mut Command, what: &[&str]) -> Result<bool> {
     succeeds(command.arg("clippy").args(what).args(["--", "--deny", "warnings"]))
+}
+
+/// Checks every one, also behind one that is not good.
+fn all<T>(of: impl IntoIterator<Item = T>, mut check: impl FnMut(T) -> Result<bool>) -> Result<bool> {
+    of.into_iter().try_fold(true, |good, one| Ok(check(one)? && good))
 }
 
 fn no_component(component: &str) -> Outcome {
