@@ -47,9 +47,6 @@ pub struct Measured {
 }
 
 /// Drives a scenario on the host, on this thread, with the options' machine and flaws.
-///
-/// # Errors
-/// An unknown scenario, bad input, or a drive that breaks the bench's rules.
 pub fn measure(name: &str, options: &BenchOptions) -> Result<Measured> {
     let run = options.run.clone();
     match catalogue::choose([name])? {
@@ -81,9 +78,6 @@ fn measured<S: System>(choice: &Choice<S>) -> Result<Measured> {
 }
 
 /// The command: measures and prints.
-///
-/// # Errors
-/// As [`measure`].
 pub fn run(options: &BenchOptions) -> Result<()> {
     let mut scenarios = options.scenarios.clone();
     if scenarios.is_empty() {

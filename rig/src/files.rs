@@ -1,17 +1,21 @@
 //! Files that are written whole or not at all.
 
 use anyhow::{Context, Result};
-use serde::ser::{Serialize, SerializeStruct, Serializer};
-use std::io::Write;
+use serde::Serialize;
+use serde::ser::{SerializeStruct, Serializer};
+use std::io::{BufWriter, Write};
+use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
+use tempfile::NamedTempFile;
 
 /// A value in a row of a CSV.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize)]
+#[serde(untagged)]
 pub enum Cell {
-    /// A time in s, to a nanosecond.
-    Time(f64),
     /// A number in single precision.
     Number(f32),
+    /// A number in double precision.
+    Exact(f64),
     /// A number as it is written down.
     Written(String),
     /// A name.
@@ -21,6 +25,11 @@ pub enum Cell {
 }
 
 impl Cell {
+    /// A time in s, to a nanosecond, so that it prints short; ticks are 40 ns.
+    pub fn time(t_s: f64) -> Self {
+        Self::Exact((t_s * 1e9).round() / 1e9)
+    }
+
     /// A number in single precision, never with an exponent.
     pub fn plain(value: f32) -> Self {
         Self::Written(value.to_string())
@@ -32,40 +41,30 @@ impl Cell {
     }
 }
 
-impl From<f64> for Cell {
-    fn from(value: f64) -> Self {
-        Self::Number(value as f32)
-    }
-}
-
-impl From<f32> for Cell {
-    fn from(value: f32) -> Self {
-        Self::Number(value)
-    }
-}
-
-impl From<&'static str> for Cell {
-    fn from(name: &'static str) -> Self {
-        Self::Name(name)
-    }
-}
-
-impl From<bool> for Cell {
-    fn from(flag: bool) -> Self {
-        Self::Count(flag.into())
-    }
-}
-
-impl Serialize for Cell {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        match self {
-            Self::Time(value) => serializer.serialize_f64(short_time(*value)),
-            Self::Number(value) => serializer.serialize_f32(*value),
-            Self::Written(text) => serializer.serialize_str(text),
-            Self::Name(name) => serializer.serialize_str(name),
-            Self::Count(count) => serializer.serialize_u32(*count),
+/// Cells of plain values.
+macro_rules! cells {
+    ($($from:ty: $value:ident => $cell:expr;)*) => {$(
+        impl From<$from> for Cell {
+            fn from($value: $from) -> Self {
+                $cell
+            }
         }
-    }
+    )*};
+}
+
+cells! {
+    f64: value => Self::Number(value as f32);
+    f32: value => Self::Number(value);
+    &'static str: name => Self::Name(name);
+    bool: flag => Self::Count(flag.into());
+}
+
+/// Columns by their names with what is in them.
+#[macro_export]
+macro_rules! columns {
+    ($($name:ident: $value:expr),* $(,)?) => {
+        $crate::files::Columns([$((stringify!($name), $crate::files::Cell::from($value))),*])
+    };
 }
 
 /// A row of a CSV: its columns with their values.
@@ -82,17 +81,11 @@ impl<const N: usize> Serialize for Columns<N> {
 }
 
 /// Writes rows under the names of their columns; of no rows nothing.
-///
-/// # Errors
-/// A file that cannot be written.
 pub fn write_rows(path: &Path, rows: impl IntoIterator<Item = impl Serialize>) -> Result<()> {
     write_whole(path, |out| Ok(rows.into_iter().try_for_each(|row| out.serialize(row))?))
 }
 
 /// Writes edges.csv: when, which gate, on or off.
-///
-/// # Errors
-/// A file that cannot be written.
 pub fn write_edges(path: &Path, edges: impl Iterator<Item = (Cell, &'static str, bool)>) -> Result<()> {
     let mut rows = edges
         .map(|(t_s, gate, on)| Columns([("t_s", t_s), ("gate", gate.into()), ("level", on.into())]))
@@ -104,9 +97,6 @@ pub fn write_edges(path: &Path, edges: impl Iterator<Item = (Cell, &'static str,
 }
 
 /// Writes what a fault has frozen in the flight recorder; else takes away what an earlier run has left.
-///
-/// # Errors
-/// A file that cannot be written.
 pub fn write_recorder<R, const N: usize>(
     path: &Path,
     recorded: &[R],
@@ -125,38 +115,28 @@ pub fn forget(path: &Path) -> Result<()> {
     }
 }
 
-/// A time rounded to a nanosecond, so that it prints short; ticks are 40 ns.
-pub fn short_time(t_s: f64) -> f64 {
-    (t_s * 1e9).round() / 1e9
-}
-
 /// Writes a CSV beside its place and moves it there when it is complete.
 pub fn write_whole(
     path: &Path,
-    fill: impl FnOnce(&mut csv::Writer<std::io::BufWriter<&std::fs::File>>) -> Result<()>,
+    fill: impl FnOnce(&mut csv::Writer<BufWriter<&mut NamedTempFile>>) -> Result<()>,
 ) -> Result<()> {
-    let folder = path.parent().unwrap_or(Path::new("."));
-    let file = tempfile::NamedTempFile::new_in(folder).with_context(|| format!("{}", folder.display()))?;
-    {
-        let mut out = csv::Writer::from_writer(std::io::BufWriter::with_capacity(1 << 16, file.as_file()));
+    written(path, |file| {
+        let mut out = csv::Writer::from_writer(BufWriter::with_capacity(1 << 16, file));
         fill(&mut out)?;
-        out.flush()?;
-    }
-    publish(file, path)
+        Ok(out.flush()?)
+    })
 }
 
 /// Writes a text file whole or not at all.
 pub fn write_text(path: &Path, text: &str) -> Result<()> {
-    let folder = path.parent().unwrap_or(Path::new("."));
-    let mut file =
-        tempfile::NamedTempFile::new_in(folder).with_context(|| format!("{}", folder.display()))?;
-    file.write_all(text.as_bytes())?;
-    publish(file, path)
+    written(path, |file| Ok(file.write_all(text.as_bytes())?))
 }
 
-fn publish(file: tempfile::NamedTempFile, path: &Path) -> Result<()> {
-    use std::os::unix::fs::PermissionsExt;
+fn written(path: &Path, write: impl FnOnce(&mut NamedTempFile) -> Result<()>) -> Result<()> {
+    let folder = path.parent().unwrap_or(Path::new("."));
+    let mut file = NamedTempFile::new_in(folder).with_context(|| folder.display().to_string())?;
+    write(&mut file)?;
     file.as_file().set_permissions(std::fs::Permissions::from_mode(0o644))?;
-    file.persist(path).with_context(|| format!("{}", path.display()))?;
+    file.persist(path).with_context(|| path.display().to_string())?;
     Ok(())
 }

@@ -42,9 +42,6 @@ impl Needs {
     }
 
     /// Of the words behind `run`.
-    ///
-    /// # Errors
-    /// Bad usage.
     pub fn of_run(words: Vec<OsString>) -> Result<Self> {
         Ok(match catalogue::choose(words)? {
             Chosen::Traction(choice) => Self::of(Traction::NAME, &choice.options),

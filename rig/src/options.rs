@@ -51,28 +51,25 @@ impl FromStr for Ripple {
     }
 }
 
+/// A number that is good; the error says what is allowed.
+pub fn number(text: &str, allowed: &str, good: impl Fn(f64) -> bool) -> Result<f64, String> {
+    let value = text.parse::<f64>().ok().filter(|value| value.is_finite() && good(*value));
+    value.ok_or_else(|| format!("must be {allowed}"))
+}
+
 /// A finite number that is not negative.
 pub fn not_negative(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(value) if value.is_finite() && value >= 0.0 => Ok(value),
-        _ => Err("must be a number of at least 0".to_owned()),
-    }
+    number(text, "a number of at least 0", |value| value >= 0.0)
 }
 
 /// A finite number above zero.
 pub fn positive(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(value) if value.is_finite() && value > 0.0 => Ok(value),
-        _ => Err("must be a number above 0".to_owned()),
-    }
+    number(text, "a number above 0", |value| value > 0.0)
 }
 
 /// Any finite number.
 pub fn finite(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(value) if value.is_finite() => Ok(value),
-        _ => Err("must be a finite number".to_owned()),
-    }
+    number(text, "a finite number", |_| true)
 }
 
 /// Options of every run.
@@ -164,10 +161,7 @@ impl<O: Args> std::ops::Deref for Options<O> {
     }
 }
 
-/// Options by name, each with its value, least and most.
-///
-/// # Errors
-/// The first that is out of its range.
+/// Options by name, each with its value, least and most. The error names the first that is out of its range.
 pub fn within(ranges: &[(&str, f64, f64, f64)]) -> anyhow::Result<()> {
     for (name, value, low, high) in ranges {
         anyhow::ensure!(
@@ -185,10 +179,8 @@ impl RunOptions {
         flaws.iter().all(|flaw| *flaw == 0.0) && self.adc_bits.is_none() && self.udc_ripple.is_none()
     }
 
-    /// The check that the flaws make sense with this machine and source, of either system.
-    ///
-    /// # Errors
-    /// The first option that is out of its range, by name.
+    /// The check that the flaws make sense with this machine and source, of either system. The error names the first option that
+    /// is out of its range.
     pub fn check_flaws(&self, machine: &Machine, source_v: f64) -> anyhow::Result<()> {
         let ripple = self.udc_ripple.unwrap_or(Ripple { amplitude_v: 0.0, frequency_hz: 1.0 });
         within(&[
@@ -202,9 +194,6 @@ impl RunOptions {
     }
 
     /// The emulator with the image that was handed over; a patient one waits for as long as somebody types.
-    ///
-    /// # Errors
-    /// Without an image.
     pub fn emulator(&self, patient: bool) -> anyhow::Result<Emulator> {
         let Some(image) = self.image.clone() else {
             anyhow::bail!("--on qemu needs --image; `cargo xtask run` builds it and hands it over");

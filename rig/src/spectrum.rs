@@ -1,12 +1,11 @@
 //! The current's spectrum in steady state beside that of the bound.
 
-use crate::analysis;
-use crate::bound;
 use crate::distortion::{self, Samples};
 use crate::machine::Machine;
 use crate::options::RunOptions;
 use crate::report::Page;
 use crate::trace::Recording;
+use crate::{analysis, bound};
 use core::f64::consts::TAU;
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;

@@ -1,5 +1,6 @@
 //! The files that a run leaves behind: trace, edges, switches of mode. Files are written whole or not at all.
 
+use crate::columns;
 use crate::files::{Cell, Columns, write_edges, write_recorder, write_rows};
 use crate::plant::LinkEnergies;
 use crate::rows::Timed;
@@ -155,24 +156,14 @@ impl Recording {
 
 impl Row {
     fn columns(&self) -> Columns<16> {
-        Columns([
-            ("t_s", Cell::Time(self.t_s)),
-            ("speed_rpm", self.speed_rpm.into()),
-            ("te_ref_nm", self.te_ref_nm.into()),
-            ("te_nm", self.te_nm.into()),
-            ("id_ref_a", self.id_ref_a.into()),
-            ("iq_ref_a", self.iq_ref_a.into()),
-            ("id_a", self.id_a.into()),
-            ("iq_a", self.iq_a.into()),
-            ("ia_a", self.ia_a.into()),
-            ("ib_a", self.ib_a.into()),
-            ("ic_a", self.ic_a.into()),
-            ("u_v", self.u_v.into()),
-            ("udc_v", self.udc_v.into()),
-            ("f1_hz", self.f1_hz.into()),
-            ("mode", self.mode.name().into()),
-            ("fault", name_of(self.trip).into()),
-        ])
+        columns! {
+            t_s: Cell::time(self.t_s), speed_rpm: self.speed_rpm,
+            te_ref_nm: self.te_ref_nm, te_nm: self.te_nm,
+            id_ref_a: self.id_ref_a, iq_ref_a: self.iq_ref_a, id_a: self.id_a, iq_a: self.iq_a,
+            ia_a: self.ia_a, ib_a: self.ib_a, ic_a: self.ic_a,
+            u_v: self.u_v, udc_v: self.udc_v, f1_hz: self.f1_hz,
+            mode: self.mode.name(), fault: name_of(self.trip),
+        }
     }
 }
 
@@ -180,38 +171,26 @@ impl SlotRow {
     fn columns(&self) -> Columns<10> {
         let Self { t_s, status } = self;
         let switches = status.switches;
-        Columns([
-            ("t_s", Cell::Time(*t_s)),
-            ("state", status.state.name().into()),
-            ("fault", name_of(status.trip).into()),
-            ("refusal", status.refusal.map_or("", |refusal| refusal.name()).into()),
-            ("refusals", Cell::Count(status.refusals)),
-            ("torque_nm", status.torque_nm.into()),
-            ("precharge", switches.precharge.into()),
-            ("main", switches.main.into()),
-            ("discharge", switches.discharge.into()),
-            ("chopper", switches.chopper.into()),
-        ])
+        columns! {
+            t_s: Cell::time(*t_s), state: status.state.name(), fault: name_of(status.trip),
+            refusal: status.refusal.map_or("", |refusal| refusal.name()),
+            refusals: Cell::Count(status.refusals), torque_nm: status.torque_nm,
+            precharge: switches.precharge, main: switches.main,
+            discharge: switches.discharge, chopper: switches.chopper,
+        }
     }
 }
 
 fn recorder_columns((t_s, record): &(f64, Record)) -> Columns<13> {
     let state = record.state;
-    Columns([
-        ("t_s", Cell::Time(*t_s)),
-        ("ia_a", record.currents_a.a.into()),
-        ("ib_a", record.currents_a.b.into()),
-        ("ic_a", record.currents_a.c.into()),
-        ("udc_v", record.udc_v.into()),
-        ("angle_deg", degrees(record.angle).into()),
-        ("id_ref_a", record.id_a.into()),
-        ("iq_ref_a", record.iq_a.into()),
-        ("u_v", record.voltage_v.into()),
-        ("mode", state.mode.name().into()),
-        ("enabled", state.enabled.into()),
-        ("pulsing", state.pulsing.into()),
-        ("fault", state.fault.map_or("", |fault| fault.name()).into()),
-    ])
+    columns! {
+        t_s: Cell::time(*t_s),
+        ia_a: record.currents_a.a, ib_a: record.currents_a.b, ic_a: record.currents_a.c,
+        udc_v: record.udc_v, angle_deg: degrees(record.angle),
+        id_ref_a: record.id_a, iq_ref_a: record.iq_a, u_v: record.voltage_v,
+        mode: state.mode.name(), enabled: state.enabled, pulsing: state.pulsing,
+        fault: state.fault.map_or("", |fault| fault.name()),
+    }
 }
 
 /// A trip's name; empty without one.
@@ -226,19 +205,10 @@ pub trait Recorded {
     /// The last row's time, in s.
     fn end_s(&self) -> f64;
     /// Writes trace.csv.
-    ///
-    /// # Errors
-    /// A file that cannot be written.
     fn write_trace(&self, path: &Path) -> Result<()>;
     /// Writes recorder.csv, if a fault has frozen the flight recorder; else takes away what an earlier run has left.
-    ///
-    /// # Errors
-    /// A file that cannot be written.
     fn write_recorder(&self, path: &Path) -> Result<()>;
     /// Writes what else there is into a folder: edges.csv, operator.csv.
-    ///
-    /// # Errors
-    /// A file that cannot be written.
     fn write_events(&self, folder: &Path) -> Result<()>;
 }
 
@@ -263,7 +233,7 @@ impl Recorded for Recording {
     fn write_events(&self, folder: &Path) -> Result<()> {
         let edges = self.edges.iter().filter(|edge| edge.tick >= self.lead);
         let edge =
-            |edge: &Edge| (Cell::Time(self.seconds(edge.tick)), GATES[usize::from(edge.gate)], edge.on);
+            |edge: &Edge| (Cell::time(self.seconds(edge.tick)), GATES[usize::from(edge.gate)], edge.on);
         write_edges(&folder.join("edges.csv"), edges.map(edge))?;
         if self.slots.is_empty() {
             return Ok(());

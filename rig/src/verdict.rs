@@ -40,6 +40,11 @@ impl Verdict {
     pub fn ours(what: &str, found: impl Into<Option<f64>>, at_most: f64) -> Self {
         Self::at_most(what, found, at_most, "–")
     }
+
+    /// Something that must not be, as 0 or 1.
+    pub fn never(what: &str, is: bool) -> Self {
+        Self::ours(what, f64::from(u8::from(is)), 0.0)
+    }
 }
 
 /// The largest of some values; nothing of none, and no number where one of them is none.

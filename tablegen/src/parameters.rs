@@ -2,57 +2,86 @@
 
 use crate::InputError;
 use std::collections::BTreeMap;
+use std::f64::consts::TAU;
 use std::fmt::Display;
 use std::path::Path;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-/// The keys of `machine.toml`, with defaults filled in. SI units; currents and voltages of phases are peak values.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Parameters {
-    /// Name of the machine.
-    pub name: String,
-    /// Pole pairs.
-    pub pole_pairs: u32,
-    /// Stator resistance of a phase, in ohm.
-    pub stator_resistance_ohm: f64,
-    /// Largest torque, in N·m.
-    pub max_torque_nm: f64,
-    /// Largest mechanical power, in W.
-    pub max_power_w: f64,
-    /// Largest current, peak, in A.
-    pub max_current_a: f64,
-    /// Largest speed, in r/min.
-    pub max_speed_rpm: f64,
-    /// Rated torque, in N·m.
-    pub rated_torque_nm: f64,
-    /// Rated speed, in r/min.
-    pub rated_speed_rpm: f64,
-    /// Lowest DC-link voltage in normal operation, in V.
-    pub dc_link_min_v: f64,
-    /// Nominal DC-link voltage, in V.
-    pub dc_link_nominal_v: f64,
-    /// Highest DC-link voltage in normal operation, in V.
-    pub dc_link_max_v: f64,
-    /// Highest switching frequency of a device, in Hz.
-    pub max_switching_hz: f64,
-    /// Phase current that trips the drive, in A; default 1.3 × `max_current_a`.
-    pub trip_current_a: f64,
-    /// DC-link voltage above which the drive trips, in V; default 1.15 × `dc_link_max_v`.
-    pub trip_dc_over_v: f64,
-    /// DC-link voltage below which the drive trips, in V; default 0.85 × `dc_link_min_v`.
-    pub trip_dc_under_v: f64,
-    /// Speed above which the drive trips, in r/min; default 1.1 × `max_speed_rpm`.
-    pub trip_speed_rpm: f64,
-    /// Slew rate of the torque demand, in N·m/s; default `max_torque_nm` in 0.1 s.
-    pub torque_slew_nm_per_s: f64,
-    /// Inertia of the rotor and what it drives, in kg·m²; by default `max_torque_nm` takes it to `max_speed_rpm` in one second.
-    pub rotor_inertia_kg_m2: f64,
-    /// Iron and mechanical loss at rated speed, in W; default 0.
-    pub loss_rated_w: f64,
-    /// Share of that loss that grows with the square of speed, 0 ..= 1; the rest is linear. Default 0.6.
-    pub loss_quadratic_fraction: f64,
-    lines: BTreeMap<String, u64>,
+/// The keys of `machine.toml`, and what may stand at each: a range, and what it is without the key.
+macro_rules! parameters {
+    (required { $($(#[$of_must:meta])* $must:ident: $within:expr;)* }
+     optional { $($(#[$of_may:meta])* $may:ident: $range:expr, $default:expr;)* }) => {
+        /// The keys of `machine.toml`, with defaults filled in. SI units; currents and voltages of phases are peak values.
+        #[derive(Clone, Debug, PartialEq)]
+        pub struct Parameters {
+            /// Name of the machine.
+            pub name: String,
+            /// Pole pairs.
+            pub pole_pairs: u32,
+            $($(#[$of_must])* pub $must: f64,)*
+            $($(#[$of_may])* pub $may: f64,)*
+            lines: BTreeMap<String, u64>,
+        }
+
+        const REQUIRED: &[&str] = &["name", "pole_pairs", $(stringify!($must)),*];
+        const OPTIONAL: &[&str] = &[$(stringify!($may)),*];
+
+        impl Keys<'_> {
+            fn parameters(&self) -> Result<Parameters, InputError> {
+                let (name, pole_pairs) = (self.name()?, self.pole_pairs()?);
+                $(let $must = self.number(stringify!($must), $within, 0.0)?;)*
+                $(let $may = self.number(stringify!($may), $range, $default)?;)*
+                let lines = self.values.iter().map(|(key, value)| (key.clone(), value.line)).collect();
+                Ok(Parameters { name, pole_pairs, $($must,)* $($may,)* lines })
+            }
+        }
+    };
+}
+
+parameters! {
+    required {
+        /// Stator resistance of a phase, in ohm.
+        stator_resistance_ohm: 0.0..=1e3;
+        /// Largest torque, in N·m.
+        max_torque_nm: ABOVE_ZERO..=1e7;
+        /// Largest mechanical power, in W.
+        max_power_w: ABOVE_ZERO..=1e9;
+        /// Largest current, peak, in A.
+        max_current_a: ABOVE_ZERO..=1e5;
+        /// Largest speed, in r/min.
+        max_speed_rpm: ABOVE_ZERO..=1e6;
+        /// Rated torque, in N·m.
+        rated_torque_nm: ABOVE_ZERO..=1e7;
+        /// Rated speed, in r/min.
+        rated_speed_rpm: ABOVE_ZERO..=1e6;
+        /// Lowest DC-link voltage in normal operation, in V.
+        dc_link_min_v: ABOVE_ZERO..=1e5;
+        /// Nominal DC-link voltage, in V.
+        dc_link_nominal_v: ABOVE_ZERO..=1e5;
+        /// Highest DC-link voltage in normal operation, in V.
+        dc_link_max_v: ABOVE_ZERO..=1e5;
+        /// Highest switching frequency of a device, in Hz.
+        max_switching_hz: 50.0..=100e3;
+    }
+    optional {
+        /// Phase current that trips the drive, in A; default 1.3 × `max_current_a`.
+        trip_current_a: ABOVE_ZERO..=1e6, 1.3 * max_current_a;
+        /// DC-link voltage above which the drive trips, in V; default 1.15 × `dc_link_max_v`.
+        trip_dc_over_v: ABOVE_ZERO..=1e6, 1.15 * dc_link_max_v;
+        /// DC-link voltage below which the drive trips, in V; default 0.85 × `dc_link_min_v`.
+        trip_dc_under_v: 0.0..=1e6, 0.85 * dc_link_min_v;
+        /// Speed above which the drive trips, in r/min; default 1.1 × `max_speed_rpm`.
+        trip_speed_rpm: ABOVE_ZERO..=1e7, 1.1 * max_speed_rpm;
+        /// Slew rate of the torque demand, in N·m/s; default `max_torque_nm` in 0.1 s.
+        torque_slew_nm_per_s: ABOVE_ZERO..=1e9, 10.0 * max_torque_nm;
+        /// Inertia of the rotor and what it drives, in kg·m²; by default `max_torque_nm` takes it to `max_speed_rpm` in one second.
+        rotor_inertia_kg_m2: ABOVE_ZERO..=1e7, max_torque_nm / (max_speed_rpm * TAU / 60.0);
+        /// Iron and mechanical loss at rated speed, in W; default 0.
+        loss_rated_w: 0.0..=1e8, 0.0;
+        /// Share of that loss that grows with the square of speed, 0 ..= 1; the rest is linear. Default 0.6.
+        loss_quadratic_fraction: 0.0..=1.0, 0.6;
+    }
 }
 
 impl Parameters {
@@ -88,11 +117,10 @@ impl Parameters {
 
     /// Limits that contradict each other.
     fn check(&self, file: &Path) -> Result<(), InputError> {
-        let rated_power_w = self.rated_torque_nm * self.rated_speed_rpm * std::f64::consts::TAU / 60.0;
-        let full_power_w = self.max_torque_nm * self.max_speed_rpm * std::f64::consts::TAU / 60.0;
+        let rated_power_w = self.rated_torque_nm * self.rated_speed_rpm * TAU / 60.0;
+        let full_power_w = self.max_torque_nm * self.max_speed_rpm * TAU / 60.0;
         let resistive_v = self.stator_resistance_ohm * self.max_current_a;
-        let spin_up_s =
-            self.rotor_inertia_kg_m2 * self.max_speed_rpm * std::f64::consts::TAU / 60.0 / self.max_torque_nm;
+        let spin_up_s = self.rotor_inertia_kg_m2 * self.max_speed_rpm * TAU / 60.0 / self.max_torque_nm;
         let orders = [
             ("rated_torque_nm", self.rated_torque_nm, "max_torque_nm", self.max_torque_nm, true),
             ("rated_speed_rpm", self.rated_speed_rpm, "max_speed_rpm", self.max_speed_rpm, true),
@@ -179,32 +207,6 @@ impl Parameters {
     }
 }
 
-const REQUIRED: [&str; 13] = [
-    "name",
-    "pole_pairs",
-    "stator_resistance_ohm",
-    "max_torque_nm",
-    "max_power_w",
-    "max_current_a",
-    "max_speed_rpm",
-    "rated_torque_nm",
-    "rated_speed_rpm",
-    "dc_link_min_v",
-    "dc_link_nominal_v",
-    "dc_link_max_v",
-    "max_switching_hz",
-];
-const OPTIONAL: [&str; 8] = [
-    "trip_current_a",
-    "trip_dc_over_v",
-    "trip_dc_under_v",
-    "trip_speed_rpm",
-    "torque_slew_nm_per_s",
-    "rotor_inertia_kg_m2",
-    "loss_rated_w",
-    "loss_quadratic_fraction",
-];
-
 /// The file's keys with their lines.
 struct Keys<'a> {
     file: &'a Path,
@@ -271,52 +273,27 @@ impl<'a> Keys<'a> {
         }
     }
 
-    fn parameters(&self) -> Result<Parameters, InputError> {
-        let name = match self.values.get("name") {
-            Some(Value { parsed: DeValue::String(name), .. }) if !name.trim().is_empty() => name.to_string(),
-            _ => return Err(self.refuse("name", "a text in quotes that is not empty")),
-        };
+    fn name(&self) -> Result<String, InputError> {
+        match self.values.get("name") {
+            Some(Value { parsed: DeValue::String(name), .. }) if !name.trim().is_empty() => {
+                Ok(name.to_string())
+            }
+            _ => Err(self.refuse("name", "a text in quotes that is not empty")),
+        }
+    }
+
+    fn pole_pairs(&self) -> Result<u32, InputError> {
         let pole_pairs = self.number("pole_pairs", 1.0..=100.0, 0.0)?;
         if pole_pairs.fract() != 0.0 {
             return Err(self.refuse("pole_pairs", "a whole number from 1 to 100"));
         }
-        let above_zero = |key: &str, most: f64, default: f64| self.number(key, ABOVE_ZERO..=most, default);
-        let max_current_a = above_zero("max_current_a", 1e5, 0.0)?;
-        let max_speed_rpm = above_zero("max_speed_rpm", 1e6, 0.0)?;
-        let max_torque_nm = above_zero("max_torque_nm", 1e7, 0.0)?;
-        let one_second_kg_m2 = max_torque_nm / (max_speed_rpm * std::f64::consts::TAU / 60.0);
-        let dc_link_min_v = above_zero("dc_link_min_v", 1e5, 0.0)?;
-        let dc_link_max_v = above_zero("dc_link_max_v", 1e5, 0.0)?;
-        Ok(Parameters {
-            name,
-            pole_pairs: pole_pairs as u32,
-            stator_resistance_ohm: self.number("stator_resistance_ohm", 0.0..=1e3, 0.0)?,
-            max_torque_nm,
-            max_power_w: above_zero("max_power_w", 1e9, 0.0)?,
-            max_current_a,
-            max_speed_rpm,
-            rated_torque_nm: above_zero("rated_torque_nm", 1e7, 0.0)?,
-            rated_speed_rpm: above_zero("rated_speed_rpm", 1e6, 0.0)?,
-            dc_link_min_v,
-            dc_link_nominal_v: above_zero("dc_link_nominal_v", 1e5, 0.0)?,
-            dc_link_max_v,
-            max_switching_hz: self.number("max_switching_hz", 50.0..=100e3, 0.0)?,
-            trip_current_a: above_zero("trip_current_a", 1e6, 1.3 * max_current_a)?,
-            trip_dc_over_v: above_zero("trip_dc_over_v", 1e6, 1.15 * dc_link_max_v)?,
-            trip_dc_under_v: self.number("trip_dc_under_v", 0.0..=1e6, 0.85 * dc_link_min_v)?,
-            trip_speed_rpm: above_zero("trip_speed_rpm", 1e7, 1.1 * max_speed_rpm)?,
-            torque_slew_nm_per_s: above_zero("torque_slew_nm_per_s", 1e9, 10.0 * max_torque_nm)?,
-            rotor_inertia_kg_m2: above_zero("rotor_inertia_kg_m2", 1e7, one_second_kg_m2)?,
-            loss_rated_w: self.number("loss_rated_w", 0.0..=1e8, 0.0)?,
-            loss_quadratic_fraction: self.number("loss_quadratic_fraction", 0.0..=1.0, 0.6)?,
-            lines: self.values.iter().map(|(key, value)| (key.clone(), value.line)).collect(),
-        })
+        Ok(pole_pairs as u32)
     }
 }
 
 /// Tells an unknown key, and which one was probably meant: the same quantity in another unit, or a slip of the pen.
 fn unknown(name: &str) -> String {
-    let known = || REQUIRED.iter().chain(&OPTIONAL);
+    let known = || REQUIRED.iter().chain(OPTIONAL);
     let quantity = |key: &str| UNITS.iter().find_map(|unit| key.strip_suffix(unit).map(str::to_owned));
     let in_other_unit = |key: &&&str| {
         quantity(key).is_some_and(|stem| {

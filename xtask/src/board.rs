@@ -1,11 +1,8 @@
 //! The boards of real hardware: the packages in `boards/`, each with what this program has to know of it in its own `Cargo.toml`.
 
-use std::path::Path;
-
+use crate::workspace::{folders, root};
 use anyhow::{Context, Result};
 use serde::Deserialize;
-
-use crate::workspace::root;
 
 /// A board.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -68,14 +65,10 @@ impl Board {
     }
 }
 
-/// The folders of `boards/`, by their names.
+/// The folders of `boards/` with a package, by their names.
 fn names() -> Vec<String> {
-    let is_package = |folder: &Path| folder.join("Cargo.toml").is_file();
-    let entries = std::fs::read_dir(root().join("boards")).into_iter().flatten().flatten();
-    let folders = entries.filter(|entry| is_package(&entry.path()));
-    let mut names: Vec<_> = folders.map(|folder| folder.file_name().to_string_lossy().into_owned()).collect();
-    names.sort_unstable();
-    names
+    let boards = root().join("boards");
+    folders(&boards).into_iter().filter(|name| boards.join(name).join("Cargo.toml").is_file()).collect()
 }
 
 #[cfg(test)]

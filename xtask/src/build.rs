@@ -1,16 +1,14 @@
 //! The calls of cargo: the image for the board, the rig for this machine.
 
-use std::ffi::OsString;
-use std::path::PathBuf;
-use std::process::{Command, Stdio};
-
-use anyhow::{Context, Result, bail};
-use clap::ValueEnum;
-
 use crate::board::Board;
 use crate::process;
 use crate::setup::Toolchain;
-pub use crate::workspace::{TARGET, cargo, root};
+pub use crate::workspace::{TARGET, cargo, cargo_with, root};
+use anyhow::{Context, Result, bail};
+use clap::ValueEnum;
+use std::ffi::OsString;
+use std::path::PathBuf;
+use std::process::{Command, Stdio};
 
 /// The feature of the reference images, on the emulated board.
 pub const QEMU: &str = "qemu";
@@ -29,12 +27,17 @@ impl System {
     /// All of them.
     pub const ALL: [Self; 2] = [Self::Traction, Self::Zs9];
 
+    /// Its image, the folder of tables/ that this is built with, and the variable that names another machine to the build script.
+    const fn names(self) -> [&'static str; 3] {
+        match self {
+            Self::Traction => ["tractive", "pmasynrm-180kw", "TRACTIVE_MACHINE"],
+            Self::Zs9 => ["zs9", "ipm-zs9", "TRACTIVE_ZS9_MACHINE"],
+        }
+    }
+
     /// The image's name.
     pub const fn image(self) -> &'static str {
-        match self {
-            Self::Traction => "tractive",
-            Self::Zs9 => "zs9",
-        }
+        self.names()[0]
     }
 
     /// The name of a board's image.
@@ -47,18 +50,12 @@ impl System {
 
     /// The folder of tables/ that the image is built with unless another is named.
     pub const fn machine(self) -> &'static str {
-        match self {
-            Self::Traction => "pmasynrm-180kw",
-            Self::Zs9 => "ipm-zs9",
-        }
+        self.names()[1]
     }
 
     /// The variable that names the machine to the build script.
     const fn machine_variable(self) -> &'static str {
-        match self {
-            Self::Traction => "TRACTIVE_MACHINE",
-            Self::Zs9 => "TRACTIVE_ZS9_MACHINE",
-        }
+        self.names()[2]
     }
 }
 
@@ -115,8 +112,7 @@ fn on_target(toolchain: &Toolchain, package: &str, name: &str) -> Command {
 /// Builds the rig's program.
 pub fn rig() -> Result<PathBuf> {
     process::say("building the rig …");
-    let mut command = cargo();
-    command.args(["build", "--release", "--package", "tractive-rig", "--bin", "tractive-rig"]);
+    let mut command = cargo_with("build --release --package tractive-rig --bin tractive-rig");
     executable(&mut command, "tractive-rig", false).context("the rig was not built")
 }
 

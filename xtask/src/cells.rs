@@ -4,14 +4,12 @@
 //! no sound cell may have been torn, stale or empty; each broken one must have been torn; and every instruction of every access,
 //! as the image's symbols and its code give them, must have been hit.
 
-use std::collections::{BTreeMap, BTreeSet};
-use std::path::Path;
-
-use anyhow::{Context, Result, bail};
-
 use crate::elf::Image;
 use crate::setup::Setup;
 use crate::{build, emulator, image, process};
+use anyhow::{Context, Result, bail};
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
 
 /// The image's name, and its module of accesses.
 const NAME: &str = "cell_stress";
@@ -46,11 +44,7 @@ pub fn check(setup: &mut Setup) -> Result<bool> {
     let said = said(&run(&qemu, &path)?)?;
     let extents = extents(&image::read(&path)?);
     print!("{}", table(&said, &extents));
-    let findings = findings(&said, &extents);
-    for finding in &findings {
-        println!("{finding}");
-    }
-    Ok(findings.is_empty())
+    Ok(process::is_good(&findings(&said, &extents)))
 }
 
 fn run(qemu: &Path, path: &Path) -> Result<String> {

@@ -68,12 +68,8 @@ pub fn panic_paths(image: &Image) -> Vec<String> {
 
 /// From the handler to the function.
 fn path(came_from: &std::collections::BTreeMap<u32, Option<u32>>, to: u32) -> Vec<u32> {
-    let mut path = vec![to];
-    let mut at = to;
-    while let Some(Some(caller)) = came_from.get(&at) {
-        path.push(*caller);
-        at = *caller;
-    }
+    let callers = std::iter::successors(Some(to), |at| came_from.get(at).copied().flatten());
+    let mut path: Vec<_> = callers.collect();
     path.reverse();
     path
 }
@@ -91,19 +87,11 @@ fn panic_name(function: &Function) -> Option<&str> {
 }
 
 fn is_panic(name: &str) -> bool {
-    const PARTS: [&str; 8] = [
-        "core::panicking",
-        "panic_fmt",
-        "panic_bounds_check",
-        "panic_const",
-        "unwrap_failed",
-        "expect_failed",
-        "rust_begin_unwind",
-        "begin_panic",
-    ];
+    const PARTS: &str = "core::panicking panic_fmt panic_bounds_check panic_const unwrap_failed expect_failed \
+        rust_begin_unwind begin_panic";
     let is_core_failure = name.contains("core::") && name.contains("_fail");
     let is_slice_failure = name.contains("slice_") && name.contains("_fail");
-    is_core_failure || is_slice_failure || PARTS.iter().any(|part| name.contains(part))
+    is_core_failure || is_slice_failure || PARTS.split(' ').any(|part| name.contains(part))
 }
 
 #[cfg(test)]

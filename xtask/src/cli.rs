@@ -1,12 +1,10 @@
 //! The command line.
 
-use std::ffi::OsString;
-
-use clap::{Args, Parser, Subcommand};
-
 use crate::board::Board;
 use crate::build::System;
 use crate::step::Step;
+use clap::{Args, Parser, Subcommand};
+use std::ffi::OsString;
 
 /// The chores of `tractive`.
 #[derive(Debug, Parser)]

@@ -1,11 +1,9 @@
 //! An image as the checks see it: its functions, its code and data bytes, its interrupt handlers, its sizes.
 
-use std::collections::{BTreeMap, BTreeSet};
-
+use crate::thumb::{self, Instruction};
 use anyhow::{Context, Result, bail};
 use object::{Object, ObjectSection, ObjectSymbol, SectionKind, SymbolKind};
-
-use crate::thumb::{self, Instruction};
+use std::collections::{BTreeMap, BTreeSet};
 
 /// A function. Several names may stand at one address.
 #[derive(Clone, Debug, Default)]

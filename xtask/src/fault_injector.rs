@@ -1,13 +1,11 @@
 //! The images with the fault injector, driven by the rig.
 
-use std::path::{Path, PathBuf};
-use std::process::Command;
-
-use anyhow::{Context, Result, bail, ensure};
-
 use crate::build::{self, System};
 use crate::process;
 use crate::setup::Setup;
+use anyhow::{Context, Result, bail, ensure};
+use std::path::{Path, PathBuf};
+use std::process::Command;
 
 /// The file that the image reads and writes.
 const FOUND: &str = "found";

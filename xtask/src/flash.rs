@@ -1,16 +1,14 @@
 //! `cargo xtask flash`: a board's image, onto the board.
 
-use std::path::Path;
-use std::process::Command;
-
-use anyhow::{Result, bail};
-
 use crate::board::Board;
 use crate::build::{self, root};
 use crate::cli::FlashArgs;
 use crate::process::{find, succeeds};
 use crate::run::machine_for_build;
 use crate::setup::Setup;
+use anyhow::{Result, bail};
+use std::path::Path;
+use std::process::Command;
 
 const PROGRAM: &str = "probe-rs";
 const INSTALL: &str = "cargo install probe-rs-tools --locked";

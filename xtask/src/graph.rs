@@ -2,10 +2,9 @@
 //! together by MOVW and MOVT, or as a literal) it is taken to call it; a function that branches through a register
 //! may besides go to any function whose address stands in the data.
 
-use std::collections::{BTreeMap, BTreeSet, VecDeque};
-
 use crate::elf::Image;
 use crate::thumb::Flow;
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
 /// The calls of an image, by the addresses of its functions.
 #[derive(Debug, Default)]

@@ -4,13 +4,11 @@
 //! others have to succeed. What would touch a board is given `--dry-run`: the image is built, and nobody is asked to flash it.
 //! Tests are built, and steps of `cargo xtask test` looked up: to run them is those steps' own business.
 
+use crate::process::cannot_start;
+use anyhow::{Context, Result, bail};
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::Instant;
-
-use anyhow::{Context, Result, bail};
-
-use crate::process::cannot_start;
 
 /// A command and the exit code that it has to have.
 #[derive(Clone, Debug, PartialEq, Eq)]

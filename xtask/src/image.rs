@@ -1,16 +1,14 @@
 //! `cargo xtask image`: what the image holds.
 
-use std::collections::BTreeSet;
-use std::path::Path;
-
-use anyhow::{Context, Result};
-use serde_json::json;
-
 use crate::board::Board;
 use crate::cli::ImageArgs;
 use crate::elf::{Image, Sizes};
 use crate::setup::Setup;
-use crate::{build, check};
+use crate::{build, check, process};
+use anyhow::{Context, Result};
+use serde_json::json;
+use std::collections::BTreeSet;
+use std::path::Path;
 
 /// The command.
 pub fn run(args: &ImageArgs) -> Result<u8> {
@@ -27,16 +25,13 @@ pub fn run(args: &ImageArgs) -> Result<u8> {
 /// The image's check as a step of the tests: what it finds is printed, `true` is good.
 pub fn check(path: &Path) -> Result<bool> {
     let image = read(path)?;
-    let findings = check::findings(&image);
-    for finding in &findings {
-        println!("{finding}");
-    }
-    if findings.is_empty() {
+    let is_good = process::is_good(&check::findings(&image));
+    if is_good {
         let handlers: BTreeSet<_> = image.vectors().into_values().flatten().map(String::as_str).collect();
         let (functions, handlers) = (image.functions.len(), Vec::from_iter(handlers).join(", "));
         println!("{functions} functions; from {handlers} no panic within reach; no double precision");
     }
-    Ok(findings.is_empty())
+    Ok(is_good)
 }
 
 /// The same for a board of real hardware, whose image must also lie where its flash memory is.

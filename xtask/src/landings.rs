@@ -10,12 +10,6 @@
 mod hunt;
 mod reach;
 
-use std::collections::HashSet;
-use std::path::Path;
-
-use anyhow::{Context, Result};
-use rayon::prelude::*;
-
 use crate::build::System;
 use crate::elf::Image;
 use crate::fault_injector::{FaultInjector, Found};
@@ -23,8 +17,12 @@ use crate::image;
 use crate::setup::Setup;
 use crate::timing::drive::Bench;
 use crate::timing::statistics::INTERRUPTS;
+use anyhow::{Context, Result};
 use hunt::Hunt;
+use rayon::prelude::*;
 use reach::{Reached, Stand};
+use std::collections::HashSet;
+use std::path::Path;
 
 /// The course that one system is driven through.
 struct Course {
@@ -113,13 +111,8 @@ impl Course {
                 Run { course: self, injector: &injector, image: &image, options, folder: &folder, is_last };
             findings.extend(run.check(&mut reached)?);
         }
-        let mut text = format!(
-            "{}: {} landings in {} passes\n{}",
-            self.system.image(),
-            reached.landings,
-            reached.passes,
-            reached.table()
-        );
+        let (image_name, Reached { landings, passes, .. }) = (self.system.image(), &reached);
+        let mut text = format!("{image_name}: {landings} landings in {passes} passes\n{}", reached.table());
         let missing = reached.findings(&image);
         if missing.len() > self.most_missing {
             findings.push(format!("{} were not hit, more than {}", missing.len(), self.most_missing));
@@ -145,15 +138,10 @@ impl Run<'_> {
     /// Adds what it reaches; what it finds.
     fn check(&self, reached: &mut Reached) -> Result<Vec<String>> {
         let folder = |name: &str| self.folder.join(name);
-        let (calls, (undisturbed, seen)) = rayon::join(
-            || self.calls(&folder("logged")),
-            || {
-                rayon::join(
-                    || self.undisturbed(&folder("undisturbed")),
-                    || self.injector.delay(&[], &self.options, &folder("prompt")),
-                )
-            },
-        );
+        let undisturbed = || self.undisturbed(&folder("undisturbed"));
+        let prompt = || self.injector.delay(&[], &self.options, &folder("prompt"));
+        let (calls, (undisturbed, seen)) =
+            rayon::join(|| self.calls(&folder("logged")), || rayon::join(undisturbed, prompt));
         let (calls, (undisturbed, undisturbed_files), seen) = (calls?, undisturbed?, seen?.seen);
         let prompt = vec![0; calls.len()];
         let mut hunt =
@@ -166,9 +154,9 @@ impl Run<'_> {
             for (delays, (found, files)) in delays.iter().zip(self.passes(&delays)?) {
                 reached.passes += 1;
                 let pass = reached.passes;
-                if found.fault != undisturbed.fault {
-                    findings
-                        .push(format!("pass {pass}: fault `{}`, not `{}`", found.fault, undisturbed.fault));
+                let wanted = &undisturbed.fault;
+                if found.fault != *wanted {
+                    findings.push(format!("pass {pass}: fault `{}`, not `{wanted}`", found.fault));
                 } else if files != undisturbed_files {
                     findings
                         .push(format!("pass {pass}: trace or edges are not those of the undisturbed run"));

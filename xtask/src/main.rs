@@ -44,14 +44,13 @@ mod thumb;
 mod timing;
 mod workspace;
 
-use std::process::ExitCode;
-
 use clap::Parser;
+use std::process::ExitCode;
 
 fn main() -> ExitCode {
     let result = match cli::Cli::parse().command {
-        cli::Command::Run(args) => run::run(&args.words, run::Verb::Run),
-        cli::Command::Talk(args) => run::run(&args.words, run::Verb::Talk),
+        cli::Command::Run(args) => run::run("run", &args.words),
+        cli::Command::Talk(args) => run::run("talk", &args.words),
         cli::Command::Test(args) => test::run(&args),
         cli::Command::Image(args) => image::run(&args),
         cli::Command::Timing(args) => timing::run(&args),

@@ -1,16 +1,14 @@
 //! The library as others use it: the example's firmware, outside the workspace, has its own vectors and both tasks, and nothing of the
 //! reference images; and the arithmetic alone needs little.
 
-use std::path::{Path, PathBuf};
-
-use anyhow::{Context, Result, ensure};
-
 use crate::build::{self, TARGET};
 use crate::elf::Image;
 use crate::graph::CallGraph;
 use crate::image;
 use crate::setup::Setup;
 use crate::timing::Profile;
+use anyhow::{Context, Result, ensure};
+use std::path::{Path, PathBuf};
 
 /// The example's interrupts: their entries in the vector table, their handlers, and the task that each must come to.
 const INTERRUPTS: [(&str, &str, &str); 2] =
@@ -30,9 +28,8 @@ pub fn check(setup: &mut Setup) -> Result<bool> {
         look_into(&path).with_context(|| format!("{} with lto = {lto:?}", path.display()))?;
         println!("lto = {lto:?}: own vectors, both tasks, nothing of the reference images");
     }
-    let output = build::cargo()
-        .args(["tree", "--package", "tractive-control", "--edges", "normal", "--prefix", "none"])
-        .output()?;
+    let mut tree = build::cargo_with("tree --package tractive-control --edges normal --prefix none");
+    let output = tree.output()?;
     ensure!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let tree = String::from_utf8_lossy(&output.stdout);
     let crates = tree.lines().filter(|line| !line.is_empty()).count();

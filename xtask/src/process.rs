@@ -1,11 +1,10 @@
 //! Running other programs.
 
+use anyhow::{Context, Result};
+use indicatif::{ProgressBar, ProgressStyle};
 use std::ffi::OsStr;
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
-
-use anyhow::{Context, Result};
-use indicatif::{ProgressBar, ProgressStyle};
 
 /// Runs it with this process's own input and output; whether it succeeded.
 pub fn succeeds(command: &mut Command) -> Result<bool> {
@@ -28,6 +27,12 @@ pub fn output_of(command: &mut Command) -> Option<String> {
 /// Tells what begins now, on a line of its own.
 pub fn say(what: &str) {
     eprintln!("xtask: {what}");
+}
+
+/// Prints what was found; good is nothing.
+pub fn is_good(findings: &[String]) -> bool {
+    findings.iter().for_each(|finding| println!("{finding}"));
+    findings.is_empty()
 }
 
 /// Processor time of this process and of all that it has waited for, in s; 0 where the system does not tell.

@@ -3,13 +3,11 @@
 //! This is what `cargo publish --dry-run` does but for asking the registry, which needs a network. Cargo's own check of several packages
 //! keeps a package of the same version that it has seen before; here each takes the others from where they were just unpacked.
 
+use crate::build::{cargo_with, root};
+use crate::process::succeeds;
+use anyhow::{Context, Result, ensure};
 use std::path::{Path, PathBuf};
 use std::process::Command;
-
-use anyhow::{Context, Result, ensure};
-
-use crate::build::{cargo, root};
-use crate::process::succeeds;
 
 /// The crates, each behind those that it depends on.
 const CRATES: [&str; 3] = ["tractive-control", "tractive-tablegen", "tractive"];
@@ -24,8 +22,7 @@ const OF_BUILT_IN: [&str; 3] =
 /// Packs and checks them.
 pub fn check() -> Result<bool> {
     // Work in progress is packed as well.
-    let mut pack = cargo();
-    pack.args(["package", "--no-verify", "--offline", "--allow-dirty", "--quiet"]);
+    let mut pack = cargo_with("package --no-verify --offline --allow-dirty --quiet");
     pack.args(CRATES.iter().flat_map(|name| ["--package", name]));
     if !succeeds(&mut pack)? {
         return Ok(false);
@@ -44,15 +41,8 @@ pub fn check() -> Result<bool> {
         format!("[workspace]\nresolver = \"3\"\nmembers = [{members}]\n\n[patch.crates-io]\n{patch}");
     std::fs::write(packages.join("Cargo.toml"), workspace)?;
     std::fs::copy(root().join("Cargo.lock"), packages.join("Cargo.lock"))?;
-    let mut check = cargo();
-    check.current_dir(&packages).args([
-        "check",
-        "--workspace",
-        "--offline",
-        "--quiet",
-        "--features",
-        "tractive/wire",
-    ]);
+    let mut check = cargo_with("check --workspace --offline --quiet --features tractive/wire");
+    check.current_dir(&packages);
     check.env("CARGO_PROFILE_DEV_DEBUG", "false").env_remove("CARGO_TARGET_DIR");
     succeeds(&mut check)
 }
@@ -68,11 +58,8 @@ fn unpack(packages: &Path, name: &str) -> Result<PathBuf> {
     println!("{name}: {} kB packed", bytes / 1_000);
     // With the present time: all files of a package have the same one, whatever they hold, and cargo looks at that.
     let mut tar = Command::new("tar");
-    ensure!(
-        succeeds(tar.arg("-xmzf").arg(&archive).arg("-C").arg(packages))?,
-        "{} is no archive",
-        archive.display()
-    );
+    tar.arg("-xmzf").arg(&archive).arg("-C").arg(packages);
+    ensure!(succeeds(&mut tar)?, "{} is no archive", archive.display());
     Ok(folder)
 }
 
@@ -82,7 +69,7 @@ mod tests {
     use serde_json::Value;
 
     fn packages() -> Vec<Value> {
-        let metadata = cargo().args(["metadata", "--format-version", "1", "--no-deps"]).output().unwrap();
+        let metadata = cargo_with("metadata --format-version 1 --no-deps").output().unwrap();
         let metadata: Value = serde_json::from_slice(&metadata.stdout).unwrap();
         metadata["packages"].as_array().unwrap().clone()
     }

@@ -2,37 +2,20 @@
 //!
 //! The rig alone reads what was typed: at first it is asked what that needs, then it is given the same words again.
 
-use std::ffi::OsString;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
-
-use anyhow::{Context, Result, bail};
-use serde::Deserialize;
-
 use crate::build::{self, System};
 use crate::process;
 use crate::setup::Setup;
+use crate::workspace::folders;
+use anyhow::{Context, Result, bail};
+use serde::Deserialize;
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
 
 /// The script of a talk that is run when none is named.
 const SCRIPT: &str = "rig/scripts/round-trip.talk";
 /// The same for the ZS9.
 const ZS9_SCRIPT: &str = "rig/scripts/zs9.talk";
-
-/// The rig's command that is meant.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Verb {
-    Run,
-    Talk,
-}
-
-impl Verb {
-    const fn name(self) -> &'static str {
-        match self {
-            Self::Run => "run",
-            Self::Talk => "talk",
-        }
-    }
-}
 
 /// The needs of the words, as the rig says.
 #[derive(Debug, Default, Deserialize, PartialEq, Eq)]
@@ -53,9 +36,9 @@ impl Needs {
     }
 
     /// The script besides the words: the shipped one, where a talk names none.
-    fn script(&self, verb: Verb) -> Option<PathBuf> {
+    fn script(&self, verb: &str) -> Option<PathBuf> {
         let shipped = if self.system() == System::Zs9 { ZS9_SCRIPT } else { SCRIPT };
-        (verb == Verb::Talk && self.script.is_none()).then(|| build::root().join(shipped))
+        (verb == "talk" && self.script.is_none()).then(|| build::root().join(shipped))
     }
 }
 
@@ -70,12 +53,12 @@ fn rig(program: &Path) -> Command {
     rig
 }
 
-/// The command; its exit code is the rig's.
-pub fn run(words: &[OsString], verb: Verb) -> Result<u8> {
+/// The command, `run` or `talk` of the rig; the exit code is the rig's.
+pub fn run(verb: &str, words: &[OsString]) -> Result<u8> {
     eprintln!("building the rig, where it is not up to date");
     let program = build::rig()?;
     let mut ask = rig(&program);
-    ask.args(["needs", verb.name()]).args(words).stderr(Stdio::inherit());
+    ask.args(["needs", verb]).args(words).stderr(Stdio::inherit());
     let said = ask.output().with_context(|| process::cannot_start(&ask))?;
     // Help or bad usage: the rig has said what there is to say.
     let Ok(needs) = serde_json::from_slice::<Needs>(&said.stdout) else {
@@ -85,7 +68,7 @@ pub fn run(words: &[OsString], verb: Verb) -> Result<u8> {
     let machine =
         needs.machine.as_deref().map(|machine| machine_for_build(machine, build::root())).transpose()?;
     let mut rig = rig(&program);
-    rig.arg(verb.name()).args(words).args(needs.script(verb));
+    rig.arg(verb).args(words).args(needs.script(verb));
     let mut setup = Setup::default();
     if needs.emulator {
         rig.env("TRACTIVE_QEMU", setup.qemu()?);
@@ -120,11 +103,7 @@ pub fn machine_for_build(machine: &str, root: &Path) -> Result<OsString> {
 
 /// The folders of tables/.
 pub fn machine_names(root: &Path) -> Vec<String> {
-    let entries = std::fs::read_dir(root.join("tables")).into_iter().flatten().flatten();
-    let folders = entries.filter(|entry| entry.path().is_dir());
-    let mut names: Vec<_> = folders.map(|entry| entry.file_name().to_string_lossy().into_owned()).collect();
-    names.sort();
-    names
+    folders(&root.join("tables"))
 }
 
 #[cfg(test)]
@@ -135,10 +114,10 @@ mod tests {
     fn a_talk_has_the_shipped_script_unless_it_names_one() {
         for (system, script) in [("pmasynrm", SCRIPT), ("zs9", ZS9_SCRIPT)] {
             let needs = Needs { system: system.to_owned(), ..Needs::default() };
-            assert_eq!(needs.script(Verb::Talk), Some(build::root().join(script)));
+            assert_eq!(needs.script("talk"), Some(build::root().join(script)));
             assert!(build::root().join(script).is_file());
-            assert_eq!(needs.script(Verb::Run), None);
-            assert_eq!(Needs { script: Some("-".into()), ..needs }.script(Verb::Talk), None);
+            assert_eq!(needs.script("run"), None);
+            assert_eq!(Needs { script: Some("-".into()), ..needs }.script("talk"), None);
         }
     }
 

@@ -1,13 +1,11 @@
 //! The set-up: the target, QEMU, the lints. Each step only when something is missing, each telling so.
 
+use crate::process::{find, output_of, quietly, say};
+use crate::workspace::{TARGET, cargo, root};
+use anyhow::{Result, bail};
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-
-use anyhow::{Result, bail};
-
-use crate::process::{find, output_of, quietly, say};
-use crate::workspace::{TARGET, cargo, root};
 
 /// The emulated board.
 const QEMU_MACHINE: &str = "mps2-an386";
@@ -157,9 +155,8 @@ impl Setup {
             self.apt_updated = true;
         }
         say(&format!("installing {} (apt-get install)", packages.join(" ")));
-        let mut args = vec!["env", "DEBIAN_FRONTEND=noninteractive", "apt-get", "install", "--yes"];
-        args.push("--no-install-recommends");
-        args.extend(packages);
+        let install = "env DEBIAN_FRONTEND=noninteractive apt-get install --yes --no-install-recommends";
+        let args: Vec<_> = install.split(' ').chain(packages.iter().copied()).collect();
         if !quietly(&mut privileged(&args)) {
             say(&format!("apt-get could not install {}", packages.join(" ")));
         }
@@ -184,12 +181,8 @@ fn privileged(args: &[&str]) -> Command {
 
 /// The target's library is there, whoever installed it.
 fn has_target() -> bool {
-    let folder = output_of(Command::new("rustc").current_dir(root()).args([
-        "--print",
-        "target-libdir",
-        "--target",
-        TARGET,
-    ]));
+    let mut rustc = Command::new("rustc");
+    let folder = output_of(rustc.current_dir(root()).args(["--print", "target-libdir", "--target", TARGET]));
     let entries = folder.and_then(|folder| std::fs::read_dir(folder).ok()).into_iter().flatten().flatten();
     entries.into_iter().any(|entry| entry.file_name().to_string_lossy().starts_with("libcore-"))
 }

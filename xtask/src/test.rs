@@ -1,18 +1,16 @@
 //! `cargo xtask test`: every check in order, then a table and a count.
 
-use std::process::Command;
-use std::time::{Duration, Instant};
-
-use anyhow::Result;
-use clap::ValueEnum;
-
 use crate::board::Board;
-use crate::build::{System, TARGET, cargo};
+use crate::build::{self, System, TARGET, cargo, cargo_with};
 use crate::cli::{TestArgs, TimingArgs};
+use crate::image;
 use crate::process::{find, processor_s, succeeds};
 use crate::setup::Setup;
 use crate::step::Step;
-use crate::{build, image};
+use anyhow::Result;
+use clap::ValueEnum;
+use std::process::Command;
+use std::time::{Duration, Instant};
 
 /// The packages by the commands that test them. Cargo unites the features of what it is asked for at once: with all of them in one
 /// command the rig and this program would be compiled anew, since `cargo rig` and `cargo xtask` ask for one package. The boards go with the
@@ -78,7 +76,7 @@ pub fn run(args: &TestArgs) -> Result<u8> {
 fn perform(step: Step, setup: &mut Setup) -> Result<Outcome> {
     let good = match step {
         Step::Fmt if !setup.component("fmt", "rustfmt") => return Ok(no_component("rustfmt")),
-        Step::Fmt => succeeds(cargo().args(["fmt", "--all", "--", "--check"]))?,
+        Step::Fmt => succeeds(&mut cargo_with("fmt --all -- --check"))?,
         Step::ClippyHost if !setup.component("clippy", "clippy") => return Ok(no_component("clippy")),
         // As released, like all that is built for this machine: macros and build scripts are then compiled once.
         Step::ClippyHost => lint(&mut cargo(), &["--release", "--workspace", "--all-targets"])?,
@@ -87,37 +85,29 @@ fn perform(step: Step, setup: &mut Setup) -> Result<Outcome> {
             if !setup.toolchain()?.has_clippy {
                 return Ok(Outcome::Skipped(format!("clippy needs rustup's target {TARGET}")));
             }
-            let mut good = true;
-            for (package, what) in on_target()? {
+            all(on_target()?, |(package, what)| {
                 let command = ["--release", "--target", TARGET, "--package", &package];
-                good &= lint(&mut cargo(), &[&command[..], what].concat())?;
-            }
-            good
+                lint(&mut cargo(), &[&command[..], what].concat())
+            })?
         }
         Step::Doc => {
-            let mut command = cargo();
-            command.env("RUSTDOCFLAGS", "-D warnings");
-            succeeds(command.args(["doc", "--release", "--no-deps", "--workspace"]))?
+            let mut command = cargo_with("doc --release --no-deps --workspace");
+            succeeds(command.env("RUSTDOCFLAGS", "-D warnings"))?
         }
-        Step::Host => {
-            let mut good = true;
-            for packages in together()? {
-                let named = packages.iter().flat_map(|package| ["--package", package.as_str()]);
-                good &= succeeds(cargo().args(["test", "--release"]).args(named))?;
-            }
-            good
-        }
+        Step::Host => all(together()?, |packages| {
+            let named = packages.iter().flat_map(|package| ["--package", package.as_str()]);
+            succeeds(cargo().args(["test", "--release"]).args(named))
+        })?,
         Step::Loom => {
-            let mut command = cargo();
-            command.env("RUSTFLAGS", "--cfg loom").args(["test", "--profile", "loom"]);
-            succeeds(command.args(["--package", "tractive-cells", "--test", "interleavings"]))?
+            let mut command = cargo_with("test --profile loom --package tractive-cells --test interleavings");
+            succeeds(command.env("RUSTFLAGS", "--cfg loom"))?
         }
         Step::Miri => {
             let Some(mut command) = setup.miri() else {
                 return Ok(Outcome::Skipped("cargo miri is not installed and cannot be added".to_owned()));
             };
-            command.args(["miri", "test", "--package", "tractive-cells", "--test", "threads"]);
-            succeeds(command.args(["--target-dir", "target/miri"]))?
+            let words = "miri test --package tractive-cells --test threads --target-dir target/miri";
+            succeeds(command.args(words.split(' ')))?
         }
         Step::Cells => crate::cells::check(setup)?,
         Step::Landings => crate::landings::check(setup)?,
@@ -128,24 +118,18 @@ fn perform(step: Step, setup: &mut Setup) -> Result<Outcome> {
             }
             true
         }
-        Step::ImageCheck => {
-            let mut good = true;
-            for system in System::ALL {
-                println!("{}:", system.image());
-                good &= image::check(&build::image(&setup.toolchain()?, system, None)?)?;
-            }
-            good
-        }
+        Step::ImageCheck => all(System::ALL, |system| {
+            println!("{}:", system.image());
+            image::check(&build::image(&setup.toolchain()?, system, None)?)
+        })?,
         Step::NucleoImage => {
-            let mut good = true;
-            for board in Board::all()? {
-                for system in System::ALL {
-                    println!("{}:", system.image_on(&board));
-                    let path = build::board_image(&setup.toolchain()?, &board, system, None)?;
-                    good &= image::check_board(&path, &board)?;
-                }
-            }
-            good
+            let boards = Board::all()?;
+            let images = boards.iter().flat_map(|board| System::ALL.map(|system| (board, system)));
+            all(images, |(board, system)| {
+                println!("{}:", system.image_on(board));
+                let path = build::board_image(&setup.toolchain()?, board, system, None)?;
+                image::check_board(&path, board)
+            })?
         }
         Step::OwnBoard => crate::own_board::check(setup)?,
         Step::Publish => crate::publish::check()?,
@@ -153,27 +137,13 @@ fn perform(step: Step, setup: &mut Setup) -> Result<Outcome> {
         Step::Book if find("mdbook").is_none() => {
             return Ok(Outcome::Skipped("mdbook is not installed (cargo install mdbook)".to_owned()));
         }
-        Step::Book => {
-            let docs = build::root().join("docs");
-            succeeds(Command::new("mdbook").arg("build").arg(docs))?
-        }
+        Step::Book => succeeds(Command::new("mdbook").arg("build").arg(build::root().join("docs")))?,
         Step::Qemu => {
-            let qemu = setup.qemu()?;
-            let toolchain = setup.toolchain()?;
-            let mut command = cargo();
+            let (qemu, toolchain) = (setup.qemu()?, setup.toolchain()?);
+            let mut command = cargo_with("test --release --package tractive-rig --test qemu -- --ignored");
             command.env("TRACTIVE_QEMU", qemu);
             command.env("TRACTIVE_IMAGE", build::image(&toolchain, System::Traction, None)?);
             command.env("TRACTIVE_ZS9_IMAGE", build::image(&toolchain, System::Zs9, None)?);
-            command.args([
-                "test",
-                "--release",
-                "--package",
-                "tractive-rig",
-                "--test",
-                "qemu",
-                "--",
-                "--ignored",
-            ]);
             succeeds(&mut command)?
         }
         Step::Timing => crate::timing::run(&TimingArgs::default())? == 0,
@@ -215,6 +185,11 @@ fn together() -> Result<Vec<Vec<String>>> {
 
 fn lint(command: &mut Command, what: &[&str]) -> Result<bool> {
     succeeds(command.arg("clippy").args(what).args(["--", "--deny", "warnings"]))
+}
+
+/// Checks every one, also behind one that is not good.
+fn all<T>(of: impl IntoIterator<Item = T>, mut check: impl FnMut(T) -> Result<bool>) -> Result<bool> {
+    of.into_iter().try_fold(true, |good, one| Ok(check(one)? && good))
 }
 
 fn no_component(component: &str) -> Outcome {

@@ -2,12 +2,11 @@
 
 pub mod cost;
 
-use std::collections::BTreeMap;
-
 use anyhow::{Context, Result};
 use capstone::arch::DetailsArchInsn;
 use capstone::arch::arm::{ArchExtraMode, ArchMode, ArmCC, ArmOperandType, ArmReg};
 use capstone::prelude::*;
+use std::collections::BTreeMap;
 
 /// The operands as they are written.
 pub type Operand = ArmOperandType;

@@ -18,3 +18,19 @@ pub fn cargo() -> Command {
     command.current_dir(root());
     command
 }
+
+/// The same with these words behind it.
+pub fn cargo_with(words: &str) -> Command {
+    let mut command = cargo();
+    command.args(words.split(' '));
+    command
+}
+
+/// The folders in one, by their names.
+pub fn folders(of: &Path) -> Vec<String> {
+    let entries = std::fs::read_dir(of).into_iter().flatten().flatten();
+    let folders = entries.filter(|entry| entry.path().is_dir());
+    let mut names: Vec<_> = folders.map(|folder| folder.file_name().to_string_lossy().into_owned()).collect();
+    names.sort_unstable();
+    names
+}

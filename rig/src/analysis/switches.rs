@@ -97,36 +97,23 @@ pub fn switch_verdicts(
     options: &RunOptions,
     machine: &Machine,
 ) -> Vec<Verdict> {
-    // One more than the frequency gives: both ends of a window may fall on a turn-on.
-    let most = (0.1 * machine.folder.parameters.max_switching_hz).floor() + 1.0;
+    let largest_nm = machine.folder.parameters.max_torque_nm;
     let excess = worst(switches.iter().map(|switch| switch.excess_percent));
+    // Of a wrong map it is asked that nothing trips.
+    let most_excess = if options.map_error == 0.0 { bound(options, 1.5, 3.0) } else { f64::INFINITY };
     let torque_nm = worst(switches.iter().map(|switch| switch.torque_excursion_nm));
+    let most_nm = bound(options, EXCURSION * largest_nm, f64::INFINITY);
+    let (hunts, turn_ons) = (hunts(recording) as f64, most_turn_ons(recording, 0.1) as f64);
+    // One more than the frequency gives: both ends of a window may fall on a turn-on.
+    let most_turn_ons = (0.1 * machine.folder.parameters.max_switching_hz).floor() + 1.0;
+    let current = "current over the larger steady envelope in %";
+    let torque = "torque beyond the steady ripple band in N·m";
+    let hunting = "hunting: switches back without a cause";
     vec![
-        Verdict::at_most(
-            "current over the larger steady envelope in %",
-            excess,
-            // Of a wrong map it is asked that nothing trips.
-            if options.map_error == 0.0 { bound(options, 1.5, 3.0) } else { f64::INFINITY },
-            "3.3 at 12 to 7, 2.35 at 3 to square",
-        ),
-        Verdict::at_most(
-            "torque beyond the steady ripple band in N·m",
-            torque_nm,
-            bound(options, EXCURSION * machine.folder.parameters.max_torque_nm, f64::INFINITY),
-            "31 up, 71 braking",
-        ),
-        Verdict::at_most(
-            "hunting: switches back without a cause",
-            hunts(recording) as f64,
-            0.0,
-            "41 switches in a sweep",
-        ),
-        Verdict::at_most(
-            "turn-ons in 100 ms",
-            most_turn_ons(recording, 0.1) as f64,
-            most,
-            "max_switching_hz",
-        ),
+        Verdict::at_most(current, excess, most_excess, "3.3 at 12 to 7, 2.35 at 3 to square"),
+        Verdict::at_most(torque, torque_nm, most_nm, "31 up, 71 braking"),
+        Verdict::at_most(hunting, hunts, 0.0, "41 switches in a sweep"),
+        Verdict::at_most("turn-ons in 100 ms", turn_ons, most_turn_ons, "max_switching_hz"),
     ]
 }
 

@@ -25,9 +25,6 @@ impl<S, R: Default> Conversions<S, R> {
 
     /// A sample is taken now. The report of the period before last must be there, because its command takes effect now; unless control
     /// does not come.
-    ///
-    /// # Errors
-    /// Where it is not.
     pub fn begin(&mut self, time: &Timeline, has_control: bool) -> Result<(), BenchError> {
         if self.samples.len() > 1 {
             if has_control {
@@ -45,9 +42,6 @@ impl<S, R: Default> Conversions<S, R> {
     }
 
     /// The sample of a step.
-    ///
-    /// # Errors
-    /// Where nothing was.
     pub fn ask(&mut self, asked: Tick) -> Result<S, BenchError> {
         while let Some((at, sample)) = self.samples.pop_front() {
             if at == asked {

@@ -44,8 +44,7 @@ use dc_side::DcSide;
 use rows::Rows;
 use tractive::modulation::CarrierHalf;
 use tractive::operator::{Feedback, Request, Status};
-use tractive::ports::Report;
-use tractive::ports::Sample;
+use tractive::ports::{Report, Sample};
 use tractive::protection::SafeState;
 use tractive::time::{Clock, Instant};
 
@@ -159,11 +158,6 @@ impl Bench {
             line.tell(tick, status);
         }
         Ok(())
-    }
-
-    /// Time since the recording's beginning, in s.
-    pub fn time_s(&self) -> f64 {
-        self.time.now_s()
     }
 
     /// The trace so far.

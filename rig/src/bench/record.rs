@@ -1,7 +1,7 @@
 //! The trace.
 
 use super::rows::Rows;
-use super::{Bench, LineSide, Simulated};
+use super::{Bench, LineSide, Simulated, Timeline};
 use crate::trace::{Recording, Row, Switch, Tick, degrees};
 use tractive::modulation::{CarrierHalf, Mode};
 use tractive::recorder::Record;
@@ -10,6 +10,10 @@ use tractive::time::Instant;
 impl Simulated for Bench {
     type Record = Record;
     type Recording = Recording;
+
+    fn time(&self) -> &Timeline {
+        &self.time
+    }
 
     fn is_done(&self) -> bool {
         self.time.now > self.end
@@ -21,14 +25,6 @@ impl Simulated for Bench {
 
     fn has_control(&self, instant: Instant) -> bool {
         self.spoiler.injected.has_control(self.instant_s(instant))
-    }
-
-    fn instant_s(&self, instant: Instant) -> f64 {
-        self.time.seconds(self.time.widen(instant))
-    }
-
-    fn slot_after(&self, slot: Instant) -> Instant {
-        self.time.slot_after(slot)
     }
 
     fn loads_from(&mut self, instant: Instant, [load_nm, _]: [f64; 2]) {

@@ -4,8 +4,7 @@ use super::{Bench, BenchError};
 use crate::inject::traction::Kind;
 use tractive::control::LinkWindow;
 use tractive::frames::Abc;
-use tractive::ports::Report;
-use tractive::ports::Sample;
+use tractive::ports::{Report, Sample};
 use tractive::protection::LegFaults;
 use tractive::time::Instant;
 

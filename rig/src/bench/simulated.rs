@@ -1,5 +1,6 @@
 //! A bench, as whoever runs a drive on it sees it.
 
+use super::Timeline;
 use tractive::time::Instant;
 
 /// A bench of either system.
@@ -9,6 +10,8 @@ pub trait Simulated {
     /// The recording of a run.
     type Recording;
 
+    /// Its time.
+    fn time(&self) -> &Timeline;
     /// `true` once the recording is complete.
     fn is_done(&self) -> bool;
     /// Share of the run that is done, 0 ..= 1.
@@ -16,9 +19,17 @@ pub trait Simulated {
     /// `true` if the control interrupt comes at this instant at all.
     fn has_control(&self, instant: Instant) -> bool;
     /// An instant near to now, in s from the recording's beginning.
-    fn instant_s(&self, instant: Instant) -> f64;
+    fn instant_s(&self, instant: Instant) -> f64 {
+        self.time().seconds(self.time().widen(instant))
+    }
     /// Beginning of the operator's slot after the one that begins at `slot`.
-    fn slot_after(&self, slot: Instant) -> Instant;
+    fn slot_after(&self, slot: Instant) -> Instant {
+        self.time().slot_after(slot)
+    }
+    /// Time since the recording's beginning, in s.
+    fn time_s(&self) -> f64 {
+        self.time().now_s()
+    }
     /// The rotors' loads from `instant` on, in N·m; of one rotor the first.
     fn loads_from(&mut self, instant: Instant, loads_nm: [f64; 2]);
     /// Ends the recording at `instant`.

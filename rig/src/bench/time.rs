@@ -71,9 +71,6 @@ impl Timeline {
     }
 
     /// The tick of an instant near to now from which on something is to hold.
-    ///
-    /// # Errors
-    /// Where that is over.
     pub fn coming(&self, from: Instant) -> Result<Tick, BenchError> {
         let step = self.widen(from);
         if step < self.now {

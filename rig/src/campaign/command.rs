@@ -2,11 +2,12 @@
 
 use super::judge::Verdict;
 use super::{Campaign, dual, healthy, report, traction};
+use crate::run::bar;
 use crate::without::Ablation;
 use anyhow::{Context, Result, bail};
 use clap::Args;
-use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -46,9 +47,6 @@ pub struct CampaignOptions {
 }
 
 /// Runs the campaign. Exit code 1 where a case is uncaught, or the document is not up to date.
-///
-/// # Errors
-/// Bad options, files that cannot be written, or a drive that breaks its bench's rules.
 pub fn run(options: &CampaignOptions) -> Result<ExitCode> {
     if let Some(minutes) = options.healthy {
         return drive_healthy(minutes, options);
@@ -62,11 +60,7 @@ pub fn run(options: &CampaignOptions) -> Result<ExitCode> {
         bail!("--only {}: no case has all of these words", options.only.join(" "));
     }
     std::fs::create_dir_all(&options.out).with_context(|| format!("--out {}", options.out.display()))?;
-    let bar = ProgressBar::new(cases.len() as u64);
-    if let Ok(style) = ProgressStyle::with_template("campaign [{bar:40}] {pos}/{len} {elapsed} (left {eta})")
-    {
-        bar.set_style(style);
-    }
+    let bar = bar(cases.len() as u64, "campaign [{bar:40}] {pos}/{len} {elapsed} (left {eta})");
     let outcomes = Campaign::new(options.without)?.run_all(&cases, || bar.inc(1))?;
     bar.finish_and_clear();
     let given = serde_json::json!({
@@ -76,11 +70,8 @@ pub fn run(options: &CampaignOptions) -> Result<ExitCode> {
     });
     report::write(&outcomes, given, &options.out)?;
     if options.json {
-        let totals = report::SYSTEMS.map(|(system, _)| (system.to_owned(), report::total(&outcomes, system)));
-        crate::say!(
-            "{}",
-            serde_json::to_string(&totals.into_iter().collect::<std::collections::BTreeMap<_, _>>())?
-        );
+        let totals = report::SYSTEMS.map(|(system, _)| (system, report::total(&outcomes, system)));
+        crate::say!("{}", serde_json::to_string(&BTreeMap::from(totals))?);
     } else {
         crate::say!("{}", report::text(&outcomes).trim_start());
         crate::say!("report: {}", options.out.join("report.html").display());

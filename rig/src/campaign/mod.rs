@@ -49,17 +49,11 @@ pub struct Campaign {
 
 impl Campaign {
     /// Both drives.
-    ///
-    /// # Errors
-    /// Machine folders that are not there.
     pub fn new(without: Option<Ablation>) -> Result<Self> {
         Ok(Self { traction: traction::Drive::new(without)?, dual: dual::Drive::new(without)? })
     }
 
     /// Runs one case.
-    ///
-    /// # Errors
-    /// A drive that breaks its bench's rules.
     pub fn run(&self, case: &Case) -> Result<Outcome> {
         match case {
             Case::Traction(case) => self.traction.run(case),
@@ -68,9 +62,6 @@ impl Campaign {
     }
 
     /// Runs many, on all cores, in their order; `after_each` is told of every one that is done.
-    ///
-    /// # Errors
-    /// The first drive that breaks its bench's rules.
     pub fn run_all(&self, cases: &[Case], after_each: impl Fn() + Sync) -> Result<Vec<Outcome>> {
         let run = |case: &Case| {
             let outcome = self.run(case).with_context(|| case.name());

@@ -10,8 +10,7 @@ pub use text::{headline, list, text};
 
 use crate::analysis::Figures;
 use crate::rows::Timed;
-use crate::trace::GATES;
-use crate::trace::{Recording, Row};
+use crate::trace::{GATES, Recording, Row};
 use anyhow::Result;
 use chart::{chart, legend, thinned};
 use std::fmt::Write as _;
@@ -64,12 +63,8 @@ impl Page {
 
     /// Torque and demand.
     pub fn torque(&mut self, recording: &Recording) {
-        self.plot(
-            "Torque",
-            "N·m",
-            recording,
-            &[("torque", |row| row.te_nm), ("demand", |row| row.te_ref_nm)],
-        );
+        let curves: [Curve; 2] = [("torque", |row| row.te_nm), ("demand", |row| row.te_ref_nm)];
+        self.plot("Torque", "N·m", recording, &curves);
     }
 
     /// The current of phase u.
@@ -119,27 +114,20 @@ impl Page {
 
     /// The flight recorder's records of a fault; nothing if there was none.
     pub fn recorder(&mut self, recording: &Recording) {
-        self.recorded(
-            &recording.recorded,
-            |record| record.state.fault,
-            &[
-                (
-                    "phase currents as sampled",
-                    "A",
-                    &[
-                        ("ia", |record: &Record| record.currents_a.a),
-                        ("ib", |record| record.currents_a.b),
-                        ("ic", |record| record.currents_a.c),
-                    ],
-                ),
-                ("current references", "A", &[("id", |record| record.id_a), ("iq", |record| record.iq_a)]),
-                (
-                    "DC link as sampled and commanded voltage",
-                    "V",
-                    &[("udc", |record| record.udc_v), ("u", |record| record.voltage_v)],
-                ),
-            ],
-        );
+        let panels: [Panel<Record>; 3] = [
+            (
+                "phase currents as sampled",
+                "A",
+                &[("ia", |of| of.currents_a.a), ("ib", |of| of.currents_a.b), ("ic", |of| of.currents_a.c)],
+            ),
+            ("current references", "A", &[("id", |of| of.id_a), ("iq", |of| of.iq_a)]),
+            (
+                "DC link as sampled and commanded voltage",
+                "V",
+                &[("udc", |of| of.udc_v), ("u", |of| of.voltage_v)],
+            ),
+        ];
+        self.recorded(&recording.recorded, |record| record.state.fault, &panels);
     }
 
     /// Panels of what a flight recorder holds, each with its unit and its curves; nothing without a fault.

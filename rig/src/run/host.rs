@@ -13,20 +13,11 @@ pub trait Interrupts {
     /// The instants of the next control and PWM interrupts.
     fn next_calls(&self) -> [Instant; 2];
     /// The PWM interrupt.
-    ///
-    /// # Errors
-    /// Where the bench cannot go on.
     fn pwm(&mut self, bench: &mut Self::Bench) -> Result<()>;
     /// The control interrupt, and the idle loop where it ends.
-    ///
-    /// # Errors
-    /// Where the bench or the supervisor cannot go on.
     fn control(&mut self, bench: &mut Self::Bench) -> Result<()>;
 
     /// Until the bench's recording is complete, or nobody wants to see more of it.
-    ///
-    /// # Errors
-    /// Where the bench or the supervisor cannot go on.
     fn drive(
         &mut self,
         bench: &mut Self::Bench,

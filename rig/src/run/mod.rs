@@ -35,10 +35,7 @@ pub(crate) fn refused(refused: Refused) -> anyhow::Error {
 
 /// The sender of commands over the protocol.
 pub trait Supervisor {
-    /// The slot that began at `t_s`: what is sent to the drive, and what happens to it.
-    ///
-    /// # Errors
-    /// Ends the run.
+    /// The slot that began at `t_s`: what is sent to the drive, and what happens to it. An error ends the run.
     fn slot(&mut self, t_s: f64) -> anyhow::Result<Turn>;
 
     /// A frame that the drive sends at `t_s`.
@@ -77,7 +74,16 @@ pub(crate) fn turn(
     Ok(turn.frame)
 }
 
-/// A bar on a terminal; in a pipe indicatif draws none.
+/// A bar of so many steps on a terminal; in a pipe indicatif draws none.
+pub(crate) fn bar(steps: u64, template: &str) -> ProgressBar {
+    let bar = ProgressBar::new(steps);
+    match ProgressStyle::with_template(template) {
+        Ok(style) => bar.with_style(style),
+        Err(_) => bar,
+    }
+}
+
+/// The progress of a run.
 pub(crate) struct Progress {
     bar: ProgressBar,
     calls: u32,
@@ -87,13 +93,8 @@ impl Progress {
     const STEPS: u64 = 1000;
 
     pub(crate) fn new(name: &str) -> Self {
-        let bar = ProgressBar::new(Self::STEPS).with_message(name.to_owned());
-        if let Ok(style) =
-            ProgressStyle::with_template("{msg:16} [{bar:40}] {percent:>3} % {elapsed} (left {eta})")
-        {
-            bar.set_style(style);
-        }
-        Self { bar, calls: 0 }
+        let template = "{msg:16} [{bar:40}] {percent:>3} % {elapsed} (left {eta})";
+        Self { bar: bar(Self::STEPS, template).with_message(name.to_owned()), calls: 0 }
     }
 
     pub(crate) fn show(&mut self, done: f64) {

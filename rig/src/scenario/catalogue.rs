@@ -3,8 +3,13 @@
 //! A command line is read twice: at first by one that knows the options of all scenarios, only to find the scenario's name
 //! among their values; then by the scenario's own, which knows nothing else.
 
-use super::traction::{self as traction, Traction};
-use super::zs9::{self as zs9, Zs9};
+use super::traction::{
+    Traction, acknowledge::Acknowledge, borders_timing::BordersTiming, characteristic::Characteristic,
+    chopper::Chopper, full_step::FullStep, link_steps::LinkSteps, load_steps::LoadSteps,
+    mode_borders::ModeBorders, precharge::Precharge, restart::Restart, reversal::Reversal, steady::Steady,
+    sweep::Sweep, timing::Timing,
+};
+use super::zs9::{self, Zs9, cycle::Cycle, load_step::LoadStep, reverse::Reverse};
 use super::{Choice, Scenario, System};
 use crate::options::{Options, RunOptions};
 use anyhow::{Result, anyhow, bail};
@@ -68,41 +73,26 @@ impl<S: System> Entry<S> {
 
 /// The PMaSynRM drive's.
 const TRACTION: [Entry<Traction>; 14] = [
-    Entry::of::<traction::LoadSteps>("load-steps", "figure 8: load steps at 200 r/min"),
-    Entry::of::<traction::Sweep>("sweep", "figure 9: sweep at full torque, and its changes of pulse pattern"),
-    Entry::of::<traction::Characteristic>(
+    Entry::of::<LoadSteps>("load-steps", "figure 8: load steps at 200 r/min"),
+    Entry::of::<Sweep>("sweep", "figure 9: sweep at full torque, and its changes of pulse pattern"),
+    Entry::of::<Characteristic>(
         "characteristic",
         "figure 10: torque accuracy and efficiency at the characteristic points",
     ),
-    Entry::of::<traction::FullStep>("full-step", "figure 8: load steps, here all of them in one"),
-    Entry::of::<traction::Steady>(
-        "steady",
-        "figures 6 and 7: current and spectrum of the mode in steady state",
-    ),
-    Entry::of::<traction::ModeBorders>(
+    Entry::of::<FullStep>("full-step", "figure 8: load steps, here all of them in one"),
+    Entry::of::<Steady>("steady", "figures 6 and 7: current and spectrum of the mode in steady state"),
+    Entry::of::<ModeBorders>(
         "mode-borders",
         "figure 9: changes of pulse pattern, here at constant speed by torque alone",
     ),
-    Entry::of::<traction::Reversal>("reversal", "figure 9d: square wave, here with its torque reversed"),
-    Entry::of::<traction::Restart>("restart", "figure 9: the modes, here each caught from coasting"),
-    Entry::of::<traction::LinkSteps>("link-steps", "figure 9: the modes, here with a DC link that steps"),
-    Entry::of::<traction::Precharge>(
-        "precharge",
-        "no figure: from power-up to running and back to an empty link",
-    ),
-    Entry::of::<traction::Chopper>(
-        "chopper",
-        "no figure: full braking into a link that cannot take the energy",
-    ),
-    Entry::of::<traction::Acknowledge>(
-        "acknowledge",
-        "no figure: a gate driver fails, and the fault is acknowledged",
-    ),
-    Entry::of::<traction::Timing>(
-        "timing",
-        "no figure: every mode in half a second, for `cargo xtask timing`",
-    ),
-    Entry::of::<traction::BordersTiming>(
+    Entry::of::<Reversal>("reversal", "figure 9d: square wave, here with its torque reversed"),
+    Entry::of::<Restart>("restart", "figure 9: the modes, here each caught from coasting"),
+    Entry::of::<LinkSteps>("link-steps", "figure 9: the modes, here with a DC link that steps"),
+    Entry::of::<Precharge>("precharge", "no figure: from power-up to running and back to an empty link"),
+    Entry::of::<Chopper>("chopper", "no figure: full braking into a link that cannot take the energy"),
+    Entry::of::<Acknowledge>("acknowledge", "no figure: a gate driver fails, and the fault is acknowledged"),
+    Entry::of::<Timing>("timing", "no figure: every mode in half a second, for `cargo xtask timing`"),
+    Entry::of::<BordersTiming>(
         "borders-timing",
         "no figure: modes that change again and again, for `cargo xtask test`",
     ),
@@ -110,14 +100,14 @@ const TRACTION: [Entry<Traction>; 14] = [
 
 /// The ZS9's.
 const ZS9: [Entry<Zs9>; 5] = [
-    Entry::of::<zs9::LoadStep>("zs9-load-step", "figures 14 to 19: motor 2's load steps, motor 1 goes on"),
-    Entry::of::<zs9::Reverse>("zs9-reverse", "figures 20 to 23: motor 2 reverses, motor 1 goes on"),
-    Entry::of::<zs9::Cycle>(
+    Entry::of::<LoadStep>("zs9-load-step", "figures 14 to 19: motor 2's load steps, motor 1 goes on"),
+    Entry::of::<Reverse>("zs9-reverse", "figures 20 to 23: motor 2 reverses, motor 1 goes on"),
+    Entry::of::<Cycle>(
         "zs9-cycle",
         "figures 24 to 36: the whole cycle, full torque, constant power, cruise, brake",
     ),
-    Entry::of::<zs9::Steady>("zs9-steady", "table 1: harmonics of both motors' currents by scheme"),
-    Entry::of::<zs9::Timing>(
+    Entry::of::<zs9::steady::Steady>("zs9-steady", "table 1: harmonics of both motors' currents by scheme"),
+    Entry::of::<zs9::timing::Timing>(
         "zs9-timing",
         "no figure: motoring, weakening and braking in a tenth of a second, for `cargo xtask timing`",
     ),
@@ -177,10 +167,7 @@ fn program() -> String {
     std::env::var("TRACTIVE_PROGRAM").unwrap_or("cargo rig".to_owned()) + " run"
 }
 
-/// Reads the words behind `run`.
-///
-/// # Errors
-/// Bad usage: clap's own where it says more than a line, or help that was asked for.
+/// Reads the words behind `run`. The error is clap's own where it says more than a line, or help that was asked for.
 pub fn choose<W: Into<OsString>>(words: impl IntoIterator<Item = W>) -> Result<Chosen> {
     let words: Vec<_> = words.into_iter().map(Into::into).collect();
     let Some(name) = name(&words) else { return Err(help().into()) };
@@ -206,10 +193,7 @@ fn matches(command: Command, name: &str, words: &[OsString]) -> Result<ArgMatche
     })
 }
 
-/// A scenario of the PMaSynRM drive, by the words behind `run`.
-///
-/// # Errors
-/// Bad usage, or a scenario of the other system.
+/// A scenario of the PMaSynRM drive, by the words behind `run`. One of the other system is an error.
 pub fn of_traction(line: &str) -> Result<Choice<Traction>> {
     match choose(line.split_whitespace())? {
         Chosen::Traction(choice) => Ok(choice),
@@ -217,10 +201,7 @@ pub fn of_traction(line: &str) -> Result<Choice<Traction>> {
     }
 }
 
-/// A scenario of the ZS9, by the words behind `run`.
-///
-/// # Errors
-/// Bad usage, or a scenario of the other system.
+/// A scenario of the ZS9, by the words behind `run`. One of the other system is an error.
 pub fn of_zs9(line: &str) -> Result<Choice<Zs9>> {
     match choose(line.split_whitespace())? {
         Chosen::Zs9(choice) => Ok(choice),

@@ -16,9 +16,6 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 /// Runs what the words behind `run` say. Exit code 1 where the drive tripped or a bound is not kept.
-///
-/// # Errors
-/// Bad usage, bad input, or a run that cannot go on.
 pub fn run(words: Vec<OsString>) -> Result<ExitCode> {
     match catalogue::choose(words)? {
         Chosen::Traction(choice) => run_choice(&choice),
@@ -57,9 +54,6 @@ fn run_choice<S: System>(choice: &Choice<S>) -> Result<ExitCode> {
 }
 
 /// The folder for the files of a run, made.
-///
-/// # Errors
-/// A folder that cannot be made.
 pub fn folder(name: &str, options: &RunOptions) -> Result<PathBuf> {
     let usual = || std::env::var_os("TRACTIVE_OUT").map_or("target/tractive".into(), PathBuf::from);
     let out = options.out.clone().unwrap_or_else(|| usual().join(name));
@@ -68,9 +62,6 @@ pub fn folder(name: &str, options: &RunOptions) -> Result<PathBuf> {
 }
 
 /// The figures, and the run that they come from.
-///
-/// # Errors
-/// Options that are no JSON.
 pub fn summary<S: System>(choice: &Choice<S>, figures: &Figures, machine: &Machine) -> Result<Value> {
     // The summary shows what was used, not that nothing was said.
     let mut options = serde_json::to_value(choice.with_step())?;
@@ -89,9 +80,6 @@ pub fn summary<S: System>(choice: &Choice<S>, figures: &Figures, machine: &Machi
 }
 
 /// Writes the recording's files and the report.
-///
-/// # Errors
-/// A file that cannot be written.
 pub fn write<S: System>(
     choice: &Choice<S>,
     recording: &S::Recording,
@@ -107,8 +95,7 @@ pub fn write<S: System>(
     }
     let mut page = Page::new(choice.name, choice.figure);
     S::draw_recorder(recording, &mut page);
-    choice.scenario.plots(recording, &mut page);
-    choice.scenario.plots_beside(recording, &choice.with_step(), machine, &mut page);
+    choice.scenario.plots(recording, &choice.with_step(), machine, &mut page);
     let subtitle = format!("tractive {}, run on {}", env!("CARGO_PKG_VERSION"), choice.options.on.name());
     write_text(&out.join("report.html"), &page.finish(&subtitle, figures)?)
 }

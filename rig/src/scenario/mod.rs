@@ -32,14 +32,8 @@ pub trait System: Sized + 'static {
     /// Step of the trace unless options or scenario say another, in s.
     fn trace_step_s(own: &Self::Own) -> f64;
     /// Checks that options are within their ranges; `scenario` are those of the scenario itself, by name.
-    ///
-    /// # Errors
-    /// The first one that is not, by name.
     fn check(options: &Options<Self::Own>, scenario: &Map<String, Value>, machine: &Machine) -> Result<()>;
     /// Drives a plan, on the host or in QEMU; with a supervisor over the protocol until it ends the run.
-    ///
-    /// # Errors
-    /// Bad input, or a drive that breaks the bench's rules.
     fn run(
         name: &str,
         plan: Self::Plan,
@@ -52,9 +46,6 @@ pub trait System: Sized + 'static {
     /// Draws what the flight recorder holds of a fault; nothing if there was none.
     fn draw_recorder(recording: &Self::Recording, page: &mut Page);
     /// One picture of the whole run, if the system has one.
-    ///
-    /// # Errors
-    /// A plot that cannot be drawn.
     fn overview(_recording: &Self::Recording) -> Result<Option<String>> {
         Ok(None)
     }
@@ -73,9 +64,7 @@ pub trait Scenario<S: System> {
         S::trace_step_s(own)
     }
     /// The plots to draw.
-    fn plots(&self, recording: &S::Recording, page: &mut Page);
-    /// Plots for which options and machine must be known.
-    fn plots_beside(&self, _: &S::Recording, _: &Options<S::Own>, _: &Machine, _page: &mut Page) {}
+    fn plots(&self, recording: &S::Recording, options: &Options<S::Own>, machine: &Machine, page: &mut Page);
 }
 
 /// A scenario that was chosen, with its options.
@@ -99,17 +88,11 @@ impl<S: System> Choice<S> {
     }
 
     /// The machine.
-    ///
-    /// # Errors
-    /// A folder that is none.
     pub fn machine(&self) -> Result<Machine> {
         Machine::load(self.machine_name())
     }
 
     /// Drives it.
-    ///
-    /// # Errors
-    /// Options out of range, or a drive that breaks the bench's rules.
     pub fn drive(&self, machine: &Machine) -> Result<S::Recording> {
         S::check(&self.options, &self.own, machine)?;
         drive(self.name, self.scenario.as_ref(), &self.options, machine)
@@ -132,9 +115,6 @@ fn with_step<S: System>(scenario: &dyn Scenario<S>, options: &Options<S::Own>) -
 }
 
 /// Drives a scenario with options that are within their ranges.
-///
-/// # Errors
-/// Bad input, or a drive that breaks the bench's rules.
 pub fn drive<S: System>(
     name: &str,
     scenario: &dyn Scenario<S>,

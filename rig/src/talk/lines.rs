@@ -16,10 +16,7 @@ pub enum Lines {
 }
 
 impl Lines {
-    /// A script's.
-    ///
-    /// # Errors
-    /// Names the file, the line and the word.
+    /// A script's. The error names the file, the line and the word.
     pub fn of_script(path: &Path, system: System) -> Result<Self> {
         let text = std::fs::read_to_string(path).with_context(|| path.display().to_string())?;
         let lines = script::script(&text, system).with_context(|| path.display().to_string())?;
@@ -31,10 +28,8 @@ impl Lines {
         matches!(self, Self::Typed(_))
     }
 
-    /// The next line; `None` at the end.
-    ///
-    /// # Errors
-    /// A line that cannot be understood; on a terminal it is said and the next one is read.
+    /// The next line; `None` at the end. A line that cannot be understood is an error; on a terminal it is said and the next one
+    /// is read.
     pub fn take(&mut self, system: System) -> Result<Option<Line>> {
         let count = match self {
             Self::Script(lines) => return Ok(lines.pop_front()),

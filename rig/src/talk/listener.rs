@@ -183,7 +183,6 @@ impl Listener {
 
     /// The present value of a column.
     pub fn value(&self, column: &str) -> String {
-        let index = self.system.columns().iter().position(|name| *name == column);
-        index.map_or(String::new(), |index| self.row(0.0)[index].clone())
+        self.system.column(column).map_or(String::new(), |index| self.row(0.0)[index].clone())
     }
 }

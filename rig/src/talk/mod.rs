@@ -18,7 +18,6 @@ pub use system::System;
 
 use crate::analysis::Figures;
 use crate::bench::LinePlan;
-use crate::files;
 use crate::machine::Machine;
 use crate::options::{Options, RunOptions};
 use crate::plant::SpeedSource;
@@ -26,7 +25,7 @@ use crate::scenario::System as _;
 use crate::scenario::traction::{self, Traction, scaled_link};
 use crate::scenario::zs9::{self as dual, Zs9};
 use crate::trace::{Recording, name_of};
-use crate::zs9;
+use crate::{files, zs9};
 use anyhow::Result;
 use serde_json::Map;
 use std::path::Path;
@@ -40,9 +39,6 @@ const TRACE_STEP_S: f64 = 1e-3;
 const LONGEST_S: f64 = 86_400.0;
 
 /// Talks.
-///
-/// # Errors
-/// A bad script, or a run that could not go on.
 pub fn run(options: &TalkOptions) -> Result<Outcome> {
     let system = options.system;
     let lines = match options.script.as_deref() {
@@ -126,9 +122,6 @@ fn figures(talk: &Talk, recording: &Happened) -> Figures {
 }
 
 /// Writes telemetry.csv, frames.log, trace.csv, recorder.csv after a fault, summary.json and report.html into a folder that exists.
-///
-/// # Errors
-/// A file that cannot be written.
 pub fn write(options: &TalkOptions, outcome: &Outcome, out: &Path) -> Result<()> {
     let Outcome { talk, system, recording, figures } = outcome;
     files::write_whole(&out.join("telemetry.csv"), |file| {

@@ -10,14 +10,14 @@ use anyhow::Result;
 type Points = Vec<(f64, f64)>;
 
 fn told(outcome: &Outcome, column: &str) -> Points {
-    let index = outcome.system.columns().iter().position(|name| *name == column).unwrap_or(0);
+    let index = outcome.system.column(column).unwrap_or(0);
     let number = |row: &Vec<String>| Some((row[0].parse().ok()?, row[index].parse().ok()?));
     outcome.talk.rows.iter().filter_map(number).collect()
 }
 
 /// The place of a name in a list, over time.
 fn named(outcome: &Outcome, column: &str, names: &[&str]) -> Points {
-    let index = outcome.system.columns().iter().position(|name| *name == column).unwrap_or(0);
+    let index = outcome.system.column(column).unwrap_or(0);
     let place = |row: &Vec<String>| {
         let place = names.iter().position(|name| *name == row[index])?;
         Some((row[0].parse().ok()?, place as f64))
@@ -68,19 +68,11 @@ pub(super) fn page(options: &TalkOptions, outcome: &Outcome) -> Result<String> {
         Happened::Zs9(recording) => dual(&mut page, outcome, recording),
     }
     let states: Vec<_> = tractive::operator::State::ALL.iter().map(|state| state.name()).collect();
-    page.curves(
-        &format!("State ({})", listed(&states)),
-        TIME,
-        "",
-        &[("state", named(outcome, "state", &states))],
-    );
+    let state = [("state", named(outcome, "state", &states))];
+    page.curves(&format!("State ({})", listed(&states)), TIME, "", &state);
     let listening: Vec<_> = tractive::protocol::Listening::ALL.iter().map(|(_, name)| *name).collect();
-    page.curves(
-        &format!("Commands ({})", listed(&listening)),
-        TIME,
-        "",
-        &[("listening", named(outcome, "listening", &listening))],
-    );
+    let commands = [("listening", named(outcome, "listening", &listening))];
+    page.curves(&format!("Commands ({})", listed(&listening)), TIME, "", &commands);
     let causes = ["unknown", "truncated", "corrupted", "repeated", "disordered", "out_of_range"];
     let rejected: Vec<_> = causes.iter().map(|cause| (*cause, told(outcome, cause))).collect();
     page.curves("Frames rejected", TIME, "", &rejected);

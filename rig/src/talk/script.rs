@@ -248,10 +248,7 @@ fn action(name: &str, words: &mut Words, system: System) -> Result<Action> {
     }
 }
 
-/// One line; `None` if there is nothing on it.
-///
-/// # Errors
-/// Names the line, the word, and what is allowed.
+/// One line; `None` if there is nothing on it. The error names the line, the word, and what is allowed.
 pub fn line(text: &str, number: usize, system: System) -> Result<Option<Line>> {
     let columns = system.columns();
     let text = text.split('#').next().unwrap_or_default().trim();
@@ -277,10 +274,7 @@ pub fn line(text: &str, number: usize, system: System) -> Result<Option<Line>> {
     parse().with_context(|| format!("line {number}")).map(Some)
 }
 
-/// A whole script.
-///
-/// # Errors
-/// As [`line()`], and times that go back.
+/// A whole script. Times that go back are an error too.
 pub fn script(text: &str, system: System) -> Result<Vec<Line>> {
     let mut lines = Vec::new();
     let mut last_s = 0.0;

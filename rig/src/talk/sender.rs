@@ -76,17 +76,20 @@ pub struct Sender {
     pub link: Option<LinkLimits>,
     /// Link voltage to repeat.
     pub link_ref: Option<Zs9Link>,
-    requests: VecDeque<ParameterRequest>,
+    /// Parameters to ask for.
+    pub requests: VecDeque<ParameterRequest>,
     kept: VecDeque<Frame>,
     /// Frames to send besides.
     extra: VecDeque<Extra>,
-    corrupt: u32,
-    truncate: u32,
+    /// Commands in each of which a bit is still to be turned.
+    pub corrupt: u32,
+    /// Commands that are still to be cut short.
+    pub truncate: u32,
     turned: u32,
     /// The command that waits for the next one to go first: `Some(None)` before it has come.
-    held: Option<Option<Frame>>,
+    pub held: Option<Option<Frame>>,
     /// The first slot in which something is sent again.
-    silent_until: u64,
+    pub silent_until: u64,
 }
 
 impl Sender {
@@ -123,29 +126,9 @@ impl Sender {
         Ok(Some(message.frame(content, &mut self.link_limits)))
     }
 
-    /// Asks for a parameter.
-    pub fn request(&mut self, request: ParameterRequest) {
-        self.requests.push_back(request);
-    }
-
-    /// Turns a bit in each of the next commands.
-    pub fn corrupt(&mut self, count: u32) {
-        self.corrupt += count;
-    }
-
-    /// Cuts the next commands short.
-    pub fn truncate(&mut self, count: u32) {
-        self.truncate += count;
-    }
-
     /// Sends the newest commands again, the newest first.
     pub fn replay(&mut self, count: u32) {
         self.extra.extend((0..count as usize).map(Extra::Old));
-    }
-
-    /// Swaps the next two commands.
-    pub fn reorder(&mut self) {
-        self.held = Some(None);
     }
 
     /// Sends frames that nobody knows.
@@ -159,15 +142,7 @@ impl Sender {
         self.extra.extend((0..count).map(|_| Extra::OutOfRange));
     }
 
-    /// Sends nothing before this slot.
-    pub fn be_silent_until(&mut self, slot: u64) {
-        self.silent_until = slot;
-    }
-
-    /// The frame of a slot.
-    ///
-    /// # Errors
-    /// A value that its signal cannot carry.
+    /// The frame of a slot. Fails with a value that its signal cannot carry.
     pub fn step(&mut self, slot: u64, command: &Spoken) -> Result<Option<Frame>, OutOfRange> {
         if slot < self.silent_until {
             return Ok(None);

@@ -178,13 +178,13 @@ impl Talk {
             Action::Write(parameter, value) => {
                 self.ask(ParameterRequest { parameter: *parameter, write: Some(*value) });
             }
-            Action::Corrupt(count) => self.sender.corrupt(*count),
-            Action::Truncate(count) => self.sender.truncate(*count),
+            Action::Corrupt(count) => self.sender.corrupt += count,
+            Action::Truncate(count) => self.sender.truncate += count,
             Action::Replay(count) => self.sender.replay(*count),
-            Action::Reorder => self.sender.reorder(),
+            Action::Reorder => self.sender.held = Some(None),
             Action::OutOfRange(count) => self.sender.out_of_range(*count),
             Action::Unknown(count) => self.sender.unknown(*count),
-            Action::Drop(ms) => self.sender.be_silent_until(self.slot + u64::from(*ms)),
+            Action::Drop(ms) => self.sender.silent_until = self.slot + u64::from(*ms),
             Action::Wait(wait_s) => self.wait_until_s = t_s + wait_s,
             Action::Expect(expectation) => self.expect(line, expectation),
             Action::End => self.ended = true,
@@ -198,8 +198,7 @@ impl Talk {
 
     /// The first request after a silence only sets the drive's counter, so something is read before.
     fn ask(&mut self, request: ParameterRequest) {
-        self.sender.request(ParameterRequest { write: None, ..request });
-        self.sender.request(request);
+        self.sender.requests.extend([ParameterRequest { write: None, ..request }, request]);
     }
 
     fn expect(&mut self, line: &Line, expectation: &Expectation) {

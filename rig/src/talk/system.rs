@@ -12,11 +12,18 @@ pub enum System {
 
 impl System {
     /// Columns of its telemetry.csv.
-    pub fn columns(self) -> &'static [&'static str] {
-        match self {
-            Self::Pmasynrm => &COLUMNS,
-            Self::Zs9 => &ZS9_COLUMNS,
-        }
+    pub fn columns(self) -> Vec<&'static str> {
+        let (pattern, measured) = match self {
+            Self::Pmasynrm => ("mode", MEASURED),
+            Self::Zs9 => ("scheme", ZS9_MEASURED),
+        };
+        let parts = ["t_s state", pattern, STATUS, measured, COUNTS];
+        parts.iter().flat_map(|part| part.split(' ')).collect()
+    }
+
+    /// The place of a column.
+    pub fn column(self, name: &str) -> Option<usize> {
+        self.columns().iter().position(|column| *column == name)
     }
 
     /// As on the command line.
@@ -36,76 +43,12 @@ impl System {
     }
 }
 
-/// The columns of telemetry.csv of the ZS9.
-pub const ZS9_COLUMNS: [&str; 35] = columns(
-    "scheme",
-    [
-        "speed1_rpm",
-        "torque1_nm",
-        "current1_a",
-        "speed2_rpm",
-        "torque2_nm",
-        "current2_a",
-        "link_v",
-        "capacitor_v",
-        "duty_percent",
-    ],
-);
-
-/// The columns of telemetry.csv.
-pub const COLUMNS: [&str; 35] = columns(
-    "mode",
-    [
-        "speed_rpm",
-        "torque_nm",
-        "link_v",
-        "current_a",
-        "id_ref_a",
-        "iq_ref_a",
-        "voltage_v",
-        "frequency_hz",
-        "temperature_c",
-    ],
-);
-
-/// The columns with a system's name of how the gates are played, and what it measures.
-const fn columns(pattern: &'static str, measured: [&'static str; 9]) -> [&'static str; 35] {
-    let [a, b, c, d, e, f, g, h, i] = measured;
-    [
-        "t_s",
-        "state",
-        pattern,
-        "listening",
-        "fault",
-        "fault_value",
-        "fault_limit",
-        "refusal",
-        "refusals",
-        "precharge",
-        "main",
-        "discharge",
-        "chopper_percent",
-        a,
-        b,
-        c,
-        d,
-        e,
-        f,
-        g,
-        h,
-        i,
-        "received",
-        "taken",
-        "lost",
-        "unknown",
-        "truncated",
-        "corrupted",
-        "repeated",
-        "disordered",
-        "out_of_range",
-        "parameter",
-        "parameter_value",
-        "parameter_result",
-        "telemetry_errors",
-    ]
-}
+/// Columns of the status behind the pulse pattern, of what each system measures, and of what became of frames and parameters.
+const STATUS: &str =
+    "listening fault fault_value fault_limit refusal refusals precharge main discharge chopper_percent";
+const MEASURED: &str =
+    "speed_rpm torque_nm link_v current_a id_ref_a iq_ref_a voltage_v frequency_hz temperature_c";
+const ZS9_MEASURED: &str = "speed1_rpm torque1_nm current1_a speed2_rpm torque2_nm current2_a \
+    link_v capacitor_v duty_percent";
+const COUNTS: &str = "received taken lost unknown truncated corrupted repeated disordered out_of_range \
+    parameter parameter_value parameter_result telemetry_errors";

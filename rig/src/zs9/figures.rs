@@ -2,7 +2,7 @@
 
 use super::trace::{Recording, Row};
 use crate::analysis::Figures;
-use crate::report::{self, Page};
+use crate::report::{self, Page, Panel};
 use crate::rows::{between, mean};
 use crate::trace::Recorded;
 use core::f64::consts::TAU;
@@ -13,6 +13,17 @@ pub type Curve<'a> = report::Curve<'a, Row>;
 
 /// The paper's figure that a plot answers, its title, its unit.
 pub type Heading<'a> = (&'a str, &'a str, &'a str);
+
+/// The motors' torques.
+pub const TORQUES: [Curve; 2] =
+    [("motor 1", |row| row.motors[0].torque_nm), ("motor 2", |row| row.motors[1].torque_nm)];
+/// The motors' speeds.
+pub const SPEEDS: [Curve; 2] =
+    [("motor 1", |row| row.motors[0].speed_rpm), ("motor 2", |row| row.motors[1].speed_rpm)];
+/// The voltages of the link and of the capacitors.
+pub const VOLTAGES: [Curve; 2] = [("U_in", |row| row.link_v), ("U_c", |row| row.capacitor_v)];
+/// The current of the inductors.
+pub const INDUCTOR: [Curve; 1] = [("i_L", |row| row.inductor_a)];
 
 /// Figures of every scenario.
 pub fn common(recording: &Recording) -> Figures {
@@ -91,53 +102,30 @@ fn phase_curves<const K: usize>() -> [Curve<'static>; 3] {
 }
 
 /// A curve of motor 1 over its speed.
-pub fn over_speed(page: &mut Page, (figure, title, unit): Heading, rows: &[Row], value: fn(&Row) -> f64) {
+pub fn over_speed(page: &mut Page, (figure, title, unit): Heading, rows: &[Row], (name, value): &Curve) {
     let every = rows.len().div_ceil(1500).max(1);
     let points = rows.iter().step_by(every).map(|row| (row.motors[0].speed_rpm, value(row)));
-    page.draw_xy(figure, title, ("speed in r/min", unit), &[("motor 1".to_owned(), points.collect())]);
+    page.draw_xy(figure, title, ("speed in r/min", unit), &[((*name).to_owned(), points.collect())]);
 }
 
 /// The flight recorder's records of a fault; nothing if there was none.
 pub fn recorder(page: &mut Page, recording: &Recording) {
-    page.recorded(
-        &recording.recorded,
-        |record| record.state.fault,
-        &[
-            (
-                "the upper motor's currents as sampled",
-                "A",
-                &[
-                    ("ia", |record: &DualRecord| record.currents_a[0].a),
-                    ("ib", |record| record.currents_a[0].b),
-                    ("ic", |record| record.currents_a[0].c),
-                ],
-            ),
-            (
-                "the lower motor's currents as sampled",
-                "A",
-                &[
-                    ("ia", |record| record.currents_a[1].a),
-                    ("ib", |record| record.currents_a[1].b),
-                    ("ic", |record| record.currents_a[1].c),
-                ],
-            ),
-            (
-                "torque references",
-                "N·m",
-                &[
-                    ("upper motor", |record| record.torque_nm[0]),
-                    ("lower motor", |record| record.torque_nm[1]),
-                ],
-            ),
-            (
-                "link, capacitors, source as sampled",
-                "V",
-                &[
-                    ("U_in", |record| record.link_v()),
-                    ("U_c", |record| record.capacitor_v),
-                    ("U_dc", |record| record.source_v),
-                ],
-            ),
-        ],
-    );
+    let currents = |[a, b, c]: [fn(&DualRecord) -> f32; 3]| [("ia", a), ("ib", b), ("ic", c)];
+    let upper = currents([|of| of.currents_a[0].a, |of| of.currents_a[0].b, |of| of.currents_a[0].c]);
+    let lower = currents([|of| of.currents_a[1].a, |of| of.currents_a[1].b, |of| of.currents_a[1].c]);
+    let panels: [Panel<DualRecord>; 4] = [
+        ("the upper motor's currents as sampled", "A", &upper),
+        ("the lower motor's currents as sampled", "A", &lower),
+        (
+            "torque references",
+            "N·m",
+            &[("upper motor", |of| of.torque_nm[0]), ("lower motor", |of| of.torque_nm[1])],
+        ),
+        (
+            "link, capacitors, source as sampled",
+            "V",
+            &[("U_in", DualRecord::link_v), ("U_c", |of| of.capacitor_v), ("U_dc", |of| of.source_v)],
+        ),
+    ];
+    page.recorded(&recording.recorded, |record| record.state.fault, &panels);
 }

@@ -1,5 +1,6 @@
 //! The files that a run of the ZS9 leaves behind. Files are written whole or not at all.
 
+use crate::columns;
 use crate::files::{Cell, Columns, write_edges, write_recorder, write_rows};
 use crate::rows::Timed;
 use crate::trace::{Recorded, degrees, name_of};
@@ -99,62 +100,37 @@ impl Row {
         let number = |value: f64| Cell::plain(value as f32);
         let [a1, b1, c1] = one.phases_a.map(number);
         let [a2, b2, c2] = two.phases_a.map(number);
-        Columns([
-            ("t_s", Cell::short(self.t_s, 1e9)),
-            ("speed1_rpm", number(one.speed_rpm)),
-            ("speed2_rpm", number(two.speed_rpm)),
-            ("te1_ref_nm", number(one.torque_ref_nm)),
-            ("te2_ref_nm", number(two.torque_ref_nm)),
-            ("te1_nm", number(one.torque_nm)),
-            ("te2_nm", number(two.torque_nm)),
-            ("id1_a", number(one.id_a)),
-            ("iq1_a", number(one.iq_a)),
-            ("id2_a", number(two.id_a)),
-            ("iq2_a", number(two.iq_a)),
-            ("ia1_a", a1),
-            ("ib1_a", b1),
-            ("ic1_a", c1),
-            ("ia2_a", a2),
-            ("ib2_a", b2),
-            ("ic2_a", c2),
-            ("uin_v", number(self.link_v)),
-            ("vc_v", number(self.capacitor_v)),
-            ("il_a", number(self.inductor_a)),
-            ("udc_v", number(self.source_v)),
-            ("d_sh", number(self.duty)),
-            ("scheme", self.scheme.name().into()),
-            ("tl1_nm", number(one.load_nm)),
-            ("tl2_nm", number(two.load_nm)),
-            ("fault", name_of(self.trip).into()),
-        ])
+        columns! {
+            t_s: Cell::short(self.t_s, 1e9),
+            speed1_rpm: number(one.speed_rpm), speed2_rpm: number(two.speed_rpm),
+            te1_ref_nm: number(one.torque_ref_nm), te2_ref_nm: number(two.torque_ref_nm),
+            te1_nm: number(one.torque_nm), te2_nm: number(two.torque_nm),
+            id1_a: number(one.id_a), iq1_a: number(one.iq_a),
+            id2_a: number(two.id_a), iq2_a: number(two.iq_a),
+            ia1_a: a1, ib1_a: b1, ic1_a: c1, ia2_a: a2, ib2_a: b2, ic2_a: c2,
+            uin_v: number(self.link_v), vc_v: number(self.capacitor_v),
+            il_a: number(self.inductor_a), udc_v: number(self.source_v),
+            d_sh: number(self.duty), scheme: self.scheme.name(),
+            tl1_nm: number(one.load_nm), tl2_nm: number(two.load_nm), fault: name_of(self.trip),
+        }
     }
 }
 
 fn recorder_columns((t_s, record): &(f64, DualRecord)) -> Columns<20> {
     let DualRecord { currents_a: [one, two], angles: [angle1, angle2], torque_nm, state, .. } = record;
     let [angle1, angle2] = [angle1, angle2].map(|angle| Cell::plain(degrees(*angle) as f32));
-    Columns([
-        ("t_s", Cell::short(*t_s, 1e9)),
-        ("ia1_a", Cell::plain(one.a)),
-        ("ib1_a", Cell::plain(one.b)),
-        ("ic1_a", Cell::plain(one.c)),
-        ("ia2_a", Cell::plain(two.a)),
-        ("ib2_a", Cell::plain(two.b)),
-        ("ic2_a", Cell::plain(two.c)),
-        ("angle1_deg", angle1),
-        ("angle2_deg", angle2),
-        ("uin_v", Cell::plain(record.link_v())),
-        ("vc_v", Cell::plain(record.capacitor_v)),
-        ("udc_v", Cell::plain(record.source_v)),
-        ("il_a", Cell::plain(record.inductor_a)),
-        ("te1_ref_nm", Cell::plain(torque_nm[0])),
-        ("te2_ref_nm", Cell::plain(torque_nm[1])),
-        ("d_sh", Cell::plain(record.duty)),
-        ("scheme", state.scheme.name().into()),
-        ("enabled", state.enabled.into()),
-        ("pulsing", state.pulsing.into()),
-        ("fault", state.fault.map_or("", |fault| fault.name()).into()),
-    ])
+    columns! {
+        t_s: Cell::short(*t_s, 1e9),
+        ia1_a: Cell::plain(one.a), ib1_a: Cell::plain(one.b), ic1_a: Cell::plain(one.c),
+        ia2_a: Cell::plain(two.a), ib2_a: Cell::plain(two.b), ic2_a: Cell::plain(two.c),
+        angle1_deg: angle1, angle2_deg: angle2,
+        uin_v: Cell::plain(record.link_v()), vc_v: Cell::plain(record.capacitor_v),
+        udc_v: Cell::plain(record.source_v), il_a: Cell::plain(record.inductor_a),
+        te1_ref_nm: Cell::plain(torque_nm[0]), te2_ref_nm: Cell::plain(torque_nm[1]),
+        d_sh: Cell::plain(record.duty), scheme: state.scheme.name(),
+        enabled: state.enabled, pulsing: state.pulsing,
+        fault: state.fault.map_or("", |fault| fault.name()),
+    }
 }
 
 impl Recorded for Recording {

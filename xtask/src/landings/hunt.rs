@@ -1,10 +1,9 @@
 //! By how many instructions each control interrupt is to begin later.
 
-use std::collections::{HashMap, HashSet};
-
 use super::INSTRUCTIONS_PER_TICK;
 use super::reach::{NEAR, Reached, Stand};
 use crate::fault_injector::Seen;
+use std::collections::{HashMap, HashSet};
 
 /// The wanted instruction: whether it was hit in another mode; mode and instruction.
 type Wanted<'a> = (bool, &'a str, u32);

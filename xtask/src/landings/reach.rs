@@ -1,10 +1,9 @@
 //! The instructions of a control interrupt at which a carrier boundary can come, and those that were hit.
 
-use std::collections::{BTreeMap, HashSet};
-
 use super::{Call, INSTRUCTIONS_PER_TICK};
 use crate::elf::Image;
 use crate::fault_injector::Seen;
+use std::collections::{BTreeMap, HashSet};
 
 /// A control interrupt samples at once. One that has not begun a sixteenth of its period after its timer counts as lost, so no delay puts
 /// a boundary before the samples that comes later than this part of the period, a little less.
@@ -33,13 +32,9 @@ pub struct Stand<'a> {
 /// The reason why no boundary can come at an instruction of a control interrupt.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Why {
-    /// It is the first one behind a boundary, and the next boundary comes after its period.
     BehindBoundary,
-    /// A boundary has come in the same control interrupt already, and the next one comes after its period.
     BehindLanding,
-    /// It comes before the first boundary, by more than its period.
     BeforeFirst,
-    /// It has no samples yet, which it takes at once, and the boundary comes later.
     BeforeSamples,
 }
 

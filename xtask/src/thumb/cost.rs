@@ -4,10 +4,9 @@
 //! worst: memory without wait states, no load pipelined behind another, three cycles to refill the pipeline after every
 //! branch that is taken, and every result of the floating-point unit wanted by the very next instruction.
 
+use super::{Operand, SP};
 use capstone::RegId;
 use capstone::arch::arm::ArmReg;
-
-use super::{Operand, SP};
 
 /// To refill the pipeline.
 pub const REFILL: u32 = 3;

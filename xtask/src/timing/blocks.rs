@@ -1,16 +1,14 @@
 //! The building blocks in the bench's image: instructions from the emulator, errors from the host.
 
-use std::collections::BTreeMap;
-use std::path::Path;
-
-use anyhow::{Context, Result, bail};
-
 use super::log::{Event, Log};
 use crate::build::{self, cargo};
 use crate::elf::Image;
 use crate::setup::Toolchain;
 use crate::thumb::cost::REFILL;
 use crate::{emulator, image, process};
+use anyhow::{Context, Result, bail};
+use std::collections::BTreeMap;
+use std::path::Path;
 
 /// A building block.
 #[derive(Clone, Debug, PartialEq)]

@@ -1,9 +1,8 @@
 //! The budgets of `budgets.toml`, and how the measured values keep them.
 
-use std::collections::BTreeMap;
-
 use anyhow::{Context, Result, bail};
 use serde::Deserialize;
+use std::collections::BTreeMap;
 
 /// The bounds of a value.
 #[derive(Clone, Copy, Debug, Deserialize, PartialEq)]

@@ -1,19 +1,17 @@
 //! Drives the image in the emulator and follows its log while it runs.
 
+use super::log::{ARGUMENTS, Log};
+use super::meter::{Call, Meter, Path as Executed};
+use super::tally::Tally;
+use crate::elf::Image;
+use crate::process;
+use anyhow::{Context, Result, bail};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{File, OpenOptions};
 use std::io::{BufRead, BufReader, Read, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::Duration;
-
-use anyhow::{Context, Result, bail};
-
-use super::log::{ARGUMENTS, Log};
-use super::meter::{Call, Meter, Path as Executed};
-use super::tally::Tally;
-use crate::elf::Image;
-use crate::process;
 
 /// Modules whose functions are the link to the rig.
 const LINK: [&str; 2] = ["tractive::board::qemu::exchange::", "tractive::wire::"];
@@ -57,29 +55,14 @@ pub struct Served {
     pub interrupt: String,
     pub mode: String,
     /// `None` where the mode says it, and without pulses.
-    pub direction: Option<Direction>,
+    pub direction: Option<&'static str>,
     /// Stator frequency; 0 where it is not told.
     pub hertz: f64,
 }
 
-/// The direction of the mechanical power: the sign of torque by speed. Where it is nothing it is the direction before.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Direction {
-    Motoring,
-    Braking,
-}
-
-impl Direction {
-    pub const BOTH: [Self; 2] = [Self::Motoring, Self::Braking];
-
-    /// As the rig and the tables call it.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Motoring => "motoring",
-            Self::Braking => "braking",
-        }
-    }
-}
+/// The directions of the mechanical power, as the rig and the tables call them: the sign of torque by speed. Where it is nothing it is
+/// the direction before.
+pub const DIRECTIONS: [&str; 2] = ["motoring", "braking"];
 
 impl Bench {
     /// Runs the scenario with these options.
@@ -122,12 +105,10 @@ impl Bench {
         let link: BTreeSet<u32> =
             link.filter(|(_, function)| is_link(&function.names)).map(|(start, _)| *start).collect();
         if link.is_empty() {
-            bail!(
-                "the image has no function of {}, which would be left out of the counts",
-                LINK.join(" or ")
-            );
+            let link = LINK.join(" or ");
+            bail!("the image has no function of {link}, which would be left out of the counts");
         }
-        let mut meter = Meter::new(&self.image, &link);
+        let mut meter = Meter::new(&self.image, link);
         meter.keeps_paths = self.keeps_paths;
         let mut lines = BufReader::with_capacity(1 << 20, Unhurried(log));
         let (mut log, mut line, mut outcome) = (Log::new(&self.image), Vec::new(), Ok(()));
@@ -188,7 +169,7 @@ fn read_served(text: &str) -> Result<Vec<Served>> {
         let [interrupt, mode, direction, hertz] = line.split(',').collect::<Vec<_>>()[..] else {
             bail!("the rig's list of interrupts holds `{line}`");
         };
-        let known = Direction::BOTH.into_iter().find(|known| known.name() == direction);
+        let known = DIRECTIONS.into_iter().find(|known| *known == direction);
         if known.is_none() && !direction.is_empty() {
             bail!("the rig's list of interrupts holds the direction `{direction}`");
         }
@@ -225,7 +206,7 @@ mod tests {
     fn the_rigs_list_is_read() {
         let served = read_served("control,async,braking,12.5\npwm,square,,\n").unwrap();
         let (interrupt, mode) = ("control".to_owned(), "async".to_owned());
-        assert_eq!(served[0], Served { interrupt, mode, direction: Some(Direction::Braking), hertz: 12.5 });
+        assert_eq!(served[0], Served { interrupt, mode, direction: Some("braking"), hertz: 12.5 });
         assert_eq!((served[1].direction, served[1].hertz), (None, 0.0));
         assert!(read_served("control").is_err());
         assert!(read_served("control,async,sideways,").is_err());

@@ -1,9 +1,8 @@
 //! The obstacles to an interrupt's entry: instructions that mask it, and the one under way.
 
-use std::collections::BTreeSet;
-
 use super::tally::Tally;
 use crate::elf::Image;
+use std::collections::BTreeSet;
 
 /// The functions outside the link in which an instruction masks interrupts.
 pub fn masking(image: &Image, is_link: impl Fn(&[String]) -> bool) -> BTreeSet<String> {

@@ -1,13 +1,11 @@
 //! The numbers that the repository holds: the page of costs, and the sizes that the images must not outgrow.
 
-use std::fmt::Write as _;
-use std::path::PathBuf;
-
-use anyhow::{Context, Result};
-
 use super::page;
 use super::report::Report;
 use crate::build;
+use anyhow::{Context, Result};
+use std::fmt::Write as _;
+use std::path::PathBuf;
 
 /// By how much a number of the page may have moved: this share, or this much.
 const MOVED_SHARE: f64 = 0.05;

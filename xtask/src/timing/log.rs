@@ -4,12 +4,10 @@
 //! run. What is announced counts when the next line has come: it may be withdrawn as a whole, or end early where an access to a
 //! peripheral's register has to be the last of its block; then the next block begins with that.
 
+use crate::elf::Image;
+use anyhow::{Context, Result, bail};
 use std::collections::HashMap;
 use std::rc::Rc;
-
-use anyhow::{Context, Result, bail};
-
-use crate::elf::Image;
 
 /// The emulator's arguments for that log, with no block chained to the next.
 pub const ARGUMENTS: [&str; 2] =

@@ -1,14 +1,12 @@
 //! From the emulator's log to the interrupts: which instruction belongs to which handler.
 
-use std::collections::{BTreeMap, BTreeSet};
-
-use anyhow::{Result, bail};
-
 use super::log::Event;
 use super::tally::Tally;
 use crate::elf::Image;
 use crate::thumb::cost::{ENTRY_AND_RETURN, EXCEPTION_FRAME, REFILL};
 use crate::thumb::{Flow, Instruction};
+use anyhow::{Result, bail};
+use std::collections::{BTreeMap, BTreeSet};
 
 /// One interrupt, from the first instruction of its handler to its return.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -36,11 +34,12 @@ pub struct Path {
 }
 
 /// Follows the log.
-pub struct Meter<'a> {
+#[derive(Default)]
+pub struct Meter {
     /// By half-words, quick to look up.
     code: Vec<Instruction>,
     /// Starts of the functions that are not counted.
-    link: &'a BTreeSet<u32>,
+    link: BTreeSet<u32>,
     active: Vec<Handler>,
     /// Instructions since the exception became pending.
     pending: BTreeMap<u32, u32>,
@@ -61,6 +60,7 @@ pub struct Meter<'a> {
 }
 
 /// A handler on its way.
+#[derive(Default)]
 struct Handler {
     call: Call,
     /// Return address and stack of the functions it is in.
@@ -79,27 +79,15 @@ struct Handler {
     by_now: u32,
 }
 
-impl<'a> Meter<'a> {
+impl Meter {
     /// A meter for an image; functions that start at `link` are not counted.
-    pub fn new(image: &Image, link: &'a BTreeSet<u32>) -> Self {
+    pub fn new(image: &Image, link: BTreeSet<u32>) -> Self {
         let end = image.instructions.keys().next_back().map_or(0, |last| last / 2 + 1);
         let mut code = vec![Instruction::default(); end as usize];
         for (address, instruction) in &image.instructions {
             code[(address / 2) as usize] = *instruction;
         }
-        Self {
-            code,
-            link,
-            active: Vec::new(),
-            pending: BTreeMap::new(),
-            calls: Vec::new(),
-            keeps_paths: false,
-            paths: Vec::new(),
-            hits: Tally::default(),
-            behind: Tally::default(),
-            deepest: BTreeMap::new(),
-            longest: BTreeMap::new(),
-        }
+        Self { code, link, ..Self::default() }
     }
 
     /// Takes the next event.
@@ -122,17 +110,7 @@ impl<'a> Meter<'a> {
             cycles: ENTRY_AND_RETURN,
             ..Call::default()
         };
-        self.active.push(Handler {
-            call,
-            within: Vec::new(),
-            base,
-            stack: base + EXCEPTION_FRAME,
-            resumes: None,
-            next: None,
-            addresses: Vec::new(),
-            elapsed: Vec::new(),
-            by_now: 0,
-        });
+        self.active.push(Handler { call, base, stack: base + EXCEPTION_FRAME, ..Handler::default() });
         let depth = self.active.len();
         for handler in &mut self.active {
             handler.call.depth = handler.call.depth.max(depth);
@@ -227,7 +205,7 @@ mod tests {
     fn measure(happened: &str) -> Result<(Vec<Call>, Tally, i32)> {
         let image = image();
         let link = BTreeSet::from([0x120]);
-        let mut meter = Meter::new(&image, &link);
+        let mut meter = Meter::new(&image, link);
         for word in happened.split_whitespace() {
             let number = || word[1..].parse().unwrap();
             meter.take(match word.split_at(1).0 {

@@ -27,11 +27,10 @@ mod tally;
 
 pub use profile::Profile;
 
-use anyhow::{Context, Result};
-
 use crate::build;
 use crate::cli::TimingArgs;
 use crate::setup::Setup;
+use anyhow::{Context, Result};
 use report::Report;
 use system::{Measured, System};
 

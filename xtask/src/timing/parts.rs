@@ -1,12 +1,10 @@
 //! The cost of the parts of an interrupt: every executed instruction belongs to one part, so they add up to the interrupt.
 
-use std::collections::{BTreeMap, BTreeSet};
-
-use anyhow::{Result, bail};
-
 use super::profile::{Place, Profile};
 use super::tally::Tally;
 use crate::build;
+use anyhow::{Result, bail};
+use std::collections::{BTreeMap, BTreeSet};
 
 /// The group of a part, by whether an interrupt could do without it and still be what its target is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]

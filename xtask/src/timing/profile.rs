@@ -1,13 +1,11 @@
 //! The places of the instructions: by function, inlined ones told apart by the debug information.
 
-use std::collections::{BTreeMap, BTreeSet};
-use std::path::Path;
-
+use super::tally::Tally;
 use addr2line::{Context as Lines, gimli};
 use anyhow::{Context, Result};
 use object::{Object, ObjectSection};
-
-use super::tally::Tally;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
 
 type Reader<'a> = gimli::EndianSlice<'a, gimli::LittleEndian>;
 

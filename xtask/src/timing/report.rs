@@ -1,12 +1,11 @@
 //! The report of all that was measured and judged, and the same as JSON.
 
-use serde_json::{Map, Value, json};
-
 use super::blocks::Block;
 use super::budget::Judged;
-use super::drive::Direction;
+use super::drive::DIRECTIONS;
 use super::statistics::{Entry, Load, Row};
 use super::system::Measured;
+use serde_json::{Value, json};
 
 const INTERRUPTS: [&str; 2] = ["control", "pwm"];
 
@@ -43,28 +42,13 @@ pub fn core_tick(blocks: &[Block]) -> Option<u32> {
     blocks.iter().find(|block| block.name == "core_tick/tractive").map(|block| block.max)
 }
 
-fn in_direction(mode: &str, direction: Direction) -> String {
-    format!("{mode}, {}", direction.name())
-}
-
-fn fields<const N: usize>(fields: [(&str, Value); N]) -> Map<String, Value> {
-    fields.into_iter().map(|(name, value)| (name.to_owned(), value)).collect()
-}
-
-fn counts(row: &Row) -> Map<String, Value> {
+fn counts(row: &Row) -> Value {
     let Row { instructions, cycles, latency, depth } = row;
-    fields([
-        ("calls", instructions.count.into()),
-        ("min", instructions.min.into()),
-        ("mean", instructions.mean().into()),
-        ("max", instructions.max.into()),
-        ("cycles_mean", cycles.mean().into()),
-        ("cycles_max", cycles.max.into()),
-        ("latency_min", latency.min.into()),
-        ("latency_max", latency.max.into()),
-        ("jitter", (latency.max - latency.min).into()),
-        ("depth", (*depth).into()),
-    ])
+    json!({
+        "calls": instructions.count, "min": instructions.min, "mean": instructions.mean(), "max": instructions.max,
+        "cycles_mean": cycles.mean(), "cycles_max": cycles.max, "latency_min": latency.min,
+        "latency_max": latency.max, "jitter": latency.max - latency.min, "depth": depth,
+    })
 }
 
 impl Measured {
@@ -82,18 +66,18 @@ impl Measured {
     /// Mode with direction, and what was counted there; nothing where the rig names no direction.
     pub fn directed(&self, interrupt: &str, mode: &str) -> impl Iterator<Item = (String, &Row)> {
         let row = move |direction| {
-            Some((in_direction(mode, direction), self.statistics.row(mode, Some(direction), interrupt)?))
+            Some((format!("{mode}, {direction}"), self.statistics.row(mode, Some(direction), interrupt)?))
         };
-        Direction::BOTH.into_iter().filter_map(row)
+        DIRECTIONS.into_iter().filter_map(row)
     }
 
     /// Modes, each with its directions behind it, and the load.
     pub fn loads(&self) -> impl Iterator<Item = (String, Load)> {
-        self.modes().into_iter().flat_map(|mode| {
+        self.modes().into_iter().flat_map(move |mode| {
             let whole = self.statistics.load(mode, None).map(|load| (mode.to_owned(), load));
-            let directed = Direction::BOTH.into_iter().filter_map(|direction| {
+            let directed = DIRECTIONS.into_iter().filter_map(move |direction| {
                 let load = self.statistics.load(mode, Some(direction))?;
-                Some((in_direction(mode, direction), load))
+                Some((format!("{mode}, {direction}"), load))
             });
             whole.into_iter().chain(directed)
         })
@@ -102,13 +86,15 @@ impl Measured {
     fn json_rows(&self) -> Vec<Value> {
         let row = |(name, mode, row): (&'static str, &str, &Row)| {
             let mut fields = counts(row);
-            let named = [("system", self.system.name), ("name", name), ("mode", mode)];
-            fields.extend(named.map(|(field, value)| (field.to_owned(), value.into())));
-            for direction in Direction::BOTH {
-                let row = self.statistics.row(mode, Some(direction), name);
-                fields.extend(row.map(|row| (direction.name().to_owned(), counts(row).into())));
+            for (field, value) in [("system", self.system.name), ("name", name), ("mode", mode)] {
+                fields[field] = value.into();
             }
-            fields.into()
+            for direction in DIRECTIONS {
+                if let Some(row) = self.statistics.row(mode, Some(direction), name) {
+                    fields[direction] = counts(row);
+                }
+            }
+            fields
         };
         self.rows().map(row).collect()
     }
@@ -126,17 +112,17 @@ impl Measured {
     fn json_load(&self) -> Vec<Value> {
         let percent = |mode: &str, direction| {
             let Load { mean, max } = self.statistics.load(mode, direction)?;
-            Some(fields([("mean_percent", mean.into()), ("max_percent", max.into())]))
+            Some(json!({ "mean_percent": mean, "max_percent": max }))
         };
         let load = |mode: &str| {
             let mut load = percent(mode, None)?;
-            load.extend(fields([("system", self.system.name.into()), ("mode", mode.into())]));
-            for direction in Direction::BOTH {
-                load.extend(
-                    percent(mode, Some(direction)).map(|of| (direction.name().to_owned(), of.into())),
-                );
+            (load["system"], load["mode"]) = (self.system.name.into(), mode.into());
+            for direction in DIRECTIONS {
+                if let Some(of) = percent(mode, Some(direction)) {
+                    load[direction] = of;
+                }
             }
-            Some(load.into())
+            Some(load)
         };
         self.modes().into_iter().filter_map(load).collect()
     }

@@ -1,11 +1,9 @@
 //! The statistics of all drives together about each interrupt in each mode.
 
-use std::collections::BTreeMap;
-
-use anyhow::{Result, bail};
-
-use super::drive::{Direction, Drive};
+use super::drive::Drive;
 use super::meter::Call;
+use anyhow::{Result, bail};
+use std::collections::BTreeMap;
 
 /// The interrupts by the numbers of their exceptions on the emulated board: sixteen more than the interrupt's.
 pub const INTERRUPTS: [(&str, u32); 2] = [("control", 16 + 8), ("pwm", 16 + 10)];
@@ -30,6 +28,10 @@ impl Default for Spread {
 }
 
 impl Spread {
+    fn of(value: u32) -> Self {
+        Self { min: value, max: value, sum: value.into(), count: 1 }
+    }
+
     fn add(&mut self, value: u32) {
         (self.min, self.max) = (self.min.min(value), self.max.max(value));
         self.sum += u64::from(value);
@@ -79,7 +81,7 @@ pub struct Load {
 }
 
 /// Mode, direction and interrupt; without a direction: all of the mode's interrupts.
-type Key = (String, Option<Direction>, String);
+type Key = (String, Option<&'static str>, String);
 
 /// By mode, direction and interrupt.
 #[derive(Clone, Debug, Default)]
@@ -123,9 +125,9 @@ impl Statistics {
     }
 
     /// The modes that were seen: first those of a list in its order, then the others as they came, without pulses last.
-    pub fn modes(&self, first: &[&str]) -> Vec<&str> {
+    pub fn modes(&self, first: &str) -> Vec<&str> {
         let mut modes: Vec<_> = self.seen.iter().map(String::as_str).collect();
-        let place = |mode: &str| first.iter().position(|known| *known == mode).unwrap_or(first.len());
+        let place = |mode: &str| first.split(' ').position(|known| known == mode).unwrap_or(usize::MAX);
         modes.sort_by_key(|mode| (*mode == "off", place(mode)));
         modes
     }
@@ -141,11 +143,7 @@ impl Statistics {
         let known = self.entries.iter_mut().find(|entry| entry.interrupt == interrupt && entry.from == from);
         match known {
             Some(entry) => entry.latency.add(call.latency),
-            None => {
-                let mut latency = Spread::default();
-                latency.add(call.latency);
-                self.entries.push(Entry { interrupt, from, latency });
-            }
+            None => self.entries.push(Entry { interrupt, from, latency: Spread::of(call.latency) }),
         }
     }
 
@@ -158,12 +156,12 @@ impl Statistics {
     }
 
     /// One interrupt in one mode, and in one direction if one is named, if it was seen there.
-    pub fn row(&self, mode: &str, direction: Option<Direction>, interrupt: &str) -> Option<&Row> {
+    pub fn row(&self, mode: &str, direction: Option<&'static str>, interrupt: &str) -> Option<&Row> {
         self.rows.get(&(mode.to_owned(), direction, interrupt.to_owned()))
     }
 
     /// Share of the processor that both interrupts take in a mode, and in one direction if one is named.
-    pub fn load(&self, mode: &str, direction: Option<Direction>) -> Option<Load> {
+    pub fn load(&self, mode: &str, direction: Option<&'static str>) -> Option<Load> {
         let row = |interrupt| self.row(mode, direction, interrupt);
         let (control, pwm) = (row("control")?, row("pwm")?);
         let pwm_hertz = CONTROL_HZ * pwm.cycles.count as f64 / control.cycles.count as f64;

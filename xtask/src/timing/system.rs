@@ -1,12 +1,5 @@
 //! The systems, and what they are driven through.
 
-use std::collections::{BTreeMap, BTreeSet};
-use std::path::{Path, PathBuf};
-
-use anyhow::{Context, Result, bail};
-use indicatif::ParallelProgressIterator;
-use rayon::prelude::*;
-
 use super::drive::{Bench, Drive, Served, is_link};
 use super::entry;
 use super::parts::{self, Part};
@@ -16,6 +9,11 @@ use super::tally::Tally;
 use crate::elf::Image;
 use crate::setup::Toolchain;
 use crate::{build, image, process};
+use anyhow::{Context, Result, bail};
+use indicatif::ParallelProgressIterator;
+use rayon::prelude::*;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
 
 /// Both directions of torque and of rotation through every mode, up to the highest stator frequency, with dead time that is to be
 /// compensated.
@@ -58,30 +56,18 @@ pub struct System {
     pub build: build::System,
     scenario: &'static str,
     /// The modes that its tables begin with; the others follow as the drives came to them.
-    pub first_modes: &'static [&'static str],
+    pub first_modes: &'static str,
 }
 
 impl System {
     pub const ALL: [Self; 2] = [
-        Self { name: "pmasynrm", build: build::System::Traction, scenario: "timing", first_modes: &[] },
+        Self { name: "pmasynrm", build: build::System::Traction, scenario: "timing", first_modes: "" },
         Self {
             name: "zs9",
             build: build::System::Zs9,
             scenario: "zs9-timing",
-            first_modes: &[
-                "s-motoring",
-                "s-weakening",
-                "s-braking",
-                "rs-motoring",
-                "rs-weakening",
-                "rs-braking",
-                "rthd-motoring",
-                "rthd-weakening",
-                "rthd-braking",
-                "zvo-motoring",
-                "zvo-weakening",
-                "zvo-braking",
-            ],
+            first_modes: "s-motoring s-weakening s-braking rs-motoring rs-weakening rs-braking rthd-motoring \
+                rthd-weakening rthd-braking zvo-motoring zvo-weakening zvo-braking",
         },
     ];
 
@@ -246,10 +232,8 @@ impl Measured {
         for (name, exception) in INTERRUPTS {
             let longest = sum.longest.get(&exception).map_or(&[][..], Vec::as_slice);
             let calls = sum.calls.get(&exception).copied().unwrap_or(0);
-            parts.push((
-                name,
-                parts::parts(&profile, (name, exception), &sum.hits, calls, longest, &mut sources)?,
-            ));
+            let of = (name, exception);
+            parts.push((name, parts::parts(&profile, of, &sum.hits, calls, longest, &mut sources)?));
         }
         let masking = entry::masking(&image, is_link);
         let [(_, control), _] = INTERRUPTS;
@@ -276,7 +260,6 @@ impl Measured {
 pub mod tests {
     use super::*;
     use crate::elf::Sizes;
-    use crate::timing::drive::Direction::{Braking, Motoring};
     use crate::timing::meter::Call;
     use crate::timing::parts::Group;
 
@@ -292,7 +275,11 @@ pub mod tests {
         };
         let drive = Drive {
             calls: vec![call(26, 7), call(24, 10), call(24, 20)],
-            served: vec![served("pwm", Motoring), served("control", Motoring), served("control", Braking)],
+            served: vec![
+                served("pwm", "motoring"),
+                served("control", "motoring"),
+                served("control", "braking"),
+            ],
             deepest: BTreeMap::from([(24, 440), (26, 200)]),
             ..Drive::default()
         };
@@ -321,8 +308,8 @@ pub mod tests {
         assert!((load.mean - 15.0).abs() < 1e-9 && (load.max - 15.0).abs() < 1e-9);
         assert!(statistics.load("square", None).is_none());
         // Motoring it comes for each of control; braking it was never seen.
-        assert!((statistics.load("mid7", Some(Motoring)).unwrap().max - 20.0).abs() < 1e-9);
-        assert!(statistics.load("mid7", Some(Braking)).is_none());
+        assert!((statistics.load("mid7", Some("motoring")).unwrap().max - 20.0).abs() < 1e-9);
+        assert!(statistics.load("mid7", Some("braking")).is_none());
     }
 
     #[test]

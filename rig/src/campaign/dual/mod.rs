@@ -11,7 +11,7 @@ pub use ride::{Ridden, Ride, Script};
 use super::Outcome;
 use super::action::{LEAD_S, Stages};
 use super::outcome::{Seen, Setting};
-use crate::bench::{Flaws, Limits};
+use crate::bench::{Flaws, Limits, Simulated};
 use crate::inject::Injection;
 use crate::inject::zs9::Kind;
 use crate::machine::Machine;
@@ -19,8 +19,7 @@ use crate::plant::zs9::{NetworkState, Zs9Plant, Zs9Settings};
 use crate::plant::{PlantSettings, SpeedSource};
 use crate::run::{CLOCK, Interrupts};
 use crate::scenario::System;
-use crate::scenario::zs9::SOURCE_V;
-use crate::scenario::zs9::Zs9;
+use crate::scenario::zs9::{SOURCE_V, Zs9};
 use crate::without::Ablation;
 use crate::zs9::bench::{Bench, BenchSettings};
 use crate::zs9::run::Tasks;
@@ -56,9 +55,6 @@ pub struct Drive {
 
 impl Drive {
     /// For two of the ZS9's machines.
-    ///
-    /// # Errors
-    /// Where their folder is not there.
     pub fn new(without: Option<Ablation>) -> Result<Self> {
         let machine = Machine::load(Zs9::MACHINE)?;
         let mut settings = settings::drive(CLOCK, CARRIER_HZ);
@@ -71,9 +67,6 @@ impl Drive {
     }
 
     /// Runs one case.
-    ///
-    /// # Errors
-    /// A drive that breaks the bench's rules.
     pub fn run(&self, case: &Case) -> Result<Outcome> {
         let mut bench = self.bench(case);
         let mut tasks = self.tasks(Instant(0));

@@ -1,7 +1,7 @@
 //! Drives that are written down as what happens when, instead of cases.
 
 use super::Drive;
-use crate::bench::{Flaws, Observed, Tick};
+use crate::bench::{Flaws, Observed, Simulated, Tick};
 use crate::campaign::action::LEAD_S;
 use crate::plant::{PlantSettings, SpeedSource, profile_speed};
 use crate::run::Interrupts;
@@ -76,9 +76,6 @@ pub struct Ridden {
 
 impl Drive {
     /// Drives a script instead of a case; the timers start at a tick.
-    ///
-    /// # Errors
-    /// A drive that breaks the bench's rules.
     pub fn ride(&self, ride: Ride, flaws: Flaws, trace_step_s: f64, origin: Tick) -> Result<Ridden> {
         let Ride { motors, course, duration_s } = ride;
         let later = |steps: &[(f64, f64)]| -> Vec<_> {

@@ -67,9 +67,6 @@ fn by_speed(random: &mut StdRng, duration_s: f64) -> Script {
 const STEP_S: f64 = 1e-3;
 
 /// Drives it; the trip in the end is what must not be.
-///
-/// # Errors
-/// A drive that breaks the bench's rules.
 pub fn drive(drive: &Drive, duration_s: f64, seed: u64) -> Result<Ridden> {
     let trip_current_a = drive.machine.folder.parameters.trip_current_a;
     drive.ride(ride(drive, duration_s, seed), flaws(trip_current_a, NOISE_A, seed), STEP_S, 0)

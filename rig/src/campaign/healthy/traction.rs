@@ -44,9 +44,6 @@ pub fn ride(drive: &Drive, duration_s: f64, seed: u64, blocks: bool) -> Ride {
 const NOISE_A: f64 = 0.5;
 
 /// Drives it; the trip in the end is what must not be.
-///
-/// # Errors
-/// A drive that breaks the bench's rules.
 pub fn drive(drive: &Drive, duration_s: f64, seed: u64, blocks: bool) -> Result<Ridden> {
     let trip_current_a = drive.machine.folder.parameters.trip_current_a;
     drive.ride(ride(drive, duration_s, seed, blocks), flaws(trip_current_a, NOISE_A, seed))

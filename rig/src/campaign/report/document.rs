@@ -38,10 +38,7 @@ impl Part {
     }
 }
 
-/// The document with its generated part replaced.
-///
-/// # Errors
-/// Without its markers.
+/// The document with its generated part replaced. Fails without its markers.
 pub fn document(text: &str, outcomes: &[Outcome], part: Part) -> Result<String> {
     let [begin, end] = part.markers();
     let (Some(from), Some(to)) = (text.find(begin), text.find(end)) else {
@@ -53,9 +50,6 @@ pub fn document(text: &str, outcomes: &[Outcome], part: Part) -> Result<String> 
 }
 
 /// Renews the generated part of a document, or says whether it is as it would be written.
-///
-/// # Errors
-/// A document that cannot be read or written, or without its markers.
 pub fn renew(path: &Path, outcomes: &[Outcome], part: Part, only_check: bool) -> Result<bool> {
     let named = || path.display().to_string();
     let before = std::fs::read_to_string(path).with_context(named)?;

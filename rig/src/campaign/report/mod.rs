@@ -86,9 +86,6 @@ pub fn text(outcomes: &[Outcome]) -> String {
 }
 
 /// Writes cases.csv, summary.json and report.html.
-///
-/// # Errors
-/// Where a file cannot be written.
 pub fn write(outcomes: &[Outcome], options: serde_json::Value, out: &Path) -> Result<()> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     for outcome in outcomes {

@@ -11,7 +11,7 @@ pub use ride::{Ridden, Ride};
 use super::Outcome;
 use super::action::{FAULT_S, LEAD_S, Stages};
 use super::outcome::{Seen, Setting};
-use crate::bench::{self, Bench, Flaws, Limits, Supply};
+use crate::bench::{self, Bench, Flaws, Limits, Simulated, Supply};
 use crate::inject::Injection;
 use crate::inject::traction::Kind;
 use crate::machine::Machine;
@@ -51,9 +51,6 @@ pub struct Drive {
 
 impl Drive {
     /// For the 180 kW machine.
-    ///
-    /// # Errors
-    /// Where its folder is not there.
     pub fn new(without: Option<Ablation>) -> Result<Self> {
         let machine = Machine::load(Traction::MACHINE)?;
         let tables = without.map_or(machine.tables, |without| without.tables(machine.tables));
@@ -66,9 +63,6 @@ impl Drive {
     }
 
     /// Runs one case.
-    ///
-    /// # Errors
-    /// A drive that breaks the bench's rules.
     pub fn run(&self, case: &Case) -> Result<Outcome> {
         let mut bench = self.bench(case);
         let mut tasks = self.tasks();

@@ -1,7 +1,7 @@
 //! Drives that are written down as what happens when, instead of cases.
 
 use super::{Drive, STAGES};
-use crate::bench::{self, Bench, Flaws, Observed};
+use crate::bench::{self, Bench, Flaws, Observed, Simulated};
 use crate::campaign::action::LEAD_S;
 use crate::inject::Injection;
 use crate::inject::traction::Kind;
@@ -45,9 +45,6 @@ const TRACE_STEP_S: f64 = 100e-6;
 
 impl Drive {
     /// Drives a script instead of a case.
-    ///
-    /// # Errors
-    /// A drive that breaks the bench's rules.
     pub fn ride(&self, ride: Ride, flaws: Flaws) -> Result<Ridden> {
         let Ride { speed, torque, enable, line, injection, duration_s } = ride;
         let operator = move |t_s: f64| {

@@ -70,10 +70,7 @@ pub enum Bridge {
 }
 
 impl Bridge {
-    /// Judges the gates of the legs u, v, w.
-    ///
-    /// # Errors
-    /// Names the first leg whose state is illegal.
+    /// Judges the gates of the legs u, v, w. The error names the first leg whose state is illegal.
     pub fn of(gates: [LegGates; 3], time_s: f64) -> Result<Self, IllegalState> {
         if gates == [LegGates::OFF; 3] {
             return Ok(Self::Off);

@@ -127,10 +127,8 @@ impl Zs9Plant {
         }
     }
 
-    /// Lets time pass with the gates of the legs u, v, w unchanged.
-    ///
-    /// # Errors
-    /// Names the first leg whose gates are illegal; nothing has happened then.
+    /// Lets time pass with the gates of the legs u, v, w unchanged. The error names the first leg whose gates are illegal;
+    /// nothing has happened then.
     pub fn advance(&mut self, gates: [LegGates; 3], dt_s: f64) -> Result<(), IllegalState> {
         self.advance_bridge(&Bridge::of(gates, self.time_s)?, dt_s);
         Ok(())

@@ -8,9 +8,6 @@ use tractive::modulation::Mode;
 use tractive::wire::{self, Request, Setup};
 
 /// Runs until the recording is complete; a supervisor commands over the protocol.
-///
-/// # Errors
-/// Where the bench cannot go on, or the emulator ends early.
 pub fn run_in_qemu(
     name: &str,
     bench: Bench,

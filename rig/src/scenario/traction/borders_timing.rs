@@ -46,7 +46,7 @@ impl Scenario<Traction> for BordersTiming {
         .plan()
     }
 
-    fn plots(&self, recording: &Recording, page: &mut Page) {
+    fn plots(&self, recording: &Recording, _: &Options, _: &Machine, page: &mut Page) {
         page.overview(recording);
     }
 }

@@ -3,10 +3,7 @@
 use super::prelude::*;
 use super::{LEAD_S, scaled_nm};
 use crate::analysis::SteadyPoint;
-use crate::bound;
-use crate::mtpa_methods;
-use crate::options::RunOptions;
-use crate::{figures, spectrum};
+use crate::{bound, figures, mtpa_methods, spectrum};
 
 /// The points one after another in one run: ramp, settle, measure.
 #[derive(Clone, Copy, Debug, Args, Serialize)]
@@ -96,7 +93,10 @@ impl Scenario<Traction> for Characteristic {
         figures
     }
 
-    fn plots_beside(&self, recording: &Recording, options: &Options, machine: &Machine, page: &mut Page) {
+    fn plots(&self, recording: &Recording, options: &Options, machine: &Machine, page: &mut Page) {
+        page.torque(recording);
+        page.plot("Speed", "r/min", recording, &[("speed", |row| row.speed_rpm)]);
+        page.phase_current(recording);
         for slot in slots(machine) {
             let window = (slot.ends_s - 0.04, slot.ends_s);
             let title = format!("{} r/min, {} N·m: phase current u", slot.speed_rpm, slot.torque_nm);
@@ -108,12 +108,6 @@ impl Scenario<Traction> for Characteristic {
             spectrum::draw(page, recording, (&title, window), options, machine);
         }
         figures::draw(page, recording, &points(recording, machine), machine);
-    }
-
-    fn plots(&self, recording: &Recording, page: &mut Page) {
-        page.torque(recording);
-        page.plot("Speed", "r/min", recording, &[("speed", |row| row.speed_rpm)]);
-        page.phase_current(recording);
     }
 }
 

@@ -1,8 +1,7 @@
 //! Full braking into a link that cannot take the energy: the chopper takes it; half the resistor is lost, then all of it, and the torque
 //! is folded back; then the source takes energy back and all of the torque returns.
 
-use super::line;
-use super::line::within;
+use super::line::{self, within};
 use super::prelude::*;
 use crate::bench::LinePlan;
 use tractive::machine::Ratings;
@@ -117,24 +116,18 @@ impl Scenario<Traction> for Chopper {
         let rise = |stretch: &Stretch| (stretch.link_peak_v - highest_v) / (trip_v - highest_v);
         let largest_a = f64::from(ratings.max_current_a);
         let most_kw = machine.folder.parameters.max_power_w / 1e3;
+        let folded = 1.0 - whole.torque_nm / source.torque_nm;
+        let peak = worst(stretches.iter().map(|stretch| stretch.current_peak_a / largest_a));
         let mut verdicts = line::verdicts(recording, &[]);
         verdicts.extend([
-            Verdict::ours("drive tripped", f64::from(u8::from(recording.trip().is_some())), 0.0),
+            Verdict::never("drive tripped", recording.trip().is_some()),
             Verdict::ours("link's rise, of the way to its trip: chopper", rise(whole), 0.3),
             Verdict::ours("link's rise, of the way to its trip: half of it", rise(half), 0.7),
             Verdict::ours("link's rise, of the way to its trip: none", rise(none), 0.9),
-            Verdict::ours(
-                "torque folded back while the chopper takes it (share)",
-                1.0 - whole.torque_nm / source.torque_nm,
-                0.02,
-            ),
+            Verdict::ours("torque folded back while the chopper takes it (share)", folded, 0.02),
             Verdict::ours("braking power with half of the resistor (of all)", half.braking_kw / most_kw, 0.7),
             Verdict::ours("braking power without it (of all)", none.braking_kw / most_kw, 0.1),
-            Verdict::ours(
-                "peak current over the largest one",
-                worst(stretches.iter().map(|stretch| stretch.current_peak_a / largest_a)),
-                1.15,
-            ),
+            Verdict::ours("peak current over the largest one", peak, 1.15),
         ]);
         line::figures(&mut figures, recording);
         figures.set("stretches", stretches);
@@ -142,21 +135,12 @@ impl Scenario<Traction> for Chopper {
         figures
     }
 
-    fn plots(&self, recording: &Recording, page: &mut Page) {
+    fn plots(&self, recording: &Recording, _: &Options, _: &Machine, page: &mut Page) {
         line::plots(page, recording);
-        page.plot_window(
-            "the braking resistor is lost: DC link",
-            "V",
-            recording,
-            (NONE_S - 0.02, NONE_S + 0.1),
-            &[("udc", |row| row.udc_v)],
-        );
-        page.plot_window(
-            "the braking resistor is lost: torque",
-            "N·m",
-            recording,
-            (NONE_S - 0.02, NONE_S + 0.1),
-            &[("after limits", |row| row.te_ref_nm), ("torque", |row| row.te_nm)],
-        );
+        let window = (NONE_S - 0.02, NONE_S + 0.1);
+        let link: [Curve; 1] = [("udc", |row| row.udc_v)];
+        page.plot_window("the braking resistor is lost: DC link", "V", recording, window, &link);
+        let torque: [Curve; 2] = [("after limits", |row| row.te_ref_nm), ("torque", |row| row.te_nm)];
+        page.plot_window("the braking resistor is lost: torque", "N·m", recording, window, &torque);
     }
 }

@@ -43,7 +43,7 @@ impl Scenario<Traction> for FullStep {
         figures
     }
 
-    fn plots(&self, recording: &Recording, page: &mut Page) {
+    fn plots(&self, recording: &Recording, _: &Options, _: &Machine, page: &mut Page) {
         page.phase_current(recording);
         page.torque(recording);
     }

@@ -3,9 +3,8 @@
 use crate::analysis::Figures;
 use crate::machine::Machine;
 use crate::plant::{DcLinkSettings, Source};
-use crate::report::Page;
-use crate::trace::Recording;
-use crate::trace::{SlotRow, Tick};
+use crate::report::{Curve, Page};
+use crate::trace::{Recording, SlotRow, Tick};
 use crate::verdict::Verdict;
 use serde::Serialize;
 use tractive::operator::State;
@@ -129,33 +128,22 @@ pub fn figures(figures: &mut Figures, recording: &Recording) {
 /// The plots that all have.
 pub fn plots(page: &mut Page, recording: &Recording) {
     page.plot("DC link", "V", recording, &[("udc", |row| row.udc_v)]);
-    page.plot(
-        "torque: demanded of the drive, after the link's limits, given",
-        "N·m",
-        recording,
-        &[
-            ("demand", |row| row.status.map_or(0.0, |status| status.torque_nm.into())),
-            ("after limits", |row| row.te_ref_nm),
-            ("torque", |row| row.te_nm),
-        ],
-    );
-    page.plot(
-        "contactors and resistors (1: on), chopper duty",
-        "–",
-        recording,
-        &[
-            ("chopper", |row| row.status.map_or(0.0, |status| status.switches.chopper.into())),
-            ("precharge", |row| switched(row.status.map(|status| status.switches.precharge))),
-            ("main", |row| switched(row.status.map(|status| status.switches.main))),
-            ("discharge", |row| switched(row.status.map(|status| status.switches.discharge))),
-        ],
-    );
-    page.plot(
-        "state: init 0, self-test 1, ready 2, precharge 3, charged 4, enabled 5, running 6, coasting 7, stopping 8, discharge 9, fault 10",
-        "–",
-        recording,
-        &[("state", |row| row.status.map_or(0.0, |status| f64::from(status.state.code())))],
-    );
+    let torques: [Curve; 3] = [
+        ("demand", |row| row.status.map_or(0.0, |status| status.torque_nm.into())),
+        ("after limits", |row| row.te_ref_nm),
+        ("torque", |row| row.te_nm),
+    ];
+    page.plot("torque: demanded of the drive, after the link's limits, given", "N·m", recording, &torques);
+    let switches: [Curve; 4] = [
+        ("chopper", |row| row.status.map_or(0.0, |status| status.switches.chopper.into())),
+        ("precharge", |row| switched(row.status.map(|status| status.switches.precharge))),
+        ("main", |row| switched(row.status.map(|status| status.switches.main))),
+        ("discharge", |row| switched(row.status.map(|status| status.switches.discharge))),
+    ];
+    page.plot("contactors and resistors (1: on), chopper duty", "–", recording, &switches);
+    let title = "state: init 0, self-test 1, ready 2, precharge 3, charged 4, enabled 5, running 6, coasting 7, stopping 8, discharge 9, fault 10";
+    let state: [Curve; 1] = [("state", |row| row.status.map_or(0.0, |of| f64::from(of.state.code())))];
+    page.plot(title, "–", recording, &state);
     page.plot("speed", "r/min", recording, &[("speed", |row| row.speed_rpm)]);
 }
 

@@ -1,15 +1,8 @@
 //! Steps of the DC link under full load.
 
+use super::prelude::*;
 use super::script::{BEGIN_S, Script};
-use super::{Options, Plan, Traction, scaled_rpm, udc_v};
-use crate::analysis::{self, Figures};
-use crate::machine::Machine;
-use crate::report::Page;
-use crate::scenario::Scenario;
-use crate::trace::{Recording, Row};
-use crate::verdict::{Verdict, worst};
-use clap::Args;
-use serde::Serialize;
+use super::{scaled_rpm, udc_v};
 
 /// At several speeds: the link falls by 2/15 of its nominal voltage, comes back, rises by as much, comes back.
 #[derive(Clone, Copy, Debug, Args, Serialize)]
@@ -55,28 +48,18 @@ impl Scenario<Traction> for LinkSteps {
             .flat_map(|slot| (0..SHARES.len()).map(move |k| begins_s(slot) + SETTLE_S + k as f64 * HOLD_S));
         let steps: Vec<_> = steps.map(|at| analysis::transition(recording, at, at + HOLD_S)).collect();
         let trip_a = machine.folder.parameters.trip_current_a;
-        figures.set(
-            "verdicts",
-            vec![
-                Verdict::at_most(
-                    "peak current over the trip level",
-                    worst(recording.rows.iter().map(Row::peak_current_a)).map(|peak_a| peak_a / trip_a),
-                    1.0,
-                    "–",
-                ),
-                Verdict::at_most(
-                    "peak current over the larger steady peak",
-                    worst(steps.iter().map(|step| step.peak_ratio)),
-                    f64::INFINITY,
-                    "–",
-                ),
-            ],
-        );
+        let peak_a = worst(recording.rows.iter().map(Row::peak_current_a));
+        let ratio = worst(steps.iter().map(|step| step.peak_ratio));
+        let verdicts = [
+            Verdict::ours("peak current over the trip level", peak_a.map(|peak_a| peak_a / trip_a), 1.0),
+            Verdict::ours("peak current over the larger steady peak", ratio, f64::INFINITY),
+        ];
+        figures.set("verdicts", verdicts);
         figures.set("transitions", steps);
         figures
     }
 
-    fn plots(&self, recording: &Recording, page: &mut Page) {
+    fn plots(&self, recording: &Recording, _: &Options, _: &Machine, page: &mut Page) {
         page.overview(recording);
         page.plot("DC link", "V", recording, &[("udc", |row| row.udc_v)]);
     }

@@ -1,16 +1,9 @@
 //! Load steps at 200 r/min: the paper's figure 8.
 
-use super::{LEAD_S, Options, Plan, Traction, scaled_nm};
-use crate::analysis::{self, Figures, StepResponse};
-use crate::machine::Machine;
-use crate::options::RunOptions;
-use crate::report::Page;
-use crate::scenario::Scenario;
-use crate::trace::Recording;
-use crate::verdict::{Verdict, bound, torque_bound, worst};
-use clap::Args;
-use serde::Serialize;
-use tractive::control::Demand;
+use super::prelude::*;
+use super::{LEAD_S, scaled_nm};
+use crate::analysis::StepResponse;
+use crate::verdict::bound;
 
 /// 0 → 200 → … → 1,235 N·m and back, 100 ms each.
 #[derive(Clone, Copy, Debug, Args, Serialize)]
@@ -53,7 +46,7 @@ impl Scenario<Traction> for LoadSteps {
         figures
     }
 
-    fn plots(&self, recording: &Recording, page: &mut Page) {
+    fn plots(&self, recording: &Recording, _: &Options, _: &Machine, page: &mut Page) {
         page.plot("DC-link voltage", "V", recording, &[("udc", |row| row.udc_v)]);
         page.line_voltage("Line voltage u-v", recording, (0.0, 0.3));
         page.phase_current(recording);
@@ -70,26 +63,15 @@ pub fn verdicts(steps: &[StepResponse], options: &RunOptions, machine: &Machine)
     let percent = bound(options, 0.3, 1.5);
     let least_nm = scaled_nm(2.0, machine);
     let error = |step: &StepResponse| step.final_error_nm.abs() / (0.01 * percent * step.to_nm).max(least_nm);
-    let ideal = |at_most: f64| bound(options, at_most, f64::INFINITY);
+    let ideal = |what: &str, value: fn(&StepResponse) -> f64, at_most: f64, others: &'static str| {
+        Verdict::at_most(what, most(value), bound(options, at_most, f64::INFINITY), others)
+    };
+    let of_final = format!("final mean over {percent} % or 0.16 % of the largest torque");
+    let (error, most_error) = (worst(steps.iter().map(error)), torque_bound(options, 1.0, 1.0));
     vec![
-        Verdict::at_most("t90 in ms", most(|step| step.t90_ms), ideal(2.5), "3.0 to 3.6; the paper about 2"),
-        Verdict::at_most(
-            "overshoot in % of the step",
-            most(|step| step.overshoot_percent),
-            ideal(2.0),
-            "1.7",
-        ),
-        Verdict::at_most(
-            "settled within 2 % in ms",
-            most(|step| step.settling_2_percent_ms),
-            ideal(5.0),
-            "5 % in 4.2 ms",
-        ),
-        Verdict::at_most(
-            &format!("final mean over {percent} % or 0.16 % of the largest torque"),
-            worst(steps.iter().map(error)),
-            torque_bound(options, 1.0, 1.0),
-            "0.02 to 0.4 %",
-        ),
+        ideal("t90 in ms", |step| step.t90_ms, 2.5, "3.0 to 3.6; the paper about 2"),
+        ideal("overshoot in % of the step", |step| step.overshoot_percent, 2.0, "1.7"),
+        ideal("settled within 2 % in ms", |step| step.settling_2_percent_ms, 5.0, "5 % in 4.2 ms"),
+        Verdict::at_most(&of_final, error, most_error, "0.02 to 0.4 %"),
     ]
 }

@@ -54,7 +54,7 @@ impl Scenario<Traction> for ModeBorders {
         figures
     }
 
-    fn plots(&self, recording: &Recording, page: &mut Page) {
+    fn plots(&self, recording: &Recording, _: &Options, _: &Machine, page: &mut Page) {
         page.overview(recording);
         switches::plots(recording, page);
     }

@@ -1,7 +1,6 @@
 //! From power-up to running and back to an empty link, by command, with commands on the way that are refused.
 
-use super::line;
-use super::line::within;
+use super::line::{self, within};
 use super::prelude::*;
 use crate::bench::LinePlan;
 use crate::steps::held;
@@ -71,7 +70,7 @@ impl Scenario<Traction> for Precharge {
         verdicts.extend([
             Verdict::ours("source over link when the main contactor closes (share)", gap_v / source_v, 0.025),
             Verdict::ours("link at the end, V", ends_v, 60.0),
-            Verdict::ours("not ready at the end", f64::from(u8::from(!ends)), 0.0),
+            Verdict::never("not ready at the end", !ends),
             Verdict::ours("mean torque off the demand while running (share)", error, 0.01),
         ]);
         line::figures(&mut figures, recording);
@@ -79,7 +78,7 @@ impl Scenario<Traction> for Precharge {
         figures
     }
 
-    fn plots(&self, recording: &Recording, page: &mut Page) {
+    fn plots(&self, recording: &Recording, _: &Options, _: &Machine, page: &mut Page) {
         line::plots(page, recording);
         page.phase_current_in("coasting and catching: phase current u", recording, (COAST.0, COAST.1 + 0.3));
     }

@@ -3,8 +3,8 @@
 pub use super::{Options, Plan, Traction};
 pub use crate::analysis::{self, Figures};
 pub use crate::machine::Machine;
-pub use crate::options::finite;
-pub use crate::report::Page;
+pub use crate::options::{RunOptions, finite};
+pub use crate::report::{Curve, Page};
 pub use crate::rows::mean;
 pub use crate::scenario::Scenario;
 pub use crate::trace::{Recorded, Recording, Row};

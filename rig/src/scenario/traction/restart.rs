@@ -1,16 +1,9 @@
 //! Coasting with the gates off, and flying restart.
 
+use super::prelude::*;
+use super::scaled_rpm;
 use super::script::{BEGIN_S, Script};
-use super::{Options, Plan, Traction, scaled_rpm};
-use crate::analysis::{self, Figures, FlyingStart};
-use crate::machine::Machine;
-use crate::options::RunOptions;
-use crate::report::Page;
-use crate::scenario::Scenario;
-use crate::trace::Recording;
-use crate::verdict::{Verdict, torque_bound, worst};
-use clap::Args;
-use serde::Serialize;
+use crate::analysis::FlyingStart;
 
 /// At each speed: coast, catch the machine, half of the envelope's torque, release, coast.
 #[derive(Clone, Copy, Debug, Args, Serialize)]
@@ -60,7 +53,7 @@ impl Scenario<Traction> for Restart {
         figures
     }
 
-    fn plots(&self, recording: &Recording, page: &mut Page) {
+    fn plots(&self, recording: &Recording, _: &Options, _: &Machine, page: &mut Page) {
         page.overview(recording);
         for slot in 0..SPEEDS_RPM.len() {
             let at_s = begins_s(slot) + COAST_S;
@@ -81,19 +74,11 @@ fn verdicts(catches: &[FlyingStart], options: &RunOptions) -> Vec<Verdict> {
     };
     let error = |catch: &FlyingStart| (catch.final_error_nm / catch.demand_nm).abs() * 100.0;
     let driven = catches.iter().filter(|catch| catch.demand_nm != 0.0);
+    let (over, error) = (worst(catches.iter().map(over)), worst(driven.map(error)));
+    let most = torque_bound(options, 0.5, 1.5);
     vec![
-        Verdict::at_most("catches in another mode than the speed needs", other_mode as f64, 0.0, "–"),
-        Verdict::at_most(
-            "current at a catch over the larger of the machine's and the diodes'",
-            worst(catches.iter().map(over)),
-            1.02,
-            "–",
-        ),
-        Verdict::at_most(
-            "mean torque error after a catch in %",
-            worst(driven.map(error)),
-            torque_bound(options, 0.5, 1.5),
-            "–",
-        ),
+        Verdict::ours("catches in another mode than the speed needs", other_mode as f64, 0.0),
+        Verdict::ours("current at a catch over the larger of the machine's and the diodes'", over, 1.02),
+        Verdict::ours("mean torque error after a catch in %", error, most),
     ]
 }

@@ -42,34 +42,20 @@ impl Scenario<Traction> for Reversal {
         });
         let (steps, holds): (Vec<_>, Vec<_>) = (steps.collect(), holds.collect());
         let mut figures = analysis::common(recording);
-        figures.set(
-            "verdicts",
-            vec![
-                Verdict::ours(
-                    "peak current over the larger steady peak",
-                    worst(steps.iter().map(|step| step.peak_ratio)),
-                    1.15,
-                ),
-                Verdict::at_most(
-                    "mean torque error at full power in %",
-                    worst(holds.iter().map(|hold| hold.torque_error_percent.abs())),
-                    torque_bound(options, 0.5, 1.5),
-                    "0.5; 14 to 33 with an id trim",
-                ),
-            ],
-        );
+        let ratio = worst(steps.iter().map(|step| step.peak_ratio));
+        let error = worst(holds.iter().map(|hold| hold.torque_error_percent.abs()));
+        let (most, others) = (torque_bound(options, 0.5, 1.5), "0.5; 14 to 33 with an id trim");
+        let verdicts = [
+            Verdict::ours("peak current over the larger steady peak", ratio, 1.15),
+            Verdict::at_most("mean torque error at full power in %", error, most, others),
+        ];
+        figures.set("verdicts", verdicts);
         figures.set("transitions", steps);
         figures.set("points", holds);
         figures
     }
 
-    fn plots_beside(&self, recording: &Recording, options: &Options, machine: &Machine, page: &mut Page) {
-        let end_s = BEGIN_S + HOLD_S;
-        let window = (end_s - 0.5 * HOLD_S, end_s);
-        spectrum::draw(page, recording, ("full power", window), options, machine);
-    }
-
-    fn plots(&self, recording: &Recording, page: &mut Page) {
+    fn plots(&self, recording: &Recording, options: &Options, machine: &Machine, page: &mut Page) {
         page.overview(recording);
         page.rotor_currents(recording);
         for k in 0..SHARES.len() {
@@ -77,5 +63,8 @@ impl Scenario<Traction> for Reversal {
             let title = format!("phase current u at {at_s:.1} s");
             page.phase_current_in(&title, recording, (at_s - 0.01, at_s + 0.05));
         }
+        let end_s = BEGIN_S + HOLD_S;
+        let window = (end_s - 0.5 * HOLD_S, end_s);
+        spectrum::draw(page, recording, ("full power", window), options, machine);
     }
 }

@@ -1,15 +1,11 @@
 //! One operating point in steady state: distortion and torque ripple beside what the pulses allow.
 
-use super::TractionOptions;
 use super::prelude::*;
-use super::scaled_rpm;
 use super::script::Script;
-use crate::bound;
-use crate::distortion;
-use crate::distortion::Distortion;
-use crate::options::{On, RunOptions};
-use crate::scenario;
-use crate::spectrum;
+use super::{TractionOptions, scaled_rpm};
+use crate::distortion::{self, Distortion};
+use crate::options::On;
+use crate::{bound, scenario, spectrum};
 
 /// `--speed` and `--torque`.
 #[derive(Clone, Copy, Debug, Args, Serialize)]
@@ -73,22 +69,14 @@ impl Scenario<Traction> for Steady {
         STEP_S
     }
 
-    fn plots_beside(&self, recording: &Recording, options: &Options, machine: &Machine, page: &mut Page) {
-        let window = (SETTLE_S, SETTLE_S + MEASURE_S);
-        spectrum::draw(page, recording, ("steady state", window), options, machine);
-    }
-
-    fn plots(&self, recording: &Recording, page: &mut Page) {
+    fn plots(&self, recording: &Recording, options: &Options, machine: &Machine, page: &mut Page) {
         let window = (SETTLE_S, SETTLE_S + 0.04);
         page.line_voltage("line voltage u-v", recording, window);
         page.phase_current_in("phase current u", recording, window);
-        page.plot_window(
-            "torque",
-            "N·m",
-            recording,
-            window,
-            &[("torque", |row| row.te_nm), ("demand", |row| row.te_ref_nm)],
-        );
+        let torque: [Curve; 2] = [("torque", |row| row.te_nm), ("demand", |row| row.te_ref_nm)];
+        page.plot_window("torque", "N·m", recording, window, &torque);
+        let window = (SETTLE_S, SETTLE_S + MEASURE_S);
+        spectrum::draw(page, recording, ("steady state", window), options, machine);
     }
 }
 

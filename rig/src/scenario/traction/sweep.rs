@@ -2,9 +2,8 @@
 
 use super::prelude::*;
 use super::{LEAD_S, switches};
-use crate::options::{On, RunOptions};
-use crate::scenario;
-use crate::spectrum;
+use crate::options::On;
+use crate::{scenario, spectrum};
 
 /// 0 → rated speed with 250 r/min a second (2,000 r/min in 8 s) and 1 s hold, at the torque envelope.
 #[derive(Clone, Copy, Debug, Args, Serialize)]
@@ -59,7 +58,15 @@ impl Scenario<Traction> for Sweep {
         figures
     }
 
-    fn plots_beside(&self, recording: &Recording, options: &Options, machine: &Machine, page: &mut Page) {
+    fn plots(&self, recording: &Recording, options: &Options, machine: &Machine, page: &mut Page) {
+        page.overview(recording);
+        page.torque(recording);
+        page.phase_current(recording);
+        page.plot("Commanded fundamental", "V", recording, &[("u", |row| row.u_v)]);
+        let title = "Mode (0 off, 1 async, 2 sync 15, 3 sync 12, 4 mid 7, 5 mid 3, 6 square)";
+        page.plot(title, "", recording, &[("mode", |row| f64::from(row.mode as u8))]);
+        page.rotor_currents(recording);
+        switches::plots(recording, page);
         // The hold at the last speed, wherever it is.
         let fastest = recording.rows.iter().map(|row| row.speed_rpm.abs()).fold(0.0, f64::max);
         let hold = |row: &&Row| fastest > 0.0 && row.speed_rpm.abs() > 0.999_999 * fastest;
@@ -67,21 +74,6 @@ impl Scenario<Traction> for Sweep {
             let (title, window) = (format!("{fastest:.0} r/min"), (end.t_s - 0.5 * HOLD_S, end.t_s));
             spectrum::draw(page, recording, (&title, window), options, machine);
         }
-    }
-
-    fn plots(&self, recording: &Recording, page: &mut Page) {
-        page.overview(recording);
-        page.torque(recording);
-        page.phase_current(recording);
-        page.plot("Commanded fundamental", "V", recording, &[("u", |row| row.u_v)]);
-        page.plot(
-            "Mode (0 off, 1 async, 2 sync 15, 3 sync 12, 4 mid 7, 5 mid 3, 6 square)",
-            "",
-            recording,
-            &[("mode", |row| f64::from(row.mode as u8))],
-        );
-        page.rotor_currents(recording);
-        switches::plots(recording, page);
     }
 }
 

@@ -98,7 +98,7 @@ impl Scenario<Traction> for Timing {
         }
     }
 
-    fn plots(&self, recording: &Recording, page: &mut Page) {
+    fn plots(&self, recording: &Recording, _: &Options, _: &Machine, page: &mut Page) {
         page.overview(recording);
     }
 }

@@ -1,7 +1,7 @@
 //! The whole traction cycle under torque control: the paper's figures 24 to 36.
 
 use super::prelude::*;
-use crate::options::positive;
+use crate::options::number;
 use crate::plant::zs9::ZNetwork;
 
 /// 10 to 1,300 r/min at full torque, a cruise there, and back.
@@ -117,41 +117,20 @@ impl Scenario<Zs9> for Cycle {
         figures
     }
 
-    fn plots(&self, recording: &Recording, page: &mut Page) {
+    fn plots(&self, recording: &Recording, _: &Options, _: &Machine, page: &mut Page) {
         let rows = figures::window(recording, 0.0, recording.rows.last().map_or(MOVING_S, |row| row.t_s));
-        plot(page, ("figures 24 and 30", "link voltage U_in", "V"), rows, &[("U_in", |row| row.link_v)]);
-        plot(page, ("figures 25 and 31", "capacitor voltage", "V"), rows, &[("U_c", |row| row.capacitor_v)]);
-        plot(page, ("figures 26 and 32", "inductor current", "A"), rows, &[("i_L", |row| row.inductor_a)]);
-        plot(
-            page,
-            ("figures 27 and 33", "torque", "N·m"),
-            rows,
-            &[("motor 1", |row| row.motors[0].torque_nm), ("motor 2", |row| row.motors[1].torque_nm)],
-        );
-        plot(
-            page,
-            ("figures 28 and 34", "speed", "r/min"),
-            rows,
-            &[("motor 1", |row| row.motors[0].speed_rpm), ("motor 2", |row| row.motors[1].speed_rpm)],
-        );
-        plot(
-            page,
-            ("figures 29 and 35", "d and q currents of motor 1", "A"),
-            rows,
-            &[("id", |row| row.motors[0].id_a), ("iq", |row| row.motors[0].iq_a)],
-        );
-        plot(
-            page,
-            ("figures 29 and 35", "phase voltage, peak", "V"),
-            rows,
-            &[("motor 1", |row| row.motors[0].voltage_v)],
-        );
-        figures::over_speed(page, ("figure 36", "torque over speed", "N·m"), &recording.rows, |row| {
-            row.motors[0].torque_nm
-        });
-        figures::over_speed(page, ("figure 36", "phase voltage over speed", "V"), &recording.rows, |row| {
-            row.motors[0].voltage_v
-        });
+        plot(page, ("figures 24 and 30", "link voltage U_in", "V"), rows, &VOLTAGES[..1]);
+        plot(page, ("figures 25 and 31", "capacitor voltage", "V"), rows, &VOLTAGES[1..]);
+        plot(page, ("figures 26 and 32", "inductor current", "A"), rows, &INDUCTOR);
+        plot(page, ("figures 27 and 33", "torque", "N·m"), rows, &TORQUES);
+        plot(page, ("figures 28 and 34", "speed", "r/min"), rows, &SPEEDS);
+        let currents: [Curve; 2] = [("id", |row| row.motors[0].id_a), ("iq", |row| row.motors[0].iq_a)];
+        plot(page, ("figures 29 and 35", "d and q currents of motor 1", "A"), rows, &currents);
+        let voltage: [Curve; 1] = [("motor 1", |row| row.motors[0].voltage_v)];
+        plot(page, ("figures 29 and 35", "phase voltage, peak", "V"), rows, &voltage);
+        figures::over_speed(page, ("figure 36", "torque over speed", "N·m"), &recording.rows, &TORQUES[0]);
+        let title = ("figure 36", "phase voltage over speed", "V");
+        figures::over_speed(page, title, &recording.rows, &voltage[0]);
     }
 }
 
@@ -169,8 +148,5 @@ fn residual_percent(rows: &[Row]) -> f64 {
 }
 
 fn cruise(text: &str) -> Result<f64, String> {
-    match positive(text) {
-        Ok(seconds) if seconds <= 3600.0 => Ok(seconds),
-        _ => Err("must be a number above 0, at most 3600".to_owned()),
-    }
+    number(text, "a number above 0, at most 3600", |seconds| seconds > 0.0 && seconds <= 3600.0)
 }

@@ -1,7 +1,7 @@
 //! Motor 2's load steps while motor 1 goes on: the paper's figures 14 to 19.
 
 use super::prelude::*;
-use crate::options::finite;
+use crate::options::number;
 
 /// Both at 1,000 r/min with 60 N·m; motor 2's load steps at 0.6 s.
 #[derive(Clone, Copy, Debug, Args, Serialize)]
@@ -55,40 +55,19 @@ impl Scenario<Zs9> for LoadStep {
         figures
     }
 
-    fn plots(&self, recording: &Recording, page: &mut Page) {
+    fn plots(&self, recording: &Recording, _: &Options, _: &Machine, page: &mut Page) {
         let rows = figures::window(recording, STEP_S - 0.1, STEP_S + 0.2);
-        plot(
-            page,
-            ("figure 14", "link voltage", "V"),
-            rows,
-            &[("U_in", |row| row.link_v), ("U_c", |row| row.capacitor_v)],
-        );
-        plot(page, ("figure 15", "inductor current", "A"), rows, &[("i_L", |row| row.inductor_a)]);
-        let torques: &[Curve] = &[
-            ("motor 1", |row| row.motors[0].torque_nm),
-            ("motor 2", |row| row.motors[1].torque_nm),
-            ("load 2", |row| row.motors[1].load_nm),
-        ];
-        plot(page, ("figure 16", "torque", "N·m"), rows, torques);
-        plot(
-            page,
-            ("figure 17", "speed of motor 2", "r/min"),
-            rows,
-            &[("motor 2", |row| row.motors[1].speed_rpm)],
-        );
-        plot(
-            page,
-            ("figure 18", "speed of motor 1", "r/min"),
-            rows,
-            &[("motor 1", |row| row.motors[0].speed_rpm)],
-        );
+        plot(page, ("figure 14", "link voltage", "V"), rows, &VOLTAGES);
+        plot(page, ("figure 15", "inductor current", "A"), rows, &INDUCTOR);
+        let [one, two] = TORQUES;
+        let torques = [one, two, ("load 2", |row| row.motors[1].load_nm)];
+        plot(page, ("figure 16", "torque", "N·m"), rows, &torques);
+        plot(page, ("figure 17", "speed of motor 2", "r/min"), rows, &SPEEDS[1..]);
+        plot(page, ("figure 18", "speed of motor 1", "r/min"), rows, &SPEEDS[..1]);
         figures::phases(page, "figure 19", figures::window(recording, STEP_S - 0.03, STEP_S + 0.05));
     }
 }
 
 fn load_step(text: &str) -> Result<f64, String> {
-    match finite(text) {
-        Ok(step) if step.abs() <= 500.0 => Ok(step),
-        _ => Err("must be a number from -500 to 500".to_owned()),
-    }
+    number(text, "a number from -500 to 500", |step| step.abs() <= 500.0)
 }

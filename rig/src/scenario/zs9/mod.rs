@@ -1,17 +1,14 @@
 //! The ZS9's scenarios.
 
-mod cycle;
-mod load_step;
+pub(super) mod cycle;
+pub(super) mod load_step;
 mod prelude;
-mod reverse;
-mod steady;
-mod timing;
+pub(super) mod reverse;
+pub(super) mod steady;
+pub(super) mod timing;
 
-pub use cycle::Cycle;
-pub use load_step::{INERTIA_KG_M2, LoadStep};
-pub use reverse::Reverse;
-pub use steady::{SPEEDS_RPM as STEADY_SPEEDS_RPM, Steady};
-pub use timing::Timing;
+pub use load_step::INERTIA_KG_M2;
+pub use steady::SPEEDS_RPM as STEADY_SPEEDS_RPM;
 
 use super::System;
 use crate::analysis::Figures;

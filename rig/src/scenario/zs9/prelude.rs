@@ -7,7 +7,7 @@ pub use crate::plant::SpeedSource;
 pub use crate::report::Page;
 pub use crate::rows::mean;
 pub use crate::scenario::Scenario;
-pub use crate::zs9::figures::{self, Curve, plot};
+pub use crate::zs9::figures::{self, Curve, INDUCTOR, SPEEDS, TORQUES, VOLTAGES, plot};
 pub use crate::zs9::trace::{Recording, Row};
 pub use crate::zs9::{Orders, SeenMotors};
 pub use clap::Args;

@@ -57,38 +57,13 @@ impl Scenario<Zs9> for Reverse {
         figures
     }
 
-    fn plots(&self, recording: &Recording, page: &mut Page) {
+    fn plots(&self, recording: &Recording, _: &Options, _: &Machine, page: &mut Page) {
         let rows = figures::window(recording, 0.0, DURATION_S);
-        plot(
-            page,
-            ("figure 20", "torque of motor 1", "N·m"),
-            rows,
-            &[("motor 1", |row| row.motors[0].torque_nm)],
-        );
-        plot(
-            page,
-            ("figure 21", "speed of motor 1", "r/min"),
-            rows,
-            &[("motor 1", |row| row.motors[0].speed_rpm)],
-        );
-        plot(
-            page,
-            ("figure 22", "torque of motor 2", "N·m"),
-            rows,
-            &[("motor 2", |row| row.motors[1].torque_nm)],
-        );
-        plot(
-            page,
-            ("figure 23", "speed of motor 2", "r/min"),
-            rows,
-            &[("motor 2", |row| row.motors[1].speed_rpm)],
-        );
-        plot(
-            page,
-            ("figures 20–23", "link", "V"),
-            rows,
-            &[("U_in", |row| row.link_v), ("U_c", |row| row.capacitor_v)],
-        );
+        plot(page, ("figure 20", "torque of motor 1", "N·m"), rows, &TORQUES[..1]);
+        plot(page, ("figure 21", "speed of motor 1", "r/min"), rows, &SPEEDS[..1]);
+        plot(page, ("figure 22", "torque of motor 2", "N·m"), rows, &TORQUES[1..]);
+        plot(page, ("figure 23", "speed of motor 2", "r/min"), rows, &SPEEDS[1..]);
+        plot(page, ("figures 20–23", "link", "V"), rows, &VOLTAGES);
         figures::phases(page, "figures 20–23", figures::window(recording, 0.95, 1.05));
     }
 }

@@ -49,10 +49,10 @@ impl Scenario<Zs9> for Steady {
         figures
     }
 
-    fn plots(&self, recording: &Recording, page: &mut Page) {
+    fn plots(&self, recording: &Recording, _: &Options, _: &Machine, page: &mut Page) {
         patterns::draw(page);
         figures::phases(page, "table 1", figures::window(recording, 0.0, 0.05));
         let rows = figures::window(recording, 0.0, 0.001);
-        figures::plot(page, ("table 1", "inductor current", "A"), rows, &[("i_L", |row| row.inductor_a)]);
+        plot(page, ("table 1", "inductor current", "A"), rows, &INDUCTOR);
     }
 }

@@ -28,7 +28,7 @@ impl Scenario<Zs9> for Timing {
         Plan::driven((LEAD_S, DURATION_S), [turning(1.0), turning(-1.0)], [0.0; 2], operator)
     }
 
-    fn plots(&self, recording: &Recording, page: &mut Page) {
+    fn plots(&self, recording: &Recording, _: &Options, _: &Machine, page: &mut Page) {
         figures::phases(page, "no figure", &recording.rows);
     }
 }

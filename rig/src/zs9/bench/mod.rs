@@ -26,8 +26,7 @@ use gates::Gates;
 use sums::Sums;
 use tractive::drive::dual::COMPARE_STEPS;
 use tractive::operator::{DualStatus, Feedback};
-use tractive::ports::DualReport;
-use tractive::ports::{DualSample, GateFeedback, PlayedPeriod};
+use tractive::ports::{DualReport, DualSample, GateFeedback, PlayedPeriod};
 use tractive::time::Instant;
 
 /// The delay from the control interrupt's nominal instant until its order to turn the gates off reaches them, in ticks (75 µs): its
@@ -159,11 +158,6 @@ impl Bench {
     /// The motors' true speeds, in r/min.
     pub fn speeds_rpm(&self) -> [f64; 2] {
         self.plant.motors.each_ref().map(|motor| motor.speed_rpm())
-    }
-
-    /// Time since the recording's beginning, in s.
-    pub fn time_s(&self) -> f64 {
-        self.time.now_s()
     }
 
     /// Length of a compare step, in s.

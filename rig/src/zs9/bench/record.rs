@@ -1,7 +1,7 @@
 //! The trace.
 
 use super::Bench;
-use crate::bench::{Simulated, Tick};
+use crate::bench::{Simulated, Tick, Timeline};
 use crate::zs9::trace::{Edge, MotorRow, Recording, Row};
 use tractive::recorder::DualRecord;
 use tractive::time::Instant;
@@ -9,6 +9,10 @@ use tractive::time::Instant;
 impl Simulated for Bench {
     type Record = DualRecord;
     type Recording = Recording;
+
+    fn time(&self) -> &Timeline {
+        &self.time
+    }
 
     fn is_done(&self) -> bool {
         self.rows.len() >= self.rows_wanted
@@ -20,15 +24,7 @@ impl Simulated for Bench {
     }
 
     fn has_control(&self, instant: Instant) -> bool {
-        self.spoiler.injected.has_control(self.time.seconds(self.time.widen(instant)))
-    }
-
-    fn instant_s(&self, instant: Instant) -> f64 {
-        self.time.seconds(self.time.widen(instant))
-    }
-
-    fn slot_after(&self, slot: Instant) -> Instant {
-        self.time.slot_after(slot)
+        self.spoiler.injected.has_control(self.instant_s(instant))
     }
 
     fn loads_from(&mut self, instant: Instant, loads_nm: [f64; 2]) {
@@ -36,7 +32,7 @@ impl Simulated for Bench {
     }
 
     fn end_at(&mut self, instant: Instant) {
-        let end_s = self.time.seconds(self.time.widen(instant));
+        let end_s = self.instant_s(instant);
         self.rows_wanted = self.rows_wanted.min((end_s / self.settings.trace_step_s).round() as usize);
     }
 

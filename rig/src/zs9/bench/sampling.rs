@@ -4,8 +4,7 @@ use super::{Bench, BenchError};
 use crate::inject::zs9::Kind;
 use crate::steps::held;
 use tractive::frames::Abc;
-use tractive::ports::DualReport;
-use tractive::ports::{DualSample, HardwareBreak, PowerSample};
+use tractive::ports::{DualReport, DualSample, HardwareBreak, PowerSample};
 use tractive::time::Instant;
 
 /// The error of a current's reading that makes no difference which counts, in A: a tenth of a machine's largest current.

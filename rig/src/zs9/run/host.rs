@@ -12,8 +12,9 @@ use tractive::nine_switch::Scheme;
 use tractive::operator::{
     self, DualDemands, DualMailboxes, DualRequest, DualSlot, DualStatus, Feedback, Line, OperatorPort, slot_s,
 };
-use tractive::ports::DualReport;
-use tractive::ports::{ControlPort, Dual, DualSample, MotorDemand, PlayedPeriod, PowerSample, PwmPort};
+use tractive::ports::{
+    ControlPort, Dual, DualReport, DualSample, MotorDemand, PlayedPeriod, PowerSample, PwmPort,
+};
 use tractive::protection::{MaskedFaults, SafeState, Trip};
 use tractive::protocol::Zs9CanEndpoint;
 use tractive::recorder::DualRecorder;

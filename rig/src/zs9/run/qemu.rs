@@ -9,9 +9,6 @@ use tractive::ports::DualReport;
 use tractive::wire::{self, DualRequest, DualSetup};
 
 /// Runs until the recording is complete; a supervisor commands over the protocol.
-///
-/// # Errors
-/// Where the bench cannot go on, or the emulator ends early.
 pub fn run_in_qemu(
     name: &str,
     bench: Bench,
