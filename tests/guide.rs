@@ -1,12 +1,22 @@
-//! The guide's list of faults against the code.
+//! The guide against the code: its list of faults, what its pages on papers and requirements name, and its links.
 
-use std::path::Path;
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+use tractive::control::Gains;
 use tractive::protection::Fault;
+
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+fn read(path: impl AsRef<Path>) -> String {
+    let path = root().join(path);
+    std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
+}
 
 #[test]
 fn every_fault_is_explained_once_and_in_the_order_of_its_code() {
-    let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/faults.md");
-    let text = std::fs::read_to_string(page).unwrap();
+    let text = read("docs/faults.md");
     let explained: Vec<_> = text
         .lines()
         .filter_map(|line| line.strip_prefix("| `")?.split_once("` | "))
@@ -16,4 +26,191 @@ fn every_fault_is_explained_once_and_in_the_order_of_its_code() {
         })
         .collect();
     assert_eq!(explained, Fault::ALL.map(Fault::name));
+}
+
+/// A row of a table: its cells by the names of their columns.
+type Row<'a> = Vec<(&'a str, &'a str)>;
+
+/// The rows of all tables under the headings that begin so.
+fn rows<'a>(text: &'a str, heading: &str) -> Vec<Row<'a>> {
+    let sections = text.split("\n## ").filter(|section| section.starts_with(heading));
+    let cells = |line: &'a str| -> Vec<&'a str> {
+        line.trim_matches('|').split(" |").map(|cell| cell.trim_start_matches('|').trim()).collect()
+    };
+    let mut rows = Vec::new();
+    for lines in
+        sections.map(|section| section.lines().filter(|line| line.starts_with('|')).collect::<Vec<_>>())
+    {
+        let [head, _, body @ ..] = lines.as_slice() else { continue };
+        let heads = cells(head);
+        for line in body {
+            let row: Row = heads.iter().copied().zip(cells(line)).collect();
+            assert_eq!(row.len(), heads.len(), "a row with too few cells: {line}");
+            rows.push(row);
+        }
+    }
+    rows
+}
+
+fn cell<'a>(row: &Row<'a>, column: &str) -> &'a str {
+    row.iter().find(|(name, _)| *name == column).map_or("", |(_, cell)| cell)
+}
+
+/// The words in code type of a cell.
+fn spans(cell: &str) -> impl Iterator<Item = &str> {
+    cell.split('`').skip(1).step_by(2)
+}
+
+/// A word stands in a text, not as a part of another.
+fn has_word(text: &str, word: &str) -> bool {
+    let is_part = |letter: char| letter.is_alphanumeric() || letter == '_';
+    text.match_indices(word)
+        .any(|(at, _)| !text[..at].ends_with(is_part) && !text[at + word.len()..].starts_with(is_part))
+}
+
+/// Names of a cell that the tree does not have: a path is a file, the words after it stand in that file, as functions where they are
+/// `tests`, and a word before any path is a scenario.
+fn missing(cell: &str, tests: bool, scenarios: &str) -> Vec<String> {
+    let (mut found, mut file) = (Vec::new(), None);
+    for span in spans(cell) {
+        if span.contains('/') {
+            match std::fs::read_to_string(root().join(span)) {
+                Ok(text) => file = Some((span, text)),
+                Err(_) => found.push(format!("no file {span}")),
+            }
+            continue;
+        }
+        match &file {
+            Some((path, text)) if tests && !text.contains(&format!("fn {span}(")) => {
+                found.push(format!("no test {span} in {path}"));
+            }
+            Some((path, text)) if !has_word(text, span) => found.push(format!("no {span} in {path}")),
+            None if !scenarios.contains(&format!("\"{span}\"")) => found.push(format!("no scenario {span}")),
+            _ => {}
+        }
+    }
+    found
+}
+
+/// Complaints about the columns that name code and tests.
+fn complaints(rows: &[Row]) -> Vec<String> {
+    let scenarios = read("rig/src/scenario/catalogue.rs");
+    let of = |row: &Row| {
+        let mut found = missing(cell(row, "code"), false, &scenarios);
+        for column in ["seen", "test"] {
+            for part in cell(row, column).split(';') {
+                found.extend(missing(part, true, &scenarios));
+            }
+        }
+        let reason = cell(row, "here");
+        if spans(cell(row, "code")).next().is_none() && reason.len() < 20 {
+            found.push(format!("{:?} has neither a place nor a reason", row[0].1));
+        }
+        found
+    };
+    rows.iter().flat_map(of).collect()
+}
+
+/// The numbers of a row's first cell: `(3)`, `figure 3`, `figures 3, 4`, `figures 3 to 5`.
+fn numbers(cell: &str) -> Vec<u32> {
+    let mut all: Vec<u32> = Vec::new();
+    let mut through = false;
+    for word in cell.split([' ', ',', '(', ')']) {
+        if let Ok(number) = word.parse() {
+            let from = if through { all.last().map_or(number, |last| last + 1) } else { number };
+            all.extend(from..=number);
+        }
+        through = word == "to";
+    }
+    all
+}
+
+#[test]
+fn the_page_on_the_papers_has_every_equation_table_and_figure() {
+    let text = read("docs/papers.md");
+    for (heading, sign, count) in [
+        ("The first paper: equations", "(", 17),
+        ("The first paper: figures", "figure", 10),
+        ("The second paper: equations", "(", 19),
+        ("The second paper: table and figures", "table", 1),
+        ("The second paper: table and figures", "figure", 36),
+    ] {
+        let rows = rows(&text, heading);
+        let named = rows.iter().map(|row| row[0].1).filter(|name| name.starts_with(sign));
+        let mut found: Vec<_> = named.flat_map(numbers).collect();
+        found.sort_unstable();
+        assert_eq!(found, (1..=count).collect::<Vec<_>>(), "{heading}: {sign}");
+        let complaints = complaints(&rows);
+        assert!(complaints.is_empty(), "{complaints:#?}");
+    }
+    let gains = Gains::DEFAULT;
+    let told = [
+        format!("g = {} (`carrier`)", gains.carrier),
+        format!("k = {} (`observer`)", gains.observer),
+        format!("1/k = {} halves", (1.0 / gains.observer).round()),
+        format!("{} rad/s (`pattern_rad_s`)", gains.pattern_rad_s),
+    ];
+    let text = text.replace('\n', " ");
+    assert!(told.iter().all(|part| text.contains(part)), "{told:?}");
+}
+
+#[test]
+fn every_requirement_names_code_and_a_test_that_there_are() {
+    let text = read("docs/requirements.md");
+    let rows = rows(&text, "Specification");
+    assert!(rows.len() > 80, "{} requirements", rows.len());
+    let mut complaints = complaints(&rows);
+    for row in &rows {
+        if spans(cell(row, "test")).next().is_none() && cell(row, "test").len() < 20 {
+            complaints.push(format!("{:?} has neither a test nor a reason", row[0].1));
+        }
+    }
+    assert!(complaints.is_empty(), "{complaints:#?}");
+    let named: BTreeSet<_> = rows.iter().map(|row| row[0].1).collect();
+    assert_eq!(named.len(), rows.len(), "a requirement stands there twice");
+}
+
+#[test]
+fn what_is_not_in_the_tree_is_found() {
+    let wrong = |cell: &str, tests| missing(cell, tests, "\"sweep\"").len();
+    assert_eq!(wrong("`src/lib.rs` `control`, `frames`", false), 0);
+    assert_eq!(wrong("`src/lib.rs` `contro`", false), 1);
+    assert_eq!(wrong("`src/no.rs`", false), 1);
+    assert_eq!(wrong("`sweep`", true) + wrong("`tests/guide.rs` `missing`", true), 0);
+    assert_eq!(wrong("`sweeps`", true) + wrong("`tests/guide.rs` `Row`", true), 2);
+    assert_eq!(numbers("figures 3, 5 to 7"), [3, 5, 6, 7]);
+}
+
+/// The anchors of a page's headings.
+fn anchors(text: &str) -> BTreeSet<String> {
+    let headings = text.lines().filter(|line| line.starts_with('#'));
+    let anchor = |heading: &str| {
+        let kept = heading.trim_start_matches('#').trim().to_lowercase();
+        let kept = kept.chars().filter(|letter| letter.is_alphanumeric() || [' ', '-', '_'].contains(letter));
+        kept.collect::<String>().replace(' ', "-")
+    };
+    headings.map(anchor).collect()
+}
+
+#[test]
+fn every_link_of_guide_and_readme_leads_somewhere() {
+    let mut pages = vec![PathBuf::from("README.md")];
+    let entries = std::fs::read_dir(root().join("docs")).unwrap().map(|entry| entry.unwrap().path());
+    pages.extend(entries.filter(|path| path.extension().is_some_and(|extension| extension == "md")));
+    let mut wrong = Vec::new();
+    for page in &pages {
+        let text = read(page);
+        let links = text.split("](").skip(1).filter_map(|rest| rest.split(')').next());
+        for link in links.filter(|link| !link.contains("://")) {
+            let (file, anchor) = link.split_once('#').unwrap_or((link, ""));
+            let target = root().join(page).parent().unwrap().join(file);
+            let target = if file.is_empty() { root().join(page) } else { target };
+            let known = anchor.is_empty()
+                || std::fs::read_to_string(&target).is_ok_and(|text| anchors(&text).contains(anchor));
+            if !target.exists() || !known {
+                wrong.push(format!("{}: {link}", page.display()));
+            }
+        }
+    }
+    assert!(pages.len() > 15 && wrong.is_empty(), "{wrong:#?}");
 }

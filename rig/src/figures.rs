@@ -7,7 +7,7 @@ use crate::report::Page;
 use crate::trace::Recording;
 use crate::verdict::worst;
 use tractive::control::{VoltageLimit, mtpa, operating_point};
-use tractive::modulation::Mode;
+use tractive::modulation::{Ladder, Mode};
 use tractive_tablegen::SmoothMap;
 
 type Series = Vec<(String, Curve)>;
@@ -31,7 +31,8 @@ pub fn draw(page: &mut Page, recording: &Recording, points: &[SteadyPoint], mach
         let title =
             format!("middle 60°, {}: legs u, v, w at {:.0} % of six-step", mode.name(), 100.0 * share);
         let axes = ("pulse angle in degrees", "level");
-        page.draw_xy("figure 7", &title, axes, &legs(machine, mode, f1_hz, share));
+        let figure = Ladder::PAPER.modes().any(|own| own == mode).then_some("figure 7");
+        page.draw_xy(figure, &title, axes, &legs(machine, mode, f1_hz, share));
     }
 }
 
@@ -40,14 +41,18 @@ type Curve = Vec<(f64, f64)>;
 /// Torque over its demand, efficiency and current of the characteristic points, over speed: full torque, then full power.
 fn accuracy(points: &[SteadyPoint], machine: &Machine) -> [(&'static str, &'static str, Curve); 3] {
     let rated_nm = machine.folder.parameters.rated_torque_nm;
-    let curve = |value: fn(&SteadyPoint) -> f64| {
+    let curve = |value: fn(&SteadyPoint) -> Option<f64>| {
         let along = points.iter().filter(|point| point.demand_nm > rated_nm);
-        along.map(|point| (point.speed_rpm, value(point))).collect()
+        along.filter_map(|point| Some((point.speed_rpm, value(point)?))).collect()
     };
     [
-        ("torque accuracy", "100 % less the error", curve(|point| 100.0 - point.torque_error_percent.abs())),
+        (
+            "torque accuracy",
+            "100 % less the error",
+            curve(|point| Some(100.0 - point.torque_error_percent.abs())),
+        ),
         ("efficiency", "%", curve(|point| point.efficiency_percent)),
-        ("phase current", "A rms", curve(|point| point.current_rms_a)),
+        ("phase current", "A rms", curve(|point| Some(point.current_rms_a))),
     ]
 }
 

@@ -1,4 +1,5 @@
-//! The paper's MTPA beside ours, judged on the smooth flux map.
+//! The paper's MTPA beside ours, judged on the smooth flux map. The paper does not say with which inductances its first pass begins: those
+//! of zero current are our reading.
 
 use crate::machine::Machine;
 use crate::verdict::{Verdict, worst};
@@ -57,7 +58,7 @@ pub fn compare(machine: &Machine) -> Vec<MethodFigures> {
         let started = Dq { d: start_d, q: start_q };
         let methods = [
             ("one pass from L(0, 0)", mtpa_passes::<1>(wanted, zero, tables)),
-            ("two passes from L(0, 0), the paper's", mtpa_passes::<2>(wanted, zero, tables)),
+            ("two passes from L(0, 0), as we read the paper", mtpa_passes::<2>(wanted, zero, tables)),
             ("two passes as we start them", mtpa_passes::<2>(wanted, started, tables)),
             (OURS, mtpa(wanted, tables)),
         ];

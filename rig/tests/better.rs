@@ -234,7 +234,7 @@ fn torque_turns_over_where_the_voltage_forces_more_flux_than_the_magnets() {
 /// paper's method.
 const PAPERS: [(&str, [f64; 4], f64); 2] = [
     ("one pass from L(0, 0)", [-9.5, -26.5, -33.0, -40.0], 0.7),
-    ("two passes from L(0, 0), the paper's", [-1.3, -7.1, -10.2, -14.8], 1.9),
+    ("two passes from L(0, 0), as we read the paper", [-1.3, -7.1, -10.2, -14.8], 1.9),
 ];
 
 #[test]

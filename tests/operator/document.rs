@@ -1,9 +1,8 @@
-//! docs/operator.md has every state, refusal and fault that the code has, and no other.
+//! docs/operator.md has every state and refusal that the code has, and no other.
 
 use std::path::Path;
 use tractive::built_in::traction::BUILT_IN;
 use tractive::operator::{Limits, Line, Refusal, State};
-use tractive::protection::Fault;
 
 fn text() -> String {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/operator.md");
@@ -24,8 +23,6 @@ fn the_tables_are_the_codes() {
     assert_eq!(table(&text, "States"), states);
     let refusals: Vec<_> = Refusal::ALL.iter().map(|refusal| refusal.name()).collect();
     assert_eq!(table(&text, "Refusals"), refusals);
-    let faults: Vec<_> = Fault::ALL.iter().map(|fault| fault.name()).collect();
-    assert_eq!(table(&text, "Faults"), faults);
 }
 
 #[test]

@@ -100,3 +100,98 @@ impl Observer {
         self.sine = self.sine + error * (2.0 * sixth.sin);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+
+    use super::super::{Committed, ModeLimits, Region, Regulated, Target, current_loop};
+    use super::*;
+    use std::vec::Vec;
+
+    /// Length of a half, in s; the disturbance, in V; the reference of the flux linkage, in Wb.
+    const HALF_S: f32 = 0.5e-3;
+    const DISTURBANCE_V: f32 = 20.0;
+    const REFERENCE_WB: f32 = 1.0;
+
+    /// The loop at standstill without resistance, on a flux linkage of 0.9 Wb at first: of each half the error in Wb, the voltage that is asked
+    /// for without a limit, the voltage that acts and the estimate before it, in V.
+    fn driven(halves: usize, limit_v: f32) -> Vec<[f32; 4]> {
+        let (mut observer, mut flux, mut acted_v) = (Observer::new(), 0.9, None);
+        let at_rest = Angle::ZERO.sin_cos();
+        let mut found = Vec::new();
+        for _ in 0..halves {
+            let along_d = |wb: f32| Dq { d: wb, q: 0.0 };
+            let sample = RotorSample { frame: at_rest, current: Dq::default(), flux: along_d(flux) };
+            let volt_seconds = acted_v.map(|volts: f32| AlphaBeta { alpha: volts * HALF_S, beta: 0.0 });
+            let boundary = Boundary { volt_seconds, length_s: HALF_S };
+            let seen =
+                Input { boundary: &boundary, sample: &sample, omega: 0.0, resistance: 0.0, sixth: false };
+            observer.step(&seen, &Gains::DEFAULT);
+            let none = Some(AlphaBeta::default());
+            let committed =
+                Committed { horizon_s: 0.0, volt_seconds: none, ripple: None, interval_s: HALF_S };
+            let limits = ModeLimits {
+                follows: Regulated::Mean,
+                depth_limit: 0.9,
+                steady_share: 1.0,
+                filled: false,
+                ripple_share: 0.05,
+                settled: true,
+            };
+            let target = Target {
+                torque_nm: 0.0,
+                current: Dq::default(),
+                flux: along_d(REFERENCE_WB),
+                region: Region::Mtpa,
+                depth: 0.1,
+                voltage_limit_v: limit_v,
+            };
+            let output = current_loop::step(
+                &current_loop::Input {
+                    ahead: &current_loop::ahead(&sample, at_rest, &committed, &observer, 0.0),
+                    disturbance: &observer,
+                    target: &target,
+                    omega: 0.0,
+                    committed: &committed,
+                    limits: &limits,
+                    resistance: 0.0,
+                },
+                &Gains::DEFAULT,
+            );
+            let (error, estimate) = (flux - REFERENCE_WB, observer.mean().d);
+            let acts_v = output.voltage.vector.d;
+            found.push([error, -Gains::DEFAULT.carrier / HALF_S * error - estimate, acts_v, estimate]);
+            flux += (acts_v + DISTURBANCE_V) * HALF_S;
+            acted_v = Some(acts_v);
+        }
+        found
+    }
+
+    /// The voltage is that of a PI on the error, its integral held back by the voltage that did not act.
+    fn is_a_pi(halves: &[[f32; 4]]) {
+        let Gains { carrier: g, observer: k, .. } = Gains::DEFAULT;
+        let (first, mut integral_v) = (halves[0][0], 0.0);
+        for (number, [error, wanted_v, acts_v, _]) in halves.iter().enumerate() {
+            let pi_v = -(g + k) / HALF_S * error - integral_v + k / HALF_S * first;
+            assert!((wanted_v - pi_v).abs() < 0.05, "half {number}: {wanted_v} V, a PI {pi_v} V");
+            integral_v += k * g / HALF_S * error - k * (acts_v - wanted_v);
+        }
+    }
+
+    #[test]
+    fn with_the_loop_it_is_a_pi() {
+        let halves = driven(400, 1e6);
+        is_a_pi(&halves);
+        let last = halves[399];
+        assert!(last[0].abs() < 1e-4 && (last[3] - DISTURBANCE_V).abs() < 0.05, "{last:?}");
+    }
+
+    #[test]
+    fn at_a_limit_it_is_one_with_back_calculation() {
+        let halves = driven(400, 10.0);
+        is_a_pi(&halves);
+        // 11.5 V against 20 V: the error grows for ever, and the estimate is still that of the disturbance.
+        assert!(halves[399][0] > 1.0 && halves[399][3] < DISTURBANCE_V + 0.05, "{:?}", halves[399]);
+    }
+}

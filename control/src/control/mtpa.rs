@@ -34,7 +34,7 @@ pub fn mtpa(torque_nm: f32, tables: &Tables) -> Dq {
 }
 
 /// `PASSES` of the paper's passes for a torque of at least zero, in N·m, the first with the parameters at `start`, in A. The
-/// paper starts with those of zero current.
+/// paper does not say where it starts; those of zero current are the plain reading.
 pub fn mtpa_passes<const PASSES: usize>(torque_nm: f32, start: Dq, tables: &Tables) -> Dq {
     let mut current = start;
     for _ in 0..PASSES {

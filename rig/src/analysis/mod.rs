@@ -45,6 +45,11 @@ impl Figures {
         self.0.get(name)
     }
 
+    /// A figure that is a number; nothing where it is none.
+    pub fn number(&self, name: &str) -> Option<f64> {
+        self.get(name).and_then(Value::as_f64)
+    }
+
     /// All figures.
     pub fn values(&self) -> &Map<String, Value> {
         &self.0

@@ -3,8 +3,8 @@
 use super::{whole_turns, window};
 use crate::options::RunOptions;
 use crate::rows::mean;
-use crate::trace::Recording;
-use crate::verdict::{Verdict, torque_bound};
+use crate::trace::{Recording, Row};
+use crate::verdict::{Verdict, torque_bound, worst};
 use serde::Serialize;
 use tractive_tablegen::MachineFolder;
 
@@ -19,18 +19,39 @@ pub struct SteadyPoint {
     pub reference_nm: f64,
     /// Mean air-gap torque, in N·m.
     pub torque_nm: f64,
-    /// Its error, in percent of the demand.
+    /// Its error, in percent of the demand, or of [`LEAST_SHARE`] of the largest torque where that is more.
     pub torque_error_percent: f64,
-    /// Its error, in percent of what the drive says.
+    /// Its error, in the same way of what the drive says.
     pub reference_error_percent: f64,
     /// Phase current, rms, in A.
     pub current_rms_a: f64,
     /// Peak to peak torque ripple, in N·m.
     pub torque_ripple_nm: f64,
-    /// Shaft power over electrical power, with the machine folder's speed-dependent loss, in percent.
-    pub efficiency_percent: f64,
+    /// Power that comes out over power that goes in, with the machine folder's speed-dependent loss, in percent: shaft over electrical while
+    /// motoring, electrical over shaft while braking; nothing where all that goes in is lost.
+    pub efficiency_percent: Option<f64>,
     /// Mode in use at the end.
     pub mode: &'static str,
+}
+
+/// Share of the largest torque below which an error is no longer one of the torque wanted, but of this.
+const LEAST_SHARE: f64 = 0.02;
+
+/// The error of a torque, in percent of the one wanted; positive where its magnitude is too large.
+fn error_percent(torque_nm: f64, wanted_nm: f64, largest_nm: f64) -> f64 {
+    let of_nm = wanted_nm.abs().max(LEAST_SHARE * largest_nm);
+    (torque_nm - wanted_nm) * wanted_nm.signum() / of_nm * 100.0
+}
+
+/// The efficiency in percent, of the powers at the shaft and at the terminals.
+fn efficiency_percent(shaft_w: f64, electrical_w: f64) -> Option<f64> {
+    if shaft_w > 0.0 && electrical_w > 0.0 {
+        Some(shaft_w / electrical_w * 100.0)
+    } else if shaft_w < 0.0 && electrical_w < 0.0 {
+        Some(electrical_w / shaft_w * 100.0)
+    } else {
+        None
+    }
 }
 
 /// Averages over a window, shortened to whole turns of the stator field.
@@ -57,31 +78,53 @@ pub fn steady_point(
         demand_nm,
         reference_nm,
         torque_nm,
-        torque_error_percent: (torque_nm / demand_nm - 1.0) * 100.0,
-        reference_error_percent: (torque_nm / reference_nm - 1.0) * 100.0,
+        torque_error_percent: error_percent(torque_nm, demand_nm, parameters.max_torque_nm),
+        reference_error_percent: error_percent(torque_nm, reference_nm, parameters.max_torque_nm),
         current_rms_a: (current_squared / 2.0).sqrt(),
         torque_ripple_nm: high - low,
-        efficiency_percent: shaft_w / (air_gap_w + copper_w) * 100.0,
+        efficiency_percent: efficiency_percent(shaft_w, air_gap_w + copper_w),
         mode: rows.last().map_or("off", |row| row.mode.name()),
     }
 }
 
 /// The verdict on the mean torque in square wave; nothing where there is none.
-pub fn square_verdict(recording: &Recording, options: &RunOptions) -> Option<Verdict> {
-    let error = square_torque_error_percent(recording)?;
+pub fn square_verdict(recording: &Recording, options: &RunOptions, largest_nm: f64) -> Option<Verdict> {
+    let error = square_torque_error_percent(recording, largest_nm)?;
     let others = "0.5; 14 to 33 with an id trim";
     let most = torque_bound(options, 0.5, 1.5);
     Some(Verdict::at_most("mean torque error in square wave in %", error, most, others))
 }
 
 /// Largest error of the mean torque in square wave over tenths of a second, in percent; nothing without square wave.
-fn square_torque_error_percent(recording: &Recording) -> Option<f64> {
+fn square_torque_error_percent(recording: &Recording, largest_nm: f64) -> Option<f64> {
     const WINDOW_S: f64 = 0.1;
     let end_s = recording.rows.last().map_or(0.0, |row| row.t_s);
     let windows = (0..(end_s / WINDOW_S) as usize)
         .map(|k| window(recording, k as f64 * WINDOW_S, (k + 1) as f64 * WINDOW_S));
     let square = windows.filter(|rows| !rows.is_empty() && rows.iter().all(|row| row.mode.is_whole()));
-    square
-        .map(|rows| (mean(rows, |row| row.te_nm) / mean(rows, |row| row.te_ref_nm) - 1.0).abs() * 100.0)
-        .reduce(f64::max)
+    let error = |rows: &[Row]| {
+        error_percent(mean(rows, |row| row.te_nm), mean(rows, |row| row.te_ref_nm), largest_nm).abs()
+    };
+    worst(square.map(error))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn efficiency_is_what_comes_out_of_what_goes_in() {
+        assert_eq!(efficiency_percent(90.0, 100.0), Some(90.0), "motoring");
+        assert_eq!(efficiency_percent(-100.0, -90.0), Some(90.0), "braking");
+        assert_eq!(efficiency_percent(-5.0, 3.0), None, "both sides feed the losses");
+        assert_eq!(efficiency_percent(0.0, 0.0), None);
+    }
+
+    #[test]
+    fn an_error_is_a_number_where_no_torque_is_wanted() {
+        assert!((error_percent(101.0, 100.0, 1000.0) - 1.0).abs() < 1e-9);
+        assert!((error_percent(-101.0, -100.0, 1000.0) - 1.0).abs() < 1e-9);
+        assert_eq!(error_percent(1.0, 0.0, 1000.0), 5.0);
+        assert_eq!(error_percent(1.0, 1e-15, 1000.0).round(), 5.0);
+    }
 }

@@ -27,7 +27,7 @@ pub struct StepResponse {
     pub to_nm: f64,
     /// From the step to 90 % of it, in ms.
     pub t90_ms: f64,
-    /// Beyond the final mean, as a share of the step, in percent.
+    /// Beyond the final mean, as a share of the step, in percent: of the averaged torque, as t90 and the settling times are.
     pub overshoot_percent: f64,
     /// Until the torque stays within 5 % of the step about the final mean, in ms.
     pub settling_5_percent_ms: f64,
@@ -35,6 +35,10 @@ pub struct StepResponse {
     pub settling_2_percent_ms: f64,
     /// Mean of the last 40 ms less the demand, in N·m.
     pub final_error_nm: f64,
+    /// Lowest torque itself, ripple included, in the first 10 ms, in N·m.
+    pub lowest_nm: f64,
+    /// Highest torque itself in the same time, in N·m.
+    pub highest_nm: f64,
 }
 
 /// Measures a step.
@@ -49,6 +53,7 @@ pub fn step_response(recording: &Recording, step: &Step) -> StepResponse {
         let last_outside = torque.iter().rev().find(|(_, value)| (progress(*value) - 1.0).abs() > band);
         last_outside.map_or(0.0, |(t_s, _)| (t_s - step.at_s) * 1e3)
     };
+    let first = window(recording, step.at_s, step.at_s + 0.01).iter().map(|row| row.te_nm);
     let highest = torque.iter().map(|(_, value)| progress(*value)).fold(0.0, f64::max);
     StepResponse {
         from_nm: step.from_nm,
@@ -58,5 +63,7 @@ pub fn step_response(recording: &Recording, step: &Step) -> StepResponse {
         settling_5_percent_ms: settled(0.05),
         settling_2_percent_ms: settled(0.02),
         final_error_nm: final_mean - step.to_nm,
+        lowest_nm: first.clone().fold(f64::INFINITY, f64::min),
+        highest_nm: first.fold(f64::NEG_INFINITY, f64::max),
     }
 }

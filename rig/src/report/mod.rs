@@ -50,9 +50,9 @@ impl Page {
         page
     }
 
-    /// From here on the plots answer this figure of the paper.
-    pub fn answers(&mut self, figure: &str) {
-        self.figure = Some(format!("The paper's {figure}"));
+    /// From here on the plots answer this figure of the paper, or none.
+    pub fn answers<'a>(&mut self, figure: impl Into<Option<&'a str>>) {
+        self.figure = figure.into().map(|figure| format!("The paper's {figure}"));
     }
 
     /// Curves over the whole recording.
@@ -195,16 +195,17 @@ impl Page {
         Ok(page)
     }
 
-    /// Curves over anything, beside a figure of the paper; `axes` are the labels of x and y.
-    pub fn draw_xy(
+    /// Curves over anything, beside a figure of the paper or none; `axes` are the labels of x and y.
+    pub fn draw_xy<'a>(
         &mut self,
-        figure: &str,
+        figure: impl Into<Option<&'a str>>,
         title: &str,
         axes: (&str, &str),
         series: &[(String, Vec<(f64, f64)>)],
     ) {
         let series: Vec<_> = series.iter().map(|(name, points)| (name.as_str(), points.clone())).collect();
-        self.add(&format!("The paper's {figure} · {title}"), axes, &series);
+        let figure = figure.into().map_or(String::new(), |figure| format!("The paper's {figure} · "));
+        self.add(&format!("{figure}{title}"), axes, &series);
     }
 
     /// Curves under a heading of their own, over time or anything else; over time dense data is shown by its extremes.

@@ -33,7 +33,7 @@ pub enum Chosen {
 /// A scenario's own part of the command line, read.
 type Own<S> = (Box<dyn Scenario<S>>, Map<String, Value>);
 
-/// A scenario: its name, the paper's figure that it answers, and its options.
+/// A scenario: its name, the paper's figure that it answers or that there is none, and its options.
 pub struct Entry<S: System> {
     name: &'static str,
     figure: &'static str,
@@ -80,14 +80,14 @@ const TRACTION: [Entry<Traction>; 14] = [
         "figure 10: torque accuracy and efficiency at the characteristic points",
     ),
     Entry::of::<FullStep>("full-step", "figure 8: load steps, here all of them in one"),
-    Entry::of::<Steady>("steady", "figures 6 and 7: current and spectrum of the mode in steady state"),
+    Entry::of::<Steady>("steady", "no figure: current, torque and spectrum of one operating point"),
     Entry::of::<ModeBorders>(
         "mode-borders",
         "figure 9: changes of pulse pattern, here at constant speed by torque alone",
     ),
-    Entry::of::<Reversal>("reversal", "figure 9d: square wave, here with its torque reversed"),
-    Entry::of::<Restart>("restart", "figure 9: the modes, here each caught from coasting"),
-    Entry::of::<LinkSteps>("link-steps", "figure 9: the modes, here with a DC link that steps"),
+    Entry::of::<Reversal>("reversal", "no figure: power reversed, released and applied again at speed"),
+    Entry::of::<Restart>("restart", "no figure: a coasting machine caught in each mode"),
+    Entry::of::<LinkSteps>("link-steps", "no figure: a DC link that steps under full torque"),
     Entry::of::<Precharge>("precharge", "no figure: from power-up to running and back to an empty link"),
     Entry::of::<Chopper>("chopper", "no figure: full braking into a link that cannot take the energy"),
     Entry::of::<Acknowledge>("acknowledge", "no figure: a gate driver fails, and the fault is acknowledged"),
@@ -106,7 +106,10 @@ const ZS9: [Entry<Zs9>; 5] = [
         "zs9-cycle",
         "figures 24 to 36: the whole cycle, full torque, constant power, cruise, brake",
     ),
-    Entry::of::<zs9::steady::Steady>("zs9-steady", "table 1: harmonics of both motors' currents by scheme"),
+    Entry::of::<zs9::steady::Steady>(
+        "zs9-steady",
+        "no figure: harmonics of both motors' currents by scheme; the sequences of figures 3 to 9",
+    ),
     Entry::of::<zs9::timing::Timing>(
         "zs9-timing",
         "no figure: motoring, weakening and braking in a tenth of a second, for `cargo xtask timing`",

@@ -11,7 +11,8 @@ use tractive::recorder::DualRecord;
 /// A curve: its name and what it shows.
 pub type Curve<'a> = report::Curve<'a, Row>;
 
-/// The paper's figure that a plot answers, its title, its unit.
+/// The paper's figure that a plot answers, its title, its unit. Of figures 14 to 36 the captions that are known are those of 17, 23 and 36; the
+/// others are told only as the group that the text speaks of.
 pub type Heading<'a> = (&'a str, &'a str, &'a str);
 
 /// The motors' torques.
@@ -87,10 +88,10 @@ pub fn plot(page: &mut Page, (figure, title, unit): Heading, rows: &[Row], curve
     page.plot_rows(title, unit, rows, curves);
 }
 
-/// Both motors' phase currents.
-pub fn phases(page: &mut Page, figure: &str, rows: &[Row]) {
-    plot(page, (figure, "phase currents of motor 1", "A"), rows, &phase_curves::<0>());
-    plot(page, (figure, "phase currents of motor 2", "A"), rows, &phase_curves::<1>());
+/// Both motors' phase currents, under the figure that the page's plots answer so far.
+pub fn phases(page: &mut Page, rows: &[Row]) {
+    page.plot_rows("phase currents of motor 1", "A", rows, &phase_curves::<0>());
+    page.plot_rows("phase currents of motor 2", "A", rows, &phase_curves::<1>());
 }
 
 fn phase_curves<const K: usize>() -> [Curve<'static>; 3] {

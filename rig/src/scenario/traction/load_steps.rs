@@ -69,8 +69,13 @@ pub fn verdicts(steps: &[StepResponse], options: &RunOptions, machine: &Machine)
     let of_final = format!("final mean over {percent} % or 0.16 % of the largest torque");
     let (error, most_error) = (worst(steps.iter().map(error)), torque_bound(options, 1.0, 1.0));
     vec![
-        ideal("t90 in ms", |step| step.t90_ms, 2.5, "3.0 to 3.6; the paper about 2"),
-        ideal("overshoot in % of the step", |step| step.overshoot_percent, 2.0, "1.7"),
+        ideal("t90 in ms", |step| step.t90_ms, 2.5, "3.0 to 3.6; the paper names no time"),
+        ideal(
+            "overshoot in % of the step, of torque averaged over a carrier",
+            |step| step.overshoot_percent,
+            2.0,
+            "1.7; the paper none, of the current",
+        ),
         ideal("settled within 2 % in ms", |step| step.settling_2_percent_ms, 5.0, "5 % in 4.2 ms"),
         Verdict::at_most(&of_final, error, most_error, "0.02 to 0.4 %"),
     ]

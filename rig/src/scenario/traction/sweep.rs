@@ -48,7 +48,11 @@ impl Scenario<Traction> for Sweep {
         let mut figures = analysis::common(recording);
         let switches = analysis::mode_switches(recording);
         let mut verdicts = analysis::switch_verdicts(&switches, recording, options, machine);
-        verdicts.extend(analysis::square_verdict(recording, options));
+        verdicts.extend(analysis::square_verdict(
+            recording,
+            options,
+            machine.folder.parameters.max_torque_nm,
+        ));
         if options.map_error != 0.0 {
             verdicts.extend(self.map_verdicts(recording, options, machine));
         }

@@ -18,8 +18,8 @@ pub fn plots(recording: &Recording, page: &mut Page) {
     }
 }
 
-/// The paper's figure of a change of mode; it shows those on the way up.
-fn figure_of(from: Mode, to: Mode) -> &'static str {
+/// The paper's figure of a change of mode; it shows these four, on the way up, and no other.
+fn figure_of(from: Mode, to: Mode) -> Option<&'static str> {
     const FIGURES: [(Mode, Mode, &str); 4] = [
         (Mode::Sync15, Mode::Sync12, "figure 9a"),
         (Mode::Sync12, Mode::Mid7, "figure 9b"),
@@ -27,5 +27,5 @@ fn figure_of(from: Mode, to: Mode) -> &'static str {
         (Mode::Mid3, Mode::Square, "figure 9d"),
     ];
     let known = FIGURES.iter().find(|(below, above, _)| (*below, *above) == (from, to));
-    known.map_or("figure 9", |(_, _, figure)| figure)
+    known.map(|(_, _, figure)| *figure)
 }

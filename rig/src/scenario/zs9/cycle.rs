@@ -104,7 +104,9 @@ impl Scenario<Zs9> for Cycle {
             figures.set("braked_s", rows[last].t_s - rows[start].t_s);
             figures.set("kinetic_energy_kj", (had_j - left_j) * 1e-3);
             figures.set("returned_to_source_kj", returned_j * 1e-3);
-            figures.set("returned_percent", returned_j / (had_j - left_j) * 100.0);
+            let returned_percent = returned_j / (had_j - left_j) * 100.0;
+            figures.set("returned_percent", returned_percent);
+            figures.set("not_returned_percent", 100.0 - returned_percent);
         }
         figures.set("end_speed_rpm", rows.last().map(|row| row.motors[0].speed_rpm));
         figures::link(&mut figures, rows, options.own.uin);
@@ -114,20 +116,27 @@ impl Scenario<Zs9> for Cycle {
         figures.set("capacitor_overshoot_percent", (highest_v / wanted_v - 1.0) * 100.0);
         figures.set("power_residual_percent", residual_percent(rows));
         figures.set("network_stored_j", ZNetwork::ZS9.capacitance_f * wanted_v * wanted_v);
+        let bounds = [
+            ("10 to 1,300 r/min in s", "accelerated_s", 9.2, "9.2"),
+            ("kinetic energy not returned in %", "not_returned_percent", 25.0, "22.5"),
+            ("capacitor voltage above its reference in %", "capacitor_overshoot_percent", 0.3, "0.16"),
+            ("link voltage off in %", "link_deviation_percent", 0.5, "0.15"),
+        ];
+        figures.set("verdicts", judge(&figures, options, &bounds));
         figures
     }
 
     fn plots(&self, recording: &Recording, _: &Options, _: &Machine, page: &mut Page) {
         let rows = figures::window(recording, 0.0, recording.rows.last().map_or(MOVING_S, |row| row.t_s));
-        plot(page, ("figures 24 and 30", "link voltage U_in", "V"), rows, &VOLTAGES[..1]);
-        plot(page, ("figures 25 and 31", "capacitor voltage", "V"), rows, &VOLTAGES[1..]);
-        plot(page, ("figures 26 and 32", "inductor current", "A"), rows, &INDUCTOR);
-        plot(page, ("figures 27 and 33", "torque", "N·m"), rows, &TORQUES);
-        plot(page, ("figures 28 and 34", "speed", "r/min"), rows, &SPEEDS);
+        plot(page, ("figures 24 to 35", "link voltage U_in", "V"), rows, &VOLTAGES[..1]);
+        plot(page, ("figures 24 to 35", "capacitor voltage", "V"), rows, &VOLTAGES[1..]);
+        plot(page, ("figures 24 to 35", "inductor current", "A"), rows, &INDUCTOR);
+        plot(page, ("figures 24 to 35", "torque", "N·m"), rows, &TORQUES);
+        plot(page, ("figures 24 to 35", "speed", "r/min"), rows, &SPEEDS);
         let currents: [Curve; 2] = [("id", |row| row.motors[0].id_a), ("iq", |row| row.motors[0].iq_a)];
-        plot(page, ("figures 29 and 35", "d and q currents of motor 1", "A"), rows, &currents);
+        plot(page, ("figures 24 to 35", "d and q currents of motor 1", "A"), rows, &currents);
         let voltage: [Curve; 1] = [("motor 1", |row| row.motors[0].voltage_v)];
-        plot(page, ("figures 29 and 35", "phase voltage, peak", "V"), rows, &voltage);
+        plot(page, ("figures 24 to 35", "phase voltage, peak", "V"), rows, &voltage);
         figures::over_speed(page, ("figure 36", "torque over speed", "N·m"), &recording.rows, &TORQUES[0]);
         let title = ("figure 36", "phase voltage over speed", "V");
         figures::over_speed(page, title, &recording.rows, &voltage[0]);

@@ -52,19 +52,48 @@ impl Scenario<Zs9> for LoadStep {
         figures.set("motor2_back_within_0p2_percent_ms", back_s * 1e3);
         figures.set("motor2_peak_torque_nm", figures::largest(after, |row| row.motors[1].torque_nm));
         figures::link(&mut figures, after, options.own.uin);
+        figures.set("verdicts", self.verdicts(&figures, options));
         figures
     }
 
     fn plots(&self, recording: &Recording, _: &Options, _: &Machine, page: &mut Page) {
         let rows = figures::window(recording, STEP_S - 0.1, STEP_S + 0.2);
-        plot(page, ("figure 14", "link voltage", "V"), rows, &VOLTAGES);
-        plot(page, ("figure 15", "inductor current", "A"), rows, &INDUCTOR);
+        plot(page, ("figures 14 to 19", "link voltage", "V"), rows, &VOLTAGES);
+        plot(page, ("figures 14 to 19", "inductor current", "A"), rows, &INDUCTOR);
         let [one, two] = TORQUES;
         let torques = [one, two, ("load 2", |row| row.motors[1].load_nm)];
-        plot(page, ("figure 16", "torque", "N·m"), rows, &torques);
+        plot(page, ("figures 14 to 19", "torque", "N·m"), rows, &torques);
         plot(page, ("figure 17", "speed of motor 2", "r/min"), rows, &SPEEDS[1..]);
-        plot(page, ("figure 18", "speed of motor 1", "r/min"), rows, &SPEEDS[..1]);
-        figures::phases(page, "figure 19", figures::window(recording, STEP_S - 0.03, STEP_S + 0.05));
+        plot(page, ("figures 14 to 19", "speed of motor 1", "r/min"), rows, &SPEEDS[..1]);
+        figures::phases(page, figures::window(recording, STEP_S - 0.03, STEP_S + 0.05));
+    }
+}
+
+impl LoadStep {
+    /// Bounds for a step of at most 40 N·m.
+    fn verdicts(&self, figures: &Figures, options: &Options) -> Vec<Verdict> {
+        let judged = self.step.abs() <= 40.0 && options.own.inject.is_none();
+        let at_most = |bound: f64| if judged { bound } else { f64::INFINITY };
+        judge(
+            figures,
+            options,
+            &[
+                ("motor 1's torque moved in N·m", "motor1_torque_deviation_nm", at_most(0.023), "0.023"),
+                ("motor 1's speed moved in r/min", "motor1_speed_deviation_rpm", at_most(0.0011), "0.0011"),
+                (
+                    "motor 2 within 0.2 % again in ms",
+                    "motor2_back_within_0p2_percent_ms",
+                    at_most(36.0),
+                    "41",
+                ),
+                (
+                    "link voltage off in %",
+                    "link_deviation_percent",
+                    at_most(0.8),
+                    "0.67; 5.1 without feed-forward",
+                ),
+            ],
+        )
     }
 }
 

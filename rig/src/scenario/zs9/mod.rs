@@ -21,6 +21,7 @@ use crate::plant::SpeedSource;
 use crate::plant::zs9::{NetworkState, Zs9Plant, Zs9Settings};
 use crate::report::Page;
 use crate::run::{CLOCK, Supervisor, on_host, refused};
+use crate::verdict::{Verdict, bound};
 use crate::zs9::bench::{Bench, BenchSettings};
 use crate::zs9::line::LineTimes;
 use crate::zs9::run::{Tasks, run_in_qemu};
@@ -200,6 +201,24 @@ fn bench(plan: Plan, options: &Options, machine: &Machine) -> Result<Bench> {
 /// Free rotors, loaded by what the operator says.
 pub fn free(inertia_kg_m2: f64) -> [SpeedSource; 2] {
     [(); 2].map(|()| SpeedSource::Inertia { inertia_kg_m2, load_nm: 0.0 })
+}
+
+/// Link voltage from which figures are judged, in V: the lowest at which bounds are known. At less the link's own are farther off.
+pub const LEAST_JUDGED_V: f64 = 667.0;
+
+/// Figures beside their bounds: the quantity with its unit, the figure's name, the bound, what a first, ordinary implementation reached. The
+/// paper shows curves without numbers. With flaws, or a link below [`LEAST_JUDGED_V`], they are only reported.
+pub fn judge(
+    figures: &Figures,
+    options: &Options,
+    bounds: &[(&str, &str, f64, &'static str)],
+) -> Vec<Verdict> {
+    let judged = options.own.uin >= LEAST_JUDGED_V;
+    let verdict = |(what, name, at_most, others): &(&str, &str, f64, &'static str)| {
+        let at_most = if judged { bound(options, *at_most, f64::INFINITY) } else { f64::INFINITY };
+        Verdict::at_most(what, figures.number(name), at_most, others)
+    };
+    bounds.iter().map(verdict).collect()
 }
 
 /// A speed in rad/s.

@@ -1,12 +1,13 @@
 //! The names that every scenario of the ZS9 is written with.
 
-pub use super::{Options, Plan, Zs9, Zs9Options, free, rad_s, ramp};
+pub use super::{LEAST_JUDGED_V, Options, Plan, Zs9, Zs9Options, free, judge, rad_s, ramp};
 pub use crate::analysis::Figures;
 pub use crate::machine::Machine;
 pub use crate::plant::SpeedSource;
 pub use crate::report::Page;
 pub use crate::rows::mean;
 pub use crate::scenario::Scenario;
+pub use crate::verdict::Verdict;
 pub use crate::zs9::figures::{self, Curve, INDUCTOR, SPEEDS, TORQUES, VOLTAGES, plot};
 pub use crate::zs9::trace::{Recording, Row};
 pub use crate::zs9::{Orders, SeenMotors};

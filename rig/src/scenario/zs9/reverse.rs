@@ -54,16 +54,22 @@ impl Scenario<Zs9> for Reverse {
         figures.set("motor1_speed_rpm", mean(last, |row| row.motors[0].speed_rpm));
         figures.set("motor2_speed_rpm", mean(last, |row| row.motors[1].speed_rpm));
         figures::link(&mut figures, &recording.rows, options.own.uin);
+        let bounds = [
+            ("motor 1's speed off, rms in r/min", "motor1_speed_error_rms_rpm", 0.001, "–"),
+            ("motor 2's speed off, rms in r/min", "motor2_speed_error_rms_rpm", 1.6, "1.6"),
+            ("link voltage off in %", "link_deviation_percent", 0.5, "–"),
+        ];
+        figures.set("verdicts", judge(&figures, options, &bounds));
         figures
     }
 
     fn plots(&self, recording: &Recording, _: &Options, _: &Machine, page: &mut Page) {
         let rows = figures::window(recording, 0.0, DURATION_S);
-        plot(page, ("figure 20", "torque of motor 1", "N·m"), rows, &TORQUES[..1]);
-        plot(page, ("figure 21", "speed of motor 1", "r/min"), rows, &SPEEDS[..1]);
-        plot(page, ("figure 22", "torque of motor 2", "N·m"), rows, &TORQUES[1..]);
+        plot(page, ("figures 20 to 23", "torque of motor 1", "N·m"), rows, &TORQUES[..1]);
+        plot(page, ("figures 20 to 23", "speed of motor 1", "r/min"), rows, &SPEEDS[..1]);
+        plot(page, ("figures 20 to 23", "torque of motor 2", "N·m"), rows, &TORQUES[1..]);
         plot(page, ("figure 23", "speed of motor 2", "r/min"), rows, &SPEEDS[1..]);
-        plot(page, ("figures 20–23", "link", "V"), rows, &VOLTAGES);
-        figures::phases(page, "figures 20–23", figures::window(recording, 0.95, 1.05));
+        plot(page, ("figures 20 to 23", "link", "V"), rows, &VOLTAGES);
+        figures::phases(page, figures::window(recording, 0.95, 1.05));
     }
 }

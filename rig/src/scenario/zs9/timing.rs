@@ -29,6 +29,6 @@ impl Scenario<Zs9> for Timing {
     }
 
     fn plots(&self, recording: &Recording, _: &Options, _: &Machine, page: &mut Page) {
-        figures::phases(page, "no figure", &recording.rows);
+        figures::phases(page, &recording.rows);
     }
 }
