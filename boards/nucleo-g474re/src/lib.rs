@@ -25,7 +25,6 @@ pub mod dead_time;
 pub mod half;
 pub mod hardware;
 pub mod legs;
-pub mod operator;
 pub mod outputs;
 pub mod pins;
 mod ports;
