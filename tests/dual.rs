@@ -210,7 +210,7 @@ impl Drive {
 
 /// The injury of a test to a sample, and the fault that it should be.
 type Case<S> = (S, Fault);
-/// What a test does to a sample and its command.
+/// The change that a test makes to a sample and its command.
 type Spoil = fn(&mut DualSample, &mut DualDriveCommand);
 
 #[test]

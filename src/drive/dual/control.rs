@@ -109,7 +109,9 @@ impl<M: Machine> ControlTask<M> {
             shared.operator.command(now)
         };
         let mut command = port.command(now, operator);
-        command.enable &= sample.may_pulse;
+        if !sample.may_pulse {
+            command.enable = false;
+        }
         let input = Input { sample: &sample, command: &command };
         let Input { sample, command } = input;
         // Once the PWM interrupt has: what it told before that cannot come back.
