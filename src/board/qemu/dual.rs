@@ -59,7 +59,7 @@ impl ControlPort<Dual> for Control {
         }
         let mut command = operator();
         command.scheme = exchange::scheme_dual();
-        command.with_link(exchange::link_ref_dual())
+        if command.link_ref_v > 0.0 { command } else { command.with_link(exchange::link_ref_dual()) }
     }
 
     fn enter(&mut self, _safe: SafeState, now: Instant) {

@@ -40,7 +40,7 @@ pub struct ControlTask<M = &'static Tables> {
     disarmed: MaskedFaults,
     trip: Option<Trip>,
     acknowledge: Acknowledge,
-    /// `true` if the operator was asked for the newest command: who is not asked is not told.
+    /// `true` once the operator was asked for a command: who is not asked is not told.
     operated: bool,
 }
 
@@ -164,7 +164,7 @@ impl<M: Machine> ControlTask<M> {
     /// The period as the flight recorder and whoever watches see it. Out of line: nothing of it is on the stack while the control
     /// laws are.
     #[inline(never)]
-    fn tell(&mut self, input: Input, gates: Gates, port: &mut impl ControlPort<Dual>, shared: &Shared) {
+    fn tell(&self, input: Input, gates: Gates, port: &mut impl ControlPort<Dual>, shared: &Shared) {
         let now = self.now.before(self.settings.clock.control_ticks);
         if let Some(recorder) = shared.recorder {
             recorder.record(self.entry(now, input, gates), self.trip.is_some());
@@ -186,7 +186,7 @@ impl<M: Machine> ControlTask<M> {
             speed_known: upper.speed_is_known() && lower.speed_is_known(),
             acknowledged: self.acknowledge.answered(),
         };
-        if core::mem::take(&mut self.operated) {
+        if self.operated {
             shared.operator.tell(now, &report);
         }
         port.report(now, &report);

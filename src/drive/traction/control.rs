@@ -55,7 +55,7 @@ pub struct ControlTask<M = &'static Tables> {
     disarmed: MaskedFaults,
     trip: Option<Trip>,
     acknowledge: Acknowledge,
-    /// `true` if the operator was asked for the newest command: who is not asked is not told.
+    /// `true` once the operator was asked for a command: who is not asked is not told.
     operated: bool,
     /// Electrical speed at which the angle was lost, in rad/s, until that is acknowledged.
     lost_at: Option<f32>,
@@ -119,9 +119,7 @@ impl<M: Machine> ControlTask<M> {
             shared.operator.command(now)
         };
         let mut command = port.command(now, operator);
-        if !sample.may_pulse {
-            command.enable = false;
-        }
+        command.enable &= sample.may_pulse;
         let input = Input { sample: &sample, command: &command };
         let Input { sample, command } = input;
         let measured = sample.measured();
@@ -197,7 +195,7 @@ impl<M: Machine> ControlTask<M> {
             let mode = applied.map_or(Mode::Off, |applied| applied.mode);
             recorder.record(self.entry(now, input, &report, mode, gates), self.trip.is_some());
         }
-        if core::mem::take(&mut self.operated) {
+        if self.operated {
             shared.operator.tell(now, &report);
         }
         port.report(now, &report);
