@@ -14,16 +14,16 @@ use crate::drive::{half_from_words, half_to_words};
 use crate::frames::{Abc, Angle};
 use crate::modulation::CarrierHalf;
 use crate::operator::{self, Feedback, LineTimes, Status, Told};
-use crate::ports::Report;
-use crate::ports::Sample;
+use crate::ports::{DriveCommand, Report, Sample};
 use crate::protection::{Fault, SafeState};
 use crate::protocol::Frame;
 use crate::recorder::Record;
 use crate::time::Instant;
 
 pub use dual::{
-    DualRequest, DualSetup, dual_asked_from_block, dual_asked_to_block, dual_sample_from_block,
-    dual_sample_to_block, dual_setup_from_block, dual_setup_to_block, power_from_block, power_to_block,
+    DualRequest, DualSetup, dual_asked_from_block, dual_asked_to_block, dual_command_from_words,
+    dual_sample_from_block, dual_sample_to_block, dual_setup_from_block, dual_setup_to_block,
+    power_from_block, power_to_block,
 };
 
 /// Words in a block.
@@ -198,30 +198,38 @@ pub fn setup_from_block(block: &Block) -> Setup {
     }
 }
 
-/// The answer to [`Request::ControlSample`]; `stop` ends the run.
-pub fn sample_to_block(sample: &Sample, stop: bool) -> Block {
-    let flags = u32::from(sample.enable) | u32::from(sample.demand.slew_limited) << 1 | u32::from(stop) << 2;
+/// The answer to [`Request::ControlSample`], with the rig's command; `stop` ends the run.
+pub fn sample_to_block(sample: &Sample, command: &DriveCommand, stop: bool) -> Block {
+    let enable = sample.may_pulse && command.enable;
+    let flags = u32::from(enable) | u32::from(command.demand.slew_limited) << 1 | u32::from(stop) << 2;
     let [a, b, c] = sample.currents_a.to_bits();
-    let torque = sample.demand.torque_nm.to_bits();
+    let torque = command.demand.torque_nm.to_bits();
     let hardware = sample.hardware.map_or(0, |fault| fault as u32);
     let angle = sample.measured().angle.0;
     [a, b, c, sample.udc_v.to_bits(), angle, torque, flags, hardware, 0, 0, 0, 0, 0, 0, 0, 0]
 }
 
-/// The inverse of [`sample_to_block`].
-pub fn sample_from_block(block: &Block) -> (Sample, bool) {
+/// The inverse of [`sample_to_block`], the command as its words.
+pub fn sample_from_block(block: &Block) -> (Sample, [u32; 2], bool) {
     let [a, b, c, udc, angle, torque, flags, hardware, ..] = *block;
     let sample = Sample {
         currents_a: Abc::from_bits([a, b, c]),
         udc_v: f32::from_bits(udc),
         angle: Some(Angle(angle)),
-        demand: Demand { torque_nm: f32::from_bits(torque), slew_limited: flags & 2 != 0 },
-        enable: flags & 1 != 0,
-        window: LinkWindow::OPEN,
-        acknowledge: 0,
+        may_pulse: flags & 1 != 0,
         hardware: Fault::from_code(hardware),
     };
-    (sample, flags & 4 != 0)
+    (sample, [torque, flags], flags & 4 != 0)
+}
+
+/// The command of such words.
+pub fn command_from_words([torque, flags]: [u32; 2]) -> DriveCommand {
+    DriveCommand {
+        enable: flags & 1 != 0,
+        demand: Demand { torque_nm: f32::from_bits(torque), slew_limited: flags & 2 != 0 },
+        window: LinkWindow::OPEN,
+        acknowledge: 0,
+    }
 }
 
 /// The answer to [`Request::Ask`]; over the protocol the frame asks, not the words.

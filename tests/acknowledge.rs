@@ -4,17 +4,16 @@
 
 use std::cell::Cell;
 use tractive::built_in::{traction::BUILT_IN, zs9};
-use tractive::control::{Demand, Gains, LinkWindow};
+use tractive::control::{Demand, Gains};
 use tractive::drive::dual::{self};
 use tractive::drive::traction;
 use tractive::frames::{Abc, Angle, Dq};
 use tractive::modulation::{CarrierHalf, Mode, SwitchLimits};
-use tractive::nine_switch::Scheme;
 use tractive::ports::DualReport;
 use tractive::ports::Report;
 use tractive::ports::{
-    ControlPort, Dual, DualSample, GateFeedback, HardwareBreak, MotorDemand, PlayedPeriod, PowerSample,
-    PwmPort, Sample,
+    ControlPort, DriveCommand, Dual, DualDriveCommand, DualSample, GateFeedback, HardwareBreak, MotorDemand,
+    PlayedPeriod, PowerSample, PwmPort, Sample,
 };
 use tractive::protection::{Fault, SafeState, Trip};
 use tractive::time::{Clock, Instant};
@@ -213,12 +212,14 @@ impl ControlPort for Board<'_> {
             currents_a: currents(now, 1.0),
             udc_v,
             angle: Some(angle(now)),
-            demand: Demand { torque_nm: 100.0, slew_limited: false },
-            enable: true,
-            window: LinkWindow::OPEN,
-            acknowledge: self.acknowledge(now),
+            may_pulse: true,
             hardware: self.case.hardware(now).then_some(Fault::HardwareOvercurrent),
         }
+    }
+
+    fn command(&mut self, now: Instant, _operator: impl FnOnce() -> DriveCommand) -> DriveCommand {
+        let demand = Demand { torque_nm: 100.0, slew_limited: false };
+        DriveCommand { enable: true, demand, acknowledge: self.acknowledge(now), ..DriveCommand::NONE }
     }
 
     fn enter(&mut self, _safe: SafeState, _now: Instant) {
@@ -262,13 +263,19 @@ impl ControlPort<Dual> for Board<'_> {
             capacitor_v: if self.case.control_finds(now) { 5_000.0 } else { 533.5 },
             inductor_a: 20.0,
             source_v: 400.0,
-            demands: [MotorDemand::Torque(Demand { torque_nm: 20.0, slew_limited: true }); 2],
-            link_ref_v: 667.0,
-            scheme: Scheme::Rthd,
-            enable: true,
-            speed_torque_nm: DualSample::UNLIMITED_NM,
-            acknowledge: self.acknowledge(now),
+            may_pulse: true,
             hardware: hardware.then_some(HardwareBreak { fault: Fault::HardwareOvercurrent, seen: 1 }),
+        }
+    }
+
+    fn command(&mut self, now: Instant, _operator: impl FnOnce() -> DualDriveCommand) -> DualDriveCommand {
+        DualDriveCommand {
+            enable: true,
+            demands: [MotorDemand::Torque(Demand { torque_nm: 20.0, slew_limited: true }); 2],
+            speed_torque_nm: DualDriveCommand::UNLIMITED_NM,
+            link_ref_v: 667.0,
+            acknowledge: self.acknowledge(now),
+            ..DualDriveCommand::NONE
         }
     }
 

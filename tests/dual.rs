@@ -11,8 +11,8 @@ use tractive::frames::{Abc, Angle, Dq};
 use tractive::nine_switch::{LegState, Scheme};
 use tractive::ports::DualReport;
 use tractive::ports::{
-    ControlPort, Dual, DualSample, GateFeedback, HardwareBreak, MotorDemand, PlayedPeriod, PowerSample,
-    PwmPort,
+    ControlPort, Dual, DualDriveCommand, DualSample, GateFeedback, HardwareBreak, MotorDemand, PlayedPeriod,
+    PowerSample, PwmPort,
 };
 use tractive::protection::{Fault, SafeState, Trip};
 use tractive::recorder::DualRecorder;
@@ -26,7 +26,9 @@ const OMEGA: f32 = 251.3;
 
 /// Two motors that turn steadily and carry a steady current, with what a test does to the samples.
 struct Fake {
-    spoil: fn(&mut DualSample),
+    spoil: Spoil,
+    /// The command beside the newest sample.
+    command: DualDriveCommand,
     spoil_power: fn(&mut PowerSample),
     overrun: u32,
     off_at: Option<Instant>,
@@ -44,7 +46,8 @@ impl Fake {
     fn new() -> Self {
         let off = PlayedPeriod::off(SETTINGS.half_steps());
         Self {
-            spoil: |_| {},
+            spoil: |_, _| {},
+            command: DualDriveCommand::NONE,
             spoil_power: |_| {},
             overrun: 0,
             off_at: None,
@@ -93,16 +96,23 @@ impl ControlPort<Dual> for Fake {
             capacitor_v: 533.5,
             inductor_a: 20.0,
             source_v: 400.0,
-            demands: [MotorDemand::Torque(Demand { torque_nm: 50.0, slew_limited: true }); 2],
-            link_ref_v: 667.0,
-            scheme: Scheme::Rthd,
-            enable: true,
-            speed_torque_nm: DualSample::UNLIMITED_NM,
-            acknowledge: self.acknowledge,
+            may_pulse: true,
             hardware: None,
         };
-        (self.spoil)(&mut sample);
+        self.command = DualDriveCommand {
+            enable: true,
+            demands: [MotorDemand::Torque(Demand { torque_nm: 50.0, slew_limited: true }); 2],
+            speed_torque_nm: DualDriveCommand::UNLIMITED_NM,
+            link_ref_v: 667.0,
+            acknowledge: self.acknowledge,
+            ..DualDriveCommand::NONE
+        };
+        (self.spoil)(&mut sample, &mut self.command);
         sample
+    }
+
+    fn command(&mut self, _now: Instant, _operator: impl FnOnce() -> DualDriveCommand) -> DualDriveCommand {
+        self.command
     }
 
     fn enter(&mut self, _safe: SafeState, now: Instant) {
@@ -188,7 +198,7 @@ impl Drive {
         assert_eq!(self.fake.off_at, Some(trip.at), "gates off in the interrupt that found it");
         assert!(trip.at.since(now).unsigned_abs() <= CARRIER_TICKS, "{trip:?} {now:?}");
         assert!(self.is_off(), "and never on again");
-        self.fake.spoil = |_| {};
+        self.fake.spoil = |_, _| {};
         self.fake.spoil_power = |_| {};
         self.run(20);
         let after = self.fake.report.trip.map(|trip| (trip.fault, trip.at));
@@ -199,35 +209,37 @@ impl Drive {
 }
 
 /// The injury of a test to a sample, and the fault that it should be.
-type Case<T> = (fn(&mut T), Fault);
+type Case<S> = (S, Fault);
+/// The change that a test makes to a sample and its command.
+type Spoil = fn(&mut DualSample, &mut DualDriveCommand);
 
 #[test]
 fn what_is_sampled_wrong_trips_by_name() {
-    let cases: [Case<DualSample>; 19] = [
-        (|sample| sample.source_v = 200.0, Fault::SourceUndervoltage),
-        (|sample| sample.source_v = f32::NAN, Fault::NotFinite),
-        (|sample| sample.capacitor_v = 721.0, Fault::CapacitorOvervoltage),
-        (|sample| sample.capacitor_v = f32::NAN, Fault::NotFinite),
-        (|sample| sample.capacitor_v = f32::INFINITY, Fault::NotFinite),
-        (|sample| sample.inductor_a = f32::NAN, Fault::NotFinite),
-        (|sample| sample.currents_a[0].a = 150.0, Fault::Overcurrent),
-        (|sample| sample.currents_a[1].c = -150.0, Fault::Overcurrent),
-        (|sample| sample.currents_a[1].c += 12.0, Fault::PhaseSum),
-        (|sample| sample.currents_a[0].b = f32::NAN, Fault::NotFinite),
-        (|sample| sample.angles[0] = None, Fault::SensorLost1),
-        (|sample| sample.angles[1] = None, Fault::SensorLost2),
-        (|sample| sample.angles[0] = Some(Angle(0)), Fault::SensorLost1),
-        (|sample| sample.link_ref_v = 1020.0, Fault::DutyRange),
-        (|sample| sample.link_ref_v = f32::NAN, Fault::NotFinite),
-        (|sample| sample.demands[0] = MotorDemand::Speed(f32::NAN), Fault::NotFinite),
-        (|sample| sample.demands[1] = MotorDemand::Speed(f32::INFINITY), Fault::NotFinite),
+    let cases: [Case<Spoil>; 19] = [
+        (|sample, _| sample.source_v = 200.0, Fault::SourceUndervoltage),
+        (|sample, _| sample.source_v = f32::NAN, Fault::NotFinite),
+        (|sample, _| sample.capacitor_v = 721.0, Fault::CapacitorOvervoltage),
+        (|sample, _| sample.capacitor_v = f32::NAN, Fault::NotFinite),
+        (|sample, _| sample.capacitor_v = f32::INFINITY, Fault::NotFinite),
+        (|sample, _| sample.inductor_a = f32::NAN, Fault::NotFinite),
+        (|sample, _| sample.currents_a[0].a = 150.0, Fault::Overcurrent),
+        (|sample, _| sample.currents_a[1].c = -150.0, Fault::Overcurrent),
+        (|sample, _| sample.currents_a[1].c += 12.0, Fault::PhaseSum),
+        (|sample, _| sample.currents_a[0].b = f32::NAN, Fault::NotFinite),
+        (|sample, _| sample.angles[0] = None, Fault::SensorLost1),
+        (|sample, _| sample.angles[1] = None, Fault::SensorLost2),
+        (|sample, _| sample.angles[0] = Some(Angle(0)), Fault::SensorLost1),
+        (|_, command| command.link_ref_v = 1020.0, Fault::DutyRange),
+        (|_, command| command.link_ref_v = f32::NAN, Fault::NotFinite),
+        (|_, command| command.demands[0] = MotorDemand::Speed(f32::NAN), Fault::NotFinite),
+        (|_, command| command.demands[1] = MotorDemand::Speed(f32::INFINITY), Fault::NotFinite),
         (
-            |sample| {
-                sample.demands[1] = MotorDemand::Torque(Demand { torque_nm: f32::NAN, slew_limited: false });
+            |_, command| {
+                command.demands[1] = MotorDemand::Torque(Demand { torque_nm: f32::NAN, slew_limited: false });
             },
             Fault::NotFinite,
         ),
-        (|sample| sample.source_v = -400.0, Fault::SourceUndervoltage),
+        (|sample, _| sample.source_v = -400.0, Fault::SourceUndervoltage),
     ];
     for (spoil, fault) in cases {
         let mut drive = Drive::pulsing();
@@ -239,7 +251,7 @@ fn what_is_sampled_wrong_trips_by_name() {
 
 #[test]
 fn the_pwm_interrupt_finds_what_is_quick() {
-    let cases: [Case<PowerSample>; 7] = [
+    let cases: [Case<fn(&mut PowerSample)>; 7] = [
         (|sample| sample.currents_a[0].b = 150.0, Fault::Overcurrent),
         (|sample| sample.currents_a[1].a = f32::NAN, Fault::NotFinite),
         (|sample| sample.source_v = 0.0, Fault::SourceUndervoltage),
@@ -298,10 +310,10 @@ fn without_control_the_pwm_interrupt_stops() {
 #[test]
 fn disabled_it_makes_no_pulses_and_no_fault() {
     let mut drive = Drive::pulsing();
-    drive.fake.spoil = |sample| sample.enable = false;
+    drive.fake.spoil = |_, command| command.enable = false;
     drive.run(3);
     assert!(drive.is_off() && drive.fake.report.trip.is_none());
-    drive.fake.spoil = |_| {};
+    drive.fake.spoil = |_, _| {};
     drive.run(3);
     assert!(!drive.is_off() && drive.fake.report.trip.is_none());
 }
@@ -331,16 +343,16 @@ fn whatever_is_sampled_the_gates_are_legal() {
         DICE.set(Dice(seed));
         let mut drive = Drive::pulsing();
         // One value a period is any bit pattern at all.
-        drive.fake.spoil = |sample| {
+        drive.fake.spoil = |sample, command| {
             let value = f32::from_bits(any());
             match any() % 8 {
                 0 => sample.capacitor_v = value,
                 1 => sample.inductor_a = value,
                 2 => sample.source_v = value,
-                3 => sample.link_ref_v = value,
-                4 => sample.demands[0] = MotorDemand::Speed(value),
+                3 => command.link_ref_v = value,
+                4 => command.demands[0] = MotorDemand::Speed(value),
                 5 => {
-                    sample.demands[1] = MotorDemand::Torque(Demand { torque_nm: value, slew_limited: false })
+                    command.demands[1] = MotorDemand::Torque(Demand { torque_nm: value, slew_limited: false })
                 }
                 6 => sample.angles[0] = Some(Angle(any())),
                 _ => sample.currents_a[1].a = value,
@@ -401,14 +413,14 @@ fn messages_arrive_as_they_were_sent() {
 }
 
 /// The injury of a test to both interrupts' samples.
-type Spoiled = (fn(&mut DualSample), fn(&mut PowerSample));
+type Spoiled = (Spoil, fn(&mut PowerSample));
 
 /// One fault stops both motors; an acknowledge with its cause gone lets both go on, with its cause there trips anew.
 #[test]
 fn a_fault_is_left_by_an_acknowledge_of_both_interrupts() {
     let cases: [Spoiled; 2] = [
-        (|sample| sample.currents_a[1].a = 150.0, |_| {}),
-        (|_| {}, |sample| sample.currents_a[0].b = 150.0),
+        (|sample, _| sample.currents_a[1].a = 150.0, |_| {}),
+        (|_, _| {}, |sample| sample.currents_a[0].b = 150.0),
     ];
     for (spoil, spoil_power) in cases {
         let mut drive = Drive::pulsing();
@@ -423,7 +435,7 @@ fn a_fault_is_left_by_an_acknowledge_of_both_interrupts() {
         assert_eq!((again.fault, drive.fake.report.acknowledged), (Fault::Overcurrent, 1));
         assert!(again.at.since(trip.at) > 0 && drive.is_off());
         // Gone.
-        drive.fake.spoil = |_| {};
+        drive.fake.spoil = |_, _| {};
         drive.fake.spoil_power = |_| {};
         drive.run(5);
         drive.fake.acknowledge = 2;
@@ -440,7 +452,7 @@ fn a_fault_is_left_by_an_acknowledge_of_both_interrupts() {
 #[test]
 fn gates_that_are_held_are_a_fault() {
     let mut drive = Drive::pulsing();
-    drive.fake.spoil = |sample| sample.currents_a[1].a = 150.0;
+    drive.fake.spoil = |sample, _| sample.currents_a[1].a = 150.0;
     drive.trips(Fault::Overcurrent);
     (drive.fake.held, drive.fake.acknowledge) = (true, 1);
     drive.run(10);
@@ -451,7 +463,7 @@ fn gates_that_are_held_are_a_fault() {
 #[test]
 fn a_break_in_hardware_has_its_name_and_where_it_was_seen() {
     let mut drive = Drive::pulsing();
-    drive.fake.spoil = |sample| {
+    drive.fake.spoil = |sample, _| {
         sample.hardware = Some(HardwareBreak { fault: Fault::HardwareOvercurrent, seen: 0b1010 });
     };
     assert_eq!(drive.trips(Fault::HardwareOvercurrent).value, 10.0);
@@ -466,7 +478,7 @@ fn the_flight_recorder_keeps_what_led_to_a_fault() {
     let mut faulty_at = None;
     for period in 0..700 {
         if period == 600 {
-            fake.spoil = |sample| sample.currents_a[1].c = -150.0;
+            fake.spoil = |sample, _| sample.currents_a[1].c = -150.0;
             faulty_at = Some(control.next_call());
             assert!(!recorder.is_frozen());
         }

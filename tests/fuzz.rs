@@ -5,7 +5,7 @@
 
 use proptest::prelude::*;
 use tractive::built_in::{traction::BUILT_IN, zs9};
-use tractive::control::{Demand, Gains, LinkWindow};
+use tractive::control::{Demand, Gains};
 use tractive::drive::dual::{self};
 use tractive::drive::traction;
 use tractive::frames::{Abc, Angle, Dq};
@@ -14,7 +14,8 @@ use tractive::nine_switch::{LegState, Scheme};
 use tractive::ports::DualReport;
 use tractive::ports::Report;
 use tractive::ports::{
-    ControlPort, Dual, DualSample, GateFeedback, MotorDemand, PlayedPeriod, PowerSample, PwmPort, Sample,
+    ControlPort, DriveCommand, Dual, DualDriveCommand, DualSample, GateFeedback, MotorDemand, PlayedPeriod,
+    PowerSample, PwmPort, Sample,
 };
 use tractive::protection::{Fault, SafeState, Trip};
 use tractive::time::{Clock, Instant};
@@ -134,10 +135,7 @@ impl ControlPort for Board {
             currents_a: currents(self.omega, now.0, Dq { d: -30.0, q: 40.0 }),
             udc_v: 1500.0,
             angle: Some(angle(self.omega, now.0)),
-            demand: Demand { torque_nm: 200.0, slew_limited: false },
-            enable: true,
-            window: LinkWindow::OPEN,
-            acknowledge: self.acknowledge,
+            may_pulse: true,
             hardware: None,
         };
         let Some((field, bits)) = self.spoilt else { return sample };
@@ -148,14 +146,25 @@ impl ControlPort for Board {
             2 => sample.currents_a.c = value,
             3 => sample.udc_v = value,
             4 => sample.angle = (bits % 5 != 0).then_some(Angle(bits)),
-            5 => sample.demand.torque_nm = value,
-            6 => sample.demand.slew_limited = true,
-            7 => sample.enable = false,
-            8 => sample.acknowledge = bits as u8,
             9 => sample.hardware = Fault::from_code(bits % 40),
             _ => {}
         }
         sample
+    }
+
+    fn command(&mut self, _now: Instant, _operator: impl FnOnce() -> DriveCommand) -> DriveCommand {
+        let demand = Demand { torque_nm: 200.0, slew_limited: false };
+        let acknowledge = self.acknowledge;
+        let mut command = DriveCommand { enable: true, demand, acknowledge, ..DriveCommand::NONE };
+        let Some((field, bits)) = self.spoilt else { return command };
+        match field {
+            5 => command.demand.torque_nm = f32::from_bits(bits),
+            6 => command.demand.slew_limited = true,
+            7 => command.enable = false,
+            8 => command.acknowledge = bits as u8,
+            _ => {}
+        }
+        command
     }
 
     fn enter(&mut self, _safe: SafeState, _now: Instant) {
@@ -207,12 +216,7 @@ impl ControlPort<Dual> for Board {
             capacitor_v: 533.5,
             inductor_a: 20.0,
             source_v: 400.0,
-            demands: [MotorDemand::Torque(Demand { torque_nm: 50.0, slew_limited: true }); 2],
-            link_ref_v: 667.0,
-            scheme: Scheme::Rthd,
-            enable: true,
-            speed_torque_nm: DualSample::UNLIMITED_NM,
-            acknowledge: self.acknowledge,
+            may_pulse: true,
             hardware: None,
         };
         let Some((field, bits)) = self.spoilt else { return sample };
@@ -225,14 +229,31 @@ impl ControlPort<Dual> for Board {
             4 => sample.capacitor_v = value,
             5 => sample.inductor_a = value,
             6 => sample.source_v = value,
-            7 => sample.demands[0] = MotorDemand::Speed(value),
-            8 => sample.demands[1] = MotorDemand::Torque(Demand { torque_nm: value, slew_limited: false }),
-            9 => sample.link_ref_v = value,
-            10 => sample.scheme = Scheme::ALL[bits as usize % Scheme::ALL.len()],
-            11 => sample.enable = false,
             _ => {}
         }
         sample
+    }
+
+    fn command(&mut self, _now: Instant, _operator: impl FnOnce() -> DualDriveCommand) -> DualDriveCommand {
+        let mut command = DualDriveCommand {
+            enable: true,
+            demands: [MotorDemand::Torque(Demand { torque_nm: 50.0, slew_limited: true }); 2],
+            speed_torque_nm: DualDriveCommand::UNLIMITED_NM,
+            link_ref_v: 667.0,
+            acknowledge: self.acknowledge,
+            ..DualDriveCommand::NONE
+        };
+        let Some((field, bits)) = self.spoilt else { return command };
+        let value = f32::from_bits(bits);
+        match field {
+            7 => command.demands[0] = MotorDemand::Speed(value),
+            8 => command.demands[1] = MotorDemand::Torque(Demand { torque_nm: value, slew_limited: false }),
+            9 => command.link_ref_v = value,
+            10 => command.scheme = Scheme::ALL[bits as usize % Scheme::ALL.len()],
+            11 => command.enable = false,
+            _ => {}
+        }
+        command
     }
 
     fn enter(&mut self, _safe: SafeState, _now: Instant) {

@@ -2,16 +2,16 @@
 //! turns the gates off in it. Instants here are real ones; the tasks count theirs, and fall behind with every interrupt they miss.
 
 use tractive::built_in::{traction::BUILT_IN, zs9};
-use tractive::control::{Demand, Gains, LinkWindow};
+use tractive::control::{Demand, Gains};
 use tractive::drive::dual::{self};
 use tractive::drive::traction;
 use tractive::frames::{Abc, Angle, Dq};
 use tractive::modulation::{CarrierHalf, Mode, SwitchLimits};
-use tractive::nine_switch::Scheme;
 use tractive::ports::DualReport;
 use tractive::ports::Report;
 use tractive::ports::{
-    ControlPort, Dual, DualSample, GateFeedback, MotorDemand, PlayedPeriod, PowerSample, PwmPort, Sample,
+    ControlPort, DriveCommand, Dual, DualDriveCommand, DualSample, GateFeedback, MotorDemand, PlayedPeriod,
+    PowerSample, PwmPort, Sample,
 };
 use tractive::protection::{Fault, MaskedFaults, SafeState, Trip};
 use tractive::time::{Clock, Instant};
@@ -68,12 +68,14 @@ impl ControlPort for Board {
             currents_a: currents(self.now, Dq { d: -30.0, q: 40.0 }),
             udc_v: 1500.0,
             angle: Some(angle(self.now)),
-            demand: Demand { torque_nm: 200.0, slew_limited: false },
-            enable: true,
-            window: LinkWindow::OPEN,
-            acknowledge: 0,
+            may_pulse: true,
             hardware: None,
         }
+    }
+
+    fn command(&mut self, _now: Instant, _operator: impl FnOnce() -> DriveCommand) -> DriveCommand {
+        let demand = Demand { torque_nm: 200.0, slew_limited: false };
+        DriveCommand { enable: true, demand, ..DriveCommand::NONE }
     }
 
     fn enter(&mut self, _safe: SafeState, _now: Instant) {
@@ -111,13 +113,18 @@ impl ControlPort<Dual> for Board {
             capacitor_v: 533.5,
             inductor_a: 20.0,
             source_v: 400.0,
-            demands: [MotorDemand::Torque(Demand { torque_nm: 50.0, slew_limited: true }); 2],
-            link_ref_v: 667.0,
-            scheme: Scheme::Rthd,
-            enable: true,
-            speed_torque_nm: DualSample::UNLIMITED_NM,
-            acknowledge: 0,
+            may_pulse: true,
             hardware: None,
+        }
+    }
+
+    fn command(&mut self, _now: Instant, _operator: impl FnOnce() -> DualDriveCommand) -> DualDriveCommand {
+        DualDriveCommand {
+            enable: true,
+            demands: [MotorDemand::Torque(Demand { torque_nm: 50.0, slew_limited: true }); 2],
+            speed_torque_nm: DualDriveCommand::UNLIMITED_NM,
+            link_ref_v: 667.0,
+            ..DualDriveCommand::NONE
         }
     }
 
@@ -349,6 +356,10 @@ impl ControlPort for Landing<'_> {
             pwm.run(&mut self.board, self.shared);
         }
         <Board as ControlPort>::sample(&mut self.board, now)
+    }
+
+    fn command(&mut self, now: Instant, operator: impl FnOnce() -> DriveCommand) -> DriveCommand {
+        <Board as ControlPort>::command(&mut self.board, now, operator)
     }
 
     fn enter(&mut self, safe: SafeState, now: Instant) {

@@ -1,12 +1,12 @@
 //! Every fault, by name, with value and limit, and the gates in the safe state in the same interrupt.
 
 use tractive::built_in::traction::BUILT_IN;
-use tractive::control::{Demand, Gains, LinkWindow, Measurements};
+use tractive::control::{Demand, Gains, Measurements};
 use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
 use tractive::frames::{Abc, AlphaBeta, Angle, Dq};
 use tractive::modulation::{CarrierHalf, Mode, SwitchLimits};
 use tractive::ports::Report;
-use tractive::ports::{ControlPort, PwmPort, Sample};
+use tractive::ports::{ControlPort, DriveCommand, PwmPort, Sample};
 use tractive::protection::{Fault, FrozenWatch, LegFaults, SafeState, Trip};
 use tractive::time::{Clock, Instant};
 
@@ -17,7 +17,7 @@ struct Fake {
     omega: f32,
     current: Dq,
     udc_v: f32,
-    spoil: fn(&mut Sample),
+    spoil: fn(&mut Sample, &mut DriveCommand),
     spoil_from: u32,
     overrun: u32,
     control_entered: Option<(SafeState, u32)>,
@@ -49,7 +49,7 @@ impl Fake {
             omega,
             current: Dq { d: -30.0, q: 40.0 },
             udc_v: 1500.0,
-            spoil: |_| {},
+            spoil: |_, _| {},
             spoil_from: 0,
             overrun: 0,
             control_entered: None,
@@ -77,6 +77,12 @@ impl Fake {
         Angle((turns.rem_euclid(1.0) * 4_294_967_296.0) as u64 as u32)
     }
 
+    fn commanded(&self, now: Instant) -> DriveCommand {
+        let demand = Demand { torque_nm: 200.0, slew_limited: false };
+        let acknowledge = u8::from(now.0 >= self.acknowledge_from);
+        DriveCommand { enable: true, demand, acknowledge, ..DriveCommand::NONE }
+    }
+
     fn currents(&self, now: Instant) -> Abc {
         // A little ripple, as every inverter makes.
         let ripple = (now.0 % 7919) as f32 * 1e-4;
@@ -90,17 +96,21 @@ impl ControlPort for Fake {
             currents_a: self.currents(now),
             udc_v: self.udc_v,
             angle: Some(self.angle(now)),
-            demand: Demand { torque_nm: 200.0, slew_limited: false },
-            enable: true,
-            window: LinkWindow::OPEN,
-            acknowledge: 0,
+            may_pulse: true,
             hardware: None,
         };
         if self.is_spoilt(now) {
-            (self.spoil)(&mut sample);
+            (self.spoil)(&mut sample, &mut self.commanded(now));
         }
-        sample.acknowledge = u8::from(now.0 >= self.acknowledge_from);
         sample
+    }
+
+    fn command(&mut self, now: Instant, _operator: impl FnOnce() -> DriveCommand) -> DriveCommand {
+        let mut command = self.commanded(now);
+        if self.is_spoilt(now) {
+            (self.spoil)(&mut ControlPort::sample(&mut Self::turning(self.omega), now), &mut command);
+        }
+        command
     }
 
     fn enter(&mut self, safe: SafeState, now: Instant) {
@@ -194,11 +204,11 @@ fn a_healthy_drive_does_not_trip() {
 }
 
 /// Spoils the measurements of a healthy drive; the control interrupt must find it.
-fn found_by_control(fault: Fault, periods: u32, spoil: fn(&mut Sample)) -> Trip {
+fn found_by_control(fault: Fault, periods: u32, spoil: fn(&mut Sample, &mut DriveCommand)) -> Trip {
     found_at(400.0, fault, periods, spoil)
 }
 
-fn found_at(omega: f32, fault: Fault, periods: u32, spoil: fn(&mut Sample)) -> Trip {
+fn found_at(omega: f32, fault: Fault, periods: u32, spoil: fn(&mut Sample, &mut DriveCommand)) -> Trip {
     let mut fake = Fake { spoil, spoil_from: SETTLED, ..Fake::turning(omega) };
     let trip = drive(&mut fake, END, u32::MAX).unwrap_or_else(|| panic!("{fault:?} was not found"));
     assert_eq!(trip.fault, fault);
@@ -211,7 +221,7 @@ fn found_at(omega: f32, fault: Fault, periods: u32, spoil: fn(&mut Sample)) -> T
 
 #[test]
 fn overcurrent_is_found_in_one_period() {
-    let trip = found_by_control(Fault::Overcurrent, 1, |sample| {
+    let trip = found_by_control(Fault::Overcurrent, 1, |sample, _| {
         sample.currents_a = Abc { a: 320.0, b: -160.0, c: -160.0 };
     });
     assert_eq!((trip.value, trip.limit), (320.0, BUILT_IN.ratings.trip_current_a));
@@ -220,35 +230,35 @@ fn overcurrent_is_found_in_one_period() {
 
 #[test]
 fn the_link_is_watched() {
-    let over = found_by_control(Fault::DcOvervoltage, 1, |sample| sample.udc_v = 2200.0);
+    let over = found_by_control(Fault::DcOvervoltage, 1, |sample, _| sample.udc_v = 2200.0);
     assert_eq!((over.value, over.limit), (2200.0, BUILT_IN.ratings.trip_dc_over_v));
-    found_by_control(Fault::DcUndervoltage, 1, |sample| sample.udc_v = 700.0);
+    found_by_control(Fault::DcUndervoltage, 1, |sample, _| sample.udc_v = 700.0);
 }
 
 #[test]
 fn what_is_not_finite_is_a_fault() {
-    found_by_control(Fault::NotFinite, 1, |sample| sample.udc_v = f32::NAN);
-    found_by_control(Fault::NotFinite, 1, |sample| sample.udc_v = f32::INFINITY);
-    found_by_control(Fault::NotFinite, 1, |sample| sample.currents_a.b = f32::NAN);
-    found_by_control(Fault::NotFinite, 1, |sample| sample.currents_a.c = f32::NEG_INFINITY);
-    found_by_control(Fault::NotFinite, 1, |sample| sample.demand.torque_nm = f32::NAN);
+    found_by_control(Fault::NotFinite, 1, |sample, _| sample.udc_v = f32::NAN);
+    found_by_control(Fault::NotFinite, 1, |sample, _| sample.udc_v = f32::INFINITY);
+    found_by_control(Fault::NotFinite, 1, |sample, _| sample.currents_a.b = f32::NAN);
+    found_by_control(Fault::NotFinite, 1, |sample, _| sample.currents_a.c = f32::NEG_INFINITY);
+    found_by_control(Fault::NotFinite, 1, |_, command| command.demand.torque_nm = f32::NAN);
 }
 
 #[test]
 fn phases_must_add_up() {
-    found_by_control(Fault::PhaseSum, 1, |sample| sample.currents_a.a += 30.0);
+    found_by_control(Fault::PhaseSum, 1, |sample, _| sample.currents_a.a += 30.0);
 }
 
 #[test]
 fn frozen_measurements_are_found() {
-    found_by_control(Fault::Frozen, 21, |sample| {
+    found_by_control(Fault::Frozen, 21, |sample, _| {
         sample.currents_a = Abc { a: 50.0, b: -20.0, c: -30.0 };
     });
     // Too slow for a surprise.
-    found_at(20.0, Fault::Frozen, 140, |sample| {
+    found_at(20.0, Fault::Frozen, 140, |sample, _| {
         sample.angle = Some(Fake::turning(20.0).angle(Instant(SETTLED)));
     });
-    found_by_control(Fault::AngleLost, 2, |sample| {
+    found_by_control(Fault::AngleLost, 2, |sample, _| {
         sample.angle = Some(Fake::turning(400.0).angle(Instant(SETTLED)));
     });
 }
@@ -284,14 +294,14 @@ fn currents_may_repeat_until_something_should_move_them() {
 
 #[test]
 fn currents_that_freeze_at_rest_are_found() {
-    found_at(0.0, Fault::Frozen, 300, |sample| {
+    found_at(0.0, Fault::Frozen, 300, |sample, _| {
         sample.currents_a = Abc { a: 50.0, b: -20.0, c: -30.0 };
     });
 }
 
 #[test]
 fn an_angle_that_cannot_be_is_found_at_once() {
-    let trip = found_by_control(Fault::AngleLost, 1, |sample| {
+    let trip = found_by_control(Fault::AngleLost, 1, |sample, _| {
         sample.angle = sample.angle.map(|angle| angle + Angle::from_radians(0.06));
     });
     assert!((trip.value - 0.06).abs() < 1e-3, "{trip:?}");
@@ -382,11 +392,11 @@ const HEALED: u32 = SETTLED + 250_000;
 const AGREED: u32 = 2_500 + 2 * 20_000;
 
 /// A drive whose measurements are spoilt from `SETTLED` to `HEALED`.
-fn passing(spoil: fn(&mut Sample), acknowledge_from: u32) -> Fake {
+fn passing(spoil: fn(&mut Sample, &mut DriveCommand), acknowledge_from: u32) -> Fake {
     Fake { spoil, spoil_from: SETTLED, spoil_until: HEALED, acknowledge_from, ..Fake::turning(400.0) }
 }
 
-fn overvoltage(sample: &mut Sample) {
+fn overvoltage(sample: &mut Sample, _: &mut DriveCommand) {
     sample.udc_v = 2200.0;
 }
 
@@ -406,7 +416,7 @@ fn an_acknowledged_fault_is_forgotten_by_both_sides_and_pulses_are_made_again() 
         passing(overvoltage, acknowledged),
         Fake {
             pwm_currents: Some((Abc { a: -320.0, b: 160.0, c: 160.0 }, SETTLED..HEALED)),
-            ..passing(|_| {}, acknowledged)
+            ..passing(|_, _| {}, acknowledged)
         },
     ] {
         let mut fake = fake;
@@ -456,11 +466,11 @@ fn a_board_that_holds_the_gates_is_a_fault_of_its_own() {
 #[test]
 fn what_holds_the_gates_in_hardware_has_its_name() {
     for fault in [Fault::GateDriver, Fault::HardwareOvercurrent, Fault::ClockFailure, Fault::PwmDeadline] {
-        let spoil: fn(&mut Sample) = match fault {
-            Fault::GateDriver => |sample| sample.hardware = Some(Fault::GateDriver),
-            Fault::HardwareOvercurrent => |sample| sample.hardware = Some(Fault::HardwareOvercurrent),
-            Fault::ClockFailure => |sample| sample.hardware = Some(Fault::ClockFailure),
-            _ => |sample| sample.hardware = Some(Fault::PwmDeadline),
+        let spoil: fn(&mut Sample, &mut DriveCommand) = match fault {
+            Fault::GateDriver => |sample, _| sample.hardware = Some(Fault::GateDriver),
+            Fault::HardwareOvercurrent => |sample, _| sample.hardware = Some(Fault::HardwareOvercurrent),
+            Fault::ClockFailure => |sample, _| sample.hardware = Some(Fault::ClockFailure),
+            _ => |sample, _| sample.hardware = Some(Fault::PwmDeadline),
         };
         found_by_control(fault, 1, spoil);
     }
@@ -469,9 +479,9 @@ fn what_holds_the_gates_in_hardware_has_its_name() {
 #[test]
 fn an_empty_link_is_a_fault_only_where_the_gates_may_be_on() {
     let mut fake = Fake {
-        spoil: |sample| {
+        spoil: |sample, command| {
             sample.udc_v = 3.0;
-            sample.enable = false;
+            command.enable = false;
         },
         ..Fake::turning(0.0)
     };
@@ -503,7 +513,7 @@ fn a_half_that_is_loaded_too_late_is_a_fault_and_control_knows() {
 fn a_cause_in_hardware_names_the_fault_where_the_gates_are_held() {
     let mut fake = Fake {
         lets_go: false,
-        spoil: |sample| sample.hardware = Some(Fault::GateDriver),
+        spoil: |sample, _| sample.hardware = Some(Fault::GateDriver),
         spoil_from: SETTLED,
         acknowledge_from: SETTLED + 100_000,
         ..Fake::turning(400.0)
@@ -518,8 +528,8 @@ const FOLLOWED: u32 = 600_000;
 
 #[test]
 fn an_angle_that_has_jumped_is_lost_once_and_followed_anew_after_an_acknowledge() {
-    let jumped: fn(&mut Sample) =
-        |sample| sample.angle = sample.angle.map(|angle| angle + Angle::from_radians(1.571));
+    let jumped: fn(&mut Sample, &mut DriveCommand) =
+        |sample, _| sample.angle = sample.angle.map(|angle| angle + Angle::from_radians(1.571));
     let forever = |acknowledge_from| Fake { spoil_until: u32::MAX, ..passing(jumped, acknowledge_from) };
     let trip = drive(&mut forever(u32::MAX), END, u32::MAX);
     assert_eq!(trip.map(|trip| trip.fault), Some(Fault::AngleLost));
@@ -538,7 +548,7 @@ fn a_lost_angle_is_followed_anew_before_the_acknowledge_and_chooses_no_safe_stat
     let told_omega = |fake: &Fake| fake.report.frequency_hz * std::f32::consts::TAU;
     // From a speed that asks for the short circuit to half of it, by a jump.
     let lost = |pwm_from| Fake {
-        spoil: |sample| sample.angle = sample.angle.map(|angle| angle + angle),
+        spoil: |sample, _| sample.angle = sample.angle.map(|angle| angle + angle),
         spoil_from: 0,
         spoil_until: SETTLED,
         pwm_currents: Some((Abc { a: 320.0, b: -160.0, c: -160.0 }, pwm_from..u32::MAX)),
@@ -561,7 +571,8 @@ fn a_lost_angle_is_followed_anew_before_the_acknowledge_and_chooses_no_safe_stat
 
 #[test]
 fn an_angle_that_is_not_known_yet_is_no_fault_until_pulses_are_wanted() {
-    let unknown: fn(&mut Sample) = |sample| (sample.angle, sample.enable) = (None, false);
+    let unknown: fn(&mut Sample, &mut DriveCommand) =
+        |sample, command| (sample.angle, command.enable) = (None, false);
     let mut fake = Fake { spoil: unknown, spoil_from: 0, spoil_until: SETTLED, ..Fake::turning(400.0) };
     assert_eq!(drive(&mut fake, SETTLED - 1, u32::MAX), None);
     assert!(!fake.report.speed_known && fake.pulsed == 0);
@@ -569,9 +580,14 @@ fn an_angle_that_is_not_known_yet_is_no_fault_until_pulses_are_wanted() {
     assert_eq!(drive(&mut fake, SETTLED + FOLLOWED, u32::MAX), None, "it is followed from where it is");
     assert!(fake.report.speed_known && fake.pulsed > SETTLED + FOLLOWED - 40_000);
     // Wanted, or known before.
-    for (from, spoil) in
-        [(0, (|sample: &mut Sample| sample.angle = None) as fn(&mut Sample)), (SETTLED, unknown)]
-    {
+    for (from, spoil) in [
+        (
+            0,
+            (|sample: &mut Sample, _: &mut DriveCommand| sample.angle = None)
+                as fn(&mut Sample, &mut DriveCommand),
+        ),
+        (SETTLED, unknown),
+    ] {
         let mut fake = Fake { spoil, spoil_from: from, ..Fake::turning(400.0) };
         let trip = drive(&mut fake, END, u32::MAX);
         assert_eq!(trip.map(|trip| trip.fault), Some(Fault::PositionSensor));

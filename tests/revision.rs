@@ -118,8 +118,10 @@ impl Pulsing {
 
     /// Boundaries and what their halves give, as control reads them: of the next half, and of the running one.
     fn told(&self) -> [(Instant, AlphaBeta); 2] {
-        let told = self.shared.applied.read(|records| {
-            let [newest, running, ..] = records.map(CommittalRecord);
+        let applied = &self.shared.applied;
+        let newest = applied.find(1, |_| true).unwrap();
+        let told = applied.read(newest, |records: [_; 2]| {
+            let [newest, running] = records.map(CommittalRecord);
             [(newest.at(), newest.volt_ticks()), (running.at(), running.volt_ticks_from(0))]
         });
         told.unwrap()

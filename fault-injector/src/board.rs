@@ -3,14 +3,14 @@
 use crate::injector;
 use tractive::board::qemu;
 pub use tractive::board::qemu::{
-    CLOCK, DESK, DUAL_DESK, DUAL_RECORDER, DualIdle, Idle, Interrupt, RECORDER, TICKS_HZ, die, die_dual,
-    idle, refuse,
+    CLOCK, DUAL_RECORDER, DualIdle, Idle, Interrupt, RECORDER, TICKS_HZ, die, die_dual, idle, refuse,
 };
 use tractive::drive::dual::Settings;
 use tractive::frames::Abc;
 use tractive::modulation::CarrierHalf;
 use tractive::ports::{
-    ControlPort, Dual, DualReport, DualSample, PlayedPeriod, PowerSample, PwmPort, Report, Sample,
+    ControlPort, DriveCommand, Dual, DualDriveCommand, DualReport, DualSample, PlayedPeriod, PowerSample,
+    PwmPort, Report, Sample,
 };
 use tractive::protection::SafeState;
 use tractive::time::Instant;
@@ -75,6 +75,10 @@ impl ControlPort for Control {
         <qemu::Control as ControlPort>::sample(&mut qemu::Control, now)
     }
 
+    fn command(&mut self, now: Instant, operator: impl FnOnce() -> DriveCommand) -> DriveCommand {
+        <qemu::Control as ControlPort>::command(&mut qemu::Control, now, operator)
+    }
+
     fn enter(&mut self, safe: SafeState, now: Instant) {
         enter(safe, now);
     }
@@ -118,6 +122,10 @@ impl ControlPort<Dual> for Control {
 
     fn sample(&mut self, now: Instant) -> DualSample {
         <qemu::Control as ControlPort<Dual>>::sample(&mut qemu::Control, now)
+    }
+
+    fn command(&mut self, now: Instant, operator: impl FnOnce() -> DualDriveCommand) -> DualDriveCommand {
+        <qemu::Control as ControlPort<Dual>>::command(&mut qemu::Control, now, operator)
     }
 
     fn enter(&mut self, _safe: SafeState, now: Instant) {

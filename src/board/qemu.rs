@@ -11,15 +11,15 @@ mod dual;
 pub mod exchange;
 mod watch;
 
-pub use dual::{DUAL_DESK, DUAL_RECORDER, DualIdle, connect_dual, die_dual, start_dual};
+pub use dual::{DUAL_RECORDER, DualIdle, connect_dual, die_dual, start_dual};
 pub use watch::ends as watch_ends;
 
 use crate::configuration::Refused;
+use crate::drive::Observation;
 use crate::frames::Abc;
 use crate::modulation::CarrierHalf;
-use crate::operator::{self, Feedback, Mailboxes, OperatorPort, Status};
-use crate::ports::Report;
-use crate::ports::{ControlPort, PwmPort, Sample};
+use crate::operator::{self, Feedback, OperatorPort, Status};
+use crate::ports::{ControlPort, DriveCommand, PwmPort, Report, Sample};
 use crate::protection::SafeState;
 use crate::protocol::CanEndpoint;
 use crate::recorder::Recorder;
@@ -96,10 +96,7 @@ fn read_register(address: usize) -> u32 {
     unsafe { core::ptr::read_volatile(address as *const u32) }
 }
 
-/// Between the idle loop's operator and control.
-pub static DESK: Mailboxes = Mailboxes::new();
-
-/// `true` if there is an operator; without one the rig's samples say what the drive may do.
+/// `true` if there is an operator; without one the rig commands the drive, beside its samples.
 static OPERATED: AtomicBool = AtomicBool::new(false);
 
 /// Opens the link and fetches the set-up. Call once, before [`start`].
@@ -204,11 +201,11 @@ impl ControlPort for Control {
     }
 
     fn sample(&mut self, now: Instant) -> Sample {
-        let mut sample = exchange::control_sample(now);
-        if OPERATED.load(Ordering::Relaxed) {
-            DESK.permit(now).apply(&mut sample);
-        }
-        sample
+        exchange::control_sample(now)
+    }
+
+    fn command(&mut self, _now: Instant, operator: impl FnOnce() -> DriveCommand) -> DriveCommand {
+        if OPERATED.load(Ordering::Relaxed) { operator() } else { exchange::command() }
     }
 
     fn enter(&mut self, safe: SafeState, now: Instant) {
@@ -224,9 +221,6 @@ impl ControlPort for Control {
     }
 
     fn report(&mut self, now: Instant, report: &Report) {
-        if OPERATED.load(Ordering::Relaxed) {
-            DESK.tell(now, report);
-        }
         exchange::report(now, report);
     }
 }
@@ -269,14 +263,14 @@ impl OperatorPort for Idle {
     fn ask(&mut self, at: Instant, slots: u32) -> (operator::Request, Feedback) {
         let (request, feedback, frame) = exchange::ask(at);
         let request = match &mut self.station {
-            Some(station) => station.listen(DESK.observed(), slots, frame.as_ref()),
+            Some(station) => station.listen(slots, frame.as_ref()),
             None => request,
         };
         (request, feedback)
     }
 
-    fn tell(&mut self, from: Instant, status: &Status) {
-        let frame = self.station.as_mut().and_then(|station| station.tell(status));
+    fn tell(&mut self, from: Instant, status: &Status, observed: Option<&Observation>) {
+        let frame = self.station.as_mut().and_then(|station| station.tell(status, observed));
         exchange::tell(from, status, frame);
     }
 }

@@ -5,10 +5,25 @@
 
 mod acknowledge;
 pub mod dual;
+mod mailbox;
 mod messages;
 pub mod traction;
 
+use crate::ports::System;
+
+pub use mailbox::{
+    DualObservation, DualOperatorMailboxes, Mailboxes, Observation, OperatorMailboxes, SLOT_PERIODS, Slotted,
+    Timed,
+};
+pub(crate) use mailbox::{next_slot, slots_between};
 pub use messages::{
     COMMITTAL_WORDS, Committal, CommittalRecord, Gates, HalfKind, VoltageCommand, half_from_words,
     half_to_words, volt_ticks,
 };
+
+/// The input of a control period: what was measured, and what the operator commands.
+#[derive(Clone, Copy)]
+struct PeriodInput<'a, S: System> {
+    sample: &'a S::Sample,
+    command: &'a S::Command,
+}

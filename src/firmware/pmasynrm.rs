@@ -63,7 +63,7 @@ fn main() -> ! {
                 Some(station) => station.settings(&operator),
                 None => operator,
             };
-            slot.run(&qemu::DESK, &mut idle, &settings, &clock);
+            slot.run(&SHARED.operator, &mut idle, &settings, &clock);
         }
         qemu::idle();
     }

@@ -37,7 +37,7 @@ fn main() -> ! {
     loop {
         if line.is_some() {
             let settings = idle.station.settings(&rated);
-            slot.run(&qemu::DUAL_DESK, &mut idle, &settings, &CLOCK);
+            slot.run(&SHARED.operator, &mut idle, &settings, &CLOCK);
         }
         qemu::idle();
     }

@@ -1,13 +1,12 @@
 //! From a request to demands: its values checked, its torque within its limits, on its way to the drive.
 
 use super::settings::Ends;
-use super::{
-    DriveCommand, Levels, Limits, MotorLimits, Observation, Ramp, Rates, Refusal, Request, Seen, Settings,
-    Situation,
-};
+use super::{Levels, Limits, MotorLimits, Ramp, Rates, Refusal, Request, Seen, Settings, Situation};
 use crate::control::{Demand, LinkWindow};
+use crate::drive::Observation;
 use crate::frames::{SQRT_3, limit};
 use crate::machine::Ratings;
+use crate::ports::DriveCommand;
 use crate::protection::{self, Violation};
 
 /// The drive's part of the state machine: its request, its observation, and its demands on their way.
@@ -16,7 +15,7 @@ pub trait Demands: Copy {
     type Request: Copy;
     /// The drive's observation of itself.
     type Observation: Copy + core::fmt::Debug;
-    /// The permit for the drive.
+    /// The command to the drive.
     type DriveCommand: Copy;
     /// The status of the demands.
     type Told: Copy + core::fmt::Debug;
@@ -47,8 +46,8 @@ pub trait Demands: Copy {
     }
     /// The demands as they stand.
     fn told(&self) -> Self::Told;
-    /// The permit for the drive.
-    fn permit(&self, enable: bool, acknowledge: u8, settings: &Settings) -> Self::DriveCommand;
+    /// The command to the drive.
+    fn command(&self, enable: bool, acknowledge: u8, settings: &Settings) -> Self::DriveCommand;
 }
 
 /// The PMaSynRM drive's demand: a torque.
@@ -130,7 +129,7 @@ impl Demands for TorqueDemand {
     }
 
     #[inline]
-    fn permit(&self, enable: bool, acknowledge: u8, settings: &Settings) -> DriveCommand {
+    fn command(&self, enable: bool, acknowledge: u8, settings: &Settings) -> DriveCommand {
         DriveCommand {
             enable,
             demand: Demand { torque_nm: self.ramp.torque_nm(), slew_limited: true },

@@ -4,12 +4,10 @@
 use super::demand::wanted_nm;
 use super::{Demands, Levels, Ramp, Rates, Refusal, Seen, Settings};
 use crate::control::Demand;
-use crate::drive::dual::{self};
+use crate::drive::{DualObservation, dual};
 use crate::frames::limit;
 use crate::machine::Ratings;
-use crate::ports::DualReport;
-use crate::ports::{DualSample, MotorDemand};
-use crate::time::Instant;
+use crate::ports::{DualDriveCommand, DualReport, MotorDemand};
 
 /// Time in which a speed demand goes from standstill to the largest speed, in s.
 const SPEED_RISE_S: f32 = 0.5;
@@ -92,55 +90,6 @@ impl DualRequest {
     pub const fn idle(ratings: &Ratings, link_ref_v: f32) -> Self {
         let motor = MotorRequest { wanted: Wanted::Torque(0.0), limits: MotorLimits::rated(ratings) };
         Self { levels: Levels::NONE, motors: [motor; 2], link_ref_v }
-    }
-}
-
-/// The ZS9's observation of itself: words of one control interrupt.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct DualObservation {
-    /// The control instant.
-    pub at: Instant,
-    /// The report of its control task.
-    pub report: DualReport,
-}
-
-/// The permit for the ZS9.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct DualDriveCommand {
-    /// Gates may pulse.
-    pub enable: bool,
-    /// Demands.
-    pub demands: [MotorDemand; 2],
-    /// Largest torques that a speed demand may take, in N·m.
-    pub speed_torque_nm: [f32; 2],
-    /// Link voltage outside shoot-through, in V; 0 leaves it to the board.
-    pub link_ref_v: f32,
-    /// Number of the last acknowledge.
-    pub acknowledge: u8,
-}
-
-impl DualDriveCommand {
-    /// Nothing.
-    pub const NONE: Self = Self {
-        enable: false,
-        demands: [MotorDemand::Torque(Demand { torque_nm: 0.0, slew_limited: true }); 2],
-        speed_torque_nm: [0.0; 2],
-        link_ref_v: 0.0,
-        acknowledge: 0,
-    };
-
-    /// Applies the permit to a sample: the board may hold the gates off, never more than that.
-    #[inline]
-    pub fn apply(&self, sample: &mut DualSample) {
-        sample.enable &= self.enable;
-        sample.demands = self.demands;
-        sample.speed_torque_nm = self.speed_torque_nm;
-        sample.acknowledge = self.acknowledge;
-        if self.link_ref_v > 0.0 {
-            sample.link_ref_v = self.link_ref_v;
-        }
     }
 }
 
@@ -301,7 +250,7 @@ impl Demands for DualDemands {
         self.ways.each_ref().map(Way::demand)
     }
 
-    fn permit(&self, enable: bool, acknowledge: u8, settings: &Settings) -> DualDriveCommand {
+    fn command(&self, enable: bool, acknowledge: u8, settings: &Settings) -> DualDriveCommand {
         let smaller = |limits: MotorLimits| {
             if limits.motoring_nm < limits.braking_nm { limits.motoring_nm } else { limits.braking_nm }
         };
@@ -310,6 +259,7 @@ impl Demands for DualDemands {
             demands: self.told(),
             speed_torque_nm: self.limits(settings).map(smaller),
             link_ref_v: self.resting_v.unwrap_or(self.link_ref_v),
+            scheme: DualDriveCommand::NONE.scheme,
             acknowledge,
         }
     }

@@ -106,7 +106,7 @@ impl<D: Demands> Operator<D> {
         self.shape(input, settings);
         let (enable, switches) = self.outputs(&situation, settings);
         Output {
-            permit: self.demands.permit(enable, self.acknowledge, settings),
+            command: self.demands.command(enable, self.acknowledge, settings),
             status: Status {
                 state: self.state(),
                 trip: match self.phase {

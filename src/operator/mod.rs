@@ -5,13 +5,12 @@
 //! has a reason.
 //!
 //! One pure step per slot of [`SLOT_PERIODS`] control periods, in the idle loop: what it looks at is the drive's word of the slot's
-//! beginning, what it decides holds from the next slot's beginning on ([`Mailboxes`]). So when the idle loop really ran changes nothing.
+//! beginning, what it decides holds from the next slot's beginning on ([`Mailboxes`](crate::drive::Mailboxes)). So when the idle loop really ran changes nothing.
 //!
 //! The drive's own protection does not wait for any of this: it trips in its interrupts, and tells.
 
 #![forbid(unsafe_code)]
 
-mod cells;
 mod demand;
 mod dual;
 mod health;
@@ -23,19 +22,16 @@ mod settings;
 mod slot;
 mod status;
 
-pub use cells::{Grant, Slotted, Timed};
 pub use demand::{Demands, TorqueDemand};
-pub use dual::{
-    DualDemands, DualDriveCommand, DualObservation, DualRequest, MotorLimits, MotorRequest, Wanted,
-};
+pub use dual::{DualDemands, DualRequest, MotorLimits, MotorRequest, Wanted};
 pub use ramp::{Ramp, Rates};
-pub use request::{Configuration, Feedback, Levels, Limits, Observation, Request, Seen};
+pub use request::{Configuration, Feedback, Levels, Limits, Request, Seen};
 pub use settings::{Line, LineTimes, Settings};
 pub use slot::OperatorPort;
 pub use status::{DualStatus, Refusal, State, Status, Switches, Told};
 
-use crate::control::{Demand, LinkWindow};
-use crate::ports::Sample;
+use crate::drive::{Observation, SLOT_PERIODS};
+use crate::ports::DriveCommand;
 use crate::time::Clock;
 
 /// The PMaSynRM drive's state machine.
@@ -46,14 +42,6 @@ pub type DualOperator = machine::Operator<DualDemands>;
 pub type Slot = slot::Slot<TorqueDemand>;
 /// The ZS9's.
 pub type DualSlot = slot::Slot<DualDemands>;
-/// Between the PMaSynRM drive's operator and its control interrupt.
-pub type Mailboxes = cells::Mailboxes<DriveCommand, Observation, 7, 12>;
-/// Between the ZS9's operator and its control interrupt.
-pub type DualMailboxes = cells::Mailboxes<DualDriveCommand, DualObservation, 7, 17>;
-
-/// Control periods in a slot.
-pub const SLOT_PERIODS: u32 = 10;
-
 /// Length of a slot, in s.
 pub fn slot_s(clock: &Clock) -> f32 {
     SLOT_PERIODS as f32 * clock.control_s()
@@ -82,45 +70,12 @@ struct Situation<'a> {
     feedback: &'a Feedback,
 }
 
-/// The permit for the drive.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct DriveCommand {
-    /// Gates may pulse.
-    pub enable: bool,
-    /// Torque.
-    pub demand: Demand,
-    /// The window of link voltage in which it ends.
-    pub window: LinkWindow,
-    /// Number of the last acknowledge: a new number, with the gates off, makes both interrupts forget their fault.
-    pub acknowledge: u8,
-}
-
-impl DriveCommand {
-    /// Applies the permit to a sample: the board may hold the gates off, never more than that.
-    #[inline]
-    pub fn apply(&self, sample: &mut Sample) {
-        sample.enable &= self.enable;
-        sample.demand = self.demand;
-        sample.window = self.window;
-        sample.acknowledge = self.acknowledge;
-    }
-
-    /// Nothing.
-    pub const NONE: Self = Self {
-        enable: false,
-        demand: Demand { torque_nm: 0.0, slew_limited: true },
-        window: LinkWindow::OPEN,
-        acknowledge: 0,
-    };
-}
-
 /// A step's result.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Output<P = DriveCommand, T = f32> {
+pub struct Output<C = DriveCommand, T = f32> {
     /// For the drive.
-    pub permit: P,
+    pub command: C,
     /// The status; its [`Switches`] are for the board.
     pub status: Status<T>,
 }

@@ -5,7 +5,6 @@ use crate::cell::Words;
 use crate::configuration::Refused;
 use crate::frames::Abc;
 use crate::machine::Ratings;
-use crate::modulation::Mode;
 use crate::protection::{Fault, Trip};
 use crate::time::Instant;
 
@@ -182,36 +181,6 @@ pub struct Seen {
     pub trip: Option<Trip>,
     /// Number of the last acknowledge that both sides have carried out.
     pub acknowledged: u8,
-}
-
-/// The drive's observation of itself: words of one control interrupt.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Observation {
-    /// The control instant.
-    pub at: Instant,
-    /// DC-link voltage, in V.
-    pub udc_v: f32,
-    /// Largest magnitude of a phase current, in A.
-    pub current_a: f32,
-    /// Electrical angular speed, in rad/s.
-    pub omega: f32,
-    /// `true` once the speed has been followed long enough to be used.
-    pub speed_known: bool,
-    /// Torque demand after envelope, slew and limits, in N·m.
-    pub torque_nm: f32,
-    /// The fault that either side has latched.
-    pub trip: Option<Trip>,
-    /// Number of the last acknowledge that both sides have carried out.
-    pub acknowledged: u8,
-    /// Current reference, d axis, in A.
-    pub id_ref_a: f32,
-    /// Current reference, q axis, in A.
-    pub iq_ref_a: f32,
-    /// Commanded fundamental, peak phase, in V.
-    pub voltage_v: f32,
-    /// Pulse pattern that control worked for.
-    pub mode: Mode,
 }
 
 /// Flags as bits of a word, the first the lowest.

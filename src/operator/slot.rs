@@ -1,9 +1,9 @@
 //! The idle loop's part: once a slot, look, step, allow, tell.
 
-use super::cells::{self, next_slot, slots_between};
 use super::machine::Operator;
-use super::{Demands, Feedback, Grant, Input, Output, Settings, Slotted, Status, Timed};
+use super::{Demands, Feedback, Input, Output, Settings, Status};
 use crate::cell::Words;
+use crate::drive::{Mailboxes, Slotted, Timed, next_slot, slots_between};
 use crate::protection::{SafeState, Trip, Violation};
 use crate::time::{Clock, Instant};
 
@@ -11,8 +11,9 @@ use crate::time::{Clock, Instant};
 pub trait OperatorPort<D: Demands = super::TorqueDemand> {
     /// The request and the board's feedback in the slot that began at `at`, so many `slots` after the last one that was done.
     fn ask(&mut self, at: Instant, slots: u32) -> (D::Request, Feedback);
-    /// Tells the status after the step; its switches are to be set at `from`, or as soon as the board can.
-    fn tell(&mut self, from: Instant, status: &Status<D::Told>);
+    /// Tells the status after the step, its switches to be set at `from`, or as soon as the board can; and the drive's observation of itself
+    /// at the slot's beginning, `None` of a drive that has not started.
+    fn tell(&mut self, from: Instant, status: &Status<D::Told>, observed: Option<&D::Observation>);
 }
 
 /// Steps that a slot makes at most: an idle loop that is away for longer is none that goes on.
@@ -32,19 +33,20 @@ impl<D: Demands> Slot<D> {
     }
 
     /// As often as the idle loop likes: does the newest slot if it is not done yet. Returns whether it did one.
-    pub fn run<const PERMIT: usize, const OBSERVATION: usize>(
+    pub fn run<const COMMAND: usize, const OBSERVATION: usize>(
         &mut self,
-        desk: &cells::Mailboxes<D::DriveCommand, D::Observation, PERMIT, OBSERVATION>,
+        mailboxes: &Mailboxes<D::DriveCommand, D::Observation, COMMAND, OBSERVATION>,
         port: &mut impl OperatorPort<D>,
         settings: &Settings,
         clock: &Clock,
     ) -> bool
     where
-        D::DriveCommand: Grant,
+        D::DriveCommand: Default,
         D::Observation: Slotted + Words<OBSERVATION>,
-        Timed<D::DriveCommand>: Words<PERMIT>,
+        Timed<D::DriveCommand>: Words<COMMAND>,
     {
-        let Some(observed) = desk.observed() else {
+        let newest = mailboxes.observed();
+        let Some(observed) = &newest else {
             return false;
         };
         let at = observed.at();
@@ -52,9 +54,11 @@ impl<D: Demands> Slot<D> {
             return false;
         }
         let slots = self.done.map_or(1, |done| slots_between(done, at, clock));
-        let output = self.step(&observed, slots, port, settings);
-        let from = desk.allow(output.permit, &observed, clock);
-        port.tell(from, &output.status);
+        let asked = port.ask(at, slots);
+        let output = self.step(observed, slots, asked, settings);
+        let from = next_slot(at, clock);
+        mailboxes.publish(output.command, from);
+        port.tell(from, &output.status, Some(observed));
         true
     }
 
@@ -72,8 +76,9 @@ impl<D: Demands> Slot<D> {
         let at = self.done.map_or(Instant(0), |done| next_slot(done, clock));
         let (fault, value, limit) = why;
         let trip = Trip { fault, value, limit, at: Instant(0), safe: SafeState::GatesOff };
-        let output = self.step(&D::Observation::refused(at, trip), 1, port, settings);
-        port.tell(next_slot(at, clock), &output.status);
+        let asked = port.ask(at, 1);
+        let output = self.step(&D::Observation::refused(at, trip), 1, asked, settings);
+        port.tell(next_slot(at, clock), &output.status, None);
     }
 
     /// The slot of an observation. The state machine also makes the steps of slots that nobody has looked at, so that its times are the
@@ -82,15 +87,13 @@ impl<D: Demands> Slot<D> {
         &mut self,
         observed: &D::Observation,
         slots: u32,
-        port: &mut impl OperatorPort<D>,
+        (request, feedback): (D::Request, Feedback),
         settings: &Settings,
     ) -> Output<D::DriveCommand, D::Told>
     where
         D::Observation: Slotted,
     {
-        let at = observed.at();
-        self.done = Some(at);
-        let (request, feedback) = port.ask(at, slots);
+        self.done = Some(observed.at());
         let input = Input { request: &request, observed, feedback: &feedback };
         for _ in 1..slots.min(MOST_STEPS) {
             self.operator.step(&input, settings);

@@ -15,7 +15,7 @@ pub enum MotorDemand {
     Speed(f32),
 }
 
-/// The ZS9's sample for control, with the operator's wishes. Motors in the order upper, lower.
+/// The ZS9's sample for control. Motors in the order upper, lower.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct DualSample {
@@ -29,18 +29,8 @@ pub struct DualSample {
     pub inductor_a: f32,
     /// Source voltage U_dc, in V.
     pub source_v: f32,
-    /// The demands on the motors.
-    pub demands: [MotorDemand; 2],
-    /// Link voltage wanted outside shoot-through, U_in*, in V.
-    pub link_ref_v: f32,
-    /// The place of the zero vectors.
-    pub scheme: Scheme,
-    /// The permission for the gates to be on.
-    pub enable: bool,
-    /// Largest torques that speed demands may take, in N·m; the machine's own holds as well.
-    pub speed_torque_nm: [f32; 2],
-    /// Number of the operator's last acknowledge.
-    pub acknowledge: u8,
+    /// `true` while the board lets the gates pulse: its enable input is high, and no break holds them.
+    pub may_pulse: bool,
     /// The cause that turned the gates off in hardware; it lasts until it is acknowledged.
     pub hardware: Option<HardwareBreak>,
 }
@@ -55,9 +45,53 @@ pub struct HardwareBreak {
     pub seen: u16,
 }
 
-impl DualSample {
-    /// Without limits or commands of an operator: for boards that have none.
+/// The operator's command to the ZS9. Motors in the order upper, lower.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct DualDriveCommand {
+    /// Gates may pulse.
+    pub enable: bool,
+    /// The demands on the motors.
+    pub demands: [MotorDemand; 2],
+    /// Largest torques that speed demands may take, in N·m; the machine's own holds as well.
+    pub speed_torque_nm: [f32; 2],
+    /// Link voltage wanted outside shoot-through, U_in*, in V; 0 leaves it to the board.
+    pub link_ref_v: f32,
+    /// The place of the zero vectors.
+    pub scheme: Scheme,
+    /// Number of the operator's last acknowledge.
+    pub acknowledge: u8,
+}
+
+impl DualDriveCommand {
+    /// Nothing.
+    pub const NONE: Self = Self {
+        enable: false,
+        demands: [MotorDemand::Torque(Demand { torque_nm: 0.0, slew_limited: true }); 2],
+        speed_torque_nm: [0.0; 2],
+        link_ref_v: 0.0,
+        scheme: Scheme::Rthd,
+        acknowledge: 0,
+    };
+
+    /// The torques of speed demands that nobody limits, in N·m.
     pub const UNLIMITED_NM: [f32; 2] = [f32::INFINITY; 2];
+
+    /// The same with the board's link voltage, in V, where the operator leaves it to the board.
+    #[inline]
+    pub fn with_link(mut self, link_ref_v: f32) -> Self {
+        let is_named = self.link_ref_v > 0.0;
+        if !is_named {
+            self.link_ref_v = link_ref_v;
+        }
+        self
+    }
+}
+
+impl Default for DualDriveCommand {
+    fn default() -> Self {
+        Self::NONE
+    }
 }
 
 /// The PWM interrupt's sample at the carrier's peak.

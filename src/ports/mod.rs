@@ -11,10 +11,12 @@ use crate::modulation::CarrierHalf;
 use crate::protection::{Fault, LegFaults, SafeState};
 use crate::time::Instant;
 
-pub use dual::{DualSample, GateFeedback, HardwareBreak, MotorDemand, PlayedPeriod, PowerSample};
+pub use dual::{
+    DualDriveCommand, DualSample, GateFeedback, HardwareBreak, MotorDemand, PlayedPeriod, PowerSample,
+};
 pub use report::{DualReport, Report};
 
-/// A control sample: what the converters hold, and what the operator wants.
+/// A control sample: what the converters and the position sensor hold, and what keeps the gates off in hardware.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Sample {
@@ -24,14 +26,8 @@ pub struct Sample {
     pub udc_v: f32,
     /// Rotor angle at that instant, electrical; `None` while it is not known, or no longer.
     pub angle: Option<Angle>,
-    /// The torque demand.
-    pub demand: Demand,
-    /// The permission for the gates to be on.
-    pub enable: bool,
-    /// DC-link voltages at which torque ends.
-    pub window: LinkWindow,
-    /// Number of the operator's last acknowledge; a new one makes the drive forget its fault.
-    pub acknowledge: u8,
+    /// `true` while the board lets the gates pulse: its enable input is high, and no break holds them.
+    pub may_pulse: bool,
     /// The cause that holds the gates off in hardware.
     pub hardware: Option<Fault>,
 }
@@ -45,10 +41,42 @@ impl Sample {
     }
 }
 
+/// The operator's command to the drive.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct DriveCommand {
+    /// Gates may pulse.
+    pub enable: bool,
+    /// The torque demand.
+    pub demand: Demand,
+    /// DC-link voltages at which torque ends.
+    pub window: LinkWindow,
+    /// Number of the operator's last acknowledge: a new one, with the gates off, makes both interrupts forget their fault.
+    pub acknowledge: u8,
+}
+
+impl DriveCommand {
+    /// Nothing.
+    pub const NONE: Self = Self {
+        enable: false,
+        demand: Demand { torque_nm: 0.0, slew_limited: true },
+        window: LinkWindow::OPEN,
+        acknowledge: 0,
+    };
+}
+
+impl Default for DriveCommand {
+    fn default() -> Self {
+        Self::NONE
+    }
+}
+
 /// One of the two drives: what passes through its ports.
 pub trait System {
-    /// The sample of the control interrupt, with the operator's wishes.
+    /// The sample of the control interrupt.
     type Sample;
+    /// The operator's command.
+    type Command;
     /// The report of the control task.
     type Report;
     /// The sample of the PWM interrupt.
@@ -67,6 +95,7 @@ pub struct Dual;
 
 impl System for Traction {
     type Sample = Sample;
+    type Command = DriveCommand;
     type Report = Report;
     /// Phase currents, in A.
     type PwmSample = Abc;
@@ -75,6 +104,7 @@ impl System for Traction {
 
 impl System for Dual {
     type Sample = DualSample;
+    type Command = DualDriveCommand;
     type Report = DualReport;
     type PwmSample = PowerSample;
     type Pulses = PlayedPeriod;
@@ -87,6 +117,12 @@ pub trait ControlPort<S: System = Traction> {
     fn begin(&mut self, _revises: bool) {}
     /// The conversions that the control timer triggered at `now`.
     fn sample(&mut self, now: Instant) -> S::Sample;
+    /// The command of this period, after [`Self::sample`]: the `operator`'s. A board that has it from elsewhere, as a simulated one may,
+    /// gives its own.
+    #[inline]
+    fn command(&mut self, _now: Instant, operator: impl FnOnce() -> S::Command) -> S::Command {
+        operator()
+    }
     /// Puts the gates into the safe state at once, until an acknowledge, whatever is played.
     fn enter(&mut self, safe: SafeState, now: Instant);
     /// By how many ticks the interrupt, begun nominally at `now`, has outlived `deadline_ticks`; 0 when in time.

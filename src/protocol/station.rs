@@ -14,14 +14,12 @@ use core::borrow::Borrow;
 pub struct CanEndpoint<D: MessageSet> {
     session: Session<D>,
     ratings: &'static Ratings,
-    /// The slot's observation.
-    observed: Option<Observation<D>>,
 }
 
 impl<D: MessageSet> CanEndpoint<D> {
     /// At power-up.
     pub const fn new(ratings: &'static Ratings) -> Self {
-        Self { session: Session::new(ratings), ratings, observed: None }
+        Self { session: Session::new(ratings), ratings }
     }
 
     /// The operator's settings with the parameters that are in force.
@@ -30,15 +28,12 @@ impl<D: MessageSet> CanEndpoint<D> {
         Settings { slew_nm_s: torque_slew_nm_s, jerk_nm_s2: torque_jerk_nm_s2, ..*settings }
     }
 
-    /// The request in a slot, `slots` after the last one, after the frames that have come since; with the drive's observation of itself
-    /// at the slot's beginning.
+    /// The request in a slot, `slots` after the last one, after the frames that have come since.
     pub fn listen<F: Borrow<Frame>>(
         &mut self,
-        observed: Option<Observation<D>>,
         slots: u32,
         frames: impl IntoIterator<Item = F>,
     ) -> Request<D> {
-        self.observed = observed;
         self.session.listen(slots, frames)
     }
 
@@ -47,9 +42,13 @@ impl<D: MessageSet> CanEndpoint<D> {
         self.session.counts()
     }
 
-    /// The frame to send after the slot, if one is due.
-    pub fn tell(&mut self, status: &Status<DriveTold<D>>) -> Option<Frame> {
-        let (measured, mode) = D::observed(self.observed.as_ref(), self.ratings);
+    /// The frame to send after the slot, if one is due; with the drive's observation of itself at the slot's beginning.
+    pub fn tell(
+        &mut self,
+        status: &Status<DriveTold<D>>,
+        observed: Option<&Observation<D>>,
+    ) -> Option<Frame> {
+        let (measured, mode) = D::observed(observed, self.ratings);
         self.session.tell(&Told { status, measured: &measured, mode })
     }
 }

@@ -9,9 +9,10 @@ use super::parameters::{Parameters, RPM_PER_RAD_S};
 use super::signal::Payload;
 use super::telemetry::Measured;
 use super::{FROM_DRIVE, TO_DRIVE};
+use crate::drive::Observation;
 use crate::machine::Ratings;
 use crate::modulation::Mode;
-use crate::operator::{Limits, MotorLimits, Observation, Request, TorqueDemand};
+use crate::operator::{Limits, MotorLimits, Request, TorqueDemand};
 
 /// The content of a frame that was taken.
 #[derive(Clone, Copy, Debug, PartialEq)]

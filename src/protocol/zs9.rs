@@ -14,10 +14,10 @@ use super::telemetry::{
     MAIN, PRECHARGE, REFUSAL, REFUSALS, SPEED_RPM, STATE, TAKEN, TRIP_FAULT, TRIP_LIMIT, TRIP_VALUE, encode,
     pattern,
 };
-use crate::drive::dual;
+use crate::drive::{DualObservation, dual};
 use crate::machine::Ratings;
 use crate::nine_switch::Scheme;
-use crate::operator::{DualDemands, DualObservation, DualRequest, Levels, MotorRequest, Wanted};
+use crate::operator::{DualDemands, DualRequest, Levels, MotorRequest, Wanted};
 
 const KIND: Signal = Signal::number("page", 35, 1, 1);
 const TORQUES: [Signal; 2] = [

@@ -6,8 +6,10 @@ use crate::control::Demand;
 use crate::frames::{Abc, Angle};
 use crate::nine_switch::{GateTicks, Scheme};
 use crate::operator::{DualStatus, Feedback, LineTimes};
-use crate::ports::DualReport;
-use crate::ports::{DualSample, GateFeedback, HardwareBreak, MotorDemand, PlayedPeriod, PowerSample};
+use crate::ports::{
+    DualDriveCommand, DualReport, DualSample, GateFeedback, HardwareBreak, MotorDemand, PlayedPeriod,
+    PowerSample,
+};
 use crate::protection::Fault;
 use crate::protocol::Frame;
 use crate::recorder::DualRecord;
@@ -141,30 +143,30 @@ pub fn dual_asked_from_block(block: &Block) -> (Feedback, Option<Frame>) {
     (Feedback::from_words([a, b, c, d]), Option::from_words([head, low, high]))
 }
 
-/// The answer to [`DualRequest::ControlSample`]; `stop` ends the run.
-pub fn dual_sample_to_block(sample: &DualSample, stop: bool) -> Block {
+/// The answer to [`DualRequest::ControlSample`], with the rig's command; `stop` ends the run.
+pub fn dual_sample_to_block(sample: &DualSample, command: &DualDriveCommand, stop: bool) -> Block {
     let [[a1, b1, c1], [a2, b2, c2]] = sample.currents_a.map(Abc::to_bits);
     let [first, second] = sample.angles.map(|angle| angle.unwrap_or(Angle::ZERO).0);
     let [lost1, lost2] = sample.angles.map(|angle| u32::from(angle.is_none()));
-    let [(kind1, demand1), (kind2, demand2)] = sample.demands.map(demand_words);
-    let flags = u32::from(sample.enable)
+    let [(kind1, demand1), (kind2, demand2)] = command.demands.map(demand_words);
+    let flags = u32::from(sample.may_pulse && command.enable)
         | u32::from(stop) << 1
         | lost1 << 2
         | lost2 << 3
         | kind1 << 4
         | kind2 << 6
-        | (sample.scheme as u32) << 8;
+        | (command.scheme as u32) << 8;
     let hardware = sample.hardware.map_or(0, |found| found.fault as u32 | u32::from(found.seen) << 16);
     let [capacitor, inductor, source, link] =
-        [sample.capacitor_v, sample.inductor_a, sample.source_v, sample.link_ref_v].map(f32::to_bits);
+        [sample.capacitor_v, sample.inductor_a, sample.source_v, command.link_ref_v].map(f32::to_bits);
     [
         a1, b1, c1, a2, b2, c2, first, second, capacitor, inductor, source, demand1, demand2, link, flags,
         hardware,
     ]
 }
 
-/// The inverse of [`dual_sample_to_block`].
-pub fn dual_sample_from_block(block: &Block) -> (DualSample, bool) {
+/// The inverse of [`dual_sample_to_block`], the command as its words.
+pub fn dual_sample_from_block(block: &Block) -> (DualSample, [u32; 4], bool) {
     let [
         a1,
         b1,
@@ -190,16 +192,23 @@ pub fn dual_sample_from_block(block: &Block) -> (DualSample, bool) {
         capacitor_v: f32::from_bits(capacitor),
         inductor_a: f32::from_bits(inductor),
         source_v: f32::from_bits(source),
-        demands: [demand(flags >> 4 & 3, demand1), demand(flags >> 6 & 3, demand2)],
-        link_ref_v: f32::from_bits(link),
-        scheme: Scheme::from_code(flags >> 8 & 0xFF),
-        speed_torque_nm: DualSample::UNLIMITED_NM,
-        acknowledge: 0,
+        may_pulse: flags & 1 != 0,
         hardware: Fault::from_code(hardware & 0xFFFF)
             .map(|fault| HardwareBreak { fault, seen: (hardware >> 16) as u16 }),
-        enable: flags & 1 != 0,
     };
-    (sample, flags & 2 != 0)
+    (sample, [demand1, demand2, link, flags], flags & 2 != 0)
+}
+
+/// The command of such words.
+pub fn dual_command_from_words([demand1, demand2, link, flags]: [u32; 4]) -> DualDriveCommand {
+    DualDriveCommand {
+        enable: flags & 1 != 0,
+        demands: [demand(flags >> 4 & 3, demand1), demand(flags >> 6 & 3, demand2)],
+        speed_torque_nm: DualDriveCommand::UNLIMITED_NM,
+        link_ref_v: f32::from_bits(link),
+        scheme: Scheme::from_code(flags >> 8 & 0xFF),
+        acknowledge: 0,
+    }
 }
 
 /// The answer to [`DualRequest::PowerSample`].
@@ -254,18 +263,23 @@ mod tests {
             capacitor_v: 533.5,
             inductor_a: -3.25,
             source_v: 400.0,
+            may_pulse: true,
+            hardware: Some(HardwareBreak { fault: Fault::GateDriver, seen: 0x3FF }),
+        };
+        let command = DualDriveCommand {
+            enable: true,
             demands: [
                 MotorDemand::Speed(104.5),
                 MotorDemand::Torque(Demand { torque_nm: -60.0, slew_limited: true }),
             ],
             link_ref_v: 667.0,
             scheme: Scheme::Zvo,
-            enable: true,
-            speed_torque_nm: DualSample::UNLIMITED_NM,
+            speed_torque_nm: DualDriveCommand::UNLIMITED_NM,
             acknowledge: 0,
-            hardware: Some(HardwareBreak { fault: Fault::GateDriver, seen: 0x3FF }),
         };
-        assert_eq!(dual_sample_from_block(&dual_sample_to_block(&sample, true)), (sample, true));
+        let block = dual_sample_to_block(&sample, &command, true);
+        let (arrived, words, stop) = dual_sample_from_block(&block);
+        assert_eq!((arrived, dual_command_from_words(words), stop), (sample, command, true));
         let power = PowerSample {
             currents_a: sample.currents_a,
             capacitor_v: 530.0,
@@ -291,7 +305,7 @@ mod tests {
             trip: None,
             refusal: None,
             refusals: 1,
-            torque_nm: sample.demands,
+            torque_nm: command.demands,
             switches: Switches { main: true, ..Switches::default() },
         };
         let record = DualRecord {

@@ -1,14 +1,15 @@
 //! The same state machine over the ZS9's two motors.
 
 use tractive::built_in::zs9::BUILT_IN;
+use tractive::drive::DualObservation;
 use tractive::drive::dual::{self};
 use tractive::machine::Ratings;
 use tractive::operator::{
-    Configuration, DualDriveCommand, DualObservation, DualOperator, DualRequest, DualStatus, Feedback, Input,
-    Line, MotorLimits, Output, Refusal, Settings, State, Wanted,
+    Configuration, DualOperator, DualRequest, DualStatus, Feedback, Input, Line, MotorLimits, Output,
+    Refusal, Settings, State, Wanted,
 };
-use tractive::ports::DualReport;
-use tractive::ports::MotorDemand;
+
+use tractive::ports::{DualDriveCommand, DualReport, MotorDemand};
 use tractive::protection::{Fault, SafeState, Trip};
 use tractive::time::{Clock, Instant};
 
@@ -54,15 +55,16 @@ impl World {
         assert_eq!(switches.chopper, 0.0);
         (self.feedback.precharge_closed, self.feedback.main_closed) = (switches.precharge, switches.main);
         if switches.precharge || switches.main {
-            let towards = if output.permit.enable { 0.5 * (output.permit.link_ref_v + 400.0) } else { 400.0 };
+            let towards =
+                if output.command.enable { 0.5 * (output.command.link_ref_v + 400.0) } else { 400.0 };
             report.capacitor_v += (towards - report.capacitor_v) * 0.02;
         }
         if let Some(last) = self.last.replace(output)
-            && last.permit.acknowledge != report.acknowledged
+            && last.command.acknowledge != report.acknowledged
         {
-            (report.acknowledged, report.trip) = (last.permit.acknowledge, None);
+            (report.acknowledged, report.trip) = (last.command.acknowledge, None);
         }
-        for (torque_nm, demand) in report.torque_nm.iter_mut().zip(output.permit.demands) {
+        for (torque_nm, demand) in report.torque_nm.iter_mut().zip(output.command.demands) {
             if let MotorDemand::Torque(demand) = demand {
                 *torque_nm = demand.torque_nm;
             }
@@ -79,12 +81,12 @@ impl World {
         assert!((0..5_000).any(|_| self.slot().state == state), "{state:?}: {:?}", self.last);
     }
 
-    fn permit(&self) -> DualDriveCommand {
-        self.last.unwrap().permit
+    fn command(&self) -> DualDriveCommand {
+        self.last.unwrap().command
     }
 
     fn torques_nm(&self) -> [f32; 2] {
-        self.permit().demands.map(|demand| match demand {
+        self.command().demands.map(|demand| match demand {
             MotorDemand::Torque(demand) => demand.torque_nm,
             MotorDemand::Speed(speed) => panic!("a speed: {speed}"),
         })
@@ -128,14 +130,14 @@ fn precharge_enable_run_stop_discharge() {
         before = now;
     }
     assert_eq!((world.torques_nm(), world.operator.state()), ([60.0, -20.0], State::Running));
-    assert_eq!(world.permit().link_ref_v, 667.0);
+    assert_eq!(world.command().link_ref_v, 667.0);
     world.request.levels.enable = false;
     assert_eq!(world.slot().state, State::Stopping);
     // The link goes down to the source's voltage before the gates go off.
     while world.slot().state == State::Stopping {
-        assert!(world.permit().enable && world.permit().link_ref_v == 400.0);
+        assert!(world.command().enable && world.command().link_ref_v == 400.0);
     }
-    assert_eq!((world.operator.state(), world.permit().enable), (State::Charged, false));
+    assert_eq!((world.operator.state(), world.command().enable), (State::Charged, false));
     assert!(world.observed.report.link_v() < 420.0);
     world.request.levels.discharge = true;
     world.until(State::Discharge);
@@ -152,10 +154,10 @@ fn a_speed_begins_where_the_motor_is_and_a_torque_where_its_torque_is() {
     world.want([Wanted::Speed(100.0), Wanted::Torque(10.0)]);
     let rise = world.ratings.max_speed_rad_s / 500.0;
     world.slot();
-    let [MotorDemand::Speed(speed), MotorDemand::Torque(_)] = world.permit().demands else { panic!() };
+    let [MotorDemand::Speed(speed), MotorDemand::Torque(_)] = world.command().demands else { panic!() };
     assert!((speed - 10.0 - rise).abs() < 1e-3, "{speed}");
     assert_eq!(world.slots(2_000).state, State::Running);
-    assert_eq!(world.permit().demands[0], MotorDemand::Speed(100.0));
+    assert_eq!(world.command().demands[0], MotorDemand::Speed(100.0));
     world.observed.report.torque_nm[0] = 30.0;
     world.want([Wanted::Torque(0.0); 2]);
     world.slot();
@@ -172,21 +174,21 @@ fn limits_are_each_motors_own() {
     world.want([Wanted::Torque(60.0), Wanted::Torque(60.0)]);
     world.slots(500);
     assert_eq!(world.torques_nm(), [60.0, 15.0]);
-    assert_eq!(world.permit().speed_torque_nm, [rated.motoring_nm, 12.0]);
+    assert_eq!(world.command().speed_torque_nm, [rated.motoring_nm, 12.0]);
     world.want([Wanted::Speed(100.0), Wanted::Speed(100.0)]);
     world.slots(1_000);
-    assert_eq!(world.permit().demands, [MotorDemand::Speed(100.0), MotorDemand::Speed(50.0)]);
+    assert_eq!(world.command().demands, [MotorDemand::Speed(100.0), MotorDemand::Speed(50.0)]);
     // Beyond the ratings: refused once, those before go on.
     world.request.motors[0].limits.motoring_nm = 121.0;
     assert_eq!(world.slots(3).refusal, Some(Refusal::LimitOutOfRange));
-    assert_eq!(world.permit().speed_torque_nm, [rated.motoring_nm, 12.0]);
+    assert_eq!(world.command().speed_torque_nm, [rated.motoring_nm, 12.0]);
     world.request.motors[0].limits = rated;
     world.slot();
     for link_ref_v in [350.0, 801.0] {
         world.request.link_ref_v = link_ref_v;
         let refusals = world.last.unwrap().status.refusals;
         assert_eq!(world.slot().refusals, refusals + 1, "{link_ref_v}");
-        assert_eq!(world.permit().link_ref_v, 667.0);
+        assert_eq!(world.command().link_ref_v, 667.0);
         world.request.link_ref_v = 667.0;
         world.slot();
     }
@@ -217,7 +219,7 @@ fn one_fault_stops_both_motors_and_is_left_by_an_acknowledge() {
     world.observed.report.trip = Some(trip);
     let status = world.slot();
     assert_eq!((status.state, status.trip), (State::Fault, Some(trip)));
-    assert_eq!((world.permit().enable, world.torques_nm()), (false, [0.0; 2]));
+    assert_eq!((world.command().enable, world.torques_nm()), (false, [0.0; 2]));
     assert!(!status.switches.main);
     world.request.levels.enable = false;
     world.slots(5);

@@ -17,7 +17,7 @@ fn fails(mut world: World, spoil: Spoil, fault: Fault) {
     }
     assert_eq!(world.fault(), Some(fault));
     let switches = world.switches();
-    assert!(!world.output().permit.enable && !switches.main && !switches.precharge && !switches.discharge);
+    assert!(!world.output().command.enable && !switches.main && !switches.precharge && !switches.discharge);
 }
 
 #[test]

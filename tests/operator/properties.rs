@@ -100,7 +100,7 @@ impl Onlooker {
         self.enable = request.enable;
         let before = self.last;
         let output = world.slot();
-        let (permit, status, switches) = (output.permit, output.status, output.status.switches);
+        let (permit, status, switches) = (output.command, output.status, output.status.switches);
         self.seen.insert(status.state.name());
         if edge {
             (self.armed, self.stopping) = (true, false);
@@ -114,7 +114,7 @@ impl Onlooker {
         }
         // Gates.
         prop_assert!(!permit.enable || self.armed, "enabled without a command: {output:?}");
-        let enabled_before = before.is_some_and(|before| before.permit.enable);
+        let enabled_before = before.is_some_and(|before| before.command.enable);
         if permit.enable {
             prop_assert!(feedback.driver_ready && feedback.hardware.is_none() && observed.trip.is_none());
             prop_assert!(feedback.sensor_alive && feedback.position_known && feedback.main_closed);

@@ -231,11 +231,11 @@ fn values_that_cannot_be_used_are_refused_once() {
     ];
     for (spoil, reason) in values {
         let mut world = World::running();
-        let before = world.output().permit;
+        let before = world.output().command;
         spoil(&mut world.request);
         let output = world.slot();
         assert_eq!((output.status.refusal, output.status.refusals), (Some(reason), 1));
-        assert_eq!(output.permit.window, before.window, "the limits before go on");
+        assert_eq!(output.command.window, before.window, "the limits before go on");
         world.slots(300);
         assert_eq!(world.output().status.refusals, 1);
         let torque_nm = if reason == Refusal::RequestNotFinite { 0.0 } else { 400.0 };

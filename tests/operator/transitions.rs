@@ -107,7 +107,7 @@ fn a_stop_ramps_torque_down_before_the_gates_go_off() {
     world.request.enable = false;
     let mut least_nm = f32::MAX;
     let mut slots = 0;
-    while world.slot().permit.enable {
+    while world.slot().command.enable {
         assert_eq!(world.state(), State::Stopping);
         least_nm = world.output().status.torque_nm;
         slots += 1;
@@ -123,10 +123,10 @@ fn at_a_speed_where_the_emf_would_be_rectified_a_stop_keeps_pulsing_without_torq
     world.request.enable = false;
     world.slots(1_000);
     assert_eq!((world.state(), world.output().status.torque_nm), (State::Stopping, 0.0));
-    assert!(world.output().permit.enable);
+    assert!(world.output().command.enable);
     world.observed.omega = 1_500.0;
     world.slot();
-    assert_eq!((world.state(), world.output().permit.enable), (State::Charged, false));
+    assert_eq!((world.state(), world.output().command.enable), (State::Charged, false));
 }
 
 #[test]
@@ -137,7 +137,7 @@ fn off_and_the_enable_input_turn_the_gates_off_at_once() {
         let mut world = World::running();
         stop(&mut world);
         let output = world.slot();
-        assert_eq!((output.permit.enable, output.status.state), (false, State::Charged));
+        assert_eq!((output.command.enable, output.status.state), (false, State::Charged));
         world.request.off = false;
         world.feedback.enable_input = true;
         world.slots(100);
@@ -153,12 +153,12 @@ fn coasting_ramps_down_opens_the_gates_and_catches_the_machine_without_a_new_com
     world.observed.omega = 800.0;
     world.request.coast = true;
     world.slot();
-    assert_eq!((world.state(), world.output().permit.enable), (State::Coasting, true));
+    assert_eq!((world.state(), world.output().command.enable), (State::Coasting, true));
     world.slots(300);
-    assert_eq!((world.state(), world.output().permit.enable), (State::Coasting, false));
+    assert_eq!((world.state(), world.output().command.enable), (State::Coasting, false));
     world.request.coast = false;
     world.slot();
-    assert!(world.output().permit.enable);
+    assert!(world.output().command.enable);
     world.slots(300);
     assert_eq!((world.state(), world.output().status.torque_nm), (State::Running, 400.0));
 }
@@ -210,12 +210,12 @@ fn a_fault_is_left_by_an_acknowledge_through_the_self_test() {
     world.observed.trip = Some(trip(Fault::Overcurrent));
     let output = world.slot();
     assert_eq!(output.status.state, State::Fault);
-    assert_eq!((output.permit.enable, world.switches().main), (false, false));
+    assert_eq!((output.command.enable, world.switches().main), (false, false));
     world.slots(500);
     assert_eq!((world.state(), world.fault()), (State::Fault, Some(Fault::Overcurrent)));
-    let number = world.output().permit.acknowledge;
+    let number = world.output().command.acknowledge;
     world.edge(|request, level| request.acknowledge = level);
-    assert_eq!(world.output().permit.acknowledge, number + 1);
+    assert_eq!(world.output().command.acknowledge, number + 1);
     world.until(State::SelfTest);
     assert_eq!(world.fault(), None);
     world.until(State::Ready);

@@ -1,10 +1,10 @@
 //! A board, a link and a drive that do what they are told, unless a test says otherwise.
 
 use tractive::built_in::traction::BUILT_IN;
+use tractive::drive::Observation;
 use tractive::frames::Abc;
 use tractive::operator::{
-    Configuration, Feedback, Input, Line, Observation, Operator, Output, Refusal, Request, Settings, State,
-    Switches,
+    Configuration, Feedback, Input, Line, Operator, Output, Refusal, Request, Settings, State, Switches,
 };
 use tractive::protection::{Fault, SafeState, Trip};
 use tractive::time::Instant;
@@ -31,7 +31,7 @@ pub struct World {
     pub persistent: Option<Trip>,
     pub last: Option<Output>,
     moving: [u32; 2],
-    /// The permit before: what the drive follows now.
+    /// The command before: what the drive follows now.
     permitted: Option<Output>,
 }
 
@@ -163,9 +163,9 @@ impl World {
         }
         if let Some(permitted) = self.permitted.replace(*output)
             && !self.deaf
-            && permitted.permit.acknowledge != self.observed.acknowledged
+            && permitted.command.acknowledge != self.observed.acknowledged
         {
-            self.observed.acknowledged = permitted.permit.acknowledge;
+            self.observed.acknowledged = permitted.command.acknowledge;
             self.observed.trip = self.persistent;
         }
         self.observed.at = self.observed.at.after(25_000);

@@ -2,9 +2,10 @@
 
 use super::Stream;
 use tractive::built_in::zs9::BUILT_IN;
+use tractive::drive::DualObservation;
 use tractive::drive::dual::Settings;
 use tractive::nine_switch::Scheme;
-use tractive::operator::{DualObservation, DualRequest, DualStatus, Levels, State, Switches, Wanted};
+use tractive::operator::{DualRequest, DualStatus, Levels, State, Switches, Wanted};
 use tractive::ports::DualReport;
 use tractive::protocol::{
     FROM_ZS9, Frame, MessageSet, Payload, StatusFrame, TO_ZS9, TorqueLimits, ZS9_COMMAND, ZS9_LIMITS,
@@ -127,13 +128,14 @@ fn the_telemetry_says_what_is_measured() {
         trip: None,
         refusal: None,
         refusals: 0,
-        torque_nm: tractive::operator::DualDriveCommand::NONE.demands,
+        torque_nm: tractive::ports::DualDriveCommand::NONE.demands,
         switches: Switches { main: true, ..Switches::default() },
     };
+    let observed = DualObservation { at: Instant(0), report };
     let (mut measured, mut told) = (Zs9Measured::default(), None);
     for _ in 0..10 {
-        station.listen(Some(DualObservation { at: Instant(0), report }), 1, None::<Frame>);
-        let Some(frame) = station.tell(&status) else { continue };
+        station.listen(1, None::<Frame>);
+        let Some(frame) = station.tell(&status, Some(&observed)) else { continue };
         let message = FROM_ZS9.into_iter().find(|message| message.id == frame.id).unwrap();
         assert!(message.is_intact(&frame));
         let payload = Payload(u64::from_le_bytes(frame.data));

@@ -17,6 +17,8 @@ const HALF_CODES: f64 = 2_048.0;
 const RANGE: f64 = 20.0;
 /// The most by which the comparators' current may exceed the machine's trip current: beyond, they protect another machine.
 const BREAK: f64 = 2.0;
+/// The slowest control that a drive starts with, in Hz.
+const SLOWEST_CONTROL_HZ: f64 = 1_000.0;
 /// The longest dead time that the ZS9's drive reckons with, in ns.
 const ZS9_DEAD_TIME_NS: f64 = 5_000.0;
 
@@ -32,6 +34,7 @@ pub struct Machine<'a> {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Keys {
+    control_hz: Option<u32>,
     dead_time_ns: u32,
     min_pulse_ns: Option<u32>,
     current_range_a: f64,
@@ -71,20 +74,24 @@ struct Stage<'a> {
 /// The first key that does not suit the board or the machine.
 pub fn traction(file: &Path, text: &str, machine: &Machine) -> Result<String, InputError> {
     let stage = Stage::parse(file, text)?;
-    let Keys { dead_time_ns, min_pulse_ns, z_source, .. } = &stage.keys;
+    let Keys { control_hz, dead_time_ns, min_pulse_ns, z_source, .. } = &stage.keys;
     if z_source.is_some() {
         return Err(stage.refuse("z_source", "is the ZS9's".to_owned()));
     }
     let Some(min_pulse_ns) = *min_pulse_ns else {
         return Err(stage.refuse("min_pulse_ns", "is missing".to_owned()));
     };
+    let Some(control_hz) = *control_hz else {
+        return Err(stage.refuse("control_hz", "is missing".to_owned()));
+    };
     let ratings = &machine.tables.ratings;
+    stage.check_control_hz(control_hz, ratings.max_switching_hz)?;
     stage.check_times(stage.longest_dead_time_ns())?;
-    let settings = rates::settings(min_pulse_ns, *dead_time_ns, ratings.max_switching_hz);
+    let settings = rates::settings(control_hz, min_pulse_ns, *dead_time_ns, ratings.max_switching_hz);
     // The longest carrier half of a machine that switches slowly.
     let longest_ticks = settings.devices.shortest_half_ticks.saturating_mul(rates::CARRIER_RANGE);
     if longest_ticks > rates::LONGEST_HALF_TICKS {
-        let least_hz = f64::from(rates::CLOCK.ticks_per_s) * f64::from(rates::CARRIER_RANGE)
+        let least_hz = f64::from(settings.clock.ticks_per_s) * f64::from(rates::CARRIER_RANGE)
             / f64::from(2 * (rates::LONGEST_HALF_TICKS - rates::CARRIER_RANGE));
         return Err(machine.refuse(format!(
             "max_switching_hz: {}: must be at least {}: the timers' 16 bits hold no longer carrier half",
@@ -92,7 +99,8 @@ pub fn traction(file: &Path, text: &str, machine: &Machine) -> Result<String, In
             shown(least_hz.ceil()),
         )));
     }
-    let half_ns = 1e9 * f64::from(settings.devices.shortest_half_ticks) / f64::from(rates::CLOCK.ticks_per_s);
+    let half_ns =
+        1e9 * f64::from(settings.devices.shortest_half_ticks) / f64::from(settings.clock.ticks_per_s);
     stage.check(&[
         Bound(
             "dead_time_ns",
@@ -111,7 +119,7 @@ pub fn traction(file: &Path, text: &str, machine: &Machine) -> Result<String, In
     ])?;
     stage.check_sensors(machine, f64::from(ratings.trip_dc_over_v), "the machine's trip_dc_over_v", 1)?;
     settings.check(machine.tables).map_err(|refused| stage.refuse_start(machine, &refused))?;
-    Ok(stage.constant(min_pulse_ns))
+    Ok(stage.constant(control_hz, min_pulse_ns))
 }
 
 /// Checks the ZS9's power stage; gives its constant as Rust.
@@ -120,7 +128,11 @@ pub fn traction(file: &Path, text: &str, machine: &Machine) -> Result<String, In
 /// The first key that does not suit the board or the machine.
 pub fn zs9(file: &Path, text: &str, machine: &Machine) -> Result<String, InputError> {
     let stage = Stage::parse(file, text)?;
-    let Keys { min_pulse_ns, z_source, encoder_zeros_deg, .. } = &stage.keys;
+    let Keys { control_hz, min_pulse_ns, z_source, encoder_zeros_deg, .. } = &stage.keys;
+    if control_hz.is_some() {
+        let problem = format!("the control of two motors has time for {} Hz alone", zs9_rates::CONTROL_HZ);
+        return Err(stage.refuse("control_hz", problem));
+    }
     if min_pulse_ns.is_some() {
         return Err(stage.refuse("min_pulse_ns", "the modulator of the nine switches has none".to_owned()));
     }
@@ -147,7 +159,7 @@ pub fn zs9(file: &Path, text: &str, machine: &Machine) -> Result<String, InputEr
          inductor_a_per_code: {inductor_range_a:?} / {HALF_CODES:?},\n    \
          source_v_per_code: {source_range_v:?} / {CODES:?},\n    link_ref_v: {link_ref_v:?},\n}}",
         // The modulator of the nine switches has no shortest pulse.
-        stage.constant(0),
+        stage.constant(zs9_rates::CONTROL_HZ, 0),
         zeros.join(", "),
     ))
 }
@@ -184,6 +196,26 @@ impl<'a> Stage<'a> {
         let Some(Bound(key, value, least, most, why)) = outside else { return Ok(()) };
         let (least, most) = (shown(*least), shown(*most));
         Err(self.refuse(key, format!("{value}: must be from {least} to {most}: {why}")))
+    }
+
+    /// A carrier lasts a control period at least, and both interrupts leave the processor some time.
+    fn check_control_hz(&self, control_hz: u32, max_switching_hz: f32) -> Result<(), InputError> {
+        let switching_hz = f64::from(max_switching_hz);
+        let core_hz = f64::from(rates::CORE_HZ);
+        let left_hz = rates::LOAD * core_hz - 2.0 * switching_hz * f64::from(rates::PWM_CYCLES);
+        self.check(&[Bound(
+            "control_hz",
+            f64::from(control_hz),
+            switching_hz.max(SLOWEST_CONTROL_HZ),
+            (left_hz / f64::from(rates::CONTROL_CYCLES)).floor(),
+            "the machine's max_switching_hz at least, and what the processor has time for at most",
+        )])?;
+        match rates::CORE_HZ.is_multiple_of(control_hz) {
+            true => Ok(()),
+            false => {
+                Err(self.refuse("control_hz", format!("{control_hz}: must be a whole part of {core_hz} Hz")))
+            }
+        }
     }
 
     /// The longest dead time that the generator makes, in ns.
@@ -282,13 +314,13 @@ impl<'a> Stage<'a> {
     }
 
     /// The constant's value as Rust.
-    fn constant(&self, min_pulse_ns: u32) -> String {
+    fn constant(&self, control_hz: u32, min_pulse_ns: u32) -> String {
         let Keys { dead_time_ns, current_range_a, zero_code, zero_tolerance, dc_link_range_v, .. } =
             self.keys;
         let Keys { break_current_a, encoder_counts, precharge_s, discharge_s, .. } = self.keys;
         let zero = angle(self.keys.encoder_zeros_deg.first().copied().unwrap_or_default());
         format!(
-            "PowerStage {{\n    dead_time_ns: {dead_time_ns},\n    min_pulse_ns: {min_pulse_ns},\n    \
+            "PowerStage {{\n    control_hz: {control_hz},\n    dead_time_ns: {dead_time_ns},\n    min_pulse_ns: {min_pulse_ns},\n    \
              current_a_per_code: {current_range_a:?} / {HALF_CODES:?},\n    zero_code: {zero_code},\n    \
              zero_tolerance: {zero_tolerance},\n    udc_v_per_code: {dc_link_range_v:?} / {CODES:?},\n    \
              break_current_a: {break_current_a:?},\n    encoder_counts: {encoder_counts},\n    encoder_zero: {zero},\n    \

@@ -3,8 +3,8 @@
 
 use super::can::Can;
 use super::log::Log;
-use super::operator::Operator;
 use super::pins::{self, Pin};
+use super::position::PositionState;
 use super::power_stage::{CORE_HZ, POWER_STAGE};
 use super::registers::Registers;
 use super::serve::Serve;
@@ -16,16 +16,20 @@ use cortex_m::peripheral::NVIC;
 use defmt_rtt as _;
 pub use stm32_metapac::Interrupt;
 use stm32_metapac::rcc::vals::Sw;
-use tractive::operator::{self, Configuration, Line, Mailboxes, Slot, slot_s};
+use tractive::drive::traction::Shared;
+use tractive::operator::{self, Configuration, Line, Slot, slot_s};
 use tractive::protection::Violation;
 use tractive::protocol::{CanEndpoint, Message, TO_DRIVE};
 use tractive::recorder::Recorder;
 
-/// The drive's operator.
-pub static OPERATOR: Operator = Operator::new(Mailboxes::new());
-
 /// The drive's flight recorder.
 pub static RECORDER: Recorder = Recorder::new();
+
+/// The cells of the drive's two interrupts and of its operator.
+pub static SHARED: Shared = Shared::recorded_by(&RECORDER);
+
+/// The position sensors' state.
+pub static POSITION: PositionState = PositionState::new();
 
 /// The signs of life that the interrupts give the watchdog.
 pub static PULSE: Pulse = Pulse::new();
@@ -152,18 +156,18 @@ pub fn idle(refused: Option<Violation>) -> ! {
     let line = Line::rated(&BUILT_IN.ratings, POWER_STAGE.line.precharge_s, POWER_STAGE.line.discharge_s);
     let rated = operator::Settings::rated(&BUILT_IN.ratings, slot_s(&CLOCK), Some(line));
     let station = CanEndpoint::new(&BUILT_IN.ratings);
-    let mut serve = Serve::new(Registers::CHIP, Can::CHIP, station, &OPERATOR, Configuration::Good);
+    let mut serve = Serve::new(Registers::CHIP, Can::CHIP, station, &POSITION, Configuration::Good);
     let (mut slot, mut log) = (Slot::new(), Log::new());
     while let Some(why) = refused {
         pause_a_slot();
         serve.refuse(&mut slot, why, &rated);
     }
     loop {
-        serve.pass(&mut slot, &rated);
+        serve.pass(&mut slot, &SHARED.operator, &rated);
         if PULSE.feed_if_both_ran(&Registers::CHIP) {
             log.record(&RECORDER);
         }
-        log.trip(OPERATOR.desk.observed().and_then(|observed| observed.trip));
+        log.trip(SHARED.operator.observed().and_then(|observed| observed.trip));
     }
 }
 

@@ -3,7 +3,7 @@
 //! * PWM timer: TIM1 with TIM8 in step, one period a carrier half; [`legs`] says how a half is played and which registers
 //!   are shadowed, [`half`] how it becomes compare values, [`dead_time`] how the dead time is coded.
 //! * Control timer: TIM3, started by TIM1's first update, so that both count from one instant.
-//! * Both timers' clocks are 170 MHz divided by [`PRESCALER`]: 16 bits then hold the longest half.
+//! * Both timers' clocks are 170 MHz divided by [`PRESCALER`]: 16 bits then hold the longest half. The control rate is the power stage's.
 //! * Converters: ADC1 at the control timer's update, ADC2 at the PWM timer's ([`sampling`]). Position: an encoder on
 //!   TIM4, or whatever implements [`Position`].
 //! * Break inputs and comparators turn the gates off without clock and software ([`comparators`]); the watchdog
@@ -25,7 +25,6 @@ pub mod dead_time;
 pub mod half;
 pub mod hardware;
 pub mod legs;
-pub mod operator;
 pub mod outputs;
 pub mod pins;
 mod ports;
@@ -51,4 +50,4 @@ mod log;
 pub use chip::*;
 pub use ports::{Control, Pwm};
 pub use position::Position;
-pub use rates::{CLOCK, PRESCALER};
+pub use power_stage::{CLOCK, PRESCALER};

@@ -18,13 +18,12 @@ mod firmware {
     use nucleo_g474re::sampling::Zeros;
     use nucleo_g474re::start::Plan;
     use nucleo_g474re::{
-        self as board, CLOCK, Control, Interrupt as interrupt, OPERATOR, PULSE, Pwm, RECORDER,
+        self as board, CLOCK, Control, Interrupt as interrupt, POSITION, PULSE, Pwm, SHARED,
     };
-    use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
+    use tractive::drive::traction::{ControlTask, PwmTask, Settings};
     use tractive::protection::Violation;
     use tractive::time::Instant;
 
-    static SHARED: Shared = Shared::recorded_by(&RECORDER);
     /// The zeros that the start measured, written before the interrupts are unmasked.
     static CONTROL_ZEROS: [AtomicU32; 3] = [const { AtomicU32::new(0) }; 3];
     static PWM_ZEROS: [AtomicU32; 3] = [const { AtomicU32::new(0) }; 3];
@@ -69,7 +68,7 @@ mod firmware {
         let board = BOARD.get_or_insert_with(|| {
             let registers = Registers::CHIP;
             let encoder = Encoder::new(registers.tim4, &POWER_STAGE, BUILT_IN.ratings.pole_pairs as u32);
-            Control::new(registers, kept(&CONTROL_ZEROS), encoder, &OPERATOR)
+            Control::new(registers, kept(&CONTROL_ZEROS), encoder, &POSITION)
         });
         let first = Instant(CLOCK.control_ticks);
         let task = TASK.get_or_insert_with(|| ControlTask::new(BuiltIn, settings(), first));

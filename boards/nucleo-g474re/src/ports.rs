@@ -4,17 +4,14 @@ use super::control_timer::ControlTimer;
 use super::half::HalfRegisters;
 use super::hardware;
 use super::legs::SoftwareBreak;
-use super::operator::Operator;
 use super::pins;
-use super::position::{Position, reported};
+use super::position::{Position, PositionState, reported};
 use super::registers::Registers;
 use super::sampling::{Sampler, Zeros, currents_a};
 use super::start::{control_sampler, pwm_sampler};
-use tractive::control::{Demand, LinkWindow};
 use tractive::frames::Abc;
 use tractive::modulation::{CarrierHalf, Mode};
-use tractive::ports::Report;
-use tractive::ports::{ControlPort, PwmPort, Sample};
+use tractive::ports::{ControlPort, PwmPort, Report, Sample};
 use tractive::protection::SafeState;
 use tractive::time::Instant;
 
@@ -25,19 +22,19 @@ pub struct Control<'a, P> {
     sampler: Sampler,
     zeros: Zeros,
     position: P,
-    operator: &'a Operator,
+    state: &'a PositionState,
 }
 
 impl<'a, P: Position> Control<'a, P> {
-    /// With the zeros that the start measured.
-    pub const fn new(registers: Registers, zeros: Zeros, position: P, operator: &'a Operator) -> Self {
+    /// With the zeros that the start measured, and where the position sensor's word of itself is kept.
+    pub const fn new(registers: Registers, zeros: Zeros, position: P, state: &'a PositionState) -> Self {
         Self {
             registers,
             timer: ControlTimer(registers.tim3),
             sampler: control_sampler(&registers),
             zeros,
             position,
-            operator,
+            state,
         }
     }
 }
@@ -51,11 +48,11 @@ impl<P: Position> ControlPort for Control<'_, P> {
     }
 
     /// Position first: it has been captured, and the conversions are still under way.
-    fn sample(&mut self, now: Instant) -> Sample {
+    fn sample(&mut self, _now: Instant) -> Sample {
         let angle = self.position.angle();
         let lost = self.position.is_lost();
         let angle = reported(angle, lost);
-        self.operator.position.tell(&[angle], &[lost]);
+        self.state.tell(&[angle], &[lost]);
         let codes = self.sampler.read();
         let udc_v = match codes {
             Some([_, _, _, udc]) => udc.udc_v(),
@@ -63,18 +60,13 @@ impl<P: Position> ControlPort for Control<'_, P> {
         };
         let hardware = hardware::latched_by(&self.registers);
         let healthy = hardware.is_none() && !self.registers.legs.is_tripped();
-        let mut sample = Sample {
+        Sample {
             currents_a: currents_a(codes, &self.zeros),
             udc_v,
             angle,
-            demand: Demand::default(),
-            enable: healthy && pins::is_enabled(&self.registers),
-            window: LinkWindow::OPEN,
-            acknowledge: 0,
+            may_pulse: healthy && pins::is_enabled(&self.registers),
             hardware,
-        };
-        self.operator.desk.permit(now).apply(&mut sample);
-        sample
+        }
     }
 
     fn enter(&mut self, safe: SafeState, _now: Instant) {
@@ -85,9 +77,7 @@ impl<P: Position> ControlPort for Control<'_, P> {
         self.timer.overrun_ticks()
     }
 
-    fn report(&mut self, now: Instant, report: &Report) {
-        self.operator.desk.tell(now, report);
-    }
+    fn report(&mut self, _now: Instant, _report: &Report) {}
 }
 
 /// The PWM interrupt's side.

@@ -8,10 +8,13 @@ use tractive::drive::traction::Settings;
 use tractive::frames::Angle;
 use tractive::machine::Ratings;
 use tractive::operator::LineTimes;
+use tractive::time::Clock;
 
 /// The power stage and its sensors.
 #[derive(Clone, Copy, Debug)]
 pub struct PowerStage {
+    /// Control interrupts per second, in Hz.
+    pub control_hz: u32,
     /// Least time between one device of a leg going off and the other going on, in ns.
     pub dead_time_ns: u32,
     /// Shortest pulse or pause of a device, dead time included, in ns.
@@ -38,10 +41,16 @@ pub struct PowerStage {
 /// The PMaSynRM's, `power_stage.toml`, which the build script has checked against the machine.
 pub const POWER_STAGE: PowerStage = include!(concat!(env!("OUT_DIR"), "/power_stage.rs"));
 
+/// The PMaSynRM's clock, of both timers.
+pub const CLOCK: Clock = rates::clock(POWER_STAGE.control_hz);
+
+/// Cycles of the undivided clock in one of its ticks.
+pub const PRESCALER: u16 = rates::prescaler(POWER_STAGE.control_hz);
+
 impl PowerStage {
     /// The PMaSynRM's settings with this stage and this machine.
     pub const fn settings(&self, ratings: &Ratings) -> Settings {
-        rates::settings(self.min_pulse_ns, self.dead_time_ns, ratings.max_switching_hz)
+        rates::settings(self.control_hz, self.min_pulse_ns, self.dead_time_ns, ratings.max_switching_hz)
     }
 
     /// The dead time for the generator, never shorter than asked for; `None` if it cannot make one.

@@ -8,18 +8,32 @@ use tractive::time::Clock;
 /// The timers' undivided clock, in Hz.
 pub const CORE_HZ: u32 = 170_000_000;
 
-/// Cycles of the undivided clock in a tick of both timers.
-pub const PRESCALER: u16 = 8;
+/// Cycles of the undivided clock in a tick of both timers at most: 16 bits then hold the halves of slow carriers.
+const COARSEST: u16 = 8;
 
-/// Control interrupts per second, in Hz.
-const CONTROL_HZ: u32 = 10_000;
+/// Cycles that the control interrupt takes at most, by the upper bound of `docs/cost.md`.
+pub const CONTROL_CYCLES: u32 = 4_100;
 
-/// 21.25 MHz ticks; control at 10 kHz.
-pub const CLOCK: Clock = {
-    let ticks_per_s = CORE_HZ / PRESCALER as u32;
-    assert!(ticks_per_s * PRESCALER as u32 == CORE_HZ && ticks_per_s.is_multiple_of(CONTROL_HZ));
-    Clock::new(ticks_per_s, ticks_per_s / CONTROL_HZ)
-};
+/// Cycles that the PWM interrupt takes at most, by the same bound.
+pub const PWM_CYCLES: u32 = 1_720;
+
+/// Share of the processor that both interrupts may take if each were as long as its longest. The rest is the operator's.
+pub const LOAD: f64 = 0.9;
+
+/// Cycles of the undivided clock in a tick of both timers at a control rate, in Hz: as many as divide a control period, up to 8.
+pub const fn prescaler(control_hz: u32) -> u16 {
+    let mut prescaler = COARSEST;
+    while !(CORE_HZ / control_hz).is_multiple_of(prescaler as u32) {
+        prescaler -= 1;
+    }
+    prescaler
+}
+
+/// The timers' clock at a control rate, in Hz, of which [`CORE_HZ`] is a multiple. 21.25 MHz at 10 kHz, 34 MHz at 20 kHz.
+pub const fn clock(control_hz: u32) -> Clock {
+    let ticks_per_s = CORE_HZ / prescaler(control_hz) as u32;
+    Clock::new(ticks_per_s, ticks_per_s / control_hz)
+}
 
 /// The longest half, in ticks: a compare of 65,535 must lie beyond the counter's last value.
 pub const LONGEST_HALF_TICKS: u32 = 65_535;
@@ -37,13 +51,19 @@ pub const fn cycles_to_ticks(cycles: u32, prescaler: u16) -> u32 {
     cycles.div_ceil(prescaler as u32)
 }
 
-/// The PMaSynRM's settings for these times of the power stage and this highest switching frequency of its devices.
-pub const fn settings(min_pulse_ns: u32, dead_time_ns: u32, max_switching_hz: f32) -> Settings {
-    let min_pulse_ticks = cycles_to_ticks(ns_to_cycles(min_pulse_ns), PRESCALER);
-    let dead_time_ticks = cycles_to_ticks(ns_to_cycles(dead_time_ns), PRESCALER);
+/// The PMaSynRM's settings for this control rate, these times of the power stage and this highest switching frequency of its devices.
+pub const fn settings(
+    control_hz: u32,
+    min_pulse_ns: u32,
+    dead_time_ns: u32,
+    max_switching_hz: f32,
+) -> Settings {
+    let (clock, prescaler) = (clock(control_hz), prescaler(control_hz));
+    let min_pulse_ticks = cycles_to_ticks(ns_to_cycles(min_pulse_ns), prescaler);
+    let dead_time_ticks = cycles_to_ticks(ns_to_cycles(dead_time_ns), prescaler);
     Settings {
-        clock: CLOCK,
-        devices: SwitchLimits::new(min_pulse_ticks, dead_time_ticks, max_switching_hz, &CLOCK),
+        clock,
+        devices: SwitchLimits::new(min_pulse_ticks, dead_time_ticks, max_switching_hz, &clock),
         gains: Gains::DEFAULT,
     }
 }

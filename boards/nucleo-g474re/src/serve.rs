@@ -1,13 +1,14 @@
 //! The idle loop's operator: asked over CAN, answered by what the board says of itself.
 
 use super::can::Can;
-use super::operator::Operator;
+use super::position::PositionState;
 use super::registers::Registers;
 use super::switchgear::Wires;
 use super::{CLOCK, hardware, pins, switchgear};
+use tractive::drive::{Observation, OperatorMailboxes};
 use tractive::frames::Abc;
 use tractive::operator::{
-    Configuration, Feedback, Mailboxes, OperatorPort, Request, Settings, Slot, Status, TorqueDemand,
+    Configuration, Feedback, OperatorPort, Request, Settings, Slot, Status, TorqueDemand,
 };
 use tractive::protection::Violation;
 use tractive::protocol::{CanEndpoint, Frame};
@@ -16,31 +17,31 @@ use tractive::time::Instant;
 /// Frames kept for a slot: more than the bus can carry in its millisecond, which is 4.5.
 const INBOX: usize = 8;
 
-/// The operator's side of the board, over a protocol's station and what the drive says of itself.
-pub struct Serve<'a, S = CanEndpoint, D = Mailboxes> {
+/// The operator's side of the board, over a protocol's station.
+pub struct Serve<'a, S = CanEndpoint> {
     pub(crate) registers: Registers,
     /// The bus.
     pub can: Can,
     /// The protocol.
     pub station: S,
-    pub(crate) operator: &'a Operator<D>,
+    position: &'a PositionState,
     configuration: Configuration,
     /// Frames that have come since the last slot, and how many.
     inbox: [Frame; INBOX],
     waiting: usize,
 }
 
-impl<'a, S, D> Serve<'a, S, D> {
+impl<'a, S> Serve<'a, S> {
     /// At power-up; the configuration has been checked, or not.
     pub fn new(
         registers: Registers,
         can: Can,
         station: S,
-        operator: &'a Operator<D>,
+        position: &'a PositionState,
         configuration: Configuration,
     ) -> Self {
         let (inbox, waiting) = ([Frame::default(); INBOX], 0);
-        Self { registers, can, station, operator, configuration, inbox, waiting }
+        Self { registers, can, station, position, configuration, inbox, waiting }
     }
 
     /// The feedback that every board gives.
@@ -50,9 +51,9 @@ impl<'a, S, D> Serve<'a, S, D> {
             precharge_closed,
             main_closed,
             driver_ready: pins::drivers_ready(&self.registers),
-            position_known: self.operator.position.is_known(),
+            position_known: self.position.is_known(),
             // An incremental encoder cannot tell at standstill; while it turns, it looks at its index, and the drive at its angle.
-            sensor_alive: !self.operator.position.is_lost(),
+            sensor_alive: !self.position.is_lost(),
             // The start has refused sensors whose zero is too far off, and taken the rest away.
             offsets_a: Abc::default(),
             configuration: self.configuration,
@@ -67,7 +68,7 @@ impl<'a, S, D> Serve<'a, S, D> {
     }
 
     /// The frames that have come since the last slot.
-    pub(crate) fn hear(&mut self) -> impl Iterator<Item = Frame> + use<S, D> {
+    pub(crate) fn hear(&mut self) -> impl Iterator<Item = Frame> + use<S> {
         self.can.tend();
         self.inbox.into_iter().take(core::mem::take(&mut self.waiting))
     }
@@ -90,10 +91,10 @@ impl Serve<'_> {
     }
 
     /// A pass of the idle loop: takes what has come, and does the newest slot if it is not done yet. Says whether it did one.
-    pub fn pass(&mut self, slot: &mut Slot, rated: &Settings) -> bool {
+    pub fn pass(&mut self, slot: &mut Slot, mailboxes: &OperatorMailboxes, rated: &Settings) -> bool {
         self.collect();
-        let (desk, settings) = (&self.operator.desk, self.station.settings(rated));
-        slot.run(desk, self, &settings, &CLOCK)
+        let settings = self.station.settings(rated);
+        slot.run(mailboxes, self, &settings, &CLOCK)
     }
 
     /// The same where the start was refused, and `why`; once in a slot's time.
@@ -107,12 +108,12 @@ impl Serve<'_> {
 impl OperatorPort<TorqueDemand> for Serve<'_> {
     fn ask(&mut self, _at: Instant, slots: u32) -> (Request, Feedback) {
         let frames = self.hear();
-        (self.station.listen(self.operator.desk.observed(), slots, frames), self.feedback())
+        (self.station.listen(slots, frames), self.feedback())
     }
 
-    fn tell(&mut self, _from: Instant, status: &Status) {
+    fn tell(&mut self, _from: Instant, status: &Status, observed: Option<&Observation>) {
         switchgear::set(&self.registers, &status.switches);
-        let frame = self.station.tell(status);
+        let frame = self.station.tell(status, observed);
         self.say(frame);
     }
 }

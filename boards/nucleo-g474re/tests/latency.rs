@@ -4,12 +4,11 @@ use nucleo_g474re::built_in::traction::BUILT_IN;
 use nucleo_g474re::power_stage::{CORE_HZ, POWER_STAGE, cycles_to_ticks, ns_to_cycles};
 use nucleo_g474re::{PRESCALER, sampling};
 use std::path::Path;
-use tractive::control::{Demand, Gains, LinkWindow};
+use tractive::control::Gains;
 use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
 use tractive::frames::{Abc, Angle};
 use tractive::modulation::{CarrierHalf, Mode, SwitchLimits};
-use tractive::ports::Report;
-use tractive::ports::{ControlPort, PwmPort, Sample};
+use tractive::ports::{ControlPort, DriveCommand, PwmPort, Report, Sample};
 use tractive::protection::SafeState;
 use tractive::time::{Clock, Instant};
 
@@ -33,12 +32,13 @@ impl ControlPort for Bench {
             currents_a: Abc::default(),
             udc_v: 1_500.0,
             angle: Some(angle),
-            demand: Demand::default(),
-            enable: now.reached(self.enabled_at),
-            window: LinkWindow::OPEN,
-            acknowledge: 0,
+            may_pulse: true,
             hardware: None,
         }
+    }
+
+    fn command(&mut self, now: Instant, _operator: impl FnOnce() -> DriveCommand) -> DriveCommand {
+        DriveCommand { enable: now.reached(self.enabled_at), ..DriveCommand::NONE }
     }
 
     fn enter(&mut self, _safe: SafeState, _now: Instant) {}

@@ -144,6 +144,53 @@ fn another_machine_is_built_once_the_comparators_suit_it() {
     assert!(constant.contains("break_current_a: 120.0"), "{constant}");
 }
 
+/// The same machine from 48 V, whose devices switch at 20 kHz.
+#[test]
+fn the_control_rate_suits_the_carrier_the_timers_and_the_processor() {
+    let said = TRACTION.refused("control_hz", "800");
+    assert!(
+        said.starts_with("control_hz: 800: must be from 1000 to 36561: the machine's max_switching_hz"),
+        "{said}"
+    );
+    assert!(
+        TRACTION.refused("control_hz", "40000").starts_with("control_hz: 40000: must be from 1000 to 36561")
+    );
+    let said = TRACTION.refused("control_hz", "12000");
+    assert_eq!(said, "control_hz: 12000: must be a whole part of 170000000 Hz");
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/own-board/machine");
+    let mut quick = tractive_tablegen::MachineFolder::read(&folder).unwrap().tables();
+    quick.ratings.max_switching_hz = 20_000.0;
+    let text =
+        TRACTION.with("break_current_a", "120.0").replace("min_pulse_ns = 15000", "min_pulse_ns = 8000");
+    let said = TRACTION.check(&text, &quick).unwrap_err();
+    assert!(said.contains("control_hz: 10000: must be from 20000 to 20536"), "{said}");
+    let constant = TRACTION.check(&text.replace("control_hz = 10000", "control_hz = 20000"), &quick).unwrap();
+    assert!(constant.contains("control_hz: 20000,"), "{constant}");
+    for (control_hz, prescaler, ticks_per_s) in [(10_000, 8, 21_250_000), (20_000, 5, 34_000_000)] {
+        let clock = rates::clock(control_hz);
+        assert_eq!(rates::prescaler(control_hz), prescaler);
+        assert_eq!((clock.ticks_per_s as u32, clock.control_ticks), (ticks_per_s, ticks_per_s / control_hz));
+    }
+    let said = ZS9.check(&format!("control_hz = 20000\n{}", ZS9.text), ZS9.tables).unwrap_err();
+    assert!(said.starts_with("power_stage_zs9.toml:1: control_hz: the control of two motors"), "{said}");
+}
+
+/// The cycles that the control rate is checked with are no fewer than those that were counted.
+#[test]
+fn the_processors_time_is_what_the_page_of_costs_says() {
+    let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/cost.md");
+    let text = std::fs::read_to_string(page).unwrap();
+    let section = text.split("## Interrupts of `pmasynrm`").nth(1).unwrap().split("\n## ").next().unwrap();
+    for (interrupt, cycles) in [("control", rates::CONTROL_CYCLES), ("pwm", rates::PWM_CYCLES)] {
+        let rows = section.lines().filter(|line| line.starts_with(&format!("| {interrupt} |")));
+        let counted = rows.filter_map(|row| row.split('|').nth(6)?.trim().parse::<u32>().ok()).max().unwrap();
+        assert!(
+            (counted..counted + 200).contains(&cycles),
+            "{interrupt}: {counted} cycles, reckoned with {cycles}"
+        );
+    }
+}
+
 #[test]
 fn a_large_machine_needs_large_sensors_and_comparators() {
     let said = TRACTION.refused_machine(|ratings| ratings.trip_current_a = 600.0);

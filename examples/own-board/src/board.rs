@@ -1,10 +1,11 @@
-//! The board: registers on the one side, the library's ports on the other. The addresses are placeholders for your chip's.
+//! The board: registers on the one side, the library's ports on the other: two for the interrupts, one for the idle loop. The addresses are placeholders for your chip's.
 
-use tractive::control::{Demand, LinkWindow};
-use tractive::ports::Report;
+use crate::machine::BUILT_IN;
+use tractive::drive::Observation;
 use tractive::frames::{Abc, Angle};
 use tractive::modulation::CarrierHalf;
-use tractive::ports::{ControlPort, PwmPort, Sample};
+use tractive::operator::{Configuration, Feedback, OperatorPort, Request, Status};
+use tractive::ports::{ControlPort, PwmPort, Report, Sample};
 use tractive::protection::SafeState;
 use tractive::time::{Clock, Instant};
 
@@ -30,6 +31,8 @@ const STATUS: *mut u32 = 0x4001_0010 as *mut u32;
 const GATES: *mut u32 = 0x4001_0044 as *mut u32;
 const PEND: *mut u32 = 0xE000_E200 as *mut u32;
 const CONTROL_STATUS: *mut u32 = 0x4000_0010 as *mut u32;
+/// Levels of the operator's switches: enable, acknowledge.
+const SWITCHES: *const u32 = 0x4002_0010 as *const u32;
 
 fn read(register: *const u32) -> u32 {
     // SAFETY: one of the addresses above, which the chip maps to a register that may be read at any time.
@@ -60,7 +63,7 @@ pub fn start() {
     gates_off();
 }
 
-/// The board as both tasks see it.
+/// The board as both tasks and the operator see it.
 pub struct Board;
 
 impl ControlPort for Board {
@@ -77,10 +80,7 @@ impl ControlPort for Board {
             currents_a: currents_a(0),
             udc_v: read(CONVERTERS.wrapping_add(3)) as f32 * VOLT_PER_CODE,
             angle: Some(Angle(count * (u32::MAX / COUNTS + 1))),
-            demand: Demand { torque_nm: 0.0, slew_limited: true },
-            enable: true,
-            window: LinkWindow::OPEN,
-            acknowledge: 0,
+            may_pulse: true,
             hardware: None,
         }
     }
@@ -117,4 +117,22 @@ impl PwmPort for Board {
     fn enter(&mut self, _safe: SafeState, _now: Instant) {
         gates_off();
     }
+}
+
+impl OperatorPort for Board {
+    fn ask(&mut self, _at: Instant, _slots: u32) -> (Request, Feedback) {
+        let levels = read(SWITCHES);
+        let (enable, acknowledge) = (levels & 1 != 0, levels & 2 != 0);
+        let feedback = Feedback {
+            driver_ready: true,
+            enable_input: true,
+            sensor_alive: true,
+            position_known: true,
+            configuration: Configuration::Good,
+            ..Feedback::default()
+        };
+        (Request { enable, acknowledge, ..Request::idle(&BUILT_IN.ratings) }, feedback)
+    }
+
+    fn tell(&mut self, _from: Instant, _status: &Status, _observed: Option<&Observation>) {}
 }

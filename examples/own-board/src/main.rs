@@ -1,5 +1,5 @@
 //! A firmware with a board of its own: what a user of the library writes. Two interrupts, their vector table, a board that implements
-//! the two ports, and the tables of the machine in `machine/`.
+//! the ports, and the tables of the machine in `machine/`.
 //!
 //! The registers in [`board`] are an example's: pulses go to three compare registers, samples come from the converters' data
 //! registers. Put your chip's in their place; everything else stays.
@@ -20,6 +20,7 @@ use machine::{BUILT_IN, BuiltIn};
 use tractive::control::Gains;
 use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
 use tractive::modulation::SwitchLimits;
+use tractive::operator::{self, Slot, slot_s};
 use tractive::time::Instant;
 
 /// Both tasks' settings: the clock, the switches' limits, the current loop's gains.
@@ -51,8 +52,10 @@ static PWM: Own<PwmTask<BuiltIn>> = Own(UnsafeCell::new(PwmTask::new(
 #[cortex_m_rt::entry]
 fn main() -> ! {
     board::start();
+    let operator = operator::Settings::rated(&BUILT_IN.ratings, slot_s(&CLOCK), None);
+    let mut slot = Slot::new();
     loop {
-        core::hint::spin_loop();
+        slot.run(&SHARED.operator, &mut Board, &operator, &CLOCK);
     }
 }
 

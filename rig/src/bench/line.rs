@@ -4,7 +4,8 @@ use super::{Switchgear, Tick};
 use crate::plant::{DcLink, DcLinkSettings, LinkEnergies, LinkSwitches};
 use crate::steps::held;
 use crate::trace::{LinkBalance, SlotRow};
-use tractive::operator::{Feedback, Request, SLOT_PERIODS, Status, Switches};
+use tractive::drive::SLOT_PERIODS;
+use tractive::operator::{Feedback, Request, Status, Switches};
 use tractive::protection::Fault;
 use tractive::time::Clock;
 

@@ -44,7 +44,7 @@ use dc_side::DcSide;
 use rows::Rows;
 use tractive::modulation::CarrierHalf;
 use tractive::operator::{Feedback, Request, Status};
-use tractive::ports::{Report, Sample};
+use tractive::ports::{DriveCommand, Report, Sample};
 use tractive::protection::SafeState;
 use tractive::time::{Clock, Instant};
 
@@ -69,7 +69,7 @@ pub struct Bench {
     /// Orders to enter a safe state, or to leave it (`None`), and when they reach the gates.
     orders: Due<Option<SafeState>>,
     slots: Vec<SlotRow>,
-    control: Conversions<Sample, Report>,
+    control: Conversions<(Sample, DriveCommand), Report>,
     loads: Due<f64>,
     /// The rows that are judged, and the others that are written.
     rows: Rows,

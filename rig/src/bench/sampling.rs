@@ -2,9 +2,8 @@
 
 use super::{Bench, BenchError};
 use crate::inject::traction::Kind;
-use tractive::control::LinkWindow;
 use tractive::frames::Abc;
-use tractive::ports::{Report, Sample};
+use tractive::ports::{DriveCommand, Report, Sample};
 use tractive::protection::LegFaults;
 use tractive::time::Instant;
 
@@ -13,8 +12,8 @@ use tractive::time::Instant;
 const MUCH_A: f32 = 23.3;
 
 impl Bench {
-    /// The conversions that the control timer triggered at `instant`.
-    pub fn control_sample(&mut self, instant: Instant) -> Result<Sample, BenchError> {
+    /// The conversions that the control timer triggered at `instant`, and what the bench commands.
+    pub fn control_sample(&mut self, instant: Instant) -> Result<(Sample, DriveCommand), BenchError> {
         let tick = self.time.widen(instant);
         self.advance(tick)?;
         self.control.ask(tick)
@@ -70,14 +69,12 @@ impl Bench {
             currents_a: self.read_currents(true_a),
             udc_v: self.udc_v(t_s) as f32,
             angle: Some(angle),
-            demand,
-            enable,
-            window: LinkWindow::OPEN,
-            acknowledge: 0,
+            may_pulse: true,
             hardware,
         };
-        self.spoiler.control(t_s, &mut sample);
-        self.control.put(now, sample);
+        let mut command = DriveCommand { enable, demand, ..DriveCommand::NONE };
+        self.spoiler.control(t_s, &mut sample, &mut command);
+        self.control.put(now, (sample, command));
         Ok(())
     }
 }

@@ -2,8 +2,9 @@
 
 use super::Tick;
 use std::collections::VecDeque;
+use tractive::drive::SLOT_PERIODS;
 use tractive::frames::Abc;
-use tractive::operator::{Configuration, Feedback, SLOT_PERIODS, Status};
+use tractive::operator::{Configuration, Feedback, Status};
 use tractive::protection::Fault;
 use tractive::time::Clock;
 

@@ -2,7 +2,7 @@
 
 use super::BenchError;
 use crate::trace::Tick;
-use tractive::operator::SLOT_PERIODS;
+use tractive::drive::SLOT_PERIODS;
 use tractive::time::{Clock, Instant};
 
 /// The times of a run.

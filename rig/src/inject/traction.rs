@@ -3,7 +3,7 @@
 use super::sensor::{AngleFault, AngleSpoiler, CurrentFault, CurrentSpoiler};
 use super::{ControlFault, GoesWrong, Injected, Injection};
 use tractive::frames::Abc;
-use tractive::ports::Sample;
+use tractive::ports::{DriveCommand, Sample};
 
 /// The faults of the PMaSynRM drive.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -86,14 +86,14 @@ impl Spoiler {
         }
     }
 
-    /// Spoils control's sample, the currents apart.
-    pub fn control(&mut self, t_s: f64, sample: &mut Sample) {
+    /// Spoils control's sample, the currents apart, and its command.
+    pub fn control(&mut self, t_s: f64, sample: &mut Sample, command: &mut DriveCommand) {
         let kind = self.injected.kind(t_s);
         if let Some(sensor) = &mut self.angle {
             sample.angle = sample.angle.map(|angle| sensor.read(kind.is_some(), angle));
         }
         if kind == Some(Kind::DemandNotFinite) {
-            sample.demand.torque_nm = f32::NAN;
+            command.demand.torque_nm = f32::NAN;
         }
     }
 }

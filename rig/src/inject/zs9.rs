@@ -4,7 +4,7 @@ use super::sensor::{AngleFault, AngleSpoiler, CurrentFault, CurrentSpoiler};
 use super::{ControlFault, GoesWrong, Injected, Injection};
 use std::str::FromStr;
 use tractive::frames::Abc;
-use tractive::ports::{DualSample, MotorDemand, PowerSample};
+use tractive::ports::{DualDriveCommand, DualSample, MotorDemand, PowerSample};
 use tractive::protection::Fault;
 
 /// The faults of the ZS9.
@@ -162,8 +162,8 @@ impl Spoiler {
         }
     }
 
-    /// Spoils control's sample.
-    pub fn control(&mut self, t_s: f64, sample: &mut DualSample) {
+    /// Spoils control's sample and its command.
+    pub fn control(&mut self, t_s: f64, sample: &mut DualSample, command: &mut DualDriveCommand) {
         let before = self.before.replace(*sample).unwrap_or(*sample);
         self.currents(t_s, &mut sample.currents_a);
         let kind = self.injected.kind(t_s);
@@ -190,8 +190,8 @@ impl Spoiler {
                 }
             }
             Some(Kind::NotFinite) => sample.currents_a[1].b = f32::NAN,
-            Some(Kind::DemandNotFinite) => sample.demands[1] = MotorDemand::Speed(f32::NAN),
-            Some(Kind::LinkOutOfRange) => sample.link_ref_v *= 2.0,
+            Some(Kind::DemandNotFinite) => command.demands[1] = MotorDemand::Speed(f32::NAN),
+            Some(Kind::LinkOutOfRange) => command.link_ref_v *= 2.0,
             _ => {}
         }
     }

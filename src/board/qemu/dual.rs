@@ -7,19 +7,18 @@ use super::{
     CLOCK, CONTROL_TIMER, Control, OPERATED, PWM_TIMER, Pwm, enable_interrupts, exchange, read_register,
     start_timers, stop, watch, write_register,
 };
+use crate::drive::DualObservation;
 use crate::drive::dual::Settings;
-use crate::operator::{DualDemands, DualMailboxes, DualRequest, DualStatus, Feedback, OperatorPort};
-use crate::ports::DualReport;
-use crate::ports::{ControlPort, Dual, DualSample, PlayedPeriod, PowerSample, PwmPort};
+use crate::operator::{DualDemands, DualRequest, DualStatus, Feedback, OperatorPort};
+use crate::ports::{
+    ControlPort, Dual, DualDriveCommand, DualReport, DualSample, PlayedPeriod, PowerSample, PwmPort,
+};
 use crate::protection::SafeState;
 use crate::protocol::Zs9CanEndpoint;
 use crate::recorder::DualRecorder;
 use crate::time::Instant;
 use crate::wire::DualSetup;
 use core::sync::atomic::Ordering;
-
-/// Between the ZS9's operator in the idle loop and its control.
-pub static DUAL_DESK: DualMailboxes = DualMailboxes::new();
 
 /// The ZS9's flight recorder. The rig reads it when the run is over.
 pub static DUAL_RECORDER: DualRecorder = DualRecorder::new();
@@ -50,10 +49,17 @@ impl ControlPort<Dual> for Control {
     fn sample(&mut self, now: Instant) -> DualSample {
         let mut sample = exchange::sample_dual(now);
         sample.hardware = sample.hardware.or(watch::found());
-        if OPERATED.load(Ordering::Relaxed) {
-            DUAL_DESK.permit(now).apply(&mut sample);
-        }
         sample
+    }
+
+    /// The scheme is the rig's in any case, and the link's voltage until the operator names one.
+    fn command(&mut self, _now: Instant, operator: impl FnOnce() -> DualDriveCommand) -> DualDriveCommand {
+        if !OPERATED.load(Ordering::Relaxed) {
+            return exchange::command_dual();
+        }
+        let mut command = operator();
+        command.scheme = exchange::scheme_dual();
+        if command.link_ref_v > 0.0 { command } else { command.with_link(exchange::link_ref_dual()) }
     }
 
     fn enter(&mut self, _safe: SafeState, now: Instant) {
@@ -69,9 +75,6 @@ impl ControlPort<Dual> for Control {
     }
 
     fn report(&mut self, now: Instant, report: &DualReport) {
-        if OPERATED.load(Ordering::Relaxed) {
-            DUAL_DESK.tell(now, report);
-        }
         exchange::report_dual(now, report);
     }
 }
@@ -111,11 +114,11 @@ pub struct DualIdle {
 impl OperatorPort<DualDemands> for DualIdle {
     fn ask(&mut self, at: Instant, slots: u32) -> (DualRequest, Feedback) {
         let (feedback, frame) = exchange::ask_dual(at);
-        (self.station.listen(DUAL_DESK.observed(), slots, frame.as_ref()), feedback)
+        (self.station.listen(slots, frame.as_ref()), feedback)
     }
 
-    fn tell(&mut self, from: Instant, status: &DualStatus) {
-        let frame = self.station.tell(status);
+    fn tell(&mut self, from: Instant, status: &DualStatus, observed: Option<&DualObservation>) {
+        let frame = self.station.tell(status, observed);
         exchange::tell_dual(from, status, frame);
     }
 }

@@ -4,8 +4,8 @@
 mod dual;
 
 pub use dual::{
-    ask_dual, dead_dual, gates_off, leave_dual, open_dual, play_dual, power_sample, report_dual, sample_dual,
-    tell_dual,
+    ask_dual, command_dual, dead_dual, gates_off, leave_dual, link_ref_dual, open_dual, play_dual,
+    power_sample, report_dual, sample_dual, scheme_dual, tell_dual,
 };
 
 use super::{RECORDER, stop};
@@ -13,8 +13,7 @@ use crate::cell::{Ring, Words};
 use crate::frames::Abc;
 use crate::modulation::CarrierHalf;
 use crate::operator::{self, Feedback, Status};
-use crate::ports::Report;
-use crate::ports::Sample;
+use crate::ports::{DriveCommand, Report, Sample};
 use crate::protection::SafeState;
 use crate::protocol::Frame;
 use crate::time::Instant;
@@ -29,6 +28,9 @@ const CONTROL_ANSWERS: usize = 1;
 /// The answers that the PWM interrupt waits for.
 pub const PWM_ANSWERS: usize = 2;
 const IDLE_ANSWERS: usize = 3;
+
+/// The words of the rig's command beside the newest sample.
+static COMMAND: [AtomicU32; 4] = [const { AtomicU32::new(0) }; 4];
 
 /// Opens the files and fetches the set-up.
 #[inline(never)]
@@ -59,11 +61,25 @@ fn open_files() {
 pub fn control_sample(now: Instant) -> Sample {
     let mut block = Request::ControlSample(now).to_block();
     exchange(&mut block, CONTROL_ANSWERS);
-    let (sample, end) = wire::sample_from_block(&block);
+    let (sample, command, end) = wire::sample_from_block(&block);
+    keep(command);
     if end {
         finish(&RECORDER, |record| Request::Recorded(record).to_block());
     }
     sample
+}
+
+fn keep<const N: usize>(words: [u32; N]) {
+    for (kept, word) in COMMAND.iter().zip(words) {
+        kept.store(word, Ordering::Relaxed);
+    }
+}
+
+/// The rig's command beside the newest sample.
+#[inline(never)]
+pub fn command() -> DriveCommand {
+    let [torque, flags, ..] = COMMAND.each_ref().map(|word| word.load(Ordering::Relaxed));
+    wire::command_from_words([torque, flags])
 }
 
 /// Tells what a flight recorder holds, if a fault has frozen it, and ends the emulation.

@@ -3,17 +3,18 @@
 use super::axis::{self, Axis, AxisInput, AxisOutput};
 use super::{DualApplied, DualCommand, MotorShare, Settings, Shared};
 use crate::control::{Measurements, ZSource, ZSourceError, ZSourceInput};
-use crate::drive::Gates;
 use crate::drive::acknowledge::Acknowledge;
+use crate::drive::{Gates, PeriodInput};
 use crate::frames::{Angle, SQRT_3};
 use crate::machine::{Machine, Tables};
-use crate::ports::DualReport;
-use crate::ports::{ControlPort, Dual, DualSample, HardwareBreak, MotorDemand};
+use crate::ports::{ControlPort, Dual, DualReport, DualSample, HardwareBreak, MotorDemand};
 use crate::protection::{self, Fault, MaskedFaults, SafeState, Trip, Violation};
 use crate::recorder::{DualRecord, DualState};
 use crate::time::Instant;
 use core::f32::consts::{FRAC_PI_4, TAU};
 use core::sync::atomic::Ordering;
+
+type Input<'a> = PeriodInput<'a, Dual>;
 
 /// Corner of the filter on the voltage limit, in Hz: fed by the link as it is, the limit would make it oscillate.
 const LIMIT_FILTER_HZ: f32 = 10.0;
@@ -39,6 +40,8 @@ pub struct ControlTask<M = &'static Tables> {
     disarmed: MaskedFaults,
     trip: Option<Trip>,
     acknowledge: Acknowledge,
+    /// `true` once the operator was asked for a command: who is not asked is not told.
+    operated: bool,
 }
 
 /// The results of a control period.
@@ -69,6 +72,7 @@ impl<M: Machine> ControlTask<M> {
             disarmed: MaskedFaults::NONE,
             trip: None,
             acknowledge: Acknowledge::new(),
+            operated: false,
         }
     }
 
@@ -93,7 +97,6 @@ impl<M: Machine> ControlTask<M> {
     /// when the command must be there; a missed one is a fault.
     pub fn run(&mut self, port: &mut impl ControlPort<Dual>, shared: &Shared) {
         let now = self.now;
-        let deadline_ticks = self.settings.deadline_ticks();
         port.begin(false);
         self.now = now.after(self.settings.clock.control_ticks);
         shared.began.store(now.0, Ordering::Relaxed);
@@ -101,9 +104,19 @@ impl<M: Machine> ControlTask<M> {
         let newest = shared.applied.read();
         let applied = newest.filter(|applied| now.reached(applied.at));
         let sample = port.sample(now);
+        let operator = || {
+            self.operated = true;
+            shared.operator.command(now)
+        };
+        let mut command = port.command(now, operator);
+        if !sample.may_pulse {
+            command.enable = false;
+        }
+        let input = Input { sample: &sample, command: &command };
+        let Input { sample, command } = input;
         // Once the PWM interrupt has: what it told before that cannot come back.
         let released = applied.as_ref().map(|applied| applied.released);
-        if self.acknowledge.step(sample.acknowledge, self.trip.is_some(), released) {
+        if self.acknowledge.step(command.acknowledge, self.trip.is_some(), released) {
             self.trip = None;
             self.axes.iter_mut().for_each(Axis::recover_angle);
         }
@@ -117,20 +130,21 @@ impl<M: Machine> ControlTask<M> {
             self.check(Some((fault, f32::from(seen), 0.0)), port);
         }
         self.check(applied.and_then(|applied| self.overdue(&applied, now)), port);
-        let angles = self.track(&sample, port);
-        let measured = self.measured(&sample, angles);
-        self.check_measurements(&sample, &measured, port);
+        let angles = self.track(input, port);
+        let measured = self.measured(sample, angles);
+        self.check_measurements(input, &measured, port);
         let known = self.axes.iter().all(Axis::speed_is_known);
-        let pulsing = self.trip.is_none() && sample.enable && known;
+        let pulsing = self.trip.is_none() && command.enable && known;
         if pulsing {
             self.check_frozen(&measured, port);
             let next = applied.and_then(|applied| applied.next);
-            self.pulse(&sample, &measured, next, port);
+            self.pulse(input, &measured, next, port);
         } else {
             self.axes.iter_mut().for_each(Axis::idle);
             self.link = ZSource::new();
             self.driven = Driven::NOTHING;
         }
+        let deadline_ticks = self.settings.deadline_ticks();
         let late = port.overrun_ticks(now, deadline_ticks);
         let late_s = self.settings.clock.seconds(late as i32);
         self.check((late > 0).then_some((Fault::ControlDeadline, late_s, 0.0)), port);
@@ -140,21 +154,22 @@ impl<M: Machine> ControlTask<M> {
             at: now,
             valid_from: now.after(deadline_ticks),
             duty: self.driven.duty,
-            scheme: sample.scheme,
+            scheme: command.scheme,
             gates,
             release: self.acknowledge.release(),
         });
-        self.tell(&sample, gates, port, shared);
+        self.tell(input, gates, port, shared);
     }
 
     /// The period as the flight recorder and whoever watches see it. Out of line: nothing of it is on the stack while the control
     /// laws are.
     #[inline(never)]
-    fn tell(&self, sample: &DualSample, gates: Gates, port: &mut impl ControlPort<Dual>, shared: &Shared) {
+    fn tell(&self, input: Input, gates: Gates, port: &mut impl ControlPort<Dual>, shared: &Shared) {
         let now = self.now.before(self.settings.clock.control_ticks);
         if let Some(recorder) = shared.recorder {
-            recorder.record(self.entry(now, sample, gates), self.trip.is_some());
+            recorder.record(self.entry(now, input, gates), self.trip.is_some());
         }
+        let Input { sample, command } = input;
         let ([upper, lower], driven) = (&self.axes, &self.driven);
         let report = DualReport {
             torque_nm: driven.motors.each_ref().map(|motor| motor.torque_nm),
@@ -162,7 +177,7 @@ impl<M: Machine> ControlTask<M> {
             weakening: driven.motors.each_ref().map(|motor| motor.weakening),
             duty: driven.duty,
             inductor_ref_a: driven.inductor_ref_a,
-            scheme: sample.scheme,
+            scheme: command.scheme,
             trip: self.trip,
             omega: [upper.omega(), lower.omega()],
             current_a: sample.currents_a.map(|currents| currents.peak()),
@@ -171,12 +186,16 @@ impl<M: Machine> ControlTask<M> {
             speed_known: upper.speed_is_known() && lower.speed_is_known(),
             acknowledged: self.acknowledge.answered(),
         };
+        if self.operated {
+            shared.operator.tell(now, &report);
+        }
         port.report(now, &report);
     }
 
     /// The period's entry in the flight recorder.
     #[inline(always)]
-    fn entry(&self, at: Instant, sample: &DualSample, gates: Gates) -> DualRecord {
+    fn entry(&self, at: Instant, input: Input, gates: Gates) -> DualRecord {
+        let Input { sample, command } = input;
         DualRecord {
             at,
             currents_a: sample.currents_a,
@@ -187,8 +206,8 @@ impl<M: Machine> ControlTask<M> {
             torque_nm: self.driven.motors.each_ref().map(|motor| motor.torque_nm),
             duty: self.driven.duty,
             state: DualState {
-                scheme: sample.scheme,
-                enabled: sample.enable,
+                scheme: command.scheme,
+                enabled: command.enable,
                 pulsing: gates == Gates::Pulse,
                 fault: self.trip.map(|trip| trip.fault),
             },
@@ -212,10 +231,10 @@ impl<M: Machine> ControlTask<M> {
     }
 
     /// Follows both rotors.
-    fn track(&mut self, sample: &DualSample, port: &mut impl ControlPort<Dual>) -> [Angle; 2] {
+    fn track(&mut self, input: Input, port: &mut impl ControlPort<Dual>) -> [Angle; 2] {
         let mut angles = [Angle::ZERO; 2];
         let mut violation = None;
-        let motors = self.axes.iter_mut().zip(&mut angles).zip(sample.angles).zip(SENSOR_LOST);
+        let motors = self.axes.iter_mut().zip(&mut angles).zip(input.sample.angles).zip(SENSOR_LOST);
         for (((axis, angle), measured), fault) in motors {
             let found = match measured {
                 Some(measured) => {
@@ -224,7 +243,7 @@ impl<M: Machine> ControlTask<M> {
                     let off_rad = axis.track(measured, trusted, &self.settings);
                     off_rad.map(|rad| (fault, rad, axis::INNOVATION_RAD))
                 }
-                None => axis.lose_angle(fault, sample.enable),
+                None => axis.lose_angle(fault, input.command.enable),
             };
             violation = violation.or(found.filter(|(fault, _, _)| !self.disarmed.has(*fault)));
         }
@@ -249,16 +268,17 @@ impl<M: Machine> ControlTask<M> {
 
     fn check_measurements(
         &mut self,
-        sample: &DualSample,
+        input: Input,
         measured: &[Measurements; 2],
         port: &mut impl ControlPort<Dual>,
     ) {
+        let Input { sample, command } = input;
         let limits = &self.settings.limits;
         let armed = |(fault, _, _): &Violation| !self.disarmed.has(*fault);
         let mut violation = limits
             .check_link(sample.source_v, sample.capacitor_v)
-            .or_else(|| limits.check_link_reference(sample.link_ref_v, sample.source_v));
-        for ((axis, measured), demand) in self.axes.iter().zip(measured).zip(&sample.demands) {
+            .or_else(|| limits.check_link_reference(command.link_ref_v, sample.source_v));
+        for ((axis, measured), demand) in self.axes.iter().zip(measured).zip(&command.demands) {
             violation = violation
                 .filter(armed)
                 .or_else(|| axis::check(measured, axis.omega(), self.machine.tables()))
@@ -280,17 +300,18 @@ impl<M: Machine> ControlTask<M> {
     /// Control laws of motors and link, while pulses are made.
     fn pulse(
         &mut self,
-        sample: &DualSample,
+        input: Input,
         measured: &[Measurements; 2],
         applied: Option<[MotorShare; 2]>,
         port: &mut impl ControlPort<Dual>,
     ) {
+        let Input { sample, command } = input;
         let link_v = 2.0 * sample.capacitor_v - sample.source_v;
         let [first, second] = &mut self.axes;
-        let ([m1, m2], [d1, d2]) = (measured, &sample.demands);
+        let ([m1, m2], [d1, d2]) = (measured, &command.demands);
         let (a1, a2) = applied.map_or((None, None), |[a1, a2]| (Some(a1), Some(a2)));
         let (settings, tables) = (&self.settings, self.machine.tables());
-        let [l1, l2] = sample.speed_torque_nm;
+        let [l1, l2] = command.speed_torque_nm;
         // The operating points in turn: the lower motor's in the periods between.
         self.upper_aims = !self.upper_aims;
         let turns = [self.upper_aims, !self.upper_aims];
@@ -310,7 +331,7 @@ impl<M: Machine> ControlTask<M> {
             inductor_a: sample.inductor_a,
             source_v: sample.source_v,
             power_w: motors.iter().map(|motor| motor.power_w).sum(),
-            link_ref_v: sample.link_ref_v,
+            link_ref_v: command.link_ref_v,
             duty_room: 1.0,
         };
         let (duty, inductor_ref_a, refused) =

@@ -22,6 +22,7 @@ mod control;
 mod messages;
 mod pwm;
 
+use super::mailbox::DualOperatorMailboxes;
 use crate::cell::{Mailbox, Seqlock};
 use crate::control::{Gains, SpeedDesign, ZSourceDesign, ZSourceGains};
 use crate::machine::Ratings;
@@ -126,12 +127,14 @@ impl Settings {
     }
 }
 
-/// The cells between the two interrupts, and the flight recorder, if there is one.
+/// The cells between the two interrupts, the operator's mailboxes, and the flight recorder, if there is one.
 pub struct Shared<'a> {
     command: Mailbox<DualCommand, 10>,
     applied: Seqlock<DualApplied, 10>,
     /// Instant of the newest control interrupt, from its beginning on.
     began: AtomicU32,
+    /// Between the operator in the idle loop and control.
+    pub operator: DualOperatorMailboxes,
     recorder: Option<&'a DualRecorder>,
 }
 
@@ -139,7 +142,13 @@ impl<'a> Shared<'a> {
     /// Empty cells.
     #[cfg(not(loom))]
     pub const fn new() -> Self {
-        Self { command: Mailbox::new(), applied: Seqlock::new(), began: AtomicU32::new(0), recorder: None }
+        Self {
+            operator: DualOperatorMailboxes::new(),
+            command: Mailbox::new(),
+            applied: Seqlock::new(),
+            began: AtomicU32::new(0),
+            recorder: None,
+        }
     }
 
     /// The same with a flight recorder, which the control interrupt fills.

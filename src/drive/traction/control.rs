@@ -5,17 +5,19 @@ use super::six_step_exit::SixStepExit;
 use super::slot::{Decision, Slot};
 use super::{Settings, Shared};
 use crate::control::{AimInput, Controller, Demand, Law, Measurements, ModeLimits, RotorSample};
+use crate::drive::PeriodInput;
 use crate::drive::acknowledge::Acknowledge;
 use crate::drive::messages::{Gates, VoltageCommand};
 use crate::frames::Angle;
 use crate::machine::{Machine, Tables};
 use crate::modulation::{Mode, Reference};
-use crate::ports::Report;
-use crate::ports::{ControlPort, Sample};
+use crate::ports::{ControlPort, DriveCommand, Report, Sample, Traction};
 use crate::protection::{self, Fault, FrozenWatch, MaskedFaults, Trip, Violation};
 use crate::recorder::{Record, State};
 use crate::time::Instant;
 use core::sync::atomic::Ordering;
+
+type Input<'a> = PeriodInput<'a, Traction>;
 
 /// A demand that jumps by more than this share of the largest torque is worth revising the next half for.
 const JUMP_SHARE: f32 = 0.05;
@@ -53,6 +55,8 @@ pub struct ControlTask<M = &'static Tables> {
     disarmed: MaskedFaults,
     trip: Option<Trip>,
     acknowledge: Acknowledge,
+    /// `true` once the operator was asked for a command: who is not asked is not told.
+    operated: bool,
     /// Electrical speed at which the angle was lost, in rad/s, until that is acknowledged.
     lost_at: Option<f32>,
 }
@@ -80,6 +84,7 @@ impl<M: Machine> ControlTask<M> {
             disarmed: MaskedFaults::NONE,
             trip: None,
             acknowledge: Acknowledge::new(),
+            operated: false,
             lost_at: None,
         }
     }
@@ -109,10 +114,18 @@ impl<M: Machine> ControlTask<M> {
         self.now = now.after(control_ticks);
         shared.began.store(now.0, Ordering::Relaxed);
         let sample = port.sample(now);
+        let operator = || {
+            self.operated = true;
+            shared.operator.command(now)
+        };
+        let mut command = port.command(now, operator);
+        command.enable &= sample.may_pulse;
+        let input = Input { sample: &sample, command: &command };
+        let Input { sample, command } = input;
         let measured = sample.measured();
         let applied = Applied::read(&shared.applied, now);
         let released = applied.map(|applied| applied.released);
-        if self.acknowledge.step(sample.acknowledge, self.trip.is_some(), released) {
+        if self.acknowledge.step(command.acknowledge, self.trip.is_some(), released) {
             (self.trip, self.lost_at) = (None, None);
         }
         if self.trip.is_none() && applied.is_some_and(|applied| applied.kind.is_tripped()) {
@@ -121,18 +134,18 @@ impl<M: Machine> ControlTask<M> {
         if let Some(fault) = sample.hardware {
             // That the gates are held is only what comes of it.
             self.trip = self.trip.filter(|trip| trip.fault != Fault::GatesHeld);
-            self.check(Some((fault, 1.0, 0.0)), &sample, port);
+            self.check(Some((fault, 1.0, 0.0)), sample, port);
         }
-        self.check_legs(&sample, port);
+        self.check_legs(sample, port);
         let overdue = applied.and_then(|applied| applied.overdue(now, &self.settings.clock));
-        let (omega, lost) = self.track(&sample);
+        let (omega, lost) = self.track(sample, command.enable);
         let violation = self
             .armed(overdue)
             .or_else(|| self.armed(lost))
-            .or_else(|| self.judge(&sample, &measured, omega));
-        self.check(violation, &sample, port);
+            .or_else(|| self.judge(command, &measured, omega));
+        self.check(violation, sample, port);
         let pulsing =
-            self.trip.is_none() && sample.enable && self.controller.speed_is_known() && !self.exit.crosses();
+            self.trip.is_none() && command.enable && self.controller.speed_is_known() && !self.exit.crosses();
         let slot = Slot::of(applied.as_ref(), now, &self.settings.clock);
         if pulsing {
             let frozen = self.watch.check(
@@ -141,17 +154,17 @@ impl<M: Machine> ControlTask<M> {
                 self.settings.clock.control_s(),
                 &self.machine.tables().ratings,
             );
-            self.check(frozen, &sample, port);
-            self.pulse(&sample, &measured, applied.as_ref(), &slot, shared);
+            self.check(frozen, sample, port);
+            self.pulse(input, &measured, applied.as_ref(), &slot, shared);
         } else {
-            self.rest(now, omega, &sample);
+            self.rest(now, omega, sample);
         }
         // Not finite if either is not.
         let odd = self.reference.voltage_v + omega;
-        self.check((!odd.is_finite()).then_some((Fault::NotFinite, odd, f32::MAX)), &sample, port);
+        self.check((!odd.is_finite()).then_some((Fault::NotFinite, odd, f32::MAX)), sample, port);
         let late = port.overrun_ticks(now, control_ticks);
         let late_s = self.settings.clock.seconds(late as i32);
-        self.check((late > 0).then_some((Fault::ControlDeadline, late_s, 0.0)), &sample, port);
+        self.check((late > 0).then_some((Fault::ControlDeadline, late_s, 0.0)), sample, port);
         let gates = if pulsing && self.trip.is_none() { Gates::Pulse } else { Gates::Off };
         self.revises &= gates == Gates::Pulse;
         if slot.commands || self.revises {
@@ -180,7 +193,10 @@ impl<M: Machine> ControlTask<M> {
         };
         if let Some(recorder) = shared.recorder {
             let mode = applied.map_or(Mode::Off, |applied| applied.mode);
-            recorder.record(self.entry(now, &sample, &report, mode, gates), self.trip.is_some());
+            recorder.record(self.entry(now, input, &report, mode, gates), self.trip.is_some());
+        }
+        if self.operated {
+            shared.operator.tell(now, &report);
         }
         port.report(now, &report);
     }
@@ -209,7 +225,8 @@ impl<M: Machine> ControlTask<M> {
 
     /// The period's entry in the flight recorder.
     #[inline(always)]
-    fn entry(&self, at: Instant, sample: &Sample, report: &Report, mode: Mode, gates: Gates) -> Record {
+    fn entry(&self, at: Instant, input: Input, report: &Report, mode: Mode, gates: Gates) -> Record {
+        let Input { sample, command } = input;
         Record {
             at,
             currents_a: sample.currents_a,
@@ -220,7 +237,7 @@ impl<M: Machine> ControlTask<M> {
             voltage_v: report.voltage_v,
             state: State {
                 mode,
-                enabled: sample.enable,
+                enabled: command.enable,
                 pulsing: gates == Gates::Pulse,
                 fault: self.trip.map(|trip| trip.fault),
             },
@@ -240,14 +257,14 @@ impl<M: Machine> ControlTask<M> {
     /// Follows the angle; returns the electrical speed, in rad/s. An angle that cannot be, or is not known, leaves the speed as it was. It
     /// may be unknown until it is known for the first time, while nobody wants pulses. After a trip the angle is followed anew and its
     /// speed told, to leave the safe state by; whatever chooses a safe state keeps to the speed at which the angle was lost.
-    fn track(&mut self, sample: &Sample) -> (f32, Option<Violation>) {
+    fn track(&mut self, sample: &Sample, enable: bool) -> (f32, Option<Violation>) {
         let clock = self.settings.clock;
         let lost = match sample.angle {
             Some(angle) if self.controller.speed_is_known() => {
                 protection::check_angle(self.controller.innovation_rad(angle, &clock))
             }
             Some(_) => None,
-            None => protection::check_known(sample.enable || self.controller.is_following()),
+            None => protection::check_known(enable || self.controller.is_following()),
         };
         let lost = self.armed(lost);
         if lost.is_some() {
@@ -263,14 +280,14 @@ impl<M: Machine> ControlTask<M> {
         (self.lost_at.unwrap_or(self.controller.omega()), lost)
     }
 
-    /// The fault of a sample by itself.
-    fn judge(&self, sample: &Sample, measured: &Measurements, omega: f32) -> Option<Violation> {
+    /// The fault of a period's input by itself.
+    fn judge(&self, command: &DriveCommand, measured: &Measurements, omega: f32) -> Option<Violation> {
         let ratings = &self.machine.tables().ratings;
         let empty =
-            || if sample.enable { protection::check_undervoltage(measured.udc_v, ratings) } else { None };
+            || if command.enable { protection::check_undervoltage(measured.udc_v, ratings) } else { None };
         self.armed(protection::check_measurements(measured, omega, ratings))
             .or_else(|| self.armed(empty()))
-            .or_else(|| protection::check_demand(&sample.demand))
+            .or_else(|| protection::check_demand(&command.demand))
     }
 
     /// Nothing where the check that found it is switched off.
@@ -282,7 +299,7 @@ impl<M: Machine> ControlTask<M> {
     #[inline(always)]
     fn pulse(
         &mut self,
-        sample: &Sample,
+        input: Input,
         measured: &Measurements,
         applied: Option<&Applied>,
         slot: &Slot,
@@ -292,21 +309,21 @@ impl<M: Machine> ControlTask<M> {
         let now = self.now.before(self.settings.clock.control_ticks);
         let here = RotorSample::new(measured.currents_a, measured.angle, tables);
         self.controller.observe(&here, tables);
-        self.revises = self.is_to_revise(applied, now, &sample.demand);
+        self.revises = self.is_to_revise(applied, now, &input.command.demand);
         let commands = slot.commands || self.revises;
         let aims = slot.aims || (commands && self.aimed != Some(slot.key));
         if let Some(applied) = applied
             && self.boundary != Some(applied.at)
             && (aims || !commands)
         {
-            self.learn(sample, measured.angle, slot.key.mode, applied, shared);
+            self.learn(input.sample, measured.angle, slot.key.mode, applied, shared);
             self.boundary = Some(applied.at);
         }
         if aims {
-            self.aim(sample, slot);
+            self.aim(input, slot);
         }
         if commands {
-            self.command(sample, &here, applied, slot, shared);
+            self.command(input.sample, &here, applied, slot, shared);
         }
     }
 
@@ -324,7 +341,8 @@ impl<M: Machine> ControlTask<M> {
     }
 
     /// The operating point of the command that a boundary will use.
-    fn aim(&mut self, sample: &Sample, slot: &Slot) {
+    fn aim(&mut self, input: Input, slot: &Slot) {
+        let Input { sample, command } = input;
         let Settings { gains, clock, .. } = &self.settings;
         let (omega, udc_v) = (self.controller.omega(), sample.udc_v);
         let tables = self.machine.tables();
@@ -332,10 +350,10 @@ impl<M: Machine> ControlTask<M> {
         self.limits =
             limits(&slot.key, &steady, &mut self.exit, &self.settings, self.controller.passed_s(clock));
         let emf_v = omega.abs() * tables.ratings.magnet_flux_wb * self.controller.map_scale();
-        let torque_nm = self.exit.one_sided(sample.demand.torque_nm, emf_v, udc_v, &tables.ratings);
-        let demand = Demand { torque_nm, ..sample.demand };
-        let input = AimInput { demand: &demand, window: Some(&sample.window), udc_v, limits: &self.limits };
-        self.controller.aim(&input, &Law { gains, clock, tables });
+        let torque_nm = self.exit.one_sided(command.demand.torque_nm, emf_v, udc_v, &tables.ratings);
+        let demand = Demand { torque_nm, ..command.demand };
+        let aim = AimInput { demand: &demand, window: Some(&command.window), udc_v, limits: &self.limits };
+        self.controller.aim(&aim, &Law { gains, clock, tables });
         let target = self.controller.target();
         self.depth = target.depth;
         self.exit.drove(target.torque_nm);

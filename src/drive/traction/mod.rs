@@ -10,6 +10,7 @@ mod pwm;
 mod six_step_exit;
 mod slot;
 
+use super::mailbox::OperatorMailboxes;
 use super::messages::{COMMITTAL_WORDS, VoltageCommand};
 use crate::cell::{History, Mailbox, Seqlock};
 use crate::control::Gains;
@@ -35,7 +36,7 @@ pub struct Settings {
     pub gains: Gains,
 }
 
-/// The cells between the two interrupts, and the flight recorder, if there is one.
+/// The cells between the two interrupts, the operator's mailboxes, and the flight recorder, if there is one.
 pub struct Shared<'a> {
     /// The command of control to the modulator.
     pub command: Mailbox<VoltageCommand, 10>,
@@ -45,6 +46,8 @@ pub struct Shared<'a> {
     pub trip: Seqlock<Trip, 4>,
     /// Instant of the newest control interrupt, from its beginning on.
     pub began: AtomicU32,
+    /// Between the operator in the idle loop and control.
+    pub operator: OperatorMailboxes,
     recorder: Option<&'a Recorder>,
 }
 
@@ -53,6 +56,7 @@ impl<'a> Shared<'a> {
     #[cfg(not(loom))]
     pub const fn new() -> Self {
         Self {
+            operator: OperatorMailboxes::new(),
             command: Mailbox::new(),
             applied: History::new(),
             trip: Seqlock::new(),

@@ -19,12 +19,11 @@ mod firmware {
     use nucleo_g474re::registers::Registers;
     use nucleo_g474re::zs9::sampling::Zeros;
     use nucleo_g474re::zs9::stage::STAGE;
-    use nucleo_g474re::zs9::{self as board, Control, OPERATOR, Pwm, RECORDER, settings};
+    use nucleo_g474re::zs9::{self as board, Control, POSITION, Pwm, SHARED, settings};
     use nucleo_g474re::{Interrupt as interrupt, PULSE};
-    use tractive::drive::dual::{ControlTask, PwmTask, Shared};
+    use tractive::drive::dual::{ControlTask, PwmTask};
     use tractive::protection::Violation;
 
-    static SHARED: Shared = Shared::recorded_by(&RECORDER);
     /// The zeros that the start measured, written before the interrupts are unmasked.
     static ZEROS: [AtomicU32; 7] = [const { AtomicU32::new(0) }; 7];
 
@@ -69,7 +68,7 @@ mod firmware {
                 Encoder::new(timer, &stage, BUILT_IN.ratings.pole_pairs as u32)
             };
             let encoders = [encoder(registers.tim4, first), encoder(registers.tim3, second)];
-            Control::new(registers, kept(), encoders, &OPERATOR)
+            Control::new(registers, kept(), encoders, &POSITION)
         });
         TASK.get_or_insert_with(|| ControlTask::new(BuiltIn, settings())).run(board, &SHARED);
         PULSE.control_ran();

@@ -7,20 +7,24 @@ use super::stage::STAGE;
 use super::{CLOCK, RATINGS, pins, start};
 use crate::can::Can;
 use crate::log::Log;
-use crate::operator::DualOperator;
+use crate::position::PositionState;
 use crate::registers::Registers;
 use crate::start::StartError;
 use crate::{Cycles, Interrupt, PULSE, die_on, join_bus, pause_a_slot, run_with};
-use tractive::operator::{self, Configuration, DualMailboxes, DualSlot, Line, slot_s};
+use tractive::drive::dual::Shared;
+use tractive::operator::{self, Configuration, DualSlot, Line, slot_s};
 use tractive::protection::Violation;
 use tractive::protocol::{TO_ZS9, Zs9CanEndpoint};
 use tractive::recorder::DualRecorder;
 
-/// The drive's operator.
-pub static OPERATOR: DualOperator = DualOperator::new(DualMailboxes::new());
-
 /// The drive's flight recorder.
 pub static RECORDER: DualRecorder = DualRecorder::new();
+
+/// The cells of the drive's two interrupts and of its operator.
+pub static SHARED: Shared = Shared::recorded_by(&RECORDER);
+
+/// The position sensors' state.
+pub static POSITION: PositionState = PositionState::new();
 
 /// Configures everything, gates off. Call it once.
 pub fn prepare() -> Result<Zeros, StartError> {
@@ -40,18 +44,18 @@ pub fn idle(refused: Option<Violation>) -> ! {
         Line::rated(&RATINGS, STAGE.common.line.precharge_s, STAGE.common.line.discharge_s).without_chopper();
     let rated = operator::Settings::rated(&RATINGS, slot_s(&CLOCK), Some(line));
     let station = Zs9CanEndpoint::new(&RATINGS);
-    let mut serve = DualServe::new(Registers::CHIP, Can::CHIP, station, &OPERATOR, Configuration::Good);
+    let mut serve = DualServe::new(Registers::CHIP, Can::CHIP, station, &POSITION, Configuration::Good);
     let (mut slot, mut log) = (DualSlot::new(), Log::new());
     while let Some(why) = refused {
         pause_a_slot();
         serve.refuse(&mut slot, why, &rated);
     }
     loop {
-        serve.pass(&mut slot, &rated);
+        serve.pass(&mut slot, &SHARED.operator, &rated);
         if PULSE.feed_if_both_ran(&Registers::CHIP) {
             log.record(&RECORDER);
         }
-        log.trip(OPERATOR.desk.observed().and_then(|observed| observed.report.trip));
+        log.trip(SHARED.operator.observed().and_then(|observed| observed.report.trip));
     }
 }
 

@@ -26,7 +26,7 @@ mod chip;
 #[cfg(target_os = "none")]
 pub use chip::*;
 pub use ports::{Control, Pwm};
-pub use rates::{CARRIER_TICKS, CLOCK, CYCLES_PER_TICK, HALF_CYCLES, settings};
+pub use rates::{CARRIER_TICKS, CLOCK, CONTROL_HZ, CYCLES_PER_TICK, HALF_CYCLES, settings};
 
 use crate::built_in::zs9::BUILT_IN;
 use tractive::machine::Ratings;

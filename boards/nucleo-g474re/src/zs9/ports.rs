@@ -8,19 +8,14 @@ use super::sampling::{Samplers, Zeros};
 use super::stage::STAGE;
 use super::start::{bridge, feedback};
 use super::{CLOCK, hardware, pins};
-use crate::operator::DualOperator;
 use crate::outputs::SoftwareBreak;
-use crate::position::{Position, reported};
+use crate::position::{Position, PositionState, reported};
 use crate::registers::Registers;
-use tractive::nine_switch::Scheme;
-use tractive::operator::DualDriveCommand;
-use tractive::ports::DualReport;
-use tractive::ports::{ControlPort, Dual, DualSample, PlayedPeriod, PowerSample, PwmPort};
+use tractive::ports::{
+    ControlPort, Dual, DualDriveCommand, DualReport, DualSample, PlayedPeriod, PowerSample, PwmPort,
+};
 use tractive::protection::SafeState;
 use tractive::time::Instant;
-
-/// The place of the zero vectors: the least harmonics in the motors' currents.
-const SCHEME: Scheme = Scheme::Rthd;
 
 /// The dead time as the timers make it.
 const DEAD_CYCLES: u16 = match STAGE.common.dead_time() {
@@ -35,16 +30,17 @@ pub struct Control<'a, P> {
     samplers: Samplers,
     zeros: Zeros,
     positions: [P; 2],
-    operator: &'a DualOperator,
+    state: &'a PositionState,
 }
 
 impl<'a, P: Position> Control<'a, P> {
-    /// With the zeros that the start measured; positions of the upper and the lower motor.
+    /// With the zeros that the start measured; positions of the upper and the lower motor, and where the sensors' word of themselves is
+    /// kept.
     pub const fn new(
         registers: Registers,
         zeros: Zeros,
         positions: [P; 2],
-        operator: &'a DualOperator,
+        state: &'a PositionState,
     ) -> Self {
         Self {
             registers,
@@ -52,7 +48,7 @@ impl<'a, P: Position> Control<'a, P> {
             samplers: Samplers::new(&registers),
             zeros,
             positions,
-            operator,
+            state,
         }
     }
 }
@@ -63,32 +59,30 @@ impl<P: Position> ControlPort<Dual> for Control<'_, P> {
     }
 
     /// Positions first: they have been captured, and the conversions are still under way.
-    fn sample(&mut self, now: Instant) -> DualSample {
+    fn sample(&mut self, _now: Instant) -> DualSample {
         let [first, second] = &mut self.positions;
         let angles = [first.angle(), second.angle()];
         let converted = self.samplers.read(&self.zeros);
         let lost = [first.is_lost(), second.is_lost()];
         let ([a1, a2], [lost1, lost2]) = (angles, lost);
         let angles = [reported(a1, lost1), reported(a2, lost2)];
-        self.operator.position.tell(&angles, &lost);
+        self.state.tell(&angles, &lost);
         let hardware = hardware::latched_by(&self.registers);
         let healthy = !bridge(&self.registers).outputs().is_tripped();
-        let mut sample = DualSample {
+        DualSample {
             currents_a: converted.currents_a,
             angles,
             capacitor_v: converted.capacitor_v,
             inductor_a: self.samplers.inductor_a(&self.zeros),
             source_v: converted.source_v,
-            demands: DualDriveCommand::NONE.demands,
-            link_ref_v: STAGE.link_ref_v,
-            scheme: SCHEME,
-            enable: healthy && pins::is_enabled(&self.registers),
-            speed_torque_nm: DualSample::UNLIMITED_NM,
-            acknowledge: 0,
+            may_pulse: healthy && pins::is_enabled(&self.registers),
             hardware,
-        };
-        self.operator.desk.permit(now).apply(&mut sample);
-        sample
+        }
+    }
+
+    /// The link's voltage is the power stage's until the operator names one.
+    fn command(&mut self, _now: Instant, operator: impl FnOnce() -> DualDriveCommand) -> DualDriveCommand {
+        operator().with_link(STAGE.link_ref_v)
     }
 
     fn enter(&mut self, _safe: SafeState, _now: Instant) {
@@ -99,9 +93,7 @@ impl<P: Position> ControlPort<Dual> for Control<'_, P> {
         self.timer.overrun_ticks(deadline_ticks, CLOCK.control_ticks)
     }
 
-    fn report(&mut self, now: Instant, report: &DualReport) {
-        self.operator.desk.tell(now, report);
-    }
+    fn report(&mut self, _now: Instant, _report: &DualReport) {}
 }
 
 /// The PWM interrupt's side.

@@ -8,7 +8,7 @@ use tractive::time::Clock;
 pub const CYCLES_PER_TICK: u32 = 5;
 
 /// Control interrupts per second, in Hz.
-const CONTROL_HZ: u32 = 10_000;
+pub const CONTROL_HZ: u32 = 10_000;
 
 /// Carrier periods in a control period: 1 (10 kHz) or 2 (20 kHz).
 pub const CARRIERS_PER_CONTROL: u32 = 1;

@@ -3,15 +3,14 @@
 use super::{CLOCK, hardware, pins};
 use crate::serve::Serve;
 use crate::switchgear;
-use tractive::operator::{
-    DualDemands, DualMailboxes, DualRequest, DualSlot, DualStatus, Feedback, OperatorPort, Settings,
-};
+use tractive::drive::{DualObservation, DualOperatorMailboxes};
+use tractive::operator::{DualDemands, DualRequest, DualSlot, DualStatus, Feedback, OperatorPort, Settings};
 use tractive::protection::Violation;
 use tractive::protocol::Zs9CanEndpoint;
 use tractive::time::Instant;
 
 /// The operator's side of the board.
-pub type DualServe<'a> = Serve<'a, Zs9CanEndpoint, DualMailboxes>;
+pub type DualServe<'a> = Serve<'a, Zs9CanEndpoint>;
 
 impl DualServe<'_> {
     /// The board's feedback.
@@ -24,10 +23,10 @@ impl DualServe<'_> {
     }
 
     /// As [`Serve::pass`].
-    pub fn pass(&mut self, slot: &mut DualSlot, rated: &Settings) -> bool {
+    pub fn pass(&mut self, slot: &mut DualSlot, mailboxes: &DualOperatorMailboxes, rated: &Settings) -> bool {
         self.collect();
-        let (desk, settings) = (&self.operator.desk, self.station.settings(rated));
-        slot.run(desk, self, &settings, &CLOCK)
+        let settings = self.station.settings(rated);
+        slot.run(mailboxes, self, &settings, &CLOCK)
     }
 
     /// As [`Serve::refuse`].
@@ -41,12 +40,12 @@ impl DualServe<'_> {
 impl OperatorPort<DualDemands> for DualServe<'_> {
     fn ask(&mut self, _at: Instant, slots: u32) -> (DualRequest, Feedback) {
         let frames = self.hear();
-        (self.station.listen(self.operator.desk.observed(), slots, frames), self.feedback())
+        (self.station.listen(slots, frames), self.feedback())
     }
 
-    fn tell(&mut self, _from: Instant, status: &DualStatus) {
+    fn tell(&mut self, _from: Instant, status: &DualStatus, observed: Option<&DualObservation>) {
         switchgear::set_wires(&self.registers, &pins::SWITCHGEAR, &status.switches);
-        let frame = self.station.tell(status);
+        let frame = self.station.tell(status, observed);
         self.say(frame);
     }
 }

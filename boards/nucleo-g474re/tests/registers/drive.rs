@@ -3,16 +3,14 @@
 use crate::bench::{Bench, control_update};
 use crate::{devices, plan};
 use nucleo_g474re::built_in::traction::BUILT_IN;
-use nucleo_g474re::operator::Operator;
-use nucleo_g474re::position::Encoder;
+use nucleo_g474re::position::{Encoder, PositionState};
 use nucleo_g474re::power_stage::{AdcCode, POWER_STAGE};
 use nucleo_g474re::{CLOCK, Control, Pwm};
 use tractive::control::Gains;
 use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
 use tractive::frames::Abc;
 use tractive::modulation::CarrierHalf;
-use tractive::operator::{DriveCommand, Mailboxes};
-use tractive::ports::PwmPort;
+use tractive::ports::{DriveCommand, PwmPort};
 use tractive::protection::SafeState;
 use tractive::time::Instant;
 
@@ -41,11 +39,11 @@ fn the_drive_pulses_a_turning_machine_through_the_registers() {
     let mut bench = Bench::started(plan());
     bench.codes[6] = (1_500.0 / POWER_STAGE.udc_v_per_code) as u16;
     let registers = bench.registers;
-    let (shared, operator) = (Shared::new(), Operator::new(Mailboxes::new()));
+    let (shared, state) = (Shared::new(), PositionState::new());
     let settings = Settings { clock: CLOCK, devices: devices(), gains: Gains::DEFAULT };
     let zeros = [AdcCode(2_048); 3];
     let encoder = Encoder::new(registers.tim4, &POWER_STAGE, 4);
-    let mut control = Control::new(registers, zeros, encoder, &operator);
+    let mut control = Control::new(registers, zeros, encoder, &state);
     let mut pwm = Pwm::new(registers, zeros);
     let first_half = Instant(plan().shortest_half_ticks);
     let mut control_task = ControlTask::new(&BUILT_IN, settings, Instant(CLOCK.control_ticks));
@@ -69,11 +67,10 @@ fn the_drive_pulses_a_turning_machine_through_the_registers() {
             control_update(&registers);
             bench.finish_sequence(registers.adc1);
             control_task.run(&mut control, &shared);
-            if operator.position.is_known() && !enabled {
-                operator.desk.allow_from(
-                    DriveCommand { enable: true, ..DriveCommand::NONE },
-                    control_task.next_call(),
-                );
+            if state.is_known() && !enabled {
+                shared
+                    .operator
+                    .publish(DriveCommand { enable: true, ..DriveCommand::NONE }, control_task.next_call());
                 enabled = true;
             }
         }
@@ -82,7 +79,7 @@ fn the_drive_pulses_a_turning_machine_through_the_registers() {
         changes += u32::from(now != gates);
         gates = now;
     }
-    assert_eq!(operator.desk.observed().unwrap().trip, None);
+    assert_eq!(shared.operator.observed().unwrap().trip, None);
     assert_eq!(pwm_task.trip(), None);
     // 20 ms pass until the speed is known, 13 ms remain: 23 halves, in each of which three legs toggle once, one device going
     // off and, the dead time later, the other on.

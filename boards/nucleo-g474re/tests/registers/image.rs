@@ -4,8 +4,7 @@ use crate::bench::{Bench, control_update};
 use crate::bus::{Bus, Sender};
 use crate::{devices, plan};
 use nucleo_g474re::built_in::traction::BUILT_IN;
-use nucleo_g474re::operator::Operator;
-use nucleo_g474re::position::Encoder;
+use nucleo_g474re::position::{Encoder, PositionState};
 use nucleo_g474re::power_stage::{POWER_STAGE, PowerStage};
 use nucleo_g474re::serve::Serve;
 use nucleo_g474re::watchdog::Pulse;
@@ -15,7 +14,7 @@ use tractive::control::{Gains, flux_linkage, torque_nm};
 use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
 use tractive::frames::{Abc, AlphaBeta, Angle, Dq};
 use tractive::modulation::{CarrierHalf, Mode};
-use tractive::operator::{self, Configuration, Line, Mailboxes, Refusal, Slot, State, slot_s};
+use tractive::operator::{self, Configuration, Line, Refusal, Slot, State, slot_s};
 use tractive::ports::PwmPort;
 use tractive::protection::{Fault, SafeState};
 use tractive::protocol::{COMMAND, CanEndpoint, Command, Frame, Payload, STATUS, StatusFrame, TO_DRIVE};
@@ -151,7 +150,7 @@ struct Image {
     /// The offset of the sensor of phase U, in A.
     offset_a: f32,
     shared: Shared<'static>,
-    operator: &'static Operator,
+    position: &'static PositionState,
     control: Control<'static, Encoder>,
     pwm: Pwm,
     control_task: ControlTask<&'static tractive::machine::Tables>,
@@ -180,7 +179,7 @@ impl Image {
         let bus = Bus::new(&TO_DRIVE, &registers, &mut bench);
         start::run(&registers, &mut bench);
         bench.settle();
-        let operator: &'static Operator = Box::leak(Box::new(Operator::new(Mailboxes::new())));
+        let position: &'static PositionState = Box::leak(Box::new(PositionState::new()));
         let stage = PowerStage { encoder_zero: zero, ..POWER_STAGE };
         let encoder = Encoder::new(registers.tim4, &stage, BUILT_IN.ratings.pole_pairs as u32);
         let settings = Settings { clock: CLOCK, devices: devices(), gains: Gains::DEFAULT };
@@ -204,12 +203,12 @@ impl Image {
             drivers_ready: true,
             offset_a: 0.0,
             shared: Shared::new(),
-            operator,
-            control: Control::new(registers, found.control_zeros, encoder, operator),
+            position,
+            control: Control::new(registers, found.control_zeros, encoder, position),
             pwm: Pwm::new(registers, found.pwm_zeros),
             control_task: ControlTask::new(&BUILT_IN, settings, Instant(CLOCK.control_ticks)),
             pwm_task: PwmTask::new(&BUILT_IN, settings, Instant(plan().shortest_half_ticks)),
-            serve: Serve::new(registers, bus.can, station, operator, Configuration::Good),
+            serve: Serve::new(registers, bus.can, station, position, Configuration::Good),
             slot: Slot::new(),
             pulse: Pulse::new(),
             bus,
@@ -345,7 +344,7 @@ impl Image {
     fn idle(&mut self) {
         let line = Line::rated(&BUILT_IN.ratings, PRECHARGE_S, DISCHARGE_S);
         let rated = operator::Settings::rated(&BUILT_IN.ratings, slot_s(&CLOCK), Some(line));
-        self.serve.pass(&mut self.slot, &rated);
+        self.serve.pass(&mut self.slot, &self.shared.operator, &rated);
         if let Some(Frame { id, data, .. }) = self.bus.settle()
             && id == STATUS.id
         {
@@ -440,7 +439,7 @@ fn a_drive_that_is_reset_while_its_machine_turns_works() {
         let mut image = Image::reset(0.3, rpm, zero);
         image.until(REST, State::Ready, 200);
         image.until(CHARGE, State::Charged, 2_000);
-        assert!(image.operator.position.is_known());
+        assert!(image.position.is_known());
         if rpm == 600.0 { works(&mut image) } else { pulls(&mut image) }
     }
 }
@@ -458,7 +457,7 @@ fn a_drive_that_is_reset_at_standstill_waits_for_its_index() {
         // Somebody pushes the vehicle, its lever still set: the index comes, and nothing else.
         image.machine.rpm = 30.0;
         image.run_ms(1_000);
-        assert!(image.operator.position.is_known());
+        assert!(image.position.is_known());
         assert_eq!((image.state(), image.fault()), (Some(State::Charged), None));
         assert!(image.gates_are_off());
         image.command = REST;
@@ -476,7 +475,7 @@ fn an_idle_loop_that_is_slow_takes_torque_and_gates_in_time() {
     image.until(PULL, State::Running, 100);
     image.run_ms(100);
     (image.idle_every, image.speaks) = (50, false);
-    let told = |image: &Image| image.operator.desk.observed().unwrap();
+    let told = |image: &Image| image.shared.operator.observed().unwrap();
     let silent_ms = (0..1_000).find(|_| {
         image.run_ms(1);
         told(&image).torque_nm.abs() < 150.0

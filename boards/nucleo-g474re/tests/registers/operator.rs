@@ -4,15 +4,15 @@ use crate::bench::Bench;
 use crate::plan;
 use nucleo_g474re::built_in::traction::BUILT_IN;
 use nucleo_g474re::can::Can;
-use nucleo_g474re::operator::Operator;
 use nucleo_g474re::pins::{Function, PINS};
+use nucleo_g474re::position::PositionState;
 use nucleo_g474re::power_stage::AdcCode;
 use nucleo_g474re::registers::Registers;
 use nucleo_g474re::serve::Serve;
 use nucleo_g474re::{Pwm, hardware, switchgear};
 use stm32_metapac::gpio::{self, regs::Idr};
 use tractive::modulation::{CarrierHalf, Mode};
-use tractive::operator::{Configuration, Feedback, Mailboxes, Switches};
+use tractive::operator::{Configuration, Feedback, Switches};
 use tractive::ports::PwmPort;
 use tractive::protection::{Fault, SafeState};
 use tractive::protocol::CanEndpoint;
@@ -83,10 +83,10 @@ fn each_switch_has_its_pin_and_the_chopper_its_duty() {
 #[test]
 fn the_operator_hears_of_contacts_drivers_and_inputs() {
     let registers = Bench::started(plan()).registers;
-    let operator = Operator::new(Mailboxes::new());
+    let state = PositionState::new();
     let station = CanEndpoint::new(&BUILT_IN.ratings);
     // The bus is not touched by what is tested here.
-    let serve = Serve::new(registers, Can::CHIP, station, &operator, Configuration::Good);
+    let serve = Serve::new(registers, Can::CHIP, station, &state, Configuration::Good);
     drivers_ready(&registers, true);
     let healthy = Feedback {
         driver_ready: true,

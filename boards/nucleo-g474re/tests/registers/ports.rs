@@ -3,8 +3,7 @@
 use crate::bench::{Bench, control_update};
 use crate::plan;
 use nucleo_g474re::legs::SoftwareBreak;
-use nucleo_g474re::operator::Operator;
-use nucleo_g474re::position::{Encoder, Position};
+use nucleo_g474re::position::{Encoder, Position, PositionState};
 use nucleo_g474re::power_stage::{AdcCode, POWER_STAGE};
 use nucleo_g474re::registers::Registers;
 use nucleo_g474re::sampling::Zeros;
@@ -12,10 +11,7 @@ use nucleo_g474re::start::{self, Wait};
 use nucleo_g474re::watchdog::Pulse;
 use nucleo_g474re::{Control, Pwm};
 use stm32_metapac::gpio::regs::Idr;
-use tractive::control::Demand;
 use tractive::frames::Angle;
-use tractive::operator::{DriveCommand, Mailboxes};
-use tractive::ports::Report;
 use tractive::ports::{ControlPort, PwmPort};
 use tractive::protection::{Fault, SafeState};
 use tractive::time::Instant;
@@ -32,7 +28,7 @@ fn write_input(port: stm32_metapac::gpio::Gpio, levels: u32) {
 /// The index passes; the angle is known from the next sample on.
 fn pass_index<P: Position>(control: &mut Control<P>, registers: &Registers) {
     registers.tim4.sr().write(|w| w.set_idxif(true));
-    assert!(!control.sample(NOW).enable, "its count may be older than the index");
+    assert!(control.sample(NOW).angle.is_none(), "its count may be older than the index");
 }
 
 /// The counts of the encoder after the trigger, while a more urgent interrupt runs, do not reach the angle.
@@ -75,9 +71,8 @@ fn an_index_just_after_the_trigger_makes_no_false_angle() {
 fn a_sample_has_currents_link_voltage_and_angle_in_si_units() {
     let mut bench = Bench::started(plan());
     let registers = bench.registers;
-    let operator = Operator::new(Mailboxes::new());
-    let mut control =
-        Control::new(registers, ZEROS, Encoder::new(registers.tim4, &POWER_STAGE, 4), &operator);
+    let state = PositionState::new();
+    let mut control = Control::new(registers, ZEROS, Encoder::new(registers.tim4, &POWER_STAGE, 4), &state);
     (bench.codes[2], bench.codes[15], bench.codes[5], bench.codes[6]) =
         (2_048 + 512, 2_050 - 256, 2_040 - 256, 2_457);
     bench.finish_sequence(registers.adc1);
@@ -86,16 +81,13 @@ fn a_sample_has_currents_link_voltage_and_angle_in_si_units() {
     registers.tim4.cnt().write(|w| w.set_cnt(256));
     control_update(&registers);
     write_input(registers.gpioc, 1 << 2);
-    let demand = Demand { torque_nm: 120.0, slew_limited: true };
-    operator.desk.allow_from(DriveCommand { enable: true, demand, ..DriveCommand::NONE }, NOW);
     let sample = control.sample(NOW);
     let currents = sample.currents_a;
     assert_eq!((currents.a, currents.b, currents.c), (125.0, -62.5, -62.5));
     assert!((sample.udc_v - 1_500.0).abs() < 0.5);
     // A sixteenth of a turn of the shaft, four pole pairs.
     assert_eq!(sample.angle, Some(Angle(1 << 30)));
-    assert!(sample.enable && sample.demand.slew_limited);
-    assert_eq!(sample.demand.torque_nm, 120.0);
+    assert!(sample.may_pulse);
 }
 
 #[test]
@@ -103,10 +95,9 @@ fn the_gates_wait_for_the_index_the_enable_input_and_quiet_break_inputs() {
     for (index, enable, trip) in [(false, true, false), (true, false, false), (true, true, true)] {
         let mut bench = Bench::started(plan());
         let registers = bench.registers;
-        let operator = Operator::new(Mailboxes::new());
+        let state = PositionState::new();
         let encoder = Encoder::new(registers.tim4, &POWER_STAGE, 4);
-        operator.desk.allow_from(DriveCommand { enable: true, ..DriveCommand::NONE }, NOW);
-        let mut control = Control::new(registers, ZEROS, encoder, &operator);
+        let mut control = Control::new(registers, ZEROS, encoder, &state);
         registers.tim4.sr().write(|w| w.set_idxif(index));
         control.sample(NOW);
         write_input(registers.gpioc, u32::from(enable) << 2);
@@ -117,8 +108,8 @@ fn the_gates_wait_for_the_index_the_enable_input_and_quiet_break_inputs() {
         bench.finish_sequence(registers.adc1);
         let sample = control.sample(NOW);
         assert_eq!(sample.angle.is_some(), index, "an angle that is not known is none");
-        assert_eq!(operator.position.is_known(), index);
-        assert!(!(sample.enable && sample.angle.is_some()));
+        assert_eq!(state.is_known(), index);
+        assert!(!(sample.may_pulse && sample.angle.is_some()));
     }
 }
 
@@ -146,9 +137,9 @@ fn the_first_samples_are_right_however_long_the_start_takes() {
     start::run(&registers, &mut bench);
     bench.microseconds(100);
     bench.finish_sequence(registers.adc1);
-    let operator = Operator::new(Mailboxes::new());
+    let state = PositionState::new();
     let encoder = Encoder::new(registers.tim4, &POWER_STAGE, 4);
-    let currents = Control::new(registers, [AdcCode(2_048); 3], encoder, &operator).sample(NOW).currents_a;
+    let currents = Control::new(registers, [AdcCode(2_048); 3], encoder, &state).sample(NOW).currents_a;
     assert_eq!((currents.a, currents.b, currents.c), (0.0, 0.0, 0.0));
 }
 
@@ -171,8 +162,8 @@ fn an_absolute_sensor_takes_the_encoders_place() {
         }
     }
     let bench = Bench::started(plan());
-    let operator = Operator::new(Mailboxes::new());
-    let mut control = Control::new(bench.registers, ZEROS, Resolver, &operator);
+    let state = PositionState::new();
+    let mut control = Control::new(bench.registers, ZEROS, Resolver, &state);
     bench.finish_sequence(bench.registers.adc1);
     assert_eq!(control.sample(NOW).angle, Some(Angle::DEG_90));
 }
@@ -181,9 +172,9 @@ fn an_absolute_sensor_takes_the_encoders_place() {
 fn an_overrun_is_counted_from_the_next_period() {
     let bench = Bench::started(plan());
     let registers = bench.registers;
-    let operator = Operator::new(Mailboxes::new());
+    let state = PositionState::new();
     let encoder = Encoder::new(registers.tim4, &POWER_STAGE, 4);
-    let mut control = Control::new(registers, ZEROS, encoder, &operator);
+    let mut control = Control::new(registers, ZEROS, encoder, &state);
     registers.tim3.sr().write(|_| ());
     registers.tim3.cnt().write(|w| w.set_cnt(77));
     assert_eq!(control.overrun_ticks(NOW, nucleo_g474re::CLOCK.control_ticks), 0);
@@ -216,18 +207,6 @@ fn the_watchdog_is_fed_only_when_both_interrupts_ran() {
         pulse.feed_if_both_ran(&registers);
         assert_eq!(fed(), food, "{control} {pwm}");
     }
-}
-
-#[test]
-fn the_idle_loop_hears_what_control_did() {
-    let bench = Bench::started(plan());
-    let registers = bench.registers;
-    let operator = Operator::new(Mailboxes::new());
-    assert!(operator.desk.observed().is_none());
-    let encoder = Encoder::new(registers.tim4, &POWER_STAGE, 4);
-    let report = Report { torque_nm: 7.0, ..Report::default() };
-    Control::new(registers, ZEROS, encoder, &operator).report(NOW, &report);
-    assert_eq!(operator.desk.observed().map(|observed| observed.torque_nm), Some(7.0));
 }
 
 /// An encoder whose index is at count 0, turning by `step` counts a control period from `from` on.
@@ -310,9 +289,9 @@ fn what_holds_the_gates_has_a_name() {
     for (what, spoil, ready, fault) in cases {
         let bench = Bench::started(plan());
         let registers = bench.registers;
-        let operator = Operator::new(Mailboxes::new());
+        let state = PositionState::new();
         let encoder = Encoder::new(registers.tim4, &POWER_STAGE, 4);
-        let mut control = Control::new(registers, ZEROS, encoder, &operator);
+        let mut control = Control::new(registers, ZEROS, encoder, &state);
         write_input(registers.gpiob, u32::from(ready) << 12);
         write_input(registers.gpioa, u32::from(ready) << 6);
         spoil(&registers);

@@ -4,13 +4,13 @@ use crate::bench::{Bench, Simulated};
 use crate::run::{Interrupts, Supervisor, turn};
 use crate::without::Ablation;
 use anyhow::Result;
-use tractive::control::{Demand, LinkWindow};
+use tractive::drive::Observation;
 use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
 use tractive::frames::Abc;
 use tractive::machine::{Ratings, Tables};
 use tractive::modulation::{CarrierHalf, Ladder, Schedule};
-use tractive::operator::{self, Feedback, Line, Mailboxes, OperatorPort, Request, Slot, Status, slot_s};
-use tractive::ports::{ControlPort, PwmPort, Report, Sample};
+use tractive::operator::{self, Feedback, Line, OperatorPort, Request, Slot, Status, slot_s};
+use tractive::ports::{ControlPort, DriveCommand, PwmPort, Report, Sample};
 use tractive::protection::{LegFaults, MaskedFaults, SafeState, Trip};
 use tractive::protocol::CanEndpoint;
 use tractive::recorder::Recorder;
@@ -20,7 +20,8 @@ use tractive::time::{Clock, Instant};
 struct Port<'a, 'w> {
     bench: &'a mut Bench,
     without: Option<Ablation>,
-    desk: &'a Mailboxes,
+    /// The bench's command beside the newest sample.
+    command: DriveCommand,
     ratings: &'a Ratings,
     wire: Option<&'a mut Wire<'w>>,
     error: Option<anyhow::Error>,
@@ -42,25 +43,18 @@ impl Port<'_, '_> {
 
 impl ControlPort for Port<'_, '_> {
     fn sample(&mut self, now: Instant) -> Sample {
-        let mut sample = self.bench.control_sample(now);
-        if self.bench.is_operated()
-            && let Ok(sample) = &mut sample
-        {
-            self.desk.permit(now).apply(sample);
-        }
-        sample.unwrap_or_else(|error| {
+        let (sample, command) = self.bench.control_sample(now).unwrap_or_else(|error| {
             self.error = Some(error.into());
-            Sample {
-                currents_a: Abc::default(),
-                udc_v: 0.0,
-                angle: None,
-                demand: Demand::default(),
-                enable: false,
-                window: LinkWindow::OPEN,
-                acknowledge: 0,
-                hardware: None,
-            }
-        })
+            let currents_a = Abc::default();
+            let sample = Sample { currents_a, udc_v: 0.0, angle: None, may_pulse: false, hardware: None };
+            (sample, DriveCommand::NONE)
+        });
+        self.command = command;
+        sample
+    }
+
+    fn command(&mut self, _now: Instant, operator: impl FnOnce() -> DriveCommand) -> DriveCommand {
+        if self.bench.is_operated() { operator() } else { self.command }
     }
 
     fn enter(&mut self, safe: SafeState, now: Instant) {
@@ -72,7 +66,6 @@ impl ControlPort for Port<'_, '_> {
     }
 
     fn report(&mut self, now: Instant, report: &Report) {
-        self.desk.tell(now, report);
         self.bench.control_report(now, *report);
     }
 
@@ -118,15 +111,15 @@ impl OperatorPort for Port<'_, '_> {
             self.error = Some(error);
             None
         });
-        (wire.station.listen(self.desk.observed(), slots, frame.as_ref()), feedback)
+        (wire.station.listen(slots, frame.as_ref()), feedback)
     }
 
-    fn tell(&mut self, from: Instant, status: &Status) {
+    fn tell(&mut self, from: Instant, status: &Status, observed: Option<&Observation>) {
         if let Err(error) = self.bench.told(from, *status) {
             self.error = Some(error.into());
         }
         let Some(wire) = &mut self.wire else { return };
-        if let Some(frame) = wire.station.tell(status) {
+        if let Some(frame) = wire.station.tell(status, observed) {
             wire.supervisor.hear(self.bench.instant_s(from), &frame);
         }
     }
@@ -137,7 +130,6 @@ pub struct Tasks<'a> {
     control: ControlTask,
     pwm: PwmTask,
     shared: Shared<'a>,
-    desk: Mailboxes,
     slot: Slot,
     operator: operator::Settings<'static>,
     clock: Clock,
@@ -165,7 +157,6 @@ impl<'a> Tasks<'a> {
             control: ControlTask::new(tables, settings, first_control),
             pwm: PwmTask::new(tables, settings, first_pwm).after_halves_of(first_half_ticks),
             shared: Shared::new(),
-            desk: Mailboxes::new(),
             slot: Slot::new(),
             operator: operator::Settings::rated(&tables.ratings, slot_s(&settings.clock), None),
             clock: settings.clock,
@@ -219,9 +210,9 @@ impl Interrupts for Tasks<'_> {
     }
 
     fn pwm(&mut self, bench: &mut Bench) -> Result<()> {
-        let (desk, ratings) = (&self.desk, self.operator.ratings);
-        let mut port =
-            Port { bench, desk, ratings, without: self.without, wire: self.wire.as_mut(), error: None };
+        let ratings = self.operator.ratings;
+        let (command, without, wire) = (DriveCommand::NONE, self.without, self.wire.as_mut());
+        let mut port = Port { bench, command, ratings, without, wire, error: None };
         self.pwm.run(&mut port, &self.shared);
         port.error.map_or(Ok(()), Err)
     }
@@ -231,16 +222,16 @@ impl Interrupts for Tasks<'_> {
             Some(wire) => wire.station.settings(&self.operator),
             None => self.operator,
         };
-        let (desk, ratings) = (&self.desk, self.operator.ratings);
-        let mut port =
-            Port { bench, desk, ratings, without: self.without, wire: self.wire.as_mut(), error: None };
+        let ratings = self.operator.ratings;
+        let (command, without, wire) = (DriveCommand::NONE, self.without, self.wire.as_mut());
+        let mut port = Port { bench, command, ratings, without, wire, error: None };
         if self.control.wants_revision() {
             self.pwm.revise(&mut port, &self.shared);
         }
         self.control.run(&mut port, &self.shared);
         // The idle loop goes on where the interrupt ends.
         if port.bench.is_operated() {
-            self.slot.run(&self.desk, &mut port, &operator, &self.clock);
+            self.slot.run(&self.shared.operator, &mut port, &operator, &self.clock);
         }
         port.error.map_or(Ok(()), Err)
     }

@@ -23,9 +23,9 @@ pub fn run_in_qemu(
         match request {
             Request::Hello => answers.control(&wire::setup_to_block(setup))?,
             Request::ControlSample(at) => {
-                let sample = bench.control_sample(at)?;
+                let (sample, command) = bench.control_sample(at)?;
                 let done = bench.is_done();
-                answers.control(&wire::sample_to_block(&sample, done))?;
+                answers.control(&wire::sample_to_block(&sample, &command, done))?;
             }
             Request::ControlReport(at, report) => {
                 served.calls.traction(&report);

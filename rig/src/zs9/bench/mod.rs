@@ -26,7 +26,7 @@ use gates::Gates;
 use sums::Sums;
 use tractive::drive::dual::COMPARE_STEPS;
 use tractive::operator::{DualStatus, Feedback};
-use tractive::ports::{DualReport, DualSample, GateFeedback, PlayedPeriod};
+use tractive::ports::{DualDriveCommand, DualReport, DualSample, GateFeedback, PlayedPeriod};
 use tractive::time::Instant;
 
 /// The delay from the control interrupt's nominal instant until its order to turn the gates off reaches them, in ticks (75 µs): its
@@ -63,7 +63,7 @@ pub struct Bench {
     pub observed: Observed,
     feedback: GateFeedback,
     orders: Orders,
-    control: Conversions<DualSample, DualReport>,
+    control: Conversions<(DualSample, DualDriveCommand), DualReport>,
     next_row: Tick,
     sums: Sums,
     /// The trace so far.

@@ -4,15 +4,15 @@ use super::{Bench, BenchError};
 use crate::inject::zs9::Kind;
 use crate::steps::held;
 use tractive::frames::Abc;
-use tractive::ports::{DualReport, DualSample, HardwareBreak, PowerSample};
+use tractive::ports::{DualDriveCommand, DualReport, DualSample, HardwareBreak, PowerSample};
 use tractive::time::Instant;
 
 /// The error of a current's reading that makes no difference which counts, in A: a tenth of a machine's largest current.
 const MUCH_A: f32 = 8.49;
 
 impl Bench {
-    /// The conversions that the control timer triggered at `instant`.
-    pub fn control_sample(&mut self, instant: Instant) -> Result<DualSample, BenchError> {
+    /// The conversions that the control timer triggered at `instant`, and what the bench commands.
+    pub fn control_sample(&mut self, instant: Instant) -> Result<(DualSample, DualDriveCommand), BenchError> {
         let at = self.time.widen(instant);
         self.advance(at)?;
         self.control.ask(at)
@@ -95,18 +95,21 @@ impl Bench {
             capacitor_v: network.capacitor_v() as f32,
             inductor_a: network.inductor_a() as f32,
             source_v: source_v as f32,
-            demands: self.orders.demands,
-            link_ref_v: self.settings.link_ref_v as f32,
-            scheme: held(&self.course.schemes, t_s).unwrap_or(self.settings.scheme),
-            enable: self.orders.enable && hardware.is_none(),
-            speed_torque_nm: DualSample::UNLIMITED_NM,
-            acknowledge: 0,
+            may_pulse: hardware.is_none(),
             hardware: hardware.map(|fault| HardwareBreak { fault, seen: 1 }),
         };
         let true_a = sample.currents_a;
-        self.spoiler.control(t_s, &mut sample);
+        let mut command = DualDriveCommand {
+            enable: self.orders.enable,
+            demands: self.orders.demands,
+            speed_torque_nm: DualDriveCommand::UNLIMITED_NM,
+            link_ref_v: self.settings.link_ref_v as f32,
+            scheme: held(&self.course.schemes, t_s).unwrap_or(self.settings.scheme),
+            acknowledge: 0,
+        };
+        self.spoiler.control(t_s, &mut sample, &mut command);
         self.compare(true_a, sample.currents_a);
-        self.control.put(self.time.now, sample);
+        self.control.put(self.time.now, (sample, command));
         self.control.show(self.time.now);
         Ok(())
     }

@@ -5,15 +5,15 @@ use crate::run::{Interrupts, Supervisor, turn};
 use crate::without::Ablation;
 use crate::zs9::bench::Bench;
 use anyhow::Result;
+use tractive::drive::DualObservation;
 use tractive::drive::dual::{ControlTask, PwmTask, Settings, Shared};
 use tractive::frames::Abc;
 use tractive::machine::{Ratings, Tables};
-use tractive::nine_switch::Scheme;
 use tractive::operator::{
-    self, DualDemands, DualMailboxes, DualRequest, DualSlot, DualStatus, Feedback, Line, OperatorPort, slot_s,
+    self, DualDemands, DualRequest, DualSlot, DualStatus, Feedback, Line, OperatorPort, slot_s,
 };
 use tractive::ports::{
-    ControlPort, Dual, DualReport, DualSample, MotorDemand, PlayedPeriod, PowerSample, PwmPort,
+    ControlPort, Dual, DualDriveCommand, DualReport, DualSample, PlayedPeriod, PowerSample, PwmPort,
 };
 use tractive::protection::{MaskedFaults, SafeState, Trip};
 use tractive::protocol::Zs9CanEndpoint;
@@ -23,7 +23,8 @@ use tractive::time::{Clock, Instant};
 /// The bench behind a board's ports; the first error ends the run.
 struct Port<'a> {
     bench: &'a mut Bench,
-    desk: &'a DualMailboxes,
+    /// The bench's command beside the newest sample.
+    command: DualDriveCommand,
     error: Option<anyhow::Error>,
 }
 
@@ -42,25 +43,26 @@ const NOTHING: DualSample = DualSample {
     capacitor_v: 0.0,
     inductor_a: 0.0,
     source_v: 0.0,
-    demands: [MotorDemand::Speed(0.0); 2],
-    link_ref_v: 0.0,
-    scheme: Scheme::S,
-    enable: false,
-    speed_torque_nm: DualSample::UNLIMITED_NM,
-    acknowledge: 0,
+    may_pulse: false,
     hardware: None,
 };
 
 impl ControlPort<Dual> for Port<'_> {
     fn sample(&mut self, now: Instant) -> DualSample {
-        let mut sample = self.bench.control_sample(now).unwrap_or_else(|error| {
+        let (sample, command) = self.bench.control_sample(now).unwrap_or_else(|error| {
             self.error = Some(error.into());
-            NOTHING
+            (NOTHING, DualDriveCommand::NONE)
         });
-        if self.bench.is_operated() {
-            self.desk.permit(now).apply(&mut sample);
-        }
+        self.command = command;
         sample
+    }
+
+    /// The scheme is the bench's in any case.
+    fn command(&mut self, _now: Instant, operator: impl FnOnce() -> DualDriveCommand) -> DualDriveCommand {
+        if !self.bench.is_operated() {
+            return self.command;
+        }
+        DualDriveCommand { scheme: self.command.scheme, ..operator().with_link(self.command.link_ref_v) }
     }
 
     fn enter(&mut self, _safe: SafeState, now: Instant) {
@@ -72,7 +74,6 @@ impl ControlPort<Dual> for Port<'_> {
     }
 
     fn report(&mut self, now: Instant, report: &DualReport) {
-        self.desk.tell(now, report);
         self.bench.control_report(now, *report);
     }
 }
@@ -116,14 +117,14 @@ impl OperatorPort<DualDemands> for Idle<'_, '_> {
             self.port.error = Some(error);
             None
         });
-        (self.station.listen(self.port.desk.observed(), slots, frame.as_ref()), feedback)
+        (self.station.listen(slots, frame.as_ref()), feedback)
     }
 
-    fn tell(&mut self, from: Instant, status: &DualStatus) {
+    fn tell(&mut self, from: Instant, status: &DualStatus, observed: Option<&DualObservation>) {
         if let Err(error) = self.port.bench.told(from, *status) {
             self.port.error = Some(error.into());
         }
-        if let Some(frame) = self.station.tell(status) {
+        if let Some(frame) = self.station.tell(status, observed) {
             self.supervisor.hear(self.port.bench.instant_s(from), &frame);
         }
     }
@@ -134,7 +135,6 @@ pub struct Tasks<'a> {
     control: ControlTask,
     pwm: PwmTask,
     shared: Shared<'a>,
-    desk: DualMailboxes,
     clock: Clock,
     /// Over the protocol, if there is a supervisor.
     wire: Option<Wire<'a>>,
@@ -152,7 +152,6 @@ impl<'a> Tasks<'a> {
             control: ControlTask::new(tables, settings).beginning_at(origin),
             pwm: PwmTask::new(tables, settings).beginning_at(origin),
             shared: Shared::new(),
-            desk: DualMailboxes::new(),
             clock: settings.clock,
             wire: None,
         }
@@ -201,19 +200,19 @@ impl Interrupts for Tasks<'_> {
     }
 
     fn pwm(&mut self, bench: &mut Bench) -> Result<()> {
-        let mut port = Port { bench, desk: &self.desk, error: None };
+        let mut port = Port { bench, command: DualDriveCommand::NONE, error: None };
         self.pwm.run(&mut port, &self.shared);
         port.error.map_or(Ok(()), Err)
     }
 
     fn control(&mut self, bench: &mut Bench) -> Result<()> {
-        let mut port = Port { bench, desk: &self.desk, error: None };
+        let mut port = Port { bench, command: DualDriveCommand::NONE, error: None };
         self.control.run(&mut port, &self.shared);
         // The idle loop goes on where the interrupt ends.
         if let Some(Wire { station, slot, operator, supervisor }) = &mut self.wire {
             let settings = station.settings(operator);
             let mut idle = Idle { port: &mut port, station, supervisor: *supervisor };
-            slot.run(&self.desk, &mut idle, &settings, &self.clock);
+            slot.run(&self.shared.operator, &mut idle, &settings, &self.clock);
         }
         port.error.map_or(Ok(()), Err)
     }

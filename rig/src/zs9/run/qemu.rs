@@ -24,9 +24,9 @@ pub fn run_in_qemu(
         match request {
             DualRequest::Hello => answers.control(&wire::dual_setup_to_block(setup))?,
             DualRequest::ControlSample(at) => {
-                let sample = bench.control_sample(at)?;
+                let (sample, command) = bench.control_sample(at)?;
                 let done = bench.is_done();
-                answers.control(&wire::dual_sample_to_block(&sample, done))?;
+                answers.control(&wire::dual_sample_to_block(&sample, &command, done))?;
             }
             DualRequest::ControlReport(at, report) => {
                 served.calls.mode = what(&report, bench.speeds_rpm());

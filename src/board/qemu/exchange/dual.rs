@@ -1,13 +1,14 @@
 //! The same for the ZS9.
 
-use super::{CONTROL_ANSWERS, IDLE_ANSWERS, PWM_ANSWERS, exchange, finish, open_files, send};
+use super::{COMMAND, CONTROL_ANSWERS, IDLE_ANSWERS, PWM_ANSWERS, exchange, finish, keep, open_files, send};
 use crate::board::qemu::{DUAL_RECORDER, watch};
+use crate::nine_switch::Scheme;
 use crate::operator::{DualStatus, Feedback};
-use crate::ports::DualReport;
-use crate::ports::{DualSample, PlayedPeriod, PowerSample};
+use crate::ports::{DualDriveCommand, DualReport, DualSample, PlayedPeriod, PowerSample};
 use crate::protocol::Frame;
 use crate::time::Instant;
 use crate::wire::{self, DualRequest, DualSetup};
+use core::sync::atomic::Ordering;
 
 /// Opens the files and fetches the set-up.
 #[inline(never)]
@@ -23,12 +24,31 @@ pub fn open_dual() -> DualSetup {
 pub fn sample_dual(now: Instant) -> DualSample {
     let mut block = DualRequest::ControlSample(now).to_block();
     exchange(&mut block, CONTROL_ANSWERS);
-    let (sample, end) = wire::dual_sample_from_block(&block);
+    let (sample, command, end) = wire::dual_sample_from_block(&block);
+    keep(command);
     if end {
         watch::stop();
         finish(&DUAL_RECORDER, |record| DualRequest::Recorded(record).to_block());
     }
     sample
+}
+
+/// The rig's command beside the newest sample.
+#[inline(never)]
+pub fn command_dual() -> DualDriveCommand {
+    wire::dual_command_from_words(COMMAND.each_ref().map(|word| word.load(Ordering::Relaxed)))
+}
+
+/// The place of the zero vectors in that command.
+#[inline(never)]
+pub fn scheme_dual() -> Scheme {
+    command_dual().scheme
+}
+
+/// Its link voltage, in V.
+#[inline(never)]
+pub fn link_ref_dual() -> f32 {
+    command_dual().link_ref_v
 }
 
 /// The conversions at a peak of the carrier.

@@ -4,11 +4,10 @@ use super::bridge::Rig;
 use super::ports::{control, converted, make_ready, permitted};
 use crate::bench::control_update;
 use nucleo_g474re::built_in::zs9::BUILT_IN;
-use nucleo_g474re::operator::DualOperator;
+use nucleo_g474re::position::PositionState;
 use nucleo_g474re::zs9::feedback::encoded;
 use nucleo_g474re::zs9::{CARRIER_TICKS, CLOCK, CYCLES_PER_TICK, settings};
 use tractive::drive::dual::{ControlTask, PwmTask, Shared};
-use tractive::operator::DualMailboxes;
 use tractive::ports::{Dual, GateFeedback, PlayedPeriod, PowerSample, PwmPort};
 use tractive::protection::SafeState;
 use tractive::time::Instant;
@@ -43,8 +42,8 @@ fn the_drive_pulses_two_turning_motors_through_the_registers() {
     let mut rig = Rig::new();
     rig.pwm = nucleo_g474re::zs9::Pwm::new(rig.model.registers, super::ports::zeros());
     let registers = rig.model.registers;
-    let (shared, operator) = (Shared::new(), DualOperator::new(DualMailboxes::new()));
-    let mut control = control(registers, &operator);
+    let (shared, state) = (Shared::new(), PositionState::new());
+    let mut control = control(registers, &state);
     let mut control_task = ControlTask::new(&BUILT_IN, settings());
     let mut pwm_task = PwmTask::new(&BUILT_IN, settings());
     make_ready(&registers);
@@ -77,15 +76,15 @@ fn the_drive_pulses_two_turning_motors_through_the_registers() {
             converted(&codes, registers);
             control_task.run(&mut control, &shared);
             rig.model.settle();
-            if operator.position.is_known() && !enabled {
-                operator.desk.allow_from(permitted([10.0, 10.0], 500.0), control_task.next_call());
+            if state.is_known() && !enabled {
+                shared.operator.publish(permitted([10.0, 10.0], 500.0), control_task.next_call());
                 enabled = true;
             }
         }
         shorted = rig.model.shorted[1];
     }
     assert_eq!(control_task.trip().or(pwm_task.trip()), None);
-    assert_eq!(operator.desk.observed().unwrap().report.trip, None);
+    assert_eq!(shared.operator.observed().unwrap().report.trip, None);
     let beats = 400 * CLOCK.control_ticks / CARRIER_TICKS;
     assert!(on > 100 * control_cycles && shorted > 1_000, "{beats} periods: {on} {shorted}");
 }

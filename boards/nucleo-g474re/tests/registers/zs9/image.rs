@@ -6,8 +6,7 @@ use super::ports::{converted, drivers_ready};
 use crate::bench::{Bench, control_update};
 use crate::bus::{Bus, Sender};
 use nucleo_g474re::built_in::zs9::BUILT_IN;
-use nucleo_g474re::operator::DualOperator;
-use nucleo_g474re::position::Encoder;
+use nucleo_g474re::position::{Encoder, PositionState};
 use nucleo_g474re::power_stage::PowerStage;
 use nucleo_g474re::watchdog::Pulse;
 use nucleo_g474re::zs9::serve::DualServe;
@@ -17,9 +16,7 @@ use stm32_metapac::timer::regs::SrGp16;
 use tractive::drive::dual::{ControlTask, PwmTask, Shared};
 use tractive::frames::Angle;
 use tractive::nine_switch::Scheme;
-use tractive::operator::{
-    self, Configuration, DualMailboxes, DualSlot, Levels, Line, Refusal, State, slot_s,
-};
+use tractive::operator::{self, Configuration, DualSlot, Levels, Line, Refusal, State, slot_s};
 use tractive::ports::{Dual, GateFeedback, PlayedPeriod, PowerSample, PwmPort};
 use tractive::protection::Fault;
 use tractive::protection::SafeState;
@@ -71,7 +68,7 @@ struct Image {
     pwm: Pwm,
     seen: GateFeedback,
     shared: Shared<'static>,
-    operator: &'static DualOperator,
+    position: &'static PositionState,
     control: Control<'static, Encoder>,
     control_task: ControlTask<&'static tractive::machine::Tables>,
     pwm_task: PwmTask<&'static tractive::machine::Tables>,
@@ -101,7 +98,7 @@ impl Image {
         let model = Model::started();
         let registers = model.registers;
         let bus = Bus::new(&TO_ZS9, &registers, &mut Bench::of_other_inverter());
-        let operator: &'static DualOperator = Box::leak(Box::new(DualOperator::new(DualMailboxes::new())));
+        let position: &'static PositionState = Box::leak(Box::new(PositionState::new()));
         let encoder = |timer, encoder_zero| {
             Encoder::new(
                 timer,
@@ -117,11 +114,11 @@ impl Image {
             pwm: Pwm::new(registers, super::ports::zeros()),
             seen: GateFeedback::default(),
             shared: Shared::new(),
-            operator,
-            control: Control::new(registers, super::ports::zeros(), encoders, operator),
+            position,
+            control: Control::new(registers, super::ports::zeros(), encoders, position),
             control_task: ControlTask::new(&BUILT_IN, settings()),
             pwm_task: PwmTask::new(&BUILT_IN, settings()),
-            serve: DualServe::new(registers, bus.can, station, operator, Configuration::Good),
+            serve: DualServe::new(registers, bus.can, station, position, Configuration::Good),
             slot: DualSlot::new(),
             pulse: Pulse::new(),
             bus,
@@ -233,7 +230,7 @@ impl Image {
         }
         let line = Line::rated(&RATINGS, PRECHARGE_S as f32, 0.1).without_chopper();
         let rated = operator::Settings::rated(&RATINGS, slot_s(&CLOCK), Some(line));
-        self.serve.pass(&mut self.slot, &rated);
+        self.serve.pass(&mut self.slot, &self.shared.operator, &rated);
         if let Some(Frame { id, data, .. }) = self.bus.settle()
             && id == ZS9_STATUS.id
         {
@@ -289,7 +286,7 @@ fn pulls(image: &mut Image) {
     image.until(PULL, State::Running, 40);
     image.run_ms(60);
     assert!(!image.gates_are_off());
-    let [upper, lower] = image.operator.desk.observed().unwrap().report.torque_nm;
+    let [upper, lower] = image.shared.operator.observed().unwrap().report.torque_nm;
     assert!((upper - 10.0).abs() < 0.1 && (lower + 10.0).abs() < 0.1, "{upper} and {lower} N·m");
 }
 
@@ -327,7 +324,7 @@ fn a_drive_that_is_reset_with_one_motor_turning_waits_for_the_others_index_and_w
     // The other one begins to turn, the lever still set: its index comes, and nothing else.
     image.rpm[1] = -900.0;
     image.run_ms(70);
-    assert!(image.operator.position.is_known() && image.gates_are_off());
+    assert!(image.position.is_known() && image.gates_are_off());
     assert_eq!((image.state(), image.control_task.trip()), (Some(State::Charged), None));
     image.command = REST;
     image.run_ms(15);

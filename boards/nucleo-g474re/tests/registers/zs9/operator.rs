@@ -1,17 +1,17 @@
 //! The exchange between the ZS9's operator and the board, and the name and the end of a break.
 
 use super::model::Model;
-use super::ports::{control, converted, drivers_ready, make_ready, permitted, zeros};
+use super::ports::{control, converted, drivers_ready, make_ready, zeros};
 use nucleo_g474re::can::Can;
-use nucleo_g474re::operator::DualOperator;
 use nucleo_g474re::outputs::SoftwareBreak;
+use nucleo_g474re::position::PositionState;
 use nucleo_g474re::registers::Registers;
 use nucleo_g474re::switchgear;
 use nucleo_g474re::zs9::hardware::{held_by, latched_by};
 use nucleo_g474re::zs9::serve::DualServe;
 use nucleo_g474re::zs9::{self, Pwm, RATINGS, start};
 use stm32_metapac::gpio::regs::Idr;
-use tractive::operator::{Configuration, DualMailboxes, Feedback, Switches};
+use tractive::operator::{Configuration, Feedback, Switches};
 use tractive::ports::{ControlPort, HardwareBreak, PwmPort};
 use tractive::protection::Fault;
 use tractive::protocol::Zs9CanEndpoint;
@@ -82,25 +82,24 @@ fn softwares_own_breaks_are_told_apart_and_are_left() {
 #[test]
 fn the_control_interrupt_is_told_of_a_break() {
     let registers = Model::started().registers;
-    let operator = DualOperator::new(DualMailboxes::new());
-    operator.desk.allow_from(permitted([0.0; 2], 600.0), NOW);
-    let mut control = control(registers, &operator);
+    let state = PositionState::new();
+    let mut control = control(registers, &state);
     make_ready(&registers);
     converted(&[], registers);
     assert_eq!(control.sample(NOW).hardware, None);
     registers.tim20.sr().modify(|w| w.set_bif(0, true));
     let sample = control.sample(NOW);
     let found = HardwareBreak { fault: Fault::HardwareOvercurrent, seen: 0b100 };
-    assert_eq!((sample.hardware, sample.enable), (Some(found), false));
+    assert_eq!((sample.hardware, sample.may_pulse), (Some(found), false));
 }
 
 #[test]
 fn the_operator_hears_of_contacts_drivers_and_inputs() {
     let registers = Model::started().registers;
-    let operator = DualOperator::new(DualMailboxes::new());
+    let state = PositionState::new();
     // The bus is not touched by what is tested here.
     let station = Zs9CanEndpoint::new(&RATINGS);
-    let serve = DualServe::new(registers, Can::CHIP, station, &operator, Configuration::Good);
+    let serve = DualServe::new(registers, Can::CHIP, station, &state, Configuration::Good);
     drivers_ready(&registers, true);
     let healthy = Feedback {
         driver_ready: true,
@@ -122,7 +121,7 @@ fn the_operator_hears_of_contacts_drivers_and_inputs() {
     }
     // The position is known one sample after both indices have passed, and stays so when control has cleared their flags.
     inputs(0);
-    let mut control = control(registers, &operator);
+    let mut control = control(registers, &state);
     for (timer, knows) in [(registers.tim3, [false; 3]), (registers.tim4, [false, true, true])] {
         timer.sr().write(|w| w.set_idxif(true));
         for known in knows {

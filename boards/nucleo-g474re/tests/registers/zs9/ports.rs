@@ -2,8 +2,7 @@
 
 use super::model::Model;
 use crate::bench::{Bench, control_update};
-use nucleo_g474re::operator::DualOperator;
-use nucleo_g474re::position::Encoder;
+use nucleo_g474re::position::{Encoder, PositionState};
 use nucleo_g474re::power_stage::AdcCode;
 use nucleo_g474re::registers::Registers;
 use nucleo_g474re::zs9::sampling::Zeros;
@@ -12,7 +11,7 @@ use nucleo_g474re::zs9::{CLOCK, Control, Pwm, start};
 use stm32_metapac::gpio::regs::Idr;
 use tractive::control::Demand;
 use tractive::frames::Angle;
-use tractive::operator::{DualDriveCommand, DualMailboxes};
+use tractive::ports::DualDriveCommand;
 use tractive::ports::{ControlPort, GateFeedback, MotorDemand, PwmPort};
 use tractive::time::Instant;
 
@@ -22,9 +21,9 @@ pub fn zeros() -> Zeros {
     Zeros { motors: [[AdcCode(2_048); 3]; 2], inductor: AdcCode(2_048) }
 }
 
-pub fn control<'a>(registers: Registers, operator: &'a DualOperator) -> Control<'a, Encoder> {
+pub fn control<'a>(registers: Registers, state: &'a PositionState) -> Control<'a, Encoder> {
     let encoders = [registers.tim4, registers.tim3].map(|timer| Encoder::new(timer, &STAGE.common, 4));
-    Control::new(registers, zeros(), encoders, operator)
+    Control::new(registers, zeros(), encoders, state)
 }
 
 /// Gates may pulse.
@@ -67,8 +66,8 @@ pub fn converted(codes: &[(usize, u16)], registers: Registers) {
 #[test]
 fn a_sample_has_both_motors_and_the_link_in_si_units() {
     let registers = Model::started().registers;
-    let operator = DualOperator::new(DualMailboxes::new());
-    let mut control = control(registers, &operator);
+    let state = PositionState::new();
+    let mut control = control(registers, &state);
     // Channels of U, V, W: 2, 7, 14 and 15, 5, 4; capacitors 6, source 9, inductor 1.
     let codes = [
         (2, 2_148),
@@ -91,7 +90,6 @@ fn a_sample_has_both_motors_and_the_link_in_si_units() {
     registers.tim4.cnt().write(|w| w.set_cnt(299));
     registers.tim3.cnt().write(|w| w.set_cnt(599));
     converted(&codes, registers);
-    operator.desk.allow_from(permitted([50.0, -20.0], 600.0), NOW);
     let sample = control.sample(NOW);
     let unit = 150.0 / 2_048.0;
     let [upper, lower] = sample.currents_a;
@@ -100,9 +98,7 @@ fn a_sample_has_both_motors_and_the_link_in_si_units() {
     assert!((sample.capacitor_v - 533.0).abs() < 0.5 && (sample.source_v - 400.0).abs() < 0.5);
     assert_eq!(sample.inductor_a, 1_000.0 * unit);
     assert_eq!(sample.angles, [Some(Angle(1 << 30)), Some(Angle(1 << 31))]);
-    let torque = |torque_nm| MotorDemand::Torque(Demand { torque_nm, slew_limited: true });
-    assert_eq!(sample.demands, [torque(50.0), torque(-20.0)]);
-    assert_eq!((sample.link_ref_v, sample.enable), (600.0, true));
+    assert!(sample.may_pulse);
 }
 
 #[test]
@@ -118,9 +114,8 @@ fn the_gates_wait_for_both_indices_the_enable_input_and_quiet_breaks() {
     ];
     for (enabled, spoil) in cases {
         let registers = Model::started().registers;
-        let operator = DualOperator::new(DualMailboxes::new());
-        let mut control = control(registers, &operator);
-        operator.desk.allow_from(permitted([0.0; 2], 600.0), NOW);
+        let state = PositionState::new();
+        let mut control = control(registers, &state);
         converted(&[], registers);
         make_ready(&registers);
         spoil(&registers);
@@ -128,16 +123,16 @@ fn the_gates_wait_for_both_indices_the_enable_input_and_quiet_breaks() {
         converted(&[], registers);
         let sample = control.sample(NOW);
         let known = sample.angles.iter().all(Option::is_some);
-        assert_eq!(sample.enable && known, enabled);
-        assert_eq!(operator.position.is_known(), known, "an angle that is not known is none");
+        assert_eq!(sample.may_pulse && known, enabled);
+        assert_eq!(state.is_known(), known, "an angle that is not known is none");
     }
 }
 
 #[test]
 fn an_index_at_the_wrong_count_is_a_lost_sensor() {
     let registers = Model::started().registers;
-    let operator = DualOperator::new(DualMailboxes::new());
-    let mut control = control(registers, &operator);
+    let state = PositionState::new();
+    let mut control = control(registers, &state);
     let mut sample = |count, index| {
         registers.tim3.cnt().write(|w| w.set_cnt(count));
         control_update(&registers);
@@ -152,7 +147,7 @@ fn an_index_at_the_wrong_count_is_a_lost_sensor() {
     assert_eq!(sample(3_904, false), [true, true]);
     assert_eq!(sample(5, true), [true, false], "96 counts back, then 197 forward");
     assert_eq!(sample(0, false), [true, false], "for good");
-    assert!(operator.position.is_lost() && !operator.position.is_known());
+    assert!(state.is_lost() && !state.is_known());
 }
 
 #[test]
@@ -163,8 +158,8 @@ fn converters_that_are_silent_give_no_number() {
     }
     let sample = Pwm::new(registers, zeros()).sample(NOW);
     assert!(sample.currents_a.iter().all(|current| current.a.is_nan()) && sample.source_v.is_nan());
-    let operator = DualOperator::new(DualMailboxes::new());
-    assert!(control(registers, &operator).sample(NOW).inductor_a.is_nan());
+    let state = PositionState::new();
+    assert!(control(registers, &state).sample(NOW).inductor_a.is_nan());
 }
 
 #[test]
@@ -204,8 +199,8 @@ fn two_marked_words_are_what_the_gates_did() {
 #[test]
 fn an_overrun_is_counted_from_the_deadline() {
     let registers = Model::started().registers;
-    let operator = DualOperator::new(DualMailboxes::new());
-    let mut control = control(registers, &operator);
+    let state = PositionState::new();
+    let mut control = control(registers, &state);
     let deadline = CLOCK.control_ticks / 2;
     for (count, again, late) in [(deadline, false, 0), (deadline + 7, false, 7), (3, true, deadline + 3)] {
         registers.tim2.cnt().write_value(count);
@@ -215,13 +210,11 @@ fn an_overrun_is_counted_from_the_deadline() {
 }
 
 #[test]
-fn nothing_is_permitted_before_the_operator_says_so() {
-    let registers = Model::started().registers;
-    let operator = DualOperator::new(DualMailboxes::new());
-    let mut control = control(registers, &operator);
-    converted(&[], registers);
-    make_ready(&registers);
-    let sample = control.sample(NOW);
-    assert_eq!((sample.enable, sample.link_ref_v), (false, STAGE.link_ref_v));
-    assert_eq!(sample.demands, permitted([0.0; 2], 0.0).demands);
+fn the_link_is_the_boards_until_the_operator_names_a_voltage() {
+    let state = PositionState::new();
+    let mut control = control(Model::started().registers, &state);
+    let command = control.command(NOW, || DualDriveCommand::NONE);
+    assert_eq!(command, DualDriveCommand { link_ref_v: STAGE.link_ref_v, ..DualDriveCommand::NONE });
+    let named = permitted([50.0, -20.0], 600.0);
+    assert_eq!(control.command(NOW, || named), named);
 }

@@ -1,31 +1,61 @@
-//! Between the operator in the idle loop and the control interrupt: words with instants, so that the same control period sees the same
-//! permit wherever the idle loop stood.
+//! The mailboxes between the operator in the idle loop and the control interrupt: words with instants, so that the same control period
+//! sees the same command wherever the idle loop stood.
 
-use super::{DriveCommand, DualDriveCommand, DualObservation, Observation, SLOT_PERIODS};
 use crate::cell::{Mailbox, Seqlock, Words};
 use crate::control::{Demand, LinkWindow};
 use crate::modulation::Mode;
-use crate::ports::DualReport;
-use crate::ports::MotorDemand;
-use crate::ports::Report;
-use crate::protection::Trip;
-use crate::protection::trip_from_words;
-use crate::protection::trip_to_words;
+use crate::nine_switch::Scheme;
+use crate::ports::{DriveCommand, DualDriveCommand, DualReport, MotorDemand, Report};
+use crate::protection::{Trip, trip_from_words, trip_to_words};
 use crate::time::{Clock, Instant};
 use core::sync::atomic::{AtomicU32, Ordering};
 
-/// A permit of any drive.
-pub trait Grant: Copy {
-    /// Nothing.
-    const NONE: Self;
+/// Control periods in a slot, the operator's step.
+pub const SLOT_PERIODS: u32 = 10;
+
+/// Between the PMaSynRM drive's operator and its control interrupt.
+pub type OperatorMailboxes = Mailboxes<DriveCommand, Observation, 7, 12>;
+/// Between the ZS9's operator and its control interrupt.
+pub type DualOperatorMailboxes = Mailboxes<DualDriveCommand, DualObservation, 7, 17>;
+
+/// The drive's observation of itself: words of one control interrupt.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Observation {
+    /// The control instant.
+    pub at: Instant,
+    /// DC-link voltage, in V.
+    pub udc_v: f32,
+    /// Largest magnitude of a phase current, in A.
+    pub current_a: f32,
+    /// Electrical angular speed, in rad/s.
+    pub omega: f32,
+    /// `true` once the speed has been followed long enough to be used.
+    pub speed_known: bool,
+    /// Torque demand after envelope, slew and limits, in N·m.
+    pub torque_nm: f32,
+    /// The fault that either side has latched.
+    pub trip: Option<Trip>,
+    /// Number of the last acknowledge that both sides have carried out.
+    pub acknowledged: u8,
+    /// Current reference, d axis, in A.
+    pub id_ref_a: f32,
+    /// Current reference, q axis, in A.
+    pub iq_ref_a: f32,
+    /// Commanded fundamental, peak phase, in V.
+    pub voltage_v: f32,
+    /// Pulse pattern that control worked for.
+    pub mode: Mode,
 }
 
-impl Grant for DriveCommand {
-    const NONE: Self = Self::NONE;
-}
-
-impl Grant for DualDriveCommand {
-    const NONE: Self = Self::NONE;
+/// The ZS9's observation of itself: words of one control interrupt.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct DualObservation {
+    /// The control instant.
+    pub at: Instant,
+    /// The report of its control task.
+    pub report: DualReport,
 }
 
 /// The observation that a drive makes of itself in the control interrupt that begins a slot.
@@ -91,10 +121,10 @@ impl Slotted for DualObservation {
     }
 }
 
-/// A permit and from when on it holds; that is the first word.
+/// A command and from when on it holds; that is the first word.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Timed<P> {
-    permit: P,
+pub struct Timed<C> {
+    command: C,
     from: Instant,
 }
 
@@ -103,7 +133,7 @@ const FROM: usize = 0;
 
 impl Words<7> for Timed<DriveCommand> {
     fn to_words(self) -> [u32; 7] {
-        let DriveCommand { enable, demand, window, acknowledge } = self.permit;
+        let DriveCommand { enable, demand, window, acknowledge } = self.command;
         let flags = u32::from(enable) | u32::from(demand.slew_limited) << 1 | u32::from(acknowledge) << 8;
         [
             self.from.0,
@@ -119,7 +149,7 @@ impl Words<7> for Timed<DriveCommand> {
     fn from_words(words: [u32; 7]) -> Self {
         let [from, flags, torque, motoring_none, motoring_full, braking_full, braking_none] = words;
         Self {
-            permit: DriveCommand {
+            command: DriveCommand {
                 enable: flags & 1 != 0,
                 demand: Demand { torque_nm: f32::from_bits(torque), slew_limited: flags & 2 != 0 },
                 window: LinkWindow {
@@ -137,7 +167,8 @@ impl Words<7> for Timed<DriveCommand> {
 
 impl Words<7> for Timed<DualDriveCommand> {
     fn to_words(self) -> [u32; 7] {
-        let DualDriveCommand { enable, demands, speed_torque_nm, link_ref_v, acknowledge } = self.permit;
+        let DualDriveCommand { enable, demands, speed_torque_nm, link_ref_v, scheme, acknowledge } =
+            self.command;
         let word = |demand| match demand {
             MotorDemand::Torque(Demand { torque_nm, .. }) => (0, torque_nm.to_bits()),
             MotorDemand::Speed(speed) => (1, speed.to_bits()),
@@ -145,6 +176,7 @@ impl Words<7> for Timed<DualDriveCommand> {
         let [(kind1, d1), (kind2, d2)] = demands.map(word);
         let [l1, l2] = speed_torque_nm.map(f32::to_bits);
         let flags = u32::from(enable) | kind1 << 1 | kind2 << 2 | u32::from(acknowledge) << 8;
+        let flags = flags | (scheme as u32) << 16;
         [self.from.0, flags, d1, d2, l1, l2, link_ref_v.to_bits()]
     }
 
@@ -155,11 +187,12 @@ impl Words<7> for Timed<DualDriveCommand> {
             _ => MotorDemand::Speed(f32::from_bits(word)),
         };
         Self {
-            permit: DualDriveCommand {
+            command: DualDriveCommand {
                 enable: flags & 1 != 0,
                 demands: [demand(2, d1), demand(4, d2)],
                 speed_torque_nm: [l1, l2].map(f32::from_bits),
                 link_ref_v: f32::from_bits(link_ref),
+                scheme: Scheme::from_code(flags >> 16),
                 acknowledge: (flags >> 8) as u8,
             },
             from: Instant(from),
@@ -211,38 +244,38 @@ impl Words<17> for DualObservation {
     }
 }
 
-/// Permit down, observation up.
-pub struct Mailboxes<P, O, const PERMIT: usize, const OBSERVATION: usize> {
-    permit: Mailbox<Timed<P>, PERMIT>,
+/// Commands down, observations up.
+pub struct Mailboxes<C, O, const COMMAND: usize, const OBSERVATION: usize> {
+    command: Mailbox<Timed<C>, COMMAND>,
     observed: Seqlock<O, OBSERVATION>,
     /// Control periods until the next slot.
     left: AtomicU32,
 }
 
-impl<P, O, const PERMIT: usize, const OBSERVATION: usize> Mailboxes<P, O, PERMIT, OBSERVATION>
+impl<C, O, const COMMAND: usize, const OBSERVATION: usize> Mailboxes<C, O, COMMAND, OBSERVATION>
 where
-    P: Grant,
+    C: Default,
     O: Slotted + Words<OBSERVATION>,
-    Timed<P>: Words<PERMIT>,
+    Timed<C>: Words<COMMAND>,
 {
-    /// Nothing permitted, nothing seen.
+    /// Nothing commanded, nothing seen.
     #[cfg(not(loom))]
     pub const fn new() -> Self {
-        Self { permit: Mailbox::new(), observed: Seqlock::new(), left: AtomicU32::new(0) }
+        Self { command: Mailbox::new(), observed: Seqlock::new(), left: AtomicU32::new(0) }
     }
 
-    /// In the control interrupt: what is permitted at `now`; nothing before the first permit.
+    /// In the control interrupt: what is commanded at `now`; nothing before the first command.
     #[inline]
-    pub fn permit(&self, now: Instant) -> P {
-        match self.permit.newest(|timed| now.reached(Instant(timed.word::<FROM>()))) {
-            Some(timed) => timed.permit,
-            None => P::NONE,
+    pub(super) fn command(&self, now: Instant) -> C {
+        match self.command.newest(|timed| now.reached(Instant(timed.word::<FROM>()))) {
+            Some(timed) => timed.command,
+            None => C::default(),
         }
     }
 
     /// In the control interrupt: what it did at `now`. The first of every [`SLOT_PERIODS`] begins a slot.
     #[inline]
-    pub fn tell(&self, now: Instant, report: &O::Report) {
+    pub(super) fn tell(&self, now: Instant, report: &O::Report) {
         let left = self.left.load(Ordering::Relaxed);
         if left > 0 {
             self.left.store(left - 1, Ordering::Relaxed);
@@ -258,25 +291,18 @@ where
         self.observed.read()
     }
 
-    /// In the idle loop, once a slot: what is permitted from the next slot's beginning on. Returns that instant.
-    pub fn allow(&self, permit: P, observed: &O, clock: &Clock) -> Instant {
-        let from = next_slot(observed.at(), clock);
-        self.allow_from(permit, from);
-        from
-    }
-
-    /// The same from an instant of one's own on.
-    pub fn allow_from(&self, permit: P, from: Instant) {
-        self.permit.publish(Timed { permit, from });
+    /// In the idle loop: what is commanded from an instant on, in a slot the next slot's beginning.
+    pub fn publish(&self, command: C, from: Instant) {
+        self.command.publish(Timed { command, from });
     }
 }
 
 #[cfg(not(loom))]
-impl<P, O, const PERMIT: usize, const OBSERVATION: usize> Default for Mailboxes<P, O, PERMIT, OBSERVATION>
+impl<C, O, const COMMAND: usize, const OBSERVATION: usize> Default for Mailboxes<C, O, COMMAND, OBSERVATION>
 where
-    P: Grant,
+    C: Default,
     O: Slotted + Words<OBSERVATION>,
-    Timed<P>: Words<PERMIT>,
+    Timed<C>: Words<COMMAND>,
 {
     fn default() -> Self {
         Self::new()
@@ -284,12 +310,12 @@ where
 }
 
 /// The slot after the one that begins at `at`.
-pub(super) fn next_slot(at: Instant, clock: &Clock) -> Instant {
+pub fn next_slot(at: Instant, clock: &Clock) -> Instant {
     at.after(SLOT_PERIODS.wrapping_mul(clock.control_ticks))
 }
 
 /// Slots from the one that began at `done` to the one at `at`, 1 at least.
-pub(super) fn slots_between(done: Instant, at: Instant, clock: &Clock) -> u32 {
+pub fn slots_between(done: Instant, at: Instant, clock: &Clock) -> u32 {
     let ticks = at.since(done).unsigned_abs();
     (ticks / SLOT_PERIODS.wrapping_mul(clock.control_ticks).max(1)).max(1)
 }
