@@ -67,6 +67,8 @@ pub struct Row {
     pub u_v: f64,
     /// DC-link voltage, in V.
     pub udc_v: f64,
+    /// Current out of the line, in A; `None` without a line filter.
+    pub line_a: Option<f64>,
     /// Stator frequency as control knows it, in Hz.
     pub f1_hz: f64,
     /// Control's estimate of how much the machine's flux linkage exceeds the map's, as a share.

@@ -4,15 +4,15 @@
 //! operating point is made once for each command, and the voltage once.
 
 use super::{
-    Boundary, Committed, Demand, Law, LinkWindow, ModeLimits, Region, Regulated, RotorSample, VoltageLimit,
-    VoltageVector, current_loop, demand, disturbance, flux_path, link_filter, map_error, operating_point,
-    speed, torque_nm, torque_trim,
+    Boundary, Committed, Demand, Law, LinkSwing, LinkWindow, ModeLimits, Region, Regulated, RotorSample,
+    VoltageLimit, VoltageVector, current_loop, demand, disturbance, flux_path, link_filter, map_error,
+    operating_point, speed, torque_nm, torque_trim,
 };
 use crate::frames::{Angle, Dq, six_step_v};
 use crate::machine::Tables;
 use crate::time::Clock;
 
-/// The trim's assumed addition to an MTPA point's voltage, as shares of six-step and of the largest torque. Chosen by trial: by the maps of the
+/// Assumed addition of the trim and of the link's damping to an MTPA point's voltage, as shares of six-step and of the largest torque. Chosen by trial: by the maps of the
 /// 180 kW machine it adds 0.55 at half torque and 0.76 at full torque; with none the mode hunts on a wrong map.
 const DEPTH_PER_TORQUE: f32 = 0.4;
 
@@ -28,8 +28,8 @@ pub struct Target {
     pub flux: Dq,
     /// The source of the reference.
     pub region: Region,
-    /// Fundamental that the MTPA point asks for at this speed, as a share of six-step. Without what the torque's trim adds: that is
-    /// each mode's own, and a mode chosen by it would not last.
+    /// Fundamental that the MTPA point asks for at this speed, as a share of six-step on the link's slow value. Without what the torque's
+    /// trim adds, which is each mode's own, and without what the link's damping adds: a mode chosen by them would not last.
     pub depth: f32,
     /// Largest fundamental that may be made, peak phase, in V.
     pub voltage_limit_v: f32,
@@ -56,6 +56,8 @@ pub struct AimInput<'a> {
     pub window: Option<&'a LinkWindow>,
     /// DC-link voltage, in V.
     pub udc_v: f32,
+    /// The link's swing, where it is to be damped.
+    pub swing: Option<LinkSwing>,
     /// The limits of the mode.
     pub limits: &'a ModeLimits,
 }
@@ -194,7 +196,7 @@ impl Controller {
 
     /// Makes the operating point, once for each command; call after [`Controller::observe`].
     pub fn aim(&mut self, input: &AimInput, law: &Law) {
-        let AimInput { demand, window, udc_v, limits } = *input;
+        let AimInput { demand, window, udc_v, swing, limits } = *input;
         let (tables, omega) = (law.tables, self.speed.omega());
         let ratings = &tables.ratings;
         let scale = self.map_error.scale();
@@ -209,7 +211,11 @@ impl Controller {
         let depth = limits.depth_limit * limits.steady_share;
         let limit = VoltageLimit { udc_v: link.slow_v / scale, depth, filled: limits.filled };
         let trim_nm = self.trim.trim_nm(demand_nm, limits.ripple_share, ratings.max_torque_nm);
-        let trimmed_nm = if demand_nm < 0.0 { demand_nm - trim_nm } else { demand_nm + trim_nm };
+        let damping_nm = swing.map_or(0.0, |swing| {
+            swing.damping_nm(law.gains.link_damping, demand_nm, omega, ratings.max_torque_nm)
+        });
+        let more_nm = trim_nm + damping_nm;
+        let trimmed_nm = if demand_nm < 0.0 { demand_nm - more_nm } else { demand_nm + more_nm };
         let point = operating_point(trimmed_nm / scale, omega, &limit, tables);
         let limited = point.region == Region::Limit;
         let given_nm = if limited { nearer_zero(point.torque_nm * scale, demand_nm) } else { demand_nm };
@@ -229,7 +235,8 @@ impl Controller {
             current: point.current,
             flux: self.path.step(point.flux, way, omega, period_s),
             region: point.region,
-            depth: point.depth - DEPTH_PER_TORQUE / ratings.max_torque_nm * trim_nm,
+            depth: point.depth * swing.map_or(1.0, |swing| link.slow_v / swing.slow_v)
+                - DEPTH_PER_TORQUE / ratings.max_torque_nm * more_nm,
             voltage_limit_v: limits.depth_limit * six_step_v(link.usable_v),
         };
     }

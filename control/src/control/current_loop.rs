@@ -88,6 +88,9 @@ pub struct Gains {
     /// Turn in a carrier half, in rad, up to which the integral part follows six times the stator frequency (what dead time
     /// leaves); 0: never.
     pub sixth_turn_rad: f32,
+    /// Percent of torque by which a motoring drive follows a percent of swing of its link, so that a line filter in front of it is damped;
+    /// 0: none.
+    pub link_damping: f32,
 }
 
 impl Gains {
@@ -98,6 +101,7 @@ impl Gains {
         square_damping: 0.5,
         observer: 0.02,
         sixth_turn_rad: 1.0,
+        link_damping: 3.0,
     };
     /// The same without what would compensate a dead time's harmonics.
     pub const WITHOUT_SIXTH: Self = Self { sixth_turn_rad: 0.0, ..Self::DEFAULT };

@@ -71,12 +71,26 @@ pub fn common(recording: &Recording) -> Figures {
     let told: Vec<_> = rows.iter().map(|row| row.map_error).filter(|share| *share != 0.0).collect();
     figures.set("map_error_estimate_percent", 100.0 * told.iter().sum::<f64>() / told.len().max(1) as f64);
     figures.set("most_turn_ons_in_100_ms", most_turn_ons(recording, 0.1));
+    let line_a = rows.iter().filter_map(|row| row.line_a).map(f64::abs).reduce(f64::max);
+    if let Some(line_a) = line_a {
+        let link_v = rows.iter().map(|row| row.udc_v);
+        figures.set("peak_line_current_a", line_a);
+        figures.set("lowest_link_v", link_v.clone().fold(f64::INFINITY, f64::min));
+        figures.set("highest_link_v", link_v.fold(0.0, f64::max));
+    }
     figures
 }
 
 /// The rows from `from_s` (included) to `to_s` (excluded).
 pub fn window(recording: &Recording, from_s: f64, to_s: f64) -> &[Row] {
     between(&recording.rows, from_s, to_s)
+}
+
+/// Half the excursion of the link in some rows, as a share of its voltage.
+pub fn link_swing(rows: &[Row]) -> f64 {
+    let links = || rows.iter().map(|row| row.udc_v);
+    let (low_v, high_v) = (links().fold(f64::INFINITY, f64::min), links().fold(0.0, f64::max));
+    (high_v - low_v) / (high_v + low_v)
 }
 
 /// The largest number of times that any one device turns on in any window of this length.

@@ -61,6 +61,15 @@ impl DcSide {
         }
     }
 
+    /// Current out of the line, in A; `None` where there is no line filter.
+    pub fn line_a(&self) -> Option<f64> {
+        match self {
+            Self::Filtered(link) => Some(link.choke_a),
+            Self::Operated(line) => line.choke_a(),
+            Self::Stiff => None,
+        }
+    }
+
     /// Lets the plant run on it for `dt_s`.
     pub fn advance(
         &mut self,

@@ -80,6 +80,11 @@ impl LineSide {
         }
     }
 
+    /// Current in the choke, in A; `None` where there is none.
+    pub fn choke_a(&self) -> Option<f64> {
+        (self.link.settings.source.inductance_h > 0.0).then_some(self.link.choke_a)
+    }
+
     /// The balance of the link's energy since tick 0.
     pub fn balance(&self) -> LinkBalance {
         let energies = self.link.energies;

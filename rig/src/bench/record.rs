@@ -105,6 +105,7 @@ impl Bench {
             ic_a,
             u_v: report.voltage_v.into(),
             udc_v: self.udc_v(t_s),
+            line_a: self.dc.line_a(),
             f1_hz: report.frequency_hz.into(),
             map_error: report.map_error.into(),
             mode: if self.inverter.is_safe() { Mode::Off } else { self.inverter.half().mode },

@@ -1,7 +1,8 @@
 //! The DC link: a capacitor between source, resistors and inverter.
 //!
 //! `C du/dt = i_source − u/R_discharge − u/R_chopper − i_inverter`, with `i_source = (U − u)/R` through whatever contactor is
-//! closed; a rectifier gives current only, a reversible source takes it too.
+//! closed, or, where there is a choke, `L di_source/dt = U − u − R i_source` through the main one; a rectifier gives current only, a
+//! reversible source takes it too.
 
 /// The source of the link's energy.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -10,6 +11,8 @@ pub struct Source {
     pub voltage_v: f64,
     /// Inner resistance, in ohm.
     pub resistance_ohm: f64,
+    /// Choke between it and the link, in H; 0: none.
+    pub inductance_h: f64,
     /// `true` if it takes energy back; a rectifier does not.
     pub reversible: bool,
 }
@@ -66,27 +69,57 @@ pub struct DcLink {
     pub switches: LinkSwitches,
     /// Voltage, in V.
     pub udc_v: f64,
+    /// Current in the choke, in A; 0 without one.
+    pub choke_a: f64,
     /// Energies since the beginning.
     pub energies: LinkEnergies,
 }
 
-/// Rates of change: the voltage and the energies in their order.
-pub(super) type LinkSlopes = [f64; 6];
+/// Rates of change: the voltage, the choke's current and the energies in their order.
+pub(super) type LinkSlopes = [f64; 7];
 
 impl DcLink {
     /// Empty, everything open.
     pub fn new(settings: DcLinkSettings) -> Self {
-        Self { settings, switches: LinkSwitches::default(), udc_v: 0.0, energies: LinkEnergies::default() }
+        Self {
+            settings,
+            switches: LinkSwitches::default(),
+            udc_v: 0.0,
+            choke_a: 0.0,
+            energies: LinkEnergies::default(),
+        }
     }
 
-    /// Energy in the capacitor, in J.
+    /// Energy in capacitor and choke, in J.
     pub fn stored_j(&self) -> f64 {
-        0.5 * self.settings.capacitance_f * self.udc_v * self.udc_v
+        0.5 * self.settings.capacitance_f * self.udc_v * self.udc_v + self.choke_j()
+    }
+
+    fn choke_j(&self) -> f64 {
+        0.5 * self.settings.source.inductance_h * self.choke_a * self.choke_a
+    }
+
+    /// `true` if the source gives its current through the choke: past the precharge resistor, which is far more than the choke.
+    fn is_choked(&self) -> bool {
+        self.switches.main && self.settings.source.inductance_h > 0.0
+    }
+
+    /// Rate of the choke's current at a link voltage, in A/s.
+    fn choke_slope(&self, udc_v: f64, choke_a: f64) -> f64 {
+        let Source { voltage_v, resistance_ohm, inductance_h, reversible } = self.settings.source;
+        if !self.is_choked() {
+            return 0.0;
+        }
+        let slope = (voltage_v - udc_v - resistance_ohm * choke_a) / inductance_h;
+        if reversible || choke_a > 0.0 { slope } else { slope.max(0.0) }
     }
 
     /// Current that the source gives at a link voltage, and the resistance that it flows through.
-    fn source(&self, udc_v: f64) -> (f64, f64) {
-        let Source { voltage_v, resistance_ohm, reversible } = self.settings.source;
+    fn source(&self, udc_v: f64, choke_a: f64) -> (f64, f64) {
+        let Source { voltage_v, resistance_ohm, reversible, .. } = self.settings.source;
+        if self.is_choked() {
+            return (choke_a, resistance_ohm);
+        }
         let resistance = match self.switches {
             LinkSwitches { main: true, .. } => resistance_ohm,
             LinkSwitches { precharge: true, .. } => resistance_ohm + self.settings.precharge_ohm,
@@ -96,14 +129,15 @@ impl DcLink {
         (if reversible { current } else { current.max(0.0) }, resistance)
     }
 
-    pub(super) fn slopes(&self, udc_v: f64, inverter_a: f64) -> LinkSlopes {
+    pub(super) fn slopes(&self, udc_v: f64, choke_a: f64, inverter_a: f64) -> LinkSlopes {
         let DcLinkSettings { capacitance_f, discharge_ohm, chopper_ohm, source, .. } = self.settings;
-        let (source_a, path_ohm) = self.source(udc_v);
+        let (source_a, path_ohm) = self.source(udc_v, choke_a);
         let through = |on: bool, ohm: f64| if on { udc_v / ohm } else { 0.0 };
         let discharge_a = through(self.switches.discharge, discharge_ohm);
         let chopper_a = through(self.switches.chopper, chopper_ohm);
         [
             (source_a - discharge_a - chopper_a - inverter_a) / capacitance_f,
+            self.choke_slope(udc_v, choke_a),
             source.voltage_v * source_a,
             path_ohm * source_a * source_a,
             udc_v * discharge_a,
@@ -112,8 +146,14 @@ impl DcLink {
         ]
     }
 
-    pub(super) fn finish(&mut self, udc_v: f64, energies: [f64; 5]) {
+    pub(super) fn finish(&mut self, udc_v: f64, choke_a: f64, energies: [f64; 5]) {
         self.udc_v = udc_v;
+        self.choke_a = if self.settings.source.reversible { choke_a } else { choke_a.max(0.0) };
+        if !self.is_choked() {
+            // The contactor's arc.
+            self.energies.path_j += self.choke_j();
+            self.choke_a = 0.0;
+        }
         let [source, path, discharge, chopper, inverter] = energies;
         self.energies.source_j += source;
         self.energies.path_j += path;

@@ -1,7 +1,10 @@
 //! The DC link behind the supply line's choke.
 
+use serde::Serialize;
+use std::str::FromStr;
+
 /// Choke and capacitor between the line and the inverter.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct LineFilter {
     /// Inductance of line and choke, in H.
     pub inductance_h: f64,
@@ -16,6 +19,30 @@ impl LineFilter {
     pub const TRACTION: Self = Self { inductance_h: 3e-3, resistance_ohm: 0.3, capacitance_f: 4e-3 };
 }
 
+impl FromStr for LineFilter {
+    type Err = String;
+
+    /// Written `L_MH,C_MF,R_MOHM`.
+    fn from_str(text: &str) -> Result<Self, String> {
+        let parse = || {
+            let parts = text.split(',').map(|part| part.parse::<f64>().ok()).collect::<Option<Vec<_>>>()?;
+            let &[inductance_mh, capacitance_mf, resistance_mohm] = parts.as_slice() else { return None };
+            let is_good = |low: f64, value: f64, high: f64| (low..=high).contains(&value);
+            let good = is_good(0.1, inductance_mh, 1e3)
+                && is_good(0.1, capacitance_mf, 1e3)
+                && is_good(0.0, resistance_mohm, 1e3);
+            good.then_some(Self {
+                inductance_h: 1e-3 * inductance_mh,
+                resistance_ohm: 1e-3 * resistance_mohm,
+                capacitance_f: 1e-3 * capacitance_mf,
+            })
+        };
+        parse().ok_or_else(|| {
+            "must be L_MH,C_MF,R_MOHM (0.1 to 1,000 mH and mF, 0 to 1,000 mΩ), for instance 3,4,30".to_owned()
+        })
+    }
+}
+
 /// The slope of a line that fails, in V/s.
 const LINE_SLOPE_V_S: f64 = 50e3;
 /// Longest step of the choke's current, in s.
@@ -28,7 +55,7 @@ pub struct FilteredLink {
     /// Voltage of the line, in V.
     line_v: f64,
     /// Current out of the line, in A.
-    choke_a: f64,
+    pub choke_a: f64,
     /// Its voltage, in V.
     pub udc_v: f64,
 }

@@ -54,8 +54,8 @@ pub struct Plant {
 
 /// The quantities that are integrated: id, iq, electrical energy, copper loss, the torque's impulse.
 type State = [f64; 5];
-/// The same, and of the link its voltage and its five energies.
-type LinkedState = [f64; 11];
+/// The same, and of the link its voltage, its choke's current and its five energies.
+type LinkedState = [f64; 12];
 
 impl Plant {
     /// At rest electrically, angle zero, turning as the speed source says.
@@ -110,16 +110,31 @@ impl Plant {
 
     /// The same with the link's voltage as one more state: what the legs take of its current is what they give the machine.
     fn step_on(&mut self, link: &mut DcLink, legs: [Leg; 3], dt_s: f64) {
-        let y0: LinkedState =
-            [self.motor.id_a, self.motor.iq_a, 0.0, 0.0, 0.0, link.udc_v, 0.0, 0.0, 0.0, 0.0, 0.0];
-        let [id, iq, electrical, copper, impulse, udc_v, energies @ ..] =
+        let y0: LinkedState = [
+            self.motor.id_a,
+            self.motor.iq_a,
+            0.0,
+            0.0,
+            0.0,
+            link.udc_v,
+            link.choke_a,
+            0.0,
+            0.0,
+            0.0,
+            0.0,
+            0.0,
+        ];
+        let [id, iq, electrical, copper, impulse, udc_v, choke_a, energies @ ..] =
             self.integrate(&y0, dt_s, |y, frame, omega| {
                 let ([id, iq, electrical, copper, impulse], current) =
                     self.slope((y[0], y[1]), legs, y[5], frame, omega);
-                let [udc, source, path, discharge, chopper, inverter] = link.slopes(y[5], current);
-                [id, iq, electrical, copper, impulse, udc, source, path, discharge, chopper, inverter]
+                let link_slopes = link.slopes(y[5], y[6], current);
+                let mut slopes = [0.0; 12];
+                slopes[..5].copy_from_slice(&[id, iq, electrical, copper, impulse]);
+                slopes[5..].copy_from_slice(&link_slopes);
+                slopes
             });
-        link.finish(udc_v, energies);
+        link.finish(udc_v, choke_a, energies);
         self.finish([id, iq, electrical, copper, impulse], dt_s);
     }
 

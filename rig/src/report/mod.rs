@@ -112,6 +112,15 @@ impl Page {
         self.curves(&self.heading(title), "time in s", unit, &series);
     }
 
+    /// Link voltage and current out of the line; nothing without a line filter.
+    pub fn line(&mut self, recording: &Recording) {
+        if recording.rows.iter().any(|row| row.line_a.is_some()) {
+            self.plot("DC link behind the line filter", "V", recording, &[("udc", |row| row.udc_v)]);
+            let curves: [Curve; 1] = [("line current", |row| row.line_a.unwrap_or(0.0))];
+            self.plot("Current out of the line", "A", recording, &curves);
+        }
+    }
+
     /// The flight recorder's records of a fault; nothing if there was none.
     pub fn recorder(&mut self, recording: &Recording) {
         let panels: [Panel<Record>; 3] = [

@@ -94,7 +94,7 @@ pub fn write<S: System>(
         write_text(&out.join("overview.svg"), &overview)?;
     }
     let mut page = Page::new(choice.name, choice.figure);
-    S::draw_recorder(recording, &mut page);
+    S::draw_common(recording, &mut page);
     choice.scenario.plots(recording, &choice.with_step(), machine, &mut page);
     let subtitle = format!("tractive {}, run on {}", env!("CARGO_PKG_VERSION"), choice.options.on.name());
     write_text(&out.join("report.html"), &page.finish(&subtitle, figures)?)

@@ -43,8 +43,8 @@ pub trait System: Sized + 'static {
     ) -> Result<Self::Recording>;
     /// Figures of a scenario that is about nothing in particular.
     fn figures(recording: &Self::Recording) -> Figures;
-    /// Draws what the flight recorder holds of a fault; nothing if there was none.
-    fn draw_recorder(recording: &Self::Recording, page: &mut Page);
+    /// Draws what every scenario shows: what the flight recorder holds of a fault, and a line behind a filter; nothing without them.
+    fn draw_common(recording: &Self::Recording, page: &mut Page);
     /// One picture of the whole run, if the system has one.
     fn overview(_recording: &Self::Recording) -> Result<Option<String>> {
         Ok(None)

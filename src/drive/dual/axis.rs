@@ -178,8 +178,13 @@ impl Axis {
         self.controller.observe(&sample, tables);
         self.controller.learn(&boundary, &sample, limits.follows, &law);
         if input.aims || before.is_none() {
-            let aim =
-                AimInput { demand: &demand, window: None, udc_v: input.measured.udc_v, limits: &limits };
+            let aim = AimInput {
+                demand: &demand,
+                window: None,
+                udc_v: input.measured.udc_v,
+                swing: None,
+                limits: &limits,
+            };
             self.controller.aim(&aim, &law);
         }
         let voltage = self.controller.regulate(&sample, &committed, &limits, &law);

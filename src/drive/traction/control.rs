@@ -4,7 +4,7 @@ use super::applied::{Applied, NO_LIMITS, Passed, Steady, Wanted, committed, foll
 use super::six_step_exit::SixStepExit;
 use super::slot::{Decision, Slot};
 use super::{Settings, Shared};
-use crate::control::{AimInput, Controller, Demand, Law, Measurements, ModeLimits, RotorSample};
+use crate::control::{AimInput, Controller, Demand, Law, LinkDamper, Measurements, ModeLimits, RotorSample};
 use crate::drive::PeriodInput;
 use crate::drive::acknowledge::Acknowledge;
 use crate::drive::messages::{Gates, VoltageCommand};
@@ -44,6 +44,7 @@ pub struct ControlTask<M = &'static Tables> {
     /// Fundamental that the last operating point would have without a limit and without the trim, as a share of six-step.
     depth: f32,
     exit: SixStepExit,
+    damper: LinkDamper,
     /// The last demand, in N·m, and whether it has jumped and no half has been revised for it yet.
     demand_nm: f32,
     jumped: bool,
@@ -76,6 +77,7 @@ impl<M: Machine> ControlTask<M> {
             steady_v: 0.0,
             depth: 0.0,
             exit: SixStepExit::new(),
+            damper: LinkDamper::new(),
             demand_nm: 0.0,
             jumped: false,
             reference: Reference::NONE,
@@ -214,6 +216,7 @@ impl<M: Machine> ControlTask<M> {
         self.revises = false;
         self.mode = Mode::Off;
         self.exit.rest(self.settings.clock.control_s());
+        self.damper = LinkDamper::new();
         self.reference = Reference {
             carrier_angle: sample.angle.unwrap_or(Angle::ZERO),
             rate: self.settings.clock.angle_rate(omega),
@@ -352,7 +355,10 @@ impl<M: Machine> ControlTask<M> {
         let emf_v = omega.abs() * tables.ratings.magnet_flux_wb * self.controller.map_scale();
         let torque_nm = self.exit.one_sided(command.demand.torque_nm, emf_v, udc_v, &tables.ratings);
         let demand = Demand { torque_nm, ..command.demand };
-        let aim = AimInput { demand: &demand, window: Some(&command.window), udc_v, limits: &self.limits };
+        let passed_s = self.controller.passed_s(clock);
+        let swing = Some(self.damper.step(udc_v, passed_s, omega, self.limits.follows));
+        let window = Some(&command.window);
+        let aim = AimInput { demand: &demand, window, udc_v, swing, limits: &self.limits };
         self.controller.aim(&aim, &Law { gains, clock, tables });
         let target = self.controller.target();
         self.depth = target.depth;

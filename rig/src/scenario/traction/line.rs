@@ -12,7 +12,7 @@ use tractive::operator::State;
 /// A 1,500 V line behind a rectifier, with parts of the size that a drive of 250 kW has.
 pub const LINK: DcLinkSettings = DcLinkSettings {
     capacitance_f: 6e-3,
-    source: Source { voltage_v: 1_500.0, resistance_ohm: 0.05, reversible: false },
+    source: Source { voltage_v: 1_500.0, resistance_ohm: 0.05, inductance_h: 0.0, reversible: false },
     precharge_ohm: 50.0,
     discharge_ohm: 100.0,
     chopper_ohm: 12.0,

@@ -28,7 +28,7 @@ use crate::inject::Injection;
 use crate::inject::traction::Kind;
 use crate::machine::Machine;
 use crate::options::{On, not_negative, within};
-use crate::plant::{DcLinkSettings, Plant, SpeedSource};
+use crate::plant::{DcLinkSettings, LineFilter, Plant, Source, SpeedSource};
 use crate::report::{self, Page};
 use crate::run::traction::{Tasks, run_in_qemu};
 use crate::run::{self, CLOCK, Supervisor};
@@ -64,6 +64,10 @@ pub struct TractionOptions {
     /// Rate of the control interrupt, in Hz; without it 10,000, or 20,000 for a machine whose devices switch faster than 10 kHz.
     #[arg(long, value_parser = clap::value_parser!(u32).range(1_000..=100_000))]
     pub control_hz: Option<u32>,
+    /// Line filter between a stiff source and the link: choke, link capacitor and the resistance of both, written L_MH,C_MF,R_MOHM;
+    /// without it the link itself is stiff.
+    #[arg(long, value_name = "L_MH,C_MF,R_MOHM", allow_negative_numbers = true)]
+    pub line: Option<LineFilter>,
     /// Time after its sample in which the angle is read, in µs; each time at another instant.
     #[arg(long, default_value_t = 0.0, value_parser = not_negative, allow_negative_numbers = true, hide = true)]
     pub angle_jitter_us: f64,
@@ -120,6 +124,16 @@ impl Plan {
         }
     }
 
+    /// The same with a line filter in front of the link's contactors, where the scenario has them.
+    fn behind(mut self, filter: Option<LineFilter>) -> Self {
+        if let (Some(line), Some(filter)) = (&mut self.line, filter) {
+            let LineFilter { inductance_h, resistance_ohm, capacitance_f } = filter;
+            let source = Source { inductance_h, resistance_ohm, ..line.link.source };
+            line.link = DcLinkSettings { capacitance_f, source, ..line.link };
+        }
+        self
+    }
+
     /// For a drive with a line side, whose operator permits what is driven.
     pub fn operated(duration_s: f64, speed: Vec<(f64, f64)>, line: LinePlan) -> Self {
         // What the operator permits takes the place of this.
@@ -164,6 +178,7 @@ impl System for Traction {
         machine: &Machine,
         supervisor: Option<&mut dyn Supervisor>,
     ) -> Result<Recording> {
+        let plan = plan.behind(options.own.line);
         let setup = setup(&plan, options, machine, supervisor.is_some());
         let bench = bench(plan, &setup, options, machine);
         match options.on {
@@ -193,7 +208,8 @@ impl System for Traction {
         figures
     }
 
-    fn draw_recorder(recording: &Recording, page: &mut Page) {
+    fn draw_common(recording: &Recording, page: &mut Page) {
+        page.line(recording);
         page.recorder(recording);
     }
 
@@ -267,7 +283,7 @@ fn bench(plan: Plan, setup: &Setup, options: &Options, machine: &Machine) -> Ben
         udc_v: udc_v(options, machine),
         link_steps: plan.link,
         flaws: Flaws { angle_jitter_s, freeze_at_s: plan.freeze_at_s, ..flaws },
-        supply: Supply::Stiff,
+        supply: options.own.line.map_or(Supply::Stiff, Supply::Line),
         injection: plan.injection,
         limits: Limits::NONE,
     };

@@ -48,6 +48,10 @@ impl Scenario<Traction> for Steady {
         figures.set("harmonics", measured.harmonics());
         let beside: Vec<_> = bound::beside(recording, window, options, machine).into_iter().collect();
         let mut verdicts = bound::verdicts(&beside, options).to_vec();
+        if options.own.line.is_some() {
+            let swing = analysis::link_swing(analysis::window(recording, window.0, window.1));
+            verdicts.push(Verdict::ours("swing of the link (share of its voltage)", swing, 0.03));
+        }
         if options.dead_time_us > 0.0 {
             let judged =
                 !options.own.uncompensated && (steady.speed_rpm.abs(), torque_nm.abs()) == DEAD_TIME_POINT;

@@ -156,7 +156,7 @@ impl System for Zs9 {
         figures::common(recording)
     }
 
-    fn draw_recorder(recording: &Recording, page: &mut Page) {
+    fn draw_common(recording: &Recording, page: &mut Page) {
         figures::recorder(page, recording);
     }
 }

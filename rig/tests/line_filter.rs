@@ -1,0 +1,121 @@
+//! The drive behind line filters of choke, capacitor and hardly any resistance, in every mode: no fault, and no swing of the link that stays.
+//! TRACTIVE_LINE_FILTERS=all tries the whole map of the guide.
+
+use rayon::prelude::*;
+use tractive::control::{Demand, Gains};
+use tractive::drive::traction::Settings;
+use tractive::modulation::SwitchLimits;
+use tractive::time::Instant;
+use tractive_rig::analysis;
+use tractive_rig::bench::{self, Bench, Flaws, Limits, Simulated, Supply};
+use tractive_rig::machine::Machine;
+use tractive_rig::plant::{LineFilter, Plant, PlantSettings, SpeedSource};
+use tractive_rig::run::traction::Tasks;
+use tractive_rig::run::{CLOCK, Interrupts};
+use tractive_rig::scenario::catalogue;
+use tractive_rig::trace::Recorded;
+
+/// Speed in r/min and torque in N·m: every mode, then weakening.
+const POINTS: [(f64, f64); 10] = [
+    (400.0, 1_235.0),
+    (750.0, 1_235.0),
+    (1_000.0, 1_235.0),
+    (1_300.0, 1_235.0),
+    (2_000.0, 900.0),
+    (1_905.0, 1_235.0),
+    (2_000.0, 1_176.0),
+    (3_500.0, 400.0),
+    (3_500.0, 671.0),
+    (6_000.0, 392.0),
+];
+/// mH, mF, mΩ: the corners, and the filter of the guide.
+const CORNERS: [(f64, f64, f64); 5] =
+    [(1.0, 2.0, 10.0), (8.0, 2.0, 10.0), (1.0, 8.0, 10.0), (8.0, 8.0, 10.0), (3.0, 4.0, 30.0)];
+/// Largest swing of the link in steady state, as a share of its voltage.
+const SWING: f64 = 0.03;
+/// Largest share by which the mean torque may be off.
+const TORQUE_OFF: f64 = 0.01;
+
+fn filters() -> Vec<(f64, f64, f64)> {
+    if std::env::var("TRACTIVE_LINE_FILTERS").is_err() {
+        return CORNERS.to_vec();
+    }
+    let each = |r: f64| [1.0, 3.0, 8.0].map(|l| [2.0, 4.0, 8.0].map(|c| (l, c, r)));
+    [10.0, 30.0, 100.0, 300.0].into_iter().flat_map(each).flatten().collect()
+}
+
+#[test]
+fn no_line_filter_swings_in_any_mode() {
+    let runs: Vec<_> = filters()
+        .into_iter()
+        .flat_map(|filter| POINTS.map(|point| (filter, point)))
+        .flat_map(|(filter, (rpm, nm))| [(filter, rpm, nm), (filter, rpm, -nm)])
+        .collect();
+    let lines: Vec<_> = runs
+        .par_iter()
+        .map(|((l, c, r), rpm, nm)| {
+            let command = format!("steady --speed {rpm} --torque {nm} --line {l},{c},{r}");
+            let chosen = catalogue::of_traction(&command).unwrap();
+            let recording = chosen.drive(&chosen.machine().unwrap()).unwrap();
+            let last = analysis::window(&recording, 0.9, 1.1);
+            let mean_nm = last.iter().map(|row| row.te_nm).sum::<f64>() / last.len() as f64;
+            let (swing, off) = (analysis::link_swing(last), (mean_nm - nm).abs() / 1_235.0);
+            let line = format!("{command}: link {:.2} %, torque {:.2} %", 100.0 * swing, 100.0 * off);
+            (recording.trip().is_none() && swing <= SWING && off <= TORQUE_OFF, line)
+        })
+        .collect();
+    lines.iter().for_each(|(_, line)| println!("{line}"));
+    let bad: Vec<_> = lines.iter().filter(|(good, _)| !good).collect();
+    assert!(bad.is_empty(), "{bad:#?}");
+}
+
+/// Swing of the link over the last 0.1 s of 0.6 s at 1,500 r/min and full torque behind 3 mH, 4 mF and 30 mΩ.
+fn swing_with(link_damping: f32) -> f64 {
+    let machine = Machine::load("pmasynrm-180kw").unwrap();
+    let devices = SwitchLimits::new(250, 0, machine.tables.ratings.max_switching_hz, &CLOCK);
+    let filter = LineFilter { inductance_h: 3e-3, resistance_ohm: 0.03, capacitance_f: 4e-3 };
+    let plant =
+        Plant::new(&machine.folder, SpeedSource::profile(vec![(0.0, 1_500.0)]), &PlantSettings::default());
+    let demand = |_: f64| (Demand { torque_nm: 1_235.0, slew_limited: true }, true);
+    let settings = bench::Settings {
+        clock: CLOCK,
+        first_half_ticks: devices.shortest_half_ticks,
+        dead_time_ticks: 0,
+        lead_s: 0.1,
+        duration_s: 0.6,
+        trace_step_s: 100e-6,
+        udc_v: 1_500.0,
+        link_steps: Vec::new(),
+        flaws: Flaws::default(),
+        supply: Supply::Line(filter),
+        limits: Limits::NONE,
+        injection: None,
+    };
+    let mut bench = Bench::new(plant, Box::new(demand), &settings);
+    let gains = Gains { link_damping, ..Gains::DEFAULT };
+    let settings = Settings { clock: CLOCK, devices, gains };
+    let mut tasks = Tasks::beginning_at(Instant(0), machine.tables, settings, devices.shortest_half_ticks);
+    tasks.drive(&mut bench, |_| true).unwrap();
+    analysis::link_swing(analysis::window(&bench.into_recording(Vec::new()), 0.5, 0.6))
+}
+
+#[test]
+fn without_damping_it_does() {
+    let (damped, undamped) = (swing_with(Gains::DEFAULT.link_damping), swing_with(0.0));
+    println!("link {:.2} %, undamped {:.1} %", 100.0 * damped, 100.0 * undamped);
+    assert!(damped < 0.01, "{damped}");
+    assert!(undamped > 0.05, "{undamped}");
+}
+
+/// Every scenario takes the option; what the link and the line did is in its figures.
+#[test]
+fn a_sweep_behind_a_line_filter_keeps_its_bounds() {
+    for command in ["sweep --down --line 3,4,30", "sweep --brake --line 1,2,10", "precharge --line 3,4,30"] {
+        let chosen = catalogue::of_traction(command).unwrap();
+        let machine = chosen.machine().unwrap();
+        let recording = chosen.drive(&machine).unwrap();
+        let figures = chosen.figures(&recording, &machine);
+        assert!(!figures.fall_short(), "{command}: {:?}", figures.get("verdicts"));
+        assert!(figures.number("peak_line_current_a").unwrap() > 30.0, "{command}");
+    }
+}
