@@ -12,10 +12,10 @@ pub const CORE_HZ: u32 = 170_000_000;
 const COARSEST: u16 = 8;
 
 /// Cycles that the control interrupt takes at most, by the upper bound of `docs/cost.md`.
-pub const CONTROL_CYCLES: u32 = 4_100;
+pub const CONTROL_CYCLES: u32 = 4_218;
 
 /// Cycles that the PWM interrupt takes at most, by the same bound.
-pub const PWM_CYCLES: u32 = 1_720;
+pub const PWM_CYCLES: u32 = 1_716;
 
 /// Share of the processor that both interrupts may take if each were as long as its longest. The rest is the operator's.
 pub const LOAD: f64 = 0.9;

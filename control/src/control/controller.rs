@@ -20,7 +20,7 @@ const DEPTH_PER_TORQUE: f32 = 0.4;
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Target {
-    /// Torque demand after envelope, slew and the limits of current and voltage, in N·m.
+    /// Torque demand after envelope, slew, the link's damping and the limits of current and voltage, in N·m.
     pub torque_nm: f32,
     /// Current reference, in A.
     pub current: Dq,
@@ -215,7 +215,11 @@ impl Controller {
             swing.damping_nm(law.gains.link_damping, demand_nm, omega, ratings.max_torque_nm)
         });
         let more_nm = trim_nm + damping_nm;
-        let trimmed_nm = if demand_nm < 0.0 { demand_nm - more_nm } else { demand_nm + more_nm };
+        let (trimmed_nm, damped_nm) = if demand_nm < 0.0 {
+            (demand_nm - more_nm, demand_nm - damping_nm)
+        } else {
+            (demand_nm + more_nm, demand_nm + damping_nm)
+        };
         let point = operating_point(trimmed_nm / scale, omega, &limit, tables);
         let limited = point.region == Region::Limit;
         let given_nm = if limited { nearer_zero(point.torque_nm * scale, demand_nm) } else { demand_nm };
@@ -231,11 +235,11 @@ impl Controller {
         self.map_error.step(self.disturbance.mean(), point.flux, omega, period_s);
         let way = (can_step, limits.filled && !limits.settled);
         self.target = Target {
-            torque_nm: given_nm,
+            torque_nm: if limited || swing.is_none() { given_nm } else { damped_nm },
             current: point.current,
             flux: self.path.step(point.flux, way, omega, period_s),
             region: point.region,
-            depth: point.depth * swing.map_or(1.0, |swing| link.slow_v / swing.slow_v)
+            depth: point.depth * swing.map_or(1.0, |swing| link.slow_v * swing.per_slow_v)
                 - DEPTH_PER_TORQUE / ratings.max_torque_nm * more_nm,
             voltage_limit_v: limits.depth_limit * six_step_v(link.usable_v),
         };

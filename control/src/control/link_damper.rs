@@ -11,8 +11,6 @@ use crate::frames::limit;
 
 /// Bandwidth at which the link's slow value follows, in rad/s. A filter of 8 mH and 8 mF swings at 125 rad/s: with 100 it was not damped.
 const SLOW_RAD_S: f32 = 20.0;
-/// Largest part of the torque.
-const MOST: f32 = 0.2;
 /// Bandwidth in square wave, as a share of the stator frequency. By trial at 1,900 to 6,000 r/min: with none a filter of 1 mH and 2 mF, whose
 /// 700 rad/s are near the stator frequency there, swung by 8 %; without damping 8 mH and 8 mF tripped.
 const SQUARE_SHARE: f32 = 0.12;
@@ -23,48 +21,48 @@ const SQUARE_SHARE: f32 = 0.12;
 pub struct LinkSwing {
     /// The part that is to be damped, as a share of the link's voltage.
     pub share: f32,
-    /// The link's slow value, in V, above zero.
-    pub slow_v: f32,
+    /// One over the link's slow value, in 1/V.
+    pub per_slow_v: f32,
 }
 
 impl LinkSwing {
-    /// Torque by which that of a motoring drive, in N·m, is to be greater: `gain` percent of it for a percent, as far as the machine gives it.
+    /// Torque by which that of a motoring drive, in N·m, is to be greater: `gain` percent of it for a percent, and the whole no
+    /// less than none and no more than the largest.
     pub(super) fn damping_nm(&self, gain: f32, torque_nm: f32, omega: f32, largest_nm: f32) -> f32 {
         if torque_nm * omega <= 0.0 {
             return 0.0;
         }
         let magnitude = torque_nm.abs();
-        let (most, left) = (MOST * magnitude, largest_nm - magnitude);
-        limit(gain * self.share * magnitude, -most, if left < most { left } else { most })
+        limit(gain * self.share * magnitude, -magnitude, largest_nm - magnitude)
     }
 }
 
 /// The observer of the link's swing.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub struct LinkDamper {
-    /// In V; 0 before the first step.
+    /// In V.
     slow_v: f32,
     /// The last step's share.
     share: f32,
 }
 
 impl LinkDamper {
-    /// Nothing seen yet.
-    pub const fn new() -> Self {
-        Self { slow_v: 0.0, share: 0.0 }
+    /// With a link that has stood at `slow_v`.
+    pub const fn at(slow_v: f32) -> Self {
+        Self { slow_v, share: 0.0 }
     }
 
     /// The swing of the link at `udc_v`, above zero, a time in s after the last step, in a mode that follows so much of a command.
     #[inline(always)]
     pub fn step(&mut self, udc_v: f32, period_s: f32, omega: f32, follows: Regulated) -> LinkSwing {
-        let before_v = if self.slow_v > 0.0 { self.slow_v } else { udc_v };
-        self.slow_v = before_v + SLOW_RAD_S * period_s * (udc_v - before_v);
-        let share = udc_v / self.slow_v - 1.0;
+        self.slow_v += SLOW_RAD_S * period_s * (udc_v - self.slow_v);
+        let per_slow_v = 1.0 / self.slow_v;
+        let share = udc_v * per_slow_v - 1.0;
         self.share = if follows == Regulated::Angle {
             self.share + SQUARE_SHARE * omega.abs() * period_s * (share - self.share)
         } else {
             share
         };
-        LinkSwing { share: self.share, slow_v: self.slow_v }
+        LinkSwing { share: self.share, per_slow_v }
     }
 }

@@ -19,7 +19,7 @@ pub struct SteadyPoint {
     pub reference_nm: f64,
     /// Mean air-gap torque, in N·m.
     pub torque_nm: f64,
-    /// Its error, in percent of the demand, or of [`LEAST_SHARE`] of the largest torque where that is more.
+    /// Its error, in percent of the demand, or of 2 % of the largest torque where that is more.
     pub torque_error_percent: f64,
     /// Its error, in the same way of what the drive says.
     pub reference_error_percent: f64,

@@ -77,7 +77,7 @@ impl<M: Machine> ControlTask<M> {
             steady_v: 0.0,
             depth: 0.0,
             exit: SixStepExit::new(),
-            damper: LinkDamper::new(),
+            damper: LinkDamper::at(0.0),
             demand_nm: 0.0,
             jumped: false,
             reference: Reference::NONE,
@@ -216,7 +216,7 @@ impl<M: Machine> ControlTask<M> {
         self.revises = false;
         self.mode = Mode::Off;
         self.exit.rest(self.settings.clock.control_s());
-        self.damper = LinkDamper::new();
+        self.damper = LinkDamper::at(sample.udc_v);
         self.reference = Reference {
             carrier_angle: sample.angle.unwrap_or(Angle::ZERO),
             rate: self.settings.clock.angle_rate(omega),
