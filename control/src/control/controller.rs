@@ -225,7 +225,7 @@ impl Controller {
         let given_nm = if limited { nearer_zero(point.torque_nm * scale, demand_nm) } else { demand_nm };
         self.trim.step(&torque_trim::Input {
             demand_nm,
-            measured_nm,
+            measured_nm: swing.map_or(measured_nm, |_| measured_nm - (damped_nm - demand_nm)),
             limited,
             short: given_nm != demand_nm,
             ripple_share: limits.ripple_share,
