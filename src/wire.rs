@@ -50,6 +50,8 @@ pub struct Setup {
     pub over_protocol: bool,
     /// `true` if nothing compensates the dead time.
     pub uncompensated: bool,
+    /// A line filter stands in front of the link: it is to be damped.
+    pub behind_line_filter: bool,
 }
 
 /// From the firmware to the rig.
@@ -156,7 +158,10 @@ impl Request {
 /// The answer to [`Request::Hello`].
 pub fn setup_to_block(setup: Setup) -> Block {
     let ticks = [setup.min_pulse_ticks, setup.dead_time_ticks, setup.pwm_delay_ticks];
-    let flags = [setup.over_protocol.into(), setup.uncompensated.into()];
+    let flags = [
+        setup.over_protocol.into(),
+        u32::from(setup.uncompensated) | u32::from(setup.behind_line_filter) << 1,
+    ];
     filled(ticks.into_iter().chain(line_to_words(setup.line)).chain(flags).chain([setup.control_ticks]))
 }
 
@@ -185,7 +190,7 @@ fn told_from_words<T: Told>(words: [u32; 14]) -> Option<(Status<T>, Option<Frame
 /// The inverse of [`setup_to_block`].
 pub fn setup_from_block(block: &Block) -> Setup {
     let [min_pulse_ticks, dead_time_ticks, pwm_delay_ticks, ..] = *block;
-    let [_, _, _, operated, precharge, discharge, frames, uncompensated, control_ticks, ..] = *block;
+    let [_, _, _, operated, precharge, discharge, frames, gains, control_ticks, ..] = *block;
     let line = line_from_words([operated, precharge, discharge]);
     Setup {
         control_ticks,
@@ -194,7 +199,8 @@ pub fn setup_from_block(block: &Block) -> Setup {
         pwm_delay_ticks,
         line,
         over_protocol: frames != 0,
-        uncompensated: uncompensated != 0,
+        uncompensated: gains & 1 != 0,
+        behind_line_filter: gains & 2 != 0,
     }
 }
 

@@ -123,7 +123,7 @@ fn growth_per_s(power_w: f64) -> f64 {
 /// Without the damping the link swings ever more, as fast as theory says of a drive that draws constant power.
 #[test]
 fn without_damping_the_link_swings_as_theory_says() {
-    let (damped, undamped) = (run_with(Gains::DEFAULT.link_damping), run_with(0.0));
+    let (damped, undamped) = (run_with(Gains::LINE_DAMPING), run_with(0.0));
     let (early, late) = (swing(&undamped, 0.1), swing(&undamped, 0.4));
     let rows = analysis::window(&undamped, 0.1, 0.5);
     let power_w = rows.iter().map(|row| row.udc_v * row.line_a.unwrap()).sum::<f64>() / rows.len() as f64;

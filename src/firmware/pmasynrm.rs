@@ -17,6 +17,7 @@ static MIN_PULSE_TICKS: AtomicU32 = AtomicU32::new(0);
 static DEAD_TIME_TICKS: AtomicU32 = AtomicU32::new(0);
 static FIRST_HALF_TICKS: AtomicU32 = AtomicU32::new(0);
 static UNCOMPENSATED: AtomicBool = AtomicBool::new(false);
+static BEHIND_LINE_FILTER: AtomicBool = AtomicBool::new(false);
 
 /// Until the host has told its own.
 const DEFAULTS: Settings = Settings {
@@ -35,7 +36,7 @@ fn settings() -> Settings {
             BUILT_IN.ratings.max_switching_hz,
             &clock,
         ),
-        gains: if UNCOMPENSATED.load(Ordering::Relaxed) { Gains::WITHOUT_SIXTH } else { Gains::DEFAULT },
+        gains: Gains::of(UNCOMPENSATED.load(Ordering::Relaxed), BEHIND_LINE_FILTER.load(Ordering::Relaxed)),
     }
 }
 
@@ -46,6 +47,7 @@ fn main() -> ! {
     MIN_PULSE_TICKS.store(setup.min_pulse_ticks, Ordering::Relaxed);
     DEAD_TIME_TICKS.store(setup.dead_time_ticks, Ordering::Relaxed);
     UNCOMPENSATED.store(setup.uncompensated, Ordering::Relaxed);
+    BEHIND_LINE_FILTER.store(setup.behind_line_filter, Ordering::Relaxed);
     if let Err(refused) = const { BUILT_IN.check() }.and_then(|()| settings().check_settings()) {
         qemu::refuse(&refused);
     }

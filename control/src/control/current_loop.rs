@@ -101,10 +101,18 @@ impl Gains {
         square_damping: 0.5,
         observer: 0.02,
         sixth_turn_rad: 1.0,
-        link_damping: 3.0,
+        link_damping: 0.0,
     };
     /// The same without what would compensate a dead time's harmonics.
     pub const WITHOUT_SIXTH: Self = Self { sixth_turn_rad: 0.0, ..Self::DEFAULT };
+    /// Percent for a percent that damp every line filter of 1 to 8 mH, 2 to 8 mF and 10 mΩ or more.
+    pub const LINE_DAMPING: f32 = 3.0;
+
+    /// The gains for a dead time that is not compensated, and for a link behind a line filter.
+    pub const fn of(uncompensated: bool, behind_line_filter: bool) -> Self {
+        let gains = if uncompensated { Self::WITHOUT_SIXTH } else { Self::DEFAULT };
+        if behind_line_filter { Self { link_damping: Self::LINE_DAMPING, ..gains } } else { gains }
+    }
 }
 
 /// The flux to be expected at the horizon, whatever is wanted then.

@@ -356,7 +356,8 @@ impl<M: Machine> ControlTask<M> {
         let torque_nm = self.exit.one_sided(command.demand.torque_nm, emf_v, udc_v, &tables.ratings);
         let demand = Demand { torque_nm, ..command.demand };
         let passed_s = self.controller.passed_s(clock);
-        let swing = Some(self.damper.step(udc_v, passed_s, omega, self.limits.follows));
+        let damps = gains.link_damping > 0.0;
+        let swing = damps.then(|| self.damper.step(udc_v, passed_s, omega, self.limits.follows));
         let window = Some(&command.window);
         let aim = AimInput { demand: &demand, window, udc_v, swing, limits: &self.limits };
         self.controller.aim(&aim, &Law { gains, clock, tables });

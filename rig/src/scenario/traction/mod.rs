@@ -183,7 +183,7 @@ impl System for Traction {
         let bench = bench(plan, &setup, options, machine);
         match options.on {
             On::Host => {
-                let gains = if options.own.uncompensated { Gains::WITHOUT_SIXTH } else { Gains::DEFAULT };
+                let gains = Gains::of(setup.uncompensated, setup.behind_line_filter);
                 let clock = clock(options, machine);
                 let settings = Settings { clock, devices: devices(&setup, machine), gains };
                 settings.check(machine.tables).map_err(run::refused)?;
@@ -257,6 +257,7 @@ fn setup(plan: &Plan, options: &Options, machine: &Machine, over_protocol: bool)
         line: plan.line.as_ref().map(|plan| times(&plan.link)),
         over_protocol,
         uncompensated,
+        behind_line_filter: options.own.line.is_some(),
     }
 }
 
