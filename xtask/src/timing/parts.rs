@@ -35,13 +35,12 @@ use Group::{Around, Beyond, Named};
 /// Parts, what they are in the control interrupt and in the PWM interrupt, and their sources: files and folders below `src/` of one of
 /// the repository's crates, whichever it is; behind a `#` a word of the function's name. Of the sources that an instruction's file lies
 /// in the longest decides. First the innermost function is asked, then those that it was inlined into.
-const PARTS: [(&str, [Group; 2], &[&str]); 29] = [
+const PARTS: [(&str, [Group; 2], &[&str]); 28] = [
     ("frames: vectors, angles, sine and cosine", [Named, Named], &["frames/"]),
     ("look-up in flux map and tables", [Named, Named], &["machine/lookup.rs"]),
     ("MTPA, two passes", [Named, Named], &["control/mtpa.rs"]),
     ("operating point: weakening, limits", [Named, Named], &["control/reference.rs"]),
     ("link's filter", [Beyond, Beyond], &["control/link_filter.rs"]),
-    ("damping of a line filter", [Beyond, Beyond], &["control/link_damper.rs"]),
     ("torque demand: envelope, slew, link's window", [Named, Named], &["control/demand.rs"]),
     ("trim of mean torque", [Beyond, Beyond], &["control/torque_trim.rs"]),
     ("speed from the angle", [Beyond, Beyond], &["control/speed.rs"]),
