@@ -176,8 +176,8 @@ impl ControlPort for Board {
     }
 
     fn report(&mut self, _now: Instant, report: &Report) {
-        let Report { torque_nm, id_a, iq_a, voltage_v, frequency_hz, map_error, .. } = *report;
-        self.see(&[torque_nm, id_a, iq_a, voltage_v, frequency_hz, map_error], report.trip, report);
+        let Report { torque_nm, id_a, iq_a, voltage_v, omega, map_error, .. } = *report;
+        self.see(&[torque_nm, id_a, iq_a, voltage_v, omega, map_error], report.trip, report);
     }
 }
 

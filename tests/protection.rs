@@ -545,7 +545,7 @@ fn an_angle_that_has_jumped_is_lost_once_and_followed_anew_after_an_acknowledge(
 
 #[test]
 fn a_lost_angle_is_followed_anew_before_the_acknowledge_and_chooses_no_safe_state() {
-    let told_omega = |fake: &Fake| fake.report.frequency_hz * std::f32::consts::TAU;
+    let told_omega = |fake: &Fake| fake.report.omega;
     // From a speed that asks for the short circuit to half of it, by a jump.
     let lost = |pwm_from| Fake {
         spoil: |sample, _| sample.angle = sample.angle.map(|angle| angle + angle),

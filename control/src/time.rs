@@ -76,6 +76,14 @@ impl Clock {
         omega * (UNITS_PER_RADIAN * self.tick_s)
     }
 
+    /// Control periods in a millisecond: the nearest whole number, 1 at least.
+    #[inline]
+    pub const fn millisecond_periods(&self) -> u32 {
+        let control_ticks = if self.control_ticks > 0 { self.control_ticks } else { 1 };
+        let periods = ((1e-3 * self.ticks_per_s) as u32).wrapping_add(control_ticks / 2) / control_ticks;
+        if periods > 0 { periods } else { 1 }
+    }
+
     /// The control timer's period, in s.
     #[inline]
     pub const fn control_s(&self) -> f32 {

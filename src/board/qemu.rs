@@ -15,7 +15,6 @@ pub use dual::{DUAL_RECORDER, DualIdle, connect_dual, die_dual, start_dual};
 pub use watch::ends as watch_ends;
 
 use crate::configuration::Refused;
-use crate::drive::Observation;
 use crate::frames::Abc;
 use crate::modulation::CarrierHalf;
 use crate::operator::{self, Feedback, OperatorPort, Status};
@@ -269,8 +268,8 @@ impl OperatorPort for Idle {
         (request, feedback)
     }
 
-    fn tell(&mut self, from: Instant, status: &Status, observed: Option<&Observation>) {
-        let frame = self.station.as_mut().and_then(|station| station.tell(status, observed));
+    fn tell(&mut self, from: Instant, status: &Status, report: Option<&Report>) {
+        let frame = self.station.as_mut().and_then(|station| station.tell(status, report));
         exchange::tell(from, status, frame);
     }
 }

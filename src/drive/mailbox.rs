@@ -3,122 +3,23 @@
 
 use crate::cell::{Mailbox, Seqlock, Words};
 use crate::control::{Demand, LinkWindow};
-use crate::modulation::Mode;
 use crate::nine_switch::Scheme;
 use crate::ports::{DriveCommand, DualDriveCommand, DualReport, MotorDemand, Report};
-use crate::protection::{Trip, trip_from_words, trip_to_words};
 use crate::time::{Clock, Instant};
-use core::sync::atomic::{AtomicU32, Ordering};
-
-/// Control periods in a slot, the operator's step.
-pub const SLOT_PERIODS: u32 = 10;
 
 /// Between the PMaSynRM drive's operator and its control interrupt.
-pub type OperatorMailboxes = Mailboxes<DriveCommand, Observation, 7, 12>;
+pub type OperatorMailboxes = Mailboxes<DriveCommand, Report, 7, 13>;
 /// Between the ZS9's operator and its control interrupt.
-pub type DualOperatorMailboxes = Mailboxes<DualDriveCommand, DualObservation, 7, 17>;
+pub type DualOperatorMailboxes = Mailboxes<DualDriveCommand, DualReport, 7, 17>;
 
-/// The drive's observation of itself: words of one control interrupt.
+/// The drive's observation of itself: the report of the control interrupt that began a slot.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Observation {
+pub struct Observation<R = Report> {
     /// The control instant.
     pub at: Instant,
-    /// DC-link voltage, in V.
-    pub udc_v: f32,
-    /// Largest magnitude of a phase current, in A.
-    pub current_a: f32,
-    /// Electrical angular speed, in rad/s.
-    pub omega: f32,
-    /// `true` once the speed has been followed long enough to be used.
-    pub speed_known: bool,
-    /// Torque demand after envelope, slew and limits, in N·m.
-    pub torque_nm: f32,
-    /// The fault that either side has latched.
-    pub trip: Option<Trip>,
-    /// Number of the last acknowledge that both sides have carried out.
-    pub acknowledged: u8,
-    /// Current reference, d axis, in A.
-    pub id_ref_a: f32,
-    /// Current reference, q axis, in A.
-    pub iq_ref_a: f32,
-    /// Commanded fundamental, peak phase, in V.
-    pub voltage_v: f32,
-    /// Pulse pattern that control worked for.
-    pub mode: Mode,
-}
-
-/// The ZS9's observation of itself: words of one control interrupt.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct DualObservation {
-    /// The control instant.
-    pub at: Instant,
-    /// The report of its control task.
-    pub report: DualReport,
-}
-
-/// The observation that a drive makes of itself in the control interrupt that begins a slot.
-pub trait Slotted: Copy {
-    /// The control interrupt's report.
-    type Report;
-    /// The observation of a report, at its instant.
-    fn of(at: Instant, report: &Self::Report) -> Self;
-    /// That instant.
-    fn at(&self) -> Instant;
-    /// The word of a drive that has not started: the fault that says why, and no measurement.
-    fn refused(at: Instant, trip: Trip) -> Self;
-}
-
-impl Slotted for Observation {
-    type Report = Report;
-
-    #[inline]
-    fn of(at: Instant, report: &Report) -> Self {
-        Self {
-            at,
-            udc_v: report.udc_v,
-            current_a: report.current_a,
-            omega: report.frequency_hz * core::f32::consts::TAU,
-            speed_known: report.speed_known,
-            torque_nm: report.torque_nm,
-            trip: report.trip,
-            acknowledged: report.acknowledged,
-            id_ref_a: report.id_a,
-            iq_ref_a: report.iq_a,
-            voltage_v: report.voltage_v,
-            mode: report.mode,
-        }
-    }
-
-    #[inline]
-    fn at(&self) -> Instant {
-        self.at
-    }
-
-    fn refused(at: Instant, trip: Trip) -> Self {
-        let report = Report { udc_v: f32::NAN, trip: Some(trip), ..Report::default() };
-        Self::of(at, &report)
-    }
-}
-
-impl Slotted for DualObservation {
-    type Report = DualReport;
-
-    #[inline]
-    fn of(at: Instant, report: &DualReport) -> Self {
-        Self { at, report: *report }
-    }
-
-    #[inline]
-    fn at(&self) -> Instant {
-        self.at
-    }
-
-    fn refused(at: Instant, trip: Trip) -> Self {
-        let (capacitor_v, source_v) = (f32::NAN, f32::NAN);
-        Self { at, report: DualReport { capacitor_v, source_v, trip: Some(trip), ..DualReport::default() } }
-    }
+    /// The report.
+    pub report: R,
 }
 
 /// A command and from when on it holds; that is the first word.
@@ -200,37 +101,21 @@ impl Words<7> for Timed<DualDriveCommand> {
     }
 }
 
-impl Words<12> for Observation {
-    fn to_words(self) -> [u32; 12] {
-        let [code, value, limit, tripped_at] = trip_to_words(self.trip);
-        let flags = u32::from(self.acknowledged) | u32::from(self.speed_known) << 8;
-        let code = code | flags << 16 | (self.mode as u32) << 26;
-        let measured = [self.udc_v, self.current_a, self.omega, self.torque_nm].map(f32::to_bits);
-        let [udc, current, omega, torque] = measured;
-        let [id, iq, voltage] = [self.id_ref_a, self.iq_ref_a, self.voltage_v].map(f32::to_bits);
-        [self.at.0, udc, current, omega, torque, code, value, limit, tripped_at, id, iq, voltage]
+impl Words<13> for Observation<Report> {
+    #[inline]
+    fn to_words(self) -> [u32; 13] {
+        let [a, b, c, d, e, f, g, h, i, j, k, l] = self.report.to_words();
+        [self.at.0, a, b, c, d, e, f, g, h, i, j, k, l]
     }
 
-    fn from_words(words: [u32; 12]) -> Self {
-        let [at, udc, current, omega, torque, code, value, limit, tripped_at, id, iq, voltage] = words;
-        Self {
-            at: Instant(at),
-            udc_v: f32::from_bits(udc),
-            current_a: f32::from_bits(current),
-            omega: f32::from_bits(omega),
-            speed_known: code >> 24 & 1 != 0,
-            torque_nm: f32::from_bits(torque),
-            trip: trip_from_words([code, value, limit, tripped_at]),
-            acknowledged: (code >> 16) as u8,
-            id_ref_a: f32::from_bits(id),
-            iq_ref_a: f32::from_bits(iq),
-            voltage_v: f32::from_bits(voltage),
-            mode: Mode::from_code(code >> 26),
-        }
+    fn from_words(words: [u32; 13]) -> Self {
+        let [at, a, b, c, d, e, f, g, h, i, j, k, l] = words;
+        let report = Report::from_words([a, b, c, d, e, f, g, h, i, j, k, l]);
+        Self { at: Instant(at), report }
     }
 }
 
-impl Words<17> for DualObservation {
+impl Words<17> for Observation<DualReport> {
     #[inline]
     fn to_words(self) -> [u32; 17] {
         let [a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p] = self.report.to_words();
@@ -245,23 +130,22 @@ impl Words<17> for DualObservation {
 }
 
 /// Commands down, observations up.
-pub struct Mailboxes<C, O, const COMMAND: usize, const OBSERVATION: usize> {
+pub struct Mailboxes<C, R, const COMMAND: usize, const OBSERVATION: usize> {
     command: Mailbox<Timed<C>, COMMAND>,
-    observed: Seqlock<O, OBSERVATION>,
-    /// Control periods until the next slot.
-    left: AtomicU32,
+    observed: Seqlock<Observation<R>, OBSERVATION>,
 }
 
-impl<C, O, const COMMAND: usize, const OBSERVATION: usize> Mailboxes<C, O, COMMAND, OBSERVATION>
+impl<C, R, const COMMAND: usize, const OBSERVATION: usize> Mailboxes<C, R, COMMAND, OBSERVATION>
 where
     C: Default,
-    O: Slotted + Words<OBSERVATION>,
+    R: Copy,
+    Observation<R>: Words<OBSERVATION>,
     Timed<C>: Words<COMMAND>,
 {
     /// Nothing commanded, nothing seen.
     #[cfg(not(loom))]
     pub const fn new() -> Self {
-        Self { command: Mailbox::new(), observed: Seqlock::new(), left: AtomicU32::new(0) }
+        Self { command: Mailbox::new(), observed: Seqlock::new() }
     }
 
     /// In the control interrupt: what is commanded at `now`; nothing before the first command.
@@ -273,21 +157,15 @@ where
         }
     }
 
-    /// In the control interrupt: what it did at `now`. The first of every [`SLOT_PERIODS`] begins a slot.
+    /// In the control interrupt that begins a slot: what it did at `now`.
     #[inline]
-    pub(super) fn tell(&self, now: Instant, report: &O::Report) {
-        let left = self.left.load(Ordering::Relaxed);
-        if left > 0 {
-            self.left.store(left - 1, Ordering::Relaxed);
-            return;
-        }
-        self.left.store(SLOT_PERIODS - 1, Ordering::Relaxed);
-        self.observed.publish(O::of(now, report));
+    pub(super) fn tell(&self, now: Instant, report: &R) {
+        self.observed.publish(Observation { at: now, report: *report });
     }
 
     /// In the idle loop: the newest slot's words; `None` before the first, or when every try was overtaken.
     #[inline(never)]
-    pub fn observed(&self) -> Option<O> {
+    pub fn observed(&self) -> Option<Observation<R>> {
         self.observed.read()
     }
 
@@ -298,10 +176,11 @@ where
 }
 
 #[cfg(not(loom))]
-impl<C, O, const COMMAND: usize, const OBSERVATION: usize> Default for Mailboxes<C, O, COMMAND, OBSERVATION>
+impl<C, R, const COMMAND: usize, const OBSERVATION: usize> Default for Mailboxes<C, R, COMMAND, OBSERVATION>
 where
     C: Default,
-    O: Slotted + Words<OBSERVATION>,
+    R: Copy,
+    Observation<R>: Words<OBSERVATION>,
     Timed<C>: Words<COMMAND>,
 {
     fn default() -> Self {
@@ -309,13 +188,63 @@ where
     }
 }
 
+/// The control interrupt's count of the periods in a slot, the operator's step: a millisecond.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct SlotTimer {
+    periods: u32,
+    /// Those until the next slot, 1 at least.
+    left: u32,
+}
+
+impl SlotTimer {
+    /// The first period begins a slot.
+    pub(super) const fn new(clock: &Clock) -> Self {
+        Self { periods: clock.millisecond_periods(), left: 1 }
+    }
+
+    /// Counts a period; `true` if it begins a slot.
+    #[inline]
+    pub(super) fn begins(&mut self) -> bool {
+        self.left = self.left.wrapping_sub(1);
+        if self.left != 0 {
+            return false;
+        }
+        self.left = self.periods;
+        true
+    }
+}
+
 /// The slot after the one that begins at `at`.
 pub fn next_slot(at: Instant, clock: &Clock) -> Instant {
-    at.after(SLOT_PERIODS.wrapping_mul(clock.control_ticks))
+    at.after(slot_ticks(clock))
 }
 
 /// Slots from the one that began at `done` to the one at `at`, 1 at least.
 pub fn slots_between(done: Instant, at: Instant, clock: &Clock) -> u32 {
-    let ticks = at.since(done).unsigned_abs();
-    (ticks / SLOT_PERIODS.wrapping_mul(clock.control_ticks).max(1)).max(1)
+    let ticks = at.0.wrapping_sub(done.0);
+    (ticks / slot_ticks(clock).max(1)).max(1)
+}
+
+/// Length of a slot, in ticks.
+#[inline(never)]
+fn slot_ticks(clock: &Clock) -> u32 {
+    clock.millisecond_periods().wrapping_mul(clock.control_ticks)
+}
+
+#[cfg(all(test, not(loom)))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_slot_is_a_millisecond_at_every_control_rate() {
+        for (control_hz, periods) in [(10_000, 10), (20_000, 20), (12_500, 13), (5_000, 5), (1_000, 1)] {
+            let clock = Clock::new(25_000_000, 25_000_000 / control_hz);
+            let mut slots = SlotTimer::new(&clock);
+            let begun = (0..10 * periods).filter(|_| slots.begins()).count();
+            assert_eq!(begun, 10, "{control_hz} Hz");
+            let (done, passed) = (Instant(u32::MAX - 7), 10 * periods * clock.control_ticks);
+            assert_eq!(slots_between(done, done.after(passed), &clock), 10, "{control_hz} Hz");
+            assert_eq!(next_slot(done, &clock), done.after(periods * clock.control_ticks));
+        }
+    }
 }

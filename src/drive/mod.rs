@@ -11,10 +11,8 @@ pub mod traction;
 
 use crate::ports::System;
 
-pub use mailbox::{
-    DualObservation, DualOperatorMailboxes, Mailboxes, Observation, OperatorMailboxes, SLOT_PERIODS, Slotted,
-    Timed,
-};
+use mailbox::SlotTimer;
+pub use mailbox::{DualOperatorMailboxes, Mailboxes, Observation, OperatorMailboxes, Timed};
 pub(crate) use mailbox::{next_slot, slots_between};
 pub use messages::{
     COMMITTAL_WORDS, Committal, CommittalRecord, Gates, HalfKind, VoltageCommand, half_from_words,

@@ -6,15 +6,15 @@ use crate::control::{Demand, LinkWindow};
 use crate::drive::Observation;
 use crate::frames::{SQRT_3, limit};
 use crate::machine::Ratings;
-use crate::ports::DriveCommand;
-use crate::protection::{self, Violation};
+use crate::ports::{DriveCommand, Report};
+use crate::protection::{self, Trip, Violation};
 
 /// The drive's part of the state machine: its request, its observation, and its demands on their way.
 pub trait Demands: Copy {
     /// The request.
     type Request: Copy;
-    /// The drive's observation of itself.
-    type Observation: Copy + core::fmt::Debug;
+    /// The drive's report of itself.
+    type Report: Copy + core::fmt::Debug;
     /// The command to the drive.
     type DriveCommand: Copy;
     /// The status of the demands.
@@ -26,7 +26,9 @@ pub trait Demands: Copy {
     /// The request's levels.
     fn levels(request: &Self::Request) -> Levels;
     /// The part of the observation that is the same for every drive.
-    fn seen(observed: &Self::Observation) -> Seen;
+    fn seen(observed: &Observation<Self::Report>) -> Seen;
+    /// The report of a drive that has not started, `trip` says why.
+    fn refused(trip: Trip) -> Self::Report;
     /// The reason why the request's values cannot be used as they are.
     fn wrong_with(request: &Self::Request, settings: &Settings) -> Option<Refusal>;
     /// `true` if more is asked for than nothing.
@@ -38,10 +40,10 @@ pub trait Demands: Copy {
     /// At rest at once.
     fn drop(&mut self);
     /// One slot towards what is asked; towards nothing without a request.
-    fn step(&mut self, request: Option<&Self::Request>, observed: &Self::Observation, settings: &Settings);
+    fn step(&mut self, request: Option<&Self::Request>, report: &Self::Report, settings: &Settings);
     /// `true` if the gates may go off at the end of a stop, as far as the link is concerned.
     #[inline]
-    fn link_may_rest(_observed: &Self::Observation) -> bool {
+    fn link_may_rest(_report: &Self::Report) -> bool {
         true
     }
     /// The demands as they stand.
@@ -66,7 +68,7 @@ impl TorqueDemand {
 
 impl Demands for TorqueDemand {
     type Request = Request;
-    type Observation = Observation;
+    type Report = Report;
     type DriveCommand = DriveCommand;
     type Told = f32;
 
@@ -80,8 +82,13 @@ impl Demands for TorqueDemand {
 
     #[inline]
     fn seen(observed: &Observation) -> Seen {
-        let Observation { at, udc_v, current_a, omega, speed_known, trip, acknowledged, .. } = *observed;
-        Seen { at, udc_v, current_a, omega, emf_omega: omega, speed_known, trip, acknowledged }
+        let Report { udc_v, current_a, omega, speed_known, trip, acknowledged, .. } = observed.report;
+        Seen { at: observed.at, udc_v, current_a, omega, emf_omega: omega, speed_known, trip, acknowledged }
+    }
+
+    #[inline]
+    fn refused(trip: Trip) -> Report {
+        Report::refused(trip)
     }
 
     #[inline]
@@ -110,13 +117,13 @@ impl Demands for TorqueDemand {
     }
 
     #[inline]
-    fn step(&mut self, request: Option<&Request>, observed: &Observation, settings: &Settings) {
+    fn step(&mut self, request: Option<&Request>, report: &Report, settings: &Settings) {
         let ratings = settings.ratings;
         let target_nm = match request {
             Some(request) => {
                 let Limits { motoring_nm, braking_nm, speed_rad_s, .. } = self.limits(settings);
                 let limits = MotorLimits { motoring_nm, braking_nm, speed_rad_s };
-                wanted_nm(request.torque_nm, observed.omega / ratings.pole_pairs, &limits)
+                wanted_nm(request.torque_nm, report.omega / ratings.pole_pairs, &limits)
             }
             None => 0.0,
         };

@@ -4,10 +4,11 @@
 use super::demand::wanted_nm;
 use super::{Demands, Levels, Ramp, Rates, Refusal, Seen, Settings};
 use crate::control::Demand;
-use crate::drive::{DualObservation, dual};
+use crate::drive::{Observation, dual};
 use crate::frames::limit;
 use crate::machine::Ratings;
 use crate::ports::{DualDriveCommand, DualReport, MotorDemand};
+use crate::protection::Trip;
 
 /// Time in which a speed demand goes from standstill to the largest speed, in s.
 const SPEED_RISE_S: f32 = 0.5;
@@ -168,7 +169,7 @@ impl DualDemands {
 
 impl Demands for DualDemands {
     type Request = DualRequest;
-    type Observation = DualObservation;
+    type Report = DualReport;
     type DriveCommand = DualDriveCommand;
     type Told = [MotorDemand; 2];
 
@@ -178,8 +179,8 @@ impl Demands for DualDemands {
         request.levels
     }
 
-    fn seen(observed: &DualObservation) -> Seen {
-        let DualObservation { at, report } = observed;
+    fn seen(observed: &Observation<DualReport>) -> Seen {
+        let Observation { at, report } = observed;
         let ([w1, w2], [i1, i2]) = (report.omega, report.current_a);
         Seen {
             at: *at,
@@ -191,6 +192,10 @@ impl Demands for DualDemands {
             trip: report.trip,
             acknowledged: report.acknowledged,
         }
+    }
+
+    fn refused(trip: Trip) -> DualReport {
+        DualReport::refused(trip)
     }
 
     fn wrong_with(request: &DualRequest, settings: &Settings) -> Option<Refusal> {
@@ -227,10 +232,10 @@ impl Demands for DualDemands {
         self.ways = [Way::AT_REST; 2];
     }
 
-    fn step(&mut self, request: Option<&DualRequest>, observed: &DualObservation, settings: &Settings) {
+    fn step(&mut self, request: Option<&DualRequest>, report: &DualReport, settings: &Settings) {
         let limits = self.limits(settings);
         let wanted = request.map_or([Wanted::Torque(0.0); 2], |request| request.motors.map(|m| m.wanted));
-        let DualReport { omega, torque_nm, source_v, .. } = observed.report;
+        let DualReport { omega, torque_nm, source_v, .. } = *report;
         self.resting_v = if request.is_none() { Some(source_v) } else { None };
         let motors = omega.into_iter().zip(torque_nm);
         for (((way, wanted), limits), (omega, torque_nm)) in
@@ -241,9 +246,8 @@ impl Demands for DualDemands {
         }
     }
 
-    fn link_may_rest(observed: &DualObservation) -> bool {
-        let DualReport { source_v, .. } = observed.report;
-        observed.report.link_v() < (1.0 + RESTING_SHARE) * source_v
+    fn link_may_rest(report: &DualReport) -> bool {
+        report.link_v() < (1.0 + RESTING_SHARE) * report.source_v
     }
 
     fn told(&self) -> [MotorDemand; 2] {

@@ -94,7 +94,7 @@ impl<D: Demands> Operator<D> {
     /// One slot.
     pub fn step(
         &mut self,
-        input: &Input<D::Request, D::Observation>,
+        input: &Input<D::Request, D::Report>,
         settings: &Settings,
     ) -> Output<D::DriveCommand, D::Told> {
         let seen = D::seen(input.observed);
@@ -251,13 +251,13 @@ impl<D: Demands> Operator<D> {
     }
 
     /// The demands after limits, slew and jerk.
-    fn shape(&mut self, input: &Input<D::Request, D::Observation>, settings: &Settings) {
+    fn shape(&mut self, input: &Input<D::Request, D::Report>, settings: &Settings) {
         match self.phase {
             Phase::Pulsing if self.bad_values != Some(Refusal::RequestNotFinite) => {
-                self.demands.step(Some(input.request), input.observed, settings);
+                self.demands.step(Some(input.request), &input.observed.report, settings);
             }
             Phase::Pulsing | Phase::Coasting { .. } | Phase::Stopping => {
-                self.demands.step(None, input.observed, settings);
+                self.demands.step(None, &input.observed.report, settings);
             }
             _ => self.demands.drop(),
         }

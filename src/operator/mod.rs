@@ -4,7 +4,7 @@
 //! come on by an explicit edge only; a fault is left by an acknowledge and with a healthy cause only; a command that is not followed
 //! has a reason.
 //!
-//! One pure step per slot of [`SLOT_PERIODS`] control periods, in the idle loop: what it looks at is the drive's word of the slot's
+//! One pure step per slot of a millisecond, a whole number of control periods, in the idle loop: what it looks at is the drive's word of the slot's
 //! beginning, what it decides holds from the next slot's beginning on ([`Mailboxes`](crate::drive::Mailboxes)). So when the idle loop really ran changes nothing.
 //!
 //! The drive's own protection does not wait for any of this: it trips in its interrupts, and tells.
@@ -30,8 +30,8 @@ pub use settings::{Line, LineTimes, Settings};
 pub use slot::OperatorPort;
 pub use status::{DualStatus, Refusal, State, Status, Switches, Told};
 
-use crate::drive::{Observation, SLOT_PERIODS};
-use crate::ports::DriveCommand;
+use crate::drive::Observation;
+use crate::ports::{DriveCommand, Report};
 use crate::time::Clock;
 
 /// The PMaSynRM drive's state machine.
@@ -44,7 +44,7 @@ pub type Slot = slot::Slot<TorqueDemand>;
 pub type DualSlot = slot::Slot<DualDemands>;
 /// Length of a slot, in s.
 pub fn slot_s(clock: &Clock) -> f32 {
-    SLOT_PERIODS as f32 * clock.control_s()
+    clock.millisecond_periods() as f32 * clock.control_s()
 }
 
 /// Time for which everything must be in order in the self-test, in s.
@@ -54,11 +54,11 @@ const ACKNOWLEDGE_S: f32 = 0.05;
 
 /// Everything that a step works on.
 #[derive(Clone, Copy, Debug)]
-pub struct Input<'a, Q = Request, O = Observation> {
+pub struct Input<'a, Q = Request, R = Report> {
     /// The request.
     pub request: &'a Q,
     /// The drive's observation of itself.
-    pub observed: &'a O,
+    pub observed: &'a Observation<R>,
     /// The board's feedback.
     pub feedback: &'a Feedback,
 }

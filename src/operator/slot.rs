@@ -3,7 +3,7 @@
 use super::machine::Operator;
 use super::{Demands, Feedback, Input, Output, Settings, Status};
 use crate::cell::Words;
-use crate::drive::{Mailboxes, Slotted, Timed, next_slot, slots_between};
+use crate::drive::{Mailboxes, Observation, Timed, next_slot, slots_between};
 use crate::protection::{SafeState, Trip, Violation};
 use crate::time::{Clock, Instant};
 
@@ -11,9 +11,9 @@ use crate::time::{Clock, Instant};
 pub trait OperatorPort<D: Demands = super::TorqueDemand> {
     /// The request and the board's feedback in the slot that began at `at`, so many `slots` after the last one that was done.
     fn ask(&mut self, at: Instant, slots: u32) -> (D::Request, Feedback);
-    /// Tells the status after the step, its switches to be set at `from`, or as soon as the board can; and the drive's observation of itself
-    /// at the slot's beginning, `None` of a drive that has not started.
-    fn tell(&mut self, from: Instant, status: &Status<D::Told>, observed: Option<&D::Observation>);
+    /// Tells the status after the step, its switches to be set at `from`, or as soon as the board can; and the drive's report at the slot's
+    /// beginning, `None` of a drive that has not started.
+    fn tell(&mut self, from: Instant, status: &Status<D::Told>, report: Option<&D::Report>);
 }
 
 /// Steps that a slot makes at most: an idle loop that is away for longer is none that goes on.
@@ -35,21 +35,21 @@ impl<D: Demands> Slot<D> {
     /// As often as the idle loop likes: does the newest slot if it is not done yet. Returns whether it did one.
     pub fn run<const COMMAND: usize, const OBSERVATION: usize>(
         &mut self,
-        mailboxes: &Mailboxes<D::DriveCommand, D::Observation, COMMAND, OBSERVATION>,
+        mailboxes: &Mailboxes<D::DriveCommand, D::Report, COMMAND, OBSERVATION>,
         port: &mut impl OperatorPort<D>,
         settings: &Settings,
         clock: &Clock,
     ) -> bool
     where
         D::DriveCommand: Default,
-        D::Observation: Slotted + Words<OBSERVATION>,
+        Observation<D::Report>: Words<OBSERVATION>,
         Timed<D::DriveCommand>: Words<COMMAND>,
     {
         let newest = mailboxes.observed();
         let Some(observed) = &newest else {
             return false;
         };
-        let at = observed.at();
+        let at = observed.at;
         if self.done == Some(at) {
             return false;
         }
@@ -58,7 +58,7 @@ impl<D: Demands> Slot<D> {
         let output = self.step(observed, slots, asked, settings);
         let from = next_slot(at, clock);
         mailboxes.publish(output.command, from);
-        port.tell(from, &output.status, Some(observed));
+        port.tell(from, &output.status, Some(&observed.report));
         true
     }
 
@@ -70,14 +70,12 @@ impl<D: Demands> Slot<D> {
         port: &mut impl OperatorPort<D>,
         settings: &Settings,
         clock: &Clock,
-    ) where
-        D::Observation: Slotted,
-    {
+    ) {
         let at = self.done.map_or(Instant(0), |done| next_slot(done, clock));
         let (fault, value, limit) = why;
         let trip = Trip { fault, value, limit, at: Instant(0), safe: SafeState::GatesOff };
         let asked = port.ask(at, 1);
-        let output = self.step(&D::Observation::refused(at, trip), 1, asked, settings);
+        let output = self.step(&Observation { at, report: D::refused(trip) }, 1, asked, settings);
         port.tell(next_slot(at, clock), &output.status, None);
     }
 
@@ -85,15 +83,12 @@ impl<D: Demands> Slot<D> {
     /// clock's.
     fn step(
         &mut self,
-        observed: &D::Observation,
+        observed: &Observation<D::Report>,
         slots: u32,
         (request, feedback): (D::Request, Feedback),
         settings: &Settings,
-    ) -> Output<D::DriveCommand, D::Told>
-    where
-        D::Observation: Slotted,
-    {
-        self.done = Some(observed.at());
+    ) -> Output<D::DriveCommand, D::Told> {
+        self.done = Some(observed.at);
         let input = Input { request: &request, observed, feedback: &feedback };
         for _ in 1..slots.min(MOST_STEPS) {
             self.operator.step(&input, settings);

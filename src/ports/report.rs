@@ -17,8 +17,8 @@ pub struct Report {
     pub iq_a: f32,
     /// Commanded fundamental, peak phase, in V.
     pub voltage_v: f32,
-    /// Stator frequency, in Hz, negative backward.
-    pub frequency_hz: f32,
+    /// Electrical angular speed, in rad/s, negative backward.
+    pub omega: f32,
     /// By how much the machine's flux linkage seems to exceed the map's, as a share; 0 where it turns too slowly to tell.
     pub map_error: f32,
     /// The latched fault, if any.
@@ -35,7 +35,15 @@ pub struct Report {
     pub mode: Mode,
 }
 
+impl Report {
+    /// The report of a drive that has not started: the fault that says why, and no measurement.
+    pub fn refused(trip: Trip) -> Self {
+        Self { udc_v: f32::NAN, trip: Some(trip), ..Self::default() }
+    }
+}
+
 impl Words<12> for Report {
+    #[inline]
     fn to_words(self) -> [u32; 12] {
         let [code, value, limit, at] = trip_to_words(self.trip);
         let flags = u32::from(self.acknowledged) | u32::from(self.speed_known) << 8;
@@ -45,7 +53,7 @@ impl Words<12> for Report {
             self.id_a.to_bits(),
             self.iq_a.to_bits(),
             self.voltage_v.to_bits(),
-            self.frequency_hz.to_bits(),
+            self.omega.to_bits(),
             self.map_error.to_bits(),
             code,
             value,
@@ -57,13 +65,13 @@ impl Words<12> for Report {
     }
 
     fn from_words(words: [u32; 12]) -> Self {
-        let [torque, id, iq, voltage, frequency, map_error, code, value, limit, at, udc, current] = words;
+        let [torque, id, iq, voltage, omega, map_error, code, value, limit, at, udc, current] = words;
         Self {
             torque_nm: f32::from_bits(torque),
             id_a: f32::from_bits(id),
             iq_a: f32::from_bits(iq),
             voltage_v: f32::from_bits(voltage),
-            frequency_hz: f32::from_bits(frequency),
+            omega: f32::from_bits(omega),
             map_error: f32::from_bits(map_error),
             trip: trip_from_words([code, value, limit, at]),
             udc_v: f32::from_bits(udc),
@@ -108,6 +116,11 @@ pub struct DualReport {
 }
 
 impl DualReport {
+    /// The report of a drive that has not started: the fault that says why, and no measurement.
+    pub fn refused(trip: Trip) -> Self {
+        Self { capacitor_v: f32::NAN, source_v: f32::NAN, trip: Some(trip), ..Self::default() }
+    }
+
     /// Link voltage outside shoot-through, in V.
     pub const fn link_v(&self) -> f32 {
         2.0 * self.capacitor_v - self.source_v

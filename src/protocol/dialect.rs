@@ -37,16 +37,16 @@ pub trait MessageSet: Copy + 'static {
     fn rest(&mut self);
     /// The request to the operator: nothing but off before it is `armed`, no torque unless the command is `fresh`.
     fn request(&self, armed: bool, fresh: bool, parameters: &Parameters, ratings: &Ratings) -> Request<Self>;
-    /// The measurements and the pattern that are sent of an observation.
-    fn observed(observed: Option<&Observation<Self>>, ratings: &Ratings) -> (Self::Measured, Self::Pattern);
+    /// The measurements and the pattern that are sent of a report.
+    fn observed(report: Option<&Report<Self>>, ratings: &Ratings) -> (Self::Measured, Self::Pattern);
     /// Content of one of the three messages of measurements.
     fn measured(measured: &Self::Measured, message: usize) -> Payload;
 }
 
 /// The request to a drive.
 pub type Request<D> = <<D as MessageSet>::Demands as Demands>::Request;
-/// The drive's observation of itself.
-pub type Observation<D> = <<D as MessageSet>::Demands as Demands>::Observation;
+/// The drive's report of itself.
+pub type Report<D> = <<D as MessageSet>::Demands as Demands>::Report;
 /// The operator's status of the demands.
 pub type Told<D> = <<D as MessageSet>::Demands as Demands>::Told;
 

@@ -1,6 +1,6 @@
-//! The drive's end of the protocol beside the operator: what the observations become in telemetry, the parameters in settings.
+//! The drive's end of the protocol beside the operator: what the reports become in telemetry, the parameters in settings.
 
-use super::dialect::{MessageSet, Observation, Request, Told as DriveTold};
+use super::dialect::{MessageSet, Report, Request, Told as DriveTold};
 use super::frame::Frame;
 use super::parameters::Parameters;
 use super::session::{Session, Told};
@@ -42,13 +42,9 @@ impl<D: MessageSet> CanEndpoint<D> {
         self.session.counts()
     }
 
-    /// The frame to send after the slot, if one is due; with the drive's observation of itself at the slot's beginning.
-    pub fn tell(
-        &mut self,
-        status: &Status<DriveTold<D>>,
-        observed: Option<&Observation<D>>,
-    ) -> Option<Frame> {
-        let (measured, mode) = D::observed(observed, self.ratings);
+    /// The frame to send after the slot, if one is due; with the drive's report at the slot's beginning.
+    pub fn tell(&mut self, status: &Status<DriveTold<D>>, report: Option<&Report<D>>) -> Option<Frame> {
+        let (measured, mode) = D::observed(report, self.ratings);
         self.session.tell(&Told { status, measured: &measured, mode })
     }
 }

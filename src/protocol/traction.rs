@@ -9,10 +9,10 @@ use super::parameters::{Parameters, RPM_PER_RAD_S};
 use super::signal::Payload;
 use super::telemetry::Measured;
 use super::{FROM_DRIVE, TO_DRIVE};
-use crate::drive::Observation;
 use crate::machine::Ratings;
 use crate::modulation::Mode;
 use crate::operator::{Limits, MotorLimits, Request, TorqueDemand};
+use crate::ports::Report;
 
 /// The content of a frame that was taken.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -111,22 +111,22 @@ impl MessageSet for Traction {
         }
     }
 
-    fn observed(observed: Option<&Observation>, ratings: &Ratings) -> (Measured, Mode) {
-        let Some(observed) = observed else {
+    fn observed(report: Option<&Report>, ratings: &Ratings) -> (Measured, Mode) {
+        let Some(report) = report else {
             return (Measured::default(), Mode::Off);
         };
         let measured = Measured {
-            speed_rpm: observed.speed_known.then_some(observed.omega / ratings.pole_pairs * RPM_PER_RAD_S),
-            torque_nm: Some(observed.torque_nm),
-            link_v: Some(observed.udc_v),
-            current_a: Some(observed.current_a),
-            id_ref_a: Some(observed.id_ref_a),
-            iq_ref_a: Some(observed.iq_ref_a),
-            voltage_v: Some(observed.voltage_v),
-            frequency_hz: Some(observed.omega / core::f32::consts::TAU),
+            speed_rpm: report.speed_known.then_some(report.omega / ratings.pole_pairs * RPM_PER_RAD_S),
+            torque_nm: Some(report.torque_nm),
+            link_v: Some(report.udc_v),
+            current_a: Some(report.current_a),
+            id_ref_a: Some(report.id_a),
+            iq_ref_a: Some(report.iq_a),
+            voltage_v: Some(report.voltage_v),
+            frequency_hz: Some(report.omega / core::f32::consts::TAU),
             temperature_c: None,
         };
-        (measured, observed.mode)
+        (measured, report.mode)
     }
 
     fn measured(measured: &Measured, message: usize) -> Payload {

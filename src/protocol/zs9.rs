@@ -14,10 +14,11 @@ use super::telemetry::{
     MAIN, PRECHARGE, REFUSAL, REFUSALS, SPEED_RPM, STATE, TAKEN, TRIP_FAULT, TRIP_LIMIT, TRIP_VALUE, encode,
     pattern,
 };
-use crate::drive::{DualObservation, dual};
+use crate::drive::dual;
 use crate::machine::Ratings;
 use crate::nine_switch::Scheme;
 use crate::operator::{DualDemands, DualRequest, Levels, MotorRequest, Wanted};
+use crate::ports::DualReport;
 
 const KIND: Signal = Signal::number("page", 35, 1, 1);
 const TORQUES: [Signal; 2] = [
@@ -305,8 +306,8 @@ impl MessageSet for Zs9 {
         }
     }
 
-    fn observed(observed: Option<&DualObservation>, ratings: &Ratings) -> (Zs9Measured, Scheme) {
-        let Some(DualObservation { report, .. }) = observed else {
+    fn observed(report: Option<&DualReport>, ratings: &Ratings) -> (Zs9Measured, Scheme) {
+        let Some(report) = report else {
             return (Zs9Measured::default(), Scheme::default());
         };
         let motor = |omega: f32, torque_nm, current_a| MotorMeasured {

@@ -1,7 +1,7 @@
 //! The same state machine over the ZS9's two motors.
 
 use tractive::built_in::zs9::BUILT_IN;
-use tractive::drive::DualObservation;
+use tractive::drive::Observation;
 use tractive::drive::dual::{self};
 use tractive::machine::Ratings;
 use tractive::operator::{
@@ -19,7 +19,7 @@ struct World {
     operator: DualOperator,
     ratings: Ratings,
     request: DualRequest,
-    observed: DualObservation,
+    observed: Observation<DualReport>,
     feedback: Feedback,
     last: Option<Output<DualDriveCommand, [MotorDemand; 2]>>,
 }
@@ -32,7 +32,7 @@ impl World {
             operator: DualOperator::new(),
             request: DualRequest::idle(&ratings, 667.0),
             ratings,
-            observed: DualObservation { at: Instant(0), report },
+            observed: Observation { at: Instant(0), report },
             feedback: Feedback {
                 driver_ready: true,
                 enable_input: true,

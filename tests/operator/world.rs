@@ -6,6 +6,7 @@ use tractive::frames::Abc;
 use tractive::operator::{
     Configuration, Feedback, Input, Line, Operator, Output, Refusal, Request, Settings, State, Switches,
 };
+use tractive::ports::Report;
 use tractive::protection::{Fault, SafeState, Trip};
 use tractive::time::Instant;
 
@@ -19,7 +20,9 @@ pub struct World {
     pub operator: Operator,
     pub settings: Settings<'static>,
     pub request: Request,
-    pub observed: Observation,
+    pub observed: Report,
+    /// Beginning of the slot.
+    at: Instant,
     pub feedback: Feedback,
     /// Source voltage, in V.
     pub source_v: f32,
@@ -50,20 +53,8 @@ impl World {
             operator: Operator::new(),
             settings: Settings::rated(&BUILT_IN.ratings, SLOT_S, Some(line())),
             request: Request::idle(&BUILT_IN.ratings),
-            observed: Observation {
-                at: Instant(0),
-                udc_v: 0.0,
-                current_a: 0.0,
-                omega: 0.0,
-                speed_known: true,
-                torque_nm: 0.0,
-                trip: None,
-                acknowledged: 0,
-                id_ref_a: 0.0,
-                iq_ref_a: 0.0,
-                voltage_v: 0.0,
-                mode: tractive::modulation::Mode::Off,
-            },
+            observed: Report { speed_known: true, ..Report::default() },
+            at: Instant(0),
             feedback: Feedback {
                 driver_ready: true,
                 enable_input: true,
@@ -113,7 +104,8 @@ impl World {
 
     /// One slot.
     pub fn slot(&mut self) -> Output {
-        let input = Input { request: &self.request, observed: &self.observed, feedback: &self.feedback };
+        let observed = Observation { at: self.at, report: self.observed };
+        let input = Input { request: &self.request, observed: &observed, feedback: &self.feedback };
         let output = self.operator.step(&input, &self.settings);
         self.last = Some(output);
         self.react(&output);
@@ -168,7 +160,7 @@ impl World {
             self.observed.acknowledged = permitted.command.acknowledge;
             self.observed.trip = self.persistent;
         }
-        self.observed.at = self.observed.at.after(25_000);
+        self.at = self.at.after(25_000);
     }
 
     /// A command's edge: low for a slot, then high.

@@ -2,7 +2,6 @@
 
 use super::Stream;
 use tractive::built_in::zs9::BUILT_IN;
-use tractive::drive::DualObservation;
 use tractive::drive::dual::Settings;
 use tractive::nine_switch::Scheme;
 use tractive::operator::{DualRequest, DualStatus, Levels, State, Switches, Wanted};
@@ -11,7 +10,7 @@ use tractive::protocol::{
     FROM_ZS9, Frame, MessageSet, Payload, StatusFrame, TO_ZS9, TorqueLimits, ZS9_COMMAND, ZS9_LIMITS,
     ZS9_LINK, Zs9, Zs9CanEndpoint, Zs9Command, Zs9Demands, Zs9Link, Zs9Measured, Zs9Session,
 };
-use tractive::time::{Clock, Instant};
+use tractive::time::Clock;
 
 const CLOCK: Clock = Clock::new(25_000_000, 2_500);
 
@@ -131,11 +130,10 @@ fn the_telemetry_says_what_is_measured() {
         torque_nm: tractive::ports::DualDriveCommand::NONE.demands,
         switches: Switches { main: true, ..Switches::default() },
     };
-    let observed = DualObservation { at: Instant(0), report };
     let (mut measured, mut told) = (Zs9Measured::default(), None);
     for _ in 0..10 {
         station.listen(1, None::<Frame>);
-        let Some(frame) = station.tell(&status, Some(&observed)) else { continue };
+        let Some(frame) = station.tell(&status, Some(&report)) else { continue };
         let message = FROM_ZS9.into_iter().find(|message| message.id == frame.id).unwrap();
         assert!(message.is_intact(&frame));
         let payload = Payload(u64::from_le_bytes(frame.data));

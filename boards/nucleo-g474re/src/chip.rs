@@ -167,7 +167,7 @@ pub fn idle(refused: Option<Violation>) -> ! {
         if PULSE.feed_if_both_ran(&Registers::CHIP) {
             log.record(&RECORDER);
         }
-        log.trip(SHARED.operator.observed().and_then(|observed| observed.trip));
+        log.trip(SHARED.operator.observed().and_then(|observed| observed.report.trip));
     }
 }
 

@@ -5,11 +5,12 @@ use super::position::PositionState;
 use super::registers::Registers;
 use super::switchgear::Wires;
 use super::{CLOCK, hardware, pins, switchgear};
-use tractive::drive::{Observation, OperatorMailboxes};
+use tractive::drive::OperatorMailboxes;
 use tractive::frames::Abc;
 use tractive::operator::{
     Configuration, Feedback, OperatorPort, Request, Settings, Slot, Status, TorqueDemand,
 };
+use tractive::ports::Report;
 use tractive::protection::Violation;
 use tractive::protocol::{CanEndpoint, Frame};
 use tractive::time::Instant;
@@ -111,9 +112,9 @@ impl OperatorPort<TorqueDemand> for Serve<'_> {
         (self.station.listen(slots, frames), self.feedback())
     }
 
-    fn tell(&mut self, _from: Instant, status: &Status, observed: Option<&Observation>) {
+    fn tell(&mut self, _from: Instant, status: &Status, report: Option<&Report>) {
         switchgear::set(&self.registers, &status.switches);
-        let frame = self.station.tell(status, observed);
+        let frame = self.station.tell(status, report);
         self.say(frame);
     }
 }

@@ -1,7 +1,6 @@
 //! The board: registers on the one side, the library's ports on the other: two for the interrupts, one for the idle loop. The addresses are placeholders for your chip's.
 
 use crate::machine::BUILT_IN;
-use tractive::drive::Observation;
 use tractive::frames::{Abc, Angle};
 use tractive::modulation::CarrierHalf;
 use tractive::operator::{Configuration, Feedback, OperatorPort, Request, Status};
@@ -134,5 +133,5 @@ impl OperatorPort for Board {
         (Request { enable, acknowledge, ..Request::idle(&BUILT_IN.ratings) }, feedback)
     }
 
-    fn tell(&mut self, _from: Instant, _status: &Status, _observed: Option<&Observation>) {}
+    fn tell(&mut self, _from: Instant, _status: &Status, _report: Option<&Report>) {}
 }

@@ -4,7 +4,6 @@ use super::{Switchgear, Tick};
 use crate::plant::{DcLink, DcLinkSettings, LinkEnergies, LinkSwitches};
 use crate::steps::held;
 use crate::trace::{LinkBalance, SlotRow};
-use tractive::drive::SLOT_PERIODS;
 use tractive::operator::{Feedback, Request, Status, Switches};
 use tractive::protection::Fault;
 use tractive::time::Clock;
@@ -70,7 +69,7 @@ impl LineSide {
             stored_before_j: link.stored_j(),
             link,
             plan,
-            slot_ticks: Tick::from(SLOT_PERIODS * clock.control_ticks),
+            slot_ticks: Tick::from(clock.millisecond_periods() * clock.control_ticks),
             gear: Switchgear::new(clock),
             discharge: false,
             duty: 0.0,
@@ -103,7 +102,7 @@ impl LineSide {
         held.map(|(.., fault)| *fault)
     }
 
-    /// A control sample at `now`, `t_s`: every [`SLOT_PERIODS`]th begins a slot. Returns whether the operator has fallen behind.
+    /// A control sample at `now`, `t_s`: the first of every millisecond begins a slot. Returns whether the operator has fallen behind.
     pub fn sampled(&mut self, now: Tick, t_s: f64) -> bool {
         let hardware = self.hardware(t_s);
         let Self { gear, plan, .. } = self;

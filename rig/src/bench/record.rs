@@ -106,7 +106,7 @@ impl Bench {
             u_v: report.voltage_v.into(),
             udc_v: self.udc_v(t_s),
             line_a: self.dc.line_a(),
-            f1_hz: report.frequency_hz.into(),
+            f1_hz: (report.omega / std::f32::consts::TAU).into(),
             map_error: report.map_error.into(),
             mode: if self.inverter.is_safe() { Mode::Off } else { self.inverter.half().mode },
             trip: report.trip,

@@ -2,7 +2,6 @@
 
 use super::Tick;
 use std::collections::VecDeque;
-use tractive::drive::SLOT_PERIODS;
 use tractive::frames::Abc;
 use tractive::operator::{Configuration, Feedback, Status};
 use tractive::protection::Fault;
@@ -46,6 +45,8 @@ pub struct Switchgear<A, T> {
     /// The request that the operator will see, by the slot's beginning.
     asked: VecDeque<(Tick, A, Feedback)>,
     samples: u32,
+    /// Samples in a slot.
+    slot_samples: u32,
 }
 
 impl<A, T: Copy> Switchgear<A, T> {
@@ -58,6 +59,7 @@ impl<A, T: Copy> Switchgear<A, T> {
             told: VecDeque::new(),
             asked: VecDeque::new(),
             samples: 0,
+            slot_samples: clock.millisecond_periods(),
         }
     }
 
@@ -71,10 +73,10 @@ impl<A, T: Copy> Switchgear<A, T> {
         self.main.closed
     }
 
-    /// A control sample at `now`, with what holds the gates off in hardware: every [`SLOT_PERIODS`]th begins a slot, in which this is
+    /// A control sample at `now`, with what holds the gates off in hardware: the first of every millisecond begins a slot, in which this is
     /// asked. Returns whether the operator has fallen behind.
     pub fn sampled(&mut self, now: Tick, hardware: Option<Fault>, ask: impl FnOnce() -> A) -> bool {
-        let begins = self.samples.is_multiple_of(SLOT_PERIODS);
+        let begins = self.samples.is_multiple_of(self.slot_samples);
         self.samples = self.samples.wrapping_add(1);
         if begins {
             let feedback = Feedback {

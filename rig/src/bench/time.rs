@@ -2,7 +2,6 @@
 
 use super::BenchError;
 use crate::trace::Tick;
-use tractive::drive::SLOT_PERIODS;
 use tractive::time::{Clock, Instant};
 
 /// The times of a run.
@@ -56,7 +55,7 @@ impl Timeline {
 
     /// Beginning of the operator's slot after the one that begins at `slot`.
     pub fn slot_after(&self, slot: Instant) -> Instant {
-        slot.after(SLOT_PERIODS * self.clock.control_ticks)
+        slot.after(self.clock.millisecond_periods() * self.clock.control_ticks)
     }
 
     /// Steps from one control sample to the next.

@@ -23,7 +23,7 @@ impl Calls {
     /// A control interrupt of the first system: the direction is its own and that of the PWM interrupts behind it.
     pub(crate) fn traction(&mut self, report: &Report) {
         self.direction = direction(report, self.direction);
-        self.line("control", &report.frequency_hz.to_string());
+        self.line("control", &(report.omega / std::f32::consts::TAU).to_string());
     }
 
     /// A control interrupt whose mode says everything.
@@ -54,7 +54,7 @@ impl Calls {
 /// By the sign of the mechanical power, torque by speed. Where that is nothing (no torque, standstill, a fault) it is the direction
 /// before, at first motoring.
 fn direction(report: &Report, before: &'static str) -> &'static str {
-    let power = report.torque_nm * report.frequency_hz;
+    let power = report.torque_nm * report.omega;
     match before {
         _ if power > 0.0 => "motoring",
         _ if power < 0.0 => "braking",
@@ -70,9 +70,8 @@ mod tests {
     #[test]
     fn the_direction_is_that_of_the_power_and_stays_where_there_is_none() {
         let mut calls = Calls::new("async");
-        for (torque_nm, frequency_hz) in [(0.0, 0.0), (9.0, -1.0), (f32::NAN, -1.0), (-9.0, -1.0), (9.0, 0.0)]
-        {
-            calls.traction(&Report { torque_nm, frequency_hz, ..Report::default() });
+        for (torque_nm, omega) in [(0.0, 0.0), (9.0, -1.0), (f32::NAN, -1.0), (-9.0, -1.0), (9.0, 0.0)] {
+            calls.traction(&Report { torque_nm, omega, ..Report::default() });
         }
         calls.pwm();
         calls.mode = Mode::Off.name().to_owned();

@@ -7,7 +7,6 @@ use super::{
     CLOCK, CONTROL_TIMER, Control, OPERATED, PWM_TIMER, Pwm, enable_interrupts, exchange, read_register,
     start_timers, stop, watch, write_register,
 };
-use crate::drive::DualObservation;
 use crate::drive::dual::Settings;
 use crate::operator::{DualDemands, DualRequest, DualStatus, Feedback, OperatorPort};
 use crate::ports::{
@@ -117,8 +116,8 @@ impl OperatorPort<DualDemands> for DualIdle {
         (self.station.listen(slots, frame.as_ref()), feedback)
     }
 
-    fn tell(&mut self, from: Instant, status: &DualStatus, observed: Option<&DualObservation>) {
-        let frame = self.station.tell(status, observed);
+    fn tell(&mut self, from: Instant, status: &DualStatus, report: Option<&DualReport>) {
+        let frame = self.station.tell(status, report);
         exchange::tell_dual(from, status, frame);
     }
 }

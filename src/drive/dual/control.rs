@@ -4,7 +4,7 @@ use super::axis::{self, Axis, AxisInput, AxisOutput};
 use super::{DualApplied, DualCommand, MotorShare, Settings, Shared};
 use crate::control::{Measurements, ZSource, ZSourceError, ZSourceInput};
 use crate::drive::acknowledge::Acknowledge;
-use crate::drive::{Gates, PeriodInput};
+use crate::drive::{Gates, PeriodInput, SlotTimer};
 use crate::frames::{Angle, SQRT_3};
 use crate::machine::{Machine, Tables};
 use crate::ports::{ControlPort, Dual, DualReport, DualSample, HardwareBreak, MotorDemand};
@@ -42,6 +42,7 @@ pub struct ControlTask<M = &'static Tables> {
     acknowledge: Acknowledge,
     /// `true` once the operator was asked for a command: who is not asked is not told.
     operated: bool,
+    slots: SlotTimer,
 }
 
 /// The results of a control period.
@@ -73,6 +74,7 @@ impl<M: Machine> ControlTask<M> {
             trip: None,
             acknowledge: Acknowledge::new(),
             operated: false,
+            slots: SlotTimer::new(&settings.clock),
         }
     }
 
@@ -164,7 +166,7 @@ impl<M: Machine> ControlTask<M> {
     /// The period as the flight recorder and whoever watches see it. Out of line: nothing of it is on the stack while the control
     /// laws are.
     #[inline(never)]
-    fn tell(&self, input: Input, gates: Gates, port: &mut impl ControlPort<Dual>, shared: &Shared) {
+    fn tell(&mut self, input: Input, gates: Gates, port: &mut impl ControlPort<Dual>, shared: &Shared) {
         let now = self.now.before(self.settings.clock.control_ticks);
         if let Some(recorder) = shared.recorder {
             recorder.record(self.entry(now, input, gates), self.trip.is_some());
@@ -186,7 +188,7 @@ impl<M: Machine> ControlTask<M> {
             speed_known: upper.speed_is_known() && lower.speed_is_known(),
             acknowledged: self.acknowledge.answered(),
         };
-        if self.operated {
+        if self.operated && self.slots.begins() {
             shared.operator.tell(now, &report);
         }
         port.report(now, &report);

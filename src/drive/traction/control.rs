@@ -5,9 +5,9 @@ use super::six_step_exit::SixStepExit;
 use super::slot::{Decision, Slot};
 use super::{Settings, Shared};
 use crate::control::{AimInput, Controller, Demand, Law, LinkDamper, Measurements, ModeLimits, RotorSample};
-use crate::drive::PeriodInput;
 use crate::drive::acknowledge::Acknowledge;
 use crate::drive::messages::{Gates, VoltageCommand};
+use crate::drive::{PeriodInput, SlotTimer};
 use crate::frames::Angle;
 use crate::machine::{Machine, Tables};
 use crate::modulation::{Mode, Reference};
@@ -58,6 +58,7 @@ pub struct ControlTask<M = &'static Tables> {
     acknowledge: Acknowledge,
     /// `true` once the operator was asked for a command: who is not asked is not told.
     operated: bool,
+    slots: SlotTimer,
     /// Electrical speed at which the angle was lost, in rad/s, until that is acknowledged.
     lost_at: Option<f32>,
 }
@@ -87,6 +88,7 @@ impl<M: Machine> ControlTask<M> {
             trip: None,
             acknowledge: Acknowledge::new(),
             operated: false,
+            slots: SlotTimer::new(&settings.clock),
             lost_at: None,
         }
     }
@@ -184,7 +186,7 @@ impl<M: Machine> ControlTask<M> {
             id_a: target.current.d,
             iq_a: target.current.q,
             voltage_v: self.reference.voltage_v,
-            frequency_hz: self.controller.omega() / core::f32::consts::TAU,
+            omega: self.controller.omega(),
             map_error: self.controller.map_error(),
             trip: self.trip,
             udc_v: sample.udc_v,
@@ -197,7 +199,7 @@ impl<M: Machine> ControlTask<M> {
             let mode = applied.map_or(Mode::Off, |applied| applied.mode);
             recorder.record(self.entry(now, input, &report, mode, gates), self.trip.is_some());
         }
-        if self.operated {
+        if self.operated && self.slots.begins() {
             shared.operator.tell(now, &report);
         }
         port.report(now, &report);

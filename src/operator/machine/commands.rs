@@ -9,14 +9,14 @@ impl<D: Demands> Operator<D> {
     /// Commands: levels that stop first, then edges.
     pub(super) fn obey(
         &mut self,
-        Input { request, observed, .. }: &Input<D::Request, D::Observation>,
+        Input { request, observed, .. }: &Input<D::Request, D::Report>,
         input: &Situation,
         settings: &Settings,
     ) {
         let levels = D::levels(request);
         let Levels { enable, charge, discharge, acknowledge, .. } = levels;
         let last = core::mem::replace(&mut self.last, Edges { enable, charge, discharge, acknowledge });
-        self.obey_levels(&levels, D::link_may_rest(observed), input, settings);
+        self.obey_levels(&levels, D::link_may_rest(&observed.report), input, settings);
         if acknowledge && !last.acknowledge {
             self.acknowledge(input, settings);
         }

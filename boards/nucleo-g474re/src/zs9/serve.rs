@@ -3,8 +3,9 @@
 use super::{CLOCK, hardware, pins};
 use crate::serve::Serve;
 use crate::switchgear;
-use tractive::drive::{DualObservation, DualOperatorMailboxes};
+use tractive::drive::DualOperatorMailboxes;
 use tractive::operator::{DualDemands, DualRequest, DualSlot, DualStatus, Feedback, OperatorPort, Settings};
+use tractive::ports::DualReport;
 use tractive::protection::Violation;
 use tractive::protocol::Zs9CanEndpoint;
 use tractive::time::Instant;
@@ -43,9 +44,9 @@ impl OperatorPort<DualDemands> for DualServe<'_> {
         (self.station.listen(slots, frames), self.feedback())
     }
 
-    fn tell(&mut self, _from: Instant, status: &DualStatus, observed: Option<&DualObservation>) {
+    fn tell(&mut self, _from: Instant, status: &DualStatus, report: Option<&DualReport>) {
         switchgear::set_wires(&self.registers, &pins::SWITCHGEAR, &status.switches);
-        let frame = self.station.tell(status, observed);
+        let frame = self.station.tell(status, report);
         self.say(frame);
     }
 }

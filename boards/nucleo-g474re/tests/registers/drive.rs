@@ -79,7 +79,7 @@ fn the_drive_pulses_a_turning_machine_through_the_registers() {
         changes += u32::from(now != gates);
         gates = now;
     }
-    assert_eq!(shared.operator.observed().unwrap().trip, None);
+    assert_eq!(shared.operator.observed().unwrap().report.trip, None);
     assert_eq!(pwm_task.trip(), None);
     // 20 ms pass until the speed is known, 13 ms remain: 23 halves, in each of which three legs toggle once, one device going
     // off and, the dead time later, the other on.

@@ -478,7 +478,7 @@ fn an_idle_loop_that_is_slow_takes_torque_and_gates_in_time() {
     let told = |image: &Image| image.shared.operator.observed().unwrap();
     let silent_ms = (0..1_000).find(|_| {
         image.run_ms(1);
-        told(&image).torque_nm.abs() < 150.0
+        told(&image).report.torque_nm.abs() < 150.0
     });
     assert!((40..90).contains(&silent_ms.unwrap()), "torque after {silent_ms:?} ms");
     let off_ms = (silent_ms.unwrap()..2_000).find(|_| {

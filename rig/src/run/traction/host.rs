@@ -4,7 +4,6 @@ use crate::bench::{Bench, Simulated};
 use crate::run::{Interrupts, Supervisor, turn};
 use crate::without::Ablation;
 use anyhow::Result;
-use tractive::drive::Observation;
 use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
 use tractive::frames::Abc;
 use tractive::machine::{Ratings, Tables};
@@ -114,12 +113,12 @@ impl OperatorPort for Port<'_, '_> {
         (wire.station.listen(slots, frame.as_ref()), feedback)
     }
 
-    fn tell(&mut self, from: Instant, status: &Status, observed: Option<&Observation>) {
+    fn tell(&mut self, from: Instant, status: &Status, report: Option<&Report>) {
         if let Err(error) = self.bench.told(from, *status) {
             self.error = Some(error.into());
         }
         let Some(wire) = &mut self.wire else { return };
-        if let Some(frame) = wire.station.tell(status, observed) {
+        if let Some(frame) = wire.station.tell(status, report) {
             wire.supervisor.hear(self.bench.instant_s(from), &frame);
         }
     }

@@ -5,7 +5,6 @@ use crate::run::{Interrupts, Supervisor, turn};
 use crate::without::Ablation;
 use crate::zs9::bench::Bench;
 use anyhow::Result;
-use tractive::drive::DualObservation;
 use tractive::drive::dual::{ControlTask, PwmTask, Settings, Shared};
 use tractive::frames::Abc;
 use tractive::machine::{Ratings, Tables};
@@ -120,11 +119,11 @@ impl OperatorPort<DualDemands> for Idle<'_, '_> {
         (self.station.listen(slots, frame.as_ref()), feedback)
     }
 
-    fn tell(&mut self, from: Instant, status: &DualStatus, observed: Option<&DualObservation>) {
+    fn tell(&mut self, from: Instant, status: &DualStatus, report: Option<&DualReport>) {
         if let Err(error) = self.port.bench.told(from, *status) {
             self.port.error = Some(error.into());
         }
-        if let Some(frame) = self.station.tell(status, observed) {
+        if let Some(frame) = self.station.tell(status, report) {
             self.supervisor.hear(self.port.bench.instant_s(from), &frame);
         }
     }
