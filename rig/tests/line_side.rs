@@ -50,6 +50,14 @@ fn no_overvoltage_whatever_the_speed_at_which_the_resistor_is_lost() {
     }
 }
 
+/// Motoring and braking, on a line of nominal and of highest voltage, behind filters of 3 mF and more.
+#[test]
+fn a_line_that_is_lost_for_a_while_is_waited_for() {
+    for line in ["gaps", "gaps --udc 1800", "gaps --line 1,8,10", "gaps --line 1,3,10"] {
+        assert!(keeps_all(line).trip().is_none(), "{line}");
+    }
+}
+
 #[test]
 fn a_gate_driver_that_fails_is_acknowledged() {
     assert!(keeps_all("acknowledge").trip().is_some());

@@ -58,6 +58,7 @@ pub struct TorqueDemand {
     ramp: Ramp,
     /// The limits that hold; `None`: as rated.
     limits: Option<Limits>,
+    line: LineVoltage,
 }
 
 impl TorqueDemand {
@@ -72,7 +73,7 @@ impl Demands for TorqueDemand {
     type DriveCommand = DriveCommand;
     type Told = f32;
 
-    const AT_REST: Self = Self { ramp: Ramp::new(), limits: None };
+    const AT_REST: Self = Self { ramp: Ramp::new(), limits: None, line: LineVoltage::UNKNOWN };
 
     #[inline]
     fn levels(request: &Request) -> Levels {
@@ -114,6 +115,7 @@ impl Demands for TorqueDemand {
     #[inline]
     fn drop(&mut self) {
         self.ramp = Ramp::new();
+        self.line = LineVoltage::UNKNOWN;
     }
 
     #[inline]
@@ -127,7 +129,14 @@ impl Demands for TorqueDemand {
             }
             None => 0.0,
         };
-        self.ramp.step(target_nm, &Rates::of(settings));
+        self.line.step(report, settings.slot_s);
+        let most_nm = motoring_nm(report, &self.line.window(&self.limits(settings), ratings), ratings);
+        let held_nm = if report.omega < 0.0 {
+            limit(target_nm, -most_nm, f32::INFINITY)
+        } else {
+            limit(target_nm, f32::NEG_INFINITY, most_nm)
+        };
+        self.ramp.step(held_nm, &Rates::of(settings));
     }
 
     #[inline]
@@ -140,7 +149,7 @@ impl Demands for TorqueDemand {
         DriveCommand {
             enable,
             demand: Demand { torque_nm: self.ramp.torque_nm(), slew_limited: true },
-            window: window(&self.limits(settings), settings.ratings),
+            window: self.line.window(&self.limits(settings), settings.ratings),
             acknowledge,
         }
     }
@@ -177,14 +186,58 @@ pub(super) fn wanted_nm(torque_nm: f32, speed: f32, limits: &MotorLimits) -> f32
     limit(torque_nm, lowest, highest)
 }
 
-/// The window of link voltage in which torque ends, for the control interrupt.
-fn window(limits: &Limits, ratings: &Ratings) -> LinkWindow {
-    let ends = Ends::rated(ratings);
-    LinkWindow {
-        motoring_none_v: limits.link_low_v,
-        motoring_full_v: limits.link_low_v + ends.motoring_span_v,
-        braking_full_v: limits.link_high_v - ends.braking_span_v,
-        braking_none_v: limits.link_high_v,
+/// Share of the largest torque that holds a link without source, where it gives the largest power; slower in proportion, so that at
+/// standstill, where nothing is to be gained, there is none.
+const HOLDING_SHARE: f32 = 0.1;
+
+/// The largest motoring torque that a link in its window is to give, in N·m. Below the window a machine that turns brakes a little, whatever is
+/// asked for: so its own energy holds the link while the line is away.
+fn motoring_nm(report: &Report, window: &LinkWindow, ratings: &Ratings) -> f32 {
+    let share = (report.udc_v - window.motoring_none_v) / (window.motoring_full_v - window.motoring_none_v);
+    let power_w = ratings.max_torque_nm * report.omega.abs() / ratings.pole_pairs;
+    let holding = HOLDING_SHARE * limit(power_w / ratings.max_power_w, 0.0, 1.0);
+    ratings.max_torque_nm * limit(share, -holding, 1.0)
+}
+
+/// The line's voltage as the link has shown it, in V; 0 while it is not known.
+///
+/// A line that is lost takes the link with it in milliseconds; one that sags does so in seconds. So motoring ends a little below what the
+/// line gave some seconds ago: the drive then holds the link near it, and a line that comes back finds little to charge.
+#[derive(Clone, Copy, Debug)]
+struct LineVoltage(f32);
+
+/// Time constant at which the line's voltage is learned, in s.
+const LINE_S: f32 = 3.0;
+/// Shares of the line's voltage between which motoring ends.
+const MOTORING_FULL: f32 = 0.95;
+const MOTORING_NONE: f32 = 0.85;
+
+impl LineVoltage {
+    const UNKNOWN: Self = Self(0.0);
+
+    /// One slot. Braking lifts the link above the line, and behind a rectifier it stays there: only a drive that takes power sees a line
+    /// that rises.
+    fn step(&mut self, report: &Report, slot_s: f32) {
+        let Self(line_v) = self;
+        let takes = report.torque_nm * report.omega > 0.0;
+        if *line_v == 0.0 {
+            *line_v = report.udc_v;
+        } else if takes || report.udc_v < *line_v {
+            *line_v += slot_s / LINE_S * (report.udc_v - *line_v);
+        }
+    }
+
+    /// The window of link voltage in which torque ends, for the control interrupt.
+    fn window(self, limits: &Limits, ratings: &Ratings) -> LinkWindow {
+        let (ends, Self(line_v)) = (Ends::rated(ratings), self);
+        let low_v = limits.link_low_v;
+        let at_least = |share_v: f32, least_v: f32| if share_v > least_v { share_v } else { least_v };
+        LinkWindow {
+            motoring_none_v: at_least(MOTORING_NONE * line_v, low_v),
+            motoring_full_v: at_least(MOTORING_FULL * line_v, low_v + ends.motoring_span_v),
+            braking_full_v: limits.link_high_v - ends.braking_span_v,
+            braking_none_v: limits.link_high_v,
+        }
     }
 }
 

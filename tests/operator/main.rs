@@ -3,6 +3,7 @@
 mod document;
 mod dual;
 mod faults;
+mod line_gap;
 mod properties;
 mod ramp;
 mod refusals;

@@ -56,10 +56,14 @@ impl Default for LinkWindow {
     }
 }
 
-/// `x` of `span`, 0 where `x` is not positive.
+/// `x` of `span`; where there is less, or none, so little that a torque just keeps its sign: in square wave the operating points of no torque
+/// and of hardly any lie far apart.
 fn share(x: f32, span: f32) -> f32 {
-    if x > 0.0 { x / span } else { 0.0 }
+    if x > KEPT_SHARE * span { x / span } else { KEPT_SHARE }
 }
+
+/// Share of a torque that the link's window leaves of it.
+const KEPT_SHARE: f32 = 0.001;
 
 /// Torque of what flows while the gates are off without the diodes rectifying, as a share of the largest: none.
 const LEAKAGE_SHARE: f32 = 0.01;

@@ -25,6 +25,8 @@ pub struct LinePlan {
     pub chopper_ohm: Vec<(f64, f64)>,
     /// The times (s) from which on the source takes energy back, or does not.
     pub reversible: Vec<(f64, bool)>,
+    /// The times (s) from which on the source is there, or is not: gaps in the line.
+    pub live: Vec<(f64, bool)>,
 }
 
 impl LinePlan {
@@ -37,7 +39,15 @@ impl LinePlan {
             hardware: Vec::new(),
             chopper_ohm: Vec::new(),
             reversible: Vec::new(),
+            live: Vec::new(),
         }
+    }
+}
+
+impl LinePlan {
+    /// `true` if a choke lies between source and link.
+    pub fn has_choke(&self) -> bool {
+        self.link.source.inductance_h > 0.0
     }
 }
 
@@ -155,6 +165,9 @@ impl LineSide {
         }
         if let Some(reversible) = held(&self.plan.reversible, t_s) {
             self.link.settings.source.reversible = reversible;
+        }
+        if let Some(live) = held(&self.plan.live, t_s) {
+            self.link.settings.source.live = live;
         }
         row
     }

@@ -15,6 +15,8 @@ pub struct Source {
     pub inductance_h: f64,
     /// `true` if it takes energy back; a rectifier does not.
     pub reversible: bool,
+    /// `true` if it is there; in a gap of the line it is not.
+    pub live: bool,
 }
 
 /// The parts of the link.
@@ -28,6 +30,8 @@ pub struct DcLinkSettings {
     pub precharge_ohm: f64,
     /// Discharge resistor, in ohm.
     pub discharge_ohm: f64,
+    /// Resistance, in ohm, that auxiliaries and losses are to the link.
+    pub auxiliary_ohm: f64,
     /// Braking resistor behind the chopper, in ohm.
     pub chopper_ohm: f64,
 }
@@ -52,7 +56,7 @@ pub struct LinkEnergies {
     pub source_j: f64,
     /// Turned into heat in the source's and the precharge resistor.
     pub path_j: f64,
-    /// Likewise in the discharge resistor.
+    /// Likewise in the discharge resistor and the auxiliaries.
     pub discharge_j: f64,
     /// Likewise in the braking resistor.
     pub chopper_j: f64,
@@ -101,12 +105,12 @@ impl DcLink {
 
     /// `true` if the source gives its current through the choke: past the precharge resistor, which is far more than the choke.
     fn is_choked(&self) -> bool {
-        self.switches.main && self.settings.source.inductance_h > 0.0
+        self.switches.main && self.settings.source.live && self.settings.source.inductance_h > 0.0
     }
 
     /// Rate of the choke's current at a link voltage, in A/s.
     fn choke_slope(&self, udc_v: f64, choke_a: f64) -> f64 {
-        let Source { voltage_v, resistance_ohm, inductance_h, reversible } = self.settings.source;
+        let Source { voltage_v, resistance_ohm, inductance_h, reversible, .. } = self.settings.source;
         if !self.is_choked() {
             return 0.0;
         }
@@ -116,7 +120,10 @@ impl DcLink {
 
     /// Current that the source gives at a link voltage, and the resistance that it flows through.
     fn source(&self, udc_v: f64, choke_a: f64) -> (f64, f64) {
-        let Source { voltage_v, resistance_ohm, reversible, .. } = self.settings.source;
+        let Source { voltage_v, resistance_ohm, reversible, live, .. } = self.settings.source;
+        if !live {
+            return (0.0, resistance_ohm);
+        }
         if self.is_choked() {
             return (choke_a, resistance_ohm);
         }
@@ -130,10 +137,11 @@ impl DcLink {
     }
 
     pub(super) fn slopes(&self, udc_v: f64, choke_a: f64, inverter_a: f64) -> LinkSlopes {
-        let DcLinkSettings { capacitance_f, discharge_ohm, chopper_ohm, source, .. } = self.settings;
+        let DcLinkSettings { capacitance_f, discharge_ohm, auxiliary_ohm, chopper_ohm, source, .. } =
+            self.settings;
         let (source_a, path_ohm) = self.source(udc_v, choke_a);
         let through = |on: bool, ohm: f64| if on { udc_v / ohm } else { 0.0 };
-        let discharge_a = through(self.switches.discharge, discharge_ohm);
+        let discharge_a = through(self.switches.discharge, discharge_ohm) + udc_v / auxiliary_ohm;
         let chopper_a = through(self.switches.chopper, chopper_ohm);
         [
             (source_a - discharge_a - chopper_a - inverter_a) / capacitance_f,
@@ -150,7 +158,7 @@ impl DcLink {
         self.udc_v = udc_v;
         self.choke_a = if self.settings.source.reversible { choke_a } else { choke_a.max(0.0) };
         if !self.is_choked() {
-            // The contactor's arc.
+            // The arc of the contactor, or of the current collector.
             self.energies.path_j += self.choke_j();
             self.choke_a = 0.0;
         }

@@ -12,9 +12,16 @@ use tractive::operator::State;
 /// A 1,500 V line behind a rectifier, with parts of the size that a drive of 250 kW has.
 pub const LINK: DcLinkSettings = DcLinkSettings {
     capacitance_f: 6e-3,
-    source: Source { voltage_v: 1_500.0, resistance_ohm: 0.05, inductance_h: 0.0, reversible: false },
+    source: Source {
+        voltage_v: 1_500.0,
+        resistance_ohm: 0.05,
+        inductance_h: 0.0,
+        reversible: false,
+        live: true,
+    },
     precharge_ohm: 50.0,
     discharge_ohm: 100.0,
+    auxiliary_ohm: f64::INFINITY,
     chopper_ohm: 12.0,
 };
 
@@ -165,6 +172,7 @@ pub fn scaled(machine: &Machine) -> DcLinkSettings {
         },
         precharge_ohm: LINK.precharge_ohm * ohms,
         discharge_ohm: LINK.discharge_ohm * ohms,
+        auxiliary_ohm: LINK.auxiliary_ohm * ohms,
         chopper_ohm: LINK.chopper_ohm * ohms,
     }
 }

@@ -5,6 +5,7 @@ pub(super) mod borders_timing;
 pub(super) mod characteristic;
 pub(super) mod chopper;
 pub(super) mod full_step;
+pub(super) mod gaps;
 mod line;
 pub(super) mod link_steps;
 pub(super) mod load_steps;
@@ -257,7 +258,7 @@ fn setup(plan: &Plan, options: &Options, machine: &Machine, over_protocol: bool)
         line: plan.line.as_ref().map(|plan| times(&plan.link)),
         over_protocol,
         uncompensated,
-        behind_line_filter: options.own.line.is_some(),
+        behind_line_filter: options.own.line.is_some() || plan.line.as_ref().is_some_and(LinePlan::has_choke),
     }
 }
 
