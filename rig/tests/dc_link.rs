@@ -8,7 +8,13 @@ use tractive_tablegen::MachineFolder;
 
 const LINK: DcLinkSettings = DcLinkSettings {
     capacitance_f: 6e-3,
-    source: Source { voltage_v: 1_500.0, resistance_ohm: 0.05, inductance_h: 0.0, reversible: false, live: true },
+    source: Source {
+        voltage_v: 1_500.0,
+        resistance_ohm: 0.05,
+        inductance_h: 0.0,
+        reversible: false,
+        live: true,
+    },
     precharge_ohm: 50.0,
     discharge_ohm: 100.0,
     auxiliary_ohm: f64::INFINITY,
