@@ -3,7 +3,7 @@
 use crate::analysis::SteadyPoint;
 use crate::machine::Machine;
 use crate::pictures::chai::{machine as plane, modes, runs};
-use crate::pictures::sheet::draw as svg;
+use crate::pictures::ink::draw as svg;
 use crate::report::Page;
 use crate::trace::Recording;
 use tractive::modulation::{Ladder, Mode};

@@ -69,7 +69,7 @@ pub struct Picture {
     /// Paper and number, `chai-9`; of a group that the paper's text speaks of its first and last, `zs9-24-35`. Without a paper where it is
     /// in none.
     pub name: &'static str,
-    /// What it shows.
+    /// The words for it in a list.
     pub what: &'static str,
     /// The maker.
     pub source: Source,

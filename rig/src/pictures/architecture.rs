@@ -4,7 +4,7 @@ use super::diagram::Diagram;
 use super::sheet::{BLUE, GREEN, GREY, VIOLET};
 use anyhow::Result;
 
-/// Who talks to whom.
+/// The parts and the words between them.
 pub fn architecture() -> Result<String> {
     let mut all = Diagram::new(
         (1000, 470),

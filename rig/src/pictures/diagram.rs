@@ -1,6 +1,7 @@
 //! Diagrams: boxes with words, and arrows between them, placed in px.
 
-use super::sheet::{BLACK, BLUE, Colour, GREY, LETTERS, Mark, Panel, Point, Side, draw};
+use super::ink::draw;
+use super::sheet::{BLACK, BLUE, Colour, GREY, LETTERS, Mark, Panel, Point, Side};
 use anyhow::Result;
 use plotters::style::RGBColor;
 

@@ -1,10 +1,15 @@
-//! The drawing of a panel: its axes and its marks in units of the sheet.
+//! The drawing of a sheet as SVG: each panel's axes and marks in units of the sheet.
 
-use super::sheet::{BLACK, Colour, DASHED, FINE, LETTERS, Mark, Panel, Point, Side, number};
+use super::sheet::{BLACK, Colour, LETTERS, Mark, Panel, Point, Side, number};
 use anyhow::Result;
 use plotters::coord::Shift;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
+
+/// Units of the drawing in a pixel: coordinates are whole numbers, and a curve of whole pixels would be stepped.
+pub const FINE: u32 = 4;
+/// The cover of a stroke that stands for dashes: plotters' SVG has none.
+pub const DASHED: f64 = 0.99;
 
 /// The sheet.
 type Sheet<'a> = DrawingArea<SVGBackend<'a>, Shift>;
@@ -27,8 +32,46 @@ fn letters(px: f64) -> i32 {
     fine(1.24 * px)
 }
 
+/// Panels as one SVG of a width and height in px. Equal panels make equal bytes.
+pub fn draw((width, height): (u32, u32), panels: &[Panel]) -> Result<String> {
+    let mut svg = String::new();
+    {
+        let fine = (width * FINE, height * FINE);
+        let area = SVGBackend::with_string(&mut svg, fine).into_drawing_area();
+        area.fill(&WHITE)?;
+        for panel in panels {
+            draw_panel(&area, panel)?;
+        }
+        area.present()?;
+    }
+    let of = |scale: u32| format!("<svg width=\"{}\" height=\"{}\" ", width * scale, height * scale);
+    let svg = svg.replacen(&of(FINE), &of(1), 1).replace("opacity=\"1\" ", "");
+    let dashes = format!("stroke-dasharray=\"{} {}\"", 6 * FINE, 4 * FINE);
+    let svg = svg.replace(&format!("opacity=\"{DASHED}\""), &dashes);
+    Ok(subscripts(&svg))
+}
+
+/// Letters after `_` in braces, set lower and smaller: `U_{in}`.
+fn subscripts(svg: &str) -> String {
+    const END: &str = "</tspan>";
+    let mut out = String::with_capacity(svg.len());
+    for line in svg.split_inclusive('\n') {
+        let mut parts = line.split("_{");
+        out += parts.next().unwrap_or_default();
+        for part in parts {
+            let (low, rest) = part.split_once('}').unwrap_or((part, ""));
+            out += &format!("<tspan dy=\".3em\" font-size=\"75%\">{low}{END}");
+            let (line, end) = rest.split_at(rest.trim_end().len());
+            // A renderer may drop a space at the beginning of a part: it is a shift instead.
+            let shift = if line.starts_with(' ') { " dx=\".28em\"" } else { "" };
+            out += &format!("<tspan{shift} dy=\"-.225em\">{}{END}{end}", line.trim_start());
+        }
+    }
+    out
+}
+
 /// Draws a panel.
-pub fn draw_panel(sheet: &Sheet, panel: &Panel) -> Result<()> {
+fn draw_panel(sheet: &Sheet, panel: &Panel) -> Result<()> {
     let (left, top, width, height) = panel.place;
     let Some((x, y)) = &panel.axes else {
         let place = |(x, y): Point| (fine(left + x), fine(top + y));
@@ -250,6 +293,27 @@ fn keep_extremes(run: &[Place], kept: &mut Vec<Place>) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::pictures::sheet::{Axis, BLUE, RED};
+
+    #[test]
+    fn subscripts_are_set_lower_and_the_line_goes_on() {
+        let text = subscripts("U_{in} = 2\n1\n");
+        assert!(text.starts_with("U<tspan dy=\".3em\" font-size=\"75%\">in</tspan>"), "{text}");
+        assert!(text.ends_with("<tspan dx=\".28em\" dy=\"-.225em\">= 2</tspan>\n1\n"), "{text}");
+    }
+
+    #[test]
+    fn equal_panels_make_equal_bytes_of_the_size_asked_for() {
+        let panel = || {
+            let mut panel =
+                Panel::plane((0.0, 0.0, 200.0, 100.0), "", Axis::fitted("id in A"), Axis::fitted("iq in A"));
+            panel.line([(0.0, 0.0), (1.0, 1.0)], BLUE, 1.0).arrow([(0.0, 0.0), (0.5, 0.0)], RED);
+            panel
+        };
+        let svg = draw((200, 100), &[panel()]).unwrap();
+        assert_eq!(svg, draw((200, 100), &[panel()]).unwrap());
+        assert!(svg.starts_with("<svg width=\"200\" height=\"100\" viewBox=\"0 0 800 400\""), "{svg}");
+    }
 
     #[test]
     fn a_path_keeps_its_bends_and_its_peaks_and_nothing_else() {

@@ -5,7 +5,7 @@
 pub mod architecture;
 pub mod chai;
 pub mod diagram;
-mod ink;
+pub mod ink;
 mod loci;
 pub mod sheet;
 pub mod zs9;

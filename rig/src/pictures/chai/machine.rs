@@ -1,9 +1,8 @@
 //! The first paper's machine: its current loci and its inductances, figures 1, 3 and 4.
 
+use super::super::ink::draw;
 use super::super::loci::Loci;
-use super::super::sheet::{
-    Axis, BLACK, BLUE, GREEN, GREY, ORANGE, Panel, Point, RED, Side, VIOLET, draw, number,
-};
+use super::super::sheet::{Axis, BLACK, BLUE, GREEN, GREY, ORANGE, Panel, Point, RED, Side, VIOLET, number};
 use crate::machine::Machine;
 use anyhow::Result;
 use tractive_tablegen::SmoothMap;

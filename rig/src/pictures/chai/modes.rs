@@ -1,7 +1,8 @@
 //! The first paper's modes, figures 6 and 7, and every mode's pulses.
 
+use super::super::ink::draw;
 use super::super::sheet::{
-    Axis, BLACK, BLUE, Colour, GREEN, GREY, ORANGE, Panel, Point, RED, Side, VIOLET, draw, number,
+    Axis, BLACK, BLUE, Colour, GREEN, GREY, ORANGE, Panel, Point, RED, Side, VIOLET, number,
 };
 use crate::machine::Machine;
 use crate::pattern::{LegEdge, Wanted, edges};

@@ -1,6 +1,7 @@
 //! The first paper's measurements, figures 8 to 10, from runs of this project.
 
-use super::super::sheet::{Axis, BLUE, GREY, Panel, RED, Side, draw, number};
+use super::super::ink::draw;
+use super::super::sheet::{Axis, BLUE, GREY, Panel, RED, Side, number};
 use crate::analysis::SteadyPoint;
 use crate::trace::{Recording, Row};
 use anyhow::Result;

@@ -113,8 +113,6 @@ mod tests {
             if k + 1 < FIRST_ZERO {
                 let angle = (TAU * (k % 6) as f64 / 6.0).sin_cos();
                 let at = (2.0 / 3.0 * angle.1, 2.0 / 3.0 * angle.0);
-                // The lower motor's are the upper one's turned by half a turn.
-                let at = if k < 6 { at } else { (-at.0, -at.1) };
                 assert!((own.0 - at.0).hypot(own.1 - at.1) < 1e-6, "V{} is at {own:?}", k + 1);
             } else {
                 assert!(own.0.hypot(own.1) < 1e-6);

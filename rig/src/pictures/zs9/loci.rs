@@ -1,7 +1,8 @@
 //! The second paper's currents: figures 12 and 13. Its motor is linear, so that ellipses are written down.
 
+use super::super::ink::draw;
 use super::super::loci::Loci;
-use super::super::sheet::{Axis, BLACK, BLUE, GREY, ORANGE, Panel, Point, RED, Side, VIOLET, draw, number};
+use super::super::sheet::{Axis, BLACK, BLUE, GREY, ORANGE, Panel, Point, RED, Side, VIOLET, number};
 use crate::machine::Machine;
 use anyhow::Result;
 use core::f64::consts::{FRAC_2_PI, TAU};

@@ -1,6 +1,7 @@
 //! The second paper's curves, figures 14 to 36, from runs of this project.
 
-use super::super::sheet::{Axis, BLUE, Colour, GREEN, ORANGE, Panel, RED, draw};
+use super::super::ink::draw;
+use super::super::sheet::{Axis, BLUE, Colour, GREEN, ORANGE, Panel, RED};
 use crate::rows::between;
 use crate::zs9::trace::{Recording, Row};
 use anyhow::Result;

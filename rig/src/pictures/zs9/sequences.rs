@@ -1,7 +1,8 @@
 //! The second paper's sequences over a carrier period: figures 2, 4 to 6, 8 and 9.
 
+use super::super::ink::draw;
 use super::super::sheet::{
-    Axis, BLACK, BLUE, Colour, GREEN, GREY, LETTERS, Mark, Panel, Point, RED, Side, VIOLET, draw,
+    Axis, BLACK, BLUE, Colour, GREEN, GREY, LETTERS, Mark, Panel, Point, RED, Side, VIOLET,
 };
 use super::gates::{FIRST_ZERO, is_on, leg, period, steps, vectors};
 use anyhow::{Context, Result};

@@ -1,6 +1,7 @@
 //! The second paper's planes of vectors: figures 3 and 7.
 
-use super::super::sheet::{Axis, BLACK, BLUE, Colour, GREEN, GREY, Panel, Point, RED, Side, VIOLET, draw};
+use super::super::ink::draw;
+use super::super::sheet::{Axis, BLACK, BLUE, Colour, GREEN, GREY, Panel, Point, RED, Side, VIOLET};
 use super::gates::{FIRST_ZERO, VECTORS, period, vectors, voltages};
 use anyhow::Result;
 use tractive::nine_switch::Scheme;
