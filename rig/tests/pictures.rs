@@ -85,3 +85,22 @@ fn words_lie_within_their_picture_and_are_large_enough_to_read() {
         }
     }
 }
+
+#[test]
+fn a_picture_by_its_number_is_drawn_and_one_that_there_is_not_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let figures = |only: &str| {
+        let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_tractive-rig"));
+        command.args(["figures", "--only", only, "--out"]).arg(&out).output().unwrap()
+    };
+    let refused = figures("zs9-37");
+    let errors = String::from_utf8_lossy(&refused.stderr);
+    assert_eq!((refused.status.code(), errors.trim().lines().count()), (Some(2), 1), "{errors}");
+    assert!(errors.contains("--only zs9-37: must be one of architecture, ") && !out.exists(), "{errors}");
+    // Figure 15 is one of the group of 14 to 19; it comes from a run.
+    let drawn = figures("zs9-15");
+    assert!(drawn.status.success(), "{}", String::from_utf8_lossy(&drawn.stderr));
+    let files: Vec<_> = std::fs::read_dir(&out).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+    assert_eq!(files, ["zs9-14-19.svg"]);
+}

@@ -71,7 +71,7 @@ pub fn control() -> Result<String> {
         .part((16.0, 318.0, 546.0, 130.0), "motor 2", RED)
         .part((626.0, 34.0, 354.0, 414.0), "inverter", VIOLET);
     all.block((150.0, 70.0, 170.0, 62.0), "v_{C} and i_{L} loops\n(figure 11)")
-        .block((400.0, 70.0, 150.0, 62.0), "duty, limited to\nwhat the motors leave");
+        .block((400.0, 70.0, 150.0, 62.0), "kept first: motors\nhave what is left");
     all.flow(&[(40.0, 101.0), (150.0, 101.0)])
         .words((90.0, 89.0), "U_{in}*")
         .flow(&[(320.0, 101.0), (400.0, 101.0)]);
@@ -122,13 +122,10 @@ pub fn link() -> Result<String> {
     );
     all.block((90.0, 80.0, 130.0, 60.0), "(U_{in}* + U_{dc})/2")
         .block((290.0, 95.0, 30.0, 30.0), "−")
-        .block((370.0, 80.0, 90.0, 60.0), "PI\n80 Hz")
+        .block((370.0, 80.0, 90.0, 60.0), "PI")
         .block((510.0, 95.0, 30.0, 30.0), "+")
         .block((590.0, 95.0, 30.0, 30.0), "−")
-        .block(
-            (670.0, 72.0, 200.0, 76.0),
-            "600 Hz: (v_{C} − U_{dc}\n+ ω_{i} L Δi + r i_{L})\n÷ (2 v_{C} − U_{dc})",
-        )
+        .block((670.0, 72.0, 200.0, 76.0), "(v_{C} − U_{dc}\n+ ω_{i} L Δi + r i_{L})\n÷ (2 v_{C} − U_{dc})")
         .block((440.0, 190.0, 170.0, 50.0), "motors' power ÷ U_{dc}");
     all.flow(&[(20.0, 110.0), (90.0, 110.0)])
         .words((52.0, 98.0), "U_{in}*")
