@@ -10,7 +10,7 @@ use tractive_rig::campaign::{self, command::CampaignOptions};
 use tractive_rig::machine::Machine;
 use tractive_rig::needs::Needs;
 use tractive_rig::scenario::command::folder;
-use tractive_rig::{nine_switch, pattern, points, report, say, scenario, talk};
+use tractive_rig::{gallery, nine_switch, pattern, points, report, say, scenario, talk};
 
 #[derive(Parser)]
 #[command(name = "tractive-rig", about = "Plays the motor to the drive, and shows what happened", version)]
@@ -53,6 +53,8 @@ enum Command {
     Pattern(PatternOptions),
     /// Faults in every mode, at every speed, motoring, braking and coasting, and what came of each.
     Campaign(CampaignOptions),
+    /// The papers' figures as this project makes them, an SVG each, named by paper and number.
+    Figures(gallery::FigureOptions),
     /// The nine-switch modulator's gates for one carrier period (T = 1): IN.csv has scheme,theta1_deg,m1,theta2_deg,m2,d_sh;
     /// OUT.csv adds for each gate UH ... WL its level just after t = 0 (X_init) and its toggle instants (X_edges, with ; between),
     /// feasible (1 or 0; then the gates are those of what fits), m1_applied and m2_applied.
@@ -103,6 +105,7 @@ fn command(command: Command) -> Result<ExitCode> {
         Command::Points { input, output, machine } => {
             done(points::run(&input, &output, &Machine::load(&machine)?))
         }
+        Command::Figures(options) => done(gallery::run(&options)),
         Command::NineSwitch { input, output } => done(nine_switch::run(&input, &output)),
         Command::Campaign(options) => campaign::command::run(&options),
         Command::Pattern(options) => {

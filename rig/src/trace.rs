@@ -154,6 +154,23 @@ impl Recording {
     pub fn seconds(&self, tick: Tick) -> f64 {
         (tick as f64 - self.lead as f64) * self.tick_s
     }
+
+    /// Line voltage between phases u and v in V over time in s, from the gates' edges from a time to another.
+    pub fn line_voltage(&self, (from_s, to_s): (f64, f64)) -> Vec<(f64, f64)> {
+        let udc_v = self.rows.first().map_or(0.0, |row| row.udc_v);
+        let mut on = [false; GATES.len()];
+        let (mut points, mut last) = (Vec::new(), 0.0);
+        for edge in &self.edges {
+            let t_s = self.seconds(edge.tick);
+            on[usize::from(edge.gate)] = edge.on;
+            let level = udc_v * (f64::from(u8::from(on[0])) - f64::from(u8::from(on[2])));
+            if t_s >= from_s && t_s <= to_s {
+                points.extend([(t_s, last), (t_s, level)]);
+            }
+            last = level;
+        }
+        points
+    }
 }
 
 impl Row {

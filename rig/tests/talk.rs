@@ -206,6 +206,31 @@ fn both_motors_of_the_zs9_go_to_their_speeds_and_back() {
 }
 
 #[test]
+fn a_speed_that_is_told_in_steps_takes_a_torque_without_them() {
+    const SLOPE_RPM_S: f64 = 500.0;
+    let folder = tempfile::tempdir().unwrap();
+    let (script, out) = (folder.path().join("ramp.talk"), folder.path().join("out"));
+    let told = format!("0.4 charge\n1.2 enable\n1.6 speed 1000 -1000 at {SLOPE_RPM_S}\n3.4 end\n");
+    std::fs::write(&script, told).unwrap();
+    let mut command = rig();
+    command.args(["--system", "zs9", "--dt", "1e-4"]).arg(&script).arg("--out").arg(&out);
+    let output = command.output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    // The loops are made for 0.1 kg·m².
+    let wanted_nm = 0.1 * SLOPE_RPM_S * core::f64::consts::TAU / 60.0;
+    let rows = rows(&out.join("trace.csv"));
+    let within = |row: &&std::collections::BTreeMap<String, String>| {
+        (1.8..3.3).contains(&row["t_s"].parse::<f64>().unwrap())
+    };
+    for (column, sign) in [("te1_nm", 1.0), ("te2_nm", -1.0)] {
+        let torque = || rows.iter().filter(within).map(|row| sign * row[column].parse::<f64>().unwrap());
+        let (least, largest) = (torque().fold(f64::MAX, f64::min), torque().fold(f64::MIN, f64::max));
+        println!("{column}: {least:.2} to {largest:.2} N·m of {wanted_nm:.2}");
+        assert!(wanted_nm - 1.0 < least && largest < wanted_nm + 1.0, "{column}: {least} to {largest} N·m");
+    }
+}
+
+#[test]
 fn the_zs9_rejects_hostile_frames_and_silence_ends_it() {
     let out = tempfile::tempdir().unwrap();
     let output = talk_zs9("zs9-hostile.talk", out.path(), &[]);

@@ -2,6 +2,7 @@
 //! one enabling edge are both motors'.
 
 use super::demand::wanted_nm;
+use super::set_point::SetPoint;
 use super::{Demands, Levels, Ramp, Rates, Refusal, Seen, Settings};
 use crate::control::Demand;
 use crate::drive::{Observation, dual};
@@ -9,9 +10,6 @@ use crate::frames::limit;
 use crate::machine::Ratings;
 use crate::ports::{DualDriveCommand, DualReport, MotorDemand};
 use crate::protection::Trip;
-
-/// Time in which a speed demand goes from standstill to the largest speed, in s.
-const SPEED_RISE_S: f32 = 0.5;
 
 /// Share of the source's voltage by which the link may be above it when the gates go off at the end of a stop: what is more swings
 /// back into the source through the inductors.
@@ -98,8 +96,8 @@ impl DualRequest {
 #[derive(Clone, Copy, Debug)]
 enum Way {
     Torque(Ramp),
-    /// The speed's reference, in rad/s.
-    Speed(f32),
+    /// The speed's reference.
+    Speed(SetPoint),
 }
 
 /// One motor's measurements in a slot.
@@ -129,13 +127,13 @@ impl Way {
                 Self::Torque(ramp)
             }
             (Wanted::Speed(target), way) => {
-                let from = match way {
-                    Self::Speed(from) => from,
-                    Self::Torque(_) => motor.speed,
+                let mut point = match way {
+                    Self::Speed(point) => point,
+                    Self::Torque(_) => SetPoint::at(motor.speed),
                 };
                 let target = limit(target, -limits.speed_rad_s, limits.speed_rad_s);
-                let step = settings.ratings.max_speed_rad_s * settings.slot_s / SPEED_RISE_S;
-                Self::Speed(limit(target, from - step, from + step))
+                point.step(target, settings);
+                Self::Speed(point)
             }
         };
     }
@@ -145,7 +143,7 @@ impl Way {
             Self::Torque(ramp) => {
                 MotorDemand::Torque(Demand { torque_nm: ramp.torque_nm(), slew_limited: true })
             }
-            Self::Speed(speed) => MotorDemand::Speed(*speed),
+            Self::Speed(point) => MotorDemand::Speed(point.speed()),
         }
     }
 }

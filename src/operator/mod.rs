@@ -18,6 +18,7 @@ mod line;
 mod machine;
 mod ramp;
 mod request;
+mod set_point;
 mod settings;
 mod slot;
 mod status;

@@ -7,6 +7,8 @@ use std::fmt::Write as _;
 
 /// Size of a plot, in pixels.
 pub const SIZE: (u32, u32) = (1000, 280);
+/// Size of the letters, as plotters counts them: 11.3 px.
+const LETTERS: u32 = 14;
 /// Points per curve; denser data is shown by its extremes.
 const POINTS: usize = 1500;
 /// Colours of the curves, in their order.
@@ -22,7 +24,8 @@ pub const COLOURS: [RGBColor; 6] = [
 /// Curves over a common axis; `x_label`, `y_label` name the axes.
 pub fn chart((x_label, y_label): (&str, &str), series: &[(&str, Vec<(f64, f64)>)]) -> Result<String> {
     let points = || series.iter().flat_map(|(_, points)| points.iter());
-    let (mut x, mut y) = ((f64::INFINITY, f64::NEG_INFINITY), (0.0_f64, 0.0_f64));
+    let none = (f64::INFINITY, f64::NEG_INFINITY);
+    let (mut x, mut y) = (none, none);
     for (t_s, value) in points() {
         x = (x.0.min(*t_s), x.1.max(*t_s));
         y = (y.0.min(*value), y.1.max(*value));
@@ -30,22 +33,47 @@ pub fn chart((x_label, y_label): (&str, &str), series: &[(&str, Vec<(f64, f64)>)
     if x.1.is_nan() || x.1 <= x.0 {
         x = (0.0, 1.0);
     }
+    let y = fitted(y);
     let room = 0.05 * (y.1 - y.0).max(1e-9);
     let mut svg = String::new();
     {
         let area = SVGBackend::with_string(&mut svg, SIZE).into_drawing_area();
         let mut chart = ChartBuilder::on(&area)
             .margin(8)
-            .x_label_area_size(34)
-            .y_label_area_size(64)
+            .x_label_area_size(38)
+            .y_label_area_size(70)
             .build_cartesian_2d(x.0..x.1, y.0 - room..y.1 + room)?;
-        chart.configure_mesh().x_desc(x_label).y_desc(y_label).light_line_style(TRANSPARENT).draw()?;
+        chart
+            .configure_mesh()
+            .x_desc(x_label)
+            .y_desc(y_label)
+            .label_style(("sans-serif", LETTERS))
+            .light_line_style(TRANSPARENT)
+            .draw()?;
         for ((_, points), colour) in series.iter().zip(COLOURS.into_iter().cycle()) {
             chart.draw_series(LineSeries::new(points.iter().copied(), &colour))?;
         }
         area.present()?;
     }
     Ok(svg)
+}
+
+/// The range of an axis for values from one to another: with 0 where that is no farther away than they are apart, so that a current or
+/// a torque stands over its 0, and a link that hardly moves fills its plot.
+fn fitted((low, high): (f64, f64)) -> (f64, f64) {
+    let span = high - low;
+    if span.is_nan() || span < 0.0 {
+        return (0.0, 1.0);
+    }
+    let least = 1e-3 * high.abs().max(low.abs());
+    let (low, high) = if span < least { (low - least, high + least) } else { (low, high) };
+    if low > 0.0 && low <= span {
+        (0.0, high)
+    } else if high < 0.0 && -high <= span {
+        (low, 0.0)
+    } else {
+        (low, high)
+    }
 }
 
 /// The curves' names in their colours; nothing for one alone.
@@ -81,4 +109,19 @@ pub fn thinned(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
             [part[low.min(high)], part[low.max(high)]]
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_axis_has_its_zero_where_it_is_near_and_fits_the_values_where_it_is_not() {
+        assert_eq!(fitted((10.0, 100.0)), (0.0, 100.0));
+        assert_eq!(fitted((-100.0, -10.0)), (-100.0, 0.0));
+        assert_eq!(fitted((-5.0, 100.0)), (-5.0, 100.0));
+        assert_eq!(fitted((660.0, 670.0)), (660.0, 670.0));
+        assert_eq!(fitted((1500.0, 1500.0)), (1498.5, 1501.5));
+        assert_eq!(fitted((f64::INFINITY, f64::NEG_INFINITY)), (0.0, 1.0));
+    }
 }

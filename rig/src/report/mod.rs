@@ -10,7 +10,7 @@ pub use text::{headline, list, text};
 
 use crate::analysis::Figures;
 use crate::rows::Timed;
-use crate::trace::{GATES, Recording, Row};
+use crate::trace::{Recording, Row};
 use anyhow::Result;
 use chart::{chart, legend, thinned};
 use std::fmt::Write as _;
@@ -167,19 +167,7 @@ impl Page {
 
     /// Line voltage between phases u and v from the gates' edges, over a part of the recording.
     pub fn line_voltage(&mut self, title: &str, recording: &Recording, window: (f64, f64)) {
-        let udc_v = recording.rows.first().map_or(0.0, |row| row.udc_v);
-        let mut on = [false; GATES.len()];
-        let mut points = Vec::new();
-        let mut last = 0.0;
-        for edge in &recording.edges {
-            let t_s = recording.seconds(edge.tick);
-            on[usize::from(edge.gate)] = edge.on;
-            let level = udc_v * (f64::from(u8::from(on[0])) - f64::from(u8::from(on[2])));
-            if t_s >= window.0 && t_s <= window.1 {
-                points.extend([(t_s, last), (t_s, level)]);
-            }
-            last = level;
-        }
+        let points = recording.line_voltage(window);
         self.draw(title, "V", &[("u-v", points)]);
     }
 
@@ -215,6 +203,12 @@ impl Page {
         let series: Vec<_> = series.iter().map(|(name, points)| (name.as_str(), points.clone())).collect();
         let figure = figure.into().map_or(String::new(), |figure| format!("The paper's {figure} · "));
         self.add(&format!("{figure}{title}"), axes, &series);
+    }
+
+    /// A picture of its own, beside a figure of the paper or none.
+    pub fn picture<'a>(&mut self, figure: impl Into<Option<&'a str>>, title: &str, svg: Result<String>) {
+        let figure = figure.into().map_or(String::new(), |figure| format!("The paper's {figure} · "));
+        self.place(&format!("{figure}{title}"), svg);
     }
 
     /// Curves under a heading of their own, over time or anything else; over time dense data is shown by its extremes.

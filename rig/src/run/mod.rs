@@ -12,7 +12,8 @@ pub(crate) use host::on_host;
 pub(crate) use qemu::in_qemu;
 
 use crate::bench::Simulated;
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
+use std::sync::LazyLock;
 use tractive::configuration::Refused;
 use tractive::protocol::Frame;
 use tractive::time::{Clock, Instant};
@@ -74,9 +75,12 @@ pub(crate) fn turn(
     Ok(turn.frame)
 }
 
+/// The bars on the terminal, a line each: runs go on side by side.
+static BARS: LazyLock<MultiProgress> = LazyLock::new(MultiProgress::new);
+
 /// A bar of so many steps on a terminal; in a pipe indicatif draws none.
 pub(crate) fn bar(steps: u64, template: &str) -> ProgressBar {
-    let bar = ProgressBar::new(steps);
+    let bar = BARS.add(ProgressBar::new(steps));
     match ProgressStyle::with_template(template) {
         Ok(style) => bar.with_style(style),
         Err(_) => bar,

@@ -4,7 +4,6 @@ pub mod bench;
 pub mod figures;
 pub mod line;
 mod operator;
-pub mod patterns;
 pub mod run;
 pub mod settings;
 pub mod trace;

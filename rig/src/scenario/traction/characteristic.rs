@@ -51,7 +51,7 @@ fn slots(machine: &Machine) -> Vec<Slot> {
 }
 
 /// Measurements at each point.
-fn points(recording: &Recording, machine: &Machine) -> Vec<SteadyPoint> {
+pub fn points(recording: &Recording, machine: &Machine) -> Vec<SteadyPoint> {
     let point = |slot: Slot| {
         let window = (slot.ends_s - MEASURE_S, slot.ends_s);
         analysis::steady_point(recording, window, slot.torque_nm, &machine.folder)

@@ -2,7 +2,7 @@
 
 pub(super) mod acknowledge;
 pub(super) mod borders_timing;
-pub(super) mod characteristic;
+pub mod characteristic;
 pub(super) mod chopper;
 pub(super) mod full_step;
 pub(super) mod gaps;

@@ -2,6 +2,7 @@
 
 pub(super) mod cycle;
 pub(super) mod load_step;
+mod patterns;
 mod prelude;
 pub(super) mod reverse;
 pub(super) mod steady;

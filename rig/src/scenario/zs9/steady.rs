@@ -1,7 +1,7 @@
 //! Harmonics in steady state: what the schemes of the nine-switch modulator differ in.
 
+use super::patterns;
 use super::prelude::*;
-use crate::zs9::patterns;
 use tractive::nine_switch::Scheme;
 
 /// 60 N·m each at prescribed speeds.
