@@ -2,6 +2,7 @@
 
 use crate::analysis::SteadyPoint;
 use crate::machine::Machine;
+use crate::options::usual_min_pulse_us;
 use crate::pattern::{self, Wanted};
 use crate::report::Page;
 use crate::trace::Recording;
@@ -144,7 +145,7 @@ fn legs(machine: &Machine, mode: Mode, f1_hz: f64, share: f64) -> Series {
         f1_hz,
         cycles: 1,
         dead_time_us: 0.0,
-        min_pulse_us: 10.0,
+        min_pulse_us: usual_min_pulse_us(machine.folder.parameters.max_switching_hz),
         max_switching_hz: machine.tables.ratings.max_switching_hz,
     };
     let edges = pattern::edges(&wanted).unwrap_or_default();
