@@ -11,7 +11,8 @@ use tractive::control::{VoltageLimit, mtpa, operating_point};
 use tractive::modulation::{Ladder, Mode};
 use tractive_tablegen::SmoothMap;
 
-type Series = Vec<(String, Curve)>;
+/// Curves, each with its name.
+pub type Series = Vec<(String, Curve)>;
 
 /// Figures 1, 3, 4, 6, 7 and 10 beside ours.
 pub fn draw(page: &mut Page, recording: &Recording, points: &[SteadyPoint], machine: &Machine) {
@@ -37,7 +38,8 @@ pub fn draw(page: &mut Page, recording: &Recording, points: &[SteadyPoint], mach
     }
 }
 
-type Curve = Vec<(f64, f64)>;
+/// Points of a curve.
+pub type Curve = Vec<(f64, f64)>;
 
 /// Torque over its demand, efficiency and current of the characteristic points, over speed: full torque, then full power.
 fn accuracy(points: &[SteadyPoint], machine: &Machine) -> [(&'static str, &'static str, Curve); 3] {
@@ -58,7 +60,7 @@ fn accuracy(points: &[SteadyPoint], machine: &Machine) -> [(&'static str, &'stat
 }
 
 /// MTPA over torque, and full power over speed.
-fn loci(machine: &Machine) -> Series {
+pub fn loci(machine: &Machine) -> Series {
     let ratings = &machine.tables.ratings;
     let parameters = &machine.folder.parameters;
     let mtpa_points = (0..=100).map(|k| {
@@ -85,7 +87,7 @@ fn loci(machine: &Machine) -> Series {
 }
 
 /// Static inductances from the smooth map.
-fn inductances(machine: &Machine, d_axis: bool) -> Series {
+pub fn inductances(machine: &Machine, d_axis: bool) -> Series {
     let map = SmoothMap::new(&machine.folder.map);
     let largest = machine.folder.parameters.max_current_a;
     [0.05, 0.35, 0.65, 0.95]

@@ -50,7 +50,7 @@ enum Command {
         #[arg(long, default_value = "pmasynrm-180kw")]
         machine: String,
     },
-    /// Machine folders: a new one from nameplate values.
+    /// Machine folders: from nameplate values, from a map of another tool, and as a page.
     #[command(subcommand)]
     Machine(Box<MachineCommand>),
     /// The modulator's pulses in steady state.

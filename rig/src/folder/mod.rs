@@ -1,12 +1,19 @@
 //! `cargo rig machine`: machine folders made, and shown.
 
 mod given;
+mod header;
+mod import;
 mod nameplate;
 mod ratings;
+mod rectangle;
+mod samples;
+mod show;
 mod write;
 
 pub use given::Given;
+pub use import::{DAxis, Import};
 pub use nameplate::Nameplate;
+pub use show::{Show, page};
 
 use anyhow::Result;
 use clap::Subcommand;
@@ -21,6 +28,14 @@ pub enum MachineCommand {
     /// one. Data of a SynRM or PMaSynRM whose d axis lies along the least reluctance (L_d above L_q, magnets along −q) has L_d and L_q
     /// the other way round: give its L_q as --ld and its L_d as --lq; ψ_f stays positive.
     New(Nameplate),
+    /// A machine folder from a flux map of another tool.
+    ///
+    /// The map's nodes stand on a rectangular grid, even or not, in any order. An even one is taken as it is; between uneven nodes the map is
+    /// interpolated. Of a map with one sign of iq the other is its mirror image. Nothing is written unless the table generator takes the
+    /// folder: flux linkage that rises with its own current, the same cross inductance both ways, one current for one flux linkage.
+    Import(Import),
+    /// A page about a machine: its flux linkages, its currents, torque and power over speed, and what each limit costs.
+    Show(Show),
 }
 
 /// Does what the command says.
@@ -30,5 +45,7 @@ pub enum MachineCommand {
 pub fn run(command: &MachineCommand) -> Result<()> {
     match command {
         MachineCommand::New(nameplate) => nameplate.make(),
+        MachineCommand::Import(import) => import.make(),
+        MachineCommand::Show(show) => show.write(),
     }
 }
