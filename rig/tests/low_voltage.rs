@@ -2,6 +2,7 @@
 //! falls short.
 
 use rayon::prelude::*;
+use std::process::Command;
 use tractive_rig::scenario::catalogue;
 use tractive_rig::trace::Recorded;
 use tractive_rig::verdict::FALLS_SHORT;
@@ -76,4 +77,26 @@ fn a_scenario_asks_what_the_machine_has() {
     assert!((most_nm / parameters.max_torque_nm - 1.0).abs() < 1e-5, "{most_nm} N·m");
     let speed_rpm = recording.rows[0].speed_rpm;
     assert!((speed_rpm / parameters.rated_speed_rpm - 0.1).abs() < 1e-6, "{speed_rpm} r/min");
+}
+
+/// A bound that another machine does not keep is exit code 1, as it is of the paper's; its page names no figure of the paper.
+#[test]
+fn a_bound_that_is_not_kept_is_exit_code_1_for_every_machine() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = |line: &str| {
+        let mut rig = Command::new(env!("CARGO_BIN_EXE_tractive-rig"));
+        let output =
+            rig.arg("run").args(line.split_whitespace()).arg("--out").arg(folder.path()).output().unwrap();
+        let page = std::fs::read_to_string(folder.path().join("report.html")).unwrap();
+        (output.status.code(), String::from_utf8_lossy(&output.stdout).into_owned(), page)
+    };
+    // Pulses as short as a carrier of 20 kHz needs, and pulses of an IGBT.
+    let own = format!("reversal --machine {MACHINE}");
+    let (code, said, page) = run(&own);
+    assert!(code == Some(0) && said.starts_with("PASS: 2 of 2 bounds kept"), "{said}");
+    assert!(!page.contains("The paper's") && page.contains("<svg"), "{page}");
+    let (code, said, _) = run(&format!("{own} --min-pulse-us 12"));
+    assert!(code == Some(1) && said.starts_with("FALLS SHORT: 1 of 2 bounds"), "{code:?}: {said}");
+    let (code, _, page) = run("full-step");
+    assert!(code == Some(0) && page.contains("The paper's figure 8"), "{page}");
 }
