@@ -66,7 +66,7 @@ const FLUX_UNITS: [(&str, f64); 11] = [
     ("wbturns", 1.0),
 ];
 
-/// What the name of a column says; nothing where it is none of the four quantities. `rms` holds where the name does not say.
+/// The meaning of a column by its name; nothing where it is none of the four quantities. `rms` holds where the name does not say.
 ///
 /// # Errors
 /// A unit in brackets that is none of the quantity's.
