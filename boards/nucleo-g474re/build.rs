@@ -19,11 +19,31 @@ mod zs9_rates;
 /// A check of a power stage's file and text against a machine; it gives the constant as Rust.
 type Check = fn(&Path, &str, &power_stage::Machine) -> Result<String, InputError>;
 
-/// For each image: the variable that names its machine, the machine when it names none, the name of its tables, its power stage's name and
-/// check.
-const IMAGES: [(&str, &str, &str, &str, Check); 2] = [
-    ("TRACTIVE_MACHINE", "pmasynrm-180kw", "traction", "power_stage", power_stage::traction),
-    ("TRACTIVE_ZS9_MACHINE", "ipm-zs9", "zs9", "power_stage_zs9", power_stage::zs9),
+/// An image: the end of the variables that name its machine and its power stage, what they are when these name none, the name of its
+/// tables, and the power stage's check.
+struct Image {
+    system: &'static str,
+    machine: &'static str,
+    stage: &'static str,
+    tables: &'static str,
+    check: Check,
+}
+
+const IMAGES: [Image; 2] = [
+    Image {
+        system: "TRACTIVE",
+        machine: "pmasynrm-180kw",
+        stage: "power_stage",
+        tables: "traction",
+        check: power_stage::traction,
+    },
+    Image {
+        system: "TRACTIVE_ZS9",
+        machine: "ipm-zs9",
+        stage: "power_stage_zs9",
+        tables: "zs9",
+        check: power_stage::zs9,
+    },
 ];
 
 /// Interrupt handlers that an image may define; the others end in cortex-m-rt's default handler.
@@ -43,13 +63,19 @@ fn main() -> ExitCode {
 
 /// The tables of each image's machine and the constant of its power stage.
 fn images(out: &Path) -> Result<(), String> {
-    for (variable, default, tables, stage, check) in IMAGES {
+    let chosen = |variable: String, default: String| {
         println!("cargo:rerun-if-env-changed={variable}");
-        let machine = env::var(variable).unwrap_or_else(|_| default.to_owned());
+        env::var(variable).unwrap_or(default)
+    };
+    for Image { system, machine, stage, tables, check } in IMAGES {
+        let machine = chosen(format!("{system}_MACHINE"), machine.to_owned());
         // A folder of tables/, or a path as seen from the repository's root.
         let mut places = ["../../tables", "../.."].into_iter().map(|place| Path::new(place).join(&machine));
         let folder = places.find(|folder| folder.is_dir()).unwrap_or_else(|| PathBuf::from(&machine));
-        let file = PathBuf::from(format!("{stage}.toml"));
+        // A file beside the package, or a path as seen from the repository's root.
+        let name = chosen(format!("{system}_POWER_STAGE"), format!("{stage}.toml"));
+        let beside = PathBuf::from(&name);
+        let file = if beside.is_file() { beside } else { Path::new("../..").join(&name) };
         for read in [&folder, &file] {
             println!("cargo:rerun-if-changed={}", read.display());
         }

@@ -122,7 +122,7 @@ pub fn ideal(rows: &[crate::trace::Row], options: &RunOptions, machine: &Machine
         f1_hz,
         cycles: cycles(last.mode),
         dead_time_us: 0.0,
-        min_pulse_us: options.min_pulse_us,
+        min_pulse_us: options.min_pulse_us(parameters.max_switching_hz),
         max_switching_hz: machine.tables.ratings.max_switching_hz,
     };
     let ripple = Ripple::of(&wanted)?;

@@ -14,6 +14,7 @@ pub mod columns;
 pub mod distortion;
 pub mod figures;
 pub mod files;
+pub mod folder;
 pub mod gallery;
 pub mod inject;
 pub mod machine;

@@ -30,6 +30,15 @@ impl Machine {
         Ok(machine)
     }
 
+    /// `true` if it is the machine of this name in `tables/`, by its contents.
+    pub fn is(&self, name: &str) -> bool {
+        self.tables.name == name
+            && Self::load(name).is_ok_and(|named| {
+                let (own, other) = (&self.folder, &named.folder);
+                own.parameters == other.parameters && own.map == other.map
+            })
+    }
+
     /// Largest torque at a mechanical speed in r/min, in N·m: the machine's largest, or what its largest power leaves.
     pub fn envelope_nm(&self, speed_rpm: f64) -> f64 {
         let parameters = &self.folder.parameters;

@@ -7,6 +7,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use tractive_rig::benchmark::{self, BenchOptions};
 use tractive_rig::campaign::{self, command::CampaignOptions};
+use tractive_rig::folder::{self, MachineCommand};
 use tractive_rig::machine::Machine;
 use tractive_rig::needs::Needs;
 use tractive_rig::scenario::command::folder;
@@ -49,6 +50,9 @@ enum Command {
         #[arg(long, default_value = "pmasynrm-180kw")]
         machine: String,
     },
+    /// Machine folders: from nameplate values, from a map of another tool, and as a page.
+    #[command(subcommand)]
+    Machine(Box<MachineCommand>),
     /// The modulator's pulses in steady state.
     Pattern(PatternOptions),
     /// Faults in every mode, at every speed, motoring, braking and coasting, and what came of each.
@@ -106,6 +110,7 @@ fn command(command: Command) -> Result<ExitCode> {
             done(points::run(&input, &output, &Machine::load(&machine)?))
         }
         Command::Figures(options) => done(gallery::run(&options)),
+        Command::Machine(command) => done(folder::run(&command)),
         Command::NineSwitch { input, output } => done(nine_switch::run(&input, &output)),
         Command::Campaign(options) => campaign::command::run(&options),
         Command::Pattern(options) => {

@@ -101,9 +101,9 @@ pub struct RunOptions {
     /// Dead time, in µs.
     #[arg(long, default_value_t = 0.0, value_parser = not_negative, allow_negative_numbers = true)]
     pub dead_time_us: f64,
-    /// Shortest pulse, in µs.
-    #[arg(long, default_value_t = 10.0, value_parser = not_negative, allow_negative_numbers = true)]
-    pub min_pulse_us: f64,
+    /// Shortest pulse, in µs; default 10, or of a machine whose devices switch faster than 900 Hz the same share of a carrier.
+    #[arg(long, value_parser = not_negative, allow_negative_numbers = true)]
+    pub min_pulse_us: Option<f64>,
     /// Resolution of the current converters, in bits.
     #[arg(long, value_parser = clap::value_parser!(u32).range(4..=24), allow_negative_numbers = true)]
     pub adc_bits: Option<u32>,
@@ -161,6 +161,14 @@ impl<O: Args> std::ops::Deref for Options<O> {
     }
 }
 
+/// Shortest pulse unless the options say another, in µs, of devices that switch up to 900 Hz.
+pub const USUAL_MIN_PULSE_US: f64 = 10.0;
+
+/// The same of devices of any highest switching frequency, in Hz: at most the same share of a carrier.
+pub fn usual_min_pulse_us(max_switching_hz: f64) -> f64 {
+    USUAL_MIN_PULSE_US * (900.0 / max_switching_hz).min(1.0)
+}
+
 /// Options by name, each with its value, least and most. The error names the first that is out of its range.
 pub fn within(ranges: &[(&str, f64, f64, f64)]) -> anyhow::Result<()> {
     for (name, value, low, high) in ranges {
@@ -173,6 +181,11 @@ pub fn within(ranges: &[(&str, f64, f64, f64)]) -> anyhow::Result<()> {
 }
 
 impl RunOptions {
+    /// Shortest pulse, in µs, of devices of this highest switching frequency, in Hz.
+    pub fn min_pulse_us(&self, max_switching_hz: f64) -> f64 {
+        self.min_pulse_us.unwrap_or_else(|| usual_min_pulse_us(max_switching_hz))
+    }
+
     /// `true` if inverter, sensors and machine are as control believes them to be.
     pub fn is_ideal(&self) -> bool {
         let flaws = [self.dead_time_us, self.noise_a, self.map_error, self.rs_error, self.angle_error];

@@ -4,13 +4,13 @@ use crate::bench::Inverter;
 use crate::files;
 use crate::options::{not_negative, positive};
 use crate::plant::Leg;
-use crate::run::{CLOCK, refused};
+use crate::run::{self, CLOCK, refused};
 use anyhow::{Result, bail};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use std::path::Path;
 use tractive::frames::{Angle, six_step_v};
 use tractive::modulation::{Mode, Modulator, Reference, Schedule, SwitchLimits, depth_limit};
-use tractive::time::Instant;
+use tractive::time::{Clock, Instant};
 
 /// The pattern to make.
 #[derive(Clone, Copy, Debug, clap::Args)]
@@ -66,7 +66,8 @@ pub fn edges(wanted: &Wanted) -> Result<Vec<LegEdge>> {
         wanted.max_switching_hz,
         &CLOCK,
     );
-    devices.check(&CLOCK).map_err(refused)?;
+    // A carrier lasts a control period at least.
+    devices.check(&run::clock(Clock::control_hz(wanted.max_switching_hz))).map_err(refused)?;
     let rate = (wanted.f1_hz * tick_s * 4_294_967_296.0) as f32;
     let lowest_hz = LONGEST_S.recip();
     if !(lowest_hz..=HIGHEST_HZ).contains(&wanted.f1_hz) {

@@ -320,3 +320,54 @@ fn mtpa_gives_its_torque_with_the_least_current() {
         assert!(current.0 < 5e-4, "{}: current {current}", case.name);
     }
 }
+
+/// A folder that `machine new` makes; its co-energy in the form of the truth, with the saturation that the command's help states.
+fn nameplate(values: &str, [ld_h, lq_h, magnet_wb, current_a, saturation]: [f64; 5]) -> Case {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("made");
+    let line = format!(
+        "machine new --ld {ld_h} --lq {lq_h} --psi-f {magnet_wb} --max-current {current_a} --saturation {saturation} {values}"
+    );
+    let rig = std::process::Command::new(env!("CARGO_BIN_EXE_tractive-rig"))
+        .args(line.split_whitespace())
+        .arg("--out")
+        .arg(&out)
+        .output()
+        .unwrap();
+    assert!(rig.status.success(), "{line}: {}", String::from_utf8_lossy(&rig.stderr));
+    let machine = Machine::load(&out.display().to_string()).unwrap();
+    let truth = match saturation {
+        1.0 => folders::linear(ld_h, lq_h, magnet_wb),
+        left => {
+            let knee_j = 0.5 * lq_h * current_a * current_a * left * left / (1.0 - left * left);
+            let (ida_a, iqa_a) = ((2.0 * knee_j / ld_h).sqrt(), (2.0 * knee_j / lq_h).sqrt());
+            let none = folders::linear(0.0, 0.0, magnet_wb);
+            CoEnergy { a_j: 2.0 * knee_j, im_a: 0.0, ida_a, iqa_a, ..none }
+        }
+    };
+    Case::new("from nameplate values", machine, truth)
+}
+
+#[test]
+fn a_machine_from_its_nameplate_has_the_operating_points_of_its_values() {
+    let raster = Raster { speeds: 20, links: 4, torques: &TORQUES };
+    let small = "--pole-pairs 4 --rs 0.05 --udc 48 --max-switching-hz 20000 --max-speed-rpm";
+    let large = "--pole-pairs 2 --rs 0.5 --udc 540 --max-speed-rpm 6000 --max-switching-hz 4000";
+    let cases = [
+        nameplate(&format!("{small} 9000"), [0.3e-3, 0.45e-3, 0.0135, 32.0, 1.0]),
+        nameplate(&format!("{small} 7000"), [0.3e-3, 0.45e-3, 0.0135, 32.0, 0.7]),
+        nameplate(large, [12e-3, 60e-3, 0.1, 32.0, 1.0]),
+    ];
+    for case in cases {
+        let found = survey(&case, &raster);
+        println!("{}: {found}", case.name);
+        let limits = [&found.voltage, &found.equations, &found.current, &found.unsaid];
+        // Single precision where the circle of the flux linkage is as large as the magnets'.
+        assert!(limits.iter().all(|over| over.0 < 2.0 * ROUNDING + between_nodes(&case)), "{found}");
+        let within = [&found.excess, &found.little, &found.early, &found.short];
+        assert!(found.torque.0 < 1.0 && within.iter().all(|off| off.0 < 5e-3), "{found}");
+        assert!(found.feasible > found.points / 4 && found.unweakened < found.points, "{found}");
+        let (torque, current) = mtpa(&case, 98);
+        assert!(torque.0 < 1.0 && current.0 < 5e-4, "{torque}, {current}");
+    }
+}

@@ -5,8 +5,6 @@ use super::settings::Line;
 use super::{Settings, Situation, Switches};
 use crate::protection::{Fault, Violation};
 
-/// Link voltage below which it counts as empty, in V: the limit of extra-low voltage.
-pub(super) const EMPTY_V: f32 = 60.0;
 /// Time constants after which charging or discharging has failed.
 const TOO_LONG: f32 = 10.0;
 /// Share of the nominal voltage that may be left between source and link when the main contactor closes.
@@ -132,17 +130,23 @@ impl Discharge {
         self.slots = self.slots.saturating_add(1);
         let passed_s = self.slots as f32 * settings.slot_s;
         let udc_v = input.observed.udc_v;
-        match contactors(input, false, false) {
-            Some(violation) if self.open || passed_s > line.contactor_s => return Outcome::Failed(violation),
-            Some(_) => return Outcome::Going,
-            None if !self.open => *self = Self { open: true, slots: 0 },
-            None => {}
+        let wrong = contactors(input, false, false);
+        if !self.open {
+            match wrong {
+                None => *self = Self { open: true, slots: 0 },
+                Some(violation) if passed_s > line.contactor_s => return Outcome::Failed(violation),
+                Some(_) => {}
+            }
+            return Outcome::Going;
         }
-        if udc_v < EMPTY_V {
+        if let Some(violation) = wrong {
+            return Outcome::Failed(violation);
+        }
+        if udc_v < line.empty_v {
             return Outcome::Done;
         }
-        if self.slots as f32 * settings.slot_s > TOO_LONG * line.discharge_s {
-            return Outcome::Failed((Fault::DischargeTimeout, udc_v, EMPTY_V));
+        if passed_s > TOO_LONG * line.discharge_s {
+            return Outcome::Failed((Fault::DischargeTimeout, udc_v, line.empty_v));
         }
         Outcome::Going
     }

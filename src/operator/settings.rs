@@ -22,6 +22,8 @@ pub struct Line {
     pub discharge_s: f32,
     /// Longest time in which a contactor answers, in s.
     pub contactor_s: f32,
+    /// Link voltage below which it counts as empty, in V.
+    pub empty_v: f32,
     /// Link voltage at which the chopper begins, in V; none has no chopper.
     pub chopper_from_v: f32,
     /// Link voltage at which it is always on, in V, above `chopper_from_v`.
@@ -35,6 +37,7 @@ impl Line {
             precharge_s,
             discharge_s,
             contactor_s: 0.2,
+            empty_v: empty_v(ratings),
             chopper_from_v: above_highest_v(ratings, CHOPPER_FROM),
             chopper_full_v: above_highest_v(ratings, CHOPPER_FULL),
         }
@@ -44,6 +47,17 @@ impl Line {
     pub const fn without_chopper(self) -> Self {
         Self { chopper_from_v: f32::INFINITY, chopper_full_v: f32::INFINITY, ..self }
     }
+}
+
+/// Limit of extra-low voltage, in V.
+const EXTRA_LOW_V: f32 = 60.0;
+/// Share of the lowest operating voltage that a link of extra-low voltage may be left with.
+const EMPTY_SHARE: f32 = 0.2;
+
+/// Link voltage below which it counts as empty, in V: extra-low voltage, and little beside what the machine runs on.
+const fn empty_v(ratings: &Ratings) -> f32 {
+    let little_v = EMPTY_SHARE * ratings.dc_link_min_v;
+    if little_v < EXTRA_LOW_V { little_v } else { EXTRA_LOW_V }
 }
 
 /// Places between the highest operating voltage (0) and the overvoltage trip (1).

@@ -29,7 +29,7 @@ use std::path::Path;
 
 pub use error::InputError;
 pub use input::read_bounded;
-pub use map::FluxMap;
+pub use map::{FluxMap, line_of};
 pub use optimum::Optimum;
 pub use parameters::Parameters;
 pub use rust_source::rust_source;

@@ -133,7 +133,7 @@ fn read_nodes(file: &Path) -> Result<Vec<Node>, InputError> {
 
 /// The line of the record that the reader begins to look for at a position: it counts from before the comments and empty
 /// lines that it skips.
-fn line_of(text: &[u8], position: &csv::Position) -> u64 {
+pub fn line_of(text: &[u8], position: &csv::Position) -> u64 {
     let rest = text.get(position.byte() as usize..).unwrap_or_default();
     let skipped = |line: &&[u8]| line.first().is_none_or(|first| *first == b'#' || *first == b'\r');
     position.line() + rest.split(|byte| *byte == b'\n').take_while(skipped).count() as u64

@@ -17,7 +17,12 @@ const HALVINGS: u32 = 80;
 impl<'a> Optimum<'a> {
     /// For a machine.
     pub fn new(map: &'a SmoothMap, parameters: &Parameters) -> Self {
-        Self { map, factor: 1.5 * f64::from(parameters.pole_pairs), max_current_a: parameters.max_current_a }
+        Self::of(map, parameters.pole_pairs, parameters.max_current_a)
+    }
+
+    /// For a map of so many pole pairs, within a largest current in A, peak.
+    pub fn of(map: &'a SmoothMap, pole_pairs: u32, max_current_a: f64) -> Self {
+        Self { map, factor: 1.5 * f64::from(pole_pairs), max_current_a }
     }
 
     /// Air-gap torque at a current, in N·m.

@@ -175,6 +175,23 @@ fn the_control_rate_suits_the_carrier_the_timers_and_the_processor() {
     assert!(said.starts_with("power_stage_zs9.toml:1: control_hz: the control of two motors"), "{said}");
 }
 
+/// The stage of extra-low voltage suits its machine, and the other one does not.
+#[test]
+fn the_stage_of_48_volts_suits_the_machine_of_48_volts() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tables/pmsm-48v-1kw");
+    let tables = tractive_tablegen::MachineFolder::read(&folder).unwrap().tables();
+    let low =
+        Delivered { file: "power_stage_48v.toml", text: include_str!("../power_stage_48v.toml"), ..TRACTION };
+    let constant = low.check(low.text, &tables).unwrap();
+    for told in ["control_hz: 20000,", "dead_time_ns: 200,", "udc_v_per_code: 80.0 / 4095.0"] {
+        assert!(constant.contains(told), "{constant}");
+    }
+    let said = low.check(low.text, TRACTION.tables).unwrap_err();
+    assert!(said.contains("max_switching_hz: 900: must be at least 1038"), "{said}");
+    let said = TRACTION.check(TRACTION.text, &tables).unwrap_err();
+    assert!(said.contains("control_hz: 10000: must be from 20000 to 20660"), "{said}");
+}
+
 /// The cycles that the control rate is checked with are no fewer than those that were counted.
 #[test]
 fn the_processors_time_is_what_the_page_of_costs_says() {

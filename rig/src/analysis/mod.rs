@@ -118,19 +118,19 @@ pub fn most_turn_ons(recording: &Recording, length_s: f64) -> usize {
         .unwrap_or(0)
 }
 
-/// A quantity averaged over one carrier period (1/900 s) around each row of the window.
+/// A quantity averaged over one carrier period around each row of the window.
 fn carrier_averaged(
     recording: &Recording,
-    from_s: f64,
-    to_s: f64,
+    (from_s, to_s): (f64, f64),
+    carrier_s: f64,
     value: impl Fn(&Row) -> f64,
 ) -> Vec<(f64, f64)> {
-    const HALF_WIDTH_S: f64 = 0.5 / 900.0;
+    let half_width_s = 0.5 * carrier_s;
     let rows = &recording.rows;
-    let step_s = if rows.len() > 1 { rows[1].t_s - rows[0].t_s } else { HALF_WIDTH_S };
-    let reach = (HALF_WIDTH_S / step_s).round() as usize;
+    let step_s = if rows.len() > 1 { rows[1].t_s - rows[0].t_s } else { half_width_s };
+    let reach = (half_width_s / step_s).round() as usize;
     let first = rows.partition_point(|row| row.t_s < from_s);
-    let last = rows.partition_point(|row| row.t_s < to_s - HALF_WIDTH_S);
+    let last = rows.partition_point(|row| row.t_s < to_s - half_width_s);
     (first..last)
         .map(|k| {
             let around = &rows[k.saturating_sub(reach)..(k + reach + 1).min(rows.len())];

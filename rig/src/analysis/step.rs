@@ -16,9 +16,11 @@ pub struct Step {
     pub to_nm: f64,
     /// Until when the torque holds, in s.
     pub until_s: f64,
+    /// Carrier period over which torque is averaged, in s.
+    pub carrier_s: f64,
 }
 
-/// The response to a step. Torque is averaged over one carrier period (1/900 s, centred).
+/// The response to a step. Torque is averaged over one carrier period, centred.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct StepResponse {
     /// Torque before, in N·m.
@@ -43,7 +45,7 @@ pub struct StepResponse {
 
 /// Measures a step.
 pub fn step_response(recording: &Recording, step: &Step) -> StepResponse {
-    let torque = carrier_averaged(recording, step.at_s, step.until_s, |row| row.te_nm);
+    let torque = carrier_averaged(recording, (step.at_s, step.until_s), step.carrier_s, |row| row.te_nm);
     let final_mean = mean(window(recording, step.until_s - 0.04, step.until_s), |row| row.te_nm);
     let size = step.to_nm - step.from_nm;
     let start = final_mean - size;

@@ -34,6 +34,9 @@ pub struct SwitchFigures {
     pub averaged_torque_excursion_nm: f64,
 }
 
+/// Time over which the torque of `averaged_torque_excursion_nm` is averaged, in s.
+const CARRIER_S: f64 = 1.0 / 900.0;
+
 /// Every switch between pulsing modes in the recording.
 pub fn mode_switches(recording: &Recording) -> Vec<SwitchFigures> {
     recording
@@ -56,7 +59,8 @@ fn at_switch(recording: &Recording, switch: &Switch) -> SwitchFigures {
         rows.iter().map(|row| row.te_nm - row.te_ref_nm).collect()
     };
     let averaged = |from_s: f64, to_s: f64| {
-        carrier_averaged(recording, switch.t_s + from_s, switch.t_s + to_s, |row| row.te_nm - row.te_ref_nm)
+        let window = (switch.t_s + from_s, switch.t_s + to_s);
+        carrier_averaged(recording, window, CARRIER_S, |row| row.te_nm - row.te_ref_nm)
             .into_iter()
             .map(|(_, error)| error)
             .collect()

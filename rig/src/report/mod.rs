@@ -25,13 +25,15 @@ pub type Panel<'a, R> = (&'a str, &'a str, &'a [(&'static str, fn(&R) -> f32)]);
 pub type Curve<'a, R = Row> = (&'a str, fn(&R) -> f64);
 
 /// The words of a scenario that answers none of the paper's figures.
-const NO_FIGURE: &str = "no figure";
+pub const NO_FIGURE: &str = "no figure";
 
 /// A page under construction.
 pub struct Page {
     title: String,
     /// The paper's figure that the plots answer from here on; nothing where it has none.
     figure: Option<String>,
+    /// `true` if none of the plots answers a figure of the paper.
+    is_another_machine: bool,
     body: String,
     error: Option<anyhow::Error>,
 }
@@ -40,8 +42,13 @@ impl Page {
     /// A page whose plots answer a figure of the paper, such as "figure 8: load steps"; or "no figure: a fault acknowledged".
     pub fn new(scenario: &str, figure: &str) -> Self {
         let (number, what) = figure.split_once(':').unwrap_or((figure, ""));
-        let mut page =
-            Self { title: format!("{scenario}: {figure}"), figure: None, body: String::new(), error: None };
+        let mut page = Self {
+            title: format!("{scenario}: {figure}"),
+            figure: None,
+            is_another_machine: false,
+            body: String::new(),
+            error: None,
+        };
         if number == NO_FIGURE {
             page.title = format!("{scenario}:{what}");
         } else {
@@ -52,7 +59,13 @@ impl Page {
 
     /// From here on the plots answer this figure of the paper, or none.
     pub fn answers<'a>(&mut self, figure: impl Into<Option<&'a str>>) {
-        self.figure = figure.into().map(|figure| format!("The paper's {figure}"));
+        let figure = figure.into().filter(|_| !self.is_another_machine);
+        self.figure = figure.map(|figure| format!("The paper's {figure}"));
+    }
+
+    /// Nothing on this page answers a figure of the paper: the machine is not the paper's.
+    pub fn answers_none(&mut self) {
+        (self.figure, self.is_another_machine) = (None, true);
     }
 
     /// Curves over the whole recording.
@@ -201,7 +214,8 @@ impl Page {
         series: &[(String, Vec<(f64, f64)>)],
     ) {
         let series: Vec<_> = series.iter().map(|(name, points)| (name.as_str(), points.clone())).collect();
-        let figure = figure.into().map_or(String::new(), |figure| format!("The paper's {figure} · "));
+        let figure = figure.into().filter(|_| !self.is_another_machine);
+        let figure = figure.map_or(String::new(), |figure| format!("The paper's {figure} · "));
         self.add(&format!("{figure}{title}"), axes, &series);
     }
 
@@ -254,6 +268,13 @@ mod tests {
     #[test]
     fn the_papers_figure_stands_above_the_plot_where_there_is_one() {
         assert!(page("figure 8: load steps").contains("<h2>The paper's figure 8 · torque</h2><svg"));
+        let mut another = Page::new("s", "figure 8: load steps");
+        another.answers_none();
+        another.answers("figure 9a");
+        another.draw("torque", "N·m", &[("t", vec![(0.0, 1.0), (1.0, 2.0)])]);
+        another.draw_xy("figure 10", "power", ("x", "y"), &[("p".to_owned(), vec![(0.0, 1.0), (1.0, 2.0)])]);
+        let another = another.finish("", &Figures::default()).unwrap();
+        assert!(another.contains("<h2>torque</h2>") && another.contains("<h2>power</h2>"), "{another}");
         let without = page("no figure: a fault acknowledged");
         assert!(without.contains("<h1>s: a fault acknowledged</h1>"), "{without}");
         assert!(without.contains("<h2>torque</h2><svg") && !without.contains("figure: "), "{without}");

@@ -34,14 +34,13 @@ fn run_choice<S: System>(choice: &Choice<S>) -> Result<ExitCode> {
     let summary = summary(choice, &figures, &machine)?;
     write(choice, &recording, &machine, &figures, &out)?;
     write_text(&out.join("summary.json"), &(serde_json::to_string_pretty(&summary)? + "\n"))?;
-    // The bounds are those of the machine that is built in.
-    let judged = machine.tables.name == S::MACHINE;
     let trip = recording.trip();
     if options.json {
         crate::say!("{}", serde_json::to_string(&summary)?);
     } else {
-        let headline = report::headline(&figures, trip, judged);
-        crate::say!("{headline} · {} · {}\n\n{}", choice.name, choice.figure, report::text(&figures));
+        let headline = report::headline(&figures, trip);
+        let title = choice.title(&machine);
+        crate::say!("{headline} · {} · {title}\n\n{}", choice.name, report::text(&figures));
         let ratio = recording.end_s() / wall_s;
         crate::say!("simulated {ratio:.1} times as fast as real time ({})", options.on.name());
         crate::say!("report: {}", out.join("report.html").display());
@@ -49,7 +48,7 @@ fn run_choice<S: System>(choice: &Choice<S>) -> Result<ExitCode> {
     if let Some(trip) = trip {
         eprintln!("fault {}: {} (limit {})", trip.fault.name(), trip.value, trip.limit);
     }
-    let kept = trip.is_none() && !(judged && figures.fall_short());
+    let kept = trip.is_none() && !figures.fall_short();
     Ok(if kept { ExitCode::SUCCESS } else { ExitCode::from(1) })
 }
 
@@ -64,7 +63,7 @@ pub fn folder(name: &str, options: &RunOptions) -> Result<PathBuf> {
 /// The figures, and the run that they come from.
 pub fn summary<S: System>(choice: &Choice<S>, figures: &Figures, machine: &Machine) -> Result<Value> {
     // The summary shows what was used, not that nothing was said.
-    let mut options = serde_json::to_value(choice.with_step())?;
+    let mut options = serde_json::to_value(choice.filled(machine))?;
     if let Value::Object(options) = &mut options {
         options.insert("machine".to_owned(), choice.machine_name().into());
         options.extend(choice.own.clone());
@@ -93,9 +92,12 @@ pub fn write<S: System>(
     if let Some(overview) = S::overview(recording)? {
         write_text(&out.join("overview.svg"), &overview)?;
     }
-    let mut page = Page::new(choice.name, choice.figure);
+    let mut page = Page::new(choice.name, &choice.title(machine));
+    if !machine.is(S::MACHINE) {
+        page.answers_none();
+    }
     S::draw_common(recording, &mut page);
-    choice.scenario.plots(recording, &choice.with_step(), machine, &mut page);
+    choice.scenario.plots(recording, &choice.filled(machine), machine, &mut page);
     let subtitle = format!("tractive {}, run on {}", env!("CARGO_PKG_VERSION"), choice.options.on.name());
     write_text(&out.join("report.html"), &page.finish(&subtitle, figures)?)
 }

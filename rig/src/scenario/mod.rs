@@ -7,8 +7,8 @@ pub mod zs9;
 
 use crate::analysis::Figures;
 use crate::machine::Machine;
-use crate::options::{Options, RunOptions};
-use crate::report::Page;
+use crate::options::{Options, RunOptions, USUAL_MIN_PULSE_US};
+use crate::report::{NO_FIGURE, Page};
 use crate::run::Supervisor;
 use crate::trace::Recorded;
 use anyhow::Result;
@@ -20,7 +20,7 @@ use serde_json::{Map, Value};
 pub trait System: Sized + 'static {
     /// Its name in reports.
     const NAME: &'static str;
-    /// The machine folder it has unless told otherwise; the bounds of its scenarios are for this machine.
+    /// The machine folder it has unless told otherwise: the paper's.
     const MACHINE: &'static str;
     /// Options that its scenarios share, besides [`RunOptions`].
     type Own: Args + Serialize + Clone;
@@ -31,6 +31,10 @@ pub trait System: Sized + 'static {
 
     /// Step of the trace unless options or scenario say another, in s.
     fn trace_step_s(own: &Self::Own) -> f64;
+    /// Shortest pulse unless the options say another, in µs.
+    fn min_pulse_us(_machine: &Machine) -> f64 {
+        USUAL_MIN_PULSE_US
+    }
     /// Checks that options are within their ranges; `scenario` are those of the scenario itself, by name.
     fn check(options: &Options<Self::Own>, scenario: &Map<String, Value>, machine: &Machine) -> Result<()>;
     /// Drives a plan, on the host or in QEMU; with a supervisor over the protocol until it ends the run.
@@ -100,18 +104,34 @@ impl<S: System> Choice<S> {
 
     /// The figures to report.
     pub fn figures(&self, recording: &S::Recording, machine: &Machine) -> Figures {
-        self.scenario.figures(recording, &self.with_step(), machine)
+        self.scenario.figures(recording, &self.filled(machine), machine)
     }
 
-    /// The options with the step of the trace that the scenario takes where none was given.
-    pub fn with_step(&self) -> Options<S::Own> {
-        with_step(self.scenario.as_ref(), &self.options)
+    /// The options with the step of the trace that the scenario takes, and the shortest pulse, where none was given.
+    pub fn filled(&self, machine: &Machine) -> Options<S::Own> {
+        filled(self.scenario.as_ref(), &self.options, machine)
+    }
+
+    /// The paper's figure that a run of this machine answers, and what it is: that of another machine answers none.
+    pub fn title(&self, machine: &Machine) -> String {
+        if machine.is(S::MACHINE) {
+            return self.figure.to_owned();
+        }
+        let what = self.figure.split_once(": ").map_or(self.figure, |(_, what)| what);
+        // The paper's speed; every machine has its own.
+        let what = what.strip_suffix(" at 200 r/min").unwrap_or(what);
+        format!("{NO_FIGURE}: {what}")
     }
 }
 
-fn with_step<S: System>(scenario: &dyn Scenario<S>, options: &Options<S::Own>) -> Options<S::Own> {
-    let dt = options.dt.unwrap_or_else(|| scenario.trace_step_s(&options.own));
-    Options { run: RunOptions { dt: Some(dt), ..options.run.clone() }, own: options.own.clone() }
+fn filled<S: System>(
+    scenario: &dyn Scenario<S>,
+    options: &Options<S::Own>,
+    machine: &Machine,
+) -> Options<S::Own> {
+    let dt = Some(options.dt.unwrap_or_else(|| scenario.trace_step_s(&options.own)));
+    let min_pulse_us = Some(options.min_pulse_us.unwrap_or_else(|| S::min_pulse_us(machine)));
+    Options { run: RunOptions { dt, min_pulse_us, ..options.run.clone() }, own: options.own.clone() }
 }
 
 /// Drives a scenario with options that are within their ranges.
@@ -121,6 +141,6 @@ pub fn drive<S: System>(
     options: &Options<S::Own>,
     machine: &Machine,
 ) -> Result<S::Recording> {
-    let options = with_step(scenario, options);
+    let options = filled(scenario, options, machine);
     S::run(name, scenario.plan(&options, machine), &options, machine, None)
 }

@@ -2,7 +2,7 @@
 
 use super::{Edges, Operator, Phase};
 use crate::operator::line::{Discharge, Precharge};
-use crate::operator::{Demands, Input, Levels, Refusal, Settings, Situation, demand, health, line};
+use crate::operator::{Demands, Input, Levels, Refusal, Settings, Situation, demand, health};
 use crate::protection::SafeState;
 
 impl<D: Demands> Operator<D> {
@@ -149,17 +149,13 @@ impl<D: Demands> Operator<D> {
             Phase::Fault { .. } => Refusal::FaultNotAcknowledged,
             Phase::Discharge(_) => Refusal::Discharging,
             Phase::Pulsing | Phase::Coasting { .. } | Phase::Stopping => Refusal::NotStopped,
-            Phase::Ready | Phase::Precharge(_) | Phase::Charged if settings.line.is_none() => {
-                Refusal::NoContactors
-            }
-            Phase::Ready | Phase::Precharge(_) | Phase::Charged
-                if demand::emf_v(input, settings.ratings) > line::EMPTY_V =>
-            {
-                Refusal::MachineTurning
-            }
-            Phase::Ready | Phase::Precharge(_) | Phase::Charged => {
-                return self.follow(Phase::Discharge(Discharge::new()));
-            }
+            Phase::Ready | Phase::Precharge(_) | Phase::Charged => match &settings.line {
+                None => Refusal::NoContactors,
+                Some(line) if demand::emf_v(input, settings.ratings) > line.empty_v => {
+                    Refusal::MachineTurning
+                }
+                Some(_) => return self.follow(Phase::Discharge(Discharge::new())),
+            },
         };
         self.refuse(reason);
     }

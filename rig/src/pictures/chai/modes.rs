@@ -5,6 +5,7 @@ use super::super::sheet::{
     Axis, BLACK, BLUE, Colour, GREEN, GREY, ORANGE, Panel, Point, RED, Side, VIOLET, number,
 };
 use crate::machine::Machine;
+use crate::options::usual_min_pulse_us;
 use crate::pattern::{LegEdge, Wanted, edges};
 use crate::trace::Recording;
 use crate::verdict::worst;
@@ -56,7 +57,7 @@ fn pulses(machine: &Machine, mode: Mode, f1_hz: f64, share: f64) -> Result<Vec<L
         f1_hz,
         cycles: 1,
         dead_time_us: 0.0,
-        min_pulse_us: 10.0,
+        min_pulse_us: usual_min_pulse_us(machine.folder.parameters.max_switching_hz),
         max_switching_hz: machine.tables.ratings.max_switching_hz,
     };
     edges(&wanted)

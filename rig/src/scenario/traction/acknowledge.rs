@@ -1,6 +1,7 @@
 //! A gate driver fails under torque: the fault, what is refused meanwhile, the acknowledge, and the machine caught again.
 
 use super::line::{self, within};
+use super::of_rated_rpm;
 use super::prelude::*;
 use crate::bench::LinePlan;
 use crate::steps::held;
@@ -41,14 +42,13 @@ fn request(t_s: f64, ratings: &Ratings) -> Request {
 
 impl Scenario<Traction> for Acknowledge {
     fn plan(&self, _options: &Options, machine: &Machine) -> Plan {
-        let scale = machine.folder.parameters.rated_speed_rpm / 2_000.0;
         let ratings = &machine.tables.ratings;
         let line = LinePlan {
             starts_charged: true,
             hardware: vec![(FAILS_S.0, FAILS_S.1, Fault::GateDriver)],
             ..LinePlan::new(line::scaled(machine), Box::new(|t_s| request(t_s, ratings)))
         };
-        Plan::operated(DURATION_S, vec![(0.0, self.speed.unwrap_or(SPEED_RPM * scale))], line)
+        Plan::operated(DURATION_S, vec![(0.0, self.speed.unwrap_or(of_rated_rpm(SPEED_RPM, machine)))], line)
     }
 
     fn figures(&self, recording: &Recording, _options: &Options, machine: &Machine) -> Figures {

@@ -3,6 +3,7 @@
 
 use super::prelude::*;
 use super::script::Script;
+use super::{of_rated_rpm, ramp_scale};
 
 /// Full torque, at speeds that swing across a border, and an enable that comes and goes.
 #[derive(Clone, Copy, Debug, Args, Serialize)]
@@ -24,23 +25,25 @@ const PAUSE_S: f64 = 0.0025;
 
 impl Scenario<Traction> for BordersTiming {
     fn plan(&self, _options: &Options, machine: &Machine) -> Plan {
-        let (first_rpm, _) = SWINGS_RPM[0];
+        let swings = SWINGS_RPM.map(|(low, high)| (of_rated_rpm(low, machine), of_rated_rpm(high, machine)));
+        let (half_swing_s, ramp_s) = (HALF_SWING_S * ramp_scale(machine), RAMP_S * ramp_scale(machine));
+        let (first_rpm, _) = swings[0];
         let mut speed = vec![(0.0, first_rpm)];
         let enable = (0..2 * PAUSES).map(|k| (FIRST_S + k as f64 * PAUSE_S, k % 2 == 1)).collect();
         let mut t_s = FIRST_S + 2.0 * PAUSES as f64 * PAUSE_S;
-        for (low_rpm, high_rpm) in SWINGS_RPM {
+        for (low_rpm, high_rpm) in swings {
             for swing in 0..SWINGS {
-                let swing_s = t_s + 2.0 * swing as f64 * HALF_SWING_S;
-                speed.extend([(swing_s, low_rpm), (swing_s + HALF_SWING_S, high_rpm)]);
+                let swing_s = t_s + 2.0 * swing as f64 * half_swing_s;
+                speed.extend([(swing_s, low_rpm), (swing_s + half_swing_s, high_rpm)]);
             }
-            t_s += (2 * SWINGS - 1) as f64 * HALF_SWING_S + RAMP_S;
+            t_s += (2 * SWINGS - 1) as f64 * half_swing_s + ramp_s;
         }
         let torque_nm = machine.folder.parameters.max_torque_nm;
         Script {
             speed,
             torque: vec![(0.0, torque_nm)],
             enable,
-            duration_s: t_s - RAMP_S,
+            duration_s: t_s - ramp_s,
             ..Script::default()
         }
         .plan()

@@ -1,7 +1,7 @@
 //! Torque accuracy, efficiency and current at the characteristic points: the paper's figure 10.
 
 use super::prelude::*;
-use super::{LEAD_S, scaled_nm};
+use super::{LEAD_S, of_rated_rpm, scaled_nm};
 use crate::analysis::SteadyPoint;
 use crate::{bound, figures, mtpa_methods, spectrum};
 
@@ -35,7 +35,6 @@ struct Slot {
 
 /// The points at this machine's own speeds and torques.
 fn slots(machine: &Machine) -> Vec<Slot> {
-    let scale = machine.folder.parameters.rated_speed_rpm / 2_000.0;
     let (mut t_s, mut last_rpm) = (0.0, POINTS[0].0);
     POINTS
         .iter()
@@ -44,8 +43,9 @@ fn slots(machine: &Machine) -> Vec<Slot> {
             let steady_s = begins_s + (speed_rpm - last_rpm).abs() / SLOPE_RPM_S;
             let ends_s = steady_s + SETTLE_S + MEASURE_S;
             (t_s, last_rpm) = (ends_s, speed_rpm);
-            let torque_nm = scaled_nm(torque_nm, machine);
-            Slot { speed_rpm: speed_rpm * scale, torque_nm, begins_s, steady_s, ends_s }
+            let speed_rpm = of_rated_rpm(speed_rpm, machine);
+            let torque_nm = scaled_nm(torque_nm, machine).min(machine.envelope_nm(speed_rpm));
+            Slot { speed_rpm, torque_nm, begins_s, steady_s, ends_s }
         })
         .collect()
 }

@@ -3,6 +3,7 @@
 
 use super::line::{self, within};
 use super::prelude::*;
+use super::{emf_v, of_rated_rpm};
 use crate::bench::LinePlan;
 use tractive::machine::Ratings;
 use tractive::operator::Request;
@@ -20,6 +21,9 @@ const BRAKE: (f64, f64) = (0.7, 4.0);
 /// The rotor is held at this speed, in r/min, but for the braking to `SLOW_RPM` with the whole chopper.
 const FAST_RPM: f64 = 2_000.0;
 const SLOW_RPM: f64 = 1_200.0;
+/// Share of the link beyond which an EMF counts as near it; from standstill to the speed then, in s.
+const NEAR: f64 = 0.5;
+const TURNS: (f64, f64) = (0.3, 0.69);
 /// From when on half of the braking resistor is lost, then all of it, and the source takes energy back.
 const HALF_S: f64 = 1.7;
 const NONE_S: f64 = 2.4;
@@ -82,10 +86,12 @@ fn stretches(recording: &Recording) -> Vec<Stretch> {
 
 impl Scenario<Traction> for Chopper {
     fn plan(&self, _options: &Options, machine: &Machine) -> Plan {
-        let scale = machine.folder.parameters.rated_speed_rpm / 2_000.0;
-        let fast = self.speed.unwrap_or(FAST_RPM * scale);
+        let fast = self.speed.unwrap_or(of_rated_rpm(FAST_RPM, machine));
         let slow = fast * SLOW_RPM / FAST_RPM;
-        let speed = vec![
+        // Near the link's voltage the EMF would charge it: such a machine turns once the main contactor is closed.
+        let near = emf_v(fast, machine) > NEAR * machine.folder.parameters.dc_link_nominal_v;
+        let begins = near.then_some([(TURNS.0, 0.0), (TURNS.1, fast)]).into_iter().flatten();
+        let later = [
             (1.0, fast),
             (1.3, slow),
             (1.5, slow),
@@ -94,6 +100,7 @@ impl Scenario<Traction> for Chopper {
             (BRAKE.1, slow),
             (DURATION_S, slow),
         ];
+        let speed = begins.chain(later).collect();
         let ratings = &machine.tables.ratings;
         let link = line::scaled(machine);
         let ohm = link.chopper_ohm;

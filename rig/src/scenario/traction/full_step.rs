@@ -3,6 +3,7 @@
 use super::load_steps::verdicts;
 use super::prelude::*;
 use super::script::{BEGIN_S, Script};
+use super::{carrier_step_s, of_rated_rpm};
 
 /// 0 → full torque → 0 at `--speed`.
 #[derive(Clone, Copy, Debug, Args, Serialize)]
@@ -17,20 +18,21 @@ const HOLD_S: f64 = 0.1;
 
 impl Scenario<Traction> for FullStep {
     fn plan(&self, _options: &Options, machine: &Machine) -> Plan {
-        let speed_rpm = self.speed.unwrap_or(SPEED_RPM);
-        Script {
+        let speed_rpm = self.speed_rpm(machine);
+        let script = Script {
             speed: vec![(0.0, speed_rpm)],
             torque: vec![(BEGIN_S, machine.envelope_nm(speed_rpm)), (BEGIN_S + HOLD_S, 0.0)],
             duration_s: BEGIN_S + 2.0 * HOLD_S,
             ..Script::default()
-        }
-        .plan()
+        };
+        Plan { judged_step_s: carrier_step_s(machine), ..script.plan() }
     }
 
     fn figures(&self, recording: &Recording, options: &Options, machine: &Machine) -> Figures {
-        let most = machine.envelope_nm(self.speed.unwrap_or(SPEED_RPM));
+        let most = machine.envelope_nm(self.speed_rpm(machine));
+        let carrier_s = machine.folder.parameters.max_switching_hz.recip();
         let steps = [(BEGIN_S, 0.0, most), (BEGIN_S + HOLD_S, most, 0.0)].map(|(at_s, from_nm, to_nm)| {
-            let step = analysis::Step { at_s, from_nm, to_nm, until_s: at_s + HOLD_S };
+            let step = analysis::Step { at_s, from_nm, to_nm, until_s: at_s + HOLD_S, carrier_s };
             analysis::step_response(recording, &step)
         });
         let mut figures = analysis::common(recording);
@@ -46,5 +48,11 @@ impl Scenario<Traction> for FullStep {
     fn plots(&self, recording: &Recording, _: &Options, _: &Machine, page: &mut Page) {
         page.phase_current(recording);
         page.torque(recording);
+    }
+}
+
+impl FullStep {
+    fn speed_rpm(&self, machine: &Machine) -> f64 {
+        self.speed.unwrap_or(of_rated_rpm(SPEED_RPM, machine))
     }
 }

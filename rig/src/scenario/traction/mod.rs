@@ -28,7 +28,7 @@ use crate::bench::{self, Bench, Flaws, Limits, LinePlan, Operator, Supply};
 use crate::inject::Injection;
 use crate::inject::traction::Kind;
 use crate::machine::Machine;
-use crate::options::{On, not_negative, within};
+use crate::options::{On, not_negative, usual_min_pulse_us, within};
 use crate::plant::{DcLinkSettings, LineFilter, Plant, Source, SpeedSource};
 use crate::report::{self, Page};
 use crate::run::traction::{Tasks, run_in_qemu};
@@ -154,6 +154,10 @@ impl System for Traction {
         STEP_S
     }
 
+    fn min_pulse_us(machine: &Machine) -> f64 {
+        usual_min_pulse_us(machine.folder.parameters.max_switching_hz)
+    }
+
     fn check(options: &Options, scenario: &Map<String, Value>, machine: &Machine) -> Result<()> {
         let parameters = &machine.folder.parameters;
         let (fastest_rpm, most_nm) = (3.0 * parameters.max_speed_rpm, 10.0 * parameters.max_torque_nm);
@@ -229,6 +233,44 @@ fn scaled_nm(torque_nm: f64, machine: &Machine) -> f64 {
     torque_nm * (machine.folder.parameters.max_torque_nm / 1235.0)
 }
 
+/// A speed of a machine rated at 2,000 r/min, in r/min, as the same share of this machine's rated one.
+fn of_rated_rpm(speed_rpm: f64, machine: &Machine) -> f64 {
+    speed_rpm * (machine.folder.parameters.rated_speed_rpm / 2_000.0)
+}
+
+/// Voltage of the machine without current at a speed in r/min, peak between lines, in V.
+fn emf_v(speed_rpm: f64, machine: &Machine) -> f64 {
+    let turns_s = speed_rpm.abs() / 60.0 * f64::from(machine.folder.parameters.pole_pairs);
+    3.0_f64.sqrt() * core::f64::consts::TAU * turns_s * f64::from(machine.tables.ratings.magnet_flux_wb)
+}
+
+/// Ratio of this machine's stator frequencies to those of the machine that the scenarios were written for, at least 1: a ramp over the
+/// same share of the speed takes so much longer, or it would count as a lost angle.
+fn ramp_scale(machine: &Machine) -> f64 {
+    let parameters = &machine.folder.parameters;
+    let speeds = (parameters.max_speed_rpm / 6000.0).max(parameters.rated_speed_rpm / 2000.0);
+    (speeds * (f64::from(parameters.pole_pairs) / 4.0)).max(1.0)
+}
+
+/// A time in which torque changes, over that of the machine that the scenarios were written for: as the link drives flux linkage into the
+/// machine, for which full power over full torque is the measure, or as carriers follow each other, whichever is slower.
+fn time_scale(machine: &Machine) -> f64 {
+    let parameters = &machine.folder.parameters;
+    let omega = |power_w: f64, torque_nm: f64, pole_pairs: f64| power_w / torque_nm * pole_pairs;
+    let own = omega(parameters.max_power_w, parameters.max_torque_nm, f64::from(parameters.pole_pairs));
+    let flux = omega(246.4e3, 1235.0, 4.0) / own;
+    flux.max(900.0 / parameters.max_switching_hz)
+}
+
+/// Step of the rows that a carrier's mean is taken from, in s: as many in a carrier as at 900 Hz, at least.
+fn carrier_step_s(machine: &Machine) -> f64 {
+    // Whole ticks each.
+    const PARTS: [u32; 6] = [1, 2, 5, 10, 25, 50];
+    let carriers = machine.folder.parameters.max_switching_hz / 900.0;
+    let parts = PARTS.into_iter().find(|parts| f64::from(*parts) >= carriers).unwrap_or(125);
+    STEP_S / f64::from(parts)
+}
+
 /// The link's voltage, in V.
 fn udc_v(options: &Options, machine: &Machine) -> f64 {
     options.udc.unwrap_or(machine.folder.parameters.dc_link_nominal_v)
@@ -251,7 +293,7 @@ fn setup(plan: &Plan, options: &Options, machine: &Machine, over_protocol: bool)
     let uncompensated = options.own.uncompensated;
     Setup {
         control_ticks: clock(options, machine).control_ticks,
-        min_pulse_ticks: ticks(options.min_pulse_us),
+        min_pulse_ticks: ticks(options.min_pulse_us(machine.folder.parameters.max_switching_hz)),
         // What the firmware compensates.
         dead_time_ticks: if uncompensated { 0 } else { ticks(options.dead_time_us) },
         pwm_delay_ticks: ticks(options.own.pwm_delay_us),

@@ -2,10 +2,13 @@
 
 use super::line::{self, within};
 use super::prelude::*;
+use super::{emf_v, of_rated_rpm};
 use crate::bench::LinePlan;
+use crate::plant::profile_speed;
 use crate::steps::held;
+use core::f64::consts::TAU;
 use tractive::machine::Ratings;
-use tractive::operator::{Request, State};
+use tractive::operator::{Line, Request, State};
 
 /// Power-up, self-test, precharge, main contactor, enable, run, coast, catch, stop, discharge.
 #[derive(Clone, Copy, Debug, Args, Serialize)]
@@ -31,6 +34,8 @@ const REFUSALS: [&str; 6] = [
     "not_stopped",
     "machine_turning",
 ];
+/// The last refusal of a machine whose EMF leaves the link empty: its link is discharged at the first word, and the second is too many.
+const LAST_OF_WEAK: &str = "discharging";
 /// Share of the largest torque that is demanded from these times on.
 const TORQUE: [(f64, f64); 4] = [(1.75, 0.01), (1.9, 0.0), (2.1, 0.65), (3.6, 0.0)];
 const SPEED: [(f64, f64); 5] = [(2.1, 0.0), (3.0, 600.0), (3.6, 600.0), (4.4, 0.0), (DURATION_S, 0.0)];
@@ -46,11 +51,32 @@ fn request(t_s: f64, ratings: &Ratings) -> Request {
     }
 }
 
+/// The speeds of this machine.
+fn speed(machine: &Machine) -> Vec<(f64, f64)> {
+    SPEED.iter().map(|(t_s, rpm)| (*t_s, of_rated_rpm(*rpm, machine))).collect()
+}
+
+/// Link voltage below which it counts as empty, in V.
+fn empty_v(machine: &Machine) -> f64 {
+    Line::rated(&machine.tables.ratings, 0.0, 0.0).empty_v.into()
+}
+
+/// The refusals of this machine.
+fn refusals(machine: &Machine) -> [&'static str; 6] {
+    let (at_s, _) = DISCHARGE[1];
+    let turning = emf_v(profile_speed(&speed(machine), at_s) * 60.0 / TAU, machine) > empty_v(machine);
+    let mut refusals = REFUSALS;
+    if !turning {
+        refusals[REFUSALS.len() - 1] = LAST_OF_WEAK;
+    }
+    refusals
+}
+
 impl Scenario<Traction> for Precharge {
     fn plan(&self, _options: &Options, machine: &Machine) -> Plan {
         let ratings = &machine.tables.ratings;
         let line = LinePlan::new(line::scaled(machine), Box::new(|t_s| request(t_s, ratings)));
-        Plan::operated(DURATION_S, SPEED.to_vec(), line)
+        Plan::operated(DURATION_S, speed(machine), line)
     }
 
     fn figures(&self, recording: &Recording, _options: &Options, machine: &Machine) -> Figures {
@@ -66,10 +92,10 @@ impl Scenario<Traction> for Precharge {
         let torque = analysis::window(recording, 2.6, 2.9);
         let torque_nm = mean(torque, |row| row.te_nm);
         let error = (torque_nm / (0.65 * machine.folder.parameters.max_torque_nm) - 1.0).abs();
-        let mut verdicts = line::verdicts(recording, &REFUSALS);
+        let mut verdicts = line::verdicts(recording, &refusals(machine));
         verdicts.extend([
             Verdict::ours("source over link when the main contactor closes (share)", gap_v / source_v, 0.025),
-            Verdict::ours("link at the end, V", ends_v, 60.0),
+            Verdict::ours("link at the end, V", ends_v, empty_v(machine)),
             Verdict::never("not ready at the end", !ends),
             Verdict::ours("mean torque off the demand while running (share)", error, 0.01),
         ]);

@@ -1,8 +1,8 @@
 //! Coasting with the gates off, and flying restart.
 
 use super::prelude::*;
-use super::scaled_rpm;
 use super::script::{BEGIN_S, Script};
+use super::{ramp_scale, scaled_rpm};
 use crate::analysis::FlyingStart;
 
 /// At each speed: coast, catch the machine, half of the envelope's torque, release, coast.
@@ -10,40 +10,59 @@ use crate::analysis::FlyingStart;
 pub struct Restart;
 
 const SPEEDS_RPM: [f64; 9] = [0.0, 300.0, 800.0, 1050.0, 1500.0, 2000.0, 3000.0, 4500.0, 6000.0];
-const COAST_S: f64 = 0.25;
+/// Coasting: as the speed changes, and at the new one.
+const RAMP_S: f64 = 0.1;
+const HOLD_S: f64 = 0.15;
 const DRIVE_S: f64 = 0.25;
-const SLOT_S: f64 = COAST_S + DRIVE_S;
 /// Without torque before coasting, in s.
 const RELEASE_S: f64 = 0.06;
 
-fn begins_s(slot: usize) -> f64 {
-    BEGIN_S + slot as f64 * SLOT_S
+/// Times of the slots.
+struct Slots {
+    ramp_s: f64,
+    coast_s: f64,
+    slot_s: f64,
+}
+
+impl Slots {
+    fn of(machine: &Machine) -> Self {
+        let ramp_s = RAMP_S * ramp_scale(machine);
+        let coast_s = ramp_s + HOLD_S;
+        Self { ramp_s, coast_s, slot_s: coast_s + DRIVE_S }
+    }
+
+    fn begins_s(&self, slot: usize) -> f64 {
+        BEGIN_S + slot as f64 * self.slot_s
+    }
 }
 
 impl Scenario<Traction> for Restart {
     fn plan(&self, _options: &Options, machine: &Machine) -> Plan {
+        let slots = Slots::of(machine);
         let mut script = Script {
             enable: vec![(0.0, false)],
             slew_limited: true,
-            duration_s: begins_s(SPEEDS_RPM.len()),
+            duration_s: slots.begins_s(SPEEDS_RPM.len()),
             ..Script::default()
         };
         let speeds_rpm = SPEEDS_RPM.map(|speed_rpm| scaled_rpm(speed_rpm, machine));
         for (slot, speed_rpm) in speeds_rpm.into_iter().enumerate() {
-            let begin = begins_s(slot);
-            let (catch, release) = (begin + COAST_S, begin + SLOT_S - RELEASE_S);
+            let begin = slots.begins_s(slot);
+            let (catch, release) = (begin + slots.coast_s, begin + slots.slot_s - RELEASE_S);
             let envelope_nm = machine.envelope_nm(speed_rpm);
             // The speed changes in the first part of the coasting.
-            script.speed.extend([(begin + 0.1, speed_rpm), (begin + SLOT_S, speed_rpm)]);
-            script.enable.extend([(catch, true), (begin + SLOT_S, false)]);
+            script.speed.extend([(begin + slots.ramp_s, speed_rpm), (begin + slots.slot_s, speed_rpm)]);
+            script.enable.extend([(catch, true), (begin + slots.slot_s, false)]);
             script.torque.extend([(catch + 0.03, 0.5 * envelope_nm), (release, 0.0)]);
         }
         script.plan()
     }
 
     fn figures(&self, recording: &Recording, options: &Options, machine: &Machine) -> Figures {
+        let slots = Slots::of(machine);
         let catches = SPEEDS_RPM.iter().enumerate().map(|(slot, _)| {
-            let driven = (begins_s(slot) + COAST_S, begins_s(slot) + SLOT_S - RELEASE_S);
+            let driven =
+                (slots.begins_s(slot) + slots.coast_s, slots.begins_s(slot) + slots.slot_s - RELEASE_S);
             analysis::catch(recording, driven, machine.folder.parameters.max_current_a)
         });
         let catches: Vec<_> = catches.collect();
@@ -53,10 +72,11 @@ impl Scenario<Traction> for Restart {
         figures
     }
 
-    fn plots(&self, recording: &Recording, _: &Options, _: &Machine, page: &mut Page) {
+    fn plots(&self, recording: &Recording, _: &Options, machine: &Machine, page: &mut Page) {
         page.overview(recording);
+        let slots = Slots::of(machine);
         for slot in 0..SPEEDS_RPM.len() {
-            let at_s = begins_s(slot) + COAST_S;
+            let at_s = slots.begins_s(slot) + slots.coast_s;
             let speed_rpm =
                 analysis::window(recording, at_s, at_s + 1.0).first().map_or(0.0, |row| row.speed_rpm);
             let title = format!("{speed_rpm:.0} r/min caught: phase current u");

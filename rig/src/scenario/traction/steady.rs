@@ -2,7 +2,7 @@
 
 use super::prelude::*;
 use super::script::Script;
-use super::{TractionOptions, scaled_rpm};
+use super::{TractionOptions, carrier_step_s, scaled_nm, scaled_rpm};
 use crate::distortion::{self, Distortion};
 use crate::options::On;
 use crate::{bound, scenario, spectrum};
@@ -36,7 +36,7 @@ impl Scenario<Traction> for Steady {
             duration_s: SETTLE_S + MEASURE_S,
             ..Script::default()
         };
-        Plan { judged_step_s: STEP_S, ..script.plan() }
+        Plan { judged_step_s: STEP_S.min(carrier_step_s(machine)), ..script.plan() }
     }
 
     fn figures(&self, recording: &Recording, options: &Options, machine: &Machine) -> Figures {
@@ -53,8 +53,9 @@ impl Scenario<Traction> for Steady {
             verdicts.push(Verdict::ours("swing of the link (share of its voltage)", swing, 0.03));
         }
         if options.dead_time_us > 0.0 {
-            let judged =
-                !options.own.uncompensated && (steady.speed_rpm.abs(), torque_nm.abs()) == DEAD_TIME_POINT;
+            let (speed_rpm, point_nm) = DEAD_TIME_POINT;
+            let point = (scaled_rpm(speed_rpm, machine), scaled_nm(point_nm, machine));
+            let judged = !options.own.uncompensated && (steady.speed_rpm.abs(), torque_nm.abs()) == point;
             verdicts.extend(dead_time_verdicts(&measured, if judged { 0.5 } else { f64::INFINITY }, ""));
             if !options.own.uncompensated
                 && let Ok(without) = self.without_compensation(window, options, machine)

@@ -1,11 +1,11 @@
 //! Full torque from standstill through every mode: the paper's figure 9.
 
 use super::prelude::*;
-use super::{LEAD_S, switches};
+use super::{LEAD_S, of_rated_rpm, switches};
 use crate::options::On;
 use crate::{scenario, spectrum};
 
-/// 0 → rated speed with 250 r/min a second (2,000 r/min in 8 s) and 1 s hold, at the torque envelope.
+/// 0 → rated speed in 8 s (2,000 r/min: 250 r/min a second) and 1 s hold, at the torque envelope.
 #[derive(Clone, Copy, Debug, Args, Serialize)]
 pub struct Sweep {
     /// Add the way back.
@@ -28,7 +28,7 @@ const HOLD_S: f64 = 1.0;
 impl Scenario<Traction> for Sweep {
     fn plan(&self, _options: &Options, machine: &Machine) -> Plan {
         let to_rpm = self.to.unwrap_or(machine.folder.parameters.rated_speed_rpm);
-        let ramp_s = to_rpm.abs() / SLOPE_RPM_S;
+        let ramp_s = to_rpm.abs() / of_rated_rpm(SLOPE_RPM_S, machine);
         let mut speed = vec![(0.0, 0.0), (ramp_s, to_rpm)];
         let mut duration_s = ramp_s + HOLD_S;
         if self.down {

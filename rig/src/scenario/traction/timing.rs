@@ -3,6 +3,7 @@
 
 use super::line;
 use super::prelude::*;
+use super::{of_rated_rpm, ramp_scale};
 use crate::bench::LinePlan;
 use crate::inject::Injection;
 use crate::inject::sensor::CurrentFault;
@@ -20,9 +21,9 @@ pub struct Timing {
     /// Share of the full torque.
     #[arg(long, default_value_t = 1.0, value_parser = finite, allow_negative_numbers = true)]
     torque_scale: f64,
-    /// Last speed, in r/min.
-    #[arg(long, default_value_t = 2000.0, value_parser = finite, allow_negative_numbers = true)]
-    to: f64,
+    /// Last speed, in r/min; default the machine's rated one.
+    #[arg(long, value_parser = finite, allow_negative_numbers = true)]
+    to: Option<f64>,
     /// The demand is not finite from this time on, in s.
     #[arg(long, value_parser = not_negative, allow_negative_numbers = true)]
     fault_at: Option<f64>,
@@ -39,6 +40,7 @@ pub struct Timing {
 
 /// Speeds where async, sync 15, sync 12, middle 7, middle 3 and square are used, in r/min.
 const SPEEDS_RPM: [f64; 6] = [150.0, 750.0, 1000.0, 1450.0, 1800.0, 2200.0];
+const TO_RPM: f64 = 2000.0;
 /// From one speed to the next, to the last one, and at each, in s. A quicker ramp would count as a lost angle.
 const RAMP_S: f64 = 0.03;
 const LAST_RAMP_S: f64 = 0.16;
@@ -66,15 +68,17 @@ fn request(t_s: f64, torque_nm: f32, ratings: &Ratings) -> Request {
 
 impl Scenario<Traction> for Timing {
     fn plan(&self, _options: &Options, machine: &Machine) -> Plan {
-        let turn = self.to.signum();
+        let to_rpm = self.to.unwrap_or(of_rated_rpm(TO_RPM, machine));
+        let turn = to_rpm.signum();
         let (mut speed, mut t_s) = (Vec::new(), if self.operated { OPERATED_S } else { 0.0 });
-        for rpm in SPEEDS_RPM {
+        let (ramp_s, last_ramp_s) = (RAMP_S * ramp_scale(machine), LAST_RAMP_S * ramp_scale(machine));
+        for rpm in SPEEDS_RPM.map(|rpm| of_rated_rpm(rpm, machine)) {
             speed.extend([(t_s, rpm * turn), (t_s + HOLD_S, rpm * turn)]);
-            t_s += HOLD_S + RAMP_S;
+            t_s += HOLD_S + ramp_s;
         }
-        t_s += LAST_RAMP_S - RAMP_S;
-        speed.extend([(t_s, self.to), (t_s + HOLD_S, self.to)]);
-        t_s += HOLD_S + RAMP_S;
+        t_s += last_ramp_s - ramp_s;
+        speed.extend([(t_s, to_rpm), (t_s + HOLD_S, to_rpm)]);
+        t_s += HOLD_S + ramp_s;
         let direction = if self.brake { -turn } else { turn };
         let torque_nm = (machine.folder.parameters.max_torque_nm * self.torque_scale * direction) as f32;
         let fault_s = self.fault_at.unwrap_or(f64::INFINITY);

@@ -1,0 +1,170 @@
+//! The ratings that follow from a flux map and the limits, and `machine.toml` of both.
+
+use super::given::Given;
+use super::write::digits;
+use anyhow::{Result, ensure};
+use core::f64::consts::TAU;
+use std::fmt::Write as _;
+use tractive_tablegen::{FluxMap, Optimum, SmoothMap};
+
+/// Ratings that follow.
+pub struct Ratings {
+    max_torque_nm: f64,
+    max_power_w: f64,
+    /// Speed up to which the nominal link gives the largest torque, in r/min.
+    corner_rpm: f64,
+    rated_torque_nm: f64,
+    rated_speed_rpm: f64,
+    /// Flux linkage without current, in Wb.
+    magnet_wb: f64,
+}
+
+/// Rated torque, as a share of the largest, and rated speed over the corner of the largest: a machine's usual proportions.
+const RATED_TORQUE: f64 = 0.7;
+const RATED_SPEED: f64 = 1.05;
+/// Ten minutes of full torque are the longest that a rotor may take to its largest speed.
+const LONGEST_S: f64 = 600.0;
+
+impl Ratings {
+    /// Of a map within the limits.
+    ///
+    /// # Errors
+    /// The option that leaves the machine no torque, or no way to hold its largest speed.
+    pub fn of(map: &FluxMap, given: &Given) -> Result<Self> {
+        let smooth = SmoothMap::new(map);
+        check_speed(&smooth, given)?;
+        let optimum = Optimum::of(&smooth, given.pole_pairs, given.max_current);
+        let max_torque_nm = rounded_down(optimum.most_torque_nm());
+        ensure!(
+            max_torque_nm > 1e-9,
+            "--max-current {}: must give some torque with this flux map",
+            given.max_current
+        );
+        let corner_rpm = corner_rpm(&smooth, optimum.least_current(max_torque_nm), given);
+        let max_power_w = rounded_down(max_torque_nm * corner_rpm * TAU / 60.0);
+        if let Some(inertia) = given.inertia {
+            let most = LONGEST_S * max_torque_nm / (given.max_speed_rpm * TAU / 60.0);
+            ensure!(
+                inertia <= most,
+                "--inertia {inertia}: must be at most {most:.3e} kg·m²: {max_torque_nm} N·m takes ten minutes to --max-speed-rpm {} with it",
+                given.max_speed_rpm
+            );
+        }
+        Ok(Self {
+            max_torque_nm,
+            max_power_w,
+            corner_rpm,
+            rated_torque_nm: rounded_down(RATED_TORQUE * max_torque_nm),
+            rated_speed_rpm: rounded_down((RATED_SPEED * corner_rpm).min(given.max_speed_rpm)),
+            magnet_wb: smooth.at(0.0, 0.0).psi_d_wb,
+        })
+    }
+
+    /// `machine.toml`; `command` are the words that made it.
+    pub fn toml(&self, given: &Given, command: &str) -> String {
+        let [least_v, nominal_v, most_v] = given.link_v().map(digits);
+        let lines: [(&str, f64, &str); 13] = [
+            ("pole_pairs", f64::from(given.pole_pairs), "given"),
+            ("stator_resistance_ohm", given.rs, "given"),
+            ("max_torque_nm", self.max_torque_nm, "derived: the most within max_current_a"),
+            ("max_power_w", self.max_power_w, "derived: that torque as far as the nominal link gives it"),
+            ("max_current_a", given.max_current, "given; peak"),
+            ("max_speed_rpm", given.max_speed_rpm, "given"),
+            ("rated_torque_nm", self.rated_torque_nm, "chosen: 0.7 of max_torque_nm"),
+            (
+                "rated_speed_rpm",
+                self.rated_speed_rpm,
+                "chosen: a little above the speed where weakening begins",
+            ),
+            ("dc_link_min_v", least_v, of(given.udc_min, "chosen: 0.8 of the nominal one")),
+            ("dc_link_nominal_v", nominal_v, "given"),
+            ("dc_link_max_v", most_v, of(given.udc_max, "chosen: 1.2 of the nominal one")),
+            ("max_switching_hz", given.max_switching_hz, "given"),
+            ("rotor_inertia_kg_m2", given.inertia.unwrap_or(f64::NAN), "given"),
+        ];
+        let mut text = format!(
+            "# Made by: cargo rig machine {command}\n# Currents and voltages of phases are peak values.\nname = {:?}\n\n",
+            given.name()
+        );
+        for (key, value, from) in lines.into_iter().filter(|(_, value, _)| !value.is_nan()) {
+            let pair = format!("{key} = {value}");
+            let _ = writeln!(text, "{pair:<40}# {from}");
+        }
+        text
+    }
+
+    /// The ratings in a few lines, and what they mean for the inverter.
+    pub fn told(&self, given: &Given) -> String {
+        let Self { max_torque_nm, max_power_w, corner_rpm, magnet_wb, .. } = self;
+        let mut text = format!(
+            "{}: {max_torque_nm} N·m up to {corner_rpm:.0} r/min, {max_power_w} W, {} r/min at most",
+            given.out.display(),
+            given.max_speed_rpm
+        );
+        // Line to line, peak: what the diodes rectify.
+        let emf_v = 3.0_f64.sqrt() * given.omega(given.max_speed_rpm) * magnet_wb;
+        let highest_v = digits(given.link_v()[2]);
+        if emf_v > highest_v {
+            let _ = write!(
+                text,
+                "\nwithout current the machine makes {emf_v:.1} V peak between lines at {} r/min, above the link's {highest_v} V: gates off, the diodes charge it",
+                given.max_speed_rpm,
+            );
+        }
+        text
+    }
+}
+
+fn of(said: Option<f64>, otherwise: &'static str) -> &'static str {
+    if said.is_some() { "given" } else { otherwise }
+}
+
+/// Four digits, not above the value.
+fn rounded_down(value: f64) -> f64 {
+    let unit = 10.0_f64.powi(value.abs().log10().floor() as i32 - 3);
+    digits((value / unit + 1e-9).floor() * unit)
+}
+
+/// Voltage in steady state, peak phase, in V.
+fn voltage_v(map: &SmoothMap, (id, iq): (f64, f64), omega: f64, rs: f64) -> f64 {
+    let at = map.at(id, iq);
+    (rs * id - omega * at.psi_q_wb).hypot(rs * iq + omega * at.psi_d_wb)
+}
+
+/// Speed up to which a current needs no more than the nominal link gives, in r/min, at most the largest.
+fn corner_rpm(map: &SmoothMap, current: (f64, f64), given: &Given) -> f64 {
+    let (mut low, mut high) = (0.0, given.max_speed_rpm);
+    let fits = |rpm: f64| voltage_v(map, current, given.omega(rpm), given.rs) <= given.voltage_v();
+    if fits(high) {
+        return high;
+    }
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        if fits(middle) { low = middle } else { high = middle }
+    }
+    low
+}
+
+/// At the largest speed some current must leave a voltage that the nominal link gives.
+fn check_speed(map: &SmoothMap, given: &Given) -> Result<()> {
+    const STEPS: i32 = 200;
+    let least_v = |rpm: f64| {
+        let along_d = (0..=STEPS).map(|k| -given.max_current * f64::from(k) / f64::from(STEPS));
+        along_d.map(|id| voltage_v(map, (id, 0.0), given.omega(rpm), given.rs)).fold(f64::INFINITY, f64::min)
+    };
+    if least_v(given.max_speed_rpm) <= given.voltage_v() {
+        return Ok(());
+    }
+    let (mut low, mut high) = (0.0, given.max_speed_rpm);
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        if least_v(middle) <= given.voltage_v() { low = middle } else { high = middle }
+    }
+    anyhow::bail!(
+        "--max-speed-rpm {}: must be at most {:.0}: above it no current within --max-current {} brings the machine's voltage down to what --udc {} gives",
+        given.max_speed_rpm,
+        low.floor(),
+        given.max_current,
+        given.udc
+    )
+}

@@ -1,0 +1,86 @@
+//! A machine folder written whole or not at all.
+
+use anyhow::{Context, Result, ensure};
+use rustix::fs::{CWD, RenameFlags, renameat_with};
+use std::fmt::Write as _;
+use std::os::unix::fs::PermissionsExt;
+use std::path::{Path, PathBuf};
+use tractive_tablegen::{FluxMap, MachineFolder};
+
+/// The two files.
+pub struct Contents {
+    /// `machine.toml`.
+    pub toml: String,
+    /// `flux_map.csv`.
+    pub map: String,
+}
+
+const FILES: [&str; 2] = ["machine.toml", "flux_map.csv"];
+
+/// Writes a folder beside its place, has the table generator read it, and moves it there.
+///
+/// # Errors
+/// Where the place is taken by anything but a machine folder, the generator refuses the contents, or it cannot be written.
+pub fn folder(out: &Path, contents: &Contents) -> Result<()> {
+    let taken = check_place(out)?;
+    let parent = out.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let failed = || format!("--out {}", out.display());
+    std::fs::create_dir_all(parent).with_context(failed)?;
+    let beside = tempfile::Builder::new().prefix(".machine").tempdir_in(parent).with_context(failed)?;
+    for (name, text) in FILES.iter().zip([&contents.toml, &contents.map]) {
+        std::fs::write(beside.path().join(name), text).with_context(failed)?;
+    }
+    MachineFolder::read(beside.path()).map_err(|error| {
+        // The file is never seen: its key and what is allowed are.
+        let file = error.file.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        anyhow::anyhow!("the table generator refuses the {file} of these values: {}", error.problem)
+    })?;
+    std::fs::set_permissions(beside.path(), std::fs::Permissions::from_mode(0o755)).with_context(failed)?;
+    if taken {
+        // The old one goes with the temporary folder.
+        renameat_with(CWD, beside.path(), CWD, out, RenameFlags::EXCHANGE).with_context(failed)
+    } else {
+        std::fs::rename(beside.path(), out).with_context(failed)
+    }
+}
+
+/// The place is free, or an empty folder, or, which is `true`, a machine folder.
+fn check_place(out: &Path) -> Result<bool> {
+    if !out.exists() {
+        return Ok(false);
+    }
+    ensure!(out.is_dir(), "--out {}: must be a folder, or nothing yet", out.display());
+    let entries = std::fs::read_dir(out).and_then(|entries| {
+        entries.map(|entry| Ok(PathBuf::from(entry?.file_name()))).collect::<std::io::Result<Vec<_>>>()
+    });
+    let entries = entries.with_context(|| format!("--out {}", out.display()))?;
+    let other = entries.iter().find(|name| FILES.iter().all(|file| name.as_path() != Path::new(file)));
+    if let Some(other) = other {
+        anyhow::bail!(
+            "--out {}: holds {}: must be a new or empty folder, or one with nothing but {}",
+            out.display(),
+            other.display(),
+            FILES.join(" and ")
+        );
+    }
+    Ok(!entries.is_empty())
+}
+
+/// `flux_map.csv` of a map with both signs of iq, after `#` comment lines; it holds those from 0 on.
+pub fn csv(map: &FluxMap, comments: &str) -> String {
+    let mut text = format!("{comments}id_a,iq_a,psi_d_wb,psi_q_wb\n");
+    let columns = map.iq_a.len();
+    for (row, id) in map.id_a.iter().enumerate() {
+        for (column, iq) in map.iq_a.iter().enumerate().filter(|(_, iq)| **iq >= 0.0) {
+            let node = row * columns + column;
+            let _ = writeln!(text, "{id},{iq},{},{}", map.psi_d_wb[node], map.psi_q_wb[node]);
+        }
+    }
+    text
+}
+
+/// The nearest number with nine digits, so that it prints short.
+pub fn digits(value: f64) -> f64 {
+    // There is one zero.
+    format!("{value:.8e}").parse::<f64>().unwrap_or(value) + 0.0
+}

@@ -1,0 +1,102 @@
+//! Every scenario of the two-level drive with a machine of 48 V and 20 kHz, by the rule of exit code 0: no fault, and no bound that
+//! falls short.
+
+use rayon::prelude::*;
+use std::process::Command;
+use tractive_rig::scenario::catalogue;
+use tractive_rig::trace::Recorded;
+use tractive_rig::verdict::FALLS_SHORT;
+
+const MACHINE: &str = "pmsm-48v-1kw";
+
+/// Each scenario, and the verdicts that it has to give at least; `acknowledge` has a fault on purpose.
+const SCENARIOS: [(&str, usize); 14] = [
+    ("mode-borders --speed 3000", 2),
+    ("load-steps", 4),
+    ("restart", 3),
+    ("characteristic", 7),
+    ("sweep", 2),
+    ("chopper", 12),
+    ("precharge", 8),
+    ("acknowledge", 8),
+    ("link-steps", 1),
+    ("steady", 3),
+    ("full-step", 4),
+    ("reversal", 2),
+    ("borders-timing", 0),
+    ("timing", 0),
+];
+
+#[test]
+fn every_scenario_keeps_its_bounds_with_48_volts_and_20_kilohertz() {
+    let complaints: Vec<_> =
+        SCENARIOS.par_iter().flat_map(|(line, least)| complaints(line, *least)).collect();
+    assert!(complaints.is_empty(), "{complaints:#?}");
+}
+
+fn complaints(line: &str, least: usize) -> Vec<String> {
+    let chosen = catalogue::of_traction(&format!("{line} --machine {MACHINE} --control-hz 20000")).unwrap();
+    let machine = chosen.machine().unwrap();
+    assert!(chosen.title(&machine).starts_with("no figure: "), "{}", chosen.title(&machine));
+    let recording = chosen.drive(&machine).unwrap();
+    let figures = chosen.figures(&recording, &machine);
+    let mut complaints = Vec::new();
+    if let Some(trip) = recording.trip().filter(|_| line != "acknowledge") {
+        complaints.push(format!("{line}: {}", trip.fault.name()));
+    }
+    let verdicts =
+        figures.get("verdicts").and_then(|verdicts| verdicts.as_array().cloned()).unwrap_or_default();
+    let kept = verdicts.iter().filter(|verdict| verdict["verdict"] == "pass").count();
+    if kept < least {
+        complaints.push(format!("{line}: {kept} bounds kept, of {least}"));
+    }
+    let short = verdicts.iter().filter(|verdict| verdict["verdict"] == FALLS_SHORT);
+    complaints.extend(short.map(|verdict| format!("{line}: {verdict}")));
+    complaints
+}
+
+/// The paper's machine has the paper's figures, and nobody else's has them.
+#[test]
+fn only_the_papers_machine_answers_its_figures() {
+    for (machine, title) in
+        [("pmasynrm-180kw", "figure 8: load steps at 200 r/min"), (MACHINE, "no figure: load steps")]
+    {
+        let chosen = catalogue::of_traction(&format!("load-steps --machine {machine}")).unwrap();
+        assert_eq!(chosen.title(&chosen.machine().unwrap()), title);
+    }
+}
+
+/// The numbers of the scenarios follow the machine's ratings: what is asked of a small machine is what it has.
+#[test]
+fn a_scenario_asks_what_the_machine_has() {
+    let chosen = catalogue::of_traction(&format!("load-steps --machine {MACHINE}")).unwrap();
+    let machine = chosen.machine().unwrap();
+    let parameters = &machine.folder.parameters;
+    let recording = chosen.drive(&machine).unwrap();
+    let most_nm = recording.rows.iter().map(|row| row.te_ref_nm).fold(0.0, f64::max);
+    assert!((most_nm / parameters.max_torque_nm - 1.0).abs() < 1e-5, "{most_nm} N·m");
+    let speed_rpm = recording.rows[0].speed_rpm;
+    assert!((speed_rpm / parameters.rated_speed_rpm - 0.1).abs() < 1e-6, "{speed_rpm} r/min");
+}
+
+/// A bound that another machine does not keep is exit code 1, as it is of the paper's; its page names no figure of the paper.
+#[test]
+fn a_bound_that_is_not_kept_is_exit_code_1_for_every_machine() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = |line: &str| {
+        let mut rig = Command::new(env!("CARGO_BIN_EXE_tractive-rig"));
+        let output =
+            rig.arg("run").args(line.split_whitespace()).arg("--out").arg(folder.path()).output().unwrap();
+        let page = std::fs::read_to_string(folder.path().join("report.html")).unwrap();
+        (output.status.code(), String::from_utf8_lossy(&output.stdout).into_owned(), page)
+    };
+    // Pulses as short as a carrier of 20 kHz needs, and pulses of an IGBT.
+    let own = format!("reversal --machine {MACHINE}");
+    let (code, said, page) = run(&own);
+    assert!(code == Some(0) && said.starts_with("PASS: 2 of 2 bounds kept"), "{said}");
+    assert!(!page.contains("The paper's") && page.contains("<svg"), "{page}");
+    let (code, said, _) = run(&format!("{own} --min-pulse-us 12"));
+    assert!(code == Some(1) && said.starts_with("FALLS SHORT: 1 of 2 bounds"), "{code:?}: {said}");
+    let (code, _, page) = run("full-step");
+    assert!(code == Some(0) && page.contains("The paper's figure 8"), "{page}");
+}

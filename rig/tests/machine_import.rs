@@ -1,0 +1,201 @@
+//! `machine import`: maps as other tools write them come out as the machine that they are of.
+
+#[path = "../../tablegen/tests/common/mod.rs"]
+mod folders;
+
+use folders::{SMALL, axis};
+use std::fmt::Write as _;
+use std::path::Path;
+use std::process::{Command, Output};
+use tractive_rig::machine::Machine;
+use tractive_tablegen::SmoothMap;
+
+const LIMITS: &str =
+    "--pole-pairs 3 --rs 0.1 --max-current 20 --udc 560 --max-speed-rpm 6000 --max-switching-hz 5000";
+
+fn import(map: &Path, options: &str, out: &Path) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_tractive-rig"))
+        .args(["machine", "import"])
+        .arg(map)
+        .args(LIMITS.split_whitespace())
+        .args(options.split_whitespace())
+        .arg("--out")
+        .arg(out)
+        .output()
+        .unwrap()
+}
+
+/// Flux linkage of the machine at a current.
+type Flux = fn(f64, f64) -> (f64, f64);
+
+fn truth(id: f64, iq: f64) -> (f64, f64) {
+    SMALL.truth.flux(id, iq)
+}
+
+/// A map: its head, its values of both currents, and a row from currents (the map's own) and flux linkages.
+fn map(head: &str, first: &[f64], second: &[f64], row: impl Fn(f64, f64) -> String) -> String {
+    let mut text = format!("{head}\n");
+    for a in first {
+        for b in second {
+            let _ = writeln!(text, "{}", row(*a, *b));
+        }
+    }
+    text
+}
+
+/// Values that are dense about 0 and sparse far from it.
+fn uneven(first: f64, last: f64, count: usize) -> Vec<f64> {
+    let place = |k: usize| 2.0 * k as f64 / (count - 1) as f64 - 1.0;
+    let bent = |x: f64| 0.5 * (x + x.powi(3));
+    (0..count).map(|k| 0.5 * (first + last) + 0.5 * (last - first) * bent(place(k))).collect()
+}
+
+/// The largest error of the imported map within the current limit, as a share of the largest flux linkage.
+fn error(folder: &Path, wanted: Flux) -> f64 {
+    let machine = Machine::load(&folder.display().to_string()).unwrap();
+    let smooth = SmoothMap::new(&machine.folder.map);
+    let (top_d, top_q) = wanted(0.0, 20.0);
+    let mut worst: f64 = 0.0;
+    for k in 0..=40 {
+        for angle in 0..=36 {
+            let (sin, cos) = (f64::from(angle) * 5.0_f64.to_radians()).sin_cos();
+            let (id, iq) = (-0.5 * f64::from(k) * sin, 0.5 * f64::from(k) * cos);
+            let (at, (psi_d, psi_q)) = (smooth.at(id, iq), wanted(id, iq));
+            worst = worst.max((at.psi_d_wb - psi_d).hypot(at.psi_q_wb - psi_q) / top_d.hypot(top_q));
+        }
+    }
+    worst
+}
+
+#[test]
+fn maps_of_other_tools_are_the_machine_that_they_are_of() {
+    let root = 2.0_f64.sqrt();
+    let (d, q) = (axis(-22.0, 1.0, 26), axis(0.0, 1.0, 23));
+    let both = axis(-22.0, 1.0, 45);
+    let cases: [(&str, String, &str, f64); 5] = [
+        (
+            "names with units in brackets, a torque beside them, half a plane",
+            map("Iq [A],Id [A],Torque [Nm],Psi_d [Vs],Psi_q [Vs]", &q, &d, |iq, id| {
+                let (psi_d, psi_q) = truth(id, iq);
+                format!("{iq},{id},1.5,{psi_d:.9},{psi_q:.9}")
+            }),
+            "",
+            1e-4,
+        ),
+        (
+            "rms and thousandths, semicolons and decimal commas, both signs of iq",
+            map("id_mA rms;iq_mA rms;lambda_d (mWb);lambda_q (mWb)", &d, &both, |id, iq| {
+                let (psi_d, psi_q) = truth(id, iq);
+                let (id, iq) = (1e3 * id / root, 1e3 * iq / root);
+                format!("{id:.6};{iq:.6};{:.6};{:.6}", 1e3 * psi_d, 1e3 * psi_q).replace('.', ",")
+            }),
+            "",
+            1e-4,
+        ),
+        (
+            "d along the least reluctance: this machine's −q is the map's d, with magnets along −q",
+            map("# from a finite-element model\ni_d\ti_q\tFd\tFq", &q, &axis(-3.0, 1.0, 26), |id, iq| {
+                let (psi_d, psi_q) = truth(-iq, id);
+                format!("{id}\t{iq}\t{psi_q:.9}\t{:.9}", -psi_d)
+            }),
+            "--d-axis reluctance",
+            1e-4,
+        ),
+        (
+            "currents counted as a generator's, the other half of the plane, flux of one of four turns",
+            map("Id,Iq,Flux Linkage D,Flux Linkage Q", &d, &q, |id, iq| {
+                let (psi_d, psi_q) = truth(id, iq);
+                format!("{},{},{:.10},{:.10}", -id, -iq, psi_d / 4.0, psi_q / 4.0)
+            }),
+            "--negate id,iq --flux-factor 4",
+            1e-4,
+        ),
+        (
+            "an uneven grid",
+            map(
+                "id_a,iq_a,psi_d_wb,psi_q_wb",
+                &uneven(-25.0, 25.0, 41),
+                &uneven(-23.0, 23.0, 37),
+                |id, iq| {
+                    let (psi_d, psi_q) = truth(id, iq);
+                    format!("{id},{iq},{psi_d:.9},{psi_q:.9}")
+                },
+            ),
+            "",
+            3e-3,
+        ),
+    ];
+    let folder = tempfile::tempdir().unwrap();
+    for (k, (what, text, options, bound)) in cases.iter().enumerate() {
+        let (file, out) = (folder.path().join(format!("{k}.csv")), folder.path().join(format!("made-{k}")));
+        std::fs::write(&file, text).unwrap();
+        let output = import(&file, options, &out);
+        assert_eq!(output.status.code(), Some(0), "{what}: {}", String::from_utf8_lossy(&output.stderr));
+        let error = error(&out, truth);
+        println!("{what}: {error:.1e}");
+        assert!(error < *bound, "{what}: {error}");
+    }
+}
+
+#[test]
+fn what_is_wrong_with_a_map_is_named_with_file_line_and_column() {
+    let (d, q) = (axis(-22.0, 2.0, 14), axis(0.0, 2.0, 12));
+    let good = map("id_a,iq_a,psi_d_wb,psi_q_wb", &d, &q, |id, iq| {
+        let (psi_d, psi_q) = truth(id, iq);
+        format!("{id},{iq},{psi_d:.9},{psi_q:.9}")
+    });
+    let line = |number: usize, with: &str| -> String {
+        let lines = good.lines().enumerate().map(|(k, line)| if k + 1 == number { with } else { line });
+        lines.collect::<Vec<_>>().join("\n")
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let (file, out) = (folder.path().join("map.csv"), folder.path().join("made"));
+    for (text, options, told) in [
+        (line(7, "-22,10,x,0.2"), "", "map.csv:7: psi_d_wb: x: must be a number"),
+        (line(7, "-22,10,0.1"), "", "map.csv:7: psi_q_wb: : must be a number"),
+        (line(7, "-22,8,0.1,0.2"), "", "map.csv:7: id -22, iq 8: must be there once: is in line 6 too"),
+        (line(7, "#"), "", "id -22, iq 10: missing"),
+        (line(1, "id_a,iq_a,psi_d_wb,torque"), "", "map.csv:1: no column for psi_q"),
+        (line(1, "id_a,Id,psi_d_wb,psi_q"), "", "map.csv:1: Id: must be there once: id_a is id too"),
+        (line(1, "id_a,iq_a,psi_d [V],psi_q"), "", "map.csv:1: psi_d [V]: unit v: must be one of wb"),
+        (line(2, "-22,0,-0.01,0.09"), "", "map.csv:2: psi_q: 0.09: must be 0 at iq = 0"),
+        (
+            line(30, "-18,8,0.5,0.2"),
+            "",
+            "map.csv:31: psi_q: 0.194442719: must rise with iq, above 0.2 of line 30",
+        ),
+        (good.clone(), "--negate psi_q", "must rise with iq, above"),
+        (good.clone(), "--negate id_a", "'--negate"),
+        (good.clone(), "--flux-factor 0", "--flux-factor 0: must be above 0"),
+        (good.replace("id_a,", "id_ma,"), "", "--max-current 20: must be at most 0.022"),
+    ] {
+        std::fs::write(&file, text).unwrap();
+        let output = import(&file, options, &out);
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{told}: {said}");
+        assert!(said.contains(told), "{told}: {said}");
+        assert!(!out.exists(), "{told}");
+    }
+}
+
+#[test]
+fn every_machine_of_the_tables_has_its_page() {
+    let folder = tempfile::tempdir().unwrap();
+    for (machine, mode, power) in [
+        ("pmasynrm-180kw", "square", "246.4"),
+        ("ipm-zs9", "async", "12.57"),
+        ("pmsm-48v-1kw", "async", "1.078"),
+    ] {
+        let file = folder.path().join(format!("{machine}.html"));
+        let mut rig = Command::new(env!("CARGO_BIN_EXE_tractive-rig"));
+        let output = rig.args(["machine", "show", machine, "--out"]).arg(&file).output().unwrap();
+        assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+        let page = std::fs::read_to_string(&file).unwrap();
+        assert_eq!(page.matches("<svg").count(), 10, "{machine}");
+        assert!(page.contains(&format!("<td>{mode}</td>")) && page.contains(power), "{machine}");
+        assert!(
+            !page.contains("NaN") && !page.contains("inf<") && !page.contains("The paper's"),
+            "{machine}"
+        );
+    }
+}

@@ -1,0 +1,92 @@
+//! `machine new`: what it refuses, and what it leaves behind.
+
+use std::path::Path;
+use std::process::{Command, Output};
+use tractive_rig::machine::Machine;
+
+const GOOD: &str = "--pole-pairs 4 --rs 0.05 --ld 0.3e-3 --lq 0.45e-3 --psi-f 0.0135 --max-current 32 --udc 48 \
+    --max-speed-rpm 6000 --max-switching-hz 20000";
+
+fn new(values: &str, out: &Path) -> Output {
+    let rig = env!("CARGO_BIN_EXE_tractive-rig");
+    Command::new(rig)
+        .args(["machine", "new"])
+        .args(values.split_whitespace())
+        .arg("--out")
+        .arg(out)
+        .output()
+        .unwrap()
+}
+
+/// The good values with one replaced.
+fn with(option: &str, value: &str) -> String {
+    let mut words: Vec<_> = GOOD.split_whitespace().collect();
+    match words.iter().position(|word| *word == option) {
+        Some(at) => words[at + 1] = value,
+        None => words.extend([option, value]),
+    }
+    words.join(" ")
+}
+
+#[test]
+fn nonsense_is_refused_by_its_option_and_leaves_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    for (option, value, allowed) in [
+        ("--rs", "-0.1", "from 0 "),
+        ("--rs", "0.8", "at most 0.75"),
+        ("--ld", "0", "above 0"),
+        ("--ld", "0.5e-3", "at most --lq"),
+        ("--lq", "450", "up to 10 H"),
+        ("--psi-f", "-0.01", "from 0 "),
+        ("--max-current", "0", "above 0"),
+        ("--udc", "-48", "above 0"),
+        ("--udc-min", "50", "up to 48"),
+        ("--udc-max", "40", "from 48"),
+        ("--max-speed-rpm", "0", "above 0"),
+        ("--max-speed-rpm", "40000", "must be at most 18"),
+        ("--max-switching-hz", "100", "at least 400"),
+        ("--inertia", "100", "ten minutes"),
+        ("--saturation", "0", "from 0.2"),
+        ("--saturation", "1.5", "up to 1"),
+        ("--name", "", "must not be empty"),
+    ] {
+        let mut words: Vec<String> = with(option, "VALUE").split(' ').map(str::to_owned).collect();
+        words.iter_mut().filter(|word| *word == "VALUE").for_each(|word| value.clone_into(word));
+        let out = folder.path().join("made");
+        let mut rig = Command::new(env!("CARGO_BIN_EXE_tractive-rig"));
+        let output = rig.args(["machine", "new"]).args(&words).arg("--out").arg(&out).output().unwrap();
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{option} {value}: {said}");
+        assert!(said.starts_with(option) && said.contains(allowed), "{option} {value}: {said}");
+        assert_eq!(said.trim().lines().count(), 1, "{said}");
+    }
+    let no_torque = "--psi-f 0 --pole-pairs 4 --rs 0.05 --ld 0.3e-3 --lq 0.3e-3 --max-current 32 --udc 48 \
+        --max-speed-rpm 6000 --max-switching-hz 20000";
+    let said = new(no_torque, &folder.path().join("made"));
+    assert!(String::from_utf8_lossy(&said.stderr).starts_with("--psi-f 0: must be above 0"), "{said:?}");
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0, "nothing is left behind");
+}
+
+#[test]
+fn a_folder_is_made_whole_replaced_whole_and_others_are_left_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("deep/made");
+    for (values, torque_nm) in [(GOOD.to_owned(), 2.736), (with("--saturation", "0.8"), 2.688)] {
+        let output = new(&values, &out);
+        assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+        let machine = Machine::load(&out.display().to_string()).unwrap();
+        let parameters = &machine.folder.parameters;
+        assert_eq!((parameters.max_torque_nm, parameters.name.as_str()), (torque_nm, "made"));
+        assert_eq!((parameters.pole_pairs, parameters.max_switching_hz), (4, 20e3));
+        let entries = std::fs::read_dir(folder.path().join("deep")).unwrap().count();
+        assert_eq!(entries, 1, "nothing beside it");
+    }
+    let before = std::fs::read(out.join("machine.toml")).unwrap();
+    assert_eq!(new(&with("--ld", "0"), &out).status.code(), Some(2));
+    assert_eq!(std::fs::read(out.join("machine.toml")).unwrap(), before, "a refusal changes nothing");
+    std::fs::write(out.join("notes.txt"), "mine").unwrap();
+    let refused = new(GOOD, &out);
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&refused.stderr).contains("holds notes.txt"), "{refused:?}");
+    assert!(out.join("notes.txt").exists());
+}
