@@ -23,6 +23,9 @@ pub mod options;
 pub mod output;
 pub mod pattern;
 pub mod plant;
+#[cfg_attr(unix, path = "platform/unix.rs")]
+#[cfg_attr(not(unix), path = "platform/none.rs")]
+mod platform;
 pub mod points;
 pub mod report;
 pub mod rows;

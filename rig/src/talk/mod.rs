@@ -13,6 +13,7 @@ mod system;
 pub use lines::Lines;
 pub use listener::Listener;
 pub use outcome::{Happened, Outcome, TalkOptions};
+pub(crate) use speed_loop::SpeedLoop;
 pub use supervisor::Talk;
 pub use system::System;
 
