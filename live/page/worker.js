@@ -106,7 +106,7 @@ channel.port1.onmessage = () => {
   if (idle) setTimeout(turn, 4); else turn();
 };
 
-await init();
+await init({ module_or_path: new URL("tractive_live_bg.wasm", import.meta.url) });
 postMessage({ type: "ready" });
 last = performance.now();
 turn();

@@ -1,0 +1,39 @@
+//! The guide's pictures of the page.
+
+use crate::browser::Browser;
+use crate::server;
+use anyhow::{Context, Result, ensure};
+use base64::Engine;
+use std::path::Path;
+use std::time::Duration;
+
+/// The largest picture, in bytes.
+const LARGEST_BYTES: usize = 200_000;
+
+/// A picture: its name, what the address says behind `#`, size, dark or not.
+const PICTURES: [(&str, &str, u32, u32, bool); 4] = [
+    ("live-light", "held=1350&torque=900&window=0.02&trigger=ia", 1280, 980, false),
+    ("live-dark", "held=2600&torque=700&window=0.01&trigger=ia", 1280, 980, true),
+    ("live-phone-light", "held=700&torque=600&window=0.05&trigger=ia", 390, 844, false),
+    ("live-phone-dark", "rotor=free&command=speed&speed=900&window=2", 390, 844, true),
+];
+
+/// Takes them all.
+pub fn take(page: &Path, out: &Path, program: &Path) -> Result<()> {
+    let address = server::serve_aside(page)?;
+    std::fs::create_dir_all(out)?;
+    for (name, words, width, height, dark) in PICTURES {
+        let mut browser = Browser::start(program)?;
+        browser.resize(width, height, dark)?;
+        browser.go(&format!("{address}#{words}"))?;
+        browser
+            .until("the drive runs", "document.getElementById('state-name')?.textContent === 'running'")?;
+        std::thread::sleep(Duration::from_secs(5));
+        let png = base64::prelude::BASE64_STANDARD.decode(browser.picture()?)?;
+        let file = out.join(format!("{name}.png"));
+        ensure!(png.len() <= LARGEST_BYTES, "{}: {} bytes", file.display(), png.len());
+        std::fs::write(&file, &png).with_context(|| file.display().to_string())?;
+        println!("{}: {} bytes", file.display(), png.len());
+    }
+    Ok(())
+}
