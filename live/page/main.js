@@ -5,14 +5,14 @@ import * as views from "./views.js";
 
 const $ = id => document.getElementById(id);
 const STEP_S = 50e-6;
-const RATES = [["0.001", "1/1000"], ["0.01", "1/100"], ["0.1", "1/10"], ["1", "real time"], ["5", "5 ×"], ["Infinity", "as fast as it goes"]];
+const RATES = [["0.001", "1/1000"], ["0.01", "1/100"], ["0.1", "1/10"], ["1", "real time"], ["5", "5 ×"], ["Infinity", "fastest"]];
 
 const worker = new Worker("worker.js", { type: "module" });
 const tell = message => worker.postMessage(message);
 const set = (name, value) => tell({ type: "set", name, value });
 const settings = read();
 const wanted = { on: true, coast: false, discharge: false };
-let memory = null, scope = null, properties = null, state = {}, factor = { reached: 0, possible: 0 }, fresh = false;
+let memory = null, scope = null, properties = null, state = {}, factor = { reached: 0, possible: 0 }, fresh = false, injected = "";
 
 /** Everything that stands in the page, as the bench is told it. */
 const orders = {
@@ -49,12 +49,13 @@ const act = {
       coast: () => { wanted.coast = !wanted.coast; set("want", wanted); },
       acknowledge: () => set("acknowledge"),
       restart: start,
-      mend: () => { set("mend"); orders.map(); },
+      // An interrupt that has stopped comes again with the processor's restart alone.
+      mend: () => { if (injected === "commands-lost") start(); else { set("mend"); orders.map(); } injected = ""; },
       sweep: () => { $("sweep").disabled = true; $("sum").textContent = "running …"; tell({ type: "sweep" }); },
     })[id]();
     buttons();
   },
-  inject: name => set("inject", name),
+  inject(name) { injected = name; set("inject", name); },
 };
 function remember() {
   write(settings, { window: $("window").value === "0.1" ? "" : $("window").value, trigger: $("trigger").value, rate: $("rate").value === "1" ? "" : $("rate").value });

@@ -1,6 +1,7 @@
 // The scope: what the bench has told lately, and the plots of it.
 
 const HELD_S = 10; // what the scope holds
+const MOST_EDGES = 12_000; // more than these are a band
 const NAMES = ["off", "async", "sync 15", "sync 12", "mid 7", "mid 3", "square"];
 export const modeName = code => NAMES[code] ?? "";
 export const WINDOWS = [0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10];
@@ -111,10 +112,10 @@ const css = name => getComputedStyle(document.documentElement).getPropertyValue(
 
 /** The plots, one below the other, with their series: column, name, colour, dashes. */
 const PLOTS = [
-  { title: "Phase currents, A", height: 190, least: 20, series: [["ia", "u", "--u"], ["ib", "v", "--v"], ["ic", "w", "--w"]] },
-  { title: "Torque, N·m", height: 140, least: 50, series: [["te", "torque", "--torque"], ["teRef", "reference", "--ref", [5, 4]]] },
-  { title: "Speed, r/min", height: 92, least: 50, series: [["speed", "speed", "--speed"]] },
-  { title: "Link voltage, V", height: 92, least: 50, series: [["udc", "link", "--link"]] },
+  { title: "Phase currents, A", height: 196, least: 20, series: [["ia", "u", "--u"], ["ib", "v", "--v"], ["ic", "w", "--w"]] },
+  { title: "Torque, N·m", height: 140, least: 50, series: [["te", "T", "--torque"], ["teRef", "T*", "--ref", [5, 4]]] },
+  { title: "Speed, r/min", height: 92, least: 50, series: [["speed", "n", "--speed"]] },
+  { title: "Link voltage, V", height: 92, least: 50, series: [["udc", "U", "--link"]] },
   { title: "Gates and mode", height: 132, gates: true, series: [] },
 ];
 
@@ -157,8 +158,10 @@ export class Scope {
   }
   reset(memory) { this.memory = memory; this.held = null; this.triggered = -1; }
   width() { return Math.max(200, this.host.clientWidth); }
+  /** Lower on a phone, so that controls are near. */
+  height(plot) { return Math.round(plot.height * (this.width() < 500 && !plot.gates ? 0.78 : 1)); }
   resize() {
-    if (this.plots[0].width !== this.width()) this.plots.forEach((plot, k) => plot.setSize({ width: this.width(), height: PLOTS[k].height }));
+    if (this.plots[0].width !== this.width()) this.plots.forEach((plot, k) => plot.setSize({ width: this.width(), height: this.height(PLOTS[k]) }));
   }
   build() {
     this.plots?.forEach(plot => plot.destroy());
@@ -170,8 +173,8 @@ export class Scope {
     const range = new Range(plot.least ?? 1);
     const time = (u, ticks) => ticks.map(t => label(t, this.shown[1] - this.shown[0]));
     const options = {
-      title: plot.title, width: this.width(), height: plot.height, pxAlign: 0,
-      padding: [2, 8, 0, 0],
+      title: plot.title, width: this.width(), height: this.height(plot), pxAlign: 0,
+      padding: [8, 8, 0, 0],
       cursor: { sync: { key: "scope" }, drag: { x: true, y: false, setScale: false }, points: { size: 6 } },
       legend: { show: !plot.gates, live: true },
       scales: { x: { time: false, range: () => this.shown }, y: plot.gates ? { range: () => [0, 4] } : { range: (u, low, high) => range.of(low, high) } },
@@ -262,6 +265,7 @@ export class Scope {
     const first = Math.max(Math.ceil(from / memory.step), memory.count - memory.size, 0), last = Math.min(Math.floor(to / memory.step), memory.count - 1);
     ctx.font = `${12 * ratio}px system-ui, 'DejaVu Sans', sans-serif`;
     ctx.textBaseline = "middle";
+    ctx.textAlign = "left";
     let begin = first, even = false;
     for (let k = first; k <= last; k++) {
       const mode = memory.value("mode", k);
@@ -283,16 +287,22 @@ export function lanes(ctx, memory, from, to, x, y, colours) {
   const first = memory.edgeAfter(from), last = memory.edgeAfter(to);
   const level = (state, leg) => (state >> (2 * leg) & 1 ? 1 : state >> (2 * leg + 1) & 1 ? 0 : 0.5);
   for (let leg = 0; leg < 3; leg++) {
-    ctx.strokeStyle = colours[leg];
+    ctx.strokeStyle = ctx.fillStyle = colours[leg];
+    if (last - first > MOST_EDGES) {
+      ctx.globalAlpha = 0.4;
+      ctx.fillRect(x(from), y(leg, 1), x(memory.end) - x(from), y(leg, 0) - y(leg, 1));
+      ctx.globalAlpha = 1;
+      continue;
+    }
     ctx.beginPath();
-    let now = level(first > 0 ? memory.edgeStates[first - 1] : 0, leg), at = -1e9;
+    let now = level(first > 0 ? memory.edgeStates[first - 1] : 0, leg);
     ctx.moveTo(x(from), y(leg, now));
     for (let k = first; k < last; k++) {
       const next = level(memory.edgeStates[k], leg);
       if (next === now) continue;
       const px = x(memory.edgeTimes[k]);
-      // More than two edges in a pixel look as two.
-      if (px - at > 0.4) { ctx.lineTo(px, y(leg, now)); ctx.lineTo(px, y(leg, next)); at = px; }
+      ctx.lineTo(px, y(leg, now));
+      ctx.lineTo(px, y(leg, next));
       now = next;
     }
     ctx.lineTo(x(Math.min(to, Math.max(from, memory.end))), y(leg, now));

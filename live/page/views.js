@@ -47,7 +47,7 @@ export function numbers(memory, state, properties, factor) {
   const rows = [
     ["Torque", torque.toFixed(0), "N·m"], ["Speed", speed.toFixed(0), "r/min"], ["Power", power.toFixed(1), "kW"],
     ["Link", udc.toFixed(0), "V"], ["Current, peak", memory.peak("ia", seconds).toFixed(0), "A"], ["Frequency", last("f1").toFixed(1), "Hz"],
-    ["Of six-step", (100 * share).toFixed(1), "%"], ["Map error told", (100 * last("mapError")).toFixed(1), "%"],
+    ["Of six-step", (100 * share).toFixed(1), "%"], ["Map error", (100 * last("mapError")).toFixed(1), "%"],
     ["Real time ×", factor.reached.toFixed(factor.reached < 10 ? 2 : 0), `of ${factor.possible.toFixed(0)}`],
   ];
   const host = document.getElementById("numbers");
