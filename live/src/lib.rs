@@ -8,7 +8,6 @@ mod machine;
 
 use anyhow::{Context, Result, bail};
 use clap::{Args, FromArgMatches};
-use js_sys::{Float32Array, Float64Array};
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 use tractive_rig::campaign::traction::{Cause, faults};
@@ -18,8 +17,11 @@ use tractive_rig::scenario::{Scenario, System};
 use tractive_rig::trace::{Edge, Row};
 use wasm_bindgen::prelude::*;
 
+/// The value of a row in a column.
+type Of = fn(&Row) -> f64;
+
 /// The columns of [`Bench::rows`], in their order.
-const COLUMNS: [(&str, fn(&Row) -> f64); 16] = [
+const COLUMNS: [(&str, Of); 16] = [
     ("ia", |row| row.ia_a),
     ("ib", |row| row.ib_a),
     ("ic", |row| row.ic_a),
@@ -90,17 +92,14 @@ impl Bench {
     }
 
     /// The rows since the last time, one behind the other.
-    pub fn rows(&mut self) -> Float32Array {
-        let values: Vec<f32> =
-            self.rows.drain(..).flat_map(|row| COLUMNS.map(|(_, of)| of(&row) as f32)).collect();
-        Float32Array::from(values.as_slice())
+    pub fn rows(&mut self) -> Vec<f32> {
+        self.rows.drain(..).flat_map(|row| COLUMNS.map(|(_, of)| of(&row) as f32)).collect()
     }
 
     /// The gates' edges since the last time: time in s; gate, and 8 more where it goes on.
-    pub fn edges(&mut self) -> Float64Array {
+    pub fn edges(&mut self) -> Vec<f64> {
         let code = |edge: Edge| f64::from(edge.gate + if edge.on { 8 } else { 0 });
-        let values: Vec<f64> = self.edges.drain(..).flat_map(|(t_s, edge)| [t_s, code(edge)]).collect();
-        Float64Array::from(values.as_slice())
+        self.edges.drain(..).flat_map(|(t_s, edge)| [t_s, code(edge)]).collect()
     }
 
     /// The operator's and the drive's word, as JSON.
@@ -217,20 +216,6 @@ pub fn sweep() -> Result<String, JsError> {
         Ok(json!({ "sha256": sha256, "bytes": bytes.len(), "rows": recording.rows.len() }))
     };
     run().map(|value| value.to_string()).map_err(told)
-}
-
-/// The bytes of its trace.csv.
-#[wasm_bindgen]
-pub fn sweep_trace() -> Result<Vec<u8>, JsError> {
-    let run = || -> Result<Vec<u8>> {
-        let machine = machine::pmasynrm()?;
-        let mut options = options(&[])?;
-        let scenario = Sweep::default();
-        options.run.dt = Some(scenario.trace_step_s(&options.own));
-        let plan = scenario.plan(&options, &machine);
-        Traction::run("sweep", plan, &options, &machine, None)?.trace_bytes()
-    };
-    run().map_err(told)
 }
 
 /// Options as on the rig's command line.
