@@ -32,6 +32,7 @@ pub mod rows;
 pub mod run;
 pub mod scenario;
 pub mod spectrum;
+mod speed_loop;
 mod steps;
 pub mod talk;
 pub mod trace;

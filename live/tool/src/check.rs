@@ -1,4 +1,4 @@
-//! What must hold of the page, seen in a browser.
+//! The checks of the page in a browser.
 
 use crate::browser::Browser;
 use crate::server;
@@ -110,7 +110,7 @@ fn contrasts(browser: &mut Browser) -> Result<()> {
     Ok(())
 }
 
-/// How fast it goes with the scope running: told, not judged.
+/// The pace with the scope running: told, not judged.
 fn runs(browser: &mut Browser) -> Result<()> {
     browser.evaluate("(r => { r.value = 'Infinity'; r.onchange(); })(document.getElementById('rate'))")?;
     std::thread::sleep(std::time::Duration::from_secs(3));

@@ -15,7 +15,7 @@ const PICTURES: [(&str, &str, u32, u32, bool); 4] = [
     ("live-light", "held=1350&torque=900&window=0.02&trigger=ia", 1280, 940, false),
     ("live-dark", "held=2600&torque=700&window=0.01&trigger=ia", 1280, 940, true),
     ("live-phone-light", "held=700&torque=600&window=0.05&trigger=ia", 390, 844, false),
-    ("live-phone-dark", "rotor=free&command=speed&speed=900&window=2", 390, 844, true),
+    ("live-phone-dark", "rotor=free&command=speed&speed=900&inertia=5&window=5", 390, 844, true),
 ];
 
 /// Takes them all.

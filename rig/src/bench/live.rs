@@ -1,4 +1,4 @@
-//! What somebody changes on a bench, or takes from it, while it runs.
+//! The changes that somebody makes on a bench while it runs, and the rows that he takes from it.
 
 use super::{Bench, Limits, LineSide, Observed, Tick};
 use crate::inject::Injection;

@@ -6,14 +6,12 @@ mod outcome;
 mod page;
 pub mod script;
 mod sender;
-mod speed_loop;
 mod supervisor;
 mod system;
 
 pub use lines::Lines;
 pub use listener::Listener;
 pub use outcome::{Happened, Outcome, TalkOptions};
-pub(crate) use speed_loop::SpeedLoop;
 pub use supervisor::Talk;
 pub use system::System;
 

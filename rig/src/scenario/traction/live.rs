@@ -7,7 +7,7 @@ use crate::inject::traction::{Kind, SupplyFault};
 use crate::plant::Source;
 use crate::run::Interrupts;
 use crate::run::traction::Tasks;
-use crate::talk::SpeedLoop;
+use crate::speed_loop::SpeedLoop;
 use crate::trace::Edge;
 use anyhow::Result;
 use core::f64::consts::TAU;
@@ -58,7 +58,7 @@ pub struct Start {
     pub step_s: f64,
 }
 
-/// What is wanted of the drive, as levels.
+/// The wishes for the drive, as levels.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Wanted {
     /// The link charged and the drive enabled; otherwise stopped.
@@ -74,7 +74,7 @@ pub struct Live {
     bench: Bench,
     tasks: Tasks<'static>,
     request: Arc<Mutex<Request>>,
-    /// What is wanted.
+    /// The present wishes.
     pub wanted: Wanted,
     /// Time until which the acknowledge stands, in s.
     acknowledged_until_s: f64,
