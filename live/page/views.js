@@ -53,7 +53,7 @@ export function numbers(memory, state, properties, factor) {
   const host = document.getElementById("numbers");
   if (!host.children.length) host.innerHTML = rows.map(([name, , unit]) => `<div><span>${name}</span><b><i style="font-style:normal"></i> <small>${unit}</small></b></div>`).join("");
   rows.forEach(([, value, unit], k) => {
-    host.children[k].querySelector("i").textContent = value.replace("-", "−");
+    host.children[k].querySelector("i").textContent = value.replace(/^-(?=[0.]+$)/, "").replace("-", "−");
     host.children[k].querySelector("small").textContent = unit;
   });
 }
