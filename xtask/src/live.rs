@@ -42,22 +42,7 @@ pub fn check(setup: &mut Setup) -> Result<Result<bool, String>> {
         return Ok(Err(no_target()));
     }
     let Some(browser) = setup.browser() else { return Ok(Err(no_browser())) };
-    if setup.component("fmt", "rustfmt") && !succeeds(live().args(["fmt", "--all", "--", "--check"]))? {
-        return Ok(Ok(false));
-    }
-    let linted = [
-        "clippy",
-        "--profile",
-        "wasm",
-        "--target",
-        WASM,
-        "--package",
-        "tractive-live",
-        "--",
-        "--deny",
-        "warnings",
-    ];
-    if setup.component("clippy", "clippy") && !succeeds(live().args(linted))? {
+    if !is_tidy(setup)? {
         return Ok(Ok(false));
     }
     let folder = root().join("target/live");
@@ -72,6 +57,17 @@ pub fn check(setup: &mut Setup) -> Result<Result<bool, String>> {
     let trace = sweep.join("trace.csv");
     let good = succeeds(tool().arg("check").arg(&page).arg(trace).arg("--browser").arg(browser))?;
     Ok(Ok(good && succeeds(live().args(["test", "--quiet", "--package", "tractive-live-tool"]))?))
+}
+
+/// Format and lints, of the bindings on their target and of the tool on this machine.
+fn is_tidy(setup: &mut Setup) -> Result<bool> {
+    if setup.component("fmt", "rustfmt") && !succeeds(live().args(["fmt", "--all", "--", "--check"]))? {
+        return Ok(false);
+    }
+    let wasm = ["--profile", "wasm", "--target", WASM, "--package", "tractive-live"];
+    let tool = ["--package", "tractive-live-tool", "--all-targets"];
+    let lint = |what: &[&str]| succeeds(live().arg("clippy").args(what).args(["--", "--deny", "warnings"]));
+    Ok(!setup.component("clippy", "clippy") || (lint(&wasm)? && lint(&tool)?))
 }
 
 /// Cargo in the live bench's workspace.
