@@ -81,8 +81,9 @@ fn a_wrong_map_is_noticed() {
 #[test]
 fn short_turns_are_the_same_as_long_ones() {
     let run = |pieces: u32| {
-        let mut live = live(&[], 1_500.0);
-        live.command(Command::Torque(700.0));
+        let mut live = live(&[], 600.0);
+        live.turn_as(Turning::Free(5.0, 0.0));
+        live.command(Command::Speed(700.0));
         for _ in 0..pieces {
             live.run(0.6 / f64::from(pieces)).unwrap();
         }
