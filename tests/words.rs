@@ -3,8 +3,19 @@
 use std::path::{Path, PathBuf};
 
 /// Folders of the sources.
-const FOLDERS: [&str; 10] =
-    ["bench", "boards", "cells", "control", "fault-injector", "rig", "src", "tablegen", "tests", "xtask"];
+const FOLDERS: [&str; 11] = [
+    "bench",
+    "boards",
+    "cells",
+    "control",
+    "fault-injector",
+    "live",
+    "rig",
+    "src",
+    "tablegen",
+    "tests",
+    "xtask",
+];
 
 /// Words with which a question begins.
 const QUESTIONS: [&str; 8] = ["What", "Whether", "How", "Which", "Where", "Who", "When", "Why"];

@@ -1,12 +1,11 @@
 //! Files that are written whole or not at all.
 
+use crate::platform::written;
 use anyhow::{Context, Result};
 use serde::Serialize;
 use serde::ser::{SerializeStruct, Serializer};
 use std::io::{BufWriter, Write};
-use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
-use tempfile::NamedTempFile;
 
 /// A value in a row of a CSV.
 #[derive(Clone, Debug, Serialize)]
@@ -85,6 +84,13 @@ pub fn write_rows(path: &Path, rows: impl IntoIterator<Item = impl Serialize>) -
     write_whole(path, |out| Ok(rows.into_iter().try_for_each(|row| out.serialize(row))?))
 }
 
+/// The bytes that [`write_rows`] writes.
+pub fn bytes_of_rows(rows: impl IntoIterator<Item = impl Serialize>) -> Result<Vec<u8>> {
+    let mut out = csv::Writer::from_writer(Vec::new());
+    rows.into_iter().try_for_each(|row| out.serialize(row))?;
+    Ok(out.into_inner().map_err(csv::IntoInnerError::into_error)?)
+}
+
 /// Writes edges.csv: when, which gate, on or off.
 pub fn write_edges(path: &Path, edges: impl Iterator<Item = (Cell, &'static str, bool)>) -> Result<()> {
     let mut rows = edges
@@ -118,7 +124,7 @@ pub fn forget(path: &Path) -> Result<()> {
 /// Writes a CSV beside its place and moves it there when it is complete.
 pub fn write_whole(
     path: &Path,
-    fill: impl FnOnce(&mut csv::Writer<BufWriter<&mut NamedTempFile>>) -> Result<()>,
+    fill: impl FnOnce(&mut csv::Writer<BufWriter<&mut dyn Write>>) -> Result<()>,
 ) -> Result<()> {
     written(path, |file| {
         let mut out = csv::Writer::from_writer(BufWriter::with_capacity(1 << 16, file));
@@ -130,13 +136,4 @@ pub fn write_whole(
 /// Writes a text file whole or not at all.
 pub fn write_text(path: &Path, text: &str) -> Result<()> {
     written(path, |file| Ok(file.write_all(text.as_bytes())?))
-}
-
-fn written(path: &Path, write: impl FnOnce(&mut NamedTempFile) -> Result<()>) -> Result<()> {
-    let folder = path.parent().unwrap_or(Path::new("."));
-    let mut file = NamedTempFile::new_in(folder).with_context(|| folder.display().to_string())?;
-    write(&mut file)?;
-    file.as_file().set_permissions(std::fs::Permissions::from_mode(0o644))?;
-    file.persist(path).with_context(|| path.display().to_string())?;
-    Ok(())
 }

@@ -26,12 +26,16 @@ pub mod output;
 pub mod pattern;
 pub mod pictures;
 pub mod plant;
+#[cfg_attr(unix, path = "platform/unix.rs")]
+#[cfg_attr(not(unix), path = "platform/none.rs")]
+mod platform;
 pub mod points;
 pub mod report;
 pub mod rows;
 pub mod run;
 pub mod scenario;
 pub mod spectrum;
+mod speed_loop;
 mod steps;
 pub mod talk;
 pub mod trace;

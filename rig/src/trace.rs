@@ -1,7 +1,7 @@
 //! The files that a run leaves behind: trace, edges, switches of mode. Files are written whole or not at all.
 
 use crate::columns;
-use crate::files::{Cell, Columns, write_edges, write_recorder, write_rows};
+use crate::files::{Cell, Columns, bytes_of_rows, write_edges, write_recorder, write_rows};
 use crate::plant::LinkEnergies;
 use crate::rows::Timed;
 use anyhow::Result;
@@ -150,6 +150,11 @@ pub struct Recording {
 }
 
 impl Recording {
+    /// The bytes of trace.csv.
+    pub fn trace_bytes(&self) -> Result<Vec<u8>> {
+        bytes_of_rows(self.written.as_ref().unwrap_or(&self.rows).iter().map(Row::columns))
+    }
+
     /// Time of a tick from the recording's beginning, in s.
     pub fn seconds(&self, tick: Tick) -> f64 {
         (tick as f64 - self.lead as f64) * self.tick_s

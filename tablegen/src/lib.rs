@@ -25,7 +25,7 @@ mod tables;
 mod weakening;
 mod weakening_tables;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 pub use error::InputError;
 pub use input::read_bounded;
@@ -63,12 +63,26 @@ impl MachineFolder {
     /// Names file, line, field, value and what is allowed, for whatever is missing, unknown, not a number, out of
     /// range or contradictory.
     pub fn read(folder: &Path) -> Result<Self, InputError> {
-        let parameters = Parameters::read(&folder.join("machine.toml"))?;
-        let map = FluxMap::read(&folder.join("flux_map.csv"))?;
-        map.check_range(parameters.max_current_a, &folder.join("flux_map.csv"))?;
-        let machine = Self { parameters, map };
-        machine.check_torque(&folder.join("machine.toml"))?;
-        Ok(machine)
+        let files = [folder.join("machine.toml"), folder.join("flux_map.csv")];
+        Self { parameters: Parameters::read(&files[0])?, map: FluxMap::read(&files[1])? }.checked(&files)
+    }
+
+    /// The same of the two files' texts: for a program that has no file system.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    pub fn parse(machine_toml: &str, flux_map_csv: &str) -> Result<Self, InputError> {
+        let files = ["machine.toml", "flux_map.csv"].map(PathBuf::from);
+        let parameters = Parameters::parse(machine_toml, &files[0])?;
+        let map = FluxMap::parse(flux_map_csv.as_bytes(), &files[1])?;
+        Self { parameters, map }.checked(&files)
+    }
+
+    /// Parameters and map must fit each other.
+    fn checked(self, [machine_toml, flux_map_csv]: &[PathBuf; 2]) -> Result<Self, InputError> {
+        self.map.check_range(self.parameters.max_current_a, flux_map_csv)?;
+        self.check_torque(machine_toml)?;
+        Ok(self)
     }
 
     /// The largest torque must be within reach of the largest current, and its best point on the map.

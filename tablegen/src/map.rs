@@ -51,7 +51,13 @@ impl FluxMap {
     /// # Errors
     /// Names the line, the column, the value and what is allowed.
     pub fn read(file: &Path) -> Result<Self, InputError> {
-        let mut nodes = read_nodes(file)?;
+        let refuse = |error| InputError::new(file, None, format!("cannot be read: {error}"));
+        Self::parse(&crate::read_bounded(file).map_err(refuse)?, file)
+    }
+
+    /// The same of a text that is there; errors name `file`.
+    pub(crate) fn parse(text: &[u8], file: &Path) -> Result<Self, InputError> {
+        let mut nodes = read_nodes(text, file)?;
         let (id_a, iq_a) = axes(&nodes, file)?;
         let sorted = nodes.is_sorted_by(|a, b| a.place(b).is_le());
         nodes.sort_by(Node::place);
@@ -85,15 +91,11 @@ impl FluxMap {
     }
 }
 
-fn read_nodes(file: &Path) -> Result<Vec<Node>, InputError> {
+fn read_nodes(text: &[u8], file: &Path) -> Result<Vec<Node>, InputError> {
     let refuse = |line: Option<u64>, problem: String| InputError::new(file, line, problem);
-    let text = crate::read_bounded(file).map_err(|error| refuse(None, format!("cannot be read: {error}")))?;
-    let line_of = |position: &csv::Position| line_of(&text, position);
-    let mut reader = csv::ReaderBuilder::new()
-        .comment(Some(b'#'))
-        .trim(csv::Trim::All)
-        .flexible(true)
-        .from_reader(text.as_slice());
+    let line_of = |position: &csv::Position| line_of(text, position);
+    let mut reader =
+        csv::ReaderBuilder::new().comment(Some(b'#')).trim(csv::Trim::All).flexible(true).from_reader(text);
     let headers = reader.headers().map_err(|error| refuse(None, error.to_string()))?;
     if headers.iter().ne(COLUMNS) {
         let line = headers.position().map(line_of);

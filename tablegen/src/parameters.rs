@@ -100,11 +100,16 @@ impl Parameters {
         let refuse = |error: &dyn Display| InputError::new(file, None, format!("cannot be read: {error}"));
         let bytes = crate::read_bounded(file).map_err(|error| refuse(&error))?;
         let text = String::from_utf8(bytes).map_err(|error| refuse(&error))?;
-        let table = DeTable::parse(&text).map_err(|error| {
-            let line = error.span().map(|span| line_at(&text, span.start));
+        Self::parse(&text, file)
+    }
+
+    /// The same of a text that is there; errors name `file`.
+    pub(crate) fn parse(text: &str, file: &Path) -> Result<Self, InputError> {
+        let table = DeTable::parse(text).map_err(|error| {
+            let line = error.span().map(|span| line_at(text, span.start));
             InputError::new(file, line, format!("not TOML: {}", error.message()))
         })?;
-        let keys = Keys::new(file, &text, table.into_inner())?;
+        let keys = Keys::new(file, text, table.into_inner())?;
         let parameters = keys.parameters()?;
         parameters.check(file)?;
         Ok(parameters)

@@ -131,3 +131,16 @@ fn a_grid_that_reaches_as_far_above_zero_as_below() {
     let judge = Judge::new(Folder::new(&good_toml(), &map).read().unwrap());
     check_nodes("wide", &judge);
 }
+
+#[test]
+fn two_texts_are_the_machine_that_their_folder_is() {
+    let folder = reference_folder();
+    let [toml, csv] =
+        ["machine.toml", "flux_map.csv"].map(|name| std::fs::read_to_string(folder.join(name)).unwrap());
+    let told = |machine: MachineFolder| format!("{machine:?}");
+    assert_eq!(told(MachineFolder::parse(&toml, &csv).unwrap()), told(MachineFolder::read(&folder).unwrap()));
+    let error = MachineFolder::parse(&toml.replace("pole_pairs = ", "pole_pairs = -"), &csv).unwrap_err();
+    assert!(error.to_string().starts_with("machine.toml:"), "{error}");
+    let error = MachineFolder::parse(&toml, "id_a,iq_a\n").unwrap_err();
+    assert!(error.to_string().starts_with("flux_map.csv:1:"), "{error}");
+}

@@ -54,7 +54,7 @@ impl System {
     }
 
     /// The variable that names the machine to the build script.
-    const fn machine_variable(self) -> &'static str {
+    pub const fn machine_variable(self) -> &'static str {
         self.names()[2]
     }
 }

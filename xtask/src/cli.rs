@@ -5,6 +5,7 @@ use crate::build::System;
 use crate::step::Step;
 use clap::{Args, Parser, Subcommand};
 use std::ffi::OsString;
+use std::path::PathBuf;
 
 /// The chores of `tractive`.
 #[derive(Debug, Parser)]
@@ -30,6 +31,8 @@ pub enum Command {
     Timing(TimingArgs),
     /// Build a board's image and flash it with probe-rs
     Flash(FlashArgs),
+    /// Build the live bench, the drive and its plant in a browser, and serve it
+    Live(LiveArgs),
 }
 
 #[derive(Args, Debug)]
@@ -86,6 +89,25 @@ pub struct FlashArgs {
     /// Build the image, and only say what probe-rs would be called with
     #[arg(long)]
     pub dry_run: bool,
+}
+
+#[derive(Args, Debug)]
+pub struct LiveArgs {
+    /// Folder for the page, which any server of static files can serve [default: target/live/page]
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Port of the server on this machine; 0: any
+    #[arg(long, default_value_t = 0)]
+    pub port: u16,
+    /// Serve, and open no browser
+    #[arg(long)]
+    pub no_open: bool,
+    /// Make the folder, and serve nothing
+    #[arg(long, conflicts_with_all = ["port", "no_open"])]
+    pub no_serve: bool,
+    /// Take the guide's pictures into this folder instead
+    #[arg(long, value_name = "DIR", conflicts_with = "no_serve")]
+    pub screenshots: Option<PathBuf>,
 }
 
 #[cfg(test)]

@@ -81,11 +81,14 @@ fn command(chapter: &str, line: &str) -> Line {
     {
         command += " --dry-run";
     }
+    if command.starts_with("cargo xtask live") {
+        command = "cargo xtask test --only live --list".to_owned();
+    }
     if command.starts_with("cargo test") {
         let (cargos, tests) = command.split_once(" -- ").unwrap_or((&command, ""));
         command = format!("{cargos} --no-run -- {tests}").trim_end_matches(" -- ").to_owned();
     }
-    if command.starts_with("cargo xtask test") {
+    if command.starts_with("cargo xtask test") && !command.ends_with(" --list") {
         command += " --list";
     }
     Line { chapter: chapter.to_owned(), command, code }
@@ -116,6 +119,7 @@ mod tests {
             command("c", "cargo xtask test --only qemu").command,
             "cargo xtask test --only qemu --list"
         );
+        assert_eq!(command("c", "cargo xtask live --out x").command, "cargo xtask test --only live --list");
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! The set-up: the target, QEMU, the lints. Each step only when something is missing, each telling so.
 
 use crate::process::{find, output_of, quietly, say};
-use crate::workspace::{TARGET, cargo, root};
+use crate::workspace::{TARGET, WASM, cargo, root};
 use anyhow::{Result, bail};
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -13,6 +13,9 @@ const QEMU_MACHINE: &str = "mps2-an386";
 const DEBIAN_PACKAGES: [&str; 3] = ["rustc-web", "cargo-web", "rust-web-src"];
 const DEBIAN_CARGO: &str = "/usr/bin/cargo";
 const DEBIAN_RUSTC: &str = "/usr/bin/rustc";
+
+/// Names of Chromium, the first one Debian's package too.
+const BROWSERS: [&str; 4] = ["chromium", "chromium-browser", "google-chrome", "google-chrome-stable"];
 
 /// The toolchain that Miri belongs to.
 const NIGHTLY: &str = "nightly";
@@ -71,15 +74,11 @@ pub struct Setup {
 impl Setup {
     /// A toolchain that builds the image.
     pub fn toolchain(&mut self) -> Result<Toolchain> {
-        if has_target() {
+        if target_is_there(TARGET) {
             return Ok(Toolchain::installed());
         }
         if find("rustup").is_some() {
-            say(&format!("adding the target {TARGET} with rustup"));
-            if quietly(Command::new("rustup").args(["target", "add", TARGET])) && has_target() {
-                return Ok(Toolchain::installed());
-            }
-            say(&format!("rustup cannot add {TARGET}; Debian's toolchain is tried instead"));
+            say(&format!("{TARGET}: Debian's toolchain is tried instead"));
         }
         if !debian_is_usable() {
             self.apt_install(&DEBIAN_PACKAGES);
@@ -94,6 +93,20 @@ impl Setup {
             Some(linker) => Ok(Toolchain::debian(&linker)),
             None => bail!("no linker for {TARGET}; {}", how_to_install("lld", "lld")),
         }
+    }
+
+    /// The browsers' target; `false` where rustup does not bring it.
+    pub fn wasm(&mut self) -> bool {
+        target_is_there(WASM)
+    }
+
+    /// A browser that runs without a screen.
+    pub fn browser(&mut self) -> Option<PathBuf> {
+        let found = || BROWSERS.iter().find_map(|name| find(name));
+        if found().is_none() {
+            self.apt_install(&BROWSERS[..1]);
+        }
+        found()
     }
 
     /// QEMU with the emulated board.
@@ -179,10 +192,23 @@ fn privileged(args: &[&str]) -> Command {
     command
 }
 
-/// The target's library is there, whoever installed it.
-fn has_target() -> bool {
+/// A target's library is there, once rustup was asked for it where it was not.
+fn target_is_there(target: &str) -> bool {
+    if has_target(target) || find("rustup").is_none() {
+        return has_target(target);
+    }
+    say(&format!("adding the target {target} with rustup"));
+    let added = quietly(Command::new("rustup").args(["target", "add", target])) && has_target(target);
+    if !added {
+        say(&format!("rustup cannot add {target}"));
+    }
+    added
+}
+
+/// A target's library is there, whoever installed it.
+fn has_target(target: &str) -> bool {
     let mut rustc = Command::new("rustc");
-    let folder = output_of(rustc.current_dir(root()).args(["--print", "target-libdir", "--target", TARGET]));
+    let folder = output_of(rustc.current_dir(root()).args(["--print", "target-libdir", "--target", target]));
     let entries = folder.and_then(|folder| std::fs::read_dir(folder).ok()).into_iter().flatten().flatten();
     entries.into_iter().any(|entry| entry.file_name().to_string_lossy().starts_with("libcore-"))
 }

@@ -39,6 +39,8 @@ pub enum Step {
     Guide,
     /// The engineer's guide as a book
     Book,
+    /// The live bench in a browser: the host's bytes, its controls, its faults, its sizes
+    Live,
     /// The image in QEMU
     Qemu,
     /// The interrupts within their budgets

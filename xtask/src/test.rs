@@ -138,6 +138,10 @@ fn perform(step: Step, setup: &mut Setup) -> Result<Outcome> {
             return Ok(Outcome::Skipped("mdbook is not installed (cargo install mdbook)".to_owned()));
         }
         Step::Book => succeeds(Command::new("mdbook").arg("build").arg(build::root().join("docs")))?,
+        Step::Live => match crate::live::check(setup)? {
+            Ok(good) => good,
+            Err(missing) => return Ok(Outcome::Skipped(missing)),
+        },
         Step::Qemu => {
             let (qemu, toolchain) = (setup.qemu()?, setup.toolchain()?);
             let mut command = cargo_with("test --release --package tractive-rig --test qemu -- --ignored");

@@ -6,6 +6,9 @@ use std::process::Command;
 /// The target that the image runs on.
 pub const TARGET: &str = "thumbv7em-none-eabihf";
 
+/// The target that the live bench runs on.
+pub const WASM: &str = "wasm32-unknown-unknown";
+
 /// The repository's root.
 pub fn root() -> &'static Path {
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));

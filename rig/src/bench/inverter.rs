@@ -177,6 +177,11 @@ impl Inverter {
         }
     }
 
+    /// Every gate does again what it is told, and what was found is forgotten.
+    pub fn mend(&mut self) {
+        (self.stuck, self.astray_since, self.found) = (None, None, LegFaults::default());
+    }
+
     /// A device is turned on. Where the other one of its leg conducts, the drivers see their devices desaturate, turn them off within
     /// some microseconds, and block. A device that has failed stays on.
     fn turns_on(&mut self, gate: u8) {
@@ -238,6 +243,11 @@ impl Inverter {
     /// Every edge so far.
     pub fn edges(&self) -> &[Edge] {
         &self.edges
+    }
+
+    /// Takes every edge since the last time.
+    pub fn take_edges(&mut self) -> Vec<Edge> {
+        std::mem::take(&mut self.edges)
     }
 
     fn order(&mut self, phase: usize, order: Order, tick: Tick) {

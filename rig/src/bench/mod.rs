@@ -11,6 +11,7 @@ mod due;
 mod error;
 mod inverter;
 mod line;
+mod live;
 mod observe;
 mod record;
 mod rows;

@@ -35,6 +35,11 @@ impl Rows {
         self.next = time.row_end(self.next_s());
     }
 
+    /// Takes those there are.
+    pub fn take(&mut self) -> Vec<Row> {
+        std::mem::take(&mut self.rows)
+    }
+
     /// Those there are.
     pub fn as_slice(&self) -> &[Row] {
         &self.rows

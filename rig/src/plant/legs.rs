@@ -53,6 +53,11 @@ impl Clamp {
         Self { small_current_a: SMALL_SHARE * max_current_a, least_inductance_h: least * flux_scale }
     }
 
+    /// For the same machine with another multiple of its flux linkage.
+    pub fn scaled(self, by: f64) -> Self {
+        Self { least_inductance_h: by * self.least_inductance_h, ..self }
+    }
+
     /// For two machines on one leg: the smaller current, the smaller inductance.
     pub fn of_both(self, other: &Self) -> Self {
         Self {

@@ -50,6 +50,7 @@ pub struct Plant {
     /// The machine.
     pub motor: Motor,
     clamp: Clamp,
+    flux_scale: f64,
 }
 
 /// The quantities that are integrated: id, iq, electrical energy, copper loss, the torque's impulse.
@@ -64,7 +65,15 @@ impl Plant {
         Self {
             motor: Motor::new(machine, speed, settings),
             clamp: Clamp::new(machine.parameters.max_current_a, &map, settings.flux_scale),
+            flux_scale: settings.flux_scale,
         }
+    }
+
+    /// Has the machine's true flux linkage be another multiple of the map's, above 0. Currents stay as they are.
+    pub fn set_flux_scale(&mut self, flux_scale: f64) {
+        self.clamp = self.clamp.scaled(flux_scale / self.flux_scale);
+        self.motor.stator.set_flux_scale(flux_scale);
+        self.flux_scale = flux_scale;
     }
 
     /// Lets time pass with the legs unchanged.

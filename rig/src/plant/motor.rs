@@ -49,6 +49,16 @@ impl Motor {
         self.rotor.set_load_nm(load_nm);
     }
 
+    /// The rotor, to be held or let go of between two steps.
+    pub fn rotor_mut(&mut self) -> &mut Rotor {
+        &mut self.rotor
+    }
+
+    /// The stator.
+    pub fn stator(&self) -> &Stator {
+        &self.stator
+    }
+
     /// Currents in the rotor frame, in A.
     pub fn currents_dq(&self) -> (f64, f64) {
         (self.id_a, self.iq_a)

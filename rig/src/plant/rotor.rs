@@ -49,6 +49,18 @@ impl Rotor {
         }
     }
 
+    /// Holds the rotor at a speed from now on, in r/min, whatever the torque; it goes there at this slope, in r/min per s, above 0.
+    pub fn hold(&mut self, speed_rpm: f64, slope_rpm_s: f64) {
+        let from_rpm = self.speed_rpm();
+        let there_s = self.time_s + (speed_rpm - from_rpm).abs() / slope_rpm_s;
+        self.source = SpeedSource::profile(vec![(self.time_s, from_rpm), (there_s, speed_rpm)]);
+    }
+
+    /// Lets go of the rotor with an inertia in kg·m², above 0, and a load against forward rotation in N·m.
+    pub fn release(&mut self, inertia_kg_m2: f64, load_nm: f64) {
+        self.source = SpeedSource::Inertia { inertia_kg_m2, load_nm };
+    }
+
     /// The step that begins now and lasts `dt_s`, with an air-gap torque that is asked for only where it counts.
     #[inline]
     pub fn turning(&self, torque_nm: impl FnOnce() -> f64, dt_s: f64) -> Turning {

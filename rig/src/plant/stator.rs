@@ -54,6 +54,11 @@ impl Stator {
         }
     }
 
+    /// Has the true flux linkage be another multiple of the map's. Currents stay.
+    pub(super) fn set_flux_scale(&mut self, scale: f64) {
+        self.scale = scale;
+    }
+
     /// Flux linkage and its Jacobian at a current in A.
     #[inline]
     pub fn flux(&self, id_a: f64, iq_a: f64) -> FluxPoint {

@@ -1,5 +1,6 @@
 //! The time of the plant's steps, of all that a thread does.
 
+pub use crate::platform::processor_s;
 use std::cell::Cell;
 
 /// Of so many steps of the plant one is timed.
@@ -24,12 +25,6 @@ pub fn in_plant<R>(step: impl FnOnce() -> R) -> R {
     let result = step();
     IN_PLANT.set(IN_PLANT.get() + processor_s() - began - TAKING.get());
     result
-}
-
-/// The processor time of this thread, in s: other programs do not count.
-pub fn processor_s() -> f64 {
-    let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
-    time.tv_sec as f64 + time.tv_nsec as f64 * 1e-9
 }
 
 /// Begins to count on this thread.

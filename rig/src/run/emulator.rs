@@ -1,5 +1,6 @@
 //! The emulator and its four FIFOs, whichever firmware runs in it.
 
+use crate::platform::{make_fifo, temporary_folder};
 use anyhow::{Context, Result, bail};
 use std::fs::{File, OpenOptions};
 use std::io::{Read, Write};
@@ -37,7 +38,7 @@ pub(crate) fn emulate(
     emulator: &Emulator,
     mut answer: impl FnMut(&Block, &mut Answers) -> Result<bool>,
 ) -> Result<()> {
-    let folder = tempfile::tempdir().context("no temporary folder for the link")?;
+    let folder = temporary_folder()?;
     let mut link = Link::open(folder.path())?;
     let watch = Watch::start(spawn(emulator, folder.path())?, link.requests.try_clone()?, emulator.patient);
     let mut serve = || -> Result<()> {
@@ -91,14 +92,7 @@ impl Link {
     fn open(folder: &Path) -> Result<Self> {
         let open = |name: &str| -> Result<File> {
             let path = folder.join(name);
-            rustix::fs::mknodat(
-                rustix::fs::CWD,
-                &path,
-                rustix::fs::FileType::Fifo,
-                rustix::fs::Mode::RUSR | rustix::fs::Mode::WUSR,
-                0,
-            )
-            .with_context(|| format!("cannot make the FIFO {}", path.display()))?;
+            make_fifo(&path)?;
             Ok(OpenOptions::new().read(true).write(true).open(&path)?)
         };
         let answers = Answers {

@@ -6,7 +6,6 @@ mod outcome;
 mod page;
 pub mod script;
 mod sender;
-mod speed_loop;
 mod supervisor;
 mod system;
 

@@ -23,7 +23,7 @@ use crate::scenario::traction::Traction;
 use crate::trace::Row;
 use crate::without::Ablation;
 use anyhow::Result;
-use faults::Cause;
+pub use faults::{Cause, faults};
 use tractive::control::{Demand, Gains};
 use tractive::drive::traction::Settings;
 use tractive::machine::Tables;

@@ -8,6 +8,7 @@ pub(super) mod full_step;
 pub(super) mod gaps;
 mod line;
 pub(super) mod link_steps;
+mod live;
 pub(super) mod load_steps;
 pub(super) mod mode_borders;
 pub(super) mod precharge;
@@ -21,6 +22,8 @@ pub mod switches;
 pub(super) mod timing;
 
 pub use line::scaled as scaled_link;
+pub use live::{Command, Live, Start, Turning, Wanted};
+pub use sweep::Sweep;
 
 use super::System;
 use crate::analysis::{self, Figures};
@@ -188,16 +191,8 @@ impl System for Traction {
         let bench = bench(plan, &setup, options, machine);
         match options.on {
             On::Host => {
-                let gains = Gains::of(setup.uncompensated, setup.behind_line_filter);
-                let clock = clock(options, machine);
-                let settings = Settings { clock, devices: devices(&setup, machine), gains };
-                settings.check(machine.tables).map_err(run::refused)?;
-                let ratings = &machine.tables.ratings;
-                let line = setup.line.map(|times| Line::rated(ratings, times.precharge_s, times.discharge_s));
-                let first = first_half_ticks(&setup, machine);
                 let recorder = Recorder::new();
-                let tasks = Tasks::new(machine.tables, settings, first).recorded_by(&recorder);
-                let tasks = tasks.operated_on(line).commanded_by(supervisor);
+                let tasks = tasks(&setup, options, machine)?.recorded_by(&recorder).commanded_by(supervisor);
                 run::on_host(name, bench, tasks, |index| recorder.read(index))
             }
             On::Qemu => {
@@ -312,6 +307,16 @@ fn devices(setup: &Setup, machine: &Machine) -> SwitchLimits {
 
 fn first_half_ticks(setup: &Setup, machine: &Machine) -> u32 {
     devices(setup, machine).shortest_half_ticks + setup.pwm_delay_ticks
+}
+
+/// The drive that an image with this setup would be, and its operator.
+fn tasks<'a>(setup: &Setup, options: &Options, machine: &Machine) -> Result<Tasks<'a>> {
+    let gains = Gains::of(setup.uncompensated, setup.behind_line_filter);
+    let settings = Settings { clock: clock(options, machine), devices: devices(setup, machine), gains };
+    settings.check(machine.tables).map_err(run::refused)?;
+    let ratings = &machine.tables.ratings;
+    let line = setup.line.map(|times| Line::rated(ratings, times.precharge_s, times.discharge_s));
+    Ok(Tasks::new(machine.tables, settings, first_half_ticks(setup, machine)).operated_on(line))
 }
 
 fn bench(plan: Plan, setup: &Setup, options: &Options, machine: &Machine) -> Bench {

@@ -22,6 +22,13 @@ pub struct Sweep {
     to: Option<f64>,
 }
 
+impl Default for Sweep {
+    /// As on the command line without options.
+    fn default() -> Self {
+        Self { down: false, brake: false, torque_scale: 1.0, to: None }
+    }
+}
+
 const SLOPE_RPM_S: f64 = 250.0;
 const HOLD_S: f64 = 1.0;
 

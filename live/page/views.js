@@ -1,0 +1,225 @@
+// What is seen of the operating point: numbers, pulses of one turn, current plane, voltage and flux, spectrum.
+import { lanes, modeName } from "./scope.js";
+
+const css = name => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+const FONT = "12px system-ui, 'Segoe UI', Roboto, 'DejaVu Sans', sans-serif";
+const TAU = 2 * Math.PI;
+
+/** A canvas of this height, cleared, in CSS pixels. */
+function canvas(id, height) {
+  const element = document.getElementById(id), ratio = devicePixelRatio || 1, width = element.clientWidth;
+  if (element.width !== Math.round(width * ratio) || element.height !== Math.round(height * ratio)) {
+    element.style.height = `${height}px`;
+    element.width = Math.round(width * ratio);
+    element.height = Math.round(height * ratio);
+  }
+  const ctx = element.getContext("2d");
+  ctx.setTransform(ratio, 0, 0, ratio, 0, 0);
+  ctx.clearRect(0, 0, width, height);
+  ctx.font = FONT;
+  ctx.lineJoin = "round";
+  return { element, ctx, width, height };
+}
+function line(ctx, colour, width, points, dash = []) {
+  ctx.strokeStyle = colour;
+  ctx.lineWidth = width;
+  ctx.setLineDash(dash);
+  ctx.beginPath();
+  points.forEach(([x, y], k) => (k ? ctx.lineTo(x, y) : ctx.moveTo(x, y)));
+  ctx.stroke();
+  ctx.setLineDash([]);
+}
+function dot(ctx, colour, x, y, radius, filled = true) {
+  ctx.beginPath();
+  ctx.arc(x, y, radius, 0, TAU);
+  ctx.lineWidth = 2;
+  ctx.strokeStyle = ctx.fillStyle = colour;
+  if (filled) ctx.fill(); else ctx.stroke();
+}
+/** Length of a turn that is looked at, in s. */
+const turn = memory => Math.min(Math.max(1 / Math.max(Math.abs(memory.last("f1")), 2), 0.005), 0.2);
+
+export function numbers(memory, state, properties, factor) {
+  const last = name => memory.last(name), seconds = Math.max(turn(memory), 0.01);
+  const torque = memory.mean("te", seconds), speed = last("speed"), udc = memory.mean("udc", seconds);
+  const share = (last("u") * Math.PI) / (2 * Math.max(udc, 1));
+  const power = (torque * speed * TAU) / 60e3;
+  const rows = [
+    ["Torque", torque.toFixed(0), "N·m"], ["Speed", speed.toFixed(0), "r/min"], ["Power", power.toFixed(1), "kW"],
+    ["Link", udc.toFixed(0), "V"], ["Current, peak", memory.peak("ia", seconds).toFixed(0), "A"], ["Frequency", last("f1").toFixed(1), "Hz"],
+    ["Of six-step", (100 * share).toFixed(1), "%"], ["Map error", (100 * last("mapError")).toFixed(1), "%"],
+    ["Real time ×", factor.reached.toFixed(factor.reached < 10 ? 2 : 0), `of ${factor.possible.toFixed(0)}`],
+  ];
+  const host = document.getElementById("numbers");
+  if (!host.children.length) host.innerHTML = rows.map(([name, , unit]) => `<div><span>${name}</span><b><i style="font-style:normal"></i> <small>${unit}</small></b></div>`).join("");
+  rows.forEach(([, value, unit], k) => {
+    host.children[k].querySelector("i").textContent = value.replace(/^-(?=[0.]+$)/, "").replace("-", "−");
+    host.children[k].querySelector("small").textContent = unit;
+  });
+}
+
+export function pulses(memory) {
+  const { element, ctx, width, height } = canvas("pulses", 132);
+  const span = turn(memory), to = memory.end, from = to - span, mode = modeName(memory.last("mode"));
+  document.getElementById("mode-name").textContent = mode === "off" ? "off" : mode;
+  const left = 18, right = width - 6, bottom = height - 20;
+  ctx.fillStyle = css("--muted");
+  ctx.textBaseline = "middle";
+  ["u", "v", "w"].forEach((name, leg) => ctx.fillText(name, 4, 20 + leg * 34));
+  const locked = Math.abs(memory.last("f1")) >= 2;
+  ctx.textAlign = "center";
+  for (let k = 0; k <= 4; k++) {
+    const x = left + (k / 4) * (right - left);
+    line(ctx, css("--grid"), 1, [[x, 4], [x, bottom]]);
+    ctx.textAlign = k === 4 ? "right" : k ? "center" : "left";
+    ctx.fillText(locked ? `${k * 90}°` : `${((k / 4) * span * 1e3).toFixed(0)} ms`, x, height - 8);
+  }
+  ctx.textAlign = "left";
+  ctx.lineWidth = 1.6;
+  const x = t => left + ((Math.max(t, from) - from) / span) * (right - left);
+  lanes(ctx, memory, from, to, x, (leg, level) => 32 + leg * 34 - 24 * level, ["--u", "--v", "--w"].map(css));
+  element.setAttribute("aria-label", `Gate pulses of the last turn, mode ${mode}`);
+}
+
+/** Flux linkages at a current, by the map's nodes. */
+function flux(properties, id, iq) {
+  const { step, side, d, q } = properties.flux, sign = iq < 0 ? -1 : 1;
+  const place = value => Math.min(Math.max(value, 0), side - 1.001);
+  const x = place(id / step + (side - 1)), y = place(Math.abs(iq) / step), i = Math.floor(x), j = Math.floor(y), a = x - i, b = y - j;
+  const at = of => (of[i * side + j] * (1 - b) + of[i * side + j + 1] * b) * (1 - a) + (of[(i + 1) * side + j] * (1 - b) + of[(i + 1) * side + j + 1] * b) * a;
+  return [at(d), sign * at(q)];
+}
+
+export function plane(memory, properties) {
+  const size = Math.min(document.getElementById("plane").clientWidth, 300);
+  const { element, ctx, width, height } = canvas("plane", Math.round(size * 0.92));
+  const most = properties.maxCurrent, negative = memory.last("iqRef") < -1 || (Math.abs(memory.last("iqRef")) <= 1 && memory.last("iq") < 0);
+  // d from the trip level to a little beyond zero, q the way that torque goes.
+  const scale = (height - 34) / (1.32 * most), ox = width / 2 + 0.44 * most * scale, oy = negative ? 12 + 0.1 * most * scale : height - 24 - 0.06 * most * scale;
+  const x = id => ox + id * scale, y = iq => oy - iq * scale;
+  const step = most > 150 ? 100 : 50, muted = css("--muted"), grid = css("--grid");
+  ctx.fillStyle = muted;
+  for (let a = -300; a <= 300; a += step) {
+    if (x(a) > 8 && x(a) < width - 8) { line(ctx, grid, 1, [[x(a), 0], [x(a), height - 18]]); ctx.textAlign = "center"; ctx.fillText(String(a).replace("-", "−"), x(a), height - 5); }
+    if (y(a) > 8 && y(a) < height - 20) { line(ctx, grid, 1, [[0, y(a)], [width, y(a)]]); if (a) { ctx.textAlign = "left"; ctx.fillText(String(a).replace("-", "−"), 2, y(a) - 4); } }
+  }
+  line(ctx, muted, 1, [[x(0), 0], [x(0), height - 18]]);
+  line(ctx, muted, 1, [[0, y(0)], [width, y(0)]]);
+  ctx.textAlign = "right";
+  ctx.fillText("d", width - 3, y(0) + (negative ? -5 : -5));
+  ctx.fillText("q", x(0) - 4, negative ? height - 24 : 11);
+  ctx.save();
+  ctx.beginPath(); ctx.rect(0, 0, width, height - 18); ctx.clip();
+  const circle = radius => Array.from({ length: 97 }, (_, k) => [x(radius * Math.cos(TAU * k / 96)), y(radius * Math.sin(TAU * k / 96))]);
+  line(ctx, css("--ref"), 1.5, circle(most));
+  line(ctx, css("--ref"), 1, circle(properties.tripCurrent), [2, 4]);
+  for (const sign of [1, -1]) line(ctx, css("--v"), 2, properties.mtpa.map(([id, iq]) => [x(id), y(sign * iq)]));
+  voltageLimit(ctx, memory, properties, x, y);
+  const rows = Math.min(memory.count, Math.round(turn(memory) / memory.step)), trail = [];
+  for (let k = memory.count - rows; k < memory.count; k += Math.max(1, Math.floor(rows / 400))) trail.push([x(memory.value("id", k)), y(memory.value("iq", k))]);
+  line(ctx, css("--u"), 1.2, trail);
+  dot(ctx, css("--w"), x(memory.last("idRef")), y(memory.last("iqRef")), 5, false);
+  dot(ctx, css("--u"), x(memory.last("id")), y(memory.last("iq")), 4);
+  ctx.restore();
+  element.setAttribute("aria-label", `Current d ${memory.last("id").toFixed(0)} A, q ${memory.last("iq").toFixed(0)} A, largest ${most} A`);
+}
+
+/** The currents whose voltage is six-step's at this speed: a contour over the map's nodes. */
+function voltageLimit(ctx, memory, properties, x, y) {
+  const omega = (memory.last("speed") * TAU * properties.polePairs) / 60, limit = (2 / Math.PI) * memory.last("udc");
+  if (Math.abs(omega) < 20) return;
+  const { step, side, d, q } = properties.flux, r = properties.resistance, cells = [];
+  ctx.strokeStyle = css("--speed");
+  ctx.lineWidth = 1.5;
+  ctx.setLineDash([6, 3]);
+  ctx.beginPath();
+  for (const sign of [1, -1]) {
+    const over = (i, j) => {
+      const id = (i - side + 1) * step, iq = sign * j * step, k = i * side + j;
+      return Math.hypot(r * id - omega * sign * q[k], r * iq + omega * d[k]) - limit;
+    };
+    for (let i = 0; i < side - 1; i++) for (let j = 0; j < side - 1; j++) {
+      const corners = [[i, j], [i + 1, j], [i + 1, j + 1], [i, j + 1]], values = corners.map(([a, b]) => over(a, b)), cut = [];
+      for (let k = 0; k < 4; k++) {
+        const [a, b] = [values[k], values[(k + 1) % 4]], [p, s] = [corners[k], corners[(k + 1) % 4]];
+        if (a < 0 !== b < 0) { const w = a / (a - b); cut.push([p[0] + w * (s[0] - p[0]), p[1] + w * (s[1] - p[1])]); }
+      }
+      if (cut.length === 2) cut.forEach(([a, b], k) => ctx[k ? "lineTo" : "moveTo"](x((a - side + 1) * step), y(sign * b * step)));
+    }
+  }
+  ctx.stroke();
+  ctx.setLineDash([]);
+}
+
+/** Rotor angle at a row, in rad: that between the currents in both frames. */
+function angle(memory, row) {
+  const v = name => memory.value(name, row);
+  return Math.atan2((v("ib") - v("ic")) / Math.sqrt(3), v("ia")) - Math.atan2(v("iq"), v("id"));
+}
+
+export function hexagon(memory, properties) {
+  const side = Math.min(document.getElementById("hexagon").clientWidth, 300);
+  const { element, ctx, width, height } = canvas("hexagon", Math.round(side * 0.88));
+  const udc = Math.max(memory.last("udc"), 1), ox = width / 2, oy = height / 2, scale = (height / 2 - 6) / ((2 / 3) * properties.tripLink[1]);
+  const ring = radius => Array.from({ length: 97 }, (_, k) => [ox + radius * Math.cos(TAU * k / 96), oy - radius * Math.sin(TAU * k / 96)]);
+  for (let k = 0; k < 3; k++) line(ctx, css("--grid"), 1, [0, Math.PI].map(a => [ox + 2e3 * scale * Math.cos(a + k * Math.PI / 3), oy - 2e3 * scale * Math.sin(a + k * Math.PI / 3)]));
+  const corner = (2 / 3) * udc * scale;
+  line(ctx, css("--ref"), 1.8, Array.from({ length: 7 }, (_, k) => [ox + corner * Math.cos(k * Math.PI / 3), oy - corner * Math.sin(k * Math.PI / 3)]));
+  line(ctx, css("--ref"), 1, ring((udc / Math.sqrt(3)) * scale), [2, 4]);
+  line(ctx, css("--speed"), 1.5, ring((2 / Math.PI) * udc * scale), [6, 3]);
+  const r = properties.resistance, id = memory.last("id"), iq = memory.last("iq"), flowing = Math.hypot(id, iq) > 3;
+  const rows = Math.min(memory.count, Math.round(turn(memory) / memory.step)), trail = [], full = (height / 2 - 10) / (1.25 * Math.hypot(...flux(properties, 0, properties.maxCurrent)));
+  for (let k = memory.count - rows; k < memory.count; k += Math.max(1, Math.floor(rows / 300))) {
+    const [d, q] = [memory.value("id", k), memory.value("iq", k)];
+    if (Math.hypot(d, q) < 3) continue;
+    const [fd, fq] = flux(properties, d, q), at = angle(memory, k), a = Math.atan2(fq, fd) + at, m = Math.hypot(fd, fq) * full;
+    trail.push([ox + m * Math.cos(a), oy - m * Math.sin(a)]);
+  }
+  line(ctx, css("--flux"), 1.6, trail);
+  if (flowing && memory.last("mode") > 0) {
+    const omega = (memory.last("speed") * TAU * properties.polePairs) / 60, [fd, fq] = flux(properties, id, iq);
+    const a = Math.atan2(r * iq + omega * fd, r * id - omega * fq) + angle(memory, memory.count - 1), u = memory.last("u") * scale;
+    line(ctx, css("--u"), 2, [[ox, oy], [ox + u * Math.cos(a), oy - u * Math.sin(a)]]);
+    dot(ctx, css("--u"), ox + u * Math.cos(a), oy - u * Math.sin(a), 4);
+  }
+  element.setAttribute("aria-label", `Voltage ${memory.last("u").toFixed(0)} V of a hexagon of ${((2 / 3) * udc).toFixed(0)} V`);
+}
+
+const POINTS = 4096;
+/** Magnitudes of a real signal's spectrum with Hann's window, in its unit. */
+function magnitudes(signal) {
+  const re = new Float64Array(POINTS), im = new Float64Array(POINTS);
+  for (let k = 0, bits = Math.log2(POINTS); k < POINTS; k++) {
+    let reversed = 0;
+    for (let b = 0; b < bits; b++) reversed |= (k >> b & 1) << (bits - 1 - b);
+    re[reversed] = signal[k] * (1 - Math.cos(TAU * k / POINTS));
+  }
+  for (let size = 2; size <= POINTS; size *= 2) {
+    const half = size / 2;
+    for (let k = 0; k < half; k++) {
+      const c = Math.cos(-TAU * k / size), s = Math.sin(-TAU * k / size);
+      for (let a = k; a < POINTS; a += size) {
+        const b = a + half, x = re[b] * c - im[b] * s, y = re[b] * s + im[b] * c;
+        re[b] = re[a] - x; im[b] = im[a] - y; re[a] += x; im[a] += y;
+      }
+    }
+  }
+  return Float64Array.from({ length: POINTS / 2 }, (_, k) => (2 * Math.hypot(re[k], im[k])) / POINTS);
+}
+
+export function spectrum(memory) {
+  const { element, ctx, width, height } = canvas("spectrum", 170);
+  if (memory.count < POINTS) return;
+  const signal = Float64Array.from({ length: POINTS }, (_, k) => memory.value("ia", memory.count - POINTS + k));
+  const amplitudes = magnitudes(signal), step = 1 / (POINTS * memory.step), most = 3000;
+  const left = 32, right = width - 6, top = 6, bottom = height - 20, [low, high] = [-1, 2.6];
+  const x = hz => left + (hz / most) * (right - left), y = a => bottom - ((Math.max(Math.log10(a + 1e-9), low) - low) / (high - low)) * (bottom - top);
+  ctx.fillStyle = css("--muted");
+  ctx.textBaseline = "middle";
+  ctx.textAlign = "right";
+  for (const a of [0.1, 1, 10, 100]) { line(ctx, css("--grid"), 1, [[left, y(a)], [right, y(a)]]); ctx.fillText(a, left - 5, y(a)); }
+  for (let hz = 0; hz <= most; hz += 1000) { line(ctx, css("--grid"), 1, [[x(hz), top], [x(hz), bottom]]); ctx.textAlign = hz ? (hz === most ? "right" : "center") : "left"; ctx.fillText(hz ? `${hz / 1000} kHz` : "0", x(hz), height - 8); }
+  ctx.textAlign = "left";
+  line(ctx, css("--u"), 1.2, Array.from({ length: Math.floor(most / step) }, (_, k) => [x(k * step), y(amplitudes[k])]));
+  element.setAttribute("aria-label", "Spectrum of the current of phase u over the last 0.2 s, 0 to 3 kHz");
+}

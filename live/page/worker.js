@@ -1,0 +1,112 @@
+// The simulation: steps the bench in real time, or as fast as it goes, and hands over what it saw.
+import init, { Bench, columns, sweep } from "./tractive_live.js";
+
+const SLICE_S = 0.002; // simulated at once
+const BUSY_MS = 14; // computed at once
+const LONGEST_LAG_S = 0.1; // what is later than this is let go
+
+let bench = null;
+let rate = 1;
+let last = 0; // wall time of the last turn, ms
+let owed = 0; // simulated time that is due, s
+let answered = true; // the page has drawn what it got
+let began = 0;
+const pace = { wall: 0, simulated: 0, busy: 0 };
+
+const settings = {
+  torque: value => bench.torque(value),
+  speed: value => bench.speed(value),
+  hold: value => bench.hold(value),
+  release: ([inertia, load]) => bench.release(inertia, load),
+  line: value => bench.line(value),
+  mapError: value => bench.map_error(value),
+  want: ({ on, coast, discharge }) => bench.want(on, coast, discharge),
+  acknowledge: () => bench.acknowledge(),
+  inject: value => bench.inject(value),
+  mend: () => bench.mend(),
+};
+
+const handlers = {
+  start({ words, speed, step, set }) {
+    bench?.free();
+    bench = null;
+    bench = new Bench(words, speed, step);
+    for (const [name, value] of set) settings[name](value);
+    began = 0;
+    owed = 0;
+    last = performance.now();
+    answered = true;
+    postMessage({ type: "started", properties: JSON.parse(bench.properties()), columns: columns() });
+  },
+  set({ name, value }) { if (bench) settings[name](value); },
+  rate({ value }) { rate = value; owed = 0; },
+  drawn() { answered = true; },
+  sweep() {
+    const from = performance.now();
+    const result = JSON.parse(sweep());
+    last = performance.now();
+    postMessage({ type: "sweep", ...result, seconds: (last - from) / 1e3 });
+  },
+};
+
+onmessage = ({ data }) => {
+  try {
+    handlers[data.type](data);
+  } catch (error) {
+    postMessage({ type: "error", message: String(error?.message ?? error) });
+  }
+};
+
+function turn() {
+  const now = performance.now();
+  const passed = (now - last) / 1e3;
+  last = now;
+  if (bench) {
+    try {
+      advance(now, passed);
+    } catch (error) {
+      bench = null;
+      postMessage({ type: "error", message: String(error?.message ?? error) });
+    }
+  }
+  channel.port2.postMessage(null);
+}
+
+function advance(now, passed) {
+  owed = rate === Infinity ? Infinity : Math.min(owed + rate * passed, Math.max(LONGEST_LAG_S, LONGEST_LAG_S * rate));
+  let time = began;
+  while (owed > 1e-6 && performance.now() - now < BUSY_MS && (rate !== Infinity || answered || time - began < 1)) {
+    const step = Math.min(owed, SLICE_S);
+    time = bench.run(step);
+    owed -= step;
+  }
+  pace.wall += passed;
+  pace.simulated += time - began;
+  pace.busy += (performance.now() - now) / 1e3;
+  began = time;
+  if (answered) hand();
+}
+
+let factor = { reached: 0, possible: 0 };
+function hand() {
+  if (pace.wall > 0.5) {
+    factor = { reached: pace.simulated / pace.wall, possible: pace.simulated / pace.busy };
+    pace.wall = pace.simulated = pace.busy = 0;
+  }
+  const from = bench.rows_from_s();
+  const rows = bench.rows(), edges = bench.edges();
+  answered = false;
+  postMessage({ type: "rows", from, rows, edges, state: JSON.parse(bench.state()), factor }, [rows.buffer, edges.buffer]);
+}
+
+// A message to itself comes sooner than a timer does; without work a timer gives the processor away.
+const channel = new MessageChannel();
+channel.port1.onmessage = () => {
+  const idle = !bench || (!answered && rate === Infinity) || (rate !== Infinity && owed < 1e-6);
+  if (idle) setTimeout(turn, 4); else turn();
+};
+
+await init({ module_or_path: new URL("tractive_live_bg.wasm", import.meta.url) });
+postMessage({ type: "ready" });
+last = performance.now();
+turn();

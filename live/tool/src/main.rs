@@ -1,0 +1,67 @@
+//! The live bench's page: made of the drive's wasm, served, looked at in a browser.
+//!
+//! `cargo xtask live` calls this; what it does is in [`page`] (the folder of static files), [`server`], [`browser`], [`check`] and
+//! [`pictures`].
+#![forbid(unsafe_code)]
+
+mod browser;
+mod check;
+mod page;
+mod pictures;
+mod server;
+
+use anyhow::Result;
+use clap::Parser;
+use std::path::PathBuf;
+
+/// The live bench's page.
+#[derive(Parser)]
+enum Command {
+    /// Makes the folder of static files
+    Make {
+        /// The wasm that cargo has made
+        wasm: PathBuf,
+        /// Folder for the page
+        out: PathBuf,
+    },
+    /// Serves it until interrupted
+    Serve {
+        /// The page's folder
+        page: PathBuf,
+        /// Port; 0: any
+        #[arg(long, default_value_t = 0)]
+        port: u16,
+        /// Do not open a browser
+        #[arg(long)]
+        no_open: bool,
+    },
+    /// Looks at it in a headless Chromium
+    Check {
+        /// The page's folder
+        page: PathBuf,
+        /// The host's trace.csv of the sweep
+        trace: PathBuf,
+        /// Chromium
+        #[arg(long, default_value = "chromium")]
+        browser: PathBuf,
+    },
+    /// Takes its pictures
+    Screenshots {
+        /// The page's folder
+        page: PathBuf,
+        /// Folder for the pictures
+        out: PathBuf,
+        /// Chromium
+        #[arg(long, default_value = "chromium")]
+        browser: PathBuf,
+    },
+}
+
+fn main() -> Result<()> {
+    match Command::parse() {
+        Command::Make { wasm, out } => page::make(&wasm, &out),
+        Command::Serve { page, port, no_open } => server::serve(&page, port, !no_open),
+        Command::Check { page, trace, browser } => check::check(&page, &trace, &browser),
+        Command::Screenshots { page, out, browser } => pictures::take(&page, &out, &browser),
+    }
+}

@@ -1,0 +1,35 @@
+//! No operating system: a program in a browser, which simulates and keeps what it sees.
+
+use anyhow::{Result, bail};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+/// No clock of the processor: 0.
+pub fn processor_s() -> f64 {
+    0.0
+}
+
+/// A folder that there is not.
+pub(crate) struct NoFolder(PathBuf);
+
+impl NoFolder {
+    /// Its path.
+    pub(crate) fn path(&self) -> &Path {
+        &self.0
+    }
+}
+
+/// None: an error.
+pub(crate) fn temporary_folder() -> Result<NoFolder> {
+    bail!("there are no folders here")
+}
+
+/// None: an error.
+pub(crate) fn make_fifo(path: &Path) -> Result<()> {
+    bail!("{}: there are no pipes here", path.display())
+}
+
+/// No file: an error.
+pub(crate) fn written(path: &Path, _fill: impl FnOnce(&mut dyn Write) -> Result<()>) -> Result<()> {
+    bail!("{}: there are no files here", path.display())
+}

@@ -1,0 +1,35 @@
+//! An operating system with files, pipes and a clock of the processor.
+
+use anyhow::{Context, Result};
+use rustix::fs::{CWD, FileType, Mode};
+use std::io::Write;
+use std::os::unix::fs::PermissionsExt;
+use std::path::Path;
+use tempfile::{NamedTempFile, TempDir};
+
+/// The processor time of this thread, in s: other programs do not count.
+pub fn processor_s() -> f64 {
+    let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
+    time.tv_sec as f64 + time.tv_nsec as f64 * 1e-9
+}
+
+/// A folder that is gone with its value.
+pub(crate) fn temporary_folder() -> Result<TempDir> {
+    tempfile::tempdir().context("no temporary folder for the link")
+}
+
+/// Makes a FIFO.
+pub(crate) fn make_fifo(path: &Path) -> Result<()> {
+    rustix::fs::mknodat(CWD, path, FileType::Fifo, Mode::RUSR | Mode::WUSR, 0)
+        .with_context(|| format!("cannot make the FIFO {}", path.display()))
+}
+
+/// Writes a file whole or not at all.
+pub(crate) fn written(path: &Path, fill: impl FnOnce(&mut dyn Write) -> Result<()>) -> Result<()> {
+    let folder = path.parent().unwrap_or(Path::new("."));
+    let mut file = NamedTempFile::new_in(folder).with_context(|| folder.display().to_string())?;
+    fill(&mut file)?;
+    file.as_file().set_permissions(std::fs::Permissions::from_mode(0o644))?;
+    file.persist(path).with_context(|| path.display().to_string())?;
+    Ok(())
+}

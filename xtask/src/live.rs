@@ -1,0 +1,115 @@
+//! `cargo xtask live`: the live bench, which is a workspace of its own in `live/`, built and served; and looked at in a browser.
+
+use crate::build;
+use crate::cli::LiveArgs;
+use crate::process::{cannot_start, say, succeeds};
+use crate::setup::Setup;
+use crate::workspace::{WASM, cargo, root};
+use anyhow::{Context, Result, bail, ensure};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+/// The command.
+pub fn run(args: &LiveArgs) -> Result<u8> {
+    let mut setup = Setup::default();
+    if !setup.wasm() {
+        bail!("{}", no_target());
+    }
+    let page = absolute(args.out.as_deref().unwrap_or(&root().join("target/live/page")))?;
+    make(&page)?;
+    if let Some(out) = &args.screenshots {
+        let out = absolute(out)?;
+        let browser = setup.browser().with_context(no_browser)?;
+        return Ok(u8::from(!succeeds(
+            tool().arg("screenshots").arg(&page).arg(out).arg("--browser").arg(browser),
+        )?));
+    }
+    if args.no_serve {
+        return Ok(0);
+    }
+    let mut serve = tool();
+    serve.arg("serve").arg(&page).args(["--port", &args.port.to_string()]);
+    if args.no_open {
+        serve.arg("--no-open");
+    }
+    Ok(u8::from(!succeeds(&mut serve)?))
+}
+
+/// The step: format and lints of what no other step sees, then the page in a browser beside the host's sweep. The inner error is what
+/// is missing.
+pub fn check(setup: &mut Setup) -> Result<Result<bool, String>> {
+    if !setup.wasm() {
+        return Ok(Err(no_target()));
+    }
+    let Some(browser) = setup.browser() else { return Ok(Err(no_browser())) };
+    if !is_tidy(setup)? {
+        return Ok(Ok(false));
+    }
+    let folder = root().join("target/live");
+    let (page, sweep) = (folder.join("page"), folder.join("sweep"));
+    make(&page)?;
+    let mut host = Command::new(build::rig()?);
+    host.current_dir(root())
+        .args(["run", "sweep", "--on", "host", "--out"])
+        .arg(&sweep)
+        .stdout(Stdio::null());
+    ensure!(succeeds(&mut host)?, "the host's sweep failed");
+    let trace = sweep.join("trace.csv");
+    let good = succeeds(tool().arg("check").arg(&page).arg(trace).arg("--browser").arg(browser))?;
+    Ok(Ok(good && succeeds(live().args(["test", "--quiet", "--package", "tractive-live-tool"]))?))
+}
+
+/// Format and lints, of the bindings on their target and of the tool on this machine.
+fn is_tidy(setup: &mut Setup) -> Result<bool> {
+    if setup.component("fmt", "rustfmt") && !succeeds(live().args(["fmt", "--all", "--", "--check"]))? {
+        return Ok(false);
+    }
+    let wasm = ["--profile", "wasm", "--target", WASM, "--package", "tractive-live"];
+    let tool = ["--package", "tractive-live-tool", "--all-targets"];
+    let lint = |what: &[&str]| succeeds(live().arg("clippy").args(what).args(["--", "--deny", "warnings"]));
+    Ok(!setup.component("clippy", "clippy") || (lint(&wasm)? && lint(&tool)?))
+}
+
+/// Cargo in the live bench's workspace.
+fn live() -> Command {
+    let mut command = cargo();
+    command.current_dir(root().join("live"));
+    // The build script takes the machines that are built in.
+    for system in build::System::ALL {
+        command.env_remove(system.machine_variable());
+    }
+    command
+}
+
+/// Its tool.
+fn tool() -> Command {
+    let mut command = live();
+    command.args(["run", "--quiet", "--package", "tractive-live-tool", "--"]);
+    command
+}
+
+/// Makes the folder of static files.
+fn make(page: &Path) -> Result<()> {
+    say("building the live bench …");
+    let mut command = live();
+    command.args(["build", "--profile", "wasm", "--target", WASM, "--package", "tractive-live"]);
+    ensure!(succeeds(&mut command)?, "the live bench was not built");
+    let wasm = PathBuf::from("target/live").join(WASM).join("wasm/tractive_live.wasm");
+    let mut command = tool();
+    command.arg("make").arg(root().join(wasm)).arg(page);
+    ensure!(command.status().with_context(|| cannot_start(&command))?.success(), "the page was not made");
+    Ok(())
+}
+
+/// A folder as it was typed, from anywhere.
+fn absolute(folder: &Path) -> Result<PathBuf> {
+    std::path::absolute(folder).with_context(|| folder.display().to_string())
+}
+
+fn no_target() -> String {
+    format!("the target {WASM} is missing; add it with: rustup target add {WASM}")
+}
+
+fn no_browser() -> String {
+    "there is no Chromium, and it cannot be installed (Debian: apt-get install chromium)".to_owned()
+}
