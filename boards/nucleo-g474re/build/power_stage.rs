@@ -45,6 +45,8 @@ struct Keys {
     encoder_counts: u32,
     encoder_zeros_deg: Vec<f64>,
     precharge_s: f64,
+    #[serde(default)]
+    behind_line_filter: bool,
     discharge_s: f64,
     z_source: Option<ZSource>,
 }
@@ -87,7 +89,8 @@ pub fn traction(file: &Path, text: &str, machine: &Machine) -> Result<String, In
     let ratings = &machine.tables.ratings;
     stage.check_control_hz(control_hz, ratings.max_switching_hz)?;
     stage.check_times(stage.longest_dead_time_ns())?;
-    let settings = rates::settings(control_hz, min_pulse_ns, *dead_time_ns, ratings.max_switching_hz);
+    let behind = stage.keys.behind_line_filter;
+    let settings = rates::settings(control_hz, min_pulse_ns, *dead_time_ns, ratings.max_switching_hz, behind);
     // The longest carrier half of a machine that switches slowly.
     let longest_ticks = settings.devices.shortest_half_ticks.saturating_mul(rates::CARRIER_RANGE);
     if longest_ticks > rates::LONGEST_HALF_TICKS {
@@ -135,6 +138,9 @@ pub fn zs9(file: &Path, text: &str, machine: &Machine) -> Result<String, InputEr
     }
     if min_pulse_ns.is_some() {
         return Err(stage.refuse("min_pulse_ns", "the modulator of the nine switches has none".to_owned()));
+    }
+    if stage.keys.behind_line_filter {
+        return Err(stage.refuse("behind_line_filter", "the Z-source has chokes of its own".to_owned()));
     }
     let Some(ZSource { inductor_range_a, source_range_v, link_ref_v }) = *z_source else {
         return Err(stage.refuse("z_source", "is missing".to_owned()));
@@ -202,12 +208,13 @@ impl<'a> Stage<'a> {
     fn check_control_hz(&self, control_hz: u32, max_switching_hz: f32) -> Result<(), InputError> {
         let switching_hz = f64::from(max_switching_hz);
         let core_hz = f64::from(rates::CORE_HZ);
+        let damping = if self.keys.behind_line_filter { rates::DAMPING_CYCLES } else { 0 };
         let left_hz = rates::LOAD * core_hz - 2.0 * switching_hz * f64::from(rates::PWM_CYCLES);
         self.check(&[Bound(
             "control_hz",
             f64::from(control_hz),
             switching_hz.max(SLOWEST_CONTROL_HZ),
-            (left_hz / f64::from(rates::CONTROL_CYCLES)).floor(),
+            (left_hz / f64::from(rates::CONTROL_CYCLES + damping)).floor(),
             "the machine's max_switching_hz at least, and what the processor has time for at most",
         )])?;
         match rates::CORE_HZ.is_multiple_of(control_hz) {
@@ -317,14 +324,16 @@ impl<'a> Stage<'a> {
     fn constant(&self, control_hz: u32, min_pulse_ns: u32) -> String {
         let Keys { dead_time_ns, current_range_a, zero_code, zero_tolerance, dc_link_range_v, .. } =
             self.keys;
-        let Keys { break_current_a, encoder_counts, precharge_s, discharge_s, .. } = self.keys;
+        let Keys { break_current_a, encoder_counts, precharge_s, discharge_s, behind_line_filter, .. } =
+            self.keys;
         let zero = angle(self.keys.encoder_zeros_deg.first().copied().unwrap_or_default());
         format!(
             "PowerStage {{\n    control_hz: {control_hz},\n    dead_time_ns: {dead_time_ns},\n    min_pulse_ns: {min_pulse_ns},\n    \
              current_a_per_code: {current_range_a:?} / {HALF_CODES:?},\n    zero_code: {zero_code},\n    \
              zero_tolerance: {zero_tolerance},\n    udc_v_per_code: {dc_link_range_v:?} / {CODES:?},\n    \
              break_current_a: {break_current_a:?},\n    encoder_counts: {encoder_counts},\n    encoder_zero: {zero},\n    \
-             line: LineTimes {{ precharge_s: {precharge_s:?}, discharge_s: {discharge_s:?} }},\n}}"
+             line: LineTimes {{ precharge_s: {precharge_s:?}, discharge_s: {discharge_s:?} }},\n    \
+             behind_line_filter: {behind_line_filter},\n}}"
         )
     }
 }

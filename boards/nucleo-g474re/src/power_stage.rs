@@ -36,6 +36,8 @@ pub struct PowerStage {
     pub encoder_zero: Angle,
     /// The line side's time constants.
     pub line: LineTimes,
+    /// `true` if a choke lies between the line and the link: the drive then damps the link.
+    pub behind_line_filter: bool,
 }
 
 /// The PMaSynRM's, `power_stage.toml`, which the build script has checked against the machine.
@@ -50,7 +52,8 @@ pub const PRESCALER: u16 = rates::prescaler(POWER_STAGE.control_hz);
 impl PowerStage {
     /// The PMaSynRM's settings with this stage and this machine.
     pub const fn settings(&self, ratings: &Ratings) -> Settings {
-        rates::settings(self.control_hz, self.min_pulse_ns, self.dead_time_ns, ratings.max_switching_hz)
+        let Self { control_hz, min_pulse_ns, dead_time_ns, behind_line_filter, .. } = *self;
+        rates::settings(control_hz, min_pulse_ns, dead_time_ns, ratings.max_switching_hz, behind_line_filter)
     }
 
     /// The dead time for the generator, never shorter than asked for; `None` if it cannot make one.

@@ -14,6 +14,9 @@ const COARSEST: u16 = 8;
 /// Cycles that the control interrupt takes at most, by the upper bound of `docs/cost.md`.
 pub const CONTROL_CYCLES: u32 = 4_240;
 
+/// Cycles that the control interrupt takes longer where it damps a line filter: its 77 instructions, at two cycles and a little each.
+pub const DAMPING_CYCLES: u32 = 170;
+
 /// Cycles that the PWM interrupt takes at most, by the same bound.
 pub const PWM_CYCLES: u32 = 1_720;
 
@@ -51,12 +54,14 @@ pub const fn cycles_to_ticks(cycles: u32, prescaler: u16) -> u32 {
     cycles.div_ceil(prescaler as u32)
 }
 
-/// The PMaSynRM's settings for this control rate, these times of the power stage and this highest switching frequency of its devices.
+/// The PMaSynRM's settings for this control rate, these times of the power stage and this highest switching frequency of its devices; a link
+/// behind a line filter is damped.
 pub const fn settings(
     control_hz: u32,
     min_pulse_ns: u32,
     dead_time_ns: u32,
     max_switching_hz: f32,
+    behind_line_filter: bool,
 ) -> Settings {
     let (clock, prescaler) = (clock(control_hz), prescaler(control_hz));
     let min_pulse_ticks = cycles_to_ticks(ns_to_cycles(min_pulse_ns), prescaler);
@@ -64,6 +69,6 @@ pub const fn settings(
     Settings {
         clock,
         devices: SwitchLimits::new(min_pulse_ticks, dead_time_ticks, max_switching_hz, &clock),
-        gains: Gains::DEFAULT,
+        gains: Gains::of(false, behind_line_filter),
     }
 }

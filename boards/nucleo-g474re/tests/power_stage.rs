@@ -7,6 +7,7 @@ use nucleo_g474re::built_in::{traction, zs9};
 use nucleo_g474re::{dead_time, rates, zs9 as zs9_rates};
 use power_stage::Machine;
 use std::path::Path;
+use tractive::control::Gains;
 use tractive::machine::{Ratings, Tables};
 
 /// A system's stage as it is delivered.
@@ -173,6 +174,21 @@ fn the_control_rate_suits_the_carrier_the_timers_and_the_processor() {
     }
     let said = ZS9.check(&format!("control_hz = 20000\n{}", ZS9.text), ZS9.tables).unwrap_err();
     assert!(said.starts_with("power_stage_zs9.toml:1: control_hz: the control of two motors"), "{said}");
+}
+
+/// The drive damps a link behind a line filter, and the processor's time for it is reckoned.
+#[test]
+fn a_line_filter_is_a_key_of_the_stage() {
+    let text = TRACTION.with("behind_line_filter", "true");
+    let constant = TRACTION.check(&text, TRACTION.tables).unwrap();
+    assert!(constant.contains("behind_line_filter: true,"), "{constant}");
+    let settings = |behind| rates::settings(10_000, 15_000, 5_000, 900.0, behind).gains;
+    assert_eq!(settings(true), Gains::of(false, true));
+    assert_eq!(settings(false), Gains::DEFAULT);
+    let said = TRACTION.check(&text.replace("control_hz = 10000", "control_hz = 40000"), TRACTION.tables);
+    assert!(said.unwrap_err().contains("control_hz: 40000: must be from 1000 to 34762"));
+    let said = ZS9.check(&format!("behind_line_filter = true\n{}", ZS9.text), ZS9.tables).unwrap_err();
+    assert!(said.contains("behind_line_filter: the Z-source has chokes of its own"), "{said}");
 }
 
 /// The stage of extra-low voltage suits its machine, and the other one does not.
