@@ -4,7 +4,9 @@ use super::applied::{Applied, NO_LIMITS, Passed, Steady, Wanted, committed, foll
 use super::six_step_exit::SixStepExit;
 use super::slot::{Decision, Slot};
 use super::{Settings, Shared};
-use crate::control::{AimInput, Controller, Demand, Law, LinkDamper, Measurements, ModeLimits, RotorSample};
+use crate::control::{
+    AimInput, ControlLaw, Controller, Demand, Law, LinkDamper, Measurements, ModeLimits, RotorSample,
+};
 use crate::drive::PeriodInput;
 use crate::drive::acknowledge::Acknowledge;
 use crate::drive::messages::{Gates, VoltageCommand};
@@ -26,11 +28,11 @@ const JUMP_SHARE: f32 = 0.05;
 /// in which control sees what became of it.
 const REVISION_PERIODS: u32 = 2;
 
-/// The control interrupt's task, for a machine.
-pub struct ControlTask<M = &'static Tables> {
+/// The control interrupt's task, for a machine and a control law.
+pub struct ControlTask<M = &'static Tables, L = Controller> {
     machine: M,
     settings: Settings,
-    controller: Controller,
+    controller: L,
     watch: FrozenWatch,
     /// Nominal instant of the next call.
     now: Instant,
@@ -65,10 +67,17 @@ pub struct ControlTask<M = &'static Tables> {
 impl<M: Machine> ControlTask<M> {
     /// A task whose first call is the control timer's first interrupt, at `first`.
     pub const fn new(machine: M, settings: Settings, first: Instant) -> Self {
+        Self::with_law(machine, settings, first, Controller::new())
+    }
+}
+
+impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
+    /// The same with another control law, at rest.
+    pub const fn with_law(machine: M, settings: Settings, first: Instant, controller: L) -> Self {
         Self {
             machine,
             settings,
-            controller: Controller::new(),
+            controller,
             watch: FrozenWatch::new(),
             now: first,
             boundary: None,
