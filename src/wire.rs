@@ -9,7 +9,7 @@
 mod dual;
 
 use crate::cell::Words;
-use crate::control::{Demand, LinkWindow};
+use crate::control::{Demand, LinkWindow, MtpaStart};
 use crate::drive::{half_from_words, half_to_words};
 use crate::frames::{Abc, Angle};
 use crate::modulation::CarrierHalf;
@@ -52,6 +52,8 @@ pub struct Setup {
     pub uncompensated: bool,
     /// A line filter stands in front of the link: it is to be damped.
     pub behind_line_filter: bool,
+    /// Where MTPA starts, to the image with the ordinary law.
+    pub mtpa_start: MtpaStart,
 }
 
 /// From the firmware to the rig.
@@ -160,7 +162,9 @@ pub fn setup_to_block(setup: Setup) -> Block {
     let ticks = [setup.min_pulse_ticks, setup.dead_time_ticks, setup.pwm_delay_ticks];
     let flags = [
         setup.over_protocol.into(),
-        u32::from(setup.uncompensated) | u32::from(setup.behind_line_filter) << 1,
+        u32::from(setup.uncompensated)
+            | u32::from(setup.behind_line_filter) << 1
+            | u32::from(setup.mtpa_start == MtpaStart::Zero) << 2,
     ];
     filled(ticks.into_iter().chain(line_to_words(setup.line)).chain(flags).chain([setup.control_ticks]))
 }
@@ -201,6 +205,7 @@ pub fn setup_from_block(block: &Block) -> Setup {
         over_protocol: frames != 0,
         uncompensated: gains & 1 != 0,
         behind_line_filter: gains & 2 != 0,
+        mtpa_start: if gains & 4 != 0 { MtpaStart::Zero } else { MtpaStart::Previous },
     }
 }
 

@@ -34,15 +34,15 @@ use crate::run::traction::{Tasks, run_in_qemu};
 use crate::run::{self, CLOCK, Supervisor};
 use crate::trace::Recording;
 use anyhow::Result;
-use clap::Args;
+use clap::{Args, ValueEnum};
 use serde::Serialize;
 use serde_json::{Map, Value};
-use tractive::control::{Demand, Gains};
+use tractive::control::{ControlLaw, Controller, Demand, Gains, MtpaStart, PiLaw};
 use tractive::drive::traction::Settings;
 use tractive::modulation::SwitchLimits;
 use tractive::operator::{Line, LineTimes};
 use tractive::recorder::Recorder;
-use tractive::time::Clock;
+use tractive::time::{Clock, Instant};
 use tractive::wire::Setup;
 
 /// The usual lead, in s.
@@ -55,9 +55,45 @@ const STEP_S: f64 = 50e-6;
 #[derive(Clone, Copy, Debug)]
 pub struct Traction;
 
+/// The control law that the drive runs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum LawName {
+    /// The project's own
+    Tractive,
+    /// The papers' ordinary one: PI loops on measured currents
+    Pi,
+}
+
+impl LawName {
+    /// As on the command line.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Tractive => "tractive",
+            Self::Pi => "pi",
+        }
+    }
+}
+
+/// The point whose inductances the first pass of MTPA takes under `--law pi`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum StartName {
+    /// That of the operating point before
+    Previous,
+    /// No current, as we read the paper
+    Zero,
+}
+
 /// Options of all its scenarios.
 #[derive(Clone, Debug, Args, Serialize)]
 pub struct TractionOptions {
+    /// The control law.
+    #[arg(long, value_enum, default_value = "tractive")]
+    pub law: LawName,
+    /// With --law pi: the point whose inductances the first of the two passes of MTPA takes.
+    #[arg(long, value_enum, default_value = "previous", value_name = "POINT")]
+    pub mtpa_start: StartName,
     /// Leave the dead time uncompensated: neither the pulses are corrected nor is the sixth harmonic of the voltage followed.
     #[arg(long)]
     pub uncompensated: bool,
@@ -183,17 +219,11 @@ impl System for Traction {
         let bench = bench(plan, &setup, options, machine);
         match options.on {
             On::Host => {
-                let gains = Gains::of(setup.uncompensated, setup.behind_line_filter);
-                let clock = clock(options, machine);
-                let settings = Settings { clock, devices: devices(&setup, machine), gains };
-                settings.check(machine.tables).map_err(run::refused)?;
-                let ratings = &machine.tables.ratings;
-                let line = setup.line.map(|times| Line::rated(ratings, times.precharge_s, times.discharge_s));
-                let first = first_half_ticks(&setup, machine);
-                let recorder = Recorder::new();
-                let tasks = Tasks::new(machine.tables, settings, first).recorded_by(&recorder);
-                let tasks = tasks.operated_on(line).commanded_by(supervisor);
-                run::on_host(name, bench, tasks, |index| recorder.read(index))
+                let run = OnHost { name, bench, setup: &setup, machine };
+                match options.own.law {
+                    LawName::Tractive => run.run(Controller::new(), supervisor),
+                    LawName::Pi => run.run(PiLaw::starting(setup.mtpa_start), supervisor),
+                }
             }
             On::Qemu => {
                 let patient = supervisor.as_ref().is_some_and(|supervisor| supervisor.is_typed());
@@ -215,6 +245,32 @@ impl System for Traction {
 
     fn overview(recording: &Recording) -> Result<Option<String>> {
         report::overview(recording).map(Some)
+    }
+}
+
+/// A run on the host, but for the control law.
+struct OnHost<'a> {
+    name: &'a str,
+    bench: Bench,
+    setup: &'a Setup,
+    machine: &'a Machine,
+}
+
+impl OnHost<'_> {
+    /// The drive's own tasks with a law.
+    fn run(self, law: impl ControlLaw, supervisor: Option<&mut dyn Supervisor>) -> Result<Recording> {
+        let Self { setup, machine, .. } = self;
+        let gains = Gains::of(setup.uncompensated, setup.behind_line_filter);
+        let clock = Clock { control_ticks: setup.control_ticks, ..CLOCK };
+        let settings = Settings { clock, devices: devices(setup, machine), gains };
+        settings.check(machine.tables).map_err(run::refused)?;
+        let ratings = &machine.tables.ratings;
+        let line = setup.line.map(|times| Line::rated(ratings, times.precharge_s, times.discharge_s));
+        let first = first_half_ticks(setup, machine);
+        let recorder = Recorder::new();
+        let tasks = Tasks::with_law(law, Instant(0), machine.tables, settings, first).recorded_by(&recorder);
+        let tasks = tasks.operated_on(line).commanded_by(supervisor);
+        run::on_host(self.name, self.bench, tasks, |index| recorder.read(index))
     }
 }
 
@@ -258,6 +314,10 @@ fn setup(plan: &Plan, options: &Options, machine: &Machine, over_protocol: bool)
         over_protocol,
         uncompensated,
         behind_line_filter: options.own.line.is_some(),
+        mtpa_start: match options.own.mtpa_start {
+            StartName::Previous => MtpaStart::Previous,
+            StartName::Zero => MtpaStart::Zero,
+        },
     }
 }
 

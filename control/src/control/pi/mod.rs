@@ -1,0 +1,267 @@
+//! The papers' own, ordinary control law: PI loops on measured currents.
+//!
+//! It is what an engineer builds of the papers and a textbook, to be run beside [`Controller`](super::Controller) on the same ports, tables
+//! and modulator. Currents are measured where the carrier has no ripple, under the patterns as their mean over 60°. The reference is that
+//! of MTPA in the paper's two passes; where the voltage runs out, an integrator on it moves i_d. Two PIs, decoupled by `jωψ` of the
+//! maps, have the gains of the modulus optimum, and their integrators are held back at the circle of the largest voltage.
+//!
+//! Nothing here knows which pulses are on their way: no prediction, no ripple, no disturbance but the integrators.
+//!
+//! From 600 to 700 N·m at standstill, the first voltage is that of the proportional part and what the integrator and the drop add:
+//!
+//! ```
+//! use tractive_control::control::{
+//!     AimInput, Committed, ControlLaw, Demand, Gains, Law, ModeLimits, PiLaw, Regulated, RotorSample, mtpa,
+//! };
+//! use tractive_control::frames::{AlphaBeta, Angle};
+//! use tractive_control::time::Clock;
+//! # fn main() -> Result<(), tractive_tablegen::InputError> {
+//! let folder = std::path::Path::new("../tables/pmasynrm-180kw");
+//! let tables = tractive_tablegen::MachineFolder::read(folder)?.tables();
+//! let clock = Clock::new(25_000_000, 2_500);
+//! let law = Law { gains: &Gains::DEFAULT, clock: &clock, tables: &tables };
+//! let limits = ModeLimits {
+//!     follows: Regulated::Mean,
+//!     depth_limit: 0.9,
+//!     # steady_share: 1.0,
+//!     # filled: false,
+//!     # ripple_share: 0.05,
+//!     # settled: true,
+//!     // …
+//! };
+//! let volt_seconds = Some(AlphaBeta::default());
+//! let committed = Committed { horizon_s: 0.5e-3, volt_seconds, ripple: None, interval_s: 0.5e-3 };
+//! let mut pi = PiLaw::new();
+//! let sample = RotorSample::new(mtpa(600.0, &tables).unpark(Angle::ZERO.sin_cos()).abc(), Angle::ZERO, &tables);
+//! for _ in 0..20 {
+//!     let demand = Demand { torque_nm: 700.0, slew_limited: false };
+//!     pi.observe(&sample, &tables);
+//!     let input = AimInput { demand: &demand, window: None, udc_v: 1_500.0, swing: None, limits: &limits };
+//!     pi.aim(&input, &law);
+//! }
+//! let wanted = pi.target().current;
+//! assert!((wanted - mtpa(700.0, &tables)).length() < 5.0, "its own way to the least current");
+//! let voltage = pi.regulate(&sample, &committed, &limits, &law);
+//! assert!(voltage.vector.beta > 50.0 && voltage.voltage_v < 860.0, "more i_q is wanted");
+//! # Ok(())
+//! # }
+//! ```
+
+mod current;
+mod reference;
+mod samples;
+mod weakening;
+
+use super::demand::{self, Shaper};
+use super::speed::SpeedTracker;
+use super::{
+    AimInput, Boundary, Committed, ControlLaw, Law, ModeLimits, Regulated, RotorSample, Target,
+    VoltageVector, flux_linkage, torque_nm,
+};
+use crate::frames::{Dq, six_step_v};
+use core::f32::consts::FRAC_PI_3;
+use crate::machine::Tables;
+use crate::time::Clock;
+use current::{Inductance, Loop};
+use reference::Reference;
+use samples::Samples;
+use weakening::Weakening;
+
+pub use reference::MtpaStart;
+
+/// Bandwidth at which the link is followed for the limit of the voltage, in rad/s.
+const LINK_RAD_S: f32 = 100.0;
+
+/// Step of current over which an incremental inductance is taken, in A.
+const STEP_A: f32 = 10.0;
+
+/// The law's state between two control periods.
+#[derive(Clone, Copy, Debug)]
+pub struct PiLaw {
+    speed: SpeedTracker,
+    demand: Shaper,
+    reference: Reference,
+    weakening: Weakening,
+    current: Loop,
+    samples: Samples,
+    /// The link without its ripple, in V; `None` before the first operating point.
+    link_v: Option<f32>,
+    /// Torque by the map, summed over the samples since the last operating point, in N·m; and how many they are.
+    sum_nm: f32,
+    count: u32,
+    /// Samples since the last voltage.
+    unused: u32,
+    target: Target,
+    /// The largest voltage on the link without its ripple, in V.
+    limit_v: f32,
+}
+
+impl PiLaw {
+    /// At rest; MTPA starts from the point of the period before.
+    pub const fn new() -> Self {
+        Self::starting(MtpaStart::Previous)
+    }
+
+    /// At rest, with MTPA started as told.
+    pub const fn starting(start: MtpaStart) -> Self {
+        Self {
+            speed: SpeedTracker::new(),
+            demand: Shaper::new(),
+            reference: Reference::new(start),
+            weakening: Weakening::NONE,
+            current: Loop::AT_REST,
+            samples: Samples::EMPTY,
+            link_v: None,
+            sum_nm: 0.0,
+            count: 0,
+            unused: 0,
+            target: Target::NONE,
+            limit_v: 0.0,
+        }
+    }
+}
+
+impl Default for PiLaw {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl ControlLaw for PiLaw {
+    fn tracker(&self) -> &SpeedTracker {
+        &self.speed
+    }
+
+    fn tracker_mut(&mut self) -> &mut SpeedTracker {
+        &mut self.speed
+    }
+
+    fn map_scale(&self) -> f32 {
+        1.0
+    }
+
+    fn map_error(&self) -> f32 {
+        0.0
+    }
+
+    fn passed_s(&self, clock: &Clock) -> f32 {
+        self.count as f32 * clock.control_s()
+    }
+
+    fn target(&self) -> &Target {
+        &self.target
+    }
+
+    fn idle(&mut self) {
+        *self = Self { speed: self.speed, ..Self::starting(self.reference.start()) };
+    }
+
+    fn begin_without_torque(&mut self) {
+        self.demand = Shaper::without_torque();
+    }
+
+    fn observe(&mut self, sample: &RotorSample, tables: &Tables) {
+        self.sum_nm += torque_nm(tables, sample.flux, sample.current);
+        self.count += 1;
+        self.unused += 1;
+        self.samples.push(sample.current);
+    }
+
+    fn learn(&mut self, _boundary: &Boundary, sample: &RotorSample, _follows: Regulated, _law: &Law) {
+        self.samples.boundary = Some(sample.current);
+    }
+
+    fn aim(&mut self, input: &AimInput, law: &Law) {
+        let AimInput { demand, window, udc_v, limits, .. } = *input;
+        let (tables, omega) = (law.tables, self.speed.omega());
+        let period_s = self.passed_s(law.clock);
+        let flowing_nm = self.sum_nm / self.count as f32;
+        (self.sum_nm, self.count) = (0.0, 0);
+        let can_step = limits.follows == Regulated::Mean;
+        let shaping = demand::Input { demand, window, udc_v, omega, flowing_nm, can_step, period_s };
+        let wanted_nm = self.demand.step(&shaping, &tables.ratings);
+        let before_v = self.link_v.unwrap_or(udc_v);
+        let link_v = before_v + LINK_RAD_S * period_s * (udc_v - before_v);
+        self.link_v = Some(link_v);
+        let limit_v = limits.depth_limit * six_step_v(link_v);
+        let point = self.reference.step(wanted_nm, self.weakening.moved_a(), tables);
+        self.target = Target {
+            torque_nm: point.torque_nm,
+            current: point.current,
+            flux: point.flux,
+            region: point.region,
+            depth: point.mtpa_voltage_v(omega, tables) / six_step_v(link_v),
+            voltage_limit_v: limits.depth_limit * six_step_v(udc_v),
+        };
+        self.limit_v = limit_v;
+    }
+
+    fn regulate(
+        &mut self,
+        sample: &RotorSample,
+        committed: &Committed,
+        limits: &ModeLimits,
+        law: &Law,
+    ) -> VoltageVector {
+        let (omega, tables) = (self.speed.omega(), law.tables);
+        let resistance = tables.ratings.stator_resistance_ohm;
+        let control_s = law.clock.control_s();
+        let passed_s = self.unused as f32 * control_s;
+        self.unused = 0;
+        let by_pulses = limits.follows == Regulated::Mean;
+        if committed.volt_seconds.is_none() && !by_pulses {
+            return self.start_flying(sample, omega);
+        }
+        let window_s = if by_pulses { 0.0 } else { FRAC_PI_3 / omega.abs() };
+        let measured = self.samples.mean(window_s / control_s);
+        let flux = flux_linkage(tables, measured);
+        let half_way = (measured + self.target.current) * 0.5;
+        let inductance = inductance(tables, half_way, flux_linkage(tables, half_way));
+        let coupling = if by_pulses { flux } else { self.target.flux };
+        let output = self.current.step(&current::Input {
+            reference: self.target.current,
+            measured,
+            without_ripple: match self.samples.boundary {
+                Some(current) if by_pulses => current,
+                _ => measured,
+            },
+            forward: coupling.j() * omega + self.target.current * resistance,
+            inductance,
+            delay_s:  1.5 * committed.interval_s,
+            passed_s,
+            limit_v: self.target.voltage_limit_v,
+            fills: limits.follows == Regulated::Angle,
+        });
+        self.weakening.step(&weakening::Input {
+            wanted_v: output.wanted_v,
+            limit_v: self.limit_v,
+            filled: limits.filled,
+            reactance_ohm: omega.abs() * inductance.by_d.d,
+            resistance_ohm: resistance,
+            largest_a: tables.ratings.max_current_a,
+            passed_s,
+        });
+        let vector = output.voltage.unpark(sample.frame);
+        VoltageVector {
+            voltage_v: output.length_v,
+            vector,
+            carrier: if by_pulses { output.steady.unpark(sample.frame) } else { vector },
+            steady_v: output.steady.length(),
+        }
+    }
+}
+
+impl PiLaw {
+    /// EMF of what flows while the gates are off, from which a pattern begins.
+    fn start_flying(&self, sample: &RotorSample, omega: f32) -> VoltageVector {
+        let emf = sample.flux.j() * omega;
+        let vector = emf.unpark(sample.frame);
+        VoltageVector { voltage_v: emf.length(), vector, carrier: vector, steady_v: emf.length() }
+    }
+}
+
+/// Incremental inductances at a current with its flux linkage, in H: what the flux linkage of both axes gains by the current of each.
+fn inductance(tables: &Tables, current: Dq, flux: Dq) -> Inductance {
+    let further = |d: f32, q: f32| (flux_linkage(tables, current + Dq { d, q }) - flux) * (1.0 / STEP_A);
+    Inductance { by_d: further(STEP_A, 0.0), by_q: further(0.0, STEP_A) }
+}
