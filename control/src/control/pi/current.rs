@@ -1,9 +1,29 @@
 //! Two PIs in the rotor's frame, decoupled, behind the circle of the largest voltage.
 
+use super::super::Regulated;
 use crate::frames::Dq;
 
-/// Longest integral time, in sums of the delays.
-const INTEGRAL_DELAYS: f32 = 40.0;
+/// The design of the loops for what a mode can follow.
+#[derive(Clone, Copy, Debug)]
+pub struct Design {
+    /// Carrier halves from a sample to the middle of what a command makes of it. The textbook's are 1.5; a pattern follows later.
+    pub delay_halves: f32,
+    /// Integral time, in these delays: L/R with the largest current where carriers follow, longer where the angle alone does.
+    integral_delays: f32,
+    /// Share of the reference in the current that decouples; the rest is measured. In square wave that alone is too old.
+    pub set_share: f32,
+}
+
+impl Design {
+    /// That for a mode.
+    pub const fn of(follows: Regulated) -> Self {
+        match follows {
+            Regulated::Mean => Self { delay_halves: 1.5, integral_delays: 40.0, set_share: 0.0 },
+            Regulated::Fundamental => Self { delay_halves: 2.25, integral_delays: 40.0, set_share: 0.0 },
+            Regulated::Angle => Self { delay_halves: 3.0, integral_delays: 80.0, set_share: 0.5 },
+        }
+    }
+}
 
 /// The two integrators.
 #[derive(Clone, Copy, Debug)]
@@ -14,16 +34,17 @@ pub struct Loop {
 
 /// Everything that a step works on.
 pub struct Input {
-    /// Reference and measured current, in A.
+    /// Reference, the newest sample and the current without ripple, in A.
     pub reference: Dq,
     pub measured: Dq,
     pub without_ripple: Dq,
     /// What decouples, and the drop of the reference, in V.
     pub forward: Dq,
-    /// Incremental inductances of the axes, in H.
+    /// Incremental inductances.
     pub inductance: Inductance,
-    /// Sum of the delays from what is measured to the middle of the voltage that comes of it, in s.
-    pub delay_s: f32,
+    /// The loops' design, and the length of a carrier half in s.
+    pub design: Design,
+    pub half_s: f32,
     /// Time since the last step, in s.
     pub passed_s: f32,
     /// Largest voltage, in V, and `true` if it is to be used whatever is asked for.
@@ -44,23 +65,26 @@ pub struct Output {
 }
 
 impl Loop {
+    /// Both integrators empty.
     pub const AT_REST: Self = Self { integral: Dq { d: 0.0, q: 0.0 } };
 
-    /// One step. Modulus optimum: gain L/(2 T) with the sum T of the delays, integral time L/R, but no more than twenty of T.
+    /// One step. Modulus optimum: with T the sum of the delays the gain is L/(2 T). The proportional part takes the newest sample, the
+    /// integral one what has no ripple.
     pub fn step(&mut self, input: &Input) -> Output {
-        let Input { reference, measured, inductance, delay_s, passed_s, limit_v, .. } = *input;
-        let per_delay = 0.5 / delay_s;
-        let proportional = inductance.of(reference - measured) * per_delay;
+        let Input { reference, inductance, design, limit_v, .. } = *input;
+        let delay_s = design.delay_halves * input.half_s;
+        let per_s = 0.5 / delay_s;
+        let proportional = inductance.of(reference - input.measured) * per_s;
         let steady = input.forward + self.integral;
         let wanted = steady + proportional;
         let wanted_v = wanted.length();
-        let fits = wanted_v <= limit_v && !input.fills || wanted_v == 0.0;
+        let fits = (wanted_v <= limit_v && !input.fills) || wanted_v == 0.0;
         let (voltage, length_v) =
             if fits { (wanted, wanted_v) } else { (wanted * (limit_v / wanted_v), limit_v) };
-        // Held back by the voltage that is not to be had, as far as the integral time.
-        let integrated = inductance.of(reference - input.without_ripple) * per_delay;
-        let missing = integrated + voltage - wanted;
-        self.integral = self.integral + missing * (passed_s / (INTEGRAL_DELAYS * delay_s));
+        // Held back by the voltage that is not to be had.
+        let error = inductance.of(reference - input.without_ripple) * per_s;
+        let share = input.passed_s / (design.integral_delays * delay_s);
+        self.integral = self.integral + (error + voltage - wanted) * share;
         Output { voltage, length_v, wanted_v, steady }
     }
 }
@@ -68,7 +92,9 @@ impl Loop {
 /// Incremental inductances, in H: the flux linkage of both axes for the current of one.
 #[derive(Clone, Copy, Debug)]
 pub struct Inductance {
+    /// For the current of d.
     pub by_d: Dq,
+    /// For the current of q.
     pub by_q: Dq,
 }
 

@@ -59,10 +59,10 @@ use super::{
     VoltageVector, flux_linkage, torque_nm,
 };
 use crate::frames::{Dq, six_step_v};
-use core::f32::consts::FRAC_PI_3;
 use crate::machine::Tables;
 use crate::time::Clock;
-use current::{Inductance, Loop};
+use core::f32::consts::FRAC_PI_3;
+use current::{Design, Inductance, Loop};
 use reference::Reference;
 use samples::Samples;
 use weakening::Weakening;
@@ -212,22 +212,25 @@ impl ControlLaw for PiLaw {
         if committed.volt_seconds.is_none() && !by_pulses {
             return self.start_flying(sample, omega);
         }
-        let window_s = if by_pulses { 0.0 } else { FRAC_PI_3 / omega.abs() };
-        let measured = self.samples.mean(window_s / control_s);
-        let flux = flux_linkage(tables, measured);
-        let half_way = (measured + self.target.current) * 0.5;
+        let design = Design::of(limits.follows);
+        let measured = sample.current;
+        let without_ripple = match self.samples.boundary {
+            _ if !by_pulses => self.samples.mean(FRAC_PI_3 / (omega.abs() * control_s)),
+            Some(current) => current,
+            None => measured,
+        };
+        let reference = self.target.current;
+        let half_way = (measured + reference) * 0.5;
         let inductance = inductance(tables, half_way, flux_linkage(tables, half_way));
-        let coupling = if by_pulses { flux } else { self.target.flux };
+        let coupling = sample.flux * (1.0 - design.set_share) + self.target.flux * design.set_share;
         let output = self.current.step(&current::Input {
-            reference: self.target.current,
+            reference,
             measured,
-            without_ripple: match self.samples.boundary {
-                Some(current) if by_pulses => current,
-                _ => measured,
-            },
-            forward: coupling.j() * omega + self.target.current * resistance,
+            without_ripple,
+            forward: coupling.j() * omega + reference * resistance,
             inductance,
-            delay_s:  1.5 * committed.interval_s,
+            design,
+            half_s: committed.interval_s,
             passed_s,
             limit_v: self.target.voltage_limit_v,
             fills: limits.follows == Regulated::Angle,

@@ -16,6 +16,7 @@ pub struct Samples {
 }
 
 impl Samples {
+    /// None yet.
     pub const EMPTY: Self = Self { boundary: None, kept: [Dq { d: 0.0, q: 0.0 }; KEPT], newest: 0, count: 0 };
 
     /// Takes a control period's sample.

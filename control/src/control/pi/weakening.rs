@@ -3,9 +3,9 @@
 use crate::frames::limit;
 
 /// Bandwidth of the feedback, in rad/s: well below that of the current loops.
-const BANDWIDTH_RAD_S: f32 = 40.0;
+const BANDWIDTH_RAD_S: f32 = 30.0;
 /// Share of the largest voltage that weakening leaves to the steady state; the rest regulates.
-const STEADY_SHARE: f32 = 0.95;
+const STEADY_SHARE: f32 = 0.97;
 
 /// The integrator on the voltage.
 #[derive(Clone, Copy, Debug)]
@@ -38,6 +38,7 @@ impl Weakening {
         self.moved_a
     }
 
+    /// One step.
     pub fn step(&mut self, input: &Input) {
         let share = if input.filled { 1.0 } else { STEADY_SHARE };
         let left_v = share * input.limit_v - input.wanted_v;
