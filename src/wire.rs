@@ -52,8 +52,6 @@ pub struct Setup {
     pub uncompensated: bool,
     /// A line filter stands in front of the link: it is to be damped.
     pub behind_line_filter: bool,
-    /// Where MTPA starts, to the image with the ordinary law.
-    pub mtpa_start: MtpaStart,
 }
 
 /// From the firmware to the rig.
@@ -162,11 +160,23 @@ pub fn setup_to_block(setup: Setup) -> Block {
     let ticks = [setup.min_pulse_ticks, setup.dead_time_ticks, setup.pwm_delay_ticks];
     let flags = [
         setup.over_protocol.into(),
-        u32::from(setup.uncompensated)
-            | u32::from(setup.behind_line_filter) << 1
-            | u32::from(setup.mtpa_start == MtpaStart::Zero) << 2,
+        u32::from(setup.uncompensated) | u32::from(setup.behind_line_filter) << 1,
     ];
     filled(ticks.into_iter().chain(line_to_words(setup.line)).chain(flags).chain([setup.control_ticks]))
+}
+
+/// The same, with where MTPA starts, for the image with the papers' ordinary law.
+pub fn setup_with_start(setup: Setup, start: MtpaStart) -> Block {
+    let mut block = setup_to_block(setup);
+    let [.., last] = &mut block;
+    *last = u32::from(start == MtpaStart::Zero);
+    block
+}
+
+/// The start of MTPA in such a block.
+pub fn start_from_block(block: &Block) -> MtpaStart {
+    let [.., last] = *block;
+    if last == 0 { MtpaStart::Previous } else { MtpaStart::Zero }
 }
 
 fn line_to_words(line: Option<LineTimes>) -> [u32; 3] {
@@ -205,7 +215,6 @@ pub fn setup_from_block(block: &Block) -> Setup {
         over_protocol: frames != 0,
         uncompensated: gains & 1 != 0,
         behind_line_filter: gains & 2 != 0,
-        mtpa_start: if gains & 4 != 0 { MtpaStart::Zero } else { MtpaStart::Previous },
     }
 }
 

@@ -123,20 +123,19 @@ impl Outcomes<'_> {
         self.by_line.get(&(line.to_owned(), self.law))
     }
 
+    /// The figures of a run; the fault where it tripped.
+    fn figures(&self, line: &str) -> Result<&Figures, &'static str> {
+        let outcome = self.of(line).ok_or("not run")?;
+        outcome.trip.map_or(Ok(&outcome.figures), Err)
+    }
+
     /// The numbers of these runs, one after another; the fault where one of them tripped.
     fn read(
         &self,
         lines: &[&str],
         number: impl Fn(&Figures) -> Option<f64>,
     ) -> Result<Vec<f64>, &'static str> {
-        let read = |line: &&str| {
-            let outcome = self.of(line).ok_or("not run")?;
-            match outcome.trip {
-                Some(fault) => Err(fault),
-                None => number(&outcome.figures).ok_or("not seen"),
-            }
-        };
-        lines.iter().map(read).collect()
+        lines.iter().map(|line| number(self.figures(line)?).ok_or("not seen")).collect()
     }
 }
 

@@ -117,6 +117,11 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         (self.settings, self.now) = (settings, first);
     }
 
+    /// Another control law of the same kind, at rest, before the first call.
+    pub fn set_law(&mut self, controller: L) {
+        self.controller = controller;
+    }
+
     /// The control timer's interrupt. Deadline: one control period after its nominal instant; a missed one is a fault.
     pub fn run(&mut self, port: &mut impl ControlPort, shared: &Shared) {
         let now = self.now;

@@ -43,7 +43,7 @@ use tractive::modulation::SwitchLimits;
 use tractive::operator::{Line, LineTimes};
 use tractive::recorder::Recorder;
 use tractive::time::{Clock, Instant};
-use tractive::wire::Setup;
+use tractive::wire::{self, Setup};
 
 /// The usual lead, in s.
 const LEAD_S: f64 = 0.1;
@@ -83,6 +83,16 @@ pub enum StartName {
     Previous,
     /// No current, as we read the paper
     Zero,
+}
+
+impl StartName {
+    /// As the law takes it.
+    const fn of(self) -> MtpaStart {
+        match self {
+            Self::Previous => MtpaStart::Previous,
+            Self::Zero => MtpaStart::Zero,
+        }
+    }
 }
 
 /// Options of all its scenarios.
@@ -222,12 +232,13 @@ impl System for Traction {
                 let run = OnHost { name, bench, setup: &setup, machine };
                 match options.own.law {
                     LawName::Tractive => run.run(Controller::new(), supervisor),
-                    LawName::Pi => run.run(PiLaw::starting(setup.mtpa_start), supervisor),
+                    LawName::Pi => run.run(PiLaw::starting(options.own.mtpa_start.of()), supervisor),
                 }
             }
             On::Qemu => {
                 let patient = supervisor.as_ref().is_some_and(|supervisor| supervisor.is_typed());
-                run_in_qemu(name, bench, setup, &options.emulator(patient)?, supervisor)
+                let hello = wire::setup_with_start(setup, options.own.mtpa_start.of());
+                run_in_qemu(name, bench, hello, &options.emulator(patient)?, supervisor)
             }
         }
     }
@@ -314,10 +325,6 @@ fn setup(plan: &Plan, options: &Options, machine: &Machine, over_protocol: bool)
         over_protocol,
         uncompensated,
         behind_line_filter: options.own.line.is_some(),
-        mtpa_start: match options.own.mtpa_start {
-            StartName::Previous => MtpaStart::Previous,
-            StartName::Zero => MtpaStart::Zero,
-        },
     }
 }
 
