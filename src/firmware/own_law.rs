@@ -17,5 +17,5 @@ pub fn connect() -> Setup {
     qemu::connect()
 }
 
-/// Sets the law up, before the first interrupt's work.
-pub const fn set_up(_task: &mut ControlTask<BuiltIn, Law>) {}
+/// Its set-up before the first interrupt's work: none.
+pub const SET_UP: Option<fn(&mut ControlTask<BuiltIn, Law>)> = None;

@@ -22,8 +22,10 @@ pub fn connect() -> Setup {
     setup
 }
 
-/// Sets the law up, before the first interrupt's work.
-pub fn set_up(task: &mut ControlTask<BuiltIn, Law>) {
+/// Its set-up before the first interrupt's work.
+pub const SET_UP: Option<fn(&mut ControlTask<BuiltIn, Law>)> = Some(set_up);
+
+fn set_up(task: &mut ControlTask<BuiltIn, Law>) {
     if STARTS_AT_ZERO.load(Ordering::Relaxed) {
         task.set_law(PiLaw::starting(MtpaStart::Zero));
     }

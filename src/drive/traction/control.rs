@@ -364,12 +364,11 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         let (omega, udc_v) = (self.controller.omega(), sample.udc_v);
         let tables = self.machine.tables();
         let steady = Steady { omega, udc_v, voltage_v: self.steady_v, depth: self.depth };
-        self.limits =
-            limits(&slot.key, &steady, &mut self.exit, &self.settings, self.controller.passed_s(clock));
+        let passed_s = self.controller.passed_s(clock);
+        self.limits = limits(&slot.key, &steady, &mut self.exit, &self.settings, passed_s);
         let emf_v = omega.abs() * tables.ratings.magnet_flux_wb * self.controller.map_scale();
         let torque_nm = self.exit.one_sided(command.demand.torque_nm, emf_v, udc_v, &tables.ratings);
         let demand = Demand { torque_nm, ..command.demand };
-        let passed_s = self.controller.passed_s(clock);
         let damps = gains.link_damping > 0.0;
         let swing = damps.then(|| self.damper.step(udc_v, passed_s, omega, self.limits.follows));
         let window = Some(&command.window);
