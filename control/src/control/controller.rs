@@ -117,27 +117,22 @@ impl ControlLaw for Controller {
         &mut self.speed
     }
 
-    #[inline]
     fn map_scale(&self) -> f32 {
         self.map_error.scale()
     }
 
-    #[inline]
     fn map_error(&self) -> f32 {
         self.map_error.share()
     }
 
-    #[inline]
     fn passed_s(&self, clock: &Clock) -> f32 {
         self.samples as f32 * clock.control_s()
     }
 
-    #[inline]
     fn target(&self) -> &Target {
         &self.target
     }
 
-    #[inline]
     fn idle(&mut self) {
         self.demand = demand::Shaper::new();
         self.disturbance = disturbance::Observer::new();
@@ -148,7 +143,6 @@ impl ControlLaw for Controller {
         self.target = Target::NONE;
     }
 
-    #[inline]
     fn begin_without_torque(&mut self) {
         self.demand = demand::Shaper::without_torque();
     }
