@@ -268,3 +268,116 @@ fn inductance(tables: &Tables, current: Dq, flux: Dq) -> Inductance {
     let further = |d: f32, q: f32| (flux_linkage(tables, current + Dq { d, q }) - flux) * (1.0 / STEP_A);
     Inductance { by_d: further(STEP_A, 0.0), by_q: further(0.0, STEP_A) }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::current::{Design, Inductance, Input, Loop};
+    use super::weakening::{self, Weakening};
+    use super::*;
+
+    const HALF_S: f32 = 0.5e-3;
+    const RESISTANCE: f32 = 0.1;
+    const INDUCTANCE_H: Dq = Dq { d: 4e-3, q: 8e-3 };
+    const LIMIT_V: f32 = 800.0;
+
+    /// A linear machine without magnets behind the loops, one half of delay between a sample and its voltage.
+    struct Plant {
+        current: Dq,
+        pending: Dq,
+        omega: f32,
+    }
+
+    impl Plant {
+        fn flux(&self) -> Dq {
+            Dq { d: INDUCTANCE_H.d * self.current.d, q: INDUCTANCE_H.q * self.current.q }
+        }
+
+        /// One half, in small steps.
+        fn step(&mut self, voltage: Dq) {
+            let acts = core::mem::replace(&mut self.pending, voltage);
+            for _ in 0..50 {
+                let slope = acts - self.current * RESISTANCE - self.flux().j() * self.omega;
+                let step_s = HALF_S / 50.0;
+                let change = Dq { d: slope.d / INDUCTANCE_H.d, q: slope.q / INDUCTANCE_H.q };
+                self.current = self.current + change * step_s;
+            }
+        }
+    }
+
+    /// So many halves towards a reference; the currents' largest q on the way, and the last voltage that was asked for.
+    fn drive(plant: &mut Plant, loops: &mut Loop, reference: Dq, limit_v: f32, halves: usize) -> (f32, f32) {
+        let (mut highest_a, mut wanted_v) = (0.0_f32, 0.0);
+        for _ in 0..halves {
+            let output = loops.step(&Input {
+                reference,
+                measured: plant.current,
+                without_ripple: plant.current,
+                forward: plant.flux().j() * plant.omega + reference * RESISTANCE,
+                inductance: Inductance {
+                    by_d: Dq { d: INDUCTANCE_H.d, q: 0.0 },
+                    by_q: Dq { d: 0.0, q: INDUCTANCE_H.q },
+                },
+                design: Design::of(Regulated::Mean),
+                half_s: HALF_S,
+                passed_s: HALF_S,
+                limit_v,
+                fills: false,
+            });
+            assert!(output.length_v <= limit_v * 1.000_1);
+            plant.step(output.voltage);
+            highest_a = highest_a.max(plant.current.q);
+            wanted_v = output.wanted_v;
+        }
+        (highest_a, wanted_v)
+    }
+
+    fn at_rest(omega: f32) -> (Plant, Loop) {
+        (Plant { current: Dq::default(), pending: Dq::default(), omega }, Loop::AT_REST)
+    }
+
+    #[test]
+    fn a_step_is_followed_as_the_modulus_optimum_has_it() {
+        let (mut plant, mut loops) = at_rest(100.0);
+        let reference = Dq { d: -20.0, q: 40.0 };
+        let (highest_a, _) = drive(&mut plant, &mut loops, reference, LIMIT_V, 8);
+        assert!(plant.current.q > 0.9 * 40.0, "{:?} after 4 ms", plant.current);
+        assert!(highest_a < 1.15 * 40.0, "{highest_a} A");
+        drive(&mut plant, &mut loops, reference, LIMIT_V, 400);
+        assert!((plant.current - reference).length() < 0.05, "{:?}", plant.current);
+    }
+
+    #[test]
+    fn a_voltage_that_is_not_to_be_had_winds_nothing_up() {
+        // 200 A would take 1,600 V at this speed; after a second of that the way back takes a few integral times of 30 ms, and would take seconds.
+        let (mut plant, mut loops) = at_rest(1_000.0);
+        drive(&mut plant, &mut loops, Dq { d: 0.0, q: 200.0 }, LIMIT_V, 2_000);
+        drive(&mut plant, &mut loops, Dq { d: 0.0, q: 20.0 }, LIMIT_V, 240);
+        assert!((plant.current.q - 20.0).abs() < 0.5, "{:?} after 120 ms", plant.current);
+    }
+
+    #[test]
+    fn weakening_keeps_the_limit_of_the_voltage() {
+        // A magnet of 1 Wb at 1,000 rad/s asks for 1,000 V: i_d of (0.97 · 800 − 1,000) / (1,000 · 4 mH) leaves 776 V.
+        let mut weakening = Weakening::NONE;
+        let wanted_v = |moved_a: f32| 1_000.0 * (1.0 + INDUCTANCE_H.d * moved_a);
+        let input = |moved_a: f32, wanted_v: f32| weakening::Input {
+            wanted_v: if moved_a.is_finite() { wanted_v } else { f32::NAN },
+            limit_v: LIMIT_V,
+            filled: false,
+            reactance_ohm: 1_000.0 * INDUCTANCE_H.d,
+            resistance_ohm: RESISTANCE,
+            largest_a: 200.0,
+            passed_s: HALF_S,
+        };
+        for _ in 0..2_000 {
+            let moved_a = weakening.moved_a();
+            weakening.step(&input(moved_a, wanted_v(moved_a)));
+        }
+        assert!((wanted_v(weakening.moved_a()) - 776.0).abs() < 1.0, "{} A", weakening.moved_a());
+        // With voltage to spare it goes back to MTPA, and no further.
+        for _ in 0..2_000 {
+            weakening.step(&input(weakening.moved_a(), 400.0));
+        }
+        assert_eq!(weakening.moved_a(), 0.0);
+    }
+}

@@ -195,6 +195,10 @@ impl System for Traction {
     type Plan = Plan;
     type Recording = Recording;
 
+    fn law(own: &TractionOptions) -> Option<&'static str> {
+        Some(own.law.name())
+    }
+
     fn trace_step_s(_own: &TractionOptions) -> f64 {
         STEP_S
     }
