@@ -11,7 +11,7 @@
 //!
 //! ```
 //! use tractive_control::control::{
-//!     AimInput, Committed, ControlLaw, Demand, Gains, Law, ModeLimits, PiLaw, Regulated, RotorSample, mtpa,
+//!     AimInput, Committed, ControlLaw, Demand, Gains, Law, ModeLimits, PiLaw, Regulated, RotorSample, flux_linkage, mtpa, torque_nm,
 //! };
 //! use tractive_control::frames::{AlphaBeta, Angle};
 //! use tractive_control::time::Clock;
@@ -40,7 +40,8 @@
 //!     pi.aim(&input, &law);
 //! }
 //! let wanted = pi.target().current;
-//! assert!((wanted - mtpa(700.0, &tables)).length() < 5.0, "its own way to the least current");
+//! let torque = torque_nm(&tables, flux_linkage(&tables, wanted), wanted);
+//! assert!((torque - 700.0).abs() < 7.0, "within 1 % of the demand once the passes no longer move");
 //! let voltage = pi.regulate(&sample, &committed, &limits, &law);
 //! assert!(voltage.vector.beta > 50.0 && voltage.voltage_v < 860.0, "more i_q is wanted");
 //! # Ok(())
