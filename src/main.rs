@@ -22,5 +22,9 @@ compile_error!("the reference images need the feature `qemu`");
 use tractive::board::qemu;
 
 #[cfg(all(target_os = "none", feature = "qemu"))]
+#[path = "firmware/own_law.rs"]
+mod law;
+
+#[cfg(all(target_os = "none", feature = "qemu"))]
 #[path = "firmware/pmasynrm.rs"]
 mod firmware;

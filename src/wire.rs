@@ -9,7 +9,7 @@
 mod dual;
 
 use crate::cell::Words;
-use crate::control::{Demand, LinkWindow};
+use crate::control::{Demand, LinkWindow, MtpaStart};
 use crate::drive::{half_from_words, half_to_words};
 use crate::frames::{Abc, Angle};
 use crate::modulation::CarrierHalf;
@@ -163,6 +163,20 @@ pub fn setup_to_block(setup: Setup) -> Block {
         u32::from(setup.uncompensated) | u32::from(setup.behind_line_filter) << 1,
     ];
     filled(ticks.into_iter().chain(line_to_words(setup.line)).chain(flags).chain([setup.control_ticks]))
+}
+
+/// The same, with where MTPA starts, for the image with the papers' ordinary law.
+pub fn setup_with_start(setup: Setup, start: MtpaStart) -> Block {
+    let mut block = setup_to_block(setup);
+    let [.., last] = &mut block;
+    *last = u32::from(start == MtpaStart::Zero);
+    block
+}
+
+/// The start of MTPA in such a block.
+pub fn start_from_block(block: &Block) -> MtpaStart {
+    let [.., last] = *block;
+    if last == 0 { MtpaStart::Previous } else { MtpaStart::Zero }
 }
 
 fn line_to_words(line: Option<LineTimes>) -> [u32; 3] {

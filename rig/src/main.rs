@@ -7,6 +7,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use tractive_rig::benchmark::{self, BenchOptions};
 use tractive_rig::campaign::{self, command::CampaignOptions};
+use tractive_rig::compare::{self, CompareOptions};
 use tractive_rig::folder::{self, MachineCommand};
 use tractive_rig::machine::Machine;
 use tractive_rig::needs::Needs;
@@ -59,6 +60,8 @@ enum Command {
     Campaign(CampaignOptions),
     /// The papers' figures as this project makes them, an SVG each, named by paper and number.
     Figures(gallery::FigureOptions),
+    /// Both control laws in the same runs, the project's own and the ordinary one: what each reached.
+    Compare(CompareOptions),
     /// The nine-switch modulator's gates for one carrier period (T = 1): IN.csv has scheme,theta1_deg,m1,theta2_deg,m2,d_sh;
     /// OUT.csv adds for each gate UH ... WL its level just after t = 0 (X_init) and its toggle instants (X_edges, with ; between),
     /// feasible (1 or 0; then the gates are those of what fits), m1_applied and m2_applied.
@@ -113,6 +116,7 @@ fn command(command: Command) -> Result<ExitCode> {
         Command::Machine(command) => done(folder::run(&command)),
         Command::NineSwitch { input, output } => done(nine_switch::run(&input, &output)),
         Command::Campaign(options) => campaign::command::run(&options),
+        Command::Compare(options) => compare::run(&options),
         Command::Pattern(options) => {
             let machine = Machine::load(&options.machine)?;
             let max_switching_hz = machine.tables.ratings.max_switching_hz;

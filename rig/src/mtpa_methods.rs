@@ -22,7 +22,13 @@ pub struct MethodFigures {
 }
 
 /// The method that the firmware runs.
-const OURS: &str = "the same, trimmed: ours";
+pub const OURS: &str = "the same, trimmed: ours";
+/// The plain reading of the paper: `--law pi --mtpa-start zero`.
+pub const ZERO: &str = "two passes from L(0, 0), as we read the paper";
+/// Where the passes no longer move: `--law pi`.
+pub const PREVIOUS: &str = "two passes from the point before, again and again";
+/// More passes than the fixed point needs.
+const MANY: usize = 60;
 /// Its bounds: torque off, and current above the least, in percent.
 const BOUNDS: (f64, f64) = (0.3, 0.05);
 
@@ -58,7 +64,8 @@ pub fn compare(machine: &Machine) -> Vec<MethodFigures> {
         let started = Dq { d: start_d, q: start_q };
         let methods = [
             ("one pass from L(0, 0)", mtpa_passes::<1>(wanted, zero, tables)),
-            ("two passes from L(0, 0), as we read the paper", mtpa_passes::<2>(wanted, zero, tables)),
+            (ZERO, mtpa_passes::<2>(wanted, zero, tables)),
+            (PREVIOUS, mtpa_passes::<MANY>(wanted, zero, tables)),
             ("two passes as we start them", mtpa_passes::<2>(wanted, started, tables)),
             (OURS, mtpa(wanted, tables)),
         ];

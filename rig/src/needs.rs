@@ -3,7 +3,7 @@
 use crate::options::{On, RunOptions};
 use crate::scenario::System;
 use crate::scenario::catalogue::{self, Chosen};
-use crate::scenario::traction::Traction;
+use crate::scenario::traction::{LawName, Traction};
 use crate::scenario::zs9::Zs9;
 use crate::talk::{self, TalkOptions};
 use anyhow::Result;
@@ -16,6 +16,8 @@ use std::path::PathBuf;
 pub struct Needs {
     /// `pmasynrm` or `zs9`.
     pub system: &'static str,
+    /// The control law: `tractive` or `pi`.
+    pub law: &'static str,
     /// The place where the drive runs.
     pub on: On,
     /// The machine that was named.
@@ -33,6 +35,7 @@ impl Needs {
         let in_qemu = options.on == On::Qemu;
         Self {
             system,
+            law: LawName::Tractive.name(),
             on: options.on,
             machine: options.machine.clone(),
             image: in_qemu && options.image.is_none(),
@@ -44,7 +47,10 @@ impl Needs {
     /// Of the words behind `run`.
     pub fn of_run(words: Vec<OsString>) -> Result<Self> {
         Ok(match catalogue::choose(words)? {
-            Chosen::Traction(choice) => Self::of(Traction::NAME, &choice.options),
+            Chosen::Traction(choice) => {
+                let law = choice.options.own.law.name();
+                Self { law, ..Self::of(Traction::NAME, &choice.options) }
+            }
             Chosen::Zs9(choice) => Self::of(Zs9::NAME, &choice.options),
         })
     }

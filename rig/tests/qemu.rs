@@ -1,4 +1,4 @@
-//! The images in QEMU against the same code on the host, byte for byte. Needs TRACTIVE_IMAGE, TRACTIVE_ZS9_IMAGE (and TRACTIVE_QEMU);
+//! The images in QEMU against the same code on the host, byte for byte. Needs TRACTIVE_IMAGE, TRACTIVE_PI_IMAGE, TRACTIVE_ZS9_IMAGE (and TRACTIVE_QEMU);
 //! `cargo xtask test` sets them, so these tests are ignored otherwise.
 
 use std::path::{Path, PathBuf};
@@ -8,6 +8,11 @@ fn run(scenario: &str, on: &str, out: &Path) -> (i32, String) {
     let mut command = Command::new(env!("CARGO_BIN_EXE_tractive-rig"));
     if scenario.starts_with("zs9-")
         && let Some(image) = std::env::var_os("TRACTIVE_ZS9_IMAGE")
+    {
+        command.env("TRACTIVE_IMAGE", image);
+    }
+    if scenario.ends_with("--law pi")
+        && let Some(image) = std::env::var_os("TRACTIVE_PI_IMAGE")
     {
         command.env("TRACTIVE_IMAGE", image);
     }
@@ -64,6 +69,13 @@ fn braking_is_the_same() {
 #[ignore = "needs the image and QEMU"]
 fn the_characteristic_is_the_same() {
     same("characteristic", 0);
+}
+
+/// Every mode, with the papers' ordinary law in place of ours; its bounds are not kept.
+#[test]
+#[ignore = "needs the image and QEMU"]
+fn the_ordinary_law_is_the_same() {
+    same("timing --to 6000 --law pi", 0);
 }
 
 #[test]

@@ -15,6 +15,7 @@ pub use dual::{DUAL_RECORDER, DualIdle, connect_dual, die_dual, start_dual};
 pub use watch::ends as watch_ends;
 
 use crate::configuration::Refused;
+use crate::control::MtpaStart;
 use crate::frames::Abc;
 use crate::modulation::CarrierHalf;
 use crate::operator::{self, Feedback, OperatorPort, Status};
@@ -103,6 +104,13 @@ pub fn connect() -> Setup {
     let setup = exchange::open();
     OPERATED.store(setup.line.is_some() || setup.over_protocol, Ordering::Relaxed);
     setup
+}
+
+/// The same, with where the MTPA of the papers' ordinary law starts.
+pub fn connect_with_start() -> (Setup, MtpaStart) {
+    let (setup, start) = exchange::open_with_start();
+    OPERATED.store(setup.line.is_some() || setup.over_protocol, Ordering::Relaxed);
+    (setup, start)
 }
 
 /// Starts both timers; the first PWM interrupt comes after `first_half_ticks`, the first control interrupt after one

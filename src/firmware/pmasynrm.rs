@@ -1,5 +1,7 @@
-//! The PMaSynRM's two interrupts and its idle loop, on whichever `qemu` the image's root names: the board, or the board with faults injected.
+//! The PMaSynRM's two interrupts and its idle loop, on whichever `qemu` the image's root names: the board, or the board with faults injected;
+//! and with the control law that its `law` names.
 
+use crate::law::{self, Law};
 use crate::qemu::{self, CLOCK, Interrupt as interrupt};
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use cortex_m_rt::{entry, exception, interrupt};
@@ -42,7 +44,7 @@ fn settings() -> Settings {
 
 #[entry]
 fn main() -> ! {
-    let setup = qemu::connect();
+    let setup = law::connect();
     CONTROL_TICKS.store(setup.control_ticks, Ordering::Relaxed);
     MIN_PULSE_TICKS.store(setup.min_pulse_ticks, Ordering::Relaxed);
     DEAD_TIME_TICKS.store(setup.dead_time_ticks, Ordering::Relaxed);
@@ -74,12 +76,16 @@ fn main() -> ! {
 /// Deadline: the next control interrupt. Missed: fault `control_deadline`, gates into the safe state.
 #[interrupt]
 fn TIMER0() {
-    static mut TASK: ControlTask<BuiltIn> = ControlTask::new(BuiltIn, DEFAULTS, Instant(CLOCK.control_ticks));
+    static mut TASK: ControlTask<BuiltIn, Law> =
+        ControlTask::with_law(BuiltIn, DEFAULTS, Instant(CLOCK.control_ticks), law::AT_REST);
     static mut IS_SET_UP: bool = false;
     let mut board = qemu::Control;
     if !*IS_SET_UP {
         let settings = settings();
         TASK.set_up(settings, Instant(settings.clock.control_ticks));
+        if let Some(set_up) = law::SET_UP {
+            set_up(TASK);
+        }
         *IS_SET_UP = true;
     }
     TASK.run(&mut board, &SHARED);

@@ -13,6 +13,9 @@ use std::process::{Command, Stdio};
 /// The feature of the reference images, on the emulated board.
 pub const QEMU: &str = "qemu";
 
+/// The PMaSynRM's image with the papers' ordinary control law.
+const PI: &str = "pi";
+
 /// The systems, each with an image of its own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum System {
@@ -64,6 +67,13 @@ pub fn image(toolchain: &Toolchain, system: System, machine: Option<&OsString>) 
     let mut command = on_target(toolchain, "tractive", system.image());
     command.args(["--features", QEMU]);
     firmware(command, system.image(), system, machine)
+}
+
+/// Builds the PMaSynRM's image with the papers' ordinary control law, likewise.
+pub fn pi_image(toolchain: &Toolchain, machine: Option<&OsString>) -> Result<PathBuf> {
+    let mut command = on_target(toolchain, "tractive", PI);
+    command.args(["--features", QEMU]);
+    firmware(command, PI, System::Traction, machine)
 }
 
 /// Builds a system's image for a board of real hardware, with the tables of `machine` if one is named.

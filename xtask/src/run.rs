@@ -21,6 +21,8 @@ const ZS9_SCRIPT: &str = "rig/scripts/zs9.talk";
 #[derive(Debug, Default, Deserialize, PartialEq, Eq)]
 struct Needs {
     system: String,
+    /// The control law: `tractive` or `pi`.
+    law: String,
     machine: Option<String>,
     /// `true` if the image is still to be built.
     image: bool,
@@ -75,7 +77,12 @@ pub fn run(verb: &str, words: &[OsString]) -> Result<u8> {
     }
     if needs.image {
         eprintln!("building the image, where it is not up to date");
-        rig.env("TRACTIVE_IMAGE", build::image(&setup.toolchain()?, needs.system(), machine.as_ref())?);
+        let (toolchain, machine) = (setup.toolchain()?, machine.as_ref());
+        let image = match needs.law.as_str() {
+            "pi" => build::pi_image(&toolchain, machine)?,
+            _ => build::image(&toolchain, needs.system(), machine)?,
+        };
+        rig.env("TRACTIVE_IMAGE", image);
     }
     Ok(code(rig.status().with_context(|| process::cannot_start(&rig))?))
 }

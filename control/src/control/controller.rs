@@ -3,10 +3,11 @@
 //! Nothing is computed that nobody uses: each control period follows the rotor and takes its sample into the mean torque; the
 //! operating point is made once for each command, and the voltage once.
 
+use super::speed::SpeedTracker;
 use super::{
-    Boundary, Committed, Demand, Law, LinkSwing, LinkWindow, ModeLimits, Region, Regulated, RotorSample,
-    VoltageLimit, VoltageVector, current_loop, demand, disturbance, flux_path, link_filter, map_error,
-    operating_point, speed, torque_nm, torque_trim,
+    Boundary, Committed, ControlLaw, Demand, Law, LinkSwing, LinkWindow, ModeLimits, Region, Regulated,
+    RotorSample, VoltageLimit, VoltageVector, current_loop, demand, disturbance, flux_path, link_filter,
+    map_error, operating_point, torque_nm, torque_trim,
 };
 use crate::frames::{Angle, Dq, six_step_v};
 use crate::machine::Tables;
@@ -37,7 +38,7 @@ pub struct Target {
 
 impl Target {
     /// While no pulses are made.
-    const NONE: Self = Self {
+    pub(super) const NONE: Self = Self {
         torque_nm: 0.0,
         current: Dq { d: 0.0, q: 0.0 },
         flux: Dq { d: 0.0, q: 0.0 },
@@ -65,7 +66,7 @@ pub struct AimInput<'a> {
 /// The control law's state between two control periods.
 #[derive(Clone, Copy, Debug)]
 pub struct Controller {
-    speed: speed::SpeedTracker,
+    speed: SpeedTracker,
     demand: demand::Shaper,
     disturbance: disturbance::Observer,
     trim: torque_trim::TorqueTrim,
@@ -81,15 +82,15 @@ pub struct Controller {
 impl Controller {
     /// At rest, with nothing known of the machine's angle.
     pub const fn new() -> Self {
-        Self::with_tracker(speed::SpeedTracker::new())
+        Self::with_tracker(SpeedTracker::new())
     }
 
     /// The same with a speed tracker of this natural frequency, in rad/s.
     pub const fn with_tracking(natural_rad_s: f32) -> Self {
-        Self::with_tracker(speed::SpeedTracker::with_natural(natural_rad_s))
+        Self::with_tracker(SpeedTracker::with_natural(natural_rad_s))
     }
 
-    const fn with_tracker(speed: speed::SpeedTracker) -> Self {
+    const fn with_tracker(speed: SpeedTracker) -> Self {
         Self {
             speed,
             demand: demand::Shaper::new(),
@@ -103,65 +104,36 @@ impl Controller {
             target: Target::NONE,
         }
     }
+}
 
-    /// Follows the angle; call once per control period, before the other stages and also while the gates are off.
-    /// Returns the electrical angular speed, in rad/s.
-    pub fn track(&mut self, angle: Angle, clock: &Clock) -> f32 {
-        self.speed.step(angle, clock.control_s())
+impl ControlLaw for Controller {
+    #[inline(always)]
+    fn tracker(&self) -> &SpeedTracker {
+        &self.speed
     }
 
-    /// By how much a measured angle, in rad, is off what the speed makes of the one before.
-    pub fn innovation_rad(&self, angle: Angle, clock: &Clock) -> f32 {
-        (angle - self.speed.predicted(clock.control_s())).signed_radians()
+    #[inline(always)]
+    fn tracker_mut(&mut self) -> &mut SpeedTracker {
+        &mut self.speed
     }
 
-    /// The angle cannot be followed: it is not known, or far off. The speed stays as it was.
-    pub fn lose_angle(&mut self) {
-        self.speed.lose();
-    }
-
-    /// Follows the angle anew, where it was lost; call once its fault is acknowledged. The speed is not known until it has settled again.
-    pub fn recover_angle(&mut self) {
-        self.speed.recover();
-    }
-
-    /// `true` once an angle has been followed since the start, or since it was recovered.
-    pub fn is_following(&self) -> bool {
-        self.speed.is_following()
-    }
-
-    /// `true` once the speed has been followed long enough to be used.
-    pub fn speed_is_known(&self) -> bool {
-        self.speed.is_settled()
-    }
-
-    /// Electrical angular speed, in rad/s, signed.
-    pub fn omega(&self) -> f32 {
-        self.speed.omega()
-    }
-
-    /// The machine's flux linkage over the map's, as far as an error of it is believed.
-    pub fn map_scale(&self) -> f32 {
+    fn map_scale(&self) -> f32 {
         self.map_error.scale()
     }
 
-    /// By how much the machine's flux linkage seems to exceed the map's, as a share; 0 where it turns too slowly to tell.
-    pub fn map_error(&self) -> f32 {
+    fn map_error(&self) -> f32 {
         self.map_error.share()
     }
 
-    /// Time since the last operating point, in s.
-    pub fn passed_s(&self, clock: &Clock) -> f32 {
+    fn passed_s(&self, clock: &Clock) -> f32 {
         self.samples as f32 * clock.control_s()
     }
 
-    /// The target of the current loop by the newest operating point; nothing while no pulses are made.
-    pub fn target(&self) -> &Target {
+    fn target(&self) -> &Target {
         &self.target
     }
 
-    /// Forgets demand and disturbance, as the gates are off.
-    pub fn idle(&mut self) {
+    fn idle(&mut self) {
         self.demand = demand::Shaper::new();
         self.disturbance = disturbance::Observer::new();
         self.trim = torque_trim::TorqueTrim::new();
@@ -171,21 +143,18 @@ impl Controller {
         self.target = Target::NONE;
     }
 
-    /// After [`Controller::idle`]: the next torque begins at none, whatever flows.
-    pub fn begin_without_torque(&mut self) {
+    fn begin_without_torque(&mut self) {
         self.demand = demand::Shaper::without_torque();
     }
 
-    /// Takes the sample of a control period into the mean torque; call in each one while pulses are made.
     #[inline(always)]
-    pub fn observe(&mut self, sample: &RotorSample, tables: &Tables) {
+    fn observe(&mut self, sample: &RotorSample, tables: &Tables) {
         self.sum_nm += torque_nm(tables, sample.flux, sample.current);
         self.samples += 1;
     }
 
-    /// Learns at a carrier boundary, from the sample there, which voltage the pulses leave unexplained, and how wrong the map is.
     #[inline(always)]
-    pub fn learn(&mut self, boundary: &Boundary, sample: &RotorSample, follows: Regulated, law: &Law) {
+    fn learn(&mut self, boundary: &Boundary, sample: &RotorSample, follows: Regulated, law: &Law) {
         let omega = self.speed.omega();
         let turn_rad = 6.0 * omega.abs() * boundary.length_s;
         let sixth = follows == Regulated::Mean && turn_rad < law.gains.sixth_turn_rad;
@@ -194,8 +163,7 @@ impl Controller {
         self.disturbance.step(&input, law.gains);
     }
 
-    /// Makes the operating point, once for each command; call after [`Controller::observe`].
-    pub fn aim(&mut self, input: &AimInput, law: &Law) {
+    fn aim(&mut self, input: &AimInput, law: &Law) {
         let AimInput { demand, window, udc_v, swing, limits } = *input;
         let (tables, omega) = (law.tables, self.speed.omega());
         let ratings = &tables.ratings;
@@ -245,9 +213,8 @@ impl Controller {
         };
     }
 
-    /// The voltage for the carrier half that begins at the horizon, from the newest sample.
     #[inline(always)]
-    pub fn regulate(
+    fn regulate(
         &mut self,
         sample: &RotorSample,
         committed: &Committed,

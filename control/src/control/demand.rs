@@ -98,6 +98,7 @@ impl Shaper {
     }
 
     /// The shaped demand, in N·m.
+    #[inline(always)]
     pub fn step(&mut self, input: &Input, ratings: &Ratings) -> f32 {
         let wanted = input.demand.torque_nm;
         let last = match self.torque_nm {

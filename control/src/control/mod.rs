@@ -14,10 +14,12 @@ pub mod current_loop;
 mod demand;
 mod disturbance;
 mod flux_path;
+mod law;
 mod link_damper;
 mod link_filter;
 mod map_error;
 mod mtpa;
+mod pi;
 mod reference;
 mod speed;
 mod speed_loop;
@@ -32,9 +34,12 @@ pub use controller::{AimInput, Controller, Target};
 pub use current_loop::{Gains, Regulated};
 pub use demand::{Demand, LinkWindow};
 pub use disturbance::Observer;
+pub use law::ControlLaw;
 pub use link_damper::{LinkDamper, LinkSwing};
 pub use mtpa::{mtpa, mtpa_passes};
+pub use pi::{MtpaStart, PiLaw};
 pub use reference::{OperatingPoint, Region, VoltageLimit, operating_point};
+pub use speed::SpeedTracker;
 pub use speed_loop::{SpeedDesign, SpeedInput, SpeedLoop};
 pub use z_source::{
     Limited, ZSource, ZSourceDesign, ZSourceError, ZSourceGains, ZSourceInput, ZSourceOutput,

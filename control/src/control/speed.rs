@@ -7,6 +7,7 @@ const NATURAL_RAD_S: f32 = 500.0;
 /// Control periods until the estimate is used.
 const SETTLING_STEPS: u32 = 200;
 
+/// The speed and the angle that is followed, and how well.
 #[derive(Clone, Copy, Debug)]
 pub struct SpeedTracker {
     angle: Angle,
@@ -17,7 +18,14 @@ pub struct SpeedTracker {
     lost: bool,
 }
 
+impl Default for SpeedTracker {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
 impl SpeedTracker {
+    /// A tracker that has seen no angle.
     pub const fn new() -> Self {
         Self::with_natural(NATURAL_RAD_S)
     }
@@ -50,7 +58,7 @@ impl SpeedTracker {
         self.omega
     }
 
-    /// An angle was not followed.
+    /// Notes that an angle was not followed.
     pub fn lose(&mut self) {
         self.lost = true;
     }
@@ -62,14 +70,17 @@ impl SpeedTracker {
         }
     }
 
+    /// `true` once an angle has been followed.
     pub fn is_following(&self) -> bool {
         self.steps > 0
     }
 
+    /// Electrical angular speed, in rad/s.
     pub fn omega(&self) -> f32 {
         self.omega
     }
 
+    /// `true` once so many angles have been followed that the speed can be used.
     pub fn is_settled(&self) -> bool {
         self.steps >= SETTLING_STEPS
     }

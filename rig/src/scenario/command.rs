@@ -39,8 +39,13 @@ fn run_choice<S: System>(choice: &Choice<S>) -> Result<ExitCode> {
         crate::say!("{}", serde_json::to_string(&summary)?);
     } else {
         let headline = report::headline(&figures, trip);
-        let title = choice.title(&machine);
-        crate::say!("{headline} · {} · {title}\n\n{}", choice.name, report::text(&figures));
+        let law = S::law(&choice.options.own).map_or(String::new(), |law| format!(" · law {law}"));
+        crate::say!(
+            "{headline} · {} · {}{law}\n\n{}",
+            choice.name,
+            choice.title(&machine),
+            report::text(&figures)
+        );
         let ratio = recording.end_s() / wall_s;
         crate::say!("simulated {ratio:.1} times as fast as real time ({})", options.on.name());
         crate::say!("report: {}", out.join("report.html").display());
@@ -98,6 +103,8 @@ pub fn write<S: System>(
     }
     S::draw_common(recording, &mut page);
     choice.scenario.plots(recording, &choice.filled(machine), machine, &mut page);
-    let subtitle = format!("tractive {}, run on {}", env!("CARGO_PKG_VERSION"), choice.options.on.name());
+    let law = S::law(&choice.options.own).map_or(String::new(), |law| format!(", law {law}"));
+    let subtitle =
+        format!("tractive {}, run on {}{law}", env!("CARGO_PKG_VERSION"), choice.options.on.name());
     write_text(&out.join("report.html"), &page.finish(&subtitle, figures)?)
 }

@@ -10,6 +10,7 @@ pub use dual::{
 
 use super::{RECORDER, stop};
 use crate::cell::{Ring, Words};
+use crate::control::MtpaStart;
 use crate::frames::Abc;
 use crate::modulation::CarrierHalf;
 use crate::operator::{self, Feedback, Status};
@@ -39,6 +40,15 @@ pub fn open() -> Setup {
     let mut block = Request::Hello.to_block();
     exchange(&mut block, CONTROL_ANSWERS);
     wire::setup_from_block(&block)
+}
+
+/// The same, with where MTPA starts.
+#[inline(never)]
+pub fn open_with_start() -> (Setup, MtpaStart) {
+    open_files();
+    let mut block = Request::Hello.to_block();
+    exchange(&mut block, CONTROL_ANSWERS);
+    (wire::setup_from_block(&block), wire::start_from_block(&block))
 }
 
 fn open_files() {

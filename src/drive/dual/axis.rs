@@ -2,8 +2,8 @@
 
 use super::{MotorCommand, MotorShare, Settings};
 use crate::control::{
-    AimInput, Boundary, Committed, Controller, Demand, Law, Measurements, ModeLimits, Region, Regulated,
-    RotorSample, SpeedInput, SpeedLoop,
+    AimInput, Boundary, Committed, ControlLaw, Controller, Demand, Law, Measurements, ModeLimits, Region,
+    Regulated, RotorSample, SpeedInput, SpeedLoop,
 };
 use crate::frames::{AlphaBeta, Angle};
 use crate::machine::Tables;
@@ -109,7 +109,7 @@ impl Axis {
         if self.controller.is_following() { Some((lost, 1.0, 0.0)) } else { protection::check_known(enable) }
     }
 
-    /// As [`Controller::recover_angle`].
+    /// As [`ControlLaw::recover_angle`].
     pub fn recover_angle(&mut self) {
         self.controller.recover_angle();
     }

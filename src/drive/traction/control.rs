@@ -4,7 +4,9 @@ use super::applied::{Applied, NO_LIMITS, Passed, Steady, Wanted, committed, foll
 use super::six_step_exit::SixStepExit;
 use super::slot::{Decision, Slot};
 use super::{Settings, Shared};
-use crate::control::{AimInput, Controller, Demand, Law, LinkDamper, Measurements, ModeLimits, RotorSample};
+use crate::control::{
+    AimInput, ControlLaw, Controller, Demand, Law, LinkDamper, Measurements, ModeLimits, RotorSample,
+};
 use crate::drive::acknowledge::Acknowledge;
 use crate::drive::messages::{Gates, VoltageCommand};
 use crate::drive::{PeriodInput, SlotTimer};
@@ -26,11 +28,11 @@ const JUMP_SHARE: f32 = 0.05;
 /// in which control sees what became of it.
 const REVISION_PERIODS: u32 = 2;
 
-/// The control interrupt's task, for a machine.
-pub struct ControlTask<M = &'static Tables> {
+/// The control interrupt's task, for a machine and a control law.
+pub struct ControlTask<M = &'static Tables, L = Controller> {
     machine: M,
     settings: Settings,
-    controller: Controller,
+    controller: L,
     watch: FrozenWatch,
     /// Nominal instant of the next call.
     now: Instant,
@@ -66,10 +68,17 @@ pub struct ControlTask<M = &'static Tables> {
 impl<M: Machine> ControlTask<M> {
     /// A task whose first call is the control timer's first interrupt, at `first`.
     pub const fn new(machine: M, settings: Settings, first: Instant) -> Self {
+        Self::with_law(machine, settings, first, Controller::new())
+    }
+}
+
+impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
+    /// The same with another control law, at rest.
+    pub const fn with_law(machine: M, settings: Settings, first: Instant, controller: L) -> Self {
         Self {
             machine,
             settings,
-            controller: Controller::new(),
+            controller,
             watch: FrozenWatch::new(),
             now: first,
             boundary: None,
@@ -108,6 +117,11 @@ impl<M: Machine> ControlTask<M> {
     /// Other settings than those it was built with, before the first call, which is at `first`.
     pub fn set_up(&mut self, settings: Settings, first: Instant) {
         (self.settings, self.now) = (settings, first);
+    }
+
+    /// Another control law of the same kind, at rest, before the first call.
+    pub fn set_law(&mut self, controller: L) {
+        self.controller = controller;
     }
 
     /// The control timer's interrupt. Deadline: one control period after its nominal instant; a missed one is a fault.
@@ -352,12 +366,11 @@ impl<M: Machine> ControlTask<M> {
         let (omega, udc_v) = (self.controller.omega(), sample.udc_v);
         let tables = self.machine.tables();
         let steady = Steady { omega, udc_v, voltage_v: self.steady_v, depth: self.depth };
-        self.limits =
-            limits(&slot.key, &steady, &mut self.exit, &self.settings, self.controller.passed_s(clock));
+        let passed_s = self.controller.passed_s(clock);
+        self.limits = limits(&slot.key, &steady, &mut self.exit, &self.settings, passed_s);
         let emf_v = omega.abs() * tables.ratings.magnet_flux_wb * self.controller.map_scale();
         let torque_nm = self.exit.one_sided(command.demand.torque_nm, emf_v, udc_v, &tables.ratings);
         let demand = Demand { torque_nm, ..command.demand };
-        let passed_s = self.controller.passed_s(clock);
         let damps = gains.link_damping > 0.0;
         let swing = damps.then(|| self.damper.step(udc_v, passed_s, omega, self.limits.follows));
         let window = Some(&command.window);

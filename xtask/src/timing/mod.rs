@@ -32,7 +32,7 @@ use crate::cli::TimingArgs;
 use crate::setup::Setup;
 use anyhow::{Context, Result};
 use report::Report;
-use system::{Measured, System};
+use system::{LawCost, Measured, System};
 
 /// The command.
 pub fn run(args: &TimingArgs) -> Result<u8> {
@@ -45,12 +45,13 @@ pub fn run(args: &TimingArgs) -> Result<u8> {
     for system in System::ALL {
         systems.push(system.measure(&toolchain, &rig, &qemu)?);
     }
+    let pi = LawCost::of_pi(&toolchain, &rig, &qemu)?;
     parts::all_found(&systems.iter().flat_map(|measured| &measured.sources).copied().collect())?;
     let budgets = build::root().join("budgets.toml");
     let text = std::fs::read_to_string(&budgets).with_context(|| budgets.display().to_string())?;
     let values: Vec<_> = systems.iter().flat_map(values).chain(report::blocks(&blocks)).collect();
     let judged = budget::judge(&text, &values)?;
-    let report = Report { systems: &systems, blocks: &blocks, judged: &judged };
+    let report = Report { systems: &systems, pi, blocks: &blocks, judged: &judged };
     if args.json {
         println!("{}", report.json());
     } else {

@@ -8,6 +8,7 @@ use super::tables;
 const HEAD: &str = include_str!("page/head.md");
 const TARGETS: &str = include_str!("page/targets.md");
 const GROUPS: &str = include_str!("page/groups.md");
+const LAWS: &str = include_str!("page/laws.md");
 const BLOCKS: &str = include_str!("page/blocks.md");
 const ENTRY: &str = include_str!("page/entry.md");
 
@@ -21,6 +22,7 @@ pub fn text(report: &Report) -> String {
             text += &format!("\n{}", table.markdown());
         }
     }
+    text += &[LAWS, &tables::laws(report).markdown()].concat();
     text += &[BLOCKS, &tables::blocks(report).markdown(), ENTRY, &tables::entries(report).markdown(), "\n"]
         .concat();
     for measured in report.systems {
@@ -41,7 +43,9 @@ pub fn plain(report: &Report) -> String {
         }
         text += &remarks(measured);
     }
-    for table in [tables::entries(report), tables::blocks(report), tables::budgets(report)] {
+    for table in
+        [tables::laws(report), tables::entries(report), tables::blocks(report), tables::budgets(report)]
+    {
         text += &format!("\n{}", table.plain());
     }
     text

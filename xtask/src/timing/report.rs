@@ -4,7 +4,7 @@ use super::blocks::Block;
 use super::budget::Judged;
 use super::drive::DIRECTIONS;
 use super::statistics::{Entry, Load, Row};
-use super::system::Measured;
+use super::system::{LawCost, Measured};
 use serde_json::{Value, json};
 
 const INTERRUPTS: [&str; 2] = ["control", "pwm"];
@@ -12,6 +12,8 @@ const INTERRUPTS: [&str; 2] = ["control", "pwm"];
 /// Everything that was measured and judged.
 pub struct Report<'a> {
     pub systems: &'a [Measured],
+    /// The control interrupt under the papers' ordinary law.
+    pub pi: LawCost,
     pub blocks: &'a [Block],
     pub judged: &'a [Judged],
 }
@@ -198,7 +200,12 @@ mod tests {
             judge("[pmasynrm]\ncontrol-max = { target = 1 }", &[("pmasynrm.control-max", 2.0)]).unwrap();
         let name = "core_tick/tractive".to_owned();
         let block = Block { name, max: 120, mean: 110.0, cycles: 250, max_error: Some(1e-7) };
-        let report = Report { systems: &[example()], blocks: &[block], judged: &judged };
+        let report = Report {
+            systems: &[example()],
+            pi: LawCost { mean: 900.0, max: 1_200 },
+            blocks: &[block],
+            judged: &judged,
+        };
         let json = report.json();
         let row = &json["interrupts"][0];
         assert_eq!(

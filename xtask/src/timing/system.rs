@@ -104,6 +104,42 @@ impl System {
     }
 }
 
+/// The control interrupt's instructions under a law: the mean in its dearest mode, and the most.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct LawCost {
+    pub mean: f64,
+    pub max: u32,
+}
+
+impl LawCost {
+    /// By what was measured.
+    pub fn of(statistics: &Statistics) -> Self {
+        statistics.of("control").fold(Self::default(), |cost, row| Self {
+            mean: cost.mean.max(row.instructions.mean()),
+            max: cost.max.max(row.instructions.max),
+        })
+    }
+
+    /// That of the papers' ordinary law: motoring and braking through every mode, without a provoked fault.
+    pub fn of_pi(toolchain: &Toolchain, rig: &Path, qemu: &Path) -> Result<Self> {
+        let path = build::pi_image(toolchain, None)?;
+        let bench = Bench {
+            rig: rig.to_owned(),
+            qemu: qemu.to_owned(),
+            command: ["run", "timing", "--law", "pi"].map(str::to_owned).to_vec(),
+            image: image::read(&path)?,
+            path,
+            keeps_paths: false,
+        };
+        let plan: Vec<_> = DRIVES.iter().map(|options| (&bench, (*options).to_owned())).collect();
+        let mut statistics = Statistics::default();
+        for drive in drive_all("pi", &plan)? {
+            statistics.add(&drive)?;
+        }
+        Ok(Self::of(&statistics))
+    }
+}
+
 fn traction(bench: &Bench, sum: &mut Sum) -> Result<()> {
     let phases =
         PHASES_US.map(|phase_us| format!("--to=6000 --pwm-delay-us={phase_us} --fault-at={SHORT_S}"));

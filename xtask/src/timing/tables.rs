@@ -4,7 +4,7 @@ use super::blocks::error;
 use super::parts::{Group, Part, together};
 use super::report::{Report, net};
 use super::statistics::Spread;
-use super::system::Measured;
+use super::system::{LawCost, Measured};
 
 /// A table of text.
 pub struct Table {
@@ -63,6 +63,15 @@ pub fn targets(report: &Report) -> Table {
         })
     });
     Table::new(&["", ">target", ">longest", &named, &beyond, &around], rows)
+}
+
+/// The PMaSynRM's control interrupt under either law.
+pub fn laws(report: &Report) -> Table {
+    let own = report.systems.first().map(|measured| LawCost::of(&measured.statistics)).unwrap_or_default();
+    let row =
+        |name: &str, cost: LawCost| vec![name.to_owned(), format!("{:.0}", cost.mean), cost.max.to_string()];
+    let rows = [row("ours", own), row("the papers' ordinary one, `--law pi`", report.pi)];
+    Table::new(&["law", ">mean in the dearest mode", ">longest"], rows)
 }
 
 /// The counts of each interrupt in each mode, by direction where the rig names one.

@@ -4,6 +4,7 @@ use crate::bench::{Bench, Simulated};
 use crate::run::{Interrupts, Supervisor, turn};
 use crate::without::Ablation;
 use anyhow::Result;
+use tractive::control::{ControlLaw, Controller};
 use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
 use tractive::frames::Abc;
 use tractive::machine::{Ratings, Tables};
@@ -124,9 +125,9 @@ impl OperatorPort for Port<'_, '_> {
     }
 }
 
-/// Both tasks and the cells between them.
-pub struct Tasks<'a> {
-    control: ControlTask,
+/// Both tasks and the cells between them, with a control law.
+pub struct Tasks<'a, L = Controller> {
+    control: ControlTask<&'static Tables, L>,
     pwm: PwmTask,
     shared: Shared<'a>,
     slot: Slot,
@@ -137,7 +138,7 @@ pub struct Tasks<'a> {
     without: Option<Ablation>,
 }
 
-impl<'a> Tasks<'a> {
+impl Tasks<'_> {
     /// Before their first interrupts.
     pub fn new(tables: &'static Tables, settings: Settings, first_half_ticks: u32) -> Self {
         Self::beginning_at(Instant(0), tables, settings, first_half_ticks)
@@ -150,10 +151,23 @@ impl<'a> Tasks<'a> {
         settings: Settings,
         first_half_ticks: u32,
     ) -> Self {
+        Self::with_law(Controller::new(), origin, tables, settings, first_half_ticks)
+    }
+}
+
+impl<'a, L: ControlLaw> Tasks<'a, L> {
+    /// The same with another control law, at rest.
+    pub fn with_law(
+        law: L,
+        origin: Instant,
+        tables: &'static Tables,
+        settings: Settings,
+        first_half_ticks: u32,
+    ) -> Self {
         let first_control = origin.after(settings.clock.control_ticks);
         let first_pwm = origin.after(first_half_ticks);
         Self {
-            control: ControlTask::new(tables, settings, first_control),
+            control: ControlTask::with_law(tables, settings, first_control, law),
             pwm: PwmTask::new(tables, settings, first_pwm).after_halves_of(first_half_ticks),
             shared: Shared::new(),
             slot: Slot::new(),
@@ -201,7 +215,7 @@ impl<'a> Tasks<'a> {
     }
 }
 
-impl Interrupts for Tasks<'_> {
+impl<L: ControlLaw> Interrupts for Tasks<'_, L> {
     type Bench = Bench;
 
     fn next_calls(&self) -> [Instant; 2] {

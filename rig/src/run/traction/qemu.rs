@@ -5,13 +5,13 @@ use crate::run::{Emulator, Supervisor, in_qemu};
 use crate::trace::Recording;
 use anyhow::{Result, bail};
 use tractive::modulation::Mode;
-use tractive::wire::{self, Request, Setup};
+use tractive::wire::{self, Block, Request};
 
-/// Runs until the recording is complete; a supervisor commands over the protocol.
+/// Runs until the recording is complete, with the set-up that answers the image's first request; a supervisor commands over the protocol.
 pub fn run_in_qemu(
     name: &str,
     bench: Bench,
-    setup: Setup,
+    hello: Block,
     emulator: &Emulator,
     supervisor: Option<&mut dyn Supervisor>,
 ) -> Result<Recording> {
@@ -21,7 +21,7 @@ pub fn run_in_qemu(
         };
         let bench = &mut served.bench;
         match request {
-            Request::Hello => answers.control(&wire::setup_to_block(setup))?,
+            Request::Hello => answers.control(&hello)?,
             Request::ControlSample(at) => {
                 let (sample, command) = bench.control_sample(at)?;
                 let done = bench.is_done();

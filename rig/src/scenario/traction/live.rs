@@ -12,6 +12,7 @@ use crate::trace::Edge;
 use anyhow::Result;
 use core::f64::consts::TAU;
 use std::sync::{Arc, Mutex, PoisonError};
+use tractive::control::Controller;
 use tractive::operator::{Request, State, Status};
 use tractive::protection::Trip;
 
@@ -106,7 +107,7 @@ impl Live {
         let plan = Plan { judged_step_s: start.step_s, ..plan };
         let source = plan.line.as_ref().map_or(link.source, |line| line.link.source);
         let setup = setup(&plan, options, machine, false);
-        let tasks = tasks(&setup, options, machine)?;
+        let tasks = tasks(Controller::new(), &setup, options, machine)?;
         let parameters = &machine.folder.parameters;
         Ok(Self {
             bench: bench(plan, &setup, options, machine).endless(),

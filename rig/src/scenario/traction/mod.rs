@@ -38,16 +38,16 @@ use crate::run::traction::{Tasks, run_in_qemu};
 use crate::run::{self, CLOCK, Supervisor};
 use crate::trace::Recording;
 use anyhow::Result;
-use clap::Args;
+use clap::{Args, ValueEnum};
 use serde::Serialize;
 use serde_json::{Map, Value};
-use tractive::control::{Demand, Gains};
+use tractive::control::{ControlLaw, Controller, Demand, Gains, MtpaStart, PiLaw};
 use tractive::drive::traction::Settings;
 use tractive::modulation::SwitchLimits;
 use tractive::operator::{Line, LineTimes};
 use tractive::recorder::Recorder;
-use tractive::time::Clock;
-use tractive::wire::Setup;
+use tractive::time::{Clock, Instant};
+use tractive::wire::{self, Setup};
 
 /// The usual lead, in s.
 const LEAD_S: f64 = 0.1;
@@ -59,9 +59,55 @@ const STEP_S: f64 = 50e-6;
 #[derive(Clone, Copy, Debug)]
 pub struct Traction;
 
+/// The control law that the drive runs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum LawName {
+    /// The project's own
+    Tractive,
+    /// The papers' ordinary one: PI loops on measured currents
+    Pi,
+}
+
+impl LawName {
+    /// As on the command line.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Tractive => "tractive",
+            Self::Pi => "pi",
+        }
+    }
+}
+
+/// The point whose inductances the first pass of MTPA takes under `--law pi`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum StartName {
+    /// That of the operating point before
+    Previous,
+    /// No current, as we read the paper
+    Zero,
+}
+
+impl StartName {
+    /// As the law takes it.
+    const fn of(self) -> MtpaStart {
+        match self {
+            Self::Previous => MtpaStart::Previous,
+            Self::Zero => MtpaStart::Zero,
+        }
+    }
+}
+
 /// Options of all its scenarios.
 #[derive(Clone, Debug, Args, Serialize)]
 pub struct TractionOptions {
+    /// The control law.
+    #[arg(long, value_enum, default_value = "tractive")]
+    pub law: LawName,
+    /// With --law pi: the point whose inductances the first of the two passes of MTPA takes.
+    #[arg(long, value_enum, default_value = "previous", value_name = "POINT")]
+    pub mtpa_start: StartName,
     /// Leave the dead time uncompensated: neither the pulses are corrected nor is the sixth harmonic of the voltage followed.
     #[arg(long)]
     pub uncompensated: bool,
@@ -153,6 +199,10 @@ impl System for Traction {
     type Plan = Plan;
     type Recording = Recording;
 
+    fn law(own: &TractionOptions) -> Option<&'static str> {
+        Some(own.law.name())
+    }
+
     fn trace_step_s(_own: &TractionOptions) -> f64 {
         STEP_S
     }
@@ -191,13 +241,16 @@ impl System for Traction {
         let bench = bench(plan, &setup, options, machine);
         match options.on {
             On::Host => {
-                let recorder = Recorder::new();
-                let tasks = tasks(&setup, options, machine)?.recorded_by(&recorder).commanded_by(supervisor);
-                run::on_host(name, bench, tasks, |index| recorder.read(index))
+                let run = OnHost { name, bench, setup: &setup, options, machine };
+                match options.own.law {
+                    LawName::Tractive => run.run(Controller::new(), supervisor),
+                    LawName::Pi => run.run(PiLaw::starting(options.own.mtpa_start.of()), supervisor),
+                }
             }
             On::Qemu => {
                 let patient = supervisor.as_ref().is_some_and(|supervisor| supervisor.is_typed());
-                run_in_qemu(name, bench, setup, &options.emulator(patient)?, supervisor)
+                let hello = wire::setup_with_start(setup, options.own.mtpa_start.of());
+                run_in_qemu(name, bench, hello, &options.emulator(patient)?, supervisor)
             }
         }
     }
@@ -215,6 +268,25 @@ impl System for Traction {
 
     fn overview(recording: &Recording) -> Result<Option<String>> {
         report::overview(recording).map(Some)
+    }
+}
+
+/// A run on the host, but for the control law.
+struct OnHost<'a> {
+    name: &'a str,
+    bench: Bench,
+    setup: &'a Setup,
+    options: &'a Options,
+    machine: &'a Machine,
+}
+
+impl OnHost<'_> {
+    /// The drive's own tasks with a law.
+    fn run(self, law: impl ControlLaw, supervisor: Option<&mut dyn Supervisor>) -> Result<Recording> {
+        let Self { setup, options, machine, .. } = self;
+        let recorder = Recorder::new();
+        let tasks = tasks(law, setup, options, machine)?.recorded_by(&recorder).commanded_by(supervisor);
+        run::on_host(self.name, self.bench, tasks, |index| recorder.read(index))
     }
 }
 
@@ -309,14 +381,20 @@ fn first_half_ticks(setup: &Setup, machine: &Machine) -> u32 {
     devices(setup, machine).shortest_half_ticks + setup.pwm_delay_ticks
 }
 
-/// The drive that an image with this setup would be, and its operator.
-fn tasks<'a>(setup: &Setup, options: &Options, machine: &Machine) -> Result<Tasks<'a>> {
+/// The drive that an image with this law and this setup would be, and its operator.
+fn tasks<'a, L: ControlLaw>(
+    law: L,
+    setup: &Setup,
+    options: &Options,
+    machine: &Machine,
+) -> Result<Tasks<'a, L>> {
     let gains = Gains::of(setup.uncompensated, setup.behind_line_filter);
     let settings = Settings { clock: clock(options, machine), devices: devices(setup, machine), gains };
     settings.check(machine.tables).map_err(run::refused)?;
     let ratings = &machine.tables.ratings;
     let line = setup.line.map(|times| Line::rated(ratings, times.precharge_s, times.discharge_s));
-    Ok(Tasks::new(machine.tables, settings, first_half_ticks(setup, machine)).operated_on(line))
+    let first = first_half_ticks(setup, machine);
+    Ok(Tasks::with_law(law, Instant(0), machine.tables, settings, first).operated_on(line))
 }
 
 fn bench(plan: Plan, setup: &Setup, options: &Options, machine: &Machine) -> Bench {

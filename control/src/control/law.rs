@@ -1,0 +1,92 @@
+//! The seam between a drive and its control law: the stages that a drive's control task calls, whichever law it runs.
+
+use super::speed::SpeedTracker;
+use super::{AimInput, Boundary, Committed, Law, ModeLimits, Regulated, RotorSample, Target, VoltageVector};
+use crate::frames::Angle;
+use crate::machine::Tables;
+use crate::time::Clock;
+
+/// A control law: which voltage is to be made of what was measured. Protection, the choice of the mode and the safe state are the
+/// drive's.
+///
+/// Each control period follows the angle; while pulses are made it then observes its sample, and learns at a boundary that has passed. The
+/// operating point is made once for each command, and the voltage once.
+pub trait ControlLaw {
+    /// The follower of the angle.
+    fn tracker(&self) -> &SpeedTracker;
+
+    /// The same, to be moved on.
+    fn tracker_mut(&mut self) -> &mut SpeedTracker;
+
+    /// Follows the angle; call once per control period, before the other stages and also while the gates are off.
+    /// Returns the electrical angular speed, in rad/s.
+    fn track(&mut self, angle: Angle, clock: &Clock) -> f32 {
+        self.tracker_mut().step(angle, clock.control_s())
+    }
+
+    /// By how much a measured angle, in rad, is off what the speed makes of the one before.
+    fn innovation_rad(&self, angle: Angle, clock: &Clock) -> f32 {
+        (angle - self.tracker().predicted(clock.control_s())).signed_radians()
+    }
+
+    /// The angle cannot be followed: it is not known, or far off. The speed stays as it was.
+    fn lose_angle(&mut self) {
+        self.tracker_mut().lose();
+    }
+
+    /// Follows the angle anew, where it was lost; call once its fault is acknowledged. The speed is not known until it has settled again.
+    fn recover_angle(&mut self) {
+        self.tracker_mut().recover();
+    }
+
+    /// `true` once an angle has been followed since the start, or since it was recovered.
+    fn is_following(&self) -> bool {
+        self.tracker().is_following()
+    }
+
+    /// `true` once the speed has been followed long enough to be used.
+    fn speed_is_known(&self) -> bool {
+        self.tracker().is_settled()
+    }
+
+    /// Electrical angular speed, in rad/s, signed.
+    fn omega(&self) -> f32 {
+        self.tracker().omega()
+    }
+
+    /// The machine's flux linkage over the map's, as far as an error of it is believed; 1 for a law that has no idea of it.
+    fn map_scale(&self) -> f32;
+
+    /// By how much the machine's flux linkage seems to exceed the map's, as a share; 0 where it turns too slowly to tell.
+    fn map_error(&self) -> f32;
+
+    /// Time since the last operating point, in s.
+    fn passed_s(&self, clock: &Clock) -> f32;
+
+    /// The target of the current loop by the newest operating point; nothing while no pulses are made.
+    fn target(&self) -> &Target;
+
+    /// Forgets what it has learnt but for the speed, as the gates are off.
+    fn idle(&mut self);
+
+    /// After [`ControlLaw::idle`]: the next torque begins at none, whatever flows.
+    fn begin_without_torque(&mut self);
+
+    /// Takes the sample of a control period; call in each one while pulses are made.
+    fn observe(&mut self, sample: &RotorSample, tables: &Tables);
+
+    /// Takes what was sampled at a carrier boundary that has passed, and what acted until then.
+    fn learn(&mut self, boundary: &Boundary, sample: &RotorSample, follows: Regulated, law: &Law);
+
+    /// Makes the operating point, once for each command; call after [`ControlLaw::observe`].
+    fn aim(&mut self, input: &AimInput, law: &Law);
+
+    /// The voltage for the carrier half that begins at the horizon, from the newest sample.
+    fn regulate(
+        &mut self,
+        sample: &RotorSample,
+        committed: &Committed,
+        limits: &ModeLimits,
+        law: &Law,
+    ) -> VoltageVector;
+}

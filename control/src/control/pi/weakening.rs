@@ -1,0 +1,49 @@
+//! Field weakening by voltage feedback: where the loops ask for more voltage than there is, i_d is moved.
+
+use crate::frames::limit;
+
+/// Bandwidth of the feedback, in rad/s: well below that of the current loops.
+const BANDWIDTH_RAD_S: f32 = 30.0;
+/// Share of the largest voltage that weakening leaves to the steady state; the rest regulates.
+const STEADY_SHARE: f32 = 0.97;
+
+/// The integrator on the voltage.
+#[derive(Clone, Copy, Debug)]
+pub struct Weakening {
+    /// By how much i_d is off that of MTPA, in A.
+    moved_a: f32,
+}
+
+/// Everything that a step works on.
+pub struct Input {
+    /// The voltage that the loops ask for, and the largest one, in V.
+    pub wanted_v: f32,
+    pub limit_v: f32,
+    /// `true` if the voltage always is the largest one: then i_d moves either way.
+    pub filled: bool,
+    /// Reactance and resistance of the d axis, in ohm.
+    pub reactance_ohm: f32,
+    pub resistance_ohm: f32,
+    /// Largest current, in A.
+    pub largest_a: f32,
+    /// Time since the last step, in s.
+    pub passed_s: f32,
+}
+
+impl Weakening {
+    pub const NONE: Self = Self { moved_a: 0.0 };
+
+    /// By how much i_d is off that of MTPA, in A.
+    pub const fn moved_a(&self) -> f32 {
+        self.moved_a
+    }
+
+    /// One step.
+    pub fn step(&mut self, input: &Input) {
+        let share = if input.filled { 1.0 } else { STEADY_SHARE };
+        let left_v = share * input.limit_v - input.wanted_v;
+        let per_s = BANDWIDTH_RAD_S / (input.reactance_ohm + input.resistance_ohm);
+        let highest_a = if input.filled { input.largest_a } else { 0.0 };
+        self.moved_a = limit(self.moved_a + per_s * input.passed_s * left_v, -input.largest_a, highest_a);
+    }
+}

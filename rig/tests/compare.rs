@@ -1,0 +1,44 @@
+//! Both control laws in the same runs: README's table is what `cargo rig compare` prints, and ours is ahead or it is said why not.
+
+use tractive_rig::compare::{self, Row};
+
+const README: &str = include_str!("../../README.md");
+
+fn rows(only: &[&str]) -> Vec<Row> {
+    compare::rows(&only.iter().map(|word| (*word).to_owned()).collect::<Vec<_>>()).unwrap()
+}
+
+#[test]
+fn the_readme_says_what_both_laws_reach() {
+    let rows = rows(&[]);
+    assert_eq!(rows.len(), 11);
+    for row in rows {
+        println!("{}: {:?}, ahead: {}", row.quantity, row.found, row.mark());
+        assert!(
+            README.lines().any(|line| line == row.markdown()),
+            "README.md has no line\n{}",
+            row.markdown()
+        );
+        assert!(row.ahead || !row.why.is_empty(), "{}: {:?}", row.quantity, row.found);
+        // A reason is for a row that needs one.
+        assert!(!row.ahead || row.why.is_empty(), "{}: ahead, and still {}", row.quantity, row.why);
+        assert!(!row.found[0].starts_with("trips"), "{}: {}", row.quantity, row.found[0]);
+    }
+}
+
+#[test]
+fn the_ordinary_law_is_no_straw_man() {
+    // What was asked of an ordinary drive before it was written: no trip, torque as the paper claims it, steps in some carriers.
+    let [torque] = &rows(&["characteristic points"])[..] else { panic!("one row") };
+    let within: f64 = torque.found[1].split(' ').nth(1).unwrap().parse().unwrap();
+    assert!(within < 5.0, "{}", torque.found[1]);
+    let [step] = &rows(&["full torque in one step"])[..] else { panic!("one row") };
+    let slowest: f64 = step.found[1].split(' ').nth(2).unwrap().parse().unwrap();
+    assert!(slowest < 3.6, "{}", step.found[1]);
+}
+
+#[test]
+fn a_word_that_no_row_has_is_named() {
+    let error = compare::rows(&["flywheel".to_owned()]).unwrap_err().to_string();
+    assert_eq!(error, "--only flywheel: no row has all of these words");
+}
