@@ -19,28 +19,25 @@ mod zs9_rates;
 /// A check of a power stage's file and text against a machine; it gives the constant as Rust.
 type Check = fn(&Path, &str, &power_stage::Machine) -> Result<String, InputError>;
 
-/// An image: the end of the variables that name its machine and its power stage, what they are when these name none, the name of its
-/// tables, and the power stage's check.
+/// An image: the variables that name its machine and its power stage, each with what holds when it names none, the name of its tables, and the
+/// power stage's check.
 struct Image {
-    system: &'static str,
-    machine: &'static str,
-    stage: &'static str,
+    machine: (&'static str, &'static str),
+    stage: (&'static str, &'static str),
     tables: &'static str,
     check: Check,
 }
 
 const IMAGES: [Image; 2] = [
     Image {
-        system: "TRACTIVE",
-        machine: "pmasynrm-180kw",
-        stage: "power_stage",
+        machine: ("TRACTIVE_MACHINE", "pmasynrm-180kw"),
+        stage: ("TRACTIVE_POWER_STAGE", "power_stage"),
         tables: "traction",
         check: power_stage::traction,
     },
     Image {
-        system: "TRACTIVE_ZS9",
-        machine: "ipm-zs9",
-        stage: "power_stage_zs9",
+        machine: ("TRACTIVE_ZS9_MACHINE", "ipm-zs9"),
+        stage: ("TRACTIVE_ZS9_POWER_STAGE", "power_stage_zs9"),
         tables: "zs9",
         check: power_stage::zs9,
     },
@@ -63,17 +60,17 @@ fn main() -> ExitCode {
 
 /// The tables of each image's machine and the constant of its power stage.
 fn images(out: &Path) -> Result<(), String> {
-    let chosen = |variable: String, default: String| {
+    let chosen = |variable: &str, default: String| {
         println!("cargo:rerun-if-env-changed={variable}");
         env::var(variable).unwrap_or(default)
     };
-    for Image { system, machine, stage, tables, check } in IMAGES {
-        let machine = chosen(format!("{system}_MACHINE"), machine.to_owned());
+    for Image { machine: (machine, usual), stage: (file, stage), tables, check } in IMAGES {
+        let machine = chosen(machine, usual.to_owned());
         // A folder of tables/, or a path as seen from the repository's root.
         let mut places = ["../../tables", "../.."].into_iter().map(|place| Path::new(place).join(&machine));
         let folder = places.find(|folder| folder.is_dir()).unwrap_or_else(|| PathBuf::from(&machine));
         // A file beside the package, or a path as seen from the repository's root.
-        let name = chosen(format!("{system}_POWER_STAGE"), format!("{stage}.toml"));
+        let name = chosen(file, format!("{stage}.toml"));
         let beside = PathBuf::from(&name);
         let file = if beside.is_file() { beside } else { Path::new("../..").join(&name) };
         for read in [&folder, &file] {

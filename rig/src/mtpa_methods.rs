@@ -25,7 +25,7 @@ pub struct MethodFigures {
 pub const OURS: &str = "the same, trimmed: ours";
 /// The plain reading of the paper: `--law pi --mtpa-start zero`.
 pub const ZERO: &str = "two passes from L(0, 0), as we read the paper";
-/// Where the passes no longer move: `--law pi`.
+/// The point at which the passes no longer move: `--law pi`.
 pub const PREVIOUS: &str = "two passes from the point before, again and again";
 /// More passes than the fixed point needs.
 const MANY: usize = 60;

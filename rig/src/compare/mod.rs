@@ -1,8 +1,10 @@
 //! `compare`: both control laws on the same plant with the same options, and what each reached, row by row.
 
+mod outcome;
 mod rows;
 
-use crate::analysis::Figures;
+pub use outcome::Row;
+
 use crate::files::write_text;
 use crate::machine::Machine;
 use crate::run::bar;
@@ -12,8 +14,8 @@ use anyhow::{Context, Result};
 use clap::Args;
 use comfy_table::presets::NOTHING;
 use comfy_table::{ContentArrangement, Table};
+use outcome::{Outcome, Outcomes};
 use rayon::prelude::*;
-use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -33,60 +35,6 @@ pub struct CompareOptions {
     /// Folder for compare.csv and compare.md.
     #[arg(long)]
     pub out: Option<PathBuf>,
-}
-
-/// The end of a run: its figures, and the fault that tripped it.
-struct Outcome {
-    figures: Figures,
-    trip: Option<&'static str>,
-}
-
-/// The outcomes of a law, by the words of their runs.
-struct Outcomes<'a> {
-    law: usize,
-    by_line: &'a BTreeMap<(String, usize), Outcome>,
-    machine: &'a Machine,
-}
-
-/// A law's result in a row: as it is printed, and its numbers, of which less is better.
-struct Cell {
-    text: String,
-    values: Vec<f64>,
-}
-
-/// A row of the table.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Row {
-    /// The quantity.
-    pub quantity: &'static str,
-    /// The results: the project's own law, then the ordinary one.
-    pub found: [String; 2],
-    /// The paper's word on it, if there is one.
-    pub paper: &'static str,
-    /// `true` if the project's own law is ahead in each number.
-    pub ahead: bool,
-    /// The reason where it is not; empty where none is known.
-    pub why: &'static str,
-}
-
-impl Row {
-    /// The last cell: `yes`, or why not.
-    pub fn mark(&self) -> String {
-        match (self.ahead, self.why) {
-            (true, _) => "yes".to_owned(),
-            (false, "") => "no, for no reason known".to_owned(),
-            (false, why) => format!("no: {why}"),
-        }
-    }
-
-    /// The row as it stands in a document: quantity, own, others.
-    pub fn markdown(&self) -> String {
-        let [own, pi] = &self.found;
-        let paper =
-            if self.paper.is_empty() { String::new() } else { format!("; the paper: {}", self.paper) };
-        let why = if self.ahead { String::new() } else { format!("; not ahead: {}", self.why) };
-        format!("| {} | {own} | {pi}{paper}{why} |", self.quantity)
-    }
 }
 
 /// Runs the rows whose name has each of the words.
@@ -115,42 +63,6 @@ fn drive(line: &str) -> Result<Outcome> {
     let recording = chosen.drive(&machine).with_context(|| line.to_owned())?;
     let trip = recording.trip().map(|trip| trip.fault.name());
     Ok(Outcome { figures: chosen.figures(&recording, &machine), trip })
-}
-
-impl Outcomes<'_> {
-    /// The outcome of a run.
-    fn of(&self, line: &str) -> Option<&Outcome> {
-        self.by_line.get(&(line.to_owned(), self.law))
-    }
-
-    /// The figures of a run; the fault where it tripped.
-    fn figures(&self, line: &str) -> Result<&Figures, &'static str> {
-        let outcome = self.of(line).ok_or("not run")?;
-        outcome.trip.map_or(Ok(&outcome.figures), Err)
-    }
-
-    /// The numbers of these runs, one after another; the fault where one of them tripped.
-    fn read(
-        &self,
-        lines: &[&str],
-        number: impl Fn(&Figures) -> Option<f64>,
-    ) -> Result<Vec<f64>, &'static str> {
-        lines.iter().map(|line| number(self.figures(line)?).ok_or("not seen")).collect()
-    }
-}
-
-/// The figure of a verdict whose name begins like this.
-fn verdict(figures: &Figures, what: &str) -> Option<f64> {
-    let verdicts = figures.get("verdicts")?.as_array()?.iter();
-    verdicts
-        .filter(|one| one["what"].as_str().is_some_and(|name| name.starts_with(what)))
-        .find_map(|one| one["found"].as_f64())
-}
-
-/// The numbers of a field over a list.
-fn field(figures: &Figures, list: &str, name: &str) -> Vec<f64> {
-    let rows = figures.get(list).and_then(Value::as_array).map_or(&[][..], Vec::as_slice);
-    rows.iter().filter_map(|row| row[name].as_f64()).collect()
 }
 
 /// The command. Exit code 1 where a row is not ahead and nothing says why.

@@ -1,6 +1,6 @@
 //! The rows: which runs, which numbers of them, and how they are printed.
 
-use super::{Cell, Outcomes, Row, field, verdict};
+use super::outcome::{Cell, Outcomes, Row, field, verdict};
 use crate::analysis::Figures;
 use crate::mtpa_methods;
 use crate::verdict::worst;
@@ -58,7 +58,7 @@ const RESTART: &str = "restart";
 const LINK: &str = "link-steps";
 const MAP: [&str; 2] = ["sweep --to 3000 --map-error 10", "sweep --to 3000 --map-error -10"];
 
-/// Where in the carrier the step comes, in µs.
+/// Instants of the step within the carrier, in µs.
 fn full_steps() -> Vec<String> {
     let delays = (0..550).step_by(50).chain([25, 75, 290, 310, 545]);
     delays.map(|delay_us| format!("full-step --pwm-delay-us {delay_us}")).collect()

@@ -70,7 +70,8 @@ mod tests {
     #[test]
     fn the_direction_is_that_of_the_power_and_stays_where_there_is_none() {
         let mut calls = Calls::new("async");
-        for (torque_nm, omega) in [(0.0, 0.0), (9.0, -1.0), (f32::NAN, -1.0), (-9.0, -1.0), (9.0, 0.0)] {
+        for (torque_nm, hertz) in [(0.0, 0.0), (9.0, -1.0), (f32::NAN, -1.0), (-9.0, -1.0), (9.0, 0.0)] {
+            let omega = hertz * std::f32::consts::TAU;
             calls.traction(&Report { torque_nm, omega, ..Report::default() });
         }
         calls.pwm();

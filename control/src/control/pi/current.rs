@@ -38,7 +38,7 @@ pub struct Input {
     pub reference: Dq,
     pub measured: Dq,
     pub without_ripple: Dq,
-    /// What decouples, and the drop of the reference, in V.
+    /// The voltage that decouples, and the drop of the reference, in V.
     pub forward: Dq,
     /// Incremental inductances.
     pub inductance: Inductance,
