@@ -119,9 +119,9 @@ fn help_shows_what_the_scenario_takes() {
 #[test]
 fn the_scenario_is_found_wherever_it_stands() {
     for (line, wanted) in [
-        ("--uncompensated load-steps", r#"{"system":"pmasynrm","on":"host","#),
-        ("--down --to 100 --on qemu", r#"{"system":"pmasynrm","on":"qemu","#),
-        ("--dt 1e-4 zs9-cycle --cruise 1", r#"{"system":"zs9","on":"host","#),
+        ("--uncompensated load-steps", r#"{"system":"pmasynrm","law":"tractive","on":"host","#),
+        ("--down --to 100 --law pi --on qemu", r#"{"system":"pmasynrm","law":"pi","on":"qemu","#),
+        ("--dt 1e-4 zs9-cycle --cruise 1", r#"{"system":"zs9","law":"tractive","on":"host","#),
     ] {
         let output = rig(&format!("needs run {line}"));
         let said = String::from_utf8_lossy(&output.stdout);

@@ -45,8 +45,7 @@ struct Keys {
     encoder_counts: u32,
     encoder_zeros_deg: Vec<f64>,
     precharge_s: f64,
-    #[serde(default)]
-    behind_line_filter: bool,
+    behind_line_filter: Option<bool>,
     discharge_s: f64,
     z_source: Option<ZSource>,
 }
@@ -89,7 +88,9 @@ pub fn traction(file: &Path, text: &str, machine: &Machine) -> Result<String, In
     let ratings = &machine.tables.ratings;
     stage.check_control_hz(control_hz, ratings.max_switching_hz)?;
     stage.check_times(stage.longest_dead_time_ns())?;
-    let behind = stage.keys.behind_line_filter;
+    let Some(behind) = stage.keys.behind_line_filter else {
+        return Err(stage.refuse("behind_line_filter", "is missing".to_owned()));
+    };
     let settings = rates::settings(control_hz, min_pulse_ns, *dead_time_ns, ratings.max_switching_hz, behind);
     // The longest carrier half of a machine that switches slowly.
     let longest_ticks = settings.devices.shortest_half_ticks.saturating_mul(rates::CARRIER_RANGE);
@@ -139,7 +140,7 @@ pub fn zs9(file: &Path, text: &str, machine: &Machine) -> Result<String, InputEr
     if min_pulse_ns.is_some() {
         return Err(stage.refuse("min_pulse_ns", "the modulator of the nine switches has none".to_owned()));
     }
-    if stage.keys.behind_line_filter {
+    if stage.keys.behind_line_filter.is_some() {
         return Err(stage.refuse("behind_line_filter", "the Z-source has chokes of its own".to_owned()));
     }
     let Some(ZSource { inductor_range_a, source_range_v, link_ref_v }) = *z_source else {
@@ -208,7 +209,7 @@ impl<'a> Stage<'a> {
     fn check_control_hz(&self, control_hz: u32, max_switching_hz: f32) -> Result<(), InputError> {
         let switching_hz = f64::from(max_switching_hz);
         let core_hz = f64::from(rates::CORE_HZ);
-        let damping = if self.keys.behind_line_filter { rates::DAMPING_CYCLES } else { 0 };
+        let damping = if self.keys.behind_line_filter == Some(true) { rates::DAMPING_CYCLES } else { 0 };
         let left_hz = rates::LOAD * core_hz - 2.0 * switching_hz * f64::from(rates::PWM_CYCLES);
         self.check(&[Bound(
             "control_hz",
@@ -326,6 +327,7 @@ impl<'a> Stage<'a> {
             self.keys;
         let Keys { break_current_a, encoder_counts, precharge_s, discharge_s, behind_line_filter, .. } =
             self.keys;
+        let behind_line_filter = behind_line_filter == Some(true);
         let zero = angle(self.keys.encoder_zeros_deg.first().copied().unwrap_or_default());
         format!(
             "PowerStage {{\n    control_hz: {control_hz},\n    dead_time_ns: {dead_time_ns},\n    min_pulse_ns: {min_pulse_ns},\n    \

@@ -146,11 +146,11 @@ mod tests {
             braking_none_v: 1900.0,
         };
         for (udc_v, motoring, braking) in [
-            (850.0, 0.0, 100.0),
+            (850.0, 0.1, 100.0),
             (950.0, 50.0, 100.0),
             (1500.0, 100.0, 100.0),
             (1850.0, 100.0, 50.0),
-            (2000.0, 100.0, 0.0),
+            (2000.0, 100.0, 0.1),
         ] {
             assert_eq!(window.bounds_nm(udc_v, 100.0, 300.0), (-braking, motoring), "{udc_v} V forward");
             assert_eq!(window.bounds_nm(udc_v, 100.0, -300.0), (-motoring, braking), "{udc_v} V backward");

@@ -1,9 +1,8 @@
 //! A machine folder written whole or not at all.
 
+use crate::platform::written_folder;
 use anyhow::{Context, Result, ensure};
-use rustix::fs::{CWD, RenameFlags, renameat_with};
 use std::fmt::Write as _;
-use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use tractive_tablegen::{FluxMap, MachineFolder};
 
@@ -23,25 +22,18 @@ const FILES: [&str; 2] = ["machine.toml", "flux_map.csv"];
 /// Where the place is taken by anything but a machine folder, the generator refuses the contents, or it cannot be written.
 pub fn folder(out: &Path, contents: &Contents) -> Result<()> {
     let taken = check_place(out)?;
-    let parent = out.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let failed = || format!("--out {}", out.display());
-    std::fs::create_dir_all(parent).with_context(failed)?;
-    let beside = tempfile::Builder::new().prefix(".machine").tempdir_in(parent).with_context(failed)?;
-    for (name, text) in FILES.iter().zip([&contents.toml, &contents.map]) {
-        std::fs::write(beside.path().join(name), text).with_context(failed)?;
-    }
-    MachineFolder::read(beside.path()).map_err(|error| {
-        // The file is never seen: its key and what is allowed are.
-        let file = error.file.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        anyhow::anyhow!("the table generator refuses the {file} of these values: {}", error.problem)
-    })?;
-    std::fs::set_permissions(beside.path(), std::fs::Permissions::from_mode(0o755)).with_context(failed)?;
-    if taken {
-        // The old one goes with the temporary folder.
-        renameat_with(CWD, beside.path(), CWD, out, RenameFlags::EXCHANGE).with_context(failed)
-    } else {
-        std::fs::rename(beside.path(), out).with_context(failed)
-    }
+    let fill = |folder: &Path| {
+        for (name, text) in FILES.iter().zip([&contents.toml, &contents.map]) {
+            std::fs::write(folder.join(name), text)?;
+        }
+        let read = MachineFolder::read(folder).map(|_| ());
+        read.map_err(|error| {
+            // The file is never seen: its key and what is allowed are.
+            let file = error.file.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            anyhow::anyhow!("the table generator refuses the {file} of these values: {}", error.problem)
+        })
+    };
+    written_folder(out, taken, fill)
 }
 
 /// The place is free, or an empty folder, or, which is `true`, a machine folder.

@@ -1,7 +1,7 @@
 //! An operating system with files, pipes and a clock of the processor.
 
 use anyhow::{Context, Result};
-use rustix::fs::{CWD, FileType, Mode};
+use rustix::fs::{CWD, FileType, Mode, RenameFlags, renameat_with};
 use std::io::Write;
 use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
@@ -32,4 +32,20 @@ pub(crate) fn written(path: &Path, fill: impl FnOnce(&mut dyn Write) -> Result<(
     file.as_file().set_permissions(std::fs::Permissions::from_mode(0o644))?;
     file.persist(path).with_context(|| path.display().to_string())?;
     Ok(())
+}
+
+/// Writes a folder whole or not at all; one that has `taken` its place is exchanged for it.
+pub(crate) fn written_folder(out: &Path, taken: bool, fill: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
+    let parent = out.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let failed = || format!("--out {}", out.display());
+    std::fs::create_dir_all(parent).with_context(failed)?;
+    let beside = tempfile::Builder::new().prefix(".machine").tempdir_in(parent).with_context(failed)?;
+    fill(beside.path())?;
+    std::fs::set_permissions(beside.path(), std::fs::Permissions::from_mode(0o755)).with_context(failed)?;
+    if taken {
+        // The old one goes with the temporary folder.
+        renameat_with(CWD, beside.path(), CWD, out, RenameFlags::EXCHANGE).with_context(failed)
+    } else {
+        std::fs::rename(beside.path(), out).with_context(failed)
+    }
 }
