@@ -53,7 +53,8 @@ const QUICK: Case = Case {
 
 /// Each mode once, and both carriers of the ZS9.
 const CASES: [Case; 9] = [
-    Case { at_s: 0.050, name: "async", ..TRACTION },
+    // At 0.050 s, a carrier boundary, a control interrupt that is slow is named `stale_command`, half a carrier later.
+    Case { at_s: 0.050_2, name: "async", ..TRACTION },
     Case { at_s: 0.090, name: "sync15", ..TRACTION },
     Case { at_s: 0.140, name: "sync12", ..TRACTION },
     Case { at_s: 0.200, name: "mid7", ..TRACTION },
