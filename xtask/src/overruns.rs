@@ -53,7 +53,8 @@ const QUICK: Case = Case {
 
 /// Each mode once, and both carriers of the ZS9.
 const CASES: [Case; 9] = [
-    // At 0.050 s, a carrier boundary, a control interrupt that is slow is named `stale_command`, half a carrier later.
+    // Not at 0.050 s: there the PWM interrupt, 10 ticks later, comes before control has acknowledged its timer; the delay follows it, a tick passes
+    // unseen, and is named as one that is lost: `stale_command`.
     Case { at_s: 0.050_2, name: "async", ..TRACTION },
     Case { at_s: 0.090, name: "sync15", ..TRACTION },
     Case { at_s: 0.140, name: "sync12", ..TRACTION },

@@ -18,13 +18,13 @@ pub struct Demand {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct LinkWindow {
-    /// No motoring torque here and below, in V.
+    /// Of motoring torque a thousandth is left here and below, in V.
     pub motoring_none_v: f32,
     /// All of it here and above, in V; above `motoring_none_v`.
     pub motoring_full_v: f32,
     /// All braking torque here and below, in V; below `braking_none_v`.
     pub braking_full_v: f32,
-    /// None here and above, in V.
+    /// A thousandth of it here and above, in V.
     pub braking_none_v: f32,
 }
 
