@@ -136,7 +136,7 @@ impl Modulator {
     fn choose_mode(&mut self, start: Instant, pulse: Angle, seen: &Reference) {
         if let Some(plan) = self.plan {
             if plan.at == self.next_half {
-                self.switch_to(start, plan.to, pulse);
+                self.switch_to(plan.to, pulse);
             }
             return;
         }
@@ -151,7 +151,7 @@ impl Modulator {
                 self.plan = Some(Plan { to: wanted, at });
             }
         } else if schedule::may_switch(self.mode, wanted, self.next_half) {
-            self.switch_to(start, wanted, pulse);
+            self.switch_to(wanted, pulse);
         }
     }
 
@@ -161,7 +161,8 @@ impl Modulator {
         (boundary(self.next_half, self.mode.carriers()) - pulse).signed().unsigned_abs() < KEPT_ANGLE.0
     }
 
-    fn switch_to(&mut self, start: Instant, mode: Mode, pulse: Angle) {
+    fn switch_to(&mut self, mode: Mode, pulse: Angle) {
+        self.schedule.switched();
         let from = self.mode;
         self.next_half = first_half(from, mode, self.next_half, pulse);
         self.mode = mode;
@@ -169,7 +170,6 @@ impl Modulator {
         self.after_pattern = from.is_pattern() && mode.is_carrier();
         self.transition =
             if from.is_pattern() { PatternTransition::begun(self.zero_rad) } else { PatternTransition::DONE };
-        self.schedule.switched(start);
     }
 
     /// Modes of the two halves that follow half number `half` of the present mode.

@@ -1,8 +1,9 @@
 //! The choice of the mode, and the angles at which it may change.
 //!
 //! The modes of a ladder stand in a row; each border between two neighbours has a frequency and a modulation depth. Above
-//! either the drive goes up, below both, less a hysteresis, it comes down, and no sooner than a dwell time after
-//! the last switch. A switch waits for the end of a whole carrier at an angle where both modes' carriers end.
+//! either the drive goes up, at once. It comes down when it has been below both, less a hysteresis, for a whole period of the
+//! slowest ripple that a line puts on the link: the choice does not follow ripple, and no two modes alternate faster than that.
+//! A switch waits for the end of a whole carrier at an angle where both modes' carriers end.
 
 use super::mode::{Regulation, Row};
 use super::{Mode, Reference, SwitchLimits};
@@ -28,23 +29,25 @@ impl Border {
     }
 }
 
-/// The locked modes that a drive uses above the asynchronous one, from the lowest frequency up. It leaves each of them where that
+/// The modes that a drive uses, from the lowest frequency up: the asynchronous one and locked ones. It leaves each of them where that
 /// mode's row says.
 #[derive(Clone, Copy, Debug)]
 pub struct Ladder(&'static [Mode]);
 
 impl Ladder {
     /// The paper's modes.
-    pub const PAPER: Self = Self::of(&[Mode::Sync15, Mode::Sync12, Mode::Mid7, Mode::Mid3, Mode::Square]);
+    pub const PAPER: Self =
+        Self::of(&[Mode::Async, Mode::Sync15, Mode::Sync12, Mode::Mid7, Mode::Mid3, Mode::Square]);
 
-    /// Of these modes; without one the asynchronous mode serves at every frequency.
-    pub const fn of(locked: &'static [Mode]) -> Self {
-        Self(locked)
+    /// Of these modes, of which the first is the asynchronous one.
+    pub const fn of(modes: &'static [Mode]) -> Self {
+        assert!(matches!(modes, [Mode::Async, ..]), "a ladder begins with the asynchronous mode");
+        Self(modes)
     }
 
     /// The modes, from the lowest frequency up.
     pub fn modes(&self) -> impl Iterator<Item = Mode> {
-        [Mode::Async].into_iter().chain(self.0.iter().copied())
+        self.0.iter().copied()
     }
 }
 
@@ -53,15 +56,16 @@ impl Ladder {
 const DEPTH_ROOM: f32 = 0.002;
 const DEPTH_HYSTERESIS: f32 = 0.012;
 
-/// Shortest time between two switches of mode, in s.
-const DWELL_S: f32 = 0.03;
+/// Time for which a lower mode must have sufficed, in s: a period of the 33 Hz that a line of 16.7 Hz puts on the link, and a third more.
+const DWELL_S: f32 = 0.04;
 
 /// The choice of mode.
 #[derive(Clone, Copy, Debug)]
 pub struct Schedule {
     ladder: Ladder,
     fixed: Option<Mode>,
-    last_switch: Option<Instant>,
+    /// The instant from which on a lower mode has sufficed; none while the present one is needed.
+    lower_since: Option<Instant>,
     dwell_ticks: i32,
 }
 
@@ -73,7 +77,7 @@ impl Schedule {
 
     /// The modes of a ladder, by frequency and modulation depth.
     pub const fn on(ladder: Ladder, clock: &Clock) -> Self {
-        Self { ladder, fixed: None, last_switch: None, dwell_ticks: (DWELL_S * clock.ticks_per_s) as i32 }
+        Self { ladder, fixed: None, lower_since: None, dwell_ticks: (DWELL_S * clock.ticks_per_s) as i32 }
     }
 
     /// Always the same mode, wherever its pulses lead.
@@ -81,56 +85,51 @@ impl Schedule {
         Self { fixed: Some(mode), ..Self::new(clock) }
     }
 
-    /// The mode that this reference should have, given the present one; the dwell time is respected.
+    /// The mode that this reference should have, given the present one: a higher one at once, the next lower one when it has sufficed
+    /// for the dwell time.
     #[inline(never)]
     pub fn wanted(&mut self, now: Instant, mode: Mode, seen: &Reference, devices: &SwitchLimits) -> Mode {
         if let Some(fixed) = self.fixed {
             return fixed;
         }
-        if let Some(last) = self.last_switch
-            && mode != Mode::Off
-        {
-            if (0..self.dwell_ticks).contains(&now.since(last)) {
-                return mode;
-            }
-            self.last_switch = None;
+        let Ladder(rungs) = self.ladder;
+        let place = rungs.iter().position(|rung| *rung == mode).unwrap_or(0);
+        let chosen = self.chosen(place, seen, devices);
+        let wanted = rungs.get(chosen).copied().unwrap_or(Mode::Async);
+        if chosen >= place {
+            self.lower_since = None;
+            return wanted;
         }
+        let since = *self.lower_since.get_or_insert(now);
+        if now.since(since) < self.dwell_ticks { mode } else { wanted }
+    }
+
+    /// The place on the ladder by this reference alone, from a place on it: up past every border that is passed, else down by one if
+    /// that one's no longer is.
+    fn chosen(&self, place: usize, seen: &Reference, devices: &SwitchLimits) -> usize {
         let share = seen.rate * (2.0 / 4_294_967_296.0) * devices.shortest_half_ticks as f32;
-        let Ladder(rungs @ [lowest, ..]) = self.ladder else { return Mode::Async };
-        if share < pick(Mode::Async.row().until.shares, mode.carriers() > 0) {
-            return Mode::Async;
-        }
         let notch = shortest_notch(seen.rate, devices);
-        let passes = |below: Mode, from_above: bool| {
+        let passes = |below: &Mode, from_above: bool| {
             let row = below.row();
             share >= pick(row.until.shares, from_above) || seen.depth >= pick(reached(row, notch), from_above)
         };
-        // From where the drive stands: up past every border that is passed, else down past those that no longer are.
-        let place = rungs.iter().position(|rung| *rung == mode).unwrap_or(0);
-        let (lower, upper) = rungs.split_at_checked(place).unwrap_or((&[], rungs));
-        let mut wanted = *upper.first().unwrap_or(lowest);
-        for pair in upper.windows(2) {
-            let [below, above] = pair else { break };
-            if !passes(*below, false) {
+        if share < pick(Mode::Async.row().until.shares, place > 0) {
+            return place.saturating_sub(1);
+        }
+        let Ladder([borders @ .., _]) = self.ladder else { return 0 };
+        let mut wanted = place.saturating_sub(1);
+        for below in borders.iter().skip(wanted) {
+            if !passes(below, wanted < place) {
                 break;
             }
-            wanted = *above;
-        }
-        if wanted != mode {
-            return wanted;
-        }
-        for below in lower.iter().rev() {
-            if passes(*below, true) {
-                break;
-            }
-            wanted = *below;
+            wanted += 1;
         }
         wanted
     }
 
-    /// Tells the schedule that the mode changed at this instant.
-    pub fn switched(&mut self, now: Instant) {
-        self.last_switch = Some(now);
+    /// Tells the schedule that the mode changed.
+    pub const fn switched(&mut self) {
+        self.lower_since = None;
     }
 }
 
@@ -142,7 +141,11 @@ fn pick((up, down): (f32, f32), from_above: bool) -> f32 {
 /// The depths of a mode's border, lowered where the mode does not reach them because of the shortest pulse.
 fn reached(row: &Row, notch: f32) -> (f32, f32) {
     let reach = row.largest - row.notch_sum * notch - DEPTH_ROOM;
-    if reach < row.until.depths.0 { (reach, reach - DEPTH_HYSTERESIS) } else { row.until.depths }
+    if row.notch_sum > 0.0 && reach < row.until.depths.0 {
+        (reach, reach - DEPTH_HYSTERESIS)
+    } else {
+        row.until.depths
+    }
 }
 
 /// Sine of half the shortest notch, with `rate` in angle units per tick: an angle of a few degrees.
