@@ -126,8 +126,8 @@ impl Request {
             1 => Self::Hello,
             2 => Self::ControlSample(at),
             3 => {
-                let [a, b, c, d, e, f, g, h, i, j, k, l, ..] = payload;
-                Self::ControlReport(at, Report::from_words([a, b, c, d, e, f, g, h, i, j, k, l]))
+                let [a, b, c, d, e, f, g, h, i, j, k, l, m, ..] = payload;
+                Self::ControlReport(at, Report::from_words([a, b, c, d, e, f, g, h, i, j, k, l, m]))
             }
             4 => Self::PwmSample(at),
             5 => {

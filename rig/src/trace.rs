@@ -73,6 +73,8 @@ pub struct Row {
     pub f1_hz: f64,
     /// Control's estimate of how much the machine's flux linkage exceeds the map's, as a share.
     pub map_error: f64,
+    /// The torque that control says flows, smoothed, in N·m.
+    pub flowing_nm: f64,
     /// Mode of the running carrier.
     pub mode: Mode,
     /// The latched fault.

@@ -205,6 +205,34 @@ fn a_wrong_map_is_noticed() {
     assert!(told.abs() < 0.1, "{told} % for a map that is right");
 }
 
+/// Each of the five borders is passed once on the way up and once on the way down.
+#[test]
+fn the_choice_of_mode_does_not_follow_the_links_ripple() {
+    for ripple in ["60@50", "100@33", "100@50", "100@100", "30@300"] {
+        let figures = run(&format!("sweep --down --udc-ripple {ripple}"));
+        assert_eq!(list(&figures, "mode_switches").len(), 10, "{ripple}");
+    }
+}
+
+/// From a twentieth of rated speed up, in every mode.
+#[test]
+fn the_torque_that_is_told_is_the_torque_that_flows() {
+    for point in [
+        "100 --torque 1235",
+        "400 --torque -600",
+        "800 --torque 1235",
+        "1500 --torque 300",
+        "2600 --torque 700",
+    ] {
+        for flaws in ["", "--rs-error 50 --map-error -10 --noise-a 0.5 --dead-time-us 5"] {
+            let figures = run(&format!("steady --speed {point} {flaws}"));
+            let told = number(&list(&figures, "point")[0], "told_error_percent");
+            println!("{point} {flaws}: {told:.2} %");
+            assert!(told < if flaws.is_empty() { 0.5 } else { 1.5 }, "{point} {flaws}: {told} %");
+        }
+    }
+}
+
 #[test]
 fn the_link_may_be_anywhere_and_may_step() {
     for udc in [1000, 1200, 1800] {

@@ -8,7 +8,7 @@ use crate::ports::{DriveCommand, DualDriveCommand, DualReport, MotorDemand, Repo
 use crate::time::{Clock, Instant};
 
 /// Between the PMaSynRM drive's operator and its control interrupt.
-pub type OperatorMailboxes = Mailboxes<DriveCommand, Report, 7, 13>;
+pub type OperatorMailboxes = Mailboxes<DriveCommand, Report, 7, 14>;
 /// Between the ZS9's operator and its control interrupt.
 pub type DualOperatorMailboxes = Mailboxes<DualDriveCommand, DualReport, 7, 17>;
 
@@ -101,16 +101,16 @@ impl Words<7> for Timed<DualDriveCommand> {
     }
 }
 
-impl Words<13> for Observation<Report> {
+impl Words<14> for Observation<Report> {
     #[inline]
-    fn to_words(self) -> [u32; 13] {
-        let [a, b, c, d, e, f, g, h, i, j, k, l] = self.report.to_words();
-        [self.at.0, a, b, c, d, e, f, g, h, i, j, k, l]
+    fn to_words(self) -> [u32; 14] {
+        let [a, b, c, d, e, f, g, h, i, j, k, l, m] = self.report.to_words();
+        [self.at.0, a, b, c, d, e, f, g, h, i, j, k, l, m]
     }
 
-    fn from_words(words: [u32; 13]) -> Self {
-        let [at, a, b, c, d, e, f, g, h, i, j, k, l] = words;
-        let report = Report::from_words([a, b, c, d, e, f, g, h, i, j, k, l]);
+    fn from_words(words: [u32; 14]) -> Self {
+        let [at, a, b, c, d, e, f, g, h, i, j, k, l, m] = words;
+        let report = Report::from_words([a, b, c, d, e, f, g, h, i, j, k, l, m]);
         Self { at: Instant(at), report }
     }
 }

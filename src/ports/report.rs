@@ -11,6 +11,8 @@ use crate::protection::{Trip, trip_from_words, trip_to_words};
 pub struct Report {
     /// Torque demand after envelope, slew and voltage limit, in N·m.
     pub torque_nm: f32,
+    /// Torque of the machine by currents and map, smoothed, in N·m; not a number where the law does not say.
+    pub flowing_nm: f32,
     /// Current reference, d axis, in A.
     pub id_a: f32,
     /// Current reference, q axis, in A.
@@ -42,9 +44,9 @@ impl Report {
     }
 }
 
-impl Words<12> for Report {
+impl Words<13> for Report {
     #[inline]
-    fn to_words(self) -> [u32; 12] {
+    fn to_words(self) -> [u32; 13] {
         let [code, value, limit, at] = trip_to_words(self.trip);
         let flags = u32::from(self.acknowledged) | u32::from(self.speed_known) << 8;
         let code = code | flags << 16 | (self.mode as u32) << 26;
@@ -61,11 +63,13 @@ impl Words<12> for Report {
             at,
             self.udc_v.to_bits(),
             self.current_a.to_bits(),
+            self.flowing_nm.to_bits(),
         ]
     }
 
-    fn from_words(words: [u32; 12]) -> Self {
-        let [torque, id, iq, voltage, omega, map_error, code, value, limit, at, udc, current] = words;
+    fn from_words(words: [u32; 13]) -> Self {
+        let [torque, id, iq, voltage, omega, map_error, code, value, limit, at, udc, current, flowing] =
+            words;
         Self {
             torque_nm: f32::from_bits(torque),
             id_a: f32::from_bits(id),
@@ -76,6 +80,7 @@ impl Words<12> for Report {
             trip: trip_from_words([code, value, limit, at]),
             udc_v: f32::from_bits(udc),
             current_a: f32::from_bits(current),
+            flowing_nm: f32::from_bits(flowing),
             speed_known: code >> 24 & 1 != 0,
             acknowledged: (code >> 16) as u8,
             mode: Mode::from_code(code >> 26),

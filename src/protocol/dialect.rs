@@ -22,8 +22,9 @@ pub trait MessageSet: Copy + 'static {
 
     /// The messages to it: the command first.
     const TO_DRIVE: &'static [&'static Message];
-    /// The messages from it: status, three of measurements, the fault's value and limit, counters, the answer about a parameter.
-    const FROM_DRIVE: [&'static Message; 8];
+    /// The messages from it: status, three of measurements, the fault's value and limit, counters, the answer about a parameter;
+    /// where a drive has it, a fourth of measurements.
+    const FROM_DRIVE: &'static [&'static Message];
     /// The first frame of a message, or the first after a silence: it only sets the counter.
     const GREETING: Self::Content;
     /// Nothing said.
@@ -39,7 +40,7 @@ pub trait MessageSet: Copy + 'static {
     fn request(&self, armed: bool, fresh: bool, parameters: &Parameters, ratings: &Ratings) -> Request<Self>;
     /// The measurements and the pattern that are sent of a report.
     fn observed(report: Option<&Report<Self>>, ratings: &Ratings) -> (Self::Measured, Self::Pattern);
-    /// Content of one of the three messages of measurements.
+    /// Content of one of the messages of measurements.
     fn measured(measured: &Self::Measured, message: usize) -> Payload;
 }
 

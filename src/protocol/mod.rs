@@ -36,15 +36,25 @@ pub use receiver::Reject;
 pub use signal::{Kind, OutOfRange, Payload, Signal};
 pub use telemetry::{
     COUNTERS, CURRENTS, Counts, FAULT_LIMIT, FAULT_VALUE, Listening, MOTION, Measured, Outcome,
-    PARAMETER_ANSWER, ParameterAnswer, Pattern, STATUS, StatusFrame, VOLTAGES, trip_frames, trip_number,
+    PARAMETER_ANSWER, ParameterAnswer, Pattern, STATUS, StatusFrame, TORQUE_ESTIMATE, VOLTAGES, trip_frames,
+    trip_number,
 };
 
 /// The messages to the drive.
 pub const TO_DRIVE: [&Message; 4] = [&COMMAND, &LIMITS, &LINK_LIMITS, &PARAMETER_REQUEST];
 
 /// The messages from the drive.
-pub const FROM_DRIVE: [&Message; 8] =
-    [&STATUS, &MOTION, &CURRENTS, &VOLTAGES, &FAULT_VALUE, &FAULT_LIMIT, &COUNTERS, &PARAMETER_ANSWER];
+pub const FROM_DRIVE: [&Message; 9] = [
+    &STATUS,
+    &MOTION,
+    &CURRENTS,
+    &VOLTAGES,
+    &FAULT_VALUE,
+    &FAULT_LIMIT,
+    &COUNTERS,
+    &PARAMETER_ANSWER,
+    &TORQUE_ESTIMATE,
+];
 
 pub use traction::{Content, Traction};
 pub use zs9::{

@@ -16,6 +16,8 @@ const FAULT_VALUE: usize = 4;
 const FAULT_LIMIT: usize = 5;
 const COUNTERS: usize = 6;
 const ANSWER: usize = 7;
+/// A fourth message of measurements, where a drive has one.
+const MORE: usize = 8;
 
 /// Counters of all messages, and the place in the cycle.
 #[derive(Clone, Copy, Debug)]
@@ -23,7 +25,7 @@ pub struct Sender<D> {
     slot: u32,
     page: u32,
     answer: Option<ParameterAnswer>,
-    counters: [Counter; 8],
+    counters: [Counter; 9],
     dialect: core::marker::PhantomData<D>,
 }
 
@@ -34,7 +36,7 @@ impl<D: MessageSet> Sender<D> {
             slot: 0,
             page: 0,
             answer: None,
-            counters: [Counter::new(); 8],
+            counters: [Counter::new(); 9],
             dialect: core::marker::PhantomData,
         }
     }
@@ -59,6 +61,7 @@ impl<D: MessageSet> Sender<D> {
             (2, _) => (1, D::measured(measured, 0)),
             (4, _) => (2, D::measured(measured, 1)),
             (6, _) => (3, D::measured(measured, 2)),
+            (7, _) if D::FROM_DRIVE.len() > MORE => (MORE, D::measured(measured, 3)),
             (8, 0) => {
                 let content = counts.encode(self.page);
                 self.page = Counts::page_after(self.page);

@@ -59,7 +59,7 @@ impl MessageSet for Traction {
     type Pattern = Mode;
 
     const TO_DRIVE: &'static [&'static Message] = &TO_DRIVE;
-    const FROM_DRIVE: [&'static Message; 8] = FROM_DRIVE;
+    const FROM_DRIVE: &'static [&'static Message] = &FROM_DRIVE;
     const GREETING: Content = Content::Greeting;
     const SILENT: Self = Self { command: Command::AT_REST, torque_limits: None, link_limits: None };
 
@@ -118,6 +118,7 @@ impl MessageSet for Traction {
         let measured = Measured {
             speed_rpm: report.speed_known.then_some(report.omega / ratings.pole_pairs * RPM_PER_RAD_S),
             torque_nm: Some(report.torque_nm),
+            torque_estimate_nm: Some(report.flowing_nm),
             link_v: Some(report.udc_v),
             current_a: Some(report.current_a),
             id_ref_a: Some(report.id_a),
@@ -133,6 +134,7 @@ impl MessageSet for Traction {
         match message {
             0 => measured.motion(),
             1 => measured.currents(),
+            3 => measured.torque_estimate(),
             _ => measured.voltages(),
         }
     }

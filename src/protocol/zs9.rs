@@ -246,7 +246,7 @@ impl MessageSet for Zs9 {
     type Pattern = Scheme;
 
     const TO_DRIVE: &'static [&'static Message] = &TO_ZS9;
-    const FROM_DRIVE: [&'static Message; 8] = FROM_ZS9;
+    const FROM_DRIVE: &'static [&'static Message] = &FROM_ZS9;
     const GREETING: Zs9Content = Zs9Content::Greeting;
     const SILENT: Self = Self { command: Zs9Command::AT_REST, limits: [None; 2], link: None };
 
@@ -331,13 +331,13 @@ impl MessageSet for Zs9 {
             0 => first,
             1 => second,
             _ => {
-                return encode([
+                return encode(&[
                     (&LINK, measured.link_v),
                     (&CAPACITOR, measured.capacitor_v),
                     (&DUTY, measured.duty_percent),
                 ]);
             }
         };
-        encode([(&SPEED, motor.speed_rpm), (&TORQUE, motor.torque_nm), (&CURRENT, motor.current_a)])
+        encode(&[(&SPEED, motor.speed_rpm), (&TORQUE, motor.torque_nm), (&CURRENT, motor.current_a)])
     }
 }

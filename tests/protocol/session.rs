@@ -68,7 +68,7 @@ impl Bench {
         let frame = self.parameters.frame(content);
         self.sent.clear();
         self.slot(Some(frame));
-        self.silence(2);
+        self.silence(4);
         let answer = self.sent.iter().find(|frame| frame.id == PARAMETER_ANSWER.id)?;
         ParameterAnswer::decode(Payload(u64::from_le_bytes(answer.data)))
     }
@@ -267,6 +267,7 @@ fn what_is_told_is_what_arrives() {
         iq_ref_a: Some(1e9),
         voltage_v: Some(700.0),
         frequency_hz: Some(-82.3),
+        torque_estimate_nm: Some(-78.9),
         temperature_c: None,
     };
     bench.sent.clear();
@@ -294,6 +295,7 @@ fn what_is_told_is_what_arrives() {
     assert!(near(measured.speed_rpm, -1_234.5, 0.5) && near(measured.torque_nm, 77.7, 0.1));
     assert!(near(measured.current_a, 412.3, 0.1) && near(measured.id_ref_a, -200.1, 0.1));
     assert!(near(measured.voltage_v, 700.0, 0.1) && near(measured.frequency_hz, -82.3, 0.05));
+    assert!(near(measured.torque_estimate_nm, -78.9, 0.1));
     assert_eq!((measured.link_v, measured.iq_ref_a, measured.temperature_c), (None, None, None));
     assert!(bench.sent.iter().any(|frame| frame.id == MOTION.id));
 }

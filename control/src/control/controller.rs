@@ -5,9 +5,9 @@
 
 use super::speed::SpeedTracker;
 use super::{
-    Boundary, Committed, ControlLaw, Demand, Law, LinkSwing, LinkWindow, ModeLimits, Region, Regulated,
-    RotorSample, VoltageLimit, VoltageVector, current_loop, demand, disturbance, flux_path, link_filter,
-    map_error, operating_point, torque_nm, torque_trim,
+    Boundary, Committed, ControlLaw, Demand, Law, LinkSwing, LinkWindow, ModeLimits, OperatingPoint, Region,
+    Regulated, RotorSample, VoltageLimit, VoltageVector, current_loop, demand, disturbance, flux_path,
+    link_filter, map_error, operating_point, torque_nm, torque_trim,
 };
 use crate::frames::{Angle, Dq, six_step_v};
 use crate::machine::Tables;
@@ -16,6 +16,9 @@ use crate::time::Clock;
 /// Assumed addition of the trim and of the link's damping to an MTPA point's voltage, as shares of six-step and of the largest torque. Chosen by trial: by the maps of the
 /// 180 kW machine it adds 0.55 at half torque and 0.76 at full torque; with none the mode hunts on a wrong map.
 const DEPTH_PER_TORQUE: f32 = 0.4;
+
+/// Time constant of the torque that is told, in s: half of telemetry's period.
+const TOLD_S: f32 = 0.005;
 
 /// The target of the current loop.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -76,6 +79,8 @@ pub struct Controller {
     /// Torque by the map, summed over the samples since the last operating point, in N·m; and how many they are.
     sum_nm: f32,
     samples: u32,
+    /// That torque, smoothed, in N·m.
+    flowing_nm: f32,
     target: Target,
 }
 
@@ -101,6 +106,7 @@ impl Controller {
             map_error: map_error::MapError::new(),
             sum_nm: 0.0,
             samples: 0,
+            flowing_nm: 0.0,
             target: Target::NONE,
         }
     }
@@ -115,6 +121,10 @@ impl ControlLaw for Controller {
     #[inline(always)]
     fn tracker_mut(&mut self) -> &mut SpeedTracker {
         &mut self.speed
+    }
+
+    fn flowing_nm(&self) -> f32 {
+        self.flowing_nm
     }
 
     fn map_scale(&self) -> f32 {
@@ -139,7 +149,7 @@ impl ControlLaw for Controller {
         self.trim = torque_trim::TorqueTrim::new();
         self.link = link_filter::LinkFilter::new();
         self.path = flux_path::FluxPath::new();
-        (self.sum_nm, self.samples) = (0.0, 0);
+        (self.sum_nm, self.samples, self.flowing_nm) = (0.0, 0, 0.0);
         self.target = Target::NONE;
     }
 
@@ -168,9 +178,12 @@ impl ControlLaw for Controller {
         let (tables, omega) = (law.tables, self.speed.omega());
         let ratings = &tables.ratings;
         let scale = self.map_error.scale();
-        let measured_nm = self.sum_nm / self.samples as f32 * scale;
+        let map_nm = self.sum_nm / self.samples as f32;
+        let measured_nm = map_nm * scale;
         let period_s = self.passed_s(law.clock);
         (self.sum_nm, self.samples) = (0.0, 0);
+        self.flowing_nm +=
+            (map_nm * self.map_error.known_scale() - self.flowing_nm) * (period_s / (period_s + TOLD_S));
         let can_step = limits.follows == Regulated::Mean;
         let shaping =
             demand::Input { demand, window, udc_v, omega, flowing_nm: measured_nm, can_step, period_s };
@@ -200,7 +213,17 @@ impl ControlLaw for Controller {
             largest_nm: ratings.max_torque_nm,
             period_s,
         });
-        self.map_error.step(self.disturbance.mean(), point.flux, omega, period_s);
+        let OperatingPoint { current, flux, .. } = point;
+        let disturbance = self.disturbance.mean();
+        self.map_error.step(&map_error::Input {
+            disturbance,
+            current,
+            flux,
+            omega,
+            period_s,
+            largest_a: ratings.max_current_a,
+            fastest: ratings.max_speed_rad_s * ratings.pole_pairs,
+        });
         let way = (can_step, limits.filled && !limits.settled);
         self.target = Target {
             torque_nm: if limited || swing.is_none() { given_nm } else { damped_nm },

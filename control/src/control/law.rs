@@ -54,6 +54,12 @@ pub trait ControlLaw {
         self.tracker().omega()
     }
 
+    /// Torque of the machine by its currents and the map, smoothed, in N·m: 0 while no pulses are made, not a number for a law that
+    /// does not say.
+    fn flowing_nm(&self) -> f32 {
+        f32::NAN
+    }
+
     /// The machine's flux linkage over the map's, as far as an error of it is believed; 1 for a law that has no idea of it.
     fn map_scale(&self) -> f32;
 

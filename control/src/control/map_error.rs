@@ -1,20 +1,44 @@
 //! The error of the flux map, and its use.
 //!
-//! If the machine's flux linkage is (1 + ε) times the map's, −ε jωψ of the EMF stays unexplained. The estimate is reported;
-//! beyond what a wrong resistance can feign, the operating point takes it into account: such a machine needs for a torque the
-//! current that the map gives for T/(1 + ε), and the voltage that it gives on a link of udc/(1 + ε).
+//! If the machine's flux linkage is (1 + ε) times the map's, and its resistance, with what dead time and devices take along the current,
+//! ΔR more than it is taken for, then u = −ε jωψ − ΔR i stays unexplained. Least squares for both, with ΔR taken as 0 where there is hardly
+//! a current to tell it from:
+//!
+//! ε = ((u·i)(jωψ·i) − (u·jωψ)(|i|² + i₀²)) / (|ωψ|² (|i|² + i₀²) − (jωψ·i)²)
+//!
+//! The estimate is reported; beyond what a link sensor may be off, the operating point takes it into account: such a machine needs for a
+//! torque the current that the map gives for T/(1 + ε), and the voltage that it gives on a link of udc/(1 + ε).
 
 use crate::frames::{Dq, limit_magnitude};
 
-/// Electrical speed from which the disturbance tells something of the map, in rad/s: the EMF is then well above the resistive
-/// drop.
-const FROM_RAD_S: f32 = 200.0;
+/// Speed from which the disturbance tells something of the map, as a share of the largest: a twentieth of the reference machine's rated one.
+const FROM: f32 = 0.02;
 /// Bandwidth of the estimate, in rad/s.
 const BANDWIDTH_RAD_S: f32 = 5.0;
-/// Error that is left alone: half as much resistance again looks like up to 3 %.
-const LEFT_ALONE: f32 = 0.03;
+/// Current i₀ that tells resistance and flux linkage apart, as a share of the largest.
+const RESISTANCE_FROM: f32 = 0.04;
+/// Error that is left alone: the usual error of a link sensor.
+const LEFT_ALONE: f32 = 0.01;
 /// Largest correction.
 const MOST: f32 = 0.15;
+
+/// The disturbance over a time, and what was aimed at.
+pub struct Input {
+    /// Mean, in V.
+    pub disturbance: Dq,
+    /// In A.
+    pub current: Dq,
+    /// Flux linkage, in Wb.
+    pub flux: Dq,
+    /// Electrical angular speed, in rad/s.
+    pub omega: f32,
+    /// The time, in s.
+    pub period_s: f32,
+    /// Largest current, in A.
+    pub largest_a: f32,
+    /// Largest electrical angular speed, in rad/s.
+    pub fastest: f32,
+}
 
 #[derive(Clone, Copy, Debug)]
 pub struct MapError {
@@ -40,21 +64,74 @@ impl MapError {
 
     /// 1 + ε with nothing of a believed ε left alone: for the flux linkage of the magnets in a machine that is caught.
     pub fn caught_scale(&self) -> f32 {
-        if self.scale == 1.0 { 1.0 } else { 1.0 + limit_magnitude(self.share, MOST) }
+        if self.scale == 1.0 { 1.0 } else { self.known_scale() }
     }
 
-    /// So much time has passed, with the mean disturbance in V and the flux linkage aimed at in Wb.
-    pub fn step(&mut self, disturbance: Dq, flux: Dq, omega: f32, period_s: f32) {
-        if omega.abs() < FROM_RAD_S {
+    /// 1 + ε, as far as it is known.
+    pub fn known_scale(&self) -> f32 {
+        1.0 + limit_magnitude(self.share, MOST)
+    }
+
+    /// A time with a mean disturbance.
+    pub fn step(&mut self, input: &Input) {
+        let Input { disturbance, current, flux, omega, period_s, largest_a, fastest } = *input;
+        if omega.abs() < FROM * fastest {
             return;
         }
+        let from_a = RESISTANCE_FROM * largest_a;
         let emf = flux.j();
-        let seen = -(disturbance.d * emf.d + disturbance.q * emf.q) / (omega * flux.squared());
+        let [along_emf, along_current, both] =
+            [(disturbance, emf), (disturbance, current), (emf, current)].map(|(a, b)| a.d * b.d + a.q * b.q);
+        let squared = current.squared() + from_a * from_a;
+        let seen =
+            (along_current * both - along_emf * squared) / (omega * (flux.squared() * squared - both * both));
         self.share += BANDWIDTH_RAD_S * period_s * (seen - self.share);
         self.scale = if self.share.abs() > LEFT_ALONE {
             1.0 + limit_magnitude(self.share - LEFT_ALONE.copysign(self.share), MOST)
         } else {
             1.0
         };
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const CURRENT: Dq = Dq { d: -120.0, q: 160.0 };
+    const FLUX: Dq = Dq { d: -0.4, q: 1.1 };
+
+    /// The estimate after a second with this unexplained share of the flux linkage and this resistance in Ω.
+    fn estimate(share: f32, more_ohm: f32, current: Dq, omega: f32) -> f32 {
+        let mut error = MapError::new();
+        let disturbance = FLUX.j() * (-share * omega) + current * -more_ohm;
+        for _ in 0..2_000 {
+            error.step(&Input {
+                disturbance,
+                current,
+                flux: FLUX,
+                omega,
+                period_s: 1e-3,
+                largest_a: 250.0,
+                fastest: 1_500.0,
+            });
+        }
+        error.share()
+    }
+
+    #[test]
+    fn a_resistance_feigns_nothing() {
+        for omega in [35.0, 300.0, -300.0] {
+            for (share, more_ohm) in [(0.1, 0.0), (-0.1, 0.05), (0.0, 0.05), (0.03, -0.03)] {
+                let told = estimate(share, more_ohm, CURRENT, omega);
+                assert!((told - share).abs() < 1e-3, "{told} for {share} with {more_ohm} Ω at {omega} rad/s");
+            }
+        }
+    }
+
+    #[test]
+    fn without_current_the_flux_linkage_alone_is_asked() {
+        let told = estimate(0.1, 0.0, Dq::default(), 300.0);
+        assert!((told - 0.1).abs() < 1e-3, "{told}");
     }
 }

@@ -136,7 +136,7 @@ impl Modulator {
     fn choose_mode(&mut self, start: Instant, pulse: Angle, seen: &Reference) {
         if let Some(plan) = self.plan {
             if plan.at == self.next_half {
-                self.switch_to(plan.to, pulse);
+                self.switch_to(start, plan.to, pulse);
             }
             return;
         }
@@ -151,7 +151,7 @@ impl Modulator {
                 self.plan = Some(Plan { to: wanted, at });
             }
         } else if schedule::may_switch(self.mode, wanted, self.next_half) {
-            self.switch_to(wanted, pulse);
+            self.switch_to(start, wanted, pulse);
         }
     }
 
@@ -161,8 +161,8 @@ impl Modulator {
         (boundary(self.next_half, self.mode.carriers()) - pulse).signed().unsigned_abs() < KEPT_ANGLE.0
     }
 
-    fn switch_to(&mut self, mode: Mode, pulse: Angle) {
-        self.schedule.switched();
+    fn switch_to(&mut self, start: Instant, mode: Mode, pulse: Angle) {
+        self.schedule.switched(start);
         let from = self.mode;
         self.next_half = first_half(from, mode, self.next_half, pulse);
         self.mode = mode;

@@ -1,7 +1,7 @@
 //! The choice of the mode, and the angles at which it may change.
 //!
 //! The modes of a ladder stand in a row; each border between two neighbours has a frequency and a modulation depth. Above
-//! either the drive goes up, at once. It comes down when it has been below both, less a hysteresis, for a whole period of the
+//! either the drive goes up. It comes down when it has been below both, less a hysteresis, for a whole period of the
 //! slowest ripple that a line puts on the link: the choice does not follow ripple, and no two modes alternate faster than that.
 //! A switch waits for the end of a whole carrier at an angle where both modes' carriers end.
 
@@ -56,7 +56,7 @@ impl Ladder {
 const DEPTH_ROOM: f32 = 0.002;
 const DEPTH_HYSTERESIS: f32 = 0.012;
 
-/// Time for which a lower mode must have sufficed, in s: a period of the 33 Hz that a line of 16.7 Hz puts on the link, and a third more.
+/// Shortest time between two switches, and the time for which a lower mode must have sufficed, in s: a period of the 33 Hz that a line of 16.7 Hz puts on the link, and a third more.
 const DWELL_S: f32 = 0.04;
 
 /// The choice of mode.
@@ -64,6 +64,8 @@ const DWELL_S: f32 = 0.04;
 pub struct Schedule {
     ladder: Ladder,
     fixed: Option<Mode>,
+    /// The last switch, while the dwell time lasts.
+    switched: Option<Instant>,
     /// The instant from which on a lower mode has sufficed; none while the present one is needed.
     lower_since: Option<Instant>,
     dwell_ticks: i32,
@@ -77,7 +79,13 @@ impl Schedule {
 
     /// The modes of a ladder, by frequency and modulation depth.
     pub const fn on(ladder: Ladder, clock: &Clock) -> Self {
-        Self { ladder, fixed: None, lower_since: None, dwell_ticks: (DWELL_S * clock.ticks_per_s) as i32 }
+        Self {
+            ladder,
+            fixed: None,
+            switched: None,
+            lower_since: None,
+            dwell_ticks: (DWELL_S * clock.ticks_per_s) as i32,
+        }
     }
 
     /// Always the same mode, wherever its pulses lead.
@@ -86,7 +94,7 @@ impl Schedule {
     }
 
     /// The mode that this reference should have, given the present one: a higher one at once, the next lower one when it has sufficed
-    /// for the dwell time.
+    /// for the dwell time; either no sooner than that after the last switch.
     #[inline(never)]
     pub fn wanted(&mut self, now: Instant, mode: Mode, seen: &Reference, devices: &SwitchLimits) -> Mode {
         if let Some(fixed) = self.fixed {
@@ -98,10 +106,15 @@ impl Schedule {
         let wanted = rungs.get(chosen).copied().unwrap_or(Mode::Async);
         if chosen >= place {
             self.lower_since = None;
-            return wanted;
+        } else {
+            self.lower_since.get_or_insert(now);
         }
-        let since = *self.lower_since.get_or_insert(now);
-        if now.since(since) < self.dwell_ticks { mode } else { wanted }
+        let dwells = |since: Option<Instant>| since.is_some_and(|since| now.since(since) < self.dwell_ticks);
+        if mode != Mode::Off && (dwells(self.switched) || dwells(self.lower_since)) {
+            return mode;
+        }
+        self.switched = None;
+        wanted
     }
 
     /// The place on the ladder by this reference alone, from a place on it: up past every border that is passed, else down by one if
@@ -127,9 +140,9 @@ impl Schedule {
         wanted
     }
 
-    /// Tells the schedule that the mode changed.
-    pub const fn switched(&mut self) {
-        self.lower_since = None;
+    /// Tells the schedule that the mode changed at this instant.
+    pub const fn switched(&mut self, now: Instant) {
+        (self.switched, self.lower_since) = (Some(now), None);
     }
 }
 

@@ -19,6 +19,10 @@ pub struct SteadyPoint {
     pub reference_nm: f64,
     /// Mean air-gap torque, in N·m.
     pub torque_nm: f64,
+    /// The torque that the drive tells of it, mean, in N·m.
+    pub told_nm: f64,
+    /// The largest distance of that from the true mean, in percent of the largest torque.
+    pub told_error_percent: f64,
     /// Its error, in percent of the demand, or of 2 % of the largest torque where that is more.
     pub torque_error_percent: f64,
     /// Its error, in the same way of what the drive says.
@@ -66,6 +70,8 @@ pub fn steady_point(
     let speed_rpm = rows.last().map_or(0.0, |row| row.speed_rpm);
     let torque_nm = mean(rows, |row| row.te_nm);
     let reference_nm = mean(rows, |row| row.te_ref_nm);
+    let told_nm = mean(rows, |row| row.flowing_nm);
+    let told_off_nm = rows.iter().map(|row| (row.flowing_nm - torque_nm).abs()).fold(0.0, f64::max);
     let current_squared = mean(rows, |row| row.id_a * row.id_a + row.iq_a * row.iq_a);
     let omega = speed_rpm * core::f64::consts::TAU / 60.0;
     let air_gap_w = torque_nm * omega;
@@ -78,6 +84,8 @@ pub fn steady_point(
         demand_nm,
         reference_nm,
         torque_nm,
+        told_nm,
+        told_error_percent: told_off_nm / parameters.max_torque_nm * 100.0,
         torque_error_percent: error_percent(torque_nm, demand_nm, parameters.max_torque_nm),
         reference_error_percent: error_percent(torque_nm, reference_nm, parameters.max_torque_nm),
         current_rms_a: (current_squared / 2.0).sqrt(),

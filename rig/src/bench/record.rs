@@ -108,6 +108,7 @@ impl Bench {
             line_a: self.dc.line_a(),
             f1_hz: (report.omega / std::f32::consts::TAU).into(),
             map_error: report.map_error.into(),
+            flowing_nm: report.flowing_nm.into(),
             mode: if self.inverter.is_safe() { Mode::Off } else { self.inverter.half().mode },
             trip: report.trip,
             status: self.dc.operated().and_then(|line| line.status),

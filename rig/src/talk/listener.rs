@@ -57,10 +57,10 @@ impl Listener {
     }
 
     /// The messages that the system sends.
-    fn messages(&self) -> [&'static Message; 8] {
+    fn messages(&self) -> &'static [&'static Message] {
         match self.system {
-            System::Pmasynrm => FROM_DRIVE,
-            System::Zs9 => FROM_ZS9,
+            System::Pmasynrm => &FROM_DRIVE,
+            System::Zs9 => &FROM_ZS9,
         }
     }
 
@@ -138,7 +138,7 @@ impl Listener {
         ];
         row.extend(switches.map(flag));
         row.push(number(status.and_then(|status| status.chopper_percent)));
-        row.extend(self.measurements().map(number));
+        row.extend(self.measurements().into_iter().map(number));
         row.extend(self.counts.to_array().map(|count| count.to_string()));
         row.extend([
             self.answer.map_or(String::new(), |answer| answer.parameter.to_string()),
@@ -150,10 +150,10 @@ impl Listener {
     }
 
     /// Measurements in the order of their columns.
-    fn measurements(&self) -> [Option<f32>; 9] {
+    fn measurements(&self) -> Vec<Option<f32>> {
         let measured = &self.measured;
         match self.system {
-            System::Pmasynrm => [
+            System::Pmasynrm => vec![
                 measured.speed_rpm,
                 measured.torque_nm,
                 measured.link_v,
@@ -163,10 +163,11 @@ impl Listener {
                 measured.voltage_v,
                 measured.frequency_hz,
                 measured.temperature_c,
+                measured.torque_estimate_nm,
             ],
             System::Zs9 => {
                 let [first, second] = &self.zs9.motors;
-                [
+                vec![
                     first.speed_rpm,
                     first.torque_nm,
                     first.current_a,

@@ -197,6 +197,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         let target = self.controller.target();
         let report = Report {
             torque_nm: target.torque_nm,
+            flowing_nm: self.controller.flowing_nm(),
             id_a: target.current.d,
             iq_a: target.current.q,
             voltage_v: self.reference.voltage_v,

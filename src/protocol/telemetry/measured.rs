@@ -15,6 +15,8 @@ const CURRENT: Signal = Signal::physical("current_a", "A", 16, 0.1, [0.0, 3_000.
 const ID_REF: Signal = Signal::physical("id_ref_a", "A", 32, 0.1, CURRENT_A);
 const IQ_REF: Signal = Signal::physical("iq_ref_a", "A", 48, 0.1, CURRENT_A);
 
+const ESTIMATE: Signal = Signal::physical("torque_estimate_nm", "N.m", 16, 0.1, TORQUE_NM);
+
 const VOLTAGE: Signal = Signal::physical("voltage_v", "V", 16, 0.1, LINK_V);
 const FREQUENCY: Signal = Signal::physical("frequency_hz", "Hz", 32, 0.05, [-1_600.0, 1_600.0]);
 const TEMPERATURE: Signal = Signal::physical("temperature_c", "degC", 48, 0.1, [-100.0, 300.0]);
@@ -25,6 +27,8 @@ pub const MOTION: Message = Message::new("MOTION", 0x182, 6, 10, &[SPEED, TORQUE
 pub const CURRENTS: Message = Message::new("CURRENTS", 0x183, 7, 10, &[CURRENT, ID_REF, IQ_REF]);
 /// Voltage, frequency, temperature.
 pub const VOLTAGES: Message = Message::new("VOLTAGES", 0x184, 8, 10, &[VOLTAGE, FREQUENCY, TEMPERATURE]);
+/// The torque that flows.
+pub const TORQUE_ESTIMATE: Message = Message::new("TORQUE_ESTIMATE", 0x189, 13, 10, &[ESTIMATE]);
 
 /// The measurements, and what control makes of them. `None`: not available.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -34,6 +38,8 @@ pub struct Measured {
     pub speed_rpm: Option<f32>,
     /// Torque demand after envelope, slew and limits, in N·m.
     pub torque_nm: Option<f32>,
+    /// Torque of the machine by its currents, its flux map and the map's error as far as it is known, in N·m.
+    pub torque_estimate_nm: Option<f32>,
     /// DC-link voltage, in V.
     pub link_v: Option<f32>,
     /// Largest magnitude of a phase current, in A.
@@ -50,12 +56,12 @@ pub struct Measured {
     pub temperature_c: Option<f32>,
 }
 
-/// Three measurements.
+/// Measurements of one message.
 #[inline(never)]
-pub(in crate::protocol) fn encode(signals: [(&Signal, Option<f32>); 3]) -> Payload {
+pub(in crate::protocol) fn encode(signals: &[(&Signal, Option<f32>)]) -> Payload {
     let mut payload = Payload::default();
     for (signal, value) in signals {
-        signal.put_measured(&mut payload, value);
+        signal.put_measured(&mut payload, *value);
     }
     payload
 }
@@ -63,21 +69,26 @@ pub(in crate::protocol) fn encode(signals: [(&Signal, Option<f32>); 3]) -> Paylo
 impl Measured {
     /// Content of [`MOTION`].
     pub fn motion(&self) -> Payload {
-        encode([(&SPEED, self.speed_rpm), (&TORQUE, self.torque_nm), (&LINK, self.link_v)])
+        encode(&[(&SPEED, self.speed_rpm), (&TORQUE, self.torque_nm), (&LINK, self.link_v)])
     }
 
     /// Content of [`CURRENTS`].
     pub fn currents(&self) -> Payload {
-        encode([(&CURRENT, self.current_a), (&ID_REF, self.id_ref_a), (&IQ_REF, self.iq_ref_a)])
+        encode(&[(&CURRENT, self.current_a), (&ID_REF, self.id_ref_a), (&IQ_REF, self.iq_ref_a)])
     }
 
     /// Content of [`VOLTAGES`].
     pub fn voltages(&self) -> Payload {
         let temperature = (&TEMPERATURE, self.temperature_c);
-        encode([(&VOLTAGE, self.voltage_v), (&FREQUENCY, self.frequency_hz), temperature])
+        encode(&[(&VOLTAGE, self.voltage_v), (&FREQUENCY, self.frequency_hz), temperature])
     }
 
-    /// Takes over what a message of these three says.
+    /// Content of [`TORQUE_ESTIMATE`].
+    pub fn torque_estimate(&self) -> Payload {
+        encode(&[(&ESTIMATE, self.torque_estimate_nm)])
+    }
+
+    /// Takes over what a message of these four says.
     pub fn merge(&mut self, message: &Message, payload: Payload) {
         match message.id {
             id if id == MOTION.id => {
@@ -95,6 +106,7 @@ impl Measured {
                 self.frequency_hz = FREQUENCY.get(payload);
                 self.temperature_c = TEMPERATURE.get(payload);
             }
+            id if id == TORQUE_ESTIMATE.id => self.torque_estimate_nm = ESTIMATE.get(payload),
             _ => (),
         }
     }

@@ -64,6 +64,10 @@ impl Scenario<Traction> for Steady {
                 figures.set("harmonics_without_compensation", without.harmonics());
             }
         }
+        if steady.told_nm.is_finite() {
+            let told = "torque that the drive tells, off the mean in % of the largest";
+            verdicts.push(Verdict::ours(told, steady.told_error_percent, 2.0));
+        }
         figures.set("point", vec![steady]);
         figures.set("verdicts", verdicts);
         figures.set("distortion", beside);
