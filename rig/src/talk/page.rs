@@ -25,11 +25,6 @@ fn named(outcome: &Outcome, column: &str, names: &[&str]) -> Points {
     outcome.talk.rows.iter().filter_map(place).collect()
 }
 
-fn listed(names: &[&str]) -> String {
-    let list: Vec<_> = names.iter().enumerate().map(|(code, name)| format!("{code} {name}")).collect();
-    list.join(", ")
-}
-
 const TIME: &str = "time in s";
 
 /// The PMaSynRM drive's speed and torque.
@@ -68,11 +63,9 @@ pub(super) fn page(options: &TalkOptions, outcome: &Outcome) -> Result<String> {
         Happened::Zs9(recording) => dual(&mut page, outcome, recording),
     }
     let states: Vec<_> = tractive::operator::State::ALL.iter().map(|state| state.name()).collect();
-    let state = [("state", named(outcome, "state", &states))];
-    page.curves(&format!("State ({})", listed(&states)), TIME, "", &state);
+    page.states("State", &states, named(outcome, "state", &states));
     let listening: Vec<_> = tractive::protocol::Listening::ALL.iter().map(|(_, name)| *name).collect();
-    let commands = [("listening", named(outcome, "listening", &listening))];
-    page.curves(&format!("Commands ({})", listed(&listening)), TIME, "", &commands);
+    page.states("Commands", &listening, named(outcome, "listening", &listening));
     let causes = ["unknown", "truncated", "corrupted", "repeated", "disordered", "out_of_range"];
     let rejected: Vec<_> = causes.iter().map(|cause| (*cause, told(outcome, cause))).collect();
     page.curves("Frames rejected", TIME, "", &rejected);

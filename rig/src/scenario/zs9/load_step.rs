@@ -57,6 +57,7 @@ impl Scenario<Zs9> for LoadStep {
     }
 
     fn plots(&self, recording: &Recording, _: &Options, _: &Machine, page: &mut Page) {
+        page.mark(STEP_S, "motor 2's load steps", false);
         let rows = figures::window(recording, STEP_S - 0.1, STEP_S + 0.2);
         plot(page, ("figures 14 to 19", "link voltage", "V"), rows, &VOLTAGES);
         plot(page, ("figures 14 to 19", "inductor current", "A"), rows, &INDUCTOR);

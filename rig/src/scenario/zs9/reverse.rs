@@ -64,6 +64,8 @@ impl Scenario<Zs9> for Reverse {
     }
 
     fn plots(&self, recording: &Recording, _: &Options, _: &Machine, page: &mut Page) {
+        page.mark(BEGINS_S, "motor 2 reverses", false);
+        page.mark(ENDS_S, "it is there", false);
         let rows = figures::window(recording, 0.0, DURATION_S);
         plot(page, ("figures 20 to 23", "torque of motor 1", "N·m"), rows, &TORQUES[..1]);
         plot(page, ("figures 20 to 23", "speed of motor 1", "r/min"), rows, &SPEEDS[..1]);
