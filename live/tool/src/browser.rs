@@ -131,13 +131,6 @@ impl Browser {
         Ok(answer["data"].as_str().context("DevTools: no picture")?.to_owned())
     }
 
-    /// A picture of the whole page, also of what is below the window.
-    pub fn whole_picture(&mut self) -> Result<String> {
-        let words = json!({ "format": "png", "captureBeyondViewport": true });
-        let answer = self.call("Page.captureScreenshot", words)?;
-        Ok(answer["data"].as_str().context("DevTools: no picture")?.to_owned())
-    }
-
     fn call(&mut self, method: &str, words: Value) -> Result<Value> {
         self.number += 1;
         let mut message = json!({ "id": self.number, "method": method, "params": words });

@@ -75,7 +75,9 @@ fn main() -> Result<()> {
         Command::Make { wasm, out } => page::make(&wasm, &out),
         Command::Serve { page, port, no_open } => server::serve(&page, port, !no_open),
         Command::Check { page, trace, browser } => check::check(&page, &trace, &browser),
-        Command::Reports { pages, pictures, browser } => reports::check(&pages, pictures.as_deref(), &browser),
+        Command::Reports { pages, pictures, browser } => {
+            reports::check(&pages, pictures.as_deref(), &browser)
+        }
         Command::Screenshots { page, out, browser } => pictures::take(&page, &out, &browser),
     }
 }

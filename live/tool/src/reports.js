@@ -30,7 +30,9 @@
     if (!own || style.visibility === "hidden" || !element.getClientRects().length) continue;
     let size = parseFloat(style.fontSize);
     const svg = element.closest("svg");
-    if (svg) size *= (element.getScreenCTM()?.a ?? 1);
+    const matrix = svg && element.getScreenCTM();
+    // Rotated letters are as large as upright ones.
+    if (matrix) size *= Math.hypot(matrix.a, matrix.b);
     const named = `${element.tagName} ${element.textContent.trim().slice(0, 30)}`;
     // Lowered letters are three quarters of the others.
     if (size < (element.tagName === "tspan" ? 8 : 11) - 0.01) add(`${named}: ${size} px`);

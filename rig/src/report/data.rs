@@ -171,7 +171,9 @@ impl Data {
                 format!("of each {stretch} rows of the run the lowest and the highest value are here")
             }
         };
-        format!("Of the longest plot {rows}; values are rounded to an {PARTS}th of their span or less, edges keep their exact time.")
+        format!(
+            "Of the longest plot {rows}; values are rounded to an {PARTS}th of their span or less, edges keep their exact time."
+        )
     }
 }
 
@@ -201,12 +203,13 @@ fn stretched(values: &[f64], stretch: usize) -> Option<Vec<f64>> {
     (stretch > 1).then(|| values.chunks(stretch).flat_map(ends).collect())
 }
 
-/// A step of 1, 2 or 5 times a power of ten, of which the values' span has at least so many; not finer than single precision.
+/// A step of 1, 2 or 5 times a power of ten, of which the values' span has at least so many.
 fn step(values: &[f64], parts: f64) -> f64 {
     let (low, high) = values
         .iter()
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(*value), high.max(*value)));
-    let least = high.abs().max(low.abs()) * f64::from(f32::EPSILON);
+    // A value that is constant but for rounding has no span.
+    let least = high.abs().max(low.abs()) / (512.0 * parts);
     let wanted = ((high - low) / parts).max(least);
     if !wanted.is_finite() || wanted <= 0.0 {
         return 1.0;

@@ -102,7 +102,11 @@ fn plots(body: &mut String, blocks: &[Block]) {
                 );
                 for panel in &scope.panels {
                     let label = escape(&panel.label);
-                    let _ = write!(body, "<div class=\"panel\"><h3>{label}</h3><div class=\"plot\"></div></div>");
+                    let one = if panel.series.len() == 1 { " one" } else { "" };
+                    let _ = write!(
+                        body,
+                        "<div class=\"panel{one}\"><h3>{label}</h3><div class=\"plot\"></div></div>"
+                    );
                 }
                 if !scope.time {
                     let _ = write!(body, "<p class=\"axis\">{}</p>", escape(&scope.x));

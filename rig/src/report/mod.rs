@@ -120,7 +120,8 @@ impl Page {
     /// Curves over rows of either system.
     pub fn plot_rows<R: Timed>(&mut self, title: &str, unit: &str, rows: &[R], curves: &[Curve<R>]) {
         let (Some(first), Some(last)) = (rows.first(), rows.last()) else { return };
-        let heading = format!("from {:.4} to {:.4} s", first.t_s(), last.t_s());
+        let short = |t_s: f64| (t_s * 1e3).round() / 1e3;
+        let heading = format!("{} to {} s", short(first.t_s()), short(last.t_s()));
         let over = Over::Rows(rows.as_ptr() as usize, rows.len());
         let series = self.series(rows, curves);
         self.show(over, &heading, None, (title, unit), series);
@@ -139,13 +140,13 @@ impl Page {
         };
         let heading = format!("Flight recorder · around {} at {t_s:.4} s", fault.name());
         let panels = panels.iter().map(|(what, unit, curves)| {
-            let of = |(index, (name, value)): (usize, &(&'static str, fn(&R) -> f32))| {
+            let mut series = Vec::new();
+            for (index, (name, value)) in curves.iter().enumerate() {
                 let of = |(at_s, record): &(f64, R)| (1e3 * (at_s - t_s), f64::from(value(record)));
                 // What is not finite may be the fault itself, and cannot be drawn.
                 let points: Points = recorded.iter().map(of).filter(|(_, value)| value.is_finite()).collect();
-                Series::new(name, self.points(&points), index)
-            };
-            let series = curves.iter().enumerate().map(of).collect();
+                series.push(Series::new(name, self.points(&points), index));
+            }
             Plotted { label: label(what, unit), series, levels: Vec::new() }
         });
         let panels = panels.collect();
@@ -201,9 +202,8 @@ impl Page {
     }
 
     fn told(&mut self, series: &[(&str, Points)]) -> Vec<Series> {
-        let of = |(index, (name, points)): (usize, &(&str, Points))| {
-            Series::new(name, self.points(points), index)
-        };
+        let of =
+            |(index, (name, points)): (usize, &(&str, Points))| Series::new(name, self.points(points), index);
         series.iter().enumerate().map(of).collect()
     }
 
@@ -257,7 +257,8 @@ impl Page {
     ) {
         let of = |block: &Block| matches!(block, Block::Plots(scope) if scope.over == over);
         let at = self.blocks.iter().position(of).unwrap_or_else(|| {
-            let (heading, figure, x, panels) = (heading.to_owned(), self.figure.clone(), TIME.to_owned(), Vec::new());
+            let (heading, figure, x, panels) =
+                (heading.to_owned(), self.figure.clone(), TIME.to_owned(), Vec::new());
             self.blocks.push(Block::Plots(Scope { heading, figure, over, time: true, x, span, panels }));
             self.blocks.len() - 1
         });

@@ -24,8 +24,8 @@ pub enum Style {
     Ripple,
     /// A curve.
     Plain,
-    /// A value that the curve before is to have.
-    Reference,
+    /// Dashed over what it is compared with: a reference, the other motor.
+    Dashed,
     /// Edges of a level.
     Edges,
 }
@@ -123,13 +123,14 @@ const INKS: [&str; 8] = ["w", "u", "v", "torque", "speed", "link", "flux", "mute
 fn look(name: &str, index: usize) -> (&'static str, Style) {
     match name {
         "torque" => ("ripple", Style::Ripple),
-        "torque, mean of a carrier" => ("torque", Style::Plain),
+        "carrier mean" => ("torque", Style::Plain),
         "ia" | "a" => ("u", Style::Plain),
         "ib" | "b" => ("v", Style::Plain),
         "ic" | "c" => ("w", Style::Plain),
         "udc" | "U_in" => ("link", Style::Plain),
         "speed" => ("speed", Style::Plain),
-        "demand" | "after limits" | "id*" | "iq*" => ("text", Style::Reference),
+        "demand" | "after limits" | "id*" | "iq*" => ("text", Style::Dashed),
+        "motor 2" | "lower motor" => ("u", Style::Dashed),
         _ => (INKS[index % INKS.len()], Style::Plain),
     }
 }
@@ -146,7 +147,7 @@ mod tests {
     #[test]
     fn a_reference_is_drawn_over_the_ripple_and_states_have_no_unit() {
         assert_eq!(look("torque", 0).1, Style::Ripple);
-        assert_eq!(look("demand", 2).1, Style::Reference);
+        assert_eq!(look("demand", 2).1, Style::Dashed);
         assert_ne!(look("motor 1", 0).0, look("motor 2", 1).0);
         assert_eq!(label("torque", "N·m"), "torque in N·m");
         assert_eq!(label("state", "–"), "state");

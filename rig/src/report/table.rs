@@ -16,7 +16,7 @@ pub fn verdicts(figures: &Figures) -> String {
     let has = |field: &str| rows.iter().any(|row| row.get(field).is_some_and(|value| *value != "–"));
     let others = has("others");
     let mut text =
-        "<table class=\"verdicts stacked\"><thead><tr><th>Verdict</th><th>Quantity</th><th>Found</th><th>Bound</th><th>Used</th>".to_owned();
+        "<table class=\"verdicts stacked\"><thead><tr><th>Verdict</th><th>Quantity</th><th class=\"n\">Found</th><th class=\"n\">Bound</th><th>Used</th>".to_owned();
     text += if others { "<th>Others</th></tr></thead><tbody>" } else { "</tr></thead><tbody>" };
     for row in rows {
         let (what, unit) = split_unit(row["what"].as_str().unwrap_or_default());
@@ -47,17 +47,21 @@ pub fn verdicts(figures: &Figures) -> String {
 /// The share of its bound that a figure takes; of a bound from below the inverse.
 fn share(row: &Value) -> Option<f64> {
     let found = row["found"].as_f64()?;
-    let share = match (row.get("at_most").and_then(Value::as_f64), row.get("at_least").and_then(Value::as_f64)) {
-        (Some(most), _) if most > 0.0 => found / most,
-        (None, Some(least)) if found > 0.0 => least / found,
-        _ => return None,
-    };
+    let share =
+        match (row.get("at_most").and_then(Value::as_f64), row.get("at_least").and_then(Value::as_f64)) {
+            (Some(most), _) if most > 0.0 => found / most,
+            (None, Some(least)) if found > 0.0 => least / found,
+            _ => return None,
+        };
     share.is_finite().then_some(share.max(0.0))
 }
 
 fn bar(share: f64) -> String {
     let percent = (100.0 * share).round();
-    format!("<meter min=\"0\" max=\"1\" value=\"{:.3}\"></meter> <small>{percent} %</small>", share.min(1.0))
+    format!(
+        "<i class=\"share\"><i style=\"width:{}%\"></i></i> <small>{percent} %</small>",
+        percent.min(100.0)
+    )
 }
 
 /// Order of a verdict: what falls short, what was not seen, what is closest to its bound, what is only reported.
@@ -87,7 +91,8 @@ pub fn tables(figures: &Figures) -> String {
                 let _ = write!(lists, "<h3>{}</h3>{}", escape(&quantity(name).0), table(rows));
             }
             _ => {
-                let (words, unit) = if value.is_f64() { quantity(name) } else { (name.replace('_', " "), "") };
+                let (words, unit) =
+                    if value.is_f64() { quantity(name) } else { (name.replace('_', " "), "") };
                 let value = with_unit(value, unit).unwrap_or("–".to_owned());
                 let _ = write!(numbers, "<div><dt>{}</dt><dd>{value}</dd></div>", escape(&words));
             }
@@ -103,14 +108,15 @@ fn table(rows: &[Value]) -> String {
         return if said.is_empty() { "<p>none</p>".to_owned() } else { format!("<ul>{said}</ul>") };
     };
     let heads: Vec<_> = first
-        .keys()
-        .map(|key| match quantity(key) {
-            (words, "") => escape(&words),
-            (words, unit) => format!("{} <small>{unit}</small>", escape(&words)),
+        .iter()
+        .map(|(key, value)| {
+            let (words, unit) = quantity(key);
+            let unit = if unit.is_empty() { String::new() } else { format!(" <small>{unit}</small>") };
+            format!("<th{}>{}{unit}</th>", number(value), escape(&words))
         })
         .collect();
     let mut text = "<table class=\"stacked\"><thead><tr>".to_owned();
-    heads.iter().for_each(|head| text += &format!("<th>{head}</th>"));
+    heads.iter().for_each(|head| text += head);
     text += "</tr></thead><tbody>";
     for row in rows.iter().filter_map(Value::as_object) {
         let _ = write!(text, "<tr>{}</tr>", cells(row));
@@ -120,10 +126,14 @@ fn table(rows: &[Value]) -> String {
 
 fn cells(row: &Map<String, Value>) -> String {
     let cell = |(key, value): (&String, &Value)| {
-        let number = if value.is_number() { " class=\"n\"" } else { "" };
-        format!("<td{number} data-head=\"{}\">{}</td>", escape(&key.replace('_', " ")), cell(value))
+        format!("<td{} data-head=\"{}\">{}</td>", number(value), escape(&key.replace('_', " ")), cell(value))
     };
     row.iter().map(cell).collect()
+}
+
+/// The class of a cell that stands to the right.
+fn number(value: &Value) -> &'static str {
+    if value.is_number() { " class=\"n\"" } else { "" }
 }
 
 /// A figure as people read it: four digits that count, not seventeen.
@@ -167,7 +177,8 @@ mod tests {
             ],
         );
         let page = verdicts(&figures);
-        let place = |what: &str| page.find(&format!(">{what}</th>")).unwrap_or_else(|| panic!("{what}: {page}"));
+        let place =
+            |what: &str| page.find(&format!(">{what}</th>")).unwrap_or_else(|| panic!("{what}: {page}"));
         let order = ["missed", "unseen", "hardly kept", "easily kept", "reported"].map(place);
         assert!(order.is_sorted(), "{order:?}: {page}");
         assert!(page.contains("3.000 ms") && page.contains("≤ 2.500 ms"), "{page}");

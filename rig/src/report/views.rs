@@ -150,7 +150,7 @@ impl Page {
         let means = carrier_means(&recording.rows, self.carrier_hz);
         let mean = self.data.add(torque[0].place.0, &means);
         let demand = self.series(&recording.rows, &[("demand", |row| row.te_ref_nm)]);
-        [torque, vec![Series::new("torque, mean of a carrier", mean, 1)], demand].concat()
+        [torque, vec![Series::new("carrier mean", mean, 1)], demand].concat()
     }
 
     /// Line voltage between phases u and v from the gates' edges at their exact times: a level, to be multiplied by the link's voltage.
@@ -208,9 +208,10 @@ fn carrier_means(rows: &[Row], carrier_hz: f64) -> Vec<f64> {
         let (whole, part) = ((reach - 0.5).max(0.0).floor() as usize, (reach - 0.5).max(0.0).fract());
         let (first, last) = (k.saturating_sub(whole), (k + whole + 1).min(rows.len()));
         let ends = [first.checked_sub(1), Some(last)].into_iter().flatten().filter_map(|at| rows.get(at));
-        let (sum, count) = ends.fold((sums[last] - sums[first], (last - first) as f64), |(sum, count), row| {
-            (sum + part * row.te_nm, count + part)
-        });
+        let (sum, count) = ends
+            .fold((sums[last] - sums[first], (last - first) as f64), |(sum, count), row| {
+                (sum + part * row.te_nm, count + part)
+            });
         sum / count
     };
     rows.iter().enumerate().map(mean).collect()

@@ -81,10 +81,12 @@ static BARS: LazyLock<MultiProgress> = LazyLock::new(MultiProgress::new);
 /// A bar of so many steps on a terminal; in a pipe indicatif draws none.
 pub(crate) fn bar(steps: u64, template: &str) -> ProgressBar {
     let bar = BARS.add(ProgressBar::new(steps));
-    match ProgressStyle::with_template(template) {
-        Ok(style) => bar.with_style(style),
-        Err(_) => bar,
+    if let Ok(style) = ProgressStyle::with_template(template) {
+        bar.set_style(style);
     }
+    // It stands there before the first step is done.
+    bar.tick();
+    bar
 }
 
 /// The progress of a run.

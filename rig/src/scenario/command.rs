@@ -112,7 +112,8 @@ pub fn write<S: System>(
 
 /// Says on the page what was run: machine, link, law, and each option that was given or filled in.
 fn ran<S: System>(choice: &Choice<S>, machine: &Machine, page: &mut Page) -> Result<()> {
-    page.ran("machine", format!("{} ({})", machine.tables.name, choice.machine_name()));
+    let (name, folder) = (machine.tables.name, choice.machine_name());
+    page.ran("machine", if name == folder { name.to_owned() } else { format!("{name} ({folder})") });
     let udc_v = choice.options.udc.unwrap_or(machine.folder.parameters.dc_link_nominal_v);
     page.ran("DC source", format!("{udc_v} V"));
     page.ran("ran on", choice.options.on.name());
@@ -120,7 +121,8 @@ fn ran<S: System>(choice: &Choice<S>, machine: &Machine, page: &mut Page) -> Res
     if let Some(commit) = option_env!("TRACTIVE_COMMIT") {
         page.ran("commit", commit);
     }
-    let flaws = if choice.options.is_ideal() { "none: ideal inverter and sensors" } else { "see the options" };
+    let flaws =
+        if choice.options.is_ideal() { "none: ideal inverter and sensors" } else { "see the options" };
     page.ran("flaws", flaws);
     let Value::Object(mut options) = serde_json::to_value(choice.filled(machine))? else { return Ok(()) };
     options.extend(choice.own.clone());

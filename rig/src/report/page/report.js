@@ -68,6 +68,7 @@
     /** Rows from a time to another for so many pixels, with one more at each end: x and y. */
     sampled(from, to, pixels) {
       const { times, values } = this, x = [], y = [];
+      if (times.at) return this.byPixel(from, to, pixels);
       const first = times.row(from), last = Math.min(times.row(to) + 1, times.rows - 1);
       const n = last - first + 1;
       if (n <= 4 * pixels) {
@@ -82,6 +83,22 @@
         const falls = values[begin] > values[end];
         x.push(times.of(begin), times.of((begin + end) >> 1));
         y.push(falls ? high[block] : low[block], falls ? low[block] : high[block]);
+      }
+      return [x, y];
+    }
+    /** The same of rows that lie here dense and there thin: in each pixel the first, the lowest, the highest and the last one. */
+    byPixel(from, to, pixels) {
+      const { times, values } = this, x = [], y = [], last = Math.min(times.row(to) + 1, times.rows - 1);
+      const put = k => { x.push(times.at[k]); y.push(values[k]); };
+      for (let k = times.row(from); k <= last;) {
+        const end = times.at[k] + (to - from) / pixels, begin = k;
+        let low = k, high = k;
+        for (; k <= last && times.at[k] <= end; k++) {
+          if (values[k] < values[low]) low = k;
+          if (values[k] > values[high]) high = k;
+        }
+        const rows = k - begin <= 4 ? Array.from({ length: k - begin }, (_, n) => begin + n) : [begin, Math.min(low, high), Math.max(low, high), k - 1];
+        rows.forEach(put);
       }
       return [x, y];
     }
@@ -125,6 +142,7 @@
   function fitted(low, high) {
     if (low == null || high == null) return [0, 1];
     const least = 2e-6 * Math.max(Math.abs(low), Math.abs(high)) || 1e-3;
+    if (high === low) return low ? [low - 1e-3 * Math.abs(low), high + 1e-3 * Math.abs(high)] : [-1, 1];
     if (high - low < least) { low -= least; high += least; }
     const span = high - low, room = 0.06 * span;
     if (low > 0 && low <= span) return [0, high + room];
@@ -173,7 +191,7 @@
       button("‹", "Earlier", () => this.move(-0.3));
       button("›", "Later", () => this.move(0.3));
       if (this.plan.time && !this.plan.span && this.marks.length) this.chips(bar, button);
-      if (!this.plan.span) bar.append(make("span", "drag to zoom, double-click to return; keys + − ← → 0", { className: "hint" }));
+      if (this.plan.time && !this.plan.span) bar.append(make("span", "drag to zoom, double-click to return; keys + − ← → 0", { className: "hint" }));
       this.section.tabIndex = 0;
       this.section.addEventListener("keydown", event => {
         const act = { "+": () => this.scale(0.5), "-": () => this.scale(2), ArrowLeft: () => this.move(-0.3), ArrowRight: () => this.move(0.3), 0: () => this.show(...this.home) }[event.key];
@@ -186,8 +204,8 @@
         this.show(mark.at - 0.25 * width, mark.at + 0.75 * width);
       };
       const words = mark => `${mark.name} · ${+mark.at.toFixed(2)} s`;
-      if (this.marks.length <= MOST_CHIPS) {
-        this.marks.forEach(mark => { if (mark.bad) button(words(mark), `Zoom to ${mark.name}`, () => go(mark)).className = "bad"; else button(words(mark), `Zoom to ${mark.name}`, () => go(mark)); });
+      if (this.marks.length <= MOST_CHIPS && innerWidth > 620) {
+        this.marks.forEach(mark => { button(words(mark), `Zoom to ${mark.name}`, () => go(mark)).className = mark.bad ? "bad" : "mark"; });
         return;
       }
       const list = make("select", "", { onchange: () => list.value && go(this.marks[list.value]) });
@@ -236,7 +254,7 @@
       const names = panel.levels, span = () => this.shown[1] - this.shown[0];
       const time = (u, ticks) => ticks.map(tick => (this.plan.time ? told(tick, span()) : +tick.toPrecision(8)));
       const options = {
-        width: this.width, height, pxAlign: 0, padding: [narrow ? 8 : 24, 10, 0, 0],
+        width: this.width, height, pxAlign: 0, padding: [narrow ? 8 : 24, 20, 0, 0],
         cursor: { ...(this.plan.time ? { sync: { key: "time", scales: ["x", null] } } : {}), drag: { x: true, y: false, setScale: false }, points: { size: 6 } },
         legend: { live: true, markers: { width: 0, fill: (u, s) => u.series[s].stroke?.(u, s) } },
         scales: {
@@ -263,10 +281,10 @@
       return made;
     }
     series(panel, { name, ink, style }, curve) {
-      const reference = style === "reference";
+      const dashed = style === "dashed";
       return {
         label: name, stroke: css(ink), spanGaps: true, points: { show: false },
-        width: style === "ripple" ? 1 : reference ? 1.6 : 1.4, dash: reference ? [6, 4] : undefined,
+        width: style === "ripple" ? 1 : dashed ? 1.6 : 1.4, dash: dashed ? [6, 4] : undefined,
         // The value itself, not what stands for it where many are drawn as one.
         value: (u, y, s, k) => (y == null ? "" : panel.levels.length ? panel.levels[Math.round(y)] ?? "" : String(+curve.at(u.data[0][k]).toPrecision(5))),
       };
@@ -315,7 +333,7 @@
       const ratio = devicePixelRatio || 1, { lane, width } = this, height = 22;
       Object.assign(lane, { width: width * ratio, height: height * ratio });
       Object.assign(lane.style, { width: `${width}px`, height: `${height}px`, display: "block" });
-      const ctx = lane.getContext("2d"), [from, to] = this.shown, left = this.axis, room = width - left - 10;
+      const ctx = lane.getContext("2d"), [from, to] = this.shown, left = this.axis, room = width - left - 20;
       const x = time => left + Math.min(Math.max((time - from) / (to - from), 0), 1) * room;
       ctx.scale(ratio, ratio);
       ctx.font = FONT;
