@@ -249,7 +249,7 @@
     }
     plot(panel, k) {
       const isLast = k === this.plan.panels.length - 1, narrow = this.width < 500;
-      const height = (this.plan.panels.length === 1 ? 250 : k === 0 ? 190 : 150) + (isLast ? 26 : 0) - (narrow ? 20 : 0);
+      const height = Math.max(this.plan.panels.length === 1 ? 250 : k === 0 ? 190 : 150, 16 * panel.levels.length + 34) + (isLast ? 26 : 0) - (narrow ? 20 : 0);
       const line = { font: FONT, stroke: css("muted"), grid: { stroke: css("grid"), width: 1 }, ticks: { stroke: css("line"), width: 1, size: 4 } };
       const names = panel.levels, span = () => this.shown[1] - this.shown[0];
       const time = (u, ticks) => ticks.map(tick => (this.plan.time ? told(tick, span()) : +tick.toPrecision(8)));
@@ -294,6 +294,7 @@
       const wanted = 16 + 6.9 * Math.max(0, ...(shown ?? []).map(text => String(text ?? "").length));
       if (wanted > this.axis + 1) {
         this.axis = Math.ceil(wanted);
+        this.section.style.setProperty("--axis", `${this.axis}px`);
         requestAnimationFrame(() => { this.plots.forEach(plot => plot.redraw(false, true)); if (this.lane) this.events(); });
       }
       return this.axis;
