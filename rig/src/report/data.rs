@@ -164,11 +164,11 @@ impl Data {
         let Some(table) = longest.filter(|table| !table.columns.is_empty()) else { return String::new() };
         let rows = match (&table.times, table.stretch) {
             (Times::Even { every, .. }, 1) => {
-                format!("every row of the run is here, one each {} µs", (every * 1e9).round() / 1e3)
+                format!("no row is left out, one each {} µs", (every * 1e9).round() / 1e3)
             }
-            (_, 1) => "every point is here".to_owned(),
+            (_, 1) => "no point is left out".to_owned(),
             (_, stretch) => {
-                format!("of each {stretch} rows of the run the lowest and the highest value are here")
+                format!("of each {stretch} rows the lowest and the highest value are left")
             }
         };
         format!(

@@ -100,7 +100,9 @@ impl Progress {
 
     pub(crate) fn new(name: &str) -> Self {
         let template = "{msg:16} [{bar:40}] {percent:>3} % {elapsed} (left {eta})";
-        Self { bar: bar(Self::STEPS, template).with_message(name.to_owned()), calls: 0 }
+        // A talk is as long as its lines say, and tells its state instead.
+        let bar = if name == "talk" { ProgressBar::hidden() } else { bar(Self::STEPS, template) };
+        Self { bar: bar.with_message(name.to_owned()), calls: 0 }
     }
 
     pub(crate) fn show(&mut self, done: f64) {
