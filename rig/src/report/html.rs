@@ -1,7 +1,7 @@
 //! The page's text: what it says first, what was run, a place for each plot, tables; and the numbers and the script that fill the places.
 
-use super::Page;
-use super::scope::Scope;
+use super::data::Data;
+use super::scope::{Band, Mark, Scope};
 use super::table::{escape, tables, verdicts};
 use crate::analysis::Figures;
 use anyhow::Result;
@@ -21,13 +21,34 @@ pub enum Block {
     Picture(String, String),
 }
 
+/// All that a page says and shows.
+#[derive(Default)]
+pub struct Document {
+    /// Name of what was run.
+    pub title: String,
+    /// The words behind it.
+    pub about: String,
+    /// The words that stand first, if there are any.
+    pub headline: Option<String>,
+    /// Lines of what was run: what, and its value.
+    pub run: Vec<(String, String)>,
+    /// The numbers behind the plots.
+    pub data: Data,
+    /// Plots and pictures, in their order.
+    pub blocks: Vec<Block>,
+    /// Instants with a name.
+    pub marks: Vec<Mark>,
+    /// Stretches of time with a name.
+    pub bands: Vec<Band>,
+}
+
 /// A title, with the paper's figure named before it.
 pub fn heading(figure: Option<&str>, title: &str) -> String {
     figure.map_or(title.to_owned(), |figure| format!("The paper's {figure} · {title}"))
 }
 
 /// The whole page.
-pub fn page(page: &Page, subtitle: &str, figures: &Figures) -> Result<String> {
+pub fn page(page: &Document, subtitle: &str, figures: &Figures) -> Result<String> {
     let mut body = String::new();
     let title = escape(&page.title);
     let _ = write!(

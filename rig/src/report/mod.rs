@@ -16,9 +16,9 @@ use crate::analysis::Figures;
 use crate::rows::Timed;
 use crate::trace::Row;
 use anyhow::Result;
-use data::{Data, Place};
-use html::Block;
-use scope::{Band, Mark, Over, Panel as Plotted, Scope, Series, label};
+use data::Place;
+use html::{Block, Document};
+use scope::{Mark, Over, Panel as Plotted, Scope, Series, label};
 use tractive::protection::Fault;
 
 /// The panel of a flight recorder's records: title, unit, and each curve's name and value.
@@ -38,20 +38,13 @@ type Points = Vec<(f64, f64)>;
 
 /// A page under construction.
 pub struct Page {
-    title: String,
-    about: String,
-    headline: Option<String>,
+    document: Document,
     /// The paper's figure that the plots answer from here on; nothing where it has none.
     figure: Option<String>,
     /// `true` if none of the plots answers a figure of the paper.
     is_another_machine: bool,
     /// Rate of a carrier that is not locked to the rotor, in Hz.
     carrier_hz: f64,
-    run: Vec<(String, String)>,
-    data: Data,
-    blocks: Vec<Block>,
-    marks: Vec<Mark>,
-    bands: Vec<Band>,
     /// The line voltage of the recording at this address.
     line_voltage: Option<(usize, Series)>,
     error: Option<anyhow::Error>,
@@ -61,23 +54,17 @@ impl Page {
     /// A page whose plots answer a figure of the paper, such as "figure 8: load steps"; or "no figure: a fault acknowledged".
     pub fn new(scenario: &str, figure: &str) -> Self {
         let (number, what) = figure.split_once(": ").unwrap_or(("", figure));
+        let (title, about) = (scenario.to_owned(), what.to_owned());
         let mut page = Self {
-            title: scenario.to_owned(),
-            about: what.to_owned(),
-            headline: None,
+            document: Document { title, about, ..Document::default() },
             figure: None,
             is_another_machine: false,
             carrier_hz: 900.0,
-            run: Vec::new(),
-            data: Data::default(),
-            blocks: Vec::new(),
-            marks: Vec::new(),
-            bands: Vec::new(),
             line_voltage: None,
             error: None,
         };
         if !number.is_empty() && number != NO_FIGURE {
-            page.about = format!("the paper's {number}: {what}");
+            page.document.about = format!("the paper's {number}: {what}");
             page.answers(number);
         }
         page
@@ -96,12 +83,12 @@ impl Page {
 
     /// The words that stand first: `PASS: …` or `FALLS SHORT: …`.
     pub fn headline(&mut self, headline: &str) {
-        self.headline = Some(headline.to_owned());
+        self.document.headline = Some(headline.to_owned());
     }
 
     /// A line of what was run, such as the machine.
     pub fn ran(&mut self, what: &str, value: impl Into<String>) {
-        self.run.push((what.to_owned(), value.into()));
+        self.document.run.push((what.to_owned(), value.into()));
     }
 
     /// Rate of a carrier that is not locked to the rotor, in Hz; torque is averaged over it.
@@ -112,8 +99,8 @@ impl Page {
     /// An instant with a name, which every plot over time marks; one of a fault is bad.
     pub fn mark(&mut self, at_s: f64, name: &str, bad: bool) {
         let mark = Mark { at: at_s, name: name.to_owned(), bad };
-        if !self.marks.contains(&mark) {
-            self.marks.push(mark);
+        if !self.document.marks.contains(&mark) {
+            self.document.marks.push(mark);
         }
     }
 
@@ -152,7 +139,7 @@ impl Page {
         let panels = panels.collect();
         let x = "time from the fault in ms".to_owned();
         let scope = Scope { heading, figure: None, over: Over::Own, time: false, x, span: None, panels };
-        self.blocks.push(Block::Plots(scope));
+        self.document.blocks.push(Block::Plots(scope));
     }
 
     /// Curves over anything, beside a figure of the paper or none; `axes` are the labels of x and y.
@@ -171,7 +158,7 @@ impl Page {
     /// A picture of its own, beside a figure of the paper or none.
     pub fn picture<'a>(&mut self, figure: impl Into<Option<&'a str>>, title: &str, svg: Result<String>) {
         match svg {
-            Ok(svg) => self.blocks.push(Block::Picture(html::heading(figure.into(), title), svg)),
+            Ok(svg) => self.document.blocks.push(Block::Picture(html::heading(figure.into(), title), svg)),
             Err(error) => self.error = Some(error),
         }
     }
@@ -197,7 +184,7 @@ impl Page {
     pub fn finish(self, subtitle: &str, figures: &Figures) -> Result<String> {
         match self.error {
             Some(error) => Err(error),
-            None => html::page(&self, subtitle, figures),
+            None => html::page(&self.document, subtitle, figures),
         }
     }
 
@@ -218,15 +205,15 @@ impl Page {
         let panel = Plotted { label: label("", unit).trim().to_owned(), series, levels: Vec::new() };
         let (heading, x, panels) = (title.to_owned(), x.to_owned(), vec![panel]);
         let scope = Scope { heading, figure, over: Over::Own, time: false, x, span: None, panels };
-        self.blocks.push(Block::Plots(scope));
+        self.document.blocks.push(Block::Plots(scope));
     }
 
     /// A column of points with an axis of their own.
     fn points(&mut self, points: &[(f64, f64)]) -> Place {
         let points: Points = points.iter().copied().filter(|(x, y)| x.is_finite() && y.is_finite()).collect();
         let (x, y): (Vec<_>, Vec<_>) = points.into_iter().unzip();
-        let table = self.data.table(&x);
-        self.data.add(table, &y)
+        let table = self.document.data.table(&x);
+        self.document.data.add(table, &y)
     }
 
     /// Columns of rows.
@@ -240,8 +227,8 @@ impl Page {
                 last
             };
             let values: Vec<_> = rows.iter().map(value).map(finite).collect();
-            let table = self.data.table(&times);
-            Series::new(name, self.data.add(table, &values), index)
+            let table = self.document.data.table(&times);
+            Series::new(name, self.document.data.add(table, &values), index)
         };
         curves.iter().enumerate().map(of).collect()
     }
@@ -256,13 +243,21 @@ impl Page {
         series: Vec<Series>,
     ) {
         let of = |block: &Block| matches!(block, Block::Plots(scope) if scope.over == over);
-        let at = self.blocks.iter().position(of).unwrap_or_else(|| {
+        let at = self.document.blocks.iter().position(of).unwrap_or_else(|| {
             let (heading, figure, x, panels) =
                 (heading.to_owned(), self.figure.clone(), TIME.to_owned(), Vec::new());
-            self.blocks.push(Block::Plots(Scope { heading, figure, over, time: true, x, span, panels }));
-            self.blocks.len() - 1
+            self.document.blocks.push(Block::Plots(Scope {
+                heading,
+                figure,
+                over,
+                time: true,
+                x,
+                span,
+                panels,
+            }));
+            self.document.blocks.len() - 1
         });
-        let Some(Block::Plots(scope)) = self.blocks.get_mut(at) else { return };
+        let Some(Block::Plots(scope)) = self.document.blocks.get_mut(at) else { return };
         if scope.panels.iter().any(|panel| panel.shows(&series)) {
             return;
         }
@@ -273,7 +268,7 @@ impl Page {
 
     /// The last panel's values are states of these names.
     fn name_levels(&mut self, names: &[&str]) {
-        if let Some(Block::Plots(scope)) = self.blocks.last_mut()
+        if let Some(Block::Plots(scope)) = self.document.blocks.last_mut()
             && let Some(panel) = scope.panels.last_mut()
         {
             panel.levels = names.iter().map(|name| (*name).to_owned()).collect();

@@ -118,11 +118,11 @@ impl Page {
                 self.mark(row.t_s, trip.fault.name(), true);
             }
             before = row.trip;
-            match self.bands.last_mut() {
+            match self.document.bands.last_mut() {
                 Some(band) if band.name == row.mode.name() => band.to = row.t_s,
                 last => {
                     last.into_iter().for_each(|band| band.to = row.t_s);
-                    self.bands.push(Band { from: row.t_s, to: row.t_s, name: row.mode.name() });
+                    self.document.bands.push(Band { from: row.t_s, to: row.t_s, name: row.mode.name() });
                 }
             }
         }
@@ -148,7 +148,7 @@ impl Page {
     fn torques(&mut self, recording: &Recording) -> Vec<Series> {
         let torque = self.series(&recording.rows, &[("torque", |row| row.te_nm)]);
         let means = carrier_means(&recording.rows, self.carrier_hz);
-        let mean = self.data.add(torque[0].place.0, &means);
+        let mean = self.document.data.add(torque[0].place.0, &means);
         let demand = self.series(&recording.rows, &[("demand", |row| row.te_ref_nm)]);
         [torque, vec![Series::new("carrier mean", mean, 1)], demand].concat()
     }
@@ -161,7 +161,7 @@ impl Page {
         }
         let (ticks, levels) = levels(recording);
         let link = self.series(&recording.rows, &[("udc", |row| row.udc_v)]);
-        let place = self.data.edges(&ticks, recording.tick_s, &levels);
+        let place = self.document.data.edges(&ticks, recording.tick_s, &levels);
         let (style, scale) = (Style::Edges, link.first().map(|link| link.place));
         let series = Series { style, scale, ..Series::new("u-v", place, 0) };
         self.line_voltage = Some((address, series.clone()));
