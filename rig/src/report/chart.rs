@@ -1,4 +1,4 @@
-//! What curves as SVG share.
+//! Size, colours and points that curves as SVG share.
 
 use plotters::prelude::*;
 
