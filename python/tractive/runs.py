@@ -58,7 +58,7 @@ class Run:
 
     @cached_property
     def recorder(self) -> pd.DataFrame | None:
-        """What the flight recorder held of a fault; None without one."""
+        """The records that the flight recorder held of a fault; None without one."""
         return self._table("recorder.csv") if (self.folder / "recorder.csv").exists() else None
 
     def levels(self, leg: str) -> tuple[np.ndarray, np.ndarray]:
