@@ -2,6 +2,7 @@
 
 use crate::files::write_text;
 use crate::machine::Machine;
+use crate::options::positive;
 use crate::pictures::architecture::architecture;
 use crate::pictures::{chai, zs9};
 use crate::run::bar;
@@ -11,7 +12,9 @@ use crate::trace::Recording;
 use crate::zs9::trace::Recording as Zs9Recording;
 use anyhow::{Context, Result, ensure};
 use rayon::prelude::*;
-use std::path::PathBuf;
+use serde_json::json;
+use std::path::{Path, PathBuf};
+use std::process::Command;
 use tractive::nine_switch::Scheme;
 
 /// The options of `figures`.
@@ -26,6 +29,48 @@ pub struct FigureOptions {
     /// Print the pictures' names and what they show, and draw none.
     #[arg(long)]
     pub list: bool,
+    /// Write these beside each SVG, by rsvg-convert (Debian: librsvg2-bin).
+    #[arg(long, value_enum, value_name = "FORMAT", num_args = 1.., value_delimiter = ',')]
+    pub also: Vec<Format>,
+    /// Pixels of a PNG for one of the SVG.
+    #[arg(long, default_value_t = 2.0, value_parser = positive)]
+    pub zoom: f64,
+    /// Print the pictures as JSON: names, what they show, files.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// A format beside SVG.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum Format {
+    /// Pixels.
+    Png,
+    /// Vectors, for a paper.
+    Pdf,
+}
+
+impl Format {
+    const fn name(self) -> &'static str {
+        match self {
+            Self::Png => "png",
+            Self::Pdf => "pdf",
+        }
+    }
+
+    /// Makes the file of this format beside an SVG.
+    fn convert(self, svg: &Path, zoom: f64) -> Result<()> {
+        let mut convert = Command::new("rsvg-convert");
+        convert.args(["--format", self.name(), "--keep-aspect-ratio", "--background-color", "white"]);
+        // Of vectors a zoom would only change the size on paper.
+        if self == Self::Png {
+            convert.args(["--zoom", &zoom.to_string()]);
+        }
+        let done = convert.arg("--output").arg(svg.with_extension(self.name())).arg(svg).output();
+        let done =
+            done.context("--also: rsvg-convert cannot be started (Debian: apt-get install librsvg2-bin)")?;
+        ensure!(done.status.success(), "{}: {}", svg.display(), String::from_utf8_lossy(&done.stderr).trim());
+        Ok(())
+    }
 }
 
 /// The maker of a picture.
@@ -227,22 +272,44 @@ pub fn drawn() -> Result<Vec<(&'static Picture, String)>> {
 pub fn run(options: &FigureOptions) -> Result<()> {
     let pictures = chosen(&options.only)?;
     if options.list {
-        for picture in &pictures {
-            crate::say!("{:<12} {}", picture.name, picture.what);
-        }
-        return Ok(());
+        return tell(options, &pictures, |_| Vec::new());
     }
     std::fs::create_dir_all(&options.out).with_context(|| format!("--out {}", options.out.display()))?;
     let machines = Machines::load()?;
     let bar = bar(pictures.len() as u64, "figures [{bar:40}] {pos}/{len} {elapsed}");
     jobs(&pictures).par_iter().try_for_each(|job| {
         for (picture, svg) in draw(job, &machines)? {
-            write_text(&options.out.join(picture.file()), &svg)?;
+            let file = options.out.join(picture.file());
+            write_text(&file, &svg)?;
+            options.also.iter().try_for_each(|format| format.convert(&file, options.zoom))?;
             bar.inc(1);
         }
         Ok::<(), anyhow::Error>(())
     })?;
     bar.finish_and_clear();
-    crate::say!("{} figures: {}", pictures.len(), options.out.display());
+    let svg = |picture: &Picture| options.out.join(picture.file());
+    tell(options, &pictures, |picture| {
+        let also = options.also.iter().map(|format| svg(picture).with_extension(format.name()));
+        std::iter::once(svg(picture)).chain(also).collect()
+    })
+}
+
+/// Says what was drawn, or with `--list` what there is.
+fn tell(
+    options: &FigureOptions,
+    pictures: &[&Picture],
+    files: impl Fn(&Picture) -> Vec<PathBuf>,
+) -> Result<()> {
+    if options.json {
+        let row = |picture: &&Picture| {
+            let figures = picture.figures().map(|(paper, first, last)| json!([paper, first, last]));
+            json!({ "name": picture.name, "what": picture.what, "figures": figures, "files": files(picture) })
+        };
+        crate::say!("{}", serde_json::to_string(&pictures.iter().map(row).collect::<Vec<_>>())?);
+    } else if options.list {
+        pictures.iter().for_each(|picture| crate::say!("{:<12} {}", picture.name, picture.what));
+    } else {
+        crate::say!("{} figures: {}", pictures.len(), options.out.display());
+    }
     Ok(())
 }

@@ -1,7 +1,7 @@
 //! The rig's command line.
 
 use anyhow::Result;
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 use std::ffi::OsString;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -35,6 +35,11 @@ enum Command {
     Needs {
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         words: Vec<OsString>,
+    },
+    /// Completions of this program's commands for a shell, on the standard output.
+    Completions {
+        /// The shell.
+        shell: clap_complete::Shell,
     },
     /// Simulated seconds per second of each scenario, on one thread of this machine, and where the time goes.
     Bench(Box<BenchOptions>),
@@ -107,6 +112,13 @@ fn command(command: Command) -> Result<ExitCode> {
     match command {
         Command::Run { words } => scenario::command::run(words),
         Command::Needs { words } => needs(words),
+        Command::Completions { shell } => {
+            let mut program = Cli::command().mut_subcommand("run", |_| scenario::catalogue::completed());
+            let mut text = Vec::new();
+            clap_complete::generate(shell, &mut program, "tractive-rig", &mut text);
+            say!("{}", String::from_utf8(text)?.trim_end());
+            Ok(ExitCode::SUCCESS)
+        }
         Command::Bench(options) => done(benchmark::run(&options)),
         Command::Talk(options) => run_talk(&options),
         Command::Points { input, output, machine } => {

@@ -17,6 +17,9 @@ const SMALLEST_PERCENT: f64 = 0.02;
 /// By how much the bound's lines stand beside the measured ones, in Hz.
 const BESIDE_HZ: f64 = 8.0;
 
+/// Half the foot of a line, in Hz: a curve has one value at a frequency.
+const FOOT_HZ: f64 = 0.1;
+
 /// Draws the spectrum in a window of a recording, under a title, and that of its bound, without the fundamental.
 pub fn draw(
     page: &mut Page,
@@ -55,7 +58,7 @@ fn lines(samples: &Samples, f1_hz: f64, beside_hz: f64) -> Vec<(f64, f64)> {
         let percent = 200.0 * value.norm() / count as f64 / fundamental_a;
         if hertz < HIGHEST_HZ && percent > SMALLEST_PERCENT {
             let at = hertz + beside_hz;
-            points.extend([(at, 0.0), (at, percent), (at, 0.0)]);
+            points.extend([(at - FOOT_HZ, 0.0), (at, percent), (at + FOOT_HZ, 0.0)]);
         }
     }
     points.push((HIGHEST_HZ, 0.0));

@@ -39,7 +39,7 @@ pub struct SlotRow {
 }
 
 /// One line of trace.csv: the plant's true values, and control's intentions at that instant.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Row {
     /// Time from the recording's beginning, in s.
     pub t_s: f64,

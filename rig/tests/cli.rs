@@ -299,8 +299,64 @@ fn a_fault_leaves_the_flight_recorder_and_a_good_run_takes_it_away() {
         assert!((recorded - wanted).abs() < 1e-2, "at {t_s}: {recorded} A, true {wanted} A");
     }
     let page = std::fs::read_to_string(folder.path().join("report.html")).unwrap();
-    assert!(page.contains("Flight recorder · phase currents as sampled around not_finite at 0.05"));
+    assert!(page.contains("Flight recorder · around not_finite at 0.05"));
     let good = rig(&format!("run timing --to 300 --torque-scale 0.1 --out {out}"));
     assert_eq!(good.status.code(), Some(0), "{}", String::from_utf8_lossy(&good.stderr));
     assert!(!recorder.exists());
+}
+
+#[test]
+fn completions_know_the_scenarios_and_the_options_of_each() {
+    for shell in ["bash", "zsh", "fish"] {
+        let output = rig(&format!("completions {shell}"));
+        let text = String::from_utf8_lossy(&output.stdout);
+        assert_eq!(output.status.code(), Some(0), "{shell}");
+        for word in ["zs9-load-step", "torque-scale", "carrier-hz", "compare"] {
+            assert!(text.contains(word), "{shell}: {word}");
+        }
+    }
+    assert_eq!(rig("completions tcsh").status.code(), Some(2));
+}
+
+#[test]
+fn what_is_printed_for_machines_is_one_line_of_json() {
+    let folder = tempfile::tempdir().unwrap();
+    let place = folder.path().display();
+    let read = |line: &str| -> serde_json::Value {
+        let output = rig(line);
+        assert_eq!(output.status.code(), Some(0), "{line}: {}", String::from_utf8_lossy(&output.stderr));
+        assert_eq!(output.stdout.iter().filter(|byte| **byte == b'\n').count(), 1, "{line}");
+        serde_json::from_slice(&output.stdout).unwrap()
+    };
+    let figures = read(&format!("figures --only chai-7 zs9-3 --json --out {place}"));
+    assert_eq!(figures[0]["name"], "chai-7");
+    assert!(std::path::Path::new(figures[1]["files"][0].as_str().unwrap()).is_file(), "{figures}");
+    let shown = read(&format!("machine show pmsm-48v-1kw --json --out {place}/page.html"));
+    assert!(shown["figures"]["max_torque_nm"].as_f64() > Some(1.0), "{shown}");
+    let made = read(&format!(
+        "machine new --pole-pairs 4 --rs 0.05 --ld 3e-4 --lq 5e-4 --psi-f 0.02 --max-current 60 --udc 96 --max-speed-rpm 3000 --max-switching-hz 10000 --json --out {place}/machine"
+    ));
+    assert!(made["max_torque_nm"].as_f64() > Some(1.0) && made["name"] == "machine", "{made}");
+    let rows = read("compare --only MTPA --json");
+    assert!(rows.as_array().is_some_and(|rows| !rows.is_empty() && rows[0]["ahead"] == true), "{rows}");
+}
+
+#[test]
+fn a_figure_is_drawn_in_pixels_and_for_a_paper_too() {
+    if std::process::Command::new("rsvg-convert").arg("--version").output().is_err() {
+        println!("skipped: rsvg-convert is not installed");
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let output =
+        rig(&format!("figures --only chai-7 --also png,pdf --zoom 1 --out {}", folder.path().display()));
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    let begins = |end: &str| std::fs::read(folder.path().join(format!("chai-7.{end}"))).unwrap();
+    assert!(begins("svg").starts_with(b"<svg") && begins("pdf").starts_with(b"%PDF"));
+    let png = begins("png");
+    assert!(png.starts_with(b"\x89PNG"));
+    // The sheet's own size.
+    let width = u32::from_be_bytes(png[16..20].try_into().unwrap());
+    let svg = String::from_utf8(begins("svg")).unwrap();
+    assert!(svg.contains(&format!("width=\"{width}\"")), "{width}: {}", &svg[..80]);
 }

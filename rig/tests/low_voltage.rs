@@ -94,7 +94,7 @@ fn a_bound_that_is_not_kept_is_exit_code_1_for_every_machine() {
     let own = format!("reversal --machine {MACHINE}");
     let (code, said, page) = run(&own);
     assert!(code == Some(0) && said.starts_with("PASS: 2 of 2 bounds kept"), "{said}");
-    assert!(!page.contains("The paper's") && page.contains("<svg"), "{page}");
+    assert!(!page.contains("The paper's") && page.contains("class=\"plot\""), "{page}");
     let (code, said, _) = run(&format!("{own} --min-pulse-us 12"));
     assert!(code == Some(1) && said.starts_with("FALLS SHORT: 1 of 2 bounds"), "{code:?}: {said}");
     let (code, _, page) = run("full-step");

@@ -20,9 +20,14 @@ pub fn run(args: &LiveArgs) -> Result<u8> {
     if let Some(out) = &args.screenshots {
         let out = absolute(out)?;
         let browser = setup.browser().with_context(no_browser)?;
-        return Ok(u8::from(!succeeds(
-            tool().arg("screenshots").arg(&page).arg(out).arg("--browser").arg(browser),
-        )?));
+        let sweep = root().join("target/live/sweep");
+        ensure!(run_on_host("sweep", &sweep)? == Some(0), "the host's sweep failed");
+        let mut report = tool();
+        report.arg("reports").arg(sweep.join("report.html")).arg("--pictures").arg(&out);
+        let mut live = tool();
+        live.arg("screenshots").arg(&page).arg(out);
+        let taken = succeeds(live.arg("--browser").arg(&browser))?;
+        return Ok(u8::from(!(taken && succeeds(report.arg("--browser").arg(&browser))?)));
     }
     if args.no_serve {
         return Ok(0);
@@ -48,15 +53,37 @@ pub fn check(setup: &mut Setup) -> Result<Result<bool, String>> {
     let folder = root().join("target/live");
     let (page, sweep) = (folder.join("page"), folder.join("sweep"));
     make(&page)?;
-    let mut host = Command::new(build::rig()?);
-    host.current_dir(root())
-        .args(["run", "sweep", "--on", "host", "--out"])
-        .arg(&sweep)
-        .stdout(Stdio::null());
-    ensure!(succeeds(&mut host)?, "the host's sweep failed");
+    ensure!(run_on_host("sweep", &sweep)? == Some(0), "the host's sweep failed");
     let trace = sweep.join("trace.csv");
-    let good = succeeds(tool().arg("check").arg(&page).arg(trace).arg("--browser").arg(browser))?;
+    let good = succeeds(tool().arg("check").arg(&page).arg(trace).arg("--browser").arg(&browser))?;
+    let good = good && has_good_reports(&folder, sweep, &browser)?;
     Ok(Ok(good && succeeds(live().args(["test", "--quiet", "--package", "tractive-live-tool"]))?))
+}
+
+/// Runs whose report pages are looked at besides the sweep's: pictures of a paper, the other system, a drive that trips.
+const REPORTS: [(&str, &str, i32); 3] = [
+    ("characteristic", "characteristic", 0),
+    ("zs9-load-step", "zs9-load-step", 0),
+    ("trip", "sweep --to 100 --udc 2200", 1),
+];
+
+/// Looks at report pages: the sweep's, and those of [`REPORTS`].
+fn has_good_reports(folder: &Path, sweep: PathBuf, browser: &Path) -> Result<bool> {
+    let mut pages = vec![sweep.join("report.html")];
+    for (name, words, code) in REPORTS {
+        let out = folder.join("reports").join(name);
+        ensure!(run_on_host(words, &out)? == Some(code), "{words} on the host: not exit code {code}");
+        pages.push(out.join("report.html"));
+    }
+    succeeds(tool().arg("reports").args(pages).arg("--browser").arg(browser))
+}
+
+/// The exit code of a run on the host.
+fn run_on_host(words: &str, out: &Path) -> Result<Option<i32>> {
+    let mut host = Command::new(build::rig()?);
+    host.current_dir(root()).arg("run").args(words.split(' ')).args(["--on", "host", "--out"]).arg(out);
+    let status = host.stdout(Stdio::null()).stderr(Stdio::null()).status();
+    Ok(status.with_context(|| cannot_start(&host))?.code())
 }
 
 /// Format and lints, of the bindings on their target and of the tool on this machine.

@@ -38,6 +38,7 @@ mod overruns;
 mod own_board;
 mod process;
 mod publish;
+mod python;
 mod run;
 mod setup;
 mod step;

@@ -39,8 +39,10 @@ pub enum Step {
     Guide,
     /// The engineer's guide as a book
     Book,
-    /// The live bench in a browser: the host's bytes, its controls, its faults, its sizes
+    /// The live bench in a browser: the host's bytes, its controls, its faults, its sizes; and report pages
     Live,
+    /// The Python package, installed and against the rig
+    Python,
     /// The image in QEMU
     Qemu,
     /// The interrupts within their budgets

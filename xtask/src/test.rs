@@ -142,6 +142,10 @@ fn perform(step: Step, setup: &mut Setup) -> Result<Outcome> {
             Ok(good) => good,
             Err(missing) => return Ok(Outcome::Skipped(missing)),
         },
+        Step::Python => match crate::python::check()? {
+            Ok(good) => good,
+            Err(missing) => return Ok(Outcome::Skipped(missing)),
+        },
         Step::Qemu => {
             let (qemu, toolchain) = (setup.qemu()?, setup.toolchain()?);
             let mut command = cargo_with("test --release --package tractive-rig --test qemu -- --ignored");

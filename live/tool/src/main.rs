@@ -1,13 +1,14 @@
 //! The live bench's page: made of the drive's wasm, served, looked at in a browser.
 //!
 //! `cargo xtask live` calls this; what it does is in [`page`] (the folder of static files), [`server`], [`browser`], [`check`] and
-//! [`pictures`].
+//! [`pictures`]. [`reports`] looks at the report pages of runs.
 #![forbid(unsafe_code)]
 
 mod browser;
 mod check;
 mod page;
 mod pictures;
+mod reports;
 mod server;
 
 use anyhow::Result;
@@ -45,6 +46,18 @@ enum Command {
         #[arg(long, default_value = "chromium")]
         browser: PathBuf,
     },
+    /// Looks at report pages in a headless Chromium
+    Reports {
+        /// The pages
+        #[arg(required = true)]
+        pages: Vec<PathBuf>,
+        /// Folder for pictures of them
+        #[arg(long)]
+        pictures: Option<PathBuf>,
+        /// Chromium
+        #[arg(long, default_value = "chromium")]
+        browser: PathBuf,
+    },
     /// Takes its pictures
     Screenshots {
         /// The page's folder
@@ -62,6 +75,9 @@ fn main() -> Result<()> {
         Command::Make { wasm, out } => page::make(&wasm, &out),
         Command::Serve { page, port, no_open } => server::serve(&page, port, !no_open),
         Command::Check { page, trace, browser } => check::check(&page, &trace, &browser),
+        Command::Reports { pages, pictures, browser } => {
+            reports::check(&pages, pictures.as_deref(), &browser)
+        }
         Command::Screenshots { page, out, browser } => pictures::take(&page, &out, &browser),
     }
 }

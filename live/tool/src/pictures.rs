@@ -35,12 +35,20 @@ pub fn take(page: &Path, out: &Path, program: &Path) -> Result<()> {
             browser.until("the fault is named", "!document.getElementById('fault').hidden")?;
             std::thread::sleep(Duration::from_secs(2));
         }
-        let png = packed(&base64::prelude::BASE64_STANDARD.decode(browser.picture()?)?)?;
-        let file = out.join(format!("{name}.png"));
-        ensure!(png.len() <= LARGEST_BYTES, "{}: {} bytes", file.display(), png.len());
-        std::fs::write(&file, &png).with_context(|| file.display().to_string())?;
-        println!("{}: {} bytes", file.display(), png.len());
+        save(&browser.picture()?, &out.join(format!("{name}.png")))?;
     }
+    Ok(())
+}
+
+/// Saves a picture that the browser has given, in few bytes.
+pub fn save(picture: &str, file: &Path) -> Result<()> {
+    let png = packed(&base64::prelude::BASE64_STANDARD.decode(picture)?)?;
+    ensure!(png.len() <= LARGEST_BYTES, "{}: {} bytes", file.display(), png.len());
+    if let Some(folder) = file.parent() {
+        std::fs::create_dir_all(folder)?;
+    }
+    std::fs::write(file, &png).with_context(|| file.display().to_string())?;
+    println!("{}: {} bytes", file.display(), png.len());
     Ok(())
 }
 

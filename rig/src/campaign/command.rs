@@ -110,15 +110,18 @@ fn drive_healthy(minutes: f64, options: &CampaignOptions) -> Result<ExitCode> {
     }
     let rides: Vec<_> =
         systems.iter().flat_map(|system| seeds.iter().map(move |seed| (*system, *seed))).collect();
+    let bar = bar(rides.len() as u64, "healthy [{bar:40}] {pos}/{len} {elapsed} (left {eta})");
     let ridden = rides.par_iter().map(|(system, seed)| {
         let driven = match *system {
             "zs9" => healthy::dual::drive(&dual, piece_s, *seed)?.into(),
             _ => healthy::traction::drive(&drive, piece_s, *seed, options.blocks)?.into(),
         };
+        bar.inc(1);
         Ok((*system, *seed, driven))
     });
     let ridden: Vec<(&str, u64, healthy::Driven)> = ridden.collect::<Result<_>>()?;
-    let mut good = true;
+    bar.finish_and_clear();
+    let (mut good, mut totals) = (true, BTreeMap::new());
     for system in &systems {
         let (mut trips, mut current_a, mut udc_v) = (0, 0.0_f64, 0.0_f64);
         for (_, seed, driven) in ridden.iter().filter(|(of, _, _)| of == system) {
@@ -129,10 +132,19 @@ fn drive_healthy(minutes: f64, options: &CampaignOptions) -> Result<ExitCode> {
                 eprintln!("{system}, seed {seed}: {tripped}");
             }
         }
+        if options.json {
+            let total = serde_json::json!({ "minutes": minutes, "pieces": pieces, "trips": trips, "peak_current_a": current_a, "highest_udc_v": udc_v });
+            totals.insert(*system, total);
+            good &= trips == 0;
+            continue;
+        }
         crate::say!(
             "{system}: {minutes} min of driving in {pieces} pieces: {trips} trips, {current_a:.0} A and {udc_v:.0} V at most"
         );
         good &= trips == 0;
+    }
+    if options.json {
+        crate::say!("{}", serde_json::to_string(&totals)?);
     }
     Ok(if good { ExitCode::SUCCESS } else { ExitCode::from(1) })
 }

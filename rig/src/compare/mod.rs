@@ -35,6 +35,9 @@ pub struct CompareOptions {
     /// Folder for compare.csv and compare.md.
     #[arg(long)]
     pub out: Option<PathBuf>,
+    /// Print the rows as JSON.
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// Runs the rows whose name has each of the words.
@@ -72,7 +75,12 @@ pub fn run(options: &CompareOptions) -> Result<ExitCode> {
     let mut table = Table::new();
     table.load_style(NOTHING).set_content_arrangement(ContentArrangement::Dynamic).set_header(HEADS);
     table.add_rows(rows.iter().map(cells));
-    crate::say!("{}", table.trim_fmt());
+    if options.json {
+        crate::say!("{}", serde_json::to_string(&rows)?);
+    } else {
+        let ahead = rows.iter().filter(|row| row.ahead).count();
+        crate::say!("{ahead} of {} rows ahead\n\n{}", rows.len(), table.trim_fmt());
+    }
     if let Some(out) = &options.out {
         std::fs::create_dir_all(out).with_context(|| format!("--out {}", out.display()))?;
         let mut csv = csv::Writer::from_path(out.join("compare.csv"))?;

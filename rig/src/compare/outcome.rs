@@ -25,7 +25,7 @@ pub(super) struct Cell {
 }
 
 /// A row of the table.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
 pub struct Row {
     /// The quantity.
     pub quantity: &'static str,

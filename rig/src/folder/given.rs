@@ -42,6 +42,9 @@ pub struct Given {
     /// The folder to make. One that is there may hold a machine's two files, which are replaced, and nothing else.
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
+    /// Print the ratings as JSON.
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// A value's option, the value, the least and the most that are allowed, and the unit.

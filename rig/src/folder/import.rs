@@ -76,8 +76,7 @@ impl Import {
         let contents =
             Contents { toml: ratings.toml(&self.given, &self.told()), map: write::csv(&map, &comment) };
         write::folder(&self.given.out, &contents)?;
-        crate::say!("{}", ratings.told(&self.given));
-        Ok(())
+        ratings.say(&self.given)
     }
 
     /// Into the project's frame.

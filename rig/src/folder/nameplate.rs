@@ -44,8 +44,7 @@ impl Nameplate {
         let ratings = Ratings::of(&map, &self.given)?;
         let contents = Contents { toml: ratings.toml(&self.given, &self.told()), map: self.csv(&map) };
         write::folder(&self.given.out, &contents)?;
-        crate::say!("{}", ratings.told(&self.given));
-        Ok(())
+        ratings.say(&self.given)
     }
 
     fn check(&self) -> Result<()> {

@@ -8,6 +8,7 @@ use std::fmt::Write as _;
 use tractive_tablegen::{FluxMap, Optimum, SmoothMap};
 
 /// Ratings that follow.
+#[derive(serde::Serialize)]
 pub struct Ratings {
     max_torque_nm: f64,
     max_power_w: f64,
@@ -93,8 +94,21 @@ impl Ratings {
         text
     }
 
+    /// Says what the machine is: a few lines, or where it was asked for, JSON.
+    pub fn say(&self, given: &Given) -> Result<()> {
+        if given.json {
+            let mut ratings = serde_json::to_value(self)?;
+            ratings["folder"] = serde_json::json!(given.out);
+            ratings["name"] = given.name().into();
+            crate::say!("{ratings}");
+        } else {
+            crate::say!("{}", self.told(given));
+        }
+        Ok(())
+    }
+
     /// The ratings in a few lines, and what they mean for the inverter.
-    pub fn told(&self, given: &Given) -> String {
+    fn told(&self, given: &Given) -> String {
         let Self { max_torque_nm, max_power_w, corner_rpm, magnet_wb, .. } = self;
         let mut text = format!(
             "{}: {max_torque_nm} N·m up to {corner_rpm:.0} r/min, {max_power_w} W, {} r/min at most",

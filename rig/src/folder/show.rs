@@ -32,6 +32,9 @@ pub struct Show {
     /// The page to write; default target/tractive/machine-NAME.html.
     #[arg(long, value_name = "FILE.html")]
     pub out: Option<PathBuf>,
+    /// Print the page's figures as JSON.
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// Points of a curve over speed.
@@ -93,7 +96,13 @@ impl Show {
             std::fs::create_dir_all(folder).with_context(|| format!("--out {}", file.display()))?;
         }
         write_text(&file, &page(&machine)?)?;
-        crate::say!("{}", file.display());
+        if self.json {
+            let figures = View::of(&machine).figures();
+            let told = serde_json::json!({ "page": file, "machine": name, "figures": figures.values() });
+            crate::say!("{told}");
+        } else {
+            crate::say!("{}", file.display());
+        }
         Ok(())
     }
 }

@@ -1,22 +1,25 @@
-//! The scenario's page: one self-contained HTML file, its plots drawn as SVG.
+//! The scenario's page: one self-contained HTML file whose plots a script draws from packed numbers.
 
 mod chart;
+mod data;
+mod html;
 mod overview;
+mod scope;
 mod table;
 mod text;
+mod views;
 
 pub use overview::overview;
 pub use text::{headline, list, text};
 
 use crate::analysis::Figures;
 use crate::rows::Timed;
-use crate::trace::{Recording, Row};
+use crate::trace::Row;
 use anyhow::Result;
-use chart::{chart, legend, thinned};
-use std::fmt::Write as _;
-use table::{escape, tables};
+use data::Place;
+use html::{Block, Document};
+use scope::{Mark, Over, Panel as Plotted, Scope, Series, label};
 use tractive::protection::Fault;
-use tractive::recorder::Record;
 
 /// The panel of a flight recorder's records: title, unit, and each curve's name and value.
 pub type Panel<'a, R> = (&'a str, &'a str, &'a [(&'static str, fn(&R) -> f32)]);
@@ -27,31 +30,41 @@ pub type Curve<'a, R = Row> = (&'a str, fn(&R) -> f64);
 /// The words of a scenario that answers none of the paper's figures.
 pub const NO_FIGURE: &str = "no figure";
 
+/// The axis of what goes on in a run.
+const TIME: &str = "time in s";
+
+/// Points of a curve: where on the axis, and the value there.
+type Points = Vec<(f64, f64)>;
+
 /// A page under construction.
 pub struct Page {
-    title: String,
+    document: Document,
     /// The paper's figure that the plots answer from here on; nothing where it has none.
     figure: Option<String>,
     /// `true` if none of the plots answers a figure of the paper.
     is_another_machine: bool,
-    body: String,
+    /// Rate of a carrier that is not locked to the rotor, in Hz.
+    carrier_hz: f64,
+    /// The line voltage of the recording at this address.
+    line_voltage: Option<(usize, Series)>,
     error: Option<anyhow::Error>,
 }
 
 impl Page {
     /// A page whose plots answer a figure of the paper, such as "figure 8: load steps"; or "no figure: a fault acknowledged".
     pub fn new(scenario: &str, figure: &str) -> Self {
-        let (number, what) = figure.split_once(':').unwrap_or((figure, ""));
+        let (number, what) = figure.split_once(": ").unwrap_or(("", figure));
+        let (title, about) = (scenario.to_owned(), what.to_owned());
         let mut page = Self {
-            title: format!("{scenario}: {figure}"),
+            document: Document { title, about, ..Document::default() },
             figure: None,
             is_another_machine: false,
-            body: String::new(),
+            carrier_hz: 900.0,
+            line_voltage: None,
             error: None,
         };
-        if number == NO_FIGURE {
-            page.title = format!("{scenario}:{what}");
-        } else {
+        if !number.is_empty() && number != NO_FIGURE {
+            page.document.about = format!("the paper's {number}: {what}");
             page.answers(number);
         }
         page
@@ -60,7 +73,7 @@ impl Page {
     /// From here on the plots answer this figure of the paper, or none.
     pub fn answers<'a>(&mut self, figure: impl Into<Option<&'a str>>) {
         let figure = figure.into().filter(|_| !self.is_another_machine);
-        self.figure = figure.map(|figure| format!("The paper's {figure}"));
+        self.figure = figure.map(str::to_owned);
     }
 
     /// Nothing on this page answers a figure of the paper: the machine is not the paper's.
@@ -68,91 +81,40 @@ impl Page {
         (self.figure, self.is_another_machine) = (None, true);
     }
 
-    /// Curves over the whole recording.
-    pub fn plot(&mut self, title: &str, unit: &str, recording: &Recording, curves: &[Curve]) {
-        let end_s = recording.rows.last().map_or(1.0, |row| row.t_s);
-        self.plot_window(title, unit, recording, (0.0, end_s), curves);
+    /// The words that stand first: `PASS: …` or `FALLS SHORT: …`.
+    pub fn headline(&mut self, headline: &str) {
+        self.document.headline = Some(headline.to_owned());
     }
 
-    /// Torque and demand.
-    pub fn torque(&mut self, recording: &Recording) {
-        let curves: [Curve; 2] = [("torque", |row| row.te_nm), ("demand", |row| row.te_ref_nm)];
-        self.plot("Torque", "N·m", recording, &curves);
+    /// A line of what was run, such as the machine.
+    pub fn ran(&mut self, what: &str, value: impl Into<String>) {
+        self.document.run.push((what.to_owned(), value.into()));
     }
 
-    /// The current of phase u.
-    pub fn phase_current(&mut self, recording: &Recording) {
-        self.plot("Phase current u", "A", recording, &[("ia", |row| row.ia_a)]);
+    /// Rate of a carrier that is not locked to the rotor, in Hz; torque is averaged over it.
+    pub const fn carrier(&mut self, hz: f64) {
+        self.carrier_hz = hz;
     }
 
-    /// The current of phase u over a part of the recording.
-    pub fn phase_current_in(&mut self, title: &str, recording: &Recording, window: (f64, f64)) {
-        self.plot_window(title, "A", recording, window, &[("ia", |row| row.ia_a)]);
-    }
-
-    /// Currents in the rotor's frame, and what is wanted of them.
-    pub fn rotor_currents(&mut self, recording: &Recording) {
-        let curves: [Curve; 4] = [
-            ("id", |row| row.id_a),
-            ("iq", |row| row.iq_a),
-            ("id*", |row| row.id_ref_a),
-            ("iq*", |row| row.iq_ref_a),
-        ];
-        self.plot("Currents, rotor frame", "A", recording, &curves);
-    }
-
-    /// The whole run in one picture.
-    pub fn overview(&mut self, recording: &Recording) {
-        self.place(&self.heading("the whole run"), overview(recording));
-    }
-
-    /// Curves over a part of the recording.
-    pub fn plot_window(
-        &mut self,
-        title: &str,
-        unit: &str,
-        recording: &Recording,
-        window: (f64, f64),
-        curves: &[Curve],
-    ) {
-        self.plot_rows(title, unit, crate::analysis::window(recording, window.0, window.1), curves);
+    /// An instant with a name, which every plot over time marks; one of a fault is bad.
+    pub fn mark(&mut self, at_s: f64, name: &str, bad: bool) {
+        let mark = Mark { at: at_s, name: name.to_owned(), bad };
+        if !self.document.marks.contains(&mark) {
+            self.document.marks.push(mark);
+        }
     }
 
     /// Curves over rows of either system.
     pub fn plot_rows<R: Timed>(&mut self, title: &str, unit: &str, rows: &[R], curves: &[Curve<R>]) {
-        let points = |value: fn(&R) -> f64| rows.iter().map(|row| (row.t_s(), value(row))).collect();
-        let series: Vec<_> = curves.iter().map(|(name, value)| (*name, points(*value))).collect();
-        self.curves(&self.heading(title), "time in s", unit, &series);
+        let (Some(first), Some(last)) = (rows.first(), rows.last()) else { return };
+        let short = |t_s: f64| (t_s * 1e3).round() / 1e3;
+        let heading = format!("{} to {} s", short(first.t_s()), short(last.t_s()));
+        let over = Over::Rows(rows.as_ptr() as usize, rows.len());
+        let series = self.series(rows, curves);
+        self.show(over, &heading, None, (title, unit), series);
     }
 
-    /// Link voltage and current out of the line; nothing without a line filter.
-    pub fn line(&mut self, recording: &Recording) {
-        if recording.rows.iter().any(|row| row.line_a.is_some()) {
-            self.plot("DC link behind the line filter", "V", recording, &[("udc", |row| row.udc_v)]);
-            let curves: [Curve; 1] = [("line current", |row| row.line_a.unwrap_or(0.0))];
-            self.plot("Current out of the line", "A", recording, &curves);
-        }
-    }
-
-    /// The flight recorder's records of a fault; nothing if there was none.
-    pub fn recorder(&mut self, recording: &Recording) {
-        let panels: [Panel<Record>; 3] = [
-            (
-                "phase currents as sampled",
-                "A",
-                &[("ia", |of| of.currents_a.a), ("ib", |of| of.currents_a.b), ("ic", |of| of.currents_a.c)],
-            ),
-            ("current references", "A", &[("id", |of| of.id_a), ("iq", |of| of.iq_a)]),
-            (
-                "DC link as sampled and commanded voltage",
-                "V",
-                &[("udc", |of| of.udc_v), ("u", |of| of.voltage_v)],
-            ),
-        ];
-        self.recorded(&recording.recorded, |record| record.state.fault, &panels);
-    }
-
-    /// Panels of what a flight recorder holds, each with its unit and its curves; nothing without a fault.
+    /// The flight recorder's records of a fault; nothing without one.
     pub fn recorded<R>(
         &mut self,
         recorded: &[(f64, R)],
@@ -163,46 +125,21 @@ impl Page {
         else {
             return;
         };
-        for (what, unit, curves) in panels {
-            let series: Vec<_> = curves
-                .iter()
-                .map(|(name, value)| {
-                    let of = |(at_s, record): &(f64, R)| (1e3 * (at_s - t_s), f64::from(value(record)));
-                    // What is not finite may be the fault itself, and cannot be drawn.
-                    let points = recorded.iter().map(of).filter(|(_, value)| value.is_finite()).collect();
-                    (*name, points)
-                })
-                .collect();
-            let heading = format!("Flight recorder · {what} around {} at {t_s:.4} s", fault.name());
-            self.add(&heading, ("time from the fault in ms", unit), &series);
-        }
-    }
-
-    /// Line voltage between phases u and v from the gates' edges, over a part of the recording.
-    pub fn line_voltage(&mut self, title: &str, recording: &Recording, window: (f64, f64)) {
-        let points = recording.line_voltage(window);
-        self.draw(title, "V", &[("u-v", points)]);
-    }
-
-    /// The whole page.
-    pub fn finish(self, subtitle: &str, figures: &Figures) -> Result<String> {
-        if let Some(error) = self.error {
-            return Err(error);
-        }
-        let mut page = String::new();
-        write!(
-            page,
-            "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>{title}</title><style>\
-             body{{font-family:sans-serif;max-width:1040px;margin:2em auto;padding:0 1em}}\
-             table{{border-collapse:collapse;font-size:90%}}td,th{{border:1px solid #ccc;padding:2px 8px;text-align:right}}\
-             h2{{font-size:105%;margin:1.4em 0 0}}svg{{max-width:100%;height:auto}}</style></head><body>\
-             <h1>{title}</h1><p>{subtitle}</p>{body}<h2>Figures</h2>{tables}</body></html>\n",
-            title = escape(&self.title),
-            subtitle = escape(subtitle),
-            body = self.body,
-            tables = tables(figures),
-        )?;
-        Ok(page)
+        let heading = format!("Flight recorder · around {} at {t_s:.4} s", fault.name());
+        let panels = panels.iter().map(|(what, unit, curves)| {
+            let mut series = Vec::new();
+            for (index, (name, value)) in curves.iter().enumerate() {
+                let of = |(at_s, record): &(f64, R)| (1e3 * (at_s - t_s), f64::from(value(record)));
+                // What is not finite may be the fault itself, and cannot be drawn.
+                let points: Points = recorded.iter().map(of).filter(|(_, value)| value.is_finite()).collect();
+                series.push(Series::new(name, self.points(&points), index));
+            }
+            Plotted { label: label(what, unit), series, levels: Vec::new() }
+        });
+        let panels = panels.collect();
+        let x = "time from the fault in ms".to_owned();
+        let scope = Scope { heading, figure: None, over: Over::Own, time: false, x, span: None, panels };
+        self.document.blocks.push(Block::Plots(scope));
     }
 
     /// Curves over anything, beside a figure of the paper or none; `axes` are the labels of x and y.
@@ -211,46 +148,130 @@ impl Page {
         figure: impl Into<Option<&'a str>>,
         title: &str,
         axes: (&str, &str),
-        series: &[(String, Vec<(f64, f64)>)],
+        series: &[(String, Points)],
     ) {
+        let figure = figure.into().filter(|_| !self.is_another_machine).map(str::to_owned);
         let series: Vec<_> = series.iter().map(|(name, points)| (name.as_str(), points.clone())).collect();
-        let figure = figure.into().filter(|_| !self.is_another_machine);
-        let figure = figure.map_or(String::new(), |figure| format!("The paper's {figure} · "));
-        self.add(&format!("{figure}{title}"), axes, &series);
+        self.chart(figure, title, axes, &series);
     }
 
     /// A picture of its own, beside a figure of the paper or none.
     pub fn picture<'a>(&mut self, figure: impl Into<Option<&'a str>>, title: &str, svg: Result<String>) {
-        let figure = figure.into().map_or(String::new(), |figure| format!("The paper's {figure} · "));
-        self.place(&format!("{figure}{title}"), svg);
-    }
-
-    /// Curves under a heading of their own, over time or anything else; over time dense data is shown by its extremes.
-    pub fn curves(&mut self, heading: &str, x: &str, unit: &str, series: &[(&str, Vec<(f64, f64)>)]) {
-        let series: Vec<_> = series.iter().map(|(name, points)| (*name, thinned(points))).collect();
-        self.add(heading, (x, unit), &series);
-    }
-
-    fn draw(&mut self, title: &str, unit: &str, series: &[(&str, Vec<(f64, f64)>)]) {
-        self.add(&self.heading(title), ("time in s", unit), series);
-    }
-
-    /// A title, with the paper's figure named before it.
-    fn heading(&self, title: &str) -> String {
-        self.figure.as_ref().map_or(title.to_owned(), |figure| format!("{figure} · {title}"))
-    }
-
-    fn add(&mut self, heading: &str, axes: (&str, &str), series: &[(&str, Vec<(f64, f64)>)]) {
-        let svg = chart(axes, series).map(|svg| legend(series) + &svg);
-        self.place(heading, svg);
-    }
-
-    fn place(&mut self, heading: &str, svg: Result<String>) {
         match svg {
-            Ok(svg) => {
-                let _ = write!(self.body, "<h2>{}</h2>{svg}", escape(heading));
-            }
+            Ok(svg) => self.document.blocks.push(Block::Picture(html::heading(figure.into(), title), svg)),
             Err(error) => self.error = Some(error),
+        }
+    }
+
+    /// Curves over time as it was told, or over anything else.
+    pub fn curves(&mut self, heading: &str, x: &str, unit: &str, series: &[(&str, Points)]) {
+        if x == TIME {
+            let series = self.told(series);
+            self.show(Over::Told, "as it was told", None, (heading, unit), series);
+        } else {
+            self.chart(None, heading, (x, unit), series);
+        }
+    }
+
+    /// States over time as they were told: a value is its name's place in the list.
+    pub fn states(&mut self, title: &str, names: &[&str], points: Points) {
+        let series = self.told(&[("state", points)]);
+        self.show(Over::Told, "as it was told", None, (title, ""), series);
+        self.name_levels(names);
+    }
+
+    /// The whole page; the subtitle stands below its title.
+    pub fn finish(self, subtitle: &str, figures: &Figures) -> Result<String> {
+        match self.error {
+            Some(error) => Err(error),
+            None => html::page(&self.document, subtitle, figures),
+        }
+    }
+
+    fn told(&mut self, series: &[(&str, Points)]) -> Vec<Series> {
+        let of =
+            |(index, (name, points)): (usize, &(&str, Points))| Series::new(name, self.points(points), index);
+        series.iter().enumerate().map(of).collect()
+    }
+
+    fn chart(
+        &mut self,
+        figure: Option<String>,
+        title: &str,
+        (x, unit): (&str, &str),
+        series: &[(&str, Points)],
+    ) {
+        let series = self.told(series);
+        let panel = Plotted { label: label("", unit).trim().to_owned(), series, levels: Vec::new() };
+        let (heading, x, panels) = (title.to_owned(), x.to_owned(), vec![panel]);
+        let scope = Scope { heading, figure, over: Over::Own, time: false, x, span: None, panels };
+        self.document.blocks.push(Block::Plots(scope));
+    }
+
+    /// A column of points with an axis of their own.
+    fn points(&mut self, points: &[(f64, f64)]) -> Place {
+        let points: Points = points.iter().copied().filter(|(x, y)| x.is_finite() && y.is_finite()).collect();
+        let (x, y): (Vec<_>, Vec<_>) = points.into_iter().unzip();
+        let table = self.document.data.table(&x);
+        self.document.data.add(table, &y)
+    }
+
+    /// Columns of rows.
+    fn series<R: Timed>(&mut self, rows: &[R], curves: &[Curve<R>]) -> Vec<Series> {
+        let times: Vec<_> = rows.iter().map(Timed::t_s).collect();
+        let of = |(index, (name, value)): (usize, &Curve<R>)| {
+            let mut last = 0.0;
+            // A value that is none cannot be drawn: the one before stands for it.
+            let finite = |value: f64| {
+                last = if value.is_finite() { value } else { last };
+                last
+            };
+            let values: Vec<_> = rows.iter().map(value).map(finite).collect();
+            let table = self.document.data.table(&times);
+            Series::new(name, self.document.data.add(table, &values), index)
+        };
+        curves.iter().enumerate().map(of).collect()
+    }
+
+    /// Adds a panel to the scope over these rows, or to a new one with this heading; once only.
+    fn show(
+        &mut self,
+        over: Over,
+        heading: &str,
+        span: Option<(f64, f64)>,
+        (title, unit): (&str, &str),
+        series: Vec<Series>,
+    ) {
+        let of = |block: &Block| matches!(block, Block::Plots(scope) if scope.over == over);
+        let at = self.document.blocks.iter().position(of).unwrap_or_else(|| {
+            let (heading, figure, x, panels) =
+                (heading.to_owned(), self.figure.clone(), TIME.to_owned(), Vec::new());
+            self.document.blocks.push(Block::Plots(Scope {
+                heading,
+                figure,
+                over,
+                time: true,
+                x,
+                span,
+                panels,
+            }));
+            self.document.blocks.len() - 1
+        });
+        let Some(Block::Plots(scope)) = self.document.blocks.get_mut(at) else { return };
+        if scope.panels.iter().any(|panel| panel.shows(&series)) {
+            return;
+        }
+        let figure = self.figure.as_deref().filter(|_| self.figure != scope.figure);
+        let title = figure.map_or(title.to_owned(), |figure| format!("{figure} · {title}"));
+        scope.panels.push(Plotted { label: label(&title, unit), series, levels: Vec::new() });
+    }
+
+    /// The last panel's values are states of these names.
+    fn name_levels(&mut self, names: &[&str]) {
+        if let Some(Block::Plots(scope)) = self.document.blocks.last_mut()
+            && let Some(panel) = scope.panels.last_mut()
+        {
+            panel.levels = names.iter().map(|name| (*name).to_owned()).collect();
         }
     }
 }
@@ -261,22 +282,42 @@ mod tests {
 
     fn page(figure: &str) -> String {
         let mut page = Page::new("s", figure);
-        page.draw("torque", "N·m", &[("t", vec![(0.0, 1.0), (1.0, 2.0)])]);
+        page.draw_xy("figure 10", "power", ("x", "W"), &[("p".to_owned(), vec![(0.0, 1.0), (1.0, 2.0)])]);
         page.finish("", &Figures::default()).unwrap()
     }
 
     #[test]
     fn the_papers_figure_stands_above_the_plot_where_there_is_one() {
-        assert!(page("figure 8: load steps").contains("<h2>The paper's figure 8 · torque</h2><svg"));
-        let mut another = Page::new("s", "figure 8: load steps");
+        assert!(page("figure 8: load steps").contains("<h2>The paper's figure 10 · power</h2>"));
+        let mut another = Page::new("s", "no figure: load steps");
         another.answers_none();
         another.answers("figure 9a");
-        another.draw("torque", "N·m", &[("t", vec![(0.0, 1.0), (1.0, 2.0)])]);
         another.draw_xy("figure 10", "power", ("x", "y"), &[("p".to_owned(), vec![(0.0, 1.0), (1.0, 2.0)])]);
         let another = another.finish("", &Figures::default()).unwrap();
-        assert!(another.contains("<h2>torque</h2>") && another.contains("<h2>power</h2>"), "{another}");
+        assert!(another.contains("<h2>power</h2>") && !another.contains("The paper's"), "{another}");
         let without = page("no figure: a fault acknowledged");
-        assert!(without.contains("<h1>s: a fault acknowledged</h1>"), "{without}");
-        assert!(without.contains("<h2>torque</h2><svg") && !without.contains("figure: "), "{without}");
+        assert!(without.contains("<title>s: a fault acknowledged</title>"), "{without}");
+    }
+
+    #[test]
+    fn no_curve_is_drawn_twice_and_the_headline_stands_before_the_verdicts() {
+        struct At(f64);
+        impl Timed for At {
+            fn t_s(&self) -> f64 {
+                self.0
+            }
+        }
+        let rows: Vec<_> = (0..100).map(|k| At(f64::from(k) * 1e-3)).collect();
+        let mut page = Page::new("s", "no figure: nothing");
+        page.headline("FALLS SHORT: 1 of 2 bounds");
+        for _ in 0..2 {
+            page.plot_rows("torque", "N·m", &rows, &[("torque", |row| row.0)]);
+        }
+        page.plot_rows("speed", "r/min", &rows, &[("speed", |row| 2.0 * row.0)]);
+        let page = page.finish("", &Figures::default()).unwrap();
+        assert_eq!(page.matches("<h3>torque in N·m</h3>").count(), 1);
+        assert_eq!(page.matches("class=\"card scope").count(), 1);
+        let place = |what: &str| page.find(what).unwrap_or_else(|| panic!("{what}: {page}"));
+        assert!(place("FALLS SHORT") < place("<h3>torque"));
     }
 }

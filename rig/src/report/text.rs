@@ -76,7 +76,7 @@ fn verdict(verdict: &Value) -> Vec<String> {
 }
 
 /// `t90 in ms` is `t90`, in ms; `overshoot in % of the step` is `overshoot of the step`, in %.
-fn split_unit(what: &str) -> (String, &'static str) {
+pub(super) fn split_unit(what: &str) -> (String, &'static str) {
     let units = UNITS.iter().map(|(_, unit)| *unit);
     let found = units.filter_map(|unit| {
         let (before, after) = what.split_once(&format!(" in {unit}"))?;
@@ -86,7 +86,7 @@ fn split_unit(what: &str) -> (String, &'static str) {
 }
 
 /// A figure's name in words, and its unit.
-fn quantity(name: &str) -> (String, &'static str) {
+pub(super) fn quantity(name: &str) -> (String, &'static str) {
     let known = UNITS.iter().find_map(|(end, unit)| Some((name.strip_suffix(end)?, *unit)));
     let (words, unit) = known.unwrap_or((name, ""));
     (words.replace('_', " "), unit)
@@ -124,7 +124,7 @@ fn measured(value: &Value, unit: &str) -> String {
 }
 
 /// Four digits that count; of what is smaller than a thousandth three decimals of its power.
-fn digits(value: f64) -> String {
+pub(super) fn digits(value: f64) -> String {
     let size = value.abs();
     let before = if size < 1.0 { 0 } else { size.log10() as usize + 1 };
     match size {

@@ -81,10 +81,12 @@ static BARS: LazyLock<MultiProgress> = LazyLock::new(MultiProgress::new);
 /// A bar of so many steps on a terminal; in a pipe indicatif draws none.
 pub(crate) fn bar(steps: u64, template: &str) -> ProgressBar {
     let bar = BARS.add(ProgressBar::new(steps));
-    match ProgressStyle::with_template(template) {
-        Ok(style) => bar.with_style(style),
-        Err(_) => bar,
+    if let Ok(style) = ProgressStyle::with_template(template) {
+        bar.set_style(style);
     }
+    // It stands there before the first step is done.
+    bar.tick();
+    bar
 }
 
 /// The progress of a run.
@@ -98,7 +100,9 @@ impl Progress {
 
     pub(crate) fn new(name: &str) -> Self {
         let template = "{msg:16} [{bar:40}] {percent:>3} % {elapsed} (left {eta})";
-        Self { bar: bar(Self::STEPS, template).with_message(name.to_owned()), calls: 0 }
+        // A talk is as long as its lines say, and tells its state instead.
+        let bar = if name == "talk" { ProgressBar::hidden() } else { bar(Self::STEPS, template) };
+        Self { bar: bar.with_message(name.to_owned()), calls: 0 }
     }
 
     pub(crate) fn show(&mut self, done: f64) {

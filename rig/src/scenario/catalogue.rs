@@ -64,6 +64,12 @@ impl<S: System> Entry<S> {
         command.about(self.figure).long_about(None)
     }
 
+    /// Its command line under its own name.
+    fn named(&self) -> Command {
+        let command = (self.arguments)(Options::<S::Own>::augment_args(Command::new(self.name)));
+        command.about(self.figure).long_about(None)
+    }
+
     fn choose(&self, matches: &ArgMatches) -> Result<Choice<S>, clap::Error> {
         let (scenario, own) = (self.read)(matches)?;
         let options = Options::from_arg_matches(matches)?;
@@ -126,6 +132,12 @@ pub fn names() -> impl Iterator<Item = (&'static str, &'static str)> {
 /// Those that are not short on purpose, for what counts instructions.
 pub fn listed() -> impl Iterator<Item = (&'static str, &'static str)> {
     names().filter(|(name, _)| !name.ends_with("timing"))
+}
+
+/// `run` with each scenario as a command of its own, for a shell's completions.
+pub fn completed() -> Command {
+    let scenarios = TRACTION.iter().map(Entry::named).chain(ZS9.iter().map(Entry::named));
+    Command::new("run").about("Runs a scenario and writes its files").subcommands(scenarios)
 }
 
 fn scenario_argument() -> Arg {

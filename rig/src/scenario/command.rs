@@ -98,13 +98,40 @@ pub fn write<S: System>(
         write_text(&out.join("overview.svg"), &overview)?;
     }
     let mut page = Page::new(choice.name, &choice.title(machine));
+    page.headline(&report::headline(figures, recording.trip()));
+    page.carrier(machine.tables.ratings.max_switching_hz.into());
+    ran(choice, machine, &mut page)?;
     if !machine.is(S::MACHINE) {
         page.answers_none();
     }
-    S::draw_common(recording, &mut page);
     choice.scenario.plots(recording, &choice.filled(machine), machine, &mut page);
-    let law = S::law(&choice.options.own).map_or(String::new(), |law| format!(", law {law}"));
-    let subtitle =
-        format!("tractive {}, run on {}{law}", env!("CARGO_PKG_VERSION"), choice.options.on.name());
+    S::draw_common(recording, &mut page);
+    let subtitle = format!("tractive {} · {}", env!("CARGO_PKG_VERSION"), S::NAME);
     write_text(&out.join("report.html"), &page.finish(&subtitle, figures)?)
+}
+
+/// Says on the page what was run: machine, link, law, and each option that was given or filled in.
+fn ran<S: System>(choice: &Choice<S>, machine: &Machine, page: &mut Page) -> Result<()> {
+    let (name, folder) = (machine.tables.name, choice.machine_name());
+    page.ran("machine", if name == folder { name.to_owned() } else { format!("{name} ({folder})") });
+    let udc_v = choice.options.udc.unwrap_or(machine.folder.parameters.dc_link_nominal_v);
+    page.ran("DC source", format!("{udc_v} V"));
+    page.ran("ran on", choice.options.on.name());
+    page.ran("version", env!("CARGO_PKG_VERSION"));
+    if let Some(commit) = option_env!("TRACTIVE_COMMIT") {
+        page.ran("commit", commit);
+    }
+    let flaws =
+        if choice.options.is_ideal() { "none: ideal inverter and sensors" } else { "see the options" };
+    page.ran("flaws", flaws);
+    let Value::Object(mut options) = serde_json::to_value(choice.filled(machine))? else { return Ok(()) };
+    options.extend(choice.own.clone());
+    // Said above, or off.
+    let said = |name: &str| matches!(name, "machine" | "udc" | "on");
+    let off = |value: &Value| value.is_null() || *value == json!(false) || value.as_f64() == Some(0.0);
+    for (name, value) in options.iter().filter(|(name, value)| !said(name) && !off(value)) {
+        let value = value.as_str().map_or_else(|| value.to_string(), str::to_owned);
+        page.ran(&format!("--{}", name.replace('_', "-")), value);
+    }
+    Ok(())
 }

@@ -52,7 +52,8 @@ pub trait System: Sized + 'static {
     ) -> Result<Self::Recording>;
     /// Figures of a scenario that is about nothing in particular.
     fn figures(recording: &Self::Recording) -> Figures;
-    /// Draws what every scenario shows: what the flight recorder holds of a fault, and a line behind a filter; nothing without them.
+    /// Draws what every scenario shows, behind its own plots: what the flight recorder holds of a fault, and a line behind a filter, nothing
+    /// without them; marks what happened.
     fn draw_common(recording: &Self::Recording, page: &mut Page);
     /// One picture of the whole run, if the system has one.
     fn overview(_recording: &Self::Recording) -> Result<Option<String>> {

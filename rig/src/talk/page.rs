@@ -25,20 +25,15 @@ fn named(outcome: &Outcome, column: &str, names: &[&str]) -> Points {
     outcome.talk.rows.iter().filter_map(place).collect()
 }
 
-fn listed(names: &[&str]) -> String {
-    let list: Vec<_> = names.iter().enumerate().map(|(code, name)| format!("{code} {name}")).collect();
-    list.join(", ")
-}
-
 const TIME: &str = "time in s";
 
 /// The PMaSynRM drive's speed and torque.
 fn traction(page: &mut Page, outcome: &Outcome, recording: &Recording) {
     page.recorder(recording);
     let of = |value: fn(&Row) -> f64| recording.rows.iter().map(|row| (row.t_s, value(row))).collect();
-    let speeds = [("telemetry", told(outcome, "speed_rpm")), ("machine", of(|row| row.speed_rpm))];
+    let speeds = [("machine", of(|row| row.speed_rpm)), ("telemetry", told(outcome, "speed_rpm"))];
     page.curves("Speed", TIME, "r/min", &speeds);
-    let torques = [("telemetry", told(outcome, "torque_nm")), ("machine", of(|row| row.te_nm))];
+    let torques = [("machine", of(|row| row.te_nm)), ("telemetry", told(outcome, "torque_nm"))];
     page.curves("Torque: demand as told, and the machine's", TIME, "N·m", &torques);
 }
 
@@ -48,10 +43,10 @@ fn dual(page: &mut Page, outcome: &Outcome, recording: &zs9::trace::Recording) {
     let both = |what: (&str, &str), value: fn(&MotorRow) -> f64| {
         let of = |k: usize| recording.rows.iter().map(|row| (row.t_s, value(&row.motors[k]))).collect();
         [
-            ("telemetry 1", told(outcome, &format!("{}1_{}", what.0, what.1))),
-            ("telemetry 2", told(outcome, &format!("{}2_{}", what.0, what.1))),
             ("upper motor", of(0)),
             ("lower motor", of(1)),
+            ("telemetry 1", told(outcome, &format!("{}1_{}", what.0, what.1))),
+            ("telemetry 2", told(outcome, &format!("{}2_{}", what.0, what.1))),
         ]
     };
     page.curves("Speeds", TIME, "r/min", &both(("speed", "rpm"), |motor| motor.speed_rpm));
@@ -63,16 +58,19 @@ fn dual(page: &mut Page, outcome: &Outcome, recording: &zs9::trace::Recording) {
 /// The whole page.
 pub(super) fn page(options: &TalkOptions, outcome: &Outcome) -> Result<String> {
     let mut page = Page::new("talk", "commanded over the protocol");
+    let (asked, not_met) = (outcome.talk.expectations, outcome.talk.failures.len());
+    page.headline(&match not_met {
+        0 => format!("PASS: {asked} expectations met"),
+        _ => format!("FALLS SHORT: {not_met} of {asked} expectations"),
+    });
     match &outcome.recording {
         Happened::Pmasynrm(recording) => traction(&mut page, outcome, recording),
         Happened::Zs9(recording) => dual(&mut page, outcome, recording),
     }
     let states: Vec<_> = tractive::operator::State::ALL.iter().map(|state| state.name()).collect();
-    let state = [("state", named(outcome, "state", &states))];
-    page.curves(&format!("State ({})", listed(&states)), TIME, "", &state);
+    page.states("State", &states, named(outcome, "state", &states));
     let listening: Vec<_> = tractive::protocol::Listening::ALL.iter().map(|(_, name)| *name).collect();
-    let commands = [("listening", named(outcome, "listening", &listening))];
-    page.curves(&format!("Commands ({})", listed(&listening)), TIME, "", &commands);
+    page.states("Commands", &listening, named(outcome, "listening", &listening));
     let causes = ["unknown", "truncated", "corrupted", "repeated", "disordered", "out_of_range"];
     let rejected: Vec<_> = causes.iter().map(|cause| (*cause, told(outcome, cause))).collect();
     page.curves("Frames rejected", TIME, "", &rejected);

@@ -5,9 +5,10 @@ use super::listener::Listener;
 use super::script::{Action, Expectation, Line};
 use super::sender::{COMMAND_SLOTS, Sender, Spoken};
 use super::system::System;
-use crate::run::{Supervisor, Turn};
+use crate::run::{Supervisor, Turn, bar};
 use crate::speed_loop::SpeedLoop;
 use anyhow::{Result, anyhow};
+use indicatif::ProgressBar;
 use std::fmt::Write as _;
 use tractive::protocol::{Frame, ParameterRequest, Zs9Link};
 
@@ -15,6 +16,8 @@ use tractive::protocol::{Frame, ParameterRequest, Zs9Link};
 const EDGE_SLOTS: u64 = 5 * COMMAND_SLOTS;
 /// The time that passes after a typed line, so that its effect shows, in s.
 const TYPED_S: f64 = 0.1;
+/// Slots between two tellings of the state.
+const SHOWN_SLOTS: u64 = 100;
 /// Length of a slot, in s.
 const SLOT_S: f64 = 1e-3;
 /// Half of it: what is due in a slot.
@@ -67,6 +70,8 @@ pub struct Talk {
     pub sent: u64,
     /// Frames received.
     pub received: u64,
+    /// The line that tells the drive's state while a script runs.
+    shown: ProgressBar,
     /// Expectations so far.
     pub expectations: u32,
     /// Those that were not met.
@@ -96,6 +101,7 @@ impl Talk {
             frames: String::new(),
             sent: 0,
             received: 0,
+            shown: bar(0, "{msg}"),
             expectations: 0,
             failures: Vec::new(),
         }
@@ -269,6 +275,9 @@ impl Supervisor for Talk {
 
     fn slot(&mut self, t_s: f64) -> Result<Turn> {
         let done = self.expectations;
+        if !self.lines.are_typed() && self.slot.is_multiple_of(SHOWN_SLOTS) {
+            self.shown.set_message(self.state(t_s));
+        }
         let waited = self.lines.are_typed() && t_s + DUE_S >= self.wait_until_s;
         if waited && self.slot > 0 {
             crate::say!("{}", self.state(t_s));
@@ -288,6 +297,9 @@ impl Supervisor for Talk {
             self.log(t_s, frame, 'T');
         }
         self.slot += 1;
+        if self.ended {
+            self.shown.finish_and_clear();
+        }
         Ok(Turn { frame, loads_nm: self.loads_nm, done: self.ended })
     }
 

@@ -102,11 +102,18 @@ fn phase_curves<const K: usize>() -> [Curve<'static>; 3] {
     ]
 }
 
-/// A curve of motor 1 over its speed.
-pub fn over_speed(page: &mut Page, (figure, title, unit): Heading, rows: &[Row], (name, value): &Curve) {
-    let every = rows.len().div_ceil(1500).max(1);
-    let points = rows.iter().step_by(every).map(|row| (row.motors[0].speed_rpm, value(row)));
-    page.draw_xy(figure, title, ("speed in r/min", unit), &[((*name).to_owned(), points.collect())]);
+/// A curve of motor 1 over its speed, up to the highest one and back.
+pub fn over_speed(page: &mut Page, (figure, title, unit): Heading, rows: &[Row], (_, value): &Curve) {
+    let speed = |row: &Row| row.motors[0].speed_rpm;
+    let brakes = rows.iter().position(|row| row.motors[0].torque_ref_nm < -1.0).unwrap_or(rows.len());
+    let (up, down) = rows.split_at(brakes);
+    let points = |rows: &[Row]| {
+        let mut points: Vec<_> = rows.iter().map(|row| (speed(row), value(row))).collect();
+        points.sort_by(|one, other| one.0.total_cmp(&other.0));
+        points
+    };
+    let series = [("up", up), ("down", down)].map(|(name, rows)| (name.to_owned(), points(rows)));
+    page.draw_xy(figure, title, ("speed in r/min", unit), &series);
 }
 
 /// The flight recorder's records of a fault; nothing if there was none.

@@ -78,7 +78,7 @@ impl Scenario<Traction> for Acknowledge {
     fn plots(&self, recording: &Recording, _: &Options, _: &Machine, page: &mut Page) {
         line::plots(page, recording);
         let fails = (FAILS_S.0 - 0.02, FAILS_S.0 + 0.05);
-        page.phase_current_in("the gate driver fails: phase current u", recording, fails);
-        page.phase_current_in("the machine is caught: phase current u", recording, (2.28, 2.6));
+        page.zoom("the gate driver fails", recording, fails);
+        page.zoom("the machine is caught", recording, (2.28, 2.6));
     }
 }

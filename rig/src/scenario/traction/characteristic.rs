@@ -95,12 +95,11 @@ impl Scenario<Traction> for Characteristic {
 
     fn plots(&self, recording: &Recording, options: &Options, machine: &Machine, page: &mut Page) {
         page.torque(recording);
-        page.plot("Speed", "r/min", recording, &[("speed", |row| row.speed_rpm)]);
+        page.plot("speed", "r/min", recording, &[("speed", |row| row.speed_rpm)]);
         page.phase_current(recording);
         for slot in slots(machine) {
             let window = (slot.ends_s - 0.04, slot.ends_s);
-            let title = format!("{} r/min, {} N·m: phase current u", slot.speed_rpm, slot.torque_nm);
-            page.phase_current_in(&title, recording, window);
+            page.zoom(&format!("{} r/min, {} N·m", slot.speed_rpm, slot.torque_nm), recording, window);
         }
         for slot in slots(machine) {
             let title = format!("{} r/min, {} N·m", slot.speed_rpm, slot.torque_nm);

@@ -146,8 +146,8 @@ impl Scenario<Traction> for Chopper {
         line::plots(page, recording);
         let window = (NONE_S - 0.02, NONE_S + 0.1);
         let link: [Curve; 1] = [("udc", |row| row.udc_v)];
-        page.plot_window("the braking resistor is lost: DC link", "V", recording, window, &link);
+        page.plot_window(("the braking resistor is lost", "DC link", "V"), recording, window, &link);
         let torque: [Curve; 2] = [("after limits", |row| row.te_ref_nm), ("torque", |row| row.te_nm)];
-        page.plot_window("the braking resistor is lost: torque", "N·m", recording, window, &torque);
+        page.plot_window(("the braking resistor is lost", "torque", "N·m"), recording, window, &torque);
     }
 }

@@ -46,8 +46,8 @@ impl Scenario<Traction> for FullStep {
     }
 
     fn plots(&self, recording: &Recording, _: &Options, _: &Machine, page: &mut Page) {
-        page.phase_current(recording);
-        page.torque(recording);
+        page.overview(recording);
+        page.zoom("the step", recording, (BEGIN_S - 0.005, BEGIN_S + 0.02));
     }
 }
 

@@ -202,9 +202,9 @@ impl Scenario<Traction> for Gaps {
                 1e3 * length_s
             );
             let link: [Curve; 1] = [("udc", |row| row.udc_v)];
-            page.plot_window(&format!("{of}: DC link"), "V", recording, window, &link);
+            page.plot_window((&of, "DC link", "V"), recording, window, &link);
             let torque: [Curve; 2] = [("after limits", |row| row.te_ref_nm), ("torque", |row| row.te_nm)];
-            page.plot_window(&format!("{of}: torque"), "N·m", recording, window, &torque);
+            page.plot_window((&of, "torque", "N·m"), recording, window, &torque);
         }
     }
 }

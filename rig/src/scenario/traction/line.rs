@@ -140,17 +140,17 @@ pub fn plots(page: &mut Page, recording: &Recording) {
         ("after limits", |row| row.te_ref_nm),
         ("torque", |row| row.te_nm),
     ];
-    page.plot("torque: demanded of the drive, after the link's limits, given", "N·m", recording, &torques);
+    page.plot("torque: demanded, after the link's limits, given", "N·m", recording, &torques);
     let switches: [Curve; 4] = [
         ("chopper", |row| row.status.map_or(0.0, |status| status.switches.chopper.into())),
         ("precharge", |row| switched(row.status.map(|status| status.switches.precharge))),
         ("main", |row| switched(row.status.map(|status| status.switches.main))),
         ("discharge", |row| switched(row.status.map(|status| status.switches.discharge))),
     ];
-    page.plot("contactors and resistors (1: on), chopper duty", "–", recording, &switches);
-    let title = "state: init 0, self-test 1, ready 2, precharge 3, charged 4, enabled 5, running 6, coasting 7, stopping 8, discharge 9, fault 10";
-    let state: [Curve; 1] = [("state", |row| row.status.map_or(0.0, |of| f64::from(of.state.code())))];
-    page.plot(title, "–", recording, &state);
+    page.plot("contactors (1: on), chopper duty", "–", recording, &switches);
+    let names: Vec<_> = State::ALL.iter().map(|state| state.name()).collect();
+    let state: Curve = ("state", |row| row.status.map_or(0.0, |of| f64::from(of.state.code())));
+    page.plot_states("state", &names, recording, state);
     page.plot("speed", "r/min", recording, &[("speed", |row| row.speed_rpm)]);
 }
 

@@ -61,6 +61,5 @@ impl Scenario<Traction> for LinkSteps {
 
     fn plots(&self, recording: &Recording, _: &Options, _: &Machine, page: &mut Page) {
         page.overview(recording);
-        page.plot("DC link", "V", recording, &[("udc", |row| row.udc_v)]);
     }
 }

@@ -50,11 +50,12 @@ impl Scenario<Traction> for LoadSteps {
     }
 
     fn plots(&self, recording: &Recording, _: &Options, _: &Machine, page: &mut Page) {
-        page.plot("DC-link voltage", "V", recording, &[("udc", |row| row.udc_v)]);
-        page.line_voltage("Line voltage u-v", recording, (0.0, 0.3));
-        page.phase_current(recording);
-        page.torque(recording);
+        page.overview(recording);
         page.rotor_currents(recording);
+        for step in [1.0, 6.0] {
+            let at_s = step * STEP_S;
+            page.zoom(&format!("the step at {at_s:.1} s"), recording, (at_s - 0.01, at_s + 0.03));
+        }
     }
 }
 

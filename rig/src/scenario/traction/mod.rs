@@ -264,6 +264,7 @@ impl System for Traction {
     fn draw_common(recording: &Recording, page: &mut Page) {
         page.line(recording);
         page.recorder(recording);
+        page.events(recording);
     }
 
     fn overview(recording: &Recording) -> Result<Option<String>> {

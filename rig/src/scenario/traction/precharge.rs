@@ -106,6 +106,6 @@ impl Scenario<Traction> for Precharge {
 
     fn plots(&self, recording: &Recording, _: &Options, _: &Machine, page: &mut Page) {
         line::plots(page, recording);
-        page.phase_current_in("coasting and catching: phase current u", recording, (COAST.0, COAST.1 + 0.3));
+        page.zoom("coasting and catching", recording, (COAST.0, COAST.1 + 0.3));
     }
 }

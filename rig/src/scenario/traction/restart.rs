@@ -79,8 +79,8 @@ impl Scenario<Traction> for Restart {
             let at_s = slots.begins_s(slot) + slots.coast_s;
             let speed_rpm =
                 analysis::window(recording, at_s, at_s + 1.0).first().map_or(0.0, |row| row.speed_rpm);
-            let title = format!("{speed_rpm:.0} r/min caught: phase current u");
-            page.phase_current_in(&title, recording, (at_s - 0.01, at_s + 0.06));
+            let title = format!("{speed_rpm:.0} r/min caught");
+            page.zoom(&title, recording, (at_s - 0.01, at_s + 0.06));
         }
     }
 }

@@ -60,8 +60,8 @@ impl Scenario<Traction> for Reversal {
         page.rotor_currents(recording);
         for k in 0..SHARES.len() {
             let at_s = BEGIN_S + k as f64 * HOLD_S;
-            let title = format!("phase current u at {at_s:.1} s");
-            page.phase_current_in(&title, recording, (at_s - 0.01, at_s + 0.05));
+            let title = format!("at {at_s:.1} s");
+            page.zoom(&title, recording, (at_s - 0.01, at_s + 0.05));
         }
         let end_s = BEGIN_S + HOLD_S;
         let window = (end_s - 0.5 * HOLD_S, end_s);

@@ -80,10 +80,7 @@ impl Scenario<Traction> for Steady {
 
     fn plots(&self, recording: &Recording, options: &Options, machine: &Machine, page: &mut Page) {
         let window = (SETTLE_S, SETTLE_S + 0.04);
-        page.line_voltage("line voltage u-v", recording, window);
-        page.phase_current_in("phase current u", recording, window);
-        let torque: [Curve; 2] = [("torque", |row| row.te_nm), ("demand", |row| row.te_ref_nm)];
-        page.plot_window("torque", "N·m", recording, window, &torque);
+        page.zoom("steady state", recording, window);
         let window = (SETTLE_S, SETTLE_S + MEASURE_S);
         spectrum::draw(page, recording, ("steady state", window), options, machine);
     }

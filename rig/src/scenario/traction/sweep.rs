@@ -71,11 +71,6 @@ impl Scenario<Traction> for Sweep {
 
     fn plots(&self, recording: &Recording, options: &Options, machine: &Machine, page: &mut Page) {
         page.overview(recording);
-        page.torque(recording);
-        page.phase_current(recording);
-        page.plot("Commanded fundamental", "V", recording, &[("u", |row| row.u_v)]);
-        let title = "Mode (0 off, 1 async, 2 sync 15, 3 sync 12, 4 mid 7, 5 mid 3, 6 square)";
-        page.plot(title, "", recording, &[("mode", |row| f64::from(row.mode as u8))]);
         page.rotor_currents(recording);
         switches::plots(recording, page);
         // The hold at the last speed, wherever it is.

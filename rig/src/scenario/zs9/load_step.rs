@@ -57,8 +57,10 @@ impl Scenario<Zs9> for LoadStep {
     }
 
     fn plots(&self, recording: &Recording, _: &Options, _: &Machine, page: &mut Page) {
+        page.mark(STEP_S, "motor 2's load steps", false);
         let rows = figures::window(recording, STEP_S - 0.1, STEP_S + 0.2);
-        plot(page, ("figures 14 to 19", "link voltage", "V"), rows, &VOLTAGES);
+        plot(page, ("figures 14 to 19", "link voltage", "V"), rows, &VOLTAGES[..1]);
+        plot(page, ("figures 14 to 19", "capacitor voltage", "V"), rows, &VOLTAGES[1..]);
         plot(page, ("figures 14 to 19", "inductor current", "A"), rows, &INDUCTOR);
         let [one, two] = TORQUES;
         let torques = [one, two, ("load 2", |row| row.motors[1].load_nm)];

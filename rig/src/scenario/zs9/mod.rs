@@ -159,6 +159,10 @@ impl System for Zs9 {
 
     fn draw_common(recording: &Recording, page: &mut Page) {
         figures::recorder(page, recording);
+        let tripped = recording.rows.iter().find_map(|row| Some((row.t_s, row.trip?)));
+        if let Some((t_s, trip)) = tripped {
+            page.mark(t_s, trip.fault.name(), true);
+        }
     }
 }
 

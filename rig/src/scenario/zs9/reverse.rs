@@ -64,12 +64,15 @@ impl Scenario<Zs9> for Reverse {
     }
 
     fn plots(&self, recording: &Recording, _: &Options, _: &Machine, page: &mut Page) {
+        page.mark(BEGINS_S, "motor 2 reverses", false);
+        page.mark(ENDS_S, "it is there", false);
         let rows = figures::window(recording, 0.0, DURATION_S);
         plot(page, ("figures 20 to 23", "torque of motor 1", "N·m"), rows, &TORQUES[..1]);
         plot(page, ("figures 20 to 23", "speed of motor 1", "r/min"), rows, &SPEEDS[..1]);
         plot(page, ("figures 20 to 23", "torque of motor 2", "N·m"), rows, &TORQUES[1..]);
         plot(page, ("figure 23", "speed of motor 2", "r/min"), rows, &SPEEDS[1..]);
-        plot(page, ("figures 20 to 23", "link", "V"), rows, &VOLTAGES);
+        plot(page, ("figures 20 to 23", "link voltage", "V"), rows, &VOLTAGES[..1]);
+        plot(page, ("figures 20 to 23", "capacitor voltage", "V"), rows, &VOLTAGES[1..]);
         figures::phases(page, figures::window(recording, 0.95, 1.05));
     }
 }
