@@ -1,4 +1,4 @@
-//! What the image did that the chip, or the board, does not allow.
+//! The findings: what the image did that the chip, or the board, does not allow.
 
 use crate::time::{Time, seconds};
 use std::fmt;

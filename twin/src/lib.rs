@@ -9,6 +9,7 @@ pub mod finding;
 pub mod image;
 pub mod machine;
 pub mod map;
+pub mod mistakes;
 pub mod output;
 pub mod run;
 pub mod stage;

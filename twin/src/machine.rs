@@ -19,10 +19,12 @@ pub struct Machine {
     pub nvic: Nvic,
     /// The chip's peripherals.
     pub chip: Chip,
-    /// What is wired to its pins.
+    /// The world at its pins.
     pub world: World,
-    /// What was found.
+    /// The findings.
     pub findings: Findings,
+    /// The mistake that a run is made with: what becomes of a write on its way.
+    pub mistake: Option<fn(u32, u32) -> u32>,
     /// The reason why the emulator was stopped.
     pub stop: Option<Stop>,
     /// The instant at which the run ends.
@@ -43,6 +45,7 @@ impl Machine {
             chip,
             world,
             findings: Findings::default(),
+            mistake: None,
             stop: None,
             until: 0,
             masked: false,
@@ -129,6 +132,7 @@ impl Machine {
 
     /// The program writes.
     pub fn write(&mut self, address: u32, size: usize, value: u32) {
+        let value = self.mistake.map_or(value, |mistake| mistake(address, value));
         if (PRIVATE..PRIVATE_END).contains(&address) {
             self.nvic.write(address, size, value, &mut self.findings);
             return;

@@ -1,4 +1,4 @@
-//! What is wired to the board: power stage, motor, encoder, contactors, bus. By the guide's wiring and the power stage's file, not by the
+//! The wires at the board: power stage, motor, encoder, contactors, bus. By the guide's wiring and the power stage's file, not by the
 //! board's code.
 
 use crate::chip::Chip;
@@ -6,7 +6,7 @@ use crate::chip::gpio::{Driver, Gpio, place};
 use crate::chip::timer::Tracks;
 use crate::finding::Findings;
 use crate::stage::PowerStage;
-use crate::time::{MILLISECOND, Time, seconds};
+use crate::time::{MICROSECOND, MILLISECOND, Time, seconds};
 use tractive::protocol::Frame;
 use tractive_rig::plant::{DcLink, Leg, Plant};
 use tractive_rig::run::Supervisor;
@@ -50,7 +50,7 @@ pub struct Edge {
     pub at: Time,
     /// The device.
     pub gate: usize,
-    /// Whether it goes on.
+    /// `true` if it goes on.
     pub on: bool,
 }
 
@@ -125,6 +125,8 @@ pub struct World {
     pub rows: Vec<Row>,
     /// The drivers are ready.
     pub ready: bool,
+    /// Current that flows in phase U besides, in A: past the motor, as to earth.
+    pub excess_a: f64,
     /// The talk is over.
     pub done: bool,
     stage: PowerStage,
@@ -133,6 +135,8 @@ pub struct World {
     pushes: usize,
     contactors: [Contactor; 2],
     gates: [bool; 6],
+    /// The instants at which they last went off.
+    off: [Option<Time>; 6],
     turns: f64,
     last_turns: f64,
     next_slot: Time,
@@ -159,6 +163,8 @@ impl World {
             pushes: 0,
             contactors: [Contactor::default(); 2],
             gates: [false; 6],
+            off: [None; 6],
+            excess_a: 0.0,
             turns: 0.0,
             last_turns: 0.0,
             next_slot: 0,
@@ -268,18 +274,25 @@ impl World {
         }
     }
 
-    /// Looks at the gates' pins.
+    /// Looks at the gates' pins: no leg has both devices on, nor one on before the other has been off for the dead time.
     pub fn see_gates(&mut self, now: Time, chip: &Chip, findings: &mut Findings) {
+        let dead = Time::from(self.stage.dead_time_ns) * MICROSECOND / 1_000;
         for gate in 0..GATES.len() {
             let on = Self::is_high(self.pins[gate], chip, now);
-            if on != self.gates[gate] {
-                self.gates[gate] = on;
-                self.edges.push(Edge { at: now, gate, on });
+            if on == self.gates[gate] {
+                continue;
             }
-        }
-        for leg in 0..3 {
-            let both = self.gates[2 * leg] && self.gates[2 * leg + 1];
-            findings.expect(!both, || format!("both devices of leg {} are on", ["U", "V", "W"][leg]));
+            self.gates[gate] = on;
+            self.edges.push(Edge { at: now, gate, on });
+            if on {
+                let other = gate ^ 1;
+                let rested = !self.gates[other] && self.off[other].is_none_or(|off| now >= off + dead);
+                findings.expect(rested, || {
+                    format!("gate {} goes on within the dead time of its leg's other device", GATES[gate])
+                });
+            } else {
+                self.off[gate] = Some(now);
+            }
         }
     }
 
@@ -306,7 +319,8 @@ impl World {
             return Some(self.stage.link_volts(self.link.udc_v));
         }
         let (_, phase) = CURRENTS.iter().find(|(name, _)| place(name) == pin)?;
-        Some(self.stage.current_volts(self.plant.motor.currents_abc()[*phase]))
+        let excess_a = if *phase == 0 { self.excess_a } else { 0.0 };
+        Some(self.stage.current_volts(self.plant.motor.currents_abc()[*phase] + excess_a))
     }
 
     /// The encoder's tracks as they arrive at its timer.

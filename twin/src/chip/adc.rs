@@ -30,6 +30,8 @@ const CONVERTING: Time = 25;
 /// Half cycles of a calibration, and those after it until the converter may be enabled.
 const CALIBRATION: Time = 2 * 116;
 const AFTER_CALIBRATION: Time = 2 * 4;
+/// The shortest cycle of its clock, at 60 MHz (data sheet, ADC characteristics).
+const FASTEST: Time = crate::time::SECOND / 60_000_000;
 /// The time that the regulator takes to start.
 const REGULATOR: Time = 20 * MICROSECOND;
 /// The events of JEXTSEL for ADC1 and ADC2, from 0 (RM0440, table "ADC1/2 - external triggers for injected channels").
@@ -281,6 +283,7 @@ impl Adc {
             self.calibrated = Some(now + CALIBRATION * half);
         }
         if sets(ADEN) {
+            findings.expect(2 * half >= FASTEST, || format!("{name}: a clock of more than 60 MHz"));
             let ready =
                 before & ADCAL == 0 && self.calibrated.is_some_and(|at| now >= at + AFTER_CALIBRATION * half);
             findings.expect(ready, || format!("{name}: enabled before its calibration has ended"));

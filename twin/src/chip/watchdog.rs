@@ -32,6 +32,11 @@ impl Watchdog {
         self.fed.map_or(Time::MAX, |fed| fed + count * SECOND / LSI_HZ)
     }
 
+    /// `true` once it is started.
+    pub fn is_running(&self) -> bool {
+        self.fed.is_some()
+    }
+
     /// The instant at which it resets the chip.
     pub fn next_event(&self) -> Time {
         if self.has_bitten { Time::MAX } else { self.bites() }
