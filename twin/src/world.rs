@@ -277,7 +277,7 @@ impl World {
     /// Looks at the gates' pins: no leg has both devices on, nor one on before the other has been off for the dead time.
     pub fn see_gates(&mut self, now: Time, chip: &Chip, findings: &mut Findings) {
         let dead = Time::from(self.stage.dead_time_ns) * MICROSECOND / 1_000;
-        for gate in 0..GATES.len() {
+        for (gate, name) in GATES.iter().enumerate() {
             let on = Self::is_high(self.pins[gate], chip, now);
             if on == self.gates[gate] {
                 continue;
@@ -288,7 +288,7 @@ impl World {
                 let other = gate ^ 1;
                 let rested = !self.gates[other] && self.off[other].is_none_or(|off| now >= off + dead);
                 findings.expect(rested, || {
-                    format!("gate {} goes on within the dead time of its leg's other device", GATES[gate])
+                    format!("gate {name} goes on within the dead time of its leg's other device")
                 });
             } else {
                 self.off[gate] = Some(now);

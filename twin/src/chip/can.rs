@@ -146,7 +146,7 @@ impl Can {
     pub fn read(&self, offset: u32) -> Option<u32> {
         let (first, count) = (self.receiving.0 as u32, self.receiving.1 as u32);
         match offset {
-            RXF0S => Some(count | first << 8 | (first + count) % 3 << 16 | u32::from(count == 3) << 24),
+            RXF0S => Some(count | first << 8 | ((first + count) % 3) << 16 | u32::from(count == 3) << 24),
             TXFQS => {
                 let (free, get) =
                     (ELEMENTS - self.sending.len(), self.sending.front().copied().unwrap_or(self.put));
