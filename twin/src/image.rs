@@ -57,9 +57,4 @@ impl Image {
         let after = self.functions.partition_point(|(from, _)| *from <= address);
         after.checked_sub(1).map_or("?", |index| &self.functions[index].1)
     }
-
-    /// The address of a symbol.
-    pub fn address(&self, name: &str) -> Option<u32> {
-        self.functions.iter().find(|(_, known)| known == name).map(|(address, _)| *address)
-    }
 }

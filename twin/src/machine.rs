@@ -110,7 +110,7 @@ impl Machine {
             if !nvic.has_fpu() && chip.is_pulsing() {
                 findings.add("the gates pulse before CPACR has switched the floating-point unit on");
             }
-            world.advance(due, chip, findings);
+            world.advance(due);
             world.act(due, chip);
             chip.act(due, world, findings);
             world.see_gates(due, chip, findings);

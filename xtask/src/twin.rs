@@ -34,7 +34,13 @@ pub fn check(setup: &mut Setup) -> Result<Result<bool, String>> {
     }
     let tidy = !setup.component("fmt", "rustfmt") || succeeds(twin().args(["fmt", "--check"]))?;
     let image = image(setup)?;
-    let tests = || succeeds(twin().args(["test", "--release", "--", "--include-ignored"]).env("TRACTIVE_NUCLEO_IMAGE", &image));
+    let tests = || {
+        succeeds(
+            twin()
+                .args(["test", "--release", "--", "--include-ignored"])
+                .env("TRACTIVE_NUCLEO_IMAGE", &image),
+        )
+    };
     let out = root().join("target/tractive/twin");
     let script = root().join(SCRIPT);
     Ok(Ok(tidy && succeeds(&mut drive(&image, &script, &out))? && tests()?))

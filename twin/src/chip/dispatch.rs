@@ -1,6 +1,7 @@
 //! Accesses: which register it is, whether it is there, clocked, writable, and of whom.
 
 use super::Chip;
+use super::adc::Adc;
 use crate::finding::Findings;
 use crate::map::{Register, peripherals};
 use crate::time::Time;
@@ -136,5 +137,3 @@ impl Chip {
         ["ADC1", "ADC2"].iter().position(|name| *name == peripheral)
     }
 }
-
-use super::adc::Adc;

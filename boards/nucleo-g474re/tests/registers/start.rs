@@ -236,7 +236,8 @@ fn a_peripheral_is_written_to_only_after_its_clock_has_come() {
     let registers = bench.registers;
     bench.watch = |registers| {
         let [power, system] = SEEN.get();
-        let untouched = !registers.pwr.cr3().read().ucpd1_dbdis() && registers.pwr.cr5().read().0 == NORMAL_MODE;
+        let untouched =
+            !registers.pwr.cr3().read().ucpd1_dbdis() && registers.pwr.cr5().read().0 == NORMAL_MODE;
         SEEN.set([
             power || (registers.rcc.apb1enr1().read().pwren() && untouched),
             system || (registers.rcc.apb2enr().read().syscfgen() && registers.syscfg.cfgr2().read().0 == 0),
