@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 /// Folders of the sources.
-const FOLDERS: [&str; 11] = [
+const FOLDERS: [&str; 12] = [
     "bench",
     "boards",
     "cells",
@@ -14,6 +14,7 @@ const FOLDERS: [&str; 11] = [
     "src",
     "tablegen",
     "tests",
+    "twin",
     "xtask",
 ];
 

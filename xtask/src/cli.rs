@@ -33,6 +33,8 @@ pub enum Command {
     Flash(FlashArgs),
     /// Build the live bench, the drive and its plant in a browser, and serve it
     Live(LiveArgs),
+    /// Execute the image that is flashed against a model of its chip, with the simulated motor at the pins
+    Twin(TwinArgs),
 }
 
 #[derive(Args, Debug)]
@@ -89,6 +91,15 @@ pub struct FlashArgs {
     /// Build the image, and only say what probe-rs would be called with
     #[arg(long)]
     pub dry_run: bool,
+}
+
+#[derive(Args, Debug)]
+pub struct TwinArgs {
+    /// The script of commands over CAN, as `talk` takes them [default: twin/scripts/drive.talk]
+    pub script: Option<PathBuf>,
+    /// Folder for trace, edges, telemetry and frames [default: target/tractive/twin]
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
 }
 
 #[derive(Args, Debug)]

@@ -9,12 +9,13 @@
 //! | `timing [--json] [--profile [N]]` | instructions per interrupt against `budgets.toml` |
 //! | `live [--out DIR] [--port N] [--no-open]` | builds the live bench and serves it |
 //! | `flash [--board NAME] [--log]` | builds a board's image and flashes it with probe-rs |
+//! | `twin [SCRIPT] [--out DIR]` | builds that image and executes it against a model of its chip |
 //!
 //! Results go to standard output, what the command does on the way to standard error. Exit codes: 0 done; 1 it ran
 //! and something failed; 2 it could not run (bad usage, bad input, something missing), with the reason on a line.
 //!
 //! The modules: [`cli`] is what may be typed, [`setup`] what has to be installed, [`build`] how cargo is called, [`board`] which boards there are,
-//! [`run`], [`mod@test`], [`image`], [`timing`], [`live`] and [`flash`] the commands; [`guide`] runs those of the documentation. An image is read by [`elf`],
+//! [`run`], [`mod@test`], [`image`], [`timing`], [`live`], [`flash`] and [`twin`] the commands; [`guide`] runs those of the documentation. An image is read by [`elf`],
 //! its instructions by [`thumb`]; [`graph`] says which function calls which, [`check`] refuses what an image must not hold, and [`cells`]
 //! looks at what the cells did under the interrupts, in the [`emulator`].
 
@@ -45,6 +46,7 @@ mod step;
 mod test;
 mod thumb;
 mod timing;
+mod twin;
 mod workspace;
 
 use clap::Parser;
@@ -59,6 +61,7 @@ fn main() -> ExitCode {
         cli::Command::Timing(args) => timing::run(&args),
         cli::Command::Flash(args) => flash::run(&args),
         cli::Command::Live(args) => live::run(&args),
+        cli::Command::Twin(args) => twin::run(&args),
     };
     match result {
         Ok(code) => ExitCode::from(code),

@@ -109,6 +109,15 @@ impl Setup {
         found()
     }
 
+    /// CMake, with which the twin's emulator is built.
+    pub fn cmake(&mut self) -> bool {
+        const PROGRAM: &str = "cmake";
+        if find(PROGRAM).is_none() {
+            self.apt_install(&[PROGRAM]);
+        }
+        find(PROGRAM).is_some()
+    }
+
     /// QEMU with the emulated board.
     pub fn qemu(&mut self) -> Result<PathBuf> {
         const PROGRAM: &str = "qemu-system-arm";

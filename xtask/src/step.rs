@@ -31,6 +31,8 @@ pub enum Step {
     ImageCheck,
     /// The images of the boards in `boards/` build, with no panic within an interrupt's reach and no double precision
     NucleoImage,
+    /// The image that is flashed, executed against a model of its chip, with the simulated motor at the pins
+    Twin,
     /// The example's firmware, outside the workspace, holds what is its own and nothing else
     OwnBoard,
     /// The crates that a user takes, packed and checked from their packages alone

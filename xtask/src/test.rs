@@ -131,6 +131,10 @@ fn perform(step: Step, setup: &mut Setup) -> Result<Outcome> {
                 image::check_board(&path, board)
             })?
         }
+        Step::Twin => match crate::twin::check(setup)? {
+            Ok(good) => good,
+            Err(missing) => return Ok(Outcome::Skipped(missing)),
+        },
         Step::OwnBoard => crate::own_board::check(setup)?,
         Step::Publish => crate::publish::check()?,
         Step::Guide => crate::guide::run(build::root())?,

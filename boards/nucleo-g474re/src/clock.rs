@@ -8,6 +8,9 @@ use stm32_metapac::{flash, rcc};
 /// their reference.
 const SUPPLY_THRESHOLD: u8 = 6;
 
+/// PWR_CR5.R1MODE (RM0440): bit 8, set after a reset. The register crate has it in bit 0, where nothing is.
+pub const NORMAL_MODE: u32 = 1 << 8;
+
 /// Takes USB's dead-battery pull-downs of 5.1 kΩ off PB4 and PB6. They are there from reset on, switched by PA9 and PA10, all of
 /// which have other uses here (RM0440, PWR_CR3.UCPD1_DBDIS). The power controller is clocked from here on.
 pub fn release_dead_battery(registers: &Registers, wait: &mut dyn Wait) {
@@ -26,7 +29,7 @@ pub fn configure(registers: &Registers, wait: &mut dyn Wait) -> Result<(), Start
         w.set_pvde(true);
     });
     // Boost: range 1 without it ends at 150 MHz. The bit's name says normal mode.
-    pwr.cr5().modify(|w| w.set_r1mode(false));
+    pwr.cr5().modify(|w| w.0 &= !NORMAL_MODE);
     flash.acr().modify(|w| {
         w.set_latency(flash::vals::Latency::WS4);
         w.set_prften(true);

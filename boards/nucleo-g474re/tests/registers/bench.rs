@@ -1,6 +1,7 @@
 //! Register blocks in ordinary memory, and as much of the hardware behind them as the board relies on: preload, update events,
 //! the combined PWM modes, the dead-time generator, the main output, breaks. After the reference manual, not the board.
 
+use nucleo_g474re::clock::NORMAL_MODE;
 use nucleo_g474re::legs::Legs;
 use nucleo_g474re::registers::Registers;
 use nucleo_g474re::start::{Timeout, Wait};
@@ -144,6 +145,8 @@ impl Bench {
             port.moder().write_value(pac::gpio::regs::Moder(mode));
             port.pupdr().write_value(pac::gpio::regs::Pupdr(pulls));
         }
+        // Range 1 is without boost after a reset (RM0440, PWR_CR5).
+        registers.pwr.cr5().write(|w| w.0 = NORMAL_MODE);
         Self {
             registers,
             legs: [Leg::default(); 3],

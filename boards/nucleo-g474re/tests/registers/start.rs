@@ -2,6 +2,7 @@
 
 use crate::bench::Bench;
 use crate::plan;
+use nucleo_g474re::clock::NORMAL_MODE;
 use nucleo_g474re::pins::PINS;
 use nucleo_g474re::registers::Registers;
 use nucleo_g474re::start::{Found, Plan, STEPS, Start, StartError, prepare, run};
@@ -139,7 +140,7 @@ fn the_clock_tree_is_170_mhz() {
     assert_eq!((tree.ppre1().to_bits(), tree.ppre2().to_bits()), (0, 0));
     assert!(registers.rcc.cr().read().csson());
     assert_eq!(registers.flash.acr().read().latency(), stm32_metapac::flash::vals::Latency::WS4);
-    assert!(!registers.pwr.cr5().read().r1mode(), "boost");
+    assert_eq!(registers.pwr.cr5().read().0, 0, "boost");
     let supply = registers.pwr.cr2().read();
     assert!(supply.pvde() && supply.pls() == 6, "2.9 V");
     let breaking = registers.syscfg.cfgr2().read();
@@ -233,10 +234,10 @@ fn a_peripheral_is_written_to_only_after_its_clock_has_come() {
     }
     let mut bench = Bench::new();
     let registers = bench.registers;
-    registers.pwr.cr5().modify(|w| w.set_r1mode(true));
     bench.watch = |registers| {
         let [power, system] = SEEN.get();
-        let untouched = !registers.pwr.cr3().read().ucpd1_dbdis() && registers.pwr.cr5().read().r1mode();
+        let untouched =
+            !registers.pwr.cr3().read().ucpd1_dbdis() && registers.pwr.cr5().read().0 == NORMAL_MODE;
         SEEN.set([
             power || (registers.rcc.apb1enr1().read().pwren() && untouched),
             system || (registers.rcc.apb2enr().read().syscfgen() && registers.syscfg.cfgr2().read().0 == 0),

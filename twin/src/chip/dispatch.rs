@@ -1,0 +1,139 @@
+//! Accesses: which register it is, whether it is there, clocked, writable, and of whom.
+
+use super::Chip;
+use super::adc::Adc;
+use crate::finding::Findings;
+use crate::map::{Register, peripherals};
+use crate::time::Time;
+use crate::world::World;
+
+impl Chip {
+    /// The register of an access, if it may be accessed at all.
+    fn found(&self, address: u32, what: &str, findings: &mut Findings) -> Option<(&'static str, Register)> {
+        let Some(register) = self.map.at(address & !3).or_else(|| self.map.at(address)) else {
+            findings.add(format!("{address:#010x} is {what}, where the chip has no register"));
+            return None;
+        };
+        let peripheral = peripherals()[register.peripheral].name;
+        if let Some((offset, bit)) = self.map.enable(register.peripheral)
+            && self.rcc.word(offset) & bit == 0
+        {
+            findings.add(format!("{peripheral}.{} is {what} while its clock is off", register.name));
+        }
+        Some((peripheral, register.clone()))
+    }
+
+    /// The program reads a register.
+    pub fn read(
+        &mut self,
+        address: u32,
+        size: usize,
+        now: Time,
+        world: &mut World,
+        findings: &mut Findings,
+    ) -> u32 {
+        let Some((peripheral, register)) = self.found(address, "read", findings) else { return 0 };
+        self.accesses.entry(address).or_default().0 += 1;
+        findings.expect(register.readable, || {
+            format!("{peripheral}.{} is read, and can only be written", register.name)
+        });
+        let value = self.value(peripheral, register.offset, now, world);
+        let Some(value) = value else {
+            findings.add(format!("{peripheral}.{} is read, which the twin does not model", register.name));
+            return 0;
+        };
+        value >> (8 * (address - (address & !3))) & (u64::MAX >> (64 - 8 * size)) as u32
+    }
+
+    fn value(&mut self, peripheral: &'static str, offset: u32, now: Time, world: &mut World) -> Option<u32> {
+        let cycle = self.rcc.cycle();
+        if let Some(timer) = self.timers.iter_mut().find(|timer| timer.name == peripheral) {
+            if peripheral == "TIM4" {
+                timer.follow(world.encoder(&self.gpio));
+            }
+            return timer.read(offset, now, cycle);
+        }
+        if let Some(number) = Self::adc(peripheral) {
+            return self.adcs[number].read(offset);
+        }
+        match peripheral {
+            "RCC" => self.rcc.read(offset),
+            "IWDG" => self.watchdog.read(offset, now),
+            "FDCAN1" => self.can.read(offset),
+            "FDCANRAM1" => self.can.read_ram(offset),
+            "ADC12_COMMON" => Some(self.adcs[0].common),
+            name if name.starts_with("GPIO") => self.gpio.read(name, offset, world),
+            name if name.starts_with("COMP") || name.starts_with("DAC") => {
+                self.comparators.read(name, offset)
+            }
+            name => self.system.read(name, offset),
+        }
+    }
+
+    /// The program writes a register.
+    pub fn write(&mut self, address: u32, size: usize, value: u32, now: Time, findings: &mut Findings) {
+        let Some((peripheral, register)) = self.found(address, "written", findings) else { return };
+        self.accesses.entry(address).or_default().1 += 1;
+        let name = format!("{peripheral}.{}", register.name);
+        findings.expect(register.writable, || format!("{name} is written, and can only be read"));
+        findings.expect(address & 3 == 0, || format!("{name} is written by {size} bytes at {address:#010x}"));
+        let reserved = value & !register.mask;
+        // Status flags are left alone by ones, also where a bit has no name.
+        let flags = peripheral.starts_with("TIM") && register.offset == 0x10;
+        findings.expect(reserved == 0 || flags, || {
+            format!("reserved bits {reserved:#010x} of {name} are written")
+        });
+        let cycle = self.rcc.cycle();
+        let offset = register.offset;
+        let done = if let Some(timer) = self.timers.iter_mut().find(|timer| timer.name == peripheral) {
+            timer.write(offset, value, now, cycle, findings)
+        } else if let Some(number) = Self::adc(peripheral) {
+            self.adcs[number].write(offset, value, now, cycle, findings)
+        } else {
+            self.write_other(peripheral, offset, value, now, findings)
+        };
+        findings
+            .expect(done, || format!("{name} is written with {value:#010x}, which the twin does not model"));
+        for index in 0..self.timers.len() {
+            self.pass_triggers(index, now);
+        }
+    }
+
+    fn write_other(
+        &mut self,
+        peripheral: &str,
+        offset: u32,
+        value: u32,
+        now: Time,
+        findings: &mut Findings,
+    ) -> bool {
+        match peripheral {
+            "RCC" => self.rcc.write(
+                offset,
+                value,
+                now,
+                self.system.flash_latency(),
+                self.system.is_boosted(),
+                findings,
+            ),
+            "IWDG" => self.watchdog.write(offset, value, now, findings),
+            "FDCAN1" => self.can.write(offset, value, now, self.rcc.can_clock(), findings),
+            "FDCANRAM1" => self.can.write_ram(offset, value),
+            "ADC12_COMMON" => {
+                let busy = self.adcs.iter().any(Adc::is_enabled);
+                findings.expect(!busy, || "ADC12_COMMON.CCR is written while a converter is enabled".into());
+                self.adcs.iter_mut().for_each(|adc| adc.common = value);
+                true
+            }
+            name if name.starts_with("GPIO") => self.gpio.write(name, offset, value),
+            name if name.starts_with("COMP") || name.starts_with("DAC") => {
+                self.comparators.write(name, offset, value, findings)
+            }
+            name => self.system.write(name, offset, value, findings),
+        }
+    }
+
+    fn adc(peripheral: &str) -> Option<usize> {
+        ["ADC1", "ADC2"].iter().position(|name| *name == peripheral)
+    }
+}

@@ -1,0 +1,76 @@
+//! Supply, flash interface, system configuration and debug (RM0440, chapters 6, 3, 10 and 47): words that are kept, with their reset values
+//! and what they bring about.
+
+use super::rcc::Rcc;
+use crate::finding::Findings;
+use std::collections::HashMap;
+
+/// The registers that are modelled, with their reset values.
+const RESET: [(&str, u32, u32); 9] = [
+    ("PWR", 0x04, 0),
+    ("PWR", 0x08, 0x8000),
+    ("PWR", 0x80, 0x0100),
+    ("FLASH", 0x00, 0x0004_0600),
+    ("SYSCFG", 0x1C, 0),
+    ("DBGMCU", 0x04, 0),
+    ("DBGMCU", 0x08, 0),
+    ("DBGMCU", 0x0C, 0),
+    ("DBGMCU", 0x10, 0),
+];
+
+/// The words, and the supply's state.
+#[derive(Debug)]
+pub struct System {
+    words: HashMap<(&'static str, u32), u32>,
+    /// The supply is below the voltage detector's threshold.
+    pub low_supply: bool,
+}
+
+impl Default for System {
+    fn default() -> Self {
+        let words = RESET.iter().map(|(name, offset, value)| ((*name, *offset), *value)).collect();
+        Self { words, low_supply: false }
+    }
+}
+
+impl System {
+    fn key(name: &str, offset: u32) -> Option<(&'static str, u32)> {
+        RESET.iter().find(|known| known.0 == name && known.1 == offset).map(|known| (known.0, known.1))
+    }
+
+    fn word(&self, name: &'static str, offset: u32) -> u32 {
+        self.words.get(&(name, offset)).copied().unwrap_or(0)
+    }
+
+    /// A register is read.
+    pub fn read(&self, name: &str, offset: u32) -> Option<u32> {
+        Self::key(name, offset).and_then(|key| self.words.get(&key).copied())
+    }
+
+    /// A register is written; `false` if the twin has none such.
+    pub fn write(&mut self, name: &str, offset: u32, value: u32, findings: &mut Findings) -> bool {
+        let Some(key) = Self::key(name, offset) else { return false };
+        if name == "SYSCFG" {
+            let before = self.word("SYSCFG", 0x1C) & 0b1111;
+            findings.expect(value & before == before, || "SYSCFG.CFGR2: a lock cannot be taken back".into());
+        }
+        self.words.insert(key, value);
+        true
+    }
+
+    /// Wait states of the flash memory.
+    pub fn flash_latency(&self) -> u32 {
+        self.word("FLASH", 0) & 0xF
+    }
+
+    /// `true` if the core voltage is boosted.
+    pub fn is_boosted(&self) -> bool {
+        self.word("PWR", 0x80) & 1 << 8 == 0
+    }
+
+    /// `true` while the chip itself breaks its timers: the crystal has stopped, or the supply is low where that is connected.
+    pub fn breaks(&self, rcc: &Rcc) -> bool {
+        let watched = self.word("PWR", 0x04) & 1 != 0 && self.word("SYSCFG", 0x1C) & 1 << 2 != 0;
+        rcc.has_failed() || (watched && self.low_supply)
+    }
+}

@@ -1,0 +1,284 @@
+//! The processor: instructions by the emulator, exceptions as ARMv7-M has them (DDI 0403E, B1.5).
+
+use super::cost;
+use crate::image::{FLASH, Image};
+use crate::machine::Machine;
+use crate::time::Time;
+use anyhow::{Result, anyhow, bail};
+use std::collections::HashMap;
+use unicorn_engine::{Arch, ArmCpuModel, HookType, Mode, Permission, RegisterARM as R, Unicorn, uc_error};
+
+/// RAM: its address, and the length of SRAM1, SRAM2 and the CCM SRAM's alias (RM0440, memory map).
+pub const RAM: (u32, u32) = (0x2000_0000, 128 * 1024);
+/// The regions of the peripherals.
+const PERIPHERALS: [(u32, u32); 5] = [
+    (0x4000_0000, 0x3_0000),
+    (0x4800_0000, 0x2000),
+    (0x5000_0000, 0x7_0000),
+    (0xE000_0000, 0x1_0000),
+    (0xE004_2000, 0x1000),
+];
+/// The emulator's word for a return from an exception.
+const EXCEPTION_RETURN: u32 = 8;
+/// EXC_RETURN: to a handler or a thread on the main stack, without a floating-point frame.
+const TO_HANDLER: u32 = 0xFFFF_FFF1;
+const TO_THREAD: u32 = 0xFFFF_FFF9;
+/// Its bit that is clear where there is a floating-point frame.
+const NO_FLOAT: u32 = 1 << 4;
+/// CONTROL.FPCA.
+const FPCA: u32 = 1 << 2;
+/// Words of a frame, and of the floating-point registers in it.
+const FRAME: u32 = 8;
+const FLOATS: u32 = 18;
+/// Cycles of entry and return, and those that the floating-point frame adds.
+const ENTRY: u32 = 12;
+const FLOAT_CYCLES: u32 = 17;
+
+/// The reason why the emulator has stopped.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stop {
+    /// An interrupt is to be taken.
+    Interrupt,
+    /// A handler returns.
+    Return,
+    /// The time is over.
+    Done,
+    /// Another exception of the processor.
+    Exception(u32),
+}
+
+/// The processor, with the machine around it.
+pub struct Cpu {
+    engine: Unicorn<'static, Machine>,
+    /// The least stack pointer so far.
+    pub lowest_stack: u32,
+    /// The costs of the handlers: cycles at most, by exception.
+    pub longest: HashMap<usize, u64>,
+    entered: Vec<Time>,
+}
+
+fn failed(error: uc_error) -> anyhow::Error {
+    anyhow!("the emulator: {error:?}")
+}
+
+impl Cpu {
+    /// Out of reset, with this image in the flash memory.
+    pub fn new(image: &Image, machine: Machine) -> Result<Self> {
+        let mode = Mode::THUMB | Mode::MCLASS | Mode::LITTLE_ENDIAN;
+        let mut engine = Unicorn::new_with_data(Arch::ARM, mode, machine).map_err(failed)?;
+        engine.ctl_set_cpu_model(ArmCpuModel::UC_CPU_ARM_CORTEX_M4 as i32).map_err(failed)?;
+        // The alias at 0 (boot from flash), and the flash memory itself.
+        for origin in [0, FLASH.0] {
+            engine
+                .mem_map(origin.into(), FLASH.1 as usize, Permission::READ | Permission::EXEC)
+                .map_err(failed)?;
+            engine.mem_write(origin.into(), &image.flash).map_err(failed)?;
+        }
+        engine.mem_map(RAM.0.into(), RAM.1 as usize, Permission::READ | Permission::WRITE).map_err(failed)?;
+        for (origin, length) in PERIPHERALS {
+            let read = move |engine: &mut Unicorn<Machine>, offset: u64, size: usize| {
+                let machine = engine.get_data_mut();
+                u64::from(machine.read(origin + offset as u32, size))
+            };
+            let write = move |engine: &mut Unicorn<Machine>, offset: u64, size: usize, value: u64| {
+                engine.get_data_mut().write(origin + offset as u32, size, value as u32);
+            };
+            engine.mmio_map(origin.into(), length as usize, Some(read), Some(write)).map_err(failed)?;
+        }
+        hook(&mut engine, image).map_err(failed)?;
+        let word = |at: usize| u32::from_le_bytes([0, 1, 2, 3].map(|byte| image.flash[at + byte]));
+        let mut cpu = Self { engine, lowest_stack: u32::MAX, longest: HashMap::new(), entered: Vec::new() };
+        cpu.set(R::MSP, word(0))?;
+        cpu.set(R::LR, u32::MAX)?;
+        cpu.jump(word(4))?;
+        Ok(cpu)
+    }
+
+    /// The machine.
+    pub fn machine(&self) -> &Machine {
+        self.engine.get_data()
+    }
+
+    /// The same, to be changed between two runs.
+    pub fn machine_mut(&mut self) -> &mut Machine {
+        self.engine.get_data_mut()
+    }
+
+    fn get(&self, register: R) -> Result<u32> {
+        self.engine.reg_read(register).map(|value| value as u32).map_err(failed)
+    }
+
+    fn set(&mut self, register: R, value: u32) -> Result<()> {
+        self.engine.reg_write(register, value.into()).map_err(failed)
+    }
+
+    fn jump(&mut self, to: u32) -> Result<()> {
+        if to & 1 == 0 {
+            bail!("a jump to {to:#010x}, which is not Thumb code");
+        }
+        self.set(R::PC, to)
+    }
+
+    /// Executes until the machine's time has come to `until`.
+    pub fn run(&mut self, until: Time) -> Result<()> {
+        self.machine_mut().until = until;
+        while self.machine().now() < until && !self.machine().world.done {
+            if self.machine().wants_interrupt() && self.take_interrupt()? {
+                continue;
+            }
+            self.machine_mut().stop = None;
+            let from = u64::from(self.get(R::PC)? | 1);
+            let outcome = self.engine.emu_start(from, u64::from(u32::MAX), 0, 0);
+            let pc = self.get(R::PC)?;
+            if let Err(error) = outcome {
+                bail!("{} at {pc:#010x}: {error:?}", self.machine().told());
+            }
+            match self.machine().stop {
+                Some(Stop::Return) => self.leave(pc)?,
+                Some(Stop::Exception(number)) => {
+                    bail!("{} at {pc:#010x}: the processor's exception {number}", self.machine().told());
+                }
+                Some(Stop::Interrupt | Stop::Done) | None => {}
+            }
+        }
+        Ok(())
+    }
+
+    fn take_interrupt(&mut self) -> Result<bool> {
+        let primask = self.get(R::PRIMASK)? & 1 != 0;
+        let Some(exception) = self.machine().nvic.next(primask) else {
+            self.machine_mut().masked = true;
+            return Ok(false);
+        };
+        self.enter(exception)?;
+        Ok(true)
+    }
+
+    fn enter(&mut self, exception: usize) -> Result<()> {
+        let floats = self.get(R::CONTROL)? & FPCA != 0;
+        let (sp, xpsr) = (self.get(R::SP)?, self.get(R::XPSR)?);
+        let words = FRAME + if floats { FLOATS } else { 0 };
+        // Aligned to eight bytes; bit 9 of the stacked word says whether that took one.
+        let frame = (sp - 4 * words) & !7;
+        let odd = u32::from(sp & 4 != 0) << 9;
+        let mut stack = Vec::new();
+        for register in [R::R0, R::R1, R::R2, R::R3, R::R12, R::LR, R::PC] {
+            stack.push(self.get(register)?);
+        }
+        stack.push(xpsr & !(1 << 9) | 1 << 24 | odd);
+        if floats {
+            for single in 0..16 {
+                stack.push(self.single(single)?);
+            }
+            stack.extend([self.get(R::FPSCR)?, 0]);
+        }
+        let bytes: Vec<u8> = stack.iter().flat_map(|word| word.to_le_bytes()).collect();
+        self.engine.mem_write(frame.into(), &bytes).map_err(failed)?;
+        self.lowest_stack = self.lowest_stack.min(frame);
+        let to = if self.machine().nvic.active.is_empty() { TO_THREAD } else { TO_HANDLER };
+        self.set(R::LR, if floats { to & !NO_FLOAT } else { to })?;
+        self.set(R::CONTROL, 0)?;
+        self.set(R::SP, frame)?;
+        self.set(R::XPSR_NZCVQG, 1 << 24 | exception as u32)?;
+        let cycles = ENTRY + if floats { FLOAT_CYCLES } else { 0 };
+        let machine = self.machine_mut();
+        let vector = machine.nvic.vectors() + 4 * exception as u32;
+        machine.nvic.enter(exception);
+        machine.pass(cycles);
+        let now = machine.now();
+        self.entered.push(now);
+        let mut target = [0; 4];
+        self.engine.mem_read(vector.into(), &mut target).map_err(failed)?;
+        self.jump(u32::from_le_bytes(target))
+    }
+
+    fn leave(&mut self, to: u32) -> Result<()> {
+        // The emulator has taken the lowest bit away.
+        let (to, floats) = (to | 1, to & NO_FLOAT == 0);
+        let Some(left) = self.machine_mut().nvic.leave() else {
+            bail!("a return to {to:#010x} from no exception")
+        };
+        let now = self.machine().now();
+        let took = now - self.entered.pop().unwrap_or(now);
+        let cycles = took / self.machine().cycle();
+        let longest = self.longest.entry(left).or_default();
+        *longest = (*longest).max(cycles);
+        if (to | NO_FLOAT == TO_THREAD) != self.machine().nvic.active.is_empty() {
+            bail!("the exception {left} returns to {to:#010x}");
+        }
+        let frame = self.get(R::SP)?;
+        self.lowest_stack = self.lowest_stack.min(frame);
+        let words = FRAME + if floats { FLOATS } else { 0 };
+        let bytes = self.engine.mem_read_as_vec(frame.into(), 4 * words as usize).map_err(failed)?;
+        let stack: Vec<u32> = bytes
+            .chunks_exact(4)
+            .map(|word| u32::from_le_bytes([word[0], word[1], word[2], word[3]]))
+            .collect();
+        for (register, value) in [R::R0, R::R1, R::R2, R::R3, R::R12, R::LR].into_iter().zip(&stack) {
+            self.set(register, *value)?;
+        }
+        let xpsr = stack[7];
+        if floats {
+            for single in 0..16 {
+                self.set_single(single, stack[8 + single])?;
+            }
+            self.set(R::FPSCR, stack[24])?;
+        }
+        let outer = self.machine().nvic.active.last().copied().unwrap_or(0) as u32;
+        self.set(R::XPSR_NZCVQG, xpsr & !0x3FF | outer)?;
+        self.set(R::CONTROL, if floats { FPCA } else { 0 })?;
+        self.set(R::SP, frame + 4 * words + if xpsr & 1 << 9 != 0 { 4 } else { 0 })?;
+        self.machine_mut().pass(ENTRY + if floats { FLOAT_CYCLES } else { 0 });
+        self.jump(stack[6] | 1)
+    }
+
+    fn single(&self, number: usize) -> Result<u32> {
+        self.engine.reg_read(R::S0 as i32 + number as i32).map(|value| value as u32).map_err(failed)
+    }
+
+    fn set_single(&mut self, number: usize, value: u32) -> Result<()> {
+        self.engine.reg_write(R::S0 as i32 + number as i32, value.into()).map_err(failed)
+    }
+
+    /// A word of the memory.
+    pub fn word(&self, address: u32) -> Result<u32> {
+        let mut bytes = [0; 4];
+        self.engine.mem_read(address.into(), &mut bytes).map_err(failed)?;
+        Ok(u32::from_le_bytes(bytes))
+    }
+}
+
+/// The emulator tells of every basic block, of exceptions, and of accesses to nowhere.
+fn hook(engine: &mut Unicorn<'static, Machine>, image: &Image) -> Result<(), uc_error> {
+    let flash = image.flash.clone();
+    let mut costs = vec![0_u16; flash.len() / 2];
+    engine.add_block_hook(1, 0, move |engine, address, size| {
+        let at = (address as u32 & 0x07FF_FFFF) as usize;
+        let cost = match costs.get_mut(at / 2) {
+            Some(known) if *known == 0 => {
+                *known = cost::cycles(flash.get(at..at + size as usize).unwrap_or_default()) as u16;
+                *known
+            }
+            Some(known) => *known,
+            None => 1,
+        };
+        let machine = engine.get_data_mut();
+        if machine.block(address as u32, cost.into()) {
+            // It stops before the block, whose cost is not counted twice.
+            let _ = engine.emu_stop();
+        }
+    })?;
+    engine.add_intr_hook(|engine, number| {
+        let stop = if number == EXCEPTION_RETURN { Stop::Return } else { Stop::Exception(number) };
+        engine.get_data_mut().stop = Some(stop);
+        let _ = engine.emu_stop();
+    })?;
+    engine.add_mem_hook(HookType::MEM_INVALID, 1, 0, |engine, kind, address, size, _| {
+        engine
+            .get_data_mut()
+            .findings
+            .add(format!("{kind:?} of {size} bytes at {address:#010x}, where nothing is"));
+        false
+    })?;
+    Ok(())
+}

@@ -1,0 +1,152 @@
+//! The nested vectored interrupt controller and the system control block, after ARMv7-M (DDI 0403E, B3).
+
+use crate::finding::Findings;
+
+/// The number of external interrupts that the chip has (RM0440, vector table).
+pub const LINES: usize = 102;
+/// The number of the first external interrupt as an exception.
+const EXTERNAL: usize = 16;
+/// The bits of a priority that the chip has: the upper four.
+const PRIORITY_BITS: u8 = 0xF0;
+/// The priority at which nothing is active.
+const IDLE: i32 = 256;
+
+/// The state.
+#[derive(Debug)]
+pub struct Nvic {
+    enabled: [bool; LINES],
+    pending: [bool; LINES],
+    /// The lines' own levels: an interrupt whose line is still high when its handler returns comes again.
+    lines: [bool; LINES],
+    priorities: [u8; LINES],
+    /// The active exceptions, the innermost last.
+    pub active: Vec<usize>,
+    /// CPACR.
+    pub cpacr: u32,
+    vtor: u32,
+}
+
+impl Default for Nvic {
+    fn default() -> Self {
+        Self {
+            enabled: [false; LINES],
+            pending: [false; LINES],
+            lines: [false; LINES],
+            priorities: [0; LINES],
+            active: Vec::new(),
+            cpacr: 0,
+            vtor: 0,
+        }
+    }
+}
+
+impl Nvic {
+    /// Sets the level of an interrupt's line; a rising one pends it.
+    pub fn drive(&mut self, line: usize, high: bool) {
+        if high && !self.lines[line] {
+            self.pending[line] = true;
+        }
+        self.lines[line] = high;
+    }
+
+    fn priority(&self, exception: usize) -> i32 {
+        exception.checked_sub(EXTERNAL).map_or(-1, |line| i32::from(self.priorities[line]))
+    }
+
+    /// The priority of what is executed.
+    fn running(&self) -> i32 {
+        self.active.iter().map(|exception| self.priority(*exception)).min().unwrap_or(IDLE)
+    }
+
+    /// The exception that is taken next, if any may be: of the highest priority, of equal ones the lowest number.
+    pub fn next(&self, primask: bool) -> Option<usize> {
+        if primask || !self.pending.contains(&true) {
+            return None;
+        }
+        let ready = (0..LINES).filter(|line| self.enabled[*line] && self.pending[*line]);
+        let first = ready.min_by_key(|line| (self.priorities[*line], *line))?;
+        (i32::from(self.priorities[first]) < self.running()).then_some(EXTERNAL + first)
+    }
+
+    /// An exception becomes active.
+    pub fn enter(&mut self, exception: usize) {
+        if let Some(line) = exception.checked_sub(EXTERNAL) {
+            self.pending[line] = false;
+        }
+        self.active.push(exception);
+    }
+
+    /// The innermost exception returns.
+    pub fn leave(&mut self) -> Option<usize> {
+        let left = self.active.pop()?;
+        if let Some(line) = left.checked_sub(EXTERNAL)
+            && self.lines[line]
+        {
+            self.pending[line] = true;
+        }
+        Some(left)
+    }
+
+    /// A word of the private peripheral bus is read.
+    pub fn read(&mut self, address: u32, findings: &mut Findings) -> u32 {
+        let word = |of: &[bool; LINES], from: u32| {
+            let first = (address - from) as usize * 8;
+            (0..32).fold(0, |word, bit| word | u32::from(of.get(first + bit).is_some_and(|bit| *bit)) << bit)
+        };
+        match address {
+            0xE000_E100..0xE000_E110 => word(&self.enabled, 0xE000_E100),
+            0xE000_E200..0xE000_E210 => word(&self.pending, 0xE000_E200),
+            0xE000_ED08 => self.vtor,
+            0xE000_ED88 => self.cpacr,
+            // No debugger.
+            0xE000_EDF0 => 0,
+            _ => {
+                findings.add(format!(
+                    "the private peripheral bus is read at {address:#010x}, which the twin does not model"
+                ));
+                0
+            }
+        }
+    }
+
+    /// A word, or for the priorities a byte, of the private peripheral bus is written.
+    pub fn write(&mut self, address: u32, size: usize, value: u32, findings: &mut Findings) {
+        let lines = |from: u32| {
+            let first = (address - from) as usize * 8;
+            (0..32)
+                .filter(move |bit| value & 1 << bit != 0)
+                .map(move |bit| first + bit)
+                .filter(|line| *line < LINES)
+        };
+        match address {
+            0xE000_E100..0xE000_E110 => lines(0xE000_E100).for_each(|line| self.enabled[line] = true),
+            0xE000_E180..0xE000_E190 => lines(0xE000_E180).for_each(|line| self.enabled[line] = false),
+            0xE000_E200..0xE000_E210 => lines(0xE000_E200).for_each(|line| self.pending[line] = true),
+            0xE000_E280..0xE000_E290 => lines(0xE000_E280).for_each(|line| self.pending[line] = false),
+            0xE000_E400..0xE000_E4F0 => {
+                let first = (address - 0xE000_E400) as usize;
+                for (byte, line) in (first..first + size).enumerate().filter(|(_, line)| *line < LINES) {
+                    self.priorities[line] = (value >> (8 * byte)) as u8 & PRIORITY_BITS;
+                }
+            }
+            0xE000_ED08 => {
+                findings.expect(value & 0x1FF == 0, || format!("VTOR is {value:#010x}, not a multiple of 512"));
+                self.vtor = value;
+            }
+            0xE000_ED88 => self.cpacr = value,
+            _ => findings.add(format!(
+                "the private peripheral bus is written at {address:#010x} with {value:#010x}, which the twin does not model"
+            )),
+        }
+    }
+
+    /// `true` if the program may use the floating-point unit.
+    pub fn has_fpu(&self) -> bool {
+        self.cpacr >> 20 & 0xF == 0xF
+    }
+
+    /// The vector table's address.
+    pub fn vectors(&self) -> u32 {
+        self.vtor
+    }
+}

@@ -1,0 +1,52 @@
+//! The findings: what the image did that the chip, or the board, does not allow.
+
+use crate::time::{Time, seconds};
+use std::fmt;
+
+/// An offence, with the instant and the place in the program.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Finding {
+    /// The instant.
+    pub at: Time,
+    /// The beginning of the basic block that was executed.
+    pub pc: u32,
+    /// In words.
+    pub text: String,
+    /// The times that it came, this one included.
+    pub count: u64,
+}
+
+impl fmt::Display for Finding {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let Self { at, pc, text, count } = self;
+        write!(f, "{:.6} s, block {pc:#010x}: {text}", seconds(*at))?;
+        if *count > 1 { write!(f, " ({count} times)") } else { Ok(()) }
+    }
+}
+
+/// The findings of a run, each text once a place.
+#[derive(Debug, Default)]
+pub struct Findings {
+    /// All of them, in their order.
+    pub all: Vec<Finding>,
+    /// The instant and the place of what is executed now.
+    pub now: (Time, u32),
+}
+
+impl Findings {
+    /// One more.
+    pub fn add(&mut self, text: impl Into<String>) {
+        let (text, (at, pc)) = (text.into(), self.now);
+        match self.all.iter_mut().find(|known| known.text == text && known.pc == pc) {
+            Some(known) => known.count += 1,
+            None => self.all.push(Finding { at, pc, text, count: 1 }),
+        }
+    }
+
+    /// One more where something does not hold.
+    pub fn expect(&mut self, holds: bool, text: impl FnOnce() -> String) {
+        if !holds {
+            self.add(text());
+        }
+    }
+}

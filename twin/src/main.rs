@@ -1,0 +1,72 @@
+//! `tractive-twin`: the image that is flashed, executed against a model of its chip.
+
+use anyhow::Result;
+use clap::Parser;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use tractive_twin::output::write;
+use tractive_twin::run::{Settings, drive, prepare};
+use tractive_twin::time::seconds;
+
+/// Executes the image of the NUCLEO-G474RE against a model of its chip, with the simulated motor at the pins.
+#[derive(Parser)]
+struct Arguments {
+    /// The image, an ELF file.
+    image: PathBuf,
+    /// The script of commands over CAN.
+    script: PathBuf,
+    /// The folder for trace, edges, telemetry and frames.
+    #[arg(long)]
+    out: Option<PathBuf>,
+    /// Lists the registers that the image has touched.
+    #[arg(long)]
+    accesses: bool,
+}
+
+fn main() -> ExitCode {
+    match run(&Arguments::parse()) {
+        Ok(true) => ExitCode::SUCCESS,
+        Ok(false) => ExitCode::from(1),
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::from(2)
+        }
+    }
+}
+
+fn run(arguments: &Arguments) -> Result<bool> {
+    let settings = Settings::new(&arguments.image, std::fs::read_to_string(&arguments.script)?);
+    let (mut cpu, image) = prepare(&settings)?;
+    println!("image {} SHA-256 {}", arguments.image.display(), image.sha256);
+    let start = std::time::Instant::now();
+    let outcome = drive(&mut cpu);
+    let machine = cpu.machine();
+    for finding in &machine.findings.all {
+        println!("{finding} (in {})", image.function(finding.pc));
+    }
+    let talk = &machine.world.talk;
+    for failure in &talk.failures {
+        println!("not met: {failure}");
+    }
+    let simulated_s = seconds(machine.now());
+    println!("{}", talk.state(simulated_s));
+    println!(
+        "{simulated_s:.3} s, {:.3} of real time; {} expectations, {} not met; {} edges; longest interrupts {:?} cycles; stack down to {:#010x}",
+        simulated_s / start.elapsed().as_secs_f64(),
+        talk.expectations,
+        talk.failures.len(),
+        machine.world.edges.len(),
+        cpu.longest,
+        cpu.lowest_stack,
+    );
+    if arguments.accesses {
+        for (address, (reads, writes)) in &machine.chip.accesses {
+            println!("{address:#010x} {reads:>9} {writes:>9}");
+        }
+    }
+    if let Some(out) = &arguments.out {
+        write(machine, out)?;
+    }
+    outcome?;
+    Ok(machine.findings.all.is_empty() && talk.failures.is_empty())
+}

@@ -1,0 +1,168 @@
+//! Mistakes of a board's code and settings, each made on the way of a write to its register, and whether a short drive shows them.
+//!
+//! The drive is the same for all: the link is charged, the motor pulls, then the gate drivers' ready wire drops or a phase carries an
+//! overcurrent. A mistake is caught by a finding, by an expectation that is not met, or by gates that do not go off.
+
+use crate::core::cpu::Cpu;
+use crate::run::{Settings, drive, prepare};
+use crate::time::MICROSECOND;
+use anyhow::Result;
+use std::path::Path;
+
+/// A change of a write: address and value in, value out.
+pub type Change = fn(u32, u32) -> u32;
+
+/// The drive.
+const SCRIPT: &str = "\
+0.20 expect state ready
+0.20 charge
+0.50 expect state charged
+0.50 enable
+0.55 expect state enabled
+0.55 torque 300 over 0.05
+0.90 expect state running
+     expect torque_nm 300 within 15
+     expect speed_rpm 84.5 within 2
+     expect mode async
+     expect fault none
+0.90 end
+";
+/// The time from the cause of a break until every gate must be off.
+const BREAK: u64 = MICROSECOND;
+
+/// The edges that every gate has at least in the drive: half of those of a carrier of 900 Hz.
+const PULSES: usize = 300;
+
+/// A mistake, and the change that makes it.
+pub struct Mistake {
+    /// In words.
+    pub name: &'static str,
+    change: Change,
+}
+
+const fn of(name: &'static str, change: Change) -> Mistake {
+    Mistake { name, change }
+}
+
+/// The value with a field's bits in another state, at one address.
+fn at(register: u32, address: u32, value: u32, mask: u32, bits: u32) -> u32 {
+    if address == register { value & !mask | bits } else { value }
+}
+
+/// The same where the field is written at all.
+fn field(register: u32, address: u32, value: u32, mask: u32, from: u32, to: u32) -> u32 {
+    if address == register && value & mask == from { value & !mask | to } else { value }
+}
+
+const TIM1: u32 = 0x4001_2C00;
+const TIM8: u32 = 0x4001_3400;
+const TIM3: u32 = 0x4000_0400;
+const TIM4: u32 = 0x4000_0800;
+const RCC: u32 = 0x4002_1000;
+const GPIOA: u32 = 0x4800_0000;
+const GPIOB: u32 = 0x4800_0400;
+const GPIOC: u32 = 0x4800_0800;
+const ADC1: u32 = 0x5000_0000;
+const ADC2: u32 = 0x5000_0100;
+
+/// The mistakes.
+pub const MISTAKES: [Mistake; 38] = [
+    of("PB15 has alternate function 6", |a, v| field(GPIOB + 0x24, a, v, 0xF << 28, 4 << 28, 6 << 28)),
+    of("PA10 has alternate function 5", |a, v| field(GPIOA + 0x24, a, v, 0xF << 8, 6 << 8, 5 << 8)),
+    of("PC6 has alternate function 2", |a, v| field(GPIOC + 0x20, a, v, 0xF << 24, 4 << 24, 2 << 24)),
+    of("PA1 stays an input", |a, v| field(GPIOA, a, v, 3 << 2, 3 << 2, 0)),
+    of("encoder's tracks without their alternate function", |a, v| {
+        field(GPIOB + 0x20, a, v, 0xF << 24, 2 << 24, 0)
+    }),
+    of("currents of U and V swapped", |a, v| match a {
+        0x5000_004C => v & !(0x1F << 9 | 0x1F << 15) | (v >> 9 & 0x1F) << 15 | (v >> 15 & 0x1F) << 9,
+        _ => v,
+    }),
+    of("ADC1 follows TIM3_CC3", |a, v| field(ADC1 + 0x4C, a, v, 0x1F << 2, 12 << 2, 11 << 2)),
+    of("ADC2 follows TIM8's TRGO", |a, v| field(ADC2 + 0x4C, a, v, 0x1F << 2, 8 << 2, 9 << 2)),
+    of("ADC1 never follows a timer", |a, v| at(ADC1 + 0x4C, a, v, 3 << 7, 0)),
+    of("ADC's clock undivided", |a, v| at(0x5000_0308, a, v, 3 << 16, 1 << 16)),
+    of("lower device of U inverted", |a, v| at(TIM1 + 0x20, a, v, 8, 8)),
+    of("upper device of V inverted", |a, v| at(TIM1 + 0x20, a, v, 1 << 9, 1 << 9)),
+    of("lower device of U not enabled", |a, v| at(TIM1 + 0x20, a, v, 4, 0)),
+    of("upper device of W not enabled", |a, v| at(TIM8 + 0x20, a, v, 1, 0)),
+    of("no dead time on U and V", |a, v| at(TIM1 + 0x44, a, v, 0xFF, 0)),
+    of("no dead time on W", |a, v| at(TIM8 + 0x44, a, v, 0xFF, 0)),
+    of("dead-time clock undivided", |a, v| at(TIM1, a, v, 3 << 8, 0)),
+    of("TIM1 without a clock", |a, v| at(RCC + 0x60, a, v, 1 << 11, 0)),
+    of("TIM3 without a clock", |a, v| at(RCC + 0x58, a, v, 1 << 1, 0)),
+    of("ADC1 and ADC2 without a clock", |a, v| at(RCC + 0x4C, a, v, 1 << 13, 0)),
+    of("comparators without a clock", |a, v| at(RCC + 0x60, a, v, 1, 0)),
+    of("CAN's clock from the bus", |a, v| at(RCC + 0x88, a, v, 3 << 24, 2 << 24)),
+    of("reload of the carrier not preloaded", |a, v| at(TIM1, a, v, 1 << 7, 0)),
+    of("compare of U not preloaded", |a, v| at(TIM1 + 0x18, a, v, 1 << 3, 0)),
+    of("carrier's prescaler one less", |a, v| at(TIM1 + 0x28, a, v, 1, 0)),
+    of("control timer's prescaler one less", |a, v| at(TIM3 + 0x28, a, v, 1, 0)),
+    of("PLL at 160 MHz", |a, v| field(RCC + 0x0C, a, v, 0x7F << 8, 85 << 8, 80 << 8)),
+    of("two wait states", |a, v| field(0x4002_2000, a, v, 0xF, 4, 2)),
+    of("no boost at 170 MHz", |a, v| at(0x4000_7080, a, v, 1 << 8, 1 << 8)),
+    of("TIM8 does not follow TIM1", |a, v| at(TIM8 + 0x08, a, v, u32::MAX, 0)),
+    of("encoder counts one track", |a, v| field(TIM4 + 0x08, a, v, 7, 3, 1)),
+    of("encoder's turn of 2,048 counts", |a, v| at(TIM4 + 0x2C, a, v, u32::MAX, 2_047)),
+    of("encoder captured by another timer", |a, v| field(TIM4 + 0x08, a, v, 0x70, 0x20, 0x10)),
+    of("encoder's index not enabled", |a, v| at(TIM4 + 0x58, a, v, 1, 0)),
+    of("break of U and V disabled", |a, v| at(TIM1 + 0x44, a, v, 1 << 12, 0)),
+    of("break input inverted", |a, v| at(TIM8 + 0x60, a, v, 1 << 9, 0)),
+    of("comparators do not break U and V", |a, v| at(TIM1 + 0x60, a, v, 0x7F << 1, 0)),
+    of("watchdog never started", |a, v| if a == 0x4000_3000 && v == 0xCCCC { 0 } else { v }),
+];
+
+/// Runs the drive with a change; what showed it, or `None`.
+pub fn caught(image: &Path, change: Option<Change>, overcurrent: bool) -> Result<Option<String>> {
+    let settings = Settings::new(image, SCRIPT.to_owned());
+    let (mut cpu, _) = prepare(&settings)?;
+    let machine = cpu.machine_mut();
+    machine.mistake = change;
+    machine.world.link.udc_v = machine.world.link.settings.source.voltage_v;
+    if let Err(error) = drive(&mut cpu) {
+        return Ok(Some(format!("{error:#}")));
+    }
+    let machine = cpu.machine();
+    if let Some(finding) = machine.findings.all.first() {
+        return Ok(Some(finding.text.clone()));
+    }
+    if let Some(failure) = machine.world.talk.failures.first() {
+        return Ok(Some(failure.clone()));
+    }
+    if let Some(gate) =
+        (0..6).find(|gate| machine.world.edges.iter().filter(|edge| edge.gate == *gate).count() < PULSES)
+    {
+        return Ok(Some(format!("gate {gate} hardly pulses")));
+    }
+    if !machine.chip.watchdog.is_running() {
+        return Ok(Some("the watchdog does not run".into()));
+    }
+    held(&mut cpu, overcurrent)
+}
+
+/// The cause of a break while the gates pulse: whether one is on later than it may be.
+fn held(cpu: &mut Cpu, overcurrent: bool) -> Result<Option<String>> {
+    let machine = cpu.machine_mut();
+    machine.world.done = false;
+    let world = &mut machine.world;
+    if !world.any_gate() {
+        return Ok(Some("no gate is on".to_owned()));
+    }
+    (world.ready, world.excess_a) = (overcurrent, if overcurrent { 600.0 } else { 0.0 });
+    // Both act without a clock: at once.
+    machine.settle();
+    let until = machine.now() + BREAK;
+    cpu.run(until)?;
+    cpu.machine_mut().settle();
+    let world = &cpu.machine().world;
+    let cause = if overcurrent { "an overcurrent" } else { "the drivers' ready wire" };
+    Ok(world.any_gate().then(|| format!("gates are on 1 µs after {cause}")))
+}
+
+/// A mistake's outcome over both causes of a break.
+pub fn outcome(image: &Path, mistake: &Mistake) -> Result<Option<String>> {
+    Ok(match caught(image, Some(mistake.change), false)? {
+        None => caught(image, Some(mistake.change), true)?,
+        shown => shown,
+    })
+}

@@ -1,0 +1,36 @@
+//! Mistakes that the twin must show, and the drive without one, which must show nothing. The image is that which
+//! `TRACTIVE_NUCLEO_IMAGE` names.
+
+use std::path::PathBuf;
+use tractive_twin::mistakes::{MISTAKES, caught, outcome};
+
+/// Mistakes that a run may miss.
+const MISSED: usize = 2;
+
+fn image() -> PathBuf {
+    std::env::var_os("TRACTIVE_NUCLEO_IMAGE").expect("TRACTIVE_NUCLEO_IMAGE").into()
+}
+
+#[test]
+#[ignore = "needs the image; `cargo xtask test --only twin` builds it"]
+fn the_image_as_it_is_shows_nothing() {
+    let image = image();
+    for overcurrent in [false, true] {
+        assert_eq!(caught(&image, None, overcurrent).unwrap(), None);
+    }
+}
+
+#[test]
+#[ignore = "needs the image; `cargo xtask test --only twin` builds it"]
+fn a_mistake_is_shown() {
+    let image = image();
+    let mut missed = Vec::new();
+    for mistake in &MISTAKES {
+        let shown = outcome(&image, mistake).unwrap();
+        println!("| {} | {} |", mistake.name, shown.as_deref().unwrap_or("not shown"));
+        if shown.is_none() {
+            missed.push(mistake.name);
+        }
+    }
+    assert!(missed.len() <= MISSED, "{missed:?}");
+}
