@@ -3,8 +3,12 @@
 use super::carrier::{self, Zeros};
 use super::flying_start::FlyingStart;
 use super::half::boundary;
+#[cfg(feature = "optimal")]
+use super::optimal::{self, Branch};
 use super::pattern_transition::PatternTransition;
 use super::{CarrierHalf, Mode, Reference, Schedule, SwitchLimits, first_half, middle60, schedule};
+#[cfg(feature = "optimal")]
+use crate::frames::{AlphaBeta, six_step_v};
 use crate::frames::{Angle, UNITS_PER_RADIAN, limit};
 use crate::time::Instant;
 
@@ -231,6 +235,11 @@ impl Modulator {
             let share = seen.share_within(start, period_ticks);
             return carrier::synchronous(self.next_half, period_ticks, self.zeros(), share, &self.devices);
         }
+        #[cfg(feature = "optimal")]
+        if let Some(branch) = self.mode.branch() {
+            let period_ticks = self.whole_ticks(wanted);
+            return self.optimal(branch, start, period_ticks, seen);
+        }
         let own_rad = middle60::zero_rad(self.mode, seen.voltage_v, seen.udc_v);
         self.zero_rad = own_rad;
         let (period, notch) = match self.transition.sector(own_rad, self.mode.sector_halves()) {
@@ -248,6 +257,19 @@ impl Modulator {
             }
         };
         middle60::half(self.mode, self.next_half, self.whole_ticks(period), notch, &self.devices)
+    }
+
+    /// One half of an optimised pattern, its edges moved by what the wanted mean voltage differs from the pattern's fundamental.
+    #[cfg(feature = "optimal")]
+    #[inline(never)]
+    fn optimal(&self, branch: &Branch, start: Instant, period_ticks: u32, seen: &Reference) -> CarrierHalf {
+        let carriers = self.mode.carriers();
+        let middle = boundary(self.next_half, carriers) + Angle(boundary(1, carriers).0 / 2);
+        let round = (middle - Angle::DEG_90).sin_cos();
+        let index = branch.within(seen.voltage_v / six_step_v(seen.udc_v));
+        let own = AlphaBeta { alpha: round.cos, beta: round.sin } * (index * core::f32::consts::FRAC_2_PI);
+        let more_ticks = (seen.share_within(start, period_ticks) - own) * period_ticks as f32;
+        optimal::half(branch, self.next_half, period_ticks, (index, more_ticks), &self.devices)
     }
 
     /// A length in whole ticks. Slower than the async mode's range there is nothing to lock to: the length stays that

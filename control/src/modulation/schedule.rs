@@ -37,6 +37,10 @@ impl Ladder {
     /// The paper's modes.
     pub const PAPER: Self = Self::of(&[Mode::Sync15, Mode::Sync12, Mode::Mid7, Mode::Mid3, Mode::Square]);
 
+    /// The optimised patterns.
+    #[cfg(feature = "optimal")]
+    pub const OPTIMAL: Self = Self::of(&OPTIMAL_RUNGS);
+
     /// Of these modes; without one the asynchronous mode serves at every frequency.
     pub const fn of(locked: &'static [Mode]) -> Self {
         Self(locked)
@@ -47,6 +51,18 @@ impl Ladder {
         [Mode::Async].into_iter().chain(self.0.iter().copied())
     }
 }
+
+/// The optimised patterns and square wave.
+#[cfg(feature = "optimal")]
+static OPTIMAL_RUNGS: [Mode; Mode::OPTIMAL.len() + 1] = {
+    let mut rungs = [Mode::Square; Mode::OPTIMAL.len() + 1];
+    let mut place = 0;
+    while place < Mode::OPTIMAL.len() {
+        rungs[place] = Mode::OPTIMAL[place];
+        place += 1;
+    }
+    rungs
+};
 
 /// Room kept between a mode's largest depth and the border above it, and the hysteresis kept below a border that
 /// the shortest pulse has lowered; shares of six-step.
@@ -81,9 +97,30 @@ impl Schedule {
         Self { fixed: Some(mode), ..Self::new(clock) }
     }
 
-    /// The mode that this reference should have, given the present one; the dwell time is respected.
+    /// The mode that this reference should have, given the present one; the dwell time is respected. Out of rest an optimised pattern
+    /// begins with one that can catch the machine.
+    #[cfg(feature = "optimal")]
     #[inline(never)]
     pub fn wanted(&mut self, now: Instant, mode: Mode, seen: &Reference, devices: &SwitchLimits) -> Mode {
+        /// Modulation index up to which the free carrier can, whatever has to be regulated meanwhile.
+        const CARRIER_CATCHES: f32 = 0.85;
+        match self.ladders_choice(now, mode, seen, devices) {
+            wanted if mode != Mode::Off || !wanted.is_optimal() => wanted,
+            _ if seen.depth < CARRIER_CATCHES => Mode::Async,
+            _ => Mode::Mid3,
+        }
+    }
+
+    /// The mode that this reference should have, given the present one; the dwell time is respected.
+    #[cfg(not(feature = "optimal"))]
+    #[inline(never)]
+    pub fn wanted(&mut self, now: Instant, mode: Mode, seen: &Reference, devices: &SwitchLimits) -> Mode {
+        self.ladders_choice(now, mode, seen, devices)
+    }
+
+    /// The ladder's rung for this reference.
+    #[inline(always)]
+    fn ladders_choice(&mut self, now: Instant, mode: Mode, seen: &Reference, devices: &SwitchLimits) -> Mode {
         if let Some(fixed) = self.fixed {
             return fixed;
         }

@@ -43,7 +43,7 @@ use serde::Serialize;
 use serde_json::{Map, Value};
 use tractive::control::{ControlLaw, Controller, Demand, Gains, MtpaStart, PiLaw};
 use tractive::drive::traction::Settings;
-use tractive::modulation::SwitchLimits;
+use tractive::modulation::{Ladder, SwitchLimits};
 use tractive::operator::{Line, LineTimes};
 use tractive::recorder::Recorder;
 use tractive::time::{Clock, Instant};
@@ -99,6 +99,26 @@ impl StartName {
     }
 }
 
+/// The pulse patterns that the drive uses above the free carrier.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum PatternsName {
+    /// The paper's modes
+    Paper,
+    /// Optimised patterns of 15 to 3 pulses
+    Optimal,
+}
+
+impl PatternsName {
+    /// As the modulator's schedule takes them.
+    const fn ladder(self) -> Ladder {
+        match self {
+            Self::Paper => Ladder::PAPER,
+            Self::Optimal => Ladder::OPTIMAL,
+        }
+    }
+}
+
 /// Options of all its scenarios.
 #[derive(Clone, Debug, Args, Serialize)]
 pub struct TractionOptions {
@@ -108,6 +128,9 @@ pub struct TractionOptions {
     /// With --law pi: the point whose inductances the first of the two passes of MTPA takes.
     #[arg(long, value_enum, default_value = "previous", value_name = "POINT")]
     pub mtpa_start: StartName,
+    /// The pulse patterns above the free carrier.
+    #[arg(long, value_enum, default_value = "paper")]
+    pub patterns: PatternsName,
     /// Leave the dead time uncompensated: neither the pulses are corrected nor is the sixth harmonic of the voltage followed.
     #[arg(long)]
     pub uncompensated: bool,
@@ -394,7 +417,8 @@ fn tasks<'a, L: ControlLaw>(
     let ratings = &machine.tables.ratings;
     let line = setup.line.map(|times| Line::rated(ratings, times.precharge_s, times.discharge_s));
     let first = first_half_ticks(setup, machine);
-    Ok(Tasks::with_law(law, Instant(0), machine.tables, settings, first).operated_on(line))
+    let tasks = Tasks::with_law(law, Instant(0), machine.tables, settings, first);
+    Ok(tasks.on(options.own.patterns.ladder()).operated_on(line))
 }
 
 fn bench(plan: Plan, setup: &Setup, options: &Options, machine: &Machine) -> Bench {
