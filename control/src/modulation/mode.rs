@@ -212,15 +212,17 @@ modes! {
         /// Optimised, 7 pulses, at a medium one.
         Opt7b: "opt7b", OPT7B, Border::new((127.0, 123.5), (0.882, 0.867));
         /// Optimised, 7 pulses, near six-step.
-        Opt7c: "opt7c", OPT7C, Border::new((127.0, 123.5), (0.955, 0.94));
+        Opt7c: "opt7c", OPT7C, Border::new((127.0, 123.5), (f32::INFINITY, f32::INFINITY));
         /// Optimised, 5 pulses, at a small modulation index.
         Opt5a: "opt5a", OPT5A, Border::new((177.0, 172.0), (0.785, 0.77));
         /// Optimised, 5 pulses, at a larger one.
         Opt5b: "opt5b", OPT5B, Border::new((177.0, 172.0), (0.932, 0.918));
         /// Optimised, 5 pulses, near six-step.
-        Opt5c: "opt5c", OPT5C, Border::new((177.0, 172.0), (0.967, 0.952));
+        Opt5c: "opt5c", OPT5C, Border::new((177.0, 172.0), (f32::INFINITY, f32::INFINITY));
         /// Optimised, 3 pulses.
-        Opt3: "opt3", OPT3, Border::new((297.0, 290.0), (0.967, 0.952));
+        Opt3a: "opt3a", OPT3A, Border::new((297.0, 290.0), (0.935, 0.915));
+        /// Optimised, 3 pulses, near six-step.
+        Opt3b: "opt3b", OPT3B, Border::new((297.0, 290.0), (f32::INFINITY, f32::INFINITY));
     }
 }
 

@@ -98,13 +98,14 @@ impl Schedule {
     }
 
     /// The mode that this reference should have, given the present one; the dwell time is respected. Out of rest an optimised pattern
-    /// begins with one that can catch the machine.
+    /// begins with one that can catch the machine; out of the free carrier with a locked one, which leads the flux to the pattern's path.
     #[cfg(feature = "optimal")]
     #[inline(never)]
     pub fn wanted(&mut self, now: Instant, mode: Mode, seen: &Reference, devices: &SwitchLimits) -> Mode {
         /// Modulation index up to which the free carrier can, whatever has to be regulated meanwhile.
         const CARRIER_CATCHES: f32 = 0.85;
         match self.ladders_choice(now, mode, seen, devices) {
+            Mode::Opt15 if mode == Mode::Async => Mode::Sync15,
             wanted if mode != Mode::Off || !wanted.is_optimal() => wanted,
             _ if seen.depth < CARRIER_CATCHES => Mode::Async,
             _ => Mode::Mid3,
@@ -205,10 +206,15 @@ pub fn depth_limit(mode: Mode, rate: f32, devices: &SwitchLimits) -> f32 {
 }
 
 /// `true` if the carrier that ends where half number `next_half` begins may give way to `to`: a locked carrier must have
-/// ended, at a multiple of 360°/gcd(N1, N2); a free one at its valley.
+/// ended, at a multiple of 360°/gcd(N1, N2); a free one at its valley. Optimised patterns give way to each other at 30° + n · 60°, where
+/// their flux paths lie nearest to each other.
 pub fn may_switch(from: Mode, to: Mode, next_half: u32) -> bool {
     if from == Mode::Off || to == Mode::Off {
         return true;
+    }
+    #[cfg(feature = "optimal")]
+    if let (Some(old), Some(_)) = (from.branch(), to.branch()) {
+        return next_half % (2 * old.halves) == old.halves;
     }
     if next_half & 1 != 0 {
         return false;

@@ -225,11 +225,22 @@ impl HalfKind {
     /// Where a pattern begins at the first of these, its own ripple is expected; where a carrier begins, what the old pattern leaves.
     fn ripple(self, decided: Mode, steady: &Steady) -> Option<Ripple> {
         let (mode, end) = (self.mode(), self.half() + 1);
-        if has_path(decided) {
+        let after = self.next_but_one_mode();
+        if decided.is_pattern() {
             let at_horizon_wb = self.ripple_at(decided, number(mode, decided, end), steady);
             return Some(Ripple { at_horizon_wb, led_wb: AlphaBeta::default() });
         }
-        let after = self.next_but_one_mode();
+        if decided.is_optimal() {
+            // The pattern itself leads the flux along its own path, and what moves its edges to that of the next one.
+            let half = number(mode, decided, end);
+            let at_horizon_wb = self.ripple_at(decided, half, steady);
+            let change = || {
+                let own = self.ripple_at(decided, half + 1, steady);
+                self.ripple_at(after, number(decided, after, half + 1), steady) - own
+            };
+            let led_wb = if after == decided { AlphaBeta::default() } else { change() };
+            return Some(Ripple { at_horizon_wb, led_wb });
+        }
         if !has_path(mode) && !has_path(after) {
             return None;
         }

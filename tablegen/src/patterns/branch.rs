@@ -32,7 +32,7 @@ pub struct Branch {
 
 /// The branches, from many pulses to few and from a small modulation index to a large one.
 #[rustfmt::skip]
-pub const BRANCHES: [Branch; 13] = [
+pub const BRANCHES: [Branch; 14] = [
     Branch { name: "opt15", pulses: 15, starts_high: false, halves: 6, anchor: 50, window: (10, 58), highest_hz: 60.0 },
     Branch { name: "opt13a", pulses: 13, starts_high: false, halves: 5, anchor: 50, window: (10, 64), highest_hz: 69.2 },
     Branch { name: "opt13b", pulses: 13, starts_high: true, halves: 5, anchor: 70, window: (62, 79), highest_hz: 69.2 },
@@ -45,7 +45,8 @@ pub const BRANCHES: [Branch; 13] = [
     Branch { name: "opt5a", pulses: 5, starts_high: true, halves: 2, anchor: 60, window: (10, 79), highest_hz: 180.0 },
     Branch { name: "opt5b", pulses: 5, starts_high: false, halves: 2, anchor: 85, window: (76, 94), highest_hz: 180.0 },
     Branch { name: "opt5c", pulses: 5, starts_high: true, halves: 2, anchor: 95, window: (91, 97), highest_hz: 180.0 },
-    Branch { name: "opt3", pulses: 3, starts_high: true, halves: 1, anchor: 80, window: (10, 97), highest_hz: 300.0 },
+    Branch { name: "opt3a", pulses: 3, starts_high: true, halves: 1, anchor: 80, window: (10, 95), highest_hz: 300.0 },
+    Branch { name: "opt3b", pulses: 3, starts_high: false, halves: 1, anchor: 95, window: (90, 99), highest_hz: 300.0 },
 ];
 
 /// A branch with its angles.

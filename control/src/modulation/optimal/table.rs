@@ -631,16 +631,16 @@ pub static OPT5C: Branch = Branch {
     ],
 };
 
-/// 3 pulses a turn, modulation index 0.10 to 0.97.
+/// 3 pulses a turn, modulation index 0.10 to 0.95.
 #[rustfmt::skip]
-pub static OPT3: Branch = Branch {
+pub static OPT3A: Branch = Branch {
     starts_high: true,
     halves: 1,
     angles: 1,
     first: 0.1,
-    last: 0.97,
+    last: 0.9500000000000001,
     inverse_step: 100.0,
-    ripple: [0.0362, 0.1329, 0.1591],
+    ripple: [0.0339, 0.1465, 0.1442],
     nodes: &[
         1.104031,
         1.109622,
@@ -728,7 +728,29 @@ pub static OPT3: Branch = Branch {
         1.535789,
         1.540792,
         1.545794,
-        1.550795,
-        1.555796,
+    ],
+};
+
+/// 3 pulses a turn, modulation index 0.90 to 0.99.
+#[rustfmt::skip]
+pub static OPT3B: Branch = Branch {
+    starts_high: false,
+    halves: 1,
+    angles: 1,
+    first: 0.9,
+    last: 0.99,
+    inverse_step: 100.0,
+    ripple: [0.0333, -0.3291, 7.9743],
+    nodes: &[
+        0.317560,
+        0.301137,
+        0.283794,
+        0.265353,
+        0.245566,
+        0.224075,
+        0.200335,
+        0.173422,
+        0.141539,
+        0.100042,
     ],
 };
