@@ -8,7 +8,7 @@ use cortex_m_rt::{entry, exception, interrupt};
 use tractive::built_in::traction::{BUILT_IN, BuiltIn};
 use tractive::control::Gains;
 use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
-use tractive::modulation::SwitchLimits;
+use tractive::modulation::{Schedule, SwitchLimits};
 use tractive::operator::{self, Line, Slot, slot_s};
 use tractive::protocol::CanEndpoint;
 use tractive::time::{Clock, Instant};
@@ -21,10 +21,13 @@ static FIRST_HALF_TICKS: AtomicU32 = AtomicU32::new(0);
 static UNCOMPENSATED: AtomicBool = AtomicBool::new(false);
 static BEHIND_LINE_FILTER: AtomicBool = AtomicBool::new(false);
 
+/// Highest frequency of the free carrier, in Hz.
+const MAX_CARRIER_HZ: f32 = law::FREE_CARRIER_SHARE * BUILT_IN.ratings.max_switching_hz;
+
 /// Until the host has told its own.
 const DEFAULTS: Settings = Settings {
     clock: CLOCK,
-    devices: SwitchLimits::new(0, 0, BUILT_IN.ratings.max_switching_hz, &CLOCK),
+    devices: SwitchLimits::new(0, 0, MAX_CARRIER_HZ, &CLOCK),
     gains: Gains::DEFAULT,
 };
 
@@ -35,7 +38,7 @@ fn settings() -> Settings {
         devices: SwitchLimits::new(
             MIN_PULSE_TICKS.load(Ordering::Relaxed),
             DEAD_TIME_TICKS.load(Ordering::Relaxed),
-            BUILT_IN.ratings.max_switching_hz,
+            MAX_CARRIER_HZ,
             &clock,
         ),
         gains: Gains::of(UNCOMPENSATED.load(Ordering::Relaxed), BEHIND_LINE_FILTER.load(Ordering::Relaxed)),
@@ -98,7 +101,11 @@ fn DUALTIMER() {
     let mut board = qemu::Pwm;
     let task = TASK.get_or_insert_with(|| {
         let first = Instant(FIRST_HALF_TICKS.load(Ordering::Relaxed));
-        PwmTask::new(BuiltIn, settings(), first).after_halves_of(first.0)
+        let task = PwmTask::new(BuiltIn, settings(), first).after_halves_of(first.0);
+        match law::LADDER {
+            Some(ladder) => task.scheduled(Schedule::on(ladder, &settings().clock)),
+            None => task,
+        }
     });
     task.run(&mut board, &SHARED);
 }

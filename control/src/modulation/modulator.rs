@@ -43,6 +43,10 @@ struct Plan {
 /// The largest distance of a carrier from its angle when it gives way to a pattern: 6°, less than half of its shortest half.
 const KEPT_ANGLE: Angle = Angle(71_582_788);
 
+/// The largest distance of a free carrier's boundary from the angle at which an optimised pattern takes over: 1.5°.
+#[cfg(feature = "optimal")]
+const CALM_ANGLE: Angle = Angle(17_895_697);
+
 /// Halves by which a switch between locked modes is announced.
 const AHEAD: u32 = 2;
 
@@ -154,9 +158,23 @@ impl Modulator {
             if keeps_angle && schedule::may_switch(self.mode, wanted, at) {
                 self.plan = Some(Plan { to: wanted, at });
             }
-        } else if schedule::may_switch(self.mode, wanted, self.next_half) {
+        } else if schedule::may_switch(self.mode, wanted, self.next_half) && self.begins_calmly(wanted, pulse)
+        {
             self.switch_to(start, wanted, pulse);
         }
+    }
+
+    /// `true` unless an optimised pattern is to take over from a free carrier, which it does where its flux lies next to the fundamental.
+    #[inline(always)]
+    fn begins_calmly(&self, wanted: Mode, pulse: Angle) -> bool {
+        #[cfg(feature = "optimal")]
+        if let Some(branch) = wanted.branch() {
+            let first = first_half(self.mode, wanted, self.next_half, pulse);
+            let off = (boundary(first, wanted.carriers()) - pulse).signed().unsigned_abs();
+            return branch.is_calm(first) && off < CALM_ANGLE.0;
+        }
+        let _ = (wanted, pulse);
+        true
     }
 
     /// `true` if the locked half that begins at pulse angle `pulse` begins where it should. After a step of torque a carrier catches up
@@ -203,7 +221,7 @@ impl Modulator {
     /// The place of the zero vectors in the next half.
     fn zeros(&self) -> Zeros {
         match self.ahead(self.next_half) {
-            [next, _] if !next.is_carrier() => Zeros::Early,
+            [next, _] if next.is_pattern() => Zeros::Early,
             _ if self.after_pattern => Zeros::Late,
             _ => Zeros::Even,
         }

@@ -98,14 +98,13 @@ impl Schedule {
     }
 
     /// The mode that this reference should have, given the present one; the dwell time is respected. Out of rest an optimised pattern
-    /// begins with one that can catch the machine; out of the free carrier with a locked one, which leads the flux to the pattern's path.
+    /// begins with one that can catch the machine.
     #[cfg(feature = "optimal")]
     #[inline(never)]
     pub fn wanted(&mut self, now: Instant, mode: Mode, seen: &Reference, devices: &SwitchLimits) -> Mode {
         /// Modulation index up to which the free carrier can, whatever has to be regulated meanwhile.
         const CARRIER_CATCHES: f32 = 0.85;
         match self.ladders_choice(now, mode, seen, devices) {
-            Mode::Opt15 if mode == Mode::Async => Mode::Sync15,
             wanted if mode != Mode::Off || !wanted.is_optimal() => wanted,
             _ if seen.depth < CARRIER_CATCHES => Mode::Async,
             _ => Mode::Mid3,
@@ -179,6 +178,10 @@ fn pick((up, down): (f32, f32), from_above: bool) -> f32 {
 
 /// The depths of a mode's border, lowered where the mode does not reach them because of the shortest pulse.
 fn reached(row: &Row, notch: f32) -> (f32, f32) {
+    #[cfg(feature = "optimal")]
+    if row.branch.is_some() {
+        return row.until.depths;
+    }
     let reach = row.largest - row.notch_sum * notch - DEPTH_ROOM;
     if reach < row.until.depths.0 { (reach, reach - DEPTH_HYSTERESIS) } else { row.until.depths }
 }
@@ -206,15 +209,19 @@ pub fn depth_limit(mode: Mode, rate: f32, devices: &SwitchLimits) -> f32 {
 }
 
 /// `true` if the carrier that ends where half number `next_half` begins may give way to `to`: a locked carrier must have
-/// ended, at a multiple of 360°/gcd(N1, N2); a free one at its valley. Optimised patterns give way to each other at 30° + n · 60°, where
-/// their flux paths lie nearest to each other.
+/// ended, at a multiple of 360°/gcd(N1, N2); a free one at its valley. Optimised patterns give way to each other where
+/// their flux paths meet.
 pub fn may_switch(from: Mode, to: Mode, next_half: u32) -> bool {
     if from == Mode::Off || to == Mode::Off {
         return true;
     }
     #[cfg(feature = "optimal")]
-    if let (Some(old), Some(_)) = (from.branch(), to.branch()) {
-        return next_half % (2 * old.halves) == old.halves;
+    if let Some(old) = from.branch() {
+        match to.branch() {
+            Some(new) => return next_half % (2 * old.halves) == old.meets(new),
+            None if to == Mode::Async => return old.is_calm(next_half),
+            None => {}
+        }
     }
     if next_half & 1 != 0 {
         return false;
@@ -227,10 +234,15 @@ pub fn may_switch(from: Mode, to: Mode, next_half: u32) -> bool {
 }
 
 /// The number of the new mode's first half. Between locked modes it begins at the very angle; from a free carrier
-/// (or none) at the carrier start nearest to the pulse angle, and its length makes up the difference.
+/// (or none) at the carrier start nearest to the pulse angle, of an optimised pattern at the nearest half, and its length makes up the difference.
 pub fn first_half(from: Mode, to: Mode, next_half: u32, pulse: Angle) -> u32 {
     match (from.carriers(), to.carriers()) {
         (_, 0) => 0,
+        #[cfg(feature = "optimal")]
+        (0, new) if to.is_optimal() => {
+            let half = ((u64::from(pulse.0) * u64::from(2 * new) + (1 << 31)) >> 32) as u32;
+            if half >= 2 * new { 0 } else { half }
+        }
         (0, new) => {
             let carrier = ((u64::from(pulse.0) * u64::from(new) + (1 << 31)) >> 32) as u32;
             if carrier >= new { 0 } else { carrier * 2 }

@@ -26,6 +26,11 @@ pub struct Branch {
     pub anchor: u32,
     /// First and last modulation index, in hundredths.
     pub window: (u32, u32),
+    /// Carrier half, counted from 0°, at whose beginning the flux lies next to its fundamental: there the pattern takes over from a free
+    /// carrier.
+    pub calm: u32,
+    /// `true` if its flux path lies near that of its neighbours at 0°; otherwise it does at 30°.
+    pub meets_at_zero: bool,
     /// Highest stator frequency at which it is used, in Hz: makes an angle of the shortest pulse.
     pub highest_hz: f64,
 }
@@ -33,20 +38,20 @@ pub struct Branch {
 /// The branches, from many pulses to few and from a small modulation index to a large one.
 #[rustfmt::skip]
 pub const BRANCHES: [Branch; 14] = [
-    Branch { name: "opt15", pulses: 15, starts_high: false, halves: 6, anchor: 50, window: (10, 58), highest_hz: 60.0 },
-    Branch { name: "opt13a", pulses: 13, starts_high: false, halves: 5, anchor: 50, window: (10, 64), highest_hz: 69.2 },
-    Branch { name: "opt13b", pulses: 13, starts_high: true, halves: 5, anchor: 70, window: (62, 79), highest_hz: 69.2 },
-    Branch { name: "opt11", pulses: 11, starts_high: false, halves: 4, anchor: 60, window: (10, 73), highest_hz: 81.8 },
-    Branch { name: "opt9a", pulses: 9, starts_high: true, halves: 4, anchor: 40, window: (10, 55), highest_hz: 100.0 },
-    Branch { name: "opt9b", pulses: 9, starts_high: false, halves: 4, anchor: 65, window: (50, 82), highest_hz: 100.0 },
-    Branch { name: "opt7a", pulses: 7, starts_high: true, halves: 3, anchor: 50, window: (10, 70), highest_hz: 128.6 },
-    Branch { name: "opt7b", pulses: 7, starts_high: false, halves: 3, anchor: 75, window: (62, 89), highest_hz: 128.6 },
-    Branch { name: "opt7c", pulses: 7, starts_high: true, halves: 3, anchor: 90, window: (86, 96), highest_hz: 128.6 },
-    Branch { name: "opt5a", pulses: 5, starts_high: true, halves: 2, anchor: 60, window: (10, 79), highest_hz: 180.0 },
-    Branch { name: "opt5b", pulses: 5, starts_high: false, halves: 2, anchor: 85, window: (76, 94), highest_hz: 180.0 },
-    Branch { name: "opt5c", pulses: 5, starts_high: true, halves: 2, anchor: 95, window: (91, 97), highest_hz: 180.0 },
-    Branch { name: "opt3a", pulses: 3, starts_high: true, halves: 1, anchor: 80, window: (10, 95), highest_hz: 300.0 },
-    Branch { name: "opt3b", pulses: 3, starts_high: false, halves: 1, anchor: 95, window: (90, 99), highest_hz: 300.0 },
+    Branch { name: "opt15", pulses: 15, starts_high: false, halves: 6, anchor: 50, window: (10, 58), calm: 1, meets_at_zero: false, highest_hz: 60.0 },
+    Branch { name: "opt13a", pulses: 13, starts_high: false, halves: 5, anchor: 50, window: (10, 64), calm: 1, meets_at_zero: false, highest_hz: 69.2 },
+    Branch { name: "opt13b", pulses: 13, starts_high: true, halves: 5, anchor: 70, window: (62, 79), calm: 5, meets_at_zero: false, highest_hz: 69.2 },
+    Branch { name: "opt11", pulses: 11, starts_high: false, halves: 4, anchor: 60, window: (10, 73), calm: 3, meets_at_zero: false, highest_hz: 81.8 },
+    Branch { name: "opt9a", pulses: 9, starts_high: true, halves: 4, anchor: 40, window: (10, 55), calm: 2, meets_at_zero: false, highest_hz: 100.0 },
+    Branch { name: "opt9b", pulses: 9, starts_high: false, halves: 4, anchor: 65, window: (50, 82), calm: 3, meets_at_zero: false, highest_hz: 100.0 },
+    Branch { name: "opt7a", pulses: 7, starts_high: true, halves: 3, anchor: 50, window: (10, 70), calm: 1, meets_at_zero: false, highest_hz: 128.6 },
+    Branch { name: "opt7b", pulses: 7, starts_high: false, halves: 3, anchor: 75, window: (62, 89), calm: 3, meets_at_zero: false, highest_hz: 128.6 },
+    Branch { name: "opt7c", pulses: 7, starts_high: true, halves: 3, anchor: 90, window: (86, 96), calm: 2, meets_at_zero: true, highest_hz: 128.6 },
+    Branch { name: "opt5a", pulses: 5, starts_high: true, halves: 2, anchor: 60, window: (10, 79), calm: 1, meets_at_zero: false, highest_hz: 180.0 },
+    Branch { name: "opt5b", pulses: 5, starts_high: false, halves: 2, anchor: 85, window: (76, 94), calm: 2, meets_at_zero: false, highest_hz: 180.0 },
+    Branch { name: "opt5c", pulses: 5, starts_high: true, halves: 2, anchor: 95, window: (91, 97), calm: 2, meets_at_zero: true, highest_hz: 180.0 },
+    Branch { name: "opt3a", pulses: 3, starts_high: true, halves: 1, anchor: 80, window: (10, 95), calm: 1, meets_at_zero: false, highest_hz: 300.0 },
+    Branch { name: "opt3b", pulses: 3, starts_high: false, halves: 1, anchor: 95, window: (90, 99), calm: 1, meets_at_zero: false, highest_hz: 300.0 },
 ];
 
 /// A branch with its angles.

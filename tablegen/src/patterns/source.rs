@@ -23,6 +23,8 @@ pub fn angle_table(branches: &[Followed]) -> String {
 pub static {name}: Branch = Branch {{
     starts_high: {},
     halves: {},
+    calm: {},
+    meets_at_zero: {},
     angles: {},
     first: {first:?},
     last: {last:?},
@@ -33,6 +35,8 @@ pub static {name}: Branch = Branch {{
             branch.pulses,
             branch.starts_high,
             branch.halves,
+            branch.calm,
+            branch.meets_at_zero,
             branch.pulses / 2,
             1.0 / STEP
         );

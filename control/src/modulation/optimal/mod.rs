@@ -26,6 +26,10 @@ pub struct Branch {
     starts_high: bool,
     /// Carrier halves in 30°.
     pub halves: u32,
+    /// The half, counted from 0° and again every 60°, at whose beginning the flux lies next to its fundamental.
+    calm: u32,
+    /// `true` if its flux path lies near that of its neighbours at 0°.
+    meets_at_zero: bool,
     /// Angles in a quarter turn: the pulses of a turn are twice as many and one.
     pub angles: usize,
     /// Modulation index of the first and last node.
@@ -64,6 +68,17 @@ impl Branch {
         let above = row(node + 1);
         let above = if above.is_empty() { below } else { above };
         Pattern { branch: self, below, above, part: place - node as f32 }
+    }
+
+    /// `true` for a half at whose beginning the pattern may take over from a free carrier.
+    pub fn is_calm(&self, half: u32) -> bool {
+        half % (2 * self.halves) == self.calm
+    }
+
+    /// The half, counted from 0° and again every 60°, at whose beginning its flux path lies nearest to that of another pattern: at 30°, but
+    /// where both meet at 0°.
+    pub fn meets(&self, other: &Self) -> u32 {
+        if self.meets_at_zero && other.meets_at_zero { 0 } else { self.halves }
     }
 
     /// Carrier halves in a quarter turn.

@@ -248,4 +248,23 @@ mod tests {
             }
         }
     }
+
+    #[test]
+    fn a_calm_half_begins_where_the_flux_lies_next_to_its_fundamental() {
+        for mode in Mode::ALL {
+            let Some(branch) = mode.branch() else { continue };
+            let voltage_v = 0.5 * (branch.first + branch.last) * six_step_v(LINK_V);
+            let off =
+                |half: u32| ripple(mode, half, voltage_v, LINK_V, 1.0).unwrap().squared().sqrt() / voltage_v;
+            let least = (0..2 * branch.halves).min_by(|a, b| off(*a).total_cmp(&off(*b))).unwrap();
+            let told = (0..2 * branch.halves).find(|half| branch.is_calm(*half)).unwrap();
+            assert!(
+                off(told) < off(least) + 0.001,
+                "{}: {least} has {}, {told} {}",
+                mode.name(),
+                off(least),
+                off(told)
+            );
+        }
+    }
 }

@@ -7,6 +7,8 @@ use super::Branch;
 pub static OPT15: Branch = Branch {
     starts_high: false,
     halves: 6,
+    calm: 1,
+    meets_at_zero: false,
     angles: 7,
     first: 0.1,
     last: 0.58,
@@ -70,6 +72,8 @@ pub static OPT15: Branch = Branch {
 pub static OPT13A: Branch = Branch {
     starts_high: false,
     halves: 5,
+    calm: 1,
+    meets_at_zero: false,
     angles: 6,
     first: 0.1,
     last: 0.64,
@@ -139,6 +143,8 @@ pub static OPT13A: Branch = Branch {
 pub static OPT13B: Branch = Branch {
     starts_high: true,
     halves: 5,
+    calm: 5,
+    meets_at_zero: false,
     angles: 6,
     first: 0.62,
     last: 0.79,
@@ -171,6 +177,8 @@ pub static OPT13B: Branch = Branch {
 pub static OPT11: Branch = Branch {
     starts_high: false,
     halves: 4,
+    calm: 3,
+    meets_at_zero: false,
     angles: 5,
     first: 0.1,
     last: 0.73,
@@ -249,6 +257,8 @@ pub static OPT11: Branch = Branch {
 pub static OPT9A: Branch = Branch {
     starts_high: true,
     halves: 4,
+    calm: 2,
+    meets_at_zero: false,
     angles: 4,
     first: 0.1,
     last: 0.55,
@@ -309,6 +319,8 @@ pub static OPT9A: Branch = Branch {
 pub static OPT9B: Branch = Branch {
     starts_high: false,
     halves: 4,
+    calm: 3,
+    meets_at_zero: false,
     angles: 4,
     first: 0.5,
     last: 0.8200000000000001,
@@ -356,6 +368,8 @@ pub static OPT9B: Branch = Branch {
 pub static OPT7A: Branch = Branch {
     starts_high: true,
     halves: 3,
+    calm: 1,
+    meets_at_zero: false,
     angles: 3,
     first: 0.1,
     last: 0.7000000000000001,
@@ -431,6 +445,8 @@ pub static OPT7A: Branch = Branch {
 pub static OPT7B: Branch = Branch {
     starts_high: false,
     halves: 3,
+    calm: 3,
+    meets_at_zero: false,
     angles: 3,
     first: 0.62,
     last: 0.89,
@@ -473,6 +489,8 @@ pub static OPT7B: Branch = Branch {
 pub static OPT7C: Branch = Branch {
     starts_high: true,
     halves: 3,
+    calm: 2,
+    meets_at_zero: true,
     angles: 3,
     first: 0.86,
     last: 0.96,
@@ -498,6 +516,8 @@ pub static OPT7C: Branch = Branch {
 pub static OPT5A: Branch = Branch {
     starts_high: true,
     halves: 2,
+    calm: 1,
+    meets_at_zero: false,
     angles: 2,
     first: 0.1,
     last: 0.79,
@@ -582,6 +602,8 @@ pub static OPT5A: Branch = Branch {
 pub static OPT5B: Branch = Branch {
     starts_high: false,
     halves: 2,
+    calm: 2,
+    meets_at_zero: false,
     angles: 2,
     first: 0.76,
     last: 0.9400000000000001,
@@ -615,6 +637,8 @@ pub static OPT5B: Branch = Branch {
 pub static OPT5C: Branch = Branch {
     starts_high: true,
     halves: 2,
+    calm: 2,
+    meets_at_zero: true,
     angles: 2,
     first: 0.91,
     last: 0.97,
@@ -636,6 +660,8 @@ pub static OPT5C: Branch = Branch {
 pub static OPT3A: Branch = Branch {
     starts_high: true,
     halves: 1,
+    calm: 1,
+    meets_at_zero: false,
     angles: 1,
     first: 0.1,
     last: 0.9500000000000001,
@@ -736,6 +762,8 @@ pub static OPT3A: Branch = Branch {
 pub static OPT3B: Branch = Branch {
     starts_high: false,
     halves: 1,
+    calm: 1,
+    meets_at_zero: false,
     angles: 1,
     first: 0.9,
     last: 0.99,

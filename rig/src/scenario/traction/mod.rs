@@ -43,7 +43,7 @@ use serde::Serialize;
 use serde_json::{Map, Value};
 use tractive::control::{ControlLaw, Controller, Demand, Gains, MtpaStart, PiLaw};
 use tractive::drive::traction::Settings;
-use tractive::modulation::{Ladder, SwitchLimits};
+use tractive::modulation::{FREE_CARRIER_SHARE, Ladder, SwitchLimits};
 use tractive::operator::{Line, LineTimes};
 use tractive::recorder::Recorder;
 use tractive::time::{Clock, Instant};
@@ -115,6 +115,22 @@ impl PatternsName {
         match self {
             Self::Paper => Ladder::PAPER,
             Self::Optimal => Ladder::OPTIMAL,
+        }
+    }
+
+    /// Highest frequency of the free carrier, as a share of the switches'.
+    const fn free_carrier_share(self) -> f32 {
+        match self {
+            Self::Paper => 1.0,
+            Self::Optimal => FREE_CARRIER_SHARE,
+        }
+    }
+
+    /// As on the command line.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Paper => "paper",
+            Self::Optimal => "optimal",
         }
     }
 }
@@ -249,6 +265,10 @@ impl System for Traction {
             ("--torque", own("torque"), -most_nm, most_nm),
             ("--to", own("to"), -fastest_rpm, fastest_rpm),
         ])?;
+        let (law, patterns) = (options.own.law, options.own.patterns);
+        if (law, patterns, options.on) == (LawName::Pi, PatternsName::Optimal, On::Qemu) {
+            anyhow::bail!("--patterns optimal: no image with --law pi has them; --on host has");
+        }
         options.check_flaws(machine, udc_v)
     }
 
@@ -394,14 +414,15 @@ fn setup(plan: &Plan, options: &Options, machine: &Machine, over_protocol: bool)
     }
 }
 
-fn devices(setup: &Setup, machine: &Machine) -> SwitchLimits {
+fn devices(setup: &Setup, options: &Options, machine: &Machine) -> SwitchLimits {
     let Setup { control_ticks, min_pulse_ticks, dead_time_ticks, .. } = *setup;
     let clock = Clock { control_ticks, ..CLOCK };
-    SwitchLimits::new(min_pulse_ticks, dead_time_ticks, machine.tables.ratings.max_switching_hz, &clock)
+    let carrier_hz = options.own.patterns.free_carrier_share() * machine.tables.ratings.max_switching_hz;
+    SwitchLimits::new(min_pulse_ticks, dead_time_ticks, carrier_hz, &clock)
 }
 
-fn first_half_ticks(setup: &Setup, machine: &Machine) -> u32 {
-    devices(setup, machine).shortest_half_ticks + setup.pwm_delay_ticks
+fn first_half_ticks(setup: &Setup, options: &Options, machine: &Machine) -> u32 {
+    devices(setup, options, machine).shortest_half_ticks + setup.pwm_delay_ticks
 }
 
 /// The drive that an image with this law and this setup would be, and its operator.
@@ -412,11 +433,12 @@ fn tasks<'a, L: ControlLaw>(
     machine: &Machine,
 ) -> Result<Tasks<'a, L>> {
     let gains = Gains::of(setup.uncompensated, setup.behind_line_filter);
-    let settings = Settings { clock: clock(options, machine), devices: devices(setup, machine), gains };
+    let settings =
+        Settings { clock: clock(options, machine), devices: devices(setup, options, machine), gains };
     settings.check(machine.tables).map_err(run::refused)?;
     let ratings = &machine.tables.ratings;
     let line = setup.line.map(|times| Line::rated(ratings, times.precharge_s, times.discharge_s));
-    let first = first_half_ticks(setup, machine);
+    let first = first_half_ticks(setup, options, machine);
     let tasks = Tasks::with_law(law, Instant(0), machine.tables, settings, first);
     Ok(tasks.on(options.own.patterns.ladder()).operated_on(line))
 }
@@ -426,7 +448,7 @@ fn bench(plan: Plan, setup: &Setup, options: &Options, machine: &Machine) -> Ben
     let angle_jitter_s = 1e-6 * options.own.angle_jitter_us;
     let settings = bench::Settings {
         clock: clock(options, machine),
-        first_half_ticks: first_half_ticks(setup, machine),
+        first_half_ticks: first_half_ticks(setup, options, machine),
         dead_time_ticks: ticks(options.dead_time_us),
         lead_s: plan.lead_s,
         duration_s: plan.duration_s,
