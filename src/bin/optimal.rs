@@ -16,8 +16,12 @@ compile_error!("this image needs the features `qemu` and `optimal`");
 use tractive::board::qemu;
 
 #[cfg(all(target_os = "none", feature = "qemu"))]
-#[path = "../firmware/optimal_law.rs"]
+#[path = "../firmware/own_law.rs"]
 mod law;
+
+#[cfg(all(target_os = "none", feature = "qemu"))]
+#[path = "../firmware/optimal_patterns.rs"]
+mod patterns;
 
 #[cfg(all(target_os = "none", feature = "qemu"))]
 #[path = "../firmware/pmasynrm.rs"]

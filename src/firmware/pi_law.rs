@@ -5,7 +5,6 @@ use core::sync::atomic::{AtomicBool, Ordering};
 use tractive::built_in::traction::BuiltIn;
 use tractive::control::{MtpaStart, PiLaw};
 use tractive::drive::traction::ControlTask;
-use tractive::modulation::Ladder;
 use tractive::wire::Setup;
 
 /// The law.
@@ -31,9 +30,3 @@ fn set_up(task: &mut ControlTask<BuiltIn, Law>) {
         task.set_law(PiLaw::starting(MtpaStart::Zero));
     }
 }
-
-/// The ladder of modes: the paper's, which the PWM task has without being told.
-pub const LADDER: Option<Ladder> = None;
-
-/// Highest frequency of the free carrier, as a share of the switches'.
-pub const FREE_CARRIER_SHARE: f32 = 1.0;

@@ -1,14 +1,15 @@
 //! The PMaSynRM's two interrupts and its idle loop, on whichever `qemu` the image's root names: the board, or the board with faults injected;
-//! and with the control law that its `law` names.
+//! and with the control law that its `law` names and the pulse patterns of its `patterns`.
 
 use crate::law::{self, Law};
+use crate::patterns;
 use crate::qemu::{self, CLOCK, Interrupt as interrupt};
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use cortex_m_rt::{entry, exception, interrupt};
 use tractive::built_in::traction::{BUILT_IN, BuiltIn};
 use tractive::control::Gains;
 use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
-use tractive::modulation::{Schedule, SwitchLimits};
+use tractive::modulation::SwitchLimits;
 use tractive::operator::{self, Line, Slot, slot_s};
 use tractive::protocol::CanEndpoint;
 use tractive::time::{Clock, Instant};
@@ -22,7 +23,7 @@ static UNCOMPENSATED: AtomicBool = AtomicBool::new(false);
 static BEHIND_LINE_FILTER: AtomicBool = AtomicBool::new(false);
 
 /// Highest frequency of the free carrier, in Hz.
-const MAX_CARRIER_HZ: f32 = law::FREE_CARRIER_SHARE * BUILT_IN.ratings.max_switching_hz;
+const MAX_CARRIER_HZ: f32 = patterns::FREE_CARRIER_SHARE * BUILT_IN.ratings.max_switching_hz;
 
 /// Until the host has told its own.
 const DEFAULTS: Settings = Settings {
@@ -102,8 +103,8 @@ fn DUALTIMER() {
     let task = TASK.get_or_insert_with(|| {
         let first = Instant(FIRST_HALF_TICKS.load(Ordering::Relaxed));
         let task = PwmTask::new(BuiltIn, settings(), first).after_halves_of(first.0);
-        match law::LADDER {
-            Some(ladder) => task.scheduled(Schedule::on(ladder, &settings().clock)),
+        match patterns::SCHEDULE {
+            Some(schedule) => task.scheduled(schedule(&settings().clock)),
             None => task,
         }
     });

@@ -31,6 +31,9 @@ pub enum Regulation {
     Fundamental,
     /// The angle alone: the amplitude is all that the link gives.
     Angle,
+    /// The flux along the pattern's own path, by moving its next edges.
+    #[cfg(feature = "optimal")]
+    Path,
 }
 
 /// A mode's flux ripple as a share of the fundamental flux, over the share of six-step that its fundamental lacks.
@@ -111,7 +114,8 @@ impl Row {
             notch_sum,
             ripple: RippleShare { least: WHOLE_RIPPLE, linear, square },
             until,
-            ..Self::REST
+            #[cfg(feature = "optimal")]
+            branch: None,
         }
     }
 
@@ -122,6 +126,7 @@ impl Row {
         Self {
             name,
             kind: Kind::Optimal,
+            regulation: Regulation::Path,
             carriers: (6 * branch.halves) as u8,
             turn_ons: (2 * branch.angles + 1) as u8,
             largest: branch.last,

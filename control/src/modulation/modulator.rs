@@ -25,6 +25,9 @@ pub struct Modulator {
     transition: PatternTransition,
     /// `true` if the half before was a pattern's and the next one is a carrier's.
     after_pattern: bool,
+    /// Carriers for which an optimised pattern has waited to take over from a free one.
+    #[cfg(feature = "optimal")]
+    waited: u32,
     /// Half the zero voltage of the present pattern's sectors, as an angle in rad.
     zero_rad: f32,
 }
@@ -47,6 +50,10 @@ const KEPT_ANGLE: Angle = Angle(71_582_788);
 #[cfg(feature = "optimal")]
 const CALM_ANGLE: Angle = Angle(17_895_697);
 
+/// Carriers for which it waits for such an angle.
+#[cfg(feature = "optimal")]
+const LONGEST_WAIT: u32 = 100;
+
 /// Halves by which a switch between locked modes is announced.
 const AHEAD: u32 = 2;
 
@@ -68,6 +75,8 @@ impl Modulator {
             plan: None,
             transition: PatternTransition::DONE,
             after_pattern: false,
+            #[cfg(feature = "optimal")]
+            waited: 0,
             zero_rad: 0.0,
         }
     }
@@ -165,15 +174,20 @@ impl Modulator {
     }
 
     /// `true` unless an optimised pattern is to take over from a free carrier, which it does where its flux lies next to the fundamental.
+    /// It does not wait for ever: at some speeds no carrier of a hundred ends there.
+    #[cfg(feature = "optimal")]
+    fn begins_calmly(&mut self, wanted: Mode, pulse: Angle) -> bool {
+        let (Mode::Async, Some(branch)) = (self.mode, wanted.branch()) else { return true };
+        let first = first_half(self.mode, wanted, self.next_half, pulse);
+        let off = (boundary(first, wanted.carriers()) - pulse).signed().unsigned_abs();
+        let is_calm = branch.is_calm(first) && off < CALM_ANGLE.0;
+        self.waited = if is_calm || self.waited >= LONGEST_WAIT { 0 } else { self.waited + 1 };
+        self.waited == 0
+    }
+
+    #[cfg(not(feature = "optimal"))]
     #[inline(always)]
-    fn begins_calmly(&self, wanted: Mode, pulse: Angle) -> bool {
-        #[cfg(feature = "optimal")]
-        if let Some(branch) = wanted.branch() {
-            let first = first_half(self.mode, wanted, self.next_half, pulse);
-            let off = (boundary(first, wanted.carriers()) - pulse).signed().unsigned_abs();
-            return branch.is_calm(first) && off < CALM_ANGLE.0;
-        }
-        let _ = (wanted, pulse);
+    fn begins_calmly(&self, _wanted: Mode, _pulse: Angle) -> bool {
         true
     }
 

@@ -105,7 +105,7 @@ impl Schedule {
         /// Modulation index up to which the free carrier can, whatever has to be regulated meanwhile.
         const CARRIER_CATCHES: f32 = 0.85;
         match self.ladders_choice(now, mode, seen, devices) {
-            wanted if mode != Mode::Off || !wanted.is_optimal() => wanted,
+            wanted if mode != Mode::Off || !wanted.is_optimal() || self.fixed.is_some() => wanted,
             _ if seen.depth < CARRIER_CATCHES => Mode::Async,
             _ => Mode::Mid3,
         }
@@ -199,6 +199,8 @@ fn largest(row: &Row, notch: f32) -> f32 {
     match row.regulation {
         Regulation::Fundamental => row.largest - row.notch_sum * notch,
         Regulation::Mean | Regulation::Angle => row.largest,
+        #[cfg(feature = "optimal")]
+        Regulation::Path => row.largest,
     }
 }
 

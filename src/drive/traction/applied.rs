@@ -129,6 +129,8 @@ pub(super) const fn follows(mode: Mode) -> Regulated {
         Regulation::Mean => Regulated::Mean,
         Regulation::Fundamental => Regulated::Fundamental,
         Regulation::Angle => Regulated::Angle,
+        #[cfg(feature = "optimal")]
+        Regulation::Path => Regulated::Path,
     }
 }
 

@@ -51,7 +51,7 @@ pub const BRANCHES: [Branch; 14] = [
     Branch { name: "opt5b", pulses: 5, starts_high: false, halves: 2, anchor: 85, window: (76, 94), calm: 2, meets_at_zero: false, highest_hz: 180.0 },
     Branch { name: "opt5c", pulses: 5, starts_high: true, halves: 2, anchor: 95, window: (91, 97), calm: 2, meets_at_zero: true, highest_hz: 180.0 },
     Branch { name: "opt3a", pulses: 3, starts_high: true, halves: 1, anchor: 80, window: (10, 95), calm: 1, meets_at_zero: false, highest_hz: 300.0 },
-    Branch { name: "opt3b", pulses: 3, starts_high: false, halves: 1, anchor: 95, window: (90, 99), calm: 1, meets_at_zero: false, highest_hz: 300.0 },
+    Branch { name: "opt3b", pulses: 3, starts_high: false, halves: 1, anchor: 95, window: (90, 98), calm: 1, meets_at_zero: false, highest_hz: 300.0 },
 ];
 
 /// A branch with its angles.

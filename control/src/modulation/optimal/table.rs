@@ -757,7 +757,7 @@ pub static OPT3A: Branch = Branch {
     ],
 };
 
-/// 3 pulses a turn, modulation index 0.90 to 0.99.
+/// 3 pulses a turn, modulation index 0.90 to 0.98.
 #[rustfmt::skip]
 pub static OPT3B: Branch = Branch {
     starts_high: false,
@@ -766,9 +766,9 @@ pub static OPT3B: Branch = Branch {
     meets_at_zero: false,
     angles: 1,
     first: 0.9,
-    last: 0.99,
+    last: 0.98,
     inverse_step: 100.0,
-    ripple: [0.0333, -0.3291, 7.9743],
+    ripple: [0.0253, -0.0156, 5.3898],
     nodes: &[
         0.317560,
         0.301137,
@@ -779,6 +779,5 @@ pub static OPT3B: Branch = Branch {
         0.200335,
         0.173422,
         0.141539,
-        0.100042,
     ],
 };
