@@ -35,11 +35,13 @@ const POINTS: [(f64, f64); 9] = [
 pub struct Point {
     /// Mode at its end.
     pub mode: String,
-    /// Distortion of the current, and by how much it exceeds what the mode's own pulses give, in percent.
+    /// Distortion of the current, in percent.
     pub thd_percent: f64,
+    /// By how much it exceeds what the mode's own pulses give, in percent of that.
     pub thd_excess_percent: f64,
-    /// Torque, peak to peak, in N·m, and by how much it exceeds that of the mode's own pulses, in percent.
+    /// Torque, peak to peak, in N·m.
     pub ripple_nm: f64,
+    /// By how much it exceeds what the mode's own pulses give, in percent of that.
     pub ripple_excess_percent: f64,
     /// Phase current, in A, rms.
     pub current_a: f64,
@@ -110,7 +112,7 @@ fn line(followed: &Followed) -> String {
     let branch = &followed.branch;
     let last = followed.nodes.len().saturating_sub(1);
     let told = followed.nodes.iter().enumerate().filter(|(place, (index, _))| {
-        *place == 0 || *place == last || (index * 100.0).round() as u32 % 10 == 0
+        *place == 0 || *place == last || ((index * 100.0).round() as u32).is_multiple_of(10)
     });
     let values = told.map(|(_, (index, angles))| {
         let wave = Waveform { first: branch.first(), angles_rad: angles };

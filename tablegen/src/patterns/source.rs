@@ -7,7 +7,7 @@ use std::fmt::Write as _;
 /// The source of the table of angles: one `Branch` each, named by the branch in capitals.
 pub fn angle_table(branches: &[Followed]) -> String {
     let mut out = String::from(
-        "//! The angles of the optimised patterns, in rad, from node to node of the modulation index. Made by `cargo rig patterns --write`.\n\nuse super::Branch;\n",
+        "//! The angles of the optimised patterns, in rad, from node to node of the modulation index. Made by `cargo rig patterns --write`.\n#![allow(clippy::excessive_precision, clippy::unreadable_literal)]\n\nuse super::Branch;\n",
     );
     for followed in branches {
         let branch = &followed.branch;

@@ -40,13 +40,13 @@ impl Pattern<'_> {
         let (quadrant, rest) = (half / quarter % 4, half % quarter);
         let mirrored = quadrant & 1 != 0;
         let place = if mirrored { quarter - rest } else { rest };
-        let left = self.to_quarter(place as f32 * self.branch.half_rad());
+        let left = self.left_from(place as f32 * self.branch.half_rad());
         // Odd about 90°, and turned over in the second half wave.
         if quadrant == 1 || quadrant == 2 { left } else { -left }
     }
 
     /// The integral of the level from an angle in rad, in the first quarter, to 90°.
-    fn to_quarter(&self, from: f32) -> f32 {
+    fn left_from(&self, from: f32) -> f32 {
         let mut level = self.branch.first_level();
         let (mut sum, mut from) = (0.0, from);
         for angle in self.angles() {

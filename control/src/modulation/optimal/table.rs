@@ -1,4 +1,5 @@
 //! The angles of the optimised patterns, in rad, from node to node of the modulation index. Made by `cargo rig patterns --write`.
+#![allow(clippy::excessive_precision, clippy::unreadable_literal)]
 
 use super::Branch;
 
