@@ -17,5 +17,9 @@ use tractive_fault_injector::board as qemu;
 mod law;
 
 #[cfg(target_os = "none")]
+#[path = "../../src/firmware/paper_patterns.rs"]
+mod patterns;
+
+#[cfg(target_os = "none")]
 #[path = "../../src/firmware/pmasynrm.rs"]
 mod firmware;

@@ -22,6 +22,7 @@ pub mod machine;
 pub mod mtpa_methods;
 pub mod needs;
 pub mod nine_switch;
+pub mod optimised;
 pub mod options;
 pub mod output;
 pub mod pattern;

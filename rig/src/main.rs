@@ -12,7 +12,7 @@ use tractive_rig::folder::{self, MachineCommand};
 use tractive_rig::machine::Machine;
 use tractive_rig::needs::Needs;
 use tractive_rig::scenario::command::folder;
-use tractive_rig::{gallery, nine_switch, pattern, points, report, say, scenario, talk};
+use tractive_rig::{gallery, nine_switch, optimised, pattern, points, report, say, scenario, talk};
 
 #[derive(Parser)]
 #[command(name = "tractive-rig", about = "Plays the motor to the drive, and shows what happened", version)]
@@ -61,6 +61,8 @@ enum Command {
     Machine(Box<MachineCommand>),
     /// The modulator's pulses in steady state.
     Pattern(PatternOptions),
+    /// Optimises the pulse patterns anew: each branch's window and weighted distortion.
+    Patterns(optimised::PatternsOptions),
     /// Faults in every mode, at every speed, motoring, braking and coasting, and what came of each.
     Campaign(CampaignOptions),
     /// The papers' figures as this project makes them, an SVG each, named by paper and number.
@@ -129,6 +131,7 @@ fn command(command: Command) -> Result<ExitCode> {
         Command::NineSwitch { input, output } => done(nine_switch::run(&input, &output)),
         Command::Campaign(options) => campaign::command::run(&options),
         Command::Compare(options) => compare::run(&options),
+        Command::Patterns(options) => done(optimised::run(&options)),
         Command::Pattern(options) => {
             let machine = Machine::load(&options.machine)?;
             let max_switching_hz = machine.tables.ratings.max_switching_hz;

@@ -3,7 +3,7 @@
 use crate::options::{On, RunOptions};
 use crate::scenario::System;
 use crate::scenario::catalogue::{self, Chosen};
-use crate::scenario::traction::{LawName, Traction};
+use crate::scenario::traction::{LawName, PatternsName, Traction};
 use crate::scenario::zs9::Zs9;
 use crate::talk::{self, TalkOptions};
 use anyhow::Result;
@@ -18,6 +18,8 @@ pub struct Needs {
     pub system: &'static str,
     /// The control law: `tractive` or `pi`.
     pub law: &'static str,
+    /// The pulse patterns: `paper` or `optimal`.
+    pub patterns: &'static str,
     /// The place where the drive runs.
     pub on: On,
     /// The machine that was named.
@@ -36,6 +38,7 @@ impl Needs {
         Self {
             system,
             law: LawName::Tractive.name(),
+            patterns: PatternsName::Paper.name(),
             on: options.on,
             machine: options.machine.clone(),
             image: in_qemu && options.image.is_none(),
@@ -48,8 +51,9 @@ impl Needs {
     pub fn of_run(words: Vec<OsString>) -> Result<Self> {
         Ok(match catalogue::choose(words)? {
             Chosen::Traction(choice) => {
-                let law = choice.options.own.law.name();
-                Self { law, ..Self::of(Traction::NAME, &choice.options) }
+                let own = &choice.options.own;
+                let (law, patterns) = (own.law.name(), own.patterns.name());
+                Self { law, patterns, ..Self::of(Traction::NAME, &choice.options) }
             }
             Chosen::Zs9(choice) => Self::of(Zs9::NAME, &choice.options),
         })

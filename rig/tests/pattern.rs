@@ -121,7 +121,9 @@ fn weighted_distortion_is_that_of_the_literature() {
 fn locked_modes_switch_as_often_as_they_say() {
     for mode in Mode::ALL.into_iter().filter(|mode| mode.carriers() > 0) {
         let pulses = f64::from(mode.turn_ons());
-        assert_eq!(Pattern::new(mode, 600.0, 100.0, 6).pulses(), pulses, "{}", mode.name());
+        // Some branches of optimised patterns end below 600 V.
+        let voltage_v = if mode.is_optimal() { 500.0 } else { 600.0 };
+        assert_eq!(Pattern::new(mode, voltage_v, 100.0, 6).pulses(), pulses, "{}", mode.name());
     }
 }
 

@@ -1,7 +1,8 @@
 //! The PMaSynRM's two interrupts and its idle loop, on whichever `qemu` the image's root names: the board, or the board with faults injected;
-//! and with the control law that its `law` names.
+//! and with the control law that its `law` names and the pulse patterns of its `patterns`.
 
 use crate::law::{self, Law};
+use crate::patterns;
 use crate::qemu::{self, CLOCK, Interrupt as interrupt};
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use cortex_m_rt::{entry, exception, interrupt};
@@ -21,10 +22,13 @@ static FIRST_HALF_TICKS: AtomicU32 = AtomicU32::new(0);
 static UNCOMPENSATED: AtomicBool = AtomicBool::new(false);
 static BEHIND_LINE_FILTER: AtomicBool = AtomicBool::new(false);
 
+/// Highest frequency of the free carrier, in Hz.
+const MAX_CARRIER_HZ: f32 = patterns::FREE_CARRIER_SHARE * BUILT_IN.ratings.max_switching_hz;
+
 /// Until the host has told its own.
 const DEFAULTS: Settings = Settings {
     clock: CLOCK,
-    devices: SwitchLimits::new(0, 0, BUILT_IN.ratings.max_switching_hz, &CLOCK),
+    devices: SwitchLimits::new(0, 0, MAX_CARRIER_HZ, &CLOCK),
     gains: Gains::DEFAULT,
 };
 
@@ -35,7 +39,7 @@ fn settings() -> Settings {
         devices: SwitchLimits::new(
             MIN_PULSE_TICKS.load(Ordering::Relaxed),
             DEAD_TIME_TICKS.load(Ordering::Relaxed),
-            BUILT_IN.ratings.max_switching_hz,
+            MAX_CARRIER_HZ,
             &clock,
         ),
         gains: Gains::of(UNCOMPENSATED.load(Ordering::Relaxed), BEHIND_LINE_FILTER.load(Ordering::Relaxed)),
@@ -98,7 +102,11 @@ fn DUALTIMER() {
     let mut board = qemu::Pwm;
     let task = TASK.get_or_insert_with(|| {
         let first = Instant(FIRST_HALF_TICKS.load(Ordering::Relaxed));
-        PwmTask::new(BuiltIn, settings(), first).after_halves_of(first.0)
+        let task = PwmTask::new(BuiltIn, settings(), first).after_halves_of(first.0);
+        match patterns::SCHEDULE {
+            Some(schedule) => task.scheduled(schedule(&settings().clock)),
+            None => task,
+        }
     });
     task.run(&mut board, &SHARED);
 }

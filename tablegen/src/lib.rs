@@ -19,6 +19,8 @@ mod input;
 mod map;
 mod optimum;
 mod parameters;
+#[cfg(feature = "patterns")]
+pub mod patterns;
 mod rust_source;
 mod smooth;
 mod tables;

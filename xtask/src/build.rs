@@ -15,6 +15,8 @@ pub const QEMU: &str = "qemu";
 
 /// The PMaSynRM's image with the papers' ordinary control law.
 const PI: &str = "pi";
+/// The PMaSynRM's image with the optimised pulse patterns.
+const OPTIMAL: &str = "optimal";
 
 /// The systems, each with an image of its own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -74,6 +76,13 @@ pub fn pi_image(toolchain: &Toolchain, machine: Option<&OsString>) -> Result<Pat
     let mut command = on_target(toolchain, "tractive", PI);
     command.args(["--features", QEMU]);
     firmware(command, PI, System::Traction, machine)
+}
+
+/// Builds the PMaSynRM's image with the optimised pulse patterns, likewise.
+pub fn optimal_image(toolchain: &Toolchain, machine: Option<&OsString>) -> Result<PathBuf> {
+    let mut command = on_target(toolchain, "tractive", OPTIMAL);
+    command.args(["--features", "qemu,optimal"]);
+    firmware(command, OPTIMAL, System::Traction, machine)
 }
 
 /// Builds a system's image for a board of real hardware, with the tables of `machine` if one is named.

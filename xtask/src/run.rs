@@ -23,6 +23,8 @@ struct Needs {
     system: String,
     /// The control law: `tractive` or `pi`.
     law: String,
+    /// The pulse patterns: `paper` or `optimal`.
+    patterns: String,
     machine: Option<String>,
     /// `true` if the image is still to be built.
     image: bool,
@@ -78,8 +80,9 @@ pub fn run(verb: &str, words: &[OsString]) -> Result<u8> {
     if needs.image {
         eprintln!("building the image, where it is not up to date");
         let (toolchain, machine) = (setup.toolchain()?, machine.as_ref());
-        let image = match needs.law.as_str() {
-            "pi" => build::pi_image(&toolchain, machine)?,
+        let image = match (needs.law.as_str(), needs.patterns.as_str()) {
+            (_, "optimal") => build::optimal_image(&toolchain, machine)?,
+            ("pi", _) => build::pi_image(&toolchain, machine)?,
             _ => build::image(&toolchain, needs.system(), machine)?,
         };
         rig.env("TRACTIVE_IMAGE", image);

@@ -258,7 +258,7 @@ impl ControlLaw for Controller {
             resistance,
         };
         let current_loop::Output { voltage, steady } = current_loop::step(&input, law.gains);
-        let regulates_by_pulses = limits.follows == Regulated::Mean;
+        let regulates_by_pulses = limits.follows.is_direct();
         let starts_flying = committed.volt_seconds.is_none() && !regulates_by_pulses;
         let vector = if starts_flying { self.start_flying(ahead.flux) } else { voltage.vector };
         let vector = vector.unpark(sample.frame);

@@ -71,6 +71,20 @@ pub enum Regulated {
     Fundamental,
     /// The angle alone: square wave.
     Angle,
+    /// The flux along a pattern's own path, as far as its next edges can move: optimised patterns.
+    #[cfg(feature = "optimal")]
+    Path,
+}
+
+impl Regulated {
+    /// `true` if the mean voltage of the very next half can be chosen.
+    #[inline(always)]
+    pub const fn is_direct(self) -> bool {
+        #[cfg(feature = "optimal")]
+        return matches!(self, Self::Mean | Self::Path);
+        #[cfg(not(feature = "optimal"))]
+        return matches!(self, Self::Mean);
+    }
 }
 
 /// Gains of the loop.
@@ -173,11 +187,14 @@ pub fn step(input: &Input, gains: &Gains) -> Output {
         let steady = steady - input.disturbance.mean();
         (steady - (input.ahead.flux - reference) * gain, steady, limit)
     };
+    let direct = || {
+        let (mean, disturbance) = mean_voltage(input, reference, gains);
+        (mean + resistive - disturbance, steady - disturbance, limit * TRANSIENT_REACH)
+    };
     let (regulated, steady, reach) = match input.limits.follows {
-        Regulated::Mean => {
-            let (mean, disturbance) = mean_voltage(input, reference, gains);
-            (mean + resistive - disturbance, steady - disturbance, limit * TRANSIENT_REACH)
-        }
+        Regulated::Mean => direct(),
+        #[cfg(feature = "optimal")]
+        Regulated::Path => direct(),
         Regulated::Fundamental => towards(gains.pattern_rad_s),
         Regulated::Angle => towards(gains.square_damping * input.omega.abs()),
     };

@@ -101,6 +101,8 @@ mod half;
 mod middle60;
 mod mode;
 mod modulator;
+#[cfg(feature = "optimal")]
+mod optimal;
 mod pattern_transition;
 mod reference;
 mod ripple;
@@ -111,8 +113,12 @@ pub use dead_time::compensated;
 pub use half::CarrierHalf;
 pub use mode::{MODE_CODES, Mode, Regulation};
 pub use modulator::Modulator;
+#[cfg(feature = "optimal")]
+pub use optimal::ripple as optimal_ripple;
 pub use pattern_transition::TRANSITION_SECTORS;
 pub use reference::Reference;
 pub use ripple::{RippleFlux, ripple_share};
 pub use schedule::{Ladder, Schedule, depth_limit, first_half};
+#[cfg(feature = "optimal")]
+pub use switch_limits::FREE_CARRIER_SHARE;
 pub use switch_limits::SwitchLimits;

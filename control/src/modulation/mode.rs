@@ -3,6 +3,8 @@
 //! A new pattern is a new row at the table's end and its tests. Whatever asks about modes (modulator, schedule, control, wire,
 //! traces, reports and command line) reads the rows; whoever wants the drive to use it names it in a [`Ladder`](super::Ladder).
 
+#[cfg(feature = "optimal")]
+use super::optimal::{self, Branch};
 use super::schedule::Border;
 
 /// The maker of a mode's pulses.
@@ -14,6 +16,9 @@ enum Kind {
     Carrier,
     /// Middle 60°: whole edges of a flux hexagon, with a notch in each carrier.
     Pattern,
+    /// Edges at angles from a table.
+    #[cfg(feature = "optimal")]
+    Optimal,
 }
 
 /// The quantities that control can regulate with a mode's pulses.
@@ -26,6 +31,9 @@ pub enum Regulation {
     Fundamental,
     /// The angle alone: the amplitude is all that the link gives.
     Angle,
+    /// The flux along the pattern's own path, by moving its next edges.
+    #[cfg(feature = "optimal")]
+    Path,
 }
 
 /// A mode's flux ripple as a share of the fundamental flux, over the share of six-step that its fundamental lacks.
@@ -56,6 +64,9 @@ pub(super) struct Row {
     pub ripple: RippleShare,
     /// The border at which the mode ends on the way up.
     pub until: Border,
+    /// The angles of an optimised pattern.
+    #[cfg(feature = "optimal")]
+    pub branch: Option<&'static Branch>,
 }
 
 /// Ripple of square wave, and of every pattern whose notches have gone.
@@ -73,6 +84,8 @@ impl Row {
         notch_sum: 0.0,
         ripple: RippleShare { least: 0.045_3, linear: 0.0, square: 0.0 },
         until: Border::NEVER,
+        #[cfg(feature = "optimal")]
+        branch: None,
     };
 
     /// A triangular carrier with min-max zero sequence, whose fundamental ends at udc/√3; so many carriers a turn, 0 for a free
@@ -101,26 +114,63 @@ impl Row {
             notch_sum,
             ripple: RippleShare { least: WHOLE_RIPPLE, linear, square },
             until,
+            #[cfg(feature = "optimal")]
+            branch: None,
+        }
+    }
+
+    /// An optimised pattern.
+    #[cfg(feature = "optimal")]
+    const fn optimal(name: &'static str, branch: &'static Branch, until: Border) -> Self {
+        let [least, linear, square] = branch.ripple;
+        Self {
+            name,
+            kind: Kind::Optimal,
+            regulation: Regulation::Path,
+            carriers: (6 * branch.halves) as u8,
+            turn_ons: (2 * branch.angles + 1) as u8,
+            largest: branch.last,
+            ripple: RippleShare { least, linear, square },
+            until,
+            branch: Some(branch),
+            ..Self::REST
         }
     }
 }
 
-/// The modes and their rows from one list. A mode's place in it is its code on every wire: rows are added at the end.
+/// The modes and their rows from one list. A mode's place in it is its code on every wire: rows are added at the end. Those behind
+/// `optimal` are there with that feature only.
 macro_rules! modes {
-    ($($(#[$about:meta])* $mode:ident: $row:expr;)*) => {
+    (
+        $($(#[$about:meta])* $mode:ident: $row:expr;)*
+        @optimal { $($(#[$also:meta])* $optimal:ident: $name:literal, $branch:ident, $until:expr;)* }
+    ) => {
         /// The pulse mode.
         #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
         #[cfg_attr(feature = "defmt", derive(defmt::Format))]
         #[repr(u8)]
         #[non_exhaustive]
-        pub enum Mode { $($(#[$about])* $mode,)* }
+        pub enum Mode { $($(#[$about])* $mode,)* $(#[cfg(feature = "optimal")] $(#[$also])* $optimal,)* }
 
+        #[cfg(not(feature = "optimal"))]
         impl Mode {
             /// Every mode, in the order of their codes.
             pub const ALL: [Self; [$(Self::$mode),*].len()] = [$(Self::$mode),*];
         }
 
+        #[cfg(feature = "optimal")]
+        impl Mode {
+            /// Every mode, in the order of their codes.
+            pub const ALL: [Self; [$(Self::$mode,)* $(Self::$optimal),*].len()] = [$(Self::$mode,)* $(Self::$optimal),*];
+
+            /// The optimised patterns, from many pulses to few, and each number's from a small modulation index to a large one.
+            pub(super) const OPTIMAL: [Self; [$(Self::$optimal),*].len()] = [$(Self::$optimal),*];
+        }
+
+        #[cfg(not(feature = "optimal"))]
         static ROWS: [Row; Mode::ALL.len()] = [$($row),*];
+        #[cfg(feature = "optimal")]
+        static ROWS: [Row; Mode::ALL.len()] = [$($row,)* $(Row::optimal($name, &optimal::$branch, $until)),*];
     };
 }
 
@@ -149,6 +199,36 @@ modes! {
     };
     /// Middle 60°, 5 pulses: 12 carriers per turn with one notch each; 4 sin 75°. Not one of the paper's.
     Mid5: Row::middle60("mid5", 2, 3.863_703, [0.0, 0.13], Border::new((176.0, 171.0), (0.955, 0.935)));
+    @optimal {
+        /// Optimised, 15 pulses.
+        Opt15: "opt15", OPT15, Border::new((59.5, 57.0), (0.57, 0.55));
+        /// Optimised, 13 pulses, at a small modulation index.
+        Opt13a: "opt13a", OPT13A, Border::new((68.5, 66.0), (0.635, 0.622));
+        /// Optimised, 13 pulses, at a larger one.
+        Opt13b: "opt13b", OPT13B, Border::new((68.5, 66.0), (0.78, 0.76));
+        /// Optimised, 11 pulses.
+        Opt11: "opt11", OPT11, Border::new((81.0, 78.5), (0.725, 0.705));
+        /// Optimised, 9 pulses, at a small modulation index.
+        Opt9a: "opt9a", OPT9A, Border::new((99.0, 96.0), (0.535, 0.52));
+        /// Optimised, 9 pulses, at a larger one.
+        Opt9b: "opt9b", OPT9B, Border::new((99.0, 96.0), (0.81, 0.79));
+        /// Optimised, 7 pulses, at a small modulation index.
+        Opt7a: "opt7a", OPT7A, Border::new((127.0, 123.5), (0.675, 0.655));
+        /// Optimised, 7 pulses, at a medium one.
+        Opt7b: "opt7b", OPT7B, Border::new((127.0, 123.5), (0.882, 0.867));
+        /// Optimised, 7 pulses, near six-step.
+        Opt7c: "opt7c", OPT7C, Border::new((127.0, 123.5), (f32::INFINITY, f32::INFINITY));
+        /// Optimised, 5 pulses, at a small modulation index.
+        Opt5a: "opt5a", OPT5A, Border::new((177.0, 172.0), (0.785, 0.77));
+        /// Optimised, 5 pulses, at a larger one.
+        Opt5b: "opt5b", OPT5B, Border::new((177.0, 172.0), (0.932, 0.918));
+        /// Optimised, 5 pulses, near six-step.
+        Opt5c: "opt5c", OPT5C, Border::new((177.0, 172.0), (f32::INFINITY, f32::INFINITY));
+        /// Optimised, 3 pulses.
+        Opt3a: "opt3a", OPT3A, Border::new((297.0, 290.0), (0.935, 0.915));
+        /// Optimised, 3 pulses, near six-step.
+        Opt3b: "opt3b", OPT3B, Border::new((297.0, 290.0), (f32::INFINITY, f32::INFINITY));
+    }
 }
 
 /// Room for modes on every wire: their codes have six bits.
@@ -204,6 +284,21 @@ impl Mode {
     #[inline]
     pub const fn is_pattern(self) -> bool {
         matches!(self.row().kind, Kind::Pattern)
+    }
+
+    /// The angles of an optimised pattern.
+    #[cfg(feature = "optimal")]
+    pub(super) const fn branch(self) -> Option<&'static Branch> {
+        self.row().branch
+    }
+
+    /// `true` for an optimised pattern; none is built in without the feature `optimal`.
+    #[inline(always)]
+    pub const fn is_optimal(self) -> bool {
+        #[cfg(feature = "optimal")]
+        return matches!(self.row().kind, Kind::Optimal);
+        #[cfg(not(feature = "optimal"))]
+        return false;
     }
 
     /// Halves in a sector of 60° of a pattern.

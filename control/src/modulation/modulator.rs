@@ -3,8 +3,12 @@
 use super::carrier::{self, Zeros};
 use super::flying_start::FlyingStart;
 use super::half::boundary;
+#[cfg(feature = "optimal")]
+use super::optimal::{self, Branch};
 use super::pattern_transition::PatternTransition;
 use super::{CarrierHalf, Mode, Reference, Schedule, SwitchLimits, first_half, middle60, schedule};
+#[cfg(feature = "optimal")]
+use crate::frames::{AlphaBeta, six_step_v};
 use crate::frames::{Angle, UNITS_PER_RADIAN, limit};
 use crate::time::Instant;
 
@@ -21,6 +25,9 @@ pub struct Modulator {
     transition: PatternTransition,
     /// `true` if the half before was a pattern's and the next one is a carrier's.
     after_pattern: bool,
+    /// Carriers for which an optimised pattern has waited to take over from a free one.
+    #[cfg(feature = "optimal")]
+    waited: u32,
     /// Half the zero voltage of the present pattern's sectors, as an angle in rad.
     zero_rad: f32,
 }
@@ -38,6 +45,14 @@ struct Plan {
 
 /// The largest distance of a carrier from its angle when it gives way to a pattern: 6°, less than half of its shortest half.
 const KEPT_ANGLE: Angle = Angle(71_582_788);
+
+/// The largest distance of a free carrier's boundary from the angle at which an optimised pattern takes over: 1.5°.
+#[cfg(feature = "optimal")]
+const CALM_ANGLE: Angle = Angle(17_895_697);
+
+/// Carriers for which it waits for such an angle.
+#[cfg(feature = "optimal")]
+const LONGEST_WAIT: u32 = 100;
 
 /// Halves by which a switch between locked modes is announced.
 const AHEAD: u32 = 2;
@@ -60,6 +75,8 @@ impl Modulator {
             plan: None,
             transition: PatternTransition::DONE,
             after_pattern: false,
+            #[cfg(feature = "optimal")]
+            waited: 0,
             zero_rad: 0.0,
         }
     }
@@ -150,9 +167,28 @@ impl Modulator {
             if keeps_angle && schedule::may_switch(self.mode, wanted, at) {
                 self.plan = Some(Plan { to: wanted, at });
             }
-        } else if schedule::may_switch(self.mode, wanted, self.next_half) {
+        } else if schedule::may_switch(self.mode, wanted, self.next_half) && self.begins_calmly(wanted, pulse)
+        {
             self.switch_to(start, wanted, pulse);
         }
+    }
+
+    /// `true` unless an optimised pattern is to take over from a free carrier, which it does where its flux lies next to the fundamental.
+    /// It does not wait for ever: at some speeds no carrier of a hundred ends there.
+    #[cfg(feature = "optimal")]
+    fn begins_calmly(&mut self, wanted: Mode, pulse: Angle) -> bool {
+        let (Mode::Async, Some(branch)) = (self.mode, wanted.branch()) else { return true };
+        let first = first_half(self.mode, wanted, self.next_half, pulse);
+        let off = (boundary(first, wanted.carriers()) - pulse).signed().unsigned_abs();
+        let is_calm = branch.is_calm(first) && off < CALM_ANGLE.0;
+        self.waited = if is_calm || self.waited >= LONGEST_WAIT { 0 } else { self.waited + 1 };
+        self.waited == 0
+    }
+
+    #[cfg(not(feature = "optimal"))]
+    #[inline(always)]
+    fn begins_calmly(&self, _wanted: Mode, _pulse: Angle) -> bool {
+        true
     }
 
     /// `true` if the locked half that begins at pulse angle `pulse` begins where it should. After a step of torque a carrier catches up
@@ -199,7 +235,7 @@ impl Modulator {
     /// The place of the zero vectors in the next half.
     fn zeros(&self) -> Zeros {
         match self.ahead(self.next_half) {
-            [next, _] if !next.is_carrier() => Zeros::Early,
+            [next, _] if next.is_pattern() => Zeros::Early,
             _ if self.after_pattern => Zeros::Late,
             _ => Zeros::Even,
         }
@@ -231,6 +267,11 @@ impl Modulator {
             let share = seen.share_within(start, period_ticks);
             return carrier::synchronous(self.next_half, period_ticks, self.zeros(), share, &self.devices);
         }
+        #[cfg(feature = "optimal")]
+        if let Some(branch) = self.mode.branch() {
+            let period_ticks = self.whole_ticks(wanted);
+            return self.optimal(branch, start, period_ticks, seen);
+        }
         let own_rad = middle60::zero_rad(self.mode, seen.voltage_v, seen.udc_v);
         self.zero_rad = own_rad;
         let (period, notch) = match self.transition.sector(own_rad, self.mode.sector_halves()) {
@@ -248,6 +289,19 @@ impl Modulator {
             }
         };
         middle60::half(self.mode, self.next_half, self.whole_ticks(period), notch, &self.devices)
+    }
+
+    /// One half of an optimised pattern, its edges moved by what the wanted mean voltage differs from the pattern's fundamental.
+    #[cfg(feature = "optimal")]
+    #[inline(never)]
+    fn optimal(&self, branch: &Branch, start: Instant, period_ticks: u32, seen: &Reference) -> CarrierHalf {
+        let carriers = self.mode.carriers();
+        let middle = boundary(self.next_half, carriers) + Angle(boundary(1, carriers).0 / 2);
+        let round = (middle - Angle::DEG_90).sin_cos();
+        let index = branch.within(seen.voltage_v / six_step_v(seen.udc_v));
+        let own = AlphaBeta { alpha: round.cos, beta: round.sin } * (index * core::f32::consts::FRAC_2_PI);
+        let more_ticks = (seen.share_within(start, period_ticks) - own) * period_ticks as f32;
+        optimal::half(branch, self.next_half, period_ticks, (index, more_ticks), &self.devices)
     }
 
     /// A length in whole ticks. Slower than the async mode's range there is nothing to lock to: the length stays that

@@ -39,6 +39,10 @@ impl Ladder {
     pub const PAPER: Self =
         Self::of(&[Mode::Async, Mode::Sync15, Mode::Sync12, Mode::Mid7, Mode::Mid3, Mode::Square]);
 
+    /// The optimised patterns.
+    #[cfg(feature = "optimal")]
+    pub const OPTIMAL: Self = Self::of(&OPTIMAL_RUNGS);
+
     /// Of these modes, of which the first is the asynchronous one.
     pub const fn of(modes: &'static [Mode]) -> Self {
         assert!(matches!(modes, [Mode::Async, ..]), "a ladder begins with the asynchronous mode");
@@ -50,6 +54,19 @@ impl Ladder {
         self.0.iter().copied()
     }
 }
+
+/// The asynchronous mode, the optimised patterns and square wave.
+#[cfg(feature = "optimal")]
+static OPTIMAL_RUNGS: [Mode; Mode::OPTIMAL.len() + 2] = {
+    let mut rungs = [Mode::Square; Mode::OPTIMAL.len() + 2];
+    rungs[0] = Mode::Async;
+    let mut place = 0;
+    while place < Mode::OPTIMAL.len() {
+        rungs[place + 1] = Mode::OPTIMAL[place];
+        place += 1;
+    }
+    rungs
+};
 
 /// Room kept between a mode's largest depth and the border above it, and the hysteresis kept below a border that
 /// the shortest pulse has lowered; shares of six-step.
@@ -93,10 +110,31 @@ impl Schedule {
         Self { fixed: Some(mode), ..Self::new(clock) }
     }
 
-    /// The mode that this reference should have, given the present one: a higher one at once, the next lower one when it has sufficed
-    /// for the dwell time; either no sooner than that after the last switch.
+    /// The mode that this reference should have, given the present one. Out of rest an optimised pattern begins with one that can catch
+    /// the machine.
+    #[cfg(feature = "optimal")]
     #[inline(never)]
     pub fn wanted(&mut self, now: Instant, mode: Mode, seen: &Reference, devices: &SwitchLimits) -> Mode {
+        /// Modulation index up to which the free carrier can, whatever has to be regulated meanwhile.
+        const CARRIER_CATCHES: f32 = 0.85;
+        match self.ladders_choice(now, mode, seen, devices) {
+            wanted if mode != Mode::Off || !wanted.is_optimal() || self.fixed.is_some() => wanted,
+            _ if seen.depth < CARRIER_CATCHES => Mode::Async,
+            _ => Mode::Mid3,
+        }
+    }
+
+    /// The mode that this reference should have, given the present one.
+    #[cfg(not(feature = "optimal"))]
+    #[inline(never)]
+    pub fn wanted(&mut self, now: Instant, mode: Mode, seen: &Reference, devices: &SwitchLimits) -> Mode {
+        self.ladders_choice(now, mode, seen, devices)
+    }
+
+    /// The ladder's rung for this reference: a higher one at once, the next lower one when it has sufficed for the dwell time; either no
+    /// sooner than that after the last switch.
+    #[inline(always)]
+    fn ladders_choice(&mut self, now: Instant, mode: Mode, seen: &Reference, devices: &SwitchLimits) -> Mode {
         if let Some(fixed) = self.fixed {
             return fixed;
         }
@@ -153,6 +191,10 @@ fn pick((up, down): (f32, f32), from_above: bool) -> f32 {
 
 /// The depths of a mode's border, lowered where the mode does not reach them because of the shortest pulse.
 fn reached(row: &Row, notch: f32) -> (f32, f32) {
+    #[cfg(feature = "optimal")]
+    if row.branch.is_some() {
+        return row.until.depths;
+    }
     let reach = row.largest - row.notch_sum * notch - DEPTH_ROOM;
     if row.notch_sum > 0.0 && reach < row.until.depths.0 {
         (reach, reach - DEPTH_HYSTERESIS)
@@ -174,6 +216,8 @@ fn largest(row: &Row, notch: f32) -> f32 {
     match row.regulation {
         Regulation::Fundamental => row.largest - row.notch_sum * notch,
         Regulation::Mean | Regulation::Angle => row.largest,
+        #[cfg(feature = "optimal")]
+        Regulation::Path => row.largest,
     }
 }
 
@@ -184,10 +228,19 @@ pub fn depth_limit(mode: Mode, rate: f32, devices: &SwitchLimits) -> f32 {
 }
 
 /// `true` if the carrier that ends where half number `next_half` begins may give way to `to`: a locked carrier must have
-/// ended, at a multiple of 360°/gcd(N1, N2); a free one at its valley.
+/// ended, at a multiple of 360°/gcd(N1, N2); a free one at its valley. Optimised patterns give way to each other where
+/// their flux paths meet.
 pub fn may_switch(from: Mode, to: Mode, next_half: u32) -> bool {
     if from == Mode::Off || to == Mode::Off {
         return true;
+    }
+    #[cfg(feature = "optimal")]
+    if let Some(old) = from.branch() {
+        match to.branch() {
+            Some(new) => return next_half % (2 * old.halves) == old.meets(new),
+            None if to == Mode::Async => return old.is_calm(next_half),
+            None => {}
+        }
     }
     if next_half & 1 != 0 {
         return false;
@@ -200,10 +253,15 @@ pub fn may_switch(from: Mode, to: Mode, next_half: u32) -> bool {
 }
 
 /// The number of the new mode's first half. Between locked modes it begins at the very angle; from a free carrier
-/// (or none) at the carrier start nearest to the pulse angle, and its length makes up the difference.
+/// (or none) at the carrier start nearest to the pulse angle, of an optimised pattern at the nearest half, and its length makes up the difference.
 pub fn first_half(from: Mode, to: Mode, next_half: u32, pulse: Angle) -> u32 {
     match (from.carriers(), to.carriers()) {
         (_, 0) => 0,
+        #[cfg(feature = "optimal")]
+        (0, new) if to.is_optimal() => {
+            let half = ((u64::from(pulse.0) * u64::from(2 * new) + (1 << 31)) >> 32) as u32;
+            if half >= 2 * new { 0 } else { half }
+        }
         (0, new) => {
             let carrier = ((u64::from(pulse.0) * u64::from(new) + (1 << 31)) >> 32) as u32;
             if carrier >= new { 0 } else { carrier * 2 }

@@ -2,6 +2,11 @@
 
 use crate::time::Clock;
 
+/// Highest frequency of the free carrier, as a share of the switches', where an optimised pattern follows it: its first edges may come
+/// half a carrier early.
+#[cfg(feature = "optimal")]
+pub const FREE_CARRIER_SHARE: f32 = 0.99;
+
 /// Limits of the inverter's switches, which every pulse keeps.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]

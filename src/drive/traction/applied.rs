@@ -7,6 +7,8 @@ use crate::cell::{History, Place, Record};
 use crate::control::{Boundary, Committed, ModeLimits, Regulated, Ripple};
 use crate::drive::messages::{COMMITTAL_WORDS, CommittalRecord, HalfKind};
 use crate::frames::{Abc, AlphaBeta, Angle};
+#[cfg(feature = "optimal")]
+use crate::modulation::optimal_ripple;
 use crate::modulation::{Mode, Reference, Regulation, RippleFlux, depth_limit, first_half, ripple_share};
 use crate::protection::{Fault, Violation};
 use crate::time::{Clock, Instant};
@@ -127,6 +129,8 @@ pub(super) const fn follows(mode: Mode) -> Regulated {
         Regulation::Mean => Regulated::Mean,
         Regulation::Fundamental => Regulated::Fundamental,
         Regulation::Angle => Regulated::Angle,
+        #[cfg(feature = "optimal")]
+        Regulation::Path => Regulated::Path,
     }
 }
 
@@ -223,12 +227,23 @@ impl HalfKind {
     /// Where a pattern begins at the first of these, its own ripple is expected; where a carrier begins, what the old pattern leaves.
     fn ripple(self, decided: Mode, steady: &Steady) -> Option<Ripple> {
         let (mode, end) = (self.mode(), self.half() + 1);
+        let after = self.next_but_one_mode();
         if decided.is_pattern() {
             let at_horizon_wb = self.ripple_at(decided, number(mode, decided, end), steady);
             return Some(Ripple { at_horizon_wb, led_wb: AlphaBeta::default() });
         }
-        let after = self.next_but_one_mode();
-        if !mode.is_pattern() && !after.is_pattern() {
+        if decided.is_optimal() {
+            // The pattern itself leads the flux along its own path, and what moves its edges to that of the next one.
+            let half = number(mode, decided, end);
+            let at_horizon_wb = self.ripple_at(decided, half, steady);
+            let change = || {
+                let own = self.ripple_at(decided, half + 1, steady);
+                self.ripple_at(after, number(decided, after, half + 1), steady) - own
+            };
+            let led_wb = if after == decided { AlphaBeta::default() } else { change() };
+            return Some(Ripple { at_horizon_wb, led_wb });
+        }
+        if !has_path(mode) && !has_path(after) {
             return None;
         }
         let at_horizon_wb = self.ripple_at(mode, end, steady);
@@ -238,10 +253,18 @@ impl HalfKind {
 
     /// A mode's ripple where half number `half` begins, seen in the mirror if the half is: nothing under a carrier.
     fn ripple_at(self, mode: Mode, half: u32, steady: &Steady) -> AlphaBeta {
-        let flux = RippleFlux::new(mode, steady.voltage_v, steady.udc_v, steady.omega.abs());
+        let omega = steady.omega.abs();
+        let flux = RippleFlux::new(mode, steady.voltage_v, steady.udc_v, omega);
         let ripple = flux.map_or(AlphaBeta::default(), |flux| flux.at(half));
+        #[cfg(feature = "optimal")]
+        let ripple = optimal_ripple(mode, half, steady.voltage_v, steady.udc_v, omega).unwrap_or(ripple);
         AlphaBeta { beta: if self.is_mirrored() { -ripple.beta } else { ripple.beta }, ..ripple }
     }
+}
+
+/// `true` for a mode whose flux stands off its fundamental at the boundaries.
+const fn has_path(mode: Mode) -> bool {
+    mode.is_pattern() || mode.is_optimal()
 }
 
 /// The number of half `half` of a mode in the mode that follows.

@@ -406,7 +406,8 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         self.mode = mode;
         self.watch.command(voltage.vector);
         self.reference = Reference {
-            voltage_v: voltage.voltage_v,
+            // An optimised pattern is that of the operating point; the vector moves its edges.
+            voltage_v: if mode.is_optimal() { voltage.steady_v } else { voltage.voltage_v },
             vector: voltage.vector,
             carrier_angle: voltage.carrier.angle(),
             rate: clock.angle_rate(omega),

@@ -19,6 +19,8 @@ impl Design {
     pub const fn of(follows: Regulated) -> Self {
         match follows {
             Regulated::Mean => Self { delay_halves: 1.5, integral_delays: 40.0, set_share: 0.0 },
+            #[cfg(feature = "optimal")]
+            Regulated::Path => Self::of(Regulated::Mean),
             Regulated::Fundamental => Self { delay_halves: 2.25, integral_delays: 40.0, set_share: 0.0 },
             Regulated::Angle => Self { delay_halves: 3.0, integral_delays: 80.0, set_share: 0.5 },
         }

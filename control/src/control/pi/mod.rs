@@ -209,7 +209,7 @@ impl ControlLaw for PiLaw {
         let control_s = law.clock.control_s();
         let passed_s = self.unused as f32 * control_s;
         self.unused = 0;
-        let by_pulses = limits.follows == Regulated::Mean;
+        let by_pulses = limits.follows.is_direct();
         if committed.volt_seconds.is_none() && !by_pulses {
             return self.start_flying(sample, omega);
         }

@@ -43,7 +43,7 @@ use serde::Serialize;
 use serde_json::{Map, Value};
 use tractive::control::{ControlLaw, Controller, Demand, Gains, MtpaStart, PiLaw};
 use tractive::drive::traction::Settings;
-use tractive::modulation::SwitchLimits;
+use tractive::modulation::{FREE_CARRIER_SHARE, Ladder, SwitchLimits};
 use tractive::operator::{Line, LineTimes};
 use tractive::recorder::Recorder;
 use tractive::time::{Clock, Instant};
@@ -99,6 +99,42 @@ impl StartName {
     }
 }
 
+/// The pulse patterns that the drive uses above the free carrier.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum PatternsName {
+    /// The paper's modes
+    Paper,
+    /// Optimised patterns of 15 to 3 pulses
+    Optimal,
+}
+
+impl PatternsName {
+    /// As the modulator's schedule takes them.
+    const fn ladder(self) -> Ladder {
+        match self {
+            Self::Paper => Ladder::PAPER,
+            Self::Optimal => Ladder::OPTIMAL,
+        }
+    }
+
+    /// Highest frequency of the free carrier, as a share of the switches'.
+    const fn free_carrier_share(self) -> f32 {
+        match self {
+            Self::Paper => 1.0,
+            Self::Optimal => FREE_CARRIER_SHARE,
+        }
+    }
+
+    /// As on the command line.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Paper => "paper",
+            Self::Optimal => "optimal",
+        }
+    }
+}
+
 /// Options of all its scenarios.
 #[derive(Clone, Debug, Args, Serialize)]
 pub struct TractionOptions {
@@ -108,6 +144,9 @@ pub struct TractionOptions {
     /// With --law pi: the point whose inductances the first of the two passes of MTPA takes.
     #[arg(long, value_enum, default_value = "previous", value_name = "POINT")]
     pub mtpa_start: StartName,
+    /// The pulse patterns above the free carrier.
+    #[arg(long, value_enum, default_value = "paper")]
+    pub patterns: PatternsName,
     /// Leave the dead time uncompensated: neither the pulses are corrected nor is the sixth harmonic of the voltage followed.
     #[arg(long)]
     pub uncompensated: bool,
@@ -226,6 +265,10 @@ impl System for Traction {
             ("--torque", own("torque"), -most_nm, most_nm),
             ("--to", own("to"), -fastest_rpm, fastest_rpm),
         ])?;
+        let (law, patterns) = (options.own.law, options.own.patterns);
+        if (law, patterns, options.on) == (LawName::Pi, PatternsName::Optimal, On::Qemu) {
+            anyhow::bail!("--patterns optimal: no image with --law pi has them; --on host has");
+        }
         options.check_flaws(machine, udc_v)
     }
 
@@ -372,14 +415,15 @@ fn setup(plan: &Plan, options: &Options, machine: &Machine, over_protocol: bool)
     }
 }
 
-fn devices(setup: &Setup, machine: &Machine) -> SwitchLimits {
+fn devices(setup: &Setup, options: &Options, machine: &Machine) -> SwitchLimits {
     let Setup { control_ticks, min_pulse_ticks, dead_time_ticks, .. } = *setup;
     let clock = Clock { control_ticks, ..CLOCK };
-    SwitchLimits::new(min_pulse_ticks, dead_time_ticks, machine.tables.ratings.max_switching_hz, &clock)
+    let carrier_hz = options.own.patterns.free_carrier_share() * machine.tables.ratings.max_switching_hz;
+    SwitchLimits::new(min_pulse_ticks, dead_time_ticks, carrier_hz, &clock)
 }
 
-fn first_half_ticks(setup: &Setup, machine: &Machine) -> u32 {
-    devices(setup, machine).shortest_half_ticks + setup.pwm_delay_ticks
+fn first_half_ticks(setup: &Setup, options: &Options, machine: &Machine) -> u32 {
+    devices(setup, options, machine).shortest_half_ticks + setup.pwm_delay_ticks
 }
 
 /// The drive that an image with this law and this setup would be, and its operator.
@@ -390,12 +434,14 @@ fn tasks<'a, L: ControlLaw>(
     machine: &Machine,
 ) -> Result<Tasks<'a, L>> {
     let gains = Gains::of(setup.uncompensated, setup.behind_line_filter);
-    let settings = Settings { clock: clock(options, machine), devices: devices(setup, machine), gains };
+    let settings =
+        Settings { clock: clock(options, machine), devices: devices(setup, options, machine), gains };
     settings.check(machine.tables).map_err(run::refused)?;
     let ratings = &machine.tables.ratings;
     let line = setup.line.map(|times| Line::rated(ratings, times.precharge_s, times.discharge_s));
-    let first = first_half_ticks(setup, machine);
-    Ok(Tasks::with_law(law, Instant(0), machine.tables, settings, first).operated_on(line))
+    let first = first_half_ticks(setup, options, machine);
+    let tasks = Tasks::with_law(law, Instant(0), machine.tables, settings, first);
+    Ok(tasks.on(options.own.patterns.ladder()).operated_on(line))
 }
 
 fn bench(plan: Plan, setup: &Setup, options: &Options, machine: &Machine) -> Bench {
@@ -403,7 +449,7 @@ fn bench(plan: Plan, setup: &Setup, options: &Options, machine: &Machine) -> Ben
     let angle_jitter_s = 1e-6 * options.own.angle_jitter_us;
     let settings = bench::Settings {
         clock: clock(options, machine),
-        first_half_ticks: first_half_ticks(setup, machine),
+        first_half_ticks: first_half_ticks(setup, options, machine),
         dead_time_ticks: ticks(options.dead_time_us),
         lead_s: plan.lead_s,
         duration_s: plan.duration_s,

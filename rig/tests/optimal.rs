@@ -1,0 +1,75 @@
+//! The optimised patterns in a closed loop on the host: better than the paper's modes, as good as their pulses, and without a shock from one to the
+//! next.
+
+use tractive_rig::analysis;
+use tractive_rig::optimised::measured;
+use tractive_rig::scenario::catalogue;
+use tractive_rig::trace::{Recorded as _, Recording};
+
+/// Speed in r/min, torque in N·m, mode, and the largest distortion in percent and torque ripple in N·m.
+const POINTS: [(f64, f64, &str, f64, f64); 8] = [
+    (700.0, 1235.0, "opt15", 4.8, 132.0),
+    (1000.0, 1235.0, "opt13a", 4.7, 130.0),
+    (1200.0, 1235.0, "opt11", 4.8, 137.0),
+    (1400.0, 1235.0, "opt9b", 4.7, 122.0),
+    (1600.0, 1235.0, "opt7b", 4.2, 97.0),
+    (1700.0, 1235.0, "opt7c", 3.2, 79.0),
+    (1905.0, 1235.0, "opt5c", 4.1, 92.0),
+    (2700.0, 871.4, "opt3b", 2.8, 77.0),
+];
+
+#[test]
+fn each_point_has_the_distortion_of_its_pulses() {
+    for (speed_rpm, torque_nm, mode, thd_percent, ripple_nm) in POINTS {
+        let point = measured(speed_rpm, torque_nm, "optimal").unwrap();
+        assert_eq!(point.mode, mode, "{speed_rpm}");
+        assert!(point.thd_percent <= thd_percent && point.ripple_nm <= ripple_nm, "{speed_rpm}: {point:?}");
+        assert!(point.thd_excess_percent.abs() < 3.0, "{speed_rpm}: {point:?}");
+        assert!(point.ripple_excess_percent.abs() < 3.0, "{speed_rpm}: {point:?}");
+    }
+}
+
+fn drive(line: &str) -> Recording {
+    let chosen = catalogue::of_traction(line).unwrap();
+    let recording = chosen.drive(&chosen.machine().unwrap()).unwrap();
+    assert!(recording.trip().is_none(), "{line}: {:?}", recording.trip());
+    recording
+}
+
+/// No more turn-ons than 900 Hz allow, and no more than this excess of current and torque at any switch.
+fn check_switches(line: &str, most_percent: f64, most_nm: f64) {
+    let recording = drive(line);
+    let turn_ons = analysis::most_turn_ons(&recording, 0.1);
+    assert!(turn_ons <= 91, "{line}: {turn_ons} turn-ons");
+    let switches = analysis::mode_switches(&recording);
+    assert!(switches.len() >= 6, "{line}: {} switches", switches.len());
+    for switch in switches {
+        let told = format!("{line}: {switch:?}");
+        assert!(switch.excess_percent < most_percent, "{told}");
+        assert!(switch.torque_excursion_nm < most_nm, "{told}");
+    }
+}
+
+#[test]
+fn one_pattern_follows_the_other_without_a_shock() {
+    check_switches("sweep --down --patterns optimal", 1.0, 15.0);
+    check_switches("sweep --brake --down --patterns optimal", 1.5, 15.0);
+}
+
+#[test]
+fn through_field_weakening_into_square_wave() {
+    check_switches("sweep --to 5000 --patterns optimal", 1.0, 25.0);
+}
+
+#[test]
+fn at_part_load_the_branches_meet_less_well() {
+    check_switches("sweep --torque-scale 0.5 --patterns optimal", 3.0, 40.0);
+    check_switches("sweep --torque-scale 0.2 --patterns optimal", 1.5, 50.0);
+}
+
+#[test]
+fn steps_reversals_and_restarts_do_not_trip() {
+    for line in ["full-step", "reversal", "restart", "link-steps", "mode-borders"] {
+        drive(&format!("{line} --patterns optimal"));
+    }
+}

@@ -1,0 +1,28 @@
+//! The PMaSynRM firmware with optimised pulse patterns: two interrupts and an idle loop, nothing else.
+#![cfg_attr(target_os = "none", no_std, no_main)]
+
+/// The image runs on a board; on the host there is nothing to do but to say so.
+#[cfg(not(target_os = "none"))]
+fn main() {
+    println!(
+        "This is the firmware. `cargo xtask run sweep --patterns optimal` builds it for its board and runs it in QEMU."
+    );
+}
+
+#[cfg(all(target_os = "none", not(all(feature = "qemu", feature = "optimal"))))]
+compile_error!("this image needs the features `qemu` and `optimal`");
+
+#[cfg(all(target_os = "none", feature = "qemu"))]
+use tractive::board::qemu;
+
+#[cfg(all(target_os = "none", feature = "qemu"))]
+#[path = "../firmware/own_law.rs"]
+mod law;
+
+#[cfg(all(target_os = "none", feature = "qemu"))]
+#[path = "../firmware/optimal_patterns.rs"]
+mod patterns;
+
+#[cfg(all(target_os = "none", feature = "qemu"))]
+#[path = "../firmware/pmasynrm.rs"]
+mod firmware;

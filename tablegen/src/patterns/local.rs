@@ -1,0 +1,93 @@
+//! The local optimum from a start: sequential quadratic programming, by the crate `slsqp`.
+
+use super::waveform::Waveform;
+use slsqp::{Func, StopTols, minimize};
+
+/// Scale of the cost, which is small: the optimiser's tolerances suit values near one.
+const SCALE: f64 = 1e3;
+/// Evaluations at most, and the relative change of cost at which it ends.
+const MOST_EVALUATIONS: usize = 100;
+const TOLERANCE: f64 = 1e-10;
+/// Fundamental by which an optimum may be off before Newton's steps make it exact, and how many of these.
+const NEAR: f64 = 1e-4;
+const NEWTON_STEPS: usize = 4;
+
+/// The problem at one modulation index.
+pub(super) struct Problem<'a> {
+    /// Level at the beginning, 1 or −1.
+    pub first: f64,
+    /// Fundamental, as a share of six-step.
+    pub index: f64,
+    /// Shortest pulse, in rad.
+    pub shortest_rad: f64,
+    /// Least and largest value of each angle, in rad.
+    pub bounds: &'a [(f64, f64)],
+}
+
+impl Problem<'_> {
+    /// The local optimum that is reached from a start; `None` where there is none, or the constraints do not hold.
+    pub fn optimum(&self, start: &[f64]) -> Option<Vec<f64>> {
+        let first = self.first;
+        let cost = |angles: &[f64], slopes: Option<&mut [f64]>, (): &mut ()| {
+            let wave = Waveform { first, angles_rad: angles };
+            let Some(slopes) = slopes else { return SCALE * wave.ripple(None) };
+            let value = wave.ripple(Some(slopes));
+            slopes.iter_mut().for_each(|slope| *slope *= SCALE);
+            SCALE * value
+        };
+        let constraints = self.constraints(start.len());
+        let constraints: Vec<&dyn Func<()>> = constraints.iter().map(AsRef::as_ref).collect();
+        let ends = StopTols { ftol_rel: TOLERANCE, ..StopTols::default() };
+        let found = minimize(cost, start, self.bounds, &constraints, (), MOST_EVALUATIONS, Some(ends));
+        // Near the optimum it may stop for rounding: the constraints decide.
+        let (Ok((_, angles, _)) | Err((_, angles, _))) = found;
+        self.made_exact(angles)
+    }
+
+    /// Negative where they hold: the fundamental neither larger nor smaller, pulses no shorter.
+    fn constraints(&self, angles: usize) -> Vec<Box<dyn Func<()>>> {
+        let (first, index, shortest) = (self.first, self.index, self.shortest_rad);
+        let fundamental = |side: f64| -> Box<dyn Func<()>> {
+            Box::new(move |angles: &[f64], slopes: Option<&mut [f64]>, (): &mut ()| {
+                let wave = Waveform { first, angles_rad: angles };
+                for (k, slope) in slopes.into_iter().flatten().enumerate() {
+                    *slope = side * wave.fundamental_slope(k);
+                }
+                side * (wave.fundamental() - index)
+            })
+        };
+        let pulse = |k: usize| -> Box<dyn Func<()>> {
+            Box::new(move |angles: &[f64], slopes: Option<&mut [f64]>, (): &mut ()| {
+                if let Some(slopes) = slopes {
+                    slopes.fill(0.0);
+                    (slopes[k], slopes[k + 1]) = (1.0, -1.0);
+                }
+                angles[k] - angles[k + 1] + shortest
+            })
+        };
+        [1.0, -1.0].map(fundamental).into_iter().chain((0..angles - 1).map(pulse)).collect()
+    }
+
+    /// The angles moved along the fundamental's slope until it is exact, if all bounds hold then.
+    fn made_exact(&self, mut angles: Vec<f64>) -> Option<Vec<f64>> {
+        let missing =
+            |angles: &[f64]| self.index - Waveform { first: self.first, angles_rad: angles }.fundamental();
+        if missing(&angles).abs() > NEAR {
+            return None;
+        }
+        for _ in 0..NEWTON_STEPS {
+            let error = missing(&angles);
+            let wave = Waveform { first: self.first, angles_rad: &angles };
+            let slopes: Vec<_> = (0..angles.len()).map(|k| wave.fundamental_slope(k)).collect();
+            let squared: f64 = slopes.iter().map(|slope| slope * slope).sum();
+            angles.iter_mut().zip(slopes).for_each(|(angle, slope)| *angle += error * slope / squared);
+        }
+        let slack = 1e-4;
+        let inside = angles
+            .iter()
+            .zip(self.bounds)
+            .all(|(angle, (low, high))| (low - slack..=high + slack).contains(angle));
+        let apart = angles.windows(2).all(|pair| pair[1] - pair[0] >= self.shortest_rad - slack);
+        (inside && apart).then_some(angles)
+    }
+}
