@@ -83,8 +83,8 @@ pub struct Schedule {
     fixed: Option<Mode>,
     /// The last switch, while the dwell time lasts.
     switched: Option<Instant>,
-    /// The instant from which on a lower mode has sufficed; none while the present one is needed.
-    lower_since: Option<Instant>,
+    /// The instant from which on lower modes have sufficed, and the highest place of those; none while the present one is needed.
+    lower: Option<(Instant, usize)>,
     dwell_ticks: i32,
 }
 
@@ -100,7 +100,7 @@ impl Schedule {
             ladder,
             fixed: None,
             switched: None,
-            lower_since: None,
+            lower: None,
             dwell_ticks: (DWELL_S * clock.ticks_per_s) as i32,
         }
     }
@@ -131,8 +131,8 @@ impl Schedule {
         self.ladders_choice(now, mode, seen, devices)
     }
 
-    /// The ladder's rung for this reference: a higher one at once, the next lower one when it has sufficed for the dwell time; either no
-    /// sooner than that after the last switch.
+    /// The ladder's rung for this reference: a higher one at once, a lower one when it has sufficed for the dwell time; either no sooner
+    /// than that after the last switch.
     #[inline(always)]
     fn ladders_choice(&mut self, now: Instant, mode: Mode, seen: &Reference, devices: &SwitchLimits) -> Mode {
         if let Some(fixed) = self.fixed {
@@ -141,22 +141,21 @@ impl Schedule {
         let Ladder(rungs) = self.ladder;
         let place = rungs.iter().position(|rung| *rung == mode).unwrap_or(0);
         let chosen = self.chosen(place, seen, devices);
-        let wanted = rungs.get(chosen).copied().unwrap_or(Mode::Async);
-        if chosen >= place {
-            self.lower_since = None;
-        } else {
-            self.lower_since.get_or_insert(now);
-        }
+        self.lower = (chosen < place).then(|| {
+            let (since, highest) = self.lower.unwrap_or((now, chosen));
+            (since, highest.max(chosen))
+        });
         let dwells = |since: Option<Instant>| since.is_some_and(|since| now.since(since) < self.dwell_ticks);
-        if mode != Mode::Off && (dwells(self.switched) || dwells(self.lower_since)) {
+        if mode != Mode::Off && (dwells(self.switched) || dwells(self.lower.map(|(since, _)| since))) {
             return mode;
         }
         self.switched = None;
-        wanted
+        let to = self.lower.map_or(chosen, |(_, highest)| highest);
+        rungs.get(to).copied().unwrap_or(Mode::Async)
     }
 
-    /// The place on the ladder by this reference alone, from a place on it: up past every border that is passed, else down by one if
-    /// that one's no longer is.
+    /// The place on the ladder by this reference alone, from a place on it: up past every border that is passed, else down past those
+    /// that no longer are.
     fn chosen(&self, place: usize, seen: &Reference, devices: &SwitchLimits) -> usize {
         let share = seen.rate * (2.0 / 4_294_967_296.0) * devices.shortest_half_ticks as f32;
         let notch = shortest_notch(seen.rate, devices);
@@ -165,22 +164,19 @@ impl Schedule {
             share >= pick(row.until.shares, from_above) || seen.depth >= pick(reached(row, notch), from_above)
         };
         if share < pick(Mode::Async.row().until.shares, place > 0) {
-            return place.saturating_sub(1);
+            return 0;
         }
         let Ladder([borders @ .., _]) = self.ladder else { return 0 };
-        let mut wanted = place.saturating_sub(1);
-        for below in borders.iter().skip(wanted) {
-            if !passes(below, wanted < place) {
-                break;
-            }
-            wanted += 1;
+        let (lower, upper) = borders.split_at_checked(place).unwrap_or((borders, &[]));
+        match upper.iter().take_while(|border| passes(border, false)).count() {
+            0 => place - lower.iter().rev().take_while(|border| !passes(border, true)).count(),
+            passed => place + passed,
         }
-        wanted
     }
 
     /// Tells the schedule that the mode changed at this instant.
     pub const fn switched(&mut self, now: Instant) {
-        (self.switched, self.lower_since) = (Some(now), None);
+        (self.switched, self.lower) = (Some(now), None);
     }
 }
 
