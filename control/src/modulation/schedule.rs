@@ -146,7 +146,8 @@ impl Schedule {
             (since, highest.max(chosen))
         });
         let dwells = |since: Option<Instant>| since.is_some_and(|since| now.since(since) < self.dwell_ticks);
-        if mode != Mode::Off && (dwells(self.switched) || dwells(self.lower.map(|(since, _)| since))) {
+        let lower_since = self.lower.map(|(since, _)| since).filter(|_| reaches_down(mode, seen.depth));
+        if mode != Mode::Off && (dwells(self.switched) || dwells(lower_since)) {
             return mode;
         }
         self.switched = None;
@@ -197,6 +198,17 @@ fn reached(row: &Row, notch: f32) -> (f32, f32) {
     } else {
         row.until.depths
     }
+}
+
+/// `true` unless so small a fundamental, as a share of six-step, lies below what a mode's pulses can make.
+#[inline(always)]
+fn reaches_down(mode: Mode, depth: f32) -> bool {
+    #[cfg(feature = "optimal")]
+    if let Some(branch) = mode.branch() {
+        return depth >= branch.first;
+    }
+    let _ = (mode, depth);
+    true
 }
 
 /// Sine of half the shortest notch, with `rate` in angle units per tick: an angle of a few degrees.
