@@ -1,10 +1,10 @@
 //! The needs of a run, for whoever builds images and sets up the emulator.
 
 use crate::options::{On, RunOptions};
-use crate::scenario::System;
 use crate::scenario::catalogue::{self, Chosen};
-use crate::scenario::traction::{LawName, Traction};
+use crate::scenario::traction::Traction;
 use crate::scenario::zs9::Zs9;
+use crate::scenario::{LawName, System};
 use crate::talk::{self, TalkOptions};
 use anyhow::Result;
 use serde::Serialize;
@@ -51,7 +51,10 @@ impl Needs {
                 let law = choice.options.own.law.name();
                 Self { law, ..Self::of(Traction::NAME, &choice.options) }
             }
-            Chosen::Zs9(choice) => Self::of(Zs9::NAME, &choice.options),
+            Chosen::Zs9(choice) => {
+                let law = choice.options.own.law.name();
+                Self { law, ..Self::of(Zs9::NAME, &choice.options) }
+            }
         })
     }
 

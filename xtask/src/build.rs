@@ -13,9 +13,6 @@ use std::process::{Command, Stdio};
 /// The feature of the reference images, on the emulated board.
 pub const QEMU: &str = "qemu";
 
-/// The PMaSynRM's image with the papers' ordinary control law.
-const PI: &str = "pi";
-
 /// The systems, each with an image of its own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum System {
@@ -41,6 +38,14 @@ impl System {
     /// The image's name.
     pub const fn image(self) -> &'static str {
         self.names()[0]
+    }
+
+    /// The name of its image with the papers' ordinary control law.
+    const fn pi_image(self) -> &'static str {
+        match self {
+            Self::Traction => "pi",
+            Self::Zs9 => "zs9_pi",
+        }
     }
 
     /// The name of a board's image.
@@ -69,11 +74,11 @@ pub fn image(toolchain: &Toolchain, system: System, machine: Option<&OsString>) 
     firmware(command, system.image(), system, machine)
 }
 
-/// Builds the PMaSynRM's image with the papers' ordinary control law, likewise.
-pub fn pi_image(toolchain: &Toolchain, machine: Option<&OsString>) -> Result<PathBuf> {
-    let mut command = on_target(toolchain, "tractive", PI);
+/// Builds a system's image with the papers' ordinary control law, likewise.
+pub fn pi_image(toolchain: &Toolchain, system: System, machine: Option<&OsString>) -> Result<PathBuf> {
+    let mut command = on_target(toolchain, "tractive", system.pi_image());
     command.args(["--features", QEMU]);
-    firmware(command, PI, System::Traction, machine)
+    firmware(command, system.pi_image(), system, machine)
 }
 
 /// Builds a system's image for a board of real hardware, with the tables of `machine` if one is named.

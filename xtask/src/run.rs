@@ -79,7 +79,7 @@ pub fn run(verb: &str, words: &[OsString]) -> Result<u8> {
         eprintln!("building the image, where it is not up to date");
         let (toolchain, machine) = (setup.toolchain()?, machine.as_ref());
         let image = match needs.law.as_str() {
-            "pi" => build::pi_image(&toolchain, machine)?,
+            "pi" => build::pi_image(&toolchain, needs.system(), machine)?,
             _ => build::image(&toolchain, needs.system(), machine)?,
         };
         rig.env("TRACTIVE_IMAGE", image);

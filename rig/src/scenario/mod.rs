@@ -2,8 +2,11 @@
 
 pub mod catalogue;
 pub mod command;
+mod law;
 pub mod traction;
 pub mod zs9;
+
+pub use law::LawName;
 
 use crate::analysis::Figures;
 use crate::machine::Machine;

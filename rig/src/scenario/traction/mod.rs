@@ -25,7 +25,7 @@ pub use line::scaled as scaled_link;
 pub use live::{Command, Live, Start, Turning, Wanted};
 pub use sweep::Sweep;
 
-use super::System;
+use super::{LawName, System};
 use crate::analysis::{self, Figures};
 use crate::bench::{self, Bench, Flaws, Limits, LinePlan, Operator, Supply};
 use crate::inject::Injection;
@@ -58,26 +58,6 @@ const STEP_S: f64 = 50e-6;
 /// The PMaSynRM drive.
 #[derive(Clone, Copy, Debug)]
 pub struct Traction;
-
-/// The control law that the drive runs.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum LawName {
-    /// The project's own
-    Tractive,
-    /// The papers' ordinary one: PI loops on measured currents
-    Pi,
-}
-
-impl LawName {
-    /// As on the command line.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Tractive => "tractive",
-            Self::Pi => "pi",
-        }
-    }
-}
 
 /// The point whose inductances the first pass of MTPA takes under `--law pi`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]

@@ -11,7 +11,7 @@ pub(super) mod timing;
 pub use load_step::INERTIA_KG_M2;
 pub use steady::SPEEDS_RPM as STEADY_SPEEDS_RPM;
 
-use super::System;
+use super::{LawName, System};
 use crate::analysis::Figures;
 use crate::bench::Limits;
 use crate::inject::Injection;
@@ -33,9 +33,13 @@ use clap::Args;
 use core::f64::consts::TAU;
 use serde::Serialize;
 use serde_json::{Map, Value};
+use tractive::control::{ControlLaw, Controller, PiLaw};
+use tractive::drive::dual::{Settings, TRACKING_RAD_S};
+use tractive::machine::Ratings;
 use tractive::nine_switch::Scheme;
 use tractive::operator::Line;
 use tractive::recorder::DualRecorder;
+use tractive::time::Instant;
 use tractive::wire::DualSetup;
 
 /// Source voltage, in V.
@@ -51,6 +55,9 @@ pub struct Zs9;
 /// Options of all the ZS9's scenarios.
 #[derive(Clone, Debug, Args, Serialize)]
 pub struct Zs9Options {
+    /// The control law of both motors and of the link.
+    #[arg(long, value_enum, default_value = "tractive")]
+    pub law: LawName,
     /// Carrier frequency, in Hz, 10000 or 20000.
     #[arg(long, default_value_t = 10_000, value_parser = carrier_hz, allow_negative_numbers = true)]
     pub carrier_hz: u32,
@@ -107,6 +114,10 @@ impl System for Zs9 {
     type Plan = Plan;
     type Recording = Recording;
 
+    fn law(own: &Zs9Options) -> Option<&'static str> {
+        Some(own.law.name())
+    }
+
     fn trace_step_s(own: &Zs9Options) -> f64 {
         f64::from(own.carrier_hz).recip()
     }
@@ -140,10 +151,11 @@ impl System for Zs9 {
                 let line = line.map(|times| {
                     Line::rated(&ratings, times.precharge_s, times.discharge_s).without_chopper()
                 });
-                let recorder = DualRecorder::new();
-                let tasks = Tasks::new(machine.tables, settings).recorded_by(&recorder);
-                let tasks = tasks.commanded_by(supervisor, ratings, line);
-                on_host(name, bench, tasks, |index| recorder.read(index))
+                let run = OnHost { name, bench, settings, ratings, line, machine };
+                match options.own.law {
+                    LawName::Tractive => run.run(Controller::with_tracking(TRACKING_RAD_S), supervisor),
+                    LawName::Pi => run.run(PiLaw::with_tracking(TRACKING_RAD_S), supervisor),
+                }
             }
             On::Qemu => {
                 let setup = DualSetup { carrier_ticks: settings.carrier_ticks, line };
@@ -162,9 +174,30 @@ impl System for Zs9 {
     }
 }
 
+/// A run on the host, but for the control law.
+struct OnHost<'a> {
+    name: &'a str,
+    bench: Bench,
+    settings: Settings,
+    ratings: Ratings,
+    line: Option<Line>,
+    machine: &'a Machine,
+}
+
+impl OnHost<'_> {
+    /// The drive's own tasks with a law for each motor.
+    fn run(self, law: impl ControlLaw + Copy, supervisor: Option<&mut dyn Supervisor>) -> Result<Recording> {
+        let Self { settings, ratings, line, machine, .. } = self;
+        let recorder = DualRecorder::new();
+        let tasks = Tasks::with_law(law, Instant(0), machine.tables, settings).recorded_by(&recorder);
+        let tasks = tasks.commanded_by(supervisor, ratings, line);
+        on_host(self.name, self.bench, tasks, |index| recorder.read(index))
+    }
+}
+
 fn bench(plan: Plan, options: &Options, machine: &Machine) -> Result<Bench> {
     let Plan { lead_s, duration_s, .. } = plan;
-    let Zs9Options { carrier_hz, uin: link_ref_v, scheme, inject } = options.own;
+    let Zs9Options { carrier_hz, uin: link_ref_v, scheme, inject, .. } = options.own;
     if let Some(injection) = inject
         && injection.at_s > duration_s
     {
