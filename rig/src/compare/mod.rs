@@ -2,13 +2,15 @@
 
 mod outcome;
 mod rows;
+mod zs9;
 
 pub use outcome::Row;
 
 use crate::files::write_text;
 use crate::machine::Machine;
 use crate::run::bar;
-use crate::scenario::catalogue;
+use crate::scenario::catalogue::{self, Chosen};
+use crate::scenario::{Choice, System};
 use crate::trace::Recorded;
 use anyhow::{Context, Result};
 use clap::Args;
@@ -39,7 +41,7 @@ pub struct CompareOptions {
 
 /// Runs the rows whose name has each of the words.
 pub fn rows(only: &[String]) -> Result<Vec<Row>> {
-    let mut plan: Vec<_> = rows::ROWS.iter().collect();
+    let mut plan: Vec<_> = rows::ROWS.iter().chain(&zs9::ROWS).collect();
     plan.retain(|row| only.iter().all(|word| row.quantity.contains(word.as_str())));
     anyhow::ensure!(!plan.is_empty(), "--only {}: no row has all of these words", only.join(" "));
     let lines: BTreeSet<_> = plan.iter().flat_map(|row| (row.lines)()).collect();
@@ -58,11 +60,18 @@ pub fn rows(only: &[String]) -> Result<Vec<Row>> {
 }
 
 fn drive(line: &str) -> Result<Outcome> {
-    let chosen = catalogue::of_traction(line)?;
-    let machine = chosen.machine()?;
-    let recording = chosen.drive(&machine).with_context(|| line.to_owned())?;
+    match catalogue::choose(line.split_whitespace())? {
+        Chosen::Traction(choice) => outcome(&choice),
+        Chosen::Zs9(choice) => outcome(&choice),
+    }
+    .with_context(|| line.to_owned())
+}
+
+fn outcome<S: System>(choice: &Choice<S>) -> Result<Outcome> {
+    let machine = choice.machine()?;
+    let recording = choice.drive(&machine)?;
     let trip = recording.trip().map(|trip| trip.fault.name());
-    Ok(Outcome { figures: chosen.figures(&recording, &machine), trip })
+    Ok(Outcome { figures: choice.figures(&recording, &machine), trip })
 }
 
 /// The command. Exit code 1 where a row is not ahead and nothing says why.

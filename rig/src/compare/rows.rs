@@ -1,4 +1,4 @@
-//! The rows: which runs, which numbers of them, and how they are printed.
+//! The rows of the PMaSynRM drive: which runs, which numbers of them, and how they are printed.
 
 use super::outcome::{Cell, Outcomes, Row, field, verdict};
 use crate::analysis::Figures;
@@ -11,9 +11,11 @@ pub struct Plan {
     /// The runs by their words.
     pub lines: fn() -> Vec<String>,
     /// A law's numbers; the fault that tripped it where it has none.
-    read: fn(&Outcomes) -> Result<Cell, &'static str>,
-    paper: &'static str,
-    why: &'static str,
+    pub read: fn(&Outcomes) -> Result<Cell, &'static str>,
+    /// The paper's word on it.
+    pub paper: &'static str,
+    /// The reason why ours is not ahead, where it is not.
+    pub why: &'static str,
 }
 
 impl Plan {
@@ -29,7 +31,7 @@ impl Plan {
 }
 
 /// So many decimals.
-fn decimals(value: f64, count: usize) -> String {
+pub(super) fn decimals(value: f64, count: usize) -> String {
     format!("{value:.count$}")
 }
 
@@ -44,7 +46,7 @@ fn of_verdict(outcomes: &Outcomes, lines: &[&str], what: &str) -> Result<Vec<f64
     outcomes.read(lines, |figures| verdict(figures, what))
 }
 
-fn words(lines: &[&str]) -> Vec<String> {
+pub(super) fn words(lines: &[&str]) -> Vec<String> {
     lines.iter().map(|line| (*line).to_owned()).collect()
 }
 

@@ -50,7 +50,7 @@ impl Scenario<Traction> for Steady {
         let mut verdicts = bound::verdicts(&beside, options).to_vec();
         if options.own.line.is_some() {
             let swing = analysis::link_swing(analysis::window(recording, window.0, window.1));
-            verdicts.push(Verdict::ours("swing of the link (share of its voltage)", swing, 0.03));
+            verdicts.push(Verdict::at_most("swing of the link (share of its voltage)", swing, 0.03));
         }
         if options.dead_time_us > 0.0 {
             let (speed_rpm, point_nm) = DEAD_TIME_POINT;
@@ -110,6 +110,6 @@ impl Steady {
 fn dead_time_verdicts(measured: &Distortion, at_most: f64, how: &str) -> [Verdict; 2] {
     [5, 7].map(|order| {
         let share = measured.share_percent(order);
-        Verdict::ours(&format!("harmonic {order} in % of the fundamental{how}"), share, at_most)
+        Verdict::at_most(&format!("harmonic {order} in % of the fundamental{how}"), share, at_most)
     })
 }

@@ -240,17 +240,12 @@ pub fn free(inertia_kg_m2: f64) -> [SpeedSource; 2] {
 /// Link voltage from which figures are judged, in V: the lowest at which bounds are known. At less the link's own are farther off.
 pub const LEAST_JUDGED_V: f64 = 667.0;
 
-/// Figures beside their bounds: the quantity with its unit, the figure's name, the bound, what a first, ordinary implementation reached. The
-/// paper shows curves without numbers. With flaws, or a link below [`LEAST_JUDGED_V`], they are only reported.
-pub fn judge(
-    figures: &Figures,
-    options: &Options,
-    bounds: &[(&str, &str, f64, &'static str)],
-) -> Vec<Verdict> {
+/// Figures beside their bounds: the quantity with its unit, the figure's name, the bound. The paper shows curves without numbers. With flaws, or a link below [`LEAST_JUDGED_V`], they are only reported.
+pub fn judge(figures: &Figures, options: &Options, bounds: &[(&str, &str, f64)]) -> Vec<Verdict> {
     let judged = options.own.uin >= LEAST_JUDGED_V;
-    let verdict = |(what, name, at_most, others): &(&str, &str, f64, &'static str)| {
+    let verdict = |(what, name, at_most): &(&str, &str, f64)| {
         let at_most = if judged { bound(options, *at_most, f64::INFINITY) } else { f64::INFINITY };
-        Verdict::at_most(what, figures.number(name), at_most, others)
+        Verdict::at_most(what, figures.number(name), at_most)
     };
     bounds.iter().map(verdict).collect()
 }
