@@ -47,6 +47,18 @@ fn the_ordinary_law_is_no_straw_man() {
 }
 
 #[test]
+fn the_page_says_what_each_part_buys() {
+    const PAGE: &str = include_str!("../../docs/papers.md");
+    let rows = compare::parts().unwrap();
+    assert_eq!(rows.len(), 12);
+    for row in rows {
+        let line = row.markdown();
+        assert!(PAGE.lines().any(|one| one == line), "docs/papers.md has no line\n{line}");
+        assert!(!row.found[0].starts_with("trips"), "{line}");
+    }
+}
+
+#[test]
 fn a_word_that_no_row_has_is_named() {
     let error = compare::rows(&["flywheel".to_owned()]).unwrap_err().to_string();
     assert_eq!(error, "--only flywheel: no row has all of these words");

@@ -1,6 +1,6 @@
 //! The rows of the PMaSynRM drive: which runs, which numbers of them, and how they are printed.
 
-use super::outcome::{Cell, Outcomes, Row, field, verdict};
+use super::outcome::{Cell, Outcomes, Row, cell, field, trips, verdict};
 use crate::analysis::Figures;
 use crate::mtpa_methods;
 use crate::verdict::worst;
@@ -21,8 +21,7 @@ pub struct Plan {
 impl Plan {
     /// Both laws' results, and who is ahead.
     pub fn judge(&self, outcomes: &[Outcomes; 2]) -> Row {
-        let tripped = |fault| Cell { text: format!("trips: {fault}"), values: vec![f64::INFINITY] };
-        let [own, pi] = outcomes.each_ref().map(|law| (self.read)(law).unwrap_or_else(tripped));
+        let [own, pi] = outcomes.each_ref().map(|law| (self.read)(law).unwrap_or_else(trips));
         let pairs = own.values.iter().zip(&pi.values);
         let ahead =
             own.values.iter().all(|value| value.is_finite()) && pairs.into_iter().all(|(own, pi)| own < pi);
@@ -33,12 +32,6 @@ impl Plan {
 /// So many decimals.
 pub(super) fn decimals(value: f64, count: usize) -> String {
     format!("{value:.count$}")
-}
-
-/// Numbers behind each other with their unit.
-fn cell(values: Vec<f64>, count: usize, unit: &str) -> Cell {
-    let texts: Vec<_> = values.iter().map(|value| format!("{} {unit}", decimals(*value, count))).collect();
-    Cell { text: texts.join(", "), values }
 }
 
 /// The numbers of one verdict over runs, each a number of its own.

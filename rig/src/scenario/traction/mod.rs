@@ -1,5 +1,6 @@
 //! The PMaSynRM drive's scenarios.
 
+mod ablated;
 pub(super) mod acknowledge;
 pub(super) mod borders_timing;
 pub mod characteristic;
@@ -21,6 +22,7 @@ pub(super) mod sweep;
 pub mod switches;
 pub(super) mod timing;
 
+pub use ablated::Part;
 pub use line::scaled as scaled_link;
 pub use live::{Command, Live, Start, Turning, Wanted};
 pub use sweep::Sweep;
@@ -37,7 +39,8 @@ use crate::report::{self, Page};
 use crate::run::traction::{Tasks, run_in_qemu};
 use crate::run::{self, CLOCK, Supervisor};
 use crate::trace::Recording;
-use anyhow::Result;
+use ablated::Ablated;
+use anyhow::{Result, bail};
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 use serde_json::{Map, Value};
@@ -88,6 +91,9 @@ pub struct TractionOptions {
     /// With --law pi: the point whose inductances the first of the two passes of MTPA takes.
     #[arg(long, value_enum, default_value = "previous", value_name = "POINT")]
     pub mtpa_start: StartName,
+    /// A part of the project's own law to take away, to see what it buys; on the host.
+    #[arg(long, value_enum, value_name = "PART")]
+    pub ablate: Option<Part>,
     /// Leave the dead time uncompensated: neither the pulses are corrected nor is the sixth harmonic of the voltage followed.
     #[arg(long)]
     pub uncompensated: bool,
@@ -206,6 +212,9 @@ impl System for Traction {
             ("--torque", own("torque"), -most_nm, most_nm),
             ("--to", own("to"), -fastest_rpm, fastest_rpm),
         ])?;
+        if options.own.ablate.is_some() && (options.own.law == LawName::Pi || options.on == On::Qemu) {
+            bail!("--ablate: a part is taken away from the project's own law, and on the host alone");
+        }
         options.check_flaws(machine, udc_v)
     }
 
@@ -222,9 +231,10 @@ impl System for Traction {
         match options.on {
             On::Host => {
                 let run = OnHost { name, bench, setup: &setup, options, machine };
-                match options.own.law {
-                    LawName::Tractive => run.run(Controller::new(), supervisor),
-                    LawName::Pi => run.run(PiLaw::starting(options.own.mtpa_start.of()), supervisor),
+                match (options.own.law, options.own.ablate) {
+                    (LawName::Tractive, Some(part)) => run.run(Ablated::new(part), supervisor),
+                    (LawName::Tractive, None) => run.run(Controller::new(), supervisor),
+                    (LawName::Pi, _) => run.run(PiLaw::starting(options.own.mtpa_start.of()), supervisor),
                 }
             }
             On::Qemu => {
