@@ -1,10 +1,10 @@
 //! The needs of a run, for whoever builds images and sets up the emulator.
 
 use crate::options::{On, RunOptions};
+use crate::scenario::System;
 use crate::scenario::catalogue::{self, Chosen};
 use crate::scenario::traction::Traction;
 use crate::scenario::zs9::Zs9;
-use crate::scenario::{LawName, System};
 use crate::talk::{self, TalkOptions};
 use anyhow::Result;
 use serde::Serialize;
@@ -35,7 +35,7 @@ impl Needs {
         let in_qemu = options.on == On::Qemu;
         Self {
             system,
-            law: LawName::Tractive.name(),
+            law: options.law.name(),
             on: options.on,
             machine: options.machine.clone(),
             image: in_qemu && options.image.is_none(),
@@ -47,14 +47,8 @@ impl Needs {
     /// Of the words behind `run`.
     pub fn of_run(words: Vec<OsString>) -> Result<Self> {
         Ok(match catalogue::choose(words)? {
-            Chosen::Traction(choice) => {
-                let law = choice.options.own.law.name();
-                Self { law, ..Self::of(Traction::NAME, &choice.options) }
-            }
-            Chosen::Zs9(choice) => {
-                let law = choice.options.own.law.name();
-                Self { law, ..Self::of(Zs9::NAME, &choice.options) }
-            }
+            Chosen::Traction(choice) => Self::of(Traction::NAME, &choice.options),
+            Chosen::Zs9(choice) => Self::of(Zs9::NAME, &choice.options),
         })
     }
 

@@ -39,7 +39,7 @@ fn run_choice<S: System>(choice: &Choice<S>) -> Result<ExitCode> {
         crate::say!("{}", serde_json::to_string(&summary)?);
     } else {
         let headline = report::headline(&figures, trip);
-        let law = S::law(&choice.options.own).map_or(String::new(), |law| format!(" · law {law}"));
+        let law = format!(" · law {}", choice.options.law.name());
         crate::say!(
             "{headline} · {} · {}{law}\n\n{}",
             choice.name,
@@ -103,7 +103,7 @@ pub fn write<S: System>(
     }
     S::draw_common(recording, &mut page);
     choice.scenario.plots(recording, &choice.filled(machine), machine, &mut page);
-    let law = S::law(&choice.options.own).map_or(String::new(), |law| format!(", law {law}"));
+    let law = format!(", law {}", choice.options.law.name());
     let subtitle =
         format!("tractive {}, run on {}{law}", env!("CARGO_PKG_VERSION"), choice.options.on.name());
     write_text(&out.join("report.html"), &page.finish(&subtitle, figures)?)

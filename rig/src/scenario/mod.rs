@@ -2,11 +2,8 @@
 
 pub mod catalogue;
 pub mod command;
-mod law;
 pub mod traction;
 pub mod zs9;
-
-pub use law::LawName;
 
 use crate::analysis::Figures;
 use crate::machine::Machine;
@@ -31,11 +28,6 @@ pub trait System: Sized + 'static {
     type Plan;
     /// The recording that a run leaves.
     type Recording: Recorded;
-
-    /// The control law that runs, where there is a choice.
-    fn law(_own: &Self::Own) -> Option<&'static str> {
-        None
-    }
 
     /// Step of the trace unless options or scenario say another, in s.
     fn trace_step_s(own: &Self::Own) -> f64;

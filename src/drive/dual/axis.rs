@@ -126,8 +126,7 @@ impl<L: ControlLaw> Axis<L> {
         self.acting = None;
     }
 
-    /// Measurements that no longer move; `lost` is the fault when it is the angle. Once in the image, for both motors.
-    #[inline(never)]
+    /// Measurements that no longer move; `lost` is the fault when it is the angle.
     pub fn check_frozen(
         &mut self,
         measured: &Measurements,

@@ -27,11 +27,12 @@ pub use line::scaled as scaled_link;
 pub use live::{Command, Live, Start, Turning, Wanted};
 pub use sweep::Sweep;
 
-use super::{LawName, System};
+use super::System;
 use crate::analysis::{self, Figures};
 use crate::bench::{self, Bench, Flaws, Limits, LinePlan, Operator, Supply};
 use crate::inject::Injection;
 use crate::inject::traction::Kind;
+use crate::law::LawName;
 use crate::machine::Machine;
 use crate::options::{On, not_negative, usual_min_pulse_us, within};
 use crate::plant::{DcLinkSettings, LineFilter, Plant, Source, SpeedSource};
@@ -85,9 +86,6 @@ impl StartName {
 /// Options of all its scenarios.
 #[derive(Clone, Debug, Args, Serialize)]
 pub struct TractionOptions {
-    /// The control law.
-    #[arg(long, value_enum, default_value = "tractive")]
-    pub law: LawName,
     /// With --law pi: the point whose inductances the first of the two passes of MTPA takes.
     #[arg(long, value_enum, default_value = "previous", value_name = "POINT")]
     pub mtpa_start: StartName,
@@ -185,10 +183,6 @@ impl System for Traction {
     type Plan = Plan;
     type Recording = Recording;
 
-    fn law(own: &TractionOptions) -> Option<&'static str> {
-        Some(own.law.name())
-    }
-
     fn trace_step_s(_own: &TractionOptions) -> f64 {
         STEP_S
     }
@@ -212,7 +206,7 @@ impl System for Traction {
             ("--torque", own("torque"), -most_nm, most_nm),
             ("--to", own("to"), -fastest_rpm, fastest_rpm),
         ])?;
-        if options.own.ablate.is_some() && (options.own.law == LawName::Pi || options.on == On::Qemu) {
+        if options.own.ablate.is_some() && (options.law == LawName::Pi || options.on == On::Qemu) {
             bail!("--ablate: a part is taken away from the project's own law, and on the host alone");
         }
         options.check_flaws(machine, udc_v)
@@ -231,7 +225,7 @@ impl System for Traction {
         match options.on {
             On::Host => {
                 let run = OnHost { name, bench, setup: &setup, options, machine };
-                match (options.own.law, options.own.ablate) {
+                match (options.law, options.own.ablate) {
                     (LawName::Tractive, Some(part)) => run.run(Ablated::new(part), supervisor),
                     (LawName::Tractive, None) => run.run(Controller::new(), supervisor),
                     (LawName::Pi, _) => run.run(PiLaw::starting(options.own.mtpa_start.of()), supervisor),

@@ -11,11 +11,12 @@ pub(super) mod timing;
 pub use load_step::INERTIA_KG_M2;
 pub use steady::SPEEDS_RPM as STEADY_SPEEDS_RPM;
 
-use super::{LawName, System};
+use super::System;
 use crate::analysis::Figures;
 use crate::bench::Limits;
 use crate::inject::Injection;
 use crate::inject::zs9::Kind;
+use crate::law::LawName;
 use crate::machine::Machine;
 use crate::options::{On, positive};
 use crate::plant::SpeedSource;
@@ -55,9 +56,6 @@ pub struct Zs9;
 /// Options of all the ZS9's scenarios.
 #[derive(Clone, Debug, Args, Serialize)]
 pub struct Zs9Options {
-    /// The control law of both motors and of the link.
-    #[arg(long, value_enum, default_value = "tractive")]
-    pub law: LawName,
     /// Carrier frequency, in Hz, 10000 or 20000.
     #[arg(long, default_value_t = 10_000, value_parser = carrier_hz, allow_negative_numbers = true)]
     pub carrier_hz: u32,
@@ -114,10 +112,6 @@ impl System for Zs9 {
     type Plan = Plan;
     type Recording = Recording;
 
-    fn law(own: &Zs9Options) -> Option<&'static str> {
-        Some(own.law.name())
-    }
-
     fn trace_step_s(own: &Zs9Options) -> f64 {
         f64::from(own.carrier_hz).recip()
     }
@@ -152,7 +146,7 @@ impl System for Zs9 {
                     Line::rated(&ratings, times.precharge_s, times.discharge_s).without_chopper()
                 });
                 let run = OnHost { name, bench, settings, ratings, line, machine };
-                match options.own.law {
+                match options.law {
                     LawName::Tractive => run.run(Controller::with_tracking(TRACKING_RAD_S), supervisor),
                     LawName::Pi => run.run(PiLaw::with_tracking(TRACKING_RAD_S), supervisor),
                 }
