@@ -2,7 +2,7 @@
 #![allow(missing_docs)]
 
 use tractive::built_in::zs9::BUILT_IN;
-use tractive::control::{Region, VoltageLimit, mtpa, operating_point};
+use tractive::control::{OperatingPoint, Region, VoltageLimit, mtpa, operating_point};
 use tractive::machine::Tables;
 
 /// The ZS9's motor, which is linear: ψ_f in Wb, L_d and L_q in H.
@@ -28,6 +28,49 @@ fn weakened_id_a(is_a: f64, iq_a: f64, flux_wb: f64) -> (f64, f64) {
     )
 }
 
+/// A line of the page's table: speed in r/min, torque in N·m, i_q, i_d of the tables, and by how much those of both closed forms differ, in A.
+fn line(forms: &str, rpm: Option<u32>, torque_nm: u32, (d, q): (f64, f64), closed: (f64, f64)) -> String {
+    let rpm = rpm.map_or("MTPA".to_owned(), |rpm| rpm.to_string());
+    let [first, second] = [closed.0 - d, closed.1 - d].map(|off| format!("{:.4}", off + 0.0));
+    format!("| {forms} | {rpm} | {torque_nm} | {q:.2} | {d:.2} | {first} | {second} |")
+}
+
+/// The page has each line of the closed forms beside the tables.
+#[test]
+fn the_page_has_the_closed_forms_beside_the_tables() {
+    const PAGE: &str = include_str!("../docs/papers.md");
+    let mut lines = Vec::new();
+    for torque_nm in (20..=120).step_by(20) {
+        let current = mtpa(torque_nm as f32, &BUILT_IN);
+        let (d, q) = (f64::from(current.d), f64::from(current.q));
+        lines.push(line("(16), (17)", None, torque_nm, (d, q), mtpa_id_a(d.hypot(q), q)));
+    }
+    let tables = without_resistance();
+    for (rpm, torque_nm) in [(900, 40), (900, 80), (900, 120), (1_300, 20), (1_300, 40), (1_300, 60)] {
+        let (point, flux_wb) = weakened(rpm, torque_nm, &tables);
+        assert_eq!(point.region, Region::Weakening, "{rpm} r/min, {torque_nm} N·m");
+        let (d, q) = (f64::from(point.current.d), f64::from(point.current.q));
+        lines.push(line("(18), (19)", Some(rpm), torque_nm, (d, q), weakened_id_a(d.hypot(q), q, flux_wb)));
+    }
+    let missing: Vec<_> = lines.iter().filter(|line| !PAGE.lines().any(|one| one == *line)).collect();
+    assert!(missing.is_empty(), "docs/papers.md lacks\n{missing:#?}");
+}
+
+/// The motor without resistance, which the paper neglects.
+fn without_resistance() -> Tables {
+    let mut tables: Tables = BUILT_IN;
+    tables.ratings.stator_resistance_ohm = 0.0;
+    tables
+}
+
+/// The tables' operating point on a link of 200 V in r/min and N·m, and the flux linkage that the voltage allows there, in Wb.
+fn weakened(rpm: u32, torque_nm: u32, tables: &Tables) -> (OperatingPoint, f64) {
+    let limit = VoltageLimit { udc_v: 200.0, depth: 1.0, filled: false };
+    let omega = f64::from(rpm) / 60.0 * core::f64::consts::TAU * 4.0;
+    let point = operating_point(torque_nm as f32, omega as f32, &limit, tables);
+    (point, core::f64::consts::FRAC_2_PI * 200.0 / omega)
+}
+
 #[test]
 fn the_tables_are_the_closed_forms_of_a_linear_motor() {
     let mut off_a = [0.0_f64; 4];
@@ -38,21 +81,16 @@ fn the_tables_are_the_closed_forms_of_a_linear_motor() {
         off_a[0] = off_a[0].max((d - by_16).abs());
         off_a[1] = off_a[1].max((d - by_17).abs());
     }
-    // The paper neglects the resistance.
-    let mut tables: Tables = BUILT_IN;
-    tables.ratings.stator_resistance_ohm = 0.0;
-    let limit = VoltageLimit { udc_v: 200.0, depth: 1.0, filled: false };
-    let voltage_v = core::f64::consts::FRAC_2_PI * 200.0;
+    let tables = without_resistance();
     let mut seen = 0;
     for rpm in (700..=1_300).step_by(50) {
-        let omega = f64::from(rpm) / 60.0 * core::f64::consts::TAU * 4.0;
         for torque_nm in (10..=120).step_by(10) {
-            let point = operating_point(torque_nm as f32, omega as f32, &limit, &tables);
+            let (point, flux_wb) = weakened(rpm, torque_nm, &tables);
             if point.region != Region::Weakening {
                 continue;
             }
             let (d, q) = (f64::from(point.current.d), f64::from(point.current.q));
-            let (by_18, by_19) = weakened_id_a(d.hypot(q), q, voltage_v / omega);
+            let (by_18, by_19) = weakened_id_a(d.hypot(q), q, flux_wb);
             off_a[2] = off_a[2].max((d - by_18).abs());
             off_a[3] = off_a[3].max((d - by_19).abs());
             seen += 1;

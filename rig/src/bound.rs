@@ -81,18 +81,17 @@ const fn cycles(mode: Mode) -> u32 {
 
 /// The verdicts on distortion and torque ripple: of an ideal inverter, no more than a little over the bound.
 pub fn verdicts(points: &[Beside], options: &RunOptions) -> [Verdict; 3] {
-    let judged = |what: &str, value: fn(&Beside) -> f64, at_most: f64, others: &'static str| {
+    let judged = |what: &str, value: fn(&Beside) -> f64, at_most: f64| {
         let found = worst(points.iter().map(value));
-        Verdict::at_most(what, found, bound(options, at_most, f64::INFINITY), others)
+        Verdict::at_most(what, found, bound(options, at_most, f64::INFINITY))
     };
     [
-        judged("current THD over its bound in %", |point| point.thd_excess_percent, 2.0, "–"),
-        judged("rms torque ripple over its bound in %", |point| point.ripple_rms_excess_percent, 2.0, "1"),
+        judged("current THD over its bound in %", |point| point.thd_excess_percent, 2.0),
+        judged("rms torque ripple over its bound in %", |point| point.ripple_rms_excess_percent, 2.0),
         judged(
             "peak-to-peak torque over its bound in %",
             |point| point.ripple_peak_to_peak_excess_percent,
             8.0,
-            "8",
         ),
     ]
 }

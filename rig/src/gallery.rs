@@ -149,7 +149,7 @@ impl Picture {
 use Source::{Drawn, Traction, Zs9};
 
 /// Every picture, in the papers' order.
-pub const PICTURES: [Picture; 31] = [
+pub const PICTURES: [Picture; 32] = [
     Picture::of("architecture", "Interrupts, cells, board and rig", Drawn(|_| architecture())),
     Picture::of("modes", "Line voltage of every mode", Drawn(|of| chai::modes::every_mode(&of.pmasynrm))),
     Picture::of("chai-1", "Current loci", Drawn(|of| chai::machine::loci(&of.pmasynrm))),
@@ -201,6 +201,11 @@ pub const PICTURES: [Picture; 31] = [
     Picture::of("zs9-23", "Speed of motor 2 in it", Zs9("zs9-reverse", zs9::runs::reverse_speed)),
     Picture::of("zs9-24-35", "The whole cycle", Zs9("zs9-cycle", zs9::runs::cycle)),
     Picture::of("zs9-36", "Torque and voltage over speed", Zs9("zs9-cycle", zs9::runs::over_speed)),
+    Picture::of(
+        "different-cycles",
+        "Motors in different cycles",
+        Zs9("zs9-cycle --second other --cruise 8", zs9::runs::cycle),
+    ),
 ];
 
 fn accuracy(recording: &Recording, machine: &Machine) -> Result<String> {

@@ -18,6 +18,7 @@ pub mod files;
 pub mod folder;
 pub mod gallery;
 pub mod inject;
+pub mod law;
 pub mod machine;
 pub mod mtpa_methods;
 pub mod needs;

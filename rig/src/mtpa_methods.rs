@@ -42,7 +42,9 @@ pub fn verdicts(figures: &[MethodFigures]) -> Vec<Verdict> {
             ("torque error", worst(own().map(|one| one.torque_error_percent.abs())), torque),
             ("current above the least", worst(own().map(|one| one.excess_current_percent)), current),
         ]
-        .map(|(what, found, at_most)| Verdict::ours(&format!("MTPA {what} in %, {method}"), found, at_most))
+        .map(|(what, found, at_most)| {
+            Verdict::at_most(&format!("MTPA {what} in %, {method}"), found, at_most)
+        })
     };
     methods.flat_map(of).collect()
 }

@@ -3,7 +3,7 @@
 use crate::options::{On, RunOptions};
 use crate::scenario::System;
 use crate::scenario::catalogue::{self, Chosen};
-use crate::scenario::traction::{LawName, PatternsName, Traction};
+use crate::scenario::traction::{PatternsName, Traction};
 use crate::scenario::zs9::Zs9;
 use crate::talk::{self, TalkOptions};
 use anyhow::Result;
@@ -37,7 +37,7 @@ impl Needs {
         let in_qemu = options.on == On::Qemu;
         Self {
             system,
-            law: LawName::Tractive.name(),
+            law: options.law.name(),
             patterns: PatternsName::Paper.name(),
             on: options.on,
             machine: options.machine.clone(),
@@ -51,9 +51,8 @@ impl Needs {
     pub fn of_run(words: Vec<OsString>) -> Result<Self> {
         Ok(match catalogue::choose(words)? {
             Chosen::Traction(choice) => {
-                let own = &choice.options.own;
-                let (law, patterns) = (own.law.name(), own.patterns.name());
-                Self { law, patterns, ..Self::of(Traction::NAME, &choice.options) }
+                let patterns = choice.options.own.patterns.name();
+                Self { patterns, ..Self::of(Traction::NAME, &choice.options) }
             }
             Chosen::Zs9(choice) => Self::of(Zs9::NAME, &choice.options),
         })

@@ -1,6 +1,7 @@
 //! Options that all runs share.
 
 use crate::bench::Flaws;
+use crate::law::LawName;
 use crate::machine::Machine;
 use crate::plant::PlantSettings;
 use crate::run::Emulator;
@@ -78,6 +79,9 @@ pub struct RunOptions {
     /// The place where the drive runs; `cargo xtask` means qemu unless told otherwise.
     #[arg(long, value_enum, env = "TRACTIVE_ON", hide_env = true, default_value = "host")]
     pub on: On,
+    /// The control law.
+    #[arg(long, value_enum, default_value = "tractive")]
+    pub law: LawName,
     /// Folder for the files; default target/tractive/SCENARIO.
     #[serde(skip)]
     #[arg(long)]

@@ -19,13 +19,11 @@ pub struct Verdict {
     pub at_most: Option<f64>,
     /// `pass`, `falls short`, `reported` or `not seen`.
     pub verdict: &'static str,
-    /// The value that the paper, or an ordinary controller in simulation, reached.
-    pub others: &'static str,
 }
 
 impl Verdict {
     /// Judges a figure that should be at most so large; with an infinite bound it is reported. What is no number falls short.
-    pub fn at_most(what: &str, found: impl Into<Option<f64>>, at_most: f64, others: &'static str) -> Self {
+    pub fn at_most(what: &str, found: impl Into<Option<f64>>, at_most: f64) -> Self {
         let (found, at_most) = (found.into(), at_most.is_finite().then_some(at_most));
         let verdict = match (found, at_most) {
             (None, _) => NOT_SEEN,
@@ -33,17 +31,12 @@ impl Verdict {
             (Some(found), Some(at_most)) if found <= at_most => "pass",
             _ => FALLS_SHORT,
         };
-        Self { what: what.to_owned(), found, at_most, verdict, others }
-    }
-
-    /// The same of a figure that nobody else has reported.
-    pub fn ours(what: &str, found: impl Into<Option<f64>>, at_most: f64) -> Self {
-        Self::at_most(what, found, at_most, "–")
+        Self { what: what.to_owned(), found, at_most, verdict }
     }
 
     /// Something that must not be, as 0 or 1.
     pub fn never(what: &str, is: bool) -> Self {
-        Self::ours(what, f64::from(u8::from(is)), 0.0)
+        Self::at_most(what, f64::from(u8::from(is)), 0.0)
     }
 }
 
@@ -68,7 +61,7 @@ mod tests {
     use super::*;
 
     fn verdict(found: Option<f64>, at_most: f64) -> &'static str {
-        Verdict::at_most("", found, at_most, "–").verdict
+        Verdict::at_most("", found, at_most).verdict
     }
 
     #[test]

@@ -122,6 +122,7 @@ fn the_scenario_is_found_wherever_it_stands() {
         ("--uncompensated load-steps", r#"{"system":"pmasynrm","law":"tractive","on":"host","#),
         ("--down --to 100 --law pi --on qemu", r#"{"system":"pmasynrm","law":"pi","on":"qemu","#),
         ("--dt 1e-4 zs9-cycle --cruise 1", r#"{"system":"zs9","law":"tractive","on":"host","#),
+        ("zs9-reverse --law pi --on qemu", r#"{"system":"zs9","law":"pi","on":"qemu","#),
     ] {
         let output = rig(&format!("needs run {line}"));
         let said = String::from_utf8_lossy(&output.stdout);

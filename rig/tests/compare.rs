@@ -11,7 +11,7 @@ fn rows(only: &[&str]) -> Vec<Row> {
 #[test]
 fn the_readme_says_what_both_laws_reach() {
     let rows = rows(&[]);
-    assert_eq!(rows.len(), 11);
+    assert_eq!(rows.len(), 19);
     for row in rows {
         println!("{}: {:?}, ahead: {}", row.quantity, row.found, row.mark());
         assert!(
@@ -35,6 +35,27 @@ fn the_ordinary_law_is_no_straw_man() {
     let [step] = &rows(&["full torque in one step"])[..] else { panic!("one row") };
     let slowest: f64 = step.found[1].split(' ').nth(2).unwrap().parse().unwrap();
     assert!(slowest < 3.6, "{}", step.found[1]);
+    // Two motors do not disturb each other, and the link stays within what regulates it.
+    let both = rows(&["ZS9"]);
+    assert!(both.len() > 5 && both.iter().all(|row| !row.found[1].starts_with("trips")), "{both:?}");
+    let [coupling] = &rows(&["motor 1's torque moves by"])[..] else { panic!("one row") };
+    let moved_nm: f64 = coupling.found[1].split(' ').next().unwrap().parse().unwrap();
+    assert!(moved_nm < 0.023, "{}", coupling.found[1]);
+    let [link] = &rows(&["link voltage within, at 10 kHz"])[..] else { panic!("one row") };
+    let within: f64 = link.found[1].split(' ').next().unwrap().parse().unwrap();
+    assert!(within < 6.0, "{}", link.found[1]);
+}
+
+#[test]
+fn the_page_says_what_each_part_buys() {
+    const PAGE: &str = include_str!("../../docs/papers.md");
+    let rows = compare::parts().unwrap();
+    assert_eq!(rows.len(), 12);
+    for row in rows {
+        let line = row.markdown();
+        assert!(PAGE.lines().any(|one| one == line), "docs/papers.md has no line\n{line}");
+        assert!(!row.found[0].starts_with("trips"), "{line}");
+    }
 }
 
 #[test]

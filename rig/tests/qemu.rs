@@ -1,4 +1,5 @@
-//! The images in QEMU against the same code on the host, byte for byte. Needs TRACTIVE_IMAGE, TRACTIVE_PI_IMAGE, TRACTIVE_ZS9_IMAGE (and TRACTIVE_QEMU);
+//! The images in QEMU against the same code on the host, byte for byte. Needs TRACTIVE_IMAGE, TRACTIVE_PI_IMAGE, TRACTIVE_ZS9_IMAGE, TRACTIVE_ZS9_PI_IMAGE (and
+//! TRACTIVE_QEMU);
 //! `cargo xtask test` sets them, so these tests are ignored otherwise.
 
 use std::path::{Path, PathBuf};
@@ -6,14 +7,13 @@ use std::process::Command;
 
 fn run(scenario: &str, on: &str, out: &Path) -> (i32, String) {
     let mut command = Command::new(env!("CARGO_BIN_EXE_tractive-rig"));
-    if scenario.starts_with("zs9-")
-        && let Some(image) = std::env::var_os("TRACTIVE_ZS9_IMAGE")
-    {
-        command.env("TRACTIVE_IMAGE", image);
-    }
-    if scenario.ends_with("--law pi")
-        && let Some(image) = std::env::var_os("TRACTIVE_PI_IMAGE")
-    {
+    let image = match (scenario.starts_with("zs9-"), scenario.ends_with("--law pi")) {
+        (false, false) => "TRACTIVE_IMAGE",
+        (false, true) => "TRACTIVE_PI_IMAGE",
+        (true, false) => "TRACTIVE_ZS9_IMAGE",
+        (true, true) => "TRACTIVE_ZS9_PI_IMAGE",
+    };
+    if let Some(image) = std::env::var_os(image) {
         command.env("TRACTIVE_IMAGE", image);
     }
     command.arg("run").args(scenario.split(' ')).args(["--on", on, "--out"]).arg(out);
@@ -113,6 +113,15 @@ fn both_motors_reversal_is_the_same() {
 #[ignore = "needs the image and QEMU"]
 fn both_motors_cycle_is_the_same() {
     same("zs9-cycle --cruise 2", 0);
+}
+
+/// Motoring, weakening and braking, then a fault, with the papers' ordinary law in place of ours.
+#[test]
+#[ignore = "needs the image and QEMU"]
+fn both_motors_under_the_ordinary_law_are_the_same() {
+    same("zs9-timing --carrier-hz 20000 --uin 800 --law pi", 0);
+    same("zs9-reverse --scheme zvo --adc-bits 12 --noise-a 0.3 --law pi", 0);
+    same("zs9-load-step --inject leg-stuck-on@0.1 --law pi", 1);
 }
 
 #[test]

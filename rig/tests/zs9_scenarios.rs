@@ -117,6 +117,25 @@ fn the_cycle_goes_up_and_back_and_returns_energy() {
 }
 
 #[test]
+fn motors_in_different_cycles_do_not_disturb_each_other() {
+    let outcome = run("zs9-cycle --second other --cruise 8");
+    let rows = &outcome.recording.rows;
+    assert!(outcome.recording.trip().is_none(), "{:?}", outcome.recording.trip());
+    let [highest, lowest] = [0, 1].map(|k| {
+        let turns = |row: &Row| if k == 0 { row.motors[0].speed_rpm } else { -row.motors[1].speed_rpm };
+        figures::largest(rows, turns)
+    });
+    assert!((1300.0..1301.0).contains(&highest) && (650.0..651.0).contains(&lowest), "{highest} {lowest}");
+    // Each is somewhere else in its cycle: one motors while the other brakes, and one cruises while the other has come back.
+    let opposite = rows.iter().filter(|row| row.motors[0].torque_nm > 50.0 && row.motors[1].torque_nm > 50.0);
+    assert!(opposite.count() > 500, "motor 2, which turns backwards, brakes while motor 1 motors");
+    for (name, most) in [("motor1_torque_apart_nm", 0.02), ("motor1_speed_apart_rpm", 0.02)] {
+        let found = figure(&outcome, name);
+        assert!(found <= most && found > 0.0, "{name}: {found}");
+    }
+}
+
+#[test]
 fn harmonics_are_those_of_the_schemes() {
     // Scheme, THD of the upper and of the lower motor, ripple of the inductor current, peak to peak.
     for (scheme, upper, lower, ripple_a) in [

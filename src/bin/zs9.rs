@@ -16,5 +16,9 @@ compile_error!("the reference images need the feature `qemu`");
 use tractive::board::qemu;
 
 #[cfg(all(target_os = "none", feature = "qemu"))]
+#[path = "../firmware/zs9_own_law.rs"]
+mod law;
+
+#[cfg(all(target_os = "none", feature = "qemu"))]
 #[path = "../firmware/zs9.rs"]
 mod firmware;

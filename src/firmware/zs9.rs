@@ -1,5 +1,7 @@
-//! The ZS9's two interrupts and its idle loop, on whichever `qemu` the image's root names: the board, or the board with faults injected.
+//! The ZS9's two interrupts and its idle loop, on whichever `qemu` the image's root names: the board, or the board with faults injected;
+//! and with the control law that its `law` names.
 
+use crate::law::{self, Law};
 use crate::qemu::{self, CLOCK, Interrupt as interrupt};
 use core::sync::atomic::{AtomicU32, Ordering};
 use cortex_m_rt::{entry, exception, interrupt};
@@ -46,7 +48,8 @@ fn main() -> ! {
 /// Deadline: the last peak before the next control interrupt. Missed: fault `control_deadline`, all gates off.
 #[interrupt]
 fn TIMER0() {
-    static mut TASK: ControlTask<BuiltIn> = ControlTask::new(BuiltIn, DEFAULTS);
+    static mut TASK: ControlTask<BuiltIn, Law> =
+        ControlTask::with_laws(BuiltIn, DEFAULTS, law::AT_REST, law::AT_REST);
     static mut IS_SET_UP: bool = false;
     let mut board = qemu::Control;
     if !*IS_SET_UP {

@@ -13,8 +13,6 @@ use std::process::{Command, Stdio};
 /// The feature of the reference images, on the emulated board.
 pub const QEMU: &str = "qemu";
 
-/// The PMaSynRM's image with the papers' ordinary control law.
-const PI: &str = "pi";
 /// The PMaSynRM's image with the optimised pulse patterns.
 const OPTIMAL: &str = "optimal";
 
@@ -45,6 +43,14 @@ impl System {
         self.names()[0]
     }
 
+    /// The name of its image with the papers' ordinary control law.
+    const fn pi_image(self) -> &'static str {
+        match self {
+            Self::Traction => "pi",
+            Self::Zs9 => "zs9_pi",
+        }
+    }
+
     /// The name of a board's image.
     pub fn image_on(self, board: &Board) -> String {
         match self {
@@ -71,11 +77,11 @@ pub fn image(toolchain: &Toolchain, system: System, machine: Option<&OsString>) 
     firmware(command, system.image(), system, machine)
 }
 
-/// Builds the PMaSynRM's image with the papers' ordinary control law, likewise.
-pub fn pi_image(toolchain: &Toolchain, machine: Option<&OsString>) -> Result<PathBuf> {
-    let mut command = on_target(toolchain, "tractive", PI);
+/// Builds a system's image with the papers' ordinary control law, likewise.
+pub fn pi_image(toolchain: &Toolchain, system: System, machine: Option<&OsString>) -> Result<PathBuf> {
+    let mut command = on_target(toolchain, "tractive", system.pi_image());
     command.args(["--features", QEMU]);
-    firmware(command, PI, System::Traction, machine)
+    firmware(command, system.pi_image(), system, machine)
 }
 
 /// Builds the PMaSynRM's image with the optimised pulse patterns, likewise.

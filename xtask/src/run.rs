@@ -82,7 +82,7 @@ pub fn run(verb: &str, words: &[OsString]) -> Result<u8> {
         let (toolchain, machine) = (setup.toolchain()?, machine.as_ref());
         let image = match (needs.law.as_str(), needs.patterns.as_str()) {
             (_, "optimal") => build::optimal_image(&toolchain, machine)?,
-            ("pi", _) => build::pi_image(&toolchain, machine)?,
+            ("pi", _) => build::pi_image(&toolchain, needs.system(), machine)?,
             _ => build::image(&toolchain, needs.system(), machine)?,
         };
         rig.env("TRACTIVE_IMAGE", image);

@@ -12,6 +12,10 @@ use crate::time::Clock;
 /// Each control period follows the angle; while pulses are made it then observes its sample, and learns at a boundary that has passed. The
 /// operating point is made once for each command, and the voltage once.
 pub trait ControlLaw {
+    /// `true` if a link that is controlled, as a Z-source's, is told the motors' power beforehand; otherwise its control sees what that power has
+    /// done to the voltage.
+    const FEEDS_POWER_FORWARD: bool = true;
+
     /// The follower of the angle.
     fn tracker(&self) -> &SpeedTracker;
 

@@ -13,5 +13,9 @@ fn main() {
 use tractive_fault_injector::board as qemu;
 
 #[cfg(target_os = "none")]
+#[path = "../../../src/firmware/zs9_own_law.rs"]
+mod law;
+
+#[cfg(target_os = "none")]
 #[path = "../../../src/firmware/zs9.rs"]
 mod firmware;

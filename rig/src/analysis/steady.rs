@@ -98,9 +98,8 @@ pub fn steady_point(
 /// The verdict on the mean torque in square wave; nothing where there is none.
 pub fn square_verdict(recording: &Recording, options: &RunOptions, largest_nm: f64) -> Option<Verdict> {
     let error = square_torque_error_percent(recording, largest_nm)?;
-    let others = "0.5; 14 to 33 with an id trim";
     let most = torque_bound(options, 0.5, 1.5);
-    Some(Verdict::at_most("mean torque error in square wave in %", error, most, others))
+    Some(Verdict::at_most("mean torque error in square wave in %", error, most))
 }
 
 /// Largest error of the mean torque in square wave over tenths of a second, in percent; nothing without square wave.

@@ -1,14 +1,18 @@
 //! `compare`: both control laws on the same plant with the same options, and what each reached, row by row.
 
 mod outcome;
+mod parts;
 mod rows;
+mod zs9;
 
 pub use outcome::Row;
+pub use parts::{PartRow, parts};
 
 use crate::files::write_text;
 use crate::machine::Machine;
 use crate::run::bar;
-use crate::scenario::catalogue;
+use crate::scenario::catalogue::{self, Chosen};
+use crate::scenario::{Choice, System};
 use crate::trace::Recorded;
 use anyhow::{Context, Result};
 use clap::Args;
@@ -32,7 +36,10 @@ pub struct CompareOptions {
     /// Only rows whose name has each of these words.
     #[arg(long, value_name = "WORD", num_args = 1..)]
     pub only: Vec<String>,
-    /// Folder for compare.csv and compare.md.
+    /// Instead: our law with its parts taken away one at a time.
+    #[arg(long, conflicts_with = "only")]
+    pub parts: bool,
+    /// Folder for compare.csv and compare.md, or parts.md.
     #[arg(long)]
     pub out: Option<PathBuf>,
     /// Print the rows as JSON.
@@ -42,34 +49,44 @@ pub struct CompareOptions {
 
 /// Runs the rows whose name has each of the words.
 pub fn rows(only: &[String]) -> Result<Vec<Row>> {
-    let mut plan: Vec<_> = rows::ROWS.iter().collect();
+    let mut plan: Vec<_> = rows::ROWS.iter().chain(&zs9::ROWS).collect();
     plan.retain(|row| only.iter().all(|word| row.quantity.contains(word.as_str())));
     anyhow::ensure!(!plan.is_empty(), "--only {}: no row has all of these words", only.join(" "));
     let lines: BTreeSet<_> = plan.iter().flat_map(|row| (row.lines)()).collect();
-    let runs: Vec<_> = lines.into_iter().flat_map(|line| [(line.clone(), 0), (line, 1)]).collect();
+    let runs: Vec<_> = lines.iter().flat_map(|line| LAWS.map(|law| format!("{line} {law}"))).collect();
     let bar = bar(runs.len() as u64, "compare [{bar:40}] {pos}/{len} {elapsed} (left {eta})");
-    let driven = runs.into_par_iter().map(|(line, law)| {
-        let outcome = drive(&format!("{line} {}", LAWS[law]))?;
+    let driven = runs.into_par_iter().map(|line| {
+        let outcome = drive(&line)?;
         bar.inc(1);
-        Ok(((line, law), outcome))
+        Ok((line, outcome))
     });
-    let by_line = driven.collect::<Result<BTreeMap<_, _>>>()?;
+    let driven = driven.collect::<Result<BTreeMap<_, _>>>()?;
     bar.finish_and_clear();
     let machine = Machine::load("pmasynrm-180kw")?;
-    let outcomes = [0, 1].map(|law| Outcomes { law, by_line: &by_line, machine: &machine });
+    let outcomes = [0, 1].map(|law| Outcomes { law, more: LAWS[law], driven: &driven, machine: &machine });
     Ok(plan.into_iter().map(|row| row.judge(&outcomes)).collect())
 }
 
 fn drive(line: &str) -> Result<Outcome> {
-    let chosen = catalogue::of_traction(line)?;
-    let machine = chosen.machine()?;
-    let recording = chosen.drive(&machine).with_context(|| line.to_owned())?;
+    match catalogue::choose(line.split_whitespace())? {
+        Chosen::Traction(choice) => outcome(&choice),
+        Chosen::Zs9(choice) => outcome(&choice),
+    }
+    .with_context(|| line.to_owned())
+}
+
+fn outcome<S: System>(choice: &Choice<S>) -> Result<Outcome> {
+    let machine = choice.machine()?;
+    let recording = choice.drive(&machine)?;
     let trip = recording.trip().map(|trip| trip.fault.name());
-    Ok(Outcome { figures: chosen.figures(&recording, &machine), trip })
+    Ok(Outcome { figures: choice.figures(&recording, &machine), trip })
 }
 
 /// The command. Exit code 1 where a row is not ahead and nothing says why.
 pub fn run(options: &CompareOptions) -> Result<ExitCode> {
+    if options.parts {
+        return run_parts(options);
+    }
     let rows = rows(&options.only)?;
     let cells = |row: &Row| [row.quantity.to_owned(), row.found[0].clone(), row.found[1].clone(), row.mark()];
     let mut table = Table::new();
@@ -95,4 +112,26 @@ pub fn run(options: &CompareOptions) -> Result<ExitCode> {
     }
     let unexplained = rows.iter().any(|row| !row.ahead && row.why.is_empty());
     Ok(if unexplained { ExitCode::from(1) } else { ExitCode::SUCCESS })
+}
+
+/// The heads of the table of parts.
+const PART_HEADS: [&str; 5] = ["part", "quantity", "with it", "without it", "--law pi"];
+
+fn run_parts(options: &CompareOptions) -> Result<ExitCode> {
+    let rows = parts()?;
+    let mut table = Table::new();
+    table.load_style(NOTHING).set_content_arrangement(ContentArrangement::Dynamic).set_header(PART_HEADS);
+    table.add_rows(rows.iter().map(|row| {
+        let [all, without, pi] = row.found.each_ref().map(String::as_str);
+        [row.part, row.quantity, all, without, pi]
+    }));
+    crate::say!("{}", table.trim_fmt());
+    if let Some(out) = &options.out {
+        std::fs::create_dir_all(out).with_context(|| format!("--out {}", out.display()))?;
+        let lines: Vec<_> = rows.iter().map(PartRow::markdown).collect();
+        let text =
+            format!("| {} |\n|---|---|---:|---:|---:|\n{}\n", PART_HEADS.join(" | "), lines.join("\n"));
+        write_text(&out.join("parts.md"), &text)?;
+    }
+    Ok(ExitCode::SUCCESS)
 }

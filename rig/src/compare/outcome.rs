@@ -14,7 +14,9 @@ pub(super) struct Outcome {
 /// The outcomes of a law, by the words of their runs.
 pub(super) struct Outcomes<'a> {
     pub(super) law: usize,
-    pub(super) by_line: &'a BTreeMap<(String, usize), Outcome>,
+    /// The words that the runs had besides their own.
+    pub(super) more: &'a str,
+    pub(super) driven: &'a BTreeMap<String, Outcome>,
     pub(super) machine: &'a Machine,
 }
 
@@ -62,7 +64,7 @@ impl Row {
 impl Outcomes<'_> {
     /// The outcome of a run.
     pub(super) fn of(&self, line: &str) -> Option<&Outcome> {
-        self.by_line.get(&(line.to_owned(), self.law))
+        self.driven.get(&format!("{line} {}", self.more))
     }
 
     /// The figures of a run; the fault where it tripped.
@@ -79,6 +81,17 @@ impl Outcomes<'_> {
     ) -> Result<Vec<f64>, &'static str> {
         lines.iter().map(|line| number(self.figures(line)?).ok_or("not seen")).collect()
     }
+}
+
+/// Numbers behind each other with their unit.
+pub(super) fn cell(values: Vec<f64>, count: usize, unit: &str) -> Cell {
+    let texts: Vec<_> = values.iter().map(|value| format!("{value:.count$} {unit}")).collect();
+    Cell { text: texts.join(", "), values }
+}
+
+/// The cell of a run that tripped.
+pub(super) fn trips(fault: &str) -> Cell {
+    Cell { text: format!("trips: {fault}"), values: vec![f64::INFINITY] }
 }
 
 /// The figure of a verdict whose name begins like this.

@@ -1,6 +1,6 @@
-//! The rows: which runs, which numbers of them, and how they are printed.
+//! The rows of the PMaSynRM drive: which runs, which numbers of them, and how they are printed.
 
-use super::outcome::{Cell, Outcomes, Row, field, verdict};
+use super::outcome::{Cell, Outcomes, Row, cell, field, trips, verdict};
 use crate::analysis::Figures;
 use crate::mtpa_methods;
 use crate::verdict::worst;
@@ -11,16 +11,17 @@ pub struct Plan {
     /// The runs by their words.
     pub lines: fn() -> Vec<String>,
     /// A law's numbers; the fault that tripped it where it has none.
-    read: fn(&Outcomes) -> Result<Cell, &'static str>,
-    paper: &'static str,
-    why: &'static str,
+    pub read: fn(&Outcomes) -> Result<Cell, &'static str>,
+    /// The paper's word on it.
+    pub paper: &'static str,
+    /// The reason why ours is not ahead, where it is not.
+    pub why: &'static str,
 }
 
 impl Plan {
     /// Both laws' results, and who is ahead.
     pub fn judge(&self, outcomes: &[Outcomes; 2]) -> Row {
-        let tripped = |fault| Cell { text: format!("trips: {fault}"), values: vec![f64::INFINITY] };
-        let [own, pi] = outcomes.each_ref().map(|law| (self.read)(law).unwrap_or_else(tripped));
+        let [own, pi] = outcomes.each_ref().map(|law| (self.read)(law).unwrap_or_else(trips));
         let pairs = own.values.iter().zip(&pi.values);
         let ahead =
             own.values.iter().all(|value| value.is_finite()) && pairs.into_iter().all(|(own, pi)| own < pi);
@@ -29,14 +30,8 @@ impl Plan {
 }
 
 /// So many decimals.
-fn decimals(value: f64, count: usize) -> String {
+pub(super) fn decimals(value: f64, count: usize) -> String {
     format!("{value:.count$}")
-}
-
-/// Numbers behind each other with their unit.
-fn cell(values: Vec<f64>, count: usize, unit: &str) -> Cell {
-    let texts: Vec<_> = values.iter().map(|value| format!("{} {unit}", decimals(*value, count))).collect();
-    Cell { text: texts.join(", "), values }
 }
 
 /// The numbers of one verdict over runs, each a number of its own.
@@ -44,7 +39,7 @@ fn of_verdict(outcomes: &Outcomes, lines: &[&str], what: &str) -> Result<Vec<f64
     outcomes.read(lines, |figures| verdict(figures, what))
 }
 
-fn words(lines: &[&str]) -> Vec<String> {
+pub(super) fn words(lines: &[&str]) -> Vec<String> {
     lines.iter().map(|line| (*line).to_owned()).collect()
 }
 

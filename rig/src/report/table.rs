@@ -13,11 +13,9 @@ pub fn verdicts(figures: &Figures) -> String {
         return String::new();
     }
     rows.sort_by(|one, other| severity(one).total_cmp(&severity(other)));
-    let has = |field: &str| rows.iter().any(|row| row.get(field).is_some_and(|value| *value != "–"));
-    let others = has("others");
     let mut text =
-        "<table class=\"verdicts stacked\"><thead><tr><th>Verdict</th><th>Quantity</th><th class=\"n\">Found</th><th class=\"n\">Bound</th><th>Used</th>".to_owned();
-    text += if others { "<th>Others</th></tr></thead><tbody>" } else { "</tr></thead><tbody>" };
+        "<table class=\"verdicts stacked\"><thead><tr><th>Verdict</th><th>Quantity</th><th class=\"n\">Found</th><th class=\"n\">Bound</th><th>Used</th></tr></thead><tbody>"
+            .to_owned();
     for row in rows {
         let (what, unit) = split_unit(row["what"].as_str().unwrap_or_default());
         let bound = [("at_most", "≤"), ("at_least", "≥")]
@@ -29,17 +27,12 @@ pub fn verdicts(figures: &Figures) -> String {
         let _ = write!(
             text,
             "<tr class=\"{class}\"><td data-head=\"Verdict\"><b class=\"pill\">{}</b></td><th scope=\"row\">{}</th>\
-             <td class=\"n\" data-head=\"Found\">{found}</td><td class=\"n\" data-head=\"Bound\">{}</td><td data-head=\"Used\">{used}</td>",
+             <td class=\"n\" data-head=\"Found\">{found}</td><td class=\"n\" data-head=\"Bound\">{}</td><td data-head=\"Used\">{used}</td></tr>",
             escape(verdict),
             escape(&what),
             bound.unwrap_or("–".to_owned()),
             class = class(verdict),
         );
-        if others {
-            let said = row.get("others").and_then(Value::as_str).unwrap_or("–");
-            let _ = write!(text, "<td data-head=\"Others\">{}</td>", escape(said));
-        }
-        text += "</tr>";
     }
     text + "</tbody></table>"
 }
@@ -165,7 +158,7 @@ mod tests {
     #[test]
     fn the_worst_verdict_comes_first() {
         let mut figures = Figures::default();
-        let of = |what: &str, found: Option<f64>, most: f64| Verdict::ours(what, found, most);
+        let of = |what: &str, found: Option<f64>, most: f64| Verdict::at_most(what, found, most);
         figures.set(
             "verdicts",
             vec![

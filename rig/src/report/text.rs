@@ -49,7 +49,7 @@ pub fn headline(figures: &Figures, trip: Option<Trip>) -> String {
 pub fn text(figures: &Figures) -> String {
     let mut parts = Vec::new();
     if let Some(Value::Array(verdicts)) = figures.get("verdicts") {
-        parts.push(table(&["verdict", "", "found", "at most", "others"], verdicts.iter().map(verdict)));
+        parts.push(table(&["verdict", "", "found", "at most"], verdicts.iter().map(verdict)));
     }
     let numbers = figures.values().iter().filter(|(_, value)| !value.is_array());
     let number = |(name, value): (&String, &Value)| {
@@ -72,7 +72,7 @@ fn verdict(verdict: &Value) -> Vec<String> {
     let (what, unit) = split_unit(what);
     let cell = |name: &str| measured(&verdict[name], unit);
     let say = |name: &str| verdict[name].as_str().unwrap_or_default().to_owned();
-    vec![say("verdict"), what, cell("found"), cell("at_most"), say("others")]
+    vec![say("verdict"), what, cell("found"), cell("at_most")]
 }
 
 /// `t90 in ms` is `t90`, in ms; `overshoot in % of the step` is `overshoot of the step`, in %.
@@ -159,7 +159,8 @@ mod tests {
 
     fn figures(verdicts: &[&str]) -> Figures {
         let mut figures = Figures::default();
-        let verdict = |verdict: &&str| json!({"what": "t90 in ms", "found": 2.25, "at_most": 2.5, "verdict": verdict, "others": "–"});
+        let verdict =
+            |verdict: &&str| json!({"what": "t90 in ms", "found": 2.25, "at_most": 2.5, "verdict": verdict});
         figures.set("verdicts", verdicts.iter().map(verdict).collect::<Vec<_>>());
         figures.set("peak_current_a", 247.123_f64);
         figures

@@ -39,7 +39,7 @@ fn run_choice<S: System>(choice: &Choice<S>) -> Result<ExitCode> {
         crate::say!("{}", serde_json::to_string(&summary)?);
     } else {
         let headline = report::headline(&figures, trip);
-        let law = S::law(&choice.options.own).map_or(String::new(), |law| format!(" · law {law}"));
+        let law = format!(" · law {}", choice.options.law.name());
         crate::say!(
             "{headline} · {} · {}{law}\n\n{}",
             choice.name,

@@ -29,11 +29,6 @@ pub trait System: Sized + 'static {
     /// The recording that a run leaves.
     type Recording: Recorded;
 
-    /// The control law that runs, where there is a choice.
-    fn law(_own: &Self::Own) -> Option<&'static str> {
-        None
-    }
-
     /// Step of the trace unless options or scenario say another, in s.
     fn trace_step_s(own: &Self::Own) -> f64;
     /// Shortest pulse unless the options say another, in µs.

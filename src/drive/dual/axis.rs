@@ -1,9 +1,9 @@
-//! One of the two motors in the control task: the same control law as the PMaSynRM's, with its own tables.
+//! One of the two motors in the control task: a control law as the PMaSynRM's drive runs it, with its own tables.
 
 use super::{MotorCommand, MotorShare, Settings};
 use crate::control::{
-    AimInput, Boundary, Committed, ControlLaw, Controller, Demand, Law, Measurements, ModeLimits, Region,
-    Regulated, RotorSample, SpeedInput, SpeedLoop,
+    AimInput, Boundary, Committed, ControlLaw, Demand, Law, Measurements, ModeLimits, Region, Regulated,
+    RotorSample, SpeedInput, SpeedLoop,
 };
 use crate::frames::{AlphaBeta, Angle};
 use crate::machine::Tables;
@@ -11,7 +11,7 @@ use crate::ports::MotorDemand;
 use crate::protection::{self, Fault, FrozenWatch, Violation};
 
 /// Natural frequency of the speed tracker, in rad/s: the speed loop's phase needs it quick.
-const TRACKING_RAD_S: f32 = 4000.0;
+pub const TRACKING_RAD_S: f32 = 4000.0;
 pub use crate::protection::INNOVATION_RAD;
 /// Time over which the speed may change, in s, and by how much in that time, as electrical rad: the rotor itself makes half of it. So a
 /// sensor that begins to count the other way is found where it is too slow for a surprise.
@@ -24,8 +24,8 @@ const LOOP_SHARE: f32 = 1.15;
 const STEADY_SHARE: f32 = 0.98;
 
 /// Control of one motor.
-pub struct Axis {
-    controller: Controller,
+pub struct Axis<L> {
+    controller: L,
     speed_loop: SpeedLoop,
     watch: FrozenWatch,
     /// Electrical speed behind a filter, in rad/s.
@@ -68,15 +68,10 @@ impl AxisOutput {
     };
 }
 
-impl Axis {
-    pub const fn new() -> Self {
-        Self {
-            controller: Controller::with_tracking(TRACKING_RAD_S),
-            speed_loop: SpeedLoop::new(),
-            watch: FrozenWatch::new(),
-            slow: 0.0,
-            acting: None,
-        }
+impl<L: ControlLaw> Axis<L> {
+    /// A motor at rest with its control law.
+    pub const fn new(controller: L) -> Self {
+        Self { controller, speed_loop: SpeedLoop::new(), watch: FrozenWatch::new(), slow: 0.0, acting: None }
     }
 
     /// Follows the angle, where it is `trusted` whatever it is. Says by how much, in rad, it is off where that is too much.

@@ -1,8 +1,8 @@
 //! The control interrupt's task.
 
-use super::axis::{self, Axis, AxisInput, AxisOutput};
+use super::axis::{self, Axis, AxisInput, AxisOutput, TRACKING_RAD_S};
 use super::{DualApplied, DualCommand, MotorShare, Settings, Shared};
-use crate::control::{Measurements, ZSource, ZSourceError, ZSourceInput};
+use crate::control::{ControlLaw, Controller, Measurements, ZSource, ZSourceError, ZSourceInput};
 use crate::drive::acknowledge::Acknowledge;
 use crate::drive::{Gates, PeriodInput, SlotTimer};
 use crate::frames::{Angle, SQRT_3};
@@ -23,11 +23,11 @@ pub(super) const TWO_LEVEL_SHARE: f32 = FRAC_PI_4 / SQRT_3;
 /// The name of a lost sensor, by motor.
 const SENSOR_LOST: [Fault; 2] = [Fault::SensorLost1, Fault::SensorLost2];
 
-/// The ZS9's control task.
-pub struct ControlTask<M = &'static Tables> {
+/// The ZS9's control task, for a machine and a control law, once a motor.
+pub struct ControlTask<M = &'static Tables, L = Controller> {
     machine: M,
     settings: Settings,
-    axes: [Axis; 2],
+    axes: [Axis<L>; 2],
     link: ZSource,
     /// The results of the last period.
     driven: Driven,
@@ -61,10 +61,18 @@ impl Driven {
 impl<M: Machine> ControlTask<M> {
     /// A task whose first call is the control timer's first interrupt, one control period after the start.
     pub const fn new(machine: M, settings: Settings) -> Self {
+        let [upper, lower] = [Controller::with_tracking(TRACKING_RAD_S); 2];
+        Self::with_laws(machine, settings, upper, lower)
+    }
+}
+
+impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
+    /// The same with other control laws, at rest: the upper motor's, the lower motor's.
+    pub const fn with_laws(machine: M, settings: Settings, upper: L, lower: L) -> Self {
         Self {
             machine,
             settings,
-            axes: [Axis::new(), Axis::new()],
+            axes: [Axis::new(upper), Axis::new(lower)],
             link: ZSource::new(),
             driven: Driven::NOTHING,
             upper_aims: false,
@@ -317,7 +325,7 @@ impl<M: Machine> ControlTask<M> {
         // The operating points in turn: the lower motor's in the periods between.
         self.upper_aims = !self.upper_aims;
         let turns = [self.upper_aims, !self.upper_aims];
-        let step = |axis: &mut Axis, measured, demand, speed_torque_nm, applied, aims| {
+        let step = |axis: &mut Axis<L>, measured, demand, speed_torque_nm, applied, aims| {
             axis.step(
                 &AxisInput { measured, demand, speed_torque_nm, applied, link_v, aims },
                 settings,
@@ -332,7 +340,11 @@ impl<M: Machine> ControlTask<M> {
             capacitor_v: sample.capacitor_v,
             inductor_a: sample.inductor_a,
             source_v: sample.source_v,
-            power_w: motors.iter().map(|motor| motor.power_w).sum(),
+            power_w: if L::FEEDS_POWER_FORWARD {
+                motors.iter().map(|motor| motor.power_w).sum()
+            } else {
+                0.0
+            },
             link_ref_v: command.link_ref_v,
             duty_room: 1.0,
         };

@@ -31,6 +31,7 @@ use crate::recorder::DualRecorder;
 use crate::time::Clock;
 use core::sync::atomic::AtomicU32;
 
+pub use axis::TRACKING_RAD_S;
 pub use control::ControlTask;
 pub use messages::{DualApplied, DualCommand, MotorCommand, MotorShare};
 pub use pwm::PwmTask;

@@ -32,7 +32,7 @@ use crate::cli::TimingArgs;
 use crate::setup::Setup;
 use anyhow::{Context, Result};
 use report::Report;
-use system::{LawCost, Measured, System};
+use system::{Measured, System};
 
 /// The command.
 pub fn run(args: &TimingArgs) -> Result<u8> {
@@ -41,17 +41,17 @@ pub fn run(args: &TimingArgs) -> Result<u8> {
     let toolchain = setup.toolchain()?;
     let rig = build::rig()?;
     let blocks = blocks::measure(&toolchain, &qemu)?;
-    let mut systems = Vec::new();
+    let (mut systems, mut pi) = (Vec::new(), Vec::new());
     for system in System::ALL {
         systems.push(system.measure(&toolchain, &rig, &qemu)?);
+        pi.push(system.under_pi(&toolchain, &rig, &qemu)?);
     }
-    let pi = LawCost::of_pi(&toolchain, &rig, &qemu)?;
     parts::all_found(&systems.iter().flat_map(|measured| &measured.sources).copied().collect())?;
     let budgets = build::root().join("budgets.toml");
     let text = std::fs::read_to_string(&budgets).with_context(|| budgets.display().to_string())?;
     let values: Vec<_> = systems.iter().flat_map(values).chain(report::blocks(&blocks)).collect();
     let judged = budget::judge(&text, &values)?;
-    let report = Report { systems: &systems, pi, blocks: &blocks, judged: &judged };
+    let report = Report { systems: &systems, pi: &pi, blocks: &blocks, judged: &judged };
     if args.json {
         println!("{}", report.json());
     } else {

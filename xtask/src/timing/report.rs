@@ -12,8 +12,8 @@ const INTERRUPTS: [&str; 2] = ["control", "pwm"];
 /// Everything that was measured and judged.
 pub struct Report<'a> {
     pub systems: &'a [Measured],
-    /// The control interrupt under the papers' ordinary law.
-    pub pi: LawCost,
+    /// The control interrupt of each under the papers' ordinary law.
+    pub pi: &'a [LawCost],
     pub blocks: &'a [Block],
     pub judged: &'a [Judged],
 }
@@ -202,7 +202,7 @@ mod tests {
         let block = Block { name, max: 120, mean: 110.0, cycles: 250, max_error: Some(1e-7) };
         let report = Report {
             systems: &[example()],
-            pi: LawCost { mean: 900.0, max: 1_200 },
+            pi: &[LawCost { mean: 900.0, max: 1_200 }],
             blocks: &[block],
             judged: &judged,
         };

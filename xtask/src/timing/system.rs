@@ -45,6 +45,9 @@ const DUAL_DRIVES: [&str; 8] = [
     "--scheme=zvo --carrier-hz=20000 --uin=800 --inject=leg-stuck-on@0.115",
 ];
 
+/// The first of them, without a fault.
+const HEALTHY_DUAL_DRIVES: usize = 5;
+
 /// Up to full torque and weakening with an operator.
 const DUAL_TALK: &str = "rig/scripts/zs9-timing.talk";
 
@@ -102,6 +105,29 @@ impl System {
         }
         Measured::new(self, path, image, sum)
     }
+
+    /// The cost of the papers' ordinary law: motoring and braking through every mode, without a provoked fault.
+    pub fn under_pi(self, toolchain: &Toolchain, rig: &Path, qemu: &Path) -> Result<LawCost> {
+        let path = build::pi_image(toolchain, self.build, None)?;
+        let bench = Bench {
+            rig: rig.to_owned(),
+            qemu: qemu.to_owned(),
+            command: ["run", self.scenario, "--law", "pi"].map(str::to_owned).to_vec(),
+            image: image::read(&path)?,
+            path,
+            keeps_paths: false,
+        };
+        let drives = match self.build {
+            build::System::Traction => &DRIVES[..],
+            build::System::Zs9 => &DUAL_DRIVES[..HEALTHY_DUAL_DRIVES],
+        };
+        let plan: Vec<_> = drives.iter().map(|options| (&bench, (*options).to_owned())).collect();
+        let mut statistics = Statistics::default();
+        for drive in drive_all("pi", &plan)? {
+            statistics.add(&drive)?;
+        }
+        Ok(LawCost::of(&statistics))
+    }
 }
 
 /// The control interrupt's instructions under a law: the mean in its dearest mode, and the most.
@@ -118,25 +144,6 @@ impl LawCost {
             mean: cost.mean.max(row.instructions.mean()),
             max: cost.max.max(row.instructions.max),
         })
-    }
-
-    /// That of the papers' ordinary law: motoring and braking through every mode, without a provoked fault.
-    pub fn of_pi(toolchain: &Toolchain, rig: &Path, qemu: &Path) -> Result<Self> {
-        let path = build::pi_image(toolchain, None)?;
-        let bench = Bench {
-            rig: rig.to_owned(),
-            qemu: qemu.to_owned(),
-            command: ["run", "timing", "--law", "pi"].map(str::to_owned).to_vec(),
-            image: image::read(&path)?,
-            path,
-            keeps_paths: false,
-        };
-        let plan: Vec<_> = DRIVES.iter().map(|options| (&bench, (*options).to_owned())).collect();
-        let mut statistics = Statistics::default();
-        for drive in drive_all("pi", &plan)? {
-            statistics.add(&drive)?;
-        }
-        Ok(Self::of(&statistics))
     }
 }
 

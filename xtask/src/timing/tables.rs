@@ -65,13 +65,17 @@ pub fn targets(report: &Report) -> Table {
     Table::new(&["", ">target", ">longest", &named, &beyond, &around], rows)
 }
 
-/// The PMaSynRM's control interrupt under either law.
+/// The control interrupt of each system under either law.
 pub fn laws(report: &Report) -> Table {
-    let own = report.systems.first().map(|measured| LawCost::of(&measured.statistics)).unwrap_or_default();
-    let row =
-        |name: &str, cost: LawCost| vec![name.to_owned(), format!("{:.0}", cost.mean), cost.max.to_string()];
-    let rows = [row("ours", own), row("the papers' ordinary one, `--law pi`", report.pi)];
-    Table::new(&["law", ">mean in the dearest mode", ">longest"], rows)
+    let rows = report.systems.iter().zip(report.pi).flat_map(|(measured, pi)| {
+        let row = |law: &str, cost: &LawCost| {
+            let name = measured.system.name.to_owned();
+            vec![name, law.to_owned(), format!("{:.0}", cost.mean), cost.max.to_string()]
+        };
+        let own = LawCost::of(&measured.statistics);
+        [row("ours", &own), row("the papers' ordinary one, `--law pi`", pi)]
+    });
+    Table::new(&["", "law", ">mean in the dearest mode", ">longest"], rows)
 }
 
 /// The counts of each interrupt in each mode, by direction where the rig names one.

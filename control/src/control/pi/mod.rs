@@ -105,8 +105,17 @@ impl PiLaw {
 
     /// At rest, with MTPA started as told.
     pub const fn starting(start: MtpaStart) -> Self {
+        Self::with_tracker(SpeedTracker::new(), start)
+    }
+
+    /// At rest, with a speed tracker of this natural frequency, in rad/s; MTPA starts from the point of the period before.
+    pub const fn with_tracking(natural_rad_s: f32) -> Self {
+        Self::with_tracker(SpeedTracker::with_natural(natural_rad_s), MtpaStart::Previous)
+    }
+
+    const fn with_tracker(speed: SpeedTracker, start: MtpaStart) -> Self {
         Self {
-            speed: SpeedTracker::new(),
+            speed,
             demand: Shaper::new(),
             reference: Reference::new(start),
             weakening: Weakening::NONE,
@@ -129,6 +138,8 @@ impl Default for PiLaw {
 }
 
 impl ControlLaw for PiLaw {
+    const FEEDS_POWER_FORWARD: bool = false;
+
     fn tracker(&self) -> &SpeedTracker {
         &self.speed
     }
@@ -154,7 +165,7 @@ impl ControlLaw for PiLaw {
     }
 
     fn idle(&mut self) {
-        *self = Self { speed: self.speed, ..Self::starting(self.reference.start()) };
+        *self = Self::with_tracker(self.speed, self.reference.start());
     }
 
     fn begin_without_torque(&mut self) {
@@ -184,7 +195,7 @@ impl ControlLaw for PiLaw {
         let before_v = self.link_v.unwrap_or(udc_v);
         let link_v = before_v + LINK_RAD_S * period_s * (udc_v - before_v);
         self.link_v = Some(link_v);
-        let limit_v = limits.depth_limit * six_step_v(link_v);
+        let limit_v = limits.depth_limit * limits.steady_share * six_step_v(link_v);
         let point = self.reference.step(wanted_nm, self.weakening.moved_a(), tables);
         self.target = Target {
             torque_nm: point.torque_nm,

@@ -67,8 +67,8 @@ impl Scenario<Traction> for Acknowledge {
         verdicts.extend([
             Verdict::never("states that are not the expected ones", others),
             Verdict::never("fault with another name", !named),
-            Verdict::ours("current between fault and enable (of the largest)", current, 0.02),
-            Verdict::ours("mean torque off the demand at the end (share)", error, 0.01),
+            Verdict::at_most("current between fault and enable (of the largest)", current, 0.02),
+            Verdict::at_most("mean torque off the demand at the end (share)", error, 0.01),
         ]);
         line::figures(&mut figures, recording);
         figures.set("verdicts", verdicts);

@@ -119,11 +119,11 @@ fn torque_verdicts(points: &[SteadyPoint], options: &RunOptions) -> Vec<Verdict>
     let (given, limited): (Vec<_>, Vec<_>) =
         points.iter().partition(|point| (point.reference_nm / point.demand_nm) > WHOLE);
     let error = worst(given.iter().map(|point| point.torque_error_percent.abs()));
-    let mut verdicts = vec![Verdict::at_most("mean torque error in %", error, most, "0.4; the paper 5")];
+    let mut verdicts = vec![Verdict::at_most("mean torque error in %", error, most)];
     if !limited.is_empty() {
         let error = worst(limited.iter().map(|point| point.reference_error_percent.abs()));
         let what = "mean torque off what the drive says, where the link gives less, in %";
-        verdicts.push(Verdict::ours(what, error, most));
+        verdicts.push(Verdict::at_most(what, error, most));
     }
     verdicts
 }

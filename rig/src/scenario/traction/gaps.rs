@@ -171,20 +171,24 @@ impl Scenario<Traction> for Gaps {
         let mut verdicts = line::verdicts(recording, &[]);
         verdicts.extend([
             Verdict::never("drive tripped", recording.trip().is_some()),
-            Verdict::ours("link's fall, of the way to its trip", fall, 0.9),
-            Verdict::ours("link's rise, of the way to its trip", rise, 0.95),
-            Verdict::ours(
+            Verdict::at_most("link's fall, of the way to its trip", fall, 0.9),
+            Verdict::at_most("link's rise, of the way to its trip", rise, 0.95),
+            Verdict::at_most(
                 "braking that holds the link (share of the largest torque)",
                 worst(gaps.iter().map(|gap| gap.holding_nm / largest_nm)),
                 0.11,
             ),
-            Verdict::ours("torque back after a gap in (s)", worst(gaps.iter().map(|gap| gap.back_s)), 0.25),
-            Verdict::ours(
+            Verdict::at_most(
+                "torque back after a gap in (s)",
+                worst(gaps.iter().map(|gap| gap.back_s)),
+                0.25,
+            ),
+            Verdict::at_most(
                 "torque after a gap and before it (share)",
                 worst(gaps.iter().map(|gap| gap.torque_error.abs())),
                 0.01,
             ),
-            Verdict::ours("peak current over the trip level", peak, 1.0),
+            Verdict::at_most("peak current over the trip level", peak, 1.0),
         ]);
         line::figures(&mut figures, recording);
         figures.set("gaps", gaps);

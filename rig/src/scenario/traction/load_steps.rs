@@ -67,21 +67,20 @@ pub fn verdicts(steps: &[StepResponse], options: &RunOptions, machine: &Machine)
     let percent = bound(options, 0.3, 1.5);
     let least_nm = scaled_nm(2.0, machine);
     let error = |step: &StepResponse| step.final_error_nm.abs() / (0.01 * percent * step.to_nm).max(least_nm);
-    let ideal = |what: &str, value: fn(&StepResponse) -> f64, at_most: f64, others: &'static str| {
-        Verdict::at_most(what, most(value), bound(options, at_most, f64::INFINITY), others)
+    let ideal = |what: &str, value: fn(&StepResponse) -> f64, at_most: f64| {
+        Verdict::at_most(what, most(value), bound(options, at_most, f64::INFINITY))
     };
     let scale = time_scale(machine);
     let of_final = format!("final mean over {percent} % or 0.16 % of the largest torque");
     let (error, most_error) = (worst(steps.iter().map(error)), torque_bound(options, 1.0, 1.0));
     vec![
-        ideal("t90 in ms", |step| step.t90_ms, 2.5 * scale, "3.0 to 3.6; the paper names no time"),
+        ideal("t90 in ms", |step| step.t90_ms, 2.5 * scale),
         ideal(
             "overshoot in % of the step, of torque averaged over a carrier",
             |step| step.overshoot_percent,
             2.0,
-            "1.7; the paper none, of the current",
         ),
-        ideal("settled within 2 % in ms", |step| step.settling_2_percent_ms, 5.0 * scale, "5 % in 4.2 ms"),
-        Verdict::at_most(&of_final, error, most_error, "0.02 to 0.4 %"),
+        ideal("settled within 2 % in ms", |step| step.settling_2_percent_ms, 5.0 * scale),
+        Verdict::at_most(&of_final, error, most_error),
     ]
 }

@@ -1,5 +1,6 @@
 //! The PMaSynRM drive's scenarios.
 
+mod ablated;
 pub(super) mod acknowledge;
 pub(super) mod borders_timing;
 pub mod characteristic;
@@ -21,6 +22,7 @@ pub(super) mod sweep;
 pub mod switches;
 pub(super) mod timing;
 
+pub use ablated::Part;
 pub use line::scaled as scaled_link;
 pub use live::{Command, Live, Start, Turning, Wanted};
 pub use sweep::Sweep;
@@ -30,6 +32,7 @@ use crate::analysis::{self, Figures};
 use crate::bench::{self, Bench, Flaws, Limits, LinePlan, Operator, Supply};
 use crate::inject::Injection;
 use crate::inject::traction::Kind;
+use crate::law::LawName;
 use crate::machine::Machine;
 use crate::options::{On, not_negative, usual_min_pulse_us, within};
 use crate::plant::{DcLinkSettings, LineFilter, Plant, Source, SpeedSource};
@@ -37,7 +40,8 @@ use crate::report::{self, Page};
 use crate::run::traction::{Tasks, run_in_qemu};
 use crate::run::{self, CLOCK, Supervisor};
 use crate::trace::Recording;
-use anyhow::Result;
+use ablated::Ablated;
+use anyhow::{Result, bail};
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 use serde_json::{Map, Value};
@@ -58,26 +62,6 @@ const STEP_S: f64 = 50e-6;
 /// The PMaSynRM drive.
 #[derive(Clone, Copy, Debug)]
 pub struct Traction;
-
-/// The control law that the drive runs.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum LawName {
-    /// The project's own
-    Tractive,
-    /// The papers' ordinary one: PI loops on measured currents
-    Pi,
-}
-
-impl LawName {
-    /// As on the command line.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Tractive => "tractive",
-            Self::Pi => "pi",
-        }
-    }
-}
 
 /// The point whose inductances the first pass of MTPA takes under `--law pi`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
@@ -138,15 +122,15 @@ impl PatternsName {
 /// Options of all its scenarios.
 #[derive(Clone, Debug, Args, Serialize)]
 pub struct TractionOptions {
-    /// The control law.
-    #[arg(long, value_enum, default_value = "tractive")]
-    pub law: LawName,
     /// With --law pi: the point whose inductances the first of the two passes of MTPA takes.
     #[arg(long, value_enum, default_value = "previous", value_name = "POINT")]
     pub mtpa_start: StartName,
     /// The pulse patterns above the free carrier.
     #[arg(long, value_enum, default_value = "paper")]
     pub patterns: PatternsName,
+    /// A part of the project's own law to take away, to see what it buys; on the host.
+    #[arg(long, value_enum, value_name = "PART")]
+    pub ablate: Option<Part>,
     /// Leave the dead time uncompensated: neither the pulses are corrected nor is the sixth harmonic of the voltage followed.
     #[arg(long)]
     pub uncompensated: bool,
@@ -238,10 +222,6 @@ impl System for Traction {
     type Plan = Plan;
     type Recording = Recording;
 
-    fn law(own: &TractionOptions) -> Option<&'static str> {
-        Some(own.law.name())
-    }
-
     fn trace_step_s(_own: &TractionOptions) -> f64 {
         STEP_S
     }
@@ -265,9 +245,11 @@ impl System for Traction {
             ("--torque", own("torque"), -most_nm, most_nm),
             ("--to", own("to"), -fastest_rpm, fastest_rpm),
         ])?;
-        let (law, patterns) = (options.own.law, options.own.patterns);
-        if (law, patterns, options.on) == (LawName::Pi, PatternsName::Optimal, On::Qemu) {
-            anyhow::bail!("--patterns optimal: no image with --law pi has them; --on host has");
+        if (options.law, options.own.patterns, options.on) == (LawName::Pi, PatternsName::Optimal, On::Qemu) {
+            bail!("--patterns optimal: no image with --law pi has them; --on host has");
+        }
+        if options.own.ablate.is_some() && (options.law == LawName::Pi || options.on == On::Qemu) {
+            bail!("--ablate: a part is taken away from the project's own law, and on the host alone");
         }
         options.check_flaws(machine, udc_v)
     }
@@ -285,9 +267,10 @@ impl System for Traction {
         match options.on {
             On::Host => {
                 let run = OnHost { name, bench, setup: &setup, options, machine };
-                match options.own.law {
-                    LawName::Tractive => run.run(Controller::new(), supervisor),
-                    LawName::Pi => run.run(PiLaw::starting(options.own.mtpa_start.of()), supervisor),
+                match (options.law, options.own.ablate) {
+                    (LawName::Tractive, Some(part)) => run.run(Ablated::new(part), supervisor),
+                    (LawName::Tractive, None) => run.run(Controller::new(), supervisor),
+                    (LawName::Pi, _) => run.run(PiLaw::starting(options.own.mtpa_start.of()), supervisor),
                 }
             }
             On::Qemu => {

@@ -94,10 +94,14 @@ impl Scenario<Traction> for Precharge {
         let error = (torque_nm / (0.65 * machine.folder.parameters.max_torque_nm) - 1.0).abs();
         let mut verdicts = line::verdicts(recording, &refusals(machine));
         verdicts.extend([
-            Verdict::ours("source over link when the main contactor closes (share)", gap_v / source_v, 0.025),
-            Verdict::ours("link at the end, V", ends_v, empty_v(machine)),
+            Verdict::at_most(
+                "source over link when the main contactor closes (share)",
+                gap_v / source_v,
+                0.025,
+            ),
+            Verdict::at_most("link at the end, V", ends_v, empty_v(machine)),
             Verdict::never("not ready at the end", !ends),
-            Verdict::ours("mean torque off the demand while running (share)", error, 0.01),
+            Verdict::at_most("mean torque off the demand while running (share)", error, 0.01),
         ]);
         line::figures(&mut figures, recording);
         figures.set("verdicts", verdicts);

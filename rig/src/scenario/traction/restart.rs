@@ -97,8 +97,8 @@ fn verdicts(catches: &[FlyingStart], options: &RunOptions) -> Vec<Verdict> {
     let (over, error) = (worst(catches.iter().map(over)), worst(driven.map(error)));
     let most = torque_bound(options, 0.5, 1.5);
     vec![
-        Verdict::ours("catches in another mode than the speed needs", other_mode as f64, 0.0),
-        Verdict::ours("current at a catch over the larger of the machine's and the diodes'", over, 1.02),
-        Verdict::ours("mean torque error after a catch in %", error, most),
+        Verdict::at_most("catches in another mode than the speed needs", other_mode as f64, 0.0),
+        Verdict::at_most("current at a catch over the larger of the machine's and the diodes'", over, 1.02),
+        Verdict::at_most("mean torque error after a catch in %", error, most),
     ]
 }

@@ -44,10 +44,10 @@ impl Scenario<Traction> for Reversal {
         let mut figures = analysis::common(recording);
         let ratio = worst(steps.iter().map(|step| step.peak_ratio));
         let error = worst(holds.iter().map(|hold| hold.torque_error_percent.abs()));
-        let (most, others) = (torque_bound(options, 0.5, 1.5), "0.5; 14 to 33 with an id trim");
+        let most = torque_bound(options, 0.5, 1.5);
         let verdicts = [
-            Verdict::ours("peak current over the larger steady peak", ratio, 1.15),
-            Verdict::at_most("mean torque error at full power in %", error, most, others),
+            Verdict::at_most("peak current over the larger steady peak", ratio, 1.15),
+            Verdict::at_most("mean torque error at full power in %", error, most),
         ];
         figures.set("verdicts", verdicts);
         figures.set("transitions", steps);

@@ -50,7 +50,7 @@ impl Scenario<Traction> for Steady {
         let mut verdicts = bound::verdicts(&beside, options).to_vec();
         if options.own.line.is_some() {
             let swing = analysis::link_swing(analysis::window(recording, window.0, window.1));
-            verdicts.push(Verdict::ours("swing of the link (share of its voltage)", swing, 0.03));
+            verdicts.push(Verdict::at_most("swing of the link (share of its voltage)", swing, 0.03));
         }
         if options.dead_time_us > 0.0 {
             let (speed_rpm, point_nm) = DEAD_TIME_POINT;
@@ -66,7 +66,7 @@ impl Scenario<Traction> for Steady {
         }
         if steady.told_nm.is_finite() {
             let told = "torque that the drive tells, off the mean in % of the largest";
-            verdicts.push(Verdict::ours(told, steady.told_error_percent, 2.0));
+            verdicts.push(Verdict::at_most(told, steady.told_error_percent, 2.0));
         }
         figures.set("point", vec![steady]);
         figures.set("verdicts", verdicts);
@@ -111,6 +111,6 @@ impl Steady {
 fn dead_time_verdicts(measured: &Distortion, at_most: f64, how: &str) -> [Verdict; 2] {
     [5, 7].map(|order| {
         let share = measured.share_percent(order);
-        Verdict::ours(&format!("harmonic {order} in % of the fundamental{how}"), share, at_most)
+        Verdict::at_most(&format!("harmonic {order} in % of the fundamental{how}"), share, at_most)
     })
 }

@@ -16,6 +16,7 @@ use crate::analysis::Figures;
 use crate::bench::Limits;
 use crate::inject::Injection;
 use crate::inject::zs9::Kind;
+use crate::law::LawName;
 use crate::machine::Machine;
 use crate::options::{On, positive};
 use crate::plant::SpeedSource;
@@ -33,9 +34,13 @@ use clap::Args;
 use core::f64::consts::TAU;
 use serde::Serialize;
 use serde_json::{Map, Value};
+use tractive::control::{ControlLaw, Controller, PiLaw};
+use tractive::drive::dual::{Settings, TRACKING_RAD_S};
+use tractive::machine::Ratings;
 use tractive::nine_switch::Scheme;
 use tractive::operator::Line;
 use tractive::recorder::DualRecorder;
+use tractive::time::Instant;
 use tractive::wire::DualSetup;
 
 /// Source voltage, in V.
@@ -140,10 +145,11 @@ impl System for Zs9 {
                 let line = line.map(|times| {
                     Line::rated(&ratings, times.precharge_s, times.discharge_s).without_chopper()
                 });
-                let recorder = DualRecorder::new();
-                let tasks = Tasks::new(machine.tables, settings).recorded_by(&recorder);
-                let tasks = tasks.commanded_by(supervisor, ratings, line);
-                on_host(name, bench, tasks, |index| recorder.read(index))
+                let run = OnHost { name, bench, settings, ratings, line, machine };
+                match options.law {
+                    LawName::Tractive => run.run(Controller::with_tracking(TRACKING_RAD_S), supervisor),
+                    LawName::Pi => run.run(PiLaw::with_tracking(TRACKING_RAD_S), supervisor),
+                }
             }
             On::Qemu => {
                 let setup = DualSetup { carrier_ticks: settings.carrier_ticks, line };
@@ -166,9 +172,30 @@ impl System for Zs9 {
     }
 }
 
+/// A run on the host, but for the control law.
+struct OnHost<'a> {
+    name: &'a str,
+    bench: Bench,
+    settings: Settings,
+    ratings: Ratings,
+    line: Option<Line>,
+    machine: &'a Machine,
+}
+
+impl OnHost<'_> {
+    /// The drive's own tasks with a law for each motor.
+    fn run(self, law: impl ControlLaw + Copy, supervisor: Option<&mut dyn Supervisor>) -> Result<Recording> {
+        let Self { settings, ratings, line, machine, .. } = self;
+        let recorder = DualRecorder::new();
+        let tasks = Tasks::with_law(law, Instant(0), machine.tables, settings).recorded_by(&recorder);
+        let tasks = tasks.commanded_by(supervisor, ratings, line);
+        on_host(self.name, self.bench, tasks, |index| recorder.read(index))
+    }
+}
+
 fn bench(plan: Plan, options: &Options, machine: &Machine) -> Result<Bench> {
     let Plan { lead_s, duration_s, .. } = plan;
-    let Zs9Options { carrier_hz, uin: link_ref_v, scheme, inject } = options.own;
+    let Zs9Options { carrier_hz, uin: link_ref_v, scheme, inject, .. } = options.own;
     if let Some(injection) = inject
         && injection.at_s > duration_s
     {
@@ -211,17 +238,12 @@ pub fn free(inertia_kg_m2: f64) -> [SpeedSource; 2] {
 /// Link voltage from which figures are judged, in V: the lowest at which bounds are known. At less the link's own are farther off.
 pub const LEAST_JUDGED_V: f64 = 667.0;
 
-/// Figures beside their bounds: the quantity with its unit, the figure's name, the bound, what a first, ordinary implementation reached. The
-/// paper shows curves without numbers. With flaws, or a link below [`LEAST_JUDGED_V`], they are only reported.
-pub fn judge(
-    figures: &Figures,
-    options: &Options,
-    bounds: &[(&str, &str, f64, &'static str)],
-) -> Vec<Verdict> {
+/// Figures beside their bounds: the quantity with its unit, the figure's name, the bound. The paper shows curves without numbers. With flaws, or a link below [`LEAST_JUDGED_V`], they are only reported.
+pub fn judge(figures: &Figures, options: &Options, bounds: &[(&str, &str, f64)]) -> Vec<Verdict> {
     let judged = options.own.uin >= LEAST_JUDGED_V;
-    let verdict = |(what, name, at_most, others): &(&str, &str, f64, &'static str)| {
+    let verdict = |(what, name, at_most): &(&str, &str, f64)| {
         let at_most = if judged { bound(options, *at_most, f64::INFINITY) } else { f64::INFINITY };
-        Verdict::at_most(what, figures.number(name), at_most, others)
+        Verdict::at_most(what, figures.number(name), at_most)
     };
     bounds.iter().map(verdict).collect()
 }

@@ -55,9 +55,9 @@ impl Scenario<Zs9> for Reverse {
         figures.set("motor2_speed_rpm", mean(last, |row| row.motors[1].speed_rpm));
         figures::link(&mut figures, &recording.rows, options.own.uin);
         let bounds = [
-            ("motor 1's speed off, rms in r/min", "motor1_speed_error_rms_rpm", 0.001, "–"),
-            ("motor 2's speed off, rms in r/min", "motor2_speed_error_rms_rpm", 1.6, "1.6"),
-            ("link voltage off in %", "link_deviation_percent", 0.5, "–"),
+            ("motor 1's speed off, rms in r/min", "motor1_speed_error_rms_rpm", 0.001),
+            ("motor 2's speed off, rms in r/min", "motor2_speed_error_rms_rpm", 1.6),
+            ("link voltage off in %", "link_deviation_percent", 0.5),
         ];
         figures.set("verdicts", judge(&figures, options, &bounds));
         figures

@@ -5,7 +5,8 @@ use crate::run::{Interrupts, Supervisor, turn};
 use crate::without::Ablation;
 use crate::zs9::bench::Bench;
 use anyhow::Result;
-use tractive::drive::dual::{ControlTask, PwmTask, Settings, Shared};
+use tractive::control::{ControlLaw, Controller};
+use tractive::drive::dual::{ControlTask, PwmTask, Settings, Shared, TRACKING_RAD_S};
 use tractive::frames::Abc;
 use tractive::machine::{Ratings, Tables};
 use tractive::operator::{
@@ -130,8 +131,8 @@ impl OperatorPort<DualDemands> for Idle<'_, '_> {
 }
 
 /// Both tasks and the cells between them.
-pub struct Tasks<'a> {
-    control: ControlTask,
+pub struct Tasks<'a, L = Controller> {
+    control: ControlTask<&'static Tables, L>,
     pwm: PwmTask,
     shared: Shared<'a>,
     clock: Clock,
@@ -147,8 +148,15 @@ impl<'a> Tasks<'a> {
 
     /// The same for timers that start at another instant.
     pub fn beginning_at(origin: Instant, tables: &'static Tables, settings: Settings) -> Self {
+        Self::with_law(Controller::with_tracking(TRACKING_RAD_S), origin, tables, settings)
+    }
+}
+
+impl<'a, L: ControlLaw + Copy> Tasks<'a, L> {
+    /// The same with another control law, at rest, for each motor.
+    pub fn with_law(law: L, origin: Instant, tables: &'static Tables, settings: Settings) -> Self {
         Self {
-            control: ControlTask::new(tables, settings).beginning_at(origin),
+            control: ControlTask::with_laws(tables, settings, law, law).beginning_at(origin),
             pwm: PwmTask::new(tables, settings).beginning_at(origin),
             shared: Shared::new(),
             clock: settings.clock,
@@ -190,7 +198,7 @@ impl<'a> Tasks<'a> {
     }
 }
 
-impl Interrupts for Tasks<'_> {
+impl<L: ControlLaw + Copy> Interrupts for Tasks<'_, L> {
     type Bench = Bench;
 
     /// They never meet: control comes at valleys, PWM at peaks.

@@ -1,0 +1,115 @@
+//! The project's law with its parts taken away one at a time, in the runs where each part counts.
+
+use super::outcome::{Cell, Outcomes, cell, trips, verdict};
+use super::rows::{Plan, ROWS, words};
+use super::{Outcome, drive};
+use crate::machine::Machine;
+use crate::run::bar;
+use anyhow::{Context, Result};
+use rayon::prelude::*;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// The run that shows what damping is worth: constant power behind a choke.
+const BEHIND_CHOKE: &str = "steady --speed 1900 --torque 1200 --line 3,4,30";
+
+/// The run that shows what the integral part is worth.
+const RESISTIVE: &str = "load-steps --rs-error 50";
+
+/// A row that no comparison of both laws has.
+const DAMPING: Plan = Plan {
+    quantity: "1,200 N·m at 1,900 r/min behind 3 mH, 4 mF and 30 mΩ: swing of the link",
+    lines: || words(&[BEHIND_CHOKE]),
+    read: |law| {
+        let swing = |figures: &_| verdict(figures, "swing of the link").map(|share| 100.0 * share);
+        Ok(cell(law.read(&[BEHIND_CHOKE], swing)?, 2, "%"))
+    },
+    paper: "",
+    why: "",
+};
+
+/// Another: half as much resistance again as the tables have.
+const RESISTANCE: Plan = Plan {
+    quantity: "half as much resistance again, load steps at 200 r/min: overshoot, within 2 % after",
+    lines: || words(&[RESISTIVE]),
+    read: |law| {
+        let of = |what: &str| law.read(&[RESISTIVE], |figures| verdict(figures, what));
+        let (over, settled) = (cell(of("overshoot")?, 1, "%"), cell(of("settled")?, 1, "ms"));
+        Ok(Cell {
+            text: format!("{}, {}", over.text, settled.text),
+            values: [over.values, settled.values].concat(),
+        })
+    },
+    paper: "",
+    why: "",
+};
+
+/// Each part: its name, the words that take it away, and the beginning of the quantity that it counts for.
+const PARTS: [(&str, &str, &str); 12] = [
+    ("prediction over committed pulses", "--ablate prediction", "load steps at 200 r/min"),
+    ("prediction over committed pulses", "--ablate prediction", "full torque in one step"),
+    ("ripple subtracted", "--ablate ripple", "current when the mode changes"),
+    ("ripple subtracted", "--ablate ripple", "torque when the mode changes"),
+    ("observer of the disturbance", "--ablate observer", "torque at the characteristic points"),
+    ("observer of the disturbance", "--ablate observer", "flux map wrong by 10 %"),
+    ("observer of the disturbance", "--ablate observer", "half as much resistance"),
+    ("sixth harmonic in the observer", "--ablate sixth", "dead time of 5 µs"),
+    ("that and the pulses' own compensation", "--uncompensated", "dead time of 5 µs"),
+    ("trim of mean torque", "--ablate trim", "torque at the characteristic points"),
+    ("trim of mean torque", "--ablate trim", "square wave"),
+    ("damping of the link", "--ablate damping", "1,200 N·m at 1,900 r/min"),
+];
+
+/// A row: the part, the quantity, and what came of it with the part, without it, and with the papers' ordinary law.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct PartRow {
+    /// The part that is taken away.
+    pub part: &'static str,
+    /// The quantity.
+    pub quantity: &'static str,
+    /// With all parts, without this one, `--law pi`.
+    pub found: [String; 3],
+}
+
+impl PartRow {
+    /// The row as it stands in a document.
+    pub fn markdown(&self) -> String {
+        let [all, without, pi] = &self.found;
+        format!("| {} | {} | {all} | {without} | {pi} |", self.part, self.quantity)
+    }
+}
+
+/// Runs all of them.
+pub fn parts() -> Result<Vec<PartRow>> {
+    let mut plan = Vec::new();
+    for (part, less, quantity) in PARTS {
+        let row = ROWS.iter().chain([&DAMPING, &RESISTANCE]).find(|row| row.quantity.starts_with(quantity));
+        plan.push((part, less, row.context(quantity)?));
+    }
+    let wanted = |(_, less, row): &(_, &str, &Plan)| {
+        let lines = (row.lines)().into_iter();
+        lines
+            .flat_map(|line| ["--law tractive", less, "--law pi"].map(|more| format!("{line} {more}")))
+            .collect::<Vec<_>>()
+    };
+    let lines: BTreeSet<_> = plan.iter().flat_map(wanted).collect();
+    let bar = bar(lines.len() as u64, "parts [{bar:40}] {pos}/{len} {elapsed} (left {eta})");
+    let driven = lines.into_par_iter().map(|line| {
+        let outcome = drive(&line)?;
+        bar.inc(1);
+        Ok((line, outcome))
+    });
+    let driven = driven.collect::<Result<BTreeMap<_, _>>>()?;
+    bar.finish_and_clear();
+    let machine = Machine::load("pmasynrm-180kw")?;
+    let row = |(part, less, row): &(&'static str, &str, &'static Plan)| {
+        let found = ["--law tractive", less, "--law pi"].map(|more| read(row, more, &driven, &machine));
+        PartRow { part, quantity: row.quantity, found }
+    };
+    Ok(plan.iter().map(row).collect())
+}
+
+/// A row's cell under a law, or without a part of ours, by the words that the runs had besides.
+fn read(row: &Plan, more: &str, driven: &BTreeMap<String, Outcome>, machine: &Machine) -> String {
+    let outcomes = Outcomes { law: 0, more, driven, machine };
+    (row.read)(&outcomes).unwrap_or_else(trips).text
+}
