@@ -17,6 +17,7 @@ pub mod figures;
 pub mod files;
 pub mod folder;
 pub mod gallery;
+pub mod identify;
 pub mod inject;
 pub mod machine;
 pub mod mtpa_methods;
