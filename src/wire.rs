@@ -155,8 +155,8 @@ impl Request {
                 Self::Tell(at, status, frame)
             }
             13 => {
-                let [a, b, c, d, e, f, g, h, ..] = payload;
-                Self::Observed(at, Observation::from_words([a, b, c, d, e, f, g, h])?)
+                let [a, b, c, d, e, f, g, h, i, ..] = payload;
+                Self::Observed(at, Observation::from_words([a, b, c, d, e, f, g, h, i])?)
             }
             _ => return None,
         })

@@ -3,7 +3,7 @@
 use super::inductance::Inductance;
 use super::observation::Stage;
 use super::pulses::{Pulses, Region};
-use crate::frames::{Dq, limit};
+use crate::frames::{Abc, Dq, SinCos, limit};
 use crate::machine::Ratings;
 
 /// A half that has passed.
@@ -20,6 +20,8 @@ pub struct Seen {
     pub length_s: f32,
     /// Electrical angular speed, in rad/s.
     pub omega: f32,
+    /// Direction of the rotor's d axis where it ended.
+    pub frame: SinCos,
 }
 
 /// The experiment's state.
@@ -34,12 +36,16 @@ pub struct Course {
     pulses: Pulses,
     /// Stator resistance, in ohm, as the staircase has shown it.
     resistance_ohm: f32,
+    /// Voltage that each leg lacks in the direction of its current, in V, likewise; and the phase current whose direction is sure, in A.
+    lacking_v: f32,
+    small_a: f32,
     /// The voltage that holds a current beside its drop in that, in V.
     held_v: Dq,
     /// Voltage and current of two steps of the staircase, summed, and how many they are.
     shown: [Shown; 2],
-    /// Electrical speed, in rad/s.
+    /// Electrical speed, in rad/s, and direction of the rotor's d axis.
     omega: f32,
+    frame: SinCos,
 }
 
 /// Sums over a step of the staircase.
@@ -64,11 +70,13 @@ const LEARNT_SHARE: f32 = 0.006;
 const NOISE_SHARE: f32 = 0.01;
 /// The change that a probe wants, likewise.
 const PROBE_SHARE: f32 = 0.03;
+/// Phase current whose direction is sure, likewise.
+const SMALL_SHARE: f32 = 0.01;
 /// The longest change of a half on the way to a direct current, likewise.
 const LED_SHARE: f32 = 0.05;
 
 /// Direct currents along d, as shares of the bound, and commands for each. Two of them show the resistance.
-const STAIRCASE: [f32; 8] = [-0.25, -0.5, -0.75, -1.0, -0.6, -0.1, 0.1, 0.2];
+const STAIRCASE: [f32; 8] = [-0.25, -0.5, -0.75, -0.97, -0.6, -0.1, 0.1, 0.2];
 const STEP_COMMANDS: u32 = 36;
 const SHOWING: [u32; 2] = [1, 3];
 /// Commands from a step's beginning on after which it shows.
@@ -78,11 +86,17 @@ const SETTLED_COMMANDS: u32 = 18;
 const ALONG_D: u32 = 180;
 const ALONG_Q: u32 = 400;
 const ALONG_BOTH: u32 = 2_300;
-const REST: u32 = 60;
+const REST: u32 = 16;
 
 /// Share of the bound at which the pulses along q begin, and what each command adds to it.
 const FIRST_BOUND: f32 = 0.2;
 const WIDENING: f32 = 0.003;
+
+/// Current along d beside the pulses along q and of the turning rotor, as a share of the bound: no phase is without current for long. Beside
+/// the last pulses it goes to and fro between two shares, so many commands each way.
+const HELD_D: f32 = -0.2;
+const SWEPT: [f32; 2] = [0.18, -0.93];
+const SWEEP_COMMANDS: u32 = 230;
 
 /// Current that turns the rotor, as a share of the bound; speed where it ends, as a share of the largest, and as electrical radians a
 /// command; the most commands for it, and those of coasting.
@@ -95,6 +109,8 @@ const COAST_COMMANDS: u32 = 500;
 /// Share of the way to a direct current that a command goes, and share of a half's unexplained voltage that is believed to stay.
 const LEAD: f32 = 0.4;
 const HELD: f32 = 0.3;
+/// The same along d beside pulses along q.
+const HELD_BESIDE: f32 = 0.1;
 
 impl Course {
     /// Before the first command.
@@ -107,9 +123,12 @@ impl Course {
             waited: 0,
             pulses: Pulses::new(),
             resistance_ohm: 0.0,
+            lacking_v: 0.0,
+            small_a: 1.0,
             held_v: NONE,
             shown: [NOTHING; 2],
             omega: 0.0,
+            frame: SinCos { sin: 0.0, cos: 1.0 },
         }
     }
 
@@ -123,14 +142,19 @@ impl Course {
         self.pulses.lasts(length_s);
     }
 
-    /// Voltage that a current takes by itself, in V.
-    pub fn drop_v(&self, current: Dq) -> Dq {
-        current * self.resistance_ohm + self.held_v
+    /// Voltage that a current takes by itself, in V, with the rotor's d axis in this direction: the resistance's, the inverter's error, and
+    /// what is left of both.
+    pub fn drop_v(&self, current: Dq, frame: SinCos) -> Dq {
+        let small_a = 1.0 / self.small_a;
+        let share = |phase_a: f32| limit(phase_a * small_a, -1.0, 1.0);
+        let Abc { a, b, c } = current.unpark(frame).abc();
+        let signs = Abc { a: share(a), b: share(b), c: share(c) }.clarke().park(frame);
+        current * self.resistance_ohm + signs * self.lacking_v + self.held_v
     }
 
     /// Takes a half that has passed.
     pub fn learn(&mut self, seen: &Seen, inductance: &mut Inductance, bound_a: f32) {
-        self.omega = seen.omega;
+        (self.omega, self.frame) = (seen.omega, seen.frame);
         let change = seen.current - seen.before;
         let moved = change.squared() > (SEEN_SHARE * bound_a) * (SEEN_SHARE * bound_a);
         let mean = (seen.current + seen.before) * 0.5;
@@ -154,11 +178,15 @@ impl Course {
         }
         let learns = change.squared() > (LEARNT_SHARE * bound_a) * (LEARNT_SHARE * bound_a);
         if learns && self.stage != Stage::Probe {
-            let flux = seen.acted - self.drop_v(mean) * seen.length_s;
+            let flux = seen.acted - self.drop_v(mean, seen.frame) * seen.length_s;
             inductance.learn(change, flux, NOISE_SHARE * bound_a);
         }
-        if matches!(self.stage, Stage::Staircase | Stage::Rest | Stage::Turn | Stage::Done) {
-            self.hold(seen, inductance);
+        match self.stage {
+            Stage::Staircase | Stage::Rest | Stage::Turn | Stage::Done => {
+                self.hold(seen, inductance, [HELD; 2])
+            }
+            Stage::AlongQ | Stage::AlongBoth => self.hold(seen, inductance, [HELD_BESIDE, 0.0]),
+            _ => {}
         }
     }
 
@@ -180,11 +208,17 @@ impl Course {
             *inductance = Inductance::round(FIRST_SHARE * reach / (PROBE_SHARE * bound_a));
         }
         self.commands += 1;
+        let before = self.stage;
         self.advance(ratings);
+        if before == Stage::AlongD && self.stage != before {
+            inductance.settle();
+        }
         // Outward step by step, so that each step is known from the one before it.
         let share = limit(FIRST_BOUND + self.commands as f32 * WIDENING, FIRST_BOUND, 1.0);
         let share = if self.stage == Stage::AlongQ { share } else { 1.0 };
-        let region = |along: [bool; 2]| Region { along, share, held: NONE, bound_a, reach, ratings };
+        let held_d = if self.stage == Stage::AlongBoth { self.swept() } else { HELD_D };
+        let held = Dq { d: if self.stage == Stage::AlongD { 0.0 } else { held_d * bound_a }, q: 0.0 };
+        let region = |along: [bool; 2]| Region { along, share, held, bound_a, reach, ratings };
         match self.stage {
             Stage::Probe => Dq { d: -PROBE_SHARE * bound_a, q: 0.0 },
             Stage::Staircase => {
@@ -193,13 +227,21 @@ impl Course {
             }
             Stage::AlongD => self.pulses.change(ahead, &region([true, false]), inductance),
             Stage::AlongQ => self.pulses.change(ahead, &region([false, true]), inductance),
-            Stage::AlongBoth => self.pulses.change(ahead, &region([true, true]), inductance),
+            Stage::AlongBoth => self.pulses.change(ahead, &region([false, true]), inductance),
             Stage::Rest | Stage::Done => Self::lead(ahead, NONE, bound_a),
             Stage::Turn => {
                 let share = [TURN_SHARE, 0.0, -TURN_SHARE].get(self.step as usize).copied().unwrap_or(0.0);
-                Self::lead(ahead, Dq { d: 0.0, q: share * bound_a }, bound_a)
+                Self::lead(ahead, Dq { d: HELD_D, q: share } * bound_a, bound_a)
             }
         }
+    }
+
+    /// The slow sweep along d, as a share of the bound.
+    fn swept(&self) -> f32 {
+        let place = self.commands % (2 * SWEEP_COMMANDS);
+        let way = if place < SWEEP_COMMANDS { place } else { 2 * SWEEP_COMMANDS - place };
+        let [first, last] = SWEPT;
+        first + (last - first) * way as f32 / SWEEP_COMMANDS as f32
     }
 
     /// Part of the way to a direct current.
@@ -212,10 +254,11 @@ impl Course {
     }
 
     /// What a half's voltage leaves unexplained on the way to a direct current, and there, stays as long as that is wanted.
-    fn hold(&mut self, seen: &Seen, inductance: &Inductance) {
+    fn hold(&mut self, seen: &Seen, inductance: &Inductance, [along_d, along_q]: [f32; 2]) {
         let mean = (seen.current + seen.before) * 0.5;
         let unexplained = (seen.acted - inductance.flux(seen.current - seen.before)) * (1.0 / seen.length_s);
-        self.held_v = self.held_v + (unexplained - self.drop_v(mean)) * HELD;
+        let more = unexplained - self.drop_v(mean, seen.frame);
+        self.held_v = self.held_v + Dq { d: more.d * along_d, q: more.q * along_q };
     }
 
     fn enter(&mut self, stage: Stage) {
@@ -229,8 +272,7 @@ impl Course {
             Stage::Staircase if after(STEP_COMMANDS) => {
                 (self.commands, self.step) = (0, self.step + 1);
                 if self.step as usize == STAIRCASE.len() {
-                    self.resistance_ohm = self.resistance();
-                    self.held_v = NONE;
+                    self.settle(ratings.max_current_a);
                     self.enter(Stage::AlongD);
                 }
             }
@@ -260,13 +302,20 @@ impl Course {
         }
     }
 
-    /// Resistance between two steps of the staircase, on one side of zero: the inverter's voltage error is the same in both.
-    fn resistance(&self) -> f32 {
+    /// Resistance and voltage error, by two steps of the staircase on one side of zero: the error is the same in both.
+    fn settle(&mut self, bound_a: f32) {
         let [low, high] = self.shown.map(|shown| {
             let per = 1.0 / (shown.count + f32::MIN_POSITIVE);
             (shown.volts * per, shown.amperes * per)
         });
         let amperes = low.1 - high.1;
-        if amperes * amperes > 0.0 { limit((low.0 - high.0) / amperes, 0.0, 1e3) } else { 0.0 }
+        let slope = if amperes * amperes > 0.0 { (low.0 - high.0) / amperes } else { 0.0 };
+        self.resistance_ohm = limit(slope, 0.0, 1e3);
+        (self.small_a, self.held_v) = (SMALL_SHARE * bound_a, NONE);
+        // With the phases' directions alone the drop is that of one volt for each leg.
+        self.lacking_v = 1.0;
+        let along_d = self.drop_v(Dq { d: low.1, q: 0.0 }, self.frame).d - low.1 * self.resistance_ohm;
+        let lacks = (low.0 - low.1 * self.resistance_ohm) / along_d;
+        self.lacking_v = if lacks > 0.0 { lacks } else { 0.0 };
     }
 }

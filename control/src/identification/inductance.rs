@@ -13,13 +13,13 @@ struct Matrix {
 /// Share of what a half shows that is believed at once.
 const GAIN: f32 = 0.7;
 /// Weight of the coupling of both axes beside their own inductances, where a change of current does not tell them apart.
-const COUPLING_WEIGHT: f32 = 0.15;
+const COUPLING_WEIGHT: f32 = 0.08;
 /// Square of the largest coupling, as a share of the product of the own inductances.
-const COUPLING: f32 = 0.6;
+const COUPLING: f32 = 0.3;
 /// Least and most of an own inductance that a half may leave of what was known before; and the least of all, of the first that was seen.
 const LEAST_SHARE: f32 = 0.4;
 const MOST_SHARE: f32 = 1.4;
-const FLOOR_SHARE: f32 = 0.2;
+const FLOOR_SHARE: f32 = 0.5;
 
 /// Fields of the plane of currents, in which each inductance is remembered: along d from beyond the bound on, along q for both signs.
 const ALONG_D: usize = 9;
@@ -63,9 +63,15 @@ impl Inductance {
         self.here = Matrix { dd: dd * by, dq: dq * by, qq: qq * by };
     }
 
-    /// The first that is seen is the measure of the least.
+    /// The least that was seen along d so far is the measure of the least of all.
     pub fn settle(&mut self) {
-        self.floor_h = FLOOR_SHARE * self.here.dd;
+        let mut least_h = self.here.dd;
+        for known in self.fields.iter().flatten() {
+            if known.dd < least_h {
+                least_h = known.dd;
+            }
+        }
+        self.floor_h = FLOOR_SHARE * least_h;
     }
 
     /// Moves to a current, in A: what is remembered of it holds, where it has been before; else that from where it comes.

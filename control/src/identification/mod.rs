@@ -25,7 +25,7 @@ use crate::control::{
     AimInput, Boundary, Committed, ControlLaw, Law, ModeLimits, Region, Regulated, RotorSample, SpeedTracker,
     Target, VoltageVector,
 };
-use crate::frames::{AlphaBeta, Dq, six_step_v};
+use crate::frames::{AlphaBeta, Dq, SinCos, six_step_v};
 use crate::machine::Tables;
 use crate::time::Clock;
 use course::{Course, Seen};
@@ -63,6 +63,8 @@ pub struct Identification {
     samples: u32,
     /// The largest voltage that may be made, in V.
     limit_v: f32,
+    /// DC-link voltage, in V.
+    udc_v: f32,
 }
 
 impl Identification {
@@ -77,6 +79,7 @@ impl Identification {
             told: None,
             samples: 0,
             limit_v: 0.0,
+            udc_v: 0.0,
         }
     }
 
@@ -91,8 +94,8 @@ impl Identification {
     }
 
     /// The voltage that changes a current by so much within an interval, without more than the limit.
-    fn voltage(&self, ahead: Dq, change: Dq, interval_s: f32) -> Dq {
-        let drop = self.course.drop_v(ahead + change * 0.5);
+    fn voltage(&self, ahead: Dq, change: Dq, frame: SinCos, interval_s: f32) -> Dq {
+        let drop = self.course.drop_v(ahead + change * 0.5, frame);
         let wanted = self.inductance.flux(change) * (1.0 / interval_s) + drop;
         let length = wanted.length();
         if length > self.limit_v { wanted * (self.limit_v / length) } else { wanted }
@@ -152,6 +155,7 @@ impl ControlLaw for Identification {
                 turned: sample.frame.sin * before.frame.cos - sample.frame.cos * before.frame.sin,
                 length_s: boundary.length_s,
                 omega: self.speed.omega(),
+                frame: sample.frame,
             };
             self.inductance.at((seen.before + seen.current) * 0.5, bound_a);
             self.course.learn(&seen, &mut self.inductance, bound_a);
@@ -162,11 +166,13 @@ impl ControlLaw for Identification {
             length_s: boundary.length_s,
             current: sample.current,
             frame: sample.frame,
+            udc_v: self.udc_v,
         });
     }
 
     fn aim(&mut self, input: &AimInput, _law: &Law) {
         self.samples = 0;
+        self.udc_v = input.udc_v;
         self.limit_v = USED_SHARE * input.limits.depth_limit * six_step_v(input.udc_v);
         self.target = Target { voltage_limit_v: self.limit_v, ..NO_TARGET };
     }
@@ -183,13 +189,13 @@ impl ControlLaw for Identification {
             let (here, interval_s) = (sample.current, committed.interval_s);
             let bound_a = law.tables.ratings.max_current_a;
             self.inductance.at(here, bound_a);
-            let left = self.course.drop_v(here) * committed.horizon_s;
+            let left = self.course.drop_v(here, sample.frame) * committed.horizon_s;
             let ahead = here + self.inductance.current(volt_seconds.park(sample.frame) - left);
             self.inductance.at(ahead, bound_a);
             let reach = self.limit_v * interval_s;
             self.course.lasts(interval_s);
             let change = self.course.change(ahead, reach, &mut self.inductance, &law.tables.ratings);
-            self.voltage(ahead, change, interval_s)
+            self.voltage(ahead, change, sample.frame, interval_s)
         });
         let (length_v, vector): (f32, AlphaBeta) = (voltage.length(), voltage.unpark(sample.frame));
         VoltageVector { voltage_v: length_v, vector, carrier: vector, steady_v: length_v }

@@ -51,10 +51,12 @@ pub struct Observation {
     pub current: Dq,
     /// Direction of the rotor's d axis there.
     pub frame: SinCos,
+    /// DC-link voltage, in V.
+    pub udc_v: f32,
 }
 
 /// Words of an observation.
-pub const OBSERVATION_WORDS: usize = 8;
+pub const OBSERVATION_WORDS: usize = 9;
 
 impl Observation {
     /// As words.
@@ -67,14 +69,15 @@ impl Observation {
             self.current.q,
             self.frame.sin,
             self.frame.cos,
+            self.udc_v,
         ];
-        let [alpha, beta, length, d, q, sin, cos] = numbers.map(f32::to_bits);
-        [self.stage as u32, alpha, beta, length, d, q, sin, cos]
+        let [alpha, beta, length, d, q, sin, cos, udc] = numbers.map(f32::to_bits);
+        [self.stage as u32, alpha, beta, length, d, q, sin, cos, udc]
     }
 
     /// Of words; `None` if the stage is none.
     pub fn from_words(words: [u32; OBSERVATION_WORDS]) -> Option<Self> {
-        let [stage, alpha, beta, length, d, q, sin, cos] = words;
+        let [stage, alpha, beta, length, d, q, sin, cos, udc] = words;
         let number = f32::from_bits;
         Some(Self {
             stage: *Stage::ALL.get(stage as usize)?,
@@ -82,6 +85,7 @@ impl Observation {
             length_s: number(length),
             current: Dq { d: number(d), q: number(q) },
             frame: SinCos { sin: number(sin), cos: number(cos) },
+            udc_v: number(udc),
         })
     }
 }
@@ -99,6 +103,7 @@ mod tests {
                 length_s: 5e-4,
                 current: Dq { d: -100.0, q: 30.0 },
                 frame: SinCos { sin: 0.6, cos: 0.8 },
+                udc_v: 1_500.0,
             };
             assert_eq!(Observation::from_words(observation.to_words()), Some(observation));
         }

@@ -38,12 +38,16 @@ pub struct Pulses {
 const D_SHARE: f32 = 0.06;
 const Q_SHARE: f32 = 0.065;
 const SLOW_SHARE: f32 = 0.017;
+/// Share of the volt-seconds that d takes at most.
+const D_REACH: f32 = 0.7;
 /// Share of the way to where an axis without pulses is held that a command goes.
-const HELD_SHARE: f32 = 0.3;
+const HELD_SHARE: f32 = 0.4;
+/// Share of the bound that the boundaries' currents keep to: between them there is ripple.
+const KEPT_SHARE: f32 = 0.94;
 /// Largest current along +d, as a share of the bound.
 const POSITIVE_SHARE: f32 = 0.2;
 /// Turn, mechanical, at which the side that makes it is given no more, in rad; and the time over which the speed counts, in halves.
-const MOST_RAD: f32 = 0.035;
+const MOST_RAD: f32 = 0.028;
 const AHEAD_HALVES: f32 = 18.0;
 /// Least share of the bound that a side keeps.
 const LEAST_SIDE: f32 = 0.1;
@@ -92,7 +96,7 @@ impl Pulses {
         }
         if along_d {
             let next = ahead.d + wanted(self.d, self.q).d;
-            let bound_a = region.share * region.bound_a;
+            let bound_a = region.share * KEPT_SHARE * region.bound_a;
             if next > POSITIVE_SHARE * bound_a {
                 self.d = -1.0;
             } else if next < -bound_a {
@@ -104,7 +108,7 @@ impl Pulses {
 
     /// The largest current: first the pulse along q turns back, then that along d.
     fn keep_within(&mut self, ahead: Dq, region: &Region, wanted: impl Fn(f32, f32) -> Dq) -> Dq {
-        let bound_a = region.share * region.bound_a;
+        let bound_a = region.share * KEPT_SHARE * region.bound_a;
         let inside = |change: Dq| (ahead + change).squared() <= bound_a * bound_a;
         let inward = (if ahead.d > 0.0 { -1.0 } else { 1.0 }, if ahead.q > 0.0 { -1.0 } else { 1.0 });
         for (d, q) in [(self.d, self.q), (self.d, inward.1), (inward.0, inward.1)] {
@@ -123,12 +127,17 @@ impl Pulses {
         let per_pole = 1.0 / region.ratings.pole_pairs;
         let comes = self.turned_rad + self.omega * AHEAD_HALVES * self.length_s;
         let share = comes * per_pole / MOST_RAD;
-        [1.0 + share, 1.0 - share].map(|side| limit(side, LEAST_SIDE, 1.0) * region.share * region.bound_a)
+        [1.0 + share, 1.0 - share]
+            .map(|side| limit(side, LEAST_SIDE, 1.0) * region.share * KEPT_SHARE * region.bound_a)
     }
 }
 
-/// A change of current, shortened to what the volt-seconds can make of it.
+/// A change of current, shortened to what the volt-seconds can make of it: what d takes is left for q.
 fn reached(change: Dq, reach: f32, inductance: &Inductance) -> Dq {
-    let takes = inductance.flux(change).length();
-    if takes > reach { change * (reach / takes) } else { change }
+    let along_d = Dq { q: 0.0, ..change };
+    let (takes_d, takes_q) =
+        (inductance.flux(along_d).length(), inductance.flux(Dq { d: 0.0, ..change }).length());
+    let d = if takes_d > D_REACH * reach { change.d * (D_REACH * reach / takes_d) } else { change.d };
+    let rest = if takes_d > D_REACH * reach { reach - D_REACH * reach } else { reach - takes_d };
+    Dq { d, q: if takes_q > rest { change.q * (rest / takes_q) } else { change.q } }
 }
