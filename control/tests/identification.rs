@@ -165,20 +165,21 @@ fn parameters_bound(machine: &str) -> f64 {
     MachineFolder::read(&folder).unwrap().parameters.max_current_a
 }
 
-/// The plane of currents is seen: in each band along d pulses reach far to both sides along q.
+/// The plane of currents is seen: in each band along d pulses reach far along q, to one side at least, as the map is even.
 fn covers(observations: &[Observation], bound_a: f64) -> bool {
     (-9..=1).all(|band| {
         let middle = 0.1 * f64::from(band) * bound_a;
         let own = observations.iter().filter(|o| (f64::from(o.current.d) - middle).abs() < 0.06 * bound_a);
-        let far = 0.65 * (bound_a * bound_a - middle * middle).sqrt();
+        // The boundaries keep to 0.94 of the bound.
+        let far = 0.65 * (0.94 * 0.94 * bound_a * bound_a - middle * middle).sqrt();
         let (low, high) = own.fold((0.0_f64, 0.0_f64), |(low, high), o| {
             let iq = f64::from(o.current.q);
             (low.min(iq), high.max(iq))
         });
-        if high < far || low > -far {
+        if high < far && low > -far {
             println!("id near {middle:.1} A: iq from {low:.1} to {high:.1} A");
         }
-        high > far && low < -far
+        high > far || low < -far
     })
 }
 
