@@ -5,7 +5,7 @@
 #[cfg(not(target_os = "none"))]
 fn main() {
     println!(
-        "This is the firmware. `cargo xtask identify` builds it for its board and runs it in QEMU; `cargo rig identify` runs its code here."
+        "This is the firmware. `cargo rig identify --on qemu --image FILE` runs it in QEMU, `cargo rig identify` its code here."
     );
 }
 
