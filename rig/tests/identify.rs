@@ -17,7 +17,7 @@ fn outcome(machine: &Machine, words: &str) -> Outcome {
     outcome
 }
 
-/// What every experiment keeps.
+/// The limits that every experiment keeps.
 fn keeps_its_place(outcome: &Outcome) {
     assert!(outcome.pulses_s < 2.0, "{} s", outcome.pulses_s);
     assert!(outcome.turned_deg < 5.0, "{}°", outcome.turned_deg);

@@ -253,7 +253,7 @@ impl Course {
         if length * LEAD > most { away * (most / length) } else { change }
     }
 
-    /// What a half's voltage leaves unexplained on the way to a direct current, and there, stays as long as that is wanted.
+    /// The voltage that a half leaves unexplained stays in part: on the way to a direct current, and there.
     fn hold(&mut self, seen: &Seen, inductance: &Inductance, [along_d, along_q]: [f32; 2]) {
         let mean = (seen.current + seen.before) * 0.5;
         let unexplained = (seen.acted - inductance.flux(seen.current - seen.before)) * (1.0 / seen.length_s);

@@ -32,7 +32,7 @@ const MIDDLE_D: f32 = 7.0;
 /// Inductances all over the plane.
 #[derive(Clone, Copy, Debug)]
 pub struct Inductance {
-    /// Where the current is.
+    /// The one of the present current.
     here: Matrix,
     field: usize,
     fields: [Option<Matrix>; ALONG_D * ALONG_Q],

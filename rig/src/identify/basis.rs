@@ -52,7 +52,7 @@ impl Basis {
         self.terms.len()
     }
 
-    /// What each term gives to a derivative of the co-energy, of these orders along d and q, at a current in A.
+    /// The part of each term in a derivative of the co-energy, of these orders along d and q, at a current in A.
     pub fn derivative(&self, (id, iq): (f64, f64), (along_d, along_q): (usize, usize)) -> Vec<f64> {
         let along_x = chebyshev((id - self.middle_a) / self.width_d_a, MOST_D);
         let along_y = chebyshev(iq / self.width_q_a, MOST_Q);
@@ -60,7 +60,7 @@ impl Basis {
         self.terms.iter().map(|(m, n)| along_x[*m][along_d] * along_y[*n][along_q] / scale).collect()
     }
 
-    /// What each term gives to the flux linkages along d and q at a current in A.
+    /// The part of each term in the flux linkages along d and q at a current in A.
     pub fn flux(&self, current: (f64, f64)) -> [Vec<f64>; 2] {
         [self.derivative(current, (1, 0)), self.derivative(current, (0, 1))]
     }

@@ -34,7 +34,7 @@ pub struct Fit {
     pub resistance_ohm: f64,
     /// The dead time that explains the inverter's voltage error, thresholds included, in s.
     pub dead_time_s: f64,
-    /// What is left of each boundary's flux linkage, by its stage, in Wb: along d and along q.
+    /// The unexplained part of each boundary's flux linkage, by its stage, in Wb: along d and along q.
     pub residuals: Vec<(Stage, [f64; 2])>,
 }
 
