@@ -5,7 +5,7 @@
 //! voltage error. What was before each part of the experiment is a constant of that part, and so each part counts from its mean.
 
 use super::basis::Basis;
-use super::half::Half;
+use super::half::{Half, add};
 use anyhow::{Result, ensure};
 use nalgebra::{DMatrix, DVector};
 use tractive::identification::{Observation, Stage};
@@ -101,15 +101,11 @@ impl Experiment<'_> {
                 halves += 1;
                 let inside = half.inside(SMALL_SHARE * self.bound_a);
                 unsure += inside.unsure;
-                for axis in 0..2 {
-                    sums[1][axis] += inside.charge[axis];
-                    sums[2][axis] += inside.lacking[axis];
-                }
+                sums[1] = add(sums[1], inside.charge, 1.0);
+                sums[2] = add(sums[2], inside.lacking, 1.0);
                 from = to;
             }
-            for axis in 0..2 {
-                sums[0][axis] += acted[axis];
-            }
+            sums[0] = add(sums[0], acted, 1.0);
             let [volt_seconds, charge, lacking] = sums;
             Boundary { stage: observation.stage, current, frame, volt_seconds, charge, lacking, unsure }
         };

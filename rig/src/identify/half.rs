@@ -43,7 +43,8 @@ fn dot(a: [f64; 2], b: [f64; 2]) -> f64 {
     a[0] * b[0] + a[1] * b[1]
 }
 
-fn add(a: [f64; 2], b: [f64; 2], scale: f64) -> [f64; 2] {
+/// The sum of a vector and a multiple of another.
+pub fn add(a: [f64; 2], b: [f64; 2], scale: f64) -> [f64; 2] {
     [a[0] + scale * b[0], a[1] + scale * b[1]]
 }
 
