@@ -171,7 +171,7 @@ fn covers(observations: &[Observation], bound_a: f64) -> bool {
         let middle = 0.1 * f64::from(band) * bound_a;
         let own = observations.iter().filter(|o| (f64::from(o.current.d) - middle).abs() < 0.06 * bound_a);
         // The boundaries keep to 0.94 of the bound.
-        let far = 0.65 * (0.94 * 0.94 * bound_a * bound_a - middle * middle).sqrt();
+        let far = 0.6 * (0.94 * 0.94 * bound_a * bound_a - middle * middle).sqrt();
         let (low, high) = own.fold((0.0_f64, 0.0_f64), |(low, high), o| {
             let iq = f64::from(o.current.q);
             (low.min(iq), high.max(iq))
