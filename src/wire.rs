@@ -12,6 +12,7 @@ use crate::cell::Words;
 use crate::control::{Demand, LinkWindow, MtpaStart};
 use crate::drive::{half_from_words, half_to_words};
 use crate::frames::{Abc, Angle};
+use crate::identification::Observation;
 use crate::modulation::CarrierHalf;
 use crate::operator::{self, Feedback, LineTimes, Status, Told};
 use crate::ports::{DriveCommand, Report, Sample};
@@ -81,6 +82,8 @@ pub enum Request {
     Recorded(Record),
     /// The image has nothing more to say.
     End,
+    /// The observation of an identification, told by the control interrupt that began at the instant.
+    Observed(Instant, Observation),
 }
 
 /// A request's block. Not in every caller: images are small.
@@ -115,6 +118,7 @@ impl Request {
             Self::Leave(at) => block(10, *at, &[]),
             Self::Ask(at) => block(11, *at, &[]),
             Self::Tell(from, status, frame) => block(12, *from, &told_to_words(status, *frame)),
+            Self::Observed(at, observation) => block(13, *at, &observation.to_words()),
         }
     }
 
@@ -149,6 +153,10 @@ impl Request {
             12 => {
                 let (status, frame) = told_from_words(payload)?;
                 Self::Tell(at, status, frame)
+            }
+            13 => {
+                let [a, b, c, d, e, f, g, h, i, ..] = payload;
+                Self::Observed(at, Observation::from_words([a, b, c, d, e, f, g, h, i])?)
             }
             _ => return None,
         })

@@ -17,6 +17,7 @@ pub mod figures;
 pub mod files;
 pub mod folder;
 pub mod gallery;
+pub mod identify;
 pub mod inject;
 pub mod law;
 pub mod machine;

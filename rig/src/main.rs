@@ -12,7 +12,7 @@ use tractive_rig::folder::{self, MachineCommand};
 use tractive_rig::machine::Machine;
 use tractive_rig::needs::Needs;
 use tractive_rig::scenario::command::folder;
-use tractive_rig::{gallery, nine_switch, optimised, pattern, points, report, say, scenario, talk};
+use tractive_rig::{gallery, identify, nine_switch, optimised, pattern, points, report, say, scenario, talk};
 
 #[derive(Parser)]
 #[command(name = "tractive-rig", about = "Plays the motor to the drive, and shows what happened", version)]
@@ -59,6 +59,8 @@ enum Command {
     /// Machine folders: from nameplate values, from a map of another tool, and as a page.
     #[command(subcommand)]
     Machine(Box<MachineCommand>),
+    /// An unknown machine, simulated, identified by its own drive: its resistance, its flux map, its inertia, and a machine folder of them.
+    Identify(Box<identify::Identify>),
     /// The modulator's pulses in steady state.
     Pattern(PatternOptions),
     /// Optimises the pulse patterns anew: each branch's window and weighted distortion.
@@ -128,6 +130,7 @@ fn command(command: Command) -> Result<ExitCode> {
         }
         Command::Figures(options) => done(gallery::run(&options)),
         Command::Machine(command) => done(folder::run(&command)),
+        Command::Identify(options) => identify::command(&options),
         Command::NineSwitch { input, output } => done(nine_switch::run(&input, &output)),
         Command::Campaign(options) => campaign::command::run(&options),
         Command::Compare(options) => compare::run(&options),

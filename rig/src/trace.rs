@@ -7,6 +7,7 @@ use crate::rows::Timed;
 use anyhow::Result;
 use std::path::Path;
 use tractive::frames::Angle;
+use tractive::identification::Observation;
 use tractive::modulation::Mode;
 use tractive::operator::Status;
 use tractive::protection::Trip;
@@ -149,6 +150,8 @@ pub struct Recording {
     pub tick_s: f64,
     /// The records of the drive's flight recorder, with their times in s from the recording's beginning; empty without a fault.
     pub recorded: Vec<(f64, Record)>,
+    /// The observations of an identification; empty of any other run.
+    pub observations: Vec<Observation>,
 }
 
 impl Recording {

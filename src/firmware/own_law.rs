@@ -4,6 +4,7 @@ use crate::qemu;
 use tractive::built_in::traction::BuiltIn;
 use tractive::control::Controller;
 use tractive::drive::traction::ControlTask;
+use tractive::time::Instant;
 use tractive::wire::Setup;
 
 /// The law.
@@ -19,3 +20,6 @@ pub fn connect() -> Setup {
 
 /// Its set-up before the first interrupt's work: none.
 pub const SET_UP: Option<fn(&mut ControlTask<BuiltIn, Law>)> = None;
+
+/// Its words for the host at the end of a control interrupt, beside the report: nothing.
+pub const TELL: Option<fn(&mut ControlTask<BuiltIn, Law>, Instant)> = None;

@@ -5,6 +5,7 @@ use core::sync::atomic::{AtomicBool, Ordering};
 use tractive::built_in::traction::BuiltIn;
 use tractive::control::{MtpaStart, PiLaw};
 use tractive::drive::traction::ControlTask;
+use tractive::time::Instant;
 use tractive::wire::Setup;
 
 /// The law.
@@ -24,6 +25,9 @@ pub fn connect() -> Setup {
 
 /// Its set-up before the first interrupt's work.
 pub const SET_UP: Option<fn(&mut ControlTask<BuiltIn, Law>)> = Some(set_up);
+
+/// Its words for the host at the end of a control interrupt, beside the report: nothing.
+pub const TELL: Option<fn(&mut ControlTask<BuiltIn, Law>, Instant)> = None;
 
 fn set_up(task: &mut ControlTask<BuiltIn, Law>) {
     if STARTS_AT_ZERO.load(Ordering::Relaxed) {

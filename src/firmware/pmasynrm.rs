@@ -92,7 +92,11 @@ fn TIMER0() {
         }
         *IS_SET_UP = true;
     }
+    let now = TASK.next_call();
     TASK.run(&mut board, &SHARED);
+    if let Some(tell) = law::TELL {
+        tell(TASK, now);
+    }
 }
 
 /// Deadline: the next carrier boundary, where the shadow registers take over.

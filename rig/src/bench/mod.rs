@@ -43,6 +43,7 @@ use crate::plant::Plant;
 use crate::trace::{Row, SlotRow, Switch};
 use dc_side::DcSide;
 use rows::Rows;
+use tractive::identification::Observation;
 use tractive::modulation::CarrierHalf;
 use tractive::operator::{Feedback, Request, Status};
 use tractive::ports::{DriveCommand, Report, Sample};
@@ -76,6 +77,7 @@ pub struct Bench {
     rows: Rows,
     written: Option<Rows>,
     switches: Vec<Switch>,
+    observations: Vec<Observation>,
 }
 
 impl Bench {
@@ -103,6 +105,7 @@ impl Bench {
             rows: Rows::new(settings.trace_step_s, settings.duration_s, &time),
             written: None,
             switches: Vec::new(),
+            observations: Vec::new(),
             time,
         }
     }

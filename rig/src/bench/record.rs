@@ -48,6 +48,7 @@ impl Simulated for Bench {
             link: self.dc.operated().map(LineSide::balance),
             lead: self.time.lead,
             tick_s: self.time.step_s,
+            observations: self.observations,
         }
     }
 }

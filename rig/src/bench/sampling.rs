@@ -1,8 +1,9 @@
 //! The samples for the drive's interrupts, and the reports of control.
 
-use super::{Bench, BenchError};
+use super::{Bench, BenchError, Simulated};
 use crate::inject::traction::Kind;
 use tractive::frames::Abc;
+use tractive::identification::{Observation, Stage};
 use tractive::ports::{DriveCommand, Report, Sample};
 use tractive::protection::LegFaults;
 use tractive::time::Instant;
@@ -22,6 +23,14 @@ impl Bench {
     /// The control interrupt's report; it shows in the trace when the command takes effect.
     pub fn control_report(&mut self, instant: Instant, report: Report) {
         self.control.tell(&self.time, instant, report);
+    }
+
+    /// The observation that an identification's control interrupt, begun at `instant`, tells; with the last word the recording ends a period later.
+    pub fn identified(&mut self, instant: Instant, observation: Observation) {
+        if observation.stage == Stage::Done {
+            self.end_at(instant.after(self.clock.control_ticks));
+        }
+        self.observations.push(observation);
     }
 
     /// By how much the control interrupt is late, in ticks.
@@ -69,7 +78,7 @@ impl Bench {
         }
         let mut sample = Sample {
             currents_a: self.read_currents(true_a),
-            udc_v: self.udc_v(t_s) as f32,
+            udc_v: self.sensors.link_v(self.udc_v(t_s)) as f32,
             angle: Some(angle),
             may_pulse: true,
             hardware,

@@ -17,6 +17,10 @@ pub struct Flaws {
     pub noise_a: f64,
     /// Amplitude (V) and frequency (Hz) of the DC link's ripple.
     pub udc_ripple: Option<(f64, f64)>,
+    /// By how much a current is read larger than it is, as a share.
+    pub current_gain: f64,
+    /// By how much the DC link is read larger than it is, as a share.
+    pub udc_gain: f64,
     /// Constant error of the angle sensor, electrical, in degrees.
     pub angle_error_deg: f64,
     /// Time after its sample in which the angle is read, in s; each time at another instant.
@@ -53,7 +57,7 @@ impl Converter {
 
     /// A current as converted now, in A.
     fn convert(&mut self, current_a: f64) -> f64 {
-        let mut value = current_a;
+        let mut value = current_a * (1.0 + self.flaws.current_gain);
         if self.flaws.noise_a > 0.0
             && let Ok(noise) = Normal::new(0.0, self.flaws.noise_a)
         {
@@ -99,6 +103,11 @@ impl Sensors {
     pub fn supply_v(&self, t_s: f64) -> f64 {
         let passed = self.link_steps.iter().rev().find(|(at_s, _)| t_s >= *at_s);
         passed.map_or(self.udc_v, |(_, udc_v)| *udc_v) + self.converter.ripple_v(t_s)
+    }
+
+    /// A link's voltage as converted, in V.
+    pub fn link_v(&self, udc_v: f64) -> f64 {
+        udc_v * (1.0 + self.converter.flaws.udc_gain)
     }
 
     /// The phase currents as converted now.

@@ -12,6 +12,7 @@ use super::{RECORDER, stop};
 use crate::cell::{Ring, Words};
 use crate::control::MtpaStart;
 use crate::frames::Abc;
+use crate::identification::Observation;
 use crate::modulation::CarrierHalf;
 use crate::operator::{self, Feedback, Status};
 use crate::ports::{DriveCommand, Report, Sample};
@@ -125,6 +126,12 @@ pub fn play(now: Instant, next: &CarrierHalf) {
 #[inline(never)]
 pub fn report(now: Instant, report: &Report) {
     send(&Request::ControlReport(now, *report).to_block());
+}
+
+/// The observation of an identification.
+#[inline(never)]
+pub fn observed(now: Instant, observation: &Observation) {
+    send(&Request::Observed(now, *observation).to_block());
 }
 
 /// An order to enter the safe state.

@@ -124,6 +124,11 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         self.controller = controller;
     }
 
+    /// The control law, between two calls.
+    pub fn law_mut(&mut self) -> &mut L {
+        &mut self.controller
+    }
+
     /// The control timer's interrupt. Deadline: one control period after its nominal instant; a missed one is a fault.
     pub fn run(&mut self, port: &mut impl ControlPort, shared: &Shared) {
         let now = self.now;

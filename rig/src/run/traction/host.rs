@@ -209,6 +209,11 @@ impl<'a, L: ControlLaw> Tasks<'a, L> {
         Self { control, pwm, without, ..self }
     }
 
+    /// The control law, between two interrupts.
+    pub fn law_mut(&mut self) -> &mut L {
+        self.control.law_mut()
+    }
+
     /// The latched fault.
     pub fn trip(&self) -> Option<Trip> {
         self.control.trip().or(self.pwm.trip())

@@ -48,6 +48,7 @@ pub fn run_in_qemu(
                 bench.told(from, status)?;
                 served.hear(from, frame);
             }
+            Request::Observed(at, observation) => bench.identified(at, observation),
             Request::Recorded(record) => served.records.push(record),
             Request::End => return Ok(true),
             Request::Dead => bail!("the firmware stopped in a panic or a HardFault, gates off"),

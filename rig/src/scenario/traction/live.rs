@@ -110,7 +110,7 @@ impl Live {
         let tasks = tasks(Controller::new(), &setup, options, machine)?;
         let parameters = &machine.folder.parameters;
         Ok(Self {
-            bench: bench(plan, &setup, options, machine).endless(),
+            bench: bench(plan, &setup, options, (machine, machine)).endless(),
             tasks,
             request,
             wanted: Wanted::default(),

@@ -7,6 +7,7 @@ pub mod characteristic;
 pub(super) mod chopper;
 pub(super) mod full_step;
 pub(super) mod gaps;
+pub mod identification;
 mod line;
 pub(super) mod link_steps;
 mod live;
@@ -34,7 +35,7 @@ use crate::inject::Injection;
 use crate::inject::traction::Kind;
 use crate::law::LawName;
 use crate::machine::Machine;
-use crate::options::{On, not_negative, usual_min_pulse_us, within};
+use crate::options::{On, finite, not_negative, usual_min_pulse_us, within};
 use crate::plant::{DcLinkSettings, LineFilter, Plant, Source, SpeedSource};
 use crate::report::{self, Page};
 use crate::run::traction::{Tasks, run_in_qemu};
@@ -144,6 +145,15 @@ pub struct TractionOptions {
     /// Time after its sample in which the angle is read, in µs; each time at another instant.
     #[arg(long, default_value_t = 0.0, value_parser = not_negative, allow_negative_numbers = true, hide = true)]
     pub angle_jitter_us: f64,
+    /// The true machine, where it is not the one that control knows: a folder of tables/, or the path of any machine folder.
+    #[arg(long, value_name = "DIR")]
+    pub plant: Option<String>,
+    /// By how much currents are read larger than they are, in percent.
+    #[arg(long, default_value_t = 0.0, value_parser = finite, allow_negative_numbers = true, value_name = "PERCENT")]
+    pub current_gain: f64,
+    /// By how much the DC link is read larger than it is, in percent.
+    #[arg(long, default_value_t = 0.0, value_parser = finite, allow_negative_numbers = true, value_name = "PERCENT")]
+    pub udc_gain: f64,
     /// By how much the PWM timer starts later, in µs.
     #[arg(long, default_value_t = 0.0, value_parser = not_negative, allow_negative_numbers = true, hide = true)]
     pub pwm_delay_us: f64,
@@ -244,6 +254,8 @@ impl System for Traction {
             ("--speed", own("speed"), -fastest_rpm, fastest_rpm),
             ("--torque", own("torque"), -most_nm, most_nm),
             ("--to", own("to"), -fastest_rpm, fastest_rpm),
+            ("--current-gain", options.own.current_gain, -50.0, 100.0),
+            ("--udc-gain", options.own.udc_gain, -50.0, 100.0),
         ])?;
         if (options.law, options.own.patterns, options.on) == (LawName::Pi, PatternsName::Optimal, On::Qemu) {
             bail!("--patterns optimal: no image with --law pi has them; --on host has");
@@ -263,7 +275,7 @@ impl System for Traction {
     ) -> Result<Recording> {
         let plan = plan.behind(options.own.line);
         let setup = setup(&plan, options, machine, supervisor.is_some());
-        let bench = bench(plan, &setup, options, machine);
+        let bench = bench(plan, &setup, options, (machine, &truth(options, machine)?));
         match options.on {
             On::Host => {
                 let run = OnHost { name, bench, setup: &setup, options, machine };
@@ -427,7 +439,13 @@ fn tasks<'a, L: ControlLaw>(
     Ok(tasks.on(options.own.patterns.ladder()).operated_on(line))
 }
 
-fn bench(plan: Plan, setup: &Setup, options: &Options, machine: &Machine) -> Bench {
+/// The true machine: the one that control knows, unless the options name another.
+fn truth(options: &Options, machine: &Machine) -> Result<Machine> {
+    options.own.plant.as_deref().map_or_else(|| Ok(machine.clone()), Machine::load)
+}
+
+/// The bench with the machine that control knows, and the true one.
+fn bench(plan: Plan, setup: &Setup, options: &Options, (machine, truth): (&Machine, &Machine)) -> Bench {
     let flaws = options.flaws(machine.folder.parameters.trip_current_a);
     let angle_jitter_s = 1e-6 * options.own.angle_jitter_us;
     let settings = bench::Settings {
@@ -439,12 +457,18 @@ fn bench(plan: Plan, setup: &Setup, options: &Options, machine: &Machine) -> Ben
         trace_step_s: plan.judged_step_s,
         udc_v: udc_v(options, machine),
         link_steps: plan.link,
-        flaws: Flaws { angle_jitter_s, freeze_at_s: plan.freeze_at_s, ..flaws },
+        flaws: Flaws {
+            angle_jitter_s,
+            freeze_at_s: plan.freeze_at_s,
+            current_gain: options.own.current_gain / 100.0,
+            udc_gain: options.own.udc_gain / 100.0,
+            ..flaws
+        },
         supply: options.own.line.map_or(Supply::Stiff, Supply::Line),
         injection: plan.injection,
         limits: Limits::NONE,
     };
-    let plant = Plant::new(&machine.folder, plan.speed, &options.plant());
+    let plant = Plant::new(&truth.folder, plan.speed, &options.plant());
     let bench = Bench::new(plant, plan.operator, &settings).with_line(plan.line);
     match options.dt {
         Some(dt_s) if dt_s != plan.judged_step_s => bench.writing_every(dt_s),

@@ -1,0 +1,321 @@
+//! The course of the experiment: the change of current that the next command is to make.
+
+use super::inductance::Inductance;
+use super::observation::Stage;
+use super::pulses::{Pulses, Region};
+use crate::frames::{Abc, Dq, SinCos, limit};
+use crate::machine::Ratings;
+
+/// A half that has passed.
+pub struct Seen {
+    /// Current where it began, in A.
+    pub before: Dq,
+    /// Current where it ended, in A.
+    pub current: Dq,
+    /// Volt-seconds that acted, in V·s.
+    pub acted: Dq,
+    /// Turn of the rotor, electrical, in rad.
+    pub turned: f32,
+    /// Length, in s.
+    pub length_s: f32,
+    /// Electrical angular speed, in rad/s.
+    pub omega: f32,
+    /// Direction of the rotor's d axis where it ended.
+    pub frame: SinCos,
+}
+
+/// The experiment's state.
+#[derive(Clone, Copy, Debug)]
+pub struct Course {
+    stage: Stage,
+    /// Commands since the stage, or its step, began; and the number of the step.
+    commands: u32,
+    step: u32,
+    /// Halves since the last guess of the inductance, in [`Stage::Probe`].
+    waited: u32,
+    pulses: Pulses,
+    /// Stator resistance, in ohm, as the staircase has shown it.
+    resistance_ohm: f32,
+    /// Voltage that each leg lacks in the direction of its current, in V, likewise; and the phase current whose direction is sure, in A.
+    lacking_v: f32,
+    small_a: f32,
+    /// The voltage that holds a current beside its drop in that, in V.
+    held_v: Dq,
+    /// Voltage and current of two steps of the staircase, summed, and how many they are.
+    shown: [Shown; 2],
+    /// Electrical speed, in rad/s, and direction of the rotor's d axis.
+    omega: f32,
+    frame: SinCos,
+}
+
+/// Sums over a step of the staircase.
+#[derive(Clone, Copy, Debug)]
+struct Shown {
+    volts: f32,
+    amperes: f32,
+    count: f32,
+}
+
+const NONE: Dq = Dq { d: 0.0, q: 0.0 };
+
+/// Voltage of the first pulse, as a share of the link's largest; the growth of the next, and the halves until then.
+const FIRST_SHARE: f32 = 0.003;
+const GROWTH: f32 = 1.5;
+const PROBE_HALVES: u32 = 4;
+/// Change of current in a half that is seen above the noise, as a share of the bound.
+const SEEN_SHARE: f32 = 0.015;
+/// Change of current that something is learnt from, likewise.
+const LEARNT_SHARE: f32 = 0.006;
+/// Change of current that counts as noise, likewise.
+const NOISE_SHARE: f32 = 0.01;
+/// The change that a probe wants, likewise.
+const PROBE_SHARE: f32 = 0.03;
+/// Phase current whose direction is sure, likewise.
+const SMALL_SHARE: f32 = 0.01;
+/// The longest change of a half on the way to a direct current, likewise.
+const LED_SHARE: f32 = 0.05;
+
+/// Direct currents along d, as shares of the bound, and commands for each. Two of them show the resistance.
+const STAIRCASE: [f32; 8] = [-0.25, -0.5, -0.75, -0.97, -0.6, -0.1, 0.1, 0.2];
+const STEP_COMMANDS: u32 = 36;
+const SHOWING: [u32; 2] = [1, 3];
+/// Commands from a step's beginning on after which it shows.
+const SETTLED_COMMANDS: u32 = 18;
+
+/// Commands of the pulses along d, along q, along both, and of the rest after them.
+const ALONG_D: u32 = 180;
+const ALONG_Q: u32 = 400;
+const ALONG_BOTH: u32 = 2_300;
+const REST: u32 = 16;
+
+/// Share of the bound at which the pulses along q begin, and what each command adds to it.
+const FIRST_BOUND: f32 = 0.2;
+const WIDENING: f32 = 0.003;
+
+/// Current along d beside the pulses along q and of the turning rotor, as a share of the bound: no phase is without current for long. Beside
+/// the last pulses it goes to and fro between two shares, so many commands each way.
+const HELD_D: f32 = -0.2;
+const SWEPT: [f32; 2] = [0.18, -0.93];
+const SWEEP_COMMANDS: u32 = 230;
+
+/// Current that turns the rotor, as a share of the bound; speed where it ends, as a share of the largest, and as electrical radians a
+/// command; the most commands for it, and those of coasting.
+const TURN_SHARE: f32 = 0.25;
+const TURN_SPEED_SHARE: f32 = 0.1;
+const TURN_RAD: f32 = 0.03;
+const TURN_COMMANDS: u32 = 2_000;
+const COAST_COMMANDS: u32 = 500;
+
+/// Share of the way to a direct current that a command goes, and share of a half's unexplained voltage that is believed to stay.
+const LEAD: f32 = 0.4;
+const HELD: f32 = 0.3;
+/// The same along d beside pulses along q.
+const HELD_BESIDE: f32 = 0.1;
+
+impl Course {
+    /// Before the first command.
+    pub const fn new() -> Self {
+        const NOTHING: Shown = Shown { volts: 0.0, amperes: 0.0, count: 0.0 };
+        Self {
+            stage: Stage::Probe,
+            commands: 0,
+            step: 0,
+            waited: 0,
+            pulses: Pulses::new(),
+            resistance_ohm: 0.0,
+            lacking_v: 0.0,
+            small_a: 1.0,
+            held_v: NONE,
+            shown: [NOTHING; 2],
+            omega: 0.0,
+            frame: SinCos { sin: 0.0, cos: 1.0 },
+        }
+    }
+
+    /// The part of the experiment that is going on.
+    pub fn stage(&self) -> Stage {
+        self.stage
+    }
+
+    /// Notes the time for which a command acts, in s.
+    pub fn lasts(&mut self, length_s: f32) {
+        self.pulses.lasts(length_s);
+    }
+
+    /// Voltage that a current takes by itself, in V, with the rotor's d axis in this direction: the resistance's, the inverter's error, and
+    /// what is left of both.
+    pub fn drop_v(&self, current: Dq, frame: SinCos) -> Dq {
+        let small_a = 1.0 / self.small_a;
+        let share = |phase_a: f32| limit(phase_a * small_a, -1.0, 1.0);
+        let Abc { a, b, c } = current.unpark(frame).abc();
+        let signs = Abc { a: share(a), b: share(b), c: share(c) }.clarke().park(frame);
+        current * self.resistance_ohm + signs * self.lacking_v + self.held_v
+    }
+
+    /// Takes a half that has passed.
+    pub fn learn(&mut self, seen: &Seen, inductance: &mut Inductance, bound_a: f32) {
+        (self.omega, self.frame) = (seen.omega, seen.frame);
+        let change = seen.current - seen.before;
+        let moved = change.squared() > (SEEN_SHARE * bound_a) * (SEEN_SHARE * bound_a);
+        let mean = (seen.current + seen.before) * 0.5;
+        match self.stage {
+            Stage::Probe => {
+                self.waited += 1;
+                if moved {
+                    inductance.learn(change, seen.acted, NOISE_SHARE * bound_a);
+                    inductance.settle();
+                    self.enter(Stage::Staircase);
+                } else if self.waited >= PROBE_HALVES {
+                    inductance.scale(GROWTH);
+                    self.waited = 0;
+                }
+            }
+            Stage::Staircase if self.commands > SETTLED_COMMANDS => {
+                self.show(seen.acted.d - inductance.flux(change).d, mean.d, seen.length_s);
+            }
+            Stage::AlongD | Stage::AlongQ | Stage::AlongBoth => self.pulses.turned(seen),
+            _ => {}
+        }
+        let learns = change.squared() > (LEARNT_SHARE * bound_a) * (LEARNT_SHARE * bound_a);
+        if learns && self.stage != Stage::Probe {
+            let flux = seen.acted - self.drop_v(mean, seen.frame) * seen.length_s;
+            inductance.learn(change, flux, NOISE_SHARE * bound_a);
+        }
+        match self.stage {
+            Stage::Staircase | Stage::Rest | Stage::Turn | Stage::Done => {
+                self.hold(seen, inductance, [HELD; 2])
+            }
+            Stage::AlongQ | Stage::AlongBoth => self.hold(seen, inductance, [HELD_BESIDE, 0.0]),
+            _ => {}
+        }
+    }
+
+    /// A half at a direct current.
+    fn show(&mut self, volt_seconds: f32, amperes: f32, length_s: f32) {
+        for (shown, step) in self.shown.iter_mut().zip(SHOWING) {
+            if step == self.step {
+                shown.volts += volt_seconds / length_s;
+                shown.amperes += amperes;
+                shown.count += 1.0;
+            }
+        }
+    }
+
+    /// The change of current that the command is to make from what flows `ahead`, with volt-seconds up to `reach` in V·s.
+    pub fn change(&mut self, ahead: Dq, reach: f32, inductance: &mut Inductance, ratings: &Ratings) -> Dq {
+        let bound_a = ratings.max_current_a;
+        if inductance.is_unknown() {
+            *inductance = Inductance::round(FIRST_SHARE * reach / (PROBE_SHARE * bound_a));
+        }
+        self.commands += 1;
+        let before = self.stage;
+        self.advance(ratings);
+        if before == Stage::AlongD && self.stage != before {
+            inductance.settle();
+        }
+        // Outward step by step, so that each step is known from the one before it.
+        let share = limit(FIRST_BOUND + self.commands as f32 * WIDENING, FIRST_BOUND, 1.0);
+        let share = if self.stage == Stage::AlongQ { share } else { 1.0 };
+        let held_d = if self.stage == Stage::AlongBoth { self.swept() } else { HELD_D };
+        let held = Dq { d: if self.stage == Stage::AlongD { 0.0 } else { held_d * bound_a }, q: 0.0 };
+        let region = |along: [bool; 2]| Region { along, share, held, bound_a, reach, ratings };
+        match self.stage {
+            Stage::Probe => Dq { d: -PROBE_SHARE * bound_a, q: 0.0 },
+            Stage::Staircase => {
+                let share = STAIRCASE.get(self.step as usize).copied().unwrap_or(0.0);
+                Self::lead(ahead, Dq { d: share * bound_a, q: 0.0 }, bound_a)
+            }
+            Stage::AlongD => self.pulses.change(ahead, &region([true, false]), inductance),
+            Stage::AlongQ => self.pulses.change(ahead, &region([false, true]), inductance),
+            Stage::AlongBoth => self.pulses.change(ahead, &region([false, true]), inductance),
+            Stage::Rest | Stage::Done => Self::lead(ahead, NONE, bound_a),
+            Stage::Turn => {
+                let share = [TURN_SHARE, 0.0, -TURN_SHARE].get(self.step as usize).copied().unwrap_or(0.0);
+                Self::lead(ahead, Dq { d: HELD_D, q: share } * bound_a, bound_a)
+            }
+        }
+    }
+
+    /// The slow sweep along d, as a share of the bound.
+    fn swept(&self) -> f32 {
+        let place = self.commands % (2 * SWEEP_COMMANDS);
+        let way = if place < SWEEP_COMMANDS { place } else { 2 * SWEEP_COMMANDS - place };
+        let [first, last] = SWEPT;
+        first + (last - first) * way as f32 / SWEEP_COMMANDS as f32
+    }
+
+    /// Part of the way to a direct current.
+    fn lead(ahead: Dq, wanted: Dq, bound_a: f32) -> Dq {
+        let most = LED_SHARE * bound_a;
+        let away = wanted - ahead;
+        let length = away.length();
+        let change = away * LEAD;
+        if length * LEAD > most { away * (most / length) } else { change }
+    }
+
+    /// The voltage that a half leaves unexplained stays in part: on the way to a direct current, and there.
+    fn hold(&mut self, seen: &Seen, inductance: &Inductance, [along_d, along_q]: [f32; 2]) {
+        let mean = (seen.current + seen.before) * 0.5;
+        let unexplained = (seen.acted - inductance.flux(seen.current - seen.before)) * (1.0 / seen.length_s);
+        let more = unexplained - self.drop_v(mean, seen.frame);
+        self.held_v = self.held_v + Dq { d: more.d * along_d, q: more.q * along_q };
+    }
+
+    fn enter(&mut self, stage: Stage) {
+        (self.stage, self.commands, self.step) = (stage, 0, 0);
+    }
+
+    /// The next step or stage, where this one is over.
+    fn advance(&mut self, ratings: &Ratings) {
+        let after = |limit: u32| self.commands > limit;
+        match self.stage {
+            Stage::Staircase if after(STEP_COMMANDS) => {
+                (self.commands, self.step) = (0, self.step + 1);
+                if self.step as usize == STAIRCASE.len() {
+                    self.settle(ratings.max_current_a);
+                    self.enter(Stage::AlongD);
+                }
+            }
+            Stage::AlongD if after(ALONG_D) => self.enter(Stage::AlongQ),
+            Stage::AlongQ if after(ALONG_Q) => self.enter(Stage::AlongBoth),
+            Stage::AlongBoth if after(ALONG_BOTH) => self.enter(Stage::Rest),
+            Stage::Rest if after(REST) => self.enter(Stage::Turn),
+            Stage::Turn => self.turn(ratings),
+            _ => {}
+        }
+    }
+
+    /// Speeds up, coasts, brakes.
+    fn turn(&mut self, ratings: &Ratings) {
+        let fast = TURN_SPEED_SHARE * ratings.max_speed_rad_s * ratings.pole_pairs;
+        let per_command = self.pulses.per_s(TURN_RAD);
+        let fast = if fast < per_command { fast } else { per_command };
+        let over = match self.step {
+            0 => self.omega > fast || self.commands > TURN_COMMANDS,
+            1 => self.commands > COAST_COMMANDS,
+            _ => self.omega < 0.0 || self.commands > TURN_COMMANDS,
+        };
+        if over && self.step == 2 {
+            self.enter(Stage::Done);
+        } else if over {
+            (self.commands, self.step) = (0, self.step + 1);
+        }
+    }
+
+    /// Resistance and voltage error, by two steps of the staircase on one side of zero: the error is the same in both.
+    fn settle(&mut self, bound_a: f32) {
+        let [low, high] = self.shown.map(|shown| {
+            let per = 1.0 / (shown.count + f32::MIN_POSITIVE);
+            (shown.volts * per, shown.amperes * per)
+        });
+        let amperes = low.1 - high.1;
+        let slope = if amperes * amperes > 0.0 { (low.0 - high.0) / amperes } else { 0.0 };
+        self.resistance_ohm = limit(slope, 0.0, 1e3);
+        (self.small_a, self.held_v) = (SMALL_SHARE * bound_a, NONE);
+        // With the phases' directions alone the drop is that of one volt for each leg.
+        self.lacking_v = 1.0;
+        let along_d = self.drop_v(Dq { d: low.1, q: 0.0 }, self.frame).d - low.1 * self.resistance_ohm;
+        let lacks = (low.0 - low.1 * self.resistance_ohm) / along_d;
+        self.lacking_v = if lacks > 0.0 { lacks } else { 0.0 };
+    }
+}

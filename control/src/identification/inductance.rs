@@ -1,0 +1,179 @@
+//! The incremental inductance where the current is, as the pulses show it.
+
+use crate::frames::{Dq, limit};
+
+/// A symmetric matrix of inductances, in H.
+#[derive(Clone, Copy, Debug)]
+struct Matrix {
+    dd: f32,
+    dq: f32,
+    qq: f32,
+}
+
+/// Share of what a half shows that is believed at once.
+const GAIN: f32 = 0.7;
+/// Weight of the coupling of both axes beside their own inductances, where a change of current does not tell them apart.
+const COUPLING_WEIGHT: f32 = 0.08;
+/// Square of the largest coupling, as a share of the product of the own inductances.
+const COUPLING: f32 = 0.3;
+/// Least and most of an own inductance that a half may leave of what was known before; and the least of all, of the first that was seen.
+const LEAST_SHARE: f32 = 0.4;
+const MOST_SHARE: f32 = 1.4;
+const FLOOR_SHARE: f32 = 0.5;
+
+/// Fields of the plane of currents, in which each inductance is remembered: along d from beyond the bound on, along q for both signs.
+const ALONG_D: usize = 9;
+const ALONG_Q: usize = 8;
+/// Fields in a bound of current.
+const PER_BOUND: f32 = 6.5;
+/// Place of no current along d.
+const MIDDLE_D: f32 = 7.0;
+
+/// Inductances all over the plane.
+#[derive(Clone, Copy, Debug)]
+pub struct Inductance {
+    /// The one of the present current.
+    here: Matrix,
+    field: usize,
+    fields: [Option<Matrix>; ALONG_D * ALONG_Q],
+    /// Sign of the current along q, which is that of the coupling.
+    sign: f32,
+    /// The least own inductance, in H.
+    floor_h: f32,
+}
+
+impl Inductance {
+    /// Nothing is known: no voltage is the answer to any change of current.
+    pub const UNKNOWN: Self = Self::round(0.0);
+
+    /// The same along both axes and at every current, in H.
+    pub const fn round(henry: f32) -> Self {
+        let here = Matrix { dd: henry, dq: 0.0, qq: henry };
+        Self { here, field: usize::MAX, fields: [None; ALONG_D * ALONG_Q], sign: 1.0, floor_h: 0.0 }
+    }
+
+    /// The first guess has not been made yet.
+    pub fn is_unknown(&self) -> bool {
+        self.here.dd <= 0.0
+    }
+
+    /// Takes another multiple of it.
+    pub fn scale(&mut self, by: f32) {
+        let Matrix { dd, dq, qq } = self.here;
+        self.here = Matrix { dd: dd * by, dq: dq * by, qq: qq * by };
+    }
+
+    /// The least that was seen along d so far is the measure of the least of all.
+    pub fn settle(&mut self) {
+        let mut least_h = self.here.dd;
+        for known in self.fields.iter().flatten() {
+            if known.dd < least_h {
+                least_h = known.dd;
+            }
+        }
+        self.floor_h = FLOOR_SHARE * least_h;
+    }
+
+    /// Moves to a current, in A: what is remembered of it holds, where it has been before; else that from where it comes.
+    pub fn at(&mut self, current: Dq, bound_a: f32) {
+        let per_a = PER_BOUND / bound_a;
+        self.sign = if current.q < 0.0 { -1.0 } else { 1.0 };
+        // What is below 0 the conversion makes 0.
+        let row = ((MIDDLE_D + current.d * per_a) as usize).min(ALONG_D - 1);
+        let column = ((current.q.abs() * per_a) as usize).min(ALONG_Q - 1);
+        let field = row * ALONG_Q + column;
+        if field != self.field {
+            self.field = field;
+            if let Some(Some(known)) = self.fields.get(field) {
+                self.here = *known;
+            }
+        }
+    }
+
+    /// Flux linkage, in Wb, of a change of current, in A.
+    pub fn flux(&self, change: Dq) -> Dq {
+        let Matrix { dd, dq, qq } = self.here;
+        let dq = dq * self.sign;
+        Dq { d: dd * change.d + dq * change.q, q: dq * change.d + qq * change.q }
+    }
+
+    /// Change of current, in A, of a flux linkage, in Wb; none while nothing is known.
+    pub fn current(&self, flux: Dq) -> Dq {
+        let Matrix { dd, dq, qq } = self.here;
+        let dq = dq * self.sign;
+        let determinant = dd * qq - dq * dq;
+        if determinant <= 0.0 {
+            return Dq { d: 0.0, q: 0.0 };
+        }
+        Dq { d: qq * flux.d - dq * flux.q, q: dd * flux.q - dq * flux.d } * (1.0 / determinant)
+    }
+
+    /// A change of current was seen to take so much flux linkage; changes of so little, in A, are noise. The matrix moves by the least
+    /// that explains a share of it, the coupling less readily than the rest.
+    pub fn learn(&mut self, change: Dq, flux: Dq, noise_a: f32) {
+        let left = flux - self.flux(change);
+        let (d, q) = (change.d, change.q * self.sign);
+        let (left_d, left_q) = (left.d, left.q * self.sign);
+        // With x = (dd, dq, qq): flux_d = d x₀ + q x₁, flux_q = d x₁ + q x₂.
+        let w = COUPLING_WEIGHT;
+        let noise = noise_a * noise_a;
+        let (a, b, c) = (d * d + w * q * q + noise, w * d * q, w * d * d + q * q + noise);
+        let scale = GAIN / (a * c - b * b);
+        let (x, y) = ((c * left_d - b * left_q) * scale, (a * left_q - b * left_d) * scale);
+        let before = self.here;
+        let own = |known: f32, more: f32| {
+            let changed = limit(known + more, LEAST_SHARE * known, MOST_SHARE * known);
+            if changed > self.floor_h { changed } else { self.floor_h }
+        };
+        let (dd, qq) = (own(before.dd, d * x), own(before.qq, q * y));
+        let dq = before.dq + w * (q * x + d * y);
+        let most = COUPLING * dd * qq;
+        let dq = if dq * dq > most { dq * (most / (dq * dq)) } else { dq };
+        self.here = Matrix { dd, dq, qq };
+        if let Some(field) = self.fields.get_mut(self.field) {
+            *field = Some(self.here);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn changes_of_both_axes_show_the_whole_matrix() {
+        let mut truth = Inductance::round(1e-3);
+        truth.here = Matrix { dd: 1e-3, dq: -4e-4, qq: 9e-3 };
+        let mut found = Inductance::round(2e-3);
+        let changes = [Dq { d: 4.0, q: 20.0 }, Dq { d: 4.0, q: -20.0 }, Dq { d: 20.0, q: 3.0 }];
+        for change in changes.into_iter().cycle().take(120) {
+            found.learn(change, truth.flux(change), 1.0);
+        }
+        let near = |a: f32, b: f32| (a - b).abs() < 0.03 * b.abs();
+        let (found_is, truth_is) = (found.here, truth.here);
+        assert!(near(found_is.dd, truth_is.dd) && near(found_is.dq, truth_is.dq), "{found_is:?}");
+        assert!(near(found_is.qq, truth_is.qq), "{found_is:?}");
+        let back = found.current(found.flux(changes[0]));
+        assert!((back - changes[0]).length() < 1e-3, "{back:?}");
+    }
+
+    #[test]
+    fn a_current_that_comes_back_finds_what_was_learnt_there() {
+        let (bound_a, there) = (100.0, Dq { d: -80.0, q: 50.0 });
+        let mut found = Inductance::round(2e-3);
+        found.at(there, bound_a);
+        for _ in 0..20 {
+            let change = Dq { d: 0.0, q: 10.0 };
+            found.learn(change, change * 9e-3, 0.1);
+        }
+        found.at(Dq { d: 0.0, q: 0.0 }, bound_a);
+        for _ in 0..20 {
+            let change = Dq { d: 0.0, q: 10.0 };
+            found.learn(change, change * 1e-3, 0.1);
+        }
+        assert!((found.here.qq - 1e-3).abs() < 1e-5);
+        // The other sign of the current along q is its mirror image.
+        found.at(Dq { d: -80.0, q: -50.0 }, bound_a);
+        assert!((found.here.qq - 9e-3).abs() < 1e-4, "{:?}", found.here);
+    }
+}

@@ -1,0 +1,203 @@
+//! Identification of a machine by its own drive: a control law whose voltages are an experiment.
+//!
+//! The law knows of the machine its ratings alone: pole pairs, largest current, largest speed; neither its flux map nor its resistance. It
+//! wants so much change of current from each command, finds out which volt-seconds that takes, and tells at each carrier boundary what
+//! acted and what flowed ([`Observation`]). The map is fitted elsewhere.
+//!
+//! 1. **Probe**: pulses along d, longer each time, until a current moves.
+//! 2. **Staircase**: direct currents along d, which give no torque: stator resistance and the inverter's voltage error.
+//! 3. **Pulses** along d, along q, along both: alternating voltages that are reversed where the current would leave the bound at the end
+//!    of the half that is commanded. The torque of one sign follows that of the other, and the side that has turned the rotor further is
+//!    given less: a free rotor swings, and stays where it is.
+//! 4. **Turn**: a little torque until the rotor turns slowly, no current for a while, and the same torque against it: the magnets'
+//!    flux and the inertia.
+//!
+//! The stator equation in the stationary frame, from boundary to boundary, `Δψ = ∫u dt − R ∫i dt`, holds whatever the rotor does meanwhile.
+
+#![forbid(unsafe_code)]
+
+mod course;
+mod inductance;
+mod observation;
+mod pulses;
+
+use crate::control::{
+    AimInput, Boundary, Committed, ControlLaw, Law, ModeLimits, Region, Regulated, RotorSample, SpeedTracker,
+    Target, VoltageVector,
+};
+use crate::frames::{AlphaBeta, Dq, SinCos, six_step_v};
+use crate::machine::Tables;
+use crate::time::Clock;
+use course::{Course, Seen};
+use inductance::Inductance;
+
+pub use observation::{OBSERVATION_WORDS, Observation, Stage};
+
+/// Share of the largest voltage of a carrier that the experiment uses.
+const USED_SHARE: f32 = 0.95;
+
+const NONE: Dq = Dq { d: 0.0, q: 0.0 };
+
+/// The target of a current loop that has none.
+const NO_TARGET: Target = Target {
+    torque_nm: 0.0,
+    current: NONE,
+    flux: NONE,
+    region: Region::Mtpa,
+    depth: 0.0,
+    voltage_limit_v: 0.0,
+};
+
+/// The law's state between two control periods.
+#[derive(Clone, Copy, Debug)]
+pub struct Identification {
+    speed: SpeedTracker,
+    target: Target,
+    course: Course,
+    /// Incremental inductance where the current is.
+    inductance: Inductance,
+    /// The newest boundary.
+    last: Option<RotorSample>,
+    told: Option<Observation>,
+    /// Samples since the last operating point.
+    samples: u32,
+    /// The largest voltage that may be made, in V.
+    limit_v: f32,
+    /// DC-link voltage, in V.
+    udc_v: f32,
+}
+
+impl Identification {
+    /// Before the experiment.
+    pub const fn new() -> Self {
+        Self {
+            speed: SpeedTracker::new(),
+            target: NO_TARGET,
+            course: Course::new(),
+            inductance: Inductance::UNKNOWN,
+            last: None,
+            told: None,
+            samples: 0,
+            limit_v: 0.0,
+            udc_v: 0.0,
+        }
+    }
+
+    /// The newest observation, once.
+    pub fn take(&mut self) -> Option<Observation> {
+        self.told.take()
+    }
+
+    /// The part of the experiment that is going on.
+    pub fn stage(&self) -> Stage {
+        self.course.stage()
+    }
+
+    /// The voltage that changes a current by so much within an interval, without more than the limit.
+    fn voltage(&self, ahead: Dq, change: Dq, frame: SinCos, interval_s: f32) -> Dq {
+        let drop = self.course.drop_v(ahead + change * 0.5, frame);
+        let wanted = self.inductance.flux(change) * (1.0 / interval_s) + drop;
+        let length = wanted.length();
+        if length > self.limit_v { wanted * (self.limit_v / length) } else { wanted }
+    }
+}
+
+impl Default for Identification {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl ControlLaw for Identification {
+    fn tracker(&self) -> &SpeedTracker {
+        &self.speed
+    }
+
+    fn tracker_mut(&mut self) -> &mut SpeedTracker {
+        &mut self.speed
+    }
+
+    fn map_scale(&self) -> f32 {
+        1.0
+    }
+
+    fn map_error(&self) -> f32 {
+        0.0
+    }
+
+    fn passed_s(&self, clock: &Clock) -> f32 {
+        self.samples as f32 * clock.control_s()
+    }
+
+    fn target(&self) -> &Target {
+        &self.target
+    }
+
+    fn idle(&mut self) {
+        *self = Self { speed: self.speed, ..Self::new() };
+    }
+
+    fn begin_without_torque(&mut self) {}
+
+    fn observe(&mut self, _sample: &RotorSample, _tables: &Tables) {
+        self.samples += 1;
+    }
+
+    fn learn(&mut self, boundary: &Boundary, sample: &RotorSample, _follows: Regulated, law: &Law) {
+        let before = self.last.replace(*sample);
+        let volt_seconds = boundary.volt_seconds.unwrap_or_default();
+        let bound_a = law.tables.ratings.max_current_a;
+        if let (Some(before), Some(acted)) = (before, boundary.volt_seconds) {
+            let seen = Seen {
+                before: before.current,
+                current: sample.current,
+                acted: acted.park(sample.frame),
+                turned: sample.frame.sin * before.frame.cos - sample.frame.cos * before.frame.sin,
+                length_s: boundary.length_s,
+                omega: self.speed.omega(),
+                frame: sample.frame,
+            };
+            self.inductance.at((seen.before + seen.current) * 0.5, bound_a);
+            self.course.learn(&seen, &mut self.inductance, bound_a);
+        }
+        self.told = Some(Observation {
+            stage: self.course.stage(),
+            volt_seconds,
+            length_s: boundary.length_s,
+            current: sample.current,
+            frame: sample.frame,
+            udc_v: self.udc_v,
+        });
+    }
+
+    fn aim(&mut self, input: &AimInput, _law: &Law) {
+        self.samples = 0;
+        self.udc_v = input.udc_v;
+        self.limit_v = USED_SHARE * input.limits.depth_limit * six_step_v(input.udc_v);
+        self.target = Target { voltage_limit_v: self.limit_v, ..NO_TARGET };
+    }
+
+    fn regulate(
+        &mut self,
+        sample: &RotorSample,
+        committed: &Committed,
+        _limits: &ModeLimits,
+        law: &Law,
+    ) -> VoltageVector {
+        // Gates that are still off begin with no voltage.
+        let voltage = committed.volt_seconds.map_or(NONE, |volt_seconds| {
+            let (here, interval_s) = (sample.current, committed.interval_s);
+            let bound_a = law.tables.ratings.max_current_a;
+            self.inductance.at(here, bound_a);
+            let left = self.course.drop_v(here, sample.frame) * committed.horizon_s;
+            let ahead = here + self.inductance.current(volt_seconds.park(sample.frame) - left);
+            self.inductance.at(ahead, bound_a);
+            let reach = self.limit_v * interval_s;
+            self.course.lasts(interval_s);
+            let change = self.course.change(ahead, reach, &mut self.inductance, &law.tables.ratings);
+            self.voltage(ahead, change, sample.frame, interval_s)
+        });
+        let (length_v, vector): (f32, AlphaBeta) = (voltage.length(), voltage.unpark(sample.frame));
+        VoltageVector { voltage_v: length_v, vector, carrier: vector, steady_v: length_v }
+    }
+}

@@ -1,0 +1,143 @@
+//! Alternating pulses within a bound of current, by which a free rotor swings and stays where it is.
+
+use super::course::Seen;
+use super::inductance::Inductance;
+use crate::frames::{Dq, limit};
+use crate::machine::Ratings;
+
+/// The region that the current may move in, and the axes that pulses move it along.
+pub struct Region<'a> {
+    /// Pulses along d, and along q.
+    pub along: [bool; 2],
+    /// Share of the bound that is used.
+    pub share: f32,
+    /// The current where an axis without pulses is held, in A.
+    pub held: Dq,
+    /// Largest current, in A.
+    pub bound_a: f32,
+    /// The most volt-seconds of a command, in V·s.
+    pub reach: f32,
+    /// The machine's ratings.
+    pub ratings: &'a Ratings,
+}
+
+/// The pulses' state.
+#[derive(Clone, Copy, Debug)]
+pub struct Pulses {
+    /// Directions of the pulses.
+    d: f32,
+    q: f32,
+    /// Turn of the rotor since the pulses began, electrical, in rad; and its speed, in rad/s.
+    turned_rad: f32,
+    omega: f32,
+    /// Length of a half, in s.
+    length_s: f32,
+}
+
+/// Change of current of a command, as a share of the bound: along d alone, along q, and along d beside q.
+const D_SHARE: f32 = 0.06;
+const Q_SHARE: f32 = 0.065;
+const SLOW_SHARE: f32 = 0.017;
+/// Share of the volt-seconds that d takes at most.
+const D_REACH: f32 = 0.7;
+/// Share of the way to where an axis without pulses is held that a command goes.
+const HELD_SHARE: f32 = 0.4;
+/// Share of the bound that the boundaries' currents keep to: between them there is ripple.
+const KEPT_SHARE: f32 = 0.94;
+/// Largest current along +d, as a share of the bound.
+const POSITIVE_SHARE: f32 = 0.2;
+/// Turn, mechanical, at which the side that makes it is given no more, in rad; and the time over which the speed counts, in halves.
+const MOST_RAD: f32 = 0.028;
+const AHEAD_HALVES: f32 = 18.0;
+/// Least share of the bound that a side keeps.
+const LEAST_SIDE: f32 = 0.1;
+
+impl Pulses {
+    /// Before the first pulse.
+    pub const fn new() -> Self {
+        Self { d: -1.0, q: 1.0, turned_rad: 0.0, omega: 0.0, length_s: 1.0 }
+    }
+
+    /// A number of this a half, per s.
+    pub fn per_s(&self, number: f32) -> f32 {
+        number / self.length_s
+    }
+
+    /// Notes by how much the rotor has turned in a half.
+    pub fn turned(&mut self, seen: &Seen) {
+        self.turned_rad += seen.turned;
+        self.omega = seen.omega;
+    }
+
+    /// Notes the length of a half, in s.
+    pub fn lasts(&mut self, length_s: f32) {
+        self.length_s = length_s;
+    }
+
+    /// The change of current that the command is to make from what flows `ahead`: on as before, unless that would leave the region.
+    pub fn change(&mut self, ahead: Dq, region: &Region, inductance: &Inductance) -> Dq {
+        let [along_d, along_q] = region.along;
+        let d_step = region.bound_a * if along_q { SLOW_SHARE } else { D_SHARE };
+        let q_step = region.bound_a * Q_SHARE;
+        let back = (region.held - ahead) * HELD_SHARE;
+        let wanted = |d: f32, q: f32| {
+            let change = Dq {
+                d: if along_d { d * d_step } else { limit(back.d, -d_step, d_step) },
+                q: if along_q { q * q_step } else { limit(back.q, -q_step, q_step) },
+            };
+            reached(change, region.reach, inductance)
+        };
+        let sides = self.sides(region);
+        if along_q {
+            let next = ahead.q + wanted(self.d, self.q).q;
+            if (self.q > 0.0 && next > sides[1]) || (self.q < 0.0 && next < -sides[0]) {
+                self.q = -self.q;
+            }
+        }
+        if along_d {
+            let next = ahead.d + wanted(self.d, self.q).d;
+            let bound_a = region.share * KEPT_SHARE * region.bound_a;
+            if next > POSITIVE_SHARE * bound_a {
+                self.d = -1.0;
+            } else if next < -bound_a {
+                self.d = 1.0;
+            }
+        }
+        self.keep_within(ahead, region, wanted)
+    }
+
+    /// The largest current: first the pulse along q turns back, then that along d.
+    fn keep_within(&mut self, ahead: Dq, region: &Region, wanted: impl Fn(f32, f32) -> Dq) -> Dq {
+        let bound_a = region.share * KEPT_SHARE * region.bound_a;
+        let inside = |change: Dq| (ahead + change).squared() <= bound_a * bound_a;
+        let inward = (if ahead.d > 0.0 { -1.0 } else { 1.0 }, if ahead.q > 0.0 { -1.0 } else { 1.0 });
+        for (d, q) in [(self.d, self.q), (self.d, inward.1), (inward.0, inward.1)] {
+            let change = wanted(d, q);
+            if inside(change) {
+                (self.d, self.q) = (d, q);
+                return change;
+            }
+        }
+        (self.d, self.q) = inward;
+        wanted(self.d, self.q)
+    }
+
+    /// The largest negative and positive current along q, in A.
+    fn sides(&self, region: &Region) -> [f32; 2] {
+        let per_pole = 1.0 / region.ratings.pole_pairs;
+        let comes = self.turned_rad + self.omega * AHEAD_HALVES * self.length_s;
+        let share = comes * per_pole / MOST_RAD;
+        [1.0 + share, 1.0 - share]
+            .map(|side| limit(side, LEAST_SIDE, 1.0) * region.share * KEPT_SHARE * region.bound_a)
+    }
+}
+
+/// A change of current, shortened to what the volt-seconds can make of it: what d takes is left for q.
+fn reached(change: Dq, reach: f32, inductance: &Inductance) -> Dq {
+    let along_d = Dq { q: 0.0, ..change };
+    let (takes_d, takes_q) =
+        (inductance.flux(along_d).length(), inductance.flux(Dq { d: 0.0, ..change }).length());
+    let d = if takes_d > D_REACH * reach { change.d * (D_REACH * reach / takes_d) } else { change.d };
+    let rest = if takes_d > D_REACH * reach { reach - D_REACH * reach } else { reach - takes_d };
+    Dq { d, q: if takes_q > rest { change.q * (rest / takes_q) } else { change.q } }
+}

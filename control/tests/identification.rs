@@ -1,0 +1,202 @@
+//! The experiment on machines that it has not seen.
+
+use std::path::Path;
+use tractive_control::control::{
+    AimInput, Boundary, Committed, ControlLaw, Demand, Gains, Law, ModeLimits, Regulated, RotorSample,
+};
+use tractive_control::frames::{Abc, AlphaBeta, Angle, Dq};
+use tractive_control::identification::{Identification, Observation, Stage};
+use tractive_control::machine::Tables;
+use tractive_control::time::Clock;
+use tractive_tablegen::{MachineFolder, SmoothMap};
+
+/// A machine behind an ideal inverter whose voltage is that of the command before; its rotor is free.
+struct Plant {
+    map: SmoothMap,
+    flux_scale: f64,
+    resistance_ohm: f64,
+    pole_pairs: f64,
+    inertia_kg_m2: f64,
+    current: (f64, f64),
+    angle: f64,
+    speed: f64,
+    seed: u32,
+    /// Voltage that each leg lacks, in V.
+    lacking_v: f32,
+    /// Phase current with ripple of both signs, in A.
+    ripple_a: f32,
+}
+
+impl Plant {
+    /// One half at a voltage in the stationary frame, of which each leg lacks some in the direction of its current.
+    fn step(&mut self, voltage: AlphaBeta, half_s: f64) {
+        const PARTS: i32 = 20;
+        let dt = half_s / f64::from(PARTS);
+        for _ in 0..PARTS {
+            let (sin, cos) = self.angle.sin_cos();
+            let (id, iq) = self.current;
+            let here =
+                AlphaBeta { alpha: (id * cos - iq * sin) as f32, beta: (id * sin + iq * cos) as f32 }.abc();
+            // Near zero the ripple has both signs.
+            let lack = |phase: f32| self.lacking_v * (phase / self.ripple_a).clamp(-1.0, 1.0);
+            let acts = voltage - Abc { a: lack(here.a), b: lack(here.b), c: lack(here.c) }.clarke();
+            let (alpha, beta) = (f64::from(acts.alpha), f64::from(acts.beta));
+            let (ud, uq) = (alpha * cos + beta * sin, beta * cos - alpha * sin);
+            let at = self.map.at(id, iq);
+            let s = self.flux_scale;
+            let omega = self.pole_pairs * self.speed;
+            let vd = (ud - self.resistance_ohm * id) / s + omega * at.psi_q_wb;
+            let vq = (uq - self.resistance_ohm * iq) / s - omega * at.psi_d_wb;
+            let det = at.ldd_h * at.lqq_h - at.ldq_h * at.lqd_h;
+            self.current.0 += dt * (at.lqq_h * vd - at.ldq_h * vq) / det;
+            self.current.1 += dt * (at.ldd_h * vq - at.lqd_h * vd) / det;
+            let torque = 1.5 * self.pole_pairs * s * (at.psi_d_wb * iq - at.psi_q_wb * id);
+            self.speed += dt * torque / self.inertia_kg_m2;
+            self.angle += dt * omega;
+        }
+    }
+
+    fn noise(&mut self, peak_a: f32) -> f32 {
+        self.seed = self.seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        peak_a * ((self.seed >> 8) as f32 / 8_388_608.0 - 1.0)
+    }
+
+    fn sample(&mut self, peak_a: f32, tables: &Tables) -> RotorSample {
+        let angle = Angle::from_turns((self.angle / core::f64::consts::TAU).rem_euclid(1.0) as f32);
+        let (id, iq) = self.current;
+        let current = Dq { d: id as f32 + self.noise(peak_a), q: iq as f32 + self.noise(peak_a) };
+        RotorSample::new(current.unpark(angle.sin_cos()).abc(), angle, tables)
+    }
+}
+
+/// Largest current beyond the bound, as a share, and the largest mechanical turn before the rotor is to turn, in degrees.
+struct Outcome {
+    peak: f64,
+    turned_deg: f64,
+    pulses_s: f64,
+    observations: Vec<Observation>,
+}
+
+fn run(machine: &str, flux_scale: f64, inertia: Option<f64>, noise_share: f32) -> Outcome {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tables").join(machine);
+    let folder = MachineFolder::read(&folder).unwrap();
+    let (tables, parameters) = (folder.tables(), &folder.parameters);
+    let half_s = 0.5 / parameters.max_switching_hz;
+    let clock = Clock::new(25_000_000, 2_500);
+    let law = Law { gains: &Gains::DEFAULT, clock: &clock, tables: &tables };
+    let mut plant = Plant {
+        map: SmoothMap::new(&folder.map),
+        flux_scale,
+        resistance_ohm: 1.1 * parameters.stator_resistance_ohm,
+        pole_pairs: parameters.pole_pairs.into(),
+        inertia_kg_m2: inertia.unwrap_or(parameters.rotor_inertia_kg_m2),
+        current: (0.0, 0.0),
+        angle: 0.3,
+        speed: 0.0,
+        seed: 7,
+        // A dead time of 5 µs at 900 Hz.
+        ripple_a: 0.02 * tables.ratings.max_current_a,
+        lacking_v: 0.0045 * parameters.dc_link_nominal_v as f32,
+    };
+    let limits = ModeLimits {
+        follows: Regulated::Mean,
+        depth_limit: 0.906,
+        steady_share: 1.0,
+        filled: false,
+        ripple_share: 0.05,
+        settled: true,
+    };
+    let mut identification = Identification::new();
+    let noise_a = noise_share * tables.ratings.max_current_a;
+    let mut committed_v = AlphaBeta::default();
+    let mut outcome = Outcome { peak: 0.0, turned_deg: 0.0, pulses_s: 0.0, observations: Vec::new() };
+    let mut volt_seconds = None;
+    for _ in 0..12_000 {
+        let sample = plant.sample(noise_a, &tables);
+        identification.track(
+            Angle::from_turns((plant.angle / core::f64::consts::TAU).rem_euclid(1.0) as f32),
+            &Clock { control_s: half_s as f32, ..clock },
+        );
+        identification.observe(&sample, &tables);
+        identification.learn(
+            &Boundary { volt_seconds, length_s: half_s as f32 },
+            &sample,
+            Regulated::Mean,
+            &law,
+        );
+        let demand = Demand { torque_nm: 0.0, slew_limited: false };
+        let input = AimInput {
+            demand: &demand,
+            window: None,
+            udc_v: tables.ratings.dc_link_nominal_v,
+            swing: None,
+            limits: &limits,
+        };
+        identification.aim(&input, &law);
+        let committed = Committed {
+            horizon_s: half_s as f32,
+            volt_seconds: Some(committed_v * half_s as f32),
+            ripple: None,
+            interval_s: half_s as f32,
+        };
+        let next = identification.regulate(&sample, &committed, &limits, &law).vector;
+        plant.step(committed_v, half_s);
+        volt_seconds = Some(committed_v * half_s as f32);
+        committed_v = next;
+        outcome.observations.extend(identification.take());
+        let stage = identification.stage();
+        let (id, iq) = plant.current;
+        outcome.peak = outcome.peak.max(id.hypot(iq) / parameters.max_current_a);
+        if !matches!(stage, Stage::Turn | Stage::Done) {
+            outcome.pulses_s += half_s;
+            let turned = (plant.angle - 0.3) / plant.pole_pairs;
+            outcome.turned_deg = outcome.turned_deg.max(turned.abs().to_degrees());
+        }
+        if outcome.observations.last().is_some_and(|observation| observation.stage == Stage::Done) {
+            break;
+        }
+    }
+    outcome
+}
+
+/// Largest current of a machine, in A.
+fn parameters_bound(machine: &str) -> f64 {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tables").join(machine);
+    MachineFolder::read(&folder).unwrap().parameters.max_current_a
+}
+
+/// The plane of currents is seen: in each band along d pulses reach far along q, to one side at least, as the map is even.
+fn covers(observations: &[Observation], bound_a: f64) -> bool {
+    (-9..=1).all(|band| {
+        let middle = 0.1 * f64::from(band) * bound_a;
+        let own = observations.iter().filter(|o| (f64::from(o.current.d) - middle).abs() < 0.06 * bound_a);
+        // The boundaries keep to 0.94 of the bound.
+        let far = 0.6 * (0.94 * 0.94 * bound_a * bound_a - middle * middle).sqrt();
+        let (low, high) = own.fold((0.0_f64, 0.0_f64), |(low, high), o| {
+            let iq = f64::from(o.current.q);
+            (low.min(iq), high.max(iq))
+        });
+        if high < far && low > -far {
+            println!("id near {middle:.1} A: iq from {low:.1} to {high:.1} A");
+        }
+        high > far || low < -far
+    })
+}
+
+#[test]
+fn the_current_keeps_to_its_bound_and_the_rotor_to_its_place() {
+    for (machine, inertia) in [("pmasynrm-180kw", Some(3.0)), ("pmsm-48v-1kw", None), ("ipm-zs9", None)] {
+        for scale in [1.0, 0.8, 1.3] {
+            let outcome = run(machine, scale, inertia, 0.002);
+            let Outcome { peak, turned_deg, pulses_s, observations } = &outcome;
+            let case = format!("{machine}, flux x {scale}");
+            println!("{case}: |i| up to {peak:.3} of the bound, turned {turned_deg:.2}°, {pulses_s:.3} s");
+            assert!(*peak < 1.1 && *peak > 0.95, "{case}: {peak}");
+            assert!(*turned_deg < 5.0, "{case}: {turned_deg}°");
+            assert!(*pulses_s < 2.0, "{case}: {pulses_s} s");
+            let last = observations.last().map(|observation| observation.stage);
+            assert_eq!(last, Some(Stage::Done), "{case}");
+            assert!(covers(observations, parameters_bound(machine)), "{case}");
+        }
+    }
+}

@@ -1,0 +1,117 @@
+//! `cargo rig identify`: an unknown machine identified by its own drive.
+//!
+//! The drive's own tasks run [`tractive::identification`] against a simulated machine; [`Fit`] makes a flux map, a resistance and a dead time of
+//! what they observe. What is known beforehand is what a nameplate tells: the keys of `machine.toml` but for resistance and inertia.
+
+mod basis;
+mod fit;
+mod half;
+mod outcome;
+mod toml;
+
+pub use fit::Fit;
+pub use outcome::{Outcome, Truth};
+
+use crate::files::write_text;
+use crate::folder::{Contents, csv, write_folder};
+use crate::machine::Machine;
+use crate::options::positive;
+use crate::report::{self, Page};
+use crate::scenario::System;
+use crate::scenario::traction::{Traction, TractionOptions, identification};
+use crate::trace::Recorded;
+use anyhow::{Context, Result, bail};
+use clap::Args;
+use serde_json::Map;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// The options of an identification.
+#[derive(Clone, Debug, Args)]
+pub struct Identify {
+    /// The drive and its bench; of `--machine` only its nameplate is known, `--out` is the machine folder that is made.
+    #[command(flatten)]
+    pub options: crate::options::Options<TractionOptions>,
+    /// Inertia of the free rotor, in kg·m²; default the folder's.
+    #[arg(long, value_name = "KG_M2", value_parser = positive, allow_negative_numbers = true)]
+    pub inertia: Option<f64>,
+    /// The page to write; default target/tractive/identify-NAME.html.
+    #[arg(long, value_name = "FILE.html")]
+    pub page: Option<PathBuf>,
+}
+
+/// Does what the command says. Exit code 1 where a fault has ended the experiment; then nothing is written.
+///
+/// # Errors
+/// Options that make no sense, observations that do not tell the machine, a folder that the table generator refuses.
+pub fn command(identify: &Identify) -> Result<ExitCode> {
+    let Some(out) = &identify.options.out else {
+        bail!("--out: must name the machine folder to make");
+    };
+    let machine = Machine::load(identify.options.machine.as_deref().unwrap_or(Traction::MACHINE))?;
+    let outcome = match identified(identify, &machine)? {
+        Ok(outcome) => outcome,
+        Err(trip) => {
+            eprintln!(
+                "fault {}: {} (limit {}): nothing is written",
+                trip.fault.name(),
+                trip.value,
+                trip.limit
+            );
+            return Ok(ExitCode::from(1));
+        }
+    };
+    write_folder(out, &contents(&outcome, &machine))?;
+    let page = match &identify.page {
+        Some(page) => page.clone(),
+        None => PathBuf::from(format!("target/tractive/identify-{}.html", machine.tables.name)),
+    };
+    write_page(&outcome, &machine, &page)?;
+    if identify.options.json {
+        crate::say!("{}", serde_json::to_string(outcome.figures().values())?);
+    } else {
+        crate::say!("{}\n", report::text(&outcome.figures()));
+        crate::say!("machine folder: {}\nreport: {}", out.display(), page.display());
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The outcome of an experiment, or the fault that has ended it.
+///
+/// # Errors
+/// As [`command`].
+pub fn identified(
+    identify: &Identify,
+    machine: &Machine,
+) -> Result<std::result::Result<Outcome, tractive::protection::Trip>> {
+    let options = &identify.options;
+    Traction::check(options, &Map::new(), machine)?;
+    let parameters = &machine.folder.parameters;
+    let inertia = identify.inertia.unwrap_or(parameters.rotor_inertia_kg_m2);
+    let recording = identification::drive(options, machine, inertia)?;
+    if let Some(trip) = recording.trip() {
+        return Ok(Err(trip));
+    }
+    let truth = Truth::of(options, machine, inertia)?;
+    Outcome::of(&recording, machine, &truth).map(Ok)
+}
+
+/// The machine folder of an outcome.
+pub fn contents(outcome: &Outcome, machine: &Machine) -> Contents {
+    let parameters = &machine.folder.parameters;
+    let map = outcome.fit.map(parameters.max_current_a);
+    let about =
+        "# Identified by the drive: the gradient of one co-energy polynomial, fitted by least squares.\n";
+    Contents { toml: toml::of(outcome, &map, parameters), map: csv(&map, about) }
+}
+
+/// The page: map, residuals, and how far it is from the truth, which only a simulation knows.
+fn write_page(outcome: &Outcome, machine: &Machine, path: &std::path::Path) -> Result<()> {
+    if let Some(parent) = path.parent() {
+        std::fs::create_dir_all(parent).with_context(|| format!("--page {}", path.display()))?;
+    }
+    let mut page = Page::new(machine.tables.name, "no figure: identified by its own drive");
+    outcome.draw(machine, &mut page);
+    let subtitle = format!("tractive {}", env!("CARGO_PKG_VERSION"));
+    write_text(path, &page.finish(&subtitle, &outcome.figures())?)
+}

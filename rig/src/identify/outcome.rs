@@ -1,0 +1,243 @@
+//! The outcome of an experiment, and how far it is from the truth.
+
+use super::fit::Fit;
+use crate::analysis::Figures;
+use crate::machine::Machine;
+use crate::report::Page;
+use crate::scenario::traction::Options;
+use crate::trace::Recording;
+use anyhow::Result;
+use core::f64::consts::TAU;
+use tractive::identification::{Observation, Stage};
+use tractive_tablegen::{Optimum, SmoothMap};
+
+/// The true machine, which a simulation knows.
+pub struct Truth {
+    map: SmoothMap,
+    flux_scale: f64,
+    resistance_ohm: f64,
+    inertia_kg_m2: f64,
+    pole_pairs: f64,
+    last_d_a: f64,
+}
+
+impl Truth {
+    /// Of the options.
+    ///
+    /// # Errors
+    /// A folder that cannot be read.
+    pub fn of(options: &Options, machine: &Machine, inertia_kg_m2: f64) -> Result<Self> {
+        let truth = options.own.plant.as_deref().map_or_else(|| Ok(machine.clone()), Machine::load)?;
+        let (parameters, plant) = (&truth.folder.parameters, options.plant());
+        Ok(Self {
+            map: SmoothMap::new(&truth.folder.map),
+            flux_scale: plant.flux_scale,
+            resistance_ohm: parameters.stator_resistance_ohm * plant.resistance_scale,
+            inertia_kg_m2,
+            pole_pairs: parameters.pole_pairs.into(),
+            last_d_a: truth.folder.map.id_a.last().copied().unwrap_or(0.0),
+        })
+    }
+
+    /// Flux linkages along d and q at a current in A, in Wb.
+    pub fn flux(&self, id_a: f64, iq_a: f64) -> (f64, f64) {
+        let at = self.map.at(id_a, iq_a);
+        (self.flux_scale * at.psi_d_wb, self.flux_scale * at.psi_q_wb)
+    }
+
+    /// Torque at a current in A, in N·m.
+    pub fn torque_nm(&self, id_a: f64, iq_a: f64) -> f64 {
+        let (psi_d, psi_q) = self.flux(id_a, iq_a);
+        1.5 * self.pole_pairs * (psi_d * iq_a - psi_q * id_a)
+    }
+}
+
+/// The outcome of an experiment.
+pub struct Outcome {
+    /// The fit.
+    pub fit: Fit,
+    /// Inertia, in kg·m².
+    pub inertia_kg_m2: f64,
+    /// Length of the pulses before the rotor turns, in s.
+    pub pulses_s: f64,
+    /// The largest current over the bound.
+    pub peak_share: f64,
+    /// The largest mechanical turn from the beginning until the rotor is to turn, in degrees.
+    pub turned_deg: f64,
+    /// Error of the flux linkage, root mean square, as a share of the largest within the circle that is judged.
+    pub flux_rms: f64,
+    /// The worst error, likewise.
+    pub flux_worst: f64,
+    /// Error of the magnets' flux linkage, as a share.
+    pub magnet_error: f64,
+    /// Error of the resistance, as a share.
+    pub resistance_error: f64,
+    /// Worst error of the torque along the map's own MTPA, as a share of the largest torque.
+    pub torque_worst: f64,
+    inertia_error: f64,
+}
+
+/// Radius of the circle in which flux linkages are judged, as a share of the bound: 200 A of 233 A.
+const JUDGED: f64 = 0.857;
+
+impl Outcome {
+    /// Of a recording.
+    ///
+    /// # Errors
+    /// Observations that do not tell the machine.
+    pub fn of(recording: &Recording, machine: &Machine, truth: &Truth) -> Result<Self> {
+        let parameters = &machine.folder.parameters;
+        let bound_a = parameters.max_current_a;
+        let observations = &recording.observations;
+        let fit = Fit::of(observations, bound_a, 0.5 / parameters.max_switching_hz)?;
+        let still = |observation: &&Observation| !matches!(observation.stage, Stage::Turn | Stage::Done);
+        let pulses_s = observations.iter().filter(still).map(|o| f64::from(o.length_s)).sum();
+        let peak_a = recording.rows.iter().map(|row| row.id_a.hypot(row.iq_a)).fold(0.0, f64::max);
+        let inertia_kg_m2 = inertia(observations, &fit, truth.pole_pairs);
+        let (flux_rms, flux_worst) = flux_errors(&fit, truth, bound_a);
+        let (magnet_wb, true_wb) = (fit.flux(0.0, 0.0).0, truth.flux(0.0, 0.0).0);
+        Ok(Self {
+            inertia_kg_m2,
+            pulses_s,
+            peak_share: peak_a / bound_a,
+            turned_deg: turned_deg(observations, truth.pole_pairs),
+            flux_rms,
+            flux_worst,
+            magnet_error: magnet_wb / true_wb - 1.0,
+            resistance_error: fit.resistance_ohm / truth.resistance_ohm - 1.0,
+            torque_worst: torque_error(&fit, truth, machine),
+            inertia_error: inertia_kg_m2 / truth.inertia_kg_m2 - 1.0,
+            fit,
+        })
+    }
+
+    /// Figures for the terminal and the page.
+    pub fn figures(&self) -> Figures {
+        let mut figures = Figures::default();
+        let percent = |share: f64| 100.0 * share;
+        let values = [
+            ("stator_resistance_ohm", self.fit.resistance_ohm),
+            ("dead_time_us", 1e6 * self.fit.dead_time_s),
+            ("magnet_flux_wb", self.fit.flux(0.0, 0.0).0),
+            ("rotor_inertia_kg_m2", self.inertia_kg_m2),
+            ("residual_mwb", 1e3 * self.fit.left_wb()),
+            ("pulses_s", self.pulses_s),
+            ("peak_current_percent_of_bound", percent(self.peak_share)),
+            ("turned_deg", self.turned_deg),
+            ("flux_error_rms_percent", percent(self.flux_rms)),
+            ("flux_error_worst_percent", percent(self.flux_worst)),
+            ("torque_error_at_mtpa_percent", percent(self.torque_worst)),
+            ("magnet_flux_error_percent", percent(self.magnet_error)),
+            ("stator_resistance_error_percent", percent(self.resistance_error)),
+            ("rotor_inertia_error_percent", percent(self.inertia_error)),
+        ];
+        values.iter().for_each(|(name, value)| figures.set(name, value));
+        figures
+    }
+
+    /// Draws the map beside the truth, and what is left of each boundary.
+    pub fn draw(&self, machine: &Machine, page: &mut Page) {
+        let most = machine.folder.parameters.max_current_a;
+        let along = |from: f64, to: f64| (0..=80).map(move |k| from + (to - from) * f64::from(k) / 80.0);
+        let shares = [0.0, 0.4, 0.8];
+        let of_d = shares.map(|share| {
+            let curve = along(-most, 0.2 * most).map(|id| (id, self.fit.flux(id, share * most).0)).collect();
+            (format!("iq = {:.3} A", share * most), curve)
+        });
+        page.draw_xy(None, "flux linkage along d over id", ("id in A", "Wb"), &of_d);
+        let of_q = shares.map(|share| {
+            let curve = along(0.0, most).map(|iq| (iq, self.fit.flux(-share * most, iq).1)).collect();
+            (format!("id = {:.3} A", -share * most), curve)
+        });
+        page.draw_xy(None, "flux linkage along q over iq", ("iq in A", "Wb"), &of_q);
+        let left = |axis: usize| -> Vec<(f64, f64)> {
+            let own = self.fit.residuals.iter().enumerate();
+            own.map(|(k, (_, pair))| (k as f64, 1e3 * pair[axis])).collect()
+        };
+        let series = [("along d".to_owned(), left(0)), ("along q".to_owned(), left(1))];
+        page.draw_xy(None, "left unexplained at each boundary", ("boundary", "mWb"), &series);
+    }
+}
+
+/// The largest mechanical turn from the beginning until the rotor is to turn, in degrees.
+fn turned_deg(observations: &[Observation], pole_pairs: f64) -> f64 {
+    let still = observations.iter().take_while(|o| o.stage != Stage::Turn);
+    let angles = turns(still.copied().collect::<Vec<_>>().as_slice());
+    angles.iter().fold(0.0_f64, |most, angle| most.max(angle.abs())) / pole_pairs * 360.0 / TAU
+}
+
+/// Electrical angle since the first boundary, in rad, however often it goes round.
+fn turns(observations: &[Observation]) -> Vec<f64> {
+    let mut sum = 0.0;
+    let mut angles = vec![0.0; usize::from(!observations.is_empty())];
+    for pair in observations.windows(2) {
+        let [a, b] = [pair[0].frame, pair[1].frame].map(|frame| (f64::from(frame.sin), f64::from(frame.cos)));
+        sum += (b.0 * a.1 - b.1 * a.0).atan2(b.1 * a.1 + b.0 * a.0);
+        angles.push(sum);
+    }
+    angles
+}
+
+/// Inertia, in kg·m²: the slope of the torque's impulse over the speed, where the rotor turns.
+fn inertia(observations: &[Observation], fit: &Fit, pole_pairs: f64) -> f64 {
+    let own: Vec<_> = observations.iter().filter(|o| o.stage == Stage::Turn).copied().collect();
+    let angles = turns(&own);
+    let torque_nm = |o: &Observation| {
+        let (id, iq) = (f64::from(o.current.d), f64::from(o.current.q));
+        let (psi_d, psi_q) = fit.flux(id, iq);
+        1.5 * pole_pairs * (psi_d * iq - psi_q * id)
+    };
+    let mut impulse = 0.0;
+    let mut points = Vec::new();
+    for k in 1..own.len() {
+        let length_s = f64::from(own[k].length_s);
+        let mean_nm = 0.5 * (torque_nm(&own[k]) + torque_nm(&own[k - 1]));
+        // The mean speed of a half stands in its middle.
+        points
+            .push((impulse + 0.5 * mean_nm * length_s, (angles[k] - angles[k - 1]) / length_s / pole_pairs));
+        impulse += mean_nm * length_s;
+    }
+    let count = points.len() as f64;
+    let mean =
+        points.iter().fold((0.0, 0.0), |sum, point| (sum.0 + point.0 / count, sum.1 + point.1 / count));
+    let (cross, square) = points.iter().fold((0.0, 0.0), |sum, point| {
+        let (x, y) = (point.0 - mean.0, point.1 - mean.1);
+        (sum.0 + x * y, sum.1 + x * x)
+    });
+    square / cross
+}
+
+/// Errors of the flux linkage within the circle, as shares of the largest there: root mean square, worst.
+fn flux_errors(fit: &Fit, truth: &Truth, bound_a: f64) -> (f64, f64) {
+    let (mut most, mut sum, mut worst, mut count) = (0.0_f64, 0.0, 0.0_f64, 0.0);
+    for d in -50..=50 {
+        for q in -50..=50 {
+            let (id, iq) = (0.02 * f64::from(d) * bound_a, 0.02 * f64::from(q) * bound_a);
+            if id.hypot(iq) > JUDGED * bound_a || id > truth.last_d_a.min(0.2 * bound_a) {
+                continue;
+            }
+            let (found, is) = (fit.flux(id, iq), truth.flux(id, iq));
+            let error = (found.0 - is.0).hypot(found.1 - is.1);
+            most = most.max(is.0.hypot(is.1));
+            worst = worst.max(error);
+            sum += error * error;
+            count += 1.0;
+        }
+    }
+    ((sum / count).sqrt() / most, worst / most)
+}
+
+/// Worst error of the torque along the map's own MTPA, as a share of the largest torque.
+fn torque_error(fit: &Fit, truth: &Truth, machine: &Machine) -> f64 {
+    const POINTS: u32 = 20;
+    let parameters = &machine.folder.parameters;
+    let smooth = SmoothMap::new(&fit.map(parameters.max_current_a));
+    let optimum = Optimum::of(&smooth, parameters.pole_pairs, parameters.max_current_a);
+    let most_nm = parameters.max_torque_nm.min(optimum.most_torque_nm());
+    let error = |k: u32| {
+        let wanted_nm = most_nm * f64::from(k) / f64::from(POINTS);
+        let (id, iq) = optimum.least_current(wanted_nm);
+        (truth.torque_nm(id, iq) - wanted_nm).abs() / parameters.max_torque_nm
+    };
+    (1..=POINTS).map(error).fold(0.0, f64::max)
+}

@@ -1,0 +1,47 @@
+//! `machine.toml` of an identified machine: the nameplate's keys, and what was found.
+
+use super::Outcome;
+use crate::folder::digits;
+use std::fmt::Write as _;
+use tractive_tablegen::{FluxMap, Optimum, Parameters, SmoothMap};
+
+/// The text. The largest torque is the nameplate's, or what the map gives within the largest current, whichever is less.
+pub fn of(outcome: &Outcome, map: &FluxMap, given: &Parameters) -> String {
+    let smooth = SmoothMap::new(map);
+    let reach_nm = Optimum::of(&smooth, given.pole_pairs, given.max_current_a).most_torque_nm();
+    // Below the generator's own rounding.
+    let within = digits((1.0 - 1e-6) * reach_nm);
+    let max_torque_nm = given.max_torque_nm.min(within);
+    let (resistance, inertia) = (digits(outcome.fit.resistance_ohm.max(0.0)), digits(outcome.inertia_kg_m2));
+    let keys: [(&str, f64, &str); 20] = [
+        ("pole_pairs", f64::from(given.pole_pairs), "given"),
+        ("stator_resistance_ohm", resistance, "identified"),
+        ("max_torque_nm", max_torque_nm, "given, as far as the map gives it"),
+        ("max_power_w", given.max_power_w, "given"),
+        ("max_current_a", given.max_current_a, "given"),
+        ("max_speed_rpm", given.max_speed_rpm, "given"),
+        ("rated_torque_nm", given.rated_torque_nm.min(max_torque_nm), "given"),
+        ("rated_speed_rpm", given.rated_speed_rpm, "given"),
+        ("dc_link_min_v", given.dc_link_min_v, "given"),
+        ("dc_link_nominal_v", given.dc_link_nominal_v, "given"),
+        ("dc_link_max_v", given.dc_link_max_v, "given"),
+        ("max_switching_hz", given.max_switching_hz, "given"),
+        ("trip_current_a", given.trip_current_a, "given"),
+        ("trip_dc_over_v", given.trip_dc_over_v, "given"),
+        ("trip_dc_under_v", given.trip_dc_under_v, "given"),
+        ("trip_speed_rpm", given.trip_speed_rpm, "given"),
+        ("torque_slew_nm_per_s", given.torque_slew_nm_per_s, "given"),
+        ("rotor_inertia_kg_m2", inertia, "identified"),
+        ("loss_rated_w", given.loss_rated_w, "given"),
+        ("loss_quadratic_fraction", given.loss_quadratic_fraction, "given"),
+    ];
+    let mut text = format!(
+        "# Made by: cargo rig identify\n# Currents and voltages of phases are peak values.\nname = {:?}\n\n",
+        given.name
+    );
+    for (key, value, from) in keys {
+        let pair = format!("{key} = {value}");
+        let _ = writeln!(text, "{pair:<40}# {from}");
+    }
+    text
+}
