@@ -9,13 +9,22 @@ impl Gains {
     /// # Errors
     /// The first scalar that does not.
     pub const fn check(&self) -> Result<(), Refused> {
-        let Self { carrier, pattern_rad_s, square_damping, observer, sixth_turn_rad, link_damping } = *self;
+        let Self {
+            carrier,
+            pattern_rad_s,
+            square_damping,
+            observer,
+            sixth_turn_rad,
+            resistance_from,
+            link_damping,
+        } = *self;
         within(&[
             Bound("gains.carrier", carrier, ABOVE_ZERO, 1.0),
             Bound("gains.pattern_rad_s", pattern_rad_s, ABOVE_ZERO, 1e4),
             Bound("gains.square_damping", square_damping, ABOVE_ZERO, 10.0),
             Bound("gains.observer", observer, ABOVE_ZERO, 0.5),
             Bound("gains.sixth_turn_rad", sixth_turn_rad, 0.0, 3.0),
+            Bound("gains.resistance_from", resistance_from, ABOVE_ZERO, 100.0),
             Bound("gains.link_damping", link_damping, 0.0, 10.0),
         ])
     }

@@ -221,7 +221,7 @@ impl ControlLaw for Controller {
             flux,
             omega,
             period_s,
-            largest_a: ratings.max_current_a,
+            from_a: law.gains.resistance_from * ratings.max_current_a,
             fastest: ratings.max_speed_rad_s * ratings.pole_pairs,
         });
         let way = (can_step, limits.filled && !limits.settled);

@@ -15,8 +15,6 @@ use crate::frames::{Dq, limit_magnitude};
 const FROM: f32 = 0.02;
 /// Bandwidth of the estimate, in rad/s.
 const BANDWIDTH_RAD_S: f32 = 5.0;
-/// Current i₀ that tells resistance and flux linkage apart, as a share of the largest.
-const RESISTANCE_FROM: f32 = 0.04;
 /// Error that is left alone: the usual error of a link sensor.
 const LEFT_ALONE: f32 = 0.01;
 /// Largest correction.
@@ -34,8 +32,8 @@ pub struct Input {
     pub omega: f32,
     /// The time, in s.
     pub period_s: f32,
-    /// Largest current, in A.
-    pub largest_a: f32,
+    /// Current i₀ that tells resistance and flux linkage apart, in A.
+    pub from_a: f32,
     /// Largest electrical angular speed, in rad/s.
     pub fastest: f32,
 }
@@ -74,11 +72,10 @@ impl MapError {
 
     /// A time with a mean disturbance.
     pub fn step(&mut self, input: &Input) {
-        let Input { disturbance, current, flux, omega, period_s, largest_a, fastest } = *input;
+        let Input { disturbance, current, flux, omega, period_s, from_a, fastest } = *input;
         if omega.abs() < FROM * fastest {
             return;
         }
-        let from_a = RESISTANCE_FROM * largest_a;
         let emf = flux.j();
         let [along_emf, along_current, both] =
             [(disturbance, emf), (disturbance, current), (emf, current)].map(|(a, b)| a.d * b.d + a.q * b.q);
@@ -112,7 +109,7 @@ mod tests {
                 flux: FLUX,
                 omega,
                 period_s: 1e-3,
-                largest_a: 250.0,
+                from_a: 10.0,
                 fastest: 1_500.0,
             });
         }

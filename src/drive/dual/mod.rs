@@ -77,7 +77,8 @@ impl Settings {
         Self {
             clock,
             carrier_ticks,
-            gains: Gains { carrier: 0.6, observer: 0.02, ..Gains::DEFAULT },
+            // Its dead time takes voltage along either motor's current, too: nothing tells that from an error of the flux linkage.
+            gains: Gains { carrier: 0.6, observer: 0.02, resistance_from: 100.0, ..Gains::DEFAULT },
             speed: SpeedDesign { inertia_kg_m2: 0.1, natural_rad_s: 280.0, period_s },
             link,
             link_gains: link.gains(),
