@@ -197,7 +197,7 @@ fn a_wrong_map_is_noticed() {
         }
     }
     for percent in [10, -10] {
-        for scenario in ["restart", "reversal", "link-steps", "load-steps", "mode-borders"] {
+        for scenario in ["restart", "reversal", "link-steps", "load-steps", "mode-borders --speed 2200"] {
             keeps_its_bounds(&format!("{scenario} --map-error {percent}"));
         }
     }

@@ -20,7 +20,7 @@ use tractive_rig::trace::{Recorded, Recording};
 
 /// The paper's modes and that one.
 const WITH_MID5: Ladder =
-    Ladder::of(&[Mode::Async, Mode::Sync15, Mode::Sync12, Mode::Mid7, Mode::Mid5, Mode::Mid3, Mode::Square]);
+    Ladder::of(&[Mode::Sync15, Mode::Sync12, Mode::Mid7, Mode::Mid5, Mode::Mid3, Mode::Square]);
 
 const LEAD_S: f64 = 0.1;
 /// Up, and down again.

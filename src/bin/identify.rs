@@ -20,5 +20,9 @@ use tractive::board::qemu;
 mod law;
 
 #[cfg(all(target_os = "none", feature = "qemu"))]
+#[path = "../firmware/paper_patterns.rs"]
+mod patterns;
+
+#[cfg(all(target_os = "none", feature = "qemu"))]
 #[path = "../firmware/pmasynrm.rs"]
 mod firmware;

@@ -22,9 +22,7 @@ pub fn connect() -> Setup {
 pub const SET_UP: Option<fn(&mut ControlTask<BuiltIn, Law>)> = None;
 
 /// Its words for the host at the end of a control interrupt, beside the report: the newest observation.
-pub const TELL: Option<fn(&mut ControlTask<BuiltIn, Law>, Instant)> = Some(tell);
-
-fn tell(task: &mut ControlTask<BuiltIn, Law>, now: Instant) {
+pub fn tell(task: &mut ControlTask<BuiltIn, Law>, now: Instant) {
     if let Some(observation) = task.law_mut().take() {
         qemu::exchange::observed(now, &observation);
     }

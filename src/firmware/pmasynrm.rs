@@ -94,9 +94,7 @@ fn TIMER0() {
     }
     let now = TASK.next_call();
     TASK.run(&mut board, &SHARED);
-    if let Some(tell) = law::TELL {
-        tell(TASK, now);
-    }
+    law::tell(TASK, now);
 }
 
 /// Deadline: the next carrier boundary, where the shadow registers take over.

@@ -189,8 +189,8 @@ impl ControlLaw for Controller {
             demand::Input { demand, window, udc_v, omega, flowing_nm: measured_nm, can_step, period_s };
         let demand_nm = self.demand.step(&shaping, ratings);
         let link = self.link.step(udc_v, period_s);
-        let depth = limits.depth_limit * limits.steady_share;
-        let limit = VoltageLimit { udc_v: link.slow_v / scale, depth, filled: limits.filled };
+        let most = limits.depth_limit * limits.steady_share;
+        let limit = VoltageLimit { udc_v: link.slow_v / scale, depth: most, filled: limits.filled };
         let trim_nm = self.trim.trim_nm(demand_nm, limits.ripple_share, ratings.max_torque_nm);
         let damping_nm = swing.map_or(0.0, |swing| {
             swing.damping_nm(law.gains.link_damping, demand_nm, omega, ratings.max_torque_nm)
@@ -202,6 +202,9 @@ impl ControlLaw for Controller {
             (demand_nm + more_nm, demand_nm + damping_nm)
         };
         let point = operating_point(trimmed_nm / scale, omega, &limit, tables);
+        let depth = point.depth
+            * swing.map_or(link.slow_v / self.link.lowest_v(), |swing| link.slow_v * swing.per_slow_v)
+            - DEPTH_PER_TORQUE / ratings.max_torque_nm * more_nm;
         let limited = point.region == Region::Limit;
         let given_nm = if limited { nearer_zero(point.torque_nm * scale, demand_nm) } else { demand_nm };
         self.trim.step(&torque_trim::Input {
@@ -213,6 +216,15 @@ impl ControlLaw for Controller {
             largest_nm: ratings.max_torque_nm,
             period_s,
         });
+        let way = (can_step, limits.filled && !limits.settled);
+        self.target = Target {
+            torque_nm: if limited || swing.is_none() { given_nm } else { damped_nm },
+            current: point.current,
+            flux: self.path.step(point.flux, way, omega, period_s),
+            region: point.region,
+            depth,
+            voltage_limit_v: limits.depth_limit * six_step_v(link.usable_v),
+        };
         let OperatingPoint { current, flux, .. } = point;
         let disturbance = self.disturbance.mean();
         self.map_error.step(&map_error::Input {
@@ -224,16 +236,6 @@ impl ControlLaw for Controller {
             from_a: law.gains.resistance_from * ratings.max_current_a,
             fastest: ratings.max_speed_rad_s * ratings.pole_pairs,
         });
-        let way = (can_step, limits.filled && !limits.settled);
-        self.target = Target {
-            torque_nm: if limited || swing.is_none() { given_nm } else { damped_nm },
-            current: point.current,
-            flux: self.path.step(point.flux, way, omega, period_s),
-            region: point.region,
-            depth: point.depth * swing.map_or(1.0, |swing| link.slow_v * swing.per_slow_v)
-                - DEPTH_PER_TORQUE / ratings.max_torque_nm * more_nm,
-            voltage_limit_v: limits.depth_limit * six_step_v(link.usable_v),
-        };
     }
 
     #[inline(always)]

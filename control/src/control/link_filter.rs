@@ -1,6 +1,7 @@
 //! The DC link, as the operating point sees it.
 //!
-//! Operating point and mode follow the link slowly: a rectifier's ripple must neither shake the one nor toggle the other. What the modulator
+//! Operating point and mode follow the link slowly: a rectifier's ripple must neither shake the one nor toggle the other. Slow ripple
+//! passes: so the mode follows the link down at once, and up in many periods of the slowest ripple. What the modulator
 //! divides by is the link as it is. Square wave divides by nothing: there a link that jumps up would throw the flux outward at
 //! once, so until the operating point has followed, no more is made of the link than before.
 
@@ -11,12 +12,17 @@ const LINK_RAD_S: f32 = 100.0;
 /// takes the other.
 const JUMPED: (f32, f32) = (1.04, 1.015);
 
+/// Rate at which the lowest link is left, in rad/s: a tenth in a period of the 33 Hz that a line of 16.7 Hz puts on the link.
+const LOWEST_RAD_S: f32 = 3.5;
+
 #[derive(Clone, Copy, Debug)]
 pub struct LinkFilter {
     /// In V; `None` before the first step.
     slow_v: Option<f32>,
     /// The link over that, above which it has jumped.
     jump: f32,
+    /// The lowest slow value, in V.
+    lowest_v: f32,
 }
 
 /// The link, in V.
@@ -29,17 +35,25 @@ pub struct Link {
 
 impl LinkFilter {
     pub const fn new() -> Self {
-        Self { slow_v: None, jump: JUMPED.0 }
+        Self { slow_v: None, jump: JUMPED.0, lowest_v: f32::MAX }
     }
 
     /// One control period, with the link as it is measured.
+    #[inline(never)]
     pub fn step(&mut self, udc_v: f32, period_s: f32) -> Link {
         let before = self.slow_v.unwrap_or(udc_v);
         let slow_v = before + LINK_RAD_S * period_s * (udc_v - before);
         self.slow_v = Some(slow_v);
+        let rise_v = slow_v - self.lowest_v;
+        self.lowest_v = if rise_v < 0.0 { slow_v } else { self.lowest_v + LOWEST_RAD_S * period_s * rise_v };
         let (from, until) = JUMPED;
         let jumped = udc_v > self.jump * slow_v;
         self.jump = if jumped { until } else { from };
         Link { slow_v, usable_v: if jumped { slow_v } else { udc_v } }
+    }
+
+    /// The lowest link without its ripple, in V; left slowly.
+    pub const fn lowest_v(&self) -> f32 {
+        self.lowest_v
     }
 }

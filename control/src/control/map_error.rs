@@ -11,8 +11,8 @@
 
 use crate::frames::{Dq, limit_magnitude};
 
-/// Speed from which the disturbance tells something of the map, as a share of the largest: a twentieth of the reference machine's rated one.
-const FROM: f32 = 0.02;
+/// Speed from which the disturbance tells something of the map, as a share of the largest.
+const FROM: f32 = 0.015;
 /// Bandwidth of the estimate, in rad/s.
 const BANDWIDTH_RAD_S: f32 = 5.0;
 /// Error that is left alone: the usual error of a link sensor.
@@ -77,8 +77,9 @@ impl MapError {
             return;
         }
         let emf = flux.j();
-        let [along_emf, along_current, both] =
-            [(disturbance, emf), (disturbance, current), (emf, current)].map(|(a, b)| a.d * b.d + a.q * b.q);
+        let along_emf = disturbance.d * emf.d + disturbance.q * emf.q;
+        let along_current = disturbance.d * current.d + disturbance.q * current.q;
+        let both = emf.d * current.d + emf.q * current.q;
         let squared = current.squared() + from_a * from_a;
         let seen =
             (along_current * both - along_emf * squared) / (omega * (flux.squared() * squared - both * both));

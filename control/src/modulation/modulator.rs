@@ -198,7 +198,6 @@ impl Modulator {
     }
 
     fn switch_to(&mut self, start: Instant, mode: Mode, pulse: Angle) {
-        self.schedule.switched(start);
         let from = self.mode;
         self.next_half = first_half(from, mode, self.next_half, pulse);
         self.mode = mode;
@@ -206,6 +205,7 @@ impl Modulator {
         self.after_pattern = from.is_pattern() && mode.is_carrier();
         self.transition =
             if from.is_pattern() { PatternTransition::begun(self.zero_rad) } else { PatternTransition::DONE };
+        self.schedule.switched(start);
     }
 
     /// Modes of the two halves that follow half number `half` of the present mode.

@@ -1,9 +1,8 @@
 //! The choice of the mode, and the angles at which it may change.
 //!
 //! The modes of a ladder stand in a row; each border between two neighbours has a frequency and a modulation depth. Above
-//! either the drive goes up. It comes down when it has been below both, less a hysteresis, for a whole period of the
-//! slowest ripple that a line puts on the link: the choice does not follow ripple, and no two modes alternate faster than that.
-//! A switch waits for the end of a whole carrier at an angle where both modes' carriers end.
+//! either the drive goes up, below both, less a hysteresis, it comes down, and no sooner than a dwell time after
+//! the last switch. A switch waits for the end of a whole carrier at an angle where both modes' carriers end.
 
 use super::mode::{Regulation, Row};
 use super::{Mode, Reference, SwitchLimits};
@@ -29,40 +28,37 @@ impl Border {
     }
 }
 
-/// The modes that a drive uses, from the lowest frequency up: the asynchronous one and locked ones. It leaves each of them where that
+/// The locked modes that a drive uses above the asynchronous one, from the lowest frequency up. It leaves each of them where that
 /// mode's row says.
 #[derive(Clone, Copy, Debug)]
 pub struct Ladder(&'static [Mode]);
 
 impl Ladder {
     /// The paper's modes.
-    pub const PAPER: Self =
-        Self::of(&[Mode::Async, Mode::Sync15, Mode::Sync12, Mode::Mid7, Mode::Mid3, Mode::Square]);
+    pub const PAPER: Self = Self::of(&[Mode::Sync15, Mode::Sync12, Mode::Mid7, Mode::Mid3, Mode::Square]);
 
     /// The optimised patterns.
     #[cfg(feature = "optimal")]
     pub const OPTIMAL: Self = Self::of(&OPTIMAL_RUNGS);
 
-    /// Of these modes, of which the first is the asynchronous one.
-    pub const fn of(modes: &'static [Mode]) -> Self {
-        assert!(matches!(modes, [Mode::Async, ..]), "a ladder begins with the asynchronous mode");
-        Self(modes)
+    /// Of these modes; without one the asynchronous mode serves at every frequency.
+    pub const fn of(locked: &'static [Mode]) -> Self {
+        Self(locked)
     }
 
     /// The modes, from the lowest frequency up.
     pub fn modes(&self) -> impl Iterator<Item = Mode> {
-        self.0.iter().copied()
+        [Mode::Async].into_iter().chain(self.0.iter().copied())
     }
 }
 
-/// The asynchronous mode, the optimised patterns and square wave.
+/// The optimised patterns and square wave.
 #[cfg(feature = "optimal")]
-static OPTIMAL_RUNGS: [Mode; Mode::OPTIMAL.len() + 2] = {
-    let mut rungs = [Mode::Square; Mode::OPTIMAL.len() + 2];
-    rungs[0] = Mode::Async;
+static OPTIMAL_RUNGS: [Mode; Mode::OPTIMAL.len() + 1] = {
+    let mut rungs = [Mode::Square; Mode::OPTIMAL.len() + 1];
     let mut place = 0;
     while place < Mode::OPTIMAL.len() {
-        rungs[place + 1] = Mode::OPTIMAL[place];
+        rungs[place] = Mode::OPTIMAL[place];
         place += 1;
     }
     rungs
@@ -73,18 +69,15 @@ static OPTIMAL_RUNGS: [Mode; Mode::OPTIMAL.len() + 2] = {
 const DEPTH_ROOM: f32 = 0.002;
 const DEPTH_HYSTERESIS: f32 = 0.012;
 
-/// Shortest time between two switches, and the time for which a lower mode must have sufficed, in s: a period of the 33 Hz that a line of 16.7 Hz puts on the link, and a third more.
-const DWELL_S: f32 = 0.04;
+/// Shortest time between two switches of mode, in s.
+const DWELL_S: f32 = 0.03;
 
 /// The choice of mode.
 #[derive(Clone, Copy, Debug)]
 pub struct Schedule {
     ladder: Ladder,
     fixed: Option<Mode>,
-    /// The last switch, while the dwell time lasts.
-    switched: Option<Instant>,
-    /// The instant from which on lower modes have sufficed, and the highest place of those; none while the present one is needed.
-    lower: Option<(Instant, usize)>,
+    last_switch: Option<Instant>,
     dwell_ticks: i32,
 }
 
@@ -96,13 +89,7 @@ impl Schedule {
 
     /// The modes of a ladder, by frequency and modulation depth.
     pub const fn on(ladder: Ladder, clock: &Clock) -> Self {
-        Self {
-            ladder,
-            fixed: None,
-            switched: None,
-            lower: None,
-            dwell_ticks: (DWELL_S * clock.ticks_per_s) as i32,
-        }
+        Self { ladder, fixed: None, last_switch: None, dwell_ticks: (DWELL_S * clock.ticks_per_s) as i32 }
     }
 
     /// Always the same mode, wherever its pulses lead.
@@ -110,8 +97,8 @@ impl Schedule {
         Self { fixed: Some(mode), ..Self::new(clock) }
     }
 
-    /// The mode that this reference should have, given the present one. Out of rest an optimised pattern begins with one that can catch
-    /// the machine.
+    /// The mode that this reference should have, given the present one; the dwell time is respected. Out of rest an optimised pattern
+    /// begins with one that can catch the machine.
     #[cfg(feature = "optimal")]
     #[inline(never)]
     pub fn wanted(&mut self, now: Instant, mode: Mode, seen: &Reference, devices: &SwitchLimits) -> Mode {
@@ -124,60 +111,63 @@ impl Schedule {
         }
     }
 
-    /// The mode that this reference should have, given the present one.
+    /// The mode that this reference should have, given the present one; the dwell time is respected.
     #[cfg(not(feature = "optimal"))]
     #[inline(never)]
     pub fn wanted(&mut self, now: Instant, mode: Mode, seen: &Reference, devices: &SwitchLimits) -> Mode {
         self.ladders_choice(now, mode, seen, devices)
     }
 
-    /// The ladder's rung for this reference: a higher one at once, a lower one when it has sufficed for the dwell time; either no sooner
-    /// than that after the last switch.
+    /// The ladder's rung for this reference.
     #[inline(always)]
     fn ladders_choice(&mut self, now: Instant, mode: Mode, seen: &Reference, devices: &SwitchLimits) -> Mode {
         if let Some(fixed) = self.fixed {
             return fixed;
         }
-        let Ladder(rungs) = self.ladder;
-        let place = rungs.iter().position(|rung| *rung == mode).unwrap_or(0);
-        let chosen = self.chosen(place, seen, devices);
-        self.lower = (chosen < place).then(|| {
-            let (since, highest) = self.lower.unwrap_or((now, chosen));
-            (since, highest.max(chosen))
-        });
-        let dwells = |since: Option<Instant>| since.is_some_and(|since| now.since(since) < self.dwell_ticks);
-        let lower_since = self.lower.map(|(since, _)| since).filter(|_| reaches_down(mode, seen.depth));
-        if mode != Mode::Off && (dwells(self.switched) || dwells(lower_since)) {
-            return mode;
+        if let Some(last) = self.last_switch
+            && mode != Mode::Off
+        {
+            if (0..self.dwell_ticks).contains(&now.since(last)) {
+                return mode;
+            }
+            self.last_switch = None;
         }
-        self.switched = None;
-        let to = self.lower.map_or(chosen, |(_, highest)| highest);
-        rungs.get(to).copied().unwrap_or(Mode::Async)
-    }
-
-    /// The place on the ladder by this reference alone, from a place on it: up past every border that is passed, else down past those
-    /// that no longer are.
-    fn chosen(&self, place: usize, seen: &Reference, devices: &SwitchLimits) -> usize {
         let share = seen.rate * (2.0 / 4_294_967_296.0) * devices.shortest_half_ticks as f32;
+        let Ladder(rungs @ [lowest, ..]) = self.ladder else { return Mode::Async };
+        if share < pick(Mode::Async.row().until.shares, mode.carriers() > 0) {
+            return Mode::Async;
+        }
         let notch = shortest_notch(seen.rate, devices);
-        let passes = |below: &Mode, from_above: bool| {
+        let passes = |below: Mode, from_above: bool| {
             let row = below.row();
             share >= pick(row.until.shares, from_above) || seen.depth >= pick(reached(row, notch), from_above)
         };
-        if share < pick(Mode::Async.row().until.shares, place > 0) {
-            return 0;
+        // From where the drive stands: up past every border that is passed, else down past those that no longer are.
+        let place = rungs.iter().position(|rung| *rung == mode).unwrap_or(0);
+        let (lower, upper) = rungs.split_at_checked(place).unwrap_or((&[], rungs));
+        let mut wanted = *upper.first().unwrap_or(lowest);
+        for pair in upper.windows(2) {
+            let [below, above] = pair else { break };
+            if !passes(*below, false) {
+                break;
+            }
+            wanted = *above;
         }
-        let Ladder([borders @ .., _]) = self.ladder else { return 0 };
-        let (lower, upper) = borders.split_at_checked(place).unwrap_or((borders, &[]));
-        match upper.iter().take_while(|border| passes(border, false)).count() {
-            0 => place - lower.iter().rev().take_while(|border| !passes(border, true)).count(),
-            passed => place + passed,
+        if wanted != mode {
+            return wanted;
         }
+        for below in lower.iter().rev() {
+            if passes(*below, true) {
+                break;
+            }
+            wanted = *below;
+        }
+        wanted
     }
 
     /// Tells the schedule that the mode changed at this instant.
-    pub const fn switched(&mut self, now: Instant) {
-        (self.switched, self.lower) = (Some(now), None);
+    pub fn switched(&mut self, now: Instant) {
+        self.last_switch = Some(now);
     }
 }
 
@@ -193,22 +183,7 @@ fn reached(row: &Row, notch: f32) -> (f32, f32) {
         return row.until.depths;
     }
     let reach = row.largest - row.notch_sum * notch - DEPTH_ROOM;
-    if row.notch_sum > 0.0 && reach < row.until.depths.0 {
-        (reach, reach - DEPTH_HYSTERESIS)
-    } else {
-        row.until.depths
-    }
-}
-
-/// `true` unless so small a fundamental, as a share of six-step, lies below what a mode's pulses can make.
-#[inline(always)]
-fn reaches_down(mode: Mode, depth: f32) -> bool {
-    #[cfg(feature = "optimal")]
-    if let Some(branch) = mode.branch() {
-        return depth >= branch.first;
-    }
-    let _ = (mode, depth);
-    true
+    if reach < row.until.depths.0 { (reach, reach - DEPTH_HYSTERESIS) } else { row.until.depths }
 }
 
 /// Sine of half the shortest notch, with `rate` in angle units per tick: an angle of a few degrees.

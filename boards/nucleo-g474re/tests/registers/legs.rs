@@ -57,15 +57,7 @@ const ALL_OFF: [(bool, bool); 3] = [(false, false); 3];
 
 /// Halves of every mode, from the modulator itself, running up forward or backward.
 fn halves_of_all_modes(direction: f32) -> Vec<CarrierHalf> {
-    let ladder = Ladder::of(&[
-        Mode::Async,
-        Mode::Sync15,
-        Mode::Sync12,
-        Mode::Mid7,
-        Mode::Mid5,
-        Mode::Mid3,
-        Mode::Square,
-    ]);
+    let ladder = Ladder::of(&[Mode::Sync15, Mode::Sync12, Mode::Mid7, Mode::Mid5, Mode::Mid3, Mode::Square]);
     let mut modulator = Modulator::new(devices(), Schedule::on(ladder, &CLOCK));
     let mut found: Vec<CarrierHalf> = Vec::new();
     let mut start = Instant(0);
