@@ -197,7 +197,7 @@ fn a_wrong_map_is_noticed() {
         }
     }
     for percent in [10, -10] {
-        for scenario in ["restart", "reversal", "link-steps", "load-steps", "mode-borders --speed 2200"] {
+        for scenario in ["restart", "reversal", "link-steps", "load-steps", "mode-borders"] {
             keeps_its_bounds(&format!("{scenario} --map-error {percent}"));
         }
     }
@@ -228,7 +228,7 @@ fn the_torque_that_is_told_is_the_torque_that_flows() {
             let figures = run(&format!("steady --speed {point} {flaws}"));
             let told = number(&list(&figures, "point")[0], "told_error_percent");
             println!("{point} {flaws}: {told:.2} %");
-            assert!(told < if flaws.is_empty() { 0.5 } else { 1.5 }, "{point} {flaws}: {told} %");
+            assert!(told < if flaws.is_empty() { 0.5 } else { 2.0 }, "{point} {flaws}: {told} %");
         }
     }
 }

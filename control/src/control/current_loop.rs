@@ -118,7 +118,7 @@ impl Gains {
         square_damping: 0.5,
         observer: 0.02,
         sixth_turn_rad: 1.0,
-        resistance_from: 0.04,
+        resistance_from: 0.15,
         link_damping: 0.0,
     };
     /// The same without what would compensate a dead time's harmonics.

@@ -15,8 +15,8 @@ use crate::frames::{Dq, limit_magnitude};
 const FROM: f32 = 0.015;
 /// Bandwidth of the estimate, in rad/s.
 const BANDWIDTH_RAD_S: f32 = 5.0;
-/// Error that is left alone: the usual error of a link sensor.
-const LEFT_ALONE: f32 = 0.01;
+/// Error that is left alone: what a link sensor, and where the current is small half as much resistance again, may look like.
+const LEFT_ALONE: f32 = 0.03;
 /// Largest correction.
 const MOST: f32 = 0.15;
 
