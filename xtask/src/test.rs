@@ -178,9 +178,10 @@ fn perform(step: Step, setup: &mut Setup) -> Result<Outcome> {
 /// The lints on the target: packages, and their parts.
 fn on_target() -> Result<Vec<(String, &'static [&'static str])>> {
     const IMAGES: &[&str] = &["--lib", "--bins"];
-    let own: [(&str, &[&str]); 3] = [
+    let own: [(&str, &[&str]); 4] = [
         ("tractive", &["--lib", "--features", "defmt"]),
         ("tractive", &["--lib", "--bins", "--features", build::QEMU]),
+        ("tractive", &["--bin", "optimal", "--features", "qemu,optimal"]),
         ("tractive-fault-injector", IMAGES),
     ];
     let own = own.map(|(package, what)| (package.to_owned(), what));
