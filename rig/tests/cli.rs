@@ -169,8 +169,7 @@ fn a_machine_that_stands_has_its_torque() {
     let torque_nm = summary["figures"]["point"][0]["torque_nm"].as_f64().unwrap();
     assert!((torque_nm - 1235.0).abs() < 2.0, "{torque_nm}");
     for verdict in summary["figures"]["verdicts"].as_array().unwrap() {
-        let is_told = verdict["what"].as_str().unwrap().starts_with("torque that the drive tells");
-        assert_eq!(verdict["verdict"] == "pass", is_told, "{verdict}");
+        assert_ne!(verdict["verdict"], "pass", "{verdict}");
     }
 }
 

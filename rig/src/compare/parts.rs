@@ -4,10 +4,8 @@ use super::outcome::{Cell, Outcomes, cell, trips, verdict};
 use super::rows::{Plan, ROWS, words};
 use super::{Outcome, drive};
 use crate::machine::Machine;
-use crate::run::bar;
 use anyhow::{Context, Result};
-use rayon::prelude::*;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 /// The run that shows what damping is worth: constant power behind a choke.
 const BEHIND_CHOKE: &str = "steady --speed 1900 --torque 1200 --line 3,4,30";
@@ -91,15 +89,7 @@ pub fn parts() -> Result<Vec<PartRow>> {
             .flat_map(|line| ["--law tractive", less, "--law pi"].map(|more| format!("{line} {more}")))
             .collect::<Vec<_>>()
     };
-    let lines: BTreeSet<_> = plan.iter().flat_map(wanted).collect();
-    let bar = bar(lines.len() as u64, "parts [{bar:40}] {pos}/{len} {elapsed} (left {eta})");
-    let driven = lines.into_par_iter().map(|line| {
-        let outcome = drive(&line)?;
-        bar.inc(1);
-        Ok((line, outcome))
-    });
-    let driven = driven.collect::<Result<BTreeMap<_, _>>>()?;
-    bar.finish_and_clear();
+    let driven = drive(plan.iter().flat_map(wanted).collect())?;
     let machine = Machine::load("pmasynrm-180kw")?;
     let row = |(part, less, row): &(&'static str, &str, &'static Plan)| {
         let found = ["--law tractive", less, "--law pi"].map(|more| read(row, more, &driven, &machine));
