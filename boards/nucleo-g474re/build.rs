@@ -3,7 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::{env, fs};
-use tractive_tablegen::{InputError, MachineFolder, rust_source};
+use tractive::modulation::FREE_CARRIER_SHARE;
+use tractive_tablegen::{InputError, MachineFolder, Patterns, rust_source};
 
 #[allow(dead_code, reason = "the image's")]
 #[path = "src/dead_time.rs"]
@@ -77,14 +78,33 @@ fn images(out: &Path) -> Result<(), String> {
             println!("cargo:rerun-if-changed={}", read.display());
         }
         let told = |error: InputError| error.to_string();
-        let made = MachineFolder::read(&folder).map_err(told)?.tables();
+        let read = MachineFolder::read(&folder).map_err(told)?;
+        let carrier_share = if tables == "traction" { carrier_share(read.parameters.patterns)? } else { 1.0 };
+        let made = read.tables();
         let text = fs::read_to_string(&file).map_err(|error| format!("{}: {error}", file.display()))?;
-        let machine = power_stage::Machine { folder: &folder, tables: &made };
+        let machine = power_stage::Machine { folder: &folder, tables: &made, carrier_share };
         let constant = check(&file, &text, &machine).map_err(told)?;
         put(&out.join(format!("{tables}.rs")), &rust_source(&made, "tractive::machine"))?;
         put(&out.join(format!("{stage}.rs")), &constant)?;
     }
     Ok(())
+}
+
+/// Highest frequency of the free carrier, as a share of the switches'.
+///
+/// # Errors
+/// The image has the patterns that its feature says, and the machine does not ask for these.
+fn carrier_share(asked: Patterns) -> Result<f32, String> {
+    match (asked, env::var_os("CARGO_FEATURE_OPTIMAL").is_some()) {
+        (Patterns::Paper, false) => Ok(1.0),
+        (Patterns::Optimal, true) => Ok(FREE_CARRIER_SHARE),
+        (Patterns::Optimal, false) => {
+            Err("machine.toml: patterns: \"optimal\": the image needs the feature `optimal`".to_owned())
+        }
+        (Patterns::Paper, true) => {
+            Err("feature `optimal`: the machine.toml has no patterns = \"optimal\"".to_owned())
+        }
+    }
 }
 
 /// The linker looks into the workspace's root before it looks here, and there `memory.x` includes `board-memory.x`.

@@ -51,7 +51,7 @@ impl Needs {
     pub fn of_run(words: Vec<OsString>) -> Result<Self> {
         Ok(match catalogue::choose(words)? {
             Chosen::Traction(choice) => {
-                let patterns = choice.options.own.patterns.name();
+                let patterns = PatternsName::of(&choice.options.own, &choice.machine()?).name();
                 Self { patterns, ..Self::of(Traction::NAME, &choice.options) }
             }
             Chosen::Zs9(choice) => Self::of(Zs9::NAME, &choice.options),

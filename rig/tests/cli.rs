@@ -1,5 +1,6 @@
 //! The command line: what it refuses, and what it leaves behind.
 
+use std::path::Path;
 use std::process::{Command, Output, Stdio};
 use tractive::modulation::Mode;
 
@@ -140,6 +141,20 @@ fn the_scenario_is_found_wherever_it_stands() {
     refused_in_one_line("run --dt 1e-4 --down load-steps", &["--down", "load-steps"]);
     refused_in_one_line("needs run a/b", &["scenario a/b", "must be one of"]);
     refused("needs run --on moon", &["moon", "qemu"]);
+}
+
+#[test]
+fn a_machine_names_its_patterns() {
+    let folder = tempfile::tempdir().unwrap();
+    let given = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tables/pmasynrm-180kw");
+    std::fs::copy(given.join("flux_map.csv"), folder.path().join("flux_map.csv")).unwrap();
+    let keys = std::fs::read_to_string(given.join("machine.toml")).unwrap();
+    std::fs::write(folder.path().join("machine.toml"), keys + "\npatterns = \"optimal\"\n").unwrap();
+    for (more, patterns) in [("", "optimal"), ("--patterns paper", "paper")] {
+        let output = rig(&format!("needs run sweep --machine {} {more}", folder.path().display()));
+        let said: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        assert_eq!(said["patterns"], patterns, "{more}");
+    }
 }
 
 #[test]

@@ -33,7 +33,7 @@ pub use error::InputError;
 pub use input::read_bounded;
 pub use map::{FluxMap, line_of};
 pub use optimum::Optimum;
-pub use parameters::Parameters;
+pub use parameters::{Parameters, Patterns};
 pub use rust_source::rust_source;
 pub use smooth::{FluxPoint, SmoothMap};
 

@@ -21,22 +21,35 @@ macro_rules! parameters {
             pub pole_pairs: u32,
             $($(#[$of_must])* pub $must: f64,)*
             $($(#[$of_may])* pub $may: f64,)*
+            /// Pulse patterns above the free carrier; default the paper's.
+            pub patterns: Patterns,
             lines: BTreeMap<String, u64>,
         }
 
         const REQUIRED: &[&str] = &["name", "pole_pairs", $(stringify!($must)),*];
-        const OPTIONAL: &[&str] = &[$(stringify!($may)),*];
+        const OPTIONAL: &[&str] = &[$(stringify!($may),)* "patterns"];
 
         impl Keys<'_> {
             fn parameters(&self) -> Result<Parameters, InputError> {
                 let (name, pole_pairs) = (self.name()?, self.pole_pairs()?);
                 $(let $must = self.number(stringify!($must), $within, 0.0)?;)*
                 $(let $may = self.number(stringify!($may), $range, $default)?;)*
+                let patterns = self.patterns()?;
                 let lines = self.values.iter().map(|(key, value)| (key.clone(), value.line)).collect();
-                Ok(Parameters { name, pole_pairs, $($must,)* $($may,)* lines })
+                Ok(Parameters { name, pole_pairs, $($must,)* $($may,)* patterns, lines })
             }
         }
     };
+}
+
+/// The pulse patterns above the free carrier.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Patterns {
+    /// The paper's modes.
+    #[default]
+    Paper,
+    /// Optimised patterns of 15 to 3 pulses.
+    Optimal,
 }
 
 parameters! {
@@ -284,6 +297,15 @@ impl<'a> Keys<'a> {
                 Ok(name.to_string())
             }
             _ => Err(self.refuse("name", "a text in quotes that is not empty")),
+        }
+    }
+
+    fn patterns(&self) -> Result<Patterns, InputError> {
+        let Some(value) = self.values.get("patterns") else { return Ok(Patterns::default()) };
+        match &value.parsed {
+            DeValue::String(name) if name == "paper" => Ok(Patterns::Paper),
+            DeValue::String(name) if name == "optimal" => Ok(Patterns::Optimal),
+            _ => Err(self.refuse("patterns", "\"paper\" or \"optimal\"")),
         }
     }
 

@@ -4,6 +4,7 @@
 mod common;
 
 use common::{Folder, good_map, good_toml, toml_with};
+use tractive_tablegen::Patterns;
 
 /// The error of reading a folder with this `machine.toml`, without the folder's path.
 #[track_caller]
@@ -86,6 +87,18 @@ fn an_unknown_key() {
     assert!(text.starts_with(&begin), "{text}");
     let machine = good_toml() + "\n[limits]\nmax_torque_nm = 3.0\n";
     assert!(refusal(&machine).contains("limits: unknown key"));
+}
+
+#[test]
+fn patterns_that_there_are_not() {
+    let with = |patterns: &str| good_toml() + &format!("\npatterns = {patterns}\n");
+    for wrong in ["\"best\"", "7", "true"] {
+        let text = refusal(&with(wrong));
+        assert!(text.ends_with(&format!("patterns: {wrong}: must be \"paper\" or \"optimal\"")), "{text}");
+    }
+    let read = |toml: &str| Folder::new(toml, &good_map()).read().unwrap().parameters.patterns;
+    assert_eq!(read(&good_toml()), Patterns::Paper);
+    assert_eq!(read(&with("\"optimal\"")), Patterns::Optimal);
 }
 
 #[test]

@@ -7,6 +7,7 @@ pub use crate::workspace::{TARGET, cargo, cargo_with, root};
 use anyhow::{Context, Result, bail};
 use clap::ValueEnum;
 use std::ffi::OsString;
+use std::fs;
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
 
@@ -99,7 +100,20 @@ pub fn board_image(
     machine: Option<&OsString>,
 ) -> Result<PathBuf> {
     let name = system.image_on(board);
-    firmware(on_target(toolchain, &board.package, &name), &name, system, machine)
+    let mut command = on_target(toolchain, &board.package, &name);
+    if system == System::Traction && wants_optimal(machine, system)? {
+        command.args(["--features", OPTIMAL]);
+    }
+    firmware(command, &name, system, machine)
+}
+
+/// `true` for a machine whose `patterns` are "optimal"; all else in its file is the build script's to judge.
+fn wants_optimal(machine: Option<&OsString>, system: System) -> Result<bool> {
+    let machine = machine.map_or_else(|| system.machine().into(), OsString::clone);
+    let file = root().join("tables").join(machine).join("machine.toml");
+    let text = fs::read_to_string(&file).with_context(|| file.display().to_string())?;
+    let keys: toml::Table = toml::from_str(&text).with_context(|| file.display().to_string())?;
+    Ok(keys.get("patterns").and_then(toml::Value::as_str) == Some(OPTIMAL))
 }
 
 fn firmware(mut command: Command, name: &str, system: System, machine: Option<&OsString>) -> Result<PathBuf> {
@@ -211,6 +225,19 @@ mod tests {
                 assert!(script.contains(&pair), "{package}: {pair}");
             }
         }
+    }
+
+    #[test]
+    fn a_machine_says_whether_its_image_has_the_optimised_patterns() {
+        let folder = tempfile::tempdir().unwrap();
+        let machine = Some(folder.path().as_os_str().to_owned());
+        let wanted = |text: &str| {
+            fs::write(folder.path().join("machine.toml"), text).unwrap();
+            wants_optimal(machine.as_ref(), System::Traction).unwrap()
+        };
+        assert!(wanted("patterns = \"optimal\""));
+        assert!(!wanted("patterns = \"paper\"") && !wanted(""));
+        assert!(!wants_optimal(None, System::Traction).unwrap());
     }
 
     #[test]

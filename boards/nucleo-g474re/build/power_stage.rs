@@ -28,6 +28,8 @@ pub struct Machine<'a> {
     pub folder: &'a Path,
     /// The tables that the image will hold.
     pub tables: &'a Tables,
+    /// Highest frequency of the free carrier, as a share of the switches'.
+    pub carrier_share: f32,
 }
 
 /// The keys of the file.
@@ -91,7 +93,8 @@ pub fn traction(file: &Path, text: &str, machine: &Machine) -> Result<String, In
     let Some(behind) = stage.keys.behind_line_filter else {
         return Err(stage.refuse("behind_line_filter", "is missing".to_owned()));
     };
-    let settings = rates::settings(control_hz, min_pulse_ns, *dead_time_ns, ratings.max_switching_hz, behind);
+    let carrier_hz = machine.carrier_share * ratings.max_switching_hz;
+    let settings = rates::settings(control_hz, min_pulse_ns, *dead_time_ns, carrier_hz, behind);
     // The longest carrier half of a machine that switches slowly.
     let longest_ticks = settings.devices.shortest_half_ticks.saturating_mul(rates::CARRIER_RANGE);
     if longest_ticks > rates::LONGEST_HALF_TICKS {

@@ -26,6 +26,7 @@ pub mod half;
 pub mod hardware;
 pub mod legs;
 pub mod outputs;
+pub mod patterns;
 pub mod pins;
 mod ports;
 pub mod position;

@@ -85,7 +85,7 @@ mod firmware {
         let task = TASK.get_or_insert_with(|| {
             let settings = settings();
             let first = Instant(settings.devices.shortest_half_ticks);
-            PwmTask::new(BuiltIn, settings, first)
+            nucleo_g474re::patterns::chosen(PwmTask::new(BuiltIn, settings, first), &settings.clock)
         });
         if task.run(board, &SHARED) {
             PULSE.pwm_ran();

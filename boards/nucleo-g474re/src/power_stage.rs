@@ -1,6 +1,7 @@
 //! The power stage that is wired to the board: every scale and time of it, from `power_stage.toml`.
 
 use super::dead_time::DeadTime;
+use super::patterns;
 use super::rates;
 pub use super::rates::{CORE_HZ, cycles_to_ticks, ns_to_cycles};
 use super::start::StartError;
@@ -53,7 +54,8 @@ impl PowerStage {
     /// The PMaSynRM's settings with this stage and this machine.
     pub const fn settings(&self, ratings: &Ratings) -> Settings {
         let Self { control_hz, min_pulse_ns, dead_time_ns, behind_line_filter, .. } = *self;
-        rates::settings(control_hz, min_pulse_ns, dead_time_ns, ratings.max_switching_hz, behind_line_filter)
+        let carrier_hz = patterns::FREE_CARRIER_SHARE * ratings.max_switching_hz;
+        rates::settings(control_hz, min_pulse_ns, dead_time_ns, carrier_hz, behind_line_filter)
     }
 
     /// The dead time for the generator, never shorter than asked for; `None` if it cannot make one.

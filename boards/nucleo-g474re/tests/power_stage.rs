@@ -35,7 +35,7 @@ const ZS9: Delivered = Delivered {
 
 impl Delivered {
     fn check(&self, text: &str, tables: &Tables) -> Result<String, String> {
-        let machine = Machine { folder: Path::new("machine"), tables };
+        let machine = Machine { folder: Path::new("machine"), tables, carrier_share: 1.0 };
         (self.check)(Path::new(self.file), text, &machine).map_err(|error| error.to_string())
     }
 

@@ -119,6 +119,4 @@ pub use pattern_transition::TRANSITION_SECTORS;
 pub use reference::Reference;
 pub use ripple::{RippleFlux, ripple_share};
 pub use schedule::{Ladder, Schedule, depth_limit, first_half};
-#[cfg(feature = "optimal")]
-pub use switch_limits::FREE_CARRIER_SHARE;
-pub use switch_limits::SwitchLimits;
+pub use switch_limits::{FREE_CARRIER_SHARE, SwitchLimits};

@@ -4,7 +4,6 @@ use crate::time::Clock;
 
 /// Highest frequency of the free carrier, as a share of the switches', where an optimised pattern follows it: its first edges may come
 /// half a carrier early.
-#[cfg(feature = "optimal")]
 pub const FREE_CARRIER_SHARE: f32 = 0.99;
 
 /// Limits of the inverter's switches, which every pulse keeps.

@@ -53,6 +53,7 @@ use tractive::operator::{Line, LineTimes};
 use tractive::recorder::Recorder;
 use tractive::time::{Clock, Instant};
 use tractive::wire::{self, Setup};
+use tractive_tablegen::Patterns;
 
 /// The usual lead, in s.
 const LEAD_S: f64 = 0.1;
@@ -94,7 +95,21 @@ pub enum PatternsName {
     Optimal,
 }
 
+impl From<Patterns> for PatternsName {
+    fn from(patterns: Patterns) -> Self {
+        match patterns {
+            Patterns::Paper => Self::Paper,
+            Patterns::Optimal => Self::Optimal,
+        }
+    }
+}
+
 impl PatternsName {
+    /// The patterns of a run: those that its options name, else the machine's.
+    pub fn of(options: &TractionOptions, machine: &Machine) -> Self {
+        options.patterns.unwrap_or_else(|| machine.folder.parameters.patterns.into())
+    }
+
     /// As the modulator's schedule takes them.
     const fn ladder(self) -> Ladder {
         match self {
@@ -126,9 +141,9 @@ pub struct TractionOptions {
     /// With --law pi: the point whose inductances the first of the two passes of MTPA takes.
     #[arg(long, value_enum, default_value = "previous", value_name = "POINT")]
     pub mtpa_start: StartName,
-    /// The pulse patterns above the free carrier.
-    #[arg(long, value_enum, default_value = "paper")]
-    pub patterns: PatternsName,
+    /// The pulse patterns above the free carrier; without it those that machine.toml names, else the paper's.
+    #[arg(long, value_enum)]
+    pub patterns: Option<PatternsName>,
     /// A part of the project's own law to take away, to see what it buys; on the host.
     #[arg(long, value_enum, value_name = "PART")]
     pub ablate: Option<Part>,
@@ -257,7 +272,9 @@ impl System for Traction {
             ("--current-gain", options.own.current_gain, -50.0, 100.0),
             ("--udc-gain", options.own.udc_gain, -50.0, 100.0),
         ])?;
-        if (options.law, options.own.patterns, options.on) == (LawName::Pi, PatternsName::Optimal, On::Qemu) {
+        if (options.law, PatternsName::of(&options.own, machine), options.on)
+            == (LawName::Pi, PatternsName::Optimal, On::Qemu)
+        {
             bail!("--patterns optimal: no image with --law pi has them; --on host has");
         }
         if options.own.ablate.is_some() && (options.law == LawName::Pi || options.on == On::Qemu) {
@@ -413,7 +430,8 @@ fn setup(plan: &Plan, options: &Options, machine: &Machine, over_protocol: bool)
 fn devices(setup: &Setup, options: &Options, machine: &Machine) -> SwitchLimits {
     let Setup { control_ticks, min_pulse_ticks, dead_time_ticks, .. } = *setup;
     let clock = Clock { control_ticks, ..CLOCK };
-    let carrier_hz = options.own.patterns.free_carrier_share() * machine.tables.ratings.max_switching_hz;
+    let carrier_hz = PatternsName::of(&options.own, machine).free_carrier_share()
+        * machine.tables.ratings.max_switching_hz;
     SwitchLimits::new(min_pulse_ticks, dead_time_ticks, carrier_hz, &clock)
 }
 
@@ -436,7 +454,7 @@ fn tasks<'a, L: ControlLaw>(
     let line = setup.line.map(|times| Line::rated(ratings, times.precharge_s, times.discharge_s));
     let first = first_half_ticks(setup, options, machine);
     let tasks = Tasks::with_law(law, Instant(0), machine.tables, settings, first);
-    Ok(tasks.on(options.own.patterns.ladder()).operated_on(line))
+    Ok(tasks.on(PatternsName::of(&options.own, machine).ladder()).operated_on(line))
 }
 
 /// The true machine: the one that control knows, unless the options name another.

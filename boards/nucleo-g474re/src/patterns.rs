@@ -1,0 +1,23 @@
+//! The pulse patterns of the PMaSynRM's image: the paper's, or the optimised ones with the feature `optimal`, which a machine whose
+//! `patterns` are "optimal" needs.
+
+use tractive::drive::traction::PwmTask;
+use tractive::machine::Machine;
+use tractive::time::Clock;
+
+/// Highest frequency of the free carrier, as a share of the switches'.
+pub const FREE_CARRIER_SHARE: f32 =
+    if cfg!(feature = "optimal") { tractive::modulation::FREE_CARRIER_SHARE } else { 1.0 };
+
+/// A task with these patterns.
+#[cfg(feature = "optimal")]
+pub fn chosen<M: Machine>(task: PwmTask<M>, clock: &Clock) -> PwmTask<M> {
+    use tractive::modulation::{Ladder, Schedule};
+    task.scheduled(Schedule::on(Ladder::OPTIMAL, clock))
+}
+
+/// A task with these patterns.
+#[cfg(not(feature = "optimal"))]
+pub fn chosen<M: Machine>(task: PwmTask<M>, _clock: &Clock) -> PwmTask<M> {
+    task
+}
