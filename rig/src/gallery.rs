@@ -4,7 +4,7 @@ use crate::files::write_text;
 use crate::machine::Machine;
 use crate::options::positive;
 use crate::pictures::architecture::architecture;
-use crate::pictures::{chai, zs9};
+use crate::pictures::{chai, patterns, zs9};
 use crate::run::bar;
 use crate::scenario::catalogue::{of_traction, of_zs9};
 use crate::scenario::traction::characteristic;
@@ -149,7 +149,7 @@ impl Picture {
 use Source::{Drawn, Traction, Zs9};
 
 /// Every picture, in the papers' order.
-pub const PICTURES: [Picture; 32] = [
+pub const PICTURES: [Picture; 35] = [
     Picture::of("architecture", "Interrupts, cells, board and rig", Drawn(|_| architecture())),
     Picture::of("modes", "Line voltage of every mode", Drawn(|of| chai::modes::every_mode(&of.pmasynrm))),
     Picture::of("chai-1", "Current loci", Drawn(|of| chai::machine::loci(&of.pmasynrm))),
@@ -205,6 +205,17 @@ pub const PICTURES: [Picture; 32] = [
         "different-cycles",
         "Motors in different cycles",
         Zs9("zs9-cycle --second other --cruise 8", zs9::runs::cycle),
+    ),
+    Picture::of(
+        "optimal-pulses",
+        "Pulses of the optimised patterns",
+        Drawn(|of| patterns::every_pulse(&of.pmasynrm)),
+    ),
+    Picture::of("optimal-spectra", "Their spectra", Drawn(|of| patterns::every_spectrum(&of.pmasynrm))),
+    Picture::of(
+        "optimal-distortion",
+        "Their distortion beside that of the paper's modes",
+        Drawn(|of| patterns::every_distortion(&of.pmasynrm)),
     ),
 ];
 

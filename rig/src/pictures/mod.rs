@@ -7,5 +7,6 @@ pub mod chai;
 pub mod diagram;
 pub mod ink;
 mod loci;
+pub mod patterns;
 pub mod sheet;
 pub mod zs9;

@@ -48,7 +48,7 @@ pub fn strategy(recording: &Recording, machine: &Machine) -> Result<String> {
 }
 
 /// A mode's pulses for a share of six-step.
-fn pulses(machine: &Machine, mode: Mode, f1_hz: f64, share: f64) -> Result<Vec<LegEdge>> {
+pub fn pulses(machine: &Machine, mode: Mode, f1_hz: f64, share: f64) -> Result<Vec<LegEdge>> {
     let udc_v = machine.folder.parameters.dc_link_nominal_v;
     let wanted = Wanted {
         mode,
@@ -64,7 +64,7 @@ fn pulses(machine: &Machine, mode: Mode, f1_hz: f64, share: f64) -> Result<Vec<L
 }
 
 /// A leg's level over the pulse angle in degrees.
-fn level(edges: &[LegEdge], f1_hz: f64, leg: usize) -> Vec<Point> {
+pub fn level(edges: &[LegEdge], f1_hz: f64, leg: usize) -> Vec<Point> {
     let mut points: Vec<Point> = Vec::new();
     for (t_s, _, on) in edges.iter().filter(|(_, which, _)| *which == leg) {
         let degrees = 360.0 * f1_hz * t_s;
