@@ -118,6 +118,19 @@ impl Setup {
         find(PROGRAM).is_some()
     }
 
+    /// mdBook, which builds the guide: the one that is there, else one built for this project alone.
+    pub fn mdbook(&mut self) -> Option<PathBuf> {
+        const PROGRAM: &str = "mdbook";
+        let tools = root().join("target/tools");
+        let own = tools.join("bin").join(PROGRAM);
+        if find(PROGRAM).is_none() && !own.is_file() {
+            say(&format!("building {PROGRAM} (cargo install)"));
+            let install = ["install", "--locked", "--no-default-features", "--quiet", PROGRAM, "--root"];
+            quietly(cargo().args(install).arg(&tools));
+        }
+        find(PROGRAM).or_else(|| Some(own).filter(|own| own.is_file()))
+    }
+
     /// QEMU with the emulated board.
     pub fn qemu(&mut self) -> Result<PathBuf> {
         const PROGRAM: &str = "qemu-system-arm";

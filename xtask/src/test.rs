@@ -4,7 +4,7 @@ use crate::board::Board;
 use crate::build::{self, System, TARGET, cargo, cargo_with};
 use crate::cli::{TestArgs, TimingArgs};
 use crate::image;
-use crate::process::{find, processor_s, succeeds};
+use crate::process::{processor_s, succeeds};
 use crate::setup::Setup;
 use crate::step::Step;
 use anyhow::Result;
@@ -138,10 +138,12 @@ fn perform(step: Step, setup: &mut Setup) -> Result<Outcome> {
         Step::OwnBoard => crate::own_board::check(setup)?,
         Step::Publish => crate::publish::check()?,
         Step::Guide => crate::guide::run(build::root())?,
-        Step::Book if find("mdbook").is_none() => {
-            return Ok(Outcome::Skipped("mdbook is not installed (cargo install mdbook)".to_owned()));
+        Step::Book => {
+            let Some(mdbook) = setup.mdbook() else {
+                return Ok(Outcome::Skipped("mdbook is not installed (cargo install mdbook)".to_owned()));
+            };
+            succeeds(Command::new(mdbook).arg("build").arg(build::root().join("docs")))?
         }
-        Step::Book => succeeds(Command::new("mdbook").arg("build").arg(build::root().join("docs")))?,
         Step::Live => match crate::live::check(setup)? {
             Ok(good) => good,
             Err(missing) => return Ok(Outcome::Skipped(missing)),
