@@ -93,10 +93,12 @@ const FIRST_BOUND: f32 = 0.2;
 const WIDENING: f32 = 0.003;
 
 /// Current along d beside the pulses along q and of the turning rotor, as a share of the bound: no phase is without current for long. Beside
-/// the last pulses it goes to and fro between two shares, so many commands each way.
+/// the last pulses it goes to and fro between two shares. Ways in a command, at first and growing by as much with each command: no two ways
+/// take as long, so that pulses along q whose to and fro fits into one of them come elsewhere in the next.
 const HELD_D: f32 = -0.2;
 const SWEPT: [f32; 2] = [0.18, -0.93];
-const SWEEP_COMMANDS: u32 = 230;
+const SWEEPS: f32 = 1.0 / 265.0;
+const SWEEPS_GROWTH: f32 = 5.3e-7;
 
 /// Current that turns the rotor, as a share of the bound; speed where it ends, as a share of the largest, and as electrical radians a
 /// command; the most commands for it, and those of coasting.
@@ -238,10 +240,13 @@ impl Course {
 
     /// The slow sweep along d, as a share of the bound.
     fn swept(&self) -> f32 {
-        let place = self.commands % (2 * SWEEP_COMMANDS);
-        let way = if place < SWEEP_COMMANDS { place } else { 2 * SWEEP_COMMANDS - place };
+        let commands = self.commands as f32;
+        let ways = commands * (SWEEPS + 0.5 * SWEEPS_GROWTH * commands);
+        let whole = ways as u32;
+        let part = ways - whole as f32;
+        let way = if whole % 2 == 0 { part } else { 1.0 - part };
         let [first, last] = SWEPT;
-        first + (last - first) * way as f32 / SWEEP_COMMANDS as f32
+        first + (last - first) * way
     }
 
     /// Part of the way to a direct current.

@@ -15,7 +15,7 @@ pub use outcome::{Outcome, Truth};
 use crate::files::write_text;
 use crate::folder::{Contents, csv, write_folder};
 use crate::machine::Machine;
-use crate::options::positive;
+use crate::options::{not_negative, positive};
 use crate::report::{self, Page};
 use crate::scenario::System;
 use crate::scenario::traction::{Traction, TractionOptions, identification};
@@ -35,6 +35,9 @@ pub struct Identify {
     /// Inertia of the free rotor, in kg·m²; default the folder's.
     #[arg(long, value_name = "KG_M2", value_parser = positive, allow_negative_numbers = true)]
     pub inertia: Option<f64>,
+    /// From this time on a current sensor reads too much, in s: the fault ends the experiment.
+    #[arg(long, value_name = "SECONDS", value_parser = not_negative, allow_negative_numbers = true)]
+    pub fault_at: Option<f64>,
     /// The page to write; default target/tractive/identify-NAME.html.
     #[arg(long, value_name = "FILE.html")]
     pub page: Option<PathBuf>,
@@ -88,7 +91,8 @@ pub fn identified(
     Traction::check(options, &Map::new(), machine)?;
     let parameters = &machine.folder.parameters;
     let inertia = identify.inertia.unwrap_or(parameters.rotor_inertia_kg_m2);
-    let recording = identification::drive(options, machine, inertia)?;
+    let stand = identification::Stand { inertia_kg_m2: inertia, fault_at_s: identify.fault_at };
+    let recording = identification::drive(options, machine, &stand)?;
     if let Some(trip) = recording.trip() {
         return Ok(Err(trip));
     }
