@@ -30,7 +30,7 @@ enum Command {
         #[arg(hide = true, trailing_var_arg = true, allow_hyphen_values = true)]
         words: Vec<OsString>,
     },
-    /// The needs of `run` or `talk` for these words, as JSON, for whoever makes them ready.
+    /// The needs of `run`, `talk` or `identify` for these words, as JSON, for whoever makes them ready.
     #[command(hide = true, disable_help_flag = true)]
     Needs {
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
@@ -149,7 +149,8 @@ fn needs(words: Vec<OsString>) -> Result<ExitCode> {
     let needs = match Cli::try_parse_from(std::iter::once("tractive-rig".into()).chain(words))?.command {
         Command::Run { words } => Needs::of_run(words)?,
         Command::Talk(options) => Needs::of_talk(&options),
-        _ => anyhow::bail!("needs: must be followed by run or talk"),
+        Command::Identify(options) => Needs::of_identify(&options),
+        _ => anyhow::bail!("needs: must be followed by run, talk or identify"),
     };
     say!("{}", serde_json::to_string(&needs)?);
     Ok(ExitCode::SUCCESS)

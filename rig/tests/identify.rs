@@ -55,6 +55,20 @@ fn the_reference_machine_with_noise_dead_time_and_a_wrong_resistance() {
     assert!((found.inertia_kg_m2 / 3.0 - 1.0).abs() < 0.01, "{}", found.inertia_kg_m2);
 }
 
+/// Charged, enabled, stopped and told by frames, which have fewer bits than the rig's own words.
+#[test]
+fn commanded_over_the_protocol_as_a_board_is() {
+    let machine = Machine::load("pmasynrm-180kw").unwrap();
+    let found = outcome(&machine, &format!("{FLAWS} --over-protocol"));
+    keeps_its_place(&found);
+    assert!(found.flux_rms < 0.005 && found.flux_worst < 0.012, "{} {}", found.flux_rms, found.flux_worst);
+    assert!(found.torque_worst < 0.01, "{}", found.torque_worst);
+    assert!(found.magnet_error.abs() < 0.005, "{}", found.magnet_error);
+    let ended = identified(&parsed(&format!("{FLAWS} --over-protocol --fault-at 1.5")), &machine);
+    let ended = ended.unwrap().err().unwrap();
+    assert!(!ended.fault.is_empty() && !ended.value.is_empty(), "{ended:?}");
+}
+
 #[test]
 fn a_wrong_gain_of_link_or_currents_is_the_torques_error_and_no_more() {
     let machine = Machine::load("pmasynrm-180kw").unwrap();

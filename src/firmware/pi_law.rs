@@ -26,6 +26,9 @@ pub fn connect() -> Setup {
 /// Its set-up before the first interrupt's work.
 pub const SET_UP: Option<fn(&mut ControlTask<BuiltIn, Law>)> = Some(set_up);
 
+/// The idle loop's side of the board.
+pub use qemu::Idle;
+
 /// Its words for the host at the end of a control interrupt, beside the report: nothing.
 #[inline(always)]
 pub fn tell(_task: &mut ControlTask<BuiltIn, Law>, _now: Instant) {}

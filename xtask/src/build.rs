@@ -16,6 +16,9 @@ pub const QEMU: &str = "qemu";
 /// The PMaSynRM's image with the optimised pulse patterns.
 const OPTIMAL: &str = "optimal";
 
+/// The image that identifies its machine.
+const IDENTIFY: &str = "identify";
+
 /// The systems, each with an image of its own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum System {
@@ -82,6 +85,13 @@ pub fn pi_image(toolchain: &Toolchain, system: System, machine: Option<&OsString
     let mut command = on_target(toolchain, "tractive", system.pi_image());
     command.args(["--features", QEMU]);
     firmware(command, system.pi_image(), system, machine)
+}
+
+/// Builds the image that identifies its machine, likewise.
+pub fn identify_image(toolchain: &Toolchain, machine: Option<&OsString>) -> Result<PathBuf> {
+    let mut command = on_target(toolchain, "tractive", IDENTIFY);
+    command.args(["--features", QEMU]);
+    firmware(command, IDENTIFY, System::Traction, machine)
 }
 
 /// Builds the PMaSynRM's image with the optimised pulse patterns, likewise.

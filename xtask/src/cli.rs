@@ -23,6 +23,9 @@ pub enum Command {
     /// Set up what is missing, build, command the drive over the protocol
     #[command(disable_help_flag = true)]
     Talk(RunArgs),
+    /// Set up what is missing, build, identify a simulated machine by its own drive
+    #[command(disable_help_flag = true)]
+    Identify(RunArgs),
     /// Set up what is missing, run every check
     Test(TestArgs),
     /// Build the image and print what is in it

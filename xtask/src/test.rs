@@ -158,6 +158,7 @@ fn perform(step: Step, setup: &mut Setup) -> Result<Outcome> {
             command.env("TRACTIVE_PI_IMAGE", build::pi_image(&toolchain, System::Traction, None)?);
             command.env("TRACTIVE_ZS9_IMAGE", build::image(&toolchain, System::Zs9, None)?);
             command.env("TRACTIVE_ZS9_PI_IMAGE", build::pi_image(&toolchain, System::Zs9, None)?);
+            command.env("TRACTIVE_IDENTIFY_IMAGE", build::identify_image(&toolchain, None)?);
             succeeds(&mut command)?
         }
         Step::Timing => crate::timing::run(&TimingArgs::default())? == 0,

@@ -19,11 +19,12 @@
 mod course;
 mod inductance;
 mod observation;
+mod packed;
 mod pulses;
 
 use crate::control::{
-    AimInput, Boundary, Committed, ControlLaw, Law, ModeLimits, Regulated, RotorSample, SpeedTracker,
-    Target, VoltageVector,
+    AimInput, Boundary, Committed, ControlLaw, Law, ModeLimits, Regulated, RotorSample, SpeedTracker, Target,
+    VoltageVector,
 };
 use crate::frames::{AlphaBeta, Dq, SinCos, six_step_v};
 use crate::machine::Tables;
@@ -32,6 +33,7 @@ use course::{Course, Seen};
 use inductance::Inductance;
 
 pub use observation::{OBSERVATION_WORDS, Observation, Stage};
+pub use packed::{PACKED_WORDS, Packed, Units};
 
 /// Share of the largest voltage of a carrier that the experiment uses.
 const USED_SHARE: f32 = 0.95;

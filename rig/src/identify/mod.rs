@@ -4,11 +4,13 @@
 //! what they observe. What is known beforehand is what a nameplate tells: the keys of `machine.toml` but for resistance and inertia.
 
 mod basis;
+mod commander;
 mod fit;
 mod half;
 mod outcome;
 mod toml;
 
+pub use commander::{Commander, Ended};
 pub use fit::Fit;
 pub use outcome::{Outcome, Truth};
 
@@ -16,15 +18,18 @@ use crate::files::write_text;
 use crate::folder::{Contents, csv, write_folder};
 use crate::machine::Machine;
 use crate::options::{not_negative, positive};
+use crate::platform::can;
 use crate::report::{self, Page};
 use crate::scenario::System;
-use crate::scenario::traction::{Traction, TractionOptions, identification};
+use crate::scenario::traction::identification::{self, Stand};
+use crate::scenario::traction::{Traction, TractionOptions};
 use crate::trace::Recorded;
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use serde_json::Map;
 use std::path::PathBuf;
 use std::process::ExitCode;
+use tractive::identification::Units;
 
 /// The options of an identification.
 #[derive(Clone, Debug, Args)]
@@ -38,6 +43,15 @@ pub struct Identify {
     /// From this time on a current sensor reads too much, in s: the fault ends the experiment.
     #[arg(long, value_name = "SECONDS", value_parser = not_negative, allow_negative_numbers = true)]
     pub fault_at: Option<f64>,
+    /// Command the drive over the protocol, as a board is: charge, enable, stop, and gather what it has kept, frame by frame.
+    #[arg(long)]
+    pub over_protocol: bool,
+    /// With --over-protocol: a file for the frames, as candump logs them.
+    #[arg(long, value_name = "FILE", requires = "over_protocol")]
+    pub frames: Option<PathBuf>,
+    /// Identify the machine of a board on this CAN interface, for instance can0; on Linux.
+    #[arg(long, value_name = "INTERFACE", conflicts_with_all = ["over_protocol", "on", "fault_at", "inertia"])]
+    pub can: Option<String>,
     /// The page to write; default target/tractive/identify-NAME.html.
     #[arg(long, value_name = "FILE.html")]
     pub page: Option<PathBuf>,
@@ -54,13 +68,8 @@ pub fn command(identify: &Identify) -> Result<ExitCode> {
     let machine = Machine::load(identify.options.machine.as_deref().unwrap_or(Traction::MACHINE))?;
     let outcome = match identified(identify, &machine)? {
         Ok(outcome) => outcome,
-        Err(trip) => {
-            eprintln!(
-                "fault {}: {} (limit {}): nothing is written",
-                trip.fault.name(),
-                trip.value,
-                trip.limit
-            );
+        Err(Ended { fault, value, limit }) => {
+            eprintln!("fault {fault}: {value} (limit {limit}): nothing is written");
             return Ok(ExitCode::from(1));
         }
     };
@@ -83,21 +92,54 @@ pub fn command(identify: &Identify) -> Result<ExitCode> {
 ///
 /// # Errors
 /// As [`command`].
-pub fn identified(
-    identify: &Identify,
-    machine: &Machine,
-) -> Result<std::result::Result<Outcome, tractive::protection::Trip>> {
+pub fn identified(identify: &Identify, machine: &Machine) -> Result<std::result::Result<Outcome, Ended>> {
+    if let Some(interface) = &identify.can {
+        return on_bus(interface, machine);
+    }
     let options = &identify.options;
     Traction::check(options, &Map::new(), machine)?;
     let parameters = &machine.folder.parameters;
-    let inertia = identify.inertia.unwrap_or(parameters.rotor_inertia_kg_m2);
-    let stand = identification::Stand { inertia_kg_m2: inertia, fault_at_s: identify.fault_at };
-    let recording = identification::drive(options, machine, &stand)?;
-    if let Some(trip) = recording.trip() {
-        return Ok(Err(trip));
-    }
-    let truth = Truth::of(options, machine, inertia)?;
-    Outcome::of(&recording, machine, &truth).map(Ok)
+    let inertia_kg_m2 = identify.inertia.unwrap_or(parameters.rotor_inertia_kg_m2);
+    let stand = Stand { inertia_kg_m2, fault_at_s: identify.fault_at };
+    let (recording, observed) = if identify.over_protocol {
+        let mut commander = Commander::new(Units::of(&machine.tables.ratings));
+        let recording = identification::drive_commanded(options, machine, &stand, &mut commander)?;
+        if let Some(log) = &identify.frames {
+            write_text(log, &commander.frames)?;
+        }
+        (recording, commander.finish())
+    } else {
+        let mut recording = identification::drive(options, machine, &stand)?;
+        let observed = match recording.trip() {
+            Some(trip) => Err(Ended {
+                fault: trip.fault.name().to_owned(),
+                value: trip.value.to_string(),
+                limit: trip.limit.to_string(),
+            }),
+            None => Ok(std::mem::take(&mut recording.observations)),
+        };
+        (recording, observed)
+    };
+    let observations = match observed {
+        Ok(observations) => observations,
+        Err(ended) => return Ok(Err(ended)),
+    };
+    let peak_a = recording.rows.iter().map(|row| row.id_a.hypot(row.iq_a)).fold(0.0, f64::max);
+    let truth = Truth::of(options, machine, inertia_kg_m2)?;
+    Outcome::of(&observations, peak_a, machine, Some(&truth)).map(Ok)
+}
+
+/// The same of a drive on a CAN bus, whose truth nobody knows.
+fn on_bus(interface: &str, machine: &Machine) -> Result<std::result::Result<Outcome, Ended>> {
+    let mut commander = Commander::new(Units::of(&machine.tables.ratings));
+    can::drive(interface, &mut commander)?;
+    let observations = match commander.finish() {
+        Ok(observations) => observations,
+        Err(ended) => return Ok(Err(ended)),
+    };
+    let currents = observations.iter().map(|observation| observation.current.length());
+    let peak_a = currents.fold(0.0, f32::max);
+    Outcome::of(&observations, peak_a.into(), machine, None).map(Ok)
 }
 
 /// The machine folder of an outcome.

@@ -5,7 +5,7 @@ mod listener;
 mod outcome;
 mod page;
 pub mod script;
-mod sender;
+pub mod sender;
 mod supervisor;
 mod system;
 

@@ -6,6 +6,7 @@ use crate::without::Ablation;
 use anyhow::Result;
 use tractive::control::{ControlLaw, Controller};
 use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
+use tractive::experiment::{Memory, Teller};
 use tractive::frames::Abc;
 use tractive::machine::{Ratings, Tables};
 use tractive::modulation::{CarrierHalf, Ladder, Schedule};
@@ -31,6 +32,8 @@ struct Port<'a, 'w> {
 struct Wire<'w> {
     station: CanEndpoint,
     supervisor: &'w mut dyn Supervisor,
+    /// The frames of an identification, where the drive's leave room.
+    teller: Option<(Teller, &'w Memory)>,
 }
 
 impl Port<'_, '_> {
@@ -119,7 +122,9 @@ impl OperatorPort for Port<'_, '_> {
             self.error = Some(error.into());
         }
         let Some(wire) = &mut self.wire else { return };
-        if let Some(frame) = wire.station.tell(status, report) {
+        let more = wire.teller.as_mut();
+        let own = wire.station.tell(status, report);
+        if let Some(frame) = own.or_else(|| more.and_then(|(teller, memory)| teller.tell(memory))) {
             wire.supervisor.hear(self.bench.instant_s(from), &frame);
         }
     }
@@ -187,7 +192,15 @@ impl<'a, L: ControlLaw> Tasks<'a, L> {
     /// The same commanded over the protocol, if there is a supervisor.
     pub fn commanded_by(mut self, supervisor: Option<&'a mut (dyn Supervisor + '_)>) -> Self {
         let station = CanEndpoint::new(self.operator.ratings);
-        self.wire = supervisor.map(|supervisor| Wire { station, supervisor });
+        self.wire = supervisor.map(|supervisor| Wire { station, supervisor, teller: None });
+        self
+    }
+
+    /// The same with the frames of what an identification keeps.
+    pub fn telling(mut self, memory: &'a Memory) -> Self {
+        if let Some(wire) = &mut self.wire {
+            wire.teller = Some((Teller::new(), memory));
+        }
         self
     }
 

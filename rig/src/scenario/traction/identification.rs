@@ -1,7 +1,7 @@
 //! The identification of a machine, driven: the firmware's own law on the bench, or its image in QEMU.
 
-use super::{Options, PatternsName, Plan, STEP_S, bench, setup, tasks, truth};
-use crate::bench::Bench;
+use super::{Options, PatternsName, Plan, STEP_S, bench, scaled_link, setup, tasks, truth};
+use crate::bench::{Bench, LinePlan};
 use crate::inject::Injection;
 use crate::inject::sensor::CurrentFault;
 use crate::inject::traction::Kind;
@@ -10,11 +10,13 @@ use crate::machine::Machine;
 use crate::options::On;
 use crate::plant::SpeedSource;
 use crate::run::traction::{Tasks, run_in_qemu};
-use crate::run::{self, Interrupts};
+use crate::run::{self, Interrupts, Supervisor};
 use crate::trace::Recording;
 use anyhow::{Result, bail};
 use tractive::control::Demand;
-use tractive::identification::Identification;
+use tractive::experiment::Memory;
+use tractive::identification::{Identification, Units};
+use tractive::operator;
 use tractive::recorder::Recorder;
 use tractive::time::Instant;
 use tractive::wire;
@@ -22,6 +24,9 @@ use tractive::wire;
 /// The longest experiment, in carrier halves; and in s.
 const MOST_HALVES: f64 = 12_000.0;
 const LEAST_S: f64 = 1.0;
+/// The longest experiment over the protocol, with all its frames, in s; and the step of its trace.
+const COMMANDED_S: f64 = 600.0;
+const COMMANDED_STEP_S: f64 = 1e-3;
 /// Time from a fault that is injected until the recording ends, in s.
 const AFTER_FAULT_S: f64 = 0.1;
 
@@ -32,6 +37,17 @@ pub struct Stand {
     pub inertia_kg_m2: f64,
     /// From this time on a current sensor reads too much by [`OFFSET`], in s.
     pub fault_at_s: Option<f64>,
+}
+
+impl Stand {
+    fn rotor(&self) -> SpeedSource {
+        SpeedSource::Inertia { inertia_kg_m2: self.inertia_kg_m2, load_nm: 0.0 }
+    }
+
+    fn injection(&self, machine: &Machine) -> Option<Injection<Kind>> {
+        let fault = CurrentFault::Offset(OFFSET * machine.folder.parameters.max_current_a);
+        self.fault_at_s.map(|at_s| Injection { kind: Kind::Current(0, fault), at_s })
+    }
 }
 
 /// Error of the sensor that fails, as a share of the machine's largest current.
@@ -63,20 +79,14 @@ fn check(options: &Options) -> Result<()> {
 /// # Errors
 /// Options that make no sense, or an emulator that does not do its part.
 pub fn drive(options: &Options, machine: &Machine, stand: &Stand) -> Result<Recording> {
-    check(options)?;
-    let mut options = options.clone();
-    options.own.uncompensated = true;
-    let options = &options;
+    let options = &uncompensated(options)?;
     let halves_s = 1.0 / (2.0 * machine.folder.parameters.max_switching_hz);
     let longest_s = LEAST_S + MOST_HALVES * halves_s;
     let duration_s = stand.fault_at_s.map_or(longest_s, |at_s| longest_s.min(at_s + AFTER_FAULT_S));
     let wanted = |_: f64| (Demand::default(), true);
     let plan = Plan {
-        speed: SpeedSource::Inertia { inertia_kg_m2: stand.inertia_kg_m2, load_nm: 0.0 },
-        injection: stand.fault_at_s.map(|at_s| {
-            let fault = CurrentFault::Offset(OFFSET * machine.folder.parameters.max_current_a);
-            Injection { kind: Kind::Current(0, fault), at_s }
-        }),
+        speed: stand.rotor(),
+        injection: stand.injection(machine),
         judged_step_s: STEP_S.min(halves_s),
         ..Plan::driven(0.0, duration_s, Vec::new(), wanted)
     };
@@ -86,7 +96,7 @@ pub fn drive(options: &Options, machine: &Machine, stand: &Stand) -> Result<Reco
         On::Host => {
             let recorder = Recorder::new();
             let tasks = tasks(Identification::new(), &setup, options, machine)?.recorded_by(&recorder);
-            run::on_host("identify", bench, Identifying(tasks), |index| recorder.read(index))
+            run::on_host("identify", bench, Identifying { tasks, memory: None }, |index| recorder.read(index))
         }
         On::Qemu => {
             run_in_qemu("identify", bench, wire::setup_to_block(setup), &options.emulator(false)?, None)
@@ -94,25 +104,75 @@ pub fn drive(options: &Options, machine: &Machine, stand: &Stand) -> Result<Reco
     }
 }
 
-/// The drive's tasks, whose law tells the bench what it observes.
-struct Identifying<'a>(Tasks<'a, Identification>);
+/// Drives the experiment as a board is driven: from an empty link, commanded over the protocol, whose frames carry off what was observed.
+///
+/// # Errors
+/// As [`drive`], and those of the supervisor.
+pub fn drive_commanded(
+    options: &Options,
+    machine: &Machine,
+    stand: &Stand,
+    supervisor: &mut dyn Supervisor,
+) -> Result<Recording> {
+    let options = &uncompensated(options)?;
+    let idle = operator::Request::idle(&machine.tables.ratings);
+    // The frames ask, not this.
+    let line = LinePlan::new(scaled_link(machine), Box::new(move |_| idle));
+    let plan = Plan {
+        speed: stand.rotor(),
+        injection: stand.injection(machine),
+        judged_step_s: options.dt.unwrap_or(COMMANDED_STEP_S),
+        ..Plan::operated(COMMANDED_S, Vec::new(), line)
+    };
+    let setup = setup(&plan, options, machine, true);
+    let bench = bench(plan, &setup, options, (machine, &truth(options, machine)?));
+    match options.on {
+        On::Host => {
+            let (recorder, memory) = (Recorder::new(), Box::new(Memory::new()));
+            let tasks = tasks(Identification::new(), &setup, options, machine)?.recorded_by(&recorder);
+            let tasks = tasks.commanded_by(Some(supervisor)).telling(&memory);
+            let kept = Some((&*memory, Units::of(&machine.tables.ratings)));
+            run::on_host("identify", bench, Identifying { tasks, memory: kept }, |index| recorder.read(index))
+        }
+        On::Qemu => {
+            let emulator = options.emulator(false)?;
+            run_in_qemu("identify", bench, wire::setup_to_block(setup), &emulator, Some(supervisor))
+        }
+    }
+}
+
+/// The options that hold: nothing compensates the dead time.
+fn uncompensated(options: &Options) -> Result<Options> {
+    check(options)?;
+    let mut options = options.clone();
+    options.own.uncompensated = true;
+    Ok(options)
+}
+
+/// The drive's tasks, whose law tells the bench what it observes, or keeps it for the protocol.
+struct Identifying<'a> {
+    tasks: Tasks<'a, Identification>,
+    memory: Option<(&'a Memory, Units)>,
+}
 
 impl Interrupts for Identifying<'_> {
     type Bench = Bench;
 
     fn next_calls(&self) -> [Instant; 2] {
-        self.0.next_calls()
+        self.tasks.next_calls()
     }
 
     fn pwm(&mut self, bench: &mut Bench) -> Result<()> {
-        self.0.pwm(bench)
+        self.tasks.pwm(bench)
     }
 
     fn control(&mut self, bench: &mut Bench) -> Result<()> {
-        let [now, _] = self.0.next_calls();
-        self.0.control(bench)?;
-        if let Some(observation) = self.0.law_mut().take() {
-            bench.identified(now, observation);
+        let [now, _] = self.next_calls();
+        self.tasks.control(bench)?;
+        match (self.tasks.law_mut().take(), &self.memory) {
+            (Some(observation), None) => bench.identified(now, observation),
+            (Some(observation), Some((memory, units))) => memory.keep(&observation, units),
+            (None, _) => {}
         }
         Ok(())
     }
