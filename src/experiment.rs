@@ -17,9 +17,14 @@ pub const OBSERVATIONS: usize = 6_800;
 pub struct Memory<const N: usize = OBSERVATIONS> {
     words: [[AtomicU32; PACKED_WORDS]; N],
     count: AtomicU32,
-    /// The stage of the newest.
+    /// The stage of the newest, from 1 on; 0 before the first.
     stage: AtomicU32,
+    /// Stage and count as they were when the slot began.
+    shown: AtomicU32,
 }
+
+/// Place of the stage in what is shown, above the count.
+const SHOWN_STAGE: u32 = 16;
 
 impl<const N: usize> Memory<N> {
     /// Before the first experiment.
@@ -28,14 +33,26 @@ impl<const N: usize> Memory<N> {
         Self {
             words: [const { [const { AtomicU32::new(0) }; PACKED_WORDS] }; N],
             count: AtomicU32::new(0),
-            stage: AtomicU32::new(Stage::Done as u32),
+            stage: AtomicU32::new(0),
+            shown: AtomicU32::new(0),
         }
     }
 
-    /// Control's side: the newest observation. The first of an experiment takes the place of the experiment before; of the end's there is
+    /// Control's side, at the end of each period: keeps the newest observation, if there is one, and shows what holds now where the period
+    /// begins a slot.
+    pub fn take(&self, newest: Option<&Observation>, units: &Units, begins_slot: bool) {
+        if let Some(observation) = newest {
+            self.keep(observation, units);
+        }
+        if begins_slot {
+            self.show();
+        }
+    }
+
+    /// Keeps an observation. The first of an experiment takes the place of the experiment before; of the end's there is
     /// one, and what finds no room is left out.
-    pub fn keep(&self, observation: &Observation, units: &Units) {
-        let before = self.stage();
+    fn keep(&self, observation: &Observation, units: &Units) {
+        let before = stage_of(self.stage.load(Ordering::Relaxed));
         let begins = observation.stage == Stage::Probe && before != Stage::Probe;
         if observation.stage == Stage::Done && before == Stage::Done {
             return;
@@ -48,32 +65,32 @@ impl<const N: usize> Memory<N> {
             }
             self.count.store(count + 1, Ordering::Release);
         }
-        self.stage.store(observation.stage as u32, Ordering::Release);
+        self.stage.store(observation.stage as u32 + 1, Ordering::Release);
     }
 
-    /// The stage of the newest observation.
-    pub fn stage(&self) -> Stage {
-        Stage::ALL.get(self.stage.load(Ordering::Acquire) as usize).copied().unwrap_or_default()
+    /// Shows what holds now: that is told in the slot, whenever the idle loop runs.
+    fn show(&self) {
+        let count = self.count.load(Ordering::Relaxed);
+        self.shown.store(self.stage.load(Ordering::Relaxed) << SHOWN_STAGE | count, Ordering::Release);
     }
 
-    /// Observations so far.
-    pub fn len(&self) -> u16 {
-        self.count.load(Ordering::Acquire) as u16
-    }
-
-    /// `true` before the first observation.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
+    /// The part of the experiment and the observations so far, as they were when the slot began.
+    pub fn told(&self) -> ExperimentFrame {
+        let shown = self.shown.load(Ordering::Acquire);
+        ExperimentFrame { stage: stage_of(shown >> SHOWN_STAGE), observations: shown as u16 }
     }
 
     /// A word of an observation.
     fn word(&self, index: u16, part: u8) -> Option<u32> {
-        if index >= self.len() {
-            return None;
-        }
         let word = self.words.get(usize::from(index))?.get(usize::from(part))?;
         Some(word.load(Ordering::Relaxed))
     }
+}
+
+/// The stage that is kept as its place from 1 on; [`Stage::Done`] before the first.
+fn stage_of(kept: u32) -> Stage {
+    let stage = kept.checked_sub(1).and_then(|place| Stage::ALL.get(place as usize));
+    stage.copied().unwrap_or(Stage::Done)
 }
 
 impl<const N: usize> Default for Memory<N> {
@@ -103,14 +120,13 @@ impl Teller {
     /// The frame for a free slot: progress, and once the experiment is over its observations, one after the other and again from the first.
     pub fn tell<const N: usize>(&mut self, memory: &Memory<N>) -> Option<Frame> {
         let [progress, observed] = &mut self.counters;
-        let stage = memory.stage();
+        let told = memory.told();
         let turn = self.calls;
         self.calls = (turn + 1) % PROGRESS_CALLS;
         if turn == 0 {
-            let content = ExperimentFrame { stage, observations: memory.len() };
-            return Some(EXPERIMENT.frame(content.encode(), progress));
+            return Some(EXPERIMENT.frame(told.encode(), progress));
         }
-        if stage != Stage::Done {
+        if told.stage != Stage::Done || told.observations == 0 {
             (self.index, self.part) = (0, 0);
             return None;
         }
@@ -119,7 +135,7 @@ impl Teller {
         self.part += 1;
         if usize::from(self.part) == PACKED_WORDS {
             let next = index + 1;
-            (self.index, self.part) = (if next < memory.len() { next } else { 0 }, 0);
+            (self.index, self.part) = (if next < told.observations { next } else { 0 }, 0);
         }
         Some(OBSERVATION.frame(content.encode(), observed))
     }
@@ -153,6 +169,7 @@ mod tests {
 
     /// Currents that so many frames tell, by their observations' numbers.
     fn told(teller: &mut Teller, memory: &Memory<4>, units: &Units, frames: u32) -> [Option<f32>; 4] {
+        memory.show();
         let mut words = [[None; PACKED_WORDS]; 4];
         for frame in (0..frames).filter_map(|_| teller.tell(memory)) {
             let payload = Payload(u64::from_le_bytes(frame.data));
@@ -178,7 +195,8 @@ mod tests {
         for _ in 0..9 {
             memory.keep(&observation(Stage::Done, 3.0), &units);
         }
-        assert_eq!(memory.len(), 3);
+        assert_eq!(told(&mut teller, &memory, &units, 0), [None; 4]);
+        assert_eq!(memory.told().observations, 3);
         for _ in 0..2 {
             let found = told(&mut teller, &memory, &units, 10);
             for (found, wanted) in found.into_iter().zip([1.0, 2.0, 3.0]) {
@@ -189,7 +207,8 @@ mod tests {
         // The next experiment takes its place, and what finds no room is left out.
         (0..6).for_each(|k| memory.keep(&observation(Stage::Probe, 10.0 + k as f32), &units));
         memory.keep(&observation(Stage::Done, 99.0), &units);
-        assert_eq!(memory.len(), 4);
+        memory.show();
+        assert_eq!(memory.told().observations, 4);
         let found = told(&mut teller, &memory, &units, 20);
         assert!(
             found

@@ -4,7 +4,7 @@
 use crate::qemu::{self, exchange};
 use core::sync::atomic::{AtomicBool, Ordering};
 use tractive::built_in::traction::{BUILT_IN, BuiltIn};
-use tractive::drive::traction::ControlTask;
+use tractive::drive::traction::{ControlTask, Shared};
 use tractive::experiment::{Memory, Teller};
 use tractive::identification::{Identification, Units};
 use tractive::operator::{Feedback, OperatorPort, Request, Status};
@@ -34,12 +34,12 @@ pub fn connect() -> Setup {
 /// Its set-up before the first interrupt's work: none.
 pub const SET_UP: Option<fn(&mut ControlTask<BuiltIn, Law>)> = None;
 
-/// Its words for the host at the end of a control interrupt, beside the report: the newest observation.
-pub fn tell(task: &mut ControlTask<BuiltIn, Law>, now: Instant) {
-    let Some(observation) = task.law_mut().take() else { return };
+/// Its words for the host at the end of a control interrupt, beside the report: the newest observation, unless it is kept.
+pub fn tell(task: &mut ControlTask<BuiltIn, Law>, shared: &Shared, now: Instant) {
+    let newest = task.law_mut().take();
     if OVER_PROTOCOL.load(Ordering::Relaxed) {
-        MEMORY.keep(&observation, &UNITS);
-    } else {
+        MEMORY.take(newest.as_ref(), &UNITS, shared.operator.has_told(now));
+    } else if let Some(observation) = newest {
         exchange::observed(now, &observation);
     }
 }

@@ -94,7 +94,7 @@ fn TIMER0() {
     }
     let now = TASK.next_call();
     TASK.run(&mut board, &SHARED);
-    law::tell(TASK, now);
+    law::tell(TASK, &SHARED, now);
 }
 
 /// Deadline: the next carrier boundary, where the shadow registers take over.

@@ -112,6 +112,12 @@ pub fn board_image(
     firmware(on_target(toolchain, &board.package, &name), &name, system, machine)
 }
 
+/// Builds the image that identifies its machine for a board of real hardware, likewise.
+pub fn identify_on(toolchain: &Toolchain, board: &Board, machine: Option<&OsString>) -> Result<PathBuf> {
+    let name = format!("{}-{IDENTIFY}", board.name);
+    firmware(on_target(toolchain, &board.package, &name), &name, System::Traction, machine)
+}
+
 fn firmware(mut command: Command, name: &str, system: System, machine: Option<&OsString>) -> Result<PathBuf> {
     command.envs(machine.map(|machine| (system.machine_variable(), machine)));
     executable(&mut command, name, machine.is_some()).context("the image was not built")

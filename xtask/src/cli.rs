@@ -85,6 +85,9 @@ pub struct FlashArgs {
     /// The system whose image it is
     #[arg(long, value_enum, default_value = "pmasynrm")]
     pub system: System,
+    /// The image that identifies its machine, in place of the drive's
+    #[arg(long, conflicts_with = "system")]
+    pub identify: bool,
     /// A folder of tables/, or the path of any machine folder [default: the system's own]
     #[arg(long, value_name = "NAME|PATH")]
     pub machine: Option<String>,

@@ -8,11 +8,13 @@ mod commander;
 mod fit;
 mod half;
 mod outcome;
+mod signs;
 mod toml;
 
 pub use commander::{Commander, Ended};
 pub use fit::Fit;
 pub use outcome::{Outcome, Truth};
+pub use signs::Signs;
 
 use crate::files::write_text;
 use crate::folder::{Contents, csv, write_folder};

@@ -1,6 +1,7 @@
 //! The outcome of an experiment, and how far it is from the truth.
 
 use super::fit::Fit;
+use super::signs::Signs;
 use crate::analysis::Figures;
 use crate::machine::Machine;
 use crate::report::Page;
@@ -74,6 +75,8 @@ pub struct Outcome {
     /// Worst error of the torque along the map's own MTPA, as a share of the largest torque.
     pub torque_worst: f64,
     inertia_error: f64,
+    /// Signs and zeros, as the observations tell them.
+    pub signs: Signs,
 }
 
 /// Radius of the circle in which flux linkages are judged, as a share of the bound: 200 A of 233 A.
@@ -109,6 +112,7 @@ impl Outcome {
             magnet_error: of(|fit, truth, _| fit.flux(0.0, 0.0).0 / truth.flux(0.0, 0.0).0 - 1.0),
             resistance_error: of(|fit, truth, _| fit.resistance_ohm / truth.resistance_ohm - 1.0),
             torque_worst: of(torque_error),
+            signs: Signs::of(observations, &fit, 0.5 / parameters.max_switching_hz),
             inertia_error: truth.map_or(f64::NAN, |truth| inertia_kg_m2 / truth.inertia_kg_m2 - 1.0),
             fit,
         })

@@ -141,7 +141,11 @@ pub struct Tasks<'a, L = Controller> {
     /// Over the protocol, if there is a supervisor.
     wire: Option<Wire<'a>>,
     without: Option<Ablation>,
+    after_control: Option<AfterControl<'a, L>>,
 }
+
+/// The work of an image with its law at the end of a control interrupt that began at the instant; `true` if that begins a slot.
+type AfterControl<'a, L> = Box<dyn FnMut(&mut L, Instant, bool) + 'a>;
 
 impl Tasks<'_> {
     /// Before their first interrupts.
@@ -180,7 +184,14 @@ impl<'a, L: ControlLaw> Tasks<'a, L> {
             clock: settings.clock,
             wire: None,
             without: None,
+            after_control: None,
         }
+    }
+
+    /// The same with something that is done at the end of each control interrupt.
+    pub fn doing(mut self, after_control: impl FnMut(&mut L, Instant, bool) + 'a) -> Self {
+        self.after_control = Some(Box::new(after_control));
+        self
     }
 
     /// The same with an operator who switches the line side, if the bench has one to ask.
@@ -259,7 +270,11 @@ impl<L: ControlLaw> Interrupts for Tasks<'_, L> {
         if self.control.wants_revision() {
             self.pwm.revise(&mut port, &self.shared);
         }
+        let now = self.control.next_call();
         self.control.run(&mut port, &self.shared);
+        if let Some(after_control) = &mut self.after_control {
+            after_control(self.control.law_mut(), now, self.shared.operator.has_told(now));
+        }
         // The idle loop goes on where the interrupt ends.
         if port.bench.is_operated() {
             self.slot.run(&self.shared.operator, &mut port, &operator, &self.clock);

@@ -96,7 +96,7 @@ pub fn drive(options: &Options, machine: &Machine, stand: &Stand) -> Result<Reco
         On::Host => {
             let recorder = Recorder::new();
             let tasks = tasks(Identification::new(), &setup, options, machine)?.recorded_by(&recorder);
-            run::on_host("identify", bench, Identifying { tasks, memory: None }, |index| recorder.read(index))
+            run::on_host("identify", bench, Identifying(tasks), |index| recorder.read(index))
         }
         On::Qemu => {
             run_in_qemu("identify", bench, wire::setup_to_block(setup), &options.emulator(false)?, None)
@@ -130,9 +130,12 @@ pub fn drive_commanded(
         On::Host => {
             let (recorder, memory) = (Recorder::new(), Box::new(Memory::new()));
             let tasks = tasks(Identification::new(), &setup, options, machine)?.recorded_by(&recorder);
-            let tasks = tasks.commanded_by(Some(supervisor)).telling(&memory);
-            let kept = Some((&*memory, Units::of(&machine.tables.ratings)));
-            run::on_host("identify", bench, Identifying { tasks, memory: kept }, |index| recorder.read(index))
+            let units = Units::of(&machine.tables.ratings);
+            let keep = |law: &mut Identification, _: Instant, begins_slot: bool| {
+                memory.take(law.take().as_ref(), &units, begins_slot);
+            };
+            let tasks = tasks.doing(keep).commanded_by(Some(supervisor)).telling(&memory);
+            run::on_host("identify", bench, tasks, |index| recorder.read(index))
         }
         On::Qemu => {
             let emulator = options.emulator(false)?;
@@ -149,30 +152,25 @@ fn uncompensated(options: &Options) -> Result<Options> {
     Ok(options)
 }
 
-/// The drive's tasks, whose law tells the bench what it observes, or keeps it for the protocol.
-struct Identifying<'a> {
-    tasks: Tasks<'a, Identification>,
-    memory: Option<(&'a Memory, Units)>,
-}
+/// The drive's tasks, whose law tells the bench what it observes.
+struct Identifying<'a>(Tasks<'a, Identification>);
 
 impl Interrupts for Identifying<'_> {
     type Bench = Bench;
 
     fn next_calls(&self) -> [Instant; 2] {
-        self.tasks.next_calls()
+        self.0.next_calls()
     }
 
     fn pwm(&mut self, bench: &mut Bench) -> Result<()> {
-        self.tasks.pwm(bench)
+        self.0.pwm(bench)
     }
 
     fn control(&mut self, bench: &mut Bench) -> Result<()> {
-        let [now, _] = self.next_calls();
-        self.tasks.control(bench)?;
-        match (self.tasks.law_mut().take(), &self.memory) {
-            (Some(observation), None) => bench.identified(now, observation),
-            (Some(observation), Some((memory, units))) => memory.keep(&observation, units),
-            (None, _) => {}
+        let [now, _] = self.0.next_calls();
+        self.0.control(bench)?;
+        if let Some(observation) = self.0.law_mut().take() {
+            bench.identified(now, observation);
         }
         Ok(())
     }
