@@ -37,22 +37,25 @@ fn from_the_wiring_to_the_first_torque() {
     assert!((found(&record, 1, "rotor_inertia_kg_m2") / 3.0 - 1.0).abs() < 0.01);
     let asked_nm = found(&record, 3, "torque_asked_nm");
     assert!((asked_nm - 0.05 * 1_235.0).abs() < 1.0, "{asked_nm}");
-    // (62 N·m for 0.3 s and their ramps) over 3 kg·m².
+    // 62 N·m for 0.2 s and two ramps of 0.1 s, over 3 kg·m².
     let speed_rpm = found(&record, 3, "speed_reached_rpm");
-    assert!((speed_rpm - 0.4 * asked_nm / 3.0 * 9.549).abs() < 0.2 * speed_rpm, "{speed_rpm}");
+    assert!((speed_rpm - 0.3 * asked_nm / 3.0 * 9.549).abs() < 0.05 * speed_rpm, "{speed_rpm}");
     assert!(place.path().join("found/flux_map.csv").is_file());
 }
 
+/// The rotor would turn away under currents that are not along d: the experiment ends before it has gone far.
 #[test]
-fn an_angle_whose_zero_is_off_is_told_and_nothing_turns_with_it() {
-    let place = tempfile::tempdir().unwrap();
-    let (code, said, record) = commissioned("--angle-error 10", place.path());
-    assert_eq!(code, 1, "{said}");
-    assert_eq!(steps(&record), [("wiring".to_owned(), true), ("identification".to_owned(), false)]);
-    assert!(!record["finished"].as_bool().unwrap());
-    let zero_deg = found(&record, 1, "angle_zero_deg");
-    assert!((zero_deg.abs() - 10.0).abs() < 4.0, "{zero_deg}");
-    assert!(!place.path().join("found").exists(), "no tables of a machine that was not found");
+fn an_angle_whose_zero_or_direction_is_wrong_is_told_and_nothing_turns_with_it() {
+    for words in ["--angle-error 15", "--angle-error -15", "--angle-error 60"] {
+        let place = tempfile::tempdir().unwrap();
+        let (code, said, record) = commissioned(words, place.path());
+        assert_eq!(code, 1, "{words}: {said}");
+        assert_eq!(steps(&record), [("wiring".to_owned(), true), ("identification".to_owned(), false)]);
+        assert!(!record["finished"].as_bool().unwrap());
+        let complaint = record["step"][1]["complaints"][0].as_str().unwrap();
+        assert!(complaint.starts_with("fault rotor_turned"), "{words}: {complaint}");
+        assert!(!place.path().join("found").exists(), "no tables of a machine that was not found");
+    }
 }
 
 #[test]

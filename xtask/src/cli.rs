@@ -72,6 +72,9 @@ pub struct TimingArgs {
     /// Take the numbers into docs/cost.md and sizes.toml
     #[arg(long)]
     pub write: bool,
+    /// Measure the image that identifies its machine instead, against the drive's budgets
+    #[arg(long, conflicts_with_all = ["json", "write", "profile"])]
+    pub identify: bool,
     /// Say where the instructions go: this many functions of each interrupt
     #[arg(long, value_name = "FUNCTIONS", num_args = 0..=1, default_missing_value = "20", conflicts_with = "json")]
     pub profile: Option<usize>,

@@ -7,37 +7,19 @@
 //!
 //! What each step found stands in a record, also where one has not passed; then the next ones are not done.
 
+mod options;
 mod record;
 mod steps;
 
+pub use options::Commission;
 pub use record::{Record, Step};
 
-use crate::identify::Identify;
 use crate::machine::Machine;
 use crate::scenario::System as _;
 use crate::scenario::traction::Traction;
 use anyhow::{Context, Result, bail};
-use clap::Args;
 use std::io::{BufRead, Write};
-use std::path::PathBuf;
 use std::process::ExitCode;
-
-/// The options of a commissioning.
-#[derive(Clone, Debug, Args)]
-pub struct Commission {
-    /// The drive and its bench; of `--machine` only its nameplate is known, `--out` is the machine folder that is made.
-    #[command(flatten)]
-    pub identify: Identify,
-    /// Go on from step to step without asking.
-    #[arg(long)]
-    pub yes: bool,
-    /// With --on qemu: the drive's image with the tables that were made, for the first torque.
-    #[arg(long, value_name = "FILE")]
-    pub drive_image: Option<PathBuf>,
-    /// The record to write; default the machine folder's name with -commissioning.toml.
-    #[arg(long, value_name = "FILE.toml")]
-    pub record: Option<PathBuf>,
-}
 
 /// Leads through the steps. Exit code 1 where one has not passed.
 ///
@@ -76,7 +58,7 @@ pub fn command(commission: &Commission) -> Result<ExitCode> {
     Ok(ExitCode::from(u8::from(!record.finished)))
 }
 
-/// Whether the person at the terminal is ready for a step.
+/// The answer of the person at the terminal: `true` if ready for a step.
 fn asked(step: &steps::Way) -> Result<bool> {
     crate::say!("\n{}\n{}", step.name, step.asks);
     eprint!("[Enter] to go on, q to stop: ");

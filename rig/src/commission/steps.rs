@@ -1,6 +1,7 @@
 //! The steps of a commissioning.
 
-use super::{Commission, Step};
+use super::options::Commission;
+use super::record::Step;
 use crate::folder::write_folder;
 use crate::identify::{Ended, Identify, contents, identified};
 use crate::machine::Machine;

@@ -140,7 +140,7 @@ impl Commander {
         (self.phase, self.since) = (phase, self.slot);
     }
 
-    /// What is due in this slot.
+    /// The work that is due in this slot.
     fn advance(&mut self) -> Result<()> {
         let [state, fault, refusal] = ["state", "fault", "refusal"].map(|name| self.listener.value(name));
         let levels = &mut self.command.levels;

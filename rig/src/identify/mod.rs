@@ -31,7 +31,7 @@ use clap::Args;
 use serde_json::Map;
 use std::path::PathBuf;
 use std::process::ExitCode;
-use tractive::identification::Units;
+use tractive::identification::{Observation, Stage, Units};
 
 /// The options of an identification.
 #[derive(Clone, Debug, Args)]
@@ -122,7 +122,7 @@ pub fn identified(identify: &Identify, machine: &Machine) -> Result<std::result:
         };
         (recording, observed)
     };
-    let observations = match observed {
+    let observations = match observed.and_then(complete) {
         Ok(observations) => observations,
         Err(ended) => return Ok(Err(ended)),
     };
@@ -131,11 +131,21 @@ pub fn identified(identify: &Identify, machine: &Machine) -> Result<std::result:
     Outcome::of(&observations, peak_a, machine, Some(&truth)).map(Ok)
 }
 
+/// Observations of an experiment that has come to its end: one whose rotor is not where it should be, as its angle is wrong or a load turns
+/// it, ends before the rotor is to turn.
+fn complete(observations: Vec<Observation>) -> std::result::Result<Vec<Observation>, Ended> {
+    if observations.iter().any(|observation| observation.stage == Stage::Turn) {
+        return Ok(observations);
+    }
+    let (value, limit) = ("more".to_owned(), "5° before it is to turn".to_owned());
+    Err(Ended { fault: "rotor_turned".to_owned(), value, limit })
+}
+
 /// The same of a drive on a CAN bus, whose truth nobody knows.
 fn on_bus(interface: &str, machine: &Machine) -> Result<std::result::Result<Outcome, Ended>> {
     let mut commander = Commander::new(Units::of(&machine.tables.ratings));
     can::drive(interface, &mut commander)?;
-    let observations = match commander.finish() {
+    let observations = match commander.finish().and_then(complete) {
         Ok(observations) => observations,
         Err(ended) => return Ok(Err(ended)),
     };
