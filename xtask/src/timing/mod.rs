@@ -83,7 +83,7 @@ fn identify(statistics: &statistics::Statistics) -> Result<u8> {
     let text = std::fs::read_to_string(&budgets).with_context(|| budgets.display().to_string())?;
     let mut all: toml::Table = text.parse().context("budgets.toml")?;
     all.retain(|group, _| group == "pmasynrm");
-    for group in all.values_mut().filter_map(toml::Value::as_table_mut) {
+    for group in all.iter_mut().filter_map(|(_, group)| group.as_table_mut()) {
         group.retain(|name, _| name == "control-max" || name == "pwm-max");
     }
     let worst = |interrupt: &str| {
