@@ -257,7 +257,7 @@ impl Course {
         let ways = commands * (SWEEPS + 0.5 * SWEEPS_GROWTH * commands);
         let whole = ways as u32;
         let part = ways - whole as f32;
-        let way = if whole % 2 == 0 { part } else { 1.0 - part };
+        let way = if whole.is_multiple_of(2) { part } else { 1.0 - part };
         let [first, last] = SWEPT;
         first + (last - first) * way
     }
