@@ -11,6 +11,7 @@ pub mod benchmark;
 pub mod bound;
 pub mod campaign;
 pub mod columns;
+pub mod commission;
 pub mod compare;
 pub mod distortion;
 pub mod figures;

@@ -7,6 +7,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use tractive_rig::benchmark::{self, BenchOptions};
 use tractive_rig::campaign::{self, command::CampaignOptions};
+use tractive_rig::commission;
 use tractive_rig::compare::{self, CompareOptions};
 use tractive_rig::folder::{self, MachineCommand};
 use tractive_rig::machine::Machine;
@@ -30,7 +31,7 @@ enum Command {
         #[arg(hide = true, trailing_var_arg = true, allow_hyphen_values = true)]
         words: Vec<OsString>,
     },
-    /// The needs of `run` or `talk` for these words, as JSON, for whoever makes them ready.
+    /// The needs of `run`, `talk` or `identify` for these words, as JSON, for whoever makes them ready.
     #[command(hide = true, disable_help_flag = true)]
     Needs {
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
@@ -61,6 +62,8 @@ enum Command {
     Machine(Box<MachineCommand>),
     /// An unknown machine, simulated, identified by its own drive: its resistance, its flux map, its inertia, and a machine folder of them.
     Identify(Box<identify::Identify>),
+    /// An unknown machine brought to its first torque, step by step: wiring, identification, tables, a little torque; and a record of it.
+    Commission(Box<commission::Commission>),
     /// The modulator's pulses in steady state.
     Pattern(PatternOptions),
     /// Optimises the pulse patterns anew: each branch's window and weighted distortion.
@@ -131,6 +134,7 @@ fn command(command: Command) -> Result<ExitCode> {
         Command::Figures(options) => done(gallery::run(&options)),
         Command::Machine(command) => done(folder::run(&command)),
         Command::Identify(options) => identify::command(&options),
+        Command::Commission(options) => commission::command(&options),
         Command::NineSwitch { input, output } => done(nine_switch::run(&input, &output)),
         Command::Campaign(options) => campaign::command::run(&options),
         Command::Compare(options) => compare::run(&options),
@@ -149,7 +153,8 @@ fn needs(words: Vec<OsString>) -> Result<ExitCode> {
     let needs = match Cli::try_parse_from(std::iter::once("tractive-rig".into()).chain(words))?.command {
         Command::Run { words } => Needs::of_run(words)?,
         Command::Talk(options) => Needs::of_talk(&options),
-        _ => anyhow::bail!("needs: must be followed by run or talk"),
+        Command::Identify(options) => Needs::of_identify(&options),
+        _ => anyhow::bail!("needs: must be followed by run, talk or identify"),
     };
     say!("{}", serde_json::to_string(&needs)?);
     Ok(ExitCode::SUCCESS)

@@ -1,5 +1,6 @@
 //! The needs of a run, for whoever builds images and sets up the emulator.
 
+use crate::identify::Identify;
 use crate::options::{On, RunOptions};
 use crate::scenario::System;
 use crate::scenario::catalogue::{self, Chosen};
@@ -16,7 +17,7 @@ use std::path::PathBuf;
 pub struct Needs {
     /// `pmasynrm` or `zs9`.
     pub system: &'static str,
-    /// The control law: `tractive` or `pi`.
+    /// The control law: `tractive`, `pi` or `identification`.
     pub law: &'static str,
     /// The pulse patterns: `paper` or `optimal`.
     pub patterns: &'static str,
@@ -56,6 +57,11 @@ impl Needs {
             }
             Chosen::Zs9(choice) => Self::of(Zs9::NAME, &choice.options),
         })
+    }
+
+    /// Of an identification.
+    pub fn of_identify(identify: &Identify) -> Self {
+        Self { law: "identification", ..Self::of(Traction::NAME, &identify.options.run) }
     }
 
     /// Of a talk.

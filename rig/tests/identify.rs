@@ -1,16 +1,31 @@
 //! Machines identified by their own drive, and how far what comes out is from the truth.
 
-use clap::{Args, Command, FromArgMatches};
+mod linear;
+
+use clap::{Args, FromArgMatches};
+use linear::MACHINES;
+use rayon::prelude::*;
+use std::ffi::OsStr;
 use std::path::Path;
-use tractive_rig::identify::{Identify, Outcome, contents, identified};
+use std::process::Command;
+use tractive::modulation::Mode;
+use tractive_rig::identify::{Identify, Outcome, identified};
 use tractive_rig::machine::Machine;
+use tractive_rig::scenario::catalogue::{self, Chosen};
+use tractive_rig::scenario::traction::identification;
+use tractive_rig::trace::Row;
+use tractive_tablegen::SmoothMap;
+
+/// The words behind `identify`.
+fn parsed(words: &str) -> Identify {
+    let command = Identify::augment_args(clap::Command::new("identify"));
+    let matches = command.get_matches_from(std::iter::once("identify").chain(words.split_whitespace()));
+    Identify::from_arg_matches(&matches).unwrap()
+}
 
 /// The outcome of the words behind `identify`, on a machine's folder.
 fn outcome(machine: &Machine, words: &str) -> Outcome {
-    let command = Identify::augment_args(Command::new("identify"));
-    let matches = command.get_matches_from(std::iter::once("identify").chain(words.split_whitespace()));
-    let identify = Identify::from_arg_matches(&matches).unwrap();
-    let outcome = identified(&identify, machine).unwrap();
+    let outcome = identified(&parsed(words), machine).unwrap();
     let outcome = outcome.unwrap_or_else(|trip| panic!("{words}: {trip:?}"));
     let values = outcome.figures();
     println!("{words}: {}", serde_json::to_string(values.values()).unwrap());
@@ -38,6 +53,20 @@ fn the_reference_machine_with_noise_dead_time_and_a_wrong_resistance() {
     assert!(found.resistance_error.abs() < 0.01, "{}", found.resistance_error);
     assert!((found.fit.dead_time_s - 5e-6).abs() < 0.2e-6, "{}", found.fit.dead_time_s);
     assert!((found.inertia_kg_m2 / 3.0 - 1.0).abs() < 0.01, "{}", found.inertia_kg_m2);
+}
+
+/// Charged, enabled, stopped and told by frames, which have fewer bits than the rig's own words.
+#[test]
+fn commanded_over_the_protocol_as_a_board_is() {
+    let machine = Machine::load("pmasynrm-180kw").unwrap();
+    let found = outcome(&machine, &format!("{FLAWS} --over-protocol"));
+    keeps_its_place(&found);
+    assert!(found.flux_rms < 0.005 && found.flux_worst < 0.012, "{} {}", found.flux_rms, found.flux_worst);
+    assert!(found.torque_worst < 0.01, "{}", found.torque_worst);
+    assert!(found.magnet_error.abs() < 0.005, "{}", found.magnet_error);
+    let ended = identified(&parsed(&format!("{FLAWS} --over-protocol --fault-at 1.5")), &machine);
+    let ended = ended.unwrap().err().unwrap();
+    assert!(!ended.fault.is_empty() && !ended.value.is_empty(), "{ended:?}");
 }
 
 #[test]
@@ -76,38 +105,178 @@ fn the_other_machines_at_their_own_carriers() {
     }
 }
 
-#[test]
-fn the_generator_takes_the_folder_and_the_drive_runs_on_the_true_machine() {
-    let machine = Machine::load("pmasynrm-180kw").unwrap();
-    let found = outcome(&machine, FLAWS);
-    let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().join("found");
-    tractive_rig::folder::write_folder(&out, &contents(&found, &machine)).unwrap();
-    let made = Machine::load(out.to_str().unwrap()).unwrap();
-    let most = machine.folder.parameters.max_torque_nm;
-    assert!(made.folder.parameters.max_torque_nm > 0.985 * most);
-    sweep(&out, most);
+/// The flaws of the reference machine's experiment: noise as the same share of current, dead time of a carrier in whole ticks.
+fn flaws_of(machine: &Machine) -> Vec<String> {
+    let parameters = &machine.folder.parameters;
+    let noise_a = 0.5 * parameters.max_current_a / 233.333;
+    let dead_time_us = (5.0 * 900.0 / parameters.max_switching_hz / 0.04).round() * 0.04;
+    let words =
+        format!("--noise-a {noise_a:.4} --dead-time-us {dead_time_us:.2} --uncompensated --rs-error 10");
+    words.split(' ').map(str::to_owned).collect()
 }
 
-/// A sweep with the found tables on the true machine.
-fn sweep(found: &Path, most_nm: f64) {
-    use tractive_rig::scenario::catalogue::{self, Chosen};
-    let words = ["sweep", "--machine", found.to_str().unwrap(), "--plant", "pmasynrm-180kw"];
-    let Ok(Chosen::Traction(choice)) = catalogue::choose(words.map(std::ffi::OsString::from).to_vec()) else {
+/// The rig's own program, with exit code 0.
+fn rig(words: &[&OsStr]) {
+    let output = Command::new(env!("CARGO_BIN_EXE_tractive-rig")).args(words).output().unwrap();
+    assert!(output.status.success(), "{words:?}: {}", String::from_utf8_lossy(&output.stderr));
+}
+
+/// The chain of a machine folder: identified, its operating points and a sweep with what was found on the true machine.
+fn is_found_and_driven(folder: &Path) {
+    let machine = Machine::load(folder.to_str().unwrap()).unwrap();
+    let place = tempfile::tempdir().unwrap();
+    let (out, page) = (place.path().join("found"), place.path().join("found.html"));
+    let flaws = flaws_of(&machine);
+    let fixed = ["identify", "--machine"].map(OsStr::new).into_iter();
+    let rest = [folder.as_os_str(), "--out".as_ref(), out.as_os_str(), "--page".as_ref(), page.as_os_str()];
+    rig(&fixed.chain(rest).chain(flaws.iter().map(OsStr::new)).collect::<Vec<_>>());
+    let points = worst_point_nm(&machine, folder, &out, place.path());
+    let swept = worst_swept_nm(folder, &out);
+    let most_nm = machine.folder.parameters.max_torque_nm;
+    let name = folder.file_name().unwrap_or_default().to_string_lossy();
+    let percent = |torque_nm: f64| 100.0 * torque_nm / most_nm;
+    println!("{name}: points within {:.3} %, sweep within {:.3} %", percent(points), percent(swept));
+    assert!(points < 0.015 * most_nm, "{name}: {points} N·m of {most_nm}");
+    assert!(swept < 0.015 * most_nm, "{name}: {swept} N·m of {most_nm}");
+}
+
+/// Worst torque of the found tables' operating points on the true machine, off what the true machine's own points give there.
+fn worst_point_nm(machine: &Machine, folder: &Path, found: &Path, place: &Path) -> f64 {
+    let parameters = &machine.folder.parameters;
+    let [input, own, of_found] = ["in.csv", "own.csv", "found.csv"].map(|name| place.join(name));
+    let mut wanted = String::from("torque_nm,speed_rpm,udc_v\n");
+    for (torque, speed) in (-8..=8).flat_map(|k| (0..=8).map(move |n| (k, n))) {
+        let torque_nm = parameters.max_torque_nm * f64::from(torque) / 8.0;
+        let speed_rpm = parameters.max_speed_rpm * f64::from(speed) / 8.0;
+        wanted += &format!("{torque_nm},{speed_rpm},{}\n", parameters.dc_link_nominal_v);
+    }
+    std::fs::write(&input, wanted).unwrap();
+    let map = SmoothMap::new(&machine.folder.map);
+    let torques = [(folder, &own), (found, &of_found)].map(|(of, output)| {
+        rig(&[
+            "points".as_ref(),
+            input.as_os_str(),
+            output.as_os_str(),
+            "--machine".as_ref(),
+            of.as_os_str(),
+        ]);
+        let text = std::fs::read_to_string(output).unwrap();
+        let torque_nm = |line: &str| {
+            let cells: Vec<_> = line.split(',').collect();
+            let (id, iq): (f64, f64) = (cells[3].parse().unwrap(), cells[4].parse().unwrap());
+            let at = map.at(id, iq);
+            1.5 * f64::from(parameters.pole_pairs) * (at.psi_d_wb * iq - at.psi_q_wb * id)
+        };
+        text.lines().skip(1).map(torque_nm).collect::<Vec<_>>()
+    });
+    let [own, of_found] = torques;
+    assert_eq!((own.len(), of_found.len()), (153, 153));
+    own.iter().zip(&of_found).map(|(own, found)| (own - found).abs()).fold(0.0, f64::max)
+}
+
+/// Worst torque of a sweep with the found tables on the true machine, off its demand, as means of a tenth of a second; no fault.
+fn worst_swept_nm(plant: &Path, found: &Path) -> f64 {
+    let words =
+        ["sweep".as_ref(), "--machine".as_ref(), found.as_os_str(), "--plant".as_ref(), plant.as_os_str()];
+    let Ok(Chosen::Traction(choice)) = catalogue::choose(words.map(OsStr::to_owned).to_vec()) else {
         panic!("a scenario of the other system")
     };
-    let machine = choice.machine().unwrap();
-    let recording = choice.drive(&machine).unwrap();
-    assert!(recording.rows.iter().all(|row| row.trip.is_none()));
-    // Means of a tenth of a second, from the second on: in the first the demand is on its way.
+    let recording = choice.drive(&choice.machine().unwrap()).unwrap();
+    let trip = recording.rows.iter().find_map(|row| row.trip);
+    assert!(trip.is_none(), "{}: {trip:?}", plant.display());
+    // From the second tenth on: in the first the demand is on its way.
     let means = recording.rows.chunks_exact(2_000).skip(1);
     let worst = means.map(|rows| {
-        let mean = |value: fn(&tractive_rig::trace::Row) -> f64| {
-            rows.iter().map(value).sum::<f64>() / rows.len() as f64
-        };
+        let mean = |value: fn(&Row) -> f64| rows.iter().map(value).sum::<f64>() / rows.len() as f64;
         (mean(|row| row.te_nm) - mean(|row| row.te_ref_nm)).abs()
     });
-    let worst = worst.fold(0.0, f64::max);
-    println!("sweep: torque within {worst} N·m of {most_nm}");
-    assert!(worst < 0.015 * most_nm, "{worst} N·m");
+    worst.fold(0.0, f64::max)
+}
+
+#[test]
+fn every_folder_of_tables_is_found_and_driven_with_what_was_found() {
+    let tables = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tables");
+    let mut folders: Vec<_> = std::fs::read_dir(&tables)
+        .unwrap()
+        .map(|entry| entry.unwrap().path().canonicalize().unwrap())
+        .collect();
+    folders.retain(|folder| folder.join("machine.toml").is_file());
+    assert!(folders.len() >= 3, "{folders:?}");
+    folders.par_iter().for_each(|folder| is_found_and_driven(folder));
+}
+
+#[test]
+fn machines_of_other_kinds_are_found_and_driven_with_what_was_found() {
+    MACHINES.par_iter().for_each(|linear| {
+        let place = tempfile::tempdir().unwrap();
+        let folder = place.path().join(linear.name);
+        std::fs::create_dir(&folder).unwrap();
+        linear.write(&folder);
+        is_found_and_driven(&folder);
+    });
+}
+
+/// A fault in the midst of the experiment: gates off, exit code 1, nothing written beside or in the place of the folder.
+#[test]
+fn a_fault_ends_the_experiment_with_gates_off_and_nothing_half_written() {
+    let machine = Machine::load("pmasynrm-180kw").unwrap();
+    for at_s in ["0.0004", "0.3", "2.1"] {
+        let place = tempfile::tempdir().unwrap();
+        let run = |out: &Path| {
+            let mut rig = Command::new(env!("CARGO_BIN_EXE_tractive-rig"));
+            rig.args("identify --inertia 3 --fault-at".split(' ')).arg(at_s).arg("--out").arg(out);
+            let output = rig.arg("--page").arg(place.path().join("found.html")).output().unwrap();
+            (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+        };
+        let (code, said) = run(&place.path().join("found"));
+        assert!(code == Some(1) && said.contains("nothing is written"), "{code:?}: {said}");
+        let left: Vec<_> = std::fs::read_dir(place.path()).unwrap().collect();
+        assert!(left.is_empty(), "{at_s} s: {left:?}");
+        let recording = identification::drive(
+            &parsed("--inertia 3").options,
+            &machine,
+            &identification::Stand { inertia_kg_m2: 3.0, fault_at_s: at_s.parse().ok() },
+        );
+        let recording = recording.unwrap();
+        let trip_s = recording.rows.iter().find(|row| row.trip.is_some()).unwrap().t_s;
+        assert!(trip_s < at_s.parse::<f64>().unwrap() + 0.01, "{trip_s} s");
+        // The devices that are on at the end, and the last that was turned on.
+        let on = recording.edges.iter().fold([false; 6], |mut on, edge| {
+            on[usize::from(edge.gate)] = edge.on;
+            on
+        });
+        let last = recording.edges.iter().rev().find(|edge| edge.on).map_or(0, |edge| edge.tick);
+        let last_s = last as f64 / 25e6;
+        assert!(on == [false; 6] && last_s < trip_s + 1e-4, "{at_s} s: {on:?}, {last_s} s, {trip_s} s");
+        assert_eq!(recording.rows.last().unwrap().mode, Mode::Off);
+    }
+}
+
+/// A folder that stands there already stays as it was.
+#[test]
+fn a_fault_leaves_the_folder_that_was_there() {
+    let place = tempfile::tempdir().unwrap();
+    let out = place.path().join("found");
+    std::fs::create_dir(&out).unwrap();
+    std::fs::write(out.join("machine.toml"), "kept").unwrap();
+    let mut rig = Command::new(env!("CARGO_BIN_EXE_tractive-rig"));
+    rig.args("identify --fault-at 0.3 --out".split(' ')).arg(&out);
+    assert_eq!(rig.output().unwrap().status.code(), Some(1));
+    assert_eq!(std::fs::read_to_string(out.join("machine.toml")).unwrap(), "kept");
+    assert_eq!(std::fs::read_dir(&out).unwrap().count(), 1);
+}
+
+/// Nothing compensates the dead time whatever is said, and what the experiment is not made for is refused by name.
+#[test]
+fn nothing_wrong_can_be_run() {
+    let machine = Machine::load("pmasynrm-180kw").unwrap();
+    let stand = identification::Stand { inertia_kg_m2: 3.0, fault_at_s: None };
+    let drive = |words: &str| identification::drive(&parsed(words).options, &machine, &stand);
+    let [with, without] = ["--dead-time-us 5 --uncompensated", "--dead-time-us 5"]
+        .map(|words| drive(words).unwrap().observations);
+    assert!(with.len() > 3_000 && with == without);
+    for words in ["--law pi", "--patterns optimal", "--line 3,4,30", "--ablate prediction"] {
+        let error = drive(words).err().map(|error| error.to_string()).unwrap_or_default();
+        assert!(error.starts_with(words.split(' ').next().unwrap()), "{words}: {error}");
+    }
 }

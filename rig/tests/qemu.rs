@@ -1,5 +1,5 @@
-//! The images in QEMU against the same code on the host, byte for byte. Needs TRACTIVE_IMAGE, TRACTIVE_PI_IMAGE, TRACTIVE_ZS9_IMAGE, TRACTIVE_ZS9_PI_IMAGE (and
-//! TRACTIVE_QEMU);
+//! The images in QEMU against the same code on the host, byte for byte. Needs TRACTIVE_IMAGE, TRACTIVE_PI_IMAGE, TRACTIVE_ZS9_IMAGE, TRACTIVE_ZS9_PI_IMAGE,
+//! TRACTIVE_IDENTIFY_IMAGE (and TRACTIVE_QEMU);
 //! `cargo xtask test` sets them, so these tests are ignored otherwise.
 
 use std::path::{Path, PathBuf};
@@ -200,4 +200,36 @@ fn a_round_trip_over_the_protocol_is_the_same() {
 #[ignore = "needs the image and QEMU"]
 fn hostile_frames_are_treated_the_same() {
     same_talk("hostile.talk");
+}
+
+/// The same experiment: the same machine folder, and over the protocol the same frames.
+fn same_machine(words: &str, files: &[&str]) {
+    let image = std::env::var_os("TRACTIVE_IDENTIFY_IMAGE").unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    for on in ["host", "qemu"] {
+        let out = folder.path().join(on);
+        std::fs::create_dir(&out).unwrap();
+        let mut command = Command::new(env!("CARGO_BIN_EXE_tractive-rig"));
+        command.env("TRACTIVE_IMAGE", &image).arg("identify").args(words.split(' ')).args(["--on", on]);
+        command.arg("--out").arg(out.join("found")).arg("--page").arg(out.join("found.html"));
+        if words.contains("--over-protocol") {
+            command.arg("--frames").arg(out.join("frames.log"));
+        }
+        let output = command.output().unwrap();
+        assert!(output.status.success(), "{words} on {on}: {}", String::from_utf8_lossy(&output.stderr));
+    }
+    for file in files {
+        let [host, qemu] =
+            ["host", "qemu"].map(|on| std::fs::read(folder.path().join(on).join(file)).unwrap());
+        assert!(host.len() > 500 && host == qemu, "{words}: {file} differs");
+    }
+}
+
+#[test]
+#[ignore = "needs the image and QEMU"]
+fn an_identification_is_the_same() {
+    let flaws = "--inertia 3 --noise-a 0.5 --dead-time-us 5 --rs-error 10";
+    let files = ["found/machine.toml", "found/flux_map.csv"];
+    same_machine(flaws, &files);
+    same_machine(&format!("{flaws} --over-protocol"), &[&files[..], &["frames.log"]].concat());
 }

@@ -266,6 +266,13 @@ pub struct Idle {
     pub station: Option<CanEndpoint>,
 }
 
+impl Idle {
+    /// At power-up.
+    pub const fn new(station: Option<CanEndpoint>) -> Self {
+        Self { station }
+    }
+}
+
 impl OperatorPort for Idle {
     fn ask(&mut self, at: Instant, slots: u32) -> (operator::Request, Feedback) {
         let (request, feedback, frame) = exchange::ask(at);

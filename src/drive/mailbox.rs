@@ -142,6 +142,11 @@ where
     Observation<R>: Words<OBSERVATION>,
     Timed<C>: Words<COMMAND>,
 {
+    /// Control's side: whether the period that began at the instant has told of itself, as the first of a slot does.
+    pub fn has_told(&self, at: Instant) -> bool {
+        self.observed().is_some_and(|observed| observed.at == at)
+    }
+
     /// Nothing commanded, nothing seen.
     #[cfg(not(loom))]
     pub const fn new() -> Self {

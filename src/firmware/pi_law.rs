@@ -4,7 +4,7 @@ use crate::qemu;
 use core::sync::atomic::{AtomicBool, Ordering};
 use tractive::built_in::traction::BuiltIn;
 use tractive::control::{MtpaStart, PiLaw};
-use tractive::drive::traction::ControlTask;
+use tractive::drive::traction::{ControlTask, Shared};
 use tractive::time::Instant;
 use tractive::wire::Setup;
 
@@ -26,9 +26,12 @@ pub fn connect() -> Setup {
 /// Its set-up before the first interrupt's work.
 pub const SET_UP: Option<fn(&mut ControlTask<BuiltIn, Law>)> = Some(set_up);
 
+/// The idle loop's side of the board.
+pub use qemu::Idle;
+
 /// Its words for the host at the end of a control interrupt, beside the report: nothing.
 #[inline(always)]
-pub fn tell(_task: &mut ControlTask<BuiltIn, Law>, _now: Instant) {}
+pub fn tell(_task: &mut ControlTask<BuiltIn, Law>, _shared: &Shared, _now: Instant) {}
 
 fn set_up(task: &mut ControlTask<BuiltIn, Law>) {
     if STARTS_AT_ZERO.load(Ordering::Relaxed) {

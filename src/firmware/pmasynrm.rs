@@ -63,7 +63,7 @@ fn main() -> ! {
     let line = setup.line.map(|times| Line::rated(&BUILT_IN.ratings, times.precharge_s, times.discharge_s));
     let operator = operator::Settings::rated(&BUILT_IN.ratings, slot_s(&clock), line);
     let station = setup.over_protocol.then(|| CanEndpoint::new(&BUILT_IN.ratings));
-    let (mut slot, mut idle) = (Slot::new(), qemu::Idle { station });
+    let (mut slot, mut idle) = (Slot::new(), law::Idle::new(station));
     qemu::start(first_half_ticks, clock.control_ticks);
     loop {
         if line.is_some() || setup.over_protocol {
@@ -94,7 +94,7 @@ fn TIMER0() {
     }
     let now = TASK.next_call();
     TASK.run(&mut board, &SHARED);
-    law::tell(TASK, now);
+    law::tell(TASK, &SHARED, now);
 }
 
 /// Deadline: the next carrier boundary, where the shadow registers take over.

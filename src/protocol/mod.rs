@@ -13,6 +13,7 @@ mod commands;
 pub mod crc;
 mod dialect;
 pub mod e2e;
+mod experiment;
 mod frame;
 mod message;
 mod parameters;
@@ -29,6 +30,7 @@ pub use commands::{
     COMMAND, Command, LIMITS, LINK_LIMITS, LinkLimits, PARAMETER_REQUEST, ParameterRequest, TorqueLimits,
 };
 pub use dialect::{MessageSet, Taken};
+pub use experiment::{EXPERIMENT, ExperimentFrame, FROM_IDENTIFICATION, OBSERVATION, ObservationFrame};
 pub use frame::{Frame, LENGTH};
 pub use message::{COUNTER, CRC, Message};
 pub use parameters::{PARAMETERS, Parameter, Parameters, RPM_PER_RAD_S, WriteError};

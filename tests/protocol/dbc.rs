@@ -7,13 +7,14 @@ use proptest::prelude::*;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
+use tractive::identification::Stage;
 use tractive::modulation::{MODE_CODES, Mode};
 use tractive::nine_switch::Scheme;
 use tractive::operator::{Refusal, State};
 use tractive::protection::Fault;
 use tractive::protocol::{
-    COUNTER, CRC, FROM_DRIVE, FROM_ZS9, Kind, Listening, Message, Outcome, Pattern, Payload, STATUS, Signal,
-    StatusFrame, TO_DRIVE, TO_ZS9, ZS9_STATUS,
+    COUNTER, CRC, FROM_DRIVE, FROM_IDENTIFICATION, FROM_ZS9, Kind, Listening, Message, Outcome, Pattern,
+    Payload, STATUS, Signal, StatusFrame, TO_DRIVE, TO_ZS9, ZS9_STATUS,
 };
 
 fn path() -> PathBuf {
@@ -30,7 +31,8 @@ fn parsed() -> Dbc {
 
 fn messages() -> impl Iterator<Item = (&'static Message, bool)> {
     let to = TO_DRIVE.into_iter().chain(TO_ZS9).map(|message| (message, true));
-    let from = FROM_DRIVE.into_iter().chain(FROM_ZS9).map(|message| (message, false));
+    let from =
+        FROM_DRIVE.into_iter().chain(FROM_IDENTIFICATION).chain(FROM_ZS9).map(|message| (message, false));
     // One drive after the other.
     let zs9 = |message: &(&Message, bool)| message.0.name.starts_with("ZS9_");
     let mut all: Vec<_> = to.chain(from).collect();
@@ -65,6 +67,7 @@ fn names(signal: &Signal) -> BTreeMap<u32, &'static str> {
             refusals.chain([(0, "none")]).collect()
         }
         "scheme" => Scheme::ALL.iter().map(|scheme| scheme.name()).enumerate().map(numbered).collect(),
+        "stage" => Stage::ALL.iter().map(|stage| stage.name()).enumerate().map(numbered).collect(),
         "mode" => Mode::ALL.iter().map(|mode| (*mode as u32, mode.name())).collect(),
         "listening" => Listening::ALL.iter().map(|(code, name)| (*code as u32, *name)).collect(),
         "result" => Outcome::ALL.iter().map(|(code, name)| (*code as u32, *name)).collect(),
@@ -149,7 +152,8 @@ fn same(found: f64, code: f32) -> bool {
 fn every_signal_is_described_as_it_is_encoded() {
     let dbc = parsed();
     assert_eq!(dbc.messages.len(), messages().count());
-    assert_eq!(messages().count(), TO_DRIVE.len() + FROM_DRIVE.len() + TO_ZS9.len() + FROM_ZS9.len());
+    let drive = TO_DRIVE.len() + FROM_DRIVE.len() + FROM_IDENTIFICATION.len();
+    assert_eq!(messages().count(), drive + TO_ZS9.len() + FROM_ZS9.len());
     for (message, to_drive) in messages() {
         let found = dbc.messages.iter().find(|found| found.id == MessageId::Standard(message.id)).unwrap();
         assert_eq!((found.name.as_str(), found.size), (message.name, 8));

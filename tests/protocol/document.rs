@@ -2,7 +2,7 @@
 
 use std::path::Path;
 use tractive::operator::{Refusal, State};
-use tractive::protocol::{FROM_DRIVE, FROM_ZS9, Message, PARAMETERS, TO_DRIVE, TO_ZS9};
+use tractive::protocol::{FROM_DRIVE, FROM_IDENTIFICATION, FROM_ZS9, Message, PARAMETERS, TO_DRIVE, TO_ZS9};
 
 fn text() -> String {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/protocol.md");
@@ -34,7 +34,8 @@ fn row(message: &Message, direction: &str) -> String {
 #[test]
 fn the_messages_are_listed() {
     let commands = TO_DRIVE.map(|message| row(message, "in"));
-    has(&[&commands[..], &FROM_DRIVE.map(|message| row(message, "out"))[..]].concat());
+    let from = FROM_DRIVE.into_iter().chain(FROM_IDENTIFICATION).map(|message| row(message, "out"));
+    has(&commands.iter().cloned().chain(from).collect::<Vec<_>>());
     let commands = TO_ZS9.map(|message| row(message, "in"));
     has(&[&commands[..], &FROM_ZS9.map(|message| row(message, "out"))[..]].concat());
 }

@@ -5,7 +5,7 @@ use autosar_e2e::{E2EProfile, E2EStatus};
 use proptest::prelude::*;
 use tractive::protocol::crc::crc8_h2f;
 use tractive::protocol::e2e::{Counter, MAX_DELTA, Order, Sequence, data_ids, is_intact, protect};
-use tractive::protocol::{FROM_DRIVE, FROM_ZS9, Message, TO_DRIVE, TO_ZS9};
+use tractive::protocol::{FROM_DRIVE, FROM_IDENTIFICATION, FROM_ZS9, Message, TO_DRIVE, TO_ZS9};
 
 /// AUTOSAR's Specification of CRC Routines, table of `Crc_CalculateCRC8H2F`.
 #[test]
@@ -40,7 +40,7 @@ fn the_protection_gives_the_specifications_values() {
 }
 
 fn all() -> impl Iterator<Item = &'static Message> {
-    TO_DRIVE.into_iter().chain(FROM_DRIVE).chain(TO_ZS9).chain(FROM_ZS9)
+    TO_DRIVE.into_iter().chain(FROM_DRIVE).chain(FROM_IDENTIFICATION).chain(TO_ZS9).chain(FROM_ZS9)
 }
 
 #[test]

@@ -17,6 +17,9 @@ pub const QEMU: &str = "qemu";
 /// The PMaSynRM's image with the optimised pulse patterns.
 const OPTIMAL: &str = "optimal";
 
+/// The image that identifies its machine.
+const IDENTIFY: &str = "identify";
+
 /// The systems, each with an image of its own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum System {
@@ -85,6 +88,13 @@ pub fn pi_image(toolchain: &Toolchain, system: System, machine: Option<&OsString
     firmware(command, system.pi_image(), system, machine)
 }
 
+/// Builds the image that identifies its machine, likewise.
+pub fn identify_image(toolchain: &Toolchain, machine: Option<&OsString>) -> Result<PathBuf> {
+    let mut command = on_target(toolchain, "tractive", IDENTIFY);
+    command.args(["--features", QEMU]);
+    firmware(command, IDENTIFY, System::Traction, machine)
+}
+
 /// Builds the PMaSynRM's image with the optimised pulse patterns, likewise.
 pub fn optimal_image(toolchain: &Toolchain, machine: Option<&OsString>) -> Result<PathBuf> {
     let mut command = on_target(toolchain, "tractive", OPTIMAL);
@@ -114,6 +124,12 @@ fn wants_optimal(machine: Option<&OsString>, system: System) -> Result<bool> {
     let text = fs::read_to_string(&file).with_context(|| file.display().to_string())?;
     let keys: toml::Table = toml::from_str(&text).with_context(|| file.display().to_string())?;
     Ok(keys.get("patterns").and_then(toml::Value::as_str) == Some(OPTIMAL))
+}
+
+/// Builds the image that identifies its machine for a board of real hardware, likewise.
+pub fn identify_on(toolchain: &Toolchain, board: &Board, machine: Option<&OsString>) -> Result<PathBuf> {
+    let name = format!("{}-{IDENTIFY}", board.name);
+    firmware(on_target(toolchain, &board.package, &name), &name, System::Traction, machine)
 }
 
 fn firmware(mut command: Command, name: &str, system: System, machine: Option<&OsString>) -> Result<PathBuf> {

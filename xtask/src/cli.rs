@@ -23,6 +23,9 @@ pub enum Command {
     /// Set up what is missing, build, command the drive over the protocol
     #[command(disable_help_flag = true)]
     Talk(RunArgs),
+    /// Set up what is missing, build, identify a simulated machine by its own drive
+    #[command(disable_help_flag = true)]
+    Identify(RunArgs),
     /// Set up what is missing, run every check
     Test(TestArgs),
     /// Build the image and print what is in it
@@ -69,6 +72,9 @@ pub struct TimingArgs {
     /// Take the numbers into docs/cost.md and sizes.toml
     #[arg(long)]
     pub write: bool,
+    /// Measure the image that identifies its machine instead, against the drive's budgets
+    #[arg(long, conflicts_with_all = ["json", "write", "profile"])]
+    pub identify: bool,
     /// Say where the instructions go: this many functions of each interrupt
     #[arg(long, value_name = "FUNCTIONS", num_args = 0..=1, default_missing_value = "20", conflicts_with = "json")]
     pub profile: Option<usize>,
@@ -82,6 +88,9 @@ pub struct FlashArgs {
     /// The system whose image it is
     #[arg(long, value_enum, default_value = "pmasynrm")]
     pub system: System,
+    /// The image that identifies its machine, in place of the drive's
+    #[arg(long, conflicts_with = "system")]
+    pub identify: bool,
     /// A folder of tables/, or the path of any machine folder [default: the system's own]
     #[arg(long, value_name = "NAME|PATH")]
     pub machine: Option<String>,

@@ -20,7 +20,11 @@ pub fn run(args: &FlashArgs) -> Result<u8> {
     }
     let machine = args.machine.as_deref().map(|machine| machine_for_build(machine, root())).transpose()?;
     let toolchain = Setup::default().toolchain()?;
-    let image = build::board_image(&toolchain, &args.board, args.system, machine.as_ref())?;
+    let image = if args.identify {
+        build::identify_on(&toolchain, &args.board, machine.as_ref())?
+    } else {
+        build::board_image(&toolchain, &args.board, args.system, machine.as_ref())?
+    };
     for mut command in commands(&args.board, args.log, &image) {
         if args.dry_run {
             println!("{}", spelled(&command));

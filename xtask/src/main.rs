@@ -55,6 +55,7 @@ use std::process::ExitCode;
 fn main() -> ExitCode {
     let result = match cli::Cli::parse().command {
         cli::Command::Run(args) => run::run("run", &args.words),
+        cli::Command::Identify(args) => run::run("identify", &args.words),
         cli::Command::Talk(args) => run::run("talk", &args.words),
         cli::Command::Test(args) => test::run(&args),
         cli::Command::Image(args) => image::run(&args),

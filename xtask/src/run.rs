@@ -1,4 +1,4 @@
-//! `cargo xtask run` and `talk`: set up, build, hand over to the rig.
+//! `cargo xtask run`, `talk` and `identify`: set up, build, hand over to the rig.
 //!
 //! The rig alone reads what was typed: at first it is asked what that needs, then it is given the same words again.
 
@@ -21,7 +21,7 @@ const ZS9_SCRIPT: &str = "rig/scripts/zs9.talk";
 #[derive(Debug, Default, Deserialize, PartialEq, Eq)]
 struct Needs {
     system: String,
-    /// The control law: `tractive` or `pi`.
+    /// The control law: `tractive`, `pi` or `identification`.
     law: String,
     /// The pulse patterns: `paper` or `optimal`.
     patterns: String,
@@ -57,7 +57,7 @@ fn rig(program: &Path) -> Command {
     rig
 }
 
-/// The command, `run` or `talk` of the rig; the exit code is the rig's.
+/// The command, `run`, `talk` or `identify` of the rig; the exit code is the rig's.
 pub fn run(verb: &str, words: &[OsString]) -> Result<u8> {
     eprintln!("building the rig, where it is not up to date");
     let program = build::rig()?;
@@ -81,6 +81,7 @@ pub fn run(verb: &str, words: &[OsString]) -> Result<u8> {
         eprintln!("building the image, where it is not up to date");
         let (toolchain, machine) = (setup.toolchain()?, machine.as_ref());
         let image = match (needs.law.as_str(), needs.patterns.as_str()) {
+            ("identification", _) => build::identify_image(&toolchain, machine)?,
             (_, "optimal") => build::optimal_image(&toolchain, machine)?,
             ("pi", _) => build::pi_image(&toolchain, needs.system(), machine)?,
             _ => build::image(&toolchain, needs.system(), machine)?,

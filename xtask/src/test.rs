@@ -125,11 +125,16 @@ fn perform(step: Step, setup: &mut Setup) -> Result<Outcome> {
         Step::NucleoImage => {
             let boards = Board::all()?;
             let images = boards.iter().flat_map(|board| System::ALL.map(|system| (board, system)));
-            all(images, |(board, system)| {
+            let drives = all(images, |(board, system)| {
                 println!("{}:", system.image_on(board));
                 let path = build::board_image(&setup.toolchain()?, board, system, None)?;
                 image::check_board(&path, board)
-            })?
+            })?;
+            drives
+                && all(&boards, |board| {
+                    println!("{}, identifying:", board.name);
+                    image::check_board(&build::identify_on(&setup.toolchain()?, board, None)?, board)
+                })?
         }
         Step::Twin => match crate::twin::check(setup)? {
             Ok(good) => good,
@@ -160,6 +165,7 @@ fn perform(step: Step, setup: &mut Setup) -> Result<Outcome> {
             command.env("TRACTIVE_PI_IMAGE", build::pi_image(&toolchain, System::Traction, None)?);
             command.env("TRACTIVE_ZS9_IMAGE", build::image(&toolchain, System::Zs9, None)?);
             command.env("TRACTIVE_ZS9_PI_IMAGE", build::pi_image(&toolchain, System::Zs9, None)?);
+            command.env("TRACTIVE_IDENTIFY_IMAGE", build::identify_image(&toolchain, None)?);
             succeeds(&mut command)?
         }
         Step::Timing => crate::timing::run(&TimingArgs::default())? == 0,

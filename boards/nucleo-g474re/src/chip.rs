@@ -7,7 +7,7 @@ use super::pins::{self, Pin};
 use super::position::PositionState;
 use super::power_stage::{CORE_HZ, POWER_STAGE};
 use super::registers::Registers;
-use super::serve::Serve;
+use super::serve::{Serve, Station};
 use super::start::{self, Found, Plan, StartError, Timeout, Wait};
 use super::watchdog::Pulse;
 use super::{CLOCK, clock};
@@ -153,9 +153,13 @@ pub fn revise_pulses() {
 /// The idle loop, forever: serves the bus and the operator, feeds the watchdog, tells what has changed, and after a fault what the flight recorder
 /// holds. Where the start was `refused` it says why to whoever asks on the bus.
 pub fn idle(refused: Option<Violation>) -> ! {
+    idle_over(CanEndpoint::new(&BUILT_IN.ratings), refused)
+}
+
+/// The same over another end of the protocol.
+pub fn idle_over(station: impl Station, refused: Option<Violation>) -> ! {
     let line = Line::rated(&BUILT_IN.ratings, POWER_STAGE.line.precharge_s, POWER_STAGE.line.discharge_s);
     let rated = operator::Settings::rated(&BUILT_IN.ratings, slot_s(&CLOCK), Some(line));
-    let station = CanEndpoint::new(&BUILT_IN.ratings);
     let mut serve = Serve::new(Registers::CHIP, Can::CHIP, station, &POSITION, Configuration::Good);
     let (mut slot, mut log) = (Slot::new(), Log::new());
     while let Some(why) = refused {

@@ -6,6 +6,7 @@ use super::registers::Registers;
 use super::switchgear::Wires;
 use super::{CLOCK, hardware, pins, switchgear};
 use tractive::drive::OperatorMailboxes;
+use tractive::experiment::{Memory, Teller};
 use tractive::frames::Abc;
 use tractive::operator::{
     Configuration, Feedback, OperatorPort, Request, Settings, Slot, Status, TorqueDemand,
@@ -81,7 +82,59 @@ impl<'a, S> Serve<'a, S> {
     }
 }
 
-impl Serve<'_> {
+/// The PMaSynRM drive's end of the protocol.
+pub trait Station {
+    /// The operator's settings with the parameters that are in force.
+    fn settings<'a>(&self, settings: &Settings<'a>) -> Settings<'a>;
+    /// The request in a slot, `slots` after the last one, after the frames that have come since.
+    fn listen(&mut self, slots: u32, frames: impl Iterator<Item = Frame>) -> Request;
+    /// The frame to send after the slot, if one is due.
+    fn tell(&mut self, status: &Status, report: Option<&Report>) -> Option<Frame>;
+}
+
+impl Station for CanEndpoint {
+    fn settings<'a>(&self, settings: &Settings<'a>) -> Settings<'a> {
+        Self::settings(self, settings)
+    }
+
+    fn listen(&mut self, slots: u32, frames: impl Iterator<Item = Frame>) -> Request {
+        Self::listen(self, slots, frames)
+    }
+
+    fn tell(&mut self, status: &Status, report: Option<&Report>) -> Option<Frame> {
+        Self::tell(self, status, report)
+    }
+}
+
+/// The same with the frames of what an identification keeps, where the drive's leave room.
+pub struct Identifying<'a> {
+    drive: CanEndpoint,
+    teller: Teller,
+    memory: &'a Memory,
+}
+
+impl<'a> Identifying<'a> {
+    /// At power-up.
+    pub const fn new(drive: CanEndpoint, memory: &'a Memory) -> Self {
+        Self { drive, teller: Teller::new(), memory }
+    }
+}
+
+impl Station for Identifying<'_> {
+    fn settings<'a>(&self, settings: &Settings<'a>) -> Settings<'a> {
+        self.drive.settings(settings)
+    }
+
+    fn listen(&mut self, slots: u32, frames: impl Iterator<Item = Frame>) -> Request {
+        self.drive.listen(slots, frames)
+    }
+
+    fn tell(&mut self, status: &Status, report: Option<&Report>) -> Option<Frame> {
+        self.drive.tell(status, report).or_else(|| self.teller.tell(self.memory))
+    }
+}
+
+impl<S: Station> Serve<'_, S> {
     /// The board's feedback.
     pub fn feedback(&self) -> Feedback {
         Feedback {
@@ -106,7 +159,7 @@ impl Serve<'_> {
 }
 
 /// The switches at once: a slot earlier or later is nothing to a contactor, and the chopper's compare is preloaded.
-impl OperatorPort<TorqueDemand> for Serve<'_> {
+impl<S: Station> OperatorPort<TorqueDemand> for Serve<'_, S> {
     fn ask(&mut self, _at: Instant, slots: u32) -> (Request, Feedback) {
         let frames = self.hear();
         (self.station.listen(slots, frames), self.feedback())

@@ -41,7 +41,7 @@ pub struct Target {
 
 impl Target {
     /// While no pulses are made.
-    pub(super) const NONE: Self = Self {
+    pub const NONE: Self = Self {
         torque_nm: 0.0,
         current: Dq { d: 0.0, q: 0.0 },
         flux: Dq { d: 0.0, q: 0.0 },

@@ -65,10 +65,15 @@ pub trait ControlLaw {
     }
 
     /// The machine's flux linkage over the map's, as far as an error of it is believed; 1 for a law that has no idea of it.
-    fn map_scale(&self) -> f32;
+    fn map_scale(&self) -> f32 {
+        1.0
+    }
 
-    /// By how much the machine's flux linkage seems to exceed the map's, as a share; 0 where it turns too slowly to tell.
-    fn map_error(&self) -> f32;
+    /// By how much the machine's flux linkage seems to exceed the map's, as a share; 0 where it turns too slowly to tell, and
+    /// of a law that has no idea of it.
+    fn map_error(&self) -> f32 {
+        0.0
+    }
 
     /// Time since the last operating point, in s.
     fn passed_s(&self, clock: &Clock) -> f32;

@@ -33,6 +33,8 @@ pub struct Course {
     step: u32,
     /// Halves since the last guess of the inductance, in [`Stage::Probe`].
     waited: u32,
+    /// Turn of the rotor since the experiment began, electrical, in rad.
+    away_rad: f32,
     pulses: Pulses,
     /// Stator resistance, in ohm, as the staircase has shown it.
     resistance_ohm: f32,
@@ -93,10 +95,16 @@ const FIRST_BOUND: f32 = 0.2;
 const WIDENING: f32 = 0.003;
 
 /// Current along d beside the pulses along q and of the turning rotor, as a share of the bound: no phase is without current for long. Beside
-/// the last pulses it goes to and fro between two shares, so many commands each way.
+/// the last pulses it goes to and fro between two shares. Ways in a command, at first and growing by as much with each command: no two ways
+/// take as long, so that pulses along q whose to and fro fits into one of them come elsewhere in the next.
 const HELD_D: f32 = -0.2;
 const SWEPT: [f32; 2] = [0.18, -0.93];
-const SWEEP_COMMANDS: u32 = 230;
+const SWEEPS: f32 = 1.0 / 265.0;
+const SWEEPS_GROWTH: f32 = 5.3e-7;
+
+/// Turn, mechanical, in rad, by which the rotor is not where it should be before it is to turn: the angle is wrong, or a load turns it. The
+/// experiment is over then.
+const AWAY_RAD: f32 = 0.087;
 
 /// Current that turns the rotor, as a share of the bound; speed where it ends, as a share of the largest, and as electrical radians a
 /// command; the most commands for it, and those of coasting.
@@ -121,6 +129,7 @@ impl Course {
             commands: 0,
             step: 0,
             waited: 0,
+            away_rad: 0.0,
             pulses: Pulses::new(),
             resistance_ohm: 0.0,
             lacking_v: 0.0,
@@ -155,6 +164,7 @@ impl Course {
     /// Takes a half that has passed.
     pub fn learn(&mut self, seen: &Seen, inductance: &mut Inductance, bound_a: f32) {
         (self.omega, self.frame) = (seen.omega, seen.frame);
+        self.away_rad += seen.turned;
         let change = seen.current - seen.before;
         let moved = change.squared() > (SEEN_SHARE * bound_a) * (SEEN_SHARE * bound_a);
         let mean = (seen.current + seen.before) * 0.5;
@@ -210,6 +220,11 @@ impl Course {
         self.commands += 1;
         let before = self.stage;
         self.advance(ratings);
+        if self.away_rad.abs() > AWAY_RAD * ratings.pole_pairs
+            && !matches!(self.stage, Stage::Turn | Stage::Done)
+        {
+            self.enter(Stage::Done);
+        }
         if before == Stage::AlongD && self.stage != before {
             inductance.settle();
         }
@@ -238,10 +253,13 @@ impl Course {
 
     /// The slow sweep along d, as a share of the bound.
     fn swept(&self) -> f32 {
-        let place = self.commands % (2 * SWEEP_COMMANDS);
-        let way = if place < SWEEP_COMMANDS { place } else { 2 * SWEEP_COMMANDS - place };
+        let commands = self.commands as f32;
+        let ways = commands * (SWEEPS + 0.5 * SWEEPS_GROWTH * commands);
+        let whole = ways as u32;
+        let part = ways - whole as f32;
+        let way = if whole.is_multiple_of(2) { part } else { 1.0 - part };
         let [first, last] = SWEPT;
-        first + (last - first) * way as f32 / SWEEP_COMMANDS as f32
+        first + (last - first) * way
     }
 
     /// Part of the way to a direct current.

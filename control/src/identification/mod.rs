@@ -19,11 +19,12 @@
 mod course;
 mod inductance;
 mod observation;
+mod packed;
 mod pulses;
 
 use crate::control::{
-    AimInput, Boundary, Committed, ControlLaw, Law, ModeLimits, Region, Regulated, RotorSample, SpeedTracker,
-    Target, VoltageVector,
+    AimInput, Boundary, Committed, ControlLaw, Law, ModeLimits, Regulated, RotorSample, SpeedTracker, Target,
+    VoltageVector,
 };
 use crate::frames::{AlphaBeta, Dq, SinCos, six_step_v};
 use crate::machine::Tables;
@@ -32,21 +33,12 @@ use course::{Course, Seen};
 use inductance::Inductance;
 
 pub use observation::{OBSERVATION_WORDS, Observation, Stage};
+pub use packed::{PACKED_WORDS, Packed, Units};
 
 /// Share of the largest voltage of a carrier that the experiment uses.
 const USED_SHARE: f32 = 0.95;
 
 const NONE: Dq = Dq { d: 0.0, q: 0.0 };
-
-/// The target of a current loop that has none.
-const NO_TARGET: Target = Target {
-    torque_nm: 0.0,
-    current: NONE,
-    flux: NONE,
-    region: Region::Mtpa,
-    depth: 0.0,
-    voltage_limit_v: 0.0,
-};
 
 /// The law's state between two control periods.
 #[derive(Clone, Copy, Debug)]
@@ -72,7 +64,7 @@ impl Identification {
     pub const fn new() -> Self {
         Self {
             speed: SpeedTracker::new(),
-            target: NO_TARGET,
+            target: Target::NONE,
             course: Course::new(),
             inductance: Inductance::UNKNOWN,
             last: None,
@@ -115,14 +107,6 @@ impl ControlLaw for Identification {
 
     fn tracker_mut(&mut self) -> &mut SpeedTracker {
         &mut self.speed
-    }
-
-    fn map_scale(&self) -> f32 {
-        1.0
-    }
-
-    fn map_error(&self) -> f32 {
-        0.0
     }
 
     fn passed_s(&self, clock: &Clock) -> f32 {
@@ -174,7 +158,7 @@ impl ControlLaw for Identification {
         self.samples = 0;
         self.udc_v = input.udc_v;
         self.limit_v = USED_SHARE * input.limits.depth_limit * six_step_v(input.udc_v);
-        self.target = Target { voltage_limit_v: self.limit_v, ..NO_TARGET };
+        self.target = Target { voltage_limit_v: self.limit_v, ..Target::NONE };
     }
 
     fn regulate(

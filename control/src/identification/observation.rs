@@ -36,6 +36,20 @@ impl Stage {
         Self::Turn,
         Self::Done,
     ];
+
+    /// As telemetry and reports call it.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Probe => "probe",
+            Self::Staircase => "staircase",
+            Self::AlongD => "along_d",
+            Self::AlongQ => "along_q",
+            Self::AlongBoth => "along_both",
+            Self::Rest => "rest",
+            Self::Turn => "turn",
+            Self::Done => "done",
+        }
+    }
 }
 
 /// A carrier boundary, and what acted since the one before it.

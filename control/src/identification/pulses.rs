@@ -46,9 +46,11 @@ const HELD_SHARE: f32 = 0.4;
 const KEPT_SHARE: f32 = 0.94;
 /// Largest current along +d, as a share of the bound.
 const POSITIVE_SHARE: f32 = 0.2;
-/// Turn, mechanical, at which the side that makes it is given no more, in rad; and the time over which the speed counts, in halves.
+/// Turn, mechanical, at which the side that makes it is given no more, in rad; and the time over which the speed counts: so many halves, for the
+/// pulse that is under way, and a time in s, by which the swing of any rotor is damped.
 const MOST_RAD: f32 = 0.028;
 const AHEAD_HALVES: f32 = 18.0;
+const AHEAD_S: f32 = 3e-3;
 /// Least share of the bound that a side keeps.
 const LEAST_SIDE: f32 = 0.1;
 
@@ -125,7 +127,7 @@ impl Pulses {
     /// The largest negative and positive current along q, in A.
     fn sides(&self, region: &Region) -> [f32; 2] {
         let per_pole = 1.0 / region.ratings.pole_pairs;
-        let comes = self.turned_rad + self.omega * AHEAD_HALVES * self.length_s;
+        let comes = self.turned_rad + self.omega * (AHEAD_HALVES * self.length_s + AHEAD_S);
         let share = comes * per_pole / MOST_RAD;
         [1.0 + share, 1.0 - share]
             .map(|side| limit(side, LEAST_SIDE, 1.0) * region.share * KEPT_SHARE * region.bound_a)

@@ -1,7 +1,7 @@
 //! The ratings that follow from a flux map and the limits, and `machine.toml` of both.
 
 use super::given::Given;
-use super::write::digits;
+use super::write::{digits, toml};
 use anyhow::{Result, ensure};
 use core::f64::consts::TAU;
 use std::fmt::Write as _;
@@ -83,15 +83,7 @@ impl Ratings {
             ("max_switching_hz", given.max_switching_hz, "given"),
             ("rotor_inertia_kg_m2", given.inertia.unwrap_or(f64::NAN), "given"),
         ];
-        let mut text = format!(
-            "# Made by: cargo rig machine {command}\n# Currents and voltages of phases are peak values.\nname = {:?}\n\n",
-            given.name()
-        );
-        for (key, value, from) in lines.into_iter().filter(|(_, value, _)| !value.is_nan()) {
-            let pair = format!("{key} = {value}");
-            let _ = writeln!(text, "{pair:<40}# {from}");
-        }
-        text
+        toml(&given.name(), &format!("machine {command}"), &lines)
     }
 
     /// Says what the machine is: a few lines, or where it was asked for, JSON.

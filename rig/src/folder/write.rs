@@ -58,6 +58,19 @@ fn check_place(out: &Path) -> Result<bool> {
     Ok(!entries.is_empty())
 }
 
+/// `machine.toml` of a machine's name: a line for each key, its value and where that comes from, below the words that made it. A value
+/// that is not a number is left out.
+pub fn toml(name: &str, command: &str, lines: &[(&str, f64, &str)]) -> String {
+    let mut text = format!(
+        "# Made by: cargo rig {command}\n# Currents and voltages of phases are peak values.\nname = {name:?}\n\n"
+    );
+    for (key, value, from) in lines.iter().filter(|(_, value, _)| !value.is_nan()) {
+        let pair = format!("{key} = {value}");
+        let _ = writeln!(text, "{pair:<40}# {from}");
+    }
+    text
+}
+
 /// `flux_map.csv` of a map with both signs of iq, after `#` comment lines; it holds those from 0 on.
 pub fn csv(map: &FluxMap, comments: &str) -> String {
     let mut text = format!("{comments}id_a,iq_a,psi_d_wb,psi_q_wb\n");

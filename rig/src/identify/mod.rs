@@ -4,27 +4,34 @@
 //! what they observe. What is known beforehand is what a nameplate tells: the keys of `machine.toml` but for resistance and inertia.
 
 mod basis;
+mod commander;
 mod fit;
 mod half;
 mod outcome;
+mod signs;
 mod toml;
 
+pub use commander::{Commander, Ended};
 pub use fit::Fit;
 pub use outcome::{Outcome, Truth};
+pub use signs::Signs;
 
 use crate::files::write_text;
 use crate::folder::{Contents, csv, write_folder};
 use crate::machine::Machine;
-use crate::options::positive;
+use crate::options::{not_negative, positive};
+use crate::platform::can;
 use crate::report::{self, Page};
 use crate::scenario::System;
-use crate::scenario::traction::{Traction, TractionOptions, identification};
+use crate::scenario::traction::identification::{self, Stand};
+use crate::scenario::traction::{Traction, TractionOptions};
 use crate::trace::Recorded;
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use serde_json::Map;
 use std::path::PathBuf;
 use std::process::ExitCode;
+use tractive::identification::{Observation, Stage, Units};
 
 /// The options of an identification.
 #[derive(Clone, Debug, Args)]
@@ -35,6 +42,18 @@ pub struct Identify {
     /// Inertia of the free rotor, in kg·m²; default the folder's.
     #[arg(long, value_name = "KG_M2", value_parser = positive, allow_negative_numbers = true)]
     pub inertia: Option<f64>,
+    /// From this time on a current sensor reads too much, in s: the fault ends the experiment.
+    #[arg(long, value_name = "SECONDS", value_parser = not_negative, allow_negative_numbers = true)]
+    pub fault_at: Option<f64>,
+    /// Command the drive over the protocol, as a board is: charge, enable, stop, and gather what it has kept, frame by frame.
+    #[arg(long)]
+    pub over_protocol: bool,
+    /// With --over-protocol: a file for the frames, as candump logs them.
+    #[arg(long, value_name = "FILE", requires = "over_protocol")]
+    pub frames: Option<PathBuf>,
+    /// Identify the machine of a board on this CAN interface, for instance can0; on Linux.
+    #[arg(long, value_name = "INTERFACE", conflicts_with_all = ["over_protocol", "on", "fault_at", "inertia"])]
+    pub can: Option<String>,
     /// The page to write; default target/tractive/identify-NAME.html.
     #[arg(long, value_name = "FILE.html")]
     pub page: Option<PathBuf>,
@@ -51,13 +70,8 @@ pub fn command(identify: &Identify) -> Result<ExitCode> {
     let machine = Machine::load(identify.options.machine.as_deref().unwrap_or(Traction::MACHINE))?;
     let outcome = match identified(identify, &machine)? {
         Ok(outcome) => outcome,
-        Err(trip) => {
-            eprintln!(
-                "fault {}: {} (limit {}): nothing is written",
-                trip.fault.name(),
-                trip.value,
-                trip.limit
-            );
+        Err(Ended { fault, value, limit }) => {
+            eprintln!("fault {fault}: {value} (limit {limit}): nothing is written");
             return Ok(ExitCode::from(1));
         }
     };
@@ -80,20 +94,64 @@ pub fn command(identify: &Identify) -> Result<ExitCode> {
 ///
 /// # Errors
 /// As [`command`].
-pub fn identified(
-    identify: &Identify,
-    machine: &Machine,
-) -> Result<std::result::Result<Outcome, tractive::protection::Trip>> {
+pub fn identified(identify: &Identify, machine: &Machine) -> Result<std::result::Result<Outcome, Ended>> {
+    if let Some(interface) = &identify.can {
+        return on_bus(interface, machine);
+    }
     let options = &identify.options;
     Traction::check(options, &Map::new(), machine)?;
     let parameters = &machine.folder.parameters;
-    let inertia = identify.inertia.unwrap_or(parameters.rotor_inertia_kg_m2);
-    let recording = identification::drive(options, machine, inertia)?;
-    if let Some(trip) = recording.trip() {
-        return Ok(Err(trip));
+    let inertia_kg_m2 = identify.inertia.unwrap_or(parameters.rotor_inertia_kg_m2);
+    let stand = Stand { inertia_kg_m2, fault_at_s: identify.fault_at };
+    let (recording, observed) = if identify.over_protocol {
+        let mut commander = Commander::new(Units::of(&machine.tables.ratings));
+        let recording = identification::drive_commanded(options, machine, &stand, &mut commander)?;
+        if let Some(log) = &identify.frames {
+            write_text(log, &commander.frames)?;
+        }
+        (recording, commander.finish())
+    } else {
+        let mut recording = identification::drive(options, machine, &stand)?;
+        let observed = match recording.trip() {
+            Some(trip) => Err(Ended {
+                fault: trip.fault.name().to_owned(),
+                value: trip.value.to_string(),
+                limit: trip.limit.to_string(),
+            }),
+            None => Ok(std::mem::take(&mut recording.observations)),
+        };
+        (recording, observed)
+    };
+    let observations = match observed.and_then(complete) {
+        Ok(observations) => observations,
+        Err(ended) => return Ok(Err(ended)),
+    };
+    let peak_a = recording.rows.iter().map(|row| row.id_a.hypot(row.iq_a)).fold(0.0, f64::max);
+    let truth = Truth::of(options, machine, inertia_kg_m2)?;
+    Outcome::of(&observations, peak_a, machine, Some(&truth)).map(Ok)
+}
+
+/// Observations of an experiment that has come to its end: one whose rotor is not where it should be, as its angle is wrong or a load turns
+/// it, ends before the rotor is to turn.
+fn complete(observations: Vec<Observation>) -> std::result::Result<Vec<Observation>, Ended> {
+    if observations.iter().any(|observation| observation.stage == Stage::Turn) {
+        return Ok(observations);
     }
-    let truth = Truth::of(options, machine, inertia)?;
-    Outcome::of(&recording, machine, &truth).map(Ok)
+    let (value, limit) = ("more".to_owned(), "5° before it is to turn".to_owned());
+    Err(Ended { fault: "rotor_turned".to_owned(), value, limit })
+}
+
+/// The same of a drive on a CAN bus, whose truth nobody knows.
+fn on_bus(interface: &str, machine: &Machine) -> Result<std::result::Result<Outcome, Ended>> {
+    let mut commander = Commander::new(Units::of(&machine.tables.ratings));
+    can::drive(interface, &mut commander)?;
+    let observations = match commander.finish().and_then(complete) {
+        Ok(observations) => observations,
+        Err(ended) => return Ok(Err(ended)),
+    };
+    let currents = observations.iter().map(|observation| observation.current.length());
+    let peak_a = currents.fold(0.0, f32::max);
+    Outcome::of(&observations, peak_a.into(), machine, None).map(Ok)
 }
 
 /// The machine folder of an outcome.

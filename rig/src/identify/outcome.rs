@@ -1,11 +1,11 @@
 //! The outcome of an experiment, and how far it is from the truth.
 
 use super::fit::Fit;
+use super::signs::Signs;
 use crate::analysis::Figures;
 use crate::machine::Machine;
 use crate::report::Page;
 use crate::scenario::traction::Options;
-use crate::trace::Recording;
 use anyhow::Result;
 use core::f64::consts::TAU;
 use tractive::identification::{Observation, Stage};
@@ -75,38 +75,45 @@ pub struct Outcome {
     /// Worst error of the torque along the map's own MTPA, as a share of the largest torque.
     pub torque_worst: f64,
     inertia_error: f64,
+    /// Signs and zeros, as the observations tell them.
+    pub signs: Signs,
 }
 
 /// Radius of the circle in which flux linkages are judged, as a share of the bound: 200 A of 233 A.
 const JUDGED: f64 = 0.857;
 
 impl Outcome {
-    /// Of a recording.
+    /// Of observations, with the largest current, in A; errors are told where the truth is known.
     ///
     /// # Errors
     /// Observations that do not tell the machine.
-    pub fn of(recording: &Recording, machine: &Machine, truth: &Truth) -> Result<Self> {
+    pub fn of(
+        observations: &[Observation],
+        peak_a: f64,
+        machine: &Machine,
+        truth: Option<&Truth>,
+    ) -> Result<Self> {
         let parameters = &machine.folder.parameters;
-        let bound_a = parameters.max_current_a;
-        let observations = &recording.observations;
+        let (bound_a, pole_pairs) = (parameters.max_current_a, f64::from(parameters.pole_pairs));
         let fit = Fit::of(observations, bound_a, 0.5 / parameters.max_switching_hz)?;
         let still = |observation: &&Observation| !matches!(observation.stage, Stage::Turn | Stage::Done);
         let pulses_s = observations.iter().filter(still).map(|o| f64::from(o.length_s)).sum();
-        let peak_a = recording.rows.iter().map(|row| row.id_a.hypot(row.iq_a)).fold(0.0, f64::max);
-        let inertia_kg_m2 = inertia(observations, &fit, truth.pole_pairs);
-        let (flux_rms, flux_worst) = flux_errors(&fit, truth, bound_a);
-        let (magnet_wb, true_wb) = (fit.flux(0.0, 0.0).0, truth.flux(0.0, 0.0).0);
+        let inertia_kg_m2 = inertia(observations, &fit, pole_pairs);
+        let of = |error: fn(&Fit, &Truth, &Machine) -> f64| {
+            truth.map_or(f64::NAN, |truth| error(&fit, truth, machine))
+        };
         Ok(Self {
             inertia_kg_m2,
             pulses_s,
             peak_share: peak_a / bound_a,
-            turned_deg: turned_deg(observations, truth.pole_pairs),
-            flux_rms,
-            flux_worst,
-            magnet_error: magnet_wb / true_wb - 1.0,
-            resistance_error: fit.resistance_ohm / truth.resistance_ohm - 1.0,
-            torque_worst: torque_error(&fit, truth, machine),
-            inertia_error: inertia_kg_m2 / truth.inertia_kg_m2 - 1.0,
+            turned_deg: turned_deg(observations, pole_pairs),
+            flux_rms: of(|fit, truth, machine| flux_errors(fit, truth, machine).0),
+            flux_worst: of(|fit, truth, machine| flux_errors(fit, truth, machine).1),
+            magnet_error: of(|fit, truth, _| fit.flux(0.0, 0.0).0 / truth.flux(0.0, 0.0).0 - 1.0),
+            resistance_error: of(|fit, truth, _| fit.resistance_ohm / truth.resistance_ohm - 1.0),
+            torque_worst: of(torque_error),
+            signs: Signs::of(observations, &fit, 0.5 / parameters.max_switching_hz),
+            inertia_error: truth.map_or(f64::NAN, |truth| inertia_kg_m2 / truth.inertia_kg_m2 - 1.0),
             fit,
         })
     }
@@ -131,7 +138,8 @@ impl Outcome {
             ("stator_resistance_error_percent", percent(self.resistance_error)),
             ("rotor_inertia_error_percent", percent(self.inertia_error)),
         ];
-        values.iter().for_each(|(name, value)| figures.set(name, value));
+        // Without a truth no error is known.
+        values.iter().filter(|(_, value)| !value.is_nan()).for_each(|(name, value)| figures.set(name, value));
         figures
     }
 
@@ -208,7 +216,8 @@ fn inertia(observations: &[Observation], fit: &Fit, pole_pairs: f64) -> f64 {
 }
 
 /// Errors of the flux linkage within the circle, as shares of the largest there: root mean square, worst.
-fn flux_errors(fit: &Fit, truth: &Truth, bound_a: f64) -> (f64, f64) {
+fn flux_errors(fit: &Fit, truth: &Truth, machine: &Machine) -> (f64, f64) {
+    let bound_a = machine.folder.parameters.max_current_a;
     let (mut most, mut sum, mut worst, mut count) = (0.0_f64, 0.0, 0.0_f64, 0.0);
     for d in -50..=50 {
         for q in -50..=50 {

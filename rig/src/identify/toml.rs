@@ -1,8 +1,7 @@
 //! `machine.toml` of an identified machine: the nameplate's keys, and what was found.
 
 use super::Outcome;
-use crate::folder::digits;
-use std::fmt::Write as _;
+use crate::folder::{digits, toml};
 use tractive_tablegen::{FluxMap, Optimum, Parameters, SmoothMap};
 
 /// The text. The largest torque is the nameplate's, or what the map gives within the largest current, whichever is less.
@@ -35,13 +34,5 @@ pub fn of(outcome: &Outcome, map: &FluxMap, given: &Parameters) -> String {
         ("loss_rated_w", given.loss_rated_w, "given"),
         ("loss_quadratic_fraction", given.loss_quadratic_fraction, "given"),
     ];
-    let mut text = format!(
-        "# Made by: cargo rig identify\n# Currents and voltages of phases are peak values.\nname = {:?}\n\n",
-        given.name
-    );
-    for (key, value, from) in keys {
-        let pair = format!("{key} = {value}");
-        let _ = writeln!(text, "{pair:<40}# {from}");
-    }
-    text
+    toml(&given.name, "identify", &keys)
 }

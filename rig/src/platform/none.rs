@@ -1,5 +1,8 @@
 //! No operating system: a program in a browser, which simulates and keeps what it sees.
 
+#[path = "no_can.rs"]
+pub(crate) mod can;
+
 use anyhow::{Result, bail};
 use std::io::Write;
 use std::path::{Path, PathBuf};

@@ -1,5 +1,9 @@
 //! An operating system with files, pipes and a clock of the processor.
 
+#[cfg_attr(target_os = "linux", path = "linux_can.rs")]
+#[cfg_attr(not(target_os = "linux"), path = "no_can.rs")]
+pub(crate) mod can;
+
 use anyhow::{Context, Result};
 use rustix::fs::{CWD, FileType, Mode, RenameFlags, renameat_with};
 use std::io::Write;

@@ -23,6 +23,11 @@ impl Lines {
         Ok(Self::Script(lines.into()))
     }
 
+    /// Those of a text. The error names the line and the word.
+    pub fn of_text(text: &str, system: System) -> Result<Self> {
+        Ok(Self::Script(script::script(text, system)?.into()))
+    }
+
     /// `true` if somebody types them.
     pub fn are_typed(&self) -> bool {
         matches!(self, Self::Typed(_))

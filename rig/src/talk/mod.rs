@@ -5,7 +5,7 @@ mod listener;
 mod outcome;
 mod page;
 pub mod script;
-mod sender;
+pub mod sender;
 mod supervisor;
 mod system;
 
@@ -47,7 +47,10 @@ pub fn run(options: &TalkOptions) -> Result<Outcome> {
     let machine = Machine::load(options.machine_name())?;
     let mut talk = Talk::new(system, lines, options.inertia(), machine.folder.parameters.max_torque_nm);
     let recording = match system {
-        System::Pmasynrm => Happened::Pmasynrm(with_traction(options, &machine, &mut talk)?),
+        System::Pmasynrm => {
+            let own = Options { run: run_options(options), own: options.traction.clone() };
+            Happened::Pmasynrm(with_traction(&own, options.inertia(), &machine, &mut talk)?)
+        }
         System::Zs9 => Happened::Zs9(with_zs9(options, &machine, &mut talk)?),
     };
     let figures = figures(&talk, &recording);
@@ -58,19 +61,26 @@ fn run_options(options: &TalkOptions) -> RunOptions {
     RunOptions { dt: Some(options.run.dt.unwrap_or(TRACE_STEP_S)), ..options.run.clone() }
 }
 
-/// A rotor on a link, commanded over the protocol.
-fn with_traction(options: &TalkOptions, machine: &Machine, talk: &mut Talk) -> Result<Recording> {
-    let own = Options { run: run_options(options), own: options.traction.clone() };
-    Traction::check(&own, &Map::new(), machine)?;
+/// A rotor of this inertia, in kg·m², on a link, commanded over the protocol.
+///
+/// # Errors
+/// Options that make no sense, or an emulator that does not do its part.
+pub fn with_traction(
+    options: &traction::Options,
+    inertia_kg_m2: f64,
+    machine: &Machine,
+    talk: &mut Talk,
+) -> Result<Recording> {
+    Traction::check(options, &Map::new(), machine)?;
     let idle = Request::idle(&machine.tables.ratings);
     // The frames ask, not this.
     let line = LinePlan::new(scaled_link(machine), Box::new(move |_| idle));
     let plan = traction::Plan {
-        judged_step_s: own.dt.unwrap_or(TRACE_STEP_S),
-        speed: SpeedSource::Inertia { inertia_kg_m2: options.inertia(), load_nm: 0.0 },
+        judged_step_s: options.dt.unwrap_or(TRACE_STEP_S),
+        speed: SpeedSource::Inertia { inertia_kg_m2, load_nm: 0.0 },
         ..traction::Plan::operated(LONGEST_S, vec![(0.0, 0.0)], line)
     };
-    Traction::run("talk", plan, &own, machine, Some(talk))
+    Traction::run("talk", plan, options, machine, Some(talk))
 }
 
 /// Two rotors on an empty network, commanded over the protocol.

@@ -40,6 +40,9 @@ pub fn run(args: &TimingArgs) -> Result<u8> {
     let qemu = setup.qemu()?;
     let toolchain = setup.toolchain()?;
     let rig = build::rig()?;
+    if args.identify {
+        return identify(&system::identification(&toolchain, &rig, &qemu)?);
+    }
     let blocks = blocks::measure(&toolchain, &qemu)?;
     let (mut systems, mut pi) = (Vec::new(), Vec::new());
     for system in System::ALL {
@@ -72,6 +75,30 @@ pub fn run(args: &TimingArgs) -> Result<u8> {
         eprintln!("{complaint}");
     }
     Ok(budget::exit_code(&judged).max(u8::from(!complaints.is_empty())))
+}
+
+/// The interrupts of the image that identifies its machine, against the budgets of the drive's.
+fn identify(statistics: &statistics::Statistics) -> Result<u8> {
+    let budgets = build::root().join("budgets.toml");
+    let text = std::fs::read_to_string(&budgets).with_context(|| budgets.display().to_string())?;
+    let mut all: toml::Table = text.parse().context("budgets.toml")?;
+    all.retain(|group, _| group == "pmasynrm");
+    for group in all.iter_mut().filter_map(|(_, group)| group.as_table_mut()) {
+        group.retain(|name, _| name == "control-max" || name == "pwm-max");
+    }
+    let worst = |interrupt: &str| {
+        statistics.of(interrupt).map(|row| f64::from(row.instructions.max)).fold(0.0, f64::max)
+    };
+    let values = [("pmasynrm.control-max", worst("control")), ("pmasynrm.pwm-max", worst("pwm"))];
+    let judged = budget::judge(&toml::to_string(&all)?, &values)?;
+    for budget::Judged { name, value, budget } in &judged {
+        println!("{name:<24} {value:>6} of {:>6}: {}", budget.bound(), budget.verdict(*value).name());
+    }
+    for interrupt in ["control", "pwm"] {
+        let mean = statistics.of(interrupt).map(|row| row.instructions.mean()).fold(0.0, f64::max);
+        println!("{interrupt:<24} {mean:>6.0} on average");
+    }
+    Ok(budget::exit_code(&judged))
 }
 
 /// The values of a system that have a budget.

@@ -130,6 +130,24 @@ impl System {
     }
 }
 
+/// The cost of an identification: the whole experiment, with dead time.
+pub fn identification(toolchain: &Toolchain, rig: &Path, qemu: &Path) -> Result<Statistics> {
+    let path = build::identify_image(toolchain, None)?;
+    let bench = Bench {
+        rig: rig.to_owned(),
+        qemu: qemu.to_owned(),
+        command: vec!["identify".to_owned()],
+        image: image::read(&path)?,
+        path,
+        keeps_paths: false,
+    };
+    let mut statistics = Statistics::default();
+    for drive in drive_all("identify", &[(&bench, "--inertia=3 --dead-time-us=5".to_owned())])? {
+        statistics.add(&drive)?;
+    }
+    Ok(statistics)
+}
+
 /// The control interrupt's instructions under a law: the mean in its dearest mode, and the most.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct LawCost {

@@ -148,14 +148,6 @@ impl ControlLaw for PiLaw {
         &mut self.speed
     }
 
-    fn map_scale(&self) -> f32 {
-        1.0
-    }
-
-    fn map_error(&self) -> f32 {
-        0.0
-    }
-
     fn passed_s(&self, clock: &Clock) -> f32 {
         self.count as f32 * clock.control_s()
     }

@@ -6,6 +6,7 @@ use crate::without::Ablation;
 use anyhow::Result;
 use tractive::control::{ControlLaw, Controller};
 use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
+use tractive::experiment::{Memory, Teller};
 use tractive::frames::Abc;
 use tractive::machine::{Ratings, Tables};
 use tractive::modulation::{CarrierHalf, Ladder, Schedule};
@@ -31,6 +32,8 @@ struct Port<'a, 'w> {
 struct Wire<'w> {
     station: CanEndpoint,
     supervisor: &'w mut dyn Supervisor,
+    /// The frames of an identification, where the drive's leave room.
+    teller: Option<(Teller, &'w Memory)>,
 }
 
 impl Port<'_, '_> {
@@ -119,7 +122,9 @@ impl OperatorPort for Port<'_, '_> {
             self.error = Some(error.into());
         }
         let Some(wire) = &mut self.wire else { return };
-        if let Some(frame) = wire.station.tell(status, report) {
+        let more = wire.teller.as_mut();
+        let own = wire.station.tell(status, report);
+        if let Some(frame) = own.or_else(|| more.and_then(|(teller, memory)| teller.tell(memory))) {
             wire.supervisor.hear(self.bench.instant_s(from), &frame);
         }
     }
@@ -136,7 +141,11 @@ pub struct Tasks<'a, L = Controller> {
     /// Over the protocol, if there is a supervisor.
     wire: Option<Wire<'a>>,
     without: Option<Ablation>,
+    after_control: Option<AfterControl<'a, L>>,
 }
+
+/// The work of an image with its law at the end of a control interrupt that began at the instant; `true` if that begins a slot.
+type AfterControl<'a, L> = Box<dyn FnMut(&mut L, Instant, bool) + 'a>;
 
 impl Tasks<'_> {
     /// Before their first interrupts.
@@ -175,7 +184,14 @@ impl<'a, L: ControlLaw> Tasks<'a, L> {
             clock: settings.clock,
             wire: None,
             without: None,
+            after_control: None,
         }
+    }
+
+    /// The same with something that is done at the end of each control interrupt.
+    pub fn doing(mut self, after_control: impl FnMut(&mut L, Instant, bool) + 'a) -> Self {
+        self.after_control = Some(Box::new(after_control));
+        self
     }
 
     /// The same with an operator who switches the line side, if the bench has one to ask.
@@ -187,7 +203,15 @@ impl<'a, L: ControlLaw> Tasks<'a, L> {
     /// The same commanded over the protocol, if there is a supervisor.
     pub fn commanded_by(mut self, supervisor: Option<&'a mut (dyn Supervisor + '_)>) -> Self {
         let station = CanEndpoint::new(self.operator.ratings);
-        self.wire = supervisor.map(|supervisor| Wire { station, supervisor });
+        self.wire = supervisor.map(|supervisor| Wire { station, supervisor, teller: None });
+        self
+    }
+
+    /// The same with the frames of what an identification keeps.
+    pub fn telling(mut self, memory: &'a Memory) -> Self {
+        if let Some(wire) = &mut self.wire {
+            wire.teller = Some((Teller::new(), memory));
+        }
         self
     }
 
@@ -246,7 +270,11 @@ impl<L: ControlLaw> Interrupts for Tasks<'_, L> {
         if self.control.wants_revision() {
             self.pwm.revise(&mut port, &self.shared);
         }
+        let now = self.control.next_call();
         self.control.run(&mut port, &self.shared);
+        if let Some(after_control) = &mut self.after_control {
+            after_control(self.control.law_mut(), now, self.shared.operator.has_told(now));
+        }
         // The idle loop goes on where the interrupt ends.
         if port.bench.is_operated() {
             self.slot.run(&self.shared.operator, &mut port, &operator, &self.clock);

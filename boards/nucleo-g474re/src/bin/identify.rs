@@ -1,0 +1,127 @@
+//! The firmware that identifies its machine on the NUCLEO-G474RE: that of the drive with another control law, whose observations it keeps and
+//! tells over CAN.
+#![cfg_attr(target_os = "none", no_std, no_main)]
+
+/// The image runs on the board; on the host it names the command that brings it there.
+#[cfg(not(target_os = "none"))]
+fn main() {
+    println!("This is the firmware. `cargo xtask flash --identify` builds it for its board and flashes it.");
+}
+
+#[cfg(target_os = "none")]
+mod firmware {
+    use core::sync::atomic::{AtomicU32, Ordering};
+    use cortex_m_rt::{entry, exception, interrupt};
+    use nucleo_g474re::built_in::traction::{BUILT_IN, BuiltIn};
+    use nucleo_g474re::position::Encoder;
+    use nucleo_g474re::power_stage::{AdcCode, POWER_STAGE};
+    use nucleo_g474re::registers::Registers;
+    use nucleo_g474re::sampling::Zeros;
+    use nucleo_g474re::serve::Identifying;
+    use nucleo_g474re::start::Plan;
+    use nucleo_g474re::{
+        self as board, CLOCK, Control, Interrupt as interrupt, POSITION, PULSE, Pwm, SHARED,
+    };
+    use tractive::control::Gains;
+    use tractive::drive::traction::{ControlTask, PwmTask, Settings};
+    use tractive::experiment::Memory;
+    use tractive::identification::{Identification, Units};
+    use tractive::modulation::SwitchLimits;
+    use tractive::protection::Violation;
+    use tractive::protocol::CanEndpoint;
+    use tractive::time::Instant;
+
+    /// The zeros that the start measured, written before the interrupts are unmasked.
+    static CONTROL_ZEROS: [AtomicU32; 3] = [const { AtomicU32::new(0) }; 3];
+    static PWM_ZEROS: [AtomicU32; 3] = [const { AtomicU32::new(0) }; 3];
+
+    static MEMORY: Memory = Memory::new();
+    static UNITS: Units = Units::of(&BUILT_IN.ratings);
+
+    /// Nothing compensates the dead time: the host counts the pulses as they are commanded.
+    const fn settings() -> Settings {
+        let drive = POWER_STAGE.settings(&BUILT_IN.ratings);
+        let devices = SwitchLimits { dead_time_ticks: 0, ..drive.devices };
+        Settings { devices, gains: Gains::of(true, false), ..drive }
+    }
+
+    // The build script has said so already, by name: a machine with which the drive would not start makes no image.
+    const _: () = assert!(settings().check(&BUILT_IN).is_ok());
+
+    fn keep(cells: &[AtomicU32; 3], zeros: Zeros) {
+        for (cell, zero) in cells.iter().zip(zeros) {
+            cell.store(u32::from(zero.0), Ordering::Relaxed);
+        }
+    }
+
+    fn kept(cells: &[AtomicU32; 3]) -> Zeros {
+        cells.each_ref().map(|cell| AdcCode(cell.load(Ordering::Relaxed) as u16))
+    }
+
+    #[entry]
+    fn main() -> ! {
+        board::idle_over(Identifying::new(CanEndpoint::new(&BUILT_IN.ratings), &MEMORY), start().err())
+    }
+
+    /// Starts the drive; the error is why it is refused.
+    fn start() -> Result<(), Violation> {
+        let plan = Plan { shortest_half_ticks: settings().devices.shortest_half_ticks };
+        let found = board::prepare(plan).map_err(|error| error.violation())?;
+        keep(&CONTROL_ZEROS, found.control_zeros);
+        keep(&PWM_ZEROS, found.pwm_zeros);
+        board::run();
+        Ok(())
+    }
+
+    /// Deadline: the next control interrupt. Missed: fault `control_deadline`, gates into the safe state.
+    #[interrupt]
+    fn TIM3() {
+        static mut BOARD: Option<Control<'static, Encoder>> = None;
+        static mut TASK: Option<ControlTask<BuiltIn, Identification>> = None;
+        let board = BOARD.get_or_insert_with(|| {
+            let registers = Registers::CHIP;
+            let encoder = Encoder::new(registers.tim4, &POWER_STAGE, BUILT_IN.ratings.pole_pairs as u32);
+            Control::new(registers, kept(&CONTROL_ZEROS), encoder, &POSITION)
+        });
+        let first = Instant(CLOCK.control_ticks);
+        let task = TASK
+            .get_or_insert_with(|| ControlTask::with_law(BuiltIn, settings(), first, Identification::new()));
+        let now = task.next_call();
+        task.run(board, &SHARED);
+        let newest = task.law_mut().take();
+        MEMORY.take(newest.as_ref(), &UNITS, SHARED.operator.has_told(now));
+        PULSE.control_ran();
+    }
+
+    /// Deadline: the next carrier boundary, where the shadow registers take over. Missed: a break, gates off for good.
+    #[interrupt]
+    fn TIM1_UP_TIM16() {
+        static mut BOARD: Option<Pwm> = None;
+        static mut TASK: Option<PwmTask<BuiltIn>> = None;
+        let board = BOARD.get_or_insert_with(|| Pwm::new(Registers::CHIP, kept(&PWM_ZEROS)));
+        let task = TASK.get_or_insert_with(|| {
+            let settings = settings();
+            let first = Instant(settings.devices.shortest_half_ticks);
+            PwmTask::new(BuiltIn, settings, first)
+        });
+        if task.run(board, &SHARED) {
+            PULSE.pwm_ran();
+        }
+    }
+
+    #[exception]
+    unsafe fn HardFault(_frame: &cortex_m_rt::ExceptionFrame) -> ! {
+        board::die()
+    }
+
+    /// Any other exception or interrupt: there is none that the drive survives (the clock security system's among them).
+    #[exception]
+    unsafe fn DefaultHandler(_number: i16) -> ! {
+        board::die()
+    }
+
+    #[panic_handler]
+    fn panic(_info: &core::panic::PanicInfo) -> ! {
+        board::die()
+    }
+}

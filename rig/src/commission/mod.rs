@@ -1,0 +1,69 @@
+//! `cargo rig commission`: an unknown machine brought to its first torque, step by step, on the rig, in QEMU or on a board over CAN.
+//!
+//! 1. **Wiring**: the link charged and discharged, gates off: its voltage, and the currents' readings where none flows.
+//! 2. **Identification**, with a free rotor; of its observations signs of sensors and the angle's zero and direction are told as well.
+//! 3. **Tables**: the machine folder, as the table generator takes it.
+//! 4. **First torque** with these tables, a little of it, and whether what flows is what was asked for.
+//!
+//! What each step found stands in a record, also where one has not passed; then the next ones are not done.
+
+mod options;
+mod record;
+mod steps;
+
+pub use options::Commission;
+pub use record::{Record, Step};
+
+use crate::machine::Machine;
+use crate::scenario::System as _;
+use crate::scenario::traction::Traction;
+use anyhow::{Context, Result, bail};
+use std::io::{BufRead, Write};
+use std::process::ExitCode;
+
+/// Leads through the steps. Exit code 1 where one has not passed.
+///
+/// # Errors
+/// Options that make no sense, and what [`crate::identify::command`] and a talk may refuse.
+pub fn command(commission: &Commission) -> Result<ExitCode> {
+    let identify = &commission.identify;
+    let Some(out) = &identify.options.out else {
+        bail!("--out: must name the machine folder to make");
+    };
+    let machine = Machine::load(identify.options.machine.as_deref().unwrap_or(Traction::MACHINE))?;
+    let path = commission.record.clone().unwrap_or_else(|| {
+        let name = out.file_name().unwrap_or_default().to_string_lossy();
+        out.with_file_name(format!("{name}-commissioning.toml"))
+    });
+    let mut record = Record::new(machine.tables.name, identify);
+    for step in steps::ALL {
+        if !commission.yes && !asked(step)? {
+            crate::say!("stopped before: {}", step.name);
+            break;
+        }
+        crate::say!("{} …", step.name);
+        let done = (step.run)(commission, &machine).with_context(|| step.name)?;
+        crate::say!("{done}");
+        let passed = done.passed;
+        record.steps.push(done);
+        // As far as it has come, whatever comes next.
+        record.write(&path)?;
+        if !passed {
+            break;
+        }
+    }
+    record.finished = record.steps.len() == steps::ALL.len() && record.steps.iter().all(|step| step.passed);
+    record.write(&path)?;
+    crate::say!("record: {}", path.display());
+    Ok(ExitCode::from(u8::from(!record.finished)))
+}
+
+/// The answer of the person at the terminal: `true` if ready for a step.
+fn asked(step: &steps::Way) -> Result<bool> {
+    crate::say!("\n{}\n{}", step.name, step.asks);
+    eprint!("[Enter] to go on, q to stop: ");
+    std::io::stderr().flush()?;
+    let mut answer = String::new();
+    let read = std::io::stdin().lock().read_line(&mut answer)?;
+    Ok(read > 0 && answer.trim().is_empty())
+}

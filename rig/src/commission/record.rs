@@ -1,0 +1,101 @@
+//! The record of a commissioning.
+
+use crate::files::write_text;
+use crate::identify::Identify;
+use anyhow::Result;
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::fmt::{Display, Formatter};
+use std::path::Path;
+use std::time::{SystemTime, UNIX_EPOCH};
+
+/// A step that was done.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Step {
+    /// Its name.
+    pub name: &'static str,
+    /// `true` if it has passed.
+    pub passed: bool,
+    /// The reasons why it has not.
+    pub complaints: Vec<String>,
+    /// The numbers that it found, by their names with units.
+    pub found: BTreeMap<&'static str, f64>,
+}
+
+impl Step {
+    /// A step that has passed so far.
+    pub fn new(name: &'static str) -> Self {
+        Self { name, passed: true, ..Self::default() }
+    }
+
+    /// Notes a number.
+    pub fn find(&mut self, name: &'static str, value: f64) {
+        self.found.insert(name, value);
+    }
+
+    /// Notes a number that is to lie between two others; it has not passed otherwise.
+    pub fn within(&mut self, name: &'static str, value: f64, [least, most]: [f64; 2]) {
+        self.find(name, value);
+        if !(least..=most).contains(&value) {
+            self.fail(format!("{name} is {value}: must be from {least} to {most}"));
+        }
+    }
+
+    /// It has not passed, and why.
+    pub fn fail(&mut self, complaint: String) {
+        self.passed = false;
+        self.complaints.push(complaint);
+    }
+}
+
+impl Display for Step {
+    fn fmt(&self, to: &mut Formatter) -> std::fmt::Result {
+        for (name, value) in &self.found {
+            writeln!(to, "  {name:<34}{value:.5}")?;
+        }
+        for complaint in &self.complaints {
+            writeln!(to, "  {complaint}")?;
+        }
+        write!(to, "  {}", if self.passed { "passed" } else { "NOT PASSED" })
+    }
+}
+
+/// The whole record.
+#[derive(Clone, Debug, Serialize)]
+pub struct Record {
+    /// The nameplate's machine.
+    machine: &'static str,
+    /// The place: `host`, `qemu` or the CAN interface.
+    on: String,
+    version: &'static str,
+    /// The time at which it began, in seconds since 1970.
+    began_unix_s: u64,
+    /// `true` if every step has passed.
+    pub finished: bool,
+    /// The steps that were done.
+    #[serde(rename = "step")]
+    pub steps: Vec<Step>,
+}
+
+impl Record {
+    /// Nothing done yet.
+    pub fn new(machine: &'static str, identify: &Identify) -> Self {
+        let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+        Self {
+            machine,
+            on: identify.can.clone().unwrap_or_else(|| identify.options.on.name().to_owned()),
+            version: env!("CARGO_PKG_VERSION"),
+            began_unix_s: since.as_secs(),
+            finished: false,
+            steps: Vec::new(),
+        }
+    }
+
+    /// Writes it.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub fn write(&self, path: &Path) -> Result<()> {
+        write_text(path, &toml::to_string(self)?)
+    }
+}

@@ -1,0 +1,187 @@
+//! The steps of a commissioning.
+
+use super::options::Commission;
+use super::record::Step;
+use crate::folder::write_folder;
+use crate::identify::{Ended, Identify, contents, identified};
+use crate::machine::Machine;
+use crate::options::On;
+use crate::platform::can;
+use crate::scenario::System as _;
+use crate::scenario::traction::{Options, Traction};
+use crate::talk::{self, Lines, System, Talk};
+use anyhow::{Result, bail};
+
+/// A step, and what it asks of the person who does it.
+pub struct Way {
+    /// Its name.
+    pub name: &'static str,
+    /// The state in which everything has to be.
+    pub asks: &'static str,
+    /// The step itself.
+    pub run: fn(&Commission, &Machine) -> Result<Step>,
+}
+
+/// All of them, in their order.
+pub const ALL: &[Way] = &[
+    Way {
+        name: "wiring",
+        asks: "The image that identifies is on the board, the machine is connected, its rotor stands. Gates stay off; the link is charged \
+               and discharged.",
+        run: wiring,
+    },
+    Way {
+        name: "identification",
+        asks: "The rotor is free: no load, nothing in its way. It swings by some degrees, then turns slowly. Stay away from it. The machine \
+               folder is written.",
+        run: identification,
+    },
+    Way {
+        name: "tables",
+        asks: "The table generator reads the machine folder; on a board the drive's image is flashed with it now: \
+               cargo xtask flash --machine FOLDER.",
+        run: tables,
+    },
+    Way {
+        name: "first torque",
+        asks: "The drive's image with these tables is on the board. A twentieth of the largest torque turns the free rotor for a moment.",
+        run: first_torque,
+    },
+];
+
+/// Share of the largest torque that the first one is, and its times: up, held, in s.
+const TORQUE_SHARE: f64 = 0.05;
+const HELD_S: f64 = 0.3;
+/// Reading without current, as a share of the largest; error of the angle's zero, in degrees; torque off what was asked for, as a share of
+/// the largest.
+const REST_SHARE: f64 = 0.02;
+const ZERO_DEG: f64 = 5.0;
+const RESPONSE_DEG: f64 = 20.0;
+const TORQUE_OFF_SHARE: f64 = 0.02;
+
+/// A talk of these lines: on the bench with the machine that the drive knows, or with whoever is on the bus.
+fn talk(commission: &Commission, options: &Options, machine: &Machine, script: &str) -> Result<Talk> {
+    let identify = &commission.identify;
+    let parameters = &machine.folder.parameters;
+    let inertia = identify.inertia.unwrap_or(parameters.rotor_inertia_kg_m2);
+    let lines = Lines::of_text(script, System::Pmasynrm)?;
+    let mut talk = Talk::new(System::Pmasynrm, lines, inertia, parameters.max_torque_nm);
+    match &identify.can {
+        Some(interface) => can::drive(interface, &mut talk)?,
+        None => talk::with_traction(options, inertia, machine, &mut talk).map(drop)?,
+    }
+    Ok(talk)
+}
+
+/// The values of a column in the rows that a state names.
+fn told(talk: &Talk, state: &str, column: &str) -> Vec<f64> {
+    let place = |name| System::Pmasynrm.column(name).unwrap_or_default();
+    let (states, values) = (place("state"), place(column));
+    talk.rows.iter().filter(|row| row[states] == state).filter_map(|row| row[values].parse().ok()).collect()
+}
+
+fn largest(values: &[f64]) -> f64 {
+    values.iter().copied().fold(f64::NAN, f64::max)
+}
+
+fn fault(talk: &Talk, step: &mut Step) {
+    let fault = talk.listener.value("fault");
+    if !fault.is_empty() {
+        step.fail(format!(
+            "fault {fault}: {} (limit {})",
+            talk.listener.value("fault_value"),
+            talk.listener.value("fault_limit")
+        ));
+    }
+}
+
+fn wiring(commission: &Commission, machine: &Machine) -> Result<Step> {
+    let script =
+        "wait 0.3\nexpect state ready\ncharge\nwait 4\nexpect state charged\ndischarge\nwait 6\nend\n";
+    let talk = talk(commission, &commission.identify.options, machine, script)?;
+    let parameters = &machine.folder.parameters;
+    let mut step = Step::new("wiring");
+    let link_v = largest(&told(&talk, "charged", "link_v"));
+    step.within("link_charged_v", link_v, [parameters.dc_link_min_v, parameters.dc_link_max_v]);
+    let [ready, charged] = ["ready", "charged"].map(|state| largest(&told(&talk, state, "current_a")));
+    step.within("current_at_rest_a", ready.max(charged), [0.0, REST_SHARE * parameters.max_current_a]);
+    talk.failures.iter().for_each(|failure| step.fail(failure.clone()));
+    fault(&talk, &mut step);
+    Ok(step)
+}
+
+fn identification(commission: &Commission, machine: &Machine) -> Result<Step> {
+    let mut step = Step::new("identification");
+    let identify = Identify { over_protocol: true, ..commission.identify.clone() };
+    let outcome = match identified(&identify, machine)? {
+        Ok(outcome) => outcome,
+        Err(Ended { fault, value, limit }) => {
+            step.fail(format!("fault {fault}: {value} (limit {limit})"));
+            return Ok(step);
+        }
+    };
+    step.within("current_answers_voltage_deg", outcome.signs.response_deg, [-RESPONSE_DEG, RESPONSE_DEG]);
+    step.within("angle_zero_deg", outcome.signs.zero_deg, [-ZERO_DEG, ZERO_DEG]);
+    step.within("turned_by_pulses_deg", outcome.turned_deg, [0.0, 5.0]);
+    step.within("largest_current_of_the_bound", outcome.peak_share, [0.0, 1.1]);
+    step.find("stator_resistance_ohm", outcome.fit.resistance_ohm);
+    step.find("dead_time_us", 1e6 * outcome.fit.dead_time_s);
+    step.find("magnet_flux_wb", outcome.fit.flux(0.0, 0.0).0);
+    step.find("rotor_inertia_kg_m2", outcome.inertia_kg_m2);
+    if let (true, Some(out)) = (step.passed, &commission.identify.options.out) {
+        write_folder(out, &contents(&outcome, machine))?;
+    }
+    Ok(step)
+}
+
+/// The machine folder that was made.
+fn made(commission: &Commission) -> Result<Machine> {
+    match &commission.identify.options.out {
+        Some(out) => Machine::load(&out.to_string_lossy()),
+        None => bail!("--out: must name the machine folder to make"),
+    }
+}
+
+fn tables(commission: &Commission, _machine: &Machine) -> Result<Step> {
+    let made = made(commission)?;
+    let mut step = Step::new("tables");
+    step.find("max_torque_nm", made.folder.parameters.max_torque_nm);
+    step.find("magnet_flux_wb", made.tables.ratings.magnet_flux_wb.into());
+    Ok(step)
+}
+
+fn first_torque(commission: &Commission, machine: &Machine) -> Result<Step> {
+    let identify = &commission.identify;
+    let mut step = Step::new("first torque");
+    let mut options = identify.options.clone();
+    if identify.can.is_none() && options.on == On::Qemu {
+        let Some(image) = &commission.drive_image else {
+            step.fail("--drive-image: must name the drive's image with the tables that were made".to_owned());
+            return Ok(step);
+        };
+        options.run.image = Some(image.clone());
+    }
+    let known = options.machine.clone().unwrap_or_else(|| Traction::MACHINE.to_owned());
+    options.own.plant.get_or_insert(known);
+    let made = made(commission)?;
+    let most_nm = made.folder.parameters.max_torque_nm;
+    let torque_nm = TORQUE_SHARE * most_nm;
+    let script = format!(
+        "wait 0.3\ncharge\nwait 4\nexpect state charged\nenable\nwait 0.2\nexpect state enabled\ntorque {torque_nm} over 0.1\nwait {HELD_S}\n\
+         torque 0 over 0.1\nwait 0.3\ndisable\nwait 0.5\nend\n"
+    );
+    let talk = talk(commission, &options, &made, &script)?;
+    talk.failures.iter().for_each(|failure| step.fail(failure.clone()));
+    fault(&talk, &mut step);
+    let [asked, flowed, speed] =
+        ["torque_nm", "torque_estimate_nm", "speed_rpm"].map(|column| told(&talk, "running", column));
+    let off = asked.iter().zip(&flowed).map(|(asked, flowed)| flowed - asked).collect::<Vec<_>>();
+    let mean = off.iter().sum::<f64>() / off.len() as f64;
+    step.within("torque_asked_nm", largest(&asked), [0.5 * torque_nm, 1.5 * torque_nm]);
+    let most_off = TORQUE_OFF_SHARE * most_nm;
+    step.within("torque_off_on_average_nm", mean, [-most_off, most_off]);
+    step.within("speed_reached_rpm", largest(&speed), [0.01, machine.folder.parameters.max_speed_rpm]);
+    let current_a = largest(&told(&talk, "running", "current_a"));
+    step.within("largest_current_a", current_a, [0.0, 0.5 * machine.folder.parameters.max_current_a]);
+    Ok(step)
+}

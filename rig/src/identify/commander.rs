@@ -1,0 +1,242 @@
+//! The commander of an experiment over the protocol: charges the link, enables, waits for the end, and gathers what was observed.
+
+use crate::run::{Supervisor, Turn, bar};
+use crate::talk::sender::{Sender, Spoken};
+use crate::talk::{Listener, System};
+use anyhow::{Result, anyhow, bail};
+use indicatif::ProgressBar;
+use std::fmt::Write as _;
+use tractive::identification::{Observation, PACKED_WORDS, Packed, Stage, Units};
+use tractive::protocol::{
+    EXPERIMENT, ExperimentFrame, FROM_IDENTIFICATION, Frame, OBSERVATION, ObservationFrame, Payload,
+};
+
+/// The part of the commander's work.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Phase {
+    /// At rest until the drive is ready: no level counts before.
+    Wait,
+    Charge,
+    /// Enabled until the experiment is over.
+    Experiment,
+    /// No longer enabled, until the gates are off.
+    Stop,
+    Gather,
+    Discharge,
+    Over,
+}
+
+impl Phase {
+    /// The longest time for it, in s, and what has not come by then.
+    const fn most(self) -> (u64, &'static str) {
+        match self {
+            Self::Wait => (5, "the drive is not ready"),
+            Self::Charge => (30, "the link is not charged"),
+            Self::Experiment => (60, "the experiment does not end"),
+            Self::Stop => (10, "the drive does not stop"),
+            Self::Gather => (300, "observations are missing"),
+            Self::Discharge | Self::Over => (60, "the link is not discharged"),
+        }
+    }
+}
+
+/// A fault that has ended an experiment, as the drive tells it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Ended {
+    /// Its name.
+    pub fault: String,
+    /// The value, and the limit that it has passed.
+    pub value: String,
+    /// The limit.
+    pub limit: String,
+}
+
+/// The commander's state.
+pub struct Commander {
+    sender: Sender,
+    command: Spoken,
+    listener: Listener,
+    units: Units,
+    phase: Phase,
+    /// Slots so far, and when the phase began.
+    slot: u64,
+    since: u64,
+    /// The drive's newest word of the experiment.
+    told: ExperimentFrame,
+    /// The experiment has been seen under way.
+    went: bool,
+    words: Vec<[Option<u32>; PACKED_WORDS]>,
+    gathered: usize,
+    ended: Option<Ended>,
+    shown: ProgressBar,
+    /// Lines as candump logs them.
+    pub frames: String,
+}
+
+/// Slots in a second.
+const SLOTS_S: u64 = 1_000;
+/// Slots for which the fault's value and limit are still waited for.
+const FAULT_SLOTS: u64 = 250;
+
+impl Commander {
+    /// Before the first slot, of a drive whose ratings give these units.
+    pub fn new(units: Units) -> Self {
+        Self {
+            sender: Sender::new(System::Pmasynrm),
+            command: Spoken::default(),
+            listener: Listener::new(System::Pmasynrm),
+            units,
+            phase: Phase::Wait,
+            slot: 0,
+            since: 0,
+            told: ExperimentFrame { stage: Stage::Done, observations: 0 },
+            went: false,
+            words: Vec::new(),
+            gathered: 0,
+            ended: None,
+            shown: bar(1, "{msg:10} [{bar:40}] {pos} of {len} observations {elapsed}"),
+            frames: String::new(),
+        }
+    }
+
+    /// The observations, in their order; or the fault that has ended the experiment.
+    pub fn finish(self) -> std::result::Result<Vec<Observation>, Ended> {
+        self.shown.finish_and_clear();
+        match self.ended {
+            Some(ended) => Err(ended),
+            None => Ok(self
+                .words
+                .iter()
+                .map(|words| self.units.unpack(Packed(words.map(Option::unwrap_or_default))))
+                .collect()),
+        }
+    }
+
+    /// A frame of the experiment.
+    fn take(&mut self, frame: &Frame) {
+        let message = FROM_IDENTIFICATION.into_iter().find(|message| message.id == frame.id);
+        let Some(message) = message.filter(|message| frame.length == 8 && message.is_intact(frame)) else {
+            return;
+        };
+        let payload = Payload(u64::from_le_bytes(frame.data));
+        if message.id == EXPERIMENT.id {
+            if let Some(told) = ExperimentFrame::decode(payload) {
+                self.told = told;
+                self.went |= self.phase == Phase::Experiment && told.stage != Stage::Done;
+            }
+        } else if message.id == OBSERVATION.id && self.phase == Phase::Gather {
+            let found = ObservationFrame::decode(payload);
+            let slot = found.and_then(|found| {
+                self.words
+                    .get_mut(usize::from(found.index))?
+                    .get_mut(usize::from(found.part))?
+                    .replace(found.word)
+            });
+            self.gathered += usize::from(slot.is_none() && found.is_some());
+        }
+    }
+
+    fn enter(&mut self, phase: Phase) {
+        (self.phase, self.since) = (phase, self.slot);
+    }
+
+    /// The work that is due in this slot.
+    fn advance(&mut self) -> Result<()> {
+        let [state, fault, refusal] = ["state", "fault", "refusal"].map(|name| self.listener.value(name));
+        let levels = &mut self.command.levels;
+        // A drive without contactors is charged by whoever switches its supply.
+        let ready = state == "charged" || (state == "ready" && refusal == "no_contactors");
+        match self.phase {
+            Phase::Wait if state == "ready" && self.slot > 100 => self.enter(Phase::Charge),
+            Phase::Charge => {
+                levels.charge = !ready;
+                if ready {
+                    levels.enable = true;
+                    self.enter(Phase::Experiment);
+                }
+            }
+            Phase::Experiment if self.went && self.told.stage == Stage::Done => {
+                levels.enable = false;
+                self.words = vec![[None; PACKED_WORDS]; self.told.observations.into()];
+                self.enter(Phase::Stop);
+            }
+            Phase::Stop if state == "charged" || state == "ready" => self.enter(Phase::Gather),
+            Phase::Gather if self.gathered == self.words.len() * PACKED_WORDS => {
+                levels.discharge = state == "charged";
+                self.enter(Phase::Discharge);
+            }
+            Phase::Discharge if state == "ready" => {
+                levels.discharge = false;
+                self.enter(Phase::Over);
+            }
+            _ => {}
+        }
+        if !fault.is_empty() && self.ended.is_none() {
+            let [value, limit] = ["fault_value", "fault_limit"].map(|name| self.listener.value(name));
+            let told = !value.is_empty() && !limit.is_empty();
+            self.command = Spoken::default();
+            if self.phase != Phase::Over {
+                self.enter(Phase::Over);
+            }
+            if told || self.slot > self.since + FAULT_SLOTS {
+                self.ended = Some(Ended { fault, value, limit });
+            }
+        }
+        let (most_s, lacking) = self.phase.most();
+        if self.slot > self.since + most_s * SLOTS_S {
+            bail!(
+                "{lacking}: state {state}, {} of {} observations",
+                self.told.observations,
+                self.words.len()
+            );
+        }
+        Ok(())
+    }
+
+    fn show(&self) {
+        let total = self.words.len().max(self.told.observations.into()).max(1);
+        let (name, done) = match self.phase {
+            Phase::Experiment => (self.told.stage.name(), usize::from(self.told.observations)),
+            _ => ("", self.gathered / PACKED_WORDS),
+        };
+        self.shown.set_length(total as u64);
+        self.shown.set_position(done as u64);
+        self.shown.set_message(name);
+    }
+
+    /// As candump logs: time, channel, identifier and bytes, T for what is sent to the drive, R for what it sends.
+    fn log(&mut self, t_s: f64, frame: &Frame, direction: char) {
+        let bytes: String = frame.data.iter().map(|byte| format!("{byte:02X}")).collect();
+        let _ = writeln!(self.frames, "({t_s:.6}) can0 {:03X}#{bytes} {direction}", frame.id);
+    }
+}
+
+impl Supervisor for Commander {
+    fn hear(&mut self, t_s: f64, frame: &Frame) {
+        self.log(t_s, frame, 'R');
+        if FROM_IDENTIFICATION.iter().any(|message| message.id == frame.id) {
+            self.take(frame);
+        } else {
+            self.listener.receive(frame);
+        }
+    }
+
+    fn slot(&mut self, t_s: f64) -> Result<Turn> {
+        self.advance()?;
+        if self.slot.is_multiple_of(100) {
+            self.show();
+        }
+        let frame = self.sender.step(self.slot, &self.command);
+        let frame = frame.map_err(|_| anyhow!("a value is beyond what its signal can carry"))?;
+        if let Some(frame) = &frame {
+            self.log(t_s, frame, 'T');
+        }
+        self.slot += 1;
+        let done = if self.phase == Phase::Over {
+            self.ended.is_some() || self.listener.value("fault").is_empty()
+        } else {
+            false
+        };
+        Ok(Turn { frame, loads_nm: [0.0; 2], done })
+    }
+}

@@ -1,0 +1,82 @@
+//! A commissioning on the rig, without anybody who answers.
+
+use std::path::Path;
+use std::process::Command;
+
+/// The exit code, what was said, and the record.
+fn commissioned(words: &str, place: &Path) -> (i32, String, toml::Table) {
+    let mut rig = Command::new(env!("CARGO_BIN_EXE_tractive-rig"));
+    rig.args("commission --yes --inertia 3 --noise-a 0.5".split(' ')).args(words.split_whitespace());
+    rig.arg("--out").arg(place.join("found")).arg("--page").arg(place.join("found.html"));
+    let output = rig.output().unwrap();
+    let record = std::fs::read_to_string(place.join("found-commissioning.toml")).unwrap();
+    let said = String::from_utf8_lossy(&output.stdout).into_owned();
+    (output.status.code().unwrap(), said, record.parse().unwrap())
+}
+
+fn steps(record: &toml::Table) -> Vec<(String, bool)> {
+    let of =
+        |step: &toml::Value| (step["name"].as_str().unwrap().to_owned(), step["passed"].as_bool().unwrap());
+    record["step"].as_array().unwrap().iter().map(of).collect()
+}
+
+fn found(record: &toml::Table, step: usize, name: &str) -> f64 {
+    record["step"][step]["found"][name].as_float().unwrap()
+}
+
+#[test]
+fn from_the_wiring_to_the_first_torque() {
+    let place = tempfile::tempdir().unwrap();
+    let (code, said, record) = commissioned("--dead-time-us 5 --rs-error 10", place.path());
+    assert_eq!(code, 0, "{said}");
+    let names = ["wiring", "identification", "tables", "first torque"];
+    assert_eq!(steps(&record), names.map(|name| (name.to_owned(), true)));
+    assert!(record["finished"].as_bool().unwrap() && record["on"].as_str() == Some("host"));
+    assert!((found(&record, 0, "link_charged_v") - 1_500.0).abs() < 20.0);
+    assert!(found(&record, 1, "angle_zero_deg").abs() < 1.0);
+    assert!((found(&record, 1, "rotor_inertia_kg_m2") / 3.0 - 1.0).abs() < 0.01);
+    let asked_nm = found(&record, 3, "torque_asked_nm");
+    assert!((asked_nm - 0.05 * 1_235.0).abs() < 1.0, "{asked_nm}");
+    // 62 N·m for 0.2 s and two ramps of 0.1 s, over 3 kg·m².
+    let speed_rpm = found(&record, 3, "speed_reached_rpm");
+    assert!((speed_rpm - 0.3 * asked_nm / 3.0 * 9.549).abs() < 0.05 * speed_rpm, "{speed_rpm}");
+    assert!(place.path().join("found/flux_map.csv").is_file());
+}
+
+/// The rotor would turn away under currents that are not along d: the experiment ends before it has gone far.
+#[test]
+fn an_angle_whose_zero_or_direction_is_wrong_is_told_and_nothing_turns_with_it() {
+    for words in ["--angle-error 15", "--angle-error -15", "--angle-error 60"] {
+        let place = tempfile::tempdir().unwrap();
+        let (code, said, record) = commissioned(words, place.path());
+        assert_eq!(code, 1, "{words}: {said}");
+        assert_eq!(steps(&record), [("wiring".to_owned(), true), ("identification".to_owned(), false)]);
+        assert!(!record["finished"].as_bool().unwrap());
+        let complaint = record["step"][1]["complaints"][0].as_str().unwrap();
+        assert!(complaint.starts_with("fault rotor_turned"), "{words}: {complaint}");
+        assert!(!place.path().join("found").exists(), "no tables of a machine that was not found");
+    }
+}
+
+#[test]
+fn a_fault_ends_it_and_stands_in_the_record() {
+    let place = tempfile::tempdir().unwrap();
+    let (code, said, record) = commissioned("--fault-at 3", place.path());
+    assert_eq!(code, 1, "{said}");
+    assert_eq!(steps(&record).last(), Some(&("identification".to_owned(), false)));
+    let complaints = record["step"][1]["complaints"].as_array().unwrap();
+    assert!(complaints[0].as_str().unwrap().starts_with("fault "), "{complaints:?}");
+    assert!(!place.path().join("found").exists());
+}
+
+/// Nobody there to answer: nothing is done.
+#[test]
+fn without_an_answer_nothing_is_done() {
+    let place = tempfile::tempdir().unwrap();
+    let mut rig = Command::new(env!("CARGO_BIN_EXE_tractive-rig"));
+    rig.arg("commission").arg("--out").arg(place.path().join("found")).stdin(std::process::Stdio::null());
+    let output = rig.output().unwrap();
+    let said = String::from_utf8_lossy(&output.stdout);
+    assert!(output.status.code() == Some(1) && said.contains("stopped before: wiring"), "{said}");
+    assert!(!place.path().join("found").exists());
+}
