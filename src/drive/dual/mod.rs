@@ -55,6 +55,8 @@ pub struct Settings {
     pub clock: Clock,
     /// Carrier period, in ticks: the control period or a whole part of it, even, at most 4,000.
     pub carrier_ticks: u32,
+    /// The dead time where two gates of a leg exchange, in ticks, which the pulses make up for; 0: none.
+    pub dead_time_ticks: u32,
     /// The current loops' gains.
     pub gains: Gains,
     /// The speed loops.
@@ -77,6 +79,7 @@ impl Settings {
         Self {
             clock,
             carrier_ticks,
+            dead_time_ticks: 0,
             // Its dead time takes voltage along either motor's current, too: nothing tells that from an error of the flux linkage.
             gains: Gains { carrier: 0.6, observer: 0.02, resistance_from: 4.0, ..Gains::DEFAULT },
             speed: SpeedDesign { inertia_kg_m2: 0.1, natural_rad_s: 280.0, period_s },

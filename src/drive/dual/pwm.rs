@@ -1,11 +1,11 @@
 //! The PWM interrupt's task.
 
-use super::{DualApplied, DualCommand, MotorShare, Settings, Shared};
+use super::{COMPARE_STEPS, DualApplied, DualCommand, MotorShare, Settings, Shared};
 use crate::drive::Gates;
 use crate::drive::traction::stale;
 use crate::frames::{Angle, limit};
 use crate::machine::{Machine, Tables};
-use crate::nine_switch::{self, GateTicks, MotorVoltage, Period, Refused, Request};
+use crate::nine_switch::{self, DeadTime, GateTicks, MotorVoltage, Period, Refused, Request};
 use crate::ports::{Dual, GateFeedback, PlayedPeriod, PowerSample, PwmPort};
 use crate::protection::{self, Fault, MaskedFaults, SafeState, Trip, Violation};
 use crate::time::Instant;
@@ -15,6 +15,9 @@ use core::sync::atomic::Ordering;
 const MOST_MOVED_V: f32 = 10.0;
 /// Least link voltage that is divided by, in V.
 const LEAST_LINK_V: f32 = 50.0;
+
+/// Phase current, as a share of the largest, whose sign may change within a period.
+const SMALL_CURRENT_SHARE: f32 = 0.05;
 
 /// The ZS9's PWM task.
 pub struct PwmTask<M = &'static Tables> {
@@ -68,6 +71,11 @@ impl<M: Machine> PwmTask<M> {
         self.now = Instant(self.settings.first_peak_ticks());
     }
 
+    /// Another dead time, in ticks; before the first call.
+    pub fn set_dead_time(&mut self, dead_time_ticks: u32) {
+        self.settings.dead_time_ticks = dead_time_ticks;
+    }
+
     /// The PWM timer's interrupt, at the carrier's peak. Deadline: the next valley, where the shadow registers take over. Says whether it
     /// came for a peak.
     pub fn run(&mut self, port: &mut impl PwmPort<Dual>, shared: &Shared) -> bool {
@@ -104,6 +112,9 @@ impl<M: Machine> PwmTask<M> {
             Some((Ok(period), request)) => {
                 for (ticks, gate) in self.next.gates.iter_mut().zip(&period.gates) {
                     *ticks = gate.ticks(half_steps);
+                }
+                if self.settings.dead_time_ticks > 0 {
+                    self.dead_time().compensate(&mut self.next.gates, &sample.currents_a);
                 }
                 expected = Expected::of(&self.next, &self.settings);
                 given = Some(shares(request, &period));
@@ -150,6 +161,14 @@ impl<M: Machine> PwmTask<M> {
             depth: motor.voltage_v * depth_per_volt,
         });
         Request { scheme: command.scheme, upper, lower, shoot_through: command.duty }
+    }
+
+    /// The dead time in compare steps.
+    fn dead_time(&self) -> DeadTime {
+        DeadTime {
+            ticks: self.settings.dead_time_ticks * COMPARE_STEPS,
+            small_a: SMALL_CURRENT_SHARE * self.machine.tables().ratings.max_current_a,
+        }
     }
 
     fn violation(
