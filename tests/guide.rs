@@ -1,9 +1,8 @@
-//! The guide against the code: its list of faults, what its pages on papers and requirements name, and its links.
+//! The guide against the code: what its pages on papers and requirements name, and its links.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use tractive::control::Gains;
-use tractive::protection::Fault;
 
 fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -12,20 +11,6 @@ fn root() -> &'static Path {
 fn read(path: impl AsRef<Path>) -> String {
     let path = root().join(path);
     std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
-}
-
-#[test]
-fn every_fault_is_explained_once_and_in_the_order_of_its_code() {
-    let text = read("docs/faults.md");
-    let explained: Vec<_> = text
-        .lines()
-        .filter_map(|line| line.strip_prefix("| `")?.split_once("` | "))
-        .map(|(name, rest)| {
-            assert!(rest.split(" | ").nth(1).is_some_and(|causes| causes.len() > 10), "{name} has no causes");
-            name
-        })
-        .collect();
-    assert_eq!(explained, Fault::ALL.map(Fault::name));
 }
 
 /// A row of a table: its cells by the names of their columns.

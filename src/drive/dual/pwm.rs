@@ -247,7 +247,7 @@ const ALL_GATES: u16 = 0x1FF;
 /// The states of the gates in a period, a bit each in the order of [`crate::nine_switch::GATES`].
 #[derive(Clone, Copy, Debug)]
 struct Expected {
-    /// On for longer than a dead time; a gate that is to be on for less may stay off.
+    /// On for longer than two dead times; a gate that is to be on for less may stay off.
     must_be_on: u16,
     may_be_on: u16,
     /// Off at some time.
