@@ -230,7 +230,7 @@ fn dead_time_is_kept_and_stops_nothing() {
     }
 }
 
-/// Without compensation the motors give 52.8 to 59.8 N·m with 3.1 to 5.1 % of THD, and RS-SVPWM trips.
+/// Without compensation the motors give 53.0 to 59.8 N·m, with 3.1 to 5.1 % of THD.
 #[test]
 fn dead_time_is_made_up_for() {
     for law in ["tractive", "pi"] {
