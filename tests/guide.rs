@@ -196,6 +196,39 @@ fn every_message_of_troubleshooting_is_one_that_the_code_prints() {
     assert!(seen.len() > 40 && parts.len() > 50 && wrong.is_empty(), "{} rows, {wrong:#?}", seen.len());
 }
 
+/// The numbers that follow the word figure, or figures, in a text.
+fn figures_named(text: &str) -> Vec<u32> {
+    let text = text.to_lowercase();
+    let after = text.split("figure").skip(1).map(|rest| rest.strip_prefix('s').unwrap_or(rest));
+    let is_list = |word: &&str| word.parse::<u32>().is_ok() || ["to", "and"].contains(word);
+    let list = |rest: &str| {
+        let words: Vec<_> =
+            rest.split([' ', ',', '"', ':', '.', ')']).filter(|word| !word.is_empty()).collect();
+        let list: Vec<_> = words.into_iter().take_while(is_list).collect();
+        list.iter().filter_map(|word| word.parse().ok()).collect::<Vec<_>>()
+    };
+    after.filter(|rest| rest.starts_with(' ')).flat_map(list).collect()
+}
+
+#[test]
+fn figures_that_are_named_are_ones_of_the_papers() {
+    // Of the first paper alone, and of either.
+    for (folder, most) in [
+        ("rig/src/scenario/traction", 10),
+        ("rig/src/pictures/chai", 10),
+        ("rig/src", 36),
+        ("src", 36),
+        ("control/src", 36),
+    ] {
+        let mut text = String::new();
+        sources(&root().join(folder), &mut text);
+        let named = figures_named(&text);
+        assert!(named.iter().all(|number| (1..=most).contains(number)), "{folder}: {named:?}");
+        assert!(!folder.starts_with("rig") || !named.is_empty(), "{folder}");
+    }
+    assert_eq!(figures_named("Figures 14 to 16, 18 and 19: x; figure 7."), [14, 16, 18, 19, 7]);
+}
+
 /// The anchors of a page's headings.
 fn anchors(text: &str) -> BTreeSet<String> {
     let headings = text.lines().filter(|line| line.starts_with('#'));

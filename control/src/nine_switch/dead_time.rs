@@ -52,7 +52,7 @@ impl DeadTime {
     /// assert_eq!([gates[1], gates[4], gates[7]], [on, off, pause(0, 0)]);
     /// ```
     #[inline(never)]
-    pub fn compensate(&self, gates: &mut [GateTicks; 9], currents_a: &[Abc; 2]) {
+    pub fn compensate(self, gates: &mut [GateTicks; 9], currents_a: &[Abc; 2]) {
         let [uh, vh, wh, um, vm, wm, ul, vl, wl] = gates;
         let [upper, lower] = currents_a;
         self.leg([uh, um, ul], upper.a, lower.a);
@@ -61,7 +61,7 @@ impl DeadTime {
     }
 
     /// The same for a leg's H, M and L. A border stays within the pauses of H and L that it is the one end of.
-    fn leg(&self, [high, middle, low]: [&mut GateTicks; 3], upper_a: f32, lower_a: f32) {
+    fn leg(self, [high, middle, low]: [&mut GateTicks; 3], upper_a: f32, lower_a: f32) {
         let (fall, step) = (high.off_from, low.off_to);
         let moved = |border: u32, current_a: f32| {
             let at = border.saturating_add_signed(self.shift(current_a));
@@ -96,7 +96,7 @@ impl DeadTime {
 
     /// The way that a border goes with this current of its node.
     #[inline]
-    fn shift(&self, current_a: f32) -> i32 {
+    fn shift(self, current_a: f32) -> i32 {
         let share = current_a / self.small_a;
         let share = if share > 1.0 { 1.0 } else { share };
         let share = if share > -1.0 { share } else { -1.0 };

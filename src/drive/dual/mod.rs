@@ -125,11 +125,11 @@ impl Settings {
         self.carrier_ticks / 2 * COMPARE_STEPS
     }
 
-    /// Compare steps for which a gate may pause in a carrier half and yet must be seen on: what two dead times leave of the half. M
-    /// is on before its pause and after it, and a dead time may take either.
+    /// Compare steps for which a gate may pause in a carrier half and yet must be seen on: what the longest dead time and the one that is
+    /// told leave of the half. M is on before its pause and after it, and a dead time may take either.
     pub const fn longest_pause_steps(&self) -> u32 {
-        let dead_steps = (2.0 * DEAD_TIME_S * self.clock.ticks_per_s) as u32 * COMPARE_STEPS;
-        self.half_steps().saturating_sub(dead_steps)
+        let dead_ticks = (DEAD_TIME_S * self.clock.ticks_per_s) as u32 + self.dead_time_ticks;
+        self.half_steps().saturating_sub(dead_ticks * COMPARE_STEPS)
     }
 }
 

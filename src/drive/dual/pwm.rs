@@ -23,6 +23,8 @@ const SMALL_CURRENT_SHARE: f32 = 0.05;
 pub struct PwmTask<M = &'static Tables> {
     machine: M,
     settings: Settings,
+    /// As [`Settings::longest_pause_steps`].
+    longest_pause_steps: u32,
     /// Nominal instant of the next call: a peak.
     now: Instant,
     /// The period that begins at the next valley; made where it stays.
@@ -43,6 +45,7 @@ impl<M: Machine> PwmTask<M> {
         Self {
             machine,
             settings,
+            longest_pause_steps: settings.longest_pause_steps(),
             now: Instant(settings.first_peak_ticks()),
             next: PlayedPeriod::off(settings.half_steps()),
             expected: [Expected::OFF; 2],
@@ -68,12 +71,14 @@ impl<M: Machine> PwmTask<M> {
     /// Another carrier period than that of the settings it was built with, in ticks; before the first call.
     pub fn set_carrier(&mut self, carrier_ticks: u32) {
         self.settings.carrier_ticks = carrier_ticks;
+        self.longest_pause_steps = self.settings.longest_pause_steps();
         self.now = Instant(self.settings.first_peak_ticks());
     }
 
     /// Another dead time, in ticks; before the first call.
     pub fn set_dead_time(&mut self, dead_time_ticks: u32) {
         self.settings.dead_time_ticks = dead_time_ticks;
+        self.longest_pause_steps = self.settings.longest_pause_steps();
     }
 
     /// The PWM timer's interrupt, at the carrier's peak. Deadline: the next valley, where the shadow registers take over. Says whether it
@@ -116,7 +121,7 @@ impl<M: Machine> PwmTask<M> {
                 if self.settings.dead_time_ticks > 0 {
                     self.dead_time().compensate(&mut self.next.gates, &sample.currents_a);
                 }
-                expected = Expected::of(&self.next, &self.settings);
+                expected = Expected::of(&self.next, half_steps, self.longest_pause_steps);
                 given = Some(shares(request, &period));
             }
             Some((Err(refused), request)) => {
@@ -247,7 +252,7 @@ const ALL_GATES: u16 = 0x1FF;
 /// The states of the gates in a period, a bit each in the order of [`crate::nine_switch::GATES`].
 #[derive(Clone, Copy, Debug)]
 struct Expected {
-    /// On for longer than two dead times; a gate that is to be on for less may stay off.
+    /// On for longer than dead times may take; a gate that is to be on for less may stay off.
     must_be_on: u16,
     may_be_on: u16,
     /// Off at some time.
@@ -257,8 +262,8 @@ struct Expected {
 impl Expected {
     const OFF: Self = Self { must_be_on: 0, may_be_on: 0, is_off: ALL_GATES };
 
-    fn of(period: &PlayedPeriod, settings: &Settings) -> Self {
-        let (half, longest_pause) = (settings.half_steps(), settings.longest_pause_steps());
+    /// With this many compare steps in a half, and at most so many in a pause of a gate that must be seen on.
+    fn of(period: &PlayedPeriod, half: u32, longest_pause: u32) -> Self {
         let mut expected = Self { must_be_on: 0, may_be_on: 0, is_off: 0 };
         let mut bit = 1;
         for gate in &period.gates {
