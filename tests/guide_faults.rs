@@ -56,7 +56,7 @@ fn code() -> String {
     code.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
-/// What stands between commas, up to the bracket that closes more than was opened.
+/// The parts between commas, up to the bracket that closes more than was opened.
 fn parts(text: &str) -> Vec<&str> {
     let (mut depth, mut from, mut parts) = (0, 0, Vec::new());
     for (at, letter) in text.char_indices() {
