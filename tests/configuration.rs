@@ -206,7 +206,7 @@ fn every_scalar_of_the_zs9() {
     try_tables(&zs9::BUILT_IN, |tables| settings.check(tables));
     let check = |settings: &dual::Settings| settings.check(&zs9::BUILT_IN);
     let own = fields!(dual::Settings as dual::Settings {
-        carrier_ticks | clock, gains, speed, link, link_gains, limits
+        carrier_ticks, dead_time_ticks | clock, gains, speed, link, link_gains, limits
     }: u32);
     try_all(settings, "", own, |settings| settings, check);
     let gains = fields!(Gains as Gains { carrier, pattern_rad_s, square_damping, observer, sixth_turn_rad, resistance_from, link_damping | }: f32);

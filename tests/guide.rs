@@ -1,9 +1,8 @@
-//! The guide against the code: its list of faults, what its pages on papers and requirements name, and its links.
+//! The guide against the code: what its pages on papers and requirements name, and its links.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use tractive::control::Gains;
-use tractive::protection::Fault;
 
 fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -12,20 +11,6 @@ fn root() -> &'static Path {
 fn read(path: impl AsRef<Path>) -> String {
     let path = root().join(path);
     std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
-}
-
-#[test]
-fn every_fault_is_explained_once_and_in_the_order_of_its_code() {
-    let text = read("docs/faults.md");
-    let explained: Vec<_> = text
-        .lines()
-        .filter_map(|line| line.strip_prefix("| `")?.split_once("` | "))
-        .map(|(name, rest)| {
-            assert!(rest.split(" | ").nth(1).is_some_and(|causes| causes.len() > 10), "{name} has no causes");
-            name
-        })
-        .collect();
-    assert_eq!(explained, Fault::ALL.map(Fault::name));
 }
 
 /// A row of a table: its cells by the names of their columns.
@@ -209,6 +194,39 @@ fn every_message_of_troubleshooting_is_one_that_the_code_prints() {
         quoted.flat_map(|span| span.split('…')).map(str::trim).filter(|part| !part.is_empty()).collect();
     let wrong: Vec<_> = parts.iter().filter(|part| !code.contains(**part)).collect();
     assert!(seen.len() > 40 && parts.len() > 50 && wrong.is_empty(), "{} rows, {wrong:#?}", seen.len());
+}
+
+/// The numbers that follow the word figure, or figures, in a text.
+fn figures_named(text: &str) -> Vec<u32> {
+    let text = text.to_lowercase();
+    let after = text.split("figure").skip(1).map(|rest| rest.strip_prefix('s').unwrap_or(rest));
+    let is_list = |word: &&str| word.parse::<u32>().is_ok() || ["to", "and"].contains(word);
+    let list = |rest: &str| {
+        let words: Vec<_> =
+            rest.split([' ', ',', '"', ':', '.', ')']).filter(|word| !word.is_empty()).collect();
+        let list: Vec<_> = words.into_iter().take_while(is_list).collect();
+        list.iter().filter_map(|word| word.parse().ok()).collect::<Vec<_>>()
+    };
+    after.filter(|rest| rest.starts_with(' ')).flat_map(list).collect()
+}
+
+#[test]
+fn figures_that_are_named_are_ones_of_the_papers() {
+    // Of the first paper alone, and of either.
+    for (folder, most) in [
+        ("rig/src/scenario/traction", 10),
+        ("rig/src/pictures/chai", 10),
+        ("rig/src", 36),
+        ("src", 36),
+        ("control/src", 36),
+    ] {
+        let mut text = String::new();
+        sources(&root().join(folder), &mut text);
+        let named = figures_named(&text);
+        assert!(named.iter().all(|number| (1..=most).contains(number)), "{folder}: {named:?}");
+        assert!(!folder.starts_with("rig") || !named.is_empty(), "{folder}");
+    }
+    assert_eq!(figures_named("Figures 14 to 16, 18 and 19: x; figure 7."), [14, 16, 18, 19, 7]);
 }
 
 /// The anchors of a page's headings.

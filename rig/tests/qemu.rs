@@ -106,7 +106,7 @@ fn both_motors_load_step_is_the_same() {
 #[test]
 #[ignore = "needs the image and QEMU"]
 fn both_motors_reversal_is_the_same() {
-    same("zs9-reverse --scheme zvo --adc-bits 12 --noise-a 0.3", 0);
+    same("zs9-reverse --scheme zvo --adc-bits 12 --noise-a 0.3 --dead-time-us 5", 0);
 }
 
 #[test]

@@ -224,9 +224,25 @@ fn dead_time_is_kept_and_stops_nothing() {
         for (torque, thd) in [("torque1_nm", "thd1_percent"), ("torque2_nm", "thd2_percent")] {
             let (torque, thd) = (figure(&outcome, torque), figure(&outcome, thd));
             println!("{scheme}: {torque} N·m, {thd} %");
-            assert!((torque / 60.0 - 1.0).abs() < 0.04 && thd < 3.5, "{scheme}: {torque} N·m, {thd} %");
+            assert!((torque / 60.0 - 1.0).abs() < 0.003 && thd < 2.6, "{scheme}: {torque} N·m, {thd} %");
         }
         assert!(exchanges_that_wait(&outcome.recording, DEAD_TIME_S) > 100, "{scheme}");
+    }
+}
+
+/// Without compensation the motors give 53.0 to 59.8 N·m, with 3.1 to 5.1 % of THD.
+#[test]
+fn dead_time_is_made_up_for() {
+    for law in ["tractive", "pi"] {
+        for scheme in ["s", "rs", "rthd", "zvo", "rthd-slide"] {
+            let outcome = run(&format!("zs9-steady --dead-time-us 5 --scheme {scheme} --law {law}"));
+            assert!(outcome.recording.trip().is_none(), "{scheme}, {law}: {:?}", outcome.recording.trip());
+            for (torque, thd) in [("torque1_nm", "thd1_percent"), ("torque2_nm", "thd2_percent")] {
+                let (torque, thd) = (figure(&outcome, torque), figure(&outcome, thd));
+                println!("{scheme}, {law}: {torque:.2} N·m, {thd:.2} %");
+                assert!((torque - 60.0).abs() <= 0.6 && thd < 3.6, "{scheme}, {law}: {torque} N·m, {thd} %");
+            }
+        }
     }
 }
 

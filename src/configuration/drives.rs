@@ -42,7 +42,8 @@ impl dual::Settings {
     /// # Errors
     /// The first scalar that makes no sense, of the machine or of the settings.
     pub const fn check(&self, tables: &Tables) -> Result<(), Refused> {
-        let Self { clock, carrier_ticks: _, gains, speed, link, link_gains, limits } = self;
+        let Self { clock, carrier_ticks: _, dead_time_ticks: _, gains, speed, link, link_gains, limits } =
+            self;
         checked!(tables.check());
         checked!(clock.check());
         checked!(self.check_carrier());
@@ -53,12 +54,12 @@ impl dual::Settings {
         check_limits(limits)
     }
 
-    /// The check that the carrier suits a clock which is checked already.
+    /// The check that carrier and dead time suit a clock which is checked already.
     ///
     /// # Errors
-    /// Its length, if it does not.
+    /// The first of them that does not.
     pub const fn check_carrier(&self) -> Result<(), Refused> {
-        let Self { clock, carrier_ticks, .. } = self;
+        let Self { clock, carrier_ticks, dead_time_ticks, .. } = self;
         let control = clock.control_ticks as f32;
         let carrier = *carrier_ticks as f32;
         let longest = if control < LONGEST_CARRIER { control } else { LONGEST_CARRIER };
@@ -68,7 +69,7 @@ impl dual::Settings {
         if !whole {
             return Err(Refused { name: "carrier_ticks", value: carrier, least: control, most: control });
         }
-        Ok(())
+        within(&[Bound("dead_time_ticks", *dead_time_ticks as f32, 0.0, 0.125 * carrier)])
     }
 }
 

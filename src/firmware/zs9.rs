@@ -12,21 +12,26 @@ use tractive::operator::{self, DualSlot, Line, slot_s};
 use tractive::protocol::Zs9CanEndpoint;
 
 static SHARED: Shared = Shared::recorded_by(&qemu::DUAL_RECORDER);
-/// Until the host has told its carrier.
+/// Until the host has told its carrier and its dead time.
 const DEFAULTS: Settings = Settings::new(CLOCK, CLOCK.control_ticks);
 /// As the operator looks at them.
 static RATINGS: Ratings = DEFAULTS.operator_ratings(&BUILT_IN.ratings);
 static CARRIER_TICKS: AtomicU32 = AtomicU32::new(0);
+static DEAD_TIME_TICKS: AtomicU32 = AtomicU32::new(0);
 
 fn settings() -> Settings {
-    Settings::new(CLOCK, CARRIER_TICKS.load(Ordering::Relaxed))
+    Settings {
+        dead_time_ticks: DEAD_TIME_TICKS.load(Ordering::Relaxed),
+        ..Settings::new(CLOCK, CARRIER_TICKS.load(Ordering::Relaxed))
+    }
 }
 
 #[entry]
 fn main() -> ! {
     let setup = qemu::connect_dual();
     CARRIER_TICKS.store(setup.carrier_ticks, Ordering::Relaxed);
-    // All but the carrier are constants of the image.
+    DEAD_TIME_TICKS.store(setup.dead_time_ticks, Ordering::Relaxed);
+    // All but carrier and dead time are constants of the image.
     let constants = const { DEFAULTS.check(&BUILT_IN) };
     if let Err(refused) = constants.and_then(|()| settings().check_carrier()) {
         qemu::refuse(&refused);
@@ -67,6 +72,7 @@ fn DUALTIMER() {
     let mut board = qemu::Pwm;
     if !*IS_SET_UP {
         TASK.set_carrier(CARRIER_TICKS.load(Ordering::Relaxed));
+        TASK.set_dead_time(DEAD_TIME_TICKS.load(Ordering::Relaxed));
         *IS_SET_UP = true;
     }
     TASK.run(&mut board, &SHARED);

@@ -41,7 +41,8 @@ pub enum Fault {
     /// Gates did not do what they were told. The value has a bit for each: of the ZS9 in the order of
     /// [`crate::nine_switch::GATES`], of the PMaSynRM drive from u on for the legs.
     LegStuck,
-    /// A gate driver is not ready, or its wire is broken: the hardware holds the gates off.
+    /// A gate driver is not ready, or its wire is broken: the hardware holds the gates off. The value of a break in hardware, this one's and the
+    /// next two's, is 1; of the ZS9's it says where it was seen.
     GateDriver,
     /// A comparator has seen a phase current beyond its threshold.
     HardwareOvercurrent,
@@ -49,15 +50,15 @@ pub enum Fault {
     ClockFailure,
     /// A carrier half ended before its interrupt did, or control saw none come, in s.
     PwmDeadline,
-    /// The board did not leave the safe state when it was told to.
+    /// The board did not leave the safe state when it was told to, or for so long after an acknowledge, in s.
     GatesHeld,
     /// A current sensor shows a current where there is none, in A.
     CurrentOffset,
     /// The link's voltage cannot be what it is measured as, in V.
     LinkImplausible,
-    /// The position sensor does not answer, or the rotor's speed does not settle while it should stand still.
+    /// The position sensor does not answer, or the rotor's speed does not settle while it should stand still. The value is 0, of 1.
     PositionSensor,
-    /// The configuration was refused, or nobody has checked it.
+    /// The configuration was refused, or nobody has checked it. The value is 2 or 0, of 1.
     Configuration,
     /// The link did not reach its voltage in time, in V.
     PrechargeTimeout,

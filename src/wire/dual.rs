@@ -20,6 +20,8 @@ use crate::time::Instant;
 pub struct DualSetup {
     /// Carrier period, in ticks.
     pub carrier_ticks: u32,
+    /// Dead time where two gates of a leg exchange, in ticks.
+    pub dead_time_ticks: u32,
     /// The line side that the operator switches; `None`: no operator, the rig commands the drive directly.
     pub line: Option<LineTimes>,
 }
@@ -123,13 +125,13 @@ fn told_of(report: &DualReport) -> [u32; 10] {
 
 /// The answer to [`DualRequest::Hello`].
 pub fn dual_setup_to_block(setup: DualSetup) -> Block {
-    filled([setup.carrier_ticks].into_iter().chain(line_to_words(setup.line)))
+    filled([setup.carrier_ticks, setup.dead_time_ticks].into_iter().chain(line_to_words(setup.line)))
 }
 
 /// The inverse of [`dual_setup_to_block`].
 pub fn dual_setup_from_block(block: &Block) -> DualSetup {
-    let [carrier_ticks, a, b, c, ..] = *block;
-    DualSetup { carrier_ticks, line: line_from_words([a, b, c]) }
+    let [carrier_ticks, dead_time_ticks, a, b, c, ..] = *block;
+    DualSetup { carrier_ticks, dead_time_ticks, line: line_from_words([a, b, c]) }
 }
 
 /// The answer to [`DualRequest::Ask`].
@@ -290,7 +292,7 @@ mod tests {
         let mut gates = [GateTicks { off_from: 1, off_to: 40_000 }; 9];
         gates[4] = GateTicks { off_from: 65_535, off_to: 65_535 };
         let report = DualReport { torque_nm: [1.0, -2.0], weakening: [false, true], ..DualReport::default() };
-        let setup = DualSetup { carrier_ticks: 2_500, line: None };
+        let setup = DualSetup { carrier_ticks: 2_500, dead_time_ticks: 125, line: None };
         let line = Some(LineTimes { precharge_s: 0.05, discharge_s: 0.5 });
         for setup in [setup, DualSetup { line, ..setup }] {
             assert_eq!(dual_setup_from_block(&dual_setup_to_block(setup)), setup);

@@ -28,10 +28,11 @@
 //! The pulses are ideal. Where two gates of a leg toggle at the same instant, the one that turns on has to wait for the
 //! dead time, in hardware: M after H and H after M (1 ↔ 0), L after M and M after L (−1 ↔ 1), L after H and H after L
 //! (−1 ↔ 0, with M on). Else all three conduct for a moment. At a border with shoot-through nothing has to wait:
-//! there all three are to conduct.
+//! there all three are to conduct. [`DeadTime`] moves the pulses so that the motors have their voltages all the same.
 
 #![forbid(unsafe_code)]
 
+mod dead_time;
 mod gates;
 mod sequence;
 mod shares;
@@ -40,6 +41,7 @@ mod vectors;
 
 use crate::frames::Angle;
 
+pub use dead_time::DeadTime;
 pub use gates::{GATES, GatePattern, GateTicks, Period};
 pub use sequence::Scheme;
 pub use vectors::LegState;

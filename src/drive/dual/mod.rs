@@ -55,6 +55,8 @@ pub struct Settings {
     pub clock: Clock,
     /// Carrier period, in ticks: the control period or a whole part of it, even, at most 4,000.
     pub carrier_ticks: u32,
+    /// The dead time where two gates of a leg exchange, in ticks, which the pulses make up for; 0: none.
+    pub dead_time_ticks: u32,
     /// The current loops' gains.
     pub gains: Gains,
     /// The speed loops.
@@ -77,6 +79,7 @@ impl Settings {
         Self {
             clock,
             carrier_ticks,
+            dead_time_ticks: 0,
             // Its dead time takes voltage along either motor's current, too: nothing tells that from an error of the flux linkage.
             gains: Gains { carrier: 0.6, observer: 0.02, resistance_from: 4.0, ..Gains::DEFAULT },
             speed: SpeedDesign { inertia_kg_m2: 0.1, natural_rad_s: 280.0, period_s },
@@ -122,10 +125,11 @@ impl Settings {
         self.carrier_ticks / 2 * COMPARE_STEPS
     }
 
-    /// Compare steps for which a gate may pause in a carrier half and yet must be seen on: what a dead time leaves of the half.
+    /// Compare steps for which a gate may pause in a carrier half and yet must be seen on: what the longest dead time and the one that is
+    /// told leave of the half. M is on before its pause and after it, and a dead time may take either.
     pub const fn longest_pause_steps(&self) -> u32 {
-        let dead_steps = (DEAD_TIME_S * self.clock.ticks_per_s) as u32 * COMPARE_STEPS;
-        self.half_steps().saturating_sub(dead_steps)
+        let dead_ticks = (DEAD_TIME_S * self.clock.ticks_per_s) as u32 + self.dead_time_ticks;
+        self.half_steps().saturating_sub(dead_ticks * COMPARE_STEPS)
     }
 }
 

@@ -1,11 +1,11 @@
 //! The PWM interrupt's task.
 
-use super::{DualApplied, DualCommand, MotorShare, Settings, Shared};
+use super::{COMPARE_STEPS, DualApplied, DualCommand, MotorShare, Settings, Shared};
 use crate::drive::Gates;
 use crate::drive::traction::stale;
 use crate::frames::{Angle, limit};
 use crate::machine::{Machine, Tables};
-use crate::nine_switch::{self, GateTicks, MotorVoltage, Period, Refused, Request};
+use crate::nine_switch::{self, DeadTime, GateTicks, MotorVoltage, Period, Refused, Request};
 use crate::ports::{Dual, GateFeedback, PlayedPeriod, PowerSample, PwmPort};
 use crate::protection::{self, Fault, MaskedFaults, SafeState, Trip, Violation};
 use crate::time::Instant;
@@ -16,10 +16,15 @@ const MOST_MOVED_V: f32 = 10.0;
 /// Least link voltage that is divided by, in V.
 const LEAST_LINK_V: f32 = 50.0;
 
+/// Phase current, as a share of the largest, whose sign may change within a period.
+const SMALL_CURRENT_SHARE: f32 = 0.05;
+
 /// The ZS9's PWM task.
 pub struct PwmTask<M = &'static Tables> {
     machine: M,
     settings: Settings,
+    /// As [`Settings::longest_pause_steps`].
+    longest_pause_steps: u32,
     /// Nominal instant of the next call: a peak.
     now: Instant,
     /// The period that begins at the next valley; made where it stays.
@@ -40,6 +45,7 @@ impl<M: Machine> PwmTask<M> {
         Self {
             machine,
             settings,
+            longest_pause_steps: settings.longest_pause_steps(),
             now: Instant(settings.first_peak_ticks()),
             next: PlayedPeriod::off(settings.half_steps()),
             expected: [Expected::OFF; 2],
@@ -65,7 +71,14 @@ impl<M: Machine> PwmTask<M> {
     /// Another carrier period than that of the settings it was built with, in ticks; before the first call.
     pub fn set_carrier(&mut self, carrier_ticks: u32) {
         self.settings.carrier_ticks = carrier_ticks;
+        self.longest_pause_steps = self.settings.longest_pause_steps();
         self.now = Instant(self.settings.first_peak_ticks());
+    }
+
+    /// Another dead time, in ticks; before the first call.
+    pub fn set_dead_time(&mut self, dead_time_ticks: u32) {
+        self.settings.dead_time_ticks = dead_time_ticks;
+        self.longest_pause_steps = self.settings.longest_pause_steps();
     }
 
     /// The PWM timer's interrupt, at the carrier's peak. Deadline: the next valley, where the shadow registers take over. Says whether it
@@ -105,7 +118,10 @@ impl<M: Machine> PwmTask<M> {
                 for (ticks, gate) in self.next.gates.iter_mut().zip(&period.gates) {
                     *ticks = gate.ticks(half_steps);
                 }
-                expected = Expected::of(&self.next, &self.settings);
+                if self.settings.dead_time_ticks > 0 {
+                    self.dead_time().compensate(&mut self.next.gates, &sample.currents_a);
+                }
+                expected = Expected::of(&self.next, half_steps, self.longest_pause_steps);
                 given = Some(shares(request, &period));
             }
             Some((Err(refused), request)) => {
@@ -150,6 +166,14 @@ impl<M: Machine> PwmTask<M> {
             depth: motor.voltage_v * depth_per_volt,
         });
         Request { scheme: command.scheme, upper, lower, shoot_through: command.duty }
+    }
+
+    /// The dead time in compare steps.
+    fn dead_time(&self) -> DeadTime {
+        DeadTime {
+            ticks: self.settings.dead_time_ticks * COMPARE_STEPS,
+            small_a: SMALL_CURRENT_SHARE * self.machine.tables().ratings.max_current_a,
+        }
     }
 
     fn violation(
@@ -228,7 +252,7 @@ const ALL_GATES: u16 = 0x1FF;
 /// The states of the gates in a period, a bit each in the order of [`crate::nine_switch::GATES`].
 #[derive(Clone, Copy, Debug)]
 struct Expected {
-    /// On for longer than a dead time; a gate that is to be on for less may stay off.
+    /// On for longer than dead times may take; a gate that is to be on for less may stay off.
     must_be_on: u16,
     may_be_on: u16,
     /// Off at some time.
@@ -238,8 +262,8 @@ struct Expected {
 impl Expected {
     const OFF: Self = Self { must_be_on: 0, may_be_on: 0, is_off: ALL_GATES };
 
-    fn of(period: &PlayedPeriod, settings: &Settings) -> Self {
-        let (half, longest_pause) = (settings.half_steps(), settings.longest_pause_steps());
+    /// With this many compare steps in a half, and at most so many in a pause of a gate that must be seen on.
+    fn of(period: &PlayedPeriod, half: u32, longest_pause: u32) -> Self {
         let mut expected = Self { must_be_on: 0, may_be_on: 0, is_off: 0 };
         let mut bit = 1;
         for gate in &period.gates {

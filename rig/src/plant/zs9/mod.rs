@@ -5,8 +5,8 @@
 //!                                            upper motor  lower motor
 //! ```
 //!
-//! Ideal switches, no dead time: the bridge needs none, because a shorted leg is a state of its own. Between two edges of the
-//! gates network and motors are integrated together, as one set of equations. Outside shoot-through the bridge draws
+//! Ideal switches. Dead time is the affair of the gates, not of the plant: while a leg waits, its diodes make one of the states that
+//! are known here. Between two edges of the gates network and motors are integrated together, as one set of equations. Outside shoot-through the bridge draws
 //! `i_in = 1.5 Σ (s·i)` at `U_in = v1 + v2 − U_dc`, s being the terminals' shares of the link as a vector, and a motor sees
 //! `u = U_in s`; so what leaves the network enters the motors, also while the diodes of a bridge without gates decide on s.
 //! In shoot-through the source is apart, and `U_in = 0`.

@@ -138,6 +138,7 @@ impl System for Zs9 {
         let line = plan.line;
         let bench = bench(plan, options, machine)?;
         let settings = settings::drive(CLOCK, options.own.carrier_hz);
+        let settings = settings::with_dead_time(settings, options.dead_time_us * 1e-6);
         match options.on {
             On::Host => {
                 settings.check(machine.tables).map_err(refused)?;
@@ -152,7 +153,11 @@ impl System for Zs9 {
                 }
             }
             On::Qemu => {
-                let setup = DualSetup { carrier_ticks: settings.carrier_ticks, line };
+                let setup = DualSetup {
+                    carrier_ticks: settings.carrier_ticks,
+                    dead_time_ticks: settings.dead_time_ticks,
+                    line,
+                };
                 let patient = supervisor.as_ref().is_some_and(|supervisor| supervisor.is_typed());
                 run_in_qemu(name, bench, setup, &options.emulator(patient)?, supervisor)
             }

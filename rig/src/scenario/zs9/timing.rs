@@ -1,6 +1,7 @@
 //! A short drive of both motors for `cargo xtask timing`: every instruction of the interrupts is logged there.
 
 use super::prelude::*;
+use crate::law::LawName;
 
 /// Full torque by the speed loops at prescribed speeds: motoring at low and at high speed, then braking from there.
 #[derive(Clone, Copy, Debug, Args, Serialize)]
@@ -14,6 +15,21 @@ const LEAD_S: f64 = 0.03;
 /// A speed out of reach, in r/min: the loop asks for all the torque there is.
 const FAR_RPM: f64 = 20_000.0;
 
+/// Figures, and the time in s over which each is the mean: at the highest speed, before the torque reverses and after it.
+const MOTORING: (&str, (f64, f64)) = ("motoring_torque_error_percent", (0.115, BRAKES_FROM_S));
+const BRAKING: (&str, (f64, f64)) = ("braking_torque_error_percent", (0.13, DURATION_S));
+/// The most that torque may be off its reference there, in %.
+const MOST_OFF_PERCENT: f64 = 1.0;
+
+/// The mean torque off its reference, of the motor of which it is farther off, in %.
+fn off_percent(rows: &[Row]) -> f64 {
+    let of_motor = |k: usize| {
+        let torque_nm = mean(rows, |row| row.motors[k].torque_nm);
+        (torque_nm / mean(rows, |row| row.motors[k].torque_ref_nm) - 1.0).abs() * 100.0
+    };
+    of_motor(0).max(of_motor(1))
+}
+
 impl Scenario<Zs9> for Timing {
     fn plan(&self, _options: &Options, _machine: &Machine) -> Plan {
         let operator = |t_s: f64, _: SeenMotors| {
@@ -26,6 +42,22 @@ impl Scenario<Zs9> for Timing {
             SpeedSource::profile(points.collect())
         };
         Plan::driven((LEAD_S, DURATION_S), [turning(1.0), turning(-1.0)], [0.0; 2], operator)
+    }
+
+    fn figures(&self, recording: &Recording, options: &Options, _machine: &Machine) -> Figures {
+        let mut figures = figures::common(recording);
+        for (name, (from_s, to_s)) in [MOTORING, BRAKING] {
+            figures.set(name, off_percent(figures::window(recording, from_s, to_s)));
+        }
+        // The papers' law has not settled so soon after the reversal.
+        let settles = matches!(options.law, LawName::Tractive);
+        let braking = if settles { MOST_OFF_PERCENT } else { f64::INFINITY };
+        let bounds = [
+            ("torque off in weakening at 1,450 r/min, motoring in %", MOTORING.0, MOST_OFF_PERCENT),
+            ("the same, braking in %", BRAKING.0, braking),
+        ];
+        figures.set("verdicts", judge(&figures, options, &bounds));
+        figures
     }
 
     fn plots(&self, recording: &Recording, _: &Options, _: &Machine, page: &mut Page) {
