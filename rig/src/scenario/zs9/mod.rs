@@ -1,6 +1,7 @@
 //! The ZS9's scenarios.
 
 pub(super) mod cycle;
+mod live;
 pub(super) mod load_step;
 mod patterns;
 mod prelude;
@@ -8,6 +9,7 @@ pub(super) mod reverse;
 pub(super) mod steady;
 pub(super) mod timing;
 
+pub use live::Live;
 pub use load_step::INERTIA_KG_M2;
 pub use steady::SPEEDS_RPM as STEADY_SPEEDS_RPM;
 
