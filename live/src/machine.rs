@@ -1,21 +1,33 @@
 //! The machine that is built in, and what the page draws of it.
 
-use anyhow::Result;
+use anyhow::{Result, bail};
 use serde_json::{Value, json};
-use tractive::built_in::traction::BUILT_IN;
+use tractive::built_in::{traction, zs9};
 use tractive_rig::machine::Machine;
 use tractive_tablegen::{MachineFolder, Optimum, SmoothMap};
 
 /// Points of a curve.
 const POINTS: u32 = 40;
 
-/// The 180 kW machine.
-pub fn pmasynrm() -> Result<Machine> {
-    let folder = MachineFolder::parse(
-        include_str!("../../tables/pmasynrm-180kw/machine.toml"),
-        include_str!("../../tables/pmasynrm-180kw/flux_map.csv"),
-    )?;
-    Ok(Machine { folder, tables: &BUILT_IN })
+/// The machine of this name in `tables/`, with the tables that are built in where they are its own.
+pub fn named(name: &str) -> Result<Machine> {
+    macro_rules! folder {
+        ($name:literal) => {
+            MachineFolder::parse(
+                include_str!(concat!("../../tables/", $name, "/machine.toml")),
+                include_str!(concat!("../../tables/", $name, "/flux_map.csv")),
+            )
+        };
+    }
+    let (folder, tables) = match name {
+        "pmasynrm-180kw" => (folder!("pmasynrm-180kw")?, Some(&traction::BUILT_IN)),
+        "ipm-zs9" => (folder!("ipm-zs9")?, Some(&zs9::BUILT_IN)),
+        "pmsm-48v-1kw" => (folder!("pmsm-48v-1kw")?, None),
+        _ => bail!("there is no machine `{name}` in the page"),
+    };
+    // Made anew at each start of a machine that is not built in, a few kilobytes.
+    let tables = tables.unwrap_or_else(|| Box::leak(Box::new(folder.tables())));
+    Ok(Machine { folder, tables })
 }
 
 /// Limits and curves, in V, A, N·m and r/min.
@@ -42,6 +54,7 @@ pub fn properties(machine: &Machine) -> Value {
         "tripLink": [parameters.trip_dc_under_v, parameters.trip_dc_over_v],
         "resistance": parameters.stator_resistance_ohm,
         "mtpa": mtpa,
+        "maxSwitching": parameters.max_switching_hz,
         "flux": flux(&map, parameters.max_current_a),
     })
 }
