@@ -46,7 +46,7 @@ impl Bench {
 
     /// The machine's limits and curves, and the faults that can be injected, as JSON.
     pub fn properties(&self) -> String {
-        let mut properties = machine::properties(&self.machine);
+        let mut properties = tractive_rig::curves::properties(&self.machine);
         properties["faults"] = self.drive.faults().into();
         properties["step"] = self.step_s.into();
         properties.to_string()

@@ -12,6 +12,7 @@ pub mod bound;
 pub mod campaign;
 pub mod columns;
 pub mod compare;
+pub mod curves;
 pub mod distortion;
 pub mod figures;
 pub mod files;
@@ -20,6 +21,8 @@ pub mod gallery;
 pub mod identify;
 pub mod inject;
 pub mod law;
+#[cfg(unix)]
+pub mod live;
 pub mod machine;
 pub mod mtpa_methods;
 pub mod needs;

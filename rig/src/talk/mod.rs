@@ -8,18 +8,22 @@ pub mod script;
 mod sender;
 mod supervisor;
 mod system;
+mod words;
 
 pub use lines::Lines;
 pub use listener::Listener;
 pub use outcome::{Happened, Outcome, TalkOptions};
 pub use supervisor::Talk;
 pub use system::System;
+pub use words::DriveOptions;
+pub(crate) use words::{read, usual};
 
 use crate::analysis::Figures;
 use crate::bench::LinePlan;
 use crate::machine::Machine;
 use crate::options::{Options, RunOptions};
 use crate::plant::SpeedSource;
+use crate::run::Supervisor;
 use crate::scenario::System as _;
 use crate::scenario::traction::{self, Traction, scaled_link};
 use crate::scenario::zs9::{self as dual, Zs9};
@@ -47,19 +51,24 @@ pub fn run(options: &TalkOptions) -> Result<Outcome> {
     let machine = Machine::load(options.machine_name())?;
     let mut talk = Talk::new(system, lines, options.inertia(), machine.folder.parameters.max_torque_nm);
     let recording = match system {
-        System::Pmasynrm => Happened::Pmasynrm(with_traction(options, &machine, &mut talk)?),
-        System::Zs9 => Happened::Zs9(with_zs9(options, &machine, &mut talk)?),
+        System::Pmasynrm => Happened::Pmasynrm(with_traction(options, LONGEST_S, &machine, &mut talk)?),
+        System::Zs9 => Happened::Zs9(with_zs9(options, LONGEST_S, &machine, &mut talk)?),
     };
     let figures = figures(&talk, &recording);
     Ok(Outcome { talk, system, recording, figures })
 }
 
-fn run_options(options: &TalkOptions) -> RunOptions {
+fn run_options(options: &DriveOptions) -> RunOptions {
     RunOptions { dt: Some(options.run.dt.unwrap_or(TRACE_STEP_S)), ..options.run.clone() }
 }
 
 /// A rotor on a link, commanded over the protocol.
-fn with_traction(options: &TalkOptions, machine: &Machine, talk: &mut Talk) -> Result<Recording> {
+pub(crate) fn with_traction(
+    options: &DriveOptions,
+    longest_s: f64,
+    machine: &Machine,
+    supervisor: &mut dyn Supervisor,
+) -> Result<Recording> {
     let own = Options { run: run_options(options), own: options.traction.clone() };
     Traction::check(&own, &Map::new(), machine)?;
     let idle = Request::idle(&machine.tables.ratings);
@@ -68,13 +77,18 @@ fn with_traction(options: &TalkOptions, machine: &Machine, talk: &mut Talk) -> R
     let plan = traction::Plan {
         judged_step_s: own.dt.unwrap_or(TRACE_STEP_S),
         speed: SpeedSource::Inertia { inertia_kg_m2: options.inertia(), load_nm: 0.0 },
-        ..traction::Plan::operated(LONGEST_S, vec![(0.0, 0.0)], line)
+        ..traction::Plan::operated(longest_s, vec![(0.0, 0.0)], line)
     };
-    Traction::run("talk", plan, &own, machine, Some(talk))
+    Traction::run("talk", plan, &own, machine, Some(supervisor))
 }
 
 /// Two rotors on an empty network, commanded over the protocol.
-fn with_zs9(options: &TalkOptions, machine: &Machine, talk: &mut Talk) -> Result<zs9::trace::Recording> {
+pub(crate) fn with_zs9(
+    options: &DriveOptions,
+    longest_s: f64,
+    machine: &Machine,
+    supervisor: &mut dyn Supervisor,
+) -> Result<zs9::trace::Recording> {
     let own = Options { run: run_options(options), own: options.zs9.clone() };
     Zs9::check(&own, &Map::new(), machine)?;
     // What the operator permits takes the place of the demands.
@@ -83,13 +97,13 @@ fn with_zs9(options: &TalkOptions, machine: &Machine, talk: &mut Talk) -> Result
         loads_nm: [0.0; 2],
         enable: true,
     };
-    let times_s = (0.0, LONGEST_S);
+    let times_s = (0.0, longest_s);
     let plan = dual::Plan {
         edges: false,
         line: Some(zs9::line::TIMES),
         ..dual::Plan::driven(times_s, dual::free(options.inertia()), [0.0; 2], operator)
     };
-    Zs9::run("talk", plan, &own, machine, Some(talk))
+    Zs9::run("talk", plan, &own, machine, Some(supervisor))
 }
 
 fn figures(talk: &Talk, recording: &Happened) -> Figures {
