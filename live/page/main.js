@@ -101,7 +101,7 @@ worker.onmessage = ({ data }) => ({
       build($("controls"), { controls: drive.controls, settings, kinds: drive.system.faults, faults: properties.faults, scenarios: data.scenarios, remote }, act);
       scope = new Scope($("plots"), memory);
       scope.largest = properties.maxTorque;
-      scope.onzoom = () => { if (!scope.held) scope.paused = false; buttons(); };
+      scope.onzoom = () => { if (!scope.held) scope.paused = false; fresh = true; buttons(); };
       toolbar();
       requestAnimationFrame(frame);
     }
@@ -175,6 +175,7 @@ function toolbar() {
     scope.held = null;
     scope.paused = false;
     scope.triggered = -1;
+    fresh = true;
     buttons();
   };
   const pace = () => tell({ type: "rate", value: +$("rate").value });
@@ -232,6 +233,7 @@ function frame() {
   if (frames % 3 === 2 && own.has("ia")) views.hexagon(own, properties, system);
   if (frames % 20 === 5 && own.has("ia")) { views.spectrum(own, properties, system, bound); tell({ type: "bound" }); }
   for (const figure of document.querySelectorAll("figure[data-needs]")) figure.hidden = !own.has(figure.dataset.needs);
+  document.body.dataset.frames = frames;
   if (frames === 1) document.body.dataset.painted = performance.now().toFixed(0);
 }
 

@@ -4,6 +4,8 @@ const PAUSE_MS = 30;
 const LINES = { torque: "torque", speed: "speed" };
 let armed = false, next = 0, answered = true, about = null, wanted = null;
 const demands = [];
+const AGAIN_MS = 700; // time after which an order that was not followed is given again
+let ordered = 0, enabled = false;
 
 const ask = async (path, options) => {
   const answer = await fetch(path, options);
@@ -30,7 +32,7 @@ const handlers = {
   async want(now) {
     const was = wanted;
     wanted = now;
-    if (now.on && !was.on) { await say("charge"); await say("enable with-torque"); }
+    ordered = 0;
     if (!now.on && was.on) await say("disable");
     if (now.coast !== was.coast) await say(`coast ${now.coast ? "on" : "off"}`);
   },
@@ -51,13 +53,26 @@ onmessage = async ({ data }) => {
   }
 };
 
+/** Charges and enables, one after the other, as the drive's state lets it. */
+async function pursue(state) {
+  if (!armed || !wanted?.on || performance.now() - ordered < AGAIN_MS) return;
+  if (state === "ready") await say("charge");
+  // Its rising edge counts.
+  else if (state === "charged") { enabled = !enabled; await say(enabled ? "enable with-torque" : "disable"); }
+  else return;
+  ordered = performance.now();
+}
+
 async function look() {
   try {
     if (answered) {
       const told = await ask(`/rows?from=${next}`);
-      if (told.rows.length) next = told.from + told.rows.length / about.columns.length;
-      answered = false;
-      postMessage({ type: "rows", from: told.from * about.step, rows: Float32Array.from(told.rows, value => value ?? NaN), edges: new Float64Array(), state: told.state, factor: null });
+      if (told.rows.length) {
+        next = told.from + told.rows.length / about.columns.length;
+        answered = false;
+        await pursue(told.state?.status?.state);
+        postMessage({ type: "rows", from: told.from * about.step, rows: Float32Array.from(told.rows, value => value ?? NaN), edges: new Float64Array(), state: told.state ?? {}, factor: null });
+      }
     }
   } catch (error) {
     postMessage({ type: "error", message: String(error?.message ?? error) });

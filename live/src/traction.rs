@@ -93,7 +93,12 @@ impl Driven for Traction {
 
     fn state(&self) -> Value {
         let status = self.live.status();
-        told::state(self.live.time_s(), self.live.trip(), status.as_ref(), status.map(|of| number(of.torque_nm)))
+        told::state(
+            self.live.time_s(),
+            self.live.trip(),
+            status.as_ref(),
+            status.map(|of| number(of.torque_nm)),
+        )
     }
 
     fn faults(&self) -> Vec<String> {
@@ -156,7 +161,8 @@ impl Driven for Traction {
         let rows = self.kept.iter().position(|row| last.t_s - row.t_s < turns / f1_hz).unwrap_or(0);
         let ideal = bound::ideal(&self.kept[rows..], &self.options, &self.machine);
         ideal.filter(|ideal| ideal.current_a.len() <= MOST_SAMPLES).map_or(Vec::new(), |ideal| {
-            let turned = ideal.angle.last().zip(ideal.angle.first()).map_or(0.0, |(last, first)| last - first);
+            let turned =
+                ideal.angle.last().zip(ideal.angle.first()).map_or(0.0, |(last, first)| last - first);
             lines(&ideal.current_a, f1_hz / (turned / TAU).round().max(1.0))
         })
     }

@@ -16,7 +16,9 @@ pub use outcome::{Happened, Outcome, TalkOptions};
 pub use supervisor::Talk;
 pub use system::System;
 pub use words::DriveOptions;
-pub(crate) use words::{read, usual};
+#[cfg(unix)]
+pub(crate) use words::read;
+pub(crate) use words::usual;
 
 use crate::analysis::Figures;
 use crate::bench::LinePlan;

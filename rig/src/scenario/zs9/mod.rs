@@ -140,7 +140,8 @@ impl System for Zs9 {
         let line = plan.line;
         let bench = bench(plan, options, machine)?;
         let settings = settings::drive(CLOCK, options.own.carrier_hz);
-        match options.on {
+        let (on, law) = options.choice()?;
+        match on {
             On::Host => {
                 settings.check(machine.tables).map_err(refused)?;
                 let ratings = settings.operator_ratings(&machine.tables.ratings);
@@ -148,7 +149,7 @@ impl System for Zs9 {
                     Line::rated(&ratings, times.precharge_s, times.discharge_s).without_chopper()
                 });
                 let run = OnHost { name, bench, settings, ratings, line, machine };
-                match options.law {
+                match law {
                     LawName::Tractive => run.run(Controller::with_tracking(TRACKING_RAD_S), supervisor),
                     LawName::Pi => run.run(PiLaw::with_tracking(TRACKING_RAD_S), supervisor),
                 }
