@@ -129,3 +129,51 @@ mod linux {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Relay, Shared, relay as page};
+    use super::*;
+    use crate::talk::System;
+    use std::collections::VecDeque;
+    use std::sync::Arc;
+    use tractive::protocol::e2e::Counter;
+    use tractive::protocol::{COMMAND, FROM_DRIVE, Payload};
+
+    /// A bus with frames that come, and those that were sent.
+    struct Fake {
+        come: VecDeque<Frame>,
+        sent: Vec<Frame>,
+    }
+
+    impl Bus for Fake {
+        fn send(&mut self, frame: &Frame) -> Result<()> {
+            self.sent.push(*frame);
+            Ok(())
+        }
+
+        fn receive(&mut self) -> Result<Option<Frame>> {
+            Ok(self.come.pop_front())
+        }
+    }
+
+    #[test]
+    fn a_bus_is_only_looked_at_until_commands_are_switched_on() {
+        let shared = Arc::new(Shared::new(true));
+        let mut to = Relay::new(System::Pmasynrm, 10.0, 1235.0, Arc::clone(&shared));
+        let status = FROM_DRIVE[0].frame(Payload(0), &mut Counter::default());
+        let mut bus = Fake { come: [status].into(), sent: Vec::new() };
+        relay(&mut bus, &mut to, 0..30).unwrap();
+        assert!(bus.sent.is_empty(), "{:?}", bus.sent);
+        let told = shared.rows(0);
+        assert_eq!(told["rows"].as_array().unwrap().len(), page::columns(System::Pmasynrm).len());
+        assert!(told["state"]["status"]["state"].is_string());
+        shared.arm(true).unwrap();
+        shared.say("charge").unwrap();
+        relay(&mut bus, &mut to, 30..60).unwrap();
+        assert!(bus.sent.len() == 3 && bus.sent.iter().all(|frame| COMMAND.is_intact(frame)), "{:?}", bus.sent);
+        shared.arm(false).unwrap();
+        relay(&mut bus, &mut to, 60..90).unwrap();
+        assert_eq!(bus.sent.len(), 3);
+    }
+}
