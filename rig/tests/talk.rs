@@ -275,7 +275,9 @@ fn each_system_has_its_own_options_alone() {
         String::from_utf8_lossy(&output.stdout).into_owned()
     };
     let (traction, zs9) = (help(&[]), help(&["--system", "zs9"]));
-    assert!(traction.contains("--patterns") && !traction.contains("--uin") && !traction.contains("link VOLTS"));
+    assert!(
+        traction.contains("--patterns") && !traction.contains("--uin") && !traction.contains("link VOLTS")
+    );
     assert!(zs9.contains("--uin") && !zs9.contains("--patterns"));
     let bench = |words: &[&str]| {
         let program = env!("CARGO_BIN_EXE_tractive-rig");

@@ -78,7 +78,7 @@ pub fn check(setup: &mut Setup) -> Result<Result<bool, String>> {
 const REPORTS: [(&str, &str, i32); 4] = [
     ("characteristic", "characteristic", 0),
     ("zs9-load-step", "zs9-load-step", 0),
-    ("million", "zs9-load-step --dt 1.2e-6", 0),
+    ("million", "zs9-cycle --dt 3.6e-5", 0),
     ("trip", "sweep --to 100 --udc 2200", 1),
 ];
 

@@ -171,7 +171,11 @@ mod tests {
         shared.arm(true).unwrap();
         shared.say("charge").unwrap();
         relay(&mut bus, &mut to, 30..60).unwrap();
-        assert!(bus.sent.len() == 3 && bus.sent.iter().all(|frame| COMMAND.is_intact(frame)), "{:?}", bus.sent);
+        assert!(
+            bus.sent.len() == 3 && bus.sent.iter().all(|frame| COMMAND.is_intact(frame)),
+            "{:?}",
+            bus.sent
+        );
         shared.arm(false).unwrap();
         relay(&mut bus, &mut to, 60..90).unwrap();
         assert_eq!(bus.sent.len(), 3);

@@ -12,8 +12,11 @@ use clap::{Args, Command};
 pub struct Planned<S: System> {
     /// The name on the command line.
     pub name: &'static str,
-    drive: fn(&'static str, &Options<S::Own>, &Machine) -> Result<S::Recording>,
+    drive: Drive<S>,
 }
+
+/// The run of a scenario by its name.
+type Drive<S> = fn(&'static str, &Options<<S as System>::Own>, &Machine) -> Result<<S as System>::Recording>;
 
 impl<S: System> Planned<S> {
     const fn of<T: Scenario<S> + Args>(name: &'static str) -> Self {

@@ -61,8 +61,8 @@ fn named(words: &[OsString]) -> System {
         "" => words.get(k + 1)?.to_str().map(str::to_owned),
         joined => joined.strip_prefix('=').map(str::to_owned),
     };
-    let names = words.iter().enumerate().filter_map(|(k, word)| value(k, word));
-    names.last().and_then(|name| System::from_str(&name, false).ok()).unwrap_or_default()
+    let mut names = words.iter().enumerate().filter_map(|(k, word)| value(k, word));
+    names.next_back().and_then(|name| System::from_str(&name, false).ok()).unwrap_or_default()
 }
 
 /// The command line of a verb for a system, with the verb's own options.

@@ -38,7 +38,7 @@ struct Wire<'w> {
 /// The source of the operator's requests.
 enum End<'w> {
     /// The protocol: the drive's end of it, and who is at the other end.
-    Protocol(Zs9CanEndpoint, &'w mut dyn Supervisor),
+    Protocol(Box<Zs9CanEndpoint>, &'w mut dyn Supervisor),
     /// Requests as they are.
     Direct(Commander),
 }
@@ -189,7 +189,9 @@ impl<'a, L: ControlLaw + Copy> Tasks<'a, L> {
         line: Option<Line>,
     ) -> Self {
         self.wire = supervisor.map(|supervisor| {
-            self.wire(ratings, line, |ratings| End::Protocol(Zs9CanEndpoint::new(ratings), supervisor))
+            self.wire(ratings, line, |ratings| {
+                End::Protocol(Box::new(Zs9CanEndpoint::new(ratings)), supervisor)
+            })
         });
         self
     }
