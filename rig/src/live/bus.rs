@@ -49,11 +49,12 @@ pub fn run(interface: &str, _: &mut Relay) -> Result<()> {
 
 #[cfg(target_os = "linux")]
 mod linux {
-    use super::{Bus, Frame};
+    use crate::live::bus::Bus;
     use anyhow::{Context, Result};
     use socketcan::{
         CanDataFrame, CanFrame, CanSocket, EmbeddedFrame, Id, ShouldRetry, Socket as _, StandardId,
     };
+    use tractive::protocol::Frame;
 
     /// A SocketCAN socket that does not wait.
     pub struct Socket(CanSocket);
@@ -132,8 +133,9 @@ mod linux {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Relay, Shared, relay as page};
     use super::*;
+    use crate::live::relay::{Relay, columns};
+    use crate::live::shared::Shared;
     use crate::talk::System;
     use std::collections::VecDeque;
     use std::sync::Arc;
@@ -166,7 +168,7 @@ mod tests {
         relay(&mut bus, &mut to, 0..30).unwrap();
         assert!(bus.sent.is_empty(), "{:?}", bus.sent);
         let told = shared.rows(0);
-        assert_eq!(told["rows"].as_array().unwrap().len(), page::columns(System::Pmasynrm).len());
+        assert_eq!(told["rows"].as_array().unwrap().len(), columns(System::Pmasynrm).len());
         assert!(told["state"]["status"]["state"].is_string());
         shared.arm(true).unwrap();
         shared.say("charge").unwrap();
