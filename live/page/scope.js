@@ -2,22 +2,24 @@
 
 const HELD_S = 10; // what the scope holds
 const MOST_EDGES = 12_000; // more than these are a band
-const NAMES = ["off", "async", "sync 15", "sync 12", "mid 7", "mid 3", "square"];
-export const modeName = code => NAMES[code] ?? "";
 export const WINDOWS = [0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10];
 
 /** Rows and edges of the last seconds, in rings. */
 export class Memory {
-  constructor(columns, step) {
+  constructor(columns, step, system, size = Math.round(HELD_S / step)) {
     this.columns = columns;
     this.step = step;
-    this.size = Math.round(HELD_S / step);
+    this.system = system;
+    this.size = Math.max(size, 2);
     this.of = Object.fromEntries(columns.map(name => [name, new Float32Array(this.size)]));
     this.count = 0; // rows so far; row k is that of time k·step
     this.edgeTimes = [];
     this.edgeStates = []; // gates that are on behind each edge, a bit each
     this.state = 0;
+    this.edgesFrom = 0; // edges before this are not known
   }
+  has(name) { return name in this.of; }
+  modeName(code) { return this.system.modes[code] ?? ""; }
   get end() { return (this.count - 1) * this.step; }
   get begin() { return Math.max(0, this.count - this.size) * this.step; }
   put(from, rows, edges) {
@@ -28,9 +30,13 @@ export class Memory {
       for (let c = 0; c < width; c++) this.of[this.columns[c]][at] = rows[k * width + c];
       this.count += 1;
     }
+    // A gap: what came before it says nothing of what comes after.
+    if (edges.length && this.edgeTimes.length && edges[0] - this.edgeTimes[this.edgeTimes.length - 1] > 0.05 && this.system.cycle) {
+      [this.edgeTimes, this.edgeStates, this.edgesFrom] = [[], [], edges[0]];
+    }
     for (let k = 0; k < edges.length; k += 2) {
-      const gate = edges[k + 1] & 7;
-      this.state = edges[k + 1] & 8 ? this.state | 1 << gate : this.state & ~(1 << gate);
+      const gate = edges[k + 1] & 15;
+      this.state = edges[k + 1] & 16 ? this.state | 1 << gate : this.state & ~(1 << gate);
       this.edgeTimes.push(edges[k]);
       this.edgeStates.push(this.state);
     }
@@ -40,7 +46,7 @@ export class Memory {
       this.edgeStates.splice(0, gone);
     }
   }
-  value(name, row) { return this.of[name][((row % this.size) + this.size) % this.size]; }
+  value(name, row) { return this.of[name]?.[((row % this.size) + this.size) % this.size] ?? NaN; }
   last(name) { return this.count ? this.value(name, this.count - 1) : 0; }
   /** Mean over the last seconds. */
   mean(name, seconds) {
@@ -93,6 +99,36 @@ export class Memory {
     }
     return [x, ...y];
   }
+  /** All that is held, as a time and values. */
+  * rows() {
+    for (let k = Math.max(0, this.count - this.size); k < this.count; k++) yield [k * this.step, this.columns.map(name => this.value(name, k))];
+  }
+  /** Line voltage over the link in a window: each step, or the least and the most of each pixel. */
+  lineVoltage(share, from, to, pixels) {
+    const first = Math.max(this.edgeAfter(from), this.edgeAfter(to) - 60_000), last = this.edgeAfter(to), x = [], y = [], current = [0, 0, 0, 1];
+    const largest = this.has("ia") ? Math.max(this.peak("ia", 0.02), 1) : 1;
+    const volts = (state, t) => {
+      const row = Math.min(Math.max(Math.round(t / this.step), 0), this.count - 1);
+      if (this.has("ia")) ["ia", "ib", "ic"].forEach((name, k) => (current[k] = this.value(name, row)));
+      current[3] = largest;
+      const value = share(state, current) * this.value("udc", row);
+      return Number.isNaN(value) ? null : value;
+    };
+    const width = (to - from) / pixels, dense = last - first > 2 * pixels;
+    let now = volts(first > 0 ? this.edgeStates[first - 1] : 0, from), low = now, high = now, until = from + width;
+    const put = (t, value) => { x.push(t); y.push(value); };
+    put(Math.max(from, this.edgesFrom), now);
+    for (let k = first; k < last; k++) {
+      const t = this.edgeTimes[k], next = volts(this.edgeStates[k], t);
+      if (dense) {
+        low = Math.min(low ?? 0, next ?? 0); high = Math.max(high ?? 0, next ?? 0);
+        if (t >= until) { put(t, low); put(t, high); low = high = next; until = t + width; }
+      } else if (next !== now) { put(t, now); put(t, next); }
+      now = next;
+    }
+    put(Math.min(to, Math.max(this.end, from)), now);
+    return [x, y];
+  }
   csv() {
     const first = Math.max(0, this.count - this.size), parts = [`t_s,${this.columns.join(",")}\n`];
     for (let begin = first; begin < this.count; begin += 5000) {
@@ -108,16 +144,7 @@ export class Memory {
   }
 }
 
-const css = name => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
-
-/** The plots, one below the other, with their series: column, name, colour, dashes. */
-const PLOTS = [
-  { title: "Phase currents, A", height: 196, least: 20, series: [["ia", "u", "--u"], ["ib", "v", "--v"], ["ic", "w", "--w"]] },
-  { title: "Torque, N·m", height: 140, least: 50, series: [["te", "T", "--torque"], ["teRef", "T*", "--ref", [5, 4]]] },
-  { title: "Speed, r/min", height: 92, least: 50, series: [["speed", "n", "--speed"]] },
-  { title: "Link voltage, V", height: 92, least: 50, series: [["udc", "U", "--link"]] },
-  { title: "Gates and mode", height: 132, gates: true, series: [] },
-];
+export const css = name => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 
 /** Ends of an axis that hold still: they move when they must. */
 class Range {
@@ -152,20 +179,27 @@ export class Scope {
     this.shown = [0, 0.1];
     this.held = null; // a window that was zoomed to
     this.triggered = -1;
+    this.largest = 1000;
     this.build();
     new ResizeObserver(() => this.resize()).observe(host);
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.build());
   }
-  reset(memory) { this.memory = memory; this.held = null; this.triggered = -1; }
+  reset(memory) { this.memory = memory; this.held = null; this.triggered = -1; this.build(); }
   width() { return Math.max(200, this.host.clientWidth); }
   /** Lower on a phone, so that controls are near. */
   height(plot) { return Math.round(plot.height * (this.width() < 500 && !plot.gates ? 0.78 : 1)); }
   resize() {
-    if (this.plots[0].width !== this.width()) this.plots.forEach((plot, k) => plot.setSize({ width: this.width(), height: this.height(PLOTS[k]) }));
+    if (this.plots[0].width !== this.width()) this.plots.forEach((plot, k) => plot.setSize({ width: this.width(), height: this.height(this.list[k]) }));
   }
+  /** The plots of what the memory has: those of gates where edges come, the others where a column is there. */
   build() {
     this.plots?.forEach(plot => plot.destroy());
-    this.plots = PLOTS.map((plot, k) => this.plot(plot, k === PLOTS.length - 1));
+    const { memory } = this, known = ([column]) => memory.has(column);
+    this.list = memory.system.plots
+      .filter(plot => (plot.lines ? memory.hasEdges : plot.gates ? memory.has("mode") : plot.series.some(known)))
+      .map(plot => (plot.series ? { ...plot, series: plot.series.filter(known) } : { ...plot, series: plot.lines.map(([name, colour]) => ["", name, colour]) }))
+      .map(plot => (plot.gates && !memory.hasEdges ? { ...plot, title: plot.title.replace("Gates and m", "M").replace("Gates and s", "S"), height: 70 } : plot));
+    this.plots = this.list.map((plot, k) => this.plot(plot, k === this.list.length - 1));
   }
   plot(plot, isLast) {
     const font = "12px system-ui, 'Segoe UI', Roboto, 'DejaVu Sans', sans-serif";
@@ -177,16 +211,16 @@ export class Scope {
       padding: [8, 8, 0, 0],
       cursor: { sync: { key: "scope" }, drag: { x: true, y: false, setScale: false }, points: { size: 6 } },
       legend: { show: !plot.gates, live: true },
-      scales: { x: { time: false, range: () => this.shown }, y: plot.gates ? { range: () => [0, 4] } : { range: (u, low, high) => range.of(low, high) } },
+      scales: { x: { time: false, range: () => this.shown }, y: plot.gates ? { range: () => [0, this.lanes() + 1] } : { range: (u, low, high) => range.of(low, high) } },
       axes: [
         { ...axis, size: isLast ? 30 : 6, values: isLast ? time : (u, ticks) => ticks.map(() => ""), space: 70 },
-        { ...axis, size: 54, space: 26, ...(plot.gates ? { splits: () => [0.5, 1.5, 2.5, 3.5], values: () => ["mode", "w", "v", "u"] } : {}) },
+        { ...axis, size: 54, space: 26, ...(plot.gates ? { splits: () => Array.from({ length: this.lanes() + 1 }, (_, k) => k + 0.5), values: () => [...(this.lanes() ? [this.memory.system.id === "zs9" ? "scheme" : "mode", ...this.memory.system.lanes.map(lane => lane.name).reverse()] : [""])], space: 1 } : {}) },
       ],
       series: [
         { label: "t", value: (u, t) => (t == null ? "" : `${(t * 1e3).toFixed(2)} ms`) },
         ...plot.series.map(([, name, colour, dash]) => ({
           label: name, stroke: css(colour), width: 1.4, dash, points: { show: false },
-          value: (u, value) => (value == null ? "" : value.toPrecision(4)),
+          value: (u, value) => (value == null || Number.isNaN(value) ? "" : value.toPrecision(4)),
         })),
         ...(plot.gates ? [{ show: true, stroke: "transparent", points: { show: false } }] : []),
       ],
@@ -199,6 +233,7 @@ export class Scope {
     made.over.addEventListener("dblclick", () => { this.held = null; this.onzoom?.(); });
     return made;
   }
+  lanes() { return this.memory.hasEdges ? this.memory.system.lanes.length : 0; }
   select(u) {
     if (u.select.width < 4) return;
     const from = u.posToVal(u.select.left, "x"), to = u.posToVal(u.select.left + u.select.width, "x");
@@ -226,14 +261,15 @@ export class Scope {
     const { memory, trigger } = this;
     const newest = memory.count - 1 - Math.ceil(0.8 * this.window / memory.step);
     const oldest = Math.max(memory.count - memory.size + 2, newest - Math.ceil((2 * this.window + 0.2) / memory.step), 1);
+    const stepped = 0.015 * this.largest;
     for (let k = newest; k >= oldest; k--) {
       const now = name => memory.value(name, k), before = name => memory.value(name, k - 1);
+      const steps = name => memory.has(name) && Math.abs(now(name) - memory.value(name, k - 20)) > stepped && Math.abs(before(name) - memory.value(name, k - 21)) <= stepped;
       const hit = {
-        ia: () => before("ia") < 0 && now("ia") >= 0,
-        te: () => Math.abs(now("teRef") - memory.value("teRef", k - 20)) > 20 && Math.abs(before("teRef") - memory.value("teRef", k - 21)) <= 20,
+        te: () => steps("teRef") || steps("teRef1") || steps("teRef2"),
         mode: () => now("mode") !== before("mode"),
-        fault: () => now("mode") === 0 && before("mode") !== 0,
-      }[trigger];
+        fault: () => (memory.has("trip") ? now("trip") > before("trip") : now("mode") === 0 && before("mode") !== 0),
+      }[trigger] ?? (() => before(trigger) < 0 && now(trigger) >= 0);
       if (hit()) return k * memory.step;
     }
     return -1;
@@ -242,12 +278,15 @@ export class Scope {
     const pixels = Math.round(0.75 * this.width());
     this.shown = this.view();
     const [from, to] = this.shown;
-    PLOTS.forEach((plot, k) => {
+    this.list.forEach((plot, k) => {
       const names = plot.series.map(([column]) => column);
-      this.plots[k].setData(plot.gates ? [[from, to], [0, 0]] : this.memory.window(names, from, to, pixels));
+      this.plots[k].setData(plot.gates ? [[from, to], [0, 0]] : plot.lines ? this.voltages(plot.lines, from, to, pixels) : this.memory.window(names, from, to, pixels));
     });
   }
-  /** Lanes of the three legs, and the mode below. */
+  voltages(lines, from, to, pixels) {
+    return uPlot.join(lines.map(([, , share]) => this.memory.lineVoltage(share, from, to, pixels)).map(pathOnce));
+  }
+  /** Lanes of the gates, and the mode below. */
   gates(u) {
     const { ctx } = u, { memory } = this, ratio = devicePixelRatio || 1;
     const [from, to] = this.shown, x = t => u.valToPos(t, "x", true), y = v => u.valToPos(v, "y", true);
@@ -256,7 +295,8 @@ export class Scope {
     ctx.rect(u.bbox.left, u.bbox.top, u.bbox.width, u.bbox.height);
     ctx.clip();
     ctx.lineWidth = 1.3 * ratio;
-    lanes(ctx, memory, from, to, t => x(Math.min(Math.max(t, from), to)), (leg, level) => y(3.15 - leg + 0.7 * level), ["--u", "--v", "--w"].map(css));
+    const most = this.lanes();
+    if (most) lanes(ctx, memory, from, to, t => x(Math.min(Math.max(t, from), to)), (lane, level) => y(most + 0.15 - lane + 0.7 * level));
     this.modes(ctx, from, to, x, y, ratio);
     ctx.restore();
   }
@@ -274,7 +314,7 @@ export class Scope {
       ctx.fillStyle = css(even ? "--press" : "--line");
       ctx.fillRect(left, y(0.9), right - left, y(0.1) - y(0.9));
       ctx.fillStyle = css("--text");
-      const name = modeName(mode), width = ctx.measureText(name).width;
+      const name = memory.modeName(mode), width = ctx.measureText(name).width;
       if (right - left > width + 8) ctx.fillText(name, Math.max(left, x(from)) + 5, y(0.48));
       begin = k + 1;
       even = !even;
@@ -282,32 +322,37 @@ export class Scope {
   }
 }
 
-/** The legs' levels as steps: 1 upper device on, 0 lower, ½ none. */
-export function lanes(ctx, memory, from, to, x, y, colours) {
-  const first = memory.edgeAfter(from), last = memory.edgeAfter(to);
-  const level = (state, leg) => (state >> (2 * leg) & 1 ? 1 : state >> (2 * leg + 1) & 1 ? 0 : 0.5);
-  for (let leg = 0; leg < 3; leg++) {
-    ctx.strokeStyle = ctx.fillStyle = colours[leg];
+/** The gates' levels as steps: 1 on, 0 off; of a leg 1 the upper device on, 0 the lower, ½ none. */
+export function lanes(ctx, memory, from, to, x, y) {
+  const known = Math.max(from, memory.edgesFrom), first = memory.edgeAfter(known), last = memory.edgeAfter(to);
+  memory.system.lanes.forEach(({ colour, level }, lane) => {
+    ctx.strokeStyle = ctx.fillStyle = css(colour);
     if (last - first > MOST_EDGES) {
       ctx.globalAlpha = 0.4;
-      ctx.fillRect(x(from), y(leg, 1), x(memory.end) - x(from), y(leg, 0) - y(leg, 1));
+      ctx.fillRect(x(known), y(lane, 1), x(Math.min(to, memory.end)) - x(known), y(lane, 0) - y(lane, 1));
       ctx.globalAlpha = 1;
-      continue;
+      return;
     }
     ctx.beginPath();
-    let now = level(first > 0 ? memory.edgeStates[first - 1] : 0, leg);
-    ctx.moveTo(x(from), y(leg, now));
+    let now = level(first > 0 ? memory.edgeStates[first - 1] : 0, lane);
+    ctx.moveTo(x(known), y(lane, now));
     for (let k = first; k < last; k++) {
-      const next = level(memory.edgeStates[k], leg);
+      const next = level(memory.edgeStates[k], lane);
       if (next === now) continue;
       const px = x(memory.edgeTimes[k]);
-      ctx.lineTo(px, y(leg, now));
-      ctx.lineTo(px, y(leg, next));
+      ctx.lineTo(px, y(lane, now));
+      ctx.lineTo(px, y(lane, next));
       now = next;
     }
-    ctx.lineTo(x(Math.min(to, Math.max(from, memory.end))), y(leg, now));
+    ctx.lineTo(x(Math.min(to, Math.max(known, memory.end))), y(lane, now));
     ctx.stroke();
-  }
+  });
+}
+
+/** The same path with times that differ, so that two of them have one axis. */
+function pathOnce([x, y]) {
+  for (let k = 1; k < x.length; k++) if (x[k] <= x[k - 1]) x[k] = x[k - 1] + 1e-9;
+  return [x, y];
 }
 
 function label(t, span) {

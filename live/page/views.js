@@ -1,7 +1,6 @@
 // What is seen of the operating point: numbers, pulses of one turn, current plane, voltage and flux, spectrum.
-import { lanes, modeName } from "./scope.js";
+import { css, lanes } from "./scope.js";
 
-const css = name => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 const FONT = "12px system-ui, 'Segoe UI', Roboto, 'DejaVu Sans', sans-serif";
 const TAU = 2 * Math.PI;
 
@@ -36,49 +35,61 @@ function dot(ctx, colour, x, y, radius, filled = true) {
   ctx.strokeStyle = ctx.fillStyle = colour;
   if (filled) ctx.fill(); else ctx.stroke();
 }
+/** What is remembered of one motor: columns and means of it have its number behind their names. */
+export function motorOf(memory, suffix, properties) {
+  const own = name => (suffix && memory.has(name + suffix) ? name + suffix : name);
+  const value = (name, row) => (name === "f1" && !memory.has("f1") ? value("speed", row) * properties.polePairs / 60 : memory.value(own(name), row));
+  return {
+    memory, value, step: memory.step, count: memory.count, end: memory.end, has: name => memory.has(own(name)),
+    last: name => (memory.count ? value(name, memory.count - 1) : 0), mean: (name, seconds) => memory.mean(own(name), seconds), peak: (name, seconds) => memory.peak(own(name), seconds),
+  };
+}
 /** Length of a turn that is looked at, in s. */
 const turn = memory => Math.min(Math.max(1 / Math.max(Math.abs(memory.last("f1")), 2), 0.005), 0.2);
 
-export function numbers(memory, state, properties, factor) {
-  const last = name => memory.last(name), seconds = Math.max(turn(memory), 0.01);
-  const torque = memory.mean("te", seconds), speed = last("speed"), udc = memory.mean("udc", seconds);
-  const share = (last("u") * Math.PI) / (2 * Math.max(udc, 1));
-  const power = (torque * speed * TAU) / 60e3;
-  const rows = [
-    ["Torque", torque.toFixed(0), "N·m"], ["Speed", speed.toFixed(0), "r/min"], ["Power", power.toFixed(1), "kW"],
-    ["Link", udc.toFixed(0), "V"], ["Current, peak", memory.peak("ia", seconds).toFixed(0), "A"], ["Frequency", last("f1").toFixed(1), "Hz"],
-    ["Of six-step", (100 * share).toFixed(1), "%"], ["Map error", (100 * last("mapError")).toFixed(1), "%"],
-    ["Real time ×", factor.reached.toFixed(factor.reached < 10 ? 2 : 0), `of ${factor.possible.toFixed(0)}`],
-  ];
+export function numbers(memory, state, properties, factor, system) {
+  const last = name => memory.last(name), seconds = Math.max(turn(memory), 0.01), told = memory.has("te") ? "te" : "teRef";
+  const torque = memory.mean(told, seconds), speed = last("speed"), udc = memory.mean("udc", seconds);
+  const share = last("u") / (system.voltage * Math.max(udc, 1));
+  const power = (torque * speed * TAU) / 60, watts = Math.abs(power) < 2000 ? [power.toFixed(0), "W"] : [(power / 1e3).toFixed(1), "kW"];
+  const digits = properties.maxTorque < 20 ? 2 : properties.maxTorque < 200 ? 1 : 0;
+  const known = {
+    Torque: [torque.toFixed(digits), "N·m"], Speed: [speed.toFixed(0), "r/min"], Power: watts, Link: [udc.toFixed(digits ? 1 : 0), "V"],
+    "Current, peak": [(memory.has("ia") ? memory.peak("ia", seconds) : last("peak")).toFixed(digits), "A"], Frequency: [last("f1").toFixed(1), "Hz"],
+    "Of six-step": [(100 * share).toFixed(1), "%"], "Of its share": [(100 * share).toFixed(1), "%"], "Map error": [(100 * last("mapError")).toFixed(1), "%"],
+    Capacitors: [last("capacitor").toFixed(0), "V"], "Shoot-through": [memory.mean("duty", seconds).toFixed(1), "%"],
+  };
+  const rows = system.numbers.filter(name => !known[name][0].startsWith("NaN")).map(name => [name, ...known[name]]);
+  if (factor) rows.push(["Real time ×", factor.reached.toFixed(factor.reached < 10 ? 2 : 0), `of ${factor.possible.toFixed(0)}`]);
   const host = document.getElementById("numbers");
-  if (!host.children.length) host.innerHTML = rows.map(([name, , unit]) => `<div><span>${name}</span><b><i style="font-style:normal"></i> <small>${unit}</small></b></div>`).join("");
+  if (host.children.length !== rows.length) host.innerHTML = rows.map(([name, , unit]) => `<div><span>${name}</span><b><i style="font-style:normal"></i> <small>${unit}</small></b></div>`).join("");
   rows.forEach(([, value, unit], k) => {
     host.children[k].querySelector("i").textContent = value.replace(/^-(?=[0.]+$)/, "").replace("-", "−");
     host.children[k].querySelector("small").textContent = unit;
   });
 }
 
-export function pulses(memory) {
-  const { element, ctx, width, height } = canvas("pulses", 132);
-  const span = turn(memory), to = memory.end, from = to - span, mode = modeName(memory.last("mode"));
-  document.getElementById("mode-name").textContent = mode === "off" ? "off" : mode;
-  const left = 18, right = width - 6, bottom = height - 20;
+export function pulses(motor, memory, system) {
+  const count = system.lanes.length, each = count > 3 ? 18 : 34;
+  const { element, ctx, width, height } = canvas("pulses", 30 + count * each);
+  const span = system.cycle ?? turn(motor), to = memory.end, from = to - span, mode = memory.modeName(memory.last("mode"));
+  document.getElementById("mode-name").textContent = mode;
+  const left = count > 3 ? 26 : 18, right = width - 6, bottom = height - 20;
   ctx.fillStyle = css("--muted");
   ctx.textBaseline = "middle";
-  ["u", "v", "w"].forEach((name, leg) => ctx.fillText(name, 4, 20 + leg * 34));
-  const locked = Math.abs(memory.last("f1")) >= 2;
-  ctx.textAlign = "center";
+  system.lanes.forEach(({ name }, lane) => ctx.fillText(name, 4, 4 + each * (lane + 0.5)));
+  const locked = !system.cycle && Math.abs(motor.last("f1")) >= 2;
   for (let k = 0; k <= 4; k++) {
     const x = left + (k / 4) * (right - left);
     line(ctx, css("--grid"), 1, [[x, 4], [x, bottom]]);
     ctx.textAlign = k === 4 ? "right" : k ? "center" : "left";
-    ctx.fillText(locked ? `${k * 90}°` : `${((k / 4) * span * 1e3).toFixed(0)} ms`, x, height - 8);
+    ctx.fillText(locked ? `${k * 90}°` : span < 1e-3 ? `${((k / 4) * span * 1e6).toFixed(0)} µs` : `${((k / 4) * span * 1e3).toFixed(0)} ms`, x, height - 8);
   }
   ctx.textAlign = "left";
   ctx.lineWidth = 1.6;
   const x = t => left + ((Math.max(t, from) - from) / span) * (right - left);
-  lanes(ctx, memory, from, to, x, (leg, level) => 32 + leg * 34 - 24 * level, ["--u", "--v", "--w"].map(css));
-  element.setAttribute("aria-label", `Gate pulses of the last turn, mode ${mode}`);
+  lanes(ctx, memory, from, to, x, (lane, level) => 4 + each * (lane + 0.85 - 0.7 * level));
+  element.setAttribute("aria-label", `Gate pulses of the last ${system.cycle ? "two carrier periods" : "turn"}, ${mode}`);
 }
 
 /** Flux linkages at a current, by the map's nodes. */
@@ -90,16 +101,17 @@ function flux(properties, id, iq) {
   return [at(d), sign * at(q)];
 }
 
-export function plane(memory, properties) {
+export function plane(memory, properties, system) {
   const size = Math.min(document.getElementById("plane").clientWidth, 300);
   const { element, ctx, width, height } = canvas("plane", Math.round(size * 0.92));
-  const most = properties.maxCurrent, negative = memory.last("iqRef") < -1 || (Math.abs(memory.last("iqRef")) <= 1 && memory.last("iq") < 0);
+  const most = properties.maxCurrent, negative = memory.has("iqRef") ? memory.last("iqRef") < -0.005 * most || (Math.abs(memory.last("iqRef")) <= 0.005 * most && memory.last("iq") < 0) : memory.mean("iq", 0.01) < -0.02 * most;
   // d from the trip level to a little beyond zero, q the way that torque goes.
   const scale = (height - 34) / (1.32 * most), ox = width / 2 + 0.44 * most * scale, oy = negative ? 12 + 0.1 * most * scale : height - 24 - 0.06 * most * scale;
   const x = id => ox + id * scale, y = iq => oy - iq * scale;
-  const step = most > 150 ? 100 : 50, muted = css("--muted"), grid = css("--grid");
+  const decade = 10 ** Math.floor(Math.log10(most / 2)), step = decade * (most / 2 / decade >= 5 ? 5 : most / 2 / decade >= 2 ? 2 : 1), muted = css("--muted"), grid = css("--grid");
   ctx.fillStyle = muted;
-  for (let a = -300; a <= 300; a += step) {
+  for (let k = -8; k <= 8; k++) {
+    const a = k * step;
     if (x(a) > 8 && x(a) < width - 8) { line(ctx, grid, 1, [[x(a), 0], [x(a), height - 18]]); ctx.textAlign = "center"; ctx.fillText(String(a).replace("-", "−"), x(a), height - 5); }
     if (y(a) > 8 && y(a) < height - 20) { line(ctx, grid, 1, [[0, y(a)], [width, y(a)]]); if (a) { ctx.textAlign = "left"; ctx.fillText(String(a).replace("-", "−"), 2, y(a) - 4); } }
   }
@@ -114,19 +126,19 @@ export function plane(memory, properties) {
   line(ctx, css("--ref"), 1.5, circle(most));
   line(ctx, css("--ref"), 1, circle(properties.tripCurrent), [2, 4]);
   for (const sign of [1, -1]) line(ctx, css("--v"), 2, properties.mtpa.map(([id, iq]) => [x(id), y(sign * iq)]));
-  voltageLimit(ctx, memory, properties, x, y);
+  voltageLimit(ctx, memory, properties, system, x, y);
   const rows = Math.min(memory.count, Math.round(turn(memory) / memory.step)), trail = [];
   for (let k = memory.count - rows; k < memory.count; k += Math.max(1, Math.floor(rows / 400))) trail.push([x(memory.value("id", k)), y(memory.value("iq", k))]);
   line(ctx, css("--u"), 1.2, trail);
-  dot(ctx, css("--w"), x(memory.last("idRef")), y(memory.last("iqRef")), 5, false);
+  if (memory.has("idRef")) dot(ctx, css("--w"), x(memory.last("idRef")), y(memory.last("iqRef")), 5, false);
   dot(ctx, css("--u"), x(memory.last("id")), y(memory.last("iq")), 4);
   ctx.restore();
   element.setAttribute("aria-label", `Current d ${memory.last("id").toFixed(0)} A, q ${memory.last("iq").toFixed(0)} A, largest ${most} A`);
 }
 
 /** The currents whose voltage is six-step's at this speed: a contour over the map's nodes. */
-function voltageLimit(ctx, memory, properties, x, y) {
-  const omega = (memory.last("speed") * TAU * properties.polePairs) / 60, limit = (2 / Math.PI) * memory.last("udc");
+function voltageLimit(ctx, memory, properties, system, x, y) {
+  const omega = (memory.last("speed") * TAU * properties.polePairs) / 60, limit = system.voltage * memory.last("udc") / (system.motors.length > 1 ? 2 : 1);
   if (Math.abs(omega) < 20) return;
   const { step, side, d, q } = properties.flux, r = properties.resistance, cells = [];
   ctx.strokeStyle = css("--speed");
@@ -157,21 +169,21 @@ function angle(memory, row) {
   return Math.atan2((v("ib") - v("ic")) / Math.sqrt(3), v("ia")) - Math.atan2(v("iq"), v("id"));
 }
 
-export function hexagon(memory, properties) {
+export function hexagon(memory, properties, system) {
   const side = Math.min(document.getElementById("hexagon").clientWidth, 300);
   const { element, ctx, width, height } = canvas("hexagon", Math.round(side * 0.88));
-  const udc = Math.max(memory.last("udc"), 1), ox = width / 2, oy = height / 2, scale = (height / 2 - 6) / ((2 / 3) * properties.tripLink[1]);
+  const udc = Math.max(memory.last("udc"), 1), ox = width / 2, oy = height / 2, scale = (height / 2 - 6) / ((2 / 3) * (system.motors.length > 1 ? 840 : properties.tripLink[1]));
   const ring = radius => Array.from({ length: 97 }, (_, k) => [ox + radius * Math.cos(TAU * k / 96), oy - radius * Math.sin(TAU * k / 96)]);
   for (let k = 0; k < 3; k++) line(ctx, css("--grid"), 1, [0, Math.PI].map(a => [ox + 2e3 * scale * Math.cos(a + k * Math.PI / 3), oy - 2e3 * scale * Math.sin(a + k * Math.PI / 3)]));
   const corner = (2 / 3) * udc * scale;
   line(ctx, css("--ref"), 1.8, Array.from({ length: 7 }, (_, k) => [ox + corner * Math.cos(k * Math.PI / 3), oy - corner * Math.sin(k * Math.PI / 3)]));
   line(ctx, css("--ref"), 1, ring((udc / Math.sqrt(3)) * scale), [2, 4]);
-  line(ctx, css("--speed"), 1.5, ring((2 / Math.PI) * udc * scale), [6, 3]);
-  const r = properties.resistance, id = memory.last("id"), iq = memory.last("iq"), flowing = Math.hypot(id, iq) > 3;
+  if (system.motors.length === 1) line(ctx, css("--speed"), 1.5, ring((2 / Math.PI) * udc * scale), [6, 3]);
+  const r = properties.resistance, id = memory.last("id"), iq = memory.last("iq"), least = 0.013 * properties.maxCurrent, flowing = Math.hypot(id, iq) > least;
   const rows = Math.min(memory.count, Math.round(turn(memory) / memory.step)), trail = [], full = (height / 2 - 10) / (1.25 * Math.hypot(...flux(properties, 0, properties.maxCurrent)));
   for (let k = memory.count - rows; k < memory.count; k += Math.max(1, Math.floor(rows / 300))) {
     const [d, q] = [memory.value("id", k), memory.value("iq", k)];
-    if (Math.hypot(d, q) < 3) continue;
+    if (Math.hypot(d, q) < least) continue;
     const [fd, fq] = flux(properties, d, q), at = angle(memory, k), a = Math.atan2(fq, fd) + at, m = Math.hypot(fd, fq) * full;
     trail.push([ox + m * Math.cos(a), oy - m * Math.sin(a)]);
   }
@@ -185,7 +197,7 @@ export function hexagon(memory, properties) {
   element.setAttribute("aria-label", `Voltage ${memory.last("u").toFixed(0)} V of a hexagon of ${((2 / 3) * udc).toFixed(0)} V`);
 }
 
-const POINTS = 4096;
+export const POINTS = 4096;
 /** Magnitudes of a real signal's spectrum with Hann's window, in its unit. */
 function magnitudes(signal) {
   const re = new Float64Array(POINTS), im = new Float64Array(POINTS);
@@ -207,19 +219,22 @@ function magnitudes(signal) {
   return Float64Array.from({ length: POINTS / 2 }, (_, k) => (2 * Math.hypot(re[k], im[k])) / POINTS);
 }
 
-export function spectrum(memory) {
+export function spectrum(memory, properties, system, bound) {
   const { element, ctx, width, height } = canvas("spectrum", 170);
   if (memory.count < POINTS) return;
   const signal = Float64Array.from({ length: POINTS }, (_, k) => memory.value("ia", memory.count - POINTS + k));
-  const amplitudes = magnitudes(signal), step = 1 / (POINTS * memory.step), most = 3000;
-  const left = 32, right = width - 6, top = 6, bottom = height - 20, [low, high] = [-1, 2.6];
+  const amplitudes = magnitudes(signal), step = 1 / (POINTS * memory.step), most = system.top;
+  const most10 = Math.log10(properties.maxCurrent), left = 32, right = width - 6, top = 6, bottom = height - 20, [low, high] = [most10 - 3.4, most10 + 0.25];
   const x = hz => left + (hz / most) * (right - left), y = a => bottom - ((Math.max(Math.log10(a + 1e-9), low) - low) / (high - low)) * (bottom - top);
   ctx.fillStyle = css("--muted");
   ctx.textBaseline = "middle";
   ctx.textAlign = "right";
-  for (const a of [0.1, 1, 10, 100]) { line(ctx, css("--grid"), 1, [[left, y(a)], [right, y(a)]]); ctx.fillText(a, left - 5, y(a)); }
-  for (let hz = 0; hz <= most; hz += 1000) { line(ctx, css("--grid"), 1, [[x(hz), top], [x(hz), bottom]]); ctx.textAlign = hz ? (hz === most ? "right" : "center") : "left"; ctx.fillText(hz ? `${hz / 1000} kHz` : "0", x(hz), height - 8); }
+  for (const a of [0.001, 0.01, 0.1, 1, 10, 100].filter(a => Math.log10(a) > low && Math.log10(a) < high)) { line(ctx, css("--grid"), 1, [[left, y(a)], [right, y(a)]]); ctx.fillText(a, left - 5, y(a)); }
+  for (let hz = 0; hz <= most; hz += most > 5000 ? 2000 : 1000) { line(ctx, css("--grid"), 1, [[x(hz), top], [x(hz), bottom]]); ctx.textAlign = hz ? (hz === most ? "right" : "center") : "left"; ctx.fillText(hz ? `${hz / 1000} kHz` : "0", x(hz), height - 8); }
   ctx.textAlign = "left";
   line(ctx, css("--u"), 1.2, Array.from({ length: Math.floor(most / step) }, (_, k) => [x(k * step), y(amplitudes[k])]));
-  element.setAttribute("aria-label", "Spectrum of the current of phase u over the last 0.2 s, 0 to 3 kHz");
+  ctx.fillStyle = css("--speed");
+  for (const [hz, a] of bound) if (hz < most && a > 10 ** low) ctx.fillRect(x(hz) - 4, y(a) - 1, 8, 2);
+  element.dataset.bound = bound.length;
+  element.setAttribute("aria-label", `Spectrum of the current of phase u over the last ${(POINTS * memory.step * 1e3).toFixed(0)} ms, 0 to ${most / 1e3} kHz; ${bound.length} lines of the pattern’s bound`);
 }

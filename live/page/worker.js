@@ -1,5 +1,5 @@
 // The simulation: steps the bench in real time, or as fast as it goes, and hands over what it saw.
-import init, { Bench, columns, sweep } from "./tractive_live.js";
+import init, { Bench, Ran, scenarios } from "./tractive_live.js";
 
 const SLICE_S = 0.002; // simulated at once
 const BUSY_MS = 14; // computed at once
@@ -13,39 +13,33 @@ let answered = true; // the page has drawn what it got
 let began = 0;
 const pace = { wall: 0, simulated: 0, busy: 0 };
 
-const settings = {
-  torque: value => bench.torque(value),
-  speed: value => bench.speed(value),
-  hold: value => bench.hold(value),
-  release: ([inertia, load]) => bench.release(inertia, load),
-  line: value => bench.line(value),
-  mapError: value => bench.map_error(value),
-  want: ({ on, coast, discharge }) => bench.want(on, coast, discharge),
-  acknowledge: () => bench.acknowledge(),
-  inject: value => bench.inject(value),
-  mend: () => bench.mend(),
-};
-
 const handlers = {
-  start({ words, speed, step, set }) {
+  start({ system, machine, words, speed, step, set, want }) {
     bench?.free();
     bench = null;
-    bench = new Bench(words, speed, step);
-    for (const [name, value] of set) settings[name](value);
+    bench = new Bench(system, machine, words, speed, step);
+    bench.want(want.on, want.coast, want.discharge);
+    for (const [name, motor, values] of set) bench.set(name, motor, Float64Array.from(values));
     began = 0;
     owed = 0;
     last = performance.now();
     answered = true;
-    postMessage({ type: "started", properties: JSON.parse(bench.properties()), columns: columns() });
+    postMessage({ type: "started", properties: JSON.parse(bench.properties()), columns: bench.columns(), scenarios: scenarios(system) });
   },
-  set({ name, value }) { if (bench) settings[name](value); },
+  set({ name, motor, values }) { bench?.set(name, motor, Float64Array.from(values)); },
+  want({ on, coast, discharge }) { bench?.want(on, coast, discharge); },
+  acknowledge() { bench?.acknowledge(); },
+  inject({ value }) { bench?.inject(value); },
+  mend() { bench?.mend(); },
+  bound() { if (bench) postMessage({ type: "bound", lines: bench.bound() }); },
   rate({ value }) { rate = value; owed = 0; },
   drawn() { answered = true; },
-  sweep() {
-    const from = performance.now();
-    const result = JSON.parse(sweep());
-    last = performance.now();
-    postMessage({ type: "sweep", ...result, seconds: (last - from) / 1e3 });
+  scenario({ name }) {
+    bench?.free();
+    bench = null;
+    const from = performance.now(), ran = new Ran(name), about = JSON.parse(ran.about()), rows = ran.rows(), edges = ran.edges();
+    ran.free();
+    postMessage({ type: "ran", name, ...about, rows, edges, seconds: (performance.now() - from) / 1e3 }, [rows.buffer, edges.buffer]);
   },
 };
 
@@ -93,7 +87,7 @@ function hand() {
     factor = { reached: pace.simulated / pace.wall, possible: pace.simulated / pace.busy };
     pace.wall = pace.simulated = pace.busy = 0;
   }
-  const from = bench.rows_from_s();
+  const from = bench.take();
   const rows = bench.rows(), edges = bench.edges();
   answered = false;
   postMessage({ type: "rows", from, rows, edges, state: JSON.parse(bench.state()), factor }, [rows.buffer, edges.buffer]);

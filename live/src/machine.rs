@@ -1,63 +1,27 @@
-//! The machine that is built in, and what the page draws of it.
+//! The machines of the page.
 
-use anyhow::Result;
-use serde_json::{Value, json};
-use tractive::built_in::traction::BUILT_IN;
+use anyhow::{Result, bail};
+use tractive::built_in::{traction, zs9};
 use tractive_rig::machine::Machine;
-use tractive_tablegen::{MachineFolder, Optimum, SmoothMap};
+use tractive_tablegen::MachineFolder;
 
-/// Points of a curve.
-const POINTS: u32 = 40;
-
-/// The 180 kW machine.
-pub fn pmasynrm() -> Result<Machine> {
-    let folder = MachineFolder::parse(
-        include_str!("../../tables/pmasynrm-180kw/machine.toml"),
-        include_str!("../../tables/pmasynrm-180kw/flux_map.csv"),
-    )?;
-    Ok(Machine { folder, tables: &BUILT_IN })
-}
-
-/// Limits and curves, in V, A, N·m and r/min.
-pub fn properties(machine: &Machine) -> Value {
-    let parameters = &machine.folder.parameters;
-    let map = SmoothMap::new(&machine.folder.map);
-    let optimum = Optimum::new(&map, parameters);
-    let mtpa: Vec<_> = (0..=POINTS)
-        .map(|k| optimum.least_current(parameters.max_torque_nm * f64::from(k) / f64::from(POINTS)))
-        .map(|(id_a, iq_a)| [id_a, iq_a])
-        .collect();
-    json!({
-        "name": machine.tables.name,
-        "polePairs": parameters.pole_pairs,
-        "maxTorque": parameters.max_torque_nm,
-        "maxCurrent": parameters.max_current_a,
-        "maxSpeed": parameters.max_speed_rpm,
-        "ratedSpeed": parameters.rated_speed_rpm,
-        "nominalLink": parameters.dc_link_nominal_v,
-        "lowestLink": parameters.dc_link_min_v,
-        "highestLink": parameters.dc_link_max_v,
-        "tripCurrent": parameters.trip_current_a,
-        "tripSpeed": parameters.trip_speed_rpm,
-        "tripLink": [parameters.trip_dc_under_v, parameters.trip_dc_over_v],
-        "resistance": parameters.stator_resistance_ohm,
-        "mtpa": mtpa,
-        "flux": flux(&map, parameters.max_current_a),
-    })
-}
-
-/// Flux linkages over the plane of currents, d along the rows, both axes with their ends; iq from zero on, being even in it.
-fn flux(map: &SmoothMap, largest_a: f64) -> Value {
-    const SIDE: u32 = 24;
-    let step_a = 1.2 * largest_a / f64::from(SIDE);
-    let axis = |from: f64| (0..=SIDE).map(move |k| from + step_a * f64::from(k));
-    let nodes = |of: fn(&tractive_tablegen::FluxPoint) -> f64| -> Vec<f64> {
-        axis(-1.2 * largest_a).flat_map(|id| axis(0.0).map(move |iq| of(&map.at(id, iq)))).collect()
+/// The machine of this name in `tables/`, with the tables that are built in where they are its own.
+pub fn named(name: &str) -> Result<Machine> {
+    macro_rules! folder {
+        ($name:literal) => {
+            MachineFolder::parse(
+                include_str!(concat!("../../tables/", $name, "/machine.toml")),
+                include_str!(concat!("../../tables/", $name, "/flux_map.csv")),
+            )
+        };
+    }
+    let (folder, tables) = match name {
+        "pmasynrm-180kw" => (folder!("pmasynrm-180kw")?, Some(&traction::BUILT_IN)),
+        "ipm-zs9" => (folder!("ipm-zs9")?, Some(&zs9::BUILT_IN)),
+        "pmsm-48v-1kw" => (folder!("pmsm-48v-1kw")?, None),
+        _ => bail!("there is no machine `{name}` in the page"),
     };
-    json!({
-        "step": step_a,
-        "side": SIDE + 1,
-        "d": nodes(|at| at.psi_d_wb),
-        "q": nodes(|at| at.psi_q_wb),
-    })
+    // Made anew at each start of a machine that is not built in, a few kilobytes.
+    let tables = tables.unwrap_or_else(|| Box::leak(Box::new(folder.tables())));
+    Ok(Machine { folder, tables })
 }

@@ -7,24 +7,68 @@ use crate::scenario::catalogue::{self, Chosen};
 use crate::scenario::traction::TractionOptions;
 use crate::scenario::zs9::Zs9Options;
 use crate::scenario::{Choice, System};
+use crate::talk::usual;
 use crate::trace::Recorded;
 use anyhow::Result;
+use clap::{Args, Command, FromArgMatches};
+use std::ffi::OsString;
 use std::time::Instant;
 
 /// The options of the measurement.
-#[derive(Clone, Debug, clap::Args)]
+#[derive(Clone, Debug)]
 pub struct BenchOptions {
-    /// All scenarios unless some are named.
-    pub scenarios: Vec<String>,
+    scenarios: Vec<String>,
+    run: RunOptions,
+    traction: TractionOptions,
+    zs9: Zs9Options,
+}
+
+/// The options that every measurement has.
+#[derive(Clone, Debug, Args)]
+struct Common {
+    /// All scenarios unless some are named. Of one system's alone its own options may be named, too.
+    scenarios: Vec<String>,
     /// The options that all runs share.
     #[command(flatten)]
-    pub run: RunOptions,
-    /// The options that the PMaSynRM drive's scenarios share.
-    #[command(flatten)]
-    pub traction: TractionOptions,
-    /// The options that the ZS9's share.
-    #[command(flatten)]
-    pub zs9: Zs9Options,
+    run: RunOptions,
+}
+
+/// The systems of the scenarios among words: the PMaSynRM drive, the ZS9.
+fn systems(words: &[OsString]) -> [bool; 2] {
+    let names = words.iter().filter_map(|word| word.to_str());
+    let named = names.filter(|word| catalogue::names().any(|(name, _)| name == *word));
+    named.fold([false; 2], |[traction, zs9], name| {
+        let is_zs9 = name.starts_with("zs9-");
+        [traction || !is_zs9, zs9 || is_zs9]
+    })
+}
+
+impl BenchOptions {
+    /// The command line for scenarios of these systems: of one alone with its own options.
+    pub fn command(systems: [bool; 2]) -> Command {
+        let command = Common::augment_args(Command::new("bench"));
+        let command = match systems {
+            [true, false] => TractionOptions::augment_args(command),
+            [false, true] => Zs9Options::augment_args(command),
+            _ => command,
+        };
+        command.about("Simulated seconds per second of each scenario, on one thread of this machine, and where the time goes")
+    }
+
+    /// Reads the words behind `bench`.
+    pub fn read(words: &[OsString]) -> Result<Self> {
+        let systems = systems(words);
+        let words = std::iter::once(OsString::from("bench")).chain(words.iter().cloned());
+        let matches = Self::command(systems).try_get_matches_from(words)?;
+        let Common { scenarios, run } = Common::from_arg_matches(&matches)?;
+        let [traction, zs9] = [systems == [true, false], systems == [false, true]];
+        Ok(Self {
+            scenarios,
+            run,
+            traction: if traction { TractionOptions::from_arg_matches(&matches)? } else { usual()? },
+            zs9: if zs9 { Zs9Options::from_arg_matches(&matches)? } else { usual()? },
+        })
+    }
 }
 
 /// The time that a scenario took.

@@ -13,6 +13,7 @@ pub mod campaign;
 pub mod columns;
 pub mod commission;
 pub mod compare;
+pub mod curves;
 pub mod distortion;
 pub mod figures;
 pub mod files;
@@ -21,6 +22,8 @@ pub mod gallery;
 pub mod identify;
 pub mod inject;
 pub mod law;
+#[cfg(unix)]
+pub mod live;
 pub mod machine;
 pub mod mtpa_methods;
 pub mod needs;

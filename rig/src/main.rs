@@ -10,6 +10,8 @@ use tractive_rig::campaign::{self, command::CampaignOptions};
 use tractive_rig::commission;
 use tractive_rig::compare::{self, CompareOptions};
 use tractive_rig::folder::{self, MachineCommand};
+#[cfg(unix)]
+use tractive_rig::live::LiveOptions;
 use tractive_rig::machine::Machine;
 use tractive_rig::needs::Needs;
 use tractive_rig::scenario::command::folder;
@@ -31,7 +33,7 @@ enum Command {
         #[arg(hide = true, trailing_var_arg = true, allow_hyphen_values = true)]
         words: Vec<OsString>,
     },
-    /// The needs of `run`, `talk` or `identify` for these words, as JSON, for whoever makes them ready.
+    /// The needs of `run`, `talk`, `live` or `identify` for these words, as JSON, for whoever makes them ready.
     #[command(hide = true, disable_help_flag = true)]
     Needs {
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
@@ -43,10 +45,26 @@ enum Command {
         shell: clap_complete::Shell,
     },
     /// Simulated seconds per second of each scenario, on one thread of this machine, and where the time goes.
-    Bench(Box<BenchOptions>),
+    #[command(disable_help_flag = true, override_usage = "tractive-rig bench [SCENARIO…] [OPTIONS]")]
+    Bench {
+        // Scenarios of one system alone bring its options.
+        #[arg(hide = true, trailing_var_arg = true, allow_hyphen_values = true)]
+        words: Vec<OsString>,
+    },
     /// Commands the drive over the protocol, by a script or line by line, and logs its telemetry.
-    #[command(after_help = talk_help())]
-    Talk(Box<talk::TalkOptions>),
+    #[command(disable_help_flag = true, override_usage = "tractive-rig talk [SCRIPT] [OPTIONS]")]
+    Talk {
+        // Each system has a command line of its own.
+        #[arg(hide = true, trailing_var_arg = true, allow_hyphen_values = true)]
+        words: Vec<OsString>,
+    },
+    /// Serves the live page of a drive that is elsewhere: the image in QEMU, or a drive on a CAN bus.
+    #[cfg(unix)]
+    #[command(disable_help_flag = true, override_usage = "tractive-rig live [OPTIONS]")]
+    Live {
+        #[arg(hide = true, trailing_var_arg = true, allow_hyphen_values = true)]
+        words: Vec<OsString>,
+    },
     /// Operating points: IN.csv has torque_nm,speed_rpm,udc_v; OUT.csv adds id_a,iq_a,region.
     Points {
         /// Points wanted.
@@ -120,14 +138,19 @@ fn command(command: Command) -> Result<ExitCode> {
         Command::Run { words } => scenario::command::run(words),
         Command::Needs { words } => needs(words),
         Command::Completions { shell } => {
-            let mut program = Cli::command().mut_subcommand("run", |_| scenario::catalogue::completed());
+            let mut program = Cli::command()
+                .mut_subcommand("run", |_| scenario::catalogue::completed())
+                .mut_subcommand("talk", |_| talk::TalkOptions::command(talk::System::default()))
+                .mut_subcommand("bench", |_| BenchOptions::command([true, false]));
             let mut text = Vec::new();
             clap_complete::generate(shell, &mut program, "tractive-rig", &mut text);
             say!("{}", String::from_utf8(text)?.trim_end());
             Ok(ExitCode::SUCCESS)
         }
-        Command::Bench(options) => done(benchmark::run(&options)),
-        Command::Talk(options) => run_talk(&options),
+        Command::Bench { words } => done(benchmark::run(&BenchOptions::read(&words)?)),
+        Command::Talk { words } => run_talk(&talk::TalkOptions::read(&words)?),
+        #[cfg(unix)]
+        Command::Live { words } => done(tractive_rig::live::run(&LiveOptions::read(&words)?)),
         Command::Points { input, output, machine } => {
             done(points::run(&input, &output, &Machine::load(&machine)?))
         }
@@ -152,21 +175,14 @@ fn command(command: Command) -> Result<ExitCode> {
 fn needs(words: Vec<OsString>) -> Result<ExitCode> {
     let needs = match Cli::try_parse_from(std::iter::once("tractive-rig".into()).chain(words))?.command {
         Command::Run { words } => Needs::of_run(words)?,
-        Command::Talk(options) => Needs::of_talk(&options),
+        Command::Talk { words } => Needs::of_talk(&talk::TalkOptions::read(&words)?),
+        #[cfg(unix)]
+        Command::Live { words } => Needs::of_drive(&LiveOptions::read(&words)?.drive),
         Command::Identify(options) => Needs::of_identify(&options),
-        _ => anyhow::bail!("needs: must be followed by run, talk or identify"),
+        _ => anyhow::bail!("needs: must be followed by run, talk, live or identify"),
     };
     say!("{}", serde_json::to_string(&needs)?);
     Ok(ExitCode::SUCCESS)
-}
-
-/// The commands of a script, for the help.
-fn talk_help() -> String {
-    let list = |commands: &[talk::script::Command]| {
-        commands.iter().map(|(usage, _)| format!("  {usage}")).collect::<Vec<_>>().join("\n")
-    };
-    let [commands, zs9] = [list(&talk::script::COMMANDS), list(&talk::script::ZS9_COMMANDS)];
-    format!("A line is [SECONDS] COMMAND; # begins a comment:\n{commands}\nWith --system zs9:\n{zs9}")
 }
 
 fn run_talk(options: &talk::TalkOptions) -> Result<ExitCode> {

@@ -6,7 +6,7 @@ use crate::scenario::System;
 use crate::scenario::catalogue::{self, Chosen};
 use crate::scenario::traction::{PatternsName, Traction};
 use crate::scenario::zs9::Zs9;
-use crate::talk::{self, TalkOptions};
+use crate::talk::{self, DriveOptions, TalkOptions};
 use anyhow::Result;
 use serde::Serialize;
 use std::ffi::OsString;
@@ -66,10 +66,15 @@ impl Needs {
 
     /// Of a talk.
     pub fn of_talk(options: &TalkOptions) -> Self {
+        Self { script: options.script.clone(), ..Self::of_drive(&options.drive) }
+    }
+
+    /// Of a drive that is talked to.
+    pub fn of_drive(options: &DriveOptions) -> Self {
         let system = match options.system {
             talk::System::Pmasynrm => Traction::NAME,
             talk::System::Zs9 => Zs9::NAME,
         };
-        Self { script: options.script.clone(), ..Self::of(system, &options.run) }
+        Self::of(system, &options.run)
     }
 }

@@ -224,6 +224,23 @@ impl RunOptions {
         })
     }
 
+    /// Where it runs and by which law. In a page both are as they are usual: what else there is would double its size.
+    ///
+    /// # Errors
+    /// Says what a page does not have.
+    pub fn choice(&self) -> anyhow::Result<(On, LawName)> {
+        if !cfg!(target_family = "wasm") {
+            return Ok((self.on, self.law));
+        }
+        anyhow::ensure!(
+            (self.on, self.law) == (On::Host, LawName::Tractive),
+            "--on {}, --law {}: not in a page",
+            self.on.name(),
+            self.law.name()
+        );
+        Ok((On::Host, LawName::Tractive))
+    }
+
     /// The deviations of the true machine from its folder.
     pub fn plant(&self) -> PlantSettings {
         PlantSettings {

@@ -257,3 +257,34 @@ fn a_fault_stops_both_motors_and_is_acknowledged() {
     assert!((2.6..2.6002).contains(&at_s), "{at_s}");
     assert_eq!((recorder[first - 1]["pulsing"].as_str(), recorder[first]["pulsing"].as_str()), ("1", "0"));
 }
+
+#[test]
+fn each_system_has_its_own_options_alone() {
+    let refused = |words: &[&str], option: &str| {
+        let output = rig().args(words).stdin(Stdio::null()).output().unwrap();
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(2), "{words:?}: {said}");
+        assert!(said.starts_with(&format!("{option}: talk --system")), "{words:?}: {said}");
+    };
+    refused(&["--uin", "600"], "--uin");
+    refused(&["--system", "zs9", "--patterns", "optimal"], "--patterns");
+    refused(&["--patterns", "optimal", "--system=zs9"], "--patterns");
+    let help = |words: &[&str]| {
+        let output = rig().args(words).arg("--help").output().unwrap();
+        assert!(output.status.success());
+        String::from_utf8_lossy(&output.stdout).into_owned()
+    };
+    let (traction, zs9) = (help(&[]), help(&["--system", "zs9"]));
+    assert!(
+        traction.contains("--patterns") && !traction.contains("--uin") && !traction.contains("link VOLTS")
+    );
+    assert!(zs9.contains("--uin") && !zs9.contains("--patterns"));
+    let bench = |words: &[&str]| {
+        let program = env!("CARGO_BIN_EXE_tractive-rig");
+        let output = Command::new(program).arg("bench").args(words).arg("--help").output().unwrap();
+        String::from_utf8_lossy(&output.stdout).into_owned()
+    };
+    assert!(bench(&["sweep"]).contains("--patterns") && !bench(&["sweep"]).contains("--uin"));
+    assert!(bench(&["zs9-reverse"]).contains("--uin") && !bench(&["zs9-reverse"]).contains("--patterns"));
+    assert!(!bench(&[]).contains("--uin") && !bench(&[]).contains("--patterns"));
+}

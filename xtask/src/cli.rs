@@ -125,6 +125,12 @@ pub struct LiveArgs {
     /// Make the folder, and serve nothing
     #[arg(long, conflicts_with_all = ["port", "no_open"])]
     pub no_serve: bool,
+    /// Serve the page of the image in QEMU instead, with the options of `rig live` behind `--`
+    #[arg(long, conflicts_with_all = ["out", "port", "no_open", "no_serve"])]
+    pub in_qemu: bool,
+    /// Options of `rig live`
+    #[arg(last = true, value_name = "OPTIONS", requires = "in_qemu")]
+    pub words: Vec<OsString>,
     /// Take the guide's pictures into this folder instead
     #[arg(long, value_name = "DIR", conflicts_with = "no_serve")]
     pub screenshots: Option<PathBuf>,

@@ -84,6 +84,10 @@ fn command(chapter: &str, line: &str) -> Line {
     if command.starts_with("cargo xtask live") {
         command = "cargo xtask test --only live --list".to_owned();
     }
+    // A page is served until somebody has seen enough.
+    if command.starts_with("cargo rig live") {
+        command += " --help";
+    }
     if command.starts_with("cargo test") {
         let (cargos, tests) = command.split_once(" -- ").unwrap_or((&command, ""));
         command = format!("{cargos} --no-run -- {tests}").trim_end_matches(" -- ").to_owned();
@@ -119,6 +123,7 @@ mod tests {
             command("c", "cargo xtask test --only qemu").command,
             "cargo xtask test --only qemu --list"
         );
+        assert_eq!(command("c", "cargo rig live --can can0").command, "cargo rig live --can can0 --help");
         assert_eq!(command("c", "cargo xtask live --out x").command, "cargo xtask test --only live --list");
     }
 

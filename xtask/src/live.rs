@@ -11,6 +11,9 @@ use std::process::{Command, Stdio};
 
 /// The command.
 pub fn run(args: &LiveArgs) -> Result<u8> {
+    if args.in_qemu {
+        return crate::run::run("live", &args.words);
+    }
     let mut setup = Setup::default();
     if !setup.wasm() {
         bail!("{}", no_target());
@@ -54,28 +57,40 @@ pub fn check(setup: &mut Setup) -> Result<Result<bool, String>> {
     let (page, sweep) = (folder.join("page"), folder.join("sweep"));
     make(&page)?;
     ensure!(run_on_host("sweep", &sweep)? == Some(0), "the host's sweep failed");
-    let trace = sweep.join("trace.csv");
-    let good = succeeds(tool().arg("check").arg(&page).arg(trace).arg("--browser").arg(&browser))?;
-    let good = good && has_good_reports(&folder, sweep, &browser)?;
+    let reports = reports(&folder)?;
+    let (trace, zs9) = (sweep.join("trace.csv"), folder.join("reports/zs9-load-step/trace.csv"));
+    let mut check = tool();
+    check
+        .arg("check")
+        .args([&page, &trace, &zs9])
+        .arg("--rig")
+        .arg(build::rig()?)
+        .arg("--browser")
+        .arg(&browser);
+    let good = succeeds(&mut check)?;
+    let mut looked = tool();
+    looked.arg("reports").arg(sweep.join("report.html")).args(reports).arg("--browser").arg(&browser);
+    let good = good && succeeds(&mut looked)?;
     Ok(Ok(good && succeeds(live().args(["test", "--quiet", "--package", "tractive-live-tool"]))?))
 }
 
-/// Runs whose report pages are looked at besides the sweep's: pictures of a paper, the other system, a drive that trips.
-const REPORTS: [(&str, &str, i32); 3] = [
+/// Runs whose report pages are looked at besides the sweep's: pictures of a paper, the other system, a million rows of it, a drive that trips.
+const REPORTS: [(&str, &str, i32); 4] = [
     ("characteristic", "characteristic", 0),
     ("zs9-load-step", "zs9-load-step", 0),
+    ("million", "zs9-cycle --dt 3.6e-5", 0),
     ("trip", "sweep --to 100 --udc 2200", 1),
 ];
 
-/// Looks at report pages: the sweep's, and those of [`REPORTS`].
-fn has_good_reports(folder: &Path, sweep: PathBuf, browser: &Path) -> Result<bool> {
-    let mut pages = vec![sweep.join("report.html")];
+/// Report pages of [`REPORTS`], made.
+fn reports(folder: &Path) -> Result<Vec<PathBuf>> {
+    let mut pages = Vec::new();
     for (name, words, code) in REPORTS {
         let out = folder.join("reports").join(name);
         ensure!(run_on_host(words, &out)? == Some(code), "{words} on the host: not exit code {code}");
         pages.push(out.join("report.html"));
     }
-    succeeds(tool().arg("reports").args(pages).arg("--browser").arg(browser))
+    Ok(pages)
 }
 
 /// The exit code of a run on the host.

@@ -3,89 +3,233 @@
 use crate::browser::Browser;
 use crate::server;
 use anyhow::{Context, Result, ensure};
+use base64::Engine;
 use sha2::{Digest, Sha256};
+use std::io::{BufRead, BufReader};
 use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::time::Duration;
 
 /// Widths of a window, in CSS pixels.
 const WIDTHS: [u32; 3] = [1280, 900, 390];
 
-/// Checks it; the trace is the host's of the same sweep.
-pub fn check(page: &Path, trace: &Path, browser: &Path) -> Result<()> {
-    let bytes = std::fs::read(trace).with_context(|| trace.display().to_string())?;
-    let host: String = Sha256::digest(&bytes).iter().map(|byte| format!("{byte:02x}")).collect();
+/// A scenario and the host's trace of it.
+pub type Scenario<'a> = (&'a str, &'a Path);
+
+/// Checks it with both systems; the traces are the host's of the same scenarios, one of each system.
+pub fn check(page: &Path, scenarios: [Scenario; 2], program: &Path) -> Result<()> {
     let address = server::serve_aside(page)?;
-    let mut browser = Browser::start(browser)?;
-    browser.resize(1280, 900, false)?;
-    browser.go(&address)?;
-    browser.until("the page draws", "!!document.body?.dataset.painted")?;
+    let [sweep, zs9] = scenarios;
+    let mut browser = opened(program, &address)?;
+    println!("first paint after {} ms", browser.evaluate(FIRST_PAINT)?);
     println!("first paint of the scope after {} ms", browser.evaluate("+document.body.dataset.painted")?);
-    browser.until("the drive runs", "document.getElementById('state-name').textContent === 'running'")?;
-    moves(&mut browser)?;
-    trips(&mut browser)?;
-    sweeps(&mut browser, &host)?;
-    fits(&mut browser)?;
-    contrasts(&mut browser)?;
+    moves(&mut browser, &[("s-torque", "", [300, 350, -400])])?;
+    browser.until("the spectrum has its bound", "+document.getElementById('spectrum').dataset.bound > 3")?;
+    trips(&mut browser, "current-u-railed")?;
+    saves(&mut browser)?;
     runs(&mut browser)?;
+    equals_the_host(&mut browser, sweep)?;
+    ends(&mut browser)?;
+    let mut browser = opened(program, &format!("{address}#system=zs9&command2=speed"))?;
+    moves(&mut browser, &[("s-torque1", "1", [70, 75, -40]), ("s-speed2", "2", [800, 0, 0])])?;
+    trips(&mut browser, "angle-2-lost")?;
+    saves(&mut browser)?;
+    runs(&mut browser)?;
+    equals_the_host(&mut browser, zs9)?;
+    ends(&mut browser)?;
+    let small = opened(program, &format!("{address}#machine=pmsm-48v-1kw"))?;
+    ensure!(small.errors.is_empty(), "errors on the console: {:?}", small.errors);
+    Ok(())
+}
+
+/// Time of the browser's own first paint, in ms.
+const FIRST_PAINT: &str =
+    "Math.round(performance.getEntriesByName('first-contentful-paint')[0]?.startTime ?? -1)";
+
+/// The page, its drive running.
+fn opened(program: &Path, address: &str) -> Result<Browser> {
+    let mut browser = Browser::start(program)?;
+    browser.resize(1280, 900, false)?;
+    browser.go(address)?;
+    browser.until("the page draws", "!!document.body?.dataset.painted")?;
+    browser.until("the drive runs", RUNNING)?;
+    Ok(browser)
+}
+
+/// The drive runs.
+const RUNNING: &str = "document.getElementById('state-name').textContent === 'running'";
+
+/// What the page looks like, and that nothing went wrong.
+fn ends(browser: &mut Browser) -> Result<()> {
+    fits(browser)?;
+    contrasts(browser)?;
     ensure!(browser.errors.is_empty(), "errors on the console: {:?}", browser.errors);
     println!("no error on the console");
     Ok(())
 }
 
+/// Checks the page of a drive elsewhere, which `rig live` serves: it looks, and commands only where that is permitted and switched on.
+pub fn check_remote(rig: &Path, program: &Path) -> Result<()> {
+    for (system, permitted) in [("pmasynrm", false), ("zs9", true)] {
+        let mut words = vec!["live", "--system", system, "--on", "host", "--no-open", "--seconds", "120"];
+        words.extend(permitted.then_some("--commands"));
+        let child = Command::new(rig).args(words).stdout(Stdio::piped()).stderr(Stdio::null()).spawn()?;
+        let mut served = Served(child);
+        let mut line = String::new();
+        BufReader::new(served.0.stdout.take().context("no output")?).read_line(&mut line)?;
+        let address = line.split_whitespace().next().context("rig live tells no address")?.to_owned();
+        let mut browser = Browser::start(program)?;
+        browser.resize(1280, 900, false)?;
+        browser.go(&address)?;
+        browser.until("the page draws", "!!document.body?.dataset.painted")?;
+        let state = |name: &str| format!("document.getElementById('state-name').textContent === '{name}'");
+        browser.until("the drive is ready", &state("ready"))?;
+        let allowed = browser.evaluate("!document.getElementById('arm').disabled")?;
+        ensure!(allowed == permitted, "{system}: commands allowed {allowed}, permitted {permitted}");
+        browser.evaluate("document.getElementById('on').click()")?;
+        std::thread::sleep(Duration::from_secs(1));
+        ensure!(browser.evaluate(&state("ready"))? == true, "{system}: it is commanded unasked");
+        if permitted {
+            browser.evaluate("document.getElementById('on').click()")?;
+            browser.evaluate("document.getElementById('arm').click()")?;
+            set(&mut browser, "s-torque1", 20)?;
+            set(&mut browser, "s-torque2", 10)?;
+            browser.evaluate("document.getElementById('on').click()")?;
+            browser.until("the drive runs", RUNNING)?;
+            browser.until("it turns", "+document.querySelectorAll('#numbers b i')[1].textContent > 50")?;
+        } else {
+            const ARM: &str = "fetch('/arm', { method: 'POST', headers: { 'X-Tractive': 'arm' }, body: 'on' }).then(answer => answer.status)";
+            let answer = browser.evaluate(ARM)?;
+            ensure!(answer == 409, "commands that are not permitted: {answer}");
+            // The browser itself calls that answer an error.
+            browser.errors.clear();
+        }
+        fits(&mut browser)?;
+        ensure!(browser.errors.is_empty(), "errors on the console: {:?}", browser.errors);
+        println!("rig live, {system}: it looks; commands permitted {permitted}");
+    }
+    Ok(())
+}
+
+/// A program that ends with this.
+struct Served(Child);
+
+impl Drop for Served {
+    fn drop(&mut self) {
+        // It may be gone already.
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+/// Moves a slider.
+fn set(browser: &mut Browser, slider: &str, value: i32) -> Result<()> {
+    let set = format!(
+        "(s => {{ s.value = {value}; s.dispatchEvent(new Event('input')); }})(document.getElementById('{slider}'))"
+    );
+    browser.evaluate(&set).map(|_| ())
+}
+
 /// The torque that is shown, in N·m.
 const TORQUE: &str = "+document.querySelector('#numbers b i').textContent.replace('−', '-')";
 
-/// Slider and key move the torque.
-fn moves(browser: &mut Browser) -> Result<()> {
-    for (what, act, wanted) in [("slider", Some(300), 300), ("key", None, 350), ("slider", Some(-400), -400)]
-    {
-        match act {
-            Some(value) => {
-                let set = format!(
-                    "(s => {{ s.value = {value}; s.dispatchEvent(new Event('input')); }})(document.getElementById('s-torque'))"
-                );
-                browser.evaluate(&set)?;
-            }
-            None => browser.press("ArrowUp")?,
+/// A slider, the key of the motor's views, and the values by slider, by key and by slider again.
+type Moved<'a> = (&'a str, &'a str, [i32; 3]);
+
+/// Sliders and keys move the torque; a speed slider only where the free rotor stays, so that it is only set.
+fn moves(browser: &mut Browser, moved: &[Moved]) -> Result<()> {
+    for (slider, key, [first, by_key, last]) in moved {
+        if !key.is_empty() {
+            browser.press(key)?;
         }
-        let near = format!("Math.abs({TORQUE} - {wanted}) < 12");
-        browser.until(&format!("torque near {wanted} N·m by {what}"), &near)?;
-        println!("torque {} N·m by {what}", browser.evaluate(TORQUE)?);
+        if slider.contains("speed") {
+            set(browser, slider, *first)?;
+            continue;
+        }
+        for (what, act, wanted) in
+            [("slider", Some(first), first), ("key", None, by_key), ("slider", Some(last), last)]
+        {
+            match act {
+                Some(value) => set(browser, slider, *value)?,
+                None => browser.press("ArrowUp")?,
+            }
+            let near = format!("Math.abs({TORQUE} - {wanted}) < {}", if wanted.abs() < 100 { 2 } else { 12 });
+            browser.until(&format!("torque near {wanted} N·m by {what}"), &near)?;
+            println!("torque {} N·m by {what}", browser.evaluate(TORQUE)?);
+        }
     }
     Ok(())
 }
 
 /// A fault is injected, named, mended, acknowledged, and the drive runs again.
-fn trips(browser: &mut Browser) -> Result<()> {
-    browser.evaluate("document.querySelector('[data-fault=current-u-railed]').click()")?;
+fn trips(browser: &mut Browser, fault: &str) -> Result<()> {
+    browser.evaluate(&format!("document.querySelector('[data-fault={fault}]').click()"))?;
     browser.until(
         "the fault is named",
-        "/^overcurrent.*limit \\d/.test(document.getElementById('fault').innerText.replace(/\\s+/g, ' '))",
+        "/^(overcurrent|sensor_lost_2|angle_lost).*limit \\d/.test(document.getElementById('fault').innerText.replace(/\\s+/g, ' '))",
     )?;
     println!("{}", browser.evaluate("document.getElementById('fault').innerText.replace(/\\s+/g, ' ')")?);
     for button in ["mend", "acknowledge"] {
         browser.evaluate(&format!("document.getElementById('{button}').click()"))?;
     }
-    browser.until("it runs again", "document.getElementById('state-name').textContent === 'running'")
+    browser.until("it runs again", RUNNING)
 }
 
-/// The sweep in the page makes the host's bytes.
-fn sweeps(browser: &mut Browser, host: &str) -> Result<()> {
-    browser.evaluate("document.getElementById('sweep').click()")?;
-    browser.until("the sweep is done", "!!document.getElementById('sum').dataset.sha256")?;
-    let found = browser.evaluate("document.getElementById('sum').dataset.sha256")?;
-    println!("{}", browser.evaluate("document.getElementById('sum').textContent")?);
-    ensure!(found == host, "the sweep's trace.csv: {found} in the page, {host} on the host");
+/// The recording is saved with all its rows, as CSV and as MCAP, which a library reads back.
+fn saves(browser: &mut Browser) -> Result<()> {
+    browser.evaluate("document.getElementById('record').click()")?;
+    std::thread::sleep(Duration::from_millis(500));
+    browser.evaluate("document.getElementById('record').click()")?;
+    const CSV: &str = "tractive.csv().text()";
+    const MCAP: &str = "new Promise(done => { const reader = new FileReader(); reader.onload = () => done(reader.result.split(',')[1]); reader.readAsDataURL(tractive.mcap()); })";
+    let csv = browser.evaluate(CSV)?.as_str().context("no CSV")?.to_owned();
+    let mut lines = csv.lines().map(|line| line.split(',').collect::<Vec<_>>());
+    let heads = lines.next().context("an empty CSV")?;
+    let bytes =
+        base64::prelude::BASE64_STANDARD.decode(browser.evaluate(MCAP)?.as_str().context("no MCAP")?)?;
+    let mut count = 0;
+    for (message, line) in mcap::MessageStream::new(&bytes)?.zip(lines.by_ref()) {
+        let message = message?;
+        let row: serde_json::Value = serde_json::from_slice(&message.data)?;
+        let time_s: f64 = line[0].parse()?;
+        ensure!((message.log_time as f64 * 1e-9 - time_s).abs() < 1e-9, "row {count}: {time_s} s in the CSV");
+        for (head, value) in heads.iter().zip(&line).skip(1) {
+            ensure!(row[*head].as_f64() == value.parse().ok(), "row {count}, {head}: {value} in the CSV");
+        }
+        count += 1;
+    }
+    ensure!(count > 1_000 && lines.next().is_none(), "{count} rows in the MCAP, more in the CSV");
+    println!("{count} rows recorded, the same as CSV and as MCAP");
     Ok(())
 }
 
-/// Nothing is wider than the window.
+/// A scenario in the page makes the host's bytes.
+fn equals_the_host(browser: &mut Browser, (name, trace): Scenario) -> Result<()> {
+    let bytes = std::fs::read(trace).with_context(|| trace.display().to_string())?;
+    let host: String = Sha256::digest(&bytes).iter().map(|byte| format!("{byte:02x}")).collect();
+    browser.evaluate(&format!(
+        "document.getElementById('scenario').value = '{name}'; document.getElementById('run').click()"
+    ))?;
+    browser.until("the scenario is done", "!!document.getElementById('sum').dataset.sha256")?;
+    let found = browser.evaluate("document.getElementById('sum').dataset.sha256")?;
+    println!("{name}: {}", browser.evaluate("document.getElementById('sum').textContent")?);
+    ensure!(found == host, "{name}'s trace.csv: {found} in the page, {host} on the host");
+    Ok(())
+}
+
+/// Size of the smallest letters, in CSS pixels.
+const LETTERS: &str = "Math.min(...[...document.querySelectorAll('body *')].filter(e => e.getClientRects().length && [...e.childNodes].some(n => n.nodeType === 3 && n.textContent.trim())).map(e => parseFloat(getComputedStyle(e).fontSize)))";
+
+/// Nothing is wider than the window, no letter under 11 pixels.
 fn fits(browser: &mut Browser) -> Result<()> {
     for width in WIDTHS {
         browser.resize(width, 860, false)?;
-        std::thread::sleep(std::time::Duration::from_millis(400));
+        std::thread::sleep(Duration::from_millis(400));
         let wide =
             browser.evaluate("Math.max(document.documentElement.scrollWidth, document.body.scrollWidth)")?;
         ensure!(wide.as_u64() <= Some(width.into()), "at {width} pixels the page is {wide} wide");
+        let small = browser.evaluate(LETTERS)?;
+        ensure!(small.as_f64() >= Some(11.0), "at {width} pixels there are letters of {small} pixels");
     }
     println!("no horizontal scroll bar at {WIDTHS:?} pixels");
     Ok(())
@@ -110,12 +254,16 @@ fn contrasts(browser: &mut Browser) -> Result<()> {
     Ok(())
 }
 
-/// The pace with the scope running: told, not judged.
+/// The pace with the scope running, and its frames: told, not judged.
 fn runs(browser: &mut Browser) -> Result<()> {
-    browser.evaluate("(r => { r.value = 'Infinity'; r.onchange(); })(document.getElementById('rate'))")?;
-    std::thread::sleep(std::time::Duration::from_secs(3));
+    const RATE: &str = "(r => { r.value = 'VALUE'; r.onchange(); })(document.getElementById('rate'))";
+    browser.evaluate(&RATE.replace("VALUE", "Infinity"))?;
+    let before = browser.evaluate("+document.body.dataset.frames")?.as_f64().unwrap_or(0.0);
+    let began = std::time::Instant::now();
+    std::thread::sleep(Duration::from_secs(3));
+    let frames = browser.evaluate("+document.body.dataset.frames")?.as_f64().unwrap_or(0.0) - before;
     let said = browser
         .evaluate("document.getElementById('numbers').lastElementChild.innerText.replace(/\\s+/g, ' ')")?;
-    println!("as fast as it goes: {said}");
-    Ok(())
+    println!("as fast as it goes: {said}; {:.0} frames a second", frames / began.elapsed().as_secs_f64());
+    browser.evaluate(&RATE.replace("VALUE", "1")).map(|_| ())
 }

@@ -40,8 +40,13 @@ enum Command {
     Check {
         /// The page's folder
         page: PathBuf,
-        /// The host's trace.csv of the sweep
+        /// The host's trace.csv of `sweep`
         trace: PathBuf,
+        /// The host's trace.csv of `zs9-load-step`
+        zs9: PathBuf,
+        /// The rig, whose page of a drive elsewhere is looked at, too
+        #[arg(long)]
+        rig: PathBuf,
         /// Chromium
         #[arg(long, default_value = "chromium")]
         browser: PathBuf,
@@ -74,7 +79,11 @@ fn main() -> Result<()> {
     match Command::parse() {
         Command::Make { wasm, out } => page::make(&wasm, &out),
         Command::Serve { page, port, no_open } => server::serve(&page, port, !no_open),
-        Command::Check { page, trace, browser } => check::check(&page, &trace, &browser),
+        Command::Check { page, trace, zs9, rig, browser } => {
+            let scenarios = [("sweep", trace.as_path()), ("zs9-load-step", zs9.as_path())];
+            check::check(&page, scenarios, &browser)?;
+            check::check_remote(&rig, &browser)
+        }
         Command::Reports { pages, pictures, browser } => {
             reports::check(&pages, pictures.as_deref(), &browser)
         }

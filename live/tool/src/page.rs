@@ -18,7 +18,13 @@ pub fn make(wasm: &Path, out: &Path) -> Result<()> {
             std::fs::copy(entry.path(), to.join(entry.file_name()))?;
         }
     }
-    Bindgen::new().input_path(wasm).out_name("tractive_live").web(true)?.typescript(false).generate(out)?;
+    Bindgen::new()
+        .remove_name_section(true)
+        .input_path(wasm)
+        .out_name("tractive_live")
+        .web(true)?
+        .typescript(false)
+        .generate(out)?;
     let bytes = std::fs::metadata(out.join("tractive_live_bg.wasm"))?.len();
     println!("{}: {bytes} bytes of wasm", out.display());
     ensure!(bytes <= LARGEST_BYTES, "the wasm has {bytes} bytes: at most {LARGEST_BYTES} are allowed");

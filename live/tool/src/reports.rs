@@ -115,12 +115,16 @@ const CURVES: [(&str, &str); 7] = [
 /// Rows of the trace between two that are looked at.
 const EVERY: usize = 97;
 
-/// The first plots' values are the trace's, to an 8192nd of their span.
+/// The first plots' values are the trace's, to an 8192nd of their span; where a stretch of rows has left its lowest and its highest value, the
+/// trace's are between them.
 fn holds_the_trace(browser: &mut Browser, trace: &Path, name: &str) -> Result<()> {
     let text = std::fs::read_to_string(trace).with_context(|| trace.display().to_string())?;
     let mut lines = text.lines().map(|line| line.split(',').collect::<Vec<_>>());
     let heads = lines.next().context("an empty trace")?;
     let rows: Vec<_> = lines.step_by(EVERY).collect();
+    let [first, second] =
+        [0, 1].map(|k| text.lines().nth(k + 1).and_then(|line| line.split(',').next()?.parse::<f64>().ok()));
+    let step_s = second.zip(first).map_or(0.0, |(second, first)| second - first);
     let mut looked = 0;
     for (curve, column) in CURVES {
         let Some(place) = heads.iter().position(|head| *head == column) else { continue };
@@ -135,7 +139,12 @@ fn holds_the_trace(browser: &mut Browser, trace: &Path, name: &str) -> Result<()
                 for (const value of values) {{ low = Math.min(low, value); high = Math.max(high, value); }}
                 const step = (high - low) / 8192 + 1e-6 * Math.max(Math.abs(low), Math.abs(high));
                 const within = [{}].filter(([t]) => t >= times.begin && t <= times.end);
-                return within.length && Math.max(...within.map(([t, v]) => Math.abs(values[times.row(t + 1e-9)] - v))) / (step || 1);
+                const stretched = times.every > 1.5 * {step_s};
+                const off = ([t, v]) => {{
+                    const k = times.row(t + 1e-9), pair = [values[k - k % 2], values[k - k % 2 + 1] ?? values[k]];
+                    return stretched ? Math.max(0, v - Math.max(...pair), Math.min(...pair) - v) : Math.abs(values[k] - v);
+                }};
+                return within.length && Math.max(...within.map(off)) / (step || 1);
             }})()",
             wanted.join(",")
         ))?;

@@ -68,7 +68,9 @@ fn talk(commission: &Commission, options: &Options, machine: &Machine, script: &
     let mut talk = Talk::new(System::Pmasynrm, lines, inertia, parameters.max_torque_nm);
     match &identify.can {
         Some(interface) => can::drive(interface, &mut talk)?,
-        None => talk::with_traction(options, inertia, machine, &mut talk).map(drop)?,
+        None => {
+            talk::with_traction(options, inertia, talk::LONGEST_S, machine, &mut talk)?;
+        }
     }
     Ok(talk)
 }

@@ -59,6 +59,11 @@ impl Stator {
         self.scale = scale;
     }
 
+    /// True flux linkage over the map's.
+    pub(super) fn flux_scale(&self) -> f64 {
+        self.scale
+    }
+
     /// Flux linkage and its Jacobian at a current in A.
     #[inline]
     pub fn flux(&self, id_a: f64, iq_a: f64) -> FluxPoint {

@@ -12,7 +12,7 @@ const PARTS: f64 = 8192.0;
 /// The same of times that are not evenly spaced.
 const TIME_PARTS: f64 = 67_108_864.0;
 /// Rows of a table at most; of more, each stretch keeps its lowest and its highest value.
-pub const MOST_ROWS: usize = 400_000;
+pub const MOST_ROWS: usize = 300_000;
 
 /// Times of a table's rows.
 #[derive(Clone, Debug, PartialEq, Serialize)]

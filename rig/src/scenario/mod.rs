@@ -2,6 +2,8 @@
 
 pub mod catalogue;
 pub mod command;
+pub mod live;
+pub mod planned;
 pub mod traction;
 pub mod zs9;
 
@@ -125,8 +127,8 @@ impl<S: System> Choice<S> {
     }
 }
 
-fn filled<S: System>(
-    scenario: &dyn Scenario<S>,
+fn filled<S: System, T: Scenario<S> + ?Sized>(
+    scenario: &T,
     options: &Options<S::Own>,
     machine: &Machine,
 ) -> Options<S::Own> {

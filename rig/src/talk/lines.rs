@@ -13,6 +13,8 @@ pub enum Lines {
     Script(VecDeque<Line>),
     /// Standard input, and how many lines were read.
     Typed(usize),
+    /// Nothing here: somebody else says lines, [`super::Talk::say`].
+    Said,
 }
 
 impl Lines {
@@ -33,12 +35,18 @@ impl Lines {
         matches!(self, Self::Typed(_))
     }
 
+    /// `true` if they have no end.
+    pub fn are_said(&self) -> bool {
+        matches!(self, Self::Said)
+    }
+
     /// The next line; `None` at the end. A line that cannot be understood is an error; on a terminal it is said and the next one
     /// is read.
     pub fn take(&mut self, system: System) -> Result<Option<Line>> {
         let count = match self {
             Self::Script(lines) => return Ok(lines.pop_front()),
             Self::Typed(count) => count,
+            Self::Said => return Ok(None),
         };
         let input = std::io::stdin();
         loop {

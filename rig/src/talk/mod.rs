@@ -8,18 +8,24 @@ pub mod script;
 pub mod sender;
 mod supervisor;
 mod system;
+mod words;
 
 pub use lines::Lines;
 pub use listener::Listener;
 pub use outcome::{Happened, Outcome, TalkOptions};
 pub use supervisor::Talk;
 pub use system::System;
+pub use words::DriveOptions;
+#[cfg(unix)]
+pub(crate) use words::read;
+pub(crate) use words::usual;
 
 use crate::analysis::Figures;
 use crate::bench::LinePlan;
 use crate::machine::Machine;
 use crate::options::{Options, RunOptions};
 use crate::plant::SpeedSource;
+use crate::run::Supervisor;
 use crate::scenario::System as _;
 use crate::scenario::traction::{self, Traction, scaled_link};
 use crate::scenario::zs9::{self as dual, Zs9};
@@ -35,7 +41,7 @@ use tractive::ports::MotorDemand;
 const TRACE_STEP_S: f64 = 1e-3;
 
 /// Longest talk, in s.
-const LONGEST_S: f64 = 86_400.0;
+pub(crate) const LONGEST_S: f64 = 86_400.0;
 
 /// Talks.
 pub fn run(options: &TalkOptions) -> Result<Outcome> {
@@ -48,28 +54,35 @@ pub fn run(options: &TalkOptions) -> Result<Outcome> {
     let mut talk = Talk::new(system, lines, options.inertia(), machine.folder.parameters.max_torque_nm);
     let recording = match system {
         System::Pmasynrm => {
-            let own = Options { run: run_options(options), own: options.traction.clone() };
-            Happened::Pmasynrm(with_traction(&own, options.inertia(), &machine, &mut talk)?)
+            let own = traction_options(options);
+            let recording = with_traction(&own, options.inertia(), LONGEST_S, &machine, &mut talk)?;
+            Happened::Pmasynrm(recording)
         }
-        System::Zs9 => Happened::Zs9(with_zs9(options, &machine, &mut talk)?),
+        System::Zs9 => Happened::Zs9(with_zs9(options, LONGEST_S, &machine, &mut talk)?),
     };
     let figures = figures(&talk, &recording);
     Ok(Outcome { talk, system, recording, figures })
 }
 
-fn run_options(options: &TalkOptions) -> RunOptions {
+fn run_options(options: &DriveOptions) -> RunOptions {
     RunOptions { dt: Some(options.run.dt.unwrap_or(TRACE_STEP_S)), ..options.run.clone() }
+}
+
+/// The same as a run of the PMaSynRM drive takes them.
+pub(crate) fn traction_options(options: &DriveOptions) -> traction::Options {
+    Options { run: run_options(options), own: options.traction.clone() }
 }
 
 /// A rotor of this inertia, in kg·m², on a link, commanded over the protocol.
 ///
 /// # Errors
 /// Options that make no sense, or an emulator that does not do its part.
-pub fn with_traction(
+pub(crate) fn with_traction(
     options: &traction::Options,
     inertia_kg_m2: f64,
+    longest_s: f64,
     machine: &Machine,
-    talk: &mut Talk,
+    supervisor: &mut dyn Supervisor,
 ) -> Result<Recording> {
     Traction::check(options, &Map::new(), machine)?;
     let idle = Request::idle(&machine.tables.ratings);
@@ -78,13 +91,18 @@ pub fn with_traction(
     let plan = traction::Plan {
         judged_step_s: options.dt.unwrap_or(TRACE_STEP_S),
         speed: SpeedSource::Inertia { inertia_kg_m2, load_nm: 0.0 },
-        ..traction::Plan::operated(LONGEST_S, vec![(0.0, 0.0)], line)
+        ..traction::Plan::operated(longest_s, vec![(0.0, 0.0)], line)
     };
-    Traction::run("talk", plan, options, machine, Some(talk))
+    Traction::run("talk", plan, options, machine, Some(supervisor))
 }
 
 /// Two rotors on an empty network, commanded over the protocol.
-fn with_zs9(options: &TalkOptions, machine: &Machine, talk: &mut Talk) -> Result<zs9::trace::Recording> {
+pub(crate) fn with_zs9(
+    options: &DriveOptions,
+    longest_s: f64,
+    machine: &Machine,
+    supervisor: &mut dyn Supervisor,
+) -> Result<zs9::trace::Recording> {
     let own = Options { run: run_options(options), own: options.zs9.clone() };
     Zs9::check(&own, &Map::new(), machine)?;
     // What the operator permits takes the place of the demands.
@@ -93,13 +111,13 @@ fn with_zs9(options: &TalkOptions, machine: &Machine, talk: &mut Talk) -> Result
         loads_nm: [0.0; 2],
         enable: true,
     };
-    let times_s = (0.0, LONGEST_S);
+    let times_s = (0.0, longest_s);
     let plan = dual::Plan {
         edges: false,
         line: Some(zs9::line::TIMES),
         ..dual::Plan::driven(times_s, dual::free(options.inertia()), [0.0; 2], operator)
     };
-    Zs9::run("talk", plan, &own, machine, Some(talk))
+    Zs9::run("talk", plan, &own, machine, Some(supervisor))
 }
 
 fn figures(talk: &Talk, recording: &Happened) -> Figures {

@@ -1,36 +1,73 @@
 //! The options of a talk, and its results.
 
+use super::script;
 use super::supervisor::Talk;
 use super::system::System;
+use super::words::{self, DriveOptions};
 use crate::analysis::Figures;
-use crate::options::RunOptions;
-use crate::scenario::System as _;
-use crate::scenario::traction::{Traction, TractionOptions};
-use crate::scenario::zs9::{Zs9, Zs9Options};
 use crate::trace::{Recorded, Recording};
 use crate::zs9;
+use anyhow::Result;
+use clap::Command;
+use std::ffi::OsString;
+use std::ops::Deref;
 use std::path::PathBuf;
 
 /// The options of a talk.
-#[derive(Clone, Debug, clap::Args)]
+#[derive(Clone, Debug)]
 pub struct TalkOptions {
-    /// A script; without one commands are read from standard input, one a line.
+    /// A script; without one commands are read from standard input.
     pub script: Option<PathBuf>,
-    /// The system that is talked to.
-    #[arg(long, value_enum, default_value_t)]
-    pub system: System,
-    /// The machine's and its load's inertia, in kg·m²; default 10, of each of the ZS9's 0.1, for which its speed loops are made.
-    #[arg(long, value_parser = crate::options::positive)]
-    pub inertia: Option<f64>,
-    /// The options that all runs share.
-    #[command(flatten)]
-    pub run: RunOptions,
-    /// The options that only the PMaSynRM drive has.
-    #[command(flatten)]
-    pub traction: TractionOptions,
-    /// The options that only the ZS9 has.
-    #[command(flatten)]
-    pub zs9: Zs9Options,
+    /// The drive that is talked to.
+    pub drive: DriveOptions,
+}
+
+/// The option of a talk alone.
+#[derive(Clone, Debug, clap::Args)]
+struct Script {
+    /// A script; without one commands are read from standard input, one a line.
+    script: Option<PathBuf>,
+}
+
+impl Deref for TalkOptions {
+    type Target = DriveOptions;
+
+    fn deref(&self) -> &DriveOptions {
+        &self.drive
+    }
+}
+
+impl TalkOptions {
+    /// Reads the words behind `talk`.
+    pub fn read(words: &[OsString]) -> Result<Self> {
+        let (Script { script }, drive) = words::read("talk", words, dressed)?;
+        Ok(Self { script, drive })
+    }
+
+    /// The command line, of a system.
+    pub fn command(system: System) -> Command {
+        dressed(words::command::<Script>("talk", system), system)
+    }
+}
+
+/// The command line with the commands of a script, for the help.
+fn dressed(command: Command, system: System) -> Command {
+    let list = |commands: &[script::Command]| {
+        commands.iter().map(|(usage, _)| format!("  {usage}")).collect::<Vec<_>>().join("\n")
+    };
+    let commands = match system {
+        System::Pmasynrm => list(&script::COMMANDS),
+        System::Zs9 => {
+            format!("{}\nor, of two motors:\n{}", list(&script::COMMANDS), list(&script::ZS9_COMMANDS))
+        }
+    };
+    let other = match system {
+        System::Pmasynrm => "\n\n`--system zs9 --help` lists what the ZS9 takes.",
+        System::Zs9 => "",
+    };
+    command
+        .about("Commands the drive over the protocol, by a script or line by line, and logs its telemetry")
+        .after_help(format!("A line is [SECONDS] COMMAND; # begins a comment:\n{commands}{other}"))
 }
 
 /// The recording of what really happened, by system.
@@ -74,20 +111,4 @@ pub struct Outcome {
     pub recording: Happened,
     /// The figures.
     pub figures: Figures,
-}
-
-impl TalkOptions {
-    /// The machine's name, or its folder.
-    pub fn machine_name(&self) -> &str {
-        let usual = match self.system {
-            System::Pmasynrm => Traction::MACHINE,
-            System::Zs9 => Zs9::MACHINE,
-        };
-        self.run.machine.as_deref().unwrap_or(usual)
-    }
-
-    /// The inertia, in kg·m².
-    pub fn inertia(&self) -> f64 {
-        self.inertia.unwrap_or(self.system.inertia_kg_m2())
-    }
 }

@@ -2,7 +2,7 @@
 
 use super::lines::Lines;
 use super::listener::Listener;
-use super::script::{Action, Expectation, Line};
+use super::script::{self, Action, Expectation, Line};
 use super::sender::{COMMAND_SLOTS, Sender, Spoken};
 use super::system::System;
 use crate::run::{Supervisor, Turn, bar};
@@ -121,7 +121,7 @@ impl Talk {
                 self.next = self.lines.take(self.system)?;
             }
             let Some(line) = self.next.take() else {
-                self.ended = true;
+                self.ended = !self.lines.are_said();
                 return Ok(());
             };
             if line.at_s.is_some_and(|at_s| t_s + DUE_S < at_s) {
@@ -134,6 +134,23 @@ impl Talk {
             }
         }
         Ok(())
+    }
+
+    /// Does what a line says, now.
+    ///
+    /// # Errors
+    /// Says what of it cannot be understood.
+    pub fn say(&mut self, t_s: f64, text: &str) -> Result<()> {
+        if let Some(line) = script::line(text, 1, self.system)? {
+            self.act(t_s, &line);
+        }
+        Ok(())
+    }
+
+    /// The rows since the last time; what was logged is forgotten.
+    pub fn take_rows(&mut self) -> Vec<Vec<String>> {
+        self.frames.clear();
+        std::mem::take(&mut self.rows)
     }
 
     fn act(&mut self, t_s: f64, line: &Line) {

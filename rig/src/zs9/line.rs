@@ -5,6 +5,7 @@
 
 use crate::bench::{Switchgear, Tick};
 use crate::plant::zs9::{NetworkState, Zs9Plant};
+use tractive::operator::DualStatus;
 use tractive::time::Clock;
 
 pub use tractive::operator::LineTimes;
@@ -18,6 +19,8 @@ pub struct LineSide {
     /// Contactors and slots.
     pub gear: Switchgear<(), [tractive::ports::MotorDemand; 2]>,
     discharge: bool,
+    /// The operator's last word that has taken effect.
+    pub status: Option<DualStatus>,
 }
 
 impl LineSide {
@@ -26,13 +29,14 @@ impl LineSide {
 
     /// At tick 0, everything open.
     pub fn new(times: LineTimes, clock: &Clock) -> Self {
-        Self { times, gear: Switchgear::new(clock), discharge: false }
+        Self { times, gear: Switchgear::new(clock), discharge: false, status: None }
     }
 
     /// Does what is due at `now`.
     pub fn act(&mut self, now: Tick) {
         if let Some(status) = self.gear.act(now) {
             self.discharge = status.switches.discharge;
+            self.status = Some(status);
         }
     }
 

@@ -1,7 +1,7 @@
 //! The files that a run of the ZS9 leaves behind. Files are written whole or not at all.
 
 use crate::columns;
-use crate::files::{Cell, Columns, write_edges, write_recorder, write_rows};
+use crate::files::{Cell, Columns, bytes_of_rows, write_edges, write_recorder, write_rows};
 use crate::rows::Timed;
 use crate::trace::{Recorded, degrees, name_of};
 use anyhow::Result;
@@ -130,6 +130,13 @@ fn recorder_columns((t_s, record): &(f64, DualRecord)) -> Columns<20> {
         d_sh: Cell::plain(record.duty), scheme: state.scheme.name(),
         enabled: state.enabled, pulsing: state.pulsing,
         fault: state.fault.map_or("", |fault| fault.name()),
+    }
+}
+
+impl Recording {
+    /// The bytes of trace.csv.
+    pub fn trace_bytes(&self) -> Result<Vec<u8>> {
+        bytes_of_rows(self.rows.iter().map(Row::columns))
     }
 }
 

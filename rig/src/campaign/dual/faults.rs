@@ -8,7 +8,7 @@ use tractive::protection::Fault;
 
 /// The cause of a fault.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Cause {
+pub enum Cause {
     /// Something on the bench.
     Bench(Kind),
     /// True flux linkage over the map's.
@@ -31,7 +31,7 @@ impl From<Kind> for Cause {
 }
 
 /// Every fault, in its order.
-pub(super) fn faults() -> Vec<Named<Cause>> {
+pub fn faults() -> Vec<Named<Cause>> {
     let mut list = Faults::beginning_with(Kind::Elsewhere);
     sensors(&mut list);
     source(&mut list);

@@ -6,6 +6,7 @@ mod faults;
 mod ride;
 
 pub use cases::{Case, cases};
+pub use faults::{Cause, faults};
 pub use ride::{Ridden, Ride, Script};
 
 use super::Outcome;
@@ -26,7 +27,6 @@ use crate::zs9::run::Tasks;
 use crate::zs9::trace::Row;
 use crate::zs9::{Orders, SeenMotors, settings};
 use anyhow::Result;
-use faults::Cause;
 use tractive::control::Demand;
 use tractive::drive::dual::Settings;
 use tractive::machine::Tables;

@@ -127,6 +127,15 @@ impl Zs9Plant {
         }
     }
 
+    /// Has both machines' true flux linkage be another multiple of their maps', above 0. Currents stay as they are.
+    pub fn set_flux_scale(&mut self, flux_scale: f64) {
+        let [motor, _] = &self.motors;
+        self.clamp = self.clamp.scaled(flux_scale / motor.stator.flux_scale());
+        for motor in &mut self.motors {
+            motor.stator.set_flux_scale(flux_scale);
+        }
+    }
+
     /// Lets time pass with the gates of the legs u, v, w unchanged. The error names the first leg whose gates are illegal;
     /// nothing has happened then.
     pub fn advance(&mut self, gates: [LegGates; 3], dt_s: f64) -> Result<(), IllegalState> {

@@ -61,7 +61,7 @@ fn check(options: &Options) -> Result<()> {
     let own = &options.own;
     let others = [
         (options.law != LawName::Tractive, "--law"),
-        (own.patterns != PatternsName::Paper, "--patterns"),
+        (own.patterns == Some(PatternsName::Optimal), "--patterns"),
         (own.ablate.is_some(), "--ablate"),
         (own.line.is_some(), "--line"),
     ];
@@ -79,7 +79,7 @@ fn check(options: &Options) -> Result<()> {
 /// # Errors
 /// Options that make no sense, or an emulator that does not do its part.
 pub fn drive(options: &Options, machine: &Machine, stand: &Stand) -> Result<Recording> {
-    let options = &uncompensated(options)?;
+    let options = &held(options)?;
     let halves_s = 1.0 / (2.0 * machine.folder.parameters.max_switching_hz);
     let longest_s = LEAST_S + MOST_HALVES * halves_s;
     let duration_s = stand.fault_at_s.map_or(longest_s, |at_s| longest_s.min(at_s + AFTER_FAULT_S));
@@ -114,7 +114,7 @@ pub fn drive_commanded(
     stand: &Stand,
     supervisor: &mut dyn Supervisor,
 ) -> Result<Recording> {
-    let options = &uncompensated(options)?;
+    let options = &held(options)?;
     let idle = operator::Request::idle(&machine.tables.ratings);
     // The frames ask, not this.
     let line = LinePlan::new(scaled_link(machine), Box::new(move |_| idle));
@@ -144,11 +144,13 @@ pub fn drive_commanded(
     }
 }
 
-/// The options that hold: nothing compensates the dead time.
-fn uncompensated(options: &Options) -> Result<Options> {
+/// The options that hold: nothing compensates the dead time, and the carrier is free.
+fn held(options: &Options) -> Result<Options> {
     check(options)?;
     let mut options = options.clone();
     options.own.uncompensated = true;
+    // Whatever machine.toml names: the images that identify have the paper's free carrier.
+    options.own.patterns = Some(PatternsName::Paper);
     Ok(options)
 }
 

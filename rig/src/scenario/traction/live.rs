@@ -1,5 +1,7 @@
 //! A drive that somebody drives by hand, as long as he likes: plant, contactors, operator and drive as in every scenario, stepped from outside.
 
+pub use crate::scenario::live::{Command, Start, Turning, Wanted};
+
 use super::prelude::*;
 use super::{bench, scaled_link, setup, tasks};
 use crate::bench::{Bench, LinePlan, Simulated};
@@ -7,6 +9,7 @@ use crate::inject::traction::{Kind, SupplyFault};
 use crate::plant::Source;
 use crate::run::Interrupts;
 use crate::run::traction::Tasks;
+use crate::scenario::live::{ACKNOWLEDGE_S, TURN_S};
 use crate::speed_loop::SpeedLoop;
 use crate::trace::Edge;
 use anyhow::Result;
@@ -16,11 +19,6 @@ use tractive::control::Controller;
 use tractive::operator::{Request, State, Status};
 use tractive::protection::Trip;
 
-/// Whoever drives looks and orders once in this time, in s: the operator's slot.
-const TURN_S: f64 = 1e-3;
-/// Time for which an acknowledge stands, in s, so that a slot sees it; and that after which a command that was refused is given again.
-const ACKNOWLEDGE_S: f64 = 3e-3;
-const AGAIN_S: f64 = 50e-3;
 /// Slope at which a held rotor goes to another speed, in r/min per s.
 const HELD_SLOPE_RPM_S: f64 = 2_000.0;
 /// Slope at which the speed loop's reference goes to another speed, in r/min per s.
@@ -31,44 +29,6 @@ const RUNAWAY: (f64, f64) = (12_000.0, 1.2);
 const ROOM_S: f64 = 0.1;
 /// Resistance of a line that is cut off, in ohm.
 const CUT_OFF_OHM: f64 = 1e9;
-
-/// The command: a torque in N·m, or a speed in r/min.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Command {
-    /// A torque.
-    Torque(f64),
-    /// A speed, held by a loop as a vehicle's computer has one.
-    Speed(f64),
-}
-
-/// The rotor's fate.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Turning {
-    /// Held at a speed, in r/min.
-    Held(f64),
-    /// Free, with an inertia in kg·m² and a load in N·m.
-    Free(f64, f64),
-}
-
-/// The state in which a drive is switched on, and the rows that it leaves.
-#[derive(Clone, Copy, Debug)]
-pub struct Start {
-    /// Mechanical speed, in r/min.
-    pub speed_rpm: f64,
-    /// Step of the rows, in s.
-    pub step_s: f64,
-}
-
-/// The wishes for the drive, as levels.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Wanted {
-    /// The link charged and the drive enabled; otherwise stopped.
-    pub on: bool,
-    /// Gates off, to be caught again.
-    pub coast: bool,
-    /// The link discharged once the drive has stopped.
-    pub discharge: bool,
-}
 
 /// A drive on its bench.
 pub struct Live {
@@ -249,18 +209,16 @@ impl Live {
             Command::Speed(_) => self.speed_loop.step(self.speed_rpm(), TURN_S),
         };
         let state = self.status().map_or(State::Init, |status| status.state);
-        let on = self.wanted.on;
-        // An edge that was refused is given again some slots later.
-        let again = self.bench.time_s() % AGAIN_S < ACKNOWLEDGE_S;
+        let now_s = self.bench.time_s();
+        let levels = self.wanted.levels(state, now_s, now_s < self.acknowledged_until_s);
         let mut request = self.request.lock().unwrap_or_else(PoisonError::into_inner);
-        let closed = !matches!(state, State::Init | State::SelfTest | State::Ready | State::Precharge);
         *request = Request {
-            enable: on && closed && state != State::Fault && (state != State::Charged || !again),
-            with_torque: true,
-            coast: self.wanted.coast,
-            charge: on && state == State::Ready && !again,
-            discharge: !on && self.wanted.discharge && state == State::Charged && !again,
-            acknowledge: self.bench.time_s() < self.acknowledged_until_s,
+            enable: levels.enable,
+            with_torque: levels.with_torque,
+            coast: levels.coast,
+            charge: levels.charge,
+            discharge: levels.discharge,
+            acknowledge: levels.acknowledge,
             torque_nm: torque_nm as f32,
             ..*request
         };

@@ -293,10 +293,11 @@ impl System for Traction {
         let plan = plan.behind(options.own.line);
         let setup = setup(&plan, options, machine, supervisor.is_some());
         let bench = bench(plan, &setup, options, (machine, &truth(options, machine)?));
-        match options.on {
+        let (on, law) = options.choice()?;
+        match on {
             On::Host => {
                 let run = OnHost { name, bench, setup: &setup, options, machine };
-                match (options.law, options.own.ablate) {
+                match (law, options.own.ablate.filter(|_| !cfg!(target_family = "wasm"))) {
                     (LawName::Tractive, Some(part)) => run.run(Ablated::new(part), supervisor),
                     (LawName::Tractive, None) => run.run(Controller::new(), supervisor),
                     (LawName::Pi, _) => run.run(PiLaw::starting(options.own.mtpa_start.of()), supervisor),

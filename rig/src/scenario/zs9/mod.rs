@@ -1,6 +1,7 @@
 //! The ZS9's scenarios.
 
 pub(super) mod cycle;
+mod live;
 pub(super) mod load_step;
 mod patterns;
 mod prelude;
@@ -8,6 +9,7 @@ pub(super) mod reverse;
 pub(super) mod steady;
 pub(super) mod timing;
 
+pub use live::Live;
 pub use load_step::INERTIA_KG_M2;
 pub use steady::SPEEDS_RPM as STEADY_SPEEDS_RPM;
 
@@ -139,7 +141,8 @@ impl System for Zs9 {
         let bench = bench(plan, options, machine)?;
         let settings = settings::drive(CLOCK, options.own.carrier_hz);
         let settings = settings::with_dead_time(settings, options.dead_time_us * 1e-6);
-        match options.on {
+        let (on, law) = options.choice()?;
+        match on {
             On::Host => {
                 settings.check(machine.tables).map_err(refused)?;
                 let ratings = settings.operator_ratings(&machine.tables.ratings);
@@ -147,7 +150,7 @@ impl System for Zs9 {
                     Line::rated(&ratings, times.precharge_s, times.discharge_s).without_chopper()
                 });
                 let run = OnHost { name, bench, settings, ratings, line, machine };
-                match options.law {
+                match law {
                     LawName::Tractive => run.run(Controller::with_tracking(TRACKING_RAD_S), supervisor),
                     LawName::Pi => run.run(PiLaw::with_tracking(TRACKING_RAD_S), supervisor),
                 }

@@ -6,6 +6,7 @@
 
 mod carrier;
 mod gates;
+mod live;
 mod record;
 mod run;
 mod sampling;
@@ -66,6 +67,8 @@ pub struct Bench {
     control: Conversions<(DualSample, DualDriveCommand), DualReport>,
     next_row: Tick,
     sums: Sums,
+    /// Rows that were taken from the trace.
+    taken: usize,
     /// The trace so far.
     pub rows: Vec<Row>,
 }
@@ -101,6 +104,7 @@ impl Bench {
             control: Conversions::new(&time),
             next_row: time.lead,
             sums: Sums::default(),
+            taken: 0,
             rows: Vec::with_capacity(rows_wanted.min(1 << 20)),
             time,
             settings,

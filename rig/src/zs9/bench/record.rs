@@ -72,7 +72,7 @@ impl Bench {
                 }
             });
             self.rows.push(Row {
-                t_s: self.rows.len() as f64 * self.settings.trace_step_s,
+                t_s: (self.taken + self.rows.len()) as f64 * self.settings.trace_step_s,
                 motors,
                 link_v: means.link_v,
                 capacitor_v: means.capacitor_v,
@@ -86,7 +86,7 @@ impl Bench {
                 explained_j: self.plant.energies.source_j - self.plant.residual_j(0.0),
             });
         }
-        let end_s = (self.rows.len() + 1) as f64 * self.settings.trace_step_s;
+        let end_s = (self.taken + self.rows.len() + 1) as f64 * self.settings.trace_step_s;
         self.next_row = self.time.row_end(end_s);
         self.control.show(self.time.now);
     }

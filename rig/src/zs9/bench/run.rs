@@ -61,8 +61,9 @@ impl Bench {
 
     fn integrate_fed(&mut self, to: Tick) -> Result<(), BenchError> {
         let steps = (to - self.time.now) as f64;
+        let supply_v = self.behind_contactor_v();
         if let Some(line) = &self.line {
-            line.feed(&mut self.plant, self.nominal_source_v, steps * self.time.step_s);
+            line.feed(&mut self.plant, supply_v, steps * self.time.step_s);
         }
         let real = self.real_levels();
         let [uh, vh, wh, um, vm, wm, ul, vl, wl] = real;
@@ -140,6 +141,15 @@ impl Bench {
             self.take_sample()?;
         }
         Ok(())
+    }
+
+    /// The source's voltage at its contactor, as the fault has it, in V.
+    pub(super) fn behind_contactor_v(&self) -> f64 {
+        let t_s = self.time.now_s();
+        match self.spoiler.injected.kind(t_s) {
+            Some(Kind::SourceLost) => self.plant.source_v,
+            _ => self.spoiler.source_v(t_s, self.nominal_source_v),
+        }
     }
 
     /// Phase currents of both motors, in A.

@@ -34,7 +34,7 @@ impl Bench {
         self.advance(at)?;
         let feedback = std::mem::take(&mut self.feedback);
         // The source's sensor is in front of the contactors.
-        let source_v = if self.line.is_some() { self.nominal_source_v } else { self.plant.source_v };
+        let source_v = if self.line.is_some() { self.behind_contactor_v() } else { self.plant.source_v };
         let mut sample = PowerSample {
             currents_a: self.converted_a(),
             capacitor_v: self.plant.network.capacitor_v() as f32,
@@ -65,7 +65,8 @@ impl Bench {
 
     pub(super) fn take_sample(&mut self) -> Result<(), BenchError> {
         let t_s = self.time.now_s();
-        self.control.begin(&self.time, self.spoiler.injected.has_control(t_s))?;
+        let has_control = self.spoiler.injected.has_control(t_s);
+        self.control.begin(&self.time, has_control)?;
         self.orders = self.operator.orders(t_s, self.speeds_rpm());
         if let Some(loads_nm) = self.loads_nm {
             self.orders.loads_nm = loads_nm;
@@ -83,7 +84,8 @@ impl Bench {
         match &mut self.line {
             None => self.plant.source_v = source_v,
             Some(line) => {
-                if line.gear.sampled(self.time.tick(), hardware, || ()) {
+                // Without the control interrupt nobody looks at slots.
+                if has_control && line.gear.sampled(self.time.tick(), hardware, || ()) {
                     return Err(BenchError::OperatorLate(t_s));
                 }
             }

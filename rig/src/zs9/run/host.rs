@@ -28,13 +28,23 @@ struct Port<'a> {
     error: Option<anyhow::Error>,
 }
 
-/// The drive's end of the protocol, its operator, and who is at the other end.
+/// The drive's operator, and who asks it for something.
 struct Wire<'w> {
-    station: Zs9CanEndpoint,
     slot: DualSlot,
     operator: operator::Settings<'static>,
-    supervisor: &'w mut dyn Supervisor,
+    end: End<'w>,
 }
+
+/// The source of the operator's requests.
+enum End<'w> {
+    /// The protocol: the drive's end of it, and who is at the other end.
+    Protocol(Box<Zs9CanEndpoint>, &'w mut dyn Supervisor),
+    /// Requests as they are.
+    Direct(Commander),
+}
+
+/// Somebody who says in every slot what is requested.
+pub type Commander = Box<dyn FnMut() -> DualRequest + Send>;
 
 /// The sample when there is nothing left to sample.
 const NOTHING: DualSample = DualSample {
@@ -100,32 +110,39 @@ impl PwmPort<Dual> for Port<'_> {
     }
 }
 
-/// The operator's port, with its station apart.
-struct Idle<'a, 'b> {
+/// The operator's port, with the source of its requests apart.
+struct Idle<'a, 'b, 'w> {
     port: &'a mut Port<'b>,
-    station: &'a mut Zs9CanEndpoint,
-    supervisor: &'a mut dyn Supervisor,
+    end: &'a mut End<'w>,
 }
 
-impl OperatorPort<DualDemands> for Idle<'_, '_> {
+impl OperatorPort<DualDemands> for Idle<'_, '_, '_> {
     fn ask(&mut self, at: Instant, slots: u32) -> (DualRequest, Feedback) {
         let feedback = self.port.bench.ask(at).unwrap_or_else(|error| {
             self.port.error = Some(error.into());
             Feedback::default()
         });
-        let frame = turn(self.supervisor, self.port.bench, at).unwrap_or_else(|error| {
-            self.port.error = Some(error);
-            None
-        });
-        (self.station.listen(slots, frame.as_ref()), feedback)
+        let request = match self.end {
+            End::Direct(commander) => commander(),
+            End::Protocol(station, supervisor) => {
+                let frame = turn(*supervisor, self.port.bench, at).unwrap_or_else(|error| {
+                    self.port.error = Some(error);
+                    None
+                });
+                station.listen(slots, frame.as_ref())
+            }
+        };
+        (request, feedback)
     }
 
     fn tell(&mut self, from: Instant, status: &DualStatus, report: Option<&DualReport>) {
         if let Err(error) = self.port.bench.told(from, *status) {
             self.port.error = Some(error.into());
         }
-        if let Some(frame) = self.station.tell(status, report) {
-            self.supervisor.hear(self.port.bench.instant_s(from), &frame);
+        if let End::Protocol(station, supervisor) = self.end
+            && let Some(frame) = station.tell(status, report)
+        {
+            supervisor.hear(self.port.bench.instant_s(from), &frame);
         }
     }
 }
@@ -136,7 +153,7 @@ pub struct Tasks<'a, L = Controller> {
     pwm: PwmTask,
     shared: Shared<'a>,
     clock: Clock,
-    /// Over the protocol, if there is a supervisor.
+    /// The operator, if there is one.
     wire: Option<Wire<'a>>,
 }
 
@@ -172,12 +189,29 @@ impl<'a, L: ControlLaw + Copy> Tasks<'a, L> {
         line: Option<Line>,
     ) -> Self {
         self.wire = supervisor.map(|supervisor| {
-            // One a run, for as long as the program lasts, as the tables are.
-            let ratings: &'static Ratings = Box::leak(Box::new(ratings));
-            let operator = operator::Settings::rated(ratings, slot_s(&self.clock), line);
-            Wire { station: Zs9CanEndpoint::new(ratings), slot: DualSlot::new(), operator, supervisor }
+            self.wire(ratings, line, |ratings| {
+                End::Protocol(Box::new(Zs9CanEndpoint::new(ratings)), supervisor)
+            })
         });
         self
+    }
+
+    /// The same with an operator on this line side whose requests come from a commander.
+    pub fn operated_by(mut self, commander: Commander, ratings: Ratings, line: Option<Line>) -> Self {
+        self.wire = Some(self.wire(ratings, line, |_| End::Direct(commander)));
+        self
+    }
+
+    fn wire(
+        &self,
+        ratings: Ratings,
+        line: Option<Line>,
+        end: impl FnOnce(&'static Ratings) -> End<'a>,
+    ) -> Wire<'a> {
+        // One a run, for as long as the program lasts, as the tables are.
+        let ratings: &'static Ratings = Box::leak(Box::new(ratings));
+        let operator = operator::Settings::rated(ratings, slot_s(&self.clock), line);
+        Wire { slot: DualSlot::new(), operator, end: end(ratings) }
     }
 
     /// The same with a flight recorder.
@@ -216,9 +250,12 @@ impl<L: ControlLaw + Copy> Interrupts for Tasks<'_, L> {
         let mut port = Port { bench, command: DualDriveCommand::NONE, error: None };
         self.control.run(&mut port, &self.shared);
         // The idle loop goes on where the interrupt ends.
-        if let Some(Wire { station, slot, operator, supervisor }) = &mut self.wire {
-            let settings = station.settings(operator);
-            let mut idle = Idle { port: &mut port, station, supervisor: *supervisor };
+        if let Some(Wire { slot, operator, end }) = &mut self.wire {
+            let settings = match &*end {
+                End::Protocol(station, _) => station.settings(operator),
+                End::Direct(_) => *operator,
+            };
+            let mut idle = Idle { port: &mut port, end };
             slot.run(&self.shared.operator, &mut idle, &settings, &self.clock);
         }
         port.error.map_or(Ok(()), Err)

@@ -3,5 +3,5 @@
 mod host;
 mod qemu;
 
-pub use host::Tasks;
+pub use host::{Commander, Tasks};
 pub use qemu::run_in_qemu;

@@ -1,0 +1,177 @@
+//! The ZS9 in the page.
+
+use crate::driven::{Column, Driven, Taken, pair, single};
+use crate::told;
+use anyhow::{Context, Result, bail};
+use serde_json::{Value, json};
+use tractive::nine_switch::Scheme;
+use tractive::ports::MotorDemand;
+use tractive_rig::campaign::dual::{Cause, faults};
+use tractive_rig::machine::Machine;
+use tractive_rig::scenario::live::{Command, Start, Turning, Wanted};
+use tractive_rig::scenario::zs9::{Live, Options};
+use tractive_rig::zs9::trace::{Edge, Row};
+
+/// The columns of a row, in their order.
+pub const COLUMNS: [Column<Row>; 29] = [
+    ("ia1", |row| row.motors[0].phases_a[0]),
+    ("ib1", |row| row.motors[0].phases_a[1]),
+    ("ic1", |row| row.motors[0].phases_a[2]),
+    ("ia2", |row| row.motors[1].phases_a[0]),
+    ("ib2", |row| row.motors[1].phases_a[1]),
+    ("ic2", |row| row.motors[1].phases_a[2]),
+    ("te1", |row| row.motors[0].torque_nm),
+    ("te2", |row| row.motors[1].torque_nm),
+    ("teRef1", |row| row.motors[0].torque_ref_nm),
+    ("teRef2", |row| row.motors[1].torque_ref_nm),
+    ("speed1", |row| row.motors[0].speed_rpm),
+    ("speed2", |row| row.motors[1].speed_rpm),
+    ("id1", |row| row.motors[0].id_a),
+    ("iq1", |row| row.motors[0].iq_a),
+    ("id2", |row| row.motors[1].id_a),
+    ("iq2", |row| row.motors[1].iq_a),
+    ("u1", |row| row.motors[0].voltage_v),
+    ("u2", |row| row.motors[1].voltage_v),
+    ("weak1", |row| row.motors[0].weakening.into()),
+    ("weak2", |row| row.motors[1].weakening.into()),
+    ("load1", |row| row.motors[0].load_nm),
+    ("load2", |row| row.motors[1].load_nm),
+    ("udc", |row| row.link_v),
+    ("capacitor", |row| row.capacitor_v),
+    ("inductor", |row| row.inductor_a),
+    ("source", |row| row.source_v),
+    ("duty", |row| 100.0 * row.duty),
+    ("mode", |row| f64::from(scheme_code(row))),
+    ("trip", |row| row.trip.is_some().into()),
+];
+
+/// 0 while no voltage is made, otherwise the scheme's place, from 1 on.
+fn scheme_code(row: &Row) -> u8 {
+    let made = row.motors.iter().any(|motor| motor.voltage_v > 0.0) && row.trip.is_none();
+    let place = Scheme::ALL.iter().position(|scheme| *scheme == row.scheme).unwrap_or(0);
+    if made { place as u8 + 1 } else { 0 }
+}
+
+/// Time in which edges are kept, in s: at so many gates more would only be drawn as a band.
+const EDGES_S: f64 = 0.1;
+
+/// It.
+pub struct Zs9 {
+    live: Live,
+    link_ref_v: f64,
+    scheme: Scheme,
+    gates: [bool; 9],
+}
+
+impl Zs9 {
+    /// Switched on.
+    pub fn new(options: &Options, machine: &Machine, start: Start) -> Result<Self> {
+        let live = Live::new(options, machine, start)?;
+        Ok(Self { live, link_ref_v: options.own.uin, scheme: options.own.scheme, gates: [false; 9] })
+    }
+
+    /// The newest edges, after the states that those before them have left.
+    fn newest(&mut self, edges: &[Edge]) -> Vec<f64> {
+        let from_s = self.live.time_s() - EDGES_S;
+        let old = edges.partition_point(|edge| edge.t_s < from_s);
+        for edge in &edges[..old] {
+            self.gates[usize::from(edge.gate)] = edge.on;
+        }
+        let left = (0_u8..).zip(self.gates).map(|(gate, on)| Edge { t_s: from_s, gate, on });
+        let left = left.take(if old > 0 { 9 } else { 0 });
+        let codes = left.chain(edges[old..].iter().copied()).flat_map(|edge| code(&edge)).collect();
+        for edge in &edges[old..] {
+            self.gates[usize::from(edge.gate)] = edge.on;
+        }
+        codes
+    }
+}
+
+/// A gate's edge as the page takes it.
+pub fn code(edge: &Edge) -> [f64; 2] {
+    [edge.t_s, f64::from(edge.gate + if edge.on { 16 } else { 0 })]
+}
+
+impl Driven for Zs9 {
+    fn columns(&self) -> Vec<String> {
+        COLUMNS.iter().map(|(name, _)| (*name).to_owned()).collect()
+    }
+
+    fn run(&mut self, seconds: f64) -> Result<()> {
+        self.live.run(seconds)
+    }
+
+    fn time_s(&self) -> f64 {
+        self.live.time_s()
+    }
+
+    fn take(&mut self, taken: &mut Taken) {
+        let (rows, edges) = self.live.take();
+        taken.from_s = taken.from_s.or(rows.first().map(|row| row.t_s));
+        taken.rows.extend(rows.iter().flat_map(|row| COLUMNS.map(|(_, of)| of(row) as f32)));
+        let edges = self.newest(&edges);
+        taken.edges.extend(edges);
+    }
+
+    fn state(&self) -> Value {
+        let status = self.live.status();
+        let demands = status.map(|status| {
+            json!(status.torque_nm.map(|demand| match demand {
+                MotorDemand::Torque(demand) => demand.torque_nm,
+                MotorDemand::Speed(speed) => speed,
+            }))
+        });
+        told::state(self.live.time_s(), self.live.trip(), status.as_ref(), demands)
+    }
+
+    fn faults(&self) -> Vec<String> {
+        faults().into_iter().skip(1).map(|fault| fault.name).collect()
+    }
+
+    fn want(&mut self, wanted: Wanted) {
+        self.live.wanted = wanted;
+    }
+
+    fn set(&mut self, name: &str, motor: usize, values: &[f64]) -> Result<()> {
+        match name {
+            "torque" => self.live.command(motor, Command::Torque(single(name, values)?)),
+            "speed" => self.live.command(motor, Command::Speed(single(name, values)?)),
+            "hold" => self.live.turn_as(motor, Turning::Held(single(name, values)?)),
+            "release" => {
+                let (inertia_kg_m2, load_nm) = pair(name, values)?;
+                self.live.turn_as(motor, Turning::Free(inertia_kg_m2, load_nm));
+            }
+            "line" => self.live.set_source_v(single(name, values)?),
+            "map" => self.live.set_flux_scale(1.0 + single(name, values)? / 100.0),
+            "link" => {
+                self.link_ref_v = single(name, values)?;
+                self.live.set_link(self.link_ref_v, self.scheme);
+            }
+            "scheme" => {
+                let place = single(name, values)? as usize;
+                self.scheme = *Scheme::ALL.get(place).context("there is no such scheme")?;
+                self.live.set_link(self.link_ref_v, self.scheme);
+            }
+            _ => bail!("there is no setting `{name}`"),
+        }
+        Ok(())
+    }
+
+    fn acknowledge(&mut self) {
+        self.live.acknowledge();
+    }
+
+    fn inject(&mut self, name: &str) -> Result<()> {
+        let fault = faults().into_iter().find(|fault| fault.name == name);
+        match fault.with_context(|| format!("there is no fault `{name}`"))?.cause {
+            Cause::Bench(kind) => self.live.inject(kind),
+            Cause::Runaway(motor) => self.live.run_away(motor),
+            Cause::Flux(flux_scale) => self.live.set_flux_scale(flux_scale),
+        }
+        Ok(())
+    }
+
+    fn mend(&mut self) {
+        self.live.mend();
+    }
+}

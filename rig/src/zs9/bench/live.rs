@@ -1,0 +1,75 @@
+//! The changes that somebody makes on the ZS9's bench while it runs, and the rows that he takes from it.
+
+use super::Bench;
+use crate::bench::{Limits, Observed, Tick};
+use crate::inject::Injection;
+use crate::inject::zs9::{Kind, Spoiler};
+use crate::plant::Motor;
+use crate::plant::zs9::{Source, ZNetwork};
+use crate::zs9::trace::{Edge, Row};
+use tractive::nine_switch::Scheme;
+use tractive::operator::DualStatus;
+
+impl Bench {
+    /// The same without an end.
+    pub fn endless(mut self) -> Self {
+        self.rows_wanted = usize::MAX;
+        self
+    }
+
+    /// The rows and edges since the last time.
+    pub fn take(&mut self) -> (Vec<Row>, Vec<Edge>) {
+        self.taken += self.rows.len();
+        let edges = std::mem::take(&mut self.gates.edges);
+        let seconds = |(at, gate, on)| Edge { t_s: self.time.seconds(at), gate, on };
+        (std::mem::take(&mut self.rows), edges.into_iter().map(seconds).collect())
+    }
+
+    /// The operator's last word; `None` in the first slot.
+    pub fn status(&self) -> Option<DualStatus> {
+        self.line.as_ref().and_then(|line| line.status)
+    }
+
+    /// A motor, 0 the upper one, 1 the lower one.
+    pub fn motor_mut(&mut self, motor: usize) -> &mut Motor {
+        &mut self.plant.motors[motor.min(1)]
+    }
+
+    /// Loads of both rotors from now on, in N·m.
+    pub fn load(&mut self, loads_nm: [f64; 2]) {
+        self.loads_nm = Some(loads_nm);
+        self.set_loads_nm(loads_nm);
+    }
+
+    /// Voltage of the source, in V, above 0.
+    pub fn set_source_v(&mut self, source_v: f64) {
+        self.nominal_source_v = source_v;
+    }
+
+    /// Link voltage wanted, in V, and the place of the zero vectors.
+    pub fn set_link(&mut self, link_ref_v: f64, scheme: Scheme) {
+        self.settings.link_ref_v = link_ref_v;
+        self.settings.scheme = scheme;
+    }
+
+    /// True flux linkage of both machines over the map's, above 0.
+    pub fn set_flux_scale(&mut self, flux_scale: f64) {
+        self.plant.set_flux_scale(flux_scale);
+    }
+
+    /// Something goes wrong from the next instant on. A fault before this one is mended.
+    pub fn inject(&mut self, kind: Kind) {
+        self.mend();
+        let from = self.time.now + 1;
+        self.spoiler = Spoiler::new(Some(Injection { kind, at_s: self.time.seconds(from) }));
+        self.observed = Observed::new(from, Limits::NONE);
+    }
+
+    /// Mends what was injected; what the drive has latched stays latched.
+    pub fn mend(&mut self) {
+        self.spoiler = Spoiler::new(None);
+        self.observed = Observed::new(Tick::MAX, Limits::NONE);
+        self.plant.source = Source::Bidirectional;
+        self.plant.parts = ZNetwork::ZS9;
+    }
+}
