@@ -25,6 +25,7 @@ pub mod law;
 #[cfg(unix)]
 pub mod live;
 pub mod machine;
+pub mod merge;
 pub mod mtpa_methods;
 pub mod needs;
 pub mod nine_switch;
@@ -42,6 +43,7 @@ pub mod report;
 pub mod rows;
 pub mod run;
 pub mod scenario;
+pub mod shards;
 pub mod spectrum;
 mod speed_loop;
 mod steps;

@@ -6,15 +6,17 @@ use std::ffi::OsString;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use tractive_rig::benchmark::{self, BenchOptions};
-use tractive_rig::campaign::{self, command::CampaignOptions};
+use tractive_rig::campaign::{self, options::CampaignOptions};
 use tractive_rig::commission;
 use tractive_rig::compare::{self, CompareOptions};
 use tractive_rig::folder::{self, MachineCommand};
 #[cfg(unix)]
 use tractive_rig::live::LiveOptions;
 use tractive_rig::machine::Machine;
+use tractive_rig::merge::{self, MergeOptions};
 use tractive_rig::needs::Needs;
 use tractive_rig::scenario::command::folder;
+use tractive_rig::shards::Shard;
 use tractive_rig::{gallery, identify, nine_switch, optimised, pattern, points, report, say, scenario, talk};
 
 #[derive(Parser)]
@@ -69,12 +71,18 @@ enum Command {
     Points {
         /// Points wanted.
         input: PathBuf,
-        /// Points found.
+        /// Points found; with --shard a folder.
         output: PathBuf,
         /// A folder of tables/, or the path of any machine folder.
         #[arg(long, default_value = "pmasynrm-180kw")]
         machine: String,
+        /// Shard K of N, from 0: its points alone, into the file shard-K-of-N.csv of the folder OUTPUT.
+        #[arg(long, value_name = "K/N")]
+        shard: Option<Shard>,
     },
+    /// The whole of a campaign or of a sweep over operating points whose shards are all in a folder: the files that one run would have
+    /// written.
+    Merge(MergeOptions),
     /// Machine folders: from nameplate values, from a map of another tool, and as a page.
     #[command(subcommand)]
     Machine(Box<MachineCommand>),
@@ -151,9 +159,10 @@ fn command(command: Command) -> Result<ExitCode> {
         Command::Talk { words } => run_talk(&talk::TalkOptions::read(&words)?),
         #[cfg(unix)]
         Command::Live { words } => done(tractive_rig::live::run(&LiveOptions::read(&words)?)),
-        Command::Points { input, output, machine } => {
-            done(points::run(&input, &output, &Machine::load(&machine)?))
+        Command::Points { input, output, machine, shard } => {
+            done(points::run(&input, &output, &Machine::load(&machine)?, shard))
         }
+        Command::Merge(options) => merge::run(&options),
         Command::Figures(options) => done(gallery::run(&options)),
         Command::Machine(command) => done(folder::run(&command)),
         Command::Identify(options) => identify::command(&options),

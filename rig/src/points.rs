@@ -3,7 +3,8 @@
 use crate::columns::Columns;
 use crate::files;
 use crate::machine::Machine;
-use anyhow::Result;
+use crate::shards::{self, Merged, Plan, Shard};
+use anyhow::{Context, Result};
 use rayon::prelude::*;
 use std::path::Path;
 use tractive::control::{VoltageLimit, operating_point};
@@ -17,28 +18,39 @@ struct Wanted {
     udc_v: f64,
 }
 
-/// Reads points, writes points with `id_a,iq_a,region`.
-pub fn run(input: &Path, output: &Path, machine: &Machine) -> Result<()> {
+/// The name of a sweep in shards.
+pub const POINTS: &str = "points";
+
+/// Reads points, writes points with `id_a,iq_a,region`; of a shard its own ones, into a folder.
+pub fn run(input: &Path, output: &Path, machine: &Machine, shard: Option<Shard>) -> Result<()> {
     let wanted = read(input)?;
-    let pole_pairs = machine.tables.ratings.pole_pairs;
-    let lines: Vec<String> = wanted
-        .par_iter()
-        .map(|point| {
-            let omega = (point.speed_rpm * core::f64::consts::TAU / 60.0) as f32 * pole_pairs;
-            let limit = VoltageLimit { udc_v: point.udc_v as f32, depth: 1.0, filled: false };
-            let found = operating_point(point.torque_nm as f32, omega, &limit, machine.tables);
-            format!(
-                "{},{},{},{},{},{}\n",
-                point.torque_nm,
-                point.speed_rpm,
-                point.udc_v,
-                found.current.d,
-                found.current.q,
-                found.region.name()
-            )
-        })
-        .collect();
-    files::write_text(output, &format!("{},id_a,iq_a,region\n{}", COLUMNS.join(","), lines.concat()))
+    let columns = format!("{},id_a,iq_a,region", COLUMNS.join(","));
+    if let Some(shard) = shard {
+        let folder = format!("{:?} {:?}", machine.folder.parameters, machine.folder.map);
+        let configuration = serde_json::json!({
+            "machine": format!("{:016x}", shards::hash(folder.as_bytes())),
+            "input": format!("{:016x}", shards::hash(&std::fs::read(input)?)),
+        });
+        let plan = Plan::new(POINTS, configuration, wanted.len(), &columns)?;
+        let row = |run: usize| Ok(line(wanted.get(run).context("a point of that number")?, machine));
+        return shards::run(&plan, shard, output, row);
+    }
+    let lines: Vec<String> = wanted.par_iter().map(|point| line(point, machine) + "\n").collect();
+    files::write_text(output, &format!("{columns}\n{}", lines.concat()))
+}
+
+/// Writes the points of shards that are merged.
+pub fn merged(merged: &Merged, out: &Path) -> Result<()> {
+    files::write_text(&out.join("points.csv"), &merged.csv())
+}
+
+fn line(point: &Wanted, machine: &Machine) -> String {
+    let Wanted { torque_nm, speed_rpm, udc_v } = *point;
+    let omega = (speed_rpm * core::f64::consts::TAU / 60.0) as f32 * machine.tables.ratings.pole_pairs;
+    let limit = VoltageLimit { udc_v: udc_v as f32, depth: 1.0, filled: false };
+    let found = operating_point(torque_nm as f32, omega, &limit, machine.tables);
+    let region = found.region.name();
+    format!("{torque_nm},{speed_rpm},{udc_v},{},{},{region}", found.current.d, found.current.q)
 }
 
 fn read(input: &Path) -> Result<Vec<Wanted>> {

@@ -1,6 +1,7 @@
 //! The frames that take effect, and the counts of the others.
 
 use crate::Stream;
+use tractive::protocol::e2e::MAX_DELTA;
 use tractive::protocol::{
     COMMAND, Command, Content, Counts, Frame, LIMITS, LINK_LIMITS, LinkLimits, PARAMETER_REQUEST,
     ParameterRequest, Payload, Receiver, Reject, STATUS, TorqueLimits,
@@ -97,6 +98,25 @@ fn up_to_two_lost_frames_are_forgiven_and_counted_more_wait_for_the_silence() {
         assert_eq!(receiver.receive(&stream.frame(command(6.0))), Ok(Content::Greeting), "after the silence");
         assert_eq!(torque(receiver.receive(&stream.frame(command(7.0)))), Some(7.0));
     }
+}
+
+#[test]
+fn a_wrong_counter_is_no_sign_of_life() {
+    let (mut receiver, mut stream) = met();
+    let old = stream.frame(command(10.0));
+    assert!(receiver.receive(&old).is_ok());
+    for _ in 0..MAX_DELTA {
+        stream.frame(command(20.0));
+    }
+    let far = stream.frame(command(20.0));
+    // A sender that repeats itself, or that is too far on, is silent: after the time-out the sequence begins anew.
+    for slots in [20, 40, 60, 80] {
+        receiver.wait(20, 100);
+        assert_eq!(receiver.receive(&old), Err(Reject::Repeated), "{slots} ms");
+        assert_eq!(receiver.receive(&far), Err(Reject::Disordered), "{slots} ms");
+    }
+    receiver.wait(20, 100);
+    assert_eq!(receiver.receive(&far), Ok(Content::Greeting));
 }
 
 #[test]

@@ -38,6 +38,24 @@ pub enum Command {
     Live(LiveArgs),
     /// Execute the image that is flashed against a model of its chip, with the simulated motor at the pins
     Twin(TwinArgs),
+    /// Mutation testing by cargo-mutants: changes of the code that no test notices
+    Mutants(MutantsArgs),
+}
+
+#[derive(Args, Debug)]
+pub struct MutantsArgs {
+    /// The package
+    #[arg(long, default_value = "tractive")]
+    pub package: String,
+    /// Only the mutants of these files (a glob; may be repeated)
+    #[arg(long, value_name = "FILE")]
+    pub file: Vec<String>,
+    /// Shard K of N, from 0
+    #[arg(long, value_name = "K/N")]
+    pub shard: Option<String>,
+    /// So many of them, evenly spread
+    #[arg(long, value_name = "N", conflicts_with = "shard")]
+    pub sample: Option<usize>,
 }
 
 #[derive(Args, Debug)]

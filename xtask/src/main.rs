@@ -10,12 +10,13 @@
 //! | `live [--out DIR] [--port N] [--no-open]` | builds the live bench and serves it |
 //! | `flash [--board NAME] [--log]` | builds a board's image and flashes it with probe-rs |
 //! | `twin [SCRIPT] [--out DIR]` | builds that image and executes it against a model of its chip |
+//! | `mutants [--package NAME] [--shard K/N] [--sample N]` | mutation testing by cargo-mutants |
 //!
 //! Results go to standard output, what the command does on the way to standard error. Exit codes: 0 done; 1 it ran
 //! and something failed; 2 it could not run (bad usage, bad input, something missing), with the reason on a line.
 //!
 //! The modules: [`cli`] is what may be typed, [`setup`] what has to be installed, [`build`] how cargo is called, [`board`] which boards there are,
-//! [`run`], [`mod@test`], [`image`], [`timing`], [`live`], [`flash`] and [`twin`] the commands; [`guide`] runs those of the documentation. An image is read by [`elf`],
+//! [`run`], [`mod@test`], [`image`], [`timing`], [`live`], [`flash`], [`twin`] and [`mutants`] the commands; [`guide`] runs those of the documentation. An image is read by [`elf`],
 //! its instructions by [`thumb`]; [`graph`] says which function calls which, [`check`] refuses what an image must not hold, and [`cells`]
 //! looks at what the cells did under the interrupts, in the [`emulator`].
 
@@ -35,6 +36,7 @@ mod guide;
 mod image;
 mod landings;
 mod live;
+mod mutants;
 mod overruns;
 mod own_board;
 mod process;
@@ -42,6 +44,7 @@ mod publish;
 mod python;
 mod run;
 mod setup;
+mod slurm;
 mod step;
 mod test;
 mod thumb;
@@ -63,6 +66,7 @@ fn main() -> ExitCode {
         cli::Command::Flash(args) => flash::run(&args),
         cli::Command::Live(args) => live::run(&args),
         cli::Command::Twin(args) => twin::run(&args),
+        cli::Command::Mutants(args) => mutants::run(&args),
     };
     match result {
         Ok(code) => ExitCode::from(code),

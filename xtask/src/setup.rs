@@ -131,6 +131,19 @@ impl Setup {
         find(PROGRAM).or_else(|| Some(own).filter(|own| own.is_file()))
     }
 
+    /// Slurm with its daemons, and munge.
+    pub fn slurm(&mut self) -> bool {
+        const PROGRAMS: [&str; 3] = ["slurmctld", "slurmd", "munged"];
+        // The daemons' folder is not on everybody's path.
+        let is_there = || {
+            PROGRAMS.iter().all(|name| find(name).is_some() || Path::new("/usr/sbin").join(name).is_file())
+        };
+        if !is_there() {
+            self.apt_install(&["slurm-wlm", "munge"]);
+        }
+        is_there()
+    }
+
     /// QEMU with the emulated board.
     pub fn qemu(&mut self) -> Result<PathBuf> {
         const PROGRAM: &str = "qemu-system-arm";

@@ -43,6 +43,8 @@ pub enum Step {
     Book,
     /// The live bench in a browser: the host's bytes, its controls, its faults, its sizes; and report pages
     Live,
+    /// A campaign as a Slurm array on this machine, a shard of it killed: the bytes of one run
+    Slurm,
     /// The Python package, installed and against the rig
     Python,
     /// The image in QEMU

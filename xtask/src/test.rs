@@ -153,6 +153,10 @@ fn perform(step: Step, setup: &mut Setup) -> Result<Outcome> {
             Ok(good) => good,
             Err(missing) => return Ok(Outcome::Skipped(missing)),
         },
+        Step::Slurm => match crate::slurm::check(setup)? {
+            Ok(good) => good,
+            Err(missing) => return Ok(Outcome::Skipped(missing)),
+        },
         Step::Python => match crate::python::check()? {
             Ok(good) => good,
             Err(missing) => return Ok(Outcome::Skipped(missing)),

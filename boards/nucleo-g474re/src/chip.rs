@@ -126,6 +126,12 @@ pub fn run() {
     run_with(Interrupt::TIM1_UP_TIM16, Interrupt::TIM3, start::run);
 }
 
+/// The PWM interrupt's priority, as the interrupt controller has it: of two the lower number preempts. The chip has the upper four bits.
+const PWM_PRIORITY: u8 = 0x40;
+/// The control interrupt's.
+const CONTROL_PRIORITY: u8 = 0x80;
+const _: () = assert!(PWM_PRIORITY >> 4 < CONTROL_PRIORITY >> 4, "PWM preempts control");
+
 /// Lets both interrupts come and starts their timers. Call it once.
 pub(super) fn run_with(pwm: Interrupt, control: Interrupt, start: fn(&Registers, &mut dyn Wait)) {
     // SAFETY: the only use of the core peripherals, before any interrupt is unmasked.
@@ -133,8 +139,8 @@ pub(super) fn run_with(pwm: Interrupt, control: Interrupt, start: fn(&Registers,
     // SAFETY: priorities are changed while both interrupts are masked; no code relies on a priority ceiling. After that
     // both may come: their handlers share nothing but cells and registers that each writes as the modules say.
     unsafe {
-        core.NVIC.set_priority(pwm, 0x40);
-        core.NVIC.set_priority(control, 0x80);
+        core.NVIC.set_priority(pwm, PWM_PRIORITY);
+        core.NVIC.set_priority(control, CONTROL_PRIORITY);
         NVIC::unmask(pwm);
         NVIC::unmask(control);
     }

@@ -157,4 +157,44 @@ mod tests {
         }
         assert_eq!(LinkWindow::OPEN.bounds_nm(1e6, 100.0, 300.0), (-100.0, 100.0));
     }
+
+    #[test]
+    fn what_flows_before_the_first_pulse_is_where_a_pattern_begins_unless_it_is_hardly_any() {
+        let ratings = Ratings {
+            pole_pairs: 4.0,
+            stator_resistance_ohm: 0.1,
+            max_torque_nm: 1_000.0,
+            max_power_w: 180e3,
+            max_current_a: 230.0,
+            max_speed_rad_s: 2_500.0,
+            magnet_flux_wb: 0.6,
+            dc_link_min_v: 1_000.0,
+            dc_link_nominal_v: 1_500.0,
+            dc_link_max_v: 1_800.0,
+            max_switching_hz: 900.0,
+            trip_current_a: 300.0,
+            trip_dc_over_v: 2_000.0,
+            trip_dc_under_v: 900.0,
+            trip_speed_rad_s: 2_700.0,
+            torque_slew_nm_s: 8_000.0,
+        };
+        let begins_nm = |flowing_nm: f32, can_step: bool| {
+            let demand = Demand { torque_nm: 0.0, slew_limited: true };
+            let (window, udc_v, omega, period_s) = (None, 1_500.0, 600.0, 1e-4);
+            let input =
+                Input { demand: &demand, window, udc_v, omega, flowing_nm, can_step, period_s };
+            Shaper::new().step(&input, &ratings)
+        };
+        let slew_nm = ratings.torque_slew_nm_s * 1e-4;
+        for sign in [1.0, -1.0] {
+            // The diodes rectify into a link below the EMF: that goes on from where it is.
+            for share in [0.02, 0.05, 0.3] {
+                let flowing_nm = sign * share * ratings.max_torque_nm;
+                assert_eq!(begins_nm(flowing_nm, false), flowing_nm - sign * slew_nm, "{share}");
+                assert_eq!(begins_nm(flowing_nm, true), 0.0, "a carrier can step");
+            }
+            // Less is what the sensors' noise makes of no current.
+            assert_eq!(begins_nm(sign * 0.005 * ratings.max_torque_nm, false), 0.0);
+        }
+    }
 }

@@ -69,7 +69,8 @@ impl Bench {
         }
         if now == self.observed.from {
             self.observed.carrier_ticks = 2 * Tick::from(self.inverter.half().period_ticks);
-            match self.spoiler.injected.kind(t_s) {
+            // Its instant has come, though it may lie between this tick and the next.
+            match self.spoiler.injected.0.map(|injection| injection.kind) {
                 Some(Kind::Gate(gate, on)) => {
                     self.inverter.stick(gate, if on { Stuck::On } else { Stuck::Off })
                 }

@@ -31,6 +31,22 @@ pub struct Flaws {
     pub seed: u64,
 }
 
+impl Flaws {
+    /// None.
+    pub const NONE: Self = Self {
+        adc_bits: None,
+        adc_full_scale_a: 0.0,
+        noise_a: 0.0,
+        udc_ripple: None,
+        current_gain: 0.0,
+        udc_gain: 0.0,
+        angle_error_deg: 0.0,
+        angle_jitter_s: 0.0,
+        freeze_at_s: None,
+        seed: 0,
+    };
+}
+
 /// The current converters: noise, then steps.
 pub struct Converter {
     flaws: Flaws,

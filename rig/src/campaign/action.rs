@@ -1,9 +1,9 @@
 //! The drive's action when a fault comes, and the time of it.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// The drive's action when the fault comes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Action {
     /// Torque along the speed.

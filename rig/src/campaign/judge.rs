@@ -8,11 +8,11 @@
 //!   drive should have noticed.
 //! - *Uncaught*: anything else.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use tractive::protection::Fault;
 
 /// The end of a case.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
     /// A fault of a fitting name, the gates safe in time, current and voltages within what is allowed.

@@ -7,11 +7,14 @@
 
 mod action;
 pub mod command;
+pub mod drawn;
 pub mod dual;
 mod fault;
 pub mod healthy;
 pub mod judge;
+pub mod options;
 mod outcome;
+pub mod random;
 pub mod report;
 pub mod traction;
 

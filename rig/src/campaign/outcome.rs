@@ -4,14 +4,15 @@ use super::Action;
 use super::fault::Named;
 use super::judge::{self, Bounded, Verdict};
 use crate::bench::Observed;
-use serde::Serialize;
+use serde::{Deserialize, Deserializer, Serialize};
 use tractive::protection::{Fault, SafeState, Trip};
 
 /// One line of the table.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Outcome {
     /// `pmasynrm` or `zs9`.
-    pub system: &'static str,
+    #[serde(deserialize_with = "system")]
+    pub system: SystemName,
     /// The fault.
     pub fault: String,
     /// Mode of the pulses when it did; the ZS9's scheme.
@@ -56,6 +57,18 @@ pub struct Outcome {
     pub why: String,
 }
 
+/// The name of a system.
+type SystemName = &'static str;
+
+/// One of the names.
+fn system<'de, D: Deserializer<'de>>(from: D) -> Result<SystemName, D::Error> {
+    let name = String::deserialize(from)?;
+    ["pmasynrm", "zs9"]
+        .into_iter()
+        .find(|system| *system == name)
+        .ok_or_else(|| serde::de::Error::custom(format!("no system {name}")))
+}
+
 /// The case of a line.
 #[derive(Clone, Debug)]
 pub struct Setting {
@@ -97,6 +110,8 @@ pub struct Allowed {
     pub uc_v: Option<f64>,
     /// Mean torque error where a share of it is allowed, in N·m.
     pub torque_nm: f64,
+    /// Mean torque error that the case's conditions explain, in N·m.
+    pub explained_nm: f64,
     /// Further bounds where the drive stopped.
     pub stopped: Vec<Bounded>,
     /// Further bounds where it went on.
@@ -104,6 +119,11 @@ pub struct Allowed {
 }
 
 impl Outcome {
+    /// The head of its CSV.
+    pub const COLUMNS: &str = "system,fault,mode,speed_rpm,action,verdict,named,safe_state,carrier_periods,time_ms,\
+        since_fault_ms,current_until_a,current_after_a,current_limit_a,udc_until_v,udc_after_v,udc_limit_v,\
+        uc_until_v,uc_after_v,uc_limit_v,torque_error_nm,why";
+
     /// The line of a case.
     pub fn new<C>(setting: &Setting, fault: &Named<C>, seen: &Seen, allowed: Allowed) -> Self {
         let Seen { observed, trip, torque_error_nm, tick_s, carrier_s } = seen;
@@ -120,7 +140,11 @@ impl Outcome {
         stopped.extend(allowed.stopped);
         let mut went_on = allowed.went_on;
         let torque_share = fault.rule.torque_share.unwrap_or(0.0);
-        went_on.push(Bounded::new("N·m off", *torque_error_nm, torque_share * allowed.torque_nm));
+        went_on.push(Bounded::new(
+            "N·m off",
+            *torque_error_nm,
+            torque_share * allowed.torque_nm + allowed.explained_nm,
+        ));
         let named = trip.map(|trip| trip.fault);
         let (verdict, why) = judge::verdict(&fault.rule, named, &stopped, &went_on);
         let since_ticks = observed.safe.map(|(safe, _)| safe as f64 - observed.from as f64);

@@ -240,3 +240,42 @@ pub fn check(measured: &Measurements, omega: f32, tables: &Tables) -> Option<Vio
     protection::check_currents(&measured.currents_a, &tables.ratings)
         .or_else(|| protection::check_speed(omega, &tables.ratings))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::control::Controller;
+    use crate::time::Clock;
+    use core::f64::consts::TAU;
+
+    const SETTINGS: Settings = Settings::new(Clock::new(25_000_000, 2_500), 2_500);
+
+    /// The time, in s, that it takes to notice that a sensor which followed `omega`, electrical in rad/s, follows `then` of that time.
+    fn noticed_s(omega: f64, then: impl Fn(f64) -> f64) -> Option<f64> {
+        let mut axis = Axis::new(Controller::with_tracking(TRACKING_RAD_S));
+        let (period_s, mut radians) = (f64::from(SETTINGS.clock.control_s()), 0.0);
+        let mut follow = |omega: f64| {
+            radians += omega * period_s;
+            let angle = Angle((radians.rem_euclid(TAU) / TAU * 4_294_967_296.0) as u64 as u32);
+            axis.track(angle, false, &SETTINGS)
+        };
+        for _ in 0..1_000 {
+            assert_eq!(follow(omega), None, "sound");
+        }
+        let times_s = (0..1_000).map(|period| f64::from(period) * period_s);
+        times_s.into_iter().find(|t_s| follow(then(*t_s)).is_some())
+    }
+
+    /// From 250 rad/s on the very next angle is a surprise; below, a sensor that counts the other way is found by where the speed goes.
+    #[test]
+    fn a_sensor_that_counts_the_other_way_is_found_at_low_speed_too_and_a_quick_rotor_is_not() {
+        for omega in [-240.0, -100.0, -40.0, 40.0, 100.0, 240.0] {
+            let found_s = noticed_s(omega, |_| -omega);
+            assert!(found_s.is_some_and(|found_s| found_s < 5e-3), "{omega} rad/s: {found_s:?}");
+        }
+        // Full torque: half of what is allowed.
+        for rad_s2 in [-5_000.0, 5_000.0] {
+            assert_eq!(noticed_s(100.0, |t_s| 100.0 + rad_s2 * t_s), None, "{rad_s2} rad/s²");
+        }
+    }
+}

@@ -126,6 +126,18 @@ fn the_control_timer_has_its_period_and_triggers_its_converter() {
     }
 }
 
+/// The watchdog bites 20 ms after its last meal: later than several of the slowest carrier halves, and soon enough that a contactor is not
+/// held for long by a processor that stands.
+#[test]
+fn the_watchdog_bites_after_twenty_milliseconds() {
+    let registers = Bench::started(plan()).registers;
+    let divider = 4 << registers.iwdg.pr().read().pr().to_bits();
+    let counts = f64::from(registers.iwdg.rlr().read().rl());
+    let bites_s = counts * f64::from(divider) / 32_000.0;
+    let slowest_half_s = f64::from(plan().shortest_half_ticks) * f64::from(CLOCK.tick_s);
+    assert!(bites_s > 10.0 * slowest_half_s && bites_s <= 0.021, "{bites_s} s, halves of {slowest_half_s} s");
+}
+
 #[test]
 fn the_clock_tree_is_170_mhz() {
     let registers = Bench::started(plan()).registers;

@@ -33,6 +33,7 @@ impl Drive {
             udc_v: 2.0 * uc_v,
             uc_v: Some(uc_v),
             torque_nm: parameters.max_torque_nm,
+            explained_nm: 0.0,
             stopped: vec![
                 Bounded::new(
                     "V at a capacitor until the gates are safe",

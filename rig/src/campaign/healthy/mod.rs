@@ -1,5 +1,6 @@
 //! Hard but healthy driving, at random: what must not trip.
 
+pub mod command;
 pub mod dual;
 pub mod traction;
 

@@ -14,6 +14,8 @@ pub enum Part {
     Tables,
     /// The results of the full campaign, in sentences.
     Sentences,
+    /// The coverage of the random campaign.
+    Coverage,
 }
 
 impl Part {
@@ -22,6 +24,7 @@ impl Part {
         match self {
             Self::Tables => ["<!-- campaign: begin -->\n", "<!-- campaign: end -->"],
             Self::Sentences => ["<!-- full campaign: begin -->\n", "<!-- full campaign: end -->"],
+            Self::Coverage => ["<!-- random campaign: begin -->\n", "<!-- random campaign: end -->"],
         }
     }
 
@@ -40,20 +43,29 @@ impl Part {
 
 /// The document with its generated part replaced. Fails without its markers.
 pub fn document(text: &str, outcomes: &[Outcome], part: Part) -> Result<String> {
+    replaced(text, part, &part.text(outcomes))
+}
+
+fn replaced(text: &str, part: Part, new: &str) -> Result<String> {
     let [begin, end] = part.markers();
     let (Some(from), Some(to)) = (text.find(begin), text.find(end)) else {
         bail!("must have the lines {} and {end}", begin.trim());
     };
     let before = text.get(..from + begin.len()).unwrap_or_default();
     let after = text.get(to..).unwrap_or_default();
-    Ok(format!("{before}{}\n{after}", part.text(outcomes)))
+    Ok(format!("{before}{new}\n{after}"))
 }
 
 /// Renews the generated part of a document, or says whether it is as it would be written.
 pub fn renew(path: &Path, outcomes: &[Outcome], part: Part, only_check: bool) -> Result<bool> {
+    renew_with(path, part, &part.text(outcomes), only_check)
+}
+
+/// The same with a text that is made already.
+pub fn renew_with(path: &Path, part: Part, text: &str, only_check: bool) -> Result<bool> {
     let named = || path.display().to_string();
     let before = std::fs::read_to_string(path).with_context(named)?;
-    let after = document(&before, outcomes, part).with_context(named)?;
+    let after = replaced(&before, part, text).with_context(named)?;
     let same = before == after;
     if !only_check && !same {
         write_text(path, &after)?;

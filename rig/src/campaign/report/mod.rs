@@ -4,7 +4,7 @@ mod document;
 mod lines;
 mod total;
 
-pub use document::{Part, document, renew};
+pub use document::{Part, document, renew, renew_with};
 pub use lines::{Line, by_fault, by_mode, by_safe_state, lines, table};
 pub use total::{Total, Worst, sentences, total};
 

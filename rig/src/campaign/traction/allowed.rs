@@ -7,7 +7,6 @@ use crate::bench::Observed;
 use crate::campaign::judge::{Bounded, CURRENT_SHARE, FORCED, half_turn_s};
 use crate::campaign::outcome::{Allowed, Seen};
 use crate::inject::traction::Kind;
-use crate::plant::LineFilter;
 use crate::run::CLOCK;
 use core::f64::consts::TAU;
 
@@ -15,7 +14,10 @@ impl Drive {
     pub(super) fn allowed(&self, case: &Case, seen: &Seen, safe_torque_nm: f64) -> Allowed {
         let parameters = &self.machine.folder.parameters;
         let observed = &seen.observed;
-        let (trip_a, over_v) = (parameters.trip_current_a, parameters.trip_dc_over_v);
+        let flaws = &case.conditions.flaws;
+        // Where the drive reads its trip levels.
+        let trip_a = parameters.trip_current_a / (1.0 + flaws.current_gain);
+        let over_v = parameters.trip_dc_over_v / (1.0 + flaws.udc_gain);
         let current_a = match case.fault.cause {
             // Flux linkage that is there when a device fails cannot leave a machine that is shorted; nothing the gates do is better.
             Cause::Bench(Kind::Device(_)) => {
@@ -24,14 +26,20 @@ impl Drive {
             _ => CURRENT_SHARE * trip_a,
         };
         let udc_v = self.forced_udc_v(case, observed);
+        let capacitance_f = case.conditions.filter.capacitance_f;
         Allowed {
             longest_s: self.longest_s(case, seen.carrier_s),
             current_a,
             udc_v,
             uc_v: None,
             torque_nm: parameters.max_torque_nm,
+            explained_nm: case.conditions.torque_share() * parameters.max_torque_nm,
             stopped: vec![
-                Bounded::new("V until the gates are safe", observed.until.udc_v, over_v + self.link_rise_v()),
+                Bounded::new(
+                    "V until the gates are safe",
+                    observed.until.udc_v,
+                    over_v + self.link_rise_v(capacitance_f),
+                ),
                 Bounded::new("V with safe gates", observed.after.udc_v, udc_v),
                 Bounded::new("N·m with safe gates", safe_torque_nm.abs(), self.safe_torque_limit_nm(case)),
             ],
@@ -52,7 +60,10 @@ impl Drive {
         match case.fault.cause {
             Cause::Bench(Kind::Current(..) | Kind::Angle(_)) => {
                 let pole_pairs = self.machine.folder.parameters.pole_pairs;
-                carriers_s.max(half_turn_s(case.point.speed_rpm, pole_pairs))
+                // A rotor that slows down takes longer.
+                let speed_rpm = case.point.speed_rpm.abs();
+                let lost_rpm = case.conditions.acceleration_rpm_s.abs() * half_turn_s(speed_rpm, pole_pairs);
+                carriers_s.max(half_turn_s(speed_rpm - lost_rpm, pole_pairs))
             }
             Cause::Runaway => carriers_s + TRACKING_S,
             _ => carriers_s,
@@ -70,8 +81,7 @@ impl Drive {
     }
 
     /// The rise of the link between a sample at the trip level and safe gates, in V.
-    fn link_rise_v(&self) -> f64 {
-        let LineFilter { capacitance_f, .. } = LineFilter::TRACTION;
+    fn link_rise_v(&self, capacitance_f: f64) -> f64 {
         let most_a = 2.0 * CURRENT_SHARE * self.machine.folder.parameters.trip_current_a;
         let time_s = f64::from(CLOCK.control_s()) + SAFE_STATE_S;
         most_a / capacitance_f * time_s
@@ -82,9 +92,12 @@ impl Drive {
     /// rectify. Below its trip level the link may do what it likes.
     fn forced_udc_v(&self, case: &Case, observed: &Observed) -> f64 {
         let pole_pairs = f64::from(self.machine.folder.parameters.pole_pairs);
-        let omega = case.point.speed_rpm.abs() * TAU / 60.0 * pole_pairs;
-        let rectified_v = 3.0_f64.sqrt() * omega * f64::from(self.machine.tables.ratings.magnet_flux_wb);
-        let capacitance_f = LineFilter::TRACTION.capacitance_f;
+        let omega = case.fastest_rpm() * TAU / 60.0 * pole_pairs;
+        let rectified_v = 3.0_f64.sqrt()
+            * omega
+            * case.conditions.flux_scale
+            * f64::from(self.machine.tables.ratings.magnet_flux_wb);
+        let capacitance_f = case.conditions.filter.capacitance_f;
         let field_v = (2.0 * observed.stored.field_j / capacitance_f).sqrt();
         let braked_v = (2.0 * observed.stored.braked_j / capacitance_f).sqrt();
         let charged_v = observed.stored.unloaded_v.hypot(field_v).hypot(braked_v);

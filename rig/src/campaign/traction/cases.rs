@@ -1,5 +1,7 @@
 //! The operating points at which the faults of the PMaSynRM drive come.
 
+use super::STAGES;
+use super::conditions::Conditions;
 use super::faults::{Cause, faults};
 use crate::campaign::Action;
 use crate::campaign::action::{LEAD_S, fault_s};
@@ -45,7 +47,7 @@ const POINTS: [Point; 18] = [
 ];
 
 /// From where a rotor runs away, in r/min: it must be above 6,600 in time.
-const RUNAWAY_FROM_RPM: f64 = 5_000.0;
+pub(super) const RUNAWAY_FROM_RPM: f64 = 5_000.0;
 
 impl Named<Cause> {
     /// `true` if it comes at rest, and the rotor is pushed off.
@@ -74,12 +76,20 @@ pub struct Case {
     pub(super) action: Action,
     /// The time of the fault, in s.
     pub(super) at_s: f64,
+    /// Everything else about it.
+    pub(super) conditions: Conditions,
 }
 
 impl Case {
     /// The name that a filter searches.
     pub fn name(&self) -> String {
         format!("pmasynrm {} {} {}", self.fault.name, self.point.speed_rpm, self.action.name())
+    }
+
+    /// The fastest that the rotor prescribed for it turns, in r/min.
+    pub(super) fn fastest_rpm(&self) -> f64 {
+        let gained = self.conditions.acceleration_rpm_s * (STAGES.end_s - self.at_s);
+        self.point.speed_rpm.abs().max((self.point.speed_rpm + gained).abs())
     }
 }
 
@@ -98,7 +108,7 @@ pub fn cases(fast: bool) -> Vec<Case> {
                     Cause::Machine(..) => -LEAD_S,
                     _ => fault_s(list.len()),
                 };
-                list.push(Case { fault: fault.clone(), point, action, at_s });
+                list.push(Case { fault: fault.clone(), point, action, at_s, conditions: Conditions::SOUND });
             }
         }
     }

@@ -2,10 +2,13 @@
 
 mod allowed;
 mod cases;
+mod conditions;
 mod faults;
+pub mod random;
 mod ride;
 
 pub use cases::{Case, cases};
+pub use conditions::Conditions;
 pub use ride::{Ridden, Ride};
 
 use super::Outcome;
@@ -64,8 +67,14 @@ impl Drive {
 
     /// Runs one case.
     pub fn run(&self, case: &Case) -> Result<Outcome> {
+        Ok(self.run_watched(case)?.0)
+    }
+
+    /// Runs one case; the modes that it went through, too.
+    fn run_watched(&self, case: &Case) -> Result<(Outcome, Vec<Mode>)> {
         let mut bench = self.bench(case);
-        let mut tasks = self.tasks();
+        let devices = self.devices(case.conditions.dead_time_ticks);
+        let mut tasks = self.tasks(devices);
         let tick_s = f64::from(CLOCK.tick_s);
         tasks.drive(&mut bench, |bench| {
             let safe_s = bench.observed.safe.map(|(at, _)| at as f64 * tick_s - LEAD_S);
@@ -80,7 +89,7 @@ impl Drive {
             torque_error_nm: torque_error_nm(rows, STAGES.turn_s).max(torque_error_nm(rows, STAGES.end_s)),
             tick_s,
             carrier_s: match observed.carrier_ticks {
-                0 => 2.0 * f64::from(self.devices().shortest_half_ticks) * tick_s,
+                0 => 2.0 * f64::from(devices.shortest_half_ticks) * tick_s,
                 ticks => ticks as f64 * tick_s,
             },
         };
@@ -91,15 +100,16 @@ impl Drive {
             action: case.action,
         };
         let allowed = self.allowed(case, &seen, last_torque_nm(rows));
-        Ok(Outcome::new(&setting, &case.fault, &seen, allowed))
+        let mut modes: Vec<Mode> = rows.iter().map(|row| row.mode).collect();
+        modes.dedup();
+        Ok((Outcome::new(&setting, &case.fault, &seen, allowed), modes))
     }
 
-    fn devices(&self) -> SwitchLimits {
-        SwitchLimits::new(250, 0, self.tables.ratings.max_switching_hz, &CLOCK)
+    fn devices(&self, dead_time_ticks: u32) -> SwitchLimits {
+        SwitchLimits::new(250, dead_time_ticks, self.tables.ratings.max_switching_hz, &CLOCK)
     }
 
-    fn tasks(&self) -> Tasks<'static> {
-        let devices = self.devices();
+    fn tasks(&self, devices: SwitchLimits) -> Tasks<'static> {
         let settings = Settings { clock: CLOCK, devices, gains: Gains::DEFAULT };
         Tasks::new(self.tables, settings, devices.shortest_half_ticks).on(self.ladder).without(self.without)
     }
@@ -108,7 +118,7 @@ impl Drive {
     fn bench_settings(&self, duration_s: f64, trace_step_s: f64) -> bench::Settings {
         bench::Settings {
             clock: CLOCK,
-            first_half_ticks: self.devices().shortest_half_ticks,
+            first_half_ticks: self.devices(0).shortest_half_ticks,
             dead_time_ticks: 0,
             lead_s: LEAD_S,
             duration_s,
@@ -124,37 +134,52 @@ impl Drive {
 
     fn bench(&self, case: &Case) -> Bench {
         let parameters = &self.machine.folder.parameters;
-        let Case { point, action, at_s, .. } = *case;
+        let Case { point, action, at_s, conditions, .. } = *case;
         let full_nm = (point.share * self.machine.envelope_nm(point.speed_rpm)).copysign(point.speed_rpm);
         let operator = move |t_s: f64| {
             let torque_nm = action.share(&STAGES, t_s) * full_nm;
             (Demand { torque_nm: torque_nm as f32, slew_limited: false }, true)
         };
-        let steady = vec![(0.0, point.speed_rpm)];
+        let steady = || {
+            let rpm_s = conditions.acceleration_rpm_s;
+            let at = |t_s: f64| (LEAD_S + t_s, point.speed_rpm + rpm_s * (t_s - at_s));
+            if rpm_s == 0.0 { vec![(0.0, point.speed_rpm)] } else { vec![at(-LEAD_S), at(STAGES.end_s)] }
+        };
+        let machine = PlantSettings {
+            flux_scale: conditions.flux_scale,
+            resistance_scale: conditions.resistance_scale,
+        };
         let faster = |rpm_s: f64| {
             let end_rpm = point.speed_rpm + rpm_s * (STAGES.end_s - at_s);
             vec![(LEAD_S + at_s, point.speed_rpm), (LEAD_S + STAGES.end_s, end_rpm)]
         };
         let (kind, machine, speed) = match case.fault.cause {
-            Cause::Bench(kind) if case.fault.needs_rest() => {
-                (kind, PlantSettings::default(), faster(PUSH_RPM_S))
-            }
-            Cause::Bench(kind) => (kind, PlantSettings::default(), steady),
+            Cause::Bench(kind) if case.fault.needs_rest() => (kind, machine, faster(PUSH_RPM_S)),
+            Cause::Bench(kind) => (kind, machine, steady()),
             Cause::Machine(flux_scale, resistance_scale) => {
-                (Kind::Elsewhere, PlantSettings { flux_scale, resistance_scale }, steady)
+                (Kind::Elsewhere, PlantSettings { flux_scale, resistance_scale }, steady())
             }
-            Cause::Runaway => (Kind::Elsewhere, PlantSettings::default(), faster(RUNAWAY_RPM_S)),
+            Cause::Runaway => (Kind::Elsewhere, machine, faster(RUNAWAY_RPM_S)),
         };
         let settings = bench::Settings {
             injection: Some(Injection { kind, at_s }),
             limits: Limits {
-                current_a: parameters.trip_current_a,
-                udc_v: (parameters.trip_dc_under_v, parameters.trip_dc_over_v),
+                // By what the sensors read.
+                current_a: parameters.trip_current_a / (1.0 + conditions.flaws.current_gain),
+                udc_v: (
+                    parameters.trip_dc_under_v / (1.0 + conditions.flaws.udc_gain),
+                    parameters.trip_dc_over_v / (1.0 + conditions.flaws.udc_gain),
+                ),
                 speed_rpm: parameters.trip_speed_rpm,
                 ..Limits::NONE
             },
+            dead_time_ticks: conditions.dead_time_ticks,
+            first_half_ticks: self.devices(conditions.dead_time_ticks).shortest_half_ticks,
+            flaws: conditions.flaws,
+            supply: Supply::Line(conditions.filter),
             ..self.bench_settings(STAGES.end_s, TRACE_STEP_S)
         };
+        let settings = bench::Settings { udc_v: conditions.line_v.unwrap_or(settings.udc_v), ..settings };
         let plant = Plant::new(&self.machine.folder, SpeedSource::profile(speed), &machine);
         Bench::new(plant, Box::new(operator), &settings)
     }

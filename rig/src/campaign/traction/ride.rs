@@ -58,7 +58,7 @@ impl Drive {
         let settings = bench::Settings { link_steps: line, flaws, injection, ..sound };
         let plant = Plant::new(&self.machine.folder, SpeedSource::profile(speed), &PlantSettings::default());
         let mut bench = Bench::new(plant, Box::new(operator), &settings);
-        let mut tasks = self.tasks();
+        let mut tasks = self.tasks(self.devices(0));
         let mut tripped_s = None;
         tasks.drive(&mut bench, |bench| {
             // Once it has stopped there is little to see.

@@ -1,0 +1,51 @@
+//! The options of `campaign`.
+
+use crate::shards::Shard;
+use crate::without::Ablation;
+use clap::Args;
+use std::path::PathBuf;
+
+/// The options of a campaign.
+#[derive(Args, Clone, Debug)]
+pub struct CampaignOptions {
+    /// Each fault of each kind once in each mode, instead of every case.
+    #[arg(long)]
+    pub fast: bool,
+    /// Only cases whose name (system, fault, speed in r/min, the ZS9's scheme, action) has each of these words.
+    #[arg(long, value_name = "WORD", num_args = 1..)]
+    pub only: Vec<String>,
+    /// One protection off: a fault's name, short_circuit or leg_safe_state. The cases that are lost are then listed.
+    #[arg(long, value_name = "PROTECTION")]
+    pub without: Option<Ablation>,
+    /// Folder for cases.csv, summary.json and report.html.
+    #[arg(long, default_value = "target/tractive/campaign")]
+    pub out: PathBuf,
+    /// A document whose generated part is written anew: the tables of the fast campaign, the totals of the full one, the coverage of the
+    /// random one.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["only", "without"])]
+    pub doc: Option<PathBuf>,
+    /// The document is not written: whether it is up to date decides on the exit code.
+    #[arg(long, requires = "doc")]
+    pub check_doc: bool,
+    /// Instead of faults: this many minutes of hard but healthy driving, at random, in which nothing may trip.
+    #[arg(long, value_name = "MINUTES", value_parser = crate::options::positive)]
+    pub healthy: Option<f64>,
+    /// With --healthy: the gates are blocked and released now and then, too.
+    #[arg(long, requires = "healthy")]
+    pub blocks: bool,
+    /// Instead of the listed cases: this many runs with machine, line, flaws, trajectory and fault at random, by a Latin hypercube.
+    #[arg(long, value_name = "RUNS", conflicts_with_all = ["fast", "only", "healthy", "without"])]
+    pub random: Option<usize>,
+    /// With --random: this run alone, made as small as it still fails.
+    #[arg(long, value_name = "RUN", requires = "random", conflicts_with = "shard")]
+    pub run: Option<usize>,
+    /// Seed of what is at random.
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// Shard K of N, from 0: its runs alone, into the file shard-K-of-N.csv of the folder, from which `merge` makes the whole.
+    #[arg(long, value_name = "K/N", conflicts_with_all = ["doc", "json"])]
+    pub shard: Option<Shard>,
+    /// Print the totals as JSON.
+    #[arg(long)]
+    pub json: bool,
+}

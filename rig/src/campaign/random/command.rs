@@ -1,0 +1,138 @@
+//! `campaign --random`: draws, runs, tells what was covered, and makes what fails small.
+
+use super::{Hypercube, coverage, minimise};
+use crate::campaign::drawn::Run;
+use crate::campaign::judge::Verdict;
+use crate::campaign::options::CampaignOptions;
+use crate::campaign::report::{Part, renew_with};
+use crate::campaign::traction::Drive;
+use crate::campaign::traction::random::DIMENSIONS;
+use crate::files::write_text;
+use crate::run::bar;
+use crate::shards::{self, Merged, Plan, seed};
+use anyhow::{Context, Result};
+use rayon::prelude::*;
+use std::path::Path;
+use std::process::ExitCode;
+
+/// The name of the campaign.
+pub const RANDOM: &str = "random";
+/// Failures that are made small, at most: each takes some dozens of runs.
+const SMALL: usize = 5;
+
+/// The drive, and what is drawn for it.
+pub struct Random {
+    drive: Drive,
+    cube: Hypercube,
+    name: String,
+}
+
+impl Random {
+    /// So many runs with a seed.
+    pub fn new(runs: usize, seed: u64) -> Result<Self> {
+        let name = format!("{RANDOM} {seed} {runs}");
+        Ok(Self { drive: Drive::new(None)?, cube: Hypercube::new(&name, runs, DIMENSIONS.len()), name })
+    }
+
+    /// Runs one.
+    pub fn run(&self, run: usize) -> Result<Run> {
+        let point = self.cube.point(run).with_context(|| format!("--run {run}: there is no such run"))?;
+        let values: Vec<f64> =
+            DIMENSIONS.iter().zip(point).map(|(dimension, coordinate)| dimension.at(coordinate)).collect();
+        self.drive.run_values(run, &values, seed(&self.name, run as u64))
+    }
+
+    /// A run's values of which as few as possible are odd, so that it is still uncaught.
+    pub fn smallest(&self, run: &Run) -> Result<Run> {
+        let drawn = &run.drawn;
+        let is_uncaught = |values: &[f64]| -> Result<bool> {
+            let run = self.drive.run_values(drawn.run, values, drawn.seed)?;
+            Ok(run.outcome.verdict == Verdict::Uncaught)
+        };
+        let values = minimise(&DIMENSIONS, &drawn.values, is_uncaught)?;
+        self.drive.run_values(drawn.run, &values, drawn.seed)
+    }
+}
+
+/// Runs the campaign. Exit code 1 where a run is uncaught, or the document is not up to date.
+pub fn run(runs: usize, options: &CampaignOptions) -> Result<ExitCode> {
+    let random = Random::new(runs, options.seed)?;
+    if let Some(run) = options.run {
+        let run = random.run(run)?;
+        crate::say!("{}", words(&run));
+        let lost = run.outcome.verdict == Verdict::Uncaught;
+        if lost {
+            crate::say!("smallest: {}", words(&random.smallest(&run)?));
+        }
+        return Ok(ExitCode::from(u8::from(lost)));
+    }
+    let configuration = serde_json::json!({ "seed": options.seed });
+    let plan = Plan::new(RANDOM, configuration, runs, &Run::columns())?;
+    if let Some(shard) = options.shard {
+        shards::run(&plan, shard, &options.out, |run| random.run(run)?.row())?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    let bar = bar(runs as u64, "random [{bar:40}] {pos}/{len} {elapsed} (left {eta})");
+    let row = |run: usize| {
+        let row = random.run(run)?.row();
+        bar.inc(1);
+        row
+    };
+    let rows = (0..runs).into_par_iter().map(row).collect::<Result<_>>()?;
+    bar.finish_and_clear();
+    std::fs::create_dir_all(&options.out).with_context(|| format!("--out {}", options.out.display()))?;
+    let merged = Merged { plan, rows };
+    let mut good = finish(&merged, &options.out)?;
+    if let Some(path) = &options.doc {
+        let text = coverage(&Run::of(&merged)?);
+        let same = renew_with(path, Part::Coverage, &text, options.check_doc)?;
+        if options.check_doc && !same {
+            eprintln!("{}: not up to date", path.display());
+            good = false;
+        }
+    }
+    Ok(if good { ExitCode::SUCCESS } else { ExitCode::from(1) })
+}
+
+/// Writes random.csv and prints the coverage; `true` if nothing is uncaught. What is uncaught is made small.
+fn finish(merged: &Merged, out: &Path) -> Result<bool> {
+    write_text(&out.join("random.csv"), &merged.csv())?;
+    let runs = Run::of(merged)?;
+    crate::say!("{}", coverage(&runs).trim_end());
+    let lost: Vec<_> = runs.iter().filter(|run| run.outcome.verdict == Verdict::Uncaught).collect();
+    let seed = merged.plan.configuration.get("seed").and_then(serde_json::Value::as_u64);
+    let random = Random::new(merged.plan.runs, seed.context("a configuration without its seed")?)?;
+    for (number, run) in lost.iter().enumerate() {
+        eprintln!("uncaught: {}", words(run));
+        if number < SMALL {
+            eprintln!("smallest: {}", words(&random.smallest(run)?));
+        }
+    }
+    Ok(lost.is_empty())
+}
+
+/// The same of shards that are merged.
+pub fn merged(merged: &Merged, out: &Path) -> Result<bool> {
+    finish(merged, out)
+}
+
+/// A run in words: its outcome, and the values that are not a sound drive's.
+fn words(run: &Run) -> String {
+    let Run { outcome, drawn } = run;
+    let odd =
+        DIMENSIONS.iter().zip(&drawn.values).filter(|(dimension, value)| dimension.sound != Some(**value));
+    let values: Vec<_> = odd.map(|(dimension, value)| format!("{} {value}", dimension.name)).collect();
+    let named = if outcome.named.is_empty() { "no fault" } else { outcome.named.as_str() };
+    format!(
+        "run {} ({} {} {:.0} r/min {}, {}): {named}, {:?} {}; {}",
+        drawn.run,
+        outcome.fault,
+        outcome.mode,
+        outcome.speed_rpm,
+        outcome.action.name(),
+        drawn.modes,
+        outcome.verdict,
+        outcome.why,
+        values.join(", ")
+    )
+}

@@ -1,0 +1,188 @@
+//! What so few bits decide is tried with all of them: instants, angles, frames, checksums, compare values. `docs/proof.md` lists what
+//! each one proves, and where its bound is.
+
+use std::ops::Range;
+use std::thread;
+use tractive::frames::Angle;
+use tractive::modulation::{Modulator, Reference, Schedule, SwitchLimits};
+use tractive::protocol::e2e::{data_ids, is_intact, protect};
+use tractive::protocol::{Command, LinkLimits, Payload, TorqueLimits};
+use tractive::time::{Clock, Instant};
+
+const CLOCK: Clock = Clock::new(25_000_000, 2_500);
+
+/// Looks at every number of 32 bits, on all cores.
+fn every_u32(look: impl Fn(Range<u64>) + Sync) {
+    let cores = thread::available_parallelism().map_or(1, |cores| cores.get() as u64);
+    let share = (1_u64 << 32).div_ceil(cores);
+    thread::scope(|scope| {
+        for core in 0..cores {
+            let look = &look;
+            scope.spawn(move || look(core * share..((core + 1) * share).min(1 << 32)));
+        }
+    });
+}
+
+#[test]
+fn an_instant_is_reached_for_half_the_range_and_never_sooner_whatever_the_count() {
+    every_u32(|range| {
+        let mut wrong = 0_u32;
+        for ticks in range.map(|ticks| ticks as u32) {
+            // A count about to wrap.
+            let now = Instant(0xFFFF_FFF0);
+            let later = now.after(ticks);
+            let is_right = later.reached(now) == (ticks < 1 << 31)
+                && later.since(now) == ticks as i32
+                && later.before(ticks) == now;
+            wrong += u32::from(!is_right);
+        }
+        assert_eq!(wrong, 0);
+    });
+}
+
+#[test]
+fn an_angle_is_its_own_short_way_round() {
+    every_u32(|range| {
+        let mut wrong = 0_u32;
+        for units in range.map(|units| units as u32) {
+            let (angle, from) = (Angle(units), Angle(0xC000_0001));
+            let there = from + angle;
+            let radians = angle.signed_radians();
+            let is_right = there - from == angle
+                && (there - from).signed() == units as i32
+                && (-core::f32::consts::PI..=core::f32::consts::PI).contains(&radians)
+                && (radians < 0.0) == (units >= 1 << 31);
+            wrong += u32::from(!is_right);
+        }
+        assert_eq!(wrong, 0);
+    });
+}
+
+/// Minutes of a core.
+#[test]
+#[ignore = "every angle: two minutes; --include-ignored"]
+fn sine_and_cosine_of_every_angle_are_within_their_bound() {
+    every_u32(|range| {
+        let mut most = 0.0_f64;
+        for units in range.map(|units| units as u32) {
+            let exact = f64::from(units) * (core::f64::consts::TAU / 4_294_967_296.0);
+            let found = Angle(units).sin_cos();
+            let off =
+                (f64::from(found.sin) - exact.sin()).abs().max((f64::from(found.cos) - exact.cos()).abs());
+            most = most.max(off);
+        }
+        assert!(most < 1.5e-7, "{most}");
+    });
+}
+
+/// The places of the counter's bits.
+const COUNTER: Range<u32> = 48..52;
+
+/// The CRC is linear, and the counter chooses what is added to it: so what is found in one frame is found in each with that counter.
+#[test]
+fn up_to_three_wrong_bits_and_every_burst_of_eight_are_found() {
+    let ids = data_ids(7);
+    for counter in 0..16 {
+        let mut sound = [0x5A, 0, 0xC3, 0x0F, 0xFF, 0, 0x81, 0x18];
+        protect(&mut sound, counter, &ids);
+        // In the order in which the bits are sent: bursts are of neighbours.
+        let number = u64::from_be_bytes(sound);
+        let intact = |pattern: u64| is_intact(&(number ^ pattern).to_be_bytes(), &ids);
+        assert!(intact(0));
+        // A wrong counter is another frame's, and judged by its place in the sequence.
+        let bits: Vec<u32> = (0..64).filter(|bit| !COUNTER.contains(bit)).collect();
+        for (first, a) in bits.iter().enumerate() {
+            for (second, b) in bits.iter().enumerate().skip(first) {
+                for c in bits.iter().skip(second) {
+                    // Twice the same bit stands for fewer wrong bits.
+                    let pattern = 1_u64 << a | 1 << b | 1 << c;
+                    assert!(!intact(pattern), "{a} {b} {c}");
+                }
+            }
+        }
+        for burst in 1..=255_u64 {
+            for at in (0..=40).chain(56..=56) {
+                assert!(!intact(burst << at), "{burst:#x} at {at}");
+            }
+        }
+    }
+}
+
+/// What is decoded is encoded as it came, and what cannot be encoded is not decoded: of each value of a signal, beside others that are
+/// in their range.
+#[test]
+fn every_word_of_a_command_comes_back_as_it_was() {
+    let comes_back = |payload: Payload| {
+        let command = Command::decode(payload);
+        command.inspect(|command| assert_eq!(command.encode().ok(), Some(payload))).is_some()
+    };
+    let mut taken = 0;
+    for levels in 0..1_u32 << 7 {
+        let is_set = |bit: u32| levels >> bit & 1 == 1;
+        let command = Command {
+            enable: is_set(0),
+            with_torque: is_set(1),
+            off: is_set(2),
+            coast: is_set(3),
+            charge: is_set(4),
+            discharge: is_set(5),
+            acknowledge: is_set(6),
+            torque_nm: 0.0,
+        };
+        let levels = command.encode().unwrap();
+        assert_eq!(Command::decode(levels), Some(command));
+        taken += (0..1_u64 << 16).filter(|torque| comes_back(Payload(levels.0 | torque << 16))).count();
+    }
+    assert_eq!(taken, 128 * 60_001, "torques of −3,000 to 3,000 N·m by tenths, and no other");
+    // The words that a command leaves free.
+    for word in 1..1_u64 << 16 {
+        for shift in [32, 48] {
+            comes_back(Payload(word << shift));
+        }
+    }
+}
+
+#[test]
+fn every_word_of_the_limits_comes_back_as_it_was() {
+    let mut taken = [0; 2];
+    for word in 0..1_u64 << 16 {
+        for (shift, beside) in [(16, 1 << 48), (32, 1 << 48), (48, 0)] {
+            let payload = Payload(word << shift | beside);
+            if let Some(limits) = TorqueLimits::decode(payload) {
+                assert_eq!(limits.encode().ok(), Some(payload));
+                taken[0] += 1;
+            }
+        }
+        for shift in [16, 32] {
+            let payload = Payload(word << shift | if shift == 16 { 60_000 << 32 } else { 1 << 16 });
+            if let Some(limits) = LinkLimits::decode(payload) {
+                assert_eq!(limits.encode().ok(), Some(payload));
+                taken[1] += 1;
+            }
+        }
+    }
+    assert!(taken.iter().all(|taken| *taken > 60_000), "{taken:?}");
+}
+
+/// The free carrier at every angle of 16 bits, from no voltage to more than there is.
+#[test]
+fn compare_values_are_within_their_half() {
+    let devices = SwitchLimits::new(250, 75, 900.0, &CLOCK);
+    for volts in [0.0, 1.0, 50.0, 300.0, 600.0] {
+        for upper in 0..1_u32 << 16 {
+            let mut modulator = Modulator::new(devices, Schedule::new(&CLOCK));
+            let reference = Reference::turning(volts, Angle(upper << 16), 0.0, Instant(0), 1_500.0);
+            let half = modulator.step(Instant(0), Some(&reference));
+            assert!(half.period_ticks >= devices.shortest_half_ticks, "{half:?}");
+            for compare in half.compare_ticks {
+                // At the half's end or behind it: no edge.
+                let is_far = (devices.min_pulse_ticks..=half.period_ticks - devices.min_pulse_ticks)
+                    .contains(&compare);
+                assert!(
+                    is_far || compare == 0 || compare >= half.period_ticks,
+                    "{upper:#x} {volts} V: {half:?}"
+                );
+            }
+        }
+    }
+}
