@@ -17,7 +17,7 @@ const DEAD_TICKS: u32 = 125;
 /// A current whose sign changes quickly: 25 Hz, 60 A.
 const HZ: f32 = 25.0;
 const PEAK_A: f32 = 60.0;
-/// Where the compensation is proportional, in A: a twentieth of the largest current.
+/// Current up to which the compensation is proportional, in A: a twentieth of the largest.
 const SMALL_A: f32 = 0.05 * 233.345;
 
 /// The true phase currents.
@@ -44,7 +44,7 @@ impl PwmPort for Machine {
     }
 }
 
-/// What is played with a dead time that the modulator does not know, and the half as the modulator made it.
+/// The halves that are played with a dead time, and their boundaries.
 fn played(dead_time_ticks: u32) -> Vec<(Instant, CarrierHalf)> {
     let devices = SwitchLimits::new(250, dead_time_ticks, 900.0, &CLOCK);
     let half_ticks = devices.shortest_half_ticks;

@@ -1,4 +1,4 @@
-//! What so few bits decide is tried with all of them: instants, angles, frames, checksums, compare values. `docs/proof.md` lists what
+//! Proofs by all values of so few bits: instants, angles, frames, checksums, compare values. `docs/proof.md` lists what
 //! each one proves, and where its bound is.
 
 use std::ops::Range;
@@ -108,8 +108,7 @@ fn up_to_three_wrong_bits_and_every_burst_of_eight_are_found() {
     }
 }
 
-/// What is decoded is encoded as it came, and what cannot be encoded is not decoded: of each value of a signal, beside others that are
-/// in their range.
+/// Each content that is decoded is encoded as it came: of each value of a signal, beside others that are in their range.
 #[test]
 fn every_word_of_a_command_comes_back_as_it_was() {
     let comes_back = |payload: Payload| {

@@ -181,8 +181,7 @@ mod tests {
         let begins_nm = |flowing_nm: f32, can_step: bool| {
             let demand = Demand { torque_nm: 0.0, slew_limited: true };
             let (window, udc_v, omega, period_s) = (None, 1_500.0, 600.0, 1e-4);
-            let input =
-                Input { demand: &demand, window, udc_v, omega, flowing_nm, can_step, period_s };
+            let input = Input { demand: &demand, window, udc_v, omega, flowing_nm, can_step, period_s };
             Shaper::new().step(&input, &ratings)
         };
         let slew_nm = ratings.torque_slew_nm_s * 1e-4;

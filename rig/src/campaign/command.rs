@@ -86,7 +86,7 @@ fn finish(outcomes: &[Outcome], given: serde_json::Value, out: &Path, json: bool
     Ok(lost.is_empty())
 }
 
-/// What `campaign` without shards would have written and printed, of shards that are merged; `true` if nothing is uncaught.
+/// The files and the text of `campaign` without shards, of shards that are merged; `true` if nothing is uncaught.
 pub fn merged(merged: &Merged, out: &Path, json: bool) -> Result<bool> {
     finish(&merged.read()?, merged.plan.configuration.clone(), out, json)
 }

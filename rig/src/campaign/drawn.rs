@@ -1,4 +1,4 @@
-//! What is drawn for a run at random.
+//! The values that are drawn for a run at random.
 
 use super::Outcome;
 
@@ -22,7 +22,7 @@ impl Dimension {
     }
 }
 
-/// What was drawn for a run.
+/// The values that were drawn for a run.
 #[derive(Clone, Debug)]
 pub struct Drawn {
     /// Its number.
@@ -40,6 +40,6 @@ pub struct Drawn {
 pub struct Run {
     /// Its outcome.
     pub outcome: Outcome,
-    /// What was drawn for it.
+    /// The values that were drawn for it.
     pub drawn: Drawn,
 }

@@ -6,7 +6,7 @@ use crate::campaign::report::{sentences, total};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-/// What was met how often, as Markdown.
+/// The number of times that each mode, border, fault and safe state was met, as Markdown.
 pub fn coverage(runs: &[Run]) -> String {
     let outcomes: Vec<_> = runs.iter().map(|run| run.outcome.clone()).collect();
     let mut text = String::new();

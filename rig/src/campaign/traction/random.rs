@@ -52,7 +52,7 @@ const RIPPLE_HZ: f64 = 300.0;
 const SOUND_SHARE: f64 = 0.3;
 /// Below this speed a wrong angle cannot be told from a rotor that stands, in r/min.
 const SLOWEST_RPM: f64 = 100.0;
-/// Where the torque is none, as a coordinate of the action.
+/// The coordinate of the action from which there is no torque.
 const COASTING_FROM: f64 = 0.9;
 
 /// The fault of a coordinate. Another machine is no fault here: it is drawn.
