@@ -83,7 +83,7 @@ impl Bench {
         match &mut self.line {
             None => self.plant.source_v = source_v,
             Some(line) => {
-                if line.gear.sampled(self.time.tick(), hardware, || ()) {
+                if line.gear.sampled(self.time.tick(), hardware, true, || ()) {
                     return Err(BenchError::OperatorLate(t_s));
                 }
             }
