@@ -7,7 +7,7 @@
 //! [`machine`] has the types of the tables made offline, [`protection`] the faults and the safe state, [`recorder`] what led to one.
 //! [`operator`] switches the drive on and off, [`protocol`] is how it is asked over CAN, [`experiment`] what an identification keeps for it.
 //!
-//! [`control`], [`identification`], [`modulation`], [`nine_switch`], [`machine`], [`frames`] and [`time`](mod@time) are those of the crate
+//! [`control`], [`identification`], [`start_up`], [`modulation`], [`nine_switch`], [`machine`], [`frames`] and [`time`](mod@time) are those of the crate
 //! `tractive-control`, which is usable alone. Neither control nor modulation knows the cells; only the drive knows all of them;
 //! only a board knows registers.
 //!
@@ -47,4 +47,6 @@ pub mod recorder;
 #[cfg(feature = "wire")]
 pub mod wire;
 
-pub use tractive_control::{control, frames, identification, machine, modulation, nine_switch, time};
+pub use tractive_control::{
+    control, frames, identification, machine, modulation, nine_switch, start_up, time,
+};

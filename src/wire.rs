@@ -84,6 +84,8 @@ pub enum Request {
     End,
     /// The observation of an identification, told by the control interrupt that began at the instant.
     Observed(Instant, Observation),
+    /// The electrical angle where the position sensor began to count, found by the control interrupt that began at the instant.
+    Align(Instant, Angle),
 }
 
 /// A request's block. Not in every caller: images are small.
@@ -119,6 +121,7 @@ impl Request {
             Self::Ask(at) => block(11, *at, &[]),
             Self::Tell(from, status, frame) => block(12, *from, &told_to_words(status, *frame)),
             Self::Observed(at, observation) => block(13, *at, &observation.to_words()),
+            Self::Align(at, zero) => block(14, *at, &[zero.0]),
         }
     }
 
@@ -157,6 +160,10 @@ impl Request {
             13 => {
                 let [a, b, c, d, e, f, g, h, i, ..] = payload;
                 Self::Observed(at, Observation::from_words([a, b, c, d, e, f, g, h, i])?)
+            }
+            14 => {
+                let [zero, ..] = payload;
+                Self::Align(at, Angle(zero))
             }
             _ => return None,
         })
@@ -226,32 +233,39 @@ pub fn setup_from_block(block: &Block) -> Setup {
     }
 }
 
-/// The answer to [`Request::ControlSample`], with the rig's command; `stop` ends the run.
-pub fn sample_to_block(sample: &Sample, command: &DriveCommand, stop: bool) -> Block {
+/// The answer to [`Request::ControlSample`], with the rig's command, and what a sensor without an angle has counted; `stop` ends the run.
+pub fn sample_to_block(sample: &Sample, command: &DriveCommand, counted: Option<Angle>, stop: bool) -> Block {
     let enable = sample.may_pulse && command.enable;
     let flags = u32::from(enable) | u32::from(command.demand.slew_limited) << 1 | u32::from(stop) << 2;
+    let counted = counted.filter(|_| sample.angle.is_none());
+    let flags = flags | u32::from(counted.is_some()) << 3;
     let [a, b, c] = sample.currents_a.to_bits();
     let torque = command.demand.torque_nm.to_bits();
     let hardware = sample.hardware.map_or(0, |fault| fault as u32);
-    let angle = sample.measured().angle.0;
+    let angle = counted.unwrap_or(sample.measured().angle).0;
     [a, b, c, sample.udc_v.to_bits(), angle, torque, flags, hardware, 0, 0, 0, 0, 0, 0, 0, 0]
 }
 
-/// The inverse of [`sample_to_block`], the command as its words.
-pub fn sample_from_block(block: &Block) -> (Sample, [u32; 2], bool) {
+/// The inverse of [`sample_to_block`], the command and what was counted as their words.
+pub fn sample_from_block(block: &Block) -> (Sample, [u32; 3], bool) {
     let [a, b, c, udc, angle, torque, flags, hardware, ..] = *block;
     let sample = Sample {
         currents_a: Abc::from_bits([a, b, c]),
         udc_v: f32::from_bits(udc),
-        angle: Some(Angle(angle)),
+        angle: (flags & 8 == 0).then_some(Angle(angle)),
         may_pulse: flags & 1 != 0,
         hardware: Fault::from_code(hardware),
     };
-    (sample, [torque, flags], flags & 4 != 0)
+    (sample, [torque, flags, angle], flags & 4 != 0)
+}
+
+/// The turn that was counted, of such words; `None` where the sample has its angle.
+pub fn counted_from_words([_, flags, angle]: [u32; 3]) -> Option<Angle> {
+    (flags & 8 != 0).then_some(Angle(angle))
 }
 
 /// The command of such words.
-pub fn command_from_words([torque, flags]: [u32; 2]) -> DriveCommand {
+pub fn command_from_words([torque, flags, _]: [u32; 3]) -> DriveCommand {
     DriveCommand {
         enable: flags & 1 != 0,
         demand: Demand { torque_nm: f32::from_bits(torque), slew_limited: flags & 2 != 0 },

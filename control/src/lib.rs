@@ -3,6 +3,7 @@
 //! * [`control`] decides which voltage: MTPA on saturated flux maps, field weakening, a current loop in flux linkage.
 //! * [`modulation`] decides which pulses of a two-level inverter: asynchronous, synchronous, middle-60° and square wave.
 //! * [`identification`] decides which voltages show what an unknown machine is like.
+//! * [`start_up`] finds the angle of a rotor whose sensor only counts.
 //! * [`nine_switch`] decides which pulses of the inverter that feeds two motors.
 //! * [`machine`] holds the types of the tables made offline, [`frames`] angles and vectors, [`time`](mod@time) instants,
 //!   [`configuration`] the checks before a start.
@@ -34,4 +35,5 @@ pub mod identification;
 pub mod machine;
 pub mod modulation;
 pub mod nine_switch;
+pub mod start_up;
 pub mod time;

@@ -260,6 +260,10 @@ impl RunOptions {
             udc_gain: 0.0,
             angle_error_deg: self.angle_error,
             angle_jitter_s: 0.0,
+            angle_harmonics_deg: [0.0; 2],
+            angle_late_s: 0.0,
+            angle_counts: None,
+            current_filter_s: 0.0,
             freeze_at_s: None,
             seed: self.seed,
         }

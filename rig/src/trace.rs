@@ -39,6 +39,15 @@ pub struct SlotRow {
     pub status: Status,
 }
 
+/// The angle of a start without one, as the drive has found it, or the index, whose error is none.
+#[derive(Clone, Copy, Debug)]
+pub struct Found {
+    /// The time from the recording's beginning, in s.
+    pub t_s: f64,
+    /// By how much it is ahead of the true one, electrical, in degrees, −180 ..= 180.
+    pub error_deg: f64,
+}
+
 /// One line of trace.csv: the plant's true values, and control's intentions at that instant.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Row {
@@ -152,6 +161,8 @@ pub struct Recording {
     pub recorded: Vec<(f64, Record)>,
     /// The observations of an identification; empty of any other run.
     pub observations: Vec<Observation>,
+    /// The angle that the drive has found, where it started without one.
+    pub found: Option<Found>,
 }
 
 impl Recording {

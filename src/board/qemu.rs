@@ -16,7 +16,7 @@ pub use watch::ends as watch_ends;
 
 use crate::configuration::Refused;
 use crate::control::MtpaStart;
-use crate::frames::Abc;
+use crate::frames::{Abc, Angle};
 use crate::modulation::CarrierHalf;
 use crate::operator::{self, Feedback, OperatorPort, Status};
 use crate::ports::{ControlPort, DriveCommand, PwmPort, Report, Sample};
@@ -229,6 +229,14 @@ impl ControlPort for Control {
 
     fn report(&mut self, now: Instant, report: &Report) {
         exchange::report(now, report);
+    }
+
+    fn turned(&mut self) -> Option<Angle> {
+        exchange::counted()
+    }
+
+    fn align(&mut self, now: Instant, zero: Angle) {
+        exchange::align(now, zero);
     }
 }
 

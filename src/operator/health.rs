@@ -107,7 +107,10 @@ pub(super) fn open_is_safe(input: &Situation, settings: &Settings) -> bool {
 pub(super) fn while_pulsing(input: &Situation, main_closed: bool) -> Option<Violation> {
     hardware(input)
         .or_else(|| position(input))
-        .or_else(|| (!input.feedback.position_known).then_some((Fault::PositionSensor, 0.0, 1.0)))
+        .or_else(|| {
+            let known = input.feedback.position_known || input.feedback.position_counted;
+            (!known).then_some((Fault::PositionSensor, 0.0, 1.0))
+        })
         .or_else(|| if main_closed { contactors(input, true, false) } else { None })
 }
 

@@ -151,6 +151,8 @@ pub struct Feedback {
     pub sensor_alive: bool,
     /// The rotor's angle is known (an incremental encoder's index has passed).
     pub position_known: bool,
+    /// The position sensor counts, so that an angle that is not known is found once the drive is enabled.
+    pub position_counted: bool,
     /// Phase currents that the sensors show at no current, in A, as found at the start.
     pub offsets_a: Abc,
     /// The configuration's check.
@@ -228,6 +230,7 @@ impl Words<4> for Feedback {
             self.sensor_alive,
             self.position_known,
             self.parameters_open,
+            self.position_counted,
         ]);
         let hardware = self.hardware.map_or(0, |fault| fault as u32);
         let [a, b, c] = self.offsets_a.to_bits();
@@ -245,6 +248,7 @@ impl Words<4> for Feedback {
             sensor_alive: flag(4),
             position_known: flag(5),
             parameters_open: flag(6),
+            position_counted: flag(7),
             offsets_a: Abc::from_bits(offsets),
             configuration: match flags >> 8 & 0xFF {
                 1 => Configuration::Good,
@@ -266,7 +270,7 @@ mod tests {
             let words = [1 << bit, 1, 2, 3, 4, 5, 6];
             assert_eq!(Request::from_words(words).to_words(), words);
         }
-        for flags in (0..7).map(|bit| 1 << bit).chain([1 << 8, 2 << 8, (Fault::GateDriver as u32) << 16]) {
+        for flags in (0..8).map(|bit| 1 << bit).chain([1 << 8, 2 << 8, (Fault::GateDriver as u32) << 16]) {
             let words = [flags, 7, 8, 9];
             assert_eq!(Feedback::from_words(words).to_words(), words);
         }

@@ -133,6 +133,14 @@ pub trait ControlPort<S: System = Traction> {
     fn leg_faults(&mut self) -> LegFaults {
         LegFaults::default()
     }
+    /// Turn of the rotor, electrical, since a position sensor that only counts began to, at the newest sample; asked for while that has no
+    /// angle. `None` where there is nothing to count.
+    fn turned(&mut self) -> Option<Angle> {
+        None
+    }
+    /// The electrical angle that the rotor had where the counting began: from the next sample on the sensor has an angle, until
+    /// an index knows better.
+    fn align(&mut self, _now: Instant, _zero: Angle) {}
 }
 
 /// The port of the PWM interrupt to a board.

@@ -112,11 +112,11 @@ impl LineSide {
         held.map(|(.., fault)| *fault)
     }
 
-    /// A control sample at `now`, `t_s`: the first of every millisecond begins a slot. Returns whether the operator has fallen behind.
-    pub fn sampled(&mut self, now: Tick, t_s: f64) -> bool {
+    /// A control sample at `now`, `t_s`, with the rotor's angle known or not: the first of every millisecond begins a slot. Returns whether the operator has fallen behind.
+    pub fn sampled(&mut self, now: Tick, t_s: f64, position_known: bool) -> bool {
         let hardware = self.hardware(t_s);
         let Self { gear, plan, .. } = self;
-        gear.sampled(now, hardware, || (plan.commander)(t_s))
+        gear.sampled(now, hardware, position_known, || (plan.commander)(t_s))
     }
 
     /// The request in the slot that began at `tick`, and the board's feedback.

@@ -8,6 +8,7 @@
 mod conversions;
 mod dc_side;
 mod due;
+mod encoder;
 mod error;
 mod inverter;
 mod line;
@@ -27,10 +28,12 @@ pub use crate::trace::Tick;
 pub use conversions::Conversions;
 pub use dc_side::Supply;
 pub use due::Due;
+pub use encoder::{Encoder, Position};
 pub use error::BenchError;
 pub use inverter::{Inverter, Stuck};
 pub use line::{Commander, LinePlan, LineSide};
 pub use observe::{Limits, Observed, Peaks, Stored};
+pub use sampling::Sampled;
 pub use sensors::{Converter, Flaws, Sensors};
 pub use settings::{Operator, Settings};
 pub use simulated::Simulated;
@@ -40,13 +43,13 @@ pub use time::Timeline;
 use crate::inject::Injection;
 use crate::inject::traction::{Kind, Spoiler};
 use crate::plant::Plant;
-use crate::trace::{Row, SlotRow, Switch};
+use crate::trace::{Found, Row, SlotRow, Switch};
 use dc_side::DcSide;
 use rows::Rows;
 use tractive::identification::Observation;
 use tractive::modulation::CarrierHalf;
 use tractive::operator::{Feedback, Request, Status};
-use tractive::ports::{DriveCommand, Report, Sample};
+use tractive::ports::Report;
 use tractive::protection::SafeState;
 use tractive::time::{Clock, Instant};
 
@@ -71,13 +74,14 @@ pub struct Bench {
     /// Orders to enter a safe state, or to leave it (`None`), and when they reach the gates.
     orders: Due<Option<SafeState>>,
     slots: Vec<SlotRow>,
-    control: Conversions<(Sample, DriveCommand), Report>,
+    control: Conversions<Sampled, Report>,
     loads: Due<f64>,
     /// The rows that are judged, and the others that are written.
     rows: Rows,
     written: Option<Rows>,
     switches: Vec<Switch>,
     observations: Vec<Observation>,
+    found: Option<Found>,
 }
 
 impl Bench {
@@ -106,6 +110,7 @@ impl Bench {
             written: None,
             switches: Vec::new(),
             observations: Vec::new(),
+            found: None,
             time,
         }
     }
@@ -141,6 +146,12 @@ impl Bench {
         if let Some(plan) = plan {
             self.dc = DcSide::Operated(Box::new(LineSide::new(plan, &self.clock)));
         }
+        self
+    }
+
+    /// The same with an incremental encoder in the place of the absolute one.
+    pub fn with_encoder(mut self, encoder: Option<Encoder>) -> Self {
+        self.sensors = self.sensors.with_encoder(encoder);
         self
     }
 

@@ -49,6 +49,7 @@ impl Simulated for Bench {
             lead: self.time.lead,
             tick_s: self.time.step_s,
             observations: self.observations,
+            found: self.found,
         }
     }
 }

@@ -30,6 +30,7 @@ impl Bench {
             self.dc.advance(&mut self.plant, self.inverter.legs(), dt_s, || {
                 (sensors.supply_v(t_s), spoiler.supply(t_s))
             });
+            self.sensors.pass(&self.plant.motor, dt_s);
             self.inverter.monitor(self.plant.motor.currents_abc(), now, tick);
             if self.inverter.leg_faults() != LegFaults::default() {
                 self.observed.makes_a_difference(now);

@@ -2,7 +2,8 @@
 
 use super::{Bench, BenchError, Simulated};
 use crate::inject::traction::Kind;
-use tractive::frames::Abc;
+use crate::trace::Found;
+use tractive::frames::{Abc, Angle};
 use tractive::identification::{Observation, Stage};
 use tractive::ports::{DriveCommand, Report, Sample};
 use tractive::protection::LegFaults;
@@ -12,9 +13,20 @@ use tractive::time::Instant;
 /// which is what the sum of the phases may be.
 const MUCH_A: f32 = 23.3;
 
+/// A control sample with what comes beside it.
+#[derive(Clone, Copy, Debug)]
+pub struct Sampled {
+    /// The sample.
+    pub sample: Sample,
+    /// The bench's command.
+    pub command: DriveCommand,
+    /// The turn that a position sensor has counted, electrical, where it has no angle.
+    pub counted: Option<Angle>,
+}
+
 impl Bench {
     /// The conversions that the control timer triggered at `instant`, and what the bench commands.
-    pub fn control_sample(&mut self, instant: Instant) -> Result<(Sample, DriveCommand), BenchError> {
+    pub fn control_sample(&mut self, instant: Instant) -> Result<Sampled, BenchError> {
         let tick = self.time.widen(instant);
         self.advance(tick)?;
         self.control.ask(tick)
@@ -31,6 +43,12 @@ impl Bench {
             self.end_at(instant.after(self.clock.control_ticks));
         }
         self.observations.push(observation);
+    }
+
+    /// Tells the position sensor the electrical angle where it began to count.
+    pub fn align(&mut self, zero: Angle) {
+        let t_s = self.time.now_s();
+        self.found = self.sensors.align(zero).map(|error_deg| Found { t_s, error_deg });
     }
 
     /// By how much the control interrupt is late, in ticks.
@@ -70,22 +88,27 @@ impl Bench {
         let has_control = self.spoiler.injected.has_control(t_s);
         self.control.begin(&self.time, has_control)?;
         let (demand, enable) = self.operator.demand(t_s);
-        let (true_a, angle) = self.sensors.measure(&self.plant.motor, t_s);
+        let (true_a, position) = self.sensors.measure(&self.plant.motor, t_s);
         let hardware = self.dc.operated().and_then(|line| line.hardware(t_s));
         // Without control nobody looks after the operator.
-        if self.dc.operated_mut().is_some_and(|line| line.sampled(now, t_s)) && has_control {
+        let known = position.angle.is_some();
+        if known && self.found.is_none() && self.sensors.has_encoder() {
+            // The index was first.
+            self.found = Some(Found { t_s, error_deg: 0.0 });
+        }
+        if self.dc.operated_mut().is_some_and(|line| line.sampled(now, t_s, known)) && has_control {
             return Err(BenchError::OperatorLate(t_s));
         }
         let mut sample = Sample {
             currents_a: self.read_currents(true_a),
             udc_v: self.sensors.link_v(self.udc_v(t_s)) as f32,
-            angle: Some(angle),
+            angle: position.angle,
             may_pulse: true,
             hardware,
         };
         let mut command = DriveCommand { enable, demand, ..DriveCommand::NONE };
         self.spoiler.control(t_s, &mut sample, &mut command);
-        self.control.put(now, (sample, command));
+        self.control.put(now, Sampled { sample, command, counted: position.counted });
         Ok(())
     }
 }

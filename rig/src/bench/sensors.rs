@@ -1,5 +1,6 @@
 //! The firmware's converters, as they see the machine.
 
+use super::{Encoder, Position};
 use crate::plant::Motor;
 use rand::rngs::StdRng;
 use rand::{Rng, SeedableRng};
@@ -25,6 +26,14 @@ pub struct Flaws {
     pub angle_error_deg: f64,
     /// Time after its sample in which the angle is read, in s; each time at another instant.
     pub angle_jitter_s: f64,
+    /// Errors of the angle that go once and twice with it, electrical: amplitudes in degrees.
+    pub angle_harmonics_deg: [f64; 2],
+    /// Age of the angle when it is read, in s.
+    pub angle_late_s: f64,
+    /// Counts of the angle in an electrical turn; `None`: as fine as the word.
+    pub angle_counts: Option<f64>,
+    /// Time constant of the current sensors, in s.
+    pub current_filter_s: f64,
     /// From this time on control is told the same currents again and again, in s.
     pub freeze_at_s: Option<f64>,
     /// Seed of the noise.
@@ -42,6 +51,10 @@ impl Flaws {
         udc_gain: 0.0,
         angle_error_deg: 0.0,
         angle_jitter_s: 0.0,
+        angle_harmonics_deg: [0.0; 2],
+        angle_late_s: 0.0,
+        angle_counts: None,
+        current_filter_s: 0.0,
         freeze_at_s: None,
         seed: 0,
     };
@@ -51,12 +64,24 @@ impl Flaws {
 pub struct Converter {
     flaws: Flaws,
     random: StdRng,
+    /// Phase currents behind the sensors' time constant, in A.
+    filtered_a: [f64; 3],
 }
 
 impl Converter {
     /// Converters with these flaws.
     pub fn new(flaws: Flaws) -> Self {
-        Self { flaws, random: StdRng::seed_from_u64(flaws.seed) }
+        Self { flaws, random: StdRng::seed_from_u64(flaws.seed), filtered_a: [0.0; 3] }
+    }
+
+    /// Lets time pass in which the motor has these phase currents, in A.
+    pub fn pass(&mut self, currents_a: [f64; 3], dt_s: f64) {
+        if self.flaws.current_filter_s > 0.0 {
+            let share = -(-dt_s / self.flaws.current_filter_s).exp_m1();
+            for (filtered_a, current_a) in self.filtered_a.iter_mut().zip(currents_a) {
+                *filtered_a += share * (current_a - *filtered_a);
+            }
+        }
     }
 
     /// Ripple of the supply at an instant, in V.
@@ -88,14 +113,21 @@ impl Converter {
 
     /// A motor's phase currents as converted now, in A.
     pub fn currents(&mut self, motor: &Motor) -> Abc {
-        let [a, b, c] = motor.currents_abc().map(|current| self.convert(current) as f32);
+        let behind_a = if self.flaws.current_filter_s > 0.0 { self.filtered_a } else { motor.currents_abc() };
+        let [a, b, c] = behind_a.map(|current| self.convert(current) as f32);
         Abc { a, b, c }
     }
 
     /// A motor's rotor angle as its sensor has it.
     pub fn angle(&mut self, motor: &Motor) -> Angle {
-        let error_turns = self.flaws.angle_error_deg / 360.0;
-        let turns = motor.angle_turns() + self.late_turns(motor.turns_s()) + error_turns;
+        let flaws = self.flaws;
+        let true_turns = motor.angle_turns() - motor.turns_s() * flaws.angle_late_s;
+        let [once, twice] = flaws.angle_harmonics_deg;
+        let (sin_once, cos_once) = (core::f64::consts::TAU * true_turns).sin_cos();
+        let harmonics_deg = once * sin_once + twice * 2.0 * sin_once * cos_once;
+        let error_turns = (flaws.angle_error_deg + harmonics_deg) / 360.0;
+        let turns = true_turns + self.late_turns(motor.turns_s()) + error_turns;
+        let turns = flaws.angle_counts.map_or(turns, |counts| (turns * counts).floor() / counts);
         Angle((turns.rem_euclid(1.0) * 4_294_967_296.0).round() as u64 as u32)
     }
 }
@@ -105,6 +137,7 @@ pub struct Sensors {
     udc_v: f64,
     link_steps: Vec<(f64, f64)>,
     converter: Converter,
+    encoder: Option<Encoder>,
     /// The currents that control was told last.
     told_a: Abc,
 }
@@ -112,7 +145,23 @@ pub struct Sensors {
 impl Sensors {
     /// Sensors on a link of this voltage, which changes at these times (in s) to these values.
     pub fn new(udc_v: f64, link_steps: Vec<(f64, f64)>, flaws: Flaws) -> Self {
-        Self { udc_v, link_steps, converter: Converter::new(flaws), told_a: Abc::default() }
+        Self { udc_v, link_steps, converter: Converter::new(flaws), encoder: None, told_a: Abc::default() }
+    }
+
+    /// The same with an incremental encoder, if there is one.
+    pub fn with_encoder(mut self, encoder: Option<Encoder>) -> Self {
+        self.encoder = encoder;
+        self
+    }
+
+    /// `true` with an incremental encoder.
+    pub fn has_encoder(&self) -> bool {
+        self.encoder.is_some()
+    }
+
+    /// Tells the encoder, if there is one, the angle where it was switched on; returns by how much that is ahead, in degrees.
+    pub fn align(&mut self, zero: Angle) -> Option<f64> {
+        self.encoder.as_mut().map(|encoder| encoder.align(zero))
     }
 
     /// The voltage of a healthy supply, which a stiff link has, in V.
@@ -126,16 +175,23 @@ impl Sensors {
         udc_v * (1.0 + self.converter.flaws.udc_gain)
     }
 
+    /// See [`Converter::pass`].
+    pub fn pass(&mut self, motor: &Motor, dt_s: f64) {
+        self.converter.pass(motor.currents_abc(), dt_s);
+    }
+
     /// The phase currents as converted now.
     pub fn currents(&mut self, motor: &Motor) -> Abc {
         self.converter.currents(motor)
     }
 
     /// The phase currents that control is told at `t_s`, and the rotor's angle.
-    pub fn measure(&mut self, motor: &Motor, t_s: f64) -> (Abc, Angle) {
+    pub fn measure(&mut self, motor: &Motor, t_s: f64) -> (Abc, Position) {
         if self.converter.flaws.freeze_at_s.is_none_or(|freeze_s| t_s < freeze_s) {
             self.told_a = self.currents(motor);
         }
-        (self.told_a, self.converter.angle(motor))
+        let angle = self.converter.angle(motor);
+        let absolute = Position { angle: Some(angle), counted: None };
+        (self.told_a, self.encoder.as_mut().map_or(absolute, |encoder| encoder.read(angle)))
     }
 }

@@ -73,9 +73,15 @@ impl<A, T: Copy> Switchgear<A, T> {
         self.main.closed
     }
 
-    /// A control sample at `now`, with what holds the gates off in hardware: the first of every millisecond begins a slot, in which this is
+    /// A control sample at `now`, with what holds the gates off in hardware and whether the rotor's angle is known: the first of every millisecond begins a slot, in which this is
     /// asked. Returns whether the operator has fallen behind.
-    pub fn sampled(&mut self, now: Tick, hardware: Option<Fault>, ask: impl FnOnce() -> A) -> bool {
+    pub fn sampled(
+        &mut self,
+        now: Tick,
+        hardware: Option<Fault>,
+        position_known: bool,
+        ask: impl FnOnce() -> A,
+    ) -> bool {
         let begins = self.samples.is_multiple_of(self.slot_samples);
         self.samples = self.samples.wrapping_add(1);
         if begins {
@@ -85,7 +91,8 @@ impl<A, T: Copy> Switchgear<A, T> {
                 driver_ready: hardware != Some(Fault::GateDriver),
                 enable_input: true,
                 sensor_alive: true,
-                position_known: true,
+                position_known,
+                position_counted: !position_known,
                 offsets_a: Abc::default(),
                 configuration: Configuration::Good,
                 parameters_open: false,

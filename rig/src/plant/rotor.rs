@@ -25,6 +25,11 @@ impl Rotor {
         Self { source, pole_pairs, time_s: 0.0, angle_turns: 0.0, speed_rad_s }
     }
 
+    /// Turns the rotor to an electrical angle, in turns.
+    pub fn turn_to(&mut self, angle_turns: f64) {
+        self.angle_turns = angle_turns.rem_euclid(1.0);
+    }
+
     /// Electrical rotor angle, in turns, 0 ≤ x < 1.
     pub fn angle_turns(&self) -> f64 {
         self.angle_turns

@@ -11,7 +11,7 @@ pub use dual::{
 use super::{RECORDER, stop};
 use crate::cell::{Ring, Words};
 use crate::control::MtpaStart;
-use crate::frames::Abc;
+use crate::frames::{Abc, Angle};
 use crate::identification::Observation;
 use crate::modulation::CarrierHalf;
 use crate::operator::{self, Feedback, Status};
@@ -89,8 +89,24 @@ fn keep<const N: usize>(words: [u32; N]) {
 /// The rig's command beside the newest sample.
 #[inline(never)]
 pub fn command() -> DriveCommand {
-    let [torque, flags, ..] = COMMAND.each_ref().map(|word| word.load(Ordering::Relaxed));
-    wire::command_from_words([torque, flags])
+    wire::command_from_words(kept())
+}
+
+/// The turn that a position sensor without an angle had counted at the newest sample.
+#[inline(never)]
+pub fn counted() -> Option<Angle> {
+    wire::counted_from_words(kept())
+}
+
+fn kept() -> [u32; 3] {
+    let [torque, flags, angle, _] = COMMAND.each_ref().map(|word| word.load(Ordering::Relaxed));
+    [torque, flags, angle]
+}
+
+/// The angle where the position sensor began to count.
+#[inline(never)]
+pub fn align(now: Instant, zero: Angle) {
+    send(&Request::Align(now, zero).to_block());
 }
 
 /// Tells what a flight recorder holds, if a fault has frozen it, and ends the emulation.

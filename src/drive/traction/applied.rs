@@ -123,6 +123,24 @@ impl Passed {
     }
 }
 
+impl Applied {
+    /// Phase currents at the newest boundary, in A, and the volt-seconds of the half that ended there, in V·s; `None` for those while the gates
+    /// were off. Another look than [`Passed::read`], so that this one costs a running drive nothing.
+    #[inline(never)]
+    pub(super) fn ended(
+        &self,
+        trail: &History<COMMITTAL_WORDS>,
+        udc_v: f32,
+        clock: &Clock,
+    ) -> Option<(AlphaBeta, Option<AlphaBeta>)> {
+        trail.read(self.place, |records: [Record<COMMITTAL_WORDS>; 3]| {
+            let [newest, _, two] = records.map(CommittalRecord);
+            let volt_seconds = || two.volt_ticks() * (udc_v * clock.tick_s);
+            (newest.currents_a().clarke(), (!two.kind().is_off()).then(volt_seconds))
+        })
+    }
+}
+
 /// The quantities that control may regulate in a mode.
 pub(super) const fn follows(mode: Mode) -> Regulated {
     match mode.regulation() {

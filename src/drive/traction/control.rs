@@ -1,5 +1,7 @@
 //! The control interrupt's task.
 
+mod start_up;
+
 use super::applied::{Applied, NO_LIMITS, Passed, Steady, Wanted, committed, follows, limits};
 use super::six_step_exit::SixStepExit;
 use super::slot::{Decision, Slot};
@@ -18,6 +20,7 @@ use crate::protection::{self, Fault, FrozenWatch, MaskedFaults, Trip, Violation}
 use crate::recorder::{Record, State};
 use crate::time::Instant;
 use core::sync::atomic::Ordering;
+use start_up::Starting;
 
 type Input<'a> = PeriodInput<'a, Traction>;
 
@@ -63,6 +66,8 @@ pub struct ControlTask<M = &'static Tables, L = Controller> {
     slots: SlotTimer,
     /// Electrical speed at which the angle was lost, in rad/s, until that is acknowledged.
     lost_at: Option<f32>,
+    /// The search for the angle of a sensor that only counts.
+    starting: Starting,
 }
 
 impl<M: Machine> ControlTask<M> {
@@ -99,6 +104,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             operated: false,
             slots: SlotTimer::new(&settings.clock),
             lost_at: None,
+            starting: Starting::new(),
         }
     }
 
@@ -161,13 +167,13 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         }
         self.check_legs(sample, port);
         let overdue = applied.and_then(|applied| applied.overdue(now, &self.settings.clock));
-        let (omega, lost) = self.track(sample, command.enable);
+        let (omega, lost) = self.track(sample, command.enable, port);
         let violation = self
             .armed(overdue)
             .or_else(|| self.armed(lost))
             .or_else(|| self.judge(command, &measured, omega));
         self.check(violation, sample, port);
-        let pulsing =
+        let mut pulsing =
             self.trip.is_none() && command.enable && self.controller.speed_is_known() && !self.exit.crosses();
         let slot = Slot::of(applied.as_ref(), now, &self.settings.clock);
         if pulsing {
@@ -181,6 +187,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             self.pulse(input, &measured, applied.as_ref(), &slot, shared);
         } else {
             self.rest(now, omega, sample);
+            pulsing = self.start_up(input, applied.as_ref(), &slot, shared, port);
         }
         // Not finite if either is not.
         let odd = self.reference.voltage_v + omega;
@@ -280,16 +287,24 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
     }
 
     /// Follows the angle; returns the electrical speed, in rad/s. An angle that cannot be, or is not known, leaves the speed as it was. It
-    /// may be unknown until it is known for the first time, while nobody wants pulses. After a trip the angle is followed anew and its
+    /// may be unknown until it is known for the first time, while nobody wants pulses or the sensor counts. After a trip the angle is followed anew and its
     /// speed told, to leave the safe state by; whatever chooses a safe state keeps to the speed at which the angle was lost.
-    fn track(&mut self, sample: &Sample, enable: bool) -> (f32, Option<Violation>) {
+    fn track(
+        &mut self,
+        sample: &Sample,
+        enable: bool,
+        port: &mut impl ControlPort,
+    ) -> (f32, Option<Violation>) {
         let clock = self.settings.clock;
         let lost = match sample.angle {
             Some(angle) if self.controller.speed_is_known() => {
                 protection::check_angle(self.controller.innovation_rad(angle, &clock))
             }
             Some(_) => None,
-            None => protection::check_known(enable || self.controller.is_following()),
+            None => {
+                let needed = self.controller.is_following() || (enable && port.turned().is_none());
+                protection::check_known(needed)
+            }
         };
         let lost = self.armed(lost);
         if lost.is_some() {

@@ -117,7 +117,10 @@ impl<D: Demands> Operator<D> {
                 observed.udc_v.is_nan() || observed.udc_v < settings.ratings.dc_link_min_v,
                 Refusal::LinkNotCharged,
             ),
-            (!feedback.position_known || !observed.speed_known, Refusal::PositionUnknown),
+            (
+                if feedback.position_known { !observed.speed_known } else { !feedback.position_counted },
+                Refusal::PositionUnknown,
+            ),
             (self.bad_values == Some(Refusal::RequestNotFinite), Refusal::RequestNotFinite),
             (health::resting_current(input, settings).is_some(), Refusal::CauseStillPresent),
             (D::asks_torque(request) && !levels.with_torque, Refusal::TorqueNotZero),

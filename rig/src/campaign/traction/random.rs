@@ -148,8 +148,8 @@ impl Drive {
             udc_gain,
             angle_error_deg,
             angle_jitter_s: 1e-6 * angle_jitter_us,
-            freeze_at_s: None,
             seed,
+            ..Flaws::NONE
         };
         let conditions = Conditions {
             line_v: Some(line_v),

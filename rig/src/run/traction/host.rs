@@ -1,13 +1,13 @@
 //! The PMaSynRM drive's tasks on its bench.
 
-use crate::bench::{Bench, Simulated};
+use crate::bench::{Bench, Sampled, Simulated};
 use crate::run::{Interrupts, Supervisor, turn};
 use crate::without::Ablation;
 use anyhow::Result;
 use tractive::control::{ControlLaw, Controller};
 use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
 use tractive::experiment::{Memory, Teller};
-use tractive::frames::Abc;
+use tractive::frames::{Abc, Angle};
 use tractive::machine::{Ratings, Tables};
 use tractive::modulation::{CarrierHalf, Ladder, Schedule};
 use tractive::operator::{self, Feedback, Line, OperatorPort, Request, Slot, Status, slot_s};
@@ -21,8 +21,9 @@ use tractive::time::{Clock, Instant};
 struct Port<'a, 'w> {
     bench: &'a mut Bench,
     without: Option<Ablation>,
-    /// The bench's command beside the newest sample.
+    /// The bench's command beside the newest sample, and what a position sensor without an angle had counted.
     command: DriveCommand,
+    counted: Option<Angle>,
     ratings: &'a Ratings,
     wire: Option<&'a mut Wire<'w>>,
     error: Option<anyhow::Error>,
@@ -46,13 +47,13 @@ impl Port<'_, '_> {
 
 impl ControlPort for Port<'_, '_> {
     fn sample(&mut self, now: Instant) -> Sample {
-        let (sample, command) = self.bench.control_sample(now).unwrap_or_else(|error| {
+        let Sampled { sample, command, counted } = self.bench.control_sample(now).unwrap_or_else(|error| {
             self.error = Some(error.into());
             let currents_a = Abc::default();
             let sample = Sample { currents_a, udc_v: 0.0, angle: None, may_pulse: false, hardware: None };
-            (sample, DriveCommand::NONE)
+            Sampled { sample, command: DriveCommand::NONE, counted: None }
         });
-        self.command = command;
+        (self.command, self.counted) = (command, counted);
         sample
     }
 
@@ -74,6 +75,14 @@ impl ControlPort for Port<'_, '_> {
 
     fn leg_faults(&mut self) -> LegFaults {
         self.found()
+    }
+
+    fn turned(&mut self) -> Option<Angle> {
+        self.counted
+    }
+
+    fn align(&mut self, _now: Instant, zero: Angle) {
+        self.bench.align(zero);
     }
 }
 
@@ -254,7 +263,7 @@ impl<L: ControlLaw> Interrupts for Tasks<'_, L> {
     fn pwm(&mut self, bench: &mut Bench) -> Result<()> {
         let ratings = self.operator.ratings;
         let (command, without, wire) = (DriveCommand::NONE, self.without, self.wire.as_mut());
-        let mut port = Port { bench, command, ratings, without, wire, error: None };
+        let mut port = Port { bench, command, counted: None, ratings, without, wire, error: None };
         self.pwm.run(&mut port, &self.shared);
         port.error.map_or(Ok(()), Err)
     }
@@ -266,7 +275,7 @@ impl<L: ControlLaw> Interrupts for Tasks<'_, L> {
         };
         let ratings = self.operator.ratings;
         let (command, without, wire) = (DriveCommand::NONE, self.without, self.wire.as_mut());
-        let mut port = Port { bench, command, ratings, without, wire, error: None };
+        let mut port = Port { bench, command, counted: None, ratings, without, wire, error: None };
         if self.control.wants_revision() {
             self.pwm.revise(&mut port, &self.shared);
         }

@@ -1,6 +1,6 @@
 //! The PMaSynRM drive's image in QEMU.
 
-use crate::bench::{Bench, Simulated};
+use crate::bench::{Bench, Sampled, Simulated};
 use crate::run::{Emulator, Supervisor, in_qemu};
 use crate::trace::Recording;
 use anyhow::{Result, bail};
@@ -23,9 +23,9 @@ pub fn run_in_qemu(
         match request {
             Request::Hello => answers.control(&hello)?,
             Request::ControlSample(at) => {
-                let (sample, command) = bench.control_sample(at)?;
+                let Sampled { sample, command, counted } = bench.control_sample(at)?;
                 let done = bench.is_done();
-                answers.control(&wire::sample_to_block(&sample, &command, done))?;
+                answers.control(&wire::sample_to_block(&sample, &command, counted, done))?;
             }
             Request::ControlReport(at, report) => {
                 served.calls.traction(&report);
@@ -48,6 +48,7 @@ pub fn run_in_qemu(
                 bench.told(from, status)?;
                 served.hear(from, frame);
             }
+            Request::Align(_, zero) => bench.align(zero),
             Request::Observed(at, observation) => bench.identified(at, observation),
             Request::Recorded(record) => served.records.push(record),
             Request::End => return Ok(true),

@@ -18,6 +18,7 @@ mod prelude;
 pub(super) mod restart;
 pub(super) mod reversal;
 mod script;
+pub(super) mod start;
 pub(super) mod steady;
 pub(super) mod sweep;
 pub mod switches;
@@ -30,7 +31,7 @@ pub use sweep::Sweep;
 
 use super::System;
 use crate::analysis::{self, Figures};
-use crate::bench::{self, Bench, Flaws, Limits, LinePlan, Operator, Supply};
+use crate::bench::{self, Bench, Encoder, Flaws, Limits, LinePlan, Operator, Supply};
 use crate::inject::Injection;
 use crate::inject::traction::Kind;
 use crate::law::LawName;
@@ -160,6 +161,21 @@ pub struct TractionOptions {
     /// Time after its sample in which the angle is read, in µs; each time at another instant.
     #[arg(long, default_value_t = 0.0, value_parser = not_negative, allow_negative_numbers = true, hide = true)]
     pub angle_jitter_us: f64,
+    /// Error of the angle sensor that goes once with the electrical angle, amplitude in electrical degrees.
+    #[arg(long, default_value_t = 0.0, value_parser = finite, allow_negative_numbers = true, value_name = "DEG")]
+    pub angle_1f_deg: f64,
+    /// The same that goes twice with it.
+    #[arg(long, default_value_t = 0.0, value_parser = finite, allow_negative_numbers = true, value_name = "DEG")]
+    pub angle_2f_deg: f64,
+    /// Age of the angle when it is read, in µs.
+    #[arg(long, default_value_t = 0.0, value_parser = not_negative, allow_negative_numbers = true, value_name = "US")]
+    pub angle_late_us: f64,
+    /// Lines of the position encoder in a turn of the shaft, four counts each; without it the angle has no steps.
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..), value_name = "LINES")]
+    pub encoder_lines: Option<u32>,
+    /// Time constant of the current sensors, in µs.
+    #[arg(long, default_value_t = 0.0, value_parser = not_negative, allow_negative_numbers = true, value_name = "US")]
+    pub current_filter_us: f64,
     /// The true machine, where it is not the one that control knows: a folder of tables/, or the path of any machine folder.
     #[arg(long, value_name = "DIR")]
     pub plant: Option<String>,
@@ -197,6 +213,8 @@ pub struct Plan {
     pub injection: Option<Injection<Kind>>,
     /// From this time on control is told the same currents again and again, in s.
     pub freeze_at_s: Option<f64>,
+    /// The incremental encoder that the rotor has in the place of an absolute one.
+    pub encoder: Option<Encoder>,
 }
 
 impl Plan {
@@ -219,6 +237,7 @@ impl Plan {
             line: None,
             injection: None,
             freeze_at_s: None,
+            encoder: None,
         }
     }
 
@@ -271,6 +290,10 @@ impl System for Traction {
             ("--to", own("to"), -fastest_rpm, fastest_rpm),
             ("--current-gain", options.own.current_gain, -50.0, 100.0),
             ("--udc-gain", options.own.udc_gain, -50.0, 100.0),
+            ("--angle-1f-deg", options.own.angle_1f_deg, -90.0, 90.0),
+            ("--angle-2f-deg", options.own.angle_2f_deg, -90.0, 90.0),
+            ("--angle-late-us", options.own.angle_late_us, 0.0, 1e4),
+            ("--current-filter-us", options.own.current_filter_us, 0.0, 1e4),
         ])?;
         if (options.law, PatternsName::of(&options.own, machine), options.on)
             == (LawName::Pi, PatternsName::Optimal, On::Qemu)
@@ -466,6 +489,7 @@ fn truth(options: &Options, machine: &Machine) -> Result<Machine> {
 /// The bench with the machine that control knows, and the true one.
 fn bench(plan: Plan, setup: &Setup, options: &Options, (machine, truth): (&Machine, &Machine)) -> Bench {
     let flaws = options.flaws(machine.folder.parameters.trip_current_a);
+    let pole_pairs = f64::from(machine.folder.parameters.pole_pairs);
     let angle_jitter_s = 1e-6 * options.own.angle_jitter_us;
     let settings = bench::Settings {
         clock: clock(options, machine),
@@ -478,6 +502,10 @@ fn bench(plan: Plan, setup: &Setup, options: &Options, (machine, truth): (&Machi
         link_steps: plan.link,
         flaws: Flaws {
             angle_jitter_s,
+            angle_harmonics_deg: [options.own.angle_1f_deg, options.own.angle_2f_deg],
+            angle_late_s: 1e-6 * options.own.angle_late_us,
+            angle_counts: options.own.encoder_lines.map(|lines| 4.0 * f64::from(lines) / pole_pairs),
+            current_filter_s: 1e-6 * options.own.current_filter_us,
             freeze_at_s: plan.freeze_at_s,
             current_gain: options.own.current_gain / 100.0,
             udc_gain: options.own.udc_gain / 100.0,
@@ -487,8 +515,11 @@ fn bench(plan: Plan, setup: &Setup, options: &Options, (machine, truth): (&Machi
         injection: plan.injection,
         limits: Limits::NONE,
     };
-    let plant = Plant::new(&truth.folder, plan.speed, &options.plant());
-    let bench = Bench::new(plant, plan.operator, &settings).with_line(plan.line);
+    let mut plant = Plant::new(&truth.folder, plan.speed, &options.plant());
+    if let Some(encoder) = plan.encoder {
+        plant.motor.rotor_mut().turn_to(encoder.turns());
+    }
+    let bench = Bench::new(plant, plan.operator, &settings).with_line(plan.line).with_encoder(plan.encoder);
     match options.dt {
         Some(dt_s) if dt_s != plan.judged_step_s => bench.writing_every(dt_s),
         _ => bench,

@@ -85,7 +85,7 @@ impl Bench {
             None => self.plant.source_v = source_v,
             Some(line) => {
                 // Without the control interrupt nobody looks at slots.
-                if has_control && line.gear.sampled(self.time.tick(), hardware, || ()) {
+                if has_control && line.gear.sampled(self.time.tick(), hardware, true, || ()) {
                     return Err(BenchError::OperatorLate(t_s));
                 }
             }

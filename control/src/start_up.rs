@@ -1,0 +1,305 @@
+//! Initial angle at standstill: a law whose voltage pulses show where the rotor of a machine stands whose sensor only counts.
+//!
+//! 1. **Still**: the gates stay off until the sensor has counted nothing for a while.
+//! 2. **Axis**: a pulse in each of twelve directions, round after round, each followed by its opposite, which takes the flux linkage away again.
+//!    With `i = A ψ + B ψ*` as complex numbers, the sum of `Δi Δψ` over all directions keeps `B`, whose angle is twice that of the d axis,
+//!    along which the inductance is least. Dead time, offsets and saturation fall out of the sum, or do not turn it.
+//! 3. **Polarity**: magnets saturate the iron along +d, so that a pulse there takes more current than one along −d. Over all directions the currents
+//!    of the pulses add up to nothing but that.
+//! 4. **Push**: a machine whose currents do not show it shows its polarity by turning: a current along q moves the rotor by half a degree or so,
+//!    and the opposite current stops it again; so do shorter ones what drift is left.
+//!
+//! The rotor swings by a fraction of a degree meanwhile; a rotor that is turned begins the law anew.
+
+#![forbid(unsafe_code)]
+
+use crate::frames::{AlphaBeta, Angle, SinCos, sqrt};
+use crate::machine::Ratings;
+
+/// Time for which the rotor has to stand still, in s, and what counts as still, electrical: 1°.
+const STILL_S: f32 = 0.1;
+const STILL: Angle = Angle(11_930_465);
+/// Turn that begins the law anew: 3°.
+const TURNED: Angle = Angle(35_791_394);
+/// Turn that shows which way a push goes: 2°.
+const PUSHED: Angle = Angle(23_860_929);
+
+/// Flux linkage of a pulse, as a share of the magnets'.
+const PULSE_SHARE: f32 = 0.17;
+/// Commands without voltage before the first pulse.
+const LEAD: u32 = 4;
+/// Pulses of the rounds, in twelve directions each.
+const PULSES: u32 = 96;
+/// Most commands that build up a pulse.
+const LONGEST: f32 = 32.0;
+
+/// Current of a push, as a share of the largest; its longest time, in s; and commands without current after it.
+const PUSH_SHARE: f32 = 0.1;
+const PUSH_S: f32 = 0.5;
+const REST: u32 = 20;
+/// Share of the way to a push's current that a command goes, by the mean of both axes' inverse inductances.
+const LEAD_SHARE: f32 = 0.2;
+/// Most rounds in which what drift is left is taken away.
+const MENDS: u32 = 4;
+
+/// `B` over `A` from which there is an axis.
+const SALIENT: f32 = 0.03;
+/// Share of the currents' way along the pulses that shows the polarity.
+const POLAR_SHARE: f32 = 0.02;
+
+/// Everything that a command is made of.
+#[derive(Clone, Copy, Debug)]
+pub struct StartUpInput<'a> {
+    /// Turn of the rotor since its sensor began to count, electrical.
+    pub turned: Angle,
+    /// Largest voltage, peak phase, in V.
+    pub limit_v: f32,
+    /// Time for which a command acts, in s, greater than zero.
+    pub interval_s: f32,
+    /// The machine.
+    pub ratings: &'a Ratings,
+}
+
+/// The outcome of a step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum StartUpStep {
+    /// Gates off.
+    Wait,
+    /// This voltage, peak phase, in V.
+    Pulse(AlphaBeta),
+    /// The electrical angle that the rotor had where its sensor began to count. Gates off.
+    Found(Angle),
+    /// There is no axis, or no polarity, to be found. Gates off.
+    Failed,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Stage {
+    Still,
+    /// No voltage while the gates come on.
+    Lead,
+    Axis,
+    Push,
+    Stop,
+    Drift,
+    Mend,
+}
+
+/// The law's state.
+#[derive(Clone, Copy, Debug)]
+pub struct StartUp {
+    stage: Stage,
+    /// Time that the rotor has stood still, in s; and where it stood.
+    still_s: f32,
+    from: Angle,
+    /// Commands of this pulse or push; pulses; commands of the first push and of the newest mend, and how many mends there were.
+    commands: u32,
+    pulses: u32,
+    pushes: u32,
+    mend: u32,
+    mends: u32,
+    /// Turn where the push began, or the drift after it; whether the rotor went backward under the push, and whether it drifts as it went.
+    pushed_from: Angle,
+    against: bool,
+    drifts_on: bool,
+    /// Commands that build the pulse up, and their voltage in V.
+    halves: u32,
+    voltage_v: f32,
+    /// Current at the last boundary, in A.
+    before: AlphaBeta,
+    /// Sums over the boundaries with a flux linkage: `Δi Δψ`, `Δi·Δψ`, `Δψ²`, the currents of the pulses; and how many they are.
+    salient: AlphaBeta,
+    round: f32,
+    squared: f32,
+    polar: AlphaBeta,
+    count: f32,
+    /// Electrical angle of the axis where `from` is.
+    axis: Angle,
+}
+
+impl StartUp {
+    /// Before the first command.
+    pub const fn new() -> Self {
+        const NONE: AlphaBeta = AlphaBeta { alpha: 0.0, beta: 0.0 };
+        Self {
+            stage: Stage::Still,
+            still_s: 0.0,
+            from: Angle::ZERO,
+            commands: 0,
+            pulses: 0,
+            pushes: 0,
+            mend: 0,
+            mends: 0,
+            pushed_from: Angle::ZERO,
+            against: false,
+            drifts_on: false,
+            halves: 0,
+            voltage_v: 0.0,
+            before: NONE,
+            salient: NONE,
+            round: 0.0,
+            squared: 0.0,
+            polar: NONE,
+            count: 0.0,
+            axis: Angle::ZERO,
+        }
+    }
+
+    /// `true` until the first pulse.
+    pub fn is_waiting(&self) -> bool {
+        self.stage == Stage::Still
+    }
+
+    /// Takes the current at a carrier boundary, in A, and the volt-seconds since the last one, in V·s; `None` where they are not known.
+    pub fn observe(&mut self, current: AlphaBeta, volt_seconds: Option<AlphaBeta>) {
+        let (change, twice) = (current - self.before, current + self.before);
+        self.before = current;
+        let Some(flux) = volt_seconds.filter(|_| self.stage == Stage::Axis) else { return };
+        self.salient = self.salient + change.turned(SinCos { sin: flux.beta, cos: flux.alpha });
+        self.round += change.dot(flux);
+        self.squared += flux.squared();
+        let built = twice.dot(flux);
+        if built > 0.0 {
+            (self.polar, self.count) = (self.polar + change, self.count + 1.0);
+        } else if built < 0.0 {
+            (self.polar, self.count) = (self.polar - change, self.count + 1.0);
+        }
+    }
+
+    /// A control period without a command, `passed_s` after the last one.
+    pub fn wait(&mut self, turned: Angle, passed_s: f32) {
+        self.still_s += passed_s;
+        let limit = if self.is_waiting() { STILL } else { TURNED };
+        let searches = matches!(self.stage, Stage::Still | Stage::Lead | Stage::Axis);
+        if searches && off(turned - self.from) > limit.0 {
+            *self = Self { from: turned, ..Self::new() };
+        }
+    }
+
+    /// The next command.
+    pub fn step(&mut self, input: &StartUpInput) -> StartUpStep {
+        let nothing = StartUpStep::Pulse(AlphaBeta::default());
+        match self.stage {
+            Stage::Still if self.still_s < STILL_S => return StartUpStep::Wait,
+            Stage::Still => self.begin(Stage::Lead),
+            Stage::Lead if self.commands < LEAD => {
+                self.commands += 1;
+                return nothing;
+            }
+            Stage::Lead => self.begin(Stage::Axis),
+            Stage::Axis => {}
+            Stage::Push | Stage::Stop | Stage::Drift | Stage::Mend => return self.push(input),
+        }
+        if self.stage == Stage::Lead {
+            return nothing;
+        }
+        if self.commands == 0 {
+            (self.halves, self.voltage_v) = pulse(input);
+        }
+        let built = self.commands < self.halves;
+        if self.commands == 2 * self.halves {
+            (self.commands, self.pulses) = (0, self.pulses + 1);
+            self.pushed_from = input.turned;
+            return if self.pulses == PULSES { self.judge() } else { None }.unwrap_or(nothing);
+        }
+        self.commands += 1;
+        // Of four directions at right angles one, its opposite, and the others, so that the torques of magnets and of saliency fall out of each
+        // four; and then the same 30° further.
+        let turned = (self.pulses >> 2).wrapping_mul(Angle::DEG_30.0);
+        let across = if self.pulses & 2 == 0 { Angle::ZERO } else { Angle::DEG_90 };
+        let direction = Angle(turned ^ self.pulses << 31) + across;
+        StartUpStep::Pulse(along(direction) * if built { self.voltage_v } else { -self.voltage_v })
+    }
+
+    /// The axis, and its polarity if the currents show it.
+    fn judge(&mut self) -> Option<StartUpStep> {
+        let salient = sqrt(self.salient.squared());
+        // Not a number is no axis.
+        let has_axis = salient > SALIENT * self.round;
+        if !has_axis {
+            return Some(StartUpStep::Failed);
+        }
+        self.axis = Angle((self.salient.angle().signed() >> 1) as u32);
+        let polar_a = self.polar.park(self.axis.sin_cos()).d;
+        // The currents' way is the sum of `Δi·Δψ` over the flux linkages' mean.
+        let way = POLAR_SHARE * self.round;
+        if polar_a * polar_a * self.squared > way * way * self.count {
+            return Some(self.found(polar_a < 0.0));
+        }
+        self.begin(Stage::Push);
+        None
+    }
+
+    fn begin(&mut self, stage: Stage) {
+        (self.stage, self.commands, self.pulses) = (stage, 0, 0);
+    }
+
+    /// A command of the push.
+    fn push(&mut self, input: &StartUpInput) -> StartUpStep {
+        let moved = input.turned - self.pushed_from;
+        self.commands += 1;
+        match self.stage {
+            Stage::Push if off(moved) > PUSHED.0 => {
+                (self.pushes, self.against) = (self.commands, moved.signed() < 0);
+                self.begin(Stage::Stop);
+            }
+            Stage::Push if self.commands as f32 * input.interval_s > PUSH_S => return StartUpStep::Failed,
+            Stage::Stop if self.commands >= self.pushes => self.begin(Stage::Drift),
+            Stage::Drift if self.commands == REST => self.pushed_from = input.turned,
+            Stage::Drift if self.commands >= REST + self.pushes => {
+                // The push gave twice its mean speed, and took as long.
+                let share = off(moved) as f32 * (0.5 / PUSHED.0 as f32);
+                self.drifts_on = (moved.signed() < 0) == self.against;
+                self.mend = (self.pushes as f32 * share) as u32;
+                if self.mend == 0 || self.mends == MENDS {
+                    return self.found(self.against);
+                }
+                self.mends += 1;
+                self.begin(Stage::Mend);
+            }
+            Stage::Mend if self.commands > self.mend => self.begin(Stage::Drift),
+            _ => {}
+        }
+        let share = match self.stage {
+            Stage::Push => PUSH_SHARE,
+            Stage::Stop => -PUSH_SHARE,
+            Stage::Mend if self.drifts_on => -PUSH_SHARE,
+            Stage::Mend => PUSH_SHARE,
+            Stage::Still | Stage::Lead | Stage::Axis | Stage::Drift => 0.0,
+        };
+        let wanted = along(self.axis + Angle::DEG_90) * (share * input.ratings.max_current_a);
+        let lead_ohm = LEAD_SHARE * self.squared / (self.round * input.interval_s);
+        StartUpStep::Pulse((wanted - self.before) * lead_ohm + wanted * input.ratings.stator_resistance_ohm)
+    }
+
+    /// Found, with d along the axis or against it.
+    fn found(&self, against: bool) -> StartUpStep {
+        StartUpStep::Found(Angle((self.axis - self.from).0 ^ u32::from(against) << 31))
+    }
+}
+
+impl Default for StartUp {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// Commands that build a pulse up, and their voltage in V.
+fn pulse(input: &StartUpInput) -> (u32, f32) {
+    let pulse_v = PULSE_SHARE * input.ratings.magnet_flux_wb / input.interval_s;
+    let share = pulse_v / input.limit_v;
+    let halves = if share < LONGEST { share as u32 + 1 } else { LONGEST as u32 };
+    (halves, if share < LONGEST { pulse_v / halves as f32 } else { input.limit_v })
+}
+
+/// The unit vector of a direction.
+#[inline(never)]
+fn along(direction: Angle) -> AlphaBeta {
+    let SinCos { sin, cos } = direction.sin_cos();
+    AlphaBeta { alpha: cos, beta: sin }
+}
+
+/// The magnitude of a turn of less than half a turn.
+fn off(turn: Angle) -> u32 {
+    turn.signed().unsigned_abs()
+}

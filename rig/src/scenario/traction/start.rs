@@ -1,0 +1,101 @@
+//! A start without an angle: the encoder has seen no index since it was switched on, the rotor stands anywhere, and the drive finds out
+//! where before it gives torque.
+
+use super::line::{self, within};
+use super::prelude::*;
+use super::udc_v;
+use crate::bench::{Encoder, LinePlan};
+use crate::options::number;
+use crate::plant::{DcLinkSettings, Source, SpeedSource};
+use crate::steps::held;
+use crate::verdict::bound;
+use tractive::machine::Ratings;
+use tractive::operator::Request;
+
+/// See the module.
+#[derive(Clone, Copy, Debug, Args, Serialize)]
+pub struct Start {
+    /// The rotor's place behind its index, mechanical, in degrees.
+    #[arg(long, value_name = "DEG", default_value_t = 77.0, value_parser = turn, allow_negative_numbers = true)]
+    from_deg: f64,
+    /// The brake holds the rotor.
+    #[arg(long)]
+    braked: bool,
+}
+
+/// From 0 to 360.
+fn turn(text: &str) -> Result<f64, String> {
+    number(text, "a number from 0 to 360", |value| (0.0..=360.0).contains(&value))
+}
+
+const CHARGE: (f64, f64) = (0.1, 0.2);
+const ENABLE_S: f64 = 0.3;
+/// Share of the largest torque that is demanded from these times on.
+const TORQUE: [(f64, f64); 2] = [(0.8, 0.2), (1.1, 0.0)];
+/// The torque is judged.
+const JUDGED_S: (f64, f64) = (0.95, 1.09);
+const DURATION_S: f64 = 1.2;
+
+fn request(t_s: f64, ratings: &Ratings) -> Request {
+    Request {
+        enable: t_s >= ENABLE_S,
+        charge: within(&[CHARGE], t_s),
+        torque_nm: held(&TORQUE, t_s).unwrap_or(0.0) as f32 * ratings.max_torque_nm,
+        ..Request::idle(ratings)
+    }
+}
+
+/// Farthest turn backward of the rotor, mechanical, in degrees.
+fn backward_deg(recording: &Recording) -> f64 {
+    let turned = recording.rows.windows(2).scan(0.0, |turned, rows| {
+        *turned += 6.0 * 0.5 * (rows[0].speed_rpm + rows[1].speed_rpm) * (rows[1].t_s - rows[0].t_s);
+        Some(*turned)
+    });
+    turned.fold(0.0, |most, turned| f64::max(most, -turned))
+}
+
+impl Scenario<Traction> for Start {
+    fn plan(&self, options: &Options, machine: &Machine) -> Plan {
+        let (ratings, parameters) = (&machine.tables.ratings, &machine.folder.parameters);
+        let link = line::scaled(machine);
+        let source = Source { voltage_v: udc_v(options, machine), ..link.source };
+        let line = LinePlan {
+            starts_charged: true,
+            ..LinePlan::new(DcLinkSettings { source, ..link }, Box::new(|t_s| request(t_s, ratings)))
+        };
+        let plan = Plan::operated(DURATION_S, Vec::new(), line);
+        let encoder = Encoder::new(parameters.pole_pairs, self.from_deg / 360.0);
+        let inertia_kg_m2 = parameters.rotor_inertia_kg_m2;
+        let free = SpeedSource::Inertia { inertia_kg_m2, load_nm: 0.0 };
+        Plan { speed: if self.braked { plan.speed } else { free }, encoder: Some(encoder), ..plan }
+    }
+
+    fn figures(&self, recording: &Recording, options: &Options, machine: &Machine) -> Figures {
+        let mut figures = analysis::common(recording);
+        let wanted_nm = TORQUE[0].1 * machine.folder.parameters.max_torque_nm;
+        let judged = analysis::window(recording, JUDGED_S.0, JUDGED_S.1);
+        let torque_error = (mean(judged, |row| row.te_nm) / wanted_nm - 1.0).abs();
+        let found = recording.found;
+        let (error_deg, backward_deg) = (found.map(|found| found.error_deg), backward_deg(recording));
+        figures.set("angle_found_after_s", found.map(|found| found.t_s - ENABLE_S));
+        figures.set("angle_error_deg", error_deg);
+        figures.set("turned_backward_deg", backward_deg);
+        let mut verdicts = line::verdicts(recording, &[]);
+        verdicts.extend([
+            Verdict::never("drive tripped", recording.trip().is_some()),
+            Verdict::at_most("angle off, electrical, in degrees", error_deg.map(f64::abs), 5.0),
+            Verdict::at_most("turned backward, mechanical, in degrees", backward_deg, 5.0),
+            Verdict::at_most("mean torque off the demand (share)", torque_error, bound(options, 0.01, 0.02)),
+        ]);
+        line::figures(&mut figures, recording);
+        figures.set("verdicts", verdicts);
+        figures
+    }
+
+    fn plots(&self, recording: &Recording, _: &Options, _: &Machine, page: &mut Page) {
+        line::plots(page, recording);
+        let end_s = recording.found.map_or(TORQUE[0].0, |found| found.t_s + 0.01);
+        page.zoom("the angle is found", recording, (ENABLE_S, end_s));
+        page.zoom("the last pulses", recording, (end_s - 0.03, end_s));
+    }
+}

@@ -1,0 +1,85 @@
+//! The start of a drive whose position sensor only counts: the pulses of [`StartUp`] in the place of the control law's.
+
+use super::super::Shared;
+use super::super::applied::Applied;
+use super::super::slot::Slot;
+use super::{ControlTask, Input};
+use crate::control::ControlLaw;
+use crate::frames::{AlphaBeta, six_step_v};
+use crate::machine::Machine;
+use crate::modulation::{Mode, Reference, depth_limit};
+use crate::ports::ControlPort;
+use crate::protection::Fault;
+use crate::start_up::{StartUp, StartUpInput, StartUpStep};
+use crate::time::Instant;
+
+/// Share of the largest voltage of a carrier that the pulses use.
+const USED_SHARE: f32 = 0.95;
+
+/// The law, and the newest carrier boundary that it has seen.
+pub(super) struct Starting {
+    law: StartUp,
+    boundary: Option<Instant>,
+}
+
+impl Starting {
+    pub(super) const fn new() -> Self {
+        Self { law: StartUp::new(), boundary: None }
+    }
+}
+
+impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
+    /// A control period at rest: where the drive is enabled and its sensor counts, a period of the search for the angle. `true` if it makes pulses.
+    #[cold]
+    #[inline(never)]
+    pub(super) fn start_up(
+        &mut self,
+        input: Input,
+        applied: Option<&Applied>,
+        slot: &Slot,
+        shared: &Shared,
+        port: &mut impl ControlPort,
+    ) -> bool {
+        let Input { sample, command } = input;
+        let starts = sample.angle.is_none() && command.enable && self.trip.is_none();
+        let Some(turned) = (if starts { port.turned() } else { None }) else {
+            self.starting = Starting::new();
+            return false;
+        };
+        let clock = self.settings.clock;
+        let now = self.now.before(clock.control_ticks);
+        let starting = &mut self.starting;
+        starting.law.wait(turned, clock.control_s());
+        if let Some(applied) = applied
+            && starting.boundary != Some(applied.at)
+        {
+            if let Some((current, volt_seconds)) = applied.ended(&shared.applied, sample.udc_v, &clock) {
+                starting.law.observe(current, volt_seconds);
+            }
+            starting.boundary = Some(applied.at);
+        }
+        let mut vector = AlphaBeta::default();
+        if slot.commands {
+            let devices = &self.settings.devices;
+            let shortest_s = clock.seconds(devices.shortest_half_ticks as i32);
+            let limit_v = USED_SHARE * depth_limit(Mode::Async, 0.0, devices) * six_step_v(sample.udc_v);
+            let interval_s = if shortest_s < clock.control_s() { clock.control_s() } else { shortest_s };
+            let ratings = &self.machine.tables().ratings;
+            match starting.law.step(&StartUpInput { turned, limit_v, interval_s, ratings }) {
+                StartUpStep::Wait => return false,
+                StartUpStep::Pulse(wanted) => vector = wanted,
+                StartUpStep::Found(zero) => {
+                    port.align(now, zero);
+                    return false;
+                }
+                StartUpStep::Failed => {
+                    self.trip_on((Fault::PositionSensor, 0.0, 1.0), sample, port);
+                    return false;
+                }
+            }
+        }
+        let voltage_v = crate::frames::sqrt(vector.squared());
+        self.reference = Reference { voltage_v, vector, ..self.reference };
+        !self.starting.law.is_waiting()
+    }
+}
