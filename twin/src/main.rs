@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use tractive_twin::output::write;
 use tractive_twin::run::{Settings, drive, prepare};
+use tractive_rig::talk::System;
 use tractive_twin::time::seconds;
 
 /// Executes the image of the NUCLEO-G474RE against a model of its chip, with the simulated motor at the pins.
@@ -15,6 +16,9 @@ struct Arguments {
     image: PathBuf,
     /// The script of commands over CAN.
     script: PathBuf,
+    /// The system that it is the image of.
+    #[arg(long, value_enum, default_value_t)]
+    system: System,
     /// The folder for trace, edges, telemetry and frames.
     #[arg(long)]
     out: Option<PathBuf>,
@@ -35,7 +39,7 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: &Arguments) -> Result<bool> {
-    let settings = Settings::new(&arguments.image, std::fs::read_to_string(&arguments.script)?);
+    let settings = Settings::of_file(&arguments.image, arguments.system, &arguments.script)?;
     let (mut cpu, image) = prepare(&settings)?;
     println!("image {} SHA-256 {}", arguments.image.display(), image.sha256);
     let start = std::time::Instant::now();
@@ -59,14 +63,15 @@ fn run(arguments: &Arguments) -> Result<bool> {
         cpu.longest,
         cpu.lowest_stack,
     );
+    let good = machine.findings.all.is_empty() && talk.failures.is_empty();
     if arguments.accesses {
         for (address, (reads, writes)) in &machine.chip.accesses {
             println!("{address:#010x} {reads:>9} {writes:>9}");
         }
     }
     if let Some(out) = &arguments.out {
-        write(machine, out)?;
+        write(&mut cpu.machine_mut().world, &settings, out)?;
     }
     outcome?;
-    Ok(machine.findings.all.is_empty() && talk.failures.is_empty())
+    Ok(good)
 }

@@ -8,6 +8,7 @@ use crate::run::{Settings, drive, prepare};
 use crate::time::MICROSECOND;
 use anyhow::Result;
 use std::path::Path;
+use tractive_rig::talk::System;
 
 /// A change of a write: address and value in, value out.
 pub type Change = fn(u32, u32) -> u32;
@@ -114,11 +115,11 @@ pub const MISTAKES: [Mistake; 38] = [
 
 /// Runs the drive with a change; what showed it, or `None`.
 pub fn caught(image: &Path, change: Option<Change>, overcurrent: bool) -> Result<Option<String>> {
-    let settings = Settings::new(image, SCRIPT.to_owned());
+    let settings = Settings::new(image, System::Pmasynrm, SCRIPT.to_owned());
     let (mut cpu, _) = prepare(&settings)?;
     let machine = cpu.machine_mut();
     machine.mistake = change;
-    machine.world.link.udc_v = machine.world.link.settings.source.voltage_v;
+    machine.world.side.charge();
     if let Err(error) = drive(&mut cpu) {
         return Ok(Some(format!("{error:#}")));
     }
@@ -148,7 +149,7 @@ fn held(cpu: &mut Cpu, overcurrent: bool) -> Result<Option<String>> {
     if !world.any_gate() {
         return Ok(Some("no gate is on".to_owned()));
     }
-    (world.ready, world.excess_a) = (overcurrent, if overcurrent { 600.0 } else { 0.0 });
+    (world.ready, world.excess_a) = (overcurrent, (0, 0, if overcurrent { 600.0 } else { 0.0 }));
     // Both act without a clock: at once.
     machine.settle();
     let until = machine.now() + BREAK;
