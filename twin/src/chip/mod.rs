@@ -104,7 +104,7 @@ impl Chip {
     /// Does what is due.
     pub fn act(&mut self, now: Time, world: &mut World, findings: &mut Findings) {
         self.rcc.act(now);
-        self.watchdog.act(now, findings);
+        self.watchdog.act(now);
         for timer in &mut self.timers {
             if let Some(tracks) = world.encoder(timer.name, &self.gpio) {
                 timer.follow(tracks);
@@ -144,6 +144,16 @@ impl Chip {
                 if happened {
                     adc.trigger(&format!("{source}_{signal}"), now);
                 }
+            }
+        }
+    }
+
+    /// The debugger halts the core: the timers that are told to stop with it do, outputs off.
+    pub fn halt(&mut self, now: Time) {
+        let cycle = self.rcc.cycle();
+        for timer in &mut self.timers {
+            if self.system.stops_with_core(timer.name) {
+                timer.freeze(now, cycle);
             }
         }
     }

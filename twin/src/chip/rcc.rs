@@ -101,6 +101,27 @@ impl Rcc {
         self.word(CR) & CSSON != 0 && !self.crystal
     }
 
+    /// The crystal stops. With the clock security system the core goes on from the internal oscillator, and `true` is given: an exception
+    /// comes (RM0440, clock security system).
+    pub fn lose_crystal(&mut self) -> bool {
+        self.crystal = false;
+        (self.crystal_ready, self.pll_ready) = (Time::MAX, Time::MAX);
+        if self.word(CR) & CSSON == 0 {
+            return false;
+        }
+        let control = self.word(CR) & !(HSEON | HSERDY | PLLON | PLLRDY);
+        let configuration = self.word(CFGR) & !0b1111 | 0b0101;
+        self.words.insert(CR, control);
+        self.words.insert(CFGR, configuration);
+        self.core_hz = HSI_HZ;
+        true
+    }
+
+    /// The flags of the last reset's cause.
+    pub fn set_cause(&mut self, flags: u32) {
+        self.words.insert(CSR, flags);
+    }
+
     /// The next change.
     pub fn next_event(&self) -> Time {
         self.crystal_ready.min(self.pll_ready)

@@ -272,8 +272,8 @@ impl World {
         }
     }
 
-    /// Looks at the gates' pins: none is on before every other of its leg that is off has been so for the dead time, and none is on
-    /// together with others but where the inverter is made for it.
+    /// Looks at the gates' pins. A device may still conduct within the dead time after its gate went off; a leg is not shorted by such
+    /// devices, and by commanded ones alone only where the inverter is made for it.
     pub fn see_gates(&mut self, now: Time, chip: &Chip, findings: &mut Findings) {
         let dead = Time::from(self.stage.dead_time_ns) * MICROSECOND / 1_000;
         let before = self.gates.clone();
@@ -291,9 +291,10 @@ impl World {
         }
         let shorted = matches!(self.side, Side::Zs9(_));
         for gate in (0..self.pins.len()).filter(|gate| self.gates[*gate] && !before[*gate]) {
-            let rested = self.leg_of[gate].iter().filter(|other| **other != gate).all(|other| {
-                if self.gates[*other] { shorted } else { self.off[*other].is_none_or(|off| now >= off + dead) }
-            });
+            let others = self.leg_of[gate].iter().copied().filter(|other| *other != gate);
+            let lingers = |other: usize| self.off[other].is_some_and(|off| now < off + dead);
+            let conducts = others.clone().all(|other| self.gates[other] || lingers(other));
+            let rested = !conducts || (shorted && others.clone().all(|other| self.gates[other]));
             findings.expect(rested, || {
                 let name = self.wiring.gates[gate].0;
                 format!("gate {name} goes on within the dead time of its leg's other device")

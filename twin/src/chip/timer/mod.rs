@@ -82,6 +82,8 @@ pub struct Timer {
     /// A break input is active, and the chip's own.
     broken: (bool, bool),
     locked: u32,
+    /// A debugger holds it, with its outputs off.
+    frozen: bool,
     /// The last instant at which it was looked at.
     seen: Time,
 }
@@ -102,6 +104,7 @@ impl Timer {
             references: [Reference::default(); 4],
             broken: (false, false),
             locked: 0,
+            frozen: false,
             seen: 0,
         }
     }
@@ -131,7 +134,7 @@ impl Timer {
     }
 
     fn is_running(&self) -> bool {
-        self.word(CR1) & CEN != 0 && !self.is_encoder()
+        self.word(CR1) & CEN != 0 && !self.is_encoder() && !self.frozen
     }
 
     fn tick(&self, cycle: Time) -> Time {
@@ -218,6 +221,12 @@ impl Timer {
             self.words[(CCR1 + 8) / 4] = self.base.0;
             self.words[SR / 4] |= CC3IF;
         }
+    }
+
+    /// A debugger halts it: the counter stands, the outputs are off as without MOE.
+    pub fn freeze(&mut self, now: Time, cycle: Time) {
+        self.base = (self.position(now, cycle), now);
+        self.frozen = true;
     }
 
     fn start(&mut self, now: Time) {
