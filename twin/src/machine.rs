@@ -64,6 +64,7 @@ pub struct Machine {
     /// The same, but only for one block.
     pub deferred: bool,
     now: Time,
+    settled: Time,
     next: Time,
     /// The block before which the emulator has stopped: its cost is counted already.
     counted: Option<u32>,
@@ -87,6 +88,7 @@ impl Machine {
             masked: false,
             deferred: false,
             now: 0,
+            settled: 0,
             next: 0,
             counted: None,
         }
@@ -170,10 +172,12 @@ impl Machine {
 
     /// Does everything that is due, instant by instant.
     pub fn settle(&mut self) {
-        let Self { chip, world, findings, nvic, now, .. } = self;
+        let Self { chip, world, findings, nvic, now, settled, .. } = self;
         self.masked = false;
         loop {
-            let due = chip.next_event().min(world.next_event()).min(*now);
+            // Never back: what a changed clock lets be overdue comes now.
+            let due = chip.next_event().min(world.next_event()).min(*now).max(*settled);
+            *settled = due;
             if !nvic.has_fpu() && chip.is_pulsing() {
                 findings.add("the gates pulse before CPACR has switched the floating-point unit on");
             }

@@ -31,6 +31,10 @@ const SCRIPT: &str = "\
 /// The time from the cause of a break until every gate must be off.
 const BREAK: u64 = MICROSECOND;
 
+/// The telemetry's period, in s, and the share by which its mean may be off: a crystal's error and the frames' jitter are far below.
+const TELEMETRY_S: f64 = 0.01;
+const TELEMETRY_SHARE: f64 = 0.01;
+
 /// The edges that every gate has at least in the drive: half of those of a carrier of 900 Hz.
 const PULSES: usize = 300;
 
@@ -135,10 +139,22 @@ pub fn caught(image: &Path, change: Option<Change>, overcurrent: bool) -> Result
     {
         return Ok(Some(format!("gate {gate} hardly pulses")));
     }
+    if let Some(slow) = off_time(&machine.world.talk.rows) {
+        return Ok(Some(slow));
+    }
     if !machine.chip.watchdog.is_running() {
         return Ok(Some("the watchdog does not run".into()));
     }
     held(&mut cpu, overcurrent)
+}
+
+/// The telemetry's period where it is not the protocol's: by the bus's clock, which is not the drive's.
+fn off_time(rows: &[Vec<String>]) -> Option<String> {
+    let seconds = |row: &Vec<String>| row.first()?.parse::<f64>().ok();
+    let (first, last) = (seconds(rows.first()?)?, seconds(rows.last()?)?);
+    let mean_s = (last - first) / (rows.len() - 1).max(1) as f64;
+    let off = (mean_s / TELEMETRY_S - 1.0).abs() > TELEMETRY_SHARE;
+    off.then(|| format!("telemetry comes every {:.3} ms, not every {:.3} ms", 1e3 * mean_s, 1e3 * TELEMETRY_S))
 }
 
 /// The cause of a break while the gates pulse: whether one is on later than it may be.

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use tractive_twin::mistakes::{MISTAKES, caught, outcome};
 
 /// Mistakes that a run may miss.
-const MISSED: usize = 2;
+const MISSED: usize = 0;
 
 fn image() -> PathBuf {
     std::env::var_os("TRACTIVE_NUCLEO_IMAGE").expect("TRACTIVE_NUCLEO_IMAGE").into()
@@ -25,7 +25,9 @@ fn the_image_as_it_is_shows_nothing() {
 fn a_mistake_is_shown() {
     let image = image();
     let mut missed = Vec::new();
-    for mistake in &MISTAKES {
+    // One alone, by a part of its name.
+    let only = std::env::var("TRACTIVE_MISTAKE").unwrap_or_default();
+    for mistake in MISTAKES.iter().filter(|mistake| mistake.name.contains(&only)) {
         let shown = outcome(&image, mistake).unwrap();
         println!("| {} | {} |", mistake.name, shown.as_deref().unwrap_or("not shown"));
         if shown.is_none() {

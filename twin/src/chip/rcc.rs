@@ -21,7 +21,7 @@ const PLLRDY: u32 = 1 << 25;
 pub const IWDGRSTF: u32 = 1 << 29;
 const RMVF: u32 = 1 << 23;
 /// Flags after power has come: brown-out and pin.
-const POWER_ON: u32 = 0b11 << 26;
+pub const POWER_ON: u32 = 0b11 << 26;
 
 /// The internal oscillator and the board's crystal, in Hz.
 const HSI_HZ: u32 = 16_000_000;

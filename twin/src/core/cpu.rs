@@ -220,7 +220,8 @@ impl Cpu {
     }
 
     fn enter(&mut self, exception: usize) -> Result<()> {
-        let floats = self.get(R::CONTROL)? & FPCA != 0;
+        // The emulator's own word for it, CONTROL.FPCA, stays behind where a block goes on after a return: what is saved is never too little.
+        let floats = self.machine().nvic.has_fpu();
         let (sp, xpsr) = (self.get(R::SP)?, self.get(R::XPSR)?);
         let words = FRAME + if floats { FLOATS } else { 0 };
         // Aligned to eight bytes; bit 9 of the stacked word says whether that took one.
