@@ -8,7 +8,7 @@ use crate::run::{Settings, prepare};
 use crate::time::{MILLISECOND, Time};
 use anyhow::{Result, ensure};
 use std::path::Path;
-use tractive_rig::talk::System;
+use tractive_rig::talk::{Listener, System};
 
 /// The drive that is disturbed.
 const SCRIPT: &str = "\
@@ -24,6 +24,8 @@ const SCRIPT_ZS9: &str = "\
 1.00 torque 20 20 over 0.05
 3.00 end
 ";
+/// The frames that are shown.
+const FRAMES: usize = 8;
 /// The time for which it is looked at afterwards.
 const AFTER: Time = 300 * MILLISECOND;
 
@@ -112,6 +114,8 @@ pub struct Seen {
     pub told: String,
     /// Whether commands are listened to at the end, as told.
     pub listening: String,
+    /// The last frames of the drive, as logged.
+    pub frames: Vec<String>,
     /// What was found besides.
     pub findings: Vec<String>,
 }
@@ -128,7 +132,7 @@ pub fn look(image: &Path, system: System, cause: Cause, when: When) -> Result<Se
     let machine = cpu.machine();
     ensure!(machine.findings.all.is_empty(), "{}", machine.findings.all[0]);
     let (from, edges, pulsed) = (machine.now(), machine.world.edges.len(), machine.world.any_gate());
-    disturb(&mut cpu, cause, from)?;
+    disturb(&mut cpu, system, cause, from)?;
     cpu.run(from + 2 * AFTER / 3)?;
     let before = cpu.machine().world.talk.received;
     cpu.run(from + AFTER)?;
@@ -142,14 +146,21 @@ pub fn look(image: &Path, system: System, cause: Cause, when: When) -> Result<Se
         heard: world.talk.received - before,
         resets: machine.resets,
         told: format!("{} {}", say("state"), say("fault")).trim().to_owned(),
+        frames: last_frames(&world.talk.frames),
         listening: say("listening"),
         findings: machine.findings.all.iter().map(|finding| finding.text.clone()).collect(),
     })
 }
 
-fn disturb(cpu: &mut Cpu, cause: Cause, from: Time) -> Result<()> {
+fn last_frames(log: &str) -> Vec<String> {
+    log.lines().rev().filter(|line| line.ends_with('R')).take(FRAMES).map(str::to_owned).collect()
+}
+
+fn disturb(cpu: &mut Cpu, system: System, cause: Cause, from: Time) -> Result<()> {
     let machine = cpu.machine_mut();
     machine.may_bite = true;
+    // A drive that begins anew counts its frames anew: whoever listens from now on hears it.
+    machine.world.talk.listener = Listener::new(system);
     match cause {
         Cause::Drivers => machine.world.ready = false,
         Cause::Overcurrent => machine.world.excess_a = (0, 0, 600.0),

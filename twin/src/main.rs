@@ -4,12 +4,12 @@ use anyhow::Result;
 use clap::Parser;
 use std::path::PathBuf;
 use std::process::ExitCode;
+use tractive_rig::talk::System;
 use tractive_twin::core::cpu::RAM;
 use tractive_twin::machine::Access;
 use tractive_twin::output::write;
 use tractive_twin::run::{Settings, drive, prepare};
-use tractive_rig::talk::System;
-use tractive_twin::time::seconds;
+use tractive_twin::time::{SECOND, Time, seconds};
 
 /// Executes the image of the NUCLEO-G474RE against a model of its chip, with the simulated motor at the pins.
 #[derive(Parser)]
@@ -24,6 +24,9 @@ struct Arguments {
     /// The folder for trace, edges, telemetry and frames.
     #[arg(long)]
     out: Option<PathBuf>,
+    /// The drivers' ready wire drops at this time for 10 ms, in s.
+    #[arg(long, value_name = "SECONDS")]
+    drivers_fail: Option<f64>,
     /// Lists every access to a peripheral: instant in µs, exception, access.
     #[arg(long)]
     record: bool,
@@ -47,6 +50,8 @@ fn run(arguments: &Arguments) -> Result<bool> {
     let settings = Settings::of_file(&arguments.image, arguments.system, &arguments.script)?;
     let (mut cpu, image) = prepare(&settings)?;
     println!("image {} SHA-256 {}", arguments.image.display(), image.sha256);
+    let instant = |at_s: f64| (at_s * SECOND as f64) as Time;
+    cpu.machine_mut().world.drops = arguments.drivers_fail.map(instant);
     if arguments.record {
         cpu.machine_mut().record = Some(Vec::new());
     }

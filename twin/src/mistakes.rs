@@ -28,6 +28,15 @@ const SCRIPT: &str = "\
      expect fault none
 0.90 end
 ";
+/// The drive for what shows only where the carrier's halves differ: until a synchronous mode runs.
+const SYNCHRONOUS: &str = "\
+0.20 charge
+0.50 enable
+0.55 torque 1235 over 0.1
+1.40 expect mode sync15
+     expect fault none
+1.40 end
+";
 /// The time from the cause of a break until every gate must be off.
 const BREAK: u64 = MICROSECOND;
 
@@ -117,9 +126,14 @@ pub const MISTAKES: [Mistake; 38] = [
     of("watchdog never started", |a, v| if a == 0x4000_3000 && v == 0xCCCC { 0 } else { v }),
 ];
 
-/// Runs the drive with a change; what showed it, or `None`.
-pub fn caught(image: &Path, change: Option<Change>, overcurrent: bool) -> Result<Option<String>> {
-    let settings = Settings::new(image, System::Pmasynrm, SCRIPT.to_owned());
+/// Runs the drive of a script with a change; what showed it, or `None`.
+fn caught_in(
+    image: &Path,
+    script: &str,
+    change: Option<Change>,
+    overcurrent: bool,
+) -> Result<Option<String>> {
+    let settings = Settings::new(image, System::Pmasynrm, script.to_owned());
     let (mut cpu, _) = prepare(&settings)?;
     let machine = cpu.machine_mut();
     machine.mistake = change;
@@ -154,7 +168,9 @@ fn off_time(rows: &[Vec<String>]) -> Option<String> {
     let (first, last) = (seconds(rows.first()?)?, seconds(rows.last()?)?);
     let mean_s = (last - first) / (rows.len() - 1).max(1) as f64;
     let off = (mean_s / TELEMETRY_S - 1.0).abs() > TELEMETRY_SHARE;
-    off.then(|| format!("telemetry comes every {:.3} ms, not every {:.3} ms", 1e3 * mean_s, 1e3 * TELEMETRY_S))
+    off.then(|| {
+        format!("telemetry comes every {:.3} ms, not every {:.3} ms", 1e3 * mean_s, 1e3 * TELEMETRY_S)
+    })
 }
 
 /// The cause of a break while the gates pulse: whether one is on later than it may be.
@@ -176,10 +192,14 @@ fn held(cpu: &mut Cpu, overcurrent: bool) -> Result<Option<String>> {
     Ok(world.any_gate().then(|| format!("gates are on 1 µs after {cause}")))
 }
 
-/// A mistake's outcome over both causes of a break.
-pub fn outcome(image: &Path, mistake: &Mistake) -> Result<Option<String>> {
-    Ok(match caught(image, Some(mistake.change), false)? {
-        None => caught(image, Some(mistake.change), true)?,
-        shown => shown,
-    })
+/// A mistake's outcome over both causes of a break, and where none shows it in a synchronous mode; without a mistake likewise.
+pub fn outcome(image: &Path, mistake: Option<&Mistake>) -> Result<Option<String>> {
+    let change = mistake.map(|mistake| mistake.change);
+    for (script, overcurrent) in [(SCRIPT, false), (SCRIPT, true), (SYNCHRONOUS, false)] {
+        let shown = caught_in(image, script, change, overcurrent)?;
+        if shown.is_some() {
+            return Ok(shown);
+        }
+    }
+    Ok(None)
 }

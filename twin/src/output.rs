@@ -40,7 +40,8 @@ fn recording(world: &mut World) -> Happened {
     match &mut world.side {
         Side::Traction(side) => {
             let rows = std::mem::take(&mut side.rows);
-            let edge = |edge: &crate::world::Edge| trace::Edge { tick: edge.at, gate: edge.gate as u8, on: edge.on };
+            let edge =
+                |edge: &crate::world::Edge| trace::Edge { tick: edge.at, gate: edge.gate as u8, on: edge.on };
             Happened::Pmasynrm(Recording {
                 written: None,
                 switches: switches(&rows),

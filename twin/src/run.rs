@@ -75,7 +75,8 @@ pub fn prepare(settings: &Settings) -> Result<(Cpu, Image)> {
     let lines = Lines::Script(script::script(&settings.script, settings.system)?.into());
     let talk = Talk::new(settings.system, lines, settings.inertia_kg_m2, parameters.max_torque_nm);
     let rotor = Rotor { inertia_kg_m2: settings.inertia_kg_m2, pole_pairs: parameters.pole_pairs.into() };
-    let world = World::new(side(settings.system, &motor), wiring, talk, PowerStage::read(&settings.stage())?, rotor);
+    let world =
+        World::new(side(settings.system, &motor), wiring, talk, PowerStage::read(&settings.stage())?, rotor);
     Ok((Cpu::new(&image, Machine::new(Chip::new(), world))?, image))
 }
 

@@ -15,6 +15,9 @@ const BOARD: &str = "nucleo-g474re";
 /// The folder of the scenarios' scripts, and the scenario that is run unless told otherwise.
 const SCRIPTS: &str = "twin/scripts";
 const SCENARIO: &str = "sweep";
+/// The scenario with a fault, and the time at which its drivers' ready wire drops, in s.
+const FAULT: &str = "fault";
+const DRIVERS_FAIL_S: &str = "3.4";
 /// Where the files go unless told otherwise.
 const OUT: &str = "target/tractive/twin";
 
@@ -101,6 +104,9 @@ fn drive(image: &Path, system: System, script: &Path, out: &Path) -> Command {
     command.args(["run", "--quiet", "--release", "--"]);
     command.args([absolute(image), absolute(script)]).args(["--system", twins_name(system)]);
     command.arg("--out").arg(absolute(out));
+    if script.file_stem().is_some_and(|name| name == FAULT) {
+        command.args(["--drivers-fail", DRIVERS_FAIL_S]);
+    }
     command
 }
 

@@ -77,7 +77,14 @@ impl Spi {
     }
 
     /// A register is written; `false` if the twin has none such.
-    pub fn write(&mut self, offset: u32, value: u32, now: Time, cycle: Time, findings: &mut Findings) -> bool {
+    pub fn write(
+        &mut self,
+        offset: u32,
+        value: u32,
+        now: Time,
+        cycle: Time,
+        findings: &mut Findings,
+    ) -> bool {
         match offset {
             CR1 => {
                 let starts = value & SPE != 0;
@@ -90,7 +97,8 @@ impl Spi {
                 self.control[0] = value;
             }
             CR2 => {
-                findings.expect(value >> 8 & 0xF == 0xF, || "SPI3: only words of 16 bits are modelled".into());
+                findings
+                    .expect(value >> 8 & 0xF == 0xF, || "SPI3: only words of 16 bits are modelled".into());
                 self.control[1] = value;
             }
             DR => {

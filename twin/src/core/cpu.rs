@@ -117,7 +117,9 @@ impl Cpu {
     fn begin(&mut self) -> Result<()> {
         self.entered.clear();
         let (stack, entry) = self.start;
-        for (register, value) in [(R::CONTROL, 0), (R::PRIMASK, 0), (R::XPSR_NZCVQG, 1 << 24), (R::MSP, stack)] {
+        for (register, value) in
+            [(R::CONTROL, 0), (R::PRIMASK, 0), (R::XPSR_NZCVQG, 1 << 24), (R::MSP, stack)]
+        {
             self.set(register, value)?;
         }
         self.set(R::LR, u32::MAX)?;

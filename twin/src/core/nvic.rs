@@ -74,7 +74,8 @@ impl Nvic {
     /// The exception that is taken next, if any may be: of the highest priority, of equal ones the lowest number.
     pub fn next(&self, primask: bool) -> Option<usize> {
         let own = [NMI, HARD_FAULT].into_iter().zip(self.system).find(|(_, pending)| *pending);
-        if let Some((exception, _)) = own.filter(|(exception, _)| self.priority(*exception) < self.running()) {
+        if let Some((exception, _)) = own.filter(|(exception, _)| self.priority(*exception) < self.running())
+        {
             return Some(exception);
         }
         if primask || !self.pending.contains(&true) {
@@ -114,6 +115,8 @@ impl Nvic {
         match address {
             0xE000_E100..0xE000_E110 => word(&self.enabled, 0xE000_E100),
             0xE000_E200..0xE000_E210 => word(&self.pending, 0xE000_E200),
+            // ICSR.VECTACTIVE.
+            0xE000_ED04 => self.active.last().map_or(0, |exception| *exception as u32),
             0xE000_ED08 => self.vtor,
             0xE000_ED88 => self.cpacr,
             // No debugger.

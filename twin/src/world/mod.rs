@@ -26,6 +26,8 @@ const OPENS: Time = 20 * MILLISECOND;
 /// speed in r/min.
 const PUSHES: [(Time, f64); 3] = [(60 * MILLISECOND, 10.0), (150 * MILLISECOND, -10.0), (Time::MAX, 0.0)];
 const PUSH_RPM_S: f64 = 1e6;
+/// The time for which the drivers' ready wire drops.
+const DROP: Time = 10 * MILLISECOND;
 /// The step of the trace.
 const SLOT: Time = MILLISECOND;
 
@@ -88,6 +90,8 @@ pub struct World {
     pub ready: bool,
     /// Current that flows in a phase besides, in A: past the motor, as to earth. The motor, the phase.
     pub excess_a: (usize, usize, f64),
+    /// The instant at which the drivers' ready wire drops for [`DROP`].
+    pub drops: Option<Time>,
     /// The encoders' wires are cut.
     pub cut: bool,
     /// The talk is over.
@@ -127,6 +131,7 @@ impl World {
             talk,
             edges: Vec::new(),
             ready: true,
+            drops: None,
             cut: false,
             done: false,
             wiring,
@@ -160,7 +165,8 @@ impl World {
         let moves = self.contactors.iter().filter_map(|contactor| contactor.moves);
         let push = PUSHES[self.pushes].0;
         let slot = if self.done { Time::MAX } else { self.next_slot };
-        moves.fold(slot.min(push), Time::min)
+        let drop = self.drops.map_or(Time::MAX, |at| if self.ready { at } else { at + DROP });
+        moves.fold(slot.min(push).min(drop), Time::min)
     }
 
     /// Lets the plant run.
@@ -193,6 +199,10 @@ impl World {
             discharge: on(self.wiring.discharge),
             chopper: self.wiring.chopper.is_some_and(on),
         });
+        if let Some(at) = self.drops {
+            self.ready = now < at || now >= at + DROP;
+            self.drops = self.drops.filter(|at| now < at + DROP);
+        }
         self.pulsing = chip.is_pulsing();
         self.select(chip);
         if now >= PUSHES[self.pushes].0 {

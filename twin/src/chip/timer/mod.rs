@@ -380,7 +380,10 @@ impl Timer {
             ARR if self.word(CR1) & ARPE == 0 => {
                 let moves = self.has_outputs() && self.is_running() && value != self.shadow.reload;
                 findings.expect(!moves, || {
-                    format!("{}.ARR is changed within a period of its outputs: it is not preloaded", self.name)
+                    format!(
+                        "{}.ARR is changed within a period of its outputs: it is not preloaded",
+                        self.name
+                    )
                 });
                 self.words[ARR / 4] = value;
                 self.shadow.reload = value;
