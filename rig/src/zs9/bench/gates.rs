@@ -106,10 +106,7 @@ impl Gates {
 
 /// The legs of a bridge that pulses, with the states that the diodes give those which wait for a gate: the current of a node that is not tied to a rail
 /// chooses it. Out of the node it flows through a diode from below, into it through one from above.
-pub fn as_diodes_have_it(
-    gates: [LegGates; 3],
-    currents_a: impl FnOnce() -> [[f64; 3]; 2],
-) -> [LegGates; 3] {
+pub fn as_diodes_have_it(gates: [LegGates; 3], currents_a: impl FnOnce() -> [[f64; 3]; 2]) -> [LegGates; 3] {
     let [upper, lower] = currents_a();
     core::array::from_fn(|leg| {
         let choose = |current_a: f64, out: LegGates, into: LegGates| if current_a > 0.0 { out } else { into };
