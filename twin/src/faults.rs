@@ -138,7 +138,7 @@ pub fn look(image: &Path, system: System, cause: Cause, when: When) -> Result<Se
     cpu.run(from + AFTER)?;
     let machine = cpu.machine();
     let world = &machine.world;
-    let last = world.edges[edges..].last().map_or(0, |edge| edge.at - from);
+    let last = world.edges[edges..].last().map_or(0, |edge| edge.at.saturating_sub(from));
     let say = |column: &str| world.talk.listener.value(column);
     Ok(Seen {
         off_after: (!world.any_gate()).then_some(last),

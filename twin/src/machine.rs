@@ -164,6 +164,8 @@ impl Machine {
 
     /// The crystal stops.
     pub fn stop_crystal(&mut self) {
+        self.settle();
+        self.settled = self.now;
         if self.chip.rcc.lose_crystal() {
             self.nvic.pend(crate::core::nvic::NMI);
         }

@@ -287,9 +287,9 @@ impl World {
     pub fn see_gates(&mut self, now: Time, chip: &Chip, findings: &mut Findings) {
         let dead = Time::from(self.stage.dead_time_ns) * MICROSECOND / 1_000;
         let before = self.gates.clone();
-        for gate in 0..self.pins.len() {
+        for (gate, was) in before.iter().copied().enumerate() {
             self.gates[gate] = Self::is_high(self.pins[gate], chip, now);
-            if self.gates[gate] != before[gate] {
+            if self.gates[gate] != was {
                 self.edges.push(Edge { at: now, gate, on: self.gates[gate] });
                 if !self.gates[gate] {
                     self.off[gate] = Some(now);
