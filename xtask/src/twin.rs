@@ -57,13 +57,8 @@ pub fn check(setup: &mut Setup) -> Result<Result<bool, String>> {
         return Ok(Err(no_cmake()));
     }
     let tidy = !setup.component("fmt", "rustfmt") || succeeds(twin().args(["fmt", "--check"]))?;
-    let lints = || {
-        Ok::<_, anyhow::Error>(
-            !setup.component("clippy", "clippy")
-                || succeeds(twin().args(["clippy", "--release", "--all-targets", "--", "-D", "warnings"]))?,
-        )
-    };
-    let tidy = tidy && lints()?;
+    let lints = ["clippy", "--release", "--all-targets", "--", "-D", "warnings"];
+    let tidy = tidy && (!setup.component("clippy", "clippy") || succeeds(twin().args(lints))?);
     let images = [image(setup, System::Traction)?, image(setup, System::Zs9)?];
     for (system, image) in System::ALL.into_iter().zip(&images) {
         let out = root().join(OUT).join(twins_name(system));
