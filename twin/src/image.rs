@@ -17,6 +17,10 @@ pub struct Image {
     pub sha256: String,
     /// Functions: address and name, by address.
     functions: Vec<(u32, String)>,
+    /// The end of what has a place of its own in RAM: the stack may not come down to it.
+    pub statics_end: u32,
+    /// The bytes of the flash memory that it fills.
+    pub flash_bytes: u32,
 }
 
 impl Image {
@@ -28,6 +32,7 @@ impl Image {
 
     fn parse(bytes: &[u8]) -> Result<Self> {
         let file = object::read::elf::ElfFile32::<object::Endianness>::parse(bytes)?;
+        let mut flash_bytes = 0;
         let mut flash = vec![0xFF; FLASH.1 as usize];
         for header in file.elf_program_headers() {
             let endian = object::Endianness::Little;
@@ -37,6 +42,7 @@ impl Image {
                 continue;
             }
             let from = at.wrapping_sub(FLASH.0) as usize;
+            flash_bytes += length as u32;
             let room = flash.get_mut(from..from + length);
             room.with_context(|| format!("a segment at {at:#010x} lies outside the flash memory"))?
                 .copy_from_slice(data);
@@ -47,9 +53,11 @@ impl Image {
             .map(|symbol| (symbol.address() as u32 & !1, symbol.name().unwrap_or_default().to_owned()))
             .collect();
         functions.sort();
+        let statics_end = file.symbols().find(|symbol| symbol.name() == Ok("__sheap"));
+        let statics_end = statics_end.context("no symbol __sheap")?.address() as u32;
         let digest = Sha256::digest(bytes);
         let sha256 = digest.iter().map(|byte| format!("{byte:02x}")).collect();
-        Ok(Self { flash, sha256, functions })
+        Ok(Self { flash, sha256, functions, statics_end, flash_bytes })
     }
 
     /// The function at an address.

@@ -5,6 +5,7 @@
 
 pub mod chip;
 pub mod core;
+pub mod faults;
 pub mod finding;
 pub mod image;
 pub mod machine;

@@ -13,6 +13,28 @@ const LONGEST: Time = 20 * crate::time::MICROSECOND;
 const PRIVATE: u32 = 0xE000_0000;
 const PRIVATE_END: u32 = 0xE001_0000;
 
+/// An access of the program, for whoever replays it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Access {
+    /// The instant.
+    pub at: Time,
+    /// The exception that it was made in; 0 is none.
+    pub exception: usize,
+    /// What was done.
+    pub what: What,
+}
+
+/// What an access did.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum What {
+    /// The exception began.
+    Entry,
+    /// A value was read at an address.
+    Read(u32, u32),
+    /// A value was written to an address.
+    Write(u32, u32),
+}
+
 /// The machine.
 pub struct Machine {
     /// The interrupt controller.
@@ -23,15 +45,26 @@ pub struct Machine {
     pub world: World,
     /// The findings.
     pub findings: Findings,
+    /// A reset by the watchdog is what is wanted.
+    pub may_bite: bool,
+    /// The resets so far, without the first.
+    pub resets: u32,
     /// The mistake that a run is made with: what becomes of a write on its way.
     pub mistake: Option<fn(u32, u32) -> u32>,
+    /// Every access to a peripheral, and every entry into an exception, if they are kept.
+    pub record: Option<Vec<Access>>,
+    /// Cycles that fetching from the flash memory would add without any cache or prefetch.
+    pub waits: u64,
     /// The reason why the emulator was stopped.
     pub stop: Option<Stop>,
     /// The instant at which the run ends.
     pub until: Time,
     /// An interrupt is pending that may not be taken.
     pub masked: bool,
+    /// The same, but only for one block.
+    pub deferred: bool,
     now: Time,
+    settled: Time,
     next: Time,
     /// The block before which the emulator has stopped: its cost is counted already.
     counted: Option<u32>,
@@ -45,11 +78,17 @@ impl Machine {
             chip,
             world,
             findings: Findings::default(),
+            may_bite: false,
+            resets: 0,
             mistake: None,
+            record: None,
+            waits: 0,
             stop: None,
             until: 0,
             masked: false,
+            deferred: false,
             now: 0,
+            settled: 0,
             next: 0,
             counted: None,
         }
@@ -79,12 +118,17 @@ impl Machine {
     }
 
     /// A basic block begins; `true` if the emulator is to stop before it.
-    pub fn block(&mut self, address: u32, cycles: u32) -> bool {
+    pub fn block(&mut self, address: u32, cycles: u32, waits: u32) -> bool {
         self.findings.now = (self.now, address);
         if self.counted.take() != Some(address) {
+            // What had to wait for the block before comes now.
+            self.masked &= !std::mem::take(&mut self.deferred);
+            self.waits += u64::from(waits);
             self.pass(cycles);
         }
-        let stop = if self.wants_interrupt() {
+        let stop = if self.wants_reset() {
+            Stop::Reset
+        } else if self.wants_interrupt() {
             Stop::Interrupt
         } else if self.now >= self.until || self.world.done {
             Stop::Done
@@ -101,12 +145,41 @@ impl Machine {
         !self.masked && self.nvic.next(false).is_some()
     }
 
+    /// `true` once the watchdog has bitten.
+    pub fn wants_reset(&self) -> bool {
+        self.chip.watchdog.has_bitten
+    }
+
+    /// The chip is reset, with these flags of the cause; the world goes on.
+    pub fn reset(&mut self, cause: u32) {
+        let crystal = self.chip.rcc.crystal;
+        self.chip = Chip::new();
+        self.chip.rcc.crystal = crystal;
+        self.chip.rcc.set_cause(cause);
+        self.nvic = Nvic::default();
+        (self.counted, self.masked, self.next) = (None, false, 0);
+        self.resets += 1;
+        self.settle();
+    }
+
+    /// The crystal stops.
+    pub fn stop_crystal(&mut self) {
+        self.settle();
+        self.settled = self.now;
+        if self.chip.rcc.lose_crystal() {
+            self.nvic.pend(crate::core::nvic::NMI);
+        }
+        self.settle();
+    }
+
     /// Does everything that is due, instant by instant.
     pub fn settle(&mut self) {
-        let Self { chip, world, findings, nvic, now, .. } = self;
+        let Self { chip, world, findings, nvic, now, settled, .. } = self;
         self.masked = false;
         loop {
-            let due = chip.next_event().min(world.next_event()).min(*now);
+            // Never back: what a changed clock lets be overdue comes now.
+            let due = chip.next_event().min(world.next_event()).min(*now).max(*settled);
+            *settled = due;
             if !nvic.has_fpu() && chip.is_pulsing() {
                 findings.add("the gates pulse before CPACR has switched the floating-point unit on");
             }
@@ -119,6 +192,9 @@ impl Machine {
             }
         }
         chip.drive_interrupts(nvic);
+        if chip.watchdog.has_bitten && !self.may_bite {
+            findings.add("the watchdog resets the chip");
+        }
         self.next = chip.next_event().min(world.next_event()).min(*now + LONGEST);
     }
 
@@ -127,7 +203,17 @@ impl Machine {
         if (PRIVATE..PRIVATE_END).contains(&address) {
             return self.nvic.read(address, &mut self.findings);
         }
-        self.chip.read(address, size, self.now, &mut self.world, &mut self.findings)
+        let value = self.chip.read(address, size, self.now, &mut self.world, &mut self.findings);
+        self.keep(What::Read(address, value));
+        value
+    }
+
+    /// Keeps what is done now, if that is wanted.
+    pub fn keep(&mut self, what: What) {
+        if let Some(record) = &mut self.record {
+            let exception = self.nvic.active.last().copied().unwrap_or(0);
+            record.push(Access { at: self.now, exception, what });
+        }
     }
 
     /// The program writes.
@@ -137,6 +223,7 @@ impl Machine {
             self.nvic.write(address, size, value, &mut self.findings);
             return;
         }
+        self.keep(What::Write(address, value));
         // All that happens before it, then the write, then all that it brings about.
         self.settle();
         self.chip.write(address, size, value, self.now, &mut self.findings);

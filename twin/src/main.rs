@@ -4,9 +4,12 @@ use anyhow::Result;
 use clap::Parser;
 use std::path::PathBuf;
 use std::process::ExitCode;
+use tractive_rig::talk::System;
+use tractive_twin::core::cpu::RAM;
+use tractive_twin::machine::Access;
 use tractive_twin::output::write;
 use tractive_twin::run::{Settings, drive, prepare};
-use tractive_twin::time::seconds;
+use tractive_twin::time::{SECOND, Time, seconds};
 
 /// Executes the image of the NUCLEO-G474RE against a model of its chip, with the simulated motor at the pins.
 #[derive(Parser)]
@@ -15,9 +18,18 @@ struct Arguments {
     image: PathBuf,
     /// The script of commands over CAN.
     script: PathBuf,
+    /// The system that it is the image of.
+    #[arg(long, value_enum, default_value_t)]
+    system: System,
     /// The folder for trace, edges, telemetry and frames.
     #[arg(long)]
     out: Option<PathBuf>,
+    /// The drivers' ready wire drops at this time for 10 ms, in s.
+    #[arg(long, value_name = "SECONDS")]
+    drivers_fail: Option<f64>,
+    /// Lists every access to a peripheral: instant in µs, exception, access.
+    #[arg(long)]
+    record: bool,
     /// Lists the registers that the image has touched.
     #[arg(long)]
     accesses: bool,
@@ -35,9 +47,14 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: &Arguments) -> Result<bool> {
-    let settings = Settings::new(&arguments.image, std::fs::read_to_string(&arguments.script)?);
+    let settings = Settings::of_file(&arguments.image, arguments.system, &arguments.script)?;
     let (mut cpu, image) = prepare(&settings)?;
     println!("image {} SHA-256 {}", arguments.image.display(), image.sha256);
+    let instant = |at_s: f64| (at_s * SECOND as f64) as Time;
+    cpu.machine_mut().world.drops = arguments.drivers_fail.map(instant);
+    if arguments.record {
+        cpu.machine_mut().record = Some(Vec::new());
+    }
     let start = std::time::Instant::now();
     let outcome = drive(&mut cpu);
     let machine = cpu.machine();
@@ -51,22 +68,34 @@ fn run(arguments: &Arguments) -> Result<bool> {
     let simulated_s = seconds(machine.now());
     println!("{}", talk.state(simulated_s));
     println!(
-        "{simulated_s:.3} s, {:.3} of real time; {} expectations, {} not met; {} edges; longest interrupts {:?} cycles; stack down to {:#010x}",
+        "{simulated_s:.3} s, {:.3} of real time; {} expectations, {} not met; {} edges; longest interrupts {:?} cycles, with every wait state {:?}",
         simulated_s / start.elapsed().as_secs_f64(),
         talk.expectations,
         talk.failures.len(),
         machine.world.edges.len(),
         cpu.longest,
-        cpu.lowest_stack,
+        cpu.longest_uncached,
+    );
+    let good = machine.findings.all.is_empty() && talk.failures.is_empty();
+    println!(
+        "{} bytes of flash; RAM {:#010x} to {:#010x} placed, {} bytes of stack used, {} left",
+        image.flash_bytes,
+        RAM.0,
+        image.statics_end,
+        cpu.stack_bytes(image.statics_end)?,
+        RAM.0 + RAM.1 - image.statics_end - cpu.stack_bytes(image.statics_end)?,
     );
     if arguments.accesses {
         for (address, (reads, writes)) in &machine.chip.accesses {
             println!("{address:#010x} {reads:>9} {writes:>9}");
         }
     }
+    for Access { at, exception, what } in machine.record.iter().flatten() {
+        println!("{:.3} {exception} {what:x?}", 1e6 * seconds(*at));
+    }
     if let Some(out) = &arguments.out {
-        write(machine, out)?;
+        write(&mut cpu.machine_mut().world, &settings, out)?;
     }
     outcome?;
-    Ok(machine.findings.all.is_empty() && talk.failures.is_empty())
+    Ok(good)
 }

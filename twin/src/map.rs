@@ -53,7 +53,9 @@ impl Map {
             for (offset, register) in of {
                 let address = peripheral.address as u32 + offset;
                 let known = CORRECTED.iter().find(|(name, at, _)| *name == peripheral.name && *at == offset);
-                let mask = known.map_or(register.mask, |(.., mask)| *mask);
+                // A register of several widths has the bits of its widest.
+                let wider = registers.get(&address).map_or(0, |wider: &Register| wider.mask);
+                let mask = known.map_or(register.mask | wider, |(.., mask)| *mask);
                 registers.insert(address, Register { peripheral: index, offset, mask, ..register });
             }
         }

@@ -8,6 +8,7 @@ use crate::run::{Settings, drive, prepare};
 use crate::time::MICROSECOND;
 use anyhow::Result;
 use std::path::Path;
+use tractive_rig::talk::System;
 
 /// A change of a write: address and value in, value out.
 pub type Change = fn(u32, u32) -> u32;
@@ -27,8 +28,21 @@ const SCRIPT: &str = "\
      expect fault none
 0.90 end
 ";
+/// The drive for what shows only where the carrier's halves differ: until a synchronous mode runs.
+const SYNCHRONOUS: &str = "\
+0.20 charge
+0.50 enable
+0.55 torque 1235 over 0.1
+1.40 expect mode sync15
+     expect fault none
+1.40 end
+";
 /// The time from the cause of a break until every gate must be off.
 const BREAK: u64 = MICROSECOND;
+
+/// The telemetry's period, in s, and the share by which its mean may be off: a crystal's error and the frames' jitter are far below.
+const TELEMETRY_S: f64 = 0.01;
+const TELEMETRY_SHARE: f64 = 0.01;
 
 /// The edges that every gate has at least in the drive: half of those of a carrier of 900 Hz.
 const PULSES: usize = 300;
@@ -112,13 +126,18 @@ pub const MISTAKES: [Mistake; 38] = [
     of("watchdog never started", |a, v| if a == 0x4000_3000 && v == 0xCCCC { 0 } else { v }),
 ];
 
-/// Runs the drive with a change; what showed it, or `None`.
-pub fn caught(image: &Path, change: Option<Change>, overcurrent: bool) -> Result<Option<String>> {
-    let settings = Settings::new(image, SCRIPT.to_owned());
+/// Runs the drive of a script with a change; what showed it, or `None`.
+fn caught_in(
+    image: &Path,
+    script: &str,
+    change: Option<Change>,
+    overcurrent: bool,
+) -> Result<Option<String>> {
+    let settings = Settings::new(image, System::Pmasynrm, script.to_owned());
     let (mut cpu, _) = prepare(&settings)?;
     let machine = cpu.machine_mut();
     machine.mistake = change;
-    machine.world.link.udc_v = machine.world.link.settings.source.voltage_v;
+    machine.world.side.charge();
     if let Err(error) = drive(&mut cpu) {
         return Ok(Some(format!("{error:#}")));
     }
@@ -134,10 +153,24 @@ pub fn caught(image: &Path, change: Option<Change>, overcurrent: bool) -> Result
     {
         return Ok(Some(format!("gate {gate} hardly pulses")));
     }
+    if let Some(slow) = off_time(&machine.world.talk.rows) {
+        return Ok(Some(slow));
+    }
     if !machine.chip.watchdog.is_running() {
         return Ok(Some("the watchdog does not run".into()));
     }
     held(&mut cpu, overcurrent)
+}
+
+/// The telemetry's period where it is not the protocol's: by the bus's clock, which is not the drive's.
+fn off_time(rows: &[Vec<String>]) -> Option<String> {
+    let seconds = |row: &Vec<String>| row.first()?.parse::<f64>().ok();
+    let (first, last) = (seconds(rows.first()?)?, seconds(rows.last()?)?);
+    let mean_s = (last - first) / (rows.len() - 1).max(1) as f64;
+    let off = (mean_s / TELEMETRY_S - 1.0).abs() > TELEMETRY_SHARE;
+    off.then(|| {
+        format!("telemetry comes every {:.3} ms, not every {:.3} ms", 1e3 * mean_s, 1e3 * TELEMETRY_S)
+    })
 }
 
 /// The cause of a break while the gates pulse: whether one is on later than it may be.
@@ -148,7 +181,7 @@ fn held(cpu: &mut Cpu, overcurrent: bool) -> Result<Option<String>> {
     if !world.any_gate() {
         return Ok(Some("no gate is on".to_owned()));
     }
-    (world.ready, world.excess_a) = (overcurrent, if overcurrent { 600.0 } else { 0.0 });
+    (world.ready, world.excess_a) = (overcurrent, (0, 0, if overcurrent { 600.0 } else { 0.0 }));
     // Both act without a clock: at once.
     machine.settle();
     let until = machine.now() + BREAK;
@@ -159,10 +192,14 @@ fn held(cpu: &mut Cpu, overcurrent: bool) -> Result<Option<String>> {
     Ok(world.any_gate().then(|| format!("gates are on 1 µs after {cause}")))
 }
 
-/// A mistake's outcome over both causes of a break.
-pub fn outcome(image: &Path, mistake: &Mistake) -> Result<Option<String>> {
-    Ok(match caught(image, Some(mistake.change), false)? {
-        None => caught(image, Some(mistake.change), true)?,
-        shown => shown,
-    })
+/// A mistake's outcome over both causes of a break, and where none shows it in a synchronous mode; without a mistake likewise.
+pub fn outcome(image: &Path, mistake: Option<&Mistake>) -> Result<Option<String>> {
+    let change = mistake.map(|mistake| mistake.change);
+    for (script, overcurrent) in [(SCRIPT, false), (SCRIPT, true), (SYNCHRONOUS, false)] {
+        let shown = caught_in(image, script, change, overcurrent)?;
+        if shown.is_some() {
+            return Ok(shown);
+        }
+    }
+    Ok(None)
 }

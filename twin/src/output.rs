@@ -1,34 +1,86 @@
-//! The files that a run leaves behind: trace, edges, telemetry, frames.
+//! The files that a run leaves behind, through the rig's own writers: trace, edges, the operator's words, telemetry, frames, page.
 
-use crate::machine::Machine;
-use crate::time::seconds;
+use crate::run::Settings;
+use crate::time::{SECOND, seconds};
+use crate::world::World;
+use crate::world::side::Side;
 use anyhow::{Context, Result};
+use clap::Parser;
 use std::path::Path;
-use tractive_rig::talk::System;
-use tractive_rig::trace::GATES;
+use tractive::modulation::Mode;
+use tractive_rig::talk::{Happened, Lines, Outcome, Talk, TalkOptions, figures};
+use tractive_rig::trace::{self, Recording, Row, Switch};
+use tractive_rig::{talk, zs9};
 
-/// Writes them into a folder, which is made where it is not there. The error names the file.
-pub fn write(machine: &Machine, out: &Path) -> Result<()> {
+/// The options that the rig's writers read.
+#[derive(Parser)]
+struct Options {
+    #[command(flatten)]
+    talk: TalkOptions,
+}
+
+/// Writes them into a folder, which is made where it is not there. The error names the file. The talk and the recording are taken out of
+/// the world.
+pub fn write(world: &mut World, settings: &Settings, out: &Path) -> Result<()> {
     std::fs::create_dir_all(out).with_context(|| out.display().to_string())?;
-    let world = &machine.world;
-    let mut trace = csv::Writer::from_path(out.join("trace.csv"))?;
-    for row in &world.rows {
-        trace.serialize(row)?;
+    let system = settings.system;
+    let options = Options::try_parse_from(["twin", &settings.name, "--system", system.name()])?.talk;
+    let over = Talk::new(system, Lines::Script(Default::default()), settings.inertia_kg_m2, 0.0);
+    let talk = std::mem::replace(&mut world.talk, over);
+    let recording = recording(world);
+    let figures = figures(&talk, &recording);
+    let outcome = Outcome { talk, system, recording, figures, on: "twin" };
+    talk::write(&options, &outcome, out)?;
+    outcome.recording.common().write_events(out)
+}
+
+/// The recording of what happened at the pins, and what was told.
+fn recording(world: &mut World) -> Happened {
+    let edges = std::mem::take(&mut world.edges);
+    match &mut world.side {
+        Side::Traction(side) => {
+            let rows = std::mem::take(&mut side.rows);
+            let edge =
+                |edge: &crate::world::Edge| trace::Edge { tick: edge.at, gate: edge.gate as u8, on: edge.on };
+            Happened::Pmasynrm(Recording {
+                written: None,
+                switches: switches(&rows),
+                rows,
+                slots: std::mem::take(&mut side.slots),
+                link: None,
+                edges: edges.iter().map(edge).collect(),
+                lead: 0,
+                tick_s: 1.0 / SECOND as f64,
+                recorded: Vec::new(),
+                observations: Vec::new(),
+            })
+        }
+        Side::Zs9(side) => {
+            let edge = |edge: &crate::world::Edge| zs9::trace::Edge {
+                t_s: seconds(edge.at),
+                gate: edge.gate as u8,
+                on: edge.on,
+            };
+            Happened::Zs9(zs9::trace::Recording {
+                rows: std::mem::take(&mut side.rows),
+                keeps_edges: true,
+                edges: edges.iter().map(edge).collect(),
+                recorded: Vec::new(),
+            })
+        }
     }
-    trace.flush()?;
-    let mut edges = csv::Writer::from_path(out.join("edges.csv"))?;
-    edges.write_record(["t_s", "gate", "on"])?;
-    for edge in &world.edges {
-        let on = u8::from(edge.on).to_string();
-        edges.write_record([format!("{:.9}", seconds(edge.at)).as_str(), GATES[edge.gate], &on])?;
+}
+
+/// The changes of mode, as they were told.
+fn switches(rows: &[Row]) -> Vec<Switch> {
+    let mut from = Mode::Off;
+    let mut switches = Vec::new();
+    for row in rows {
+        if row.mode != from {
+            let (t_s, to, speed_rpm) = (row.t_s, row.mode, row.speed_rpm);
+            switches.push(Switch { t_s, from, to, pulse_angle_deg: None, speed_rpm });
+            from = to;
+        }
     }
-    edges.flush()?;
-    let mut telemetry = csv::Writer::from_path(out.join("telemetry.csv"))?;
-    telemetry.write_record(System::Pmasynrm.columns())?;
-    for row in &world.talk.rows {
-        telemetry.write_record(row)?;
-    }
-    telemetry.flush()?;
-    let frames = out.join("frames.log");
-    std::fs::write(&frames, &world.talk.frames).with_context(|| frames.display().to_string())
+    switches
 }

@@ -6,12 +6,16 @@ use crate::image::Image;
 use crate::machine::Machine;
 use crate::stage::PowerStage;
 use crate::time::{MILLISECOND, SECOND, Time};
-use crate::world::{Rotor, World};
-use anyhow::{Result, ensure};
+use crate::world::side::{Side, Traction, Zs9};
+use crate::world::{Rotor, World, wiring};
+use anyhow::{Context, Result, ensure};
 use std::path::{Path, PathBuf};
 use tractive_rig::machine::Machine as Motor;
+use tractive_rig::plant::zs9::{Zs9Plant, Zs9Settings};
 use tractive_rig::plant::{DcLink, Plant, PlantSettings, SpeedSource};
+use tractive_rig::scenario::System as _;
 use tractive_rig::scenario::traction::scaled_link;
+use tractive_rig::scenario::{traction, zs9};
 use tractive_rig::talk::{Lines, System, Talk, script};
 
 /// The longest run, in s.
@@ -23,43 +27,73 @@ const LOOK: Time = 10 * MILLISECOND;
 pub struct Settings {
     /// The image.
     pub image: PathBuf,
-    /// The power stage's file.
-    pub stage: PathBuf,
-    /// The machine's name or folder.
-    pub machine: String,
+    /// The system that it is the image of.
+    pub system: System,
+    /// The script's name.
+    pub name: String,
     /// The script's text.
     pub script: String,
-    /// The rotor's inertia, in kg·m².
+    /// The rotors' inertia, in kg·m².
     pub inertia_kg_m2: f64,
 }
 
 impl Settings {
     /// The delivered power stage and machine, and a script.
-    pub fn new(image: &Path, script: String) -> Self {
-        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    pub fn new(image: &Path, system: System, script: String) -> Self {
         Self {
             image: image.to_owned(),
-            stage: root.join("boards/nucleo-g474re/power_stage.toml"),
-            machine: "pmasynrm-180kw".to_owned(),
+            system,
+            name: "script".to_owned(),
             script,
-            inertia_kg_m2: System::Pmasynrm.inertia_kg_m2(),
+            inertia_kg_m2: system.inertia_kg_m2(),
         }
+    }
+
+    /// The same with the script of a file. The error names it.
+    pub fn of_file(image: &Path, system: System, file: &Path) -> Result<Self> {
+        let text = std::fs::read_to_string(file).with_context(|| file.display().to_string())?;
+        Ok(Self { name: file.display().to_string(), ..Self::new(image, system, text) })
+    }
+
+    fn stage(&self) -> PathBuf {
+        let name = match self.system {
+            System::Pmasynrm => "power_stage.toml",
+            System::Zs9 => "power_stage_zs9.toml",
+        };
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("../boards/nucleo-g474re").join(name)
     }
 }
 
 /// The image in its machine, at the release of reset.
 pub fn prepare(settings: &Settings) -> Result<(Cpu, Image)> {
     let image = Image::read(&settings.image)?;
-    let motor = Motor::load(&settings.machine)?;
+    let (motor, wiring) = match settings.system {
+        System::Pmasynrm => (Motor::load(traction::Traction::MACHINE)?, &wiring::TRACTION),
+        System::Zs9 => (Motor::load(zs9::Zs9::MACHINE)?, &wiring::ZS9),
+    };
     let parameters = &motor.folder.parameters;
-    let lines = Lines::Script(script::script(&settings.script, System::Pmasynrm)?.into());
-    let talk = Talk::new(System::Pmasynrm, lines, settings.inertia_kg_m2, parameters.max_torque_nm);
-    let speed = SpeedSource::profile(vec![(0.0, 0.0)]);
-    let plant = Plant::new(&motor.folder, speed, &PlantSettings::default());
-    let link = DcLink::new(scaled_link(&motor));
+    let lines = Lines::Script(script::script(&settings.script, settings.system)?.into());
+    let talk = Talk::new(settings.system, lines, settings.inertia_kg_m2, parameters.max_torque_nm);
     let rotor = Rotor { inertia_kg_m2: settings.inertia_kg_m2, pole_pairs: parameters.pole_pairs.into() };
-    let world = World::new(plant, link, talk, PowerStage::read(&settings.stage)?, rotor);
+    let world =
+        World::new(side(settings.system, &motor), wiring, talk, PowerStage::read(&settings.stage())?, rotor);
     Ok((Cpu::new(&image, Machine::new(Chip::new(), world))?, image))
+}
+
+fn side(system: System, motor: &Motor) -> Side {
+    let speed = || SpeedSource::profile(vec![(0.0, 0.0)]);
+    match system {
+        System::Pmasynrm => Side::Traction(Box::new(Traction {
+            plant: Plant::new(&motor.folder, speed(), &PlantSettings::default()),
+            link: DcLink::new(scaled_link(motor)),
+            rows: Vec::new(),
+            slots: Vec::new(),
+        })),
+        System::Zs9 => {
+            let plant = Zs9Plant::new([&motor.folder; 2], [speed(), speed()], &Zs9Settings::default());
+            Side::Zs9(Box::new(Zs9::new(plant, tractive_rig::zs9::line::TIMES)))
+        }
+    }
 }
 
 /// Runs until the script ends, or something is found.

@@ -15,6 +15,14 @@ pub struct PowerStage {
     pub dead_time_ns: u32,
     /// Phase current at which the comparators turn the gates off, in A.
     pub break_current_a: f64,
+    z_source: Option<ZSource>,
+}
+
+/// The scales that only the ZS9 has.
+#[derive(Clone, Copy, Debug, serde::Deserialize)]
+struct ZSource {
+    inductor_range_a: f64,
+    source_range_v: f64,
 }
 
 impl PowerStage {
@@ -32,5 +40,15 @@ impl PowerStage {
     /// The link divider's output, in V.
     pub fn link_volts(&self, udc_v: f64) -> f64 {
         REFERENCE_V * udc_v / self.dc_link_range_v
+    }
+
+    /// The source divider's output, in V; 0 where there is none.
+    pub fn source_volts(&self, source_v: f64) -> f64 {
+        self.z_source.map_or(0.0, |scales| REFERENCE_V * source_v / scales.source_range_v)
+    }
+
+    /// The output of the inductors' sensor, in V; 0 where there is none.
+    pub fn inductor_volts(&self, current_a: f64) -> f64 {
+        self.z_source.map_or(0.0, |scales| 0.5 * REFERENCE_V * (1.0 + current_a / scales.inductor_range_a))
     }
 }

@@ -122,9 +122,13 @@ pub struct FlashArgs {
 
 #[derive(Args, Debug)]
 pub struct TwinArgs {
-    /// The script of commands over CAN, as `talk` takes them [default: twin/scripts/drive.talk]
-    pub script: Option<PathBuf>,
-    /// Folder for trace, edges, telemetry and frames [default: target/tractive/twin]
+    /// A scenario of twin/scripts/ (sweep, load-steps, precharge, chopper, restart, fault), or a script of commands over CAN, as `talk` takes
+    /// them [default: sweep]
+    pub scenario: Option<PathBuf>,
+    /// The system whose image it is
+    #[arg(long, value_enum, default_value = "pmasynrm")]
+    pub system: System,
+    /// Folder for trace, edges, telemetry, frames and page [default: target/tractive/twin]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
 }

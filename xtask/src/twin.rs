@@ -6,14 +6,20 @@ use crate::cli::TwinArgs;
 use crate::process::{say, succeeds};
 use crate::setup::Setup;
 use crate::workspace::{cargo, root};
-use anyhow::{Result, bail};
+use anyhow::{Context, Result, bail};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// The board that it is the twin of.
 const BOARD: &str = "nucleo-g474re";
-/// The script that is run unless told otherwise.
-const SCRIPT: &str = "twin/scripts/drive.talk";
+/// The folder of the scenarios' scripts, and the scenario that is run unless told otherwise.
+const SCRIPTS: &str = "twin/scripts";
+const SCENARIO: &str = "sweep";
+/// The scenario with a fault, and the time at which its drivers' ready wire drops, in s.
+const FAULT: &str = "fault";
+const DRIVERS_FAIL_S: &str = "3.4";
+/// Where the files go unless told otherwise.
+const OUT: &str = "target/tractive/twin";
 
 /// The command.
 pub fn run(args: &TwinArgs) -> Result<u8> {
@@ -21,34 +27,62 @@ pub fn run(args: &TwinArgs) -> Result<u8> {
     if !setup.cmake() {
         bail!("{}", no_cmake());
     }
-    let script = args.script.clone().unwrap_or_else(|| root().join(SCRIPT));
-    let image = image(&mut setup)?;
-    let out = args.out.clone().unwrap_or_else(|| root().join("target/tractive/twin"));
-    Ok(u8::from(!succeeds(&mut drive(&image, &script, &out))?))
+    let script = script(args.scenario.as_deref().unwrap_or(Path::new(SCENARIO)), args.system)?;
+    let image = image(&mut setup, args.system)?;
+    let out = args.out.clone().unwrap_or_else(|| root().join(OUT));
+    Ok(u8::from(!succeeds(&mut drive(&image, args.system, &script, &out))?))
 }
 
-/// The step: format, lints and tests of what no other step sees, then the image through its script. The inner error is what is missing.
+/// The script of a scenario's name, or of a path. The error names those that there are.
+fn script(scenario: &Path, system: System) -> Result<PathBuf> {
+    if scenario.is_file() {
+        return Ok(scenario.to_owned());
+    }
+    let folder = root().join(SCRIPTS).join(twins_name(system));
+    let file = folder.join(scenario).with_extension("talk");
+    if file.is_file() {
+        return Ok(file);
+    }
+    let entries = std::fs::read_dir(&folder).with_context(|| folder.display().to_string())?;
+    let mut names: Vec<_> = entries
+        .filter_map(|entry| Some(entry.ok()?.path().file_stem()?.to_string_lossy().into_owned()))
+        .collect();
+    names.sort();
+    bail!("{}: neither a script nor one of {}", scenario.display(), names.join(", "))
+}
+
+/// The step: format, lints and tests of what no other step sees, then the images through their sweeps. The inner error is what is missing.
 pub fn check(setup: &mut Setup) -> Result<Result<bool, String>> {
     if !setup.cmake() {
         return Ok(Err(no_cmake()));
     }
     let tidy = !setup.component("fmt", "rustfmt") || succeeds(twin().args(["fmt", "--check"]))?;
-    let image = image(setup)?;
-    let tests = || {
-        succeeds(
-            twin()
-                .args(["test", "--release", "--", "--include-ignored"])
-                .env("TRACTIVE_NUCLEO_IMAGE", &image),
-        )
-    };
-    let out = root().join("target/tractive/twin");
-    let script = root().join(SCRIPT);
-    Ok(Ok(tidy && succeeds(&mut drive(&image, &script, &out))? && tests()?))
+    let lints = ["clippy", "--release", "--all-targets", "--", "-D", "warnings"];
+    let tidy = tidy && (!setup.component("clippy", "clippy") || succeeds(twin().args(lints))?);
+    let images = [image(setup, System::Traction)?, image(setup, System::Zs9)?];
+    for (system, image) in System::ALL.into_iter().zip(&images) {
+        let out = root().join(OUT).join(twins_name(system));
+        if !(tidy && succeeds(&mut drive(image, system, &script(Path::new(SCENARIO), system)?, &out))?) {
+            return Ok(Ok(false));
+        }
+    }
+    let mut tests = twin();
+    tests.args(["test", "--release", "--", "--include-ignored"]);
+    tests.env("TRACTIVE_NUCLEO_IMAGE", &images[0]).env("TRACTIVE_NUCLEO_ZS9_IMAGE", &images[1]);
+    Ok(Ok(succeeds(&mut tests)?))
 }
 
 /// The image, as `flash` builds it.
-fn image(setup: &mut Setup) -> Result<PathBuf> {
-    build::board_image(&setup.toolchain()?, &Board::read(BOARD)?, System::Traction, None)
+fn image(setup: &mut Setup, system: System) -> Result<PathBuf> {
+    build::board_image(&setup.toolchain()?, &Board::read(BOARD)?, system, None)
+}
+
+/// The system as the twin calls it.
+fn twins_name(system: System) -> &'static str {
+    match system {
+        System::Traction => "pmasynrm",
+        System::Zs9 => "zs9",
+    }
 }
 
 /// Cargo in the twin's workspace.
@@ -58,12 +92,16 @@ fn twin() -> Command {
     command
 }
 
-fn drive(image: &Path, script: &Path, out: &Path) -> Command {
+fn drive(image: &Path, system: System, script: &Path, out: &Path) -> Command {
     say("building the twin …");
     let absolute = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
     let mut command = twin();
     command.args(["run", "--quiet", "--release", "--"]);
-    command.args([absolute(image), absolute(script)]).arg("--out").arg(absolute(out));
+    command.args([absolute(image), absolute(script)]).args(["--system", twins_name(system)]);
+    command.arg("--out").arg(absolute(out));
+    if script.file_stem().is_some_and(|name| name == FAULT) {
+        command.args(["--drivers-fail", DRIVERS_FAIL_S]);
+    }
     command
 }
 

@@ -61,7 +61,7 @@ pub fn run(options: &TalkOptions) -> Result<Outcome> {
         System::Zs9 => Happened::Zs9(with_zs9(options, LONGEST_S, &machine, &mut talk)?),
     };
     let figures = figures(&talk, &recording);
-    Ok(Outcome { talk, system, recording, figures })
+    Ok(Outcome { talk, system, recording, figures, on: options.run.on.name() })
 }
 
 fn run_options(options: &DriveOptions) -> RunOptions {
@@ -120,7 +120,8 @@ pub(crate) fn with_zs9(
     Zs9::run("talk", plan, &own, machine, Some(supervisor))
 }
 
-fn figures(talk: &Talk, recording: &Happened) -> Figures {
+/// The figures of a talk and of what really happened.
+pub fn figures(talk: &Talk, recording: &Happened) -> Figures {
     let mut figures = Figures::default();
     let speeds = recording.speeds_rpm();
     let (last_s, last_rpm) = speeds.last().copied().unwrap_or_default();
@@ -150,7 +151,7 @@ fn figures(talk: &Talk, recording: &Happened) -> Figures {
 
 /// Writes telemetry.csv, frames.log, trace.csv, recorder.csv after a fault, summary.json and report.html into a folder that exists.
 pub fn write(options: &TalkOptions, outcome: &Outcome, out: &Path) -> Result<()> {
-    let Outcome { talk, system, recording, figures } = outcome;
+    let Outcome { talk, system, recording, figures, on } = outcome;
     files::write_whole(&out.join("telemetry.csv"), |file| {
         file.write_record(system.columns())?;
         for row in &talk.rows {
@@ -167,7 +168,7 @@ pub fn write(options: &TalkOptions, outcome: &Outcome, out: &Path) -> Result<()>
         "version": env!("CARGO_PKG_VERSION"),
         "system": system.name(),
         "machine": options.machine_name(),
-        "on": options.run.on.name(),
+        "on": on,
         "inertia_kg_m2": options.inertia(),
         "figures": figures.values(),
     });

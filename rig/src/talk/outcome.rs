@@ -111,4 +111,6 @@ pub struct Outcome {
     pub recording: Happened,
     /// The figures.
     pub figures: Figures,
+    /// The name of the place where the drive ran.
+    pub on: &'static str,
 }

@@ -85,7 +85,6 @@ pub(super) fn page(options: &TalkOptions, outcome: &Outcome) -> Result<String> {
     page.curves("Currents", TIME, "A", &curves(currents));
     let script =
         options.script.as_ref().map_or("standard input".to_owned(), |path| path.display().to_string());
-    let subtitle =
-        format!("tractive {}, run on {}, {script}", env!("CARGO_PKG_VERSION"), options.run.on.name());
+    let subtitle = format!("tractive {}, run on {}, {script}", env!("CARGO_PKG_VERSION"), outcome.on);
     page.finish(&subtitle, &outcome.figures)
 }

@@ -42,18 +42,41 @@ impl LineSide {
 
     /// Feeds the network from the source over the next `dt_s`.
     pub fn feed(&self, plant: &mut Zs9Plant, source_v: f64, dt_s: f64) {
-        if self.gear.main_closed() {
+        let feeding = Feeding {
+            main: self.gear.main_closed(),
+            precharge: self.gear.precharge_closed(),
+            discharge: self.discharge,
+        };
+        feeding.feed(&self.times, plant, source_v, dt_s);
+    }
+}
+
+/// The switches that connect source, network and discharge resistor; each is on where it is true.
+#[derive(Clone, Copy, Debug)]
+pub struct Feeding {
+    /// The main contactor.
+    pub main: bool,
+    /// The precharge relay.
+    pub precharge: bool,
+    /// The discharge resistor.
+    pub discharge: bool,
+}
+
+impl Feeding {
+    /// Feeds the network from the source over the next `dt_s`.
+    pub fn feed(&self, times: &LineTimes, plant: &mut Zs9Plant, source_v: f64, dt_s: f64) {
+        if self.main {
             plant.source_v = source_v;
             return;
         }
         let mut capacitor_v = plant.network.capacitor_v();
-        if self.gear.precharge_closed() {
-            capacitor_v += (source_v - capacitor_v) * -(-dt_s / f64::from(self.times.precharge_s)).exp_m1();
+        if self.precharge {
+            capacitor_v += (source_v - capacitor_v) * -(-dt_s / f64::from(times.precharge_s)).exp_m1();
         }
         if self.discharge {
-            capacitor_v *= (-dt_s / f64::from(self.times.discharge_s)).exp();
+            capacitor_v *= (-dt_s / f64::from(times.discharge_s)).exp();
         }
-        let capacitor_v = capacitor_v.max(Self::EMPTY_V);
+        let capacitor_v = capacitor_v.max(LineSide::EMPTY_V);
         plant.network = NetworkState::even(0.0, capacitor_v);
         // Nothing flows between a source and capacitors of one voltage.
         plant.source_v = capacitor_v;

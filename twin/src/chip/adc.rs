@@ -55,6 +55,27 @@ const TRIGGERS: [&str; 18] = [
     "TIM20_TRGO",
     "TIM20_TRGO2",
 ];
+/// The same of ADC3 to ADC5.
+const TRIGGERS_345: [&str; 18] = [
+    "TIM1_TRGO",
+    "TIM1_CC4",
+    "TIM2_TRGO",
+    "TIM8_CC2",
+    "TIM4_CC3",
+    "TIM4_TRGO",
+    "TIM4_CC4",
+    "TIM8_CC4",
+    "TIM1_TRGO2",
+    "TIM8_TRGO",
+    "TIM8_TRGO2",
+    "TIM1_CC3",
+    "TIM3_TRGO",
+    "EXTI3",
+    "TIM6_TRGO",
+    "TIM15_TRGO",
+    "TIM20_TRGO",
+    "TIM20_TRGO2",
+];
 /// The reference, in V, and the codes of its range.
 pub const REFERENCE_V: f64 = 3.3;
 const CODES: f64 = 4_096.0;
@@ -78,7 +99,7 @@ pub struct Adc {
     smpr: [u32; 2],
     jsqr: u32,
     results: [u32; 4],
-    /// ADC12_COMMON.CCR, which both converters have.
+    /// ADC12_COMMON.CCR, or ADC345_COMMON.CCR, which several converters have.
     pub common: u32,
     regulated: Time,
     calibrated: Option<Time>,
@@ -135,7 +156,8 @@ impl Adc {
 
     /// An event of a timer.
     pub fn trigger(&mut self, event: &str, now: Time) {
-        let selected = TRIGGERS.get((self.jsqr >> 2 & 0x1F) as usize);
+        let triggers = if self.name == "ADC3" { TRIGGERS_345 } else { TRIGGERS };
+        let selected = triggers.get((self.jsqr >> 2 & 0x1F) as usize);
         if self.cr & JADSTART != 0
             && self.jsqr >> 7 & 0b11 == 1
             && selected == Some(&event)

@@ -32,6 +32,10 @@ const RAM: usize = 0x350 / 4;
 const BIT_RATE: u32 = 500_000;
 const FRAME_TIME: Time = 2 * 125 * MICROSECOND;
 
+/// PSR.BO, and the time of 129 times eleven recessive bits.
+const BUS_OFF: u32 = 1 << 7;
+const RECOVERY: Time = 129 * 11 * 2 * MICROSECOND;
+
 /// The controller.
 pub struct Can {
     words: HashMap<u32, u32>,
@@ -41,6 +45,8 @@ pub struct Can {
     put: usize,
     sent: Time,
     arriving: VecDeque<(Time, Frame)>,
+    /// The end of a recovery from bus-off.
+    recovers: Time,
     is_timed: bool,
     /// Frames that found the receive FIFO full.
     pub lost: u32,
@@ -57,6 +63,7 @@ impl Default for Can {
             put: 0,
             sent: Time::MAX,
             arriving: VecDeque::new(),
+            recovers: Time::MAX,
             is_timed: false,
             lost: 0,
         }
@@ -69,7 +76,13 @@ impl Can {
     }
 
     fn is_on_bus(&self) -> bool {
-        self.word(CCCR) & INIT == 0 && self.is_timed
+        self.word(CCCR) & INIT == 0 && self.word(PSR) & BUS_OFF == 0 && self.is_timed
+    }
+
+    /// Too many errors: it leaves the bus by itself.
+    pub fn leave_bus(&mut self) {
+        *self.words.entry(PSR).or_default() |= BUS_OFF;
+        *self.words.entry(CCCR).or_default() |= INIT;
     }
 
     /// Somebody begins to send a frame.
@@ -79,12 +92,16 @@ impl Can {
 
     /// The next change.
     pub fn next_event(&self) -> Time {
-        self.sent.min(self.arriving.front().map_or(Time::MAX, |(at, _)| *at))
+        self.sent.min(self.recovers).min(self.arriving.front().map_or(Time::MAX, |(at, _)| *at))
     }
 
     /// Does what is due.
     pub fn act(&mut self, now: Time, gpio: &Gpio, world: &mut World) {
         let is_wired = |signal| gpio.leading_to(("FDCAN1", signal)).any(|pin| world.is_bus(pin, signal));
+        if self.recovers <= now {
+            self.recovers = Time::MAX;
+            *self.words.entry(PSR).or_default() &= !BUS_OFF;
+        }
         let (listens, speaks) = (is_wired("RX"), is_wired("TX"));
         if self.sent <= now {
             self.sent = Time::MAX;
@@ -175,6 +192,9 @@ impl Can {
                 findings.expect(both, || "FDCAN1.CCCR.CCE is set before INIT has arrived".into());
                 self.words.insert(CCCR, value);
                 if value & INIT == 0 {
+                    if self.word(PSR) & BUS_OFF != 0 {
+                        self.recovers = now + RECOVERY;
+                    }
                     self.join(clock, findings);
                 }
             }

@@ -5,6 +5,10 @@ use super::gpio::{Driver, Gpio, place};
 use crate::finding::Findings;
 use crate::world::World;
 
+/// The internal reference, in V, and the bits that lend it and its divider.
+const INTERNAL_V: f64 = 1.212;
+const BRGEN: u32 = 1 << 22;
+const SCALEN: u32 = 1 << 23;
 const LOCK: u32 = 1 << 31;
 const VALUE: u32 = 1 << 30;
 /// The inputs of COMP1 to COMP7, by INPSEL (RM0440, "COMP non-inverting input assignment").
@@ -41,7 +45,14 @@ impl Comparators {
 
     /// The threshold of a comparator, in V; `None` while there is none.
     fn threshold_v(&self, index: usize) -> Option<f64> {
-        if self.controls[index] >> 4 & 7 != 4 {
+        let control = self.controls[index];
+        let source = control >> 4 & 7;
+        if source < 4 {
+            // The internal reference, or behind its divider a part of it.
+            let share = if control & BRGEN != 0 { f64::from(source + 1) / 4.0 } else { 1.0 };
+            return (control & SCALEN != 0).then_some(INTERNAL_V * share);
+        }
+        if source != 4 {
             return None;
         }
         let (converter, channel) = THRESHOLDS[index];

@@ -48,8 +48,8 @@ impl Chip {
     fn value(&mut self, peripheral: &'static str, offset: u32, now: Time, world: &mut World) -> Option<u32> {
         let cycle = self.rcc.cycle();
         if let Some(timer) = self.timers.iter_mut().find(|timer| timer.name == peripheral) {
-            if peripheral == "TIM4" {
-                timer.follow(world.encoder(&self.gpio));
+            if let Some(tracks) = world.encoder(peripheral, &self.gpio) {
+                timer.follow(tracks);
             }
             return timer.read(offset, now, cycle);
         }
@@ -62,6 +62,8 @@ impl Chip {
             "FDCAN1" => self.can.read(offset),
             "FDCANRAM1" => self.can.read_ram(offset),
             "ADC12_COMMON" => Some(self.adcs[0].common),
+            "ADC345_COMMON" => Some(self.adcs[2].common),
+            "SPI3" => self.spi.read(offset),
             name if name.starts_with("GPIO") => self.gpio.read(name, offset, world),
             name if name.starts_with("COMP") || name.starts_with("DAC") => {
                 self.comparators.read(name, offset)
@@ -119,10 +121,14 @@ impl Chip {
             "IWDG" => self.watchdog.write(offset, value, now, findings),
             "FDCAN1" => self.can.write(offset, value, now, self.rcc.can_clock(), findings),
             "FDCANRAM1" => self.can.write_ram(offset, value),
-            "ADC12_COMMON" => {
-                let busy = self.adcs.iter().any(Adc::is_enabled);
-                findings.expect(!busy, || "ADC12_COMMON.CCR is written while a converter is enabled".into());
-                self.adcs.iter_mut().for_each(|adc| adc.common = value);
+            "SPI3" => self.spi.write(offset, value, now, self.rcc.cycle(), findings),
+            "ADC12_COMMON" | "ADC345_COMMON" => {
+                let (first, second) = self.adcs.split_at_mut(2);
+                let of = if peripheral == "ADC12_COMMON" { first } else { second };
+                let busy = of.iter().any(Adc::is_enabled);
+                findings
+                    .expect(!busy, || format!("{peripheral}.CCR is written while a converter is enabled"));
+                of.iter_mut().for_each(|adc| adc.common = value);
                 true
             }
             name if name.starts_with("GPIO") => self.gpio.write(name, offset, value),
@@ -134,6 +140,6 @@ impl Chip {
     }
 
     fn adc(peripheral: &str) -> Option<usize> {
-        ["ADC1", "ADC2"].iter().position(|name| *name == peripheral)
+        ["ADC1", "ADC2", "ADC3"].iter().position(|name| *name == peripheral)
     }
 }

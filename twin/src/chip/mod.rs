@@ -7,6 +7,7 @@ mod dispatch;
 pub mod gpio;
 pub mod output;
 pub mod rcc;
+pub mod spi;
 pub mod system;
 pub mod timer;
 pub mod watchdog;
@@ -21,6 +22,7 @@ use can::Can;
 use comparators::Comparators;
 use gpio::Gpio;
 use rcc::Rcc;
+use spi::Spi;
 use system::System;
 use timer::Timer;
 use watchdog::Watchdog;
@@ -47,8 +49,10 @@ pub struct Chip {
     pub gpio: Gpio,
     /// Timers, as [`TIMERS`].
     pub timers: Vec<Timer>,
-    /// ADC1 and ADC2.
-    pub adcs: [Adc; 2],
+    /// ADC1, ADC2 and ADC3.
+    pub adcs: [Adc; 3],
+    /// SPI3.
+    pub spi: Spi,
     /// Comparators, and the converters of their thresholds.
     pub comparators: Comparators,
     /// The CAN controller.
@@ -68,7 +72,8 @@ impl Chip {
             system: System::default(),
             gpio: Gpio::new(&map),
             timers: TIMERS.iter().map(|(name, _)| Timer::new(name)).collect(),
-            adcs: [Adc::new("ADC1"), Adc::new("ADC2")],
+            adcs: ["ADC1", "ADC2", "ADC3"].map(Adc::new),
+            spi: Spi::default(),
             comparators: Comparators::default(),
             can: Can::default(),
             watchdog: Watchdog::default(),
@@ -91,17 +96,19 @@ impl Chip {
     pub fn next_event(&self) -> Time {
         let timers = self.timers.iter().map(|timer| timer.next_event(self.rcc.cycle()));
         let adcs = self.adcs.iter().map(Adc::next_event);
-        let others = [self.rcc.next_event(), self.can.next_event(), self.watchdog.next_event()];
+        let others =
+            [self.rcc.next_event(), self.can.next_event(), self.watchdog.next_event(), self.spi.next_event()];
         timers.chain(adcs).chain(others).min().unwrap_or(Time::MAX)
     }
 
     /// Does what is due.
     pub fn act(&mut self, now: Time, world: &mut World, findings: &mut Findings) {
         self.rcc.act(now);
-        self.watchdog.act(now, findings);
-        let position = world.encoder(&self.gpio);
-        if let Some(encoder) = self.timers.iter_mut().find(|timer| timer.name == "TIM4") {
-            encoder.follow(position);
+        self.watchdog.act(now);
+        for timer in &mut self.timers {
+            if let Some(tracks) = world.encoder(timer.name, &self.gpio) {
+                timer.follow(tracks);
+            }
         }
         let cycle = self.rcc.cycle();
         for index in 0..self.timers.len() {
@@ -111,6 +118,7 @@ impl Chip {
         for adc in &mut self.adcs {
             adc.act(now, cycle, &self.gpio, world, findings);
         }
+        self.spi.act(now, cycle, &self.gpio, world);
         let seen = self.comparators.see(&self.gpio, world);
         let supply = self.system.breaks(&self.rcc);
         for timer in &mut self.timers {
@@ -136,6 +144,16 @@ impl Chip {
                 if happened {
                     adc.trigger(&format!("{source}_{signal}"), now);
                 }
+            }
+        }
+    }
+
+    /// The debugger halts the core: the timers that are told to stop with it do, outputs off.
+    pub fn halt(&mut self, now: Time) {
+        let cycle = self.rcc.cycle();
+        for timer in &mut self.timers {
+            if self.system.stops_with_core(timer.name) {
+                timer.freeze(now, cycle);
             }
         }
     }

@@ -31,31 +31,38 @@ impl Reference {
     }
 }
 
-/// The reference of a channel in an output mode, at a count; a mode that is not modelled gives `None`. `own` and `next` are the compares
-/// of the channel and of its partner, `partner` the partner's mode.
-pub fn level(mode: u32, count: u32, own: u32, partner: u32, next: u32) -> Option<bool> {
-    let simple = |mode: u32, compare: u32| match mode & 7 {
-        6 => Some(count < compare),
-        7 => Some(count >= compare),
-        _ => None,
-    };
-    match mode {
-        // Frozen: as it is after a reset, low.
-        0 => Some(false),
-        4 => Some(false),
-        5 => Some(true),
-        6 | 7 => simple(mode, own),
-        // Combined modes: the partner must be in the other one's base mode (RM0440, combined PWM mode).
-        12 => Some(simple(6, own)? || base(partner, count, next)?),
-        13 => Some(simple(7, own)? && base(partner, count, next)?),
-        _ => None,
+/// A counter, and whether it counts down.
+#[derive(Clone, Copy, Debug)]
+pub struct Stand {
+    /// Its count.
+    pub count: u32,
+    /// Its direction.
+    pub down: bool,
+}
+
+impl Stand {
+    /// `true` where PWM mode 1 is active: below the compare, on the way down also at it.
+    fn is_below(self, compare: u32) -> bool {
+        if self.down { self.count <= compare } else { self.count < compare }
     }
 }
 
-fn base(mode: u32, count: u32, compare: u32) -> Option<bool> {
+/// The reference of a channel in an output mode; a mode that is not modelled gives `None`. `own` and `next` are the compares
+/// of the channel and of its partner, `partner` the partner's mode.
+pub fn level(mode: u32, at: Stand, own: u32, partner: u32, next: u32) -> Option<bool> {
     match mode {
-        6 | 12 => Some(count < compare),
-        7 | 13 => Some(count >= compare),
+        // Combined modes: the partner must be in the other one's base mode (RM0440, combined PWM mode).
+        12 => Some(base(6, at, own)? || base(partner, at, next)?),
+        13 => Some(base(7, at, own)? && base(partner, at, next)?),
+        mode => base(mode, at, own),
+    }
+}
+
+fn base(mode: u32, at: Stand, compare: u32) -> Option<bool> {
+    match mode {
+        6 | 12 => Some(at.is_below(compare)),
+        7 | 13 => Some(!at.is_below(compare)),
+        // Frozen: as it is after a reset, low.
         0 | 4 => Some(false),
         5 => Some(true),
         _ => None,

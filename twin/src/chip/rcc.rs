@@ -21,7 +21,7 @@ const PLLRDY: u32 = 1 << 25;
 pub const IWDGRSTF: u32 = 1 << 29;
 const RMVF: u32 = 1 << 23;
 /// Flags after power has come: brown-out and pin.
-const POWER_ON: u32 = 0b11 << 26;
+pub const POWER_ON: u32 = 0b11 << 26;
 
 /// The internal oscillator and the board's crystal, in Hz.
 const HSI_HZ: u32 = 16_000_000;
@@ -99,6 +99,27 @@ impl Rcc {
     /// `true` if the clock security system has seen the crystal stop.
     pub fn has_failed(&self) -> bool {
         self.word(CR) & CSSON != 0 && !self.crystal
+    }
+
+    /// The crystal stops. With the clock security system the core goes on from the internal oscillator, and `true` is given: an exception
+    /// comes (RM0440, clock security system).
+    pub fn lose_crystal(&mut self) -> bool {
+        self.crystal = false;
+        (self.crystal_ready, self.pll_ready) = (Time::MAX, Time::MAX);
+        if self.word(CR) & CSSON == 0 {
+            return false;
+        }
+        let control = self.word(CR) & !(HSEON | HSERDY | PLLON | PLLRDY);
+        let configuration = self.word(CFGR) & !0b1111 | 0b0101;
+        self.words.insert(CR, control);
+        self.words.insert(CFGR, configuration);
+        self.core_hz = HSI_HZ;
+        true
+    }
+
+    /// The flags of the last reset's cause.
+    pub fn set_cause(&mut self, flags: u32) {
+        self.words.insert(CSR, flags);
     }
 
     /// The next change.

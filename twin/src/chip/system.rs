@@ -58,6 +58,21 @@ impl System {
         true
     }
 
+    /// `true` if a timer stops while a debugger halts the core (DBGMCU_APB1FZR1, APB2FZR).
+    pub fn stops_with_core(&self, timer: &str) -> bool {
+        let (offset, bit) = match timer {
+            "TIM2" => (0x08, 0),
+            "TIM3" => (0x08, 1),
+            "TIM4" => (0x08, 2),
+            "TIM1" => (0x10, 11),
+            "TIM8" => (0x10, 13),
+            "TIM17" => (0x10, 18),
+            "TIM20" => (0x10, 20),
+            _ => return false,
+        };
+        self.word("DBGMCU", offset) >> bit & 1 != 0
+    }
+
     /// Wait states of the flash memory.
     pub fn flash_latency(&self) -> u32 {
         self.word("FLASH", 0) & 0xF

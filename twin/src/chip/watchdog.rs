@@ -43,11 +43,8 @@ impl Watchdog {
     }
 
     /// Resets the chip, if it was not fed.
-    pub fn act(&mut self, now: Time, findings: &mut Findings) {
-        if !self.has_bitten && self.bites() <= now {
-            self.has_bitten = true;
-            findings.add("the watchdog resets the chip");
-        }
+    pub fn act(&mut self, now: Time) {
+        self.has_bitten |= self.bites() <= now;
     }
 
     /// A register is read.

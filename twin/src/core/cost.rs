@@ -7,6 +7,10 @@ const REFILL: u32 = 3;
 const DIVISION: u32 = 14;
 const INTEGER_DIVISION: u32 = 12;
 
+/// Bytes of a line of the flash memory, and its wait states at 170 MHz.
+const LINE: usize = 8;
+const WAIT_STATES: u32 = 4;
+
 /// Cycles of a block's instructions.
 pub fn cycles(code: &[u8]) -> u32 {
     let halves: Vec<u32> =
@@ -19,6 +23,13 @@ pub fn cycles(code: &[u8]) -> u32 {
         at += if wide { 2 } else { 1 };
     }
     cycles
+}
+
+/// Cycles that a block's fetches add with no cache and no prefetch: each of the flash memory's lines that it lies in takes the wait
+/// states once (RM0440, 3.3.4; two banks, lines of 64 bits).
+pub fn waits(at: usize, length: usize) -> u32 {
+    let lines = (at + length).div_ceil(LINE) - at / LINE;
+    WAIT_STATES * lines as u32
 }
 
 fn narrow_cycles(code: u32) -> u32 {

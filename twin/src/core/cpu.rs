@@ -1,8 +1,9 @@
 //! The processor: instructions by the emulator, exceptions as ARMv7-M has them (DDI 0403E, B1.5).
 
 use super::cost;
+use crate::chip::rcc::IWDGRSTF;
 use crate::image::{FLASH, Image};
-use crate::machine::Machine;
+use crate::machine::{Machine, What};
 use crate::time::Time;
 use anyhow::{Result, anyhow, bail};
 use std::collections::HashMap;
@@ -25,6 +26,14 @@ const TO_HANDLER: u32 = 0xFFFF_FFF1;
 const TO_THREAD: u32 = 0xFFFF_FFF9;
 /// Its bit that is clear where there is a floating-point frame.
 const NO_FLOAT: u32 = 1 << 4;
+/// EPSR.IT in xPSR.
+const IT_STATE: u32 = 0x0600_FC00;
+/// What the memory holds before the program writes.
+const PAINT: u8 = 0xA5;
+/// Cycles between two looks while the core stands still.
+const STALL_CYCLES: u32 = 17;
+/// The flag of a reset by the pin, which every reset drives.
+const PIN_RESET: u32 = 1 << 26;
 /// CONTROL.FPCA.
 const FPCA: u32 = 1 << 2;
 /// Words of a frame, and of the floating-point registers in it.
@@ -43,6 +52,8 @@ pub enum Stop {
     Return,
     /// The time is over.
     Done,
+    /// The chip is reset.
+    Reset,
     /// Another exception of the processor.
     Exception(u32),
 }
@@ -50,11 +61,13 @@ pub enum Stop {
 /// The processor, with the machine around it.
 pub struct Cpu {
     engine: Unicorn<'static, Machine>,
-    /// The least stack pointer so far.
-    pub lowest_stack: u32,
     /// The costs of the handlers: cycles at most, by exception.
     pub longest: HashMap<usize, u64>,
-    entered: Vec<Time>,
+    entered: Vec<(Time, u64)>,
+    /// The costs of the handlers with every wait state of the flash memory, likewise.
+    pub longest_uncached: HashMap<usize, u64>,
+    /// The vector table's first two words.
+    start: (u32, u32),
 }
 
 fn failed(error: uc_error) -> anyhow::Error {
@@ -87,11 +100,58 @@ impl Cpu {
         }
         hook(&mut engine, image).map_err(failed)?;
         let word = |at: usize| u32::from_le_bytes([0, 1, 2, 3].map(|byte| image.flash[at + byte]));
-        let mut cpu = Self { engine, lowest_stack: u32::MAX, longest: HashMap::new(), entered: Vec::new() };
-        cpu.set(R::MSP, word(0))?;
-        cpu.set(R::LR, u32::MAX)?;
-        cpu.jump(word(4))?;
+        // After power-up nobody knows what the memory holds.
+        engine.mem_write(RAM.0.into(), &vec![PAINT; RAM.1 as usize]).map_err(failed)?;
+        let mut cpu = Self {
+            engine,
+            longest: HashMap::new(),
+            longest_uncached: HashMap::new(),
+            entered: Vec::new(),
+            start: (word(0), word(4)),
+        };
+        cpu.begin()?;
         Ok(cpu)
+    }
+
+    /// Out of reset; the memory keeps what it holds.
+    fn begin(&mut self) -> Result<()> {
+        self.entered.clear();
+        let (stack, entry) = self.start;
+        for (register, value) in
+            [(R::CONTROL, 0), (R::PRIMASK, 0), (R::XPSR_NZCVQG, 1 << 24), (R::MSP, stack)]
+        {
+            self.set(register, value)?;
+        }
+        self.set(R::LR, u32::MAX)?;
+        self.jump(entry)
+    }
+
+    /// A reset with these flags of its cause.
+    pub fn reset(&mut self, cause: u32) -> Result<()> {
+        self.machine_mut().reset(cause);
+        self.begin()
+    }
+
+    /// The bytes of the stack that have been written at any time, above the end of what has a place of its own.
+    pub fn stack_bytes(&self, statics_end: u32) -> Result<u32> {
+        let top = self.start.0;
+        let bytes =
+            self.engine.mem_read_as_vec(statics_end.into(), (top - statics_end) as usize).map_err(failed)?;
+        let untouched = bytes.iter().take_while(|byte| **byte == PAINT).count() as u32;
+        Ok(top - statics_end - untouched)
+    }
+
+    /// Time passes while the core executes nothing: it hangs, or a debugger has halted it.
+    pub fn stall(&mut self, until: Time) -> Result<()> {
+        while self.machine().now() < until && !self.machine().wants_reset() {
+            self.machine_mut().pass(STALL_CYCLES);
+        }
+        self.bite()
+    }
+
+    /// The reset, if the watchdog has bitten.
+    fn bite(&mut self) -> Result<()> {
+        if self.machine().wants_reset() { self.reset(IWDGRSTF | PIN_RESET) } else { Ok(()) }
     }
 
     /// The machine.
@@ -123,6 +183,7 @@ impl Cpu {
     pub fn run(&mut self, until: Time) -> Result<()> {
         self.machine_mut().until = until;
         while self.machine().now() < until && !self.machine().world.done {
+            self.bite()?;
             if self.machine().wants_interrupt() && self.take_interrupt()? {
                 continue;
             }
@@ -138,13 +199,19 @@ impl Cpu {
                 Some(Stop::Exception(number)) => {
                     bail!("{} at {pc:#010x}: the processor's exception {number}", self.machine().told());
                 }
-                Some(Stop::Interrupt | Stop::Done) | None => {}
+                Some(Stop::Interrupt | Stop::Done | Stop::Reset) | None => {}
             }
         }
         Ok(())
     }
 
     fn take_interrupt(&mut self) -> Result<bool> {
+        // Between two blocks that one IT instruction spans: the emulator cannot give its state back.
+        if self.get(R::XPSR)? & IT_STATE != 0 {
+            let machine = self.machine_mut();
+            (machine.masked, machine.deferred) = (true, true);
+            return Ok(false);
+        }
         let primask = self.get(R::PRIMASK)? & 1 != 0;
         let Some(exception) = self.machine().nvic.next(primask) else {
             self.machine_mut().masked = true;
@@ -155,7 +222,8 @@ impl Cpu {
     }
 
     fn enter(&mut self, exception: usize) -> Result<()> {
-        let floats = self.get(R::CONTROL)? & FPCA != 0;
+        // The emulator's own word for it, CONTROL.FPCA, stays behind where a block goes on after a return: what is saved is never too little.
+        let floats = self.machine().nvic.has_fpu();
         let (sp, xpsr) = (self.get(R::SP)?, self.get(R::XPSR)?);
         let words = FRAME + if floats { FLOATS } else { 0 };
         // Aligned to eight bytes; bit 9 of the stacked word says whether that took one.
@@ -174,7 +242,6 @@ impl Cpu {
         }
         let bytes: Vec<u8> = stack.iter().flat_map(|word| word.to_le_bytes()).collect();
         self.engine.mem_write(frame.into(), &bytes).map_err(failed)?;
-        self.lowest_stack = self.lowest_stack.min(frame);
         let to = if self.machine().nvic.active.is_empty() { TO_THREAD } else { TO_HANDLER };
         self.set(R::LR, if floats { to & !NO_FLOAT } else { to })?;
         self.set(R::CONTROL, 0)?;
@@ -184,9 +251,10 @@ impl Cpu {
         let machine = self.machine_mut();
         let vector = machine.nvic.vectors() + 4 * exception as u32;
         machine.nvic.enter(exception);
+        machine.keep(What::Entry);
         machine.pass(cycles);
-        let now = machine.now();
-        self.entered.push(now);
+        let entered = (machine.now(), machine.waits);
+        self.entered.push(entered);
         let mut target = [0; 4];
         self.engine.mem_read(vector.into(), &mut target).map_err(failed)?;
         self.jump(u32::from_le_bytes(target))
@@ -198,16 +266,17 @@ impl Cpu {
         let Some(left) = self.machine_mut().nvic.leave() else {
             bail!("a return to {to:#010x} from no exception")
         };
-        let now = self.machine().now();
-        let took = now - self.entered.pop().unwrap_or(now);
-        let cycles = took / self.machine().cycle();
+        let (now, waits) = (self.machine().now(), self.machine().waits);
+        let (since, waited) = self.entered.pop().unwrap_or((now, waits));
+        let cycles = (now - since) / self.machine().cycle();
         let longest = self.longest.entry(left).or_default();
         *longest = (*longest).max(cycles);
+        let uncached = self.longest_uncached.entry(left).or_default();
+        *uncached = (*uncached).max(cycles + waits - waited);
         if (to | NO_FLOAT == TO_THREAD) != self.machine().nvic.active.is_empty() {
             bail!("the exception {left} returns to {to:#010x}");
         }
         let frame = self.get(R::SP)?;
-        self.lowest_stack = self.lowest_stack.min(frame);
         let words = FRAME + if floats { FLOATS } else { 0 };
         let bytes = self.engine.mem_read_as_vec(frame.into(), 4 * words as usize).map_err(failed)?;
         let stack: Vec<u32> = bytes
@@ -251,19 +320,20 @@ impl Cpu {
 /// The emulator tells of every basic block, of exceptions, and of accesses to nowhere.
 fn hook(engine: &mut Unicorn<'static, Machine>, image: &Image) -> Result<(), uc_error> {
     let flash = image.flash.clone();
-    let mut costs = vec![0_u16; flash.len() / 2];
+    let mut costs = vec![(0_u16, 0_u16); flash.len() / 2];
     engine.add_block_hook(1, 0, move |engine, address, size| {
         let at = (address as u32 & 0x07FF_FFFF) as usize;
         let cost = match costs.get_mut(at / 2) {
-            Some(known) if *known == 0 => {
-                *known = cost::cycles(flash.get(at..at + size as usize).unwrap_or_default()) as u16;
+            Some(known) if known.0 == 0 => {
+                let code = flash.get(at..at + size as usize).unwrap_or_default();
+                *known = (cost::cycles(code) as u16, cost::waits(at, code.len()) as u16);
                 *known
             }
             Some(known) => *known,
-            None => 1,
+            None => (1, 0),
         };
         let machine = engine.get_data_mut();
-        if machine.block(address as u32, cost.into()) {
+        if machine.block(address as u32, cost.0.into(), cost.1.into()) {
             // It stops before the block, whose cost is not counted twice.
             let _ = engine.emu_stop();
         }

@@ -6,6 +6,10 @@ use crate::finding::Findings;
 pub const LINES: usize = 102;
 /// The number of the first external interrupt as an exception.
 const EXTERNAL: usize = 16;
+/// The non-maskable interrupt and the hard fault, as exceptions.
+pub const NMI: usize = 2;
+/// See [`NMI`].
+pub const HARD_FAULT: usize = 3;
 /// The bits of a priority that the chip has: the upper four.
 const PRIORITY_BITS: u8 = 0xF0;
 /// The priority at which nothing is active.
@@ -19,6 +23,8 @@ pub struct Nvic {
     /// The lines' own levels: an interrupt whose line is still high when its handler returns comes again.
     lines: [bool; LINES],
     priorities: [u8; LINES],
+    /// The processor's own exceptions that are pending: the non-maskable interrupt, the hard fault.
+    system: [bool; 2],
     /// The active exceptions, the innermost last.
     pub active: Vec<usize>,
     /// CPACR.
@@ -33,6 +39,7 @@ impl Default for Nvic {
             pending: [false; LINES],
             lines: [false; LINES],
             priorities: [0; LINES],
+            system: [false; 2],
             active: Vec::new(),
             cpacr: 0,
             vtor: 0,
@@ -49,8 +56,14 @@ impl Nvic {
         self.lines[line] = high;
     }
 
+    /// Pends one of the processor's own exceptions.
+    pub fn pend(&mut self, exception: usize) {
+        self.system[usize::from(exception == HARD_FAULT)] = true;
+    }
+
     fn priority(&self, exception: usize) -> i32 {
-        exception.checked_sub(EXTERNAL).map_or(-1, |line| i32::from(self.priorities[line]))
+        let own = if exception == NMI { -2 } else { -1 };
+        exception.checked_sub(EXTERNAL).map_or(own, |line| i32::from(self.priorities[line]))
     }
 
     /// The priority of what is executed.
@@ -60,6 +73,11 @@ impl Nvic {
 
     /// The exception that is taken next, if any may be: of the highest priority, of equal ones the lowest number.
     pub fn next(&self, primask: bool) -> Option<usize> {
+        let own = [NMI, HARD_FAULT].into_iter().zip(self.system).find(|(_, pending)| *pending);
+        if let Some((exception, _)) = own.filter(|(exception, _)| self.priority(*exception) < self.running())
+        {
+            return Some(exception);
+        }
         if primask || !self.pending.contains(&true) {
             return None;
         }
@@ -70,8 +88,9 @@ impl Nvic {
 
     /// An exception becomes active.
     pub fn enter(&mut self, exception: usize) {
-        if let Some(line) = exception.checked_sub(EXTERNAL) {
-            self.pending[line] = false;
+        match exception.checked_sub(EXTERNAL) {
+            Some(line) => self.pending[line] = false,
+            None => self.system[usize::from(exception == HARD_FAULT)] = false,
         }
         self.active.push(exception);
     }
@@ -96,6 +115,8 @@ impl Nvic {
         match address {
             0xE000_E100..0xE000_E110 => word(&self.enabled, 0xE000_E100),
             0xE000_E200..0xE000_E210 => word(&self.pending, 0xE000_E200),
+            // ICSR.VECTACTIVE.
+            0xE000_ED04 => self.active.last().map_or(0, |exception| *exception as u32),
             0xE000_ED08 => self.vtor,
             0xE000_ED88 => self.cpacr,
             // No debugger.

@@ -104,6 +104,9 @@ pub struct Pwm {
     zeros: Zeros,
     /// A peak has been served since the last valley.
     served: bool,
+    /// A valley has left conversions that nobody has read. The first peak has none: there the interrupt builds the drive before it gets
+    /// here, and its own conversions are complete by then.
+    stale: bool,
     /// The period that runs has pulses.
     pulses: bool,
 }
@@ -117,6 +120,7 @@ impl Pwm {
             feedback: feedback(&registers),
             zeros,
             served: false,
+            stale: false,
             pulses: false,
         }
     }
@@ -136,12 +140,14 @@ impl Pwm {
                 if !self.served {
                     self.bridge.outputs().trip_by(SoftwareBreak::Late);
                 }
-                self.served = false;
+                (self.served, self.stale) = (false, true);
                 false
             }
             Beat::Peak => {
                 self.feedback.begin();
-                self.samplers.forget();
+                if self.stale {
+                    self.samplers.forget();
+                }
                 if self.bridge.outputs().is_tripped() {
                     // A break of one timer alone stops the others.
                     self.bridge.outputs().trip();

@@ -84,34 +84,13 @@ impl Gates {
         self.ordered = ordered;
     }
 
-    /// The legs of a bridge that pulses, with the states that the diodes give those which wait for a gate: the current of a node that is not tied to a rail
-    /// chooses it. Out of the node it flows through a diode from below, into it through one from above.
+    /// As [`as_diodes_have_it`]; without a dead time no gate is waited for.
     pub fn as_diodes_have_it(
         &self,
         gates: [LegGates; 3],
         currents_a: impl FnOnce() -> [[f64; 3]; 2],
     ) -> [LegGates; 3] {
-        if self.dead_time == 0 {
-            return gates;
-        }
-        let [upper, lower] = currents_a();
-        core::array::from_fn(|leg| {
-            let choose =
-                |current_a: f64, out: LegGates, into: LegGates| if current_a > 0.0 { out } else { into };
-            match (gates[leg].high, gates[leg].middle, gates[leg].low) {
-                (false, false, true) => choose(upper[leg], LegGates::ZERO, LegGates::ONE),
-                (true, false, false) => choose(lower[leg], LegGates::ONE, LegGates::MINUS_ONE),
-                (false, true, false) => choose(upper[leg] + lower[leg], LegGates::ZERO, LegGates::MINUS_ONE),
-                // Two exchanges within a dead time: both nodes are free; where their currents pull them together, the sum chooses.
-                (false, false, false) if upper[leg] <= 0.0 => {
-                    choose(lower[leg], LegGates::ONE, LegGates::MINUS_ONE)
-                }
-                (false, false, false) => {
-                    choose(upper[leg] + lower[leg].min(0.0), LegGates::ZERO, LegGates::MINUS_ONE)
-                }
-                _ => gates[leg],
-            }
-        })
+        if self.dead_time == 0 { gates } else { as_diodes_have_it(gates, currents_a) }
     }
 
     fn set(&mut self, now: Tick, gate: u8, on: bool) {
@@ -123,4 +102,26 @@ impl Gates {
             }
         }
     }
+}
+
+/// The legs of a bridge that pulses, with the states that the diodes give those which wait for a gate: the current of a node that is not tied to a rail
+/// chooses it. Out of the node it flows through a diode from below, into it through one from above.
+pub fn as_diodes_have_it(gates: [LegGates; 3], currents_a: impl FnOnce() -> [[f64; 3]; 2]) -> [LegGates; 3] {
+    let [upper, lower] = currents_a();
+    core::array::from_fn(|leg| {
+        let choose = |current_a: f64, out: LegGates, into: LegGates| if current_a > 0.0 { out } else { into };
+        match (gates[leg].high, gates[leg].middle, gates[leg].low) {
+            (false, false, true) => choose(upper[leg], LegGates::ZERO, LegGates::ONE),
+            (true, false, false) => choose(lower[leg], LegGates::ONE, LegGates::MINUS_ONE),
+            (false, true, false) => choose(upper[leg] + lower[leg], LegGates::ZERO, LegGates::MINUS_ONE),
+            // Two exchanges within a dead time: both nodes are free; where their currents pull them together, the sum chooses.
+            (false, false, false) if upper[leg] <= 0.0 => {
+                choose(lower[leg], LegGates::ONE, LegGates::MINUS_ONE)
+            }
+            (false, false, false) => {
+                choose(upper[leg] + lower[leg].min(0.0), LegGates::ZERO, LegGates::MINUS_ONE)
+            }
+            _ => gates[leg],
+        }
+    })
 }

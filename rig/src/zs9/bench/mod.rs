@@ -14,6 +14,8 @@ mod settings;
 mod sums;
 mod watch;
 
+pub use gates::as_diodes_have_it;
+
 pub use crate::bench::BenchError;
 pub use settings::{BenchSettings, Course};
 

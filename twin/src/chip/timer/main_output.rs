@@ -41,7 +41,7 @@ impl Timer {
         let (own, other) =
             if complementary { (ccer & 4 != 0, ccer & 1 != 0) } else { (ccer & 1 != 0, ccer & 4 != 0) };
         let inverted = ccer & if complementary { 8 } else { 2 } != 0;
-        if bdtr & MOE == 0 {
+        if bdtr & MOE == 0 || self.frozen {
             // OSSI: the idle level, CR2.OIS; without it the output is off.
             let idle = self.word(CR2) >> (8 + 2 * channel + usize::from(complementary)) & 1 != 0;
             return (bdtr & 1 << 10 != 0 && own).then_some(idle);

@@ -1,8 +1,9 @@
 //! A timer (RM0440, chapters 28 to 30): counter, shadow registers, slave modes, capture, encoder.
 
+mod control;
 mod main_output;
 
-use super::output::{self, Reference};
+use super::output::{self, Reference, Stand};
 use crate::finding::Findings;
 use crate::time::Time;
 
@@ -33,6 +34,8 @@ const SBIF: u32 = 1 << 13;
 const IDXIF: u32 = 1 << 20;
 const CEN: u32 = 1;
 const URS: u32 = 1 << 2;
+const DIR: u32 = 1 << 4;
+const CMS: u32 = 0b11 << 5;
 const ARPE: u32 = 1 << 7;
 const MOE: u32 = 1 << 15;
 const BKE: u32 = 1 << 12;
@@ -72,6 +75,7 @@ pub struct Timer {
     pub name: &'static str,
     words: [u32; 32],
     shadow: Shadow,
+    /// The position in the period, and the instant at which it was reached. Counting up and down, the way down follows the way up.
     base: (u32, Time),
     followed: Option<i64>,
     triggers: Triggers,
@@ -79,6 +83,8 @@ pub struct Timer {
     /// A break input is active, and the chip's own.
     broken: (bool, bool),
     locked: u32,
+    /// A debugger holds it, with its outputs off.
+    frozen: bool,
     /// The last instant at which it was looked at.
     seen: Time,
 }
@@ -99,6 +105,7 @@ impl Timer {
             references: [Reference::default(); 4],
             broken: (false, false),
             locked: 0,
+            frozen: false,
             seen: 0,
         }
     }
@@ -128,19 +135,34 @@ impl Timer {
     }
 
     fn is_running(&self) -> bool {
-        self.word(CR1) & CEN != 0 && !self.is_encoder()
+        self.word(CR1) & CEN != 0 && !self.is_encoder() && !self.frozen
     }
 
     fn tick(&self, cycle: Time) -> Time {
         Time::from(self.shadow.prescaler + 1) * cycle
     }
 
-    fn count(&self, now: Time, cycle: Time) -> u32 {
+    /// It counts up and down (CR1.CMS).
+    fn is_centred(&self) -> bool {
+        self.word(CR1) & CMS != 0
+    }
+
+    fn position(&self, now: Time, cycle: Time) -> u32 {
         if !self.is_running() {
             return self.base.0;
         }
         let passed = (now - self.base.1) / self.tick(cycle);
-        (Time::from(self.base.0) + passed).min(self.shadow.reload.into()) as u32
+        let last = if self.is_centred() { 2 * self.reload() - 1 } else { self.shadow.reload };
+        (Time::from(self.base.0) + passed).min(last.into()) as u32
+    }
+
+    /// The counter at a position, with its direction.
+    fn stand(&self, position: u32) -> Stand {
+        let peak = self.reload();
+        match self.is_centred() && position >= peak {
+            true => Stand { count: 2 * peak - position, down: true },
+            false => Stand { count: position, down: false },
+        }
     }
 
     /// The main output is on.
@@ -158,13 +180,13 @@ impl Timer {
         std::mem::take(&mut self.triggers)
     }
 
-    fn update(&mut self, now: Time, by_software: bool) {
+    fn update(&mut self, position: u32, now: Time, by_software: bool) {
         self.shadow = Shadow {
             prescaler: self.word(PSC),
             reload: self.word(ARR),
             compares: [0, 1, 2, 3].map(|channel| self.word(CCR1 + 4 * channel)),
         };
-        self.base = (0, now);
+        self.base = (position, now);
         if !by_software || self.word(CR1) & URS == 0 {
             self.words[SR / 4] |= UIF;
         }
@@ -188,42 +210,30 @@ impl Timer {
             return;
         }
         match self.mode() {
-            4 => self.update(now, true),
+            4 => self.update(0, now, true),
             6 => self.start(now),
             8 => {
-                self.update(now, true);
+                self.update(0, now, true);
                 self.start(now);
             }
             _ => {}
         }
         if self.word(CCMR2) & 0b11 == 0b11 && self.word(CCER) & 1 << 8 != 0 {
-            let count = self.base.0;
-            self.words[(CCR1 + 8) / 4] = count;
+            self.words[(CCR1 + 8) / 4] = self.base.0;
             self.words[SR / 4] |= CC3IF;
         }
+    }
+
+    /// A debugger halts it: the counter stands, the outputs are off as without MOE.
+    pub fn freeze(&mut self, now: Time, cycle: Time) {
+        self.base = (self.position(now, cycle), now);
+        self.frozen = true;
     }
 
     fn start(&mut self, now: Time) {
         if self.word(CR1) & CEN == 0 {
             self.base.1 = now;
             self.words[CR1 / 4] |= CEN;
-        }
-    }
-
-    /// Counts the edges of an encoder's tracks.
-    pub fn follow(&mut self, tracks: Tracks) {
-        let Some(counts) = tracks.counts else { return };
-        let before = self.followed.replace(counts).unwrap_or(counts);
-        if !self.is_encoder() || self.word(CR1) & CEN == 0 || before == counts {
-            return;
-        }
-        let turn = i64::from(self.word(ARR)) + 1;
-        let moved = (i64::from(self.base.0) + counts - before).rem_euclid(turn);
-        let passes = counts.div_euclid(tracks.turn) != before.div_euclid(tracks.turn);
-        self.base.0 = moved as u32;
-        if passes && tracks.has_index && self.word(ECR) & 1 != 0 {
-            self.base.0 = counts.rem_euclid(tracks.turn).min(turn - 1) as u32;
-            self.words[SR / 4] |= IDXIF;
         }
     }
 
@@ -246,13 +256,13 @@ impl Timer {
         if !self.has_outputs() {
             return;
         }
-        let count = self.count(now, cycle);
+        let stand = self.stand(self.position(now, cycle));
         for channel in 0..4 {
             let Some(mode) = self.output_mode(channel) else { continue };
             let other = channel ^ 1;
             let partner = self.output_mode(other).unwrap_or(0);
             if let Some(high) =
-                output::level(mode, count, self.compare(channel), partner, self.compare(other))
+                output::level(mode, stand, self.compare(channel), partner, self.compare(other))
             {
                 self.references[channel].set(high, now);
             }
@@ -266,10 +276,20 @@ impl Timer {
             let tick = self.tick(cycle);
             let compares = (0..if self.has_outputs() { 4 } else { 0 }).map(|channel| self.compare(channel));
             let reload = self.reload();
-            for threshold in compares.filter(|compare| *compare <= reload).chain([reload + 1]) {
+            let mut look = |threshold: u32| {
                 if threshold > self.base.0 {
                     next = next.min(self.base.1 + Time::from(threshold - self.base.0) * tick);
                 }
+            };
+            let (is_centred, compares) = (self.is_centred(), compares.filter(|compare| *compare <= reload));
+            for threshold in compares.chain([if is_centred { reload } else { reload + 1 }]) {
+                look(threshold);
+                if is_centred {
+                    look(2 * reload - threshold);
+                }
+            }
+            if is_centred {
+                look(2 * reload);
             }
         }
         let dead = self.dead(cycle);
@@ -283,13 +303,19 @@ impl Timer {
         self.refer(now, cycle);
         if self.is_running() {
             let tick = self.tick(cycle);
-            let count = Time::from(self.base.0) + (now - self.base.1) / tick;
-            if count > self.reload().into() {
-                self.update(now, false);
+            let position = Time::from(self.base.0) + (now - self.base.1) / tick;
+            let peak = self.reload();
+            let next = match self.is_centred() {
+                true if self.base.0 < peak && position >= peak.into() => Some(peak),
+                true => (position >= (2 * peak).into()).then_some(0),
+                false => (position > peak.into()).then_some(0),
+            };
+            if let Some(next) = next {
+                self.update(next, now, false);
                 self.refer(now, cycle);
-            } else if count as u32 > self.base.0 {
-                let passed = count - Time::from(self.base.0);
-                self.base = (count as u32, self.base.1 + passed * tick);
+            } else if position as u32 > self.base.0 {
+                let passed = position - Time::from(self.base.0);
+                self.base = (position as u32, self.base.1 + passed * tick);
             }
         }
     }
@@ -297,7 +323,11 @@ impl Timer {
     /// A register is read.
     pub fn read(&mut self, offset: u32, now: Time, cycle: Time) -> Option<u32> {
         match offset as usize {
-            CNT => Some(self.count(now, cycle)),
+            CNT => Some(self.stand(self.position(now, cycle)).count),
+            CR1 if self.is_centred() => {
+                let down = self.stand(self.position(now, cycle)).down;
+                Some(self.word(CR1) & !DIR | if down { DIR } else { 0 })
+            }
             EGR => None,
             register @ (CR1..=BDTR | CCR5 | CCR6 | ECR | AF1) => Some(self.word(register)),
             _ => None,
@@ -316,14 +346,7 @@ impl Timer {
         let register = offset as usize;
         self.check_lock(register, value, findings);
         match register {
-            CR1 => {
-                findings.expect(value & 0b0111_0010 == 0, || {
-                    format!("{}: only counting up is modelled", self.name)
-                });
-                let started = value & CEN != 0 && self.word(CR1) & CEN == 0;
-                self.base = (self.count(now, cycle), if started { now } else { self.base.1 });
-                self.words[0] = value;
-            }
+            CR1 => self.control(value, now, cycle, findings),
             SR => {
                 self.words[SR / 4] &= value;
                 // A flag whose cause is still there is set again.
@@ -339,6 +362,13 @@ impl Timer {
                 self.words[SMCR / 4] = value;
             }
             ARR if self.word(CR1) & ARPE == 0 => {
+                let moves = self.has_outputs() && self.is_running() && value != self.shadow.reload;
+                findings.expect(!moves, || {
+                    format!(
+                        "{}.ARR is changed within a period of its outputs: it is not preloaded",
+                        self.name
+                    )
+                });
                 self.words[ARR / 4] = value;
                 self.shadow.reload = value;
             }
@@ -351,15 +381,5 @@ impl Timer {
         }
         self.refer(now, cycle);
         true
-    }
-
-    fn generate(&mut self, value: u32, now: Time, findings: &mut Findings) {
-        findings.expect(value & !0x81 == 0, || format!("{}.EGR: {value:#x} is not modelled", self.name));
-        if value & 1 != 0 {
-            self.update(now, true);
-        }
-        if value & 1 << 7 != 0 {
-            self.break_now(BIF);
-        }
     }
 }

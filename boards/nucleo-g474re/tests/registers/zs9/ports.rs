@@ -8,7 +8,9 @@ use nucleo_g474re::registers::Registers;
 use nucleo_g474re::zs9::sampling::Zeros;
 use nucleo_g474re::zs9::stage::STAGE;
 use nucleo_g474re::zs9::{CLOCK, Control, Pwm, start};
+use stm32_metapac::adc::regs::Isr;
 use stm32_metapac::gpio::regs::Idr;
+use stm32_metapac::timer::vals::Dir;
 use tractive::control::Demand;
 use tractive::frames::Angle;
 use tractive::ports::DualDriveCommand;
@@ -160,6 +162,23 @@ fn converters_that_are_silent_give_no_number() {
     assert!(sample.currents_a.iter().all(|current| current.a.is_nan()) && sample.source_v.is_nan());
     let state = PositionState::new();
     assert!(control(registers, &state).sample(NOW).inductor_a.is_nan());
+}
+
+#[test]
+fn the_first_peak_forgets_nothing_and_a_later_one_what_a_valley_has_left() {
+    let registers = Bench::of_other_inverter().registers;
+    let turn = |dir| registers.legs.tim1.cr1().modify(|w| w.set_dir(dir));
+    let mut pwm = Pwm::new(registers, zeros());
+    // The drive is built in the first interrupt: its own conversions may be complete by now.
+    turn(Dir::DOWN);
+    registers.adc1.isr().write_value(Isr(0));
+    assert!(pwm.begin());
+    assert_eq!(registers.adc1.isr().read().0, 0);
+    turn(Dir::UP);
+    assert!(!pwm.begin());
+    turn(Dir::DOWN);
+    assert!(pwm.begin());
+    assert!(registers.adc1.isr().read().jeos(), "a flag is taken back by writing 1");
 }
 
 #[test]

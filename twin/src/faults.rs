@@ -1,0 +1,187 @@
+//! The hardware's faults, each while the drive rests, is charged, is enabled or pulls: the time until every gate is off, and what the drive
+//! says of it.
+
+use crate::chip::rcc::POWER_ON;
+use crate::core::cpu::Cpu;
+use crate::core::nvic::HARD_FAULT;
+use crate::run::{Settings, prepare};
+use crate::time::{MILLISECOND, Time};
+use anyhow::{Result, ensure};
+use std::path::Path;
+use tractive_rig::talk::{Listener, System};
+
+/// The drive that is disturbed.
+const SCRIPT: &str = "\
+0.20 charge
+0.50 enable
+0.55 torque 300 over 0.05
+3.00 end
+";
+/// The same of the ZS9, whose network charges more slowly.
+const SCRIPT_ZS9: &str = "\
+0.20 charge
+0.70 enable
+1.00 torque 20 20 over 0.05
+3.00 end
+";
+/// The frames that are shown.
+const FRAMES: usize = 8;
+/// The time for which it is looked at afterwards.
+const AFTER: Time = 300 * MILLISECOND;
+
+/// The state of the drive.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum When {
+    /// Nothing commanded.
+    Ready,
+    /// The link is charged.
+    Charged,
+    /// Pulses without torque.
+    Enabled,
+    /// Torque.
+    Running,
+}
+
+impl When {
+    /// All of them.
+    pub const ALL: [Self; 4] = [Self::Ready, Self::Charged, Self::Enabled, Self::Running];
+
+    fn instant(self, system: System) -> Time {
+        let ms = match (self, system) {
+            (Self::Ready, _) => 190,
+            (Self::Charged, System::Pmasynrm) => 480,
+            (Self::Charged, System::Zs9) => 680,
+            (Self::Enabled, System::Pmasynrm) => 540,
+            (Self::Enabled, System::Zs9) => 980,
+            (Self::Running, System::Pmasynrm) => 750,
+            (Self::Running, System::Zs9) => 1_150,
+        };
+        // Not at a control interrupt.
+        ms * MILLISECOND + MILLISECOND / 30
+    }
+}
+
+/// A fault.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Cause {
+    /// A gate driver is not ready.
+    Drivers,
+    /// A phase current beyond the comparators' threshold.
+    Overcurrent,
+    /// The encoder's wires are cut.
+    Encoder,
+    /// The processor hangs.
+    Hang,
+    /// The crystal stops.
+    Crystal,
+    /// The supply falls below the detector's threshold, then below that of the reset, and comes back.
+    BrownOut,
+    /// A debugger halts the processor.
+    Debugger,
+    /// A hard fault.
+    HardFault,
+    /// The CAN controller leaves the bus.
+    BusOff,
+}
+
+impl Cause {
+    /// All of them.
+    pub const ALL: [Self; 9] = [
+        Self::Drivers,
+        Self::Overcurrent,
+        Self::Encoder,
+        Self::Hang,
+        Self::Crystal,
+        Self::BrownOut,
+        Self::Debugger,
+        Self::HardFault,
+        Self::BusOff,
+    ];
+}
+
+/// What came of it.
+#[derive(Clone, Debug)]
+pub struct Seen {
+    /// The time from the cause until the last gate went off, and none went on again; `None` if one is on at the end.
+    pub off_after: Option<Time>,
+    /// Gates were on just before.
+    pub pulsed: bool,
+    /// Frames heard in the last third of the time.
+    pub heard: u64,
+    /// The resets.
+    pub resets: u32,
+    /// State and fault as told at the end.
+    pub told: String,
+    /// Whether commands are listened to at the end, as told.
+    pub listening: String,
+    /// The last frames of the drive, as logged.
+    pub frames: Vec<String>,
+    /// What was found besides.
+    pub findings: Vec<String>,
+}
+
+/// Drives the image into a state, lets the fault come, and looks.
+pub fn look(image: &Path, system: System, cause: Cause, when: When) -> Result<Seen> {
+    let script = match system {
+        System::Pmasynrm => SCRIPT,
+        System::Zs9 => SCRIPT_ZS9,
+    };
+    let (mut cpu, _) = prepare(&Settings::new(image, system, script.to_owned()))?;
+    cpu.machine_mut().world.side.charge();
+    cpu.run(when.instant(system))?;
+    let machine = cpu.machine();
+    ensure!(machine.findings.all.is_empty(), "{}", machine.findings.all[0]);
+    let (from, edges, pulsed) = (machine.now(), machine.world.edges.len(), machine.world.any_gate());
+    disturb(&mut cpu, system, cause, from)?;
+    cpu.run(from + 2 * AFTER / 3)?;
+    let before = cpu.machine().world.talk.received;
+    cpu.run(from + AFTER)?;
+    let machine = cpu.machine();
+    let world = &machine.world;
+    let last = world.edges[edges..].last().map_or(0, |edge| edge.at.saturating_sub(from));
+    let say = |column: &str| world.talk.listener.value(column);
+    Ok(Seen {
+        off_after: (!world.any_gate()).then_some(last),
+        pulsed,
+        heard: world.talk.received - before,
+        resets: machine.resets,
+        told: format!("{} {}", say("state"), say("fault")).trim().to_owned(),
+        frames: last_frames(&world.talk.frames),
+        listening: say("listening"),
+        findings: machine.findings.all.iter().map(|finding| finding.text.clone()).collect(),
+    })
+}
+
+fn last_frames(log: &str) -> Vec<String> {
+    log.lines().rev().filter(|line| line.ends_with('R')).take(FRAMES).map(str::to_owned).collect()
+}
+
+fn disturb(cpu: &mut Cpu, system: System, cause: Cause, from: Time) -> Result<()> {
+    let machine = cpu.machine_mut();
+    machine.may_bite = true;
+    // A drive that begins anew counts its frames anew: whoever listens from now on hears it.
+    machine.world.talk.listener = Listener::new(system);
+    match cause {
+        Cause::Drivers => machine.world.ready = false,
+        Cause::Overcurrent => machine.world.excess_a = (0, 0, 600.0),
+        Cause::Encoder => machine.world.cut = true,
+        Cause::Hang => cpu.stall(from + AFTER)?,
+        Cause::Crystal => machine.stop_crystal(),
+        Cause::BrownOut => {
+            machine.chip.system.low_supply = true;
+            machine.settle();
+            cpu.run(from + MILLISECOND)?;
+            cpu.reset(POWER_ON)?;
+        }
+        Cause::Debugger => {
+            let now = machine.now();
+            machine.chip.halt(now);
+            machine.settle();
+            cpu.stall(from + AFTER)?;
+        }
+        Cause::HardFault => machine.nvic.pend(HARD_FAULT),
+        Cause::BusOff => machine.chip.can.leave_bus(),
+    }
+    cpu.machine_mut().settle();
+    Ok(())
+}

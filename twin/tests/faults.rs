@@ -1,0 +1,89 @@
+//! The hardware's faults on the very images. Those are what `TRACTIVE_NUCLEO_IMAGE` and `TRACTIVE_NUCLEO_ZS9_IMAGE` name.
+
+use std::path::PathBuf;
+use tractive_rig::talk::System;
+use tractive_twin::faults::{Cause, Seen, When, look};
+use tractive_twin::time::{MICROSECOND, Time};
+
+fn image(system: System) -> PathBuf {
+    let name = match system {
+        System::Pmasynrm => "TRACTIVE_NUCLEO_IMAGE",
+        System::Zs9 => "TRACTIVE_NUCLEO_ZS9_IMAGE",
+    };
+    std::env::var_os(name).expect(name).into()
+}
+
+/// The time within which every gate is off; `None` where the drive goes on.
+fn within(cause: Cause) -> Option<Time> {
+    match cause {
+        // Without clock and software.
+        Cause::Drivers | Cause::Overcurrent | Cause::Crystal | Cause::BrownOut | Cause::Debugger => Some(0),
+        // The handler.
+        Cause::HardFault => Some(10 * MICROSECOND),
+        // 161 counts of the watchdog's clock.
+        Cause::Hang => Some(20_200 * MICROSECOND),
+        Cause::Encoder => Some(20_000 * MICROSECOND),
+        Cause::BusOff => None,
+    }
+}
+
+/// The words at the end.
+fn told(cause: Cause, seen: &Seen) -> bool {
+    let told = seen.told.as_str();
+    match cause {
+        Cause::Drivers => told == "fault gate_driver",
+        // Software that samples within the same period may be first with the name.
+        Cause::Overcurrent => ["fault hardware_overcurrent", "fault overcurrent"].contains(&told),
+        Cause::Hang | Cause::Debugger | Cause::HardFault => told == "fault start_refused" && seen.resets == 1,
+        // The contactors that open within 20 ms are found closed by the start, where they were.
+        Cause::BrownOut => ["ready", "fault contactor"].contains(&told) && seen.resets == 1,
+        // There is no bus without the crystal, and no fault where no angle is needed.
+        Cause::Crystal | Cause::Encoder => true,
+        Cause::BusOff => seen.heard > 0 && seen.listening == "fresh" && seen.resets == 0,
+    }
+}
+
+fn campaign(system: System, cases: impl IntoIterator<Item = (Cause, When)>) {
+    let image = image(system);
+    let mut wrong = Vec::new();
+    // One alone, by its name.
+    let only = std::env::var("TRACTIVE_FAULT").unwrap_or_default();
+    for (cause, when) in cases.into_iter().filter(|case| format!("{case:?}").contains(&only)) {
+        let seen = look(&image, system, cause, when).unwrap();
+        let us = seen.off_after.map(|off| off as f64 / MICROSECOND as f64);
+        let (name, words) = (system.name(), &seen.told);
+        let (resets, heard) = (seen.resets, seen.heard);
+        println!(
+            "| {name} | {cause:?} | {when:?} | {us:.3?} µs | {words} | {resets} resets | {heard} frames |"
+        );
+        let off = match within(cause) {
+            Some(limit) => seen.off_after.is_some_and(|off| off <= limit),
+            None => true,
+        };
+        let pulsed = seen.pulsed == matches!(when, When::Enabled | When::Running);
+        if !(off && pulsed && told(cause, &seen) && seen.findings.is_empty()) {
+            wrong.push((cause, when, seen));
+        }
+    }
+    assert!(wrong.is_empty(), "{wrong:#?}");
+}
+
+#[test]
+#[ignore = "needs the image; `cargo xtask test --only twin` builds it"]
+fn a_fault_of_the_hardware_turns_the_gates_off() {
+    campaign(System::Pmasynrm, Cause::ALL.map(|cause| (cause, When::Running)));
+}
+
+#[test]
+#[ignore = "needs the image; `cargo xtask test --only twin` builds it"]
+fn a_fault_of_the_hardware_turns_the_gates_of_the_zs9_off() {
+    campaign(System::Zs9, Cause::ALL.map(|cause| (cause, When::Running)));
+}
+
+#[test]
+#[ignore = "needs the image; `cargo xtask test --only twin` builds it"]
+fn in_every_state_nothing_turns_a_gate_on() {
+    let states = [When::Ready, When::Charged, When::Enabled];
+    let causes = [Cause::HardFault, Cause::Hang, Cause::Debugger, Cause::BrownOut];
+    campaign(System::Pmasynrm, causes.into_iter().flat_map(|cause| states.map(|when| (cause, when))));
+}
