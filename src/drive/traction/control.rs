@@ -187,7 +187,8 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             self.pulse(input, &measured, applied.as_ref(), &slot, shared);
         } else {
             self.rest(now, omega, sample);
-            pulsing = self.start_up(input, applied.as_ref(), &slot, shared, port);
+            let commands = command.enable.then_some(slot.commands);
+            pulsing = self.start_up(sample, applied.as_ref(), commands, shared, port);
         }
         // Not finite if either is not.
         let odd = self.reference.voltage_v + omega;

@@ -2,13 +2,12 @@
 
 use super::super::Shared;
 use super::super::applied::Applied;
-use super::super::slot::Slot;
-use super::{ControlTask, Input};
+use super::ControlTask;
 use crate::control::ControlLaw;
 use crate::frames::{AlphaBeta, six_step_v};
 use crate::machine::Machine;
 use crate::modulation::{Mode, Reference, depth_limit};
-use crate::ports::ControlPort;
+use crate::ports::{ControlPort, Sample};
 use crate::protection::Fault;
 use crate::start_up::{StartUp, StartUpInput, StartUpStep};
 use crate::time::Instant;
@@ -29,19 +28,19 @@ impl Starting {
 }
 
 impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
-    /// A control period at rest: where the drive is enabled and its sensor counts, a period of the search for the angle. `true` if it makes pulses.
+    /// A control period at rest: where the drive is enabled and its sensor counts, a period of the search for the angle. `commands` is `None`
+    /// where the drive is not enabled, else `true` if the next boundary uses this period. `true` if it makes pulses.
     #[cold]
     #[inline(never)]
     pub(super) fn start_up(
         &mut self,
-        input: Input,
+        sample: &Sample,
         applied: Option<&Applied>,
-        slot: &Slot,
+        commands: Option<bool>,
         shared: &Shared,
         port: &mut impl ControlPort,
     ) -> bool {
-        let Input { sample, command } = input;
-        let starts = sample.angle.is_none() && command.enable && self.trip.is_none();
+        let starts = commands.is_some() && sample.angle.is_none() && self.trip.is_none();
         let Some(turned) = (if starts { port.turned() } else { None }) else {
             self.starting = Starting::new();
             return false;
@@ -59,7 +58,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             starting.boundary = Some(applied.at);
         }
         let mut vector = AlphaBeta::default();
-        if slot.commands {
+        if commands == Some(true) {
             let devices = &self.settings.devices;
             let shortest_s = clock.seconds(devices.shortest_half_ticks as i32);
             let limit_v = USED_SHARE * depth_limit(Mode::Async, 0.0, devices) * six_step_v(sample.udc_v);
