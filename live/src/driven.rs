@@ -4,7 +4,7 @@ use anyhow::{Result, bail};
 use serde_json::Value;
 use tractive_rig::scenario::live::Wanted;
 
-/// What a drive has left since the last time.
+/// The samples and events of a drive since the last time.
 #[derive(Default)]
 pub struct Taken {
     /// Time of the first row in s; `None` where there is no row.

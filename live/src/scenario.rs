@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 use tractive_rig::scenario::planned;
 
-/// What a scenario has left.
+/// The rest of a scenario.
 pub struct Ran {
     /// Its rows and edges.
     pub taken: Taken,

@@ -224,7 +224,7 @@ impl RunOptions {
         })
     }
 
-    /// Where it runs and by which law. In a page both are as they are usual: what else there is would double its size.
+    /// The place where it runs, and the law. In a page both are as they are usual: what else there is would double its size.
     ///
     /// # Errors
     /// Says what a page does not have.

@@ -99,7 +99,7 @@ impl Cause {
     ];
 }
 
-/// What came of it.
+/// The outcome.
 #[derive(Clone, Debug)]
 pub struct Seen {
     /// The time from the cause until the last gate went off, and none went on again; `None` if one is on at the end.
@@ -112,11 +112,11 @@ pub struct Seen {
     pub resets: u32,
     /// State and fault as told at the end.
     pub told: String,
-    /// Whether commands are listened to at the end, as told.
+    /// `true` if commands are listened to at the end, as told.
     pub listening: String,
     /// The last frames of the drive, as logged.
     pub frames: Vec<String>,
-    /// What was found besides.
+    /// The findings besides.
     pub findings: Vec<String>,
 }
 

@@ -20,11 +20,11 @@ pub struct Access {
     pub at: Time,
     /// The exception that it was made in; 0 is none.
     pub exception: usize,
-    /// What was done.
+    /// The kind, with address and value.
     pub what: What,
 }
 
-/// What an access did.
+/// The kind of an access.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum What {
     /// The exception began.

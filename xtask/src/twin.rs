@@ -18,7 +18,7 @@ const SCENARIO: &str = "sweep";
 /// The scenario with a fault, and the time at which its drivers' ready wire drops, in s.
 const FAULT: &str = "fault";
 const DRIVERS_FAIL_S: &str = "3.4";
-/// Where the files go unless told otherwise.
+/// The place for the files unless another is named.
 const OUT: &str = "target/tractive/twin";
 
 /// The command.

@@ -59,7 +59,7 @@ fn opened(program: &Path, address: &str) -> Result<Browser> {
 /// The drive runs.
 const RUNNING: &str = "document.getElementById('state-name').textContent === 'running'";
 
-/// What the page looks like, and that nothing went wrong.
+/// The looks of the page, and that nothing went wrong.
 fn ends(browser: &mut Browser) -> Result<()> {
     fits(browser)?;
     contrasts(browser)?;

@@ -29,7 +29,7 @@ use rayon::prelude::*;
 #[derive(Clone, Debug)]
 pub enum Case {
     /// Of the PMaSynRM drive.
-    Traction(traction::Case),
+    Traction(Box<traction::Case>),
     /// Of the ZS9.
     Dual(dual::Case),
 }
@@ -77,6 +77,6 @@ impl Campaign {
 
 /// Every case; of the fast ones each fault in each mode once at least.
 pub fn cases(fast: bool) -> Vec<Case> {
-    let traction = traction::cases(fast).into_iter().map(Case::Traction);
+    let traction = traction::cases(fast).into_iter().map(|case| Case::Traction(Box::new(case)));
     traction.chain(dual::cases(fast).into_iter().map(Case::Dual)).collect()
 }

@@ -1,4 +1,4 @@
-//! What the drive's side and the page's side hand each other.
+//! The data that the drive's side and the page's side hand each other.
 
 use serde_json::{Value, json};
 use std::collections::VecDeque;

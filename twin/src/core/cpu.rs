@@ -28,7 +28,7 @@ const TO_THREAD: u32 = 0xFFFF_FFF9;
 const NO_FLOAT: u32 = 1 << 4;
 /// EPSR.IT in xPSR.
 const IT_STATE: u32 = 0x0600_FC00;
-/// What the memory holds before the program writes.
+/// The memory's content before the program writes.
 const PAINT: u8 = 0xA5;
 /// Cycles between two looks while the core stands still.
 const STALL_CYCLES: u32 = 17;

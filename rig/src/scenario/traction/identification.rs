@@ -35,7 +35,7 @@ const AFTER_FAULT_S: f64 = 0.1;
 pub struct Stand {
     /// Inertia of the free rotor, in kg·m².
     pub inertia_kg_m2: f64,
-    /// From this time on a current sensor reads too much by [`OFFSET`], in s.
+    /// From this time on a current sensor reads too much by three tenths of the largest current, in s.
     pub fault_at_s: Option<f64>,
 }
 

@@ -1,4 +1,4 @@
-//! What starts and moves a timer from outside: its control register, events by software, an encoder's tracks.
+//! The ways to start and move a timer from outside: its control register, events by software, an encoder's tracks.
 
 use super::{ARR, BIF, CEN, CMS, CR1, DIR, ECR, IDXIF, SR, Timer, Tracks};
 use crate::finding::Findings;
