@@ -5,26 +5,20 @@ use crate::time::{SECOND, seconds};
 use crate::world::World;
 use crate::world::side::Side;
 use anyhow::{Context, Result};
-use clap::Parser;
+use std::ffi::OsString;
 use std::path::Path;
 use tractive::modulation::Mode;
 use tractive_rig::talk::{Happened, Lines, Outcome, Talk, TalkOptions, figures};
 use tractive_rig::trace::{self, Recording, Row, Switch};
 use tractive_rig::{talk, zs9};
 
-/// The options that the rig's writers read.
-#[derive(Parser)]
-struct Options {
-    #[command(flatten)]
-    talk: TalkOptions,
-}
-
 /// Writes them into a folder, which is made where it is not there. The error names the file. The talk and the recording are taken out of
 /// the world.
 pub fn write(world: &mut World, settings: &Settings, out: &Path) -> Result<()> {
     std::fs::create_dir_all(out).with_context(|| out.display().to_string())?;
     let system = settings.system;
-    let options = Options::try_parse_from(["twin", &settings.name, "--system", system.name()])?.talk;
+    let options =
+        TalkOptions::read(&[settings.name.as_str(), "--system", system.name()].map(OsString::from))?;
     let over = Talk::new(system, Lines::Script(Default::default()), settings.inertia_kg_m2, 0.0);
     let talk = std::mem::replace(&mut world.talk, over);
     let recording = recording(world);
@@ -53,6 +47,7 @@ fn recording(world: &mut World) -> Happened {
                 tick_s: 1.0 / SECOND as f64,
                 recorded: Vec::new(),
                 observations: Vec::new(),
+                found: None,
             })
         }
         Side::Zs9(side) => {
