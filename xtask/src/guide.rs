@@ -18,8 +18,15 @@ struct Line {
     code: i32,
 }
 
+/// The folder of the guide's files: what an earlier build has left there is not gone on with.
+const FILES: &str = "target/guide";
+
 /// Runs them all; `true` is good.
 pub fn run(root: &Path) -> Result<bool> {
+    let files = root.join(FILES);
+    if files.is_dir() {
+        std::fs::remove_dir_all(&files).with_context(|| files.display().to_string())?;
+    }
     let mut good = true;
     for Line { chapter, command, code } in lines(root)? {
         let began = Instant::now();
