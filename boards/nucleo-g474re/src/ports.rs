@@ -9,7 +9,7 @@ use super::position::{Position, PositionState, reported};
 use super::registers::Registers;
 use super::sampling::{Sampler, Zeros, currents_a};
 use super::start::{control_sampler, pwm_sampler};
-use tractive::frames::Abc;
+use tractive::frames::{Abc, Angle};
 use tractive::modulation::{CarrierHalf, Mode};
 use tractive::ports::{ControlPort, PwmPort, Report, Sample};
 use tractive::protection::SafeState;
@@ -52,7 +52,7 @@ impl<P: Position> ControlPort for Control<'_, P> {
         let angle = self.position.angle();
         let lost = self.position.is_lost();
         let angle = reported(angle, lost);
-        self.state.tell(&[angle], &[lost]);
+        self.state.tell(&[angle], &[lost], self.position.counted().is_some());
         let codes = self.sampler.read();
         let udc_v = match codes {
             Some([_, _, _, udc]) => udc.udc_v(),
@@ -78,6 +78,14 @@ impl<P: Position> ControlPort for Control<'_, P> {
     }
 
     fn report(&mut self, _now: Instant, _report: &Report) {}
+
+    fn turned(&mut self) -> Option<Angle> {
+        self.position.counted()
+    }
+
+    fn align(&mut self, _now: Instant, zero: Angle) {
+        self.position.align(zero);
+    }
 }
 
 /// The PWM interrupt's side.

@@ -19,6 +19,14 @@ pub trait Position {
     fn is_lost(&self) -> bool {
         false
     }
+
+    /// Turn since the sensor began to count, electrical, at the newest [`Position::angle`], where that is not known; `None` where nothing counts.
+    fn counted(&self) -> Option<Angle> {
+        None
+    }
+
+    /// Takes the electrical angle that the rotor had where the sensor began to count: the angle is known from now on.
+    fn align(&mut self, _zero: Angle) {}
 }
 
 /// The state of a drive's position sensors, one word from the control interrupt, which reads them, to the idle loop.
@@ -28,18 +36,25 @@ pub struct PositionState(AtomicU32);
 impl PositionState {
     const KNOWN: u32 = 1;
     const LOST: u32 = 2;
+    const COUNTED: u32 = 4;
 
     /// Nothing read yet.
     pub const fn new() -> Self {
         Self(AtomicU32::new(0))
     }
 
-    /// In the control interrupt: the angles that its sensors gave, and whether each has lost its rotor.
+    /// In the control interrupt: the angles that its sensors gave, whether each has lost its rotor, and whether the drive can find the angles.
     #[inline]
-    pub(super) fn tell<const N: usize>(&self, angles: &[Option<Angle>; N], lost: &[bool; N]) {
+    pub(super) fn tell<const N: usize>(&self, angles: &[Option<Angle>; N], lost: &[bool; N], counted: bool) {
+        let counted = if counted { Self::COUNTED } else { 0 };
         let known = if angles.iter().all(Option::is_some) { Self::KNOWN } else { 0 };
         let lost = if lost.contains(&true) { Self::LOST } else { 0 };
-        self.0.store(known | lost, Ordering::Relaxed);
+        self.0.store(known | lost | counted, Ordering::Relaxed);
+    }
+
+    /// `true` while an angle is not known that the drive can find.
+    pub fn is_counted(&self) -> bool {
+        self.0.load(Ordering::Relaxed) & Self::COUNTED != 0
     }
 
     /// `true` once all angles are known.
@@ -77,7 +92,17 @@ pub struct Encoder {
     /// The last call has seen the index. Its count may be older than that: the next one is not.
     passed: bool,
     lost: bool,
+    /// Before the index: the counted angle, and its change in the last call.
+    counted: Angle,
+    moved: Angle,
+    /// The angle where the count is 0, as somebody has found it before the index.
+    found: Option<Angle>,
+    /// What is left of that one's error, behind the index.
+    left: Angle,
 }
+
+/// Share of that error that is left after each call, as a number of bits: the angle mends in some hundreds of calls, without a step.
+const MENDING_BITS: u32 = 7;
 
 /// The channel that captures the count, from 0.
 const CAPTURE: usize = 2;
@@ -101,6 +126,10 @@ impl Encoder {
             last: None,
             passed: false,
             lost: false,
+            counted: Angle::ZERO,
+            moved: Angle::ZERO,
+            found: None,
+            left: Angle::ZERO,
         }
     }
 
@@ -142,9 +171,17 @@ impl Position for Encoder {
             self.timer.sr().write_value(all_but_index);
         }
         let passed = core::mem::replace(&mut self.passed, index);
+        let turned = Angle(count.wrapping_mul(self.units_per_count));
+        let left = self.left.signed();
+        self.left = Angle(left.wrapping_sub(left >> MENDING_BITS) as u32);
         self.last = match self.last {
-            None if !passed => return None,
-            None => Some((count, 0)),
+            None if !passed => return self.before_index(turned, index),
+            None => {
+                if let Some(found) = self.found {
+                    self.left = self.counted + self.moved + found - (turned + self.zero);
+                }
+                Some((count, 0))
+            }
             Some((before, moved)) => {
                 let moves = self.wrapped(count + self.counts - before);
                 let off = self.wrapped(moves + self.counts - moved);
@@ -154,7 +191,15 @@ impl Position for Encoder {
                 Some((count, moves))
             }
         };
-        Some(Angle(count.wrapping_mul(self.units_per_count)) + self.zero)
+        Some(turned + self.zero + self.left)
+    }
+
+    fn counted(&self) -> Option<Angle> {
+        (self.last.is_none() && self.found.is_none()).then_some(self.counted)
+    }
+
+    fn align(&mut self, zero: Angle) {
+        self.found = self.found.or(Some(zero));
     }
 
     #[inline]
@@ -164,6 +209,17 @@ impl Position for Encoder {
 }
 
 impl Encoder {
+    /// The angle before the index, where somebody has found it. A count with the index's flag may be from before or behind it: there the rotor
+    /// is taken to have turned on.
+    #[cold]
+    fn before_index(&mut self, turned: Angle, index: bool) -> Option<Angle> {
+        if !index {
+            self.moved = turned - self.counted;
+        }
+        self.counted = self.counted + self.moved;
+        self.found.map(|found| self.counted + found)
+    }
+
     /// Less than a turn, from less than two.
     #[inline]
     fn wrapped(&self, counts: u32) -> u32 {

@@ -139,6 +139,7 @@ impl<S: Station> Serve<'_, S> {
     pub fn feedback(&self) -> Feedback {
         Feedback {
             enable_input: pins::is_enabled(&self.registers),
+            position_counted: self.position.is_counted(),
             hardware: hardware::held_by(&self.registers),
             ..self.common(&pins::SWITCHGEAR)
         }

@@ -66,7 +66,7 @@ impl<P: Position> ControlPort<Dual> for Control<'_, P> {
         let lost = [first.is_lost(), second.is_lost()];
         let ([a1, a2], [lost1, lost2]) = (angles, lost);
         let angles = [reported(a1, lost1), reported(a2, lost2)];
-        self.state.tell(&angles, &lost);
+        self.state.tell(&angles, &lost, false);
         let hardware = hardware::latched_by(&self.registers);
         let healthy = !bridge(&self.registers).outputs().is_tripped();
         DualSample {

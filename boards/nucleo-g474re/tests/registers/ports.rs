@@ -67,6 +67,41 @@ fn an_index_just_after_the_trigger_makes_no_false_angle() {
     assert_eq!(at(1_005, false), (Some(1_005), true));
 }
 
+/// An angle that was found is an angle; what the index then shows to be wrong goes in small steps, in whichever sample its flag is seen.
+#[test]
+fn an_angle_that_was_found_mends_at_the_index() {
+    const UNIT: i32 = 1 << 22;
+    for late in [false, true] {
+        let registers = Bench::started(plan()).registers;
+        let mut encoder = Encoder::new(registers.tim4, &POWER_STAGE, 4);
+        let at = |encoder: &mut Encoder, captured: u16, index: bool| {
+            registers.tim4.cnt().write(|w| w.set_cnt(captured));
+            control_update(&registers);
+            registers.tim4.sr().write(|w| w.set_idxif(index));
+            encoder.angle().map(|angle| angle.signed())
+        };
+        assert_eq!(at(&mut encoder, 100, false), None);
+        assert_eq!(at(&mut encoder, 110, false), None);
+        assert_eq!(encoder.counted(), Some(Angle(110 << 22)));
+        // The index is 30 counts ahead; the angle was found 10 counts too far.
+        encoder.align(Angle((-130 * UNIT) as u32));
+        assert_eq!(encoder.counted(), None);
+        assert_eq!(at(&mut encoder, 120, false), Some(-10 * UNIT));
+        assert_eq!(at(&mut encoder, 130, false), Some(0));
+        let flagged = if late { 140 } else { 0 };
+        assert_eq!(at(&mut encoder, flagged, true), Some(10 * UNIT), "with the index's flag");
+        assert_eq!(at(&mut encoder, 10, false), Some(20 * UNIT), "the first of the index's own");
+        let mut before = 20 * UNIT;
+        for _ in 0..2_000 {
+            let angle = at(&mut encoder, 10, false).unwrap();
+            assert!((before - UNIT / 8..=before).contains(&angle), "{angle} after {before}");
+            before = angle;
+        }
+        assert!((before - 10 * UNIT).abs() < UNIT / 100, "{before}");
+        assert!(!encoder.is_lost());
+    }
+}
+
 #[test]
 fn a_sample_has_currents_link_voltage_and_angle_in_si_units() {
     let mut bench = Bench::started(plan());
