@@ -97,7 +97,7 @@ pub struct Encoder {
     moved: Angle,
     /// The angle where the count is 0, as somebody has found it before the index.
     found: Option<Angle>,
-    /// What is left of that one's error, behind the index.
+    /// The rest of that one's error, behind the index.
     left: Angle,
 }
 
