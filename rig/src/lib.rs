@@ -10,6 +10,7 @@ pub mod bench;
 pub mod benchmark;
 pub mod bound;
 pub mod campaign;
+pub mod can;
 pub mod columns;
 pub mod commission;
 pub mod compare;

@@ -2,11 +2,11 @@
 
 use super::options::Commission;
 use super::record::Step;
+use crate::can;
 use crate::folder::write_folder;
 use crate::identify::{Ended, Identify, contents, identified};
 use crate::machine::Machine;
 use crate::options::On;
-use crate::platform::can;
 use crate::scenario::System as _;
 use crate::scenario::traction::{Options, Traction};
 use crate::talk::{self, Lines, System, Talk};
@@ -67,7 +67,7 @@ fn talk(commission: &Commission, options: &Options, machine: &Machine, script: &
     let lines = Lines::of_text(script, System::Pmasynrm)?;
     let mut talk = Talk::new(System::Pmasynrm, lines, inertia, parameters.max_torque_nm);
     match &identify.can {
-        Some(interface) => can::drive(interface, &mut talk)?,
+        Some(interface) => can::command(interface, &mut talk)?,
         None => {
             talk::with_traction(options, inertia, talk::LONGEST_S, machine, &mut talk)?;
         }

@@ -16,11 +16,11 @@ pub use fit::Fit;
 pub use outcome::{Outcome, Truth};
 pub use signs::Signs;
 
+use crate::can;
 use crate::files::write_text;
 use crate::folder::{Contents, csv, write_folder};
 use crate::machine::Machine;
 use crate::options::{not_negative, positive};
-use crate::platform::can;
 use crate::report::{self, Page};
 use crate::scenario::System;
 use crate::scenario::traction::identification::{self, Stand};
@@ -144,7 +144,7 @@ fn complete(observations: Vec<Observation>) -> std::result::Result<Vec<Observati
 /// The same of a drive on a CAN bus, whose truth nobody knows.
 fn on_bus(interface: &str, machine: &Machine) -> Result<std::result::Result<Outcome, Ended>> {
     let mut commander = Commander::new(Units::of(&machine.tables.ratings));
-    can::drive(interface, &mut commander)?;
+    can::command(interface, &mut commander)?;
     let observations = match commander.finish().and_then(complete) {
         Ok(observations) => observations,
         Err(ended) => return Ok(Err(ended)),

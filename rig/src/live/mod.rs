@@ -1,15 +1,14 @@
 //! `rig live`: the live page of a drive that is elsewhere, in QEMU, on the host, or on a CAN bus. The page looks; commands need to be permitted
 //! by an option, and to be switched on in the page.
 
-mod bus;
 mod relay;
 mod server;
 mod shared;
 
-pub use bus::Bus;
 pub use relay::Relay;
 pub use shared::Shared;
 
+use crate::can;
 use crate::curves;
 use crate::machine::Machine;
 use crate::talk::{self, DriveOptions, System};
@@ -87,7 +86,7 @@ pub fn run(options: &LiveOptions) -> Result<()> {
     let largest_nm = machine.folder.parameters.max_torque_nm;
     let mut relay = Relay::new(drive.system, drive.inertia(), largest_nm, shared);
     match (&page.can, drive.system) {
-        (Some(interface), _) => bus::run(interface, &mut relay),
+        (Some(interface), _) => can::command(interface, &mut relay),
         (None, System::Pmasynrm) => {
             let own = talk::traction_options(drive);
             talk::with_traction(&own, drive.inertia(), page.seconds, &machine, &mut relay).map(|_| ())

@@ -70,16 +70,6 @@ impl Relay {
         self.began.elapsed().as_secs_f64()
     }
 
-    /// A slot without waiting: the frame for the drive, if commands are switched on.
-    pub fn relay(&mut self, t_s: f64) -> Result<Turn> {
-        while let Some(line) = self.shared.line() {
-            self.refused = self.talk.say(t_s, &line).err().map(|error| format!("{line}: {error:#}"));
-        }
-        let armed = self.shared.is_armed();
-        let turn = self.talk.slot(t_s)?;
-        Ok(Turn { frame: turn.frame.filter(|_| armed), ..turn })
-    }
-
     /// The place of a name in the telemetry among codes, for the page: 0 is off.
     fn mode(&self, row: &[String]) -> f64 {
         let say = |column: &str| self.system.column(column).map_or("", |place| row[place].as_str());
@@ -118,7 +108,12 @@ impl Supervisor for Relay {
         if early_s > 0.0 {
             std::thread::sleep(Duration::from_secs_f64(early_s));
         }
-        self.relay(t_s)
+        while let Some(line) = self.shared.line() {
+            self.refused = self.talk.say(t_s, &line).err().map(|error| format!("{line}: {error:#}"));
+        }
+        let armed = self.shared.is_armed();
+        let turn = self.talk.slot(t_s)?;
+        Ok(Turn { frame: turn.frame.filter(|_| armed), ..turn })
     }
 
     fn hear(&mut self, t_s: f64, frame: &Frame) {
@@ -135,5 +130,58 @@ impl Supervisor for Relay {
     /// Somebody may look for as long as he likes.
     fn is_typed(&self) -> bool {
         true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::can::{Bus, drive};
+    use crate::live::shared::Shared;
+    use crate::talk::System;
+    use std::collections::VecDeque;
+    use std::sync::Arc;
+    use tractive::protocol::e2e::Counter;
+    use tractive::protocol::{COMMAND, FROM_DRIVE, Payload};
+
+    /// A bus with frames that come, and those that were sent.
+    struct Fake {
+        come: VecDeque<Frame>,
+        sent: Vec<Frame>,
+    }
+
+    impl Bus for Fake {
+        fn send(&mut self, frame: &Frame) -> Result<()> {
+            self.sent.push(*frame);
+            Ok(())
+        }
+
+        fn receive(&mut self) -> Result<Option<Frame>> {
+            Ok(self.come.pop_front())
+        }
+    }
+
+    #[test]
+    fn a_bus_is_only_looked_at_until_commands_are_switched_on() {
+        let shared = Arc::new(Shared::new(true));
+        let mut to = Relay::new(System::Pmasynrm, 10.0, 1235.0, Arc::clone(&shared));
+        let status = FROM_DRIVE[0].frame(Payload(0), &mut Counter::default());
+        let mut bus = Fake { come: [status].into(), sent: Vec::new() };
+        drive(&mut bus, &mut to, 0..30).unwrap();
+        assert!(bus.sent.is_empty(), "{:?}", bus.sent);
+        let told = shared.rows(0);
+        assert_eq!(told["rows"].as_array().unwrap().len(), columns(System::Pmasynrm).len());
+        assert!(told["state"]["status"]["state"].is_string());
+        shared.arm(true).unwrap();
+        shared.say("charge").unwrap();
+        drive(&mut bus, &mut to, 30..60).unwrap();
+        assert!(
+            bus.sent.len() == 3 && bus.sent.iter().all(|frame| COMMAND.is_intact(frame)),
+            "{:?}",
+            bus.sent
+        );
+        shared.arm(false).unwrap();
+        drive(&mut bus, &mut to, 60..90).unwrap();
+        assert_eq!(bus.sent.len(), 3);
     }
 }

@@ -1,49 +1,80 @@
-//! A board on a CAN bus, by SocketCAN.
+//! A CAN bus, by SocketCAN.
 
-use crate::run::Supervisor;
+use crate::can::Bus;
 use anyhow::{Context, Result};
-use socketcan::{CanFrame, CanSocket, EmbeddedFrame, Socket, StandardId};
-use std::time::{Duration, Instant};
-use tractive::protocol::{Frame, LENGTH};
+use socketcan::{CanDataFrame, CanFrame, CanSocket, EmbeddedFrame, Id, ShouldRetry, Socket as _, StandardId};
+use tractive::protocol::Frame;
 
-/// A supervisor's slot.
-const SLOT: Duration = Duration::from_millis(1);
+/// A SocketCAN socket that does not wait.
+pub(crate) struct Socket(CanSocket);
 
-/// Lets a supervisor command whoever is on the bus, a slot each millisecond, until it is done.
-pub(crate) fn drive(interface: &str, supervisor: &mut dyn Supervisor) -> Result<()> {
-    let named = || format!("--can {interface}");
-    let socket = CanSocket::open(interface).with_context(named)?;
-    let begun = Instant::now();
-    for slot in 0_u32.. {
-        let turn = supervisor.slot(begun.elapsed().as_secs_f64())?;
-        if let Some(frame) = turn.frame {
-            let id = StandardId::new(frame.id).context("an identifier of more than 11 bits")?;
-            let sent = CanFrame::new(id, &frame.data).context("a frame of more than eight bytes")?;
-            socket.write_frame(&sent).with_context(named)?;
+impl Socket {
+    pub(crate) fn open(interface: &str) -> Result<Self> {
+        let open = || -> Result<CanSocket> {
+            let socket = CanSocket::open(interface)?;
+            socket.set_nonblocking(true)?;
+            Ok(socket)
+        };
+        Ok(Self(open().with_context(|| format!("--can {interface}"))?))
+    }
+}
+
+impl Bus for Socket {
+    fn send(&mut self, frame: &Frame) -> Result<()> {
+        match self.0.write_frame(&to_bus(frame)?) {
+            // A queue that is full loses a frame, as the drive's counters will tell.
+            Err(error) if error.should_retry() => Ok(()),
+            sent => Ok(sent?),
         }
-        if turn.done {
-            break;
-        }
-        while let Some(left) = (SLOT * (slot + 1)).checked_sub(begun.elapsed()).filter(|left| !left.is_zero())
-        {
-            match socket.read_frame_timeout(left) {
-                Ok(received) => {
-                    if let Some(frame) = of(&received) {
-                        supervisor.hear(begun.elapsed().as_secs_f64(), &frame);
+    }
+
+    fn receive(&mut self) -> Result<Option<Frame>> {
+        loop {
+            match self.0.read_frame() {
+                Ok(CanFrame::Data(frame)) => {
+                    if let Some(frame) = from_bus(&frame) {
+                        return Ok(Some(frame));
                     }
                 }
-                Err(error) if error.kind() == std::io::ErrorKind::TimedOut => {}
-                Err(error) => return Err(error).with_context(named),
+                // Neither remote frames nor a bus's errors are anything to the protocol.
+                Ok(_) => {}
+                Err(error) if error.should_retry() => return Ok(None),
+                Err(error) => return Err(error.into()),
             }
         }
     }
-    Ok(())
 }
 
-/// The protocol's frame; `None` for what is none of its kind.
-fn of(received: &CanFrame) -> Option<Frame> {
-    let CanFrame::Data(data) = received else { return None };
-    let socketcan::Id::Standard(id) = data.id() else { return None };
-    let data = <[u8; LENGTH as usize]>::try_from(data.data()).ok()?;
-    Some(Frame { id: id.as_raw(), length: LENGTH, data })
+fn to_bus(frame: &Frame) -> Result<CanDataFrame> {
+    let id = StandardId::new(frame.id).context("an identifier of more than 11 bits")?;
+    let length = usize::from(frame.length).min(8);
+    CanDataFrame::new(id, &frame.data[..length]).context("more than eight bytes")
+}
+
+/// The frame as the protocol has it; `None` for an extended identifier.
+fn from_bus(frame: &CanDataFrame) -> Option<Frame> {
+    let Id::Standard(id) = frame.id() else { return None };
+    let mut data = [0; 8];
+    data.get_mut(..frame.data().len())?.copy_from_slice(frame.data());
+    Some(Frame { id: id.as_raw(), length: frame.data().len() as u8, data })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_frame_goes_to_the_bus_and_back() {
+        let frame = Frame { id: 0x181, length: 5, data: [1, 2, 3, 4, 5, 0, 0, 0] };
+        assert_eq!(from_bus(&to_bus(&frame).unwrap()), Some(frame));
+        assert!(to_bus(&Frame { id: 0x800, ..frame }).is_err());
+        let extended = socketcan::ExtendedId::new(0x181).unwrap();
+        assert_eq!(from_bus(&CanDataFrame::new(extended, &[1]).unwrap()), None);
+    }
+
+    #[test]
+    fn an_interface_that_is_not_there_is_named() {
+        let error = Socket::open("nowhere0").err().unwrap();
+        assert!(format!("{error:#}").starts_with("--can nowhere0"), "{error:#}");
+    }
 }

@@ -1,9 +1,24 @@
 //! No CAN.
 
-use crate::run::Supervisor;
+use crate::can::Bus;
 use anyhow::{Result, bail};
+use tractive::protocol::Frame;
 
-/// None: an error.
-pub(crate) fn drive(interface: &str, _supervisor: &mut dyn Supervisor) -> Result<()> {
-    bail!("--can {interface}: there is no CAN here")
+/// A socket that there is not.
+pub(crate) enum Socket {}
+
+impl Socket {
+    pub(crate) fn open(interface: &str) -> Result<Self> {
+        bail!("--can {interface}: there is SocketCAN on Linux alone")
+    }
+}
+
+impl Bus for Socket {
+    fn send(&mut self, _: &Frame) -> Result<()> {
+        match *self {}
+    }
+
+    fn receive(&mut self) -> Result<Option<Frame>> {
+        match *self {}
+    }
 }

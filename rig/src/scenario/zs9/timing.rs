@@ -49,9 +49,9 @@ impl Scenario<Zs9> for Timing {
         for (name, (from_s, to_s)) in [MOTORING, BRAKING] {
             figures.set(name, off_percent(figures::window(recording, from_s, to_s)));
         }
-        // The papers' law has not settled so soon after the reversal.
-        let settles = matches!(options.law, LawName::Tractive);
-        let braking = if settles { MOST_OFF_PERCENT } else { f64::INFINITY };
+        // The papers' law is 2.4 % off then: of it this is told, not judged.
+        let is_judged = matches!(options.law, LawName::Tractive);
+        let braking = if is_judged { MOST_OFF_PERCENT } else { f64::INFINITY };
         let bounds = [
             ("torque off in weakening at 1,450 r/min, motoring in %", MOTORING.0, MOST_OFF_PERCENT),
             ("the same, braking in %", BRAKING.0, braking),
