@@ -1,5 +1,5 @@
-//! The images in QEMU against the same code on the host, byte for byte. Needs TRACTIVE_IMAGE, TRACTIVE_PI_IMAGE, TRACTIVE_ZS9_IMAGE, TRACTIVE_ZS9_PI_IMAGE,
-//! TRACTIVE_IDENTIFY_IMAGE (and TRACTIVE_QEMU);
+//! The images in QEMU against the same code on the host, byte for byte. Needs TRACTIVE_IMAGE, TRACTIVE_PI_IMAGE, TRACTIVE_OPTIMAL_IMAGE,
+//! TRACTIVE_ZS9_IMAGE, TRACTIVE_ZS9_PI_IMAGE, TRACTIVE_IDENTIFY_IMAGE (and TRACTIVE_QEMU);
 //! `cargo xtask test` sets them, so these tests are ignored otherwise.
 
 use std::path::{Path, PathBuf};
@@ -8,6 +8,7 @@ use std::process::Command;
 fn run(scenario: &str, on: &str, out: &Path) -> (i32, String) {
     let mut command = Command::new(env!("CARGO_BIN_EXE_tractive-rig"));
     let image = match (scenario.starts_with("zs9-"), scenario.ends_with("--law pi")) {
+        (false, _) if scenario.ends_with("--patterns optimal") => "TRACTIVE_OPTIMAL_IMAGE",
         (false, false) => "TRACTIVE_IMAGE",
         (false, true) => "TRACTIVE_PI_IMAGE",
         (true, false) => "TRACTIVE_ZS9_IMAGE",
@@ -76,6 +77,12 @@ fn the_characteristic_is_the_same() {
 #[ignore = "needs the image and QEMU"]
 fn the_ordinary_law_is_the_same() {
     same("timing --to 6000 --law pi", 0);
+}
+
+#[test]
+#[ignore = "needs the image and QEMU"]
+fn optimised_patterns_are_the_same() {
+    same("sweep --patterns optimal", 0);
 }
 
 #[test]
@@ -174,12 +181,15 @@ fn an_acknowledged_fault_is_the_same() {
 }
 
 /// The same scripts over the protocol: the same frames, telemetry and pulses.
-fn same_talk(name: &str) {
+fn same_talk(system: &str, name: &str) {
+    let zs9 = std::env::var_os("TRACTIVE_ZS9_IMAGE").filter(|_| system == "zs9");
     let folder = tempfile::tempdir().unwrap();
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("scripts").join(name);
     for on in ["host", "qemu"] {
         let mut command = Command::new(env!("CARGO_BIN_EXE_tractive-rig"));
-        command.arg("talk").arg(&script).args(["--on", on, "--out"]).arg(folder.path().join(on));
+        command.envs(zs9.iter().map(|image| ("TRACTIVE_IMAGE", image)));
+        command.args(["talk", "--system", system]).arg(&script);
+        command.args(["--on", on, "--out"]).arg(folder.path().join(on));
         let output = command.output().unwrap();
         assert!(output.status.success(), "{name} on {on}: {}", String::from_utf8_lossy(&output.stderr));
     }
@@ -193,13 +203,19 @@ fn same_talk(name: &str) {
 #[test]
 #[ignore = "needs the image and QEMU"]
 fn a_round_trip_over_the_protocol_is_the_same() {
-    same_talk("round-trip.talk");
+    same_talk("pmasynrm", "round-trip.talk");
 }
 
 #[test]
 #[ignore = "needs the image and QEMU"]
 fn hostile_frames_are_treated_the_same() {
-    same_talk("hostile.talk");
+    same_talk("pmasynrm", "hostile.talk");
+}
+
+#[test]
+#[ignore = "needs the image and QEMU"]
+fn both_motors_over_the_protocol_are_the_same() {
+    same_talk("zs9", "zs9.talk");
 }
 
 /// The same experiment: the same machine folder, and over the protocol the same frames.

@@ -2,7 +2,7 @@
 //!
 //! They are the lines of the `sh` blocks in the chapters of `docs/SUMMARY.md`. A line that ends in `# exits with N` has to; all
 //! others have to succeed. What would touch a board is given `--dry-run`: the image is built, and nobody is asked to flash it.
-//! Tests are built, and steps of `cargo xtask test` looked up: to run them is those steps' own business.
+//! Tests are built, steps of `cargo xtask test` looked up, and what would run in QEMU runs on the host: the rest is those steps' own business.
 
 use crate::process::cannot_start;
 use anyhow::{Context, Result, bail};
@@ -95,7 +95,12 @@ fn command(chapter: &str, line: &str) -> Line {
     if command.starts_with("cargo rig live") {
         command += " --help";
     }
-    if command.starts_with("cargo test") {
+    // Step `qemu` runs the images, and shows that the host does the same.
+    if in_qemu(&command) {
+        command += " --on host";
+    }
+    // A setting of the environment may stand before it.
+    if command.contains("cargo test ") {
         let (cargos, tests) = command.split_once(" -- ").unwrap_or((&command, ""));
         command = format!("{cargos} --no-run -- {tests}").trim_end_matches(" -- ").to_owned();
     }
@@ -103,6 +108,12 @@ fn command(chapter: &str, line: &str) -> Line {
         command += " --list";
     }
     Line { chapter: chapter.to_owned(), command, code }
+}
+
+/// `true` for a run or a talk whose drive is an image in QEMU.
+fn in_qemu(command: &str) -> bool {
+    let runs = ["cargo xtask run ", "cargo xtask talk"].iter().any(|start| command.starts_with(start));
+    runs && !["--on ", "--help"].iter().any(|word| command.contains(word))
 }
 
 #[cfg(test)]
@@ -126,6 +137,9 @@ mod tests {
     fn what_other_steps_run_is_not_run_again() {
         assert_eq!(command("c", "cargo test -p x --test y").command, "cargo test -p x --test y --no-run");
         assert_eq!(command("c", "cargo test -- --nocapture").command, "cargo test --no-run -- --nocapture");
+        assert_eq!(command("c", "ALL=1 cargo test -p x").command, "ALL=1 cargo test -p x --no-run");
+        assert_eq!(command("c", "cargo xtask run chopper").command, "cargo xtask run chopper --on host");
+        assert_eq!(command("c", "cargo xtask run --help").command, "cargo xtask run --help");
         assert_eq!(
             command("c", "cargo xtask test --only qemu").command,
             "cargo xtask test --only qemu --list"

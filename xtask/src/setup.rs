@@ -125,7 +125,9 @@ impl Setup {
         let own = tools.join("bin").join(PROGRAM);
         if find(PROGRAM).is_none() && !own.is_file() {
             say(&format!("building {PROGRAM} (cargo install)"));
-            let install = ["install", "--locked", "--no-default-features", "--quiet", PROGRAM, "--root"];
+            // One small book: not worth the time of an optimised build.
+            let install =
+                ["install", "--debug", "--locked", "--no-default-features", "--quiet", PROGRAM, "--root"];
             quietly(cargo().args(install).arg(&tools));
         }
         find(PROGRAM).or_else(|| Some(own).filter(|own| own.is_file()))

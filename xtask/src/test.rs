@@ -166,6 +166,7 @@ fn perform(step: Step, setup: &mut Setup) -> Result<Outcome> {
             let mut command = cargo_with("test --release --package tractive-rig --test qemu -- --ignored");
             command.env("TRACTIVE_QEMU", qemu);
             command.env("TRACTIVE_IMAGE", build::image(&toolchain, System::Traction, None)?);
+            command.env("TRACTIVE_OPTIMAL_IMAGE", build::optimal_image(&toolchain, None)?);
             command.env("TRACTIVE_PI_IMAGE", build::pi_image(&toolchain, System::Traction, None)?);
             command.env("TRACTIVE_ZS9_IMAGE", build::image(&toolchain, System::Zs9, None)?);
             command.env("TRACTIVE_ZS9_PI_IMAGE", build::pi_image(&toolchain, System::Zs9, None)?);
