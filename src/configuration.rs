@@ -8,4 +8,5 @@
 
 mod drives;
 
+pub use drives::LATEST_ANGLE_S;
 pub use tractive_control::configuration::Refused;

@@ -53,6 +53,8 @@ pub struct Setup {
     pub uncompensated: bool,
     /// A line filter stands in front of the link: it is to be damped.
     pub behind_line_filter: bool,
+    /// Age of the angle that the drive knows of, in s.
+    pub angle_late_s: f32,
 }
 
 /// From the firmware to the rig.
@@ -177,7 +179,13 @@ pub fn setup_to_block(setup: Setup) -> Block {
         setup.over_protocol.into(),
         u32::from(setup.uncompensated) | u32::from(setup.behind_line_filter) << 1,
     ];
-    filled(ticks.into_iter().chain(line_to_words(setup.line)).chain(flags).chain([setup.control_ticks]))
+    filled(
+        ticks
+            .into_iter()
+            .chain(line_to_words(setup.line))
+            .chain(flags)
+            .chain([setup.control_ticks, setup.angle_late_s.to_bits()]),
+    )
 }
 
 /// The same, with where MTPA starts, for the image with the papers' ordinary law.
@@ -219,7 +227,7 @@ fn told_from_words<T: Told>(words: [u32; 14]) -> Option<(Status<T>, Option<Frame
 /// The inverse of [`setup_to_block`].
 pub fn setup_from_block(block: &Block) -> Setup {
     let [min_pulse_ticks, dead_time_ticks, pwm_delay_ticks, ..] = *block;
-    let [_, _, _, operated, precharge, discharge, frames, gains, control_ticks, ..] = *block;
+    let [_, _, _, operated, precharge, discharge, frames, gains, control_ticks, late, ..] = *block;
     let line = line_from_words([operated, precharge, discharge]);
     Setup {
         control_ticks,
@@ -230,6 +238,7 @@ pub fn setup_from_block(block: &Block) -> Setup {
         over_protocol: frames != 0,
         uncompensated: gains & 1 != 0,
         behind_line_filter: gains & 2 != 0,
+        angle_late_s: f32::from_bits(late),
     }
 }
 

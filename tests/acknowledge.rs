@@ -4,7 +4,7 @@
 
 use std::cell::Cell;
 use tractive::built_in::{traction::BUILT_IN, zs9};
-use tractive::control::{Demand, Gains};
+use tractive::control::Demand;
 use tractive::drive::dual::{self};
 use tractive::drive::traction;
 use tractive::frames::{Abc, Angle, Dq};
@@ -323,7 +323,7 @@ const LAST: u32 = (SETTLED + WINDOW + AGREED) * CLOCK.control_ticks;
 #[test]
 fn the_traction_drive_forgets_no_fault() {
     let devices = SwitchLimits::new(250, 0, 900.0, &CLOCK);
-    let settings = traction::Settings { clock: CLOCK, devices, gains: Gains::DEFAULT };
+    let settings = traction::Settings::new(CLOCK, devices);
     let mut cases = 0;
     Case::each(12, |case| {
         let shared = traction::Shared::new();

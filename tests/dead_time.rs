@@ -3,7 +3,6 @@
 use core::f32::consts::TAU;
 use std::sync::atomic::Ordering;
 use tractive::built_in::traction::BUILT_IN;
-use tractive::control::Gains;
 use tractive::drive::traction::{PwmTask, Settings, Shared};
 use tractive::drive::{Gates, VoltageCommand};
 use tractive::frames::{Abc, Angle};
@@ -48,7 +47,7 @@ impl PwmPort for Machine {
 fn played(dead_time_ticks: u32) -> Vec<(Instant, CarrierHalf)> {
     let devices = SwitchLimits::new(250, dead_time_ticks, 900.0, &CLOCK);
     let half_ticks = devices.shortest_half_ticks;
-    let settings = Settings { clock: CLOCK, devices, gains: Gains::DEFAULT };
+    let settings = Settings::new(CLOCK, devices);
     let mut pwm = PwmTask::new(&BUILT_IN, settings, Instant(half_ticks));
     let (shared, mut machine) = (Shared::new(), Machine::default());
     for boundary in 1..160 {

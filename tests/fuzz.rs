@@ -5,7 +5,7 @@
 
 use proptest::prelude::*;
 use tractive::built_in::{traction::BUILT_IN, zs9};
-use tractive::control::{Demand, Gains};
+use tractive::control::Demand;
 use tractive::drive::dual::{self};
 use tractive::drive::traction;
 use tractive::frames::{Abc, Angle, Dq};
@@ -332,7 +332,7 @@ proptest! {
         calls in calls(),
     ) {
         let devices = SwitchLimits::new(250, 100, 900.0, &CLOCK);
-        let settings = traction::Settings { clock: CLOCK, devices, gains: Gains::DEFAULT };
+        let settings = traction::Settings::new(CLOCK, devices);
         let shared = traction::Shared::new();
         let mut control = traction::ControlTask::new(&BUILT_IN, settings, Instant(first).after(2_500));
         let mut pwm = traction::PwmTask::new(&BUILT_IN, settings, Instant(first).after(devices.shortest_half_ticks));

@@ -2,7 +2,7 @@
 //! turns the gates off in it. Instants here are real ones; the tasks count theirs, and fall behind with every interrupt they miss.
 
 use tractive::built_in::{traction::BUILT_IN, zs9};
-use tractive::control::{Demand, Gains};
+use tractive::control::Demand;
 use tractive::drive::dual::{self};
 use tractive::drive::traction;
 use tractive::frames::{Abc, Angle, Dq};
@@ -207,7 +207,7 @@ impl Timers {
 /// The PMaSynRM drive for some time after the injected fault: the trip, when the gates went off, the longest half meanwhile.
 fn traction(injected: InjectedFault) -> (Option<Trip>, Option<u32>, u32) {
     let devices = SwitchLimits::new(250, 0, 900.0, &CLOCK);
-    let settings = traction::Settings { clock: CLOCK, devices, gains: Gains::DEFAULT };
+    let settings = traction::Settings::new(CLOCK, devices);
     let first = devices.shortest_half_ticks;
     let shared = traction::Shared::new();
     let lost = MaskedFaults::of(Fault::AngleLost);
@@ -379,7 +379,7 @@ impl ControlPort for Landing<'_> {
 #[test]
 fn the_first_boundary_may_land_in_a_control_interrupt() {
     let devices = SwitchLimits::new(250, 0, 900.0, &CLOCK);
-    let settings = traction::Settings { clock: CLOCK, devices, gains: Gains::DEFAULT };
+    let settings = traction::Settings::new(CLOCK, devices);
     for first in [CLOCK.control_ticks + 1, 5 * CLOCK.control_ticks + 400] {
         let shared = traction::Shared::new();
         let mut control = traction::ControlTask::new(&BUILT_IN, settings, Instant(CLOCK.control_ticks));

@@ -1,7 +1,7 @@
 //! Every fault, by name, with value and limit, and the gates in the safe state in the same interrupt.
 
 use tractive::built_in::traction::BUILT_IN;
-use tractive::control::{Demand, Gains, Measurements};
+use tractive::control::{Demand, Measurements};
 use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
 use tractive::frames::{Abc, AlphaBeta, Angle, Dq};
 use tractive::modulation::{CarrierHalf, Mode, SwitchLimits};
@@ -165,7 +165,7 @@ impl PwmPort for Fake {
 /// Both interrupts in their order until `end`; control is lost from `control_until` on.
 fn drive(fake: &mut Fake, end: u32, control_until: u32) -> Option<Trip> {
     let devices = SwitchLimits::new(250, 0, 900.0, &CLOCK);
-    let settings = Settings { clock: CLOCK, devices, gains: Gains::DEFAULT };
+    let settings = Settings::new(CLOCK, devices);
     let shared = Shared::new();
     let mut control = ControlTask::new(&BUILT_IN, settings, Instant(2_500));
     let mut pwm = PwmTask::new(&BUILT_IN, settings, Instant(devices.shortest_half_ticks));

@@ -12,11 +12,7 @@ use tractive::time::{Clock, Instant};
 const CLOCK: Clock = Clock::new(25_000_000, 2_500);
 
 fn settings() -> Settings {
-    Settings {
-        clock: CLOCK,
-        devices: SwitchLimits::new(250, 0, 900.0, &CLOCK),
-        gains: tractive::control::Gains::DEFAULT,
-    }
+    Settings::new(CLOCK, SwitchLimits::new(250, 0, 900.0, &CLOCK))
 }
 
 fn half_ticks() -> u32 {

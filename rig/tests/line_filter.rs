@@ -97,7 +97,7 @@ fn run_with(link_damping: f32) -> Recording {
     };
     let mut bench = Bench::new(plant, Box::new(demand), &settings);
     let gains = Gains { link_damping, ..Gains::DEFAULT };
-    let settings = Settings { clock: CLOCK, devices, gains };
+    let settings = Settings { gains, ..Settings::new(CLOCK, devices) };
     let mut tasks = Tasks::beginning_at(Instant(0), machine.tables, settings, devices.shortest_half_ticks);
     tasks.drive(&mut bench, |_| true).unwrap();
     bench.into_recording(Vec::new())

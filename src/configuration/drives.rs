@@ -14,6 +14,9 @@ const MOST_CARRIERS: f32 = 8.0;
 /// The longest carrier period, in ticks: sixteen bits hold a half of it in compare steps.
 const LONGEST_CARRIER: f32 = 4_000.0;
 
+/// The oldest angle that can be brought up to date, in s.
+pub const LATEST_ANGLE_S: f32 = 0.5e-3;
+
 impl traction::Settings {
     /// The check that a drive may start with these settings and this machine.
     ///
@@ -29,9 +32,10 @@ impl traction::Settings {
     /// # Errors
     /// The first scalar that makes no sense.
     pub const fn check_settings(&self) -> Result<(), Refused> {
-        let Self { clock, devices, gains } = self;
+        let Self { clock, devices, gains, angle_late_s } = self;
         checked!(clock.check());
         checked!(devices.check(clock));
+        checked!(within(&[Bound("angle_late_s", *angle_late_s, 0.0, LATEST_ANGLE_S)]));
         gains.check()
     }
 }

@@ -21,16 +21,14 @@ static DEAD_TIME_TICKS: AtomicU32 = AtomicU32::new(0);
 static FIRST_HALF_TICKS: AtomicU32 = AtomicU32::new(0);
 static UNCOMPENSATED: AtomicBool = AtomicBool::new(false);
 static BEHIND_LINE_FILTER: AtomicBool = AtomicBool::new(false);
+/// Age of the angle when it is sampled, in s, as bits.
+static ANGLE_LATE: AtomicU32 = AtomicU32::new(0);
 
 /// Highest frequency of the free carrier, in Hz.
 const MAX_CARRIER_HZ: f32 = patterns::FREE_CARRIER_SHARE * BUILT_IN.ratings.max_switching_hz;
 
 /// Until the host has told its own.
-const DEFAULTS: Settings = Settings {
-    clock: CLOCK,
-    devices: SwitchLimits::new(0, 0, MAX_CARRIER_HZ, &CLOCK),
-    gains: Gains::DEFAULT,
-};
+const DEFAULTS: Settings = Settings::new(CLOCK, SwitchLimits::new(0, 0, MAX_CARRIER_HZ, &CLOCK));
 
 fn settings() -> Settings {
     let clock = Clock::new(qemu::TICKS_HZ, CONTROL_TICKS.load(Ordering::Relaxed));
@@ -43,6 +41,7 @@ fn settings() -> Settings {
             &clock,
         ),
         gains: Gains::of(UNCOMPENSATED.load(Ordering::Relaxed), BEHIND_LINE_FILTER.load(Ordering::Relaxed)),
+        angle_late_s: f32::from_bits(ANGLE_LATE.load(Ordering::Relaxed)),
     }
 }
 
@@ -54,6 +53,7 @@ fn main() -> ! {
     DEAD_TIME_TICKS.store(setup.dead_time_ticks, Ordering::Relaxed);
     UNCOMPENSATED.store(setup.uncompensated, Ordering::Relaxed);
     BEHIND_LINE_FILTER.store(setup.behind_line_filter, Ordering::Relaxed);
+    ANGLE_LATE.store(setup.angle_late_s.to_bits(), Ordering::Relaxed);
     if let Err(refused) = const { BUILT_IN.check() }.and_then(|()| settings().check_settings()) {
         qemu::refuse(&refused);
     }

@@ -5,7 +5,7 @@ use super::dead_time::DeadTime;
 use super::{rates, zs9_rates};
 use serde::Deserialize;
 use std::path::Path;
-use tractive::configuration::Refused;
+use tractive::configuration::{LATEST_ANGLE_S, Refused};
 use tractive::machine::Tables;
 use tractive_tablegen::InputError;
 
@@ -48,6 +48,7 @@ struct Keys {
     encoder_zeros_deg: Vec<f64>,
     precharge_s: f64,
     behind_line_filter: Option<bool>,
+    angle_late_us: Option<f64>,
     discharge_s: f64,
     z_source: Option<ZSource>,
 }
@@ -124,6 +125,12 @@ pub fn traction(file: &Path, text: &str, machine: &Machine) -> Result<String, In
             "more than the dead time, up to half of the shortest carrier half",
         ),
     ])?;
+    let Some(late_us) = stage.keys.angle_late_us else {
+        return Err(stage.refuse("angle_late_us", "is missing".to_owned()));
+    };
+    let latest_us = 1e6 * f64::from(LATEST_ANGLE_S);
+    let late = Bound("angle_late_us", late_us, 0.0, latest_us.round(), "made up for by the speed");
+    stage.check(&[late])?;
     stage.check_sensors(machine, f64::from(ratings.trip_dc_over_v), "the machine's trip_dc_over_v", 1)?;
     settings.check(machine.tables).map_err(|refused| stage.refuse_start(machine, &refused))?;
     Ok(stage.constant(control_hz, min_pulse_ns))
@@ -145,6 +152,11 @@ pub fn zs9(file: &Path, text: &str, machine: &Machine) -> Result<String, InputEr
     }
     if stage.keys.behind_line_filter.is_some() {
         return Err(stage.refuse("behind_line_filter", "the Z-source has chokes of its own".to_owned()));
+    }
+    if stage.keys.angle_late_us.is_some() {
+        return Err(
+            stage.refuse("angle_late_us", "the control of two motors takes the angle as it is".to_owned())
+        );
     }
     let Some(ZSource { inductor_range_a, source_range_v, link_ref_v }) = *z_source else {
         return Err(stage.refuse("z_source", "is missing".to_owned()));
@@ -331,6 +343,7 @@ impl<'a> Stage<'a> {
         let Keys { break_current_a, encoder_counts, precharge_s, discharge_s, behind_line_filter, .. } =
             self.keys;
         let behind_line_filter = behind_line_filter == Some(true);
+        let angle_late_s = 1e-6 * self.keys.angle_late_us.unwrap_or_default();
         let zero = angle(self.keys.encoder_zeros_deg.first().copied().unwrap_or_default());
         format!(
             "PowerStage {{\n    control_hz: {control_hz},\n    dead_time_ns: {dead_time_ns},\n    min_pulse_ns: {min_pulse_ns},\n    \
@@ -338,7 +351,8 @@ impl<'a> Stage<'a> {
              zero_tolerance: {zero_tolerance},\n    udc_v_per_code: {dc_link_range_v:?} / {CODES:?},\n    \
              break_current_a: {break_current_a:?},\n    encoder_counts: {encoder_counts},\n    encoder_zero: {zero},\n    \
              line: LineTimes {{ precharge_s: {precharge_s:?}, discharge_s: {discharge_s:?} }},\n    \
-             behind_line_filter: {behind_line_filter},\n}}"
+             behind_line_filter: {behind_line_filter},\n    \
+             angle_late_s: {angle_late_s:?},\n}}"
         )
     }
 }

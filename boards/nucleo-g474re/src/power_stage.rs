@@ -39,6 +39,8 @@ pub struct PowerStage {
     pub line: LineTimes,
     /// `true` if a choke lies between the line and the link: the drive then damps the link.
     pub behind_line_filter: bool,
+    /// Age of the angle when it is read, in s, which the drive makes up for.
+    pub angle_late_s: f32,
 }
 
 /// The PMaSynRM's, `power_stage.toml`, which the build script has checked against the machine.
@@ -53,9 +55,11 @@ pub const PRESCALER: u16 = rates::prescaler(POWER_STAGE.control_hz);
 impl PowerStage {
     /// The PMaSynRM's settings with this stage and this machine.
     pub const fn settings(&self, ratings: &Ratings) -> Settings {
-        let Self { control_hz, min_pulse_ns, dead_time_ns, behind_line_filter, .. } = *self;
+        let Self { control_hz, min_pulse_ns, dead_time_ns, behind_line_filter, angle_late_s, .. } = *self;
         let carrier_hz = patterns::FREE_CARRIER_SHARE * ratings.max_switching_hz;
-        rates::settings(control_hz, min_pulse_ns, dead_time_ns, carrier_hz, behind_line_filter)
+        let settings =
+            rates::settings(control_hz, min_pulse_ns, dead_time_ns, carrier_hz, behind_line_filter);
+        Settings { angle_late_s, ..settings }
     }
 
     /// The dead time for the generator, never shorter than asked for; `None` if it cannot make one.

@@ -66,9 +66,6 @@ pub const fn settings(
     let (clock, prescaler) = (clock(control_hz), prescaler(control_hz));
     let min_pulse_ticks = cycles_to_ticks(ns_to_cycles(min_pulse_ns), prescaler);
     let dead_time_ticks = cycles_to_ticks(ns_to_cycles(dead_time_ns), prescaler);
-    Settings {
-        clock,
-        devices: SwitchLimits::new(min_pulse_ticks, dead_time_ticks, max_switching_hz, &clock),
-        gains: Gains::of(false, behind_line_filter),
-    }
+    let devices = SwitchLimits::new(min_pulse_ticks, dead_time_ticks, max_switching_hz, &clock);
+    Settings { gains: Gains::of(false, behind_line_filter), ..Settings::new(clock, devices) }
 }

@@ -4,7 +4,6 @@ use nucleo_g474re::built_in::traction::BUILT_IN;
 use nucleo_g474re::power_stage::{CORE_HZ, POWER_STAGE, cycles_to_ticks, ns_to_cycles};
 use nucleo_g474re::{PRESCALER, sampling};
 use std::path::Path;
-use tractive::control::Gains;
 use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
 use tractive::frames::{Abc, Angle};
 use tractive::modulation::{CarrierHalf, Mode, SwitchLimits};
@@ -74,7 +73,7 @@ fn measured(clock: Clock, min_pulse_ticks: u32, dead_time_ticks: u32) -> [u32; 3
     let max_hz = BUILT_IN.ratings.max_switching_hz;
     let devices = SwitchLimits::new(min_pulse_ticks, dead_time_ticks, max_hz, &clock);
     let first = devices.shortest_half_ticks;
-    let settings = Settings { clock, devices, gains: Gains::DEFAULT };
+    let settings = Settings::new(clock, devices);
     let (mut least, mut most) = (u32::MAX, 0);
     for phase in 0..100 {
         let shared = Shared::new();

@@ -87,6 +87,7 @@ fn every_key_is_refused_by_name_and_line() {
         for (key, value) in keys {
             let nonsense: &[&str] = match value {
                 toml::Value::Integer(_) => &["0", "4294967295", "-1", "1.5"],
+                toml::Value::Float(_) if key == "angle_late_us" => &["nan", "inf", "-1.0", "501.0"],
                 toml::Value::Float(_) => &["0.0", "nan", "inf", "-1.0", "1e9"],
                 _ => &["[]", "[nan]", "[nan, 0.0]", "[0.0, 1e9]", "[0.0, 0.0, 0.0]"],
             };
@@ -172,6 +173,8 @@ fn the_control_rate_suits_the_carrier_the_timers_and_the_processor() {
         assert_eq!(rates::prescaler(control_hz), prescaler);
         assert_eq!((clock.ticks_per_s as u32, clock.control_ticks), (ticks_per_s, ticks_per_s / control_hz));
     }
+    let said = ZS9.check(&format!("angle_late_us = 1.0\n{}", ZS9.text), ZS9.tables).unwrap_err();
+    assert!(said.contains("angle_late_us: the control of two motors"), "{said}");
     let said = ZS9.check(&format!("control_hz = 20000\n{}", ZS9.text), ZS9.tables).unwrap_err();
     assert!(said.starts_with("power_stage_zs9.toml:1: control_hz: the control of two motors"), "{said}");
 }

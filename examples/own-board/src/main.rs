@@ -17,18 +17,14 @@ mod machine {
 use board::{Board, CLOCK, MIN_PULSE_TICKS};
 use core::cell::UnsafeCell;
 use machine::{BUILT_IN, BuiltIn};
-use tractive::control::Gains;
 use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
 use tractive::modulation::SwitchLimits;
 use tractive::operator::{self, Slot, slot_s};
 use tractive::time::Instant;
 
-/// Both tasks' settings: the clock, the switches' limits, the current loop's gains.
-const SETTINGS: Settings = Settings {
-    clock: CLOCK,
-    devices: SwitchLimits::new(MIN_PULSE_TICKS, 0, BUILT_IN.ratings.max_switching_hz, &CLOCK),
-    gains: Gains::DEFAULT,
-};
+/// Both tasks' settings: the clock, the switches' limits, the default gains, an angle without delay.
+const SETTINGS: Settings =
+    Settings::new(CLOCK, SwitchLimits::new(MIN_PULSE_TICKS, 0, BUILT_IN.ratings.max_switching_hz, &CLOCK));
 
 /// The tables and the settings are refused by name when this does not compile.
 const _: () = assert!(SETTINGS.check(&BUILT_IN).is_ok());

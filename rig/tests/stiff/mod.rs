@@ -1,6 +1,5 @@
 //! The PMaSynRM drive on a stiff link, with ideal sensors and nothing that goes wrong.
 
-use tractive::control::Gains;
 use tractive::drive::traction::Settings;
 use tractive::modulation::SwitchLimits;
 use tractive::time::Instant;
@@ -49,6 +48,6 @@ pub fn bench(
 /// The tasks, their timers started at an instant.
 pub fn tasks(machine: &Machine, origin: Instant) -> Tasks<'static> {
     let devices = devices(machine);
-    let settings = Settings { clock: CLOCK, devices, gains: Gains::DEFAULT };
+    let settings = Settings::new(CLOCK, devices);
     Tasks::beginning_at(origin, machine.tables, settings, devices.shortest_half_ticks)
 }

@@ -151,7 +151,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         command.enable &= sample.may_pulse;
         let input = Input { sample: &sample, command: &command };
         let Input { sample, command } = input;
-        let measured = sample.measured();
+        let mut measured = sample.measured();
         let applied = Applied::read(&shared.applied, now);
         let released = applied.map(|applied| applied.released);
         if self.acknowledge.step(command.acknowledge, self.trip.is_some(), released) {
@@ -168,6 +168,8 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         self.check_legs(sample, port);
         let overdue = applied.and_then(|applied| applied.overdue(now, &self.settings.clock));
         let (omega, lost) = self.track(sample, command.enable, port);
+        measured.angle =
+            measured.angle + Angle::within_half_turn(self.controller.omega() * self.settings.angle_late_s);
         let violation = self
             .armed(overdue)
             .or_else(|| self.armed(lost))
@@ -186,7 +188,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             self.check(frozen, sample, port);
             self.pulse(input, &measured, applied.as_ref(), &slot, shared);
         } else {
-            self.rest(now, omega, sample);
+            self.rest(now, omega, &measured);
             let commands = command.enable.then_some(slot.commands);
             pulsing = self.start_up(sample, applied.as_ref(), commands, shared, port);
         }
@@ -234,7 +236,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
     }
 
     /// No pulses: the control law begins anew.
-    fn rest(&mut self, now: Instant, omega: f32, sample: &Sample) {
+    fn rest(&mut self, now: Instant, omega: f32, measured: &Measurements) {
         self.controller.idle();
         if self.exit.crosses() {
             self.controller.begin_without_torque();
@@ -246,12 +248,12 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         self.revises = false;
         self.mode = Mode::Off;
         self.exit.rest(self.settings.clock.control_s());
-        self.damper = LinkDamper::at(sample.udc_v);
+        self.damper = LinkDamper::at(measured.udc_v);
         self.reference = Reference {
-            carrier_angle: sample.angle.unwrap_or(Angle::ZERO),
+            carrier_angle: measured.angle,
             rate: self.settings.clock.angle_rate(omega),
             at: now,
-            udc_v: sample.udc_v,
+            udc_v: measured.udc_v,
             ..Reference::NONE
         };
     }

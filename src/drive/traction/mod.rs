@@ -34,6 +34,15 @@ pub struct Settings {
     pub devices: SwitchLimits,
     /// The current loop's gains.
     pub gains: Gains,
+    /// Age of the angle when it is sampled, in s.
+    pub angle_late_s: f32,
+}
+
+impl Settings {
+    /// Settings for a clock and the inverter's devices, with the default gains, and an angle without delay.
+    pub const fn new(clock: Clock, devices: SwitchLimits) -> Self {
+        Self { clock, devices, gains: Gains::DEFAULT, angle_late_s: 0.0 }
+    }
 }
 
 /// The cells between the two interrupts, the operator's mailboxes, and the flight recorder, if there is one.

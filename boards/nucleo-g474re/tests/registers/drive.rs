@@ -6,7 +6,6 @@ use nucleo_g474re::built_in::traction::BUILT_IN;
 use nucleo_g474re::position::{Encoder, PositionState};
 use nucleo_g474re::power_stage::{AdcCode, POWER_STAGE};
 use nucleo_g474re::{CLOCK, Control, Pwm};
-use tractive::control::Gains;
 use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
 use tractive::frames::Abc;
 use tractive::modulation::CarrierHalf;
@@ -40,7 +39,7 @@ fn the_drive_pulses_a_turning_machine_through_the_registers() {
     bench.codes[6] = (1_500.0 / POWER_STAGE.udc_v_per_code) as u16;
     let registers = bench.registers;
     let (shared, state) = (Shared::new(), PositionState::new());
-    let settings = Settings { clock: CLOCK, devices: devices(), gains: Gains::DEFAULT };
+    let settings = Settings::new(CLOCK, devices());
     let zeros = [AdcCode(2_048); 3];
     let encoder = Encoder::new(registers.tim4, &POWER_STAGE, 4);
     let mut control = Control::new(registers, zeros, encoder, &state);

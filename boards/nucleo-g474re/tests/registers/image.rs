@@ -10,7 +10,7 @@ use nucleo_g474re::serve::Serve;
 use nucleo_g474re::watchdog::Pulse;
 use nucleo_g474re::{CLOCK, Control, Pwm, start};
 use stm32_metapac::timer::regs::SrGp16;
-use tractive::control::{Gains, flux_linkage, torque_nm};
+use tractive::control::{flux_linkage, torque_nm};
 use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
 use tractive::frames::{Abc, AlphaBeta, Angle, Dq};
 use tractive::modulation::{CarrierHalf, Mode};
@@ -182,7 +182,7 @@ impl Image {
         let position: &'static PositionState = Box::leak(Box::new(PositionState::new()));
         let stage = PowerStage { encoder_zero: zero, ..POWER_STAGE };
         let encoder = Encoder::new(registers.tim4, &stage, BUILT_IN.ratings.pole_pairs as u32);
-        let settings = Settings { clock: CLOCK, devices: devices(), gains: Gains::DEFAULT };
+        let settings = Settings::new(CLOCK, devices());
         let station = CanEndpoint::new(&BUILT_IN.ratings);
         let mut image = Self {
             machine: Machine {

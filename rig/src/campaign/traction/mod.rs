@@ -27,7 +27,7 @@ use crate::trace::Row;
 use crate::without::Ablation;
 use anyhow::Result;
 pub use faults::{Cause, faults};
-use tractive::control::{Demand, Gains};
+use tractive::control::Demand;
 use tractive::drive::traction::Settings;
 use tractive::machine::Tables;
 use tractive::modulation::{Ladder, Mode, SwitchLimits};
@@ -110,7 +110,7 @@ impl Drive {
     }
 
     fn tasks(&self, devices: SwitchLimits) -> Tasks<'static> {
-        let settings = Settings { clock: CLOCK, devices, gains: Gains::DEFAULT };
+        let settings = Settings::new(CLOCK, devices);
         Tasks::new(self.tables, settings, devices.shortest_half_ticks).on(self.ladder).without(self.without)
     }
 

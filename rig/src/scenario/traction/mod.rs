@@ -96,6 +96,13 @@ pub enum PatternsName {
     Optimal,
 }
 
+impl TractionOptions {
+    /// Age of the angle that the drive is told, in s.
+    fn known_late_s(&self) -> f32 {
+        if self.angle_late_known { (1e-6 * self.angle_late_us) as f32 } else { 0.0 }
+    }
+}
+
 impl From<Patterns> for PatternsName {
     fn from(patterns: Patterns) -> Self {
         match patterns {
@@ -176,6 +183,9 @@ pub struct TractionOptions {
     /// Time constant of the current sensors, in µs.
     #[arg(long, default_value_t = 0.0, value_parser = not_negative, allow_negative_numbers = true, value_name = "US")]
     pub current_filter_us: f64,
+    /// The drive knows of --angle-late-us, as by its power stage's key, and makes up for it.
+    #[arg(long)]
+    pub angle_late_known: bool,
     /// The true machine, where it is not the one that control knows: a folder of tables/, or the path of any machine folder.
     #[arg(long, value_name = "DIR")]
     pub plant: Option<String>,
@@ -292,7 +302,12 @@ impl System for Traction {
             ("--udc-gain", options.own.udc_gain, -50.0, 100.0),
             ("--angle-1f-deg", options.own.angle_1f_deg, -90.0, 90.0),
             ("--angle-2f-deg", options.own.angle_2f_deg, -90.0, 90.0),
-            ("--angle-late-us", options.own.angle_late_us, 0.0, 1e4),
+            (
+                "--angle-late-us",
+                options.own.angle_late_us,
+                0.0,
+                if options.own.angle_late_known { 500.0 } else { 1e4 },
+            ),
             ("--current-filter-us", options.own.current_filter_us, 0.0, 1e4),
         ])?;
         if (options.law, PatternsName::of(&options.own, machine), options.on)
@@ -448,6 +463,7 @@ fn setup(plan: &Plan, options: &Options, machine: &Machine, over_protocol: bool)
         over_protocol,
         uncompensated,
         behind_line_filter: options.own.line.is_some() || plan.line.as_ref().is_some_and(LinePlan::has_choke),
+        angle_late_s: options.own.known_late_s(),
     }
 }
 
@@ -471,8 +487,9 @@ fn tasks<'a, L: ControlLaw>(
     machine: &Machine,
 ) -> Result<Tasks<'a, L>> {
     let gains = Gains::of(setup.uncompensated, setup.behind_line_filter);
+    let devices = devices(setup, options, machine);
     let settings =
-        Settings { clock: clock(options, machine), devices: devices(setup, options, machine), gains };
+        Settings { clock: clock(options, machine), devices, gains, angle_late_s: setup.angle_late_s };
     settings.check(machine.tables).map_err(run::refused)?;
     let ratings = &machine.tables.ratings;
     let line = setup.line.map(|times| Line::rated(ratings, times.precharge_s, times.discharge_s));

@@ -1,0 +1,33 @@
+//! An angle that is read late: told its age, the drive makes up for it.
+
+use tractive_rig::scenario::catalogue;
+use tractive_rig::trace::Recorded;
+
+/// Errors of torque at the end of each catch of `restart`, in N·m, and the demands.
+fn catches(flaw: &str) -> Vec<[f64; 2]> {
+    let line = format!("restart {flaw}");
+    let chosen = catalogue::of_traction(line.trim_end()).unwrap();
+    let machine = chosen.machine().unwrap();
+    let recording = chosen.drive(&machine).unwrap();
+    assert!(recording.trip().is_none(), "{line}");
+    let figures = chosen.figures(&recording, &machine);
+    let number = |catch: &serde_json::Value, key: &str| catch[key].as_f64().unwrap();
+    let catches = figures.values()["catches"].as_array().unwrap();
+    catches.iter().map(|catch| ["final_error_nm", "demand_nm"].map(|key| number(catch, key))).collect()
+}
+
+/// Largest error, as a share of the demand.
+fn worst(catches: &[[f64; 2]]) -> f64 {
+    catches.iter().map(|[error_nm, demand_nm]| (error_nm / demand_nm).abs()).fold(0.0, f64::max)
+}
+
+#[test]
+fn a_late_angle_whose_age_is_known_costs_no_torque() {
+    let [unknown, known] = ["", " --angle-late-known"].map(|known| {
+        let worst = worst(&catches(&format!("--angle-late-us 50{known}")));
+        println!("50 µs late{known}: {:.2} % of the demand at worst", 100.0 * worst);
+        worst
+    });
+    assert!(unknown > 0.1, "an angle that is late must be noticed: {unknown}");
+    assert!(known < 0.01, "{known}");
+}
