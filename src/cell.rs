@@ -2,9 +2,10 @@
 //!
 //! All are arrays of 32-bit atomics with relaxed loads and stores (plain `ldr`/`str` on the target), so a value
 //! can be stale but never undefined, and nothing here needs `unsafe`. One core; the higher-priority interrupt
-//! preempts the lower one and runs to completion.
+//! preempts the lower one and runs to completion: so on the target what each period uses is ordered by the
+//! compiler alone; the sequence counter, which is used seldom, has fences.
 //!
-//! * [`Mailbox`], low → high: a double buffer. The reader is wait-free because the writer cannot run while
+//! * [`Mailbox`], low → high: a double buffer, or one of more slots. The reader is wait-free because the writer cannot run while
 //!   it reads, and never sees a half-written value because the writer fills the slot that nobody reads.
 //! * [`History`], high → low: a ring of records. The writer is wait-free and writes each record once; the reader looks at the last
 //!   few where they lie, and the writer cannot come round to them while it does.
@@ -19,8 +20,12 @@ mod ring;
 pub use ring::Ring;
 
 #[cfg(loom)]
-use loom::sync::atomic::{AtomicU32, Ordering, fence};
+use loom::sync::atomic::{AtomicU32, Ordering, fence, fence as order};
 
+#[cfg(all(not(loom), target_os = "none"))]
+use core::sync::atomic::compiler_fence as order;
+#[cfg(all(not(loom), not(target_os = "none")))]
+use core::sync::atomic::fence as order;
 #[cfg(not(loom))]
 use core::sync::atomic::{AtomicU32, Ordering, fence};
 
@@ -48,26 +53,42 @@ fn load<const N: usize>(slot: &[AtomicU32; N]) -> [u32; N] {
     words
 }
 
+/// A word, and with it all that was stored before it was.
+#[inline(always)]
+fn acquire(word: &AtomicU32) -> u32 {
+    let value = word.load(Ordering::Relaxed);
+    order(Ordering::Acquire);
+    value
+}
+
+/// Stores a word behind all that was stored before.
+#[inline(always)]
+fn release(word: &AtomicU32, value: u32) {
+    order(Ordering::Release);
+    word.store(value, Ordering::Relaxed);
+}
+
 /// From the low-priority interrupt (writer) to the high-priority one (reader).
 ///
-/// It holds the two newest values, so that the reader can pick by a rule that does not depend on when the
-/// writer happened to finish: the newest one if `ready`, otherwise the one before it. The older slot is
-/// rewritten only by the next [`Mailbox::publish`]; a writer that publishes only once its previous value is
-/// `ready` for every reader (one control period later, by construction) never has the slot in use rewritten.
-pub struct Mailbox<T, const N: usize> {
-    slots: [[AtomicU32; N]; 2],
-    /// Counts the values published, 0 before the first; the newest is in slot `published % 2`.
+/// It holds the newest values, two unless more are asked for (a power of two), so that the reader can pick by a rule that does not depend
+/// on when the writer happened to finish: the newest one that is `ready`. The oldest slot is rewritten only by the next
+/// [`Mailbox::publish`]; a writer that publishes only once no reader wants that one any more (of two values: once its previous value is
+/// `ready` for every reader, one control period later by construction) never has the slot in use rewritten.
+pub struct Mailbox<T, const N: usize, const SLOTS: usize = 2> {
+    slots: [[AtomicU32; N]; SLOTS],
+    /// Counts the values published, 0 before the first; the newest is in slot `published % SLOTS`.
     published: AtomicU32,
     value: core::marker::PhantomData<fn(T) -> T>,
 }
 
-impl<T: Words<N>, const N: usize> Mailbox<T, N> {
-    /// An empty cell: both slots hold zero words, which [`Mailbox::newest`] reports as `None` until published.
+impl<T: Words<N>, const N: usize, const SLOTS: usize> Mailbox<T, N, SLOTS> {
+    /// An empty cell: all slots hold zero words, which [`Mailbox::newest`] reports as `None` until published.
     #[cfg(not(loom))]
     #[allow(clippy::declare_interior_mutable_const, reason = "an array initialiser, never borrowed")]
     pub const fn new() -> Self {
+        const { assert!(SLOTS.is_power_of_two()) };
         Self {
-            slots: [const { [const { AtomicU32::new(0) }; N] }; 2],
+            slots: [const { [const { AtomicU32::new(0) }; N] }; SLOTS],
             published: AtomicU32::new(0),
             value: core::marker::PhantomData,
         }
@@ -86,39 +107,53 @@ impl<T: Words<N>, const N: usize> Mailbox<T, N> {
     /// Writer's side: publishes a value. Called by one interrupt only.
     #[inline]
     pub fn publish(&self, value: T) {
-        // Zero means "none yet", so the count wraps from its odd maximum to the even 2.
+        // Zero means "none yet", so the count wraps to full slots.
         let next = match self.published.load(Ordering::Relaxed).wrapping_add(1) {
-            0 => 2,
+            0 => SLOTS as u32,
             count => count,
         };
         store(self.slot(next), value.to_words());
-        self.published.store(next, Ordering::Release);
+        release(&self.published, next);
     }
 
-    /// Reader's side: the newest value whose record is `ready`, of the two newest; `None` when neither is.
+    /// Reader's side: the newest value whose record is `ready`; `None` when none is.
     #[inline]
     pub fn newest(&self, ready: impl Fn(&Record<N>) -> bool) -> Option<T> {
-        let published = self.published.load(Ordering::Acquire);
-        if published == 0 {
-            return None;
-        }
-        let mut record = self.slot(published);
-        if !ready(&Record(record)) {
-            record = self.slot(published.wrapping_sub(1));
-            if published == 1 || !ready(&Record(record)) {
+        self.find(ready).map(|record| T::from_words(load(record.0)))
+    }
+
+    /// The same where it lies.
+    #[inline]
+    pub fn find(&self, ready: impl Fn(&Record<N>) -> bool) -> Option<Record<'_, N>> {
+        let published = acquire(&self.published);
+        for back in 0..SLOTS as u32 {
+            if back >= published {
                 return None;
             }
+            let record = Record(self.slot(published.wrapping_sub(back)));
+            if ready(&record) {
+                return Some(record);
+            }
         }
-        Some(T::from_words(load(record)))
+        None
+    }
+
+    /// Reader's side: the newest value where it lies, ready or not.
+    #[inline]
+    pub fn last(&self) -> Option<Record<'_, N>> {
+        match acquire(&self.published) {
+            0 => None,
+            published => Some(Record(self.slot(published))),
+        }
     }
 
     #[inline]
     fn slot(&self, count: u32) -> &[AtomicU32; N] {
-        &self.slots[count as usize % 2]
+        &self.slots[count as usize % SLOTS]
     }
 }
 
-impl<T: Words<N>, const N: usize> Default for Mailbox<T, N> {
+impl<T: Words<N>, const N: usize, const SLOTS: usize> Default for Mailbox<T, N, SLOTS> {
     fn default() -> Self {
         Self::new()
     }
@@ -212,14 +247,11 @@ const RECORDS: usize = 8;
 /// From the high-priority interrupt (writer) to the low-priority one (reader): the last records of `N` words.
 ///
 /// The reader finds the record that it wants by what stands in it, then reads that one and those before it as often as it likes. A new
-/// record goes into the oldest of the ring: a read is good until that is one of those that were read, which is noticed. A record that
-/// is written anew makes a reader that it interrupts look again.
+/// record goes into the oldest of the ring: a read is good until that is one of those that were read, which is noticed.
 pub struct History<const N: usize> {
     records: [[AtomicU32; N]; RECORDS],
     /// Counts the records, 0 before the first; record n is in place `n % RECORDS`.
     published: AtomicU32,
-    /// Counts twice what was written into the newest record anew; odd while that is under way.
-    revised: AtomicU32,
 }
 
 /// The number of a record, counted on past the ring's end.
@@ -227,6 +259,7 @@ pub struct History<const N: usize> {
 pub struct Place(u32);
 
 /// A record where it lies: each word is loaded when it is asked for. Zeros where nothing was published yet.
+#[derive(Clone, Copy)]
 pub struct Record<'a, const N: usize>(&'a [AtomicU32; N]);
 
 impl<const N: usize> Record<'_, N> {
@@ -243,11 +276,7 @@ impl<const N: usize> History<N> {
     #[cfg(not(loom))]
     #[allow(clippy::declare_interior_mutable_const, reason = "an array initialiser, never borrowed")]
     pub const fn new() -> Self {
-        Self {
-            records: [const { [const { AtomicU32::new(0) }; N] }; RECORDS],
-            published: AtomicU32::new(0),
-            revised: AtomicU32::new(0),
-        }
+        Self { records: [const { [const { AtomicU32::new(0) }; N] }; RECORDS], published: AtomicU32::new(0) }
     }
 
     /// An empty cell (loom's atomics are not `const`).
@@ -256,7 +285,6 @@ impl<const N: usize> History<N> {
         Self {
             records: core::array::from_fn(|_| core::array::from_fn(|_| AtomicU32::new(0))),
             published: AtomicU32::new(0),
-            revised: AtomicU32::new(0),
         }
     }
 
@@ -265,31 +293,26 @@ impl<const N: usize> History<N> {
     pub fn publish(&self, words: [u32; N]) {
         let count = self.published.load(Ordering::Relaxed);
         // The words must not be seen before the count of the write before.
-        fence(Ordering::Release);
+        order(Ordering::Release);
         store(&self.records[count as usize % RECORDS], words);
         // Zero means "none yet", so the count wraps to a full ring.
         let next = match count.wrapping_add(1) {
             0 => RECORDS as u32,
             next => next,
         };
-        self.published.store(next, Ordering::Release);
+        release(&self.published, next);
     }
 
-    /// Writer's side: writes the newest record anew.
+    /// Reader's side: `true` while no record is newer than that at a place.
     #[inline]
-    pub fn revise(&self, words: [u32; N]) {
-        let revised = self.revised.load(Ordering::Relaxed);
-        self.revised.store(revised.wrapping_add(1), Ordering::Relaxed);
-        fence(Ordering::Release);
-        let newest = self.published.load(Ordering::Relaxed).wrapping_sub(1);
-        store(&self.records[newest as usize % RECORDS], words);
-        self.revised.store(revised.wrapping_add(2), Ordering::Release);
+    pub fn is_newest(&self, place: Place) -> bool {
+        acquire(&self.published) == place.0.wrapping_add(1)
     }
 
     /// Reader's side: the newest record of the last `within` that `fits`; `None` if there is none.
     #[inline(always)]
     pub fn find(&self, within: u32, fits: impl Fn(Record<N>) -> bool) -> Option<Place> {
-        let published = self.published.load(Ordering::Acquire);
+        let published = acquire(&self.published);
         let mut place = Place(published.wrapping_sub(1));
         for _ in 0..if published == 0 { 0 } else { within } {
             if fits(self.record(place, 0)) {
@@ -300,8 +323,8 @@ impl<const N: usize> History<N> {
         None
     }
 
-    /// Reader's side: what `look` makes of the record at a place and of those before it, the newest first; `None` when every try was
-    /// overtaken by writes.
+    /// Reader's side: what `look` makes of the record at a place and of those before it, the newest first; `None` when writes have come round
+    /// to one of them.
     #[inline]
     pub fn read<const COUNT: usize, R>(
         &self,
@@ -309,19 +332,11 @@ impl<const N: usize> History<N> {
         look: impl Fn([Record<N>; COUNT]) -> R,
     ) -> Option<R> {
         const { assert!(COUNT < RECORDS) };
-        // A record is written anew at most once, so the second try succeeds.
-        for _ in 0..2 {
-            let revised = self.revised.load(Ordering::Acquire);
-            let seen = look(core::array::from_fn(|back| self.record(place, back as u32)));
-            fence(Ordering::Acquire);
-            // The record that is being written now is the oldest of the ring.
-            let written = self.published.load(Ordering::Relaxed).wrapping_sub(place.0);
-            let whole = revised & 1 == 0 && self.revised.load(Ordering::Relaxed) == revised;
-            if whole && written <= (RECORDS - COUNT) as u32 {
-                return Some(seen);
-            }
-        }
-        None
+        let seen = look(core::array::from_fn(|back| self.record(place, back as u32)));
+        order(Ordering::Acquire);
+        // The record that is being written now is the oldest of the ring.
+        let written = self.published.load(Ordering::Relaxed).wrapping_sub(place.0);
+        (written <= (RECORDS - COUNT) as u32).then_some(seen)
     }
 
     /// The record so many before a place. The count wraps by whole rings.

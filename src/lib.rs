@@ -1,7 +1,7 @@
 //! `tractive`: the controller of a railway traction inverter.
 //!
-//! A timer interrupt decides which voltage ([`control`]), a PWM interrupt decides which pulses ([`modulation`] for two-level
-//! inverters, [`nine_switch`] for the one that feeds two motors), lock-free cells carry the few words between them ([`cell`]), a
+//! A timer interrupt decides which voltage ([`control`]) and, with time to spare, which pulses ([`modulation`] for two-level inverters), a PWM
+//! interrupt of higher priority loads them ([`nine_switch`], for the inverter that feeds two motors, is computed there), lock-free cells carry the few words between them ([`cell`]), a
 //! board gives samples and takes pulses ([`ports`]), and a rig on the host plays the motor. [`drive`] puts them together, once for
 //! each system ([`drive::traction`], [`drive::dual`]): its tasks are what the two interrupts call, on any board and on the host.
 //! [`machine`] has the types of the tables made offline, [`protection`] the faults and the safe state, [`recorder`] what led to one.

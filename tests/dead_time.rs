@@ -3,10 +3,10 @@
 use core::f32::consts::TAU;
 use std::sync::atomic::Ordering;
 use tractive::built_in::traction::BUILT_IN;
+use tractive::drive::PlannedHalf;
 use tractive::drive::traction::{PwmTask, Settings, Shared};
-use tractive::drive::{Gates, VoltageCommand};
 use tractive::frames::{Abc, Angle};
-use tractive::modulation::{CarrierHalf, Mode, Reference, SwitchLimits};
+use tractive::modulation::{CarrierHalf, Mode, Modulator, Reference, Schedule, SwitchLimits};
 use tractive::ports::PwmPort;
 use tractive::protection::SafeState;
 use tractive::time::{Clock, Instant};
@@ -49,6 +49,7 @@ fn played(dead_time_ticks: u32) -> Vec<(Instant, CarrierHalf)> {
     let half_ticks = devices.shortest_half_ticks;
     let settings = Settings::new(CLOCK, devices);
     let mut pwm = PwmTask::new(&BUILT_IN, settings, Instant(half_ticks));
+    let mut modulator = Modulator::new(devices, Schedule::new(&CLOCK));
     let (shared, mut machine) = (Shared::new(), Machine::default());
     for boundary in 1..160 {
         let at = pwm.next_call();
@@ -60,9 +61,8 @@ fn played(dead_time_ticks: u32) -> Vec<(Instant, CarrierHalf)> {
         let reference =
             Reference::turning(100.0, Angle((rate * sampled.0 as f32) as u32), rate, sampled, 1_500.0);
         shared.began.store(valid_from.0, Ordering::Relaxed);
-        let command =
-            VoltageCommand { reference, valid_from, gates: Gates::Pulse, revises: false, release: 0 };
-        shared.command.publish(command);
+        let half = modulator.step(at.after(half_ticks), Some(&reference));
+        shared.planned.publish(PlannedHalf { at, half, release: 0, rate, udc_v: 1_500.0 });
         pwm.run(&mut machine, &shared);
     }
     machine.0

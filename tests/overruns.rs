@@ -395,3 +395,56 @@ fn the_first_boundary_may_land_in_a_control_interrupt() {
         assert_eq!((landing.board.trip, landing.board.entered), (None, None));
     }
 }
+
+/// A drive that has pulsed for a while, and in whose control interrupt at [`SETTLED`] the boundary lands that comes so many ticks after its
+/// beginning, before it has planned anything: the trip that control reports in the end, that of the PWM interrupt, and when the gates went off.
+fn boundary_within_control(after_ticks: u32) -> (Option<Trip>, Option<Trip>, Option<u32>) {
+    let devices = SwitchLimits::new(250, 0, 900.0, &CLOCK);
+    let settings = traction::Settings::new(CLOCK, devices);
+    let first = (SETTLED + after_ticks) % devices.shortest_half_ticks;
+    let shared = traction::Shared::new();
+    let mut control = traction::ControlTask::new(&BUILT_IN, settings, Instant(CLOCK.control_ticks));
+    let mut pwm = traction::PwmTask::new(&BUILT_IN, settings, Instant(first));
+    let mut board = Board::new(CarrierHalf::off(first), PlayedPeriod::off(0));
+    while control.next_call().0 < SETTLED {
+        board.now = control.next_call().0.min(pwm.next_call().0);
+        if control.next_call().reached(pwm.next_call()) {
+            pwm.run(&mut board, &shared);
+        } else {
+            control.run(&mut board, &shared);
+        }
+    }
+    assert_eq!((board.trip, board.entered, board.shadow.mode), (None, None, Mode::Async));
+    assert_eq!((control.next_call(), pwm.next_call()), (Instant(SETTLED), Instant(SETTLED + after_ticks)));
+    board.now = SETTLED + after_ticks;
+    let mut landing = Landing { board, pwm: Some(&mut pwm), shared: &shared };
+    control.run(&mut landing, &shared);
+    let mut board = landing.board;
+    for _ in 0..20 {
+        board.now = control.next_call().0.min(pwm.next_call().0);
+        if control.next_call().reached(pwm.next_call()) {
+            pwm.run(&mut board, &shared);
+        } else {
+            control.run(&mut board, &shared);
+        }
+    }
+    assert_eq!(board.entered.is_some(), board.shadow.mode == Mode::Off);
+    (board.trip, pwm.trip(), board.entered)
+}
+
+/// The half for a boundary is planned a control period ahead. Where control has begun in time but lasts until that boundary, the PWM
+/// interrupt finds nothing for it: it says so by name, and the gates are off at once.
+#[test]
+fn a_half_that_is_not_there_at_its_boundary_is_a_fault() {
+    let period = CLOCK.control_ticks;
+    for after in [0, 1, period / 2, period - 1] {
+        assert_eq!(boundary_within_control(after), (None, None, None), "{after}");
+    }
+    for after in [period, period + 1, period + period / 16] {
+        let (told, found, entered) = boundary_within_control(after);
+        let trip = found.unwrap_or_else(|| panic!("nothing is planned for {after}, and it is not noticed"));
+        assert_eq!((trip.fault, trip.at), (Fault::StaleCommand, Instant(SETTLED + after)));
+        assert!(trip.value > 0.0 && trip.limit == 0.0, "{trip:?}");
+        assert_eq!((told, entered), (Some(trip), Some(SETTLED + after)));
+    }
+}

@@ -1,11 +1,13 @@
 //! A demand that jumps revises the half that is already committed, and nothing else does.
 
+use std::sync::atomic::Ordering;
 use tractive::built_in::traction::BUILT_IN;
-use tractive::drive::traction::{PwmTask, Settings, Shared};
-use tractive::drive::{CommittalRecord, Gates, VoltageCommand, volt_ticks};
-use tractive::frames::{Abc, AlphaBeta, Angle};
+use tractive::control::Demand;
+use tractive::drive::PlannedHalf;
+use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
+use tractive::frames::{Abc, Angle};
 use tractive::modulation::{CarrierHalf, Mode, Modulator, Reference, Schedule, SwitchLimits};
-use tractive::ports::PwmPort;
+use tractive::ports::{ControlPort, DriveCommand, PwmPort, Report, Sample};
 use tractive::protection::SafeState;
 use tractive::time::{Clock, Instant};
 
@@ -59,7 +61,7 @@ impl PwmPort for Played {
     }
 }
 
-/// A drive whose PWM interrupt has come at three boundaries, with pulses since the second.
+/// A PWM interrupt that has come at three boundaries, each time with the same half planned.
 struct Pulsing {
     pwm: PwmTask,
     shared: Shared<'static>,
@@ -68,59 +70,28 @@ struct Pulsing {
 
 impl Pulsing {
     fn new() -> Self {
-        let mut pulsing = Self::at_two_boundaries();
-        pulsing.publish(100.0, 3 * half_ticks() - 2_500, false);
-        pulsing.run();
-        pulsing
-    }
-
-    fn at_two_boundaries() -> Self {
         let first = Instant(half_ticks());
         let mut pulsing = Self {
             pwm: PwmTask::new(&BUILT_IN, settings(), first),
             shared: Shared::new(),
             played: Played::default(),
         };
-        for boundary in 1..=2 {
-            pulsing.publish(100.0, boundary * half_ticks() - 2_500, false);
+        for boundary in 1..=3 {
+            pulsing.plan(boundary, half(100.0));
             pulsing.run();
         }
         pulsing
     }
 
     fn run(&mut self) -> CarrierHalf {
+        self.shared.began.store(self.pwm.next_call().0, Ordering::Relaxed);
         self.pwm.run(&mut self.played, &self.shared);
         self.played.0.last().unwrap().1
     }
 
-    /// Publishes a command that is valid from this tick on, one control period after its sample.
-    fn publish(&self, voltage_v: f32, valid_from: u32, revises: bool) {
-        self.publish_of(valid_from - 2_500, voltage_v, valid_from, revises);
-    }
-
-    /// The same for a sample of any tick.
-    fn publish_of(&self, at: u32, voltage_v: f32, valid_from: u32, revises: bool) {
-        let reference = reference(voltage_v, 1.0, Instant(at));
-        self.shared.began.store(valid_from, std::sync::atomic::Ordering::Relaxed);
-        let valid_from = Instant(valid_from);
-        self.shared.command.publish(VoltageCommand {
-            reference,
-            valid_from,
-            gates: Gates::Pulse,
-            revises,
-            release: 0,
-        });
-    }
-
-    /// Boundaries and what their halves give, as control reads them: of the next half, and of the running one.
-    fn told(&self) -> [(Instant, AlphaBeta); 2] {
-        let applied = &self.shared.applied;
-        let newest = applied.find(1, |_| true).unwrap();
-        let told = applied.read(newest, |records: [_; 2]| {
-            let [newest, running] = records.map(CommittalRecord);
-            [(newest.at(), newest.volt_ticks()), (running.at(), running.volt_ticks_from(0))]
-        });
-        told.unwrap()
+    fn plan(&self, boundary: u32, half: CarrierHalf) {
+        let at = Instant(boundary * half_ticks());
+        self.shared.planned.publish(PlannedHalf { at, half, release: 0, rate: 0.0, udc_v: 1_500.0 });
     }
 
     fn revise(&mut self) -> Option<CarrierHalf> {
@@ -133,43 +104,129 @@ impl Pulsing {
     }
 }
 
-#[test]
-fn a_revised_half_has_the_newer_voltage_and_is_told_to_control() {
-    let mut drive = Pulsing::new();
-    let committed = drive.played.0.last().unwrap().1;
-    drive.publish(700.0, 3 * half_ticks() + 2_500, true);
-    let revised = drive.revise().unwrap();
-    assert_ne!(revised, committed);
-    // What the boundary would have made of the same reference, had it known it.
-    let mut knowing = Pulsing::at_two_boundaries();
-    knowing.publish_of(3 * half_ticks(), 700.0, 3 * half_ticks() - 1, false);
-    assert_eq!(revised, knowing.run());
-    let [newest, _] = drive.told();
-    assert_eq!(newest, (Instant(3 * half_ticks()), volt_ticks(revised.on_ticks(0))));
-    // What control is told of the running half is what was played last.
-    drive.publish(700.0, 4 * half_ticks() - 2_500, false);
-    drive.run();
-    let [_, running] = drive.told();
-    assert_eq!(running.1, volt_ticks(revised.on_ticks(0)));
+/// A free half of so much voltage.
+fn half(voltage_v: f32) -> CarrierHalf {
+    let mut modulator = Modulator::new(settings().devices, Schedule::new(&CLOCK));
+    modulator.step(Instant(0), Some(&reference(voltage_v, 1.0, Instant(0))))
+}
+
+/// The same as a board plays it, which is not told what follows.
+fn played(voltage_v: f32) -> CarrierHalf {
+    CarrierHalf { ahead: [Mode::Off; 2], ..half(voltage_v) }
 }
 
 #[test]
-fn only_a_command_that_asks_for_it_revises() {
+fn a_half_that_is_planned_anew_is_loaded_before_its_boundary() {
     let mut drive = Pulsing::new();
-    drive.publish(700.0, 3 * half_ticks() + 2_500, false);
-    assert_eq!(drive.revise(), None);
+    assert_eq!(drive.played.0.last().unwrap().1, played(100.0));
+    drive.plan(3, half(700.0));
+    assert_eq!(drive.revise(), Some(played(700.0)));
+    drive.plan(4, half(200.0));
+    assert_eq!(drive.run(), played(200.0), "the next boundary loads its own");
 }
 
 #[test]
-fn a_revision_that_a_boundary_has_overtaken_is_dropped() {
+fn a_half_that_is_planned_for_another_boundary_waits_for_it() {
     let mut drive = Pulsing::new();
-    drive.publish(700.0, 3 * half_ticks() - 1, true);
+    drive.plan(4, half(700.0));
     assert_eq!(drive.revise(), None);
+    assert_eq!(drive.run(), played(700.0));
+}
+
+/// A drive at rest whose demand jumps, on a board without anything, and the instant at which it revises.
+struct Jumping<'a> {
+    torque_nm: f32,
+    played: Played,
+    pwm: PwmTask,
+    shared: &'a Shared<'a>,
+    revised: Vec<Instant>,
+}
+
+impl Jumping<'_> {
+    fn boundary(&mut self) {
+        let mut played = core::mem::take(&mut self.played);
+        self.pwm.run(&mut played, self.shared);
+        self.played = played;
+    }
+}
+
+const SPEED_RAD_S: f32 = 20.0;
+
+impl ControlPort for Jumping<'_> {
+    fn begin(&mut self, revises: bool) {
+        if revises {
+            self.pwm.revise(&mut self.played, self.shared);
+            self.revised.push(Instant(self.shared.began.load(Ordering::Relaxed)).after(2_500));
+        }
+    }
+
+    fn sample(&mut self, now: Instant) -> Sample {
+        let turns = f64::from(SPEED_RAD_S) * f64::from(now.0) / 25e6 / std::f64::consts::TAU;
+        let angle = Angle((turns.rem_euclid(1.0) * 4_294_967_296.0) as u32);
+        let ripple = (now.0 % 7_919) as f32 * 1e-4;
+        let currents_a = Abc { a: ripple, b: -ripple, c: 0.0 };
+        Sample { currents_a, udc_v: 1_500.0, angle: Some(angle), may_pulse: true, hardware: None }
+    }
+
+    fn command(&mut self, _now: Instant, _operator: impl FnOnce() -> DriveCommand) -> DriveCommand {
+        let demand = Demand { torque_nm: self.torque_nm, slew_limited: false };
+        DriveCommand { enable: true, demand, ..DriveCommand::NONE }
+    }
+
+    fn enter(&mut self, _safe: SafeState, _now: Instant) {
+        unreachable!("nothing is wrong");
+    }
+
+    fn overrun_ticks(&mut self, _now: Instant, _deadline_ticks: u32) -> u32 {
+        0
+    }
+
+    fn report(&mut self, _now: Instant, _report: &Report) {}
+}
+
+/// The halves that a drive loads whose demand jumps at a control instant, and at which instants it revises them.
+fn jumped(period: u32) -> (Vec<(Instant, CarrierHalf)>, Vec<Instant>) {
+    let shared = Shared::new();
+    let pwm = PwmTask::new(&BUILT_IN, settings(), Instant(half_ticks()));
+    let (torque_nm, played, revised) = (0.0, Played::default(), Vec::new());
+    let mut board = Jumping { torque_nm, played, pwm, shared: &shared, revised };
+    let mut control = ControlTask::new(&BUILT_IN, settings(), Instant(2_500));
+    while control.next_call().0 < 2_500 * (period + 40) {
+        if control.next_call().reached(board.pwm.next_call()) {
+            board.boundary();
+            continue;
+        }
+        board.torque_nm = if control.next_call().0 < 2_500 * period { 0.0 } else { 600.0 };
+        control.run(&mut board, &shared);
+    }
+    (board.played.0, board.revised)
+}
+
+/// Wherever the jump falls, one half is loaded twice, with the same place and another voltage, and at least a control period before it
+/// begins: the next one, or the one after it where that begins too soon.
+#[test]
+fn a_jump_of_the_demand_revises_the_half_that_is_loaded() {
+    let mut later = 0;
+    for period in 300..330 {
+        let (played, revised) = jumped(period);
+        let twice: Vec<_> = played.windows(2).filter(|pair| pair[0].0 == pair[1].0).collect();
+        assert_eq!((twice.len(), revised.len()), (1, 1), "{period}: {revised:?}");
+        for (pair, at) in twice.iter().zip(&revised) {
+            let [(boundary, before), (_, after)] = pair else { unreachable!() };
+            let waited = at.0 - 2_500 * (period + 1);
+            assert!(waited <= 2 * 2_500, "{period}: {waited} ticks");
+            later += u32::from(waited > 0);
+            assert!(boundary.0 + half_ticks() - at.0 >= 2_500, "{period}");
+            assert_eq!((before.mode, before.half), (Mode::Async, after.half), "{period}");
+            assert_ne!(before.compare_ticks, after.compare_ticks, "{period}");
+        }
+    }
+    assert!((1..15).contains(&later), "{later} of 30 jumps waited");
 }
 
 #[test]
 fn a_half_that_gives_way_to_another_mode_is_not_revised() {
-    let mut half = Pulsing::new().played.0.last().unwrap().1;
+    let mut half = half(100.0);
     assert!(half.is_free());
     half.ahead = [Mode::Async, Mode::Sync15];
     assert!(!half.is_free());

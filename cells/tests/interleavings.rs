@@ -68,20 +68,6 @@ fn a_trail_is_never_torn_by_the_next_record() {
     });
 }
 
-#[test]
-fn a_trail_is_never_torn_by_a_revision() {
-    loom::model(|| {
-        let trail = Arc::new(History::<2>::new());
-        trail.publish([1; 2]);
-        let reader = Arc::clone(&trail);
-        let thread = thread::spawn(move || newest_two(&reader));
-        trail.revise([9; 2]);
-        let read = thread.join().unwrap();
-        assert!([None, Some([[1; 2], [0; 2]]), Some([[9; 2], [0; 2]])].contains(&read), "{read:?}");
-        assert_eq!(newest_two(&trail), Some([[9; 2], [0; 2]]));
-    });
-}
-
 /// The protocol: while a reader reads, the writer publishes at most once, because its previous value was ready for every
 /// reader before it began.
 #[test]
@@ -96,6 +82,35 @@ fn a_downlink_gives_the_value_that_is_ready_while_the_next_one_is_written() {
         cell.publish(Message::number(3));
         assert_eq!(thread.join().unwrap(), Some(Message::number(2)));
         assert_eq!(cell.newest(|_| true), Some(Message::number(3)));
+    });
+}
+
+/// Of four slots the last three values stand while the next one is written, whichever of them the reader is to have.
+#[test]
+fn a_planned_value_is_whole_until_three_later_ones_are_published() {
+    for wanted in 2..=4 {
+        loom::model(move || {
+            let cell = Arc::new(Mailbox::<Message, 2, 4>::new());
+            (1..=4).for_each(|number| cell.publish(Message::number(number)));
+            let reader = Arc::clone(&cell);
+            let thread = thread::spawn(move || reader.newest(|record| record.word::<0>() <= wanted));
+            cell.publish(Message::number(5));
+            assert_eq!(thread.join().unwrap(), Some(Message::number(wanted)));
+        });
+    }
+}
+
+/// The test can fail: the oldest slot is the one that is written.
+#[test]
+#[should_panic(expected = "assertion")]
+fn a_planned_value_of_four_slots_ago_is_written_over() {
+    loom::model(|| {
+        let cell = Arc::new(Mailbox::<Message, 2, 4>::new());
+        (1..=4).for_each(|number| cell.publish(Message::number(number)));
+        let reader = Arc::clone(&cell);
+        let thread = thread::spawn(move || reader.newest(|record| record.word::<0>() <= 1));
+        cell.publish(Message::number(5));
+        assert_eq!(thread.join().unwrap(), Some(Message::number(1)));
     });
 }
 

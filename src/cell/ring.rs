@@ -1,12 +1,12 @@
 //! A ring that one interrupt fills until a fault freezes it, and that anybody reads afterwards.
 
 #[cfg(loom)]
-use loom::sync::atomic::{AtomicU32, Ordering, fence};
+use loom::sync::atomic::{AtomicU32, Ordering};
 
 #[cfg(not(loom))]
-use core::sync::atomic::{AtomicU32, Ordering, fence};
+use core::sync::atomic::{AtomicU32, Ordering};
 
-use super::{Words, load, store};
+use super::{Words, acquire, load, order, release, store};
 
 /// The last `N` values of one writer, `N` a power of two.
 ///
@@ -67,21 +67,21 @@ impl<T: Words<W>, const W: usize, const N: usize> Ring<T, W, N> {
         let Some(slot) = self.slots.get(written as usize % N) else { return };
         store(slot, value.to_words());
         let next = written.wrapping_add(1);
-        self.written.store(if next == 0 { N as u32 } else { next }, Ordering::Release);
+        release(&self.written, if next == 0 { N as u32 } else { next });
         // The last word to change: who sees it full sees all that it froze.
-        self.after.store(after + u32::from(faulty), Ordering::Release);
+        release(&self.after, after + u32::from(faulty));
     }
 
     /// Writer's side: forgets the fault and what led to it, and records anew.
     pub fn release(&self) {
         self.after.store(0, Ordering::Relaxed);
         self.forgotten.store(self.written.load(Ordering::Relaxed), Ordering::Relaxed);
-        fence(Ordering::Release);
+        order(Ordering::Release);
     }
 
     /// Reader's side: whether a fault has frozen the ring.
     pub fn is_frozen(&self) -> bool {
-        self.after.load(Ordering::Acquire) == Self::AFTER as u32
+        acquire(&self.after) == Self::AFTER as u32
     }
 
     /// Reader's side: the value number `index`, 0 the oldest; `None` beyond the newest, and while the ring is not frozen.
@@ -89,14 +89,14 @@ impl<T: Words<W>, const W: usize, const N: usize> Ring<T, W, N> {
         if !self.is_frozen() {
             return None;
         }
-        let written = self.written.load(Ordering::Acquire);
+        let written = acquire(&self.written);
         let length = match written.checked_sub(self.forgotten.load(Ordering::Relaxed)) {
             Some(kept) if (kept as usize) < N => kept as usize,
             _ => N,
         };
         let back = length.checked_sub(index).filter(|back| *back > 0)?;
         let value = T::from_words(load(self.slots.get((written as usize).wrapping_sub(back) % N)?));
-        fence(Ordering::Acquire);
+        order(Ordering::Acquire);
         let untouched = self.is_frozen() && self.written.load(Ordering::Relaxed) == written;
         untouched.then_some(value)
     }

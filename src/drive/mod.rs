@@ -15,7 +15,7 @@ use mailbox::SlotTimer;
 pub use mailbox::{DualOperatorMailboxes, Mailboxes, Observation, OperatorMailboxes, Timed};
 pub(crate) use mailbox::{next_slot, slots_between};
 pub use messages::{
-    COMMITTAL_WORDS, Committal, CommittalRecord, Gates, HalfKind, VoltageCommand, half_from_words,
+    Gates, LOADED_WORDS, Loaded, LoadedRecord, PLANNED_WORDS, PlannedHalf, PlannedRecord, half_from_words,
     half_to_words, volt_ticks,
 };
 

@@ -87,6 +87,9 @@ fn TIMER0() {
     if !*IS_SET_UP {
         let settings = settings();
         TASK.set_up(settings, Instant(settings.clock.control_ticks));
+        if let Some(schedule) = patterns::SCHEDULE {
+            TASK.set_schedule(schedule(&settings.clock));
+        }
         if let Some(set_up) = law::SET_UP {
             set_up(TASK);
         }
@@ -104,11 +107,7 @@ fn DUALTIMER() {
     let mut board = qemu::Pwm;
     let task = TASK.get_or_insert_with(|| {
         let first = Instant(FIRST_HALF_TICKS.load(Ordering::Relaxed));
-        let task = PwmTask::new(BuiltIn, settings(), first).after_halves_of(first.0);
-        match patterns::SCHEDULE {
-            Some(schedule) => task.scheduled(schedule(&settings().clock)),
-            None => task,
-        }
+        PwmTask::new(BuiltIn, settings(), first).after_halves_of(first.0)
     });
     task.run(&mut board, &SHARED);
 }

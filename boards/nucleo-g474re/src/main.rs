@@ -71,7 +71,10 @@ mod firmware {
             Control::new(registers, kept(&CONTROL_ZEROS), encoder, &POSITION)
         });
         let first = Instant(CLOCK.control_ticks);
-        let task = TASK.get_or_insert_with(|| ControlTask::new(BuiltIn, settings(), first));
+        let task = TASK.get_or_insert_with(|| {
+            let settings = settings();
+            nucleo_g474re::patterns::chosen(ControlTask::new(BuiltIn, settings, first), &settings.clock)
+        });
         task.run(board, &SHARED);
         PULSE.control_ran();
     }
@@ -85,7 +88,7 @@ mod firmware {
         let task = TASK.get_or_insert_with(|| {
             let settings = settings();
             let first = Instant(settings.devices.shortest_half_ticks);
-            nucleo_g474re::patterns::chosen(PwmTask::new(BuiltIn, settings, first), &settings.clock)
+            PwmTask::new(BuiltIn, settings, first)
         });
         if task.run(board, &SHARED) {
             PULSE.pwm_ran();

@@ -1,7 +1,7 @@
 //! The pulse patterns of the PMaSynRM's image: the paper's, or the optimised ones with the feature `optimal`, which a machine whose
 //! `patterns` are "optimal" needs.
 
-use tractive::drive::traction::PwmTask;
+use tractive::drive::traction::ControlTask;
 use tractive::machine::Machine;
 use tractive::time::Clock;
 
@@ -11,13 +11,13 @@ pub const FREE_CARRIER_SHARE: f32 =
 
 /// A task with these patterns.
 #[cfg(feature = "optimal")]
-pub fn chosen<M: Machine>(task: PwmTask<M>, clock: &Clock) -> PwmTask<M> {
+pub fn chosen<M: Machine>(task: ControlTask<M>, clock: &Clock) -> ControlTask<M> {
     use tractive::modulation::{Ladder, Schedule};
     task.scheduled(Schedule::on(Ladder::OPTIMAL, clock))
 }
 
 /// A task with these patterns.
 #[cfg(not(feature = "optimal"))]
-pub fn chosen<M: Machine>(task: PwmTask<M>, _clock: &Clock) -> PwmTask<M> {
+pub fn chosen<M: Machine>(task: ControlTask<M>, _clock: &Clock) -> ControlTask<M> {
     task
 }

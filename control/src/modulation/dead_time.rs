@@ -7,29 +7,23 @@
 use super::{CarrierHalf, SwitchLimits};
 use crate::frames::Abc;
 
-/// The half as the timer must play it so that the legs do what `half` says; `currents_a` are the phase currents that are
+/// Moves the edges of a half so that the legs do what it says when the timer plays it; `currents_a` are the phase currents that are
 /// expected in it. Currents below `small_a` may have either sign by their ripple: they count in proportion. Edges at the half's
 /// very start belong to the half before and cannot come earlier.
 ///
 /// ```
 /// use tractive_control::frames::Abc;
-/// use tractive_control::modulation::{CarrierHalf, SwitchLimits, compensated};
+/// use tractive_control::modulation::{CarrierHalf, SwitchLimits, compensate};
 /// let devices = SwitchLimits { min_pulse_ticks: 250, dead_time_ticks: 125, shortest_half_ticks: 10_000 };
 /// // All three phases rise 5,000 ticks after the start; the current flows out of leg a and into the others.
-/// let half = CarrierHalf { period_ticks: 10_000, compare_ticks: [5_000; 3], ..CarrierHalf::default() };
-/// let played = compensated(&half, &Abc { a: 80.0, b: -40.0, c: -40.0 }, 2.0, &devices);
+/// let mut half = CarrierHalf { period_ticks: 10_000, compare_ticks: [5_000; 3], ..CarrierHalf::default() };
+/// compensate(&mut half, &Abc { a: 80.0, b: -40.0, c: -40.0 }, 2.0, &devices);
 /// // Leg a alone would rise late, by the dead time: its edge is commanded that much earlier.
-/// assert_eq!(played.compare_ticks, [4_875, 5_000, 5_000]);
+/// assert_eq!(half.compare_ticks, [4_875, 5_000, 5_000]);
 /// ```
-pub fn compensated(
-    half: &CarrierHalf,
-    currents_a: &Abc,
-    small_a: f32,
-    devices: &SwitchLimits,
-) -> CarrierHalf {
-    let mut played = *half;
+pub fn compensate(half: &mut CarrierHalf, currents_a: &Abc, small_a: f32, devices: &SwitchLimits) {
     let dead_ticks = devices.dead_time_ticks as f32;
-    let phases = played.compare_ticks.iter_mut().zip(half.start_levels);
+    let phases = half.compare_ticks.iter_mut().zip(half.start_levels);
     for ((compare, start_level), current) in phases.zip([currents_a.a, currents_a.b, currents_a.c]) {
         let against = if start_level { -current } else { current };
         if *compare < half.period_ticks {
@@ -39,7 +33,6 @@ pub fn compensated(
             *compare = compare.saturating_sub((late + 0.5) as u32);
         }
     }
-    played
 }
 
 #[cfg(test)]
@@ -51,10 +44,11 @@ mod tests {
 
     fn played(start_levels: [bool; 3], currents: [f32; 3]) -> [u32; 3] {
         let compare_ticks = [5_000, 60, u32::MAX];
-        let half =
+        let mut half =
             CarrierHalf { period_ticks: 10_000, compare_ticks, start_levels, ..CarrierHalf::default() };
         let [a, b, c] = currents;
-        compensated(&half, &Abc { a, b, c }, 2.0, &DEVICES).compare_ticks
+        compensate(&mut half, &Abc { a, b, c }, 2.0, &DEVICES);
+        half.compare_ticks
     }
 
     #[test]

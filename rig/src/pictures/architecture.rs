@@ -11,16 +11,21 @@ pub fn architecture() -> Result<String> {
         "Two interrupts, lock-free cells between them, a board below, and the rig in the motor's place",
     );
     all.part((16.0, 34.0, 196.0, 150.0), "operator's slot, lowest", GREY)
-        .part((270.0, 34.0, 460.0, 150.0), "timer interrupt, low priority: which voltage", GREEN)
-        .part((270.0, 226.0, 460.0, 118.0), "PWM interrupt, high priority: which pulses", VIOLET)
+        .part(
+            (270.0, 34.0, 460.0, 150.0),
+            "timer interrupt, low priority: which voltage, which pulses",
+            GREEN,
+        )
+        .part((270.0, 226.0, 460.0, 118.0), "PWM interrupt, high priority: pulses in time", VIOLET)
         .part((764.0, 34.0, 220.0, 310.0), "board", BLUE);
     all.block((26.0, 66.0, 176.0, 46.0), "CAN, operator\nsession, ramps, states")
         .block((26.0, 126.0, 176.0, 44.0), "flight recorder\nread where it is frozen")
-        .block((290.0, 66.0, 120.0, 54.0), "protection\nfaults by name")
-        .block((440.0, 66.0, 120.0, 54.0), "operating point\nMTPA, weakening")
-        .block((590.0, 66.0, 120.0, 54.0), "current loop\non predicted flux")
+        .block((290.0, 66.0, 92.0, 54.0), "protection\nby name")
+        .block((400.0, 66.0, 96.0, 54.0), "operating point\nweakening")
+        .block((514.0, 66.0, 96.0, 54.0), "current loop\npredicted flux")
+        .block((628.0, 66.0, 92.0, 54.0), "modulator\nmode, half")
         .block((290.0, 132.0, 420.0, 40.0), "tables of the machine, made offline from its flux map")
-        .block((290.0, 264.0, 130.0, 56.0), "mode, and the\nchange of it")
+        .block((290.0, 264.0, 130.0, 56.0), "protection\nat the boundary")
         .block(
             (460.0, 264.0, 250.0, 56.0),
             "carrier half after the running one:\nlength, levels, toggle instants",
@@ -36,13 +41,14 @@ pub fn architecture() -> Result<String> {
         .words((241.0, 76.0), "demand")
         .flow(&[(290.0, 106.0), (202.0, 106.0)])
         .words((241.0, 117.0), "report")
-        .flow(&[(410.0, 93.0), (440.0, 93.0)])
-        .flow(&[(560.0, 93.0), (590.0, 93.0)])
+        .flow(&[(382.0, 93.0), (400.0, 93.0)])
+        .flow(&[(496.0, 93.0), (514.0, 93.0)])
+        .flow(&[(610.0, 93.0), (628.0, 93.0)])
         .flow(&[(784.0, 100.0), (730.0, 100.0)])
         .flow(&[(650.0, 184.0), (650.0, 264.0)])
-        .words((706.0, 206.0), "voltage command")
+        .words((706.0, 206.0), "planned halves")
         .flow(&[(590.0, 264.0), (590.0, 184.0)])
-        .words((524.0, 206.0), "committed halves")
+        .words((524.0, 206.0), "loaded, sampled")
         .flow(&[(420.0, 292.0), (460.0, 292.0)])
         .flow(&[(710.0, 292.0), (784.0, 292.0)])
         .words((748.0, 280.0), "half")

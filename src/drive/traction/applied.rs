@@ -1,76 +1,18 @@
-//! The modulator's work, as the control interrupt sees it.
+//! The modulator's work, as the control law is told of it.
 
 use super::Settings;
+use super::pulses::{Half, Pulses};
 use super::six_step_exit::SixStepExit;
 use super::slot::Decision;
-use crate::cell::{History, Place, Record};
 use crate::control::{Boundary, Committed, ModeLimits, Regulated, Ripple};
-use crate::drive::messages::{COMMITTAL_WORDS, CommittalRecord, HalfKind};
-use crate::frames::{Abc, AlphaBeta, Angle};
+use crate::frames::{AlphaBeta, Angle};
 #[cfg(feature = "optimal")]
 use crate::modulation::optimal_ripple;
 use crate::modulation::{Mode, Reference, Regulation, RippleFlux, depth_limit, first_half, ripple_share};
-use crate::protection::{Fault, Violation};
 use crate::time::{Clock, Instant};
-
-/// By which part of a control period the PWM interrupt may be late before control calls it lost: more than it takes to enter it.
-const PWM_LATE_PART: u32 = 4;
-
-/// Records of which one is that of the newest boundary at a control interrupt's instant: two may have come since.
-const LATEST: u32 = 3;
 
 /// Share of a mode's largest fundamental that the operating point may use where the voltage must also regulate.
 const REGULATION_ROOM: f32 = 0.999;
-
-/// The newest boundary, and what is committed from there on, as it stood at a control interrupt.
-#[derive(Clone, Copy)]
-pub(super) struct Applied {
-    /// The record of the newest boundary.
-    place: Place,
-    /// The newest boundary.
-    pub at: Instant,
-    /// The boundary after it, where the half begins that was committed last; that half's length, in ticks, and its kind.
-    pub begins: Instant,
-    pub period_ticks: u32,
-    pub kind: HalfKind,
-    /// Mode of the half that runs until then.
-    pub mode: Mode,
-    /// Number of the release that the PWM interrupt had carried out.
-    pub released: u8,
-}
-
-impl Applied {
-    /// As it stood at `now`, even if the PWM interrupt has come since, as it does twice in a control period where a carrier lasts one;
-    /// `None` before the modulator has told anything.
-    #[inline]
-    pub(super) fn read(trail: &History<COMMITTAL_WORDS>, now: Instant) -> Option<Self> {
-        let stands = |record: Record<COMMITTAL_WORDS>| {
-            let record = CommittalRecord(record);
-            // A half that was written has a length.
-            record.period_ticks() > 0 && now.reached(record.at())
-        };
-        let place = trail.find(LATEST, stands)?;
-        trail.read(place, |records: [Record<COMMITTAL_WORDS>; 2]| {
-            let [newest, one] = records.map(CommittalRecord);
-            Self {
-                place,
-                at: newest.at(),
-                begins: newest.begins(),
-                period_ticks: newest.period_ticks(),
-                kind: newest.kind(),
-                mode: one.kind().mode(),
-                released: newest.released(),
-            }
-        })
-    }
-
-    /// The PWM interrupt that should have come by `now` and has not: since when, in s.
-    pub(super) fn overdue(&self, now: Instant, clock: &Clock) -> Option<Violation> {
-        let late = now.since(self.begins);
-        let limit = (clock.control_ticks / PWM_LATE_PART) as i32;
-        (late > limit).then(|| (Fault::PwmDeadline, clock.seconds(late), clock.seconds(limit)))
-    }
-}
 
 /// The voltage at the instant of a control interrupt, with what it is made for.
 pub(super) struct Steady {
@@ -84,60 +26,18 @@ pub(super) struct Steady {
     pub depth: f32,
 }
 
-/// A boundary's own sample, and what the halves gave since the one before that was used.
-pub(super) struct Passed {
-    /// Phase currents, in A.
-    pub currents_a: Abc,
-    /// Time since then, in s.
-    pub age_s: f32,
-    pub boundary: Boundary,
-}
-
-impl Passed {
-    /// The newest boundary. The half that ended there counts where its beginning was the boundary that was `used` last, and two of them
-    /// where that was the one before.
-    #[inline(always)]
-    pub(super) fn read(
-        trail: &History<COMMITTAL_WORDS>,
-        applied: &Applied,
-        used: Option<Instant>,
-        now: Instant,
-        udc_v: f32,
-        clock: &Clock,
-    ) -> Option<Self> {
-        trail.read(applied.place, |records: [Record<COMMITTAL_WORDS>; 4]| {
-            let [newest, one, two, three] = records.map(CommittalRecord);
-            let both = used == Some(two.at());
-            let before = if both { two.at() } else { one.at() };
-            let known = used == Some(before) && !two.kind().is_off() && !(both && three.kind().is_off());
-            let volt_ticks = || if both { two.volt_ticks() + three.volt_ticks() } else { two.volt_ticks() };
-            Self {
-                currents_a: newest.currents_a(),
-                age_s: clock.seconds(now.since(applied.at)),
-                boundary: Boundary {
-                    volt_seconds: known.then(|| volt_ticks() * (udc_v * clock.tick_s)),
-                    length_s: clock.seconds(applied.at.since(before)),
-                },
-            }
-        })
-    }
-}
-
-impl Applied {
-    /// Phase currents at the newest boundary, in A, and the volt-seconds of the half that ended there, in V·s; `None` for those while the gates
-    /// were off. Another look than [`Passed::read`], so that this one costs a running drive nothing.
-    #[inline(never)]
-    pub(super) fn ended(
-        &self,
-        trail: &History<COMMITTAL_WORDS>,
-        udc_v: f32,
-        clock: &Clock,
-    ) -> Option<(AlphaBeta, Option<AlphaBeta>)> {
-        trail.read(self.place, |records: [Record<COMMITTAL_WORDS>; 3]| {
-            let [newest, _, two] = records.map(CommittalRecord);
-            let volt_seconds = || two.volt_ticks() * (udc_v * clock.tick_s);
-            (newest.currents_a().clarke(), (!two.kind().is_off()).then(volt_seconds))
-        })
+/// The volt-seconds of the halves that ended at the newest boundary, and their time. The last half counts where its beginning was the boundary
+/// that was `used` last, and two of them where that was the one before.
+#[inline(always)]
+pub(super) fn passed(pulses: &Pulses, used: Option<Instant>, udc_v: f32, clock: &Clock) -> Boundary {
+    let [newest, one, two, three] = [0, 1, 2, 3].map(|boundaries| pulses.before(boundaries));
+    let both = used == Some(two.at);
+    let before = if both { two.at } else { one.at };
+    let known = used == Some(before) && !two.is_off() && !(both && three.is_off());
+    let volt_ticks = || if both { two.volt_ticks + three.volt_ticks } else { two.volt_ticks };
+    Boundary {
+        volt_seconds: known.then(|| volt_ticks() * (udc_v * clock.tick_s)),
+        length_s: clock.seconds(newest.at.since(before)),
     }
 }
 
@@ -200,8 +100,7 @@ pub(super) struct Wanted<'a> {
 /// The modulator's pulses from `now` until a command of this period can act.
 #[inline(always)]
 pub(super) fn committed(
-    trail: &History<COMMITTAL_WORDS>,
-    applied: Option<&Applied>,
+    pulses: &Pulses,
     now: Instant,
     steady: &Steady,
     settings: &Settings,
@@ -216,36 +115,33 @@ pub(super) fn committed(
         0 => shortest_s,
         carriers => core::f32::consts::PI / (carriers as f32 * steady.omega.abs()),
     };
-    let look = |applied: &Applied| {
-        trail.read(applied.place, |records: [Record<COMMITTAL_WORDS>; 2]| {
-            let [newest, one] = records.map(CommittalRecord);
-            let off = one.kind().is_off() || applied.kind.is_off();
-            let running = || one.volt_ticks_from(now.since(applied.at).max(0) as u32);
-            let volt_ticks =
-                (!off).then(|| if revises { running() } else { running() + newest.volt_ticks() });
-            let left =
-                applied.begins.since(now).max(0) as u32 + if revises { 0 } else { applied.period_ticks };
-            let volt_seconds = volt_ticks.map(|ticks| ticks * (steady.udc_v * clock.tick_s));
-            let gap = between * applied.period_ticks;
-            let made = || before.vector_at(now.after(left + gap / 2)) * clock.seconds(gap as i32);
-            Committed {
-                horizon_s: clock.seconds((left + gap) as i32),
-                volt_seconds: if gap == 0 { volt_seconds } else { volt_seconds.map(|known| known + made()) },
-                ripple: applied.kind.ripple(decided, steady),
-                interval_s,
-            }
-        })
+    let Some(newest) = pulses.newest() else {
+        return Committed { horizon_s: 0.0, volt_seconds: None, ripple: None, interval_s };
     };
-    let nothing = Committed { horizon_s: 0.0, volt_seconds: None, ripple: None, interval_s };
-    applied.and_then(look).unwrap_or(nothing)
+    let running = pulses.before(1);
+    let elapsed = now.since(newest.at).max(0) as u32;
+    let period_ticks = newest.half.period_ticks;
+    let rest = || running.volt_ticks_from(elapsed);
+    let volt_ticks = (!newest.is_off() && !running.is_off())
+        .then(|| if revises { rest() } else { rest() + newest.volt_ticks });
+    let left = newest.begins.since(now).max(0) as u32 + if revises { 0 } else { period_ticks };
+    let volt_seconds = volt_ticks.map(|ticks| ticks * (steady.udc_v * clock.tick_s));
+    let gap = between * period_ticks;
+    let made = || before.vector_at(now.after(left + gap / 2)) * clock.seconds(gap as i32);
+    Committed {
+        horizon_s: clock.seconds((left + gap) as i32),
+        volt_seconds: if gap == 0 { volt_seconds } else { volt_seconds.map(|known| known + made()) },
+        ripple: newest.ripple(decided, steady),
+        interval_s,
+    }
 }
 
-impl HalfKind {
+impl Half {
     /// Ripple flux at the end of this half, which is committed, and what the half after it, of the mode `decided`, is to change of it.
     /// Where a pattern begins at the first of these, its own ripple is expected; where a carrier begins, what the old pattern leaves.
-    fn ripple(self, decided: Mode, steady: &Steady) -> Option<Ripple> {
-        let (mode, end) = (self.mode(), self.half() + 1);
-        let after = self.next_but_one_mode();
+    fn ripple(&self, decided: Mode, steady: &Steady) -> Option<Ripple> {
+        let (mode, end) = (self.half.mode, u32::from(self.half.half) + 1);
+        let [_, after] = self.half.ahead;
         if decided.is_pattern() {
             let at_horizon_wb = self.ripple_at(decided, number(mode, decided, end), steady);
             return Some(Ripple { at_horizon_wb, led_wb: AlphaBeta::default() });
@@ -270,13 +166,13 @@ impl HalfKind {
     }
 
     /// A mode's ripple where half number `half` begins, seen in the mirror if the half is: nothing under a carrier.
-    fn ripple_at(self, mode: Mode, half: u32, steady: &Steady) -> AlphaBeta {
+    fn ripple_at(&self, mode: Mode, half: u32, steady: &Steady) -> AlphaBeta {
         let omega = steady.omega.abs();
         let flux = RippleFlux::new(mode, steady.voltage_v, steady.udc_v, omega);
         let ripple = flux.map_or(AlphaBeta::default(), |flux| flux.at(half));
         #[cfg(feature = "optimal")]
         let ripple = optimal_ripple(mode, half, steady.voltage_v, steady.udc_v, omega).unwrap_or(ripple);
-        AlphaBeta { beta: if self.is_mirrored() { -ripple.beta } else { ripple.beta }, ..ripple }
+        AlphaBeta { beta: if self.mirrored { -ripple.beta } else { ripple.beta }, ..ripple }
     }
 }
 
@@ -288,26 +184,4 @@ const fn has_path(mode: Mode) -> bool {
 /// The number of half `half` of a mode in the mode that follows.
 fn number(from: Mode, to: Mode, half: u32) -> u32 {
     if from == to { half } else { first_half(from, to, half, Angle::ZERO) }
-}
-
-#[cfg(all(test, not(loom)))]
-mod tests {
-    use super::*;
-    use crate::drive::messages::Committal;
-
-    #[test]
-    fn what_stood_at_an_instant_stands_whatever_the_pwm_interrupt_has_told_since() {
-        const HALF_TICKS: u32 = 625;
-        let history = History::new();
-        let now = Instant(10 * HALF_TICKS + 1);
-        for boundary in 0..=12 {
-            history.publish(Committal::at_rest(Instant(boundary * HALF_TICKS), HALF_TICKS).to_words());
-            let newest = boundary.min(10) * HALF_TICKS;
-            assert_eq!(
-                Applied::read(&history, now).map(|applied| applied.at),
-                Some(Instant(newest)),
-                "{boundary}"
-            );
-        }
-    }
 }

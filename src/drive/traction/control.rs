@@ -2,7 +2,8 @@
 
 mod start_up;
 
-use super::applied::{Applied, NO_LIMITS, Passed, Steady, Wanted, committed, follows, limits};
+use super::applied::{NO_LIMITS, Steady, Wanted, committed, follows, limits, passed};
+use super::pulses::{Half, Order, Pulses};
 use super::six_step_exit::SixStepExit;
 use super::slot::{Decision, Slot};
 use super::{Settings, Shared};
@@ -10,11 +11,10 @@ use crate::control::{
     AimInput, ControlLaw, Controller, Demand, Law, LinkDamper, Measurements, ModeLimits, RotorSample,
 };
 use crate::drive::acknowledge::Acknowledge;
-use crate::drive::messages::{Gates, VoltageCommand};
 use crate::drive::{PeriodInput, SlotTimer};
 use crate::frames::Angle;
 use crate::machine::{Machine, Tables};
-use crate::modulation::{Mode, Reference};
+use crate::modulation::{Mode, Reference, Schedule};
 use crate::ports::{ControlPort, DriveCommand, Report, Sample, Traction};
 use crate::protection::{self, Fault, FrozenWatch, MaskedFaults, Trip, Violation};
 use crate::recorder::{Record, State};
@@ -36,6 +36,7 @@ pub struct ControlTask<M = &'static Tables, L = Controller> {
     machine: M,
     settings: Settings,
     controller: L,
+    pulses: Pulses,
     watch: FrozenWatch,
     /// Nominal instant of the next call.
     now: Instant,
@@ -84,6 +85,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             machine,
             settings,
             controller,
+            pulses: Pulses::new(&settings, Schedule::new(&settings.clock)),
             watch: FrozenWatch::new(),
             now: first,
             boundary: None,
@@ -108,21 +110,29 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         }
     }
 
-    /// `true` if [`PwmTask::revise`](super::PwmTask::revise) is to run before the next [`ControlTask::run`], at the same
-    /// instant: first thing in the interrupt, the handler makes the PWM interrupt pending.
-    pub fn wants_revision(&self) -> bool {
-        self.revises
-    }
-
     /// The same without a check.
     pub const fn without(mut self, disarmed: MaskedFaults) -> Self {
         self.disarmed = disarmed;
         self
     }
 
-    /// Other settings than those it was built with, before the first call, which is at `first`.
+    /// The same with a schedule of one's own.
+    pub fn scheduled(mut self, schedule: Schedule) -> Self {
+        self.set_schedule(schedule);
+        self
+    }
+
+    /// Another schedule, before the first call.
+    #[cold]
+    #[inline(never)]
+    pub fn set_schedule(&mut self, schedule: Schedule) {
+        self.pulses = Pulses::new(&self.settings, schedule);
+    }
+
+    /// Other settings than those it was built with, and the usual schedule, before the first call, which is at `first`.
     pub fn set_up(&mut self, settings: Settings, first: Instant) {
         (self.settings, self.now) = (settings, first);
+        self.set_schedule(Schedule::new(&settings.clock));
     }
 
     /// Another control law of the same kind, at rest, before the first call.
@@ -139,6 +149,11 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
     pub fn run(&mut self, port: &mut impl ControlPort, shared: &Shared) {
         let now = self.now;
         let control_ticks = self.settings.clock.control_ticks;
+        if self.revises {
+            let release = self.acknowledge.release();
+            let order = Order { pulses: true, reference: &self.reference, release };
+            self.pulses.revise(&order, &shared.planned);
+        }
         port.begin(self.revises);
         self.now = now.after(control_ticks);
         shared.began.store(now.0, Ordering::Relaxed);
@@ -152,12 +167,12 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         let input = Input { sample: &sample, command: &command };
         let Input { sample, command } = input;
         let mut measured = sample.measured();
-        let applied = Applied::read(&shared.applied, now);
-        let released = applied.map(|applied| applied.released);
+        let told = self.pulses.look(&shared.loaded, now, self.now);
+        let released = told.map(|told| told.released);
         if self.acknowledge.step(command.acknowledge, self.trip.is_some(), released) {
             (self.trip, self.lost_at) = (None, None);
         }
-        if self.trip.is_none() && applied.is_some_and(|applied| applied.kind.is_tripped()) {
+        if self.trip.is_none() && told.is_some_and(|told| told.tripped) {
             self.trip = shared.trip.read();
         }
         if let Some(fault) = sample.hardware {
@@ -166,7 +181,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             self.check(Some((fault, 1.0, 0.0)), sample, port);
         }
         self.check_legs(sample, port);
-        let overdue = applied.and_then(|applied| applied.overdue(now, &self.settings.clock));
+        let overdue = self.pulses.newest().and_then(|newest| newest.overdue(now, &self.settings.clock));
         let (omega, lost) = self.track(sample, command.enable, port);
         measured.angle =
             measured.angle + Angle::within_half_turn(self.controller.omega() * self.settings.angle_late_s);
@@ -177,7 +192,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         self.check(violation, sample, port);
         let mut pulsing =
             self.trip.is_none() && command.enable && self.controller.speed_is_known() && !self.exit.crosses();
-        let slot = Slot::of(applied.as_ref(), now, &self.settings.clock);
+        let slot = Slot::of(self.pulses.newest(), now, &self.settings.clock);
         if pulsing {
             let frozen = self.watch.check(
                 &measured,
@@ -186,29 +201,24 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
                 &self.machine.tables().ratings,
             );
             self.check(frozen, sample, port);
-            self.pulse(input, &measured, applied.as_ref(), &slot, shared);
+            self.pulse(input, &measured, &slot, shared);
         } else {
             self.rest(now, omega, &measured);
             let commands = command.enable.then_some(slot.commands);
-            pulsing = self.start_up(sample, applied.as_ref(), commands, shared, port);
+            pulsing = self.start_up(sample, commands, shared, port);
         }
         // Not finite if either is not.
         let odd = self.reference.voltage_v + omega;
         self.check((!odd.is_finite()).then_some((Fault::NotFinite, odd, f32::MAX)), sample, port);
+        pulsing &= self.trip.is_none();
+        self.revises &= pulsing;
+        let release = self.acknowledge.release();
+        let order = Order { pulses: pulsing, reference: &self.reference, release };
+        self.pulses.plan(self.now.after(control_ticks), &order, &shared.planned);
         let late = port.overrun_ticks(now, control_ticks);
         let late_s = self.settings.clock.seconds(late as i32);
         self.check((late > 0).then_some((Fault::ControlDeadline, late_s, 0.0)), sample, port);
-        let gates = if pulsing && self.trip.is_none() { Gates::Pulse } else { Gates::Off };
-        self.revises &= gates == Gates::Pulse;
-        if slot.commands || self.revises {
-            shared.command.publish(VoltageCommand {
-                reference: self.reference,
-                valid_from: self.now,
-                gates,
-                revises: self.revises,
-                release: self.acknowledge.release(),
-            });
-        }
+        pulsing &= self.trip.is_none();
         let target = self.controller.target();
         let report = Report {
             torque_nm: target.torque_nm,
@@ -226,8 +236,8 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             mode: self.mode,
         };
         if let Some(recorder) = shared.recorder {
-            let mode = applied.map_or(Mode::Off, |applied| applied.mode);
-            recorder.record(self.entry(now, input, &report, mode, gates), self.trip.is_some());
+            let mode = told.map_or(Mode::Off, |told| told.mode);
+            recorder.record(self.entry(now, input, &report, mode, pulsing), self.trip.is_some());
         }
         if self.operated && self.slots.begins() {
             shared.operator.tell(now, &report);
@@ -260,7 +270,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
 
     /// The period's entry in the flight recorder.
     #[inline(always)]
-    fn entry(&self, at: Instant, input: Input, report: &Report, mode: Mode, gates: Gates) -> Record {
+    fn entry(&self, at: Instant, input: Input, report: &Report, mode: Mode, pulsing: bool) -> Record {
         let Input { sample, command } = input;
         Record {
             at,
@@ -270,12 +280,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             id_a: report.id_a,
             iq_a: report.iq_a,
             voltage_v: report.voltage_v,
-            state: State {
-                mode,
-                enabled: command.enable,
-                pulsing: gates == Gates::Pulse,
-                fault: self.trip.map(|trip| trip.fault),
-            },
+            state: State { mode, enabled: command.enable, pulsing, fault: self.trip.map(|trip| trip.fault) },
         }
     }
 
@@ -340,43 +345,37 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
 
     /// The control law's stages that this period is for, while pulses are made.
     #[inline(always)]
-    fn pulse(
-        &mut self,
-        input: Input,
-        measured: &Measurements,
-        applied: Option<&Applied>,
-        slot: &Slot,
-        shared: &Shared,
-    ) {
+    fn pulse(&mut self, input: Input, measured: &Measurements, slot: &Slot, shared: &Shared) {
         let tables = self.machine.tables();
         let now = self.now.before(self.settings.clock.control_ticks);
         let here = RotorSample::new(measured.currents_a, measured.angle, tables);
         self.controller.observe(&here, tables);
-        self.revises = self.is_to_revise(applied, now, &input.command.demand);
+        self.revises = self.is_to_revise(now, &input.command.demand);
         let commands = slot.commands || self.revises;
         let aims = slot.aims || (commands && self.aimed != Some(slot.key));
-        if let Some(applied) = applied
-            && self.boundary != Some(applied.at)
+        if let Some(at) = self.pulses.newest().map(|newest| newest.at)
+            && self.boundary != Some(at)
             && (aims || !commands)
         {
-            self.learn(input.sample, measured.angle, slot.key.mode, applied, shared);
-            self.boundary = Some(applied.at);
+            self.learn(input.sample, measured.angle, slot.key.mode, shared);
+            self.boundary = Some(at);
         }
         if aims {
             self.aim(input, slot);
         }
         if commands {
-            self.command(input.sample, &here, applied, slot, shared);
+            self.command(input.sample, &here, slot);
         }
     }
 
     /// Learns from the newest boundary.
-    fn learn(&mut self, sample: &Sample, angle: Angle, decided: Mode, applied: &Applied, shared: &Shared) {
+    fn learn(&mut self, sample: &Sample, angle: Angle, decided: Mode, shared: &Shared) {
         let Settings { gains, clock, .. } = &self.settings;
         let now = self.now.before(clock.control_ticks);
         let tables = self.machine.tables();
-        let passed = Passed::read(&shared.applied, applied, self.boundary, now, sample.udc_v, clock);
-        if let Some(Passed { currents_a, age_s, boundary }) = passed {
+        let boundary = passed(&self.pulses, self.boundary, sample.udc_v, clock);
+        if let Some(currents_a) = self.pulses.currents_a(&shared.loaded) {
+            let age_s = clock.seconds(now.since(self.pulses.before(0).at));
             let angle = angle - Angle::within_half_turn(self.controller.omega() * age_s);
             let there = RotorSample::new(currents_a, angle, tables);
             self.controller.learn(&boundary, &there, follows(decided), &Law { gains, clock, tables });
@@ -408,21 +407,14 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
 
     /// The command itself.
     #[inline(always)]
-    fn command(
-        &mut self,
-        sample: &Sample,
-        here: &RotorSample,
-        applied: Option<&Applied>,
-        slot: &Slot,
-        shared: &Shared,
-    ) {
+    fn command(&mut self, sample: &Sample, here: &RotorSample, slot: &Slot) {
         let Settings { gains, clock, .. } = &self.settings;
         let now = self.now.before(clock.control_ticks);
         let (omega, udc_v) = (self.controller.omega(), sample.udc_v);
         let steady = Steady { omega, udc_v, voltage_v: self.steady_v, depth: self.depth };
         let (mode, revises) = (slot.key.mode, self.revises);
         let wanted = Wanted { mode, revises, between: slot.between, before: &self.reference };
-        let committed = committed(&shared.applied, applied, now, &steady, &self.settings, &wanted);
+        let committed = committed(&self.pulses, now, &steady, &self.settings, &wanted);
         let law = Law { gains, clock, tables: self.machine.tables() };
         let voltage = self.controller.regulate(here, &committed, &self.limits, &law);
         self.steady_v = voltage.steady_v;
@@ -442,7 +434,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
 
     /// `true` if the demand has jumped and the next half can still be changed: the running one lasts long enough, and the next one is
     /// of the free carrier, whose length is always the same. An operating point from before a jump does not hold.
-    fn is_to_revise(&mut self, applied: Option<&Applied>, now: Instant, demand: &Demand) -> bool {
+    fn is_to_revise(&mut self, now: Instant, demand: &Demand) -> bool {
         let change = demand.torque_nm - self.demand_nm;
         self.demand_nm = demand.torque_nm;
         let largest_nm = self.machine.tables().ratings.max_torque_nm;
@@ -450,8 +442,8 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             (self.jumped, self.aimed) = (true, None);
         }
         let latest = now.after(REVISION_PERIODS * self.settings.clock.control_ticks);
-        let possible = |applied: &Applied| applied.kind.is_free() && applied.begins.reached(latest);
-        let revises = self.jumped && applied.is_some_and(possible);
+        let possible = |newest: &Half| newest.half.is_free() && newest.begins.reached(latest);
+        let revises = self.jumped && self.pulses.newest().is_some_and(possible);
         self.jumped &= !revises;
         revises
     }

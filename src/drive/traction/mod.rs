@@ -1,18 +1,22 @@
 //! The PMaSynRM drive: one control task, one PWM task, two cells.
 //!
+//! Control decides which voltage; for the boundaries of the period after it its task calls the modulator, which decides which pulses. The PWM task
+//! loads each boundary's half, which is there, or it is a fault.
+//!
 //! Logical execution time: a command sampled at one control instant may be used from the next one on, and each task
 //! looks at the other's words by their instants, not by their arrival. So where one interrupt lands in the other
 //! changes nothing, and the same inputs give the same pulses on every board and on the host.
 
 mod applied;
 mod control;
+mod pulses;
 mod pwm;
 mod six_step_exit;
 mod slot;
 
 use super::mailbox::OperatorMailboxes;
-use super::messages::{COMMITTAL_WORDS, VoltageCommand};
-use crate::cell::{History, Mailbox, Seqlock};
+use super::messages::LOADED_WORDS;
+use crate::cell::{History, Seqlock};
 use crate::control::Gains;
 use crate::modulation::SwitchLimits;
 use crate::protection::Trip;
@@ -21,6 +25,7 @@ use crate::time::Clock;
 use core::sync::atomic::AtomicU32;
 
 pub use control::ControlTask;
+pub use pulses::{PLANNED_SLOTS, Planned};
 pub use pwm::PwmTask;
 pub(super) use pwm::stale;
 
@@ -47,10 +52,10 @@ impl Settings {
 
 /// The cells between the two interrupts, the operator's mailboxes, and the flight recorder, if there is one.
 pub struct Shared<'a> {
-    /// The command of control to the modulator.
-    pub command: Mailbox<VoltageCommand, 10>,
-    /// The work of the modulator.
-    pub applied: History<COMMITTAL_WORDS>,
+    /// The halves that control has planned.
+    pub planned: Planned,
+    /// The boundaries at which the PWM interrupt has loaded one, and its samples there.
+    pub loaded: History<LOADED_WORDS>,
     /// The fault that tripped the PWM interrupt.
     pub trip: Seqlock<Trip, 4>,
     /// Instant of the newest control interrupt, from its beginning on.
@@ -66,8 +71,8 @@ impl<'a> Shared<'a> {
     pub const fn new() -> Self {
         Self {
             operator: OperatorMailboxes::new(),
-            command: Mailbox::new(),
-            applied: History::new(),
+            planned: Planned::new(),
+            loaded: History::new(),
             trip: Seqlock::new(),
             began: AtomicU32::new(0),
             recorder: None,

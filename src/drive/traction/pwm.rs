@@ -1,10 +1,10 @@
 //! The PWM interrupt's task.
 
 use super::{Settings, Shared};
-use crate::drive::messages::{Committal, Gates, VoltageCommand};
+use crate::drive::messages::{Loaded, PlannedRecord};
 use crate::frames::{Abc, UNITS_PER_RADIAN};
 use crate::machine::{Machine, Tables};
-use crate::modulation::{Modulator, Schedule, compensated};
+use crate::modulation::{CarrierHalf, compensate};
 use crate::ports::PwmPort;
 use crate::protection::{self, Fault, MaskedFaults, SafeState, Trip, Violation};
 use crate::time::{Clock, Instant};
@@ -20,10 +20,13 @@ const SMALL_CURRENT_SHARE: f32 = 0.05;
 pub struct PwmTask<M = &'static Tables> {
     machine: M,
     settings: Settings,
-    modulator: Modulator,
-    /// The decision of the last boundary. The boundary where its half begins is the nominal instant of the next call.
-    newest: Committal,
-    /// Phase currents at the boundary before, in A.
+    /// The last boundary, and the next one, which is the nominal instant of the next call.
+    at: Instant,
+    begins: Instant,
+    /// Length of the half that begins there, in ticks.
+    period_ticks: u32,
+    /// Phase currents at the last boundary and at the one before, in A.
+    currents_a: Abc,
     currents_before_a: Abc,
     trip: Option<Trip>,
     disarmed: MaskedFaults,
@@ -37,19 +40,15 @@ impl<M: Machine> PwmTask<M> {
         Self {
             machine,
             settings,
-            modulator: Modulator::new(settings.devices, Schedule::new(&settings.clock)),
-            newest: Committal::at_rest(first, settings.devices.shortest_half_ticks),
+            at: first,
+            begins: first,
+            period_ticks: settings.devices.shortest_half_ticks,
+            currents_a: Abc { a: 0.0, b: 0.0, c: 0.0 },
             currents_before_a: Abc { a: 0.0, b: 0.0, c: 0.0 },
             trip: None,
             disarmed: MaskedFaults::NONE,
             released: 0,
         }
-    }
-
-    /// The same with a schedule of one's own.
-    pub const fn scheduled(mut self, schedule: Schedule) -> Self {
-        self.modulator = Modulator::new(self.settings.devices, schedule);
-        self
     }
 
     /// The same without a check.
@@ -58,13 +57,13 @@ impl<M: Machine> PwmTask<M> {
         self
     }
 
-    /// The same for a timer whose first two halves, before the first one of the modulator's, have another length.
+    /// The same for a timer whose first two halves, before the first one that is planned, have another length.
     pub const fn after_halves_of(mut self, ticks: u32) -> Self {
-        self.newest = Committal::at_rest(self.newest.begins, ticks);
+        self.period_ticks = ticks;
         self
     }
 
-    /// The PWM timer's interrupt, at a carrier boundary, or where control has pulses to revise. Deadline: the next boundary, where the shadow
+    /// The PWM timer's interrupt, at a carrier boundary, or where control has revised pulses. Deadline: the next boundary, where the shadow
     /// registers take over. Says whether it came for a boundary.
     pub fn run(&mut self, port: &mut impl PwmPort, shared: &Shared) -> bool {
         let boundary = port.begin();
@@ -76,62 +75,57 @@ impl<M: Machine> PwmTask<M> {
         boundary
     }
 
-    /// A carrier boundary.
+    /// A carrier boundary: loads the half that control has planned for it.
     #[inline(always)]
     fn pass(&mut self, port: &mut impl PwmPort, shared: &Shared) {
-        let now = self.newest.begins;
-        let currents_a = port.sample(now);
-        self.currents_before_a = self.newest.currents_a;
-        let command = shared.command.newest(|command| now.reached(VoltageCommand::valid_from(command)));
-        self.release(&command, now, port, shared);
-        self.check(&currents_a, &command, port, shared);
-        let begins = now.after(self.newest.half.period_ticks);
-        let pulsing = self.trip.is_none();
-        // Field by field: the half goes where it stays.
-        self.newest.half = match &command {
-            Some(command) if command.gates == Gates::Pulse && pulsing => {
-                self.modulator.step(begins, Some(&command.reference))
-            }
-            resting => self.modulator.rest(begins, resting.as_ref().map(|command| &command.reference)),
+        let now = self.begins;
+        self.currents_before_a = self.currents_a;
+        self.currents_a = port.sample(now);
+        let newest = shared.planned.find(|half| now.reached(PlannedRecord(*half).at())).map(PlannedRecord);
+        self.release(newest.as_ref(), port, shared);
+        self.check(newest.as_ref(), port, shared);
+        let half = match &newest {
+            Some(half) if half.at() == now && self.trip.is_none() => half.half(),
+            _ => CarrierHalf::off(self.settings.devices.shortest_half_ticks),
         };
-        self.newest.at = now;
-        self.newest.currents_a = currents_a;
-        self.newest.begins = begins;
-        self.newest.mirrored = self.modulator.is_mirrored();
-        self.newest.tripped = !pulsing;
-        self.newest.released = self.released;
-        self.play(port);
-        self.check_late(port, shared);
-        shared.applied.publish(self.newest.to_words());
+        self.at = now;
+        self.begins = now.after(self.period_ticks);
+        self.period_ticks = half.period_ticks;
+        self.play(half, port, shared);
+        shared.loaded.publish(
+            Loaded {
+                at: now,
+                begins: self.begins,
+                currents_a: self.currents_a,
+                tripped: self.trip.is_some(),
+                released: self.released,
+            }
+            .to_words(),
+        );
     }
 
-    /// The PWM interrupt when it is no boundary that it comes for, but control's
-    /// [`ControlTask::wants_revision`](super::ControlTask::wants_revision): makes the next half anew from the newest command, if
-    /// its boundary is still ahead.
+    /// The PWM interrupt when it is no boundary that it comes for, but what [`ControlPort::begin`](crate::ports::ControlPort::begin) asks for:
+    /// loads the next half as it was planned anew, if its boundary is still ahead.
+    #[inline(never)]
     pub fn revise(&mut self, port: &mut impl PwmPort, shared: &Shared) {
-        let Committal { at, begins, half, tripped, .. } = self.newest;
-        // A command from before the last boundary was for the half that runs by now.
-        let command = shared.command.newest(|command| VoltageCommand::valid_from(command).reached(at));
-        if let Some(command) = command
-            && command.revises
-            && !tripped
-            && half.is_free()
+        if let Some(half) = shared.planned.last().map(PlannedRecord)
+            && half.at() == self.at
+            && self.trip.is_none()
         {
-            self.newest.half = self.modulator.revised(&half, begins, &command.reference);
-            self.play(port);
-            self.check_late(port, shared);
-            shared.applied.revise(self.newest.to_words());
+            self.play(half.half(), port, shared);
         }
     }
 
-    /// Gives the port the half that makes the legs do what the newest one says.
-    fn play(&self, port: &mut impl PwmPort) {
-        let (newest, devices) = (&self.newest, &self.settings.devices);
-        if devices.dead_time_ticks == 0 {
-            return port.play(newest.at, &newest.half);
+    /// Gives the port what makes the legs do as the half says.
+    #[inline(always)]
+    fn play(&mut self, mut half: CarrierHalf, port: &mut impl PwmPort, shared: &Shared) {
+        let devices = &self.settings.devices;
+        if devices.dead_time_ticks > 0 {
+            let small_a = SMALL_CURRENT_SHARE * self.tables().ratings.max_current_a;
+            compensate(&mut half, &self.expected_currents(), small_a, devices);
         }
-        let small_a = SMALL_CURRENT_SHARE * self.tables().ratings.max_current_a;
-        port.play(newest.at, &compensated(&newest.half, &self.expected_currents(), small_a, devices));
+        port.play(self.at, &half);
+        self.check_late(port, shared);
     }
 
     /// Phase currents in the middle of the next half, from the boundaries at both ends of the half before the running one.
@@ -139,13 +133,13 @@ impl<M: Machine> PwmTask<M> {
         /// From the last boundary to the middle of the next half, in halves.
         const AHEAD: f32 = 1.5;
         let ahead = |now: f32, before: f32| now + AHEAD * (now - before);
-        let (now, before) = (self.newest.currents_a, self.currents_before_a);
+        let (now, before) = (self.currents_a, self.currents_before_a);
         Abc { a: ahead(now.a, before.a), b: ahead(now.b, before.b), c: ahead(now.c, before.c) }
     }
 
     /// Nominal instant of the next call.
     pub fn next_call(&self) -> Instant {
-        self.newest.begins
+        self.begins
     }
 
     /// The latched fault.
@@ -154,64 +148,52 @@ impl<M: Machine> PwmTask<M> {
     }
 
     /// Forgets the fault and leaves the safe state, gates off, once for each release that control asks for.
-    fn release(
-        &mut self,
-        command: &Option<VoltageCommand>,
-        now: Instant,
-        port: &mut impl PwmPort,
-        shared: &Shared,
-    ) {
-        let Some(command) = command else {
+    fn release(&mut self, newest: Option<&PlannedRecord>, port: &mut impl PwmPort, shared: &Shared) {
+        let Some(release) = newest.map(PlannedRecord::release).filter(|number| *number != self.released)
+        else {
             return;
         };
-        if command.release == self.released {
-            return;
-        }
-        self.released = command.release;
+        self.released = release;
         self.trip = None;
-        if !port.leave(now) {
+        if !port.leave(self.begins) {
             let (fault, safe) = (Fault::GatesHeld, SafeState::GatesOff);
-            self.latch(Trip { fault, value: 1.0, limit: 0.0, at: now, safe }, shared);
+            self.latch(Trip { fault, value: 1.0, limit: 0.0, at: self.begins, safe }, shared);
         }
     }
 
-    fn check(
-        &mut self,
-        currents_a: &Abc,
-        command: &Option<VoltageCommand>,
-        port: &mut impl PwmPort,
-        shared: &Shared,
-    ) {
+    fn check(&mut self, newest: Option<&PlannedRecord>, port: &mut impl PwmPort, shared: &Shared) {
         if self.trip.is_some() {
             return;
         }
+        let now = self.begins;
         let legs = port.leg_faults();
         let armed = |(fault, _, _): &Violation| !self.disarmed.has(*fault);
-        let currents = || protection::check_currents(currents_a, &self.tables().ratings);
-        let pulses = command.as_ref().is_some_and(|command| command.gates == Gates::Pulse);
-        let began = Instant(shared.began.load(Ordering::Relaxed));
-        let stale = || if pulses { stale(self.newest.begins, began, &self.settings.clock) } else { None };
-        let violation = legs.check().or_else(|| currents().filter(armed)).or_else(|| stale().filter(armed));
+        let currents = || protection::check_currents(&self.currents_a, &self.tables().ratings);
+        let late = || {
+            let pulsing = newest.filter(|half| !half.is_off())?;
+            let clock = &self.settings.clock;
+            let began = Instant(shared.began.load(Ordering::Relaxed));
+            stale(now, began, clock).or_else(|| unplanned(now, pulsing.at(), clock))
+        };
+        let violation = legs.check().or_else(|| currents().filter(armed)).or_else(|| late().filter(armed));
         let Some((fault, value, limit)) = violation else {
             return;
         };
-        let (rate, udc_v) = match command {
-            Some(command) => (command.reference.rate, command.reference.udc_v),
+        let (rate, udc_v) = match newest {
+            Some(half) => (half.rate(), half.udc_v()),
             None => (0.0, self.tables().ratings.dc_link_nominal_v),
         };
         let omega = rate * self.settings.clock.ticks_per_s / UNITS_PER_RADIAN;
         let safe = legs.safe_state(omega, udc_v, &self.tables().ratings);
-        let at = self.newest.begins;
-        port.enter(safe, at);
-        self.latch(Trip { fault, value, limit, at, safe }, shared);
+        port.enter(safe, now);
+        self.latch(Trip { fault, value, limit, at: now, safe }, shared);
     }
 
     /// A half that was loaded after its beginning: the board has turned the gates off.
     fn check_late(&mut self, port: &mut impl PwmPort, shared: &Shared) {
         if port.is_late() && self.trip.is_none() {
             let (fault, safe) = (Fault::PwmDeadline, SafeState::GatesOff);
-            self.latch(Trip { fault, value: 1.0, limit: 0.0, at: self.newest.at, safe }, shared);
-            self.newest.tripped = true;
+            self.latch(Trip { fault, value: 1.0, limit: 0.0, at: self.at, safe }, shared);
         }
     }
 
@@ -230,4 +212,10 @@ pub(in crate::drive) fn stale(now: Instant, began: Instant, clock: &Clock) -> Op
     let age = now.since(began);
     let limit = (clock.control_ticks + clock.control_ticks / CONTROL_LATE_PART) as i32;
     (age > limit).then(|| (Fault::StaleCommand, clock.seconds(age), clock.seconds(limit)))
+}
+
+/// The half that control should have planned for `now` and has not: how long ago the boundary of the newest one was, in s.
+fn unplanned(now: Instant, newest: Instant, clock: &Clock) -> Option<Violation> {
+    let age = now.since(newest);
+    (age > 0).then(|| (Fault::StaleCommand, clock.seconds(age), 0.0))
 }

@@ -1,6 +1,6 @@
 //! The boundary that uses the command of a control period, and so the purpose of the period.
 
-use super::applied::Applied;
+use super::pulses::Half;
 use crate::modulation::Mode;
 use crate::time::{Clock, Instant};
 
@@ -30,14 +30,14 @@ pub(super) struct Slot {
 impl Slot {
     /// The period that begins at `now`. While nothing is known of the modulator each one may be the last.
     #[inline]
-    pub(super) fn of(applied: Option<&Applied>, now: Instant, clock: &Clock) -> Self {
-        let Some(applied) = applied else {
+    pub(super) fn of(newest: Option<&Half>, now: Instant, clock: &Clock) -> Self {
+        let Some(newest) = newest else {
             let key = Decision { boundary: now, mode: Mode::Off };
             return Self { key, commands: true, aims: false, between: 0 };
         };
         let period = clock.control_ticks;
         let valid = now.after(period);
-        let later = |halves| applied.begins.after(halves * applied.period_ticks);
+        let later = |halves| newest.begins.after(halves * newest.half.period_ticks);
         let halves = if later(0).reached(valid) {
             0
         } else if later(1).reached(valid) {
@@ -48,8 +48,9 @@ impl Slot {
         let left = later(halves).since(valid);
         let commands = left < period as i32;
         // A pattern's half of less than two periods, which is rare, counts as if this command were in time for the next boundary.
-        let between = if commands && !applied.kind.is_free() { 0 } else { halves };
-        let mode = if between == 0 { applied.kind.next_mode() } else { applied.kind.next_but_one_mode() };
+        let between = if commands && !newest.half.is_free() { 0 } else { halves };
+        let [next, next_but_one] = newest.half.ahead;
+        let mode = if between == 0 { next } else { next_but_one };
         Self {
             key: Decision { boundary: later(between), mode },
             commands,

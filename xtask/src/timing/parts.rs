@@ -64,7 +64,7 @@ const PARTS: [(&str, [Group; 2], &[&str]); 28] = [
     ("dead-time compensation", [Beyond, Beyond], &["modulation/dead_time.rs"]),
     ("transition between patterns", [Beyond, Beyond], &["modulation/pattern_transition.rs"]),
     ("shoot-through", [Named, Named], &["nine_switch/shoot_through.rs"]),
-    ("pulses", [Beyond, Named], &["modulation/", "nine_switch/"]),
+    ("pulses", [Beyond, Named], &["modulation/", "nine_switch/", "drive/traction/pulses.rs"]),
     ("axis of a motor", [Around, Around], &["drive/dual/axis.rs"]),
     ("task", [Around, Around], &["drive/"]),
     ("entry and board", [Around, Around], &["firmware/", "board/"]),

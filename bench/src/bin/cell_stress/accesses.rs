@@ -8,10 +8,11 @@ use tractive::cell::{History, Mailbox, Ring, Seqlock, Words};
 pub static DOWNLINK_10: Mailbox<Message<10>, 10> = Mailbox::new();
 pub static UPLINK_4: Seqlock<Message<4>, 4> = Seqlock::new();
 pub static UPLINK_10: Seqlock<Message<10>, 10> = Seqlock::new();
-pub static TRAIL_13: History<13> = History::new();
-pub static TRAIL_REVISED: History<13> = History::new();
+pub static TRAIL_6: History<6> = History::new();
+/// The halves that control plans.
+pub static PLANNED_9: Mailbox<Message<9>, 9, 4> = Mailbox::new();
 /// Never written.
-pub static EMPTY_13: History<13> = History::new();
+pub static EMPTY_6: History<6> = History::new();
 pub static EMPTY_RING: Ring<Message<10>, 10, 8> = Ring::new();
 pub static EMPTY_UNFROZEN: Unfrozen<10, 8> = Unfrozen::new();
 pub static EMPTY_4: Seqlock<Message<4>, 4> = Seqlock::new();
@@ -30,6 +31,11 @@ pub static EAGER: Eager<10> = Eager::new();
 #[inline(never)]
 pub fn downlink_10_publish(message: &Message<10>) {
     DOWNLINK_10.publish(*message);
+}
+
+#[inline(never)]
+pub fn planned_9_publish(message: &Message<9>) {
+    PLANNED_9.publish(*message);
 }
 
 #[inline(never)]
@@ -65,16 +71,16 @@ pub fn uplink_10_read(cell: &Seqlock<Message<10>, 10>) -> Option<Message<10>> {
 
 /// The last four records, the newest first.
 #[inline(never)]
-pub fn trail_13_read(cell: &History<13>) -> Option<[Message<13>; 4]> {
+pub fn trail_6_read(cell: &History<6>) -> Option<[Message<6>; 4]> {
     cell.read(cell.find(1, |_| true)?, |records| records.map(|record| Message::from_words(words(&record))))
 }
 
 #[inline(always)]
-fn words(record: &tractive::cell::Record<13>) -> [u32; 13] {
+fn words(record: &tractive::cell::Record<6>) -> [u32; 6] {
     macro_rules! all {
         ($($k:literal)*) => { [$(record.word::<$k>()),*] };
     }
-    all!(0 1 2 3 4 5 6 7 8 9 10 11 12)
+    all!(0 1 2 3 4 5)
 }
 
 #[inline(never)]

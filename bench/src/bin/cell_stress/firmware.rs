@@ -22,8 +22,10 @@ const _: () = assert!(!PWM_TICKS.is_multiple_of(SUBJECTS.len() as u32));
 /// Second part: four PWM interrupts in a row, so that a reader is hit in every try, and where it gives up. One subject after the other, a
 /// sweep for each of these times from one interrupt's end to the next: any part of a try.
 const BURST: u32 = 4;
-const PAUSES_TICKS: [u32; 24] =
-    [16, 20, 25, 30, 33, 36, 39, 43, 47, 51, 55, 60, 65, 70, 75, 80, 85, 90, 97, 105, 120, 135, 150, 170];
+const PAUSES_TICKS: [u32; 33] = [
+    12, 14, 16, 18, 20, 22, 24, 26, 28, 30, 32, 34, 36, 38, 40, 42, 44, 47, 51, 55, 60, 65, 70, 75, 80, 85,
+    90, 97, 105, 120, 135, 150, 170,
+];
 const PAUSES: usize = PAUSES_TICKS.len();
 const ROUNDS: u32 = SINGLE_ROUNDS + (PAUSES * BURST_SUBJECTS.len()) as u32 * PWM_TICKS;
 

@@ -26,6 +26,8 @@ struct Port<'a, 'w> {
     counted: Option<Angle>,
     ratings: &'a Ratings,
     wire: Option<&'a mut Wire<'w>>,
+    /// The PWM interrupt's task, in control's interrupt.
+    pwm: Option<(&'a mut PwmTask, &'a Shared<'w>)>,
     error: Option<anyhow::Error>,
 }
 
@@ -46,6 +48,12 @@ impl Port<'_, '_> {
 }
 
 impl ControlPort for Port<'_, '_> {
+    fn begin(&mut self, revises: bool) {
+        if let Some((pwm, shared)) = self.pwm.take().filter(|_| revises) {
+            pwm.revise(self, shared);
+        }
+    }
+
     fn sample(&mut self, now: Instant) -> Sample {
         let Sampled { sample, command, counted } = self.bench.control_sample(now).unwrap_or_else(|error| {
             self.error = Some(error.into());
@@ -232,7 +240,7 @@ impl<'a, L: ControlLaw> Tasks<'a, L> {
 
     /// The same with the modes of another ladder.
     pub fn on(self, ladder: Ladder) -> Self {
-        Self { pwm: self.pwm.scheduled(Schedule::on(ladder, &self.clock)), ..self }
+        Self { control: self.control.scheduled(Schedule::on(ladder, &self.clock)), ..self }
     }
 
     /// The same with a protection off, or none; its levels are the tables' business.
@@ -263,7 +271,7 @@ impl<L: ControlLaw> Interrupts for Tasks<'_, L> {
     fn pwm(&mut self, bench: &mut Bench) -> Result<()> {
         let ratings = self.operator.ratings;
         let (command, without, wire) = (DriveCommand::NONE, self.without, self.wire.as_mut());
-        let mut port = Port { bench, command, counted: None, ratings, without, wire, error: None };
+        let mut port = Port { bench, command, counted: None, ratings, without, wire, pwm: None, error: None };
         self.pwm.run(&mut port, &self.shared);
         port.error.map_or(Ok(()), Err)
     }
@@ -275,10 +283,8 @@ impl<L: ControlLaw> Interrupts for Tasks<'_, L> {
         };
         let ratings = self.operator.ratings;
         let (command, without, wire) = (DriveCommand::NONE, self.without, self.wire.as_mut());
-        let mut port = Port { bench, command, counted: None, ratings, without, wire, error: None };
-        if self.control.wants_revision() {
-            self.pwm.revise(&mut port, &self.shared);
-        }
+        let pwm = Some((&mut self.pwm, &self.shared));
+        let mut port = Port { bench, command, counted: None, ratings, without, wire, pwm, error: None };
         let now = self.control.next_call();
         self.control.run(&mut port, &self.shared);
         if let Some(after_control) = &mut self.after_control {

@@ -1,7 +1,6 @@
 //! The start of a drive whose position sensor only counts: the pulses of [`StartUp`] in the place of the control law's.
 
 use super::super::Shared;
-use super::super::applied::Applied;
 use super::ControlTask;
 use crate::control::ControlLaw;
 use crate::frames::{AlphaBeta, six_step_v};
@@ -35,7 +34,6 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
     pub(super) fn start_up(
         &mut self,
         sample: &Sample,
-        applied: Option<&Applied>,
         commands: Option<bool>,
         shared: &Shared,
         port: &mut impl ControlPort,
@@ -49,13 +47,15 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         let now = self.now.before(clock.control_ticks);
         let starting = &mut self.starting;
         starting.law.wait(turned, clock.control_s());
-        if let Some(applied) = applied
-            && starting.boundary != Some(applied.at)
+        if let Some(newest) = self.pulses.newest()
+            && starting.boundary != Some(newest.at)
         {
-            if let Some((current, volt_seconds)) = applied.ended(&shared.applied, sample.udc_v, &clock) {
-                starting.law.observe(current, volt_seconds);
+            if let Some(currents_a) = self.pulses.currents_a(&shared.loaded) {
+                let ended = self.pulses.before(2);
+                let volt_seconds = || ended.volt_ticks * (sample.udc_v * clock.tick_s);
+                starting.law.observe(currents_a.clarke(), (!ended.is_off()).then(volt_seconds));
             }
-            starting.boundary = Some(applied.at);
+            starting.boundary = Some(newest.at);
         }
         let mut vector = AlphaBeta::default();
         if commands == Some(true) {

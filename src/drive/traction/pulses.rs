@@ -1,0 +1,344 @@
+//! The pulses: the modulator's steps, made at control's priority for the boundaries where they will be loaded, and what has become of them.
+
+use super::Settings;
+use crate::cell::{History, Mailbox, Place};
+use crate::drive::messages::{LOADED_WORDS, LoadedRecord, PLANNED_WORDS, PlannedHalf, volt_ticks};
+use crate::frames::{Abc, AlphaBeta};
+use crate::modulation::{CarrierHalf, Mode, Modulator, Reference, Schedule};
+use crate::protection::{Fault, Violation};
+use crate::time::{Clock, Instant};
+
+/// By which part of a control period the PWM interrupt may be late before control calls it lost: more than it takes to enter it.
+const PWM_LATE_PART: u32 = 4;
+
+/// Records of which one is that of the newest boundary at a control interrupt's instant: two may have come since.
+const LATEST: u32 = 3;
+
+/// Halves that a control period may plan: two where a carrier lasts one, and as many for a pattern whose first half is short.
+const MOST_PLANNED: u32 = 4;
+
+/// Halves that the cell to the PWM interrupt holds: those for a period's boundaries, and those that are planned meanwhile for the next one's.
+pub const PLANNED_SLOTS: usize = 4;
+
+/// Halves that are remembered: four that ended or run, and those that are planned.
+const REMEMBERED: usize = 8;
+
+/// The halves that control has planned, for the PWM interrupt.
+pub type Planned = Mailbox<PlannedHalf, PLANNED_WORDS, PLANNED_SLOTS>;
+
+/// A half that is planned or loaded.
+#[derive(Clone, Copy)]
+pub(super) struct Half {
+    /// The boundary where it is loaded.
+    pub at: Instant,
+    /// The next one, where it begins.
+    pub begins: Instant,
+    pub half: CarrierHalf,
+    /// `true` if the modulator saw the machine in the mirror (turning backward).
+    pub mirrored: bool,
+    /// The volt-ticks of the whole half, in ticks; see [`volt_ticks`].
+    pub volt_ticks: AlphaBeta,
+}
+
+impl Half {
+    /// None yet.
+    const NONE: Self = Self {
+        at: Instant(0),
+        begins: Instant(0),
+        half: CarrierHalf {
+            period_ticks: 0,
+            compare_ticks: [0; 3],
+            start_levels: [false; 3],
+            mode: Mode::Off,
+            half: 0,
+            ahead: [Mode::Off; 2],
+        },
+        mirrored: false,
+        volt_ticks: AlphaBeta { alpha: 0.0, beta: 0.0 },
+    };
+
+    /// Gates off.
+    const fn off(at: Instant, begins: Instant, period_ticks: u32) -> Self {
+        Self { at, begins, half: CarrierHalf::off(period_ticks), ..Self::NONE }
+    }
+
+    /// `true` if the gates are off in it.
+    #[inline]
+    pub fn is_off(&self) -> bool {
+        self.half.mode == Mode::Off
+    }
+
+    /// The volt-ticks from `elapsed` ticks after its beginning on, in ticks.
+    #[inline]
+    pub fn volt_ticks_from(&self, elapsed: u32) -> AlphaBeta {
+        volt_ticks(self.half.on_ticks(elapsed))
+    }
+
+    /// The PWM interrupt that should have come by `now`, where the half begins, and has not: since when, in s.
+    #[inline]
+    pub fn overdue(&self, now: Instant, clock: &Clock) -> Option<Violation> {
+        let late = now.since(self.begins);
+        let limit = (clock.control_ticks / PWM_LATE_PART) as i32;
+        (late > limit).then(|| (Fault::PwmDeadline, clock.seconds(late), clock.seconds(limit)))
+    }
+
+    #[inline]
+    fn ends(&self) -> Instant {
+        self.begins.after(self.half.period_ticks)
+    }
+}
+
+/// The PWM interrupt's word of itself at the newest boundary.
+#[derive(Clone, Copy)]
+pub(super) struct Told {
+    /// `true` once it has found a fault.
+    pub tripped: bool,
+    /// Number of the release that it had carried out.
+    pub released: u8,
+    /// Mode of the half that runs from there on.
+    pub mode: Mode,
+}
+
+/// The order that the halves of a control period are made by.
+pub(super) struct Order<'a> {
+    /// Pulses, or none.
+    pub pulses: bool,
+    pub reference: &'a Reference,
+    /// Number of the last release.
+    pub release: u8,
+}
+
+/// The modulator, and the halves that it has made.
+pub(super) struct Pulses {
+    modulator: Modulator,
+    /// Length of a half without pulses, in ticks.
+    off_ticks: u32,
+    /// Half number n is in place `n % REMEMBERED`.
+    halves: [Half; REMEMBERED],
+    /// Number of the half that was planned last, and the boundary after its own, for which nothing is planned yet.
+    planned: u32,
+    unplanned: Instant,
+    /// Number of the half that was loaded at the newest boundary, and what the PWM interrupt told there; `None` before it has come.
+    loaded: u32,
+    told: Option<(Place, Told)>,
+}
+
+impl Pulses {
+    /// Before anything is known of the PWM timer.
+    pub(super) const fn new(settings: &Settings, schedule: Schedule) -> Self {
+        let off_ticks = settings.devices.shortest_half_ticks;
+        Self {
+            modulator: Modulator::new(settings.devices, schedule),
+            off_ticks,
+            halves: [Half::NONE; REMEMBERED],
+            planned: 0,
+            unplanned: Instant(0),
+            loaded: 0,
+            told: None,
+        }
+    }
+
+    #[inline(always)]
+    fn half(&self, number: u32) -> &Half {
+        &self.halves[number as usize % REMEMBERED]
+    }
+
+    /// The half that was loaded at the newest boundary, `None` before there was one.
+    #[inline(always)]
+    pub(super) fn newest(&self) -> Option<&Half> {
+        self.told.map(|_| self.half(self.loaded))
+    }
+
+    /// The half that was loaded so many boundaries before the newest one.
+    #[inline(always)]
+    pub(super) fn before(&self, boundaries: u32) -> &Half {
+        self.half(self.loaded.wrapping_sub(boundaries))
+    }
+
+    /// Phase currents at the newest boundary, in A.
+    #[inline]
+    pub(super) fn currents_a(&self, loaded: &History<LOADED_WORDS>) -> Option<Abc> {
+        let (place, _) = self.told?;
+        loaded.read(place, |[newest]: [_; 1]| LoadedRecord(newest).currents_a())
+    }
+
+    /// Looks at the newest boundary as it stood at `now`, even if the PWM interrupt has come since, as it does twice in a control period where a
+    /// carrier lasts one; `None` before it has come at all. What is planned in this period is for boundaries from `valid` on.
+    #[inline]
+    pub(super) fn look(
+        &mut self,
+        loaded: &History<LOADED_WORDS>,
+        now: Instant,
+        valid: Instant,
+    ) -> Option<Told> {
+        if !self.told.is_some_and(|(place, _)| loaded.is_newest(place)) {
+            self.told = self.look_anew(loaded, now, valid).or(self.told);
+        }
+        self.told.map(|(_, told)| told)
+    }
+
+    /// The same where a boundary has come.
+    #[inline(never)]
+    fn look_anew(
+        &mut self,
+        loaded: &History<LOADED_WORDS>,
+        now: Instant,
+        valid: Instant,
+    ) -> Option<(Place, Told)> {
+        let place = loaded.find(LATEST, |record| {
+            let record = LoadedRecord(record);
+            // A record that was written has a half before its next boundary.
+            record.begins() != record.at() && now.reached(record.at())
+        })?;
+        let (at, begins, (tripped, released)) = loaded.read(place, |[newest]: [_; 1]| {
+            let newest = LoadedRecord(newest);
+            (newest.at(), newest.begins(), newest.tripped_and_released())
+        })?;
+        let as_planned = |number: &u32| {
+            let half = self.half(*number);
+            half.at == at && half.begins == begins && (half.is_off() || !tripped)
+        };
+        match (0..=LATEST).map(|ahead| self.loaded.wrapping_add(ahead)).find(as_planned) {
+            Some(number) => self.loaded = number,
+            None => self.begin_anew(at, begins, valid),
+        }
+        Some((place, Told { tripped, released, mode: self.before(1).half.mode }))
+    }
+
+    /// Takes over from what the PWM interrupt loaded by itself, without pulses: at the boundary `at`, and at those after it that come before
+    /// `valid`.
+    #[cold]
+    #[inline(never)]
+    fn begin_anew(&mut self, at: Instant, begins: Instant, valid: Instant) {
+        self.halves = [Half::NONE; REMEMBERED];
+        self.halves[0] = Half::off(at, begins, self.off_ticks);
+        (self.loaded, self.planned) = (0, 0);
+        self.unplanned = begins;
+        for _ in 0..MOST_PLANNED {
+            if self.unplanned.reached(valid) {
+                return;
+            }
+            let newest = *self.half(self.planned);
+            self.planned = self.planned.wrapping_add(1);
+            let next = Half::off(newest.begins, newest.ends(), self.off_ticks);
+            self.halves[self.planned as usize % REMEMBERED] = next;
+            self.unplanned = next.begins;
+        }
+    }
+
+    /// Plans a half for each boundary that comes before `until`.
+    #[inline(always)]
+    pub(super) fn plan(&mut self, until: Instant, order: &Order, cell: &Planned) {
+        if !self.unplanned.reached(until) && self.told.is_some() {
+            self.plan_until(until, order, cell);
+        }
+    }
+
+    #[inline(never)]
+    fn plan_until(&mut self, until: Instant, order: &Order, cell: &Planned) {
+        for _ in 0..MOST_PLANNED {
+            if self.unplanned.reached(until) {
+                return;
+            }
+            let (at, begins) = (self.unplanned, self.half(self.planned).ends());
+            self.planned = self.planned.wrapping_add(1);
+            let next = &mut self.halves[self.planned as usize % REMEMBERED];
+            // Field by field: the half goes where it stays.
+            (next.at, next.begins) = (at, begins);
+            next.half = if order.pulses {
+                self.modulator.step(begins, Some(order.reference))
+            } else {
+                self.modulator.rest(begins, Some(order.reference))
+            };
+            next.mirrored = self.modulator.is_mirrored();
+            next.volt_ticks = volt_ticks(next.half.on_ticks(0));
+            self.unplanned = begins;
+            tell(next, order, cell);
+        }
+    }
+
+    /// Makes the half anew that was loaded at the newest boundary, in the control period after the command that wants it.
+    #[inline(never)]
+    pub(super) fn revise(&mut self, order: &Order, cell: &Planned) {
+        let newest = &mut self.halves[self.loaded as usize % REMEMBERED];
+        newest.half = self.modulator.revised(&newest.half, newest.begins, order.reference);
+        newest.volt_ticks = volt_ticks(newest.half.on_ticks(0));
+        tell(newest, order, cell);
+    }
+}
+
+/// Puts a half into the cell to the PWM interrupt.
+#[inline(never)]
+fn tell(planned: &Half, order: &Order, cell: &Planned) {
+    let Half { at, half, .. } = *planned;
+    let &Order { reference: &Reference { rate, udc_v, .. }, release, .. } = order;
+    cell.publish(PlannedHalf { at, half, release, rate, udc_v });
+}
+
+#[cfg(all(test, not(loom)))]
+mod tests {
+    use super::*;
+    use crate::drive::messages::Loaded;
+    use crate::modulation::SwitchLimits;
+
+    const CLOCK: Clock = Clock::new(25_000_000, 2_500);
+
+    fn pulses(max_hz: f32) -> (Pulses, u32) {
+        let devices = SwitchLimits::new(250, 0, max_hz, &CLOCK);
+        let settings = Settings::new(CLOCK, devices);
+        (Pulses::new(&settings, Schedule::new(&CLOCK)), devices.shortest_half_ticks)
+    }
+
+    fn loaded(at: Instant, begins: Instant) -> [u32; LOADED_WORDS] {
+        Loaded { at, begins, currents_a: Abc::default(), tripped: false, released: 0 }.to_words()
+    }
+
+    #[test]
+    fn what_stood_at_an_instant_stands_whatever_the_pwm_interrupt_has_told_since() {
+        let history = History::new();
+        let (mut pulses, half_ticks) = pulses(20_000.0);
+        let now = Instant(10 * half_ticks + 1);
+        for boundary in 0..=12 {
+            let at = Instant(boundary * half_ticks);
+            history.publish(loaded(at, at.after(half_ticks)));
+            let newest = boundary.min(10) * half_ticks;
+            assert!(pulses.look(&history, now, now.after(2_500)).is_some());
+            assert_eq!(pulses.newest().map(|newest| newest.at), Some(Instant(newest)), "{boundary}");
+        }
+    }
+
+    /// A carrier from two halves a control period to many periods a half, and a modulator at rest and pulsing: each boundary finds its half, and
+    /// control knows it again.
+    #[test]
+    fn every_boundary_finds_the_half_that_was_planned_for_it() {
+        for max_hz in [10_000.0, 9_000.0, 5_000.0, 2_400.0, 900.0] {
+            let (mut pulses, half_ticks) = pulses(max_hz);
+            let (history, planned) = (History::new(), Planned::new());
+            let mut boundary = (Instant(half_ticks), Instant(2 * half_ticks));
+            let (mut found, mut boundaries) = (0, 0);
+            for period in 1..400 {
+                let now = Instant(period * 2_500);
+                while now.reached(boundary.0) {
+                    let (at, begins) = boundary;
+                    let next = planned.newest(|half| half.word::<0>() == at.0);
+                    found += u32::from(next.is_some());
+                    assert!(next.is_some() || found == 0, "{max_hz} Hz: nothing for {at:?}");
+                    boundaries += 1;
+                    let running = next.map_or(half_ticks, |next| next.half.period_ticks);
+                    history.publish(loaded(at, begins));
+                    boundary = (begins, begins.after(running));
+                }
+                let valid = now.after(2_500);
+                if pulses.look(&history, now, valid).is_some() {
+                    assert_eq!(pulses.newest().map(|newest| newest.ends()), Some(boundary.1), "{max_hz} Hz");
+                }
+                let reference = Reference::turning(100.0, crate::frames::Angle::ZERO, 20_000.0, now, 1_500.0);
+                let order = Order { pulses: period > 50, reference: &reference, release: 0 };
+                pulses.plan(valid.after(2_500), &order, &planned);
+            }
+            // Nothing is planned before control has seen a boundary.
+            assert!(found > 20 && found + 5 > boundaries, "{max_hz} Hz: {found} of {boundaries}");
+            assert!(!pulses.before(0).is_off());
+        }
+    }
+}
