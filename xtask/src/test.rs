@@ -7,8 +7,10 @@ use crate::image;
 use crate::process::{processor_s, succeeds};
 use crate::setup::Setup;
 use crate::step::Step;
+use crate::twin;
 use anyhow::Result;
 use clap::ValueEnum;
+use std::path::Path;
 use std::process::Command;
 use std::time::{Duration, Instant};
 
@@ -79,20 +81,20 @@ fn perform(step: Step, setup: &mut Setup) -> Result<Outcome> {
         Step::Fmt => succeeds(&mut cargo_with("fmt --all -- --check"))?,
         Step::ClippyHost if !setup.component("clippy", "clippy") => return Ok(no_component("clippy")),
         // As released, like all that is built for this machine: macros and build scripts are then compiled once.
-        Step::ClippyHost => lint(&mut cargo(), &["--release", "--workspace", "--all-targets"])?,
-        Step::ClippyTarget if !setup.component("clippy", "clippy") => return Ok(no_component("clippy")),
-        Step::ClippyTarget => {
-            if !setup.toolchain()?.has_clippy {
-                return Ok(Outcome::Skipped(format!("clippy needs rustup's target {TARGET}")));
-            }
-            all(on_target()?, |(package, what)| {
-                let command = ["--release", "--target", TARGET, "--package", &package];
-                lint(&mut cargo(), &[&command[..], what].concat())
-            })?
+        Step::ClippyHost => {
+            lint(&mut cargo(), &["--release", "--workspace", "--exclude", twin::PACKAGE, "--all-targets"])?
         }
+        Step::ClippyTarget if !setup.component("clippy", "clippy") => return Ok(no_component("clippy")),
+        Step::ClippyTarget if !setup.toolchain()?.has_clippy => {
+            return Ok(Outcome::Skipped(format!("clippy needs rustup's target {TARGET}")));
+        }
+        Step::ClippyTarget => all(on_target()?, |(package, what)| {
+            let command = ["--release", "--target", TARGET, "--package", &package];
+            lint(&mut cargo(), &[&command[..], what].concat())
+        })?,
         Step::Doc => {
-            let mut command = cargo_with("doc --release --no-deps --workspace");
-            succeeds(command.env("RUSTDOCFLAGS", "-D warnings"))?
+            let mut command = cargo_with("doc --release --no-deps --workspace --exclude");
+            succeeds(command.arg(twin::PACKAGE).env("RUSTDOCFLAGS", "-D warnings"))?
         }
         Step::Host => all(together()?, |packages| {
             let named = packages.iter().flat_map(|package| ["--package", package.as_str()]);
@@ -102,90 +104,98 @@ fn perform(step: Step, setup: &mut Setup) -> Result<Outcome> {
             let mut command = cargo_with("test --profile loom --package tractive-cells --test interleavings");
             succeeds(command.env("RUSTFLAGS", "--cfg loom"))?
         }
-        Step::Miri => {
-            let Some(mut command) = setup.miri() else {
-                return Ok(Outcome::Skipped("cargo miri is not installed and cannot be added".to_owned()));
-            };
-            let words = "miri test --package tractive-cells --test threads --target-dir target/miri";
-            succeeds(command.args(words.split(' ')))?
-        }
+        Step::Miri => return miri(setup),
         Step::Cells => crate::cells::check(setup)?,
         Step::Landings => crate::landings::check(setup)?,
         Step::Overruns => crate::overruns::check(setup)?,
-        Step::Image => {
-            for system in System::ALL {
-                println!("{}", build::image(&setup.toolchain()?, system, None)?.display());
-            }
-            true
-        }
-        Step::ImageCheck => all(System::ALL, |system| {
-            println!("{}:", system.image());
-            image::check(&build::image(&setup.toolchain()?, system, None)?)
+        Step::Image => images(setup, |path| {
+            println!("{}", path.display());
+            Ok(true)
         })?,
-        Step::NucleoImage => {
-            let boards = Board::all()?;
-            let images = boards.iter().flat_map(|board| System::ALL.map(|system| (board, system)));
-            let drives = all(images, |(board, system)| {
-                println!("{}:", system.image_on(board));
-                let path = build::board_image(&setup.toolchain()?, board, system, None)?;
-                image::check_board(&path, board)
-            })?;
-            drives
-                && all(&boards, |board| {
-                    println!("{}, identifying:", board.name);
-                    image::check_board(&build::identify_on(&setup.toolchain()?, board, None)?, board)
-                })?
-        }
-        Step::Twin => match crate::twin::check(setup)? {
-            Ok(good) => good,
-            Err(missing) => return Ok(Outcome::Skipped(missing)),
-        },
+        Step::ImageCheck => images(setup, image::check)?,
+        Step::NucleoImage => board_images(setup)?,
+        Step::Twin => return Ok(where_possible(twin::check(setup)?)),
         Step::OwnBoard => crate::own_board::check(setup)?,
         Step::Publish => crate::publish::check()?,
         Step::Guide => crate::guide::run(build::root())?,
-        Step::Book => {
-            let Some(mdbook) = setup.mdbook() else {
-                return Ok(Outcome::Skipped("mdbook is not installed (cargo install mdbook)".to_owned()));
-            };
-            succeeds(Command::new(mdbook).arg("build").arg(build::root().join("docs")))?
-        }
-        Step::Live => match crate::live::check(setup)? {
-            Ok(good) => good,
-            Err(missing) => return Ok(Outcome::Skipped(missing)),
-        },
-        Step::Slurm => match crate::slurm::check(setup)? {
-            Ok(good) => good,
-            Err(missing) => return Ok(Outcome::Skipped(missing)),
-        },
-        Step::Python => match crate::python::check()? {
-            Ok(good) => good,
-            Err(missing) => return Ok(Outcome::Skipped(missing)),
-        },
-        Step::Qemu => {
-            let (qemu, toolchain) = (setup.qemu()?, setup.toolchain()?);
-            let mut command = cargo_with("test --release --package tractive-rig --test qemu -- --ignored");
-            command.env("TRACTIVE_QEMU", qemu);
-            command.env("TRACTIVE_IMAGE", build::image(&toolchain, System::Traction, None)?);
-            command.env("TRACTIVE_OPTIMAL_IMAGE", build::optimal_image(&toolchain, None)?);
-            command.env("TRACTIVE_PI_IMAGE", build::pi_image(&toolchain, System::Traction, None)?);
-            command.env("TRACTIVE_ZS9_IMAGE", build::image(&toolchain, System::Zs9, None)?);
-            command.env("TRACTIVE_ZS9_PI_IMAGE", build::pi_image(&toolchain, System::Zs9, None)?);
-            command.env("TRACTIVE_IDENTIFY_IMAGE", build::identify_image(&toolchain, None)?);
-            succeeds(&mut command)?
-        }
+        Step::Book => return book(setup),
+        Step::Live => return Ok(where_possible(crate::live::check(setup)?)),
+        Step::Slurm => return Ok(where_possible(crate::slurm::check(setup)?)),
+        Step::Python => return Ok(where_possible(crate::python::check()?)),
+        Step::Qemu => qemu(setup)?,
         Step::Timing => crate::timing::run(&TimingArgs::default())? == 0,
-        // Behind all that takes the built-in machine, since each change of machine builds the image anew.
-        Step::Machines => {
-            let toolchain = setup.toolchain()?;
-            for machine in crate::run::machine_names(build::root()) {
-                let named = Some(machine.clone().into()).filter(|_| machine != System::Traction.machine());
-                build::image(&toolchain, System::Traction, named.as_ref())?;
-                println!("{machine}");
-            }
-            true
-        }
+        Step::Machines => machines(setup)?,
     };
     Ok(good.into())
+}
+
+/// The outcome of a check that may lack a tool; the inner error names it.
+fn where_possible(checked: Result<bool, String>) -> Outcome {
+    checked.map_or_else(Outcome::Skipped, Outcome::from)
+}
+
+fn miri(setup: &mut Setup) -> Result<Outcome> {
+    let Some(mut command) = setup.miri() else {
+        return Ok(Outcome::Skipped("cargo miri is not installed and cannot be added".to_owned()));
+    };
+    let words = "miri test --package tractive-cells --test threads --target-dir target/miri";
+    Ok(succeeds(command.args(words.split(' ')))?.into())
+}
+
+/// Checks the reference image of each system.
+fn images(setup: &mut Setup, check: impl Fn(&Path) -> Result<bool>) -> Result<bool> {
+    all(System::ALL, |system| {
+        println!("{}:", system.image());
+        check(&build::image(&setup.toolchain()?, system, None)?)
+    })
+}
+
+/// Checks the images of every board: both drives, and the one that identifies.
+fn board_images(setup: &mut Setup) -> Result<bool> {
+    let boards = Board::all()?;
+    let images = boards.iter().flat_map(|board| System::ALL.map(|system| (board, system)));
+    let drives = all(images, |(board, system)| {
+        println!("{}:", system.image_on(board));
+        let path = build::board_image(&setup.toolchain()?, board, system, None)?;
+        image::check_board(&path, board)
+    })?;
+    let identifying = all(&boards, |board| {
+        println!("{}, identifying:", board.name);
+        image::check_board(&build::identify_on(&setup.toolchain()?, board, None)?, board)
+    })?;
+    Ok(drives && identifying)
+}
+
+fn book(setup: &mut Setup) -> Result<Outcome> {
+    let Some(mdbook) = setup.mdbook() else {
+        return Ok(Outcome::Skipped("mdbook is not installed (cargo install mdbook)".to_owned()));
+    };
+    Ok(succeeds(Command::new(mdbook).arg("build").arg(build::root().join("docs")))?.into())
+}
+
+/// The images in QEMU against the host.
+fn qemu(setup: &mut Setup) -> Result<bool> {
+    let (qemu, toolchain) = (setup.qemu()?, setup.toolchain()?);
+    let mut command = cargo_with("test --release --package tractive-rig --test qemu -- --ignored");
+    command.env("TRACTIVE_QEMU", qemu);
+    command.env("TRACTIVE_IMAGE", build::image(&toolchain, System::Traction, None)?);
+    command.env("TRACTIVE_OPTIMAL_IMAGE", build::optimal_image(&toolchain, None)?);
+    command.env("TRACTIVE_PI_IMAGE", build::pi_image(&toolchain, System::Traction, None)?);
+    command.env("TRACTIVE_ZS9_IMAGE", build::image(&toolchain, System::Zs9, None)?);
+    command.env("TRACTIVE_ZS9_PI_IMAGE", build::pi_image(&toolchain, System::Zs9, None)?);
+    command.env("TRACTIVE_IDENTIFY_IMAGE", build::identify_image(&toolchain, None)?);
+    succeeds(&mut command)
+}
+
+/// The image with each machine. Behind all that takes the built-in machine, since each change of machine builds the image anew.
+fn machines(setup: &mut Setup) -> Result<bool> {
+    let toolchain = setup.toolchain()?;
+    for machine in crate::run::machine_names(build::root()) {
+        let named = Some(machine.clone().into()).filter(|_| machine != System::Traction.machine());
+        build::image(&toolchain, System::Traction, named.as_ref())?;
+        println!("{machine}");
+    }
+    Ok(true)
 }
 
 /// The lints on the target: packages, and their parts.
@@ -280,6 +290,8 @@ mod tests {
         let packages = metadata["packages"].as_array().unwrap();
         let mut there: Vec<_> = packages.iter().map(|package| package["name"].as_str().unwrap()).collect();
         let mut tested = together().unwrap().concat();
+        // Step `twin` tests it, where there is cmake.
+        tested.push(twin::PACKAGE.to_owned());
         there.sort_unstable();
         tested.sort_unstable();
         assert_eq!(tested, there);

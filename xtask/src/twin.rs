@@ -1,4 +1,4 @@
-//! `cargo xtask twin`: the board's twin, which is a workspace of its own in `twin/`, built and run on the very image that is flashed.
+//! `cargo xtask twin`: the board's twin, the package in `twin/`, built and run on the very image that is flashed.
 
 use crate::board::Board;
 use crate::build::{self, System};
@@ -10,6 +10,8 @@ use anyhow::{Context, Result, bail};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+/// The twin's package: no default member, as it needs cmake.
+pub const PACKAGE: &str = "tractive-twin";
 /// The board that it is the twin of.
 const BOARD: &str = "nucleo-g474re";
 /// The folder of the scenarios' scripts, and the scenario that is run unless told otherwise.
@@ -51,14 +53,13 @@ fn script(scenario: &Path, system: System) -> Result<PathBuf> {
     bail!("{}: neither a script nor one of {}", scenario.display(), names.join(", "))
 }
 
-/// The step: format, lints and tests of what no other step sees, then the images through their sweeps. The inner error is what is missing.
+/// The step: lints and tests of what no other step sees, then the images through their sweeps. The inner error is what is missing.
 pub fn check(setup: &mut Setup) -> Result<Result<bool, String>> {
     if !setup.cmake() {
         return Ok(Err(no_cmake()));
     }
-    let tidy = !setup.component("fmt", "rustfmt") || succeeds(twin().args(["fmt", "--check"]))?;
-    let lints = ["clippy", "--release", "--all-targets", "--", "-D", "warnings"];
-    let tidy = tidy && (!setup.component("clippy", "clippy") || succeeds(twin().args(lints))?);
+    let lints = ["--all-targets", "--", "-D", "warnings"];
+    let tidy = !setup.component("clippy", "clippy") || succeeds(twin("clippy").args(lints))?;
     let images = [image(setup, System::Traction)?, image(setup, System::Zs9)?];
     for (system, image) in System::ALL.into_iter().zip(&images) {
         let out = root().join(OUT).join(twins_name(system));
@@ -66,8 +67,8 @@ pub fn check(setup: &mut Setup) -> Result<Result<bool, String>> {
             return Ok(Ok(false));
         }
     }
-    let mut tests = twin();
-    tests.args(["test", "--release", "--", "--include-ignored"]);
+    let mut tests = twin("test");
+    tests.args(["--", "--include-ignored"]);
     tests.env("TRACTIVE_NUCLEO_IMAGE", &images[0]).env("TRACTIVE_NUCLEO_ZS9_IMAGE", &images[1]);
     Ok(Ok(succeeds(&mut tests)?))
 }
@@ -85,18 +86,18 @@ fn twins_name(system: System) -> &'static str {
     }
 }
 
-/// Cargo in the twin's workspace.
-fn twin() -> Command {
+/// A command of cargo's on the twin.
+fn twin(verb: &str) -> Command {
     let mut command = cargo();
-    command.current_dir(root().join("twin"));
+    command.args([verb, "--release", "--package", PACKAGE]);
     command
 }
 
 fn drive(image: &Path, system: System, script: &Path, out: &Path) -> Command {
     say("building the twin …");
     let absolute = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
-    let mut command = twin();
-    command.args(["run", "--quiet", "--release", "--"]);
+    let mut command = twin("run");
+    command.args(["--quiet", "--"]);
     command.args([absolute(image), absolute(script)]).args(["--system", twins_name(system)]);
     command.arg("--out").arg(absolute(out));
     if script.file_stem().is_some_and(|name| name == FAULT) {
