@@ -69,7 +69,7 @@ pub fn currents(rows: &[Row], stretch: Stretch, machine: &Machine) -> Option<[Ve
     Some([motors[0].phase_u(&upper, instant)?, motors[1].phase_u(&lower, instant)?])
 }
 
-/// The pulses, and what they have added to the motors' flux linkages.
+/// The pulses, with the volt-seconds that the motors have had of them.
 struct Pulses<'a> {
     carrier_hz: f64,
     link_v: f64,
@@ -192,7 +192,7 @@ impl Motor {
         self.angle(t_s) + self.ahead
     }
 
-    /// What the pulses' volt-seconds are beyond those of the fundamental, (α, β) in Wb.
+    /// The pulses' volt-seconds less those of the fundamental, (α, β) in Wb.
     fn ripple(&self, (alpha, beta): (f64, f64), t_s: f64) -> (f64, f64) {
         let (sin, cos) = self.voltage_angle(t_s).sin_cos();
         let length = self.voltage_v / self.rotor.2;
