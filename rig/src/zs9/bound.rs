@@ -1,7 +1,7 @@
 //! The bound that the nine-switch modulator's own pulses set: the phase currents of both motors in steady state, with no control at all.
 //!
 //! The pulses' volt-seconds, less those of the fundamental, are the ripple of the flux linkage. Put around the mean flux linkage of the
-//! operating point and turned into current by the map, they give the least that any control could reach with these pulses. Both motors
+//! operating point and turned into current by the inductances there, they give the least that any control could reach with these pulses. Both motors
 //! turn at their own speeds, so nothing repeats, and the answer is a stretch of time.
 
 use super::trace::{MotorRow, Row};
@@ -66,7 +66,7 @@ pub fn currents(rows: &[Row], stretch: Stretch, machine: &Machine) -> Option<[Ve
         }
     }
     let [upper, lower] = flux;
-    Some([motors[0].phase_u(&upper, instant)?, motors[1].phase_u(&lower, instant)?])
+    Some([motors[0].phase_u(&upper, instant), motors[1].phase_u(&lower, instant)])
 }
 
 /// The pulses, with the volt-seconds that the motors have had of them.
@@ -144,12 +144,11 @@ struct Motor {
     rotor: (f64, f64, f64),
     /// Mean currents (d, q), in A.
     current_a: (f64, f64),
-    /// Flux linkages at them, in Wb.
-    flux_wb: (f64, f64),
+    /// Currents of a flux linkage more, in A/Wb: d of d, d of q, q of d, q of q.
+    softness: [f64; 4],
     /// The voltage that they need, in V, and its angle before the rotor's, in rad.
     voltage_v: f64,
     ahead: f64,
-    map: SmoothMap,
 }
 
 /// The least electrical speed, in rad/s: slower motors hardly turn in the time that is looked at.
@@ -165,8 +164,8 @@ impl Motor {
             rows.iter().map(|row| value(&row.motors[k])).sum::<f64>() / rows.len() as f64
         };
         let (id, iq) = (mean(|row| row.id_a), mean(|row| row.iq_a));
-        let map = SmoothMap::new(&machine.folder.map);
-        let at = map.at(id, iq);
+        let at = SmoothMap::new(&machine.folder.map).at(id, iq);
+        let determinant = at.ldd_h * at.lqq_h - at.ldq_h * at.lqd_h;
         let r = parameters.stator_resistance_ohm;
         let (ud, uq) = (r * id - omega * at.psi_q_wb, r * iq + omega * at.psi_d_wb);
         let [a, b, c] = last.phases_a;
@@ -175,10 +174,9 @@ impl Motor {
         (omega.abs() >= LEAST_RAD_S).then_some(Self {
             rotor: (turned, middle_s, omega),
             current_a: (id, iq),
-            flux_wb: (at.psi_d_wb, at.psi_q_wb),
+            softness: [at.lqq_h, -at.ldq_h, -at.lqd_h, at.ldd_h].map(|part| part / determinant),
             voltage_v: ud.hypot(uq),
             ahead: uq.atan2(ud),
-            map,
         })
     }
 
@@ -201,19 +199,19 @@ impl Motor {
     }
 
     /// Current of phase u with that ripple around the operating point, row by row.
-    fn phase_u(&self, ripple: &[(f64, f64)], instant: impl Fn(usize) -> f64) -> Option<Vec<f64>> {
+    fn phase_u(&self, ripple: &[(f64, f64)], instant: impl Fn(usize) -> f64) -> Vec<f64> {
         let count = ripple.len() as f64;
         let mean = ripple.iter().fold((0.0, 0.0), |sum, of| (sum.0 + of.0 / count, sum.1 + of.1 / count));
-        let mut current = self.current_a;
-        let mut samples = Vec::with_capacity(ripple.len());
-        for (sample, (alpha, beta)) in ripple.iter().enumerate() {
+        let [of_dd, of_dq, of_qd, of_qq] = self.softness;
+        let sample = |(sample, (alpha, beta)): (usize, &(f64, f64))| {
             let (alpha, beta) = (alpha - mean.0, beta - mean.1);
             let (sin, cos) = self.angle(instant(sample)).sin_cos();
-            let (d, q) =
-                (self.flux_wb.0 + alpha * cos + beta * sin, self.flux_wb.1 + beta * cos - alpha * sin);
-            current = self.map.inverse(d, q, current)?;
-            samples.push(current.0 * cos - current.1 * sin);
-        }
-        Some(samples.chunks(WITHIN_ROW).map(|row| row.iter().sum::<f64>() / row.len() as f64).collect())
+            let (d, q) = (alpha * cos + beta * sin, beta * cos - alpha * sin);
+            let id = self.current_a.0 + of_dd * d + of_dq * q;
+            let iq = self.current_a.1 + of_qd * d + of_qq * q;
+            id * cos - iq * sin
+        };
+        let samples: Vec<f64> = ripple.iter().enumerate().map(sample).collect();
+        samples.chunks(WITHIN_ROW).map(|row| row.iter().sum::<f64>() / row.len() as f64).collect()
     }
 }
