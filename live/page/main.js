@@ -85,7 +85,7 @@ function begin(told) {
   motor = system.motors.length > 1 && words().get("motor") === "2" ? 1 : 0;
   $("motor").replaceChildren(...system.motors.map(({ text }, k) => new Option(text ?? "", k)));
   $("motor").value = motor;
-  $("motor").onchange = () => { motor = +$("motor").value; remember(); };
+  $("motor").onchange = () => { motor = +$("motor").value; bound = []; remember(); };
   $("trigger").append(...system.triggers.map(([value, text]) => new Option(text, value)));
   for (const figure of document.querySelectorAll("[data-system]")) figure.hidden = figure.dataset.system !== system.id;
   start();
@@ -114,7 +114,7 @@ worker.onmessage = ({ data }) => ({
     }
     [state, factor, fresh] = [data.state, data.factor, true];
   },
-  bound() { bound = Array.from({ length: data.lines.length / 2 }, (_, k) => [data.lines[2 * k], data.lines[2 * k + 1]]); },
+  bound() { bound = data.values; },
   ran() {
     memory = remembered(data.columns, data.step, data.rows.length / data.columns.length);
     memory.put(0, data.rows, data.edges);
@@ -231,7 +231,7 @@ function frame() {
   if (frames % 3 === 0) views.numbers(own, state, properties, factor, system);
   if (frames % 3 === 1) { if (own.has("id")) views.plane(own, properties, system); if (memory.hasEdges) views.pulses(own, memory, system); }
   if (frames % 3 === 2 && own.has("ia")) views.hexagon(own, properties, system);
-  if (frames % 20 === 5 && own.has("ia")) { views.spectrum(own, properties, system, bound); tell({ type: "bound" }); }
+  if (frames % 20 === 5 && own.has("ia")) { views.spectrum(own, properties, system, bound); tell({ type: "bound", motor }); }
   for (const figure of document.querySelectorAll("figure[data-needs]")) figure.hidden = !own.has(figure.dataset.needs);
   document.body.dataset.frames = frames;
   if (frames === 1) document.body.dataset.painted = performance.now().toFixed(0);

@@ -214,7 +214,7 @@ export class Scope {
       scales: { x: { time: false, range: () => this.shown }, y: plot.gates ? { range: () => [0, this.lanes() + 1] } : { range: (u, low, high) => range.of(low, high) } },
       axes: [
         { ...axis, size: isLast ? 30 : 6, values: isLast ? time : (u, ticks) => ticks.map(() => ""), space: 70 },
-        { ...axis, size: 54, space: 26, ...(plot.gates ? { splits: () => Array.from({ length: this.lanes() + 1 }, (_, k) => k + 0.5), values: () => [...(this.lanes() ? [this.memory.system.id === "zs9" ? "scheme" : "mode", ...this.memory.system.lanes.map(lane => lane.name).reverse()] : [""])], space: 1 } : {}) },
+        { ...axis, size: 58, space: 26, ...(plot.gates ? { splits: () => Array.from({ length: this.lanes() + 1 }, (_, k) => k + 0.5), values: () => [...(this.lanes() ? [this.memory.system.id === "zs9" ? "scheme" : "mode", ...this.memory.system.lanes.map(lane => lane.name).reverse()] : [""])], space: 1 } : {}) },
       ],
       series: [
         { label: "t", value: (u, t) => (t == null ? "" : `${(t * 1e3).toFixed(2)} ms`) },

@@ -64,7 +64,7 @@ const PMASYNRM = {
   id: "pmasynrm", title: "PMaSynRM, one motor on a two-level inverter", motors: [{ suffix: "" }],
   modes: ["off", "async", "sync 15", "sync 12", "mid 7", "mid 3", "square"],
   lanes: [0, 1, 2].map(leg => ({ name: "uvw"[leg], colour: ["--u", "--v", "--w"][leg], level: state => level3(state, leg) })),
-  cycle: null, top: 3000, voltage: 2 / Math.PI,
+  cycle: null, top: 3000, repeats: true, voltage: 2 / Math.PI,
   plots: [
     { title: "Phase currents, A", height: 196, least: 20, series: [["ia", "u", "--u"], ["ib", "v", "--v"], ["ic", "w", "--w"], ["peak", "peak", "--u"]] },
     { title: "Torque, N·m", height: 140, least: 50, series: [["te", "T", "--torque"], ["teRef", "T*", "--ref", [5, 4]]] },
@@ -95,7 +95,7 @@ const ZS9 = {
   id: "zs9", title: "ZS9: two motors on a Z-source nine-switch inverter", motors: [{ suffix: "1", text: "motor 1" }, { suffix: "2", text: "motor 2" }],
   modes: ["off", ...SCHEMES],
   lanes: ["uH", "vH", "wH", "uM", "vM", "wM", "uL", "vL", "wL"].map((name, gate) => ({ name, colour: ["--u", "--v", "--w"][gate % 3], level: state => on(state, gate) })),
-  cycle: 2e-4, top: 8000, voltage: 1 / Math.sqrt(3),
+  cycle: 2e-4, top: 25_000, repeats: false, voltage: 1 / Math.sqrt(3),
   plots: [
     two("Currents of motor 1, A", 140, 8, ["ia1", "u", "--u"], ["ib1", "v", "--v"], ["ic1", "w", "--w"], ["peak1", "peak", "--u"]),
     two("Currents of motor 2, A", 140, 8, ["ia2", "u", "--u"], ["ib2", "v", "--v"], ["ic2", "w", "--w"], ["peak2", "peak", "--w"]),

@@ -83,7 +83,9 @@ export function pulses(motor, memory, system) {
     const x = left + (k / 4) * (right - left);
     line(ctx, css("--grid"), 1, [[x, 4], [x, bottom]]);
     ctx.textAlign = k === 4 ? "right" : k ? "center" : "left";
-    ctx.fillText(locked ? `${k * 90}°` : span < 1e-3 ? `${((k / 4) * span * 1e6).toFixed(0)} µs` : `${((k / 4) * span * 1e3).toFixed(0)} ms`, x, height - 8);
+    // The unit stands at the last one alone: there is no room for five.
+    const [scale, unit] = locked ? [360 / span, "°"] : span < 1e-3 ? [1e6, " µs"] : [1e3, " ms"];
+    ctx.fillText(`${((k / 4) * span * scale).toFixed(0)}${locked || k === 4 ? unit : ""}`, x, height - 8);
   }
   ctx.textAlign = "left";
   ctx.lineWidth = 1.6;
@@ -223,18 +225,34 @@ export function spectrum(memory, properties, system, bound) {
   const { element, ctx, width, height } = canvas("spectrum", 170);
   if (memory.count < POINTS) return;
   const signal = Float64Array.from({ length: POINTS }, (_, k) => memory.value("ia", memory.count - POINTS + k));
-  const amplitudes = magnitudes(signal), step = 1 / (POINTS * memory.step), most = system.top;
-  const most10 = Math.log10(properties.maxCurrent), left = 32, right = width - 6, top = 6, bottom = height - 20, [low, high] = [most10 - 3.4, most10 + 0.25];
+  const amplitudes = magnitudes(signal), step = 1 / (POINTS * memory.step), most = Math.min(system.top, 0.5 / memory.step);
+  const alone = system.repeats || bound.length !== POINTS ? null : magnitudes(bound);
+  const most10 = Math.log10(properties.maxCurrent), left = 32, right = width - 6, top = 6, bottom = height - 20, [low, high] = [most10 - (system.repeats ? 3.4 : 4.2), most10 + 0.25];
   const x = hz => left + (hz / most) * (right - left), y = a => bottom - ((Math.max(Math.log10(a + 1e-9), low) - low) / (high - low)) * (bottom - top);
   ctx.fillStyle = css("--muted");
   ctx.textBaseline = "middle";
   ctx.textAlign = "right";
   for (const a of [0.001, 0.01, 0.1, 1, 10, 100].filter(a => Math.log10(a) > low && Math.log10(a) < high)) { line(ctx, css("--grid"), 1, [[left, y(a)], [right, y(a)]]); ctx.fillText(a, left - 5, y(a)); }
-  for (let hz = 0; hz <= most; hz += most > 5000 ? 2000 : 1000) { line(ctx, css("--grid"), 1, [[x(hz), top], [x(hz), bottom]]); ctx.textAlign = hz ? (hz === most ? "right" : "center") : "left"; ctx.fillText(hz ? `${hz / 1000} kHz` : "0", x(hz), height - 8); }
+  for (let hz = 0; hz <= most; hz += most > 12_000 ? 5000 : most > 5000 ? 2000 : 1000) { line(ctx, css("--grid"), 1, [[x(hz), top], [x(hz), bottom]]); ctx.textAlign = hz ? (hz === most ? "right" : "center") : "left"; ctx.fillText(hz ? `${hz / 1000} kHz` : "0", x(hz), height - 8); }
   ctx.textAlign = "left";
-  line(ctx, css("--u"), 1.2, Array.from({ length: Math.floor(most / step) }, (_, k) => [x(k * step), y(amplitudes[k])]));
+  const curve = of => Array.from({ length: Math.floor(most / step) }, (_, k) => [x(k * step), y(of[k])]);
+  if (alone) line(ctx, css("--speed"), 3, curve(alone));
+  line(ctx, css("--u"), 1.2, curve(amplitudes));
   ctx.fillStyle = css("--speed");
-  for (const [hz, a] of bound) if (hz < most && a > 10 ** low) ctx.fillRect(x(hz) - 4, y(a) - 1, 8, 2);
-  element.dataset.bound = bound.length;
-  element.setAttribute("aria-label", `Spectrum of the current of phase u over the last ${(POINTS * memory.step * 1e3).toFixed(0)} ms, 0 to ${most / 1e3} kHz; ${bound.length} lines of the pattern’s bound`);
+  let lines = 0;
+  for (let k = 0; system.repeats && k < bound.length; k += 2) {
+    const [hz, a] = [bound[k], bound[k + 1]];
+    if (hz >= most || a <= 10 ** low) continue;
+    ctx.fillRect(x(hz) - 4, y(a) - 1, 8, 2);
+    lines += 1;
+  }
+  // The largest lines of the bound that are harmonics of the pulses, and what is measured there over them.
+  if (alone) {
+    const peaks = Array.from(alone.keys()).filter(k => k * step > 0.3 * most && alone[k] > 10 ** low && alone[k] > alone[k - 1] && alone[k] >= (alone[k + 1] ?? 0));
+    lines = peaks.length;
+    const k = peaks.sort((a, b) => alone[b] - alone[a])[0];
+    element.dataset.over = k ? amplitudes[k] / alone[k] : "";
+  }
+  element.dataset.bound = lines;
+  element.setAttribute("aria-label", `Spectrum of the current of phase u over the last ${(POINTS * memory.step * 1e3).toFixed(0)} ms, 0 to ${most / 1e3} kHz; ${lines} lines of the pulses’ bound`);
 }

@@ -31,7 +31,7 @@ const handlers = {
   acknowledge() { bench?.acknowledge(); },
   inject({ value }) { bench?.inject(value); },
   mend() { bench?.mend(); },
-  bound() { if (bench) postMessage({ type: "bound", lines: bench.bound() }); },
+  bound({ motor }) { if (bench) postMessage({ type: "bound", values: bench.bound(motor) }); },
   rate({ value }) { rate = value; owed = 0; },
   drawn() { answered = true; },
   scenario({ name }) {

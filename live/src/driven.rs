@@ -42,10 +42,9 @@ pub trait Driven {
     fn inject(&mut self, name: &str) -> Result<()>;
     /// Mends all that was injected.
     fn mend(&mut self);
-    /// Lines of the bound's spectrum at the present operating point, each a frequency in Hz and a current in A; none where it is not steady.
-    fn bound(&self) -> Vec<[f64; 2]> {
-        Vec::new()
-    }
+    /// The bound that the pulses set to the current of motor 0 or 1 at the present operating point; nothing where that is not steady. Where
+    /// the pulses repeat, lines of its spectrum, a frequency in Hz, a current in A, and so on; else the current in A, row by row.
+    fn bound(&self, motor: usize) -> Vec<f64>;
 }
 
 /// Two values where they are wanted.

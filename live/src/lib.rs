@@ -110,9 +110,10 @@ impl Bench {
         self.drive.mend();
     }
 
-    /// Lines of the pattern's bound at this operating point: a frequency in Hz, a current in A, and so on.
-    pub fn bound(&self) -> Vec<f64> {
-        self.drive.bound().into_iter().flatten().collect()
+    /// The bound that the pulses set to the current of motor 0 or 1. Where they repeat, lines of its spectrum, a frequency in Hz, a current
+    /// in A, and so on; else, of the ZS9, the current in A, row by row.
+    pub fn bound(&self, motor: usize) -> Vec<f64> {
+        self.drive.bound(motor)
     }
 }
 

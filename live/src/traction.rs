@@ -148,7 +148,7 @@ impl Driven for Traction {
         self.live.mend();
     }
 
-    fn bound(&self) -> Vec<[f64; 2]> {
+    fn bound(&self, _motor: usize) -> Vec<f64> {
         let (Some(first), Some(last)) = (self.kept.first(), self.kept.last()) else { return Vec::new() };
         let steady = self.kept.iter().all(|row| row.mode == last.mode)
             && (first.speed_rpm - last.speed_rpm).abs() <= STEADY.0 * last.speed_rpm.abs();
@@ -163,7 +163,7 @@ impl Driven for Traction {
         ideal.filter(|ideal| ideal.current_a.len() <= MOST_SAMPLES).map_or(Vec::new(), |ideal| {
             let turned =
                 ideal.angle.last().zip(ideal.angle.first()).map_or(0.0, |(last, first)| last - first);
-            lines(&ideal.current_a, f1_hz / (turned / TAU).round().max(1.0))
+            lines(&ideal.current_a, f1_hz / (turned / TAU).round().max(1.0)).into_iter().flatten().collect()
         })
     }
 }

@@ -10,6 +10,7 @@ use tractive_rig::campaign::dual::{Cause, faults};
 use tractive_rig::machine::Machine;
 use tractive_rig::scenario::live::{Command, Start, Turning, Wanted};
 use tractive_rig::scenario::zs9::{Live, Options};
+use tractive_rig::zs9::bound::{Stretch, currents};
 use tractive_rig::zs9::trace::{Edge, Row};
 
 /// The columns of a row, in their order.
@@ -55,9 +56,20 @@ fn scheme_code(row: &Row) -> u8 {
 /// Time in which edges are kept, in s: at so many gates more would only be drawn as a band.
 const EDGES_S: f64 = 0.1;
 
-/// It.
+/// Time over which the bound's operating point is taken, in s.
+const LOOKED_AT_S: f64 = 0.1;
+/// By how much a speed, and a torque's demand, may change in it, as a share of the largest, and the speed below which nothing is asked, in r/min.
+const STEADY: (f64, f64) = (0.005, 30.0);
+/// Rows of the bound's current: those of the page's spectrum.
+const BOUND_ROWS: usize = 4096;
+
+/// It, with its last rows.
 pub struct Zs9 {
     live: Live,
+    machine: Machine,
+    carrier_hz: f64,
+    step_s: f64,
+    kept: Vec<Row>,
     link_ref_v: f64,
     scheme: Scheme,
     gates: [bool; 9],
@@ -66,8 +78,30 @@ pub struct Zs9 {
 impl Zs9 {
     /// Switched on.
     pub fn new(options: &Options, machine: &Machine, start: Start) -> Result<Self> {
-        let live = Live::new(options, machine, start)?;
-        Ok(Self { live, link_ref_v: options.own.uin, scheme: options.own.scheme, gates: [false; 9] })
+        Ok(Self {
+            live: Live::new(options, machine, start)?,
+            machine: machine.clone(),
+            carrier_hz: options.own.carrier_hz.into(),
+            step_s: start.step_s,
+            kept: Vec::new(),
+            link_ref_v: options.own.uin,
+            scheme: options.own.scheme,
+            gates: [false; 9],
+        })
+    }
+
+    /// Both motors turn and make the torque that they made a while ago.
+    fn is_steady(&self) -> bool {
+        let (Some(first), Some(last)) = (self.kept.first(), self.kept.last()) else { return false };
+        let largest_nm = self.machine.folder.parameters.max_torque_nm;
+        last.trip.is_none()
+            && last.t_s - first.t_s > 0.9 * LOOKED_AT_S
+            && first.motors.iter().zip(&last.motors).all(|(first, last)| {
+                last.voltage_v > 0.0
+                    && last.speed_rpm.abs() >= STEADY.1
+                    && (last.speed_rpm - first.speed_rpm).abs() <= STEADY.0 * last.speed_rpm.abs()
+                    && (last.torque_ref_nm - first.torque_ref_nm).abs() <= STEADY.0 * largest_nm
+            })
     }
 
     /// The newest edges, after the states that those before them have left.
@@ -111,6 +145,9 @@ impl Driven for Zs9 {
         taken.rows.extend(rows.iter().flat_map(|row| COLUMNS.map(|(_, of)| of(row) as f32)));
         let edges = self.newest(&edges);
         taken.edges.extend(edges);
+        self.kept.extend(rows);
+        let gone = self.kept.len().saturating_sub((LOOKED_AT_S / self.step_s) as usize);
+        self.kept.drain(..gone);
     }
 
     fn state(&self) -> Value {
@@ -173,5 +210,11 @@ impl Driven for Zs9 {
 
     fn mend(&mut self) {
         self.live.mend();
+    }
+
+    fn bound(&self, motor: usize) -> Vec<f64> {
+        let stretch = Stretch { carrier_hz: self.carrier_hz, step_s: self.step_s, count: BOUND_ROWS };
+        let both = self.is_steady().then(|| currents(&self.kept, stretch, &self.machine)).flatten();
+        both.and_then(|both| both.into_iter().nth(motor)).unwrap_or_default()
     }
 }

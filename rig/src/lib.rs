@@ -7,29 +7,39 @@
 
 pub mod analysis;
 pub mod bench;
+#[cfg(unix)]
 pub mod benchmark;
 pub mod bound;
 pub mod campaign;
 pub mod can;
 pub mod columns;
+#[cfg(unix)]
 pub mod commission;
+#[cfg(unix)]
 pub mod compare;
 pub mod curves;
 pub mod distortion;
 pub mod figures;
 pub mod files;
+#[cfg(unix)]
 pub mod folder;
+#[cfg(unix)]
 pub mod gallery;
+#[cfg(unix)]
 pub mod identify;
 pub mod inject;
 pub mod law;
 #[cfg(unix)]
 pub mod live;
 pub mod machine;
+#[cfg(unix)]
 pub mod merge;
 pub mod mtpa_methods;
+#[cfg(unix)]
 pub mod needs;
+#[cfg(unix)]
 pub mod nine_switch;
+#[cfg(unix)]
 pub mod optimised;
 pub mod options;
 pub mod output;
@@ -39,6 +49,7 @@ pub mod plant;
 #[cfg_attr(unix, path = "platform/unix.rs")]
 #[cfg_attr(not(unix), path = "platform/none.rs")]
 mod platform;
+#[cfg(unix)]
 pub mod points;
 pub mod report;
 pub mod rows;
@@ -48,6 +59,7 @@ pub mod shards;
 pub mod spectrum;
 mod speed_loop;
 mod steps;
+#[cfg(unix)]
 pub mod talk;
 pub mod trace;
 pub mod verdict;

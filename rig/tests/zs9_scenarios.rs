@@ -5,6 +5,7 @@ use tractive_rig::analysis::Figures;
 use tractive_rig::rows::mean;
 use tractive_rig::scenario::{catalogue, command};
 use tractive_rig::trace::Recorded;
+use tractive_rig::zs9::bound;
 use tractive_rig::zs9::figures;
 use tractive_rig::zs9::trace::{Recording, Row};
 
@@ -292,4 +293,34 @@ fn the_trace_has_its_columns_and_is_written_whole() {
         serde_json::from_str(&std::fs::read_to_string(folder.path().join("summary.json")).unwrap()).unwrap();
     assert_eq!(summary["machine"], "ipm-zs9");
     assert_eq!(summary["options"]["carrier_hz"], 10_000);
+}
+
+/// Distortion of a phase current over so many periods of its fundamental, in percent.
+fn distortion(current_a: &[f64], periods: f64) -> f64 {
+    let count = current_a.len() as f64;
+    let (mut cos, mut sin, mut squares) = (0.0, 0.0, 0.0);
+    for (k, value) in current_a.iter().enumerate() {
+        let (s, c) = (core::f64::consts::TAU * periods * (k as f64 + 0.5) / count).sin_cos();
+        (cos, sin, squares) = (cos + value * c, sin + value * s, squares + value * value);
+    }
+    let fundamental = 2.0 / (count * count) * (cos * cos + sin * sin);
+    (squares / count / fundamental - 1.0).max(0.0).sqrt() * 100.0
+}
+
+#[test]
+fn distortion_is_that_of_the_pulses_alone() {
+    for scheme in ["s", "rs", "rthd", "zvo"] {
+        let chosen = catalogue::of_zs9(&format!("zs9-steady --dt 1e-5 --scheme {scheme}")).unwrap();
+        let machine = chosen.machine().unwrap();
+        let rows = chosen.drive(&machine).unwrap().rows;
+        let stretch = bound::Stretch { carrier_hz: 1e4, step_s: 1e-5, count: rows.len() };
+        let least = bound::currents(&rows, stretch, &machine).unwrap();
+        for (motor, periods) in [20.0, 14.0].into_iter().enumerate() {
+            let measured: Vec<f64> = rows.iter().map(|row| row.motors[motor].phases_a[0]).collect();
+            let (measured, least) = (distortion(&measured, periods), distortion(&least[motor], periods));
+            println!("{scheme}, motor {}: {measured:.3} %, by the pulses alone {least:.3} %", motor + 1);
+            assert!(measured <= 1.005 * least, "{scheme}, motor {}: {measured} %, {least} %", motor + 1);
+            assert!(least <= 1.01 * measured, "{scheme}, motor {}: {measured} %, {least} %", motor + 1);
+        }
+    }
 }

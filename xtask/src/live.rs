@@ -1,6 +1,6 @@
 //! `cargo xtask live`: the live bench, which is a workspace of its own in `live/`, built and served; and looked at in a browser.
 
-use crate::build;
+use crate::build::{self, System};
 use crate::cli::LiveArgs;
 use crate::process::{cannot_start, say, succeeds};
 use crate::setup::Setup;
@@ -60,17 +60,25 @@ pub fn check(setup: &mut Setup) -> Result<Result<bool, String>> {
     let reports = reports(&folder)?;
     let (trace, zs9) = (sweep.join("trace.csv"), folder.join("reports/zs9-load-step/trace.csv"));
     let mut check = tool();
-    check
-        .arg("check")
-        .args([&page, &trace, &zs9])
-        .arg("--rig")
-        .arg(build::rig()?)
-        .arg("--browser")
-        .arg(&browser);
-    let good = succeeds(&mut check)?;
-    let mut looked = tool();
-    looked.arg("reports").arg(sweep.join("report.html")).args(reports).arg("--browser").arg(&browser);
-    let good = good && succeeds(&mut looked)?;
+    check.arg("check").args([&page, &trace, &zs9]).arg("--rig").arg(build::rig()?);
+    for report in [sweep.join("report.html")].iter().chain(&reports) {
+        check.arg("--report").arg(report);
+    }
+    // The page of a drive elsewhere: the image in QEMU where there is one, as `live --in-qemu` has it.
+    match (setup.qemu(), setup.toolchain()) {
+        (Ok(qemu), Ok(toolchain)) => {
+            let image = build::image(&toolchain, System::Zs9, None)?;
+            check.arg("--in-qemu").env("TRACTIVE_QEMU", qemu).env("TRACTIVE_IMAGE", image);
+        }
+        (Err(missing), _) | (_, Err(missing)) => {
+            say(&format!("the page of QEMU's image is not looked at: {missing:#}"))
+        }
+    }
+    match setup.axe() {
+        Some(axe) => drop(check.arg("--axe").arg(axe)),
+        None => say("axe-core cannot be fetched by npm or pip: the pages are looked at without it"),
+    }
+    let good = succeeds(check.arg("--browser").arg(&browser))?;
     Ok(Ok(good && succeeds(live().args(["test", "--quiet", "--package", "tractive-live-tool"]))?))
 }
 
@@ -117,7 +125,7 @@ fn live() -> Command {
     let mut command = cargo();
     command.current_dir(root().join("live"));
     // The build script takes the machines that are built in.
-    for system in build::System::ALL {
+    for system in System::ALL {
         command.env_remove(system.machine_variable());
     }
     command

@@ -109,6 +109,28 @@ impl Setup {
         found()
     }
 
+    /// The file of axe-core, which looks for what keeps people out of a page: by npm, else out of a Python package that has it inside.
+    pub fn axe(&mut self) -> Option<PathBuf> {
+        const BY_NPM: &str = "axe-core@4.11.0";
+        const BY_PIP: &str = "axe-playwright-python==0.1.8";
+        let tools = root().join("target/tools/axe");
+        let files = ["node_modules/axe-core/axe.min.js", "axe_playwright_python/axe.min.js"]
+            .map(|file| tools.join(file));
+        let found = || files.iter().find(|file| file.is_file()).cloned();
+        if found().is_none() && find("npm").is_some() {
+            say("fetching axe-core (npm install)");
+            let install =
+                ["install", "--no-save", "--no-audit", "--no-fund", "--ignore-scripts", BY_NPM, "--prefix"];
+            quietly(Command::new("npm").args(install).arg(&tools));
+        }
+        if found().is_none() && find("python3").is_some() {
+            say("fetching axe-core (pip install)");
+            let install = ["-m", "pip", "install", "--no-deps", BY_PIP, "--target"];
+            quietly(Command::new("python3").args(install).arg(&tools));
+        }
+        found()
+    }
+
     /// CMake, with which the twin's emulator is built.
     pub fn cmake(&mut self) -> bool {
         const PROGRAM: &str = "cmake";

@@ -166,6 +166,8 @@ fn the_control_rate_suits_the_carrier_the_timers_and_the_processor() {
         TRACTION.with("break_current_a", "120.0").replace("min_pulse_ns = 15000", "min_pulse_ns = 8000");
     let said = TRACTION.check(&text, &quick).unwrap_err();
     assert!(said.contains("control_hz: 10000: must be from 20000 to 20091"), "{said}");
+    const PAGE: &str = include_str!("../../../docs/nucleo-g474re.md");
+    assert!(PAGE.contains("(35,161 with 900 Hz, 20,091 with 20 kHz)"), "the page says other rates");
     let constant = TRACTION.check(&text.replace("control_hz = 10000", "control_hz = 20000"), &quick).unwrap();
     assert!(constant.contains("control_hz: 20000,"), "{constant}");
     for (control_hz, prescaler, ticks_per_s) in [(10_000, 8, 21_250_000), (20_000, 5, 34_000_000)] {

@@ -76,9 +76,15 @@ impl Browser {
         Ok(browser)
     }
 
-    /// Goes to an address.
+    /// Goes to an address, as if nothing had been open before.
     pub fn go(&mut self, address: &str) -> Result<()> {
-        self.call("Page.navigate", json!({ "url": address })).map(|_| ())
+        // An address that differs behind its `#` alone would be the same page still.
+        self.call("Page.navigate", json!({ "url": "about:blank" }))?;
+        self.until("the page before is gone", "location.href === 'about:blank'")?;
+        self.errors.clear();
+        self.call("Page.navigate", json!({ "url": address }))?;
+        // What is not in front is not drawn.
+        self.call("Page.bringToFront", json!({})).map(|_| ())
     }
 
     /// A window of this size, in CSS pixels, dark or light.

@@ -1,5 +1,6 @@
 //! The checks of the page in a browser.
 
+use crate::axe::Axe;
 use crate::browser::Browser;
 use crate::server;
 use anyhow::{Context, Result, ensure};
@@ -17,28 +18,40 @@ const WIDTHS: [u32; 3] = [1280, 900, 390];
 pub type Scenario<'a> = (&'a str, &'a Path);
 
 /// Checks it with both systems; the traces are the host's of the same scenarios, one of each system.
-pub fn check(page: &Path, scenarios: [Scenario; 2], program: &Path) -> Result<()> {
+pub fn check(page: &Path, scenarios: [Scenario; 2], browser: &mut Browser, axe: &Axe) -> Result<()> {
     let address = server::serve_aside(page)?;
     let [sweep, zs9] = scenarios;
-    let mut browser = opened(program, &address)?;
+    open(browser, &address)?;
     println!("first paint after {} ms", browser.evaluate(FIRST_PAINT)?);
     println!("first paint of the scope after {} ms", browser.evaluate("+document.body.dataset.painted")?);
-    moves(&mut browser, &[("s-torque", "", [300, 350, -400])])?;
+    moves(browser, &[("s-torque", "", [300, 350, -400])])?;
     browser.until("the spectrum has its bound", "+document.getElementById('spectrum').dataset.bound > 3")?;
-    trips(&mut browser, "current-u-railed")?;
-    saves(&mut browser)?;
-    runs(&mut browser)?;
-    equals_the_host(&mut browser, sweep)?;
-    ends(&mut browser)?;
-    let mut browser = opened(program, &format!("{address}#system=zs9&command2=speed"))?;
-    moves(&mut browser, &[("s-torque1", "1", [70, 75, -40]), ("s-speed2", "2", [800, 0, 0])])?;
-    trips(&mut browser, "angle-2-lost")?;
-    saves(&mut browser)?;
-    runs(&mut browser)?;
-    equals_the_host(&mut browser, zs9)?;
-    ends(&mut browser)?;
-    let small = opened(program, &format!("{address}#machine=pmsm-48v-1kw"))?;
-    ensure!(small.errors.is_empty(), "errors on the console: {:?}", small.errors);
+    trips(browser, "current-u-railed")?;
+    saves(browser)?;
+    runs(browser)?;
+    equals_the_host(browser, sweep)?;
+    ends(browser, axe, "live, pmasynrm")?;
+    open(browser, &format!("{address}#system=zs9&command2=speed"))?;
+    moves(browser, &[("s-torque1", "1", [70, 75, -40]), ("s-speed2", "2", [800, 0, 0])])?;
+    bound_is_met(browser)?;
+    trips(browser, "angle-2-lost")?;
+    saves(browser)?;
+    runs(browser)?;
+    equals_the_host(browser, zs9)?;
+    ends(browser, axe, "live, zs9")?;
+    open(browser, &format!("{address}#machine=pmsm-48v-1kw"))?;
+    ensure!(browser.errors.is_empty(), "errors on the console: {:?}", browser.errors);
+    Ok(())
+}
+
+/// The spectrum of the ZS9's current has its bound, and the largest of the pulses' harmonics is as large as measured: the bound is neither
+/// another motor's nor of other pulses.
+fn bound_is_met(browser: &mut Browser) -> Result<()> {
+    const MET: &str =
+        "(of => of.bound > 1 && Math.abs(of.over - 1) < 0.05)(document.getElementById('spectrum').dataset)";
+    browser.until("the spectrum has its bound", MET)?;
+    const SAID: &str = "(of => `${of.bound} lines, the largest measured ${(100 * of.over).toFixed(1)} % of its bound`)(document.getElementById('spectrum').dataset)";
+    println!("the pulses' bound: {}", browser.evaluate(SAID)?);
     Ok(())
 }
 
@@ -46,39 +59,40 @@ pub fn check(page: &Path, scenarios: [Scenario; 2], program: &Path) -> Result<()
 const FIRST_PAINT: &str =
     "Math.round(performance.getEntriesByName('first-contentful-paint')[0]?.startTime ?? -1)";
 
-/// The page, its drive running.
-fn opened(program: &Path, address: &str) -> Result<Browser> {
-    let mut browser = Browser::start(program)?;
+/// Opens the page, and waits until its drive runs.
+fn open(browser: &mut Browser, address: &str) -> Result<()> {
     browser.resize(1280, 900, false)?;
     browser.go(address)?;
     browser.until("the page draws", "!!document.body?.dataset.painted")?;
-    browser.until("the drive runs", RUNNING)?;
-    Ok(browser)
+    browser.until("the drive runs", RUNNING)
 }
 
 /// The drive runs.
 const RUNNING: &str = "document.getElementById('state-name').textContent === 'running'";
 
 /// The looks of the page, and that nothing went wrong.
-fn ends(browser: &mut Browser) -> Result<()> {
+fn ends(browser: &mut Browser, axe: &Axe, name: &str) -> Result<()> {
     fits(browser)?;
     contrasts(browser)?;
+    for (width, dark) in [(1280, false), (390, true)] {
+        browser.resize(width, 900, dark)?;
+        axe.check(browser, &format!("{name}, {width} pixels"))?;
+    }
     ensure!(browser.errors.is_empty(), "errors on the console: {:?}", browser.errors);
     println!("no error on the console");
     Ok(())
 }
 
 /// Checks the page of a drive elsewhere, which `rig live` serves: it looks, and commands only where that is permitted and switched on.
-pub fn check_remote(rig: &Path, program: &Path) -> Result<()> {
-    for (system, permitted) in [("pmasynrm", false), ("zs9", true)] {
-        let mut words = vec!["live", "--system", system, "--on", "host", "--no-open", "--seconds", "120"];
+pub fn check_remote(rig: &Path, on: &str, browser: &mut Browser, axe: &Axe) -> Result<()> {
+    for (system, on, permitted) in [("pmasynrm", "host", false), ("zs9", on, true)] {
+        let mut words = vec!["live", "--system", system, "--on", on, "--no-open", "--seconds", "120"];
         words.extend(permitted.then_some("--commands"));
         let child = Command::new(rig).args(words).stdout(Stdio::piped()).stderr(Stdio::null()).spawn()?;
         let mut served = Served(child);
         let mut line = String::new();
         BufReader::new(served.0.stdout.take().context("no output")?).read_line(&mut line)?;
         let address = line.split_whitespace().next().context("rig live tells no address")?.to_owned();
-        let mut browser = Browser::start(program)?;
         browser.resize(1280, 900, false)?;
         browser.go(&address)?;
         browser.until("the page draws", "!!document.body?.dataset.painted")?;
@@ -92,8 +106,8 @@ pub fn check_remote(rig: &Path, program: &Path) -> Result<()> {
         if permitted {
             browser.evaluate("document.getElementById('on').click()")?;
             browser.evaluate("document.getElementById('arm').click()")?;
-            set(&mut browser, "s-torque1", 20)?;
-            set(&mut browser, "s-torque2", 10)?;
+            set(browser, "s-torque1", 20)?;
+            set(browser, "s-torque2", 10)?;
             browser.evaluate("document.getElementById('on').click()")?;
             browser.until("the drive runs", RUNNING)?;
             browser.until("it turns", "+document.querySelectorAll('#numbers b i')[1].textContent > 50")?;
@@ -104,9 +118,10 @@ pub fn check_remote(rig: &Path, program: &Path) -> Result<()> {
             // The browser itself calls that answer an error.
             browser.errors.clear();
         }
-        fits(&mut browser)?;
+        fits(browser)?;
+        axe.check(browser, &format!("rig live, {system}"))?;
         ensure!(browser.errors.is_empty(), "errors on the console: {:?}", browser.errors);
-        println!("rig live, {system}: it looks; commands permitted {permitted}");
+        println!("rig live, {system} on {on}: it looks; commands permitted {permitted}");
     }
     Ok(())
 }

@@ -1,9 +1,10 @@
 //! The live bench's page: made of the drive's wasm, served, looked at in a browser.
 //!
 //! `cargo xtask live` calls this; what it does is in [`page`] (the folder of static files), [`server`], [`browser`], [`check`] and
-//! [`pictures`]. [`reports`] looks at the report pages of runs.
+//! [`pictures`]. [`reports`] looks at the report pages of runs, [`axe`] at all of them.
 #![forbid(unsafe_code)]
 
+mod axe;
 mod browser;
 mod check;
 mod page;
@@ -12,6 +13,8 @@ mod reports;
 mod server;
 
 use anyhow::Result;
+use axe::Axe;
+use browser::Browser;
 use clap::Parser;
 use std::path::PathBuf;
 
@@ -47,6 +50,15 @@ enum Command {
         /// The rig, whose page of a drive elsewhere is looked at, too
         #[arg(long)]
         rig: PathBuf,
+        /// Report pages that are looked at, too
+        #[arg(long)]
+        report: Vec<PathBuf>,
+        /// That drive runs in QEMU, by the environment's image; else on the host
+        #[arg(long)]
+        in_qemu: bool,
+        /// The file axe.min.js of axe-core
+        #[arg(long)]
+        axe: Option<PathBuf>,
         /// Chromium
         #[arg(long, default_value = "chromium")]
         browser: PathBuf,
@@ -79,13 +91,15 @@ fn main() -> Result<()> {
     match Command::parse() {
         Command::Make { wasm, out } => page::make(&wasm, &out),
         Command::Serve { page, port, no_open } => server::serve(&page, port, !no_open),
-        Command::Check { page, trace, zs9, rig, browser } => {
+        Command::Check { page, trace, zs9, rig, report, in_qemu, axe, browser } => {
             let scenarios = [("sweep", trace.as_path()), ("zs9-load-step", zs9.as_path())];
-            check::check(&page, scenarios, &browser)?;
-            check::check_remote(&rig, &browser)
+            let (axe, mut browser) = (Axe::read(axe.as_deref())?, Browser::start(&browser)?);
+            check::check(&page, scenarios, &mut browser, &axe)?;
+            check::check_remote(&rig, if in_qemu { "qemu" } else { "host" }, &mut browser, &axe)?;
+            reports::check(&report, None, &mut browser, &axe)
         }
         Command::Reports { pages, pictures, browser } => {
-            reports::check(&pages, pictures.as_deref(), &browser)
+            reports::check(&pages, pictures.as_deref(), &mut Browser::start(&browser)?, &Axe::default())
         }
         Command::Screenshots { page, out, browser } => pictures::take(&page, &out, &browser),
     }

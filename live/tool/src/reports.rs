@@ -1,5 +1,6 @@
 //! The checks of report pages in a browser: opened as files, without a server.
 
+use crate::axe::Axe;
 use crate::browser::Browser;
 use crate::pictures;
 use anyhow::{Context, Result, ensure};
@@ -16,14 +17,16 @@ const MOST_POINTS: u64 = 10_000;
 /// The faults of the page as it is shown: too wide, letters under 11 px, contrast under 4.5 to 1, 3 to 1 of large letters.
 const COMPLAINTS: &str = include_str!("reports.js");
 
+/// The plots have the width that the window gives them.
+const LAID_OUT: &str = "report.scopes.every(scope => !scope || scope.hosts[0].clientWidth === scope.width)";
+
 /// Checks report pages; with a folder, takes pictures of their first window as well.
-pub fn check(pages: &[PathBuf], folder: Option<&Path>, program: &Path) -> Result<()> {
+pub fn check(pages: &[PathBuf], folder: Option<&Path>, browser: &mut Browser, axe: &Axe) -> Result<()> {
     for page in pages {
         let name = page.parent().and_then(Path::file_name).unwrap_or_default().to_string_lossy().into_owned();
         let page = std::path::absolute(page)?;
         let bytes = std::fs::metadata(&page).with_context(|| page.display().to_string())?.len();
         ensure!(bytes <= LARGEST_BYTES, "{}: {bytes} bytes, at most {LARGEST_BYTES}", page.display());
-        let mut browser = Browser::start(program)?;
         browser.resize(WIDTHS[0], 900, false)?;
         browser.go(&format!("file://{}", page.display()))?;
         browser.until("the page draws", "!!document.body?.dataset.drawn")?;
@@ -39,6 +42,9 @@ pub fn check(pages: &[PathBuf], folder: Option<&Path>, program: &Path) -> Result
                     wrong.as_array().is_some_and(Vec::is_empty),
                     "{name} at {width} pixels, dark {dark}: {wrong}"
                 );
+                if dark == (width == WIDTHS[1]) {
+                    axe.check(browser, &format!("{name}, {width} pixels"))?;
+                }
                 if let Some(out) = folder {
                     let file = out
                         .join(format!("report-{name}-{width}-{}.png", if dark { "dark" } else { "light" }));
@@ -47,8 +53,9 @@ pub fn check(pages: &[PathBuf], folder: Option<&Path>, program: &Path) -> Result
             }
         }
         browser.resize(WIDTHS[0], 900, false)?;
-        zooms(&mut browser, &name)?;
-        holds_the_trace(&mut browser, &page.with_file_name("trace.csv"), &name)?;
+        browser.until("the plots are as wide as the window", LAID_OUT)?;
+        zooms(browser, &name)?;
+        holds_the_trace(browser, &page.with_file_name("trace.csv"), &name)?;
         ensure!(browser.errors.is_empty(), "{name}: errors on the console: {:?}", browser.errors);
     }
     Ok(())

@@ -7,6 +7,7 @@ const LOAD_STEP: &str = "zs9-load-step";
 const FAST: &str = "zs9-load-step --carrier-hz 20000 --uin 800";
 const REVERSE: &str = "zs9-reverse";
 const CYCLE: &str = "zs9-cycle";
+const TIMING: &str = "zs9-timing";
 const SCHEMES: [&str; 4] = ["s", "rs", "rthd", "zvo"];
 
 /// Figures of one run by their names, each with its decimals and its unit.
@@ -26,7 +27,7 @@ fn steady() -> Vec<String> {
 }
 
 /// All rows.
-pub const ROWS: [Plan; 8] = [
+pub const ROWS: [Plan; 9] = [
     Plan {
         quantity: "ZS9, motor 2's load 60 → 100 N·m (figures 14 to 19): motor 1's torque moves by, its speed by",
         lines: || words(&[LOAD_STEP]),
@@ -105,6 +106,17 @@ pub const ROWS: [Plan; 8] = [
         },
         paper: "",
         why: "",
+    },
+    Plan {
+        quantity: "ZS9, full torque at 1,450 r/min in weakening, 5 ms after a ramp there, then reversed (zs9-timing): torque off, motoring, braking",
+        lines: || words(&[TIMING]),
+        read: |law| {
+            let wanted =
+                [("motoring_torque_error_percent", 2, "%"), ("braking_torque_error_percent", 2, "%")];
+            figures(law, TIMING, &wanted)
+        },
+        paper: "",
+        why: "motoring, ours still settles after the ramp, with more torque than its demand; the PIs are off as the torque reverses",
     },
     Plan {
         quantity: "ZS9, THD of the currents at 60 N·m and 1,000, 700 r/min, upper, lower motor: S, RS, RTHD, ZVO",

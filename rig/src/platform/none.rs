@@ -36,12 +36,3 @@ pub(crate) fn make_fifo(path: &Path) -> Result<()> {
 pub(crate) fn written(path: &Path, _fill: impl FnOnce(&mut dyn Write) -> Result<()>) -> Result<()> {
     bail!("{}: there are no files here", path.display())
 }
-
-/// No folder: an error.
-pub(crate) fn written_folder(
-    out: &Path,
-    _taken: bool,
-    _fill: impl FnOnce(&Path) -> Result<()>,
-) -> Result<()> {
-    bail!("{}: there are no folders here", out.display())
-}

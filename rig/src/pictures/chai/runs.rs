@@ -28,7 +28,38 @@ fn curve(recording: &Recording, (from_s, to_s): (f64, f64), value: fn(&Row) -> f
     rows.iter().map(|row| (row.t_s, value(row))).collect()
 }
 
-/// Figure 8: link voltage, line voltage and phase current of the load steps, one above the other.
+/// The step that figure 8 shows closer: its time in s, and the time before and after it that is drawn.
+const CLOSER: (f64, f64, f64) = (0.3, 0.004, 0.012);
+
+/// Line voltage, phase current and torque around one step, one above the other from a height on.
+fn closer(recording: &Recording, mut top: f64) -> Vec<Panel> {
+    let (at_s, before_s, after_s) = CLOSER;
+    let window = (at_s - before_s, at_s + after_s);
+    let since = |(t_s, value): (f64, f64)| (1e3 * (t_s - at_s), value);
+    let demands = curve(recording, window, |row| row.te_ref_nm);
+    let [from_nm, to_nm] = [demands.first(), demands.last()].map(|of| of.map_or(0.0, |(_, value)| *value));
+    let title = format!("Line voltage, closer: the step from {} to {} N·m", number(from_nm), number(to_nm));
+    let panels = [
+        (title.as_str(), "u_{uv} in V", recording.line_voltage(window), Some((-1800.0, 1800.0)), 180.0),
+        ("Phase current", "i_{u} in A", curve(recording, window, |row| row.ia_a), None, 180.0),
+        ("Torque and demand", "T in N·m", curve(recording, window, |row| row.te_nm), None, 200.0),
+    ];
+    let mut sheet = Vec::new();
+    for (title, unit, points, range, height) in panels {
+        let y = Axis { range, ..Axis::fitted(unit) };
+        let x = Axis::of("time from the step in ms", -1e3 * before_s, 1e3 * after_s);
+        let mut panel = Panel::new((0.0, top, 900.0, height), title, x, y);
+        panel.line(points.into_iter().map(since), BLUE, 1.4);
+        if title.starts_with("Torque") {
+            panel.line(demands.iter().copied().map(since), RED, 1.4);
+        }
+        sheet.push(panel);
+        top += height;
+    }
+    sheet
+}
+
+/// Figure 8: link voltage, line voltage, phase current and torque of the load steps, one above the other, and one step closer.
 pub fn load_steps(recording: &Recording) -> Result<String> {
     let end_s = recording.rows.last().map_or(1.0, |row| row.t_s);
     let window = (0.0, end_s);
@@ -52,6 +83,9 @@ pub fn load_steps(recording: &Recording) -> Result<String> {
         sheet.push(panel);
         top += height;
     }
+    let closer = closer(recording, top);
+    top += closer.iter().map(|panel| panel.place.3).sum::<f64>();
+    sheet.extend(closer);
     draw((900, top as u32), &sheet)
 }
 
