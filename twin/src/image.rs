@@ -60,6 +60,15 @@ impl Image {
         Ok(Self { flash, sha256, functions, statics_end, flash_bytes })
     }
 
+    /// An image of these words, the vector table first, without names.
+    #[cfg(test)]
+    pub fn of(words: &[u32]) -> Self {
+        let mut flash: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
+        flash.resize(FLASH.1 as usize, 0xFF);
+        let flash_bytes = 4 * words.len() as u32;
+        Self { flash, sha256: String::new(), functions: Vec::new(), statics_end: 0x2000_0000, flash_bytes }
+    }
+
     /// The function at an address.
     pub fn function(&self, address: u32) -> &str {
         let after = self.functions.partition_point(|(from, _)| *from <= address);

@@ -67,6 +67,11 @@ impl Settings {
 /// The image in its machine, at the release of reset.
 pub fn prepare(settings: &Settings) -> Result<(Cpu, Image)> {
     let image = Image::read(&settings.image)?;
+    Ok((Cpu::new(&image, machine(settings)?)?, image))
+}
+
+/// The machine around the processor, at the release of reset.
+pub fn machine(settings: &Settings) -> Result<Machine> {
     let (motor, wiring) = match settings.system {
         System::Pmasynrm => (Motor::load(traction::Traction::MACHINE)?, &wiring::TRACTION),
         System::Zs9 => (Motor::load(zs9::Zs9::MACHINE)?, &wiring::ZS9),
@@ -77,7 +82,7 @@ pub fn prepare(settings: &Settings) -> Result<(Cpu, Image)> {
     let rotor = Rotor { inertia_kg_m2: settings.inertia_kg_m2, pole_pairs: parameters.pole_pairs.into() };
     let world =
         World::new(side(settings.system, &motor), wiring, talk, PowerStage::read(&settings.stage())?, rotor);
-    Ok((Cpu::new(&image, Machine::new(Chip::new(), world))?, image))
+    Ok(Machine::new(Chip::new(), world))
 }
 
 fn side(system: System, motor: &Motor) -> Side {
