@@ -74,6 +74,7 @@ mod firmware {
         let task = TASK.get_or_insert_with(|| ControlTask::new(BuiltIn, settings(), first));
         task.run(board, &SHARED);
         PULSE.control_ran();
+        nucleo_g474re::complete_stores();
     }
 
     /// Deadline: the next carrier boundary, where the shadow registers take over. Missed: a break, gates off for good.
@@ -90,6 +91,7 @@ mod firmware {
         if task.run(board, &SHARED) {
             PULSE.pwm_ran();
         }
+        nucleo_g474re::complete_stores();
     }
 
     #[exception]
