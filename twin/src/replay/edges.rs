@@ -109,12 +109,14 @@ fn spans(halves: &[Begun], scale: &Scale) -> Vec<Span> {
         for (phase, now) in now.iter_mut().enumerate() {
             let (start, ticks) = (half.start_levels[phase], half.compare_ticks[phase]);
             let turn = (ticks < half.period_ticks).then_some((!start, ticks));
-            for (level, ticks) in [(start, 0)].into_iter().chain(turn).filter(|(level, _)| *level != *now) {
+            for (level, ticks) in [(start, 0)].into_iter().chain(turn) {
+                if std::mem::replace(now, level) == level {
+                    continue;
+                }
                 let [on, off] = [usize::from(!level), usize::from(level)].map(|lower| 2 * phase + lower);
                 span.edges.push(Edge { at: at(ticks), gate: off, on: false });
                 span.edges.push(Edge { at: at(ticks) + scale.dead, gate: on, on: true });
             }
-            *now = turn.map_or(start, |(level, _)| level);
         }
         levels = Some(now);
     }
