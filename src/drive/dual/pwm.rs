@@ -206,9 +206,8 @@ impl<M: Machine> PwmTask<M> {
         let [before, running] = &self.expected;
         let missing = (before.must_be_on | running.must_be_on) & !seen.on;
         let surplus = seen.on & !(before.may_be_on | running.may_be_on);
-        let never_off = running.is_off & !seen.off;
-        let astray = seen.off & !(before.is_off | running.is_off);
-        let wrong = (missing | surplus | never_off | astray) & ALL_GATES;
+        let off = (running.is_off | before.is_off & seen.off) ^ seen.off;
+        let wrong = (missing | surplus | off) & ALL_GATES;
         (wrong != 0).then_some((Fault::LegStuck, f32::from(wrong), 0.0))
     }
 

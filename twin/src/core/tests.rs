@@ -15,7 +15,7 @@ const READS: u32 = PROGRAM + 0x1C;
 const HANDLER: u32 = PROGRAM + 0x2A;
 /// The interrupt, as an exception.
 const EXCEPTION: usize = 45;
-/// Where the program leaves FPSCR and S0.
+/// The place where the program leaves FPSCR and S0.
 const LEFT: u32 = 0x2000_2000;
 
 /// Switches the floating-point unit on, compares 1 with 2, and in the next basic block reads the flags and stores them with S0. The handler

@@ -1,4 +1,4 @@
-//! What the image's tasks were given: read out of the record of its accesses, interrupt by interrupt.
+//! The inputs that the image's tasks were given: read out of the record of its accesses, interrupt by interrupt.
 
 use crate::machine::{Access, What};
 use crate::time::Time;
