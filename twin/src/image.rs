@@ -17,6 +17,8 @@ pub struct Image {
     pub sha256: String,
     /// Functions: address and name, by address.
     functions: Vec<(u32, String)>,
+    /// Variables, likewise.
+    variables: Vec<(u32, String)>,
     /// The end of what has a place of its own in RAM: the stack may not come down to it.
     pub statics_end: u32,
     /// The bytes of the flash memory that it fills.
@@ -53,11 +55,31 @@ impl Image {
             .map(|symbol| (symbol.address() as u32 & !1, symbol.name().unwrap_or_default().to_owned()))
             .collect();
         functions.sort();
+        let data = file.symbols().filter(|symbol| symbol.kind() == SymbolKind::Data);
+        let mut variables: Vec<_> = data
+            .map(|symbol| (symbol.address() as u32, symbol.name().unwrap_or_default().to_owned()))
+            .collect();
+        variables.sort();
         let statics_end = file.symbols().find(|symbol| symbol.name() == Ok("__sheap"));
         let statics_end = statics_end.context("no symbol __sheap")?.address() as u32;
         let digest = Sha256::digest(bytes);
         let sha256 = digest.iter().map(|byte| format!("{byte:02x}")).collect();
-        Ok(Self { flash, sha256, functions, statics_end, flash_bytes })
+        Ok(Self { flash, sha256, functions, variables, statics_end, flash_bytes })
+    }
+
+    /// An image of these words, the vector table first, without names.
+    #[cfg(test)]
+    pub fn of(words: &[u32]) -> Self {
+        let mut flash: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
+        flash.resize(FLASH.1 as usize, 0xFF);
+        let flash_bytes = 4 * words.len() as u32;
+        let (functions, variables) = (Vec::new(), Vec::new());
+        Self { flash, sha256: String::new(), functions, variables, statics_end: 0x2000_0000, flash_bytes }
+    }
+
+    /// The first address of a variable, by a part of its name.
+    pub fn variable(&self, name: &str) -> Option<u32> {
+        self.variables.iter().find(|(_, known)| known.contains(name)).map(|(address, _)| *address)
     }
 
     /// The function at an address.

@@ -12,6 +12,7 @@ pub mod machine;
 pub mod map;
 pub mod mistakes;
 pub mod output;
+pub mod replay;
 pub mod run;
 pub mod stage;
 pub mod time;

@@ -8,8 +8,11 @@ use tractive_rig::talk::System;
 use tractive_twin::core::cpu::RAM;
 use tractive_twin::machine::Access;
 use tractive_twin::output::write;
-use tractive_twin::run::{Settings, drive, prepare};
+use tractive_twin::replay::Replay;
+use tractive_twin::replay::edges::Compared;
+use tractive_twin::run::{Settings, drive_beside, prepare};
 use tractive_twin::time::{SECOND, Time, seconds};
+use tractive_twin::world::World;
 
 /// Executes the image of the NUCLEO-G474RE against a model of its chip, with the simulated motor at the pins.
 #[derive(Parser)]
@@ -27,8 +30,11 @@ struct Arguments {
     /// The drivers' ready wire drops at this time for 10 ms, in s.
     #[arg(long, value_name = "SECONDS")]
     drivers_fail: Option<f64>,
-    /// Lists every access to a peripheral: instant in µs, exception, access.
+    /// Holds the gates' edges against those that the drive makes on the host of the same inputs.
     #[arg(long)]
+    host: bool,
+    /// Lists every access to a peripheral: instant in µs, exception, access.
+    #[arg(long, conflicts_with = "host")]
     record: bool,
     /// Lists the registers that the image has touched.
     #[arg(long)]
@@ -55,8 +61,9 @@ fn run(arguments: &Arguments) -> Result<bool> {
     if arguments.record {
         cpu.machine_mut().record = Some(Vec::new());
     }
+    let mut replay = arguments.host.then(|| Replay::new(&settings, &image)).transpose()?;
     let start = std::time::Instant::now();
-    let outcome = drive(&mut cpu);
+    let outcome = drive_beside(&mut cpu, replay.as_mut());
     let machine = cpu.machine();
     for finding in &machine.findings.all {
         println!("{finding} (in {})", image.function(finding.pc));
@@ -76,7 +83,11 @@ fn run(arguments: &Arguments) -> Result<bool> {
         cpu.longest,
         cpu.longest_uncached,
     );
-    let good = machine.findings.all.is_empty() && talk.failures.is_empty();
+    let same = match &replay {
+        Some(replay) => told(&replay.compare(machine), &machine.world),
+        None => true,
+    };
+    let good = same && machine.findings.all.is_empty() && talk.failures.is_empty();
     println!(
         "{} bytes of flash; RAM {:#010x} to {:#010x} placed, {} bytes of stack used, {} left",
         image.flash_bytes,
@@ -98,4 +109,21 @@ fn run(arguments: &Arguments) -> Result<bool> {
     }
     outcome?;
     Ok(good)
+}
+
+/// Says how far the edges are off the host's; `true` where none is by more than a tick.
+fn told(compared: &Compared, world: &World) -> bool {
+    let Compared { edges, all, worst, missed, first } = *compared;
+    println!(
+        "{edges} of {all} edges held against the host's of the same inputs: {:.1} ns off at most",
+        1e9 * seconds(worst)
+    );
+    if let Some((gate, at)) = first {
+        println!(
+            "{missed} are off by more than a tick, or alone; the first: {} at {:.6} s",
+            world.wiring().gates[gate].1,
+            seconds(at)
+        );
+    }
+    first.is_none() && edges > 0
 }

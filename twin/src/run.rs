@@ -4,6 +4,7 @@ use crate::chip::Chip;
 use crate::core::cpu::Cpu;
 use crate::image::Image;
 use crate::machine::Machine;
+use crate::replay::Replay;
 use crate::stage::PowerStage;
 use crate::time::{MILLISECOND, SECOND, Time};
 use crate::world::side::{Side, Traction, Zs9};
@@ -22,6 +23,9 @@ use tractive_rig::talk::{Lines, System, Talk, script};
 const LONGEST_S: Time = 600;
 /// The time between two looks at what has been found.
 const LOOK: Time = 10 * MILLISECOND;
+
+/// The same with the tasks on the host beside it: half a slot of the operator.
+const BESIDE: Time = MILLISECOND / 2;
 
 /// The settings of a run.
 pub struct Settings {
@@ -55,7 +59,8 @@ impl Settings {
         Ok(Self { name: file.display().to_string(), ..Self::new(image, system, text) })
     }
 
-    fn stage(&self) -> PathBuf {
+    /// The power stage's file.
+    pub fn stage(&self) -> PathBuf {
         let name = match self.system {
             System::Pmasynrm => "power_stage.toml",
             System::Zs9 => "power_stage_zs9.toml",
@@ -67,6 +72,11 @@ impl Settings {
 /// The image in its machine, at the release of reset.
 pub fn prepare(settings: &Settings) -> Result<(Cpu, Image)> {
     let image = Image::read(&settings.image)?;
+    Ok((Cpu::new(&image, machine(settings)?)?, image))
+}
+
+/// The machine around the processor, at the release of reset.
+pub fn machine(settings: &Settings) -> Result<Machine> {
     let (motor, wiring) = match settings.system {
         System::Pmasynrm => (Motor::load(traction::Traction::MACHINE)?, &wiring::TRACTION),
         System::Zs9 => (Motor::load(zs9::Zs9::MACHINE)?, &wiring::ZS9),
@@ -77,7 +87,7 @@ pub fn prepare(settings: &Settings) -> Result<(Cpu, Image)> {
     let rotor = Rotor { inertia_kg_m2: settings.inertia_kg_m2, pole_pairs: parameters.pole_pairs.into() };
     let world =
         World::new(side(settings.system, &motor), wiring, talk, PowerStage::read(&settings.stage())?, rotor);
-    Ok((Cpu::new(&image, Machine::new(Chip::new(), world))?, image))
+    Ok(Machine::new(Chip::new(), world))
 }
 
 fn side(system: System, motor: &Motor) -> Side {
@@ -98,6 +108,15 @@ fn side(system: System, motor: &Motor) -> Side {
 
 /// Runs until the script ends, or something is found.
 pub fn drive(cpu: &mut Cpu) -> Result<()> {
+    drive_beside(cpu, None)
+}
+
+/// The same with the tasks on the host beside it.
+pub fn drive_beside(cpu: &mut Cpu, mut replay: Option<&mut Replay>) -> Result<()> {
+    let look = if replay.is_some() { BESIDE } else { LOOK };
+    if replay.is_some() {
+        cpu.machine_mut().record = Some(Vec::new());
+    }
     loop {
         let machine = cpu.machine();
         if machine.world.done || !machine.findings.all.is_empty() {
@@ -105,6 +124,9 @@ pub fn drive(cpu: &mut Cpu) -> Result<()> {
         }
         let now = machine.now();
         ensure!(now < LONGEST_S * SECOND, "the script has not ended after {LONGEST_S} s");
-        cpu.run(now + LOOK)?;
+        cpu.run(now + look)?;
+        if let Some(replay) = &mut replay {
+            replay.follow(cpu)?;
+        }
     }
 }

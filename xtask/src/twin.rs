@@ -96,11 +96,15 @@ fn twin(verb: &str) -> Command {
 fn drive(image: &Path, system: System, script: &Path, out: &Path) -> Command {
     say("building the twin …");
     let absolute = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+    let is = |name: &str| script.file_stem().is_some_and(|stem| stem == name);
     let mut command = twin("run");
     command.args(["--quiet", "--"]);
     command.args([absolute(image), absolute(script)]).args(["--system", twins_name(system)]);
     command.arg("--out").arg(absolute(out));
-    if script.file_stem().is_some_and(|name| name == FAULT) {
+    if system == System::Traction && is(SCENARIO) {
+        command.arg("--host");
+    }
+    if is(FAULT) {
         command.args(["--drivers-fail", DRIVERS_FAIL_S]);
     }
     command

@@ -156,6 +156,13 @@ pub fn revise_pulses() {
     cortex_m::asm::isb();
 }
 
+/// The last thing in an interrupt: its stores are done before it returns. A store that is still under way while a handler returns and another
+/// interrupt changes what comes next can let the core fetch the wrong vector (Cortex-M4 erratum 838869).
+#[inline(always)]
+pub fn complete_stores() {
+    cortex_m::asm::dsb();
+}
+
 /// The idle loop, forever: serves the bus and the operator, feeds the watchdog, tells what has changed, and after a fault what the flight recorder
 /// holds. Where the start was `refused` it says why to whoever asks on the bus.
 pub fn idle(refused: Option<Violation>) -> ! {

@@ -77,6 +77,7 @@ mod firmware {
         });
         task.run(board, &SHARED);
         PULSE.control_ran();
+        nucleo_g474re::complete_stores();
     }
 
     /// Deadline: the next carrier boundary, where the shadow registers take over. Missed: a break, gates off for good.
@@ -93,6 +94,7 @@ mod firmware {
         if task.run(board, &SHARED) {
             PULSE.pwm_ran();
         }
+        nucleo_g474re::complete_stores();
     }
 
     #[exception]

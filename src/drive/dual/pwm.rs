@@ -200,13 +200,14 @@ impl<M: Machine> PwmTask<M> {
     }
 
     /// Gates that were not seen as they should be since the last peak: in the falling half of the one period and the rising
-    /// half of the other.
+    /// half of the other. A pause must be seen in its rising half alone: the falling one may be over before the board has begun to look
+    /// anew, where it lies close around the peak.
     fn stuck(&self, seen: &GateFeedback) -> Option<Violation> {
         let [before, running] = &self.expected;
         let missing = (before.must_be_on | running.must_be_on) & !seen.on;
         let surplus = seen.on & !(before.may_be_on | running.may_be_on);
-        let never_off = (before.is_off | running.is_off) ^ seen.off;
-        let wrong = (missing | surplus | never_off) & ALL_GATES;
+        let off = (running.is_off | before.is_off & seen.off) ^ seen.off;
+        let wrong = (missing | surplus | off) & ALL_GATES;
         (wrong != 0).then_some((Fault::LegStuck, f32::from(wrong), 0.0))
     }
 

@@ -34,8 +34,9 @@ const PAINT: u8 = 0xA5;
 const STALL_CYCLES: u32 = 17;
 /// The flag of a reset by the pin, which every reset drives.
 const PIN_RESET: u32 = 1 << 26;
-/// CONTROL.FPCA.
-const FPCA: u32 = 1 << 2;
+/// CONTROL.FPCA, and the bit beside it, SFPA of ARMv8-M: the emulator takes the core to be in its secure state, and without that bit makes a
+/// new floating-point context, FPSCR and its flags anew, at the next floating-point instruction.
+const FLOAT_CONTEXT: u32 = 0b11 << 2;
 /// Words of a frame, and of the floating-point registers in it.
 const FRAME: u32 = 8;
 const FLOATS: u32 = 18;
@@ -295,7 +296,7 @@ impl Cpu {
         }
         let outer = self.machine().nvic.active.last().copied().unwrap_or(0) as u32;
         self.set(R::XPSR_NZCVQG, xpsr & !0x3FF | outer)?;
-        self.set(R::CONTROL, if floats { FPCA } else { 0 })?;
+        self.set(R::CONTROL, if floats { FLOAT_CONTEXT } else { 0 })?;
         self.set(R::SP, frame + 4 * words + if xpsr & 1 << 9 != 0 { 4 } else { 0 })?;
         self.machine_mut().pass(ENTRY + if floats { FLOAT_CYCLES } else { 0 });
         self.jump(stack[6] | 1)

@@ -3,3 +3,6 @@
 mod cost;
 pub mod cpu;
 pub mod nvic;
+
+#[cfg(test)]
+mod tests;

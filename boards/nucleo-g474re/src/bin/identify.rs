@@ -91,6 +91,7 @@ mod firmware {
         let newest = task.law_mut().take();
         MEMORY.take(newest.as_ref(), &UNITS, SHARED.operator.has_told(now));
         PULSE.control_ran();
+        nucleo_g474re::complete_stores();
     }
 
     /// Deadline: the next carrier boundary, where the shadow registers take over. Missed: a break, gates off for good.
@@ -107,6 +108,7 @@ mod firmware {
         if task.run(board, &SHARED) {
             PULSE.pwm_ran();
         }
+        nucleo_g474re::complete_stores();
     }
 
     #[exception]

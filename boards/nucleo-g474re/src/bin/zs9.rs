@@ -72,6 +72,7 @@ mod firmware {
         });
         TASK.get_or_insert_with(|| ControlTask::new(BuiltIn, settings())).run(board, &SHARED);
         PULSE.control_ran();
+        nucleo_g474re::complete_stores();
     }
 
     /// Comes at peaks and valleys; only the peaks are the drive's. Deadline: the next valley, where the shadow registers take
@@ -84,6 +85,7 @@ mod firmware {
         if TASK.get_or_insert_with(|| PwmTask::new(BuiltIn, settings())).run(board, &SHARED) {
             PULSE.pwm_ran();
         }
+        nucleo_g474re::complete_stores();
     }
 
     #[exception]

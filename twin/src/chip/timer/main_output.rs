@@ -6,7 +6,8 @@ use crate::finding::Findings;
 use crate::time::Time;
 
 impl Timer {
-    pub(super) fn dead(&self, cycle: Time) -> Time {
+    /// The dead time that its generator makes.
+    pub fn dead(&self, cycle: Time) -> Time {
         output::dead_periods(self.word(BDTR) & 0xFF) * (cycle << (self.word(CR1) >> 8 & 0b11))
     }
 

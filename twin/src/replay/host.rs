@@ -1,0 +1,233 @@
+//! The drive's tasks on the host, given what the image's were given.
+
+use super::given::Given;
+use anyhow::{Context, Result};
+use std::path::Path;
+use tractive::control::{Demand, Gains, LinkWindow};
+use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
+use tractive::frames::{Abc, Angle};
+use tractive::machine::Tables;
+use tractive::modulation::{CarrierHalf, SwitchLimits};
+use tractive::ports::{ControlPort, DriveCommand, PwmPort, Report, Sample};
+use tractive::protection::SafeState;
+use tractive::time::{Clock, Instant};
+
+/// The core's clock, in Hz.
+const CORE_HZ: u32 = 170_000_000;
+/// Cycles of a tick at most.
+const COARSEST: u32 = 8;
+
+/// The power stage's file.
+#[derive(Clone, Debug, serde::Deserialize)]
+pub struct Stage {
+    control_hz: u32,
+    dead_time_ns: u32,
+    min_pulse_ns: u32,
+    current_range_a: f64,
+    dc_link_range_v: f64,
+    encoder_counts: u64,
+    encoder_zeros_deg: [f64; 1],
+    behind_line_filter: bool,
+}
+
+impl Stage {
+    /// Reads the file. The error names it.
+    pub fn read(path: &Path) -> Result<Self> {
+        let text = std::fs::read_to_string(path).with_context(|| path.display().to_string())?;
+        toml::from_str(&text).with_context(|| path.display().to_string())
+    }
+
+    /// Cycles of a tick of the drive's.
+    pub fn prescaler(&self) -> u32 {
+        let period = CORE_HZ / self.control_hz;
+        (1..=COARSEST).rev().find(|cycles| period.is_multiple_of(*cycles)).unwrap_or(1)
+    }
+
+    fn settings(&self, max_switching_hz: f32) -> Settings {
+        let ticks_per_s = CORE_HZ / self.prescaler();
+        let clock = Clock::new(ticks_per_s, ticks_per_s / self.control_hz);
+        let ticks = |ns: u32| {
+            let cycles = (u64::from(ns) * u64::from(CORE_HZ)).div_ceil(1_000_000_000) as u32;
+            cycles.div_ceil(self.prescaler())
+        };
+        let (pulse, dead) = (ticks(self.min_pulse_ns), ticks(self.dead_time_ns));
+        let devices = SwitchLimits::new(pulse, dead, max_switching_hz, &clock);
+        Settings { clock, devices, gains: Gains::of(false, self.behind_line_filter) }
+    }
+}
+
+/// A half, and the instant at which it begins.
+#[derive(Clone, Copy, Debug)]
+pub struct Begun {
+    /// Ticks since the timers' start.
+    pub begins: u32,
+    /// The half.
+    pub half: CarrierHalf,
+}
+
+/// Both tasks.
+pub struct Host {
+    control: ControlTask,
+    pwm: PwmTask,
+    shared: Shared<'static>,
+    board: Board,
+    /// The halves so far.
+    pub halves: Vec<Begun>,
+}
+
+/// The sensors' scales, the encoder, and the commands.
+struct Board {
+    zeros: [[u32; 3]; 2],
+    a_per_code: f32,
+    v_per_code: f32,
+    units_per_count: u32,
+    zero: Angle,
+    /// The index has passed in the call before; the angle is known.
+    passed: bool,
+    known: bool,
+    commands: Vec<(Instant, DriveCommand)>,
+}
+
+impl Host {
+    /// At rest. The zeros are those that the image has measured, of control's converter and of the PWM's.
+    pub fn new(stage: &Stage, tables: &'static Tables, zeros: [[u32; 3]; 2]) -> Self {
+        let settings = stage.settings(tables.ratings.max_switching_hz);
+        let turns = (tables.ratings.pole_pairs as u64) << 32;
+        let degrees = stage.encoder_zeros_deg[0] / 360.0 * 2f64.powi(32);
+        let board = Board {
+            zeros,
+            a_per_code: stage.current_range_a as f32 / 2_048.0,
+            v_per_code: stage.dc_link_range_v as f32 / 4_095.0,
+            units_per_count: ((turns + stage.encoder_counts / 2) / stage.encoder_counts) as u32,
+            zero: Angle(degrees.round() as i64 as u32),
+            passed: false,
+            known: false,
+            commands: Vec::new(),
+        };
+        Self {
+            control: ControlTask::new(tables, settings, Instant(settings.clock.control_ticks)),
+            pwm: PwmTask::new(tables, settings, Instant(settings.devices.shortest_half_ticks)),
+            shared: Shared::new(),
+            board,
+            halves: Vec::new(),
+        }
+    }
+
+    /// A command of the operator's mailbox, by its words, as the image's idle loop has left it there.
+    pub fn command(&mut self, [from, flags, torque, window @ ..]: [u32; 7]) {
+        let [motoring_none_v, motoring_full_v, braking_full_v, braking_none_v] = window.map(f32::from_bits);
+        let from = Instant(from);
+        if self.board.commands.iter().rev().any(|(known, _)| *known == from) {
+            return;
+        }
+        let command = DriveCommand {
+            enable: flags & 1 != 0,
+            demand: Demand { torque_nm: f32::from_bits(torque), slew_limited: flags & 2 != 0 },
+            window: LinkWindow { motoring_none_v, motoring_full_v, braking_full_v, braking_none_v },
+            acknowledge: (flags >> 8) as u8,
+        };
+        self.board.commands.push((from, command));
+    }
+
+    /// An interrupt.
+    pub fn run(&mut self, given: &Given) {
+        let Self { control, pwm, shared, board, halves } = self;
+        if given.control {
+            control.run(&mut ControlSide { given, board, pwm, shared, halves }, shared);
+        } else {
+            play(pwm, shared, halves, board.currents(1, [1, 2, 3].map(|rank| given.codes[rank])), true);
+        }
+    }
+}
+
+/// The PWM's task, at a boundary or for a revision.
+fn play(pwm: &mut PwmTask, shared: &Shared, halves: &mut Vec<Begun>, currents_a: Abc, boundary: bool) {
+    let mut side = PwmSide { boundary, currents_a, played: None };
+    pwm.run(&mut side, shared);
+    let Some(half) = side.played else { return };
+    if !boundary {
+        halves.pop();
+    }
+    halves.push(Begun { begins: pwm.next_call().0, half });
+}
+
+impl Board {
+    fn currents(&self, converter: usize, codes: [u32; 3]) -> Abc {
+        let current = |phase: usize| {
+            (codes[phase] as i32 - self.zeros[converter][phase] as i32) as f32 * self.a_per_code
+        };
+        Abc { a: current(0), b: current(1), c: current(2) }
+    }
+
+    fn angle(&mut self, given: &Given) -> Option<Angle> {
+        let passed = std::mem::replace(&mut self.passed, given.index);
+        self.known |= passed;
+        self.known.then(|| Angle(given.count.wrapping_mul(self.units_per_count)) + self.zero)
+    }
+}
+
+struct ControlSide<'a> {
+    given: &'a Given,
+    board: &'a mut Board,
+    pwm: &'a mut PwmTask,
+    shared: &'a Shared<'static>,
+    halves: &'a mut Vec<Begun>,
+}
+
+impl ControlPort for ControlSide<'_> {
+    fn begin(&mut self, _revises: bool) {
+        if self.given.revised {
+            play(self.pwm, self.shared, self.halves, Abc::default(), false);
+        }
+    }
+
+    fn sample(&mut self, _now: Instant) -> Sample {
+        let [u, v, w, link] = self.given.codes;
+        Sample {
+            currents_a: self.board.currents(0, [u, v, w]),
+            udc_v: link as f32 * self.board.v_per_code,
+            angle: self.board.angle(self.given),
+            may_pulse: true,
+            hardware: None,
+        }
+    }
+
+    fn command(&mut self, now: Instant, _operator: impl FnOnce() -> DriveCommand) -> DriveCommand {
+        let mut held = self.board.commands.iter().rev().filter(|(from, _)| now.reached(*from));
+        held.next().map_or_else(DriveCommand::default, |(_, command)| *command)
+    }
+
+    fn enter(&mut self, _safe: SafeState, _now: Instant) {}
+
+    fn overrun_ticks(&mut self, _now: Instant, _deadline_ticks: u32) -> u32 {
+        0
+    }
+
+    fn report(&mut self, _now: Instant, _report: &Report) {}
+}
+
+struct PwmSide {
+    boundary: bool,
+    currents_a: Abc,
+    played: Option<CarrierHalf>,
+}
+
+impl PwmPort for PwmSide {
+    fn begin(&mut self) -> bool {
+        self.boundary
+    }
+
+    fn sample(&mut self, _now: Instant) -> Abc {
+        self.currents_a
+    }
+
+    fn play(&mut self, _now: Instant, next: &CarrierHalf) {
+        self.played = Some(*next);
+    }
+
+    fn enter(&mut self, _safe: SafeState, _now: Instant) {}
+
+    fn leave(&mut self, _now: Instant) -> bool {
+        true
+    }
+}
