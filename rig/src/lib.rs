@@ -15,6 +15,7 @@ pub mod columns;
 pub mod commission;
 pub mod compare;
 pub mod curves;
+pub mod dbc;
 pub mod distortion;
 pub mod figures;
 pub mod files;

@@ -60,6 +60,12 @@ impl Message {
         Payload(content.0 ^ worth.wrapping_mul(scales.code(mask) as u64))
     }
 
+    /// The quantities whose scales it tells.
+    pub fn quantities(&self) -> impl Iterator<Item = Quantity> {
+        let (_, mask) = self.mark;
+        Quantity::SCALED.into_iter().filter(move |quantity| mask & Scales::mask(&[*quantity]) != 0)
+    }
+
     /// The signal of the bits that tell the scales, with the one value that it may have; `None` on the usual scales.
     pub fn mark_signal(&self, scales: Scales) -> Option<Signal> {
         let (worth, mask) = self.mark;

@@ -6,7 +6,7 @@ use super::telemetry::{CURRENT_A, FREQUENCY_HZ, SPEED_RPM};
 use crate::machine::Ratings;
 use core::f32::consts::TAU;
 
-/// A physical quantity whose signals' steps follow from the machine, by its power's place among the bits of [`Scales`].
+/// A physical quantity whose signals' steps follow from the machine, by its exponent's place among the bits of [`Scales`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u8)]
@@ -39,18 +39,18 @@ impl Quantity {
     }
 }
 
-/// Bits of a power of ten, in two's complement.
+/// Bits of an exponent, in two's complement.
 const BITS: u32 = 4;
-const POWER: u32 = 0xF;
-/// The powers' ends.
-const POWERS: [i32; 2] = [-4, 4];
+const NIBBLE: u32 = 0xF;
+/// The exponents' ends.
+const EXPONENTS: [i32; 2] = [-4, 4];
 
-/// The worth of each power by its bits: 0 to 7, then −8 to −1.
+/// The worth of each exponent by its bits: 0 to 7, then −8 to −1.
 const WORTH: [f32; 16] =
     [1.0, 10.0, 100.0, 1e3, 1e4, 1e5, 1e6, 1e7, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.1];
 
-const fn worth(power: i32) -> f32 {
-    WORTH[(power as u32 & POWER) as usize]
+const fn worth(exponent: i32) -> f32 {
+    WORTH[(exponent as u32 & NIBBLE) as usize]
 }
 
 /// Steps in a rating, at least.
@@ -61,16 +61,16 @@ const TORQUE_MARGIN: f32 = 1.5;
 
 /// 0, the usual step; a tenth of it, and again, while a rating has less than 500 steps; ten times that while the most that is to be told,
 /// as a share of the usual range, lies beyond it.
-const fn power(rated_steps: f32, most: f32) -> i32 {
-    let [lowest, highest] = POWERS;
-    let mut power = 0;
-    while power > lowest && rated_steps < FEWEST_STEPS * worth(power) {
-        power -= 1;
+const fn exponent(rated_steps: f32, most: f32) -> i32 {
+    let [lowest, highest] = EXPONENTS;
+    let mut exponent = 0;
+    while exponent > lowest && rated_steps < FEWEST_STEPS * worth(exponent) {
+        exponent -= 1;
     }
-    while power < highest && most > worth(power) {
-        power += 1;
+    while exponent < highest && most > worth(exponent) {
+        exponent += 1;
     }
-    power
+    exponent
 }
 
 /// The worth of a step of every quantity, as powers of ten of the usual one: four bits each.
@@ -89,24 +89,24 @@ impl Scales {
         let trip_hz = ratings.pole_pairs * ratings.trip_speed_rad_s / TAU / FREQUENCY_HZ[1];
         let torque_nm = ratings.max_torque_nm;
         Self::USUAL
-            .with(Quantity::Torque, power(torque_nm / 0.1, TORQUE_MARGIN * torque_nm / TORQUE_NM[1]))
+            .with(Quantity::Torque, exponent(torque_nm / 0.1, TORQUE_MARGIN * torque_nm / TORQUE_NM[1]))
             .with(
                 Quantity::Current,
-                power(ratings.max_current_a / 0.1, ratings.trip_current_a / CURRENT_A[1]),
+                exponent(ratings.max_current_a / 0.1, ratings.trip_current_a / CURRENT_A[1]),
             )
             .with(
                 Quantity::Voltage,
-                power(ratings.dc_link_nominal_v / 0.1, ratings.trip_dc_over_v / LINK_V[1]),
+                exponent(ratings.dc_link_nominal_v / 0.1, ratings.trip_dc_over_v / LINK_V[1]),
             )
-            .with(Quantity::Speed, power(rpm / 0.5, if trip_rpm > trip_hz { trip_rpm } else { trip_hz }))
+            .with(Quantity::Speed, exponent(rpm / 0.5, if trip_rpm > trip_hz { trip_rpm } else { trip_hz }))
     }
 
-    const fn with(self, quantity: Quantity, power: i32) -> Self {
-        Self(self.0 | (power as u32 & POWER) << (quantity as u32))
+    const fn with(self, quantity: Quantity, exponent: i32) -> Self {
+        Self(self.0 | (exponent as u32 & NIBBLE) << (quantity as u32))
     }
 
-    /// The power of a quantity.
-    pub const fn power(self, quantity: Quantity) -> i32 {
+    /// The exponent of a quantity.
+    pub const fn exponent(self, quantity: Quantity) -> i32 {
         let unused = u32::BITS - BITS;
         ((self.bits(quantity) << unused) as i32) >> unused
     }
@@ -117,7 +117,7 @@ impl Scales {
     }
 
     const fn bits(self, quantity: Quantity) -> u32 {
-        self.0 >> (quantity as u32) & POWER
+        self.0 >> (quantity as u32) & NIBBLE
     }
 
     /// The bits of these quantities.
@@ -125,17 +125,17 @@ impl Scales {
         let mut mask = 0;
         let mut index = 0;
         while index < quantities.len() {
-            mask |= POWER << (quantities[index] as u32);
+            mask |= NIBBLE << (quantities[index] as u32);
             index += 1;
         }
         mask
     }
 
-    /// The four bits by which a message tells the powers of the quantities under its mask: the exclusive or of them.
+    /// The four bits by which a message tells the exponents of the quantities under its mask: the exclusive or of them.
     pub(super) const fn code(self, mask: u32) -> u32 {
-        let powers = self.0 & mask;
-        let folded = powers ^ powers >> (2 * BITS);
-        (folded ^ folded >> BITS) & POWER
+        let exponents = self.0 & mask;
+        let folded = exponents ^ exponents >> (2 * BITS);
+        (folded ^ folded >> BITS) & NIBBLE
     }
 
     /// A value as it is on the usual scales.

@@ -65,7 +65,7 @@ fn talk(commission: &Commission, options: &Options, machine: &Machine, script: &
     let parameters = &machine.folder.parameters;
     let inertia = identify.inertia.unwrap_or(parameters.rotor_inertia_kg_m2);
     let lines = Lines::of_text(script, System::Pmasynrm)?;
-    let mut talk = Talk::new(System::Pmasynrm, lines, inertia, parameters.max_torque_nm);
+    let mut talk = Talk::new(System::Pmasynrm, lines, inertia, &machine.tables.ratings);
     match &identify.can {
         Some(interface) => can::command(interface, &mut talk)?,
         None => {

@@ -7,6 +7,7 @@ use anyhow::{Result, anyhow, bail};
 use indicatif::ProgressBar;
 use std::fmt::Write as _;
 use tractive::identification::{Observation, PACKED_WORDS, Packed, Stage, Units};
+use tractive::machine::Ratings;
 use tractive::protocol::{
     EXPERIMENT, ExperimentFrame, FROM_IDENTIFICATION, Frame, OBSERVATION, ObservationFrame, Payload,
 };
@@ -79,13 +80,14 @@ const SLOTS_S: u64 = 1_000;
 const FAULT_SLOTS: u64 = 250;
 
 impl Commander {
-    /// Before the first slot, of a drive whose ratings give these units.
-    pub fn new(units: Units) -> Self {
+    /// Before the first slot, of a drive of these ratings.
+    pub fn new(ratings: &Ratings) -> Self {
+        let scales = System::Pmasynrm.scales(ratings);
         Self {
-            sender: Sender::new(System::Pmasynrm),
+            sender: Sender::new(System::Pmasynrm, scales),
             command: Spoken::default(),
-            listener: Listener::new(System::Pmasynrm),
-            units,
+            listener: Listener::new(System::Pmasynrm, scales),
+            units: Units::of(ratings),
             phase: Phase::Wait,
             slot: 0,
             since: 0,
@@ -222,6 +224,9 @@ impl Supervisor for Commander {
     }
 
     fn slot(&mut self, t_s: f64) -> Result<Turn> {
+        if let Some(foreign) = &self.listener.foreign {
+            bail!("{foreign}");
+        }
         self.advance()?;
         if self.slot.is_multiple_of(100) {
             self.show();

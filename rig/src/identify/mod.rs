@@ -31,7 +31,7 @@ use clap::Args;
 use serde_json::Map;
 use std::path::PathBuf;
 use std::process::ExitCode;
-use tractive::identification::{Observation, Stage, Units};
+use tractive::identification::{Observation, Stage};
 
 /// The options of an identification.
 #[derive(Clone, Debug, Args)]
@@ -104,7 +104,7 @@ pub fn identified(identify: &Identify, machine: &Machine) -> Result<std::result:
     let inertia_kg_m2 = identify.inertia.unwrap_or(parameters.rotor_inertia_kg_m2);
     let stand = Stand { inertia_kg_m2, fault_at_s: identify.fault_at };
     let (recording, observed) = if identify.over_protocol {
-        let mut commander = Commander::new(Units::of(&machine.tables.ratings));
+        let mut commander = Commander::new(&machine.tables.ratings);
         let recording = identification::drive_commanded(options, machine, &stand, &mut commander)?;
         if let Some(log) = &identify.frames {
             write_text(log, &commander.frames)?;
@@ -143,7 +143,7 @@ fn complete(observations: Vec<Observation>) -> std::result::Result<Vec<Observati
 
 /// The same of a drive on a CAN bus, whose truth nobody knows.
 fn on_bus(interface: &str, machine: &Machine) -> Result<std::result::Result<Outcome, Ended>> {
-    let mut commander = Commander::new(Units::of(&machine.tables.ratings));
+    let mut commander = Commander::new(&machine.tables.ratings);
     can::command(interface, &mut commander)?;
     let observations = match commander.finish().and_then(complete) {
         Ok(observations) => observations,

@@ -7,6 +7,7 @@ use anyhow::Result;
 use serde_json::{Value, json};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
+use tractive::machine::Ratings;
 use tractive::modulation::Mode;
 use tractive::nine_switch::Scheme;
 use tractive::protocol::Frame;
@@ -59,9 +60,9 @@ pub struct Relay {
 }
 
 impl Relay {
-    /// To a drive of a system whose rotor has an inertia in kg·m² and a largest torque in N·m.
-    pub fn new(system: System, inertia_kg_m2: f64, largest_nm: f64, shared: Arc<Shared>) -> Self {
-        let talk = Talk::new(system, Lines::Said, inertia_kg_m2, largest_nm);
+    /// To a drive of a system whose rotor has an inertia in kg·m², of a machine of these ratings.
+    pub fn new(system: System, inertia_kg_m2: f64, ratings: &Ratings, shared: Arc<Shared>) -> Self {
+        let talk = Talk::new(system, Lines::Said, inertia_kg_m2, ratings);
         Self { system, talk, shared, began: Instant::now(), refused: None }
     }
 
