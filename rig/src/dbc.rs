@@ -88,7 +88,11 @@ fn names(signal: &Signal) -> BTreeMap<u32, &'static str> {
         }
         "scheme" => Scheme::ALL.iter().map(|scheme| scheme.name()).enumerate().map(numbered).collect(),
         "stage" => Stage::ALL.iter().map(|stage| stage.name()).enumerate().map(numbered).collect(),
-        "mode" => Mode::ALL.iter().map(|mode| (*mode as u32, mode.name())).collect(),
+        // The optimised patterns come last, and are in images with their feature only.
+        "mode" => {
+            let modes = Mode::ALL.iter().filter(|mode| **mode as u32 <= Mode::Mid5 as u32);
+            modes.map(|mode| (*mode as u32, mode.name())).collect()
+        }
         "listening" => Listening::ALL.iter().map(|(code, name)| (*code as u32, *name)).collect(),
         "result" => Outcome::ALL.iter().map(|(code, name)| (*code as u32, *name)).collect(),
         _ => BTreeMap::new(),

@@ -54,7 +54,29 @@ fn an_angle_whose_zero_or_direction_is_wrong_is_told_and_nothing_turns_with_it()
         assert!(!record["finished"].as_bool().unwrap());
         let complaint = record["step"][1]["complaints"][0].as_str().unwrap();
         assert!(complaint.starts_with("fault rotor_turned"), "{words}: {complaint}");
+        let advice = record["step"][1]["advice"][0].as_str().unwrap();
+        assert!(advice.contains("encoder_zeros_deg"), "{advice}");
         assert!(!place.path().join("found").exists(), "no tables of a machine that was not found");
+    }
+}
+
+/// A zero that is some degrees off, so that the rotor turns away, is told with the key to change and the number to add; with that it passes.
+#[test]
+fn the_number_that_mends_the_angles_zero_is_told() {
+    let mut error_deg = 8.0;
+    for passes in [false, true] {
+        let place = tempfile::tempdir().unwrap();
+        let (code, said, record) = commissioned(&format!("--angle-error {error_deg}"), place.path());
+        assert_eq!(code == 0, passes, "{said}");
+        let advice = record["step"][1]["advice"].as_array().unwrap();
+        assert_eq!(advice.is_empty(), passes, "{advice:?}");
+        if let Some(advice) = advice.first() {
+            let text = advice.as_str().unwrap();
+            let number = text.strip_prefix("power stage, encoder_zeros_deg: add ").expect(text);
+            // The angle that the drive reads is its zero and what the encoder has counted.
+            error_deg += number.split(';').next().unwrap().parse::<f64>().expect(text);
+            assert!(!place.path().join("found").exists());
+        }
     }
 }
 

@@ -50,6 +50,8 @@ pub struct Ended {
     pub value: String,
     /// The limit.
     pub limit: String,
+    /// The number that mends the angle's zero, electrical, in degrees, where the rotor has turned away and the pulses tell it.
+    pub zero_deg: Option<f64>,
 }
 
 /// The commander's state.
@@ -181,7 +183,7 @@ impl Commander {
                 self.enter(Phase::Over);
             }
             if told || self.slot > self.since + FAULT_SLOTS {
-                self.ended = Some(Ended { fault, value, limit });
+                self.ended = Some(Ended { fault, value, limit, zero_deg: None });
             }
         }
         let (most_s, lacking) = self.phase.most();
