@@ -203,7 +203,7 @@ fn every_difference_is_told() {
     }
 }
 
-/// What is measured comes as it was sent, within half a step.
+/// Measurements come as they were sent, within half a step.
 #[test]
 fn measurements_come_through() {
     let scales = Scales::of(&tables("pmsm-48v-1kw").ratings);

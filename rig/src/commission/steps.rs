@@ -146,7 +146,7 @@ fn identification(commission: &Commission, machine: &Machine) -> Result<Step> {
     Ok(step)
 }
 
-/// What mends signs and zeros that are not right: the key with the number to add, or the wires.
+/// Advice on signs and zeros that are not right: the key with the number to add, or the wires.
 fn advise(signs: &Signs, step: &mut Step) {
     let Signs { response_deg, zero_deg } = *signs;
     if response_deg.abs() > 180.0 - RESPONSE_DEG {
@@ -164,10 +164,12 @@ fn advise(signs: &Signs, step: &mut Step) {
 }
 
 fn zero_off(zero_deg: f64) -> String {
-    format!("power stage, encoder_zeros_deg: add {zero_deg:.1}; then flash this image anew and begin anew")
+    format!(
+        "power stage, encoder_zeros_deg: add about {zero_deg:.1}; then flash this image anew and begin anew"
+    )
 }
 
-/// What mends an angle by which the rotor turns away.
+/// Advice on an angle by which the rotor turns away.
 fn turned_away(zero_deg: Option<f64>) -> String {
     match zero_deg {
         Some(zero_deg) if zero_deg.abs() > LEAST_ZERO_DEG => zero_off(zero_deg),
