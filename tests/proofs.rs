@@ -6,7 +6,7 @@ use std::thread;
 use tractive::frames::Angle;
 use tractive::modulation::{Modulator, Reference, Schedule, SwitchLimits};
 use tractive::protocol::e2e::{data_ids, is_intact, protect};
-use tractive::protocol::{Command, LinkLimits, Payload, TorqueLimits};
+use tractive::protocol::{Command, LinkLimits, Payload, Scales, TorqueLimits};
 use tractive::time::{Clock, Instant};
 
 const CLOCK: Clock = Clock::new(25_000_000, 2_500);
@@ -112,8 +112,8 @@ fn up_to_three_wrong_bits_and_every_burst_of_eight_are_found() {
 #[test]
 fn every_word_of_a_command_comes_back_as_it_was() {
     let comes_back = |payload: Payload| {
-        let command = Command::decode(payload);
-        command.inspect(|command| assert_eq!(command.encode().ok(), Some(payload))).is_some()
+        let command = Command::decode(payload, Scales::USUAL);
+        command.inspect(|command| assert_eq!(command.encode(Scales::USUAL).ok(), Some(payload))).is_some()
     };
     let mut taken = 0;
     for levels in 0..1_u32 << 7 {
@@ -128,8 +128,8 @@ fn every_word_of_a_command_comes_back_as_it_was() {
             acknowledge: is_set(6),
             torque_nm: 0.0,
         };
-        let levels = command.encode().unwrap();
-        assert_eq!(Command::decode(levels), Some(command));
+        let levels = command.encode(Scales::USUAL).unwrap();
+        assert_eq!(Command::decode(levels, Scales::USUAL), Some(command));
         taken += (0..1_u64 << 16).filter(|torque| comes_back(Payload(levels.0 | torque << 16))).count();
     }
     assert_eq!(taken, 128 * 60_001, "torques of −3,000 to 3,000 N·m by tenths, and no other");
@@ -147,15 +147,15 @@ fn every_word_of_the_limits_comes_back_as_it_was() {
     for word in 0..1_u64 << 16 {
         for (shift, beside) in [(16, 1 << 48), (32, 1 << 48), (48, 0)] {
             let payload = Payload(word << shift | beside);
-            if let Some(limits) = TorqueLimits::decode(payload) {
-                assert_eq!(limits.encode().ok(), Some(payload));
+            if let Some(limits) = TorqueLimits::decode(payload, Scales::USUAL) {
+                assert_eq!(limits.encode(Scales::USUAL).ok(), Some(payload));
                 taken[0] += 1;
             }
         }
         for shift in [16, 32] {
             let payload = Payload(word << shift | if shift == 16 { 60_000 << 32 } else { 1 << 16 });
-            if let Some(limits) = LinkLimits::decode(payload) {
-                assert_eq!(limits.encode().ok(), Some(payload));
+            if let Some(limits) = LinkLimits::decode(payload, Scales::USUAL) {
+                assert_eq!(limits.encode(Scales::USUAL).ok(), Some(payload));
                 taken[1] += 1;
             }
         }

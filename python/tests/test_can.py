@@ -89,5 +89,26 @@ def test_bad_signals_are_named():
         Sender().frame("COMMAND", torque_nm=3001)
 
 
+@pytest.fixture(scope="module")
+def low_voltage(tmp_path_factory):
+    out = tmp_path_factory.mktemp("dbc") / "low.dbc"
+    subprocess.run([*rig(), "dbc", "--machine", "pmsm-48v-1kw", "--out", str(out)], check=True, cwd=ROOT, capture_output=True)
+    return Protocol(out)
+
+
+def test_another_machines_file_has_other_steps_and_they_are_not_misread(low_voltage):
+    usual = Protocol()
+    for protocol, other, torque_nm in [(low_voltage, usual, 1.234), (usual, low_voltage, 123.4)]:
+        sender = Sender(protocol)
+        frames = [_words(sender.frame("COMMAND", enable=1, torque_nm=torque_nm)) for _ in range(3)]
+        own, foreign = Receiver(protocol), Receiver(other)
+        assert own.take(**frames[0])[1]["torque_nm"] == pytest.approx(torque_nm)
+        assert foreign.take(**frames[0])[1] == "scaled otherwise"
+    with pytest.raises(ValueError, match="torque_nm"):
+        Sender(low_voltage).frame("COMMAND", torque_nm=31)
+    with pytest.raises(ValueError, match="scale"):
+        Sender(low_voltage).frame("COMMAND", scale=0)
+
+
 def _words(frame):
     return {"identifier": frame["arbitration_id"], "data": frame["data"]}

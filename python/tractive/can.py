@@ -1,14 +1,17 @@
-"""The drive's CAN protocol: signals after tractive.dbc, protected end to end after AUTOSAR's profile 2."""
+"""The drive's CAN protocol: signals after a DBC file, protected end to end after AUTOSAR's profile 2."""
 
 from __future__ import annotations
 
 import math
 from importlib.resources import files
+from pathlib import Path
 
 import cantools
 
 POLYNOMIAL = 0x2F
 MAX_DELTA = 3
+# The signal by which a message says in which steps it counts, where they are not the usual ones.
+SCALE = "scale"
 
 
 def _remainder(value: int) -> int:
@@ -39,11 +42,12 @@ def crc_of(data: bytes, number: int) -> int:
 
 
 class Protocol:
-    """The messages of both systems."""
+    """The messages of both systems, in the steps of a machine: as `cargo rig dbc --machine DIR --out FILE` writes them, without a file those
+    of the papers' machines."""
 
-    def __init__(self):
-        with files(__package__).joinpath("tractive.dbc").open() as dbc:
-            self.messages = cantools.database.load(dbc, database_format="dbc")
+    def __init__(self, dbc=None):
+        with (Path(dbc) if dbc else files(__package__).joinpath("tractive.dbc")).open() as text:
+            self.messages = cantools.database.load(text, database_format="dbc")
 
     def message(self, name_or_id):
         """A message by its name or identifier. KeyError where there is none."""
@@ -59,10 +63,11 @@ class Protocol:
     def encode(self, name: str, counter: int, signals: dict) -> bytes:
         """The eight bytes of a message; signals that are not named are 0. ValueError names one that is unknown or out of its range."""
         message = self.message(name)
-        known = {signal.name for signal in message.signals} - {"crc", "counter"}
+        known = {signal.name for signal in message.signals} - {"crc", "counter", SCALE}
         if unknown := set(signals) - known:
             raise ValueError(f"{name}: {', '.join(sorted(unknown))}: must be of {', '.join(sorted(known))}")
-        values = {signal.name: 0 for signal in message.signals} | signals | {"crc": 0, "counter": counter & 0xF}
+        values = {signal.name: signal.minimum if signal.name == SCALE else 0 for signal in message.signals}
+        values |= signals | {"crc": 0, "counter": counter & 0xF}
         # Of what shares its place by pages only the page's own is sent.
         page = next((values[signal.name] for signal in message.signals if signal.is_multiplexer), None)
         values = {
@@ -84,8 +89,19 @@ class Protocol:
         return {
             signal.name: None if _is_missing(signal, raw[signal.name]) else scaled[signal.name]
             for signal in message.signals
-            if signal.name in raw and signal.name not in ("crc", "counter")
+            if signal.name in raw and signal.name not in ("crc", "counter", SCALE)
         }
+
+    @staticmethod
+    def is_own(message, data: bytes) -> bool:
+        """True if a frame is in the steps of this file: then no bit is set that no signal has, and `scale` is the file's."""
+        bits = int.from_bytes(data, "little")
+        for signal in message.signals:
+            ones = (1 << signal.length) - 1
+            if signal.name == SCALE and bits >> signal.start & ones != signal.minimum:
+                return False
+            bits &= ~(ones << signal.start)
+        return bits == 0
 
 
 def _is_missing(signal, raw) -> bool:
@@ -128,7 +144,10 @@ class Receiver:
         self.lost = 0
 
     def take(self, identifier: int, data: bytes) -> tuple[str, dict | str]:
-        """A frame: its message's name with its signals, or with the reason why it is rejected."""
+        """A frame: its message's name with its signals, or with the reason why it is rejected.
+
+        "scaled otherwise": the drive counts in the steps of another machine than this protocol's file.
+        """
         try:
             message = self.protocol.message(identifier)
         except KeyError:
@@ -145,6 +164,8 @@ class Receiver:
             return message.name, "disordered"
         self.last[identifier] = counter
         self.lost += delta - 1
+        if not self.protocol.is_own(message, data):
+            return message.name, "scaled otherwise"
         found = self.protocol.decode(message, data)
         self.signals.setdefault(message.name, {}).update(found)
         return message.name, found

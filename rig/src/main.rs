@@ -9,6 +9,7 @@ use tractive_rig::benchmark::{self, BenchOptions};
 use tractive_rig::campaign::{self, options::CampaignOptions};
 use tractive_rig::commission;
 use tractive_rig::compare::{self, CompareOptions};
+use tractive_rig::dbc::{self, DbcOptions};
 use tractive_rig::folder::{self, MachineCommand};
 #[cfg(unix)]
 use tractive_rig::live::LiveOptions;
@@ -90,6 +91,8 @@ enum Command {
     Identify(Box<identify::Identify>),
     /// An unknown machine brought to its first torque, step by step: wiring, identification, tables, a little torque; and a record of it.
     Commission(Box<commission::Commission>),
+    /// The protocol's description for CAN tools, a DBC file: signals in the steps that follow from a machine's ratings.
+    Dbc(DbcOptions),
     /// The modulator's pulses in steady state.
     Pattern(PatternOptions),
     /// Optimises the pulse patterns anew: each branch's window and weighted distortion.
@@ -167,6 +170,7 @@ fn command(command: Command) -> Result<ExitCode> {
         Command::Machine(command) => done(folder::run(&command)),
         Command::Identify(options) => identify::command(&options),
         Command::Commission(options) => commission::command(&options),
+        Command::Dbc(options) => done(dbc::run(&options)),
         Command::NineSwitch { input, output } => done(nine_switch::run(&input, &output)),
         Command::Campaign(options) => campaign::command::run(&options),
         Command::Compare(options) => compare::run(&options),

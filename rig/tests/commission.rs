@@ -54,7 +54,24 @@ fn an_angle_whose_zero_or_direction_is_wrong_is_told_and_nothing_turns_with_it()
         assert!(!record["finished"].as_bool().unwrap());
         let complaint = record["step"][1]["complaints"][0].as_str().unwrap();
         assert!(complaint.starts_with("fault rotor_turned"), "{words}: {complaint}");
+        let advice = record["step"][1]["advice"][0].as_str().unwrap();
+        assert!(advice.contains("encoder_zeros_deg"), "{advice}");
         assert!(!place.path().join("found").exists(), "no tables of a machine that was not found");
+    }
+}
+
+/// A zero that is some degrees off turns a free rotor away; the key to change is told, and about the number to add.
+#[test]
+fn the_key_that_mends_the_angles_zero_is_told() {
+    for (error_deg, [least, most]) in [(8.0, [-10.0, -6.0]), (-20.0, [8.0, 22.0])] {
+        let place = tempfile::tempdir().unwrap();
+        let (code, said, record) = commissioned(&format!("--angle-error {error_deg}"), place.path());
+        assert_eq!(code, 1, "{said}");
+        let text = record["step"][1]["advice"][0].as_str().unwrap();
+        let number = text.strip_prefix("power stage, encoder_zeros_deg: add about ").expect(text);
+        let number = number.split(';').next().unwrap().parse::<f64>().expect(text);
+        assert!((least..=most).contains(&number), "{error_deg}: {text}");
+        assert!(!place.path().join("found").exists());
     }
 }
 

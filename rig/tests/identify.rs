@@ -72,10 +72,17 @@ fn commanded_over_the_protocol_as_a_board_is() {
 #[test]
 fn a_wrong_gain_of_link_or_currents_is_the_torques_error_and_no_more() {
     let machine = Machine::load("pmasynrm-180kw").unwrap();
-    for gain in ["--udc-gain 1", "--udc-gain -1", "--current-gain 1", "--current-gain -1"] {
+    // A wrong volt is a wrong weber, and nothing in the observations tells it; a wrong ampere is not where no current flows.
+    for (gain, webers) in [
+        ("--udc-gain 1", 0.01),
+        ("--udc-gain -1", -0.01),
+        ("--current-gain 1", 0.0),
+        ("--current-gain -1", 0.0),
+    ] {
         let found = outcome(&machine, &format!("{FLAWS} {gain}"));
         keeps_its_place(&found);
         assert!(found.torque_worst < 0.015, "{gain}: {}", found.torque_worst);
+        assert!((found.magnet_error - webers).abs() < 0.005, "{gain}: {}", found.magnet_error);
     }
 }
 

@@ -271,12 +271,12 @@ impl PwmPort for Pwm {
 /// The idle loop's side of the board.
 pub struct Idle {
     /// The protocol, where the operator is asked over it; `None`: the rig asks by words.
-    pub station: Option<CanEndpoint>,
+    pub station: Option<&'static mut CanEndpoint>,
 }
 
 impl Idle {
     /// At power-up.
-    pub const fn new(station: Option<CanEndpoint>) -> Self {
+    pub const fn new(station: Option<&'static mut CanEndpoint>) -> Self {
         Self { station }
     }
 }

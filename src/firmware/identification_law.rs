@@ -47,13 +47,13 @@ pub fn tell(task: &mut ControlTask<BuiltIn, Law>, shared: &Shared, now: Instant)
 /// The idle loop's side of the board, with the experiment's frames where the drive's leave room.
 pub struct Idle {
     /// The protocol, where the operator is asked over it; `None`: the rig asks by words.
-    pub station: Option<CanEndpoint>,
+    pub station: Option<&'static mut CanEndpoint>,
     teller: Teller,
 }
 
 impl Idle {
     /// At power-up.
-    pub const fn new(station: Option<CanEndpoint>) -> Self {
+    pub const fn new(station: Option<&'static mut CanEndpoint>) -> Self {
         Self { station, teller: Teller::new() }
     }
 }

@@ -47,6 +47,7 @@ fn settings() -> Settings {
 
 #[entry]
 fn main() -> ! {
+    static mut STATION: CanEndpoint = CanEndpoint::new(&BUILT_IN.ratings);
     let setup = law::connect();
     CONTROL_TICKS.store(setup.control_ticks, Ordering::Relaxed);
     MIN_PULSE_TICKS.store(setup.min_pulse_ticks, Ordering::Relaxed);
@@ -62,7 +63,7 @@ fn main() -> ! {
     FIRST_HALF_TICKS.store(first_half_ticks, Ordering::Relaxed);
     let line = setup.line.map(|times| Line::rated(&BUILT_IN.ratings, times.precharge_s, times.discharge_s));
     let operator = operator::Settings::rated(&BUILT_IN.ratings, slot_s(&clock), line);
-    let station = setup.over_protocol.then(|| CanEndpoint::new(&BUILT_IN.ratings));
+    let station = setup.over_protocol.then_some(STATION);
     let (mut slot, mut idle) = (Slot::new(), law::Idle::new(station));
     qemu::start(first_half_ticks, clock.control_ticks);
     loop {

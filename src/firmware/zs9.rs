@@ -28,6 +28,7 @@ fn settings() -> Settings {
 
 #[entry]
 fn main() -> ! {
+    static mut STATION: Zs9CanEndpoint = Zs9CanEndpoint::new(&RATINGS);
     let setup = qemu::connect_dual();
     CARRIER_TICKS.store(setup.carrier_ticks, Ordering::Relaxed);
     DEAD_TIME_TICKS.store(setup.dead_time_ticks, Ordering::Relaxed);
@@ -39,7 +40,7 @@ fn main() -> ! {
     let line =
         setup.line.map(|times| Line::rated(&RATINGS, times.precharge_s, times.discharge_s).without_chopper());
     let rated = operator::Settings::rated(&RATINGS, slot_s(&CLOCK), line);
-    let (mut slot, mut idle) = (DualSlot::new(), qemu::DualIdle { station: Zs9CanEndpoint::new(&RATINGS) });
+    let (mut slot, mut idle) = (DualSlot::new(), qemu::DualIdle { station: STATION });
     qemu::start_dual(&settings());
     loop {
         if line.is_some() {

@@ -1,6 +1,7 @@
 //! The messages to the drive.
 
 use super::message::Message;
+use super::scales::{Quantity, Scales};
 use super::signal::{OutOfRange, Payload, Signal};
 use crate::operator::Levels;
 
@@ -15,17 +16,20 @@ pub(super) const ENABLE: Signal = Signal::flag("enable", 12);
 pub(super) const WITH_TORQUE: Signal = Signal::flag("with_torque", 13);
 pub(super) const OFF: Signal = Signal::flag("off", 14);
 pub(super) const COAST: Signal = Signal::flag("coast", 15);
-const TORQUE: Signal = Signal::physical("torque_nm", "N.m", 16, 0.1, TORQUE_NM);
+const TORQUE: Signal = Signal::physical("torque_nm", "N.m", 16, 0.1, TORQUE_NM).of(Quantity::Torque);
 pub(super) const CHARGE: Signal = Signal::flag("charge", 32);
 pub(super) const DISCHARGE: Signal = Signal::flag("discharge", 33);
 pub(super) const ACKNOWLEDGE: Signal = Signal::flag("acknowledge", 34);
 
-pub(super) const MOTORING: Signal = Signal::physical("motoring_nm", "N.m", 16, 0.1, LIMIT_NM);
-pub(super) const BRAKING: Signal = Signal::physical("braking_nm", "N.m", 32, 0.1, LIMIT_NM);
-pub(super) const SPEED: Signal = Signal::physical("speed_rpm", "r/min", 48, 0.5, LIMIT_RPM);
+pub(super) const MOTORING: Signal =
+    Signal::physical("motoring_nm", "N.m", 16, 0.1, LIMIT_NM).of(Quantity::Torque);
+pub(super) const BRAKING: Signal =
+    Signal::physical("braking_nm", "N.m", 32, 0.1, LIMIT_NM).of(Quantity::Torque);
+pub(super) const SPEED: Signal =
+    Signal::physical("speed_rpm", "r/min", 48, 0.5, LIMIT_RPM).of(Quantity::Speed);
 
-const LINK_LOW: Signal = Signal::physical("link_low_v", "V", 16, 0.1, LINK_V);
-const LINK_HIGH: Signal = Signal::physical("link_high_v", "V", 32, 0.1, LINK_V);
+const LINK_LOW: Signal = Signal::physical("link_low_v", "V", 16, 0.1, LINK_V).of(Quantity::Voltage);
+const LINK_HIGH: Signal = Signal::physical("link_high_v", "V", 32, 0.1, LINK_V).of(Quantity::Voltage);
 
 pub(super) const WRITE: Signal = Signal::flag("write", 12);
 pub(super) const PARAMETER: Signal = Signal::number("parameter", 16, 8, 0xFF);
@@ -38,13 +42,16 @@ pub const COMMAND: Message = Message::new(
     1,
     10,
     &[ENABLE, WITH_TORQUE, OFF, COAST, TORQUE, CHARGE, DISCHARGE, ACKNOWLEDGE],
-);
+)
+.telling(36, &[Quantity::Torque]);
 
 /// Limits of torque and speed; as rated until it comes.
-pub const LIMITS: Message = Message::new("LIMITS", 0x102, 2, 100, &[MOTORING, BRAKING, SPEED]);
+pub const LIMITS: Message = Message::new("LIMITS", 0x102, 2, 100, &[MOTORING, BRAKING, SPEED])
+    .telling(12, &[Quantity::Torque, Quantity::Speed]);
 
 /// Limits of the link; as rated until it comes.
-pub const LINK_LIMITS: Message = Message::new("LINK_LIMITS", 0x103, 3, 100, &[LINK_LOW, LINK_HIGH]);
+pub const LINK_LIMITS: Message =
+    Message::new("LINK_LIMITS", 0x103, 3, 100, &[LINK_LOW, LINK_HIGH]).telling(12, &[Quantity::Voltage]);
 
 /// Reads a parameter, or writes it.
 pub const PARAMETER_REQUEST: Message =
@@ -116,20 +123,20 @@ impl Command {
         torque_nm: 0.0,
     };
 
-    /// As a frame's content.
-    pub fn encode(&self) -> Result<Payload, OutOfRange> {
+    /// As a frame's content, without its mark.
+    pub fn encode(&self, scales: Scales) -> Result<Payload, OutOfRange> {
         let Self { enable, with_torque, off, coast, charge, discharge, acknowledge, .. } = *self;
         let levels = Levels { enable, with_torque, off, coast, charge, discharge, acknowledge };
         let mut payload = put_levels(&levels);
-        TORQUE.put(&mut payload, self.torque_nm)?;
+        TORQUE.put_on(scales, &mut payload, self.torque_nm)?;
         Ok(payload)
     }
 
-    /// From a frame's content; `None` if a value is out of its range or an unused bit is set.
-    pub fn decode(payload: Payload) -> Option<Self> {
+    /// From a frame's content without its mark; `None` if a value is out of its range or an unused bit is set.
+    pub fn decode(payload: Payload, scales: Scales) -> Option<Self> {
         COMMAND.is_tidy(payload).then_some(())?;
         let Levels { enable, with_torque, off, coast, charge, discharge, acknowledge } = levels(payload);
-        let torque_nm = TORQUE.get(payload)?;
+        let torque_nm = TORQUE.get_on(scales, payload)?;
         Some(Self { enable, with_torque, off, coast, charge, discharge, acknowledge, torque_nm })
     }
 }
@@ -147,23 +154,23 @@ pub struct TorqueLimits {
 }
 
 impl TorqueLimits {
-    /// As a frame's content.
-    pub fn encode(&self) -> Result<Payload, OutOfRange> {
+    /// As a frame's content, without its mark.
+    pub fn encode(&self, scales: Scales) -> Result<Payload, OutOfRange> {
         let mut payload = Payload::default();
-        MOTORING.put(&mut payload, self.motoring_nm)?;
-        BRAKING.put(&mut payload, self.braking_nm)?;
-        SPEED.put(&mut payload, self.speed_rpm)?;
+        MOTORING.put_on(scales, &mut payload, self.motoring_nm)?;
+        BRAKING.put_on(scales, &mut payload, self.braking_nm)?;
+        SPEED.put_on(scales, &mut payload, self.speed_rpm)?;
         Ok(payload)
     }
 
-    /// From a frame's content; `None` if a value is out of its range or an unused bit is set.
-    pub fn decode(payload: Payload) -> Option<Self> {
+    /// From a frame's content without its mark; `None` if a value is out of its range or an unused bit is set.
+    pub fn decode(payload: Payload, scales: Scales) -> Option<Self> {
         // Of the ZS9's motors the same signals.
         LIMITS.is_tidy(payload).then_some(())?;
         Some(Self {
-            motoring_nm: MOTORING.get(payload)?,
-            braking_nm: BRAKING.get(payload)?,
-            speed_rpm: SPEED.get(payload)?,
+            motoring_nm: MOTORING.get_on(scales, payload)?,
+            braking_nm: BRAKING.get_on(scales, payload)?,
+            speed_rpm: SPEED.get_on(scales, payload)?,
         })
     }
 }
@@ -179,18 +186,19 @@ pub struct LinkLimits {
 }
 
 impl LinkLimits {
-    /// As a frame's content.
-    pub fn encode(&self) -> Result<Payload, OutOfRange> {
+    /// As a frame's content, without its mark.
+    pub fn encode(&self, scales: Scales) -> Result<Payload, OutOfRange> {
         let mut payload = Payload::default();
-        LINK_LOW.put(&mut payload, self.low_v)?;
-        LINK_HIGH.put(&mut payload, self.high_v)?;
+        LINK_LOW.put_on(scales, &mut payload, self.low_v)?;
+        LINK_HIGH.put_on(scales, &mut payload, self.high_v)?;
         Ok(payload)
     }
 
-    /// From a frame's content; `None` if a value is out of its range, an unused bit is set, or low is not below high.
-    pub fn decode(payload: Payload) -> Option<Self> {
+    /// From a frame's content without its mark; `None` if a value is out of its range, an unused bit is set, or low is not below high.
+    pub fn decode(payload: Payload, scales: Scales) -> Option<Self> {
         LINK_LIMITS.is_tidy(payload).then_some(())?;
-        let limits = Self { low_v: LINK_LOW.get(payload)?, high_v: LINK_HIGH.get(payload)? };
+        let (low_v, high_v) = (LINK_LOW.get_on(scales, payload)?, LINK_HIGH.get_on(scales, payload)?);
+        let limits = Self { low_v, high_v };
         (limits.low_v < limits.high_v).then_some(limits)
     }
 }

@@ -4,6 +4,7 @@ use super::commands::ParameterRequest;
 use super::commands::TorqueLimits;
 use super::message::Message;
 use super::parameters::{Parameters, RPM_PER_RAD_S};
+use super::scales::Scales;
 use super::signal::Payload;
 use super::telemetry::Pattern;
 use crate::machine::Ratings;
@@ -27,11 +28,13 @@ pub trait MessageSet: Copy + 'static {
     const FROM_DRIVE: &'static [&'static Message];
     /// The first frame of a message, or the first after a silence: it only sets the counter.
     const GREETING: Self::Content;
+    /// `true` where the signals' steps follow from the machine's ratings.
+    const IS_SCALED: bool;
     /// Nothing said.
     const SILENT: Self;
 
-    /// The content of a frame of [`Self::TO_DRIVE`]; `None` if a value is out of its range or an unused bit is set.
-    fn decode(id: u16, payload: Payload) -> Option<Self::Content>;
+    /// The content of a frame of [`Self::TO_DRIVE`] without its mark; `None` if a value is out of its range or an unused bit is set.
+    fn decode(id: u16, payload: Payload, scales: Scales) -> Option<Self::Content>;
     /// Keeps what is said.
     fn take(&mut self, content: Self::Content) -> Taken;
     /// The command is forgotten, as if nothing were asked.
@@ -40,8 +43,8 @@ pub trait MessageSet: Copy + 'static {
     fn request(&self, armed: bool, fresh: bool, parameters: &Parameters, ratings: &Ratings) -> Request<Self>;
     /// The measurements and the pattern that are sent of a report.
     fn observed(report: Option<&Report<Self>>, ratings: &Ratings) -> (Self::Measured, Self::Pattern);
-    /// Content of one of the messages of measurements.
-    fn measured(measured: &Self::Measured, message: usize) -> Payload;
+    /// Content of one of the messages of measurements, without its mark.
+    fn measured(measured: &Self::Measured, message: usize, scales: Scales) -> Payload;
 }
 
 /// The request to a drive.

@@ -2,6 +2,7 @@
 
 use super::e2e::{self, Counter, DataIds};
 use super::frame::{Frame, LENGTH};
+use super::scales::{Quantity, Scales};
 use super::signal::{Payload, Signal};
 
 /// The CRC of every message.
@@ -23,6 +24,8 @@ pub struct Message {
     /// Signals besides CRC and counter.
     pub signals: &'static [Signal],
     data_ids: DataIds,
+    /// The worth of the lowest of the four bits that tell the scales, and the mask of the quantities.
+    mark: (u64, u32),
     /// The bits of all signals.
     used: u64,
 }
@@ -42,7 +45,33 @@ impl Message {
             used |= signals[index].mask();
             index += 1;
         }
-        Self { name, id, number, period_ms, signals, data_ids: e2e::data_ids(number), used }
+        Self { name, id, number, period_ms, signals, data_ids: e2e::data_ids(number), mark: (0, 0), used }
+    }
+
+    /// The same, with four bits from `start` on that tell the scales of these quantities.
+    pub const fn telling(self, start: u32, quantities: &[Quantity]) -> Self {
+        Self { mark: (1 << start, Scales::mask(quantities)), ..self }
+    }
+
+    /// A content with the bits that tell the scales, or, where it has them, without. On the usual scales they are zero.
+    #[inline(never)]
+    pub const fn mark(&self, content: Payload, scales: Scales) -> Payload {
+        let (worth, mask) = self.mark;
+        Payload(content.0 ^ worth.wrapping_mul(scales.code(mask) as u64))
+    }
+
+    /// The quantities whose scales it tells.
+    pub fn quantities(&self) -> impl Iterator<Item = Quantity> {
+        let (_, mask) = self.mark;
+        Quantity::SCALED.into_iter().filter(move |quantity| mask & Scales::mask(&[*quantity]) != 0)
+    }
+
+    /// The signal of the bits that tell the scales, with the one value that it may have; `None` on the usual scales.
+    pub fn mark_signal(&self, scales: Scales) -> Option<Signal> {
+        let (worth, mask) = self.mark;
+        let code = scales.code(mask);
+        (code != 0)
+            .then(|| Signal { min: code as f32, ..Signal::number("scale", worth.trailing_zeros(), 4, code) })
     }
 
     /// Its 16 data identifiers.

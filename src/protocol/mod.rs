@@ -18,6 +18,7 @@ mod frame;
 mod message;
 mod parameters;
 mod receiver;
+mod scales;
 mod sender;
 mod session;
 mod signal;
@@ -35,6 +36,7 @@ pub use frame::{Frame, LENGTH};
 pub use message::{COUNTER, CRC, Message};
 pub use parameters::{PARAMETERS, Parameter, Parameters, RPM_PER_RAD_S, WriteError};
 pub use receiver::Reject;
+pub use scales::{Quantity, Scales};
 pub use signal::{Kind, OutOfRange, Payload, Signal};
 pub use telemetry::{
     COUNTERS, CURRENTS, Counts, FAULT_LIMIT, FAULT_VALUE, Listening, MOTION, Measured, Outcome,

@@ -4,6 +4,7 @@
 use super::dialect::MessageSet;
 use super::e2e::{self, Order, Sequence};
 use super::frame::{Frame, LENGTH};
+use super::scales::Scales;
 use super::signal::Payload;
 use super::telemetry::Counts;
 
@@ -102,9 +103,9 @@ impl<D: MessageSet> Receiver<D> {
         &self.counts
     }
 
-    /// A frame.
-    pub fn receive(&mut self, frame: &Frame) -> Result<D::Content, Reject> {
-        let verdict = self.judge(frame);
+    /// A frame, its signals on these scales.
+    pub fn receive(&mut self, frame: &Frame, scales: Scales) -> Result<D::Content, Reject> {
+        let verdict = self.judge(frame, scales);
         let counts = &mut self.counts;
         counts.received = counts.received.wrapping_add(1);
         let count = match verdict {
@@ -120,7 +121,7 @@ impl<D: MessageSet> Receiver<D> {
         verdict
     }
 
-    fn judge(&mut self, frame: &Frame) -> Result<D::Content, Reject> {
+    fn judge(&mut self, frame: &Frame, scales: Scales) -> Result<D::Content, Reject> {
         let known = D::TO_DRIVE.iter().zip(&mut self.channels).find(|(message, _)| message.id == frame.id);
         let Some((message, channel)) = known else { return Err(Reject::Unknown) };
         if frame.length != LENGTH {
@@ -135,7 +136,8 @@ impl<D: MessageSet> Receiver<D> {
             Order::Repeated => return Err(Reject::Repeated),
             Order::Wrong => return Err(Reject::Disordered),
         }
-        D::decode(frame.id, Payload(u64::from_le_bytes(frame.data))).ok_or(Reject::OutOfRange)
+        let content = message.mark(Payload(u64::from_le_bytes(frame.data)), scales);
+        D::decode(frame.id, content, scales).ok_or(Reject::OutOfRange)
     }
 }
 

@@ -3,7 +3,7 @@
 use super::dialect::MessageSet;
 use super::e2e::Counter;
 use super::frame::Frame;
-use super::signal::Payload;
+use super::scales::Scales;
 use super::telemetry::{Counts, ParameterAnswer, StatusFrame, trip_frames};
 use crate::protection::Trip;
 
@@ -50,7 +50,7 @@ impl<D: MessageSet> Sender<D> {
     pub fn step(
         &mut self,
         status: &StatusFrame<D::Pattern>,
-        measured: &D::Measured,
+        (measured, scales): (&D::Measured, Scales),
         trip: Option<&Trip>,
         counts: &Counts,
     ) -> Option<Frame> {
@@ -58,10 +58,10 @@ impl<D: MessageSet> Sender<D> {
         self.slot = (slot + 1) % CYCLE;
         let (place, content) = match (slot % 10, slot / 10) {
             (0, _) => (STATUS, status.encode()),
-            (2, _) => (1, D::measured(measured, 0)),
-            (4, _) => (2, D::measured(measured, 1)),
-            (6, _) => (3, D::measured(measured, 2)),
-            (7, _) if D::FROM_DRIVE.len() > MORE => (MORE, D::measured(measured, 3)),
+            (2, _) => (1, D::measured(measured, 0, scales)),
+            (4, _) => (2, D::measured(measured, 1, scales)),
+            (6, _) => (3, D::measured(measured, 2, scales)),
+            (7, _) if D::FROM_DRIVE.len() > MORE => (MORE, D::measured(measured, 3, scales)),
             (8, 0) => {
                 let content = counts.encode(self.page);
                 self.page = Counts::page_after(self.page);
@@ -78,11 +78,8 @@ impl<D: MessageSet> Sender<D> {
             (8, _) => return None,
             _ => (ANSWER, self.answer.take()?.encode()),
         };
-        self.frame(place, content)
-    }
-
-    fn frame(&mut self, place: usize, content: Payload) -> Option<Frame> {
-        Some(D::FROM_DRIVE.get(place)?.frame(content, self.counters.get_mut(place)?))
+        let message = D::FROM_DRIVE.get(place)?;
+        Some(message.frame(message.mark(content, scales), self.counters.get_mut(place)?))
     }
 }
 

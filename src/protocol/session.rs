@@ -5,6 +5,7 @@ use super::dialect::{MessageSet, Request, Taken, Told as DriveTold};
 use super::frame::Frame;
 use super::parameters::{Parameters, WriteError};
 use super::receiver::Receiver;
+use super::scales::Scales;
 use super::sender::Sender;
 use super::telemetry::{Counts, Listening, Outcome, ParameterAnswer, StatusFrame};
 use crate::machine::Ratings;
@@ -26,6 +27,7 @@ pub struct Told<'a, D: MessageSet> {
 #[derive(Clone, Copy, Debug)]
 pub struct Session<D: MessageSet> {
     ratings: &'static Ratings,
+    scales: Scales,
     receiver: Receiver<D>,
     parameters: Parameters,
     /// The content that was received last.
@@ -41,8 +43,10 @@ pub struct Session<D: MessageSet> {
 impl<D: MessageSet> Session<D> {
     /// Nothing received yet.
     pub const fn new(ratings: &'static Ratings) -> Self {
+        let scales = if D::IS_SCALED { Scales::of(ratings) } else { Scales::USUAL };
         Self {
             ratings,
+            scales,
             receiver: Receiver::new(),
             parameters: Parameters::rated(ratings),
             said: D::SILENT,
@@ -61,7 +65,7 @@ impl<D: MessageSet> Session<D> {
     ) -> Request<D> {
         self.wait(slots);
         for frame in received {
-            if let Ok(content) = self.receiver.receive(frame.borrow()) {
+            if let Ok(content) = self.receiver.receive(frame.borrow(), self.scales) {
                 self.take(content);
             }
         }
@@ -73,7 +77,12 @@ impl<D: MessageSet> Session<D> {
     pub fn tell(&mut self, told: &Told<D>) -> Option<Frame> {
         self.state = told.status.state;
         let status = StatusFrame::new(told.status, told.mode, self.listening(), self.receiver.counts());
-        self.sender.step(&status, told.measured, told.status.trip.as_ref(), self.receiver.counts())
+        self.sender.step(
+            &status,
+            (told.measured, self.scales),
+            told.status.trip.as_ref(),
+            self.receiver.counts(),
+        )
     }
 
     /// The parameters in force.

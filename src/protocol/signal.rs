@@ -1,5 +1,7 @@
 //! Signals: numbers and flags in a frame's 64 bits, by the description that the DBC file publishes.
 
+use super::scales::{Quantity, Scales};
+
 /// The eight bytes of a frame as one number: bit 0 is the first byte's lowest.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -23,7 +25,7 @@ pub enum Kind {
 #[non_exhaustive]
 pub struct OutOfRange;
 
-/// A signal. Little-endian; its value is `raw · scale + offset`. Its methods stay out of line: nothing here is in a hurry, and
+/// A signal. Little-endian; its value is `raw · scale + offset`, on the usual [scales](super::Scales). Its methods stay out of line: nothing here is in a hurry, and
 /// sixty signals would otherwise be sixty copies.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Signal {
@@ -47,14 +49,16 @@ pub struct Signal {
     pub max: f32,
     /// The page on which the signal is, in messages of several pages.
     pub page: Option<u32>,
+    /// The quantity whose [scale](super::Scales) multiplies scale and range.
+    pub quantity: Quantity,
 }
 
 impl Signal {
     /// A raw number from `start` on, 0 ..= `max`.
     pub const fn number(name: &'static str, start: u32, bits: u32, max: u32) -> Self {
         let max = max as f32;
-        let (unit, kind, page) = ("", Kind::Unsigned, None);
-        Self { name, unit, start, bits, kind, scale: 1.0, offset: 0.0, min: 0.0, max, page }
+        let (unit, kind, page, quantity) = ("", Kind::Unsigned, None, Quantity::Fixed);
+        Self { name, unit, start, bits, kind, scale: 1.0, offset: 0.0, min: 0.0, max, page, quantity }
     }
 
     /// A flag.
@@ -72,7 +76,8 @@ impl Signal {
         [min, max]: [f32; 2],
     ) -> Self {
         let kind = if min < 0.0 { Kind::Signed } else { Kind::Unsigned };
-        Self { name, unit, start, bits: 16, kind, scale, offset: 0.0, min, max, page: None }
+        let (offset, page, quantity) = (0.0, None, Quantity::Fixed);
+        Self { name, unit, start, bits: 16, kind, scale, offset, min, max, page, quantity }
     }
 
     /// Any finite number, as it is.
@@ -89,12 +94,18 @@ impl Signal {
             min: f32::MIN,
             max: f32::MAX,
             page,
+            quantity: Quantity::Fixed,
         }
     }
 
     /// The same on one page of several.
     pub const fn on_page(self, page: u32) -> Self {
         Self { page: Some(page), ..self }
+    }
+
+    /// The same, in steps that follow from the machine.
+    pub const fn of(self, quantity: Quantity) -> Self {
+        Self { quantity, ..self }
     }
 
     /// The bits it takes.
@@ -124,8 +135,14 @@ impl Signal {
     }
 
     /// The value; `None` outside its range, which is also how "not available" is written.
-    #[inline(never)]
+    #[inline]
     pub fn get(&self, payload: Payload) -> Option<f32> {
+        self.get_on(Scales::USUAL, payload)
+    }
+
+    /// The same on other scales.
+    #[inline(never)]
+    pub fn get_on(&self, scales: Scales, payload: Payload) -> Option<f32> {
         let raw = self.raw(payload);
         let steps = match self.kind {
             Kind::Float => {
@@ -139,12 +156,19 @@ impl Signal {
             }
         };
         let inside = (self.steps(self.min)..=self.steps(self.max)).contains(&steps);
-        inside.then_some(steps as f32 * self.scale + self.offset)
+        inside.then_some((steps as f32 * self.scale + self.offset) * scales.worth(self.quantity))
     }
 
     /// Sets the value, rounded to the nearest step; an error outside its range and for what is not finite.
-    #[inline(never)]
+    #[inline]
     pub fn put(&self, payload: &mut Payload, value: f32) -> Result<(), OutOfRange> {
+        self.put_on(Scales::USUAL, payload, value)
+    }
+
+    /// The same on other scales.
+    #[inline(never)]
+    pub fn put_on(&self, scales: Scales, payload: &mut Payload, value: f32) -> Result<(), OutOfRange> {
+        let value = scales.to_usual(self.quantity, value);
         let within = value >= self.min && value <= self.max;
         if !within {
             return Err(OutOfRange);
@@ -155,9 +179,15 @@ impl Signal {
     }
 
     /// Sets a measured value; where there is none, or it is outside the range, the raw number that says so.
-    #[inline(never)]
+    #[inline]
     pub fn put_measured(&self, payload: &mut Payload, value: Option<f32>) {
-        if value.is_none_or(|value| self.put(payload, value).is_err()) {
+        self.put_measured_on(Scales::USUAL, payload, value);
+    }
+
+    /// The same on other scales.
+    #[inline(never)]
+    pub fn put_measured_on(&self, scales: Scales, payload: &mut Payload, value: Option<f32>) {
+        if value.is_none_or(|value| self.put_on(scales, payload, value).is_err()) {
             self.put_raw(payload, self.not_available());
         }
     }

@@ -6,6 +6,7 @@ use super::commands::{
 use super::dialect::{MessageSet, Taken, motor_limits};
 use super::message::Message;
 use super::parameters::{Parameters, RPM_PER_RAD_S};
+use super::scales::Scales;
 use super::signal::Payload;
 use super::telemetry::Measured;
 use super::{FROM_DRIVE, TO_DRIVE};
@@ -60,14 +61,15 @@ impl MessageSet for Traction {
 
     const TO_DRIVE: &'static [&'static Message] = &TO_DRIVE;
     const FROM_DRIVE: &'static [&'static Message] = &FROM_DRIVE;
+    const IS_SCALED: bool = true;
     const GREETING: Content = Content::Greeting;
     const SILENT: Self = Self { command: Command::AT_REST, torque_limits: None, link_limits: None };
 
-    fn decode(id: u16, payload: Payload) -> Option<Content> {
+    fn decode(id: u16, payload: Payload, scales: Scales) -> Option<Content> {
         Some(match id {
-            id if id == COMMAND.id => Content::Command(Command::decode(payload)?),
-            id if id == LIMITS.id => Content::Limits(TorqueLimits::decode(payload)?),
-            id if id == LINK_LIMITS.id => Content::LinkLimits(LinkLimits::decode(payload)?),
+            id if id == COMMAND.id => Content::Command(Command::decode(payload, scales)?),
+            id if id == LIMITS.id => Content::Limits(TorqueLimits::decode(payload, scales)?),
+            id if id == LINK_LIMITS.id => Content::LinkLimits(LinkLimits::decode(payload, scales)?),
             id if id == PARAMETER_REQUEST.id => Content::Parameter(ParameterRequest::decode(payload)?),
             _ => return None,
         })
@@ -130,12 +132,12 @@ impl MessageSet for Traction {
         (measured, report.mode)
     }
 
-    fn measured(measured: &Measured, message: usize) -> Payload {
+    fn measured(measured: &Measured, message: usize, scales: Scales) -> Payload {
         match message {
-            0 => measured.motion(),
-            1 => measured.currents(),
-            3 => measured.torque_estimate(),
-            _ => measured.voltages(),
+            0 => measured.motion(scales),
+            1 => measured.currents(scales),
+            3 => measured.torque_estimate(scales),
+            _ => measured.voltages(scales),
         }
     }
 }

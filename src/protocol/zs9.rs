@@ -8,6 +8,7 @@ use super::commands::{
 use super::dialect::{MessageSet, Taken, motor_limits};
 use super::message::Message;
 use super::parameters::{Parameters, RPM_PER_RAD_S};
+use super::scales::Scales;
 use super::signal::{OutOfRange, Payload, Signal};
 use super::telemetry::{
     ANSWER_PARAMETER, ANSWER_RESULT, ANSWER_VALUE, CHOPPER, COUNTER_SIGNALS, DISCHARGE, FAULT, LISTENING,
@@ -247,15 +248,16 @@ impl MessageSet for Zs9 {
 
     const TO_DRIVE: &'static [&'static Message] = &TO_ZS9;
     const FROM_DRIVE: &'static [&'static Message] = &FROM_ZS9;
+    const IS_SCALED: bool = false;
     const GREETING: Zs9Content = Zs9Content::Greeting;
     const SILENT: Self = Self { command: Zs9Command::AT_REST, limits: [None; 2], link: None };
 
-    fn decode(id: u16, payload: Payload) -> Option<Zs9Content> {
+    fn decode(id: u16, payload: Payload, scales: Scales) -> Option<Zs9Content> {
         let [first, second] = &ZS9_LIMITS;
         Some(match id {
             id if id == ZS9_COMMAND.id => Zs9Content::Command(Zs9Command::decode(payload)?),
-            id if id == first.id => Zs9Content::Limits(0, TorqueLimits::decode(payload)?),
-            id if id == second.id => Zs9Content::Limits(1, TorqueLimits::decode(payload)?),
+            id if id == first.id => Zs9Content::Limits(0, TorqueLimits::decode(payload, scales)?),
+            id if id == second.id => Zs9Content::Limits(1, TorqueLimits::decode(payload, scales)?),
             id if id == ZS9_LINK.id => Zs9Content::Link(Zs9Link::decode(payload)?),
             id if id == ZS9_PARAMETER_REQUEST.id => Zs9Content::Parameter(ParameterRequest::decode(payload)?),
             _ => return None,
@@ -325,19 +327,20 @@ impl MessageSet for Zs9 {
         (measured, report.scheme)
     }
 
-    fn measured(measured: &Zs9Measured, message: usize) -> Payload {
+    fn measured(measured: &Zs9Measured, message: usize, scales: Scales) -> Payload {
         let [first, second] = &measured.motors;
         let motor = match message {
             0 => first,
             1 => second,
             _ => {
-                return encode(&[
+                let link = [
                     (&LINK, measured.link_v),
                     (&CAPACITOR, measured.capacitor_v),
                     (&DUTY, measured.duty_percent),
-                ]);
+                ];
+                return encode(&link, scales);
             }
         };
-        encode(&[(&SPEED, motor.speed_rpm), (&TORQUE, motor.torque_nm), (&CURRENT, motor.current_a)])
+        encode(&[(&SPEED, motor.speed_rpm), (&TORQUE, motor.torque_nm), (&CURRENT, motor.current_a)], scales)
     }
 }

@@ -4,17 +4,11 @@ use can_dbc::{
     ByteOrder, Dbc, MessageId, MultiplexIndicator, NumericValue, SignalExtendedValueType, ValueType,
 };
 use proptest::prelude::*;
-use std::collections::BTreeMap;
-use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
-use tractive::identification::Stage;
-use tractive::modulation::{MODE_CODES, Mode};
-use tractive::nine_switch::Scheme;
-use tractive::operator::{Refusal, State};
-use tractive::protection::Fault;
+use tractive::modulation::MODE_CODES;
 use tractive::protocol::{
-    COUNTER, CRC, FROM_DRIVE, FROM_IDENTIFICATION, FROM_ZS9, Kind, Listening, Message, Outcome, Pattern,
-    Payload, STATUS, Signal, StatusFrame, TO_DRIVE, TO_ZS9, ZS9_STATUS,
+    COUNTER, CRC, FROM_DRIVE, FROM_IDENTIFICATION, FROM_ZS9, Kind, Message, Pattern, Payload, STATUS, Signal,
+    StatusFrame, TO_DRIVE, TO_ZS9, ZS9_STATUS,
 };
 
 fn path() -> PathBuf {
@@ -47,92 +41,6 @@ fn node(message: &Message) -> &'static str {
 
 fn signals(message: &Message) -> Vec<Signal> {
     [CRC, COUNTER].into_iter().chain(message.signals.iter().copied()).collect()
-}
-
-fn number(value: f32) -> String {
-    if value.abs() > 1e9 { format!("{value:e}") } else { value.to_string() }
-}
-
-/// Names of a signal's values, where it has any.
-fn names(signal: &Signal) -> BTreeMap<u32, &'static str> {
-    let numbered = |(code, name): (usize, &'static str)| (code as u32, name);
-    match signal.name {
-        "state" => State::ALL.iter().map(|state| state.name()).enumerate().map(numbered).collect(),
-        "fault" => {
-            let faults = (1..256).filter_map(Fault::from_code).map(|fault| (fault as u32, fault.name()));
-            faults.chain([(0, "none")]).collect()
-        }
-        "refusal" => {
-            let refusals = Refusal::ALL.iter().map(|refusal| (u32::from(refusal.code()) + 1, refusal.name()));
-            refusals.chain([(0, "none")]).collect()
-        }
-        "scheme" => Scheme::ALL.iter().map(|scheme| scheme.name()).enumerate().map(numbered).collect(),
-        "stage" => Stage::ALL.iter().map(|stage| stage.name()).enumerate().map(numbered).collect(),
-        "mode" => Mode::ALL.iter().map(|mode| (*mode as u32, mode.name())).collect(),
-        "listening" => Listening::ALL.iter().map(|(code, name)| (*code as u32, *name)).collect(),
-        "result" => Outcome::ALL.iter().map(|(code, name)| (*code as u32, *name)).collect(),
-        _ => BTreeMap::new(),
-    }
-}
-
-/// The file as it should be.
-fn wanted() -> String {
-    let mut text = String::from("VERSION \"1\"\n\nNS_ :\n\nBS_:\n\nBU_: DRIVE ZS9 SUPERVISOR\n");
-    for (message, to_drive) in messages() {
-        let node = node(message);
-        let (sender, receiver) = if to_drive { ("SUPERVISOR", node) } else { (node, "SUPERVISOR") };
-        let _ = write!(text, "\nBO_ {} {}: 8 {sender}\n", message.id, message.name);
-        for signal in signals(message) {
-            let page = match signal.page {
-                _ if signal.name == "page" => " M".to_owned(),
-                Some(page) => format!(" m{page}"),
-                None => String::new(),
-            };
-            let sign = if signal.kind == Kind::Unsigned { '+' } else { '-' };
-            let [scale, offset, min, max] = [signal.scale, signal.offset, signal.min, signal.max].map(number);
-            let (start, bits) = (signal.start, signal.bits);
-            let _ = writeln!(
-                text,
-                " SG_ {}{page} : {start}|{bits}@1{sign} ({scale},{offset}) [{min}|{max}] \"{}\" {receiver}",
-                signal.name, signal.unit,
-            );
-        }
-    }
-    text +=
-        "\nCM_ \"Every message carries end-to-end protection after AUTOSAR profile 2: see protocol.md.\";\n";
-    text += "BA_DEF_ BO_ \"GenMsgCycleTime\" INT 0 65535;\nBA_DEF_ BO_ \"DataIdNumber\" INT 1 31;\n";
-    text += "BA_DEF_DEF_ \"GenMsgCycleTime\" 0;\nBA_DEF_DEF_ \"DataIdNumber\" 1;\n";
-    for (message, _) in messages() {
-        let _ = writeln!(text, "BA_ \"GenMsgCycleTime\" BO_ {} {};", message.id, message.period_ms);
-        let _ = writeln!(text, "BA_ \"DataIdNumber\" BO_ {} {};", message.id, message.number);
-    }
-    for (message, _) in messages() {
-        for signal in signals(message) {
-            let names = names(&signal);
-            if !names.is_empty() {
-                let list: String = names.iter().map(|(code, name)| format!(" {code} \"{name}\"")).collect();
-                let _ = writeln!(text, "VAL_ {} {}{list} ;", message.id, signal.name);
-            }
-        }
-    }
-    for (message, _) in messages() {
-        for signal in signals(message).iter().filter(|signal| signal.kind == Kind::Float) {
-            let _ = writeln!(text, "SIG_VALTYPE_ {} {} : 1;", message.id, signal.name);
-        }
-    }
-    text
-}
-
-#[test]
-fn the_file_is_what_the_code_says() {
-    let wanted = wanted();
-    if std::env::var_os("TRACTIVE_RENEW_DBC").is_some() {
-        std::fs::write(path(), &wanted).unwrap();
-    }
-    assert!(
-        published() == wanted,
-        "docs/tractive.dbc is not what the code says; TRACTIVE_RENEW_DBC=1 cargo test --test protocol writes it anew"
-    );
 }
 
 fn float(value: &NumericValue) -> f64 {

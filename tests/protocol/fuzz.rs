@@ -6,7 +6,7 @@ use tractive::cell::Words;
 use tractive::protocol::e2e::Counter;
 use tractive::protocol::{
     COMMAND, Command, Content, Counts, Frame, LIMITS, LINK_LIMITS, Listening, Measured, PARAMETER_REQUEST,
-    Payload, Receiver, Session, TO_DRIVE,
+    Payload, Receiver, Scales, Session, TO_DRIVE,
 };
 
 /// The injuries that a bus, or somebody on it, does to frames.
@@ -60,7 +60,7 @@ impl Bus {
             Event::Protected(message, content) => self.send(*message, Payload(*content)),
             Event::Valid(torque_nm) => {
                 let command = Command { torque_nm: *torque_nm, ..Command::default() };
-                self.send(0, command.encode().unwrap())
+                self.send(0, command.encode(Scales::USUAL).unwrap())
             }
             Event::Replay(index) => *self.seen.get(index.index(self.seen.len().max(1)))?,
             Event::Flip(bits) => {
@@ -98,7 +98,7 @@ proptest! {
             let Some(frame) = bus.frame(event) else { continue };
             received += 1;
             let before = *receiver.counts();
-            let verdict = receiver.receive(&frame);
+            let verdict = receiver.receive(&frame, Scales::USUAL);
             let counts = *receiver.counts();
             prop_assert!(adds_up(&counts) && counts.received == received);
             prop_assert_eq!(counts.taken - before.taken, u32::from(verdict.is_ok()));
@@ -109,9 +109,9 @@ proptest! {
                 let zero = Payload(u64::from_le_bytes(frame.data) & !0xFFF);
                 let same = match content {
                     Content::Greeting => true,
-                    Content::Command(command) => message.id == COMMAND.id && command.encode() == Ok(zero),
-                    Content::Limits(limits) => message.id == LIMITS.id && limits.encode() == Ok(zero),
-                    Content::LinkLimits(limits) => message.id == LINK_LIMITS.id && limits.encode() == Ok(zero),
+                    Content::Command(command) => message.id == COMMAND.id && command.encode(Scales::USUAL) == Ok(zero),
+                    Content::Limits(limits) => message.id == LIMITS.id && limits.encode(Scales::USUAL) == Ok(zero),
+                    Content::LinkLimits(limits) => message.id == LINK_LIMITS.id && limits.encode(Scales::USUAL) == Ok(zero),
                     Content::Parameter(request) => message.id == PARAMETER_REQUEST.id && request.encode() == Ok(zero),
                 };
                 prop_assert!(same, "{content:?} {frame:?}");
@@ -131,7 +131,7 @@ proptest! {
                 judge.wait(1, 50);
                 age_ms = age_ms.saturating_add(1);
                 let frame = frame.as_ref().filter(|_| slot == 0);
-                if let Some(Ok(Content::Command(command))) = frame.map(|frame| judge.receive(frame)) {
+                if let Some(Ok(Content::Command(command))) = frame.map(|frame| judge.receive(frame, Scales::USUAL)) {
                     (torque_nm, age_ms) = (command.torque_nm, 0);
                 }
                 let request = session.listen(1, frame);
@@ -147,7 +147,7 @@ proptest! {
     fn any_words_are_a_frame_or_none(words: [u32; 3]) {
         if let Some(frame) = Option::<Frame>::from_words(words) {
             prop_assert_eq!(Option::<Frame>::from_words(Some(frame).to_words()), Some(frame));
-            let _ = Receiver::new().receive(&frame);
+            let _ = Receiver::new().receive(&frame, Scales::USUAL);
         }
     }
 
@@ -158,7 +158,7 @@ proptest! {
         let payload = Payload(bits);
         let (mut measured, mut counts) = (Measured::default(), Counts::default());
         for message in FROM_DRIVE {
-            measured.merge(message, payload);
+            measured.merge(message, payload, Scales::USUAL);
         }
         counts.merge(payload);
         let status = StatusFrame::<Mode>::decode(payload);

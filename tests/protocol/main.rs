@@ -6,6 +6,7 @@ mod document;
 mod e2e;
 mod fuzz;
 mod receiver;
+mod scales;
 mod session;
 mod zs9;
 

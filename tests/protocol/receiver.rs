@@ -4,17 +4,17 @@ use crate::Stream;
 use tractive::protocol::e2e::MAX_DELTA;
 use tractive::protocol::{
     COMMAND, Command, Content, Counts, Frame, LIMITS, LINK_LIMITS, LinkLimits, PARAMETER_REQUEST,
-    ParameterRequest, Payload, Receiver, Reject, STATUS, TorqueLimits,
+    ParameterRequest, Payload, Receiver, Reject, STATUS, Scales, TorqueLimits,
 };
 
 fn command(torque_nm: f32) -> Payload {
-    Command { torque_nm, ..Command::default() }.encode().unwrap()
+    Command { torque_nm, ..Command::default() }.encode(Scales::USUAL).unwrap()
 }
 
 /// A receiver that has heard the first frame, and the stream that goes on from it.
 fn met() -> (Receiver, Stream) {
     let (mut receiver, mut stream) = (Receiver::new(), Stream::of(&COMMAND));
-    assert_eq!(receiver.receive(&stream.frame(command(0.0))), Ok(Content::Greeting));
+    assert_eq!(receiver.receive(&stream.frame(command(0.0)), Scales::USUAL), Ok(Content::Greeting));
     (receiver, stream)
 }
 
@@ -30,7 +30,10 @@ fn frames_in_order_take_effect() {
     let (mut receiver, mut stream) = met();
     for k in 0..40 {
         let torque_nm = k as f32;
-        assert_eq!(torque(receiver.receive(&stream.frame(command(torque_nm)))), Some(torque_nm));
+        assert_eq!(
+            torque(receiver.receive(&stream.frame(command(torque_nm)), Scales::USUAL)),
+            Some(torque_nm)
+        );
     }
     assert_eq!(*receiver.counts(), Counts { received: 41, taken: 41, ..Counts::default() });
 }
@@ -39,24 +42,24 @@ fn frames_in_order_take_effect() {
 fn each_cause_is_named_and_counted() {
     let (mut receiver, mut stream) = met();
     let good = stream.frame(command(10.0));
-    assert!(receiver.receive(&good).is_ok());
-    assert_eq!(receiver.receive(&good), Err(Reject::Repeated));
-    assert_eq!(receiver.receive(&Frame { id: 0x7FF, ..good }), Err(Reject::Unknown));
-    assert_eq!(receiver.receive(&Frame { id: STATUS.id, ..good }), Err(Reject::Unknown));
+    assert!(receiver.receive(&good, Scales::USUAL).is_ok());
+    assert_eq!(receiver.receive(&good, Scales::USUAL), Err(Reject::Repeated));
+    assert_eq!(receiver.receive(&Frame { id: 0x7FF, ..good }, Scales::USUAL), Err(Reject::Unknown));
+    assert_eq!(receiver.receive(&Frame { id: STATUS.id, ..good }, Scales::USUAL), Err(Reject::Unknown));
     for length in (0..8).chain(9..16) {
-        assert_eq!(receiver.receive(&Frame { length, ..good }), Err(Reject::Truncated));
+        assert_eq!(receiver.receive(&Frame { length, ..good }, Scales::USUAL), Err(Reject::Truncated));
     }
     for bit in 0..64 {
         let mut bad = stream.frame(command(20.0));
         bad.data[bit / 8] ^= 1 << (bit % 8);
-        assert_eq!(receiver.receive(&bad), Err(Reject::Corrupted), "bit {bit}");
+        assert_eq!(receiver.receive(&bad, Scales::USUAL), Err(Reject::Corrupted), "bit {bit}");
     }
     // The 64 corrupted frames have taken the counter round four times.
-    assert_eq!(torque(receiver.receive(&stream.frame(command(30.0)))), Some(30.0));
-    assert_eq!(receiver.receive(&good), Err(Reject::Disordered), "an old frame");
+    assert_eq!(torque(receiver.receive(&stream.frame(command(30.0)), Scales::USUAL)), Some(30.0));
+    assert_eq!(receiver.receive(&good, Scales::USUAL), Err(Reject::Disordered), "an old frame");
     let mut reserved = command(40.0);
     reserved.0 |= 1 << 63;
-    assert_eq!(receiver.receive(&stream.frame(reserved)), Err(Reject::OutOfRange));
+    assert_eq!(receiver.receive(&stream.frame(reserved), Scales::USUAL), Err(Reject::OutOfRange));
     let counts = *receiver.counts();
     let wanted = Counts {
         received: 87,
@@ -78,9 +81,9 @@ fn frames_that_change_places_lose_the_late_one() {
     let (mut receiver, mut stream) = met();
     let (first, second, third) =
         (stream.frame(command(1.0)), stream.frame(command(2.0)), stream.frame(command(3.0)));
-    assert_eq!(torque(receiver.receive(&second)), Some(2.0));
-    assert_eq!(receiver.receive(&first), Err(Reject::Disordered));
-    assert_eq!(torque(receiver.receive(&third)), Some(3.0));
+    assert_eq!(torque(receiver.receive(&second, Scales::USUAL)), Some(2.0));
+    assert_eq!(receiver.receive(&first, Scales::USUAL), Err(Reject::Disordered));
+    assert_eq!(torque(receiver.receive(&third, Scales::USUAL)), Some(3.0));
     assert_eq!((receiver.counts().lost, receiver.counts().disordered), (1, 1));
 }
 
@@ -91,12 +94,16 @@ fn up_to_two_lost_frames_are_forgiven_and_counted_more_wait_for_the_silence() {
         for _ in 0..lost {
             stream.frame(command(0.0));
         }
-        let verdict = receiver.receive(&stream.frame(command(5.0)));
+        let verdict = receiver.receive(&stream.frame(command(5.0)), Scales::USUAL);
         assert_eq!(verdict.is_ok(), lost <= 2, "{lost}");
         assert_eq!(receiver.counts().lost, if lost <= 2 { lost } else { 0 });
         (0..50).for_each(|_| receiver.wait(1, 50));
-        assert_eq!(receiver.receive(&stream.frame(command(6.0))), Ok(Content::Greeting), "after the silence");
-        assert_eq!(torque(receiver.receive(&stream.frame(command(7.0)))), Some(7.0));
+        assert_eq!(
+            receiver.receive(&stream.frame(command(6.0)), Scales::USUAL),
+            Ok(Content::Greeting),
+            "after the silence"
+        );
+        assert_eq!(torque(receiver.receive(&stream.frame(command(7.0)), Scales::USUAL)), Some(7.0));
     }
 }
 
@@ -104,7 +111,7 @@ fn up_to_two_lost_frames_are_forgiven_and_counted_more_wait_for_the_silence() {
 fn a_wrong_counter_is_no_sign_of_life() {
     let (mut receiver, mut stream) = met();
     let old = stream.frame(command(10.0));
-    assert!(receiver.receive(&old).is_ok());
+    assert!(receiver.receive(&old, Scales::USUAL).is_ok());
     for _ in 0..MAX_DELTA {
         stream.frame(command(20.0));
     }
@@ -112,11 +119,11 @@ fn a_wrong_counter_is_no_sign_of_life() {
     // A sender that repeats itself, or that is too far on, is silent: after the time-out the sequence begins anew.
     for slots in [20, 40, 60, 80] {
         receiver.wait(20, 100);
-        assert_eq!(receiver.receive(&old), Err(Reject::Repeated), "{slots} ms");
-        assert_eq!(receiver.receive(&far), Err(Reject::Disordered), "{slots} ms");
+        assert_eq!(receiver.receive(&old, Scales::USUAL), Err(Reject::Repeated), "{slots} ms");
+        assert_eq!(receiver.receive(&far, Scales::USUAL), Err(Reject::Disordered), "{slots} ms");
     }
     receiver.wait(20, 100);
-    assert_eq!(receiver.receive(&far), Ok(Content::Greeting));
+    assert_eq!(receiver.receive(&far, Scales::USUAL), Ok(Content::Greeting));
 }
 
 #[test]
@@ -136,9 +143,13 @@ fn out_of_range_is_rejected_whole_in_every_message() {
         ),
     ] {
         let (mut receiver, mut stream) = (Receiver::new(), Stream::of(stream));
-        receiver.receive(&stream.frame(contents[0])).unwrap();
+        receiver.receive(&stream.frame(contents[0]), Scales::USUAL).unwrap();
         for content in &contents {
-            assert_eq!(receiver.receive(&stream.frame(*content)), Err(Reject::OutOfRange), "{content:X?}");
+            assert_eq!(
+                receiver.receive(&stream.frame(*content), Scales::USUAL),
+                Err(Reject::OutOfRange),
+                "{content:X?}"
+            );
         }
     }
 }
@@ -152,13 +163,13 @@ fn every_message_says_what_was_put_in() {
     let command =
         Command { enable: true, coast: true, acknowledge: true, torque_nm: -77.5, ..Command::default() };
     for (message, content, wanted) in [
-        (&COMMAND, command.encode().unwrap(), Content::Command(command)),
-        (&LIMITS, limits.encode().unwrap(), Content::Limits(limits)),
-        (&LINK_LIMITS, link.encode().unwrap(), Content::LinkLimits(link)),
+        (&COMMAND, command.encode(Scales::USUAL).unwrap(), Content::Command(command)),
+        (&LIMITS, limits.encode(Scales::USUAL).unwrap(), Content::Limits(limits)),
+        (&LINK_LIMITS, link.encode(Scales::USUAL).unwrap(), Content::LinkLimits(link)),
         (&PARAMETER_REQUEST, request.encode().unwrap(), Content::Parameter(request)),
     ] {
         let mut stream = Stream::of(message);
-        assert_eq!(receiver.receive(&stream.frame(content)), Ok(Content::Greeting));
-        assert_eq!(receiver.receive(&stream.frame(content)), Ok(wanted));
+        assert_eq!(receiver.receive(&stream.frame(content), Scales::USUAL), Ok(Content::Greeting));
+        assert_eq!(receiver.receive(&stream.frame(content), Scales::USUAL), Ok(wanted));
     }
 }

@@ -8,7 +8,7 @@ use tractive::protection::{Fault, SafeState, Trip};
 use tractive::protocol::{
     COMMAND, COUNTERS, Command, Counts, FAULT_LIMIT, FAULT_VALUE, FROM_DRIVE, Frame, LIMITS, LINK_LIMITS,
     LinkLimits, Listening, MOTION, Measured, Outcome, PARAMETER_ANSWER, PARAMETER_REQUEST, PARAMETERS,
-    ParameterAnswer, ParameterRequest, Payload, STATUS, Session, StatusFrame, Told, TorqueLimits,
+    ParameterAnswer, ParameterRequest, Payload, STATUS, Scales, Session, StatusFrame, Told, TorqueLimits,
     trip_number,
 };
 use tractive::time::Instant;
@@ -47,7 +47,7 @@ impl Bench {
     }
 
     fn command(&mut self, command: Command) -> Request {
-        let frame = self.commands.frame(command.encode().unwrap());
+        let frame = self.commands.frame(command.encode(Scales::USUAL).unwrap());
         self.slot(Some(frame))
     }
 
@@ -138,8 +138,8 @@ fn limits_are_the_senders_within_the_parameters() {
     let at_link = LinkLimits { low_v: 1_100.0, high_v: 1_750.0 };
     let mut request = bench.slot(None);
     for _ in 0..2 {
-        bench.slot(Some(torque.frame(as_rated.encode().unwrap())));
-        request = bench.slot(Some(link.frame(at_link.encode().unwrap())));
+        bench.slot(Some(torque.frame(as_rated.encode(Scales::USUAL).unwrap())));
+        request = bench.slot(Some(link.frame(at_link.encode(Scales::USUAL).unwrap())));
     }
     let limits = request.limits;
     assert_eq!((limits.motoring_nm, limits.braking_nm), (rated.motoring_nm, 100.0));
@@ -149,7 +149,7 @@ fn limits_are_the_senders_within_the_parameters() {
     bench.parameter(3, Some(500.0)).unwrap();
     assert_eq!(bench.slot(None).limits.motoring_nm, 500.0);
     let beyond = TorqueLimits { motoring_nm: ratings.max_torque_nm + 1.0, ..as_rated };
-    let limits = bench.slot(Some(torque.frame(beyond.encode().unwrap()))).limits;
+    let limits = bench.slot(Some(torque.frame(beyond.encode(Scales::USUAL).unwrap()))).limits;
     assert!(limits.motoring_nm > ratings.max_torque_nm, "the operator refuses it; nothing is clamped here");
 }
 
@@ -276,7 +276,7 @@ fn what_is_told_is_what_arrives() {
     for frame in &bench.sent {
         let payload = Payload(u64::from_le_bytes(frame.data));
         let message = FROM_DRIVE.iter().find(|message| message.id == frame.id).unwrap();
-        measured.merge(message, payload);
+        measured.merge(message, payload, Scales::USUAL);
         if frame.id == STATUS.id {
             told = told.or(Some(StatusFrame::<Mode>::decode(payload)));
         } else if frame.id == COUNTERS.id {
@@ -321,14 +321,15 @@ fn silence_is_measured_by_the_clock_however_seldom_anybody_looks() {
 fn all_frames_of_a_slot_are_taken() {
     let mut bench = Bench::armed();
     let (mut torque, mut link) = (Stream::of(&LIMITS), Stream::of(&LINK_LIMITS));
-    let content = TorqueLimits { motoring_nm: 50.0, braking_nm: 40.0, speed_rpm: 600.0 }.encode().unwrap();
-    let at_link = LinkLimits { low_v: 1_100.0, high_v: 1_750.0 }.encode().unwrap();
+    let content =
+        TorqueLimits { motoring_nm: 50.0, braking_nm: 40.0, speed_rpm: 600.0 }.encode(Scales::USUAL).unwrap();
+    let at_link = LinkLimits { low_v: 1_100.0, high_v: 1_750.0 }.encode(Scales::USUAL).unwrap();
     let frames = [
         torque.frame(content),
         torque.frame(content),
         link.frame(at_link),
         link.frame(at_link),
-        bench.commands.frame(PULL.encode().unwrap()),
+        bench.commands.frame(PULL.encode(Scales::USUAL).unwrap()),
     ];
     let request = bench.session.listen(1, frames);
     assert_eq!(

@@ -7,7 +7,7 @@ use tractive::nine_switch::Scheme;
 use tractive::operator::{DualRequest, DualStatus, Levels, State, Switches, Wanted};
 use tractive::ports::DualReport;
 use tractive::protocol::{
-    FROM_ZS9, Frame, MessageSet, Payload, StatusFrame, TO_ZS9, TorqueLimits, ZS9_COMMAND, ZS9_LIMITS,
+    FROM_ZS9, Frame, MessageSet, Payload, Scales, StatusFrame, TO_ZS9, TorqueLimits, ZS9_COMMAND, ZS9_LIMITS,
     ZS9_LINK, Zs9, Zs9CanEndpoint, Zs9Command, Zs9Demands, Zs9Link, Zs9Measured, Zs9Session,
 };
 use tractive::time::Clock;
@@ -73,7 +73,7 @@ fn each_motor_has_its_limits_and_the_link_its_voltage() {
         let mut stream = Stream::of(message);
         let mut session = session;
         for _ in 0..2 {
-            session.listen(1, Some(&stream.frame(limits.encode().unwrap())));
+            session.listen(1, Some(&stream.frame(limits.encode(Scales::USUAL).unwrap())));
         }
         let request = session.listen(1, None::<Frame>);
         let [limited, other] = [motor, 1 - motor].map(|motor| request.motors[motor].limits);

@@ -8,6 +8,7 @@ use crate::run::{Settings, prepare};
 use crate::time::{MILLISECOND, Time};
 use anyhow::{Result, ensure};
 use std::path::Path;
+use tractive::protocol::Scales;
 use tractive_rig::talk::{Listener, System};
 
 /// The drive that is disturbed.
@@ -160,7 +161,7 @@ fn disturb(cpu: &mut Cpu, system: System, cause: Cause, from: Time) -> Result<()
     let machine = cpu.machine_mut();
     machine.may_bite = true;
     // A drive that begins anew counts its frames anew: whoever listens from now on hears it.
-    machine.world.talk.listener = Listener::new(system);
+    machine.world.talk.listener = Listener::new(system, Scales::USUAL);
     match cause {
         Cause::Drivers => machine.world.ready = false,
         Cause::Overcurrent => machine.world.excess_a = (0, 0, 600.0),

@@ -1,6 +1,6 @@
 //! The files that a run leaves behind, through the rig's own writers: trace, edges, the operator's words, telemetry, frames, page.
 
-use crate::run::Settings;
+use crate::run::{Settings, motor};
 use crate::time::{SECOND, seconds};
 use crate::world::World;
 use crate::world::side::Side;
@@ -19,7 +19,12 @@ pub fn write(world: &mut World, settings: &Settings, out: &Path) -> Result<()> {
     let system = settings.system;
     let options =
         TalkOptions::read(&[settings.name.as_str(), "--system", system.name()].map(OsString::from))?;
-    let over = Talk::new(system, Lines::Script(Default::default()), settings.inertia_kg_m2, 0.0);
+    let over = Talk::new(
+        system,
+        Lines::Script(Default::default()),
+        settings.inertia_kg_m2,
+        &motor(system)?.tables.ratings,
+    );
     let talk = std::mem::replace(&mut world.talk, over);
     let recording = recording(world);
     let figures = figures(&talk, &recording);

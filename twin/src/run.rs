@@ -77,17 +77,26 @@ pub fn prepare(settings: &Settings) -> Result<(Cpu, Image)> {
 
 /// The machine around the processor, at the release of reset.
 pub fn machine(settings: &Settings) -> Result<Machine> {
-    let (motor, wiring) = match settings.system {
-        System::Pmasynrm => (Motor::load(traction::Traction::MACHINE)?, &wiring::TRACTION),
-        System::Zs9 => (Motor::load(zs9::Zs9::MACHINE)?, &wiring::ZS9),
+    let motor = motor(settings.system)?;
+    let wiring = match settings.system {
+        System::Pmasynrm => &wiring::TRACTION,
+        System::Zs9 => &wiring::ZS9,
     };
     let parameters = &motor.folder.parameters;
     let lines = Lines::Script(script::script(&settings.script, settings.system)?.into());
-    let talk = Talk::new(settings.system, lines, settings.inertia_kg_m2, parameters.max_torque_nm);
+    let talk = Talk::new(settings.system, lines, settings.inertia_kg_m2, &motor.tables.ratings);
     let rotor = Rotor { inertia_kg_m2: settings.inertia_kg_m2, pole_pairs: parameters.pole_pairs.into() };
     let world =
         World::new(side(settings.system, &motor), wiring, talk, PowerStage::read(&settings.stage())?, rotor);
     Ok(Machine::new(Chip::new(), world))
+}
+
+/// The machine of a system's image.
+pub fn motor(system: System) -> Result<Motor> {
+    Motor::load(match system {
+        System::Pmasynrm => traction::Traction::MACHINE,
+        System::Zs9 => zs9::Zs9::MACHINE,
+    })
 }
 
 fn side(system: System, motor: &Motor) -> Side {

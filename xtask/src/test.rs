@@ -123,7 +123,10 @@ fn perform(step: Step, setup: &mut Setup) -> Result<Outcome> {
         Step::Slurm => return Ok(where_possible(crate::slurm::check(setup)?)),
         Step::Python => return Ok(where_possible(crate::python::check()?)),
         Step::Qemu => qemu(setup)?,
-        Step::Timing => crate::timing::run(&TimingArgs::default())? == 0,
+        Step::Timing => {
+            let identify = TimingArgs { identify: true, ..TimingArgs::default() };
+            crate::timing::run(&TimingArgs::default())? == 0 && crate::timing::run(&identify)? == 0
+        }
         Step::Machines => machines(setup)?,
     };
     Ok(good.into())

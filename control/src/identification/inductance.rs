@@ -66,7 +66,8 @@ impl Inductance {
     /// The least that was seen along d so far is the measure of the least of all.
     pub fn settle(&mut self) {
         let mut least_h = self.here.dd;
-        for known in self.fields.iter().flatten() {
+        // Without current along q: the first field of each row.
+        for known in self.fields.iter().step_by(ALONG_Q).flatten() {
             if known.dd < least_h {
                 least_h = known.dd;
             }

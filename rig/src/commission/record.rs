@@ -18,6 +18,8 @@ pub struct Step {
     pub passed: bool,
     /// The reasons why it has not.
     pub complaints: Vec<String>,
+    /// The changes that mend it, by the key or the wire that they are made at.
+    pub advice: Vec<String>,
     /// The numbers that it found, by their names with units.
     pub found: BTreeMap<&'static str, f64>,
 }
@@ -41,6 +43,11 @@ impl Step {
         }
     }
 
+    /// Says what mends it.
+    pub fn advise(&mut self, advice: String) {
+        self.advice.push(advice);
+    }
+
     /// It has not passed, and why.
     pub fn fail(&mut self, complaint: String) {
         self.passed = false;
@@ -53,7 +60,7 @@ impl Display for Step {
         for (name, value) in &self.found {
             writeln!(to, "  {name:<34}{value:.5}")?;
         }
-        for complaint in &self.complaints {
+        for complaint in self.complaints.iter().chain(&self.advice) {
             writeln!(to, "  {complaint}")?;
         }
         write!(to, "  {}", if self.passed { "passed" } else { "NOT PASSED" })

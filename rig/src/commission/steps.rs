@@ -4,7 +4,7 @@ use super::options::Commission;
 use super::record::Step;
 use crate::can;
 use crate::folder::write_folder;
-use crate::identify::{Ended, Identify, contents, identified};
+use crate::identify::{Ended, Identify, ROTOR_TURNED, Signs, contents, identified};
 use crate::machine::Machine;
 use crate::options::On;
 use crate::scenario::System as _;
@@ -59,13 +59,19 @@ const ZERO_DEG: f64 = 5.0;
 const RESPONSE_DEG: f64 = 20.0;
 const TORQUE_OFF_SHARE: f64 = 0.02;
 
+/// An error of the angle's zero by which a free rotor turns away, at least, in degrees.
+const LEAST_ZERO_DEG: f64 = 2.0;
+const ADVICE_TURNED: &str = "a load turns the rotor; or its angle counts the wrong way: with the gates off turn the rotor forward, and where \
+    speed_rpm is below 0 exchange the encoder's channels A and B or two phases; or its zero is far off: set the power stage's \
+    encoder_zeros_deg anew";
+
 /// A talk of these lines: on the bench with the machine that the drive knows, or with whoever is on the bus.
 fn talk(commission: &Commission, options: &Options, machine: &Machine, script: &str) -> Result<Talk> {
     let identify = &commission.identify;
     let parameters = &machine.folder.parameters;
     let inertia = identify.inertia.unwrap_or(parameters.rotor_inertia_kg_m2);
     let lines = Lines::of_text(script, System::Pmasynrm)?;
-    let mut talk = Talk::new(System::Pmasynrm, lines, inertia, parameters.max_torque_nm);
+    let mut talk = Talk::new(System::Pmasynrm, lines, inertia, &machine.tables.ratings);
     match &identify.can {
         Some(interface) => can::command(interface, &mut talk)?,
         None => {
@@ -117,13 +123,17 @@ fn identification(commission: &Commission, machine: &Machine) -> Result<Step> {
     let identify = Identify { over_protocol: true, ..commission.identify.clone() };
     let outcome = match identified(&identify, machine)? {
         Ok(outcome) => outcome,
-        Err(Ended { fault, value, limit }) => {
+        Err(Ended { fault, value, limit, zero_deg }) => {
+            if fault == ROTOR_TURNED {
+                step.advise(turned_away(zero_deg));
+            }
             step.fail(format!("fault {fault}: {value} (limit {limit})"));
             return Ok(step);
         }
     };
     step.within("current_answers_voltage_deg", outcome.signs.response_deg, [-RESPONSE_DEG, RESPONSE_DEG]);
     step.within("angle_zero_deg", outcome.signs.zero_deg, [-ZERO_DEG, ZERO_DEG]);
+    advise(&outcome.signs, &mut step);
     step.within("turned_by_pulses_deg", outcome.turned_deg, [0.0, 5.0]);
     step.within("largest_current_of_the_bound", outcome.peak_share, [0.0, 1.1]);
     step.find("stator_resistance_ohm", outcome.fit.resistance_ohm);
@@ -134,6 +144,37 @@ fn identification(commission: &Commission, machine: &Machine) -> Result<Step> {
         write_folder(out, &contents(&outcome, machine))?;
     }
     Ok(step)
+}
+
+/// Advice on signs and zeros that are not right: the key with the number to add, or the wires.
+fn advise(signs: &Signs, step: &mut Step) {
+    let Signs { response_deg, zero_deg } = *signs;
+    if response_deg.abs() > 180.0 - RESPONSE_DEG {
+        step.advise(
+            "current sensors: all read with the wrong sign, so exchange the leads of each".to_owned(),
+        );
+    } else if response_deg.abs() > RESPONSE_DEG {
+        step.advise(
+            "current sensors: one reads with the wrong sign, or they are in another order than the phases"
+                .to_owned(),
+        );
+    } else if zero_deg.abs() > ZERO_DEG {
+        step.advise(zero_off(zero_deg));
+    }
+}
+
+fn zero_off(zero_deg: f64) -> String {
+    format!(
+        "power stage, encoder_zeros_deg: add about {zero_deg:.1}; then flash this image anew and begin anew"
+    )
+}
+
+/// Advice on an angle by which the rotor turns away.
+fn turned_away(zero_deg: Option<f64>) -> String {
+    match zero_deg {
+        Some(zero_deg) if zero_deg.abs() > LEAST_ZERO_DEG => zero_off(zero_deg),
+        _ => ADVICE_TURNED.to_owned(),
+    }
 }
 
 /// The machine folder that was made.

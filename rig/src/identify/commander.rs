@@ -7,6 +7,7 @@ use anyhow::{Result, anyhow, bail};
 use indicatif::ProgressBar;
 use std::fmt::Write as _;
 use tractive::identification::{Observation, PACKED_WORDS, Packed, Stage, Units};
+use tractive::machine::Ratings;
 use tractive::protocol::{
     EXPERIMENT, ExperimentFrame, FROM_IDENTIFICATION, Frame, OBSERVATION, ObservationFrame, Payload,
 };
@@ -49,6 +50,8 @@ pub struct Ended {
     pub value: String,
     /// The limit.
     pub limit: String,
+    /// The number that mends the angle's zero, electrical, in degrees, where the rotor has turned away and the pulses tell it.
+    pub zero_deg: Option<f64>,
 }
 
 /// The commander's state.
@@ -79,13 +82,14 @@ const SLOTS_S: u64 = 1_000;
 const FAULT_SLOTS: u64 = 250;
 
 impl Commander {
-    /// Before the first slot, of a drive whose ratings give these units.
-    pub fn new(units: Units) -> Self {
+    /// Before the first slot, of a drive of these ratings.
+    pub fn new(ratings: &Ratings) -> Self {
+        let scales = System::Pmasynrm.scales(ratings);
         Self {
-            sender: Sender::new(System::Pmasynrm),
+            sender: Sender::new(System::Pmasynrm, scales),
             command: Spoken::default(),
-            listener: Listener::new(System::Pmasynrm),
-            units,
+            listener: Listener::new(System::Pmasynrm, scales),
+            units: Units::of(ratings),
             phase: Phase::Wait,
             slot: 0,
             since: 0,
@@ -179,7 +183,7 @@ impl Commander {
                 self.enter(Phase::Over);
             }
             if told || self.slot > self.since + FAULT_SLOTS {
-                self.ended = Some(Ended { fault, value, limit });
+                self.ended = Some(Ended { fault, value, limit, zero_deg: None });
             }
         }
         let (most_s, lacking) = self.phase.most();
@@ -222,6 +226,9 @@ impl Supervisor for Commander {
     }
 
     fn slot(&mut self, t_s: f64) -> Result<Turn> {
+        if let Some(foreign) = &self.listener.foreign {
+            bail!("{foreign}");
+        }
         self.advance()?;
         if self.slot.is_multiple_of(100) {
             self.show();

@@ -14,7 +14,7 @@ mod toml;
 pub use commander::{Commander, Ended};
 pub use fit::Fit;
 pub use outcome::{Outcome, Truth};
-pub use signs::Signs;
+pub use signs::{Signs, saliency_deg};
 
 use crate::can;
 use crate::files::write_text;
@@ -31,7 +31,7 @@ use clap::Args;
 use serde_json::Map;
 use std::path::PathBuf;
 use std::process::ExitCode;
-use tractive::identification::{Observation, Stage, Units};
+use tractive::identification::{Observation, Stage};
 
 /// The options of an identification.
 #[derive(Clone, Debug, Args)]
@@ -70,7 +70,7 @@ pub fn command(identify: &Identify) -> Result<ExitCode> {
     let machine = Machine::load(identify.options.machine.as_deref().unwrap_or(Traction::MACHINE))?;
     let outcome = match identified(identify, &machine)? {
         Ok(outcome) => outcome,
-        Err(Ended { fault, value, limit }) => {
+        Err(Ended { fault, value, limit, .. }) => {
             eprintln!("fault {fault}: {value} (limit {limit}): nothing is written");
             return Ok(ExitCode::from(1));
         }
@@ -104,7 +104,7 @@ pub fn identified(identify: &Identify, machine: &Machine) -> Result<std::result:
     let inertia_kg_m2 = identify.inertia.unwrap_or(parameters.rotor_inertia_kg_m2);
     let stand = Stand { inertia_kg_m2, fault_at_s: identify.fault_at };
     let (recording, observed) = if identify.over_protocol {
-        let mut commander = Commander::new(Units::of(&machine.tables.ratings));
+        let mut commander = Commander::new(&machine.tables.ratings);
         let recording = identification::drive_commanded(options, machine, &stand, &mut commander)?;
         if let Some(log) = &identify.frames {
             write_text(log, &commander.frames)?;
@@ -117,12 +117,14 @@ pub fn identified(identify: &Identify, machine: &Machine) -> Result<std::result:
                 fault: trip.fault.name().to_owned(),
                 value: trip.value.to_string(),
                 limit: trip.limit.to_string(),
+                zero_deg: None,
             }),
             None => Ok(std::mem::take(&mut recording.observations)),
         };
         (recording, observed)
     };
-    let observations = match observed.and_then(complete) {
+    let bound_a = parameters.max_current_a;
+    let observations = match observed.and_then(|observations| complete(observations, bound_a)) {
         Ok(observations) => observations,
         Err(ended) => return Ok(Err(ended)),
     };
@@ -131,21 +133,27 @@ pub fn identified(identify: &Identify, machine: &Machine) -> Result<std::result:
     Outcome::of(&observations, peak_a, machine, Some(&truth)).map(Ok)
 }
 
+/// The fault of an experiment whose rotor has turned away.
+pub const ROTOR_TURNED: &str = "rotor_turned";
+
 /// Observations of an experiment that has come to its end: one whose rotor is not where it should be, as its angle is wrong or a load turns
 /// it, ends before the rotor is to turn.
-fn complete(observations: Vec<Observation>) -> std::result::Result<Vec<Observation>, Ended> {
+fn complete(observations: Vec<Observation>, bound_a: f64) -> std::result::Result<Vec<Observation>, Ended> {
     if observations.iter().any(|observation| observation.stage == Stage::Turn) {
         return Ok(observations);
     }
     let (value, limit) = ("more".to_owned(), "5° before it is to turn".to_owned());
-    Err(Ended { fault: "rotor_turned".to_owned(), value, limit })
+    let zero_deg = saliency_deg(&observations, bound_a);
+    Err(Ended { fault: ROTOR_TURNED.to_owned(), value, limit, zero_deg })
 }
 
 /// The same of a drive on a CAN bus, whose truth nobody knows.
 fn on_bus(interface: &str, machine: &Machine) -> Result<std::result::Result<Outcome, Ended>> {
-    let mut commander = Commander::new(Units::of(&machine.tables.ratings));
+    let mut commander = Commander::new(&machine.tables.ratings);
     can::command(interface, &mut commander)?;
-    let observations = match commander.finish().and_then(complete) {
+    let bound_a = machine.folder.parameters.max_current_a;
+    let observed = commander.finish().and_then(|observations| complete(observations, bound_a));
+    let observations = match observed {
         Ok(observations) => observations,
         Err(ended) => return Ok(Err(ended)),
     };

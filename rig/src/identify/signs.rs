@@ -61,6 +61,56 @@ impl Signs {
     }
 }
 
+/// Halves along either axis from which the saliency is told, at least; largest current of one, as a share of the bound; and the least ratio of
+/// both inductances.
+const LEAST_HALVES: usize = 10;
+const SMALL_SHARE: f64 = 0.4;
+const LEAST_RATIO: f64 = 1.05;
+
+/// The angle by which the axis of the lower inductance lies ahead of where the angle says that d is, electrical, in degrees from −90 to 90, as
+/// the pulses along d and along q show it at small currents: they need no rotor that turns. Without pulses along q a part of the angle, the greater, the
+/// more salient the machine is. `None` where there are too few pulses, or no saliency.
+pub fn saliency_deg(observations: &[Observation], bound_a: f64) -> Option<f64> {
+    // Least squares of change = Y · volt-seconds: sums of the right sides and of the volt-seconds' squares.
+    let (mut halves, mut sides, mut squares) = ([0_usize; 2], [[0.0; 2]; 2], [[0.0; 2]; 2]);
+    for pair in observations.windows(2) {
+        let [before, after] = pair else { continue };
+        let axis = match after.stage {
+            Stage::Probe | Stage::AlongD => 0,
+            Stage::AlongQ => 1,
+            _ => continue,
+        };
+        let at = direction(before);
+        let [from, to] = [before, after]
+            .map(|of| times(times((of.current.d.into(), of.current.q.into()), direction(of)), conjugate(at)));
+        if from.0.hypot(from.1).max(to.0.hypot(to.1)) > SMALL_SHARE * bound_a {
+            continue;
+        }
+        let volt_seconds = (f64::from(after.volt_seconds.alpha), f64::from(after.volt_seconds.beta));
+        let (d, q) = times(volt_seconds, conjugate(at));
+        halves[axis] += 1;
+        for (k, change) in [to.0 - from.0, to.1 - from.1].into_iter().enumerate() {
+            sides[k] = [sides[k][0] + change * d, sides[k][1] + change * q];
+        }
+        squares[0] = [squares[0][0] + d * d, squares[0][1] + d * q];
+        squares[1][1] += q * q;
+    }
+    let [[dd, dq], [_, qq]] = squares;
+    let determinant = dd * qq - dq * dq;
+    match halves.map(|count| count >= LEAST_HALVES) {
+        [true, true] if determinant > 0.0 => {}
+        [true, _] => return Some(degrees((sides[0][0], sides[1][0]))),
+        _ => return None,
+    }
+    let row = |side: [f64; 2]| {
+        [(side[0] * qq - side[1] * dq) / determinant, (side[1] * dd - side[0] * dq) / determinant]
+    };
+    let ([y_dd, y_dq], [y_qd, y_qq]) = (row(sides[0]), row(sides[1]));
+    let (mean, half) = (0.5 * (y_dd + y_qq), (0.5 * (y_dd - y_qq), 0.5 * (y_dq + y_qd)));
+    let apart = half.0.hypot(half.1);
+    (mean + apart > LEAST_RATIO * (mean - apart)).then(|| 0.5 * degrees(half))
+}
+
 /// Volt-seconds of the turning flux linkage along d in a half, rotor frame, forward: of what acted, less what resistance and dead time take,
 /// and less the turn of the flux linkage along q.
 fn turning([before, after]: [&Observation; 2], fit: &Fit, half_s: f64) -> Vector {

@@ -83,8 +83,7 @@ pub fn run(options: &LiveOptions) -> Result<()> {
     if !page.no_open {
         open(&address);
     }
-    let largest_nm = machine.folder.parameters.max_torque_nm;
-    let mut relay = Relay::new(drive.system, drive.inertia(), largest_nm, shared);
+    let mut relay = Relay::new(drive.system, drive.inertia(), &machine.tables.ratings, shared);
     match (&page.can, drive.system) {
         (Some(interface), _) => can::command(interface, &mut relay),
         (None, System::Pmasynrm) => {

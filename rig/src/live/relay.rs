@@ -7,6 +7,7 @@ use anyhow::Result;
 use serde_json::{Value, json};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
+use tractive::machine::Ratings;
 use tractive::modulation::Mode;
 use tractive::nine_switch::Scheme;
 use tractive::protocol::Frame;
@@ -59,9 +60,9 @@ pub struct Relay {
 }
 
 impl Relay {
-    /// To a drive of a system whose rotor has an inertia in kg·m² and a largest torque in N·m.
-    pub fn new(system: System, inertia_kg_m2: f64, largest_nm: f64, shared: Arc<Shared>) -> Self {
-        let talk = Talk::new(system, Lines::Said, inertia_kg_m2, largest_nm);
+    /// To a drive of a system whose rotor has an inertia in kg·m², of a machine of these ratings.
+    pub fn new(system: System, inertia_kg_m2: f64, ratings: &Ratings, shared: Arc<Shared>) -> Self {
+        let talk = Talk::new(system, Lines::Said, inertia_kg_m2, ratings);
         Self { system, talk, shared, began: Instant::now(), refused: None }
     }
 
@@ -138,6 +139,7 @@ mod tests {
     use super::*;
     use crate::can::{Bus, drive};
     use crate::live::shared::Shared;
+    use crate::machine::Machine;
     use crate::talk::System;
     use std::collections::VecDeque;
     use std::sync::Arc;
@@ -164,7 +166,8 @@ mod tests {
     #[test]
     fn a_bus_is_only_looked_at_until_commands_are_switched_on() {
         let shared = Arc::new(Shared::new(true));
-        let mut to = Relay::new(System::Pmasynrm, 10.0, 1235.0, Arc::clone(&shared));
+        let machine = Machine::load("pmasynrm-180kw").unwrap();
+        let mut to = Relay::new(System::Pmasynrm, 10.0, &machine.tables.ratings, Arc::clone(&shared));
         let status = FROM_DRIVE[0].frame(Payload(0), &mut Counter::default());
         let mut bus = Fake { come: [status].into(), sent: Vec::new() };
         drive(&mut bus, &mut to, 0..30).unwrap();

@@ -7,7 +7,7 @@ use tractive::protection::Fault;
 use tractive::protocol::e2e::{Order, Sequence, counter};
 use tractive::protocol::{
     Counts, FROM_DRIVE, FROM_ZS9, Frame, Listening, Measured, Message, Outcome, ParameterAnswer, Pattern,
-    Payload, StatusFrame, Zs9Measured, trip_number,
+    Payload, Scales, StatusFrame, Zs9Measured, trip_number,
 };
 
 /// Places of the messages in the lists of both systems.
@@ -35,6 +35,7 @@ impl Pattern for Code {
 #[derive(Clone, Debug, Default)]
 pub struct Listener {
     system: System,
+    scales: Scales,
     sequences: [Sequence; FROM_DRIVE.len()],
     status: Option<StatusFrame<Code>>,
     /// Measurements of the PMaSynRM drive.
@@ -48,12 +49,27 @@ pub struct Listener {
     answer: Option<ParameterAnswer>,
     /// Frames that did not check, or were not in order.
     pub errors: u32,
+    /// The frame that is on the scales of another machine.
+    pub foreign: Option<String>,
+}
+
+/// The reason why a message cannot be read.
+fn foreign(message: &Message, scales: Scales) -> String {
+    let scaled = message
+        .quantities()
+        .map(|quantity| format!("{} in {} of the usual steps", quantity.name(), scales.worth(quantity)));
+    let scaled: Vec<_> = scaled.collect();
+    format!(
+        "{}: the drive counts in other steps than the machine's, {}: its image is another machine's",
+        message.name,
+        scaled.join(", ")
+    )
 }
 
 impl Listener {
-    /// To a system, before its first frame.
-    pub fn new(system: System) -> Self {
-        Self { system, ..Self::default() }
+    /// To a system on these scales, before its first frame.
+    pub fn new(system: System, scales: Scales) -> Self {
+        Self { system, scales, ..Self::default() }
     }
 
     /// The messages that the system sends.
@@ -81,9 +97,14 @@ impl Listener {
             self.errors += 1;
             return false;
         }
-        let payload = Payload(u64::from_le_bytes(frame.data));
+        let payload = message.mark(Payload(u64::from_le_bytes(frame.data)), self.scales);
+        if !message.is_tidy(payload) {
+            self.errors += 1;
+            self.foreign.get_or_insert_with(|| foreign(message, self.scales));
+            return false;
+        }
         match self.system {
-            System::Pmasynrm => self.measured.merge(message, payload),
+            System::Pmasynrm => self.measured.merge(message, payload, self.scales),
             System::Zs9 => self.zs9.merge(message, payload),
         }
         match index {

@@ -51,7 +51,7 @@ pub fn run(options: &TalkOptions) -> Result<Outcome> {
         _ => Lines::Typed(0),
     };
     let machine = Machine::load(options.machine_name())?;
-    let mut talk = Talk::new(system, lines, options.inertia(), machine.folder.parameters.max_torque_nm);
+    let mut talk = Talk::new(system, lines, options.inertia(), &machine.tables.ratings);
     let recording = match system {
         System::Pmasynrm => {
             let own = traction_options(options);

@@ -6,7 +6,7 @@ use tractive::operator::Levels;
 use tractive::protocol::e2e::Counter;
 use tractive::protocol::{
     COMMAND, Command, Frame, LIMITS, LINK_LIMITS, LinkLimits, Message, OutOfRange, PARAMETER_REQUEST,
-    ParameterRequest, Payload, TO_ZS9, TorqueLimits, ZS9_COMMAND, ZS9_LINK, ZS9_PARAMETER_REQUEST,
+    ParameterRequest, Payload, Scales, TO_ZS9, TorqueLimits, ZS9_COMMAND, ZS9_LINK, ZS9_PARAMETER_REQUEST,
     Zs9Command, Zs9Demands, Zs9Link,
 };
 
@@ -22,14 +22,14 @@ pub struct Spoken {
 }
 
 impl Spoken {
-    fn encode(&self, system: System) -> Result<Payload, OutOfRange> {
+    fn encode(&self, system: System, scales: Scales) -> Result<Payload, OutOfRange> {
         let levels = self.levels;
         match system {
             System::Pmasynrm => {
                 let Levels { enable, with_torque, off, coast, charge, discharge, acknowledge } = levels;
                 let [torque_nm, _] = self.torques_nm;
                 Command { enable, with_torque, off, coast, charge, discharge, acknowledge, torque_nm }
-                    .encode()
+                    .encode(scales)
             }
             System::Zs9 => {
                 let demands =
@@ -66,6 +66,7 @@ enum Extra {
 #[derive(Debug, Default)]
 pub struct Sender {
     system: System,
+    scales: Scales,
     command: Counter,
     limits: [Counter; 2],
     link_limits: Counter,
@@ -93,9 +94,9 @@ pub struct Sender {
 }
 
 impl Sender {
-    /// To a system, nothing sent yet.
-    pub fn new(system: System) -> Self {
-        Self { system, ..Self::default() }
+    /// To a system on these scales, nothing sent yet.
+    pub fn new(system: System, scales: Scales) -> Self {
+        Self { system, scales, ..Self::default() }
     }
 
     /// Messages of a command, of a parameter.
@@ -113,13 +114,14 @@ impl Sender {
             System::Zs9 => TO_ZS9[1 + motor],
         };
         let Some(limits) = &self.torque_limits[motor] else { return Ok(None) };
-        Ok(Some(message.frame(limits.encode()?, &mut self.limits[motor])))
+        let content = message.mark(limits.encode(self.scales)?, self.scales);
+        Ok(Some(message.frame(content, &mut self.limits[motor])))
     }
 
     /// Limits of the link, or its voltage.
     fn link(&mut self) -> Result<Option<Frame>, OutOfRange> {
         let (message, content) = match (&self.link, &self.link_ref) {
-            (Some(limits), _) => (&LINK_LIMITS, limits.encode()?),
+            (Some(limits), _) => (&LINK_LIMITS, LINK_LIMITS.mark(limits.encode(self.scales)?, self.scales)),
             (None, Some(link)) => (&ZS9_LINK, link.encode()?),
             (None, None) => return Ok(None),
         };
@@ -150,7 +152,9 @@ impl Sender {
         let [command_message, parameter_message] = self.messages();
         Ok(match (slot % COMMAND_SLOTS, slot % LIMIT_SLOTS) {
             (1, _) => {
-                let frame = command_message.frame(command.encode(self.system)?, &mut self.command);
+                let content = command.encode(self.system, self.scales)?;
+                let content = command_message.mark(content, self.scales);
+                let frame = command_message.frame(content, &mut self.command);
                 self.mistreated(frame)
             }
             (3, 3) => self.motor_limits(0)?,
@@ -164,7 +168,8 @@ impl Sender {
                 Some(Extra::Frame(frame)) => Some(frame),
                 Some(Extra::Old(back)) => self.kept.iter().rev().nth(back).copied(),
                 Some(Extra::OutOfRange) => {
-                    Some(command_message.frame(TORQUE_OUT_OF_RANGE, &mut self.command))
+                    let content = command_message.mark(TORQUE_OUT_OF_RANGE, self.scales);
+                    Some(command_message.frame(content, &mut self.command))
                 }
                 None => None,
             },

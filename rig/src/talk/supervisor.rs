@@ -7,9 +7,10 @@ use super::sender::{COMMAND_SLOTS, Sender, Spoken};
 use super::system::System;
 use crate::run::{Supervisor, Turn, bar};
 use crate::speed_loop::SpeedLoop;
-use anyhow::{Result, anyhow};
+use anyhow::{Result, anyhow, bail};
 use indicatif::ProgressBar;
 use std::fmt::Write as _;
+use tractive::machine::Ratings;
 use tractive::protocol::{Frame, ParameterRequest, Zs9Link};
 
 /// Slots for which a level stands whose edge counts: more than may be lost in a row.
@@ -79,8 +80,9 @@ pub struct Talk {
 }
 
 impl Talk {
-    /// At rest; the speed loop is made for this inertia and torque.
-    pub fn new(system: System, lines: Lines, inertia_kg_m2: f64, largest_nm: f64) -> Self {
+    /// At rest; the speed loop is made for this inertia and for the largest torque, the steps of all signals for the ratings.
+    pub fn new(system: System, lines: Lines, inertia_kg_m2: f64, ratings: &Ratings) -> Self {
+        let scales = system.scales(ratings);
         Self {
             system,
             lines,
@@ -93,10 +95,10 @@ impl Talk {
             ramp: Ramp::default(),
             speed_loop: None,
             inertia_kg_m2,
-            largest_nm,
+            largest_nm: ratings.max_torque_nm.into(),
             loads_nm: [0.0; 2],
-            sender: Sender::new(system),
-            listener: Listener::new(system),
+            sender: Sender::new(system, scales),
+            listener: Listener::new(system, scales),
             rows: Vec::new(),
             frames: String::new(),
             sent: 0,
@@ -291,6 +293,9 @@ impl Supervisor for Talk {
     }
 
     fn slot(&mut self, t_s: f64) -> Result<Turn> {
+        if let Some(foreign) = &self.listener.foreign {
+            bail!("{foreign}");
+        }
         let done = self.expectations;
         if !self.lines.are_typed() && self.slot.is_multiple_of(SHOWN_SLOTS) {
             self.shown.set_message(self.state(t_s));

@@ -1,5 +1,8 @@
 //! The system that is talked to, and the columns of its telemetry.
 
+use tractive::machine::Ratings;
+use tractive::protocol::Scales;
+
 /// The system that is talked to.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
 pub enum System {
@@ -24,6 +27,14 @@ impl System {
     /// The place of a column.
     pub fn column(self, name: &str) -> Option<usize> {
         self.columns().iter().position(|column| *column == name)
+    }
+
+    /// The scales of its signals, of a machine of these ratings.
+    pub const fn scales(self, ratings: &Ratings) -> Scales {
+        match self {
+            Self::Pmasynrm => Scales::of(ratings),
+            Self::Zs9 => Scales::USUAL,
+        }
     }
 
     /// As on the command line.

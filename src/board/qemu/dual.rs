@@ -107,7 +107,7 @@ impl PwmPort<Dual> for Pwm {
 /// The idle loop's side of the board, for the ZS9.
 pub struct DualIdle {
     /// The protocol.
-    pub station: Zs9CanEndpoint,
+    pub station: &'static mut Zs9CanEndpoint,
 }
 
 impl OperatorPort<DualDemands> for DualIdle {

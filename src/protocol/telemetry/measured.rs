@@ -2,33 +2,44 @@
 
 use crate::protocol::commands::{LINK_V, TORQUE_NM};
 use crate::protocol::message::Message;
+use crate::protocol::scales::{Quantity, Scales};
 use crate::protocol::signal::{Payload, Signal};
 
-const CURRENT_A: [f32; 2] = [-3_000.0, 3_000.0];
+/// Range of every current, in A.
+pub(in crate::protocol) const CURRENT_A: [f32; 2] = [-3_000.0, 3_000.0];
+/// Range of every speed that is told, in r/min.
 pub(in crate::protocol) const SPEED_RPM: [f32; 2] = [-16_000.0, 16_000.0];
 
-const SPEED: Signal = Signal::physical("speed_rpm", "r/min", 16, 0.5, SPEED_RPM);
-const TORQUE: Signal = Signal::physical("torque_nm", "N.m", 32, 0.1, TORQUE_NM);
-const LINK: Signal = Signal::physical("link_v", "V", 48, 0.1, LINK_V);
+/// Range of the stator frequency, in Hz.
+pub(in crate::protocol) const FREQUENCY_HZ: [f32; 2] = [-1_600.0, 1_600.0];
 
-const CURRENT: Signal = Signal::physical("current_a", "A", 16, 0.1, [0.0, 3_000.0]);
-const ID_REF: Signal = Signal::physical("id_ref_a", "A", 32, 0.1, CURRENT_A);
-const IQ_REF: Signal = Signal::physical("iq_ref_a", "A", 48, 0.1, CURRENT_A);
+const SPEED: Signal = Signal::physical("speed_rpm", "r/min", 16, 0.5, SPEED_RPM).of(Quantity::Speed);
+const TORQUE: Signal = Signal::physical("torque_nm", "N.m", 32, 0.1, TORQUE_NM).of(Quantity::Torque);
+const LINK: Signal = Signal::physical("link_v", "V", 48, 0.1, LINK_V).of(Quantity::Voltage);
 
-const ESTIMATE: Signal = Signal::physical("torque_estimate_nm", "N.m", 16, 0.1, TORQUE_NM);
+const CURRENT: Signal = Signal::physical("current_a", "A", 16, 0.1, [0.0, 3_000.0]).of(Quantity::Current);
+const ID_REF: Signal = Signal::physical("id_ref_a", "A", 32, 0.1, CURRENT_A).of(Quantity::Current);
+const IQ_REF: Signal = Signal::physical("iq_ref_a", "A", 48, 0.1, CURRENT_A).of(Quantity::Current);
 
-const VOLTAGE: Signal = Signal::physical("voltage_v", "V", 16, 0.1, LINK_V);
-const FREQUENCY: Signal = Signal::physical("frequency_hz", "Hz", 32, 0.05, [-1_600.0, 1_600.0]);
+const ESTIMATE: Signal =
+    Signal::physical("torque_estimate_nm", "N.m", 16, 0.1, TORQUE_NM).of(Quantity::Torque);
+
+const VOLTAGE: Signal = Signal::physical("voltage_v", "V", 16, 0.1, LINK_V).of(Quantity::Voltage);
+const FREQUENCY: Signal = Signal::physical("frequency_hz", "Hz", 32, 0.05, FREQUENCY_HZ).of(Quantity::Speed);
 const TEMPERATURE: Signal = Signal::physical("temperature_c", "degC", 48, 0.1, [-100.0, 300.0]);
 
 /// Speed, torque, link.
-pub const MOTION: Message = Message::new("MOTION", 0x182, 6, 10, &[SPEED, TORQUE, LINK]);
+pub const MOTION: Message = Message::new("MOTION", 0x182, 6, 10, &[SPEED, TORQUE, LINK])
+    .telling(12, &[Quantity::Speed, Quantity::Torque, Quantity::Voltage]);
 /// Currents.
-pub const CURRENTS: Message = Message::new("CURRENTS", 0x183, 7, 10, &[CURRENT, ID_REF, IQ_REF]);
+pub const CURRENTS: Message =
+    Message::new("CURRENTS", 0x183, 7, 10, &[CURRENT, ID_REF, IQ_REF]).telling(12, &[Quantity::Current]);
 /// Voltage, frequency, temperature.
-pub const VOLTAGES: Message = Message::new("VOLTAGES", 0x184, 8, 10, &[VOLTAGE, FREQUENCY, TEMPERATURE]);
+pub const VOLTAGES: Message = Message::new("VOLTAGES", 0x184, 8, 10, &[VOLTAGE, FREQUENCY, TEMPERATURE])
+    .telling(12, &[Quantity::Voltage]);
 /// The torque that flows.
-pub const TORQUE_ESTIMATE: Message = Message::new("TORQUE_ESTIMATE", 0x189, 13, 10, &[ESTIMATE]);
+pub const TORQUE_ESTIMATE: Message =
+    Message::new("TORQUE_ESTIMATE", 0x189, 13, 10, &[ESTIMATE]).telling(12, &[Quantity::Torque]);
 
 /// The measurements, and what control makes of them. `None`: not available.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -58,55 +69,55 @@ pub struct Measured {
 
 /// Measurements of one message.
 #[inline(never)]
-pub(in crate::protocol) fn encode(signals: &[(&Signal, Option<f32>)]) -> Payload {
+pub(in crate::protocol) fn encode(signals: &[(&Signal, Option<f32>)], scales: Scales) -> Payload {
     let mut payload = Payload::default();
     for (signal, value) in signals {
-        signal.put_measured(&mut payload, *value);
+        signal.put_measured_on(scales, &mut payload, *value);
     }
     payload
 }
 
 impl Measured {
-    /// Content of [`MOTION`].
-    pub fn motion(&self) -> Payload {
-        encode(&[(&SPEED, self.speed_rpm), (&TORQUE, self.torque_nm), (&LINK, self.link_v)])
+    /// Content, without its mark, of [`MOTION`].
+    pub fn motion(&self, scales: Scales) -> Payload {
+        encode(&[(&SPEED, self.speed_rpm), (&TORQUE, self.torque_nm), (&LINK, self.link_v)], scales)
     }
 
-    /// Content of [`CURRENTS`].
-    pub fn currents(&self) -> Payload {
-        encode(&[(&CURRENT, self.current_a), (&ID_REF, self.id_ref_a), (&IQ_REF, self.iq_ref_a)])
+    /// Content, without its mark, of [`CURRENTS`].
+    pub fn currents(&self, scales: Scales) -> Payload {
+        encode(&[(&CURRENT, self.current_a), (&ID_REF, self.id_ref_a), (&IQ_REF, self.iq_ref_a)], scales)
     }
 
-    /// Content of [`VOLTAGES`].
-    pub fn voltages(&self) -> Payload {
+    /// Content, without its mark, of [`VOLTAGES`].
+    pub fn voltages(&self, scales: Scales) -> Payload {
         let temperature = (&TEMPERATURE, self.temperature_c);
-        encode(&[(&VOLTAGE, self.voltage_v), (&FREQUENCY, self.frequency_hz), temperature])
+        encode(&[(&VOLTAGE, self.voltage_v), (&FREQUENCY, self.frequency_hz), temperature], scales)
     }
 
-    /// Content of [`TORQUE_ESTIMATE`].
-    pub fn torque_estimate(&self) -> Payload {
-        encode(&[(&ESTIMATE, self.torque_estimate_nm)])
+    /// Content, without its mark, of [`TORQUE_ESTIMATE`].
+    pub fn torque_estimate(&self, scales: Scales) -> Payload {
+        encode(&[(&ESTIMATE, self.torque_estimate_nm)], scales)
     }
 
-    /// Takes over what a message of these four says.
-    pub fn merge(&mut self, message: &Message, payload: Payload) {
+    /// Takes over what a message of these four says, without its mark.
+    pub fn merge(&mut self, message: &Message, payload: Payload, scales: Scales) {
         match message.id {
             id if id == MOTION.id => {
-                self.speed_rpm = SPEED.get(payload);
-                self.torque_nm = TORQUE.get(payload);
-                self.link_v = LINK.get(payload);
+                self.speed_rpm = SPEED.get_on(scales, payload);
+                self.torque_nm = TORQUE.get_on(scales, payload);
+                self.link_v = LINK.get_on(scales, payload);
             }
             id if id == CURRENTS.id => {
-                self.current_a = CURRENT.get(payload);
-                self.id_ref_a = ID_REF.get(payload);
-                self.iq_ref_a = IQ_REF.get(payload);
+                self.current_a = CURRENT.get_on(scales, payload);
+                self.id_ref_a = ID_REF.get_on(scales, payload);
+                self.iq_ref_a = IQ_REF.get_on(scales, payload);
             }
             id if id == VOLTAGES.id => {
-                self.voltage_v = VOLTAGE.get(payload);
-                self.frequency_hz = FREQUENCY.get(payload);
-                self.temperature_c = TEMPERATURE.get(payload);
+                self.voltage_v = VOLTAGE.get_on(scales, payload);
+                self.frequency_hz = FREQUENCY.get_on(scales, payload);
+                self.temperature_c = TEMPERATURE.get_on(scales, payload);
             }
-            id if id == TORQUE_ESTIMATE.id => self.torque_estimate_nm = ESTIMATE.get(payload),
+            id if id == TORQUE_ESTIMATE.id => self.torque_estimate_nm = ESTIMATE.get_on(scales, payload),
             _ => (),
         }
     }

@@ -14,7 +14,7 @@ pub use trip::{FAULT_LIMIT, FAULT_VALUE, trip_frames, trip_number};
 
 pub(super) use answer::{ANSWER_PARAMETER, ANSWER_RESULT, ANSWER_VALUE};
 pub(super) use counters::COUNTER_SIGNALS;
-pub(super) use measured::{SPEED_RPM, encode};
+pub(super) use measured::{CURRENT_A, FREQUENCY_HZ, SPEED_RPM, encode};
 pub(super) use status::{
     CHOPPER, DISCHARGE, FAULT, LISTENING, MAIN, PRECHARGE, REFUSAL, REFUSALS, STATE, TAKEN, pattern,
 };

@@ -50,8 +50,7 @@ pub fn run(args: &TimingArgs) -> Result<u8> {
         pi.push(system.under_pi(&toolchain, &rig, &qemu)?);
     }
     parts::all_found(&systems.iter().flat_map(|measured| &measured.sources).copied().collect())?;
-    let budgets = build::root().join("budgets.toml");
-    let text = std::fs::read_to_string(&budgets).with_context(|| budgets.display().to_string())?;
+    let text = budgets(|group| group != IDENTIFICATION)?;
     let values: Vec<_> = systems.iter().flat_map(values).chain(report::blocks(&blocks)).collect();
     let judged = budget::judge(&text, &values)?;
     let report = Report { systems: &systems, pi: &pi, blocks: &blocks, judged: &judged };
@@ -77,28 +76,33 @@ pub fn run(args: &TimingArgs) -> Result<u8> {
     Ok(budget::exit_code(&judged).max(u8::from(!complaints.is_empty())))
 }
 
-/// The interrupts of the image that identifies its machine, against the budgets of the drive's.
+/// The group of budgets of the image that identifies its machine.
+const IDENTIFICATION: &str = "identification";
+
+/// The interrupts of the image that identifies its machine, against its budgets.
 fn identify(statistics: &statistics::Statistics) -> Result<u8> {
-    let budgets = build::root().join("budgets.toml");
-    let text = std::fs::read_to_string(&budgets).with_context(|| budgets.display().to_string())?;
-    let mut all: toml::Table = text.parse().context("budgets.toml")?;
-    all.retain(|group, _| group == "pmasynrm");
-    for group in all.iter_mut().filter_map(|(_, group)| group.as_table_mut()) {
-        group.retain(|name, _| name == "control-max" || name == "pwm-max");
-    }
-    let worst = |interrupt: &str| {
-        statistics.of(interrupt).map(|row| f64::from(row.instructions.max)).fold(0.0, f64::max)
+    let of = |interrupt: &str, value: fn(&statistics::Row) -> f64| {
+        statistics.of(interrupt).map(value).fold(0.0, f64::max)
     };
-    let values = [("pmasynrm.control-max", worst("control")), ("pmasynrm.pwm-max", worst("pwm"))];
-    let judged = budget::judge(&toml::to_string(&all)?, &values)?;
+    let values = [
+        ("identification.control-max", of("control", |row| row.instructions.max.into())),
+        ("identification.control-mean", of("control", |row| row.instructions.mean())),
+        ("identification.pwm-max", of("pwm", |row| row.instructions.max.into())),
+    ];
+    let judged = budget::judge(&budgets(|group| group == IDENTIFICATION)?, &values)?;
     for budget::Judged { name, value, budget } in &judged {
-        println!("{name:<24} {value:>6} of {:>6}: {}", budget.bound(), budget.verdict(*value).name());
-    }
-    for interrupt in ["control", "pwm"] {
-        let mean = statistics.of(interrupt).map(|row| row.instructions.mean()).fold(0.0, f64::max);
-        println!("{interrupt:<24} {mean:>6.0} on average");
+        println!("{name:<28} {value:>6.0} of {:>6}: {}", budget.bound(), budget.verdict(*value).name());
     }
     Ok(budget::exit_code(&judged))
+}
+
+/// The groups of budgets.toml whose names pass.
+fn budgets(passes: impl Fn(&str) -> bool) -> Result<String> {
+    let path = build::root().join("budgets.toml");
+    let text = std::fs::read_to_string(&path).with_context(|| path.display().to_string())?;
+    let mut all: toml::Table = text.parse().context("budgets.toml")?;
+    all.retain(|group, _| passes(group));
+    Ok(toml::to_string(&all)?)
 }
 
 /// The values of a system that have a budget.

@@ -17,7 +17,9 @@ use tractive::modulation::{CarrierHalf, Mode};
 use tractive::operator::{self, Configuration, Line, Refusal, Slot, State, slot_s};
 use tractive::ports::PwmPort;
 use tractive::protection::{Fault, SafeState};
-use tractive::protocol::{COMMAND, CanEndpoint, Command, Frame, Payload, STATUS, StatusFrame, TO_DRIVE};
+use tractive::protocol::{
+    COMMAND, CanEndpoint, Command, Frame, Payload, STATUS, Scales, StatusFrame, TO_DRIVE,
+};
 use tractive::time::Instant;
 
 const SOURCE_V: f32 = 1_500.0;
@@ -332,7 +334,7 @@ impl Image {
         self.pulse.control_ran();
         self.bench.settle();
         if self.speaks && self.periods.is_multiple_of(100) {
-            let frame = self.commands.frame(self.command.encode().unwrap());
+            let frame = self.commands.frame(self.command.encode(Scales::USUAL).unwrap());
             self.bus.arrive(frame);
         }
         if self.periods.is_multiple_of(self.idle_every) {
@@ -508,8 +510,10 @@ fn five_messages_back_to_back_are_all_taken() {
     };
     let mut image = Image::reset(0.3, 600.0, Angle::ZERO);
     image.run_ms(20);
-    let torque = TorqueLimits { motoring_nm: 500.0, braking_nm: 400.0, speed_rpm: 2_000.0 }.encode().unwrap();
-    let link = LinkLimits { low_v: 1_100.0, high_v: 1_750.0 }.encode().unwrap();
+    let torque = TorqueLimits { motoring_nm: 500.0, braking_nm: 400.0, speed_rpm: 2_000.0 }
+        .encode(Scales::USUAL)
+        .unwrap();
+    let link = LinkLimits { low_v: 1_100.0, high_v: 1_750.0 }.encode(Scales::USUAL).unwrap();
     let request = ParameterRequest { parameter: 3, write: None }.encode().unwrap();
     let mut senders = [&LIMITS, &LINK_LIMITS, &PARAMETER_REQUEST, &LIMITS, &LINK_LIMITS].map(Sender::of);
     for _ in 0..20 {
@@ -543,7 +547,7 @@ fn a_start_that_is_refused_is_told_on_the_bus_and_every_command_is_answered() {
     ] {
         for slot in 0..200_u32 {
             if slot % 10 == 0 {
-                let frame = image.commands.frame(command.encode().unwrap());
+                let frame = image.commands.frame(command.encode(Scales::USUAL).unwrap());
                 image.bus.arrive(frame);
             }
             image.serve.refuse(&mut image.slot, why, &rated);

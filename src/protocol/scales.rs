@@ -1,0 +1,146 @@
+//! Scales: the worth of a signal's step, a power of ten that follows from the machine's ratings.
+
+use super::commands::{LINK_V, TORQUE_NM};
+use super::parameters::RPM_PER_RAD_S;
+use super::telemetry::{CURRENT_A, FREQUENCY_HZ, SPEED_RPM};
+use crate::machine::Ratings;
+use core::f32::consts::TAU;
+
+/// A physical quantity whose signals' steps follow from the machine, by its exponent's place among the bits of [`Scales`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[repr(u8)]
+pub enum Quantity {
+    /// Torque.
+    Torque = 0,
+    /// Current.
+    Current = 4,
+    /// Voltage.
+    Voltage = 8,
+    /// Speed and frequency.
+    Speed = 12,
+    /// Whatever has the same steps on every machine.
+    Fixed = 16,
+}
+
+impl Quantity {
+    /// Those that follow from the machine.
+    pub const SCALED: [Self; 4] = [Self::Torque, Self::Current, Self::Voltage, Self::Speed];
+
+    /// Its name.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Torque => "torque",
+            Self::Current => "current",
+            Self::Voltage => "voltage",
+            Self::Speed => "speed",
+            Self::Fixed => "fixed",
+        }
+    }
+}
+
+/// Bits of an exponent, in two's complement.
+const BITS: u32 = 4;
+const NIBBLE: u32 = 0xF;
+/// The exponents' ends.
+const EXPONENTS: [i32; 2] = [-4, 4];
+
+/// The worth of each exponent by its bits: 0 to 7, then −8 to −1.
+const WORTH: [f32; 16] =
+    [1.0, 10.0, 100.0, 1e3, 1e4, 1e5, 1e6, 1e7, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.1];
+
+const fn worth(exponent: i32) -> f32 {
+    WORTH[(exponent as u32 & NIBBLE) as usize]
+}
+
+/// Steps in a rating, at least.
+const FEWEST_STEPS: f32 = 500.0;
+
+/// The part of a rated torque that can be told.
+const TORQUE_MARGIN: f32 = 1.5;
+
+/// 0, the usual step; a tenth of it, and again, while a rating has less than 500 steps; ten times that while the most that is to be told,
+/// as a share of the usual range, lies beyond it.
+const fn exponent(rated_steps: f32, most: f32) -> i32 {
+    let [lowest, highest] = EXPONENTS;
+    let mut exponent = 0;
+    while exponent > lowest && rated_steps < FEWEST_STEPS * worth(exponent) {
+        exponent -= 1;
+    }
+    while exponent < highest && most > worth(exponent) {
+        exponent += 1;
+    }
+    exponent
+}
+
+/// The worth of a step of every quantity, as powers of ten of the usual one: four bits each.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Scales(u32);
+
+impl Scales {
+    /// The usual steps of every quantity.
+    pub const USUAL: Self = Self(0);
+
+    /// Those of a machine.
+    pub const fn of(ratings: &Ratings) -> Self {
+        let rpm = RPM_PER_RAD_S * ratings.max_speed_rad_s;
+        let trip_rpm = RPM_PER_RAD_S * ratings.trip_speed_rad_s / SPEED_RPM[1];
+        let trip_hz = ratings.pole_pairs * ratings.trip_speed_rad_s / TAU / FREQUENCY_HZ[1];
+        let torque_nm = ratings.max_torque_nm;
+        Self::USUAL
+            .with(Quantity::Torque, exponent(torque_nm / 0.1, TORQUE_MARGIN * torque_nm / TORQUE_NM[1]))
+            .with(
+                Quantity::Current,
+                exponent(ratings.max_current_a / 0.1, ratings.trip_current_a / CURRENT_A[1]),
+            )
+            .with(
+                Quantity::Voltage,
+                exponent(ratings.dc_link_nominal_v / 0.1, ratings.trip_dc_over_v / LINK_V[1]),
+            )
+            .with(Quantity::Speed, exponent(rpm / 0.5, if trip_rpm > trip_hz { trip_rpm } else { trip_hz }))
+    }
+
+    const fn with(self, quantity: Quantity, exponent: i32) -> Self {
+        Self(self.0 | (exponent as u32 & NIBBLE) << (quantity as u32))
+    }
+
+    /// The exponent of a quantity.
+    pub const fn exponent(self, quantity: Quantity) -> i32 {
+        let unused = u32::BITS - BITS;
+        ((self.bits(quantity) << unused) as i32) >> unused
+    }
+
+    /// Usual steps in one of a quantity's.
+    pub const fn worth(self, quantity: Quantity) -> f32 {
+        worth(self.bits(quantity) as i32)
+    }
+
+    const fn bits(self, quantity: Quantity) -> u32 {
+        self.0 >> (quantity as u32) & NIBBLE
+    }
+
+    /// The bits of these quantities.
+    pub(super) const fn mask(quantities: &[Quantity]) -> u32 {
+        let mut mask = 0;
+        let mut index = 0;
+        while index < quantities.len() {
+            mask |= NIBBLE << (quantities[index] as u32);
+            index += 1;
+        }
+        mask
+    }
+
+    /// The four bits by which a message tells the exponents of the quantities under its mask: the exclusive or of them.
+    pub(super) const fn code(self, mask: u32) -> u32 {
+        let exponents = self.0 & mask;
+        let folded = exponents ^ exponents >> (2 * BITS);
+        (folded ^ folded >> BITS) & NIBBLE
+    }
+
+    /// A value as it is on the usual scales.
+    #[inline]
+    pub(super) const fn to_usual(self, quantity: Quantity, value: f32) -> f32 {
+        value * worth(-(self.bits(quantity) as i32))
+    }
+}
