@@ -28,6 +28,7 @@ pub struct Stage {
     encoder_counts: u64,
     encoder_zeros_deg: [f64; 1],
     behind_line_filter: bool,
+    angle_late_us: f32,
 }
 
 impl Stage {
@@ -52,7 +53,8 @@ impl Stage {
         };
         let (pulse, dead) = (ticks(self.min_pulse_ns), ticks(self.dead_time_ns));
         let devices = SwitchLimits::new(pulse, dead, max_switching_hz, &clock);
-        Settings { clock, devices, gains: Gains::of(false, self.behind_line_filter) }
+        let gains = Gains::of(false, self.behind_line_filter);
+        Settings { gains, angle_late_s: 1e-6 * self.angle_late_us, ..Settings::new(clock, devices) }
     }
 }
 
