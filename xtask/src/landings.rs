@@ -45,14 +45,17 @@ const COURSES: [Course; 2] = [
     Course {
         system: System::Traction,
         // With control so slow that a carrier half is shorter than two of its periods: all stages of the law run in each, so a boundary
-        // comes at each of them. At a phase of the timers where a boundary meets what control does every fifty periods.
+        // comes at each of them. At phases of the timers where a boundary meets what control does every fifty periods, and once a switch.
         runs: &[
             ("timing", &["--to=2500", "--control-hz=3125"]),
             ("borders-timing", &["--pwm-delay-us=25", "--control-hz=3125"]),
+            ("borders-timing", &["--pwm-delay-us=100", "--control-hz=3125"]),
+            ("borders-timing", &["--pwm-delay-us=175", "--control-hz=3125"]),
+            ("borders-timing", &["--pwm-delay-us=250", "--control-hz=3125"]),
         ],
         control_ticks: 8_000,
         deadline_ticks: 8_000,
-        // Three are left: they tell control the ripple flux when a pattern gives way to a carrier.
+        // Six are left: of the choice of the mode, and of the flux that is led from a pattern's ripple to a carrier.
         most_missing: 8,
     },
     // At 10 kHz the PWM interrupt comes at control's deadline.
