@@ -112,6 +112,8 @@ impl<T: Words<N>, const N: usize, const SLOTS: usize> Mailbox<T, N, SLOTS> {
             0 => SLOTS as u32,
             count => count,
         };
+        // Not before the value before it is told.
+        order(Ordering::Release);
         store(self.slot(next), value.to_words());
         release(&self.published, next);
     }

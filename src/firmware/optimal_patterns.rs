@@ -3,7 +3,7 @@
 use tractive::modulation::{Ladder, Schedule};
 use tractive::time::Clock;
 
-/// The schedule of the PWM task: the optimised patterns above the free carrier.
+/// The schedule of the modulator: the optimised patterns above the free carrier.
 pub const SCHEDULE: Option<fn(&Clock) -> Schedule> = Some(|clock| Schedule::on(Ladder::OPTIMAL, clock));
 
 /// Highest frequency of the free carrier, as a share of the switches': room for the first edges of the pattern that follows it.

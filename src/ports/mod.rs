@@ -112,7 +112,7 @@ impl System for Dual {
 
 /// The port of the control interrupt to a board.
 pub trait ControlPort<S: System = Traction> {
-    /// First thing in the interrupt: takes the timer's flag back. Where control `revises` the pulses, the PWM interrupt has come in between
+    /// First call of the interrupt, behind a half that is made anew: takes the timer's flag back. Where control `revises` the pulses, the PWM interrupt has come in between
     /// when this returns.
     fn begin(&mut self, _revises: bool) {}
     /// The conversions that the control timer triggered at `now`.

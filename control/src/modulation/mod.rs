@@ -1,7 +1,7 @@
 //! The pulses: the modulator of a two-level inverter.
 //!
-//! Every mode is one carrier with one compare value a phase. The PWM interrupt comes once per carrier half and
-//! describes the half after the running one, as a timer's shadow registers take it: its length, each phase's level at
+//! Every mode is one carrier with one compare value a phase. Once for each carrier half the modulator
+//! describes it, as a timer's shadow registers take it: its length, each phase's level at
 //! its start, and the instant at which that level toggles. In the synchronous modes the halves are locked to
 //! the pulse angle (voltage angle + 90°: phase a's reference is the sine of it): the length of each half takes the
 //! carrier to its next boundary angle, so phase errors vanish within a half and nothing accumulates.

@@ -219,6 +219,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         let late_s = self.settings.clock.seconds(late as i32);
         self.check((late > 0).then_some((Fault::ControlDeadline, late_s, 0.0)), sample, port);
         pulsing &= self.trip.is_none();
+        self.revises &= pulsing;
         let target = self.controller.target();
         let report = Report {
             torque_nm: target.torque_nm,

@@ -14,14 +14,15 @@ const PWM_LATE_PART: u32 = 4;
 /// Records of which one is that of the newest boundary at a control interrupt's instant: two may have come since.
 const LATEST: u32 = 3;
 
-/// Halves that a control period may plan: two where a carrier lasts one, and as many for a pattern whose first half is short.
-const MOST_PLANNED: u32 = 4;
+/// Halves that a control period may plan: a locked carrier of a machine that switches once a control period has five, and one more if it is
+/// turned on.
+const MOST_PLANNED: u32 = 6;
 
 /// Halves that the cell to the PWM interrupt holds: those for a period's boundaries, and those that are planned meanwhile for the next one's.
-pub const PLANNED_SLOTS: usize = 4;
+pub const PLANNED_SLOTS: usize = 16;
 
-/// Halves that are remembered: four that ended or run, and those that are planned.
-const REMEMBERED: usize = 8;
+/// Halves that are remembered: four that ended or run, and those that are planned for two periods.
+const REMEMBERED: usize = 16;
 
 /// The halves that control has planned, for the PWM interrupt.
 pub type Planned = Mailbox<PlannedHalf, PLANNED_WORDS, PLANNED_SLOTS>;
@@ -198,7 +199,7 @@ impl Pulses {
             let half = self.half(*number);
             half.at == at && half.begins == begins && (half.is_off() || !tripped)
         };
-        match (0..=LATEST).map(|ahead| self.loaded.wrapping_add(ahead)).find(as_planned) {
+        match (0..=MOST_PLANNED).map(|ahead| self.loaded.wrapping_add(ahead)).find(as_planned) {
             Some(number) => self.loaded = number,
             None => self.begin_anew(at, begins, valid),
         }
@@ -307,38 +308,58 @@ mod tests {
         }
     }
 
-    /// A carrier from two halves a control period to many periods a half, and a modulator at rest and pulsing: each boundary finds its half, and
-    /// control knows it again.
+    /// The boundaries of a PWM timer against control, for so many periods: each finds its half, and control knows it again. Returns how many.
+    fn drive(mut pulses: Pulses, half_ticks: u32, rate: f32) -> u32 {
+        let (history, planned) = (History::new(), Planned::new());
+        let mut boundary = (Instant(half_ticks), Instant(2 * half_ticks));
+        let (mut found, mut boundaries) = (0, 0);
+        for period in 1..400 {
+            let now = Instant(period * 2_500);
+            while now.reached(boundary.0) {
+                let (at, begins) = boundary;
+                let next = planned.newest(|half| half.word::<0>() == at.0);
+                found += u32::from(next.is_some());
+                assert!(next.is_some() || found == 0, "nothing for {at:?}");
+                boundaries += 1;
+                let running = next.map_or(half_ticks, |next| next.half.period_ticks);
+                history.publish(loaded(at, begins));
+                boundary = (begins, begins.after(running));
+            }
+            let valid = now.after(2_500);
+            if pulses.look(&history, now, valid).is_some() {
+                assert_eq!(pulses.newest().map(|newest| newest.ends()), Some(boundary.1));
+            }
+            let angle = crate::frames::Angle((f64::from(rate) * f64::from(now.0)) as u64 as u32);
+            let reference = Reference::turning(100.0, angle, rate, now, 1_500.0);
+            let order = Order { pulses: period > 50, reference: &reference, release: 0 };
+            pulses.plan(valid.after(2_500), &order, &planned);
+        }
+        // Nothing is planned before control has seen a boundary.
+        assert!(found > 20 && found + 10 > boundaries, "{found} of {boundaries}");
+        assert!(!pulses.before(0).is_off());
+        boundaries
+    }
+
+    /// A carrier from two halves a control period to many periods a half, and a modulator at rest and pulsing.
     #[test]
     fn every_boundary_finds_the_half_that_was_planned_for_it() {
         for max_hz in [10_000.0, 9_000.0, 5_000.0, 2_400.0, 900.0] {
-            let (mut pulses, half_ticks) = pulses(max_hz);
-            let (history, planned) = (History::new(), Planned::new());
-            let mut boundary = (Instant(half_ticks), Instant(2 * half_ticks));
-            let (mut found, mut boundaries) = (0, 0);
-            for period in 1..400 {
-                let now = Instant(period * 2_500);
-                while now.reached(boundary.0) {
-                    let (at, begins) = boundary;
-                    let next = planned.newest(|half| half.word::<0>() == at.0);
-                    found += u32::from(next.is_some());
-                    assert!(next.is_some() || found == 0, "{max_hz} Hz: nothing for {at:?}");
-                    boundaries += 1;
-                    let running = next.map_or(half_ticks, |next| next.half.period_ticks);
-                    history.publish(loaded(at, begins));
-                    boundary = (begins, begins.after(running));
-                }
-                let valid = now.after(2_500);
-                if pulses.look(&history, now, valid).is_some() {
-                    assert_eq!(pulses.newest().map(|newest| newest.ends()), Some(boundary.1), "{max_hz} Hz");
-                }
-                let reference = Reference::turning(100.0, crate::frames::Angle::ZERO, 20_000.0, now, 1_500.0);
-                let order = Order { pulses: period > 50, reference: &reference, release: 0 };
-                pulses.plan(valid.after(2_500), &order, &planned);
-            }
-            // Nothing is planned before control has seen a boundary.
-            assert!(found > 20 && found + 5 > boundaries, "{max_hz} Hz: {found} of {boundaries}");
-            assert!(!pulses.before(0).is_off());
+            let (pulses, half_ticks) = pulses(max_hz);
+            assert!(drive(pulses, half_ticks, 20_000.0) > 60, "{max_hz} Hz");
         }
+    }
+
+    /// A locked carrier of a machine that switches once a control period has up to five halves in one.
+    #[test]
+    fn every_boundary_of_a_locked_carrier_finds_its_half() {
+        let (ordinary, half_ticks) = pulses(10_000.0);
+        let schedule = Schedule::fixed(Mode::Mid7, &CLOCK);
+        let pulses = Pulses {
+            modulator: Modulator::new(SwitchLimits::new(50, 0, 10_000.0, &CLOCK), schedule),
+            ..ordinary
+        };
+        let rate = (1_260.0 * 4_294_967_296.0 / 25e6) as f32;
+        let boundaries = drive(pulses, half_ticks, rate);
+        assert!(boundaries > 4 * 300, "{boundaries}");
     }
 }

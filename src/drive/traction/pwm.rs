@@ -4,7 +4,7 @@ use super::{Settings, Shared};
 use crate::drive::messages::{Loaded, PlannedRecord};
 use crate::frames::{Abc, UNITS_PER_RADIAN};
 use crate::machine::{Machine, Tables};
-use crate::modulation::{CarrierHalf, compensate};
+use crate::modulation::{CarrierHalf, Mode, compensate};
 use crate::ports::PwmPort;
 use crate::protection::{self, Fault, MaskedFaults, SafeState, Trip, Violation};
 use crate::time::{Clock, Instant};
@@ -25,6 +25,8 @@ pub struct PwmTask<M = &'static Tables> {
     begins: Instant,
     /// Length of the half that begins there, in ticks.
     period_ticks: u32,
+    /// `true` if that half has pulses.
+    pulses: bool,
     /// Phase currents at the last boundary and at the one before, in A.
     currents_a: Abc,
     currents_before_a: Abc,
@@ -43,6 +45,7 @@ impl<M: Machine> PwmTask<M> {
             at: first,
             begins: first,
             period_ticks: settings.devices.shortest_half_ticks,
+            pulses: false,
             currents_a: Abc { a: 0.0, b: 0.0, c: 0.0 },
             currents_before_a: Abc { a: 0.0, b: 0.0, c: 0.0 },
             trip: None,
@@ -91,6 +94,7 @@ impl<M: Machine> PwmTask<M> {
         self.at = now;
         self.begins = now.after(self.period_ticks);
         self.period_ticks = half.period_ticks;
+        self.pulses = half.mode != Mode::Off;
         self.play(half, port, shared);
         shared.loaded.publish(
             Loaded {
@@ -170,10 +174,15 @@ impl<M: Machine> PwmTask<M> {
         let armed = |(fault, _, _): &Violation| !self.disarmed.has(*fault);
         let currents = || protection::check_currents(&self.currents_a, &self.tables().ratings);
         let late = || {
-            let pulsing = newest.filter(|half| !half.is_off())?;
+            let pulses = newest.is_some_and(|half| !half.is_off());
+            if !(pulses || self.pulses) {
+                return None;
+            }
             let clock = &self.settings.clock;
             let began = Instant(shared.began.load(Ordering::Relaxed));
-            stale(now, began, clock).or_else(|| unplanned(now, pulsing.at(), clock))
+            let planned = newest.map_or(self.at, PlannedRecord::at);
+            let stale = || if pulses { stale(now, began, clock) } else { None };
+            stale().or_else(|| unplanned(now, planned, clock))
         };
         let violation = legs.check().or_else(|| currents().filter(armed)).or_else(|| late().filter(armed));
         let Some((fault, value, limit)) = violation else {

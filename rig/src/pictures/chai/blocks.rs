@@ -4,11 +4,15 @@ use super::super::diagram::Diagram;
 use super::super::sheet::{GREEN, VIOLET};
 use anyhow::Result;
 
-/// Figure 2: control in the timer's interrupt, modulation in the PWM's.
+/// Figure 2: control and modulation in the timer's interrupt, the PWM interrupt plays.
 pub fn control() -> Result<String> {
     let mut all = Diagram::new((1000, 430), "Control decides which voltage, modulation which pulses");
     all.part((16.0, 34.0, 760.0, 188.0), "timer interrupt: control", GREEN)
-        .part((16.0, 262.0, 760.0, 140.0), "PWM interrupt: modulation, once a carrier half", VIOLET)
+        .part(
+            (16.0, 262.0, 760.0, 140.0),
+            "timer interrupt: modulation, for each carrier half; PWM interrupt: plays it",
+            VIOLET,
+        )
         .block((88.0, 96.0, 110.0, 60.0), "torque\nenvelope, slew")
         .block((240.0, 62.0, 140.0, 54.0), "MTPA\ntwo look-ups")
         .block((240.0, 140.0, 140.0, 60.0), "field weakening\non circles of flux")
@@ -19,7 +23,7 @@ pub fn control() -> Result<String> {
         )
         .block((60.0, 308.0, 150.0, 62.0), "mode\nby frequency\nand voltage")
         .block((280.0, 308.0, 190.0, 62.0), "pulses of the next half\nasync, 15, 12, 7, 3, square")
-        .block((550.0, 308.0, 190.0, 62.0), "length, start levels,\ntoggle instants")
+        .block((550.0, 308.0, 190.0, 62.0), "PWM interrupt: length,\nstart levels, toggles")
         .block((830.0, 308.0, 130.0, 62.0), "inverter\n900 Hz at most")
         .block((830.0, 96.0, 130.0, 62.0), "PMaSynRM");
     all.flow(&[(24.0, 126.0), (88.0, 126.0)])
@@ -31,7 +35,7 @@ pub fn control() -> Result<String> {
         .flow(&[(532.0, 126.0), (610.0, 126.0)])
         .words((571.0, 114.0), "i_{d}*, i_{q}*")
         .flow(&[(650.0, 170.0), (650.0, 236.0), (21.0, 236.0), (21.0, 338.0), (60.0, 338.0)])
-        .words((250.0, 248.0), "cell: voltage, angle, frequency")
+        .words((250.0, 248.0), "voltage, angle, frequency")
         .flow(&[(210.0, 338.0), (280.0, 338.0)])
         .flow(&[(470.0, 338.0), (550.0, 338.0)])
         .flow(&[(740.0, 338.0), (830.0, 338.0)])
@@ -41,7 +45,7 @@ pub fn control() -> Result<String> {
         .flow(&[(895.0, 96.0), (895.0, 56.0), (683.0, 56.0), (683.0, 82.0)])
         .words((836.0, 44.0), "i_{uvw}, θ, u_{dc}")
         .flow(&[(722.0, 262.0), (722.0, 170.0)])
-        .words((655.0, 250.0), "cell: committed halves");
+        .words((655.0, 250.0), "cell: what was loaded");
     all.finish()
 }
 
