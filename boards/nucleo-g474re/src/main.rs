@@ -12,6 +12,7 @@ mod firmware {
     use core::sync::atomic::{AtomicU32, Ordering};
     use cortex_m_rt::{entry, exception, interrupt};
     use nucleo_g474re::built_in::traction::{BUILT_IN, BuiltIn};
+    use nucleo_g474re::patterns::chosen;
     use nucleo_g474re::position::Encoder;
     use nucleo_g474re::power_stage::{AdcCode, POWER_STAGE};
     use nucleo_g474re::registers::Registers;
@@ -64,18 +65,14 @@ mod firmware {
     #[interrupt]
     fn TIM3() {
         static mut BOARD: Option<Control<'static, Encoder>> = None;
-        static mut TASK: Option<ControlTask<BuiltIn>> = None;
+        static mut TASK: ControlTask<BuiltIn> =
+            chosen(ControlTask::new(BuiltIn, settings(), Instant(CLOCK.control_ticks)), &CLOCK);
         let board = BOARD.get_or_insert_with(|| {
             let registers = Registers::CHIP;
             let encoder = Encoder::new(registers.tim4, &POWER_STAGE, BUILT_IN.ratings.pole_pairs as u32);
             Control::new(registers, kept(&CONTROL_ZEROS), encoder, &POSITION)
         });
-        let first = Instant(CLOCK.control_ticks);
-        let task = TASK.get_or_insert_with(|| {
-            let settings = settings();
-            nucleo_g474re::patterns::chosen(ControlTask::new(BuiltIn, settings, first), &settings.clock)
-        });
-        task.run(board, &SHARED);
+        TASK.run(board, &SHARED);
         PULSE.control_ran();
         nucleo_g474re::complete_stores();
     }
@@ -84,14 +81,10 @@ mod firmware {
     #[interrupt]
     fn TIM1_UP_TIM16() {
         static mut BOARD: Option<Pwm> = None;
-        static mut TASK: Option<PwmTask<BuiltIn>> = None;
+        static mut TASK: PwmTask<BuiltIn> =
+            PwmTask::new(BuiltIn, settings(), Instant(settings().devices.shortest_half_ticks));
         let board = BOARD.get_or_insert_with(|| Pwm::new(Registers::CHIP, kept(&PWM_ZEROS)));
-        let task = TASK.get_or_insert_with(|| {
-            let settings = settings();
-            let first = Instant(settings.devices.shortest_half_ticks);
-            PwmTask::new(BuiltIn, settings, first)
-        });
-        if task.run(board, &SHARED) {
+        if TASK.run(board, &SHARED) {
             PULSE.pwm_ran();
         }
         nucleo_g474re::complete_stores();

@@ -11,13 +11,13 @@ pub const FREE_CARRIER_SHARE: f32 =
 
 /// A task with these patterns.
 #[cfg(feature = "optimal")]
-pub fn chosen<M: Machine>(task: ControlTask<M>, clock: &Clock) -> ControlTask<M> {
+pub const fn chosen<M: Machine>(task: ControlTask<M>, clock: &Clock) -> ControlTask<M> {
     use tractive::modulation::{Ladder, Schedule};
     task.scheduled(Schedule::on(Ladder::OPTIMAL, clock))
 }
 
 /// A task with these patterns.
 #[cfg(not(feature = "optimal"))]
-pub fn chosen<M: Machine>(task: ControlTask<M>, _clock: &Clock) -> ControlTask<M> {
+pub const fn chosen<M: Machine>(task: ControlTask<M>, _clock: &Clock) -> ControlTask<M> {
     task
 }

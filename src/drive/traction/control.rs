@@ -117,8 +117,8 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
     }
 
     /// The same with a schedule of one's own.
-    pub fn scheduled(mut self, schedule: Schedule) -> Self {
-        self.set_schedule(schedule);
+    pub const fn scheduled(mut self, schedule: Schedule) -> Self {
+        self.pulses = Pulses::new(&self.settings, schedule);
         self
     }
 

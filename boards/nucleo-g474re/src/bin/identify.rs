@@ -77,18 +77,16 @@ mod firmware {
     #[interrupt]
     fn TIM3() {
         static mut BOARD: Option<Control<'static, Encoder>> = None;
-        static mut TASK: Option<ControlTask<BuiltIn, Identification>> = None;
+        static mut TASK: ControlTask<BuiltIn, Identification> =
+            ControlTask::with_law(BuiltIn, settings(), Instant(CLOCK.control_ticks), Identification::new());
         let board = BOARD.get_or_insert_with(|| {
             let registers = Registers::CHIP;
             let encoder = Encoder::new(registers.tim4, &POWER_STAGE, BUILT_IN.ratings.pole_pairs as u32);
             Control::new(registers, kept(&CONTROL_ZEROS), encoder, &POSITION)
         });
-        let first = Instant(CLOCK.control_ticks);
-        let task = TASK
-            .get_or_insert_with(|| ControlTask::with_law(BuiltIn, settings(), first, Identification::new()));
-        let now = task.next_call();
-        task.run(board, &SHARED);
-        let newest = task.law_mut().take();
+        let now = TASK.next_call();
+        TASK.run(board, &SHARED);
+        let newest = TASK.law_mut().take();
         MEMORY.take(newest.as_ref(), &UNITS, SHARED.operator.has_told(now));
         PULSE.control_ran();
         nucleo_g474re::complete_stores();
@@ -98,14 +96,10 @@ mod firmware {
     #[interrupt]
     fn TIM1_UP_TIM16() {
         static mut BOARD: Option<Pwm> = None;
-        static mut TASK: Option<PwmTask<BuiltIn>> = None;
+        static mut TASK: PwmTask<BuiltIn> =
+            PwmTask::new(BuiltIn, settings(), Instant(settings().devices.shortest_half_ticks));
         let board = BOARD.get_or_insert_with(|| Pwm::new(Registers::CHIP, kept(&PWM_ZEROS)));
-        let task = TASK.get_or_insert_with(|| {
-            let settings = settings();
-            let first = Instant(settings.devices.shortest_half_ticks);
-            PwmTask::new(BuiltIn, settings, first)
-        });
-        if task.run(board, &SHARED) {
+        if TASK.run(board, &SHARED) {
             PULSE.pwm_ran();
         }
         nucleo_g474re::complete_stores();

@@ -59,7 +59,7 @@ mod firmware {
     #[interrupt]
     fn TIM2() {
         static mut BOARD: Option<Control<'static, Encoder>> = None;
-        static mut TASK: Option<ControlTask<BuiltIn>> = None;
+        static mut TASK: ControlTask<BuiltIn> = ControlTask::new(BuiltIn, settings());
         let board = BOARD.get_or_insert_with(|| {
             let registers = Registers::CHIP;
             let [first, second] = STAGE.encoder_zeros;
@@ -70,7 +70,7 @@ mod firmware {
             let encoders = [encoder(registers.tim4, first), encoder(registers.tim3, second)];
             Control::new(registers, kept(), encoders, &POSITION)
         });
-        TASK.get_or_insert_with(|| ControlTask::new(BuiltIn, settings())).run(board, &SHARED);
+        TASK.run(board, &SHARED);
         PULSE.control_ran();
         nucleo_g474re::complete_stores();
     }
@@ -80,9 +80,9 @@ mod firmware {
     #[interrupt]
     fn TIM1_UP_TIM16() {
         static mut BOARD: Option<Pwm> = None;
-        static mut TASK: Option<PwmTask<BuiltIn>> = None;
+        static mut TASK: PwmTask<BuiltIn> = PwmTask::new(BuiltIn, settings());
         let board = BOARD.get_or_insert_with(|| Pwm::new(Registers::CHIP, kept()));
-        if TASK.get_or_insert_with(|| PwmTask::new(BuiltIn, settings())).run(board, &SHARED) {
+        if TASK.run(board, &SHARED) {
             PULSE.pwm_ran();
         }
         nucleo_g474re::complete_stores();
