@@ -4,6 +4,12 @@ use crate::chip::adc::REFERENCE_V;
 use anyhow::{Context, Result};
 use std::path::Path;
 
+/// The keys of a power stage's file that are wanted. The error names the file.
+pub fn keys<T: serde::de::DeserializeOwned>(path: &Path) -> Result<T> {
+    let text = std::fs::read_to_string(path).with_context(|| path.display().to_string())?;
+    toml::from_str(&text).with_context(|| path.display().to_string())
+}
+
 /// The scales.
 #[derive(Clone, Copy, Debug, serde::Deserialize)]
 pub struct PowerStage {
@@ -28,8 +34,7 @@ struct ZSource {
 impl PowerStage {
     /// Reads the file. The error names it.
     pub fn read(path: &Path) -> Result<Self> {
-        let text = std::fs::read_to_string(path).with_context(|| path.display().to_string())?;
-        toml::from_str(&text).with_context(|| path.display().to_string())
+        keys(path)
     }
 
     /// A current sensor's output, in V.

@@ -1,8 +1,6 @@
 //! The drive's tasks on the host, given what the image's were given.
 
 use super::given::Given;
-use anyhow::{Context, Result};
-use std::path::Path;
 use tractive::control::{Demand, Gains, LinkWindow};
 use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
 use tractive::frames::{Abc, Angle};
@@ -32,12 +30,6 @@ pub struct Stage {
 }
 
 impl Stage {
-    /// Reads the file. The error names it.
-    pub fn read(path: &Path) -> Result<Self> {
-        let text = std::fs::read_to_string(path).with_context(|| path.display().to_string())?;
-        toml::from_str(&text).with_context(|| path.display().to_string())
-    }
-
     /// Cycles of a tick of the drive's.
     pub fn prescaler(&self) -> u32 {
         let period = CORE_HZ / self.control_hz;

@@ -11,6 +11,7 @@ use crate::core::cpu::Cpu;
 use crate::image::Image;
 use crate::machine::Machine;
 use crate::run::Settings;
+use crate::stage;
 use crate::time::Time;
 use anyhow::{Context, Result};
 use edges::{Compared, Scale, compare};
@@ -39,7 +40,7 @@ impl Replay {
     pub fn new(settings: &Settings, image: &Image) -> Result<Self> {
         let zeros = |name: &str| image.variable(name).with_context(|| format!("no symbol {name}"));
         Ok(Self {
-            stage: Stage::read(&settings.stage())?,
+            stage: stage::keys(&settings.stage())?,
             stream: Stream::default(),
             host: None,
             slots: place::place(&settings.image, "SHARED", &SLOTS)?,
