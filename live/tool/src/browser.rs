@@ -26,7 +26,7 @@ const WORDS: [&str; 13] = [
     "about:blank",
 ];
 /// Time within which it starts, or answers.
-const PATIENCE: Duration = Duration::from_secs(60);
+const PATIENCE: Duration = Duration::from_secs(300);
 /// Time between two looks.
 const PAUSE: Duration = Duration::from_millis(50);
 

@@ -86,9 +86,9 @@ fn ends(browser: &mut Browser, axe: &Axe, name: &str) -> Result<()> {
 /// Checks the page of a drive elsewhere, which `rig live` serves: it looks, and commands only where that is permitted and switched on.
 pub fn check_remote(rig: &Path, on: &str, browser: &mut Browser, axe: &Axe) -> Result<()> {
     for (system, on, permitted) in [("pmasynrm", "host", false), ("zs9", on, true)] {
-        let mut words = vec!["live", "--system", system, "--on", on, "--no-open", "--seconds", "120"];
+        let mut words = vec!["live", "--system", system, "--on", on, "--no-open", "--seconds", "1200"];
         words.extend(permitted.then_some("--commands"));
-        let child = Command::new(rig).args(words).stdout(Stdio::piped()).stderr(Stdio::null()).spawn()?;
+        let child = Command::new(rig).args(words).stdout(Stdio::piped()).spawn()?;
         let mut served = Served(child);
         let mut line = String::new();
         BufReader::new(served.0.stdout.take().context("no output")?).read_line(&mut line)?;
