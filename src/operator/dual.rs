@@ -15,6 +15,9 @@ use crate::protection::Trip;
 /// back into the source through the inductors.
 const RESTING_SHARE: f32 = 0.05;
 
+/// Time over which the torque that holds a speed is the mean, in s: at an instant the speed loop's torque is full of the noise of the speed.
+const HOLDING_S: f32 = 0.05;
+
 /// The demand on one motor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -96,8 +99,8 @@ impl DualRequest {
 #[derive(Clone, Copy, Debug)]
 enum Way {
     Torque(Ramp),
-    /// The speed's reference.
-    Speed(SetPoint),
+    /// The speed's reference, and the torque that holds it, in N·m.
+    Speed(SetPoint, f32),
 }
 
 /// One motor's measurements in a slot.
@@ -115,25 +118,26 @@ impl Way {
         matches!(self, Self::Torque(ramp) if ramp.torque_nm() == 0.0)
     }
 
-    /// One slot. A demand of the other kind begins where the motor is: torque at its torque, speed at its speed.
+    /// One slot. A demand of the other kind begins where the motor is: torque at what has held its speed, speed at its speed.
     fn step(&mut self, wanted: Wanted, motor: &Motor, limits: &MotorLimits, settings: &Settings) {
         *self = match (wanted, *self) {
             (Wanted::Torque(torque_nm), way) => {
                 let mut ramp = match way {
                     Self::Torque(ramp) => ramp,
-                    Self::Speed(_) => Ramp::at(motor.torque_nm),
+                    Self::Speed(_, holding_nm) => Ramp::at(holding_nm),
                 };
                 ramp.step(wanted_nm(torque_nm, motor.speed, limits), &Rates::of(settings));
                 Self::Torque(ramp)
             }
             (Wanted::Speed(target), way) => {
-                let mut point = match way {
-                    Self::Speed(point) => point,
-                    Self::Torque(_) => SetPoint::at(motor.speed),
+                let (mut point, holding_nm) = match way {
+                    Self::Speed(point, holding_nm) => (point, holding_nm),
+                    Self::Torque(ramp) => (SetPoint::at(motor.speed), ramp.torque_nm()),
                 };
                 let target = limit(target, -limits.speed_rad_s, limits.speed_rad_s);
                 point.step(target, settings);
-                Self::Speed(point)
+                let share = settings.slot_s / (settings.slot_s + HOLDING_S);
+                Self::Speed(point, holding_nm + share * (motor.torque_nm - holding_nm))
             }
         };
     }
@@ -143,7 +147,7 @@ impl Way {
             Self::Torque(ramp) => {
                 MotorDemand::Torque(Demand { torque_nm: ramp.torque_nm(), slew_limited: true })
             }
-            Self::Speed(point) => MotorDemand::Speed(point.speed()),
+            Self::Speed(point, _) => MotorDemand::Speed(point.speed()),
         }
     }
 }

@@ -148,7 +148,7 @@ fn precharge_enable_run_stop_discharge() {
 }
 
 #[test]
-fn a_speed_begins_where_the_motor_is_and_a_torque_where_its_torque_is() {
+fn a_speed_begins_where_the_motor_is_and_a_torque_at_what_held_its_speed() {
     let mut world = World::enabled();
     world.observed.report.omega = [4.0 * 10.0, 0.0];
     world.want([Wanted::Speed(100.0), Wanted::Torque(10.0)]);
@@ -156,13 +156,15 @@ fn a_speed_begins_where_the_motor_is_and_a_torque_where_its_torque_is() {
     world.slot();
     let [MotorDemand::Speed(speed), MotorDemand::Torque(_)] = world.command().demands else { panic!() };
     assert!((speed - 10.0 - rise).abs() < 1e-3, "{speed}");
+    world.observed.report.torque_nm[0] = 30.0;
     assert_eq!(world.slots(2_000).state, State::Running);
     assert_eq!(world.command().demands[0], MotorDemand::Speed(100.0));
-    world.observed.report.torque_nm[0] = 30.0;
+    // Of a speed that is told in steps the speed loop makes this at an instant.
+    world.observed.report.torque_nm[0] = -90.0;
     world.want([Wanted::Torque(0.0); 2]);
     world.slot();
     let [first, _] = world.torques_nm();
-    assert!((29.0..30.0).contains(&first), "{first}");
+    assert!((26.0..30.0).contains(&first), "{first}");
     assert_eq!(world.slots(500).state, State::Enabled);
 }
 
