@@ -1,4 +1,4 @@
-//! An angle that is read late: told its age, the drive makes up for it.
+//! An angle that is read late, whose age the drive is told, and one that is read in steps.
 
 use tractive_rig::scenario::catalogue;
 use tractive_rig::trace::Recorded;
@@ -30,4 +30,12 @@ fn a_late_angle_whose_age_is_known_costs_no_torque() {
     });
     assert!(unknown > 0.1, "an angle that is late must be noticed: {unknown}");
     assert!(known < 0.01, "{known}");
+}
+
+/// 4,096 counts a turn of the shaft; half of one is 0.18°, electrical.
+#[test]
+fn an_encoder_tells_the_middle_of_its_counts() {
+    let worst = worst(&catches("--encoder-lines 1024"));
+    println!("1,024 lines: {:.2} % of the demand at worst", 100.0 * worst);
+    assert!(worst < 0.01, "{worst}");
 }

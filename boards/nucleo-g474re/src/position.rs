@@ -118,11 +118,13 @@ const INDEX_TOLERANCE: u32 = 8;
 impl Encoder {
     /// The encoder of a machine with this many pole pairs.
     pub fn new(timer: TimGp16, stage: &PowerStage, pole_pairs: u32) -> Self {
+        let units_per_count = units_per_count(stage.encoder_counts, pole_pairs);
         Self {
             timer,
-            units_per_count: units_per_count(stage.encoder_counts, pole_pairs),
+            units_per_count,
             counts: stage.encoder_counts.max(1),
-            zero: stage.encoder_zero,
+            // The middle of a count, not where it begins.
+            zero: stage.encoder_zero + Angle(units_per_count / 2),
             last: None,
             passed: false,
             lost: false,

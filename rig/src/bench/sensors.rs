@@ -30,7 +30,7 @@ pub struct Flaws {
     pub angle_harmonics_deg: [f64; 2],
     /// Age of the angle when it is read, in s.
     pub angle_late_s: f64,
-    /// Counts of the angle in an electrical turn; `None`: as fine as the word.
+    /// Counts of the angle in an electrical turn, of which the middle is told; `None`: as fine as the word.
     pub angle_counts: Option<f64>,
     /// Time constant of the current sensors, in s.
     pub current_filter_s: f64,
@@ -127,7 +127,7 @@ impl Converter {
         let harmonics_deg = once * sin_once + twice * 2.0 * sin_once * cos_once;
         let error_turns = (flaws.angle_error_deg + harmonics_deg) / 360.0;
         let turns = true_turns + self.late_turns(motor.turns_s()) + error_turns;
-        let turns = flaws.angle_counts.map_or(turns, |counts| (turns * counts).floor() / counts);
+        let turns = flaws.angle_counts.map_or(turns, |counts| ((turns * counts).floor() + 0.5) / counts);
         Angle((turns.rem_euclid(1.0) * 4_294_967_296.0).round() as u64 as u32)
     }
 }

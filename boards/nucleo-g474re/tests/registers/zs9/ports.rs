@@ -99,7 +99,8 @@ fn a_sample_has_both_motors_and_the_link_in_si_units() {
     assert_eq!([lower.a, lower.b, lower.c], [-200.0 * unit, 0.0, 200.0 * unit]);
     assert!((sample.capacitor_v - 533.0).abs() < 0.5 && (sample.source_v - 400.0).abs() < 0.5);
     assert_eq!(sample.inductor_a, 1_000.0 * unit);
-    assert_eq!(sample.angles, [Some(Angle(1 << 30)), Some(Angle(1 << 31))]);
+    // With half a count, 2⁻¹¹ turns, electrical.
+    assert_eq!(sample.angles, [Some(Angle((1 << 30) + (1 << 21))), Some(Angle((1 << 31) + (1 << 21)))]);
     assert!(sample.may_pulse);
 }
 
