@@ -1,11 +1,12 @@
-//! The hardware's faults, each while the drive rests, is charged, is enabled or pulls: the time until every gate is off, and what the drive
-//! says of it.
+//! The hardware's faults, each while the drive starts, rests, is charged, is enabled or pulls: the time until every gate is off, and what the
+//! drive says of it.
 
 use crate::chip::rcc::POWER_ON;
 use crate::core::cpu::Cpu;
 use crate::core::nvic::HARD_FAULT;
 use crate::run::{Settings, prepare};
-use crate::time::{MILLISECOND, Time};
+use crate::time::{MICROSECOND, MILLISECOND, Time};
+use crate::world::Edge;
 use anyhow::{Result, ensure};
 use std::path::Path;
 use tractive::protocol::Scales;
@@ -33,6 +34,8 @@ const AFTER: Time = 300 * MILLISECOND;
 /// The state of the drive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum When {
+    /// The start is under way: this many µs after the release of reset.
+    Starting(u32),
     /// Nothing commanded.
     Ready,
     /// The link is charged.
@@ -44,11 +47,9 @@ pub enum When {
 }
 
 impl When {
-    /// All of them.
-    pub const ALL: [Self; 4] = [Self::Ready, Self::Charged, Self::Enabled, Self::Running];
-
     fn instant(self, system: System) -> Time {
         let ms = match (self, system) {
+            (Self::Starting(us), _) => return Time::from(us) * MICROSECOND,
             (Self::Ready, _) => 190,
             (Self::Charged, System::Pmasynrm) => 480,
             (Self::Charged, System::Zs9) => 680,
@@ -105,6 +106,8 @@ impl Cause {
 pub struct Seen {
     /// The time from the cause until the last gate went off, and none went on again; `None` if one is on at the end.
     pub off_after: Option<Time>,
+    /// The same of contactors, discharge resistor and chopper.
+    pub lines_off_after: Option<Time>,
     /// Gates were on just before.
     pub pulsed: bool,
     /// Frames heard in the last third of the time.
@@ -132,19 +135,22 @@ pub fn look(image: &Path, system: System, cause: Cause, when: When) -> Result<Se
     cpu.run(when.instant(system))?;
     let machine = cpu.machine();
     ensure!(machine.findings.all.is_empty(), "{}", machine.findings.all[0]);
-    let (from, edges, pulsed) = (machine.now(), machine.world.edges.len(), machine.world.any_gate());
+    let (from, pulsed) = (machine.now(), machine.world.any_gate());
+    let before = [machine.world.edges.len(), machine.world.line_edges.len()];
     disturb(&mut cpu, system, cause, from)?;
     cpu.run(from + 2 * AFTER / 3)?;
-    let before = cpu.machine().world.talk.received;
+    let received = cpu.machine().world.talk.received;
     cpu.run(from + AFTER)?;
     let machine = cpu.machine();
     let world = &machine.world;
-    let last = world.edges[edges..].last().map_or(0, |edge| edge.at.saturating_sub(from));
+    let [gates, lines] = before;
+    let last = |edges: &[Edge]| edges.last().map_or(0, |edge| edge.at.saturating_sub(from));
     let say = |column: &str| world.talk.listener.value(column);
     Ok(Seen {
-        off_after: (!world.any_gate()).then_some(last),
+        off_after: (!world.any_gate()).then(|| last(&world.edges[gates..])),
+        lines_off_after: (!world.any_line()).then(|| last(&world.line_edges[lines..])),
         pulsed,
-        heard: world.talk.received - before,
+        heard: world.talk.received - received,
         resets: machine.resets,
         told: format!("{} {}", say("state"), say("fault")).trim().to_owned(),
         frames: last_frames(&world.talk.frames),

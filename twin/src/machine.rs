@@ -191,7 +191,7 @@ impl Machine {
                 break;
             }
         }
-        chip.drive_interrupts(nvic);
+        chip.drive_interrupts(nvic, *now);
         if chip.watchdog.has_bitten && !self.may_bite {
             findings.add("the watchdog resets the chip");
         }
@@ -200,11 +200,16 @@ impl Machine {
 
     /// The program reads.
     pub fn read(&mut self, address: u32, size: usize) -> u32 {
-        if (PRIVATE..PRIVATE_END).contains(&address) {
-            return self.nvic.read(address, &mut self.findings);
+        self.findings.access = Some(address);
+        let is_private = (PRIVATE..PRIVATE_END).contains(&address);
+        let value = match is_private {
+            true => self.nvic.read(address, &mut self.findings),
+            false => self.chip.read(address, size, self.now, &mut self.world, &mut self.findings),
+        };
+        self.findings.access = None;
+        if !is_private {
+            self.keep(What::Read(address, value));
         }
-        let value = self.chip.read(address, size, self.now, &mut self.world, &mut self.findings);
-        self.keep(What::Read(address, value));
         value
     }
 
@@ -220,13 +225,17 @@ impl Machine {
     pub fn write(&mut self, address: u32, size: usize, value: u32) {
         let value = self.mistake.map_or(value, |mistake| mistake(address, value));
         if (PRIVATE..PRIVATE_END).contains(&address) {
+            self.findings.access = Some(address);
             self.nvic.write(address, size, value, &mut self.findings);
+            self.findings.access = None;
             return;
         }
         self.keep(What::Write(address, value));
         // All that happens before it, then the write, then all that it brings about.
         self.settle();
+        self.findings.access = Some(address);
         self.chip.write(address, size, value, self.now, &mut self.findings);
+        self.findings.access = None;
         self.settle();
     }
 }

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use tractive_rig::talk::System;
 use tractive_twin::core::cpu::RAM;
+use tractive_twin::instants::Instants;
 use tractive_twin::machine::Access;
 use tractive_twin::output::write;
 use tractive_twin::replay::Replay;
@@ -83,6 +84,16 @@ fn run(arguments: &Arguments) -> Result<bool> {
         cpu.longest,
         cpu.longest_uncached,
     );
+    for exception in cpu.longest.keys() {
+        let waited = machine.nvic.waited(*exception) / machine.cycle();
+        println!("exception {exception} waited for {waited} cycles at most");
+    }
+    for adc in &machine.chip.adcs {
+        let instants = Instants::of(adc.name(), &adc.samplings, &machine.world.edges);
+        if instants.sequences > 0 {
+            println!("{instants}");
+        }
+    }
     let same = match &replay {
         Some(replay) => told(&replay.compare(machine), &machine.world),
         None => true,

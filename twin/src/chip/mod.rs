@@ -1,6 +1,7 @@
 //! The chip's peripherals, each in a file of its own, and the wires between them.
 
 pub mod adc;
+mod bits;
 pub mod can;
 pub mod comparators;
 mod dispatch;
@@ -159,10 +160,10 @@ impl Chip {
     }
 
     /// The interrupts' lines.
-    pub fn drive_interrupts(&self, nvic: &mut Nvic) {
+    pub fn drive_interrupts(&self, nvic: &mut Nvic, now: Time) {
         for (timer, (_, line)) in self.timers.iter().zip(TIMERS) {
             if let Some(line) = line {
-                nvic.drive(line, timer.interrupts());
+                nvic.drive(line, timer.interrupts(), now);
             }
         }
     }

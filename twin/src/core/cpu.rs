@@ -250,8 +250,8 @@ impl Cpu {
         self.set(R::XPSR_NZCVQG, 1 << 24 | exception as u32)?;
         let cycles = ENTRY + if floats { FLOAT_CYCLES } else { 0 };
         let machine = self.machine_mut();
-        let vector = machine.nvic.vectors() + 4 * exception as u32;
-        machine.nvic.enter(exception);
+        let (vector, now) = (machine.nvic.vectors() + 4 * exception as u32, machine.now());
+        machine.nvic.enter(exception, now);
         machine.keep(What::Entry);
         machine.pass(cycles);
         let entered = (machine.now(), machine.waits);
@@ -264,10 +264,11 @@ impl Cpu {
     fn leave(&mut self, to: u32) -> Result<()> {
         // The emulator has taken the lowest bit away.
         let (to, floats) = (to | 1, to & NO_FLOAT == 0);
-        let Some(left) = self.machine_mut().nvic.leave() else {
+        let now = self.machine().now();
+        let Some(left) = self.machine_mut().nvic.leave(now) else {
             bail!("a return to {to:#010x} from no exception")
         };
-        let (now, waits) = (self.machine().now(), self.machine().waits);
+        let waits = self.machine().waits;
         let (since, waited) = self.entered.pop().unwrap_or((now, waits));
         let cycles = (now - since) / self.machine().cycle();
         let longest = self.longest.entry(left).or_default();

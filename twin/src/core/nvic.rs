@@ -1,6 +1,7 @@
 //! The nested vectored interrupt controller and the system control block, after ARMv7-M (DDI 0403E, B3).
 
 use crate::finding::Findings;
+use crate::time::Time;
 
 /// The number of external interrupts that the chip has (RM0440, vector table).
 pub const LINES: usize = 102;
@@ -23,6 +24,9 @@ pub struct Nvic {
     /// The lines' own levels: an interrupt whose line is still high when its handler returns comes again.
     lines: [bool; LINES],
     priorities: [u8; LINES],
+    /// The instants since which they could come, and the longest that each has waited from then on.
+    since: [Time; LINES],
+    waited: [Time; LINES],
     /// The processor's own exceptions that are pending: the non-maskable interrupt, the hard fault.
     system: [bool; 2],
     /// The active exceptions, the innermost last.
@@ -39,6 +43,8 @@ impl Default for Nvic {
             pending: [false; LINES],
             lines: [false; LINES],
             priorities: [0; LINES],
+            since: [0; LINES],
+            waited: [0; LINES],
             system: [false; 2],
             active: Vec::new(),
             cpacr: 0,
@@ -49,11 +55,23 @@ impl Default for Nvic {
 
 impl Nvic {
     /// Sets the level of an interrupt's line; a rising one pends it.
-    pub fn drive(&mut self, line: usize, high: bool) {
+    pub fn drive(&mut self, line: usize, high: bool, now: Time) {
         if high && !self.lines[line] {
-            self.pending[line] = true;
+            self.pend_line(line, now);
         }
         self.lines[line] = high;
+    }
+
+    fn pend_line(&mut self, line: usize, now: Time) {
+        if !self.pending[line] {
+            self.since[line] = now;
+        }
+        self.pending[line] = true;
+    }
+
+    /// The longest time that an interrupt, by its number as an exception, has waited until it began.
+    pub fn waited(&self, exception: usize) -> Time {
+        exception.checked_sub(EXTERNAL).map_or(0, |line| self.waited[line])
     }
 
     /// Pends one of the processor's own exceptions.
@@ -87,21 +105,24 @@ impl Nvic {
     }
 
     /// An exception becomes active.
-    pub fn enter(&mut self, exception: usize) {
+    pub fn enter(&mut self, exception: usize, now: Time) {
         match exception.checked_sub(EXTERNAL) {
-            Some(line) => self.pending[line] = false,
+            Some(line) => {
+                self.pending[line] = false;
+                self.waited[line] = self.waited[line].max(now.saturating_sub(self.since[line]));
+            }
             None => self.system[usize::from(exception == HARD_FAULT)] = false,
         }
         self.active.push(exception);
     }
 
     /// The innermost exception returns.
-    pub fn leave(&mut self) -> Option<usize> {
+    pub fn leave(&mut self, now: Time) -> Option<usize> {
         let left = self.active.pop()?;
         if let Some(line) = left.checked_sub(EXTERNAL)
             && self.lines[line]
         {
-            self.pending[line] = true;
+            self.pend_line(line, now);
         }
         Some(left)
     }
@@ -132,6 +153,7 @@ impl Nvic {
 
     /// A word, or for the priorities a byte, of the private peripheral bus is written.
     pub fn write(&mut self, address: u32, size: usize, value: u32, findings: &mut Findings) {
+        let (now, _) = findings.now;
         let lines = |from: u32| {
             let first = (address - from) as usize * 8;
             (0..32)
@@ -140,9 +162,11 @@ impl Nvic {
                 .filter(|line| *line < LINES)
         };
         match address {
-            0xE000_E100..0xE000_E110 => lines(0xE000_E100).for_each(|line| self.enabled[line] = true),
+            0xE000_E100..0xE000_E110 => lines(0xE000_E100).for_each(|line| {
+                (self.enabled[line], self.since[line]) = (true, now);
+            }),
             0xE000_E180..0xE000_E190 => lines(0xE000_E180).for_each(|line| self.enabled[line] = false),
-            0xE000_E200..0xE000_E210 => lines(0xE000_E200).for_each(|line| self.pending[line] = true),
+            0xE000_E200..0xE000_E210 => lines(0xE000_E200).for_each(|line| self.pend_line(line, now)),
             0xE000_E280..0xE000_E290 => lines(0xE000_E280).for_each(|line| self.pending[line] = false),
             0xE000_E400..0xE000_E4F0 => {
                 let first = (address - 0xE000_E400) as usize;

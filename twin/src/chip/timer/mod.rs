@@ -94,7 +94,8 @@ impl Timer {
     pub fn new(name: &'static str) -> Self {
         let mut words = [0; 32];
         let widest = if name == "TIM2" { u32::MAX } else { 0xFFFF };
-        (words[ARR / 4], words[AF1 / 4]) = (widest, 1);
+        words[ARR / 4] = widest;
+        words[AF1 / 4] = u32::from(Self::breaks(name));
         Self {
             name,
             words,
@@ -110,8 +111,13 @@ impl Timer {
         }
     }
 
+    /// `true` for a timer with gates, and with a break.
+    fn breaks(name: &str) -> bool {
+        ["TIM1", "TIM8", "TIM17", "TIM20"].contains(&name)
+    }
+
     fn has_outputs(&self) -> bool {
-        ["TIM1", "TIM8", "TIM17", "TIM20"].contains(&self.name)
+        Self::breaks(self.name)
     }
 
     fn word(&self, register: usize) -> u32 {
