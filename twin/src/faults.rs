@@ -28,8 +28,9 @@ const SCRIPT_ZS9: &str = "\
 ";
 /// The frames that are shown.
 const FRAMES: usize = 8;
-/// The time for which it is looked at afterwards.
+/// The time for which it is looked at afterwards, and where the fault comes in the start.
 const AFTER: Time = 300 * MILLISECOND;
+const AFTER_STARTING: Time = 90 * MILLISECOND;
 
 /// The state of the drive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -137,10 +138,11 @@ pub fn look(image: &Path, system: System, cause: Cause, when: When) -> Result<Se
     ensure!(machine.findings.all.is_empty(), "{}", machine.findings.all[0]);
     let (from, pulsed) = (machine.now(), machine.world.any_gate());
     let before = [machine.world.edges.len(), machine.world.line_edges.len()];
-    disturb(&mut cpu, system, cause, from)?;
-    cpu.run(from + 2 * AFTER / 3)?;
+    let after = if matches!(when, When::Starting(_)) { AFTER_STARTING } else { AFTER };
+    disturb(&mut cpu, system, cause, from + after)?;
+    cpu.run(from + 2 * after / 3)?;
     let received = cpu.machine().world.talk.received;
-    cpu.run(from + AFTER)?;
+    cpu.run(from + after)?;
     let machine = cpu.machine();
     let world = &machine.world;
     let [gates, lines] = before;
@@ -163,7 +165,7 @@ fn last_frames(log: &str) -> Vec<String> {
     log.lines().rev().filter(|line| line.ends_with('R')).take(FRAMES).map(str::to_owned).collect()
 }
 
-fn disturb(cpu: &mut Cpu, system: System, cause: Cause, from: Time) -> Result<()> {
+fn disturb(cpu: &mut Cpu, system: System, cause: Cause, until: Time) -> Result<()> {
     let machine = cpu.machine_mut();
     machine.may_bite = true;
     // A drive that begins anew counts its frames anew: whoever listens from now on hears it.
@@ -172,19 +174,20 @@ fn disturb(cpu: &mut Cpu, system: System, cause: Cause, from: Time) -> Result<()
         Cause::Drivers => machine.world.ready = false,
         Cause::Overcurrent => machine.world.excess_a = (0, 0, 600.0),
         Cause::Encoder => machine.world.cut = true,
-        Cause::Hang => cpu.stall(from + AFTER)?,
+        Cause::Hang => cpu.stall(until)?,
         Cause::Crystal => machine.stop_crystal(),
         Cause::BrownOut => {
             machine.chip.system.low_supply = true;
             machine.settle();
-            cpu.run(from + MILLISECOND)?;
+            let reset = cpu.machine().now() + MILLISECOND;
+            cpu.run(reset)?;
             cpu.reset(POWER_ON)?;
         }
         Cause::Debugger => {
             let now = machine.now();
             machine.chip.halt(now);
             machine.settle();
-            cpu.stall(from + AFTER)?;
+            cpu.stall(until)?;
         }
         Cause::HardFault => machine.nvic.pend(HARD_FAULT),
         Cause::BusOff => machine.chip.can.leave_bus(),

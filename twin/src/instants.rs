@@ -44,8 +44,8 @@ pub struct Instants {
     pub apart: Range,
     /// The time from a sequence's start to the end of each of its samplings.
     pub ends: Vec<Range>,
-    /// The time from the last edge of a gate to the end of a sampling, and the samplings in which an edge lies.
-    pub settled: Range,
+    /// The shortest time from an edge of a gate to the end of a sampling, and the samplings in which an edge lies.
+    pub settled: Option<Time>,
     /// See [`Self::settled`].
     pub edged: usize,
 }
@@ -54,7 +54,7 @@ impl Instants {
     /// Of a converter's samplings, beside the gates' edges.
     pub fn of(name: &'static str, samplings: &[Sampling], edges: &[Edge]) -> Self {
         let mut told =
-            Self { name, sequences: 0, apart: Range::NONE, ends: Vec::new(), settled: Range::NONE, edged: 0 };
+            Self { name, sequences: 0, apart: Range::NONE, ends: Vec::new(), settled: None, edged: 0 };
         let (mut before, mut past) = (None, 0);
         for Sampling { triggered, rank, from, until } in samplings {
             if *rank == 0 {
@@ -68,7 +68,7 @@ impl Instants {
             told.ends[rank].take(until - triggered);
             past += edges[past..].iter().take_while(|edge| edge.at <= *until).count();
             if let Some(last) = past.checked_sub(1).map(|index| edges[index].at) {
-                told.settled.take(until - last);
+                told.settled = Some(told.settled.map_or(until - last, |known| known.min(until - last)));
                 told.edged += usize::from(last > *from);
             }
         }
@@ -82,10 +82,11 @@ impl fmt::Display for Instants {
         let ends: Vec<_> = ends.iter().map(Range::to_string).collect();
         write!(
             f,
-            "{name}: {sequences} sequences, {apart} µs apart; sampled {} µs after the timer's event; last edge of a gate {} µs before at \
-             least, {edged} times within a sampling",
-            ends.join(", "),
-            Range { most: settled.least, ..*settled },
-        )
+            "{name}: {sequences} sequences, {apart} µs apart; sampled {} µs after the timer's event",
+            ends.join(", ")
+        )?;
+        let Some(settled) = settled else { return Ok(()) };
+        let nearest = Range { least: *settled, most: *settled };
+        write!(f, "; an edge of a gate {nearest} µs before at least, {edged} times within a sampling")
     }
 }

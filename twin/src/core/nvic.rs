@@ -19,8 +19,9 @@ const IDLE: i32 = 256;
 /// The state.
 #[derive(Debug)]
 pub struct Nvic {
-    enabled: [bool; LINES],
-    pending: [bool; LINES],
+    /// A bit each.
+    enabled: u128,
+    pending: u128,
     /// The lines' own levels: an interrupt whose line is still high when its handler returns comes again.
     lines: [bool; LINES],
     priorities: [u8; LINES],
@@ -39,8 +40,8 @@ pub struct Nvic {
 impl Default for Nvic {
     fn default() -> Self {
         Self {
-            enabled: [false; LINES],
-            pending: [false; LINES],
+            enabled: 0,
+            pending: 0,
             lines: [false; LINES],
             priorities: [0; LINES],
             since: [0; LINES],
@@ -63,10 +64,10 @@ impl Nvic {
     }
 
     fn pend_line(&mut self, line: usize, now: Time) {
-        if !self.pending[line] {
+        if self.pending >> line & 1 == 0 {
             self.since[line] = now;
         }
-        self.pending[line] = true;
+        self.pending |= 1 << line;
     }
 
     /// The longest time that an interrupt, by its number as an exception, has waited until it began.
@@ -96,10 +97,11 @@ impl Nvic {
         {
             return Some(exception);
         }
-        if primask || !self.pending.contains(&true) {
+        let ready = self.enabled & self.pending;
+        if primask || ready == 0 {
             return None;
         }
-        let ready = (0..LINES).filter(|line| self.enabled[*line] && self.pending[*line]);
+        let ready = (0..LINES).filter(|line| ready >> line & 1 != 0);
         let first = ready.min_by_key(|line| (self.priorities[*line], *line))?;
         (i32::from(self.priorities[first]) < self.running()).then_some(EXTERNAL + first)
     }
@@ -108,7 +110,7 @@ impl Nvic {
     pub fn enter(&mut self, exception: usize, now: Time) {
         match exception.checked_sub(EXTERNAL) {
             Some(line) => {
-                self.pending[line] = false;
+                self.pending &= !(1 << line);
                 self.waited[line] = self.waited[line].max(now.saturating_sub(self.since[line]));
             }
             None => self.system[usize::from(exception == HARD_FAULT)] = false,
@@ -129,13 +131,10 @@ impl Nvic {
 
     /// A word of the private peripheral bus is read.
     pub fn read(&mut self, address: u32, findings: &mut Findings) -> u32 {
-        let word = |of: &[bool; LINES], from: u32| {
-            let first = (address - from) as usize * 8;
-            (0..32).fold(0, |word, bit| word | u32::from(of.get(first + bit).is_some_and(|bit| *bit)) << bit)
-        };
+        let word = |of: u128, from: u32| (of >> ((address - from) * 8)) as u32;
         match address {
-            0xE000_E100..0xE000_E110 => word(&self.enabled, 0xE000_E100),
-            0xE000_E200..0xE000_E210 => word(&self.pending, 0xE000_E200),
+            0xE000_E100..0xE000_E110 => word(self.enabled, 0xE000_E100),
+            0xE000_E200..0xE000_E210 => word(self.pending, 0xE000_E200),
             // ICSR.VECTACTIVE.
             0xE000_ED04 => self.active.last().map_or(0, |exception| *exception as u32),
             0xE000_ED08 => self.vtor,
@@ -163,11 +162,12 @@ impl Nvic {
         };
         match address {
             0xE000_E100..0xE000_E110 => lines(0xE000_E100).for_each(|line| {
-                (self.enabled[line], self.since[line]) = (true, now);
+                self.enabled |= 1 << line;
+                self.since[line] = now;
             }),
-            0xE000_E180..0xE000_E190 => lines(0xE000_E180).for_each(|line| self.enabled[line] = false),
+            0xE000_E180..0xE000_E190 => lines(0xE000_E180).for_each(|line| self.enabled &= !(1 << line)),
             0xE000_E200..0xE000_E210 => lines(0xE000_E200).for_each(|line| self.pend_line(line, now)),
-            0xE000_E280..0xE000_E290 => lines(0xE000_E280).for_each(|line| self.pending[line] = false),
+            0xE000_E280..0xE000_E290 => lines(0xE000_E280).for_each(|line| self.pending &= !(1 << line)),
             0xE000_E400..0xE000_E4F0 => {
                 let first = (address - 0xE000_E400) as usize;
                 for (byte, line) in (first..first + size).enumerate().filter(|(_, line)| *line < LINES) {
