@@ -1,6 +1,7 @@
 //! The machine around the processor: time, chip, motor, and what is found wrong.
 
 use crate::chip::Chip;
+use crate::core::cost::Cost;
 use crate::core::cpu::Stop;
 use crate::core::nvic::Nvic;
 use crate::finding::Findings;
@@ -35,6 +36,23 @@ pub enum What {
     Write(u32, u32),
 }
 
+/// Cycles that reading from the flash memory would add, since the beginning.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Waits {
+    /// With the prefetch alone.
+    pub prefetched: u64,
+    /// Without any cache or prefetch.
+    pub all: u64,
+}
+
+impl Waits {
+    /// More of them.
+    pub fn add(&mut self, prefetched: u32, all: u32) {
+        self.prefetched += u64::from(prefetched);
+        self.all += u64::from(all);
+    }
+}
+
 /// The machine.
 pub struct Machine {
     /// The interrupt controller.
@@ -53,8 +71,8 @@ pub struct Machine {
     pub mistake: Option<fn(u32, u32) -> u32>,
     /// Every access to a peripheral, and every entry into an exception, if they are kept.
     pub record: Option<Vec<Access>>,
-    /// Cycles that fetching from the flash memory would add without any cache or prefetch.
-    pub waits: u64,
+    /// Cycles that reading from the flash memory would add.
+    pub waits: Waits,
     /// The reason why the emulator was stopped.
     pub stop: Option<Stop>,
     /// The instant at which the run ends.
@@ -82,7 +100,7 @@ impl Machine {
             resets: 0,
             mistake: None,
             record: None,
-            waits: 0,
+            waits: Waits::default(),
             stop: None,
             until: 0,
             masked: false,
@@ -118,13 +136,13 @@ impl Machine {
     }
 
     /// A basic block begins; `true` if the emulator is to stop before it.
-    pub fn block(&mut self, address: u32, cycles: u32, waits: u32) -> bool {
+    pub fn block(&mut self, address: u32, cost: Cost) -> bool {
         self.findings.now = (self.now, address);
         if self.counted.take() != Some(address) {
             // What had to wait for the block before comes now.
             self.masked &= !std::mem::take(&mut self.deferred);
-            self.waits += u64::from(waits);
-            self.pass(cycles);
+            self.waits.add(cost.prefetched, cost.waits);
+            self.pass(cost.cycles);
         }
         let stop = if self.wants_reset() {
             Stop::Reset

@@ -136,7 +136,7 @@ impl Tasks for Host {
         }
     }
 
-    /// Where a leg turns, the device that goes off does so at once, the other one goes on the dead time later.
+    /// The edges of each half with pulses: where a leg turns, the device that goes off does so at once, the other one goes on the dead time later.
     fn spans(&self, scale: &Scale) -> Vec<Span> {
         let tick = scale.cycle * Time::from(self.tick_cycles);
         let mut spans: Vec<Span> = Vec::new();
