@@ -92,7 +92,7 @@ pub struct World {
     pub ready: bool,
     /// Current that flows in a phase besides, in A: past the motor, as to earth. The motor, the phase.
     pub excess_a: (usize, usize, f64),
-    /// The instant at which the drivers' ready wire drops for [`DROP`].
+    /// The instant at which the drivers' ready wire drops for 10 ms.
     pub drops: Option<Time>,
     /// The encoders' wires are cut.
     pub cut: bool,
