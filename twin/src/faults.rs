@@ -1,11 +1,12 @@
-//! The hardware's faults, each while the drive rests, is charged, is enabled or pulls: the time until every gate is off, and what the drive
-//! says of it.
+//! The hardware's faults, each while the drive starts, rests, is charged, is enabled or pulls: the time until every gate is off, and what the
+//! drive says of it.
 
 use crate::chip::rcc::POWER_ON;
 use crate::core::cpu::Cpu;
 use crate::core::nvic::HARD_FAULT;
 use crate::run::{Settings, prepare};
-use crate::time::{MILLISECOND, Time};
+use crate::time::{MICROSECOND, MILLISECOND, Time};
+use crate::world::Edge;
 use anyhow::{Result, ensure};
 use std::path::Path;
 use tractive::protocol::Scales;
@@ -27,12 +28,15 @@ const SCRIPT_ZS9: &str = "\
 ";
 /// The frames that are shown.
 const FRAMES: usize = 8;
-/// The time for which it is looked at afterwards.
+/// The time for which it is looked at afterwards, and where the fault comes in the start.
 const AFTER: Time = 300 * MILLISECOND;
+const AFTER_STARTING: Time = 90 * MILLISECOND;
 
 /// The state of the drive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum When {
+    /// The start is under way: this many µs after the release of reset.
+    Starting(u32),
     /// Nothing commanded.
     Ready,
     /// The link is charged.
@@ -44,11 +48,9 @@ pub enum When {
 }
 
 impl When {
-    /// All of them.
-    pub const ALL: [Self; 4] = [Self::Ready, Self::Charged, Self::Enabled, Self::Running];
-
     fn instant(self, system: System) -> Time {
         let ms = match (self, system) {
+            (Self::Starting(us), _) => return Time::from(us) * MICROSECOND,
             (Self::Ready, _) => 190,
             (Self::Charged, System::Pmasynrm) => 480,
             (Self::Charged, System::Zs9) => 680,
@@ -105,6 +107,8 @@ impl Cause {
 pub struct Seen {
     /// The time from the cause until the last gate went off, and none went on again; `None` if one is on at the end.
     pub off_after: Option<Time>,
+    /// The same of contactors, discharge resistor and chopper.
+    pub lines_off_after: Option<Time>,
     /// Gates were on just before.
     pub pulsed: bool,
     /// Frames heard in the last third of the time.
@@ -132,19 +136,23 @@ pub fn look(image: &Path, system: System, cause: Cause, when: When) -> Result<Se
     cpu.run(when.instant(system))?;
     let machine = cpu.machine();
     ensure!(machine.findings.all.is_empty(), "{}", machine.findings.all[0]);
-    let (from, edges, pulsed) = (machine.now(), machine.world.edges.len(), machine.world.any_gate());
-    disturb(&mut cpu, system, cause, from)?;
-    cpu.run(from + 2 * AFTER / 3)?;
-    let before = cpu.machine().world.talk.received;
-    cpu.run(from + AFTER)?;
+    let (from, pulsed) = (machine.now(), machine.world.any_gate());
+    let before = [machine.world.edges.len(), machine.world.line_edges.len()];
+    let after = if matches!(when, When::Starting(_)) { AFTER_STARTING } else { AFTER };
+    disturb(&mut cpu, system, cause, from + after)?;
+    cpu.run(from + 2 * after / 3)?;
+    let received = cpu.machine().world.talk.received;
+    cpu.run(from + after)?;
     let machine = cpu.machine();
     let world = &machine.world;
-    let last = world.edges[edges..].last().map_or(0, |edge| edge.at.saturating_sub(from));
+    let [gates, lines] = before;
+    let last = |edges: &[Edge]| edges.last().map_or(0, |edge| edge.at.saturating_sub(from));
     let say = |column: &str| world.talk.listener.value(column);
     Ok(Seen {
-        off_after: (!world.any_gate()).then_some(last),
+        off_after: (!world.any_gate()).then(|| last(&world.edges[gates..])),
+        lines_off_after: (!world.any_line()).then(|| last(&world.line_edges[lines..])),
         pulsed,
-        heard: world.talk.received - before,
+        heard: world.talk.received - received,
         resets: machine.resets,
         told: format!("{} {}", say("state"), say("fault")).trim().to_owned(),
         frames: last_frames(&world.talk.frames),
@@ -157,7 +165,7 @@ fn last_frames(log: &str) -> Vec<String> {
     log.lines().rev().filter(|line| line.ends_with('R')).take(FRAMES).map(str::to_owned).collect()
 }
 
-fn disturb(cpu: &mut Cpu, system: System, cause: Cause, from: Time) -> Result<()> {
+fn disturb(cpu: &mut Cpu, system: System, cause: Cause, until: Time) -> Result<()> {
     let machine = cpu.machine_mut();
     machine.may_bite = true;
     // A drive that begins anew counts its frames anew: whoever listens from now on hears it.
@@ -166,19 +174,20 @@ fn disturb(cpu: &mut Cpu, system: System, cause: Cause, from: Time) -> Result<()
         Cause::Drivers => machine.world.ready = false,
         Cause::Overcurrent => machine.world.excess_a = (0, 0, 600.0),
         Cause::Encoder => machine.world.cut = true,
-        Cause::Hang => cpu.stall(from + AFTER)?,
+        Cause::Hang => cpu.stall(until)?,
         Cause::Crystal => machine.stop_crystal(),
         Cause::BrownOut => {
             machine.chip.system.low_supply = true;
             machine.settle();
-            cpu.run(from + MILLISECOND)?;
+            let reset = cpu.machine().now() + MILLISECOND;
+            cpu.run(reset)?;
             cpu.reset(POWER_ON)?;
         }
         Cause::Debugger => {
             let now = machine.now();
             machine.chip.halt(now);
             machine.settle();
-            cpu.stall(from + AFTER)?;
+            cpu.stall(until)?;
         }
         Cause::HardFault => machine.nvic.pend(HARD_FAULT),
         Cause::BusOff => machine.chip.can.leave_bus(),

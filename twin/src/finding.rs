@@ -10,6 +10,8 @@ pub struct Finding {
     pub at: Time,
     /// The beginning of the basic block that was executed.
     pub pc: u32,
+    /// The address, if an access to it is what was found.
+    pub address: Option<u32>,
     /// In words.
     pub text: String,
     /// The times that it came, this one included.
@@ -18,8 +20,12 @@ pub struct Finding {
 
 impl fmt::Display for Finding {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        let Self { at, pc, text, count } = self;
-        write!(f, "{:.6} s, block {pc:#010x}: {text}", seconds(*at))?;
+        let Self { at, pc, address, text, count } = self;
+        write!(f, "{:.6} s, block {pc:#010x}", seconds(*at))?;
+        if let Some(address) = address {
+            write!(f, ", access to {address:#010x}")?;
+        }
+        write!(f, ": {text}")?;
         if *count > 1 { write!(f, " ({count} times)") } else { Ok(()) }
     }
 }
@@ -31,15 +37,17 @@ pub struct Findings {
     pub all: Vec<Finding>,
     /// The instant and the place of what is executed now.
     pub now: (Time, u32),
+    /// The address that is accessed now.
+    pub access: Option<u32>,
 }
 
 impl Findings {
     /// One more.
     pub fn add(&mut self, text: impl Into<String>) {
-        let (text, (at, pc)) = (text.into(), self.now);
+        let (text, (at, pc), address) = (text.into(), self.now, self.access);
         match self.all.iter_mut().find(|known| known.text == text && known.pc == pc) {
             Some(known) => known.count += 1,
-            None => self.all.push(Finding { at, pc, text, count: 1 }),
+            None => self.all.push(Finding { at, pc, address, text, count: 1 }),
         }
     }
 

@@ -8,6 +8,7 @@ pub mod core;
 pub mod faults;
 pub mod finding;
 pub mod image;
+pub mod instants;
 pub mod machine;
 pub mod map;
 pub mod mistakes;

@@ -1,6 +1,7 @@
 //! The machine around the processor: time, chip, motor, and what is found wrong.
 
 use crate::chip::Chip;
+use crate::core::cost::Cost;
 use crate::core::cpu::Stop;
 use crate::core::nvic::Nvic;
 use crate::finding::Findings;
@@ -35,6 +36,23 @@ pub enum What {
     Write(u32, u32),
 }
 
+/// Cycles that reading from the flash memory would add, since the beginning.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Waits {
+    /// With the prefetch alone.
+    pub prefetched: u64,
+    /// Without any cache or prefetch.
+    pub all: u64,
+}
+
+impl Waits {
+    /// More of them.
+    pub fn add(&mut self, prefetched: u32, all: u32) {
+        self.prefetched += u64::from(prefetched);
+        self.all += u64::from(all);
+    }
+}
+
 /// The machine.
 pub struct Machine {
     /// The interrupt controller.
@@ -53,8 +71,8 @@ pub struct Machine {
     pub mistake: Option<fn(u32, u32) -> u32>,
     /// Every access to a peripheral, and every entry into an exception, if they are kept.
     pub record: Option<Vec<Access>>,
-    /// Cycles that fetching from the flash memory would add without any cache or prefetch.
-    pub waits: u64,
+    /// Cycles that reading from the flash memory would add.
+    pub waits: Waits,
     /// The reason why the emulator was stopped.
     pub stop: Option<Stop>,
     /// The instant at which the run ends.
@@ -82,7 +100,7 @@ impl Machine {
             resets: 0,
             mistake: None,
             record: None,
-            waits: 0,
+            waits: Waits::default(),
             stop: None,
             until: 0,
             masked: false,
@@ -118,13 +136,13 @@ impl Machine {
     }
 
     /// A basic block begins; `true` if the emulator is to stop before it.
-    pub fn block(&mut self, address: u32, cycles: u32, waits: u32) -> bool {
+    pub fn block(&mut self, address: u32, cost: Cost) -> bool {
         self.findings.now = (self.now, address);
         if self.counted.take() != Some(address) {
             // What had to wait for the block before comes now.
             self.masked &= !std::mem::take(&mut self.deferred);
-            self.waits += u64::from(waits);
-            self.pass(cycles);
+            self.waits.add(cost.prefetched, cost.waits);
+            self.pass(cost.cycles);
         }
         let stop = if self.wants_reset() {
             Stop::Reset
@@ -191,7 +209,7 @@ impl Machine {
                 break;
             }
         }
-        chip.drive_interrupts(nvic);
+        chip.drive_interrupts(nvic, *now);
         if chip.watchdog.has_bitten && !self.may_bite {
             findings.add("the watchdog resets the chip");
         }
@@ -200,11 +218,16 @@ impl Machine {
 
     /// The program reads.
     pub fn read(&mut self, address: u32, size: usize) -> u32 {
-        if (PRIVATE..PRIVATE_END).contains(&address) {
-            return self.nvic.read(address, &mut self.findings);
+        self.findings.access = Some(address);
+        let is_private = (PRIVATE..PRIVATE_END).contains(&address);
+        let value = match is_private {
+            true => self.nvic.read(address, &mut self.findings),
+            false => self.chip.read(address, size, self.now, &mut self.world, &mut self.findings),
+        };
+        self.findings.access = None;
+        if !is_private {
+            self.keep(What::Read(address, value));
         }
-        let value = self.chip.read(address, size, self.now, &mut self.world, &mut self.findings);
-        self.keep(What::Read(address, value));
         value
     }
 
@@ -220,13 +243,17 @@ impl Machine {
     pub fn write(&mut self, address: u32, size: usize, value: u32) {
         let value = self.mistake.map_or(value, |mistake| mistake(address, value));
         if (PRIVATE..PRIVATE_END).contains(&address) {
+            self.findings.access = Some(address);
             self.nvic.write(address, size, value, &mut self.findings);
+            self.findings.access = None;
             return;
         }
         self.keep(What::Write(address, value));
         // All that happens before it, then the write, then all that it brings about.
         self.settle();
+        self.findings.access = Some(address);
         self.chip.write(address, size, value, self.now, &mut self.findings);
+        self.findings.access = None;
         self.settle();
     }
 }

@@ -5,7 +5,9 @@ use clap::Parser;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use tractive_rig::talk::System;
-use tractive_twin::core::cpu::RAM;
+use tractive_twin::core::cpu::{Cpu, Longest, RAM};
+use tractive_twin::image::Image;
+use tractive_twin::instants::Instants;
 use tractive_twin::machine::Access;
 use tractive_twin::output::write;
 use tractive_twin::replay::Replay;
@@ -75,27 +77,19 @@ fn run(arguments: &Arguments) -> Result<bool> {
     let simulated_s = seconds(machine.now());
     println!("{}", talk.state(simulated_s));
     println!(
-        "{simulated_s:.3} s, {:.3} of real time; {} expectations, {} not met; {} edges; longest interrupts {:?} cycles, with every wait state {:?}",
+        "{simulated_s:.3} s, {:.3} of real time; {} expectations, {} not met; {} edges",
         simulated_s / start.elapsed().as_secs_f64(),
         talk.expectations,
         talk.failures.len(),
         machine.world.edges.len(),
-        cpu.longest,
-        cpu.longest_uncached,
     );
+    tell_instants(&cpu);
     let same = match &replay {
         Some(replay) => told(&replay.compare(machine), &machine.world),
         None => true,
     };
     let good = same && machine.findings.all.is_empty() && talk.failures.is_empty();
-    println!(
-        "{} bytes of flash; RAM {:#010x} to {:#010x} placed, {} bytes of stack used, {} left",
-        image.flash_bytes,
-        RAM.0,
-        image.statics_end,
-        cpu.stack_bytes(image.statics_end)?,
-        RAM.0 + RAM.1 - image.statics_end - cpu.stack_bytes(image.statics_end)?,
-    );
+    tell_memory(&cpu, &image)?;
     if arguments.accesses {
         for (address, (reads, writes)) in &machine.chip.accesses {
             println!("{address:#010x} {reads:>9} {writes:>9}");
@@ -109,6 +103,37 @@ fn run(arguments: &Arguments) -> Result<bool> {
     }
     outcome?;
     Ok(good)
+}
+
+/// Says what the interrupts take, and when the converters sample.
+fn tell_instants(cpu: &Cpu) {
+    let machine = cpu.machine();
+    for (exception, longest) in &cpu.longest {
+        let late = machine.nvic.waited(*exception) / machine.cycle();
+        let Longest { cycles, prefetched, waited } = longest;
+        println!(
+            "exception {exception}: {cycles} cycles at most, {prefetched} with the flash memory's prefetch alone, {waited} with all of its wait states; it waited for {late} at most"
+        );
+    }
+    for adc in &machine.chip.adcs {
+        let instants = Instants::of(adc.name(), &adc.samplings, &machine.world.edges);
+        if instants.sequences > 0 {
+            println!("{instants}");
+        }
+    }
+}
+
+/// Says what the memory holds.
+fn tell_memory(cpu: &Cpu, image: &Image) -> Result<()> {
+    println!(
+        "{} bytes of flash; RAM {:#010x} to {:#010x} placed, {} bytes of stack used, {} left",
+        image.flash_bytes,
+        RAM.0,
+        image.statics_end,
+        cpu.stack_bytes(image.statics_end)?,
+        RAM.0 + RAM.1 - image.statics_end - cpu.stack_bytes(image.statics_end)?,
+    );
+    Ok(())
 }
 
 /// Says how far the edges are off the host's; `true` where none is by more than a tick.

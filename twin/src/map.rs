@@ -75,6 +75,11 @@ impl Map {
         self.registers.get(&address)
     }
 
+    /// All registers with their addresses.
+    pub fn registers(&self) -> impl Iterator<Item = (u32, &Register)> {
+        self.registers.iter().map(|(address, register)| (*address, register))
+    }
+
     /// The enable bit of a peripheral's clock; `None` if it needs none.
     pub fn enable(&self, peripheral: usize) -> Option<Enable> {
         self.enables[peripheral]

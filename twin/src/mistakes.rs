@@ -5,7 +5,7 @@
 
 use crate::core::cpu::Cpu;
 use crate::run::{Settings, drive, prepare};
-use crate::time::MICROSECOND;
+use crate::time::{MICROSECOND, seconds};
 use anyhow::Result;
 use std::path::Path;
 use tractive_rig::talk::System;
@@ -44,6 +44,10 @@ const BREAK: u64 = MICROSECOND;
 const TELEMETRY_S: f64 = 0.01;
 const TELEMETRY_SHARE: f64 = 0.01;
 
+/// The PWM interrupt, as an exception, and the longest time that it may wait: it preempts everything, so for an instruction and its entry.
+const PWM: usize = 41;
+const WAIT: u64 = MICROSECOND;
+
 /// The edges that every gate has at least in the drive: half of those of a carrier of 900 Hz.
 const PULSES: usize = 300;
 
@@ -64,7 +68,7 @@ fn at(register: u32, address: u32, value: u32, mask: u32, bits: u32) -> u32 {
 }
 
 /// The same where the field is written at all.
-fn field(register: u32, address: u32, value: u32, mask: u32, from: u32, to: u32) -> u32 {
+fn field(register: u32, address: u32, value: u32, mask: u32, [from, to]: [u32; 2]) -> u32 {
     if address == register && value & mask == from { value & !mask | to } else { value }
 }
 
@@ -78,22 +82,23 @@ const GPIOB: u32 = 0x4800_0400;
 const GPIOC: u32 = 0x4800_0800;
 const ADC1: u32 = 0x5000_0000;
 const ADC2: u32 = 0x5000_0100;
+const PRIORITIES: u32 = 0xE000_E400;
 
 /// The mistakes.
-pub const MISTAKES: [Mistake; 38] = [
-    of("PB15 has alternate function 6", |a, v| field(GPIOB + 0x24, a, v, 0xF << 28, 4 << 28, 6 << 28)),
-    of("PA10 has alternate function 5", |a, v| field(GPIOA + 0x24, a, v, 0xF << 8, 6 << 8, 5 << 8)),
-    of("PC6 has alternate function 2", |a, v| field(GPIOC + 0x20, a, v, 0xF << 24, 4 << 24, 2 << 24)),
-    of("PA1 stays an input", |a, v| field(GPIOA, a, v, 3 << 2, 3 << 2, 0)),
+pub const MISTAKES: [Mistake; 40] = [
+    of("PB15 has alternate function 6", |a, v| field(GPIOB + 0x24, a, v, 0xF << 28, [4 << 28, 6 << 28])),
+    of("PA10 has alternate function 5", |a, v| field(GPIOA + 0x24, a, v, 0xF << 8, [6 << 8, 5 << 8])),
+    of("PC6 has alternate function 2", |a, v| field(GPIOC + 0x20, a, v, 0xF << 24, [4 << 24, 2 << 24])),
+    of("PA1 stays an input", |a, v| field(GPIOA, a, v, 3 << 2, [3 << 2, 0])),
     of("encoder's tracks without their alternate function", |a, v| {
-        field(GPIOB + 0x20, a, v, 0xF << 24, 2 << 24, 0)
+        field(GPIOB + 0x20, a, v, 0xF << 24, [2 << 24, 0])
     }),
     of("currents of U and V swapped", |a, v| match a {
         0x5000_004C => v & !(0x1F << 9 | 0x1F << 15) | (v >> 9 & 0x1F) << 15 | (v >> 15 & 0x1F) << 9,
         _ => v,
     }),
-    of("ADC1 follows TIM3_CC3", |a, v| field(ADC1 + 0x4C, a, v, 0x1F << 2, 12 << 2, 11 << 2)),
-    of("ADC2 follows TIM8's TRGO", |a, v| field(ADC2 + 0x4C, a, v, 0x1F << 2, 8 << 2, 9 << 2)),
+    of("ADC1 follows TIM3_CC3", |a, v| field(ADC1 + 0x4C, a, v, 0x1F << 2, [12 << 2, 11 << 2])),
+    of("ADC2 follows TIM8's TRGO", |a, v| field(ADC2 + 0x4C, a, v, 0x1F << 2, [8 << 2, 9 << 2])),
     of("ADC1 never follows a timer", |a, v| at(ADC1 + 0x4C, a, v, 3 << 7, 0)),
     of("ADC's clock undivided", |a, v| at(0x5000_0308, a, v, 3 << 16, 1 << 16)),
     of("lower device of U inverted", |a, v| at(TIM1 + 0x20, a, v, 8, 8)),
@@ -112,17 +117,19 @@ pub const MISTAKES: [Mistake; 38] = [
     of("compare of U not preloaded", |a, v| at(TIM1 + 0x18, a, v, 1 << 3, 0)),
     of("carrier's prescaler one less", |a, v| at(TIM1 + 0x28, a, v, 1, 0)),
     of("control timer's prescaler one less", |a, v| at(TIM3 + 0x28, a, v, 1, 0)),
-    of("PLL at 160 MHz", |a, v| field(RCC + 0x0C, a, v, 0x7F << 8, 85 << 8, 80 << 8)),
-    of("two wait states", |a, v| field(0x4002_2000, a, v, 0xF, 4, 2)),
+    of("PLL at 160 MHz", |a, v| field(RCC + 0x0C, a, v, 0x7F << 8, [85 << 8, 80 << 8])),
+    of("two wait states", |a, v| field(0x4002_2000, a, v, 0xF, [4, 2])),
     of("no boost at 170 MHz", |a, v| at(0x4000_7080, a, v, 1 << 8, 1 << 8)),
     of("TIM8 does not follow TIM1", |a, v| at(TIM8 + 0x08, a, v, u32::MAX, 0)),
-    of("encoder counts one track", |a, v| field(TIM4 + 0x08, a, v, 7, 3, 1)),
+    of("encoder counts one track", |a, v| field(TIM4 + 0x08, a, v, 7, [3, 1])),
     of("encoder's turn of 2,048 counts", |a, v| at(TIM4 + 0x2C, a, v, u32::MAX, 2_047)),
-    of("encoder captured by another timer", |a, v| field(TIM4 + 0x08, a, v, 0x70, 0x20, 0x10)),
+    of("encoder captured by another timer", |a, v| field(TIM4 + 0x08, a, v, 0x70, [0x20, 0x10])),
     of("encoder's index not enabled", |a, v| at(TIM4 + 0x58, a, v, 1, 0)),
     of("break of U and V disabled", |a, v| at(TIM1 + 0x44, a, v, 1 << 12, 0)),
     of("break input inverted", |a, v| at(TIM8 + 0x60, a, v, 1 << 9, 0)),
     of("comparators do not break U and V", |a, v| at(TIM1 + 0x60, a, v, 0x7F << 1, 0)),
+    of("PWM's priority that of control", |a, v| at(PRIORITIES + 25, a, v, 0xFF, 0x80)),
+    of("PWM's priority below control's", |a, v| at(PRIORITIES + 25, a, v, 0xFF, 0xC0)),
     of("watchdog never started", |a, v| if a == 0x4000_3000 && v == 0xCCCC { 0 } else { v }),
 ];
 
@@ -156,6 +163,10 @@ fn caught_in(
     if let Some(slow) = off_time(&machine.world.talk.rows) {
         return Ok(Some(slow));
     }
+    let waited = machine.nvic.waited(PWM);
+    if waited > WAIT {
+        return Ok(Some(format!("the PWM interrupt waits for {:.1} µs", 1e6 * seconds(waited))));
+    }
     if !machine.chip.watchdog.is_running() {
         return Ok(Some("the watchdog does not run".into()));
     }
@@ -164,8 +175,8 @@ fn caught_in(
 
 /// The telemetry's period where it is not the protocol's: by the bus's clock, which is not the drive's.
 fn off_time(rows: &[Vec<String>]) -> Option<String> {
-    let seconds = |row: &Vec<String>| row.first()?.parse::<f64>().ok();
-    let (first, last) = (seconds(rows.first()?)?, seconds(rows.last()?)?);
+    let instant = |row: &Vec<String>| row.first()?.parse::<f64>().ok();
+    let (first, last) = (instant(rows.first()?)?, instant(rows.last()?)?);
     let mean_s = (last - first) / (rows.len() - 1).max(1) as f64;
     let off = (mean_s / TELEMETRY_S - 1.0).abs() > TELEMETRY_SHARE;
     off.then(|| {

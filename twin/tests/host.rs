@@ -1,10 +1,11 @@
-//! The edges at the pins beside those that the drive makes on the host of the same inputs. The image is that which
-//! `TRACTIVE_NUCLEO_IMAGE` names.
+//! The edges at the pins beside those that the drive makes on the host of the same inputs. The images are those which
+//! `TRACTIVE_NUCLEO_IMAGE` and `TRACTIVE_NUCLEO_ZS9_IMAGE` name.
 
 use tractive_rig::talk::System;
 use tractive_twin::replay::Replay;
 use tractive_twin::replay::edges::Compared;
 use tractive_twin::run::{Settings, drive_beside, prepare};
+use tractive_twin::time::{SECOND, Time};
 
 /// A short pull, from standstill.
 const SCRIPT: &str = "\
@@ -14,28 +15,56 @@ const SCRIPT: &str = "\
 0.65 expect mode async
 0.65 end
 ";
+/// The same of both motors.
+const SCRIPT_ZS9: &str = "\
+0.20 charge
+0.70 enable
+1.00 torque 20 -20 over 0.02
+1.10 expect state running
+1.10 end
+";
 
-/// The first compare of leg U: TIM1_CCR1.
+/// The first compare of leg U: TIM1_CCR1; and the compare at which M of leg V goes on again: TIM8_CCR4.
 const COMPARE: u32 = 0x4001_2C34;
+const COMPARE_ZS9: u32 = 0x4001_3440;
+/// A cycle of the core.
+const CYCLE: Time = SECOND / 170_000_000;
 
-fn compared(mistake: Option<fn(u32, u32) -> u32>) -> Compared {
-    let image = std::env::var_os("TRACTIVE_NUCLEO_IMAGE").expect("TRACTIVE_NUCLEO_IMAGE");
-    let settings = Settings::new(image.as_ref(), System::Pmasynrm, SCRIPT.to_owned());
+fn compared(system: System, mistake: Option<fn(u32, u32) -> u32>) -> Compared {
+    let (name, script) = match system {
+        System::Pmasynrm => ("TRACTIVE_NUCLEO_IMAGE", SCRIPT),
+        System::Zs9 => ("TRACTIVE_NUCLEO_ZS9_IMAGE", SCRIPT_ZS9),
+    };
+    let image = std::env::var_os(name).expect(name);
+    let settings = Settings::new(image.as_ref(), system, script.to_owned());
     let (mut cpu, image) = prepare(&settings).unwrap();
     let mut replay = Replay::new(&settings, &image).unwrap();
     let machine = cpu.machine_mut();
     machine.mistake = mistake;
     machine.world.side.charge();
     drive_beside(&mut cpu, Some(&mut replay)).unwrap();
-    replay.compare(cpu.machine())
+    let machine = cpu.machine();
+    assert!(mistake.is_some() || machine.findings.all.is_empty(), "{:?}", machine.findings.all);
+    assert!(mistake.is_some() || machine.world.talk.failures.is_empty(), "{:?}", machine.world.talk.failures);
+    replay.compare(machine)
 }
 
 #[test]
 #[ignore = "needs the image; `cargo xtask test --only twin` builds it"]
 fn the_edges_are_those_of_the_host() {
-    let Compared { edges, all, worst, missed, .. } = compared(None);
+    let Compared { edges, all, worst, missed, .. } = compared(System::Pmasynrm, None);
     assert!(edges > 1_000 && all - edges < 10, "{edges} of {all}");
     assert_eq!((worst, missed), (0, 0));
+}
+
+#[test]
+#[ignore = "needs the image; `cargo xtask test --only twin` builds it"]
+fn the_edges_of_the_zs9_are_those_of_the_host() {
+    let found = compared(System::Zs9, None);
+    let Compared { edges, all, worst, missed, .. } = found;
+    println!("{found:?}");
+    assert!(edges > 50_000 && all == edges, "{found:?}");
+    assert!(worst <= CYCLE && missed == 0, "{found:?}");
 }
 
 #[test]
@@ -45,6 +74,18 @@ fn a_compare_two_ticks_late_is_seen() {
         1..0xFFFF if address == COMPARE => value + 2,
         _ => value,
     };
-    let Compared { missed, first, .. } = compared(Some(late));
+    let Compared { missed, first, .. } = compared(System::Pmasynrm, Some(late));
     assert!(missed > 100 && first.is_some_and(|(gate, _)| gate < 2), "{missed} {first:?}");
+}
+
+#[test]
+#[ignore = "needs the image; `cargo xtask test --only twin` builds it"]
+fn a_compare_of_the_zs9_two_cycles_late_is_seen() {
+    let late = |address, value| match value {
+        1..8_490 if address == COMPARE_ZS9 => value + 2,
+        _ => value,
+    };
+    let Compared { missed, first, .. } = compared(System::Zs9, Some(late));
+    // M of leg V is the fifth gate. It also trips the drive, which sees its gates.
+    assert!(missed > 10 && first.is_some_and(|(gate, _)| gate == 4), "{missed} {first:?}");
 }

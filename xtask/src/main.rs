@@ -9,7 +9,7 @@
 //! | `timing [--json] [--profile [N]]` | instructions per interrupt against `budgets.toml` |
 //! | `live [--out DIR] [--port N] [--no-open]` | builds the live bench and serves it |
 //! | `flash [--board NAME] [--log]` | builds a board's image and flashes it with probe-rs |
-//! | `twin [SCRIPT] [--out DIR]` | builds that image and executes it against a model of its chip |
+//! | `twin [SCENARIO] [--out DIR]` | builds that image and executes it against a model of its chip |
 //! | `mutants [--package NAME] [--shard K/N] [--sample N]` | mutation testing by cargo-mutants |
 //!
 //! Results go to standard output, what the command does on the way to standard error. Exit codes: 0 done; 1 it ran

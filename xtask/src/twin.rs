@@ -17,9 +17,8 @@ const BOARD: &str = "nucleo-g474re";
 /// The folder of the scenarios' scripts, and the scenario that is run unless told otherwise.
 const SCRIPTS: &str = "twin/scripts";
 const SCENARIO: &str = "sweep";
-/// The scenario with a fault, and the time at which its drivers' ready wire drops, in s.
+/// The scenario with a fault.
 const FAULT: &str = "fault";
-const DRIVERS_FAIL_S: &str = "3.4";
 /// The place for the files unless another is named.
 const OUT: &str = "target/tractive/twin";
 
@@ -40,20 +39,29 @@ fn script(scenario: &Path, system: System) -> Result<PathBuf> {
     if scenario.is_file() {
         return Ok(scenario.to_owned());
     }
-    let folder = root().join(SCRIPTS).join(twins_name(system));
-    let file = folder.join(scenario).with_extension("talk");
-    if file.is_file() {
-        return Ok(file);
+    let known = scripts(system)?;
+    let names: Vec<_> = known.iter().map(|script| self::scenario(script)).collect();
+    match known.iter().find(|script| scenario.as_os_str() == &*self::scenario(script)) {
+        Some(file) => Ok(file.clone()),
+        None => bail!("{}: neither a script nor one of {}", scenario.display(), names.join(", ")),
     }
-    let entries = std::fs::read_dir(&folder).with_context(|| folder.display().to_string())?;
-    let mut names: Vec<_> = entries
-        .filter_map(|entry| Some(entry.ok()?.path().file_stem()?.to_string_lossy().into_owned()))
-        .collect();
-    names.sort();
-    bail!("{}: neither a script nor one of {}", scenario.display(), names.join(", "))
 }
 
-/// The step: lints and tests of what no other step sees, then the images through their sweeps. The inner error is what is missing.
+/// The scenario of a script, by its name.
+fn scenario(script: &Path) -> String {
+    script.file_stem().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+/// The scenarios of a system, by their scripts.
+fn scripts(system: System) -> Result<Vec<PathBuf>> {
+    let folder = root().join(SCRIPTS).join(twins_name(system));
+    let entries = std::fs::read_dir(&folder).with_context(|| folder.display().to_string())?;
+    let mut files: Vec<_> = entries.filter_map(|entry| Some(entry.ok()?.path())).collect();
+    files.sort();
+    Ok(files)
+}
+
+/// The step: lints and tests of what no other step sees, then the images through all their scenarios. The inner error is what is missing.
 pub fn check(setup: &mut Setup) -> Result<Result<bool, String>> {
     if !setup.cmake() {
         return Ok(Err(no_cmake()));
@@ -62,9 +70,11 @@ pub fn check(setup: &mut Setup) -> Result<Result<bool, String>> {
     let tidy = !setup.component("clippy", "clippy") || succeeds(twin("clippy").args(lints))?;
     let images = [image(setup, System::Traction)?, image(setup, System::Zs9)?];
     for (system, image) in System::ALL.into_iter().zip(&images) {
-        let out = root().join(OUT).join(twins_name(system));
-        if !(tidy && succeeds(&mut drive(image, system, &script(Path::new(SCENARIO), system)?, &out))?) {
-            return Ok(Ok(false));
+        for script in scripts(system)? {
+            let out = root().join(OUT).join(twins_name(system)).join(scenario(&script));
+            if !(tidy && succeeds(&mut drive(image, system, &script, &out))?) {
+                return Ok(Ok(false));
+            }
         }
     }
     let mut tests = twin("test");
@@ -86,6 +96,14 @@ fn twins_name(system: System) -> &'static str {
     }
 }
 
+/// The time at which the drivers' ready wire drops in the scenario with a fault, in s.
+fn drivers_fail_s(system: System) -> &'static str {
+    match system {
+        System::Traction => "3.4",
+        System::Zs9 => "2.6",
+    }
+}
+
 /// A command of cargo's on the twin.
 fn twin(verb: &str) -> Command {
     let mut command = cargo();
@@ -96,16 +114,16 @@ fn twin(verb: &str) -> Command {
 fn drive(image: &Path, system: System, script: &Path, out: &Path) -> Command {
     say("building the twin …");
     let absolute = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
-    let is = |name: &str| script.file_stem().is_some_and(|stem| stem == name);
+    let is = |name: &str| scenario(script) == name;
     let mut command = twin("run");
     command.args(["--quiet", "--"]);
     command.args([absolute(image), absolute(script)]).args(["--system", twins_name(system)]);
     command.arg("--out").arg(absolute(out));
-    if system == System::Traction && is(SCENARIO) {
+    if is(SCENARIO) {
         command.arg("--host");
     }
     if is(FAULT) {
-        command.args(["--drivers-fail", DRIVERS_FAIL_S]);
+        command.args(["--drivers-fail", drivers_fail_s(system)]);
     }
     command
 }

@@ -200,3 +200,25 @@ pub(super) fn die_on(of: &[Pin]) -> ! {
         cortex_m::asm::nop();
     }
 }
+
+/// The handlers of a firmware that no drive survives: each ends in what is given, which turns all outputs off.
+#[macro_export]
+macro_rules! last_resorts {
+    ($die:path) => {
+        #[cortex_m_rt::exception]
+        unsafe fn HardFault(_frame: &cortex_m_rt::ExceptionFrame) -> ! {
+            $die()
+        }
+
+        /// Any other exception or interrupt: there is none that the drive survives (the clock security system's among them).
+        #[cortex_m_rt::exception]
+        unsafe fn DefaultHandler(_number: i16) -> ! {
+            $die()
+        }
+
+        #[panic_handler]
+        fn panic(_info: &core::panic::PanicInfo) -> ! {
+            $die()
+        }
+    };
+}

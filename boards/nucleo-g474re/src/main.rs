@@ -9,14 +9,13 @@ fn main() {
 
 #[cfg(target_os = "none")]
 mod firmware {
-    use core::sync::atomic::{AtomicU32, Ordering};
-    use cortex_m_rt::{entry, exception, interrupt};
+    use cortex_m_rt::{entry, interrupt};
     use nucleo_g474re::built_in::traction::{BUILT_IN, BuiltIn};
     use nucleo_g474re::patterns::chosen;
     use nucleo_g474re::position::Encoder;
-    use nucleo_g474re::power_stage::{AdcCode, POWER_STAGE};
+    use nucleo_g474re::power_stage::POWER_STAGE;
     use nucleo_g474re::registers::Registers;
-    use nucleo_g474re::sampling::Zeros;
+    use nucleo_g474re::sampling::KeptZeros;
     use nucleo_g474re::start::Plan;
     use nucleo_g474re::{
         self as board, CLOCK, Control, Interrupt as interrupt, POSITION, PULSE, Pwm, SHARED,
@@ -26,8 +25,8 @@ mod firmware {
     use tractive::time::Instant;
 
     /// The zeros that the start measured, written before the interrupts are unmasked.
-    static CONTROL_ZEROS: [AtomicU32; 3] = [const { AtomicU32::new(0) }; 3];
-    static PWM_ZEROS: [AtomicU32; 3] = [const { AtomicU32::new(0) }; 3];
+    static CONTROL_ZEROS: KeptZeros = KeptZeros::new();
+    static PWM_ZEROS: KeptZeros = KeptZeros::new();
 
     const fn settings() -> Settings {
         POWER_STAGE.settings(&BUILT_IN.ratings)
@@ -35,16 +34,6 @@ mod firmware {
 
     // The build script has said so already, by name: a machine with which the drive would not start makes no image.
     const _: () = assert!(settings().check(&BUILT_IN).is_ok());
-
-    fn keep(cells: &[AtomicU32; 3], zeros: Zeros) {
-        for (cell, zero) in cells.iter().zip(zeros) {
-            cell.store(u32::from(zero.0), Ordering::Relaxed);
-        }
-    }
-
-    fn kept(cells: &[AtomicU32; 3]) -> Zeros {
-        cells.each_ref().map(|cell| AdcCode(cell.load(Ordering::Relaxed) as u16))
-    }
 
     #[entry]
     fn main() -> ! {
@@ -55,8 +44,8 @@ mod firmware {
     fn start() -> Result<(), Violation> {
         let plan = Plan { shortest_half_ticks: settings().devices.shortest_half_ticks };
         let found = board::prepare(plan).map_err(|error| error.violation())?;
-        keep(&CONTROL_ZEROS, found.control_zeros);
-        keep(&PWM_ZEROS, found.pwm_zeros);
+        CONTROL_ZEROS.keep(found.control_zeros);
+        PWM_ZEROS.keep(found.pwm_zeros);
         board::run();
         Ok(())
     }
@@ -70,7 +59,7 @@ mod firmware {
         let board = BOARD.get_or_insert_with(|| {
             let registers = Registers::CHIP;
             let encoder = Encoder::new(registers.tim4, &POWER_STAGE, BUILT_IN.ratings.pole_pairs as u32);
-            Control::new(registers, kept(&CONTROL_ZEROS), encoder, &POSITION)
+            Control::new(registers, CONTROL_ZEROS.kept(), encoder, &POSITION)
         });
         TASK.run(board, &SHARED);
         PULSE.control_ran();
@@ -83,26 +72,12 @@ mod firmware {
         static mut BOARD: Option<Pwm> = None;
         static mut TASK: PwmTask<BuiltIn> =
             PwmTask::new(BuiltIn, settings(), Instant(settings().devices.shortest_half_ticks));
-        let board = BOARD.get_or_insert_with(|| Pwm::new(Registers::CHIP, kept(&PWM_ZEROS)));
+        let board = BOARD.get_or_insert_with(|| Pwm::new(Registers::CHIP, PWM_ZEROS.kept()));
         if TASK.run(board, &SHARED) {
             PULSE.pwm_ran();
         }
         nucleo_g474re::complete_stores();
     }
 
-    #[exception]
-    unsafe fn HardFault(_frame: &cortex_m_rt::ExceptionFrame) -> ! {
-        board::die()
-    }
-
-    /// Any other exception or interrupt: there is none that the drive survives (the clock security system's among them).
-    #[exception]
-    unsafe fn DefaultHandler(_number: i16) -> ! {
-        board::die()
-    }
-
-    #[panic_handler]
-    fn panic(_info: &core::panic::PanicInfo) -> ! {
-        board::die()
-    }
+    nucleo_g474re::last_resorts!(board::die);
 }

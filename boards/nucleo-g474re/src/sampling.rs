@@ -10,6 +10,7 @@
 
 use super::power_stage::{AdcCode, PowerStage};
 use super::start::{StartError, Wait};
+use core::sync::atomic::{AtomicU32, Ordering};
 use stm32_metapac::{adc, adccommon};
 use tractive::frames::Abc;
 
@@ -43,6 +44,35 @@ const PATIENCE: u32 = 300;
 
 /// Codes at no current, of U, V, W.
 pub type Zeros = [AdcCode; 3];
+
+/// The zeros that the start measured, for an interrupt that begins with them. Written before the interrupts are unmasked.
+#[derive(Debug)]
+pub struct KeptZeros([AtomicU32; 3]);
+
+impl KeptZeros {
+    /// None yet.
+    pub const fn new() -> Self {
+        Self([const { AtomicU32::new(0) }; 3])
+    }
+
+    /// Keeps them.
+    pub fn keep(&self, zeros: Zeros) {
+        for (cell, zero) in self.0.iter().zip(zeros) {
+            cell.store(u32::from(zero.0), Ordering::Relaxed);
+        }
+    }
+
+    /// Those that are kept.
+    pub fn kept(&self) -> Zeros {
+        self.0.each_ref().map(|cell| AdcCode(cell.load(Ordering::Relaxed) as u16))
+    }
+}
+
+impl Default for KeptZeros {
+    fn default() -> Self {
+        Self::new()
+    }
+}
 
 /// A converter with its sequence.
 #[derive(Clone, Copy)]

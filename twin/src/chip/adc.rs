@@ -80,6 +80,19 @@ const TRIGGERS_345: [&str; 18] = [
 pub const REFERENCE_V: f64 = 3.3;
 const CODES: f64 = 4_096.0;
 
+/// A sampling that a timer started.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Sampling {
+    /// The instant of the timer's event.
+    pub triggered: Time,
+    /// The place in the sequence, from 0.
+    pub rank: u32,
+    /// Its beginning.
+    pub from: Time,
+    /// Its end: the voltage of this instant is converted.
+    pub until: Time,
+}
+
 #[derive(Clone, Copy, Debug)]
 struct Running {
     rank: u32,
@@ -106,6 +119,10 @@ pub struct Adc {
     half: Time,
     running: Option<Running>,
     pending: Option<Time>,
+    /// The timer's event of the sequence that runs.
+    triggered: Option<Time>,
+    /// The samplings so far that a timer started.
+    pub samplings: Vec<Sampling>,
 }
 
 impl Adc {
@@ -128,7 +145,14 @@ impl Adc {
             half: 0,
             running: None,
             pending: None,
+            triggered: None,
+            samplings: Vec::new(),
         }
+    }
+
+    /// Its name.
+    pub fn name(&self) -> &'static str {
+        self.name
     }
 
     /// `true` once it is enabled.
@@ -163,7 +187,7 @@ impl Adc {
             && selected == Some(&event)
             && self.running.is_none()
         {
-            self.pending = Some(now);
+            (self.pending, self.triggered) = (Some(now), Some(now));
         }
     }
 
@@ -173,6 +197,9 @@ impl Adc {
             _ => self.smpr[1] >> (3 * (channel - 10)) & 7,
         };
         let samples = now + SAMPLING[code(self.channel(rank)) as usize] * self.half;
+        if let Some(triggered) = self.triggered {
+            self.samplings.push(Sampling { triggered, rank, from: now, until: samples });
+        }
         self.running =
             Some(Running { rank, samples: Some(samples), ends: samples + CONVERTING * self.half, code: 0 });
     }
@@ -314,7 +341,7 @@ impl Adc {
         if sets(JADSTART) {
             findings.expect(before & ADEN != 0, || format!("{name}: started before it is enabled"));
             if self.jsqr >> 7 & 0b11 == 0 {
-                self.pending = Some(now);
+                (self.pending, self.triggered) = (Some(now), None);
             }
         }
         // What starts something is not taken back by writing 0.

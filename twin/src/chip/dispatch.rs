@@ -2,10 +2,14 @@
 
 use super::Chip;
 use super::adc::Adc;
+use super::bits;
 use crate::finding::Findings;
 use crate::map::{Register, peripherals};
 use crate::time::Time;
 use crate::world::World;
+
+/// ADC12_COMMON.CCR, and ADC345_COMMON's.
+const COMMON_CCR: u32 = 0x08;
 
 impl Chip {
     /// The register of an access, if it may be accessed at all.
@@ -61,8 +65,8 @@ impl Chip {
             "IWDG" => self.watchdog.read(offset, now),
             "FDCAN1" => self.can.read(offset),
             "FDCANRAM1" => self.can.read_ram(offset),
-            "ADC12_COMMON" => Some(self.adcs[0].common),
-            "ADC345_COMMON" => Some(self.adcs[2].common),
+            "ADC12_COMMON" if offset == COMMON_CCR => Some(self.adcs[0].common),
+            "ADC345_COMMON" if offset == COMMON_CCR => Some(self.adcs[2].common),
             "SPI3" => self.spi.read(offset),
             name if name.starts_with("GPIO") => self.gpio.read(name, offset, world),
             name if name.starts_with("COMP") || name.starts_with("DAC") => {
@@ -87,6 +91,10 @@ impl Chip {
         });
         let cycle = self.rcc.cycle();
         let offset = register.offset;
+        let ignored = bits::modelled(peripheral, offset).map_or(0, |bits| value & register.mask & !bits);
+        findings.expect(ignored == 0, || {
+            format!("bits {ignored:#010x} of {name} are written, which the twin does not model")
+        });
         let done = if let Some(timer) = self.timers.iter_mut().find(|timer| timer.name == peripheral) {
             timer.write(offset, value, now, cycle, findings)
         } else if let Some(number) = Self::adc(peripheral) {
@@ -110,19 +118,12 @@ impl Chip {
         findings: &mut Findings,
     ) -> bool {
         match peripheral {
-            "RCC" => self.rcc.write(
-                offset,
-                value,
-                now,
-                self.system.flash_latency(),
-                self.system.is_boosted(),
-                findings,
-            ),
+            "RCC" => self.rcc.write(offset, value, now, self.system.supply(), findings),
             "IWDG" => self.watchdog.write(offset, value, now, findings),
             "FDCAN1" => self.can.write(offset, value, now, self.rcc.can_clock(), findings),
             "FDCANRAM1" => self.can.write_ram(offset, value),
             "SPI3" => self.spi.write(offset, value, now, self.rcc.cycle(), findings),
-            "ADC12_COMMON" | "ADC345_COMMON" => {
+            "ADC12_COMMON" | "ADC345_COMMON" if offset == COMMON_CCR => {
                 let (first, second) = self.adcs.split_at_mut(2);
                 let of = if peripheral == "ADC12_COMMON" { first } else { second };
                 let busy = of.iter().any(Adc::is_enabled);

@@ -36,6 +36,8 @@ pub struct Gpio {
     signals: HashMap<(usize, u8), Vec<Signal>>,
     drivers: [Driver; PINS],
     inputs: Vec<(usize, Signal)>,
+    /// The pins that lead to each timer's break.
+    breaks: [Vec<usize>; TIMERS.len()],
 }
 
 /// A pin's place by its name, as `PB13`.
@@ -70,7 +72,13 @@ impl Gpio {
                 }
             }
         }
-        let mut gpio = Self { words, signals, drivers: [Driver::Analog; PINS], inputs: Vec::new() };
+        let mut gpio = Self {
+            words,
+            signals,
+            drivers: [Driver::Analog; PINS],
+            inputs: Vec::new(),
+            breaks: Default::default(),
+        };
         gpio.connect();
         gpio
     }
@@ -95,6 +103,7 @@ impl Gpio {
                 }
             };
         }
+        self.breaks = TIMERS.map(|(timer, _)| self.leading_to((timer, "BKIN")).collect());
     }
 
     /// The driver of a pin.
@@ -113,10 +122,9 @@ impl Gpio {
         world.level(pin).unwrap_or(pull == 0b01)
     }
 
-    /// The level of a timer's break input; low where no pin leads to it.
-    pub fn break_level(&self, timer: &'static str, world: &World) -> bool {
-        let mut pins = self.leading_to((timer, "BKIN"));
-        pins.any(|pin| self.level(pin, world))
+    /// The level of a timer's break input, by its place in [`TIMERS`]; low where no pin leads to it.
+    pub fn break_level(&self, timer: usize, world: &World) -> bool {
+        self.breaks[timer].iter().any(|pin| self.level(*pin, world))
     }
 
     /// A register is read.

@@ -1,6 +1,7 @@
 //! The chip's peripherals, each in a file of its own, and the wires between them.
 
 pub mod adc;
+mod bits;
 pub mod can;
 pub mod comparators;
 mod dispatch;
@@ -105,7 +106,7 @@ impl Chip {
     pub fn act(&mut self, now: Time, world: &mut World, findings: &mut Findings) {
         self.rcc.act(now);
         self.watchdog.act(now);
-        for timer in &mut self.timers {
+        for timer in self.timers.iter_mut().filter(|timer| timer.is_encoder()) {
             if let Some(tracks) = world.encoder(timer.name, &self.gpio) {
                 timer.follow(tracks);
             }
@@ -121,8 +122,8 @@ impl Chip {
         self.spi.act(now, cycle, &self.gpio, world);
         let seen = self.comparators.see(&self.gpio, world);
         let supply = self.system.breaks(&self.rcc);
-        for timer in &mut self.timers {
-            let pin = self.gpio.break_level(timer.name, world);
+        for (index, timer) in self.timers.iter_mut().enumerate() {
+            let pin = self.gpio.break_level(index, world);
             timer.break_by(pin, seen, supply);
         }
         self.can.act(now, &self.gpio, world);
@@ -159,10 +160,10 @@ impl Chip {
     }
 
     /// The interrupts' lines.
-    pub fn drive_interrupts(&self, nvic: &mut Nvic) {
+    pub fn drive_interrupts(&self, nvic: &mut Nvic, now: Time) {
         for (timer, (_, line)) in self.timers.iter().zip(TIMERS) {
             if let Some(line) = line {
-                nvic.drive(line, timer.interrupts());
+                nvic.drive(line, timer.interrupts(), now);
             }
         }
     }

@@ -45,6 +45,15 @@ pub struct Rcc {
     pub crystal: bool,
 }
 
+/// The conditions of a fast clock: wait states of the flash memory, and a core voltage that is boosted.
+#[derive(Clone, Copy, Debug)]
+pub struct Supply {
+    /// Wait states.
+    pub latency: u32,
+    /// The core voltage is boosted.
+    pub boosted: bool,
+}
+
 impl Default for Rcc {
     fn default() -> Self {
         let reset = [(CR, 0x0500), (CFGR, 0x05), (PLLCFGR, 0x1000), (CCIPR, 0), (CSR, POWER_ON)];
@@ -150,8 +159,7 @@ impl Rcc {
         offset: u32,
         value: u32,
         now: Time,
-        latency: u32,
-        boosted: bool,
+        supply: Supply,
         findings: &mut Findings,
     ) -> bool {
         match offset {
@@ -161,7 +169,7 @@ impl Rcc {
                 findings.expect(!running, || "RCC.PLLCFGR is written while the PLL runs".into());
                 self.words.insert(PLLCFGR, value);
             }
-            CFGR => self.write_configuration(value, now, latency, boosted, findings),
+            CFGR => self.write_configuration(value, now, supply, findings),
             CSR => {
                 let flags = if value & RMVF != 0 { 0 } else { self.word(CSR) & 0xFF80_0000 };
                 self.words.insert(CSR, flags);
@@ -204,14 +212,7 @@ impl Rcc {
         if word & 1 << 24 == 0 { 0 } else { source / m * n / r }
     }
 
-    fn write_configuration(
-        &mut self,
-        value: u32,
-        now: Time,
-        latency: u32,
-        boosted: bool,
-        findings: &mut Findings,
-    ) {
+    fn write_configuration(&mut self, value: u32, now: Time, supply: Supply, findings: &mut Findings) {
         let (before, ready) = (self.word(CFGR), self.word(CR));
         let source = value & 0b11;
         let is_ready = match source {
@@ -241,14 +242,14 @@ impl Rcc {
                 "half the frequency lasted less than a microsecond".into()
             });
         }
-        check_speed(hz, latency, boosted, findings);
+        check_speed(hz, supply, findings);
         self.words.insert(CFGR, value & !0b1100 | source << 2);
         self.core_hz = hz.max(1);
     }
 }
 
 /// Wait states in range 1: one for each 30 MHz without boost, for each 34 MHz with it; beyond 150 MHz only with it (RM0440, 3.3.3, 6.1.5).
-fn check_speed(hz: u32, latency: u32, boosted: bool, findings: &mut Findings) {
+fn check_speed(hz: u32, Supply { latency, boosted }: Supply, findings: &mut Findings) {
     let step_hz = if boosted { 34_000_000 } else { 30_000_000 };
     findings.expect(boosted || hz <= 150_000_000, || {
         format!("{hz} Hz without the voltage that it needs (PWR_CR5.R1MODE)")

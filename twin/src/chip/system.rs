@@ -1,7 +1,7 @@
 //! Supply, flash interface, system configuration and debug (RM0440, chapters 6, 3, 10 and 47): words that are kept, with their reset values
 //! and what they bring about.
 
-use super::rcc::Rcc;
+use super::rcc::{Rcc, Supply};
 use crate::finding::Findings;
 use std::collections::HashMap;
 
@@ -73,14 +73,9 @@ impl System {
         self.word("DBGMCU", offset) >> bit & 1 != 0
     }
 
-    /// Wait states of the flash memory.
-    pub fn flash_latency(&self) -> u32 {
-        self.word("FLASH", 0) & 0xF
-    }
-
-    /// `true` if the core voltage is boosted.
-    pub fn is_boosted(&self) -> bool {
-        self.word("PWR", 0x80) & 1 << 8 == 0
+    /// The conditions of a fast clock.
+    pub fn supply(&self) -> Supply {
+        Supply { latency: self.word("FLASH", 0) & 0xF, boosted: self.word("PWR", 0x80) & 1 << 8 == 0 }
     }
 
     /// `true` while the chip itself breaks its timers: the crystal has stopped, or the supply is low where that is connected.

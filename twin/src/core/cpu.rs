@@ -1,12 +1,12 @@
 //! The processor: instructions by the emulator, exceptions as ARMv7-M has them (DDI 0403E, B1.5).
 
-use super::cost;
+use super::cost::{self, Cost};
 use crate::chip::rcc::IWDGRSTF;
 use crate::image::{FLASH, Image};
-use crate::machine::{Machine, What};
+use crate::machine::{Machine, Waits, What};
 use crate::time::Time;
 use anyhow::{Result, anyhow, bail};
-use std::collections::HashMap;
+use std::collections::BTreeMap;
 use unicorn_engine::{Arch, ArmCpuModel, HookType, Mode, Permission, RegisterARM as R, Unicorn, uc_error};
 
 /// RAM: its address, and the length of SRAM1, SRAM2 and the CCM SRAM's alias (RM0440, memory map).
@@ -59,14 +59,23 @@ pub enum Stop {
     Exception(u32),
 }
 
+/// The longest run of a handler, in cycles.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Longest {
+    /// With no wait for the flash memory.
+    pub cycles: u64,
+    /// With the prefetch alone, and every wait state of the words of tables and literals.
+    pub prefetched: u64,
+    /// With every wait state.
+    pub waited: u64,
+}
+
 /// The processor, with the machine around it.
 pub struct Cpu {
     engine: Unicorn<'static, Machine>,
-    /// The costs of the handlers: cycles at most, by exception.
-    pub longest: HashMap<usize, u64>,
-    entered: Vec<(Time, u64)>,
-    /// The costs of the handlers with every wait state of the flash memory, likewise.
-    pub longest_uncached: HashMap<usize, u64>,
+    /// The costs of the handlers, by exception.
+    pub longest: BTreeMap<usize, Longest>,
+    entered: Vec<(Time, Waits)>,
     /// The vector table's first two words.
     start: (u32, u32),
 }
@@ -103,13 +112,8 @@ impl Cpu {
         let word = |at: usize| u32::from_le_bytes([0, 1, 2, 3].map(|byte| image.flash[at + byte]));
         // After power-up nobody knows what the memory holds.
         engine.mem_write(RAM.0.into(), &vec![PAINT; RAM.1 as usize]).map_err(failed)?;
-        let mut cpu = Self {
-            engine,
-            longest: HashMap::new(),
-            longest_uncached: HashMap::new(),
-            entered: Vec::new(),
-            start: (word(0), word(4)),
-        };
+        let mut cpu =
+            Self { engine, longest: BTreeMap::new(), entered: Vec::new(), start: (word(0), word(4)) };
         cpu.begin()?;
         Ok(cpu)
     }
@@ -250,8 +254,8 @@ impl Cpu {
         self.set(R::XPSR_NZCVQG, 1 << 24 | exception as u32)?;
         let cycles = ENTRY + if floats { FLOAT_CYCLES } else { 0 };
         let machine = self.machine_mut();
-        let vector = machine.nvic.vectors() + 4 * exception as u32;
-        machine.nvic.enter(exception);
+        let (vector, now) = (machine.nvic.vectors() + 4 * exception as u32, machine.now());
+        machine.nvic.enter(exception, now);
         machine.keep(What::Entry);
         machine.pass(cycles);
         let entered = (machine.now(), machine.waits);
@@ -264,16 +268,17 @@ impl Cpu {
     fn leave(&mut self, to: u32) -> Result<()> {
         // The emulator has taken the lowest bit away.
         let (to, floats) = (to | 1, to & NO_FLOAT == 0);
-        let Some(left) = self.machine_mut().nvic.leave() else {
+        let now = self.machine().now();
+        let Some(left) = self.machine_mut().nvic.leave(now) else {
             bail!("a return to {to:#010x} from no exception")
         };
-        let (now, waits) = (self.machine().now(), self.machine().waits);
-        let (since, waited) = self.entered.pop().unwrap_or((now, waits));
+        let waits = self.machine().waits;
+        let (since, before) = self.entered.pop().unwrap_or((now, waits));
         let cycles = (now - since) / self.machine().cycle();
         let longest = self.longest.entry(left).or_default();
-        *longest = (*longest).max(cycles);
-        let uncached = self.longest_uncached.entry(left).or_default();
-        *uncached = (*uncached).max(cycles + waits - waited);
+        longest.cycles = longest.cycles.max(cycles);
+        longest.prefetched = longest.prefetched.max(cycles + waits.prefetched - before.prefetched);
+        longest.waited = longest.waited.max(cycles + waits.all - before.all);
         if (to | NO_FLOAT == TO_THREAD) != self.machine().nvic.active.is_empty() {
             bail!("the exception {left} returns to {to:#010x}");
         }
@@ -321,20 +326,16 @@ impl Cpu {
 /// The emulator tells of every basic block, of exceptions, and of accesses to nowhere.
 fn hook(engine: &mut Unicorn<'static, Machine>, image: &Image) -> Result<(), uc_error> {
     let flash = image.flash.clone();
-    let mut costs = vec![(0_u16, 0_u16); flash.len() / 2];
+    let mut costs = vec![None; flash.len() / 2];
     engine.add_block_hook(1, 0, move |engine, address, size| {
         let at = (address as u32 & 0x07FF_FFFF) as usize;
         let cost = match costs.get_mut(at / 2) {
-            Some(known) if known.0 == 0 => {
-                let code = flash.get(at..at + size as usize).unwrap_or_default();
-                *known = (cost::cycles(code) as u16, cost::waits(at, code.len()) as u16);
-                *known
-            }
-            Some(known) => *known,
-            None => (1, 0),
+            Some(known) => *known
+                .get_or_insert_with(|| cost::of(at, flash.get(at..at + size as usize).unwrap_or_default())),
+            None => Cost { cycles: 1, ..Cost::default() },
         };
         let machine = engine.get_data_mut();
-        if machine.block(address as u32, cost.0.into(), cost.1.into()) {
+        if machine.block(address as u32, cost) {
             // It stops before the block, whose cost is not counted twice.
             let _ = engine.emu_stop();
         }
@@ -344,6 +345,14 @@ fn hook(engine: &mut Unicorn<'static, Machine>, image: &Image) -> Result<(), uc_
         engine.get_data_mut().stop = Some(stop);
         let _ = engine.emu_stop();
     })?;
+    // Tables and literals: each word takes every wait state, as without the data cache.
+    for origin in [0, FLASH.0] {
+        let (from, to) = (u64::from(origin), u64::from(origin + FLASH.1 - 1));
+        engine.add_mem_hook(HookType::MEM_READ, from, to, |engine, _, _, _, _| {
+            engine.get_data_mut().waits.add(cost::WAIT_STATES, cost::WAIT_STATES);
+            true
+        })?;
+    }
     engine.add_mem_hook(HookType::MEM_INVALID, 1, 0, |engine, kind, address, size, _| {
         engine
             .get_data_mut()

@@ -1,6 +1,6 @@
 //! The processor: a Cortex-M4F's instructions by an emulator, its exceptions and its time by what ARMv7-M says.
 
-mod cost;
+pub mod cost;
 pub mod cpu;
 pub mod nvic;
 

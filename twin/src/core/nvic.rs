@@ -1,6 +1,7 @@
 //! The nested vectored interrupt controller and the system control block, after ARMv7-M (DDI 0403E, B3).
 
 use crate::finding::Findings;
+use crate::time::Time;
 
 /// The number of external interrupts that the chip has (RM0440, vector table).
 pub const LINES: usize = 102;
@@ -18,11 +19,15 @@ const IDLE: i32 = 256;
 /// The state.
 #[derive(Debug)]
 pub struct Nvic {
-    enabled: [bool; LINES],
-    pending: [bool; LINES],
+    /// A bit each.
+    enabled: u128,
+    pending: u128,
     /// The lines' own levels: an interrupt whose line is still high when its handler returns comes again.
     lines: [bool; LINES],
     priorities: [u8; LINES],
+    /// The instants since which they could come, and the longest that each has waited from then on.
+    since: [Time; LINES],
+    waited: [Time; LINES],
     /// The processor's own exceptions that are pending: the non-maskable interrupt, the hard fault.
     system: [bool; 2],
     /// The active exceptions, the innermost last.
@@ -35,10 +40,12 @@ pub struct Nvic {
 impl Default for Nvic {
     fn default() -> Self {
         Self {
-            enabled: [false; LINES],
-            pending: [false; LINES],
+            enabled: 0,
+            pending: 0,
             lines: [false; LINES],
             priorities: [0; LINES],
+            since: [0; LINES],
+            waited: [0; LINES],
             system: [false; 2],
             active: Vec::new(),
             cpacr: 0,
@@ -49,11 +56,23 @@ impl Default for Nvic {
 
 impl Nvic {
     /// Sets the level of an interrupt's line; a rising one pends it.
-    pub fn drive(&mut self, line: usize, high: bool) {
+    pub fn drive(&mut self, line: usize, high: bool, now: Time) {
         if high && !self.lines[line] {
-            self.pending[line] = true;
+            self.pend_line(line, now);
         }
         self.lines[line] = high;
+    }
+
+    fn pend_line(&mut self, line: usize, now: Time) {
+        if self.pending >> line & 1 == 0 {
+            self.since[line] = now;
+        }
+        self.pending |= 1 << line;
+    }
+
+    /// The longest time that an interrupt, by its number as an exception, has waited until it began.
+    pub fn waited(&self, exception: usize) -> Time {
+        exception.checked_sub(EXTERNAL).map_or(0, |line| self.waited[line])
     }
 
     /// Pends one of the processor's own exceptions.
@@ -78,43 +97,44 @@ impl Nvic {
         {
             return Some(exception);
         }
-        if primask || !self.pending.contains(&true) {
+        let ready = self.enabled & self.pending;
+        if primask || ready == 0 {
             return None;
         }
-        let ready = (0..LINES).filter(|line| self.enabled[*line] && self.pending[*line]);
+        let ready = (0..LINES).filter(|line| ready >> line & 1 != 0);
         let first = ready.min_by_key(|line| (self.priorities[*line], *line))?;
         (i32::from(self.priorities[first]) < self.running()).then_some(EXTERNAL + first)
     }
 
     /// An exception becomes active.
-    pub fn enter(&mut self, exception: usize) {
+    pub fn enter(&mut self, exception: usize, now: Time) {
         match exception.checked_sub(EXTERNAL) {
-            Some(line) => self.pending[line] = false,
+            Some(line) => {
+                self.pending &= !(1 << line);
+                self.waited[line] = self.waited[line].max(now.saturating_sub(self.since[line]));
+            }
             None => self.system[usize::from(exception == HARD_FAULT)] = false,
         }
         self.active.push(exception);
     }
 
     /// The innermost exception returns.
-    pub fn leave(&mut self) -> Option<usize> {
+    pub fn leave(&mut self, now: Time) -> Option<usize> {
         let left = self.active.pop()?;
         if let Some(line) = left.checked_sub(EXTERNAL)
             && self.lines[line]
         {
-            self.pending[line] = true;
+            self.pend_line(line, now);
         }
         Some(left)
     }
 
     /// A word of the private peripheral bus is read.
     pub fn read(&mut self, address: u32, findings: &mut Findings) -> u32 {
-        let word = |of: &[bool; LINES], from: u32| {
-            let first = (address - from) as usize * 8;
-            (0..32).fold(0, |word, bit| word | u32::from(of.get(first + bit).is_some_and(|bit| *bit)) << bit)
-        };
+        let word = |of: u128, from: u32| (of >> ((address - from) * 8)) as u32;
         match address {
-            0xE000_E100..0xE000_E110 => word(&self.enabled, 0xE000_E100),
-            0xE000_E200..0xE000_E210 => word(&self.pending, 0xE000_E200),
+            0xE000_E100..0xE000_E110 => word(self.enabled, 0xE000_E100),
+            0xE000_E200..0xE000_E210 => word(self.pending, 0xE000_E200),
             // ICSR.VECTACTIVE.
             0xE000_ED04 => self.active.last().map_or(0, |exception| *exception as u32),
             0xE000_ED08 => self.vtor,
@@ -132,6 +152,7 @@ impl Nvic {
 
     /// A word, or for the priorities a byte, of the private peripheral bus is written.
     pub fn write(&mut self, address: u32, size: usize, value: u32, findings: &mut Findings) {
+        let (now, _) = findings.now;
         let lines = |from: u32| {
             let first = (address - from) as usize * 8;
             (0..32)
@@ -140,10 +161,13 @@ impl Nvic {
                 .filter(|line| *line < LINES)
         };
         match address {
-            0xE000_E100..0xE000_E110 => lines(0xE000_E100).for_each(|line| self.enabled[line] = true),
-            0xE000_E180..0xE000_E190 => lines(0xE000_E180).for_each(|line| self.enabled[line] = false),
-            0xE000_E200..0xE000_E210 => lines(0xE000_E200).for_each(|line| self.pending[line] = true),
-            0xE000_E280..0xE000_E290 => lines(0xE000_E280).for_each(|line| self.pending[line] = false),
+            0xE000_E100..0xE000_E110 => lines(0xE000_E100).for_each(|line| {
+                self.enabled |= 1 << line;
+                self.since[line] = now;
+            }),
+            0xE000_E180..0xE000_E190 => lines(0xE000_E180).for_each(|line| self.enabled &= !(1 << line)),
+            0xE000_E200..0xE000_E210 => lines(0xE000_E200).for_each(|line| self.pend_line(line, now)),
+            0xE000_E280..0xE000_E290 => lines(0xE000_E280).for_each(|line| self.pending &= !(1 << line)),
             0xE000_E400..0xE000_E4F0 => {
                 let first = (address - 0xE000_E400) as usize;
                 for (byte, line) in (first..first + size).enumerate().filter(|(_, line)| *line < LINES) {

@@ -74,3 +74,74 @@ fn an_interrupt_between_a_comparison_and_its_use_leaves_the_flags() {
     assert_eq!(left(false), (LESS, 1.0));
     assert_eq!(left(true), (LESS, 1.0));
 }
+
+/// The instructions of a program that writes words to addresses, one after another; last it reads the last address.
+fn writes(of: &[(u32, u32)]) -> Vec<u32> {
+    // ldr r0, its address; ldr r1, the word; str r1, [r0]; a nop. Then ldr r2, [r0]; b to itself.
+    let literals = 2 * of.len() as u32 + 1;
+    let mut words = Vec::new();
+    for index in 0..of.len() as u32 {
+        // A literal's offset counts from the instruction's word on, and a word further.
+        let to_literal = |place: u32, instruction: u32| literals + place - (instruction + 1);
+        let load = |register: u32, words: u32| 0x4800 | register << 8 | words;
+        let (address, value) = (to_literal(2 * index, 2 * index), to_literal(2 * index + 1, 2 * index));
+        words.extend([load(1, value) << 16 | load(0, address), 0xBF00 << 16 | 0x6001]);
+    }
+    words.push(0xE7FE << 16 | 0x6802);
+    words.extend(of.iter().flat_map(|(address, value)| [*address, *value]));
+    words
+}
+
+/// The first offence of a program that writes these words, told.
+fn offence(of: &[(u32, u32)]) -> crate::finding::Finding {
+    let mut words = vec![0; VECTORS];
+    (words[0], words[1]) = (0x2000_1000, 0x0800_0001 + PROGRAM);
+    words.extend(writes(of));
+    let settings = Settings::new(Path::new(""), System::Pmasynrm, "1 end".to_owned());
+    let mut cpu = Cpu::new(&Image::of(&words), machine(&settings).unwrap()).unwrap();
+    // A place outside every region ends the emulator, and is found as well.
+    let outcome = cpu.run(20 * MICROSECOND);
+    let findings = &cpu.machine().findings.all;
+    assert!(outcome.is_ok() || !findings.is_empty(), "{outcome:?}");
+    findings.first().unwrap_or_else(|| panic!("nothing is found of {of:x?}")).clone()
+}
+
+#[test]
+fn an_offence_is_told_with_its_address_and_its_place_in_the_program() {
+    const ENABLE_APB1: (u32, u32) = (0x4002_1058, 0x400 | 1 << 11 | 1);
+    const ENABLE_APB2: (u32, u32) = (0x4002_1060, 1 << 11);
+    const ENABLE_DMA: (u32, u32) = (0x4002_1048, 0x100 | 1);
+    let cases: [(&[(u32, u32)], &str); 13] = [
+        // What the twin does not model: the window watchdog, a DMA channel, the second CAN's clock is off.
+        (
+            &[ENABLE_APB1, (0x4000_2C00, 0xFF)],
+            "WWDG.CR is written with 0x000000ff, which the twin does not model",
+        ),
+        (&[ENABLE_DMA, (0x4002_0008, 1)], "is written with 0x00000001, which the twin does not model"),
+        (&[(0x4000_6818, 0)], "FDCAN2.CCCR is written while its clock is off"),
+        // A bit that is not: the second break's.
+        (
+            &[ENABLE_APB2, (0x4001_2C44, 1 << 24)],
+            "bits 0x01000000 of TIM1.BDTR are written, which the twin does not model",
+        ),
+        // No register there; reserved bits; registers that are only read; halves of a register.
+        (&[(0x4000_5FFC, 0)], "0x40005ffc is written, where the chip has no register"),
+        (&[ENABLE_APB2, (0x4001_2C00, 1 << 15)], "reserved bits 0x00008000 of TIM1.CR1 are written"),
+        (&[(0x4800_0010, 1)], "GPIOA.IDR is written"),
+        // Without a clock; locked; out of its order; too fast; not modelled in the private bus.
+        (&[(0x4001_2C00, 0)], "TIM1.CR1 is written while its clock is off"),
+        (&[(0x4000_3004, 0)], "IWDG is written while it is locked"),
+        (&[(0x4002_1008, 0b11)], "RCC.CFGR switches to clock 3, which is not ready"),
+        (&[(0xE000_E010, 1)], "the private peripheral bus is written at 0xe000e010"),
+        (&[(0x6000_0000, 1)], "at 0x60000000, where nothing is"),
+        (&[(0x0800_0000, 1)], "at 0x08000000"),
+    ];
+    for (of, told) in cases {
+        let finding = offence(of);
+        let text = finding.to_string();
+        assert!(text.to_lowercase().contains(&told.to_lowercase()), "{text}, not {told}");
+        assert!(text.contains(&format!("block {:#010x}", 0x0800_0000 + PROGRAM)), "{text}");
+        let (address, _) = of[of.len() - 1];
+        assert!(text.contains(&format!("{address:#010x}")), "{text}");
+    }
+}

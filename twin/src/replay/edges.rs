@@ -1,12 +1,7 @@
-//! The edges that a sequence of halves puts on the gates' pins, and how far those that were there are off them.
+//! The edges that the host's pulses put on the gates' pins, and how far those that were there are off them.
 
-use super::host::Begun;
 use crate::time::Time;
 use crate::world::Edge;
-use tractive::modulation::Mode;
-
-/// The time after the first half with pulses begins in which software switches the outputs on.
-const SWITCHING_ON: Time = 20 * crate::time::MICROSECOND;
 
 /// The farthest that two edges may be apart to be one.
 const NEARBY: Time = 20 * crate::time::MICROSECOND;
@@ -16,8 +11,8 @@ const NEARBY: Time = 20 * crate::time::MICROSECOND;
 pub struct Scale {
     /// The timers' start.
     pub started: Time,
-    /// A tick of the drive's.
-    pub tick: Time,
+    /// A cycle of the core and of the timers.
+    pub cycle: Time,
     /// The dead time.
     pub dead: Time,
     /// The end of the run.
@@ -39,23 +34,26 @@ pub struct Compared {
     pub first: Option<(usize, Time)>,
 }
 
-/// A span of pulses.
-struct Span {
-    from: Time,
-    until: Time,
-    edges: Vec<Edge>,
+/// A time in which all edges are the pulses'.
+pub struct Span {
+    /// Its beginning.
+    pub from: Time,
+    /// Its end.
+    pub until: Time,
+    /// The host's edges, those of a gate in their order.
+    pub edges: Vec<Edge>,
 }
 
-/// Compares.
-pub fn compare(halves: &[Begun], pins: &[Edge], scale: &Scale) -> Compared {
+/// Compares with so many gates; two edges are the same if a tick at most is between them.
+pub fn compare(spans: &[Span], pins: &[Edge], gates: usize, tick: Time, ended: Time) -> Compared {
     let mut outcome = Compared { all: pins.len(), ..Compared::default() };
-    for span in spans(halves, scale) {
-        let inside = |edge: &&Edge| edge.at >= span.from && edge.at < span.until.min(scale.ended);
-        for gate in 0..6 {
+    for span in spans {
+        let inside = |edge: &&Edge| edge.at >= span.from && edge.at < span.until.min(ended);
+        for gate in 0..gates {
             let of = |edge: &&Edge| edge.gate == gate;
             let wanted: Vec<_> = span.edges.iter().filter(inside).filter(of).collect();
             let found: Vec<_> = pins.iter().filter(inside).filter(of).collect();
-            outcome.take(&wanted, &found, scale.tick);
+            outcome.take(&wanted, &found, tick);
         }
     }
     outcome
@@ -86,39 +84,4 @@ impl Compared {
             }
         }
     }
-}
-
-/// The spans of halves with pulses, and the edges in them: where a leg turns, the device that goes off does so at once, the other one goes
-/// on the dead time later.
-fn spans(halves: &[Begun], scale: &Scale) -> Vec<Span> {
-    let mut spans: Vec<Span> = Vec::new();
-    let mut levels = None;
-    for Begun { begins, half } in halves {
-        let at = |ticks: u32| scale.started + Time::from(begins + ticks) * scale.tick;
-        if half.mode == Mode::Off {
-            levels = None;
-            continue;
-        }
-        let before = levels.unwrap_or_else(|| {
-            spans.push(Span { from: at(0) + SWITCHING_ON, until: at(0), edges: Vec::new() });
-            half.start_levels
-        });
-        let Some(span) = spans.last_mut() else { continue };
-        span.until = at(half.period_ticks);
-        let mut now = before;
-        for (phase, now) in now.iter_mut().enumerate() {
-            let (start, ticks) = (half.start_levels[phase], half.compare_ticks[phase]);
-            let turn = (ticks < half.period_ticks).then_some((!start, ticks));
-            for (level, ticks) in [(start, 0)].into_iter().chain(turn) {
-                if std::mem::replace(now, level) == level {
-                    continue;
-                }
-                let [on, off] = [usize::from(!level), usize::from(level)].map(|lower| 2 * phase + lower);
-                span.edges.push(Edge { at: at(ticks), gate: off, on: false });
-                span.edges.push(Edge { at: at(ticks) + scale.dead, gate: on, on: true });
-            }
-        }
-        levels = Some(now);
-    }
-    spans
 }

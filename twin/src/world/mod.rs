@@ -86,11 +86,13 @@ pub struct World {
     pub talk: Talk,
     /// Every edge of a gate.
     pub edges: Vec<Edge>,
+    /// Every edge of a contactor's, the discharge resistor's and the chopper's pin, by its place in [`Wiring::lines`].
+    pub line_edges: Vec<Edge>,
     /// The drivers are ready.
     pub ready: bool,
     /// Current that flows in a phase besides, in A: past the motor, as to earth. The motor, the phase.
     pub excess_a: (usize, usize, f64),
-    /// The instant at which the drivers' ready wire drops for [`DROP`].
+    /// The instant at which the drivers' ready wire drops for 10 ms.
     pub drops: Option<Time>,
     /// The encoders' wires are cut.
     pub cut: bool,
@@ -112,6 +114,7 @@ pub struct World {
     next_slot: Time,
     outbox: Vec<(Time, Frame)>,
     pins: Vec<usize>,
+    lines: Vec<(usize, bool)>,
     leg_of: Vec<&'static [usize]>,
     shift: ShiftRegister,
     illegal: Option<String>,
@@ -130,6 +133,7 @@ impl World {
             side,
             talk,
             edges: Vec::new(),
+            line_edges: Vec::new(),
             ready: true,
             drops: None,
             cut: false,
@@ -149,6 +153,7 @@ impl World {
             next_slot: 0,
             outbox: Vec::new(),
             pins: wiring.gates.iter().map(|(pin, _)| place(pin)).collect(),
+            lines: wiring.lines().map(|pin| (place(pin), false)).collect(),
             leg_of: (0..count).map(leg).collect(),
             shift: ShiftRegister::default(),
             illegal: None,
@@ -190,6 +195,12 @@ impl World {
     /// Switchgear, and the vehicle's computer once in a slot.
     pub fn act(&mut self, now: Time, chip: &mut Chip) {
         let on = |pin: &str| Self::is_high(place(pin), chip, now);
+        for (gate, (pin, was)) in self.lines.iter_mut().enumerate() {
+            let on = Self::is_high(*pin, chip, now);
+            if std::mem::replace(was, on) != on {
+                self.line_edges.push(Edge { at: now, gate, on });
+            }
+        }
         for (contactor, pin) in self.contactors.iter_mut().zip(self.wiring.contactors) {
             contactor.act(on(pin), now);
         }
@@ -318,6 +329,11 @@ impl World {
     /// `true` while any gate is on.
     pub fn any_gate(&self) -> bool {
         self.gates.contains(&true)
+    }
+
+    /// `true` while a contactor, the discharge resistor or the chopper is switched on.
+    pub fn any_line(&self) -> bool {
+        self.lines.iter().any(|(_, on)| *on)
     }
 
     /// The level that somebody outside gives a pin.

@@ -52,6 +52,13 @@ pub struct Wiring {
     pub feedback: Option<(&'static str, [(&'static str, &'static str); 2])>,
 }
 
+impl Wiring {
+    /// The pins of contactors, discharge resistor and chopper.
+    pub fn lines(&self) -> impl Iterator<Item = &'static str> {
+        self.contactors.into_iter().chain([self.discharge]).chain(self.chopper)
+    }
+}
+
 /// The transceiver's pins, of either.
 pub const BUS: [(&str, &str); 2] = [("PA11", "RX"), ("PA12", "TX")];
 

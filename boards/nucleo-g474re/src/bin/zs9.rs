@@ -12,7 +12,7 @@ fn main() {
 #[cfg(target_os = "none")]
 mod firmware {
     use core::sync::atomic::{AtomicU32, Ordering};
-    use cortex_m_rt::{entry, exception, interrupt};
+    use cortex_m_rt::{entry, interrupt};
     use nucleo_g474re::built_in::zs9::{BUILT_IN, BuiltIn};
     use nucleo_g474re::position::Encoder;
     use nucleo_g474re::power_stage::{AdcCode, PowerStage};
@@ -88,19 +88,5 @@ mod firmware {
         nucleo_g474re::complete_stores();
     }
 
-    #[exception]
-    unsafe fn HardFault(_frame: &cortex_m_rt::ExceptionFrame) -> ! {
-        board::die()
-    }
-
-    /// Any other exception or interrupt: there is none that the drive survives (the clock security system's among them).
-    #[exception]
-    unsafe fn DefaultHandler(_number: i16) -> ! {
-        board::die()
-    }
-
-    #[panic_handler]
-    fn panic(_info: &core::panic::PanicInfo) -> ! {
-        board::die()
-    }
+    nucleo_g474re::last_resorts!(board::die);
 }

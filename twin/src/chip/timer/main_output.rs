@@ -14,7 +14,7 @@ impl Timer {
     /// The inputs of the break: the level of the pin, the comparators that see their threshold crossed, and the chip's own.
     pub fn break_by(&mut self, pin: bool, comparators: u32, chip: bool) {
         let (af1, bdtr) = (self.word(AF1), self.word(BDTR));
-        if !self.has_outputs() || bdtr & BKE == 0 {
+        if !self.has_outputs || bdtr & BKE == 0 {
             self.broken = (false, false);
             return;
         }

@@ -73,6 +73,8 @@ struct Shadow {
 pub struct Timer {
     /// Its name.
     pub name: &'static str,
+    /// It has gates, and a break.
+    has_outputs: bool,
     words: [u32; 32],
     shadow: Shadow,
     /// The position in the period, and the instant at which it was reached. Counting up and down, the way down follows the way up.
@@ -94,9 +96,12 @@ impl Timer {
     pub fn new(name: &'static str) -> Self {
         let mut words = [0; 32];
         let widest = if name == "TIM2" { u32::MAX } else { 0xFFFF };
-        (words[ARR / 4], words[AF1 / 4]) = (widest, 1);
+        words[ARR / 4] = widest;
+        let has_outputs = ["TIM1", "TIM8", "TIM17", "TIM20"].contains(&name);
+        words[AF1 / 4] = u32::from(has_outputs);
         Self {
             name,
+            has_outputs,
             words,
             shadow: Shadow { prescaler: 0, reload: widest, compares: [0; 4] },
             base: (0, 0),
@@ -110,15 +115,12 @@ impl Timer {
         }
     }
 
-    fn has_outputs(&self) -> bool {
-        ["TIM1", "TIM8", "TIM17", "TIM20"].contains(&self.name)
-    }
-
     fn word(&self, register: usize) -> u32 {
         self.words[register / 4]
     }
 
-    fn is_encoder(&self) -> bool {
+    /// It counts an encoder's tracks.
+    pub fn is_encoder(&self) -> bool {
         self.mode() == 3
     }
 
@@ -253,7 +255,7 @@ impl Timer {
     }
 
     fn refer(&mut self, now: Time, cycle: Time) {
-        if !self.has_outputs() {
+        if !self.has_outputs {
             return;
         }
         let stand = self.stand(self.position(now, cycle));
@@ -274,7 +276,7 @@ impl Timer {
         let mut next = Time::MAX;
         if self.is_running() {
             let tick = self.tick(cycle);
-            let compares = (0..if self.has_outputs() { 4 } else { 0 }).map(|channel| self.compare(channel));
+            let compares = (0..if self.has_outputs { 4 } else { 0 }).map(|channel| self.compare(channel));
             let reload = self.reload();
             let mut look = |threshold: u32| {
                 if threshold > self.base.0 {
@@ -362,7 +364,7 @@ impl Timer {
                 self.words[SMCR / 4] = value;
             }
             ARR if self.word(CR1) & ARPE == 0 => {
-                let moves = self.has_outputs() && self.is_running() && value != self.shadow.reload;
+                let moves = self.has_outputs && self.is_running() && value != self.shadow.reload;
                 findings.expect(!moves, || {
                     format!(
                         "{}.ARR is changed within a period of its outputs: it is not preloaded",

@@ -1,19 +1,24 @@
-//! The drive's tasks on the host, given what the image's were given.
+//! The PMaSynRM's tasks on the host, and the edges of the halves that they play.
 
+use super::edges::{Scale, Span};
 use super::given::Given;
+use super::{CORE_HZ, Commands, Tasks, WORDS};
+use crate::time::Time;
+use crate::world::Edge;
 use tractive::control::{Demand, Gains, LinkWindow};
 use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
 use tractive::frames::{Abc, Angle};
 use tractive::machine::Tables;
-use tractive::modulation::{CarrierHalf, SwitchLimits};
+use tractive::modulation::{CarrierHalf, Mode, SwitchLimits};
 use tractive::ports::{ControlPort, DriveCommand, PwmPort, Report, Sample};
 use tractive::protection::SafeState;
 use tractive::time::{Clock, Instant};
 
-/// The core's clock, in Hz.
-const CORE_HZ: u32 = 170_000_000;
 /// Cycles of a tick at most.
 const COARSEST: u32 = 8;
+
+/// The time after the first half with pulses begins in which software switches the outputs on.
+const SWITCHING_ON: Time = 20 * crate::time::MICROSECOND;
 
 /// The power stage's file.
 #[derive(Clone, Debug, serde::Deserialize)]
@@ -31,7 +36,7 @@ pub struct Stage {
 
 impl Stage {
     /// Cycles of a tick of the drive's.
-    pub fn prescaler(&self) -> u32 {
+    fn prescaler(&self) -> u32 {
         let period = CORE_HZ / self.control_hz;
         (1..=COARSEST).rev().find(|cycles| period.is_multiple_of(*cycles)).unwrap_or(1)
     }
@@ -52,11 +57,10 @@ impl Stage {
 
 /// A half, and the instant at which it begins.
 #[derive(Clone, Copy, Debug)]
-pub struct Begun {
+struct Begun {
     /// Ticks since the timers' start.
-    pub begins: u32,
-    /// The half.
-    pub half: CarrierHalf,
+    begins: u32,
+    half: CarrierHalf,
 }
 
 /// Both tasks.
@@ -65,8 +69,9 @@ pub struct Host {
     pwm: PwmTask,
     shared: Shared<'static>,
     board: Board,
+    tick_cycles: u32,
     /// The halves so far.
-    pub halves: Vec<Begun>,
+    halves: Vec<Begun>,
 }
 
 /// The sensors' scales, the encoder, and the commands.
@@ -79,58 +84,95 @@ struct Board {
     /// The index has passed in the call before; the angle is known.
     passed: bool,
     known: bool,
-    commands: Vec<(Instant, DriveCommand)>,
+    commands: Commands<DriveCommand>,
 }
 
 impl Host {
-    /// At rest. The zeros are those that the image has measured, of control's converter and of the PWM's.
-    pub fn new(stage: &Stage, tables: &'static Tables, zeros: [[u32; 3]; 2]) -> Self {
+    /// At rest. The zeros are those of control's converter and of the PWM's.
+    pub fn new(stage: &Stage, tables: &'static Tables, zeros: &[u32]) -> Self {
         let settings = stage.settings(tables.ratings.max_switching_hz);
         let turns = (tables.ratings.pole_pairs as u64) << 32;
         let degrees = stage.encoder_zeros_deg[0] / 360.0 * 2f64.powi(32);
+        let zero = |index: usize| zeros.get(index).copied().unwrap_or(0);
         let board = Board {
-            zeros,
+            zeros: [[zero(0), zero(1), zero(2)], [zero(3), zero(4), zero(5)]],
             a_per_code: stage.current_range_a as f32 / 2_048.0,
             v_per_code: stage.dc_link_range_v as f32 / 4_095.0,
             units_per_count: ((turns + stage.encoder_counts / 2) / stage.encoder_counts) as u32,
             zero: Angle(degrees.round() as i64 as u32),
             passed: false,
             known: false,
-            commands: Vec::new(),
+            commands: Commands(Vec::new()),
         };
         Self {
             control: ControlTask::new(tables, settings, Instant(settings.clock.control_ticks)),
             pwm: PwmTask::new(tables, settings, Instant(settings.devices.shortest_half_ticks)),
             shared: Shared::new(),
             board,
+            tick_cycles: stage.prescaler(),
             halves: Vec::new(),
         }
     }
+}
 
-    /// A command of the operator's mailbox, by its words, as the image's idle loop has left it there.
-    pub fn command(&mut self, [from, flags, torque, window @ ..]: [u32; 7]) {
+impl Tasks for Host {
+    fn command(&mut self, [from, flags, torque, window @ ..]: [u32; WORDS]) {
         let [motoring_none_v, motoring_full_v, braking_full_v, braking_none_v] = window.map(f32::from_bits);
-        let from = Instant(from);
-        if self.board.commands.iter().rev().any(|(known, _)| *known == from) {
-            return;
-        }
-        let command = DriveCommand {
+        self.board.commands.add(from, || DriveCommand {
             enable: flags & 1 != 0,
             demand: Demand { torque_nm: f32::from_bits(torque), slew_limited: flags & 2 != 0 },
             window: LinkWindow { motoring_none_v, motoring_full_v, braking_full_v, braking_none_v },
             acknowledge: (flags >> 8) as u8,
-        };
-        self.board.commands.push((from, command));
+        });
     }
 
-    /// An interrupt.
-    pub fn run(&mut self, given: &Given) {
-        let Self { control, pwm, shared, board, halves } = self;
+    fn run(&mut self, given: &Given) {
+        let Self { control, pwm, shared, board, halves, .. } = self;
         if given.control {
             control.run(&mut ControlSide { given, board, pwm, shared, halves }, shared);
         } else {
-            play(pwm, shared, halves, board.currents(1, [1, 2, 3].map(|rank| given.codes[rank])), true);
+            let [_, codes, _] = given.codes;
+            play(pwm, shared, halves, board.currents(1, [1, 2, 3].map(|rank| codes[rank])), true);
         }
+    }
+
+    /// The edges of each half with pulses: where a leg turns, the device that goes off does so at once, the other one goes on the dead time later.
+    fn spans(&self, scale: &Scale) -> Vec<Span> {
+        let tick = scale.cycle * Time::from(self.tick_cycles);
+        let mut spans: Vec<Span> = Vec::new();
+        let mut levels = None;
+        for Begun { begins, half } in &self.halves {
+            let at = |ticks: u32| scale.started + Time::from(begins + ticks) * tick;
+            if half.mode == Mode::Off {
+                levels = None;
+                continue;
+            }
+            let before = levels.unwrap_or_else(|| {
+                spans.push(Span { from: at(0) + SWITCHING_ON, until: at(0), edges: Vec::new() });
+                half.start_levels
+            });
+            let Some(span) = spans.last_mut() else { continue };
+            span.until = at(half.period_ticks);
+            let mut now = before;
+            for (phase, now) in now.iter_mut().enumerate() {
+                let (start, ticks) = (half.start_levels[phase], half.compare_ticks[phase]);
+                let turn = (ticks < half.period_ticks).then_some((!start, ticks));
+                for (level, ticks) in [(start, 0)].into_iter().chain(turn) {
+                    if std::mem::replace(now, level) == level {
+                        continue;
+                    }
+                    let [on, off] = [usize::from(!level), usize::from(level)].map(|lower| 2 * phase + lower);
+                    span.edges.push(Edge { at: at(ticks), gate: off, on: false });
+                    span.edges.push(Edge { at: at(ticks) + scale.dead, gate: on, on: true });
+                }
+            }
+            levels = Some(now);
+        }
+        spans
+    }
+
+    fn tick_cycles(&self) -> u32 {
+        self.tick_cycles
     }
 }
 
@@ -154,9 +196,10 @@ impl Board {
     }
 
     fn angle(&mut self, given: &Given) -> Option<Angle> {
-        let passed = std::mem::replace(&mut self.passed, given.index);
+        let [encoder, _] = given.encoders;
+        let passed = std::mem::replace(&mut self.passed, encoder.index);
         self.known |= passed;
-        self.known.then(|| Angle(given.count.wrapping_mul(self.units_per_count)) + self.zero)
+        self.known.then(|| Angle(encoder.count.wrapping_mul(self.units_per_count)) + self.zero)
     }
 }
 
@@ -176,7 +219,7 @@ impl ControlPort for ControlSide<'_> {
     }
 
     fn sample(&mut self, _now: Instant) -> Sample {
-        let [u, v, w, link] = self.given.codes;
+        let [[u, v, w, link], ..] = self.given.codes;
         Sample {
             currents_a: self.board.currents(0, [u, v, w]),
             udc_v: link as f32 * self.board.v_per_code,
@@ -187,8 +230,7 @@ impl ControlPort for ControlSide<'_> {
     }
 
     fn command(&mut self, now: Instant, _operator: impl FnOnce() -> DriveCommand) -> DriveCommand {
-        let mut held = self.board.commands.iter().rev().filter(|(from, _)| now.reached(*from));
-        held.next().map_or_else(DriveCommand::default, |(_, command)| *command)
+        self.board.commands.at(now)
     }
 
     fn enter(&mut self, _safe: SafeState, _now: Instant) {}
