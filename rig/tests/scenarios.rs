@@ -119,6 +119,9 @@ fn characteristic_currents_are_the_ratings() {
     for point in points {
         assert!(point["current_rms_a"].as_f64().unwrap() < 165.0, "{point}");
     }
+    // The rated point does not need the voltage of square wave; full power at the same speed does.
+    let modes: Vec<_> = points[5..].iter().map(|point| point["mode"].as_str().unwrap()).collect();
+    assert_eq!(modes, ["mid3", "square"]);
 }
 
 #[test]

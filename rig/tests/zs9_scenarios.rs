@@ -1,5 +1,6 @@
 //! The ZS9's scenarios on the host, held against their bounds.
 
+use rayon::prelude::*;
 use serde_json::Value;
 use tractive_rig::analysis::Figures;
 use tractive_rig::rows::mean;
@@ -42,6 +43,35 @@ fn disturbance(with: &Recording, without: &Recording) -> (f64, f64) {
     )
 }
 
+/// Every scenario judges itself by so many bounds, and keeps them.
+#[test]
+fn every_scenario_has_bounds_and_keeps_them() {
+    const BOUNDS: [(&str, usize); 10] = [
+        ("zs9-load-step", 4),
+        ("zs9-load-step --carrier-hz 20000 --uin 800", 4),
+        ("zs9-reverse", 3),
+        ("zs9-cycle", 4),
+        ("zs9-cycle --second other --cruise 8", 5),
+        ("zs9-steady --scheme s", 3),
+        ("zs9-steady --scheme rs", 3),
+        ("zs9-steady --scheme rthd", 3),
+        ("zs9-steady --scheme zvo", 3),
+        ("zs9-timing", 2),
+    ];
+    let judged = |name: &str| BOUNDS.iter().any(|(line, _)| line.split(' ').next() == Some(name));
+    let forgotten: Vec<_> = catalogue::names()
+        .map(|(name, _)| name)
+        .filter(|name| name.starts_with("zs9") && !judged(name))
+        .collect();
+    assert!(forgotten.is_empty(), "{forgotten:?}");
+    BOUNDS.into_par_iter().for_each(|(line, bounds)| {
+        let outcome = run(line);
+        let verdicts = outcome.figures.get("verdicts").and_then(Value::as_array).unwrap();
+        let of = |word: &str| verdicts.iter().filter(|verdict| verdict["verdict"] == word).count();
+        assert_eq!((of("pass"), of("reported")), (bounds, verdicts.len() - bounds), "{line}: {verdicts:#?}");
+    });
+}
+
 /// A load step against the run without one: motor 1's disturbance, motor 2's recovery in ms, the link's deviation in percent.
 fn load_step(options: &str) -> (f64, f64, f64, f64) {
     let with = run(&format!("zs9-load-step{options}"));
@@ -68,6 +98,24 @@ fn a_faster_carrier_and_more_shoot_through_do_better() {
     assert!(back_ms <= 12.0 && link_percent <= 0.5, "{back_ms} ms, {link_percent} %");
 }
 
+/// A line of README's table.
+fn is_in_readme(line: &str) {
+    const README: &str = include_str!("../../README.md");
+    assert!(README.lines().any(|one| one == line), "README.md has no line\n{line}");
+}
+
+#[test]
+fn the_readme_says_how_little_a_motor_feels_of_the_other() {
+    let [slow, fast] = ["", " --carrier-hz 20000 --uin 800"].map(load_step);
+    let ((torque, speed, back, link), (torque_fast, speed_fast, back_fast, link_fast)) = (slow, fast);
+    is_in_readme(&format!(
+        "| motor 2's load 60 → 100 N·m: motor 1's torque moves by | {torque:.4} N·m | {torque_fast:.4} N·m |"
+    ));
+    is_in_readme(&format!("| … its speed by | {speed:.5} r/min | {speed_fast:.5} r/min |"));
+    is_in_readme(&format!("| motor 2 within 0.2 % again after | {back:.1} ms | {back_fast:.1} ms |"));
+    is_in_readme(&format!("| link voltage within | ±{link:.2} % | ±{link_fast:.2} % |"));
+}
+
 #[test]
 fn every_scheme_takes_the_load_step() {
     for scheme in ["s", "rs", "zvo", "rthd-central", "rthd-slide"] {
@@ -89,6 +137,9 @@ fn motor_1_holds_while_motor_2_reverses() {
     let (torque_nm, speed_rpm) = disturbance(&with.recording, &without.recording);
     println!("{torque_nm:.4} N·m, {speed_rpm:.5} r/min");
     assert!(torque_nm <= 0.01 && speed_rpm <= 0.001, "{torque_nm} N·m, {speed_rpm} r/min");
+    is_in_readme(&format!(
+        "| motor 2 reverses: motor 1 moves by | {torque_nm:.3} N·m, {speed_rpm:.4} r/min | |"
+    ));
     assert!(figure(&with, "motor2_speed_error_rms_rpm") <= 1.6);
     assert!((figure(&with, "motor2_speed_rpm") + 800.0).abs() < 0.01);
     assert!((figure(&with, "motor1_speed_rpm") - 800.0).abs() < 0.01);
@@ -115,6 +166,11 @@ fn the_cycle_goes_up_and_back_and_returns_energy() {
     assert!(figure(&outcome, "returned_percent") >= 75.0);
     assert!(figure(&outcome, "power_residual_percent") < 0.1);
     assert!(figure(&outcome, "link_deviation_percent") < 0.5);
+    let [returned, over] =
+        ["returned_percent", "capacitor_overshoot_percent"].map(|name| figure(&outcome, name));
+    is_in_readme(&format!(
+        "| cycle: energy returned, capacitor overshoot | {returned:.0} %, {over:.2} % | |"
+    ));
 }
 
 #[test]
@@ -231,7 +287,38 @@ fn dead_time_is_kept_and_stops_nothing() {
     }
 }
 
-/// Without compensation the motors give 53.0 to 59.8 N·m, with 3.1 to 5.1 % of THD.
+/// The guide's table: torque and distortion with the dead time, distortion without it, and both where nothing makes up for it.
+#[test]
+fn the_guide_says_what_dead_time_costs_with_and_without_compensation() {
+    const PAGE: &str = include_str!("../../docs/papers.md");
+    ["s", "rs", "rthd", "zvo"].into_par_iter().for_each(|scheme| {
+        let of = |options: &str| {
+            let outcome = run(&format!("zs9-steady --scheme {scheme}{options}"));
+            let names = ["torque1_nm", "torque2_nm", "thd1_percent", "thd2_percent"];
+            let trip = outcome.recording.trip().map(|trip| trip.fault.name());
+            trip.map_or(Ok(names.map(|name| figure(&outcome, name))), Err)
+        };
+        let [_, _, ideal1, ideal2] = of("").unwrap();
+        let [torque1, torque2, thd1, thd2] = of(" --dead-time-us 5").unwrap();
+        let left = match of(" --dead-time-us 5 --uncompensated") {
+            Ok([torque1, torque2, thd1, thd2]) => {
+                format!("{torque1:.2}, {torque2:.2} N·m; {thd1:.2}, {thd2:.2} %")
+            }
+            Err(fault) => format!("trips: `{fault}`"),
+        };
+        let line = format!(
+            "| {} | {torque1:.2}, {torque2:.2} | {thd1:.2}, {thd2:.2} | {ideal1:.2}, {ideal2:.2} | {left} |",
+            scheme.to_uppercase()
+        );
+        assert!(PAGE.lines().any(|one| one == line), "docs/papers.md has no line\n{line}");
+    });
+    let central = run("zs9-steady --scheme rthd-central --dead-time-us 5");
+    let [torque1, torque2, thd1, thd2] =
+        ["torque1_nm", "torque2_nm", "thd1_percent", "thd2_percent"].map(|name| figure(&central, name));
+    let told = format!("{torque1:.2} and {torque2:.2} N·m, with {thd1:.2} and {thd2:.2} %");
+    assert!(PAGE.contains(&told), "docs/papers.md does not say {told}");
+}
+
 #[test]
 fn dead_time_is_made_up_for() {
     for law in ["tractive", "pi"] {
