@@ -266,6 +266,31 @@ fn figures_and_equations_that_are_named_are_ones_of_the_papers() {
     assert_eq!(numbers_after("Equations (7)–(13), equation (3)", "equation"), [7, 13, 3]);
 }
 
+/// The calls of a trait in a source, as a page has them: name and parameters without `self`, types and the mark of what is not used.
+fn calls(source: &str, port: &str) -> BTreeSet<String> {
+    let (_, body) = source.split_once(&format!("pub trait {port}<")).unwrap();
+    let body = body.split("\n}").next().unwrap();
+    let call = |declared: &str| {
+        let (name, rest) = declared.split_once('(').unwrap();
+        let parameters = rest.split(", ").filter_map(|one| one.split_once(": ").map(|(name, _)| name));
+        let parameters: Vec<_> = parameters.map(|name| name.trim_start_matches('_')).collect();
+        format!("{name}({})", parameters.join(", "))
+    };
+    body.lines().filter_map(|line| line.trim().strip_prefix("fn ")).map(call).collect()
+}
+
+#[test]
+fn the_page_on_boards_has_every_call_of_the_ports() {
+    let (text, ports, slot) =
+        (read("docs/own-board.md"), read("src/ports/mod.rs"), read("src/operator/slot.rs"));
+    for (port, source) in [("ControlPort", &ports), ("PwmPort", &ports), ("OperatorPort", &slot)] {
+        let (_, table) = text.split_once(&format!("| `{port}` |")).unwrap();
+        let rows = table.lines().skip(2).take_while(|line| line.starts_with('|'));
+        let told: BTreeSet<_> = rows.map(|row| spans(row).next().unwrap().to_owned()).collect();
+        assert_eq!(told, calls(source, port), "{port}");
+    }
+}
+
 /// The anchors of a page's headings.
 fn anchors(text: &str) -> BTreeSet<String> {
     let headings = text.lines().filter(|line| line.starts_with('#'));
