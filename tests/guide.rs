@@ -291,6 +291,26 @@ fn the_page_on_boards_has_every_call_of_the_ports() {
     }
 }
 
+#[test]
+fn the_page_on_machines_has_every_key_of_machine_toml() {
+    let (text, source) = (read("docs/own-machine.md"), read("tablegen/src/parameters.rs"));
+    let (_, body) = source.split_once("\nparameters! {").unwrap();
+    let body = body.split("\n}").next().unwrap();
+    let declared = body.lines().filter_map(|line| line.trim().strip_suffix(';')?.split_once(": "));
+    let declared: Vec<_> = declared.collect();
+    let rows = rows(&text, "The files");
+    let told: BTreeSet<_> = rows.iter().flat_map(|row| spans(row[0].1)).collect();
+    let keys: BTreeSet<_> =
+        declared.iter().map(|(key, _)| *key).chain(["name", "pole_pairs", "patterns"]).collect();
+    assert_eq!(told, keys);
+    for (key, rest) in declared.iter().filter(|(key, _)| key.starts_with("trip_")) {
+        let (factor, of) = rest.rsplit(", ").next().unwrap().split_once(" * ").unwrap();
+        let row = rows.iter().find(|row| row[0].1.contains(key)).unwrap();
+        let default = format!("{factor} × `{of}`");
+        assert!(cell(row, "what").ends_with(&default), "{key}: {default}");
+    }
+}
+
 /// The anchors of a page's headings.
 fn anchors(text: &str) -> BTreeSet<String> {
     let headings = text.lines().filter(|line| line.starts_with('#'));
