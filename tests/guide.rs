@@ -91,6 +91,11 @@ fn complaints(rows: &[Row]) -> Vec<String> {
         if spans(cell(row, "code")).next().is_none() && reason.len() < 20 {
             found.push(format!("{:?} has neither a place nor a reason", row[0].1));
         }
+        if spans(cell(row, "code")).next().is_some()
+            && ["seen", "test"].iter().all(|column| cell(row, column).len() < 4)
+        {
+            found.push(format!("{:?} is nowhere to be seen", row[0].1));
+        }
         found
     };
     rows.iter().flat_map(of).collect()
@@ -134,6 +139,10 @@ fn the_page_on_the_papers_has_every_equation_table_and_figure() {
         format!("k = {} (`observer`)", gains.observer),
         format!("1/k = {} halves", (1.0 / gains.observer).round()),
         format!("{} rad/s (`pattern_rad_s`)", gains.pattern_rad_s),
+        format!(
+            "{} the stator's frequency (`square_damping`)",
+            if gains.square_damping == 0.5 { "half" } else { "not" }
+        ),
     ];
     let text = text.replace('\n', " ");
     assert!(told.iter().all(|part| text.contains(part)), "{told:?}");
@@ -196,37 +205,110 @@ fn every_message_of_troubleshooting_is_one_that_the_code_prints() {
     assert!(seen.len() > 40 && parts.len() > 50 && wrong.is_empty(), "{} rows, {wrong:#?}", seen.len());
 }
 
-/// The numbers that follow the word figure, or figures, in a text.
-fn figures_named(text: &str) -> Vec<u32> {
+/// The numbers that follow a word, or its plural, in a text: `figures 14–16, 18 and 19`, `figure 9a`, `equations (7) to (13)`.
+fn numbers_after(text: &str, word: &str) -> Vec<u32> {
     let text = text.to_lowercase();
-    let after = text.split("figure").skip(1).map(|rest| rest.strip_prefix('s').unwrap_or(rest));
-    let is_list = |word: &&str| word.parse::<u32>().is_ok() || ["to", "and"].contains(word);
+    let after = text.split(word).skip(1).map(|rest| rest.strip_prefix('s').unwrap_or(rest));
+    let number = |word: &&str| word.trim_end_matches(['a', 'b', 'c', 'd']).parse::<u32>().ok();
     let list = |rest: &str| {
-        let words: Vec<_> =
-            rest.split([' ', ',', '"', ':', '.', ')']).filter(|word| !word.is_empty()).collect();
-        let list: Vec<_> = words.into_iter().take_while(is_list).collect();
-        list.iter().filter_map(|word| word.parse().ok()).collect::<Vec<_>>()
+        let between = |letter: char| " ,\":.()–*`".contains(letter);
+        let words: Vec<_> = rest.split(between).filter(|word| !word.is_empty()).collect();
+        let list = words.iter().take_while(|word| number(word).is_some() || ["to", "and"].contains(word));
+        list.filter_map(number).collect::<Vec<_>>()
     };
     after.filter(|rest| rest.starts_with(' ')).flat_map(list).collect()
 }
 
-#[test]
-fn figures_that_are_named_are_ones_of_the_papers() {
-    // Of the first paper alone, and of either.
-    for (folder, most) in [
-        ("rig/src/scenario/traction", 10),
-        ("rig/src/pictures/chai", 10),
-        ("rig/src", 36),
-        ("src", 36),
-        ("control/src", 36),
-    ] {
-        let mut text = String::new();
-        sources(&root().join(folder), &mut text);
-        let named = figures_named(&text);
-        assert!(named.iter().all(|number| (1..=most).contains(number)), "{folder}: {named:?}");
-        assert!(!folder.starts_with("rig") || !named.is_empty(), "{folder}");
+/// The texts that people read, by their paths: sources, pages of the guide, of reports and of the live bench, pictures.
+fn read_by_people(folder: &Path, out: &mut Vec<(String, String)>) {
+    const ENDS: [&str; 9] = ["rs", "md", "js", "html", "css", "py", "ipynb", "svg", "toml"];
+    const OTHERS: [&str; 3] = ["target", "vendor", "node_modules"];
+    for entry in std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap()) {
+        let (name, path) = (entry.file_name().into_string().unwrap(), entry.path());
+        if name.starts_with('.') || OTHERS.contains(&name.as_str()) {
+            continue;
+        }
+        if path.is_dir() {
+            read_by_people(&path, out);
+        } else if ENDS.iter().any(|end| path.extension().is_some_and(|extension| extension == *end)) {
+            let place = path.strip_prefix(root()).unwrap().display().to_string();
+            out.push((place, std::fs::read_to_string(&path).unwrap()));
+        }
     }
-    assert_eq!(figures_named("Figures 14 to 16, 18 and 19: x; figure 7."), [14, 16, 18, 19, 7]);
+}
+
+#[test]
+fn figures_and_equations_that_are_named_are_ones_of_the_papers() {
+    // Of the first paper and of the second one.
+    const MOST: [(&str, [u32; 2]); 2] = [("figure", [10, 36]), ("equation", [17, 19])];
+    const FIRST: [&str; 3] =
+        ["rig/src/scenario/traction/", "rig/src/pictures/chai/", "control/src/modulation/"];
+    let mut texts = Vec::new();
+    read_by_people(root(), &mut texts);
+    let (mut wrong, mut named) = (Vec::new(), 0);
+    for (place, text) in &texts {
+        let lower = text.to_lowercase();
+        let of_second = place.contains("zs9") || lower.contains("zs9") || lower.contains("second paper");
+        let of_second = of_second && !FIRST.iter().any(|folder| place.starts_with(folder));
+        for (word, most) in MOST {
+            let numbers = numbers_after(text, word);
+            named += numbers.len();
+            let beyond = |number: &&u32| **number == 0 || **number > most[usize::from(of_second)];
+            wrong.extend(numbers.iter().filter(beyond).map(|number| format!("{place}: {word} {number}")));
+        }
+    }
+    assert!(
+        texts.len() > 300 && named > 200 && wrong.is_empty(),
+        "{} texts, {named}: {wrong:#?}",
+        texts.len()
+    );
+    assert_eq!(numbers_after("Figures 14–16, 18 and 19: x; figure 9a.", "figure"), [14, 16, 18, 19, 9]);
+    assert_eq!(numbers_after("Equations (7)–(13), equation (3)", "equation"), [7, 13, 3]);
+}
+
+/// The calls of a trait in a source, as a page has them: name and parameters without `self`, types and the mark of what is not used.
+fn calls(source: &str, port: &str) -> BTreeSet<String> {
+    let (_, body) = source.split_once(&format!("pub trait {port}<")).unwrap();
+    let body = body.split("\n}").next().unwrap();
+    let call = |declared: &str| {
+        let (name, rest) = declared.split_once('(').unwrap();
+        let parameters = rest.split(", ").filter_map(|one| one.split_once(": ").map(|(name, _)| name));
+        let parameters: Vec<_> = parameters.map(|name| name.trim_start_matches('_')).collect();
+        format!("{name}({})", parameters.join(", "))
+    };
+    body.lines().filter_map(|line| line.trim().strip_prefix("fn ")).map(call).collect()
+}
+
+#[test]
+fn the_page_on_boards_has_every_call_of_the_ports() {
+    let (text, ports, slot) =
+        (read("docs/own-board.md"), read("src/ports/mod.rs"), read("src/operator/slot.rs"));
+    for (port, source) in [("ControlPort", &ports), ("PwmPort", &ports), ("OperatorPort", &slot)] {
+        let (_, table) = text.split_once(&format!("| `{port}` |")).unwrap();
+        let rows = table.lines().skip(2).take_while(|line| line.starts_with('|'));
+        let told: BTreeSet<_> = rows.map(|row| spans(row).next().unwrap().to_owned()).collect();
+        assert_eq!(told, calls(source, port), "{port}");
+    }
+}
+
+#[test]
+fn the_page_on_machines_has_every_key_of_machine_toml() {
+    let (text, source) = (read("docs/own-machine.md"), read("tablegen/src/parameters.rs"));
+    let (_, body) = source.split_once("\nparameters! {").unwrap();
+    let body = body.split("\n}").next().unwrap();
+    let declared = body.lines().filter_map(|line| line.trim().strip_suffix(';')?.split_once(": "));
+    let declared: Vec<_> = declared.collect();
+    let rows = rows(&text, "The files");
+    let told: BTreeSet<_> = rows.iter().flat_map(|row| spans(row[0].1)).collect();
+    let keys: BTreeSet<_> =
+        declared.iter().map(|(key, _)| *key).chain(["name", "pole_pairs", "patterns"]).collect();
+    assert_eq!(told, keys);
+    for (key, rest) in declared.iter().filter(|(key, _)| key.starts_with("trip_")) {
+        let (factor, of) = rest.rsplit(", ").next().unwrap().split_once(" * ").unwrap();
+        let row = rows.iter().find(|row| row[0].1.contains(key)).unwrap();
+        let default = format!("{factor} × `{of}`");
+        assert!(cell(row, "what").ends_with(&default), "{key}: {default}");
+    }
 }
 
 /// The anchors of a page's headings.

@@ -8,7 +8,7 @@ use tractive::control::{flux_linkage, mtpa};
 use tractive::frames::{self, Abc, Angle, Dq};
 
 /// Every block; of those with the same word before the stroke the first is ours.
-pub const ALL: [Block; 19] = [
+pub const ALL: [Block; 20] = [
     Block { name: "call/nothing", run: call_nothing, exact: None },
     Block { name: "sin_cos/tractive", run: sin_cos_tractive, exact: Some(exact::sin_cos) },
     Block { name: "sin_cos/idsp", run: sin_cos_idsp, exact: Some(exact::sin_cos) },
@@ -28,6 +28,7 @@ pub const ALL: [Block; 19] = [
     Block { name: "core_tick/tractive", run: core_tick_tractive, exact: None },
     Block { name: "core_tick/foc", run: core_tick_foc, exact: None },
     Block { name: "core_tick/fluxkit", run: core_tick_fluxkit, exact: None },
+    Block { name: "duty_tick/tractive", run: duty_tick_tractive, exact: None },
 ];
 
 /// The work that every block has besides its own: the call's return, two values read and two written.
@@ -126,13 +127,15 @@ fn mtpa_tractive(input: &Input, output: &mut Output) {
     *output = [point.d, point.q];
 }
 
+const GAIN: f32 = 900.0;
+const INTEGRAL_GAIN: f32 = 20.0;
+const RESISTANCE: f32 = 0.1;
+const LINK_V: f32 = 100.0;
+
 /// The tick of every field-oriented controller, in this drive's way: Clarke, Park, current to flux by the map, the
-/// flux error with its integral part, decoupling, back to the stator, three phases.
+/// flux error with its integral part, decoupling, back to the stator, voltages of the phases.
 #[inline(never)]
 fn core_tick_tractive(input: &Input, output: &mut Output) {
-    const GAIN: f32 = 900.0;
-    const INTEGRAL_GAIN: f32 = 20.0;
-    const RESISTANCE: f32 = 0.1;
     let frame = Angle(input.turn).sin_cos();
     let current = currents(input).clarke().park(frame);
     let flux = flux_linkage(&BUILT_IN, current);
@@ -144,7 +147,33 @@ fn core_tick_tractive(input: &Input, output: &mut Output) {
     *output = [phases.a, phases.b];
 }
 
-/// The same of the crate `foc`, in fixed point: no map, no decoupling, compare values by space vectors.
+/// The same on to three duties: within the circle of the largest voltage, the integral part held back by what that cuts off, the phases
+/// centred by the zero sequence.
+#[inline(never)]
+fn duty_tick_tractive(input: &Input, output: &mut Output) {
+    const LIMIT_V: f32 = LINK_V * 0.577_350_3;
+    let frame = Angle(input.turn).sin_cos();
+    let current = currents(input).clarke().park(frame);
+    let flux = flux_linkage(&BUILT_IN, current);
+    let [d, q] = input.vector;
+    let error = Dq { d, q } - flux;
+    let integral = Dq { d: output[0], q: output[1] } + error * INTEGRAL_GAIN;
+    let wanted = error * GAIN + integral + flux.j() * input.radians + current * RESISTANCE;
+    let squared = wanted.d * wanted.d + wanted.q * wanted.q;
+    let fits = squared <= LIMIT_V * LIMIT_V;
+    let voltage = if fits { wanted } else { wanted * (LIMIT_V / frames::sqrt(squared)) };
+    let kept = integral + (voltage - wanted) * (INTEGRAL_GAIN / GAIN);
+    let Abc { a, b, c } = voltage.unpark(frame).abc();
+    let larger = |x: f32, y: f32| if x > y { x } else { y };
+    let smaller = |x: f32, y: f32| if x < y { x } else { y };
+    let centre = 0.5 * (larger(a, larger(b, c)) + smaller(a, smaller(b, c)));
+    let [a, b, c] = [a, b, c].map(|phase| 0.5 + (phase - centre) * (1.0 / LINK_V));
+    // The third duty and the integral part are stored as well.
+    core::hint::black_box((c, kept));
+    *output = [a, b];
+}
+
+/// The tick of the crate `foc`, in fixed point: no map, no decoupling, compare values by space vectors.
 #[inline(never)]
 fn core_tick_foc(input: &Input, output: &mut Output) {
     use foc::{Foc, pid::PIController, pwm::SpaceVector};
@@ -157,14 +186,13 @@ fn core_tick_foc(input: &Input, output: &mut Output) {
     *output = [f32::from(compare[0]), f32::from(compare[1])];
 }
 
-/// The same of `fluxkit_math`: no map, no decoupling.
+/// That of `fluxkit_math`: no map, no decoupling, each axis within its limits, duties.
 #[inline(never)]
 fn core_tick_fluxkit(input: &Input, output: &mut Output) {
     use fluxkit_math::frame;
     use fluxkit_math::modulation::svpwm;
     use fluxkit_math::transforms::{clarke, inverse_park, park};
     use fluxkit_math::{PiConfig, PiController};
-    const LINK_V: f32 = 100.0;
     const PERIOD_S: f32 = 1e-4;
     let controller = || PiController::new(PiConfig { kp: 1.0, ki: 10.0, out_min: -50.0, out_max: 50.0 });
     let Abc { a, b, c } = currents(input);

@@ -95,7 +95,7 @@ fn options_that_do_nothing_are_refused() {
     refused_in_one_line("run zs9-reverse --step 40", &["--step", "zs9-reverse"]);
     refused_in_one_line("run sweep --uin 667", &["--uin", "sweep"]);
     refused_in_one_line("run sweep --step 40", &["--step", "sweep"]);
-    refused_in_one_line("run zs9-load-step --uncompensated", &["--uncompensated", "zs9-load-step"]);
+    refused_in_one_line("run zs9-load-step --ablate trim", &["--ablate", "zs9-load-step"]);
     refused_in_one_line("run zs9-load-step --inject source-short@1.3", &["--inject", "1.3 s", "1.2 s"]);
 }
 

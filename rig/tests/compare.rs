@@ -1,17 +1,19 @@
-//! Both control laws in the same runs: README's table is what `cargo rig compare` prints, and ours is ahead or it is said why not.
+//! Both control laws in the same runs: the tables of README and guide are what `cargo rig compare` prints, and ours is ahead or it is said
+//! why not.
 
 use tractive_rig::compare::{self, Row};
 
 const README: &str = include_str!("../../README.md");
+const PAGE: &str = include_str!("../../docs/papers.md");
 
 fn rows(only: &[&str]) -> Vec<Row> {
     compare::rows(&only.iter().map(|word| (*word).to_owned()).collect::<Vec<_>>()).unwrap()
 }
 
 #[test]
-fn the_readme_says_what_both_laws_reach() {
+fn readme_and_guide_say_what_both_laws_reach() {
     let rows = rows(&[]);
-    assert_eq!(rows.len(), 20);
+    assert_eq!(rows.len(), 21);
     for row in rows {
         println!("{}: {:?}, ahead: {}", row.quantity, row.found, row.mark());
         assert!(
@@ -19,6 +21,9 @@ fn the_readme_says_what_both_laws_reach() {
             "README.md has no line\n{}",
             row.markdown()
         );
+        let [own, pi] = &row.found;
+        let begins = format!("| {} | {own} | {pi} | ", row.quantity);
+        assert!(PAGE.lines().any(|line| line.starts_with(&begins)), "docs/papers.md has no line\n{begins}");
         assert!(row.ahead || !row.why.is_empty(), "{}: {:?}", row.quantity, row.found);
         // A reason is for a row that needs one.
         assert!(!row.ahead || row.why.is_empty(), "{}: ahead, and still {}", row.quantity, row.why);
@@ -48,7 +53,6 @@ fn the_ordinary_law_is_no_straw_man() {
 
 #[test]
 fn the_page_says_what_each_part_buys() {
-    const PAGE: &str = include_str!("../../docs/papers.md");
     let rows = compare::parts().unwrap();
     assert_eq!(rows.len(), 12);
     for row in rows {

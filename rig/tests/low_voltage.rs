@@ -2,6 +2,7 @@
 //! falls short.
 
 use rayon::prelude::*;
+use std::collections::BTreeSet;
 use std::process::Command;
 use tractive_rig::scenario::catalogue;
 use tractive_rig::trace::Recorded;
@@ -97,6 +98,30 @@ fn a_bound_that_is_not_kept_is_exit_code_1_for_every_machine() {
     assert!(!page.contains("The paper's") && page.contains("class=\"plot\""), "{page}");
     let (code, said, _) = run(&format!("{own} --min-pulse-us 12"));
     assert!(code == Some(1) && said.starts_with("FALLS SHORT: 1 of 2 bounds"), "{code:?}: {said}");
-    let (code, _, page) = run("full-step");
-    assert!(code == Some(0) && page.contains("The paper's figure 8"), "{page}");
+}
+
+/// A heading names a figure of the paper where the plot shows the same: of that machine, and nothing that the paper does not show.
+#[test]
+fn a_plot_names_the_papers_figure_only_where_it_shows_the_same() {
+    let headings = |line: &str| {
+        let folder = tempfile::tempdir().unwrap();
+        let mut rig = Command::new(env!("CARGO_BIN_EXE_tractive-rig"));
+        rig.arg("run").args(line.split_whitespace()).arg("--out").arg(folder.path());
+        assert!(rig.output().unwrap().status.success(), "{line}");
+        let page = std::fs::read_to_string(folder.path().join("report.html")).unwrap();
+        let named = page.split("The paper's ").skip(1).filter_map(|rest| rest.split(" · ").next());
+        named.map(str::to_owned).collect::<BTreeSet<_>>()
+    };
+    for (line, figures) in [
+        ("load-steps", &["figure 8"][..]),
+        ("full-step", &[]),
+        ("sweep", &["figure 9a", "figure 9b", "figure 9c", "figure 9d"]),
+        ("sweep --brake --to 2300", &[]),
+        ("mode-borders", &[]),
+        ("characteristic", &["figure 1", "figure 10", "figure 3", "figure 4", "figure 6", "figure 7"]),
+    ] {
+        let wanted: BTreeSet<_> = figures.iter().map(|figure| (*figure).to_owned()).collect();
+        assert_eq!(headings(line), wanted, "{line}");
+        assert!(headings(&format!("{line} --machine {MACHINE}")).is_empty(), "{line}");
+    }
 }

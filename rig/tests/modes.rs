@@ -67,7 +67,7 @@ fn the_drive_goes_up_and_down_its_ladder() {
     assert!(std::fs::read_to_string(&path).unwrap().contains(",mid5,"));
     let mut page = Page::new("modes", "no figure: a ladder of its own");
     figures::draw(&mut page, &recording, &[], &machine);
-    switches::plots(&recording, &mut page);
+    switches::plots(&recording, &mut page, |_, _| None);
     let page = page.finish("", &Figures::default()).unwrap();
     for part in ["mid5: 5 pulses a turn", "mid7 → mid5", "mid5 → mid3", "\nmid5\n", "\nsquare\n"] {
         assert!(page.contains(part), "{part}");

@@ -119,6 +119,38 @@ fn characteristic_currents_are_the_ratings() {
     for point in points {
         assert!(point["current_rms_a"].as_f64().unwrap() < 165.0, "{point}");
     }
+    // The rated point does not need the voltage of square wave; full power at the same speed does.
+    let modes: Vec<_> = points[5..].iter().map(|point| point["mode"].as_str().unwrap()).collect();
+    assert_eq!(modes, ["mid3", "square"]);
+}
+
+/// The guide's numbers of what the papers claim and this drive does not reach.
+#[test]
+fn the_guide_says_what_is_not_reached() {
+    let page = include_str!("../../docs/papers.md").split_whitespace().collect::<Vec<_>>().join(" ");
+    let of = |line: &str, list: &str, name: &str| -> Vec<f64> {
+        let (figures, _) = run(line);
+        figures.get(list).unwrap().as_array().unwrap().iter().map(|one| one[name].as_f64().unwrap()).collect()
+    };
+    let [at_200, at_500, at_1000, at_1500, fast @ ..] =
+        &of("characteristic", "points", "efficiency_percent")[..]
+    else {
+        panic!("seven points")
+    };
+    let (low, high) =
+        fast.iter().fold((f64::MAX, 0.0_f64), |(low, high), one| (low.min(*one), high.max(*one)));
+    let highest_nm = of("load-steps", "steps", "highest_nm");
+    for told in [
+        format!(
+            "{at_200:.1} % at 200 r/min, {at_500:.1} at 500, {at_1000:.1} at 1,000, {at_1500:.1} at 1,500"
+        ),
+        format!("and {low:.1} to {high:.1} from 1,905 r/min on"),
+        format!("{:.1} A in 0.1 Ω", of("characteristic", "points", "current_rms_a")[0]),
+        format!("from 200 to 0 N·m to {:.0} N·m", highest_nm[11]),
+        format!("the ripple of 200 N·m alone reaches {:.0}", highest_nm[0]),
+    ] {
+        assert!(page.contains(&told), "docs/papers.md does not say: {told}");
+    }
 }
 
 #[test]

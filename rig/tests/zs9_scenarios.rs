@@ -1,5 +1,6 @@
 //! The ZS9's scenarios on the host, held against their bounds.
 
+use rayon::prelude::*;
 use serde_json::Value;
 use tractive_rig::analysis::Figures;
 use tractive_rig::rows::mean;
@@ -42,6 +43,35 @@ fn disturbance(with: &Recording, without: &Recording) -> (f64, f64) {
     )
 }
 
+/// Every scenario judges itself by so many bounds, and keeps them.
+#[test]
+fn every_scenario_has_bounds_and_keeps_them() {
+    const BOUNDS: [(&str, usize); 10] = [
+        ("zs9-load-step", 4),
+        ("zs9-load-step --carrier-hz 20000 --uin 800", 4),
+        ("zs9-reverse", 3),
+        ("zs9-cycle", 4),
+        ("zs9-cycle --second other --cruise 8", 5),
+        ("zs9-steady --scheme s", 3),
+        ("zs9-steady --scheme rs", 3),
+        ("zs9-steady --scheme rthd", 3),
+        ("zs9-steady --scheme zvo", 3),
+        ("zs9-timing", 2),
+    ];
+    let judged = |name: &str| BOUNDS.iter().any(|(line, _)| line.split(' ').next() == Some(name));
+    let forgotten: Vec<_> = catalogue::names()
+        .map(|(name, _)| name)
+        .filter(|name| name.starts_with("zs9") && !judged(name))
+        .collect();
+    assert!(forgotten.is_empty(), "{forgotten:?}");
+    BOUNDS.into_par_iter().for_each(|(line, bounds)| {
+        let outcome = run(line);
+        let verdicts = outcome.figures.get("verdicts").and_then(Value::as_array).unwrap();
+        let of = |word: &str| verdicts.iter().filter(|verdict| verdict["verdict"] == word).count();
+        assert_eq!((of("pass"), of("reported")), (bounds, verdicts.len() - bounds), "{line}: {verdicts:#?}");
+    });
+}
+
 /// A load step against the run without one: motor 1's disturbance, motor 2's recovery in ms, the link's deviation in percent.
 fn load_step(options: &str) -> (f64, f64, f64, f64) {
     let with = run(&format!("zs9-load-step{options}"));
@@ -68,6 +98,24 @@ fn a_faster_carrier_and_more_shoot_through_do_better() {
     assert!(back_ms <= 12.0 && link_percent <= 0.5, "{back_ms} ms, {link_percent} %");
 }
 
+/// A line of README's table.
+fn is_in_readme(line: &str) {
+    const README: &str = include_str!("../../README.md");
+    assert!(README.lines().any(|one| one == line), "README.md has no line\n{line}");
+}
+
+#[test]
+fn the_readme_says_how_little_a_motor_feels_of_the_other() {
+    let [slow, fast] = ["", " --carrier-hz 20000 --uin 800"].map(load_step);
+    let ((torque, speed, back, link), (torque_fast, speed_fast, back_fast, link_fast)) = (slow, fast);
+    is_in_readme(&format!(
+        "| motor 2's load 60 → 100 N·m: motor 1's torque moves by | {torque:.4} N·m | {torque_fast:.4} N·m |"
+    ));
+    is_in_readme(&format!("| … its speed by | {speed:.5} r/min | {speed_fast:.5} r/min |"));
+    is_in_readme(&format!("| motor 2 within 0.2 % again after | {back:.1} ms | {back_fast:.1} ms |"));
+    is_in_readme(&format!("| link voltage within | ±{link:.2} % | ±{link_fast:.2} % |"));
+}
+
 #[test]
 fn every_scheme_takes_the_load_step() {
     for scheme in ["s", "rs", "zvo", "rthd-central", "rthd-slide"] {
@@ -89,6 +137,9 @@ fn motor_1_holds_while_motor_2_reverses() {
     let (torque_nm, speed_rpm) = disturbance(&with.recording, &without.recording);
     println!("{torque_nm:.4} N·m, {speed_rpm:.5} r/min");
     assert!(torque_nm <= 0.01 && speed_rpm <= 0.001, "{torque_nm} N·m, {speed_rpm} r/min");
+    is_in_readme(&format!(
+        "| motor 2 reverses: motor 1 moves by | {torque_nm:.3} N·m, {speed_rpm:.4} r/min | |"
+    ));
     assert!(figure(&with, "motor2_speed_error_rms_rpm") <= 1.6);
     assert!((figure(&with, "motor2_speed_rpm") + 800.0).abs() < 0.01);
     assert!((figure(&with, "motor1_speed_rpm") - 800.0).abs() < 0.01);
@@ -115,6 +166,11 @@ fn the_cycle_goes_up_and_back_and_returns_energy() {
     assert!(figure(&outcome, "returned_percent") >= 75.0);
     assert!(figure(&outcome, "power_residual_percent") < 0.1);
     assert!(figure(&outcome, "link_deviation_percent") < 0.5);
+    let [returned, over] =
+        ["returned_percent", "capacitor_overshoot_percent"].map(|name| figure(&outcome, name));
+    is_in_readme(&format!(
+        "| cycle: energy returned, capacitor overshoot | {returned:.0} %, {over:.2} % | |"
+    ));
 }
 
 #[test]
@@ -213,62 +269,6 @@ fn flaws_of_the_sensors_do_not_stop_the_drive() {
     assert!(outcome.recording.trip().is_none(), "{:?}", outcome.recording.trip());
     let back_ms = figure(&outcome, "motor2_back_within_0p2_percent_ms");
     assert!(back_ms < 50.0, "{back_ms} ms");
-}
-
-/// Dead time where two gates of a leg exchange, none where a leg is shorted on purpose; the diodes choose the state meanwhile.
-#[test]
-fn dead_time_is_kept_and_stops_nothing() {
-    const DEAD_TIME_S: f64 = 2e-6;
-    for scheme in ["s", "rs", "rthd", "zvo"] {
-        let outcome = run(&format!("zs9-steady --dead-time-us 2 --scheme {scheme}"));
-        assert!(outcome.recording.trip().is_none(), "{scheme}: {:?}", outcome.recording.trip());
-        for (torque, thd) in [("torque1_nm", "thd1_percent"), ("torque2_nm", "thd2_percent")] {
-            let (torque, thd) = (figure(&outcome, torque), figure(&outcome, thd));
-            println!("{scheme}: {torque} N·m, {thd} %");
-            assert!((torque / 60.0 - 1.0).abs() < 0.003 && thd < 2.6, "{scheme}: {torque} N·m, {thd} %");
-        }
-        assert!(exchanges_that_wait(&outcome.recording, DEAD_TIME_S) > 100, "{scheme}");
-    }
-}
-
-/// Without compensation the motors give 53.0 to 59.8 N·m, with 3.1 to 5.1 % of THD.
-#[test]
-fn dead_time_is_made_up_for() {
-    for law in ["tractive", "pi"] {
-        for scheme in ["s", "rs", "rthd", "zvo", "rthd-slide"] {
-            let outcome = run(&format!("zs9-steady --dead-time-us 5 --scheme {scheme} --law {law}"));
-            assert!(outcome.recording.trip().is_none(), "{scheme}, {law}: {:?}", outcome.recording.trip());
-            for (torque, thd) in [("torque1_nm", "thd1_percent"), ("torque2_nm", "thd2_percent")] {
-                let (torque, thd) = (figure(&outcome, torque), figure(&outcome, thd));
-                println!("{scheme}, {law}: {torque:.2} N·m, {thd:.2} %");
-                assert!((torque - 60.0).abs() <= 0.6 && thd < 3.6, "{scheme}, {law}: {torque} N·m, {thd} %");
-            }
-        }
-    }
-}
-
-/// Counts the edges after which two gates of a leg are on and one is off, and holds each against the dead time since that one
-/// turned off.
-fn exchanges_that_wait(recording: &Recording, dead_time_s: f64) -> usize {
-    let mut exchanges = 0;
-    for leg in 0..3 {
-        let (mut on, mut off_at_s) = ([None; 3], [None; 3]);
-        for edge in recording.edges.iter().filter(|edge| edge.gate % 3 == leg) {
-            let gate = usize::from(edge.gate / 3);
-            on[gate] = Some(edge.on);
-            if !edge.on {
-                off_at_s[gate] = Some(edge.t_s);
-                continue;
-            }
-            let off = (0..3).filter(|gate| on[*gate] == Some(false)).collect::<Vec<_>>();
-            if let ([off], true) = (off.as_slice(), on.iter().all(Option::is_some)) {
-                let wait_s = edge.t_s - off_at_s[*off].unwrap();
-                assert!(wait_s > dead_time_s - 2e-9, "leg {leg}, gate {gate} waits {wait_s} s");
-                exchanges += 1;
-            }
-        }
-    }
-    exchanges
 }
 
 #[test]

@@ -3,6 +3,8 @@
 //! They are the lines of the `sh` blocks in the chapters of `docs/SUMMARY.md`. A line that ends in `# exits with N` has to; all
 //! others have to succeed. What would touch a board is given `--dry-run`: the image is built, and nobody is asked to flash it.
 //! Tests are built, steps of `cargo xtask test` looked up, and what would run in QEMU runs on the host: the rest is those steps' own business.
+//!
+//! A block ```` ```text prints ```` behind a command holds lines that it has to print, in this order; `…` stands for what is left out.
 
 use crate::process::cannot_start;
 use anyhow::{Context, Result, bail};
@@ -10,13 +12,17 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::Instant;
 
-/// A command and the exit code that it has to have.
+/// A command, the exit code that it has to have, and lines that it has to print.
 #[derive(Clone, Debug, PartialEq, Eq)]
 struct Line {
     chapter: String,
     command: String,
     code: i32,
+    prints: Vec<String>,
 }
+
+/// The first line of a block of what is printed.
+const PRINTS: &str = "```text prints";
 
 /// The folder of the guide's files: what an earlier build has left there is not gone on with.
 const FILES: &str = "target/guide";
@@ -28,15 +34,19 @@ pub fn run(root: &Path) -> Result<bool> {
         std::fs::remove_dir_all(&files).with_context(|| files.display().to_string())?;
     }
     let mut good = true;
-    for Line { chapter, command, code } in lines(root)? {
+    for Line { chapter, command, code, prints } in lines(root)? {
         let began = Instant::now();
         let mut shell = Command::new("sh");
         shell.current_dir(root).args(["-c", &command]).stdin(Stdio::null());
         let output = shell.output().with_context(|| cannot_start(&shell))?;
-        let passed = output.status.code() == Some(code);
+        let said = [&output.stdout, &output.stderr].map(|said| String::from_utf8_lossy(said)).concat();
+        let missing = missing(&said, &prints);
+        let passed = output.status.code() == Some(code) && missing.is_none();
         let verdict = if passed { "passed" } else { "FAILED" };
         println!("{verdict} {:>5.1} s  {chapter}: {command}", began.elapsed().as_secs_f64());
-        if !passed {
+        if let Some(missing) = missing {
+            println!("it does not print, or not in this place: {missing}\n{}", said.trim_end());
+        } else if !passed {
             println!("{}, expected {code}", output.status);
             println!("{}", String::from_utf8_lossy(&output.stderr).trim_end());
         }
@@ -67,16 +77,38 @@ fn chapters(summary: &str) -> Vec<String> {
 }
 
 fn commands(chapter: &str, text: &str) -> Vec<Line> {
-    let mut lines = Vec::new();
-    let mut inside = false;
+    let mut lines: Vec<Line> = Vec::new();
+    let mut block = "";
     for line in text.lines() {
         if line.starts_with("```") {
-            inside = line == "```sh";
-        } else if inside && !line.trim().is_empty() {
+            block = line;
+        } else if block == "```sh" && !line.trim().is_empty() {
             lines.push(command(chapter, line));
+        } else if block == PRINTS
+            && let Some(last) = lines.last_mut()
+        {
+            last.prints.push(line.to_owned());
         }
     }
     lines
+}
+
+/// The first of the lines that does not stand in a text, behind the one before it.
+fn missing<'a>(text: &str, lines: &'a [String]) -> Option<&'a String> {
+    let mut left = text.lines();
+    let has = |line: &str, wanted: &str| {
+        let mut rest = line;
+        let mut parts = wanted.split('…').map(str::trim).filter(|part| !part.is_empty());
+        parts.all(|part| match rest.split_once(part) {
+            Some((_, behind)) => {
+                rest = behind;
+                true
+            }
+            None => false,
+        })
+    };
+    let wanted = |line: &&String| !line.replace('…', "").trim().is_empty();
+    lines.iter().filter(wanted).find(|wanted| !left.any(|line| has(line, wanted)))
 }
 
 fn command(chapter: &str, line: &str) -> Line {
@@ -107,7 +139,7 @@ fn command(chapter: &str, line: &str) -> Line {
     if command.starts_with("cargo xtask test") && !command.ends_with(" --list") {
         command += " --list";
     }
-    Line { chapter: chapter.to_owned(), command, code }
+    Line { chapter: chapter.to_owned(), command, code, prints: Vec::new() }
 }
 
 /// `true` for a run or a talk whose drive is an image in QEMU.
@@ -128,9 +160,26 @@ mod tests {
     #[test]
     fn commands_stand_in_sh_blocks_alone() {
         let text = "ls\n```sh\ncargo rig run sweep # exits with 1\n\ncargo xtask flash --log   # prints\n```\n```text\nno\n```\n";
-        let line = |command: &str, code| Line { chapter: "c".to_owned(), command: command.to_owned(), code };
+        let line = |command: &str, code| Line {
+            chapter: "c".to_owned(),
+            command: command.to_owned(),
+            code,
+            prints: Vec::new(),
+        };
         let wanted = [line("cargo rig run sweep", 1), line("cargo xtask flash --log --dry-run", 0)];
         assert_eq!(commands("c", text), wanted);
+    }
+
+    #[test]
+    fn what_is_to_be_printed_belongs_to_the_command_before_it() {
+        let text =
+            "```sh\na\nb\n```\nIt prints:\n```text prints\none … three\n…\nfour\n```\n```text\nfive\n```\n";
+        let [a, b] = &commands("c", text)[..] else { panic!("two commands") };
+        assert_eq!((a.prints.len(), b.prints.join("|").as_str()), (0, "one … three|…|four"));
+        assert_eq!(missing("zero\none two three\n\nfour five\n", &b.prints), None);
+        for text in ["one two\nfour", "four\none two three", "three one\nfour"] {
+            assert!(missing(text, &b.prints).is_some(), "{text}");
+        }
     }
 
     #[test]

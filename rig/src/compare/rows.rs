@@ -60,7 +60,7 @@ fn full_steps() -> Vec<String> {
 }
 
 /// All rows.
-pub const ROWS: [Plan; 11] = [
+pub const ROWS: [Plan; 12] = [
     Plan {
         quantity: "torque at the characteristic points (figure 10)",
         lines: || words(&[CHARACTERISTIC]),
@@ -72,6 +72,18 @@ pub const ROWS: [Plan; 11] = [
             Ok(Cell { text: format!("within {} %", decimals(found[0], 2)), values: found })
         },
         paper: "within 5 %",
+        why: "",
+    },
+    Plan {
+        quantity: "efficiency there at 1,235 N·m and 200 r/min, at 1,174.6 N·m and 2,000 r/min, with 0.1 Ω and the losses of `machine.toml`",
+        lines: || words(&[CHARACTERISTIC]),
+        read: |law| {
+            let all = field(law.figures(CHARACTERISTIC)?, "points", "efficiency_percent");
+            let (Some(slow), Some(fast)) = (all.first(), all.last()) else { return Err("not seen") };
+            let text = format!("{} %, {} %", decimals(*slow, 2), decimals(*fast, 2));
+            Ok(Cell { text, values: vec![100.0 - slow, 100.0 - fast] })
+        },
+        paper: "at least 95 % at each",
         why: "",
     },
     Plan {

@@ -157,8 +157,9 @@ impl Page {
 
     /// A picture of its own, beside a figure of the paper or none.
     pub fn picture<'a>(&mut self, figure: impl Into<Option<&'a str>>, title: &str, svg: Result<String>) {
+        let figure = figure.into().filter(|_| !self.is_another_machine);
         match svg {
-            Ok(svg) => self.document.blocks.push(Block::Picture(html::heading(figure.into(), title), svg)),
+            Ok(svg) => self.document.blocks.push(Block::Picture(html::heading(figure, title), svg)),
             Err(error) => self.error = Some(error),
         }
     }

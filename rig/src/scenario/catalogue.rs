@@ -85,11 +85,11 @@ const TRACTION: [Entry<Traction>; 16] = [
         "characteristic",
         "figure 10: torque accuracy and efficiency at the characteristic points",
     ),
-    Entry::of::<FullStep>("full-step", "figure 8: load steps, here all of them in one"),
+    Entry::of::<FullStep>("full-step", "no figure: full torque in one step, and back"),
     Entry::of::<Steady>("steady", "no figure: current, torque and spectrum of one operating point"),
     Entry::of::<ModeBorders>(
         "mode-borders",
-        "figure 9: changes of pulse pattern, here at constant speed by torque alone",
+        "no figure: changes of pulse pattern at constant speed, by torque alone",
     ),
     Entry::of::<Reversal>("reversal", "no figure: power reversed, released and applied again at speed"),
     Entry::of::<Restart>("restart", "no figure: a coasting machine caught in each mode"),

@@ -94,6 +94,8 @@ impl Scenario<Traction> for Characteristic {
     }
 
     fn plots(&self, recording: &Recording, options: &Options, machine: &Machine, page: &mut Page) {
+        // The paper's figure is of the points, not of what flows at them.
+        page.answers(None);
         page.torque(recording);
         page.plot("speed", "r/min", recording, &[("speed", |row| row.speed_rpm)]);
         page.phase_current(recording);

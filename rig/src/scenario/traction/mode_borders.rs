@@ -56,6 +56,6 @@ impl Scenario<Traction> for ModeBorders {
 
     fn plots(&self, recording: &Recording, _: &Options, _: &Machine, page: &mut Page) {
         page.overview(recording);
-        switches::plots(recording, page);
+        switches::plots(recording, page, |_, _| None);
     }
 }

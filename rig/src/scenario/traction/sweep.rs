@@ -3,6 +3,7 @@
 use super::prelude::*;
 use super::{LEAD_S, of_rated_rpm, switches};
 use crate::options::On;
+use crate::pictures::chai::runs::change;
 use crate::{scenario, spectrum};
 
 /// 0 → rated speed in 8 s (2,000 r/min: 250 r/min a second) and 1 s hold, at the torque envelope.
@@ -70,9 +71,14 @@ impl Scenario<Traction> for Sweep {
     }
 
     fn plots(&self, recording: &Recording, options: &Options, machine: &Machine, page: &mut Page) {
+        // The paper's figure is of the changes alone.
+        page.answers(None);
         page.overview(recording);
         page.rotor_currents(recording);
-        switches::plots(recording, page);
+        // The paper shows full torque, motoring.
+        let figure: switches::Figure =
+            if self.brake || self.torque_scale != 1.0 { |_, _| None } else { change };
+        switches::plots(recording, page, figure);
         // The hold at the last speed, wherever it is.
         let fastest = recording.rows.iter().map(|row| row.speed_rpm.abs()).fold(0.0, f64::max);
         let hold = |row: &&Row| fastest > 0.0 && row.speed_rpm.abs() > 0.999_999 * fastest;

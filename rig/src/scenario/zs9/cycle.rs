@@ -185,6 +185,10 @@ impl Scenario<Zs9> for Cycle {
     }
 
     fn plots(&self, recording: &Recording, _: &Options, _: &Machine, page: &mut Page) {
+        // In the paper both motors go through the same cycle.
+        if self.second != Second::Same {
+            page.answers_none();
+        }
         let rows = figures::window(recording, 0.0, recording.rows.last().map_or(MOVING_S, |row| row.t_s));
         plot(page, ("figures 24 to 35", "link voltage U_in", "V"), rows, &VOLTAGES[..1]);
         plot(page, ("figures 24 to 35", "capacitor voltage", "V"), rows, &VOLTAGES[1..]);

@@ -72,6 +72,9 @@ pub struct Zs9Options {
     /// sensor-frozen-1, sensor-frozen-2, sensor-jump-2, overcurrent, not-finite, leg-stuck-on, leg-stuck-off.
     #[arg(long)]
     pub inject: Option<Injection<Kind>>,
+    /// Leave the dead time uncompensated: the pulses are not corrected.
+    #[arg(long)]
+    pub uncompensated: bool,
 }
 
 /// Options of a run.
@@ -140,7 +143,8 @@ impl System for Zs9 {
         let line = plan.line;
         let bench = bench(plan, options, machine)?;
         let settings = settings::drive(CLOCK, options.own.carrier_hz);
-        let settings = settings::with_dead_time(settings, options.dead_time_us * 1e-6);
+        let told_us = if options.own.uncompensated { 0.0 } else { options.dead_time_us };
+        let settings = settings::with_dead_time(settings, told_us * 1e-6);
         let (on, law) = options.choice()?;
         match on {
             On::Host => {
