@@ -103,7 +103,7 @@ export function build(host, { controls, settings, kinds, faults, scenarios, remo
     wrong.append(element("details", { open: k === 2 }, element("summary", { textContent: kind }), element("div", { className: "buttons" }, ...buttons)));
   }
   group("Scenario").append(
-    element("p", { className: "hint", textContent: "One of the rig’s scenarios in this page, on its ordinary bench, shown in the scope: the SHA-256 of its trace.csv is that of `cargo rig run`." }),
+    element("p", { className: "hint", textContent: "One of the rig’s scenarios in this page, on its ordinary bench, shown in the scope, with the SHA-256 of its trace.csv." }),
     element("div", { className: "buttons" }, select("scenario", scenarios.map(name => [name, name]), scenarios[0], { ariaLabel: "Scenario" }), button("run", "Run", "From its beginning to its end"),
       button("free", "Drive on", "Back to free driving")),
     element("p", { className: "sum", id: "sum", role: "status" }));
@@ -111,6 +111,7 @@ export function build(host, { controls, settings, kinds, faults, scenarios, remo
 
 export const KEYS = [
   ["↑ ↓", "command up, down (with Shift ten times as far)"], ["← →", "held speed, or load, down, up"], ["0", "command to zero"], ["1 2", "the motor that keys and views are about"],
+  ["V D F", "line voltage, dead time, true flux over the map up (with Shift down)"],
   ["E", "start, stop"], ["C", "coast, catch"], ["A", "acknowledge the fault"], ["R", "restart"], ["M", "mend what was injected"],
-  ["Space", "pause the scope"], ["[ ]", "shorter, longer window"], ["?", "this list"],
+  ["Space", "pause the scope, go on"], ["[ ]", "shorter, longer window"], ["+ - , .", "the paused scope closer, wider, earlier, later"], ["?", "this list"],
 ];

@@ -1,7 +1,7 @@
 // The page: starts the simulation in its worker, hands it what is set, and draws what comes back.
 import { KEYS, build, read, select, write } from "./controls.js";
 import { mcap } from "./mcap.js";
-import { Memory, Scope, WINDOWS } from "./scope.js";
+import { Memory, Scope, WINDOWS, told } from "./scope.js";
 import { SYSTEMS, chosen, machines } from "./systems.js";
 import * as views from "./views.js";
 
@@ -189,7 +189,7 @@ function toolbar() {
   };
   $("csv").onclick = () => save(csv(), "csv");
   $("mcap").onclick = () => save(mcap(memory.columns, saved()), "mcap");
-  globalThis.tractive = { csv, mcap: () => mcap(memory.columns, saved()) };
+  globalThis.tractive = { csv, mcap: () => mcap(memory.columns, saved()), faults: properties.faults };
   if (remote) for (const id of ["rate-choice"]) $(id).hidden = true;
   $("help").innerHTML = `<h2>Keys</h2><table>${KEYS.map(([keys, text]) => `<tr><td>${keys.split(" ").map(key => `<kbd>${key}</kbd>`).join(" ")}</td><td>${text}</td></tr>`).join("")}</table><form method="dialog"><p><button>Close</button></p></form>`;
   apply();
@@ -202,7 +202,7 @@ function fault(html) {
   $("fault").innerHTML = html;
   $("fault").hidden = !html;
 }
-const figure = value => (typeof value === "number" ? +value.toPrecision(4) : value);
+const figure = value => (typeof value === "number" ? told(+value.toPrecision(4)) : value);
 const STATES = { running: "good", enabled: "good", fault: "bad" };
 function report() {
   const name = state.status?.state ?? "init", trip = state.trip;
@@ -211,8 +211,8 @@ function report() {
   $("state").dataset.kind = trip ? "bad" : STATES[name] ?? "";
   if (trip) {
     const safe = { GatesOff: "gates off", ShortCircuit: "lower devices on", UpperShortCircuit: "upper devices on" }[trip.safe] ?? trip.safe;
-    const refusal = state.status?.refusal ? ` <span>refused: ${state.status.refusal}</span>` : "";
-    fault(`<b>${trip.fault}</b> <span>value ${figure(trip.value)}, limit ${figure(trip.limit)}</span> <span>${safe}</span>${refusal} <span>Mend the cause, then acknowledge.</span>`);
+    const unit = properties.units[trip.fault], of = value => `${figure(value)}${unit ? ` ${unit}` : ""}`, refusal = state.status?.refusal ? ` <span>refused: ${state.status.refusal}</span>` : "";
+    fault(`<b>${trip.fault}</b> <span>value ${of(trip.value)}, limit ${of(trip.limit)}</span> <span>${safe}</span>${refusal} <span>Mend the cause, then acknowledge.</span>`);
   } else if (memory) fault("");
   if ($("acknowledge").disabled !== !trip) buttons();
 }
@@ -237,15 +237,17 @@ function frame() {
   if (frames === 1) document.body.dataset.painted = performance.now().toFixed(0);
 }
 
-const nudge = (name, steps) => find(name).set(settings[name] + steps * find(name).step);
+const nudge = (name, steps) => find(name).set?.(settings[name] + steps * find(name).step);
 const view = k => { if (drive.system.motors[k]) { $("motor").value = k; $("motor").onchange(); } };
 addEventListener("keydown", event => {
   const inControl = event.target.closest?.("input, select, textarea, dialog, summary");
   if (event.ctrlKey || event.metaKey || event.altKey || !scope) return;
-  const far = event.shiftKey ? 100 : 10, n = suffix(), big = `${settings[`command${n}`]}${n}`, turning = settings[`rotor${n}`] === "held" ? `held${n}` : `load${n}`;
+  const far = event.shiftKey ? 100 : 10, up = event.shiftKey ? -1 : 1, n = suffix(), big = `${settings[`command${n}`]}${n}`, turning = settings[`rotor${n}`] === "held" ? `held${n}` : `load${n}`;
   const windows = by => { const at = WINDOWS.indexOf(+$("window").value) + by; if (WINDOWS[at]) { $("window").value = String(WINDOWS[at]); $("window").onchange(); } };
   const arrows = { ArrowUp: () => nudge(big, far), ArrowDown: () => nudge(big, -far), ArrowRight: () => nudge(turning, far), ArrowLeft: () => nudge(turning, -far), " ": () => $("pause").click() };
   const letters = {
+    v: () => nudge("link", 10 * up), d: () => nudge("dead", up), f: () => nudge("map", 2 * up),
+    "+": () => scope.move(0.5), "-": () => scope.move(2), ",": () => scope.move(1, -0.3), ".": () => scope.move(1, 0.3),
     e: () => act.press("on"), c: () => act.press("coast"), a: () => act.press("acknowledge"), r: () => act.press("restart"), m: () => act.press("mend"),
     0: () => find(big).set(0), 1: () => view(0), 2: () => view(1), "[": () => windows(-1), "]": () => windows(1), "?": () => $("help").showModal(),
   };

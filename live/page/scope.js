@@ -25,11 +25,14 @@ export class Memory {
   put(from, rows, edges) {
     const width = this.columns.length, n = rows.length / width;
     if (n > 0) this.count = Math.max(this.count, Math.round(from / this.step));
-    for (let k = 0; k < n; k++) {
-      const at = this.count % this.size;
-      for (let c = 0; c < width; c++) this.of[this.columns[c]][at] = rows[k * width + c];
-      this.count += 1;
-    }
+    this.columns.forEach((name, column) => {
+      const ring = this.of[name];
+      for (let from = column, at = this.count % this.size; from < rows.length; from += width) {
+        ring[at] = rows[from];
+        if (++at === this.size) at = 0;
+      }
+    });
+    this.count += n;
     // A gap: what came before it says nothing of what comes after.
     if (edges.length && this.edgeTimes.length && edges[0] - this.edgeTimes[this.edgeTimes.length - 1] > 0.05 && this.system.cycle) {
       [this.edgeTimes, this.edgeStates, this.edgesFrom] = [[], [], edges[0]];
@@ -106,7 +109,7 @@ export class Memory {
   /** Line voltage over the link in a window: each step, or the least and the most of each pixel. */
   lineVoltage(share, from, to, pixels) {
     const first = Math.max(this.edgeAfter(from), this.edgeAfter(to) - 60_000), last = this.edgeAfter(to), x = [], y = [], current = [0, 0, 0, 1];
-    const largest = this.has("ia") ? Math.max(this.peak("ia", 0.02), 1) : 1;
+    const largest = this.has("ia") ? Math.max(this.peak("ia", 0.02), 10) : 1;
     const volts = (state, t) => {
       const row = Math.min(Math.max(Math.round(t / this.step), 0), this.count - 1);
       if (this.has("ia")) ["ia", "ib", "ic"].forEach((name, k) => (current[k] = this.value(name, row)));
@@ -118,32 +121,33 @@ export class Memory {
     let now = volts(first > 0 ? this.edgeStates[first - 1] : 0, from), low = now, high = now, until = from + width;
     const put = (t, value) => { x.push(t); y.push(value); };
     put(Math.max(from, this.edgesFrom), now);
+    // Of a leg whose gates are off the diodes decide, which needs no edge.
+    const drift = (state, begin, end) => {
+      if (!this.system.isFree(state)) return;
+      for (let t = begin, step = Math.max(width, this.step); t < end; t += step) {
+        const next = volts(state, t);
+        if (next !== now) { put(t, now); put(t, next); now = low = high = next; }
+      }
+    };
     for (let k = first; k < last; k++) {
       const t = this.edgeTimes[k], next = volts(this.edgeStates[k], t);
+      drift(k > 0 ? this.edgeStates[k - 1] : 0, k > first ? this.edgeTimes[k - 1] : from, t);
       if (dense) {
         low = Math.min(low ?? 0, next ?? 0); high = Math.max(high ?? 0, next ?? 0);
         if (t >= until) { put(t, low); put(t, high); low = high = next; until = t + width; }
       } else if (next !== now) { put(t, now); put(t, next); }
       now = next;
     }
-    put(Math.min(to, Math.max(this.end, from)), now);
+    const end = Math.min(to, Math.max(this.end, from));
+    drift(last > 0 ? this.edgeStates[last - 1] : 0, last > first ? this.edgeTimes[last - 1] : from, end);
+    put(end, now);
     return [x, y];
-  }
-  csv() {
-    const first = Math.max(0, this.count - this.size), parts = [`t_s,${this.columns.join(",")}\n`];
-    for (let begin = first; begin < this.count; begin += 5000) {
-      let text = "";
-      for (let k = begin; k < Math.min(begin + 5000, this.count); k++) {
-        text += +(k * this.step).toFixed(9);
-        for (const name of this.columns) text += "," + +this.value(name, k).toPrecision(7);
-        text += "\n";
-      }
-      parts.push(text);
-    }
-    return new Blob(parts, { type: "text/csv" });
   }
 }
 
+/** A number as the text of this project writes it: 1,500 or −20. */
+export const told = value => FORMAT.format(value).replace("-", "−");
+const FORMAT = new Intl.NumberFormat("en", { maximumSignificantDigits: 6 });
 export const css = name => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 
 /** Ends of an axis that hold still: they move when they must. */
@@ -189,7 +193,9 @@ export class Scope {
   /** Lower on a phone, so that controls are near. */
   height(plot) { return Math.round(plot.height * (this.width() < 500 && !plot.gates ? 0.78 : 1)); }
   resize() {
-    if (this.plots[0].width !== this.width()) this.plots.forEach((plot, k) => plot.setSize({ width: this.width(), height: this.height(this.list[k]) }));
+    const width = this.width();
+    // Each by itself: a scroll bar may have come and gone while they were made.
+    this.plots.forEach((plot, k) => { if (plot.width !== width) plot.setSize({ width, height: this.height(this.list[k]) }); });
   }
   /** The plots of what the memory has: those of gates where edges come, the others where a column is there. */
   build() {
@@ -214,13 +220,13 @@ export class Scope {
       scales: { x: { time: false, range: () => this.shown }, y: plot.gates ? { range: () => [0, this.lanes() + 1] } : { range: (u, low, high) => range.of(low, high) } },
       axes: [
         { ...axis, size: isLast ? 30 : 6, values: isLast ? time : (u, ticks) => ticks.map(() => ""), space: 70 },
-        { ...axis, size: 58, space: 26, ...(plot.gates ? { splits: () => Array.from({ length: this.lanes() + 1 }, (_, k) => k + 0.5), values: () => [...(this.lanes() ? [this.memory.system.id === "zs9" ? "scheme" : "mode", ...this.memory.system.lanes.map(lane => lane.name).reverse()] : [""])], space: 1 } : {}) },
+        { ...axis, size: 58, space: plot.height < 100 ? 18 : 26, values: (u, ticks) => ticks.map(told), ...(plot.gates ? { splits: () => Array.from({ length: this.lanes() + 1 }, (_, k) => k + 0.5), values: () => [...(this.lanes() ? [this.memory.system.id === "zs9" ? "scheme" : "mode", ...this.memory.system.lanes.map(lane => lane.name).reverse()] : [""])], space: 1 } : {}) },
       ],
       series: [
         { label: "t", value: (u, t) => (t == null ? "" : `${(t * 1e3).toFixed(2)} ms`) },
         ...plot.series.map(([, name, colour, dash]) => ({
           label: name, stroke: css(colour), width: 1.4, dash, points: { show: false },
-          value: (u, value) => (value == null || Number.isNaN(value) ? "" : value.toPrecision(4)),
+          value: (u, value) => (value == null || Number.isNaN(value) ? "" : told(+value.toPrecision(4))),
         })),
         ...(plot.gates ? [{ show: true, stroke: "transparent", points: { show: false } }] : []),
       ],
@@ -229,6 +235,10 @@ export class Scope {
         draw: plot.gates ? [u => this.gates(u)] : [],
       },
     };
+    // Where title and names do not fit into one row, the names have one of their own.
+    const narrow = innerWidth < 620, room = narrow ? 46 : 92; // of a name with its value, which a narrow window does not show
+    const names = options.series.reduce((sum, { label = "" }, k) => sum + (k || !narrow ? 8 * label.length + room : 0), 0);
+    if (!plot.gates && 7 * plot.title.length + 66 + names > this.width()) options.class = "two-rows";
     const made = new uPlot(options, [[], ...options.series.slice(1).map(() => [])], this.host);
     made.over.addEventListener("dblclick", () => { this.held = null; this.onzoom?.(); });
     return made;
@@ -238,11 +248,19 @@ export class Scope {
     if (u.select.width < 4) return;
     const from = u.posToVal(u.select.left, "x"), to = u.posToVal(u.select.left + u.select.width, "x");
     u.setSelect({ left: 0, width: 0, top: 0, height: 0 }, false);
-    if (to - from > 2 * this.memory.step) {
-      this.held = [from, to];
-      this.paused = true;
-      this.onzoom?.();
-    }
+    this.hold(from, to);
+  }
+  /** Shows a part of what is held, and stands still. */
+  hold(from, to) {
+    if (to - from <= 2 * this.memory.step) return;
+    this.held = [from, to];
+    this.paused = true;
+    this.onzoom?.();
+  }
+  /** Closer or wider about the middle, and earlier or later by a share of the window. */
+  move(by, later = 0) {
+    const [from, to] = this.shown, middle = 0.5 * (from + to) + later * (to - from), half = 0.5 * by * (to - from);
+    this.hold(middle - half, middle + half);
   }
   /** The window that is shown now. */
   view() {

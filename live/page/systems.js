@@ -40,9 +40,9 @@ const common = machine => [
   { name: "noise", group: LINE, text: "Current noise, rms", low: 0, high: machine.noise, step: machine.noise / 30, unit: "A", first: 0, restart: true },
 ];
 const faults = (numbered, sensors) => [
-  ["Current sensors", name => name.startsWith("current-")], ["Angle sensor", name => name.startsWith("angle-") && !name.endsWith("at-rest")],
+  ["Current sensors", name => name.startsWith("current-")], ["Angle sensor", name => name.startsWith("angle-")],
   [sensors, name => /^(link|source|capacitors)-/.test(name)], ["Gates and devices", name => /^([uvw][hml]-|leg-|shoot-)/.test(name)],
-  ["Interrupts and rotor", name => /^(control-late|commands-lost|demand-not-finite|overspeed)/.test(name)], ["Another machine", name => name.startsWith("flux-")],
+  ["Interrupts and rotor", name => /^(control-late|commands-lost|demand-not-finite|overspeed)/.test(name)], ["Another machine", name => /^(flux|resistance)-/.test(name)],
 ];
 const SAMPLES = { name: "samples", group: "Scope", of: [["20", "20 kHz"], ["50", "50 kHz"]], first: "20", restart: true };
 const level3 = (state, leg) => (state >> (2 * leg) & 1 ? 1 : state >> (2 * leg + 1) & 1 ? 0 : 0.5);
@@ -64,6 +64,7 @@ const PMASYNRM = {
   id: "pmasynrm", title: "PMaSynRM, one motor on a two-level inverter", motors: [{ suffix: "" }],
   modes: ["off", "async", "sync 15", "sync 12", "mid 7", "mid 3", "square"],
   lanes: [0, 1, 2].map(leg => ({ name: "uvw"[leg], colour: ["--u", "--v", "--w"][leg], level: state => level3(state, leg) })),
+  isFree: state => [0, 1, 2].some(leg => level3(state, leg) === 0.5),
   cycle: null, top: 3000, repeats: true, voltage: 2 / Math.PI,
   plots: [
     { title: "Phase currents, A", height: 196, least: 20, series: [["ia", "u", "--u"], ["ib", "v", "--v"], ["ic", "w", "--w"], ["peak", "peak", "--u"]] },
@@ -95,6 +96,7 @@ const ZS9 = {
   id: "zs9", title: "ZS9: two motors on a Z-source nine-switch inverter", motors: [{ suffix: "1", text: "motor 1" }, { suffix: "2", text: "motor 2" }],
   modes: ["off", ...SCHEMES],
   lanes: ["uH", "vH", "wH", "uM", "vM", "wM", "uL", "vL", "wL"].map((name, gate) => ({ name, colour: ["--u", "--v", "--w"][gate % 3], level: state => on(state, gate) })),
+  isFree: () => false,
   cycle: 2e-4, top: 25_000, repeats: false, voltage: 1 / Math.sqrt(3),
   plots: [
     two("Currents of motor 1, A", 140, 8, ["ia1", "u", "--u"], ["ib1", "v", "--v"], ["ic1", "w", "--w"], ["peak1", "peak", "--u"]),
@@ -103,7 +105,8 @@ const ZS9 = {
     two("Speeds, r/min", 92, 20, ["speed1", "n1", "--speed"], ["speed2", "n2", "--link"]),
     two("Z-source, V", 110, 20, ["udc", "link", "--link"], ["capacitor", "capacitors", "--flux"], ["source", "source", "--speed"]),
     two("Inductor current, A; shoot-through, %", 92, 10, ["inductor", "A", "--w"], ["duty", "%", "--v"]),
-    { title: "Line voltages, V", height: 92, lines: [["u–v, motor 1", "--u", share9(false)], ["motor 2", "--w", share9(true)]] },
+    { title: "Line voltage of motor 1, V", height: 84, lines: [["u–v", "--u", share9(false)]] },
+    { title: "Line voltage of motor 2, V", height: 84, lines: [["u–v", "--w", share9(true)]] },
     { title: "Gates and scheme", height: 190, gates: true, series: [] },
   ],
   triggers: [["ia1", "current u of motor 1 ↑"], ["ia2", "current u of motor 2 ↑"], ["te", "torque demand steps"], ["mode", "scheme changes"], ["fault", "fault"]],

@@ -233,7 +233,7 @@ export function spectrum(memory, properties, system, bound) {
   ctx.textBaseline = "middle";
   ctx.textAlign = "right";
   for (const a of [0.001, 0.01, 0.1, 1, 10, 100].filter(a => Math.log10(a) > low && Math.log10(a) < high)) { line(ctx, css("--grid"), 1, [[left, y(a)], [right, y(a)]]); ctx.fillText(a, left - 5, y(a)); }
-  for (let hz = 0; hz <= most; hz += most > 12_000 ? 5000 : most > 5000 ? 2000 : 1000) { line(ctx, css("--grid"), 1, [[x(hz), top], [x(hz), bottom]]); ctx.textAlign = hz ? (hz === most ? "right" : "center") : "left"; ctx.fillText(hz ? `${hz / 1000} kHz` : "0", x(hz), height - 8); }
+  for (let hz = 0; hz <= most; hz += most > 8000 ? 5000 : most > 5000 ? 2000 : 1000) { line(ctx, css("--grid"), 1, [[x(hz), top], [x(hz), bottom]]); ctx.textAlign = hz ? (hz === most ? "right" : "center") : "left"; ctx.fillText(hz ? `${hz / 1000} kHz` : "0", x(hz), height - 8); }
   ctx.textAlign = "left";
   const curve = of => Array.from({ length: Math.floor(most / step) }, (_, k) => [x(k * step), y(of[k])]);
   if (alone) line(ctx, css("--speed"), 3, curve(alone));

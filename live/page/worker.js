@@ -4,6 +4,8 @@ import init, { Bench, Ran, scenarios } from "./tractive_live.js";
 const SLICE_S = 0.002; // simulated at once
 const BUSY_MS = 14; // computed at once
 const LONGEST_LAG_S = 0.1; // what is later than this is let go
+const LONGEST_AHEAD_S = 1; // further ahead of the page the bench waits for it, as where nobody looks
+const FRAME_MS = 26; // between two frames as fast as it goes: thirty of a screen's sixty a second
 
 let bench = null;
 let rate = 1;
@@ -11,6 +13,7 @@ let last = 0; // wall time of the last turn, ms
 let owed = 0; // simulated time that is due, s
 let answered = true; // the page has drawn what it got
 let began = 0;
+let handed = { at: 0, wall: 0 }; // when rows were last handed over, in both times
 const pace = { wall: 0, simulated: 0, busy: 0 };
 
 const handlers = {
@@ -20,7 +23,7 @@ const handlers = {
     bench = new Bench(system, machine, words, speed, step);
     bench.want(want.on, want.coast, want.discharge);
     for (const [name, motor, values] of set) bench.set(name, motor, Float64Array.from(values));
-    began = 0;
+    began = handed.at = 0;
     owed = 0;
     last = performance.now();
     answered = true;
@@ -69,7 +72,7 @@ function turn() {
 function advance(now, passed) {
   owed = rate === Infinity ? Infinity : Math.min(owed + rate * passed, Math.max(LONGEST_LAG_S, LONGEST_LAG_S * rate));
   let time = began;
-  while (owed > 1e-6 && performance.now() - now < BUSY_MS && (rate !== Infinity || answered || time - began < 1)) {
+  while (owed > 1e-6 && performance.now() - now < BUSY_MS && (answered || time - handed.at < LONGEST_AHEAD_S)) {
     const step = Math.min(owed, SLICE_S);
     time = bench.run(step);
     owed -= step;
@@ -78,7 +81,7 @@ function advance(now, passed) {
   pace.simulated += time - began;
   pace.busy += (performance.now() - now) / 1e3;
   began = time;
-  if (answered) hand();
+  if (answered && (rate !== Infinity || performance.now() - handed.wall > FRAME_MS)) hand();
 }
 
 let factor = { reached: 0, possible: 0 };
@@ -87,6 +90,7 @@ function hand() {
     factor = { reached: pace.simulated / pace.wall, possible: pace.simulated / pace.busy };
     pace.wall = pace.simulated = pace.busy = 0;
   }
+  handed = { at: began, wall: performance.now() };
   const from = bench.take();
   const rows = bench.rows(), edges = bench.edges();
   answered = false;
@@ -96,7 +100,7 @@ function hand() {
 // A message to itself comes sooner than a timer does; without work a timer gives the processor away.
 const channel = new MessageChannel();
 channel.port1.onmessage = () => {
-  const idle = !bench || (!answered && rate === Infinity) || (rate !== Infinity && owed < 1e-6);
+  const idle = !bench || owed < 1e-6 || (!answered && began - handed.at >= LONGEST_AHEAD_S);
   if (idle) setTimeout(turn, 4); else turn();
 };
 

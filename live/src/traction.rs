@@ -136,9 +136,7 @@ impl Driven for Traction {
             Cause::Runaway => self.live.run_away(),
             Cause::Machine(flux_scale, resistance_scale) => {
                 self.live.set_flux_scale(flux_scale);
-                if resistance_scale != 1.0 {
-                    bail!("`{name}`: the resistance is an option of the start");
-                }
+                self.live.set_resistance_scale(resistance_scale);
             }
         }
         Ok(())

@@ -1,7 +1,9 @@
 //! The limits and curves of a machine that the live page draws.
 
 use crate::machine::Machine;
-use serde_json::{Value, json};
+use crate::report::unit;
+use serde_json::{Map, Value, json};
+use tractive::protection::Fault;
 use tractive_tablegen::{Optimum, SmoothMap};
 
 /// Points of a curve.
@@ -16,6 +18,8 @@ pub fn properties(machine: &Machine) -> Value {
         .map(|k| optimum.least_current(parameters.max_torque_nm * f64::from(k) / f64::from(POINTS)))
         .map(|(id_a, iq_a)| [id_a, iq_a])
         .collect();
+    let units: Map<_, _> =
+        Fault::ALL.map(|fault| (fault.name().to_owned(), unit(fault).into())).into_iter().collect();
     json!({
         "name": machine.tables.name,
         "polePairs": parameters.pole_pairs,
@@ -32,6 +36,7 @@ pub fn properties(machine: &Machine) -> Value {
         "resistance": parameters.stator_resistance_ohm,
         "mtpa": mtpa,
         "maxSwitching": parameters.max_switching_hz,
+        "units": units,
         "flux": flux(&map, parameters.max_current_a),
     })
 }

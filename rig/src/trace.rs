@@ -185,11 +185,16 @@ impl Recording {
             let t_s = self.seconds(edge.tick);
             on[usize::from(edge.gate)] = edge.on;
             let level = udc_v * (f64::from(u8::from(on[0])) - f64::from(u8::from(on[2])));
-            if t_s >= from_s && t_s <= to_s {
-                points.extend([(t_s, last), (t_s, level)]);
+            if t_s > to_s {
+                break;
+            }
+            if t_s >= from_s {
+                let begin = points.is_empty().then_some((from_s, last));
+                points.extend(begin.into_iter().chain([(t_s, last), (t_s, level)]));
             }
             last = level;
         }
+        points.push((to_s, last));
         points
     }
 }

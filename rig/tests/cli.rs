@@ -46,6 +46,22 @@ fn a_reader_who_leaves_changes_nothing() {
 }
 
 #[test]
+fn the_page_says_what_was_run() {
+    let folder = tempfile::tempdir().unwrap();
+    rig(&format!("run sweep --to 100 --udc 1400 --seed 7 --out {}", folder.path().display()));
+    let page = std::fs::read_to_string(folder.path().join("report.html")).unwrap();
+    let git = ["-C", env!("CARGO_MANIFEST_DIR"), "rev-parse", "--short=12", "HEAD"];
+    let git = Command::new("git").args(git).output().ok().filter(|output| output.status.success());
+    let commit = git.map_or(String::new(), |output| String::from_utf8(output.stdout).unwrap());
+    let version = env!("CARGO_PKG_VERSION");
+    let lines =
+        [("machine", "pmasynrm-180kw"), ("DC source", "1400 V"), ("--seed", "7"), ("version", version)];
+    for (what, value) in lines.into_iter().chain((!commit.is_empty()).then_some(("commit", commit.trim()))) {
+        assert!(page.contains(&format!("<dt>{what}</dt><dd>{value}")), "{what}: no {value}");
+    }
+}
+
+#[test]
 fn bad_usage_is_refused() {
     refused_in_one_line("run nonsense", &["nonsense", "load-steps, sweep, characteristic, "]);
     refused_in_one_line("run sweep --machine nowhere", &["nowhere", "must be"]);

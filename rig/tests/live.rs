@@ -79,6 +79,22 @@ fn a_wrong_map_is_noticed() {
 }
 
 #[test]
+fn a_resistance_that_doubles_takes_more_voltage_until_it_is_mended() {
+    let mut live = live(&[], 200.0);
+    live.command(Command::Torque(1_000.0));
+    let mut voltage_v = |scale: Option<f64>| {
+        match scale {
+            Some(scale) => live.set_resistance_scale(scale),
+            None => live.mend(),
+        }
+        run(&mut live, 0.8);
+        mean(&run(&mut live, 0.2), |row| row.u_v)
+    };
+    let [rated, doubled, mended] = [Some(1.0), Some(2.0), None].map(&mut voltage_v);
+    assert!(doubled > rated + 5.0 && (mended - rated).abs() < 1.0, "{rated} {doubled} {mended}");
+}
+
+#[test]
 fn short_turns_are_the_same_as_long_ones() {
     let run = |pieces: u32| {
         let mut live = live(&[], 600.0);
@@ -102,7 +118,10 @@ fn wrong(cause: Cause) -> (Live, Option<Fault>) {
     match cause {
         Cause::Bench(kind) => live.inject(kind),
         Cause::Runaway => live.run_away(),
-        Cause::Machine(flux_scale, _) => live.set_flux_scale(flux_scale),
+        Cause::Machine(flux_scale, resistance_scale) => {
+            live.set_flux_scale(flux_scale);
+            live.set_resistance_scale(resistance_scale);
+        }
     }
     run(&mut live, if cause == Cause::Runaway { 0.6 } else { 0.05 });
     let named = live.trip().map(|trip| trip.fault);

@@ -82,6 +82,15 @@ fn words_lie_within_their_picture_and_are_large_enough_to_read() {
             assert!(letters >= 11.0, "{}: {letters} px in {line}", picture.name);
             let (x, y) = (attribute(line, "x") / fine, attribute(line, "y") / fine);
             assert!((0.0..=width).contains(&x) && (0.0..=height).contains(&y), "{}: {line}", picture.name);
+            // The words themselves stand on the next line; a letter is half as wide as high.
+            let text =
+                svg[line.as_ptr() as usize - svg.as_ptr() as usize..].lines().nth(1).unwrap_or_default();
+            let words: String =
+                text.split('<').map(|part| part.split('>').next_back().unwrap_or(part)).collect();
+            let begins = line.contains("text-anchor=\"start\"") && !line.contains("rotate");
+            let room = if begins { width - x } else { width };
+            let long = 0.5 * letters * words.chars().count() as f64;
+            assert!(long <= room, "{}: {words} is {long} px long, {room} px are left", picture.name);
         }
     }
 }

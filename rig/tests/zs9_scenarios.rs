@@ -288,6 +288,7 @@ fn the_trace_has_its_columns_and_is_written_whole() {
     let edges = std::fs::read_to_string(folder.path().join("edges.csv")).unwrap();
     assert!(edges.starts_with("t_s,gate,level\n") && edges.lines().count() > 100_000);
     let page = std::fs::read_to_string(folder.path().join("report.html")).unwrap();
+    assert!(page.contains("<dt>DC source</dt><dd>400 V"), "the source's, not the machine's");
     assert!(["figures 20 to 23 ·", "figure 23 ·"].iter().all(|figure| page.contains(figure)));
     let summary: Value =
         serde_json::from_str(&std::fs::read_to_string(folder.path().join("summary.json")).unwrap()).unwrap();

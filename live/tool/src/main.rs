@@ -43,11 +43,7 @@ enum Command {
     Check {
         /// The page's folder
         page: PathBuf,
-        /// The host's trace.csv of `sweep`
-        trace: PathBuf,
-        /// The host's trace.csv of `zs9-load-step`
-        zs9: PathBuf,
-        /// The rig, whose page of a drive elsewhere is looked at, too
+        /// The rig, whose traces are the page's and whose page of a drive elsewhere is looked at, too
         #[arg(long)]
         rig: PathBuf,
         /// Report pages that are looked at, too
@@ -91,10 +87,9 @@ fn main() -> Result<()> {
     match Command::parse() {
         Command::Make { wasm, out } => page::make(&wasm, &out),
         Command::Serve { page, port, no_open } => server::serve(&page, port, !no_open),
-        Command::Check { page, trace, zs9, rig, report, in_qemu, axe, browser } => {
-            let scenarios = [("sweep", trace.as_path()), ("zs9-load-step", zs9.as_path())];
+        Command::Check { page, rig, report, in_qemu, axe, browser } => {
             let (axe, mut browser) = (Axe::read(axe.as_deref())?, Browser::start(&browser)?);
-            check::check(&page, scenarios, &mut browser, &axe)?;
+            check::check(&page, &rig, &mut browser, &axe)?;
             check::check_remote(&rig, if in_qemu { "qemu" } else { "host" }, &mut browser, &axe)?;
             reports::check(&report, None, &mut browser, &axe)
         }

@@ -5,6 +5,7 @@ use crate::files::write_text;
 use crate::machine::Machine;
 use crate::options::usual_min_pulse_us;
 use crate::pictures::chai::machine as plane;
+use crate::pictures::sheet::number;
 use crate::report::Page;
 use crate::run;
 use anyhow::{Context, Result};
@@ -228,14 +229,14 @@ impl<'a> View<'a> {
             .map(|share| {
                 let points =
                     along(-largest, last_d).map(|id| (id, self.map.at(id, share * largest).psi_d_wb));
-                (format!("iq = {:.3} A", share * largest), points.collect())
+                (format!("iq = {} A", number((share * largest).round())), points.collect())
             })
             .collect();
         let psi_q: Series = shares
             .iter()
             .map(|share| {
                 let points = along(0.0, largest).map(|iq| (iq, self.map.at(-share * largest, iq).psi_q_wb));
-                (format!("id = {:.3} A", -share * largest), points.collect())
+                (format!("id = {} A", number((-share * largest).round())), points.collect())
             })
             .collect();
         page.draw_xy(None, "flux linkage along d over id", ("id in A", "Wb"), &psi_d);

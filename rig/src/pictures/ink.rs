@@ -3,6 +3,8 @@
 use super::sheet::{BLACK, Colour, LETTERS, Mark, Panel, Point, Side, number};
 use anyhow::Result;
 use plotters::coord::Shift;
+use plotters::coord::ranged1d::{DefaultFormatting, KeyPointHint, Ranged};
+use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
@@ -82,12 +84,13 @@ fn draw_panel(sheet: &Sheet, panel: &Panel) -> Result<()> {
     let (x_range, y_range) = ranges(panel, size);
     let size_fine = (fine(width - EDGE) as u32, fine(height - EDGE) as u32);
     let part = sheet.clone().shrink((fine(left + EDGE), fine(top)), size_fine);
+    let across = Numbered { whole: (x_range.0..x_range.1).into(), each: x.each };
     let mut chart = ChartBuilder::on(&part)
         .margin_top(fine(above))
         .margin_right(fine(ROOM.3))
         .set_label_area_size(LabelAreaPosition::Left, fine(ROOM.0 - EDGE))
         .set_label_area_size(LabelAreaPosition::Bottom, fine(ROOM.1 - EDGE))
-        .build_cartesian_2d(x_range.0..x_range.1, y_range.0..y_range.1)?;
+        .build_cartesian_2d(across, y_range.0..y_range.1)?;
     let numbers = ("sans-serif", letters(LETTERS - 1.0)).into_font().color(&BLACK);
     let labels = ("sans-serif", letters(LETTERS)).into_font().color(&BLACK);
     let count = |length: f64, each: f64, bare: bool| if bare { 0 } else { (length / each) as usize };
@@ -115,6 +118,33 @@ fn draw_panel(sheet: &Sheet, panel: &Panel) -> Result<()> {
     headings(sheet, panel, above)
 }
 
+/// An axis whose numbers have a distance of their own, if it says one.
+struct Numbered {
+    whole: RangedCoordf64,
+    each: Option<f64>,
+}
+
+impl Ranged for Numbered {
+    type FormatOption = DefaultFormatting;
+    type ValueType = f64;
+
+    fn map(&self, value: &f64, limit: Place) -> i32 {
+        self.whole.map(value, limit)
+    }
+
+    fn key_points<Hint: KeyPointHint>(&self, hint: Hint) -> Vec<f64> {
+        let Some(each) = self.each else { return self.whole.key_points(hint) };
+        let range = self.range();
+        let places = (range.start / each).ceil() as i64..=(range.end / each).floor() as i64;
+        let bold = !hint.weight().allow_light_points();
+        places.filter(|_| bold).map(|k| each * k as f64).collect()
+    }
+
+    fn range(&self) -> core::ops::Range<f64> {
+        self.whole.range()
+    }
+}
+
 /// Title and names above a panel.
 fn headings(sheet: &Sheet, panel: &Panel, above: f64) -> Result<()> {
     let (left, top, ..) = panel.place;
@@ -126,9 +156,10 @@ fn headings(sheet: &Sheet, panel: &Panel, above: f64) -> Result<()> {
         draw_mark(sheet, &title, &place)?;
     }
     let mut x = begin;
-    for (name, colour) in &panel.names {
+    for (k, (name, colour)) in panel.names.iter().enumerate() {
         let y = top + above - 10.0;
-        let stroke = Mark::Line(vec![(x, y), (x + 18.0, y)], *colour, 2.0, false);
+        let dashed = panel.last_dashed && k + 1 == panel.names.len();
+        let stroke = Mark::Line(vec![(x, y), (x + 18.0, y)], *colour, 2.0, dashed);
         draw_mark(sheet, &stroke, &place)?;
         let words = Mark::Words((x + 23.0, y), name.clone(), Side::Right, BLACK, LETTERS);
         draw_mark(sheet, &words, &place)?;

@@ -17,6 +17,15 @@ const COUNTED: u32 = 499;
 
 /// Top of the axis of distortion, in %.
 const HIGHEST: f64 = 12.0;
+/// Place of a pattern's name: share of its curve, distance above it in %, and side. The curves fall: right above one and left below it there is
+/// nothing of itself.
+fn name_place(name: &str) -> (f64, f64, Side) {
+    match name {
+        "opt5c" => (0.0, 0.0, Side::Left),
+        "opt13b" | "opt15" | "opt11" | "opt7a" | "opt7c" => (0.33, -0.25, Side::Left),
+        _ => (0.5, 0.2, Side::Right),
+    }
+}
 
 /// A pattern at a modulation index in its window.
 struct Played {
@@ -77,7 +86,7 @@ fn place(k: usize, height: f64) -> (f64, f64, f64, f64) {
 pub fn every_pulse(machine: &Machine) -> Result<String> {
     const ROW: f64 = 1.5;
     let rows = BRANCHES.len() as f64;
-    let axes = (Axis::of("pulse angle in degrees", 0.0, 360.0), Axis::of("", -0.3, ROW * rows - 0.1).bare());
+    let axes = (Axis::turn("pulse angle in degrees"), Axis::of("", -0.3, ROW * rows - 0.1).bare());
     let mut panel =
         Panel::new((110.0, 0.0, 850.0, 640.0), "A leg of each pattern over a turn", axes.0, axes.1);
     for (k, branch) in BRANCHES.into_iter().enumerate() {
@@ -97,8 +106,7 @@ pub fn every_spectrum(machine: &Machine) -> Result<String> {
     let mut panels = Vec::new();
     for (k, branch) in BRANCHES.into_iter().enumerate() {
         let played = Played::usual(machine, branch)?;
-        let axes =
-            (Axis::of("harmonic", 0.0, f64::from(SHOWN + 1)), Axis::of("% of the fundamental", 0.0, 110.0));
+        let axes = (Axis::of("harmonic", 0.0, f64::from(SHOWN + 1)), Axis::of("% of V_{1}", 0.0, 110.0));
         let mut panel = Panel::new(place(k, HEIGHT), &played.title(), axes.0, axes.1);
         // Of a machine without a neutral: odd, and no multiple of three.
         for order in (1..=SHOWN).step_by(2).filter(|order| order % 3 != 0) {
@@ -122,8 +130,9 @@ pub fn every_distortion(machine: &Machine) -> Result<String> {
             let played = Played::of(machine, branch, f64::from(hundredths) / 100.0)?;
             points.push((played.index, distortion(&played.edges, played.f1_hz)));
         }
-        if let Some((x, y)) = points.get(points.len() / 2) {
-            panel.words((*x, y + 0.25), branch.name, Side::Middle, colour);
+        let (share, above, side) = name_place(branch.name);
+        if let Some((x, y)) = points.get((share * points.len() as f64) as usize) {
+            panel.words((*x, y + above), branch.name, side, colour);
         }
         panel.line(points, colour, 2.0);
     }
@@ -136,7 +145,7 @@ pub fn every_distortion(machine: &Machine) -> Result<String> {
             let Ok(edges) = pulses(machine, mode, f1_hz, share) else { break };
             points.push((share, distortion(&edges, f1_hz)));
         }
-        if let Some((x, y)) = points.iter().find(|(_, percent)| *percent < HIGHEST) {
+        if let Some((x, y)) = points.iter().find(|(_, percent)| *percent < HIGHEST - 0.5) {
             panel.words((*x, y + 0.25), mode.name(), Side::Right, GREY);
         }
         panel.dashes(points, GREY);

@@ -62,17 +62,24 @@ pub struct Axis {
     pub range: Option<(f64, f64)>,
     /// `true` if the axis has no numbers.
     pub bare: bool,
+    /// Distance of its numbers; where there is none, a round one.
+    pub each: Option<f64>,
 }
 
 impl Axis {
     /// An axis that fits its curves.
     pub fn fitted(label: &str) -> Self {
-        Self { label: label.to_owned(), range: None, bare: false }
+        Self { label: label.to_owned(), ..Self::default() }
     }
 
     /// An axis from a value to another.
     pub fn of(label: &str, first: f64, last: f64) -> Self {
-        Self { label: label.to_owned(), range: Some((first, last)), bare: false }
+        Self { label: label.to_owned(), range: Some((first, last)), ..Self::default() }
+    }
+
+    /// The axis of an angle over a turn, in degrees, with a number each 60°.
+    pub fn turn(label: &str) -> Self {
+        Self { each: Some(60.0), ..Self::of(label, 0.0, 360.0) }
     }
 
     /// The same without numbers.
@@ -96,6 +103,8 @@ pub struct Panel {
     pub marks: Vec<Mark>,
     /// Names of curves by their colours, in a row above the panel.
     pub names: Vec<(String, Colour)>,
+    /// `true` if the last of them is dashed.
+    pub last_dashed: bool,
 }
 
 impl Panel {
@@ -129,6 +138,19 @@ impl Panel {
     ) -> &mut Self {
         self.names.push((name.to_owned(), colour));
         self.line(points, colour, 1.6)
+    }
+
+    /// Adds a dashed curve whose name stands above the panel: one that may lie on the one before. It is the last of them.
+    pub fn named_dashes(
+        &mut self,
+        name: &str,
+        points: impl IntoIterator<Item = Point>,
+        colour: Colour,
+    ) -> &mut Self {
+        self.names.push((name.to_owned(), colour));
+        self.last_dashed = true;
+        self.marks.push(Mark::Line(points.into_iter().collect(), colour, 1.6, true));
+        self
     }
 
     /// Adds a dashed curve.

@@ -25,7 +25,6 @@ pub use speed::{SpeedSource, profile_speed};
 pub use stator::{Stator, StatorSlopes};
 pub use vector::Vector;
 
-use core::f64::consts::TAU;
 use legs::{Clamp, LONGEST_STEP_S};
 use runge_kutta::{along, rotated};
 use tractive_tablegen::{MachineFolder, SmoothMap};
@@ -74,6 +73,11 @@ impl Plant {
         self.clamp = self.clamp.scaled(flux_scale / self.flux_scale);
         self.motor.stator.set_flux_scale(flux_scale);
         self.flux_scale = flux_scale;
+    }
+
+    /// Has the machine's true resistance be another multiple of its rating, from 0. Currents stay as they are.
+    pub fn set_resistance_scale(&mut self, scale: f64) {
+        self.motor.stator.set_resistance_scale(scale);
     }
 
     /// Lets time pass with the legs unchanged.
@@ -160,7 +164,7 @@ impl Plant {
     ) -> [f64; N] {
         let rotor = &self.motor.rotor;
         let turning = rotor.turning(|| self.motor.torque_nm(), dt_s);
-        let begin = (rotor.angle_turns() * TAU).sin_cos();
+        let begin = rotor.sin_cos();
         let middle = rotated(begin, turning.turned(0.5 * dt_s).sin_cos());
         let end = rotated(begin, turning.turned(dt_s).sin_cos());
         let half = turning.omega(0.5 * dt_s);

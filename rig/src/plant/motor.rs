@@ -66,7 +66,7 @@ impl Motor {
 
     /// Phase currents, positive into the motor, in A.
     pub fn currents_abc(&self) -> [f64; 3] {
-        Vector::from_rotor((self.id_a, self.iq_a), (self.rotor.angle_turns() * TAU).sin_cos()).phases()
+        Vector::from_rotor((self.id_a, self.iq_a), self.rotor.sin_cos()).phases()
     }
 
     /// Air-gap torque, in N·m.

@@ -11,6 +11,8 @@ pub struct Rotor {
     time_s: f64,
     /// Electrical angle, 0 ≤ x < 1 turn.
     angle_turns: f64,
+    /// Its sine and cosine.
+    sin_cos: (f64, f64),
     /// Mechanical, in rad/s.
     speed_rad_s: f64,
     /// Torque of friction of a free rotor, in N·m.
@@ -24,17 +26,26 @@ impl Rotor {
             SpeedSource::Profile(points) => profile_speed(points, 0.0),
             SpeedSource::Inertia { .. } => 0.0,
         };
-        Self { source, pole_pairs, time_s: 0.0, angle_turns: 0.0, speed_rad_s, friction_nm: 0.0 }
+        let sin_cos = (0.0, 1.0);
+        Self { source, pole_pairs, time_s: 0.0, angle_turns: 0.0, sin_cos, speed_rad_s, friction_nm: 0.0 }
     }
 
     /// Turns the rotor to an electrical angle, in turns.
     pub fn turn_to(&mut self, angle_turns: f64) {
-        self.angle_turns = angle_turns.rem_euclid(1.0);
+        self.angle_turns =
+            if (0.0..1.0).contains(&angle_turns) { angle_turns } else { angle_turns.rem_euclid(1.0) };
+        self.sin_cos = (self.angle_turns * TAU).sin_cos();
     }
 
     /// Electrical rotor angle, in turns, 0 ≤ x < 1.
     pub fn angle_turns(&self) -> f64 {
         self.angle_turns
+    }
+
+    /// Its sine and cosine.
+    #[inline]
+    pub fn sin_cos(&self) -> (f64, f64) {
+        self.sin_cos
     }
 
     /// Mechanical speed, in r/min.
@@ -116,7 +127,7 @@ impl Rotor {
             }
         };
         let mean_speed = 0.5 * (speed_before + self.speed_rad_s);
-        self.angle_turns = (self.angle_turns + self.pole_pairs * mean_speed * dt_s / TAU).rem_euclid(1.0);
+        self.turn_to(self.angle_turns + self.pole_pairs * mean_speed * dt_s / TAU);
         impulse_nm_s * mean_speed
     }
 }

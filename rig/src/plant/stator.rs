@@ -10,6 +10,7 @@ pub struct Stator {
     scale: f64,
     /// Pole pairs.
     pub pole_pairs: f64,
+    rated_ohm: f64,
     resistance_ohm: f64,
 }
 
@@ -50,6 +51,7 @@ impl Stator {
             flux: linear(&machine.map).unwrap_or_else(|| Flux::Smooth(SmoothMap::new(&machine.map))),
             scale: settings.flux_scale,
             pole_pairs: f64::from(parameters.pole_pairs),
+            rated_ohm: parameters.stator_resistance_ohm,
             resistance_ohm: parameters.stator_resistance_ohm * settings.resistance_scale,
         }
     }
@@ -57,6 +59,11 @@ impl Stator {
     /// Has the true flux linkage be another multiple of the map's. Currents stay.
     pub(super) fn set_flux_scale(&mut self, scale: f64) {
         self.scale = scale;
+    }
+
+    /// Has the true resistance be another multiple of the rating. Currents stay.
+    pub(super) fn set_resistance_scale(&mut self, scale: f64) {
+        self.resistance_ohm = self.rated_ohm * scale;
     }
 
     /// True flux linkage over the map's.

@@ -12,6 +12,22 @@ pub fn processor_s() -> f64 {
     0.0
 }
 
+/// No repository: nothing.
+pub(crate) fn commit() -> Option<String> {
+    None
+}
+
+/// The progress of a run, which nobody is shown.
+pub(crate) struct Progress;
+
+impl Progress {
+    pub(crate) fn new(_name: &str) -> Self {
+        Self
+    }
+
+    pub(crate) fn show(&mut self, _done: f64) {}
+}
+
 /// A folder that there is not.
 pub(crate) struct NoFolder(PathBuf);
 

@@ -4,17 +4,58 @@
 #[cfg_attr(not(target_os = "linux"), path = "no_can.rs")]
 pub(crate) mod can;
 
+use crate::run::bar;
 use anyhow::{Context, Result};
+use indicatif::ProgressBar;
 use rustix::fs::{CWD, FileType, Mode, RenameFlags, renameat_with};
 use std::io::Write;
 use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
+use std::process::Command;
 use tempfile::{NamedTempFile, TempDir};
 
 /// The processor time of this thread, in s: other programs do not count.
 pub fn processor_s() -> f64 {
     let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
     time.tv_sec as f64 + time.tv_nsec as f64 * 1e-9
+}
+
+/// The commit that the repository of this program's sources stands at, `-dirty` behind it where a file differs; nothing without a repository.
+pub(crate) fn commit() -> Option<String> {
+    const WORDS: [&str; 6] = ["describe", "--always", "--dirty", "--abbrev=12", "--exclude", "*"];
+    let told = Command::new("git").args(["-C", env!("CARGO_MANIFEST_DIR")]).args(WORDS).output().ok()?;
+    let commit = String::from_utf8(told.stdout).ok()?.trim().to_owned();
+    (told.status.success() && !commit.is_empty()).then_some(commit)
+}
+
+/// The progress of a run, as a bar on the terminal.
+pub(crate) struct Progress {
+    bar: ProgressBar,
+    calls: u32,
+}
+
+impl Progress {
+    const STEPS: u64 = 1000;
+
+    pub(crate) fn new(name: &str) -> Self {
+        let template = "{msg:16} [{bar:40}] {percent:>3} % {elapsed} (left {eta})";
+        // A talk is as long as its lines say, and tells its state instead.
+        let bar = if name == "talk" { ProgressBar::hidden() } else { bar(Self::STEPS, template) };
+        Self { bar: bar.with_message(name.to_owned()), calls: 0 }
+    }
+
+    pub(crate) fn show(&mut self, done: f64) {
+        self.calls = self.calls.wrapping_add(1);
+        if self.calls.is_multiple_of(256) {
+            self.bar.set_position((done * Self::STEPS as f64) as u64);
+        }
+    }
+}
+
+impl Drop for Progress {
+    fn drop(&mut self) {
+        self.bar.finish_and_clear();
+    }
 }
 
 /// A folder that is gone with its value.

@@ -158,12 +158,12 @@ impl Data {
         BASE64_STANDARD.encode(miniz_oxide::deflate::compress_to_vec(&self.bytes, 7))
     }
 
-    /// The resolution of the stored rows in words.
-    pub fn resolution(&self) -> String {
+    /// The resolution of the stored rows in words; over time, with their distance.
+    pub fn resolution(&self, over_time: bool) -> String {
         let longest = self.tables.iter().max_by_key(|table| table.rows * table.columns.len());
         let Some(table) = longest.filter(|table| !table.columns.is_empty()) else { return String::new() };
         let rows = match (&table.times, table.stretch) {
-            (Times::Even { every, .. }, 1) => {
+            (Times::Even { every, .. }, 1) if over_time => {
                 format!("no row is left out, one each {} µs", (every * 1e9).round() / 1e3)
             }
             (_, 1) => "no point is left out".to_owned(),
@@ -172,7 +172,7 @@ impl Data {
             }
         };
         format!(
-            "Of the longest plot {rows}; values are rounded to an {PARTS}th of their span or less, edges keep their exact time."
+            "Of the longest plot {rows}; values are rounded to an {PARTS}th of their span, of what hardly moves to 3e-8 of themselves, or finer; edges keep their exact time."
         )
     }
 }
@@ -209,7 +209,7 @@ fn step(values: &[f64], parts: f64) -> f64 {
         .iter()
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(*value), high.max(*value)));
     // A value that is constant but for rounding has no span.
-    let least = high.abs().max(low.abs()) / (512.0 * parts);
+    let least = high.abs().max(low.abs()) / (4096.0 * parts);
     let wanted = ((high - low) / parts).max(least);
     if !wanted.is_finite() || wanted <= 0.0 {
         return 1.0;
@@ -299,7 +299,7 @@ mod tests {
         assert!(found.len() <= MOST_ROWS && found.len() == data.tables[table].rows);
         let extremes: Vec<_> = found.iter().filter(|value| **value != 0.0).collect();
         assert_eq!(extremes, [&-5.0, &9.0]);
-        assert!(data.resolution().contains("of each 6 rows"), "{}", data.resolution());
+        assert!(data.resolution(true).contains("of each 6 rows"), "{}", data.resolution(true));
     }
 
     #[test]

@@ -79,7 +79,8 @@ pub fn page(page: &Document, subtitle: &str, figures: &Figures) -> Result<String
         let _ = write!(body, "<section class=\"card\"><h2>Figures</h2>{tables}</section>");
     }
     let scopes: Vec<_> = page.blocks.iter().filter_map(Block::scope).collect();
-    let resolution = if scopes.is_empty() { String::new() } else { page.data.resolution() };
+    let over_time = scopes.iter().any(|scope| scope.time);
+    let resolution = if scopes.is_empty() { String::new() } else { page.data.resolution(over_time) };
     let model = json!({
         "tables": serde_json::to_value(page.data.tables())?,
         "scopes": serde_json::to_value(scopes)?,

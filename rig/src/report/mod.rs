@@ -10,7 +10,7 @@ mod text;
 mod views;
 
 pub use overview::overview;
-pub use text::{headline, list, text};
+pub use text::{broken, headline, list, text, unit};
 
 use crate::analysis::Figures;
 use crate::rows::Timed;

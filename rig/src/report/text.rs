@@ -4,9 +4,9 @@ use crate::analysis::Figures;
 use crate::verdict::{FALLS_SHORT, NOT_SEEN};
 use comfy_table::presets::NOTHING;
 use comfy_table::{CellAlignment, Table};
-use serde_json::{Map, Value};
+use serde_json::{Map, Value, json};
 use std::collections::BTreeSet;
-use tractive::protection::Trip;
+use tractive::protection::{Fault, Trip};
 
 /// Ends of figures' names, and the units they stand for.
 const UNITS: [(&str, &str); 18] = [
@@ -30,10 +30,31 @@ const UNITS: [(&str, &str); 18] = [
     ("_k", "K"),
 ];
 
+/// Unit of a fault's value and limit; nothing of those that count something.
+pub const fn unit(fault: Fault) -> &'static str {
+    match fault {
+        Fault::Overcurrent | Fault::PhaseSum | Fault::CurrentOffset => "A",
+        Fault::DcOvervoltage | Fault::DcUndervoltage | Fault::SourceUndervoltage => "V",
+        Fault::CapacitorOvervoltage | Fault::LinkImplausible => "V",
+        Fault::PrechargeTimeout | Fault::DischargeTimeout => "V",
+        Fault::Overspeed => "rad/s",
+        Fault::SensorLost1 | Fault::SensorLost2 | Fault::AngleLost => "rad",
+        Fault::ControlDeadline | Fault::StaleCommand => "s",
+        Fault::Frozen => "control periods",
+        _ => "",
+    }
+}
+
+/// A fault with the value that broke its limit.
+pub fn broken(trip: Trip) -> String {
+    let of = |value: f32| measured(&json!(f64::from(value)), unit(trip.fault));
+    format!("{}: {}, limit {}", trip.fault.name(), of(trip.value), of(trip.limit))
+}
+
 /// Pass, or what was not kept.
 pub fn headline(figures: &Figures, trip: Option<Trip>) -> String {
     if let Some(trip) = trip {
-        return format!("FALLS SHORT: the drive tripped, {}", trip.fault.name());
+        return format!("FALLS SHORT: the drive tripped, {}", broken(trip));
     }
     let verdicts = figures.get("verdicts").and_then(Value::as_array).map_or(&[][..], Vec::as_slice);
     let count = |what: &str| verdicts.iter().filter(|verdict| verdict["verdict"] == what).count();
@@ -89,7 +110,8 @@ pub(super) fn split_unit(what: &str) -> (String, &'static str) {
 pub(super) fn quantity(name: &str) -> (String, &'static str) {
     let known = UNITS.iter().find_map(|(end, unit)| Some((name.strip_suffix(end)?, *unit)));
     let (words, unit) = known.unwrap_or((name, ""));
-    (words.replace('_', " "), unit)
+    // Of the percent in a name its point is a letter: `back_within_0p2_percent`.
+    (words.replace('_', " ").replace("0p2 percent", "0.2 %"), unit)
 }
 
 /// Rows of a list under the names of their fields.
@@ -156,6 +178,8 @@ fn table(heads: &[&str], rows: impl Iterator<Item = Vec<String>>) -> String {
 mod tests {
     use super::*;
     use serde_json::json;
+    use tractive::protection::SafeState;
+    use tractive::time::Instant;
 
     fn figures(verdicts: &[&str]) -> Figures {
         let mut figures = Figures::default();
@@ -174,11 +198,31 @@ mod tests {
     }
 
     #[test]
+    fn a_faults_unit_is_that_of_its_value_in_the_guide() {
+        let page = include_str!("../../../docs/faults.md");
+        for fault in Fault::ALL {
+            let row = page.lines().find(|line| line.starts_with(&format!("| `{}` |", fault.name())));
+            let value = row.and_then(|row| row.split('|').nth(2)).unwrap_or_default();
+            let said = ["A", "V", "rad/s", "rad", "s", "control periods"].into_iter().find(|unit| {
+                value.split([',', ';', ' ']).any(|word| word == *unit) || value.contains(&format!(" {unit} "))
+            });
+            // What counts in one case and takes a time in another has none.
+            let mixed = value.trim_start().starts_with('1');
+            assert_eq!(unit(fault), said.filter(|_| !mixed).unwrap_or_default(), "{}: {value}", fault.name());
+        }
+        let (fault, at, safe) = (Fault::DcOvervoltage, Instant(0), SafeState::GatesOff);
+        let trip = Trip { fault, value: 2200.0, limit: 2070.0, at, safe };
+        let told = "FALLS SHORT: the drive tripped, dc_overvoltage: 2200 V, limit 2070 V";
+        assert_eq!(headline(&Figures::default(), Some(trip)), told);
+    }
+
+    #[test]
     fn quantities_have_units_and_columns_line_up() {
         let text = text(&figures(&["pass"]));
         assert!(text.contains("2.250 ms") && text.contains("2.500 ms"), "{text}");
         assert!(text.contains("peak current") && text.contains("247.1 A"), "{text}");
         assert_eq!(split_unit("overshoot in % of the step"), ("overshoot of the step".to_owned(), "%"));
+        assert_eq!(quantity("back_within_0p2_percent_ms"), ("back within 0.2 %".to_owned(), "ms"));
         assert_eq!(digits(0.000_123_4), "1.23e-4");
     }
 }

@@ -6,6 +6,7 @@ mod host;
 mod qemu;
 pub mod traction;
 
+pub(crate) use crate::platform::Progress;
 pub use emulator::Emulator;
 pub use host::Interrupts;
 pub(crate) use host::on_host;
@@ -87,34 +88,4 @@ pub(crate) fn bar(steps: u64, template: &str) -> ProgressBar {
     // It stands there before the first step is done.
     bar.tick();
     bar
-}
-
-/// The progress of a run.
-pub(crate) struct Progress {
-    bar: ProgressBar,
-    calls: u32,
-}
-
-impl Progress {
-    const STEPS: u64 = 1000;
-
-    pub(crate) fn new(name: &str) -> Self {
-        let template = "{msg:16} [{bar:40}] {percent:>3} % {elapsed} (left {eta})";
-        // A talk is as long as its lines say, and tells its state instead.
-        let bar = if name == "talk" { ProgressBar::hidden() } else { bar(Self::STEPS, template) };
-        Self { bar: bar.with_message(name.to_owned()), calls: 0 }
-    }
-
-    pub(crate) fn show(&mut self, done: f64) {
-        self.calls = self.calls.wrapping_add(1);
-        if self.calls.is_multiple_of(256) {
-            self.bar.set_position((done * Self::STEPS as f64) as u64);
-        }
-    }
-}
-
-impl Drop for Progress {
-    fn drop(&mut self) {
-        self.bar.finish_and_clear();
-    }
 }

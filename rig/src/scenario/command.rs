@@ -51,7 +51,7 @@ fn run_choice<S: System>(choice: &Choice<S>) -> Result<ExitCode> {
         crate::say!("report: {}", out.join("report.html").display());
     }
     if let Some(trip) = trip {
-        eprintln!("fault {}: {} (limit {})", trip.fault.name(), trip.value, trip.limit);
+        eprintln!("fault {}", report::broken(trip));
     }
     let kept = trip.is_none() && !figures.fall_short();
     Ok(if kept { ExitCode::SUCCESS } else { ExitCode::from(1) })
@@ -114,11 +114,11 @@ pub fn write<S: System>(
 fn ran<S: System>(choice: &Choice<S>, machine: &Machine, page: &mut Page) -> Result<()> {
     let (name, folder) = (machine.tables.name, choice.machine_name());
     page.ran("machine", if name == folder { name.to_owned() } else { format!("{name} ({folder})") });
-    let udc_v = choice.options.udc.unwrap_or(machine.folder.parameters.dc_link_nominal_v);
+    let udc_v = choice.options.udc.unwrap_or_else(|| S::source_v(machine));
     page.ran("DC source", format!("{udc_v} V"));
     page.ran("ran on", choice.options.on.name());
     page.ran("version", env!("CARGO_PKG_VERSION"));
-    if let Some(commit) = option_env!("TRACTIVE_COMMIT") {
+    if let Some(commit) = crate::platform::commit() {
         page.ran("commit", commit);
     }
     let flaws =

@@ -33,6 +33,10 @@ pub trait System: Sized + 'static {
 
     /// Step of the trace unless options or scenario say another, in s.
     fn trace_step_s(own: &Self::Own) -> f64;
+    /// Voltage of the DC source unless the options say another, in V.
+    fn source_v(machine: &Machine) -> f64 {
+        machine.folder.parameters.dc_link_nominal_v
+    }
     /// Shortest pulse unless the options say another, in µs.
     fn min_pulse_us(_machine: &Machine) -> f64 {
         USUAL_MIN_PULSE_US

@@ -45,7 +45,7 @@ pub fn control() -> Result<String> {
         .flow(&[(895.0, 96.0), (895.0, 56.0), (683.0, 56.0), (683.0, 82.0)])
         .words((836.0, 44.0), "i_{uvw}, θ, u_{dc}")
         .flow(&[(722.0, 262.0), (722.0, 170.0)])
-        .words((655.0, 250.0), "cell: what was loaded");
+        .words((648.0, 250.0), "cell: what was loaded");
     all.finish()
 }
 

@@ -110,7 +110,7 @@ pub fn inductance(machine: &Machine, d_axis: bool) -> Result<String> {
                 (x, 1e3 * map.at(fixed, x).psi_q_wb / x)
             }
         });
-        panel.named(&format!("{other} = {fixed:.0} A"), points, colour);
+        panel.named(&format!("{other} = {} A", number(fixed.round())), points, colour);
     }
     draw((800, 420), &[panel])
 }

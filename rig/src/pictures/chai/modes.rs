@@ -86,7 +86,7 @@ pub fn middle60(machine: &Machine, mode: Mode) -> Result<Panel> {
     let edges = pulses(machine, mode, f1_hz, share)?;
     let title =
         format!("{}: {} pulses a turn, at {:.0} % of six-step", mode.name(), mode.turn_ons(), 100.0 * share);
-    let (x, y) = (Axis::of("pulse angle in degrees", 0.0, 360.0), Axis::of("", -0.2, 4.3).bare());
+    let (x, y) = (Axis::turn("pulse angle in degrees"), Axis::of("", -0.2, 4.3).bare());
     let mut panel = Panel::new((0.0, 0.0, 860.0, 260.0), &title, x, y);
     for (leg, (name, colour)) in [("u", BLUE), ("v", RED), ("w", GREEN)].into_iter().enumerate() {
         let base = 1.5 * (2 - leg) as f64;
@@ -137,10 +137,8 @@ pub fn every_mode(machine: &Machine) -> Result<String> {
         let title =
             format!("{}, {} Hz: {carrier}, {:.0} % of six-step", mode.name(), number(f1_hz), 100.0 * share);
         let place = (480.0 * (k % 2) as f64, 220.0 * (k / 2) as f64, 480.0, 214.0);
-        let axes = (
-            Axis::of("pulse angle in degrees", 0.0, 360.0),
-            Axis::of("u_{uv} in V", -1.15 * udc_v, 1.15 * udc_v),
-        );
+        let axes =
+            (Axis::turn("pulse angle in degrees"), Axis::of("u_{uv} in V", -1.15 * udc_v, 1.15 * udc_v));
         let mut panel = Panel::new(place, &title, axes.0, axes.1);
         panel.line(line, BLUE, 1.3);
         let peak_v = 3.0_f64.sqrt() * share * udc_v * FRAC_2_PI;

@@ -139,6 +139,9 @@ pub fn accuracy(points: &[SteadyPoint], rated_nm: f64) -> Result<String> {
         let mut panel =
             Panel::new(place, title, Axis::of("speed in r/min", 0.0, fastest), Axis::fitted(unit));
         let of = |point: &SteadyPoint| Some((point.speed_rpm, value(point)?));
+        let all = points.iter().filter_map(value);
+        let (low, high) = all.fold((f64::MAX, f64::MIN), |(low, high), of| (low.min(of), high.max(of)));
+        let span = high - low;
         let full: Vec<_> =
             points.iter().filter(|point| point.demand_nm > 1.001 * rated_nm).filter_map(of).collect();
         panel.line(full.iter().copied(), BLUE, 1.6);
@@ -147,7 +150,7 @@ pub fn accuracy(points: &[SteadyPoint], rated_nm: f64) -> Result<String> {
         });
         for at in points.iter().filter(|point| point.demand_nm <= 1.001 * rated_nm).filter_map(of) {
             panel.spot(at, RED);
-            panel.words((at.0 + 0.01 * fastest, at.1), "rated", Side::Right, RED);
+            panel.words((at.0 + 0.01 * fastest, at.1 - 0.08 * span), "rated", Side::Right, RED);
         }
         if title == "Efficiency" {
             panel.dashes([(0.0, 95.0), (fastest, 95.0)], GREY);

@@ -113,15 +113,13 @@ pub fn ways(machine: &Machine) -> Result<String> {
         plane("Current loci: MTPA, most torque up to the machine's largest, and full power", largest, 0.0);
     for rpm in [700.0, 1000.0, 1300.0, 1500.0] {
         let ellipse: Vec<_> = motor.ellipse(rpm).filter(|(_, q)| *q >= 0.0).collect();
-        let words_at = motor.at(motor.flux_wb(rpm), 90.0);
-        if words_at.1 < 1.05 * largest {
-            panel.words(
-                (words_at.0, words_at.1 + 4.0),
-                &format!("{} r/min", number(rpm)),
-                Side::Middle,
-                GREY,
-            );
-        }
+        let (top, right) = (motor.at(motor.flux_wb(rpm), 90.0), motor.at(motor.flux_wb(rpm), 0.0));
+        let (at, side) = if top.1 < 1.05 * largest {
+            ((top.0, top.1 + 4.0), Side::Middle)
+        } else {
+            ((right.0 - 3.0, 5.0), Side::Left)
+        };
+        panel.words(at, &format!("{} r/min", number(rpm)), side, GREY);
         panel.dashes(ellipse, GREY);
     }
     panel.line(loci.circle(), RED, 1.3);
@@ -131,6 +129,7 @@ pub fn ways(machine: &Machine) -> Result<String> {
         .into_iter()
         .map(|(point, _)| point)
         .filter(|point| point.1 > 0.0)
+        .take_while(|point| point.0.hypot(point.1) <= 1.003 * largest)
         .collect();
     panel.dashes([loci.mtpa().pop().unwrap_or_default(), loci.mtpa_end()], BLUE);
     panel.line(outer.iter().copied(), VIOLET, 2.6);

@@ -20,10 +20,13 @@ fn stacked(recording: &Recording, (from_s, to_s): (f64, f64), parts: &[Part]) ->
     let panels = parts.iter().enumerate().map(|(k, (title, unit, curves))| {
         let place = (0.0, HEIGHT * k as f64, 880.0, HEIGHT);
         let mut panel = Panel::new(place, title, Axis::of("time in s", from_s, to_s), Axis::fitted(unit));
-        for (name, value, colour) in curves {
+        for (k, (name, value, colour)) in curves.iter().enumerate() {
             let points = rows.iter().map(|row| (row.t_s, value(row)));
-            match curves.len() {
-                1 => panel.line(points, *colour, 1.2),
+            match curves.as_slice() {
+                [_] => panel.line(points, *colour, 1.2),
+                [(_, first, _), ..] if k > 0 && lies_on(rows, *value, *first) => {
+                    panel.named_dashes(name, points, *colour)
+                }
                 _ => panel.named(name, points, *colour),
             };
         }
@@ -31,6 +34,13 @@ fn stacked(recording: &Recording, (from_s, to_s): (f64, f64), parts: &[Part]) ->
     });
     let panels: Vec<_> = panels.collect();
     draw((880, (HEIGHT * parts.len() as f64) as u32), &panels)
+}
+
+/// `true` if a value is another one most of the time, so that its curve would hide the other's.
+fn lies_on(rows: &[Row], value: Value, other: Value) -> bool {
+    const NEAR: f64 = 0.5;
+    let near = |row: &&Row| (value(row) - other(row)).abs() < NEAR;
+    rows.iter().filter(near).count() > rows.len() / 2
 }
 
 fn torques<'a>() -> Part<'a> {
@@ -117,18 +127,25 @@ pub fn cycle(recording: &Recording) -> Result<String> {
 
 /// Figure 36: torque and voltage over speed.
 pub fn over_speed(recording: &Recording) -> Result<String> {
-    let values: [(&str, Curve); 2] = [
-        ("N·m", ("Torque of motor 1", |row| row.motors[0].torque_nm, BLUE)),
-        ("V", ("Phase voltage of motor 1, peak", |row| row.motors[0].voltage_v, RED)),
+    let values: [(&str, &str, Value); 2] = [
+        ("N·m", "Torque of motor 1", |row| row.motors[0].torque_nm),
+        ("V", "Phase voltage of motor 1, peak", |row| row.motors[0].voltage_v),
     ];
-    let panels = values.map(|(unit, (title, value, colour))| {
+    let panels = values.map(|(unit, title, value)| {
         let mut panel = Panel::new(
             (0.0, 0.0, 880.0, 260.0),
             title,
             Axis::of("speed in r/min", 0.0, 1350.0),
             Axis::fitted(unit),
         );
-        panel.line(recording.rows.iter().map(|row| (row.motors[0].speed_rpm, value(row))), colour, 1.4);
+        for (name, colour, brakes) in [("motoring", BLUE, false), ("braking", RED, true)] {
+            // What is no number ends a curve.
+            let of = |row: &Row| match (row.motors[0].torque_ref_nm < 0.0) == brakes {
+                true => (row.motors[0].speed_rpm, value(row)),
+                false => (f64::NAN, f64::NAN),
+            };
+            panel.named(name, recording.rows.iter().map(of), colour);
+        }
         panel
     });
     let [first, mut second] = panels;

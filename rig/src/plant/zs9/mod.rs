@@ -28,7 +28,6 @@ pub use network::{NetworkState, ZNetwork};
 use super::legs::{Clamp, LONGEST_STEP_S};
 use super::{PlantSettings, SpeedSource};
 use bridge::Bridge;
-use core::f64::consts::TAU;
 use means::Adder;
 use tractive_tablegen::{MachineFolder, SmoothMap};
 
@@ -92,8 +91,6 @@ pub struct Zs9Plant {
     pub network: NetworkState,
     /// The upper motor and the lower one.
     pub motors: [Motor; 2],
-    /// Of the motors' angles.
-    sin_cos: [(f64, f64); 2],
     time_s: f64,
     /// Energies since the beginning.
     pub energies: Zs9Energies,
@@ -119,7 +116,6 @@ impl Zs9Plant {
             source_v: settings.source_v,
             clamp: clamp.of_both(&other),
             network: NetworkState::even(0.0, settings.source_v),
-            sin_cos: motors.each_ref().map(|motor| (motor.angle_turns() * TAU).sin_cos()),
             motors,
             time_s: 0.0,
             energies: Zs9Energies::default(),

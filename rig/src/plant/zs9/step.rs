@@ -6,7 +6,6 @@ use super::network::NetworkState;
 use super::{Vector, Zs9Plant};
 use crate::plant::runge_kutta::{along, rotated};
 use crate::plant::{StatorSlopes, Turning};
-use core::f64::consts::TAU;
 
 /// The feed of the network on the source's side.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -56,9 +55,9 @@ impl Zs9Plant {
 
     /// Runge–Kutta, fourth order. The frames turn during the step; the speeds change linearly at most.
     pub(super) fn try_step(&self, bridge: &Bridge, feed: Feed, dt_s: f64) -> Trial {
-        let turning = self.motors.each_ref().map(|motor| motor.rotor.turning(|| motor.torque_nm(), dt_s));
-        let begin = self.sin_cos;
-        let after = |t: f64| [0, 1].map(|k| turned(begin[k], turning[k].turned(t)));
+        let turning = both(|k| self.motors[k].rotor.turning(|| self.motors[k].torque_nm(), dt_s));
+        let begin = both(|k| self.motors[k].rotor.sin_cos());
+        let after = |t: f64| both(|k| turned(begin[k], turning[k].turned(t)));
         let half = 0.5 * dt_s;
         let (middle, end) = (after(half), after(dt_s));
         let (f0, f1, f2) = (
@@ -88,7 +87,6 @@ impl Zs9Plant {
         for (k, motor) in self.motors.iter_mut().enumerate() {
             let energies = [sums[3 * k], sums[3 * k + 1], sums[3 * k + 2]];
             motor.finish([state[2 * k], state[2 * k + 1]], energies, dt_s);
-            self.sin_cos[k] = (motor.rotor.angle_turns() * TAU).sin_cos();
         }
         self.network = NetworkState { inductors_a: [state[4], state[5]], capacitors_v: [state[6], state[7]] };
         self.energies.source_j += sums[6];
@@ -99,9 +97,9 @@ impl Zs9Plant {
 
     /// The values at a step's end that the means take.
     fn seen(&self) -> [Seen; 2] {
-        [0, 1].map(|k| {
+        both(|k| {
             let motor = &self.motors[k];
-            let vector = Vector::from_rotor((motor.id_a, motor.iq_a), self.sin_cos[k]);
+            let vector = Vector::from_rotor((motor.id_a, motor.iq_a), motor.rotor.sin_cos());
             Seen { vector, speed_rpm: motor.rotor.speed_rpm() }
         })
     }
@@ -148,11 +146,12 @@ impl Zs9Plant {
 
     /// The frames now.
     fn still(&self, bridge: &Bridge) -> [Frame; 2] {
-        let turning = self.motors.each_ref().map(|motor| motor.rotor.turning(|| 0.0, 1.0));
-        frames(bridge, self.sin_cos, &turning, 0.0)
+        let turning = both(|k| self.motors[k].rotor.turning(|| 0.0, 1.0));
+        frames(bridge, both(|k| self.motors[k].rotor.sin_cos()), &turning, 0.0)
     }
 
-    #[inline]
+    // Four of them are a step, and most of a run: they are compiled into it, whatever they are compiled for.
+    #[inline(always)]
     fn rates(&self, y: &State, frames: &[Frame; 2], bridge: &Bridge, feed: Feed) -> (State, Sums) {
         let shares = self.shares(y, frames, bridge);
         let network = NetworkState { inductors_a: [y[4], y[5]], capacitors_v: [y[6], y[7]] };
@@ -164,7 +163,8 @@ impl Zs9Plant {
             Feed::Clamped => (self.source_v, 0.5 * inductors_a),
         };
         let link_v = capacitors_v - feed_v;
-        let [upper, lower] = [0, 1].map(|k| self.motor_slopes(k, y, frames, &shares, link_v));
+        let upper = self.motor_slopes(0, y, frames, &shares, link_v);
+        let lower = self.motor_slopes(1, y, frames, &shares, link_v);
         let slopes = self.parts.slopes(&network, feed_v, bridge_a);
         let ([di1, di2], [dv1, dv2]) = (slopes.inductors_a, slopes.capacitors_v);
         (
@@ -182,7 +182,7 @@ impl Zs9Plant {
         )
     }
 
-    #[inline]
+    #[inline(always)]
     fn motor_slopes(
         &self,
         k: usize,
@@ -197,7 +197,7 @@ impl Zs9Plant {
     }
 
     /// The terminals' shares of the link, in the rotor frames.
-    #[inline]
+    #[inline(always)]
     fn shares(&self, y: &State, frames: &[Frame; 2], bridge: &Bridge) -> Shares {
         let gates = match bridge {
             Bridge::Off => [LegGates::OFF; 3],
@@ -205,9 +205,9 @@ impl Zs9Plant {
             Bridge::Driven(_) | Bridge::Short => return [frames[0].share, frames[1].share],
         };
         let [upper, lower] =
-            [0, 1].map(|k| Vector::from_rotor((y[2 * k], y[2 * k + 1]), frames[k].sin_cos).phases());
+            both(|k| Vector::from_rotor((y[2 * k], y[2 * k + 1]), frames[k].sin_cos).phases());
         let stationary = freewheeling(&self.clamp, &gates, upper, lower);
-        [0, 1].map(|k| stationary[k].to_rotor(frames[k].sin_cos))
+        both(|k| stationary[k].to_rotor(frames[k].sin_cos))
     }
 
     /// The current that the motors draw from the link, in A: `1.5 (s·i)` of both.
@@ -246,17 +246,23 @@ impl Zs9Plant {
 type Shares = [(f64, f64); 2];
 
 /// Both frames a time after the step's beginning.
-#[inline]
+#[inline(always)]
 fn frames(bridge: &Bridge, sin_cos: [(f64, f64); 2], turning: &[Turning; 2], t_s: f64) -> [Frame; 2] {
     let stationary = match bridge {
         Bridge::Driven(shares) => *shares,
         Bridge::Short | Bridge::Off | Bridge::Partly(_) => [Vector::default(); 2],
     };
-    [0, 1].map(|k| Frame {
+    both(|k| Frame {
         sin_cos: sin_cos[k],
         omega: turning[k].omega(t_s),
         share: stationary[k].to_rotor(sin_cos[k]),
     })
+}
+
+/// The same of the upper motor and of the lower one; an array's `map` is not compiled into its place.
+#[inline(always)]
+fn both<T>(of: impl Fn(usize) -> T) -> [T; 2] {
+    [of(0), of(1)]
 }
 
 /// Sine and cosine after turning by an angle in rad.

@@ -5,6 +5,11 @@
   const MOST_CHIPS = 14; // marks with a button each; more are a list
   const AXIS = 58; // room of an axis, in px
   const FONT = "12px system-ui, 'Segoe UI', Roboto, 'DejaVu Sans', sans-serif";
+  /** A tick as the text writes numbers, 1,500 or −0.02, with as many decimals as the distance of two ticks has. */
+  const written = (tick, apart) => {
+    const decimals = (apart.toFixed(9).replace(/0+$/, "").split(".")[1] ?? "").length;
+    return tick.toLocaleString("en", { minimumFractionDigits: 0, maximumFractionDigits: decimals }).replace("-", "−");
+  };
   const css = name => getComputedStyle(document.documentElement).getPropertyValue("--" + name).trim();
   const make = (name, text, more = {}) => Object.assign(document.createElement(name), { textContent: text }, more);
 
@@ -250,11 +255,15 @@
     plot(panel, k) {
       const isLast = k === this.plan.panels.length - 1, narrow = this.width < 500;
       const height = Math.max(this.plan.panels.length === 1 ? 250 : k === 0 ? 190 : 150, 16 * panel.levels.length + 34) + (isLast ? 26 : 0) - (narrow ? 20 : 0);
+      // The names stand below the title where both do not fit beside each other.
+      const long = panel.series.reduce((sum, { name }) => sum + 100 + 7 * name.length, 0);
+      const fits = narrow || this.axis + 7 * panel.label.length + long <= this.width, rows = fits ? 0 : Math.ceil(long / this.width);
+      this.hosts[k].parentElement.classList.toggle("two", !fits);
       const line = { font: FONT, stroke: css("muted"), grid: { stroke: css("grid"), width: 1 }, ticks: { stroke: css("line"), width: 1, size: 4 } };
       const names = panel.levels, span = () => this.shown[1] - this.shown[0];
       const time = (u, ticks) => ticks.map(tick => (this.plan.time ? told(tick, span()) : +tick.toPrecision(8)));
       const options = {
-        width: this.width, height, pxAlign: 0, padding: [narrow ? 8 : 24, 20, 0, 0],
+        width: this.width, height: height + 17 * rows, pxAlign: 0, padding: [narrow ? 8 : 24 + 17 * rows, 28, 0, 0],
         cursor: { ...(this.plan.time ? { sync: { key: "time", scales: ["x", null] } } : {}), drag: { x: true, y: false, setScale: false }, points: { size: 6 } },
         legend: { live: true, markers: { width: 0, fill: (u, s) => u.series[s].stroke?.(u, s) } },
         scales: {
@@ -265,6 +274,7 @@
           { ...line, size: isLast ? 28 : 6, values: isLast ? time : (u, ticks) => ticks.map(() => ""), space: this.plan.time ? 80 : 60 },
           {
             ...line, space: 28, size: (u, shown) => this.room(shown),
+            values: (u, ticks, axis, space, apart) => ticks.map(tick => written(tick, apart)),
             ...(names.length ? { splits: () => names.map((_, level) => level), values: (u, ticks) => ticks.map(tick => names[tick]) } : {}),
           },
         ],
@@ -334,7 +344,7 @@
       const ratio = devicePixelRatio || 1, { lane, width } = this, height = 22;
       Object.assign(lane, { width: width * ratio, height: height * ratio });
       Object.assign(lane.style, { width: `${width}px`, height: `${height}px`, display: "block" });
-      const ctx = lane.getContext("2d"), [from, to] = this.shown, left = this.axis, room = width - left - 20;
+      const ctx = lane.getContext("2d"), [from, to] = this.shown, left = this.axis, room = width - left - 28;
       const x = time => left + Math.min(Math.max((time - from) / (to - from), 0), 1) * room;
       ctx.scale(ratio, ratio);
       ctx.font = FONT;
@@ -375,6 +385,12 @@
     }), { rootMargin: "400px" });
     if (sections.length) build(sections[0]);
     sections.slice(1).forEach(section => seen.observe(section));
+    // What is not looked at yet is made in between, so that no place stays empty.
+    const rest = () => {
+      const next = sections.find(section => !scopes[+section.dataset.scope]);
+      if (next) { build(next); setTimeout(rest, 30); }
+    };
+    setTimeout(rest, 300);
     const again = () => scopes.forEach(scope => scope?.build());
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", again);
     addEventListener("resize", () => scopes.forEach(scope => { if (scope && scope.hosts[0].clientWidth !== scope.width) scope.build(); }));

@@ -43,6 +43,8 @@ pub struct Live {
     speed_loop: SpeedLoop,
     turning: Turning,
     largest_nm: f64,
+    /// True resistance over the rating, as long as nothing is wrong.
+    resistance_scale: f64,
     source: Source,
     supply: Option<(SupplyFault, f64)>,
     trip_rpm: f64,
@@ -79,6 +81,7 @@ impl Live {
             speed_loop: SpeedLoop::new(1.0, parameters.max_torque_nm, start.speed_rpm, 0.0),
             turning: Turning::Held(start.speed_rpm),
             largest_nm: parameters.max_torque_nm,
+            resistance_scale: options.plant().resistance_scale,
             source,
             supply: None,
             trip_rpm: parameters.trip_speed_rpm,
@@ -163,6 +166,11 @@ impl Live {
         self.bench.plant_mut().set_flux_scale(scale);
     }
 
+    /// True resistance over the rating, until all is mended.
+    pub fn set_resistance_scale(&mut self, scale: f64) {
+        self.bench.plant_mut().set_resistance_scale(scale);
+    }
+
     /// The fault is acknowledged, once.
     pub fn acknowledge(&mut self) {
         self.acknowledged_until_s = self.bench.time_s() + ACKNOWLEDGE_S;
@@ -188,6 +196,7 @@ impl Live {
     pub fn mend(&mut self) {
         self.bench.mend();
         self.supply = None;
+        self.set_resistance_scale(self.resistance_scale);
         self.turn_as(self.turning);
     }
 

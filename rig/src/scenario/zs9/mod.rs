@@ -117,6 +117,10 @@ impl System for Zs9 {
     type Plan = Plan;
     type Recording = Recording;
 
+    fn source_v(_machine: &Machine) -> f64 {
+        SOURCE_V
+    }
+
     fn trace_step_s(own: &Zs9Options) -> f64 {
         f64::from(own.carrier_hz).recip()
     }

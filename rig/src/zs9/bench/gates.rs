@@ -59,6 +59,9 @@ impl Gates {
         }
         for leg in 0..3_u8 {
             let gates = [leg, leg + 3, leg + 6];
+            if gates.iter().all(|gate| ordered[usize::from(*gate)] == self.ordered[usize::from(*gate)]) {
+                continue;
+            }
             let changes = |gate: u8, to: bool| {
                 ordered[usize::from(gate)] == to && self.ordered[usize::from(gate)] != to
             };

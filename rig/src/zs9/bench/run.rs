@@ -67,11 +67,8 @@ impl Bench {
         }
         let real = self.real_levels();
         let [uh, vh, wh, um, vm, wm, ul, vl, wl] = real;
-        let gates = [(uh, um, ul), (vh, vm, vl), (wh, wm, wl)].map(|(high, middle, low)| LegGates {
-            high,
-            middle,
-            low,
-        });
+        let leg = |high, middle, low| LegGates { high, middle, low };
+        let gates = [leg(uh, um, ul), leg(vh, vm, vl), leg(wh, wm, wl)];
         let dt_s = steps * self.time.step_s;
         if real == self.gates.levels {
             let gates =
