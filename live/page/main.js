@@ -108,10 +108,10 @@ worker.onmessage = ({ data }) => ({
     buttons();
   },
   rows() {
-    if (memory) {
-      memory.put(data.from, data.rows, data.edges);
-      if (record?.runs) keep(data.from, data.rows);
-    }
+    // Of a drive elsewhere rows may come before the page has its columns: there are more.
+    if (!memory) return tell({ type: "drawn" });
+    memory.put(data.from, data.rows, data.edges);
+    if (record?.runs) keep(data.from, data.rows);
     [state, factor, fresh] = [data.state, data.factor, true];
   },
   bound() { bound = data.values; },

@@ -79,14 +79,19 @@ const fn cycles(mode: Mode) -> u32 {
     if mode.carriers() == 0 { 20 } else { 1 }
 }
 
+/// The distortion of pulses from which on the current has no fundamental that anything could be a share of, in percent.
+const NO_FUNDAMENTAL_PERCENT: f64 = 1000.0;
+
 /// The verdicts on distortion and torque ripple: of an ideal inverter, no more than a little over the bound.
 pub fn verdicts(points: &[Beside], options: &RunOptions) -> [Verdict; 3] {
+    let has_fundamental = points.iter().all(|point| point.thd_bound_percent < NO_FUNDAMENTAL_PERCENT);
+    let thd_percent = if has_fundamental { 2.0 } else { f64::INFINITY };
     let judged = |what: &str, value: fn(&Beside) -> f64, at_most: f64| {
         let found = worst(points.iter().map(value));
         Verdict::at_most(what, found, bound(options, at_most, f64::INFINITY))
     };
     [
-        judged("current THD over its bound in %", |point| point.thd_excess_percent, 2.0),
+        judged("current THD over its bound in %", |point| point.thd_excess_percent, thd_percent),
         judged("rms torque ripple over its bound in %", |point| point.ripple_rms_excess_percent, 2.0),
         judged(
             "peak-to-peak torque over its bound in %",

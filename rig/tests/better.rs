@@ -118,6 +118,8 @@ fn distortion_is_what_pulses_and_inductances_allow() {
         "1800 --torque 1235",
         "2000 --torque 859.4",
         "2000 --torque 600",
+        // Without torque there is hardly a fundamental: distortion, which is a share of it, is told, not judged.
+        "3000 --torque 0",
         "2000 --torque 1174.6",
         "4000 --torque 588",
         "6000 --torque 392",

@@ -116,7 +116,7 @@ const ZS9: [Entry<Zs9>; 5] = [
     ),
     Entry::of::<zs9::steady::Steady>(
         "zs9-steady",
-        "no figure: harmonics of both motors' currents by scheme; the sequences of figures 3 to 9",
+        "no figure: harmonics of both motors' currents by scheme; the sequences of figures 2 to 9",
     ),
     Entry::of::<zs9::timing::Timing>(
         "zs9-timing",
