@@ -39,16 +39,16 @@ pub enum What {
 /// Cycles that reading from the flash memory would add, since the beginning.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Waits {
-    /// With the prefetch alone.
-    pub prefetched: u64,
+    /// With the prefetch alone, less what branches that were not taken have not taken.
+    pub prefetched: i64,
     /// Without any cache or prefetch.
     pub all: u64,
 }
 
 impl Waits {
     /// More of them.
-    pub fn add(&mut self, prefetched: u32, all: u32) {
-        self.prefetched += u64::from(prefetched);
+    pub fn add(&mut self, prefetched: i64, all: u32) {
+        self.prefetched += prefetched;
         self.all += u64::from(all);
     }
 }
@@ -84,6 +84,8 @@ pub struct Machine {
     now: Time,
     settled: Time,
     next: Time,
+    /// The end of the last block.
+    block_end: u32,
     /// The block before which the emulator has stopped: its cost is counted already.
     counted: Option<u32>,
 }
@@ -108,6 +110,7 @@ impl Machine {
             now: 0,
             settled: 0,
             next: 0,
+            block_end: 0,
             counted: None,
         }
     }
@@ -136,12 +139,14 @@ impl Machine {
     }
 
     /// A basic block begins; `true` if the emulator is to stop before it.
-    pub fn block(&mut self, address: u32, cost: Cost) -> bool {
+    pub fn block(&mut self, address: u32, size: u32, cost: Cost) -> bool {
         self.findings.now = (self.now, address);
         if self.counted.take() != Some(address) {
             // What had to wait for the block before comes now.
             self.masked &= !std::mem::take(&mut self.deferred);
-            self.waits.add(cost.prefetched, cost.waits);
+            let led_on = if self.block_end == address { cost.led_on } else { 0 };
+            self.waits.add(i64::from(cost.prefetched) - i64::from(led_on), cost.waits);
+            self.block_end = address + size;
             self.pass(cost.cycles);
         }
         let stop = if self.wants_reset() {

@@ -9,6 +9,7 @@ use tractive_twin::core::cpu::{Cpu, Longest, RAM};
 use tractive_twin::image::Image;
 use tractive_twin::instants::Instants;
 use tractive_twin::machine::Access;
+use tractive_twin::map::interrupt;
 use tractive_twin::output::write;
 use tractive_twin::replay::Replay;
 use tractive_twin::replay::edges::Compared;
@@ -112,7 +113,8 @@ fn tell_instants(cpu: &Cpu) {
         let late = machine.nvic.waited(*exception) / machine.cycle();
         let Longest { cycles, prefetched, waited } = longest;
         println!(
-            "exception {exception}: {cycles} cycles at most, {prefetched} with the flash memory's prefetch alone, {waited} with all of its wait states; it waited for {late} at most"
+            "{}: {cycles} cycles at most, {prefetched} with the flash memory's prefetch alone, {waited} with all of its wait states; it waited for {late} at most",
+            interrupt(*exception)
         );
     }
     for adc in &machine.chip.adcs {

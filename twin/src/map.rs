@@ -36,6 +36,13 @@ pub fn peripherals() -> &'static [Peripheral] {
     METADATA.peripherals
 }
 
+/// The name of an interrupt by its number as an exception.
+pub fn interrupt(exception: usize) -> &'static str {
+    let line = exception.checked_sub(16);
+    let found = METADATA.interrupts.iter().find(|known| Some(known.number as usize) == line);
+    found.map_or("exception", |known| known.name)
+}
+
 /// Fields where the published description is wrong by the reference manual: peripheral, offset, the bits that have a name.
 const CORRECTED: [(&str, u32, u32); 1] = [
     // PWR_CR5.R1MODE is bit 8 (RM0440, 6.4.20), not bit 0.

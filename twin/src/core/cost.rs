@@ -23,6 +23,9 @@ pub struct Cost {
     /// Those with the prefetch alone: the next line is fetched while one is executed, so only the first line, to which the program has come by a
     /// branch, takes all of them.
     pub prefetched: u32,
+    /// The cycles of either that it does not take where the block before leads on to it without a branch: its pipeline's refill, and the first line's
+    /// wait unless it begins one.
+    pub led_on: u32,
 }
 
 /// The cost of a block's instructions at an offset in the flash memory.
@@ -30,7 +33,13 @@ pub fn of(at: usize, code: &[u8]) -> Cost {
     let halves: Vec<u32> =
         code.chunks_exact(2).map(|pair| u32::from(u16::from_le_bytes([pair[0], pair[1]]))).collect();
     let lines = (at + code.len()).div_ceil(LINE) - at / LINE;
-    let mut cost = Cost { cycles: REFILL - 1, waits: WAIT_STATES * lines as u32, prefetched: 0 };
+    let inside = if at.is_multiple_of(LINE) { 0 } else { WAIT_STATES };
+    let mut cost = Cost {
+        cycles: REFILL - 1,
+        waits: WAIT_STATES * lines as u32,
+        prefetched: 0,
+        led_on: REFILL - 1 + inside,
+    };
     let (mut place, mut line, mut in_line) = (0, None, 0);
     while let Some(first) = halves.get(place) {
         let wide = first >> 11 >= 0b11101;
@@ -110,13 +119,13 @@ mod tests {
     fn a_line_waits_for_what_the_one_before_leaves() {
         let nops = |count: usize| [0x00, 0xBF].repeat(count);
         // Four instructions a line, of a cycle each: the next line comes a cycle later than they are done.
-        assert_eq!(of(0, &nops(4)), Cost { cycles: 6, waits: 4, prefetched: 4 });
-        assert_eq!(of(0, &nops(12)), Cost { cycles: 14, waits: 12, prefetched: 4 + 1 + 1 });
+        assert_eq!(of(0, &nops(4)), Cost { cycles: 6, waits: 4, prefetched: 4, led_on: 2 });
+        assert_eq!(of(0, &nops(12)), Cost { cycles: 14, waits: 12, prefetched: 4 + 1 + 1, led_on: 2 });
         // From the middle of a line.
-        assert_eq!(of(4, &nops(6)), Cost { cycles: 8, waits: 8, prefetched: 4 + 3 });
+        assert_eq!(of(4, &nops(6)), Cost { cycles: 8, waits: 8, prefetched: 4 + 3, led_on: 6 });
         // A division hides it.
         let division: Vec<u8> =
             [0xEE80_u16, 0x0A20, 0xEE80, 0x0A20, 0xBF00].iter().flat_map(|half| half.to_le_bytes()).collect();
-        assert_eq!(of(0, &division), Cost { cycles: 31, waits: 8, prefetched: 4 });
+        assert_eq!(of(0, &division), Cost { cycles: 31, waits: 8, prefetched: 4, led_on: 2 });
     }
 }

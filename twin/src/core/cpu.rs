@@ -64,7 +64,7 @@ pub enum Stop {
 pub struct Longest {
     /// With no wait for the flash memory.
     pub cycles: u64,
-    /// With the prefetch alone, and every wait state of the words of tables and literals.
+    /// With the prefetch alone, and every wait state of the words of tables and literals; branches by whether they were taken.
     pub prefetched: u64,
     /// With every wait state.
     pub waited: u64,
@@ -277,7 +277,8 @@ impl Cpu {
         let cycles = (now - since) / self.machine().cycle();
         let longest = self.longest.entry(left).or_default();
         longest.cycles = longest.cycles.max(cycles);
-        longest.prefetched = longest.prefetched.max(cycles + waits.prefetched - before.prefetched);
+        let prefetched = cycles.saturating_add_signed(waits.prefetched - before.prefetched);
+        longest.prefetched = longest.prefetched.max(prefetched);
         longest.waited = longest.waited.max(cycles + waits.all - before.all);
         if (to | NO_FLOAT == TO_THREAD) != self.machine().nvic.active.is_empty() {
             bail!("the exception {left} returns to {to:#010x}");
@@ -335,7 +336,7 @@ fn hook(engine: &mut Unicorn<'static, Machine>, image: &Image) -> Result<(), uc_
             None => Cost { cycles: 1, ..Cost::default() },
         };
         let machine = engine.get_data_mut();
-        if machine.block(address as u32, cost) {
+        if machine.block(address as u32, size, cost) {
             // It stops before the block, whose cost is not counted twice.
             let _ = engine.emu_stop();
         }
@@ -349,7 +350,7 @@ fn hook(engine: &mut Unicorn<'static, Machine>, image: &Image) -> Result<(), uc_
     for origin in [0, FLASH.0] {
         let (from, to) = (u64::from(origin), u64::from(origin + FLASH.1 - 1));
         engine.add_mem_hook(HookType::MEM_READ, from, to, |engine, _, _, _, _| {
-            engine.get_data_mut().waits.add(cost::WAIT_STATES, cost::WAIT_STATES);
+            engine.get_data_mut().waits.add(cost::WAIT_STATES.into(), cost::WAIT_STATES);
             true
         })?;
     }
