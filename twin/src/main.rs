@@ -13,7 +13,7 @@ use tractive_twin::map::interrupt;
 use tractive_twin::output::write;
 use tractive_twin::replay::Replay;
 use tractive_twin::replay::edges::Compared;
-use tractive_twin::run::{Settings, drive_beside, prepare};
+use tractive_twin::run::{Settings, drive_beside, instruction, prepare};
 use tractive_twin::time::{SECOND, Time, seconds};
 use tractive_twin::world::World;
 
@@ -70,6 +70,13 @@ fn run(arguments: &Arguments) -> Result<bool> {
     let machine = cpu.machine();
     for finding in &machine.findings.all {
         println!("{finding} (in {})", image.function(finding.pc));
+    }
+    if let Some(finding) = machine.findings.all.first() {
+        let (mut again, _) = prepare(&settings)?;
+        again.machine_mut().world.drops = arguments.drivers_fail.map(instant);
+        if let Some(pc) = instruction(&mut again, finding)? {
+            println!("the first of it by the instruction at {pc:#010x} (in {})", image.function(pc));
+        }
     }
     let talk = &machine.world.talk;
     for failure in &talk.failures {

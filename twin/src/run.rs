@@ -2,6 +2,7 @@
 
 use crate::chip::Chip;
 use crate::core::cpu::Cpu;
+use crate::finding::Finding;
 use crate::image::Image;
 use crate::machine::Machine;
 use crate::replay::Replay;
@@ -113,6 +114,17 @@ fn side(system: System, motor: &Motor) -> Side {
             Side::Zs9(Box::new(Zs9::new(plant, tractive_rig::zs9::line::TIMES)))
         }
     }
+}
+
+/// The address of the instruction that made a finding: the run, prepared anew, once more, its end instruction by instruction; `None` if it does not
+/// come there.
+pub fn instruction(cpu: &mut Cpu, finding: &Finding) -> Result<Option<u32>> {
+    cpu.run(finding.at.saturating_sub(MILLISECOND))?;
+    cpu.trace()?;
+    // What was found may be the end of the emulator, too.
+    let _ = cpu.run(finding.at + MILLISECOND);
+    let again = cpu.machine().findings.all.first();
+    Ok(again.filter(|again| again.text == finding.text).map(|again| again.pc))
 }
 
 /// Runs until the script ends, or something is found.

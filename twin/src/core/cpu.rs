@@ -131,6 +131,14 @@ impl Cpu {
         self.jump(entry)
     }
 
+    /// From now on a finding's place is its very instruction, not the beginning of its block. That takes the emulator longer.
+    pub fn trace(&mut self) -> Result<()> {
+        self.engine
+            .add_code_hook(1, 0, |engine, address, _| engine.get_data_mut().findings.now.1 = address as u32)
+            .map_err(failed)?;
+        self.engine.ctl_flush_tb().map_err(failed)
+    }
+
     /// A reset with these flags of its cause.
     pub fn reset(&mut self, cause: u32) -> Result<()> {
         self.machine_mut().reset(cause);

@@ -1,6 +1,7 @@
 //! The processor's exceptions, by a program of a few instructions.
 
 use super::cpu::Cpu;
+use crate::finding::Finding;
 use crate::image::Image;
 use crate::run::{Settings, machine};
 use crate::time::MICROSECOND;
@@ -92,13 +93,16 @@ fn writes(of: &[(u32, u32)]) -> Vec<u32> {
     words
 }
 
-/// The first offence of a program that writes these words, told.
-fn offence(of: &[(u32, u32)]) -> crate::finding::Finding {
+/// The first offence of a program that writes these words, told; `traced` by its instruction.
+fn offence(of: &[(u32, u32)], traced: bool) -> Finding {
     let mut words = vec![0; VECTORS];
     (words[0], words[1]) = (0x2000_1000, 0x0800_0001 + PROGRAM);
     words.extend(writes(of));
     let settings = Settings::new(Path::new(""), System::Pmasynrm, "1 end".to_owned());
     let mut cpu = Cpu::new(&Image::of(&words), machine(&settings).unwrap()).unwrap();
+    if traced {
+        cpu.trace().unwrap();
+    }
     // A place outside every region ends the emulator, and is found as well.
     let outcome = cpu.run(20 * MICROSECOND);
     let findings = &cpu.machine().findings.all;
@@ -137,11 +141,14 @@ fn an_offence_is_told_with_its_address_and_its_place_in_the_program() {
         (&[(0x0800_0000, 1)], "at 0x08000000"),
     ];
     for (of, told) in cases {
-        let finding = offence(of);
+        let finding = offence(of, false);
         let text = finding.to_string();
         assert!(text.to_lowercase().contains(&told.to_lowercase()), "{text}, not {told}");
         assert!(text.contains(&format!("block {:#010x}", 0x0800_0000 + PROGRAM)), "{text}");
         let (address, _) = of[of.len() - 1];
         assert!(text.contains(&format!("{address:#010x}")), "{text}");
+        // Of eight bytes a write, the store is the third instruction.
+        let store = PROGRAM + 8 * (of.len() as u32 - 1) + 4;
+        assert_eq!(offence(of, true).pc, 0x0800_0000 + store, "{text}");
     }
 }
