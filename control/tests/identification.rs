@@ -35,7 +35,7 @@ struct Sensors {
     noise_share: f32,
     /// Error of the angle's zero, electrical, in degrees.
     zero_deg: f64,
-    /// What phase currents are read as.
+    /// The reading of phase currents.
     reads: fn(Abc) -> Abc,
 }
 

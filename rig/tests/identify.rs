@@ -122,7 +122,7 @@ fn a_zero_that_is_off_is_found_with_the_machine() {
     });
 }
 
-/// What the sensors read where nothing flows is known before the first pulse, and is no current of the fit's.
+/// Offsets of the sensors are known before the first pulse, and are no currents of the fit.
 #[test]
 fn offsets_of_the_current_sensors_are_found() {
     for ((name, flaws), offset_a) in EVERY.into_iter().zip([3.0_f64, 0.4, 1.1]) {

@@ -1,4 +1,4 @@
-//! How currents follow voltages: what tells a machine from current sensors that read something else.
+//! The currents as they follow voltages: what tells a machine from current sensors that read something else.
 //!
 //! Changes of current are volt-seconds times the inverse of the inductance, a symmetric matrix with positive eigenvalues, wherever the rotor stands.
 //! Sensors in another order than the phases turn or mirror it, those of the wrong sign make it indefinite.

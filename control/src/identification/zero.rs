@@ -15,7 +15,7 @@ const TURNS_S: f32 = 0.04;
 const MOST_RAD: f32 = 0.35;
 
 impl Zero {
-    /// Where the angle says.
+    /// A zero that is where the angle says.
     pub const fn new() -> Self {
         Self { rad: 0.0, ahead: SinCos { sin: 0.0, cos: 1.0 } }
     }
