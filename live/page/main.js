@@ -108,11 +108,13 @@ worker.onmessage = ({ data }) => ({
     buttons();
   },
   rows() {
-    // Of a drive elsewhere rows may come before the page has its columns: there are more.
-    if (!memory) return tell({ type: "drawn" });
-    memory.put(data.from, data.rows, data.edges);
-    if (record?.runs) keep(data.from, data.rows);
+    if (memory) {
+      memory.put(data.from, data.rows, data.edges);
+      if (record?.runs) keep(data.from, data.rows);
+    }
     [state, factor, fresh] = [data.state, data.factor, true];
+    // Nothing to draw yet, which no frame would say: no row has come, or, of a drive elsewhere, no columns.
+    if (!memory?.count) tell({ type: "drawn" });
   },
   bound() { bound = data.values; },
   ran() {

@@ -12,15 +12,15 @@ const LARGEST_BYTES: usize = 240_000;
 
 /// A picture: its name, what the address says behind `#`, the fault that is injected, size, dark or not.
 const PICTURES: [(&str, &str, &str, u32, u32, bool); 6] = [
-    ("live-light", "held=1350&torque=900&window=0.02&trigger=ia", "", 1280, 1340, false),
+    ("live-light", "held=1350&torque=900&window=0.02&trigger=ia", "", 1280, 1230, false),
     ("live-dark", "held=2600&torque=700&window=0.01&trigger=ia", "", 1280, 940, true),
     ("live-fault", "held=600&torque=-700&window=0.05&trigger=fault", "uh-stuck-off", 1000, 900, false),
     (
         "live-zs9",
-        "system=zs9&command2=speed&speed2=600&rotor2=free&load2=30&window=0.02&trigger=ia1&samples=50",
+        "system=zs9&command2=speed&speed2=600&rotor2=free&load2=30&window=0.02&trigger=ia1",
         "",
         1280,
-        1420,
+        1250,
         false,
     ),
     ("live-phone-light", "held=700&torque=600&window=0.05&trigger=ia", "", 390, 844, false),
