@@ -252,9 +252,11 @@
       const height = Math.max(this.plan.panels.length === 1 ? 250 : k === 0 ? 190 : 150, 16 * panel.levels.length + 34) + (isLast ? 26 : 0) - (narrow ? 20 : 0);
       const line = { font: FONT, stroke: css("muted"), grid: { stroke: css("grid"), width: 1 }, ticks: { stroke: css("line"), width: 1, size: 4 } };
       const names = panel.levels, span = () => this.shown[1] - this.shown[0];
+      // Room above the curves for the legend, however many lines it has.
+      let above = narrow ? 8 : 24;
       const time = (u, ticks) => ticks.map(tick => (this.plan.time ? told(tick, span()) : +tick.toPrecision(8)));
       const options = {
-        width: this.width, height, pxAlign: 0, padding: [narrow ? 8 : 24, 20, 0, 0],
+        width: this.width, height, pxAlign: 0, padding: [() => above, 20, 0, 0],
         cursor: { ...(this.plan.time ? { sync: { key: "time", scales: ["x", null] } } : {}), drag: { x: true, y: false, setScale: false }, points: { size: 6 } },
         legend: { live: true, markers: { width: 0, fill: (u, s) => u.series[s].stroke?.(u, s) } },
         scales: {
@@ -272,6 +274,11 @@
         hooks: { setSelect: [u => this.select(u)], drawClear: [u => this.shade(u)], draw: [u => this.lines(u)] },
       };
       const made = new uPlot(options, [[], ...panel.series.map(() => [])], this.hosts[k]);
+      const more = (made.root.querySelector(".u-legend")?.offsetHeight ?? 0) + 4 - above;
+      if (!narrow && more > 0) {
+        above += more;
+        made.setSize({ width: this.width, height: height + more });
+      }
       made.over.addEventListener("dblclick", () => this.show(...this.home));
       made.over.addEventListener("wheel", event => {
         if (!event.ctrlKey && !event.shiftKey) return;
