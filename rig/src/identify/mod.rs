@@ -5,20 +5,16 @@
 
 mod basis;
 mod commander;
-mod corrected;
 mod fit;
 mod half;
 mod outcome;
-mod response;
 mod signs;
 mod toml;
-mod turn;
 
 pub use commander::{Commander, Ended};
 pub use fit::Fit;
 pub use outcome::{Outcome, Truth};
 pub use signs::{Signs, saliency_deg};
-pub use turn::Rotor;
 
 use crate::can;
 use crate::files::write_text;
@@ -121,7 +117,7 @@ pub fn identified(identify: &Identify, machine: &Machine) -> Result<std::result:
                 fault: trip.fault.name().to_owned(),
                 value: trip.value.to_string(),
                 limit: trip.limit.to_string(),
-                ..Ended::default()
+                zero_deg: None,
             }),
             None => Ok(std::mem::take(&mut recording.observations)),
         };
@@ -139,26 +135,16 @@ pub fn identified(identify: &Identify, machine: &Machine) -> Result<std::result:
 
 /// The fault of an experiment whose rotor has turned away.
 pub const ROTOR_TURNED: &str = "rotor_turned";
-/// The fault of an experiment whose currents do not follow the voltage.
-pub const CURRENT_SENSORS: &str = "current_sensors";
 
-/// Observations of an experiment that has come to its end. One whose rotor is not where it should be, as its angle is wrong or a load turns
-/// it, ends before the rotor is to turn; one whose currents answer as no machine's do, after its first pulses.
+/// Observations of an experiment that has come to its end: one whose rotor is not where it should be, as its angle is wrong or a load turns
+/// it, ends before the rotor is to turn.
 fn complete(observations: Vec<Observation>, bound_a: f64) -> std::result::Result<Vec<Observation>, Ended> {
-    let reached = |stage: Stage| observations.iter().any(|observation| observation.stage == stage);
-    if reached(Stage::Turn) {
+    if observations.iter().any(|observation| observation.stage == Stage::Turn) {
         return Ok(observations);
     }
-    Err(if reached(Stage::Staircase) {
-        let zero_deg = saliency_deg(&observations, bound_a);
-        let (value, limit) = ("more".to_owned(), "5° before it is to turn".to_owned());
-        Ended { fault: ROTOR_TURNED.to_owned(), value, limit, zero_deg, wiring: None }
-    } else {
-        let wiring = response::wiring(&observations);
-        let value = wiring.map_or_else(|| "as no machine's".to_owned(), |wiring| wiring.to_string());
-        let limit = "u,v,w, as the currents answer the first pulses".to_owned();
-        Ended { fault: CURRENT_SENSORS.to_owned(), value, limit, zero_deg: None, wiring }
-    })
+    let (value, limit) = ("more".to_owned(), "5° before it is to turn".to_owned());
+    let zero_deg = saliency_deg(&observations, bound_a);
+    Err(Ended { fault: ROTOR_TURNED.to_owned(), value, limit, zero_deg })
 }
 
 /// The same of a drive on a CAN bus, whose truth nobody knows.
