@@ -92,14 +92,16 @@ impl Host {
     pub fn new(stage: &Stage, tables: &'static Tables, zeros: &[u32]) -> Self {
         let settings = stage.settings(tables.ratings.max_switching_hz);
         let turns = (tables.ratings.pole_pairs as u64) << 32;
+        let units_per_count = ((turns + stage.encoder_counts / 2) / stage.encoder_counts) as u32;
         let degrees = stage.encoder_zeros_deg[0] / 360.0 * 2f64.powi(32);
         let zero = |index: usize| zeros.get(index).copied().unwrap_or(0);
         let board = Board {
             zeros: [[zero(0), zero(1), zero(2)], [zero(3), zero(4), zero(5)]],
             a_per_code: stage.current_range_a as f32 / 2_048.0,
             v_per_code: stage.dc_link_range_v as f32 / 4_095.0,
-            units_per_count: ((turns + stage.encoder_counts / 2) / stage.encoder_counts) as u32,
-            zero: Angle(degrees.round() as i64 as u32),
+            units_per_count,
+            // The middle of a count.
+            zero: Angle(degrees.round() as i64 as u32) + Angle(units_per_count / 2),
             passed: false,
             known: false,
             commands: Commands(Vec::new()),

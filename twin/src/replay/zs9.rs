@@ -92,9 +92,11 @@ impl Host {
         let clock = Clock::new(ticks_per_s, ticks_per_s / CONTROL_HZ);
         let settings = Settings::new(clock, clock.control_ticks);
         let turns = (tables.ratings.pole_pairs as u64) << 32;
+        let units_per_count = ((turns + stage.encoder_counts / 2) / stage.encoder_counts) as u32;
         let rotor = |degrees: f64| {
             let zero = Angle((degrees / 360.0 * 2f64.powi(32)).round() as i64 as u32);
-            Rotor { zero, passed: false, known: false }
+            // The middle of a count.
+            Rotor { zero: zero + Angle(units_per_count / 2), passed: false, known: false }
         };
         let board = Board {
             zeros: std::array::from_fn(|index| zeros.get(index).copied().unwrap_or(0)),
@@ -103,7 +105,7 @@ impl Host {
             capacitor_v_per_code: stage.dc_link_range_v as f32 / 4_095.0,
             source_v_per_code: stage.z_source.source_range_v as f32 / 4_095.0,
             link_ref_v: stage.z_source.link_ref_v as f32,
-            units_per_count: ((turns + stage.encoder_counts / 2) / stage.encoder_counts) as u32,
+            units_per_count,
             encoders: stage.encoder_zeros_deg.map(rotor),
             commands: Commands(Vec::new()),
         };
