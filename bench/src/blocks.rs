@@ -5,7 +5,7 @@ use fixed::types::I16F16;
 use micromath::F32Ext;
 use tractive::built_in::traction::BUILT_IN;
 use tractive::control::{flux_linkage, mtpa};
-use tractive::frames::{self, Abc, Angle, Dq};
+use tractive::frames::{self, Abc, Angle, Dq, SinCos};
 
 /// Every block; of those with the same word before the stroke the first is ours.
 pub const ALL: [Block; 20] = [
@@ -132,17 +132,23 @@ const INTEGRAL_GAIN: f32 = 20.0;
 const RESISTANCE: f32 = 0.1;
 const LINK_V: f32 = 100.0;
 
-/// The tick of every field-oriented controller, in this drive's way: Clarke, Park, current to flux by the map, the
-/// flux error with its integral part, decoupling, back to the stator, voltages of the phases.
-#[inline(never)]
-fn core_tick_tractive(input: &Input, output: &mut Output) {
+/// The voltage of every field-oriented controller, in this drive's way: Clarke, Park, current to flux by the map, the flux error with its integral part,
+/// decoupling. The rotor's frame, the integral part and the voltage.
+#[inline(always)]
+fn controlled(input: &Input, output: &Output) -> (SinCos, Dq, Dq) {
     let frame = Angle(input.turn).sin_cos();
     let current = currents(input).clarke().park(frame);
     let flux = flux_linkage(&BUILT_IN, current);
     let [d, q] = input.vector;
     let error = Dq { d, q } - flux;
     let integral = Dq { d: output[0], q: output[1] } + error * INTEGRAL_GAIN;
-    let voltage = error * GAIN + integral + flux.j() * input.radians + current * RESISTANCE;
+    (frame, integral, error * GAIN + integral + flux.j() * input.radians + current * RESISTANCE)
+}
+
+/// The tick of every field-oriented controller: that voltage, back to the stator, as voltages of the phases.
+#[inline(never)]
+fn core_tick_tractive(input: &Input, output: &mut Output) {
+    let (frame, _, voltage) = controlled(input, output);
     let phases = voltage.unpark(frame).abc();
     *output = [phases.a, phases.b];
 }
@@ -152,13 +158,7 @@ fn core_tick_tractive(input: &Input, output: &mut Output) {
 #[inline(never)]
 fn duty_tick_tractive(input: &Input, output: &mut Output) {
     const LIMIT_V: f32 = LINK_V * 0.577_350_3;
-    let frame = Angle(input.turn).sin_cos();
-    let current = currents(input).clarke().park(frame);
-    let flux = flux_linkage(&BUILT_IN, current);
-    let [d, q] = input.vector;
-    let error = Dq { d, q } - flux;
-    let integral = Dq { d: output[0], q: output[1] } + error * INTEGRAL_GAIN;
-    let wanted = error * GAIN + integral + flux.j() * input.radians + current * RESISTANCE;
+    let (frame, integral, wanted) = controlled(input, output);
     let squared = wanted.d * wanted.d + wanted.q * wanted.q;
     let fits = squared <= LIMIT_V * LIMIT_V;
     let voltage = if fits { wanted } else { wanted * (LIMIT_V / frames::sqrt(squared)) };

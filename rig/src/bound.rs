@@ -82,19 +82,24 @@ const fn cycles(mode: Mode) -> u32 {
 /// The distortion of pulses from which on the current has no fundamental that anything could be a share of, in percent.
 const NO_FUNDAMENTAL_PERCENT: f64 = 1000.0;
 
-/// The verdicts on distortion and torque ripple: of an ideal inverter, no more than a little over the bound.
+/// The verdicts on distortion and torque ripple: of an ideal inverter, no more than a little over the bound. Distortion is judged at the points whose
+/// current has a fundamental; where none has, it is told.
 pub fn verdicts(points: &[Beside], options: &RunOptions) -> [Verdict; 3] {
-    let has_fundamental = points.iter().all(|point| point.thd_bound_percent < NO_FUNDAMENTAL_PERCENT);
-    let thd_percent = if has_fundamental { 2.0 } else { f64::INFINITY };
-    let judged = |what: &str, value: fn(&Beside) -> f64, at_most: f64| {
-        let found = worst(points.iter().map(value));
+    let with_fundamental: Vec<_> =
+        points.iter().filter(|point| point.thd_bound_percent < NO_FUNDAMENTAL_PERCENT).collect();
+    let all: Vec<_> = points.iter().collect();
+    let (of, thd_percent) =
+        if with_fundamental.is_empty() { (&all, f64::INFINITY) } else { (&with_fundamental, 2.0) };
+    let judged = |what: &str, points: &[&Beside], value: fn(&Beside) -> f64, at_most: f64| {
+        let found = worst(points.iter().map(|point| value(point)));
         Verdict::at_most(what, found, bound(options, at_most, f64::INFINITY))
     };
     [
-        judged("current THD over its bound in %", |point| point.thd_excess_percent, thd_percent),
-        judged("rms torque ripple over its bound in %", |point| point.ripple_rms_excess_percent, 2.0),
+        judged("current THD over its bound in %", of, |point| point.thd_excess_percent, thd_percent),
+        judged("rms torque ripple over its bound in %", &all, |point| point.ripple_rms_excess_percent, 2.0),
         judged(
             "peak-to-peak torque over its bound in %",
+            &all,
             |point| point.ripple_peak_to_peak_excess_percent,
             8.0,
         ),

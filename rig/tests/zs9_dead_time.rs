@@ -1,30 +1,11 @@
 //! The dead time of the ZS9's nine gates: kept, made up for, and what is left of it.
 
+mod zs9_runs;
+
 use rayon::prelude::*;
-use serde_json::Value;
-use tractive_rig::analysis::Figures;
-use tractive_rig::scenario::catalogue;
 use tractive_rig::trace::Recorded;
 use tractive_rig::zs9::trace::Recording;
-
-/// The results of a run.
-struct Outcome {
-    recording: Recording,
-    figures: Figures,
-}
-
-/// Runs a scenario as on the command line.
-fn run(line: &str) -> Outcome {
-    let chosen = catalogue::of_zs9(line).unwrap();
-    let machine = chosen.machine().unwrap();
-    let recording = chosen.drive(&machine).unwrap();
-    let figures = chosen.figures(&recording, &machine);
-    Outcome { recording, figures }
-}
-
-fn figure(outcome: &Outcome, name: &str) -> f64 {
-    outcome.figures.get(name).and_then(Value::as_f64).unwrap_or_else(|| panic!("no figure {name}"))
-}
+use zs9_runs::{figure, run};
 
 /// Dead time where two gates of a leg exchange, none where a leg is shorted on purpose; the diodes choose the state meanwhile.
 #[test]

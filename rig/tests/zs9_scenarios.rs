@@ -1,33 +1,16 @@
 //! The ZS9's scenarios on the host, held against their bounds.
 
+mod zs9_runs;
+
 use rayon::prelude::*;
 use serde_json::Value;
-use tractive_rig::analysis::Figures;
 use tractive_rig::rows::mean;
 use tractive_rig::scenario::{catalogue, command};
 use tractive_rig::trace::Recorded;
 use tractive_rig::zs9::bound;
 use tractive_rig::zs9::figures;
 use tractive_rig::zs9::trace::{Recording, Row};
-
-/// The results of a run.
-struct Outcome {
-    recording: Recording,
-    figures: Figures,
-}
-
-/// Runs a scenario as on the command line.
-fn run(line: &str) -> Outcome {
-    let chosen = catalogue::of_zs9(line).unwrap();
-    let machine = chosen.machine().unwrap();
-    let recording = chosen.drive(&machine).unwrap();
-    let figures = chosen.figures(&recording, &machine);
-    Outcome { recording, figures }
-}
-
-fn figure(outcome: &Outcome, name: &str) -> f64 {
-    outcome.figures.get(name).and_then(Value::as_f64).unwrap_or_else(|| panic!("no figure {name}"))
-}
+use zs9_runs::{figure, run};
 
 /// Largest difference of a value between two runs, row by row.
 fn difference(a: &Recording, b: &Recording, value: fn(&Row) -> f64) -> f64 {

@@ -15,7 +15,8 @@ use crate::protection::Trip;
 /// back into the source through the inductors.
 const RESTING_SHARE: f32 = 0.05;
 
-/// Time over which the torque that holds a speed is the mean, in s: at an instant the speed loop's torque is full of the noise of the speed.
+/// Time over which the torque that holds a speed is the mean, in s. At an instant the speed loop's torque is full of the speed's noise: behind an encoder
+/// of 4,096 counts up to 90 N·m of 120, which ramped down from there spun the ZS9's free motor to 390 r/min.
 const HOLDING_S: f32 = 0.05;
 
 /// The demand on one motor.

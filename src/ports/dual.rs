@@ -21,7 +21,7 @@ pub enum MotorDemand {
 pub struct DualSample {
     /// Phase currents, positive into the motor, in A.
     pub currents_a: [Abc; 2],
-    /// Rotor angles, electrical; `None` while one is not known, or no longer: the sensor itself has lost its rotor.
+    /// Rotor angles, electrical, of sensors that count the middle of the count; `None` while one is not known, or no longer: the sensor itself has lost its rotor.
     pub angles: [Option<Angle>; 2],
     /// Capacitor voltage, mean of both, in V.
     pub capacitor_v: f32,

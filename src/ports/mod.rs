@@ -24,7 +24,7 @@ pub struct Sample {
     pub currents_a: Abc,
     /// DC-link voltage at that instant, in V.
     pub udc_v: f32,
-    /// Rotor angle at that instant, electrical; `None` while it is not known, or no longer.
+    /// Rotor angle at that instant, electrical, of a sensor that counts the middle of its count; `None` while it is not known, or no longer.
     pub angle: Option<Angle>,
     /// `true` while the board lets the gates pulse: its enable input is high, and no break holds them.
     pub may_pulse: bool,

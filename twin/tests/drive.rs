@@ -1,11 +1,14 @@
 //! A short drive of each image: what no other place can show of it. The images are those which `TRACTIVE_NUCLEO_IMAGE` and
 //! `TRACTIVE_NUCLEO_ZS9_IMAGE` name.
 
+mod prepared;
+
+use prepared::{is_sound, prepared};
 use tractive_rig::talk::System;
 use tractive_twin::core::cpu::{Cpu, Longest, RAM};
 use tractive_twin::image::Image;
 use tractive_twin::instants::{Instants, Range};
-use tractive_twin::run::{Settings, drive, prepare};
+use tractive_twin::run::drive;
 use tractive_twin::time::{MILLISECOND, SECOND, Time};
 
 /// Charged at once, enabled, pulling.
@@ -33,20 +36,9 @@ const CONTROL_ZS9: usize = 44;
 const PWM: usize = 41;
 
 fn driven(system: System, mistake: Option<fn(u32, u32) -> u32>) -> (Cpu, Image) {
-    let (name, script) = match system {
-        System::Pmasynrm => ("TRACTIVE_NUCLEO_IMAGE", SCRIPT),
-        System::Zs9 => ("TRACTIVE_NUCLEO_ZS9_IMAGE", SCRIPT_ZS9),
-    };
-    let image = std::env::var_os(name).expect(name);
-    let settings = Settings::new(image.as_ref(), system, script.to_owned());
-    let (mut cpu, image) = prepare(&settings).unwrap();
-    let machine = cpu.machine_mut();
-    machine.mistake = mistake;
-    machine.world.side.charge();
+    let (_, mut cpu, image) = prepared(system, [SCRIPT, SCRIPT_ZS9], mistake);
     drive(&mut cpu).unwrap();
-    let machine = cpu.machine();
-    assert!(mistake.is_some() || machine.findings.all.is_empty(), "{:?}", machine.findings.all);
-    assert!(mistake.is_some() || machine.world.talk.failures.is_empty(), "{:?}", machine.world.talk.failures);
+    is_sound(&cpu);
     (cpu, image)
 }
 

@@ -1,10 +1,13 @@
 //! The edges at the pins beside those that the drive makes on the host of the same inputs. The images are those which
 //! `TRACTIVE_NUCLEO_IMAGE` and `TRACTIVE_NUCLEO_ZS9_IMAGE` name.
 
+mod prepared;
+
+use prepared::{is_sound, prepared};
 use tractive_rig::talk::System;
 use tractive_twin::replay::Replay;
 use tractive_twin::replay::edges::Compared;
-use tractive_twin::run::{Settings, drive_beside, prepare};
+use tractive_twin::run::drive_beside;
 use tractive_twin::time::{SECOND, Time};
 
 /// A short pull, from standstill.
@@ -31,22 +34,11 @@ const COMPARE_ZS9: u32 = 0x4001_3440;
 const CYCLE: Time = SECOND / 170_000_000;
 
 fn compared(system: System, mistake: Option<fn(u32, u32) -> u32>) -> Compared {
-    let (name, script) = match system {
-        System::Pmasynrm => ("TRACTIVE_NUCLEO_IMAGE", SCRIPT),
-        System::Zs9 => ("TRACTIVE_NUCLEO_ZS9_IMAGE", SCRIPT_ZS9),
-    };
-    let image = std::env::var_os(name).expect(name);
-    let settings = Settings::new(image.as_ref(), system, script.to_owned());
-    let (mut cpu, image) = prepare(&settings).unwrap();
+    let (settings, mut cpu, image) = prepared(system, [SCRIPT, SCRIPT_ZS9], mistake);
     let mut replay = Replay::new(&settings, &image).unwrap();
-    let machine = cpu.machine_mut();
-    machine.mistake = mistake;
-    machine.world.side.charge();
     drive_beside(&mut cpu, Some(&mut replay)).unwrap();
-    let machine = cpu.machine();
-    assert!(mistake.is_some() || machine.findings.all.is_empty(), "{:?}", machine.findings.all);
-    assert!(mistake.is_some() || machine.world.talk.failures.is_empty(), "{:?}", machine.world.talk.failures);
-    replay.compare(machine)
+    is_sound(&cpu);
+    replay.compare(cpu.machine())
 }
 
 #[test]

@@ -147,9 +147,11 @@ impl Panel {
         points: impl IntoIterator<Item = Point>,
         colour: Colour,
     ) -> &mut Self {
-        self.names.push((name.to_owned(), colour));
         self.last_dashed = true;
-        self.marks.push(Mark::Line(points.into_iter().collect(), colour, 1.6, true));
+        self.named(name, points, colour);
+        if let Some(Mark::Line(.., dashed)) = self.marks.last_mut() {
+            *dashed = true;
+        }
         self
     }
 
