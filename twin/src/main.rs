@@ -118,9 +118,9 @@ fn tell_instants(cpu: &Cpu) {
     let machine = cpu.machine();
     for (exception, longest) in &cpu.longest {
         let late = machine.nvic.waited(*exception) / machine.cycle();
-        let Longest { cycles, prefetched, waited } = longest;
+        let Longest { cycles, waited } = longest;
         println!(
-            "{}: {cycles} cycles at most, {prefetched} with the flash memory's prefetch alone, {waited} with all of its wait states; it waited for {late} at most",
+            "{}: {cycles} cycles at most, {waited} with the waits for tables and literals; it waited for {late} at most",
             interrupt(*exception)
         );
     }

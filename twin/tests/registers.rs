@@ -26,7 +26,7 @@ const RCC: &[Published] = published!(rcc:
     0x58 apb1enr1 APB1ENR1rs, 0x5C apb1enr2 APB1ENR2rs, 0x60 apb2enr APB2ENRrs, 0x88 ccipr CCIPRrs, 0x94 csr CSRrs);
 const PWR: &[Published] = published!(pwr: 0x04 cr2 CR2rs, 0x08 cr3 CR3rs, 0x80 cr5 CR5rs);
 const FLASH: &[Published] = published!(flash: 0x00 acr ACRrs);
-const SYSCFG: &[Published] = published!(syscfg: 0x1C cfgr2 CFGR2rs);
+const SYSCFG: &[Published] = published!(syscfg: 0x1C cfgr2 CFGR2rs, 0x20 swpr SWPRrs);
 const DBGMCU: &[Published] = published!(dbgmcu: 0x04 cr CRrs, 0x08 apb1l_fz APB1L_FZrs, 0x0C apb1h_fz APB1H_FZrs, 0x10 apb2_fz APB2_FZrs);
 const IWDG: &[Published] = published!(iwdg: 0x04 pr PRrs, 0x08 rlr RLRrs, 0x0C sr SRrs);
 const SPI: &[Published] = published!(spi1: 0x00 cr1 CR1rs, 0x04 cr2 CR2rs, 0x08 sr SRrs, 0x0C dr DRrs);

@@ -6,12 +6,13 @@ use crate::finding::Findings;
 use std::collections::HashMap;
 
 /// The registers that are modelled, with their reset values.
-const RESET: [(&str, u32, u32); 9] = [
+const RESET: [(&str, u32, u32); 10] = [
     ("PWR", 0x04, 0),
     ("PWR", 0x08, 0x8000),
     ("PWR", 0x80, 0x0100),
     ("FLASH", 0x00, 0x0004_0600),
     ("SYSCFG", 0x1C, 0),
+    ("SYSCFG", 0x20, 0),
     ("DBGMCU", 0x04, 0),
     ("DBGMCU", 0x08, 0),
     ("DBGMCU", 0x0C, 0),
@@ -51,8 +52,11 @@ impl System {
     pub fn write(&mut self, name: &str, offset: u32, value: u32, findings: &mut Findings) -> bool {
         let Some(key) = Self::key(name, offset) else { return false };
         if name == "SYSCFG" {
-            let before = self.word("SYSCFG", 0x1C) & 0b1111;
-            findings.expect(value & before == before, || "SYSCFG.CFGR2: a lock cannot be taken back".into());
+            let (locks, register) = if offset == 0x1C { (0b1111, "CFGR2") } else { (u32::MAX, "SWPR") };
+            let before = self.word("SYSCFG", offset) & locks;
+            findings.expect(value & before == before, || {
+                format!("SYSCFG.{register}: a lock cannot be taken back")
+            });
         }
         self.words.insert(key, value);
         true
@@ -71,6 +75,11 @@ impl System {
             _ => return false,
         };
         self.word("DBGMCU", offset) >> bit & 1 != 0
+    }
+
+    /// `true` if the CCM SRAM cannot be written at an offset (SYSCFG_SWPR, a bit for each page of 1 KB).
+    pub fn is_protected(&self, offset: u32) -> bool {
+        self.word("SYSCFG", 0x20) >> (offset >> 10) & 1 != 0
     }
 
     /// The conditions of a fast clock.

@@ -106,6 +106,11 @@ impl Nvic {
         (i32::from(self.priorities[first]) < self.running()).then_some(EXTERNAL + first)
     }
 
+    /// `true` in an interrupt: an exception of the chip's, not the core's own.
+    pub fn in_interrupt(&self) -> bool {
+        self.active.last().is_some_and(|exception| *exception >= EXTERNAL)
+    }
+
     /// An exception becomes active.
     pub fn enter(&mut self, exception: usize, now: Time) {
         match exception.checked_sub(EXTERNAL) {

@@ -1,6 +1,6 @@
 //! The processor's exceptions, by a program of a few instructions.
 
-use super::cpu::Cpu;
+use super::cpu::{CCM, Cpu};
 use crate::finding::Finding;
 use crate::image::Image;
 use crate::run::{Settings, machine};
@@ -44,8 +44,8 @@ const CODE: [u32; 17] = [
 /// FPSCR.N: less.
 const LESS: u32 = 1 << 31;
 
-/// FPSCR's condition flags and S0 as the program has stored them, with or without an interrupt between the comparison and its use.
-fn left(interrupted: bool) -> (u32, f32) {
+/// The program after it has stored the flags, with or without an interrupt between the comparison and its use.
+fn after(interrupted: bool) -> Cpu {
     let mut words = vec![0; VECTORS];
     (words[0], words[1], words[EXCEPTION]) = (0x2000_1000, 0x0800_0001 + PROGRAM, 0x0800_0001 + HANDLER);
     words.extend(CODE);
@@ -66,7 +66,12 @@ fn left(interrupted: bool) -> (u32, f32) {
     let until = machine.now() + 100 * MICROSECOND;
     cpu.run(until).unwrap();
     assert_eq!(cpu.longest.contains_key(&EXCEPTION), interrupted);
-    assert!(cpu.machine().findings.all.is_empty(), "{:?}", cpu.machine().findings.all);
+    cpu
+}
+
+/// FPSCR's condition flags and S0 as the program has stored them.
+fn left(interrupted: bool) -> (u32, f32) {
+    let cpu = after(interrupted);
     (cpu.word(LEFT).unwrap() & 0xF << 28, f32::from_bits(cpu.word(LEFT + 4).unwrap()))
 }
 
@@ -74,6 +79,15 @@ fn left(interrupted: bool) -> (u32, f32) {
 fn an_interrupt_between_a_comparison_and_its_use_leaves_the_flags() {
     assert_eq!(left(false), (LESS, 1.0));
     assert_eq!(left(true), (LESS, 1.0));
+}
+
+#[test]
+fn an_interrupt_whose_code_is_in_the_flash_memory_is_found() {
+    assert!(after(false).machine().findings.all.is_empty());
+    let cpu = after(true);
+    let [finding] = &cpu.machine().findings.all[..] else { panic!("{:?}", cpu.machine().findings.all) };
+    assert_eq!(finding.text, "an interrupt executes from the flash memory");
+    assert_eq!(finding.pc, 0x0800_0000 + HANDLER);
 }
 
 /// The instructions of a program that writes words to addresses, one after another; last it reads the last address.
@@ -114,8 +128,9 @@ fn offence(of: &[(u32, u32)], traced: bool) -> Finding {
 fn an_offence_is_told_with_its_address_and_its_place_in_the_program() {
     const ENABLE_APB1: (u32, u32) = (0x4002_1058, 0x400 | 1 << 11 | 1);
     const ENABLE_APB2: (u32, u32) = (0x4002_1060, 1 << 11);
+    const ENABLE_SYSCFG: (u32, u32) = (0x4002_1060, 1);
     const ENABLE_DMA: (u32, u32) = (0x4002_1048, 0x100 | 1);
-    let cases: [(&[(u32, u32)], &str); 13] = [
+    let cases: [(&[(u32, u32)], &str); 15] = [
         // What the twin does not model: the window watchdog, a DMA channel, the second CAN's clock is off.
         (
             &[ENABLE_APB1, (0x4000_2C00, 0xFF)],
@@ -132,6 +147,12 @@ fn an_offence_is_told_with_its_address_and_its_place_in_the_program() {
         (&[(0x4000_5FFC, 0)], "0x40005ffc is written, where the chip has no register"),
         (&[ENABLE_APB2, (0x4001_2C00, 1 << 15)], "reserved bits 0x00008000 of TIM1.CR1 are written"),
         (&[(0x4800_0010, 1)], "GPIOA.IDR is written"),
+        // Code that is protected, and cannot be otherwise any more.
+        (
+            &[ENABLE_SYSCFG, (0x4001_0020, 2), (CCM.0, 1), (CCM.0 + 0x400, 1)],
+            "a write to the CCM SRAM's page 1, which is protected",
+        ),
+        (&[ENABLE_SYSCFG, (0x4001_0020, 2), (0x4001_0020, 1)], "SYSCFG.SWPR: a lock cannot be taken back"),
         // Without a clock; locked; out of its order; too fast; not modelled in the private bus.
         (&[(0x4001_2C00, 0)], "TIM1.CR1 is written while its clock is off"),
         (&[(0x4000_3004, 0)], "IWDG is written while it is locked"),
