@@ -1,35 +1,37 @@
 //! The control interrupt's task.
 
+mod checks;
+mod law;
 mod start_up;
 
-use super::applied::{NO_LIMITS, Steady, Wanted, committed, follows, limits, passed};
-use super::pulses::{Half, Order, Pulses};
+use super::applied::NO_LIMITS;
+use super::pulses::{Order, Pulses};
 use super::six_step_exit::SixStepExit;
 use super::slot::{Decision, Slot};
 use super::{Settings, Shared};
-use crate::control::{
-    AimInput, ControlLaw, Controller, Demand, Law, LinkDamper, Measurements, ModeLimits, RotorSample,
-};
+use crate::control::{ControlLaw, Controller, LinkDamper, Measurements, ModeLimits};
 use crate::drive::acknowledge::Acknowledge;
 use crate::drive::{PeriodInput, SlotTimer};
 use crate::frames::Angle;
 use crate::machine::{Machine, Tables};
 use crate::modulation::{Mode, Reference, Schedule};
-use crate::ports::{ControlPort, DriveCommand, Report, Sample, Traction};
-use crate::protection::{self, Fault, FrozenWatch, MaskedFaults, Trip, Violation};
+use crate::ports::{ControlPort, Report, Sample, Traction};
+use crate::protection::{Fault, FrozenWatch, MaskedFaults, Trip};
 use crate::recorder::{Record, State};
-use crate::time::Instant;
+use crate::time::{Clock, Instant};
 use core::sync::atomic::Ordering;
 use start_up::Starting;
 
 type Input<'a> = PeriodInput<'a, Traction>;
 
-/// A demand that jumps by more than this share of the largest torque is worth revising the next half for.
-const JUMP_SHARE: f32 = 0.05;
-
-/// Control periods that the running half must still last for the next one to be revised: one until the command is valid, and one
-/// in which control sees what became of it.
-const REVISION_PERIODS: u32 = 2;
+/// A period as its checks leave it: its nominal instant, the measurements with the angle where they were taken, the electrical speed in rad/s, and the
+/// mode of the newest half that was loaded.
+struct Seen {
+    now: Instant,
+    measured: Measurements,
+    omega: f32,
+    loaded: Mode,
+}
 
 /// The control interrupt's task, for a machine and a control law.
 pub struct ControlTask<M = &'static Tables, L = Controller> {
@@ -147,16 +149,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
 
     /// The control timer's interrupt. Deadline: one control period after its nominal instant; a missed one is a fault.
     pub fn run(&mut self, port: &mut impl ControlPort, shared: &Shared) {
-        let now = self.now;
-        let control_ticks = self.settings.clock.control_ticks;
-        if self.revises {
-            let release = self.acknowledge.release();
-            let order = Order { pulses: true, reference: &self.reference, release };
-            self.pulses.revise(&order, &shared.planned);
-        }
-        port.begin(self.revises);
-        self.now = now.after(control_ticks);
-        shared.began.store(now.0, Ordering::Relaxed);
+        let now = self.begin(port, shared);
         let sample = port.sample(now);
         let operator = || {
             self.operated = true;
@@ -165,6 +158,30 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         let mut command = port.command(now, operator);
         command.enable &= sample.may_pulse;
         let input = Input { sample: &sample, command: &command };
+        let seen = self.protect(now, input, port, shared);
+        let pulsing = self.decide(&seen, input, port, shared);
+        let pulsing = self.plan(&seen, pulsing, &sample, port, shared);
+        self.tell(&seen, pulsing, input, port, shared);
+    }
+
+    /// The half that this period may still change, and the period's clock; returns the period's nominal instant.
+    #[inline(always)]
+    fn begin(&mut self, port: &mut impl ControlPort, shared: &Shared) -> Instant {
+        let now = self.now;
+        if self.revises {
+            let release = self.acknowledge.release();
+            let order = Order { pulses: true, reference: &self.reference, release };
+            self.pulses.revise(&order, &shared.planned);
+        }
+        port.begin(self.revises);
+        self.now = now.after(self.settings.clock.control_ticks);
+        shared.began.store(now.0, Ordering::Relaxed);
+        now
+    }
+
+    /// Every check of what is measured, and of what the PWM interrupt tells.
+    #[inline(always)]
+    fn protect(&mut self, now: Instant, input: Input, port: &mut impl ControlPort, shared: &Shared) -> Seen {
         let Input { sample, command } = input;
         let mut measured = sample.measured();
         let told = self.pulses.look(&shared.loaded, now, self.now);
@@ -190,36 +207,73 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             .or_else(|| self.armed(lost))
             .or_else(|| self.judge(command, &measured, omega));
         self.check(violation, sample, port);
-        let mut pulsing =
+        Seen { now, measured, omega, loaded: told.map_or(Mode::Off, |told| told.mode) }
+    }
+
+    /// The control law, or what begins it anew; `true` if there are to be pulses.
+    #[inline(always)]
+    fn decide(&mut self, seen: &Seen, input: Input, port: &mut impl ControlPort, shared: &Shared) -> bool {
+        let Input { sample, command } = input;
+        let Seen { now, ref measured, omega, .. } = *seen;
+        let pulsing =
             self.trip.is_none() && command.enable && self.controller.speed_is_known() && !self.exit.crosses();
         let slot = Slot::of(self.pulses.newest(), now, &self.settings.clock);
-        if pulsing {
-            let frozen = self.watch.check(
-                &measured,
-                omega,
-                self.settings.clock.control_s(),
-                &self.machine.tables().ratings,
-            );
+        let pulsing = if pulsing {
+            let ratings = &self.machine.tables().ratings;
+            let frozen = self.watch.check(measured, omega, self.settings.clock.control_s(), ratings);
             self.check(frozen, sample, port);
-            self.pulse(input, &measured, &slot, shared);
+            self.pulse(input, measured, &slot, shared);
+            true
         } else {
-            self.rest(now, omega, &measured);
+            self.rest(now, omega, measured);
             let commands = command.enable.then_some(slot.commands);
-            pulsing = self.start_up(sample, commands, shared, port);
-        }
+            self.start_up(sample, commands, shared, port)
+        };
         // Not finite if either is not.
         let odd = self.reference.voltage_v + omega;
         self.check((!odd.is_finite()).then_some((Fault::NotFinite, odd, f32::MAX)), sample, port);
-        pulsing &= self.trip.is_none();
-        self.revises &= pulsing;
+        self.pulses_on(pulsing)
+    }
+
+    /// The halves that the PWM interrupt will play, and whether they came in time; `true` if they are pulses.
+    #[inline(always)]
+    fn plan(
+        &mut self,
+        seen: &Seen,
+        pulsing: bool,
+        sample: &Sample,
+        port: &mut impl ControlPort,
+        shared: &Shared,
+    ) -> bool {
+        let Clock { control_ticks, .. } = self.settings.clock;
         let release = self.acknowledge.release();
         let order = Order { pulses: pulsing, reference: &self.reference, release };
         self.pulses.plan(self.now.after(control_ticks), &order, &shared.planned);
-        let late = port.overrun_ticks(now, control_ticks);
+        let late = port.overrun_ticks(seen.now, control_ticks);
         let late_s = self.settings.clock.seconds(late as i32);
         self.check((late > 0).then_some((Fault::ControlDeadline, late_s, 0.0)), sample, port);
-        pulsing &= self.trip.is_none();
+        self.pulses_on(pulsing)
+    }
+
+    /// `true` if pulses that were wanted go on: not after a fault, which no half is revised after either.
+    #[inline(always)]
+    fn pulses_on(&mut self, wanted: bool) -> bool {
+        let pulsing = wanted && self.trip.is_none();
         self.revises &= pulsing;
+        pulsing
+    }
+
+    /// The period as the flight recorder, the operator and whoever watches see it.
+    #[inline(always)]
+    fn tell(
+        &mut self,
+        seen: &Seen,
+        pulsing: bool,
+        input: Input,
+        port: &mut impl ControlPort,
+        shared: &Shared,
+    ) {
+        let (Input { sample, .. }, now) = (input, seen.now);
         let target = self.controller.target();
         let report = Report {
             torque_nm: target.torque_nm,
@@ -237,36 +291,12 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             mode: self.mode,
         };
         if let Some(recorder) = shared.recorder {
-            let mode = told.map_or(Mode::Off, |told| told.mode);
-            recorder.record(self.entry(now, input, &report, mode, pulsing), self.trip.is_some());
+            recorder.record(self.entry(now, input, &report, seen.loaded, pulsing), self.trip.is_some());
         }
         if self.operated && self.slots.begins() {
             shared.operator.tell(now, &report);
         }
         port.report(now, &report);
-    }
-
-    /// No pulses: the control law begins anew.
-    fn rest(&mut self, now: Instant, omega: f32, measured: &Measurements) {
-        self.controller.idle();
-        if self.exit.crosses() {
-            self.controller.begin_without_torque();
-        }
-        self.watch = FrozenWatch::new();
-        self.boundary = None;
-        self.aimed = None;
-        self.steady_v = 0.0;
-        self.revises = false;
-        self.mode = Mode::Off;
-        self.exit.rest(self.settings.clock.control_s());
-        self.damper = LinkDamper::at(measured.udc_v);
-        self.reference = Reference {
-            carrier_angle: measured.angle,
-            rate: self.settings.clock.angle_rate(omega),
-            at: now,
-            udc_v: measured.udc_v,
-            ..Reference::NONE
-        };
     }
 
     /// The period's entry in the flight recorder.
@@ -293,191 +323,5 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
     /// The latched fault.
     pub fn trip(&self) -> Option<Trip> {
         self.trip
-    }
-
-    /// Follows the angle; returns the electrical speed, in rad/s. An angle that cannot be, or is not known, leaves the speed as it was. It
-    /// may be unknown until it is known for the first time, while nobody wants pulses or the sensor counts. After a trip the angle is followed anew and its
-    /// speed told, to leave the safe state by; whatever chooses a safe state keeps to the speed at which the angle was lost.
-    fn track(
-        &mut self,
-        sample: &Sample,
-        enable: bool,
-        port: &mut impl ControlPort,
-    ) -> (f32, Option<Violation>) {
-        let clock = self.settings.clock;
-        let lost = match sample.angle {
-            Some(angle) if self.controller.speed_is_known() => {
-                protection::check_angle(self.controller.innovation_rad(angle, &clock))
-            }
-            Some(_) => None,
-            None => {
-                let needed = self.controller.is_following() || (enable && port.turned().is_none());
-                protection::check_known(needed)
-            }
-        };
-        let lost = self.armed(lost);
-        if lost.is_some() {
-            self.lost_at.get_or_insert(self.controller.omega());
-            self.controller.lose_angle();
-        }
-        if self.trip.is_some() {
-            self.controller.recover_angle();
-        }
-        if let Some(angle) = sample.angle.filter(|_| lost.is_none() || self.trip.is_some()) {
-            self.controller.track(angle, &clock);
-        }
-        (self.lost_at.unwrap_or(self.controller.omega()), lost)
-    }
-
-    /// The fault of a period's input by itself.
-    fn judge(&self, command: &DriveCommand, measured: &Measurements, omega: f32) -> Option<Violation> {
-        let ratings = &self.machine.tables().ratings;
-        let empty =
-            || if command.enable { protection::check_undervoltage(measured.udc_v, ratings) } else { None };
-        self.armed(protection::check_measurements(measured, omega, ratings))
-            .or_else(|| self.armed(empty()))
-            .or_else(|| protection::check_demand(&command.demand))
-    }
-
-    /// Nothing where the check that found it is switched off.
-    fn armed(&self, violation: Option<Violation>) -> Option<Violation> {
-        violation.filter(|(fault, _, _)| !self.disarmed.has(*fault))
-    }
-
-    /// The control law's stages that this period is for, while pulses are made.
-    #[inline(always)]
-    fn pulse(&mut self, input: Input, measured: &Measurements, slot: &Slot, shared: &Shared) {
-        let tables = self.machine.tables();
-        let now = self.now.before(self.settings.clock.control_ticks);
-        let here = RotorSample::new(measured.currents_a, measured.angle, tables);
-        self.controller.observe(&here, tables);
-        self.revises = self.is_to_revise(now, &input.command.demand);
-        let commands = slot.commands || self.revises;
-        let aims = slot.aims || (commands && self.aimed != Some(slot.key));
-        if let Some(at) = self.pulses.newest().map(|newest| newest.at)
-            && self.boundary != Some(at)
-            && (aims || !commands)
-        {
-            self.learn(input.sample, measured.angle, slot.key.mode, shared);
-            self.boundary = Some(at);
-        }
-        if aims {
-            self.aim(input, slot);
-        }
-        if commands {
-            self.command(input.sample, &here, slot);
-        }
-    }
-
-    /// Learns from the newest boundary.
-    fn learn(&mut self, sample: &Sample, angle: Angle, decided: Mode, shared: &Shared) {
-        let Settings { gains, clock, .. } = &self.settings;
-        let now = self.now.before(clock.control_ticks);
-        let tables = self.machine.tables();
-        let boundary = passed(&self.pulses, self.boundary, sample.udc_v, clock);
-        if let Some(currents_a) = self.pulses.currents_a(&shared.loaded) {
-            let age_s = clock.seconds(now.since(self.pulses.before(0).at));
-            let angle = angle - Angle::within_half_turn(self.controller.omega() * age_s);
-            let there = RotorSample::new(currents_a, angle, tables);
-            self.controller.learn(&boundary, &there, follows(decided), &Law { gains, clock, tables });
-        }
-    }
-
-    /// The operating point of the command that a boundary will use.
-    fn aim(&mut self, input: Input, slot: &Slot) {
-        let Input { sample, command } = input;
-        let Settings { gains, clock, .. } = &self.settings;
-        let (omega, udc_v) = (self.controller.omega(), sample.udc_v);
-        let tables = self.machine.tables();
-        let steady = Steady { omega, udc_v, voltage_v: self.steady_v, depth: self.depth };
-        let passed_s = self.controller.passed_s(clock);
-        self.limits = limits(&slot.key, &steady, &mut self.exit, &self.settings, passed_s);
-        let emf_v = omega.abs() * tables.ratings.magnet_flux_wb * self.controller.map_scale();
-        let torque_nm = self.exit.one_sided(command.demand.torque_nm, emf_v, udc_v, &tables.ratings);
-        let demand = Demand { torque_nm, ..command.demand };
-        let damps = gains.link_damping > 0.0;
-        let swing = damps.then(|| self.damper.step(udc_v, passed_s, omega, self.limits.follows));
-        let window = Some(&command.window);
-        let aim = AimInput { demand: &demand, window, udc_v, swing, limits: &self.limits };
-        self.controller.aim(&aim, &Law { gains, clock, tables });
-        let target = self.controller.target();
-        self.depth = target.depth;
-        self.exit.drove(target.torque_nm);
-        self.aimed = Some(slot.key);
-    }
-
-    /// The command itself.
-    #[inline(always)]
-    fn command(&mut self, sample: &Sample, here: &RotorSample, slot: &Slot) {
-        let Settings { gains, clock, .. } = &self.settings;
-        let now = self.now.before(clock.control_ticks);
-        let (omega, udc_v) = (self.controller.omega(), sample.udc_v);
-        let steady = Steady { omega, udc_v, voltage_v: self.steady_v, depth: self.depth };
-        let (mode, revises) = (slot.key.mode, self.revises);
-        let wanted = Wanted { mode, revises, between: slot.between, before: &self.reference };
-        let committed = committed(&self.pulses, now, &steady, &self.settings, &wanted);
-        let law = Law { gains, clock, tables: self.machine.tables() };
-        let voltage = self.controller.regulate(here, &committed, &self.limits, &law);
-        self.steady_v = voltage.steady_v;
-        self.mode = mode;
-        self.watch.command(voltage.vector);
-        self.reference = Reference {
-            // An optimised pattern is that of the operating point; the vector moves its edges.
-            voltage_v: if mode.is_optimal() { voltage.steady_v } else { voltage.voltage_v },
-            vector: voltage.vector,
-            carrier_angle: voltage.carrier.angle(),
-            rate: clock.angle_rate(omega),
-            at: now,
-            udc_v,
-            depth: self.depth,
-        };
-    }
-
-    /// `true` if the demand has jumped and the next half can still be changed: the running one lasts long enough, and the next one is
-    /// of the free carrier, whose length is always the same. An operating point from before a jump does not hold.
-    fn is_to_revise(&mut self, now: Instant, demand: &Demand) -> bool {
-        let change = demand.torque_nm - self.demand_nm;
-        self.demand_nm = demand.torque_nm;
-        let largest_nm = self.machine.tables().ratings.max_torque_nm;
-        if !demand.slew_limited && change.abs() > JUMP_SHARE * largest_nm {
-            (self.jumped, self.aimed) = (true, None);
-        }
-        let latest = now.after(REVISION_PERIODS * self.settings.clock.control_ticks);
-        let possible = |newest: &Half| newest.half.is_free() && newest.begins.reached(latest);
-        let revises = self.jumped && self.pulses.newest().is_some_and(possible);
-        self.jumped &= !revises;
-        revises
-    }
-
-    fn check(&mut self, violation: Option<Violation>, sample: &Sample, port: &mut impl ControlPort) {
-        if let (Some(violation), None) = (violation, self.trip) {
-            self.trip_on(violation, sample, port);
-        }
-    }
-
-    /// Out of line: it happens once, and there are many checks.
-    #[cold]
-    #[inline(never)]
-    fn trip_on(&mut self, (fault, value, limit): Violation, sample: &Sample, port: &mut impl ControlPort) {
-        if self.disarmed.has(fault) {
-            return;
-        }
-        let at = self.now.before(self.settings.clock.control_ticks);
-        let safe =
-            protection::safe_state(self.controller.omega(), sample.udc_v, &self.machine.tables().ratings);
-        port.enter(safe, at);
-        self.trip = Some(Trip { fault, value, limit, at, safe });
-    }
-
-    /// First of all checks: a leg that is stuck decides on the safe state.
-    fn check_legs(&mut self, sample: &Sample, port: &mut impl ControlPort) {
-        let found = port.leg_faults();
-        if let (Some((fault, value, limit)), None) = (found.check(), self.trip) {
-            let at = self.now.before(self.settings.clock.control_ticks);
-            let (omega, ratings) = (self.controller.omega(), &self.machine.tables().ratings);
-            let safe = found.safe_state(omega, sample.udc_v, ratings);
-            port.enter(safe, at);
-            self.trip = Some(Trip { fault, value, limit, at, safe });
-        }
     }
 }

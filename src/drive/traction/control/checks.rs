@@ -1,0 +1,105 @@
+//! The checks of a period, and the trip that comes of them.
+
+use super::ControlTask;
+use crate::control::{ControlLaw, Measurements};
+use crate::machine::Machine;
+use crate::ports::{ControlPort, DriveCommand, Sample};
+use crate::protection::{self, Trip, Violation};
+
+impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
+    /// Follows the angle; returns the electrical speed, in rad/s. An angle that cannot be, or is not known, leaves the speed as it was. It
+    /// may be unknown until it is known for the first time, while nobody wants pulses or the sensor counts. After a trip the angle is followed anew and its
+    /// speed told, to leave the safe state by; whatever chooses a safe state keeps to the speed at which the angle was lost.
+    pub(super) fn track(
+        &mut self,
+        sample: &Sample,
+        enable: bool,
+        port: &mut impl ControlPort,
+    ) -> (f32, Option<Violation>) {
+        let clock = self.settings.clock;
+        let lost = match sample.angle {
+            Some(angle) if self.controller.speed_is_known() => {
+                protection::check_angle(self.controller.innovation_rad(angle, &clock))
+            }
+            Some(_) => None,
+            None => {
+                let needed = self.controller.is_following() || (enable && port.turned().is_none());
+                protection::check_known(needed)
+            }
+        };
+        let lost = self.armed(lost);
+        if lost.is_some() {
+            self.lost_at.get_or_insert(self.controller.omega());
+            self.controller.lose_angle();
+        }
+        if self.trip.is_some() {
+            self.controller.recover_angle();
+        }
+        if let Some(angle) = sample.angle.filter(|_| lost.is_none() || self.trip.is_some()) {
+            self.controller.track(angle, &clock);
+        }
+        (self.lost_at.unwrap_or(self.controller.omega()), lost)
+    }
+
+    /// The fault of a period's input by itself.
+    pub(super) fn judge(
+        &self,
+        command: &DriveCommand,
+        measured: &Measurements,
+        omega: f32,
+    ) -> Option<Violation> {
+        let ratings = &self.machine.tables().ratings;
+        let empty =
+            || if command.enable { protection::check_undervoltage(measured.udc_v, ratings) } else { None };
+        self.armed(protection::check_measurements(measured, omega, ratings))
+            .or_else(|| self.armed(empty()))
+            .or_else(|| protection::check_demand(&command.demand))
+    }
+
+    /// Nothing where the check that found it is switched off.
+    pub(super) fn armed(&self, violation: Option<Violation>) -> Option<Violation> {
+        violation.filter(|(fault, _, _)| !self.disarmed.has(*fault))
+    }
+
+    pub(super) fn check(
+        &mut self,
+        violation: Option<Violation>,
+        sample: &Sample,
+        port: &mut impl ControlPort,
+    ) {
+        if let (Some(violation), None) = (violation, self.trip) {
+            self.trip_on(violation, sample, port);
+        }
+    }
+
+    /// Out of line: it happens once, and there are many checks.
+    #[cold]
+    #[inline(never)]
+    pub(super) fn trip_on(
+        &mut self,
+        (fault, value, limit): Violation,
+        sample: &Sample,
+        port: &mut impl ControlPort,
+    ) {
+        if self.disarmed.has(fault) {
+            return;
+        }
+        let at = self.now.before(self.settings.clock.control_ticks);
+        let safe =
+            protection::safe_state(self.controller.omega(), sample.udc_v, &self.machine.tables().ratings);
+        port.enter(safe, at);
+        self.trip = Some(Trip { fault, value, limit, at, safe });
+    }
+
+    /// First of all checks: a leg that is stuck decides on the safe state.
+    pub(super) fn check_legs(&mut self, sample: &Sample, port: &mut impl ControlPort) {
+        let found = port.leg_faults();
+        if let (Some((fault, value, limit)), None) = (found.check(), self.trip) {
+            let at = self.now.before(self.settings.clock.control_ticks);
+            let (omega, ratings) = (self.controller.omega(), &self.machine.tables().ratings);
+            let safe = found.safe_state(omega, sample.udc_v, ratings);
+            port.enter(safe, at);
+            self.trip = Some(Trip { fault, value, limit, at, safe });
+        }
+    }
+}

@@ -1,0 +1,151 @@
+//! The control law's part of a period: what the newest boundary teaches, the operating point, the command.
+
+use super::super::applied::{Steady, Wanted, committed, follows, limits, passed};
+use super::super::pulses::Half;
+use super::super::slot::Slot;
+use super::super::{Settings, Shared};
+use super::{ControlTask, Input};
+use crate::control::{AimInput, ControlLaw, Demand, Law, LinkDamper, Measurements, RotorSample};
+use crate::frames::Angle;
+use crate::machine::Machine;
+use crate::modulation::{Mode, Reference};
+use crate::ports::Sample;
+use crate::protection::FrozenWatch;
+use crate::time::Instant;
+
+/// A demand that jumps by more than this share of the largest torque is worth revising the next half for.
+const JUMP_SHARE: f32 = 0.05;
+
+/// Control periods that the running half must still last for the next one to be revised: one until the command is valid, and one
+/// in which control sees what became of it.
+const REVISION_PERIODS: u32 = 2;
+
+impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
+    /// The control law's stages that this period is for, while pulses are made.
+    #[inline(always)]
+    pub(super) fn pulse(&mut self, input: Input, measured: &Measurements, slot: &Slot, shared: &Shared) {
+        let tables = self.machine.tables();
+        let now = self.now.before(self.settings.clock.control_ticks);
+        let here = RotorSample::new(measured.currents_a, measured.angle, tables);
+        self.controller.observe(&here, tables);
+        self.revises = self.is_to_revise(now, &input.command.demand);
+        let commands = slot.commands || self.revises;
+        let aims = slot.aims || (commands && self.aimed != Some(slot.key));
+        if let Some(at) = self.pulses.newest().map(|newest| newest.at)
+            && self.boundary != Some(at)
+            && (aims || !commands)
+        {
+            self.learn(input.sample, measured.angle, slot.key.mode, shared);
+            self.boundary = Some(at);
+        }
+        if aims {
+            self.aim(input, slot);
+        }
+        if commands {
+            self.command(input.sample, &here, slot);
+        }
+    }
+
+    /// Learns from the newest boundary.
+    pub(super) fn learn(&mut self, sample: &Sample, angle: Angle, decided: Mode, shared: &Shared) {
+        let Settings { gains, clock, .. } = &self.settings;
+        let now = self.now.before(clock.control_ticks);
+        let tables = self.machine.tables();
+        let boundary = passed(&self.pulses, self.boundary, sample.udc_v, clock);
+        if let Some(currents_a) = self.pulses.currents_a(&shared.loaded) {
+            let age_s = clock.seconds(now.since(self.pulses.before(0).at));
+            let angle = angle - Angle::within_half_turn(self.controller.omega() * age_s);
+            let there = RotorSample::new(currents_a, angle, tables);
+            self.controller.learn(&boundary, &there, follows(decided), &Law { gains, clock, tables });
+        }
+    }
+
+    /// The operating point of the command that a boundary will use.
+    pub(super) fn aim(&mut self, input: Input, slot: &Slot) {
+        let Input { sample, command } = input;
+        let Settings { gains, clock, .. } = &self.settings;
+        let (omega, udc_v) = (self.controller.omega(), sample.udc_v);
+        let tables = self.machine.tables();
+        let steady = Steady { omega, udc_v, voltage_v: self.steady_v, depth: self.depth };
+        let passed_s = self.controller.passed_s(clock);
+        self.limits = limits(&slot.key, &steady, &mut self.exit, &self.settings, passed_s);
+        let emf_v = omega.abs() * tables.ratings.magnet_flux_wb * self.controller.map_scale();
+        let torque_nm = self.exit.one_sided(command.demand.torque_nm, emf_v, udc_v, &tables.ratings);
+        let demand = Demand { torque_nm, ..command.demand };
+        let damps = gains.link_damping > 0.0;
+        let swing = damps.then(|| self.damper.step(udc_v, passed_s, omega, self.limits.follows));
+        let window = Some(&command.window);
+        let aim = AimInput { demand: &demand, window, udc_v, swing, limits: &self.limits };
+        self.controller.aim(&aim, &Law { gains, clock, tables });
+        let target = self.controller.target();
+        self.depth = target.depth;
+        self.exit.drove(target.torque_nm);
+        self.aimed = Some(slot.key);
+    }
+
+    /// The command itself.
+    #[inline(always)]
+    pub(super) fn command(&mut self, sample: &Sample, here: &RotorSample, slot: &Slot) {
+        let Settings { gains, clock, .. } = &self.settings;
+        let now = self.now.before(clock.control_ticks);
+        let (omega, udc_v) = (self.controller.omega(), sample.udc_v);
+        let steady = Steady { omega, udc_v, voltage_v: self.steady_v, depth: self.depth };
+        let (mode, revises) = (slot.key.mode, self.revises);
+        let wanted = Wanted { mode, revises, between: slot.between, before: &self.reference };
+        let committed = committed(&self.pulses, now, &steady, &self.settings, &wanted);
+        let law = Law { gains, clock, tables: self.machine.tables() };
+        let voltage = self.controller.regulate(here, &committed, &self.limits, &law);
+        self.steady_v = voltage.steady_v;
+        self.mode = mode;
+        self.watch.command(voltage.vector);
+        self.reference = Reference {
+            // An optimised pattern is that of the operating point; the vector moves its edges.
+            voltage_v: if mode.is_optimal() { voltage.steady_v } else { voltage.voltage_v },
+            vector: voltage.vector,
+            carrier_angle: voltage.carrier.angle(),
+            rate: clock.angle_rate(omega),
+            at: now,
+            udc_v,
+            depth: self.depth,
+        };
+    }
+
+    /// `true` if the demand has jumped and the next half can still be changed: the running one lasts long enough, and the next one is
+    /// of the free carrier, whose length is always the same. An operating point from before a jump does not hold.
+    pub(super) fn is_to_revise(&mut self, now: Instant, demand: &Demand) -> bool {
+        let change = demand.torque_nm - self.demand_nm;
+        self.demand_nm = demand.torque_nm;
+        let largest_nm = self.machine.tables().ratings.max_torque_nm;
+        if !demand.slew_limited && change.abs() > JUMP_SHARE * largest_nm {
+            (self.jumped, self.aimed) = (true, None);
+        }
+        let latest = now.after(REVISION_PERIODS * self.settings.clock.control_ticks);
+        let possible = |newest: &Half| newest.half.is_free() && newest.begins.reached(latest);
+        let revises = self.jumped && self.pulses.newest().is_some_and(possible);
+        self.jumped &= !revises;
+        revises
+    }
+
+    /// No pulses: the control law begins anew.
+    pub(super) fn rest(&mut self, now: Instant, omega: f32, measured: &Measurements) {
+        self.controller.idle();
+        if self.exit.crosses() {
+            self.controller.begin_without_torque();
+        }
+        self.watch = FrozenWatch::new();
+        self.boundary = None;
+        self.aimed = None;
+        self.steady_v = 0.0;
+        self.revises = false;
+        self.mode = Mode::Off;
+        self.exit.rest(self.settings.clock.control_s());
+        self.damper = LinkDamper::at(measured.udc_v);
+        self.reference = Reference {
+            carrier_angle: measured.angle,
+            rate: self.settings.clock.angle_rate(omega),
+            at: now,
+            udc_v: measured.udc_v,
+            ..Reference::NONE
+        };
+    }
+}
