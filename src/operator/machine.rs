@@ -202,44 +202,17 @@ impl<D: Demands> Operator<D> {
                 }
             }
             Phase::Precharge(sequence) => {
-                let Some(line) = &settings.line else {
-                    self.phase = Phase::Ready;
-                    return;
-                };
-                match sequence.step(input, line, settings) {
-                    Outcome::Going => {}
-                    Outcome::Done => self.phase = Phase::Charged,
-                    Outcome::Failed(violation) => self.trip(violation, input),
-                }
+                let outcome = settings.line.as_ref().map(|line| sequence.step(input, line, settings));
+                self.switch(outcome, Phase::Charged, input);
             }
             Phase::Discharge(sequence) => {
-                let Some(line) = &settings.line else {
-                    self.phase = Phase::Ready;
-                    return;
-                };
-                match sequence.step(input, line, settings) {
-                    Outcome::Going => {}
-                    Outcome::Done => self.phase = Phase::Ready,
-                    Outcome::Failed(violation) => self.trip(violation, input),
-                }
+                let outcome = settings.line.as_ref().map(|line| sequence.step(input, line, settings));
+                self.switch(outcome, Phase::Ready, input);
             }
             Phase::Fault { trip, asked: Some(slots) } => {
                 *slots = slots.saturating_add(1);
-                let waited_s = *slots as f32 * settings.slot_s;
-                if input.observed.acknowledged == self.acknowledge {
-                    match input.observed.trip {
-                        None => self.phase = Phase::SelfTest { slots: 0 },
-                        Some(again) => {
-                            self.fail(again);
-                            self.refuse(Refusal::CauseStillPresent);
-                        }
-                    }
-                } else if waited_s > ACKNOWLEDGE_S {
-                    let trip =
-                        Trip { fault: Fault::GatesHeld, value: waited_s, limit: ACKNOWLEDGE_S, ..*trip };
-                    self.fail(trip);
-                    self.refuse(Refusal::CauseStillPresent);
-                }
+                let (trip, waited_s) = (*trip, *slots as f32 * settings.slot_s);
+                self.await_release(trip, waited_s, input);
             }
             Phase::Ready
             | Phase::Charged
@@ -248,6 +221,31 @@ impl<D: Demands> Operator<D> {
             | Phase::Stopping
             | Phase::Fault { .. } => {}
         }
+    }
+
+    /// The state after a step of a sequence on the line's side, which ends in `done`; without a line there is none.
+    fn switch(&mut self, outcome: Option<Outcome>, done: Phase, input: &Situation) {
+        match outcome {
+            Some(Outcome::Going) => {}
+            Some(Outcome::Done) => self.phase = done,
+            Some(Outcome::Failed(violation)) => self.trip(violation, input),
+            None => self.phase = Phase::Ready,
+        }
+    }
+
+    /// The drive's answer to an acknowledge: its cause is gone, or stays; without one the fault stays as well.
+    fn await_release(&mut self, trip: Trip, waited_s: f32, input: &Situation) {
+        let answered = input.observed.acknowledged == self.acknowledge;
+        let again = match input.observed.trip {
+            None if answered => return self.phase = Phase::SelfTest { slots: 0 },
+            Some(again) if answered => again,
+            _ if waited_s > ACKNOWLEDGE_S => {
+                Trip { fault: Fault::GatesHeld, value: waited_s, limit: ACKNOWLEDGE_S, ..trip }
+            }
+            _ => return,
+        };
+        self.fail(again);
+        self.refuse(Refusal::CauseStillPresent);
     }
 
     /// The demands after limits, slew and jerk.

@@ -97,6 +97,13 @@ parameters! {
     }
 }
 
+/// Two values with their names, of which the low one may not be above the high one.
+struct Order {
+    low: (&'static str, f64),
+    high: (&'static str, f64),
+    may_be_equal: bool,
+}
+
 impl Parameters {
     /// Iron and mechanical loss at a speed, in W: `P = P_rated (f (n/n_rated)² + (1 − f) n/n_rated)`.
     pub fn speed_loss_w(&self, speed_rpm: f64) -> f64 {
@@ -135,80 +142,71 @@ impl Parameters {
 
     /// Limits that contradict each other.
     fn check(&self, file: &Path) -> Result<(), InputError> {
-        let rated_power_w = self.rated_torque_nm * self.rated_speed_rpm * TAU / 60.0;
-        let full_power_w = self.max_torque_nm * self.max_speed_rpm * TAU / 60.0;
-        let resistive_v = self.stator_resistance_ohm * self.max_current_a;
-        let spin_up_s = self.rotor_inertia_kg_m2 * self.max_speed_rpm * TAU / 60.0 / self.max_torque_nm;
-        let orders = [
-            ("rated_torque_nm", self.rated_torque_nm, "max_torque_nm", self.max_torque_nm, true),
-            ("rated_speed_rpm", self.rated_speed_rpm, "max_speed_rpm", self.max_speed_rpm, true),
-            ("dc_link_min_v", self.dc_link_min_v, "dc_link_nominal_v", self.dc_link_nominal_v, true),
-            ("dc_link_nominal_v", self.dc_link_nominal_v, "dc_link_max_v", self.dc_link_max_v, true),
-            ("dc_link_max_v", self.dc_link_max_v, "trip_dc_over_v", self.trip_dc_over_v, false),
-            ("trip_dc_under_v", self.trip_dc_under_v, "dc_link_min_v", self.dc_link_min_v, false),
-            ("max_current_a", self.max_current_a, "trip_current_a", self.trip_current_a, false),
-            ("max_speed_rpm", self.max_speed_rpm, "trip_speed_rpm", self.trip_speed_rpm, false),
-            // 1 % because ratings are rounded.
-            (
-                "power of rated_torque_nm at rated_speed_rpm",
-                rated_power_w,
-                "max_power_w",
-                self.max_power_w * 1.01,
-                true,
-            ),
-            (
-                "max_power_w",
-                self.max_power_w,
-                "power of max_torque_nm at max_speed_rpm",
-                full_power_w * 1.01,
-                true,
-            ),
-            // A trip level far above its limit protects nothing.
-            ("trip_current_a", self.trip_current_a, "4 × max_current_a", 4.0 * self.max_current_a, true),
-            ("trip_dc_over_v", self.trip_dc_over_v, "3 × dc_link_max_v", 3.0 * self.dc_link_max_v, true),
-            ("trip_speed_rpm", self.trip_speed_rpm, "3 × max_speed_rpm", 3.0 * self.max_speed_rpm, true),
-            (
-                "drop of max_current_a across stator_resistance_ohm",
-                resistive_v,
-                "half of dc_link_nominal_v",
-                0.5 * self.dc_link_nominal_v,
-                true,
-            ),
-            (
-                "torque_slew_nm_per_s",
-                self.torque_slew_nm_per_s,
-                "max_torque_nm in 1 ms",
-                1e3 * self.max_torque_nm,
-                true,
-            ),
-            (
-                "max_torque_nm in 100 s",
-                0.01 * self.max_torque_nm,
-                "torque_slew_nm_per_s",
-                self.torque_slew_nm_per_s,
-                true,
-            ),
-            ("loss_rated_w", self.loss_rated_w, "max_power_w", self.max_power_w, true),
-            (
-                "seconds at max_torque_nm to max_speed_rpm with rotor_inertia_kg_m2",
-                spin_up_s,
-                "ten minutes",
-                600.0,
-                true,
-            ),
-        ];
-        for (low_name, low, high_name, high, may_be_equal) in orders {
+        for Order { low: (low_name, low), high: (high_name, high), may_be_equal } in
+            self.limits().into_iter().chain(self.margins())
+        {
             if low > high || (low == high && !may_be_equal) {
                 let relation = if may_be_equal { "at most" } else { "below" };
                 let line = self.line_of(low_name).or_else(|| self.line_of(high_name));
-                return Err(InputError::new(
-                    file,
-                    line,
-                    format!("{low_name}: {low}: must be {relation} {high_name}, {high}"),
-                ));
+                let problem = format!("{low_name}: {low}: must be {relation} {high_name}, {high}");
+                return Err(InputError::new(file, line, problem));
             }
         }
         self.check_switching(file)
+    }
+
+    /// The order of limits: a trip level lies beyond its limit.
+    fn limits(&self) -> [Order; 8] {
+        let at_most = |low, high| Order { low, high, may_be_equal: true };
+        let below = |low, high| Order { low, high, may_be_equal: false };
+        let least = ("dc_link_min_v", self.dc_link_min_v);
+        let nominal = ("dc_link_nominal_v", self.dc_link_nominal_v);
+        let most = ("dc_link_max_v", self.dc_link_max_v);
+        let (current_a, speed_rpm) = (self.max_current_a, self.max_speed_rpm);
+        [
+            at_most(("rated_torque_nm", self.rated_torque_nm), ("max_torque_nm", self.max_torque_nm)),
+            at_most(("rated_speed_rpm", self.rated_speed_rpm), ("max_speed_rpm", speed_rpm)),
+            at_most(least, nominal),
+            at_most(nominal, most),
+            below(most, ("trip_dc_over_v", self.trip_dc_over_v)),
+            below(("trip_dc_under_v", self.trip_dc_under_v), least),
+            below(("max_current_a", current_a), ("trip_current_a", self.trip_current_a)),
+            below(("max_speed_rpm", speed_rpm), ("trip_speed_rpm", self.trip_speed_rpm)),
+        ]
+    }
+
+    /// The orders of values that would be too much, or too little, beside the other ratings.
+    fn margins(&self) -> [Order; 10] {
+        let power_w = |torque_nm: f64, speed_rpm: f64| torque_nm * speed_rpm * TAU / 60.0;
+        let rated_power_w = power_w(self.rated_torque_nm, self.rated_speed_rpm);
+        let full_power_w = power_w(self.max_torque_nm, self.max_speed_rpm);
+        let resistive_v = self.stator_resistance_ohm * self.max_current_a;
+        let spin_up_s = self.rotor_inertia_kg_m2 * self.max_speed_rpm * TAU / 60.0 / self.max_torque_nm;
+        let (power, slew) =
+            (("max_power_w", self.max_power_w), ("torque_slew_nm_per_s", self.torque_slew_nm_per_s));
+        let least_nm_s = ("max_torque_nm in 100 s", 0.01 * self.max_torque_nm);
+        let half_v = ("half of dc_link_nominal_v", 0.5 * self.dc_link_nominal_v);
+        [
+            // 1 % because ratings are rounded.
+            (
+                ("power of rated_torque_nm at rated_speed_rpm", rated_power_w),
+                ("max_power_w", self.max_power_w * 1.01),
+            ),
+            (power, ("power of max_torque_nm at max_speed_rpm", full_power_w * 1.01)),
+            // A trip level far above its limit protects nothing.
+            (("trip_current_a", self.trip_current_a), ("4 × max_current_a", 4.0 * self.max_current_a)),
+            (("trip_dc_over_v", self.trip_dc_over_v), ("3 × dc_link_max_v", 3.0 * self.dc_link_max_v)),
+            (("trip_speed_rpm", self.trip_speed_rpm), ("3 × max_speed_rpm", 3.0 * self.max_speed_rpm)),
+            (("drop of max_current_a across stator_resistance_ohm", resistive_v), half_v),
+            (slew, ("max_torque_nm in 1 ms", 1e3 * self.max_torque_nm)),
+            (least_nm_s, slew),
+            (("loss_rated_w", self.loss_rated_w), power),
+            (
+                ("seconds at max_torque_nm to max_speed_rpm with rotor_inertia_kg_m2", spin_up_s),
+                ("ten minutes", 600.0),
+            ),
+        ]
+        .map(|(low, high)| Order { low, high, may_be_equal: true })
     }
 
     /// The devices must switch at least as often as the stator's voltage turns: square wave turns each on once a turn.

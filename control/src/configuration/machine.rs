@@ -56,6 +56,28 @@ impl Ratings {
             Bound("ratings.trip_speed_rad_s", trip_speed_rad_s, ABOVE_ZERO, 1.1e6),
             Bound("ratings.torque_slew_nm_s", torque_slew_nm_s, ABOVE_ZERO, 1e9),
         ]));
+        self.check_together()
+    }
+
+    /// The same, together.
+    const fn check_together(&self) -> Result<(), Refused> {
+        let Self {
+            pole_pairs,
+            stator_resistance_ohm,
+            max_torque_nm,
+            max_power_w,
+            max_current_a,
+            max_speed_rad_s,
+            dc_link_min_v,
+            dc_link_nominal_v,
+            dc_link_max_v,
+            trip_current_a,
+            trip_dc_over_v,
+            trip_dc_under_v,
+            trip_speed_rad_s,
+            torque_slew_nm_s,
+            ..
+        } = *self;
         let whole = pole_pairs as u32 as f32;
         let ohm = RESISTIVE_SHARE * dc_link_nominal_v / max_current_a;
         let (slowest, quickest) = SLEW_PER_S;
