@@ -7,8 +7,8 @@ use tractive::modulation::Mode;
 use tractive::operator::{Request, State, Status, Switches};
 use tractive::protocol::authentication::{Guard, Signer};
 use tractive::protocol::{
-    COMMAND, Command, Content, Frame, LENGTH, Listening, Measured, PARAMETER_ANSWER, PARAMETER_REQUEST,
-    PARAMETERS, ParameterRequest, Payload, Receiver, Scales, Session, TO_DRIVE, Told,
+    COMMAND, Command, Content, Frame, LENGTH, LIMITS, Listening, Measured, PARAMETER_ANSWER,
+    PARAMETER_REQUEST, PARAMETERS, ParameterRequest, Payload, Receiver, Scales, Session, TO_DRIVE, Told,
 };
 
 const PULL: Command = Command { enable: true, torque_nm: 100.0, ..Command::AT_REST };
@@ -218,6 +218,18 @@ fn a_node_that_babbles_at_random_commands_nothing_and_at_worst_there_is_no_torqu
     assert!(session.counts().out_of_range > 100 && without > 0, "{without} {:?}", session.counts());
 }
 
+/// LIMITS has fewer unused bits than a command.
+#[test]
+fn of_a_million_random_limits_a_few_are_taken() {
+    let (mut receiver, mut noise) = (Receiver::new(), Noise(0x9E37_79B9_7F4A_7C15));
+    let mut babble = || {
+        let frame = Frame { id: LIMITS.id, length: LENGTH, data: noise.next().to_le_bytes() };
+        matches!(receiver.receive(&frame, Scales::USUAL), Ok(Content::Limits(_)))
+    };
+    let taken = (0..1_000_000).filter(|_| babble()).count();
+    assert!((1..40).contains(&taken), "{taken}");
+}
+
 /// Five slots in ten are free for answers; all else keeps its place.
 #[test]
 fn a_flood_of_requests_moves_no_telemetry() {
@@ -263,6 +275,7 @@ fn a_bus_off_takes_the_torque_and_the_second_frame_behind_it_brings_it_back() {
 fn ages_do_not_wrap() {
     let mut stream = Stream::of(&COMMAND);
     let mut session = following(&mut stream);
+    session.listen(20, None::<Frame>);
     for _ in 0..3 {
         let request = session.listen(u32::MAX, None::<Frame>);
         assert!(!does_anything(&request) && session.listening() == Listening::Off);

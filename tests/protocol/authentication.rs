@@ -32,7 +32,7 @@ fn the_tags_are_those_of_another_implementation() {
     let frames: Vec<Frame> = (0..32).map(|_| signed(&mut signer, PULL)).collect();
     for (number, tag) in [(0, [0x38, 0xFE, 0x8F]), (1, [0x08, 0x60, 0x75]), (31, [0x5E, 0x7C, 0x97])] {
         let Frame { id, length, data } = frames[number];
-        assert_eq!((id, length, &data[1..5]), (COMMAND.id, 8, &[0x10 | number as u8 % 16, 0xE8, 3, 0][..]));
+        assert_eq!((id, length, &data[1..5]), (COMMAND.id, 8, &[0x10 | (number as u8 % 16), 0xE8, 3, 0][..]));
         assert_eq!(data[5..], tag, "{number}");
     }
 }
@@ -59,7 +59,7 @@ fn a_drive_without_a_guard_refuses_a_tag() {
     assert_eq!([receive(), receive()], [Ok(Content::Greeting), Err(Reject::OutOfRange)]);
 }
 
-/// Who lacks the key can make a CRC, and no tag.
+/// A CRC anybody can make, a tag the holder of the key alone.
 #[test]
 fn a_frame_with_any_bit_changed_is_refused_even_with_a_right_crc() {
     let (mut signer, mut guard) = ends();
