@@ -182,6 +182,12 @@ fn every_mutation_and_proof_names_a_test_that_there_is() {
     let missing: Vec<_> =
         rows.iter().flat_map(|row| missing(cell(row, "test that fails"), true, "")).collect();
     assert!(missing.is_empty(), "{missing:#?}");
+    let proofs = ["tests/proofs.rs", "tests/protocol/e2e.rs"].map(read).concat();
+    let rows = self::rows(&text, "Every value");
+    let named = rows.iter().flat_map(|row| spans(cell(row, "by"))).filter(|name| !name.contains(['/', ' ']));
+    let missing: Vec<_> = named.filter(|name| !proofs.contains(&format!("fn {name}("))).collect();
+    assert!(rows.len() >= 8 && missing.is_empty(), "{missing:?}");
+    assert!(rows.iter().all(|row| cell(row, "fails with").len() > 5));
 }
 
 #[test]
