@@ -165,6 +165,32 @@ fn every_requirement_names_code_and_a_test_that_there_are() {
 }
 
 #[test]
+fn every_software_requirement_names_code_and_a_test_that_there_are() {
+    let text = read("docs/assessor.md");
+    let rows = rows(&text, "Software requirements");
+    let numbered = rows.iter().enumerate().filter(|(k, row)| row[0].1.starts_with(&format!("SR{}: ", k + 1)));
+    assert!(rows.len() > 20 && numbered.count() == rows.len(), "{} requirements, in their order", rows.len());
+    let complaints = complaints(&rows);
+    assert!(complaints.is_empty(), "{complaints:#?}");
+}
+
+#[test]
+fn every_mutation_and_proof_names_a_test_that_there_is() {
+    let text = read("docs/proof.md");
+    let rows = rows(&text, "Mutations");
+    assert!(rows.len() >= 13, "{} mutations", rows.len());
+    let missing: Vec<_> =
+        rows.iter().flat_map(|row| missing(cell(row, "test that fails"), true, "")).collect();
+    assert!(missing.is_empty(), "{missing:#?}");
+    let proofs = ["tests/proofs.rs", "tests/protocol/e2e.rs"].map(read).concat();
+    let rows = self::rows(&text, "Every value");
+    let named = rows.iter().flat_map(|row| spans(cell(row, "by"))).filter(|name| !name.contains(['/', ' ']));
+    let missing: Vec<_> = named.filter(|name| !proofs.contains(&format!("fn {name}("))).collect();
+    assert!(rows.len() >= 8 && missing.is_empty(), "{missing:?}");
+    assert!(rows.iter().all(|row| cell(row, "fails with").len() > 5));
+}
+
+#[test]
 fn what_is_not_in_the_tree_is_found() {
     let wrong = |cell: &str, tests| missing(cell, tests, "\"sweep\"").len();
     assert_eq!(wrong("`src/lib.rs` `control`, `frames`", false), 0);

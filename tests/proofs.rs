@@ -163,11 +163,13 @@ fn every_word_of_the_limits_comes_back_as_it_was() {
     assert!(taken.iter().all(|taken| *taken > 60_000), "{taken:?}");
 }
 
-/// The free carrier at every angle of 16 bits, from no voltage to more than there is.
+/// The free carrier at every angle of 16 bits, from no voltage to more than there is. A pulse spans two halves, so a half may hold half the
+/// shortest one.
 #[test]
 fn compare_values_are_within_their_half() {
     let devices = SwitchLimits::new(250, 75, 900.0, &CLOCK);
-    for volts in [0.0, 1.0, 50.0, 300.0, 600.0] {
+    let (mut whole, shortest) = (0, devices.min_pulse_ticks.div_ceil(2));
+    for volts in [0.0, 1.0, 50.0, 300.0, 600.0, 800.0, 840.0, 860.0, 900.0] {
         for upper in 0..1_u32 << 16 {
             let mut modulator = Modulator::new(devices, Schedule::new(&CLOCK));
             let reference = Reference::turning(volts, Angle(upper << 16), 0.0, Instant(0), 1_500.0);
@@ -175,8 +177,8 @@ fn compare_values_are_within_their_half() {
             assert!(half.period_ticks >= devices.shortest_half_ticks, "{half:?}");
             for compare in half.compare_ticks {
                 // At the half's end or behind it: no edge.
-                let is_far = (devices.min_pulse_ticks..=half.period_ticks - devices.min_pulse_ticks)
-                    .contains(&compare);
+                let is_far = (shortest..=half.period_ticks - shortest).contains(&compare);
+                whole += u32::from(!is_far || compare == shortest);
                 assert!(
                     is_far || compare == 0 || compare >= half.period_ticks,
                     "{upper:#x} {volts} V: {half:?}"
@@ -184,4 +186,5 @@ fn compare_values_are_within_their_half() {
             }
         }
     }
+    assert!(whole > 10_000, "{whole} at the border");
 }

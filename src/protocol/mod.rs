@@ -9,6 +9,8 @@
 
 #![forbid(unsafe_code)]
 
+#[cfg(feature = "authentication")]
+pub mod authentication;
 mod commands;
 pub mod crc;
 mod dialect;

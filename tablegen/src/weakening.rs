@@ -142,3 +142,41 @@ fn at_id(id: f64, wanted_nm: f64, optimum: &Optimum, max_current_a: f64) -> (f64
     }
     (id, high)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::MachineFolder;
+    use std::path::Path;
+
+    /// Shares of a circle's torque, little ones above all.
+    const SHARES: [f64; 8] = [0.0, 0.01, 0.03, 0.1, 0.2, 0.4, 0.7, 1.0];
+
+    /// Little torques stand at the id at which the circle comes within the current limit: there the flux linkage is the circle's, within a
+    /// step of the search.
+    #[test]
+    fn a_circle_is_entered_where_the_current_limit_cuts_it() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tables/pmasynrm-180kw");
+        let machine = MachineFolder::read(&folder).unwrap();
+        let (smooth, most_a) = (SmoothMap::new(&machine.map), machine.parameters.max_current_a);
+        let flux_wb = |id: f64, iq: f64| smooth.at(id, iq).psi_d_wb.hypot(smooth.at(id, iq).psi_q_wb);
+        let highest_id = machine.map.id_a[machine.map.id_a.len() - 1];
+        let (mut inside, mut on, mut worst) = (0, 0, 0.0_f64);
+        for psi_wb in (5..120).map(|k| 0.01 * f64::from(k) * flux_wb(0.0, most_a)) {
+            let circle = circle(psi_wb, &SHARES, &smooth, &machine.map, &machine.parameters, most_a);
+            if circle.torque_nm <= TINY_TORQUE_NM {
+                continue;
+            }
+            for (id, iq) in circle.currents_a.into_iter().filter(|(id, _)| *id < highest_id) {
+                if (flux_wb(id, iq) / psi_wb - 1.0).abs() < 1e-6 {
+                    on += 1;
+                    continue;
+                }
+                inside += 1;
+                let entered_wb = flux_wb(id, (most_a * most_a - id * id).max(0.0).sqrt());
+                worst = worst.max((entered_wb / psi_wb - 1.0).abs());
+            }
+        }
+        assert!(on > 300 && inside > 10 && worst < 0.004, "{on}, {inside}, {worst}");
+    }
+}

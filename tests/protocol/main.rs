@@ -1,6 +1,8 @@
 //! The protocol: its protection against AUTOSAR's own values, its messages against the published DBC file, what takes effect
 //! against whatever may come.
 
+mod adversary;
+mod authentication;
 mod dbc;
 mod document;
 mod e2e;

@@ -2,14 +2,15 @@
 //! drive says of it.
 
 use crate::chip::rcc::POWER_ON;
-use crate::core::cpu::Cpu;
+use crate::core::cpu::{Cpu, Longest};
 use crate::core::nvic::HARD_FAULT;
 use crate::run::{Settings, prepare};
 use crate::time::{MICROSECOND, MILLISECOND, Time};
 use crate::world::Edge;
 use anyhow::{Result, ensure};
+use std::collections::BTreeMap;
 use std::path::Path;
-use tractive::protocol::Scales;
+use tractive::protocol::{Frame, Scales};
 use tractive_rig::talk::{Listener, System};
 
 /// The drive that is disturbed.
@@ -28,6 +29,9 @@ const SCRIPT_ZS9: &str = "\
 ";
 /// The frames that are shown.
 const FRAMES: usize = 8;
+/// The babbling node's frame: 47 bits with the space behind it.
+const EMPTY: Frame = Frame { id: 0x102, length: 0, data: [0; 8] };
+const EMPTY_TIME: Time = 47 * 2 * MICROSECOND;
 /// The time for which it is looked at afterwards, and where the fault comes in the start.
 const AFTER: Time = 300 * MILLISECOND;
 const AFTER_STARTING: Time = 90 * MILLISECOND;
@@ -85,11 +89,13 @@ pub enum Cause {
     HardFault,
     /// The CAN controller leaves the bus.
     BusOff,
+    /// A node fills the bus with frames without a byte, under an identifier that the drive listens to.
+    Babble,
 }
 
 impl Cause {
     /// All of them.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::Drivers,
         Self::Overcurrent,
         Self::Encoder,
@@ -99,6 +105,7 @@ impl Cause {
         Self::Debugger,
         Self::HardFault,
         Self::BusOff,
+        Self::Babble,
     ];
 }
 
@@ -121,6 +128,10 @@ pub struct Seen {
     pub listening: String,
     /// The last frames of the drive, as logged.
     pub frames: Vec<String>,
+    /// The costs of the handlers from the cause on, by exception.
+    pub longest: BTreeMap<usize, Longest>,
+    /// Frames that found the receive FIFO full.
+    pub lost: u32,
     /// The findings besides.
     pub findings: Vec<String>,
 }
@@ -139,6 +150,8 @@ pub fn look(image: &Path, system: System, cause: Cause, when: When) -> Result<Se
     let (from, pulsed) = (machine.now(), machine.world.any_gate());
     let before = [machine.world.edges.len(), machine.world.line_edges.len()];
     let after = if matches!(when, When::Starting(_)) { AFTER_STARTING } else { AFTER };
+    let lost = machine.chip.can.lost;
+    cpu.longest.clear();
     disturb(&mut cpu, system, cause, from + after)?;
     cpu.run(from + 2 * after / 3)?;
     let received = cpu.machine().world.talk.received;
@@ -157,6 +170,8 @@ pub fn look(image: &Path, system: System, cause: Cause, when: When) -> Result<Se
         told: format!("{} {}", say("state"), say("fault")).trim().to_owned(),
         frames: last_frames(&world.talk.frames),
         listening: say("listening"),
+        longest: cpu.longest.clone(),
+        lost: machine.chip.can.lost - lost,
         findings: machine.findings.all.iter().map(|finding| finding.text.clone()).collect(),
     })
 }
@@ -191,6 +206,7 @@ fn disturb(cpu: &mut Cpu, system: System, cause: Cause, until: Time) -> Result<(
         }
         Cause::HardFault => machine.nvic.pend(HARD_FAULT),
         Cause::BusOff => machine.chip.can.leave_bus(),
+        Cause::Babble => machine.world.babble = Some((EMPTY, EMPTY_TIME)),
     }
     cpu.machine_mut().settle();
     Ok(())

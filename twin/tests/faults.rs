@@ -32,7 +32,7 @@ fn within(cause: Cause) -> Option<Time> {
         // 161 counts of the watchdog's clock.
         Cause::Hang => Some(20_200 * MICROSECOND),
         Cause::Encoder => Some(20_000 * MICROSECOND),
-        Cause::BusOff => None,
+        Cause::BusOff | Cause::Babble => None,
     }
 }
 
@@ -71,7 +71,21 @@ fn told(system: System, cause: Cause, when: When, seen: &Seen) -> bool {
         // There is no bus without the crystal, and no fault where no angle is needed.
         Cause::Crystal | Cause::Encoder => true,
         Cause::BusOff => seen.heard > 0 && seen.listening == "fresh" && seen.resets == 0,
+        Cause::Babble => {
+            told == "running" && seen.listening == "fresh" && seen.lost == 0 && in_time(system, seen)
+        }
     }
+}
+
+/// Control and PWM interrupts end before their deadlines, in cycles with the flash memory's prefetch: the ZS9's before the next valley or peak.
+fn in_time(system: System, seen: &Seen) -> bool {
+    let (control, deadlines) = match system {
+        System::Pmasynrm => (45, [17_000, 94_000]),
+        System::Zs9 => (44, [17_000, 8_500]),
+    };
+    let longest = [control, 41].map(|exception| seen.longest[&exception].prefetched);
+    println!("control and PWM interrupt: {longest:?} cycles at most, {} frames lost", seen.lost);
+    longest.iter().zip(deadlines).all(|(longest, deadline)| (500..deadline).contains(longest))
 }
 
 fn campaign(system: System, cases: impl IntoIterator<Item = (Cause, When)>) {

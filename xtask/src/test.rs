@@ -205,7 +205,7 @@ fn machines(setup: &mut Setup) -> Result<bool> {
 fn on_target() -> Result<Vec<(String, &'static [&'static str])>> {
     const IMAGES: &[&str] = &["--lib", "--bins"];
     let own: [(&str, &[&str]); 4] = [
-        ("tractive", &["--lib", "--features", "defmt"]),
+        ("tractive", &["--lib", "--features", "defmt,authentication"]),
         ("tractive", &["--lib", "--bins", "--features", build::QEMU]),
         ("tractive", &["--bin", "optimal", "--features", "qemu,optimal"]),
         ("tractive-fault-injector", IMAGES),

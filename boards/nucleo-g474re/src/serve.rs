@@ -16,8 +16,8 @@ use tractive::protection::Violation;
 use tractive::protocol::{CanEndpoint, Frame};
 use tractive::time::Instant;
 
-/// Frames kept for a slot: more than the bus can carry in its millisecond, which is 4.5.
-const INBOX: usize = 8;
+/// Frames kept for a slot: more than the bus can carry in its millisecond, which are 4.5 of eight bytes, 10.6 without one.
+const INBOX: usize = 12;
 
 /// The operator's side of the board, over a protocol's station.
 pub struct Serve<'a, S = CanEndpoint> {

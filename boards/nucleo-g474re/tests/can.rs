@@ -15,6 +15,9 @@ const RAM: usize = 0x350 / 4;
 /// Register offsets in words.
 const CCCR: usize = 0x18 / 4;
 const NBTP: usize = 0x1C / 4;
+/// The interrupts that are asked for, and the lines that they have.
+const IE: usize = 0x54 / 4;
+const ILE: usize = 0x5C / 4;
 const PSR: usize = 0x44 / 4;
 const RXGFC: usize = 0x80 / 4;
 const RXF0S: usize = 0x90 / 4;
@@ -278,6 +281,20 @@ fn a_bus_off_is_left_after_a_pause_and_counted_once() {
     bench.write(PSR, 1 << 7);
     bench.can.tend();
     assert_eq!(bench.can.health().bus_offs, 2);
+}
+
+/// However many frames come, and however often the bus is lost: no interrupt is spent on it.
+#[test]
+fn nothing_on_the_bus_asks_for_an_interrupt() {
+    let mut bench = Bench::configured();
+    for pass in 0..1_000_u32 {
+        bench.write(RXF0S, 3 | (pass % 3) << 8);
+        bench.write(PSR, u32::from(pass % 300 > 150) << 7);
+        bench.can.receive(&mut [Frame::default(); 8]);
+        bench.can.send(&Frame { id: 0x181, length: 8, data: [0; 8] });
+        bench.can.tend();
+        assert_eq!((bench.read(IE), bench.read(ILE)), (0, 0));
+    }
 }
 
 #[test]

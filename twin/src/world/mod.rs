@@ -96,6 +96,8 @@ pub struct World {
     pub drops: Option<Time>,
     /// The encoders' wires are cut.
     pub cut: bool,
+    /// The frame that a babbling node sends without end, and the time from one to the next.
+    pub babble: Option<(Frame, Time)>,
     /// The talk is over.
     pub done: bool,
     wiring: &'static Wiring,
@@ -137,6 +139,7 @@ impl World {
             ready: true,
             drops: None,
             cut: false,
+            babble: None,
             done: false,
             wiring,
             stage,
@@ -244,6 +247,7 @@ impl World {
                 if let Some(frame) = turn.frame {
                     chip.can.hear(frame, now);
                 }
+                self.babble(now, chip);
                 self.side.load(turn.loads_nm);
                 self.done = turn.done;
             }
@@ -253,6 +257,13 @@ impl World {
             }
         }
         self.side.row(seconds(now), &self.talk.listener);
+    }
+
+    /// The babbling node's frames of a slot.
+    fn babble(&self, now: Time, chip: &mut Chip) {
+        let Some((frame, apart)) = self.babble else { return };
+        let times = (1..=SLOT / apart).map(|number| now + number * apart);
+        times.for_each(|at| chip.can.hear(frame, at));
     }
 
     /// The driver board is selected while its line is low, and begins anew each time.

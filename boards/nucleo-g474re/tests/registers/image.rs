@@ -18,7 +18,7 @@ use tractive::operator::{self, Configuration, Line, Refusal, Slot, State, slot_s
 use tractive::ports::PwmPort;
 use tractive::protection::{Fault, SafeState};
 use tractive::protocol::{
-    COMMAND, CanEndpoint, Command, Frame, Payload, STATUS, Scales, StatusFrame, TO_DRIVE,
+    COMMAND, CanEndpoint, Command, Frame, LIMITS, Payload, STATUS, Scales, StatusFrame, TO_DRIVE,
 };
 use tractive::time::Instant;
 
@@ -170,6 +170,8 @@ struct Image {
     idle_every: u64,
     /// `true` if the vehicle's computer is on the bus.
     speaks: bool,
+    /// The frame that a babbling node sends as often as the bus carries it, and the control periods from one to the next.
+    babble: Option<(Frame, u64)>,
 }
 
 impl Image {
@@ -221,6 +223,7 @@ impl Image {
             fed: 0,
             idle_every: 1,
             speaks: true,
+            babble: None,
             bench,
         };
         image.wire();
@@ -333,6 +336,11 @@ impl Image {
         self.control_task.run(&mut self.control, &self.shared);
         self.pulse.control_ran();
         self.bench.settle();
+        if let Some((frame, every)) = self.babble
+            && self.periods.is_multiple_of(every)
+        {
+            self.bus.arrive(frame);
+        }
         if self.speaks && self.periods.is_multiple_of(100) {
             let frame = self.commands.frame(self.command.encode(Scales::USUAL).unwrap());
             self.bus.arrive(frame);
@@ -505,9 +513,7 @@ fn an_idle_loop_that_is_slow_takes_torque_and_gates_in_time() {
 
 #[test]
 fn five_messages_back_to_back_are_all_taken() {
-    use tractive::protocol::{
-        LIMITS, LINK_LIMITS, LinkLimits, PARAMETER_REQUEST, ParameterRequest, TorqueLimits,
-    };
+    use tractive::protocol::{LINK_LIMITS, LinkLimits, PARAMETER_REQUEST, ParameterRequest, TorqueLimits};
     let mut image = Image::reset(0.3, 600.0, Angle::ZERO);
     image.run_ms(20);
     let torque = TorqueLimits { motoring_nm: 500.0, braking_nm: 400.0, speed_rpm: 2_000.0 }
@@ -528,6 +534,28 @@ fn five_messages_back_to_back_are_all_taken() {
         image.run_ms(2);
         let counts = image.serve.station.counts();
         assert!(counts.received - before.received >= 5 && image.bus.lost == 0, "{counts:?}");
+    }
+}
+
+/// Five frames of eight bytes in a millisecond, or ten without a byte: the most that 500 kbit/s carry, in front of the vehicle's computer's.
+#[test]
+fn a_drive_on_a_bus_that_is_full_goes_on() {
+    let mut image = Image::reset(0.3, 600.0, Angle::ZERO);
+    image.until(REST, State::Ready, 200);
+    image.until(CHARGE, State::Charged, 2_000);
+    let stuck = Sender::of(&LIMITS).frame(Payload(1 << 16 | 1 << 32 | 1 << 48));
+    let empty = Frame { length: 0, data: [0; 8], ..stuck };
+    for (frame, every) in [(stuck, 2), (empty, 1)] {
+        image.until(REST, State::Charged, 500);
+        image.babble = Some((frame, every));
+        pulls(&mut image);
+        let before = image.serve.station.counts().received;
+        image.run_ms(100);
+        let received = image.serve.station.counts().received - before;
+        // The vehicle's computer sends ten.
+        assert!(u64::from(received).abs_diff(1_000 / every + 10) <= 11, "{received} frames");
+        assert_eq!(image.bus.lost, 0);
+        assert_eq!((image.state(), image.fault()), (Some(State::Running), None));
     }
 }
 
