@@ -196,11 +196,8 @@ impl ControlLaw for Controller {
             swing.damping_nm(law.gains.link_damping, demand_nm, omega, ratings.max_torque_nm)
         });
         let more_nm = trim_nm + damping_nm;
-        let (trimmed_nm, damped_nm) = if demand_nm < 0.0 {
-            (demand_nm - more_nm, demand_nm - damping_nm)
-        } else {
-            (demand_nm + more_nm, demand_nm + damping_nm)
-        };
+        let outwards = |nm: f32| if demand_nm < 0.0 { demand_nm - nm } else { demand_nm + nm };
+        let (trimmed_nm, damped_nm) = (outwards(more_nm), outwards(damping_nm));
         let point = operating_point(trimmed_nm / scale, omega, &limit, tables);
         let depth = point.depth
             * swing.map_or(link.slow_v / self.link.lowest_v(), |swing| link.slow_v * swing.per_slow_v)

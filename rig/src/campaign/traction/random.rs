@@ -99,6 +99,19 @@ fn acceleration_rpm_s(drawn: f64, speed_rpm: f64, at_s: f64, fault: &Named<Cause
     drawn.clamp(-most, most)
 }
 
+/// The values within their ranges, or sound.
+///
+/// # Errors
+/// The first that is neither.
+fn check(values: &[f64]) -> Result<()> {
+    for (Dimension { name, low, high, sound }, value) in DIMENSIONS.iter().zip(values) {
+        if !(*low..=*high).contains(value) && *sound != Some(*value) {
+            bail!("{name} {value}: must be from {low} to {high}");
+        }
+    }
+    Ok(())
+}
+
 impl Drive {
     /// The case of some values, in the order of [`DIMENSIONS`]; `seed` is the noise's.
     pub fn case(&self, values: &[f64], seed: u64) -> Result<Case> {
@@ -127,11 +140,7 @@ impl Drive {
         else {
             bail!("{} values, not {}", values.len(), DIMENSIONS.len());
         };
-        for (Dimension { name, low, high, sound }, value) in DIMENSIONS.iter().zip(values) {
-            if !(*low..=*high).contains(value) && *sound != Some(*value) {
-                bail!("{name} {value}: must be from {low} to {high}");
-            }
-        }
+        check(values)?;
         let fault = fault(fault_at)?;
         let action = match action_at {
             at if at >= COASTING_FROM => Action::Coasting,
