@@ -25,6 +25,14 @@ pub enum Kind {
 #[non_exhaustive]
 pub struct OutOfRange;
 
+impl core::fmt::Display for OutOfRange {
+    fn fmt(&self, f: &mut core::fmt::Formatter) -> core::fmt::Result {
+        f.write_str("the value lies beyond what its signal can carry")
+    }
+}
+
+impl core::error::Error for OutOfRange {}
+
 /// A signal. Little-endian; its value is `raw · scale + offset`, on the usual [scales](super::Scales). Its methods stay out of line: nothing here is in a hurry, and
 /// sixty signals would otherwise be sixty copies.
 #[derive(Clone, Copy, Debug, PartialEq)]
