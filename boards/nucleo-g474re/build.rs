@@ -110,15 +110,18 @@ fn carrier_share(asked: Patterns) -> Result<f32, String> {
 /// The linker looks into the workspace's root before it looks here, and there `memory.x` includes `board-memory.x`.
 fn linker(out: &Path) -> Result<(), String> {
     println!("cargo:rerun-if-changed=memory.x");
+    println!("cargo:rerun-if-changed=ccm.x");
     if env::var("CARGO_CFG_TARGET_OS").as_deref() != Ok("none") {
         return Ok(());
     }
     let handlers = HANDLERS.map(|name| format!("PROVIDE({name} = DefaultHandler);\n")).concat();
+    let here = env::var("CARGO_MANIFEST_DIR").map_err(|error| format!("CARGO_MANIFEST_DIR: {error}"))?;
     let memory = fs::read_to_string("memory.x").map_err(|error| format!("memory.x: {error}"))?;
     for (file, text) in [("board-memory.x", memory), ("device.x", handlers)] {
         put(&out.join(file), &text)?;
     }
     println!("cargo:rustc-link-search={}", out.display());
+    println!("cargo:rustc-link-arg-bin=nucleo-g474re-zs9=-T{}", Path::new(&here).join("ccm.x").display());
     for script in ["link.x", "defmt.x"] {
         println!("cargo:rustc-link-arg-bins=-T{script}");
     }

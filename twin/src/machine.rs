@@ -1,6 +1,7 @@
 //! The machine around the processor: time, chip, motor, and what is found wrong.
 
 use crate::chip::Chip;
+use crate::core::cost::Cost;
 use crate::core::cpu::{CCM, Stop};
 use crate::core::nvic::Nvic;
 use crate::finding::Findings;
@@ -36,6 +37,23 @@ pub enum What {
     Write(u32, u32),
 }
 
+/// Cycles that reading from the flash memory would add, since the beginning.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Waits {
+    /// With the prefetch alone, less what branches that were not taken have not taken.
+    pub prefetched: i64,
+    /// Without any cache or prefetch.
+    pub all: u64,
+}
+
+impl Waits {
+    /// More of them.
+    pub fn add(&mut self, prefetched: i64, all: u32) {
+        self.prefetched += prefetched;
+        self.all += u64::from(all);
+    }
+}
+
 /// The machine.
 pub struct Machine {
     /// The interrupt controller.
@@ -54,9 +72,8 @@ pub struct Machine {
     pub mistake: Option<fn(u32, u32) -> u32>,
     /// Every access to a peripheral, and every entry into an exception, if they are kept.
     pub record: Option<Vec<Access>>,
-    /// Cycles that reading tables and literals would add, since the beginning: each of the flash memory's words takes every wait state, as without
-    /// the data cache, and beside code the fetch of the same cycle waits.
-    pub waits: u64,
+    /// Cycles that reading from the flash memory would add.
+    pub waits: Waits,
     /// The reason why the emulator was stopped.
     pub stop: Option<Stop>,
     /// The instant at which the run ends.
@@ -65,9 +82,13 @@ pub struct Machine {
     pub masked: bool,
     /// The same, but only for one block.
     pub deferred: bool,
+    /// The interrupts' code is in the CCM SRAM.
+    holds_code_apart: bool,
     now: Time,
     settled: Time,
     next: Time,
+    /// The end of the last block.
+    block_end: u32,
     /// The block before which the emulator has stopped: its cost is counted already.
     counted: Option<u32>,
 }
@@ -84,14 +105,16 @@ impl Machine {
             resets: 0,
             mistake: None,
             record: None,
-            waits: 0,
+            waits: Waits::default(),
             stop: None,
             until: 0,
             masked: false,
             deferred: false,
+            holds_code_apart: false,
             now: 0,
             settled: 0,
             next: 0,
+            block_end: 0,
             counted: None,
         }
     }
@@ -119,16 +142,22 @@ impl Machine {
         }
     }
 
-    /// A basic block of so many cycles begins; `true` if the emulator is to stop before it.
-    pub fn block(&mut self, address: u32, cycles: u32) -> bool {
+    /// A basic block begins; `true` if the emulator is to stop before it.
+    pub fn block(&mut self, address: u32, size: u32, cost: Cost) -> bool {
         self.findings.now = (self.now, address);
         if self.counted.take() != Some(address) {
             // What had to wait for the block before comes now.
             self.masked &= !std::mem::take(&mut self.deferred);
-            if self.nvic.in_interrupt() && (FLASH.0..FLASH.0 + FLASH.1).contains(&address) {
+            let led_on = if self.block_end == address { cost.led_on } else { 0 };
+            self.waits.add(i64::from(cost.prefetched) - i64::from(led_on), cost.waits);
+            self.block_end = address + size;
+            if self.holds_code_apart
+                && self.nvic.in_interrupt()
+                && (FLASH.0..FLASH.0 + FLASH.1).contains(&address)
+            {
                 self.findings.add("an interrupt executes from the flash memory");
             }
-            self.pass(cycles);
+            self.pass(cost.cycles);
         }
         let stop = if self.wants_reset() {
             Stop::Reset
@@ -144,8 +173,9 @@ impl Machine {
         true
     }
 
-    /// The program writes to the CCM SRAM, where the code of the interrupts is.
+    /// The program writes to the CCM SRAM: from now on the interrupts' code is there, all of it.
     pub fn write_code(&mut self, address: u32) {
+        self.holds_code_apart = true;
         let offset = address - CCM.0;
         self.findings.access = Some(address);
         let is_protected = self.chip.system.is_protected(offset);

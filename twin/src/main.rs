@@ -5,7 +5,7 @@ use clap::Parser;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use tractive_rig::talk::System;
-use tractive_twin::core::cpu::{Cpu, Longest, RAM};
+use tractive_twin::core::cpu::{Cpu, Longest};
 use tractive_twin::image::Image;
 use tractive_twin::instants::Instants;
 use tractive_twin::machine::Access;
@@ -118,9 +118,9 @@ fn tell_instants(cpu: &Cpu) {
     let machine = cpu.machine();
     for (exception, longest) in &cpu.longest {
         let late = machine.nvic.waited(*exception) / machine.cycle();
-        let Longest { cycles, waited } = longest;
+        let Longest { cycles, prefetched, waited } = longest;
         println!(
-            "{}: {cycles} cycles at most, {waited} with the waits for tables and literals; it waited for {late} at most",
+            "{}: {cycles} cycles at most, {prefetched} with the flash memory's prefetch alone, {waited} with all of its wait states; it waited for {late} at most",
             interrupt(*exception)
         );
     }
@@ -135,12 +135,11 @@ fn tell_instants(cpu: &Cpu) {
 /// Says what the memory holds.
 fn tell_memory(cpu: &Cpu, image: &Image) -> Result<()> {
     println!(
-        "{} bytes of flash; RAM {:#010x} to {:#010x} placed, {} bytes of stack used, {} left",
+        "{} bytes of flash; RAM up to {:#010x} placed, {} bytes of stack used, {} left",
         image.flash_bytes,
-        RAM.0,
         image.statics_end,
         cpu.stack_bytes(image.statics_end)?,
-        RAM.0 + RAM.1 - image.statics_end - cpu.stack_bytes(image.statics_end)?,
+        cpu.stack_room(image.statics_end) - cpu.stack_bytes(image.statics_end)?,
     );
     Ok(())
 }

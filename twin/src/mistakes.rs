@@ -23,7 +23,7 @@ const SCRIPT: &str = "\
 0.55 torque 300 over 0.05
 0.90 expect state running
      expect torque_nm 300 within 15
-     expect speed_rpm 82 within 2
+     expect speed_rpm 84.5 within 2
      expect mode async
      expect fault none
 0.90 end

@@ -10,7 +10,7 @@ use super::registers::Registers;
 use super::serve::{Serve, Station};
 use super::start::{self, Found, Plan, StartError, Timeout, Wait};
 use super::watchdog::Pulse;
-use super::{CLOCK, clock, code};
+use super::{CLOCK, clock};
 use crate::built_in::traction::BUILT_IN;
 use cortex_m::peripheral::NVIC;
 use defmt_rtt as _;
@@ -97,7 +97,6 @@ pub(super) fn pause_a_slot() {
 
 /// Configures everything, gates off. Call it once.
 pub fn prepare(plan: Plan) -> Result<Found, StartError> {
-    code::load();
     let found = start::prepare(&Registers::CHIP, &mut Cycles, plan);
     join_bus(found, &TO_DRIVE, &pins::PINS)
 }

@@ -2,7 +2,6 @@
 
 use super::registers::Registers;
 use super::start::{StartError, Wait};
-use stm32_metapac::syscfg::regs::Swpr;
 use stm32_metapac::{flash, rcc};
 
 /// PWR_CR2.PLS of the supply below which the gates go off, some 2.9 V: the highest one. Comparators and converters have the supply as
@@ -64,7 +63,7 @@ pub fn configure(registers: &Registers, wait: &mut dyn Wait) -> Result<(), Start
 
 /// Clocks of the peripherals; timers and processor stop together under a debugger, and stopped PWM and chopper timers have their
 /// outputs off. The watchdog goes on: it resets a halted chip, which opens the contactors too. A locked-up processor, a bad
-/// memory word or a low supply breaks the timers. The CCM SRAM, which holds the interrupts' code, can be written no more.
+/// memory word or a low supply breaks the timers.
 pub fn enable_peripherals(registers: &Registers, wait: &mut dyn Wait) {
     let Registers { rcc, syscfg, dbgmcu, .. } = *registers;
     rcc.ahb2enr().modify(|w| {
@@ -106,6 +105,4 @@ pub fn enable_peripherals(registers: &Registers, wait: &mut dyn Wait) {
         w.set_eccl(true);
         w.set_pvdl(true);
     });
-    // The code is there by now, and nothing else is: whoever writes to it from now on is stopped by a hard fault.
-    syscfg.swpr().write_value(Swpr(u32::MAX));
 }

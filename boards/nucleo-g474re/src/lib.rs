@@ -45,8 +45,6 @@ pub mod zs9;
 #[cfg(target_os = "none")]
 mod chip;
 #[cfg(target_os = "none")]
-mod code;
-#[cfg(target_os = "none")]
 mod log;
 
 #[cfg(target_os = "none")]

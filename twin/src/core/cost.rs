@@ -7,21 +7,66 @@ const REFILL: u32 = 3;
 const DIVISION: u32 = 14;
 const INTEGER_DIVISION: u32 = 12;
 
-/// Wait states of the flash memory at 170 MHz.
-pub const WAIT_STATES: u64 = 4;
+/// Bytes of a line of the flash memory.
+const LINE: usize = 8;
+/// Its wait states at 170 MHz.
+pub const WAIT_STATES: u32 = 4;
 
-/// Cycles of a block's instructions, fetched without a wait.
-pub fn cycles(code: &[u8]) -> u32 {
+/// The cost of a block, in cycles.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Cost {
+    /// Its instructions, fetched without a wait.
+    pub cycles: u32,
+    /// The waits that its fetches add with no cache and no prefetch: each of the flash memory's lines that it lies in takes the wait states
+    /// once (RM0440, 3.3.4; two banks, lines of 64 bits).
+    pub waits: u32,
+    /// Those with the prefetch alone: the next line is fetched while one is executed, so only the first line, to which the program has come by a
+    /// branch, takes all of them.
+    pub prefetched: u32,
+    /// The cycles of either that it does not take where the block before leads on to it without a branch: its pipeline's refill, and the first line's
+    /// wait unless it begins one.
+    pub led_on: u32,
+}
+
+/// The cost of a block's instructions in a memory without wait states.
+pub fn unwaited(code: &[u8]) -> Cost {
+    Cost { waits: 0, prefetched: 0, led_on: REFILL - 1, ..of(0, code) }
+}
+
+/// The cost of a block's instructions at an offset in the flash memory.
+pub fn of(at: usize, code: &[u8]) -> Cost {
     let halves: Vec<u32> =
         code.chunks_exact(2).map(|pair| u32::from(u16::from_le_bytes([pair[0], pair[1]]))).collect();
-    let (mut cycles, mut place) = (REFILL - 1, 0);
+    let lines = (at + code.len()).div_ceil(LINE) - at / LINE;
+    let inside = if at.is_multiple_of(LINE) { 0 } else { WAIT_STATES };
+    let mut cost = Cost {
+        cycles: REFILL - 1,
+        waits: WAIT_STATES * lines as u32,
+        prefetched: 0,
+        led_on: REFILL - 1 + inside,
+    };
+    let (mut place, mut line, mut in_line) = (0, None, 0);
     while let Some(first) = halves.get(place) {
         let wide = first >> 11 >= 0b11101;
         let second = if wide { halves.get(place + 1).copied().unwrap_or(0) } else { 0 };
-        cycles += if wide { wide_cycles(*first, second) } else { narrow_cycles(*first) };
+        let cycles = if wide { wide_cycles(*first, second) } else { narrow_cycles(*first) };
+        // The instruction is there with its last half.
+        let ends = (at + 2 * place + if wide { 2 } else { 0 }) / LINE;
+        if line.replace(ends).is_none_or(|before| before != ends) {
+            let first = cost.prefetched == 0;
+            cost.prefetched += if first { WAIT_STATES } else { (1 + WAIT_STATES).saturating_sub(in_line) };
+            in_line = 0;
+        }
+        (cost.cycles, in_line) = (cost.cycles + cycles, in_line + cycles);
         place += if wide { 2 } else { 1 };
     }
-    cycles
+    cost
+}
+
+/// Cycles of a block's instructions.
+#[cfg(test)]
+fn cycles(code: &[u8]) -> u32 {
+    of(0, code).cycles
 }
 
 fn narrow_cycles(code: u32) -> u32 {
@@ -57,7 +102,7 @@ fn wide_cycles(first: u32, second: u32) -> u32 {
 
 #[cfg(test)]
 mod tests {
-    use super::cycles;
+    use super::{Cost, cycles, of, unwaited};
 
     #[test]
     fn each_kind_has_its_price() {
@@ -74,5 +119,19 @@ mod tests {
         assert_eq!(of(&[0xED2D, 0x8A04]), 5, "vpush {{s16-s19}}");
         assert_eq!(of(&[0xFBB0, 0xF0F1]), 12, "udiv r0, r0, r1");
         assert_eq!(of(&[0xE8BD, 0x8070]), 5, "pop.w {{r4, r5, r6, pc}}");
+    }
+    #[test]
+    fn a_line_waits_for_what_the_one_before_leaves() {
+        let nops = |count: usize| [0x00, 0xBF].repeat(count);
+        // Four instructions a line, of a cycle each: the next line comes a cycle later than they are done.
+        assert_eq!(of(0, &nops(4)), Cost { cycles: 6, waits: 4, prefetched: 4, led_on: 2 });
+        assert_eq!(of(0, &nops(12)), Cost { cycles: 14, waits: 12, prefetched: 4 + 1 + 1, led_on: 2 });
+        assert_eq!(unwaited(&nops(12)), Cost { cycles: 14, waits: 0, prefetched: 0, led_on: 2 });
+        // From the middle of a line.
+        assert_eq!(of(4, &nops(6)), Cost { cycles: 8, waits: 8, prefetched: 4 + 3, led_on: 6 });
+        // A division hides it.
+        let division: Vec<u8> =
+            [0xEE80_u16, 0x0A20, 0xEE80, 0x0A20, 0xBF00].iter().flat_map(|half| half.to_le_bytes()).collect();
+        assert_eq!(of(0, &division), Cost { cycles: 31, waits: 8, prefetched: 4, led_on: 2 });
     }
 }

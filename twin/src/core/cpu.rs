@@ -3,16 +3,18 @@
 use super::cost;
 use crate::chip::rcc::IWDGRSTF;
 use crate::image::{FLASH, Image};
-use crate::machine::{Machine, What};
+use crate::machine::{Machine, Waits, What};
 use crate::time::Time;
 use anyhow::{Result, anyhow, bail};
 use std::collections::{BTreeMap, HashMap};
 use unicorn_engine::{Arch, ArmCpuModel, HookType, Mode, Permission, RegisterARM as R, Unicorn, uc_error};
 
-/// RAM: its address, and the length of SRAM1 and SRAM2 (RM0440, memory map). The CCM SRAM's alias behind them is left out: an access to it is a finding.
-pub const RAM: (u32, u32) = (0x2000_0000, 96 * 1024);
-/// The CCM SRAM, by the address at which the core fetches from it.
+/// RAM: its address, and the length of SRAM1, SRAM2 and the CCM SRAM's alias (RM0440, memory map).
+const RAM: (u32, u32) = (0x2000_0000, 128 * 1024);
+/// The CCM SRAM, by the address at which the core fetches from it. An image that has code there does without the alias.
 pub const CCM: (u32, u32) = (0x1000_0000, 32 * 1024);
+/// The alias.
+const CCM_ALIAS: u32 = RAM.0 + RAM.1 - CCM.1;
 /// The regions of the peripherals.
 const PERIPHERALS: [(u32, u32); 5] = [
     (0x4000_0000, 0x3_0000),
@@ -64,9 +66,11 @@ pub enum Stop {
 /// The longest run of a handler, in cycles.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Longest {
-    /// With no wait.
+    /// With no wait for the flash memory.
     pub cycles: u64,
-    /// With those for tables and literals.
+    /// With the prefetch alone, and every wait state of the words of tables and literals; branches by whether they were taken.
+    pub prefetched: u64,
+    /// With every wait state.
     pub waited: u64,
 }
 
@@ -75,7 +79,7 @@ pub struct Cpu {
     engine: Unicorn<'static, Machine>,
     /// The costs of the handlers, by exception.
     pub longest: BTreeMap<usize, Longest>,
-    entered: Vec<(Time, u64)>,
+    entered: Vec<(Time, Waits)>,
     /// The vector table's first two words.
     start: (u32, u32),
 }
@@ -97,8 +101,14 @@ impl Cpu {
                 .map_err(failed)?;
             engine.mem_write(origin.into(), &image.flash).map_err(failed)?;
         }
-        engine.mem_map(RAM.0.into(), RAM.1 as usize, Permission::READ | Permission::WRITE).map_err(failed)?;
-        engine.mem_map(CCM.0.into(), CCM.1 as usize, Permission::ALL).map_err(failed)?;
+        let word = |at: usize| u32::from_le_bytes([0, 1, 2, 3].map(|byte| image.flash[at + byte]));
+        // The stack ends where the RAM does.
+        let ram_end = if word(0) > CCM_ALIAS { RAM.0 + RAM.1 } else { CCM_ALIAS };
+        let ram = (RAM.0, ram_end - RAM.0);
+        engine.mem_map(ram.0.into(), ram.1 as usize, Permission::READ | Permission::WRITE).map_err(failed)?;
+        if ram_end == CCM_ALIAS {
+            engine.mem_map(CCM.0.into(), CCM.1 as usize, Permission::ALL).map_err(failed)?;
+        }
         for (origin, length) in PERIPHERALS {
             let read = move |engine: &mut Unicorn<Machine>, offset: u64, size: usize| {
                 let machine = engine.get_data_mut();
@@ -110,11 +120,8 @@ impl Cpu {
             engine.mmio_map(origin.into(), length as usize, Some(read), Some(write)).map_err(failed)?;
         }
         hook(&mut engine).map_err(failed)?;
-        let word = |at: usize| u32::from_le_bytes([0, 1, 2, 3].map(|byte| image.flash[at + byte]));
         // After power-up nobody knows what the memory holds.
-        for (origin, length) in [RAM, CCM] {
-            engine.mem_write(origin.into(), &vec![PAINT; length as usize]).map_err(failed)?;
-        }
+        engine.mem_write(ram.0.into(), &vec![PAINT; ram.1 as usize]).map_err(failed)?;
         let mut cpu =
             Self { engine, longest: BTreeMap::new(), entered: Vec::new(), start: (word(0), word(4)) };
         cpu.begin()?;
@@ -146,6 +153,11 @@ impl Cpu {
     pub fn reset(&mut self, cause: u32) -> Result<()> {
         self.machine_mut().reset(cause);
         self.begin()
+    }
+
+    /// The bytes between what has a place of its own, which ends here, and the end of RAM.
+    pub fn stack_room(&self, statics_end: u32) -> u32 {
+        self.start.0 - statics_end
     }
 
     /// The bytes of the stack that have been written at any time, above the end of what has a place of its own.
@@ -288,7 +300,9 @@ impl Cpu {
         let cycles = (now - since) / self.machine().cycle();
         let longest = self.longest.entry(left).or_default();
         longest.cycles = longest.cycles.max(cycles);
-        longest.waited = longest.waited.max(cycles + waits - before);
+        let prefetched = cycles.saturating_add_signed(waits.prefetched - before.prefetched);
+        longest.prefetched = longest.prefetched.max(prefetched);
+        longest.waited = longest.waited.max(cycles + waits.all - before.all);
         if (to | NO_FLOAT == TO_THREAD) != self.machine().nvic.active.is_empty() {
             bail!("the exception {left} returns to {to:#010x}");
         }
@@ -333,14 +347,17 @@ impl Cpu {
     }
 }
 
-/// The emulator tells of every basic block, of exceptions, of what is read and written where that takes time or is not allowed, and of accesses
-/// to nowhere.
+/// The emulator tells of every basic block, of exceptions, and of accesses to nowhere.
 fn hook(engine: &mut Unicorn<'static, Machine>) -> Result<(), uc_error> {
     let mut costs = HashMap::new();
     engine.add_block_hook(1, 0, move |engine, address, size| {
         let code = || engine.mem_read_as_vec(address, size as usize).unwrap_or_default();
-        let cycles = *costs.entry(address).or_insert_with(|| cost::cycles(&code()));
-        if engine.get_data_mut().block(address as u32, cycles) {
+        let is_ccm = is_ccm(address as u32);
+        let cost = *costs.entry(address).or_insert_with(|| match is_ccm {
+            true => cost::unwaited(&code()),
+            false => cost::of(address as usize, &code()),
+        });
+        if engine.get_data_mut().block(address as u32, size, cost) {
             // It stops before the block, whose cost is not counted twice.
             let _ = engine.emu_stop();
         }
@@ -350,25 +367,21 @@ fn hook(engine: &mut Unicorn<'static, Machine>) -> Result<(), uc_error> {
         engine.get_data_mut().stop = Some(stop);
         let _ = engine.emu_stop();
     })?;
-    let last = |(from, length): (u32, u32)| u64::from(from + length - 1);
     // Tables and literals: each word takes every wait state, as without the data cache.
     for origin in [0, FLASH.0] {
-        engine.add_mem_hook(
-            HookType::MEM_READ,
-            origin.into(),
-            last((origin, FLASH.1)),
-            |engine, _, _, _, _| {
-                engine.get_data_mut().waits += cost::WAIT_STATES;
-                true
-            },
-        )?;
+        let (from, to) = (u64::from(origin), u64::from(origin + FLASH.1 - 1));
+        engine.add_mem_hook(HookType::MEM_READ, from, to, |engine, _, _, _, _| {
+            engine.get_data_mut().waits.add(cost::WAIT_STATES.into(), cost::WAIT_STATES);
+            true
+        })?;
     }
+    let last = u64::from(CCM.0 + CCM.1 - 1);
     // A literal beside the code: the fetch of the same cycle waits for it.
-    engine.add_mem_hook(HookType::MEM_READ, CCM.0.into(), last(CCM), |engine, _, _, _, _| {
-        engine.get_data_mut().waits += 1;
+    engine.add_mem_hook(HookType::MEM_READ, CCM.0.into(), last, |engine, _, _, _, _| {
+        engine.get_data_mut().waits.add(1, 1);
         true
     })?;
-    engine.add_mem_hook(HookType::MEM_WRITE, CCM.0.into(), last(CCM), |engine, _, address, _, _| {
+    engine.add_mem_hook(HookType::MEM_WRITE, CCM.0.into(), last, |engine, _, address, _, _| {
         engine.get_data_mut().write_code(address as u32);
         true
     })?;
@@ -380,4 +393,9 @@ fn hook(engine: &mut Unicorn<'static, Machine>) -> Result<(), uc_error> {
         false
     })?;
     Ok(())
+}
+
+/// `true` for an address in the CCM SRAM.
+fn is_ccm(address: u32) -> bool {
+    (CCM.0..CCM.0 + CCM.1).contains(&address)
 }

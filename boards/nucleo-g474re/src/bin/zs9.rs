@@ -11,6 +11,7 @@ fn main() {
 
 #[cfg(target_os = "none")]
 mod firmware {
+    use core::arch::global_asm;
     use core::sync::atomic::{AtomicU32, Ordering};
     use cortex_m_rt::{entry, interrupt};
     use nucleo_g474re::built_in::zs9::{BUILT_IN, BuiltIn};
@@ -42,6 +43,26 @@ mod firmware {
             ZEROS.each_ref().map(|cell| AdcCode(cell.load(Ordering::Relaxed) as u16));
         Zeros { motors: [[u1, v1, w1], [u2, v2, w2]], inductor }
     }
+
+    // The interrupts' code, word by word from the flash memory to the CCM SRAM (`ccm.x`). The runtime calls it first of all, before there are variables:
+    // therefore not in Rust.
+    global_asm!(
+        ".section .text.__pre_init, \"ax\"",
+        ".global __pre_init",
+        ".type __pre_init, %function",
+        ".thumb_func",
+        "__pre_init:",
+        "ldr r0, =__sccm",
+        "ldr r1, =__eccm",
+        "ldr r2, =__siccm",
+        "2: ldr r3, [r2], #4",
+        "str r3, [r0], #4",
+        "cmp r0, r1",
+        "bne 2b",
+        "dsb",
+        "isb",
+        "bx lr",
+    );
 
     #[entry]
     fn main() -> ! {

@@ -10,7 +10,7 @@ use crate::log::Log;
 use crate::position::PositionState;
 use crate::registers::Registers;
 use crate::start::StartError;
-use crate::{Cycles, Interrupt, PULSE, code, die_on, join_bus, pause_a_slot, run_with};
+use crate::{Cycles, Interrupt, PULSE, die_on, join_bus, pause_a_slot, run_with};
 use tractive::drive::dual::Shared;
 use tractive::operator::{self, Configuration, DualSlot, Line, slot_s};
 use tractive::protection::Violation;
@@ -28,7 +28,6 @@ pub static POSITION: PositionState = PositionState::new();
 
 /// Configures everything, gates off. Call it once.
 pub fn prepare() -> Result<Zeros, StartError> {
-    code::load();
     let found = start::prepare(&Registers::CHIP, &mut Cycles);
     join_bus(found, &TO_ZS9, &pins::PINS)
 }

@@ -12,6 +12,7 @@ use crate::registers::Registers;
 use crate::start::{StartError, Wait, settle_breaks, switch_off};
 use crate::{clock, pins as all_pins, watchdog};
 use stm32_metapac::comp::vals::Inm;
+use stm32_metapac::syscfg::regs::Swpr;
 
 /// Each current on one comparator, above; and the gate drivers' ready line below the internal reference. Where a current is too far
 /// below zero another one of its motor is above by half as much or more; the drive itself looks at both signs.
@@ -50,6 +51,8 @@ pub const STEPS: [(&str, Step); 12] = [
     ("clock tree", |start| clock::configure(start.registers, start.wait)),
     ("peripheral clocks", |start| {
         clock::enable_peripherals(start.registers, start.wait);
+        // The CCM SRAM holds the interrupts' code alone: nobody writes there any more.
+        start.registers.syscfg.swpr().write_value(Swpr(u32::MAX));
         Ok(())
     }),
     // Not earlier: what is refused is told over the bus, which needs the crystal and its pins.
