@@ -7,6 +7,7 @@ use proc_macro2::{TokenStream, TokenTree};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 
 fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -17,8 +18,12 @@ fn read(path: impl AsRef<Path>) -> String {
     std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
 }
 
+/// The pages, one test at a time.
+static PAGES: Mutex<()> = Mutex::new(());
+
 /// Holds a part of a page against what it has to be, or writes it.
 fn holds(page: &str, part: &str, wanted: &str) {
+    let _alone = PAGES.lock().unwrap_or_else(PoisonError::into_inner);
     let text = read(page);
     let [begin, end] = ["begin", "end"].map(|word| format!("<!-- {part}: {word} -->\n"));
     let (before, rest) = text.split_once(&begin).unwrap_or_else(|| panic!("{page} has no part {part}"));

@@ -51,6 +51,7 @@ fn the_gates_are_off_until_everything_is_configured() {
             .filter(|pin| pin.is_gate())
             .all(|pin| mode(&registers, pin) == gpio::vals::Moder::ALTERNATE)
     );
+    assert_eq!(registers.syscfg.swpr().read().0, u32::MAX, "nobody writes to the interrupts' code");
 }
 
 #[test]
