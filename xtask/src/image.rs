@@ -34,13 +34,20 @@ pub fn check(path: &Path) -> Result<bool> {
     Ok(is_good)
 }
 
-/// The same for a board of real hardware, whose image must also lie where its flash memory is.
+/// The least that a board's image leaves for its stack, in bytes: the longest that the timing and the twin have seen is half of it.
+const LEAST_STACK: u64 = 4_096;
+
+/// The same for a board of real hardware, whose image must also lie where its flash memory is, and leave room for the stack.
 pub fn check_board(path: &Path, board: &Board) -> Result<bool> {
-    let (origin, wanted) = (read(path)?.origin, board.told.flash_origin);
-    if origin != wanted {
-        println!("the image begins at {origin:#x}, the board's flash memory at {wanted:#x}");
+    let (image, wanted) = (read(path)?, board.told.flash_origin);
+    let (is_there, has_room) = (image.origin == wanted, image.sizes.stack >= LEAST_STACK);
+    if !is_there {
+        println!("the image begins at {:#x}, the board's flash memory at {wanted:#x}", image.origin);
     }
-    Ok(check(path)? && origin == wanted)
+    if !has_room {
+        println!("{} bytes are left for the stack, {LEAST_STACK} at least are needed", image.sizes.stack);
+    }
+    Ok(check(path)? && is_there && has_room)
 }
 
 /// Reads an image.
