@@ -254,6 +254,48 @@ fn the_torque_that_is_told_is_the_torque_that_flows() {
     }
 }
 
+/// A machine folder of the 180 kW machine whose magnets have so many Wb more.
+fn with_magnets(more_wb: f64) -> tempfile::TempDir {
+    let given = concat!(env!("CARGO_MANIFEST_DIR"), "/../tables/pmasynrm-180kw");
+    let folder = tempfile::tempdir().unwrap();
+    // Hot magnets do not give the torque of its rating within that of the current.
+    let machine = std::fs::read_to_string(format!("{given}/machine.toml")).unwrap();
+    let machine = machine.replace("max_torque_nm = 1235.0", "max_torque_nm = 1000.0");
+    std::fs::write(folder.path().join("machine.toml"), machine).unwrap();
+    let map = std::fs::read_to_string(format!("{given}/flux_map.csv")).unwrap();
+    let shifted = map.lines().map(|line| {
+        let cells: Vec<&str> = line.split(',').collect();
+        match cells[..].iter().map(|cell| cell.parse::<f64>()).collect::<Result<Vec<_>, _>>() {
+            Ok(row) => format!("{},{},{},{}\n", row[0], row[1], row[2] + more_wb, row[3]),
+            Err(_) => format!("{line}\n"),
+        }
+    });
+    std::fs::write(folder.path().join("flux_map.csv"), shifted.collect::<String>()).unwrap();
+    folder
+}
+
+/// Hot and cold magnets, which the map does not know of: without a law of their own the torque was 10 % less and 5 % more than asked for, and
+/// what was told of it as far off. On a slower rotor the resistance hides them.
+#[test]
+fn hot_and_cold_magnets_are_made_up_for() {
+    for more_wb in [-0.08, 0.05] {
+        let folder = with_magnets(more_wb);
+        for speed in [800, 1500, 3000] {
+            let line =
+                format!("steady --speed {speed} --torque 400 --plant {}", folder.path().to_str().unwrap());
+            let figures = run(&line);
+            let point = &list(&figures, "point")[0];
+            let (off, told) = (number(point, "torque_error_percent"), number(point, "told_error_percent"));
+            println!("{more_wb} Wb at {speed} r/min: torque {off:.2} %, told {told:.2} % of the largest");
+            assert!(off.abs() < 2.0 && told < 2.0, "{more_wb} Wb at {speed} r/min: {off} %, {told} %");
+        }
+        let line = format!("steady --speed 3000 --torque 700 --plant {}", folder.path().to_str().unwrap());
+        let told = number(&list(&run(&line), "point")[0], "told_error_percent");
+        println!("{more_wb} Wb in square wave: told {told:.2} %");
+        assert!(told < 2.0, "{more_wb} Wb: {told} %");
+    }
+}
+
 #[test]
 fn the_link_may_be_anywhere_and_may_step() {
     for udc in [1000, 1200, 1800] {

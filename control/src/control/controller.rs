@@ -179,11 +179,13 @@ impl ControlLaw for Controller {
         let ratings = &tables.ratings;
         let scale = self.map_error.scale();
         let map_nm = self.sum_nm / self.samples as f32;
-        let measured_nm = map_nm * scale;
+        let magnets = self.map_error.magnets_share(&self.target, ratings);
+        let torque_scale = scale + magnets;
+        let measured_nm = map_nm * torque_scale;
         let period_s = self.passed_s(law.clock);
         (self.sum_nm, self.samples) = (0.0, 0);
-        self.flowing_nm +=
-            (map_nm * self.map_error.known_scale() - self.flowing_nm) * (period_s / (period_s + TOLD_S));
+        let known_nm = map_nm * (self.map_error.known_scale() + magnets);
+        self.flowing_nm += (known_nm - self.flowing_nm) * (period_s / (period_s + TOLD_S));
         let can_step = limits.follows == Regulated::Mean;
         let shaping =
             demand::Input { demand, window, udc_v, omega, flowing_nm: measured_nm, can_step, period_s };
@@ -201,12 +203,13 @@ impl ControlLaw for Controller {
         } else {
             (demand_nm + more_nm, demand_nm + damping_nm)
         };
-        let point = operating_point(trimmed_nm / scale, omega, &limit, tables);
+        let point = operating_point(trimmed_nm / torque_scale, omega, &limit, tables);
         let depth = point.depth
             * swing.map_or(link.slow_v / self.link.lowest_v(), |swing| link.slow_v * swing.per_slow_v)
             - DEPTH_PER_TORQUE / ratings.max_torque_nm * more_nm;
         let limited = point.region == Region::Limit;
-        let given_nm = if limited { nearer_zero(point.torque_nm * scale, demand_nm) } else { demand_nm };
+        let given_nm =
+            if limited { nearer_zero(point.torque_nm * torque_scale, demand_nm) } else { demand_nm };
         self.trim.step(&torque_trim::Input {
             demand_nm,
             measured_nm: swing.map_or(measured_nm, |_| measured_nm - (damped_nm - demand_nm)),
@@ -233,7 +236,7 @@ impl ControlLaw for Controller {
             flux,
             omega,
             period_s,
-            from_a: law.gains.resistance_from * ratings.max_current_a,
+            doubt_ohm: law.gains.resistance_doubt * ratings.stator_resistance_ohm,
             fastest: ratings.max_speed_rad_s * ratings.pole_pairs,
         });
     }

@@ -81,7 +81,7 @@ impl Settings {
             carrier_ticks,
             dead_time_ticks: 0,
             // Its dead time takes voltage along either motor's current, too: nothing tells that from an error of the flux linkage.
-            gains: Gains { carrier: 0.6, observer: 0.02, resistance_from: 4.0, ..Gains::DEFAULT },
+            gains: Gains { carrier: 0.6, observer: 0.02, resistance_doubt: 0.0, ..Gains::DEFAULT },
             speed: SpeedDesign { inertia_kg_m2: 0.1, natural_rad_s: 280.0, period_s },
             link,
             link_gains: link.gains(),
