@@ -151,11 +151,11 @@ fn another_machine_is_built_once_the_comparators_suit_it() {
 fn the_control_rate_suits_the_carrier_the_timers_and_the_processor() {
     let said = TRACTION.refused("control_hz", "800");
     assert!(
-        said.starts_with("control_hz: 800: must be from 1000 to 36049: the machine's max_switching_hz"),
+        said.starts_with("control_hz: 800: must be from 1000 to 34837: the machine's max_switching_hz"),
         "{said}"
     );
     assert!(
-        TRACTION.refused("control_hz", "40000").starts_with("control_hz: 40000: must be from 1000 to 36049")
+        TRACTION.refused("control_hz", "40000").starts_with("control_hz: 40000: must be from 1000 to 34837")
     );
     let said = TRACTION.refused("control_hz", "12000");
     assert_eq!(said, "control_hz: 12000: must be a whole part of 170000000 Hz");
@@ -192,7 +192,7 @@ fn a_line_filter_is_a_key_of_the_stage() {
     assert_eq!(settings(false), Gains::DEFAULT);
     let said = TRACTION.check(&text.replace("control_hz = 10000", "control_hz = 40000"), TRACTION.tables);
     let said = said.unwrap_err();
-    assert!(said.contains("control_hz: 40000: must be from 1000 to 34681"), "{said}");
+    assert!(said.contains("control_hz: 40000: must be from 1000 to 33558"), "{said}");
     let said = ZS9.check(&format!("behind_line_filter = true\n{}", ZS9.text), ZS9.tables).unwrap_err();
     assert!(said.contains("behind_line_filter: the Z-source has chokes of its own"), "{said}");
 }
