@@ -1,6 +1,6 @@
 //! The firmware's converters, as they see the machine.
 
-use super::{Encoder, Position};
+use super::{Encoder, Position, Wiring};
 use crate::plant::Motor;
 use rand::rngs::StdRng;
 use rand::{Rng, SeedableRng};
@@ -22,6 +22,12 @@ pub struct Flaws {
     pub current_gain: f64,
     /// By how much the DC link is read larger than it is, as a share.
     pub udc_gain: f64,
+    /// The readings of the three current sensors where no current flows, in A.
+    pub current_offsets_a: [f64; 3],
+    /// The wires of the current sensors.
+    pub current_wiring: Wiring,
+    /// `true` if the angle sensor counts the wrong way.
+    pub angle_reversed: bool,
     /// Constant error of the angle sensor, electrical, in degrees.
     pub angle_error_deg: f64,
     /// Time after its sample in which the angle is read, in s; each time at another instant.
@@ -49,6 +55,9 @@ impl Flaws {
         udc_ripple: None,
         current_gain: 0.0,
         udc_gain: 0.0,
+        current_offsets_a: [0.0; 3],
+        current_wiring: Wiring::RIGHT,
+        angle_reversed: false,
         angle_error_deg: 0.0,
         angle_jitter_s: 0.0,
         angle_harmonics_deg: [0.0; 2],
@@ -96,9 +105,13 @@ impl Converter {
         if latest_s > 0.0 { turns_s * self.random.random_range(0.0..latest_s) } else { 0.0 }
     }
 
-    /// A current as converted now, in A.
-    fn convert(&mut self, current_a: f64) -> f64 {
+    /// A current as converted now, in A, by a sensor that reads this where no current flows.
+    fn convert(&mut self, current_a: f64, offset_a: f64) -> f64 {
         let mut value = current_a * (1.0 + self.flaws.current_gain);
+        // Zero keeps its sign.
+        if offset_a != 0.0 {
+            value += offset_a;
+        }
         if self.flaws.noise_a > 0.0
             && let Ok(noise) = Normal::new(0.0, self.flaws.noise_a)
         {
@@ -114,7 +127,8 @@ impl Converter {
     /// A motor's phase currents as converted now, in A.
     pub fn currents(&mut self, motor: &Motor) -> Abc {
         let behind_a = if self.flaws.current_filter_s > 0.0 { self.filtered_a } else { motor.currents_abc() };
-        let [a, b, c] = behind_a.map(|current| self.convert(current) as f32);
+        let (read_a, offsets_a) = (self.flaws.current_wiring.read(behind_a), self.flaws.current_offsets_a);
+        let [a, b, c] = [0, 1, 2].map(|sensor| self.convert(read_a[sensor], offsets_a[sensor]) as f32);
         Abc { a, b, c }
     }
 
@@ -127,6 +141,7 @@ impl Converter {
         let harmonics_deg = once * sin_once + twice * 2.0 * sin_once * cos_once;
         let error_turns = (flaws.angle_error_deg + harmonics_deg) / 360.0;
         let turns = true_turns + self.late_turns(motor.turns_s()) + error_turns;
+        let turns = if flaws.angle_reversed { -turns } else { turns };
         let turns = flaws.angle_counts.map_or(turns, |counts| ((turns * counts).floor() + 0.5) / counts);
         Angle((turns.rem_euclid(1.0) * 4_294_967_296.0).round() as u64 as u32)
     }

@@ -31,7 +31,7 @@ pub use sweep::Sweep;
 
 use super::System;
 use crate::analysis::{self, Figures};
-use crate::bench::{self, Bench, Encoder, Flaws, Limits, LinePlan, Operator, Supply};
+use crate::bench::{self, Bench, Encoder, Flaws, Limits, LinePlan, Operator, Supply, Wiring};
 use crate::inject::Injection;
 use crate::inject::traction::Kind;
 use crate::law::LawName;
@@ -195,6 +195,18 @@ pub struct TractionOptions {
     /// By how much the DC link is read larger than it is, in percent.
     #[arg(long, default_value_t = 0.0, value_parser = finite, allow_negative_numbers = true, value_name = "PERCENT")]
     pub udc_gain: f64,
+    /// The readings of the three current sensors where no current flows, in A.
+    #[arg(long, value_delimiter = ',', num_args = 1, value_parser = finite, allow_negative_numbers = true, value_name = "U,V,W")]
+    pub current_offset_a: Vec<f64>,
+    /// The phase that each of the three current sensors reads, with - where its leads are exchanged.
+    #[arg(long, default_value_t, allow_hyphen_values = true, value_name = "U,V,W")]
+    pub current_sensors: Wiring,
+    /// The angle sensor counts the wrong way.
+    #[arg(long)]
+    pub angle_reversed: bool,
+    /// Torque of friction of a free rotor against either direction, in N·m.
+    #[arg(long, default_value_t = 0.0, value_parser = not_negative, allow_negative_numbers = true, value_name = "NM")]
+    pub friction: f64,
     /// By how much the PWM timer starts later, in µs.
     #[arg(long, default_value_t = 0.0, value_parser = not_negative, allow_negative_numbers = true, hide = true)]
     pub pwm_delay_us: f64,
@@ -310,6 +322,9 @@ impl System for Traction {
             ),
             ("--current-filter-us", options.own.current_filter_us, 0.0, 1e4),
         ])?;
+        if offsets_a(&options.own.current_offset_a).is_none() {
+            bail!("--current-offset-a: must be three numbers, one for each sensor");
+        }
         if (options.law, PatternsName::of(&options.own, machine), options.on)
             == (LawName::Pi, PatternsName::Optimal, On::Qemu)
         {
@@ -498,6 +513,11 @@ fn tasks<'a, L: ControlLaw>(
     Ok(tasks.on(PatternsName::of(&options.own, machine).ladder()).operated_on(line))
 }
 
+/// The offsets of three sensors, in A; of none where nothing is said. `None`: another number of them.
+fn offsets_a(said: &[f64]) -> Option<[f64; 3]> {
+    if said.is_empty() { Some([0.0; 3]) } else { said.try_into().ok() }
+}
+
 /// The true machine: the one that control knows, unless the options name another.
 fn truth(options: &Options, machine: &Machine) -> Result<Machine> {
     options.own.plant.as_deref().map_or_else(|| Ok(machine.clone()), Machine::load)
@@ -526,6 +546,9 @@ fn bench(plan: Plan, setup: &Setup, options: &Options, (machine, truth): (&Machi
             freeze_at_s: plan.freeze_at_s,
             current_gain: options.own.current_gain / 100.0,
             udc_gain: options.own.udc_gain / 100.0,
+            current_offsets_a: offsets_a(&options.own.current_offset_a).unwrap_or_default(),
+            current_wiring: options.own.current_sensors,
+            angle_reversed: options.own.angle_reversed,
             ..flaws
         },
         supply: options.own.line.map_or(Supply::Stiff, Supply::Line),
@@ -533,6 +556,7 @@ fn bench(plan: Plan, setup: &Setup, options: &Options, (machine, truth): (&Machi
         limits: Limits::NONE,
     };
     let mut plant = Plant::new(&truth.folder, plan.speed, &options.plant());
+    plant.motor.rotor_mut().set_friction_nm(options.own.friction);
     if let Some(encoder) = plan.encoder {
         plant.motor.rotor_mut().turn_to(encoder.turns());
     }
