@@ -256,16 +256,9 @@ impl RunOptions {
             adc_full_scale_a: 1.25 * trip_current_a,
             noise_a: self.noise_a,
             udc_ripple: self.udc_ripple.map(|ripple| (ripple.amplitude_v, ripple.frequency_hz)),
-            current_gain: 0.0,
-            udc_gain: 0.0,
             angle_error_deg: self.angle_error,
-            angle_jitter_s: 0.0,
-            angle_harmonics_deg: [0.0; 2],
-            angle_late_s: 0.0,
-            angle_counts: None,
-            current_filter_s: 0.0,
-            freeze_at_s: None,
             seed: self.seed,
+            ..Flaws::NONE
         }
     }
 }
