@@ -55,6 +55,8 @@ pub struct Setup {
     pub behind_line_filter: bool,
     /// Age of the angle that the drive knows of, in s.
     pub angle_late_s: f32,
+    /// Step of a count of the angle, electrical, in rad; 0: none.
+    pub angle_step_rad: f32,
 }
 
 /// From the firmware to the rig.
@@ -179,13 +181,11 @@ pub fn setup_to_block(setup: Setup) -> Block {
         setup.over_protocol.into(),
         u32::from(setup.uncompensated) | u32::from(setup.behind_line_filter) << 1,
     ];
-    filled(
-        ticks
-            .into_iter()
-            .chain(line_to_words(setup.line))
-            .chain(flags)
-            .chain([setup.control_ticks, setup.angle_late_s.to_bits()]),
-    )
+    filled(ticks.into_iter().chain(line_to_words(setup.line)).chain(flags).chain([
+        setup.control_ticks,
+        setup.angle_late_s.to_bits(),
+        setup.angle_step_rad.to_bits(),
+    ]))
 }
 
 /// The same, with where MTPA starts, for the image with the papers' ordinary law.
@@ -227,7 +227,7 @@ fn told_from_words<T: Told>(words: [u32; 14]) -> Option<(Status<T>, Option<Frame
 /// The inverse of [`setup_to_block`].
 pub fn setup_from_block(block: &Block) -> Setup {
     let [min_pulse_ticks, dead_time_ticks, pwm_delay_ticks, ..] = *block;
-    let [_, _, _, operated, precharge, discharge, frames, gains, control_ticks, late, ..] = *block;
+    let [_, _, _, operated, precharge, discharge, frames, gains, control_ticks, late, step, ..] = *block;
     let line = line_from_words([operated, precharge, discharge]);
     Setup {
         control_ticks,
@@ -239,6 +239,7 @@ pub fn setup_from_block(block: &Block) -> Setup {
         uncompensated: gains & 1 != 0,
         behind_line_filter: gains & 2 != 0,
         angle_late_s: f32::from_bits(late),
+        angle_step_rad: f32::from_bits(step),
     }
 }
 

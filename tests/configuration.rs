@@ -187,7 +187,7 @@ fn every_scalar_of_the_traction_drive() {
     settings.check(&BUILT_IN).unwrap();
     try_tables(&BUILT_IN, |tables| settings.check(tables));
     let check = |settings: &traction::Settings| settings.check(&BUILT_IN);
-    let _ = fields!(traction::Settings as traction::Settings { | clock, devices, gains, angle_late_s }: f32);
+    let own = fields!(traction::Settings as traction::Settings { angle_late_s, angle_step_rad | clock, devices, gains }: f32);
     let floats = fields!(Clock as Clock { tick_s, ticks_per_s, control_s | control_ticks }: f32);
     try_all(settings, "clock.", floats, |settings| &mut settings.clock, check);
     let ticks: [Field<Clock, u32>; 1] = [("control_ticks", |clock| &mut clock.control_ticks)];
@@ -196,8 +196,7 @@ fn every_scalar_of_the_traction_drive() {
     try_all(settings, "devices.", devices, |settings| &mut settings.devices, check);
     let gains = fields!(Gains as Gains { carrier, pattern_rad_s, square_damping, observer, sixth_turn_rad, resistance_from, link_damping | }: f32);
     try_all(settings, "gains.", gains, |settings| &mut settings.gains, check);
-    let own: [Field<traction::Settings, f32>; 1] = [("angle_late_s", |settings| &mut settings.angle_late_s)];
-    try_all(settings, "", &own, |settings| settings, check);
+    try_all(settings, "", own, |settings| settings, check);
 }
 
 #[test]

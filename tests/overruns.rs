@@ -60,12 +60,20 @@ impl Board {
     fn new(first: CarrierHalf, off: PlayedPeriod) -> Self {
         Self { now: 0, late: 0, entered: None, shadow: first, periods: [off; 2], trip: None }
     }
+
+    /// None flow before there are pulses.
+    fn traction_currents(&self) -> Abc {
+        if self.shadow.mode == Mode::Off {
+            return Abc::default();
+        }
+        currents(self.now, Dq { d: -30.0, q: 40.0 })
+    }
 }
 
 impl ControlPort for Board {
     fn sample(&mut self, _now: Instant) -> Sample {
         Sample {
-            currents_a: currents(self.now, Dq { d: -30.0, q: 40.0 }),
+            currents_a: self.traction_currents(),
             udc_v: 1500.0,
             angle: Some(angle(self.now)),
             may_pulse: true,
@@ -93,7 +101,7 @@ impl ControlPort for Board {
 
 impl PwmPort for Board {
     fn sample(&mut self, _now: Instant) -> Abc {
-        currents(self.now, Dq { d: -30.0, q: 40.0 })
+        self.traction_currents()
     }
 
     fn play(&mut self, _now: Instant, next: &CarrierHalf) {

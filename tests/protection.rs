@@ -83,7 +83,11 @@ impl Fake {
         DriveCommand { enable: true, demand, acknowledge, ..DriveCommand::NONE }
     }
 
+    /// No current flows before there are pulses.
     fn currents(&self, now: Instant) -> Abc {
+        if self.played.mode == Mode::Off {
+            return Abc::default();
+        }
         // A little ripple, as every inverter makes.
         let ripple = (now.0 % 7919) as f32 * 1e-4;
         (self.current + Dq { d: ripple, q: -ripple }).unpark(self.angle(now).sin_cos()).abc()

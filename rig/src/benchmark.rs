@@ -95,10 +95,10 @@ pub fn measure(name: &str, options: &BenchOptions) -> Result<Measured> {
     let run = options.run.clone();
     match catalogue::choose([name])? {
         Chosen::Traction(choice) => {
-            measured(&Choice { options: Options { run, own: options.traction.clone() }, ..choice })
+            measured(&Choice { options: Options { run, own: options.traction.clone() }, ..*choice })
         }
         Chosen::Zs9(choice) => {
-            measured(&Choice { options: Options { run, own: options.zs9.clone() }, ..choice })
+            measured(&Choice { options: Options { run, own: options.zs9.clone() }, ..*choice })
         }
     }
 }

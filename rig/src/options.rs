@@ -246,6 +246,7 @@ impl RunOptions {
         PlantSettings {
             flux_scale: 1.0 + self.map_error / 100.0,
             resistance_scale: 1.0 + self.rs_error / 100.0,
+            ..PlantSettings::default()
         }
     }
 

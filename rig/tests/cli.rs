@@ -103,6 +103,23 @@ fn an_endless_machine_is_refused() {
     }
 }
 
+/// A flaw that cannot be is refused, and named.
+#[test]
+fn flaws_that_cannot_be_are_refused() {
+    refused_in_one_line("run load-steps --slots 200", &["--slots", "200", "-100 to 100"]);
+    refused_in_one_line("run load-steps --current-offset 0,101,0", &["--current-offset", "101"]);
+    refused_in_one_line("run load-steps --current-gains 0,0,-60", &["--current-gains", "-60"]);
+    refused_in_one_line("run load-steps --device-drop 200,5,1.5,3", &["--device-drop", "200"]);
+    refused_in_one_line("run load-steps --angle-1f-phase-deg 400", &["--angle-1f-phase-deg", "400"]);
+    refused_in_one_line("run load-steps --angle-jitter-us 1e5", &["--angle-jitter-us", "100000"]);
+    for line in ["--current-offset 2,0", "--current-gains 1,2,x", "--device-drop 2,5,-1,3", "--slots nan"] {
+        let output = rig(&format!("run load-steps {line}"));
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(2), "{line}: {said}");
+        assert!(said.contains(line.split(' ').next().unwrap()) && said.contains("must be"), "{line}: {said}");
+    }
+}
+
 /// Options that would change nothing, or never happen, are refused.
 #[test]
 fn options_that_do_nothing_are_refused() {

@@ -31,7 +31,7 @@ fn peaks_a(machine: &Machine, case: &Case) -> Option<[f64; STARTS]> {
         let on = (0..STARTS).any(|start| (0.0..DRIVEN_S).contains(&(t_s - begins(start))));
         (Demand { torque_nm: 0.0, slew_limited: true }, on)
     };
-    let motor = PlantSettings { flux_scale: 1.0 + case.map_error, resistance_scale: 1.0 };
+    let motor = PlantSettings { flux_scale: 1.0 + case.map_error, ..PlantSettings::default() };
     let plant = Plant::new(&machine.folder, SpeedSource::profile(vec![(0.0, case.speed_rpm)]), &motor);
     let run = stiff::Run { lead_s: 0.0, duration_s: begins(STARTS), trace_step_s: 20e-6, udc_v: case.udc_v };
     let mut bench = stiff::bench(machine, plant, operator, run).without_edges();

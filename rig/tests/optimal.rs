@@ -7,14 +7,15 @@ use tractive_rig::scenario::catalogue;
 use tractive_rig::trace::{Recorded as _, Recording};
 
 /// Speed in r/min, torque in N·m, mode, and the largest distortion in percent and torque ripple in N·m.
-const POINTS: [(f64, f64, &str, f64, f64); 8] = [
-    (700.0, 1235.0, "opt15", 4.8, 132.0),
+const POINTS: [(f64, f64, &str, f64, f64); 9] = [
+    (700.0, 1235.0, "opt15", 4.8, 130.0),
     (1000.0, 1235.0, "opt13a", 4.7, 130.0),
     (1200.0, 1235.0, "opt11", 4.8, 137.0),
     (1400.0, 1235.0, "opt9b", 4.7, 122.0),
     (1600.0, 1235.0, "opt7b", 4.2, 97.0),
     (1700.0, 1235.0, "opt7c", 3.2, 79.0),
-    (1905.0, 1235.0, "opt5c", 4.1, 92.0),
+    (1850.0, 1235.0, "opt7d", 2.9, 66.0),
+    (1905.0, 1235.0, "opt7d", 2.5, 62.0),
     (2700.0, 871.4, "opt3b", 2.8, 77.0),
 ];
 
@@ -62,9 +63,10 @@ fn through_field_weakening_into_square_wave() {
 }
 
 #[test]
-fn at_part_load_the_branches_meet_less_well() {
-    check_switches("sweep --torque-scale 0.5 --patterns optimal", 3.0, 40.0);
-    check_switches("sweep --torque-scale 0.2 --patterns optimal", 1.5, 50.0);
+fn at_part_load_too() {
+    check_switches("sweep --down --torque-scale 0.5 --patterns optimal", 1.5, 15.0);
+    check_switches("sweep --down --torque-scale 0.2 --patterns optimal", 1.5, 15.0);
+    check_switches("sweep --down --brake --torque-scale 0.25 --udc 1000 --patterns optimal", 2.0, 15.0);
 }
 
 #[test]

@@ -47,10 +47,22 @@ fn stored_j(map: &SmoothMap, id: f64, iq: f64) -> f64 {
 
 #[test]
 fn energy_is_kept() {
+    keeps_energy(&PlantSettings::default());
+}
+
+/// Torque and voltage of slots belong together: what the one gives the other takes.
+#[test]
+fn energy_is_kept_over_slots() {
+    let with = PlantSettings { slots_share: 0.3, ..PlantSettings::default() };
+    assert!((keeps_energy(&with) - keeps_energy(&PlantSettings::default())).abs() > 5.0);
+}
+
+/// Returns the energy that the rotor got, in J.
+fn keeps_energy(settings: &PlantSettings) -> f64 {
     let speed_rpm = 2500.0;
     let map = SmoothMap::new(&machine().map);
     let ((id0, iq0), voltage_turns) = square_point(&map, speed_rpm, 0.2);
-    let mut plant = plant_at(speed_rpm);
+    let mut plant = Plant::new(&machine(), SpeedSource::profile(vec![(0.0, speed_rpm)]), settings);
     plant.motor.set_currents(id0, iq0);
     let before = stored_j(&map, id0, iq0);
     let dt_s = 1.0 / (speed_rpm / 15.0 * 1200.0);
@@ -68,6 +80,7 @@ fn energy_is_kept() {
     assert!(energies.mechanical_j > 1000.0 && largest < 250.0, "{energies:?} {largest} A");
     // The splines of ψd and ψq are not exactly the gradient of one energy.
     assert!(residual.abs() < 1e-6 * energies.electrical_j, "{residual} J");
+    energies.mechanical_j
 }
 
 #[test]

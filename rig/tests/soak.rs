@@ -40,7 +40,7 @@ fn demand(t_s: f64) -> (Demand, bool) {
 /// Drives for so long, the timers started at a tick.
 fn drive(origin: Tick, duration_s: f64, trace_step_s: f64, goes_on: impl FnMut(&Bench) -> bool) -> Bench {
     let machine = Machine::load("pmasynrm-180kw").unwrap();
-    let settings = PlantSettings { flux_scale: 1.0, resistance_scale: 1.0 };
+    let settings = PlantSettings::default();
     let plant = Plant::new(&machine.folder, SpeedSource::profile(speed(duration_s)), &settings);
     let udc_v = machine.folder.parameters.dc_link_nominal_v;
     let run = stiff::Run { lead_s: LEAD_S, duration_s, trace_step_s, udc_v };

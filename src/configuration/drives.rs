@@ -16,6 +16,8 @@ const LONGEST_CARRIER: f32 = 4_000.0;
 
 /// The oldest angle that can be brought up to date, in s.
 pub const LATEST_ANGLE_S: f32 = 0.5e-3;
+/// Largest step of a counted angle, in rad: twice what counts as an angle that is lost.
+const COARSEST_STEP_RAD: f32 = 0.1;
 
 impl traction::Settings {
     /// The check that a drive may start with these settings and this machine.
@@ -32,10 +34,13 @@ impl traction::Settings {
     /// # Errors
     /// The first scalar that makes no sense.
     pub const fn check_settings(&self) -> Result<(), Refused> {
-        let Self { clock, devices, gains, angle_late_s } = self;
+        let Self { clock, devices, gains, angle_late_s, angle_step_rad } = self;
         checked!(clock.check());
         checked!(devices.check(clock));
-        checked!(within(&[Bound("angle_late_s", *angle_late_s, 0.0, LATEST_ANGLE_S)]));
+        checked!(within(&[
+            Bound("angle_late_s", *angle_late_s, 0.0, LATEST_ANGLE_S),
+            Bound("angle_step_rad", *angle_step_rad, 0.0, COARSEST_STEP_RAD),
+        ]));
         gains.check()
     }
 }

@@ -23,6 +23,8 @@ static UNCOMPENSATED: AtomicBool = AtomicBool::new(false);
 static BEHIND_LINE_FILTER: AtomicBool = AtomicBool::new(false);
 /// Age of the angle when it is sampled, in s, as bits.
 static ANGLE_LATE: AtomicU32 = AtomicU32::new(0);
+/// Step of a count of the angle, in rad, as bits.
+static ANGLE_STEP: AtomicU32 = AtomicU32::new(0);
 
 /// Highest frequency of the free carrier, in Hz.
 const MAX_CARRIER_HZ: f32 = patterns::FREE_CARRIER_SHARE * BUILT_IN.ratings.max_switching_hz;
@@ -42,6 +44,7 @@ fn settings() -> Settings {
         ),
         gains: Gains::of(UNCOMPENSATED.load(Ordering::Relaxed), BEHIND_LINE_FILTER.load(Ordering::Relaxed)),
         angle_late_s: f32::from_bits(ANGLE_LATE.load(Ordering::Relaxed)),
+        angle_step_rad: f32::from_bits(ANGLE_STEP.load(Ordering::Relaxed)),
     }
 }
 
@@ -55,6 +58,7 @@ fn main() -> ! {
     UNCOMPENSATED.store(setup.uncompensated, Ordering::Relaxed);
     BEHIND_LINE_FILTER.store(setup.behind_line_filter, Ordering::Relaxed);
     ANGLE_LATE.store(setup.angle_late_s.to_bits(), Ordering::Relaxed);
+    ANGLE_STEP.store(setup.angle_step_rad.to_bits(), Ordering::Relaxed);
     if let Err(refused) = const { BUILT_IN.check() }.and_then(|()| settings().check_settings()) {
         qemu::refuse(&refused);
     }

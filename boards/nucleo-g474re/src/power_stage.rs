@@ -55,11 +55,20 @@ pub const PRESCALER: u16 = rates::prescaler(POWER_STAGE.control_hz);
 impl PowerStage {
     /// The PMaSynRM's settings with this stage and this machine.
     pub const fn settings(&self, ratings: &Ratings) -> Settings {
-        let Self { control_hz, min_pulse_ns, dead_time_ns, behind_line_filter, angle_late_s, .. } = *self;
+        let Self {
+            control_hz,
+            min_pulse_ns,
+            dead_time_ns,
+            behind_line_filter,
+            angle_late_s,
+            encoder_counts,
+            ..
+        } = *self;
         let carrier_hz = patterns::FREE_CARRIER_SHARE * ratings.max_switching_hz;
         let settings =
             rates::settings(control_hz, min_pulse_ns, dead_time_ns, carrier_hz, behind_line_filter);
-        Settings { angle_late_s, ..settings }
+        let angle_step_rad = Settings::step_rad(encoder_counts, ratings.pole_pairs);
+        Settings { angle_late_s, angle_step_rad, ..settings }
     }
 
     /// The dead time for the generator, never shorter than asked for; `None` if it cannot make one.

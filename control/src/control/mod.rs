@@ -9,6 +9,7 @@
 
 #![forbid(unsafe_code)]
 
+mod angle_harmonics;
 mod controller;
 pub mod current_loop;
 mod demand;
@@ -30,6 +31,7 @@ use crate::frames::{Abc, AlphaBeta, Angle, Dq, SinCos};
 use crate::machine::Tables;
 use crate::time::Clock;
 
+pub use angle_harmonics::AngleHarmonics;
 pub use controller::{AimInput, Controller, Target};
 pub use current_loop::{Gains, Regulated};
 pub use demand::{Demand, LinkWindow};

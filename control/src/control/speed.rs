@@ -80,6 +80,16 @@ impl SpeedTracker {
         self.omega
     }
 
+    /// The angle that is followed, at the newest sample.
+    pub fn angle(&self) -> Angle {
+        self.angle
+    }
+
+    /// Natural frequency of the loop, in rad/s.
+    pub fn natural_rad_s(&self) -> f32 {
+        self.natural_rad_s
+    }
+
     /// `true` once so many angles have been followed that the speed can be used.
     pub fn is_settled(&self) -> bool {
         self.steps >= SETTLING_STEPS

@@ -139,7 +139,7 @@ impl Row {
 }
 
 /// The modes and their rows from one list. A mode's place in it is its code on every wire: rows are added at the end. Those behind
-/// `optimal` are there with that feature only.
+/// `optimal` are there with that feature only, in the ladder's order.
 macro_rules! modes {
     (
         $($(#[$about:meta])* $mode:ident: $row:expr;)*
@@ -213,13 +213,15 @@ modes! {
         /// Optimised, 9 pulses, at a larger one.
         Opt9b: "opt9b", OPT9B, Border::new((99.0, 96.0), (0.81, 0.79));
         /// Optimised, 7 pulses, at a small modulation index.
-        Opt7a: "opt7a", OPT7A, Border::new((127.0, 123.5), (0.675, 0.655));
+        Opt7a: "opt7a", OPT7A, Border::new((129.3, 128.4), (0.675, 0.66));
         /// Optimised, 7 pulses, at a medium one.
-        Opt7b: "opt7b", OPT7B, Border::new((127.0, 123.5), (0.882, 0.867));
-        /// Optimised, 7 pulses, near six-step.
-        Opt7c: "opt7c", OPT7C, Border::new((127.0, 123.5), (f32::INFINITY, f32::INFINITY));
+        Opt7b: "opt7b", OPT7B, Border::new((129.3, 128.4), (0.882, 0.867));
+        /// Optimised, 7 pulses, at a large one.
+        Opt7c: "opt7c", OPT7C, Border::new((129.3, 128.4), (0.945, 0.94));
+        /// Optimised, 7 pulses, near six-step. The free carrier's share of the switching frequency makes 128.0 Hz of these 129.3.
+        Opt7d: "opt7d", OPT7D, Border::new((129.3, 128.4), (f32::INFINITY, f32::INFINITY));
         /// Optimised, 5 pulses, at a small modulation index.
-        Opt5a: "opt5a", OPT5A, Border::new((177.0, 172.0), (0.785, 0.77));
+        Opt5a: "opt5a", OPT5A, Border::new((177.0, 172.0), (0.81, 0.795));
         /// Optimised, 5 pulses, at a larger one.
         Opt5b: "opt5b", OPT5B, Border::new((177.0, 172.0), (0.932, 0.918));
         /// Optimised, 5 pulses, near six-step.

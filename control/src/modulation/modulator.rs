@@ -301,7 +301,17 @@ impl Modulator {
         let index = branch.within(seen.voltage_v / six_step_v(seen.udc_v));
         let own = AlphaBeta { alpha: round.cos, beta: round.sin } * (index * core::f32::consts::FRAC_2_PI);
         let more_ticks = (seen.share_within(start, period_ticks) - own) * period_ticks as f32;
-        optimal::half(branch, self.next_half, period_ticks, (index, more_ticks), &self.devices)
+        let (half, wanted) = (self.next_half, (index, more_ticks));
+        match self.gives_way_to() {
+            Some(next) => optimal::last_half((branch, next), half, period_ticks, wanted, &self.devices),
+            None => optimal::half(branch, half, period_ticks, wanted, &self.devices),
+        }
+    }
+
+    /// The branch that takes over after the next half, if one does.
+    #[cfg(feature = "optimal")]
+    fn gives_way_to(&self) -> Option<&'static Branch> {
+        self.plan.filter(|plan| plan.at == self.half_after(self.next_half, 1))?.to.branch()
     }
 
     /// A length in whole ticks. Slower than the async mode's range there is nothing to lock to: the length stays that
@@ -309,5 +319,35 @@ impl Modulator {
     #[inline(never)]
     fn whole_ticks(&self, period: f32) -> u32 {
         ((period + 0.5) as u32).min(self.devices.shortest_half_ticks * 4).max(1)
+    }
+}
+
+#[cfg(all(test, feature = "optimal"))]
+mod tests {
+    use super::*;
+    use crate::modulation::Ladder;
+    use crate::time::Clock;
+
+    /// Up and down by the modulation index alone, also between the frequencies at which seven pulses give way to five and take over again.
+    #[test]
+    fn seven_pulses_follow_the_modulation_index_at_one_frequency() {
+        let clock = Clock::new(25_000_000, 2_500);
+        let devices = SwitchLimits::new(250, 0, 900.0, &clock);
+        for hz in [120.0, 128.6] {
+            let mut modulator = Modulator::new(devices, Schedule::on(Ladder::OPTIMAL, &clock));
+            let rate = (hz * 4_294_967_296.0 / 25e6) as f32;
+            let mut now = Instant(0);
+            for (index, mode) in
+                [(0.92, Mode::Opt7c), (0.96, Mode::Opt7d), (0.92, Mode::Opt7c), (0.8, Mode::Opt7b)]
+            {
+                for _ in 0..2_000 {
+                    let angle = Angle((f64::from(rate) * f64::from(now.0)) as u64 as u32);
+                    let reference =
+                        Reference::turning(index * six_step_v(1_500.0), angle, rate, now, 1_500.0);
+                    now = now.after(modulator.step(now, Some(&reference)).period_ticks);
+                }
+                assert_eq!(modulator.mode, mode, "{hz} Hz, {index}");
+            }
+        }
     }
 }

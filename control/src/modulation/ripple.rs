@@ -96,6 +96,8 @@ const fn directions<const N: usize>(count: u32) -> [SinCos; N] {
 /// The flux ripple of a mode as a share of the fundamental flux (its weighted distortion), for a fundamental of `depth` of
 /// six-step: within a tenth of what the pulses have. The carriers count as one, that of 12 carriers a turn.
 pub fn ripple_share(mode: Mode, depth: f32) -> f32 {
+    #[cfg(feature = "optimal")]
+    let depth = mode.branch().map_or(depth, |branch| branch.within(depth));
     let missing = if depth < 1.0 { 1.0 - depth } else { 0.0 };
     let share = mode.row().ripple;
     share.least + share.linear * missing + share.square * missing * missing

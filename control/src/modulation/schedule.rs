@@ -140,7 +140,10 @@ impl Schedule {
         let notch = shortest_notch(seen.rate, devices);
         let passes = |below: Mode, from_above: bool| {
             let row = below.row();
-            share >= pick(row.until.shares, from_above) || seen.depth >= pick(reached(row, notch), from_above)
+            // Modes of one number of pulses are told apart by depth alone.
+            let faster = !from_above || row.until.shares != mode.row().until.shares;
+            faster && share >= pick(row.until.shares, from_above)
+                || seen.depth >= pick(reached(row, notch), from_above)
         };
         // From where the drive stands: up past every border that is passed, else down past those that no longer are.
         let place = rungs.iter().position(|rung| *rung == mode).unwrap_or(0);
@@ -220,7 +223,7 @@ pub fn may_switch(from: Mode, to: Mode, next_half: u32) -> bool {
     #[cfg(feature = "optimal")]
     if let Some(old) = from.branch() {
         match to.branch() {
-            Some(new) => return next_half % (2 * old.halves) == old.meets(new),
+            Some(new) => return next_half % (2 * old.halves) == old.takes_over(new, (to as u8) > from as u8),
             None if to == Mode::Async => return old.is_calm(next_half),
             None => {}
         }

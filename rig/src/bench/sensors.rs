@@ -20,6 +20,10 @@ pub struct Flaws {
     pub udc_ripple: Option<(f64, f64)>,
     /// By how much a current is read larger than it is, as a share.
     pub current_gain: f64,
+    /// The same of each phase by itself.
+    pub current_gains: [f64; 3],
+    /// The currents that are read where none flows, in A.
+    pub current_offsets_a: [f64; 3],
     /// By how much the DC link is read larger than it is, as a share.
     pub udc_gain: f64,
     /// Constant error of the angle sensor, electrical, in degrees.
@@ -28,6 +32,8 @@ pub struct Flaws {
     pub angle_jitter_s: f64,
     /// Errors of the angle that go once and twice with it, electrical: amplitudes in degrees.
     pub angle_harmonics_deg: [f64; 2],
+    /// Their phases where the angle is 0, in degrees.
+    pub angle_phases_deg: [f64; 2],
     /// Age of the angle when it is read, in s.
     pub angle_late_s: f64,
     /// Counts of the angle in an electrical turn, of which the middle is told; `None`: as fine as the word.
@@ -48,10 +54,13 @@ impl Flaws {
         noise_a: 0.0,
         udc_ripple: None,
         current_gain: 0.0,
+        current_gains: [0.0; 3],
+        current_offsets_a: [0.0; 3],
         udc_gain: 0.0,
         angle_error_deg: 0.0,
         angle_jitter_s: 0.0,
         angle_harmonics_deg: [0.0; 2],
+        angle_phases_deg: [0.0; 2],
         angle_late_s: 0.0,
         angle_counts: None,
         current_filter_s: 0.0,
@@ -96,9 +105,13 @@ impl Converter {
         if latest_s > 0.0 { turns_s * self.random.random_range(0.0..latest_s) } else { 0.0 }
     }
 
-    /// A current as converted now, in A.
-    fn convert(&mut self, current_a: f64) -> f64 {
-        let mut value = current_a * (1.0 + self.flaws.current_gain);
+    /// A phase's current as converted now, in A.
+    fn convert(&mut self, phase: usize, current_a: f64) -> f64 {
+        let offset_a = self.flaws.current_offsets_a[phase];
+        let mut value = current_a * (1.0 + self.flaws.current_gain + self.flaws.current_gains[phase]);
+        if offset_a != 0.0 {
+            value += offset_a;
+        }
         if self.flaws.noise_a > 0.0
             && let Ok(noise) = Normal::new(0.0, self.flaws.noise_a)
         {
@@ -114,7 +127,7 @@ impl Converter {
     /// A motor's phase currents as converted now, in A.
     pub fn currents(&mut self, motor: &Motor) -> Abc {
         let behind_a = if self.flaws.current_filter_s > 0.0 { self.filtered_a } else { motor.currents_abc() };
-        let [a, b, c] = behind_a.map(|current| self.convert(current) as f32);
+        let [a, b, c] = [0, 1, 2].map(|phase| self.convert(phase, behind_a[phase]) as f32);
         Abc { a, b, c }
     }
 
@@ -122,9 +135,15 @@ impl Converter {
     pub fn angle(&mut self, motor: &Motor) -> Angle {
         let flaws = self.flaws;
         let true_turns = motor.angle_turns() - motor.turns_s() * flaws.angle_late_s;
-        let [once, twice] = flaws.angle_harmonics_deg;
-        let (sin_once, cos_once) = (core::f64::consts::TAU * true_turns).sin_cos();
-        let harmonics_deg = once * sin_once + twice * 2.0 * sin_once * cos_once;
+        let harmonics_deg: f64 = flaws
+            .angle_harmonics_deg
+            .into_iter()
+            .zip(flaws.angle_phases_deg)
+            .zip([1.0, 2.0])
+            .map(|((deg, phase_deg), order)| {
+                deg * (core::f64::consts::TAU * order * true_turns + phase_deg.to_radians()).sin()
+            })
+            .sum();
         let error_turns = (flaws.angle_error_deg + harmonics_deg) / 360.0;
         let turns = true_turns + self.late_turns(motor.turns_s()) + error_turns;
         let turns = flaws.angle_counts.map_or(turns, |counts| ((turns * counts).floor() + 0.5) / counts);

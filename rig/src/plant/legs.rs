@@ -68,7 +68,12 @@ impl Clamp {
 
     /// Voltage of an open leg from the link's midpoint, in V.
     pub fn voltage(&self, current_a: f64, udc_v: f64) -> f64 {
-        -0.5 * udc_v * (current_a / self.small_current_a).clamp(-1.0, 1.0)
+        -0.5 * udc_v * self.near_zero(current_a)
+    }
+
+    /// A current over the small one, −1 ..= 1: its sign, but near zero.
+    pub fn near_zero(&self, current_a: f64) -> f64 {
+        (current_a / self.small_current_a).clamp(-1.0, 1.0)
     }
 
     /// Likewise as a share of the link, 0 ..= 1 from the negative rail.

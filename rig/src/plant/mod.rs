@@ -5,6 +5,7 @@
 //! machine. The legs' voltages count from the link's midpoint.
 
 mod dc_link;
+mod devices;
 mod legs;
 mod line_filter;
 mod motor;
@@ -17,6 +18,7 @@ mod vector;
 pub mod zs9;
 
 pub use dc_link::{DcLink, DcLinkSettings, LinkEnergies, LinkSwitches, Source};
+pub use devices::DeviceDrops;
 pub use legs::Leg;
 pub use line_filter::{FilteredLink, LineFilter};
 pub use motor::{Motor, MotorEnergies};
@@ -36,11 +38,15 @@ pub struct PlantSettings {
     pub flux_scale: f64,
     /// True stator resistance over the rating.
     pub resistance_scale: f64,
+    /// Sixth harmonic of the magnets' voltage over the rotor's angle, as a share of that voltage.
+    pub slots_share: f64,
+    /// Voltage drops of the inverter's devices; a plant with several motors has none.
+    pub drops: DeviceDrops,
 }
 
 impl Default for PlantSettings {
     fn default() -> Self {
-        Self { flux_scale: 1.0, resistance_scale: 1.0 }
+        Self { flux_scale: 1.0, resistance_scale: 1.0, slots_share: 0.0, drops: DeviceDrops::NONE }
     }
 }
 
@@ -49,6 +55,7 @@ pub struct Plant {
     /// The machine.
     pub motor: Motor,
     clamp: Clamp,
+    drops: DeviceDrops,
     flux_scale: f64,
 }
 
@@ -64,6 +71,7 @@ impl Plant {
         Self {
             motor: Motor::new(machine, speed, settings),
             clamp: Clamp::new(machine.parameters.max_current_a, &map, settings.flux_scale),
+            drops: settings.drops,
             flux_scale: settings.flux_scale,
         }
     }
@@ -191,6 +199,7 @@ impl Plant {
         let currents = Vector::from_rotor((id, iq), sin_cos).phases();
         let mut volts = [0.0; 3];
         let mut link_a = 0.0;
+        let has_drops = self.drops.is_some();
         for ((volt, leg), current) in volts.iter_mut().zip(legs).zip(currents) {
             (*volt, link_a) = match leg {
                 Leg::Upper => (0.5 * udc_v, link_a + current),
@@ -199,9 +208,13 @@ impl Plant {
                     (self.clamp.voltage(current, udc_v), link_a + self.clamp.share(current) * current)
                 }
             };
+            if has_drops {
+                *volt -= self.drops.drop_v(leg, current, self.clamp.near_zero(current));
+            }
         }
+        let stator = &self.motor.stator;
         let StatorSlopes { id_a_s, iq_a_s, electrical_w, copper_w, torque_nm } =
-            self.motor.stator.slopes((id, iq), Vector::clarke(volts).to_rotor(sin_cos), omega);
+            stator.slopes_at((id, iq), Vector::clarke(volts).to_rotor(sin_cos), omega, sin_cos);
         ([id_a_s, iq_a_s, electrical_w, copper_w, torque_nm], link_a)
     }
 }

@@ -71,7 +71,8 @@ impl Motor {
 
     /// Air-gap torque, in N·m.
     pub fn torque_nm(&self) -> f64 {
-        self.stator.torque_nm(self.id_a, self.iq_a)
+        let slots_nm = self.stator.slot_torque_nm((self.id_a, self.iq_a), self.rotor.sin_cos());
+        self.stator.torque_nm(self.id_a, self.iq_a) + slots_nm
     }
 
     /// Electrical rotor angle, in turns, 0 ≤ x < 1.

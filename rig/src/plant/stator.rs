@@ -1,6 +1,7 @@
 //! A machine's stator equation in the rotor frame.
 
 use super::PlantSettings;
+use super::runge_kutta::rotated;
 use tractive_tablegen::{FluxMap, FluxPoint, MachineFolder, SmoothMap};
 
 /// Stator of a machine: `L(i) di/dt = u − R i − jω ψ(i)`, with the incremental inductances of the flux map.
@@ -12,6 +13,8 @@ pub struct Stator {
     pub pole_pairs: f64,
     rated_ohm: f64,
     resistance_ohm: f64,
+    /// Amplitude of the magnets' flux linkage that goes six times with the angle, in Wb.
+    slots_wb: f64,
 }
 
 /// Flux linkage over current.
@@ -40,16 +43,31 @@ pub struct StatorSlopes {
 
 /// Deviation from a plane that is rounding in the file, as a share of the largest flux linkage.
 const LINEAR_TOLERANCE: f64 = 1e-7;
+/// Order of the slots' harmonic over the electrical angle.
+const SLOT_ORDER: f64 = 6.0;
 /// Pieces of the way from zero current along which the field's energy is added up.
 const FIELD_PIECES: u32 = 500;
+
+impl Flux {
+    /// Flux linkage of the magnets, in Wb.
+    fn magnet_wb(&self) -> f64 {
+        match self {
+            Self::Smooth(map) => map.at(0.0, 0.0).psi_d_wb,
+            Self::Linear { magnet_wb, .. } => *magnet_wb,
+        }
+    }
+}
 
 impl Stator {
     /// For a machine that differs from its folder as the settings say.
     pub fn new(machine: &MachineFolder, settings: &PlantSettings) -> Self {
         let parameters = &machine.parameters;
+        let flux = linear(&machine.map).unwrap_or_else(|| Flux::Smooth(SmoothMap::new(&machine.map)));
+        let magnet_wb = settings.flux_scale * flux.magnet_wb();
         Self {
-            flux: linear(&machine.map).unwrap_or_else(|| Flux::Smooth(SmoothMap::new(&machine.map))),
+            flux,
             scale: settings.flux_scale,
+            slots_wb: settings.slots_share / SLOT_ORDER * magnet_wb,
             pole_pairs: f64::from(parameters.pole_pairs),
             rated_ohm: parameters.stator_resistance_ohm,
             resistance_ohm: parameters.stator_resistance_ohm * settings.resistance_scale,
@@ -100,6 +118,46 @@ impl Stator {
     pub fn torque_nm(&self, id_a: f64, iq_a: f64) -> f64 {
         let flux = self.flux(id_a, iq_a);
         1.5 * self.pole_pairs * (flux.psi_d_wb * iq_a - flux.psi_q_wb * id_a)
+    }
+
+    /// The part of the torque that the slots make at a current, with the rotor at an angle of this sine and cosine, in N·m.
+    pub fn slot_torque_nm(&self, (id, iq): (f64, f64), rotor: (f64, f64)) -> f64 {
+        if self.slots_wb == 0.0 {
+            return 0.0;
+        }
+        let (d, q) = self.slots(rotor);
+        1.5 * self.pole_pairs * (d * id + q * iq)
+    }
+
+    /// The voltage that the slots induce with the rotor at an angle of this sine and cosine, rotor frame, over the electrical speed, in Wb. The flux linkage is
+    /// `h (cos 6θ, 0)`, whose change and turn are `h (−6 sin 6θ, cos 6θ)`.
+    fn slots(&self, rotor: (f64, f64)) -> (f64, f64) {
+        let twice = rotated(rotor, rotor);
+        let (sin, cos) = rotated(rotated(twice, twice), twice);
+        (-SLOT_ORDER * self.slots_wb * sin, self.slots_wb * cos)
+    }
+
+    /// The stator equation with the rotor at an angle of the sine and cosine `rotor`; see [`Self::slopes`], which knows of no slots.
+    #[inline]
+    pub fn slopes_at(
+        &self,
+        current: (f64, f64),
+        (ud, uq): (f64, f64),
+        omega: f64,
+        rotor: (f64, f64),
+    ) -> StatorSlopes {
+        if self.slots_wb == 0.0 {
+            return self.slopes(current, (ud, uq), omega);
+        }
+        let (slot_d, slot_q) = self.slots(rotor);
+        let induced_v = (omega * slot_d, omega * slot_q);
+        let without = self.slopes(current, (ud - induced_v.0, uq - induced_v.1), omega);
+        let induced_w = 1.5 * (induced_v.0 * current.0 + induced_v.1 * current.1);
+        StatorSlopes {
+            electrical_w: without.electrical_w + induced_w,
+            torque_nm: without.torque_nm + self.slot_torque_nm(current, rotor),
+            ..without
+        }
     }
 
     /// The stator equation at a current in A, under a voltage in V, both in the rotor frame, which turns with the

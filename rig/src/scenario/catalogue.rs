@@ -25,9 +25,9 @@ pub const DEFAULT: &str = "sweep";
 /// A scenario of either system that was chosen.
 pub enum Chosen {
     /// Of the PMaSynRM drive.
-    Traction(Choice<Traction>),
+    Traction(Box<Choice<Traction>>),
     /// Of the ZS9.
-    Zs9(Choice<Zs9>),
+    Zs9(Box<Choice<Zs9>>),
 }
 
 /// A scenario's own part of the command line, read.
@@ -189,10 +189,10 @@ pub fn choose<W: Into<OsString>>(words: impl IntoIterator<Item = W>) -> Result<C
     let words: Vec<_> = words.into_iter().map(Into::into).collect();
     let Some(name) = name(&words) else { return Err(help().into()) };
     if let Some(entry) = TRACTION.iter().find(|entry| entry.name == name) {
-        return Ok(Chosen::Traction(entry.choose(&matches(entry.command(), &name, &words)?)?));
+        return Ok(Chosen::Traction(Box::new(entry.choose(&matches(entry.command(), &name, &words)?)?)));
     }
     if let Some(entry) = ZS9.iter().find(|entry| entry.name == name) {
-        return Ok(Chosen::Zs9(entry.choose(&matches(entry.command(), &name, &words)?)?));
+        return Ok(Chosen::Zs9(Box::new(entry.choose(&matches(entry.command(), &name, &words)?)?)));
     }
     let names: Vec<_> = listed().map(|(name, _)| name).collect();
     bail!("scenario {name}: must be one of {}", names.join(", "))
@@ -213,7 +213,7 @@ fn matches(command: Command, name: &str, words: &[OsString]) -> Result<ArgMatche
 /// A scenario of the PMaSynRM drive, by the words behind `run`. One of the other system is an error.
 pub fn of_traction(line: &str) -> Result<Choice<Traction>> {
     match choose(line.split_whitespace())? {
-        Chosen::Traction(choice) => Ok(choice),
+        Chosen::Traction(choice) => Ok(*choice),
         Chosen::Zs9(choice) => bail!("{} is a scenario of the ZS9", choice.name),
     }
 }
@@ -221,7 +221,7 @@ pub fn of_traction(line: &str) -> Result<Choice<Traction>> {
 /// A scenario of the ZS9, by the words behind `run`. One of the other system is an error.
 pub fn of_zs9(line: &str) -> Result<Choice<Zs9>> {
     match choose(line.split_whitespace())? {
-        Chosen::Zs9(choice) => Ok(choice),
+        Chosen::Zs9(choice) => Ok(*choice),
         Chosen::Traction(choice) => bail!("{} is a scenario of the PMaSynRM drive", choice.name),
     }
 }

@@ -41,6 +41,10 @@ pub trait System: Sized + 'static {
     fn min_pulse_us(_machine: &Machine) -> f64 {
         USUAL_MIN_PULSE_US
     }
+    /// The options with what those stand for that name others.
+    fn filled(options: &Options<Self::Own>, _machine: &Machine) -> Options<Self::Own> {
+        options.clone()
+    }
     /// Checks that options are within their ranges; `scenario` are those of the scenario itself, by name.
     fn check(options: &Options<Self::Own>, scenario: &Map<String, Value>, machine: &Machine) -> Result<()>;
     /// Drives a plan, on the host or in QEMU; with a supervisor over the protocol until it ends the run.
@@ -138,7 +142,8 @@ fn filled<S: System, T: Scenario<S> + ?Sized>(
 ) -> Options<S::Own> {
     let dt = Some(options.dt.unwrap_or_else(|| scenario.trace_step_s(&options.own)));
     let min_pulse_us = Some(options.min_pulse_us.unwrap_or_else(|| S::min_pulse_us(machine)));
-    Options { run: RunOptions { dt, min_pulse_us, ..options.run.clone() }, own: options.own.clone() }
+    let Options { run, own } = S::filled(options, machine);
+    Options { run: RunOptions { dt, min_pulse_us, ..run }, own }
 }
 
 /// Drives a scenario with options that are within their ranges.

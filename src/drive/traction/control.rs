@@ -5,11 +5,12 @@ mod law;
 mod start_up;
 
 use super::applied::NO_LIMITS;
+use super::current_zeros::CurrentZeros;
 use super::pulses::{Order, Pulses};
 use super::six_step_exit::SixStepExit;
 use super::slot::{Decision, Slot};
 use super::{Settings, Shared};
-use crate::control::{ControlLaw, Controller, LinkDamper, Measurements, ModeLimits};
+use crate::control::{AngleHarmonics, ControlLaw, Controller, LinkDamper, Measurements, ModeLimits};
 use crate::drive::acknowledge::Acknowledge;
 use crate::drive::{PeriodInput, SlotTimer};
 use crate::frames::Angle;
@@ -71,6 +72,10 @@ pub struct ControlTask<M = &'static Tables, L = Controller> {
     lost_at: Option<f32>,
     /// The search for the angle of a sensor that only counts.
     starting: Starting,
+    /// The known errors of the position sensor; and by how much the angle was off what the speed made of the one before, in rad.
+    harmonics: AngleHarmonics,
+    innovation_rad: f32,
+    zeros: CurrentZeros,
 }
 
 impl<M: Machine> ControlTask<M> {
@@ -109,6 +114,9 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             slots: SlotTimer::new(&settings.clock),
             lost_at: None,
             starting: Starting::new(),
+            harmonics: AngleHarmonics::new(settings.angle_late_s),
+            innovation_rad: 0.0,
+            zeros: CurrentZeros::new(),
         }
     }
 
@@ -184,6 +192,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
     fn protect(&mut self, now: Instant, input: Input, port: &mut impl ControlPort, shared: &Shared) -> Seen {
         let Input { sample, command } = input;
         let mut measured = sample.measured();
+        measured.currents_a = self.zeros.without(sample.currents_a);
         let told = self.pulses.look(&shared.loaded, now, self.now);
         let released = told.map(|told| told.released);
         if self.acknowledge.step(command.acknowledge, self.trip.is_some(), released) {
@@ -199,9 +208,11 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         }
         self.check_legs(sample, port);
         let overdue = self.pulses.newest().and_then(|newest| newest.overdue(now, &self.settings.clock));
-        let (omega, lost) = self.track(sample, command.enable, port);
-        measured.angle =
-            measured.angle + Angle::within_half_turn(self.controller.omega() * self.settings.angle_late_s);
+        let angle = sample.angle.map(|angle| self.harmonics.corrected(angle));
+        let (omega, lost) = self.track(angle, command.enable, port);
+        let coarse = self.settings.counts_coarsely();
+        let here = if coarse { self.controller.tracker().angle() } else { angle.unwrap_or(Angle::ZERO) };
+        measured.angle = here + Angle::within_half_turn(self.controller.omega() * self.settings.angle_late_s);
         let violation = self
             .armed(overdue)
             .or_else(|| self.armed(lost))
@@ -220,14 +231,27 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         let slot = Slot::of(self.pulses.newest(), now, &self.settings.clock);
         let pulsing = if pulsing {
             let ratings = &self.machine.tables().ratings;
-            let frozen = self.watch.check(measured, omega, self.settings.clock.control_s(), ratings);
-            self.check(frozen, sample, port);
+            let angle = sample.angle.unwrap_or(Angle::ZERO);
+            let frozen = self.watch.check(
+                &Measurements { angle, ..*measured },
+                omega,
+                self.settings.clock.control_s(),
+                ratings,
+            );
+            let offset = self.zeros.begin(ratings.max_current_a);
+            self.check(frozen.or(offset), sample, port);
             self.pulse(input, measured, &slot, shared);
             true
         } else {
             self.rest(now, omega, measured);
             let commands = command.enable.then_some(slot.commands);
-            self.start_up(sample, commands, shared, port)
+            let pulses = self.start_up(sample, commands, shared, port);
+            if pulses {
+                let offset = self.zeros.begin(self.machine.tables().ratings.max_current_a);
+                self.check(offset, sample, port);
+            }
+            self.rest_currents(sample, pulses);
+            pulses
         };
         // Not finite if either is not.
         let odd = self.reference.voltage_v + omega;

@@ -9,6 +9,7 @@
 
 mod applied;
 mod control;
+mod current_zeros;
 mod pulses;
 mod pwm;
 mod six_step_exit;
@@ -41,12 +42,28 @@ pub struct Settings {
     pub gains: Gains,
     /// Age of the angle when it is sampled, in s.
     pub angle_late_s: f32,
+    /// Step of a count of the angle, electrical, in rad; 0: it has none to speak of.
+    pub angle_step_rad: f32,
 }
+
+/// Step of a count from which the tracker's angle is nearer the rotor's than the sensor's own, in rad: half a degree.
+const COARSE_RAD: f32 = 8.727e-3;
 
 impl Settings {
     /// Settings for a clock and the inverter's devices, with the default gains, and an angle without delay.
     pub const fn new(clock: Clock, devices: SwitchLimits) -> Self {
-        Self { clock, devices, gains: Gains::DEFAULT, angle_late_s: 0.0 }
+        Self { clock, devices, gains: Gains::DEFAULT, angle_late_s: 0.0, angle_step_rad: 0.0 }
+    }
+
+    /// Step of a count, electrical, in rad, of an encoder with this many counts in a turn of the shaft, at least 1.
+    pub const fn step_rad(counts: u32, pole_pairs: f32) -> f32 {
+        core::f32::consts::TAU * pole_pairs / counts as f32
+    }
+
+    /// `true` if the angle is counted so coarsely that the speed tracker's own is used: between two counts it turns on by the speed.
+    #[inline(always)]
+    fn counts_coarsely(&self) -> bool {
+        self.angle_step_rad > COARSE_RAD
     }
 }
 

@@ -15,14 +15,14 @@ const PWM_LATE_PART: u32 = 4;
 const LATEST: u32 = 3;
 
 /// Halves that a control period may plan: a locked carrier of a machine that switches once a control period has five, and one more if it is
-/// turned on.
-const MOST_PLANNED: u32 = 6;
+/// turned on; of the optimised patterns' short halves eleven.
+const MOST_PLANNED: u32 = if cfg!(feature = "optimal") { 12 } else { 6 };
 
 /// Halves that the cell to the PWM interrupt holds: those for a period's boundaries, and those that are planned meanwhile for the next one's.
-pub const PLANNED_SLOTS: usize = 16;
+pub const PLANNED_SLOTS: usize = if cfg!(feature = "optimal") { 32 } else { 16 };
 
 /// Halves that are remembered: four that ended or run, and those that are planned for two periods.
-const REMEMBERED: usize = 16;
+const REMEMBERED: usize = PLANNED_SLOTS;
 
 /// The halves that control has planned, for the PWM interrupt.
 pub type Planned = Mailbox<PlannedHalf, PLANNED_WORDS, PLANNED_SLOTS>;

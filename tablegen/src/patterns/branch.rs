@@ -1,6 +1,7 @@
 //! The branches: continuous lines of local optima over the modulation index.
 
 use super::local::Problem;
+use super::torque::TorqueRipple;
 use super::waveform::Waveform;
 use std::f64::consts::FRAC_PI_2;
 
@@ -29,29 +30,30 @@ pub struct Branch {
     /// Carrier half, counted from 0°, at whose beginning the flux lies next to its fundamental: there the pattern takes over from a free
     /// carrier.
     pub calm: u32,
-    /// `true` if its flux path lies near that of its neighbours at 0°; otherwise it does at 30°.
-    pub meets_at_zero: bool,
+    /// The place among the branches of as many pulses, from the smallest modulation index up.
+    pub place: u32,
     /// Highest stator frequency at which it is used, in Hz: makes an angle of the shortest pulse.
     pub highest_hz: f64,
 }
 
 /// The branches, from many pulses to few and from a small modulation index to a large one.
 #[rustfmt::skip]
-pub const BRANCHES: [Branch; 14] = [
-    Branch { name: "opt15", pulses: 15, starts_high: false, halves: 6, anchor: 50, window: (10, 58), calm: 1, meets_at_zero: false, highest_hz: 60.0 },
-    Branch { name: "opt13a", pulses: 13, starts_high: false, halves: 5, anchor: 50, window: (10, 64), calm: 1, meets_at_zero: false, highest_hz: 69.2 },
-    Branch { name: "opt13b", pulses: 13, starts_high: true, halves: 5, anchor: 70, window: (62, 79), calm: 5, meets_at_zero: false, highest_hz: 69.2 },
-    Branch { name: "opt11", pulses: 11, starts_high: false, halves: 4, anchor: 60, window: (10, 73), calm: 3, meets_at_zero: false, highest_hz: 81.8 },
-    Branch { name: "opt9a", pulses: 9, starts_high: true, halves: 4, anchor: 40, window: (10, 55), calm: 2, meets_at_zero: false, highest_hz: 100.0 },
-    Branch { name: "opt9b", pulses: 9, starts_high: false, halves: 4, anchor: 65, window: (50, 82), calm: 3, meets_at_zero: false, highest_hz: 100.0 },
-    Branch { name: "opt7a", pulses: 7, starts_high: true, halves: 3, anchor: 50, window: (10, 70), calm: 1, meets_at_zero: false, highest_hz: 128.6 },
-    Branch { name: "opt7b", pulses: 7, starts_high: false, halves: 3, anchor: 75, window: (62, 89), calm: 3, meets_at_zero: false, highest_hz: 128.6 },
-    Branch { name: "opt7c", pulses: 7, starts_high: true, halves: 3, anchor: 90, window: (86, 96), calm: 2, meets_at_zero: true, highest_hz: 128.6 },
-    Branch { name: "opt5a", pulses: 5, starts_high: true, halves: 2, anchor: 60, window: (10, 79), calm: 1, meets_at_zero: false, highest_hz: 180.0 },
-    Branch { name: "opt5b", pulses: 5, starts_high: false, halves: 2, anchor: 85, window: (76, 94), calm: 2, meets_at_zero: false, highest_hz: 180.0 },
-    Branch { name: "opt5c", pulses: 5, starts_high: true, halves: 2, anchor: 95, window: (91, 97), calm: 2, meets_at_zero: true, highest_hz: 180.0 },
-    Branch { name: "opt3a", pulses: 3, starts_high: true, halves: 1, anchor: 80, window: (10, 95), calm: 1, meets_at_zero: false, highest_hz: 300.0 },
-    Branch { name: "opt3b", pulses: 3, starts_high: false, halves: 1, anchor: 95, window: (90, 98), calm: 1, meets_at_zero: false, highest_hz: 300.0 },
+pub const BRANCHES: [Branch; 15] = [
+    Branch { name: "opt15", pulses: 15, starts_high: false, halves: 6, anchor: 50, window: (10, 58), calm: 1, place: 0, highest_hz: 60.0 },
+    Branch { name: "opt13a", pulses: 13, starts_high: false, halves: 5, anchor: 50, window: (10, 64), calm: 1, place: 0, highest_hz: 69.2 },
+    Branch { name: "opt13b", pulses: 13, starts_high: true, halves: 5, anchor: 70, window: (62, 79), calm: 5, place: 1, highest_hz: 69.2 },
+    Branch { name: "opt11", pulses: 11, starts_high: false, halves: 4, anchor: 60, window: (10, 73), calm: 3, place: 0, highest_hz: 81.8 },
+    Branch { name: "opt9a", pulses: 9, starts_high: true, halves: 4, anchor: 40, window: (10, 55), calm: 3, place: 0, highest_hz: 100.0 },
+    Branch { name: "opt9b", pulses: 9, starts_high: false, halves: 4, anchor: 65, window: (50, 82), calm: 3, place: 1, highest_hz: 100.0 },
+    Branch { name: "opt7a", pulses: 7, starts_high: true, halves: 3, anchor: 50, window: (10, 70), calm: 1, place: 0, highest_hz: 128.6 },
+    Branch { name: "opt7b", pulses: 7, starts_high: false, halves: 3, anchor: 75, window: (62, 89), calm: 3, place: 1, highest_hz: 128.6 },
+    Branch { name: "opt7c", pulses: 7, starts_high: true, halves: 3, anchor: 90, window: (86, 96), calm: 2, place: 2, highest_hz: 128.6 },
+    Branch { name: "opt7d", pulses: 7, starts_high: false, halves: 6, anchor: 96, window: (94, 97), calm: 6, place: 3, highest_hz: 128.6 },
+    Branch { name: "opt5a", pulses: 5, starts_high: true, halves: 2, anchor: 60, window: (10, 84), calm: 1, place: 0, highest_hz: 180.0 },
+    Branch { name: "opt5b", pulses: 5, starts_high: false, halves: 2, anchor: 85, window: (76, 94), calm: 2, place: 1, highest_hz: 180.0 },
+    Branch { name: "opt5c", pulses: 5, starts_high: true, halves: 2, anchor: 95, window: (91, 97), calm: 2, place: 2, highest_hz: 180.0 },
+    Branch { name: "opt3a", pulses: 3, starts_high: true, halves: 1, anchor: 80, window: (10, 95), calm: 1, place: 0, highest_hz: 300.0 },
+    Branch { name: "opt3b", pulses: 3, starts_high: false, halves: 1, anchor: 95, window: (90, 98), calm: 1, place: 1, highest_hz: 300.0 },
 ];
 
 /// A branch with its angles.
@@ -82,12 +84,16 @@ impl Branch {
         let lost = |at: u32| format!("{}: no optimum at modulation index {:.2}", self.name, index(at));
         let start = self.best_at_anchor().ok_or_else(|| lost(self.anchor))?;
         let bounds = self.bounds(&start).ok_or_else(|| lost(self.anchor))?;
+        let torque = TorqueRipple::new();
         let follow = |steps: &mut dyn Iterator<Item = u32>| {
             let mut last = start.clone();
             let mut nodes = Vec::new();
             for at in steps {
-                last = self.problem(at, &bounds).optimum(&last).ok_or_else(|| lost(at))?;
-                nodes.push((index(at), last.clone()));
+                let problem = self.problem(at, &bounds);
+                last = problem.optimum(&last).ok_or_else(|| lost(at))?;
+                let calmer =
+                    Problem { torque: Some(&torque), ..problem }.optimum(&last).ok_or_else(|| lost(at))?;
+                nodes.push((index(at), calmer));
             }
             Ok::<_, String>(nodes)
         };
@@ -99,7 +105,13 @@ impl Branch {
 
     /// The problem at a modulation index in hundredths.
     fn problem<'a>(&self, at: u32, bounds: &'a [(f64, f64)]) -> Problem<'a> {
-        Problem { first: self.first(), index: index(at), shortest_rad: self.shortest_rad(), bounds }
+        Problem {
+            first: self.first(),
+            index: index(at),
+            shortest_rad: self.shortest_rad(),
+            bounds,
+            torque: None,
+        }
     }
 
     /// The best optimum at the anchor whose edges the carrier halves can hold.
@@ -115,8 +127,7 @@ impl Branch {
         held.min_by(|a, b| cost(a).total_cmp(&cost(b)))
     }
 
-    /// The carrier half in which each angle lies, less half the shortest pulse at its ends; `None` where one lies nowhere, or two edges of
-    /// a phase lie in one half.
+    /// The carrier half in which each angle lies, less half the shortest pulse at its ends; `None` where two edges of a phase lie in one half.
     fn bounds(&self, angles: &[f64]) -> Option<Vec<(f64, f64)>> {
         let width = FRAC_PI_2 / f64::from(3 * self.halves);
         let room = 0.5 * self.shortest_rad();
@@ -126,8 +137,7 @@ impl Branch {
         // The edge at angle 0 is one, too.
         let first = cells.first().is_some_and(|cell| *cell > 0.0) || angles[0] >= 2.0 * room;
         let single = cells.windows(2).all(|pair| pair[0] < pair[1]);
-        let inside = angles.iter().zip(&bounds).all(|(angle, (low, high))| (low..=high).contains(&angle));
-        (first && single && inside).then_some(bounds)
+        (first && single).then_some(bounds)
     }
 }
 

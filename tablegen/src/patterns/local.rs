@@ -1,5 +1,6 @@
 //! The local optimum from a start: sequential quadratic programming, by the crate `slsqp`.
 
+use super::torque::TorqueRipple;
 use super::waveform::Waveform;
 use slsqp::{Func, StopTols, minimize};
 
@@ -22,23 +23,38 @@ pub(super) struct Problem<'a> {
     pub shortest_rad: f64,
     /// Least and largest value of each angle, in rad.
     pub bounds: &'a [(f64, f64)],
+    /// The torque ripple that counts as much as the distortion, if it counts.
+    pub torque: Option<&'a TorqueRipple>,
 }
+
+/// Step of an angle by which the torque ripple's slope is found, in rad.
+const SLOPE_STEP: f64 = 1e-6;
 
 impl Problem<'_> {
     /// The local optimum that is reached from a start; `None` where there is none, or the constraints do not hold.
     pub fn optimum(&self, start: &[f64]) -> Option<Vec<f64>> {
         let first = self.first;
-        let cost = |angles: &[f64], slopes: Option<&mut [f64]>, (): &mut ()| {
+        let cost = |angles: &[f64], mut slopes: Option<&mut [f64]>, (): &mut ()| {
             let wave = Waveform { first, angles_rad: angles };
-            let Some(slopes) = slopes else { return SCALE * wave.ripple(None) };
-            let value = wave.ripple(Some(slopes));
-            slopes.iter_mut().for_each(|slope| *slope *= SCALE);
+            let mut value = wave.ripple(slopes.as_deref_mut());
+            if let Some(torque) = self.torque {
+                let own = torque.squared(&wave);
+                value += own;
+                for (k, slope) in slopes.iter_mut().flat_map(|slopes| slopes.iter_mut()).enumerate() {
+                    let mut moved = angles.to_vec();
+                    moved[k] += SLOPE_STEP;
+                    *slope += (torque.squared(&Waveform { first, angles_rad: &moved }) - own) / SLOPE_STEP;
+                }
+            }
+            slopes.into_iter().flatten().for_each(|slope| *slope *= SCALE);
             SCALE * value
         };
         let constraints = self.constraints(start.len());
         let constraints: Vec<&dyn Func<()>> = constraints.iter().map(AsRef::as_ref).collect();
+        let start: Vec<_> =
+            start.iter().zip(self.bounds).map(|(angle, (low, high))| angle.clamp(*low, *high)).collect();
         let ends = StopTols { ftol_rel: TOLERANCE, ..StopTols::default() };
-        let found = minimize(cost, start, self.bounds, &constraints, (), MOST_EVALUATIONS, Some(ends));
+        let found = minimize(cost, &start, self.bounds, &constraints, (), MOST_EVALUATIONS, Some(ends));
         // Near the optimum it may stop for rounding: the constraints decide.
         let (Ok((_, angles, _)) | Err((_, angles, _))) = found;
         self.made_exact(angles)

@@ -24,7 +24,7 @@ pub static {name}: Branch = Branch {{
     starts_high: {},
     halves: {},
     calm: {},
-    meets_at_zero: {},
+    place: {},
     angles: {},
     first: {first:?},
     last: {last:?},
@@ -36,7 +36,7 @@ pub static {name}: Branch = Branch {{
             branch.starts_high,
             branch.halves,
             branch.calm,
-            branch.meets_at_zero,
+            branch.place,
             branch.pulses / 2,
             1.0 / STEP
         );

@@ -61,6 +61,16 @@ impl Waveform<'_> {
         sum
     }
 
+    /// The harmonics `V_n/n` in shares of six-step's fundamental, for n = 6k − 1 and 6k + 1, k from 1.
+    pub(super) fn flux_harmonics(&self) -> impl Iterator<Item = (f64, f64)> {
+        let harmonic = |n: f64| {
+            let edges = self.angles_rad.iter().zip(signs());
+            let sum: f64 = edges.map(|(angle, sign)| 2.0 * sign * libm::cos(n * angle)).sum();
+            self.first * (1.0 + sum) / (n * n)
+        };
+        (1..).map(move |k| (harmonic(6.0 * f64::from(k) - 1.0), harmonic(6.0 * f64::from(k) + 1.0)))
+    }
+
     /// The shortest pulse or pause, as an angle in rad: between the edges at 0, at the angles, and mirrored at 90°.
     pub fn shortest_rad(&self) -> f64 {
         let last = self.angles_rad.last().copied().unwrap_or(0.0);

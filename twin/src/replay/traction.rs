@@ -8,7 +8,7 @@ use crate::world::Edge;
 use tractive::control::{Demand, Gains, LinkWindow};
 use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
 use tractive::frames::{Abc, Angle};
-use tractive::machine::Tables;
+use tractive::machine::{Ratings, Tables};
 use tractive::modulation::{CarrierHalf, Mode, SwitchLimits};
 use tractive::ports::{ControlPort, DriveCommand, PwmPort, Report, Sample};
 use tractive::protection::SafeState;
@@ -41,7 +41,7 @@ impl Stage {
         (1..=COARSEST).rev().find(|cycles| period.is_multiple_of(*cycles)).unwrap_or(1)
     }
 
-    fn settings(&self, max_switching_hz: f32) -> Settings {
+    fn settings(&self, ratings: &Ratings) -> Settings {
         let ticks_per_s = CORE_HZ / self.prescaler();
         let clock = Clock::new(ticks_per_s, ticks_per_s / self.control_hz);
         let ticks = |ns: u32| {
@@ -49,9 +49,11 @@ impl Stage {
             cycles.div_ceil(self.prescaler())
         };
         let (pulse, dead) = (ticks(self.min_pulse_ns), ticks(self.dead_time_ns));
-        let devices = SwitchLimits::new(pulse, dead, max_switching_hz, &clock);
+        let devices = SwitchLimits::new(pulse, dead, ratings.max_switching_hz, &clock);
         let gains = Gains::of(false, self.behind_line_filter);
-        Settings { gains, angle_late_s: 1e-6 * self.angle_late_us, ..Settings::new(clock, devices) }
+        let angle_late_s = 1e-6 * self.angle_late_us;
+        let angle_step_rad = Settings::step_rad(self.encoder_counts as u32, ratings.pole_pairs);
+        Settings { gains, angle_late_s, angle_step_rad, ..Settings::new(clock, devices) }
     }
 }
 
@@ -90,7 +92,7 @@ struct Board {
 impl Host {
     /// At rest. The zeros are those of control's converter and of the PWM's.
     pub fn new(stage: &Stage, tables: &'static Tables, zeros: &[u32]) -> Self {
-        let settings = stage.settings(tables.ratings.max_switching_hz);
+        let settings = stage.settings(&tables.ratings);
         let turns = (tables.ratings.pole_pairs as u64) << 32;
         let units_per_count = ((turns + stage.encoder_counts / 2) / stage.encoder_counts) as u32;
         let degrees = stage.encoder_zeros_deg[0] / 360.0 * 2f64.powi(32);

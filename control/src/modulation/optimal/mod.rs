@@ -9,10 +9,12 @@
 //! their phases allow and the shortest pulse is kept. What is left then is seen again at the next boundary.
 
 mod flux;
+mod meeting;
 mod pulses;
 mod table;
 
 pub use flux::ripple;
+pub(super) use meeting::last_half;
 pub(super) use pulses::half;
 pub(super) use table::*;
 
@@ -28,8 +30,8 @@ pub struct Branch {
     pub halves: u32,
     /// The half, counted from 0° and again every 60°, at whose beginning the flux lies next to its fundamental.
     calm: u32,
-    /// `true` if its flux path lies near that of its neighbours at 0°.
-    meets_at_zero: bool,
+    /// The place among the branches of as many pulses, from the smallest modulation index up: tells the shape of its flux path.
+    place: u32,
     /// Angles in a quarter turn: the pulses of a turn are twice as many and one.
     pub angles: usize,
     /// Modulation index of the first and last node.
@@ -73,12 +75,6 @@ impl Branch {
     /// `true` for a half at whose beginning the pattern may take over from a free carrier.
     pub fn is_calm(&self, half: u32) -> bool {
         half % (2 * self.halves) == self.calm
-    }
-
-    /// The half, counted from 0° and again every 60°, at whose beginning its flux path lies nearest to that of another pattern: at 30°, but
-    /// where both meet at 0°.
-    pub fn meets(&self, other: &Self) -> u32 {
-        if self.meets_at_zero && other.meets_at_zero { 0 } else { self.halves }
     }
 
     /// Carrier halves in a quarter turn.

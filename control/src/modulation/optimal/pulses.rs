@@ -6,13 +6,13 @@ use crate::modulation::{CarrierHalf, SwitchLimits};
 
 /// One phase's part of a carrier half.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Part {
+pub(super) struct Part {
     /// Level at its beginning.
-    level: bool,
+    pub level: bool,
     /// The place of its edge, as a share of the half.
-    edge: Option<f32>,
+    pub edge: Option<f32>,
     /// `true` if it also has an edge at its very beginning, and at its very end: these cannot move.
-    jumps: (bool, bool),
+    pub jumps: (bool, bool),
 }
 
 /// A half of a branch's pattern at a modulation index, `period_ticks` long, with its edges moved so that it has `more_ticks` of volt-seconds
@@ -24,9 +24,17 @@ pub fn half(
     (index, more_ticks): (f32, AlphaBeta),
     devices: &SwitchLimits,
 ) -> CarrierHalf {
-    let third = branch.quarter() * 4 / 3;
-    let pattern = branch.pattern(index);
-    let parts = [half, half + 2 * third, half + third].map(|half| pattern.part(half));
+    let parts = branch.parts(half, index);
+    played(&parts, period_ticks, more_ticks, devices)
+}
+
+/// The half of these parts, with their edges moved.
+pub(super) fn played(
+    parts: &[Part; 3],
+    period_ticks: u32,
+    more_ticks: AlphaBeta,
+    devices: &SwitchLimits,
+) -> CarrierHalf {
     let longer = longer(parts.map(|part| part.edge.is_some()), more_ticks);
     let mut out = CarrierHalf {
         period_ticks,
@@ -57,6 +65,28 @@ fn longer(edge: [bool; 3], more_ticks: AlphaBeta) -> [f32; 3] {
         [true, false, true] => [a - b, 0.0, c - b],
         [false, true, true] => [0.0, b - a, c - a],
         _ => [1.5 * a, 1.5 * b, 1.5 * c],
+    }
+}
+
+impl Part {
+    /// Level at its end.
+    pub fn ends_at(&self) -> bool {
+        self.level ^ self.edge.is_some()
+    }
+
+    /// The share of the half for which the level is the upper one.
+    pub fn on(&self) -> f32 {
+        let edge = self.edge.unwrap_or(1.0);
+        if self.level { edge } else { 1.0 - edge }
+    }
+}
+
+impl Branch {
+    /// The parts of the three phases in half number `half`, at a modulation index.
+    pub(super) fn parts(&self, half: u32, index: f32) -> [Part; 3] {
+        let third = self.quarter() * 4 / 3;
+        let pattern = self.pattern(index);
+        [half, half + 2 * third, half + third].map(|half| pattern.part(half))
     }
 }
 

@@ -148,6 +148,7 @@ impl Drive {
         let machine = PlantSettings {
             flux_scale: conditions.flux_scale,
             resistance_scale: conditions.resistance_scale,
+            ..PlantSettings::default()
         };
         let faster = |rpm_s: f64| {
             let end_rpm = point.speed_rpm + rpm_s * (STAGES.end_s - at_s);
@@ -156,9 +157,11 @@ impl Drive {
         let (kind, machine, speed) = match case.fault.cause {
             Cause::Bench(kind) if case.fault.needs_rest() => (kind, machine, faster(PUSH_RPM_S)),
             Cause::Bench(kind) => (kind, machine, steady()),
-            Cause::Machine(flux_scale, resistance_scale) => {
-                (Kind::Elsewhere, PlantSettings { flux_scale, resistance_scale }, steady())
-            }
+            Cause::Machine(flux_scale, resistance_scale) => (
+                Kind::Elsewhere,
+                PlantSettings { flux_scale, resistance_scale, ..PlantSettings::default() },
+                steady(),
+            ),
             Cause::Runaway => (Kind::Elsewhere, machine, faster(RUNAWAY_RPM_S)),
         };
         let settings = bench::Settings {

@@ -5,6 +5,7 @@ pub(super) mod acknowledge;
 pub(super) mod borders_timing;
 pub mod characteristic;
 pub(super) mod chopper;
+pub mod flaws;
 pub(super) mod full_step;
 pub(super) mod gaps;
 pub mod identification;
@@ -37,7 +38,7 @@ use crate::inject::traction::Kind;
 use crate::law::LawName;
 use crate::machine::Machine;
 use crate::options::{On, finite, not_negative, usual_min_pulse_us, within};
-use crate::plant::{DcLinkSettings, LineFilter, Plant, Source, SpeedSource};
+use crate::plant::{DcLinkSettings, LineFilter, Plant, PlantSettings, Source, SpeedSource};
 use crate::report::{self, Page};
 use crate::run::traction::{Tasks, run_in_qemu};
 use crate::run::{self, CLOCK, Supervisor};
@@ -45,6 +46,7 @@ use crate::trace::Recording;
 use ablated::Ablated;
 use anyhow::{Result, bail};
 use clap::{Args, ValueEnum};
+use flaws::{Beside, Filled, FlawOptions};
 use serde::Serialize;
 use serde_json::{Map, Value};
 use tractive::control::{ControlLaw, Controller, Demand, Gains, MtpaStart, PiLaw};
@@ -165,9 +167,6 @@ pub struct TractionOptions {
     /// without it the link itself is stiff.
     #[arg(long, value_name = "L_MH,C_MF,R_MOHM", allow_negative_numbers = true)]
     pub line: Option<LineFilter>,
-    /// Time after its sample in which the angle is read, in µs; each time at another instant.
-    #[arg(long, default_value_t = 0.0, value_parser = not_negative, allow_negative_numbers = true, hide = true)]
-    pub angle_jitter_us: f64,
     /// Error of the angle sensor that goes once with the electrical angle, amplitude in electrical degrees.
     #[arg(long, default_value_t = 0.0, value_parser = finite, allow_negative_numbers = true, value_name = "DEG")]
     pub angle_1f_deg: f64,
@@ -198,6 +197,10 @@ pub struct TractionOptions {
     /// By how much the PWM timer starts later, in µs.
     #[arg(long, default_value_t = 0.0, value_parser = not_negative, allow_negative_numbers = true, hide = true)]
     pub pwm_delay_us: f64,
+    /// Further flaws.
+    #[serde(flatten)]
+    #[command(flatten)]
+    pub flaws: FlawOptions,
 }
 
 /// Options of a run.
@@ -318,7 +321,12 @@ impl System for Traction {
         if options.own.ablate.is_some() && (options.law == LawName::Pi || options.on == On::Qemu) {
             bail!("--ablate: a part is taken away from the project's own law, and on the host alone");
         }
+        options.own.flaws.check(machine)?;
         options.check_flaws(machine, udc_v)
+    }
+
+    fn filled(options: &Options, machine: &Machine) -> Options {
+        filled(options, machine)
     }
 
     fn run(
@@ -364,6 +372,21 @@ impl System for Traction {
     fn overview(recording: &Recording) -> Result<Option<String>> {
         report::overview(recording).map(Some)
     }
+}
+
+/// The options with everything that `--real` stands for.
+fn filled(options: &Options, machine: &Machine) -> Options {
+    let own = &options.own;
+    if !own.flaws.real {
+        return options.clone();
+    }
+    let TractionOptions { udc_gain, current_filter_us, angle_1f_deg, angle_2f_deg, .. } = *own;
+    let beside = Beside { udc_gain, current_filter_us, angle_deg: [angle_1f_deg, angle_2f_deg] };
+    let Filled { run, beside, flaws } = Filled::of(&options.run, beside, &own.flaws, machine);
+    let Beside { udc_gain, current_filter_us, angle_deg: [angle_1f_deg, angle_2f_deg] } = beside;
+    let own =
+        TractionOptions { udc_gain, current_filter_us, angle_1f_deg, angle_2f_deg, flaws, ..own.clone() };
+    Options { run, own }
 }
 
 /// A run on the host, but for the control law.
@@ -464,7 +487,14 @@ fn setup(plan: &Plan, options: &Options, machine: &Machine, over_protocol: bool)
         uncompensated,
         behind_line_filter: options.own.line.is_some() || plan.line.as_ref().is_some_and(LinePlan::has_choke),
         angle_late_s: options.own.known_late_s(),
+        angle_step_rad: angle_step_rad(options, machine),
     }
+}
+
+/// Step of the encoder's counts, electrical, in rad; 0 without an encoder.
+fn angle_step_rad(options: &Options, machine: &Machine) -> f32 {
+    let counts = options.own.encoder_lines.map(|lines| lines.saturating_mul(4));
+    counts.map_or(0.0, |counts| Settings::step_rad(counts, machine.tables.ratings.pole_pairs))
 }
 
 fn devices(setup: &Setup, options: &Options, machine: &Machine) -> SwitchLimits {
@@ -488,8 +518,12 @@ fn tasks<'a, L: ControlLaw>(
 ) -> Result<Tasks<'a, L>> {
     let gains = Gains::of(setup.uncompensated, setup.behind_line_filter);
     let devices = devices(setup, options, machine);
-    let settings =
-        Settings { clock: clock(options, machine), devices, gains, angle_late_s: setup.angle_late_s };
+    let settings = Settings {
+        angle_late_s: setup.angle_late_s,
+        angle_step_rad: setup.angle_step_rad,
+        gains,
+        ..Settings::new(clock(options, machine), devices)
+    };
     settings.check(machine.tables).map_err(run::refused)?;
     let ratings = &machine.tables.ratings;
     let line = setup.line.map(|times| Line::rated(ratings, times.precharge_s, times.discharge_s));
@@ -507,7 +541,7 @@ fn truth(options: &Options, machine: &Machine) -> Result<Machine> {
 fn bench(plan: Plan, setup: &Setup, options: &Options, (machine, truth): (&Machine, &Machine)) -> Bench {
     let flaws = options.flaws(machine.folder.parameters.trip_current_a);
     let pole_pairs = f64::from(machine.folder.parameters.pole_pairs);
-    let angle_jitter_s = 1e-6 * options.own.angle_jitter_us;
+    let own = &options.own.flaws;
     let settings = bench::Settings {
         clock: clock(options, machine),
         first_half_ticks: first_half_ticks(setup, options, machine),
@@ -518,8 +552,11 @@ fn bench(plan: Plan, setup: &Setup, options: &Options, (machine, truth): (&Machi
         udc_v: udc_v(options, machine),
         link_steps: plan.link,
         flaws: Flaws {
-            angle_jitter_s,
+            current_offsets_a: own.offsets().map(|share| share * flaws.adc_full_scale_a),
+            current_gains: own.gains(),
+            angle_jitter_s: 1e-6 * own.angle_jitter_us,
             angle_harmonics_deg: [options.own.angle_1f_deg, options.own.angle_2f_deg],
+            angle_phases_deg: [own.angle_1f_phase_deg, own.angle_2f_phase_deg],
             angle_late_s: 1e-6 * options.own.angle_late_us,
             angle_counts: options.own.encoder_lines.map(|lines| 4.0 * f64::from(lines) / pole_pairs),
             current_filter_s: 1e-6 * options.own.current_filter_us,
@@ -532,7 +569,8 @@ fn bench(plan: Plan, setup: &Setup, options: &Options, (machine, truth): (&Machi
         injection: plan.injection,
         limits: Limits::NONE,
     };
-    let mut plant = Plant::new(&truth.folder, plan.speed, &options.plant());
+    let deviations = PlantSettings { slots_share: own.slots / 100.0, drops: own.drops(), ..options.plant() };
+    let mut plant = Plant::new(&truth.folder, plan.speed, &deviations);
     if let Some(encoder) = plan.encoder {
         plant.motor.rotor_mut().turn_to(encoder.turns());
     }

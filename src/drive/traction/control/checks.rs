@@ -2,6 +2,7 @@
 
 use super::ControlTask;
 use crate::control::{ControlLaw, Measurements};
+use crate::frames::Angle;
 use crate::machine::Machine;
 use crate::ports::{ControlPort, DriveCommand, Sample};
 use crate::protection::{self, Trip, Violation};
@@ -12,14 +13,15 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
     /// speed told, to leave the safe state by; whatever chooses a safe state keeps to the speed at which the angle was lost.
     pub(super) fn track(
         &mut self,
-        sample: &Sample,
+        angle: Option<Angle>,
         enable: bool,
         port: &mut impl ControlPort,
     ) -> (f32, Option<Violation>) {
         let clock = self.settings.clock;
-        let lost = match sample.angle {
+        let lost = match angle {
             Some(angle) if self.controller.speed_is_known() => {
-                protection::check_angle(self.controller.innovation_rad(angle, &clock))
+                self.innovation_rad = self.controller.innovation_rad(angle, &clock);
+                protection::check_angle(self.innovation_rad)
             }
             Some(_) => None,
             None => {
@@ -35,7 +37,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         if self.trip.is_some() {
             self.controller.recover_angle();
         }
-        if let Some(angle) = sample.angle.filter(|_| lost.is_none() || self.trip.is_some()) {
+        if let Some(angle) = angle.filter(|_| lost.is_none() || self.trip.is_some()) {
             self.controller.track(angle, &clock);
         }
         (self.lost_at.unwrap_or(self.controller.omega()), lost)

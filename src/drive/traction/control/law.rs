@@ -6,11 +6,11 @@ use super::super::slot::Slot;
 use super::super::{Settings, Shared};
 use super::{ControlTask, Input};
 use crate::control::{AimInput, ControlLaw, Demand, Law, LinkDamper, Measurements, RotorSample};
-use crate::frames::Angle;
+use crate::frames::{Angle, SinCos};
 use crate::machine::Machine;
 use crate::modulation::{Mode, Reference};
 use crate::ports::Sample;
-use crate::protection::FrozenWatch;
+use crate::protection::{FrozenWatch, SafeState, safe_state};
 use crate::time::Instant;
 
 /// A demand that jumps by more than this share of the largest torque is worth revising the next half for.
@@ -30,6 +30,10 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         self.controller.observe(&here, tables);
         self.revises = self.is_to_revise(now, &input.command.demand);
         let commands = slot.commands || self.revises;
+        // Not in the longest periods, unless all are.
+        if !commands || slot.between > 0 {
+            self.learn_angle(measured.angle, here.frame);
+        }
         let aims = slot.aims || (commands && self.aimed != Some(slot.key));
         if let Some(at) = self.pulses.newest().map(|newest| newest.at)
             && self.boundary != Some(at)
@@ -46,6 +50,15 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         }
     }
 
+    /// Learns the position sensor's errors from an angle and its direction; not where counts look like errors.
+    #[inline(always)]
+    pub(super) fn learn_angle(&mut self, angle: Angle, direction: SinCos) {
+        if self.settings.counts_coarsely() {
+            return;
+        }
+        self.harmonics.observe(angle, direction, self.innovation_rad, self.controller.tracker());
+    }
+
     /// Learns from the newest boundary.
     pub(super) fn learn(&mut self, sample: &Sample, angle: Angle, decided: Mode, shared: &Shared) {
         let Settings { gains, clock, .. } = &self.settings;
@@ -55,7 +68,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         if let Some(currents_a) = self.pulses.currents_a(&shared.loaded) {
             let age_s = clock.seconds(now.since(self.pulses.before(0).at));
             let angle = angle - Angle::within_half_turn(self.controller.omega() * age_s);
-            let there = RotorSample::new(currents_a, angle, tables);
+            let there = RotorSample::new(self.zeros.without(currents_a), angle, tables);
             self.controller.learn(&boundary, &there, follows(decided), &Law { gains, clock, tables });
         }
     }
@@ -126,6 +139,17 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         revises
     }
 
+    /// A period without pulses of the control law: where nothing else makes a current flow either, the sensors show their zeros.
+    pub(super) fn rest_currents(&mut self, sample: &Sample, pulses: bool) {
+        let ratings = &self.machine.tables().ratings;
+        let open = safe_state(self.controller.omega(), sample.udc_v, ratings) == SafeState::GatesOff;
+        if open && !pulses && self.trip.is_none() {
+            self.zeros.rest(sample.currents_a);
+        } else {
+            self.zeros.flow();
+        }
+    }
+
     /// No pulses: the control law begins anew.
     pub(super) fn rest(&mut self, now: Instant, omega: f32, measured: &Measurements) {
         self.controller.idle();
@@ -147,5 +171,10 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             udc_v: measured.udc_v,
             ..Reference::NONE
         };
+        if self.controller.speed_is_known() {
+            self.learn_angle(measured.angle, measured.angle.sin_cos());
+        } else {
+            self.harmonics.pause();
+        }
     }
 }

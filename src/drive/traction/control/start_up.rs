@@ -53,7 +53,9 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             if let Some(currents_a) = self.pulses.currents_a(&shared.loaded) {
                 let ended = self.pulses.before(2);
                 let volt_seconds = || ended.volt_ticks * (sample.udc_v * clock.tick_s);
-                starting.law.observe(currents_a.clarke(), (!ended.is_off()).then(volt_seconds));
+                starting
+                    .law
+                    .observe(self.zeros.without(currents_a).clarke(), (!ended.is_off()).then(volt_seconds));
             }
             starting.boundary = Some(newest.at);
         }

@@ -1,0 +1,258 @@
+//! Errors of a position sensor that go once and twice with the electrical angle, as a resolver's do: learnt from what the speed tracker leaves
+//! of them, and taken out.
+//!
+//! A rotor whose torque ripples little for its inertia turns evenly, so what goes once or twice with its angle is the sensor's. Of an error that turns with ω the tracker, whose
+//! natural frequency is ω₀, follows a part: what it leaves, E, is that of an error D = E (1 − (ω₀/ω)² − 2j ω₀/ω). Over some whole turns of even
+//! speed E is the mean of what is left times 2 e^(−jkθ), and of D half is added to what is known: the error goes away in some of these times whatever
+//! noise, lag and acceleration are, and nothing is fed back faster than it was measured.
+
+use super::speed::SpeedTracker;
+use crate::frames::{Angle, SinCos, limit_magnitude};
+
+/// Turns over which the error is measured, as a number of bits: four.
+const TURNS_BITS: u32 = 2;
+/// Speed from which an error is learnt, over the tracker's natural frequency: below it the tracker follows most of it.
+const FROM: f32 = 0.4;
+/// Change of the speed over these turns up to which it counts as even, as a share.
+const EVEN: f32 = 0.02;
+/// Share of a measured error that is added to what is known.
+const GAIN: f32 = 0.5;
+/// What is known and left alone, as the root of the sum of squares, in rad: 0.1°, which an encoder's counts may look like. It is half of the error,
+/// for the half that is added first.
+const LEFT_ALONE_RAD: f32 = 1.745e-3;
+/// Largest step by which what is known of a part may change, in rad: less than what counts as an angle that is lost.
+const MOST_STEP_RAD: f32 = 0.02;
+/// Samples up to which turns count as gone at one speed, more than they take at the least: the rotor stood meanwhile.
+const MOST_SAMPLES: u32 = 8_192;
+/// Largest error that is taken out, of each part, in rad.
+const MOST_RAD: f32 = 0.1;
+
+/// Amplitudes of the cosine and the sine of a multiple of the angle, in rad.
+#[derive(Clone, Copy, Debug)]
+struct Part {
+    cos: f32,
+    sin: f32,
+}
+
+impl Part {
+    const NONE: Self = Self { cos: 0.0, sin: 0.0 };
+
+    /// The error in a direction, in rad.
+    #[inline(always)]
+    fn at(self, direction: SinCos) -> f32 {
+        self.cos * direction.cos + self.sin * direction.sin
+    }
+
+    /// One more sample of what is left, in rad.
+    #[inline(always)]
+    fn add(&mut self, left_rad: f32, direction: SinCos) {
+        self.cos += left_rad * direction.cos;
+        self.sin += left_rad * direction.sin;
+    }
+
+    /// The same part seen from an angle before, so many times the angle that lies between.
+    fn turned_back(self, by: SinCos) -> Self {
+        Self { cos: self.cos * by.cos + self.sin * by.sin, sin: self.sin * by.cos - self.cos * by.sin }
+    }
+
+    /// Learns from the means of what is left times cosine and sine, each by half, where the tracker's natural frequency is `ratio` times that of this part.
+    fn learn(&mut self, mean: Self, ratio: f32) {
+        let (real, imaginary) = (1.0 - ratio * ratio, 2.0 * ratio);
+        let gain = 2.0 * GAIN;
+        let step = |change: f32| limit_magnitude(gain * change, MOST_STEP_RAD);
+        let cos = self.cos + step(real * mean.cos - imaginary * mean.sin);
+        let sin = self.sin + step(real * mean.sin + imaginary * mean.cos);
+        *self = Self { cos: limit_magnitude(cos, MOST_RAD), sin: limit_magnitude(sin, MOST_RAD) };
+    }
+}
+
+/// The errors of once and twice the angle that are known, and what is being measured of them.
+#[derive(Clone, Copy, Debug)]
+pub struct AngleHarmonics {
+    /// By how long the angles that are observed are ahead of the sensor's, in s.
+    ahead_s: f32,
+    known: [Part; 2],
+    /// Sums of what was left, times cosine and sine, and how many samples they are of.
+    sums: [Part; 2],
+    samples: u32,
+    /// Way that the angle has gone since these began: a turn is 2³² over the turns of a measurement.
+    way: u32,
+    last: Angle,
+    /// Electrical speed where they began, in rad/s; 0 where that was no beginning.
+    omega: f32,
+    /// `true` if what is known is worth taking out.
+    used: bool,
+}
+
+impl AngleHarmonics {
+    /// Nothing known, of a sensor whose angles are brought forward by so long before they are observed, in s.
+    pub const fn new(ahead_s: f32) -> Self {
+        const NONE: [Part; 2] = [Part::NONE; 2];
+        Self {
+            ahead_s,
+            known: NONE,
+            sums: NONE,
+            samples: 0,
+            way: 0,
+            last: Angle::ZERO,
+            omega: 0.0,
+            used: false,
+        }
+    }
+
+    /// A measured angle without what is known of its errors.
+    #[inline(always)]
+    pub fn corrected(&self, measured: Angle) -> Angle {
+        if self.used { self.without(measured) } else { measured }
+    }
+
+    #[inline(never)]
+    fn without(&self, measured: Angle) -> Angle {
+        let there = measured.sin_cos();
+        let error_rad = self.error_rad(there);
+        // The errors are those of the true angle, which the first look comes near.
+        let back = SinCos { sin: -error_rad, cos: 1.0 - 0.5 * error_rad * error_rad };
+        measured - Angle::within_half_turn(self.error_rad(there.turned(back)))
+    }
+
+    /// The error that is known in a direction, in rad.
+    #[inline(always)]
+    fn error_rad(&self, once: SinCos) -> f32 {
+        let [first, second] = self.known;
+        first.at(once) + second.at(once.turned(once))
+    }
+
+    /// No angle comes for a while: what begins anew is no measurement before the next whole turns.
+    #[inline(always)]
+    pub fn pause(&mut self) {
+        self.omega = 0.0;
+    }
+
+    /// A control period: the corrected angle, brought forward, and its direction, and by how much it was off what the tracker expected, in rad. Periods may be left
+    /// out, a half turn of the angle at most.
+    #[inline(never)]
+    pub fn observe(&mut self, angle: Angle, direction: SinCos, left_rad: f32, tracker: &SpeedTracker) {
+        let [once, twice] = &mut self.sums;
+        once.add(left_rad, direction);
+        twice.add(left_rad, direction.turned(direction));
+        self.samples = self.samples.saturating_add(1);
+        let moved = (angle - self.last).signed().unsigned_abs() >> TURNS_BITS;
+        self.last = angle;
+        let (way, whole) = self.way.overflowing_add(moved);
+        self.way = way;
+        if whole {
+            self.end(tracker);
+        }
+    }
+
+    /// Both parts as they are of the sensor's own angles.
+    #[inline(always)]
+    fn sensed(&self, once: Part, twice: Part, omega: f32) -> (Part, Part) {
+        if self.ahead_s == 0.0 {
+            return (once, twice);
+        }
+        let ahead = Angle::within_half_turn(omega * self.ahead_s).sin_cos();
+        (once.turned_back(ahead), twice.turned_back(ahead.turned(ahead)))
+    }
+
+    /// The turns are whole.
+    #[cold]
+    #[inline(never)]
+    fn end(&mut self, tracker: &SpeedTracker) {
+        let (omega, natural) = (tracker.omega(), tracker.natural_rad_s());
+        let even = (omega - self.omega).abs() < EVEN * omega.abs();
+        let samples = self.samples;
+        let per_sample = 1.0 / samples as f32;
+        let [once, twice] =
+            self.sums.map(|sum| Part { cos: sum.cos * per_sample, sin: sum.sin * per_sample });
+        (self.omega, self.samples, self.sums) = (omega, 0, [Part::NONE; 2]);
+        if even && samples <= MOST_SAMPLES && omega.abs() > FROM * natural {
+            let (once, twice) = self.sensed(once, twice, omega);
+            let ratio = natural / omega;
+            // What is not taken out is all in what was left.
+            if !self.used {
+                self.known = [Part::NONE; 2];
+            }
+            let [first, second] = &mut self.known;
+            first.learn(once, ratio);
+            second.learn(twice, 0.5 * ratio);
+            let squares = self.known.map(|part| part.cos * part.cos + part.sin * part.sin);
+            self.used = squares[0] + squares[1] > LEFT_ALONE_RAD * LEFT_ALONE_RAD;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+
+    use super::*;
+    use std::vec::Vec;
+
+    const PERIOD_S: f32 = 1e-4;
+    const AHEAD_S: f32 = 5e-4;
+    const ERROR_RAD: [(f32, f32); 2] = [(0.052, 0.7), (0.017, -2.0)];
+
+    /// Errors of the corrected angle in rad over the last tenth of so many seconds at an electrical speed that changes by so many rad/s²; every fifth
+    /// period is not observed.
+    fn left(omega: f64, slope: f64, seconds: f64, errors: [(f32, f32); 2]) -> Vec<f32> {
+        let (mut harmonics, mut tracker) = (AngleHarmonics::new(AHEAD_S), SpeedTracker::new());
+        let periods = (seconds / f64::from(PERIOD_S)) as u32;
+        let mut found = Vec::new();
+        for period in 0..periods {
+            let t_s = f64::from(period) * f64::from(PERIOD_S);
+            let turns = (omega + 0.5 * slope * t_s) * t_s / core::f64::consts::TAU;
+            let truth = Angle((turns.rem_euclid(1.0) * 4_294_967_296.0) as u64 as u32);
+            let of = |(order, (rad, phase)): (f32, (f32, f32))| {
+                rad * (order * truth.turns() * core::f32::consts::TAU + phase).sin()
+            };
+            let error_rad: f32 = [1.0, 2.0].into_iter().zip(errors).map(of).sum();
+            let angle = harmonics.corrected(truth + Angle::within_half_turn(error_rad));
+            let left_rad = (angle - tracker.predicted(PERIOD_S)).signed_radians();
+            tracker.step(angle, PERIOD_S);
+            if tracker.is_settled() && period % 5 != 0 {
+                let ahead = angle + Angle::within_half_turn(tracker.omega() * AHEAD_S);
+                harmonics.observe(ahead, ahead.sin_cos(), left_rad, &tracker);
+            }
+            if period > periods - periods / 10 {
+                found.push((angle - truth).signed_radians());
+            }
+        }
+        found
+    }
+
+    fn worst(errors: &[f32]) -> f32 {
+        errors.iter().fold(0.0, |worst, error| if error.abs() > worst { error.abs() } else { worst })
+    }
+
+    #[test]
+    fn both_errors_go_at_every_speed_where_they_are_learnt() {
+        for omega in [210.0, 400.0, 838.0, 1_257.0, 2_513.0, -300.0, -1_257.0] {
+            let seconds = 0.05 + 20.0 * 4.0 * core::f64::consts::TAU / f64::abs(omega);
+            let left_rad = worst(&left(omega, 0.0, seconds, ERROR_RAD));
+            assert!(left_rad < 1e-3, "{left_rad} rad are left at {omega} rad/s");
+        }
+    }
+
+    #[test]
+    fn a_sensor_without_errors_is_left_alone() {
+        for (omega, slope) in
+            [(1_257.0, 0.0), (300.0, 100.0), (300.0, 2_000.0), (2_513.0, -1_000.0), (20.0, 0.0)]
+        {
+            let left_rad = worst(&left(omega, slope, 2.0, [(0.0, 0.0); 2]));
+            assert!(left_rad < 1e-6, "{left_rad} rad at {omega} rad/s, {slope} rad/s²");
+        }
+    }
+
+    #[test]
+    fn nothing_is_learnt_where_the_tracker_follows() {
+        let left_rad = worst(&left(100.0, 0.0, 3.0, ERROR_RAD));
+        assert!(left_rad > 0.04, "{left_rad} rad");
+    }
+
+    #[test]
+    fn nothing_grows_beyond_what_a_sensor_may_be_off() {
+        let left_rad = worst(&left(1_257.0, 0.0, 3.0, [(0.3, 0.0), (0.0, 0.0)]));
+        assert!(left_rad < 0.35, "{left_rad} rad");
+    }
+}

@@ -1,0 +1,222 @@
+//! Flaws that every run of the PMaSynRM drive can have, one by one or all at once.
+
+use crate::machine::Machine;
+use crate::options::{Ripple, RunOptions, finite, not_negative, within};
+use crate::plant::DeviceDrops;
+use anyhow::Result;
+use clap::Args;
+use serde::{Serialize, Serializer};
+use std::str::FromStr;
+
+/// Percentages of the three phases, written `U,V,W`.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Phases(pub [f64; 3]);
+
+impl FromStr for Phases {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let values = list::<3>(text).filter(|values| values.iter().all(|value| value.is_finite()));
+        values.map(Self).ok_or_else(|| "must be U,V,W in percent, for instance 2,0,0".to_owned())
+    }
+}
+
+/// Voltage drops of IGBTs and diodes, written `V,MOHM,V,MOHM`.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Drops(pub [f64; 4]);
+
+impl FromStr for Drops {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let good = |values: &[f64; 4]| values.iter().all(|value| value.is_finite() && *value >= 0.0);
+        list::<4>(text).filter(good).map(Self).ok_or_else(|| {
+            "must be V,MOHM,V,MOHM of IGBT and diode, each at least 0, for instance 2,5,1.5,3".to_owned()
+        })
+    }
+}
+
+/// So many numbers between commas; `None` if they are more or fewer.
+fn list<const N: usize>(text: &str) -> Option<[f64; N]> {
+    let values: Option<Vec<f64>> = text.split(',').map(|value| value.trim().parse().ok()).collect();
+    values?.try_into().ok()
+}
+
+/// Numbers as they are written on the command line.
+fn written(values: &[f64]) -> String {
+    values.iter().map(f64::to_string).collect::<Vec<_>>().join(",")
+}
+
+impl Serialize for Phases {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(&written(&self.0))
+    }
+}
+
+impl Serialize for Drops {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(&written(&self.0))
+    }
+}
+
+/// The flaws' options.
+#[derive(Clone, Debug, Args, Serialize)]
+pub struct FlawOptions {
+    /// All flaws of a usual inverter at once, each as large as the guide's page on flaws says; one that is given as well keeps its own value.
+    #[arg(long)]
+    pub real: bool,
+    /// Offset of each current sensor, in percent of the converters' range.
+    #[arg(long, value_name = "U,V,W", allow_hyphen_values = true)]
+    pub current_offset: Option<Phases>,
+    /// By how much each phase's current is read larger than it is, in percent.
+    #[arg(long, value_name = "U,V,W", allow_hyphen_values = true)]
+    pub current_gains: Option<Phases>,
+    /// Phase of --angle-1f-deg, in degrees.
+    #[arg(long, default_value_t = 0.0, value_parser = finite, allow_negative_numbers = true, value_name = "DEG")]
+    pub angle_1f_phase_deg: f64,
+    /// Phase of --angle-2f-deg, in degrees.
+    #[arg(long, default_value_t = 0.0, value_parser = finite, allow_negative_numbers = true, value_name = "DEG")]
+    pub angle_2f_phase_deg: f64,
+    /// Time after its sample in which the angle is read, in µs; each time at another instant.
+    #[arg(long, default_value_t = 0.0, value_parser = not_negative, allow_negative_numbers = true, value_name = "US")]
+    pub angle_jitter_us: f64,
+    /// Sixth harmonic of the magnets' voltage over the rotor's angle, in percent of that voltage: slots.
+    #[arg(long, default_value_t = 0.0, value_parser = finite, allow_negative_numbers = true, value_name = "PERCENT")]
+    pub slots: f64,
+    /// Threshold and slope of an IGBT, and of a diode.
+    #[arg(long, value_name = "V,MOHM,V,MOHM", allow_negative_numbers = true)]
+    pub device_drop: Option<Drops>,
+}
+
+/// The flaws of `--real`, for devices of 900 Hz on 1,500 V, 233 A: a usual IGBT inverter with a resolver.
+mod real {
+    pub const DEAD_TIME_US: f64 = 5.0;
+    pub const ADC_BITS: u32 = 12;
+    /// Of the largest current.
+    pub const NOISE_SHARE: f64 = 0.002;
+    /// Of the link's nominal voltage.
+    pub const RIPPLE_SHARE: f64 = 0.02;
+    pub const RIPPLE_HZ: f64 = 300.0;
+    pub const RS_ERROR_PERCENT: f64 = 20.0;
+    pub const OFFSET_PERCENT: [f64; 3] = [2.0, 0.0, 0.0];
+    pub const GAINS_PERCENT: [f64; 3] = [1.0, -1.0, 0.0];
+    pub const UDC_GAIN_PERCENT: f64 = 1.0;
+    pub const FILTER_US: f64 = 10.0;
+    pub const ANGLE_1F_DEG: f64 = 1.0;
+    pub const ANGLE_2F_DEG: f64 = 0.5;
+    pub const JITTER_US: f64 = 1.0;
+    pub const SLOTS_PERCENT: f64 = 2.0;
+    pub const DROP: [f64; 4] = [2.0, 5.0, 1.5, 3.0];
+    /// Link voltage in V, current in A and switching frequency in Hz of the machine that they are those of.
+    pub const LINK_V: f64 = 1_500.0;
+    pub const CURRENT_A: f64 = 233.345;
+    pub const SWITCHING_HZ: f64 = 900.0;
+}
+
+/// The value that was given, or that of `--real`.
+fn or(given: f64, real: f64) -> f64 {
+    if given == 0.0 { real } else { given }
+}
+
+/// The flaws that have options of their own beside these.
+#[derive(Clone, Copy, Debug)]
+pub struct Beside {
+    /// By how much the link is read larger than it is, in percent.
+    pub udc_gain: f64,
+    /// Time constant of the current sensors, in µs.
+    pub current_filter_us: f64,
+    /// Errors of the angle that go once and twice with it, in degrees.
+    pub angle_deg: [f64; 2],
+}
+
+/// Options with everything that `--real` stands for.
+#[derive(Clone, Debug)]
+pub struct Filled {
+    /// Those of every run.
+    pub run: RunOptions,
+    /// Those beside the flaws' own.
+    pub beside: Beside,
+    /// The flaws' own.
+    pub flaws: FlawOptions,
+}
+
+impl Filled {
+    /// Of options that ask for it, for a machine: what is given stays.
+    pub fn of(given: &RunOptions, beside: Beside, flaws: &FlawOptions, machine: &Machine) -> Self {
+        let parameters = &machine.folder.parameters;
+        let (link_v, most_a) = (parameters.dc_link_nominal_v, parameters.max_current_a);
+        let times = (real::SWITCHING_HZ / parameters.max_switching_hz).min(1.0);
+        let volts = link_v / real::LINK_V;
+        let ohms = volts / (most_a / real::CURRENT_A);
+        let [igbt_v, igbt_mohm, diode_v, diode_mohm] = real::DROP;
+        let drops = Drops([igbt_v * volts, igbt_mohm * ohms, diode_v * volts, diode_mohm * ohms]);
+        let ripple = Ripple { amplitude_v: real::RIPPLE_SHARE * link_v, frequency_hz: real::RIPPLE_HZ };
+        let [once_deg, twice_deg] = beside.angle_deg;
+        Self {
+            run: RunOptions {
+                dead_time_us: or(given.dead_time_us, real::DEAD_TIME_US * times),
+                adc_bits: given.adc_bits.or(Some(real::ADC_BITS)),
+                noise_a: or(given.noise_a, real::NOISE_SHARE * most_a),
+                udc_ripple: given.udc_ripple.or(Some(ripple)),
+                rs_error: or(given.rs_error, real::RS_ERROR_PERCENT),
+                ..given.clone()
+            },
+            beside: Beside {
+                udc_gain: or(beside.udc_gain, real::UDC_GAIN_PERCENT),
+                current_filter_us: or(beside.current_filter_us, real::FILTER_US * times),
+                angle_deg: [or(once_deg, real::ANGLE_1F_DEG), or(twice_deg, real::ANGLE_2F_DEG)],
+            },
+            flaws: FlawOptions {
+                current_offset: flaws.current_offset.or(Some(Phases(real::OFFSET_PERCENT))),
+                current_gains: flaws.current_gains.or(Some(Phases(real::GAINS_PERCENT))),
+                angle_jitter_us: or(flaws.angle_jitter_us, real::JITTER_US * times),
+                slots: or(flaws.slots, real::SLOTS_PERCENT),
+                device_drop: flaws.device_drop.or(Some(drops)),
+                ..flaws.clone()
+            },
+        }
+    }
+}
+
+impl FlawOptions {
+    /// The check that each flaw is within its range. The error names the first option that is not.
+    pub fn check(&self, machine: &Machine) -> Result<()> {
+        let parameters = &machine.folder.parameters;
+        let link_v = parameters.dc_link_nominal_v;
+        let [offset, gains] = [self.current_offset, self.current_gains].map(Option::unwrap_or_default);
+        for phase in 0..3 {
+            within(&[
+                ("--current-offset", offset.0[phase], -100.0, 100.0),
+                ("--current-gains", gains.0[phase], -50.0, 100.0),
+            ])?;
+        }
+        let Drops([igbt_v, igbt_mohm, diode_v, diode_mohm]) = self.device_drop.unwrap_or_default();
+        let most_mohm = 1e3 * link_v / parameters.max_current_a;
+        within(&[
+            ("--angle-1f-phase-deg", self.angle_1f_phase_deg, -360.0, 360.0),
+            ("--angle-2f-phase-deg", self.angle_2f_phase_deg, -360.0, 360.0),
+            ("--angle-jitter-us", self.angle_jitter_us, 0.0, 1e4),
+            ("--slots", self.slots, -100.0, 100.0),
+            ("--device-drop", igbt_v, 0.0, 0.1 * link_v),
+            ("--device-drop", igbt_mohm, 0.0, 0.1 * most_mohm),
+            ("--device-drop", diode_v, 0.0, 0.1 * link_v),
+            ("--device-drop", diode_mohm, 0.0, 0.1 * most_mohm),
+        ])
+    }
+
+    /// Offsets of the current sensors, as shares of the converters' range.
+    pub fn offsets(&self) -> [f64; 3] {
+        self.current_offset.unwrap_or_default().0.map(|percent| percent / 100.0)
+    }
+
+    /// By how much each phase's current is read larger than it is, as shares.
+    pub fn gains(&self) -> [f64; 3] {
+        self.current_gains.unwrap_or_default().0.map(|percent| percent / 100.0)
+    }
+
+    /// The devices' drops.
+    pub fn drops(&self) -> DeviceDrops {
+        let Drops([igbt_v, igbt_mohm, diode_v, diode_mohm]) = self.device_drop.unwrap_or_default();
+        DeviceDrops { igbt_v, igbt_ohm: 1e-3 * igbt_mohm, diode_v, diode_ohm: 1e-3 * diode_mohm }
+    }
+}
