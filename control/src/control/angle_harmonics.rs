@@ -22,8 +22,6 @@ const GAIN: f32 = 0.5;
 const LEFT_ALONE_RAD: f32 = 1.745e-3;
 /// Largest step by which what is known of a part may change, in rad: less than what counts as an angle that is lost.
 const MOST_STEP_RAD: f32 = 0.02;
-/// Samples up to which turns count as gone at one speed, more than they take at the least: the rotor stood meanwhile.
-const MOST_SAMPLES: u32 = 8_192;
 /// Largest error that is taken out, of each part, in rad.
 const MOST_RAD: f32 = 0.1;
 
@@ -122,7 +120,13 @@ impl AngleHarmonics {
         first.at(once) + second.at(once.turned(once))
     }
 
-    /// No angle comes for a while: what begins anew is no measurement before the next whole turns.
+    /// `true` if the speed is known, and not far below that from which errors are learnt: they move the tracker's speed, too.
+    #[inline(always)]
+    pub fn can_observe(tracker: &SpeedTracker) -> bool {
+        tracker.is_settled() && tracker.omega().abs() > 0.5 * FROM * tracker.natural_rad_s()
+    }
+
+    /// Nothing is learnt for a while: what begins anew is no measurement before the next whole turns.
     #[inline(always)]
     pub fn pause(&mut self) {
         self.omega = 0.0;
@@ -166,7 +170,7 @@ impl AngleHarmonics {
         let [once, twice] =
             self.sums.map(|sum| Part { cos: sum.cos * per_sample, sin: sum.sin * per_sample });
         (self.omega, self.samples, self.sums) = (omega, 0, [Part::NONE; 2]);
-        if even && samples <= MOST_SAMPLES && omega.abs() > FROM * natural {
+        if even && omega.abs() > FROM * natural {
             let (once, twice) = self.sensed(once, twice, omega);
             let ratio = natural / omega;
             // What is not taken out is all in what was left.
@@ -210,7 +214,9 @@ mod tests {
             let angle = harmonics.corrected(truth + Angle::within_half_turn(error_rad));
             let left_rad = (angle - tracker.predicted(PERIOD_S)).signed_radians();
             tracker.step(angle, PERIOD_S);
-            if tracker.is_settled() && period % 5 != 0 {
+            if !AngleHarmonics::can_observe(&tracker) {
+                harmonics.pause();
+            } else if period % 5 != 0 {
                 let ahead = angle + Angle::within_half_turn(tracker.omega() * AHEAD_S);
                 harmonics.observe(ahead, ahead.sin_cos(), left_rad, &tracker);
             }

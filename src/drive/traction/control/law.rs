@@ -5,7 +5,9 @@ use super::super::pulses::Half;
 use super::super::slot::Slot;
 use super::super::{Settings, Shared};
 use super::{ControlTask, Input};
-use crate::control::{AimInput, ControlLaw, Demand, Law, LinkDamper, Measurements, RotorSample};
+use crate::control::{
+    AimInput, AngleHarmonics, ControlLaw, Demand, Law, LinkDamper, Measurements, RotorSample,
+};
 use crate::frames::{Angle, SinCos};
 use crate::machine::Machine;
 use crate::modulation::{Mode, Reference};
@@ -30,11 +32,11 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         self.controller.observe(&here, tables);
         self.revises = self.is_to_revise(now, &input.command.demand);
         let commands = slot.commands || self.revises;
-        // Not in the longest periods, unless all are.
-        if !commands || slot.between > 0 {
-            self.learn_angle(measured.angle, here.frame);
-        }
         let aims = slot.aims || (commands && self.aimed != Some(slot.key));
+        // Once a half, and not where it would lengthen the longest period, unless all are alike.
+        if slot.commands && (!aims || slot.between > 0) {
+            self.learn_angle(measured.angle, || here.frame);
+        }
         if let Some(at) = self.pulses.newest().map(|newest| newest.at)
             && self.boundary != Some(at)
             && (aims || !commands)
@@ -50,13 +52,15 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         }
     }
 
-    /// Learns the position sensor's errors from an angle and its direction; not where counts look like errors.
+    /// Learns the position sensor's errors from an angle and its direction; not where the speed tracker follows them, and not where counts look like errors.
     #[inline(always)]
-    pub(super) fn learn_angle(&mut self, angle: Angle, direction: SinCos) {
-        if self.settings.counts_coarsely() {
-            return;
+    fn learn_angle(&mut self, angle: Angle, direction: impl FnOnce() -> SinCos) {
+        let tracker = self.controller.tracker();
+        if self.settings.counts_coarsely() || !AngleHarmonics::can_observe(tracker) {
+            self.harmonics.pause();
+        } else {
+            self.harmonics.observe(angle, direction(), self.innovation_rad, tracker);
         }
-        self.harmonics.observe(angle, direction, self.innovation_rad, self.controller.tracker());
     }
 
     /// Learns from the newest boundary.
@@ -171,10 +175,6 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             udc_v: measured.udc_v,
             ..Reference::NONE
         };
-        if self.controller.speed_is_known() {
-            self.learn_angle(measured.angle, measured.angle.sin_cos());
-        } else {
-            self.harmonics.pause();
-        }
+        self.learn_angle(measured.angle, || measured.angle.sin_cos());
     }
 }
