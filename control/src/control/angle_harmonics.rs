@@ -120,10 +120,10 @@ impl AngleHarmonics {
         first.at(once) + second.at(once.turned(once))
     }
 
-    /// `true` if the speed is known, and not far below that from which errors are learnt: they move the tracker's speed, too.
+    /// `true` if the speed is not far below that from which errors are learnt: they move the tracker's speed, too.
     #[inline(always)]
     pub fn can_observe(tracker: &SpeedTracker) -> bool {
-        tracker.is_settled() && tracker.omega().abs() > 0.5 * FROM * tracker.natural_rad_s()
+        tracker.omega().abs() > 0.5 * FROM * tracker.natural_rad_s()
     }
 
     /// Nothing is learnt for a while: what begins anew is no measurement before the next whole turns.

@@ -34,6 +34,7 @@ pub struct Stand<'a> {
 pub enum Why {
     BehindBoundary,
     BehindLanding,
+    OfCommand,
     BeforeFirst,
     BeforeSamples,
 }
@@ -46,6 +47,9 @@ impl Why {
             }
             Self::BehindLanding => {
                 "only where a boundary has come in the same control interrupt already, and the next comes after its period"
+            }
+            Self::OfCommand => {
+                "only in the control interrupt that makes the next boundary's command, and the boundary comes after its period"
             }
             Self::BeforeFirst => "only before the first boundary of all",
             Self::BeforeSamples => {
@@ -90,6 +94,7 @@ impl<'a> Stand<'a> {
         match self.since_ticks {
             None if far => Some(Why::BeforeFirst),
             Some(since) if far && since < self.control_ticks => Some(Why::BehindBoundary),
+            Some(_) if far && self.left_ticks < 2 * self.control_ticks => Some(Why::OfCommand),
             _ if before < self.call.sampled && self.left_ticks > self.control_ticks / BEGUN_PART => {
                 Some(Why::BeforeSamples)
             }

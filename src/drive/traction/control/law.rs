@@ -33,9 +33,9 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         self.revises = self.is_to_revise(now, &input.command.demand);
         let commands = slot.commands || self.revises;
         let aims = slot.aims || (commands && self.aimed != Some(slot.key));
-        // Once a half, and not where it would lengthen the longest period, unless all are alike.
+        // Once a half, and not in the longest periods unless all are.
         if slot.commands && (!aims || slot.between > 0) {
-            self.learn_angle(measured.angle, || here.frame);
+            self.learn_angle(measured.angle, here.frame);
         }
         if let Some(at) = self.pulses.newest().map(|newest| newest.at)
             && self.boundary != Some(at)
@@ -54,12 +54,12 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
 
     /// Learns the position sensor's errors from an angle and its direction; not where the speed tracker follows them, and not where counts look like errors.
     #[inline(always)]
-    fn learn_angle(&mut self, angle: Angle, direction: impl FnOnce() -> SinCos) {
+    fn learn_angle(&mut self, angle: Angle, direction: SinCos) {
         let tracker = self.controller.tracker();
         if self.settings.counts_coarsely() || !AngleHarmonics::can_observe(tracker) {
             self.harmonics.pause();
         } else {
-            self.harmonics.observe(angle, direction(), self.innovation_rad, tracker);
+            self.harmonics.observe(angle, direction, self.innovation_rad, tracker);
         }
     }
 
@@ -175,6 +175,6 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             udc_v: measured.udc_v,
             ..Reference::NONE
         };
-        self.learn_angle(measured.angle, || measured.angle.sin_cos());
+        self.harmonics.pause();
     }
 }
