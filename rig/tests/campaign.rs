@@ -8,6 +8,7 @@ use tractive::protection::Fault;
 use tractive_rig::bench::Flaws;
 use tractive_rig::campaign::judge::Verdict;
 use tractive_rig::campaign::{Campaign, Case, Outcome, cases, dual, healthy, report, traction};
+use tractive_rig::scenario::traction::PatternsName;
 use tractive_rig::without::Ablation;
 
 /// The cases whose names have all these words.
@@ -43,6 +44,26 @@ fn nothing_escapes_the_fast_campaign() {
         let trip_a = if outcome.system == "zs9" { 110.5 } else { 303.349 };
         assert!(current_a <= 1.5 * trip_a, "{outcome:?}");
     }
+}
+
+/// Every so many cases, and all of those with a wrong map or a link that moves where a pattern has hardly more voltage, or less voltage no more.
+#[test]
+fn nothing_escapes_the_optimised_patterns() {
+    const EVERY: usize = 31;
+    let is_hard = |name: &str| {
+        ["flux-20%", "link-"].iter().any(|fault| name.contains(fault))
+            && [" 2000 ", " 2800 ", " 3000 "].iter().any(|speed| name.contains(speed))
+    };
+    let traction = traction::cases(false).into_iter().enumerate();
+    let chosen = traction.filter(|(number, case)| number % EVERY == 0 || is_hard(&case.name()));
+    let cases: Vec<_> = chosen.map(|(_, case)| Case::Traction(Box::new(case))).collect();
+    assert!(cases.len() > 150, "{}", cases.len());
+    let campaign = Campaign::new(None).unwrap().with(PatternsName::Optimal);
+    let outcomes = campaign.run_all(&cases, || ()).unwrap();
+    let lost: Vec<_> = outcomes.iter().filter(|outcome| is_lost(outcome)).collect();
+    assert!(lost.is_empty(), "{lost:#?}");
+    let modes: BTreeSet<_> = outcomes.iter().map(|outcome| outcome.mode.as_str()).collect();
+    assert!(modes.iter().filter(|mode| mode.starts_with("opt")).count() >= 7, "{modes:?}");
 }
 
 /// The parts that are switched off, and the cases of which one must then be lost.

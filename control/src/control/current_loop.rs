@@ -191,14 +191,14 @@ pub fn step(input: &Input, gains: &Gains) -> Output {
         let steady = steady - input.disturbance.mean();
         (steady - (input.ahead.flux - reference) * gain, steady, limit)
     };
-    let direct = || {
+    let direct = |reference: Dq| {
         let (mean, disturbance) = mean_voltage(input, reference, gains);
         (mean + resistive - disturbance, steady - disturbance, limit * TRANSIENT_REACH)
     };
     let (regulated, steady, reach) = match input.limits.follows {
-        Regulated::Mean => direct(),
+        Regulated::Mean => direct(reference),
         #[cfg(feature = "optimal")]
-        Regulated::Path => direct(),
+        Regulated::Path => direct(held(input, steady - input.disturbance.mean())),
         Regulated::Fundamental => towards(gains.pattern_rad_s),
         Regulated::Angle => towards(gains.square_damping * input.omega.abs()),
     };
@@ -207,6 +207,14 @@ pub fn step(input: &Input, gains: &Gains) -> Output {
         voltage: Voltage::fitted(regulated, reach, fills),
         steady: Voltage::fitted(steady, limit, fills),
     }
+}
+
+/// The flux linkage that a pattern can hold where the operating point's voltage is more than it has: that of as much voltage as there is, in
+/// the same direction. Edges that were moved for more, without an end, would leave the flux at another angle.
+#[cfg(feature = "optimal")]
+fn held(input: &Input, steady: Dq) -> Dq {
+    let beyond = steady - Voltage::fitted(steady, input.target.voltage_limit_v, false).vector;
+    input.target.flux + beyond.j() * (1.0 / input.omega)
 }
 
 /// The mean voltage of a carrier half that moves the flux from where it is predicted to where it should be, without the

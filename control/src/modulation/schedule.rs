@@ -6,6 +6,8 @@
 
 use super::mode::{Regulation, Row};
 use super::{Mode, Reference, SwitchLimits};
+#[cfg(feature = "optimal")]
+use crate::frames::six_step_v;
 use crate::frames::{Angle, UNITS_PER_RADIAN};
 use crate::time::{Clock, Instant};
 
@@ -104,6 +106,20 @@ impl Schedule {
     pub fn wanted(&mut self, now: Instant, mode: Mode, seen: &Reference, devices: &SwitchLimits) -> Mode {
         /// Modulation index up to which the free carrier can, whatever has to be regulated meanwhile.
         const CARRIER_CATCHES: f32 = 0.85;
+        /// By how much the modulation index may stay below the operating point's by the map.
+        const MAP_ROOM: f32 = 0.02;
+        // No branch has less than its smallest index: where the machine has less flux linkage than its map, or the link jumps up, what is
+        // made counts, at once.
+        let seen = &match mode.branch() {
+            Some(branch) => {
+                let made = seen.voltage_v / six_step_v(seen.udc_v) + MAP_ROOM;
+                if made < branch.first {
+                    self.last_switch = None;
+                }
+                Reference { depth: if made < seen.depth { made } else { seen.depth }, ..*seen }
+            }
+            None => *seen,
+        };
         match self.ladders_choice(now, mode, seen, devices) {
             wanted if mode != Mode::Off || !wanted.is_optimal() || self.fixed.is_some() => wanted,
             _ if seen.depth < CARRIER_CATCHES => Mode::Async,

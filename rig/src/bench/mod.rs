@@ -43,7 +43,7 @@ pub use time::Timeline;
 use crate::inject::Injection;
 use crate::inject::traction::{Kind, Spoiler};
 use crate::plant::Plant;
-use crate::trace::{Found, Row, SlotRow, Switch};
+use crate::trace::{Extremes, Found, Row, SlotRow, Switch};
 use dc_side::DcSide;
 use rows::Rows;
 use tractive::identification::Observation;
@@ -79,6 +79,8 @@ pub struct Bench {
     /// The rows that are judged, and the others that are written.
     rows: Rows,
     written: Option<Rows>,
+    /// Extremes since the last row that is judged.
+    extremes: Extremes,
     switches: Vec<Switch>,
     observations: Vec<Observation>,
     found: Option<Found>,
@@ -108,6 +110,7 @@ impl Bench {
             loads: Due::default(),
             rows: Rows::new(settings.trace_step_s, settings.duration_s, &time),
             written: None,
+            extremes: Extremes::NONE,
             switches: Vec::new(),
             observations: Vec::new(),
             found: None,

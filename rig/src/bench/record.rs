@@ -2,7 +2,7 @@
 
 use super::rows::Rows;
 use super::{Bench, LineSide, Simulated, Timeline};
-use crate::trace::{Recording, Row, Switch, Tick, degrees};
+use crate::trace::{Extremes, Recording, Row, Switch, Tick, degrees};
 use tractive::modulation::{CarrierHalf, Mode};
 use tractive::recorder::Record;
 use tractive::time::Instant;
@@ -83,6 +83,7 @@ impl Bench {
         let written = self.written.as_ref().filter(|rows| due(rows)).map(row);
         if let Some(row) = judged {
             self.rows.push(row, &self.time);
+            self.extremes = Extremes::NONE;
         }
         if let (Some(rows), Some(row)) = (&mut self.written, written) {
             rows.push(row, &self.time);
@@ -92,12 +93,13 @@ impl Bench {
     fn row(&self, t_s: f64) -> Row {
         let (id_a, iq_a) = self.plant.motor.currents_dq();
         let [ia_a, ib_a, ic_a] = self.plant.motor.currents_abc();
+        let te_nm = self.plant.motor.torque_nm();
         let report = &self.control.report;
         Row {
             t_s,
             speed_rpm: self.plant.motor.speed_rpm(),
             te_ref_nm: report.torque_nm.into(),
-            te_nm: self.plant.motor.torque_nm(),
+            te_nm,
             id_ref_a: report.id_a.into(),
             iq_ref_a: report.iq_a.into(),
             id_a,
@@ -114,6 +116,7 @@ impl Bench {
             mode: if self.inverter.is_safe() { Mode::Off } else { self.inverter.half().mode },
             trip: report.trip,
             status: self.dc.operated().and_then(|line| line.status),
+            extremes: self.extremes.with([ia_a, ib_a, ic_a], te_nm),
         }
     }
 }

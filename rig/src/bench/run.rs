@@ -37,7 +37,11 @@ impl Bench {
             }
             self.time.now = tick;
             let udc_v = self.udc_v(self.time.now_s());
-            let peaks = Peaks::at(&self.plant.motor.currents_abc(), udc_v, 0.0);
+            let currents_a = self.plant.motor.currents_abc();
+            if (self.time.lead..self.rows.next).contains(&tick) {
+                self.extremes = self.extremes.with(currents_a, self.plant.motor.torque_nm());
+            }
+            let peaks = Peaks::at(&currents_a, udc_v, 0.0);
             self.observed.note(tick, &peaks, self.plant.motor.speed_rpm());
         }
     }

@@ -27,8 +27,9 @@ pub fn run(options: &CampaignOptions) -> Result<ExitCode> {
         "fast": options.fast,
         "only": options.only,
         "without": options.without.map(Ablation::name),
+        "patterns": options.patterns,
     });
-    let campaign = Campaign::new(options.without)?;
+    let campaign = Campaign::new(options.without)?.with(options.patterns);
     if let Some(shard) = options.shard {
         let plan = Plan::new(FAULTS, given, cases.len(), Outcome::COLUMNS)?;
         let row = |run: usize| {

@@ -21,6 +21,7 @@ pub mod traction;
 pub use action::Action;
 pub use outcome::Outcome;
 
+use crate::scenario::traction::PatternsName;
 use crate::without::Ablation;
 use anyhow::{Context, Result};
 use rayon::prelude::*;
@@ -54,6 +55,11 @@ impl Campaign {
     /// Both drives.
     pub fn new(without: Option<Ablation>) -> Result<Self> {
         Ok(Self { traction: traction::Drive::new(without)?, dual: dual::Drive::new(without)? })
+    }
+
+    /// The same with other pulse patterns.
+    pub fn with(self, patterns: PatternsName) -> Self {
+        Self { traction: self.traction.with(patterns), ..self }
     }
 
     /// Runs one case.

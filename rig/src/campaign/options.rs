@@ -1,5 +1,6 @@
 //! The options of `campaign`.
 
+use crate::scenario::traction::PatternsName;
 use crate::shards::Shard;
 use crate::without::Ablation;
 use clap::Args;
@@ -17,6 +18,9 @@ pub struct CampaignOptions {
     /// One protection off: a fault's name, short_circuit or leg_safe_state. The cases that are lost are then listed.
     #[arg(long, value_name = "PROTECTION")]
     pub without: Option<Ablation>,
+    /// The pulse patterns of the PMaSynRM drive above the free carrier.
+    #[arg(long, value_enum, default_value = "paper")]
+    pub patterns: PatternsName,
     /// Folder for cases.csv, summary.json and report.html.
     #[arg(long, default_value = "target/tractive/campaign")]
     pub out: PathBuf,

@@ -73,7 +73,9 @@ pub(super) fn limits(
     let Settings { clock, devices, .. } = settings;
     let mode = decision.mode;
     let largest = depth_limit(mode, clock.angle_rate(steady.omega), devices);
-    let largest = if mode.is_whole() { largest } else { REGULATION_ROOM * largest };
+    // Edges can move at an optimised pattern's largest index, too.
+    let is_all = mode.is_whole() || mode.is_optimal();
+    let largest = if is_all { largest } else { REGULATION_ROOM * largest };
     let (depth_limit, filled) = exit.fill(mode, largest, steady.depth, passed_s);
     ModeLimits {
         follows: follows(mode),

@@ -16,6 +16,8 @@ impl Branch {
             _ => 0,
         };
         match [self.place, next.place] {
+            // Before two phases have edges again: for 40° before it only one has, and what is wrong then stays.
+            _ if self.halves == next.halves && self.angles > next.angles => sector - 1,
             _ if self.halves == next.halves && is_above => joint(self, next),
             // The last half is the same, in a turn seen backward.
             _ if self.halves == next.halves => (sector + 1 - joint(next, self)) % sector,

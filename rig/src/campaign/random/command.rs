@@ -9,14 +9,23 @@ use crate::campaign::traction::Drive;
 use crate::campaign::traction::random::DIMENSIONS;
 use crate::files::write_text;
 use crate::run::bar;
+use crate::scenario::traction::PatternsName;
 use crate::shards::{self, Merged, Plan, seed};
 use anyhow::{Context, Result};
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::process::ExitCode;
 
 /// The name of the campaign.
 pub const RANDOM: &str = "random";
+/// The configuration of a campaign.
+#[derive(Serialize, Deserialize)]
+struct Configuration {
+    seed: u64,
+    patterns: PatternsName,
+}
+
 /// Failures that are made small, at most: each takes some dozens of runs.
 const SMALL: usize = 5;
 
@@ -29,9 +38,10 @@ pub struct Random {
 
 impl Random {
     /// So many runs with a seed.
-    pub fn new(runs: usize, seed: u64) -> Result<Self> {
+    pub fn new(runs: usize, seed: u64, patterns: PatternsName) -> Result<Self> {
         let name = format!("{RANDOM} {seed} {runs}");
-        Ok(Self { drive: Drive::new(None)?, cube: Hypercube::new(&name, runs, DIMENSIONS.len()), name })
+        let drive = Drive::new(None)?.with(patterns);
+        Ok(Self { drive, cube: Hypercube::new(&name, runs, DIMENSIONS.len()), name })
     }
 
     /// Runs one.
@@ -56,7 +66,7 @@ impl Random {
 
 /// Runs the campaign. Exit code 1 where a run is uncaught, or the document is not up to date.
 pub fn run(runs: usize, options: &CampaignOptions) -> Result<ExitCode> {
-    let random = Random::new(runs, options.seed)?;
+    let random = Random::new(runs, options.seed, options.patterns)?;
     if let Some(run) = options.run {
         let run = random.run(run)?;
         crate::say!("{}", words(&run));
@@ -66,7 +76,8 @@ pub fn run(runs: usize, options: &CampaignOptions) -> Result<ExitCode> {
         }
         return Ok(ExitCode::from(u8::from(lost)));
     }
-    let configuration = serde_json::json!({ "seed": options.seed });
+    let configuration =
+        serde_json::to_value(Configuration { seed: options.seed, patterns: options.patterns })?;
     let plan = Plan::new(RANDOM, configuration, runs, &Run::columns())?;
     if let Some(shard) = options.shard {
         shards::run(&plan, shard, &options.out, |run| random.run(run)?.row())?;
@@ -100,8 +111,8 @@ fn finish(merged: &Merged, out: &Path) -> Result<bool> {
     let runs = Run::of(merged)?;
     crate::say!("{}", coverage(&runs).trim_end());
     let lost: Vec<_> = runs.iter().filter(|run| run.outcome.verdict == Verdict::Uncaught).collect();
-    let seed = merged.plan.configuration.get("seed").and_then(serde_json::Value::as_u64);
-    let random = Random::new(merged.plan.runs, seed.context("a configuration without its seed")?)?;
+    let Configuration { seed, patterns } = serde_json::from_value(merged.plan.configuration.clone())?;
+    let random = Random::new(merged.plan.runs, seed, patterns)?;
     for (number, run) in lost.iter().enumerate() {
         eprintln!("uncaught: {}", words(run));
         if number < SMALL {

@@ -22,7 +22,7 @@ use crate::plant::{LineFilter, Plant, PlantSettings, SpeedSource};
 use crate::run::traction::Tasks;
 use crate::run::{CLOCK, Interrupts};
 use crate::scenario::System;
-use crate::scenario::traction::Traction;
+use crate::scenario::traction::{PatternsName, Traction};
 use crate::trace::Row;
 use crate::without::Ablation;
 use anyhow::Result;
@@ -50,6 +50,8 @@ pub struct Drive {
     tables: &'static Tables,
     without: Option<Ablation>,
     ladder: Ladder,
+    /// Highest frequency of the free carrier, as a share of the switches'.
+    carrier_share: f32,
 }
 
 impl Drive {
@@ -57,12 +59,17 @@ impl Drive {
     pub fn new(without: Option<Ablation>) -> Result<Self> {
         let machine = Machine::load(Traction::MACHINE)?;
         let tables = without.map_or(machine.tables, |without| without.tables(machine.tables));
-        Ok(Self { machine, tables, without, ladder: Ladder::PAPER })
+        Ok(Self { machine, tables, without, ladder: Ladder::PAPER, carrier_share: 1.0 })
     }
 
     /// The same with the modes of another ladder.
     pub fn on(self, ladder: Ladder) -> Self {
         Self { ladder, ..self }
+    }
+
+    /// The same with other pulse patterns.
+    pub fn with(self, patterns: PatternsName) -> Self {
+        Self { ladder: patterns.ladder(), carrier_share: patterns.free_carrier_share(), ..self }
     }
 
     /// Runs one case.
@@ -106,7 +113,8 @@ impl Drive {
     }
 
     fn devices(&self, dead_time_ticks: u32) -> SwitchLimits {
-        SwitchLimits::new(250, dead_time_ticks, self.tables.ratings.max_switching_hz, &CLOCK)
+        let carrier_hz = self.carrier_share * self.tables.ratings.max_switching_hz;
+        SwitchLimits::new(250, dead_time_ticks, carrier_hz, &CLOCK)
     }
 
     fn tasks(&self, devices: SwitchLimits) -> Tasks<'static> {

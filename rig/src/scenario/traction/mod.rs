@@ -47,7 +47,7 @@ use ablated::Ablated;
 use anyhow::{Result, bail};
 use clap::{Args, ValueEnum};
 use flaws::{Beside, Filled, FlawOptions};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use tractive::control::{ControlLaw, Controller, Demand, Gains, MtpaStart, PiLaw};
 use tractive::drive::traction::Settings;
@@ -89,7 +89,7 @@ impl StartName {
 }
 
 /// The pulse patterns that the drive uses above the free carrier.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum PatternsName {
     /// The paper's modes
@@ -121,7 +121,7 @@ impl PatternsName {
     }
 
     /// As the modulator's schedule takes them.
-    const fn ladder(self) -> Ladder {
+    pub(crate) const fn ladder(self) -> Ladder {
         match self {
             Self::Paper => Ladder::PAPER,
             Self::Optimal => Ladder::OPTIMAL,
@@ -129,7 +129,7 @@ impl PatternsName {
     }
 
     /// Highest frequency of the free carrier, as a share of the switches'.
-    const fn free_carrier_share(self) -> f32 {
+    pub(crate) const fn free_carrier_share(self) -> f32 {
         match self {
             Self::Paper => 1.0,
             Self::Optimal => FREE_CARRIER_SHARE,
