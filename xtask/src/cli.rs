@@ -38,8 +38,22 @@ pub enum Command {
     Live(LiveArgs),
     /// Execute the image that is flashed against a model of its chip, with the simulated motor at the pins
     Twin(TwinArgs),
+    /// Coverage-guided fuzzing of the targets in fuzz/
+    Fuzz(FuzzArgs),
     /// Mutation testing by cargo-mutants: changes of the code that no test notices
     Mutants(MutantsArgs),
+}
+
+#[derive(Args, Debug)]
+pub struct FuzzArgs {
+    /// The targets [default: all]
+    pub target: Vec<String>,
+    /// Time of each, in s; as many run at once as there are cores
+    #[arg(long, value_name = "N", default_value_t = 60)]
+    pub seconds: u32,
+    /// Add to fuzz/corpus what reaches code that it does not
+    #[arg(long)]
+    pub keep: bool,
 }
 
 #[derive(Args, Debug)]
