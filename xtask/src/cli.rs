@@ -3,7 +3,7 @@
 use crate::board::Board;
 use crate::build::System;
 use crate::step::Step;
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::ffi::OsString;
 use std::path::PathBuf;
 
@@ -67,9 +67,30 @@ pub struct MutantsArgs {
     /// Shard K of N, from 0
     #[arg(long, value_name = "K/N")]
     pub shard: Option<String>,
+    /// The mutants of an area, whatever its package
+    #[arg(long, value_enum, conflicts_with = "package")]
+    pub area: Option<Area>,
     /// So many of them, evenly spread
     #[arg(long, value_name = "N", conflicts_with = "shard")]
     pub sample: Option<usize>,
+    /// Draw the sample by this number instead
+    #[arg(long, value_name = "N", requires = "sample")]
+    pub seed: Option<u64>,
+}
+
+/// A part of the code whose tests are tested.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Area {
+    Control,
+    Modulation,
+    NineSwitch,
+    Drive,
+    Protection,
+    Cell,
+    Operator,
+    Protocol,
+    Boards,
+    Tablegen,
 }
 
 #[derive(Args, Debug)]
