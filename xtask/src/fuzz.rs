@@ -102,6 +102,10 @@ fn run_target(folder: &Path, target: &str, seconds: u32) -> Result<bool> {
     let mut command = Command::new(folder.join(target));
     command.arg(own).arg(kept).arg(format!("-max_total_time={seconds}")).arg(format!("-max_len={longest}"));
     command.arg("-timeout=20").arg(format!("-artifact_prefix={}/", found.display()));
+    let dictionary = root().join("fuzz/dictionaries").join(target);
+    if dictionary.is_file() {
+        command.arg(format!("-dict={}", dictionary.display()));
+    }
     let output = command.output().with_context(|| cannot_start(&command))?;
     let log = String::from_utf8_lossy(&output.stderr);
     std::fs::write(found.with_extension("log"), log.as_bytes())?;
