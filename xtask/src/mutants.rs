@@ -14,26 +14,37 @@ pub fn run(args: &MutantsArgs) -> Result<u8> {
     if output_of(cargo().args(["mutants", "--version"])).is_none() {
         bail!("cargo-mutants is missing; install it with: cargo install --locked cargo-mutants");
     }
-    let mut command = mutants(args);
+    let (package, files) = args.area.map_or((args.package.as_str(), &[][..]), |area| area.place());
+    let mut files: Vec<&str> = files.iter().copied().chain(args.file.iter().map(String::as_str)).collect();
+    let listed = match args.sample {
+        None => String::new(),
+        Some(_) => output_of(mutants(package, &files).arg("--list")).context("cargo mutants --list")?,
+    };
+    let names: Vec<&str> = listed.lines().collect();
+    let sample = sampled(&names, args.sample.unwrap_or(0), args.seed);
+    if args.sample.is_some() {
+        if sample.is_empty() {
+            bail!("no mutant is in the sample");
+        }
+        // No pattern keeps cargo-mutants from deleting fields: those of other files it leaves alone.
+        files = sample.iter().filter_map(|name| name.split(':').next()).collect();
+        files.dedup();
+    }
+    let mut command = mutants(package, &files);
     command.arg("--output").arg(root().join("target/tractive"));
     if let Some(shard) = &args.shard {
         command.args(["--shard", shard]);
     }
-    if let Some(sample) = args.sample {
-        let listed = output_of(mutants(args).arg("--list")).context("cargo mutants --list")?;
-        let names: Vec<&str> = listed.lines().collect();
-        for name in sampled(&names, sample, args.seed) {
-            command.args(["--re", &format!("^{}$", escaped(name))]);
-        }
+    for name in sample {
+        command.args(["--re", &format!("^{}$", escaped(name))]);
     }
     Ok(u8::from(!succeeds(&mut command)?))
 }
 
-fn mutants(args: &MutantsArgs) -> Command {
+fn mutants(package: &str, files: &[&str]) -> Command {
     let mut command = cargo();
-    let (package, files) = args.area.map_or((args.package.as_str(), &[][..]), |area| area.place());
     command.current_dir(root()).args(["mutants", "--package", package]);
-    for file in files.iter().copied().chain(args.file.iter().map(String::as_str)) {
+    for file in files {
         command.args(["--file", file]);
     }
     command
