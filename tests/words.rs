@@ -3,12 +3,13 @@
 use std::path::{Path, PathBuf};
 
 /// Folders of the sources.
-const FOLDERS: [&str; 12] = [
+const FOLDERS: [&str; 13] = [
     "bench",
     "boards",
     "cells",
     "control",
     "fault-injector",
+    "fuzz",
     "live",
     "rig",
     "src",

@@ -1,10 +1,15 @@
-//! Anything as a talk's script: no panic, and a refusal names its line.
+//! Anything as a talk's script. What must hold is in `fuzz/src/script.rs`.
 //!
 //! `TRACTIVE_FUZZ_CASES=100000 cargo test --release -p tractive-rig --test script_fuzz` tries longer.
 
+#[path = "../../fuzz/src/corpus.rs"]
+mod corpus;
+#[path = "../../fuzz/src/script.rs"]
+mod script;
+use tractive_rig::talk;
+
 use proptest::prelude::*;
-use tractive_rig::talk::System;
-use tractive_rig::talk::script::script;
+use script::check_text;
 
 fn config() -> ProptestConfig {
     let cases =
@@ -36,14 +41,11 @@ proptest! {
 
     #[test]
     fn any_text_is_a_script_or_is_refused_by_its_line(text in text()) {
-        for system in [System::Pmasynrm, System::Zs9] {
-            match script(&text, system) {
-                Ok(lines) => {
-                    prop_assert!(lines.len() <= text.lines().count());
-                    prop_assert!(lines.iter().all(|line| line.at_s.is_none_or(f64::is_finite)), "{lines:?}");
-                }
-                Err(error) => prop_assert!(format!("{error:#}").contains("line "), "{error:#}"),
-            }
-        }
+        check_text(&text);
     }
+}
+
+#[test]
+fn every_kept_input_is_a_script_or_is_refused_by_its_line() {
+    corpus::each("../fuzz/corpus/script", script::check);
 }

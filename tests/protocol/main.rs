@@ -3,6 +3,10 @@
 
 mod adversary;
 mod authentication;
+#[path = "../../fuzz/src/bytes.rs"]
+mod bytes;
+#[path = "../../fuzz/src/corpus.rs"]
+mod corpus;
 mod dbc;
 mod document;
 mod e2e;

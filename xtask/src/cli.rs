@@ -3,7 +3,7 @@
 use crate::board::Board;
 use crate::build::System;
 use crate::step::Step;
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::ffi::OsString;
 use std::path::PathBuf;
 
@@ -38,8 +38,22 @@ pub enum Command {
     Live(LiveArgs),
     /// Execute the image that is flashed against a model of its chip, with the simulated motor at the pins
     Twin(TwinArgs),
+    /// Coverage-guided fuzzing of the targets in fuzz/
+    Fuzz(FuzzArgs),
     /// Mutation testing by cargo-mutants: changes of the code that no test notices
     Mutants(MutantsArgs),
+}
+
+#[derive(Args, Debug)]
+pub struct FuzzArgs {
+    /// The targets [default: all]
+    pub target: Vec<String>,
+    /// Time of each, in s; as many run at once as there are cores
+    #[arg(long, value_name = "N", default_value_t = 60)]
+    pub seconds: u32,
+    /// Add to fuzz/corpus what reaches code that it does not
+    #[arg(long)]
+    pub keep: bool,
 }
 
 #[derive(Args, Debug)]
@@ -53,9 +67,30 @@ pub struct MutantsArgs {
     /// Shard K of N, from 0
     #[arg(long, value_name = "K/N")]
     pub shard: Option<String>,
+    /// The mutants of an area, whatever its package
+    #[arg(long, value_enum, conflicts_with = "package")]
+    pub area: Option<Area>,
     /// So many of them, evenly spread
     #[arg(long, value_name = "N", conflicts_with = "shard")]
     pub sample: Option<usize>,
+    /// Draw the sample by this number instead
+    #[arg(long, value_name = "N", requires = "sample")]
+    pub seed: Option<u64>,
+}
+
+/// A part of the code whose tests are tested.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Area {
+    Control,
+    Modulation,
+    NineSwitch,
+    Drive,
+    Protection,
+    Cell,
+    Operator,
+    Protocol,
+    Boards,
+    Tablegen,
 }
 
 #[derive(Args, Debug)]

@@ -10,13 +10,14 @@
 //! | `live [--out DIR] [--port N] [--no-open]` | builds the live bench and serves it |
 //! | `flash [--board NAME] [--log]` | builds a board's image and flashes it with probe-rs |
 //! | `twin [SCENARIO] [--out DIR]` | builds that image and executes it against a model of its chip |
+//! | `fuzz [TARGET]… [--seconds N]` | coverage-guided fuzzing of the targets in `fuzz/` |
 //! | `mutants [--package NAME] [--shard K/N] [--sample N]` | mutation testing by cargo-mutants |
 //!
 //! Results go to standard output, what the command does on the way to standard error. Exit codes: 0 done; 1 it ran
 //! and something failed; 2 it could not run (bad usage, bad input, something missing), with the reason on a line.
 //!
 //! The modules: [`cli`] is what may be typed, [`setup`] what has to be installed, [`build`] how cargo is called, [`board`] which boards there are,
-//! [`run`], [`mod@test`], [`image`], [`timing`], [`live`], [`flash`], [`twin`] and [`mutants`] the commands; [`guide`] runs those of the documentation. An image is read by [`elf`],
+//! [`run`], [`mod@test`], [`image`], [`timing`], [`live`], [`flash`], [`twin`], [`fuzz`] and [`mutants`] the commands; [`guide`] runs those of the documentation. An image is read by [`elf`],
 //! its instructions by [`thumb`]; [`graph`] says which function calls which, [`check`] refuses what an image must not hold, and [`cells`]
 //! looks at what the cells did under the interrupts, in the [`emulator`].
 
@@ -31,6 +32,7 @@ mod elf;
 mod emulator;
 mod fault_injector;
 mod flash;
+mod fuzz;
 mod graph;
 mod guide;
 mod image;
@@ -66,6 +68,7 @@ fn main() -> ExitCode {
         cli::Command::Flash(args) => flash::run(&args),
         cli::Command::Live(args) => live::run(&args),
         cli::Command::Twin(args) => twin::run(&args),
+        cli::Command::Fuzz(args) => fuzz::run(&args),
         cli::Command::Mutants(args) => mutants::run(&args),
     };
     match result {

@@ -19,6 +19,8 @@ pub enum Step {
     Loom,
     /// The lock-free cells in the interpreter that knows undefined behaviour
     Miri,
+    /// Every target of fuzz/ for a minute, guided by what it reaches
+    Fuzz,
     /// The lock-free cells in QEMU, interrupted on every instruction
     Cells,
     /// Interrupts slow, late and lost, in QEMU

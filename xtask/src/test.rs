@@ -105,6 +105,7 @@ fn perform(step: Step, setup: &mut Setup) -> Result<Outcome> {
             succeeds(command.env("RUSTFLAGS", "--cfg loom"))?
         }
         Step::Miri => return miri(setup),
+        Step::Fuzz => return Ok(where_possible(crate::fuzz::check()?)),
         Step::Cells => crate::cells::check(setup)?,
         Step::Landings => crate::landings::check(setup)?,
         Step::Overruns => crate::overruns::check(setup)?,

@@ -17,7 +17,7 @@ const FROM: f32 = 0.4;
 const EVEN: f32 = 0.02;
 /// Share of a measured error that is added to what is known.
 const GAIN: f32 = 0.5;
-/// What is known and left alone, as the root of the sum of squares, in rad: 0.1°, which an encoder's counts may look like. It is half of the error,
+/// Error that is known and left alone, as the root of the sum of squares, in rad: 0.1°, which an encoder's counts may look like. It is half of the error,
 /// for the half that is added first.
 const LEFT_ALONE_RAD: f32 = 1.745e-3;
 /// Largest step by which what is known of a part may change, in rad: less than what counts as an angle that is lost.

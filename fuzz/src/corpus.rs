@@ -1,0 +1,15 @@
+//! The inputs that are kept in `fuzz/corpus`: all that fuzzing reached, and all that it found.
+
+/// Checks each input of a folder, which is named from the package's own.
+pub fn each(folder: &str, check: impl Fn(&[u8])) {
+    let entries = std::fs::read_dir(folder).unwrap_or_else(|error| panic!("{folder}: {error}"));
+    let mut count = 0;
+    for path in entries.map(|entry| entry.unwrap().path()) {
+        let bytes = std::fs::read(&path).unwrap();
+        // So that a failure names its file.
+        println!("{}", path.display());
+        check(&bytes);
+        count += 1;
+    }
+    assert!(count >= 10, "{folder}: {count}");
+}

@@ -1,0 +1,4 @@
+//! See the module of the same name.
+#![no_main]
+
+libfuzzer_sys::fuzz_target!(|bytes: &[u8]| tractive_fuzz::script::check(bytes));

@@ -1,0 +1,151 @@
+//! `cargo xtask fuzz`: coverage-guided fuzzing of the targets in `fuzz/`, a workspace of its own, by libFuzzer.
+//!
+//! The counters of what is reached are put in by a pass of LLVM that every toolchain has: neither a nightly one nor cargo-fuzz is
+//! needed, only a C++ compiler for libFuzzer itself.
+
+use crate::cli::FuzzArgs;
+use crate::process::{cannot_start, find, output_of, succeeds};
+use crate::workspace::{cargo, root};
+use anyhow::{Context, Result, bail};
+use rayon::prelude::*;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// The flags with which what is fuzzed counts what it reaches, and tells what it compares.
+const FLAGS: [&str; 6] = [
+    "-Cpasses=sancov-module",
+    "-Cllvm-args=-sanitizer-coverage-level=4",
+    "-Cllvm-args=-sanitizer-coverage-inline-8bit-counters",
+    "-Cllvm-args=-sanitizer-coverage-pc-table",
+    "-Cllvm-args=-sanitizer-coverage-trace-compares",
+    "--cfg=fuzzing",
+];
+
+/// Longest input, in bytes: of most targets, and of a machine folder's files.
+const LONGEST: usize = 512;
+const LONGEST_FILE: usize = 4_096;
+
+/// Time of each target in the tests, in s.
+const MINUTE_S: u32 = 60;
+
+/// The command. Exit code 1 where something was found.
+pub fn run(args: &FuzzArgs) -> Result<u8> {
+    let all = targets()?;
+    if let Some(unknown) = args.target.iter().find(|target| !all.contains(target)) {
+        bail!("{unknown}: must be one of {}", all.join(", "));
+    }
+    let chosen = if args.target.is_empty() { &all } else { &args.target };
+    let folder = match build()? {
+        Ok(folder) => folder,
+        Err(missing) => bail!(missing),
+    };
+    let is_good = fuzz(&folder, chosen, args.seconds)?;
+    if args.keep {
+        chosen.iter().try_for_each(|target| keep(&folder, target))?;
+    }
+    Ok(u8::from(!is_good))
+}
+
+/// Every target for a minute. The inner error is what is missing.
+pub fn check() -> Result<Result<bool, String>> {
+    match build()? {
+        Ok(folder) => fuzz(&folder, &targets()?, MINUTE_S).map(Ok),
+        Err(missing) => Ok(Err(missing)),
+    }
+}
+
+/// The targets, by their names.
+fn targets() -> Result<Vec<String>> {
+    let entries = std::fs::read_dir(root().join("fuzz/targets")).context("fuzz/targets")?.flatten();
+    let mut names: Vec<_> =
+        entries.filter_map(|entry| Some(entry.path().file_stem()?.to_string_lossy().into_owned())).collect();
+    names.sort_unstable();
+    Ok(names)
+}
+
+/// Builds the targets; the folder that they are in. The inner error is what is missing.
+fn build() -> Result<Result<PathBuf, String>> {
+    if std::env::var_os("CXX").is_none() && find("c++").is_none() {
+        return Ok(Err("there is no C++ compiler for libFuzzer (Debian: apt-get install g++)".to_owned()));
+    }
+    let version = output_of(Command::new("rustc").current_dir(root()).arg("-vV")).context("rustc -vV")?;
+    let host = version.lines().find_map(|line| line.strip_prefix("host: ")).context("rustc names no host")?;
+    let out = root().join("target/fuzz");
+    let mut command = cargo();
+    // With a target named the flags are not those of build scripts.
+    command.args(["build", "--release", "--locked", "--manifest-path", "fuzz/Cargo.toml", "--target", host]);
+    command.arg("--target-dir").arg(&out).env("CARGO_ENCODED_RUSTFLAGS", FLAGS.join("\x1f"));
+    if !succeeds(&mut command)? {
+        bail!("fuzz/ does not build");
+    }
+    Ok(Ok(out.join(host).join("release")))
+}
+
+/// The corpora: the kept ones, and those that grow on this machine.
+fn corpora(target: &str) -> Result<[PathBuf; 2]> {
+    let corpora = ["fuzz/corpus", "target/fuzz/corpus"].map(|folder| root().join(folder).join(target));
+    corpora.iter().try_for_each(std::fs::create_dir_all)?;
+    Ok(corpora)
+}
+
+/// Runs these targets, on every core one at a time; whether nothing was found.
+fn fuzz(folder: &Path, targets: &[String], seconds: u32) -> Result<bool> {
+    let good = targets.par_iter().map(|target| run_target(folder, target, seconds));
+    Ok(good.collect::<Result<Vec<_>>>()?.into_iter().all(|good| good))
+}
+
+fn run_target(folder: &Path, target: &str, seconds: u32) -> Result<bool> {
+    let [kept, own] = corpora(target)?;
+    let found = root().join("target/fuzz/found").join(target);
+    std::fs::create_dir_all(&found)?;
+    let longest = if target == "folder" { LONGEST_FILE } else { LONGEST };
+    let mut command = Command::new(folder.join(target));
+    command.arg(own).arg(kept).arg(format!("-max_total_time={seconds}")).arg(format!("-max_len={longest}"));
+    command.arg("-timeout=20").arg(format!("-artifact_prefix={}/", found.display()));
+    let dictionary = root().join("fuzz/dictionaries").join(target);
+    if dictionary.is_file() {
+        command.arg(format!("-dict={}", dictionary.display()));
+    }
+    let output = command.output().with_context(|| cannot_start(&command))?;
+    let log = String::from_utf8_lossy(&output.stderr);
+    std::fs::write(found.with_extension("log"), log.as_bytes())?;
+    if output.status.success() {
+        println!("{target}: {}", log.lines().rfind(|line| line.contains("DONE")).unwrap_or_default());
+        return Ok(true);
+    }
+    // The panic's place and its message, and where the input is.
+    let panic = log.lines().skip_while(|line| !line.contains("panicked at")).take(2);
+    let written =
+        log.lines().filter(|line| line.contains("ERROR: ") || line.contains("Test unit written to"));
+    panic.chain(written).for_each(|line| println!("{target}: {line}"));
+    println!(
+        "{target}: mend it, and keep that file in fuzz/corpus/{target}/, where the ordinary tests try it"
+    );
+    Ok(false)
+}
+
+/// Adds to a kept corpus what reaches code that it does not.
+fn keep(folder: &Path, target: &str) -> Result<()> {
+    let [kept, own] = corpora(target)?;
+    if !succeeds(
+        Command::new(folder.join(target)).args(["-set_cover_merge=1", "-use_counters=0"]).args([kept, own]),
+    )? {
+        bail!("{target}: the corpora cannot be merged");
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_target_has_inputs_that_are_kept() {
+        let targets = targets().unwrap();
+        assert!(targets.len() >= 5, "{targets:?}");
+        for target in targets {
+            let kept = std::fs::read_dir(root().join("fuzz/corpus").join(&target)).unwrap().count();
+            assert!((1..100).contains(&kept), "{target}: {kept}");
+        }
+    }
+}
