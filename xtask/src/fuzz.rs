@@ -68,6 +68,11 @@ fn build() -> Result<Result<PathBuf, String>> {
     if std::env::var_os("CXX").is_none() && find("c++").is_none() {
         return Ok(Err("there is no C++ compiler for libFuzzer (Debian: apt-get install g++)".to_owned()));
     }
+    let mut fetch = cargo();
+    fetch.args(["fetch", "--quiet", "--locked", "--manifest-path", "fuzz/Cargo.toml"]);
+    if !succeeds(&mut fetch)? {
+        return Ok(Err("its packages cannot be had".to_owned()));
+    }
     let version = output_of(Command::new("rustc").current_dir(root()).arg("-vV")).context("rustc -vV")?;
     let host = version.lines().find_map(|line| line.strip_prefix("host: ")).context("rustc names no host")?;
     let out = root().join("target/fuzz");

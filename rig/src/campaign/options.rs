@@ -26,7 +26,7 @@ pub struct CampaignOptions {
     pub out: PathBuf,
     /// A document whose generated part is written anew: the tables of the fast campaign, the totals of the full one, the coverage of the
     /// random one.
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["only", "without"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["only", "without", "patterns"])]
     pub doc: Option<PathBuf>,
     /// The document is not written: whether it is up to date decides on the exit code.
     #[arg(long, requires = "doc")]
