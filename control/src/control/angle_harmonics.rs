@@ -197,12 +197,12 @@ mod tests {
     const AHEAD_S: f32 = 5e-4;
     const ERROR_RAD: [(f32, f32); 2] = [(0.052, 0.7), (0.017, -2.0)];
 
-    /// Errors of the corrected angle in rad over the last tenth of so many seconds at an electrical speed that changes by so many rad/s²; every fifth
-    /// period is not observed.
+    /// Errors of the corrected angle in rad over the last tenth of so many seconds at an electrical speed that changes by so many rad/s²; observed
+    /// once in 30°, as with the carrier halves of the fewest pulses.
     fn left(omega: f64, slope: f64, seconds: f64, errors: [(f32, f32); 2]) -> Vec<f32> {
         let (mut harmonics, mut tracker) = (AngleHarmonics::new(AHEAD_S), SpeedTracker::new());
         let periods = (seconds / f64::from(PERIOD_S)) as u32;
-        let mut found = Vec::new();
+        let (mut found, mut sector) = (Vec::new(), 0);
         for period in 0..periods {
             let t_s = f64::from(period) * f64::from(PERIOD_S);
             let turns = (omega + 0.5 * slope * t_s) * t_s / core::f64::consts::TAU;
@@ -214,9 +214,11 @@ mod tests {
             let angle = harmonics.corrected(truth + Angle::within_half_turn(error_rad));
             let left_rad = (angle - tracker.predicted(PERIOD_S)).signed_radians();
             tracker.step(angle, PERIOD_S);
+            let (before, now) = (sector, (u64::from(truth.0) * 12) >> 32);
+            sector = now;
             if !AngleHarmonics::can_observe(&tracker) {
                 harmonics.pause();
-            } else if period % 5 != 0 {
+            } else if now != before {
                 let ahead = angle + Angle::within_half_turn(tracker.omega() * AHEAD_S);
                 harmonics.observe(ahead, ahead.sin_cos(), left_rad, &tracker);
             }
