@@ -90,8 +90,10 @@ fn identify(statistics: &statistics::Statistics) -> Result<u8> {
         ("identification.pwm-max", of("pwm", |row| row.instructions.max.into())),
     ];
     let judged = budget::judge(&budgets(|group| group == IDENTIFICATION)?, &values)?;
-    for budget::Judged { name, value, budget } in &judged {
-        println!("{name:<28} {value:>6.0} of {:>6}: {}", budget.bound(), budget.verdict(*value).name());
+    for judged in &judged {
+        let budget::Judged { name, value, budget } = judged;
+        let verdict = if judged.kept() { "ok" } else { "OVER" };
+        println!("{name:<28} {value:>6.0} of {budget:>6}: {verdict}");
     }
     Ok(budget::exit_code(&judged))
 }

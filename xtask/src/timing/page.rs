@@ -6,39 +6,35 @@ use super::system::Measured;
 use super::tables;
 
 const HEAD: &str = include_str!("page/head.md");
-const TARGETS: &str = include_str!("page/targets.md");
-const GROUPS: &str = include_str!("page/groups.md");
+const PARTS: &str = include_str!("page/parts.md");
 const LAWS: &str = include_str!("page/laws.md");
 const BLOCKS: &str = include_str!("page/blocks.md");
+const OTHERS: &str = include_str!("page/others.md");
 const ENTRY: &str = include_str!("page/entry.md");
 
 /// The whole page.
 pub fn text(report: &Report) -> String {
-    let mut text = [HEAD, TARGETS, &tables::targets(report).markdown(), GROUPS].concat();
+    let mut text =
+        [HEAD, &tables::modes(report).markdown(), "\n", &tables::images(report).markdown()].concat();
+    text += PARTS;
     for measured in report.systems {
-        text += &format!("\n## Interrupts of `{}`\n", measured.system.name);
-        let parts = measured.parts.iter().map(|(name, parts)| tables::by_parts(name, parts));
-        for table in [tables::interrupts(measured), tables::loads(measured)].into_iter().chain(parts) {
-            text += &format!("\n{}", table.markdown());
-        }
+        text += &format!("\n{}", tables::by_parts(measured).markdown());
     }
-    text += &[LAWS, &tables::laws(report).markdown()].concat();
-    text += &[BLOCKS, &tables::blocks(report).markdown(), ENTRY, &tables::entries(report).markdown(), "\n"]
-        .concat();
-    for measured in report.systems {
-        let (system, cycles) = (measured.system.name, measured.longest.map_or(0, |(_, cycles)| cycles));
-        text += &format!("- `{system}`: control's longest instruction takes {cycles} cycles.\n");
-    }
-    text + "\n## Budgets\n\n" + &tables::budgets(report).markdown()
+    text += &[LAWS, &tables::laws(report).markdown(), BLOCKS, &tables::blocks(report).markdown()].concat();
+    text += &[OTHERS, &tables::alike(report).markdown(), ENTRY, &tables::entries(report).markdown()].concat();
+    let longest = report.systems.iter().map(|measured| {
+        let cycles = measured.longest.map_or(0, |(_, cycles)| cycles);
+        format!("{cycles} cycles in `{}`", measured.system.name)
+    });
+    text + &format!("\nControl's longest instruction: {}.\n", longest.collect::<Vec<_>>().join(", "))
 }
 
 /// For a terminal.
 pub fn plain(report: &Report) -> String {
     let mut text = String::new();
     for measured in report.systems {
-        let parts = measured.parts.iter().map(|(name, parts)| tables::by_parts(name, parts));
         text += &format!("\n{}: instructions, without the link to the rig\n\n", measured.system.name);
-        for table in [tables::interrupts(measured), tables::loads(measured)].into_iter().chain(parts) {
+        for table in [tables::interrupts(measured), tables::loads(measured), tables::by_parts(measured)] {
             text += &format!("{}\n", table.plain());
         }
         text += &remarks(measured);

@@ -6,68 +6,68 @@ use crate::build;
 use anyhow::{Result, bail};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// The group of a part, by whether an interrupt could do without it and still be what its target is for.
+/// The group of a part, by whether the papers' systems have it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Group {
-    /// The part that the targets name.
-    Named,
-    /// The part that the drive does beyond it.
+    /// The part that the papers' systems have, too.
+    Paper,
+    /// The part that the drive has beyond them.
     Beyond,
     /// The part that carries both.
     Around,
 }
 
 impl Group {
-    pub const ALL: [Self; 3] = [Self::Named, Self::Beyond, Self::Around];
+    pub const ALL: [Self; 3] = [Self::Paper, Self::Beyond, Self::Around];
 
     /// As in the tables.
     pub const fn name(self) -> &'static str {
         match self {
-            Self::Named => "what the target names",
-            Self::Beyond => "what the drive does beyond it",
+            Self::Paper => "what the papers' systems have",
+            Self::Beyond => "what the drive has beyond them",
             Self::Around => "cells, entry, messages",
         }
     }
 }
 
-use Group::{Around, Beyond, Named};
+use Group::{Around, Beyond, Paper};
 
-/// Parts, what they are in the control interrupt and in the PWM interrupt, and their sources: files and folders below `src/` of one of
+/// Parts, their groups and their sources: files and folders below `src/` of one of
 /// the repository's crates, whichever it is; behind a `#` a word of the function's name. Of the sources that an instruction's file lies
 /// in the longest decides. First the innermost function is asked, then those that it was inlined into.
-const PARTS: [(&str, [Group; 2], &[&str]); 28] = [
-    ("frames: vectors, angles, sine and cosine", [Named, Named], &["frames/"]),
-    ("look-up in flux map and tables", [Named, Named], &["machine/lookup.rs"]),
-    ("MTPA, two passes", [Named, Named], &["control/mtpa.rs"]),
-    ("operating point: weakening, limits", [Named, Named], &["control/reference.rs"]),
-    ("link's filter", [Beyond, Beyond], &["control/link_filter.rs"]),
-    ("torque demand: envelope, slew, link's window", [Named, Named], &["control/demand.rs"]),
-    ("trim of mean torque", [Beyond, Beyond], &["control/torque_trim.rs"]),
-    ("speed from the angle", [Beyond, Beyond], &["control/speed.rs"]),
-    ("speed loop", [Beyond, Beyond], &["control/speed_loop.rs"]),
-    ("disturbance, its sixth harmonic", [Beyond, Beyond], &["control/disturbance.rs"]),
-    ("map error", [Beyond, Beyond], &["control/map_error.rs"]),
-    ("current loop", [Named, Named], &["control/current_loop.rs", "control/flux_path.rs"]),
-    ("Z-source", [Beyond, Beyond], &["control/z_source.rs"]),
-    ("control law, the rest", [Named, Named], &["control/"]),
-    ("ripple of the pattern", [Named, Named], &["modulation/ripple.rs"]),
+const PARTS: [(&str, Group, &[&str]); 28] = [
+    ("frames: vectors, angles, sine and cosine", Paper, &["frames/"]),
+    ("look-up in flux map and tables", Paper, &["machine/lookup.rs"]),
+    ("MTPA, two passes", Paper, &["control/mtpa.rs"]),
+    ("operating point: weakening, limits", Paper, &["control/reference.rs"]),
+    ("link's filter", Beyond, &["control/link_filter.rs"]),
+    ("torque demand: envelope, slew, link's window", Paper, &["control/demand.rs"]),
+    ("trim of mean torque", Beyond, &["control/torque_trim.rs"]),
+    ("speed from the angle", Paper, &["control/speed.rs"]),
+    ("speed loop", Beyond, &["control/speed_loop.rs"]),
+    ("disturbance, its sixth harmonic", Beyond, &["control/disturbance.rs"]),
+    ("map error", Beyond, &["control/map_error.rs"]),
+    ("current loop", Paper, &["control/current_loop.rs", "control/flux_path.rs"]),
+    ("Z-source", Paper, &["control/z_source.rs"]),
+    ("control law, the rest", Paper, &["control/"]),
+    ("ripple of the pattern", Paper, &["modulation/ripple.rs"]),
     (
         "flux predicted from committed pulses",
-        [Beyond, Beyond],
+        Beyond,
         &["drive/traction/applied.rs", "drive/traction/six_step_exit.rs"],
     ),
-    ("gates read back", [Beyond, Beyond], &["drive/dual/pwm.rs#Expected", "drive/dual/pwm.rs#stuck"]),
-    ("protection", [Named, Named], &["protection/"]),
-    ("flight recorder", [Beyond, Beyond], &["recorder.rs", "cell/ring.rs"]),
-    ("cells and messages", [Around, Around], &["cell.rs", "drive/messages.rs", "drive/dual/messages.rs"]),
-    ("choice of the mode", [Beyond, Named], &["modulation/schedule.rs"]),
-    ("dead-time compensation", [Beyond, Beyond], &["modulation/dead_time.rs"]),
-    ("transition between patterns", [Beyond, Beyond], &["modulation/pattern_transition.rs"]),
-    ("shoot-through", [Named, Named], &["nine_switch/shoot_through.rs"]),
-    ("pulses", [Beyond, Named], &["modulation/", "nine_switch/", "drive/traction/pulses.rs"]),
-    ("axis of a motor", [Around, Around], &["drive/dual/axis.rs"]),
-    ("task", [Around, Around], &["drive/"]),
-    ("entry and board", [Around, Around], &["firmware/", "board/"]),
+    ("gates read back", Beyond, &["drive/dual/pwm.rs#Expected", "drive/dual/pwm.rs#stuck"]),
+    ("protection", Paper, &["protection/"]),
+    ("flight recorder", Beyond, &["recorder.rs", "cell/ring.rs"]),
+    ("cells and messages", Around, &["cell.rs", "drive/messages.rs", "drive/dual/messages.rs"]),
+    ("choice of the mode", Paper, &["modulation/schedule.rs"]),
+    ("dead-time compensation", Beyond, &["modulation/dead_time.rs"]),
+    ("transition between patterns", Beyond, &["modulation/pattern_transition.rs"]),
+    ("shoot-through", Paper, &["nine_switch/shoot_through.rs"]),
+    ("pulses", Paper, &["modulation/", "nine_switch/", "drive/traction/pulses.rs"]),
+    ("axis of a motor", Around, &["drive/dual/axis.rs"]),
+    ("task", Around, &["drive/"]),
+    ("entry and board", Around, &["firmware/", "board/"]),
 ];
 /// The part that nobody owns: copies and the like.
 const REST: &str = "library";
@@ -82,6 +82,12 @@ pub struct Part {
     pub longest: u32,
 }
 
+/// The names of the parts of a group, and of what nobody owns.
+pub fn names(group: Group) -> impl Iterator<Item = &'static str> {
+    let named = PARTS.iter().filter(move |(_, of, _)| *of == group).map(|(name, ..)| *name);
+    named.chain((group == Around).then_some(REST))
+}
+
 /// Instructions of these parts together, on the mean and in the longest call.
 pub fn together<'a>(parts: impl Iterator<Item = &'a Part>) -> (f64, u32) {
     parts.fold((0.0, 0), |(mean, longest), part| (mean + part.mean, longest + part.longest))
@@ -91,7 +97,7 @@ pub fn together<'a>(parts: impl Iterator<Item = &'a Part>) -> (f64, u32) {
 /// added to `sources`.
 pub fn parts(
     profile: &Profile,
-    (interrupt, exception): (&str, u32),
+    exception: u32,
     hits: &Tally,
     calls: usize,
     longest: &[u32],
@@ -118,12 +124,7 @@ pub fn parts(
     let mean = |count: u64| count as f64 / calls.max(1) as f64;
     let mut parts: Vec<_> = sums
         .into_iter()
-        .map(|(name, (count, longest))| Part {
-            name,
-            group: group(interrupt, name),
-            mean: mean(count),
-            longest,
-        })
+        .map(|(name, (count, longest))| Part { name, group: group(name), mean: mean(count), longest })
         .collect();
     parts.sort_by(|a, b| a.group.cmp(&b.group).then(b.mean.total_cmp(&a.mean)));
     Ok(parts)
@@ -166,9 +167,8 @@ pub fn all_found(sources: &BTreeSet<&str>) -> Result<()> {
     Ok(())
 }
 
-fn group(interrupt: &str, part: &str) -> Group {
-    let known = PARTS.iter().find(|(name, ..)| *name == part);
-    known.map_or(Around, |(_, [control, pwm], _)| if interrupt == "control" { *control } else { *pwm })
+fn group(part: &str) -> Group {
+    PARTS.iter().find(|(name, ..)| *name == part).map_or(Around, |(_, group, _)| *group)
 }
 
 #[cfg(test)]
@@ -215,11 +215,5 @@ mod tests {
         assert!(
             all_found(&sources).unwrap_err().to_string().contains("`control/mtpa.rs` (MTPA, two passes)")
         );
-    }
-
-    #[test]
-    fn pulses_are_what_the_pwm_interrupt_is_for_and_control_only_foresees_them() {
-        assert_eq!([group("control", "pulses"), group("pwm", "pulses")], [Beyond, Named]);
-        assert_eq!([group("control", "MTPA, two passes"), group("control", REST)], [Named, Around]);
     }
 }

@@ -54,8 +54,14 @@ fn counts(row: &Row) -> Value {
 }
 
 impl Measured {
-    fn modes(&self) -> Vec<&str> {
+    /// The modes that were seen, in the order of the tables.
+    pub fn modes(&self) -> Vec<&str> {
         self.statistics.modes(self.system.first_modes)
+    }
+
+    /// `true` for a part that either interrupt executes.
+    pub fn has_part(&self, name: &str) -> bool {
+        self.parts.iter().any(|(_, parts)| parts.iter().any(|part| part.name == name))
     }
 
     /// Interrupt, mode and what was counted in both directions together, in the order of the tables.
@@ -164,10 +170,7 @@ impl Report<'_> {
         };
         let judged = |judged: &Judged| {
             let Judged { name, value, budget } = judged;
-            json!({
-                "name": name, "value": value, "target": budget.target, "ceiling": budget.bound(),
-                "verdict": judged.verdict().name(),
-            })
+            json!({ "name": name, "value": value, "budget": budget, "kept": judged.kept() })
         };
         let first = self.systems.first();
         let images = self.systems.iter().map(|measured| (measured.system.name, measured.json_image()));
@@ -196,8 +199,7 @@ mod tests {
 
     #[test]
     fn the_json_holds_what_the_contract_names() {
-        let judged =
-            judge("[pmasynrm]\ncontrol-max = { target = 1 }", &[("pmasynrm.control-max", 2.0)]).unwrap();
+        let judged = judge("[pmasynrm]\ncontrol-max = 1", &[("pmasynrm.control-max", 2.0)]).unwrap();
         let name = "core_tick/tractive".to_owned();
         let block = Block { name, max: 120, mean: 110.0, cycles: 250, max_error: Some(1e-7) };
         let report = Report {
@@ -231,10 +233,10 @@ mod tests {
         for row in ["mid7, motoring 10 10 10 1700 0", "mid7, braking 20 20 20 1700 0"] {
             assert!(plain.contains(&format!("control {row}")), "{plain}");
         }
-        assert!(plain.contains("what the target names 12 20 MTPA, two passes 12 20 "), "{plain}");
+        assert!(plain.contains("what the papers' systems have 12 20 MTPA, two passes 12 20 "), "{plain}");
         let page = page::text(&report);
-        assert!(page.contains("| pmasynrm control | 1 | 20 | 20 | 0 | 0 |"), "{page}");
-        assert!(page.contains("| control | mid7, motoring | 10 | 10 | 10 | 1700 | 0 |"), "{page}");
-        assert!(page.contains("| control | mid7, braking | 20 | 20 | 20 | 1700 | 0 |"), "{page}");
+        assert!(page.contains("| pmasynrm | mid7 | 15 | 20 | 1700 | 7 | 7 | 1700 | 15 | 15 |"), "{page}");
+        assert!(page.contains("| MTPA, two passes | 12 | 20 |"), "{page}");
+        assert!(page.contains("| pmasynrm | 1 | 2 | 4 | 6 | 640 |"), "{page}");
     }
 }

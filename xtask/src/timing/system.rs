@@ -293,8 +293,7 @@ impl Measured {
         for (name, exception) in INTERRUPTS {
             let longest = sum.longest.get(&exception).map_or(&[][..], Vec::as_slice);
             let calls = sum.calls.get(&exception).copied().unwrap_or(0);
-            let of = (name, exception);
-            parts.push((name, parts::parts(&profile, of, &sum.hits, calls, longest, &mut sources)?));
+            parts.push((name, parts::parts(&profile, exception, &sum.hits, calls, longest, &mut sources)?));
         }
         let masking = entry::masking(&image, is_link);
         let [(_, control), _] = INTERRUPTS;
@@ -347,7 +346,7 @@ pub mod tests {
         let mut statistics = Statistics::default();
         statistics.add(&drive).unwrap();
         let sizes = Sizes { code: 1, tables: 2, rodata: 3, ram: 4, recorder: 6, stack: 5 };
-        let part = Part { name: "MTPA, two passes", group: Group::Named, mean: 12.0, longest: 20 };
+        let part = Part { name: "MTPA, two passes", group: Group::Paper, mean: 12.0, longest: 20 };
         Measured {
             system: System::ALL[0],
             image: Image { sizes, ..Image::default() },

@@ -1,9 +1,9 @@
 //! The tables of what was measured, for the page of the documentation and for a terminal.
 
 use super::blocks::error;
-use super::parts::{Group, Part, together};
+use super::parts::{self, Group, Part, together};
 use super::report::{Report, net};
-use super::statistics::Spread;
+use super::statistics::{Row, Spread};
 use super::system::{LawCost, Measured};
 
 /// A table of text.
@@ -48,21 +48,53 @@ impl Table {
     }
 }
 
-/// The longest interrupts by the groups of their parts.
-pub fn targets(report: &Report) -> Table {
-    let [named, beyond, around] = Group::ALL.map(|group| format!(">{}", group.name()));
-    let rows = report.systems.iter().flat_map(|measured| {
-        measured.parts.iter().map(move |(name, parts)| {
-            let budget = format!("{}.{name}-max", measured.system.name);
-            let judged = report.judged.iter().find(|judged| judged.name == budget);
-            let target = judged.map_or_else(String::new, |judged| judged.budget.target.to_string());
-            let of = |group| together(parts.iter().filter(|part| part.group == group)).1.to_string();
-            let longest = together(parts.iter()).1.to_string();
-            let [named, beyond, around] = Group::ALL.map(of);
-            vec![format!("{} {name}", measured.system.name), target, longest, named, beyond, around]
-        })
+/// Both interrupts of all systems in each mode, instructions beside cycles, and what they load the processor with.
+pub fn modes(report: &Report) -> Table {
+    let row = |(measured, mode): (&Measured, &str)| {
+        let of = |interrupt| measured.statistics.row(mode, None, interrupt);
+        let counts = |row: &Row| {
+            let Row { instructions, cycles, .. } = row;
+            [format!("{:.0}", instructions.mean()), instructions.max.to_string(), cycles.max.to_string()]
+        };
+        let (control, pwm) = (counts(of("control")?), counts(of("pwm")?));
+        let load = measured.statistics.load(mode, None)?;
+        let load = [load.mean, load.max].map(|percent| format!("{percent:.0}"));
+        let names = [measured.system.name, mode].map(str::to_owned);
+        Some(names.into_iter().chain(control).chain(pwm).chain(load).collect())
+    };
+    let modes = |measured| Measured::modes(measured).into_iter().map(move |mode| (measured, mode));
+    let head = ["", "mode", ">control, mean", ">at most", ">cycles", ">PWM, mean", ">at most", ">cycles"];
+    let head = [&head[..], &[">load, %", ">at most"]].concat();
+    Table::new(&head, report.systems.iter().flat_map(modes).filter_map(row))
+}
+
+/// Bytes that each image takes, and what its interrupts wait at most.
+pub fn images(report: &Report) -> Table {
+    let rows = report.systems.iter().map(|measured| {
+        let sizes = &measured.image.sizes;
+        let stack = u64::from(measured.statistics.stack_bytes().unsigned_abs());
+        let bytes = [sizes.code, sizes.tables, sizes.ram, sizes.recorder, stack].map(|size| size.to_string());
+        [measured.system.name.to_owned()].into_iter().chain(bytes).collect()
     });
-    Table::new(&["", ">target", ">longest", &named, &beyond, &around], rows)
+    Table::new(&["bytes", ">code", ">tables", ">RAM", ">flight recorder", ">stack"], rows)
+}
+
+/// The work that a tick of a plain field-oriented controller has, as this drive does it: parts of the mean control interrupt, and the block.
+pub fn alike(report: &Report) -> Table {
+    let parts = ["entry and board", "protection", "speed from the angle"];
+    let mut sum = 0.0;
+    let mut rows = Vec::new();
+    let control = report.systems.first().and_then(|measured| measured.parts.first());
+    for part in control.iter().flat_map(|(_, all)| all).filter(|part| parts.contains(&part.name)) {
+        sum += part.mean;
+        rows.push(vec![part.name.to_owned(), format!("{:.0}", part.mean)]);
+    }
+    for block in report.blocks.iter().filter(|block| block.name == "duty_tick/tractive") {
+        sum += block.mean;
+        rows.push(vec![format!("`{}`", block.name), format!("{:.0}", block.mean)]);
+    }
+    rows.push(vec!["**together**".to_owned(), format!("{sum:.0}")]);
+    Table::new(&["part", ">instructions, mean"], rows)
 }
 
 /// The control interrupt of each system under either law.
@@ -104,18 +136,25 @@ pub fn loads(measured: &Measured) -> Table {
     Table::new(&["mode", ">load, %", ">at most"], rows)
 }
 
-/// The parts of an interrupt by their groups, with sums.
-pub fn by_parts(name: &str, parts: &[Part]) -> Table {
-    let row = |name: String, mean: f64, longest: u32| vec![name, format!("{mean:.0}"), longest.to_string()];
-    let sum = |name: &str, (mean, longest)| row(format!("**{name}**"), mean, longest);
+/// The parts of a system's interrupts by their groups, with sums.
+pub fn by_parts(measured: &Measured) -> Table {
+    let cells = |name: String, within: &dyn Fn(&Part) -> bool| {
+        let sums = measured.parts.iter().map(|(_, parts)| together(parts.iter().filter(|part| within(part))));
+        let sums = sums.flat_map(|(mean, longest)| [format!("{mean:.0}"), longest.to_string()]);
+        [name].into_iter().chain(sums).collect::<Vec<_>>()
+    };
     let mut rows = Vec::new();
     for group in Group::ALL {
-        let of = || parts.iter().filter(move |part| part.group == group);
-        rows.push(sum(group.name(), together(of())));
-        rows.extend(of().map(|part| row(part.name.to_owned(), part.mean, part.longest)));
+        rows.push(cells(format!("**{}**", group.name()), &|part| part.group == group));
+        for name in parts::names(group).filter(|name| measured.has_part(name)) {
+            rows.push(cells(name.to_owned(), &|part| part.name == name));
+        }
     }
-    rows.push(sum("together", together(parts.iter())));
-    Table::new(&[&format!("{name}, by its parts"), ">mean", ">in the longest"], rows)
+    rows.push(cells("**together**".to_owned(), &|_| true));
+    let columns =
+        measured.parts.iter().flat_map(|(name, _)| [format!(">{name}, mean"), ">in the longest".to_owned()]);
+    let head: Vec<_> = [measured.system.name.to_owned()].into_iter().chain(columns).collect();
+    Table::new(&head.iter().map(String::as_str).collect::<Vec<_>>(), rows)
 }
 
 /// The building blocks.
@@ -140,11 +179,12 @@ pub fn entries(report: &Report) -> Table {
     Table::new(&["", "interrupt", "comes into", ">times", ">waits at least", ">at most"], rows)
 }
 
-/// The table of what has a budget, and of its verdicts.
+/// The table of what has a budget, and whether it is kept.
 pub fn budgets(report: &Report) -> Table {
     let rows = report.judged.iter().map(|judged| {
-        let (value, target) = (format!("{:.0}", judged.value), judged.budget.target.to_string());
-        vec![judged.name.clone(), value, target, judged.verdict().name().to_owned()]
+        let (value, budget) = (format!("{:.0}", judged.value), judged.budget.to_string());
+        let verdict = if judged.kept() { "ok" } else { "OVER" };
+        vec![judged.name.clone(), value, budget, verdict.to_owned()]
     });
-    Table::new(&["", ">value", ">target", ""], rows)
+    Table::new(&["", ">value", ">budget", ""], rows)
 }
