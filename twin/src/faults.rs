@@ -128,7 +128,7 @@ pub struct Seen {
     pub listening: String,
     /// The last frames of the drive, as logged.
     pub frames: Vec<String>,
-    /// The costs of the handlers from the cause on, by exception.
+    /// The costs of the handlers from the cause on, by exception; with their waits if the bus is full.
     pub longest: BTreeMap<usize, Longest>,
     /// Frames that found the receive FIFO full.
     pub lost: u32,
@@ -152,6 +152,9 @@ pub fn look(image: &Path, system: System, cause: Cause, when: When) -> Result<Se
     let after = if matches!(when, When::Starting(_)) { AFTER_STARTING } else { AFTER };
     let lost = machine.chip.can.lost;
     cpu.longest.clear();
+    if matches!(cause, Cause::Babble) {
+        cpu.count_waits()?;
+    }
     disturb(&mut cpu, system, cause, from + after)?;
     cpu.run(from + 2 * after / 3)?;
     let received = cpu.machine().world.talk.received;

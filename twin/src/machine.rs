@@ -46,14 +46,6 @@ pub struct Waits {
     pub all: u64,
 }
 
-impl Waits {
-    /// More of them.
-    pub fn add(&mut self, prefetched: i64, all: u32) {
-        self.prefetched += prefetched;
-        self.all += u64::from(all);
-    }
-}
-
 /// The machine.
 pub struct Machine {
     /// The interrupt controller.
@@ -72,8 +64,8 @@ pub struct Machine {
     pub mistake: Option<fn(u32, u32) -> u32>,
     /// Every access to a peripheral, and every entry into an exception, if they are kept.
     pub record: Option<Vec<Access>>,
-    /// Cycles that reading from the flash memory would add.
-    pub waits: Waits,
+    /// Cycles that reading from the flash memory would add, if they are counted.
+    pub waits: Option<Waits>,
     /// The reason why the emulator was stopped.
     pub stop: Option<Stop>,
     /// The instant at which the run ends.
@@ -105,7 +97,7 @@ impl Machine {
             resets: 0,
             mistake: None,
             record: None,
-            waits: Waits::default(),
+            waits: None,
             stop: None,
             until: 0,
             masked: false,
@@ -142,6 +134,14 @@ impl Machine {
         }
     }
 
+    /// More waits for the flash memory, if they are counted.
+    pub fn wait(&mut self, prefetched: i64, all: u32) {
+        if let Some(waits) = &mut self.waits {
+            waits.prefetched += prefetched;
+            waits.all += u64::from(all);
+        }
+    }
+
     /// A basic block begins; `true` if the emulator is to stop before it.
     pub fn block(&mut self, address: u32, size: u32, cost: Cost) -> bool {
         self.findings.now = (self.now, address);
@@ -149,7 +149,7 @@ impl Machine {
             // What had to wait for the block before comes now.
             self.masked &= !std::mem::take(&mut self.deferred);
             let led_on = if self.block_end == address { cost.led_on } else { 0 };
-            self.waits.add(i64::from(cost.prefetched) - i64::from(led_on), cost.waits);
+            self.wait(i64::from(cost.prefetched) - i64::from(led_on), cost.waits);
             self.block_end = address + size;
             if self.holds_code_apart
                 && self.nvic.in_interrupt()

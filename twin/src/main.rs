@@ -58,6 +58,7 @@ fn main() -> ExitCode {
 fn run(arguments: &Arguments) -> Result<bool> {
     let settings = Settings::of_file(&arguments.image, arguments.system, &arguments.script)?;
     let (mut cpu, image) = prepare(&settings)?;
+    cpu.count_waits()?;
     println!("image {} SHA-256 {}", arguments.image.display(), image.sha256);
     let instant = |at_s: f64| (at_s * SECOND as f64) as Time;
     cpu.machine_mut().world.drops = arguments.drivers_fail.map(instant);

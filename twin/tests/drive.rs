@@ -37,6 +37,7 @@ const PWM: usize = 41;
 
 fn driven(system: System, mistake: Option<fn(u32, u32) -> u32>) -> (Cpu, Image) {
     let (_, mut cpu, image) = prepared(system, [SCRIPT, SCRIPT_ZS9], mistake);
+    cpu.count_waits().unwrap();
     drive(&mut cpu).unwrap();
     is_sound(&cpu);
     (cpu, image)

@@ -6,7 +6,8 @@ use crate::image::{FLASH, Image};
 use crate::machine::{Machine, Waits, What};
 use crate::time::Time;
 use anyhow::{Result, anyhow, bail};
-use std::collections::{BTreeMap, HashMap};
+use rustc_hash::FxHashMap;
+use std::collections::BTreeMap;
 use unicorn_engine::{Arch, ArmCpuModel, HookType, Mode, Permission, RegisterARM as R, Unicorn, uc_error};
 
 /// RAM: its address, and the length of SRAM1, SRAM2 and the CCM SRAM's alias (RM0440, memory map).
@@ -68,9 +69,10 @@ pub enum Stop {
 pub struct Longest {
     /// With no wait for the flash memory.
     pub cycles: u64,
-    /// With the prefetch alone, and every wait state of the words of tables and literals; branches by whether they were taken.
+    /// With the prefetch alone, and every wait state of the words of tables and literals; branches by whether they were taken. 0 unless
+    /// waits are counted.
     pub prefetched: u64,
-    /// With every wait state.
+    /// With every wait state; 0 unless waits are counted.
     pub waited: u64,
 }
 
@@ -79,7 +81,7 @@ pub struct Cpu {
     engine: Unicorn<'static, Machine>,
     /// The costs of the handlers, by exception.
     pub longest: BTreeMap<usize, Longest>,
-    entered: Vec<(Time, Waits)>,
+    entered: Vec<(Time, Option<Waits>)>,
     /// The vector table's first two words.
     start: (u32, u32),
 }
@@ -119,7 +121,7 @@ impl Cpu {
             };
             engine.mmio_map(origin.into(), length as usize, Some(read), Some(write)).map_err(failed)?;
         }
-        hook(&mut engine).map_err(failed)?;
+        hook(&mut engine, ram_end == CCM_ALIAS).map_err(failed)?;
         // After power-up nobody knows what the memory holds.
         engine.mem_write(ram.0.into(), &vec![PAINT; ram.1 as usize]).map_err(failed)?;
         let mut cpu =
@@ -147,6 +149,12 @@ impl Cpu {
             .add_code_hook(1, 0, |engine, address, _| engine.get_data_mut().findings.now.1 = address as u32)
             .map_err(failed)?;
         self.engine.ctl_flush_tb().map_err(failed)
+    }
+
+    /// From now on the waits for the flash memory are counted. That takes the emulator a quarter longer.
+    pub fn count_waits(&mut self) -> Result<()> {
+        self.machine_mut().waits = Some(Waits::default());
+        hook_loads(&mut self.engine).and_then(|()| self.engine.ctl_flush_tb()).map_err(failed)
     }
 
     /// A reset with these flags of its cause.
@@ -300,9 +308,11 @@ impl Cpu {
         let cycles = (now - since) / self.machine().cycle();
         let longest = self.longest.entry(left).or_default();
         longest.cycles = longest.cycles.max(cycles);
-        let prefetched = cycles.saturating_add_signed(waits.prefetched - before.prefetched);
-        longest.prefetched = longest.prefetched.max(prefetched);
-        longest.waited = longest.waited.max(cycles + waits.all - before.all);
+        if let (Some(waits), Some(before)) = (waits, before) {
+            let prefetched = cycles.saturating_add_signed(waits.prefetched - before.prefetched);
+            longest.prefetched = longest.prefetched.max(prefetched);
+            longest.waited = longest.waited.max(cycles + waits.all - before.all);
+        }
         if (to | NO_FLOAT == TO_THREAD) != self.machine().nvic.active.is_empty() {
             bail!("the exception {left} returns to {to:#010x}");
         }
@@ -347,9 +357,9 @@ impl Cpu {
     }
 }
 
-/// The emulator tells of every basic block, of exceptions, and of accesses to nowhere.
-fn hook(engine: &mut Unicorn<'static, Machine>) -> Result<(), uc_error> {
-    let mut costs = HashMap::new();
+/// The emulator tells of every basic block, of exceptions, of accesses to nowhere, and of writes to code in the CCM SRAM if the image has any.
+fn hook(engine: &mut Unicorn<'static, Machine>, has_ccm: bool) -> Result<(), uc_error> {
+    let mut costs = FxHashMap::default();
     engine.add_block_hook(1, 0, move |engine, address, size| {
         let code = || engine.mem_read_as_vec(address, size as usize).unwrap_or_default();
         let is_ccm = is_ccm(address as u32);
@@ -367,24 +377,13 @@ fn hook(engine: &mut Unicorn<'static, Machine>) -> Result<(), uc_error> {
         engine.get_data_mut().stop = Some(stop);
         let _ = engine.emu_stop();
     })?;
-    // Tables and literals: each word takes every wait state, as without the data cache.
-    for origin in [0, FLASH.0] {
-        let (from, to) = (u64::from(origin), u64::from(origin + FLASH.1 - 1));
-        engine.add_mem_hook(HookType::MEM_READ, from, to, |engine, _, _, _, _| {
-            engine.get_data_mut().waits.add(cost::WAIT_STATES.into(), cost::WAIT_STATES);
+    if has_ccm {
+        let last = u64::from(CCM.0 + CCM.1 - 1);
+        engine.add_mem_hook(HookType::MEM_WRITE, CCM.0.into(), last, |engine, _, address, _, _| {
+            engine.get_data_mut().write_code(address as u32);
             true
         })?;
     }
-    let last = u64::from(CCM.0 + CCM.1 - 1);
-    // A literal beside the code: the fetch of the same cycle waits for it.
-    engine.add_mem_hook(HookType::MEM_READ, CCM.0.into(), last, |engine, _, _, _, _| {
-        engine.get_data_mut().waits.add(1, 1);
-        true
-    })?;
-    engine.add_mem_hook(HookType::MEM_WRITE, CCM.0.into(), last, |engine, _, address, _, _| {
-        engine.get_data_mut().write_code(address as u32);
-        true
-    })?;
     engine.add_mem_hook(HookType::MEM_INVALID, 1, 0, |engine, kind, address, size, _| {
         engine
             .get_data_mut()
@@ -392,6 +391,21 @@ fn hook(engine: &mut Unicorn<'static, Machine>) -> Result<(), uc_error> {
             .add(format!("{kind:?} of {size} bytes at {address:#010x}, where nothing is"));
         false
     })?;
+    Ok(())
+}
+
+/// The emulator tells of loads from where they have to wait.
+fn hook_loads(engine: &mut Unicorn<'static, Machine>) -> Result<(), uc_error> {
+    // Tables and literals: each word takes every wait state, as without the data cache. A literal beside the code in the CCM SRAM: the fetch of the same
+    // cycle waits for it.
+    for ((origin, length), wait) in [((0, FLASH.1), cost::WAIT_STATES), (FLASH, cost::WAIT_STATES), (CCM, 1)]
+    {
+        let (from, to) = (u64::from(origin), u64::from(origin + length - 1));
+        engine.add_mem_hook(HookType::MEM_READ, from, to, move |engine, _, _, _, _| {
+            engine.get_data_mut().wait(wait.into(), wait);
+            true
+        })?;
+    }
     Ok(())
 }
 
