@@ -51,16 +51,14 @@ struct Case {
 impl Case {
     /// Every order within the window, for so many phases between the timers, one control period apart in all.
     fn each(phases: u32, mut run: impl FnMut(&Self)) {
-        for phase in 0..phases {
-            for finder in [Finder::Control, Finder::Pwm, Finder::Hardware] {
-                for fault_in in 0..WINDOW {
-                    for acknowledge_in in 0..WINDOW {
-                        let phase_ticks = phase * CLOCK.control_ticks / phases;
-                        let again = |ahead: u32| (ahead > 0).then_some(acknowledge_in + ahead);
-                        for again_in in (0..4).map(again) {
-                            run(&Self { phase_ticks, finder, fault_in, acknowledge_in, again_in });
-                        }
-                    }
+        let finders = [Finder::Control, Finder::Pwm, Finder::Hardware];
+        for (phase, finder) in (0..phases).flat_map(|phase| finders.map(|finder| (phase, finder))) {
+            let phase_ticks = phase * CLOCK.control_ticks / phases;
+            for (fault_in, acknowledge_in) in (0..WINDOW * WINDOW).map(|both| (both / WINDOW, both % WINDOW))
+            {
+                let again = |ahead: u32| (ahead > 0).then_some(acknowledge_in + ahead);
+                for again_in in (0..4).map(again) {
+                    run(&Self { phase_ticks, finder, fault_in, acknowledge_in, again_in });
                 }
             }
         }

@@ -67,12 +67,12 @@ fn error(folder: &Path, wanted: Flux) -> f64 {
     worst
 }
 
-#[test]
-fn maps_of_other_tools_are_the_machine_that_they_are_of() {
+/// Maps as other tools write them: what is odd, the file, the options that it takes, and the largest error.
+fn foreign() -> [(&'static str, String, &'static str, f64); 5] {
     let root = 2.0_f64.sqrt();
     let (d, q) = (axis(-22.0, 1.0, 26), axis(0.0, 1.0, 23));
     let both = axis(-22.0, 1.0, 45);
-    let cases: [(&str, String, &str, f64); 5] = [
+    [
         (
             "names with units in brackets, a torque beside them, half a plane",
             map("Iq [A],Id [A],Torque [Nm],Psi_d [Vs],Psi_q [Vs]", &q, &d, |iq, id| {
@@ -124,9 +124,13 @@ fn maps_of_other_tools_are_the_machine_that_they_are_of() {
             "",
             3e-3,
         ),
-    ];
+    ]
+}
+
+#[test]
+fn maps_of_other_tools_are_the_machine_that_they_are_of() {
     let folder = tempfile::tempdir().unwrap();
-    for (k, (what, text, options, bound)) in cases.iter().enumerate() {
+    for (k, (what, text, options, bound)) in foreign().iter().enumerate() {
         let (file, out) = (folder.path().join(format!("{k}.csv")), folder.path().join(format!("made-{k}")));
         std::fs::write(&file, text).unwrap();
         let output = import(&file, options, &out);

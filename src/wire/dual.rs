@@ -256,10 +256,9 @@ mod tests {
     use crate::operator::{State, Switches};
     use crate::recorder::DualState;
 
-    #[test]
-    fn what_is_sent_arrives() {
+    fn sample() -> DualSample {
         let current = Abc { a: 1.5, b: -2.5, c: 1.0 };
-        let sample = DualSample {
+        DualSample {
             currents_a: [current, Abc { a: 0.25, ..current }],
             angles: [Some(Angle(0x1234_5678)), None],
             capacitor_v: 533.5,
@@ -267,8 +266,11 @@ mod tests {
             source_v: 400.0,
             may_pulse: true,
             hardware: Some(HardwareBreak { fault: Fault::GateDriver, seen: 0x3FF }),
-        };
-        let command = DualDriveCommand {
+        }
+    }
+
+    fn command() -> DualDriveCommand {
+        DualDriveCommand {
             enable: true,
             demands: [
                 MotorDemand::Speed(104.5),
@@ -278,7 +280,12 @@ mod tests {
             scheme: Scheme::Zvo,
             speed_torque_nm: DualDriveCommand::UNLIMITED_NM,
             acknowledge: 0,
-        };
+        }
+    }
+
+    #[test]
+    fn samples_and_set_up_arrive() {
+        let (sample, command) = (sample(), command());
         let block = dual_sample_to_block(&sample, &command, true);
         let (arrived, words, stop) = dual_sample_from_block(&block);
         assert_eq!((arrived, dual_command_from_words(words), stop), (sample, command, true));
@@ -289,30 +296,35 @@ mod tests {
             gates: GateFeedback { on: 0x1A5, off: 0x05A },
         };
         assert_eq!(power_from_block(&power_to_block(&power)), power);
-        let mut gates = [GateTicks { off_from: 1, off_to: 40_000 }; 9];
-        gates[4] = GateTicks { off_from: 65_535, off_to: 65_535 };
-        let report = DualReport { torque_nm: [1.0, -2.0], weakening: [false, true], ..DualReport::default() };
         let setup = DualSetup { carrier_ticks: 2_500, dead_time_ticks: 125, line: None };
         let line = Some(LineTimes { precharge_s: 0.05, discharge_s: 0.5 });
         for setup in [setup, DualSetup { line, ..setup }] {
             assert_eq!(dual_setup_from_block(&dual_setup_to_block(setup)), setup);
         }
         let feedback = Feedback { main_closed: true, ..Feedback::default() };
-        let frame = Some(Frame { id: 0x111, length: 8, data: [1, 2, 3, 4, 5, 6, 7, 8] });
-        for frame in [None, frame] {
+        for frame in [None, FRAME] {
             assert_eq!(dual_asked_from_block(&dual_asked_to_block(&feedback, frame)), (feedback, frame));
         }
+    }
+
+    const FRAME: Option<Frame> = Some(Frame { id: 0x111, length: 8, data: [1, 2, 3, 4, 5, 6, 7, 8] });
+
+    #[test]
+    fn requests_arrive() {
+        let mut gates = [GateTicks { off_from: 1, off_to: 40_000 }; 9];
+        gates[4] = GateTicks { off_from: 65_535, off_to: 65_535 };
+        let report = DualReport { torque_nm: [1.0, -2.0], weakening: [false, true], ..DualReport::default() };
         let status = DualStatus {
             state: State::Running,
             trip: None,
             refusal: None,
             refusals: 1,
-            torque_nm: command.demands,
+            torque_nm: command().demands,
             switches: Switches { main: true, ..Switches::default() },
         };
         let record = DualRecord {
             at: Instant(12),
-            currents_a: sample.currents_a,
+            currents_a: sample().currents_a,
             angles: [Angle(1), Angle(2)],
             capacitor_v: 533.0,
             source_v: 400.0,
@@ -333,7 +345,7 @@ mod tests {
             DualRequest::End,
             DualRequest::Leave(Instant(13)),
             DualRequest::Ask(Instant(14)),
-            DualRequest::Tell(Instant(15), status, frame),
+            DualRequest::Tell(Instant(15), status, FRAME),
         ] {
             assert_eq!(DualRequest::from_block(&request.to_block()), Some(request));
         }

@@ -1,6 +1,6 @@
 //! Field weakening: constant-torque curves cut with circles of constant flux linkage.
 
-use crate::{FluxMap, Optimum, Parameters, SmoothMap};
+use crate::{MachineFolder, Optimum, SmoothMap};
 
 /// One circle.
 pub struct Circle {
@@ -22,17 +22,16 @@ struct Point {
     torque: f64,
 }
 
-/// The circle of flux linkage `psi_wb` within a current limit, with currents at `torque · shares`.
+/// The circle of flux linkage `psi_wb` of a machine within a current limit, with currents at `torque · shares`.
 pub fn circle(
     psi_wb: f64,
     shares: &[f64],
     map: &SmoothMap,
-    nodes: &FluxMap,
-    parameters: &Parameters,
+    machine: &MachineFolder,
     max_current_a: f64,
 ) -> Circle {
-    let optimum = Optimum::new(map, parameters);
-    let highest_id = nodes.id_a[nodes.id_a.len() - 1];
+    let optimum = Optimum::new(map, &machine.parameters);
+    let highest_id = machine.map.id_a[machine.map.id_a.len() - 1];
     let arc = rising_arc(psi_wb, map, &optimum, max_current_a);
     let Some(top) = arc.last().copied() else {
         // No current within the limit has this flux: nothing to give, and the current that comes nearest.
@@ -163,7 +162,7 @@ mod tests {
         let highest_id = machine.map.id_a[machine.map.id_a.len() - 1];
         let (mut inside, mut on, mut worst) = (0, 0, 0.0_f64);
         for psi_wb in (5..120).map(|k| 0.01 * f64::from(k) * flux_wb(0.0, most_a)) {
-            let circle = circle(psi_wb, &SHARES, &smooth, &machine.map, &machine.parameters, most_a);
+            let circle = circle(psi_wb, &SHARES, &smooth, &machine, most_a);
             if circle.torque_nm <= TINY_TORQUE_NM {
                 continue;
             }

@@ -150,14 +150,8 @@ impl<'a> Circles<'a> {
         let wide_wb = self.flux_wb(k as f64 / (ROWS - 1) as f64);
         let psi_wb = wide_wb * (1.0 - flux[COLUMNS - 1]);
         let max_current_a = self.machine.parameters.max_current_a * (1.0 - current);
-        let Circle { torque_nm, currents_a } = circle(
-            psi_wb,
-            &self.shares,
-            self.smooth,
-            &self.machine.map,
-            &self.machine.parameters,
-            max_current_a,
-        );
+        let Circle { torque_nm, currents_a } =
+            circle(psi_wb, &self.shares, self.smooth, self.machine, max_current_a);
         let least = LEAST_EFFECTIVE * self.flux_wb(1.0);
         let nodes = currents_a.iter().zip(&self.shares).zip(flux).map(|((start, share), margin)| {
             let wanted_nm = share * torque_nm;

@@ -164,12 +164,11 @@ impl Tasks for Host {
                 let gates = [leg, leg + 3, leg + 6];
                 let pauses = pauses(gates.map(|gate| &period.gates[gate]), dead);
                 for (gate, (from, to)) in gates.into_iter().zip(pauses) {
-                    for (from, to) in [(from, to), (2 * HALF - to, 2 * HALF - from)] {
-                        if from < to {
-                            let pulse = pulses[gate].pause(at(*begins, from), at(*begins, to));
-                            span.edges
-                                .extend(pulse.into_iter().flat_map(|pulse| pulse.edges(gate, scale.dead)));
-                        }
+                    let both = [(from, to), (2 * HALF - to, 2 * HALF - from)];
+                    for (from, to) in both.into_iter().filter(|(from, to)| from < to) {
+                        let pulse = pulses[gate].pause(at(*begins, from), at(*begins, to));
+                        let edges = pulse.into_iter().flat_map(|pulse| pulse.edges(gate, scale.dead));
+                        span.edges.extend(edges);
                     }
                 }
             }

@@ -1,7 +1,6 @@
 //! The cost of the parts of an interrupt: every executed instruction belongs to one part, so they add up to the interrupt.
 
 use super::profile::{Place, Profile};
-use super::tally::Tally;
 use crate::build;
 use anyhow::{Result, bail};
 use std::collections::{BTreeMap, BTreeSet};
@@ -93,12 +92,11 @@ pub fn together<'a>(parts: impl Iterator<Item = &'a Part>) -> (f64, u32) {
     parts.fold((0.0, 0), |(mean, longest), part| (mean + part.mean, longest + part.longest))
 }
 
-/// The parts of an interrupt that came `calls` times, by their groups, the dearest first. The sources that instructions came from are
-/// added to `sources`.
+/// The parts of an interrupt that came `calls` times and executed what `hits` counts by address, by their groups, the dearest first. The
+/// sources that instructions came from are added to `sources`.
 pub fn parts(
     profile: &Profile,
-    exception: u32,
-    hits: &Tally,
+    hits: impl Iterator<Item = (u32, u64)>,
     calls: usize,
     longest: &[u32],
     sources: &mut BTreeSet<&'static str>,
@@ -115,7 +113,7 @@ pub fn parts(
         Ok(name)
     };
     let mut sums = BTreeMap::<&str, (u64, u32)>::new();
-    for (address, count) in hits.of(exception) {
+    for (address, count) in hits {
         sums.entry(part(address)?).or_default().0 += count;
     }
     for address in longest {

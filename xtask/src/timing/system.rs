@@ -293,7 +293,7 @@ impl Measured {
         for (name, exception) in INTERRUPTS {
             let longest = sum.longest.get(&exception).map_or(&[][..], Vec::as_slice);
             let calls = sum.calls.get(&exception).copied().unwrap_or(0);
-            parts.push((name, parts::parts(&profile, exception, &sum.hits, calls, longest, &mut sources)?));
+            parts.push((name, parts::parts(&profile, sum.hits.of(exception), calls, longest, &mut sources)?));
         }
         let masking = entry::masking(&image, is_link);
         let [(_, control), _] = INTERRUPTS;
