@@ -17,7 +17,7 @@ use crate::frames::Angle;
 use crate::machine::{Machine, Tables};
 use crate::modulation::{Mode, Reference, Schedule};
 use crate::ports::{ControlPort, Report, Sample, Traction};
-use crate::protection::{Fault, FrozenWatch, MaskedFaults, Trip};
+use crate::protection::{DiodeWatch, Fault, FrozenWatch, MaskedFaults, Trip};
 use crate::recorder::{Record, State};
 use crate::time::{Clock, Instant};
 use core::sync::atomic::Ordering;
@@ -41,6 +41,7 @@ pub struct ControlTask<M = &'static Tables, L = Controller> {
     controller: L,
     pulses: Pulses,
     watch: FrozenWatch,
+    diodes: DiodeWatch,
     /// Nominal instant of the next call.
     now: Instant,
     /// Instant of the newest carrier boundary that was used.
@@ -94,6 +95,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             controller,
             pulses: Pulses::new(&settings, Schedule::new(&settings.clock)),
             watch: FrozenWatch::new(),
+            diodes: DiodeWatch::new(),
             now: first,
             boundary: None,
             aimed: None,
@@ -244,6 +246,9 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             true
         } else {
             self.rest(now, omega, measured);
+            if let Some(trip) = self.trip {
+                self.stay_safe(trip, seen, port);
+            }
             let commands = command.enable.then_some(slot.commands);
             let pulses = self.start_up(sample, commands, shared, port);
             if pulses {

@@ -1,11 +1,11 @@
 //! The checks of a period, and the trip that comes of them.
 
-use super::ControlTask;
+use super::{ControlTask, Seen};
 use crate::control::{ControlLaw, Measurements};
 use crate::frames::Angle;
 use crate::machine::Machine;
 use crate::ports::{ControlPort, DriveCommand, Sample};
-use crate::protection::{self, Trip, Violation};
+use crate::protection::{self, SafeState, Trip, Violation};
 
 impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
     /// Follows the angle; returns the electrical speed, in rad/s. An angle that cannot be, or is not known, leaves the speed as it was. It
@@ -91,6 +91,24 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             protection::safe_state(self.controller.omega(), sample.udc_v, &self.machine.tables().ratings);
         port.enter(safe, at);
         self.trip = Some(Trip { fault, value, limit, at, safe });
+    }
+
+    /// A period after a trip: gates that are off become the short circuit where the machine goes on generating through the diodes.
+    #[cold]
+    #[inline(never)]
+    pub(super) fn stay_safe(&mut self, trip: Trip, seen: &Seen, port: &mut impl ControlPort) {
+        let ratings = &self.machine.tables().ratings;
+        let period_s = self.settings.clock.control_s();
+        if trip.safe != SafeState::GatesOff
+            || !self.diodes.generates(&seen.measured, seen.omega, period_s, ratings)
+        {
+            return;
+        }
+        let safe = port.leg_faults().in_place_of(SafeState::ShortCircuit, seen.omega, ratings);
+        if safe != SafeState::GatesOff {
+            port.enter(safe, seen.now);
+            self.trip = Some(Trip { safe, ..trip });
+        }
     }
 
     /// First of all checks: a leg that is stuck decides on the safe state.
