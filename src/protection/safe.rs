@@ -1,6 +1,6 @@
 //! The safe states, and which of them the speed asks for.
 
-use crate::control::Measurements;
+use super::LegFaults;
 use crate::frames::{Abc, SQRT_3};
 use crate::machine::Ratings;
 
@@ -71,16 +71,37 @@ impl DiodeWatch {
         Self { turned_rad: 0.0 }
     }
 
-    /// A period with the gates off at an electrical angular speed in rad/s; `true` once a current that the EMF may hold has flowed for an
-    /// electrical turn. What is not a number is no current.
-    pub fn generates(&mut self, measured: &Measurements, omega: f32, period_s: f32, ratings: &Ratings) -> bool {
+    /// A period after a trip into the state `safe`; the short circuit once gates that are off should become it, because a current that the EMF
+    /// may hold has flowed for an electrical turn. What is not a number is no current.
+    pub fn step(
+        &mut self,
+        safe: SafeState,
+        open: &OpenGates,
+        legs: &LegFaults,
+        ratings: &Ratings,
+    ) -> Option<SafeState> {
+        let OpenGates { currents_a: Abc { a, b, c }, udc_v, omega, period_s } = *open;
         let least_a = FLOWING_SHARE * ratings.max_current_a;
-        let Abc { a, b, c } = measured.currents_a;
         let flows = [a, b, c].iter().any(|current| current.abs() > least_a);
-        let held = emf_v(omega, ratings) > GENERATING_SHARE * standing_v(measured.udc_v, ratings);
-        self.turned_rad = if flows && held { self.turned_rad + omega.abs() * period_s } else { 0.0 };
-        self.turned_rad > core::f32::consts::TAU
+        let held = emf_v(omega, ratings) > GENERATING_SHARE * standing_v(udc_v, ratings);
+        let generates = safe == SafeState::GatesOff && flows && held;
+        self.turned_rad = if generates { self.turned_rad + omega.abs() * period_s } else { 0.0 };
+        let shorted = legs.in_place_of(SafeState::ShortCircuit, omega, ratings);
+        (self.turned_rad > core::f32::consts::TAU && shorted != safe).then_some(shorted)
     }
+}
+
+/// A period with the gates off, as either interrupt sees it.
+#[derive(Clone, Copy, Debug)]
+pub struct OpenGates {
+    /// Phase currents, in A.
+    pub currents_a: Abc,
+    /// DC-link voltage, in V.
+    pub udc_v: f32,
+    /// Electrical angular speed, in rad/s.
+    pub omega: f32,
+    /// Its length, in s.
+    pub period_s: f32,
 }
 
 /// The link's voltage, in V; above its nominal voltage that: it will not stay there.

@@ -6,7 +6,7 @@ use crate::frames::{Abc, UNITS_PER_RADIAN};
 use crate::machine::{Machine, Tables};
 use crate::modulation::{CarrierHalf, Mode, compensate};
 use crate::ports::PwmPort;
-use crate::protection::{self, Fault, MaskedFaults, SafeState, Trip, Violation};
+use crate::protection::{self, DiodeWatch, Fault, MaskedFaults, OpenGates, SafeState, Trip, Violation};
 use crate::time::{Clock, Instant};
 use core::sync::atomic::Ordering;
 
@@ -31,6 +31,7 @@ pub struct PwmTask<M = &'static Tables> {
     currents_a: Abc,
     currents_before_a: Abc,
     trip: Option<Trip>,
+    diodes: DiodeWatch,
     disarmed: MaskedFaults,
     /// Number of the release that was carried out last.
     released: u8,
@@ -49,6 +50,7 @@ impl<M: Machine> PwmTask<M> {
             currents_a: Abc { a: 0.0, b: 0.0, c: 0.0 },
             currents_before_a: Abc { a: 0.0, b: 0.0, c: 0.0 },
             trip: None,
+            diodes: DiodeWatch::new(),
             disarmed: MaskedFaults::NONE,
             released: 0,
         }
@@ -166,8 +168,8 @@ impl<M: Machine> PwmTask<M> {
     }
 
     fn check(&mut self, newest: Option<&PlannedRecord>, port: &mut impl PwmPort, shared: &Shared) {
-        if self.trip.is_some() {
-            return;
+        if let Some(trip) = self.trip {
+            return self.stay_safe(trip, newest, port);
         }
         let now = self.begins;
         let legs = port.leg_faults();
@@ -188,14 +190,33 @@ impl<M: Machine> PwmTask<M> {
         let Some((fault, value, limit)) = violation else {
             return;
         };
+        let (omega, udc_v) = self.told(newest);
+        let safe = legs.safe_state(omega, udc_v, &self.tables().ratings);
+        port.enter(safe, now);
+        self.latch(Trip { fault, value, limit, at: now, safe }, shared);
+    }
+
+    /// The electrical speed, in rad/s, and the link's voltage, in V, as control told them last.
+    fn told(&self, newest: Option<&PlannedRecord>) -> (f32, f32) {
         let (rate, udc_v) = match newest {
             Some(half) => (half.rate(), half.udc_v()),
             None => (0.0, self.tables().ratings.dc_link_nominal_v),
         };
-        let omega = rate * self.settings.clock.ticks_per_s / UNITS_PER_RADIAN;
-        let safe = legs.safe_state(omega, udc_v, &self.tables().ratings);
-        port.enter(safe, now);
-        self.latch(Trip { fault, value, limit, at: now, safe }, shared);
+        (rate * self.settings.clock.ticks_per_s / UNITS_PER_RADIAN, udc_v)
+    }
+
+    /// As control's `stay_safe`, for where control is lost.
+    #[cold]
+    #[inline(never)]
+    fn stay_safe(&mut self, trip: Trip, newest: Option<&PlannedRecord>, port: &mut impl PwmPort) {
+        let (omega, udc_v) = self.told(newest);
+        let period_s = self.settings.clock.seconds(self.begins.since(self.at));
+        let open = OpenGates { currents_a: self.currents_a, udc_v, omega, period_s };
+        let ratings = &self.tables().ratings;
+        if let Some(safe) = self.diodes.step(trip.safe, &open, &port.leg_faults(), ratings) {
+            port.enter(safe, self.begins);
+            self.trip = Some(Trip { safe, ..trip });
+        }
     }
 
     /// A half that was loaded after its beginning: the board has turned the gates off.

@@ -5,7 +5,7 @@ use crate::control::{ControlLaw, Measurements};
 use crate::frames::Angle;
 use crate::machine::Machine;
 use crate::ports::{ControlPort, DriveCommand, Sample};
-use crate::protection::{self, SafeState, Trip, Violation};
+use crate::protection::{self, OpenGates, Trip, Violation};
 
 impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
     /// Follows the angle; returns the electrical speed, in rad/s. An angle that cannot be, or is not known, leaves the speed as it was. It
@@ -97,15 +97,14 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
     #[cold]
     #[inline(never)]
     pub(super) fn stay_safe(&mut self, trip: Trip, seen: &Seen, port: &mut impl ControlPort) {
+        let open = OpenGates {
+            currents_a: seen.measured.currents_a,
+            udc_v: seen.measured.udc_v,
+            omega: seen.omega,
+            period_s: self.settings.clock.control_s(),
+        };
         let ratings = &self.machine.tables().ratings;
-        let period_s = self.settings.clock.control_s();
-        if trip.safe != SafeState::GatesOff
-            || !self.diodes.generates(&seen.measured, seen.omega, period_s, ratings)
-        {
-            return;
-        }
-        let safe = port.leg_faults().in_place_of(SafeState::ShortCircuit, seen.omega, ratings);
-        if safe != SafeState::GatesOff {
+        if let Some(safe) = self.diodes.step(trip.safe, &open, &port.leg_faults(), ratings) {
             port.enter(safe, seen.now);
             self.trip = Some(Trip { safe, ..trip });
         }
