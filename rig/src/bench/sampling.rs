@@ -10,7 +10,7 @@ use tractive::protection::LegFaults;
 use tractive::time::Instant;
 
 /// The error of a current's reading that makes no difference which counts, in A: a tenth of the machine's largest current,
-/// which is what the sum of the phases may be. Errors of the other readings hide as much of it as they add up to.
+/// which is what the sum of the phases may be.
 const MUCH_A: f32 = 23.3;
 
 /// A control sample with what comes beside it.
@@ -76,9 +76,8 @@ impl Bench {
     fn read_currents(&mut self, true_a: Abc) -> Abc {
         let read_a = self.spoiler.currents(self.time.now_s(), true_a);
         let off = [read_a.a - true_a.a, read_a.b - true_a.b, read_a.c - true_a.c];
-        let much_a = MUCH_A + self.sensors.sum_error_a() as f32;
         // What is not a number is off as well.
-        if off.iter().any(|off| off.is_nan() || off.abs() > much_a) {
+        if off.iter().any(|off| off.is_nan() || off.abs() > MUCH_A) {
             self.observed.makes_a_difference(self.time.now);
         }
         read_a

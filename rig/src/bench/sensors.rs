@@ -105,16 +105,6 @@ impl Converter {
         if latest_s > 0.0 { turns_s * self.random.random_range(0.0..latest_s) } else { 0.0 }
     }
 
-    /// The most that the sum of three good readings may be off, in A: three times the noise's rms, and half a step of each.
-    pub fn sum_error_a(&self) -> f64 {
-        let noise_a = 3.0 * 3.0_f64.sqrt() * self.flaws.noise_a;
-        noise_a + self.flaws.adc_bits.map_or(0.0, |bits| 1.5 * self.step_a(bits))
-    }
-
-    fn step_a(&self, bits: u32) -> f64 {
-        2.0 * self.flaws.adc_full_scale_a / f64::from(bits).exp2()
-    }
-
     /// A phase's current as converted now, in A.
     fn convert(&mut self, phase: usize, current_a: f64) -> f64 {
         let offset_a = self.flaws.current_offsets_a[phase];
@@ -128,7 +118,7 @@ impl Converter {
             value += noise.sample(&mut self.random);
         }
         if let Some(bits) = self.flaws.adc_bits {
-            let step = self.step_a(bits);
+            let step = 2.0 * self.flaws.adc_full_scale_a / f64::from(bits).exp2();
             value = (value / step).round() * step;
         }
         value
@@ -212,11 +202,6 @@ impl Sensors {
     /// The phase currents as converted now.
     pub fn currents(&mut self, motor: &Motor) -> Abc {
         self.converter.currents(motor)
-    }
-
-    /// See [`Converter::sum_error_a`].
-    pub fn sum_error_a(&self) -> f64 {
-        self.converter.sum_error_a()
     }
 
     /// The phase currents that control is told at `t_s`, and the rotor's angle.
