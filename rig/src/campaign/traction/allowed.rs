@@ -23,9 +23,7 @@ impl Drive {
         let most_a = trip_a + (CURRENT_SHARE - 1.0) * trip_a * line_share.max(1.0);
         let current_a = match case.fault.cause {
             // Flux linkage that is there when a device fails cannot leave a machine that is shorted; nothing the gates do is better.
-            Cause::Bench(Kind::Device(_)) => {
-                most_a.max(FORCED * observed.stored.short_circuit_a)
-            }
+            Cause::Bench(Kind::Device(_)) => most_a.max(FORCED * observed.stored.short_circuit_a),
             _ => most_a,
         };
         let udc_v = self.forced_udc_v(case, observed);
