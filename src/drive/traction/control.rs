@@ -246,8 +246,8 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             true
         } else {
             self.rest(now, omega, measured);
-            if let Some(trip) = self.trip {
-                self.stay_safe(trip, seen, port);
+            if self.trip.is_some() {
+                self.stay_safe(measured, omega, port);
             }
             let commands = command.enable.then_some(slot.commands);
             let pulses = self.start_up(sample, commands, shared, port);

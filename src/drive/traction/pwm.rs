@@ -168,8 +168,9 @@ impl<M: Machine> PwmTask<M> {
     }
 
     fn check(&mut self, newest: Option<&PlannedRecord>, port: &mut impl PwmPort, shared: &Shared) {
-        if let Some(trip) = self.trip {
-            return self.stay_safe(trip, newest, port);
+        if self.trip.is_some() {
+            let (omega, udc_v) = self.told(newest);
+            return self.stay_safe(omega, udc_v, port);
         }
         let now = self.begins;
         let legs = port.leg_faults();
@@ -197,6 +198,7 @@ impl<M: Machine> PwmTask<M> {
     }
 
     /// The electrical speed, in rad/s, and the link's voltage, in V, as control told them last.
+    #[inline(always)]
     fn told(&self, newest: Option<&PlannedRecord>) -> (f32, f32) {
         let (rate, udc_v) = match newest {
             Some(half) => (half.rate(), half.udc_v()),
@@ -208,8 +210,8 @@ impl<M: Machine> PwmTask<M> {
     /// As control's `stay_safe`, for where control is lost.
     #[cold]
     #[inline(never)]
-    fn stay_safe(&mut self, trip: Trip, newest: Option<&PlannedRecord>, port: &mut impl PwmPort) {
-        let (omega, udc_v) = self.told(newest);
+    fn stay_safe(&mut self, omega: f32, udc_v: f32, port: &mut impl PwmPort) {
+        let Some(trip) = self.trip else { return };
         let period_s = self.settings.clock.seconds(self.begins.since(self.at));
         let open = OpenGates { currents_a: self.currents_a, udc_v, omega, period_s };
         let ratings = &self.tables().ratings;

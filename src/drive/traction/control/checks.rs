@@ -1,6 +1,6 @@
 //! The checks of a period, and the trip that comes of them.
 
-use super::{ControlTask, Seen};
+use super::ControlTask;
 use crate::control::{ControlLaw, Measurements};
 use crate::frames::Angle;
 use crate::machine::Machine;
@@ -96,16 +96,13 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
     /// A period after a trip: gates that are off become the short circuit where the machine goes on generating through the diodes.
     #[cold]
     #[inline(never)]
-    pub(super) fn stay_safe(&mut self, trip: Trip, seen: &Seen, port: &mut impl ControlPort) {
-        let open = OpenGates {
-            currents_a: seen.measured.currents_a,
-            udc_v: seen.measured.udc_v,
-            omega: seen.omega,
-            period_s: self.settings.clock.control_s(),
-        };
+    pub(super) fn stay_safe(&mut self, measured: &Measurements, omega: f32, port: &mut impl ControlPort) {
+        let Some(trip) = self.trip else { return };
+        let Measurements { currents_a, udc_v, .. } = *measured;
+        let open = OpenGates { currents_a, udc_v, omega, period_s: self.settings.clock.control_s() };
         let ratings = &self.machine.tables().ratings;
         if let Some(safe) = self.diodes.step(trip.safe, &open, &port.leg_faults(), ratings) {
-            port.enter(safe, seen.now);
+            port.enter(safe, self.now.before(self.settings.clock.control_ticks));
             self.trip = Some(Trip { safe, ..trip });
         }
     }
