@@ -59,7 +59,7 @@ const FLOWING_SHARE: f32 = 0.05;
 ///
 /// Where nothing is held, the current is gone within an electrical turn. From half the link on a short circuit brakes little, and so a sensor that
 /// shows a current which is none does no harm.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct DiodeWatch {
     /// By how much the rotor has turned while current flowed, in electrical rad.
     turned_rad: f32,

@@ -41,7 +41,6 @@ pub struct ControlTask<M = &'static Tables, L = Controller> {
     controller: L,
     pulses: Pulses,
     watch: FrozenWatch,
-    diodes: DiodeWatch,
     /// Nominal instant of the next call.
     now: Instant,
     /// Instant of the newest carrier boundary that was used.
@@ -77,6 +76,7 @@ pub struct ControlTask<M = &'static Tables, L = Controller> {
     harmonics: AngleHarmonics,
     innovation_rad: f32,
     zeros: CurrentZeros,
+    diodes: DiodeWatch,
 }
 
 impl<M: Machine> ControlTask<M> {
@@ -247,7 +247,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         } else {
             self.rest(now, omega, measured);
             if self.trip.is_some() {
-                self.stay_safe(measured, omega, port);
+                self.stay_safe(sample, omega, port);
             }
             let commands = command.enable.then_some(slot.commands);
             let pulses = self.start_up(sample, commands, shared, port);

@@ -31,10 +31,10 @@ pub struct PwmTask<M = &'static Tables> {
     currents_a: Abc,
     currents_before_a: Abc,
     trip: Option<Trip>,
-    diodes: DiodeWatch,
     disarmed: MaskedFaults,
     /// Number of the release that was carried out last.
     released: u8,
+    diodes: DiodeWatch,
 }
 
 impl<M: Machine> PwmTask<M> {

@@ -96,9 +96,9 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
     /// A period after a trip: gates that are off become the short circuit where the machine goes on generating through the diodes.
     #[cold]
     #[inline(never)]
-    pub(super) fn stay_safe(&mut self, measured: &Measurements, omega: f32, port: &mut impl ControlPort) {
+    pub(super) fn stay_safe(&mut self, sample: &Sample, omega: f32, port: &mut impl ControlPort) {
         let Some(trip) = self.trip else { return };
-        let Measurements { currents_a, udc_v, .. } = *measured;
+        let Sample { currents_a, udc_v, .. } = *sample;
         let open = OpenGates { currents_a, udc_v, omega, period_s: self.settings.clock.control_s() };
         let ratings = &self.machine.tables().ratings;
         if let Some(safe) = self.diodes.step(trip.safe, &open, &port.leg_faults(), ratings) {
