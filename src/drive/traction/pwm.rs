@@ -74,6 +74,9 @@ impl<M: Machine> PwmTask<M> {
         let boundary = port.begin();
         if boundary {
             self.pass(port, shared);
+            if let Some(trip) = self.trip {
+                self.stay_safe(trip, port, shared);
+            }
         } else {
             self.revise(port, shared);
         }
@@ -169,8 +172,7 @@ impl<M: Machine> PwmTask<M> {
 
     fn check(&mut self, newest: Option<&PlannedRecord>, port: &mut impl PwmPort, shared: &Shared) {
         if self.trip.is_some() {
-            let (omega, udc_v) = self.told(newest);
-            return self.stay_safe(omega, udc_v, port);
+            return;
         }
         let now = self.begins;
         let legs = port.leg_faults();
@@ -198,7 +200,6 @@ impl<M: Machine> PwmTask<M> {
     }
 
     /// The electrical speed, in rad/s, and the link's voltage, in V, as control told them last.
-    #[inline(always)]
     fn told(&self, newest: Option<&PlannedRecord>) -> (f32, f32) {
         let (rate, udc_v) = match newest {
             Some(half) => (half.rate(), half.udc_v()),
@@ -207,16 +208,20 @@ impl<M: Machine> PwmTask<M> {
         (rate * self.settings.clock.ticks_per_s / UNITS_PER_RADIAN, udc_v)
     }
 
-    /// As control's `stay_safe`, for where control is lost.
+    /// As control's `stay_safe`, for where control is lost: by what it told last.
     #[cold]
     #[inline(never)]
-    fn stay_safe(&mut self, omega: f32, udc_v: f32, port: &mut impl PwmPort) {
-        let Some(trip) = self.trip else { return };
+    fn stay_safe(&mut self, trip: Trip, port: &mut impl PwmPort, shared: &Shared) {
+        if trip.at == self.at {
+            // The interrupt that has found it is long enough.
+            return;
+        }
+        let (omega, udc_v) = self.told(shared.planned.last().map(PlannedRecord).as_ref());
         let period_s = self.settings.clock.seconds(self.begins.since(self.at));
         let open = OpenGates { currents_a: self.currents_a, udc_v, omega, period_s };
         let ratings = &self.tables().ratings;
         if let Some(safe) = self.diodes.step(trip.safe, &open, &port.leg_faults(), ratings) {
-            port.enter(safe, self.begins);
+            port.enter(safe, self.at);
             self.trip = Some(Trip { safe, ..trip });
         }
     }
