@@ -7,7 +7,7 @@ use tractive::frames::{Abc, AlphaBeta, Angle, Dq};
 use tractive::modulation::{CarrierHalf, Mode, SwitchLimits};
 use tractive::ports::Report;
 use tractive::ports::{ControlPort, DriveCommand, PwmPort, Sample};
-use tractive::protection::{Fault, FrozenWatch, LegFaults, SafeState, Trip};
+use tractive::protection::{DiodeWatch, Fault, FrozenWatch, LegFaults, OpenGates, SafeState, Trip};
 use tractive::time::{Clock, Instant};
 
 const CLOCK: Clock = Clock::new(25_000_000, 2_500);
@@ -364,6 +364,39 @@ fn the_safe_state_follows_the_emf() {
     }
     // On a lower link the diodes rectify earlier.
     assert_eq!(tractive::protection::safe_state(1300.0, 1000.0, &BUILT_IN.ratings), SafeState::ShortCircuit);
+}
+
+/// Gates off and `current` in phase u, at so much of the rule's speed: the time until the watch asks for another state, in turns.
+fn watched(current: f32, share: f32, legs: LegFaults) -> Option<(SafeState, f32)> {
+    let ratings = &BUILT_IN.ratings;
+    let omega = share * 1_500.0 / (3.0_f32.sqrt() * ratings.magnet_flux_wb);
+    let currents_a = Abc { a: current, b: f32::NAN, c: -current };
+    let open = OpenGates { currents_a, udc_v: 1_500.0, omega, period_s: 1e-4 };
+    let mut watch = DiodeWatch::new();
+    let mut step = |periods: u32| {
+        let safe = watch.step(SafeState::GatesOff, &open, &legs, ratings)?;
+        Some((safe, periods as f32 * 1e-4 * omega.abs() / std::f32::consts::TAU))
+    };
+    (1..1_000).find_map(&mut step)
+}
+
+#[test]
+fn gates_off_become_a_short_circuit_where_current_stays() {
+    let sound = LegFaults::default();
+    for share in [0.55, -0.55, 0.85, -0.85, 1.2] {
+        let (safe, turns) = watched(100.0, share, sound).unwrap();
+        assert_eq!(safe, SafeState::ShortCircuit, "{share}");
+        assert!((1.0..1.05).contains(&turns), "{share}: {turns} turns");
+    }
+    let high = LegFaults { high: 1, ..sound };
+    assert_eq!(watched(100.0, 0.85, high).unwrap().0, SafeState::UpperShortCircuit);
+    let blocked = LegFaults { blocked: 0b11, ..sound };
+    // No current; so slow that a short circuit could brake; a leg that cannot take part; no number.
+    for (current, share, legs) in
+        [(5.0, 0.85, sound), (300.0, 0.45, sound), (100.0, 0.85, blocked), (f32::NAN, 0.85, sound)]
+    {
+        assert_eq!(watched(current, share, legs), None, "{current} A, {share}");
+    }
 }
 
 /// A leg whose one driver blocks has the other device conducting: that one's rail is safe at every speed. Bits uh ul vh vl wh wl.

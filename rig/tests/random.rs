@@ -6,7 +6,6 @@ use tractive_rig::campaign::judge::Verdict;
 use tractive_rig::campaign::random::command::Random;
 use tractive_rig::campaign::traction::Drive;
 use tractive_rig::campaign::traction::random::DIMENSIONS;
-use tractive_rig::campaign::{Action, Outcome};
 use tractive_rig::scenario::traction::PatternsName;
 
 /// A case by what is odd about it; the first five dimensions have no sound value.
@@ -26,24 +25,14 @@ fn is_caught(run: &Run, fault: &str, named: &str) {
     assert_eq!(outcome.verdict, Verdict::Caught, "{outcome:#?}");
 }
 
-/// `true` for the generating through the diodes that the safe state's rule leaves: gates off while braking near the speed where the
-/// machine's voltage meets the link's (docs/campaigns.md).
-fn generates(outcome: &Outcome) -> bool {
-    outcome.action == Action::Braking
-        && outcome.safe_state == "gates off"
-        && (3_000.0..4_300.0).contains(&outcome.speed_rpm.abs())
-        && outcome.why.starts_with("N·m with safe gates")
-}
-
 /// A hundred runs of each of three campaigns.
 #[test]
-fn nothing_else_escapes_random_runs_and_every_number_is_one() {
+fn nothing_escapes_random_runs_and_every_number_is_one() {
     for seed in [11, 12, 13] {
         let random = Random::new(100, seed, PatternsName::Paper).unwrap();
         let runs: Vec<Run> = (0..100).into_par_iter().map(|run| random.run(run).unwrap()).collect();
         for Run { outcome, drawn } in runs {
-            let escapes = outcome.verdict == Verdict::Uncaught && !generates(&outcome);
-            assert!(!escapes, "seed {seed}, run {}: {outcome:#?}", drawn.run);
+            assert_ne!(outcome.verdict, Verdict::Uncaught, "seed {seed}, run {}: {outcome:#?}", drawn.run);
             let worst =
                 [outcome.current_until_a, outcome.current_after_a, outcome.udc_until_v, outcome.udc_after_v];
             assert!(worst.iter().all(|value| value.is_finite()), "{outcome:#?}");
@@ -63,4 +52,23 @@ fn trip_levels_are_those_of_what_is_read() {
     let odd = [("capacitance_mf", 4.376), ("udc_gain", -0.009493)];
     let run = case(0.6736472960417522, 0.8356279498501046, (-2666.7, 0.0788, 7.2717), &odd);
     is_caught(&run, "link-over", "dc_overvoltage");
+}
+
+/// Of ten thousand runs with the paper's patterns: current that the diodes keep alive after a fault that control finds, and where control is
+/// lost; a sensor's error that is found while it is small; a link of 1,714 V, on which current rises faster. Of three thousand with optimised ones: pulses
+/// that begin where the diodes rectify, after rest and after a pause in which torque changes its sign.
+#[test]
+fn what_large_campaigns_found_stays_mended() {
+    const FOUND: [(usize, PatternsName, &[usize]); 3] = [
+        (1_000, PatternsName::Paper, &[167, 484, 680]),
+        (10_000, PatternsName::Paper, &[4619, 5142, 7805, 8012]),
+        (3_000, PatternsName::Optimal, &[93, 570, 996, 2775]),
+    ];
+    for (runs, patterns, numbers) in FOUND {
+        let random = Random::new(runs, 1, patterns).unwrap();
+        numbers.par_iter().for_each(|number| {
+            let outcome = random.run(*number).unwrap().outcome;
+            assert_ne!(outcome.verdict, Verdict::Uncaught, "run {number} of {runs}: {outcome:#?}");
+        });
+    }
 }

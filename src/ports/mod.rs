@@ -123,7 +123,8 @@ pub trait ControlPort<S: System = Traction> {
     fn command(&mut self, _now: Instant, operator: impl FnOnce() -> S::Command) -> S::Command {
         operator()
     }
-    /// Puts the gates into the safe state at once, until an acknowledge, whatever is played.
+    /// Puts the gates into the safe state at once, until an acknowledge, whatever is played. Gates off may become a short circuit later; a
+    /// short circuit stays one, whatever either interrupt orders then.
     fn enter(&mut self, safe: SafeState, now: Instant);
     /// By how many ticks the interrupt, begun nominally at `now`, has outlived `deadline_ticks`; 0 when in time.
     fn overrun_ticks(&mut self, now: Instant, deadline_ticks: u32) -> u32;
@@ -154,7 +155,7 @@ pub trait PwmPort<S: System = Traction> {
     fn sample(&mut self, now: Instant) -> S::PwmSample;
     /// Loads the shadow registers: `next` takes over when the half that begins `now` ends; of the ZS9 at the next valley.
     fn play(&mut self, now: Instant, next: &S::Pulses);
-    /// Puts the gates into the safe state at once, until an acknowledge, whatever is played.
+    /// As [`ControlPort::enter`].
     fn enter(&mut self, safe: SafeState, now: Instant);
     /// `true` if what was played last came after the half that it was for had ended; the gates are off then.
     fn is_late(&mut self) -> bool {

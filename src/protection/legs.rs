@@ -27,13 +27,18 @@ impl LegFaults {
     }
 
     /// The safe state with such legs, for an electrical angular speed in rad/s; with sound ones that of [`safe_state`].
+    pub fn safe_state(&self, omega: f32, udc_v: f32, ratings: &Ratings) -> SafeState {
+        self.in_place_of(safe_state(omega, udc_v, ratings), omega, ratings)
+    }
+
+    /// The safe state with such legs in place of the one that sound legs would be in.
     ///
     /// - A driver that blocks alone has found the other device of its leg conducting: then the short circuit at that one's rail is
     ///   safe at every speed. With the gates off this leg and the diodes of the others would rectify the EMF into one half-wave
     ///   of several times the short circuit's current; and at the other rail the machine would have the whole link across it.
     /// - A leg without both devices makes the short circuit lopsided: gates off for as long as the link stands the EMF.
     /// - A leg without one of its devices takes part in the short circuit at the rail where it was seen.
-    pub fn safe_state(&self, omega: f32, udc_v: f32, ratings: &Ratings) -> SafeState {
+    pub fn in_place_of(&self, usual: SafeState, omega: f32, ratings: &Ratings) -> SafeState {
         const UPPER: u8 = 0b01_0101;
         let (upper, lower) = (self.blocked & UPPER, self.blocked >> 1 & UPPER);
         if lower & !upper != 0 {
@@ -42,7 +47,6 @@ impl LegFaults {
         if upper & !lower != 0 {
             return SafeState::ShortCircuit;
         }
-        let usual = safe_state(omega, udc_v, ratings);
         let stands_emf = emf_v(omega, ratings) < ratings.trip_dc_over_v;
         match usual {
             SafeState::ShortCircuit if self.blocked != 0 && stands_emf => SafeState::GatesOff,

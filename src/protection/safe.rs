@@ -1,6 +1,7 @@
 //! The safe states, and which of them the speed asks for.
 
-use crate::frames::SQRT_3;
+use super::LegFaults;
+use crate::frames::{Abc, SQRT_3};
 use crate::machine::Ratings;
 
 /// The inverter's safe states.
@@ -36,13 +37,77 @@ const RECTIFYING_MARGIN: f32 = 0.9;
 /// A link above its nominal voltage counts as nominal: it will not stay there.
 #[inline(never)]
 pub fn safe_state(omega: f32, udc_v: f32, ratings: &Ratings) -> SafeState {
-    let nominal_v = ratings.dc_link_nominal_v;
-    let udc_v = if udc_v < nominal_v { udc_v } else { nominal_v };
-    if emf_v(omega, ratings) > RECTIFYING_MARGIN * udc_v {
+    if emf_v(omega, ratings) > RECTIFYING_MARGIN * standing_v(udc_v, ratings) {
         SafeState::ShortCircuit
     } else {
         SafeState::GatesOff
     }
+}
+
+/// Share of the link above which the EMF can keep a current alive through the diodes.
+const GENERATING_SHARE: f32 = 0.5;
+/// Phase current that counts as one, as a share of the largest.
+const FLOWING_SHARE: f32 = 0.05;
+
+/// Looks for a machine that goes on generating through the diodes, once the gates are off.
+///
+/// A machine whose d axis has another inductance than its q axis holds a current through the diodes at an EMF that could not begin one: a
+/// load of power factor 1, as the diodes are, raises its voltage to `k = ξ/(2√(ξ − 1))` times the EMF, `ξ` the larger inductance over the
+/// smaller, and they conduct with a fundamental of `2 udc/π`. So from `2√3/(πk)` of `udc/(√3 ψ_f)` on what flows when the gates go off may
+/// stay: Jahns and Caliskan, "Uncontrolled generator operation of interior PM synchronous machines following high-speed inverter shutdown",
+/// IEEE Trans. Ind. Appl. 35(6), 1999. Up to `ξ` = 18 that is above [half the link](GENERATING_SHARE), with saturation and hot or cold magnets.
+///
+/// Where nothing is held, the current is gone within an electrical turn. From half the link on a short circuit brakes little, and so a sensor that
+/// shows a current which is none does no harm.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct DiodeWatch {
+    /// By how much the rotor has turned while current flowed, in electrical rad.
+    turned_rad: f32,
+}
+
+impl DiodeWatch {
+    /// Of gates that have just gone off.
+    pub const fn new() -> Self {
+        Self { turned_rad: 0.0 }
+    }
+
+    /// A period after a trip into the state `safe`; the short circuit once gates that are off should become it, because a current that the EMF
+    /// may hold has flowed for an electrical turn. What is not a number is no current.
+    pub fn step(
+        &mut self,
+        safe: SafeState,
+        open: &OpenGates,
+        legs: &LegFaults,
+        ratings: &Ratings,
+    ) -> Option<SafeState> {
+        let OpenGates { currents_a: Abc { a, b, c }, udc_v, omega, period_s } = *open;
+        let least_a = FLOWING_SHARE * ratings.max_current_a;
+        let flows = [a, b, c].iter().any(|current| current.abs() > least_a);
+        let held = emf_v(omega, ratings) > GENERATING_SHARE * standing_v(udc_v, ratings);
+        let generates = safe == SafeState::GatesOff && flows && held;
+        self.turned_rad = if generates { self.turned_rad + omega.abs() * period_s } else { 0.0 };
+        let shorted = legs.in_place_of(SafeState::ShortCircuit, omega, ratings);
+        (self.turned_rad > core::f32::consts::TAU && shorted != safe).then_some(shorted)
+    }
+}
+
+/// A period with the gates off, as either interrupt sees it.
+#[derive(Clone, Copy, Debug)]
+pub struct OpenGates {
+    /// Phase currents, in A.
+    pub currents_a: Abc,
+    /// DC-link voltage, in V.
+    pub udc_v: f32,
+    /// Electrical angular speed, in rad/s.
+    pub omega: f32,
+    /// Its length, in s.
+    pub period_s: f32,
+}
+
+/// The link's voltage, in V; above its nominal voltage that: it will not stay there.
+fn standing_v(udc_v: f32, ratings: &Ratings) -> f32 {
+    let nominal_v = ratings.dc_link_nominal_v;
+    if udc_v < nominal_v { udc_v } else { nominal_v }
 }
 
 /// Peak of the EMF between two phases without current, in V.

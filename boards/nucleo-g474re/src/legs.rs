@@ -175,9 +175,12 @@ impl Legs {
         self.outputs().leave()
     }
 
-    /// The three lower devices on for good, unless a break is latched. The dead time passes first, in hardware.
+    /// The three lower devices on for good, unless a break is latched that the drive has not made. The dead time passes first, in hardware.
     #[inline]
     pub fn short_circuit(&self) {
+        if self.software_break() == Some(SoftwareBreak::Drive) {
+            self.leave();
+        }
         if self.is_tripped() {
             return;
         }
@@ -187,8 +190,9 @@ impl Legs {
         self.outputs().switch_on();
     }
 
+    /// `true` if they are to be.
     #[inline]
-    fn is_short_circuited(&self) -> bool {
+    pub fn is_short_circuited(&self) -> bool {
         self.tim1.ccmr_output(FIRST_PAIR).read().ocm(0) == vals::Ocm::FORCE_INACTIVE
     }
 }

@@ -185,6 +185,7 @@ fn revise_pulses() {
 #[inline]
 fn enter(registers: &Registers, safe: SafeState) {
     match safe {
+        _ if registers.legs.is_short_circuited() => {}
         // Nothing here tells of a leg stuck at the upper rail.
         SafeState::GatesOff | SafeState::UpperShortCircuit => registers.legs.trip_by(SoftwareBreak::Drive),
         SafeState::ShortCircuit => registers.legs.short_circuit(),

@@ -81,6 +81,9 @@ pub struct Schedule {
     fixed: Option<Mode>,
     last_switch: Option<Instant>,
     dwell_ticks: i32,
+    /// The mode that catches a machine whose ladder's rung is an optimised pattern.
+    #[cfg(feature = "optimal")]
+    catches: Mode,
 }
 
 impl Schedule {
@@ -91,7 +94,14 @@ impl Schedule {
 
     /// The modes of a ladder, by frequency and modulation depth.
     pub const fn on(ladder: Ladder, clock: &Clock) -> Self {
-        Self { ladder, fixed: None, last_switch: None, dwell_ticks: (DWELL_S * clock.ticks_per_s) as i32 }
+        Self {
+            ladder,
+            fixed: None,
+            last_switch: None,
+            dwell_ticks: (DWELL_S * clock.ticks_per_s) as i32,
+            #[cfg(feature = "optimal")]
+            catches: Mode::Async,
+        }
     }
 
     /// Always the same mode, wherever its pulses lead.
@@ -122,8 +132,14 @@ impl Schedule {
         };
         match self.ladders_choice(now, mode, seen, devices) {
             wanted if mode != Mode::Off || !wanted.is_optimal() || self.fixed.is_some() => wanted,
-            _ if seen.depth < CARRIER_CATCHES => Mode::Async,
-            _ => Mode::Mid3,
+            _ => {
+                // The first command is made for the mode that was announced while there was no voltage.
+                if seen.voltage_v == 0.0 {
+                    self.catches = if seen.depth < CARRIER_CATCHES { Mode::Async } else { Mode::Mid3 };
+                }
+                let reach = pick(reached(Mode::Mid3.row(), shortest_notch(seen.rate, devices)), false);
+                if self.catches == Mode::Mid3 && seen.depth >= reach { Mode::Square } else { self.catches }
+            }
         }
     }
 

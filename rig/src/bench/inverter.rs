@@ -97,9 +97,9 @@ impl Inverter {
         self.half_start + Tick::from(self.half.period_ticks)
     }
 
-    /// `true` if the gates are in a safe state, whatever is played.
-    pub fn is_safe(&self) -> bool {
-        self.safe.is_some()
+    /// The safe state in which the gates are, whatever is played.
+    pub fn safe(&self) -> Option<SafeState> {
+        self.safe
     }
 
     /// The next half takes over at `tick`.

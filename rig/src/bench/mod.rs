@@ -190,14 +190,14 @@ impl Bench {
 
     /// An interrupt at `instant` orders the safe state.
     pub fn enter(&mut self, instant: Instant, safe: SafeState) {
-        if !self.will_be_safe() {
+        if self.will_be_safe().is_none_or(|before| before == SafeState::GatesOff && safe != before) {
             self.order(instant, Some(safe));
         }
     }
 
     /// The PWM interrupt at `instant` leaves it.
     pub fn leave(&mut self, instant: Instant) {
-        if self.will_be_safe() {
+        if self.will_be_safe().is_some() {
             self.order(instant, None);
         }
     }
@@ -206,8 +206,8 @@ impl Bench {
         self.orders.push(self.time.widen(instant) + SAFE_STATE_DELAY, order);
     }
 
-    /// `true` if the gates will be in a safe state once every order has reached them.
-    fn will_be_safe(&self) -> bool {
-        self.orders.last().map_or(self.inverter.is_safe(), Option::is_some)
+    /// The safe state in which the gates will be once every order has reached them.
+    fn will_be_safe(&self) -> Option<SafeState> {
+        self.orders.last().copied().unwrap_or(self.inverter.safe())
     }
 }

@@ -113,7 +113,7 @@ impl Bench {
             f1_hz: (report.omega / std::f32::consts::TAU).into(),
             map_error: report.map_error.into(),
             flowing_nm: report.flowing_nm.into(),
-            mode: if self.inverter.is_safe() { Mode::Off } else { self.inverter.half().mode },
+            mode: if self.inverter.safe().is_some() { Mode::Off } else { self.inverter.half().mode },
             trip: report.trip,
             status: self.dc.operated().and_then(|line| line.status),
             extremes: self.extremes.with([ia_a, ib_a, ic_a], te_nm),

@@ -86,6 +86,10 @@ impl Bench {
         while let Some(order) = self.orders.take(now) {
             match order {
                 Some(safe) => {
+                    // A sensor whose error is found while it still makes no difference that counts.
+                    if let Some(Kind::Current(..)) = self.spoiler.injected.kind(self.time.now_s()) {
+                        self.observed.makes_a_difference(now);
+                    }
                     self.inverter.enter(safe, now);
                     self.observed.enters(now, safe, self.stored());
                 }

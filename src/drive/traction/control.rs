@@ -17,7 +17,7 @@ use crate::frames::Angle;
 use crate::machine::{Machine, Tables};
 use crate::modulation::{Mode, Reference, Schedule};
 use crate::ports::{ControlPort, Report, Sample, Traction};
-use crate::protection::{Fault, FrozenWatch, MaskedFaults, Trip};
+use crate::protection::{DiodeWatch, Fault, FrozenWatch, MaskedFaults, Trip};
 use crate::recorder::{Record, State};
 use crate::time::{Clock, Instant};
 use core::sync::atomic::Ordering;
@@ -76,6 +76,7 @@ pub struct ControlTask<M = &'static Tables, L = Controller> {
     harmonics: AngleHarmonics,
     innovation_rad: f32,
     zeros: CurrentZeros,
+    diodes: DiodeWatch,
 }
 
 impl<M: Machine> ControlTask<M> {
@@ -94,6 +95,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             controller,
             pulses: Pulses::new(&settings, Schedule::new(&settings.clock)),
             watch: FrozenWatch::new(),
+            diodes: DiodeWatch::new(),
             now: first,
             boundary: None,
             aimed: None,
@@ -244,6 +246,9 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             true
         } else {
             self.rest(now, omega, measured);
+            if self.trip.is_some() {
+                self.stay_safe(sample, omega, port);
+            }
             let commands = command.enable.then_some(slot.commands);
             let pulses = self.start_up(sample, commands, shared, port);
             if pulses {

@@ -6,7 +6,7 @@ use crate::frames::{Abc, UNITS_PER_RADIAN};
 use crate::machine::{Machine, Tables};
 use crate::modulation::{CarrierHalf, Mode, compensate};
 use crate::ports::PwmPort;
-use crate::protection::{self, Fault, MaskedFaults, SafeState, Trip, Violation};
+use crate::protection::{self, DiodeWatch, Fault, MaskedFaults, OpenGates, SafeState, Trip, Violation};
 use crate::time::{Clock, Instant};
 use core::sync::atomic::Ordering;
 
@@ -34,6 +34,7 @@ pub struct PwmTask<M = &'static Tables> {
     disarmed: MaskedFaults,
     /// Number of the release that was carried out last.
     released: u8,
+    diodes: DiodeWatch,
 }
 
 impl<M: Machine> PwmTask<M> {
@@ -49,6 +50,7 @@ impl<M: Machine> PwmTask<M> {
             currents_a: Abc { a: 0.0, b: 0.0, c: 0.0 },
             currents_before_a: Abc { a: 0.0, b: 0.0, c: 0.0 },
             trip: None,
+            diodes: DiodeWatch::new(),
             disarmed: MaskedFaults::NONE,
             released: 0,
         }
@@ -72,6 +74,9 @@ impl<M: Machine> PwmTask<M> {
         let boundary = port.begin();
         if boundary {
             self.pass(port, shared);
+            if let Some(trip) = self.trip {
+                self.stay_safe(trip, port, shared);
+            }
         } else {
             self.revise(port, shared);
         }
@@ -188,14 +193,37 @@ impl<M: Machine> PwmTask<M> {
         let Some((fault, value, limit)) = violation else {
             return;
         };
+        let (omega, udc_v) = self.told(newest);
+        let safe = legs.safe_state(omega, udc_v, &self.tables().ratings);
+        port.enter(safe, now);
+        self.latch(Trip { fault, value, limit, at: now, safe }, shared);
+    }
+
+    /// The electrical speed, in rad/s, and the link's voltage, in V, as control told them last.
+    fn told(&self, newest: Option<&PlannedRecord>) -> (f32, f32) {
         let (rate, udc_v) = match newest {
             Some(half) => (half.rate(), half.udc_v()),
             None => (0.0, self.tables().ratings.dc_link_nominal_v),
         };
-        let omega = rate * self.settings.clock.ticks_per_s / UNITS_PER_RADIAN;
-        let safe = legs.safe_state(omega, udc_v, &self.tables().ratings);
-        port.enter(safe, now);
-        self.latch(Trip { fault, value, limit, at: now, safe }, shared);
+        (rate * self.settings.clock.ticks_per_s / UNITS_PER_RADIAN, udc_v)
+    }
+
+    /// As control's `stay_safe`, for where control is lost: by what it told last.
+    #[cold]
+    #[inline(never)]
+    fn stay_safe(&mut self, trip: Trip, port: &mut impl PwmPort, shared: &Shared) {
+        if trip.at == self.at {
+            // The interrupt that has found it is long enough.
+            return;
+        }
+        let (omega, udc_v) = self.told(shared.planned.last().map(PlannedRecord).as_ref());
+        let period_s = self.settings.clock.seconds(self.begins.since(self.at));
+        let open = OpenGates { currents_a: self.currents_a, udc_v, omega, period_s };
+        let ratings = &self.tables().ratings;
+        if let Some(safe) = self.diodes.step(trip.safe, &open, &port.leg_faults(), ratings) {
+            port.enter(safe, self.at);
+            self.trip = Some(Trip { safe, ..trip });
+        }
     }
 
     /// A half that was loaded after its beginning: the board has turned the gates off.

@@ -232,6 +232,23 @@ fn a_short_circuit_outlasts_what_is_played() {
     }
 }
 
+/// Gates that the drive has turned off may become the short circuit, which stays; those that the hardware has turned off may not.
+#[test]
+fn gates_off_become_a_short_circuit_that_stays() {
+    let mut rig = Rig::new();
+    rig.interrupt(&CarrierHalf::off(2_000));
+    for entered in [SafeState::GatesOff, SafeState::ShortCircuit, SafeState::GatesOff] {
+        rig.pwm.enter(entered, NOW);
+        rig.run(120);
+    }
+    assert_eq!(rig.gates(), [(false, true); 3]);
+    rig.bench.fault = [true; 2];
+    rig.bench.settle();
+    rig.pwm.enter(SafeState::ShortCircuit, NOW);
+    rig.run(120);
+    assert_eq!(rig.gates(), ALL_OFF);
+}
+
 #[test]
 fn an_answer_that_comes_after_its_half_turns_the_gates_off() {
     let mut rig = Rig::new();
@@ -296,14 +313,17 @@ proptest! {
     #[test]
     fn no_sequence_of_calls_turns_both_devices_of_a_leg_on(calls in proptest::collection::vec(calls(), 1..60)) {
         let mut rig = Rig::new();
-        let mut tripped = false;
+        let (mut tripped, mut shorted) = (false, false);
         for call in calls {
             match call {
                 Call::Play(half) => rig.interrupt(&half),
                 Call::Enter(safe) => {
                     rig.pwm.enter(safe, NOW);
                     rig.bench.settle();
-                    tripped |= safe == SafeState::GatesOff;
+                    // Gates off may become the short circuit, which then stays.
+                    shorted |= safe == SafeState::ShortCircuit;
+                    tripped |= safe == SafeState::GatesOff && !shorted;
+                    tripped &= safe == SafeState::GatesOff || rig.bench.registers.legs.is_tripped();
                 }
                 Call::Break => {
                     rig.bench.fault = [true; 2];

@@ -18,12 +18,13 @@ impl Drive {
         // Where the drive reads its trip levels.
         let trip_a = parameters.trip_current_a / (1.0 + flaws.current_gain);
         let over_v = parameters.trip_dc_over_v / (1.0 + flaws.udc_gain);
+        // Between two samples a current rises in proportion to the voltage of the link: half the trip level where that is the nominal one.
+        let line_share = case.conditions.line_v.map_or(1.0, |line_v| line_v / parameters.dc_link_nominal_v);
+        let most_a = trip_a + (CURRENT_SHARE - 1.0) * trip_a * line_share.max(1.0);
         let current_a = match case.fault.cause {
             // Flux linkage that is there when a device fails cannot leave a machine that is shorted; nothing the gates do is better.
-            Cause::Bench(Kind::Device(_)) => {
-                (CURRENT_SHARE * trip_a).max(FORCED * observed.stored.short_circuit_a)
-            }
-            _ => CURRENT_SHARE * trip_a,
+            Cause::Bench(Kind::Device(_)) => most_a.max(FORCED * observed.stored.short_circuit_a),
+            _ => most_a,
         };
         let udc_v = self.forced_udc_v(case, observed);
         let capacitance_f = case.conditions.filter.capacitance_f;

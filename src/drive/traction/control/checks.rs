@@ -5,7 +5,7 @@ use crate::control::{ControlLaw, Measurements};
 use crate::frames::Angle;
 use crate::machine::Machine;
 use crate::ports::{ControlPort, DriveCommand, Sample};
-use crate::protection::{self, Trip, Violation};
+use crate::protection::{self, OpenGates, Trip, Violation};
 
 impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
     /// Follows the angle; returns the electrical speed, in rad/s. An angle that cannot be, or is not known, leaves the speed as it was. It
@@ -91,6 +91,20 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             protection::safe_state(self.controller.omega(), sample.udc_v, &self.machine.tables().ratings);
         port.enter(safe, at);
         self.trip = Some(Trip { fault, value, limit, at, safe });
+    }
+
+    /// A period after a trip: gates that are off become the short circuit where the machine goes on generating through the diodes.
+    #[cold]
+    #[inline(never)]
+    pub(super) fn stay_safe(&mut self, sample: &Sample, omega: f32, port: &mut impl ControlPort) {
+        let Some(trip) = self.trip else { return };
+        let Sample { currents_a, udc_v, .. } = *sample;
+        let open = OpenGates { currents_a, udc_v, omega, period_s: self.settings.clock.control_s() };
+        let ratings = &self.machine.tables().ratings;
+        if let Some(safe) = self.diodes.step(trip.safe, &open, &port.leg_faults(), ratings) {
+            port.enter(safe, self.now.before(self.settings.clock.control_ticks));
+            self.trip = Some(Trip { safe, ..trip });
+        }
     }
 
     /// First of all checks: a leg that is stuck decides on the safe state.

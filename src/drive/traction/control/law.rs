@@ -8,7 +8,7 @@ use super::{ControlTask, Input};
 use crate::control::{
     AimInput, AngleHarmonics, ControlLaw, Demand, Law, LinkDamper, Measurements, RotorSample,
 };
-use crate::frames::{Angle, SinCos};
+use crate::frames::{Angle, SinCos, six_step_v};
 use crate::machine::Machine;
 use crate::modulation::{Mode, Reference};
 use crate::ports::Sample;
@@ -173,6 +173,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             rate: self.settings.clock.angle_rate(omega),
             at: now,
             udc_v: measured.udc_v,
+            depth: omega.abs() * self.machine.tables().ratings.magnet_flux_wb / six_step_v(measured.udc_v),
             ..Reference::NONE
         };
         self.harmonics.pause();
