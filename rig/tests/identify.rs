@@ -9,6 +9,7 @@ use std::ffi::OsStr;
 use std::path::Path;
 use std::process::Command;
 use tractive::modulation::Mode;
+use tractive_rig::bench::Wiring;
 use tractive_rig::identify::{Identify, Outcome, identified};
 use tractive_rig::machine::Machine;
 use tractive_rig::scenario::catalogue::{self, Chosen};
@@ -52,7 +53,7 @@ fn the_reference_machine_with_noise_dead_time_and_a_wrong_resistance() {
     assert!(found.magnet_error.abs() < 0.005, "{}", found.magnet_error);
     assert!(found.resistance_error.abs() < 0.01, "{}", found.resistance_error);
     assert!((found.fit.dead_time_s - 5e-6).abs() < 0.2e-6, "{}", found.fit.dead_time_s);
-    assert!((found.inertia_kg_m2 / 3.0 - 1.0).abs() < 0.01, "{}", found.inertia_kg_m2);
+    assert!((found.rotor.inertia_kg_m2 / 3.0 - 1.0).abs() < 0.01, "{}", found.rotor.inertia_kg_m2);
 }
 
 /// Charged, enabled, stopped and told by frames, which have fewer bits than the rig's own words.
@@ -96,13 +97,88 @@ fn the_machine_is_found_not_the_folder_that_the_drive_was_built_with() {
     assert!((share - 0.85).abs() < 0.005, "{share}");
 }
 
+/// The machines with the flaws of their experiments: noise and dead time as the same shares of current and carrier.
+const EVERY: [(&str, &str); 3] = [
+    ("pmasynrm-180kw", FLAWS),
+    ("pmsm-48v-1kw", "--noise-a 0.064 --dead-time-us 0.24 --uncompensated --rs-error 10"),
+    ("ipm-zs9", "--noise-a 0.18 --dead-time-us 0.48 --uncompensated --rs-error 10"),
+];
+
+/// The rotor is free, and the currents along what the angle says is d are not along d.
+#[test]
+fn a_zero_that_is_off_is_found_with_the_machine() {
+    let cases =
+        EVERY.into_iter().flat_map(|(name, flaws)| [-10.0, 10.0].map(|error_deg| (name, flaws, error_deg)));
+    cases.collect::<Vec<_>>().par_iter().for_each(|(name, flaws, error_deg)| {
+        let machine = Machine::load(name).unwrap();
+        let found = outcome(&machine, &format!("{flaws} --angle-error {error_deg}"));
+        keeps_its_place(&found);
+        let case = format!("{name}, {error_deg}°");
+        assert!((found.signs.zero_deg + error_deg).abs() < 0.3, "{case}: {}", found.signs.zero_deg);
+        assert!(found.flux_rms < 0.005, "{case}: {}", found.flux_rms);
+        assert!(found.flux_worst < 0.012, "{case}: {}", found.flux_worst);
+        assert!(found.torque_worst < 0.01, "{case}: {}", found.torque_worst);
+        assert!(found.magnet_error.abs() < 0.005, "{case}: {}", found.magnet_error);
+    });
+}
+
+/// Offsets of the sensors are known before the first pulse, and are no currents of the fit.
+#[test]
+fn offsets_of_the_current_sensors_are_found() {
+    for ((name, flaws), offset_a) in EVERY.into_iter().zip([3.0_f64, 0.4, 1.1]) {
+        let machine = Machine::load(name).unwrap();
+        let (first, other) = (offset_a, -0.5 * offset_a);
+        let found = outcome(&machine, &format!("{flaws} --current-offset-a {first},{other},{other}"));
+        keeps_its_place(&found);
+        assert!((found.offset_a - offset_a).abs() < 0.1 * offset_a, "{name}: {}", found.offset_a);
+        assert!(found.flux_rms < 0.005, "{name}: {}", found.flux_rms);
+        assert!(found.flux_worst < 0.012, "{name}: {}", found.flux_worst);
+        assert!(found.torque_worst < 0.01, "{name}: {}", found.torque_worst);
+        assert!(found.magnet_error.abs() < 0.005, "{name}: {}", found.magnet_error);
+    }
+}
+
+/// A fiftieth of the largest torque: a dry bearing and more.
+#[test]
+fn friction_is_found_beside_the_inertia() {
+    for (name, flaws) in EVERY {
+        let machine = Machine::load(name).unwrap();
+        let parameters = &machine.folder.parameters;
+        let friction_nm = 0.02 * parameters.max_torque_nm;
+        let found = outcome(&machine, &format!("{flaws} --friction {friction_nm}"));
+        keeps_its_place(&found);
+        let share = found.rotor.friction_nm / friction_nm;
+        assert!((share - 1.0).abs() < 0.05, "{name}: {share}");
+        let without = outcome(&machine, flaws).rotor;
+        assert!(without.friction_nm.abs() < 0.05 * friction_nm, "{name}: {}", without.friction_nm);
+        let inertia = found.rotor.inertia_kg_m2 / without.inertia_kg_m2;
+        assert!((inertia - 1.0).abs() < 0.01, "{name}: {inertia}");
+    }
+}
+
+/// Sensors of another sign or order: the wires that they have are told, and nothing else is done.
+#[test]
+fn wires_of_the_current_sensors_are_told() {
+    let every: Vec<_> = Wiring::every().iter().map(Wiring::to_string).collect();
+    let cases = EVERY
+        .into_iter()
+        .flat_map(|(name, flaws)| every.clone().into_iter().skip(1).map(move |wiring| (name, flaws, wiring)));
+    cases.collect::<Vec<_>>().par_iter().for_each(|(name, flaws, wiring)| {
+        let machine = Machine::load(name).unwrap();
+        let words = format!("{flaws} --current-sensors={wiring}");
+        let ended = identified(&parsed(&words), &machine).unwrap().err();
+        let ended = ended.unwrap_or_else(|| panic!("{name}: {wiring}"));
+        assert_eq!(
+            (ended.fault.as_str(), ended.value.as_str()),
+            ("current_sensors", wiring.as_str()),
+            "{name}"
+        );
+    });
+}
+
 #[test]
 fn the_other_machines_at_their_own_carriers() {
-    // Noise and dead time as the same shares of current and carrier.
-    for (name, flaws) in [
-        ("pmsm-48v-1kw", "--noise-a 0.064 --dead-time-us 0.24 --uncompensated --rs-error 10"),
-        ("ipm-zs9", "--noise-a 0.18 --dead-time-us 0.48 --uncompensated --rs-error 10"),
-    ] {
+    for (name, flaws) in EVERY.into_iter().skip(1) {
         let machine = Machine::load(name).unwrap();
         let found = outcome(&machine, flaws);
         keeps_its_place(&found);

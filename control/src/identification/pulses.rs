@@ -27,7 +27,7 @@ pub struct Pulses {
     /// Directions of the pulses.
     d: f32,
     q: f32,
-    /// Turn of the rotor since the pulses began, electrical, in rad; and its speed, in rad/s.
+    /// Turn of the rotor since the experiment began, electrical, in rad; and its speed, in rad/s.
     turned_rad: f32,
     omega: f32,
     /// Length of a half, in s.
@@ -50,9 +50,14 @@ const POSITIVE_SHARE: f32 = 0.2;
 /// pulse that is under way, and a time in s, by which the swing of any rotor is damped.
 const MOST_RAD: f32 = 0.028;
 const AHEAD_HALVES: f32 = 18.0;
-const AHEAD_S: f32 = 3e-3;
+const AHEAD_S: f32 = 8e-3;
 /// Least share of the bound that a side keeps.
 const LEAST_SIDE: f32 = 0.1;
+/// Current along q that takes the rotor back beside currents along d, as a share of the bound: at the most turn that there is to be, and at most,
+/// where with the longest of those it is the bound.
+const BACK_GAIN: f32 = 0.15;
+const BACK_S: f32 = 0.025;
+const BACK_SHARE: f32 = 0.24;
 
 impl Pulses {
     /// Before the first pulse.
@@ -69,6 +74,23 @@ impl Pulses {
     pub fn turned(&mut self, seen: &Seen) {
         self.turned_rad += seen.turned;
         self.omega = seen.omega;
+    }
+
+    /// Turn of the rotor since the experiment began, electrical, in rad.
+    pub fn turned_rad(&self) -> f32 {
+        self.turned_rad
+    }
+
+    /// The turn that there is soon, over the most that there is to be.
+    fn away(&self, pole_pairs: f32, ahead_s: f32) -> f32 {
+        let comes = self.turned_rad + self.omega * ahead_s;
+        comes / (pole_pairs * MOST_RAD)
+    }
+
+    /// The current along q over the bound that takes the rotor back to where it was, beside a negative one along d. Where currents that are to
+    /// lie along d turn the rotor, as its angle's zero is off, it comes to rest where this one takes their torque away.
+    pub fn back_share(&self, pole_pairs: f32) -> f32 {
+        limit(-BACK_GAIN * self.away(pole_pairs, BACK_S), -BACK_SHARE, BACK_SHARE)
     }
 
     /// Notes the length of a half, in s.
@@ -126,9 +148,7 @@ impl Pulses {
 
     /// The largest negative and positive current along q, in A.
     fn sides(&self, region: &Region) -> [f32; 2] {
-        let per_pole = 1.0 / region.ratings.pole_pairs;
-        let comes = self.turned_rad + self.omega * (AHEAD_HALVES * self.length_s + AHEAD_S);
-        let share = comes * per_pole / MOST_RAD;
+        let share = self.away(region.ratings.pole_pairs, AHEAD_HALVES * self.length_s + AHEAD_S);
         [1.0 + share, 1.0 - share]
             .map(|side| limit(side, LEAST_SIDE, 1.0) * region.share * KEPT_SHARE * region.bound_a)
     }
