@@ -66,7 +66,7 @@ fn a_zero_that_is_off_is_told_and_the_tables_are_made() {
 /// The rotor turns away under currents that are not along d by far: the experiment ends before it has gone far.
 #[test]
 fn an_angle_whose_zero_is_far_off_is_told_and_nothing_turns_with_it() {
-    for words in ["--angle-error 60", "--angle-error -60", "--angle-error 180"] {
+    for words in ["--angle-error 60", "--angle-error -60"] {
         let place = tempfile::tempdir().unwrap();
         let (code, said, record) = commissioned(words, place.path());
         assert_eq!(code, 1, "{words}: {said}");
@@ -83,13 +83,18 @@ fn an_angle_whose_zero_is_far_off_is_told_and_nothing_turns_with_it() {
 /// Current sensors whose wires are exchanged: which, and nothing turns.
 #[test]
 fn the_wires_of_the_current_sensors_are_told() {
-    for wiring in ["-u,-v,-w", "u,-v,w", "v,u,w", "v,w,u"] {
+    for wiring in ["-u,-v,-w", "v,u,w", "v,w,u", "-u,v,w"] {
         let place = tempfile::tempdir().unwrap();
         let (code, said, record) = commissioned(&format!("--current-sensors={wiring}"), place.path());
         assert_eq!(code, 1, "{said}");
         assert_eq!(steps(&record), [("wiring".to_owned(), true), ("identification".to_owned(), false)]);
         let advice = record["step"][1]["advice"][0].as_str().unwrap();
-        assert!(advice.starts_with(&format!("current sensors: those of u,v,w read {wiring}:")), "{advice}");
+        let told = if wiring == "-u,v,w" {
+            "current sensors: one or two have".to_owned()
+        } else {
+            format!("current sensors: those of u,v,w read {wiring}:")
+        };
+        assert!(advice.starts_with(&told), "{advice}");
         assert!(!place.path().join("found").exists());
     }
 }

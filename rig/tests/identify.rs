@@ -156,21 +156,25 @@ fn friction_is_found_beside_the_inertia() {
     }
 }
 
-/// Sensors of another sign or order: the wires that they have are told, and nothing else is done.
+/// Sensors of the wrong sign or in another order: their wires are told, and nothing else is done. Where some have the wrong sign the phases' sum is
+/// not zero, which is a fault.
 #[test]
 fn wires_of_the_current_sensors_are_told() {
-    let every: Vec<_> = Wiring::every().iter().map(Wiring::to_string).collect();
-    let cases = EVERY
-        .into_iter()
-        .flat_map(|(name, flaws)| every.clone().into_iter().skip(1).map(move |wiring| (name, flaws, wiring)));
-    cases.collect::<Vec<_>>().par_iter().for_each(|(name, flaws, wiring)| {
+    let one_sign =
+        Wiring::of_one_sign().into_iter().skip(1).map(|wiring| (wiring.to_string(), "current_sensors"));
+    let some = ["-u,v,w", "u,-v,w", "-u,-v,w", "v,u,-w"].map(|wiring| (wiring.to_owned(), "phase_sum"));
+    let wirings: Vec<_> = one_sign.chain(some).collect();
+    let cases: Vec<_> =
+        EVERY.iter().flat_map(|machine| wirings.iter().map(move |wiring| (machine, wiring))).collect();
+    cases.par_iter().for_each(|((name, flaws), (wiring, fault))| {
         let machine = Machine::load(name).unwrap();
-        let words = format!("{flaws} --current-sensors={wiring}");
-        let ended = identified(&parsed(&words), &machine).unwrap().err();
+        let ended =
+            identified(&parsed(&format!("{flaws} --current-sensors={wiring}")), &machine).unwrap().err();
         let ended = ended.unwrap_or_else(|| panic!("{name}: {wiring}"));
+        assert_eq!(ended.fault, *fault, "{name}: {wiring}: {ended:?}");
         assert_eq!(
-            (ended.fault.as_str(), ended.value.as_str()),
-            ("current_sensors", wiring.as_str()),
+            ended.wiring.map(|told| told.to_string()),
+            (*fault == "current_sensors").then(|| wiring.clone()),
             "{name}"
         );
     });
@@ -198,10 +202,11 @@ fn flaws_of(machine: &Machine) -> Vec<String> {
     words.split(' ').map(str::to_owned).collect()
 }
 
-/// The rig's own program, with exit code 0.
-fn rig(words: &[&OsStr]) {
+/// What the rig's own program says, with exit code 0.
+fn rig(words: &[&OsStr]) -> String {
     let output = Command::new(env!("CARGO_BIN_EXE_tractive-rig")).args(words).output().unwrap();
     assert!(output.status.success(), "{words:?}: {}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout).unwrap()
 }
 
 /// The chain of a machine folder: identified, its operating points and a sweep with what was found on the true machine.
@@ -212,7 +217,12 @@ fn is_found_and_driven(folder: &Path) {
     let flaws = flaws_of(&machine);
     let fixed = ["identify", "--machine"].map(OsStr::new).into_iter();
     let rest = [folder.as_os_str(), "--out".as_ref(), out.as_os_str(), "--page".as_ref(), page.as_os_str()];
-    rig(&fixed.chain(rest).chain(flaws.iter().map(OsStr::new)).collect::<Vec<_>>());
+    let flaws = flaws.iter().map(OsStr::new).chain(["--json".as_ref()]);
+    let told = rig(&fixed.chain(rest).chain(flaws).collect::<Vec<_>>());
+    let told: serde_json::Value = serde_json::from_str(&told).unwrap();
+    let [turned_deg, peak] =
+        ["turned_deg", "peak_current_percent_of_bound"].map(|name| told[name].as_f64().unwrap());
+    assert!(turned_deg < 5.0 && peak < 110.0, "{}: {turned_deg}°, {peak} % of the bound", folder.display());
     let points = worst_point_nm(&machine, folder, &out, place.path());
     let swept = worst_swept_nm(folder, &out);
     let most_nm = machine.folder.parameters.max_torque_nm;
@@ -295,6 +305,46 @@ fn machines_of_other_kinds_are_found_and_driven_with_what_was_found() {
         let folder = place.path().join(linear.name);
         std::fs::create_dir(&folder).unwrap();
         linear.write(&folder);
+        is_found_and_driven(&folder);
+    });
+}
+
+/// Machines as a nameplate tells them: magnets on the surface, much reluctance, 300 kW, 200 W at 24 V, and a car's, whose current is fast and whose
+/// iron saturates.
+const NAMEPLATES: [(&str, &str); 5] = [
+    (
+        "surface",
+        "--pole-pairs 4 --rs 0.3 --ld 2.5e-3 --lq 2.5e-3 --psi-f 0.15 --max-current 30 --udc 325 --max-speed-rpm 4500 --max-switching-hz 10000",
+    ),
+    (
+        "reluctance",
+        "--pole-pairs 2 --rs 0.25 --ld 6e-3 --lq 55e-3 --psi-f 0.22 --saturation 0.45 --max-current 60 --udc 560 --max-speed-rpm 4500 \
+         --max-switching-hz 8000",
+    ),
+    (
+        "large",
+        "--pole-pairs 4 --rs 0.012 --ld 0.55e-3 --lq 1.4e-3 --psi-f 0.62 --saturation 0.6 --max-current 800 --udc 1500 --max-speed-rpm 4500 \
+         --max-switching-hz 2000",
+    ),
+    (
+        "small",
+        "--pole-pairs 5 --rs 0.08 --ld 0.12e-3 --lq 0.13e-3 --psi-f 0.006 --max-current 15 --udc 24 --max-speed-rpm 3500 --max-switching-hz 20000",
+    ),
+    (
+        "car",
+        "--pole-pairs 4 --rs 0.01 --ld 0.13e-3 --lq 0.35e-3 --psi-f 0.075 --saturation 0.55 --max-current 550 --udc 370 --max-speed-rpm 12000 \
+         --max-switching-hz 10000",
+    ),
+];
+
+#[test]
+fn machines_of_a_nameplate_are_found_and_driven_with_what_was_found() {
+    NAMEPLATES.par_iter().for_each(|(name, values)| {
+        let place = tempfile::tempdir().unwrap();
+        let folder = place.path().join(name);
+        let words: Vec<_> =
+            ["machine", "new"].into_iter().chain(values.split_whitespace()).map(OsStr::new).collect();
+        rig(&[words, vec!["--out".as_ref(), folder.as_os_str()]].concat());
         is_found_and_driven(&folder);
     });
 }

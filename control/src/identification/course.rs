@@ -223,7 +223,10 @@ impl Course {
         } else if self.commands <= QUIET {
             self.waited = 0;
         } else if moved {
-            inductance.learn(change, seen.acted, NOISE_SHARE * bound_a);
+            // Against its voltage goes no machine's current: then the guess by which it has moved is the better one.
+            if change.d * seen.acted.d > 0.0 {
+                inductance.learn(change, seen.acted, NOISE_SHARE * bound_a);
+            }
             inductance.settle();
             (self.commands, self.step) = (0, 1);
         } else {

@@ -44,6 +44,8 @@ const D_REACH: f32 = 0.7;
 const HELD_SHARE: f32 = 0.4;
 /// Share of the bound that the boundaries' currents keep to: between them there is ripple.
 const KEPT_SHARE: f32 = 0.94;
+/// The change along q that a command may make where the iron saturates as the current goes outward, over the one that it is to make.
+const OUTWARD: f32 = 1.4;
 /// Largest current along +d, as a share of the bound.
 const POSITIVE_SHARE: f32 = 0.2;
 /// Turn, mechanical, at which the side that makes it is given no more, in rad; and the time over which the speed counts: so many halves, for the
@@ -56,6 +58,8 @@ const LEAST_SIDE: f32 = 0.1;
 /// Current along q that takes the rotor back beside currents along d, as a share of the bound: at the most turn that there is to be, and at most,
 /// where with the longest of those it is the bound.
 const BACK_GAIN: f32 = 0.15;
+/// The part of that turn up to which a rotor stays where it is by itself.
+const STAYS: f32 = 0.4;
 const BACK_S: f32 = 0.025;
 const BACK_SHARE: f32 = 0.24;
 
@@ -90,7 +94,8 @@ impl Pulses {
     /// The current along q over the bound that takes the rotor back to where it was, beside a negative one along d. Where currents that are to
     /// lie along d turn the rotor, as its angle's zero is off, it comes to rest where this one takes their torque away.
     pub fn back_share(&self, pole_pairs: f32) -> f32 {
-        limit(-BACK_GAIN * self.away(pole_pairs, BACK_S), -BACK_SHARE, BACK_SHARE)
+        let away = self.away(pole_pairs, BACK_S);
+        limit(-BACK_GAIN * (away - limit(away, -STAYS, STAYS)), -BACK_SHARE, BACK_SHARE)
     }
 
     /// Notes the length of a half, in s.
@@ -133,7 +138,7 @@ impl Pulses {
     /// The largest current: first the pulse along q turns back, then that along d.
     fn keep_within(&mut self, ahead: Dq, region: &Region, wanted: impl Fn(f32, f32) -> Dq) -> Dq {
         let bound_a = region.share * KEPT_SHARE * region.bound_a;
-        let inside = |change: Dq| (ahead + change).squared() <= bound_a * bound_a;
+        let inside = |Dq { d, q }: Dq| (ahead + Dq { d, q: q * OUTWARD }).squared() <= bound_a * bound_a;
         let inward = (if ahead.d > 0.0 { -1.0 } else { 1.0 }, if ahead.q > 0.0 { -1.0 } else { 1.0 });
         for (d, q) in [(self.d, self.q), (self.d, inward.1), (inward.0, inward.1)] {
             let change = wanted(d, q);

@@ -13,16 +13,10 @@ impl Wiring {
     /// As it should be.
     pub const RIGHT: Self = Self([(0, false), (1, false), (2, false)]);
 
-    /// All of them, those with the fewest sensors that are not right first.
-    pub fn every() -> Vec<Self> {
+    /// Those in which all sensors have one sign, the right one first. Of others the phases' sum tells.
+    pub fn of_one_sign() -> [Self; 12] {
         const ORDERS: [[usize; 3]; 6] = [[0, 1, 2], [0, 2, 1], [2, 1, 0], [1, 0, 2], [1, 2, 0], [2, 0, 1]];
-        let of =
-            |(order, signs): ([usize; 3], usize)| Self([0, 1, 2].map(|k| (order[k], signs >> k & 1 == 1)));
-        let signed = |order| (0..8).map(move |signs| (order, signs));
-        let mut every: Vec<_> = ORDERS.into_iter().flat_map(signed).map(of).collect();
-        let wrong = |of: &Self| of.0.iter().zip(Self::RIGHT.0).filter(|(own, right)| **own != *right).count();
-        every.sort_by_key(wrong);
-        every
+        std::array::from_fn(|k| Self(ORDERS[k / 2].map(|phase| (phase, k % 2 == 1))))
     }
 
     /// The stationary frame's currents that are read of one A along α and along β, by rows.

@@ -13,6 +13,7 @@ use crate::scenario::traction::{Options, Traction};
 use crate::talk::{self, Lines, System, Talk};
 use anyhow::{Result, bail};
 use core::f64::consts::TAU;
+use tractive::protection::Fault;
 
 /// A step, and what it asks of the person who does it.
 pub struct Way {
@@ -65,6 +66,10 @@ const TORQUE_OFF_SHARE: f64 = 0.02;
 
 /// An error of the angle's zero by which a free rotor turns away, at least, in degrees.
 const LEAST_ZERO_DEG: f64 = 2.0;
+/// The drive's fault of currents whose sum is not zero.
+const PHASE_SUM: &str = Fault::PhaseSum.name();
+const ADVICE_SUM: &str = "current sensors: one or two have the wrong sign, so that what they read does not add up to zero: exchange the leads of \
+    one after the other and begin anew";
 const ADVICE_TURNED: &str = "a load turns the rotor; or its angle counts the wrong way: with the gates off turn the rotor forward, and where \
     speed_rpm is below 0 exchange the encoder's channels A and B or two phases; or its zero is far off: set the power stage's \
     encoder_zeros_deg anew";
@@ -131,6 +136,7 @@ fn identification(commission: &Commission, machine: &Machine, _record: &Record) 
             match fault.as_str() {
                 ROTOR_TURNED => step.advise(turned_away(zero_deg)),
                 CURRENT_SENSORS => step.advise(sensors_wrong(wiring)),
+                PHASE_SUM => step.advise(ADVICE_SUM.to_owned()),
                 _ => {}
             }
             step.fail(format!("fault {fault}: {value} (limit {limit})"));

@@ -10,18 +10,18 @@ use tractive::identification::{Observation, Stage};
 type Matrix = [[f64; 2]; 2];
 
 /// Largest asymmetry, as a share of the trace, and largest ratio of the eigenvalues of what may be a machine.
-const ASYMMETRY: f64 = 0.15;
-const RATIO: f64 = 40.0;
-/// Volt-seconds of a pulse that counts, at least, as a share of those of the longest.
-const LEAST_SHARE: f32 = 0.5;
+const ASYMMETRY: f64 = 0.5;
+const RATIO: f64 = 100.0;
+/// The halves that are looked at.
+const LAST: usize = 20;
 
-/// The wires of the current sensors as the probe's pulses show them: of those that explain the response the ones with the fewest changes. `None`
-/// where nothing explains it, or there are no pulses.
+/// The wires of the current sensors with which the response to the probe's pulses is a machine's, of those in which the sensors have one sign. `None`
+/// where none is, or there are no pulses.
 pub fn wiring(observations: &[Observation]) -> Option<Wiring> {
     let answers = response(observations)?;
-    Wiring::every()
-        .into_iter()
-        .find(|wiring| inverse(wiring.matrix()).is_some_and(|wires| is_machine(times(wires, answers))))
+    let explains =
+        |wiring: &Wiring| inverse(wiring.matrix()).is_some_and(|wires| is_machine(times(wires, answers)));
+    Wiring::of_one_sign().into_iter().find(explains)
 }
 
 fn is_machine([[xx, xy], [yx, yy]]: Matrix) -> bool {
@@ -43,18 +43,12 @@ fn inverse([[a, b], [c, d]]: Matrix) -> Option<Matrix> {
     (determinant.abs() > 1e-9).then(|| [[d, -b], [-c, a]].map(|row| row.map(|value| value / determinant)))
 }
 
-/// Change of current of a volt-second, stationary frame, by least squares over the probe's halves. Of the shortest pulses the dead time leaves too
-/// little.
+/// Change of current of a volt-second, stationary frame, by least squares over the probe's last halves, in which pulses lie along both axes.
 fn response(observations: &[Observation]) -> Option<Matrix> {
     let (mut squares, mut sides) = ([[0.0; 2]; 2], [[0.0; 2]; 2]);
-    let size = |of: &Observation| of.volt_seconds.alpha.hypot(of.volt_seconds.beta);
-    let probe = observations.iter().filter(|of| of.stage == Stage::Probe);
-    let least = LEAST_SHARE * probe.map(size).fold(0.0, f32::max);
-    for pair in observations.windows(2) {
+    let probe = observations.iter().filter(|of| of.stage == Stage::Probe).count();
+    for pair in observations[probe.saturating_sub(LAST)..].windows(2).take(LAST) {
         let [before, after] = pair else { continue };
-        if before.stage != Stage::Probe || size(after) < least {
-            continue;
-        }
         let [from, to] = [before, after].map(|of| of.current.unpark(of.frame));
         let acted = [after.volt_seconds.alpha, after.volt_seconds.beta].map(f64::from);
         let change = [to.alpha - from.alpha, to.beta - from.beta].map(f64::from);
