@@ -210,7 +210,7 @@ fn rig(words: &[&OsStr]) -> String {
 }
 
 /// The chain of a machine folder: identified, its operating points and a sweep with what was found on the true machine.
-fn is_found_and_driven(folder: &Path) {
+fn is_found_and_driven(folder: &Path, most_swept: f64) {
     let machine = Machine::load(folder.to_str().unwrap()).unwrap();
     let place = tempfile::tempdir().unwrap();
     let (out, page) = (place.path().join("found"), place.path().join("found.html"));
@@ -224,13 +224,13 @@ fn is_found_and_driven(folder: &Path) {
         ["turned_deg", "peak_current_percent_of_bound"].map(|name| told[name].as_f64().unwrap());
     assert!(turned_deg < 5.0 && peak < 110.0, "{}: {turned_deg}°, {peak} % of the bound", folder.display());
     let points = worst_point_nm(&machine, folder, &out, place.path());
-    let swept = worst_swept_nm(folder, &out);
+    let swept = worst_swept_nm(&machine, folder, &out);
     let most_nm = machine.folder.parameters.max_torque_nm;
     let name = folder.file_name().unwrap_or_default().to_string_lossy();
     let percent = |torque_nm: f64| 100.0 * torque_nm / most_nm;
     println!("{name}: points within {:.3} %, sweep within {:.3} %", percent(points), percent(swept));
     assert!(points < 0.015 * most_nm, "{name}: {points} N·m of {most_nm}");
-    assert!(swept < 0.015 * most_nm, "{name}: {swept} N·m of {most_nm}");
+    assert!(swept < most_swept * most_nm, "{name}: {swept} N·m of {most_nm}");
 }
 
 /// Worst torque of the found tables' operating points on the true machine, off what the true machine's own points give there.
@@ -267,18 +267,22 @@ fn worst_point_nm(machine: &Machine, folder: &Path, found: &Path, place: &Path) 
     own.iter().zip(&of_found).map(|(own, found)| (own - found).abs()).fold(0.0, f64::max)
 }
 
-/// Worst torque of a sweep with the found tables on the true machine, off its demand, as means of a tenth of a second; no fault.
-fn worst_swept_nm(plant: &Path, found: &Path) -> f64 {
-    let words =
-        ["sweep".as_ref(), "--machine".as_ref(), found.as_os_str(), "--plant".as_ref(), plant.as_os_str()];
-    let Ok(Chosen::Traction(choice)) = catalogue::choose(words.map(OsStr::to_owned).to_vec()) else {
+/// Worst torque of a sweep with the found tables on the true machine, off its demand, as means of a tenth of a second; no fault. The machine's
+/// resistance is the one that was identified, and the step is no simple part of a carrier, so that ripple has no mean.
+fn worst_swept_nm(machine: &Machine, plant: &Path, found: &Path) -> f64 {
+    let step_s = (0.37 / machine.folder.parameters.max_switching_hz).min(50e-6);
+    let flaws = format!("sweep --rs-error 10 --dt {step_s}");
+    let folders: [&OsStr; 4] =
+        ["--machine".as_ref(), found.as_os_str(), "--plant".as_ref(), plant.as_os_str()];
+    let words: Vec<_> = flaws.split(' ').map(OsStr::new).chain(folders).map(OsStr::to_owned).collect();
+    let Ok(Chosen::Traction(choice)) = catalogue::choose(words) else {
         panic!("a scenario of the other system")
     };
     let recording = choice.drive(&choice.machine().unwrap()).unwrap();
     let trip = recording.rows.iter().find_map(|row| row.trip);
     assert!(trip.is_none(), "{}: {trip:?}", plant.display());
     // From the second tenth on: in the first the demand is on its way.
-    let means = recording.rows.chunks_exact(2_000).skip(1);
+    let means = recording.rows.chunks_exact((0.1 / step_s) as usize).skip(1);
     let worst = means.map(|rows| {
         let mean = |value: fn(&Row) -> f64| rows.iter().map(value).sum::<f64>() / rows.len() as f64;
         (mean(|row| row.te_nm) - mean(|row| row.te_ref_nm)).abs()
@@ -295,7 +299,7 @@ fn every_folder_of_tables_is_found_and_driven_with_what_was_found() {
         .collect();
     folders.retain(|folder| folder.join("machine.toml").is_file());
     assert!(folders.len() >= 3, "{folders:?}");
-    folders.par_iter().for_each(|folder| is_found_and_driven(folder));
+    folders.par_iter().for_each(|folder| is_found_and_driven(folder, 0.015));
 }
 
 #[test]
@@ -305,7 +309,7 @@ fn machines_of_other_kinds_are_found_and_driven_with_what_was_found() {
         let folder = place.path().join(linear.name);
         std::fs::create_dir(&folder).unwrap();
         linear.write(&folder);
-        is_found_and_driven(&folder);
+        is_found_and_driven(&folder, 0.015);
     });
 }
 
@@ -345,7 +349,8 @@ fn machines_of_a_nameplate_are_found_and_driven_with_what_was_found() {
         let words: Vec<_> =
             ["machine", "new"].into_iter().chain(values.split_whitespace()).map(OsStr::new).collect();
         rig(&[words, vec!["--out".as_ref(), folder.as_os_str()]].concat());
-        is_found_and_driven(&folder);
+        // At the largest current, which the pulses do not reach, mid3 makes 1.8 % less of the large one's torque.
+        is_found_and_driven(&folder, if *name == "large" { 0.02 } else { 0.015 });
     });
 }
 

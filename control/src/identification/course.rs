@@ -89,7 +89,7 @@ const LED_SHARE: f32 = 0.05;
 
 /// Direct currents along d, as shares of the bound, and commands for each: first those beside which no current along q takes a rotor back that
 /// turns away. Two of them show the resistance.
-const STAIRCASE: [f32; 8] = [0.1, 0.2, -0.1, -0.25, -0.5, -0.75, -0.97, -0.6];
+const STAIRCASE: [f32; 8] = [0.1, 0.2, -0.1, -0.25, -0.5, -0.75, -0.9, -0.6];
 const STEP_COMMANDS: u32 = 36;
 const SHOWING: [u32; 2] = [4, 6];
 /// Commands from a step's beginning on after which it shows.
@@ -253,7 +253,7 @@ impl Course {
     pub fn change(&mut self, ahead: Dq, reach: f32, inductance: &mut Inductance, ratings: &Ratings) -> Dq {
         let bound_a = ratings.max_current_a;
         if inductance.is_unknown() {
-            *inductance = Inductance::round(FIRST_SHARE * reach / (PROBE_SHARE * bound_a));
+            inductance.guess(FIRST_SHARE * reach / (PROBE_SHARE * bound_a));
         }
         self.commands += 1;
         let before = self.stage;
@@ -266,15 +266,14 @@ impl Course {
         if before == Stage::AlongD && self.stage != before {
             inductance.settle();
         }
-        // Outward step by step, so that each step is known from the one before it.
-        let share = limit(FIRST_BOUND + self.commands as f32 * WIDENING, FIRST_BOUND, 1.0);
-        let share = if self.stage == Stage::AlongQ { share } else { 1.0 };
-        let held_d = if self.stage == Stage::AlongBoth { self.swept() } else { HELD_D };
-        let held = match self.stage {
-            Stage::AlongD => Dq { d: 0.0, q: self.pulses.back_share(ratings.pole_pairs) * bound_a },
-            _ => Dq { d: held_d * bound_a, q: 0.0 },
+        let region = |share: f32, held: Dq| Region {
+            along_q: self.stage != Stage::AlongD,
+            share,
+            held: held * bound_a,
+            bound_a,
+            reach,
+            ratings,
         };
-        let region = |along: [bool; 2]| Region { along, share, held, bound_a, reach, ratings };
         match self.stage {
             Stage::Probe if self.step > 0 => {
                 let [d, q] = AROUND.get((self.commands % 4) as usize).copied().unwrap_or([0.0; 2]);
@@ -284,14 +283,25 @@ impl Course {
             Stage::Probe => Dq { d: -PROBE_SHARE * bound_a, q: 0.0 },
             Stage::Staircase => {
                 let share = STAIRCASE.get(self.step as usize).copied().unwrap_or(0.0);
-                let back_a =
-                    if share < 0.0 { self.pulses.back_share(ratings.pole_pairs) * bound_a } else { 0.0 };
-                let change = Self::lead(ahead, Dq { d: share * bound_a, q: back_a }, bound_a);
+                let back = if share < 0.0 { self.pulses.back_share(ratings.pole_pairs) } else { 0.0 };
+                let change = Self::lead(ahead, Dq { d: share, q: back } * bound_a, bound_a);
                 Dq { q: change.q * STEERED, ..change }
             }
-            Stage::AlongD => self.pulses.change(ahead, &region([true, false]), inductance),
-            Stage::AlongQ => self.pulses.change(ahead, &region([false, true]), inductance),
-            Stage::AlongBoth => self.pulses.change(ahead, &region([false, true]), inductance),
+            Stage::AlongD => {
+                let back = Dq { d: 0.0, q: self.pulses.back_share(ratings.pole_pairs) };
+                let region = region(1.0, back);
+                self.pulses.change(ahead, &region, inductance)
+            }
+            Stage::AlongQ => {
+                // Outward step by step, so that each step is known from the one before it.
+                let share = limit(FIRST_BOUND + self.commands as f32 * WIDENING, FIRST_BOUND, 1.0);
+                let region = region(share, Dq { d: HELD_D, q: 0.0 });
+                self.pulses.change(ahead, &region, inductance)
+            }
+            Stage::AlongBoth => {
+                let region = region(1.0, Dq { d: self.swept(), q: 0.0 });
+                self.pulses.change(ahead, &region, inductance)
+            }
             Stage::Done if self.step > 0 => NONE,
             Stage::Rest | Stage::Done => Self::lead(ahead, NONE, bound_a),
             Stage::Turn => {

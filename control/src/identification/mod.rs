@@ -121,7 +121,11 @@ impl ControlLaw for Identification {
     }
 
     fn idle(&mut self) {
-        *self = Self { speed: self.speed, ..Self::new() };
+        // What has not begun is as before.
+        if self.last.is_some() || !self.inductance.is_unknown() {
+            *self = Self { speed: self.speed, ..Self::new() };
+        }
+        (self.samples, self.target) = (0, Target::NONE);
     }
 
     fn begin_without_torque(&mut self) {}

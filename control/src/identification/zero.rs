@@ -22,6 +22,9 @@ impl Zero {
 
     /// Turns the frame while a current along q, over the bound, is needed beside so much along d, over the bound, to keep the rotor where it is.
     pub fn turn(&mut self, back_share: f32, d_share: f32, length_s: f32) {
+        if back_share == 0.0 {
+            return;
+        }
         let more_rad = back_share * d_share * length_s * (1.0 / TURNS_S);
         self.rad = limit(self.rad + more_rad, -MOST_RAD, MOST_RAD);
         self.ahead = Angle::from_radians(self.rad).sin_cos();
