@@ -208,8 +208,7 @@ const MACHINES: [(&str, Option<f64>); 3] =
 fn keeps_its_limits(outcome: &Outcome, case: &str) {
     let Outcome { peak, turned_deg, pulses_s, observations } = outcome;
     println!("{case}: |i| up to {peak:.3} of the bound, turned {turned_deg:.2}°, {pulses_s:.3} s");
-    // The boundaries keep to 0.94.
-    assert!(*peak < 1.1 && *peak > 0.93, "{case}: {peak}");
+    assert!(*peak < 1.1 && *peak > 0.95, "{case}: {peak}");
     assert!(*turned_deg < 5.0, "{case}: {turned_deg}°");
     assert!(*pulses_s < 2.0, "{case}: {pulses_s} s");
     let last = observations.last().map(|observation| observation.stage);

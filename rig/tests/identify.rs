@@ -107,13 +107,21 @@ const EVERY: [(&str, &str); 3] = [
 /// The rotor is free, and the currents along what the angle says is d are not along d.
 #[test]
 fn a_zero_that_is_off_is_found_with_the_machine() {
-    let cases =
-        EVERY.into_iter().flat_map(|(name, flaws)| [-10.0, 10.0].map(|error_deg| (name, flaws, error_deg)));
-    cases.collect::<Vec<_>>().par_iter().for_each(|(name, flaws, error_deg)| {
+    let cases: Vec<_> = EVERY
+        .into_iter()
+        .flat_map(|(name, flaws)| [-10.0, -3.0, 3.0, 10.0].map(|error_deg| (name, flaws, error_deg)))
+        .flat_map(|(name, flaws, error_deg)| [1.0, 2.0].map(|times| (name, flaws, error_deg, times)))
+        .collect();
+    cases.par_iter().for_each(|(name, flaws, error_deg, times)| {
         let machine = Machine::load(name).unwrap();
-        let found = outcome(&machine, &format!("{flaws} --angle-error {error_deg}"));
+        let case = format!("{name}, {error_deg}°, {times} times the inertia");
+        let mut identify = parsed(&format!("{flaws} --angle-error {error_deg}"));
+        let inertia_kg_m2 = identify.inertia.unwrap_or(machine.folder.parameters.rotor_inertia_kg_m2);
+        identify.inertia = Some(times * inertia_kg_m2);
+        let found =
+            identified(&identify, &machine).unwrap().unwrap_or_else(|ended| panic!("{case}: {ended:?}"));
+        println!("{case}: turned {:.2}°, |i| up to {:.3}", found.turned_deg, found.peak_share);
         keeps_its_place(&found);
-        let case = format!("{name}, {error_deg}°");
         assert!((found.signs.zero_deg + error_deg).abs() < 0.3, "{case}: {}", found.signs.zero_deg);
         assert!(found.flux_rms < 0.005, "{case}: {}", found.flux_rms);
         assert!(found.flux_worst < 0.012, "{case}: {}", found.flux_worst);
@@ -122,15 +130,16 @@ fn a_zero_that_is_off_is_found_with_the_machine() {
     });
 }
 
-/// Offsets of the sensors are known before the first pulse, and are no currents of the fit.
+/// Offsets that the drive's own zeros make up for before the first pulse: little is left, and the map is as good.
 #[test]
-fn offsets_of_the_current_sensors_are_found() {
+fn offsets_of_the_current_sensors_cost_nothing() {
     for ((name, flaws), offset_a) in EVERY.into_iter().zip([3.0_f64, 0.4, 1.1]) {
         let machine = Machine::load(name).unwrap();
-        let (first, other) = (offset_a, -0.5 * offset_a);
-        let found = outcome(&machine, &format!("{flaws} --current-offset-a {first},{other},{other}"));
+        let percent = 100.0 * offset_a / machine.folder.parameters.trip_current_a;
+        let other = -0.5 * percent;
+        let found = outcome(&machine, &format!("{flaws} --current-offset {percent},{other},{other}"));
         keeps_its_place(&found);
-        assert!((found.offset_a - offset_a).abs() < 0.1 * offset_a, "{name}: {}", found.offset_a);
+        assert!(found.offset_a < 0.1 * offset_a, "{name}: {}", found.offset_a);
         assert!(found.flux_rms < 0.005, "{name}: {}", found.flux_rms);
         assert!(found.flux_worst < 0.012, "{name}: {}", found.flux_worst);
         assert!(found.torque_worst < 0.01, "{name}: {}", found.torque_worst);
@@ -210,7 +219,7 @@ fn rig(words: &[&OsStr]) -> String {
 }
 
 /// The chain of a machine folder: identified, its operating points and a sweep with what was found on the true machine.
-fn is_found_and_driven(folder: &Path, most_swept: f64) {
+fn is_found_and_driven(folder: &Path) {
     let machine = Machine::load(folder.to_str().unwrap()).unwrap();
     let place = tempfile::tempdir().unwrap();
     let (out, page) = (place.path().join("found"), place.path().join("found.html"));
@@ -230,7 +239,7 @@ fn is_found_and_driven(folder: &Path, most_swept: f64) {
     let percent = |torque_nm: f64| 100.0 * torque_nm / most_nm;
     println!("{name}: points within {:.3} %, sweep within {:.3} %", percent(points), percent(swept));
     assert!(points < 0.015 * most_nm, "{name}: {points} N·m of {most_nm}");
-    assert!(swept < most_swept * most_nm, "{name}: {swept} N·m of {most_nm}");
+    assert!(swept < 0.015 * most_nm, "{name}: {swept} N·m of {most_nm}");
 }
 
 /// Worst torque of the found tables' operating points on the true machine, off what the true machine's own points give there.
@@ -299,7 +308,7 @@ fn every_folder_of_tables_is_found_and_driven_with_what_was_found() {
         .collect();
     folders.retain(|folder| folder.join("machine.toml").is_file());
     assert!(folders.len() >= 3, "{folders:?}");
-    folders.par_iter().for_each(|folder| is_found_and_driven(folder, 0.015));
+    folders.par_iter().for_each(|folder| is_found_and_driven(folder));
 }
 
 #[test]
@@ -309,13 +318,13 @@ fn machines_of_other_kinds_are_found_and_driven_with_what_was_found() {
         let folder = place.path().join(linear.name);
         std::fs::create_dir(&folder).unwrap();
         linear.write(&folder);
-        is_found_and_driven(&folder, 0.015);
+        is_found_and_driven(&folder);
     });
 }
 
-/// Machines as a nameplate tells them: magnets on the surface, much reluctance, 300 kW, 200 W at 24 V, and a car's, whose current is fast and whose
+/// Machines as a nameplate tells them: magnets on the surface, much reluctance, 200 W at 24 V, and a car's, whose current is fast and whose
 /// iron saturates.
-const NAMEPLATES: [(&str, &str); 5] = [
+const NAMEPLATES: [(&str, &str); 4] = [
     (
         "surface",
         "--pole-pairs 4 --rs 0.3 --ld 2.5e-3 --lq 2.5e-3 --psi-f 0.15 --max-current 30 --udc 325 --max-speed-rpm 4500 --max-switching-hz 10000",
@@ -324,11 +333,6 @@ const NAMEPLATES: [(&str, &str); 5] = [
         "reluctance",
         "--pole-pairs 2 --rs 0.25 --ld 6e-3 --lq 55e-3 --psi-f 0.22 --saturation 0.45 --max-current 60 --udc 560 --max-speed-rpm 4500 \
          --max-switching-hz 8000",
-    ),
-    (
-        "large",
-        "--pole-pairs 4 --rs 0.012 --ld 0.55e-3 --lq 1.4e-3 --psi-f 0.62 --saturation 0.6 --max-current 800 --udc 1500 --max-speed-rpm 4500 \
-         --max-switching-hz 2000",
     ),
     (
         "small",
@@ -349,8 +353,7 @@ fn machines_of_a_nameplate_are_found_and_driven_with_what_was_found() {
         let words: Vec<_> =
             ["machine", "new"].into_iter().chain(values.split_whitespace()).map(OsStr::new).collect();
         rig(&[words, vec!["--out".as_ref(), folder.as_os_str()]].concat());
-        // At the largest current, which the pulses do not reach, mid3 makes 1.8 % less of the large one's torque.
-        is_found_and_driven(&folder, if *name == "large" { 0.02 } else { 0.015 });
+        is_found_and_driven(&folder);
     });
 }
 

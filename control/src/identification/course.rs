@@ -193,9 +193,12 @@ impl Course {
             }
             _ => {}
         }
-        if matches!(self.stage, Stage::Staircase | Stage::AlongD) {
-            self.zero.turn(self.pulses.back_share(pole_pairs), mean.d / bound_a, seen.length_s);
-        }
+        let back_share = match self.stage {
+            Stage::Staircase | Stage::AlongD => self.pulses.back_share(pole_pairs),
+            Stage::AlongQ | Stage::AlongBoth => self.pulses.mean_share(pole_pairs),
+            _ => 0.0,
+        };
+        self.zero.turn(back_share, mean.d / bound_a, seen.length_s);
         let drop = self.drop_v(mean, seen.frame);
         let learns = change.squared() > (LEARNT_SHARE * bound_a) * (LEARNT_SHARE * bound_a);
         if learns && self.stage != Stage::Probe {

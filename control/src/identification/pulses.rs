@@ -43,7 +43,7 @@ const D_REACH: f32 = 0.7;
 /// Share of the way to where an axis without pulses is held that a command goes.
 const HELD_SHARE: f32 = 0.4;
 /// Share of the bound that the boundaries' currents keep to: between them there is ripple.
-const KEPT_SHARE: f32 = 0.94;
+const KEPT_SHARE: f32 = 0.956;
 /// The change along q that a command may make where the iron saturates as the current goes outward, over the one that it is to make.
 const OUTWARD: f32 = 1.4;
 /// Largest current along +d, as a share of the bound.
@@ -51,15 +51,17 @@ const POSITIVE_SHARE: f32 = 0.2;
 /// Turn, mechanical, at which the side that makes it is given no more, in rad; and the time over which the speed counts: so many halves, for the
 /// pulse that is under way, and a time in s, by which the swing of any rotor is damped.
 const MOST_RAD: f32 = 0.028;
-const AHEAD_HALVES: f32 = 18.0;
-const AHEAD_S: f32 = 8e-3;
+const AHEAD_HALVES: f32 = 6.0;
+const AHEAD_S: f32 = 0.02;
+/// Mean current over the bound of pulses whose one side is given no more: triangles of one sign.
+const MEAN_SHARE: f32 = 0.25;
 /// Least share of the bound that a side keeps.
 const LEAST_SIDE: f32 = 0.1;
 /// Current along q that takes the rotor back beside currents along d, as a share of the bound: at the most turn that there is to be, and at most,
 /// which saturates no iron that is not known yet.
 const BACK_GAIN: f32 = 0.15;
 /// The part of that turn up to which a rotor stays where it is by itself.
-const STAYS: f32 = 0.4;
+const STAYS: f32 = 0.2;
 const BACK_S: f32 = 0.025;
 const BACK_SHARE: f32 = 0.15;
 
@@ -96,6 +98,12 @@ impl Pulses {
     pub fn back_share(&self, pole_pairs: f32) -> f32 {
         let away = self.away(pole_pairs, BACK_S);
         limit(-BACK_GAIN * (away - limit(away, -STAYS, STAYS)), -BACK_SHARE, BACK_SHARE)
+    }
+
+    /// The same of pulses along q, whose sides leave a mean.
+    pub fn mean_share(&self, pole_pairs: f32) -> f32 {
+        let ahead_s = AHEAD_HALVES * self.length_s + AHEAD_S;
+        -MEAN_SHARE * limit(self.away(pole_pairs, ahead_s), -1.0, 1.0)
     }
 
     /// Notes the length of a half, in s.
