@@ -248,7 +248,8 @@ fn a_free_rotor_keeps_its_place_where_the_angles_zero_is_off() {
 /// Sensors of the wrong sign or order: the experiment ends before a current flows that counts.
 #[test]
 fn currents_that_answer_against_the_voltage_end_the_experiment() {
-    let wrong: [(&str, fn(Abc) -> Abc); 5] = [
+    type Reads = fn(Abc) -> Abc;
+    let wrong: [(&str, Reads); 5] = [
         ("one of the wrong sign", |Abc { a, b, c }| Abc { a, b: -b, c }),
         ("all of the wrong sign", |Abc { a, b, c }| Abc { a: -a, b: -b, c: -c }),
         ("two exchanged", |Abc { a, b, c }| Abc { a, b: c, c: b }),
