@@ -7,7 +7,7 @@ use std::str::FromStr;
 /// The phase that each current sensor reads, and its sign: `u,v,w` where all is right, `-u,v,w` where the first has its leads exchanged,
 /// `v,u,w` where the first two are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Wiring([(usize, bool); 3]);
+pub struct Wiring([(u8, bool); 3]);
 
 impl Wiring {
     /// As it should be.
@@ -15,7 +15,7 @@ impl Wiring {
 
     /// Those in which all sensors have one sign, the right one first. Of others the phases' sum tells.
     pub fn of_one_sign() -> [Self; 12] {
-        const ORDERS: [[usize; 3]; 6] = [[0, 1, 2], [0, 2, 1], [2, 1, 0], [1, 0, 2], [1, 2, 0], [2, 0, 1]];
+        const ORDERS: [[u8; 3]; 6] = [[0, 1, 2], [0, 2, 1], [2, 1, 0], [1, 0, 2], [1, 2, 0], [2, 0, 1]];
         std::array::from_fn(|k| Self(ORDERS[k / 2].map(|phase| (phase, k % 2 == 1))))
     }
 
@@ -31,7 +31,11 @@ impl Wiring {
 
     /// The sensors' readings of these phase currents, in A.
     pub fn read(self, currents_a: [f64; 3]) -> [f64; 3] {
-        self.0.map(|(phase, reversed)| if reversed { -currents_a[phase] } else { currents_a[phase] })
+        self.0.map(
+            |(phase, reversed)| {
+                if reversed { -currents_a[usize::from(phase)] } else { currents_a[usize::from(phase)] }
+            },
+        )
     }
 }
 
@@ -49,11 +53,11 @@ impl FromStr for Wiring {
     fn from_str(text: &str) -> Result<Self, String> {
         let sensor = |word: &str| {
             let (reversed, name) = word.strip_prefix('-').map_or((false, word), |name| (true, name));
-            Some((PHASES.iter().position(|phase| *phase == name)?, reversed))
+            Some((PHASES.iter().zip(0..).find(|(phase, _)| **phase == name)?.1, reversed))
         };
         let found: Option<Vec<_>> = text.split(',').map(|word| sensor(word.trim())).collect();
         let sensors = found.and_then(|found| <[_; 3]>::try_from(found).ok());
-        let seen = |phase: usize, sensors: &[(usize, bool); 3]| sensors.iter().any(|(own, _)| *own == phase);
+        let seen = |phase: u8, sensors: &[(u8, bool); 3]| sensors.iter().any(|(own, _)| *own == phase);
         let sensors = sensors.filter(|sensors| (0..3).all(|phase| seen(phase, sensors)));
         sensors.map(Self).ok_or_else(|| "must be u, v and w in some order, each with or without -".to_owned())
     }
@@ -61,8 +65,9 @@ impl FromStr for Wiring {
 
 impl Display for Wiring {
     fn fmt(&self, to: &mut Formatter) -> std::fmt::Result {
-        let words =
-            self.0.map(|(phase, reversed)| format!("{}{}", if reversed { "-" } else { "" }, PHASES[phase]));
+        let words = self.0.map(|(phase, reversed)| {
+            format!("{}{}", if reversed { "-" } else { "" }, PHASES[usize::from(phase)])
+        });
         write!(to, "{}", words.join(","))
     }
 }
