@@ -211,7 +211,7 @@ fn flaws_of(machine: &Machine) -> Vec<String> {
     words.split(' ').map(str::to_owned).collect()
 }
 
-/// What the rig's own program says, with exit code 0.
+/// The words of the rig's own program, with exit code 0.
 fn rig(words: &[&OsStr]) -> String {
     let output = Command::new(env!("CARGO_BIN_EXE_tractive-rig")).args(words).output().unwrap();
     assert!(output.status.success(), "{words:?}: {}", String::from_utf8_lossy(&output.stderr));
