@@ -76,7 +76,7 @@ impl Bus {
     fn of_zs9() -> Self {
         let pull = |torque_nm| {
             let demands = Zs9Demands::Torques([torque_nm; 2]);
-            Zs9Command { demands, ..Zs9Command::AT_REST }.encode().unwrap()
+            Zs9Command { demands, ..Zs9Command::AT_REST }.encode(Scales::USUAL).unwrap()
         };
         Self { to_drive: &TO_ZS9, pull, ..Self::new() }
     }
@@ -296,8 +296,8 @@ pub fn check_content(payload: Payload, scales: Scales) {
         TorqueLimits::decode(payload, scales).map(|limits| limits.encode(scales)),
         LinkLimits::decode(payload, scales).map(|limits| limits.encode(scales)),
         ParameterRequest::decode(payload).map(|request| request.encode()),
-        Zs9Command::decode(payload).map(|command| command.encode()),
-        Zs9Link::decode(payload).map(|link| link.encode()),
+        Zs9Command::decode(payload, scales).map(|command| command.encode(scales)),
+        Zs9Link::decode(payload, scales).map(|link| link.encode(scales)),
     ];
     for (place, again) in again.into_iter().enumerate() {
         assert!(again.is_none_or(|again| again == Ok(payload)), "{place}: {payload:?}, not {again:?}");

@@ -1,12 +1,14 @@
 //! The description of the protocol as a DBC file, with the steps of a machine.
 
 use crate::machine::Machine;
+use crate::talk::System;
 use crate::{files, say};
 use anyhow::Result;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 use tractive::identification::Stage;
+use tractive::machine::Ratings;
 use tractive::modulation::Mode;
 use tractive::nine_switch::Scheme;
 use tractive::operator::{Refusal, State};
@@ -29,7 +31,7 @@ pub struct DbcOptions {
 
 /// Writes the file.
 pub fn run(options: &DbcOptions) -> Result<()> {
-    let text = text(Scales::of(&Machine::load(&options.machine)?.tables.ratings));
+    let text = text(&Machine::load(&options.machine)?.tables.ratings);
     match &options.out {
         Some(path) => files::write_text(path, &text),
         None => {
@@ -53,7 +55,13 @@ fn is_zs9(message: &Message) -> bool {
     message.name.starts_with("ZS9_")
 }
 
-/// The signals of a message on a machine's scales. The ZS9 has the usual ones.
+/// The scales of a message for a machine of these ratings.
+pub fn scales(message: &Message, ratings: &Ratings) -> Scales {
+    let system = if is_zs9(message) { System::Zs9 } else { System::Pmasynrm };
+    system.scales(ratings)
+}
+
+/// The signals of a message on a machine's scales.
 pub fn signals(message: &Message, scales: Scales) -> Vec<Signal> {
     let own = message.signals.iter().copied();
     [CRC, COUNTER].into_iter().chain(message.mark_signal(scales)).chain(own).collect()
@@ -99,11 +107,11 @@ fn names(signal: &Signal) -> BTreeMap<u32, &'static str> {
     }
 }
 
-/// The file on these scales.
-pub fn text(scales: Scales) -> String {
+/// The file for a machine of these ratings.
+pub fn text(ratings: &Ratings) -> String {
     let mut text = String::from("VERSION \"1\"\n\nNS_ :\n\nBS_:\n\nBU_: DRIVE ZS9 SUPERVISOR\n");
     for (message, to_drive) in messages() {
-        describe(&mut text, message, to_drive, if is_zs9(message) { Scales::USUAL } else { scales });
+        describe(&mut text, message, to_drive, scales(message, ratings));
     }
     text +=
         "\nCM_ \"Every message carries end-to-end protection after AUTOSAR profile 2: see protocol.md.\";\n";

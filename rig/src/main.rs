@@ -36,7 +36,7 @@ enum Command {
         #[arg(hide = true, trailing_var_arg = true, allow_hyphen_values = true)]
         words: Vec<OsString>,
     },
-    /// The needs of `run`, `talk`, `live` or `identify` for these words, as JSON, for whoever makes them ready.
+    /// The needs of `run`, `talk`, `live`, `identify` or `commission` for these words, as JSON, for whoever makes them ready.
     #[command(hide = true, disable_help_flag = true)]
     Needs {
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
@@ -192,7 +192,8 @@ fn needs(words: Vec<OsString>) -> Result<ExitCode> {
         #[cfg(unix)]
         Command::Live { words } => Needs::of_drive(&LiveOptions::read(&words)?.drive),
         Command::Identify(options) => Needs::of_identify(&options),
-        _ => anyhow::bail!("needs: must be followed by run, talk, live or identify"),
+        Command::Commission(options) => Needs::of_commission(&options),
+        _ => anyhow::bail!("needs: must be followed by run, talk, live, identify or commission"),
     };
     say!("{}", serde_json::to_string(&needs)?);
     Ok(ExitCode::SUCCESS)

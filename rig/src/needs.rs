@@ -1,5 +1,6 @@
 //! The needs of a run, for whoever builds images and sets up the emulator.
 
+use crate::commission::Commission;
 use crate::identify::Identify;
 use crate::options::{On, RunOptions};
 use crate::scenario::System;
@@ -31,6 +32,8 @@ pub struct Needs {
     pub emulator: bool,
     /// The script of a talk that was named.
     pub script: Option<PathBuf>,
+    /// The machine folder that a commissioning makes, where the drive's image with its tables is still to be built then.
+    pub tables: Option<PathBuf>,
 }
 
 impl Needs {
@@ -45,6 +48,7 @@ impl Needs {
             image: in_qemu && options.image.is_none(),
             emulator: in_qemu && options.qemu.as_os_str() == "qemu-system-arm",
             script: None,
+            tables: None,
         }
     }
 
@@ -62,6 +66,13 @@ impl Needs {
     /// Of an identification.
     pub fn of_identify(identify: &Identify) -> Self {
         Self { law: "identification", ..Self::of(Traction::NAME, &identify.options.run) }
+    }
+
+    /// Of a commissioning.
+    pub fn of_commission(commission: &Commission) -> Self {
+        let options = &commission.identify.options;
+        let drives = options.on == On::Qemu && commission.until.is_none() && commission.drive_image.is_none();
+        Self { tables: options.out.clone().filter(|_| drives), ..Self::of_identify(&commission.identify) }
     }
 
     /// Of a talk.

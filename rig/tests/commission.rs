@@ -43,10 +43,30 @@ fn from_the_wiring_to_the_first_torque() {
     assert!(place.path().join("found/flux_map.csv").is_file());
 }
 
-/// The rotor would turn away under currents that are not along d: the experiment ends before it has gone far.
+/// A zero that is some degrees off: the tables are of the zero that is right, the key to change and the number to add are told, and with it
+/// the first torque is.
 #[test]
-fn an_angle_whose_zero_or_direction_is_wrong_is_told_and_nothing_turns_with_it() {
-    for words in ["--angle-error 15", "--angle-error -15", "--angle-error 60"] {
+fn a_zero_that_is_off_is_told_and_the_tables_are_made() {
+    for error_deg in [8.0, -10.0] {
+        let place = tempfile::tempdir().unwrap();
+        let (code, said, record) = commissioned(&format!("--angle-error {error_deg}"), place.path());
+        assert_eq!(code, 0, "{said}");
+        assert!((found(&record, 1, "angle_zero_deg") + error_deg).abs() < 0.3, "{said}");
+        let text = record["step"][1]["advice"][0].as_str().unwrap();
+        let number = text.strip_prefix("power stage, encoder_zeros_deg: add about ").expect(text);
+        let number = number.split(',').next().unwrap().parse::<f64>().expect(text);
+        assert!((number + error_deg).abs() < 0.3, "{text}");
+        assert!((found(&record, 3, "encoder_zero_added_deg") + error_deg).abs() < 0.3);
+        let [speed_rpm, expected_rpm] =
+            ["speed_reached_rpm", "speed_expected_rpm"].map(|name| found(&record, 3, name));
+        assert!((speed_rpm / expected_rpm - 1.0).abs() < 0.05, "{speed_rpm} r/min, not {expected_rpm}");
+    }
+}
+
+/// The rotor turns away under currents that are not along d by far: the experiment ends before it has gone far.
+#[test]
+fn an_angle_whose_zero_is_far_off_is_told_and_nothing_turns_with_it() {
+    for words in ["--angle-error 60", "--angle-error -60"] {
         let place = tempfile::tempdir().unwrap();
         let (code, said, record) = commissioned(words, place.path());
         assert_eq!(code, 1, "{words}: {said}");
@@ -60,19 +80,37 @@ fn an_angle_whose_zero_or_direction_is_wrong_is_told_and_nothing_turns_with_it()
     }
 }
 
-/// A zero that is some degrees off turns a free rotor away; the key to change is told, and about the number to add.
+/// Current sensors whose wires are exchanged: which, and nothing turns.
 #[test]
-fn the_key_that_mends_the_angles_zero_is_told() {
-    for (error_deg, [least, most]) in [(8.0, [-10.0, -6.0]), (-20.0, [8.0, 22.0])] {
+fn the_wires_of_the_current_sensors_are_told() {
+    for wiring in ["-u,-v,-w", "v,u,w", "v,w,u", "-u,v,w"] {
         let place = tempfile::tempdir().unwrap();
-        let (code, said, record) = commissioned(&format!("--angle-error {error_deg}"), place.path());
+        let (code, said, record) = commissioned(&format!("--current-sensors={wiring}"), place.path());
         assert_eq!(code, 1, "{said}");
-        let text = record["step"][1]["advice"][0].as_str().unwrap();
-        let number = text.strip_prefix("power stage, encoder_zeros_deg: add about ").expect(text);
-        let number = number.split(';').next().unwrap().parse::<f64>().expect(text);
-        assert!((least..=most).contains(&number), "{error_deg}: {text}");
+        assert_eq!(steps(&record), [("wiring".to_owned(), true), ("identification".to_owned(), false)]);
+        let advice = record["step"][1]["advice"][0].as_str().unwrap();
+        let told = if wiring == "-u,v,w" {
+            "current sensors: one or two have".to_owned()
+        } else {
+            format!("current sensors: those of u,v,w read {wiring}:")
+        };
+        assert!(advice.starts_with(&told), "{advice}");
         assert!(!place.path().join("found").exists());
     }
+}
+
+/// As far as the tables, then on: what has passed is not done again.
+#[test]
+fn a_commissioning_goes_on_where_it_has_ended() {
+    let place = tempfile::tempdir().unwrap();
+    let (code, said, record) = commissioned("--until tables", place.path());
+    assert_eq!((code, steps(&record).len(), record["finished"].as_bool()), (0, 3, Some(false)), "{said}");
+    let (code, said, resumed) = commissioned("--resume", place.path());
+    assert_eq!((code, steps(&resumed).len(), resumed["finished"].as_bool()), (0, 4, Some(true)), "{said}");
+    assert!(!said.contains("identification"), "{said}");
+    assert_eq!(resumed["step"].as_array().unwrap()[..3], record["step"].as_array().unwrap()[..]);
+    let (code, said, _) = commissioned("--resume --machine pmsm-48v-1kw", place.path());
+    assert!(code != 0, "a record of another machine: {said}");
 }
 
 #[test]

@@ -67,6 +67,29 @@ fn nonsense_is_refused_by_its_option_and_leaves_nothing() {
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0, "nothing is left behind");
 }
 
+/// Without saliency the largest torque is as round a number as the values are.
+#[test]
+fn a_machine_of_round_numbers_is_taken() {
+    let folder = tempfile::tempdir().unwrap();
+    for (values, torque_nm) in [
+        (
+            "--pole-pairs 4 --rs 0.3 --ld 2.5e-3 --lq 2.5e-3 --psi-f 0.15 --max-current 30 --udc 325 --max-speed-rpm 4500",
+            27.0,
+        ),
+        (
+            "--pole-pairs 1 --rs 0.05 --ld 3e-4 --lq 3e-4 --psi-f 0.035 --max-current 80 --udc 300 --max-speed-rpm 40000",
+            4.2,
+        ),
+    ] {
+        let out = folder.path().join("made");
+        let output = new(&format!("{values} --max-switching-hz 20000"), &out);
+        assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+        let machine = Machine::load(&out.display().to_string()).unwrap();
+        let share = machine.folder.parameters.max_torque_nm / torque_nm;
+        assert!((0.999..=1.0).contains(&share), "{values}: {share}");
+    }
+}
+
 #[test]
 fn a_folder_is_made_whole_replaced_whole_and_others_are_left_alone() {
     let folder = tempfile::tempdir().unwrap();

@@ -28,8 +28,8 @@ pub trait MessageSet: Copy + 'static {
     const FROM_DRIVE: &'static [&'static Message];
     /// The first frame of a message, or the first after a silence: it only sets the counter.
     const GREETING: Self::Content;
-    /// `true` where the signals' steps follow from the machine's ratings.
-    const IS_SCALED: bool;
+    /// `true` for the ZS9, whose ratings are its operator's.
+    const IS_ZS9: bool;
     /// Nothing said.
     const SILENT: Self;
 

@@ -59,6 +59,9 @@ const FEWEST_STEPS: f32 = 500.0;
 /// The part of a rated torque that can be told.
 const TORQUE_MARGIN: f32 = 1.5;
 
+/// The part of the ZS9's highest capacitor voltage that can be told.
+const CAPACITOR_MARGIN: f32 = 1.5;
+
 /// 0, the usual step; a tenth of it, and again, while a rating has less than 500 steps; ten times that while the most that is to be told,
 /// as a share of the usual range, lies beyond it.
 const fn exponent(rated_steps: f32, most: f32) -> i32 {
@@ -84,6 +87,17 @@ impl Scales {
 
     /// Those of a machine.
     pub const fn of(ratings: &Ratings) -> Self {
+        Self::up_to(ratings, ratings.trip_dc_over_v)
+    }
+
+    /// Those of two machines on a ZS9, by its operator's ratings. At which capacitor voltage it trips is the power stage's matter, of which a
+    /// host knows nothing: the highest one in normal operation is the measure.
+    pub const fn of_zs9(ratings: &Ratings) -> Self {
+        Self::up_to(ratings, CAPACITOR_MARGIN * ratings.dc_link_max_v)
+    }
+
+    /// With voltages up to this one, in V.
+    const fn up_to(ratings: &Ratings, most_v: f32) -> Self {
         let rpm = RPM_PER_RAD_S * ratings.max_speed_rad_s;
         let trip_rpm = RPM_PER_RAD_S * ratings.trip_speed_rad_s / SPEED_RPM[1];
         let trip_hz = ratings.pole_pairs * ratings.trip_speed_rad_s / TAU / FREQUENCY_HZ[1];
@@ -94,10 +108,7 @@ impl Scales {
                 Quantity::Current,
                 exponent(ratings.max_current_a / 0.1, ratings.trip_current_a / CURRENT_A[1]),
             )
-            .with(
-                Quantity::Voltage,
-                exponent(ratings.dc_link_nominal_v / 0.1, ratings.trip_dc_over_v / LINK_V[1]),
-            )
+            .with(Quantity::Voltage, exponent(ratings.dc_link_nominal_v / 0.1, most_v / LINK_V[1]))
             .with(Quantity::Speed, exponent(rpm / 0.5, if trip_rpm > trip_hz { trip_rpm } else { trip_hz }))
     }
 

@@ -43,7 +43,7 @@ pub struct Session<D: MessageSet> {
 impl<D: MessageSet> Session<D> {
     /// Nothing received yet.
     pub const fn new(ratings: &'static Ratings) -> Self {
-        let scales = if D::IS_SCALED { Scales::of(ratings) } else { Scales::USUAL };
+        let scales = if D::IS_ZS9 { Scales::of_zs9(ratings) } else { Scales::of(ratings) };
         Self {
             ratings,
             scales,

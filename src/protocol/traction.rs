@@ -61,7 +61,7 @@ impl MessageSet for Traction {
 
     const TO_DRIVE: &'static [&'static Message] = &TO_DRIVE;
     const FROM_DRIVE: &'static [&'static Message] = &FROM_DRIVE;
-    const IS_SCALED: bool = true;
+    const IS_ZS9: bool = false;
     const GREETING: Content = Content::Greeting;
     const SILENT: Self = Self { command: Command::AT_REST, torque_limits: None, link_limits: None };
 

@@ -8,7 +8,7 @@ use super::commands::{
 use super::dialect::{MessageSet, Taken, motor_limits};
 use super::message::Message;
 use super::parameters::{Parameters, RPM_PER_RAD_S};
-use super::scales::Scales;
+use super::scales::{Quantity, Scales};
 use super::signal::{OutOfRange, Payload, Signal};
 use super::telemetry::{
     ANSWER_PARAMETER, ANSWER_RESULT, ANSWER_VALUE, CHOPPER, COUNTER_SIGNALS, DISCHARGE, FAULT, LISTENING,
@@ -23,21 +23,21 @@ use crate::ports::DualReport;
 
 const KIND: Signal = Signal::number("page", 35, 1, 1);
 const TORQUES: [Signal; 2] = [
-    Signal::physical("torque1_nm", "N.m", 16, 0.1, TORQUE_NM).on_page(0),
-    Signal::physical("torque2_nm", "N.m", 48, 0.1, TORQUE_NM).on_page(0),
+    Signal::physical("torque1_nm", "N.m", 16, 0.1, TORQUE_NM).of(Quantity::Torque).on_page(0),
+    Signal::physical("torque2_nm", "N.m", 48, 0.1, TORQUE_NM).of(Quantity::Torque).on_page(0),
 ];
 const SPEEDS: [Signal; 2] = [
-    Signal::physical("speed1_rpm", "r/min", 16, 0.5, SPEED_RPM).on_page(1),
-    Signal::physical("speed2_rpm", "r/min", 48, 0.5, SPEED_RPM).on_page(1),
+    Signal::physical("speed1_rpm", "r/min", 16, 0.5, SPEED_RPM).of(Quantity::Speed).on_page(1),
+    Signal::physical("speed2_rpm", "r/min", 48, 0.5, SPEED_RPM).of(Quantity::Speed).on_page(1),
 ];
-const LINK_REF: Signal = Signal::physical("link_ref_v", "V", 16, 0.1, LINK_V);
+const LINK_REF: Signal = Signal::physical("link_ref_v", "V", 16, 0.1, LINK_V).of(Quantity::Voltage);
 
 const SCHEME: Signal = pattern("scheme");
-const SPEED: Signal = Signal::physical("speed_rpm", "r/min", 16, 0.5, SPEED_RPM);
-const TORQUE: Signal = Signal::physical("torque_nm", "N.m", 32, 0.1, TORQUE_NM);
-const CURRENT: Signal = Signal::physical("current_a", "A", 48, 0.1, [0.0, 3_000.0]);
-const LINK: Signal = Signal::physical("link_v", "V", 16, 0.1, LINK_V);
-const CAPACITOR: Signal = Signal::physical("capacitor_v", "V", 32, 0.1, LINK_V);
+const SPEED: Signal = Signal::physical("speed_rpm", "r/min", 16, 0.5, SPEED_RPM).of(Quantity::Speed);
+const TORQUE: Signal = Signal::physical("torque_nm", "N.m", 32, 0.1, TORQUE_NM).of(Quantity::Torque);
+const CURRENT: Signal = Signal::physical("current_a", "A", 48, 0.1, [0.0, 3_000.0]).of(Quantity::Current);
+const LINK: Signal = Signal::physical("link_v", "V", 16, 0.1, LINK_V).of(Quantity::Voltage);
+const CAPACITOR: Signal = Signal::physical("capacitor_v", "V", 32, 0.1, LINK_V).of(Quantity::Voltage);
 const DUTY: Signal = Signal::physical("duty_percent", "%", 48, 0.01, [0.0, 100.0]);
 
 /// Levels and demands: on page 0 torques, on page 1 speeds. Without it the drive does nothing.
@@ -60,14 +60,18 @@ pub const ZS9_COMMAND: Message = Message::new(
         SPEEDS[0],
         SPEEDS[1],
     ],
-);
+)
+.telling(36, &[Quantity::Torque, Quantity::Speed]);
 /// Limits of torque and speed of the upper motor, of the lower one; as rated until they come.
 pub const ZS9_LIMITS: [Message; 2] = [
-    Message::new("ZS9_LIMITS_1", 0x112, 18, 100, &[MOTORING, BRAKING, SPEED_LIMIT]),
-    Message::new("ZS9_LIMITS_2", 0x113, 19, 100, &[MOTORING, BRAKING, SPEED_LIMIT]),
+    Message::new("ZS9_LIMITS_1", 0x112, 18, 100, &[MOTORING, BRAKING, SPEED_LIMIT])
+        .telling(12, &[Quantity::Torque, Quantity::Speed]),
+    Message::new("ZS9_LIMITS_2", 0x113, 19, 100, &[MOTORING, BRAKING, SPEED_LIMIT])
+        .telling(12, &[Quantity::Torque, Quantity::Speed]),
 ];
 /// The link's voltage outside shoot-through; the nominal one until it comes.
-pub const ZS9_LINK: Message = Message::new("ZS9_LINK", 0x114, 20, 100, &[LINK_REF]);
+pub const ZS9_LINK: Message =
+    Message::new("ZS9_LINK", 0x114, 20, 100, &[LINK_REF]).telling(12, &[Quantity::Voltage]);
 /// Reads a parameter, or writes it.
 pub const ZS9_PARAMETER_REQUEST: Message =
     Message::new("ZS9_PARAMETER_REQUEST", 0x115, 21, 0, &[WRITE, PARAMETER, VALUE]);
@@ -80,9 +84,13 @@ pub const ZS9_STATUS: Message = Message::new(
     10,
     &[STATE, FAULT, REFUSAL, REFUSALS, SCHEME, LISTENING, PRECHARGE, MAIN, DISCHARGE, CHOPPER, TAKEN],
 );
-const MOTOR_1: Message = Message::new("ZS9_MOTOR_1", 0x192, 23, 10, &[SPEED, TORQUE, CURRENT]);
-const MOTOR_2: Message = Message::new("ZS9_MOTOR_2", 0x193, 24, 10, &[SPEED, TORQUE, CURRENT]);
-const LINK_STATE: Message = Message::new("ZS9_LINK_STATE", 0x194, 25, 10, &[LINK, CAPACITOR, DUTY]);
+// One tells torque's steps and the other current's; with the command's, which tells torque's and speed's together, none is misread.
+const MOTOR_1: Message =
+    Message::new("ZS9_MOTOR_1", 0x192, 23, 10, &[SPEED, TORQUE, CURRENT]).telling(12, &[Quantity::Torque]);
+const MOTOR_2: Message =
+    Message::new("ZS9_MOTOR_2", 0x193, 24, 10, &[SPEED, TORQUE, CURRENT]).telling(12, &[Quantity::Current]);
+const LINK_STATE: Message =
+    Message::new("ZS9_LINK_STATE", 0x194, 25, 10, &[LINK, CAPACITOR, DUTY]).telling(12, &[Quantity::Voltage]);
 const FAULT_VALUE: Message = Message::new("ZS9_FAULT_VALUE", 0x195, 26, 100, &[TRIP_FAULT, TRIP_VALUE]);
 const FAULT_LIMIT: Message = Message::new("ZS9_FAULT_LIMIT", 0x196, 27, 100, &[TRIP_FAULT, TRIP_LIMIT]);
 const COUNTERS: Message = Message::new("ZS9_COUNTERS", 0x197, 28, 100, &COUNTER_SIGNALS);
@@ -122,7 +130,7 @@ impl Zs9Command {
     pub const AT_REST: Self = Self { levels: Levels::NONE, demands: Zs9Demands::Torques([0.0; 2]) };
 
     /// As a frame's content.
-    pub fn encode(&self) -> Result<Payload, OutOfRange> {
+    pub fn encode(&self, scales: Scales) -> Result<Payload, OutOfRange> {
         let mut payload = put_levels(&self.levels);
         let (kind, signals, values) = match self.demands {
             Zs9Demands::Torques(values) => (0, &TORQUES, values),
@@ -130,17 +138,17 @@ impl Zs9Command {
         };
         KIND.put_raw(&mut payload, kind);
         for (signal, value) in signals.iter().zip(values) {
-            signal.put(&mut payload, value)?;
+            signal.put_on(scales, &mut payload, value)?;
         }
         Ok(payload)
     }
 
     /// From a frame's content; `None` if a value is out of its range or an unused bit is set.
-    pub fn decode(payload: Payload) -> Option<Self> {
+    pub fn decode(payload: Payload, scales: Scales) -> Option<Self> {
         ZS9_COMMAND.is_tidy(payload).then_some(())?;
         let is_speed = KIND.is_set(payload);
         let [first, second] = if is_speed { &SPEEDS } else { &TORQUES };
-        let values = [first.get(payload)?, second.get(payload)?];
+        let values = [first.get_on(scales, payload)?, second.get_on(scales, payload)?];
         let demands = if is_speed { Zs9Demands::Speeds(values) } else { Zs9Demands::Torques(values) };
         Some(Self { levels: levels(payload), demands })
     }
@@ -156,16 +164,16 @@ pub struct Zs9Link {
 
 impl Zs9Link {
     /// As a frame's content.
-    pub fn encode(&self) -> Result<Payload, OutOfRange> {
+    pub fn encode(&self, scales: Scales) -> Result<Payload, OutOfRange> {
         let mut payload = Payload::default();
-        LINK_REF.put(&mut payload, self.link_ref_v)?;
+        LINK_REF.put_on(scales, &mut payload, self.link_ref_v)?;
         Ok(payload)
     }
 
     /// From a frame's content; `None` if the value is out of its range or an unused bit is set.
-    pub fn decode(payload: Payload) -> Option<Self> {
+    pub fn decode(payload: Payload, scales: Scales) -> Option<Self> {
         ZS9_LINK.is_tidy(payload).then_some(())?;
-        Some(Self { link_ref_v: LINK_REF.get(payload)? })
+        Some(Self { link_ref_v: LINK_REF.get_on(scales, payload)? })
     }
 }
 
@@ -213,22 +221,22 @@ pub struct Zs9Measured {
 
 impl Zs9Measured {
     /// Takes over what a message of the three says.
-    pub fn merge(&mut self, message: &Message, payload: Payload) {
+    pub fn merge(&mut self, message: &Message, payload: Payload, scales: Scales) {
         let [first, second] = &mut self.motors;
         let motor = match message.id {
             id if id == MOTOR_1.id => first,
             id if id == MOTOR_2.id => second,
             id if id == LINK_STATE.id => {
-                self.link_v = LINK.get(payload);
-                self.capacitor_v = CAPACITOR.get(payload);
-                self.duty_percent = DUTY.get(payload);
+                self.link_v = LINK.get_on(scales, payload);
+                self.capacitor_v = CAPACITOR.get_on(scales, payload);
+                self.duty_percent = DUTY.get_on(scales, payload);
                 return;
             }
             _ => return,
         };
-        motor.speed_rpm = SPEED.get(payload);
-        motor.torque_nm = TORQUE.get(payload);
-        motor.current_a = CURRENT.get(payload);
+        motor.speed_rpm = SPEED.get_on(scales, payload);
+        motor.torque_nm = TORQUE.get_on(scales, payload);
+        motor.current_a = CURRENT.get_on(scales, payload);
     }
 }
 
@@ -248,17 +256,17 @@ impl MessageSet for Zs9 {
 
     const TO_DRIVE: &'static [&'static Message] = &TO_ZS9;
     const FROM_DRIVE: &'static [&'static Message] = &FROM_ZS9;
-    const IS_SCALED: bool = false;
+    const IS_ZS9: bool = true;
     const GREETING: Zs9Content = Zs9Content::Greeting;
     const SILENT: Self = Self { command: Zs9Command::AT_REST, limits: [None; 2], link: None };
 
     fn decode(id: u16, payload: Payload, scales: Scales) -> Option<Zs9Content> {
         let [first, second] = &ZS9_LIMITS;
         Some(match id {
-            id if id == ZS9_COMMAND.id => Zs9Content::Command(Zs9Command::decode(payload)?),
+            id if id == ZS9_COMMAND.id => Zs9Content::Command(Zs9Command::decode(payload, scales)?),
             id if id == first.id => Zs9Content::Limits(0, TorqueLimits::decode(payload, scales)?),
             id if id == second.id => Zs9Content::Limits(1, TorqueLimits::decode(payload, scales)?),
-            id if id == ZS9_LINK.id => Zs9Content::Link(Zs9Link::decode(payload)?),
+            id if id == ZS9_LINK.id => Zs9Content::Link(Zs9Link::decode(payload, scales)?),
             id if id == ZS9_PARAMETER_REQUEST.id => Zs9Content::Parameter(ParameterRequest::decode(payload)?),
             _ => return None,
         })

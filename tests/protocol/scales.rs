@@ -3,13 +3,15 @@
 use super::Stream;
 use std::path::Path;
 use tractive::built_in::traction::BUILT_IN;
+use tractive::drive::dual::Settings;
 use tractive::machine::{Ratings, Tables};
 use tractive::protocol::e2e::Counter;
 use tractive::protocol::{
-    COMMAND, CURRENTS, Command, Content, FROM_DRIVE, Frame, Kind, LIMITS, LINK_LIMITS, LinkLimits, MOTION,
-    Measured, Message, Payload, Quantity, Receiver, Reject, Scales, Signal, TO_DRIVE, TORQUE_ESTIMATE,
-    TorqueLimits, VOLTAGES,
+    COMMAND, CURRENTS, Command, Content, FROM_DRIVE, FROM_ZS9, Frame, Kind, LIMITS, LINK_LIMITS, LinkLimits,
+    MOTION, Measured, Message, Payload, Quantity, Receiver, Reject, Scales, Signal, TO_DRIVE, TO_ZS9,
+    TORQUE_ESTIMATE, TorqueLimits, VOLTAGES,
 };
+use tractive::time::Clock;
 use tractive_tablegen::MachineFolder;
 
 fn tables(name: &str) -> Tables {
@@ -98,11 +100,71 @@ fn the_papers_machines_have_the_usual_steps() {
     }
 }
 
+/// The ratings by which the ZS9's operator knows two such machines, and its scales.
+fn on_a_zs9(ratings: &Ratings) -> (Ratings, Scales) {
+    let operated = Settings::new(Clock::new(25_000_000, 2_500), 2_500).operator_ratings(ratings);
+    (operated, Scales::of_zs9(&operated))
+}
+
+/// The same of two machines on a ZS9, whose capacitor has more volts than a machine's own link; the paper's have the usual steps.
+#[test]
+fn the_zs9_counts_in_its_machines_steps() {
+    assert_eq!(on_a_zs9(&tables("ipm-zs9").ratings).1, Scales::USUAL);
+    let (_, low) = on_a_zs9(&tables("pmsm-48v-1kw").ratings);
+    assert_eq!(Quantity::SCALED.map(|quantity| low.exponent(quantity)), [-2, -1, 0, 0]);
+    for (name, own) in machines() {
+        let (operated, scales) = on_a_zs9(&own);
+        let mut scaled = 0;
+        for message in TO_ZS9.into_iter().chain(FROM_ZS9) {
+            for signal in message.signals.iter().filter(|signal| signal.quantity != Quantity::Fixed) {
+                scaled += 1;
+                let step = signal.scale * scales.worth(signal.quantity);
+                let [rating, most] = rated(&operated, signal);
+                let most =
+                    if signal.quantity == Quantity::Voltage { 1.4 * operated.dc_link_max_v } else { most };
+                assert!(0.5 * step <= 1e-3 * rating, "{name}: {}.{}", message.name, signal.name);
+                let mut payload = Payload(0);
+                assert_eq!(signal.put_on(scales, &mut payload, most), Ok(()), "{name}: {}", signal.name);
+            }
+            let physical = message.signals.iter().any(|signal| {
+                !signal.unit.is_empty() && signal.unit != "%" && signal.quantity == Quantity::Fixed
+            });
+            assert!(!physical, "{}: a value whose steps are the same of every machine", message.name);
+        }
+        assert_eq!(scaled, 19);
+    }
+}
+
+/// Whatever two machines' steps differ in, some message tells.
+#[test]
+fn steps_that_differ_are_told() {
+    let usual = Scales::USUAL;
+    for (quantity, ratings) in Quantity::SCALED.into_iter().zip(finer(&tables("ipm-zs9").ratings)) {
+        let (_, other) = on_a_zs9(&ratings);
+        assert_ne!(other.exponent(quantity), 0);
+        let told = |message: &&Message| message.mark(Payload(0), usual) != message.mark(Payload(0), other);
+        let messages: Vec<_> =
+            TO_ZS9.into_iter().chain(FROM_ZS9).filter(told).map(|message| message.name).collect();
+        assert!(!messages.is_empty(), "{}", quantity.name());
+        println!("{}: {messages:?}", quantity.name());
+    }
+}
+
+/// The ratings with another step of torque, of current, of voltage, of speed, and of no other quantity.
+fn finer(ratings: &Ratings) -> [Ratings; 4] {
+    [
+        Ratings { max_torque_nm: 1.0, ..*ratings },
+        Ratings { max_current_a: 1.0, trip_current_a: 1.3, ..*ratings },
+        Ratings { dc_link_min_v: 3.0, dc_link_nominal_v: 4.0, dc_link_max_v: 5.0, ..*ratings },
+        Ratings { max_speed_rad_s: 5.0, trip_speed_rad_s: 6.0, ..*ratings },
+    ]
+}
+
 /// The bits that tell the scales lie where no signal is.
 #[test]
 fn the_mark_has_bits_of_its_own() {
     let low = Scales::of(&tables("pmsm-48v-1kw").ratings);
-    for message in TO_DRIVE.into_iter().chain(FROM_DRIVE) {
+    for message in TO_DRIVE.into_iter().chain(FROM_DRIVE).chain(TO_ZS9).chain(FROM_ZS9) {
         if let Some(mark) = message.mark_signal(low) {
             assert!(
                 message.signals.iter().all(|signal| signal.mask() & mark.mask() == 0),

@@ -19,7 +19,7 @@ fn ratings() -> &'static tractive::machine::Ratings {
 }
 
 fn command(enable: bool, demands: Zs9Demands) -> Payload {
-    Zs9Command { levels: Levels { enable, ..Levels::default() }, demands }.encode().unwrap()
+    Zs9Command { levels: Levels { enable, ..Levels::default() }, demands }.encode(Scales::USUAL).unwrap()
 }
 
 /// A session that has been greeted and armed.
@@ -82,7 +82,7 @@ fn each_motor_has_its_limits_and_the_link_its_voltage() {
     }
     let mut stream = Stream::of(&ZS9_LINK);
     for _ in 0..2 {
-        session.listen(1, Some(&stream.frame(Zs9Link { link_ref_v: 700.0 }.encode().unwrap())));
+        session.listen(1, Some(&stream.frame(Zs9Link { link_ref_v: 700.0 }.encode(Scales::USUAL).unwrap())));
     }
     assert_eq!(session.listen(1, None::<Frame>).link_ref_v, 700.0);
 }
@@ -137,7 +137,7 @@ fn the_telemetry_says_what_is_measured() {
         let message = FROM_ZS9.into_iter().find(|message| message.id == frame.id).unwrap();
         assert!(message.is_intact(&frame));
         let payload = Payload(u64::from_le_bytes(frame.data));
-        measured.merge(message, payload);
+        measured.merge(message, payload, Scales::USUAL);
         if message.id == Zs9::FROM_DRIVE[0].id {
             told = Some(StatusFrame::<Scheme>::decode(payload));
         }

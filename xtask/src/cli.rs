@@ -26,6 +26,9 @@ pub enum Command {
     /// Set up what is missing, build, identify a simulated machine by its own drive
     #[command(disable_help_flag = true)]
     Identify(RunArgs),
+    /// Set up what is missing, build, bring a simulated machine to its first torque, step by step
+    #[command(disable_help_flag = true)]
+    Commission(RunArgs),
     /// Set up what is missing, run every check
     Test(TestArgs),
     /// Build the image and print what is in it

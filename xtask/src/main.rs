@@ -61,6 +61,7 @@ fn main() -> ExitCode {
     let result = match cli::Cli::parse().command {
         cli::Command::Run(args) => run::run("run", &args.words),
         cli::Command::Identify(args) => run::run("identify", &args.words),
+        cli::Command::Commission(args) => run::run("commission", &args.words),
         cli::Command::Talk(args) => run::run("talk", &args.words),
         cli::Command::Test(args) => test::run(&args),
         cli::Command::Image(args) => image::run(&args),

@@ -1,4 +1,4 @@
-//! `cargo xtask run`, `talk` and `identify`: set up, build, hand over to the rig.
+//! `cargo xtask run`, `talk`, `identify` and `commission`: set up, build, hand over to the rig.
 //!
 //! The rig alone reads what was typed: at first it is asked what that needs, then it is given the same words again.
 
@@ -8,7 +8,7 @@ use crate::setup::Setup;
 use crate::workspace::folders;
 use anyhow::{Context, Result, bail};
 use serde::Deserialize;
-use std::ffi::OsString;
+use std::ffi::{OsStr, OsString};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
@@ -32,6 +32,8 @@ struct Needs {
     emulator: bool,
     /// The script of a talk.
     script: Option<PathBuf>,
+    /// The machine folder that a commissioning makes, of which the drive's image is to be built then.
+    tables: Option<PathBuf>,
 }
 
 impl Needs {
@@ -57,7 +59,7 @@ fn rig(program: &Path) -> Command {
     rig
 }
 
-/// The command, `run`, `talk` or `identify` of the rig; the exit code is the rig's.
+/// The command, `run`, `talk`, `identify` or `commission` of the rig; the exit code is the rig's.
 pub fn run(verb: &str, words: &[OsString]) -> Result<u8> {
     eprintln!("building the rig, where it is not up to date");
     let program = build::rig()?;
@@ -88,6 +90,23 @@ pub fn run(verb: &str, words: &[OsString]) -> Result<u8> {
         };
         rig.env("TRACTIVE_IMAGE", image);
     }
+    let Some(tables) = needs.tables else {
+        return Ok(code(rig.status().with_context(|| process::cannot_start(&rig))?));
+    };
+    let first = rig.args(["--until", "tables"]).status().with_context(|| process::cannot_start(&rig))?;
+    if !first.success() {
+        return Ok(code(first));
+    }
+    eprintln!("building the drive's image with the tables that were made");
+    let made = machine_for_build(&tables.to_string_lossy(), build::root())?;
+    let image = build::image(&setup.toolchain()?, System::Traction, Some(&made))?;
+    last(&program, setup.qemu()?.as_ref(), verb, words, &image)
+}
+
+/// The rest of a commissioning, with the drive's image.
+fn last(program: &Path, qemu: &OsStr, verb: &str, words: &[OsString], image: &Path) -> Result<u8> {
+    let mut rig = rig(program);
+    rig.env("TRACTIVE_QEMU", qemu).arg(verb).args(words).args(["--resume", "--drive-image"]).arg(image);
     Ok(code(rig.status().with_context(|| process::cannot_start(&rig))?))
 }
 

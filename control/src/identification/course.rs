@@ -1,8 +1,10 @@
 //! The course of the experiment: the change of current that the next command is to make.
 
+use super::followed::Followed;
 use super::inductance::Inductance;
 use super::observation::Stage;
 use super::pulses::{Pulses, Region};
+use super::zero::Zero;
 use crate::frames::{Abc, Dq, SinCos, limit};
 use crate::machine::Ratings;
 
@@ -31,10 +33,9 @@ pub struct Course {
     /// Commands since the stage, or its step, began; and the number of the step.
     commands: u32,
     step: u32,
-    /// Halves since the last guess of the inductance, in [`Stage::Probe`].
+    /// Halves since the last guess of the inductance, in [`Stage::Probe`]; and how its currents follow the volt-seconds.
     waited: u32,
-    /// Turn of the rotor since the experiment began, electrical, in rad.
-    away_rad: f32,
+    followed: Followed,
     pulses: Pulses,
     /// Stator resistance, in ohm, as the staircase has shown it.
     resistance_ohm: f32,
@@ -48,6 +49,7 @@ pub struct Course {
     /// Electrical speed, in rad/s, and direction of the rotor's d axis.
     omega: f32,
     frame: SinCos,
+    zero: Zero,
 }
 
 /// Sums over a step of the staircase.
@@ -60,6 +62,8 @@ struct Shown {
 
 const NONE: Dq = Dq { d: 0.0, q: 0.0 };
 
+/// Commands without voltage before the first pulse, which show what the current sensors read where nothing flows.
+const QUIET: u32 = 40;
 /// Voltage of the first pulse, as a share of the link's largest; the growth of the next, and the halves until then.
 const FIRST_SHARE: f32 = 0.003;
 const GROWTH: f32 = 1.5;
@@ -70,17 +74,24 @@ const SEEN_SHARE: f32 = 0.015;
 const LEARNT_SHARE: f32 = 0.006;
 /// Change of current that counts as noise, likewise.
 const NOISE_SHARE: f32 = 0.01;
-/// The change that a probe wants, likewise.
+/// The change that a probe wants, likewise; the directions of those after the first that was seen, and the change that they want, likewise, of a
+/// machine without saliency; and how many they are.
 const PROBE_SHARE: f32 = 0.03;
+const AROUND: [[f32; 2]; 4] = [[0.0, 1.0], [1.0, 0.0], [0.0, -1.0], [-1.0, 0.0]];
+const AROUND_SHARE: f32 = 0.12;
+const PROBES_AROUND: u32 = 24;
+/// Commands that are on their way at most when another one comes.
+const LATE: u32 = 3;
 /// Phase current whose direction is sure, likewise.
 const SMALL_SHARE: f32 = 0.01;
 /// The longest change of a half on the way to a direct current, likewise.
 const LED_SHARE: f32 = 0.05;
 
-/// Direct currents along d, as shares of the bound, and commands for each. Two of them show the resistance.
-const STAIRCASE: [f32; 8] = [-0.25, -0.5, -0.75, -0.97, -0.6, -0.1, 0.1, 0.2];
+/// Direct currents along d, as shares of the bound, and commands for each: first those beside which no current along q takes a rotor back that
+/// turns away. Two of them show the resistance.
+const STAIRCASE: [f32; 8] = [0.1, 0.2, -0.1, -0.25, -0.5, -0.75, -0.9, -0.6];
 const STEP_COMMANDS: u32 = 36;
-const SHOWING: [u32; 2] = [1, 3];
+const SHOWING: [u32; 2] = [4, 6];
 /// Commands from a step's beginning on after which it shows.
 const SETTLED_COMMANDS: u32 = 18;
 
@@ -117,8 +128,9 @@ const COAST_COMMANDS: u32 = 500;
 /// Share of the way to a direct current that a command goes, and share of a half's unexplained voltage that is believed to stay.
 const LEAD: f32 = 0.4;
 const HELD: f32 = 0.3;
-/// The same along d beside pulses along q.
+/// The latter along d beside pulses along q; the former along q over that along d, for the current that keeps the rotor where it is.
 const HELD_BESIDE: f32 = 0.1;
+const STEERED: f32 = 2.0;
 
 impl Course {
     /// Before the first command.
@@ -129,7 +141,7 @@ impl Course {
             commands: 0,
             step: 0,
             waited: 0,
-            away_rad: 0.0,
+            followed: Followed::NOTHING,
             pulses: Pulses::new(),
             resistance_ohm: 0.0,
             lacking_v: 0.0,
@@ -138,12 +150,18 @@ impl Course {
             shown: [NOTHING; 2],
             omega: 0.0,
             frame: SinCos { sin: 0.0, cos: 1.0 },
+            zero: Zero::new(),
         }
     }
 
     /// The part of the experiment that is going on.
     pub fn stage(&self) -> Stage {
         self.stage
+    }
+
+    /// The angle's zero.
+    pub fn zero(&self) -> &Zero {
+        &self.zero
     }
 
     /// Notes the time for which a command acts, in s.
@@ -162,41 +180,64 @@ impl Course {
     }
 
     /// Takes a half that has passed.
-    pub fn learn(&mut self, seen: &Seen, inductance: &mut Inductance, bound_a: f32) {
+    pub fn learn(&mut self, seen: &Seen, inductance: &mut Inductance, ratings: &Ratings) {
+        let (bound_a, pole_pairs) = (ratings.max_current_a, ratings.pole_pairs);
         (self.omega, self.frame) = (seen.omega, seen.frame);
-        self.away_rad += seen.turned;
+        self.pulses.turned(seen);
         let change = seen.current - seen.before;
-        let moved = change.squared() > (SEEN_SHARE * bound_a) * (SEEN_SHARE * bound_a);
         let mean = (seen.current + seen.before) * 0.5;
         match self.stage {
-            Stage::Probe => {
-                self.waited += 1;
-                if moved {
-                    inductance.learn(change, seen.acted, NOISE_SHARE * bound_a);
-                    inductance.settle();
-                    self.enter(Stage::Staircase);
-                } else if self.waited >= PROBE_HALVES {
-                    inductance.scale(GROWTH);
-                    self.waited = 0;
-                }
-            }
+            Stage::Probe => self.probe(seen, change, inductance, bound_a),
             Stage::Staircase if self.commands > SETTLED_COMMANDS => {
                 self.show(seen.acted.d - inductance.flux(change).d, mean.d, seen.length_s);
             }
-            Stage::AlongD | Stage::AlongQ | Stage::AlongBoth => self.pulses.turned(seen),
             _ => {}
         }
+        let back_share = match self.stage {
+            Stage::Staircase | Stage::AlongD => self.pulses.back_share(pole_pairs),
+            Stage::AlongQ | Stage::AlongBoth => self.pulses.mean_share(pole_pairs),
+            _ => 0.0,
+        };
+        self.zero.turn(back_share, mean.d / bound_a, seen.length_s);
+        let drop = self.drop_v(mean, seen.frame);
         let learns = change.squared() > (LEARNT_SHARE * bound_a) * (LEARNT_SHARE * bound_a);
         if learns && self.stage != Stage::Probe {
-            let flux = seen.acted - self.drop_v(mean, seen.frame) * seen.length_s;
-            inductance.learn(change, flux, NOISE_SHARE * bound_a);
+            inductance.learn(change, seen.acted - drop * seen.length_s, NOISE_SHARE * bound_a);
         }
-        match self.stage {
-            Stage::Staircase | Stage::Rest | Stage::Turn | Stage::Done => {
-                self.hold(seen, inductance, [HELD; 2])
+        let [along_d, along_q] = match self.stage {
+            Stage::Done if self.step > 0 => [0.0; 2],
+            Stage::Staircase | Stage::Rest | Stage::Turn | Stage::Done => [HELD; 2],
+            Stage::AlongQ | Stage::AlongBoth => [HELD_BESIDE, 0.0],
+            _ => [0.0; 2],
+        };
+        // The voltage that a half leaves unexplained stays in part: on the way to a direct current, and there.
+        let more = (seen.acted - inductance.flux(change)) * (1.0 / seen.length_s) - drop;
+        self.held_v = self.held_v + Dq { d: more.d * along_d, q: more.q * along_q };
+    }
+
+    /// A half of the probe: along d until a current moves, then along both axes.
+    fn probe(&mut self, seen: &Seen, change: Dq, inductance: &mut Inductance, bound_a: f32) {
+        let moved = change.squared() > (SEEN_SHARE * bound_a) * (SEEN_SHARE * bound_a);
+        if self.step > 0 {
+            // At first what came before is still on its way.
+            if self.commands > LATE {
+                self.followed = self.followed.and(change, seen.acted);
             }
-            Stage::AlongQ | Stage::AlongBoth => self.hold(seen, inductance, [HELD_BESIDE, 0.0]),
-            _ => {}
+        } else if self.commands <= QUIET {
+            self.waited = 0;
+        } else if moved {
+            // Against its voltage goes no machine's current: then the guess by which it has moved is the better one.
+            if change.d * seen.acted.d > 0.0 {
+                inductance.learn(change, seen.acted, NOISE_SHARE * bound_a);
+            }
+            inductance.settle();
+            (self.commands, self.step) = (0, 1);
+        } else {
+            self.waited += 1;
+            if self.waited >= PROBE_HALVES {
+                inductance.scale(GROWTH);
+                self.waited = 0;
+            }
         }
     }
 
@@ -215,12 +256,12 @@ impl Course {
     pub fn change(&mut self, ahead: Dq, reach: f32, inductance: &mut Inductance, ratings: &Ratings) -> Dq {
         let bound_a = ratings.max_current_a;
         if inductance.is_unknown() {
-            *inductance = Inductance::round(FIRST_SHARE * reach / (PROBE_SHARE * bound_a));
+            inductance.guess(FIRST_SHARE * reach / (PROBE_SHARE * bound_a));
         }
         self.commands += 1;
         let before = self.stage;
         self.advance(ratings);
-        if self.away_rad.abs() > AWAY_RAD * ratings.pole_pairs
+        if self.pulses.turned_rad().abs() > AWAY_RAD * ratings.pole_pairs
             && !matches!(self.stage, Stage::Turn | Stage::Done)
         {
             self.enter(Stage::Done);
@@ -228,21 +269,43 @@ impl Course {
         if before == Stage::AlongD && self.stage != before {
             inductance.settle();
         }
-        // Outward step by step, so that each step is known from the one before it.
-        let share = limit(FIRST_BOUND + self.commands as f32 * WIDENING, FIRST_BOUND, 1.0);
-        let share = if self.stage == Stage::AlongQ { share } else { 1.0 };
-        let held_d = if self.stage == Stage::AlongBoth { self.swept() } else { HELD_D };
-        let held = Dq { d: if self.stage == Stage::AlongD { 0.0 } else { held_d * bound_a }, q: 0.0 };
-        let region = |along: [bool; 2]| Region { along, share, held, bound_a, reach, ratings };
+        let region = |share: f32, held: Dq| Region {
+            along_q: self.stage != Stage::AlongD,
+            share,
+            held: held * bound_a,
+            bound_a,
+            reach,
+            ratings,
+        };
         match self.stage {
+            Stage::Probe if self.step > 0 => {
+                let [d, q] = AROUND.get((self.commands % 4) as usize).copied().unwrap_or([0.0; 2]);
+                Dq { d, q } * (AROUND_SHARE * bound_a)
+            }
+            Stage::Probe if self.commands <= QUIET => NONE,
             Stage::Probe => Dq { d: -PROBE_SHARE * bound_a, q: 0.0 },
             Stage::Staircase => {
                 let share = STAIRCASE.get(self.step as usize).copied().unwrap_or(0.0);
-                Self::lead(ahead, Dq { d: share * bound_a, q: 0.0 }, bound_a)
+                let back = if share < 0.0 { self.pulses.back_share(ratings.pole_pairs) } else { 0.0 };
+                let change = Self::lead(ahead, Dq { d: share, q: back } * bound_a, bound_a);
+                Dq { q: change.q * STEERED, ..change }
             }
-            Stage::AlongD => self.pulses.change(ahead, &region([true, false]), inductance),
-            Stage::AlongQ => self.pulses.change(ahead, &region([false, true]), inductance),
-            Stage::AlongBoth => self.pulses.change(ahead, &region([false, true]), inductance),
+            Stage::AlongD => {
+                let back = Dq { d: 0.0, q: self.pulses.back_share(ratings.pole_pairs) };
+                let region = region(1.0, back);
+                self.pulses.change(ahead, &region, inductance)
+            }
+            Stage::AlongQ => {
+                // Outward step by step, so that each step is known from the one before it.
+                let share = limit(FIRST_BOUND + self.commands as f32 * WIDENING, FIRST_BOUND, 1.0);
+                let region = region(share, Dq { d: HELD_D, q: 0.0 });
+                self.pulses.change(ahead, &region, inductance)
+            }
+            Stage::AlongBoth => {
+                let region = region(1.0, Dq { d: self.swept(), q: 0.0 });
+                self.pulses.change(ahead, &region, inductance)
+            }
+            Stage::Done if self.step > 0 => NONE,
             Stage::Rest | Stage::Done => Self::lead(ahead, NONE, bound_a),
             Stage::Turn => {
                 let share = [TURN_SHARE, 0.0, -TURN_SHARE].get(self.step as usize).copied().unwrap_or(0.0);
@@ -271,22 +334,27 @@ impl Course {
         if length * LEAD > most { away * (most / length) } else { change }
     }
 
-    /// The voltage that a half leaves unexplained stays in part: on the way to a direct current, and there.
-    fn hold(&mut self, seen: &Seen, inductance: &Inductance, [along_d, along_q]: [f32; 2]) {
-        let mean = (seen.current + seen.before) * 0.5;
-        let unexplained = (seen.acted - inductance.flux(seen.current - seen.before)) * (1.0 / seen.length_s);
-        let more = unexplained - self.drop_v(mean, seen.frame);
-        self.held_v = self.held_v + Dq { d: more.d * along_d, q: more.q * along_q };
-    }
-
     fn enter(&mut self, stage: Stage) {
         (self.stage, self.commands, self.step) = (stage, 0, 0);
+    }
+
+    /// The end, with no voltage: currents whose sensors tell something else cannot be held.
+    fn refuse(&mut self) {
+        self.enter(Stage::Done);
+        self.step = 1;
     }
 
     /// The next step or stage, where this one is over.
     fn advance(&mut self, ratings: &Ratings) {
         let after = |limit: u32| self.commands > limit;
         match self.stage {
+            Stage::Probe if self.step > 0 && after(PROBES_AROUND) => {
+                if self.followed.is_machine() {
+                    self.enter(Stage::Staircase)
+                } else {
+                    self.refuse()
+                }
+            }
             Stage::Staircase if after(STEP_COMMANDS) => {
                 (self.commands, self.step) = (0, self.step + 1);
                 if self.step as usize == STAIRCASE.len() {

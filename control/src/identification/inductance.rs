@@ -36,8 +36,10 @@ pub struct Inductance {
     here: Matrix,
     field: usize,
     fields: [Option<Matrix>; ALONG_D * ALONG_Q],
-    /// Sign of the current along q, which is that of the coupling.
-    sign: f32,
+    /// The newest of each current along q, whatever flows along d: iron saturates along q with it.
+    along_q: [Option<Matrix>; ALONG_Q],
+    /// Share of the coupling that acts here: odd in the current along q.
+    coupled: f32,
     /// The least own inductance, in H.
     floor_h: f32,
 }
@@ -49,12 +51,24 @@ impl Inductance {
     /// The same along both axes and at every current, in H.
     pub const fn round(henry: f32) -> Self {
         let here = Matrix { dd: henry, dq: 0.0, qq: henry };
-        Self { here, field: usize::MAX, fields: [None; ALONG_D * ALONG_Q], sign: 1.0, floor_h: 0.0 }
+        Self {
+            here,
+            field: usize::MAX,
+            fields: [None; ALONG_D * ALONG_Q],
+            along_q: [None; ALONG_Q],
+            coupled: 1.0,
+            floor_h: 0.0,
+        }
     }
 
     /// The first guess has not been made yet.
     pub fn is_unknown(&self) -> bool {
         self.here.dd <= 0.0
+    }
+
+    /// Takes the same along both axes, in H, where nothing is known.
+    pub fn guess(&mut self, henry: f32) {
+        self.here = Matrix { dd: henry, dq: 0.0, qq: henry };
     }
 
     /// Takes another multiple of it.
@@ -75,10 +89,11 @@ impl Inductance {
         self.floor_h = FLOOR_SHARE * least_h;
     }
 
-    /// Moves to a current, in A: what is remembered of it holds, where it has been before; else that from where it comes.
+    /// Moves to a current, in A: what is remembered of it holds, where it has been before; else what is of its part along q, else that from
+    /// where it comes.
     pub fn at(&mut self, current: Dq, bound_a: f32) {
         let per_a = PER_BOUND / bound_a;
-        self.sign = if current.q < 0.0 { -1.0 } else { 1.0 };
+        self.coupled = limit(current.q * per_a, -1.0, 1.0);
         // What is below 0 the conversion makes 0.
         let row = ((MIDDLE_D + current.d * per_a) as usize).min(ALONG_D - 1);
         let column = ((current.q.abs() * per_a) as usize).min(ALONG_Q - 1);
@@ -87,6 +102,8 @@ impl Inductance {
             self.field = field;
             if let Some(Some(known)) = self.fields.get(field) {
                 self.here = *known;
+            } else if let Some(Some(known)) = self.along_q.get(column) {
+                self.here = *known;
             }
         }
     }
@@ -94,14 +111,21 @@ impl Inductance {
     /// Flux linkage, in Wb, of a change of current, in A.
     pub fn flux(&self, change: Dq) -> Dq {
         let Matrix { dd, dq, qq } = self.here;
-        let dq = dq * self.sign;
+        let dq = dq * self.coupled;
         Dq { d: dd * change.d + dq * change.q, q: dq * change.d + qq * change.q }
+    }
+
+    /// Flux linkages, in Wb, of the parts of a change of current along d and along q, in A.
+    pub fn fluxes(&self, change: Dq) -> [Dq; 2] {
+        let Matrix { dd, dq, qq } = self.here;
+        let dq = dq * self.coupled;
+        [Dq { d: dd * change.d, q: dq * change.d }, Dq { d: dq * change.q, q: qq * change.q }]
     }
 
     /// Change of current, in A, of a flux linkage, in Wb; none while nothing is known.
     pub fn current(&self, flux: Dq) -> Dq {
         let Matrix { dd, dq, qq } = self.here;
-        let dq = dq * self.sign;
+        let dq = dq * self.coupled;
         let determinant = dd * qq - dq * dq;
         if determinant <= 0.0 {
             return Dq { d: 0.0, q: 0.0 };
@@ -113,10 +137,10 @@ impl Inductance {
     /// that explains a share of it, the coupling less readily than the rest.
     pub fn learn(&mut self, change: Dq, flux: Dq, noise_a: f32) {
         let left = flux - self.flux(change);
-        let (d, q) = (change.d, change.q * self.sign);
-        let (left_d, left_q) = (left.d, left.q * self.sign);
-        // With x = (dd, dq, qq): flux_d = d x₀ + q x₁, flux_q = d x₁ + q x₂.
-        let w = COUPLING_WEIGHT;
+        let (Dq { d, q }, Dq { d: left_d, q: left_q }) = (change, left);
+        // With x = (dd, dq, qq) and the coupled share s: flux_d = d x₀ + s q x₁, flux_q = s d x₁ + q x₂.
+        let w_s = COUPLING_WEIGHT * self.coupled;
+        let w = w_s * self.coupled;
         let noise = noise_a * noise_a;
         let (a, b, c) = (d * d + w * q * q + noise, w * d * q, w * d * d + q * q + noise);
         let scale = GAIN / (a * c - b * b);
@@ -127,12 +151,15 @@ impl Inductance {
             if changed > self.floor_h { changed } else { self.floor_h }
         };
         let (dd, qq) = (own(before.dd, d * x), own(before.qq, q * y));
-        let dq = before.dq + w * (q * x + d * y);
+        let dq = before.dq + w_s * (q * x + d * y);
         let most = COUPLING * dd * qq;
         let dq = if dq * dq > most { dq * (most / (dq * dq)) } else { dq };
         self.here = Matrix { dd, dq, qq };
         if let Some(field) = self.fields.get_mut(self.field) {
             *field = Some(self.here);
+        }
+        if let Some(column) = self.along_q.get_mut(self.field % ALONG_Q) {
+            *column = Some(self.here);
         }
     }
 }

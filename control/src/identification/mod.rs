@@ -5,7 +5,8 @@
 //! acted and what flowed ([`Observation`]). The map is fitted elsewhere.
 //!
 //! 1. **Probe**: pulses along d, longer each time, until a current moves.
-//! 2. **Staircase**: direct currents along d, which give no torque: stator resistance and the inverter's voltage error.
+//! 2. **Staircase**: direct currents along d, which give no torque: stator resistance and the inverter's voltage error. Where they turn a free
+//!    rotor the angle's zero is off: a current along q takes it back, and the frame turns until none is needed.
 //! 3. **Pulses** along d, along q, along both: alternating voltages that are reversed where the current would leave the bound at the end
 //!    of the half that is commanded. The torque of one sign follows that of the other, and the side that has turned the rotor further is
 //!    given less: a free rotor swings, and stays where it is.
@@ -17,10 +18,12 @@
 #![forbid(unsafe_code)]
 
 mod course;
+mod followed;
 mod inductance;
 mod observation;
 mod packed;
 mod pulses;
+mod zero;
 
 use crate::control::{
     AimInput, Boundary, Committed, ControlLaw, Law, ModeLimits, Regulated, RotorSample, SpeedTracker, Target,
@@ -48,8 +51,8 @@ pub struct Identification {
     course: Course,
     /// Incremental inductance where the current is.
     inductance: Inductance,
-    /// The newest boundary.
-    last: Option<RotorSample>,
+    /// The current of the newest boundary in A, and the direction of the rotor's d axis there as the angle says.
+    last: Option<(Dq, SinCos)>,
     told: Option<Observation>,
     /// Samples since the last operating point.
     samples: u32,
@@ -118,7 +121,11 @@ impl ControlLaw for Identification {
     }
 
     fn idle(&mut self) {
-        *self = Self { speed: self.speed, ..Self::new() };
+        // What has not begun is as before.
+        if self.last.is_some() || !self.inductance.is_unknown() {
+            *self = Self { speed: self.speed, ..Self::new() };
+        }
+        (self.samples, self.target) = (0, Target::NONE);
     }
 
     fn begin_without_torque(&mut self) {}
@@ -128,21 +135,22 @@ impl ControlLaw for Identification {
     }
 
     fn learn(&mut self, boundary: &Boundary, sample: &RotorSample, _follows: Regulated, law: &Law) {
-        let before = self.last.replace(*sample);
+        let (current, frame) = self.course.zero().seen(sample.current, sample.frame);
+        let before = self.last.replace((current, sample.frame));
         let volt_seconds = boundary.volt_seconds.unwrap_or_default();
-        let bound_a = law.tables.ratings.max_current_a;
-        if let (Some(before), Some(acted)) = (before, boundary.volt_seconds) {
+        let ratings = &law.tables.ratings;
+        if let (Some((before, from)), Some(acted)) = (before, boundary.volt_seconds) {
             let seen = Seen {
-                before: before.current,
-                current: sample.current,
-                acted: acted.park(sample.frame),
-                turned: sample.frame.sin * before.frame.cos - sample.frame.cos * before.frame.sin,
+                before,
+                current,
+                acted: acted.park(frame),
+                turned: sample.frame.sin * from.cos - sample.frame.cos * from.sin,
                 length_s: boundary.length_s,
                 omega: self.speed.omega(),
-                frame: sample.frame,
+                frame,
             };
-            self.inductance.at((seen.before + seen.current) * 0.5, bound_a);
-            self.course.learn(&seen, &mut self.inductance, bound_a);
+            self.inductance.at((seen.before + seen.current) * 0.5, ratings.max_current_a);
+            self.course.learn(&seen, &mut self.inductance, ratings);
         }
         self.told = Some(Observation {
             stage: self.course.stage(),
@@ -169,19 +177,20 @@ impl ControlLaw for Identification {
         law: &Law,
     ) -> VoltageVector {
         // Gates that are still off begin with no voltage.
+        let (here, frame) = self.course.zero().seen(sample.current, sample.frame);
         let voltage = committed.volt_seconds.map_or(NONE, |volt_seconds| {
-            let (here, interval_s) = (sample.current, committed.interval_s);
+            let interval_s = committed.interval_s;
             let bound_a = law.tables.ratings.max_current_a;
             self.inductance.at(here, bound_a);
-            let left = self.course.drop_v(here, sample.frame) * committed.horizon_s;
-            let ahead = here + self.inductance.current(volt_seconds.park(sample.frame) - left);
+            let left = self.course.drop_v(here, frame) * committed.horizon_s;
+            let ahead = here + self.inductance.current(volt_seconds.park(frame) - left);
             self.inductance.at(ahead, bound_a);
             let reach = self.limit_v * interval_s;
             self.course.lasts(interval_s);
             let change = self.course.change(ahead, reach, &mut self.inductance, &law.tables.ratings);
-            self.voltage(ahead, change, sample.frame, interval_s)
+            self.voltage(ahead, change, frame, interval_s)
         });
-        let (length_v, vector): (f32, AlphaBeta) = (voltage.length(), voltage.unpark(sample.frame));
+        let (length_v, vector): (f32, AlphaBeta) = (voltage.length(), voltage.unpark(frame));
         VoltageVector { voltage_v: length_v, vector, carrier: vector, steady_v: length_v }
     }
 }

@@ -5,10 +5,10 @@ use super::inductance::Inductance;
 use crate::frames::{Dq, limit};
 use crate::machine::Ratings;
 
-/// The region that the current may move in, and the axes that pulses move it along.
+/// The region that the current may move in, and the axis that pulses move it along.
 pub struct Region<'a> {
-    /// Pulses along d, and along q.
-    pub along: [bool; 2],
+    /// Pulses along q, or else along d.
+    pub along_q: bool,
     /// Share of the bound that is used.
     pub share: f32,
     /// The current where an axis without pulses is held, in A.
@@ -27,7 +27,7 @@ pub struct Pulses {
     /// Directions of the pulses.
     d: f32,
     q: f32,
-    /// Turn of the rotor since the pulses began, electrical, in rad; and its speed, in rad/s.
+    /// Turn of the rotor since the experiment began, electrical, in rad; and its speed, in rad/s.
     turned_rad: f32,
     omega: f32,
     /// Length of a half, in s.
@@ -43,16 +43,27 @@ const D_REACH: f32 = 0.7;
 /// Share of the way to where an axis without pulses is held that a command goes.
 const HELD_SHARE: f32 = 0.4;
 /// Share of the bound that the boundaries' currents keep to: between them there is ripple.
-const KEPT_SHARE: f32 = 0.94;
+const KEPT_SHARE: f32 = 0.956;
+/// The change along q that a command may make where the iron saturates as the current goes outward, over the one that it is to make.
+const OUTWARD: f32 = 1.4;
 /// Largest current along +d, as a share of the bound.
 const POSITIVE_SHARE: f32 = 0.2;
 /// Turn, mechanical, at which the side that makes it is given no more, in rad; and the time over which the speed counts: so many halves, for the
 /// pulse that is under way, and a time in s, by which the swing of any rotor is damped.
 const MOST_RAD: f32 = 0.028;
-const AHEAD_HALVES: f32 = 18.0;
-const AHEAD_S: f32 = 3e-3;
+const AHEAD_HALVES: f32 = 6.0;
+const AHEAD_S: f32 = 0.02;
+/// Mean current over the bound of pulses whose one side is given no more: triangles of one sign.
+const MEAN_SHARE: f32 = 0.25;
 /// Least share of the bound that a side keeps.
 const LEAST_SIDE: f32 = 0.1;
+/// Current along q that takes the rotor back beside currents along d, as a share of the bound: at the most turn that there is to be, and at most,
+/// which saturates no iron that is not known yet.
+const BACK_GAIN: f32 = 0.15;
+/// The part of that turn up to which a rotor stays where it is by itself.
+const STAYS: f32 = 0.2;
+const BACK_S: f32 = 0.025;
+const BACK_SHARE: f32 = 0.15;
 
 impl Pulses {
     /// Before the first pulse.
@@ -71,6 +82,30 @@ impl Pulses {
         self.omega = seen.omega;
     }
 
+    /// Turn of the rotor since the experiment began, electrical, in rad.
+    pub fn turned_rad(&self) -> f32 {
+        self.turned_rad
+    }
+
+    /// The turn that there is soon, over the most that there is to be.
+    fn away(&self, pole_pairs: f32, ahead_s: f32) -> f32 {
+        let comes = self.turned_rad + self.omega * ahead_s;
+        comes / (pole_pairs * MOST_RAD)
+    }
+
+    /// The current along q over the bound that takes the rotor back to where it was, beside a negative one along d. Where currents that are to
+    /// lie along d turn the rotor, as its angle's zero is off, it comes to rest where this one takes their torque away.
+    pub fn back_share(&self, pole_pairs: f32) -> f32 {
+        let away = self.away(pole_pairs, BACK_S);
+        limit(-BACK_GAIN * (away - limit(away, -STAYS, STAYS)), -BACK_SHARE, BACK_SHARE)
+    }
+
+    /// The same of pulses along q, whose sides leave a mean.
+    pub fn mean_share(&self, pole_pairs: f32) -> f32 {
+        let ahead_s = AHEAD_HALVES * self.length_s + AHEAD_S;
+        -MEAN_SHARE * limit(self.away(pole_pairs, ahead_s), -1.0, 1.0)
+    }
+
     /// Notes the length of a half, in s.
     pub fn lasts(&mut self, length_s: f32) {
         self.length_s = length_s;
@@ -78,57 +113,57 @@ impl Pulses {
 
     /// The change of current that the command is to make from what flows `ahead`: on as before, unless that would leave the region.
     pub fn change(&mut self, ahead: Dq, region: &Region, inductance: &Inductance) -> Dq {
-        let [along_d, along_q] = region.along;
-        let d_step = region.bound_a * if along_q { SLOW_SHARE } else { D_SHARE };
-        let q_step = region.bound_a * Q_SHARE;
-        let back = (region.held - ahead) * HELD_SHARE;
-        let wanted = |d: f32, q: f32| {
-            let change = Dq {
-                d: if along_d { d * d_step } else { limit(back.d, -d_step, d_step) },
-                q: if along_q { q * q_step } else { limit(back.q, -q_step, q_step) },
-            };
-            reached(change, region.reach, inductance)
+        let bound_a = region.share * KEPT_SHARE * region.bound_a;
+        let inside = |Dq { d, q }: Dq| (ahead + Dq { d, q: q * OUTWARD }).squared() <= bound_a * bound_a;
+        let before = self.along(region);
+        let mut change = self.wanted(ahead, region, inductance);
+        let beyond = if region.along_q {
+            let [negative, positive] = self.sides(region);
+            let next = ahead.q + change.q;
+            if self.q > 0.0 { next > positive } else { next < -negative }
+        } else {
+            let next = ahead.d + change.d;
+            if self.d > 0.0 { next > POSITIVE_SHARE * bound_a } else { next < -bound_a }
         };
-        let sides = self.sides(region);
-        if along_q {
-            let next = ahead.q + wanted(self.d, self.q).q;
-            if (self.q > 0.0 && next > sides[1]) || (self.q < 0.0 && next < -sides[0]) {
-                self.q = -self.q;
-            }
+        if beyond {
+            self.turn_to(-before, region);
+            change = self.wanted(ahead, region, inductance);
         }
-        if along_d {
-            let next = ahead.d + wanted(self.d, self.q).d;
-            let bound_a = region.share * KEPT_SHARE * region.bound_a;
-            if next > POSITIVE_SHARE * bound_a {
-                self.d = -1.0;
-            } else if next < -bound_a {
-                self.d = 1.0;
-            }
+        let flows = if region.along_q { ahead.q } else { ahead.d };
+        let inward = if flows > 0.0 { -1.0 } else { 1.0 };
+        if !inside(change) && self.along(region) != inward {
+            self.turn_to(inward, region);
+            change = self.wanted(ahead, region, inductance);
         }
-        self.keep_within(ahead, region, wanted)
+        change
     }
 
-    /// The largest current: first the pulse along q turns back, then that along d.
-    fn keep_within(&mut self, ahead: Dq, region: &Region, wanted: impl Fn(f32, f32) -> Dq) -> Dq {
-        let bound_a = region.share * KEPT_SHARE * region.bound_a;
-        let inside = |change: Dq| (ahead + change).squared() <= bound_a * bound_a;
-        let inward = (if ahead.d > 0.0 { -1.0 } else { 1.0 }, if ahead.q > 0.0 { -1.0 } else { 1.0 });
-        for (d, q) in [(self.d, self.q), (self.d, inward.1), (inward.0, inward.1)] {
-            let change = wanted(d, q);
-            if inside(change) {
-                (self.d, self.q) = (d, q);
-                return change;
-            }
-        }
-        (self.d, self.q) = inward;
-        wanted(self.d, self.q)
+    /// The direction of the pulses along their axis.
+    fn along(&self, region: &Region) -> f32 {
+        if region.along_q { self.q } else { self.d }
+    }
+
+    /// Takes another direction along their axis.
+    fn turn_to(&mut self, direction: f32, region: &Region) {
+        *(if region.along_q { &mut self.q } else { &mut self.d }) = direction;
+    }
+
+    /// The change of current that the pulses' directions ask for.
+    fn wanted(&self, ahead: Dq, region: &Region, inductance: &Inductance) -> Dq {
+        let (d_step, q_step) = (region.bound_a * D_SHARE, region.bound_a * Q_SHARE);
+        let back = (region.held - ahead) * HELD_SHARE;
+        let change = if region.along_q {
+            let slow = region.bound_a * SLOW_SHARE;
+            Dq { d: limit(back.d, -slow, slow), q: self.q * q_step }
+        } else {
+            Dq { d: self.d * d_step, q: limit(back.q, -q_step, q_step) }
+        };
+        reached(change, region.reach, inductance)
     }
 
     /// The largest negative and positive current along q, in A.
     fn sides(&self, region: &Region) -> [f32; 2] {
-        let per_pole = 1.0 / region.ratings.pole_pairs;
-        let comes = self.turned_rad + self.omega * (AHEAD_HALVES * self.length_s + AHEAD_S);
-        let share = comes * per_pole / MOST_RAD;
+        let share = self.away(region.ratings.pole_pairs, AHEAD_HALVES * self.length_s + AHEAD_S);
         [1.0 + share, 1.0 - share]
             .map(|side| limit(side, LEAST_SIDE, 1.0) * region.share * KEPT_SHARE * region.bound_a)
     }
@@ -136,9 +171,7 @@ impl Pulses {
 
 /// A change of current, shortened to what the volt-seconds can make of it: what d takes is left for q.
 fn reached(change: Dq, reach: f32, inductance: &Inductance) -> Dq {
-    let along_d = Dq { q: 0.0, ..change };
-    let (takes_d, takes_q) =
-        (inductance.flux(along_d).length(), inductance.flux(Dq { d: 0.0, ..change }).length());
+    let [takes_d, takes_q] = inductance.fluxes(change).map(Dq::length);
     let d = if takes_d > D_REACH * reach { change.d * (D_REACH * reach / takes_d) } else { change.d };
     let rest = if takes_d > D_REACH * reach { reach - D_REACH * reach } else { reach - takes_d };
     Dq { d, q: if takes_q > rest { change.q * (rest / takes_q) } else { change.q } }

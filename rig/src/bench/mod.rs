@@ -23,6 +23,7 @@ mod settings;
 mod simulated;
 mod switchgear;
 mod time;
+mod wiring;
 
 pub use crate::trace::Tick;
 pub use conversions::Conversions;
@@ -39,6 +40,7 @@ pub use settings::{Operator, Settings};
 pub use simulated::Simulated;
 pub use switchgear::Switchgear;
 pub use time::Timeline;
+pub use wiring::Wiring;
 
 use crate::inject::Injection;
 use crate::inject::traction::{Kind, Spoiler};

@@ -1,6 +1,6 @@
 //! The firmware's converters, as they see the machine.
 
-use super::{Encoder, Position};
+use super::{Encoder, Position, Wiring};
 use crate::plant::Motor;
 use rand::rngs::StdRng;
 use rand::{Rng, SeedableRng};
@@ -26,6 +26,10 @@ pub struct Flaws {
     pub current_offsets_a: [f64; 3],
     /// By how much the DC link is read larger than it is, as a share.
     pub udc_gain: f64,
+    /// The wires of the current sensors.
+    pub current_wiring: Wiring,
+    /// `true` if the angle sensor counts the wrong way.
+    pub angle_reversed: bool,
     /// Constant error of the angle sensor, electrical, in degrees.
     pub angle_error_deg: f64,
     /// Time after its sample in which the angle is read, in s; each time at another instant.
@@ -57,6 +61,8 @@ impl Flaws {
         current_gains: [0.0; 3],
         current_offsets_a: [0.0; 3],
         udc_gain: 0.0,
+        current_wiring: Wiring::RIGHT,
+        angle_reversed: false,
         angle_error_deg: 0.0,
         angle_jitter_s: 0.0,
         angle_harmonics_deg: [0.0; 2],
@@ -105,10 +111,10 @@ impl Converter {
         if latest_s > 0.0 { turns_s * self.random.random_range(0.0..latest_s) } else { 0.0 }
     }
 
-    /// A phase's current as converted now, in A.
-    fn convert(&mut self, phase: usize, current_a: f64) -> f64 {
-        let offset_a = self.flaws.current_offsets_a[phase];
-        let mut value = current_a * (1.0 + self.flaws.current_gain + self.flaws.current_gains[phase]);
+    /// A sensor's current as converted now, in A.
+    fn convert(&mut self, sensor: usize, current_a: f64) -> f64 {
+        let offset_a = self.flaws.current_offsets_a[sensor];
+        let mut value = current_a * (1.0 + self.flaws.current_gain + self.flaws.current_gains[sensor]);
         if offset_a != 0.0 {
             value += offset_a;
         }
@@ -127,7 +133,8 @@ impl Converter {
     /// A motor's phase currents as converted now, in A.
     pub fn currents(&mut self, motor: &Motor) -> Abc {
         let behind_a = if self.flaws.current_filter_s > 0.0 { self.filtered_a } else { motor.currents_abc() };
-        let [a, b, c] = [0, 1, 2].map(|phase| self.convert(phase, behind_a[phase]) as f32);
+        let read_a = self.flaws.current_wiring.read(behind_a);
+        let [a, b, c] = [0, 1, 2].map(|sensor| self.convert(sensor, read_a[sensor]) as f32);
         Abc { a, b, c }
     }
 
@@ -146,6 +153,7 @@ impl Converter {
             .sum();
         let error_turns = (flaws.angle_error_deg + harmonics_deg) / 360.0;
         let turns = true_turns + self.late_turns(motor.turns_s()) + error_turns;
+        let turns = if flaws.angle_reversed { -turns } else { turns };
         let turns = flaws.angle_counts.map_or(turns, |counts| ((turns * counts).floor() + 0.5) / counts);
         Angle((turns.rem_euclid(1.0) * 4_294_967_296.0).round() as u64 as u32)
     }

@@ -1,7 +1,8 @@
 //! `cargo rig commission`: an unknown machine brought to its first torque, step by step, on the rig, in QEMU or on a board over CAN.
 //!
 //! 1. **Wiring**: the link charged and discharged, gates off: its voltage, and the currents' readings where none flows.
-//! 2. **Identification**, with a free rotor; of its observations signs of sensors and the angle's zero and direction are told as well.
+//! 2. **Identification**, with a free rotor; of its observations order, signs and offsets of sensors and the angle's zero and direction are told as
+//!    well.
 //! 3. **Tables**: the machine folder, as the table generator takes it.
 //! 4. **First torque** with these tables, a little of it, and whether what flows is what was asked for.
 //!
@@ -36,26 +37,32 @@ pub fn command(commission: &Commission) -> Result<ExitCode> {
         out.with_file_name(format!("{name}-commissioning.toml"))
     });
     let mut record = Record::new(machine.tables.name, identify);
-    for step in steps::ALL {
+    if commission.resume {
+        record = record.resumed(&path)?;
+    }
+    for step in steps::ALL.iter().skip(record.steps.len()) {
         if !commission.yes && !asked(step)? {
             crate::say!("stopped before: {}", step.name);
             break;
         }
         crate::say!("{} …", step.name);
-        let done = (step.run)(commission, &machine).with_context(|| step.name)?;
+        let done = (step.run)(commission, &machine, &record).with_context(|| step.name)?;
         crate::say!("{done}");
         let passed = done.passed;
         record.steps.push(done);
         // As far as it has come, whatever comes next.
         record.write(&path)?;
-        if !passed {
+        if !passed || commission.until.as_deref() == Some(step.name) {
             break;
         }
     }
-    record.finished = record.steps.len() == steps::ALL.len() && record.steps.iter().all(|step| step.passed);
+    let passed = record.steps.iter().all(|step| step.passed);
+    record.finished = passed && record.steps.len() == steps::ALL.len();
     record.write(&path)?;
     crate::say!("record: {}", path.display());
-    Ok(ExitCode::from(u8::from(!record.finished)))
+    let is_last = |step: &Step| commission.until.as_ref().is_some_and(|until| *until == step.name);
+    let done = record.finished || (passed && record.steps.last().is_some_and(is_last));
+    Ok(ExitCode::from(u8::from(!done)))
 }
 
 /// The answer of the person at the terminal: `true` if ready for a step.

@@ -13,6 +13,12 @@ pub struct Commission {
     /// Go on from step to step without asking.
     #[arg(long)]
     pub yes: bool,
+    /// End after this step: wiring, identification, tables.
+    #[arg(long, value_name = "STEP", value_parser = ["wiring", "identification", "tables"])]
+    pub until: Option<String>,
+    /// Go on where the record ends: what has passed is not done again.
+    #[arg(long)]
+    pub resume: bool,
     /// With --on qemu: the drive's image with the tables that were made, for the first torque.
     #[arg(long, value_name = "FILE")]
     pub drive_image: Option<PathBuf>,

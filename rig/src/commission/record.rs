@@ -2,18 +2,18 @@
 
 use crate::files::write_text;
 use crate::identify::Identify;
-use anyhow::Result;
-use serde::Serialize;
+use anyhow::{Context, Result, ensure};
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fmt::{Display, Formatter};
 use std::path::Path;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 /// A step that was done.
-#[derive(Clone, Debug, Default, Serialize)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Step {
     /// Its name.
-    pub name: &'static str,
+    pub name: String,
     /// `true` if it has passed.
     pub passed: bool,
     /// The reasons why it has not.
@@ -21,22 +21,22 @@ pub struct Step {
     /// The changes that mend it, by the key or the wire that they are made at.
     pub advice: Vec<String>,
     /// The numbers that it found, by their names with units.
-    pub found: BTreeMap<&'static str, f64>,
+    pub found: BTreeMap<String, f64>,
 }
 
 impl Step {
     /// A step that has passed so far.
-    pub fn new(name: &'static str) -> Self {
-        Self { name, passed: true, ..Self::default() }
+    pub fn new(name: &str) -> Self {
+        Self { name: name.to_owned(), passed: true, ..Self::default() }
     }
 
     /// Notes a number.
-    pub fn find(&mut self, name: &'static str, value: f64) {
-        self.found.insert(name, value);
+    pub fn find(&mut self, name: &str, value: f64) {
+        self.found.insert(name.to_owned(), value);
     }
 
     /// Notes a number that is to lie between two others; it has not passed otherwise.
-    pub fn within(&mut self, name: &'static str, value: f64, [least, most]: [f64; 2]) {
+    pub fn within(&mut self, name: &str, value: f64, [least, most]: [f64; 2]) {
         self.find(name, value);
         if !(least..=most).contains(&value) {
             self.fail(format!("{name} is {value}: must be from {least} to {most}"));
@@ -68,34 +68,57 @@ impl Display for Step {
 }
 
 /// The whole record.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Record {
     /// The nameplate's machine.
-    machine: &'static str,
+    machine: String,
     /// The place: `host`, `qemu` or the CAN interface.
     on: String,
-    version: &'static str,
+    version: String,
     /// The time at which it began, in seconds since 1970.
     began_unix_s: u64,
     /// `true` if every step has passed.
     pub finished: bool,
     /// The steps that were done.
-    #[serde(rename = "step")]
+    #[serde(rename = "step", default)]
     pub steps: Vec<Step>,
 }
 
 impl Record {
     /// Nothing done yet.
-    pub fn new(machine: &'static str, identify: &Identify) -> Self {
+    pub fn new(machine: &str, identify: &Identify) -> Self {
         let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
         Self {
-            machine,
+            machine: machine.to_owned(),
             on: identify.can.clone().unwrap_or_else(|| identify.options.on.name().to_owned()),
-            version: env!("CARGO_PKG_VERSION"),
+            version: env!("CARGO_PKG_VERSION").to_owned(),
             began_unix_s: since.as_secs(),
             finished: false,
             steps: Vec::new(),
         }
+    }
+
+    /// The steps of one that ended early, as far as they have passed, of the same machine at the same place.
+    ///
+    /// # Errors
+    /// A file that cannot be read, and a record of something else.
+    pub fn resumed(self, path: &Path) -> Result<Self> {
+        let text = std::fs::read_to_string(path).with_context(|| format!("--resume: {}", path.display()))?;
+        let before: Self = toml::from_str(&text).with_context(|| format!("--resume: {}", path.display()))?;
+        let own = |record: &Self| (record.machine.clone(), record.on.clone());
+        let ((machine, on), (here, place)) = (own(&before), own(&self));
+        ensure!(
+            (&machine, &on) == (&here, &place),
+            "--resume: {} is of {machine} on {on}, not of {here} on {place}",
+            path.display()
+        );
+        let steps = before.steps.into_iter().take_while(|step| step.passed).collect();
+        Ok(Self { began_unix_s: before.began_unix_s, steps, ..self })
+    }
+
+    /// A number that a step found; `None` if it has not.
+    pub fn found(&self, name: &str) -> Option<f64> {
+        self.steps.iter().find_map(|step| step.found.get(name)).copied()
     }
 
     /// Writes it.

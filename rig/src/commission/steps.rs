@@ -1,16 +1,19 @@
 //! The steps of a commissioning.
 
 use super::options::Commission;
-use super::record::Step;
+use super::record::{Record, Step};
+use crate::bench::Wiring;
 use crate::can;
 use crate::folder::write_folder;
-use crate::identify::{Ended, Identify, ROTOR_TURNED, Signs, contents, identified};
+use crate::identify::{CURRENT_SENSORS, Ended, Identify, ROTOR_TURNED, Signs, contents, identified};
 use crate::machine::Machine;
 use crate::options::On;
 use crate::scenario::System as _;
 use crate::scenario::traction::{Options, Traction};
 use crate::talk::{self, Lines, System, Talk};
 use anyhow::{Result, bail};
+use core::f64::consts::TAU;
+use tractive::protection::Fault;
 
 /// A step, and what it asks of the person who does it.
 pub struct Way {
@@ -19,7 +22,7 @@ pub struct Way {
     /// The state in which everything has to be.
     pub asks: &'static str,
     /// The step itself.
-    pub run: fn(&Commission, &Machine) -> Result<Step>,
+    pub run: fn(&Commission, &Machine, &Record) -> Result<Step>,
 }
 
 /// All of them, in their order.
@@ -52,15 +55,21 @@ pub const ALL: &[Way] = &[
 /// Share of the largest torque that the first one is, and its times: up, held, in s.
 const TORQUE_SHARE: f64 = 0.05;
 const HELD_S: f64 = 0.3;
-/// Reading without current, as a share of the largest; error of the angle's zero, in degrees; torque off what was asked for, as a share of
-/// the largest.
+const RAMP_S: f64 = 0.1;
+/// Reading without current, as a share of the largest; error of the angle's zero that is to be mended, and the most with which the machine is
+/// found, in degrees; torque off what was asked for, as a share of the largest.
 const REST_SHARE: f64 = 0.02;
-const ZERO_DEG: f64 = 5.0;
+const ZERO_DEG: f64 = 1.0;
+const MOST_ZERO_DEG: f64 = 20.0;
 const RESPONSE_DEG: f64 = 20.0;
 const TORQUE_OFF_SHARE: f64 = 0.02;
 
 /// An error of the angle's zero by which a free rotor turns away, at least, in degrees.
 const LEAST_ZERO_DEG: f64 = 2.0;
+/// The drive's fault of currents whose sum is not zero.
+const PHASE_SUM: &str = Fault::PhaseSum.name();
+const ADVICE_SUM: &str = "current sensors: one or two have the wrong sign, so that what they read does not add up to zero: exchange the leads of \
+    one after the other and begin anew";
 const ADVICE_TURNED: &str = "a load turns the rotor; or its angle counts the wrong way: with the gates off turn the rotor forward, and where \
     speed_rpm is below 0 exchange the encoder's channels A and B or two phases; or its zero is far off: set the power stage's \
     encoder_zeros_deg anew";
@@ -103,7 +112,7 @@ fn fault(talk: &Talk, step: &mut Step) {
     }
 }
 
-fn wiring(commission: &Commission, machine: &Machine) -> Result<Step> {
+fn wiring(commission: &Commission, machine: &Machine, _record: &Record) -> Result<Step> {
     let script =
         "wait 0.3\nexpect state ready\ncharge\nwait 4\nexpect state charged\ndischarge\nwait 6\nend\n";
     let talk = talk(commission, &commission.identify.options, machine, script)?;
@@ -118,61 +127,75 @@ fn wiring(commission: &Commission, machine: &Machine) -> Result<Step> {
     Ok(step)
 }
 
-fn identification(commission: &Commission, machine: &Machine) -> Result<Step> {
+fn identification(commission: &Commission, machine: &Machine, _record: &Record) -> Result<Step> {
     let mut step = Step::new("identification");
     let identify = Identify { over_protocol: true, ..commission.identify.clone() };
     let outcome = match identified(&identify, machine)? {
         Ok(outcome) => outcome,
-        Err(Ended { fault, value, limit, zero_deg }) => {
-            if fault == ROTOR_TURNED {
-                step.advise(turned_away(zero_deg));
+        Err(Ended { fault, value, limit, zero_deg, wiring }) => {
+            match fault.as_str() {
+                ROTOR_TURNED => step.advise(turned_away(zero_deg)),
+                CURRENT_SENSORS => step.advise(sensors_wrong(wiring)),
+                PHASE_SUM => step.advise(ADVICE_SUM.to_owned()),
+                _ => {}
             }
             step.fail(format!("fault {fault}: {value} (limit {limit})"));
             return Ok(step);
         }
     };
     step.within("current_answers_voltage_deg", outcome.signs.response_deg, [-RESPONSE_DEG, RESPONSE_DEG]);
-    step.within("angle_zero_deg", outcome.signs.zero_deg, [-ZERO_DEG, ZERO_DEG]);
+    step.within("angle_zero_deg", outcome.signs.zero_deg, [-MOST_ZERO_DEG, MOST_ZERO_DEG]);
+    let offset_a = REST_SHARE * machine.folder.parameters.max_current_a;
+    step.within("current_offset_a", outcome.offset_a, [0.0, offset_a]);
     advise(&outcome.signs, &mut step);
     step.within("turned_by_pulses_deg", outcome.turned_deg, [0.0, 5.0]);
     step.within("largest_current_of_the_bound", outcome.peak_share, [0.0, 1.1]);
     step.find("stator_resistance_ohm", outcome.fit.resistance_ohm);
     step.find("dead_time_us", 1e6 * outcome.fit.dead_time_s);
     step.find("magnet_flux_wb", outcome.fit.flux(0.0, 0.0).0);
-    step.find("rotor_inertia_kg_m2", outcome.inertia_kg_m2);
+    step.find("rotor_inertia_kg_m2", outcome.rotor.inertia_kg_m2);
+    step.find("friction_nm", outcome.rotor.friction_nm);
     if let (true, Some(out)) = (step.passed, &commission.identify.options.out) {
         write_folder(out, &contents(&outcome, machine))?;
     }
     Ok(step)
 }
 
-/// Advice on signs and zeros that are not right: the key with the number to add, or the wires.
+/// Advice on the angle's zero: the key with the number to add.
 fn advise(signs: &Signs, step: &mut Step) {
-    let Signs { response_deg, zero_deg } = *signs;
-    if response_deg.abs() > 180.0 - RESPONSE_DEG {
-        step.advise(
-            "current sensors: all read with the wrong sign, so exchange the leads of each".to_owned(),
-        );
-    } else if response_deg.abs() > RESPONSE_DEG {
-        step.advise(
-            "current sensors: one reads with the wrong sign, or they are in another order than the phases"
-                .to_owned(),
-        );
-    } else if zero_deg.abs() > ZERO_DEG {
-        step.advise(zero_off(zero_deg));
+    if signs.zero_deg.abs() > MOST_ZERO_DEG {
+        step.advise(format!("{}; then flash this image anew and begin anew", zero_off(signs.zero_deg)));
+    } else if signs.zero_deg.abs() > ZERO_DEG {
+        step.advise(format!(
+            "{}, before the drive's image is made: the tables are those of a zero that is right",
+            zero_off(signs.zero_deg)
+        ));
     }
 }
 
 fn zero_off(zero_deg: f64) -> String {
-    format!(
-        "power stage, encoder_zeros_deg: add about {zero_deg:.1}; then flash this image anew and begin anew"
-    )
+    format!("power stage, encoder_zeros_deg: add about {zero_deg:.1}")
+}
+
+/// Advice on current sensors that read something else than their phases.
+fn sensors_wrong(wiring: Option<Wiring>) -> String {
+    match wiring {
+        Some(wiring) => format!(
+            "current sensors: those of u,v,w read {wiring}: exchange the leads of those with a -, and put the others in order"
+        ),
+        None => {
+            "current sensors: no order and no signs of them explain what they read; check each phase alone"
+                .to_owned()
+        }
+    }
 }
 
 /// Advice on an angle by which the rotor turns away.
 fn turned_away(zero_deg: Option<f64>) -> String {
     match zero_deg {
-        Some(zero_deg) if zero_deg.abs() > LEAST_ZERO_DEG => zero_off(zero_deg),
+        Some(zero_deg) if zero_deg.abs() > LEAST_ZERO_DEG => {
+            format!("{}; then flash this image anew and begin anew", zero_off(zero_deg))
+        }
         _ => ADVICE_TURNED.to_owned(),
     }
 }
@@ -185,7 +208,7 @@ fn made(commission: &Commission) -> Result<Machine> {
     }
 }
 
-fn tables(commission: &Commission, _machine: &Machine) -> Result<Step> {
+fn tables(commission: &Commission, _machine: &Machine, _record: &Record) -> Result<Step> {
     let made = made(commission)?;
     let mut step = Step::new("tables");
     step.find("max_torque_nm", made.folder.parameters.max_torque_nm);
@@ -193,7 +216,7 @@ fn tables(commission: &Commission, _machine: &Machine) -> Result<Step> {
     Ok(step)
 }
 
-fn first_torque(commission: &Commission, machine: &Machine) -> Result<Step> {
+fn first_torque(commission: &Commission, machine: &Machine, record: &Record) -> Result<Step> {
     let identify = &commission.identify;
     let mut step = Step::new("first torque");
     let mut options = identify.options.clone();
@@ -204,14 +227,21 @@ fn first_torque(commission: &Commission, machine: &Machine) -> Result<Step> {
         };
         options.run.image = Some(image.clone());
     }
+    // The rig does what a person does with the power stage's file.
+    if let (None, Some(zero_deg)) = (&identify.can, record.found("angle_zero_deg"))
+        && zero_deg.abs() > ZERO_DEG
+    {
+        options.run.angle_error += zero_deg;
+        step.find("encoder_zero_added_deg", zero_deg);
+    }
     let known = options.machine.clone().unwrap_or_else(|| Traction::MACHINE.to_owned());
     options.own.plant.get_or_insert(known);
     let made = made(commission)?;
     let most_nm = made.folder.parameters.max_torque_nm;
     let torque_nm = TORQUE_SHARE * most_nm;
     let script = format!(
-        "wait 0.3\ncharge\nwait 4\nexpect state charged\nenable\nwait 0.2\nexpect state enabled\ntorque {torque_nm} over 0.1\nwait {HELD_S}\n\
-         torque 0 over 0.1\nwait 0.3\ndisable\nwait 0.5\nend\n"
+        "wait 0.3\ncharge\nwait 4\nexpect state charged\nenable\nwait 0.2\nexpect state enabled\ntorque {torque_nm} over {RAMP_S}\nwait {HELD_S}\n\
+         torque 0 over {RAMP_S}\nwait 0.3\ndisable\nwait 0.5\nend\n"
     );
     let talk = talk(commission, &options, &made, &script)?;
     talk.failures.iter().for_each(|failure| step.fail(failure.clone()));
@@ -224,6 +254,9 @@ fn first_torque(commission: &Commission, machine: &Machine) -> Result<Step> {
     let most_off = TORQUE_OFF_SHARE * most_nm;
     step.within("torque_off_on_average_nm", mean, [-most_off, most_off]);
     step.within("speed_reached_rpm", largest(&speed), [0.01, machine.folder.parameters.max_speed_rpm]);
+    let rotor = ["rotor_inertia_kg_m2", "friction_nm"].map(|name| record.found(name).unwrap_or(f64::NAN));
+    let expected_rpm = (torque_nm - rotor[1]) * HELD_S / rotor[0] * 60.0 / TAU;
+    step.find("speed_expected_rpm", expected_rpm);
     let current_a = largest(&told(&talk, "running", "current_a"));
     step.within("largest_current_a", current_a, [0.0, 0.5 * machine.folder.parameters.max_current_a]);
     Ok(step)

@@ -35,7 +35,8 @@ impl Ratings {
         let smooth = SmoothMap::new(map);
         check_speed(&smooth, given)?;
         let optimum = Optimum::of(&smooth, given.pole_pairs, given.max_current);
-        let max_torque_nm = rounded_down(optimum.most_torque_nm());
+        // Below the generator's own rounding.
+        let max_torque_nm = rounded_down((1.0 - 1e-6) * optimum.most_torque_nm());
         ensure!(
             max_torque_nm > 1e-9,
             "--max-current {}: must give some torque with this flux map",

@@ -337,7 +337,8 @@ impl<'a> View<'a> {
             let depth = depth_limit(mode, self.rate(rpm), &self.devices);
             let in_mode_nm = f64::from(self.point(most_nm, rpm, udc_v, depth).torque_nm);
             let envelope_nm = self.machine.envelope_nm(rpm);
-            let percent = |nm: f64| 100.0 * nm.max(0.0) / most_nm;
+            // To a thousandth: what is less the tables' own rounding makes.
+            let percent = |nm: f64| (1e5 * nm.max(0.0) / most_nm).round() / 1e3;
             Limits {
                 speed_rpm: rpm,
                 mode: mode.name(),

@@ -1,5 +1,6 @@
 //! The commander of an experiment over the protocol: charges the link, enables, waits for the end, and gathers what was observed.
 
+use crate::bench::Wiring;
 use crate::run::{Supervisor, Turn, bar};
 use crate::talk::sender::{Sender, Spoken};
 use crate::talk::{Listener, System};
@@ -42,7 +43,7 @@ impl Phase {
 }
 
 /// A fault that has ended an experiment, as the drive tells it.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Ended {
     /// Its name.
     pub fault: String,
@@ -52,6 +53,8 @@ pub struct Ended {
     pub limit: String,
     /// The number that mends the angle's zero, electrical, in degrees, where the rotor has turned away and the pulses tell it.
     pub zero_deg: Option<f64>,
+    /// The wires of the current sensors, where the currents do not follow the voltage and the first pulses tell them.
+    pub wiring: Option<Wiring>,
 }
 
 /// The commander's state.
@@ -183,7 +186,7 @@ impl Commander {
                 self.enter(Phase::Over);
             }
             if told || self.slot > self.since + FAULT_SLOTS {
-                self.ended = Some(Ended { fault, value, limit, zero_deg: None });
+                self.ended = Some(Ended { fault, value, limit, ..Ended::default() });
             }
         }
         let (most_s, lacking) = self.phase.most();

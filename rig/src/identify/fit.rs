@@ -5,6 +5,7 @@
 //! voltage error. What was before each part of the experiment is a constant of that part, and so each part counts from its mean.
 
 use super::basis::Basis;
+use super::corrected::turned_by;
 use super::half::{Half, add};
 use anyhow::{Result, ensure};
 use nalgebra::{DMatrix, DVector};
@@ -22,8 +23,13 @@ const SMOOTHNESS: f64 = 4e-4;
 const GRID: (u32, u32) = (26, 18);
 /// Phase current, as a share of the bound, whose sign is not sure.
 const SMALL_SHARE: f64 = 0.006;
-/// Rounds in which ripple and inductances find each other.
-const ROUNDS: u32 = 2;
+/// Rounds in which ripple, inductances and the angle's zero find each other: at least, at most, and the change of the zero, in rad, below
+/// which they have.
+const LEAST_ROUNDS: u32 = 2;
+const MOST_ROUNDS: u32 = 10;
+const SAME_RAD: f64 = 2e-4;
+/// Largest change of the zero in a round, in rad.
+const MOST_RAD: f64 = 0.1;
 
 /// A machine as the observations show it.
 #[derive(Clone, Debug)]
@@ -34,6 +40,8 @@ pub struct Fit {
     pub resistance_ohm: f64,
     /// The dead time that explains the inverter's voltage error, thresholds included, in s.
     pub dead_time_s: f64,
+    /// The angle by which the d axis lies ahead of where the observations say that it is, electrical, in rad.
+    pub zero_rad: f64,
     /// The unexplained part of each boundary's flux linkage, by its stage, in Wb: along d and along q.
     pub residuals: Vec<(Stage, [f64; 2])>,
 }
@@ -66,8 +74,9 @@ struct Experiment<'a> {
 }
 
 impl Experiment<'_> {
-    /// The boundaries; `per_flux` is the current, in A, of a small flux linkage, in Wb, at a current in the rotor's frame.
-    fn boundaries(&self, per_flux: impl Fn((f64, f64)) -> [[f64; 2]; 2]) -> Vec<Boundary> {
+    /// The boundaries in the frame that a fit has found; its inductances make the ripple.
+    fn boundaries(&self, known: Option<&Fit>) -> Vec<Boundary> {
+        let per_flux = |current| known.map_or([[0.0; 2]; 2], |fit| fit.per_flux(current));
         let mut sums = [[0.0; 2]; 3];
         let mut before: Option<([f64; 2], (f64, f64))> = None;
         let (mut halves, mut unsure) = (0, 0.0);
@@ -109,7 +118,7 @@ impl Experiment<'_> {
             let [volt_seconds, charge, lacking] = sums;
             Boundary { stage: observation.stage, current, frame, volt_seconds, charge, lacking, unsure }
         };
-        self.observations.iter().map(step).collect()
+        turned_by(self.observations, known.map_or(0.0, |fit| fit.zero_rad)).iter().map(step).collect()
     }
 }
 
@@ -137,9 +146,9 @@ struct Equations {
 }
 
 impl Equations {
-    /// The two rows of each boundary, every part's from its mean.
-    fn of(boundaries: &[Boundary], basis: &Basis) -> Self {
-        let unknowns = basis.len() + 2;
+    /// The two rows of each boundary, every part's from its mean. With a fit that is known the last unknown is a turn of the frame.
+    fn of(boundaries: &[Boundary], basis: &Basis, known: Option<&Fit>) -> Self {
+        let unknowns = basis.len() + 2 + usize::from(known.is_some());
         let mut equations = Self { unknowns, rows: Vec::new(), right: Vec::new() };
         for part in parts(boundaries) {
             let mut own: [Vec<Vec<f64>>; 2] = [Vec::new(), Vec::new()];
@@ -151,9 +160,12 @@ impl Equations {
                     pair[0].push(flux[0]);
                     pair[1].push(flux[1]);
                 }
+                let turns = known.map(|fit| turned(boundary.frame, fit.turns(boundary.current)));
                 for (axis, row) in pair.into_iter().enumerate() {
                     let mut row = row;
-                    row.extend([boundary.charge[axis], boundary.lacking[axis], boundary.volt_seconds[axis]]);
+                    row.extend([boundary.charge[axis], boundary.lacking[axis]]);
+                    row.extend(turns.map(|turns| turns[axis]));
+                    row.push(boundary.volt_seconds[axis]);
                     own[axis].push(row);
                 }
             }
@@ -181,7 +193,8 @@ impl Equations {
                 [((3, 0), 1.0), ((2, 1), 3.0_f64.sqrt()), ((1, 2), 3.0_f64.sqrt()), ((0, 3), 1.0)]
             {
                 let bends = basis.derivative(current, orders);
-                self.rows.extend(bends.into_iter().map(|value| weight * share * value).chain([0.0, 0.0]));
+                self.rows.extend(bends.into_iter().map(|value| weight * share * value));
+                self.rows.resize(self.rows.len() + self.unknowns - basis.len(), 0.0);
                 self.right.push(0.0);
             }
         }
@@ -211,18 +224,25 @@ impl Equations {
 }
 
 impl Experiment<'_> {
-    /// The fit: at first as if the current went straight from boundary to boundary, then with the ripple that its own inductances make.
+    /// The fit: at first as if the current went straight from boundary to boundary, then with the ripple that its own inductances make, and
+    /// in the frame in which it explains most.
     fn fit(&self) -> Result<Fit> {
-        let mut fit = self.solved(&self.boundaries(|_| [[0.0; 2]; 2]))?;
-        for _ in 0..ROUNDS {
-            fit = self.solved(&self.boundaries(|current| fit.per_flux(current)))?;
+        let mut fit = self.solved(None)?;
+        for round in 1..=MOST_ROUNDS {
+            let next = self.solved(Some(&fit))?;
+            let turned_rad = (next.zero_rad - fit.zero_rad).abs();
+            fit = next;
+            if round >= LEAST_ROUNDS && turned_rad < SAME_RAD {
+                break;
+            }
         }
         Ok(fit)
     }
 
-    fn solved(&self, boundaries: &[Boundary]) -> Result<Fit> {
+    fn solved(&self, known: Option<&Fit>) -> Result<Fit> {
+        let boundaries = &self.boundaries(known);
         let basis = Basis::new(self.bound_a);
-        let mut equations = Equations::of(boundaries, &basis);
+        let mut equations = Equations::of(boundaries, &basis, known);
         let count = self.observations.len();
         ensure!(
             equations.right.len() > 4 * equations.unknowns,
@@ -237,9 +257,11 @@ impl Experiment<'_> {
         };
         let left: Vec<f64> = (0..samples).map(residual).collect();
         let residuals = by_boundary(boundaries, &left);
+        let more_rad = if known.is_some() { terms.pop().unwrap_or(f64::NAN) } else { 0.0 };
+        let zero_rad = known.map_or(0.0, |fit| fit.zero_rad) + more_rad.clamp(-MOST_RAD, MOST_RAD);
         let dead_time_s = terms.pop().unwrap_or(f64::NAN);
         let resistance_ohm = terms.pop().unwrap_or(f64::NAN);
-        Ok(Fit { basis, terms, resistance_ohm, dead_time_s, residuals })
+        Ok(Fit { basis, terms, resistance_ohm, dead_time_s, zero_rad, residuals })
     }
 }
 
@@ -262,12 +284,22 @@ impl Fit {
         (sum / self.residuals.len() as f64).sqrt()
     }
 
+    /// Incremental inductances, in H: of d, of both, of q.
+    fn inductances(&self, current: (f64, f64)) -> [f64; 3] {
+        [(2, 0), (1, 1), (0, 2)].map(|orders| {
+            self.basis.derivative(current, orders).iter().zip(&self.terms).map(|(a, b)| a * b).sum::<f64>()
+        })
+    }
+
+    /// The flux linkage in the observations' frame, in Wb, by which a frame that is turned by one rad makes it another.
+    fn turns(&self, (id, iq): (f64, f64)) -> [f64; 2] {
+        let ((psi_d, psi_q), [dd, dq, qq]) = (self.flux(id, iq), self.inductances((id, iq)));
+        [dd * iq - dq * id - psi_q, psi_d + dq * iq - qq * id]
+    }
+
     /// Current, in A, of a small flux linkage, in Wb, at a current: the inverse of the incremental inductance.
     fn per_flux(&self, current: (f64, f64)) -> [[f64; 2]; 2] {
-        let second = |orders| {
-            self.basis.derivative(current, orders).iter().zip(&self.terms).map(|(a, b)| a * b).sum::<f64>()
-        };
-        let (dd, dq, qq) = (second((2, 0)), second((1, 1)), second((0, 2)));
+        let [dd, dq, qq] = self.inductances(current);
         let determinant = dd * qq - dq * dq;
         if dd <= 0.0 || determinant <= 0.0 {
             return [[0.0; 2]; 2];

@@ -5,16 +5,20 @@
 
 mod basis;
 mod commander;
+mod corrected;
 mod fit;
 mod half;
 mod outcome;
+mod response;
 mod signs;
 mod toml;
+mod turn;
 
 pub use commander::{Commander, Ended};
 pub use fit::Fit;
 pub use outcome::{Outcome, Truth};
 pub use signs::{Signs, saliency_deg};
+pub use turn::Rotor;
 
 use crate::can;
 use crate::files::write_text;
@@ -117,7 +121,7 @@ pub fn identified(identify: &Identify, machine: &Machine) -> Result<std::result:
                 fault: trip.fault.name().to_owned(),
                 value: trip.value.to_string(),
                 limit: trip.limit.to_string(),
-                zero_deg: None,
+                ..Ended::default()
             }),
             None => Ok(std::mem::take(&mut recording.observations)),
         };
@@ -135,16 +139,26 @@ pub fn identified(identify: &Identify, machine: &Machine) -> Result<std::result:
 
 /// The fault of an experiment whose rotor has turned away.
 pub const ROTOR_TURNED: &str = "rotor_turned";
+/// The fault of an experiment whose currents do not follow the voltage.
+pub const CURRENT_SENSORS: &str = "current_sensors";
 
-/// Observations of an experiment that has come to its end: one whose rotor is not where it should be, as its angle is wrong or a load turns
-/// it, ends before the rotor is to turn.
+/// Observations of an experiment that has come to its end. One whose rotor is not where it should be, as its angle is wrong or a load turns
+/// it, ends before the rotor is to turn; one whose currents answer as no machine's do, after its first pulses.
 fn complete(observations: Vec<Observation>, bound_a: f64) -> std::result::Result<Vec<Observation>, Ended> {
-    if observations.iter().any(|observation| observation.stage == Stage::Turn) {
+    let reached = |stage: Stage| observations.iter().any(|observation| observation.stage == stage);
+    if reached(Stage::Turn) {
         return Ok(observations);
     }
-    let (value, limit) = ("more".to_owned(), "5° before it is to turn".to_owned());
-    let zero_deg = saliency_deg(&observations, bound_a);
-    Err(Ended { fault: ROTOR_TURNED.to_owned(), value, limit, zero_deg })
+    Err(if reached(Stage::Staircase) {
+        let zero_deg = saliency_deg(&observations, bound_a);
+        let (value, limit) = ("more".to_owned(), "5° before it is to turn".to_owned());
+        Ended { fault: ROTOR_TURNED.to_owned(), value, limit, zero_deg, wiring: None }
+    } else {
+        let wiring = response::wiring(&observations);
+        let value = wiring.map_or_else(|| "as no machine's".to_owned(), |wiring| wiring.to_string());
+        let limit = "u,v,w, as the currents answer the first pulses".to_owned();
+        Ended { fault: CURRENT_SENSORS.to_owned(), value, limit, zero_deg: None, wiring }
+    })
 }
 
 /// The same of a drive on a CAN bus, whose truth nobody knows.

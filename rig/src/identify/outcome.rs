@@ -1,13 +1,14 @@
 //! The outcome of an experiment, and how far it is from the truth.
 
+use super::corrected::{offset_a, turned_by, without_offset};
 use super::fit::Fit;
 use super::signs::Signs;
+use super::turn::{Rotor, turned_deg};
 use crate::analysis::Figures;
 use crate::machine::Machine;
 use crate::report::Page;
 use crate::scenario::traction::Options;
 use anyhow::Result;
-use core::f64::consts::TAU;
 use tractive::identification::{Observation, Stage};
 use tractive_tablegen::{Optimum, SmoothMap};
 
@@ -56,8 +57,10 @@ impl Truth {
 pub struct Outcome {
     /// The fit.
     pub fit: Fit,
-    /// Inertia, in kg·m².
-    pub inertia_kg_m2: f64,
+    /// Inertia and friction.
+    pub rotor: Rotor,
+    /// The largest reading of a phase's sensor where no current flows, as far as the phases' sum does not take part, in A.
+    pub offset_a: f64,
     /// Length of the pulses before the rotor turns, in s.
     pub pulses_s: f64,
     /// The largest current over the bound.
@@ -95,15 +98,20 @@ impl Outcome {
     ) -> Result<Self> {
         let parameters = &machine.folder.parameters;
         let (bound_a, pole_pairs) = (parameters.max_current_a, f64::from(parameters.pole_pairs));
-        let fit = Fit::of(observations, bound_a, 0.5 / parameters.max_switching_hz)?;
+        let half_s = 0.5 / parameters.max_switching_hz;
+        let offset = offset_a(observations);
+        let read = without_offset(observations, offset);
+        let fit = Fit::of(&read, bound_a, half_s)?;
+        let observations = &turned_by(&read, fit.zero_rad);
         let still = |observation: &&Observation| !matches!(observation.stage, Stage::Turn | Stage::Done);
         let pulses_s = observations.iter().filter(still).map(|o| f64::from(o.length_s)).sum();
-        let inertia_kg_m2 = inertia(observations, &fit, pole_pairs);
+        let rotor = Rotor::of(observations, &fit, pole_pairs);
         let of = |error: fn(&Fit, &Truth, &Machine) -> f64| {
             truth.map_or(f64::NAN, |truth| error(&fit, truth, machine))
         };
         Ok(Self {
-            inertia_kg_m2,
+            rotor,
+            offset_a: largest_phase_a(offset),
             pulses_s,
             peak_share: peak_a / bound_a,
             turned_deg: turned_deg(observations, pole_pairs),
@@ -112,8 +120,8 @@ impl Outcome {
             magnet_error: of(|fit, truth, _| fit.flux(0.0, 0.0).0 / truth.flux(0.0, 0.0).0 - 1.0),
             resistance_error: of(|fit, truth, _| fit.resistance_ohm / truth.resistance_ohm - 1.0),
             torque_worst: of(torque_error),
-            signs: Signs::of(observations, &fit, 0.5 / parameters.max_switching_hz),
-            inertia_error: truth.map_or(f64::NAN, |truth| inertia_kg_m2 / truth.inertia_kg_m2 - 1.0),
+            signs: Signs::of(observations, &fit, bound_a),
+            inertia_error: truth.map_or(f64::NAN, |truth| rotor.inertia_kg_m2 / truth.inertia_kg_m2 - 1.0),
             fit,
         })
     }
@@ -126,7 +134,10 @@ impl Outcome {
             ("stator_resistance_ohm", self.fit.resistance_ohm),
             ("dead_time_us", 1e6 * self.fit.dead_time_s),
             ("magnet_flux_wb", self.fit.flux(0.0, 0.0).0),
-            ("rotor_inertia_kg_m2", self.inertia_kg_m2),
+            ("rotor_inertia_kg_m2", self.rotor.inertia_kg_m2),
+            ("friction_nm", self.rotor.friction_nm),
+            ("current_offset_a", self.offset_a),
+            ("angle_zero_deg", self.signs.zero_deg),
             ("residual_mwb", 1e3 * self.fit.left_wb()),
             ("pulses_s", self.pulses_s),
             ("peak_current_percent_of_bound", percent(self.peak_share)),
@@ -167,52 +178,10 @@ impl Outcome {
     }
 }
 
-/// The largest mechanical turn from the beginning until the rotor is to turn, in degrees.
-fn turned_deg(observations: &[Observation], pole_pairs: f64) -> f64 {
-    let still = observations.iter().take_while(|o| o.stage != Stage::Turn);
-    let angles = turns(still.copied().collect::<Vec<_>>().as_slice());
-    angles.iter().fold(0.0_f64, |most, angle| most.max(angle.abs())) / pole_pairs * 360.0 / TAU
-}
-
-/// Electrical angle since the first boundary, in rad, however often it goes round.
-fn turns(observations: &[Observation]) -> Vec<f64> {
-    let mut sum = 0.0;
-    let mut angles = vec![0.0; usize::from(!observations.is_empty())];
-    for pair in observations.windows(2) {
-        let [a, b] = [pair[0].frame, pair[1].frame].map(|frame| (f64::from(frame.sin), f64::from(frame.cos)));
-        sum += (b.0 * a.1 - b.1 * a.0).atan2(b.1 * a.1 + b.0 * a.0);
-        angles.push(sum);
-    }
-    angles
-}
-
-/// Inertia, in kg·m²: the slope of the torque's impulse over the speed, where the rotor turns.
-fn inertia(observations: &[Observation], fit: &Fit, pole_pairs: f64) -> f64 {
-    let own: Vec<_> = observations.iter().filter(|o| o.stage == Stage::Turn).copied().collect();
-    let angles = turns(&own);
-    let torque_nm = |o: &Observation| {
-        let (id, iq) = (f64::from(o.current.d), f64::from(o.current.q));
-        let (psi_d, psi_q) = fit.flux(id, iq);
-        1.5 * pole_pairs * (psi_d * iq - psi_q * id)
-    };
-    let mut impulse = 0.0;
-    let mut points = Vec::new();
-    for k in 1..own.len() {
-        let length_s = f64::from(own[k].length_s);
-        let mean_nm = 0.5 * (torque_nm(&own[k]) + torque_nm(&own[k - 1]));
-        // The mean speed of a half stands in its middle.
-        points
-            .push((impulse + 0.5 * mean_nm * length_s, (angles[k] - angles[k - 1]) / length_s / pole_pairs));
-        impulse += mean_nm * length_s;
-    }
-    let count = points.len() as f64;
-    let mean =
-        points.iter().fold((0.0, 0.0), |sum, point| (sum.0 + point.0 / count, sum.1 + point.1 / count));
-    let (cross, square) = points.iter().fold((0.0, 0.0), |sum, point| {
-        let (x, y) = (point.0 - mean.0, point.1 - mean.1);
-        (sum.0 + x * y, sum.1 + x * x)
-    });
-    square / cross
+/// The largest of three phases' parts of a current in the stationary frame, in A.
+fn largest_phase_a([alpha, beta]: [f64; 2]) -> f64 {
+    let half_beta = 0.75_f64.sqrt() * beta;
+    [alpha, half_beta - 0.5 * alpha, -half_beta - 0.5 * alpha].map(f64::abs).into_iter().fold(0.0, f64::max)
 }
 
 /// Errors of the flux linkage within the circle, as shares of the largest there: root mean square, worst.

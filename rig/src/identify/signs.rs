@@ -1,7 +1,7 @@
 //! Signs of sensors and the angle's zero and direction, as an experiment's observations tell them.
 
 use super::fit::Fit;
-use core::f64::consts::{FRAC_2_PI, PI};
+use core::f64::consts::PI;
 use tractive::identification::{Observation, Stage};
 
 /// Angles that are near zero where everything is connected as it is said to be.
@@ -10,8 +10,8 @@ pub struct Signs {
     /// From the volt-seconds to the change of current that they make in the pulses along d, stationary frame, in degrees: 180 of currents
     /// that are read with the wrong sign, and far from 0 where phases are exchanged.
     pub response_deg: f64,
-    /// From where the angle says that the magnets' voltage is to where it is, electrical, in degrees: the error of the angle's zero; far
-    /// from 0 where the angle counts the wrong way. Of a machine without magnets the voltage of its reluctance along d.
+    /// From where the angle says that the d axis is to where it is, electrical, in degrees: the error of the angle's zero, as the fit has found
+    /// it; near 180 where the magnets lie the other way round.
     pub zero_deg: f64,
 }
 
@@ -35,29 +35,31 @@ fn direction(of: &Observation) -> Vector {
     (of.frame.cos.into(), of.frame.sin.into())
 }
 
+/// Flux linkage along −d without current, as a share of that of the largest current along q, that tells magnets the other way round.
+const NEGATIVE_SHARE: f64 = 0.02;
+
 impl Signs {
-    /// Of the observations, with the machine that was found of them and the length of a carrier half, in s.
-    pub fn of(observations: &[Observation], fit: &Fit, half_s: f64) -> Self {
-        let (mut response, mut voltage) = ((0.0, 0.0), (0.0, 0.0));
+    /// Of the observations, turned to the d axis that the fit has found, with the machine that it has found and its largest current, in A.
+    pub fn of(observations: &[Observation], fit: &Fit, bound_a: f64) -> Self {
+        let mut response = (0.0, 0.0);
         for pair in observations.windows(2) {
             let [before, after] = pair else { continue };
+            if !matches!(after.stage, Stage::Probe | Stage::AlongD) {
+                continue;
+            }
             let volt_seconds = (f64::from(after.volt_seconds.alpha), f64::from(after.volt_seconds.beta));
             let [from, to] =
                 [before, after].map(|of| times((of.current.d.into(), of.current.q.into()), direction(of)));
-            match after.stage {
-                Stage::Probe | Stage::AlongD => {
-                    let change = times((to.0 - from.0, to.1 - from.1), conjugate(volt_seconds));
-                    response = (response.0 + change.0, response.1 + change.1);
-                }
-                Stage::Turn => {
-                    let more = turning([before, after], fit, half_s);
-                    voltage = (voltage.0 + more.0, voltage.1 + more.1);
-                }
-                _ => {}
-            }
+            let change = times((to.0 - from.0, to.1 - from.1), conjugate(volt_seconds));
+            response = (response.0 + change.0, response.1 + change.1);
         }
-        // The voltage stands on the flux linkage, which lies along d.
-        Self { response_deg: degrees(response), zero_deg: degrees(times(voltage, (0.0, -1.0))) }
+        // The pulses tell an axis; which way the magnets lie on it the map does.
+        let half_a_turn_off = fit.flux(0.0, 0.0).0 < -NEGATIVE_SHARE * fit.flux(0.0, bound_a).1;
+        let zero_deg = fit.zero_rad.to_degrees();
+        Self {
+            response_deg: degrees(response),
+            zero_deg: if half_a_turn_off { zero_deg + 180.0 } else { zero_deg },
+        }
     }
 }
 
@@ -109,24 +111,4 @@ pub fn saliency_deg(observations: &[Observation], bound_a: f64) -> Option<f64> {
     let (mean, half) = (0.5 * (y_dd + y_qq), (0.5 * (y_dd - y_qq), 0.5 * (y_dq + y_qd)));
     let apart = half.0.hypot(half.1);
     (mean + apart > LEAST_RATIO * (mean - apart)).then(|| 0.5 * degrees(half))
-}
-
-/// Volt-seconds of the turning flux linkage along d in a half, rotor frame, forward: of what acted, less what resistance and dead time take,
-/// and less the turn of the flux linkage along q.
-fn turning([before, after]: [&Observation; 2], fit: &Fit, half_s: f64) -> Vector {
-    let mean = |value: fn(&Observation) -> f32| 0.5 * f64::from(value(before) + value(after));
-    let (id, iq) = (mean(|of| of.current.d), mean(|of| of.current.q));
-    let acted = (f64::from(after.volt_seconds.alpha), f64::from(after.volt_seconds.beta));
-    // In the middle of the half, nearly of length 1.
-    let middle = (mean(|of| of.frame.cos), mean(|of| of.frame.sin));
-    let (d, q) = times(acted, conjugate(middle));
-    let turned = times(direction(after), conjugate(direction(before)));
-    let turned_rad = turned.1.atan2(turned.0);
-    let length_s = f64::from(after.length_s);
-    // Each leg lacks half a dead time in a half, against its current: the fundamental of that lies along the current.
-    let lacking = 2.0 * FRAC_2_PI * 0.5 * fit.dead_time_s * f64::from(after.udc_v) * length_s / half_s;
-    let drop = fit.resistance_ohm * length_s + lacking / id.hypot(iq).max(f64::MIN_POSITIVE);
-    let (psi_d, psi_q) = fit.flux(id, iq);
-    let forward = (psi_d * turned_rad).signum();
-    (forward * (d - drop * id + psi_q * turned_rad), forward * (q - drop * iq))
 }

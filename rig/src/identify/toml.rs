@@ -11,7 +11,8 @@ pub fn of(outcome: &Outcome, map: &FluxMap, given: &Parameters) -> String {
     // Below the generator's own rounding.
     let within = digits((1.0 - 1e-6) * reach_nm);
     let max_torque_nm = given.max_torque_nm.min(within);
-    let (resistance, inertia) = (digits(outcome.fit.resistance_ohm.max(0.0)), digits(outcome.inertia_kg_m2));
+    let (resistance, inertia) =
+        (digits(outcome.fit.resistance_ohm.max(0.0)), digits(outcome.rotor.inertia_kg_m2));
     let keys: [(&str, f64, &str); 20] = [
         ("pole_pairs", f64::from(given.pole_pairs), "given"),
         ("stator_resistance_ohm", resistance, "identified"),

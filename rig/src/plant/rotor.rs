@@ -15,6 +15,8 @@ pub struct Rotor {
     sin_cos: (f64, f64),
     /// Mechanical, in rad/s.
     speed_rad_s: f64,
+    /// Torque of friction of a free rotor, in N·m.
+    friction_nm: f64,
 }
 
 impl Rotor {
@@ -25,7 +27,7 @@ impl Rotor {
             SpeedSource::Inertia { .. } => 0.0,
         };
         let sin_cos = (0.0, 1.0);
-        Self { source, pole_pairs, time_s: 0.0, angle_turns: 0.0, sin_cos, speed_rad_s }
+        Self { source, pole_pairs, time_s: 0.0, angle_turns: 0.0, sin_cos, speed_rad_s, friction_nm: 0.0 }
     }
 
     /// Turns the rotor to an electrical angle, in turns.
@@ -65,6 +67,22 @@ impl Rotor {
         }
     }
 
+    /// Gives a free rotor friction: a torque against either direction, and up to that against any that would turn it at rest, in N·m.
+    pub fn set_friction_nm(&mut self, torque_nm: f64) {
+        self.friction_nm = torque_nm;
+    }
+
+    /// The torque that is left of one, in N·m, where friction takes its part: beyond rest it turns nothing back.
+    fn beyond_friction_nm(&self, torque_nm: f64, (inertia_kg_m2, dt_s): (f64, f64)) -> f64 {
+        if self.friction_nm == 0.0 {
+            return torque_nm;
+        }
+        // The torque that would stop the rotor within the step.
+        let stops_nm = -self.speed_rad_s * inertia_kg_m2 / dt_s;
+        let against_nm = (stops_nm - torque_nm).clamp(-self.friction_nm, self.friction_nm);
+        torque_nm + against_nm
+    }
+
     /// Holds the rotor at a speed from now on, in r/min, whatever the torque; it goes there at this slope, in r/min per s, above 0.
     pub fn hold(&mut self, speed_rpm: f64, slope_rpm_s: f64) {
         let from_rpm = self.speed_rpm();
@@ -84,7 +102,9 @@ impl Rotor {
             SpeedSource::Profile(points) => {
                 (profile_speed(points, self.time_s + dt_s) - profile_speed(points, self.time_s)) / dt_s
             }
-            SpeedSource::Inertia { inertia_kg_m2, load_nm } => (torque_nm() - load_nm) / inertia_kg_m2,
+            SpeedSource::Inertia { inertia_kg_m2, load_nm } => {
+                self.beyond_friction_nm(torque_nm() - load_nm, (*inertia_kg_m2, dt_s)) / inertia_kg_m2
+            }
         };
         Turning { pole_pairs: self.pole_pairs, speed_rad_s: self.speed_rad_s, acceleration }
     }
@@ -97,7 +117,13 @@ impl Rotor {
         self.speed_rad_s = match &self.source {
             SpeedSource::Profile(points) => profile_speed(points, self.time_s),
             SpeedSource::Inertia { inertia_kg_m2, load_nm } => {
-                speed_before + (impulse_nm_s - load_nm * dt_s) / inertia_kg_m2
+                let impulse_nm_s = impulse_nm_s - load_nm * dt_s;
+                let left_nm_s = if self.friction_nm == 0.0 {
+                    impulse_nm_s
+                } else {
+                    self.beyond_friction_nm(impulse_nm_s / dt_s, (*inertia_kg_m2, dt_s)) * dt_s
+                };
+                speed_before + left_nm_s / inertia_kg_m2
             }
         };
         let mean_speed = 0.5 * (speed_before + self.speed_rad_s);

@@ -105,7 +105,7 @@ impl Listener {
         }
         match self.system {
             System::Pmasynrm => self.measured.merge(message, payload, self.scales),
-            System::Zs9 => self.zs9.merge(message, payload),
+            System::Zs9 => self.zs9.merge(message, payload, self.scales),
         }
         match index {
             STATUS => {

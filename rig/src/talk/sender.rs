@@ -34,7 +34,7 @@ impl Spoken {
             System::Zs9 => {
                 let demands =
                     self.speeds_rpm.map_or(Zs9Demands::Torques(self.torques_nm), Zs9Demands::Speeds);
-                Zs9Command { levels, demands }.encode()
+                Zs9Command { levels, demands }.encode(scales)
             }
         }
     }
@@ -122,7 +122,7 @@ impl Sender {
     fn link(&mut self) -> Result<Option<Frame>, OutOfRange> {
         let (message, content) = match (&self.link, &self.link_ref) {
             (Some(limits), _) => (&LINK_LIMITS, LINK_LIMITS.mark(limits.encode(self.scales)?, self.scales)),
-            (None, Some(link)) => (&ZS9_LINK, link.encode()?),
+            (None, Some(link)) => (&ZS9_LINK, ZS9_LINK.mark(link.encode(self.scales)?, self.scales)),
             (None, None) => return Ok(None),
         };
         Ok(Some(message.frame(content, &mut self.link_limits)))

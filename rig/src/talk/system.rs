@@ -1,5 +1,7 @@
 //! The system that is talked to, and the columns of its telemetry.
 
+use crate::run::CLOCK;
+use tractive::drive::dual::Settings;
 use tractive::machine::Ratings;
 use tractive::protocol::Scales;
 
@@ -33,7 +35,7 @@ impl System {
     pub const fn scales(self, ratings: &Ratings) -> Scales {
         match self {
             Self::Pmasynrm => Scales::of(ratings),
-            Self::Zs9 => Scales::USUAL,
+            Self::Zs9 => Scales::of_zs9(&LINK.operator_ratings(ratings)),
         }
     }
 
@@ -53,6 +55,9 @@ impl System {
         }
     }
 }
+
+/// The ZS9's settings, as far as its operator's ratings of the link follow from them.
+const LINK: Settings = Settings::new(CLOCK, CLOCK.control_ticks);
 
 /// Columns of the status behind the pulse pattern, of what each system measures, and of what became of frames and parameters.
 const STATUS: &str =

@@ -32,7 +32,7 @@ pub use sweep::Sweep;
 
 use super::System;
 use crate::analysis::{self, Figures};
-use crate::bench::{self, Bench, Encoder, Flaws, Limits, LinePlan, Operator, Supply};
+use crate::bench::{self, Bench, Encoder, Flaws, Limits, LinePlan, Operator, Supply, Wiring};
 use crate::inject::Injection;
 use crate::inject::traction::Kind;
 use crate::law::LawName;
@@ -194,6 +194,15 @@ pub struct TractionOptions {
     /// By how much the DC link is read larger than it is, in percent.
     #[arg(long, default_value_t = 0.0, value_parser = finite, allow_negative_numbers = true, value_name = "PERCENT")]
     pub udc_gain: f64,
+    /// The phase that each of the three current sensors reads, with - where its leads are exchanged.
+    #[arg(long, default_value_t, allow_hyphen_values = true, value_name = "U,V,W")]
+    pub current_sensors: Wiring,
+    /// The angle sensor counts the wrong way.
+    #[arg(long)]
+    pub angle_reversed: bool,
+    /// Torque of friction of a free rotor against either direction, in N·m.
+    #[arg(long, default_value_t = 0.0, value_parser = not_negative, allow_negative_numbers = true, value_name = "NM")]
+    pub friction: f64,
     /// By how much the PWM timer starts later, in µs.
     #[arg(long, default_value_t = 0.0, value_parser = not_negative, allow_negative_numbers = true, hide = true)]
     pub pwm_delay_us: f64,
@@ -563,6 +572,8 @@ fn bench(plan: Plan, setup: &Setup, options: &Options, (machine, truth): (&Machi
             freeze_at_s: plan.freeze_at_s,
             current_gain: options.own.current_gain / 100.0,
             udc_gain: options.own.udc_gain / 100.0,
+            current_wiring: options.own.current_sensors,
+            angle_reversed: options.own.angle_reversed,
             ..flaws
         },
         supply: options.own.line.map_or(Supply::Stiff, Supply::Line),
@@ -571,6 +582,7 @@ fn bench(plan: Plan, setup: &Setup, options: &Options, (machine, truth): (&Machi
     };
     let deviations = PlantSettings { slots_share: own.slots / 100.0, drops: own.drops(), ..options.plant() };
     let mut plant = Plant::new(&truth.folder, plan.speed, &deviations);
+    plant.motor.rotor_mut().set_friction_nm(options.own.friction);
     if let Some(encoder) = plan.encoder {
         plant.motor.rotor_mut().turn_to(encoder.turns());
     }

@@ -21,7 +21,8 @@ use tractive::ports::{Dual, GateFeedback, PlayedPeriod, PowerSample, PwmPort};
 use tractive::protection::Fault;
 use tractive::protection::SafeState;
 use tractive::protocol::{
-    Frame, Payload, StatusFrame, TO_ZS9, ZS9_COMMAND, ZS9_STATUS, Zs9CanEndpoint, Zs9Command, Zs9Demands,
+    Frame, Payload, Scales, StatusFrame, TO_ZS9, ZS9_COMMAND, ZS9_STATUS, Zs9CanEndpoint, Zs9Command,
+    Zs9Demands,
 };
 use tractive::time::Instant;
 
@@ -225,7 +226,7 @@ impl Image {
         self.pulse.control_ran();
         self.model.settle();
         if self.periods.is_multiple_of(100) {
-            let frame = self.commands.frame(self.command.encode().unwrap());
+            let frame = self.commands.frame(self.command.encode(Scales::USUAL).unwrap());
             self.bus.arrive(frame);
         }
         let line = Line::rated(&RATINGS, PRECHARGE_S as f32, 0.1).without_chopper();
