@@ -18,6 +18,7 @@ pub mod commission;
 #[cfg(unix)]
 pub mod compare;
 pub mod curves;
+#[cfg(unix)]
 pub mod dbc;
 pub mod distortion;
 pub mod figures;

@@ -55,7 +55,7 @@ const FLOWING_SHARE: f32 = 0.05;
 /// load of power factor 1, as the diodes are, raises its voltage to `k = ξ/(2√(ξ − 1))` times the EMF, `ξ` the larger inductance over the
 /// smaller, and they conduct with a fundamental of `2 udc/π`. So from `2√3/(πk)` of `udc/(√3 ψ_f)` on what flows when the gates go off may
 /// stay: Jahns and Caliskan, "Uncontrolled generator operation of interior PM synchronous machines following high-speed inverter shutdown",
-/// IEEE Trans. Ind. Appl. 35(6), 1999. Up to `ξ` = 18 that is above [half the link](GENERATING_SHARE), with saturation and hot or cold magnets.
+/// IEEE Trans. Ind. Appl. 35(6), 1999. Up to `ξ` = 18 that is above half the link, with saturation and hot or cold magnets.
 ///
 /// Where nothing is held, the current is gone within an electrical turn. From half the link on a short circuit brakes little, and so a sensor that
 /// shows a current which is none does no harm.

@@ -4,6 +4,7 @@ mod lines;
 mod listener;
 mod outcome;
 mod page;
+mod scales;
 pub mod script;
 pub mod sender;
 mod supervisor;

@@ -1,10 +1,5 @@
 //! The system that is talked to, and the columns of its telemetry.
 
-use crate::run::CLOCK;
-use tractive::drive::dual::Settings;
-use tractive::machine::Ratings;
-use tractive::protocol::Scales;
-
 /// The system that is talked to.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
 pub enum System {
@@ -31,14 +26,6 @@ impl System {
         self.columns().iter().position(|column| *column == name)
     }
 
-    /// The scales of its signals, of a machine of these ratings.
-    pub const fn scales(self, ratings: &Ratings) -> Scales {
-        match self {
-            Self::Pmasynrm => Scales::of(ratings),
-            Self::Zs9 => Scales::of_zs9(&LINK.operator_ratings(ratings)),
-        }
-    }
-
     /// As on the command line.
     pub const fn name(self) -> &'static str {
         match self {
@@ -55,9 +42,6 @@ impl System {
         }
     }
 }
-
-/// The ZS9's settings, as far as its operator's ratings of the link follow from them.
-const LINK: Settings = Settings::new(CLOCK, CLOCK.control_ticks);
 
 /// Columns of the status behind the pulse pattern, of what each system measures, and of what became of frames and parameters.
 const STATUS: &str =
