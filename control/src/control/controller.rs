@@ -230,7 +230,8 @@ impl ControlLaw for Controller {
             flux,
             omega,
             period_s,
-            from_a: law.gains.resistance_from * ratings.max_current_a,
+            resistance_from: law.gains.resistance_from,
+            largest_a: ratings.max_current_a,
             fastest: ratings.max_speed_rad_s * ratings.pole_pairs,
         });
     }

@@ -11,8 +11,9 @@
 
 use crate::frames::{Dq, limit_magnitude};
 
-/// Speed from which the disturbance tells something of the map, as a share of the largest.
-const FROM: f32 = 0.015;
+/// Speed from which the disturbance tells something of the map, as a share of the largest, over that of the largest current which tells
+/// resistance and flux linkage apart: the more of the one counts as the other, the larger the EMF has to be beside it.
+const FROM: f32 = 0.1;
 /// Bandwidth of the estimate, in rad/s.
 const BANDWIDTH_RAD_S: f32 = 5.0;
 /// Error that is left alone: what a link sensor, and where the current is small half as much resistance again, may look like.
@@ -32,8 +33,10 @@ pub struct Input {
     pub omega: f32,
     /// The time, in s.
     pub period_s: f32,
-    /// Current i₀ that tells resistance and flux linkage apart, in A.
-    pub from_a: f32,
+    /// Current i₀ that tells resistance and flux linkage apart, as a share of the largest.
+    pub resistance_from: f32,
+    /// Largest current, in A.
+    pub largest_a: f32,
     /// Largest electrical angular speed, in rad/s.
     pub fastest: f32,
 }
@@ -72,10 +75,12 @@ impl MapError {
 
     /// A time with a mean disturbance.
     pub fn step(&mut self, input: &Input) {
-        let Input { disturbance, current, flux, omega, period_s, from_a, fastest } = *input;
-        if omega.abs() < FROM * fastest {
+        let Input { disturbance, current, flux, omega, period_s, resistance_from, largest_a, fastest } =
+            *input;
+        if omega.abs() < resistance_from * (FROM * fastest) {
             return;
         }
+        let from_a = resistance_from * largest_a;
         let emf = flux.j();
         let along_emf = disturbance.d * emf.d + disturbance.q * emf.q;
         let along_current = disturbance.d * current.d + disturbance.q * current.q;
@@ -110,7 +115,8 @@ mod tests {
                 flux: FLUX,
                 omega,
                 period_s: 1e-3,
-                from_a: 40.0,
+                resistance_from: 0.15,
+                largest_a: 267.0,
                 fastest: 1_500.0,
             });
         }
