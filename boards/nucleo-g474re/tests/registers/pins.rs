@@ -10,8 +10,11 @@ use std::path::Path;
 use stm32_metapac::gpio::vals::Moder;
 use stm32_metapac::metadata::METADATA;
 
+/// The pins of each position sensor.
+type Sensors = &'static [&'static [Pin]];
+
 /// The wiring of each drive, with its page: what is always there, and position sensors of which it has one.
-const TABLES: [(&str, &[Pin], &[&[Pin]]); 2] = [
+const TABLES: [(&str, &[Pin], Sensors); 2] = [
     (
         "../../docs/nucleo-g474re.md",
         &PINS,
