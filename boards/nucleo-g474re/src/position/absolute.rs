@@ -23,8 +23,6 @@ pub struct Absolute<const BITS: u32, const GRAY: bool> {
     spi: Spi,
     pole_pairs: u32,
     zero: Angle,
-    /// A frame is under way.
-    asked: bool,
 }
 
 impl<const BITS: u32, const GRAY: bool> Position for Absolute<BITS, GRAY> {
@@ -51,17 +49,16 @@ impl<const BITS: u32, const GRAY: bool> Position for Absolute<BITS, GRAY> {
     }
 
     fn of(registers: &Registers, stage: &PowerStage, pole_pairs: u32) -> Self {
-        Self { spi: registers.spi1, pole_pairs, zero: stage.encoder_zero, asked: false }
+        Self { spi: registers.spi1, pole_pairs, zero: stage.encoder_zero }
     }
 
     /// None where the frame has not come, or not as a frame is.
     #[inline]
     fn angle(&mut self) -> Option<Angle> {
-        let frame = if self.asked { self.take() } else { None };
-        self.asked = true;
+        let frame = self.take();
         self.spi.dr16().write_value(0);
         self.spi.dr16().write_value(0);
-        let position = decoded(frame?, BITS, GRAY)?;
+        let position = decoded(frame, BITS, GRAY)?;
         // The middle of a step, not where it begins.
         let turn = (position << (32 - BITS)) | (1 << (31 - BITS));
         Some(Angle(turn.wrapping_mul(self.pole_pairs)) + self.zero)
@@ -69,18 +66,14 @@ impl<const BITS: u32, const GRAY: bool> Position for Absolute<BITS, GRAY> {
 }
 
 impl<const BITS: u32, const GRAY: bool> Absolute<BITS, GRAY> {
-    /// The two words of a frame. What came without being complete is thrown away, so that the next frame begins with its first word.
+    /// What came of a frame's two words. Without both of them its first bit is low, which is no frame.
     #[inline]
-    fn take(&self) -> Option<u32> {
-        let mut words = 0;
-        let mut frame = 0;
-        for _ in 0..2 {
-            if self.spi.sr().read().rxne() {
-                frame = frame << 16 | u32::from(self.spi.dr16().read());
-                words += 1;
-            }
-        }
-        (words == 2).then_some(frame)
+    fn take(&self) -> u32 {
+        let came = |frame| match self.spi.sr().read().rxne() {
+            true => frame << 16 | u32::from(self.spi.dr16().read()),
+            false => frame,
+        };
+        came(came(0))
     }
 }
 
