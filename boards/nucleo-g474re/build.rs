@@ -86,6 +86,9 @@ fn images(out: &Path) -> Result<(), String> {
         let constant = check(&file, &text, &machine).map_err(told)?;
         put(&out.join(format!("{tables}.rs")), &rust_source(&made, "tractive::machine"))?;
         put(&out.join(format!("{stage}.rs")), &constant)?;
+        if tables == "traction" {
+            put(&out.join("position.rs"), &power_stage::sensor(&file, &text, &machine).map_err(told)?)?;
+        }
     }
     Ok(())
 }

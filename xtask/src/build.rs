@@ -117,6 +117,14 @@ pub fn board_image(
     firmware(command, &name, system, machine)
 }
 
+/// Builds the PMaSynRM's image for a board with another power stage, a file beside the board's package.
+pub fn image_of_stage(toolchain: &Toolchain, board: &Board, stage: &str) -> Result<PathBuf> {
+    let name = System::Traction.image_on(board);
+    let mut command = on_target(toolchain, &board.package, &name);
+    command.env("TRACTIVE_POWER_STAGE", stage);
+    firmware(command, &name, System::Traction, None)
+}
+
 /// `true` for a machine whose `patterns` are "optimal"; all else in its file is the build script's to judge.
 fn wants_optimal(machine: Option<&OsString>, system: System) -> Result<bool> {
     let machine = machine.map_or_else(|| system.machine().into(), OsString::clone);

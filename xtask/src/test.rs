@@ -154,9 +154,17 @@ fn images(setup: &mut Setup, check: impl Fn(&Path) -> Result<bool>) -> Result<bo
     })
 }
 
-/// Checks the images of every board: both drives, and the one that identifies.
+/// Power stages with other position sensors than an encoder that counts.
+const SENSORS: [&str; 2] = ["power_stage_absolute.toml", "power_stage_resolver.toml"];
+
+/// Checks the images of every board: both drives, with each position sensor, and the one that identifies.
 fn board_images(setup: &mut Setup) -> Result<bool> {
     let boards = Board::all()?;
+    let stages = boards.iter().flat_map(|board| SENSORS.map(|stage| (board, stage)));
+    let sensors = all(stages, |(board, stage)| {
+        println!("{}, {stage}:", board.name);
+        image::check_board(&build::image_of_stage(&setup.toolchain()?, board, stage)?, board)
+    })?;
     let images = boards.iter().flat_map(|board| System::ALL.map(|system| (board, system)));
     let drives = all(images, |(board, system)| {
         println!("{}:", system.image_on(board));
@@ -167,7 +175,7 @@ fn board_images(setup: &mut Setup) -> Result<bool> {
         println!("{}, identifying:", board.name);
         image::check_board(&build::identify_on(&setup.toolchain()?, board, None)?, board)
     })?;
-    Ok(drives && identifying)
+    Ok(sensors && drives && identifying)
 }
 
 fn book(setup: &mut Setup) -> Result<Outcome> {

@@ -44,13 +44,39 @@ struct Keys {
     zero_tolerance: u16,
     dc_link_range_v: f64,
     break_current_a: f64,
-    encoder_counts: u32,
+    encoder_counts: Option<u32>,
     encoder_zeros_deg: Vec<f64>,
     precharge_s: f64,
     behind_line_filter: Option<bool>,
     angle_late_us: Option<f64>,
     discharge_s: f64,
     z_source: Option<ZSource>,
+    absolute: Option<Absolute>,
+    resolver: Option<Resolver>,
+}
+
+/// An absolute encoder in the place of one that counts.
+#[derive(Clone, Copy, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Absolute {
+    bits: u32,
+    gray: bool,
+}
+
+/// A resolver in its place.
+#[derive(Clone, Copy, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Resolver {
+    pole_pairs: u32,
+    amplitude_v: f64,
+    lag_us: f64,
+}
+
+/// The position sensor of a stage.
+enum Sensor {
+    Encoder,
+    Absolute(Absolute),
+    Resolver(Resolver),
 }
 
 /// The keys that the ZS9's stage has besides.
@@ -61,6 +87,15 @@ struct ZSource {
     source_range_v: f64,
     link_ref_v: f64,
 }
+
+/// The highest control rate at which an absolute encoder's frame, 24 µs, and its rest of 20 µs pass within a period, in Hz.
+const ABSOLUTE_HZ: u32 = 22_000;
+/// Control rates of twice the frequencies that resolvers are made for, in Hz.
+const RESOLVER_HZ: [u32; 2] = [4_000, 20_000];
+/// The time behind a sample in which the excitation's level is read, in µs.
+const LEVEL_US: f64 = 20.0;
+/// V at a converter's pin over half its range.
+const HALF_RANGE_V: f64 = 1.65;
 
 /// A key, its value, the least and the most that are allowed, and why.
 struct Bound<'a>(&'a str, f64, f64, f64, &'a str);
@@ -129,11 +164,12 @@ pub fn traction(file: &Path, text: &str, machine: &Machine) -> Result<String, In
         return Err(stage.refuse("angle_late_us", "is missing".to_owned()));
     };
     let latest_us = 1e6 * f64::from(LATEST_ANGLE_S);
-    let late = Bound("angle_late_us", late_us, 0.0, latest_us.round(), "made up for by the speed");
-    stage.check(&[late])?;
+    let own_us = 1e6 * stage.sensor_age_s(control_hz)?;
+    let most_us = (latest_us - own_us).round();
+    stage.check(&[Bound("angle_late_us", late_us, 0.0, most_us, "made up for by the speed")])?;
     stage.check_sensors(machine, f64::from(ratings.trip_dc_over_v), "the machine's trip_dc_over_v", 1)?;
     settings.check(machine.tables).map_err(|refused| stage.refuse_start(machine, &refused))?;
-    Ok(stage.constant(control_hz, min_pulse_ns))
+    stage.constant(control_hz, min_pulse_ns)
 }
 
 /// Checks the ZS9's power stage; gives its constant as Rust.
@@ -152,6 +188,13 @@ pub fn zs9(file: &Path, text: &str, machine: &Machine) -> Result<String, InputEr
     }
     if stage.keys.behind_line_filter.is_some() {
         return Err(stage.refuse("behind_line_filter", "the Z-source has chokes of its own".to_owned()));
+    }
+    for (key, given) in
+        [("absolute", stage.keys.absolute.is_some()), ("resolver", stage.keys.resolver.is_some())]
+    {
+        if given {
+            return Err(stage.refuse(key, "the ZS9's board reads encoders that count".to_owned()));
+        }
     }
     if stage.keys.angle_late_us.is_some() {
         return Err(
@@ -181,12 +224,95 @@ pub fn zs9(file: &Path, text: &str, machine: &Machine) -> Result<String, InputEr
          inductor_a_per_code: {inductor_range_a:?} / {HALF_CODES:?},\n    \
          source_v_per_code: {source_range_v:?} / {CODES:?},\n    link_ref_v: {link_ref_v:?},\n}}",
         // The modulator of the nine switches has no shortest pulse.
-        stage.constant(zs9_rates::CONTROL_HZ, 0),
+        stage.constant(zs9_rates::CONTROL_HZ, 0)?,
         zeros.join(", "),
     ))
 }
 
+/// The type of the position sensor that a stage names, as Rust.
+///
+/// # Errors
+/// A sensor that does not suit the control rate or the machine.
+pub fn sensor(file: &Path, text: &str, machine: &Machine) -> Result<String, InputError> {
+    let stage = Stage::parse(file, text)?;
+    let control_hz = stage.keys.control_hz.unwrap_or(rates::CORE_HZ);
+    let kind = match stage.sensor()? {
+        Sensor::Encoder => "Encoder".to_owned(),
+        Sensor::Absolute(Absolute { bits, gray }) => {
+            stage.check(&[
+                Bound("bits", f64::from(bits), 8.0, 24.0, "of one turn"),
+                Bound("control_hz", f64::from(control_hz), 0.0, f64::from(ABSOLUTE_HZ), "a frame and a rest"),
+            ])?;
+            format!("Absolute<{bits}, {gray}>")
+        }
+        Sensor::Resolver(Resolver { pole_pairs, amplitude_v, lag_us }) => {
+            let period_us = 1e6 / f64::from(control_hz);
+            let [least_hz, most_hz] = RESOLVER_HZ.map(f64::from);
+            let machine_pairs = f64::from(machine.tables.ratings.pole_pairs);
+            stage.check(&[
+                Bound(
+                    "control_hz",
+                    f64::from(control_hz),
+                    least_hz,
+                    most_hz,
+                    "twice the excitation's frequency",
+                ),
+                Bound("pole_pairs", f64::from(pole_pairs), 1.0, machine_pairs, "the machine's at most"),
+                Bound(
+                    "amplitude_v",
+                    amplitude_v,
+                    0.2,
+                    0.75 * HALF_RANGE_V,
+                    "at the converter's pin, with some room",
+                ),
+                Bound("lag_us", lag_us, 0.0, 0.5 * period_us - LEVEL_US, "of filter and resolver"),
+            ])?;
+            let turns = machine_pairs / f64::from(pole_pairs);
+            if turns.fract() != 0.0 {
+                let problem = format!("{pole_pairs}: must divide the machine's {machine_pairs}");
+                return Err(stage.refuse("pole_pairs", problem));
+            }
+            let amplitude = amplitude_v / HALF_RANGE_V * HALF_CODES;
+            let ticks_per_us = 1e-6 * f64::from(rates::clock(control_hz).ticks_per_s);
+            let toggle = (0.5 * period_us - lag_us) * ticks_per_us;
+            format!("Resolver<{turns}, {amplitude:.0}, {toggle:.0}>")
+        }
+    };
+    Ok(format!("/// The position sensor of the image.\npub type Sensor = {kind};\n"))
+}
+
 impl<'a> Stage<'a> {
+    /// The sensor that the file names: one, and counts for an encoder alone.
+    fn sensor(&self) -> Result<Sensor, InputError> {
+        let Keys { encoder_counts, absolute, resolver, .. } = self.keys;
+        match (encoder_counts, absolute, resolver) {
+            (Some(_), None, None) => Ok(Sensor::Encoder),
+            (None, Some(absolute), None) => Ok(Sensor::Absolute(absolute)),
+            (None, None, Some(resolver)) => Ok(Sensor::Resolver(resolver)),
+            (None, None, None) => Err(self.refuse("encoder_counts", "is missing".to_owned())),
+            _ => Err(self.refuse("encoder_counts", "one of encoder_counts, absolute, resolver".to_owned())),
+        }
+    }
+
+    /// Counts in a turn of the shaft; of a resolver so many that none is noticed.
+    fn sensor_counts(&self) -> Result<u32, InputError> {
+        Ok(match self.sensor()? {
+            Sensor::Encoder => self.keys.encoder_counts.unwrap_or_default(),
+            Sensor::Absolute(Absolute { bits, .. }) => 1 << bits.min(24),
+            Sensor::Resolver(_) => 65_536,
+        })
+    }
+
+    /// Age of an angle by the way its sensor is read, in s.
+    fn sensor_age_s(&self, control_hz: u32) -> Result<f64, InputError> {
+        let periods = match self.sensor()? {
+            Sensor::Encoder => 0.0,
+            Sensor::Absolute(_) => 1.0,
+            Sensor::Resolver(_) => 0.5,
+        };
+        Ok(periods / f64::from(control_hz))
+    }
+
     fn parse(file: &'a Path, text: &'a str) -> Result<Self, InputError> {
         let line = |start: usize| 1 + text[..start].matches('\n').count() as u64;
         let keys = toml::from_str(text).map_err(|error| {
@@ -305,14 +431,11 @@ impl<'a> Stage<'a> {
                 room * a_per_code,
                 "what the converters hold with current_range_a",
             ),
-            Bound(
-                "encoder_counts",
-                f64::from(self.keys.encoder_counts),
-                4.0,
-                65_536.0,
-                "what the timer counts",
-            ),
         ])?;
+        if let Sensor::Encoder = self.sensor()? {
+            let counts = f64::from(self.sensor_counts()?);
+            self.check(&[Bound("encoder_counts", counts, 4.0, 65_536.0, "what the timer counts")])?;
+        }
         let zeros = &self.keys.encoder_zeros_deg;
         if zeros.len() != encoders {
             return Err(
@@ -337,15 +460,16 @@ impl<'a> Stage<'a> {
     }
 
     /// The constant's value as Rust.
-    fn constant(&self, control_hz: u32, min_pulse_ns: u32) -> String {
+    fn constant(&self, control_hz: u32, min_pulse_ns: u32) -> Result<String, InputError> {
         let Keys { dead_time_ns, current_range_a, zero_code, zero_tolerance, dc_link_range_v, .. } =
             self.keys;
-        let Keys { break_current_a, encoder_counts, precharge_s, discharge_s, behind_line_filter, .. } =
-            self.keys;
+        let Keys { break_current_a, precharge_s, discharge_s, behind_line_filter, .. } = self.keys;
+        let encoder_counts = self.sensor_counts()?;
         let behind_line_filter = behind_line_filter == Some(true);
-        let angle_late_s = 1e-6 * self.keys.angle_late_us.unwrap_or_default();
+        let angle_late_s =
+            1e-6 * self.keys.angle_late_us.unwrap_or_default() + self.sensor_age_s(control_hz)?;
         let zero = angle(self.keys.encoder_zeros_deg.first().copied().unwrap_or_default());
-        format!(
+        Ok(format!(
             "PowerStage {{\n    control_hz: {control_hz},\n    dead_time_ns: {dead_time_ns},\n    min_pulse_ns: {min_pulse_ns},\n    \
              current_a_per_code: {current_range_a:?} / {HALF_CODES:?},\n    zero_code: {zero_code},\n    \
              zero_tolerance: {zero_tolerance},\n    udc_v_per_code: {dc_link_range_v:?} / {CODES:?},\n    \
@@ -353,7 +477,7 @@ impl<'a> Stage<'a> {
              line: LineTimes {{ precharge_s: {precharge_s:?}, discharge_s: {discharge_s:?} }},\n    \
              behind_line_filter: {behind_line_filter},\n    \
              angle_late_s: {angle_late_s:?},\n}}"
-        )
+        ))
     }
 }
 

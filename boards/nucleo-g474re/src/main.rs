@@ -12,7 +12,7 @@ mod firmware {
     use cortex_m_rt::{entry, interrupt};
     use nucleo_g474re::built_in::traction::{BUILT_IN, BuiltIn};
     use nucleo_g474re::patterns::chosen;
-    use nucleo_g474re::position::Encoder;
+    use nucleo_g474re::position::{Position, Sensor};
     use nucleo_g474re::power_stage::POWER_STAGE;
     use nucleo_g474re::registers::Registers;
     use nucleo_g474re::sampling::KeptZeros;
@@ -53,13 +53,13 @@ mod firmware {
     /// Deadline: the next control interrupt. Missed: fault `control_deadline`, gates into the safe state.
     #[interrupt]
     fn TIM3() {
-        static mut BOARD: Option<Control<'static, Encoder>> = None;
+        static mut BOARD: Option<Control<'static, Sensor>> = None;
         static mut TASK: ControlTask<BuiltIn> =
             chosen(ControlTask::new(BuiltIn, settings(), Instant(CLOCK.control_ticks)), &CLOCK);
         let board = BOARD.get_or_insert_with(|| {
             let registers = Registers::CHIP;
-            let encoder = Encoder::new(registers.tim4, &POWER_STAGE, BUILT_IN.ratings.pole_pairs as u32);
-            Control::new(registers, CONTROL_ZEROS.kept(), encoder, &POSITION)
+            let sensor = Sensor::of(&registers, &POWER_STAGE, BUILT_IN.ratings.pole_pairs as u32);
+            Control::new(registers, CONTROL_ZEROS.kept(), sensor, &POSITION)
         });
         TASK.run(board, &SHARED);
         PULSE.control_ran();

@@ -19,7 +19,7 @@ pub enum Port {
 pub enum Function {
     /// A gate: alternate function of this number, output.
     Gate(u8),
-    /// Alternate function of this number, input with pull-down.
+    /// Alternate function of this number, with pull-down.
     Alternate(u8),
     /// Converters and comparators.
     Analog,
@@ -58,8 +58,8 @@ pub(super) const fn pin(
     Pin { port, number, function, signals, purpose }
 }
 
-/// Every pin the PMaSynRM's drive uses.
-pub const PINS: [Pin; 27] = [
+/// Every pin the PMaSynRM's drive uses, but for those of its [position sensor](super::Position::PINS).
+pub const PINS: [Pin; 24] = [
     pin(Port::A, 8, Function::Gate(6), &["TIM1_CH1"], "gate U, upper device"),
     pin(Port::B, 13, Function::Gate(6), &["TIM1_CH1N"], "gate U, lower device"),
     pin(Port::A, 10, Function::Gate(6), &["TIM1_CH3"], "gate V, upper device"),
@@ -75,9 +75,6 @@ pub const PINS: [Pin; 27] = [
     pin(Port::B, 11, Function::Analog, &["ADC2_IN14", "COMP6_INP"], "current of W"),
     pin(Port::B, 14, Function::Analog, &["ADC1_IN5", "COMP7_INP"], "current of W, the same wire"),
     pin(Port::C, 0, Function::Analog, &["ADC1_IN6"], "DC-link voltage"),
-    pin(Port::B, 6, Function::Alternate(2), &["TIM4_CH1"], "encoder, track A"),
-    pin(Port::B, 7, Function::Alternate(2), &["TIM4_CH2"], "encoder, track B"),
-    pin(Port::B, 3, Function::Alternate(2), &["TIM4_ETR"], "encoder, index"),
     pin(Port::C, 2, Function::Input, &[], "enable: high lets the gates pulse"),
     pin(Port::C, 8, Function::Switch, &[], "precharge relay, high closes"),
     pin(Port::C, 9, Function::Switch, &[], "main contactor, high closes"),

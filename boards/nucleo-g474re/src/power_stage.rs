@@ -31,9 +31,9 @@ pub struct PowerStage {
     /// Phase current, of either sign, at which the comparators turn the gates off, in A. Above the drive's own trip level,
     /// so that a fault that software can still catch has its name.
     pub break_current_a: f32,
-    /// Counts of the encoder in a mechanical turn: four times its lines; 4 ..= 65,536.
+    /// Counts of the position sensor in a mechanical turn: of an encoder four times its lines, 4 ..= 65,536.
     pub encoder_counts: u32,
-    /// Electrical angle of the d axis at the encoder's index.
+    /// Electrical angle of the d axis at the encoder's index, or where the sensor says 0.
     pub encoder_zero: Angle,
     /// The line side's time constants.
     pub line: LineTimes,

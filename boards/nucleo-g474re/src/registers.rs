@@ -32,10 +32,14 @@ pub struct Registers {
     pub adc1: pac::adc::Adc,
     /// Samples of the PWM interrupt; with the ZS9 both interrupts'.
     pub adc2: pac::adc::Adc,
-    /// The ZS9's inductor current.
+    /// The ZS9's inductor current; a resolver's sine.
     pub adc3: pac::adc::Adc,
+    /// A resolver's cosine.
+    pub adc5: pac::adc::Adc,
     pub adc12: pac::adccommon::AdcCommon,
     pub adc345: pac::adccommon::AdcCommon,
+    /// An absolute encoder.
+    pub spi1: pac::spi::Spi,
     /// The ZS9's gate feedback.
     pub spi3: pac::spi::Spi,
     /// COMP1 ..= COMP7.
@@ -66,8 +70,10 @@ impl Registers {
         adc1: pac::ADC1,
         adc2: pac::ADC2,
         adc3: pac::ADC3,
+        adc5: pac::ADC5,
         adc12: pac::ADC12_COMMON,
         adc345: pac::ADC345_COMMON,
+        spi1: pac::SPI1,
         spi3: pac::SPI3,
         comparators: [pac::COMP1, pac::COMP2, pac::COMP3, pac::COMP4, pac::COMP5, pac::COMP6, pac::COMP7],
         dac3: pac::DAC3,

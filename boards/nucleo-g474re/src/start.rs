@@ -5,7 +5,7 @@ use super::control_timer::ControlTimer;
 use super::half;
 use super::outputs::Outputs;
 use super::pins::{self, Pin};
-use super::position::{Encoder, TIM4_BY_TIM3};
+use super::position::{Position, Sensor};
 use super::power_stage::{POWER_STAGE, PowerStage};
 use super::rates::CARRIER_RANGE;
 use super::registers::Registers;
@@ -63,6 +63,7 @@ pub const STEPS: [(&str, Step); 13] = [
     ("reset cause", |start| watchdog::refuse_after_bite(start.registers)),
     ("inputs", |start| {
         pins::configure_inputs(start.registers, &pins::PINS);
+        pins::configure_inputs(start.registers, Sensor::PINS);
         Ok(())
     }),
     ("comparators", |start| {
@@ -70,10 +71,9 @@ pub const STEPS: [(&str, Step); 13] = [
         Ok(())
     }),
     ("PWM timers", configure_legs),
-    ("control timer and encoder", |start| {
+    ("control timer and position sensor", |start| {
         ControlTimer(start.registers.tim3).configure(PRESCALER, CLOCK.control_ticks);
-        Encoder::configure(start.registers.tim4, start.stage, TIM4_BY_TIM3);
-        Ok(())
+        Sensor::prepare(start.registers, start.stage, start.wait)
     }),
     ("switchgear", |start| {
         switchgear::configure(start.registers);
@@ -127,6 +127,7 @@ pub fn switch_off(registers: &Registers, pins: &[Pin]) {
 pub fn run(registers: &Registers, wait: &mut dyn Wait) {
     let samplers = [control_sampler(registers), pwm_sampler(registers)];
     samplers.iter().for_each(|sampler| sampler.refresh(wait));
+    Sensor::follow(registers, wait);
     registers.legs.start();
     samplers.iter().for_each(Sampler::follow_timer);
 }

@@ -110,6 +110,58 @@ fn every_key_is_refused_by_name_and_line() {
     }
 }
 
+const ABSOLUTE: &str = include_str!("../power_stage_absolute.toml");
+const RESOLVER: &str = include_str!("../power_stage_resolver.toml");
+
+#[test]
+fn another_position_sensor_takes_the_encoders_place() {
+    let machine = Machine { folder: Path::new("machine"), tables: TRACTION.tables, carrier_share: 1.0 };
+    let sensor = |text: &str| {
+        power_stage::sensor(Path::new(TRACTION.file), text, &machine).map_err(|error| error.to_string())
+    };
+    for (text, kind, counts, late_s) in [
+        (TRACTION.text.to_owned(), "Encoder", 4_096, 0.0),
+        (ABSOLUTE.to_owned(), "Absolute<17, true>", 131_072, 1e-4),
+        // 1 V of 1.65 V are 1,241 codes; 40 µs at 21.25 MHz 850 ticks.
+        (RESOLVER.to_owned(), "Resolver<4, 1241, 850>", 65_536, 5e-5),
+    ] {
+        assert!(sensor(&text).unwrap().contains(&format!("pub type Sensor = {kind};")), "{kind}");
+        let constant = TRACTION.check(&text, TRACTION.tables).unwrap();
+        assert!(constant.contains(&format!("encoder_counts: {counts},")), "{constant}");
+        assert!(constant.contains(&format!("angle_late_s: {late_s:?},")), "{constant}");
+    }
+    for (text, key, bad, told) in [
+        (ABSOLUTE, "bits = 17", "bits = 25", "bits: 25: must be from 8 to 24: of one turn"),
+        (ABSOLUTE, "gray = true", "gray = 1", "invalid type"),
+        (RESOLVER, "pole_pairs = 1", "pole_pairs = 3", "pole_pairs: 3: must divide the machine's 4"),
+        (RESOLVER, "pole_pairs = 1", "pole_pairs = 8", "pole_pairs: 8: must be from 1 to 4"),
+        (RESOLVER, "amplitude_v = 1.0", "amplitude_v = 1.3", "amplitude_v: 1.3: must be from 0.2 to 1.237"),
+        (
+            RESOLVER,
+            "lag_us = 10.0",
+            "lag_us = 31.0",
+            "lag_us: 31: must be from 0 to 30: of filter and resolver",
+        ),
+    ] {
+        let said = sensor(&text.replace(key, bad)).unwrap_err();
+        assert!(said.contains(told), "{said}");
+    }
+    let quick = RESOLVER.replace("control_hz = 10000", "control_hz = 25000");
+    assert!(sensor(&quick).unwrap_err().contains("control_hz: 25000: must be from 4000 to 20000"));
+    let quick = ABSOLUTE.replace("control_hz = 10000", "control_hz = 25000");
+    assert!(sensor(&quick).unwrap_err().contains("control_hz: 25000: must be from 0 to 22000"));
+    let late = ABSOLUTE.replace("angle_late_us = 0.0", "angle_late_us = 401.0");
+    let said = TRACTION.check(&late, TRACTION.tables).unwrap_err();
+    assert!(said.contains("angle_late_us: 401: must be from 0 to 400"), "{said}");
+    let table = |text: &'static str| text.split_once("\n[").map(|(_, table)| format!("\n[{table}")).unwrap();
+    for both in [TRACTION.text.to_owned() + &table(ABSOLUTE), ABSOLUTE.to_owned() + &table(RESOLVER)] {
+        let said = sensor(&both).unwrap_err();
+        assert!(said.contains("one of encoder_counts, absolute, resolver"), "{said}");
+    }
+    let said = ZS9.check(&(ZS9.text.to_owned() + &table(RESOLVER)), ZS9.tables).unwrap_err();
+    assert!(said.contains("resolver: the ZS9's board reads encoders that count"), "{said}");
+}
+
 #[test]
 fn a_small_machine_needs_small_comparators() {
     let mut small = *TRACTION.tables;

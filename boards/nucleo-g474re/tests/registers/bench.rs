@@ -99,8 +99,8 @@ pub struct Bench {
     pub time_ns: u64,
     /// Instant at which the break inputs become quiet, in ns.
     pub quiet_from_ns: Option<u64>,
-    /// Instant of the last conversion of ADC1, ADC2, ADC3, in ns.
-    converted_ns: [Cell<u64>; 3],
+    /// Instant of the last conversion of ADC1, ADC2, ADC3, ADC5, in ns.
+    converted_ns: [Cell<u64>; 4],
     /// Called at each wait.
     pub watch: fn(&Registers),
 }
@@ -127,7 +127,9 @@ impl Bench {
             adc1: at_memory!(pac::adc::Adc),
             adc2: at_memory!(pac::adc::Adc),
             adc3: at_memory!(pac::adc::Adc),
+            adc5: at_memory!(pac::adc::Adc),
             adc345: at_memory!(pac::adccommon::AdcCommon),
+            spi1: at_memory!(pac::spi::Spi),
             spi3: at_memory!(pac::spi::Spi),
             adc12: at_memory!(pac::adccommon::AdcCommon),
             comparators: core::array::from_fn(|_| at_memory!(pac::comp::Comp)),
@@ -358,13 +360,13 @@ impl Wait for Bench {
         if self.broken {
             return Err(Timeout);
         }
-        let Registers { rcc, adc1, adc2, adc3, .. } = self.registers;
+        let Registers { rcc, adc1, adc2, adc3, adc5, .. } = self.registers;
         rcc.cr().modify(|w| {
             w.set_hserdy(w.hseon());
             w.set_pllrdy(w.pllon());
         });
         rcc.cfgr().modify(|w| w.set_sws(w.sw()));
-        for adc in [adc1, adc2, adc3] {
+        for adc in [adc1, adc2, adc3, adc5] {
             self.convert(adc);
         }
         self.settle();
@@ -397,8 +399,8 @@ impl Bench {
     /// conversion done late after calibration or previous conversion").
     pub fn finish_sequence(&self, adc: pac::adc::Adc) {
         let sequence = adc.jsqr().read();
-        let Registers { adc1, adc2, adc3, .. } = self.registers;
-        let index = [adc1, adc2, adc3].iter().position(|own| own.as_ptr() == adc.as_ptr());
+        let Registers { adc1, adc2, adc3, adc5, .. } = self.registers;
+        let index = [adc1, adc2, adc3, adc5].iter().position(|own| own.as_ptr() == adc.as_ptr());
         let last_ns = index.map(|index| self.converted_ns[index].replace(self.time_ns));
         let late = last_ns.is_some_and(|last_ns| self.time_ns > last_ns + 1_000_000);
         for rank in 0..usize::from(sequence.jl()) + 1 {

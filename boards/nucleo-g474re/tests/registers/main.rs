@@ -9,6 +9,7 @@ mod operator;
 mod outputs;
 mod pins;
 mod ports;
+mod position;
 mod start;
 mod zs9;
 

@@ -2,6 +2,7 @@
 
 use crate::bench::Bench;
 use nucleo_g474re::pins::{Function, PINS, Pin, Port};
+use nucleo_g474re::position::{Absolute, Encoder, Position, Resolver};
 use nucleo_g474re::sampling::{CONTROL, PWM};
 use nucleo_g474re::zs9;
 use std::collections::BTreeSet;
@@ -9,9 +10,22 @@ use std::path::Path;
 use stm32_metapac::gpio::vals::Moder;
 use stm32_metapac::metadata::METADATA;
 
-/// The wiring of each drive, with its page.
-const TABLES: [(&str, &[Pin]); 2] =
-    [("../../docs/nucleo-g474re.md", &PINS), ("../../docs/nucleo-g474re-zs9.md", &zs9::pins::PINS)];
+/// The pins of each position sensor.
+type Sensors = &'static [&'static [Pin]];
+
+/// The wiring of each drive, with its page: what is always there, and position sensors of which it has one.
+const TABLES: [(&str, &[Pin], Sensors); 2] = [
+    (
+        "../../docs/nucleo-g474re.md",
+        &PINS,
+        &[Encoder::PINS, <Absolute<8, false>>::PINS, <Resolver<1, 1, 1>>::PINS],
+    ),
+    ("../../docs/nucleo-g474re-zs9.md", &zs9::pins::PINS, &[&[]]),
+];
+
+fn every_pin() -> impl Iterator<Item = &'static Pin> {
+    TABLES.iter().flat_map(|(_, pins, sensors)| pins.iter().chain(sensors.iter().copied().flatten()))
+}
 
 fn name(pin: &Pin) -> String {
     format!("P{:?}{}", pin.port, pin.number)
@@ -19,7 +33,7 @@ fn name(pin: &Pin) -> String {
 
 #[test]
 fn the_chip_has_every_signal_on_its_pin() {
-    for pin in TABLES.iter().flat_map(|(_, pins)| *pins) {
+    for pin in every_pin() {
         let function = match pin.function {
             Function::Gate(number) | Function::Alternate(number) | Function::Bus(number) => Some(number),
             Function::Analog | Function::Input | Function::Output | Function::Switch => None,
@@ -40,9 +54,11 @@ fn the_chip_has_every_signal_on_its_pin() {
 
 #[test]
 fn no_pin_is_used_twice_and_none_belongs_to_the_debugger_or_the_crystal() {
-    for (_, pins) in TABLES {
-        let names: BTreeSet<_> = pins.iter().map(name).collect();
-        assert_eq!(names.len(), pins.len());
+    for (pins, sensor) in
+        TABLES.iter().flat_map(|(_, pins, sensors)| sensors.iter().map(|sensor| (*pins, *sensor)))
+    {
+        let names: BTreeSet<_> = pins.iter().chain(sensor).map(name).collect();
+        assert_eq!(names.len(), pins.len() + sensor.len());
         for taken in ["PA13", "PA14", "PA2", "PA3", "PF0", "PF1"] {
             assert!(!names.contains(taken), "{taken}");
         }
@@ -75,18 +91,16 @@ fn the_pins_that_do_not_float_are_those_of_the_reset_values_and_the_chips_data()
 
 #[test]
 fn what_switches_something_on_when_high_floats_from_reset_on() {
-    for (_, pins) in TABLES {
-        for pin in pins.iter().filter(|pin| matches!(pin.function, Function::Gate(_) | Function::Switch)) {
-            let reason = NOT_FLOATING.iter().find(|(taken, _)| *taken == name(pin));
-            assert_eq!(reason, None, "{}", pin.purpose);
-        }
+    for pin in every_pin().filter(|pin| matches!(pin.function, Function::Gate(_) | Function::Switch)) {
+        let reason = NOT_FLOATING.iter().find(|(taken, _)| *taken == name(pin));
+        assert_eq!(reason, None, "{}", pin.purpose);
     }
 }
 
 /// Two converters that sample one pin at a time disturb each other.
 #[test]
 fn no_pin_belongs_to_two_converters() {
-    for pin in TABLES.iter().flat_map(|(_, pins)| *pins) {
+    for pin in every_pin() {
         let converters = pin.signals.iter().filter(|signal| signal.starts_with("ADC")).count();
         assert!(converters <= 1, "{} {:?}", name(pin), pin.signals);
     }
@@ -121,11 +135,11 @@ fn row(pin: &Pin) -> String {
 
 #[test]
 fn the_documentation_has_the_table_that_the_code_has() {
-    for (page, pins) in TABLES {
+    for (page, pins, sensors) in TABLES {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(page);
         let text = std::fs::read_to_string(path).unwrap();
         let documented: Vec<_> = text.lines().filter(|line| line.starts_with("| P")).collect();
-        let wanted: Vec<_> = pins.iter().map(row).collect();
+        let wanted: Vec<_> = pins.iter().chain(sensors.concat().iter()).map(row).collect();
         assert_eq!(documented, wanted, "the table of {page} should be:\n{}", wanted.join("\n"));
     }
 }

@@ -20,7 +20,7 @@ const NOW: Instant = Instant(0);
 const ZEROS: Zeros = [AdcCode(2_048), AdcCode(2_050), AdcCode(2_040)];
 
 /// Writes a register that only the hardware writes.
-fn write_input(port: stm32_metapac::gpio::Gpio, levels: u32) {
+pub fn write_input(port: stm32_metapac::gpio::Gpio, levels: u32) {
     // SAFETY: IDR is word 4 of the port's block of memory.
     unsafe { port.as_ptr().cast::<Idr>().add(4).write_volatile(Idr(levels)) };
 }
@@ -187,21 +187,6 @@ fn a_converter_that_is_silent_gives_no_number() {
     registers.adc2.isr().write(|_| ());
     let currents = Pwm::new(registers, ZEROS).sample(NOW);
     assert!(currents.a.is_nan() && currents.b.is_nan() && currents.c.is_nan());
-}
-
-#[test]
-fn an_absolute_sensor_takes_the_encoders_place() {
-    struct Resolver;
-    impl Position for Resolver {
-        fn angle(&mut self) -> Option<Angle> {
-            Some(Angle::DEG_90)
-        }
-    }
-    let bench = Bench::started(plan());
-    let state = PositionState::new();
-    let mut control = Control::new(bench.registers, ZEROS, Resolver, &state);
-    bench.finish_sequence(bench.registers.adc1);
-    assert_eq!(control.sample(NOW).angle, Some(Angle::DEG_90));
 }
 
 #[test]

@@ -1,84 +1,16 @@
-//! The rotor's position.
+//! An incremental encoder with an index.
 //!
 //! The encoder's count is captured by hardware at the control timer's update, the instant at which the currents are sampled: channel 3 of the
 //! encoder's timer captures the internal trigger TRC, which TS selects; the encoder mode leaves TS free (RM0440, general-purpose timers:
 //! encoder interface, "latching the counter value into a third input capture register", and TIMx_CCMR2.CC3S = 11).
 
-use super::power_stage::PowerStage;
-use core::sync::atomic::{AtomicU32, Ordering};
+use super::Position;
+use crate::pins::{Function, Pin, Port, pin};
+use crate::power_stage::PowerStage;
+use crate::registers::Registers;
+use crate::start::{StartError, Wait};
 use stm32_metapac::timer::{TimGp16, regs, vals};
 use tractive::frames::Angle;
-
-/// A source of the electrical angle. The board has the encoder; a resolver or an absolute encoder (SSI) implements this
-/// and takes its place in [`super::Control`].
-pub trait Position {
-    /// The angle at the control timer's update; `None` while it is not known, which keeps the gates off. Called in the control interrupt: it may not wait.
-    fn angle(&mut self) -> Option<Angle>;
-
-    /// `true` once the sensor has noticed that it lost its rotor: a fault, and for good.
-    fn is_lost(&self) -> bool {
-        false
-    }
-
-    /// Turn since the sensor began to count, electrical, at the newest [`Position::angle`], where that is not known; `None` where nothing counts.
-    fn counted(&self) -> Option<Angle> {
-        None
-    }
-
-    /// Takes the electrical angle that the rotor had where the sensor began to count: the angle is known from now on.
-    fn align(&mut self, _zero: Angle) {}
-}
-
-/// The state of a drive's position sensors, one word from the control interrupt, which reads them, to the idle loop.
-#[derive(Debug)]
-pub struct PositionState(AtomicU32);
-
-impl PositionState {
-    const KNOWN: u32 = 1;
-    const LOST: u32 = 2;
-    const COUNTED: u32 = 4;
-
-    /// Nothing read yet.
-    pub const fn new() -> Self {
-        Self(AtomicU32::new(0))
-    }
-
-    /// In the control interrupt: the angles that its sensors gave, whether each has lost its rotor, and whether the drive can find the angles.
-    #[inline]
-    pub(super) fn tell<const N: usize>(&self, angles: &[Option<Angle>; N], lost: &[bool; N], counted: bool) {
-        let counted = if counted { Self::COUNTED } else { 0 };
-        let known = if angles.iter().all(Option::is_some) { Self::KNOWN } else { 0 };
-        let lost = if lost.contains(&true) { Self::LOST } else { 0 };
-        self.0.store(known | lost | counted, Ordering::Relaxed);
-    }
-
-    /// `true` while an angle is not known that the drive can find.
-    pub fn is_counted(&self) -> bool {
-        self.0.load(Ordering::Relaxed) & Self::COUNTED != 0
-    }
-
-    /// `true` once all angles are known.
-    pub fn is_known(&self) -> bool {
-        self.0.load(Ordering::Relaxed) & Self::KNOWN != 0
-    }
-
-    /// `true` once a sensor has noticed that it lost its rotor.
-    pub fn is_lost(&self) -> bool {
-        self.0.load(Ordering::Relaxed) & Self::LOST != 0
-    }
-}
-
-impl Default for PositionState {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
-/// An angle as the drive is told of it: none where the sensor has lost its rotor.
-#[inline]
-pub(super) fn reported(angle: Option<Angle>, lost: bool) -> Option<Angle> {
-    if lost { None } else { angle }
-}
 
 /// An incremental encoder with an index, counted by TIM4.
 #[derive(Clone, Copy)]
@@ -159,6 +91,21 @@ impl Encoder {
 }
 
 impl Position for Encoder {
+    const PINS: &'static [Pin] = &[
+        pin(Port::B, 6, Function::Alternate(2), &["TIM4_CH1"], "encoder, track A"),
+        pin(Port::B, 7, Function::Alternate(2), &["TIM4_CH2"], "encoder, track B"),
+        pin(Port::B, 3, Function::Alternate(2), &["TIM4_ETR"], "encoder, index"),
+    ];
+
+    fn prepare(registers: &Registers, stage: &PowerStage, _wait: &mut dyn Wait) -> Result<(), StartError> {
+        Self::configure(registers.tim4, stage, TIM4_BY_TIM3);
+        Ok(())
+    }
+
+    fn of(registers: &Registers, stage: &PowerStage, pole_pairs: u32) -> Self {
+        Self::new(registers.tim4, stage, pole_pairs)
+    }
+
     /// Known from the second call after the index on: the flag is read, not captured, and an index between the capture and the
     /// reading is in the next count. Called every control period: each further index must find the count where the speed lets it
     /// be expected, else counts were lost or invented on the way, and the angle is lost for good.

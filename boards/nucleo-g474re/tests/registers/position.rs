@@ -1,0 +1,164 @@
+//! The position sensors that take the encoder's place: what they configure, and the angles that they read.
+
+use crate::bench::Bench;
+use crate::plan;
+use crate::ports::write_input;
+use nucleo_g474re::Control;
+use nucleo_g474re::position::{Absolute, Position, PositionState, Resolver, decoded};
+use nucleo_g474re::power_stage::{AdcCode, POWER_STAGE};
+use nucleo_g474re::registers::Registers;
+use stm32_metapac::adc::Adc;
+use stm32_metapac::spi::vals::{Br, Cpha, Cpol};
+use stm32_metapac::timer::vals::Ocm;
+use tractive::frames::Angle;
+use tractive::ports::ControlPort;
+use tractive::time::Instant;
+
+type Ssi = Absolute<13, true>;
+/// Three turns of the machine for one of the resolver, 1 V at the converter, 10 µs of lag.
+type Wound = Resolver<3, 1_241, 850>;
+
+fn prepared<P: Position>() -> (Bench, P) {
+    let mut bench = Bench::started(plan());
+    let registers = bench.registers;
+    P::prepare(&registers, &POWER_STAGE, &mut bench).unwrap();
+    P::follow(&registers, &mut bench);
+    (bench, P::of(&registers, &POWER_STAGE, 4))
+}
+
+/// SPI1 has received these words, the same each.
+fn receive(registers: &Registers, word: u16, complete: bool) {
+    registers.spi1.dr16().write_value(word);
+    registers.spi1.sr().write(|w| w.set_rxne(complete));
+}
+
+#[test]
+fn an_absolute_encoders_clock_rests_high_and_its_bits_are_taken_as_it_falls() {
+    let (bench, _) = prepared::<Ssi>();
+    let registers = bench.registers;
+    assert!(registers.rcc.apb2enr().read().spi1en());
+    let control = registers.spi1.cr1().read();
+    assert_eq!((control.cpol(), control.cpha()), (Cpol::IDLE_HIGH, Cpha::FIRST_EDGE));
+    // 170 MHz / 128: 32 clocks are 24 µs.
+    assert_eq!(control.br(), Br::DIV128);
+    assert!(control.spe());
+}
+
+#[test]
+fn an_absolute_angle_is_that_of_the_frame_before() {
+    let (bench, mut sensor) = prepared::<Ssi>();
+    let registers = bench.registers;
+    assert_eq!(sensor.angle(), None, "nothing was asked for");
+    let word = 0b1001_0110_0110_1000;
+    receive(&registers, word, true);
+    let position = decoded(u32::from(word) << 16 | u32::from(word), 13, true).unwrap();
+    let turns = (f64::from(position) + 0.5) / 8_192.0 * 4.0;
+    let angle = sensor.angle().unwrap() - POWER_STAGE.encoder_zero;
+    assert!((f64::from(angle.0) / 4_294_967_296.0 - turns.fract()).abs() < 1e-9);
+    assert_eq!(registers.spi1.dr16().read(), 0, "the next frame is under way");
+    for (word, complete) in [(word, false), (0, true), (u16::MAX, true)] {
+        receive(&registers, word, complete);
+        assert_eq!(sensor.angle(), None, "{word:#x}");
+        receive(&registers, 0b1001_0110_0110_1000, true);
+        assert!(sensor.angle().is_some());
+    }
+}
+
+#[test]
+fn a_resolver_is_excited_at_half_the_control_rate_in_step_with_its_samples() {
+    let (bench, _) = prepared::<Wound>();
+    let Registers { tim3, adc3, adc5, .. } = bench.registers;
+    assert_eq!(tim3.ccmr_output(0).read().ocm(1), Ocm::TOGGLE);
+    assert!(tim3.ccer().read().cce(1) && !tim3.ccer().read().cce(0));
+    assert_eq!(tim3.ccr(1).read().ccr(), 850);
+    for (adc, channel) in [(adc3, 1), (adc5, 2)] {
+        let sequence = adc.jsqr().read();
+        assert_eq!((sequence.jl(), sequence.jsq(0), sequence.jextsel()), (0, channel, 12));
+        assert!(adc.cr().read().aden());
+    }
+}
+
+/// A period: the windings by their share of the amplitude, the excitation's sign, and the converters' offset.
+fn wind(bench: &mut Bench, [sine, cosine]: [f64; 2], positive: bool) {
+    let Registers { adc3, adc5, gpiob, .. } = bench.registers;
+    write_input(gpiob, u32::from(positive) << 5);
+    let sign = if positive { 1.0 } else { -1.0 };
+    let mut convert = |adc: Adc, channel: usize, share: f64| {
+        bench.codes[channel] = (2_100.0 + sign * 1_241.0 * share).round() as u16;
+        bench.finish_sequence(adc);
+    };
+    convert(adc3, 1, sine);
+    convert(adc5, 2, cosine);
+}
+
+#[test]
+fn a_resolver_tells_every_angle_whatever_the_converters_offset() {
+    let (mut bench, mut sensor) = prepared::<Wound>();
+    for (period, degrees) in (0..3_600).step_by(7).enumerate() {
+        let (sine, cosine) = (0.1 * f64::from(degrees)).to_radians().sin_cos();
+        wind(&mut bench, [sine, cosine], period % 2 == 0);
+        sensor.angle();
+        wind(&mut bench, [sine, cosine], period % 2 == 1);
+        let told = sensor.angle().unwrap() - POWER_STAGE.encoder_zero;
+        let wanted = Angle((0.3 * f64::from(degrees) / 360.0 * 4_294_967_296.0) as u64 as u32);
+        let off = f64::from((told - wanted).signed()) / 4_294_967_296.0 * 360.0;
+        assert!(off.abs() < 0.2, "{off}° at {degrees}");
+    }
+}
+
+/// A wire that is open stands still: without a look at the range the other winding alone would be an angle.
+#[test]
+fn a_wire_that_is_pulled_to_an_end_of_the_range_is_no_winding() {
+    let (mut bench, mut sensor) = prepared::<Wound>();
+    for (pulled, known) in [(3_000, true), (4_090, false), (3_000, true), (5, false)] {
+        let mut told = None;
+        for positive in [true, false, true] {
+            wind(&mut bench, [1.0, 0.0], positive);
+            bench.codes[2] = pulled;
+            bench.finish_sequence(bench.registers.adc5);
+            told = sensor.angle();
+        }
+        assert_eq!(told.is_some(), known, "{pulled}");
+    }
+}
+
+#[test]
+fn a_resolver_without_excitation_or_with_an_open_wire_has_no_angle() {
+    let (mut bench, mut sensor) = prepared::<Wound>();
+    let mut told = |windings: [f64; 2]| {
+        for positive in [true, false, true] {
+            wind(&mut bench, windings, positive);
+            sensor.angle();
+        }
+        wind(&mut bench, windings, false);
+        sensor.angle()
+    };
+    assert!(told([0.6, 0.8]).is_some());
+    for (windings, what) in [
+        ([0.0, 0.0], "no excitation"),
+        ([0.6, 0.0], "a shorted winding"),
+        ([0.9, 1.1], "too much"),
+        ([0.6, 1.6], "pulled to the converter's end"),
+        ([1.65, 0.6], "pulled to the converter's end"),
+    ] {
+        assert_eq!(told(windings), None, "{what}");
+        assert!(told([0.6, 0.8]).is_some(), "again, after {what}");
+    }
+}
+
+/// The drive is told no angle, which it names as `sensor_lost`, and the operator that the angle is not known.
+#[test]
+fn control_is_told_of_a_lost_excitation() {
+    let (mut bench, sensor) = prepared::<Wound>();
+    let state = PositionState::new();
+    let registers = bench.registers;
+    let mut control = Control::new(registers, [AdcCode(2_048); 3], sensor, &state);
+    for (windings, known) in [([0.6, 0.8], true), ([0.0, 0.0], false), ([0.6, 0.8], true)] {
+        for positive in [true, false, true] {
+            wind(&mut bench, windings, positive);
+            bench.finish_sequence(registers.adc1);
+            let angle = control.sample(Instant(0)).angle;
+            assert!(positive || (angle.is_some(), state.is_known()) == (known, known), "{windings:?}");
+        }
+    }
+}
