@@ -291,9 +291,9 @@ pub fn asked_to_block(asked: &operator::Request, feedback: &Feedback, frame: Opt
 
 /// The inverse of [`asked_to_block`].
 pub fn asked_from_block(block: &Block) -> (operator::Request, Feedback, Option<Frame>) {
-    let [a, b, c, d, e, f, g, h, i, j, k, head, low, high, ..] = *block;
+    let [a, b, c, d, e, f, g, h, i, j, k, l, head, low, high, ..] = *block;
     let asked = operator::Request::from_words([a, b, c, d, e, f, g]);
-    (asked, Feedback::from_words([h, i, j, k]), Option::from_words([head, low, high]))
+    (asked, Feedback::from_words([h, i, j, k, l]), Option::from_words([head, low, high]))
 }
 
 /// The answer to [`Request::PwmSample`].

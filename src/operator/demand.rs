@@ -35,6 +35,8 @@ pub trait Demands: Copy {
     fn asks_torque(request: &Self::Request) -> bool;
     /// Takes over limits that are good.
     fn take_limits(&mut self, request: &Self::Request);
+    /// Takes over the share of the limits that the temperatures leave, 0 ..= 1.
+    fn derate(&mut self, share: f32);
     /// `true` if nothing is asked for any more.
     fn are_at_rest(&self) -> bool;
     /// At rest at once.
@@ -58,12 +60,16 @@ pub struct TorqueDemand {
     ramp: Ramp,
     /// The limits that hold; `None`: as rated.
     limits: Option<Limits>,
+    /// The share of them that the temperatures leave.
+    share: f32,
     line: LineVoltage,
 }
 
 impl TorqueDemand {
     fn limits(&self, settings: &Settings) -> Limits {
-        self.limits.unwrap_or(Limits::rated(settings.ratings))
+        let limits = self.limits.unwrap_or(Limits::rated(settings.ratings));
+        let (motoring_nm, braking_nm) = (self.share * limits.motoring_nm, self.share * limits.braking_nm);
+        Limits { motoring_nm, braking_nm, ..limits }
     }
 }
 
@@ -73,7 +79,7 @@ impl Demands for TorqueDemand {
     type DriveCommand = DriveCommand;
     type Told = f32;
 
-    const AT_REST: Self = Self { ramp: Ramp::new(), limits: None, line: LineVoltage::UNKNOWN };
+    const AT_REST: Self = Self { ramp: Ramp::new(), limits: None, share: 1.0, line: LineVoltage::UNKNOWN };
 
     #[inline]
     fn levels(request: &Request) -> Levels {
@@ -83,8 +89,10 @@ impl Demands for TorqueDemand {
 
     #[inline]
     fn seen(observed: &Observation) -> Seen {
-        let Report { udc_v, current_a, omega, speed_known, trip, acknowledged, .. } = observed.report;
-        Seen { at: observed.at, udc_v, current_a, omega, emf_omega: omega, speed_known, trip, acknowledged }
+        let Report { udc_v, current_a, map_error, omega, speed_known, trip, acknowledged, .. } =
+            observed.report;
+        let (at, emf_omega) = (observed.at, omega);
+        Seen { at, udc_v, current_a, map_error, omega, emf_omega, speed_known, trip, acknowledged }
     }
 
     #[inline]
@@ -105,6 +113,11 @@ impl Demands for TorqueDemand {
     #[inline]
     fn take_limits(&mut self, request: &Request) {
         self.limits = Some(request.limits);
+    }
+
+    #[inline]
+    fn derate(&mut self, share: f32) {
+        self.share = share;
     }
 
     #[inline]

@@ -141,8 +141,8 @@ pub fn dual_asked_to_block(feedback: &Feedback, frame: Option<Frame>) -> Block {
 
 /// The inverse of [`dual_asked_to_block`].
 pub fn dual_asked_from_block(block: &Block) -> (Feedback, Option<Frame>) {
-    let [a, b, c, d, head, low, high, ..] = *block;
-    (Feedback::from_words([a, b, c, d]), Option::from_words([head, low, high]))
+    let [a, b, c, d, e, head, low, high, ..] = *block;
+    (Feedback::from_words([a, b, c, d, e]), Option::from_words([head, low, high]))
 }
 
 /// The answer to [`DualRequest::ControlSample`], with the rig's command; `stop` ends the run.
@@ -321,6 +321,7 @@ mod tests {
             refusals: 1,
             torque_nm: command().demands,
             switches: Switches { main: true, ..Switches::default() },
+            temperatures: None,
         };
         let record = DualRecord {
             at: Instant(12),

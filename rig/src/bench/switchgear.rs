@@ -5,6 +5,7 @@ use std::collections::VecDeque;
 use tractive::frames::Abc;
 use tractive::operator::{Configuration, Feedback, Status};
 use tractive::protection::Fault;
+use tractive::thermal::Ratios;
 use tractive::time::Clock;
 
 /// Time in which a contactor closes, and opens, in s.
@@ -97,6 +98,7 @@ impl<A, T: Copy> Switchgear<A, T> {
                 configuration: Configuration::Good,
                 parameters_open: false,
                 hardware,
+                temperatures: Ratios::default(),
             };
             self.asked.push_back((now, ask(), feedback));
         }
