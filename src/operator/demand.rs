@@ -4,7 +4,7 @@ use super::settings::Ends;
 use super::{Levels, Limits, MotorLimits, Ramp, Rates, Refusal, Request, Seen, Settings, Situation};
 use crate::control::{Demand, LinkWindow};
 use crate::drive::Observation;
-use crate::frames::{SQRT_3, limit};
+use crate::frames::{Dq, SQRT_3, limit};
 use crate::machine::Ratings;
 use crate::ports::{DriveCommand, Report};
 use crate::protection::{self, Trip, Violation};
@@ -92,7 +92,19 @@ impl Demands for TorqueDemand {
         let Report { udc_v, current_a, map_error, omega, speed_known, trip, acknowledged, .. } =
             observed.report;
         let (at, emf_omega) = (observed.at, omega);
-        Seen { at, udc_v, current_a, map_error, omega, emf_omega, speed_known, trip, acknowledged }
+        let reference_a = Dq { d: observed.report.id_a, q: observed.report.iq_a }.length();
+        Seen {
+            at,
+            udc_v,
+            current_a,
+            reference_a,
+            map_error,
+            omega,
+            emf_omega,
+            speed_known,
+            trip,
+            acknowledged,
+        }
     }
 
     #[inline]

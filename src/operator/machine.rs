@@ -131,8 +131,9 @@ impl<D: Demands> Operator<D> {
     /// The temperatures' slot, and the first violation that lasts.
     fn warm(&mut self, seen: &Seen, feedback: &Feedback, settings: &Settings) -> Option<Violation> {
         let thermal = settings.thermal.as_ref()?;
-        let Seen { current_a, udc_v, map_error, .. } = *seen;
-        let load = Load { current_a, udc_v, map_error, max_current_a: settings.ratings.max_current_a };
+        let Seen { current_a, reference_a, udc_v, map_error, .. } = *seen;
+        let max_current_a = settings.ratings.max_current_a;
+        let load = Load { current_a, reference_a, udc_v, map_error, max_current_a };
         let (temperatures, violation) =
             self.thermal.step(&load, feedback.temperatures, thermal, settings.slot_s);
         self.temperatures = temperatures;

@@ -176,6 +176,8 @@ pub struct Seen {
     pub udc_v: f32,
     /// Largest magnitude of a phase current, in A.
     pub current_a: f32,
+    /// Magnitude of the current's reference, in A; 0 where the map's error is not known.
+    pub reference_a: f32,
     /// By how much the machine's flux linkage seems to exceed the map's, as a share; 0 while that is not known.
     pub map_error: f32,
     /// Electrical angular speed, of the faster motor, in rad/s.

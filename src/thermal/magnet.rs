@@ -35,7 +35,7 @@ impl MagnetState {
 
     /// One slot; the estimate stays while it cannot be renewed.
     pub fn step(&mut self, load: &Load, magnets: &Magnets, slot_s: f32) -> Option<f32> {
-        let is_small = load.current_a < SMALL * load.max_current_a && load.map_error != 0.0;
+        let is_small = load.reference_a < SMALL * load.max_current_a && load.map_error != 0.0;
         self.small_s = if is_small { self.small_s + slot_s } else { 0.0 };
         let celsius = magnets.map_c + load.map_error / magnets.per_k;
         if self.small_s > SETTLED_S && celsius.is_finite() {
@@ -53,8 +53,8 @@ mod tests {
     const MAGNETS: Magnets =
         Magnets { per_k: -1e-3, map_c: 20.0, derating: Derating { from_c: 120.0, none_c: 150.0 } };
 
-    fn load(current_a: f32, map_error: f32) -> Load {
-        Load { current_a, udc_v: 1_500.0, map_error, max_current_a: 200.0 }
+    fn load(reference_a: f32, map_error: f32) -> Load {
+        Load { current_a: 0.0, reference_a, udc_v: 1_500.0, map_error, max_current_a: 200.0 }
     }
 
     #[test]

@@ -67,6 +67,8 @@ pub struct Ratios {
 pub struct Load {
     /// Largest magnitude of a phase current, in A.
     pub current_a: f32,
+    /// Magnitude of the current's reference, in A: the fundamental's, without ripple.
+    pub reference_a: f32,
     /// Voltage of the DC link, in V.
     pub udc_v: f32,
     /// By how much the flux linkage seems to exceed the map's, as a share; 0 while that is not known.

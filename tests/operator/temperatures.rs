@@ -188,7 +188,7 @@ fn losses_warm_what_has_no_sensor() {
 #[test]
 fn hot_magnets_take_torque_and_trip_nothing() {
     let mut world = warm(World::running());
-    (world.observed.current_a, world.observed.map_error) = (1.0, -0.115);
+    (world.observed.iq_a, world.observed.map_error) = (1.0, -0.115);
     world.slots(2_000);
     let Temperatures { magnets_c, torque_share, .. } = told(&world);
     assert!((magnets_c.unwrap() - 135.0).abs() < 0.1 && (torque_share - 0.5).abs() < 0.01);

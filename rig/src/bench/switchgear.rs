@@ -36,6 +36,16 @@ impl Contactor {
     }
 }
 
+/// The rest of the board's feedback.
+pub struct Held {
+    /// The cause that holds the gates off in hardware.
+    pub hardware: Option<Fault>,
+    /// `true` if the rotor's angle is known.
+    pub position_known: bool,
+    /// The temperature sensors' voltages.
+    pub temperatures: Ratios,
+}
+
 /// Contactors and slots; `A` is what is asked besides the board's word, `T` what is told of the demands.
 pub struct Switchgear<A, T> {
     tick_s: f64,
@@ -74,13 +84,12 @@ impl<A, T: Copy> Switchgear<A, T> {
         self.main.closed
     }
 
-    /// A control sample at `now`, with what holds the gates off in hardware and whether the rotor's angle is known: the first of every millisecond begins a slot, in which this is
+    /// A control sample at `now`, with what the board sees beside contactors: the first of every millisecond begins a slot, in which this is
     /// asked. Returns whether the operator has fallen behind.
     pub fn sampled(
         &mut self,
         now: Tick,
-        hardware: Option<Fault>,
-        position_known: bool,
+        Held { hardware, position_known, temperatures }: Held,
         ask: impl FnOnce() -> A,
     ) -> bool {
         let begins = self.samples.is_multiple_of(self.slot_samples);
@@ -98,7 +107,7 @@ impl<A, T: Copy> Switchgear<A, T> {
                 configuration: Configuration::Good,
                 parameters_open: false,
                 hardware,
-                temperatures: Ratios::default(),
+                temperatures,
             };
             self.asked.push_back((now, ask(), feedback));
         }
