@@ -123,7 +123,7 @@ impl Request {
             Self::End => block(9, Instant(0), &[]),
             Self::Leave(at) => block(10, *at, &[]),
             Self::Ask(at) => block(11, *at, &[]),
-            Self::Tell(from, status, frame) => block(12, *from, &told_to_words(status, *frame)),
+            Self::Tell(from, status, frame) => told_to_block(*from, status, *frame),
             Self::Observed(at, observation) => block(13, *at, &observation.to_words()),
             Self::Align(at, zero) => block(14, *at, &[zero.0]),
         }
@@ -216,6 +216,11 @@ fn told_to_words<T: Told>(status: &Status<T>, frame: Option<Frame>) -> [u32; 12]
     let [a, b, c, d, e, f, g, h, i] = status.to_words();
     let [head, low, high] = frame.to_words();
     [a, b, c, d, e, f, g, h, i, head, low, high]
+}
+
+/// The block of [`Request::Tell`], or of [`DualRequest::Tell`].
+pub fn told_to_block<T: Told>(from: Instant, status: &Status<T>, frame: Option<Frame>) -> Block {
+    block(12, from, &told_to_words(status, frame))
 }
 
 /// The inverse of [`told_to_words`].

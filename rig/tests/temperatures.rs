@@ -77,7 +77,7 @@ struct Run {
     torque_nm: f64,
     duration_s: f64,
     heat: Heat,
-    thermal: Option<Thermal>,
+    thermal: Option<&'static Thermal>,
 }
 
 /// The run's recording, its warmth at the end, and the operator's temperatures in each slot.
@@ -115,7 +115,7 @@ fn last_nm(recording: &Recording) -> f64 {
 }
 
 /// Full torque for twenty of the stator's time constants.
-fn overload(thermal: Option<Thermal>) -> (Recording, Heat) {
+fn overload(thermal: Option<&'static Thermal>) -> (Recording, Heat) {
     run(Run { rpm: 500.0, torque_nm: 1_235.0, duration_s: 15.0, heat: Heat::new(HEAT), thermal })
 }
 
@@ -124,7 +124,7 @@ fn a_long_overload_derates_and_trips_nothing() {
     let (hot, heat) = overload(None);
     let [unheeded_c, _] = heat.highest_c;
     assert!(hot.trip().is_none() && unheeded_c > 250.0, "nobody looks: {unheeded_c} °C");
-    let (recording, heat) = overload(Some(THERMAL));
+    let (recording, heat) = overload(Some(&THERMAL));
     let Temperatures { winding_c: told_c, torque_share, .. } = told(&recording);
     let ([winding_c, junction_c], torque_nm) = (heat.highest_c, last_nm(&recording));
     println!(
@@ -145,7 +145,7 @@ fn a_blocked_rotor_is_held_by_its_hottest_junction() {
     let stator = Node { k_per_w: 1e-3, ..HEAT.stator };
     let heat_sink = Node { k_per_w: 0.04, ..HEAT.heat_sink };
     let heat = Heat::new(HeatSettings { stator, heat_sink, ..HEAT });
-    let blocked = Run { rpm: 0.0, torque_nm: 1_235.0, duration_s: 15.0, heat, thermal: Some(THERMAL) };
+    let blocked = Run { rpm: 0.0, torque_nm: 1_235.0, duration_s: 15.0, heat, thermal: Some(&THERMAL) };
     let (recording, heat) = run(blocked);
     let Temperatures { junction_c: told_c, torque_share, .. } = told(&recording);
     let [_, junction_c] = heat.highest_c;
@@ -166,7 +166,7 @@ fn a_lost_sensor_stops_the_drive_by_its_own_name_in_time() {
             wires[place] = wire;
             let heat = Heat::new(HEAT).wired(vec![(LOST_S, wires)]);
             let lost =
-                Run { rpm: 1_000.0, torque_nm: 1_235.0, duration_s: 0.8, heat, thermal: Some(THERMAL) };
+                Run { rpm: 1_000.0, torque_nm: 1_235.0, duration_s: 0.8, heat, thermal: Some(&THERMAL) };
             let (recording, _) = run(lost);
             let tripped = |row: &&SlotRow| row.status.trip.is_some();
             let SlotRow { t_s, status } = recording.slots.iter().find(tripped).expect("a trip");
@@ -183,7 +183,7 @@ fn a_lost_sensor_stops_the_drive_by_its_own_name_in_time() {
 /// Coasting with the gates on at 2,000 r/min, magnets at a temperature: what is told of them.
 fn magnets(magnets_c: f64, torque_nm: f64) -> (Option<f32>, f64) {
     let heat = Heat::new(HeatSettings { magnets_c, magnets_per_k: -1e-3, ..HEAT });
-    let (recording, _) = run(Run { rpm: 2_000.0, torque_nm, duration_s: 3.0, heat, thermal: Some(THERMAL) });
+    let (recording, _) = run(Run { rpm: 2_000.0, torque_nm, duration_s: 3.0, heat, thermal: Some(&THERMAL) });
     assert!(recording.trip().is_none());
     (told(&recording).magnets_c, last_nm(&recording))
 }

@@ -22,6 +22,8 @@ pub trait Demands: Copy {
 
     /// Nothing asked for.
     const AT_REST: Self;
+    /// `true` if its limits derate by temperatures; otherwise nobody looks at them, whatever the settings know.
+    const DERATES: bool = false;
 
     /// The request's levels.
     fn levels(request: &Self::Request) -> Levels;
@@ -36,7 +38,8 @@ pub trait Demands: Copy {
     /// Takes over limits that are good.
     fn take_limits(&mut self, request: &Self::Request);
     /// Takes over the share of the limits that the temperatures leave, 0 ..= 1.
-    fn derate(&mut self, share: f32);
+    #[inline]
+    fn derate(&mut self, _share: f32) {}
     /// `true` if nothing is asked for any more.
     fn are_at_rest(&self) -> bool;
     /// At rest at once.
@@ -80,6 +83,7 @@ impl Demands for TorqueDemand {
     type Told = f32;
 
     const AT_REST: Self = Self { ramp: Ramp::new(), limits: None, share: 1.0, line: LineVoltage::UNKNOWN };
+    const DERATES: bool = true;
 
     #[inline]
     fn levels(request: &Request) -> Levels {

@@ -159,8 +159,6 @@ pub struct DualDemands {
     ways: [Way; 2],
     /// The limits that hold; `None`: as rated.
     limits: Option<[MotorLimits; 2]>,
-    /// The share of them that the temperatures leave.
-    share: f32,
     link_ref_v: f32,
     /// While it stops the link goes down to the source's voltage.
     resting_v: Option<f32>,
@@ -168,11 +166,7 @@ pub struct DualDemands {
 
 impl DualDemands {
     fn limits(&self, settings: &Settings) -> [MotorLimits; 2] {
-        self.limits.unwrap_or([MotorLimits::rated(settings.ratings); 2]).map(|limits| MotorLimits {
-            motoring_nm: self.share * limits.motoring_nm,
-            braking_nm: self.share * limits.braking_nm,
-            ..limits
-        })
+        self.limits.unwrap_or([MotorLimits::rated(settings.ratings); 2])
     }
 }
 
@@ -182,8 +176,7 @@ impl Demands for DualDemands {
     type DriveCommand = DualDriveCommand;
     type Told = [MotorDemand; 2];
 
-    const AT_REST: Self =
-        Self { ways: [Way::AT_REST; 2], limits: None, share: 1.0, link_ref_v: 0.0, resting_v: None };
+    const AT_REST: Self = Self { ways: [Way::AT_REST; 2], limits: None, link_ref_v: 0.0, resting_v: None };
 
     fn levels(request: &DualRequest) -> Levels {
         request.levels
@@ -234,10 +227,6 @@ impl Demands for DualDemands {
     fn take_limits(&mut self, request: &DualRequest) {
         self.limits = Some(request.motors.map(|motor| motor.limits));
         self.link_ref_v = request.link_ref_v;
-    }
-
-    fn derate(&mut self, share: f32) {
-        self.share = share;
     }
 
     fn are_at_rest(&self) -> bool {

@@ -129,8 +129,9 @@ impl<D: Demands> Operator<D> {
     }
 
     /// The temperatures' slot, and the first violation that lasts.
+    #[inline(never)]
     fn warm(&mut self, seen: &Seen, feedback: &Feedback, settings: &Settings) -> Option<Violation> {
-        let thermal = settings.thermal.as_ref()?;
+        let thermal = settings.thermal.filter(|_| D::DERATES)?;
         let Seen { current_a, reference_a, udc_v, map_error, .. } = *seen;
         let max_current_a = settings.ratings.max_current_a;
         let load = Load { current_a, reference_a, udc_v, map_error, max_current_a };

@@ -109,8 +109,8 @@ pub struct Settings<'a> {
     pub jerk_nm_s2: f32,
     /// Contactors and resistors; `None`: the link is alive by itself.
     pub line: Option<Line>,
-    /// Temperature sensors, and what is known of how machine and power stage warm; `None`: nothing is, and nothing derates.
-    pub thermal: Option<Thermal>,
+    /// Temperature sensors, and what is known of how machine and power stage warm; `None`, and of the ZS9: nothing is, and nothing derates.
+    pub thermal: Option<&'a Thermal>,
 }
 
 /// The demand's slew rate as a share of the drive's.

@@ -184,8 +184,8 @@ impl Told for [MotorDemand; 2] {
 
 impl<T: Told> Status<T> {
     /// As nine words.
-    pub fn to_words(self) -> [u32; 9] {
-        let Self { state, trip, refusal, refusals, torque_nm, switches, temperatures: _ } = self;
+    pub fn to_words(&self) -> [u32; 9] {
+        let Self { state, trip, refusal, refusals, torque_nm, switches, temperatures: _ } = *self;
         let refusal = refusal.map_or(NONE, |refusal| refusal.code().into());
         let Switches { precharge, main, discharge, chopper } = switches;
         let flags = u32::from(precharge) | u32::from(main) << 1 | u32::from(discharge) << 2;

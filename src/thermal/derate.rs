@@ -13,9 +13,13 @@ pub struct Derating {
 }
 
 impl Derating {
-    /// The share of the torque that a temperature in °C leaves.
+    /// The share of the torque that a temperature in °C leaves; what is not a number leaves none.
     pub fn share(&self, celsius: f32) -> f32 {
-        limit((self.none_c - celsius) / (self.none_c - self.from_c), 0.0, 1.0)
+        if celsius < self.none_c {
+            limit((self.none_c - celsius) / (self.none_c - self.from_c), 0.0, 1.0)
+        } else {
+            0.0
+        }
     }
 }
 
@@ -26,7 +30,9 @@ mod tests {
     #[test]
     fn torque_goes_along_a_straight_line() {
         let derating = Derating { from_c: 140.0, none_c: 160.0 };
-        for (celsius, share) in [(-40.0, 1.0), (140.0, 1.0), (145.0, 0.75), (160.0, 0.0), (300.0, 0.0)] {
+        for (celsius, share) in
+            [(-40.0, 1.0), (140.0, 1.0), (145.0, 0.75), (160.0, 0.0), (300.0, 0.0), (f32::NAN, 0.0)]
+        {
             assert_eq!(derating.share(celsius), share, "{celsius} °C");
         }
     }

@@ -1,6 +1,6 @@
 //! The ZS9's blocks: the same three streams and the same tags, other contents.
 
-use super::{Block, block, filled, line_from_words, line_to_words, told_from_words, told_to_words};
+use super::{Block, block, filled, line_from_words, line_to_words, told_from_words, told_to_block};
 use crate::cell::Words;
 use crate::control::Demand;
 use crate::frames::{Abc, Angle};
@@ -75,7 +75,7 @@ impl DualRequest {
             Self::End => block(9, Instant(0), &[]),
             Self::Leave(at) => block(10, *at, &[]),
             Self::Ask(at) => block(11, *at, &[]),
-            Self::Tell(from, status, frame) => block(12, *from, &told_to_words(status, *frame)),
+            Self::Tell(from, status, frame) => told_to_block(*from, status, *frame),
         }
     }
 

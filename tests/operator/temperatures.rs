@@ -1,11 +1,12 @@
 //! Temperatures: sensors that are lost, torque that goes as parts get hot, and what trips in the end.
 
 use crate::world::{SLOT_S, World};
+use proptest::prelude::*;
 use tractive::operator::{Refusal, State};
 use tractive::protection::{Fault, Trip};
 use tractive::thermal::{
-    Derating, DeviceLosses, Element, Magnets, PERSISTENCE_S, Ratios, Rise, Sensor, Temperatures, Thermal,
-    copper_factor,
+    Derating, DeviceLosses, Element, Load, Magnets, PERSISTENCE_S, Ratios, Rise, Sensor, Temperatures,
+    Thermal, ThermalState, copper_factor,
 };
 
 const NTC_AT_25_OHM: f32 = 10e3;
@@ -40,7 +41,7 @@ fn ratios(winding_c: f32, heat_sink_c: f32) -> Ratios {
 }
 
 fn warm(mut world: World) -> World {
-    world.settings.thermal = Some(THERMAL);
+    world.settings.thermal = Some(&THERMAL);
     world.feedback.temperatures = ratios(60.0, 40.0);
     world.slots(5);
     world
@@ -195,4 +196,67 @@ fn hot_magnets_take_torque_and_trip_nothing() {
     world.observed.map_error = -0.9;
     world.slots(2_000);
     assert_eq!((world.state(), told(&world).torque_share), (State::Enabled, 0.0));
+}
+
+#[test]
+fn settings_that_make_no_sense_are_refused_by_name() {
+    assert_eq!(THERMAL.check(), Ok(()));
+    let spoils: [(fn(&mut Thermal), &str); 14] = [
+        (|thermal| thermal.winding_sensor.series_ohm = 0.0, "thermal.sensor.series_ohm"),
+        (|thermal| thermal.heat_sink_sensor.range_c = [130.0, -40.0], "thermal.sensor.lowest_c"),
+        (|thermal| thermal.heat_sink_sensor.range_c[1] = 600.0, "thermal.sensor.highest_c"),
+        (
+            |thermal| thermal.heat_sink_sensor.element = Element::Ntc { at_25_ohm: 0.0, beta_k: 3e3 },
+            "thermal.sensor.at_25_ohm",
+        ),
+        (
+            |thermal| thermal.heat_sink_sensor.element = Element::Ntc { at_25_ohm: 1e4, beta_k: 0.0 },
+            "thermal.sensor.beta_k",
+        ),
+        (|thermal| thermal.resistance_ohm = f32::NAN, "thermal.resistance_ohm"),
+        (|thermal| thermal.winding.time_s = 0.0, "thermal.rise.time_s"),
+        (|thermal| thermal.junction.k_per_w = -1.0, "thermal.rise.k_per_w"),
+        (|thermal| thermal.losses.slope_ohm = -1.0, "thermal.losses.slope_ohm"),
+        (|thermal| thermal.winding_derating.from_c = 160.0, "thermal.derating.from_c"),
+        (|thermal| thermal.junction_derating.none_c = 1e3, "thermal.derating.none_c"),
+        (|thermal| thermal.winding_trip_c = 160.0, "thermal.winding_trip_c"),
+        (|thermal| thermal.junction_trip_c = f32::NAN, "thermal.junction_trip_c"),
+        (|thermal| thermal.magnets.as_mut().unwrap().per_k = 1e-3, "thermal.magnets.per_k"),
+    ];
+    for (spoil, name) in spoils {
+        let mut thermal = THERMAL;
+        spoil(&mut thermal);
+        assert_eq!(thermal.check().unwrap_err().name, name);
+    }
+}
+
+/// Numbers as they come from broken sensors, too.
+fn number(most: f32) -> impl Strategy<Value = f32> {
+    prop_oneof![8 => -most..most, 1 => Just(f32::NAN), 1 => Just(f32::INFINITY)]
+}
+
+proptest! {
+    /// Whatever the sensors show and the drive reports: a share of the torque, temperatures that are numbers, and a sensor that is wrong for long
+    /// enough is told.
+    #[test]
+    fn no_sequence_of_readings_leaves_what_is_promised(
+        slots in proptest::collection::vec((any::<u16>(), any::<u16>(), number(1e3), number(1.0)), 1..40),
+    ) {
+        let mut state = ThermalState::new();
+        for (winding, heat_sink, current_a, map_error) in slots {
+            let load =
+                Load { current_a, reference_a: current_a, udc_v: 1_500.0, map_error, max_current_a: 233.0 };
+            for slot in 1..=10 {
+                let (told, violation) = state.step(&load, Ratios { winding, heat_sink }, &THERMAL, SLOT_S);
+                if let Some(Temperatures { winding_c, heat_sink_c, junction_c, torque_share, .. }) = told {
+                    prop_assert!((0.0..=1.0).contains(&torque_share));
+                    prop_assert!([winding_c, heat_sink_c, junction_c].into_iter().all(f32::is_finite));
+                }
+                let lost = THERMAL.winding_sensor.read(winding).is_err();
+                if slot as f32 * SLOT_S >= PERSISTENCE_S && lost {
+                    prop_assert_eq!(violation.map(|(fault, ..)| fault), Some(Fault::WindingSensor));
+                }
+            }
+        }
+    }
 }

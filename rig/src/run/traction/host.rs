@@ -219,7 +219,7 @@ impl<'a, L: ControlLaw> Tasks<'a, L> {
     }
 
     /// The same with an operator that knows temperature sensors, and how what they are on warms.
-    pub fn warmed_by(mut self, thermal: Option<Thermal>) -> Self {
+    pub fn warmed_by(mut self, thermal: Option<&'static Thermal>) -> Self {
         self.operator.thermal = thermal;
         self
     }
