@@ -201,7 +201,8 @@ fn hot_magnets_take_torque_and_trip_nothing() {
 #[test]
 fn settings_that_make_no_sense_are_refused_by_name() {
     assert_eq!(THERMAL.check(), Ok(()));
-    let spoils: [(fn(&mut Thermal), &str); 14] = [
+    type Spoil = fn(&mut Thermal);
+    let spoils: [(Spoil, &str); 14] = [
         (|thermal| thermal.winding_sensor.series_ohm = 0.0, "thermal.sensor.series_ohm"),
         (|thermal| thermal.heat_sink_sensor.range_c = [130.0, -40.0], "thermal.sensor.lowest_c"),
         (|thermal| thermal.heat_sink_sensor.range_c[1] = 600.0, "thermal.sensor.highest_c"),
