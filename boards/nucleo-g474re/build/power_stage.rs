@@ -7,6 +7,7 @@ use serde::Deserialize;
 use std::path::Path;
 use tractive::configuration::{LATEST_ANGLE_S, Refused};
 use tractive::machine::Tables;
+use tractive::thermal::{Derating, DeviceLosses, Element, Magnets, Rise, Sensor, Thermal};
 use tractive_tablegen::InputError;
 
 /// Codes of the 12-bit converters.
@@ -51,6 +52,90 @@ struct Keys {
     angle_late_us: Option<f64>,
     discharge_s: f64,
     z_source: Option<ZSource>,
+    thermal: Option<ThermalKeys>,
+}
+
+/// The keys of temperature sensors and thermal data.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ThermalKeys {
+    winding_sensor: SensorKeys,
+    heat_sink_sensor: SensorKeys,
+    winding: RiseKeys,
+    junction: RiseKeys,
+    losses: LossKeys,
+    winding_derating_c: [f32; 3],
+    junction_derating_c: [f32; 3],
+    magnets: Option<MagnetKeys>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SensorKeys {
+    ntc: Option<[f32; 2]>,
+    series_ohm: f32,
+    range_c: [f32; 2],
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RiseKeys {
+    k_per_w: f32,
+    time_s: f32,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct LossKeys {
+    threshold_v: f32,
+    slope_ohm: f32,
+    switching_share: f32,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct MagnetKeys {
+    per_k: f32,
+    map_c: f32,
+    derating_c: [f32; 2],
+}
+
+impl SensorKeys {
+    fn sensor(&self) -> Sensor {
+        let element =
+            self.ntc.map_or(Element::Pt1000, |[at_25_ohm, beta_k]| Element::Ntc { at_25_ohm, beta_k });
+        Sensor { element, series_ohm: self.series_ohm, range_c: self.range_c }
+    }
+}
+
+impl ThermalKeys {
+    fn thermal(&self, resistance_ohm: f32) -> Thermal {
+        let rise = |keys: &RiseKeys| Rise { k_per_w: keys.k_per_w, time_s: keys.time_s };
+        let LossKeys { threshold_v, slope_ohm, switching_share } = self.losses;
+        let (
+            [winding_from_c, winding_none_c, winding_trip_c],
+            [junction_from_c, junction_none_c, junction_trip_c],
+        ) = (self.winding_derating_c, self.junction_derating_c);
+        Thermal {
+            winding_sensor: self.winding_sensor.sensor(),
+            heat_sink_sensor: self.heat_sink_sensor.sensor(),
+            resistance_ohm,
+            winding: rise(&self.winding),
+            junction: rise(&self.junction),
+            losses: DeviceLosses { threshold_v, slope_ohm, switching_share },
+            winding_derating: Derating { from_c: winding_from_c, none_c: winding_none_c },
+            winding_trip_c,
+            junction_derating: Derating { from_c: junction_from_c, none_c: junction_none_c },
+            junction_trip_c,
+            magnets: self.magnets.as_ref().map(
+                |&MagnetKeys { per_k, map_c, derating_c: [from_c, none_c] }| Magnets {
+                    per_k,
+                    map_c,
+                    derating: Derating { from_c, none_c },
+                },
+            ),
+        }
+    }
 }
 
 /// The keys that the ZS9's stage has besides.
@@ -133,7 +218,11 @@ pub fn traction(file: &Path, text: &str, machine: &Machine) -> Result<String, In
     stage.check(&[late])?;
     stage.check_sensors(machine, f64::from(ratings.trip_dc_over_v), "the machine's trip_dc_over_v", 1)?;
     settings.check(machine.tables).map_err(|refused| stage.refuse_start(machine, &refused))?;
-    Ok(stage.constant(control_hz, min_pulse_ns))
+    let thermal = stage.keys.thermal.as_ref().map(|keys| keys.thermal(ratings.stator_resistance_ohm));
+    if let Some(Err(refused)) = thermal.map(|thermal| thermal.check()) {
+        return Err(stage.refuse("thermal", refused.to_string()));
+    }
+    Ok(stage.constant(control_hz, min_pulse_ns, thermal))
 }
 
 /// Checks the ZS9's power stage; gives its constant as Rust.
@@ -158,6 +247,9 @@ pub fn zs9(file: &Path, text: &str, machine: &Machine) -> Result<String, InputEr
             stage.refuse("angle_late_us", "the control of two motors takes the angle as it is".to_owned())
         );
     }
+    if stage.keys.thermal.is_some() {
+        return Err(stage.refuse("thermal", "the ZS9 knows no temperatures".to_owned()));
+    }
     let Some(ZSource { inductor_range_a, source_range_v, link_ref_v }) = *z_source else {
         return Err(stage.refuse("z_source", "is missing".to_owned()));
     };
@@ -181,7 +273,7 @@ pub fn zs9(file: &Path, text: &str, machine: &Machine) -> Result<String, InputEr
          inductor_a_per_code: {inductor_range_a:?} / {HALF_CODES:?},\n    \
          source_v_per_code: {source_range_v:?} / {CODES:?},\n    link_ref_v: {link_ref_v:?},\n}}",
         // The modulator of the nine switches has no shortest pulse.
-        stage.constant(zs9_rates::CONTROL_HZ, 0),
+        stage.constant(zs9_rates::CONTROL_HZ, 0, None),
         zeros.join(", "),
     ))
 }
@@ -337,7 +429,7 @@ impl<'a> Stage<'a> {
     }
 
     /// The constant's value as Rust.
-    fn constant(&self, control_hz: u32, min_pulse_ns: u32) -> String {
+    fn constant(&self, control_hz: u32, min_pulse_ns: u32, thermal: Option<Thermal>) -> String {
         let Keys { dead_time_ns, current_range_a, zero_code, zero_tolerance, dc_link_range_v, .. } =
             self.keys;
         let Keys { break_current_a, encoder_counts, precharge_s, discharge_s, behind_line_filter, .. } =
@@ -352,7 +444,7 @@ impl<'a> Stage<'a> {
              break_current_a: {break_current_a:?},\n    encoder_counts: {encoder_counts},\n    encoder_zero: {zero},\n    \
              line: LineTimes {{ precharge_s: {precharge_s:?}, discharge_s: {discharge_s:?} }},\n    \
              behind_line_filter: {behind_line_filter},\n    \
-             angle_late_s: {angle_late_s:?},\n}}"
+             angle_late_s: {angle_late_s:?},\n    thermal: {thermal:?},\n}}"
         )
     }
 }

@@ -10,6 +10,7 @@ mod outputs;
 mod pins;
 mod ports;
 mod start;
+mod temperatures;
 mod zs9;
 
 use nucleo_g474re::CLOCK;
