@@ -5,7 +5,7 @@
 //! board gives samples and takes pulses ([`ports`]), and a rig on the host plays the motor. [`drive`] puts them together, once for
 //! each system ([`drive::traction`], [`drive::dual`]): its tasks are what the two interrupts call, on any board and on the host.
 //! [`machine`] has the types of the tables made offline, [`protection`] the faults and the safe state, [`recorder`] what led to one.
-//! [`operator`] switches the drive on and off, [`protocol`] is how it is asked over CAN, [`experiment`] what an identification keeps for it.
+//! [`operator`] switches the drive on and off, by [`thermal`] with less torque where it is hot, [`protocol`] is how it is asked over CAN, [`experiment`] what an identification keeps for it.
 //!
 //! [`control`], [`identification`], [`start_up`], [`modulation`], [`nine_switch`], [`machine`], [`frames`] and [`time`](mod@time) are those of the crate
 //! `tractive-control`, which is usable alone. Neither control nor modulation knows the cells; only the drive knows all of them;
@@ -45,6 +45,7 @@ pub mod ports;
 pub mod protection;
 pub mod protocol;
 pub mod recorder;
+pub mod thermal;
 #[cfg(feature = "wire")]
 pub mod wire;
 

@@ -123,7 +123,7 @@ impl Request {
             Self::End => block(9, Instant(0), &[]),
             Self::Leave(at) => block(10, *at, &[]),
             Self::Ask(at) => block(11, *at, &[]),
-            Self::Tell(from, status, frame) => block(12, *from, &told_to_words(status, *frame)),
+            Self::Tell(from, status, frame) => told_to_block(*from, status, *frame),
             Self::Observed(at, observation) => block(13, *at, &observation.to_words()),
             Self::Align(at, zero) => block(14, *at, &[zero.0]),
         }
@@ -218,6 +218,11 @@ fn told_to_words<T: Told>(status: &Status<T>, frame: Option<Frame>) -> [u32; 12]
     [a, b, c, d, e, f, g, h, i, head, low, high]
 }
 
+/// The block of [`Request::Tell`], or of [`DualRequest::Tell`].
+pub fn told_to_block<T: Told>(from: Instant, status: &Status<T>, frame: Option<Frame>) -> Block {
+    block(12, from, &told_to_words(status, frame))
+}
+
 /// The inverse of [`told_to_words`].
 fn told_from_words<T: Told>(words: [u32; 14]) -> Option<(Status<T>, Option<Frame>)> {
     let [a, b, c, d, e, f, g, h, i, head, low, high, ..] = words;
@@ -291,9 +296,9 @@ pub fn asked_to_block(asked: &operator::Request, feedback: &Feedback, frame: Opt
 
 /// The inverse of [`asked_to_block`].
 pub fn asked_from_block(block: &Block) -> (operator::Request, Feedback, Option<Frame>) {
-    let [a, b, c, d, e, f, g, h, i, j, k, head, low, high, ..] = *block;
+    let [a, b, c, d, e, f, g, h, i, j, k, l, head, low, high, ..] = *block;
     let asked = operator::Request::from_words([a, b, c, d, e, f, g]);
-    (asked, Feedback::from_words([h, i, j, k]), Option::from_words([head, low, high]))
+    (asked, Feedback::from_words([h, i, j, k, l]), Option::from_words([head, low, high]))
 }
 
 /// The answer to [`Request::PwmSample`].

@@ -11,8 +11,8 @@ use tractive::protocol::e2e::Counter;
 use tractive::protocol::{
     COMMAND, Command, Content, Counts, ExperimentFrame, FROM_DRIVE, Frame, LIMITS, LINK_LIMITS, LinkLimits,
     Listening, Measured, Message, ObservationFrame, PARAMETER_REQUEST, ParameterAnswer, ParameterRequest,
-    Payload, Receiver, Scales, Session, StatusFrame, TO_DRIVE, TO_ZS9, Told, TorqueLimits, Zs9Command,
-    Zs9Demands, Zs9Link, Zs9Session, trip_number,
+    Payload, Receiver, Scales, Session, StatusFrame, TO_DRIVE, TO_ZS9, TemperaturesFrame, Told, TorqueLimits,
+    Zs9Command, Zs9Demands, Zs9Link, Zs9Session, trip_number,
 };
 
 /// The injuries that a bus, or somebody on it, does to frames.
@@ -199,6 +199,7 @@ fn status(state: usize) -> Status {
         refusals: 0,
         torque_nm: 0.0,
         switches: Switches::default(),
+        temperatures: None,
     }
 }
 
@@ -288,7 +289,7 @@ pub fn check_content(payload: Payload, scales: Scales) {
     counts.merge(payload);
     let status = StatusFrame::<Mode>::decode(payload);
     assert_eq!(StatusFrame::decode(status.encode()), status);
-    let _ = (ParameterAnswer::decode(payload), trip_number(payload));
+    let _ = (ParameterAnswer::decode(payload), trip_number(payload), TemperaturesFrame::decode(payload));
     // Without CRC and counter.
     let payload = Payload(payload.0 & !0xFFF);
     let again = [

@@ -4,7 +4,7 @@ use super::settings::Ends;
 use super::{Levels, Limits, MotorLimits, Ramp, Rates, Refusal, Request, Seen, Settings, Situation};
 use crate::control::{Demand, LinkWindow};
 use crate::drive::Observation;
-use crate::frames::{SQRT_3, limit};
+use crate::frames::{Dq, SQRT_3, limit};
 use crate::machine::Ratings;
 use crate::ports::{DriveCommand, Report};
 use crate::protection::{self, Trip, Violation};
@@ -22,6 +22,8 @@ pub trait Demands: Copy {
 
     /// Nothing asked for.
     const AT_REST: Self;
+    /// `true` if its limits derate by temperatures; otherwise nobody looks at them, whatever the settings know.
+    const DERATES: bool = false;
 
     /// The request's levels.
     fn levels(request: &Self::Request) -> Levels;
@@ -35,6 +37,9 @@ pub trait Demands: Copy {
     fn asks_torque(request: &Self::Request) -> bool;
     /// Takes over limits that are good.
     fn take_limits(&mut self, request: &Self::Request);
+    /// Takes over the share of the limits that the temperatures leave, 0 ..= 1.
+    #[inline]
+    fn derate(&mut self, _share: f32) {}
     /// `true` if nothing is asked for any more.
     fn are_at_rest(&self) -> bool;
     /// At rest at once.
@@ -58,12 +63,16 @@ pub struct TorqueDemand {
     ramp: Ramp,
     /// The limits that hold; `None`: as rated.
     limits: Option<Limits>,
+    /// The share of them that the temperatures leave.
+    share: f32,
     line: LineVoltage,
 }
 
 impl TorqueDemand {
     fn limits(&self, settings: &Settings) -> Limits {
-        self.limits.unwrap_or(Limits::rated(settings.ratings))
+        let limits = self.limits.unwrap_or(Limits::rated(settings.ratings));
+        let (motoring_nm, braking_nm) = (self.share * limits.motoring_nm, self.share * limits.braking_nm);
+        Limits { motoring_nm, braking_nm, ..limits }
     }
 }
 
@@ -73,7 +82,8 @@ impl Demands for TorqueDemand {
     type DriveCommand = DriveCommand;
     type Told = f32;
 
-    const AT_REST: Self = Self { ramp: Ramp::new(), limits: None, line: LineVoltage::UNKNOWN };
+    const AT_REST: Self = Self { ramp: Ramp::new(), limits: None, share: 1.0, line: LineVoltage::UNKNOWN };
+    const DERATES: bool = true;
 
     #[inline]
     fn levels(request: &Request) -> Levels {
@@ -83,8 +93,22 @@ impl Demands for TorqueDemand {
 
     #[inline]
     fn seen(observed: &Observation) -> Seen {
-        let Report { udc_v, current_a, omega, speed_known, trip, acknowledged, .. } = observed.report;
-        Seen { at: observed.at, udc_v, current_a, omega, emf_omega: omega, speed_known, trip, acknowledged }
+        let Report { udc_v, current_a, map_error, omega, speed_known, trip, acknowledged, .. } =
+            observed.report;
+        let (at, emf_omega) = (observed.at, omega);
+        let reference_a = Dq { d: observed.report.id_a, q: observed.report.iq_a }.length();
+        Seen {
+            at,
+            udc_v,
+            current_a,
+            reference_a,
+            map_error,
+            omega,
+            emf_omega,
+            speed_known,
+            trip,
+            acknowledged,
+        }
     }
 
     #[inline]
@@ -105,6 +129,11 @@ impl Demands for TorqueDemand {
     #[inline]
     fn take_limits(&mut self, request: &Request) {
         self.limits = Some(request.limits);
+    }
+
+    #[inline]
+    fn derate(&mut self, share: f32) {
+        self.share = share;
     }
 
     #[inline]

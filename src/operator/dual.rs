@@ -189,6 +189,8 @@ impl Demands for DualDemands {
             at: *at,
             udc_v: report.capacitor_v,
             current_a: larger(i1, i2),
+            reference_a: 0.0,
+            map_error: 0.0,
             omega: larger(w1.abs(), w2.abs()),
             emf_omega: w1.abs() + w2.abs(),
             speed_known: report.speed_known,

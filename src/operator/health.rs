@@ -23,13 +23,16 @@ pub(super) fn cause(input: &Situation, main_closed: bool, settings: &Settings) -
         .or_else(|| if settings.line.is_some() { contactors(input, main_closed, false) } else { None })
 }
 
-/// Gate drivers, and whatever else holds the gates off.
+/// Gate drivers, whatever else holds the gates off, and temperatures.
 pub(super) fn hardware(input: &Situation) -> Option<Violation> {
     let feedback = input.feedback;
     if let Some(fault) = feedback.hardware {
         return Some((fault, 1.0, 0.0));
     }
-    (!feedback.driver_ready).then_some((Fault::GateDriver, 1.0, 0.0))
+    if !feedback.driver_ready {
+        return Some((Fault::GateDriver, 1.0, 0.0));
+    }
+    input.thermal
 }
 
 fn configuration(input: &Situation) -> Option<Violation> {

@@ -5,10 +5,11 @@ mod commands;
 use super::demand;
 use super::line::{Discharge, Outcome, Precharge};
 use super::{
-    ACKNOWLEDGE_S, Configuration, Demands, Input, Output, Refusal, SELF_TEST_S, Settings, Situation, State,
-    Status, Switches, health, line,
+    ACKNOWLEDGE_S, Configuration, Demands, Feedback, Input, Output, Refusal, SELF_TEST_S, Seen, Settings,
+    Situation, State, Status, Switches, health, line,
 };
 use crate::protection::{Fault, SafeState, Trip, Violation};
+use crate::thermal::{Load, Temperatures, ThermalState};
 
 /// The state, with the memory that each state has.
 #[derive(Clone, Copy, Debug)]
@@ -48,6 +49,8 @@ pub struct Operator<D> {
     refusals: u32,
     /// Number of the last acknowledge that was handed on.
     acknowledge: u8,
+    thermal: ThermalState,
+    temperatures: Option<Temperatures>,
 }
 
 /// Levels whose rise is a command.
@@ -71,6 +74,8 @@ impl<D: Demands> Operator<D> {
             refusal: None,
             refusals: 0,
             acknowledge: 0,
+            thermal: ThermalState::new(),
+            temperatures: None,
         }
     }
 
@@ -98,7 +103,8 @@ impl<D: Demands> Operator<D> {
         settings: &Settings,
     ) -> Output<D::DriveCommand, D::Told> {
         let seen = D::seen(input.observed);
-        let situation = Situation { observed: &seen, feedback: input.feedback };
+        let thermal = self.warm(&seen, input.feedback, settings);
+        let situation = Situation { observed: &seen, feedback: input.feedback, thermal };
         self.look_at_values(input.request, settings);
         self.supervise(&situation, settings);
         self.advance(&situation, settings);
@@ -117,8 +123,23 @@ impl<D: Demands> Operator<D> {
                 refusals: self.refusals,
                 torque_nm: self.demands.told(),
                 switches,
+                temperatures: self.temperatures,
             },
         }
+    }
+
+    /// The temperatures' slot, and the first violation that lasts.
+    #[inline(never)]
+    fn warm(&mut self, seen: &Seen, feedback: &Feedback, settings: &Settings) -> Option<Violation> {
+        let thermal = settings.thermal.filter(|_| D::DERATES)?;
+        let Seen { current_a, reference_a, udc_v, map_error, .. } = *seen;
+        let max_current_a = settings.ratings.max_current_a;
+        let load = Load { current_a, reference_a, udc_v, map_error, max_current_a };
+        let (temperatures, violation) =
+            self.thermal.step(&load, feedback.temperatures, thermal, settings.slot_s);
+        self.temperatures = temperatures;
+        self.demands.derate(temperatures.map_or(1.0, |temperatures| temperatures.torque_share));
+        violation
     }
 
     fn refuse(&mut self, reason: Refusal) {

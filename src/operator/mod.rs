@@ -33,6 +33,7 @@ pub use status::{DualStatus, Refusal, State, Status, Switches, Told};
 
 use crate::drive::Observation;
 use crate::ports::{DriveCommand, Report};
+use crate::protection::Violation;
 use crate::time::Clock;
 
 /// The PMaSynRM drive's state machine.
@@ -69,6 +70,8 @@ pub struct Input<'a, Q = Request, R = Report> {
 struct Situation<'a> {
     observed: &'a Seen,
     feedback: &'a Feedback,
+    /// The first violation of the temperatures and their sensors.
+    thermal: Option<Violation>,
 }
 
 /// A step's result.

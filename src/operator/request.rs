@@ -6,6 +6,7 @@ use crate::configuration::Refused;
 use crate::frames::Abc;
 use crate::machine::Ratings;
 use crate::protection::{Fault, Trip};
+use crate::thermal::Ratios;
 use crate::time::Instant;
 
 /// The request of the command's sender, as levels: a frame that is lost or repeated changes nothing. Where a command is an edge, it is
@@ -161,6 +162,8 @@ pub struct Feedback {
     pub parameters_open: bool,
     /// The cause that keeps the gates off in hardware, while it lasts.
     pub hardware: Option<Fault>,
+    /// The temperature sensors' voltages; where the settings know of none, nobody looks.
+    pub temperatures: Ratios,
 }
 
 /// The part of an observation that every drive has.
@@ -173,6 +176,10 @@ pub struct Seen {
     pub udc_v: f32,
     /// Largest magnitude of a phase current, in A.
     pub current_a: f32,
+    /// Magnitude of the current's reference, in A; 0 where the map's error is not known.
+    pub reference_a: f32,
+    /// By how much the machine's flux linkage seems to exceed the map's, as a share; 0 while that is not known.
+    pub map_error: f32,
     /// Electrical angular speed, of the faster motor, in rad/s.
     pub omega: f32,
     /// The electrical speed whose EMF the diodes see, in rad/s: of two motors the sum, because one bridge has them in series.
@@ -220,8 +227,8 @@ impl Words<7> for Request {
     }
 }
 
-impl Words<4> for Feedback {
-    fn to_words(self) -> [u32; 4] {
+impl Words<5> for Feedback {
+    fn to_words(self) -> [u32; 5] {
         let flags = bits([
             self.precharge_closed,
             self.main_closed,
@@ -234,11 +241,13 @@ impl Words<4> for Feedback {
         ]);
         let hardware = self.hardware.map_or(0, |fault| fault as u32);
         let [a, b, c] = self.offsets_a.to_bits();
-        [flags | (self.configuration as u32) << 8 | hardware << 16, a, b, c]
+        let Ratios { winding, heat_sink } = self.temperatures;
+        let temperatures = u32::from(winding) | u32::from(heat_sink) << 16;
+        [flags | (self.configuration as u32) << 8 | hardware << 16, a, b, c, temperatures]
     }
 
-    fn from_words(words: [u32; 4]) -> Self {
-        let [flags, offsets @ ..] = words;
+    fn from_words(words: [u32; 5]) -> Self {
+        let [flags, a, b, c, temperatures] = words;
         let flag = |bit: u32| flags >> bit & 1 != 0;
         Self {
             precharge_closed: flag(0),
@@ -249,13 +258,14 @@ impl Words<4> for Feedback {
             position_known: flag(5),
             parameters_open: flag(6),
             position_counted: flag(7),
-            offsets_a: Abc::from_bits(offsets),
+            offsets_a: Abc::from_bits([a, b, c]),
             configuration: match flags >> 8 & 0xFF {
                 1 => Configuration::Good,
                 2 => Configuration::Bad,
                 _ => Configuration::Unchecked,
             },
             hardware: Fault::from_code(flags >> 16),
+            temperatures: Ratios { winding: temperatures as u16, heat_sink: (temperatures >> 16) as u16 },
         }
     }
 }
@@ -271,7 +281,7 @@ mod tests {
             assert_eq!(Request::from_words(words).to_words(), words);
         }
         for flags in (0..8).map(|bit| 1 << bit).chain([1 << 8, 2 << 8, (Fault::GateDriver as u32) << 16]) {
-            let words = [flags, 7, 8, 9];
+            let words = [flags, 7, 8, 9, 10 | 11 << 16];
             assert_eq!(Feedback::from_words(words).to_words(), words);
         }
     }

@@ -5,6 +5,7 @@ use crate::ports::MotorDemand;
 use crate::protection::Trip;
 use crate::protection::trip_from_words;
 use crate::protection::trip_to_words;
+use crate::thermal::Temperatures;
 
 macro_rules! named {
     ($(#[$meta:meta])* $name:ident { $($(#[$doc:meta])* $variant:ident = $text:literal),+ $(,)? }) => {
@@ -135,6 +136,8 @@ pub struct Status<T = f32> {
     pub torque_nm: T,
     /// The contactors and resistors that are switched.
     pub switches: Switches,
+    /// The temperatures, where the settings know of their sensors. They are not among the status's words: the protocol tells them.
+    pub temperatures: Option<Temperatures>,
 }
 
 const NONE: u32 = 0xFF;
@@ -181,8 +184,8 @@ impl Told for [MotorDemand; 2] {
 
 impl<T: Told> Status<T> {
     /// As nine words.
-    pub fn to_words(self) -> [u32; 9] {
-        let Self { state, trip, refusal, refusals, torque_nm, switches } = self;
+    pub fn to_words(&self) -> [u32; 9] {
+        let Self { state, trip, refusal, refusals, torque_nm, switches, temperatures: _ } = *self;
         let refusal = refusal.map_or(NONE, |refusal| refusal.code().into());
         let Switches { precharge, main, discharge, chopper } = switches;
         let flags = u32::from(precharge) | u32::from(main) << 1 | u32::from(discharge) << 2;
@@ -212,6 +215,7 @@ impl<T: Told> Status<T> {
                 discharge: flag(2),
                 chopper: f32::from_bits(chopper),
             },
+            temperatures: None,
         })
     }
 }
@@ -239,13 +243,16 @@ mod tests {
                 Switches { main: true, chopper: 0.25, ..Switches::default() },
                 Switches { discharge: true, ..Switches::default() },
             ] {
-                let status = Status { state, trip, refusal, refusals: 3, torque_nm: -20.0, switches };
+                let temperatures = None;
+                let status =
+                    Status { state, trip, refusal, refusals: 3, torque_nm: -20.0, switches, temperatures };
                 assert_eq!(Status::from_words(status.to_words()), Some(status));
                 let torque_nm = [
                     MotorDemand::Torque(Demand { torque_nm: -20.0, slew_limited: true }),
                     MotorDemand::Speed(104.5),
                 ];
-                let status = DualStatus { state, trip, refusal, refusals: 3, torque_nm, switches };
+                let status =
+                    DualStatus { state, trip, refusal, refusals: 3, torque_nm, switches, temperatures };
                 assert_eq!(Status::from_words(status.to_words()), Some(status));
             }
         }

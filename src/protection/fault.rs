@@ -72,11 +72,19 @@ pub enum Fault {
     DriverBlocked,
     /// The board refused to start; the value is the number of its reason.
     StartRefused,
+    /// The winding's temperature sensor is unplugged, shorted or out of its range; the value is what it shows, in °C.
+    WindingSensor,
+    /// The same of the heat sink's.
+    HeatSinkSensor,
+    /// The winding is hotter than where derating ends, in °C.
+    WindingTemperature,
+    /// The devices' junctions are, in °C.
+    JunctionTemperature,
 }
 
 impl Fault {
     /// All of them, in the order of their codes, which begin at 1.
-    pub const ALL: [Self; 30] = [
+    pub const ALL: [Self; 34] = [
         Self::Overcurrent,
         Self::DcOvervoltage,
         Self::DcUndervoltage,
@@ -107,6 +115,10 @@ impl Fault {
         Self::AngleLost,
         Self::DriverBlocked,
         Self::StartRefused,
+        Self::WindingSensor,
+        Self::HeatSinkSensor,
+        Self::WindingTemperature,
+        Self::JunctionTemperature,
     ];
 
     /// The fault with this code; `None` for 0 or an unknown number.
@@ -147,6 +159,10 @@ impl Fault {
             Self::AngleLost => "angle_lost",
             Self::DriverBlocked => "driver_blocked",
             Self::StartRefused => "start_refused",
+            Self::WindingSensor => "winding_sensor",
+            Self::HeatSinkSensor => "heat_sink_sensor",
+            Self::WindingTemperature => "winding_temperature",
+            Self::JunctionTemperature => "junction_temperature",
         }
     }
 }

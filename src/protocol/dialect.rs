@@ -9,6 +9,7 @@ use super::signal::Payload;
 use super::telemetry::Pattern;
 use crate::machine::Ratings;
 use crate::operator::{Demands, MotorLimits};
+use crate::thermal::Temperatures;
 
 /// A drive's messages, and, as a value, what was said last.
 pub trait MessageSet: Copy + 'static {
@@ -24,7 +25,7 @@ pub trait MessageSet: Copy + 'static {
     /// The messages to it: the command first.
     const TO_DRIVE: &'static [&'static Message];
     /// The messages from it: status, three of measurements, the fault's value and limit, counters, the answer about a parameter;
-    /// where a drive has it, a fourth of measurements.
+    /// where a drive has them, a fourth of measurements and the temperatures.
     const FROM_DRIVE: &'static [&'static Message];
     /// The first frame of a message, or the first after a silence: it only sets the counter.
     const GREETING: Self::Content;
@@ -41,8 +42,12 @@ pub trait MessageSet: Copy + 'static {
     fn rest(&mut self);
     /// The request to the operator: nothing but off before it is `armed`, no torque unless the command is `fresh`.
     fn request(&self, armed: bool, fresh: bool, parameters: &Parameters, ratings: &Ratings) -> Request<Self>;
-    /// The measurements and the pattern that are sent of a report.
-    fn observed(report: Option<&Report<Self>>, ratings: &Ratings) -> (Self::Measured, Self::Pattern);
+    /// The measurements and the pattern that are sent of a report and the temperatures.
+    fn observed(
+        report: Option<&Report<Self>>,
+        temperatures: Option<&Temperatures>,
+        ratings: &Ratings,
+    ) -> (Self::Measured, Self::Pattern);
     /// Content of one of the messages of measurements, without its mark.
     fn measured(measured: &Self::Measured, message: usize, scales: Scales) -> Payload;
 }

@@ -42,15 +42,15 @@ pub use scales::{Quantity, Scales};
 pub use signal::{Kind, OutOfRange, Payload, Signal};
 pub use telemetry::{
     COUNTERS, CURRENTS, Counts, FAULT_LIMIT, FAULT_VALUE, Listening, MOTION, Measured, Outcome,
-    PARAMETER_ANSWER, ParameterAnswer, Pattern, STATUS, StatusFrame, TORQUE_ESTIMATE, VOLTAGES, trip_frames,
-    trip_number,
+    PARAMETER_ANSWER, ParameterAnswer, Pattern, STATUS, StatusFrame, TEMPERATURES, TORQUE_ESTIMATE,
+    TemperaturesFrame, VOLTAGES, trip_frames, trip_number,
 };
 
 /// The messages to the drive.
 pub const TO_DRIVE: [&Message; 4] = [&COMMAND, &LIMITS, &LINK_LIMITS, &PARAMETER_REQUEST];
 
 /// The messages from the drive.
-pub const FROM_DRIVE: [&Message; 9] = [
+pub const FROM_DRIVE: [&Message; 10] = [
     &STATUS,
     &MOTION,
     &CURRENTS,
@@ -60,6 +60,7 @@ pub const FROM_DRIVE: [&Message; 9] = [
     &COUNTERS,
     &PARAMETER_ANSWER,
     &TORQUE_ESTIMATE,
+    &TEMPERATURES,
 ];
 
 pub use traction::{Content, Traction};

@@ -4,8 +4,9 @@ use super::dialect::MessageSet;
 use super::e2e::Counter;
 use super::frame::Frame;
 use super::scales::Scales;
-use super::telemetry::{Counts, ParameterAnswer, StatusFrame, trip_frames};
+use super::telemetry::{Counts, ParameterAnswer, StatusFrame, TemperaturesFrame, trip_frames};
 use crate::protection::Trip;
+use crate::thermal::Temperatures;
 
 /// Slots in a cycle.
 const CYCLE: u32 = 100;
@@ -18,6 +19,8 @@ const COUNTERS: usize = 6;
 const ANSWER: usize = 7;
 /// A fourth message of measurements, where a drive has one.
 const MORE: usize = 8;
+/// The temperatures, where a drive has them.
+const TEMPERATURES: usize = 9;
 
 /// Counters of all messages, and the place in the cycle.
 #[derive(Clone, Copy, Debug)]
@@ -25,7 +28,7 @@ pub struct Sender<D> {
     slot: u32,
     page: u32,
     answer: Option<ParameterAnswer>,
-    counters: [Counter; 9],
+    counters: [Counter; 10],
     dialect: core::marker::PhantomData<D>,
 }
 
@@ -36,7 +39,7 @@ impl<D: MessageSet> Sender<D> {
             slot: 0,
             page: 0,
             answer: None,
-            counters: [Counter::new(); 9],
+            counters: [Counter::new(); 10],
             dialect: core::marker::PhantomData,
         }
     }
@@ -51,6 +54,7 @@ impl<D: MessageSet> Sender<D> {
         &mut self,
         status: &StatusFrame<D::Pattern>,
         (measured, scales): (&D::Measured, Scales),
+        temperatures: Option<&Temperatures>,
         trip: Option<&Trip>,
         counts: &Counts,
     ) -> Option<Frame> {
@@ -66,6 +70,9 @@ impl<D: MessageSet> Sender<D> {
                 let content = counts.encode(self.page);
                 self.page = Counts::page_after(self.page);
                 (COUNTERS, content)
+            }
+            (8, 1) if D::FROM_DRIVE.len() > TEMPERATURES => {
+                (TEMPERATURES, TemperaturesFrame::from(temperatures?).encode())
             }
             (8, 3) => {
                 let [value, _] = trip_frames(trip?);

@@ -80,6 +80,7 @@ impl<D: MessageSet> Session<D> {
         self.sender.step(
             &status,
             (told.measured, self.scales),
+            told.status.temperatures.as_ref(),
             told.status.trip.as_ref(),
             self.receiver.counts(),
         )

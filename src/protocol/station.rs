@@ -44,7 +44,7 @@ impl<D: MessageSet> CanEndpoint<D> {
 
     /// The frame to send after the slot, if one is due; with the drive's report at the slot's beginning.
     pub fn tell(&mut self, status: &Status<DriveTold<D>>, report: Option<&Report<D>>) -> Option<Frame> {
-        let (measured, mode) = D::observed(report, self.ratings);
+        let (measured, mode) = D::observed(report, status.temperatures.as_ref(), self.ratings);
         self.session.tell(&Told { status, measured: &measured, mode })
     }
 }

@@ -14,6 +14,7 @@ use crate::machine::Ratings;
 use crate::modulation::Mode;
 use crate::operator::{Limits, MotorLimits, Request, TorqueDemand};
 use crate::ports::Report;
+use crate::thermal::Temperatures;
 
 /// The content of a frame that was taken.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -113,7 +114,11 @@ impl MessageSet for Traction {
         }
     }
 
-    fn observed(report: Option<&Report>, ratings: &Ratings) -> (Measured, Mode) {
+    fn observed(
+        report: Option<&Report>,
+        temperatures: Option<&Temperatures>,
+        ratings: &Ratings,
+    ) -> (Measured, Mode) {
         let Some(report) = report else {
             return (Measured::default(), Mode::Off);
         };
@@ -127,7 +132,7 @@ impl MessageSet for Traction {
             iq_ref_a: Some(report.iq_a),
             voltage_v: Some(report.voltage_v),
             frequency_hz: Some(report.omega / core::f32::consts::TAU),
-            temperature_c: None,
+            temperature_c: temperatures.map(|temperatures| temperatures.winding_c),
         };
         (measured, report.mode)
     }

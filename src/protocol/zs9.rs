@@ -20,6 +20,7 @@ use crate::machine::Ratings;
 use crate::nine_switch::Scheme;
 use crate::operator::{DualDemands, DualRequest, Levels, MotorRequest, Wanted};
 use crate::ports::DualReport;
+use crate::thermal::Temperatures;
 
 const KIND: Signal = Signal::number("page", 35, 1, 1);
 const TORQUES: [Signal; 2] = [
@@ -316,7 +317,11 @@ impl MessageSet for Zs9 {
         }
     }
 
-    fn observed(report: Option<&DualReport>, ratings: &Ratings) -> (Zs9Measured, Scheme) {
+    fn observed(
+        report: Option<&DualReport>,
+        _temperatures: Option<&Temperatures>,
+        ratings: &Ratings,
+    ) -> (Zs9Measured, Scheme) {
         let Some(report) = report else {
             return (Zs9Measured::default(), Scheme::default());
         };

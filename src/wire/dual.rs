@@ -1,6 +1,6 @@
 //! The ZS9's blocks: the same three streams and the same tags, other contents.
 
-use super::{Block, block, filled, line_from_words, line_to_words, told_from_words, told_to_words};
+use super::{Block, block, filled, line_from_words, line_to_words, told_from_words, told_to_block};
 use crate::cell::Words;
 use crate::control::Demand;
 use crate::frames::{Abc, Angle};
@@ -75,7 +75,7 @@ impl DualRequest {
             Self::End => block(9, Instant(0), &[]),
             Self::Leave(at) => block(10, *at, &[]),
             Self::Ask(at) => block(11, *at, &[]),
-            Self::Tell(from, status, frame) => block(12, *from, &told_to_words(status, *frame)),
+            Self::Tell(from, status, frame) => told_to_block(*from, status, *frame),
         }
     }
 
@@ -141,8 +141,8 @@ pub fn dual_asked_to_block(feedback: &Feedback, frame: Option<Frame>) -> Block {
 
 /// The inverse of [`dual_asked_to_block`].
 pub fn dual_asked_from_block(block: &Block) -> (Feedback, Option<Frame>) {
-    let [a, b, c, d, head, low, high, ..] = *block;
-    (Feedback::from_words([a, b, c, d]), Option::from_words([head, low, high]))
+    let [a, b, c, d, e, head, low, high, ..] = *block;
+    (Feedback::from_words([a, b, c, d, e]), Option::from_words([head, low, high]))
 }
 
 /// The answer to [`DualRequest::ControlSample`], with the rig's command; `stop` ends the run.
@@ -321,6 +321,7 @@ mod tests {
             refusals: 1,
             torque_nm: command().demands,
             switches: Switches { main: true, ..Switches::default() },
+            temperatures: None,
         };
         let record = DualRecord {
             at: Instant(12),

@@ -7,5 +7,6 @@ mod line_gap;
 mod properties;
 mod ramp;
 mod refusals;
+mod temperatures;
 mod transitions;
 mod world;

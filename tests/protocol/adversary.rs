@@ -237,8 +237,15 @@ fn a_flood_of_requests_moves_no_telemetry() {
         let (mut session, mut stream) = (Session::new(&BUILT_IN.ratings), Stream::of(&PARAMETER_REQUEST));
         let read = ParameterRequest { parameter: 3, write: None }.encode().unwrap();
         let switches = Switches::default();
-        let status =
-            Status { state: State::Ready, trip: None, refusal: None, refusals: 0, torque_nm: 0.0, switches };
+        let status = Status {
+            state: State::Ready,
+            trip: None,
+            refusal: None,
+            refusals: 0,
+            torque_nm: 0.0,
+            switches,
+            temperatures: None,
+        };
         let told = Told { status: &status, measured: &Measured::default(), mode: Mode::Off };
         let mut sent = Vec::new();
         for ms in 0..1_000 {

@@ -8,14 +8,15 @@ use tractive::protection::{Fault, SafeState, Trip};
 use tractive::protocol::{
     COMMAND, COUNTERS, Command, Counts, FAULT_LIMIT, FAULT_VALUE, FROM_DRIVE, Frame, LIMITS, LINK_LIMITS,
     LinkLimits, Listening, MOTION, Measured, Outcome, PARAMETER_ANSWER, PARAMETER_REQUEST, PARAMETERS,
-    ParameterAnswer, ParameterRequest, Payload, STATUS, Scales, Session, StatusFrame, Told, TorqueLimits,
-    trip_number,
+    ParameterAnswer, ParameterRequest, Payload, STATUS, Scales, Session, StatusFrame, TEMPERATURES,
+    TemperaturesFrame, Told, TorqueLimits, trip_number,
 };
+use tractive::thermal::Temperatures;
 use tractive::time::Instant;
 
 fn status(state: State) -> Status {
     let switches = Switches::default();
-    Status { state, trip: None, refusal: None, refusals: 0, torque_nm: 0.0, switches }
+    Status { state, trip: None, refusal: None, refusals: 0, torque_nm: 0.0, switches, temperatures: None }
 }
 
 struct Bench {
@@ -219,6 +220,7 @@ fn every_message_comes_with_its_period_protected_and_in_order() {
         safe: SafeState::GatesOff,
     };
     bench.status.trip = Some(trip);
+    bench.status.temperatures = Some(TEMPERATURES_TOLD);
     let mut last = vec![None; FROM_DRIVE.len()];
     let mut counters = vec![None; FROM_DRIVE.len()];
     bench.sent.clear();
@@ -241,11 +243,39 @@ fn every_message_comes_with_its_period_protected_and_in_order() {
             assert_eq!(trip_number(payload), (Fault::Overcurrent as u8, Some(512.5)));
         } else if message.id == FAULT_LIMIT.id {
             assert_eq!(trip_number(payload), (Fault::Overcurrent as u8, Some(450.0)));
+        } else if message.id == TEMPERATURES.id {
+            assert_eq!(
+                TemperaturesFrame::decode(payload),
+                TemperaturesFrame {
+                    winding_c: Some(141.5),
+                    heat_sink_c: Some(-12.0),
+                    junction_c: Some(88.0),
+                    magnets_c: None,
+                    torque_share_percent: Some(92.5),
+                }
+            );
         }
     }
     let missing: Vec<_> =
         FROM_DRIVE.iter().zip(&last).filter(|(_, at)| at.is_none()).map(|(m, _)| m.name).collect();
     assert_eq!(missing, [PARAMETER_ANSWER.name], "which nobody asked for");
+}
+
+/// Temperatures of a winding in derating and cold devices.
+const TEMPERATURES_TOLD: Temperatures = Temperatures {
+    winding_c: 141.4,
+    heat_sink_c: -12.1,
+    junction_c: 87.9,
+    magnets_c: None,
+    torque_share: 0.926,
+};
+
+#[test]
+fn a_drive_without_temperature_sensors_sends_no_temperatures() {
+    let mut bench = Bench::armed();
+    bench.sent.clear();
+    bench.silence(500);
+    assert!(bench.sent.len() > 200 && bench.sent.iter().all(|frame| frame.id != TEMPERATURES.id));
 }
 
 #[test]

@@ -129,6 +129,7 @@ fn the_telemetry_says_what_is_measured() {
         refusals: 0,
         torque_nm: tractive::ports::DualDriveCommand::NONE.demands,
         switches: Switches { main: true, ..Switches::default() },
+        temperatures: None,
     };
     let (mut measured, mut told) = (Zs9Measured::default(), None);
     for _ in 0..10 {

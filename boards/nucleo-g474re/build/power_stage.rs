@@ -7,6 +7,7 @@ use serde::Deserialize;
 use std::path::Path;
 use tractive::configuration::{LATEST_ANGLE_S, Refused};
 use tractive::machine::Tables;
+use tractive::thermal::{Derating, DeviceLosses, Element, Magnets, Rise, Sensor, Thermal};
 use tractive_tablegen::InputError;
 
 /// Codes of the 12-bit converters.
@@ -53,6 +54,7 @@ struct Keys {
     z_source: Option<ZSource>,
     absolute: Option<Absolute>,
     resolver: Option<Resolver>,
+    thermal: Option<ThermalKeys>,
 }
 
 /// An absolute encoder in the place of one that counts.
@@ -73,10 +75,93 @@ struct Resolver {
 }
 
 /// The position sensor of a stage.
-enum Sensor {
+enum PositionSensor {
     Encoder,
     Absolute(Absolute),
     Resolver(Resolver),
+}
+
+/// The keys of temperature sensors and thermal data.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ThermalKeys {
+    winding_sensor: SensorKeys,
+    heat_sink_sensor: SensorKeys,
+    winding: RiseKeys,
+    junction: RiseKeys,
+    losses: LossKeys,
+    winding_derating_c: [f32; 3],
+    junction_derating_c: [f32; 3],
+    magnets: Option<MagnetKeys>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SensorKeys {
+    ntc: Option<[f32; 2]>,
+    series_ohm: f32,
+    range_c: [f32; 2],
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RiseKeys {
+    k_per_w: f32,
+    time_s: f32,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct LossKeys {
+    threshold_v: f32,
+    slope_ohm: f32,
+    switching_share: f32,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct MagnetKeys {
+    per_k: f32,
+    map_c: f32,
+    derating_c: [f32; 2],
+}
+
+impl SensorKeys {
+    fn sensor(&self) -> Sensor {
+        let element =
+            self.ntc.map_or(Element::Pt1000, |[at_25_ohm, beta_k]| Element::Ntc { at_25_ohm, beta_k });
+        Sensor { element, series_ohm: self.series_ohm, range_c: self.range_c }
+    }
+}
+
+impl ThermalKeys {
+    fn thermal(&self, resistance_ohm: f32) -> Thermal {
+        let rise = |keys: &RiseKeys| Rise { k_per_w: keys.k_per_w, time_s: keys.time_s };
+        let LossKeys { threshold_v, slope_ohm, switching_share } = self.losses;
+        let (
+            [winding_from_c, winding_none_c, winding_trip_c],
+            [junction_from_c, junction_none_c, junction_trip_c],
+        ) = (self.winding_derating_c, self.junction_derating_c);
+        Thermal {
+            winding_sensor: self.winding_sensor.sensor(),
+            heat_sink_sensor: self.heat_sink_sensor.sensor(),
+            resistance_ohm,
+            winding: rise(&self.winding),
+            junction: rise(&self.junction),
+            losses: DeviceLosses { threshold_v, slope_ohm, switching_share },
+            winding_derating: Derating { from_c: winding_from_c, none_c: winding_none_c },
+            winding_trip_c,
+            junction_derating: Derating { from_c: junction_from_c, none_c: junction_none_c },
+            junction_trip_c,
+            magnets: self.magnets.as_ref().map(
+                |&MagnetKeys { per_k, map_c, derating_c: [from_c, none_c] }| Magnets {
+                    per_k,
+                    map_c,
+                    derating: Derating { from_c, none_c },
+                },
+            ),
+        }
+    }
 }
 
 /// The keys that the ZS9's stage has besides.
@@ -163,13 +248,15 @@ pub fn traction(file: &Path, text: &str, machine: &Machine) -> Result<String, In
     let Some(late_us) = stage.keys.angle_late_us else {
         return Err(stage.refuse("angle_late_us", "is missing".to_owned()));
     };
-    let latest_us = 1e6 * f64::from(LATEST_ANGLE_S);
-    let own_us = 1e6 * stage.sensor_age_s(control_hz)?;
-    let most_us = (latest_us - own_us).round();
+    let most_us = (1e6 * (f64::from(LATEST_ANGLE_S) - stage.sensor_age_s(control_hz)?)).round();
     stage.check(&[Bound("angle_late_us", late_us, 0.0, most_us, "made up for by the speed")])?;
     stage.check_sensors(machine, f64::from(ratings.trip_dc_over_v), "the machine's trip_dc_over_v", 1)?;
     settings.check(machine.tables).map_err(|refused| stage.refuse_start(machine, &refused))?;
-    stage.constant(control_hz, min_pulse_ns)
+    let thermal = stage.keys.thermal.as_ref().map(|keys| keys.thermal(ratings.stator_resistance_ohm));
+    if let Some(Err(refused)) = thermal.map(|thermal| thermal.check()) {
+        return Err(stage.refuse("thermal", refused.to_string()));
+    }
+    stage.constant(control_hz, min_pulse_ns, thermal)
 }
 
 /// Checks the ZS9's power stage; gives its constant as Rust.
@@ -201,6 +288,9 @@ pub fn zs9(file: &Path, text: &str, machine: &Machine) -> Result<String, InputEr
             stage.refuse("angle_late_us", "the control of two motors takes the angle as it is".to_owned())
         );
     }
+    if stage.keys.thermal.is_some() {
+        return Err(stage.refuse("thermal", "the ZS9 knows no temperatures".to_owned()));
+    }
     let Some(ZSource { inductor_range_a, source_range_v, link_ref_v }) = *z_source else {
         return Err(stage.refuse("z_source", "is missing".to_owned()));
     };
@@ -224,7 +314,7 @@ pub fn zs9(file: &Path, text: &str, machine: &Machine) -> Result<String, InputEr
          inductor_a_per_code: {inductor_range_a:?} / {HALF_CODES:?},\n    \
          source_v_per_code: {source_range_v:?} / {CODES:?},\n    link_ref_v: {link_ref_v:?},\n}}",
         // The modulator of the nine switches has no shortest pulse.
-        stage.constant(zs9_rates::CONTROL_HZ, 0)?,
+        stage.constant(zs9_rates::CONTROL_HZ, 0, None)?,
         zeros.join(", "),
     ))
 }
@@ -237,15 +327,15 @@ pub fn sensor(file: &Path, text: &str, machine: &Machine) -> Result<String, Inpu
     let stage = Stage::parse(file, text)?;
     let control_hz = stage.keys.control_hz.unwrap_or(rates::CORE_HZ);
     let kind = match stage.sensor()? {
-        Sensor::Encoder => "Encoder".to_owned(),
-        Sensor::Absolute(Absolute { bits, gray }) => {
+        PositionSensor::Encoder => "Encoder".to_owned(),
+        PositionSensor::Absolute(Absolute { bits, gray }) => {
             stage.check(&[
                 Bound("bits", f64::from(bits), 8.0, 24.0, "of one turn"),
                 Bound("control_hz", f64::from(control_hz), 0.0, f64::from(ABSOLUTE_HZ), "a frame and a rest"),
             ])?;
             format!("Absolute<{bits}, {gray}>")
         }
-        Sensor::Resolver(Resolver { pole_pairs, amplitude_v, lag_us }) => {
+        PositionSensor::Resolver(Resolver { pole_pairs, amplitude_v, lag_us }) => {
             let period_us = 1e6 / f64::from(control_hz);
             let [least_hz, most_hz] = RESOLVER_HZ.map(f64::from);
             let machine_pairs = f64::from(machine.tables.ratings.pole_pairs);
@@ -283,12 +373,12 @@ pub fn sensor(file: &Path, text: &str, machine: &Machine) -> Result<String, Inpu
 
 impl<'a> Stage<'a> {
     /// The sensor that the file names: one, and counts for an encoder alone.
-    fn sensor(&self) -> Result<Sensor, InputError> {
+    fn sensor(&self) -> Result<PositionSensor, InputError> {
         let Keys { encoder_counts, absolute, resolver, .. } = self.keys;
         match (encoder_counts, absolute, resolver) {
-            (Some(_), None, None) => Ok(Sensor::Encoder),
-            (None, Some(absolute), None) => Ok(Sensor::Absolute(absolute)),
-            (None, None, Some(resolver)) => Ok(Sensor::Resolver(resolver)),
+            (Some(_), None, None) => Ok(PositionSensor::Encoder),
+            (None, Some(absolute), None) => Ok(PositionSensor::Absolute(absolute)),
+            (None, None, Some(resolver)) => Ok(PositionSensor::Resolver(resolver)),
             (None, None, None) => Err(self.refuse("encoder_counts", "is missing".to_owned())),
             _ => Err(self.refuse("encoder_counts", "one of encoder_counts, absolute, resolver".to_owned())),
         }
@@ -297,18 +387,18 @@ impl<'a> Stage<'a> {
     /// Counts in a turn of the shaft; of a resolver so many that none is noticed.
     fn sensor_counts(&self) -> Result<u32, InputError> {
         Ok(match self.sensor()? {
-            Sensor::Encoder => self.keys.encoder_counts.unwrap_or_default(),
-            Sensor::Absolute(Absolute { bits, .. }) => 1 << bits.min(24),
-            Sensor::Resolver(_) => 65_536,
+            PositionSensor::Encoder => self.keys.encoder_counts.unwrap_or_default(),
+            PositionSensor::Absolute(Absolute { bits, .. }) => 1 << bits.min(24),
+            PositionSensor::Resolver(_) => 65_536,
         })
     }
 
     /// Age of an angle by the way its sensor is read, in s.
     fn sensor_age_s(&self, control_hz: u32) -> Result<f64, InputError> {
         let periods = match self.sensor()? {
-            Sensor::Encoder => 0.0,
-            Sensor::Absolute(_) => 1.0,
-            Sensor::Resolver(_) => 0.5,
+            PositionSensor::Encoder => 0.0,
+            PositionSensor::Absolute(_) => 1.0,
+            PositionSensor::Resolver(_) => 0.5,
         };
         Ok(periods / f64::from(control_hz))
     }
@@ -432,7 +522,7 @@ impl<'a> Stage<'a> {
                 "what the converters hold with current_range_a",
             ),
         ])?;
-        if let Sensor::Encoder = self.sensor()? {
+        if let PositionSensor::Encoder = self.sensor()? {
             let counts = f64::from(self.sensor_counts()?);
             self.check(&[Bound("encoder_counts", counts, 4.0, 65_536.0, "what the timer counts")])?;
         }
@@ -460,7 +550,12 @@ impl<'a> Stage<'a> {
     }
 
     /// The constant's value as Rust.
-    fn constant(&self, control_hz: u32, min_pulse_ns: u32) -> Result<String, InputError> {
+    fn constant(
+        &self,
+        control_hz: u32,
+        min_pulse_ns: u32,
+        thermal: Option<Thermal>,
+    ) -> Result<String, InputError> {
         let Keys { dead_time_ns, current_range_a, zero_code, zero_tolerance, dc_link_range_v, .. } =
             self.keys;
         let Keys { break_current_a, precharge_s, discharge_s, behind_line_filter, .. } = self.keys;
@@ -476,7 +571,7 @@ impl<'a> Stage<'a> {
              break_current_a: {break_current_a:?},\n    encoder_counts: {encoder_counts},\n    encoder_zero: {zero},\n    \
              line: LineTimes {{ precharge_s: {precharge_s:?}, discharge_s: {discharge_s:?} }},\n    \
              behind_line_filter: {behind_line_filter},\n    \
-             angle_late_s: {angle_late_s:?},\n}}"
+             angle_late_s: {angle_late_s:?},\n    thermal: {thermal:?},\n}}"
         ))
     }
 }

@@ -5,7 +5,7 @@ use super::can::Can;
 use super::log::Log;
 use super::pins::{self, Pin};
 use super::position::PositionState;
-use super::power_stage::{CORE_HZ, POWER_STAGE};
+use super::power_stage::{CORE_HZ, POWER_STAGE, THERMAL};
 use super::registers::Registers;
 use super::serve::{Serve, Station};
 use super::start::{self, Found, Plan, StartError, Timeout, Wait};
@@ -172,7 +172,8 @@ pub fn idle(refused: Option<Violation>) -> ! {
 /// The same over another end of the protocol.
 pub fn idle_over(station: impl Station, refused: Option<Violation>) -> ! {
     let line = Line::rated(&BUILT_IN.ratings, POWER_STAGE.line.precharge_s, POWER_STAGE.line.discharge_s);
-    let rated = operator::Settings::rated(&BUILT_IN.ratings, slot_s(&CLOCK), Some(line));
+    let mut rated = operator::Settings::rated(&BUILT_IN.ratings, slot_s(&CLOCK), Some(line));
+    rated.thermal = THERMAL.as_ref();
     let mut serve = Serve::new(Registers::CHIP, Can::CHIP, station, &POSITION, Configuration::Good);
     let (mut slot, mut log) = (Slot::new(), Log::new());
     while let Some(why) = refused {

@@ -38,6 +38,7 @@ pub mod serve;
 pub mod start;
 pub mod start_error;
 pub mod switchgear;
+pub mod temperatures;
 pub mod wait;
 pub mod watchdog;
 pub mod zs9;

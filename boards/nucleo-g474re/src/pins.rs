@@ -59,7 +59,7 @@ pub(super) const fn pin(
 }
 
 /// Every pin the PMaSynRM's drive uses, but for those of its [position sensor](super::Position::PINS).
-pub const PINS: [Pin; 24] = [
+pub const PINS: [Pin; 26] = [
     pin(Port::A, 8, Function::Gate(6), &["TIM1_CH1"], "gate U, upper device"),
     pin(Port::B, 13, Function::Gate(6), &["TIM1_CH1N"], "gate U, lower device"),
     pin(Port::A, 10, Function::Gate(6), &["TIM1_CH3"], "gate V, upper device"),
@@ -75,6 +75,8 @@ pub const PINS: [Pin; 24] = [
     pin(Port::B, 11, Function::Analog, &["ADC2_IN14", "COMP6_INP"], "current of W"),
     pin(Port::B, 14, Function::Analog, &["ADC1_IN5", "COMP7_INP"], "current of W, the same wire"),
     pin(Port::C, 0, Function::Analog, &["ADC1_IN6"], "DC-link voltage"),
+    pin(Port::A, 0, Function::Analog, &["ADC1_IN1"], "winding's temperature sensor"),
+    pin(Port::C, 3, Function::Analog, &["ADC1_IN9"], "heat sink's temperature sensor"),
     pin(Port::C, 2, Function::Input, &[], "enable: high lets the gates pulse"),
     pin(Port::C, 8, Function::Switch, &[], "precharge relay, high closes"),
     pin(Port::C, 9, Function::Switch, &[], "main contactor, high closes"),

@@ -9,6 +9,10 @@ use tractive::drive::traction::Settings;
 use tractive::frames::Angle;
 use tractive::machine::Ratings;
 use tractive::operator::LineTimes;
+#[allow(unused_imports, reason = "a stage without temperature sensors has none of them")]
+use tractive::thermal::Element::{Ntc, Pt1000};
+#[allow(unused_imports, reason = "the same")]
+use tractive::thermal::{Derating, DeviceLosses, Magnets, Rise, Sensor, Thermal};
 use tractive::time::Clock;
 
 /// The power stage and its sensors.
@@ -41,10 +45,15 @@ pub struct PowerStage {
     pub behind_line_filter: bool,
     /// Age of the angle when it is read, in s, which the drive makes up for.
     pub angle_late_s: f32,
+    /// Temperature sensors, and how what they are on warms; `None`: there are none.
+    pub thermal: Option<Thermal>,
 }
 
 /// The PMaSynRM's, `power_stage.toml`, which the build script has checked against the machine.
 pub const POWER_STAGE: PowerStage = include!(concat!(env!("OUT_DIR"), "/power_stage.rs"));
+
+/// Its temperature sensors.
+pub static THERMAL: Option<Thermal> = POWER_STAGE.thermal;
 
 /// The PMaSynRM's clock, of both timers.
 pub const CLOCK: Clock = rates::clock(POWER_STAGE.control_hz);

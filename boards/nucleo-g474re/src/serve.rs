@@ -2,8 +2,10 @@
 
 use super::can::Can;
 use super::position::PositionState;
+use super::power_stage::THERMAL;
 use super::registers::Registers;
 use super::switchgear::Wires;
+use super::temperatures::TemperatureInputs;
 use super::{CLOCK, hardware, pins, switchgear};
 use tractive::drive::OperatorMailboxes;
 use tractive::experiment::{Memory, Teller};
@@ -31,6 +33,7 @@ pub struct Serve<'a, S = CanEndpoint> {
     /// Frames that have come since the last slot, and how many.
     inbox: [Frame; INBOX],
     waiting: usize,
+    temperatures: TemperatureInputs,
 }
 
 impl<'a, S> Serve<'a, S> {
@@ -43,7 +46,16 @@ impl<'a, S> Serve<'a, S> {
         configuration: Configuration,
     ) -> Self {
         let (inbox, waiting) = ([Frame::default(); INBOX], 0);
-        Self { registers, can, station, position, configuration, inbox, waiting }
+        Self {
+            registers,
+            can,
+            station,
+            position,
+            configuration,
+            inbox,
+            waiting,
+            temperatures: TemperatureInputs::default(),
+        }
     }
 
     /// The feedback that every board gives.
@@ -141,6 +153,7 @@ impl<S: Station> Serve<'_, S> {
             enable_input: pins::is_enabled(&self.registers),
             position_counted: self.position.is_counted(),
             hardware: hardware::held_by(&self.registers),
+            temperatures: self.temperatures.ratios(),
             ..self.common(&pins::SWITCHGEAR)
         }
     }
@@ -162,6 +175,9 @@ impl<S: Station> Serve<'_, S> {
 /// The switches at once: a slot earlier or later is nothing to a contactor, and the chopper's compare is preloaded.
 impl<S: Station> OperatorPort<TorqueDemand> for Serve<'_, S> {
     fn ask(&mut self, _at: Instant, slots: u32) -> (Request, Feedback) {
+        if THERMAL.is_some() {
+            self.temperatures.step(self.registers.adc1);
+        }
         let frames = self.hear();
         (self.station.listen(slots, frames), self.feedback())
     }

@@ -12,7 +12,7 @@ use super::registers::Registers;
 use super::sampling::{self, Sampler, Zeros};
 pub use super::start_error::StartError;
 pub use super::wait::{Timeout, Wait};
-use super::{CLOCK, PRESCALER, clock, switchgear, watchdog};
+use super::{CLOCK, PRESCALER, clock, switchgear, temperatures, watchdog};
 
 /// The length of the first carrier half, and the needs of the machine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -157,6 +157,7 @@ fn prepare_samplers(start: &mut Start) -> Result<(), StartError> {
     sampling::configure_clock(start.registers.adc12);
     let (control, pwm) = (control_sampler(start.registers), pwm_sampler(start.registers));
     control.prepare(start.wait)?;
+    temperatures::prepare(control.adc);
     pwm.prepare(start.wait)?;
     start.found.control_zeros = control.zeros(start.stage, start.wait)?;
     start.found.pwm_zeros = pwm.zeros(start.stage, start.wait)?;

@@ -357,3 +357,46 @@ fn a_machine_that_the_image_would_refuse_is_not_built() {
         );
     }
 }
+
+/// Temperature sensors and thermal data as the guide has them.
+fn thermal() -> String {
+    let guide = include_str!("../../../docs/nucleo-g474re.md");
+    let (_, from) = guide.split_once("```toml\n[thermal]").expect("a table");
+    let (keys, _) = from.split_once("```").expect("its end");
+    format!("{}\n[thermal]{keys}", TRACTION.text)
+}
+
+#[test]
+fn temperature_sensors_are_taken_as_the_guide_has_them() {
+    let none = TRACTION.check(TRACTION.text, TRACTION.tables).unwrap();
+    assert!(none.contains("thermal: None,"), "{none}");
+    let some = TRACTION.check(&thermal(), TRACTION.tables).unwrap();
+    for part in [
+        "thermal: Some(Thermal { winding_sensor: Sensor { element: Pt1000, series_ohm: 1000.0, range_c: [-40.0, 220.0] }",
+        "element: Ntc { at_25_ohm: 10000.0, beta_k: 3435.0 }",
+        "resistance_ohm: 0.1,",
+        "winding_derating: Derating { from_c: 140.0, none_c: 160.0 }, winding_trip_c: 175.0",
+        "magnets: Some(Magnets { per_k: -0.001, map_c: 20.0,",
+    ] {
+        assert!(some.contains(part), "{part}: {some}");
+    }
+}
+
+#[test]
+fn thermal_data_that_makes_no_sense_are_refused_by_name() {
+    let text = thermal();
+    for (good, bad, name) in [
+        ("[140.0, 160.0, 175.0]", "[140.0, 160.0, 150.0]", "thermal.winding_trip_c"),
+        ("[140.0, 160.0, 175.0]", "[170.0, 160.0, 175.0]", "thermal.derating.from_c"),
+        ("series_ohm = 1000.0", "series_ohm = 0.0", "thermal.sensor.series_ohm"),
+        ("[10000.0, 3435.0]", "[10000.0, 0.0]", "thermal.sensor.beta_k"),
+        ("series_ohm = 1000.0", "serial_ohm = 1000.0", "serial_ohm"),
+    ] {
+        assert!(text.contains(good), "{good}");
+        let said = TRACTION.check(&text.replacen(good, bad, 1), TRACTION.tables).expect_err(bad);
+        assert!(said.contains(name), "{said}");
+    }
+    let (_, keys) = text.split_once("[thermal]").unwrap();
+    let said = ZS9.check(&format!("{}\n[thermal]{keys}", ZS9.text), ZS9.tables).expect_err("of the ZS9");
+    assert!(said.contains("the ZS9 knows no temperatures"), "{said}");
+}

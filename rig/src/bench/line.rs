@@ -1,11 +1,13 @@
 //! The line side in the timers' time: contactors, a chopper that switches, and whoever commands the drive.
 
+use super::switchgear::Held;
 use super::{Switchgear, Tick};
-use crate::plant::{DcLink, DcLinkSettings, LinkEnergies, LinkSwitches};
+use crate::plant::{DcLink, DcLinkSettings, Heat, LinkEnergies, LinkSwitches, Plant};
 use crate::steps::held;
 use crate::trace::{LinkBalance, SlotRow};
 use tractive::operator::{Feedback, Request, Status, Switches};
 use tractive::protection::Fault;
+use tractive::thermal::Ratios;
 use tractive::time::Clock;
 
 /// The sender of commands: the request at `t_s` seconds after the recording begins.
@@ -27,6 +29,8 @@ pub struct LinePlan {
     pub reversible: Vec<(f64, bool)>,
     /// The times (s) from which on the source is there, or is not: gaps in the line.
     pub live: Vec<(f64, bool)>,
+    /// The warmth of machine and inverter, with its sensors; `None`: they stay as they are, and there are no sensors.
+    pub heat: Option<Heat>,
 }
 
 impl LinePlan {
@@ -40,6 +44,7 @@ impl LinePlan {
             chopper_ohm: Vec::new(),
             reversible: Vec::new(),
             live: Vec::new(),
+            heat: None,
         }
     }
 }
@@ -115,8 +120,23 @@ impl LineSide {
     /// A control sample at `now`, `t_s`, with the rotor's angle known or not: the first of every millisecond begins a slot. Returns whether the operator has fallen behind.
     pub fn sampled(&mut self, now: Tick, t_s: f64, position_known: bool) -> bool {
         let hardware = self.hardware(t_s);
+        let temperatures = self.plan.heat.as_ref().map_or(Ratios::default(), |heat| heat.ratios(t_s));
         let Self { gear, plan, .. } = self;
-        gear.sampled(now, hardware, position_known, || (plan.commander)(t_s))
+        let held = Held { hardware, position_known, temperatures };
+        gear.sampled(now, held, || (plan.commander)(t_s))
+    }
+
+    /// Warms machine and inverter by the losses of `dt_s`, where they do; the machine's resistance and magnets follow.
+    pub fn warm(&mut self, plant: &mut Plant, dt_s: f64) {
+        let udc_v = self.link.udc_v;
+        if let Some(heat) = &mut self.plan.heat {
+            heat.step(plant, udc_v, dt_s);
+        }
+    }
+
+    /// The warmth of machine and inverter.
+    pub fn heat(&self) -> Option<&Heat> {
+        self.plan.heat.as_ref()
     }
 
     /// The request in the slot that began at `tick`, and the board's feedback.

@@ -38,13 +38,13 @@ pub use sampling::Sampled;
 pub use sensors::{Converter, Flaws, Sensors};
 pub use settings::{Operator, Settings};
 pub use simulated::Simulated;
-pub use switchgear::Switchgear;
+pub use switchgear::{Held, Switchgear};
 pub use time::Timeline;
 pub use wiring::Wiring;
 
 use crate::inject::Injection;
 use crate::inject::traction::{Kind, Spoiler};
-use crate::plant::Plant;
+use crate::plant::{Heat, Plant};
 use crate::trace::{Extremes, Found, Row, SlotRow, Switch};
 use dc_side::DcSide;
 use rows::Rows;
@@ -178,6 +178,11 @@ impl Bench {
             line.tell(tick, status);
         }
         Ok(())
+    }
+
+    /// The warmth of machine and inverter, where the line side's plan has it.
+    pub fn heat(&self) -> Option<&Heat> {
+        self.dc.operated().and_then(LineSide::heat)
     }
 
     /// The trace so far.

@@ -87,6 +87,10 @@ impl Bench {
         let (now, t_s) = (self.time.now, self.time.now_s());
         let has_control = self.spoiler.injected.has_control(t_s);
         self.control.begin(&self.time, has_control)?;
+        let period_s = f64::from(self.clock.control_s());
+        if let Some(line) = self.dc.operated_mut() {
+            line.warm(&mut self.plant, period_s);
+        }
         let (demand, enable) = self.operator.demand(t_s);
         let (true_a, position) = self.sensors.measure(&self.plant.motor, t_s);
         let hardware = self.dc.operated().and_then(|line| line.hardware(t_s));

@@ -5,6 +5,7 @@ use std::collections::VecDeque;
 use tractive::frames::Abc;
 use tractive::operator::{Configuration, Feedback, Status};
 use tractive::protection::Fault;
+use tractive::thermal::Ratios;
 use tractive::time::Clock;
 
 /// Time in which a contactor closes, and opens, in s.
@@ -33,6 +34,16 @@ impl Contactor {
             (self.closed, self.moves) = (self.told, None);
         }
     }
+}
+
+/// The rest of the board's feedback.
+pub struct Held {
+    /// The cause that holds the gates off in hardware.
+    pub hardware: Option<Fault>,
+    /// `true` if the rotor's angle is known.
+    pub position_known: bool,
+    /// The temperature sensors' voltages.
+    pub temperatures: Ratios,
 }
 
 /// Contactors and slots; `A` is what is asked besides the board's word, `T` what is told of the demands.
@@ -73,13 +84,12 @@ impl<A, T: Copy> Switchgear<A, T> {
         self.main.closed
     }
 
-    /// A control sample at `now`, with what holds the gates off in hardware and whether the rotor's angle is known: the first of every millisecond begins a slot, in which this is
+    /// A control sample at `now`, with what the board sees beside contactors: the first of every millisecond begins a slot, in which this is
     /// asked. Returns whether the operator has fallen behind.
     pub fn sampled(
         &mut self,
         now: Tick,
-        hardware: Option<Fault>,
-        position_known: bool,
+        Held { hardware, position_known, temperatures }: Held,
         ask: impl FnOnce() -> A,
     ) -> bool {
         let begins = self.samples.is_multiple_of(self.slot_samples);
@@ -97,6 +107,7 @@ impl<A, T: Copy> Switchgear<A, T> {
                 configuration: Configuration::Good,
                 parameters_open: false,
                 hardware,
+                temperatures,
             };
             self.asked.push_back((now, ask(), feedback));
         }

@@ -14,6 +14,7 @@ mod runge_kutta;
 mod speed;
 mod stator;
 pub mod stopwatch;
+mod thermal;
 mod vector;
 pub mod zs9;
 
@@ -25,6 +26,7 @@ pub use motor::{Motor, MotorEnergies};
 pub use rotor::{Rotor, Turning};
 pub use speed::{SpeedSource, profile_speed};
 pub use stator::{Stator, StatorSlopes};
+pub use thermal::{Heat, HeatSettings, Node, Wire, Wired};
 pub use vector::Vector;
 
 use legs::{Clamp, LONGEST_STEP_S};
@@ -86,6 +88,11 @@ impl Plant {
     /// Has the machine's true resistance be another multiple of its rating, from 0. Currents stay as they are.
     pub fn set_resistance_scale(&mut self, scale: f64) {
         self.motor.stator.set_resistance_scale(scale);
+    }
+
+    /// Has the machine's magnets have another multiple of their flux linkage, from 0. Currents stay as they are.
+    pub fn set_magnet_scale(&mut self, scale: f64) {
+        self.motor.stator.set_magnet_scale(scale);
     }
 
     /// Lets time pass with the legs unchanged.

@@ -9,6 +9,8 @@ use tractive_tablegen::{FluxMap, FluxPoint, MachineFolder, SmoothMap};
 pub struct Stator {
     flux: Flux,
     scale: f64,
+    /// Flux linkage of the magnets that warmth has taken, in Wb.
+    lost_wb: f64,
     /// Pole pairs.
     pub pole_pairs: f64,
     rated_ohm: f64,
@@ -67,6 +69,7 @@ impl Stator {
         Self {
             flux,
             scale: settings.flux_scale,
+            lost_wb: 0.0,
             slots_wb: settings.slots_share / SLOT_ORDER * magnet_wb,
             pole_pairs: f64::from(parameters.pole_pairs),
             rated_ohm: parameters.stator_resistance_ohm,
@@ -82,6 +85,11 @@ impl Stator {
     /// Has the true resistance be another multiple of the rating. Currents stay.
     pub(super) fn set_resistance_scale(&mut self, scale: f64) {
         self.resistance_ohm = self.rated_ohm * scale;
+    }
+
+    /// Has the magnets have another multiple of their flux linkage; the iron's stays. So do the currents.
+    pub(super) fn set_magnet_scale(&mut self, scale: f64) {
+        self.lost_wb = (1.0 - scale) * self.scale * self.flux.magnet_wb();
     }
 
     /// True flux linkage over the map's.
@@ -105,7 +113,7 @@ impl Stator {
             },
         };
         FluxPoint {
-            psi_d_wb: flux.psi_d_wb * scale,
+            psi_d_wb: flux.psi_d_wb * scale - self.lost_wb,
             psi_q_wb: flux.psi_q_wb * scale,
             ldd_h: flux.ldd_h * scale,
             ldq_h: flux.ldq_h * scale,

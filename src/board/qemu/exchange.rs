@@ -173,7 +173,7 @@ pub fn ask(at: Instant) -> (operator::Request, Feedback, Option<Frame>) {
 /// The operator's status, and the frame that carries it.
 #[inline(never)]
 pub fn tell(from: Instant, status: &Status, frame: Option<Frame>) {
-    send(&Request::Tell(from, *status, frame).to_block());
+    send(&wire::told_to_block(from, status, frame));
 }
 
 /// The processor stops, gates off.

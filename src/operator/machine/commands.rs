@@ -98,7 +98,7 @@ impl<D: Demands> Operator<D> {
         input: &Situation,
         settings: &Settings,
     ) -> Option<Refusal> {
-        let Situation { observed, feedback } = *input;
+        let Situation { observed, feedback, .. } = *input;
         match self.phase {
             Phase::Init | Phase::SelfTest { .. } => return Some(Refusal::NotReady),
             Phase::Fault { .. } => return Some(Refusal::FaultNotAcknowledged),

@@ -63,7 +63,7 @@ pub struct Measured {
     pub voltage_v: Option<f32>,
     /// Stator frequency, in Hz, negative backward.
     pub frequency_hz: Option<f32>,
-    /// Temperature, in °C.
+    /// The winding's hottest place, in °C.
     pub temperature_c: Option<f32>,
 }
 

@@ -11,6 +11,7 @@ mod pins;
 mod ports;
 mod position;
 mod start;
+mod temperatures;
 mod zs9;
 
 use nucleo_g474re::CLOCK;

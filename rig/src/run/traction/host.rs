@@ -15,6 +15,7 @@ use tractive::ports::{ControlPort, DriveCommand, PwmPort, Report, Sample};
 use tractive::protection::{LegFaults, MaskedFaults, SafeState, Trip};
 use tractive::protocol::CanEndpoint;
 use tractive::recorder::Recorder;
+use tractive::thermal::Thermal;
 use tractive::time::{Clock, Instant};
 
 /// The bench behind a board's ports; the first error ends the run.
@@ -214,6 +215,12 @@ impl<'a, L: ControlLaw> Tasks<'a, L> {
     /// The same with an operator who switches the line side, if the bench has one to ask.
     pub fn operated_on(mut self, line: Option<Line>) -> Self {
         self.operator.line = line;
+        self
+    }
+
+    /// The same with an operator that knows temperature sensors, and how what they are on warms.
+    pub fn warmed_by(mut self, thermal: Option<&'static Thermal>) -> Self {
+        self.operator.thermal = thermal;
         self
     }
 

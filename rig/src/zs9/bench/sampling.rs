@@ -1,10 +1,12 @@
 //! The samples for the drive's interrupts, and the reports of control.
 
 use super::{Bench, BenchError};
+use crate::bench::Held;
 use crate::inject::zs9::Kind;
 use crate::steps::held;
 use tractive::frames::Abc;
 use tractive::ports::{DualDriveCommand, DualReport, DualSample, HardwareBreak, PowerSample};
+use tractive::thermal::Ratios;
 use tractive::time::Instant;
 
 /// The error of a current's reading that makes no difference which counts, in A: a tenth of a machine's largest current.
@@ -85,7 +87,8 @@ impl Bench {
             None => self.plant.source_v = source_v,
             Some(line) => {
                 // Without the control interrupt nobody looks at slots.
-                if has_control && line.gear.sampled(self.time.tick(), hardware, true, || ()) {
+                let held = Held { hardware, position_known: true, temperatures: Ratios::default() };
+                if has_control && line.gear.sampled(self.time.tick(), held, || ()) {
                     return Err(BenchError::OperatorLate(t_s));
                 }
             }

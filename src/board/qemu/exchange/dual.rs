@@ -94,7 +94,7 @@ pub fn ask_dual(at: Instant) -> (Feedback, Option<Frame>) {
 /// The operator's status, and the frame that carries it.
 #[inline(never)]
 pub fn tell_dual(from: Instant, status: &DualStatus, frame: Option<Frame>) {
-    send(&DualRequest::Tell(from, *status, frame).to_block());
+    send(&wire::told_to_block(from, status, frame));
 }
 
 /// The processor stops, gates off.
