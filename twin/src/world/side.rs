@@ -204,6 +204,7 @@ fn status(heard: &Listener) -> Option<Status> {
             discharge: on("discharge"),
             chopper: number("chopper_percent") / 100.0,
         },
+        temperatures: None,
     })
 }
 
