@@ -66,7 +66,7 @@ impl<const BITS: u32, const GRAY: bool> Position for Absolute<BITS, GRAY> {
 }
 
 impl<const BITS: u32, const GRAY: bool> Absolute<BITS, GRAY> {
-    /// What came of a frame's two words. Without both of them its first bit is low, which is no frame.
+    /// The bits that came of a frame's two words. Without both of them its first bit is low, which is no frame.
     #[inline]
     fn take(&self) -> u32 {
         let came = |frame| match self.spi.sr().read().rxne() {
@@ -97,7 +97,7 @@ fn of_gray(code: u32) -> u32 {
 mod tests {
     use super::*;
 
-    /// What an encoder shifts out.
+    /// The frame that an encoder shifts out.
     fn frame(position: u32, bits: u32, gray: bool) -> u32 {
         let code = if gray { position ^ position >> 1 } else { position };
         1 << 31 | code << (31 - bits)
