@@ -7,7 +7,7 @@ use super::Fault;
 pub struct MaskedFaults {
     /// A bit for each fault's discriminant.
     #[cfg(not(target_os = "none"))]
-    faults: u32,
+    faults: u64,
 }
 
 impl MaskedFaults {
@@ -32,5 +32,19 @@ impl MaskedFaults {
     #[cfg(target_os = "none")]
     pub(crate) const fn has(&self, _fault: Fault) -> bool {
         false
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_check_that_is_off_is_no_others() {
+        for off in Fault::ALL {
+            let masked = MaskedFaults::of(off);
+            assert!(Fault::ALL.into_iter().all(|fault| masked.has(fault) == (fault == off)), "{off:?}");
+            assert!(!MaskedFaults::NONE.has(off));
+        }
     }
 }
