@@ -1,5 +1,6 @@
 //! The settings of the operator's step.
 
+use super::TrainLimits;
 use crate::machine::Ratings;
 
 /// Time constants of the line side.
@@ -108,6 +109,8 @@ pub struct Settings<'a> {
     pub jerk_nm_s2: f32,
     /// Contactors and resistors; `None`: the link is alive by itself.
     pub line: Option<Line>,
+    /// Limits of line and acceleration.
+    pub train: TrainLimits,
 }
 
 /// The demand's slew rate as a share of the drive's.
@@ -119,6 +122,6 @@ impl<'a> Settings<'a> {
     /// The usual ones for a machine.
     pub const fn rated(ratings: &'a Ratings, slot_s: f32, line: Option<Line>) -> Self {
         let slew_nm_s = SLEW_SHARE * ratings.torque_slew_nm_s;
-        Self { ratings, slot_s, slew_nm_s, jerk_nm_s2: slew_nm_s / JERK_S, line }
+        Self { ratings, slot_s, slew_nm_s, jerk_nm_s2: slew_nm_s / JERK_S, line, train: TrainLimits::NONE }
     }
 }

@@ -15,6 +15,7 @@ mod speed;
 mod stator;
 pub mod stopwatch;
 mod vector;
+mod wheel;
 pub mod zs9;
 
 pub use dc_link::{DcLink, DcLinkSettings, LinkEnergies, LinkSwitches, Source};
@@ -26,6 +27,7 @@ pub use rotor::{Rotor, Turning};
 pub use speed::{SpeedSource, profile_speed};
 pub use stator::{Stator, StatorSlopes};
 pub use vector::Vector;
+pub use wheel::Wheel;
 
 use legs::{Clamp, LONGEST_STEP_S};
 use runge_kutta::{along, rotated};
