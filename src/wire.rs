@@ -14,7 +14,7 @@ use crate::drive::{half_from_words, half_to_words};
 use crate::frames::{Abc, Angle};
 use crate::identification::Observation;
 use crate::modulation::CarrierHalf;
-use crate::operator::{self, Feedback, LineTimes, Status, Told};
+use crate::operator::{self, Feedback, LineTimes, Status, Told, TrainLimits};
 use crate::ports::{DriveCommand, Report, Sample};
 use crate::protection::{Fault, SafeState};
 use crate::protocol::Frame;
@@ -57,6 +57,8 @@ pub struct Setup {
     pub angle_late_s: f32,
     /// Step of a count of the angle, electrical, in rad; 0: none.
     pub angle_step_rad: f32,
+    /// The operator's limits of line and acceleration; over the protocol the parameters hold.
+    pub train: TrainLimits,
 }
 
 /// From the firmware to the rig.
@@ -177,15 +179,12 @@ impl Request {
 /// The answer to [`Request::Hello`].
 pub fn setup_to_block(setup: Setup) -> Block {
     let ticks = [setup.min_pulse_ticks, setup.dead_time_ticks, setup.pwm_delay_ticks];
-    let flags = [
-        setup.over_protocol.into(),
-        u32::from(setup.uncompensated) | u32::from(setup.behind_line_filter) << 1,
-    ];
-    filled(ticks.into_iter().chain(line_to_words(setup.line)).chain(flags).chain([
-        setup.control_ticks,
-        setup.angle_late_s.to_bits(),
-        setup.angle_step_rad.to_bits(),
-    ]))
+    let flags = u32::from(setup.over_protocol)
+        | u32::from(setup.uncompensated) << 1
+        | u32::from(setup.behind_line_filter) << 2;
+    let more = [flags, setup.control_ticks, setup.angle_late_s.to_bits(), setup.angle_step_rad.to_bits()];
+    let line = line_to_words(setup.line);
+    filled(ticks.into_iter().chain(line).chain(more).chain(setup.train.to_words()))
 }
 
 /// The same, with where MTPA starts, for the image with the papers' ordinary law.
@@ -232,7 +231,7 @@ fn told_from_words<T: Told>(words: [u32; 14]) -> Option<(Status<T>, Option<Frame
 /// The inverse of [`setup_to_block`].
 pub fn setup_from_block(block: &Block) -> Setup {
     let [min_pulse_ticks, dead_time_ticks, pwm_delay_ticks, ..] = *block;
-    let [_, _, _, operated, precharge, discharge, frames, gains, control_ticks, late, step, ..] = *block;
+    let [_, _, _, operated, precharge, discharge, flags, control_ticks, late, step, train @ .., _] = *block;
     let line = line_from_words([operated, precharge, discharge]);
     Setup {
         control_ticks,
@@ -240,11 +239,12 @@ pub fn setup_from_block(block: &Block) -> Setup {
         dead_time_ticks,
         pwm_delay_ticks,
         line,
-        over_protocol: frames != 0,
-        uncompensated: gains & 1 != 0,
-        behind_line_filter: gains & 2 != 0,
+        over_protocol: flags & 1 != 0,
+        uncompensated: flags & 2 != 0,
+        behind_line_filter: flags & 4 != 0,
         angle_late_s: f32::from_bits(late),
         angle_step_rad: f32::from_bits(step),
+        train: TrainLimits::from_words(train),
     }
 }
 

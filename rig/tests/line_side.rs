@@ -58,6 +58,32 @@ fn a_line_that_is_lost_for_a_while_is_waited_for() {
     }
 }
 
+/// The line's current and power within 2 % of their limits, and used: on a line of nominal, sagged and highest voltage, of the other machine.
+#[test]
+fn line_current_and_line_power_keep_their_limits() {
+    for line in [
+        "line-limits",
+        "line-limits --udc 1200",
+        "line-limits --udc 1800 --line 1,8,10",
+        "line-limits --rs-error 50 --dead-time-us 5 --adc-bits 12 --noise-a 0.5",
+        "line-limits --machine pmsm-48v-1kw",
+    ] {
+        assert!(keeps_all(line).trip().is_none(), "{line}");
+    }
+}
+
+/// Without the limit the wheel runs away, 20 % in 0.1 s, and the run says so; with it torque is reduced and comes back.
+#[test]
+fn a_wheel_that_loses_its_grip_is_caught() {
+    for line in ["wheel", "wheel --real", "wheel --encoder-lines 256", "wheel --machine pmsm-48v-1kw"] {
+        assert!(keeps_all(line).trip().is_none(), "{line}");
+    }
+    let (recording, short) = run("wheel --acceleration-limit 1e9");
+    assert!(recording.trip().is_none());
+    let rise = short.iter().find_map(|short| short.strip_prefix("change of speed in 0.1 s (share): "));
+    assert!(rise.is_some_and(|rise| rise.parse::<f64>().unwrap() > 0.2), "{short:?}");
+}
+
 #[test]
 fn a_gate_driver_that_fails_is_acknowledged() {
     assert!(keeps_all("acknowledge").trip().is_some());

@@ -38,7 +38,7 @@ fn same(scenario: &str, code: i32) {
     if code == 1 && !scenario.starts_with("zs9-") {
         files.push("recorder.csv");
     }
-    if ["precharge", "chopper", "acknowledge"].contains(&scenario) {
+    if ["precharge", "chopper", "acknowledge", "wheel"].contains(&scenario) {
         files.push("operator.csv");
     }
     for file in files {
@@ -166,6 +166,13 @@ fn nonsense_is_refused_by_name_before_anything_starts() {
 #[ignore = "needs the image and QEMU"]
 fn from_power_up_to_an_empty_link_is_the_same() {
     same("precharge", 0);
+}
+
+#[test]
+#[ignore = "needs the image and QEMU"]
+fn limits_of_line_and_rail_are_the_same() {
+    same("line-limits --udc 1200", 0);
+    same("wheel", 0);
 }
 
 #[test]

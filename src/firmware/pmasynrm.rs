@@ -66,7 +66,8 @@ fn main() -> ! {
     let first_half_ticks = devices.shortest_half_ticks.saturating_add(setup.pwm_delay_ticks);
     FIRST_HALF_TICKS.store(first_half_ticks, Ordering::Relaxed);
     let line = setup.line.map(|times| Line::rated(&BUILT_IN.ratings, times.precharge_s, times.discharge_s));
-    let operator = operator::Settings::rated(&BUILT_IN.ratings, slot_s(&clock), line);
+    let mut operator = operator::Settings::rated(&BUILT_IN.ratings, slot_s(&clock), line);
+    operator.train = setup.train;
     let station = setup.over_protocol.then_some(STATION);
     let (mut slot, mut idle) = (Slot::new(), law::Idle::new(station));
     qemu::start(first_half_ticks, clock.control_ticks);

@@ -1,5 +1,7 @@
 //! From a request to demands: its values checked, its torque within its limits, on its way to the drive.
 
+use super::grip::Grip;
+use super::line_limits::{Drawn, Most};
 use super::settings::Ends;
 use super::{Levels, Limits, MotorLimits, Ramp, Rates, Refusal, Request, Seen, Settings, Situation};
 use crate::control::{Demand, LinkWindow};
@@ -66,6 +68,8 @@ pub struct TorqueDemand {
     /// The share of them that the temperatures leave.
     share: f32,
     line: LineVoltage,
+    drawn: Drawn,
+    grip: Grip,
 }
 
 impl TorqueDemand {
@@ -73,6 +77,11 @@ impl TorqueDemand {
         let limits = self.limits.unwrap_or(Limits::rated(settings.ratings));
         let (motoring_nm, braking_nm) = (self.share * limits.motoring_nm, self.share * limits.braking_nm);
         Limits { motoring_nm, braking_nm, ..limits }
+    }
+
+    /// The torque demand, in N·m.
+    fn torque_nm(&self) -> f32 {
+        self.grip.share() * self.ramp.torque_nm()
     }
 }
 
@@ -82,7 +91,14 @@ impl Demands for TorqueDemand {
     type DriveCommand = DriveCommand;
     type Told = f32;
 
-    const AT_REST: Self = Self { ramp: Ramp::new(), limits: None, share: 1.0, line: LineVoltage::UNKNOWN };
+    const AT_REST: Self = Self {
+        ramp: Ramp::new(),
+        limits: None,
+        share: 1.0,
+        line: LineVoltage::UNKNOWN,
+        drawn: Drawn::UNKNOWN,
+        grip: Grip::FULL,
+    };
     const DERATES: bool = true;
 
     #[inline]
@@ -143,41 +159,45 @@ impl Demands for TorqueDemand {
 
     #[inline]
     fn drop(&mut self) {
-        self.ramp = Ramp::new();
-        self.line = LineVoltage::UNKNOWN;
+        *self = Self { limits: self.limits, share: self.share, ..Self::AT_REST };
     }
 
     #[inline]
     fn step(&mut self, request: Option<&Request>, report: &Report, settings: &Settings) {
         let ratings = settings.ratings;
+        let speed = report.omega / ratings.pole_pairs;
         let target_nm = match request {
             Some(request) => {
                 let Limits { motoring_nm, braking_nm, speed_rad_s, .. } = self.limits(settings);
                 let limits = MotorLimits { motoring_nm, braking_nm, speed_rad_s };
-                wanted_nm(request.torque_nm, report.omega / ratings.pole_pairs, &limits)
+                wanted_nm(request.torque_nm, speed, &limits)
             }
             None => 0.0,
         };
         self.line.step(report, settings.slot_s);
-        let most_nm = motoring_nm(report, &self.line.window(&self.limits(settings), ratings), ratings);
+        let link_nm = motoring_nm(report, &self.line.window(&self.limits(settings), ratings), ratings);
+        self.drawn.step(report, settings);
+        let Most { motoring_nm, braking_nm } = self.drawn.most(speed, ratings, &settings.train);
+        let most_nm = if link_nm < motoring_nm { link_nm } else { motoring_nm };
         let held_nm = if report.omega < 0.0 {
-            limit(target_nm, -most_nm, f32::INFINITY)
+            limit(target_nm, -most_nm, braking_nm)
         } else {
-            limit(target_nm, f32::NEG_INFINITY, most_nm)
+            limit(target_nm, -braking_nm, most_nm)
         };
         self.ramp.step(held_nm, &Rates::of(settings));
+        self.grip.step(self.ramp.torque_nm(), speed, settings);
     }
 
     #[inline]
     fn told(&self) -> f32 {
-        self.ramp.torque_nm()
+        self.torque_nm()
     }
 
     #[inline]
     fn command(&self, enable: bool, acknowledge: u8, settings: &Settings) -> DriveCommand {
         DriveCommand {
             enable,
-            demand: Demand { torque_nm: self.ramp.torque_nm(), slew_limited: true },
+            demand: Demand { torque_nm: self.torque_nm(), slew_limited: true },
             window: self.line.window(&self.limits(settings), settings.ratings),
             acknowledge,
         }

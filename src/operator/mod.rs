@@ -13,8 +13,10 @@
 
 mod demand;
 mod dual;
+mod grip;
 mod health;
 mod line;
+mod line_limits;
 mod machine;
 mod ramp;
 mod request;
@@ -22,6 +24,7 @@ mod set_point;
 mod settings;
 mod slot;
 mod status;
+mod train;
 
 pub use demand::{Demands, TorqueDemand};
 pub use dual::{DualDemands, DualRequest, MotorLimits, MotorRequest, Wanted};
@@ -30,6 +33,7 @@ pub use request::{Configuration, Feedback, Levels, Limits, Request, Seen};
 pub use settings::{Line, LineTimes, Settings};
 pub use slot::OperatorPort;
 pub use status::{DualStatus, Refusal, State, Status, Switches, Told};
+pub use train::TrainLimits;
 
 use crate::drive::Observation;
 use crate::ports::{DriveCommand, Report};

@@ -1,5 +1,6 @@
 //! The settings of the operator's step.
 
+use super::TrainLimits;
 use crate::machine::Ratings;
 use crate::thermal::Thermal;
 
@@ -111,6 +112,8 @@ pub struct Settings<'a> {
     pub line: Option<Line>,
     /// Temperature sensors, and what is known of how machine and power stage warm; `None`, and of the ZS9: nothing is, and nothing derates.
     pub thermal: Option<&'a Thermal>,
+    /// Limits of line and acceleration.
+    pub train: TrainLimits,
 }
 
 /// The demand's slew rate as a share of the drive's.
@@ -122,6 +125,14 @@ impl<'a> Settings<'a> {
     /// The usual ones for a machine.
     pub const fn rated(ratings: &'a Ratings, slot_s: f32, line: Option<Line>) -> Self {
         let slew_nm_s = SLEW_SHARE * ratings.torque_slew_nm_s;
-        Self { ratings, slot_s, slew_nm_s, jerk_nm_s2: slew_nm_s / JERK_S, line, thermal: None }
+        Self {
+            ratings,
+            slot_s,
+            slew_nm_s,
+            jerk_nm_s2: slew_nm_s / JERK_S,
+            line,
+            thermal: None,
+            train: TrainLimits::NONE,
+        }
     }
 }

@@ -1,7 +1,7 @@
 //! Parameters: what is set once for a drive, whatever its machine. Kept in RAM; a reset brings the defaults back.
 
 use crate::machine::Ratings;
-use crate::operator::Settings;
+use crate::operator::{Settings, TrainLimits};
 use core::f32::consts::TAU;
 
 /// A parameter.
@@ -22,14 +22,21 @@ pub struct Parameter {
     pub purpose: &'static str,
 }
 
+const NONE: TrainLimits = TrainLimits::NONE;
+
 /// Every parameter, by its number from 1 on.
-pub const PARAMETERS: [Parameter; 6] = [
+pub const PARAMETERS: [Parameter; 11] = [
     parameter(1, "torque_slew", "N.m/s", [1.0, 1e6], "fastest change of the torque demand"),
     parameter(2, "torque_jerk", "N.m/s2", [1.0, 1e9], "fastest change of that change"),
     parameter(3, "torque_limit", "N.m", [0.0, 3_000.0], "largest torque demand, either sign"),
     parameter(4, "speed_limit", "r/min", [0.5, 30_000.0], "speed beyond which nothing accelerates"),
     parameter(5, "command_zero", "ms", [20.0, 1_000.0], "silence after which torque is zero"),
     parameter(6, "command_off", "ms", [20.0, 10_000.0], "silence after which the drive stops"),
+    parameter(7, "line_current_motoring", "A", [0.0, NONE.motoring_a], "largest line current, motoring"),
+    parameter(8, "line_current_braking", "A", [0.0, NONE.braking_a], "largest line current, braking"),
+    parameter(9, "line_power_motoring", "kW", [0.0, NONE.motoring_w / 1e3], "largest line power, motoring"),
+    parameter(10, "line_power_braking", "kW", [0.0, NONE.braking_w / 1e3], "largest line power, braking"),
+    parameter(11, "acceleration_limit", "r/min/s", [1.0, 1e9], "largest acceleration of a wheel with grip"),
 ];
 
 const fn parameter(
@@ -61,6 +68,16 @@ pub struct Parameters {
     pub command_zero_ms: f32,
     /// Silence after which the drive stops, in ms; counted from the same command.
     pub command_off_ms: f32,
+    /// Largest line current while motoring, in A.
+    pub line_current_motoring_a: f32,
+    /// Largest line current while braking, in A.
+    pub line_current_braking_a: f32,
+    /// Largest line power while motoring, in kW.
+    pub line_power_motoring_kw: f32,
+    /// Largest line power while braking, in kW.
+    pub line_power_braking_kw: f32,
+    /// Largest acceleration of the rotor on rails with grip, in r/min/s.
+    pub acceleration_limit_rpm_s: f32,
 }
 
 /// The reason why a value was not written.
@@ -85,6 +102,22 @@ impl Parameters {
             speed_limit_rpm: ratings.max_speed_rad_s * RPM_PER_RAD_S,
             command_zero_ms: 50.0,
             command_off_ms: 500.0,
+            line_current_motoring_a: NONE.motoring_a,
+            line_current_braking_a: NONE.braking_a,
+            line_power_motoring_kw: NONE.motoring_w / 1e3,
+            line_power_braking_kw: NONE.braking_w / 1e3,
+            acceleration_limit_rpm_s: 1e9,
+        }
+    }
+
+    /// Limits of line and acceleration.
+    pub fn train(&self) -> TrainLimits {
+        TrainLimits {
+            motoring_a: self.line_current_motoring_a,
+            braking_a: self.line_current_braking_a,
+            motoring_w: 1e3 * self.line_power_motoring_kw,
+            braking_w: 1e3 * self.line_power_braking_kw,
+            acceleration_rad_s2: self.acceleration_limit_rpm_s / RPM_PER_RAD_S,
         }
     }
 
@@ -96,6 +129,11 @@ impl Parameters {
             4 => &mut self.speed_limit_rpm,
             5 => &mut self.command_zero_ms,
             6 => &mut self.command_off_ms,
+            7 => &mut self.line_current_motoring_a,
+            8 => &mut self.line_current_braking_a,
+            9 => &mut self.line_power_motoring_kw,
+            10 => &mut self.line_power_braking_kw,
+            11 => &mut self.acceleration_limit_rpm_s,
             _ => return None,
         })
     }

@@ -24,8 +24,10 @@ impl<D: MessageSet> CanEndpoint<D> {
 
     /// The operator's settings with the parameters that are in force.
     pub fn settings<'a>(&self, settings: &Settings<'a>) -> Settings<'a> {
-        let Parameters { torque_slew_nm_s, torque_jerk_nm_s2, .. } = *self.session.parameters();
-        Settings { slew_nm_s: torque_slew_nm_s, jerk_nm_s2: torque_jerk_nm_s2, ..*settings }
+        let parameters = self.session.parameters();
+        let Parameters { torque_slew_nm_s, torque_jerk_nm_s2, .. } = *parameters;
+        let train = parameters.train();
+        Settings { slew_nm_s: torque_slew_nm_s, jerk_nm_s2: torque_jerk_nm_s2, train, ..*settings }
     }
 
     /// The request in a slot, `slots` after the last one, after the frames that have come since.

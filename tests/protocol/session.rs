@@ -3,13 +3,13 @@
 use crate::Stream;
 use tractive::built_in::traction::BUILT_IN;
 use tractive::modulation::Mode;
-use tractive::operator::{Limits, Refusal, Request, State, Status, Switches};
+use tractive::operator::{Limits, Refusal, Request, Settings, State, Status, Switches, TrainLimits};
 use tractive::protection::{Fault, SafeState, Trip};
 use tractive::protocol::{
-    COMMAND, COUNTERS, Command, Counts, FAULT_LIMIT, FAULT_VALUE, FROM_DRIVE, Frame, LIMITS, LINK_LIMITS,
-    LinkLimits, Listening, MOTION, Measured, Outcome, PARAMETER_ANSWER, PARAMETER_REQUEST, PARAMETERS,
-    ParameterAnswer, ParameterRequest, Payload, STATUS, Scales, Session, StatusFrame, TEMPERATURES,
-    TemperaturesFrame, Told, TorqueLimits, trip_number,
+    COMMAND, COUNTERS, CanEndpoint, Command, Counts, FAULT_LIMIT, FAULT_VALUE, FROM_DRIVE, Frame, LIMITS,
+    LINK_LIMITS, LinkLimits, Listening, MOTION, Measured, Outcome, PARAMETER_ANSWER, PARAMETER_REQUEST,
+    PARAMETERS, ParameterAnswer, ParameterRequest, Payload, RPM_PER_RAD_S, STATUS, Scales, Session,
+    StatusFrame, TEMPERATURES, TemperaturesFrame, Told, TorqueLimits, trip_number,
 };
 use tractive::thermal::Temperatures;
 use tractive::time::Instant;
@@ -195,6 +195,32 @@ fn parameters_have_ranges_and_nothing_is_clamped() {
     assert_eq!(bench.parameter(5, Some(100.0)).unwrap().outcome, Outcome::Done);
     bench.command(PULL);
     bench.command(PULL);
+}
+
+/// What is written over CAN is what the operator works with.
+#[test]
+fn limits_of_line_and_rail_reach_the_operator() {
+    let usual = Settings::rated(&BUILT_IN.ratings, 1e-3, None);
+    let (mut endpoint, mut requests) = (CanEndpoint::new(&BUILT_IN.ratings), Stream::of(&PARAMETER_REQUEST));
+    let before = endpoint.settings(&usual).train;
+    assert_eq!(
+        (before.motoring_a, before.braking_w),
+        (TrainLimits::NONE.motoring_a, TrainLimits::NONE.braking_w)
+    );
+    assert!(before.acceleration_rad_s2 >= TrainLimits::NONE.acceleration_rad_s2);
+    for (parameter, value) in [(7, 1.0), (7, 70.0), (8, 80.0), (9, 90.0), (10, 100.0), (11, 300.0)] {
+        let content = ParameterRequest { parameter, write: Some(value) }.encode().unwrap();
+        endpoint.listen(1, Some(requests.frame(content)));
+    }
+    let acceleration_rad_s2 = 300.0 / RPM_PER_RAD_S;
+    let train = TrainLimits {
+        motoring_a: 70.0,
+        braking_a: 80.0,
+        motoring_w: 90e3,
+        braking_w: 100e3,
+        acceleration_rad_s2,
+    };
+    assert_eq!(endpoint.settings(&usual).train, train);
 }
 
 #[test]

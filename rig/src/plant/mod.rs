@@ -16,6 +16,7 @@ mod stator;
 pub mod stopwatch;
 mod thermal;
 mod vector;
+mod wheel;
 pub mod zs9;
 
 pub use dc_link::{DcLink, DcLinkSettings, LinkEnergies, LinkSwitches, Source};
@@ -28,6 +29,7 @@ pub use speed::{SpeedSource, profile_speed};
 pub use stator::{Stator, StatorSlopes};
 pub use thermal::{Heat, HeatSettings, Node, Wire, Wired};
 pub use vector::Vector;
+pub use wheel::Wheel;
 
 use legs::{Clamp, LONGEST_STEP_S};
 use runge_kutta::{along, rotated};

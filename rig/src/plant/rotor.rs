@@ -25,6 +25,7 @@ impl Rotor {
         let speed_rad_s = match &source {
             SpeedSource::Profile(points) => profile_speed(points, 0.0),
             SpeedSource::Inertia { .. } => 0.0,
+            SpeedSource::Wheel(wheel) => wheel.train_rad_s,
         };
         let sin_cos = (0.0, 1.0);
         Self { source, pole_pairs, time_s: 0.0, angle_turns: 0.0, sin_cos, speed_rad_s, friction_nm: 0.0 }
@@ -105,6 +106,9 @@ impl Rotor {
             SpeedSource::Inertia { inertia_kg_m2, load_nm } => {
                 self.beyond_friction_nm(torque_nm() - load_nm, (*inertia_kg_m2, dt_s)) / inertia_kg_m2
             }
+            SpeedSource::Wheel(wheel) => {
+                (torque_nm() - wheel.grip_nm(self.speed_rad_s, self.time_s)) / wheel.inertia_kg_m2
+            }
         };
         Turning { pole_pairs: self.pole_pairs, speed_rad_s: self.speed_rad_s, acceleration }
     }
@@ -112,6 +116,7 @@ impl Rotor {
     /// Ends a step in which the air-gap torque gave an impulse, in N·m·s. Returns the work done on the rotor, in J.
     #[inline]
     pub fn finish(&mut self, impulse_nm_s: f64, dt_s: f64) -> f64 {
+        let began_s = self.time_s;
         self.time_s += dt_s;
         let speed_before = self.speed_rad_s;
         self.speed_rad_s = match &self.source {
@@ -125,7 +130,14 @@ impl Rotor {
                 };
                 speed_before + left_nm_s / inertia_kg_m2
             }
+            SpeedSource::Wheel(wheel) => {
+                let grip_nm_s = wheel.grip_nm(speed_before, began_s) * dt_s;
+                speed_before + (impulse_nm_s - grip_nm_s) / wheel.inertia_kg_m2
+            }
         };
+        if let SpeedSource::Wheel(wheel) = &mut self.source {
+            wheel.drive(speed_before, began_s, dt_s);
+        }
         let mean_speed = 0.5 * (speed_before + self.speed_rad_s);
         self.turn_to(self.angle_turns + self.pole_pairs * mean_speed * dt_s / TAU);
         impulse_nm_s * mean_speed

@@ -1,5 +1,6 @@
 //! The drive of the rotor.
 
+use super::wheel::Wheel;
 use core::f64::consts::TAU;
 
 /// The source of the speed.
@@ -14,6 +15,8 @@ pub enum SpeedSource {
         /// Load torque against forward rotation, in N·m.
         load_nm: f64,
     },
+    /// A wheel set on its rail.
+    Wheel(Wheel),
 }
 
 impl SpeedSource {

@@ -5,9 +5,9 @@
 
 use super::traction::{
     Traction, acknowledge::Acknowledge, borders_timing::BordersTiming, characteristic::Characteristic,
-    chopper::Chopper, full_step::FullStep, gaps::Gaps, link_steps::LinkSteps, load_steps::LoadSteps,
-    mode_borders::ModeBorders, precharge::Precharge, restart::Restart, reversal::Reversal, start::Start,
-    steady::Steady, sweep::Sweep, timing::Timing,
+    chopper::Chopper, full_step::FullStep, gaps::Gaps, line_limits::LineLimits, link_steps::LinkSteps,
+    load_steps::LoadSteps, mode_borders::ModeBorders, precharge::Precharge, restart::Restart,
+    reversal::Reversal, start::Start, steady::Steady, sweep::Sweep, timing::Timing, wheel::Wheel,
 };
 use super::zs9::{self, Zs9, cycle::Cycle, load_step::LoadStep, reverse::Reverse};
 use super::{Choice, Scenario, System};
@@ -78,7 +78,7 @@ impl<S: System> Entry<S> {
 }
 
 /// The PMaSynRM drive's.
-const TRACTION: [Entry<Traction>; 16] = [
+const TRACTION: [Entry<Traction>; 18] = [
     Entry::of::<LoadSteps>("load-steps", "figure 8: load steps at 200 r/min"),
     Entry::of::<Sweep>("sweep", "figure 9: sweep at full torque, and its changes of pulse pattern"),
     Entry::of::<Characteristic>(
@@ -97,6 +97,8 @@ const TRACTION: [Entry<Traction>; 16] = [
     Entry::of::<Precharge>("precharge", "no figure: from power-up to running and back to an empty link"),
     Entry::of::<Chopper>("chopper", "no figure: full braking into a link that cannot take the energy"),
     Entry::of::<Gaps>("gaps", "no figure: a line that is lost for 20 to 500 ms, motoring and braking"),
+    Entry::of::<LineLimits>("line-limits", "no figure: line current and line power at their limits"),
+    Entry::of::<Wheel>("wheel", "no figure: a wheel that loses its grip, motoring and braking"),
     Entry::of::<Start>("start", "no figure: a start without an angle, found at standstill"),
     Entry::of::<Acknowledge>("acknowledge", "no figure: a gate driver fails, and the fault is acknowledged"),
     Entry::of::<Timing>("timing", "no figure: every mode in half a second, for `cargo xtask timing`"),

@@ -10,7 +10,7 @@ use tractive::experiment::{Memory, Teller};
 use tractive::frames::{Abc, Angle};
 use tractive::machine::{Ratings, Tables};
 use tractive::modulation::{CarrierHalf, Ladder, Schedule};
-use tractive::operator::{self, Feedback, Line, OperatorPort, Request, Slot, Status, slot_s};
+use tractive::operator::{self, Feedback, Line, OperatorPort, Request, Slot, Status, TrainLimits, slot_s};
 use tractive::ports::{ControlPort, DriveCommand, PwmPort, Report, Sample};
 use tractive::protection::{LegFaults, MaskedFaults, SafeState, Trip};
 use tractive::protocol::CanEndpoint;
@@ -221,6 +221,12 @@ impl<'a, L: ControlLaw> Tasks<'a, L> {
     /// The same with an operator that knows temperature sensors, and how what they are on warms.
     pub fn warmed_by(mut self, thermal: Option<&'static Thermal>) -> Self {
         self.operator.thermal = thermal;
+        self
+    }
+
+    /// The same with limits of line and acceleration.
+    pub fn limited_to(mut self, train: TrainLimits) -> Self {
+        self.operator.train = train;
         self
     }
 

@@ -87,7 +87,7 @@ fn request(t_s: f64, ratings: &Ratings) -> Request {
 }
 
 /// The link behind the usual filter, the same times and shares of voltage and power as the reference machine's.
-fn link(machine: &Machine, nominal_v: f64) -> DcLinkSettings {
+pub(super) fn link(machine: &Machine, nominal_v: f64) -> DcLinkSettings {
     let link = line::scaled(machine);
     let ohms = link.precharge_ohm / line::LINK.precharge_ohm;
     DcLinkSettings {

@@ -10,6 +10,7 @@ pub(super) mod full_step;
 pub(super) mod gaps;
 pub mod identification;
 mod line;
+pub(super) mod line_limits;
 pub(super) mod link_steps;
 mod live;
 pub(super) mod load_steps;
@@ -24,6 +25,7 @@ pub(super) mod steady;
 pub(super) mod sweep;
 pub mod switches;
 pub(super) mod timing;
+pub(super) mod wheel;
 
 pub use ablated::Part;
 pub use line::scaled as scaled_link;
@@ -52,7 +54,7 @@ use serde_json::{Map, Value};
 use tractive::control::{ControlLaw, Controller, Demand, Gains, MtpaStart, PiLaw};
 use tractive::drive::traction::Settings;
 use tractive::modulation::{FREE_CARRIER_SHARE, Ladder, SwitchLimits};
-use tractive::operator::{Line, LineTimes};
+use tractive::operator::{Line, LineTimes, TrainLimits};
 use tractive::recorder::Recorder;
 use tractive::time::{Clock, Instant};
 use tractive::wire::{self, Setup};
@@ -231,6 +233,8 @@ pub struct Plan {
     pub operator: Box<dyn Operator + Send>,
     /// The line side, where the scenario is about it; otherwise the link is stiff and the drive is commanded directly.
     pub line: Option<LinePlan>,
+    /// The operator's limits of line and acceleration.
+    pub train: TrainLimits,
     /// The fault, if there is one.
     pub injection: Option<Injection<Kind>>,
     /// From this time on control is told the same currents again and again, in s.
@@ -257,6 +261,7 @@ impl Plan {
             link: Vec::new(),
             operator: Box::new(operator),
             line: None,
+            train: TrainLimits::NONE,
             injection: None,
             freeze_at_s: None,
             encoder: None,
@@ -497,6 +502,7 @@ fn setup(plan: &Plan, options: &Options, machine: &Machine, over_protocol: bool)
         behind_line_filter: options.own.line.is_some() || plan.line.as_ref().is_some_and(LinePlan::has_choke),
         angle_late_s: options.own.known_late_s(),
         angle_step_rad: angle_step_rad(options, machine),
+        train: plan.train,
     }
 }
 
@@ -538,7 +544,7 @@ fn tasks<'a, L: ControlLaw>(
     let line = setup.line.map(|times| Line::rated(ratings, times.precharge_s, times.discharge_s));
     let first = first_half_ticks(setup, options, machine);
     let tasks = Tasks::with_law(law, Instant(0), machine.tables, settings, first);
-    Ok(tasks.on(PatternsName::of(&options.own, machine).ladder()).operated_on(line))
+    Ok(tasks.on(PatternsName::of(&options.own, machine).ladder()).operated_on(line).limited_to(setup.train))
 }
 
 /// The true machine: the one that control knows, unless the options name another.

@@ -1,0 +1,142 @@
+//! The torque that limits of line current and line power leave.
+//!
+//! The line's power is the shaft's and the copper loss: `P = ω T + k T²`, with `k` from the present currents, `1.5 R (i_d² + i_q²)/T²`. Solved for the
+//! torque, so that no loop closes over the loss; at the limit, where it counts, `k T²` is the loss itself. Inverter, iron and auxiliaries are not in it.
+
+use super::{Settings, TrainLimits};
+use crate::frames::{limit, sqrt};
+use crate::machine::Ratings;
+use crate::ports::Report;
+
+/// Time constant of the link voltage and of the loss, in s: slower than the swing of a usual line filter, which is not the line's.
+const SMOOTH_S: f32 = 0.05;
+/// Share of the largest torque below which the loss is taken as that torque's: of weakening currents there is one without torque.
+const LEAST_SHARE: f32 = 0.1;
+/// Share of the nominal voltage below which the line's current falls, to nothing at the lowest operating voltage.
+const FULL_SHARE: f32 = 0.9;
+
+/// The line as the link shows it, and the drive's losses.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Drawn {
+    /// Link voltage, in V; 0 while it is not known.
+    udc_v: f32,
+    /// Copper loss over the torque's square, in W/(N·m)².
+    loss: f32,
+}
+
+/// Largest torques, in N·m.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Most {
+    pub motoring_nm: f32,
+    pub braking_nm: f32,
+}
+
+impl Drawn {
+    pub(super) const UNKNOWN: Self = Self { udc_v: 0.0, loss: 0.0 };
+
+    /// One slot.
+    #[inline(never)]
+    pub(super) fn step(&mut self, report: &Report, settings: &Settings) {
+        let Settings { ratings, slot_s, .. } = *settings;
+        let Report { udc_v, torque_nm, id_a, iq_a, .. } = *report;
+        let least_nm = LEAST_SHARE * ratings.max_torque_nm;
+        let torque_nm = if torque_nm.abs() > least_nm { torque_nm } else { least_nm };
+        let copper_w = 1.5 * ratings.stator_resistance_ohm * (id_a * id_a + iq_a * iq_a);
+        let loss = copper_w / (torque_nm * torque_nm);
+        let share = if self.udc_v > 0.0 { slot_s / (slot_s + SMOOTH_S) } else { 1.0 };
+        self.udc_v += share * (udc_v - self.udc_v);
+        self.loss += share * (loss - self.loss);
+    }
+
+    /// The torques that the limits leave at a mechanical speed, in rad/s.
+    #[inline(never)]
+    pub(super) fn most(&self, speed: f32, ratings: &Ratings, limits: &TrainLimits) -> Most {
+        let TrainLimits { motoring_a, braking_a, motoring_w, braking_w, .. } = *limits;
+        let none = TrainLimits::NONE;
+        let (udc_v, speed) = (self.udc_v, speed.abs());
+        let current_w = motoring_a * motoring_share(udc_v, ratings) * udc_v;
+        let taken_w = lower((motoring_a, none.motoring_a, current_w), (motoring_w, none.motoring_w));
+        let given_w = lower((braking_a, none.braking_a, braking_a * udc_v), (braking_w, none.braking_w));
+        Most {
+            motoring_nm: taken_w.map_or(f32::INFINITY, |power_w| torque_nm(power_w, speed, self.loss)),
+            braking_nm: given_w.map_or(f32::INFINITY, |power_w| torque_nm(power_w, speed, -self.loss)),
+        }
+    }
+}
+
+/// The power that is allowed, in W: the lower of that of the current and of the limit itself; `None` without a limit.
+fn lower(
+    (limit_a, no_limit_a, current_w): (f32, f32, f32),
+    (limit_w, no_limit_w): (f32, f32),
+) -> Option<f32> {
+    let power_w = if limit_a >= no_limit_a || limit_w < current_w { limit_w } else { current_w };
+    (limit_a < no_limit_a || limit_w < no_limit_w).then_some(power_w)
+}
+
+/// Share of the line's current that a motoring drive may take at a line voltage.
+fn motoring_share(udc_v: f32, ratings: &Ratings) -> f32 {
+    let none_v = ratings.dc_link_min_v;
+    let span_v = FULL_SHARE * ratings.dc_link_nominal_v - none_v;
+    if span_v > 0.0 { limit((udc_v - none_v) / span_v, 0.0, 1.0) } else { 1.0 }
+}
+
+/// The torque at which the line's power is `power_w`: of `ω T + k T² = P` the positive root. Without one the loss takes all that is braked: no
+/// limit. Of a power that is no number: no torque.
+fn torque_nm(power_w: f32, speed: f32, loss: f32) -> f32 {
+    let square = speed * speed + 4.0 * loss * power_w;
+    if loss < 0.0 && square <= 0.0 {
+        f32::INFINITY
+    } else if power_w > 0.0 && square >= 0.0 {
+        2.0 * power_w / (speed + sqrt(square))
+    } else {
+        0.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::built_in::traction::BUILT_IN;
+
+    const LIMITS: TrainLimits = TrainLimits { motoring_a: 100.0, braking_w: 90e3, ..TrainLimits::NONE };
+
+    fn drawn(udc_v: f32) -> Drawn {
+        Drawn { udc_v, loss: 4e-3 }
+    }
+
+    #[test]
+    fn without_limits_there_is_no_bound() {
+        for (speed, udc_v) in [(0.0, 0.0), (100.0, 900.0), (-600.0, 1_500.0), (300.0, f32::NAN)] {
+            let most = drawn(udc_v).most(speed, &BUILT_IN.ratings, &TrainLimits::NONE);
+            assert_eq!(most, Most { motoring_nm: f32::INFINITY, braking_nm: f32::INFINITY });
+        }
+    }
+
+    /// The torque and its copper loss make the power of the limit.
+    #[test]
+    fn shaft_and_loss_are_the_line_s_power() {
+        for speed in [2.0, -20.0, 200.0, -600.0] {
+            let most = drawn(1_500.0).most(speed, &BUILT_IN.ratings, &LIMITS);
+            let power_w =
+                |torque_nm: f32, sign: f32| torque_nm * speed.abs() + sign * 4e-3 * torque_nm * torque_nm;
+            assert!((power_w(most.motoring_nm, 1.0) / 150e3 - 1.0).abs() < 1e-3, "{speed}: {most:?}");
+            let given_w = power_w(most.braking_nm, -1.0);
+            assert!(most.braking_nm == f32::INFINITY || (given_w / 90e3 - 1.0).abs() < 1e-3, "{speed}");
+        }
+    }
+
+    #[test]
+    fn a_line_that_sags_gives_less_current_and_at_the_lowest_voltage_none() {
+        let ratings = &BUILT_IN.ratings;
+        let current_a = |udc_v: f32| {
+            let most = drawn(udc_v).most(300.0, ratings, &LIMITS).motoring_nm;
+            (most * 300.0 + 4e-3 * most * most) / udc_v
+        };
+        let (full_v, none_v) = (FULL_SHARE * ratings.dc_link_nominal_v, ratings.dc_link_min_v);
+        for (udc_v, share) in [(1_800.0, 1.0), (full_v, 1.0), (0.5 * (full_v + none_v), 0.5)] {
+            assert!((current_a(udc_v) / (100.0 * share) - 1.0).abs() < 1e-3, "{udc_v}: {}", current_a(udc_v));
+        }
+        assert_eq!(current_a(none_v), 0.0);
+        assert_eq!(drawn(f32::NAN).most(300.0, ratings, &LIMITS).motoring_nm, 0.0);
+    }
+}
