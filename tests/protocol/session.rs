@@ -197,7 +197,7 @@ fn parameters_have_ranges_and_nothing_is_clamped() {
     bench.command(PULL);
 }
 
-/// What is written over CAN is what the operator works with.
+/// Limits that are written over CAN are those that the operator works with.
 #[test]
 fn limits_of_line_and_rail_reach_the_operator() {
     let usual = Settings::rated(&BUILT_IN.ratings, 1e-3, None);
