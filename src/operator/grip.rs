@@ -2,7 +2,7 @@
 //!
 //! A reference follows the rotor's speed along the torque, motoring upward, braking downward, at most at the acceleration limit. What the rotor is
 //! ahead of it is slip. The torque's share falls at once in proportion to the slip, and further while it lasts; with grip it comes back along a
-//! straight line. The same law holds a train that is too light to its acceleration.
+//! straight line.
 
 use super::Settings;
 use crate::frames::limit;
