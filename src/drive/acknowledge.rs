@@ -36,6 +36,12 @@ impl Acknowledge {
         false
     }
 
+    /// The safe state entered once more: the PWM interrupt may have left it for a release that control has not seen carried out, and is
+    /// asked to leave it anew.
+    pub(super) fn entered(&mut self) {
+        self.release = self.release.wrapping_add(u8::from(self.pending));
+    }
+
     /// Number of the operator's acknowledge that both interrupts have carried out, or that had nothing to forget.
     pub(super) fn answered(&self) -> u8 {
         self.answered

@@ -54,6 +54,10 @@ pub struct FuzzArgs {
     /// Time of each, in s; as many run at once as there are cores
     #[arg(long, value_name = "N", default_value_t = 60)]
     pub seconds: u32,
+    /// From the kept inputs alone, in the order of this seed: with 1 the inputs of the tests' step, for longer [default: from all that was
+    /// found here, at random]
+    #[arg(long, value_name = "N", conflicts_with = "keep")]
+    pub seed: Option<u32>,
     /// Add to fuzz/corpus what reaches code that it does not
     #[arg(long)]
     pub keep: bool,

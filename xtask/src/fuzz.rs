@@ -25,8 +25,16 @@ const FLAGS: [&str; 6] = [
 const LONGEST: usize = 512;
 const LONGEST_FILE: usize = 4_096;
 
-/// Time of each target in the tests, in s.
+/// Time of each target in the tests, in s, and its seed: the inputs of a change are the same wherever it is tested.
 const MINUTE_S: u32 = 60;
+const SEED: u32 = 1;
+
+/// Where the inputs come from: the kept ones alone, and the seed's; or all that have grown on this machine, too, and anything.
+#[derive(Clone, Copy)]
+enum Origin {
+    Seed(u32),
+    Any,
+}
 
 /// The command. Exit code 1 where something was found.
 pub fn run(args: &FuzzArgs) -> Result<u8> {
@@ -39,17 +47,18 @@ pub fn run(args: &FuzzArgs) -> Result<u8> {
         Ok(folder) => folder,
         Err(missing) => bail!(missing),
     };
-    let is_good = fuzz(&folder, chosen, args.seconds)?;
+    let origin = args.seed.map_or(Origin::Any, Origin::Seed);
+    let is_good = fuzz(&folder, chosen, args.seconds, origin)?;
     if args.keep {
         chosen.iter().try_for_each(|target| keep(&folder, target))?;
     }
     Ok(u8::from(!is_good))
 }
 
-/// Every target for a minute. The inner error is what is missing.
+/// Every target for a minute, with the same inputs each time. The inner error is what is missing.
 pub fn check() -> Result<Result<bool, String>> {
     match build()? {
-        Ok(folder) => fuzz(&folder, &targets()?, MINUTE_S).map(Ok),
+        Ok(folder) => fuzz(&folder, &targets()?, MINUTE_S, Origin::Seed(SEED)).map(Ok),
         Err(missing) => Ok(Err(missing)),
     }
 }
@@ -94,19 +103,28 @@ fn corpora(target: &str) -> Result<[PathBuf; 2]> {
 }
 
 /// Runs these targets, on every core one at a time; whether nothing was found.
-fn fuzz(folder: &Path, targets: &[String], seconds: u32) -> Result<bool> {
-    let good = targets.par_iter().map(|target| run_target(folder, target, seconds));
+fn fuzz(folder: &Path, targets: &[String], seconds: u32, origin: Origin) -> Result<bool> {
+    let good = targets.par_iter().map(|target| run_target(folder, target, seconds, origin));
     Ok(good.collect::<Result<Vec<_>>>()?.into_iter().all(|good| good))
 }
 
-fn run_target(folder: &Path, target: &str, seconds: u32) -> Result<bool> {
+fn run_target(folder: &Path, target: &str, seconds: u32, origin: Origin) -> Result<bool> {
     let [kept, own] = corpora(target)?;
+    let fresh = tempfile::tempdir().context("no temporary folder")?;
+    let (own, seed) = match origin {
+        Origin::Seed(seed) => (fresh.path().to_owned(), seed),
+        // libFuzzer takes one of its own.
+        Origin::Any => (own, 0),
+    };
     let found = root().join("target/fuzz/found").join(target);
     std::fs::create_dir_all(&found)?;
     let longest = if target == "folder" { LONGEST_FILE } else { LONGEST };
     let mut command = Command::new(folder.join(target));
     command.arg(own).arg(kept).arg(format!("-max_total_time={seconds}")).arg(format!("-max_len={longest}"));
-    command.arg("-timeout=20").arg(format!("-artifact_prefix={}/", found.display()));
+    command
+        .arg(format!("-seed={seed}"))
+        .arg("-timeout=20")
+        .arg(format!("-artifact_prefix={}/", found.display()));
     let dictionary = root().join("fuzz/dictionaries").join(target);
     if dictionary.is_file() {
         command.arg(format!("-dict={}", dictionary.display()));

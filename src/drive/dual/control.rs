@@ -378,6 +378,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         let at = self.now.before(self.settings.clock.control_ticks);
         port.enter(SafeState::GatesOff, at);
         self.trip = Some(Trip { fault, value, limit, at, safe: SafeState::GatesOff });
+        self.acknowledge.entered();
     }
 }
 

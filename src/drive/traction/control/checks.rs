@@ -89,8 +89,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         let at = self.now.before(self.settings.clock.control_ticks);
         let safe =
             protection::safe_state(self.controller.omega(), sample.udc_v, &self.machine.tables().ratings);
-        port.enter(safe, at);
-        self.trip = Some(Trip { fault, value, limit, at, safe });
+        self.enter(Trip { fault, value, limit, at, safe }, port);
     }
 
     /// A period after a trip: gates that are off become the short circuit where the machine goes on generating through the diodes.
@@ -102,9 +101,15 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         let open = OpenGates { currents_a, udc_v, omega, period_s: self.settings.clock.control_s() };
         let ratings = &self.machine.tables().ratings;
         if let Some(safe) = self.diodes.step(trip.safe, &open, &port.leg_faults(), ratings) {
-            port.enter(safe, self.now.before(self.settings.clock.control_ticks));
-            self.trip = Some(Trip { safe, ..trip });
+            self.enter(Trip { safe, ..trip }, port);
         }
+    }
+
+    /// The safe state that a fault asks for.
+    fn enter(&mut self, trip: Trip, port: &mut impl ControlPort) {
+        port.enter(trip.safe, self.now.before(self.settings.clock.control_ticks));
+        self.trip = Some(trip);
+        self.acknowledge.entered();
     }
 
     /// First of all checks: a leg that is stuck decides on the safe state.
@@ -114,8 +119,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             let at = self.now.before(self.settings.clock.control_ticks);
             let (omega, ratings) = (self.controller.omega(), &self.machine.tables().ratings);
             let safe = found.safe_state(omega, sample.udc_v, ratings);
-            port.enter(safe, at);
-            self.trip = Some(Trip { fault, value, limit, at, safe });
+            self.enter(Trip { fault, value, limit, at, safe }, port);
         }
     }
 }
