@@ -1,6 +1,6 @@
 //! One of the two motors in the control task: a control law as the PMaSynRM's drive runs it, with its own tables.
 
-use super::{MotorCommand, MotorShare, Settings};
+use super::{MotorCommand, MotorShare, Settings, TURNS};
 use crate::control::{
     AimInput, Boundary, Committed, ControlLaw, Demand, Law, Measurements, ModeLimits, Region, Regulated,
     RotorSample, SpeedInput, SpeedLoop,
@@ -32,6 +32,8 @@ pub struct Axis<L> {
     slow: f32,
     /// Mean voltage of the period that began at the last sample, per volt of link; and the link's voltage there.
     acting: Option<(AlphaBeta, f32)>,
+    /// The volt-seconds of the period that ended at the newest operating point, in V·s.
+    ended: Option<AlphaBeta>,
 }
 
 /// Everything that a motor's step works on.
@@ -44,7 +46,7 @@ pub struct AxisInput<'a> {
     pub applied: Option<MotorShare>,
     /// Measured link voltage outside shoot-through, in V.
     pub link_v: f32,
-    /// `true` if it is this motor's turn for a new operating point.
+    /// `true` if it is this motor's turn for a new operating point; else it learns.
     pub aims: bool,
 }
 
@@ -71,7 +73,14 @@ impl AxisOutput {
 impl<L: ControlLaw> Axis<L> {
     /// A motor at rest with its control law.
     pub const fn new(controller: L) -> Self {
-        Self { controller, speed_loop: SpeedLoop::new(), watch: FrozenWatch::new(), slow: 0.0, acting: None }
+        Self {
+            controller,
+            speed_loop: SpeedLoop::new(),
+            watch: FrozenWatch::new(),
+            slow: 0.0,
+            acting: None,
+            ended: None,
+        }
     }
 
     /// Follows the angle, where it is `trusted` whatever it is. Says by how much, in rad, it is off where that is too much.
@@ -146,11 +155,8 @@ impl<L: ControlLaw> Axis<L> {
         let period_s = settings.clock.control_s();
         let begins = input.applied.map(|share| self.mean_per_volt(&share, settings));
         let before = core::mem::replace(&mut self.acting, begins.map(|mean| (mean, input.link_v)));
-        let boundary = Boundary {
-            // The link moves along a straight line in between.
-            volt_seconds: before.map(|(mean, link_v)| mean * (0.5 * (link_v + input.link_v) * period_s)),
-            length_s: period_s,
-        };
+        // The link moves along a straight line in between.
+        let ended = before.map(|(mean, link_v)| mean * (0.5 * (link_v + input.link_v) * period_s));
         let committed = Committed {
             horizon_s: period_s,
             volt_seconds: begins.map(|mean| mean * (input.link_v * period_s)),
@@ -167,12 +173,12 @@ impl<L: ControlLaw> Axis<L> {
             ripple_share: 1.0,
             settled: true,
         };
-        let demand = self.demand(input, omega, settings, tables);
         let law = Law { gains: &settings.gains, clock: &settings.clock, tables };
         let sample = RotorSample::new(input.measured.currents_a, input.measured.angle, tables);
         self.controller.observe(&sample, tables);
-        self.controller.learn(&boundary, &sample, limits.follows, &law);
         if input.aims || before.is_none() {
+            self.controller.pass(&sample);
+            let demand = self.demand(input, omega, settings, tables);
             let aim = AimInput {
                 demand: &demand,
                 window: None,
@@ -181,6 +187,14 @@ impl<L: ControlLaw> Axis<L> {
                 limits: &limits,
             };
             self.controller.aim(&aim, &law);
+            self.ended = ended;
+        } else {
+            // Since it learnt last: the noise of the sample between drops out.
+            let boundary = Boundary {
+                volt_seconds: self.ended.zip(ended).map(|(earlier, later)| earlier + later),
+                length_s: TURNS as f32 * period_s,
+            };
+            self.controller.learn(&boundary, &sample, limits.follows, &law);
         }
         let voltage = self.controller.regulate(&sample, &committed, &limits, &law);
         let target = self.controller.target();
