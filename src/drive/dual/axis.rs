@@ -149,8 +149,9 @@ impl<L: ControlLaw> Axis<L> {
         if self.watch.angle_stands() { Some((lost, turned_rad, limit_rad)) } else { Some(violation) }
     }
 
-    /// One control period.
-    pub fn step(&mut self, input: &AxisInput, settings: &Settings, tables: &Tables) -> AxisOutput {
+    /// One control period; what comes of it goes where it stays.
+    #[inline(never)]
+    pub fn step(&mut self, input: &AxisInput, settings: &Settings, tables: &Tables, output: &mut AxisOutput) {
         let omega = self.controller.omega();
         let period_s = settings.clock.control_s();
         let begins = input.applied.map(|share| self.mean_per_volt(&share, settings));
@@ -199,18 +200,14 @@ impl<L: ControlLaw> Axis<L> {
         let voltage = self.controller.regulate(&sample, &committed, &limits, &law);
         let target = self.controller.target();
         self.watch.command(voltage.vector);
-        AxisOutput {
-            command: MotorCommand {
-                voltage_v: voltage.voltage_v,
-                angle: voltage.vector.angle(),
-                rate: settings.clock.angle_rate(omega),
-            },
-            torque_nm: target.torque_nm,
-            weakening: target.region != Region::Mtpa,
-            // Of the voltage that begins to act now, as the modulator really gives it, at the measured current.
-            power_w: begins
-                .map_or(0.0, |mean| 1.5 * input.link_v * mean.dot(input.measured.currents_a.clarke())),
-        }
+        output.command.voltage_v = voltage.voltage_v;
+        output.command.angle = voltage.vector.angle();
+        output.command.rate = settings.clock.angle_rate(omega);
+        output.torque_nm = target.torque_nm;
+        output.weakening = target.region != Region::Mtpa;
+        // Of the voltage that begins to act now, as the modulator really gives it, at the measured current.
+        output.power_w =
+            begins.map_or(0.0, |mean| 1.5 * input.link_v * mean.dot(input.measured.currents_a.clarke()));
     }
 
     /// The torque that is asked for, by the operator or by the speed loop.
