@@ -84,10 +84,12 @@ impl dual::Settings {
 
 const fn check_speed(speed: &SpeedDesign, control_s: f32, ratings: &Ratings) -> Result<(), Refused> {
     let SpeedDesign { inertia_kg_m2, natural_rad_s, period_s } = *speed;
+    // The loop runs where its motor has a new operating point.
+    let turns_s = dual::TURNS as f32 * control_s;
     let most_nm = STIFFEST * ratings.max_torque_nm;
     within(&[
-        Bound("speed.period_s", period_s, (1.0 - ROUNDING) * control_s, (1.0 + ROUNDING) * control_s),
-        Bound("speed.natural_rad_s", natural_rad_s, ABOVE_ZERO, 0.5 / control_s),
+        Bound("speed.period_s", period_s, (1.0 - ROUNDING) * turns_s, (1.0 + ROUNDING) * turns_s),
+        Bound("speed.natural_rad_s", natural_rad_s, ABOVE_ZERO, 0.5 / turns_s),
         Bound("speed.inertia_kg_m2", inertia_kg_m2, ABOVE_ZERO, 0.5 * most_nm / natural_rad_s),
     ])
 }

@@ -93,6 +93,9 @@ pub trait ControlLaw {
     /// Takes what was sampled at a carrier boundary that has passed, and what acted until then.
     fn learn(&mut self, boundary: &Boundary, sample: &RotorSample, follows: Regulated, law: &Law);
 
+    /// Passes a carrier boundary where nothing is learnt, as the next one learns for both.
+    fn pass(&mut self, _sample: &RotorSample) {}
+
     /// Makes the operating point, once for each command; call after [`ControlLaw::observe`].
     fn aim(&mut self, input: &AimInput, law: &Law);
 

@@ -1,6 +1,6 @@
 //! One of the two motors in the control task: a control law as the PMaSynRM's drive runs it, with its own tables.
 
-use super::{MotorCommand, MotorShare, Settings};
+use super::{MotorCommand, MotorShare, Settings, TURNS};
 use crate::control::{
     AimInput, Boundary, Committed, ControlLaw, Demand, Law, Measurements, ModeLimits, Region, Regulated,
     RotorSample, SpeedInput, SpeedLoop,
@@ -32,6 +32,8 @@ pub struct Axis<L> {
     slow: f32,
     /// Mean voltage of the period that began at the last sample, per volt of link; and the link's voltage there.
     acting: Option<(AlphaBeta, f32)>,
+    /// The volt-seconds of the period that ended at the newest operating point, in V·s.
+    ended: Option<AlphaBeta>,
 }
 
 /// Everything that a motor's step works on.
@@ -44,7 +46,7 @@ pub struct AxisInput<'a> {
     pub applied: Option<MotorShare>,
     /// Measured link voltage outside shoot-through, in V.
     pub link_v: f32,
-    /// `true` if it is this motor's turn for a new operating point.
+    /// `true` if it is this motor's turn for a new operating point; else it learns.
     pub aims: bool,
 }
 
@@ -71,7 +73,14 @@ impl AxisOutput {
 impl<L: ControlLaw> Axis<L> {
     /// A motor at rest with its control law.
     pub const fn new(controller: L) -> Self {
-        Self { controller, speed_loop: SpeedLoop::new(), watch: FrozenWatch::new(), slow: 0.0, acting: None }
+        Self {
+            controller,
+            speed_loop: SpeedLoop::new(),
+            watch: FrozenWatch::new(),
+            slow: 0.0,
+            acting: None,
+            ended: None,
+        }
     }
 
     /// Follows the angle, where it is `trusted` whatever it is. Says by how much, in rad, it is off where that is too much.
@@ -140,17 +149,15 @@ impl<L: ControlLaw> Axis<L> {
         if self.watch.angle_stands() { Some((lost, turned_rad, limit_rad)) } else { Some(violation) }
     }
 
-    /// One control period.
-    pub fn step(&mut self, input: &AxisInput, settings: &Settings, tables: &Tables) -> AxisOutput {
+    /// One control period; what comes of it goes where it stays.
+    #[inline(never)]
+    pub fn step(&mut self, input: &AxisInput, settings: &Settings, tables: &Tables, output: &mut AxisOutput) {
         let omega = self.controller.omega();
         let period_s = settings.clock.control_s();
         let begins = input.applied.map(|share| self.mean_per_volt(&share, settings));
         let before = core::mem::replace(&mut self.acting, begins.map(|mean| (mean, input.link_v)));
-        let boundary = Boundary {
-            // The link moves along a straight line in between.
-            volt_seconds: before.map(|(mean, link_v)| mean * (0.5 * (link_v + input.link_v) * period_s)),
-            length_s: period_s,
-        };
+        // The link moves along a straight line in between.
+        let ended = before.map(|(mean, link_v)| mean * (0.5 * (link_v + input.link_v) * period_s));
         let committed = Committed {
             horizon_s: period_s,
             volt_seconds: begins.map(|mean| mean * (input.link_v * period_s)),
@@ -167,12 +174,12 @@ impl<L: ControlLaw> Axis<L> {
             ripple_share: 1.0,
             settled: true,
         };
-        let demand = self.demand(input, omega, settings, tables);
         let law = Law { gains: &settings.gains, clock: &settings.clock, tables };
         let sample = RotorSample::new(input.measured.currents_a, input.measured.angle, tables);
         self.controller.observe(&sample, tables);
-        self.controller.learn(&boundary, &sample, limits.follows, &law);
         if input.aims || before.is_none() {
+            self.controller.pass(&sample);
+            let demand = self.demand(input, omega, settings, tables);
             let aim = AimInput {
                 demand: &demand,
                 window: None,
@@ -181,22 +188,26 @@ impl<L: ControlLaw> Axis<L> {
                 limits: &limits,
             };
             self.controller.aim(&aim, &law);
+            self.ended = ended;
+        } else {
+            // Since it learnt last: the noise of the sample between drops out.
+            let boundary = Boundary {
+                volt_seconds: self.ended.zip(ended).map(|(earlier, later)| earlier + later),
+                length_s: TURNS as f32 * period_s,
+            };
+            self.controller.learn(&boundary, &sample, limits.follows, &law);
         }
         let voltage = self.controller.regulate(&sample, &committed, &limits, &law);
         let target = self.controller.target();
         self.watch.command(voltage.vector);
-        AxisOutput {
-            command: MotorCommand {
-                voltage_v: voltage.voltage_v,
-                angle: voltage.vector.angle(),
-                rate: settings.clock.angle_rate(omega),
-            },
-            torque_nm: target.torque_nm,
-            weakening: target.region != Region::Mtpa,
-            // Of the voltage that begins to act now, as the modulator really gives it, at the measured current.
-            power_w: begins
-                .map_or(0.0, |mean| 1.5 * input.link_v * mean.dot(input.measured.currents_a.clarke())),
-        }
+        output.command.voltage_v = voltage.voltage_v;
+        output.command.angle = voltage.vector.angle();
+        output.command.rate = settings.clock.angle_rate(omega);
+        output.torque_nm = target.torque_nm;
+        output.weakening = target.region != Region::Mtpa;
+        // Of the voltage that begins to act now, as the modulator really gives it, at the measured current.
+        output.power_w =
+            begins.map_or(0.0, |mean| 1.5 * input.link_v * mean.dot(input.measured.currents_a.clarke()));
     }
 
     /// The torque that is asked for, by the operator or by the speed loop.

@@ -241,24 +241,29 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
     }
 
     /// Follows both rotors.
+    #[inline(always)]
     fn track(&mut self, input: Input, port: &mut impl ControlPort<Dual>) -> [Angle; 2] {
-        let mut angles = [Angle::ZERO; 2];
-        let mut violation = None;
-        let motors = self.axes.iter_mut().zip(&mut angles).zip(input.sample.angles).zip(SENSOR_LOST);
-        for (((axis, angle), measured), fault) in motors {
-            let found = match measured {
-                Some(measured) => {
-                    *angle = measured;
-                    let trusted = self.disarmed.has(fault);
-                    let off_rad = axis.track(measured, trusted, &self.settings);
-                    off_rad.map(|rad| (fault, rad, axis::INNOVATION_RAD))
-                }
-                None => axis.lose_angle(fault, input.command.enable),
-            };
-            violation = violation.or(found.filter(|(fault, _, _)| !self.disarmed.has(*fault)));
+        let [first, second] = input.sample.angles;
+        let enable = input.command.enable;
+        let upper = self.follow::<0>(first, enable);
+        let lower = self.follow::<1>(second, enable);
+        // The upper motor's first, if both are lost.
+        self.check(upper, port);
+        self.check(lower, port);
+        [first.unwrap_or(Angle::ZERO), second.unwrap_or(Angle::ZERO)]
+    }
+
+    /// Follows one rotor.
+    #[inline(always)]
+    fn follow<const MOTOR: usize>(&mut self, measured: Option<Angle>, enable: bool) -> Option<Violation> {
+        let (axis, fault) = (&mut self.axes[MOTOR], SENSOR_LOST[MOTOR]);
+        let trusted = self.disarmed.has(fault);
+        match measured {
+            Some(measured) => axis
+                .track(measured, trusted, &self.settings)
+                .map(|off_rad| (fault, off_rad, axis::INNOVATION_RAD)),
+            None => axis.lose_angle(fault, enable),
         }
-        self.check(violation, port);
-        angles
     }
 
     /// The measurements for the control law: the link as a two-level inverter's that can give as much.
@@ -298,13 +303,15 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         self.check(violation, port);
     }
 
-    fn check_frozen(&mut self, measured: &[Measurements; 2], port: &mut impl ControlPort<Dual>) {
-        let mut violation = None;
-        for ((axis, measured), lost) in self.axes.iter_mut().zip(measured).zip(SENSOR_LOST) {
-            let found = axis.check_frozen(measured, lost, &self.settings, self.machine.tables());
-            violation = violation.or(found.filter(|(fault, _, _)| !self.disarmed.has(*fault)));
-        }
-        self.check(violation, port);
+    #[inline(always)]
+    fn check_frozen(&mut self, [first, second]: &[Measurements; 2], port: &mut impl ControlPort<Dual>) {
+        let (settings, tables) = (&self.settings, self.machine.tables());
+        let [upper, lower] = &mut self.axes;
+        let [lost_upper, lost_lower] = SENSOR_LOST;
+        let upper = upper.check_frozen(first, lost_upper, settings, tables);
+        let lower = lower.check_frozen(second, lost_lower, settings, tables);
+        self.check(upper, port);
+        self.check(lower, port);
     }
 
     /// Control laws of motors and link, while pulses are made.
@@ -325,17 +332,14 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         // The operating points in turn: the lower motor's in the periods between.
         self.upper_aims = !self.upper_aims;
         let turns = [self.upper_aims, !self.upper_aims];
-        let step = |axis: &mut Axis<L>, measured, demand, speed_torque_nm, applied, aims| {
-            axis.step(
-                &AxisInput { measured, demand, speed_torque_nm, applied, link_v, aims },
-                settings,
-                tables,
-            )
-        };
         let motors = &mut self.driven.motors;
         let [o1, o2] = motors;
-        *o1 = step(first, m1, d1, l1, a1, turns[0]);
-        *o2 = step(second, m2, d2, l2, a2, turns[1]);
+        let upper =
+            AxisInput { measured: m1, demand: d1, speed_torque_nm: l1, applied: a1, link_v, aims: turns[0] };
+        first.step(&upper, settings, tables, o1);
+        let lower =
+            AxisInput { measured: m2, demand: d2, speed_torque_nm: l2, applied: a2, link_v, aims: turns[1] };
+        second.step(&lower, settings, tables, o2);
         let link = ZSourceInput {
             capacitor_v: sample.capacitor_v,
             inductor_a: sample.inductor_a,

@@ -47,6 +47,9 @@ pub const LOWEST_SHARE: f32 = 0.9;
 /// Longest dead time that the gates' hardware may insert, in s.
 const DEAD_TIME_S: f32 = 5e-6;
 
+/// Control periods from one operating point of a motor to its next one: the motors take turns.
+pub(crate) const TURNS: u32 = 2;
+
 /// The settings of both tasks.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -81,8 +84,19 @@ impl Settings {
             carrier_ticks,
             dead_time_ticks: 0,
             // Its dead time takes voltage along either motor's current, too: nothing tells that from an error of the flux linkage.
-            gains: Gains { carrier: 0.6, observer: 0.02, resistance_from: 4.0, ..Gains::DEFAULT },
-            speed: SpeedDesign { inertia_kg_m2: 0.1, natural_rad_s: 280.0, period_s },
+            // What is learnt is learnt in every other period, from both.
+            gains: Gains {
+                carrier: 0.6,
+                observer: TURNS as f32 * 0.02,
+                sixth_turn_rad: TURNS as f32 * Gains::DEFAULT.sixth_turn_rad,
+                resistance_from: 4.0,
+                ..Gains::DEFAULT
+            },
+            speed: SpeedDesign {
+                inertia_kg_m2: 0.1,
+                natural_rad_s: 280.0,
+                period_s: TURNS as f32 * period_s,
+            },
             link,
             link_gains: link.gains(),
             limits: LinkLimits { source_min_v: 280.0, capacitor_max_v: 720.0, duty_max: link.duty_max },

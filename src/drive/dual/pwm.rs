@@ -265,14 +265,18 @@ impl Expected {
 
     /// With this many compare steps in a half, and at most so many in a pause of a gate that must be seen on.
     fn of(period: &PlayedPeriod, half: u32, longest_pause: u32) -> Self {
-        let mut expected = Self { must_be_on: 0, may_be_on: 0, is_off: 0 };
+        let mut expected = Self { must_be_on: ALL_GATES, may_be_on: ALL_GATES, is_off: ALL_GATES };
+        // Most gates are both on and off for long: one comparison tells.
+        let ordinary = longest_pause.saturating_sub(1);
         let mut bit = 1;
         for gate in &period.gates {
             // Never the other way round: rounding keeps order.
             let pause = gate.off_to.wrapping_sub(gate.off_from);
-            expected.must_be_on |= if pause < longest_pause { bit } else { 0 };
-            expected.may_be_on |= if pause < half { bit } else { 0 };
-            expected.is_off |= if pause > 0 { bit } else { 0 };
+            if pause.wrapping_sub(1) >= ordinary {
+                expected.must_be_on ^= if pause < longest_pause { 0 } else { bit };
+                expected.may_be_on ^= if pause < half { 0 } else { bit };
+                expected.is_off ^= if pause > 0 { 0 } else { bit };
+            }
             bit <<= 1;
         }
         expected

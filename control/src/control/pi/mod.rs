@@ -175,6 +175,10 @@ impl ControlLaw for PiLaw {
         self.samples.boundary = Some(sample.current);
     }
 
+    fn pass(&mut self, sample: &RotorSample) {
+        self.samples.boundary = Some(sample.current);
+    }
+
     fn aim(&mut self, input: &AimInput, law: &Law) {
         let AimInput { demand, window, udc_v, limits, .. } = *input;
         let (tables, omega) = (law.tables, self.speed.omega());
