@@ -29,7 +29,7 @@ const LONGEST_FILE: usize = 4_096;
 const MINUTE_S: u32 = 60;
 const SEED: u32 = 1;
 
-/// Where the inputs come from: the kept ones alone, and the seed's; or all that have grown on this machine, too, and anything.
+/// Origin of the inputs: the kept ones alone, and the seed's; or all that have grown on this machine, too, and anything.
 #[derive(Clone, Copy)]
 enum Origin {
     Seed(u32),
