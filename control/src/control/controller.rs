@@ -6,8 +6,8 @@
 use super::speed::SpeedTracker;
 use super::{
     Boundary, Committed, ControlLaw, Demand, Law, LinkSwing, LinkWindow, ModeLimits, OperatingPoint, Region,
-    Regulated, RotorSample, VoltageLimit, VoltageVector, current_loop, demand, disturbance, flux_path,
-    link_filter, map_error, operating_point, torque_nm, torque_trim,
+    Regulated, RotorSample, VoltageLimit, VoltageVector, current_loop, demagnetisation, demand, disturbance,
+    flux_path, link_filter, map_error, operating_point, torque_nm, torque_trim,
 };
 use crate::frames::{Angle, Dq, six_step_v};
 use crate::machine::Tables;
@@ -217,7 +217,7 @@ impl ControlLaw for Controller {
         self.target = Target {
             torque_nm: if limited || swing.is_none() { given_nm } else { damped_nm },
             current: point.current,
-            flux: self.path.step(point.flux, way, omega, period_s),
+            flux: self.led(&point, way, period_s, tables),
             region: point.region,
             depth,
             voltage_limit_v: limits.depth_limit * six_step_v(link.usable_v),
@@ -273,6 +273,14 @@ impl ControlLaw for Controller {
 }
 
 impl Controller {
+    /// The flux reference on its way to an operating point, in Wb.
+    #[inline(always)]
+    fn led(&mut self, point: &OperatingPoint, way: (bool, bool), period_s: f32, tables: &Tables) -> Dq {
+        let flux = self.path.step(point.flux, way, self.speed.omega(), period_s);
+        // There already, the point keeps the limit.
+        if flux == point.flux { flux } else { demagnetisation::kept(flux, point.current.q, tables) }
+    }
+
     /// EMF of the `present` flux linkage in Wb, from which a pattern will lead to that of the operating point, in V: as far as the map's
     /// error is known, and with it what it will leave unexplained there.
     fn start_flying(&mut self, present: Dq) -> Dq {

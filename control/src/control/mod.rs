@@ -12,6 +12,7 @@
 mod angle_harmonics;
 mod controller;
 pub mod current_loop;
+mod demagnetisation;
 mod demand;
 mod disturbance;
 mod flux_path;

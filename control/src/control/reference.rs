@@ -161,7 +161,8 @@ fn weakened(torque_nm: f32, mtpa_squared: f32, omega: f32, voltage_v: f32, table
     let [d, effective] = currents.at(at, (1.0 - left) / ((1.0 + share_knee) - left));
     let torque_nm = if torque_nm < 0.0 { -given } else { given };
     Weakened {
-        current: Dq { d, q: torque_nm / (factor * effective) },
+        // Beyond the narrowest circle the table would go on.
+        current: Dq { d: ratings.kept_id_a(d), q: torque_nm / (factor * effective) },
         torque_nm,
         region: if limited { Region::Limit } else { Region::Weakening },
         inside,
