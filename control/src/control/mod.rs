@@ -26,6 +26,7 @@ mod reference;
 mod speed;
 mod speed_loop;
 mod torque_trim;
+mod warmth;
 mod z_source;
 
 use crate::frames::{Abc, AlphaBeta, Angle, Dq, SinCos};
@@ -44,6 +45,7 @@ pub use pi::{MtpaStart, PiLaw};
 pub use reference::{OperatingPoint, Region, VoltageLimit, operating_point};
 pub use speed::SpeedTracker;
 pub use speed_loop::{SpeedDesign, SpeedInput, SpeedLoop};
+pub use warmth::{Scales, Warmth};
 pub use z_source::{
     Limited, ZSource, ZSourceDesign, ZSourceError, ZSourceGains, ZSourceInput, ZSourceOutput,
 };
