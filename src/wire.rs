@@ -285,7 +285,7 @@ pub fn command_from_words([torque, flags, _]: [u32; 3]) -> DriveCommand {
         enable: flags & 1 != 0,
         demand: Demand { torque_nm: f32::from_bits(torque), slew_limited: flags & 2 != 0 },
         window: LinkWindow::OPEN,
-        acknowledge: 0,
+        ..DriveCommand::NONE
     }
 }
 

@@ -61,7 +61,8 @@ macro_rules! whole_scalars {
 whole_scalars!(u32, usize);
 
 /// Scalars for which 0 is a value like any other: what is ideal, what is not there, where an axis begins.
-const MAY_BE_ZERO: [&str; 8] = [
+const MAY_BE_ZERO: [&str; 9] = [
+    "ratings.min_id_a",
     "ratings.stator_resistance_ohm",
     "ratings.magnet_flux_wb",
     "ratings.trip_dc_under_v",
@@ -99,7 +100,7 @@ fn try_all<C: Copy, T, V: Scalar>(
 fn try_tables(good: &'static Tables, check: impl Fn(&Tables) -> Result<(), Refused> + Copy) {
     check(good).unwrap_or_else(|refused| panic!("{}: {refused}", good.name));
     let ratings = fields!(Ratings as Ratings {
-        pole_pairs, stator_resistance_ohm, max_torque_nm, max_power_w, max_current_a, max_speed_rad_s, magnet_flux_wb,
+        pole_pairs, stator_resistance_ohm, max_torque_nm, max_power_w, max_current_a, min_id_a, max_speed_rad_s, magnet_flux_wb,
         dc_link_min_v, dc_link_nominal_v, dc_link_max_v, max_switching_hz, trip_current_a, trip_dc_over_v,
         trip_dc_under_v, trip_speed_rad_s, torque_slew_nm_s |
     }: f32);

@@ -46,7 +46,7 @@ fn cells(line: &str) -> Vec<&str> {
 
 /// The item that a fault of the campaign is of, by the beginning of its name.
 fn item(fault: &str) -> &'static str {
-    const ITEMS: [(&str, &str); 15] = [
+    const ITEMS: [(&str, &str); 17] = [
         ("current-", "current sensor"),
         ("angle-", "angle sensor"),
         ("link-", "DC link and its line"),
@@ -61,6 +61,8 @@ fn item(fault: &str) -> &'static str {
         ("resistance-", "machine beside its tables"),
         ("shoot-through-", "power device or its driver"),
         ("none", "nothing"),
+        ("winding-sensor-", "temperature sensor"),
+        ("heat-sink-sensor-", "temperature sensor"),
         ("", "power device or its driver"),
     ];
     let found = ITEMS.iter().find(|(begin, _)| fault.starts_with(begin));

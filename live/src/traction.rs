@@ -102,7 +102,9 @@ impl Driven for Traction {
     }
 
     fn faults(&self) -> Vec<String> {
-        faults().into_iter().skip(1).map(|fault| fault.name).collect()
+        // Its operator knows no temperature sensors.
+        let told = faults().into_iter().skip(1).filter(|fault| !matches!(fault.cause, Cause::Sensor(..)));
+        told.map(|fault| fault.name).collect()
     }
 
     fn want(&mut self, wanted: Wanted) {
@@ -138,6 +140,7 @@ impl Driven for Traction {
                 self.live.set_flux_scale(flux_scale);
                 self.live.set_resistance_scale(resistance_scale);
             }
+            Cause::Sensor(..) => bail!("`{name}`: no temperature sensors here"),
         }
         Ok(())
     }

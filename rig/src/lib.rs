@@ -65,5 +65,6 @@ mod steps;
 pub mod talk;
 pub mod trace;
 pub mod verdict;
+pub mod warmth;
 pub mod without;
 pub mod zs9;

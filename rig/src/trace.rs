@@ -105,18 +105,26 @@ pub struct Extremes {
     pub lowest_nm: f64,
     /// Largest one, in N·m.
     pub highest_nm: f64,
+    /// Lowest i_d, in A.
+    pub lowest_id_a: f64,
 }
 
 impl Extremes {
     /// Before anything is seen.
-    pub const NONE: Self = Self { current_a: 0.0, lowest_nm: f64::INFINITY, highest_nm: f64::NEG_INFINITY };
+    pub const NONE: Self = Self {
+        current_a: 0.0,
+        lowest_nm: f64::INFINITY,
+        highest_nm: f64::NEG_INFINITY,
+        lowest_id_a: f64::INFINITY,
+    };
 
-    /// With one more instant's phase currents and torque.
-    pub fn with(self, currents_a: [f64; 3], torque_nm: f64) -> Self {
+    /// With one more instant's phase currents, torque and i_d.
+    pub fn with(self, currents_a: [f64; 3], torque_nm: f64, id_a: f64) -> Self {
         Self {
             current_a: currents_a.into_iter().fold(self.current_a, |most, current| most.max(current.abs())),
             lowest_nm: self.lowest_nm.min(torque_nm),
             highest_nm: self.highest_nm.max(torque_nm),
+            lowest_id_a: self.lowest_id_a.min(id_a),
         }
     }
 }
@@ -277,6 +285,8 @@ pub trait Recorded {
     fn trip(&self) -> Option<Trip>;
     /// The last row's time, in s.
     fn end_s(&self) -> f64;
+    /// The lowest i_d of any motor, in A.
+    fn lowest_id_a(&self) -> f64;
     /// Writes trace.csv.
     fn write_trace(&self, path: &Path) -> Result<()>;
     /// Writes recorder.csv, if a fault has frozen the flight recorder; else takes away what an earlier run has left.
@@ -292,6 +302,10 @@ impl Recorded for Recording {
 
     fn end_s(&self) -> f64 {
         self.rows.last().map_or(0.0, |row| row.t_s)
+    }
+
+    fn lowest_id_a(&self) -> f64 {
+        self.rows.iter().map(|row| row.extremes.lowest_id_a).fold(f64::INFINITY, f64::min)
     }
 
     fn write_trace(&self, path: &Path) -> Result<()> {

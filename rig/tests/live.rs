@@ -122,6 +122,7 @@ fn wrong(cause: Cause) -> (Live, Option<Fault>) {
             live.set_flux_scale(flux_scale);
             live.set_resistance_scale(resistance_scale);
         }
+        Cause::Sensor(..) => unreachable!("no temperature sensors here"),
     }
     run(&mut live, if cause == Cause::Runaway { 0.6 } else { 0.05 });
     let named = live.trip().map(|trip| trip.fault);
@@ -132,6 +133,9 @@ fn wrong(cause: Cause) -> (Live, Option<Fault>) {
 fn every_fault_is_named_as_in_the_campaign() {
     let mut named = 0;
     for fault in faults().into_iter().skip(1).filter(|fault| fault.fast) {
+        if matches!(fault.cause, Cause::Sensor(..)) {
+            continue;
+        }
         if let (_, Some(name)) = wrong(fault.cause) {
             assert!(fault.rule.names.contains(&name), "{}: {}", fault.name, name.name());
             named += 1;

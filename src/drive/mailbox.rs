@@ -2,7 +2,7 @@
 //! sees the same command wherever the idle loop stood.
 
 use crate::cell::{Mailbox, Seqlock, Words};
-use crate::control::{Demand, LinkWindow};
+use crate::control::{Demand, LinkWindow, Warmth};
 use crate::nine_switch::Scheme;
 use crate::ports::{DriveCommand, DualDriveCommand, DualReport, MotorDemand, Report};
 use crate::time::{Clock, Instant};
@@ -34,8 +34,9 @@ const FROM: usize = 0;
 
 impl Words<7> for Timed<DriveCommand> {
     fn to_words(self) -> [u32; 7] {
-        let DriveCommand { enable, demand, window, acknowledge } = self.command;
+        let DriveCommand { enable, demand, window, acknowledge, warmth } = self.command;
         let flags = u32::from(enable) | u32::from(demand.slew_limited) << 1 | u32::from(acknowledge) << 8;
+        let flags = flags | u32::from(warmth.word()) << 16;
         [
             self.from.0,
             flags,
@@ -60,6 +61,7 @@ impl Words<7> for Timed<DriveCommand> {
                     braking_none_v: f32::from_bits(braking_none),
                 },
                 acknowledge: (flags >> 8) as u8,
+                warmth: Warmth::from_word((flags >> 16) as u16),
             },
             from: Instant(from),
         }

@@ -4,7 +4,7 @@ use super::grip::Grip;
 use super::line_limits::{Drawn, Most};
 use super::settings::Ends;
 use super::{Levels, Limits, MotorLimits, Ramp, Rates, Refusal, Request, Seen, Settings, Situation};
-use crate::control::{Demand, LinkWindow};
+use crate::control::{Demand, LinkWindow, Warmth};
 use crate::drive::Observation;
 use crate::frames::{Dq, SQRT_3, limit};
 use crate::machine::Ratings;
@@ -39,9 +39,9 @@ pub trait Demands: Copy {
     fn asks_torque(request: &Self::Request) -> bool;
     /// Takes over limits that are good.
     fn take_limits(&mut self, request: &Self::Request);
-    /// Takes over the share of the limits that the temperatures leave, 0 ..= 1.
+    /// Takes over what the temperatures leave of the limits, 0 ..= 1, and make of the machine.
     #[inline]
-    fn derate(&mut self, _share: f32) {}
+    fn derate(&mut self, _share: f32, _warmth: Warmth) {}
     /// `true` if nothing is asked for any more.
     fn are_at_rest(&self) -> bool;
     /// At rest at once.
@@ -67,6 +67,7 @@ pub struct TorqueDemand {
     limits: Option<Limits>,
     /// The share of them that the temperatures leave.
     share: f32,
+    warmth: Warmth,
     line: LineVoltage,
     drawn: Drawn,
     grip: Grip,
@@ -95,6 +96,7 @@ impl Demands for TorqueDemand {
         ramp: Ramp::new(),
         limits: None,
         share: 1.0,
+        warmth: Warmth::NONE,
         line: LineVoltage::UNKNOWN,
         drawn: Drawn::UNKNOWN,
         grip: Grip::FULL,
@@ -148,8 +150,8 @@ impl Demands for TorqueDemand {
     }
 
     #[inline]
-    fn derate(&mut self, share: f32) {
-        self.share = share;
+    fn derate(&mut self, share: f32, warmth: Warmth) {
+        (self.share, self.warmth) = (share, warmth);
     }
 
     #[inline]
@@ -159,7 +161,7 @@ impl Demands for TorqueDemand {
 
     #[inline]
     fn drop(&mut self) {
-        *self = Self { limits: self.limits, share: self.share, ..Self::AT_REST };
+        *self = Self { limits: self.limits, share: self.share, warmth: self.warmth, ..Self::AT_REST };
     }
 
     #[inline]
@@ -200,6 +202,7 @@ impl Demands for TorqueDemand {
             demand: Demand { torque_nm: self.torque_nm(), slew_limited: true },
             window: self.line.window(&self.limits(settings), settings.ratings),
             acknowledge,
+            warmth: self.warmth,
         }
     }
 }

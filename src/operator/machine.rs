@@ -8,6 +8,7 @@ use super::{
     ACKNOWLEDGE_S, Configuration, Demands, Feedback, Input, Output, Refusal, SELF_TEST_S, Seen, Settings,
     Situation, State, Status, Switches, health, line,
 };
+use crate::control::Warmth;
 use crate::protection::{Fault, SafeState, Trip, Violation};
 use crate::thermal::{Load, Temperatures, ThermalState};
 
@@ -138,7 +139,10 @@ impl<D: Demands> Operator<D> {
         let (temperatures, violation) =
             self.thermal.step(&load, feedback.temperatures, thermal, settings.slot_s);
         self.temperatures = temperatures;
-        self.demands.derate(temperatures.map_or(1.0, |temperatures| temperatures.torque_share));
+        let (share, warmth) = temperatures.map_or((1.0, Warmth::NONE), |temperatures| {
+            (temperatures.torque_share, thermal.warmth(&temperatures, settings.ratings))
+        });
+        self.demands.derate(share, warmth);
         violation
     }
 

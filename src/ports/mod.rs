@@ -5,7 +5,7 @@
 mod dual;
 mod report;
 
-use crate::control::{Demand, LinkWindow, Measurements};
+use crate::control::{Demand, LinkWindow, Measurements, Warmth};
 use crate::frames::{Abc, Angle};
 use crate::modulation::CarrierHalf;
 use crate::protection::{Fault, LegFaults, SafeState};
@@ -53,6 +53,8 @@ pub struct DriveCommand {
     pub window: LinkWindow,
     /// Number of the operator's last acknowledge: a new one, with the gates off, makes both interrupts forget their fault.
     pub acknowledge: u8,
+    /// The warmth of the machine, where its temperatures are measured.
+    pub warmth: Warmth,
 }
 
 impl DriveCommand {
@@ -62,6 +64,7 @@ impl DriveCommand {
         demand: Demand { torque_nm: 0.0, slew_limited: true },
         window: LinkWindow::OPEN,
         acknowledge: 0,
+        warmth: Warmth::NONE,
     };
 }
 

@@ -17,6 +17,8 @@ pub use magnet::Magnets;
 pub use model::{DeviceLosses, Rise, copper_factor};
 pub use sensor::{Element, Sensor};
 
+use crate::control::Warmth;
+use crate::machine::Ratings;
 use crate::protection::{Fault, Violation};
 use magnet::MagnetState;
 use model::RiseState;
@@ -47,6 +49,16 @@ pub struct Thermal {
     pub junction_trip_c: f32,
     /// The magnets; `None`: nothing is known of them.
     pub magnets: Option<Magnets>,
+}
+
+impl Thermal {
+    /// The warmth of a machine's winding, and of its magnets once their temperature is known, for the control law.
+    pub fn warmth(&self, temperatures: &Temperatures, ratings: &Ratings) -> Warmth {
+        let resistance_ohm = self.resistance_ohm * copper_factor(temperatures.winding_c);
+        let of_magnets = self.magnets.as_ref().zip(temperatures.magnets_c);
+        let share = of_magnets.map_or(0.0, |(magnets, celsius)| magnets.per_k * (celsius - magnets.map_c));
+        Warmth::new(resistance_ohm / ratings.stator_resistance_ohm, share)
+    }
 }
 
 /// Time for which a sensor must be wrong, or a part too hot, in s: far below what either takes, and longer than what a disturbed conversion does.

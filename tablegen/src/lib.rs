@@ -14,6 +14,7 @@
 #![forbid(unsafe_code)]
 
 mod axis;
+mod demagnetisation;
 mod error;
 mod input;
 mod map;
@@ -83,6 +84,7 @@ impl MachineFolder {
     /// Parameters and map must fit each other.
     fn checked(self, [machine_toml, flux_map_csv]: &[PathBuf; 2]) -> Result<Self, InputError> {
         self.map.check_range(self.parameters.max_current_a, flux_map_csv)?;
+        demagnetisation::check(&self, machine_toml)?;
         self.check_torque(machine_toml)?;
         Ok(self)
     }

@@ -7,6 +7,7 @@ pub struct Optimum<'a> {
     map: &'a SmoothMap,
     factor: f64,
     max_current_a: f64,
+    least_id_a: f64,
 }
 
 /// Golden-section steps: 0.618⁶⁰ of the interval is below 1e-12 of it.
@@ -17,12 +18,13 @@ const HALVINGS: u32 = 80;
 impl<'a> Optimum<'a> {
     /// For a machine.
     pub fn new(map: &'a SmoothMap, parameters: &Parameters) -> Self {
-        Self::of(map, parameters.pole_pairs, parameters.max_current_a)
+        let whole = Self::of(map, parameters.pole_pairs, parameters.max_current_a);
+        Self { least_id_a: parameters.least_id_a(), ..whole }
     }
 
-    /// For a map of so many pole pairs, within a largest current in A, peak.
+    /// For a map of so many pole pairs, within a largest current in A, peak, whatever i_d.
     pub fn of(map: &'a SmoothMap, pole_pairs: u32, max_current_a: f64) -> Self {
-        Self { map, factor: 1.5 * f64::from(pole_pairs), max_current_a }
+        Self { map, factor: 1.5 * f64::from(pole_pairs), max_current_a, least_id_a: f64::NEG_INFINITY }
     }
 
     /// Air-gap torque at a current, in N·m.
@@ -35,7 +37,8 @@ impl<'a> Optimum<'a> {
     fn at_magnitude(&self, current_a: f64) -> (f64, f64) {
         let torque = |angle: f64| self.torque_nm(-current_a * angle.sin(), current_a * angle.cos());
         // The optimum lies on the other side of the q axis for a machine with L_d > L_q.
-        let angle = largest(-std::f64::consts::FRAC_PI_4, std::f64::consts::FRAC_PI_2, torque);
+        let most_rad = (-self.least_id_a / current_a).min(1.0).asin();
+        let angle = largest(-std::f64::consts::FRAC_PI_4, most_rad, torque);
         (torque(angle), angle)
     }
 

@@ -78,6 +78,8 @@ parameters! {
         max_switching_hz: 50.0..=100e3;
     }
     optional {
+        /// Least direct-axis current, negative, in A: the magnets' demagnetisation limit; default −`max_current_a`, which limits nothing.
+        min_id_a: -1e5..=0.0, -max_current_a;
         /// Phase current that trips the drive, in A; default 1.3 × `max_current_a`.
         trip_current_a: ABOVE_ZERO..=1e6, 1.3 * max_current_a;
         /// DC-link voltage above which the drive trips, in V; default 1.15 × `dc_link_max_v`.
@@ -110,6 +112,11 @@ impl Parameters {
         let relative = speed_rpm.abs() / self.rated_speed_rpm;
         let quadratic = self.loss_quadratic_fraction;
         self.loss_rated_w * (quadratic * relative * relative + (1.0 - quadratic) * relative)
+    }
+
+    /// The demagnetisation limit, in A: i_d is never below; −∞ where there is none.
+    pub fn least_id_a(&self) -> f64 {
+        if self.min_id_a > -self.max_current_a { self.min_id_a } else { f64::NEG_INFINITY }
     }
 
     /// Reads and checks the file.
@@ -152,7 +159,20 @@ impl Parameters {
                 return Err(InputError::new(file, line, problem));
             }
         }
+        self.check_least_id(file)?;
         self.check_switching(file)
+    }
+
+    /// A demagnetisation limit below what the current limit allows anyway is none.
+    fn check_least_id(&self, file: &Path) -> Result<(), InputError> {
+        if self.min_id_a >= -self.max_current_a {
+            return Ok(());
+        }
+        let problem = format!(
+            "min_id_a: {}: must be from {}, −max_current_a, to 0",
+            self.min_id_a, -self.max_current_a
+        );
+        Err(InputError::new(file, self.line_of("min_id_a"), problem))
     }
 
     /// The order of limits: a trip level lies beyond its limit.

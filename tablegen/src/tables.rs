@@ -233,6 +233,7 @@ fn ratings(parameters: &Parameters, magnet_flux_wb: f64) -> Ratings {
         max_torque_nm: parameters.max_torque_nm as f32,
         max_power_w: parameters.max_power_w as f32,
         max_current_a: parameters.max_current_a as f32,
+        min_id_a: parameters.min_id_a as f32,
         max_speed_rad_s: (parameters.max_speed_rpm * rad_s) as f32,
         magnet_flux_wb: magnet_flux_wb.max(0.0) as f32,
         dc_link_min_v: parameters.dc_link_min_v as f32,

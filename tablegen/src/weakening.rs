@@ -22,7 +22,7 @@ struct Point {
     torque: f64,
 }
 
-/// The circle of flux linkage `psi_wb` of a machine within a current limit, with currents at `torque · shares`.
+/// The circle of flux linkage `psi_wb` of a machine within a current limit and above its least i_d, with currents at `torque · shares`.
 pub fn circle(
     psi_wb: f64,
     shares: &[f64],
@@ -32,10 +32,12 @@ pub fn circle(
 ) -> Circle {
     let optimum = Optimum::new(map, &machine.parameters);
     let highest_id = machine.map.id_a[machine.map.id_a.len() - 1];
-    let arc = rising_arc(psi_wb, map, &optimum, max_current_a);
+    let least_id_a = machine.parameters.least_id_a();
+    let within = |point: &Point| point.id.hypot(point.iq) <= max_current_a && point.id >= least_id_a;
+    let arc = rising_arc(psi_wb, map, &optimum, within);
     let Some(top) = arc.last().copied() else {
         // No current within the limit has this flux: nothing to give, and the current that comes nearest.
-        let nearest = (-max_current_a, 0.0);
+        let nearest = ((-max_current_a).max(least_id_a), 0.0);
         return Circle { torque_nm: TINY_TORQUE_NM, currents_a: vec![nearest; shares.len()] };
     };
     let torque_nm = top.torque.max(TINY_TORQUE_NM);
@@ -58,11 +60,16 @@ pub fn circle(
 /// Stands for no torque where something divides by it.
 const TINY_TORQUE_NM: f64 = 1e-3;
 
-/// The part of the circle where torque rises from nothing to its most, within the current limit.
+/// The part of the circle where torque rises from nothing to its most, within the limits.
 ///
 /// On a circle wider than the magnet's flux the smallest load angles need id > 0, where reluctance torque is negative; so
 /// the whole circle is searched first, and the arc is what leads up to its summit.
-fn rising_arc(psi_wb: f64, map: &SmoothMap, optimum: &Optimum, max_current_a: f64) -> Vec<Point> {
+fn rising_arc(
+    psi_wb: f64,
+    map: &SmoothMap,
+    optimum: &Optimum,
+    within: impl Fn(&Point) -> bool,
+) -> Vec<Point> {
     let mut scanned: Vec<Point> = Vec::new();
     let mut from = (0.0, 0.0);
     for k in 0..=ANGLE_STEPS {
@@ -70,7 +77,6 @@ fn rising_arc(psi_wb: f64, map: &SmoothMap, optimum: &Optimum, max_current_a: f6
         from = (point.id, point.iq);
         scanned.push(point);
     }
-    let within = |point: &Point| point.id.hypot(point.iq) <= max_current_a;
     let by_torque = |a: &(usize, &Point), b: &(usize, &Point)| a.1.torque.total_cmp(&b.1.torque);
     let inside = scanned.iter().enumerate().filter(|(_, point)| within(point));
     let Some((top, _)) = inside.max_by(by_torque) else {
@@ -133,7 +139,7 @@ fn on_arc(arc: &[Point], wanted_nm: f64, psi_wb: f64, map: &SmoothMap, optimum: 
 }
 
 /// The current with a given id that gives a torque.
-fn at_id(id: f64, wanted_nm: f64, optimum: &Optimum, max_current_a: f64) -> (f64, f64) {
+pub(crate) fn at_id(id: f64, wanted_nm: f64, optimum: &Optimum, max_current_a: f64) -> (f64, f64) {
     let (mut low, mut high) = (0.0, max_current_a);
     for _ in 0..60 {
         let middle = 0.5 * (low + high);

@@ -107,6 +107,8 @@ fn mix(a: f64, b: f64, share: f64) -> f64 {
     a + (b - a) * share
 }
 
+/// Just within, in single precision, as a share.
+const ALMOST: f64 = 0.999;
 /// The smallest circle at most, as a share of the largest flux linkage.
 const MOST_LOW: f64 = 0.7;
 
@@ -116,9 +118,16 @@ impl<'a> Circles<'a> {
         let max_omega = parameters.max_speed_rpm * TAU / 60.0 * f64::from(parameters.pole_pairs);
         // Below what the lowest link gives at the highest speed, and above what full torque needs. Where the link has much voltage in
         // reserve, the circles still lie where the machine's flux linkage does.
-        let low =
-            (LEAST_DEPTH * FRAC_2_PI * parameters.dc_link_min_v / max_omega).min(MOST_LOW * top_flux_wb);
+        let least_wb = FRAC_2_PI * parameters.dc_link_min_v / max_omega;
+        let low = (LEAST_DEPTH * least_wb).min(MOST_LOW * top_flux_wb);
+        // Nor where the demagnetisation limit leaves no current, but for what any table has.
+        let reach_wb = smooth.at(parameters.least_id_a().max(-parameters.max_current_a), 0.0).psi_d_wb;
+        let limited = parameters.least_id_a().is_finite();
+        let low = if limited { low.max(reach_wb.min(ALMOST * least_wb)) } else { low };
         let high = (1.15 * top_flux_wb).max(1.5 * low);
+        // The largest torque then may take almost as much flux linkage as there is.
+        let most = smooth.at(0.0, parameters.max_current_a);
+        let high = if limited { high.min(ALMOST * most.psi_d_wb.hypot(most.psi_q_wb)) } else { high };
         let knee_wb = FLUX_KNEE * high;
         let share = |k: usize| {
             let x = k as f64 / (COLUMNS - 1) as f64 / (1.0 + SHARE_KNEE);
@@ -173,6 +182,7 @@ impl<'a> Circles<'a> {
     fn moved(&self, start: (f64, f64), torque_nm: f64, from_wb: f64, to_wb: f64) -> (f64, f64) {
         let (mut id, mut iq) = start;
         let highest_id = self.machine.map.id_a[self.machine.map.id_a.len() - 1];
+        let allowed = |id: f64| id <= highest_id && id >= self.machine.parameters.least_id_a();
         let at = self.smooth.at(id, iq);
         if from_wb == to_wb || (at.psi_d_wb.hypot(at.psi_q_wb) / from_wb - 1.0).abs() > 1e-9 {
             return start;
@@ -184,7 +194,7 @@ impl<'a> Circles<'a> {
             if torque.abs() < 1e-9 * self.machine.parameters.max_torque_nm
                 && square.abs() < 1e-12 * to_wb * to_wb
             {
-                return if id > highest_id { start } else { (id, iq) };
+                return if allowed(id) { (id, iq) } else { start };
             }
             let torque_by_id = self.factor * (at.ldd_h * iq - at.lqd_h * id - at.psi_q_wb);
             let torque_by_iq = self.factor * (at.psi_d_wb + at.ldq_h * iq - at.lqq_h * id);

@@ -5,7 +5,7 @@ mod common;
 #[path = "common/judge.rs"]
 mod judge;
 
-use common::{Analytic, Folder, REFERENCE, SMALL, axis, good_toml, linear, reference_folder};
+use common::{Analytic, Folder, REFERENCE, SMALL, axis, good_map, good_toml, linear, reference_folder};
 use judge::Judge;
 use tractive_tablegen::MachineFolder;
 
@@ -13,6 +13,8 @@ use tractive_tablegen::MachineFolder;
 struct Bounds {
     mtpa: (f64, f64),
     weakening: (f64, f64),
+    /// Torque of weakening, of the largest one.
+    of_largest: f64,
 }
 
 fn check(name: &str, machine: MachineFolder, bounds: &Bounds) {
@@ -26,7 +28,7 @@ fn check(name: &str, machine: MachineFolder, bounds: &Bounds) {
     assert!(weakening.torque < bounds.weakening.0 && weakening.other < bounds.weakening.1, "{name}");
     // Of single precision.
     assert!(weakening.above < 1e-6, "{name}: more flux linkage than asked for");
-    assert!(mtpa.torque_of_largest < 1e-3 && weakening.torque_of_largest < 1e-3, "{name}");
+    assert!(mtpa.torque_of_largest < 1e-3 && weakening.torque_of_largest < bounds.of_largest, "{name}");
     assert!(mtpa.current_a < most && weakening.current_a < most, "{name}");
 }
 
@@ -52,7 +54,10 @@ fn check_nodes(name: &str, judge: &Judge) {
     assert!((20..=65).contains(&flux.columns), "{name}: {} columns", flux.columns);
 }
 
-const TIGHT: Bounds = Bounds { mtpa: (0.003, 5e-4), weakening: (0.003, 0.003) };
+/// The highest demagnetisation limit of the reference machine, in A.
+const MOST_ID_A: f64 = -152.1;
+
+const TIGHT: Bounds = Bounds { mtpa: (0.003, 5e-4), weakening: (0.003, 0.003), of_largest: 1e-3 };
 
 #[test]
 fn the_reference_machine() {
@@ -130,6 +135,25 @@ fn a_grid_that_reaches_as_far_above_zero_as_below() {
     let map = REFERENCE.map(&axis(-250.0, 10.0, 51), &axis(0.0, 10.0, 26));
     let judge = Judge::new(Folder::new(&good_toml(), &map).read().unwrap());
     check_nodes("wide", &judge);
+}
+
+/// With a demagnetisation limit no node and nothing read between nodes is below it, and what is left is the best above it.
+#[test]
+fn the_reference_machine_with_a_demagnetisation_limit() {
+    for least_a in [-200.0, -160.0, MOST_ID_A] {
+        let machine =
+            Folder::new(&format!("{}\nmin_id_a = {least_a}\n", good_toml()), &good_map()).read().unwrap();
+        let (name, judge) = (format!("{least_a} A"), Judge::new(machine.clone()));
+        // Beside the narrowest circle that the limit leaves, torque rises as a root, which one cell shows as a line.
+        let root = Bounds { weakening: (0.003, 0.02), of_largest: 2e-3, ..TIGHT };
+        check(&name, machine, if least_a == MOST_ID_A { &root } else { &TIGHT });
+        let least = least_a as f32 * 1.000_001;
+        assert!(judge.tables.weakening.currents.nodes.iter().all(|[id, _]| *id >= least), "{name}: a node");
+        let starts = judge.tables.mtpa.start.nodes;
+        assert!(starts.iter().all(|[id, ..]| *id >= least), "{name}: a start of MTPA");
+        let reaches = starts.iter().any(|[id, ..]| *id <= 0.999 * least);
+        assert_eq!(reaches, least_a > -180.0, "{name}: MTPA itself is limited");
+    }
 }
 
 #[test]

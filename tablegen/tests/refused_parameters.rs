@@ -197,6 +197,47 @@ fn limits_that_contradict_each_other() {
     }
 }
 
+/// A demagnetisation limit that takes away what the largest current alone would give, or that limits nothing.
+#[test]
+fn a_demagnetisation_limit_that_leaves_too_little() {
+    let with = |line: &str| good_toml() + "\n" + line + "\n";
+    for (line, what) in [
+        ("min_id_a = -240.0", "min_id_a: -240: must be from -233.345, −max_current_a, to 0"),
+        ("min_id_a = 5.0", "min_id_a: 5.0: must be a number from -100000 to 0"),
+        ("min_id = -100.0", "min_id: wrong unit: must be min_id_a"),
+        ("min_id_a = -152.0", "min_id_a: -152: must be at or below -152.1, which max_torque_nm takes"),
+    ] {
+        let text = refusal(&with(line));
+        assert!(text.contains(what), "{text}");
+    }
+    // A machine of less torque weakens less for it than for the highest speed, and than for the rated point on a low link.
+    let weak = toml_with("max_torque_nm", "max_torque_nm = 870.0") + "\nmin_id_a = -120.0\n";
+    let text = refusal(&weak);
+    assert!(
+        text.contains("-120: must be at or below -14")
+            && text.ends_with("which no torque at max_speed_rpm on dc_link_min_v takes"),
+        "{text}"
+    );
+    let slow = weak.replace("max_speed_rpm = 6000.0", "max_speed_rpm = 2800.0");
+    assert!(Folder::new(&slow, &good_map()).read().is_ok());
+    let fast = slow.replace("rated_speed_rpm = 2000.0", "rated_speed_rpm = 2690.0");
+    let text = refusal(&fast);
+    assert!(text.ends_with("which rated_torque_nm at rated_speed_rpm on dc_link_nominal_v takes"), "{text}");
+    // Where the largest current does not weaken as far as the speed asks for, the limit takes nothing away.
+    let mut fast = slow;
+    for (from, to) in [
+        ("max_speed_rpm = 2800.0", "max_speed_rpm = 60000.0"),
+        ("max_switching_hz = 900.0", "max_switching_hz = 5000.0"),
+        ("max_torque_nm = 870.0", "max_torque_nm = 500.0"),
+        ("rated_torque_nm = 859.4", "rated_torque_nm = 400.0"),
+        ("max_current_a = 233.345", "max_current_a = 180.0"),
+    ] {
+        assert!(fast.contains(from), "{from}");
+        fast = fast.replace(from, to);
+    }
+    Folder::new(&fast, &good_map()).read().unwrap();
+}
+
 /// A thousand times what is good is nonsense for every key, and told by the key's name.
 #[test]
 fn a_number_a_thousand_times_too_large() {

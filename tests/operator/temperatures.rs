@@ -2,6 +2,7 @@
 
 use crate::world::{SLOT_S, World};
 use proptest::prelude::*;
+use tractive::control::Warmth;
 use tractive::operator::{Refusal, State};
 use tractive::protection::{Fault, Trip};
 use tractive::thermal::{
@@ -229,6 +230,26 @@ fn settings_that_make_no_sense_are_refused_by_name() {
         spoil(&mut thermal);
         assert_eq!(thermal.check().unwrap_err().name, name);
     }
+}
+
+#[test]
+fn the_command_tells_the_drive_how_warm_the_machine_is() {
+    let cold = World::running();
+    assert_eq!(cold.output().command.warmth, Warmth::NONE, "without settings");
+    let mut world = warm(World::running());
+    let near =
+        |found: f32, wanted: f32, step: f32| assert!((found - wanted).abs() < step, "{found}, {wanted}");
+    let rated_ohm = world.settings.ratings.stator_resistance_ohm;
+    let warmth = world.output().command.warmth;
+    near(warmth.resistance_ratio(), 0.1 * copper_factor(told(&world).winding_c) / rated_ohm, 0.01);
+    assert_eq!(warmth.magnet_share(), 0.0, "magnets are not known yet");
+    (world.observed.id_a, world.observed.iq_a, world.observed.map_error) = (0.0, 1.0, -0.1);
+    world.slots(1_100);
+    near(told(&world).magnets_c.expect("an estimate"), 120.0, 0.1);
+    near(world.output().command.warmth.magnet_share(), -0.1, 1e-3);
+    // Words of a mailbox take both along.
+    let warmth = world.output().command.warmth;
+    assert_eq!(Warmth::from_word(warmth.word()), warmth);
 }
 
 /// Numbers as they come from broken sensors, too.

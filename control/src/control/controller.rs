@@ -6,8 +6,8 @@
 use super::speed::SpeedTracker;
 use super::{
     Boundary, Committed, ControlLaw, Demand, Law, LinkSwing, LinkWindow, ModeLimits, OperatingPoint, Region,
-    Regulated, RotorSample, VoltageLimit, VoltageVector, current_loop, demand, disturbance, flux_path,
-    link_filter, map_error, operating_point, torque_nm, torque_trim,
+    Regulated, RotorSample, Scales, VoltageLimit, VoltageVector, Warmth, current_loop, demagnetisation,
+    demand, disturbance, flux_linkage, flux_path, link_filter, map_error, reference, torque_nm, torque_trim,
 };
 use crate::frames::{Angle, Dq, six_step_v};
 use crate::machine::Tables;
@@ -82,6 +82,10 @@ pub struct Controller {
     /// That torque, smoothed, in N·m.
     flowing_nm: f32,
     target: Target,
+    /// Stator resistance over its rating.
+    resistance_ratio: f32,
+    /// The magnets' flux linkage over the map's, less 1.
+    magnet_share: f32,
 }
 
 impl Controller {
@@ -108,6 +112,8 @@ impl Controller {
             samples: 0,
             flowing_nm: 0.0,
             target: Target::NONE,
+            resistance_ratio: 1.0,
+            magnet_share: 0.0,
         }
     }
 }
@@ -128,7 +134,7 @@ impl ControlLaw for Controller {
     }
 
     fn map_scale(&self) -> f32 {
-        self.map_error.scale()
+        self.map_error.scales().flux
     }
 
     fn map_error(&self) -> f32 {
@@ -141,6 +147,21 @@ impl ControlLaw for Controller {
 
     fn target(&self) -> &Target {
         &self.target
+    }
+
+    #[inline(never)]
+    fn warm(&mut self, warmth: Warmth, law: &Law) {
+        self.resistance_ratio = warmth.resistance_ratio();
+        let (current, tables) = (self.target.current, law.tables);
+        let flux = flux_linkage(tables, current);
+        let from_a = law.gains.resistance_from * tables.ratings.max_current_a;
+        // The voltage of all that the magnets have, at 1 rad/s.
+        let seen = Dq { d: 0.0, q: -tables.ratings.magnet_flux_wb };
+        let whole = map_error::share_of(seen, 1.0, current, flux, from_a);
+        let share = warmth.magnet_share();
+        let new = whole * (share - self.magnet_share);
+        self.magnet_share = share;
+        self.map_error.warm(warmth.scales(current, flux, tables), whole * share, new);
     }
 
     fn idle(&mut self) {
@@ -168,7 +189,7 @@ impl ControlLaw for Controller {
         let omega = self.speed.omega();
         let turn_rad = 6.0 * omega.abs() * boundary.length_s;
         let sixth = follows == Regulated::Mean && turn_rad < law.gains.sixth_turn_rad;
-        let resistance = law.tables.ratings.stator_resistance_ohm;
+        let resistance = self.resistance_ohm(law.tables);
         let input = disturbance::Input { boundary, sample, omega, resistance, sixth };
         self.disturbance.step(&input, law.gains);
     }
@@ -177,20 +198,20 @@ impl ControlLaw for Controller {
         let AimInput { demand, window, udc_v, swing, limits } = *input;
         let (tables, omega) = (law.tables, self.speed.omega());
         let ratings = &tables.ratings;
-        let scale = self.map_error.scale();
+        let Scales { torque, flux } = self.map_error.scales();
         let map_nm = self.sum_nm / self.samples as f32;
-        let measured_nm = map_nm * scale;
+        let measured_nm = map_nm * torque;
         let period_s = self.passed_s(law.clock);
         (self.sum_nm, self.samples) = (0.0, 0);
-        self.flowing_nm +=
-            (map_nm * self.map_error.known_scale() - self.flowing_nm) * (period_s / (period_s + TOLD_S));
+        self.flowing_nm += (map_nm * self.map_error.known_torque_scale() - self.flowing_nm)
+            * (period_s / (period_s + TOLD_S));
         let can_step = limits.follows == Regulated::Mean;
         let shaping =
             demand::Input { demand, window, udc_v, omega, flowing_nm: measured_nm, can_step, period_s };
         let demand_nm = self.demand.step(&shaping, ratings);
         let link = self.link.step(udc_v, period_s);
         let most = limits.depth_limit * limits.steady_share;
-        let limit = VoltageLimit { udc_v: link.slow_v / scale, depth: most, filled: limits.filled };
+        let limit = VoltageLimit { udc_v: link.slow_v / flux, depth: most, filled: limits.filled };
         let trim_nm = self.trim.trim_nm(demand_nm, limits.ripple_share, ratings.max_torque_nm);
         let damping_nm = swing.map_or(0.0, |swing| {
             swing.damping_nm(law.gains.link_damping, demand_nm, omega, ratings.max_torque_nm)
@@ -198,12 +219,12 @@ impl ControlLaw for Controller {
         let more_nm = trim_nm + damping_nm;
         let outwards = |nm: f32| if demand_nm < 0.0 { demand_nm - nm } else { demand_nm + nm };
         let (trimmed_nm, damped_nm) = (outwards(more_nm), outwards(damping_nm));
-        let point = operating_point(trimmed_nm / scale, omega, &limit, tables);
+        let point = reference::point(trimmed_nm / torque, omega, &limit, self.resistance_ohm(tables), tables);
         let depth = point.depth
             * swing.map_or(link.slow_v / self.link.lowest_v(), |swing| link.slow_v * swing.per_slow_v)
             - DEPTH_PER_TORQUE / ratings.max_torque_nm * more_nm;
         let limited = point.region == Region::Limit;
-        let given_nm = if limited { nearer_zero(point.torque_nm * scale, demand_nm) } else { demand_nm };
+        let given_nm = if limited { nearer_zero(point.torque_nm * torque, demand_nm) } else { demand_nm };
         self.trim.step(&torque_trim::Input {
             demand_nm,
             measured_nm: swing.map_or(measured_nm, |_| measured_nm - (damped_nm - demand_nm)),
@@ -217,7 +238,7 @@ impl ControlLaw for Controller {
         self.target = Target {
             torque_nm: if limited || swing.is_none() { given_nm } else { damped_nm },
             current: point.current,
-            flux: self.path.step(point.flux, way, omega, period_s),
+            flux: self.led(&point, way, period_s, tables),
             region: point.region,
             depth,
             voltage_limit_v: limits.depth_limit * six_step_v(link.usable_v),
@@ -245,7 +266,7 @@ impl ControlLaw for Controller {
         law: &Law,
     ) -> VoltageVector {
         let omega = self.speed.omega();
-        let resistance = law.tables.ratings.stator_resistance_ohm;
+        let resistance = self.resistance_ohm(law.tables);
         let half_way = Angle::within_half_turn(0.5 * omega * committed.horizon_s).sin_cos();
         let ahead = current_loop::ahead(sample, half_way, committed, &self.disturbance, resistance);
         let input = current_loop::Input {
@@ -273,6 +294,20 @@ impl ControlLaw for Controller {
 }
 
 impl Controller {
+    /// Stator resistance of a phase, in ohm.
+    #[inline(always)]
+    fn resistance_ohm(&self, tables: &Tables) -> f32 {
+        tables.ratings.stator_resistance_ohm * self.resistance_ratio
+    }
+
+    /// The flux reference on its way to an operating point, in Wb.
+    #[inline(always)]
+    fn led(&mut self, point: &OperatingPoint, way: (bool, bool), period_s: f32, tables: &Tables) -> Dq {
+        let flux = self.path.step(point.flux, way, self.speed.omega(), period_s);
+        // There already, the point keeps the limit.
+        if flux == point.flux { flux } else { demagnetisation::kept(flux, point.current.q, tables) }
+    }
+
     /// EMF of the `present` flux linkage in Wb, from which a pattern will lead to that of the operating point, in V: as far as the map's
     /// error is known, and with it what it will leave unexplained there.
     fn start_flying(&mut self, present: Dq) -> Dq {

@@ -166,6 +166,7 @@ mod tests {
             max_torque_nm: 1_000.0,
             max_power_w: 180e3,
             max_current_a: 230.0,
+            min_id_a: -230.0,
             max_speed_rad_s: 2_500.0,
             magnet_flux_wb: 0.6,
             dc_link_min_v: 1_000.0,

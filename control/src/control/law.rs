@@ -1,7 +1,9 @@
 //! The seam between a drive and its control law: the stages that a drive's control task calls, whichever law it runs.
 
 use super::speed::SpeedTracker;
-use super::{AimInput, Boundary, Committed, Law, ModeLimits, Regulated, RotorSample, Target, VoltageVector};
+use super::{
+    AimInput, Boundary, Committed, Law, ModeLimits, Regulated, RotorSample, Target, VoltageVector, Warmth,
+};
 use crate::frames::Angle;
 use crate::machine::Tables;
 use crate::time::Clock;
@@ -80,6 +82,10 @@ pub trait ControlLaw {
 
     /// The target of the current loop by the newest operating point; nothing while no pulses are made.
     fn target(&self) -> &Target;
+
+    /// Takes the machine's warmth into account from the next operating point on; call where there is time, as often as the operating point
+    /// changes. A law that knows nothing of temperatures goes on as rated.
+    fn warm(&mut self, _warmth: Warmth, _law: &Law) {}
 
     /// Forgets what it has learnt but for the speed, as the gates are off.
     fn idle(&mut self);

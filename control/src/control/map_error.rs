@@ -7,8 +7,10 @@
 //! ε = ((u·i)(jωψ·i) − (u·jωψ)(|i|² + i₀²)) / (|ωψ|² (|i|² + i₀²) − (jωψ·i)²)
 //!
 //! The estimate is reported; beyond what a link sensor may be off, the operating point takes it into account: such a machine needs for a
-//! torque the current that the map gives for T/(1 + ε), and the voltage that it gives on a link of udc/(1 + ε).
+//! torque the current that the map gives for T/(1 + ε), and the voltage that it gives on a link of udc/(1 + ε). What [`super::Warmth`] explains
+//! of it is taken into account whole, for torque and flux linkage each by its own amount, and only the rest is an error.
 
+use super::Scales;
 use crate::frames::{Dq, limit_magnitude};
 
 /// Speed from which the disturbance tells something of the map, as a share of the largest, over that of the largest current which tells
@@ -43,34 +45,56 @@ pub struct Input {
 
 #[derive(Clone, Copy, Debug)]
 pub struct MapError {
+    /// Without what temperatures explain.
     share: f32,
-    /// Of `share`: made where that changes, since it is wanted far more often.
-    scale: f32,
+    /// Of a warm machine, as far as its temperatures are known: what they explain is no error.
+    warm: Scales,
+    explained: f32,
+    /// Of `share` and `warm`: made where they change, since it is wanted far more often.
+    believed: Scales,
 }
 
 impl MapError {
     pub const fn new() -> Self {
-        Self { share: 0.0, scale: 1.0 }
+        Self { share: 0.0, warm: Scales::NONE, explained: 0.0, believed: Scales::NONE }
     }
 
     /// ε, as far as it is known.
     pub fn share(&self) -> f32 {
-        self.share
+        self.share + self.explained
     }
 
-    /// 1 + ε, as far as it is believed.
-    pub fn scale(&self) -> f32 {
-        self.scale
+    /// 1 + ε, as far as it is believed or known by temperatures: of the flux linkage, and of the torque.
+    pub fn scales(&self) -> Scales {
+        self.believed
+    }
+
+    /// Knowledge by temperatures: torque and flux linkage, the ε that a machine so warm shows with the present currents, and the part of it that is
+    /// new, because the temperatures are: what was an error until now is none.
+    pub fn warm(&mut self, warm: Scales, explained: f32, new: f32) {
+        (self.warm, self.explained) = (warm, explained);
+        self.share -= new;
+        self.believe();
     }
 
     /// 1 + ε with nothing of a believed ε left alone: for the flux linkage of the magnets in a machine that is caught.
     pub fn caught_scale(&self) -> f32 {
-        if self.scale == 1.0 { 1.0 } else { self.known_scale() }
+        if self.believed == Scales::NONE { 1.0 } else { 1.0 + limit_magnitude(self.share(), MOST) }
     }
 
-    /// 1 + ε, as far as it is known.
-    pub fn known_scale(&self) -> f32 {
-        1.0 + limit_magnitude(self.share, MOST)
+    /// Torque over that of the map, as far as it is known.
+    pub fn known_torque_scale(&self) -> f32 {
+        (1.0 + limit_magnitude(self.share, MOST)) * self.warm.torque
+    }
+
+    fn believe(&mut self) {
+        let left = self.share;
+        let believed = if left.abs() > LEFT_ALONE {
+            1.0 + limit_magnitude(left - LEFT_ALONE.copysign(left), MOST)
+        } else {
+            1.0
+        };
+        self.believed = Scales { torque: believed * self.warm.torque, flux: believed * self.warm.flux };
     }
 
     /// A time with a mean disturbance.
@@ -80,21 +104,21 @@ impl MapError {
         if omega.abs() < resistance_from * (FROM * fastest) {
             return;
         }
-        let from_a = resistance_from * largest_a;
-        let emf = flux.j();
-        let along_emf = disturbance.d * emf.d + disturbance.q * emf.q;
-        let along_current = disturbance.d * current.d + disturbance.q * current.q;
-        let both = emf.d * current.d + emf.q * current.q;
-        let squared = current.squared() + from_a * from_a;
-        let seen =
-            (along_current * both - along_emf * squared) / (omega * (flux.squared() * squared - both * both));
-        self.share += BANDWIDTH_RAD_S * period_s * (seen - self.share);
-        self.scale = if self.share.abs() > LEFT_ALONE {
-            1.0 + limit_magnitude(self.share - LEFT_ALONE.copysign(self.share), MOST)
-        } else {
-            1.0
-        };
+        let seen = share_of(disturbance, omega, current, flux, resistance_from * largest_a);
+        self.share += BANDWIDTH_RAD_S * period_s * (seen - self.explained - self.share);
+        self.believe();
     }
+}
+
+/// ε of a voltage in V that is unexplained at an electrical angular speed in rad/s, a current in A and its flux linkage by the map in Wb, with i₀ in A.
+#[inline(always)]
+pub fn share_of(voltage: Dq, omega: f32, current: Dq, flux: Dq, from_a: f32) -> f32 {
+    let emf = flux.j();
+    let along_emf = voltage.d * emf.d + voltage.q * emf.q;
+    let along_current = voltage.d * current.d + voltage.q * current.q;
+    let both = emf.d * current.d + emf.q * current.q;
+    let squared = current.squared() + from_a * from_a;
+    (along_current * both - along_emf * squared) / (omega * (flux.squared() * squared - both * both))
 }
 
 #[cfg(test)]

@@ -12,6 +12,7 @@
 mod angle_harmonics;
 mod controller;
 pub mod current_loop;
+mod demagnetisation;
 mod demand;
 mod disturbance;
 mod flux_path;
@@ -25,6 +26,7 @@ mod reference;
 mod speed;
 mod speed_loop;
 mod torque_trim;
+mod warmth;
 mod z_source;
 
 use crate::frames::{Abc, AlphaBeta, Angle, Dq, SinCos};
@@ -43,6 +45,7 @@ pub use pi::{MtpaStart, PiLaw};
 pub use reference::{OperatingPoint, Region, VoltageLimit, operating_point};
 pub use speed::SpeedTracker;
 pub use speed_loop::{SpeedDesign, SpeedInput, SpeedLoop};
+pub use warmth::{Scales, Warmth};
 pub use z_source::{
     Limited, ZSource, ZSourceDesign, ZSourceError, ZSourceGains, ZSourceInput, ZSourceOutput,
 };

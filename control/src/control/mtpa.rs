@@ -3,7 +3,8 @@
 use crate::frames::{Dq, sqrt};
 use crate::machine::Tables;
 
-/// The current of least magnitude for a torque in N·m (either sign, |T| within the machine's largest), in A.
+/// The current of least magnitude for a torque in N·m (either sign, |T| within the machine's largest), in A; its i_d is no lower than the
+/// demagnetisation limit.
 ///
 /// The first pass reads ψ_f and L_q − L_d at the start point that the tables give for this torque, the second one at the
 /// result of the first. What the start points and trims hold is decided offline.
@@ -30,7 +31,7 @@ pub fn mtpa(torque_nm: f32, tables: &Tables) -> Dq {
     let [d_start, q_start, d_trim, q_trim] = tables.mtpa.start.at(torque);
     let start = Dq { d: d_start, q: q_start };
     let current = mtpa_passes::<2>(torque, start, tables) + Dq { d: d_trim, q: q_trim };
-    Dq { d: current.d, q: if torque_nm < 0.0 { -current.q } else { current.q } }
+    Dq { d: tables.ratings.kept_id_a(current.d), q: if torque_nm < 0.0 { -current.q } else { current.q } }
 }
 
 /// `PASSES` of the paper's passes for a torque of at least zero, in N·m, the first with the parameters at `start`, in A. The

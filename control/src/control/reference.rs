@@ -89,6 +89,18 @@ const MTPA_OFF: f32 = 0.002;
 /// # }
 /// ```
 pub fn operating_point(torque_nm: f32, omega: f32, limit: &VoltageLimit, tables: &Tables) -> OperatingPoint {
+    point(torque_nm, omega, limit, tables.ratings.stator_resistance_ohm, tables)
+}
+
+/// The same at another stator resistance, in ohm.
+#[inline(always)]
+pub(super) fn point(
+    torque_nm: f32,
+    omega: f32,
+    limit: &VoltageLimit,
+    resistance: f32,
+    tables: &Tables,
+) -> OperatingPoint {
     // The torque axis ends where the current does.
     let most = tables.mtpa.start.last();
     let beyond = torque_nm.abs() > most;
@@ -96,7 +108,6 @@ pub fn operating_point(torque_nm: f32, omega: f32, limit: &VoltageLimit, tables:
     let region = if beyond { Region::Limit } else { Region::Mtpa };
     let best = mtpa(torque_nm, tables);
     let flux = flux_linkage(tables, best);
-    let resistance = tables.ratings.stator_resistance_ohm;
     let steady_v = flux.j() * omega + best * resistance;
     let six_step_v = six_step_v(limit.udc_v);
     let voltage_v = limit.depth * six_step_v;
@@ -107,12 +118,19 @@ pub fn operating_point(torque_nm: f32, omega: f32, limit: &VoltageLimit, tables:
         return unweakened;
     }
     let Weakened { current, torque_nm, region, inside } =
-        weakened(torque_nm, best.squared(), omega, voltage_v, tables);
+        weakened(torque_nm, best.squared(), &Electrical { omega, voltage_v, resistance }, tables);
     let right = current.d - best.d >= MTPA_OFF * tables.ratings.max_current_a;
     if region == Region::Weakening && (right || inside) && !limit.filled {
         return unweakened;
     }
     OperatingPoint { current, flux: flux_linkage(tables, current), torque_nm, region, depth }
+}
+
+/// Electrical angular speed in rad/s, largest voltage in V and stator resistance in ohm.
+struct Electrical {
+    omega: f32,
+    voltage_v: f32,
+    resistance: f32,
 }
 
 /// A point on a circle of flux linkage.
@@ -127,7 +145,8 @@ struct Weakened {
 /// The point on the circle of flux linkage that the voltage allows, for either sign of torque. From (3) squared,
 /// `u² = (ωψ)² + 2 R ω T/(1.5 n_p) + R² i²`, all of it taken times 1/ω². Inlined, so that the compiler knows the tables.
 #[inline(always)]
-fn weakened(torque_nm: f32, mtpa_squared: f32, omega: f32, voltage_v: f32, tables: &Tables) -> Weakened {
+fn weakened(torque_nm: f32, mtpa_squared: f32, at: &Electrical, tables: &Tables) -> Weakened {
+    let Electrical { omega, voltage_v, resistance } = *at;
     let Weakening { currents, torque, flux_knee_wb, share_knee } = &tables.weakening;
     let ratings = &tables.ratings;
     let factor = 1.5 * ratings.pole_pairs;
@@ -138,13 +157,13 @@ fn weakened(torque_nm: f32, mtpa_squared: f32, omega: f32, voltage_v: f32, table
         let root = sqrt(square);
         root / (root + flux_knee_wb * speed)
     };
-    let resistance_squared = ratings.stator_resistance_ohm * ratings.stator_resistance_ohm;
+    let resistance_squared = resistance * resistance;
     let largest_squared = ratings.max_current_a * ratings.max_current_a;
     // Without torque and with the largest current. From there the most torque along its slope: its own drop leaves less flux, or
     // more when braking. As the slope is the least one, the flux comes out too small rather than too large.
     let square = voltage_v * voltage_v - resistance_squared * largest_squared;
     let [_, most, slope, above, rise] = torque.at(place(square));
-    let drop = torque_nm.signum() * omega * (2.0 * ratings.stator_resistance_ohm / factor);
+    let drop = torque_nm.signum() * omega * (2.0 * resistance / factor);
     let most = most * speed * speed / (speed * speed + drop * slope);
     let magnitude = torque_nm.abs();
     let flowing = if magnitude > most { most } else { magnitude };
@@ -161,7 +180,8 @@ fn weakened(torque_nm: f32, mtpa_squared: f32, omega: f32, voltage_v: f32, table
     let [d, effective] = currents.at(at, (1.0 - left) / ((1.0 + share_knee) - left));
     let torque_nm = if torque_nm < 0.0 { -given } else { given };
     Weakened {
-        current: Dq { d, q: torque_nm / (factor * effective) },
+        // Beyond the narrowest circle the table would go on.
+        current: Dq { d: ratings.kept_id_a(d), q: torque_nm / (factor * effective) },
         torque_nm,
         region: if limited { Region::Limit } else { Region::Weakening },
         inside,

@@ -26,6 +26,8 @@ pub struct Ratings {
     pub max_power_w: f32,
     /// Largest current space vector, peak, in A.
     pub max_current_a: f32,
+    /// Least direct-axis current, −`max_current_a` ..= 0, in A: the magnets' demagnetisation limit; −`max_current_a` limits nothing.
+    pub min_id_a: f32,
     /// Largest mechanical speed, in rad/s.
     pub max_speed_rad_s: f32,
     /// Magnet flux linkage psi_d(0, 0), in Wb; 0 for a machine without magnets.
@@ -48,6 +50,24 @@ pub struct Ratings {
     pub trip_speed_rad_s: f32,
     /// Slew rate of the torque demand, in N·m/s.
     pub torque_slew_nm_s: f32,
+}
+
+impl Ratings {
+    /// The demagnetisation limit, in A; `None` where there is none. Inlined, so that the compiler leaves it out of an image whose machine has
+    /// none.
+    #[inline(always)]
+    pub const fn least_id_a(&self) -> Option<f32> {
+        if self.min_id_a > -self.max_current_a { Some(self.min_id_a) } else { None }
+    }
+
+    /// A direct-axis current, in A, no lower than the demagnetisation limit.
+    #[inline(always)]
+    pub(crate) fn kept_id_a(&self, id_a: f32) -> f32 {
+        match self.least_id_a() {
+            Some(least_a) if id_a < least_a => least_a,
+            _ => id_a,
+        }
+    }
 }
 
 /// MTPA tables: the paper's universal curve, the parameters it is fed with, and where its first pass starts.

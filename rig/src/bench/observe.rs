@@ -4,11 +4,13 @@ use super::Tick;
 use crate::plant::Motor;
 use tractive::protection::SafeState;
 
-/// Largest values, of an instant or over a time.
+/// Extremes, of an instant or over a time.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Peaks {
     /// Phase current, in A.
     pub current_a: f64,
+    /// Lowest i_d, at most 0, in A; the ZS9's of both motors.
+    pub lowest_id_a: f64,
     /// Link voltage, in V; the ZS9's outside shoot-through.
     pub udc_v: f64,
     /// The ZS9's capacitor voltage, in V.
@@ -17,13 +19,14 @@ pub struct Peaks {
 
 impl Peaks {
     /// Of an instant.
-    pub fn at(currents_a: &[f64], udc_v: f64, uc_v: f64) -> Self {
+    pub fn at(currents_a: &[f64], id_a: f64, udc_v: f64, uc_v: f64) -> Self {
         let current_a = currents_a.iter().fold(0.0_f64, |most, current| most.max(current.abs()));
-        Self { current_a, udc_v, uc_v }
+        Self { current_a, lowest_id_a: id_a.min(0.0), udc_v, uc_v }
     }
 
     fn note(&mut self, now: &Self) {
         self.current_a = self.current_a.max(now.current_a);
+        self.lowest_id_a = self.lowest_id_a.min(now.lowest_id_a);
         self.udc_v = self.udc_v.max(now.udc_v);
         self.uc_v = self.uc_v.max(now.uc_v);
     }

@@ -116,7 +116,7 @@ impl Bench {
             mode: if self.inverter.safe().is_some() { Mode::Off } else { self.inverter.half().mode },
             trip: report.trip,
             status: self.dc.operated().and_then(|line| line.status),
-            extremes: self.extremes.with([ia_a, ib_a, ic_a], te_nm),
+            extremes: self.extremes.with([ia_a, ib_a, ic_a], te_nm, id_a),
         }
     }
 }

@@ -38,10 +38,11 @@ impl Bench {
             self.time.now = tick;
             let udc_v = self.udc_v(self.time.now_s());
             let currents_a = self.plant.motor.currents_abc();
+            let (id_a, _) = self.plant.motor.currents_dq();
             if (self.time.lead..self.rows.next).contains(&tick) {
-                self.extremes = self.extremes.with(currents_a, self.plant.motor.torque_nm());
+                self.extremes = self.extremes.with(currents_a, self.plant.motor.torque_nm(), id_a);
             }
-            let peaks = Peaks::at(&currents_a, udc_v, 0.0);
+            let peaks = Peaks::at(&currents_a, id_a, udc_v, 0.0);
             self.observed.note(tick, &peaks, self.plant.motor.speed_rpm());
         }
     }

@@ -51,6 +51,8 @@ pub struct Outcome {
     pub uc_after_v: Option<f64>,
     /// The limit.
     pub uc_limit_v: Option<f64>,
+    /// Lowest i_d from the fault on, in A; the ZS9's of both motors.
+    pub lowest_id_a: f64,
     /// Mean torque less demand where the drive went on, in N·m: the worst of both demands, and for the ZS9 of both motors.
     pub torque_error_nm: f64,
     /// The reason why it is uncaught; empty otherwise.
@@ -122,7 +124,7 @@ impl Outcome {
     /// The head of its CSV.
     pub const COLUMNS: &str = "system,fault,mode,speed_rpm,action,verdict,named,safe_state,carrier_periods,time_ms,\
         since_fault_ms,current_until_a,current_after_a,current_limit_a,udc_until_v,udc_after_v,udc_limit_v,\
-        uc_until_v,uc_after_v,uc_limit_v,torque_error_nm,why";
+        uc_until_v,uc_after_v,uc_limit_v,lowest_id_a,torque_error_nm,why";
 
     /// The line of a case.
     pub fn new<C>(setting: &Setting, fault: &Named<C>, seen: &Seen, allowed: Allowed) -> Self {
@@ -169,6 +171,7 @@ impl Outcome {
             uc_until_v: allowed.uc_v.map(|_| observed.until.uc_v),
             uc_after_v: allowed.uc_v.map(|_| observed.after.uc_v),
             uc_limit_v: allowed.uc_v,
+            lowest_id_a: observed.until.lowest_id_a.min(observed.after.lowest_id_a),
             torque_error_nm: *torque_error_nm,
             why,
         }

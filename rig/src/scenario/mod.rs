@@ -115,7 +115,11 @@ impl<S: System> Choice<S> {
 
     /// The figures to report.
     pub fn figures(&self, recording: &S::Recording, machine: &Machine) -> Figures {
-        self.scenario.figures(recording, &self.filled(machine), machine)
+        let mut figures = self.scenario.figures(recording, &self.filled(machine), machine);
+        if machine.tables.ratings.least_id_a().is_some() {
+            figures.set("lowest_id_a", recording.lowest_id_a());
+        }
+        figures
     }
 
     /// The options with the step of the trace that the scenario takes, and the shortest pulse, where none was given.

@@ -141,6 +141,11 @@ impl Recording {
 }
 
 impl Recorded for Recording {
+    fn lowest_id_a(&self) -> f64 {
+        let motors = self.rows.iter().flat_map(|row| &row.motors);
+        motors.map(|motor| motor.id_a).fold(f64::INFINITY, f64::min)
+    }
+
     fn trip(&self) -> Option<Trip> {
         self.rows.iter().find_map(|row| row.trip)
     }

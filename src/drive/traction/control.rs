@@ -10,7 +10,7 @@ use super::pulses::{Order, Pulses};
 use super::six_step_exit::SixStepExit;
 use super::slot::{Decision, Slot};
 use super::{Settings, Shared};
-use crate::control::{AngleHarmonics, ControlLaw, Controller, LinkDamper, Measurements, ModeLimits};
+use crate::control::{AngleHarmonics, ControlLaw, Controller, LinkDamper, Measurements, ModeLimits, Warmth};
 use crate::drive::acknowledge::Acknowledge;
 use crate::drive::{PeriodInput, SlotTimer};
 use crate::frames::Angle;
@@ -76,6 +76,7 @@ pub struct ControlTask<M = &'static Tables, L = Controller> {
     harmonics: AngleHarmonics,
     innovation_rad: f32,
     zeros: CurrentZeros,
+    warmth: Warmth,
     diodes: DiodeWatch,
 }
 
@@ -119,6 +120,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             harmonics: AngleHarmonics::new(settings.angle_late_s),
             innovation_rad: 0.0,
             zeros: CurrentZeros::new(),
+            warmth: Warmth::NONE,
         }
     }
 

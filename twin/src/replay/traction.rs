@@ -5,7 +5,7 @@ use super::given::Given;
 use super::{CORE_HZ, Commands, Tasks, WORDS};
 use crate::time::Time;
 use crate::world::Edge;
-use tractive::control::{Demand, Gains, LinkWindow};
+use tractive::control::{Demand, Gains, LinkWindow, Warmth};
 use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
 use tractive::frames::{Abc, Angle};
 use tractive::machine::{Ratings, Tables};
@@ -127,6 +127,7 @@ impl Tasks for Host {
             demand: Demand { torque_nm: f32::from_bits(torque), slew_limited: flags & 2 != 0 },
             window: LinkWindow { motoring_none_v, motoring_full_v, braking_full_v, braking_none_v },
             acknowledge: (flags >> 8) as u8,
+            warmth: Warmth::from_word((flags >> 16) as u16),
         });
     }
 

@@ -250,6 +250,7 @@ impl ControlLaw for PiLaw {
             reactance_ohm: omega.abs() * inductance.by_d.d,
             resistance_ohm: resistance,
             largest_a: tables.ratings.max_current_a,
+            least_id_a: tables.ratings.min_id_a,
             passed_s,
         });
         let vector = output.voltage.unpark(sample.frame);
@@ -375,6 +376,7 @@ mod tests {
             reactance_ohm: 1_000.0 * INDUCTANCE_H.d,
             resistance_ohm: RESISTANCE,
             largest_a: 200.0,
+            least_id_a: -200.0,
             passed_s: HALF_S,
         };
         for _ in 0..2_000 {

@@ -59,9 +59,10 @@ impl Reference {
         };
         self.mtpa = mtpa_passes::<2>(torque, start, tables);
         let weakened = moved_a != 0.0;
-        let unlimited = if weakened { moved(self.mtpa, at, moved_a, torque, tables) } else { self.mtpa };
+        let off = weakened || self.mtpa.d < ratings.min_id_a;
+        let unlimited = if off { moved(self.mtpa, at, moved_a, torque, tables) } else { self.mtpa };
         let largest = ratings.max_current_a;
-        let d = limit(unlimited.d, -largest, largest);
+        let d = limit(unlimited.d, ratings.min_id_a, largest);
         let left = sqrt(largest * largest - d * d);
         let is_limited = unlimited.q > left || wanted > most;
         self.last = Dq { d, q: if unlimited.q > left { left } else { unlimited.q } };
@@ -81,7 +82,7 @@ impl Reference {
 /// The current of a torque in N·m, of at least zero, with i_d off that of MTPA; equation (2) with the inductances at a point.
 fn moved(mtpa: Dq, at: Dq, moved_a: f32, torque: f32, tables: &Tables) -> Dq {
     let [psi_f, saliency] = tables.mtpa.parameters.at(at.d, at.q);
-    let d = mtpa.d + moved_a;
+    let d = tables.ratings.kept_id_a(mtpa.d + moved_a);
     let effective = psi_f - saliency * d;
     // Where magnets and saliency cancel no current gives the torque.
     let least = 0.1 * psi_f;

@@ -24,8 +24,9 @@ pub struct Input {
     /// Reactance and resistance of the d axis, in ohm.
     pub reactance_ohm: f32,
     pub resistance_ohm: f32,
-    /// Largest current, in A.
+    /// Largest current, and least i_d, in A.
     pub largest_a: f32,
+    pub least_id_a: f32,
     /// Time since the last step, in s.
     pub passed_s: f32,
 }
@@ -44,6 +45,6 @@ impl Weakening {
         let left_v = share * input.limit_v - input.wanted_v;
         let per_s = BANDWIDTH_RAD_S / (input.reactance_ohm + input.resistance_ohm);
         let highest_a = if input.filled { input.largest_a } else { 0.0 };
-        self.moved_a = limit(self.moved_a + per_s * input.passed_s * left_v, -input.largest_a, highest_a);
+        self.moved_a = limit(self.moved_a + per_s * input.passed_s * left_v, input.least_id_a, highest_a);
     }
 }

@@ -23,7 +23,7 @@ pub struct Total {
 type Quantity = (&'static str, &'static str, &'static str, fn(&Outcome) -> Option<f64>);
 
 /// Things of which the worst cases are told, in their order.
-const QUANTITIES: [Quantity; 8] = [
+const QUANTITIES: [Quantity; 9] = [
     ("worst_carrier_periods", "longest until the gates were safe", " carrier periods", |of| {
         of.carrier_periods
     }),
@@ -32,6 +32,7 @@ const QUANTITIES: [Quantity; 8] = [
     ("worst_forced_current_a", "largest phase current where a device or the source is shorted", " A", |of| {
         of.is_forced().then(|| of.worst_current_a())
     }),
+    ("worst_negative_id_a", "most negative i_d, as −i_d", " A", |of| Some(-of.lowest_id_a)),
     ("worst_udc_v", "highest DC voltage", " V", |of| Some(of.udc_until_v.max(of.udc_after_v))),
     ("worst_uc_v", "highest capacitor voltage", " V", |of| Some(of.uc_until_v?.max(of.uc_after_v?))),
     ("worst_current_share", "largest phase current over what it may be", "", |of| Some(of.current_share())),

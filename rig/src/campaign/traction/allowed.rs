@@ -2,7 +2,7 @@
 
 use super::cases::Case;
 use super::faults::Cause;
-use super::{Drive, STAGES};
+use super::{Drive, STAGES, sensors};
 use crate::bench::Observed;
 use crate::campaign::judge::{Bounded, CURRENT_SHARE, FORCED, half_turn_s};
 use crate::campaign::outcome::{Allowed, Seen};
@@ -67,6 +67,7 @@ impl Drive {
                 carriers_s.max(half_turn_s(speed_rpm - lost_rpm, pole_pairs))
             }
             Cause::Runaway => carriers_s + TRACKING_S,
+            Cause::Sensor(..) => sensors::longest_s(carrier_s),
             _ => carriers_s,
         }
     }

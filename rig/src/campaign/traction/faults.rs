@@ -3,6 +3,7 @@
 use crate::campaign::fault::{BENT, Faults, Named, SensorErrors, UNFELT};
 use crate::inject::sensor::{AngleFault, CurrentFault};
 use crate::inject::traction::{Kind, SupplyFault};
+use crate::plant::Wire;
 use crate::trace::GATES;
 use tractive::protection::Fault;
 
@@ -15,6 +16,8 @@ pub enum Cause {
     Machine(f64, f64),
     /// The rotor runs away.
     Runaway,
+    /// The wire of a temperature sensor: the winding's (0) or the heat sink's (1).
+    Sensor(usize, Wire),
 }
 
 /// The errors of the current sensors; their converters' range is a quarter above the trip level.
@@ -42,7 +45,26 @@ pub fn faults() -> Vec<Named<Cause>> {
     list.add("flux-20%-more", Cause::Machine(1.2, 1.0), CURRENT, Some(ANOTHER_MACHINE), true);
     list.add("flux-20%-less", Cause::Machine(0.8, 1.0), CURRENT, Some(ANOTHER_MACHINE), true);
     list.add("resistance-doubled", Cause::Machine(1.0, 2.0), CURRENT, Some(BENT), true);
+    temperatures(&mut list);
     list.0
+}
+
+/// The temperature sensors: of a thermistor and of a PT1000, so that each way of failing looks cold once and hot once.
+fn temperatures(list: &mut Faults<Cause>) {
+    const WINDING: &[Fault] = &[Fault::WindingSensor];
+    const SINK: &[Fault] = &[Fault::HeatSinkSensor];
+    for (place, sensor, names) in [(0, "winding", WINDING), (1, "heat-sink", SINK)] {
+        let wires = [
+            ("unplugged", Wire::Unplugged),
+            ("shorted", Wire::Shorted),
+            ("too-cold", Wire::Shows(-45.0)),
+            ("too-hot", Wire::Shows(230.0)),
+        ];
+        for (what, wire) in wires {
+            let name = format!("{sensor}-sensor-{what}");
+            list.add(&name, Cause::Sensor(place, wire), names, None, what == "unplugged");
+        }
+    }
 }
 
 /// The current sensors.

@@ -6,6 +6,7 @@ mod conditions;
 mod faults;
 pub mod random;
 mod ride;
+mod sensors;
 
 pub use cases::{Case, cases};
 pub use conditions::Conditions;
@@ -79,6 +80,9 @@ impl Drive {
 
     /// Runs one case; the modes that it went through, too.
     fn run_watched(&self, case: &Case) -> Result<(Outcome, Vec<Mode>)> {
+        if let Cause::Sensor(place, wire) = case.fault.cause {
+            return self.run_sensor(case, place, wire);
+        }
         let mut bench = self.bench(case);
         let devices = self.devices(case.conditions.dead_time_ticks);
         let mut tasks = self.tasks(devices);
@@ -171,6 +175,7 @@ impl Drive {
                 steady(),
             ),
             Cause::Runaway => (Kind::Elsewhere, machine, faster(RUNAWAY_RPM_S)),
+            Cause::Sensor(..) => (Kind::Elsewhere, machine, steady()),
         };
         let settings = bench::Settings {
             injection: Some(Injection { kind, at_s }),

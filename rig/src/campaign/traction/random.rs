@@ -55,10 +55,10 @@ const SLOWEST_RPM: f64 = 100.0;
 /// The coordinate of the action from which there is no torque.
 const COASTING_FROM: f64 = 0.9;
 
-/// The fault of a coordinate. Another machine is no fault here: it is drawn.
+/// The fault of a coordinate. Another machine is no fault here: it is drawn. Temperature sensors have cases of their own.
 fn fault(coordinate: f64) -> Result<Named<Cause>> {
     let mut list = faults();
-    list.retain(|fault| !matches!(fault.cause, Cause::Machine(..)));
+    list.retain(|fault| !matches!(fault.cause, Cause::Machine(..) | Cause::Sensor(..)));
     let above = (coordinate - SOUND_SHARE) / (1.0 - SOUND_SHARE);
     let others = list.len() - 1;
     let index = if above < 0.0 { 0 } else { 1 + ((above * others as f64) as usize).min(others - 1) };

@@ -6,7 +6,7 @@ use super::super::slot::Slot;
 use super::super::{Settings, Shared};
 use super::{ControlTask, Input};
 use crate::control::{
-    AimInput, AngleHarmonics, ControlLaw, Demand, Law, LinkDamper, Measurements, RotorSample,
+    AimInput, AngleHarmonics, ControlLaw, Demand, Law, LinkDamper, Measurements, RotorSample, Warmth,
 };
 use crate::frames::{Angle, SinCos, six_step_v};
 use crate::machine::Machine;
@@ -33,6 +33,10 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         self.revises = self.is_to_revise(now, &input.command.demand);
         let commands = slot.commands || self.revises;
         let aims = slot.aims || (commands && self.aimed != Some(slot.key));
+        // Not in the longest periods, either.
+        if !commands || slot.between > 0 {
+            self.warm(input.command.warmth);
+        }
         // Once a half, and not in the longest periods unless all are.
         if slot.commands && (!aims || slot.between > 0) {
             self.learn_angle(measured.angle, here.frame);
@@ -49,6 +53,16 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         }
         if commands {
             self.command(input.sample, &here, slot);
+        }
+    }
+
+    /// Takes the machine's warmth into account, where its temperatures are measured.
+    #[inline(always)]
+    fn warm(&mut self, warmth: Warmth) {
+        if warmth != Warmth::NONE || self.warmth != Warmth::NONE {
+            let Settings { gains, clock, .. } = &self.settings;
+            self.controller.warm(warmth, &Law { gains, clock, tables: self.machine.tables() });
+            self.warmth = warmth;
         }
     }
 
