@@ -254,6 +254,14 @@ fn flaws_of_the_sensors_do_not_stop_the_drive() {
     assert!(back_ms < 50.0, "{back_ms} ms");
 }
 
+/// Each motor learns in every other period, from the volt-seconds of both; from those of one alone noise would be 2.47 %.
+#[test]
+fn noise_distorts_no_more_than_the_pulses_do() {
+    let outcome = run("zs9-steady --noise-a 0.3 --adc-bits 12 --map-error 10");
+    let thd = figure(&outcome, "thd1_percent");
+    assert!((2.0..2.2).contains(&thd), "{thd} %");
+}
+
 #[test]
 fn the_trace_has_its_columns_and_is_written_whole() {
     let folder = tempfile::tempdir().unwrap();
