@@ -4,14 +4,15 @@ use crate::plant::{HeatSettings, Node};
 use tractive::thermal::{Derating, DeviceLosses, Element, Magnets, Rise, Sensor, Thermal};
 
 /// The sensor in the winding.
-const PT1000: Sensor = Sensor { element: Element::Pt1000, series_ohm: 1e3, range_c: [-40.0, 220.0] };
+pub const PT1000: Sensor = Sensor { element: Element::Pt1000, series_ohm: 1e3, range_c: [-40.0, 220.0] };
 /// The one on the heat sink.
-const NTC: Sensor = Sensor {
+pub const NTC: Sensor = Sensor {
     element: Element::Ntc { at_25_ohm: 10e3, beta_k: 3_435.0 },
     series_ohm: 4.7e3,
     range_c: [-40.0, 130.0],
 };
-const LOSSES: DeviceLosses = DeviceLosses { threshold_v: 1.0, slope_ohm: 5e-3, switching_share: 1e-3 };
+/// The devices' losses.
+pub const LOSSES: DeviceLosses = DeviceLosses { threshold_v: 1.0, slope_ohm: 5e-3, switching_share: 1e-3 };
 
 /// The drive's knowledge of the 180 kW machine and its inverter.
 pub const THERMAL: Thermal = Thermal {

@@ -6,9 +6,7 @@ mod stiff;
 
 use tractive::operator::{Line, Request, State};
 use tractive::protection::Fault;
-use tractive::thermal::{
-    Derating, DeviceLosses, Element, Magnets, PERSISTENCE_S, Rise, Sensor, Temperatures, Thermal,
-};
+use tractive::thermal::{Derating, Magnets, PERSISTENCE_S, Rise, Temperatures, Thermal};
 use tractive::time::Instant;
 use tractive_rig::bench::{LinePlan, Simulated};
 use tractive_rig::machine::Machine;
@@ -17,14 +15,8 @@ use tractive_rig::plant::{
 };
 use tractive_rig::run::Interrupts;
 use tractive_rig::trace::{Recorded, Recording, SlotRow};
+use tractive_rig::warmth::{LOSSES, NTC, PT1000};
 
-const PT1000: Sensor = Sensor { element: Element::Pt1000, series_ohm: 1e3, range_c: [-40.0, 220.0] };
-const NTC: Sensor = Sensor {
-    element: Element::Ntc { at_25_ohm: 10e3, beta_k: 3_435.0 },
-    series_ohm: 4.7e3,
-    range_c: [-40.0, 130.0],
-};
-const LOSSES: DeviceLosses = DeviceLosses { threshold_v: 1.0, slope_ohm: 5e-3, switching_share: 1e-3 };
 const WINDING: (f64, f64) = (5e-3, 0.5);
 const JUNCTION: (f64, f64) = (0.06, 0.1);
 
