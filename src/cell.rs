@@ -326,7 +326,7 @@ impl<const N: usize> History<N> {
     }
 
     /// Reader's side: what `look` makes of the record at a place and of those before it, the newest first; `None` when writes have come round
-    /// to one of them.
+    /// to one of them, or the count has wrapped since the place was found, once in 2³² records.
     #[inline]
     pub fn read<const COUNT: usize, R>(
         &self,
@@ -356,7 +356,10 @@ impl<const N: usize> Default for History<N> {
 
 #[cfg(all(test, not(loom)))]
 mod tests {
+    extern crate std;
+
     use super::*;
+    use std::vec::Vec;
 
     impl Words<1> for u32 {
         fn to_words(self) -> [u32; 1] {
@@ -385,5 +388,100 @@ mod tests {
             assert_eq!(down.newest(|value| value.word::<0>() < n), (n > 1).then(|| n - 1), "{n}");
         }
         assert!(down.published.load(Ordering::Relaxed) < 10 && up.sequence.load(Ordering::Relaxed) < 20);
+    }
+
+    /// Counts around the beginning and around the wrap: a place in a ring depends on the count by its lowest bits, and on the two ends.
+    fn counts() -> impl Iterator<Item = u32> {
+        (0..100).chain(u32::MAX - 100..=u32::MAX)
+    }
+
+    /// The values of a mailbox, from the newest back; `None` where there is none.
+    fn values<const SLOTS: usize>(cell: &Mailbox<u32, 1, SLOTS>) -> Vec<Option<u32>> {
+        (0..SLOTS)
+            .map(|back| {
+                let seen = core::cell::Cell::new(0);
+                cell.newest(|_| seen.replace(seen.get() + 1) == back)
+            })
+            .collect()
+    }
+
+    fn every_slot_is_kept<const SLOTS: usize>() {
+        for count in counts() {
+            let cell = Mailbox::<u32, 1, SLOTS>::new();
+            cell.published.store(count, Ordering::Relaxed);
+            // A count that was reached without these values: all that it has.
+            for (place, slot) in cell.slots.iter().enumerate() {
+                slot[0].store(1_000 + place as u32, Ordering::Relaxed);
+            }
+            let before = values(&cell);
+            assert_eq!(before.iter().flatten().count(), SLOTS.min(count as usize), "{count}");
+            for number in 0..2 * SLOTS {
+                let known = values(&cell);
+                cell.publish(number as u32);
+                let now = values(&cell);
+                // The new one, then all that were there, but for the oldest.
+                assert_eq!(now[0], Some(number as u32), "{count}");
+                assert_eq!(now[1..], known[..SLOTS - 1], "{count}");
+                assert_eq!(cell.last().map(|record| record.word::<0>()), now[0]);
+            }
+        }
+    }
+
+    #[test]
+    fn every_slot_of_a_mailbox_is_kept_until_its_turn() {
+        every_slot_is_kept::<1>();
+        every_slot_is_kept::<2>();
+        every_slot_is_kept::<4>();
+        every_slot_is_kept::<16>();
+        every_slot_is_kept::<32>();
+    }
+
+    /// What is read from a history as it stood, so many records long, after some more have come.
+    fn read<const COUNT: usize>(later: u32, from: u32) -> Option<[u32; COUNT]> {
+        let trail = History::<1>::new();
+        trail.published.store(from, Ordering::Relaxed);
+        (0..8).for_each(|number| trail.publish([number]));
+        let place = trail.find(1, |_| true)?;
+        assert!(trail.is_newest(place));
+        (8..8 + later).for_each(|number| trail.publish([number]));
+        assert_eq!(trail.is_newest(place), later == 0);
+        trail.read(place, |records| records.map(|record| record.word::<0>()))
+    }
+
+    fn every_read_is_whole<const COUNT: usize>() {
+        for (later, from) in (0..12).flat_map(|later| counts().map(move |from| (later, from))) {
+            // The next record would go into the place of the oldest that was read: from then on nothing is told.
+            let kept = later as usize + COUNT < RECORDS;
+            let newest_first = core::array::from_fn(|back| 7 - back as u32);
+            let counted = u64::from(from) + 8;
+            let wraps = counted < 1 << 32 && counted + u64::from(later) >= 1 << 32;
+            let told = (kept && !wraps).then_some(newest_first);
+            assert_eq!(read::<COUNT>(later, from), told, "{later} {from}");
+        }
+    }
+
+    #[test]
+    fn a_history_tells_no_record_that_was_overwritten() {
+        every_read_is_whole::<1>();
+        every_read_is_whole::<2>();
+        every_read_is_whole::<4>();
+        every_read_is_whole::<7>();
+    }
+
+    /// Record `within` back is the last one that is looked for, and none is there before the first.
+    #[test]
+    fn a_history_is_searched_as_far_as_it_is_told() {
+        for from in counts() {
+            let trail = History::<1>::new();
+            assert!(trail.find(8, |_| true).is_none());
+            trail.published.store(from, Ordering::Relaxed);
+            (0..8).for_each(|number| trail.publish([number]));
+            for (within, wanted) in (0..=8).flat_map(|within| (0..8).map(move |wanted| (within, wanted))) {
+                let place = trail.find(within, |record| record.word::<0>() == wanted);
+                assert_eq!(place.is_some(), 7 - wanted < within, "{within} {wanted} {from}");
+                let read = place.and_then(|place| trail.read(place, |[one]: [Record<1>; 1]| one.word::<0>()));
+                assert!(read.is_none_or(|read| read == wanted));
+            }
+        }
     }
 }

@@ -1,10 +1,11 @@
-//! Proofs by all values of so few bits: instants, angles, frames, checksums, compare values. `docs/proof.md` lists what
-//! each one proves, and where its bound is.
+//! Proofs by all values of so few bits: instants, angles, frames, checksums, compare values, legs. `docs/proof.md` lists what
+//! each one proves, and where its bound is; those of what is not public stand beside it.
 
 use std::ops::Range;
 use std::thread;
-use tractive::frames::Angle;
-use tractive::modulation::{Modulator, Reference, Schedule, SwitchLimits};
+use tractive::frames::{Abc, Angle};
+use tractive::modulation::{CarrierHalf, Modulator, Reference, Schedule, SwitchLimits, compensate};
+use tractive::nine_switch::{DeadTime, GateTicks, LegState};
 use tractive::protocol::e2e::{data_ids, is_intact, protect};
 use tractive::protocol::{Command, LinkLimits, Payload, Scales, TorqueLimits};
 use tractive::time::{Clock, Instant};
@@ -187,4 +188,117 @@ fn compare_values_are_within_their_half() {
         }
     }
     assert!(whole > 10_000, "{whole} at the border");
+}
+
+/// Ticks of a carrier half in which every leg of nine switches is tried.
+const FEW: u32 = 8;
+
+/// Six instants in order, from 0 to [`FEW`]: the ends of the pauses of L, M and H.
+fn every_leg() -> impl Iterator<Item = [u32; 6]> {
+    let digit = |number: u32, place: u32| number / (FEW + 1).pow(place) % (FEW + 1);
+    (0..(FEW + 1).pow(6))
+        .map(move |number| [0, 1, 2, 3, 4, 5].map(|place| digit(number, place)))
+        .filter(|ends| ends.is_sorted())
+}
+
+/// The ticks of a half in which a leg shorts the link; `None` if its state is illegal at any time.
+fn shorted([low, middle, high]: [GateTicks; 3]) -> Option<usize> {
+    let states =
+        (0..FEW).map(|tick| LegState::of_gates(high.is_on(tick), middle.is_on(tick), low.is_on(tick)));
+    let states: Option<Vec<LegState>> = states.collect();
+    Some(states?.into_iter().filter(|state| *state == LegState::ShootThrough).count())
+}
+
+fn pauses([la, lb, ma, mb, ha, hb]: [u32; 6]) -> [GateTicks; 3] {
+    [(la, lb), (ma, mb), (ha, hb)].map(|(off_from, off_to)| GateTicks { off_from, off_to })
+}
+
+/// Pauses that are in order make a legal leg, and those that overlap do not: so legality is their order.
+#[test]
+fn a_leg_is_legal_where_its_pauses_are_apart() {
+    let (mut apart, mut together) = (0, 0);
+    for ends in every_leg() {
+        assert!(shorted(pauses(ends)).is_some(), "{ends:?}");
+        apart += 1;
+        let [la, lb, ma, mb, ha, hb] = ends;
+        // The same ends, two pauses exchanged to overlap.
+        for (other, overlaps) in [([la, ma, lb, mb, ha, hb], lb < ma), ([la, lb, ma, ha, mb, hb], mb < ha)] {
+            if overlaps && la < lb && ma < mb && ha < hb {
+                assert_eq!(shorted(pauses(other)), None, "{other:?}");
+                together += 1;
+            }
+        }
+    }
+    assert!(apart == 3_003 && together > 100, "{apart} {together}");
+}
+
+/// Every leg of a half of eight ticks, with every move of its two borders by up to eight: what compensates the dead time only compares,
+/// adds and halves, so that there is nothing in a longer half that is not in this one.
+#[test]
+fn compensated_legs_stay_legal_and_short_nothing_for_longer() {
+    let small_a = 8.0;
+    let currents: Vec<f32> =
+        (-8..=8).map(|tick| tick as f32).chain([f32::NAN, f32::INFINITY, f32::MIN]).collect();
+    let currents: Vec<[f32; 2]> = currents.iter().flat_map(|a| currents.iter().map(|b| [*a, *b])).collect();
+    let (mut moved, mut rests) = (0_u32, 0_u32);
+    for ends in every_leg() {
+        let [low, middle, high] = pauses(ends);
+        let before = shorted([low, middle, high]);
+        for (ticks, currents_a) in
+            [0, 5, 16].into_iter().flat_map(|ticks| currents.iter().map(move |a| (ticks, a)))
+        {
+            let mut gates = [GateTicks::default(); 9];
+            [gates[0], gates[3], gates[6]] = [high, middle, low];
+            let currents_a = currents_a.map(|a| Abc { a, b: 8.0, c: -8.0 });
+            DeadTime { ticks, small_a }.compensate(&mut gates, &currents_a);
+            let leg = [gates[6], gates[3], gates[0]];
+            let ordered = leg.iter().all(|gate| gate.off_from <= gate.off_to && gate.off_to <= FEW);
+            let after = shorted(leg);
+            assert!(
+                ordered && after.is_some() && after <= before,
+                "{ends:?} {ticks} {currents_a:?}: {leg:?}"
+            );
+            assert!([1, 2, 4, 5, 7, 8].iter().all(|other| gates[*other] == GateTicks::default()));
+            assert!(ticks > 0 || leg == [low, middle, high]);
+            *(if leg == [low, middle, high] { &mut rests } else { &mut moved }) += 1;
+        }
+    }
+    assert!(moved > 500_000 && rests > 500_000, "{moved} {rests}");
+}
+
+/// Every edge of a half of 64 ticks of a two-level leg, with every dead time up to 70 and every current's share of it.
+#[test]
+fn compensated_edges_come_earlier_by_the_dead_time_at_most() {
+    let (period_ticks, small_a) = (64, 8.0);
+    let mut moved = 0;
+    for (compare, dead_time_ticks) in (0..=70).flat_map(|compare| (0..=70).map(move |dead| (compare, dead))) {
+        let devices = SwitchLimits { min_pulse_ticks: 0, dead_time_ticks, shortest_half_ticks: period_ticks };
+        for current in (-10..=10).map(|a| a as f32).chain([f32::NAN, f32::INFINITY, f32::NEG_INFINITY]) {
+            for level in [false, true] {
+                let before = CarrierHalf {
+                    period_ticks,
+                    compare_ticks: [compare; 3],
+                    start_levels: [level; 3],
+                    ..CarrierHalf::default()
+                };
+                let mut half = before;
+                compensate(&mut half, &Abc { a: current, b: current, c: current }, small_a, &devices);
+                let [found, ..] = half.compare_ticks;
+                let against = if level { -current } else { current };
+                let most = if compare < period_ticks && against > 0.0 { dead_time_ticks } else { 0 };
+                assert!(
+                    (compare.saturating_sub(most)..=compare).contains(&found),
+                    "{before:?} {current} {found}"
+                );
+                // All of it from the small current on.
+                assert!(
+                    against < small_a || found == compare.saturating_sub(most),
+                    "{before:?} {current} {found}"
+                );
+                assert_eq!(CarrierHalf { compare_ticks: [compare; 3], ..half }, before);
+                moved += u32::from(found < compare);
+            }
+        }
+    }
+    assert!(moved > 50_000, "{moved}");
 }

@@ -3,6 +3,7 @@
 mod document;
 mod dual;
 mod faults;
+mod limits;
 mod line_gap;
 mod properties;
 mod ramp;

@@ -95,12 +95,31 @@ fn whole_pulse(share: f32, period_ticks: u32, min_pulse_ticks: u32) -> u32 {
 mod tests {
     use super::*;
 
+    /// Every on-time of every half up to 120 ticks, with every shortest pulse up to 130: there is nothing but comparisons behind it. And what is
+    /// no share.
     #[test]
     fn a_pulse_is_whole_or_not_there() {
-        for on in 0..=1000_u32 {
-            let got = whole_pulse(on as f32 / 1000.0, 1000, 100);
-            assert!(got == 0 || got == 1000 || (50..=950).contains(&got), "{on} -> {got}");
-            assert!(got.abs_diff(on) <= 25, "{on} -> {got}");
+        for (period, min_pulse) in
+            (0..=120_u32).flat_map(|period| (0..=130_u32).map(move |pulse| (period, pulse)))
+        {
+            let shortest = min_pulse.div_ceil(2);
+            for on in 0..=period {
+                let got = whole_pulse(on as f32 / period.max(1) as f32, period, min_pulse);
+                let is_whole = (shortest..=period.saturating_sub(shortest)).contains(&got);
+                let told = || (period, min_pulse, on, got);
+                if 2 * shortest > period {
+                    assert!(got <= period, "{:?}", told());
+                    continue;
+                }
+                assert!(got == 0 || got == period || is_whole, "{:?}", told());
+                // To the nearer one of what there may be.
+                assert!(got == on || on < shortest || period - on < shortest, "{:?}", told());
+                assert!(got.abs_diff(on) <= shortest.div_ceil(2), "{:?}", told());
+            }
+            let [none, all] = [[f32::NAN, f32::NEG_INFINITY, -1.0], [f32::INFINITY, 2.0, 1.0]];
+            assert!(none.into_iter().all(|share| whole_pulse(share, period, min_pulse) == 0));
+            let fits = |share: f32| 2 * shortest > period || whole_pulse(share, period, min_pulse) == period;
+            assert!(all.into_iter().all(fits));
         }
     }
 

@@ -96,6 +96,24 @@ mod tests {
         }
     }
 
+    /// Every notch of every half up to 120 ticks, with every shortest pulse up to 130, and what is no length.
+    #[test]
+    fn a_notch_and_what_is_beside_it_are_no_shorter_than_half_the_shortest_pulse() {
+        for (period, min_pulse) in
+            (0..=120_u32).flat_map(|period| (0..=130_u32).map(move |pulse| (period, pulse)))
+        {
+            let shortest = min_pulse.div_ceil(2).min(period / 2);
+            for wanted in 0..=130 {
+                let got = whole_notch(wanted as f32, period, min_pulse);
+                assert_eq!(got, wanted.clamp(shortest, period - shortest), "{period} {min_pulse} {wanted}");
+            }
+            let limits = [f32::NAN, f32::NEG_INFINITY, -1.0, f32::INFINITY, f32::MAX];
+            let got = limits.map(|wanted| whole_notch(wanted, period, min_pulse));
+            let longest = period - shortest;
+            assert_eq!(got, [shortest, shortest, shortest, longest, longest], "{period} {min_pulse}");
+        }
+    }
+
     #[test]
     fn notches_follow_equations_16_and_17() {
         let beta3 = 2.0 * half_notch_rad(Mode::Mid3, 700.0, 1500.0);

@@ -322,6 +322,9 @@ impl Modulator {
     }
 }
 
+#[cfg(test)]
+mod proofs;
+
 #[cfg(all(test, feature = "optimal"))]
 mod tests {
     use super::*;

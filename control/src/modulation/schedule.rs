@@ -299,6 +299,9 @@ pub fn first_half(from: Mode, to: Mode, next_half: u32, pulse: Angle) -> u32 {
 }
 
 #[cfg(test)]
+mod proofs;
+
+#[cfg(test)]
 mod tests {
     extern crate std;
 

@@ -34,6 +34,8 @@
 
 mod dead_time;
 mod gates;
+#[cfg(test)]
+mod proofs;
 mod sequence;
 mod shares;
 mod shoot_through;

@@ -1,0 +1,436 @@
+//! Proofs of the choice of mode, by every cell of the arrangement of its borders.
+//!
+//! The choice compares the frequency and the modulation index with the ladder's borders, and looks at nothing else. So it is the same
+//! in a whole cell between the borders, and a few numbers stand for all of them: each border as the first number that is not
+//! below it, both its neighbours, one number between two borders, and all that is no ordinary number. Borders of the
+//! index that the shortest pulse lowers depend on the frequency: where two of them cross, the frequency has a border too.
+//!
+//! Each proof holds for pulses of any shortest length that [`SHORTEST`] brackets by examples.
+
+extern crate std;
+
+use super::*;
+use std::collections::BTreeMap;
+use std::sync::OnceLock;
+use std::vec::Vec;
+
+const CLOCK: Clock = Clock::new(25_000_000, 2_500);
+const LINK_V: f32 = 1_500.0;
+
+/// Shortest pulses, in ticks: none, 10 µs, 40 µs.
+const SHORTEST: [u32; 3] = [0, 250, 1_000];
+
+/// What is no ordinary number, and the ends of those that are.
+const SPECIAL: [f32; 10] = [
+    f32::NAN,
+    f32::NEG_INFINITY,
+    f32::MIN,
+    -1e-3,
+    -0.0,
+    0.0,
+    f32::from_bits(1),
+    f32::MIN_POSITIVE,
+    f32::MAX,
+    f32::INFINITY,
+];
+
+/// The first number from 0 up to `most` that a rule holds for, which holds from there on.
+fn first(most: f32, holds: impl Fn(f32) -> bool) -> f32 {
+    let (mut low, mut high) = (0, most.to_bits());
+    while low < high {
+        let middle = low + (high - low) / 2;
+        (low, high) = if holds(f32::from_bits(middle)) { (low, middle) } else { (middle + 1, high) };
+    }
+    f32::from_bits(low)
+}
+
+/// A number for every cell between these borders.
+fn cells(mut borders: Vec<f32>) -> Vec<f32> {
+    borders.retain(|border| border.is_finite());
+    borders.sort_by(f32::total_cmp);
+    borders.dedup();
+    let between = borders.windows(2).map(|pair| pair[0] + 0.5 * (pair[1] - pair[0]));
+    let around = borders.iter().flat_map(|border| [border.next_down(), *border, border.next_up()]);
+    between.chain(around).chain(SPECIAL).collect()
+}
+
+/// The borders that a number has passed on the way up and on the way down, a bit for each.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct Passed {
+    up: u32,
+    down: u32,
+}
+
+impl Passed {
+    fn of(value: f32, borders: impl Iterator<Item = (f32, f32)>) -> Self {
+        let bit = |is_passed: bool, place: usize| u32::from(is_passed) << place;
+        borders.enumerate().fold(Self { up: 0, down: 0 }, |all, (place, (up, down))| Self {
+            up: all.up | bit(value >= up, place),
+            down: all.down | bit(value >= down, place),
+        })
+    }
+
+    /// `true` if from one number to the other a border's whole hysteresis is passed.
+    const fn spans(self, other: Self) -> bool {
+        self.up & !other.down | other.up & !self.down != 0
+    }
+
+    /// `true` if it has passed all that the other one has.
+    const fn includes(self, other: Self) -> bool {
+        other.up & !self.up | other.down & !self.down == 0
+    }
+}
+
+/// A cell: the outcomes of all comparisons.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct Cell {
+    share: Passed,
+    index: Passed,
+    /// Of the modulation index that is made; `None` if that is no number.
+    made: Option<Passed>,
+}
+
+impl Cell {
+    fn spans(&self, other: &Self) -> bool {
+        let made = match (self.made, other.made) {
+            (Some(one), Some(other)) => one.spans(other),
+            (one, other) => one != other,
+        };
+        self.share.spans(other.share) || self.index.spans(other.index) || made
+    }
+}
+
+/// A ladder with its devices.
+#[derive(Clone, Copy)]
+struct Case {
+    ladder: Ladder,
+    devices: SwitchLimits,
+}
+
+impl Case {
+    fn new(ladder: Ladder, min_pulse_ticks: u32) -> Self {
+        Self { ladder, devices: SwitchLimits::new(min_pulse_ticks, 0, 900.0, &CLOCK) }
+    }
+
+    /// Every case. No shortest pulse moves a border of the optimised patterns.
+    fn all() -> Vec<Self> {
+        let ladders = [Ladder::PAPER, Ladder::of(&[Mode::Sync12]), Ladder::of(&[])];
+        let on = |ladder: &Ladder| SHORTEST.map(|ticks| Self::new(*ladder, ticks));
+        let optimal = [
+            #[cfg(feature = "optimal")]
+            Self::new(Ladder::OPTIMAL, SHORTEST[1]),
+        ];
+        ladders.iter().flat_map(on).chain(optimal).collect()
+    }
+
+    /// `true` if a mode of the ladder may have to come down because less voltage is made than the operating point asks for.
+    fn is_optimal(&self) -> bool {
+        self.ladder.modes().any(Mode::is_optimal)
+    }
+
+    fn schedule(&self) -> Schedule {
+        Schedule::on(self.ladder, &CLOCK)
+    }
+
+    /// The ladder's modes, those that catch a machine, and one that is not on it.
+    fn modes(&self) -> Vec<Mode> {
+        let mut modes: Vec<_> = self.ladder.modes().collect();
+        for other in [Mode::Mid3, Mode::Square, Mode::Mid5] {
+            if !modes.contains(&other) {
+                modes.push(other);
+            }
+        }
+        modes
+    }
+
+    /// Shares of the frequency's borders, up and down. The free carrier's is passed by what is no number, too.
+    fn shares(&self) -> impl Iterator<Item = (f32, f32)> {
+        self.ladder.modes().map(|mode| mode.row().until.shares)
+    }
+
+    /// The index's borders of each locked mode, up and down, at an angular speed in angle units per tick.
+    fn indices(&self, rate: f32) -> impl Iterator<Item = (f32, f32)> {
+        let notch = shortest_notch(rate, &self.devices);
+        self.ladder.modes().skip(1).map(move |mode| reached(mode.row(), notch))
+    }
+
+    fn share(&self, rate: f32) -> f32 {
+        share(&Reference { rate, ..Reference::NONE }, &self.devices)
+    }
+
+    /// Every rate that stands for a cell.
+    fn rates(&self) -> Vec<f32> {
+        let sides = self.shares().flat_map(|(up, down)| [up, down]);
+        let mut rates: Vec<_> =
+            sides.map(|side| first(f32::INFINITY, |rate| self.share(rate) >= side)).collect();
+        // The largest rate at which the shortest pulse is less than an angle of 1 rad: far beyond the last border of the frequency.
+        let most = 2.0 * UNITS_PER_RADIAN / (self.devices.min_pulse_ticks as f32 + 1.0);
+        assert!(self.share(most) > 2.0);
+        let sides = |rate: f32| self.indices(rate).flat_map(|(up, down)| [up, down]).collect::<Vec<_>>();
+        let fixed = sides(0.0);
+        let lowered = (0..fixed.len()).map(|side| first(most, |rate| sides(rate)[side] != fixed[side]));
+        rates.extend(lowered);
+        rates.extend([0.0, most]);
+        rates.sort_by(f32::total_cmp);
+        let mut crossings = Vec::new();
+        for span in rates.windows(2).filter(|span| span[1] <= most) {
+            let (low, high) = (sides(span[0]), sides(span[1]));
+            for (i, j) in (0..fixed.len()).flat_map(|i| (0..fixed.len()).map(move |j| (i, j))) {
+                for is_below in [|a: f32, b: f32| a < b, |a: f32, b: f32| a <= b] {
+                    if !is_below(low[i], low[j]) && is_below(high[i], high[j]) {
+                        crossings.push(first(span[1], |rate| {
+                            rate > span[0] && is_below(sides(rate)[i], sides(rate)[j])
+                        }));
+                    }
+                }
+            }
+        }
+        rates.extend(crossings);
+        cells(rates)
+    }
+
+    /// Every voltage that stands for a cell of the index that is made.
+    fn voltages(&self) -> Vec<f32> {
+        if !self.is_optimal() {
+            return std::vec![0.0];
+        }
+        let sides = self.indices(0.0).flat_map(|(up, down)| [up, down]).filter(|side| side.is_finite());
+        let mut borders: Vec<_> = sides.map(|side| first(f32::MAX, |volts| made(volts) >= side)).collect();
+        borders.push(0.0);
+        cells(borders)
+    }
+
+    fn cell(&self, seen: &Reference) -> Cell {
+        let made = made(seen.voltage_v);
+        let mut share = Passed::of(self.share(seen.rate), self.shares());
+        if seen.rate.is_nan() {
+            (share.up, share.down) = (1, 1);
+        }
+        Cell {
+            share,
+            index: Passed::of(seen.depth, self.indices(seen.rate)),
+            made: (!made.is_nan()).then(|| Passed::of(made, self.indices(0.0))),
+        }
+    }
+
+    /// The choice in every cell, out of each of [`Case::modes`] long after the last switch, with a reference of the cell. It is asserted
+    /// that nothing but the cell decides.
+    fn choices(&self) -> Vec<Choice> {
+        let (modes, voltages) = (self.modes(), self.voltages());
+        let mut choices = BTreeMap::<Cell, Choice>::new();
+        for rate in self.rates() {
+            let borders = self.indices(rate).flat_map(|(up, down)| [up, down]);
+            let depths = cells(borders.chain([0.5]).collect());
+            for (depth, volts) in depths.iter().flat_map(|depth| voltages.iter().map(move |v| (*depth, *v))) {
+                let seen = Reference { rate, depth, voltage_v: volts, udc_v: LINK_V, ..Reference::NONE };
+                let chosen = |mode: &Mode| self.schedule().wanted(Instant(0), *mode, &seen, &self.devices);
+                let cell = self.cell(&seen);
+                let next: Vec<u8> = modes.iter().map(|mode| place(&modes, chosen(mode))).collect();
+                let known = choices.entry(cell).or_insert(Choice { cell, seen, next: next.clone() });
+                assert_eq!(next, known.next, "{seen:?} {:?}", known.seen);
+            }
+        }
+        choices.into_values().collect()
+    }
+}
+
+/// The index that is counted as made of a voltage: with the room that `wanted` gives it.
+fn made(voltage_v: f32) -> f32 {
+    voltage_v / crate::frames::six_step_v(LINK_V) + 0.02
+}
+
+fn place(modes: &[Mode], mode: Mode) -> u8 {
+    modes.iter().position(|known| *known == mode).unwrap_or_else(|| panic!("{mode:?}")) as u8
+}
+
+/// The choices of every case, made once for all proofs.
+fn every_choice() -> &'static [(Case, Vec<Choice>)] {
+    static CHOICES: OnceLock<Vec<(Case, Vec<Choice>)>> = OnceLock::new();
+    CHOICES.get_or_init(|| Case::all().into_iter().map(|case| (case, case.choices())).collect())
+}
+
+/// The choice in a cell.
+struct Choice {
+    cell: Cell,
+    /// A reference in it.
+    seen: Reference,
+    /// Of each mode, by its place, the one that is wanted.
+    next: Vec<u8>,
+}
+
+impl Choice {
+    /// The mode at which the choice stays, and after how many switches.
+    fn settled(&self, mut mode: u8) -> (u8, u32) {
+        for switches in 0..10 {
+            let next = self.next[usize::from(mode)];
+            if next == mode {
+                return (mode, switches);
+            }
+            mode = next;
+        }
+        panic!("never settles: {:?}", self.seen);
+    }
+}
+
+/// A mode that is wanted is on the ladder, and wanted still once it has come: at once by the paper's ladder. Of the optimised patterns the
+/// first may give way where less voltage is made than the operating point asks for.
+#[test]
+fn a_constant_input_ends_in_one_mode_of_the_ladder() {
+    for (case, choices) in every_choice() {
+        let on_ladder = case.ladder.modes().count() as u8;
+        let modes = case.modes();
+        let most = if case.is_optimal() { 2 } else { 1 };
+        let mut longest = 0;
+        for choice in choices {
+            assert!(choice.next.iter().all(|next| *next < on_ladder), "{:?}", choice.seen);
+            for mode in 0..modes.len() as u8 {
+                let (_, switches) = choice.settled(mode);
+                longest = longest.max(switches);
+            }
+        }
+        std::println!("{} modes, {} cells: {longest} switches", on_ladder, choices.len());
+        assert_eq!(longest, if on_ladder == 1 { 1 } else { most });
+    }
+}
+
+/// Between two inputs that no border's whole hysteresis parts, to and fro as often as one likes: no mode that was left is taken again.
+#[test]
+fn no_mode_is_taken_again_within_the_hysteresis() {
+    for (_, choices) in every_choice() {
+        let mut pairs = 0_u32;
+        for (place, one) in choices.iter().enumerate() {
+            for other in choices[place + 1..].iter().filter(|other| !one.cell.spans(&other.cell)) {
+                pairs += 1;
+                for (from, to) in [(one, other), (other, one)] {
+                    for mode in 0..from.next.len() as u8 {
+                        to_and_fro(from, to, mode);
+                    }
+                }
+            }
+        }
+        std::println!("{} cells, {pairs} pairs within the hysteresis", choices.len());
+        assert!(pairs as usize >= choices.len() - 1);
+    }
+}
+
+/// To and fro between two inputs, once the mode has settled at the first one.
+fn to_and_fro(from: &Choice, to: &Choice, mode: u8) {
+    let (mut mode, mut left, mut still) = (from.settled(mode).0, 0_u32, 0);
+    let mut inputs = [to, from].into_iter().cycle();
+    while still < 2 {
+        let input = inputs.next().unwrap_or(to);
+        still += 1;
+        while input.next[usize::from(mode)] != mode {
+            left |= 1 << mode;
+            mode = input.next[usize::from(mode)];
+            still = 0;
+            assert!(left >> mode & 1 == 0, "mode {mode} again: {:?} {:?}", from.seen, to.seen);
+        }
+    }
+}
+
+/// A higher frequency, a larger index or both never lead to a lower rung of the paper's ladder.
+#[test]
+fn more_of_either_never_leads_down() {
+    for (case, choices) in every_choice().iter().filter(|(case, _)| !case.is_optimal()) {
+        let on_ladder = case.ladder.modes().count();
+        for low in choices {
+            let more = |high: &&Choice| {
+                high.cell.share.includes(low.cell.share) && high.cell.index.includes(low.cell.index)
+            };
+            for high in choices.iter().filter(more) {
+                let mut rungs = low.next.iter().zip(&high.next).take(on_ladder);
+                assert!(rungs.all(|(low, high)| low <= high), "{:?} {:?}", low.seen, high.seen);
+            }
+        }
+    }
+}
+
+/// For its dwell time a mode is kept, whatever comes, and no tick longer; also where the count of the ticks wraps, and where it has
+/// gone half round since. With gates off there is nothing to keep. An optimised pattern does not wait below its smallest index.
+#[test]
+fn a_mode_is_kept_for_its_dwell_time_and_no_longer() {
+    for (case, choices) in every_choice() {
+        let dwell_ticks = case.schedule().dwell_ticks as u32;
+        assert_eq!(dwell_ticks, 750_000, "30 ms");
+        let modes = case.modes();
+        for choice in choices {
+            for (mode, next) in modes.iter().zip(&choice.next) {
+                for (elapsed, is_kept) in [
+                    (0, true),
+                    (1, true),
+                    (dwell_ticks - 1, true),
+                    (dwell_ticks, false),
+                    (i32::MAX as u32, false),
+                    (1 << 31, false),
+                    (u32::MAX, false),
+                ] {
+                    let mut schedule = case.schedule();
+                    let last = Instant(u32::MAX - 7);
+                    schedule.switched(last);
+                    let found = schedule.wanted(last.after(elapsed), *mode, &choice.seen, &case.devices);
+                    let keeps = is_kept && !is_below(*mode, &choice.seen);
+                    let wanted = if keeps { *mode } else { modes[usize::from(*next)] };
+                    assert_eq!(found, wanted, "{mode:?} after {elapsed}: {:?}", choice.seen);
+                    // What has run out stays so, however far the ticks count on.
+                    let again = schedule.wanted(last, *mode, &choice.seen, &case.devices);
+                    assert!(keeps || again == modes[usize::from(*next)]);
+                }
+            }
+        }
+    }
+}
+
+#[cfg(not(feature = "optimal"))]
+fn is_below(_: Mode, _: &Reference) -> bool {
+    false
+}
+
+/// `true` if less is made than the least of an optimised pattern.
+#[cfg(feature = "optimal")]
+fn is_below(mode: Mode, seen: &Reference) -> bool {
+    mode.branch().is_some_and(|branch| made(seen.voltage_v) < branch.first)
+}
+
+/// Out of rest each input has a mode at once: the one that the lowest mode would give way to, or of the optimised ladder one that
+/// can catch a machine.
+#[test]
+fn every_input_has_a_mode_to_begin_with() {
+    for (case, choices) in every_choice() {
+        let modes = case.modes();
+        for Choice { seen, next, .. } in choices {
+            let mut schedule = case.schedule();
+            schedule.switched(Instant(0));
+            let begun = schedule.wanted(Instant(1), Mode::Off, seen, &case.devices);
+            if case.is_optimal() {
+                assert!([Mode::Async, Mode::Mid3, Mode::Square].contains(&begun), "{begun:?}: {seen:?}");
+            } else {
+                assert_eq!(begun, modes[usize::from(next[0])], "{seen:?}");
+            }
+        }
+    }
+}
+
+/// What is not finite is in no mode's way: a frequency that is no number has passed no border but the free carrier's, an index that is none
+/// has passed none.
+#[test]
+fn what_is_no_number_counts_as_the_lowest_rung() {
+    for case in Case::all().into_iter().filter(|case| case.ladder.modes().count() > 1) {
+        let lowest = case.ladder.modes().nth(1);
+        let rate = |hz: f32| hz * 4_294_967_296.0 / 25e6;
+        for (rate, depth, wanted) in [
+            (f32::NAN, 0.0, lowest),
+            (f32::NAN, f32::NAN, lowest),
+            (rate(50.0), f32::NAN, lowest),
+            (rate(30.0), f32::NAN, Some(Mode::Async)),
+            (f32::NEG_INFINITY, 1.0, Some(Mode::Async)),
+            (f32::INFINITY, f32::NAN, case.ladder.modes().last()),
+        ] {
+            let seen = Reference { rate, depth, voltage_v: 900.0, udc_v: LINK_V, ..Reference::NONE };
+            for mode in case.ladder.modes().filter(|mode| !mode.is_optimal()) {
+                let found = case.schedule().wanted(Instant(0), mode, &seen, &case.devices);
+                assert_eq!(Some(found), wanted, "{mode:?} {seen:?}");
+            }
+        }
+    }
+}

@@ -1,0 +1,362 @@
+//! Limits and times of the operator: the last value that is allowed and the first that is not, and the slot in which a time has run out.
+
+use crate::world::{DISCHARGE_S, PRECHARGE_S, SLOT_S, World, trip};
+use tractive::built_in::traction::BUILT_IN;
+use tractive::machine::Ratings;
+use tractive::operator::{Limits, Refusal, Request, State};
+use tractive::protection::{Fault, SafeState, Trip};
+
+const RATINGS: &Ratings = &BUILT_IN.ratings;
+
+type Set = fn(&mut World, f32);
+
+/// The self-test passes with the limit, and fails with the next number, which its fault tells.
+fn tested(limit: f32, beyond: f32, fault: Fault, set: Set) {
+    let end = |value: f32| {
+        let mut world = World::new();
+        set(&mut world, value);
+        world.slots(60);
+        world.output().status
+    };
+    assert_eq!((end(limit).state, end(limit).trip), (State::Ready, None), "{limit}");
+    let Trip { fault: found, value, limit: told, .. } = end(beyond).trip.expect("a fault");
+    assert_eq!((found, value.abs(), told.abs()), (fault, beyond.abs(), limit.abs()));
+}
+
+#[test]
+fn the_self_tests_limits_to_the_last_bit() {
+    let offset_a = 0.02 * RATINGS.max_current_a;
+    let offsets: [Set; 3] = [
+        |world, a| world.feedback.offsets_a.a = a,
+        |world, b| world.feedback.offsets_a.b = b,
+        |world, c| world.feedback.offsets_a.c = c,
+    ];
+    for set in offsets {
+        tested(offset_a, offset_a.next_up(), Fault::CurrentOffset, set);
+        tested(-offset_a, -offset_a.next_up(), Fault::CurrentOffset, set);
+    }
+    let resting_a = 0.05 * RATINGS.max_current_a;
+    let slow: Set = |world, a| (world.observed.current_a, world.observed.udc_v) = (a, 1_500.0);
+    tested(resting_a, resting_a.next_up(), Fault::CurrentOffset, slow);
+    // Where the diodes rectify, a current may flow up to its trip level.
+    let fast: Set = |world, a| {
+        (world.observed.current_a, world.observed.udc_v) = (a, 1_500.0);
+        world.observed.omega = 2_000.0;
+    };
+    tested(RATINGS.trip_current_a, RATINGS.trip_current_a.next_up(), Fault::CurrentOffset, fast);
+    let link: Set = |world, udc_v| world.observed.udc_v = udc_v;
+    let (lowest_v, highest_v) = (-0.02 * RATINGS.dc_link_nominal_v, RATINGS.trip_dc_over_v);
+    tested(lowest_v, lowest_v.next_down(), Fault::LinkImplausible, link);
+    tested(highest_v, highest_v.next_up(), Fault::DcOvervoltage, link);
+    let speed: Set = |world, speed| world.observed.omega = speed * RATINGS.pole_pairs;
+    tested(RATINGS.trip_speed_rad_s, RATINGS.trip_speed_rad_s.next_up(), Fault::Overspeed, speed);
+    tested(-RATINGS.trip_speed_rad_s, -RATINGS.trip_speed_rad_s.next_up(), Fault::Overspeed, speed);
+}
+
+/// Slots until the fault comes, and the fault.
+fn slots_to_fault(world: &mut World) -> (u32, Trip) {
+    (1..5_000).find_map(|slot| Some((slot, world.slot().status.trip?))).expect("a fault")
+}
+
+/// Slots that pass until a time has run out: the first one after it.
+fn beyond(time_s: f32) -> u32 {
+    (time_s / SLOT_S).round() as u32 + 1
+}
+
+#[test]
+fn contactors_have_their_time_and_no_slot_more() {
+    let contactor_s = World::new().settings.line.unwrap().contactor_s;
+    let mut relay = World::ready();
+    relay.stuck = true;
+    relay.edge(|request, level| request.charge = level);
+    let mut main = World::ready();
+    main.edge(|request, level| request.charge = level);
+    while !main.switches().main {
+        main.slot();
+    }
+    main.stuck = true;
+    let mut released = World::ready();
+    released.edge(|request, level| request.charge = level);
+    while released.switches().precharge {
+        released.slot();
+    }
+    released.stuck = true;
+    let mut opened = World::charged();
+    opened.stuck = true;
+    opened.edge(|request, level| request.discharge = level);
+    for (mut world, value) in [(relay, 2.0), (main, 1.0), (released, 2.0), (opened, 1.0)] {
+        let (slots, Trip { fault, value: found, limit, .. }) = slots_to_fault(&mut world);
+        assert_eq!((slots, fault, found, limit), (beyond(contactor_s), Fault::Contactor, value, 0.0));
+    }
+}
+
+#[test]
+fn charging_and_discharging_have_ten_time_constants() {
+    let mut world = World::ready();
+    world.source_v = 300.0;
+    world.edge(|request, level| request.charge = level);
+    while !world.feedback.precharge_closed {
+        world.slot();
+    }
+    // The slot that sees the relay closed, and those after it.
+    let (slots, Trip { fault, value, limit, .. }) = slots_to_fault(&mut world);
+    assert_eq!((slots, fault), (1 + beyond(10.0 * PRECHARGE_S), Fault::PrechargeTimeout));
+    assert_eq!(limit, RATINGS.dc_link_min_v);
+    assert!((value - 300.0).abs() < 1.0);
+    let mut world = World::charged();
+    world.edge(|request, level| request.discharge = level);
+    while !world.switches().discharge {
+        world.slot();
+    }
+    let mut slots = 0;
+    while world.fault().is_none() {
+        world.observed.udc_v = 61.0;
+        world.slot();
+        slots += 1;
+    }
+    assert_eq!((slots, world.fault()), (beyond(10.0 * DISCHARGE_S), Some(Fault::DischargeTimeout)));
+    let Trip { value, limit, .. } = world.output().status.trip.unwrap();
+    assert_eq!((value, limit), (61.0, 60.0));
+}
+
+/// The link is a fiftieth of the nominal voltage from its source, by its rate over 20 ms: between that rate's gap and the gap at its end.
+#[test]
+fn the_main_contactor_closes_once_the_source_is_near() {
+    let mut world = World::ready();
+    world.edge(|request, level| request.charge = level);
+    while !world.switches().main {
+        world.slot();
+    }
+    let gap_v = world.source_v - world.observed.udc_v;
+    assert!((21.0..28.0).contains(&gap_v), "{gap_v} V");
+}
+
+#[test]
+fn a_link_is_empty_below_extra_low_voltage() {
+    let mut world = World::charged();
+    world.edge(|request, level| request.discharge = level);
+    while !world.switches().discharge {
+        world.slot();
+    }
+    world.observed.udc_v = 60.0;
+    world.slot();
+    assert_eq!(world.state(), State::Discharge);
+    world.observed.udc_v = 60.0_f32.next_down();
+    world.slot();
+    assert_eq!(world.state(), State::Ready);
+}
+
+#[test]
+fn an_acknowledge_has_fifty_milliseconds() {
+    let mut world = World::charged();
+    world.observed.trip = Some(trip(Fault::Overcurrent));
+    world.deaf = true;
+    world.slots(100);
+    world.edge(|request, level| request.acknowledge = level);
+    assert_eq!(world.refusal(), None);
+    world.slots(50);
+    assert_eq!((world.fault(), world.refusal()), (Some(Fault::Overcurrent), None));
+    world.slot();
+    let Trip { fault, value, limit, .. } = world.output().status.trip.unwrap();
+    assert_eq!((fault, limit, world.refusal()), (Fault::GatesHeld, 0.05, Some(Refusal::CauseStillPresent)));
+    assert!((value - 0.051).abs() < 1e-6, "{value}");
+}
+
+#[test]
+fn a_drive_is_enabled_from_the_lowest_operating_voltage_on_and_trips_below_its_limit() {
+    let lowest_v = RATINGS.dc_link_min_v;
+    for (source_v, refusal) in [(lowest_v, None), (lowest_v.next_down(), Some(Refusal::LinkNotCharged))] {
+        let mut world = World::charged();
+        world.source_v = source_v;
+        world.slots(2);
+        assert_eq!(world.edge(|request, level| request.enable = level).status.refusal, refusal);
+    }
+    let trips_v = RATINGS.trip_dc_under_v;
+    for begin in [World::charged as fn() -> World, World::enabled] {
+        let mut world = begin();
+        world.source_v = trips_v;
+        world.slots(10);
+        assert_eq!(world.fault(), None);
+        world.source_v = trips_v.next_down();
+        world.slots(2);
+        let Trip { fault, value, limit, .. } = world.output().status.trip.unwrap();
+        assert_eq!((fault, value, limit), (Fault::DcUndervoltage, trips_v.next_down(), trips_v));
+    }
+}
+
+/// The EMF between two lines, peak, as it is computed; and the speed of a number about it at which it is just a voltage.
+fn omega_of(emf_v: f32, compute: fn(f32) -> f32) -> f32 {
+    let about = emf_v / (3.0_f32.sqrt() * RATINGS.magnet_flux_wb);
+    let first = about.to_bits() - 64;
+    let all = (first..first + 128).map(f32::from_bits);
+    all.filter(|omega| compute(*omega) <= emf_v).fold(0.0, f32::max)
+}
+
+#[test]
+fn a_machine_that_turns_is_not_discharged_nor_stopped_beyond_its_emf() {
+    // Where the EMF is 60 V the link may be discharged still.
+    let slow = omega_of(60.0, |omega| 3.0_f32.sqrt() * omega.abs() * RATINGS.magnet_flux_wb);
+    for (omega, refusal) in [(slow, None), (-slow, None), (slow.next_up(), Some(Refusal::MachineTurning))] {
+        let mut world = World::charged();
+        world.observed.omega = omega;
+        assert_eq!(world.edge(|request, level| request.discharge = level).status.refusal, refusal, "{omega}");
+    }
+    // At 0.9 of the nominal link open gates are safe still, whatever the link is.
+    let open = omega_of(0.9 * RATINGS.dc_link_nominal_v, |omega| {
+        omega.abs() * 3.0_f32.sqrt() * RATINGS.magnet_flux_wb
+    });
+    for (omega, source_v, state) in [
+        (open, 1_500.0, State::Charged),
+        (open, 1_800.0, State::Charged),
+        (open, 1_100.0, State::Charged),
+        (-open, 1_500.0, State::Charged),
+        (open.next_up(), 1_500.0, State::Stopping),
+        (open.next_up(), 1_800.0, State::Stopping),
+        (open.next_up(), 1_100.0, State::Stopping),
+    ] {
+        let mut world = World::enabled();
+        (world.observed.omega, world.source_v) = (omega, source_v);
+        world.request.enable = false;
+        world.slots(3);
+        assert_eq!(world.state(), state, "{omega} {source_v}");
+    }
+}
+
+/// A shorted machine may carry what its EMF drives through its resistance, and the current that may flow at rest.
+#[test]
+fn a_shorted_machines_current_to_the_last_bit() {
+    let omega = 30.0;
+    let driven_a = omega * RATINGS.magnet_flux_wb / RATINGS.stator_resistance_ohm;
+    let limit_a = driven_a + 0.05 * RATINGS.max_current_a;
+    for (omega, current_a, refusal) in [
+        (omega, limit_a, None),
+        (-omega, limit_a, None),
+        (omega, limit_a.next_up(), Some(Refusal::CauseStillPresent)),
+        (omega, f32::NAN, Some(Refusal::CauseStillPresent)),
+    ] {
+        let mut world = World::charged();
+        world.observed.trip = Some(Trip { safe: SafeState::ShortCircuit, ..trip(Fault::Overspeed) });
+        world.slots(100);
+        (world.observed.omega, world.observed.current_a) = (omega, current_a);
+        let found = world.edge(|request, level| request.acknowledge = level).status.refusal;
+        assert_eq!(found, refusal, "{omega} {current_a}");
+    }
+}
+
+#[test]
+fn every_limit_of_a_request_may_be_as_rated_and_no_more() {
+    type Field = fn(&mut Limits) -> &mut f32;
+    let rated = Limits::rated(RATINGS);
+    let least = f32::from_bits(1);
+    let fields: [(Field, [f32; 2], [f32; 2]); 5] = [
+        (|limits| &mut limits.motoring_nm, [0.0, rated.motoring_nm], [-least, rated.motoring_nm.next_up()]),
+        (|limits| &mut limits.braking_nm, [0.0, rated.braking_nm], [-least, rated.braking_nm.next_up()]),
+        (|limits| &mut limits.speed_rad_s, [least, rated.speed_rad_s], [0.0, rated.speed_rad_s.next_up()]),
+        (
+            |limits| &mut limits.link_low_v,
+            [rated.link_low_v, rated.link_high_v.next_down()],
+            [rated.link_low_v.next_down(), rated.link_high_v],
+        ),
+        (
+            |limits| &mut limits.link_high_v,
+            [rated.link_low_v.next_up(), rated.link_high_v],
+            [rated.link_low_v, rated.link_high_v.next_up()],
+        ),
+    ];
+    for (field, allowed, refused) in fields {
+        for (value, refusals) in
+            allowed.into_iter().map(|value| (value, 0)).chain(refused.map(|value| (value, 1)))
+        {
+            let mut world = World::charged();
+            *field(&mut world.request.limits) = value;
+            world.slot();
+            assert_eq!(world.output().status.refusals, refusals, "{value}");
+        }
+    }
+    // What is no number, in each value by itself.
+    let all: [fn(&mut Request) -> &mut f32; 6] = [
+        |request| &mut request.torque_nm,
+        |request| &mut request.limits.motoring_nm,
+        |request| &mut request.limits.braking_nm,
+        |request| &mut request.limits.speed_rad_s,
+        |request| &mut request.limits.link_low_v,
+        |request| &mut request.limits.link_high_v,
+    ];
+    for field in all {
+        let mut world = World::charged();
+        *field(&mut world.request) = f32::NAN;
+        world.slot();
+        assert_eq!(world.refusal(), Some(Refusal::RequestNotFinite));
+    }
+}
+
+/// Levels of a link of 1,000 to 1,800 V that trips at 850 and 2,070 V: motoring ends half way to the lower one, braking at 0.6 of the way to the
+/// upper one and over half of that; the line's voltage ends it sooner.
+#[test]
+fn the_window_of_the_link_is_that_of_the_ratings_and_of_the_line() {
+    let mut world = World::enabled();
+    world.source_v = 1_000.0;
+    world.slots(30_000);
+    let Ratings { dc_link_min_v, dc_link_max_v, trip_dc_under_v, trip_dc_over_v, .. } = *RATINGS;
+    let (below, above) = (dc_link_min_v - trip_dc_under_v, trip_dc_over_v - dc_link_max_v);
+    let window = world.output().command.window;
+    let near = |found: f32, wanted: f32| assert!((found - wanted).abs() < 0.01, "{found} {wanted}");
+    near(window.motoring_none_v, dc_link_min_v - 0.5 * below);
+    near(window.motoring_full_v, dc_link_min_v);
+    near(window.braking_none_v, dc_link_max_v + 0.6 * above);
+    near(window.braking_full_v, dc_link_max_v + 0.3 * above);
+    let mut world = World::enabled();
+    world.slots(10);
+    let window = world.output().command.window;
+    near(window.motoring_none_v, 0.85 * 1_500.0);
+    near(window.motoring_full_v, 0.95 * 1_500.0);
+    // The line is forgotten with three seconds.
+    world.source_v = 1_400.0;
+    world.slots(3_000);
+    let line_v = 1_400.0 + 100.0 * (-1.0_f32).exp();
+    assert!((world.output().command.window.motoring_none_v - 0.85 * line_v).abs() < 0.05);
+    // It rises only while the drive takes power: by torque and speed of one sign.
+    for (torque_nm, omega, rises) in
+        [(10.0, 100.0, true), (-10.0, -100.0, true), (-10.0, 100.0, false), (0.0, 100.0, false)]
+    {
+        let mut world = World::enabled();
+        world.slots(10);
+        (world.observed.torque_nm, world.observed.omega, world.source_v) = (torque_nm, omega, 1_600.0);
+        world.slots(1_000);
+        let found = world.output().command.window.motoring_none_v;
+        assert_eq!(found > 0.85 * 1_501.0, rises, "{torque_nm} {omega}: {found}");
+    }
+}
+
+/// Half way between the two ends half of the largest torque is left.
+#[test]
+fn motoring_fades_along_a_straight_line() {
+    let mut world = World::enabled();
+    (world.observed.omega, world.request.torque_nm) = (100.0, RATINGS.max_torque_nm);
+    world.slots(400);
+    assert_eq!(world.output().command.demand.torque_nm, RATINGS.max_torque_nm);
+    let window = world.output().command.window;
+    world.source_v = 0.5 * (window.motoring_none_v + window.motoring_full_v);
+    world.slots(150);
+    let now = world.output().command.window;
+    let share = (world.source_v - now.motoring_none_v) / (now.motoring_full_v - now.motoring_none_v);
+    let wanted_nm = share * RATINGS.max_torque_nm;
+    assert!((0.5..0.6).contains(&share));
+    assert!((world.output().command.demand.torque_nm - wanted_nm).abs() < 2.0, "{wanted_nm}");
+}
+
+/// The settings' rates: 80 % of the drive's slew rate, taken up in 50 ms.
+#[test]
+fn the_rates_are_those_of_the_ratings() {
+    let settings = World::new().settings;
+    assert!((settings.slew_nm_s - 0.8 * RATINGS.torque_slew_nm_s).abs() < 1e-2);
+    assert!((settings.jerk_nm_s2 / settings.slew_nm_s - 20.0).abs() < 1e-3);
+    let line = settings.line.unwrap();
+    assert_eq!((line.contactor_s, line.empty_v, line.precharge_s, line.discharge_s), (0.2, 60.0, 0.1, 0.1));
+    let above = RATINGS.trip_dc_over_v - RATINGS.dc_link_max_v;
+    assert!((line.chopper_from_v - RATINGS.dc_link_max_v - 0.05 * above).abs() < 0.01);
+    assert!((line.chopper_full_v - RATINGS.dc_link_max_v - 0.25 * above).abs() < 0.01);
+    // Of a small machine a fifth of its lowest voltage counts as empty, not 60 V.
+    let small = Ratings { dc_link_min_v: 48.0, ..*RATINGS };
+    assert!((tractive::operator::Line::rated(&small, 0.1, 0.1).empty_v - 9.6).abs() < 1e-5);
+}
