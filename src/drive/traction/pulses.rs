@@ -109,19 +109,20 @@ pub(super) struct Order<'a> {
     pub release: u8,
 }
 
-/// The modulator, and the halves that it has made.
+/// The modulator, and the halves that it has made. In this order in memory, as in [`ControlTask`](super::ControlTask).
+#[repr(C)]
 pub(super) struct Pulses {
     modulator: Modulator,
     /// Length of a half without pulses, in ticks.
     off_ticks: u32,
-    /// Half number n is in place `n % REMEMBERED`.
-    halves: [Half; REMEMBERED],
     /// Number of the half that was planned last, and the boundary after its own, for which nothing is planned yet.
     planned: u32,
     unplanned: Instant,
     /// Number of the half that was loaded at the newest boundary, and what the PWM interrupt told there; `None` before it has come.
     loaded: u32,
     told: Option<(Place, Told)>,
+    /// Half number n is in place `n % REMEMBERED`.
+    halves: [Half; REMEMBERED],
 }
 
 impl Pulses {
