@@ -179,9 +179,17 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         if let Some(recorder) = shared.recorder {
             recorder.record(self.entry(now, input, gates), self.trip.is_some());
         }
+        if self.operated && self.slots.begins() {
+            shared.operator.tell(now, &self.report(input));
+        }
+        port.report(now, || self.report(input));
+    }
+
+    /// The period's report.
+    fn report(&self, input: Input) -> DualReport {
         let Input { sample, command } = input;
         let ([upper, lower], driven) = (&self.axes, &self.driven);
-        let report = DualReport {
+        DualReport {
             torque_nm: driven.motors.each_ref().map(|motor| motor.torque_nm),
             voltage_v: driven.motors.each_ref().map(|motor| motor.command.voltage_v),
             weakening: driven.motors.each_ref().map(|motor| motor.weakening),
@@ -195,11 +203,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             source_v: sample.source_v,
             speed_known: upper.speed_is_known() && lower.speed_is_known(),
             acknowledged: self.acknowledge.answered(),
-        };
-        if self.operated && self.slots.begins() {
-            shared.operator.tell(now, &report);
         }
-        port.report(now, &report);
     }
 
     /// The period's entry in the flight recorder.

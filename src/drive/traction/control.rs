@@ -10,7 +10,7 @@ use super::pulses::{Order, Pulses};
 use super::six_step_exit::SixStepExit;
 use super::slot::{Decision, Slot};
 use super::{Settings, Shared};
-use crate::control::{AngleHarmonics, ControlLaw, Controller, LinkDamper, Measurements, ModeLimits, Warmth};
+use crate::control::{AngleHarmonics, ControlLaw, Controller, LinkDamper, Measurements, ModeLimits, Target, Warmth};
 use crate::drive::acknowledge::Acknowledge;
 use crate::drive::{PeriodInput, SlotTimer};
 use crate::frames::Angle;
@@ -306,9 +306,20 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         port: &mut impl ControlPort,
         shared: &Shared,
     ) {
-        let (Input { sample, .. }, now) = (input, seen.now);
+        let now = seen.now;
+        if let Some(recorder) = shared.recorder {
+            recorder.record(self.entry(now, input, seen.loaded, pulsing), self.trip.is_some());
+        }
+        if self.operated && self.slots.begins() {
+            shared.operator.tell(now, &self.report(input.sample));
+        }
+        port.report(now, || self.report(input.sample));
+    }
+
+    /// The period's report.
+    fn report(&self, sample: &Sample) -> Report {
         let target = self.controller.target();
-        let report = Report {
+        Report {
             torque_nm: target.torque_nm,
             flowing_nm: self.controller.flowing_nm(),
             id_a: target.current.d,
@@ -322,28 +333,22 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             speed_known: self.controller.speed_is_known(),
             acknowledged: self.acknowledge.answered(),
             mode: self.mode,
-        };
-        if let Some(recorder) = shared.recorder {
-            recorder.record(self.entry(now, input, &report, seen.loaded, pulsing), self.trip.is_some());
         }
-        if self.operated && self.slots.begins() {
-            shared.operator.tell(now, &report);
-        }
-        port.report(now, &report);
     }
 
     /// The period's entry in the flight recorder.
     #[inline(always)]
-    fn entry(&self, at: Instant, input: Input, report: &Report, mode: Mode, pulsing: bool) -> Record {
+    fn entry(&self, at: Instant, input: Input, mode: Mode, pulsing: bool) -> Record {
         let Input { sample, command } = input;
+        let Target { current, .. } = self.controller.target();
         Record {
             at,
             currents_a: sample.currents_a,
             udc_v: sample.udc_v,
             angle: sample.angle.unwrap_or(Angle::ZERO),
-            id_a: report.id_a,
-            iq_a: report.iq_a,
-            voltage_v: report.voltage_v,
+            id_a: current.d,
+            iq_a: current.q,
+            voltage_v: self.reference.voltage_v,
             state: State { mode, enabled: command.enable, pulsing, fault: self.trip.map(|trip| trip.fault) },
         }
     }
