@@ -85,13 +85,14 @@ impl<L: ControlLaw> Axis<L> {
 
     /// Follows the angle, where it is `trusted` whatever it is. Says by how much, in rad, it is off where that is too much.
     pub fn track(&mut self, angle: Angle, trusted: bool, settings: &Settings) -> Option<f32> {
-        let surprise = self.controller.innovation_rad(angle, &settings.clock);
+        let innovation = self.controller.innovation(angle, &settings.clock);
+        let surprise = innovation.signed_radians();
         let known = self.controller.speed_is_known();
         if known && surprise.abs() > INNOVATION_RAD && !trusted {
             self.controller.lose_angle();
             return Some(surprise);
         }
-        self.controller.track(angle, &settings.clock);
+        self.controller.follow(angle, innovation, &settings.clock);
         let gone_astray = (self.omega() - self.slow) * SLOW_S;
         self.slow += (self.omega() - self.slow) * (settings.clock.control_s() * (1.0 / SLOW_S));
         if !known || trusted {
