@@ -57,7 +57,8 @@ impl SpeedTracker {
         } else {
             let error = innovation.signed_radians();
             self.omega += self.natural_rad_s * self.natural_rad_s * period_s * error;
-            self.angle = measured - innovation + Angle::within_half_turn(2.0 * self.natural_rad_s * period_s * error);
+            self.angle =
+                measured - innovation + Angle::within_half_turn(2.0 * self.natural_rad_s * period_s * error);
         }
         self.steps = self.steps.saturating_add(1);
         self.omega

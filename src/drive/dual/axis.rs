@@ -247,6 +247,13 @@ impl<L: ControlLaw> Axis<L> {
     }
 }
 
+/// `true` if [`check`] finds nothing.
+#[inline(always)]
+pub fn is_sound(measured: &Measurements, omega: f32, tables: &Tables) -> bool {
+    protection::are_sound(&measured.currents_a, &tables.ratings)
+        && protection::check_speed(omega, &tables.ratings).is_none()
+}
+
 /// Phase currents and speed of one motor.
 pub fn check(measured: &Measurements, omega: f32, tables: &Tables) -> Option<Violation> {
     protection::check_currents(&measured.currents_a, &tables.ratings)

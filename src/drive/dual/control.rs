@@ -292,6 +292,27 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         port: &mut impl ControlPort<Dual>,
     ) {
         let Input { sample, command } = input;
+        let ([upper, lower], [first, second]) = (&self.axes, measured);
+        let (limits, tables) = (&self.settings.limits, self.machine.tables());
+        let [of_upper, of_lower] = &command.demands;
+        let sound = limits.check_link(sample.source_v, sample.capacitor_v).is_none()
+            && limits.check_link_reference(command.link_ref_v, sample.source_v).is_none()
+            && axis::is_sound(first, upper.omega(), tables)
+            && axis::is_sound(second, lower.omega(), tables)
+            && check_demand(of_upper).is_none()
+            && check_demand(of_lower).is_none();
+        if !sound {
+            // Copies: what stands behind a reference is in memory in every period.
+            let measured = *measured;
+            self.find_fault(input, &measured, port);
+        }
+    }
+
+    /// The fault of a period's input, where it has one.
+    #[cold]
+    #[inline(never)]
+    fn find_fault(&mut self, input: Input, measured: &[Measurements; 2], port: &mut impl ControlPort<Dual>) {
+        let Input { sample, command } = input;
         let limits = &self.settings.limits;
         let armed = |(fault, _, _): &Violation| !self.disarmed.has(*fault);
         let mut violation = limits

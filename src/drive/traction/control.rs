@@ -10,7 +10,9 @@ use super::pulses::{Order, Pulses};
 use super::six_step_exit::SixStepExit;
 use super::slot::{Decision, Slot};
 use super::{Settings, Shared};
-use crate::control::{AngleHarmonics, ControlLaw, Controller, LinkDamper, Measurements, ModeLimits, Target, Warmth};
+use crate::control::{
+    AngleHarmonics, ControlLaw, Controller, LinkDamper, Measurements, ModeLimits, Target, Warmth,
+};
 use crate::drive::acknowledge::Acknowledge;
 use crate::drive::{PeriodInput, SlotTimer};
 use crate::frames::Angle;
@@ -213,16 +215,15 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             self.check(Some((fault, 1.0, 0.0)), sample, port);
         }
         self.check_legs(sample, port);
-        let overdue = self.pulses.newest().and_then(|newest| newest.overdue(now, &self.settings.clock));
         let angle = sample.angle.map(|angle| self.harmonics.corrected(angle));
         let (omega, lost) = self.track(angle, command.enable, port);
         let coarse = self.settings.counts_coarsely();
         let here = if coarse { self.controller.tracker().angle() } else { angle.unwrap_or(Angle::ZERO) };
         measured.angle = here + Angle::within_half_turn(self.controller.omega() * self.settings.angle_late_s);
-        let violation = self
-            .armed(overdue)
-            .or_else(|| self.armed(lost))
-            .or_else(|| self.judge(command, &measured, omega));
+        let overdue = self.pulses.newest().and_then(|newest| newest.overdue(now, &self.settings.clock));
+        self.check(overdue, sample, port);
+        self.check(lost, sample, port);
+        let violation = self.judge(command, &measured, omega);
         self.check(violation, sample, port);
         Seen { now, measured, omega, loaded: told.map_or(Mode::Off, |told| told.mode) }
     }

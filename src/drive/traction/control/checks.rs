@@ -45,12 +45,25 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
     }
 
     /// The fault of a period's input by itself.
+    #[inline(always)]
     pub(super) fn judge(
         &self,
         command: &DriveCommand,
         measured: &Measurements,
         omega: f32,
     ) -> Option<Violation> {
+        if protection::is_sound(measured, omega, &command.demand, &self.machine.tables().ratings) {
+            return None;
+        }
+        // Copies: what stands behind a reference is in memory in every period.
+        let (command, measured) = (*command, *measured);
+        self.find_fault(&command, &measured, omega)
+    }
+
+    /// The same for an input that may have one.
+    #[cold]
+    #[inline(never)]
+    fn find_fault(&self, command: &DriveCommand, measured: &Measurements, omega: f32) -> Option<Violation> {
         let ratings = &self.machine.tables().ratings;
         let empty =
             || if command.enable { protection::check_undervoltage(measured.udc_v, ratings) } else { None };
