@@ -266,7 +266,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         // Not finite if either is not.
         let odd = self.reference.voltage_v + omega;
         self.check((!odd.is_finite()).then_some((Fault::NotFinite, odd, f32::MAX)), sample, port);
-        self.pulses_on(pulsing)
+        pulsing && self.trip.is_none()
     }
 
     /// The halves that the PWM interrupt will play, and whether they came in time; `true` if they are pulses.
@@ -280,19 +280,17 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         shared: &Shared,
     ) -> bool {
         let Clock { control_ticks, .. } = self.settings.clock;
-        let release = self.acknowledge.release();
-        let order = Order { pulses: pulsing, reference: &self.reference, release };
-        self.pulses.plan(self.now.after(control_ticks), &order, &shared.planned);
+        let until = self.now.after(control_ticks);
+        if self.pulses.lack(until) {
+            let release = self.acknowledge.release();
+            let order = Order { pulses: pulsing, reference: &self.reference, release };
+            self.pulses.plan(until, &order, &shared.planned);
+        }
         let late = port.overrun_ticks(seen.now, control_ticks);
         let late_s = self.settings.clock.seconds(late as i32);
         self.check((late > 0).then_some((Fault::ControlDeadline, late_s, 0.0)), sample, port);
-        self.pulses_on(pulsing)
-    }
-
-    /// `true` if pulses that were wanted go on: not after a fault, which no half is revised after either.
-    #[inline(always)]
-    fn pulses_on(&mut self, wanted: bool) -> bool {
-        let pulsing = wanted && self.trip.is_none();
+        let pulsing = pulsing && self.trip.is_none();
+        // Not after a fault.
         self.revises &= pulsing;
         pulsing
     }

@@ -228,16 +228,15 @@ impl Pulses {
         }
     }
 
-    /// Plans a half for each boundary that comes before `until`.
+    /// `true` if a boundary that comes before `until` has no half yet, and any boundary is known.
     #[inline(always)]
-    pub(super) fn plan(&mut self, until: Instant, order: &Order, cell: &Planned) {
-        if !self.unplanned.reached(until) && self.told.is_some() {
-            self.plan_until(until, order, cell);
-        }
+    pub(super) fn lack(&self, until: Instant) -> bool {
+        !self.unplanned.reached(until) && self.told.is_some()
     }
 
+    /// Plans a half for each boundary that comes before `until`; call it where there are such.
     #[inline(never)]
-    fn plan_until(&mut self, until: Instant, order: &Order, cell: &Planned) {
+    pub(super) fn plan(&mut self, until: Instant, order: &Order, cell: &Planned) {
         for _ in 0..MOST_PLANNED {
             if self.unplanned.reached(until) {
                 return;
@@ -333,7 +332,9 @@ mod tests {
             let angle = crate::frames::Angle((f64::from(rate) * f64::from(now.0)) as u64 as u32);
             let reference = Reference::turning(100.0, angle, rate, now, 1_500.0);
             let order = Order { pulses: period > 50, reference: &reference, release: 0 };
-            pulses.plan(valid.after(2_500), &order, &planned);
+            if pulses.lack(valid.after(2_500)) {
+                pulses.plan(valid.after(2_500), &order, &planned);
+            }
         }
         // Nothing is planned before control has seen a boundary.
         assert!(found > 20 && found + 10 > boundaries, "{found} of {boundaries}");
