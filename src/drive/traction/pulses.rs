@@ -235,27 +235,33 @@ impl Pulses {
     }
 
     /// Plans a half for each boundary that comes before `until`; call it where there are such.
-    #[inline(never)]
+    #[inline(always)]
     pub(super) fn plan(&mut self, until: Instant, order: &Order, cell: &Planned) {
         for _ in 0..MOST_PLANNED {
             if self.unplanned.reached(until) {
                 return;
             }
-            let (at, begins) = (self.unplanned, self.half(self.planned).ends());
-            self.planned = self.planned.wrapping_add(1);
-            let next = &mut self.halves[self.planned as usize % REMEMBERED];
-            // Field by field: the half goes where it stays.
-            (next.at, next.begins) = (at, begins);
-            next.half = if order.pulses {
-                self.modulator.step(begins, Some(order.reference))
-            } else {
-                self.modulator.rest(begins, Some(order.reference))
-            };
-            next.mirrored = self.modulator.is_mirrored();
-            next.volt_ticks = volt_ticks(next.half.on_ticks(0));
-            self.unplanned = begins;
-            tell(next, order, cell);
+            self.plan_next(order, cell);
         }
+    }
+
+    /// Plans one. Out of line: what a loop prepares for all of its rounds would be prepared for one.
+    #[inline(never)]
+    fn plan_next(&mut self, order: &Order, cell: &Planned) {
+        let (at, begins) = (self.unplanned, self.half(self.planned).ends());
+        self.planned = self.planned.wrapping_add(1);
+        let next = &mut self.halves[self.planned as usize % REMEMBERED];
+        // Field by field: the half goes where it stays.
+        (next.at, next.begins) = (at, begins);
+        if order.pulses {
+            next.half = self.modulator.step(begins, Some(order.reference));
+        } else {
+            next.half = self.modulator.rest(begins, Some(order.reference));
+        }
+        next.mirrored = self.modulator.is_mirrored();
+        next.volt_ticks = volt_ticks(next.half.on_ticks(0));
+        self.unplanned = begins;
+        tell(next, order, cell);
     }
 
     /// Makes the half anew that was loaded at the newest boundary, in the control period after the command that wants it.
@@ -269,7 +275,7 @@ impl Pulses {
 }
 
 /// Puts a half into the cell to the PWM interrupt.
-#[inline(never)]
+#[inline(always)]
 fn tell(planned: &Half, order: &Order, cell: &Planned) {
     let Half { at, half, .. } = *planned;
     let &Order { reference: &Reference { rate, udc_v, .. }, release, .. } = order;
