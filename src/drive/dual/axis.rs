@@ -137,6 +137,7 @@ impl<L: ControlLaw> Axis<L> {
     }
 
     /// Measurements that no longer move; `lost` is the fault when it is the angle.
+    #[inline(always)]
     pub fn check_frozen(
         &mut self,
         measured: &Measurements,

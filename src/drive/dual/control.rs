@@ -130,9 +130,9 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             self.trip = None;
             self.axes.iter_mut().for_each(Axis::recover_angle);
         }
-        if self.trip.is_none() {
+        if let (None, Some(trip)) = (self.trip, newest.and_then(|newest| newest.trip)) {
             // Also from beyond this call: only where calls of it have been lost.
-            self.trip = newest.and_then(|newest| newest.trip);
+            self.trip = Some(trip);
         }
         if let Some(HardwareBreak { fault, seen }) = sample.hardware {
             // That the gates are held, or did not do what they were told, is only what comes of it.
@@ -159,8 +159,9 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         let late_s = self.settings.clock.seconds(late as i32);
         self.check((late > 0).then_some((Fault::ControlDeadline, late_s, 0.0)), port);
         let gates = if pulsing && self.trip.is_none() { Gates::Pulse } else { Gates::Off };
+        let [upper, lower] = &self.driven.motors;
         shared.command.publish(DualCommand {
-            motors: self.driven.motors.each_ref().map(|motor| motor.command),
+            motors: [upper.command, lower.command],
             at: now,
             valid_from: now.after(deadline_ticks),
             duty: self.driven.duty,
@@ -210,14 +211,15 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
     #[inline(always)]
     fn entry(&self, at: Instant, input: Input, gates: Gates) -> DualRecord {
         let Input { sample, command } = input;
+        let ([first, second], [upper, lower]) = (sample.angles, &self.driven.motors);
         DualRecord {
             at,
             currents_a: sample.currents_a,
-            angles: sample.angles.map(|angle| angle.unwrap_or(Angle::ZERO)),
+            angles: [first.unwrap_or(Angle::ZERO), second.unwrap_or(Angle::ZERO)],
             capacitor_v: sample.capacitor_v,
             source_v: sample.source_v,
             inductor_a: sample.inductor_a,
-            torque_nm: self.driven.motors.each_ref().map(|motor| motor.torque_nm),
+            torque_nm: [upper.torque_nm, lower.torque_nm],
             duty: self.driven.duty,
             state: DualState {
                 scheme: command.scheme,
