@@ -228,8 +228,8 @@ impl ControlPort for Board<'_> {
         0
     }
 
-    fn report(&mut self, now: Instant, report: &Report) {
-        self.see(report.trip, now);
+    fn report(&mut self, now: Instant, report: impl FnOnce() -> Report) {
+        self.see(report().trip, now);
     }
 }
 
@@ -285,8 +285,8 @@ impl ControlPort<Dual> for Board<'_> {
         0
     }
 
-    fn report(&mut self, now: Instant, report: &DualReport) {
-        self.see(report.trip, now);
+    fn report(&mut self, now: Instant, report: impl FnOnce() -> DualReport) {
+        self.see(report().trip, now);
     }
 }
 

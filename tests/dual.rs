@@ -127,8 +127,8 @@ impl ControlPort<Dual> for Fake {
         self.overrun
     }
 
-    fn report(&mut self, _now: Instant, report: &DualReport) {
-        self.report = *report;
+    fn report(&mut self, _now: Instant, report: impl FnOnce() -> DualReport) {
+        self.report = report();
     }
 }
 

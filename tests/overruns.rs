@@ -94,8 +94,8 @@ impl ControlPort for Board {
         self.late
     }
 
-    fn report(&mut self, _now: Instant, report: &Report) {
-        self.trip = report.trip;
+    fn report(&mut self, _now: Instant, report: impl FnOnce() -> Report) {
+        self.trip = report().trip;
     }
 }
 
@@ -144,8 +144,8 @@ impl ControlPort<Dual> for Board {
         self.late
     }
 
-    fn report(&mut self, _now: Instant, report: &DualReport) {
-        self.trip = report.trip;
+    fn report(&mut self, _now: Instant, report: impl FnOnce() -> DualReport) {
+        self.trip = report().trip;
     }
 }
 
@@ -378,7 +378,7 @@ impl ControlPort for Landing<'_> {
         0
     }
 
-    fn report(&mut self, now: Instant, report: &Report) {
+    fn report(&mut self, now: Instant, report: impl FnOnce() -> Report) {
         <Board as ControlPort>::report(&mut self.board, now, report);
     }
 }

@@ -126,12 +126,13 @@ impl ControlPort for Fake {
         if now.0 >= self.spoil_from { self.overrun } else { 0 }
     }
 
-    fn report(&mut self, now: Instant, report: &Report) {
+    fn report(&mut self, now: Instant, report: impl FnOnce() -> Report) {
+        let report = report();
         let fault = report.trip.map(|trip| trip.fault);
         if fault != self.report.trip.map(|trip| trip.fault) {
             self.faults.push((fault, now.0));
         }
-        self.report = *report;
+        self.report = report;
     }
 }
 

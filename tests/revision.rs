@@ -181,7 +181,7 @@ impl ControlPort for Jumping<'_> {
         0
     }
 
-    fn report(&mut self, _now: Instant, _report: &Report) {}
+    fn report(&mut self, _now: Instant, _report: impl FnOnce() -> Report) {}
 }
 
 /// The halves that a drive loads whose demand jumps at a control instant, and at which instants it revises them.

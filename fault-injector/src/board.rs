@@ -87,7 +87,7 @@ impl ControlPort for Control {
         <qemu::Control as ControlPort>::overrun_ticks(&mut qemu::Control, now, deadline_ticks)
     }
 
-    fn report(&mut self, now: Instant, report: &Report) {
+    fn report(&mut self, now: Instant, report: impl FnOnce() -> Report) {
         <qemu::Control as ControlPort>::report(&mut qemu::Control, now, report);
     }
 }
@@ -136,7 +136,7 @@ impl ControlPort<Dual> for Control {
         <qemu::Control as ControlPort<Dual>>::overrun_ticks(&mut qemu::Control, now, deadline_ticks)
     }
 
-    fn report(&mut self, now: Instant, report: &DualReport) {
+    fn report(&mut self, now: Instant, report: impl FnOnce() -> DualReport) {
         <qemu::Control as ControlPort<Dual>>::report(&mut qemu::Control, now, report);
     }
 }

@@ -153,9 +153,10 @@ impl ControlPort for Board {
         self.spoilt.filter(|(field, _)| *field == 10).map_or(0, |(_, bits)| bits)
     }
 
-    fn report(&mut self, _now: Instant, report: &Report) {
-        let Report { torque_nm, id_a, iq_a, voltage_v, omega, map_error, .. } = *report;
-        self.see(&[torque_nm, id_a, iq_a, voltage_v, omega, map_error], report.trip, report);
+    fn report(&mut self, _now: Instant, report: impl FnOnce() -> Report) {
+        let report = report();
+        let Report { torque_nm, id_a, iq_a, voltage_v, omega, map_error, .. } = report;
+        self.see(&[torque_nm, id_a, iq_a, voltage_v, omega, map_error], report.trip, &report);
     }
 }
 
@@ -242,9 +243,10 @@ impl ControlPort<Dual> for Board {
         self.spoilt.filter(|(field, _)| *field == 12).map_or(0, |(_, bits)| bits)
     }
 
-    fn report(&mut self, _now: Instant, report: &DualReport) {
-        let DualReport { torque_nm: [t1, t2], voltage_v: [v1, v2], duty, inductor_ref_a, .. } = *report;
-        self.see(&[t1, t2, v1, v2, duty, inductor_ref_a], report.trip, report);
+    fn report(&mut self, _now: Instant, report: impl FnOnce() -> DualReport) {
+        let report = report();
+        let DualReport { torque_nm: [t1, t2], voltage_v: [v1, v2], duty, inductor_ref_a, .. } = report;
+        self.see(&[t1, t2, v1, v2, duty, inductor_ref_a], report.trip, &report);
         self.duties.rotate_right(1);
         self.duties[0] = duty;
     }

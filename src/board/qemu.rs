@@ -227,7 +227,7 @@ impl ControlPort for Control {
         read_register(CONTROL_TIMER + 8).saturating_sub(read_register(CONTROL_TIMER + 4)).saturating_add(1)
     }
 
-    fn report(&mut self, now: Instant, report: &Report) {
+    fn report(&mut self, now: Instant, report: impl FnOnce() -> Report) {
         exchange::report(now, report);
     }
 

@@ -131,8 +131,8 @@ pub trait ControlPort<S: System = Traction> {
     fn enter(&mut self, safe: SafeState, now: Instant);
     /// By how many ticks the interrupt, begun nominally at `now`, has outlived `deadline_ticks`; 0 when in time.
     fn overrun_ticks(&mut self, now: Instant, deadline_ticks: u32) -> u32;
-    /// The control task's report, for whoever watches.
-    fn report(&mut self, now: Instant, report: &S::Report);
+    /// The control task's report, for whoever watches: made where it is called for.
+    fn report(&mut self, now: Instant, report: impl FnOnce() -> S::Report);
     /// The faults that the power stage reports of its legs; none where it cannot.
     fn leg_faults(&mut self) -> LegFaults {
         LegFaults::default()

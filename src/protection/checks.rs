@@ -23,8 +23,30 @@ pub fn check_known(needed: bool) -> Option<Violation> {
 /// Share of the largest current that the sum of the phases may reach.
 const PHASE_SUM_SHARE: f32 = 0.1;
 
+/// `true` if [`check_currents`] finds nothing.
+#[inline(always)]
+pub fn are_sound(currents_a: &Abc, ratings: &Ratings) -> bool {
+    let Abc { a, b, c } = *currents_a;
+    let flows = |current_a: f32| current_a.abs() <= ratings.trip_current_a;
+    // What is not a number compares as nothing.
+    (a + b + c).abs() <= PHASE_SUM_SHARE * ratings.max_current_a && flows(a) && flows(b) && flows(c)
+}
+
 /// Phase currents alone, as both interrupts sample them.
+#[inline(always)]
 pub fn check_currents(currents_a: &Abc, ratings: &Ratings) -> Option<Violation> {
+    if are_sound(currents_a, ratings) {
+        return None;
+    }
+    // A copy: what stands behind a reference is in memory in every period.
+    let currents_a = *currents_a;
+    find_in_currents(&currents_a, ratings)
+}
+
+/// The same for currents that are not sound.
+#[cold]
+#[inline(never)]
+fn find_in_currents(currents_a: &Abc, ratings: &Ratings) -> Option<Violation> {
     let sum = currents_a.a + currents_a.b + currents_a.c;
     if !sum.is_finite() {
         return Some((Fault::NotFinite, sum, f32::MAX));
@@ -52,6 +74,18 @@ pub fn check_measurements(measured: &Measurements, omega: f32, ratings: &Ratings
     check_speed(omega, ratings).or_else(|| check_currents(&measured.currents_a, ratings))
 }
 
+/// `true` if neither [`check_measurements`] nor [`check_undervoltage`] nor [`check_demand`] finds anything: one test for the ordinary period.
+/// `false` where one of them may.
+#[inline(always)]
+pub fn is_sound(measured: &Measurements, omega: f32, demand: &Demand, ratings: &Ratings) -> bool {
+    let udc_v = measured.udc_v;
+    are_sound(&measured.currents_a, ratings)
+        && udc_v <= ratings.trip_dc_over_v
+        && udc_v >= ratings.trip_dc_under_v
+        && omega.abs() <= ratings.trip_speed_rad_s * ratings.pole_pairs
+        && demand.torque_nm.is_finite()
+}
+
 /// The link while the gates may be on: without them it may be empty.
 pub fn check_undervoltage(udc_v: f32, ratings: &Ratings) -> Option<Violation> {
     (udc_v < ratings.trip_dc_under_v).then_some((Fault::DcUndervoltage, udc_v, ratings.trip_dc_under_v))
@@ -69,4 +103,42 @@ pub fn check_speed(omega: f32, ratings: &Ratings) -> Option<Violation> {
         return Some((Fault::Overspeed, omega.abs() / ratings.pole_pairs, ratings.trip_speed_rad_s));
     }
     None
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+
+    use super::*;
+    use crate::built_in;
+    use crate::frames::Angle;
+
+    /// Of every combination of values inside, at and beyond the limits, and of none that is a number, the one test says as the checks do.
+    #[test]
+    fn what_is_sound_is_what_no_check_finds() {
+        let ratings = &built_in::traction::BUILT_IN.ratings;
+        let (trip_a, sum_a) = (ratings.trip_current_a, PHASE_SUM_SHARE * ratings.max_current_a);
+        let fastest = ratings.trip_speed_rad_s * ratings.pole_pairs;
+        let around =
+            |limit: f32| [0.0, limit, limit.next_up(), -limit, (-limit).next_down(), f32::NAN, f32::INFINITY];
+        let currents = around(trip_a);
+        for a in currents {
+            for (b, c) in currents.into_iter().flat_map(|b| around(sum_a).map(|sum| (b, sum - a - b))) {
+                for udc_v in [around(ratings.trip_dc_over_v), around(ratings.trip_dc_under_v)].concat() {
+                    for (omega, torque_nm) in
+                        around(fastest).into_iter().zip([0.0, f32::MAX, f32::NAN, 1.0, 0.0, 2.0, 3.0])
+                    {
+                        let measured =
+                            Measurements { currents_a: Abc { a, b, c }, udc_v, angle: Angle::ZERO };
+                        let demand = Demand { torque_nm, slew_limited: true };
+                        let found = check_measurements(&measured, omega, ratings)
+                            .or_else(|| check_undervoltage(udc_v, ratings))
+                            .or_else(|| check_demand(&demand));
+                        let sound = is_sound(&measured, omega, &demand, ratings);
+                        assert_eq!(sound, found.is_none(), "{measured:?} {omega} {torque_nm}: {found:?}");
+                    }
+                }
+            }
+        }
+    }
 }

@@ -110,6 +110,7 @@ impl FrozenWatch {
     }
 
     /// One control period; `omega` is the electrical speed, in rad/s. Call it while pulses are made.
+    #[inline(always)]
     pub fn check(
         &mut self,
         measured: &Measurements,

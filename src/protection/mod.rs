@@ -15,8 +15,8 @@ mod safe;
 mod words;
 
 pub use checks::{
-    INNOVATION_RAD, check_angle, check_currents, check_demand, check_known, check_measurements, check_speed,
-    check_undervoltage,
+    INNOVATION_RAD, are_sound, check_angle, check_currents, check_demand, check_known, check_measurements,
+    check_speed, check_undervoltage, is_sound,
 };
 pub use fault::{Fault, Trip, Violation};
 pub use frozen::FrozenWatch;

@@ -77,7 +77,7 @@ impl<P: Position> ControlPort for Control<'_, P> {
         self.timer.overrun_ticks()
     }
 
-    fn report(&mut self, _now: Instant, _report: &Report) {}
+    fn report(&mut self, _now: Instant, _report: impl FnOnce() -> Report) {}
 
     fn turned(&mut self) -> Option<Angle> {
         self.position.counted()

@@ -30,9 +30,14 @@ pub trait ControlLaw {
         self.tracker_mut().step(angle, clock.control_s())
     }
 
-    /// By how much a measured angle, in rad, is off what the speed makes of the one before.
-    fn innovation_rad(&self, angle: Angle, clock: &Clock) -> f32 {
-        (angle - self.tracker().predicted(clock.control_s())).signed_radians()
+    /// By how much a measured angle is off what the speed makes of the one before.
+    fn innovation(&self, angle: Angle, clock: &Clock) -> Angle {
+        angle - self.tracker().predicted(clock.control_s())
+    }
+
+    /// As [`ControlLaw::track`], with the innovation of this angle.
+    fn follow(&mut self, angle: Angle, innovation: Angle, clock: &Clock) -> f32 {
+        self.tracker_mut().follow(angle, innovation, clock.control_s())
     }
 
     /// The angle cannot be followed: it is not known, or far off. The speed stays as it was.

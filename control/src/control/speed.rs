@@ -42,6 +42,12 @@ impl SpeedTracker {
 
     /// The angle measured now; returns the electrical angular speed in rad/s.
     pub fn step(&mut self, measured: Angle, period_s: f32) -> f32 {
+        self.follow(measured, measured - self.predicted(period_s), period_s)
+    }
+
+    /// The same where it is known already by how much the angle is off the predicted one.
+    #[inline(always)]
+    pub fn follow(&mut self, measured: Angle, innovation: Angle, period_s: f32) -> f32 {
         if self.steps == 0 {
             self.angle = measured;
         } else if self.steps == 1 {
@@ -49,10 +55,10 @@ impl SpeedTracker {
             self.omega = (measured - self.angle).signed_radians() / period_s;
             self.angle = measured;
         } else {
-            let predicted = self.predicted(period_s);
-            let error = (measured - predicted).signed_radians();
+            let error = innovation.signed_radians();
             self.omega += self.natural_rad_s * self.natural_rad_s * period_s * error;
-            self.angle = predicted + Angle::within_half_turn(2.0 * self.natural_rad_s * period_s * error);
+            self.angle =
+                measured - innovation + Angle::within_half_turn(2.0 * self.natural_rad_s * period_s * error);
         }
         self.steps = self.steps.saturating_add(1);
         self.omega

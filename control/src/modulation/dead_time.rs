@@ -27,9 +27,8 @@ pub fn compensate(half: &mut CarrierHalf, currents_a: &Abc, small_a: f32, device
     for ((compare, start_level), current) in phases.zip([currents_a.a, currents_a.b, currents_a.c]) {
         let against = if start_level { -current } else { current };
         if *compare < half.period_ticks {
-            let share = against / small_a;
             // What is below 0 the conversion makes 0.
-            let late = dead_ticks * if share > 1.0 { 1.0 } else { share };
+            let late = dead_ticks * if against > small_a { 1.0 } else { against / small_a };
             *compare = compare.saturating_sub((late + 0.5) as u32);
         }
     }

@@ -97,9 +97,13 @@ impl DeadTime {
     /// The way that a border goes with this current of its node.
     #[inline]
     fn shift(self, current_a: f32) -> i32 {
-        let share = current_a / self.small_a;
-        let share = if share > 1.0 { 1.0 } else { share };
-        let share = if share > -1.0 { share } else { -1.0 };
+        let share = if current_a > self.small_a {
+            1.0
+        } else if current_a > -self.small_a {
+            current_a / self.small_a
+        } else {
+            -1.0
+        };
         (0.5 * self.ticks as f32 * share) as i32
     }
 }

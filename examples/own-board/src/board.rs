@@ -92,7 +92,7 @@ impl ControlPort for Board {
         0
     }
 
-    fn report(&mut self, _now: Instant, _report: &Report) {}
+    fn report(&mut self, _now: Instant, _report: impl FnOnce() -> Report) {}
 }
 
 impl PwmPort for Board {

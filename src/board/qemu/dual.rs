@@ -73,7 +73,7 @@ impl ControlPort<Dual> for Control {
         age.saturating_sub(deadline_ticks)
     }
 
-    fn report(&mut self, now: Instant, report: &DualReport) {
+    fn report(&mut self, now: Instant, report: impl FnOnce() -> DualReport) {
         exchange::report_dual(now, report);
     }
 }

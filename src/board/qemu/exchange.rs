@@ -138,10 +138,10 @@ pub fn play(now: Instant, next: &CarrierHalf) {
     send(&Request::Play(now, *next).to_block());
 }
 
-/// The end of a control interrupt.
+/// The end of a control interrupt, with its report, which is made for the rig.
 #[inline(never)]
-pub fn report(now: Instant, report: &Report) {
-    send(&Request::ControlReport(now, *report).to_block());
+pub fn report(now: Instant, report: impl FnOnce() -> Report) {
+    send(&Request::ControlReport(now, report()).to_block());
 }
 
 /// The observation of an identification.

@@ -85,13 +85,14 @@ impl<L: ControlLaw> Axis<L> {
 
     /// Follows the angle, where it is `trusted` whatever it is. Says by how much, in rad, it is off where that is too much.
     pub fn track(&mut self, angle: Angle, trusted: bool, settings: &Settings) -> Option<f32> {
-        let surprise = self.controller.innovation_rad(angle, &settings.clock);
+        let innovation = self.controller.innovation(angle, &settings.clock);
+        let surprise = innovation.signed_radians();
         let known = self.controller.speed_is_known();
         if known && surprise.abs() > INNOVATION_RAD && !trusted {
             self.controller.lose_angle();
             return Some(surprise);
         }
-        self.controller.track(angle, &settings.clock);
+        self.controller.follow(angle, innovation, &settings.clock);
         let gone_astray = (self.omega() - self.slow) * SLOW_S;
         self.slow += (self.omega() - self.slow) * (settings.clock.control_s() * (1.0 / SLOW_S));
         if !known || trusted {
@@ -136,6 +137,7 @@ impl<L: ControlLaw> Axis<L> {
     }
 
     /// Measurements that no longer move; `lost` is the fault when it is the angle.
+    #[inline(always)]
     pub fn check_frozen(
         &mut self,
         measured: &Measurements,
@@ -244,6 +246,13 @@ impl<L: ControlLaw> Axis<L> {
         let length = 0.5 * share.depth * (1.0 - between * (1.0 / 24.0));
         AlphaBeta { alpha: middle.cos, beta: middle.sin } * length
     }
+}
+
+/// `true` if [`check`] finds nothing.
+#[inline(always)]
+pub fn is_sound(measured: &Measurements, omega: f32, tables: &Tables) -> bool {
+    protection::are_sound(&measured.currents_a, &tables.ratings)
+        && protection::check_speed(omega, &tables.ratings).is_none()
 }
 
 /// Phase currents and speed of one motor.

@@ -130,9 +130,9 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             self.trip = None;
             self.axes.iter_mut().for_each(Axis::recover_angle);
         }
-        if self.trip.is_none() {
+        if let (None, Some(trip)) = (self.trip, newest.and_then(|newest| newest.trip)) {
             // Also from beyond this call: only where calls of it have been lost.
-            self.trip = newest.and_then(|newest| newest.trip);
+            self.trip = Some(trip);
         }
         if let Some(HardwareBreak { fault, seen }) = sample.hardware {
             // That the gates are held, or did not do what they were told, is only what comes of it.
@@ -159,8 +159,9 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         let late_s = self.settings.clock.seconds(late as i32);
         self.check((late > 0).then_some((Fault::ControlDeadline, late_s, 0.0)), port);
         let gates = if pulsing && self.trip.is_none() { Gates::Pulse } else { Gates::Off };
+        let [upper, lower] = &self.driven.motors;
         shared.command.publish(DualCommand {
-            motors: self.driven.motors.each_ref().map(|motor| motor.command),
+            motors: [upper.command, lower.command],
             at: now,
             valid_from: now.after(deadline_ticks),
             duty: self.driven.duty,
@@ -179,9 +180,17 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         if let Some(recorder) = shared.recorder {
             recorder.record(self.entry(now, input, gates), self.trip.is_some());
         }
+        if self.operated && self.slots.begins() {
+            shared.operator.tell(now, &self.report(input));
+        }
+        port.report(now, || self.report(input));
+    }
+
+    /// The period's report.
+    fn report(&self, input: Input) -> DualReport {
         let Input { sample, command } = input;
         let ([upper, lower], driven) = (&self.axes, &self.driven);
-        let report = DualReport {
+        DualReport {
             torque_nm: driven.motors.each_ref().map(|motor| motor.torque_nm),
             voltage_v: driven.motors.each_ref().map(|motor| motor.command.voltage_v),
             weakening: driven.motors.each_ref().map(|motor| motor.weakening),
@@ -195,25 +204,22 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             source_v: sample.source_v,
             speed_known: upper.speed_is_known() && lower.speed_is_known(),
             acknowledged: self.acknowledge.answered(),
-        };
-        if self.operated && self.slots.begins() {
-            shared.operator.tell(now, &report);
         }
-        port.report(now, &report);
     }
 
     /// The period's entry in the flight recorder.
     #[inline(always)]
     fn entry(&self, at: Instant, input: Input, gates: Gates) -> DualRecord {
         let Input { sample, command } = input;
+        let ([first, second], [upper, lower]) = (sample.angles, &self.driven.motors);
         DualRecord {
             at,
             currents_a: sample.currents_a,
-            angles: sample.angles.map(|angle| angle.unwrap_or(Angle::ZERO)),
+            angles: [first.unwrap_or(Angle::ZERO), second.unwrap_or(Angle::ZERO)],
             capacitor_v: sample.capacitor_v,
             source_v: sample.source_v,
             inductor_a: sample.inductor_a,
-            torque_nm: self.driven.motors.each_ref().map(|motor| motor.torque_nm),
+            torque_nm: [upper.torque_nm, lower.torque_nm],
             duty: self.driven.duty,
             state: DualState {
                 scheme: command.scheme,
@@ -287,6 +293,27 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         measured: &[Measurements; 2],
         port: &mut impl ControlPort<Dual>,
     ) {
+        let Input { sample, command } = input;
+        let ([upper, lower], [first, second]) = (&self.axes, measured);
+        let (limits, tables) = (&self.settings.limits, self.machine.tables());
+        let [of_upper, of_lower] = &command.demands;
+        let sound = limits.check_link(sample.source_v, sample.capacitor_v).is_none()
+            && limits.check_link_reference(command.link_ref_v, sample.source_v).is_none()
+            && axis::is_sound(first, upper.omega(), tables)
+            && axis::is_sound(second, lower.omega(), tables)
+            && check_demand(of_upper).is_none()
+            && check_demand(of_lower).is_none();
+        if !sound {
+            // Copies: what stands behind a reference is in memory in every period.
+            let measured = *measured;
+            self.find_fault(input, &measured, port);
+        }
+    }
+
+    /// The fault of a period's input, where it has one.
+    #[cold]
+    #[inline(never)]
+    fn find_fault(&mut self, input: Input, measured: &[Measurements; 2], port: &mut impl ControlPort<Dual>) {
         let Input { sample, command } = input;
         let limits = &self.settings.limits;
         let armed = |(fault, _, _): &Violation| !self.disarmed.has(*fault);

@@ -10,7 +10,9 @@ use super::pulses::{Order, Pulses};
 use super::six_step_exit::SixStepExit;
 use super::slot::{Decision, Slot};
 use super::{Settings, Shared};
-use crate::control::{AngleHarmonics, ControlLaw, Controller, LinkDamper, Measurements, ModeLimits, Warmth};
+use crate::control::{
+    AngleHarmonics, ControlLaw, Controller, LinkDamper, Measurements, ModeLimits, Target, Warmth,
+};
 use crate::drive::acknowledge::Acknowledge;
 use crate::drive::{PeriodInput, SlotTimer};
 use crate::frames::Angle;
@@ -34,12 +36,13 @@ struct Seen {
     loaded: Mode,
 }
 
-/// The control interrupt's task, for a machine and a control law.
+/// The control interrupt's task, for a machine and a control law. In this order in memory, the remembered halves last: within 1,020 bytes of its
+/// beginning a number is loaded by one instruction, beyond by two.
+#[repr(C)]
 pub struct ControlTask<M = &'static Tables, L = Controller> {
     machine: M,
     settings: Settings,
     controller: L,
-    pulses: Pulses,
     watch: FrozenWatch,
     /// Nominal instant of the next call.
     now: Instant,
@@ -78,6 +81,7 @@ pub struct ControlTask<M = &'static Tables, L = Controller> {
     zeros: CurrentZeros,
     warmth: Warmth,
     diodes: DiodeWatch,
+    pulses: Pulses,
 }
 
 impl<M: Machine> ControlTask<M> {
@@ -211,16 +215,15 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             self.check(Some((fault, 1.0, 0.0)), sample, port);
         }
         self.check_legs(sample, port);
-        let overdue = self.pulses.newest().and_then(|newest| newest.overdue(now, &self.settings.clock));
         let angle = sample.angle.map(|angle| self.harmonics.corrected(angle));
         let (omega, lost) = self.track(angle, command.enable, port);
         let coarse = self.settings.counts_coarsely();
         let here = if coarse { self.controller.tracker().angle() } else { angle.unwrap_or(Angle::ZERO) };
         measured.angle = here + Angle::within_half_turn(self.controller.omega() * self.settings.angle_late_s);
-        let violation = self
-            .armed(overdue)
-            .or_else(|| self.armed(lost))
-            .or_else(|| self.judge(command, &measured, omega));
+        let overdue = self.pulses.newest().and_then(|newest| newest.overdue(now, &self.settings.clock));
+        self.check(overdue, sample, port);
+        self.check(lost, sample, port);
+        let violation = self.judge(command, &measured, omega);
         self.check(violation, sample, port);
         Seen { now, measured, omega, loaded: told.map_or(Mode::Off, |told| told.mode) }
     }
@@ -263,7 +266,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         // Not finite if either is not.
         let odd = self.reference.voltage_v + omega;
         self.check((!odd.is_finite()).then_some((Fault::NotFinite, odd, f32::MAX)), sample, port);
-        self.pulses_on(pulsing)
+        pulsing && self.trip.is_none()
     }
 
     /// The halves that the PWM interrupt will play, and whether they came in time; `true` if they are pulses.
@@ -277,19 +280,17 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         shared: &Shared,
     ) -> bool {
         let Clock { control_ticks, .. } = self.settings.clock;
-        let release = self.acknowledge.release();
-        let order = Order { pulses: pulsing, reference: &self.reference, release };
-        self.pulses.plan(self.now.after(control_ticks), &order, &shared.planned);
+        let until = self.now.after(control_ticks);
+        if self.pulses.lack(until) {
+            let release = self.acknowledge.release();
+            let order = Order { pulses: pulsing, reference: &self.reference, release };
+            self.pulses.plan(until, &order, &shared.planned);
+        }
         let late = port.overrun_ticks(seen.now, control_ticks);
         let late_s = self.settings.clock.seconds(late as i32);
         self.check((late > 0).then_some((Fault::ControlDeadline, late_s, 0.0)), sample, port);
-        self.pulses_on(pulsing)
-    }
-
-    /// `true` if pulses that were wanted go on: not after a fault, which no half is revised after either.
-    #[inline(always)]
-    fn pulses_on(&mut self, wanted: bool) -> bool {
-        let pulsing = wanted && self.trip.is_none();
+        let pulsing = pulsing && self.trip.is_none();
+        // Not after a fault.
         self.revises &= pulsing;
         pulsing
     }
@@ -304,9 +305,20 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         port: &mut impl ControlPort,
         shared: &Shared,
     ) {
-        let (Input { sample, .. }, now) = (input, seen.now);
+        let now = seen.now;
+        if let Some(recorder) = shared.recorder {
+            recorder.record(self.entry(now, input, seen.loaded, pulsing), self.trip.is_some());
+        }
+        if self.operated && self.slots.begins() {
+            shared.operator.tell(now, &self.report(input.sample));
+        }
+        port.report(now, || self.report(input.sample));
+    }
+
+    /// The period's report.
+    fn report(&self, sample: &Sample) -> Report {
         let target = self.controller.target();
-        let report = Report {
+        Report {
             torque_nm: target.torque_nm,
             flowing_nm: self.controller.flowing_nm(),
             id_a: target.current.d,
@@ -320,28 +332,22 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             speed_known: self.controller.speed_is_known(),
             acknowledged: self.acknowledge.answered(),
             mode: self.mode,
-        };
-        if let Some(recorder) = shared.recorder {
-            recorder.record(self.entry(now, input, &report, seen.loaded, pulsing), self.trip.is_some());
         }
-        if self.operated && self.slots.begins() {
-            shared.operator.tell(now, &report);
-        }
-        port.report(now, &report);
     }
 
     /// The period's entry in the flight recorder.
     #[inline(always)]
-    fn entry(&self, at: Instant, input: Input, report: &Report, mode: Mode, pulsing: bool) -> Record {
+    fn entry(&self, at: Instant, input: Input, mode: Mode, pulsing: bool) -> Record {
         let Input { sample, command } = input;
+        let Target { current, .. } = self.controller.target();
         Record {
             at,
             currents_a: sample.currents_a,
             udc_v: sample.udc_v,
             angle: sample.angle.unwrap_or(Angle::ZERO),
-            id_a: report.id_a,
-            iq_a: report.iq_a,
-            voltage_v: report.voltage_v,
+            id_a: current.d,
+            iq_a: current.q,
+            voltage_v: self.reference.voltage_v,
             state: State { mode, enabled: command.enable, pulsing, fault: self.trip.map(|trip| trip.fault) },
         }
     }

@@ -109,19 +109,20 @@ pub(super) struct Order<'a> {
     pub release: u8,
 }
 
-/// The modulator, and the halves that it has made.
+/// The modulator, and the halves that it has made. In this order in memory, as in [`ControlTask`](super::ControlTask).
+#[repr(C)]
 pub(super) struct Pulses {
     modulator: Modulator,
     /// Length of a half without pulses, in ticks.
     off_ticks: u32,
-    /// Half number n is in place `n % REMEMBERED`.
-    halves: [Half; REMEMBERED],
     /// Number of the half that was planned last, and the boundary after its own, for which nothing is planned yet.
     planned: u32,
     unplanned: Instant,
     /// Number of the half that was loaded at the newest boundary, and what the PWM interrupt told there; `None` before it has come.
     loaded: u32,
     told: Option<(Place, Told)>,
+    /// Half number n is in place `n % REMEMBERED`.
+    halves: [Half; REMEMBERED],
 }
 
 impl Pulses {
@@ -227,35 +228,40 @@ impl Pulses {
         }
     }
 
-    /// Plans a half for each boundary that comes before `until`.
+    /// `true` if a boundary that comes before `until` has no half yet, and any boundary is known.
     #[inline(always)]
-    pub(super) fn plan(&mut self, until: Instant, order: &Order, cell: &Planned) {
-        if !self.unplanned.reached(until) && self.told.is_some() {
-            self.plan_until(until, order, cell);
-        }
+    pub(super) fn lack(&self, until: Instant) -> bool {
+        !self.unplanned.reached(until) && self.told.is_some()
     }
 
-    #[inline(never)]
-    fn plan_until(&mut self, until: Instant, order: &Order, cell: &Planned) {
+    /// Plans a half for each boundary that comes before `until`; call it where there are such.
+    #[inline(always)]
+    pub(super) fn plan(&mut self, until: Instant, order: &Order, cell: &Planned) {
         for _ in 0..MOST_PLANNED {
             if self.unplanned.reached(until) {
                 return;
             }
-            let (at, begins) = (self.unplanned, self.half(self.planned).ends());
-            self.planned = self.planned.wrapping_add(1);
-            let next = &mut self.halves[self.planned as usize % REMEMBERED];
-            // Field by field: the half goes where it stays.
-            (next.at, next.begins) = (at, begins);
-            next.half = if order.pulses {
-                self.modulator.step(begins, Some(order.reference))
-            } else {
-                self.modulator.rest(begins, Some(order.reference))
-            };
-            next.mirrored = self.modulator.is_mirrored();
-            next.volt_ticks = volt_ticks(next.half.on_ticks(0));
-            self.unplanned = begins;
-            tell(next, order, cell);
+            self.plan_next(order, cell);
         }
+    }
+
+    /// Plans one. Out of line: what a loop prepares for all of its rounds would be prepared for one.
+    #[inline(never)]
+    fn plan_next(&mut self, order: &Order, cell: &Planned) {
+        let (at, begins) = (self.unplanned, self.half(self.planned).ends());
+        self.planned = self.planned.wrapping_add(1);
+        let next = &mut self.halves[self.planned as usize % REMEMBERED];
+        // Field by field: the half goes where it stays.
+        (next.at, next.begins) = (at, begins);
+        if order.pulses {
+            next.half = self.modulator.step(begins, Some(order.reference));
+        } else {
+            next.half = self.modulator.rest(begins, Some(order.reference));
+        }
+        next.mirrored = self.modulator.is_mirrored();
+        next.volt_ticks = volt_ticks(next.half.on_ticks(0));
+        self.unplanned = begins;
+        tell(next, order, cell);
     }
 
     /// Makes the half anew that was loaded at the newest boundary, in the control period after the command that wants it.
@@ -269,7 +275,7 @@ impl Pulses {
 }
 
 /// Puts a half into the cell to the PWM interrupt.
-#[inline(never)]
+#[inline(always)]
 fn tell(planned: &Half, order: &Order, cell: &Planned) {
     let Half { at, half, .. } = *planned;
     let &Order { reference: &Reference { rate, udc_v, .. }, release, .. } = order;
@@ -332,7 +338,9 @@ mod tests {
             let angle = crate::frames::Angle((f64::from(rate) * f64::from(now.0)) as u64 as u32);
             let reference = Reference::turning(100.0, angle, rate, now, 1_500.0);
             let order = Order { pulses: period > 50, reference: &reference, release: 0 };
-            pulses.plan(valid.after(2_500), &order, &planned);
+            if pulses.lack(valid.after(2_500)) {
+                pulses.plan(valid.after(2_500), &order, &planned);
+            }
         }
         // Nothing is planned before control has seen a boundary.
         assert!(found > 20 && found + 10 > boundaries, "{found} of {boundaries}");

@@ -18,6 +18,8 @@ pub(super) struct Decision {
 /// command is made once, in the period before it is used, and its operating point one period earlier. Where a carrier half is shorter
 /// than two periods, both are made in one.
 pub(super) struct Slot {
+    /// Its nominal instant.
+    pub now: Instant,
     pub key: Decision,
     /// `true` if the boundary uses the command of this period.
     pub commands: bool,
@@ -33,12 +35,19 @@ impl Slot {
     pub(super) fn of(newest: Option<&Half>, now: Instant, clock: &Clock) -> Self {
         let Some(newest) = newest else {
             let key = Decision { boundary: now, mode: Mode::Off };
-            return Self { key, commands: true, aims: false, between: 0 };
+            return Self { now, key, commands: true, aims: false, between: 0 };
         };
         let period = clock.control_ticks;
         let valid = now.after(period);
         let later = |halves| newest.begins.after(halves * newest.half.period_ticks);
-        let halves = if later(0).reached(valid) {
+        let [next, next_but_one] = newest.half.ahead;
+        let rest = later(0).since(valid);
+        if rest >= 2 * period as i32 {
+            // Most periods of a long half.
+            let key = Decision { boundary: newest.begins, mode: next };
+            return Self { now, key, commands: false, aims: false, between: 0 };
+        }
+        let halves = if rest >= 0 {
             0
         } else if later(1).reached(valid) {
             1
@@ -49,9 +58,9 @@ impl Slot {
         let commands = left < period as i32;
         // A pattern's half of less than two periods, which is rare, counts as if this command were in time for the next boundary.
         let between = if commands && !newest.half.is_free() { 0 } else { halves };
-        let [next, next_but_one] = newest.half.ahead;
         let mode = if between == 0 { next } else { next_but_one };
         Self {
+            now,
             key: Decision { boundary: later(between), mode },
             commands,
             aims: !commands && left < 2 * period as i32,

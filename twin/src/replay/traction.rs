@@ -244,7 +244,7 @@ impl ControlPort for ControlSide<'_> {
         0
     }
 
-    fn report(&mut self, _now: Instant, _report: &Report) {}
+    fn report(&mut self, _now: Instant, _report: impl FnOnce() -> Report) {}
 }
 
 struct PwmSide {

@@ -309,7 +309,7 @@ impl ControlPort<Dual> for ControlSide<'_> {
         0
     }
 
-    fn report(&mut self, _now: Instant, _report: &DualReport) {}
+    fn report(&mut self, _now: Instant, _report: impl FnOnce() -> DualReport) {}
 }
 
 struct PwmSide {

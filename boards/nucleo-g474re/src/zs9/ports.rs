@@ -93,7 +93,7 @@ impl<P: Position> ControlPort<Dual> for Control<'_, P> {
         self.timer.overrun_ticks(deadline_ticks, CLOCK.control_ticks)
     }
 
-    fn report(&mut self, _now: Instant, _report: &DualReport) {}
+    fn report(&mut self, _now: Instant, _report: impl FnOnce() -> DualReport) {}
 }
 
 /// The PWM interrupt's side.

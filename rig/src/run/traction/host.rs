@@ -78,8 +78,8 @@ impl ControlPort for Port<'_, '_> {
         self.bench.control_late_ticks()
     }
 
-    fn report(&mut self, now: Instant, report: &Report) {
-        self.bench.control_report(now, *report);
+    fn report(&mut self, now: Instant, report: impl FnOnce() -> Report) {
+        self.bench.control_report(now, report());
     }
 
     fn leg_faults(&mut self) -> LegFaults {

@@ -83,8 +83,8 @@ impl ControlPort<Dual> for Port<'_> {
         self.bench.control_late_ticks()
     }
 
-    fn report(&mut self, now: Instant, report: &DualReport) {
-        self.bench.control_report(now, *report);
+    fn report(&mut self, now: Instant, report: impl FnOnce() -> DualReport) {
+        self.bench.control_report(now, report());
     }
 }
 

@@ -67,8 +67,8 @@ pub fn play_dual(now: Instant, next: &PlayedPeriod) {
 
 /// The end of a control interrupt.
 #[inline(never)]
-pub fn report_dual(now: Instant, report: &DualReport) {
-    send(&DualRequest::ControlReport(now, *report).to_block());
+pub fn report_dual(now: Instant, report: impl FnOnce() -> DualReport) {
+    send(&DualRequest::ControlReport(now, report()).to_block());
 }
 
 /// An order to turn all gates off.

@@ -18,11 +18,12 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         port: &mut impl ControlPort,
     ) -> (f32, Option<Violation>) {
         let clock = self.settings.clock;
-        let lost = match angle {
-            Some(angle) if self.controller.speed_is_known() => {
-                self.innovation_rad = self.controller.innovation_rad(angle, &clock);
-                protection::check_angle(self.innovation_rad)
-            }
+        let followed = angle.map(|angle| (angle, self.controller.innovation(angle, &clock)));
+        if let Some((_, innovation)) = followed {
+            self.innovation_rad = innovation.signed_radians();
+        }
+        let lost = match followed {
+            Some(_) if self.controller.speed_is_known() => protection::check_angle(self.innovation_rad),
             Some(_) => None,
             None => {
                 let needed = self.controller.is_following() || (enable && port.turned().is_none());
@@ -37,19 +38,32 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         if self.trip.is_some() {
             self.controller.recover_angle();
         }
-        if let Some(angle) = angle.filter(|_| lost.is_none() || self.trip.is_some()) {
-            self.controller.track(angle, &clock);
+        if let Some((angle, innovation)) = followed.filter(|_| lost.is_none() || self.trip.is_some()) {
+            self.controller.follow(angle, innovation, &clock);
         }
         (self.lost_at.unwrap_or(self.controller.omega()), lost)
     }
 
     /// The fault of a period's input by itself.
+    #[inline(always)]
     pub(super) fn judge(
         &self,
         command: &DriveCommand,
         measured: &Measurements,
         omega: f32,
     ) -> Option<Violation> {
+        if protection::is_sound(measured, omega, &command.demand, &self.machine.tables().ratings) {
+            return None;
+        }
+        // Copies: what stands behind a reference is in memory in every period.
+        let (command, measured) = (*command, *measured);
+        self.find_fault(&command, &measured, omega)
+    }
+
+    /// The same for an input that may have one.
+    #[cold]
+    #[inline(never)]
+    fn find_fault(&self, command: &DriveCommand, measured: &Measurements, omega: f32) -> Option<Violation> {
         let ratings = &self.machine.tables().ratings;
         let empty =
             || if command.enable { protection::check_undervoltage(measured.udc_v, ratings) } else { None };

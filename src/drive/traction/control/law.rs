@@ -27,10 +27,9 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
     #[inline(always)]
     pub(super) fn pulse(&mut self, input: Input, measured: &Measurements, slot: &Slot, shared: &Shared) {
         let tables = self.machine.tables();
-        let now = self.now.before(self.settings.clock.control_ticks);
         let here = RotorSample::new(measured.currents_a, measured.angle, tables);
         self.controller.observe(&here, tables);
-        self.revises = self.is_to_revise(now, &input.command.demand);
+        self.revises = self.is_to_revise(slot.now, &input.command.demand);
         let commands = slot.commands || self.revises;
         let aims = slot.aims || (commands && self.aimed != Some(slot.key));
         // Not in the longest periods, either.
@@ -45,7 +44,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             && self.boundary != Some(at)
             && (aims || !commands)
         {
-            self.learn(input.sample, measured.angle, slot.key.mode, shared);
+            self.learn(input.sample, measured.angle, slot, shared);
             self.boundary = Some(at);
         }
         if aims {
@@ -78,16 +77,15 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
     }
 
     /// Learns from the newest boundary.
-    pub(super) fn learn(&mut self, sample: &Sample, angle: Angle, decided: Mode, shared: &Shared) {
+    pub(super) fn learn(&mut self, sample: &Sample, angle: Angle, slot: &Slot, shared: &Shared) {
         let Settings { gains, clock, .. } = &self.settings;
-        let now = self.now.before(clock.control_ticks);
         let tables = self.machine.tables();
         let boundary = passed(&self.pulses, self.boundary, sample.udc_v, clock);
         if let Some(currents_a) = self.pulses.currents_a(&shared.loaded) {
-            let age_s = clock.seconds(now.since(self.pulses.before(0).at));
+            let age_s = clock.seconds(slot.now.since(self.pulses.before(0).at));
             let angle = angle - Angle::within_half_turn(self.controller.omega() * age_s);
             let there = RotorSample::new(self.zeros.without(currents_a), angle, tables);
-            self.controller.learn(&boundary, &there, follows(decided), &Law { gains, clock, tables });
+            self.controller.learn(&boundary, &there, follows(slot.key.mode), &Law { gains, clock, tables });
         }
     }
 
@@ -118,7 +116,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
     #[inline(always)]
     pub(super) fn command(&mut self, sample: &Sample, here: &RotorSample, slot: &Slot) {
         let Settings { gains, clock, .. } = &self.settings;
-        let now = self.now.before(clock.control_ticks);
+        let now = slot.now;
         let (omega, udc_v) = (self.controller.omega(), sample.udc_v);
         let steady = Steady { omega, udc_v, voltage_v: self.steady_v, depth: self.depth };
         let (mode, revises) = (slot.key.mode, self.revises);
