@@ -5,6 +5,7 @@ mod law;
 mod start_up;
 
 use super::applied::NO_LIMITS;
+use super::current_gains::CurrentGains;
 use super::current_zeros::CurrentZeros;
 use super::pulses::{Order, Pulses};
 use super::six_step_exit::SixStepExit;
@@ -78,6 +79,7 @@ pub struct ControlTask<M = &'static Tables, L = Controller> {
     zeros: CurrentZeros,
     warmth: Warmth,
     diodes: DiodeWatch,
+    gains: CurrentGains,
 }
 
 impl<M: Machine> ControlTask<M> {
@@ -123,6 +125,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             warmth: Warmth::NONE,
         }
     }
+            gains: CurrentGains::new(),
 
     /// The same without a check.
     pub const fn without(mut self, disarmed: MaskedFaults) -> Self {
@@ -196,7 +199,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
     fn protect(&mut self, now: Instant, input: Input, port: &mut impl ControlPort, shared: &Shared) -> Seen {
         let Input { sample, command } = input;
         let mut measured = sample.measured();
-        measured.currents_a = self.zeros.without(sample.currents_a);
+        measured.currents_a = self.gains.without(self.zeros.without(sample.currents_a));
         let told = self.pulses.look(&shared.loaded, now, self.now);
         let released = told.map(|told| told.released);
         if self.acknowledge.step(command.acknowledge, self.trip.is_some(), released) {

@@ -36,6 +36,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         // Not in the longest periods, either.
         if !commands || slot.between > 0 {
             self.warm(input.command.warmth);
+            self.gains.learn(measured.currents_a, tables.ratings.max_current_a);
         }
         // Once a half, and not in the longest periods unless all are.
         if slot.commands && (!aims || slot.between > 0) {
@@ -86,7 +87,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         if let Some(currents_a) = self.pulses.currents_a(&shared.loaded) {
             let age_s = clock.seconds(now.since(self.pulses.before(0).at));
             let angle = angle - Angle::within_half_turn(self.controller.omega() * age_s);
-            let there = RotorSample::new(self.zeros.without(currents_a), angle, tables);
+            let there = RotorSample::new(self.gains.without(self.zeros.without(currents_a)), angle, tables);
             self.controller.learn(&boundary, &there, follows(decided), &Law { gains, clock, tables });
         }
     }
