@@ -54,6 +54,8 @@ pub struct ControlTask<M = &'static Tables, L = Controller> {
     /// Fundamental that the last operating point would have without a limit and without the trim, as a share of six-step.
     depth: f32,
     exit: SixStepExit,
+    /// The link's voltage over what its sensor reads, as far as it is known.
+    link_scale: f32,
     damper: LinkDamper,
     /// The last demand, in N·m, and whether it has jumped and no half has been revised for it yet.
     demand_nm: f32,
@@ -77,9 +79,9 @@ pub struct ControlTask<M = &'static Tables, L = Controller> {
     harmonics: AngleHarmonics,
     innovation_rad: f32,
     zeros: CurrentZeros,
+    gains: CurrentGains,
     warmth: Warmth,
     diodes: DiodeWatch,
-    gains: CurrentGains,
 }
 
 impl<M: Machine> ControlTask<M> {
@@ -106,6 +108,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             steady_v: 0.0,
             depth: 0.0,
             exit: SixStepExit::new(),
+            link_scale: 1.0,
             damper: LinkDamper::at(0.0),
             demand_nm: 0.0,
             jumped: false,
@@ -122,10 +125,10 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             harmonics: AngleHarmonics::new(settings.angle_late_s),
             innovation_rad: 0.0,
             zeros: CurrentZeros::new(),
+            gains: CurrentGains::new(),
             warmth: Warmth::NONE,
         }
     }
-            gains: CurrentGains::new(),
 
     /// The same without a check.
     pub const fn without(mut self, disarmed: MaskedFaults) -> Self {
