@@ -134,7 +134,10 @@ fn least_of_references<L: ControlLaw>(
             continue;
         }
         let demand = Demand { torque_nm: wanted_nm, slew_limited: period < 6_000 };
-        law.aim(&AimInput { demand: &demand, window: None, udc_v, swing: None, limits }, &constants);
+        law.aim(
+            &AimInput { demand: &demand, window: None, udc_v, link_scale: 1.0, swing: None, limits },
+            &constants,
+        );
         let target = law.target();
         current_a = current_a.min(target.current.d);
         flux_a = flux_a.min(id_a(tables, target.flux));
@@ -208,7 +211,14 @@ fn the_papers_law_keeps_it_however_much_voltage_is_missing() {
             continue;
         }
         let demand = Demand { torque_nm: 1_235.0, slew_limited: true };
-        let input = AimInput { demand: &demand, window: None, udc_v: 900.0, swing: None, limits: &limits };
+        let input = AimInput {
+            demand: &demand,
+            window: None,
+            udc_v: 900.0,
+            link_scale: 1.0,
+            swing: None,
+            limits: &limits,
+        };
         law.aim(&input, &constants);
         law.regulate(&sample, &committed, &limits, &constants);
         least_a = least_a.min(law.target().current.d);

@@ -42,7 +42,14 @@ fn driven(warmth: Warmth, rpm: f32, torque_nm: f32, udc_v: f32) -> (Dq, Dq, f32)
         if period % 5 == 0 && period > 1_000 {
             let demand = Demand { torque_nm, slew_limited: true };
             law.aim(
-                &AimInput { demand: &demand, window: None, udc_v, swing: None, limits: &limits },
+                &AimInput {
+                    demand: &demand,
+                    window: None,
+                    udc_v,
+                    link_scale: 1.0,
+                    swing: None,
+                    limits: &limits,
+                },
                 &constants,
             );
             steady_v = law.regulate(&sample, &committed, &limits, &constants).steady_v;

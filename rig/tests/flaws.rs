@@ -151,6 +151,39 @@ fn offsets_of_current_sensors_are_learnt_at_rest() {
     }
 }
 
+/// Without what is learnt of them gains of 2 % and −2 % cost 27 % of torque ripple at 200 r/min, and no step settles. The first step of `load-steps` is
+/// before anything flows that could teach it.
+#[test]
+fn differences_between_the_gains_of_current_sensors_are_learnt() {
+    for point in ["--speed 200 --torque 1235", "--speed 1500 --torque 1235", "--speed 3000 --torque 784"] {
+        for gains in ["2,-2,0", "0,-1,3"] {
+            let [thd, ripple] = excess(&format!("{point} --current-gains {gains}"));
+            assert!(thd < 3.0 && ripple < 3.0, "{point}, {gains}: {thd} %, {ripple} %");
+        }
+    }
+    for gains in ["2,-2,0", "0,-2,2"] {
+        let times = settling_ms(&format!("--current-gains {gains}"));
+        assert!(times.iter().skip(1).all(|ms| *ms < 5.0), "{gains}: {times:?}");
+    }
+}
+
+/// Without what is learnt of it a link that is read 3 % too small costs 20.9 ms at a step; in a sweep 3.2 % of current and 53 N·m at a switch, and a switch back.
+/// The first step of `load-steps` is 0.2 s after the first pulses, where two thirds are learnt.
+#[test]
+fn a_link_sensors_gain_is_learnt() {
+    for gain in [-3, 3] {
+        let times = settling_ms(&format!("--udc-gain {gain}"));
+        assert!(times.iter().skip(1).all(|ms| *ms < 5.0), "{gain} %: {times:?}");
+        let chosen = catalogue::of_traction(&format!("sweep --down --udc-gain {gain}")).unwrap();
+        let machine = chosen.machine().unwrap();
+        let recording = chosen.drive(&machine).unwrap();
+        let figures = chosen.figures(&recording, &machine);
+        for verdict in figures.values()["verdicts"].as_array().unwrap() {
+            assert_ne!(verdict["verdict"], "falls short", "{gain} %: {verdict}");
+        }
+    }
+}
+
 #[test]
 fn an_offset_that_is_too_large_has_its_name() {
     let chosen = catalogue::of_traction("load-steps --current-offset 0,0,4").unwrap();

@@ -58,8 +58,10 @@ pub struct AimInput<'a> {
     pub demand: &'a Demand,
     /// The window of link voltage in which it ends; `None`: nowhere.
     pub window: Option<&'a LinkWindow>,
-    /// DC-link voltage, in V.
+    /// DC-link voltage as it is read, in V.
     pub udc_v: f32,
+    /// The link's voltage over that, as far as the drive makes use of [`ControlLaw::link_scale`] for its volt-seconds; 1: it makes none.
+    pub link_scale: f32,
     /// The link's swing, where it is to be damped.
     pub swing: Option<LinkSwing>,
     /// The limits of the mode.
@@ -137,6 +139,10 @@ impl ControlLaw for Controller {
         self.map_error.scales().flux
     }
 
+    fn link_scale(&self) -> f32 {
+        self.map_error.link_scale()
+    }
+
     fn map_error(&self) -> f32 {
         self.map_error.share()
     }
@@ -195,7 +201,7 @@ impl ControlLaw for Controller {
     }
 
     fn aim(&mut self, input: &AimInput, law: &Law) {
-        let AimInput { demand, window, udc_v, swing, limits } = *input;
+        let AimInput { demand, window, udc_v, link_scale, swing, limits } = *input;
         let (tables, omega) = (law.tables, self.speed.omega());
         let ratings = &tables.ratings;
         let Scales { torque, flux } = self.map_error.scales();
@@ -209,7 +215,7 @@ impl ControlLaw for Controller {
         let shaping =
             demand::Input { demand, window, udc_v, omega, flowing_nm: measured_nm, can_step, period_s };
         let demand_nm = self.demand.step(&shaping, ratings);
-        let link = self.link.step(udc_v, period_s);
+        let link = self.link.step(udc_v * link_scale, period_s);
         let most = limits.depth_limit * limits.steady_share;
         let limit = VoltageLimit { udc_v: link.slow_v / flux, depth: most, filled: limits.filled };
         let trim_nm = self.trim.trim_nm(demand_nm, limits.ripple_share, ratings.max_torque_nm);
@@ -247,6 +253,7 @@ impl ControlLaw for Controller {
         let disturbance = self.disturbance.mean();
         self.map_error.step(&map_error::Input {
             disturbance,
+            explained: 1.0 - link_scale,
             current,
             flux,
             omega,

@@ -76,6 +76,11 @@ pub trait ControlLaw {
         1.0
     }
 
+    /// The link's voltage over what its sensor reads, as far as it is known: all volt-seconds are made and counted with it.
+    fn link_scale(&self) -> f32 {
+        1.0
+    }
+
     /// By how much the machine's flux linkage seems to exceed the map's, as a share; 0 where it turns too slowly to tell, and
     /// of a law that has no idea of it.
     fn map_error(&self) -> f32 {

@@ -6,7 +6,8 @@
 //!
 //! ε = ((u·i)(jωψ·i) − (u·jωψ)(|i|² + i₀²)) / (|ωψ|² (|i|² + i₀²) − (jωψ·i)²)
 //!
-//! The estimate is reported; beyond what a link sensor may be off, the operating point takes it into account: such a machine needs for a
+//! The estimate is reported, and used whole. As much of it as a link sensor may be off is taken for that: a link that is read too large by ε looks like it, and
+//! all volt-seconds are then those of a link of udc/(1 + ε). What is beyond is the map's, and the operating point takes it into account: such a machine needs for a
 //! torque the current that the map gives for T/(1 + ε), and the voltage that it gives on a link of udc/(1 + ε). What [`super::Warmth`] explains
 //! of it is taken into account whole, for torque and flux linkage each by its own amount, and only the rest is an error.
 
@@ -18,8 +19,10 @@ use crate::frames::{Dq, limit_magnitude};
 const FROM: f32 = 0.1;
 /// Bandwidth of the estimate, in rad/s.
 const BANDWIDTH_RAD_S: f32 = 5.0;
-/// Error that is left alone: what a link sensor, and where the current is small half as much resistance again, may look like.
-const LEFT_ALONE: f32 = 0.03;
+/// Error that is the link sensor's: what it, and where the current is small half as much resistance again, may look like.
+const LINK: f32 = 0.03;
+/// Part of that which is left alone: a sensor without an error is used as it is, bit for bit.
+const LEFT_ALONE: f32 = 0.005;
 /// Largest correction.
 const MOST: f32 = 0.15;
 
@@ -27,6 +30,8 @@ const MOST: f32 = 0.15;
 pub struct Input {
     /// Mean, in V.
     pub disturbance: Dq,
+    /// ε that is not in it, as the volt-seconds have it already.
+    pub explained: f32,
     /// In A.
     pub current: Dq,
     /// Flux linkage, in Wb.
@@ -77,9 +82,17 @@ impl MapError {
         self.believe();
     }
 
-    /// 1 + ε with nothing of a believed ε left alone: for the flux linkage of the magnets in a machine that is caught.
+    /// The link's voltage over what its sensor reads, as far as it is known: 1/(1 + ε), within 3e-5, of what ε may be the sensor's.
+    pub fn link_scale(&self) -> f32 {
+        let links = limit_magnitude(self.share, LINK);
+        let error = links - limit_magnitude(links, LEFT_ALONE);
+        1.0 - error + error * error
+    }
+
+    /// 1 + ε without the link sensor's part: for the flux linkage of the magnets in a machine that is caught.
     pub fn caught_scale(&self) -> f32 {
-        if self.believed == Scales::NONE { 1.0 } else { 1.0 + limit_magnitude(self.share(), MOST) }
+        let beyond = self.share() - limit_magnitude(self.share, LINK);
+        if self.believed == Scales::NONE { 1.0 } else { 1.0 + limit_magnitude(beyond, MOST) }
     }
 
     /// Torque over that of the map, as far as it is known.
@@ -88,24 +101,21 @@ impl MapError {
     }
 
     fn believe(&mut self) {
-        let left = self.share;
-        let believed = if left.abs() > LEFT_ALONE {
-            1.0 + limit_magnitude(left - LEFT_ALONE.copysign(left), MOST)
-        } else {
-            1.0
-        };
+        let share = self.share;
+        let believed = 1.0 + limit_magnitude(share - limit_magnitude(share, LINK), MOST);
         self.believed = Scales { torque: believed * self.warm.torque, flux: believed * self.warm.flux };
     }
 
     /// A time with a mean disturbance.
     pub fn step(&mut self, input: &Input) {
-        let Input { disturbance, current, flux, omega, period_s, resistance_from, largest_a, fastest } =
-            *input;
+        let Input {
+            disturbance, current, flux, omega, period_s, resistance_from, largest_a, fastest, ..
+        } = *input;
         if omega.abs() < resistance_from * (FROM * fastest) {
             return;
         }
         let seen = share_of(disturbance, omega, current, flux, resistance_from * largest_a);
-        self.share += BANDWIDTH_RAD_S * period_s * (seen - self.explained - self.share);
+        self.share += BANDWIDTH_RAD_S * period_s * (seen + input.explained - self.explained - self.share);
         self.believe();
     }
 }
@@ -135,6 +145,7 @@ mod tests {
         for _ in 0..2_000 {
             error.step(&Input {
                 disturbance,
+                explained: 0.0,
                 current,
                 flux: FLUX,
                 omega,
@@ -155,6 +166,44 @@ mod tests {
                 assert!((told - share).abs() < 5e-3, "{told} for {share} with {more_ohm} Ω at {omega} rad/s");
             }
         }
+    }
+
+    /// A drive that makes use of the link's scale, in front of a machine with this share of more flux linkage: the estimate after two seconds,
+    /// the scale, and what the map has of it.
+    fn used(share: f32) -> [f32; 3] {
+        let (mut error, omega) = (MapError::new(), 300.0);
+        for _ in 0..2_000 {
+            let scale = error.link_scale();
+            error.step(&Input {
+                disturbance: FLUX.j() * (omega * (1.0 - scale - share)),
+                explained: 1.0 - scale,
+                current: CURRENT,
+                flux: FLUX,
+                omega,
+                period_s: 1e-3,
+                resistance_from: 0.15,
+                largest_a: 267.0,
+                fastest: 1_500.0,
+            });
+        }
+        [error.share(), error.link_scale(), error.scales().torque]
+    }
+
+    #[test]
+    fn what_a_link_sensor_may_be_off_is_its_own_and_the_rest_the_maps() {
+        for (share, link, map) in [
+            (0.004, 0.0, 0.0),
+            (0.03, 0.025, 0.0),
+            (-0.03, -0.025, 0.0),
+            (0.1, 0.025, 0.07),
+            (-0.1, -0.025, -0.07),
+        ] {
+            let [told, scale, torque] = used(share);
+            assert!((told - share).abs() < 1e-3, "{told} for {share}");
+            assert!((scale * (1.0 + link) - 1.0).abs() < 2e-4, "{scale} for {share}");
+            assert!((torque - 1.0 - map).abs() < 1e-3, "{torque} for {share}");
+        }
+        assert_eq!(used(0.004)[1], 1.0, "a good sensor is used as it is");
     }
 
     #[test]

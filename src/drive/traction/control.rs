@@ -5,6 +5,7 @@ mod law;
 mod start_up;
 
 use super::applied::NO_LIMITS;
+use super::current_gains::CurrentGains;
 use super::current_zeros::CurrentZeros;
 use super::pulses::{Order, Pulses};
 use super::six_step_exit::SixStepExit;
@@ -56,6 +57,8 @@ pub struct ControlTask<M = &'static Tables, L = Controller> {
     /// Fundamental that the last operating point would have without a limit and without the trim, as a share of six-step.
     depth: f32,
     exit: SixStepExit,
+    /// The link's voltage over what its sensor reads, as far as it is known.
+    link_scale: f32,
     damper: LinkDamper,
     /// The last demand, in N·m, and whether it has jumped and no half has been revised for it yet.
     demand_nm: f32,
@@ -79,6 +82,7 @@ pub struct ControlTask<M = &'static Tables, L = Controller> {
     harmonics: AngleHarmonics,
     innovation_rad: f32,
     zeros: CurrentZeros,
+    gains: CurrentGains,
     warmth: Warmth,
     diodes: DiodeWatch,
     pulses: Pulses,
@@ -108,6 +112,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             steady_v: 0.0,
             depth: 0.0,
             exit: SixStepExit::new(),
+            link_scale: 1.0,
             damper: LinkDamper::at(0.0),
             demand_nm: 0.0,
             jumped: false,
@@ -124,6 +129,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             harmonics: AngleHarmonics::new(settings.angle_late_s),
             innovation_rad: 0.0,
             zeros: CurrentZeros::new(),
+            gains: CurrentGains::new(),
             warmth: Warmth::NONE,
         }
     }
@@ -200,7 +206,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
     fn protect(&mut self, now: Instant, input: Input, port: &mut impl ControlPort, shared: &Shared) -> Seen {
         let Input { sample, command } = input;
         let mut measured = sample.measured();
-        measured.currents_a = self.zeros.without(sample.currents_a);
+        measured.currents_a = self.gains.without(self.zeros.without(sample.currents_a));
         let told = self.pulses.look(&shared.loaded, now, self.now);
         let released = told.map(|told| told.released);
         if self.acknowledge.step(command.acknowledge, self.trip.is_some(), released) {

@@ -9,6 +9,7 @@
 
 mod applied;
 mod control;
+mod current_gains;
 mod current_zeros;
 mod pulses;
 mod pwm;

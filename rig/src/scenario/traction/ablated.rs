@@ -66,6 +66,10 @@ impl ControlLaw for Ablated {
         self.controller.map_scale()
     }
 
+    fn link_scale(&self) -> f32 {
+        self.controller.link_scale()
+    }
+
     fn map_error(&self) -> f32 {
         self.controller.map_error()
     }

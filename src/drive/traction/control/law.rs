@@ -35,6 +35,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         // Not in the longest periods, either.
         if !commands || slot.between > 0 {
             self.warm(input.command.warmth);
+            self.gains.learn(measured.currents_a, tables.ratings.max_current_a);
         }
         // Once a half, and not in the longest periods unless all are.
         if slot.commands && (!aims || slot.between > 0) {
@@ -80,11 +81,11 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
     pub(super) fn learn(&mut self, sample: &Sample, angle: Angle, slot: &Slot, shared: &Shared) {
         let Settings { gains, clock, .. } = &self.settings;
         let tables = self.machine.tables();
-        let boundary = passed(&self.pulses, self.boundary, sample.udc_v, clock);
+        let boundary = passed(&self.pulses, self.boundary, sample.udc_v * self.link_scale, clock);
         if let Some(currents_a) = self.pulses.currents_a(&shared.loaded) {
             let age_s = clock.seconds(slot.now.since(self.pulses.before(0).at));
             let angle = angle - Angle::within_half_turn(self.controller.omega() * age_s);
-            let there = RotorSample::new(self.zeros.without(currents_a), angle, tables);
+            let there = RotorSample::new(self.gains.without(self.zeros.without(currents_a)), angle, tables);
             self.controller.learn(&boundary, &there, follows(slot.key.mode), &Law { gains, clock, tables });
         }
     }
@@ -95,7 +96,8 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         let Settings { gains, clock, .. } = &self.settings;
         let (omega, udc_v) = (self.controller.omega(), sample.udc_v);
         let tables = self.machine.tables();
-        let steady = Steady { omega, udc_v, voltage_v: self.steady_v, depth: self.depth };
+        let steady =
+            Steady { omega, udc_v: udc_v * self.link_scale, voltage_v: self.steady_v, depth: self.depth };
         let passed_s = self.controller.passed_s(clock);
         self.limits = limits(&slot.key, &steady, &mut self.exit, &self.settings, passed_s);
         let emf_v = omega.abs() * tables.ratings.magnet_flux_wb * self.controller.map_scale();
@@ -104,10 +106,18 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         let damps = gains.link_damping > 0.0;
         let swing = damps.then(|| self.damper.step(udc_v, passed_s, omega, self.limits.follows));
         let window = Some(&command.window);
-        let aim = AimInput { demand: &demand, window, udc_v, swing, limits: &self.limits };
+        let aim = AimInput {
+            demand: &demand,
+            window,
+            udc_v,
+            link_scale: self.link_scale,
+            swing,
+            limits: &self.limits,
+        };
         self.controller.aim(&aim, &Law { gains, clock, tables });
         let target = self.controller.target();
         self.depth = target.depth;
+        self.link_scale = self.controller.link_scale();
         self.exit.drove(target.torque_nm);
         self.aimed = Some(slot.key);
     }
@@ -117,7 +127,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
     pub(super) fn command(&mut self, sample: &Sample, here: &RotorSample, slot: &Slot) {
         let Settings { gains, clock, .. } = &self.settings;
         let now = slot.now;
-        let (omega, udc_v) = (self.controller.omega(), sample.udc_v);
+        let (omega, udc_v) = (self.controller.omega(), sample.udc_v * self.link_scale);
         let steady = Steady { omega, udc_v, voltage_v: self.steady_v, depth: self.depth };
         let (mode, revises) = (slot.key.mode, self.revises);
         let wanted = Wanted { mode, revises, between: slot.between, before: &self.reference };
