@@ -126,10 +126,13 @@ fn perform(step: Step, setup: &mut Setup) -> Result<Outcome> {
         Step::Cells => crate::cells::check(setup)?,
         Step::Landings => crate::landings::check(setup)?,
         Step::Overruns => crate::overruns::check(setup)?,
-        Step::Image => images(setup, |path| {
-            println!("{}", path.display());
-            Ok(true)
-        })?,
+        Step::Image => {
+            build::reference_images(&setup.toolchain()?)?
+                && images(setup, |path| {
+                    println!("{}", path.display());
+                    Ok(true)
+                })?
+        }
         Step::ImageCheck => images(setup, image::check)?,
         Step::NucleoImage => board_images(setup)?,
         Step::Twin => return Ok(where_possible(twin::check(setup)?)),
@@ -193,6 +196,7 @@ fn board_images(setup: &mut Setup) -> Result<bool> {
         println!("{}, {stage}:", board.name);
         image::check_board(&build::image_of_stage(&setup.toolchain()?, board, stage)?, board)
     })?;
+    let built = all(&boards, |board| build::images_of(&setup.toolchain()?, board))?;
     let images = boards.iter().flat_map(|board| System::ALL.map(|system| (board, system)));
     let drives = all(images, |(board, system)| {
         println!("{}:", system.image_on(board));
@@ -203,7 +207,7 @@ fn board_images(setup: &mut Setup) -> Result<bool> {
         println!("{}, identifying:", board.name);
         image::check_board(&build::identify_on(&setup.toolchain()?, board, None)?, board)
     })?;
-    Ok(sensors && drives && identifying)
+    Ok(sensors && built && drives && identifying)
 }
 
 fn book(setup: &mut Setup) -> Result<Outcome> {
