@@ -1,6 +1,7 @@
 //! The smooth flux map between the nodes.
 
 use crate::map::FluxMap;
+use core::ops::{Add, Mul};
 
 /// Flux linkage at a current, with its Jacobian.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -28,7 +29,7 @@ pub struct SmoothMap {
     step_q: f64,
     cells_d: usize,
     cells_q: usize,
-    cells: Vec<[[f64; 16]; 2]>,
+    cells: Vec<[Both; 16]>,
 }
 
 impl SmoothMap {
@@ -42,7 +43,8 @@ impl SmoothMap {
         let mut cells = Vec::with_capacity((rows - 1) * (columns - 1));
         for r in 0..rows - 1 {
             for c in 0..columns - 1 {
-                cells.push([surfaces[0].cell(r, c), surfaces[1].cell(r, c)]);
+                let [d, q] = [surfaces[0].cell(r, c), surfaces[1].cell(r, c)];
+                cells.push(core::array::from_fn(|k| Both([d[k], q[k]])));
             }
         }
         Self {
@@ -60,21 +62,21 @@ impl SmoothMap {
     pub fn at(&self, id_a: f64, iq_a: f64) -> FluxPoint {
         let (r, x, beyond_d) = place((id_a - self.first_d) / self.step_d, self.cells_d);
         let (c, y, beyond_q) = place((iq_a - self.first_q) / self.step_q, self.cells_q);
-        let [d, q] = self.cells[r * self.cells_q + c].each_ref().map(|k| {
-            let inside = Value::of(k, x, y);
-            if beyond_d == 0.0 && beyond_q == 0.0 {
-                inside
-            } else {
-                inside.beyond(k, (x, y), (beyond_d, beyond_q))
-            }
-        });
+        let k = &self.cells[r * self.cells_q + c];
+        let inside = Value::of(k, x, y);
+        let at = if beyond_d == 0.0 && beyond_q == 0.0 {
+            inside
+        } else {
+            inside.beyond(k, (x, y), (beyond_d, beyond_q))
+        };
+        let ([psi_d_wb, psi_q_wb], [by_d_d, by_d_q], [by_q_d, by_q_q]) = (at.value.0, at.by_x.0, at.by_y.0);
         FluxPoint {
-            psi_d_wb: d.value,
-            psi_q_wb: q.value,
-            ldd_h: d.by_x / self.step_d,
-            ldq_h: d.by_y / self.step_q,
-            lqd_h: q.by_x / self.step_d,
-            lqq_h: q.by_y / self.step_q,
+            psi_d_wb,
+            psi_q_wb,
+            ldd_h: by_d_d / self.step_d,
+            ldq_h: by_q_d / self.step_q,
+            lqd_h: by_d_q / self.step_d,
+            lqq_h: by_q_q / self.step_q,
         }
     }
 
@@ -105,17 +107,40 @@ fn place(position: f64, cells: usize) -> (usize, f64, f64) {
     (cell, inside - cell as f64, position - inside)
 }
 
-/// A surface's value and slopes, per cell.
+/// A quantity of both surfaces, ψd's and ψq's: the simulations spend a third of their time here, and a processor reckons two at once.
+#[derive(Clone, Copy, Debug)]
+struct Both([f64; 2]);
+
+impl Add for Both {
+    type Output = Self;
+
+    #[inline(always)]
+    fn add(self, Self([d, q]): Self) -> Self {
+        Self([self.0[0] + d, self.0[1] + q])
+    }
+}
+
+impl Mul<Both> for f64 {
+    type Output = Both;
+
+    #[inline(always)]
+    fn mul(self, Both([d, q]): Both) -> Both {
+        Both([self * d, self * q])
+    }
+}
+
+/// The surfaces' values and slopes, per cell.
 #[derive(Clone, Copy)]
 struct Value {
-    value: f64,
-    by_x: f64,
-    by_y: f64,
+    value: Both,
+    by_x: Both,
+    by_y: Both,
 }
 
 impl Value {
     /// Of a bicubic polynomial.
-    fn of(k: &[f64; 16], x: f64, y: f64) -> Self {
+    #[inline(always)]
+    fn of(k: &[Both; 16], x: f64, y: f64) -> Self {
         let row = |i: usize| {
             let (a, b, c, d) = (k[4 * i], k[4 * i + 1], k[4 * i + 2], k[4 * i + 3]);
             (a + y * (b + y * (c + y * d)), b + y * (2.0 * c + 3.0 * y * d))
@@ -129,13 +154,13 @@ impl Value {
     }
 
     /// Outside the grid: the edge's tangent, which turns as the edge does; so the slopes are those of the value there too.
-    fn beyond(self, k: &[f64; 16], (x, y): (f64, f64), (beyond_x, beyond_y): (f64, f64)) -> Self {
+    fn beyond(self, k: &[Both; 16], (x, y): (f64, f64), (beyond_x, beyond_y): (f64, f64)) -> Self {
         let row = |i: usize| k[4 * i + 1] + y * (2.0 * k[4 * i + 2] + 3.0 * y * k[4 * i + 3]);
         let mixed = row(1) + x * (2.0 * row(2) + 3.0 * x * row(3));
         Self {
-            value: self.value + self.by_x * beyond_x + self.by_y * beyond_y + mixed * beyond_x * beyond_y,
-            by_x: self.by_x + mixed * beyond_y,
-            by_y: self.by_y + mixed * beyond_x,
+            value: self.value + beyond_x * self.by_x + beyond_y * self.by_y + beyond_y * (beyond_x * mixed),
+            by_x: self.by_x + beyond_y * mixed,
+            by_y: self.by_y + beyond_x * mixed,
         }
     }
 }

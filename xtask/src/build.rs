@@ -161,6 +161,23 @@ pub fn bench(toolchain: &Toolchain, name: &str) -> Result<PathBuf> {
         .context("the bench was not built")
 }
 
+/// Builds the reference images, which are of one set of features, at once: each core links one. Then they are there for whoever asks
+/// for one of them.
+pub fn reference_images(toolchain: &Toolchain) -> Result<bool> {
+    let [of_traction, of_zs9] = System::ALL.map(|system| [system.image(), system.pi_image()]);
+    let mut command = on_target(toolchain, "tractive", IDENTIFY);
+    command.args(["--features", QEMU]);
+    command.args([of_traction, of_zs9].concat().iter().flat_map(|name| ["--bin", name]));
+    process::succeeds(&mut command)
+}
+
+/// Builds a board's images, likewise.
+pub fn images_of(toolchain: &Toolchain, board: &Board) -> Result<bool> {
+    let mut command = on_target(toolchain, &board.package, &format!("{}-{IDENTIFY}", board.name));
+    command.args(System::ALL.iter().flat_map(|system| ["--bin".to_owned(), system.image_on(board)]));
+    process::succeeds(&mut command)
+}
+
 /// The build of a package's image with its built-in machines.
 fn on_target(toolchain: &Toolchain, package: &str, name: &str) -> Command {
     let args = ["build", "--profile", "firmware", "--target", TARGET, "--package", package, "--bin", name];

@@ -16,13 +16,38 @@ use std::time::{Duration, Instant};
 
 /// The packages by the commands that test them. Cargo unites the features of what it is asked for at once: with all of them in one
 /// command the rig and this program would be compiled anew, since `cargo rig` and `cargo xtask` ask for one package. The boards go with the
-/// first; with the rig `tractive-control` has its optimised patterns, too.
+/// first.
 const TOGETHER: [&[&str]; 4] = [
-    &["tractive", "tractive-control", "tractive-tablegen"],
-    &["tractive-rig", "tractive-control"],
-    &["xtask"],
-    &["tractive-bench", "tractive-cells", "tractive-fault-injector"],
+    &[
+        "tractive",
+        "tractive-control",
+        "tractive-tablegen",
+        "tractive-bench",
+        "tractive-cells",
+        "tractive-fault-injector",
+    ],
+    &[CONTROL],
+    &[RIG],
+    &[OWN],
 ];
+
+/// The control crate once more, with its optimised patterns.
+const CONTROL: &str = "tractive-control";
+const CONTROL_PARTS: [&[&str]; 1] = [&["--lib", "--features", "optimal"]];
+
+/// The rig, and the parts that it is tested in. Its own unit tests take a second, but all of it compiled once more: that is done without
+/// optimisation. The others take the library that `cargo rig` runs.
+const RIG: &str = "tractive-rig";
+const RIG_PARTS: [&[&str]; 3] = [
+    &["--lib", "--config", "profile.release.package.tractive-rig.opt-level=0"],
+    &["--bins", "--test", "*"],
+    &["--doc"],
+];
+
+/// This program, likewise.
+const OWN: &str = "xtask";
+const OWN_PARTS: [&[&str]; 2] =
+    [&["--bins", "--config", "profile.release.package.xtask.opt-level=0"], &["--test", "*"]];
 
 /// The end of a step.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -96,10 +121,7 @@ fn perform(step: Step, setup: &mut Setup) -> Result<Outcome> {
             let mut command = cargo_with("doc --release --no-deps --workspace --exclude");
             succeeds(command.arg(twin::PACKAGE).env("RUSTDOCFLAGS", "-D warnings"))?
         }
-        Step::Host => all(together()?, |packages| {
-            let named = packages.iter().flat_map(|package| ["--package", package.as_str()]);
-            succeeds(cargo().args(["test", "--release"]).args(named))
-        })?,
+        Step::Host => all(together()?, |packages| host(&packages))?,
         Step::Loom => {
             let mut command = cargo_with("test --profile loom --package tractive-cells --test interleavings");
             succeeds(command.env("RUSTFLAGS", "--cfg loom"))?
@@ -109,10 +131,13 @@ fn perform(step: Step, setup: &mut Setup) -> Result<Outcome> {
         Step::Cells => crate::cells::check(setup)?,
         Step::Landings => crate::landings::check(setup)?,
         Step::Overruns => crate::overruns::check(setup)?,
-        Step::Image => images(setup, |path| {
-            println!("{}", path.display());
-            Ok(true)
-        })?,
+        Step::Image => {
+            build::reference_images(&setup.toolchain()?)?
+                && images(setup, |path| {
+                    println!("{}", path.display());
+                    Ok(true)
+                })?
+        }
         Step::ImageCheck => images(setup, image::check)?,
         Step::NucleoImage => board_images(setup)?,
         Step::Twin => return Ok(where_possible(twin::check(setup)?)),
@@ -131,6 +156,18 @@ fn perform(step: Step, setup: &mut Setup) -> Result<Outcome> {
         Step::Machines => machines(setup)?,
     };
     Ok(good.into())
+}
+
+/// The tests of packages on this machine.
+fn host(packages: &[String]) -> Result<bool> {
+    let named = packages.iter().flat_map(|package| ["--package", package.as_str()]);
+    let parts: &[&[&str]] = match packages {
+        [package] if package == CONTROL => &CONTROL_PARTS,
+        [package] if package == RIG => &RIG_PARTS,
+        [package] if package == OWN => &OWN_PARTS,
+        _ => &[&[]],
+    };
+    all(parts, |part| succeeds(cargo().args(["test", "--release"]).args(named.clone()).args(*part)))
 }
 
 /// The outcome of a check that may lack a tool; the inner error names it.
@@ -165,6 +202,7 @@ fn board_images(setup: &mut Setup) -> Result<bool> {
         println!("{}, {stage}:", board.name);
         image::check_board(&build::image_of_stage(&setup.toolchain()?, board, stage)?, board)
     })?;
+    let built = all(&boards, |board| build::images_of(&setup.toolchain()?, board))?;
     let images = boards.iter().flat_map(|board| System::ALL.map(|system| (board, system)));
     let drives = all(images, |(board, system)| {
         println!("{}:", system.image_on(board));
@@ -175,7 +213,7 @@ fn board_images(setup: &mut Setup) -> Result<bool> {
         println!("{}, identifying:", board.name);
         image::check_board(&build::identify_on(&setup.toolchain()?, board, None)?, board)
     })?;
-    Ok(sensors && drives && identifying)
+    Ok(sensors && built && drives && identifying)
 }
 
 fn book(setup: &mut Setup) -> Result<Outcome> {
@@ -274,6 +312,7 @@ fn summary(done: &[Done]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::collections::BTreeSet;
 
     #[test]
     fn the_summary_ends_with_the_count_alone_on_its_line() {
@@ -307,6 +346,34 @@ mod tests {
         there.sort_unstable();
         tested.sort_unstable();
         assert_eq!(tested, there);
+    }
+
+    /// The units of what cargo would compile: package, target, what for, profile and features.
+    fn units(words: &str) -> BTreeSet<String> {
+        let mut command = cargo_with(words);
+        // The list of units is the part that stable cargos keep behind this.
+        command.args(["--unit-graph", "-Zunstable-options"]).env("RUSTC_BOOTSTRAP", "1");
+        let graph: serde_json::Value = serde_json::from_slice(&command.output().unwrap().stdout).unwrap();
+        let unit = |unit: &serde_json::Value| {
+            let parts = ["pkg_id", "mode", "platform", "features"].map(|part| unit[part].to_string());
+            format!("{} {} {}", parts.join(" "), unit["target"]["name"], unit["profile"]["opt_level"])
+        };
+        graph["units"].as_array().unwrap().iter().map(unit).collect()
+    }
+
+    /// The rig's program, which the twin's tests do not need.
+    const PROGRAM: &str = "\"tractive-rig\"";
+
+    /// A feature that a package of the tests alone asks for would have the library and all that needs it compiled twice.
+    #[test]
+    fn the_rigs_tests_and_the_twin_take_the_rig_that_runs() {
+        let rig = units("build --release --package tractive-rig --bin tractive-rig");
+        assert!(rig.len() > 50, "{rig:?}");
+        for words in ["test --release --package tractive-rig", "test --release --package tractive-twin"] {
+            let units = units(words);
+            let lacking: Vec<_> = rig.difference(&units).filter(|unit| !unit.contains(PROGRAM)).collect();
+            assert!(lacking.is_empty(), "{words}: with other features {lacking:#?}");
+        }
     }
 
     #[test]

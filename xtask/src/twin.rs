@@ -3,12 +3,13 @@
 use crate::board::Board;
 use crate::build::{self, System};
 use crate::cli::TwinArgs;
-use crate::process::{say, succeeds};
+use crate::process::{cannot_start, say, succeeds};
 use crate::setup::Setup;
 use crate::workspace::{cargo, root};
 use anyhow::{Context, Result, bail};
+use rayon::prelude::*;
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Command, Output};
 
 /// The twin's package: no default member, as it needs cmake.
 pub const PACKAGE: &str = "tractive-twin";
@@ -69,18 +70,31 @@ pub fn check(setup: &mut Setup) -> Result<Result<bool, String>> {
     let lints = ["--all-targets", "--", "-D", "warnings"];
     let tidy = !setup.component("clippy", "clippy") || succeeds(twin("clippy").args(lints))?;
     let images = [image(setup, System::Traction)?, image(setup, System::Zs9)?];
-    for (system, image) in System::ALL.into_iter().zip(&images) {
-        for script in scripts(system)? {
-            let out = root().join(OUT).join(twins_name(system)).join(scenario(&script));
-            if !(tidy && succeeds(&mut drive(image, system, &script, &out))?) {
-                return Ok(Ok(false));
-            }
-        }
+    if !(tidy && succeeds(&mut twin("build"))? && drive_all(&images)?) {
+        return Ok(Ok(false));
     }
     let mut tests = twin("test");
     tests.args(["--", "--include-ignored"]);
     tests.env("TRACTIVE_NUCLEO_IMAGE", &images[0]).env("TRACTIVE_NUCLEO_ZS9_IMAGE", &images[1]);
     Ok(Ok(succeeds(&mut tests)?))
+}
+
+/// Drives both images through all their scenarios, as many at a time as there are cores; each tells in its turn. `true` is good.
+fn drive_all(images: &[PathBuf; 2]) -> Result<bool> {
+    let mut drives = Vec::new();
+    for (system, image) in System::ALL.into_iter().zip(images) {
+        for script in scripts(system)? {
+            let out = root().join(OUT).join(twins_name(system)).join(scenario(&script));
+            drives.push((script.clone(), drive(image, system, &script, &out)));
+        }
+    }
+    let told = drives.par_iter_mut().map(|(_, drive)| drive.output().with_context(|| cannot_start(drive)));
+    let told: Vec<Output> = told.collect::<Result<_>>()?;
+    for ((script, _), Output { stdout, stderr, .. }) in drives.iter().zip(&told) {
+        println!("{}:\n{}", script.display(), String::from_utf8_lossy(stdout).trim_end());
+        eprint!("{}", String::from_utf8_lossy(stderr));
+    }
+    Ok(told.iter().all(|told| told.status.success()))
 }
 
 /// The image, as `flash` builds it.

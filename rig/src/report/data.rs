@@ -6,6 +6,8 @@
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
 use serde::Serialize;
+use std::collections::HashMap;
+use std::hash::{DefaultHasher, Hash, Hasher};
 
 /// Parts of its span to which a curve is rounded, at least.
 const PARTS: f64 = 8192.0;
@@ -64,6 +66,8 @@ pub type Place = (usize, usize);
 pub struct Data {
     tables: Vec<Table>,
     bytes: Vec<u8>,
+    /// The places of values that are here already, by their table and their hash: a page shows the same curve around every change of mode.
+    known: HashMap<(usize, u64), Place>,
 }
 
 impl Data {
@@ -97,8 +101,16 @@ impl Data {
 
     /// A column of a table, with a value for each of its times; the same values are the same column.
     pub fn add(&mut self, table: usize, values: &[f64]) -> Place {
+        let mut hasher = DefaultHasher::new();
+        values.iter().for_each(|value| value.to_bits().hash(&mut hasher));
+        let key = (table, hasher.finish());
+        if let Some(place) = self.known.get(&key) {
+            return *place;
+        }
         let stretched = stretched(values, self.tables[table].stretch);
-        self.keep(table, stretched.as_deref().unwrap_or(values))
+        let place = self.keep(table, stretched.as_deref().unwrap_or(values));
+        self.known.insert(key, place);
+        place
     }
 
     /// Instants in whole ticks of a length in s, with a level that is a small whole number from each on.

@@ -45,8 +45,9 @@ pub struct Page {
     is_another_machine: bool,
     /// Rate of a carrier that is not locked to the rotor, in Hz.
     carrier_hz: f64,
-    /// The line voltage of the recording at this address.
+    /// The line voltage of the recording at this address, and its torques.
     line_voltage: Option<(usize, Series)>,
+    torques: Option<(usize, Vec<Series>)>,
     error: Option<anyhow::Error>,
 }
 
@@ -61,6 +62,7 @@ impl Page {
             is_another_machine: false,
             carrier_hz: 900.0,
             line_voltage: None,
+            torques: None,
             error: None,
         };
         if !number.is_empty() && number != NO_FIGURE {
@@ -220,6 +222,7 @@ impl Page {
     /// Columns of rows.
     fn series<R: Timed>(&mut self, rows: &[R], curves: &[Curve<R>]) -> Vec<Series> {
         let times: Vec<_> = rows.iter().map(Timed::t_s).collect();
+        let table = self.document.data.table(&times);
         let of = |(index, (name, value)): (usize, &Curve<R>)| {
             let mut last = 0.0;
             // A value that is none cannot be drawn: the one before stands for it.
@@ -228,7 +231,6 @@ impl Page {
                 last
             };
             let values: Vec<_> = rows.iter().map(value).map(finite).collect();
-            let table = self.document.data.table(&times);
             Series::new(name, self.document.data.add(table, &values), index)
         };
         curves.iter().enumerate().map(of).collect()

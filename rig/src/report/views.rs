@@ -146,11 +146,17 @@ impl Page {
     }
 
     fn torques(&mut self, recording: &Recording) -> Vec<Series> {
+        let address = recording.rows.as_ptr() as usize;
+        if let Some((_, series)) = self.torques.as_ref().filter(|(of, _)| *of == address) {
+            return series.clone();
+        }
         let torque = self.series(&recording.rows, &[("torque", |row| row.te_nm)]);
         let means = carrier_means(&recording.rows, self.carrier_hz);
         let mean = self.document.data.add(torque[0].place.0, &means);
         let demand = self.series(&recording.rows, &[("demand", |row| row.te_ref_nm)]);
-        [torque, vec![Series::new("carrier mean", mean, 1)], demand].concat()
+        let series = [torque, vec![Series::new("carrier mean", mean, 1)], demand].concat();
+        self.torques = Some((address, series.clone()));
+        series
     }
 
     /// Line voltage between phases u and v from the gates' edges at their exact times: a level, to be multiplied by the link's voltage.
