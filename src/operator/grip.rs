@@ -109,4 +109,36 @@ mod tests {
             assert_eq!(grip.share(), 1.0);
         }
     }
+
+    /// Slip takes its share at once and goes on taking while it lasts; below the free slip nothing is taken. Speeds are shares of the largest.
+    #[test]
+    fn slip_takes_its_share_at_once_and_more_while_it_lasts() {
+        let settings = settings();
+        let largest = settings.ratings.max_speed_rad_s;
+        for (torque, speed) in WAYS {
+            // The rotor jumps ahead by a slip: half of the span beyond what is free.
+            let ahead = |slip: f32| speed * 200.0 + torque * slip * largest;
+            let mut grip = Grip::FULL;
+            grip.step(torque * 800.0, ahead(0.0), &settings);
+            assert_eq!(grip.share(), 1.0);
+            // Within the slot the reference follows by 0.02 rad/s.
+            let followed = 20.0 * 1e-3 / largest;
+            grip.step(torque * 800.0, ahead(FREE + 0.5 * SPAN + followed), &settings);
+            let held = 1.0 - 0.5 * 1e-3 / LOSE_S;
+            assert!((grip.share() - (held - 0.5)).abs() < 1e-3, "{}", grip.share());
+            // As far ahead as before, the reference nearer.
+            grip.step(torque * 800.0, ahead(FREE + 0.5 * SPAN + 2.0 * followed), &settings);
+            let held = held - 0.5 * 1e-3 / LOSE_S;
+            assert!((grip.share() - (held - 0.5)).abs() < 2e-3, "{}", grip.share());
+            // Just free: all of it comes back but what is held, and that by a thousandth a slot.
+            grip.step(torque * 800.0, ahead(0.99 * FREE), &settings);
+            assert!((grip.share() - (held + 1e-3 / RESTORE_S)).abs() < 1e-5, "{}", grip.share());
+            // The torque's other direction has its own reference: it begins where the rotor is.
+            grip.step(-torque * 800.0, ahead(0.5), &settings);
+            assert!((grip.share() - (held + 2e-3 / RESTORE_S)).abs() < 1e-5, "{}", grip.share());
+            // No torque, no direction.
+            grip.step(0.0, ahead(-0.5), &settings);
+            assert!((grip.share() - (held + 3e-3 / RESTORE_S)).abs() < 1e-5, "{}", grip.share());
+        }
+    }
 }

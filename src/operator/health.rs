@@ -96,13 +96,11 @@ fn speed(input: &Situation, settings: &Settings) -> Option<Violation> {
     protection::check_speed(input.observed.omega, settings.ratings)
 }
 
-/// `true` if the machine's EMF stays below the link, or below a link of nominal voltage, with the gates off: faster, the diodes
-/// would rectify it.
+/// `true` if the machine's EMF stays below a link of nominal voltage with the gates off: faster, the diodes would rectify it.
 #[inline(never)]
 pub(super) fn open_is_safe(input: &Situation, settings: &Settings) -> bool {
-    let (udc_v, nominal_v) = (input.observed.udc_v, settings.ratings.dc_link_nominal_v);
-    let link_v = if udc_v > nominal_v { udc_v } else { nominal_v };
-    protection::safe_state(input.observed.emf_omega, link_v, settings.ratings) == SafeState::GatesOff
+    let (emf_omega, nominal_v) = (input.observed.emf_omega, settings.ratings.dc_link_nominal_v);
+    protection::safe_state(emf_omega, nominal_v, settings.ratings) == SafeState::GatesOff
 }
 
 /// The first of the conditions that is not kept while the gates may pulse.

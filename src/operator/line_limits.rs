@@ -139,4 +139,84 @@ mod tests {
         assert_eq!(current_a(none_v), 0.0);
         assert_eq!(drawn(f32::NAN).most(300.0, ratings, &LIMITS).motoring_nm, 0.0);
     }
+
+    /// The first slot takes over what there is, every later one a part in 51; the loss is that of the present currents, at a tenth of the
+    /// largest torque at least.
+    #[test]
+    fn the_line_and_the_loss_are_smoothed() {
+        let ratings = &BUILT_IN.ratings;
+        let settings = Settings::rated(ratings, 1e-3, None);
+        let report = |udc_v: f32, torque_nm: f32, id_a: f32, iq_a: f32| Report {
+            udc_v,
+            torque_nm,
+            id_a,
+            iq_a,
+            ..Report::default()
+        };
+        let loss = |square_a: f32, torque_nm: f32| {
+            1.5 * ratings.stator_resistance_ohm * square_a / (torque_nm * torque_nm)
+        };
+        let least_nm = 0.1 * ratings.max_torque_nm;
+        for (torque_nm, counted_nm) in [
+            (200.0, 200.0),
+            (-200.0, 200.0),
+            (least_nm.next_up(), least_nm),
+            (10.0, least_nm),
+            (0.0, least_nm),
+        ] {
+            let mut drawn = Drawn::UNKNOWN;
+            drawn.step(&report(1_500.0, torque_nm, -30.0, 40.0), &settings);
+            assert_eq!(drawn.udc_v, 1_500.0);
+            assert!((drawn.loss / loss(2_500.0, counted_nm) - 1.0).abs() < 1e-5, "{torque_nm}: {drawn:?}");
+            let before = drawn;
+            drawn.step(&report(1_449.0, torque_nm, 0.0, 0.0), &settings);
+            assert!((drawn.udc_v - 1_499.0).abs() < 1e-2, "{drawn:?}");
+            assert!((drawn.loss / before.loss - 50.0 / 51.0).abs() < 1e-5, "{drawn:?}");
+        }
+    }
+
+    /// Each limit by itself and both together: the lower one counts.
+    #[test]
+    fn the_lower_of_current_and_power_counts() {
+        let ratings = &BUILT_IN.ratings;
+        let none = TrainLimits::NONE;
+        let free = |udc_v: f32| Drawn { udc_v, loss: 0.0 };
+        let most = |limits: TrainLimits| free(1_500.0).most(-200.0, ratings, &limits);
+        let free_nm = f32::INFINITY;
+        for (limits, motoring_nm, braking_nm) in [
+            (TrainLimits { motoring_a: 20.0, ..none }, 150.0, free_nm),
+            (TrainLimits { motoring_w: 40e3, ..none }, 200.0, free_nm),
+            (TrainLimits { motoring_a: 20.0, motoring_w: 40e3, ..none }, 150.0, free_nm),
+            (TrainLimits { motoring_a: 40.0, motoring_w: 40e3, ..none }, 200.0, free_nm),
+            (TrainLimits { braking_a: 20.0, ..none }, free_nm, 150.0),
+            (TrainLimits { braking_w: 40e3, ..none }, free_nm, 200.0),
+            (TrainLimits { braking_a: 20.0, braking_w: 40e3, ..none }, free_nm, 150.0),
+            (TrainLimits { braking_a: 40.0, braking_w: 40e3, ..none }, free_nm, 200.0),
+            (TrainLimits { motoring_a: 0.0, braking_w: 0.0, ..none }, 0.0, 0.0),
+        ] {
+            assert_eq!(most(limits), Most { motoring_nm, braking_nm }, "{limits:?}");
+        }
+        // Braking takes what the line bears, whatever its voltage.
+        let limits = TrainLimits { motoring_a: 20.0, braking_a: 20.0, ..none };
+        let Most { motoring_nm, braking_nm } = free(1_000.0).most(200.0, ratings, &limits);
+        assert_eq!((motoring_nm, braking_nm), (0.0, 100.0));
+    }
+
+    /// The positive root of `ω T + k T² = P`, and what there is where there is none.
+    #[test]
+    fn the_torque_of_a_power_is_the_positive_root() {
+        // 100 T + 4 T² = 600 at 5; 100 T − 4 T² = 400 at 5; at rest 4 T² = 100.
+        for (power_w, speed, loss, wanted_nm) in [
+            (600.0, 100.0, 4.0, 5.0),
+            (400.0, 100.0, -4.0, 5.0),
+            (100.0, 0.0, 4.0, 5.0),
+            (625.0, 100.0, -4.0, f32::INFINITY),
+            (700.0, 100.0, -4.0, f32::INFINITY),
+            (0.0, 100.0, 4.0, 0.0),
+            (-100.0, 100.0, 4.0, 0.0),
+            (f32::NAN, 100.0, 4.0, 0.0),
+        ] {
+            assert_eq!(torque_nm(power_w, speed, loss), wanted_nm, "{power_w} {speed} {loss}");
+        }
+    }
 }

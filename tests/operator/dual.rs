@@ -243,3 +243,102 @@ fn two_turning_motors_keep_the_gates_on_without_torque() {
     world.observed.report.omega = [omega, 0.0];
     world.until(State::Charged);
 }
+
+/// The link may be a twentieth above its source when the gates go off.
+#[test]
+fn the_gates_go_off_once_the_link_is_near_its_source() {
+    for (capacitor_v, state) in [(410.0_f32, State::Stopping), (410.0_f32.next_down(), State::Charged)] {
+        let mut world = World::enabled();
+        world.request.levels.enable = false;
+        world.slot();
+        world.observed.report.capacitor_v = capacitor_v;
+        assert_eq!(world.slot().state, state, "{capacitor_v}");
+    }
+}
+
+/// Each value of each motor by itself: as rated, and not beyond it; and no number in any of them.
+#[test]
+fn every_value_of_either_motor_is_judged() {
+    type Field = fn(&mut MotorLimits) -> &mut f32;
+    let rated = MotorLimits::rated(&World::new().ratings);
+    let fields: [(Field, [f32; 2], [f32; 2]); 3] = [
+        (|limits| &mut limits.motoring_nm, [0.0, rated.motoring_nm], [-1e-9, rated.motoring_nm.next_up()]),
+        (|limits| &mut limits.braking_nm, [0.0, rated.braking_nm], [-1e-9, rated.braking_nm.next_up()]),
+        (|limits| &mut limits.speed_rad_s, [1e-9, rated.speed_rad_s], [0.0, rated.speed_rad_s.next_up()]),
+    ];
+    let refusal = |set: &dyn Fn(&mut DualRequest)| {
+        let mut world = World::new();
+        world.until(State::Ready);
+        set(&mut world.request);
+        world.slot().refusal
+    };
+    for motor in 0..2 {
+        for (field, allowed, refused) in &fields {
+            let found = |value: f32| refusal(&|request| *field(&mut request.motors[motor].limits) = value);
+            assert_eq!(allowed.map(found), [None; 2]);
+            assert_eq!(refused.map(found), [Some(Refusal::LimitOutOfRange); 2]);
+            assert_eq!(found(f32::NAN), Some(Refusal::RequestNotFinite));
+        }
+        for wanted in [Wanted::Torque(f32::NAN), Wanted::Speed(f32::INFINITY)] {
+            let found = refusal(&|request| request.motors[motor].wanted = wanted);
+            assert_eq!(found, Some(Refusal::RequestNotFinite));
+        }
+    }
+    let [low_v, high_v, _] = dual::Settings::link_range_v(&World::new().ratings);
+    let found = |link_ref_v: f32| refusal(&|request| request.link_ref_v = link_ref_v);
+    assert_eq!([low_v, high_v].map(found), [None; 2]);
+    assert_eq!([low_v.next_down(), high_v.next_up()].map(found), [Some(Refusal::LimitOutOfRange); 2]);
+    assert_eq!(found(f32::NAN), Some(Refusal::RequestNotFinite));
+}
+
+/// The larger current of the two motors counts, and the faster one's speed; what is no number, of whichever motor, is beyond every limit.
+#[test]
+fn either_motors_current_and_speed_count() {
+    let ratings = World::new().ratings;
+    let resting_a = 0.05 * ratings.max_current_a;
+    let trip = ratings.trip_speed_rad_s * ratings.pole_pairs;
+    let fault = |currents_a: [f32; 2], omega: [f32; 2]| {
+        let mut world = World::new();
+        (world.observed.report.current_a, world.observed.report.omega) = (currents_a, omega);
+        world.observed.report.capacitor_v = 400.0;
+        world.slots(60).trip.map(|trip| trip.fault)
+    };
+    assert_eq!(fault([resting_a; 2], [0.0; 2]), None);
+    for beyond in [resting_a.next_up(), f32::NAN] {
+        assert_eq!(fault([beyond, 0.0], [0.0; 2]), Some(Fault::CurrentOffset), "{beyond}");
+        assert_eq!(fault([0.0, beyond], [0.0; 2]), Some(Fault::CurrentOffset), "{beyond}");
+    }
+    for omega in [[1.01 * trip, 0.0], [0.0, 1.01 * trip], [-1.01 * trip, 0.0], [0.0, -1.01 * trip]] {
+        assert_eq!(fault([0.0; 2], omega), Some(Fault::Overspeed), "{omega:?}");
+    }
+}
+
+/// The mean of the torque that has held a speed: of a step a part in 51 is left behind with every slot.
+#[test]
+fn the_torque_that_holds_a_speed_is_a_mean() {
+    let mut world = World::enabled();
+    world.observed.report.torque_nm = [0.0, 0.0];
+    world.want([Wanted::Speed(0.0), Wanted::Torque(0.0)]);
+    world.slots(3);
+    world.observed.report.torque_nm[0] = 30.0;
+    for _ in 0..50 {
+        world.slot();
+    }
+    world.want([Wanted::Torque(30.0), Wanted::Torque(0.0)]);
+    world.slot();
+    let [first, _] = world.torques_nm();
+    let mean = 30.0 * (1.0 - (50.0_f32 / 51.0).powi(50));
+    // And the ramp's first step from there.
+    assert!((0.0..0.1).contains(&(first - mean)), "{first} {mean}");
+}
+
+/// A speed is held with the smaller of both torques, whichever that is.
+#[test]
+fn a_speed_has_the_smaller_of_both_torques() {
+    let mut world = World::enabled();
+    let rated = MotorLimits::rated(&world.ratings);
+    world.request.motors[0].limits = MotorLimits { motoring_nm: 15.0, ..rated };
+    world.request.motors[1].limits = MotorLimits { braking_nm: 14.0, ..rated };
+    world.slot();
+    assert_eq!(world.command().speed_torque_nm, [15.0, 14.0]);
+}
