@@ -33,19 +33,13 @@ pub fn are_sound(currents_a: &Abc, ratings: &Ratings) -> bool {
 }
 
 /// Phase currents alone, as both interrupts sample them.
-#[inline(always)]
+#[inline]
 pub fn check_currents(currents_a: &Abc, ratings: &Ratings) -> Option<Violation> {
-    if are_sound(currents_a, ratings) {
-        return None;
-    }
-    // A copy: what stands behind a reference is in memory in every period.
-    let currents_a = *currents_a;
-    find_in_currents(&currents_a, ratings)
+    if are_sound(currents_a, ratings) { None } else { find_in_currents(currents_a, ratings) }
 }
 
 /// The same for currents that are not sound.
-#[cold]
-#[inline(never)]
+#[inline]
 fn find_in_currents(currents_a: &Abc, ratings: &Ratings) -> Option<Violation> {
     let sum = currents_a.a + currents_a.b + currents_a.c;
     if !sum.is_finite() {
