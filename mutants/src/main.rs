@@ -43,6 +43,9 @@ pub struct Options {
     /// Processor time of tests, without a mutant, that one mutant is tried with, in s
     #[arg(long, value_name = "S", default_value_t = 20.0)]
     budget: f64,
+    /// Processor time that a test may take to be tried at all, in s
+    #[arg(long, value_name = "S", default_value_t = 10)]
+    longest: u64,
     /// Threads
     #[arg(long, value_name = "N", default_value_t = 2)]
     jobs: usize,
@@ -64,7 +67,9 @@ fn shard(text: &str) -> Result<(usize, usize), String> {
 
 /// Places of the run.
 pub struct Places {
+    /// The repository.
     pub root: PathBuf,
+    /// The folder of the copy, its build, and what came of it.
     pub work: PathBuf,
 }
 

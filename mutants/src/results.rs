@@ -1,7 +1,7 @@
 //! What came of each mutant, in a file that grows by a line each; a later line of the same mutant wins.
 
 use crate::tree::Mutant;
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, HashMap};
 use std::fs::{File, OpenOptions};
@@ -88,7 +88,11 @@ pub struct KnownList {
 impl KnownList {
     pub fn read(path: &Path) -> Result<Self> {
         let text = std::fs::read_to_string(path).unwrap_or_default();
-        toml::from_str(&text).with_context(|| path.display().to_string())
+        let list: Self = toml::from_str(&text).with_context(|| path.display().to_string())?;
+        match list.mutant.iter().find(|known| known.reason.trim().is_empty()) {
+            Some(known) => bail!("{}: {}: {}: reason: empty; say why no test notices it", path.display(), known.file, known.what),
+            None => Ok(list),
+        }
     }
 
     pub fn has(&self, mutant: &Mutant) -> bool {

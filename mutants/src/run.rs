@@ -64,7 +64,7 @@ pub fn run(places: &Places, tree: &Tree, options: &Options) -> Result<()> {
     keep_left_out(places, tree, &left_out)?;
     let programs = built?;
     rayon::ThreadPoolBuilder::new().num_threads(options.jobs).build_global()?;
-    let trials = learnt(places, &programs)?;
+    let trials = learnt(places, &programs, options.longest)?;
     let results = Results::open(&places.work.join("results.jsonl"))?;
     let open: Vec<&Mutant> = chosen(&tree.mutants, options)
         .into_iter()
@@ -87,14 +87,14 @@ pub fn run(places: &Places, tree: &Tree, options: &Options) -> Result<()> {
 }
 
 /// The trials of all programs; those of a program that is as it was are read.
-fn learnt(places: &Places, programs: &[Program]) -> Result<Vec<Trial>> {
+fn learnt(places: &Places, programs: &[Program], longest_s: u64) -> Result<Vec<Trial>> {
     let folder = places.work.join("reached");
     std::fs::create_dir_all(&folder)?;
     let mut all = Vec::new();
     for program in programs {
         let bytes = std::fs::read(&program.path).with_context(|| program.path.display().to_string())?;
         let mut hasher = DefaultHasher::new();
-        (bytes, include_str!("../goldens.txt")).hash(&mut hasher);
+        (bytes, longest_s, include_str!("../goldens.txt")).hash(&mut hasher);
         let file = folder.join(format!("{}-{:016x}.json", program.name.replace(' ', "-"), hasher.finish()));
         if let Some(trials) = std::fs::read_to_string(&file).ok().and_then(|text| serde_json::from_str(&text).ok()) {
             let trials: Vec<Trial> = trials;
@@ -108,7 +108,7 @@ fn learnt(places: &Places, programs: &[Program]) -> Result<Vec<Trial>> {
         };
         let count = found.len();
         let learnt: Vec<Trial> =
-            found.into_par_iter().with_max_len(1).filter_map(|trial| trial.learn(&places.work.join("scratch"))).collect();
+            found.into_par_iter().with_max_len(1).filter_map(|trial| trial.learn(&places.work.join("scratch"), longest_s)).collect();
         eprintln!("mutants: {}: {} of {count} tests come by a mutant", program.name, learnt.len());
         std::fs::write(&file, serde_json::to_string(&learnt)?)?;
         all.extend(learnt);

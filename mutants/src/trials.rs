@@ -31,8 +31,6 @@ pub enum End {
     Late,
 }
 
-/// Processor time that a test may take without a mutant to be tried with one, in s.
-pub const LONGEST_S: u64 = 30;
 /// A mutant's run may take so many times as long, and `GRACE_S` more.
 const TIMES: f64 = 4.0;
 const GRACE_S: f64 = 2.0;
@@ -62,33 +60,28 @@ impl Trial {
         command
     }
 
-    /// Runs it once as it is and once watched; `None` where it fails, takes too long, or is never the same.
-    pub fn learn(mut self, scratch: &Path) -> Option<Self> {
+    /// Runs it watched, and what is compared once more; `None` where it fails, takes longer, is never the same, or comes by no mutant.
+    pub fn learn(mut self, scratch: &Path, longest_s: u64) -> Option<Self> {
         let folder = tempfolder(scratch).ok()?;
-        let out = folder.join("out");
-        let mut clean = self.command(&out);
-        let time = folder.join("time");
-        clean.env("MUTANT", "0").env("MUTANT_SECONDS", LONGEST_S.to_string()).env("MUTANT_TIME", &time);
-        let status = ended(&mut clean)?;
-        self.seconds = processor_s(&time).max(0.003);
-        let success = status.success();
-        if self.golden.is_some() {
-            self.golden = Some(hash(&out, status));
-        } else if !success {
-            eprintln!("mutants: left alone, without a mutant it fails or takes too long: {}", self.label());
-            return None;
-        }
-        let reached = folder.join("reached");
+        let (out, time, reached) = (folder.join("out"), folder.join("time"), folder.join("reached"));
         std::fs::create_dir_all(&reached).ok()?;
-        let again = ended(self.command(&out).env("MUTANT_REACHED", &reached))?;
-        let same = self.golden.is_none_or(|golden| golden == hash(&out, again));
-        if again.success() != success || !same {
-            eprintln!("mutants: left alone, it ends otherwise each time: {}", self.label());
-            return None;
-        }
+        let mut watched = self.command(&out);
+        watched.env("MUTANT_SECONDS", longest_s.to_string()).env("MUTANT_TIME", &time);
+        let status = ended(watched.env("MUTANT_REACHED", &reached))?;
+        self.seconds = processor_s(&time).max(0.003);
         self.reached = union(&reached);
+        let same = if self.golden.is_some() {
+            self.golden = Some(hash(&out, status));
+            let again = ended(self.command(&out).env("MUTANT", "0"))?;
+            self.golden == Some(hash(&out, again))
+        } else {
+            status.success()
+        };
         std::fs::remove_dir_all(&folder).ok()?;
-        (!self.reached.is_empty()).then_some(self)
+        if !same {
+            eprintln!("mutants: left alone, without a mutant it fails or takes too long: {}", self.label());
+        }
+        (same && !self.reached.is_empty()).then_some(self)
     }
 
     /// Runs it with a mutant.

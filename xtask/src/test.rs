@@ -21,7 +21,7 @@ const TOGETHER: [&[&str]; 4] = [
     &["tractive", "tractive-control", "tractive-tablegen"],
     &["tractive-rig"],
     &["xtask"],
-    &["tractive-bench", "tractive-cells", "tractive-fault-injector"],
+    &["tractive-bench", "tractive-cells", "tractive-fault-injector", "tractive-mutants"],
 ];
 
 /// The end of a step.
@@ -106,6 +106,7 @@ fn perform(step: Step, setup: &mut Setup) -> Result<Outcome> {
         }
         Step::Miri => return miri(setup),
         Step::Fuzz => return Ok(where_possible(crate::fuzz::check()?)),
+        Step::Mutants => crate::mutants::check()?,
         Step::Cells => crate::cells::check(setup)?,
         Step::Landings => crate::landings::check(setup)?,
         Step::Overruns => crate::overruns::check(setup)?,
