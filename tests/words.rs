@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 /// Folders of the sources.
-const FOLDERS: [&str; 13] = [
+const FOLDERS: [&str; 14] = [
     "bench",
     "boards",
     "cells",
@@ -11,6 +11,7 @@ const FOLDERS: [&str; 13] = [
     "fault-injector",
     "fuzz",
     "live",
+    "mutants",
     "rig",
     "src",
     "tablegen",

@@ -43,7 +43,8 @@ pub enum Command {
     Twin(TwinArgs),
     /// Coverage-guided fuzzing of the targets in fuzz/
     Fuzz(FuzzArgs),
-    /// Mutation testing by cargo-mutants: changes of the code that no test notices
+    /// Mutation testing: changes of the code that no test notices
+    #[command(disable_help_flag = true)]
     Mutants(MutantsArgs),
 }
 
@@ -65,39 +66,9 @@ pub struct FuzzArgs {
 
 #[derive(Args, Debug)]
 pub struct MutantsArgs {
-    /// The package
-    #[arg(long, default_value = "tractive")]
-    pub package: String,
-    /// Only the mutants of these files (a glob; may be repeated)
-    #[arg(long, value_name = "FILE")]
-    pub file: Vec<String>,
-    /// Shard K of N, from 0
-    #[arg(long, value_name = "K/N")]
-    pub shard: Option<String>,
-    /// The mutants of an area, whatever its package
-    #[arg(long, value_enum, conflicts_with = "package")]
-    pub area: Option<Area>,
-    /// So many of them, evenly spread
-    #[arg(long, value_name = "N", conflicts_with = "shard")]
-    pub sample: Option<usize>,
-    /// Draw the sample by this number instead
-    #[arg(long, value_name = "N", requires = "sample")]
-    pub seed: Option<u64>,
-}
-
-/// A part of the code whose tests are tested.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Area {
-    Control,
-    Modulation,
-    NineSwitch,
-    Drive,
-    Protection,
-    Cell,
-    Operator,
-    Protocol,
-    Boards,
-    Tablegen,
+    // Those of mutants/, all of them.
+    #[arg(hide = true, trailing_var_arg = true, allow_hyphen_values = true)]
+    pub words: Vec<OsString>,
 }
 
 #[derive(Args, Debug)]

@@ -70,7 +70,7 @@ fn main() -> ExitCode {
         cli::Command::Live(args) => live::run(&args),
         cli::Command::Twin(args) => twin::run(&args),
         cli::Command::Fuzz(args) => fuzz::run(&args),
-        cli::Command::Mutants(args) => mutants::run(&args),
+        cli::Command::Mutants(args) => mutants::run(&args.words),
     };
     match result {
         Ok(code) => ExitCode::from(code),

@@ -21,6 +21,8 @@ pub enum Step {
     Miri,
     /// Every target of fuzz/ for a minute, guided by what it reaches
     Fuzz,
+    /// A sample of mutants of the code: a test notices each, or its reason is known
+    Mutants,
     /// The lock-free cells in QEMU, interrupted on every instruction
     Cells,
     /// Interrupts slow, late and lost, in QEMU

@@ -25,6 +25,7 @@ const TOGETHER: [&[&str]; 4] = [
         "tractive-bench",
         "tractive-cells",
         "tractive-fault-injector",
+        "tractive-mutants",
     ],
     &[CONTROL],
     &[RIG],
@@ -128,6 +129,7 @@ fn perform(step: Step, setup: &mut Setup) -> Result<Outcome> {
         }
         Step::Miri => return miri(setup),
         Step::Fuzz => return Ok(where_possible(crate::fuzz::check()?)),
+        Step::Mutants => crate::mutants::check()?,
         Step::Cells => crate::cells::check(setup)?,
         Step::Landings => crate::landings::check(setup)?,
         Step::Overruns => crate::overruns::check(setup)?,

@@ -1,0 +1,127 @@
+//! The build of all test programs with all mutants, but those that do not compile this way.
+
+use crate::schema::Schema;
+use crate::tree::{Tree, put};
+use anyhow::{Context, Result, bail};
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+/// The packages whose tests are run.
+const PACKAGES: [&str; 5] =
+    ["tractive-control", "tractive-tablegen", "tractive", "tractive-nucleo-g474re", "tractive-rig"];
+
+/// The packages that are named, or all.
+pub fn packages(named: &[String]) -> Vec<String> {
+    if named.is_empty() { PACKAGES.map(str::to_owned).into() } else { named.to_vec() }
+}
+
+/// Builds until all is compiled, at most; every build leaves out what the last one complained of.
+const BUILDS: usize = 60;
+
+/// A program of tests, and the folder of its package; or the rig's own.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Program {
+    pub path: PathBuf,
+    pub folder: PathBuf,
+    /// "tractive modulation": its package and its target.
+    pub name: String,
+    pub is_test: bool,
+}
+
+/// Writes the sources and builds; the programs, and beside it the mutants left out with the error's code.
+pub fn programs(to: &Path, target: &Path, tree: &Tree, packages: &[String], left_out: &mut BTreeMap<u32, String>) -> Result<Vec<Program>> {
+    for _ in 0..BUILDS {
+        let mut schemata = BTreeMap::new();
+        for source in &tree.sources {
+            let schema = source.schema(left_out);
+            put(&to.join(&source.file), schema.text.as_bytes())?;
+            schemata.insert(source.file.clone(), schema);
+        }
+        eprintln!("mutants: building, without {}", left_out.len());
+        let messages = cargo(to, target, packages)?;
+        if messages.success {
+            return Ok(messages.lines.iter().filter_map(|line| program(line)).collect());
+        }
+        let before = left_out.len();
+        for line in &messages.lines {
+            leave_out(to, line, &schemata, left_out);
+        }
+        eprintln!("mutants: {} do not compile this way, {} more", left_out.len(), left_out.len() - before);
+        if left_out.len() == before {
+            bail!("the build failed, and by no mutant:\n{}", messages.rendered());
+        }
+    }
+    bail!("the build failed {BUILDS} times")
+}
+
+struct Messages {
+    success: bool,
+    lines: Vec<Value>,
+}
+
+impl Messages {
+    fn rendered(&self) -> String {
+        let errors = self.lines.iter().filter(|line| line["message"]["level"] == "error");
+        errors.filter_map(|line| line["message"]["rendered"].as_str()).take(5).collect()
+    }
+}
+
+fn cargo(to: &Path, target: &Path, packages: &[String]) -> Result<Messages> {
+    let wrapper = to.join("mutant/rustc.sh");
+    put(&wrapper, b"#!/bin/sh\nRUSTC_BOOTSTRAP=1 exec \"$@\"\n")?;
+    Command::new("chmod").arg("+x").arg(&wrapper).status()?;
+    let mut command = Command::new("cargo");
+    command.current_dir(to).args(["build", "--release", "--tests", "--bins", "--keep-going", "--message-format=json"]);
+    command.args(packages.iter().flat_map(|package| ["--package", package.as_str()]));
+    // What is optimised less is compiled sooner; most of it runs only for a moment.
+    for package in ["tractive", "tractive-control", "tractive-tablegen", "tractive-nucleo-g474re"] {
+        command.args(["--config", &format!("profile.release.package.{package}.opt-level=1")]);
+    }
+    command.env("CARGO_TARGET_DIR", target).env("RUSTC_WORKSPACE_WRAPPER", wrapper);
+    command.env("CARGO_PROFILE_RELEASE_INCREMENTAL", "true");
+    command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::inherit());
+    let output = command.output().context("cannot start cargo")?;
+    let text = String::from_utf8_lossy(&output.stdout);
+    let lines = text.lines().filter_map(|line| serde_json::from_str(line).ok()).collect();
+    Ok(Messages { success: output.status.success(), lines })
+}
+
+fn program(line: &Value) -> Option<Program> {
+    let path = PathBuf::from(line["executable"].as_str()?);
+    let is_test = line["profile"]["test"].as_bool()?;
+    let manifest = Path::new(line["manifest_path"].as_str()?);
+    let folder = manifest.parent()?.to_owned();
+    let manifest: toml::Table = toml::from_str(&std::fs::read_to_string(manifest).ok()?).ok()?;
+    let package = manifest.get("package")?.get("name")?.as_str()?;
+    Some(Program { path, folder, name: format!("{package} {}", line["target"]["name"].as_str()?), is_test })
+}
+
+/// Finds whose the error is: the smallest place that has its first byte in it.
+fn leave_out(to: &Path, line: &Value, schemata: &BTreeMap<String, Schema>, left_out: &mut BTreeMap<u32, String>) {
+    let message = &line["message"];
+    if line["reason"] != "compiler-message" || message["level"] != "error" {
+        return;
+    }
+    let code = message["code"]["code"].as_str().unwrap_or("error");
+    let children = message["children"].as_array().into_iter().flatten();
+    let own = [message].into_iter().chain(children).flat_map(|message| message["spans"].as_array().into_iter().flatten());
+    let mut spans: Vec<_> = own.collect();
+    spans.sort_by_key(|span| span["is_primary"] != true);
+    for span in spans {
+        let (Some(name), Some(byte)) = (span["file_name"].as_str(), span["byte_start"].as_u64()) else { continue };
+        let name = Path::new(name);
+        let name = name.strip_prefix(to).unwrap_or(name);
+        let Some(schema) = schemata.get(&*name.to_string_lossy()) else { continue };
+        let within = schema.written.iter().filter(|written| written.bytes.contains(&(byte as usize)));
+        let fresh = within.filter(|written| written.numbers.iter().any(|number| !left_out.contains_key(number)));
+        if let Some(written) = fresh.min_by_key(|written| written.bytes.len()) {
+            for number in &written.numbers {
+                left_out.entry(*number).or_insert_with(|| code.to_owned());
+            }
+            return;
+        }
+    }
+}

@@ -1,0 +1,92 @@
+//! Mutation testing: every mutant compiled into one build of the tests, and chosen when they run.
+
+mod areas;
+mod build;
+mod modules;
+mod report;
+mod results;
+mod run;
+mod schema;
+mod sites;
+mod tree;
+mod trials;
+mod values;
+
+use anyhow::Result;
+use areas::Area;
+use clap::Parser;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+/// Tests the tests of `tractive`.
+#[derive(Debug, Parser)]
+#[command(name = "cargo xtask mutants", version)]
+pub struct Options {
+    /// Only the mutants of an area (may be repeated)
+    #[arg(long, value_enum)]
+    area: Vec<Area>,
+    /// Only those of files whose path begins so (may be repeated)
+    #[arg(long)]
+    file: Vec<String>,
+    /// Shard K of N, from 0
+    #[arg(long, value_name = "K/N", value_parser = shard)]
+    shard: Option<(usize, usize)>,
+    /// So many of them, evenly spread
+    #[arg(long, value_name = "N", conflicts_with = "shard")]
+    sample: Option<usize>,
+    /// Draw the sample by this number instead
+    #[arg(long, value_name = "N", requires = "sample")]
+    seed: Option<u64>,
+    /// Only the tests of these packages (may be repeated) [default: all that have any of this code]
+    #[arg(long, value_name = "NAME")]
+    tests: Vec<String>,
+    /// Processor time of tests, without a mutant, that one mutant is tried with, in s
+    #[arg(long, value_name = "S", default_value_t = 20.0)]
+    budget: f64,
+    /// Processor time that a test may take to be tried at all, in s
+    #[arg(long, value_name = "S", default_value_t = 10)]
+    longest: u64,
+    /// Threads
+    #[arg(long, value_name = "N", default_value_t = 2)]
+    jobs: usize,
+    /// Try those again that were missed
+    #[arg(long)]
+    again: bool,
+    /// Name the mutants, and do nothing
+    #[arg(long)]
+    list: bool,
+    /// Say what came of all that were tried, and do nothing
+    #[arg(long)]
+    report: bool,
+}
+
+fn shard(text: &str) -> Result<(usize, usize), String> {
+    let parsed = text.split_once('/').and_then(|(k, n)| Some((k.parse().ok()?, n.parse().ok()?)));
+    parsed.filter(|(k, n)| k < n).ok_or_else(|| "K/N with K from 0 below N".to_owned())
+}
+
+/// Places of the run.
+pub struct Places {
+    /// The repository.
+    pub root: PathBuf,
+    /// The folder of the copy, its build, and what came of it.
+    pub work: PathBuf,
+}
+
+fn main() -> Result<ExitCode> {
+    let options = Options::parse();
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().map(Path::to_owned).unwrap_or_default();
+    let places = Places { work: root.join("target/mutants"), root };
+    let tree = tree::read(&places.root)?;
+    if options.list {
+        for mutant in run::chosen(&tree.mutants, &options) {
+            println!("{}", mutant.name());
+        }
+        return Ok(ExitCode::SUCCESS);
+    }
+    if !options.report {
+        run::run(&places, &tree, &options)?;
+    }
+    let good = report::print(&places, &tree, &options)?;
+    Ok(ExitCode::from(u8::from(!good)))
+}

@@ -1,0 +1,70 @@
+//! What came of the mutants, area by area.
+
+use crate::areas::Area;
+use crate::results::{Count, KnownList, Outcome, Results};
+use crate::run::{chosen, left_out};
+use crate::tree::Tree;
+use crate::{Options, Places};
+use anyhow::Result;
+use std::collections::BTreeMap;
+use std::fmt::Write;
+
+/// Errors that say that the mutant is no program: types that do not fit, a trait that is not there, a missing arm.
+const UNVIABLE: [&str; 8] = ["E0277", "E0308", "E0369", "E0600", "E0599", "E0368", "E0282", "E0283"];
+
+/// Prints the table and writes a list of survivors for each area; whether all that survived are known.
+pub fn print(places: &Places, tree: &Tree, options: &Options) -> Result<bool> {
+    let results = Results::open(&places.work.join("results.jsonl"))?;
+    let known = KnownList::read(&places.root.join("mutants/known.toml"))?;
+    let left_out = left_out(places, tree);
+    let mut counts: BTreeMap<Area, Count> = BTreeMap::new();
+    let mut survivors: BTreeMap<Area, String> = BTreeMap::new();
+    for mutant in chosen(&tree.mutants, options) {
+        let Some(area) = mutant.area() else { continue };
+        let count = counts.entry(area).or_default();
+        let list = survivors.entry(area).or_default();
+        if let Some(code) = left_out.get(&mutant.number) {
+            let of = if UNVIABLE.contains(&code.as_str()) { &mut count.unviable } else { &mut count.elsewhere };
+            *of += 1;
+            continue;
+        }
+        if mutant.fixed {
+            count.elsewhere += 1;
+            continue;
+        }
+        let Some(line) = results.of(mutant) else {
+            count.open += 1;
+            continue;
+        };
+        *count.of.entry(line.outcome).or_default() += 1;
+        if matches!(line.outcome, Outcome::Missed | Outcome::Unreached | Outcome::Golden) {
+            if known.has(mutant) {
+                count.known += 1;
+            } else {
+                writeln!(list, "{}  [{:?} {}]\n    {}", mutant.name(), line.outcome, line.by, mutant.source)?;
+            }
+        }
+    }
+    println!("area            tests   late  bytes missed nobody   open | unviable elsewhere |  known | tests %  +bytes %");
+    for (area, count) in &counts {
+        let of = |outcome| count.of.get(&outcome).copied().unwrap_or(0);
+        let (tests, all) = count.shares();
+        println!(
+            "{:<14} {:>6} {:>6} {:>6} {:>6} {:>6} {:>6} | {:>8} {:>9} | {:>6} | {tests:>6.1} {all:>9.1}  (asked {})",
+            area.name(),
+            of(Outcome::Killed),
+            of(Outcome::Late),
+            of(Outcome::Golden),
+            of(Outcome::Missed),
+            of(Outcome::Unreached),
+            count.open,
+            count.unviable,
+            count.elsewhere,
+            count.known,
+            area.bound(),
+        );
+        let list = survivors.get(area).map_or("", String::as_str);
+        std::fs::write(places.work.join(format!("survivors-{}.txt", area.name())), list)?;
+    }
+    Ok(survivors.values().all(String::is_empty))
+}

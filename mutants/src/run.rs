@@ -1,0 +1,186 @@
+//! The run: builds, learns which test comes by which mutant, and tries mutants with the tests that do, those first that cost least.
+
+use crate::build::{self, Program};
+use crate::results::{Line, Outcome, Results};
+use crate::tree::{self, Mutant, Tree};
+use crate::trials::{self, End, Trial};
+use crate::{Options, Places};
+use anyhow::{Context, Result};
+use rayon::prelude::*;
+use std::collections::{BTreeMap, HashMap};
+use std::hash::{DefaultHasher, Hash, Hasher};
+use std::path::Path;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// The mutants that the options ask for.
+pub fn chosen<'a>(mutants: &'a [Mutant], options: &Options) -> Vec<&'a Mutant> {
+    let area = |mutant: &Mutant| options.area.is_empty() || mutant.area().is_some_and(|area| options.area.contains(&area));
+    let file = |mutant: &Mutant| {
+        options.file.is_empty() || options.file.iter().any(|file| mutant.file.starts_with(file.as_str()))
+    };
+    let mut chosen: Vec<&Mutant> = mutants.iter().filter(|mutant| area(mutant) && file(mutant)).collect();
+    if let Some((k, n)) = options.shard {
+        chosen = chosen.into_iter().skip(k).step_by(n).collect();
+    }
+    let Some(sample) = options.sample else { return chosen };
+    let count = sample.min(chosen.len());
+    if let Some(seed) = options.seed {
+        chosen.sort_by_cached_key(|mutant| {
+            let mut hasher = DefaultHasher::new();
+            (seed, mutant.name()).hash(&mut hasher);
+            hasher.finish()
+        });
+        chosen.truncate(count);
+    }
+    let all = chosen.len();
+    (0..count).filter_map(|index| chosen.get(index * all / count).copied()).collect()
+}
+
+/// The file of the mutants that do not compile this way: names, each with the error's code.
+pub fn left_out(places: &Places, tree: &Tree) -> BTreeMap<u32, String> {
+    let text = std::fs::read_to_string(places.work.join("left-out.json")).unwrap_or_default();
+    let named: HashMap<String, String> = serde_json::from_str(&text).unwrap_or_default();
+    let code = |mutant: &Mutant| named.get(&mutant.name()).map(|code| (mutant.number, code.clone()));
+    tree.mutants.iter().filter_map(code).collect()
+}
+
+fn keep_left_out(places: &Places, tree: &Tree, left_out: &BTreeMap<u32, String>) -> Result<()> {
+    let named: BTreeMap<String, &String> = tree
+        .mutants
+        .iter()
+        .filter_map(|mutant| Some((mutant.name(), left_out.get(&mutant.number)?)))
+        .collect();
+    Ok(std::fs::write(places.work.join("left-out.json"), serde_json::to_string_pretty(&named)?)?)
+}
+
+/// Tries them all.
+pub fn run(places: &Places, tree: &Tree, options: &Options) -> Result<()> {
+    let copy = places.work.join("tree");
+    tree::copy(&places.root, &copy, tree)?;
+    let mut left_out = left_out(places, tree);
+    let packages = build::packages(&options.tests);
+    let built = build::programs(&copy, &places.work.join("build"), tree, &packages, &mut left_out);
+    keep_left_out(places, tree, &left_out)?;
+    let programs = built?;
+    rayon::ThreadPoolBuilder::new().num_threads(options.jobs).build_global()?;
+    let trials = learnt(places, &programs, options.longest)?;
+    let results = Results::open(&places.work.join("results.jsonl"))?;
+    let open: Vec<&Mutant> = chosen(&tree.mutants, options)
+        .into_iter()
+        .filter(|mutant| !mutant.fixed && !left_out.contains_key(&mutant.number))
+        .filter(|mutant| match results.of(mutant).map(|line| line.outcome) {
+            None => true,
+            Some(outcome) => options.again && !matches!(outcome, Outcome::Killed | Outcome::Late),
+        })
+        .collect();
+    let hunt = Hunt::new(&trials, options.budget, &places.work);
+    let done = AtomicUsize::new(0);
+    open.par_iter().with_max_len(1).try_for_each(|mutant| {
+        let (outcome, by) = hunt.of(mutant)?;
+        let count = done.fetch_add(1, Ordering::Relaxed) + 1;
+        if count % 100 == 0 {
+            eprintln!("mutants: {count} of {} tried", open.len());
+        }
+        results.add(&Line { name: mutant.name(), source: mutant.hash, outcome, by })
+    })
+}
+
+/// The trials of all programs; those of a program that is as it was are read.
+fn learnt(places: &Places, programs: &[Program], longest_s: u64) -> Result<Vec<Trial>> {
+    let folder = places.work.join("reached");
+    std::fs::create_dir_all(&folder)?;
+    let mut all = Vec::new();
+    for program in programs {
+        let bytes = std::fs::read(&program.path).with_context(|| program.path.display().to_string())?;
+        let mut hasher = DefaultHasher::new();
+        (bytes, longest_s, include_str!("../goldens.txt")).hash(&mut hasher);
+        let file = folder.join(format!("{}-{:016x}.json", program.name.replace(' ', "-"), hasher.finish()));
+        if let Some(trials) = std::fs::read_to_string(&file).ok().and_then(|text| serde_json::from_str(&text).ok()) {
+            let trials: Vec<Trial> = trials;
+            all.extend(trials);
+            continue;
+        }
+        let found = match (program.is_test, program.name.ends_with(" tractive-rig")) {
+            (true, _) => trials::of(program)?,
+            (false, true) => trials::goldens(program),
+            (false, false) => Vec::new(),
+        };
+        let count = found.len();
+        let learnt: Vec<Trial> =
+            found.into_par_iter().with_max_len(1).filter_map(|trial| trial.learn(&places.work.join("scratch"), longest_s)).collect();
+        eprintln!("mutants: {}: {} of {count} tests come by a mutant", program.name, learnt.len());
+        std::fs::write(&file, serde_json::to_string(&learnt)?)?;
+        all.extend(learnt);
+    }
+    Ok(all)
+}
+
+/// The trials, and what is known of them.
+struct Hunt<'a> {
+    trials: &'a [Trial],
+    /// For each mutant the trials that come by it.
+    by: HashMap<u32, Vec<usize>>,
+    /// Runs and kills of each trial in each file.
+    scores: Mutex<HashMap<(String, usize), (f64, f64)>>,
+    budget: f64,
+    work: &'a Path,
+}
+
+impl<'a> Hunt<'a> {
+    fn new(trials: &'a [Trial], budget: f64, work: &'a Path) -> Self {
+        let mut by: HashMap<u32, Vec<usize>> = HashMap::new();
+        for (index, trial) in trials.iter().enumerate() {
+            for number in &trial.reached {
+                by.entry(*number).or_default().push(index);
+            }
+        }
+        Self { trials, by, scores: Mutex::default(), budget, work }
+    }
+
+    /// The trials in the order in which a kill is expected to cost least; tests before the rig's bytes.
+    fn order(&self, mutant: &Mutant) -> Vec<usize> {
+        let mut order = self.by.get(&mutant.number).cloned().unwrap_or_default();
+        let scores = self.scores.lock();
+        let cost = |index: &usize| {
+            let Some(trial) = self.trials.get(*index) else { return (true, f64::MAX) };
+            let key = (mutant.file.clone(), *index);
+            let (runs, kills) = scores.as_ref().ok().and_then(|scores| scores.get(&key).copied()).unwrap_or((0.0, 0.0));
+            (trial.golden.is_some(), (trial.seconds + 0.01) * (runs + 2.0) / (kills + 0.5))
+        };
+        let mut keyed: Vec<_> = order.drain(..).map(|index| (cost(&index), index)).collect();
+        keyed.sort_by(|(a, _), (b, _)| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
+        keyed.into_iter().map(|(_, index)| index).collect()
+    }
+
+    fn of(&self, mutant: &Mutant) -> Result<(Outcome, String)> {
+        let order = self.order(mutant);
+        if order.is_empty() {
+            return Ok((Outcome::Unreached, String::new()));
+        }
+        // The rig's bytes have a budget of their own.
+        let mut left = [self.budget; 2];
+        let mut passed = 0;
+        for index in &order {
+            let Some(trial) = self.trials.get(*index) else { continue };
+            let Some(left) = left.get_mut(usize::from(trial.golden.is_some())) else { continue };
+            if *left < trial.seconds {
+                continue;
+            }
+            *left -= trial.seconds;
+            let end = trial.run(mutant.number, &self.work.join("scratch"))?;
+            if let Ok(mut scores) = self.scores.lock() {
+                let (runs, kills) = scores.entry((mutant.file.clone(), *index)).or_default();
+                *runs += 1.0;
+                *kills += f64::from(u8::from(end != End::Same));
+            }
+            match (end, trial.golden) {
+                (End::Same, _) => passed += 1,
+                (_, Some(_)) => return Ok((Outcome::Golden, trial.label())),
+                (End::Late, None) => return Ok((Outcome::Late, trial.label())),
+                (End::Other, None) => return Ok((Outcome::Killed, trial.label())),
+            }
+        }
+        Ok((Outcome::Missed, format!("{passed} of {}", order.len())))
+    }
+}
