@@ -233,7 +233,9 @@ fn the_components_are_those_of_the_sources() {
 fn the_tests_are_those_of_the_sources() {
     let requirements = read("docs/requirements.md") + &read("docs/assessor.md");
     let mut files = Vec::new();
-    for folder in ["boards", "control", "rig", "src", "tablegen", "tests", "twin", "xtask", "cells", "mutants"] {
+    for folder in
+        ["boards", "control", "rig", "src", "tablegen", "tests", "twin", "xtask", "cells", "mutants"]
+    {
         sources(&root().join(folder), &mut files);
     }
     let mut out = String::from("| file | what it tests | requirements that name it |\n|---|---|--:|\n");

@@ -28,7 +28,8 @@ pub const CRATES: [(&str, &str); 4] = [
 impl Area {
     /// The area of a file; none: nobody's.
     pub fn of(file: &str) -> Option<Self> {
-        let place = |area: &Self| file.strip_prefix(area.folder()).is_some_and(|rest| rest.starts_with(['/', '.']));
+        let place =
+            |area: &Self| file.strip_prefix(area.folder()).is_some_and(|rest| rest.starts_with(['/', '.']));
         Self::value_variants().iter().copied().find(place)
     }
 

@@ -10,8 +10,31 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 /// The packages whose tests are run.
-const PACKAGES: [&str; 5] =
-    ["tractive-control", "tractive-tablegen", "tractive", "tractive-nucleo-g474re", "tractive-rig"];
+const PACKAGES: [&str; 6] = [
+    "tractive-control",
+    "tractive-tablegen",
+    "tractive",
+    "tractive-cells",
+    "tractive-nucleo-g474re",
+    "tractive-rig",
+];
+
+/// The rig's package, and those of its tests that soon end.
+const RIG: &str = "tractive-rig";
+const RIG_TESTS: [&str; 12] = [
+    "flying_start",
+    "identify",
+    "modes",
+    "nine_switch",
+    "optimal",
+    "points",
+    "scenarios",
+    "start",
+    "talk",
+    "temperatures",
+    "zs9_phases",
+    "zs9_scenarios",
+];
 
 /// The packages that are named, or all.
 pub fn packages(named: &[String]) -> Vec<String> {
@@ -32,7 +55,13 @@ pub struct Program {
 }
 
 /// Writes the sources and builds; the programs, and beside it the mutants left out with the error's code.
-pub fn programs(to: &Path, target: &Path, tree: &Tree, packages: &[String], left_out: &mut BTreeMap<u32, String>) -> Result<Vec<Program>> {
+pub fn programs(
+    to: &Path,
+    target: &Path,
+    tree: &Tree,
+    packages: &[String],
+    left_out: &mut BTreeMap<u32, String>,
+) -> Result<Vec<Program>> {
     for _ in 0..BUILDS {
         let mut schemata = BTreeMap::new();
         for source in &tree.sources {
@@ -41,7 +70,7 @@ pub fn programs(to: &Path, target: &Path, tree: &Tree, packages: &[String], left
             schemata.insert(source.file.clone(), schema);
         }
         eprintln!("mutants: building, without {}", left_out.len());
-        let messages = cargo(to, target, packages)?;
+        let messages = cargo_all(to, target, packages)?;
         if messages.success {
             return Ok(messages.lines.iter().filter_map(|line| program(line)).collect());
         }
@@ -69,13 +98,29 @@ impl Messages {
     }
 }
 
-fn cargo(to: &Path, target: &Path, packages: &[String]) -> Result<Messages> {
+/// The rig in a command of its own: its features are not the others'.
+fn cargo_all(to: &Path, target: &Path, packages: &[String]) -> Result<Messages> {
+    let (rig, others): (Vec<_>, Vec<_>) =
+        packages.iter().map(String::as_str).partition(|package| *package == RIG);
+    let mut all = Messages { success: true, lines: Vec::new() };
+    let tests: Vec<&str> = RIG_TESTS.iter().flat_map(|test| ["--test", test]).collect();
+    for (packages, what) in [(others, vec!["--tests"]), (rig, [&["--bins"][..], &tests].concat())] {
+        if all.success && !packages.is_empty() {
+            let messages = cargo(to, target, &packages, &what)?;
+            all.success = messages.success;
+            all.lines.extend(messages.lines);
+        }
+    }
+    Ok(all)
+}
+
+fn cargo(to: &Path, target: &Path, packages: &[&str], what: &[&str]) -> Result<Messages> {
     let wrapper = to.join("mutant/rustc.sh");
     put(&wrapper, b"#!/bin/sh\nRUSTC_BOOTSTRAP=1 exec \"$@\"\n")?;
     Command::new("chmod").arg("+x").arg(&wrapper).status()?;
     let mut command = Command::new("cargo");
-    command.current_dir(to).args(["build", "--release", "--tests", "--bins", "--keep-going", "--message-format=json"]);
-    command.args(packages.iter().flat_map(|package| ["--package", package.as_str()]));
+    command.current_dir(to).args(["build", "--release", "--keep-going", "--message-format=json"]).args(what);
+    command.args(packages.iter().flat_map(|package| ["--package", package]));
     // What is optimised less is compiled sooner; most of it runs only for a moment.
     for package in ["tractive", "tractive-control", "tractive-tablegen", "tractive-nucleo-g474re"] {
         command.args(["--config", &format!("profile.release.package.{package}.opt-level=1")]);
@@ -100,23 +145,34 @@ fn program(line: &Value) -> Option<Program> {
 }
 
 /// Finds whose the error is: the smallest place that has its first byte in it.
-fn leave_out(to: &Path, line: &Value, schemata: &BTreeMap<String, Schema>, left_out: &mut BTreeMap<u32, String>) {
+fn leave_out(
+    to: &Path,
+    line: &Value,
+    schemata: &BTreeMap<String, Schema>,
+    left_out: &mut BTreeMap<u32, String>,
+) {
     let message = &line["message"];
     if line["reason"] != "compiler-message" || message["level"] != "error" {
         return;
     }
     let code = message["code"]["code"].as_str().unwrap_or("error");
     let children = message["children"].as_array().into_iter().flatten();
-    let own = [message].into_iter().chain(children).flat_map(|message| message["spans"].as_array().into_iter().flatten());
+    let own = [message]
+        .into_iter()
+        .chain(children)
+        .flat_map(|message| message["spans"].as_array().into_iter().flatten());
     let mut spans: Vec<_> = own.collect();
     spans.sort_by_key(|span| span["is_primary"] != true);
     for span in spans {
-        let (Some(name), Some(byte)) = (span["file_name"].as_str(), span["byte_start"].as_u64()) else { continue };
+        let (Some(name), Some(byte)) = (span["file_name"].as_str(), span["byte_start"].as_u64()) else {
+            continue;
+        };
         let name = Path::new(name);
         let name = name.strip_prefix(to).unwrap_or(name);
         let Some(schema) = schemata.get(&*name.to_string_lossy()) else { continue };
         let within = schema.written.iter().filter(|written| written.bytes.contains(&(byte as usize)));
-        let fresh = within.filter(|written| written.numbers.iter().any(|number| !left_out.contains_key(number)));
+        let fresh =
+            within.filter(|written| written.numbers.iter().any(|number| !left_out.contains_key(number)));
         if let Some(written) = fresh.min_by_key(|written| written.bytes.len()) {
             for number in &written.numbers {
                 left_out.entry(*number).or_insert_with(|| code.to_owned());

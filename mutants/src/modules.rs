@@ -42,6 +42,7 @@ const OFF: [&str; 9] = [
 pub fn is_off(attributes: &[Attribute]) -> bool {
     attributes.iter().any(|attribute| {
         let text = quote::ToTokens::to_token_stream(&attribute.meta).to_string().replace(' ', "");
-        text == "test" || text.strip_prefix("cfg").is_some_and(|cfg| OFF.iter().any(|off| cfg.starts_with(off)))
+        text == "test"
+            || text.strip_prefix("cfg").is_some_and(|cfg| OFF.iter().any(|off| cfg.starts_with(off)))
     })
 }

@@ -24,7 +24,8 @@ pub fn print(places: &Places, tree: &Tree, options: &Options) -> Result<bool> {
         let count = counts.entry(area).or_default();
         let list = survivors.entry(area).or_default();
         if let Some(code) = left_out.get(&mutant.number) {
-            let of = if UNVIABLE.contains(&code.as_str()) { &mut count.unviable } else { &mut count.elsewhere };
+            let of =
+                if UNVIABLE.contains(&code.as_str()) { &mut count.unviable } else { &mut count.elsewhere };
             *of += 1;
             continue;
         }
@@ -36,6 +37,10 @@ pub fn print(places: &Places, tree: &Tree, options: &Options) -> Result<bool> {
             count.open += 1;
             continue;
         };
+        if line.outcome == Outcome::Unreached && mutant.early {
+            count.elsewhere += 1;
+            continue;
+        }
         *count.of.entry(line.outcome).or_default() += 1;
         if matches!(line.outcome, Outcome::Missed | Outcome::Unreached | Outcome::Golden) {
             if known.has(mutant) {
@@ -45,7 +50,9 @@ pub fn print(places: &Places, tree: &Tree, options: &Options) -> Result<bool> {
             }
         }
     }
-    println!("area            tests   late  bytes missed nobody   open | unviable elsewhere |  known | tests %  +bytes %");
+    println!(
+        "area            tests   late  bytes missed nobody   open | unviable elsewhere |  known | tests %  +bytes %"
+    );
     for (area, count) in &counts {
         let of = |outcome| count.of.get(&outcome).copied().unwrap_or(0);
         let (tests, all) = count.shares();

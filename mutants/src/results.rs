@@ -66,40 +66,39 @@ impl Results {
     }
 }
 
-/// A mutant that no test can notice, or none needs to, with the reason.
+/// Mutants that no test can notice, or none needs to, with the reason.
 #[derive(Clone, Debug, Deserialize)]
 pub struct Known {
-    pub file: String,
-    pub function: String,
-    pub what: String,
-    /// The line of the source, where one function has the same mutation several times.
-    #[serde(default)]
-    pub source: Option<String>,
+    /// The reason of all of them.
     pub reason: String,
+    /// "FILE: WHAT in FUNCTION", and behind " @ " the line of the source where one function has the same mutation several times.
+    pub mutants: Vec<String>,
 }
 
 /// The list of those.
 #[derive(Debug, Default, Deserialize)]
 pub struct KnownList {
     #[serde(default)]
-    pub mutant: Vec<Known>,
+    pub known: Vec<Known>,
 }
 
 impl KnownList {
     pub fn read(path: &Path) -> Result<Self> {
         let text = std::fs::read_to_string(path).unwrap_or_default();
         let list: Self = toml::from_str(&text).with_context(|| path.display().to_string())?;
-        match list.mutant.iter().find(|known| known.reason.trim().is_empty()) {
-            Some(known) => bail!("{}: {}: {}: reason: empty; say why no test notices it", path.display(), known.file, known.what),
+        match list.known.iter().find(|known| known.reason.trim().is_empty()) {
+            Some(known) => {
+                bail!("{}: {:?}: reason: empty; say why no test notices them", path.display(), known.mutants)
+            }
             None => Ok(list),
         }
     }
 
     pub fn has(&self, mutant: &Mutant) -> bool {
-        self.mutant.iter().any(|known| {
-            let source = known.source.as_ref().is_none_or(|source| *source == mutant.source);
-            source && known.file == mutant.file && known.function == mutant.function && known.what == mutant.what
-        })
+        let Mutant { file, what, function, source, .. } = mutant;
+        let short = format!("{file}: {what} in {function}");
+        let long = format!("{short} @ {source}");
+        self.known.iter().flat_map(|known| &known.mutants).any(|name| *name == short || *name == long)
     }
 }
 
@@ -118,8 +117,10 @@ pub struct Count {
 impl Count {
     /// The share of what was tried that was noticed by a test; and by a test or in bytes; in percent.
     pub fn shares(&self) -> (f64, f64) {
-        let count = |outcomes: &[Outcome]| outcomes.iter().filter_map(|outcome| self.of.get(outcome)).sum::<usize>();
-        let all = count(&[Outcome::Killed, Outcome::Late, Outcome::Golden, Outcome::Missed, Outcome::Unreached]);
+        let count =
+            |outcomes: &[Outcome]| outcomes.iter().filter_map(|outcome| self.of.get(outcome)).sum::<usize>();
+        let all =
+            count(&[Outcome::Killed, Outcome::Late, Outcome::Golden, Outcome::Missed, Outcome::Unreached]);
         let share = |part: usize| 100.0 * part as f64 / all.max(1) as f64;
         let tests = count(&[Outcome::Killed, Outcome::Late]);
         (share(tests), share(tests + count(&[Outcome::Golden])))

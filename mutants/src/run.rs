@@ -15,7 +15,9 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// The mutants that the options ask for.
 pub fn chosen<'a>(mutants: &'a [Mutant], options: &Options) -> Vec<&'a Mutant> {
-    let area = |mutant: &Mutant| options.area.is_empty() || mutant.area().is_some_and(|area| options.area.contains(&area));
+    let area = |mutant: &Mutant| {
+        options.area.is_empty() || mutant.area().is_some_and(|area| options.area.contains(&area))
+    };
     let file = |mutant: &Mutant| {
         options.file.is_empty() || options.file.iter().any(|file| mutant.file.starts_with(file.as_str()))
     };
@@ -26,15 +28,17 @@ pub fn chosen<'a>(mutants: &'a [Mutant], options: &Options) -> Vec<&'a Mutant> {
     let Some(sample) = options.sample else { return chosen };
     let count = sample.min(chosen.len());
     if let Some(seed) = options.seed {
-        chosen.sort_by_cached_key(|mutant| {
-            let mut hasher = DefaultHasher::new();
-            (seed, mutant.name()).hash(&mut hasher);
-            hasher.finish()
-        });
+        chosen.sort_by_cached_key(|mutant| drawn(seed, mutant));
         chosen.truncate(count);
     }
     let all = chosen.len();
     (0..count).filter_map(|index| chosen.get(index * all / count).copied()).collect()
+}
+
+fn drawn(seed: u64, mutant: &Mutant) -> u64 {
+    let mut hasher = DefaultHasher::new();
+    (seed, mutant.name()).hash(&mut hasher);
+    hasher.finish()
 }
 
 /// The file of the mutants that do not compile this way: names, each with the error's code.
@@ -66,7 +70,7 @@ pub fn run(places: &Places, tree: &Tree, options: &Options) -> Result<()> {
     rayon::ThreadPoolBuilder::new().num_threads(options.jobs).build_global()?;
     let trials = learnt(places, &programs, options.longest)?;
     let results = Results::open(&places.work.join("results.jsonl"))?;
-    let open: Vec<&Mutant> = chosen(&tree.mutants, options)
+    let mut open: Vec<&Mutant> = chosen(&tree.mutants, options)
         .into_iter()
         .filter(|mutant| !mutant.fixed && !left_out.contains_key(&mutant.number))
         .filter(|mutant| match results.of(mutant).map(|line| line.outcome) {
@@ -74,6 +78,8 @@ pub fn run(places: &Places, tree: &Tree, options: &Options) -> Result<()> {
             Some(outcome) => options.again && !matches!(outcome, Outcome::Killed | Outcome::Late),
         })
         .collect();
+    // In no order: a run that is stopped is then a sample of all.
+    open.sort_by_cached_key(|mutant| drawn(0, mutant));
     let hunt = Hunt::new(&trials, options.budget, &places.work);
     let done = AtomicUsize::new(0);
     open.par_iter().with_max_len(1).try_for_each(|mutant| {
@@ -96,7 +102,9 @@ fn learnt(places: &Places, programs: &[Program], longest_s: u64) -> Result<Vec<T
         let mut hasher = DefaultHasher::new();
         (bytes, longest_s, include_str!("../goldens.txt")).hash(&mut hasher);
         let file = folder.join(format!("{}-{:016x}.json", program.name.replace(' ', "-"), hasher.finish()));
-        if let Some(trials) = std::fs::read_to_string(&file).ok().and_then(|text| serde_json::from_str(&text).ok()) {
+        if let Some(trials) =
+            std::fs::read_to_string(&file).ok().and_then(|text| serde_json::from_str(&text).ok())
+        {
             let trials: Vec<Trial> = trials;
             all.extend(trials);
             continue;
@@ -107,8 +115,11 @@ fn learnt(places: &Places, programs: &[Program], longest_s: u64) -> Result<Vec<T
             (false, false) => Vec::new(),
         };
         let count = found.len();
-        let learnt: Vec<Trial> =
-            found.into_par_iter().with_max_len(1).filter_map(|trial| trial.learn(&places.work.join("scratch"), longest_s)).collect();
+        let learnt: Vec<Trial> = found
+            .into_par_iter()
+            .with_max_len(1)
+            .filter_map(|trial| trial.learn(&places.work.join("scratch"), longest_s))
+            .collect();
         eprintln!("mutants: {}: {} of {count} tests come by a mutant", program.name, learnt.len());
         std::fs::write(&file, serde_json::to_string(&learnt)?)?;
         all.extend(learnt);
@@ -145,7 +156,8 @@ impl<'a> Hunt<'a> {
         let cost = |index: &usize| {
             let Some(trial) = self.trials.get(*index) else { return (true, f64::MAX) };
             let key = (mutant.file.clone(), *index);
-            let (runs, kills) = scores.as_ref().ok().and_then(|scores| scores.get(&key).copied()).unwrap_or((0.0, 0.0));
+            let (runs, kills) =
+                scores.as_ref().ok().and_then(|scores| scores.get(&key).copied()).unwrap_or((0.0, 0.0));
             (trial.golden.is_some(), (trial.seconds + 0.01) * (runs + 2.0) / (kills + 0.5))
         };
         let mut keyed: Vec<_> = order.drain(..).map(|index| (cost(&index), index)).collect();

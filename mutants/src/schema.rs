@@ -109,8 +109,9 @@ fn is(number: u32) -> String {
 /// One branch for each mutant that there is, then the code's own.
 fn branches<'a>(numbers: &[u32], texts: impl Iterator<Item = String> + 'a, own: &str) -> Vec<Piece> {
     let there = numbers.iter().zip(texts).filter(|(number, _)| **number > 0);
-    let mut pieces: Vec<_> =
-        there.map(|(number, text)| (format!("if {} {{ {text} }} else ", is(*number)), Some(*number))).collect();
+    let mut pieces: Vec<_> = there
+        .map(|(number, text)| (format!("if {} {{ {text} }} else ", is(*number)), Some(*number)))
+        .collect();
     pieces.push((format!("{{ {own} }}"), None));
     pieces
 }
@@ -124,10 +125,13 @@ fn edit(source: &str, site: &Site, index: usize, numbers: &[u32], edits: &mut Ve
         Shape::Fixed => {}
         Shape::Body(values) => {
             let there = numbers.iter().zip(values).filter(|(number, _)| **number > 0);
-            let pieces = there.map(|(number, value)| (format!(" if {} {{ return {value}; }}", is(*number)), Some(*number)));
+            let pieces = there
+                .map(|(number, value)| (format!(" if {} {{ return {value}; }}", is(*number)), Some(*number)));
             editor.middle(bytes.start, bytes.start, pieces.collect());
         }
-        Shape::Operator { right, own, others } => operator(&mut editor, site.left, *right, own, others, numbers),
+        Shape::Operator { right, own, others } => {
+            operator(&mut editor, site.left, *right, own, others, numbers)
+        }
         Shape::Lazy { right, and } => {
             editor.begin(&bytes, bytes.start, "(match (");
             let chosen = if *and { "!=" } else { "==" };
@@ -152,18 +156,34 @@ fn edit(source: &str, site: &Site, index: usize, numbers: &[u32], edits: &mut Ve
             pieces.push(plain(" })"));
             editor.end(&bytes, pieces);
         }
-        Shape::Arm => editor.middle(bytes.start, bytes.start, vec![(format!(" if !{}", is(first)), Some(first))]),
+        Shape::Arm => {
+            editor.middle(bytes.start, bytes.start, vec![(format!(" if !{}", is(first)), Some(first))])
+        }
         Shape::Guard => {
             let number = |index: usize| is(numbers.get(index).copied().unwrap_or(0));
-            editor.begin(&bytes, bytes.start, &format!("(!{} && ({} || !{} && (", number(2), number(0), number(1)));
+            editor.begin(
+                &bytes,
+                bytes.start,
+                &format!("(!{} && ({} || !{} && (", number(2), number(0), number(1)),
+            );
             editor.end(&bytes, vec![plain(")))")]);
         }
         Shape::Fields { base, fields } => {
             let path = text(bytes.start..site.left);
-            editor.begin(&bytes, bytes.start, &format!("(match ({path} {{ ..{} }}) {{ __s => ", text(base.clone())));
-            for ((name, short, value), number) in fields.iter().zip(numbers).filter(|(_, number)| **number > 0) {
+            editor.begin(
+                &bytes,
+                bytes.start,
+                &format!("(match ({path} {{ ..{} }}) {{ __s => ", text(base.clone())),
+            );
+            for ((name, short, value), number) in
+                fields.iter().zip(numbers).filter(|(_, number)| **number > 0)
+            {
                 let name_of = if *short { format!("{name}: ") } else { String::new() };
-                editor.begin(value, value.start, &format!("{name_of}if {} {{ __s.{name} }} else {{ ", is(*number)));
+                editor.begin(
+                    value,
+                    value.start,
+                    &format!("{name_of}if {} {{ __s.{name} }} else {{ ", is(*number)),
+                );
                 editor.end(value, vec![(" }".to_owned(), Some(*number))]);
             }
             editor.middle(base.start, base.end, vec![plain("__s")]);
@@ -179,7 +199,11 @@ fn operator(editor: &mut Editor, left: usize, right: usize, own: &str, others: &
     editor.begin(&bytes, bytes.start, &format!("(match ({by}("));
     editor.middle(left, right, vec![(format!("), {by}("), None)]);
     let mut pieces = vec![plain(")) { (__a, __b) => ")];
-    pieces.extend(branches(numbers, others.iter().map(|other| format!("{a} {other} {b}")), &format!("{a} {own} {b}")));
+    pieces.extend(branches(
+        numbers,
+        others.iter().map(|other| format!("{a} {other} {b}")),
+        &format!("{a} {own} {b}"),
+    ));
     pieces.push(plain(" })"));
     editor.end(&bytes, pieces);
 }
@@ -223,7 +247,16 @@ mod tests {
              match x { 1.0 if y[0] > 1 => 1, 2.0 | 3.0 => 2, _ => S { a: 1 + 2, b, ..S::new() }.a }; let _ = [0; 2 + 3]; }
              const N: usize = 3 * 4;",
         );
-        for part in ["x += __b", "x -= __b", "S { ..S::new() }", "b: if", "..__s", "2.0 | 3.0 if !", "[0; 2 + 3]", "= 3 * 4;"] {
+        for part in [
+            "x += __b",
+            "x -= __b",
+            "S { ..S::new() }",
+            "b: if",
+            "..__s",
+            "2.0 | 3.0 if !",
+            "[0; 2 + 3]",
+            "= 3 * 4;",
+        ] {
             assert!(text.contains(part), "{part}: {text}");
         }
     }

@@ -20,6 +20,8 @@ pub struct Found {
     pub function: String,
     /// "replace + with -", as cargo-mutants says it.
     pub what: String,
+    /// In a `const fn`: where it runs only while compiling, no test comes by it.
+    pub early: bool,
 }
 
 /// The shape of a place, for what is written there.
@@ -69,13 +71,16 @@ struct Finder {
     around: Vec<String>,
     /// Depth of constants around.
     fixed: usize,
+    /// In a `const fn`.
+    early: bool,
 }
 
 impl Finder {
     fn add(&mut self, at: &impl Spanned, bytes: Bytes, left: usize, shape: Shape, whats: Vec<String>) {
         let start = at.span().start();
         let function = self.around.join("::");
-        let found = |what| Found { line: start.line, column: start.column + 1, function: function.clone(), what };
+        let (line, column, early) = (start.line, start.column + 1, self.early);
+        let found = |what| Found { line, column, function: function.clone(), what, early };
         let mutants: Vec<_> = whats.into_iter().map(found).collect();
         let shape = if self.fixed > 0 { Shape::Fixed } else { shape };
         if !mutants.is_empty() {
@@ -97,21 +102,27 @@ impl Finder {
 
     fn function(&mut self, signature: &syn::Signature, block: &Block) {
         let fixed = std::mem::take(&mut self.fixed);
+        let early = std::mem::replace(&mut self.early, signature.constness.is_some());
         self.within(signature.ident.to_string(), |finder| {
             let unit = matches!(signature.output, syn::ReturnType::Default);
-            if !(unit && block.stmts.is_empty()) && signature.unsafety.is_none() {
+            let is_default = signature.ident == "default" && signature.inputs.is_empty();
+            if !(unit && block.stmts.is_empty()) && signature.unsafety.is_none() && !is_default {
                 let values: Vec<_> = values::of(&signature.output);
                 let own = block.stmts.iter().map(|statement| statement.to_token_stream().to_string());
                 let own: String = own.collect();
                 let squeezed = |text: &str| text.replace(' ', "");
-                let values: Vec<_> = values.into_iter().filter(|value| squeezed(value) != squeezed(&own)).collect();
-                let whats = values.iter().map(|value| format!("replace with {}", value.replace("::mutant::", ""))).collect();
+                let values: Vec<_> =
+                    values.into_iter().filter(|value| squeezed(value) != squeezed(&own)).collect();
+                let whats = values
+                    .iter()
+                    .map(|value| format!("replace with {}", value.replace("::mutant::", "")))
+                    .collect();
                 let behind = block.brace_token.span.open().byte_range().end;
                 finder.add(&signature.ident, behind..behind, behind, Shape::Body(values), whats);
             }
             finder.visit_block(block);
         });
-        self.fixed = fixed;
+        (self.fixed, self.early) = (fixed, early);
     }
 
     fn binary(&mut self, binary: &syn::ExprBinary) {
@@ -146,7 +157,8 @@ impl Finder {
                 Some((_, guard)) if has_let(guard) => {}
                 Some((_, guard)) => {
                     let text = guard.to_token_stream();
-                    let constants = [true, false].map(|value| format!("replace match guard {text} with {value}"));
+                    let constants =
+                        [true, false].map(|value| format!("replace match guard {text} with {value}"));
                     let whats = constants.into_iter().chain(delete).collect();
                     let place = bytes(guard);
                     self.add(guard, place.clone(), place.end, Shape::Guard, whats);
@@ -164,7 +176,10 @@ impl Finder {
             .map(|field| (name(field), field.colon_token.is_none(), bytes(&field.expr)))
             .collect();
         let path = structure.path.to_token_stream();
-        let whats = fields.iter().map(|(name, ..)| format!("delete field {name} from struct {path} expression")).collect();
+        let whats = fields
+            .iter()
+            .map(|(name, ..)| format!("delete field {name} from struct {path} expression"))
+            .collect();
         let (place, end) = (bytes(structure), bytes(&structure.path).end);
         self.add(structure, place, end, Shape::Fields { base: bytes(base), fields }, whats);
     }
@@ -179,8 +194,10 @@ impl<'ast> Visit<'ast> for Finder {
 
     fn visit_item_impl(&mut self, item: &'ast syn::ItemImpl) {
         let ty = item.self_ty.to_token_stream().to_string().replace(' ', "");
-        let of = item.trait_.as_ref().map(|(_, path, _)| path.segments.last().map(|last| last.ident.to_string()));
-        let printed = matches!(of.as_ref().and_then(|name| name.as_deref()), Some("Debug" | "Display" | "Format"));
+        let of =
+            item.trait_.as_ref().map(|(_, path, _)| path.segments.last().map(|last| last.ident.to_string()));
+        let printed =
+            matches!(of.as_ref().and_then(|name| name.as_deref()), Some("Debug" | "Display" | "Format"));
         if is_off(&item.attrs) || printed {
             return;
         }
@@ -212,19 +229,25 @@ impl<'ast> Visit<'ast> for Finder {
 
     fn visit_item_const(&mut self, item: &'ast syn::ItemConst) {
         if !is_off(&item.attrs) {
-            self.within(item.ident.to_string(), |finder| finder.constant(|finder| finder.visit_expr(&item.expr)));
+            self.within(item.ident.to_string(), |finder| {
+                finder.constant(|finder| finder.visit_expr(&item.expr))
+            });
         }
     }
 
     fn visit_item_static(&mut self, item: &'ast syn::ItemStatic) {
         if !is_off(&item.attrs) {
-            self.within(item.ident.to_string(), |finder| finder.constant(|finder| finder.visit_expr(&item.expr)));
+            self.within(item.ident.to_string(), |finder| {
+                finder.constant(|finder| finder.visit_expr(&item.expr))
+            });
         }
     }
 
     fn visit_impl_item_const(&mut self, item: &'ast syn::ImplItemConst) {
         if !is_off(&item.attrs) {
-            self.within(item.ident.to_string(), |finder| finder.constant(|finder| finder.visit_expr(&item.expr)));
+            self.within(item.ident.to_string(), |finder| {
+                finder.constant(|finder| finder.visit_expr(&item.expr))
+            });
         }
     }
 

@@ -23,6 +23,8 @@ pub struct Mutant {
     pub source: String,
     /// Compiled before it can be chosen.
     pub fixed: bool,
+    /// In a `const fn`.
+    pub early: bool,
     /// The hash of the file.
     pub hash: u64,
 }
@@ -84,10 +86,21 @@ impl Tree {
         for site in &sites {
             let fixed = matches!(site.shape, Shape::Fixed);
             let own = site.mutants.iter().map(|found| {
-                let Found { line, column, function, what } = found.clone();
+                let Found { line, column, function, what, early } = found.clone();
                 let source = lines.get(line.saturating_sub(1)).map_or("", |line| line.trim()).to_owned();
                 let number = self.mutants.len() as u32 + 1;
-                self.mutants.push(Mutant { number, file: name.clone(), line, column, function, what, source, fixed, hash });
+                self.mutants.push(Mutant {
+                    number,
+                    file: name.clone(),
+                    line,
+                    column,
+                    function,
+                    what,
+                    source,
+                    fixed,
+                    early,
+                    hash,
+                });
                 number
             });
             numbers.push(own.collect());
@@ -118,7 +131,9 @@ pub fn copy(root: &Path, to: &Path, tree: &Tree) -> Result<()> {
     let text = String::from_utf8_lossy(&listed.stdout).into_owned();
     for file in text.split('\0').filter(|file| !file.is_empty() && !mutated(file)) {
         let Ok(mut bytes) = std::fs::read(root.join(file)) else { continue };
-        if let Some((folder, _)) = CRATES.iter().find(|(folder, _)| Path::new(folder).join("Cargo.toml") == Path::new(file)) {
+        if let Some((folder, _)) =
+            CRATES.iter().find(|(folder, _)| Path::new(folder).join("Cargo.toml") == Path::new(file))
+        {
             let up = "../".repeat(Path::new(folder).components().count());
             let manifest = String::from_utf8_lossy(&bytes);
             let dependency = format!("[dependencies]\nmutant = {{ path = \"{up}mutant\" }}\n");
@@ -126,7 +141,10 @@ pub fn copy(root: &Path, to: &Path, tree: &Tree) -> Result<()> {
         }
         put(&to.join(file), &bytes)?;
     }
-    put(&to.join("mutant/Cargo.toml"), b"[package]\nname = \"mutant\"\nedition = \"2024\"\n[lib]\npath = \"lib.rs\"\n")?;
+    put(
+        &to.join("mutant/Cargo.toml"),
+        b"[package]\nname = \"mutant\"\nedition = \"2024\"\n[lib]\npath = \"lib.rs\"\n",
+    )?;
     put(&to.join("mutant/lib.rs"), include_bytes!("../runtime/lib.rs"))?;
     put(&to.join("mutant/count.rs"), (tree.mutants.len() + 1).to_string().as_bytes())
 }

@@ -90,7 +90,8 @@ impl Trial {
         let out = folder.join("out");
         let seconds = (self.seconds * TIMES + GRACE_S).ceil() as u64;
         let mut command = self.command(&out);
-        let status = ended(command.env("MUTANT", mutant.to_string()).env("MUTANT_SECONDS", seconds.to_string()));
+        let status =
+            ended(command.env("MUTANT", mutant.to_string()).env("MUTANT_SECONDS", seconds.to_string()));
         let end = match (status, self.golden) {
             (None, _) => End::Late,
             (Some(status), _) if is_late(status) => End::Late,
@@ -105,7 +106,10 @@ impl Trial {
 
 /// The tests of a program.
 pub fn of(program: &Program) -> Result<Vec<Trial>> {
-    let list = Command::new(&program.path).args(["--list", "--format", "terse"]).current_dir(&program.folder).output();
+    let list = Command::new(&program.path)
+        .args(["--list", "--format", "terse"])
+        .current_dir(&program.folder)
+        .output();
     let list = list.with_context(|| program.path.display().to_string())?;
     let ignored = Command::new(&program.path).args(["--list", "--format", "terse", "--ignored"]).output()?;
     let names = |bytes: &[u8]| -> Vec<String> {

@@ -20,7 +20,9 @@ fn of_type(ty: &Type) -> Vec<String> {
             let length = array.len.to_token_stream();
             of_type(&array.elem).iter().map(|value| format!("[{value}; {length}]")).collect()
         }
-        Type::Tuple(tuple) => tuple.elems.iter().map(of_type).fold(vec![Vec::new()], product).iter().map(tupled).collect(),
+        Type::Tuple(tuple) => {
+            tuple.elems.iter().map(of_type).fold(vec![Vec::new()], product).iter().map(tupled).collect()
+        }
         Type::Reference(reference) => match (&*reference.elem, reference.mutability) {
             (Type::Slice(slice), mutability) => {
                 let none = if mutability.is_some() { "&mut []" } else { "&[]" };
@@ -37,10 +39,12 @@ fn of_type(ty: &Type) -> Vec<String> {
 
 fn of_segment(segment: &PathSegment) -> Vec<String> {
     let inner = || match &segment.arguments {
-        PathArguments::AngleBracketed(arguments) => arguments.args.iter().find_map(|argument| match argument {
-            GenericArgument::Type(ty) => Some(of_type(ty)),
-            _ => None,
-        }),
+        PathArguments::AngleBracketed(arguments) => {
+            arguments.args.iter().find_map(|argument| match argument {
+                GenericArgument::Type(ty) => Some(of_type(ty)),
+                _ => None,
+            })
+        }
         _ => None,
     };
     let wrapped = |wrapper: &str| {

@@ -108,3 +108,67 @@ pub(super) fn motor_limits(
     }
     limits
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::built_in::traction::BUILT_IN;
+
+    /// Limits with parameters at three quarters of the ratings, of a sender that asks for shares of the ratings.
+    fn limits(torque: f32, speed: f32) -> MotorLimits {
+        let mut parameters = Parameters::rated(&BUILT_IN.ratings);
+        parameters.torque_limit_nm *= 0.75;
+        parameters.speed_limit_rpm *= 0.75;
+        let sent = TorqueLimits {
+            motoring_nm: torque * BUILT_IN.ratings.max_torque_nm,
+            braking_nm: torque * BUILT_IN.ratings.max_torque_nm,
+            speed_rpm: speed * BUILT_IN.ratings.max_speed_rad_s * RPM_PER_RAD_S,
+        };
+        motor_limits(Some(&sent), &parameters, &BUILT_IN.ratings)
+    }
+
+    fn shares(limits: MotorLimits) -> [f32; 3] {
+        let torque = BUILT_IN.ratings.max_torque_nm;
+        [
+            limits.motoring_nm / torque,
+            limits.braking_nm / torque,
+            limits.speed_rad_s / BUILT_IN.ratings.max_speed_rad_s,
+        ]
+    }
+
+    #[test]
+    fn the_lower_of_sender_and_parameter_holds_and_what_exceeds_a_rating_stays_to_be_refused() {
+        // Sent, and what holds: a rating that rounding raised is none that exceeds it.
+        for (sent, holds) in [
+            (0.0, 0.0),
+            (0.5, 0.5),
+            (0.74, 0.74),
+            (0.8, 0.75),
+            (1.0, 0.75),
+            (1.000_05, 0.75),
+            (1.000_2, 1.000_2),
+        ] {
+            for share in shares(limits(sent, sent)) {
+                assert!((share - holds).abs() < 1e-6, "{sent}: {share}, not {holds}");
+            }
+        }
+        let negative = limits(-0.5, -0.5);
+        assert!(shares(negative).iter().all(|share| (share + 0.5).abs() < 1e-6));
+    }
+
+    #[test]
+    fn a_rating_that_rounding_raised_is_the_rating() {
+        let mut parameters = Parameters::rated(&BUILT_IN.ratings);
+        for (share, holds) in
+            [(0.999_95, 0.999_95), (1.0, 1.0), (1.000_05, 1.0), (1.000_15, 1.000_15), (1.5, 1.5)]
+        {
+            parameters.speed_limit_rpm = share * BUILT_IN.ratings.max_speed_rad_s * RPM_PER_RAD_S;
+            let [.., speed] = shares(motor_limits(None, &parameters, &BUILT_IN.ratings));
+            assert!((speed - holds).abs() < 2e-6, "{share}: {speed}, not {holds}");
+            if holds == 1.0 {
+                let limits = motor_limits(None, &parameters, &BUILT_IN.ratings);
+                assert!(limits.speed_rad_s <= BUILT_IN.ratings.max_speed_rad_s, "{share}");
+            }
+        }
+    }
+}

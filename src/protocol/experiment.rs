@@ -78,3 +78,27 @@ impl ObservationFrame {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_told_comes_back() {
+        for stage in Stage::ALL {
+            let told = ExperimentFrame { stage, observations: 0x1ABC };
+            assert_eq!(ExperimentFrame::decode(told.encode()), Some(told));
+        }
+        for word in [0, 1, 0xFFFF, 0x1_0000, 0x8765_4321, u32::MAX] {
+            let told = ObservationFrame { index: 513, part: 1, word };
+            assert_eq!(ObservationFrame::decode(told.encode()), Some(told), "{word:x}");
+        }
+    }
+
+    #[test]
+    fn a_stage_that_is_none_is_refused() {
+        let mut payload = Payload::default();
+        STAGE.put_raw(&mut payload, Stage::ALL.len() as u32);
+        assert_eq!(ExperimentFrame::decode(payload), None);
+    }
+}

@@ -155,11 +155,62 @@ impl Parameters {
             _ => known.max,
         };
         let smallest = if id == 6 { self.command_zero_ms } else { known.min };
-        let inside = value >= known.min && value <= known.max && value >= smallest && value <= largest;
+        let inside = value >= smallest && value <= known.max && value <= largest;
         if !inside {
             return Err(WriteError::OutOfRange);
         }
         *self.slot(id).ok_or(WriteError::Unknown)? = value;
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::built_in::traction::BUILT_IN;
+
+    #[test]
+    fn a_fresh_drive_has_no_limits_of_the_line() {
+        let [own, none] = [Parameters::rated(&BUILT_IN.ratings).train(), NONE];
+        let pairs = [
+            (own.motoring_a, none.motoring_a),
+            (own.braking_a, none.braking_a),
+            (own.motoring_w, none.motoring_w),
+            (own.braking_w, none.braking_w),
+        ];
+        for (own, none) in pairs {
+            assert!((own / none - 1.0).abs() < 1e-6, "{own}, not {none}");
+        }
+    }
+
+    #[test]
+    fn each_parameter_is_its_own_and_ends_where_it_says() {
+        for parameter in PARAMETERS {
+            let mut parameters = Parameters {
+                command_off_ms: 1e4,
+                command_zero_ms: 20.0,
+                ..Parameters::rated(&BUILT_IN.ratings)
+            };
+            let largest = parameter.max.min(match parameter.id {
+                1 | 3 | 4 => parameters.read(parameter.id).unwrap(),
+                _ => parameter.max,
+            });
+            for value in [parameter.min.next_down(), largest.next_up(), f32::NAN] {
+                let refused = parameters.write(parameter.id, value, &BUILT_IN.ratings);
+                assert_eq!(refused, Err(WriteError::OutOfRange), "{} {value}", parameter.name);
+            }
+            let before = parameters;
+            for value in [parameter.min, largest] {
+                assert_eq!(
+                    parameters.write(parameter.id, value, &BUILT_IN.ratings),
+                    Ok(()),
+                    "{} {value}",
+                    parameter.name
+                );
+                assert_eq!(parameters.read(parameter.id), Some(value));
+            }
+            let others = PARAMETERS.iter().filter(|other| other.id != parameter.id);
+            assert!(others.map(|other| other.id).all(|id| parameters.read(id) == before.read(id)));
+        }
     }
 }

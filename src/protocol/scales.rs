@@ -155,3 +155,91 @@ impl Scales {
         value * worth(-(self.bits(quantity) as i32))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::protocol::{COMMAND, LIMITS, Payload};
+
+    /// Scales with these exponents of [`Quantity::SCALED`].
+    fn scales(exponents: [i32; 4]) -> Scales {
+        let each = Quantity::SCALED.into_iter().zip(exponents);
+        each.fold(Scales::USUAL, |scales, (quantity, exponent)| scales.with(quantity, exponent))
+    }
+
+    #[test]
+    fn exponents_come_back_each_its_own() {
+        for exponent in EXPONENTS[0]..=EXPONENTS[1] {
+            let exponents = [exponent, -exponent.abs(), 4, -4];
+            let scales = scales(exponents);
+            for (quantity, exponent) in Quantity::SCALED.into_iter().zip(exponents) {
+                assert_eq!(scales.exponent(quantity), exponent);
+                let worth = 10_f32.powi(exponent);
+                assert!((scales.worth(quantity) / worth - 1.0).abs() < 1e-6);
+                assert!((scales.to_usual(quantity, 3.0) * worth / 3.0 - 1.0).abs() < 1e-6);
+            }
+            assert_eq!(scales.worth(Quantity::Fixed), 1.0);
+            assert_eq!(scales.to_usual(Quantity::Fixed, 3.0), 3.0);
+        }
+    }
+
+    #[test]
+    fn a_rating_has_five_hundred_steps_and_what_is_most_has_room() {
+        let most = [(1.0, 0), (1.01, 1), (10.0, 1), (10.1, 2), (1e4, 4), (1e9, 4)];
+        assert!(most.into_iter().all(|(most, exponent)| super::exponent(1e3, most) == exponent));
+        let rated = [(500.0, 0), (499.0, -1), (50.0, -1), (49.0, -2), (0.05, -4), (1e-9, -4)];
+        assert!(rated.into_iter().all(|(rated, exponent)| super::exponent(rated, 0.0) == exponent));
+        // Room comes before fineness.
+        assert_eq!(super::exponent(1.0, 0.005), -2);
+    }
+
+    #[test]
+    fn a_mark_is_the_exclusive_or_of_exponents() {
+        let [torque, current, voltage, speed] = [1, -3, 2, -4];
+        let scales = scales([torque, current, voltage, speed]);
+        let code = |quantities: &[Quantity]| scales.code(Scales::mask(quantities)) as i32;
+        let [t, c, v, s] = Quantity::SCALED;
+        assert_eq!(
+            [code(&[t]), code(&[c]), code(&[v]), code(&[s])],
+            [torque, current & 15, voltage, speed & 15]
+        );
+        assert_eq!(code(&[t, s]), (torque ^ speed) & 15);
+        assert_eq!(code(&[s, t, v]), (torque ^ speed ^ voltage) & 15);
+        assert_eq!(code(&Quantity::SCALED), (torque ^ current ^ voltage ^ speed) & 15);
+        assert_eq!(code(&[]), 0);
+    }
+
+    #[test]
+    fn a_message_names_the_quantities_and_the_signal_of_its_mark() {
+        let scales = scales([-1, 0, 0, 2]);
+        let told =
+            |message: &super::super::Message| message.quantities().map(Quantity::name).collect::<Vec<_>>();
+        assert_eq!(told(&COMMAND), ["torque"]);
+        assert_eq!(told(&LIMITS), ["torque", "speed"]);
+        for (message, start, code) in [(COMMAND, 36, 15), (LIMITS, 12, 15 ^ 2)] {
+            assert_eq!(message.mark_signal(Scales::USUAL), None);
+            let signal = message.mark_signal(scales).unwrap();
+            assert_eq!(
+                (signal.start, signal.bits, signal.min, signal.max),
+                (start, 4, code as f32, code as f32)
+            );
+            assert_eq!(signal.raw(message.mark(Payload(0), scales)), code);
+            let content = Payload(0x1234_0000_0000_0000);
+            let marked = message.mark(content, scales);
+            assert_ne!(marked, content);
+            assert_eq!(
+                (message.mark(marked, scales), message.mark(content, Scales::USUAL)),
+                (content, content)
+            );
+        }
+    }
+
+    #[test]
+    fn every_quantity_has_its_name() {
+        let names = Quantity::SCALED.map(Quantity::name);
+        assert_eq!((names, Quantity::Fixed.name()), (["torque", "current", "voltage", "speed"], "fixed"));
+    }
+
+    extern crate std;
+    use std::vec::Vec;
+}

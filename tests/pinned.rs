@@ -1,0 +1,208 @@
+//! Outputs of both control laws pinned, bit for bit, over random walks of every input: what changes a law changes a line of
+//! `tests/pinned/laws.txt`. Whoever means to change it writes the file anew, `TRACTIVE_PINNED=write`, and says what the change buys.
+
+use std::fmt::Write;
+use std::path::Path;
+use tractive::built_in::traction::BUILT_IN;
+use tractive::control::{
+    AimInput, Boundary, Committed, ControlLaw, Controller, Demand, Gains, Law, LinkDamper, LinkWindow,
+    ModeLimits, PiLaw, Regulated, Ripple, RotorSample, Warmth,
+};
+use tractive::frames::{AlphaBeta, Angle, Dq};
+use tractive::time::Clock;
+
+/// Control periods of a walk.
+const PERIODS: u32 = 4_000;
+/// Walks of each law; every other one has a damped link.
+const WALKS: u32 = 8;
+
+/// Random numbers, the same on every machine.
+struct Random(u64);
+
+impl Random {
+    /// Between -1 and 1.
+    fn next(&mut self) -> f32 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        ((self.0 >> 40) as f32) / (1 << 23) as f32 - 1.0
+    }
+
+    /// Between two values.
+    fn within(&mut self, low: f32, high: f32) -> f32 {
+        low + 0.5 * (self.next() + 1.0) * (high - low)
+    }
+
+    fn is(&mut self, share: f32) -> bool {
+        self.within(0.0, 1.0) < share
+    }
+
+    fn vector(&mut self, length: f32) -> AlphaBeta {
+        AlphaBeta { alpha: length * self.next(), beta: length * self.next() }
+    }
+}
+
+/// The state of a walk's inputs.
+struct Walk {
+    random: Random,
+    rpm: f32,
+    rpm_wanted: f32,
+    udc_v: f32,
+    angle: Angle,
+    demand: Demand,
+    limits: ModeLimits,
+    window: Option<LinkWindow>,
+    warmth: Warmth,
+}
+
+impl Walk {
+    fn new(number: u32) -> Self {
+        let limits = ModeLimits {
+            follows: Regulated::Mean,
+            depth_limit: 0.9,
+            steady_share: 0.95,
+            filled: false,
+            ripple_share: 0.05,
+            settled: true,
+        };
+        Self {
+            random: Random(u64::from(number) + 1),
+            rpm: 0.0,
+            rpm_wanted: 0.0,
+            udc_v: 1_500.0,
+            angle: Angle::default(),
+            demand: Demand { torque_nm: 0.0, slew_limited: true },
+            limits,
+            window: None,
+            warmth: Warmth::NONE,
+        }
+    }
+
+    /// A control period later.
+    fn step(&mut self, clock: &Clock) {
+        let random = &mut self.random;
+        if random.is(0.004) {
+            self.rpm_wanted = random.within(-4_500.0, 4_500.0);
+        }
+        if random.is(0.01) {
+            let torque_nm = random.within(-1_300.0, 1_300.0);
+            self.demand = Demand { torque_nm, slew_limited: random.is(0.5) };
+        }
+        if random.is(0.01) {
+            self.limits.follows = match random.within(0.0, 3.0) {
+                0.0..1.0 => Regulated::Mean,
+                1.0..2.0 => Regulated::Fundamental,
+                _ => Regulated::Angle,
+            };
+            self.limits.depth_limit = random.within(0.7, 1.0);
+            self.limits.steady_share = random.within(0.9, 1.0);
+            self.limits.ripple_share = random.within(0.01, 0.2);
+            (self.limits.filled, self.limits.settled) = (random.is(0.3), random.is(0.7));
+        }
+        if random.is(0.002) {
+            self.window = random.is(0.5).then_some(LinkWindow {
+                motoring_none_v: 1_000.0,
+                motoring_full_v: 1_400.0,
+                braking_full_v: 1_600.0,
+                braking_none_v: 1_900.0,
+            });
+            self.warmth = Warmth::new(random.within(0.8, 1.5), random.within(-0.2, 0.05));
+        }
+        self.rpm += (self.rpm_wanted - self.rpm) * 0.01;
+        self.udc_v = (self.udc_v + 5.0 * random.next()).clamp(900.0, 2_000.0);
+        let turns = self.rpm / 60.0 * BUILT_IN.ratings.pole_pairs * clock.control_s();
+        self.angle = self.angle + Angle::from_turns(turns);
+    }
+
+    fn committed(&mut self) -> Committed {
+        let random = &mut self.random;
+        let ripple = random
+            .is(0.5)
+            .then(|| Ripple { at_horizon_wb: random.vector(0.05), led_wb: random.vector(0.02) });
+        let volt_seconds = (!random.is(0.02)).then(|| random.vector(0.3));
+        let (horizon_s, interval_s) = (random.within(0.0, 1e-3), random.within(1e-4, 1e-3));
+        Committed { horizon_s, volt_seconds, ripple, interval_s }
+    }
+}
+
+/// A hash of numbers, by their bits: FNV-1a.
+fn hash(hash: u64, numbers: &[f32]) -> u64 {
+    let bytes = numbers.iter().flat_map(|number| number.to_bits().to_le_bytes());
+    bytes.fold(hash, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x100_0000_01b3))
+}
+
+/// The walk of a law: a line each eighth of it, with the hash of all outputs until then.
+fn walk<L: ControlLaw>(mut law: L, name: &str, number: u32, out: &mut String) {
+    let (clock, mut walk, mut sum) =
+        (Clock::new(25_000_000, 2_500), Walk::new(number), 0xcbf2_9ce4_8422_2325);
+    let gains = Gains::of(number & 2 != 0, number & 1 != 0);
+    let law_of = Law { gains: &gains, clock: &clock, tables: &BUILT_IN };
+    let mut damper = LinkDamper::at(1_500.0);
+    for period in 0..PERIODS {
+        walk.step(&clock);
+        let omega = law.track(walk.angle, &clock);
+        let off = Dq { d: 15.0 * walk.random.next(), q: 15.0 * walk.random.next() };
+        let current = law.target().current + off;
+        let sample = RotorSample::new(current.unpark(walk.angle.sin_cos()).abc(), walk.angle, &BUILT_IN);
+        law.observe(&sample, &BUILT_IN);
+        if period % 64 == 0 {
+            law.warm(walk.warmth, &law_of);
+        }
+        if period % 3 == 0 {
+            let volt_seconds = (!walk.random.is(0.02)).then(|| walk.random.vector(0.3));
+            let boundary = Boundary { volt_seconds, length_s: walk.random.within(1e-4, 1e-3) };
+            law.learn(&boundary, &sample, walk.limits.follows, &law_of);
+        } else {
+            law.pass(&sample);
+        }
+        if walk.random.is(0.001) {
+            law.idle();
+            law.observe(&sample, &BUILT_IN);
+        }
+        if walk.random.is(0.001) {
+            law.begin_without_torque();
+        }
+        if period % 5 == 4 {
+            let passed_s = law.passed_s(&clock);
+            let swing =
+                (number & 1 != 0).then(|| damper.step(walk.udc_v, passed_s, omega, walk.limits.follows));
+            let (demand, udc_v) = (walk.demand, walk.udc_v);
+            let input = AimInput {
+                demand: &demand,
+                window: walk.window.as_ref(),
+                udc_v,
+                swing,
+                limits: &walk.limits,
+            };
+            law.aim(&input, &law_of);
+            let committed = walk.committed();
+            let made = law.regulate(&sample, &committed, &walk.limits, &law_of);
+            let target = *law.target();
+            assert!(made.voltage_v.is_finite(), "{name} {number}, period {period}: {made:?}");
+            sum = hash(sum, &[made.voltage_v, made.vector.alpha, made.vector.beta, made.steady_v]);
+            sum = hash(sum, &[made.carrier.alpha, made.carrier.beta, target.torque_nm, target.depth]);
+            sum = hash(sum, &[target.current.d, target.current.q, target.flux.d, target.flux.q]);
+            sum = hash(sum, &[target.voltage_limit_v, target.region as u8 as f32, law.map_scale()]);
+            sum = hash(sum, &[law.map_error(), law.flowing_nm(), omega, passed_s]);
+        }
+        if (period + 1) % (PERIODS / 8) == 0 {
+            writeln!(out, "{name} walk {number} period {period}: {sum:016x}").unwrap();
+        }
+    }
+}
+
+#[test]
+fn every_output_of_the_laws_is_as_it_was() {
+    let mut out = String::new();
+    for number in 0..WALKS {
+        walk(Controller::new(), "tractive", number, &mut out);
+        walk(PiLaw::new(), "pi", number, &mut out);
+    }
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/pinned/laws.txt");
+    if std::env::var_os("TRACTIVE_PINNED").is_some_and(|word| word == "write") {
+        std::fs::write(&file, &out).unwrap();
+    }
+    let pinned = std::fs::read_to_string(&file).unwrap();
+    for (now, pinned) in out.lines().zip(pinned.lines()) {
+        assert_eq!(now, pinned, "the first output that changed is in this eighth of the walk");
+    }
+    assert_eq!(out.lines().count(), pinned.lines().count());
+}
