@@ -215,8 +215,22 @@ mod tests {
             (0.0, 100.0, 4.0, 0.0),
             (-100.0, 100.0, 4.0, 0.0),
             (f32::NAN, 100.0, 4.0, 0.0),
+            // At rest and without loss any torque takes nothing; without power and loss there is none.
+            (100.0, 0.0, 0.0, f32::INFINITY),
+            (0.0, 0.0, 0.0, 0.0),
+            (0.0, 0.0, 4.0, 0.0),
         ] {
             assert_eq!(torque_nm(power_w, speed, loss), wanted_nm, "{power_w} {speed} {loss}");
+        }
+    }
+
+    /// Of a machine whose lowest voltage is where the current would begin to fall, it does not fall.
+    #[test]
+    fn without_a_span_the_current_does_not_fall() {
+        let nominal_v = BUILT_IN.ratings.dc_link_nominal_v;
+        for (lowest, udc_v) in [(FULL_SHARE, 1_000.0), (FULL_SHARE, 1_500.0), (0.95, 1_000.0)] {
+            let ratings = Ratings { dc_link_min_v: lowest * nominal_v, ..BUILT_IN.ratings };
+            assert_eq!(motoring_share(udc_v, &ratings), 1.0, "{lowest} {udc_v}");
         }
     }
 }

@@ -71,3 +71,40 @@ impl Ramp {
         self.torque_nm
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const RATES: Rates = Rates { step_s: 1e-3, slew_nm_s: 9_880.0, jerk_nm_s2: 197_600.0 };
+    /// Change of the rate in a step, and what a step at that rate adds.
+    const CHANGE_NM_S: f32 = RATES.jerk_nm_s2 * RATES.step_s;
+    const STEP_NM: f32 = CHANGE_NM_S * RATES.step_s;
+
+    /// A step towards 100 N·m from so far below it, at a rate; both in changes of the rate. Returns the torque and the rate after it.
+    fn stepped(below: f32, rate: f32) -> (f32, f32) {
+        let mut ramp = Ramp { torque_nm: 100.0 - below * STEP_NM, rate_nm_s: rate * CHANGE_NM_S };
+        let torque_nm = ramp.step(100.0, &RATES);
+        assert_eq!(torque_nm, ramp.torque_nm());
+        (torque_nm, ramp.rate_nm_s / CHANGE_NM_S)
+    }
+
+    /// Landing ends the rate in two steps of the jerk: the step's own rate is no larger than both, and no farther from the rate before.
+    #[test]
+    fn a_ramp_lands_where_two_steps_of_the_jerk_suffice() {
+        // On the target already; passing it; at a rate that is not quite gone.
+        for (below, rate) in
+            [(0.0, 0.0), (0.0, 1.5), (0.0, -1.5), (0.5, 2.3), (1.5, 3.0), (1.9, 3.8), (-0.5, -2.3)]
+        {
+            assert_eq!(stepped(below, rate), (100.0, 0.0), "{below} {rate}");
+        }
+        // Too quick: it passes, slows down as the jerk allows, and comes back.
+        for (below, rate) in [(0.5, 2.7), (0.0, 2.2), (2.1, 3.5), (0.5, 5.0)] {
+            let (torque_nm, after) = stepped(below, rate);
+            assert!(
+                torque_nm > 100.0 && (after - (rate - 1.0)).abs() < 1e-3,
+                "{below} {rate}: {torque_nm} {after}"
+            );
+        }
+    }
+}

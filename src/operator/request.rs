@@ -285,4 +285,11 @@ mod tests {
             assert_eq!(Feedback::from_words(words).to_words(), words);
         }
     }
+
+    #[test]
+    fn a_configuration_is_what_its_check_says() {
+        let refused = Ratings { pole_pairs: 0.0, ..crate::built_in::traction::BUILT_IN.ratings }.check();
+        assert!(refused.is_err());
+        assert_eq!([Ok(()), refused].map(Configuration::from), [Configuration::Good, Configuration::Bad]);
+    }
 }

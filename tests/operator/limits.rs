@@ -3,7 +3,7 @@
 use crate::world::{DISCHARGE_S, PRECHARGE_S, SLOT_S, World, trip};
 use tractive::built_in::traction::BUILT_IN;
 use tractive::machine::Ratings;
-use tractive::operator::{Limits, Refusal, Request, State};
+use tractive::operator::{Configuration, Limits, Line, Operator, Refusal, Request, State};
 use tractive::protection::{Fault, SafeState, Trip};
 
 const RATINGS: &Ratings = &BUILT_IN.ratings;
@@ -162,6 +162,59 @@ fn an_acknowledge_has_fifty_milliseconds() {
     assert!((value - 0.051).abs() < 1e-6, "{value}");
 }
 
+/// A drive that has forgotten its fault but not carried out the acknowledge is waited for, like one that answers nothing.
+#[test]
+fn a_fault_that_has_gone_is_left_by_its_acknowledge_alone() {
+    let mut world = World::charged();
+    world.observed.trip = Some(trip(Fault::Overcurrent));
+    world.deaf = true;
+    world.slots(100);
+    world.observed.trip = None;
+    world.edge(|request, level| request.acknowledge = level);
+    world.slots(50);
+    assert_eq!((world.state(), world.fault()), (State::Fault, Some(Fault::Overcurrent)));
+    world.slot();
+    assert_eq!((world.state(), world.fault()), (State::Fault, Some(Fault::GatesHeld)));
+}
+
+/// The gates stay on until the torque has gone, and go off in the slot after that.
+#[test]
+fn coasting_waits_for_the_torque_to_go() {
+    let mut world = World::running();
+    world.request.coast = true;
+    world.slot();
+    let mut slots = 0;
+    while world.output().status.torque_nm != 0.0 {
+        assert_eq!((world.state(), world.output().command.enable), (State::Coasting, true));
+        world.slot();
+        slots += 1;
+    }
+    assert!(slots > 50, "{slots}");
+    assert!(world.output().command.enable);
+    world.slot();
+    assert_eq!((world.state(), world.output().command.enable), (State::Coasting, false));
+}
+
+/// A link that has its voltage from elsewhere is not charged: the main contactor is open.
+#[test]
+fn a_link_with_a_voltage_is_not_charged_without_its_contactor() {
+    let mut world = World::ready();
+    world.observed.udc_v = 1_500.0;
+    assert_eq!(
+        world.edge(|request, level| request.enable = level).status.refusal,
+        Some(Refusal::LinkNotCharged)
+    );
+    assert_eq!(world.state(), State::Ready);
+}
+
+#[test]
+fn an_operator_begins_at_its_beginning() {
+    assert_eq!(
+        (Operator::default().state(), Configuration::default()),
+        (State::Init, Configuration::Unchecked)
+    );
+}
+
 #[test]
 fn a_drive_is_enabled_from_the_lowest_operating_voltage_on_and_trips_below_its_limit() {
     let lowest_v = RATINGS.dc_link_min_v;
@@ -184,27 +237,21 @@ fn a_drive_is_enabled_from_the_lowest_operating_voltage_on_and_trips_below_its_l
     }
 }
 
-/// The EMF between two lines, peak, as it is computed; and the speed of a number about it at which it is just a voltage.
-fn omega_of(emf_v: f32, compute: fn(f32) -> f32) -> f32 {
-    let about = emf_v / (3.0_f32.sqrt() * RATINGS.magnet_flux_wb);
-    let first = about.to_bits() - 64;
-    let all = (first..first + 128).map(f32::from_bits);
-    all.filter(|omega| compute(*omega) <= emf_v).fold(0.0, f32::max)
-}
-
 #[test]
 fn a_machine_that_turns_is_not_discharged_nor_stopped_beyond_its_emf() {
-    // Where the EMF is 60 V the link may be discharged still.
-    let slow = omega_of(60.0, |omega| 3.0_f32.sqrt() * omega.abs() * RATINGS.magnet_flux_wb);
+    // Where the EMF is just that of an empty link it may be discharged still.
+    let slow = 70.0_f32;
     for (omega, refusal) in [(slow, None), (-slow, None), (slow.next_up(), Some(Refusal::MachineTurning))] {
         let mut world = World::charged();
+        let empty_v = tractive::frames::SQRT_3 * slow * RATINGS.magnet_flux_wb;
+        world.settings.line = world.settings.line.map(|line| Line { empty_v, ..line });
         world.observed.omega = omega;
         assert_eq!(world.edge(|request, level| request.discharge = level).status.refusal, refusal, "{omega}");
     }
     // At 0.9 of the nominal link open gates are safe still, whatever the link is.
-    let open = omega_of(0.9 * RATINGS.dc_link_nominal_v, |omega| {
-        omega.abs() * 3.0_f32.sqrt() * RATINGS.magnet_flux_wb
-    });
+    let emf_v = |omega: f32| omega * tractive::frames::SQRT_3 * RATINGS.magnet_flux_wb;
+    let all = (1_700.0_f32.to_bits()..1_800.0_f32.to_bits()).map(f32::from_bits);
+    let open = all.filter(|omega| emf_v(*omega) <= 0.9 * RATINGS.dc_link_nominal_v).fold(0.0, f32::max);
     for (omega, source_v, state) in [
         (open, 1_500.0, State::Charged),
         (open, 1_800.0, State::Charged),
@@ -358,5 +405,11 @@ fn the_rates_are_those_of_the_ratings() {
     assert!((line.chopper_full_v - RATINGS.dc_link_max_v - 0.25 * above).abs() < 0.01);
     // Of a small machine a fifth of its lowest voltage counts as empty, not 60 V.
     let small = Ratings { dc_link_min_v: 48.0, ..*RATINGS };
-    assert!((tractive::operator::Line::rated(&small, 0.1, 0.1).empty_v - 9.6).abs() < 1e-5);
+    assert!((Line::rated(&small, 0.1, 0.1).empty_v - 9.6).abs() < 1e-5);
+    let without = line.without_chopper();
+    assert_eq!((without.chopper_from_v, without.chopper_full_v), (f32::INFINITY, f32::INFINITY));
+    assert_eq!(
+        Line { chopper_from_v: line.chopper_from_v, chopper_full_v: line.chopper_full_v, ..without },
+        line
+    );
 }

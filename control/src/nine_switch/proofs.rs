@@ -45,10 +45,10 @@ fn every_direction_has_a_gap_within_its_span() {
         for angle in angles.map(|angle| angle as u32) {
             let Direction { span, high_gap, peak, .. } = Direction::of(Angle(angle));
             // Half-sectors of 30°; the peaks are around 0°, 120° and 240°.
-            let half_sector = u64::from(angle.wrapping_add(1)) * 12 >> 32;
-            let is_peak = (half_sector + 1) / 2 & 1 == 0;
-            let is_gap = (high_gap >= 0.0) & (high_gap <= span);
-            let is_right = is_gap & (span >= 0.374_999) & (span <= 0.433_012_8) & (peak == is_peak);
+            let half_sector = (u64::from(angle.wrapping_add(1)) * 12) >> 32;
+            let is_peak = half_sector.div_ceil(2).is_multiple_of(2);
+            let is_gap = (0.0..=span).contains(&high_gap) && (0.374_999..=0.433_012_8).contains(&span);
+            let is_right = is_gap && peak == is_peak;
             wrong += u32::from(!is_right);
         }
         assert_eq!(wrong, 0);

@@ -53,10 +53,10 @@ fn course(mut modulator: Modulator, off: Angle, turns: u32) -> Vec<CarrierHalf> 
 fn is_legal(from: Mode, to: Mode, half: u32) -> bool {
     let [old, new] = [from, to].map(Mode::carriers);
     if from.is_optimal() && to.is_optimal() {
-        return half * new % old == 0;
+        return (half * new).is_multiple_of(old);
     }
-    let divisor = (1..=old).rev().find(|n| old % n == 0 && new % n == 0).unwrap_or(1);
-    half * divisor % (2 * old) == 0
+    let divisor = (1..=old).rev().find(|n| old.is_multiple_of(*n) && new.is_multiple_of(*n)).unwrap_or(1);
+    (half * divisor).is_multiple_of(2 * old)
 }
 
 /// A switch between locked modes comes once, in its place in the turn, and is announced two halves before.
@@ -178,7 +178,7 @@ fn the_first_half_is_the_nearest_one_of_the_turn() {
         let angles = (0..1_u32 << 16).map(|upper| upper << 16);
         for pulse in angles.chain(near).map(Angle) {
             let half = first_half(Mode::Async, to, 0, pulse);
-            assert!(half < turn && half % step == 0, "{to:?} {pulse:?}: {half}");
+            assert!(half < turn && half.is_multiple_of(step), "{to:?} {pulse:?}: {half}");
             let off = (boundary(half, to.carriers()) - pulse).signed().unsigned_abs();
             let most = boundary(step, to.carriers()).0 / 2 + 2;
             assert!(off <= most, "{to:?} {pulse:?}: {half}, {off} of {most}");

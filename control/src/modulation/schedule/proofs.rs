@@ -172,20 +172,10 @@ impl Case {
         rates.extend(lowered);
         rates.extend([0.0, most]);
         rates.sort_by(f32::total_cmp);
-        let mut crossings = Vec::new();
-        for span in rates.windows(2).filter(|span| span[1] <= most) {
-            let (low, high) = (sides(span[0]), sides(span[1]));
-            for (i, j) in (0..fixed.len()).flat_map(|i| (0..fixed.len()).map(move |j| (i, j))) {
-                for is_below in [|a: f32, b: f32| a < b, |a: f32, b: f32| a <= b] {
-                    if !is_below(low[i], low[j]) && is_below(high[i], high[j]) {
-                        crossings.push(first(span[1], |rate| {
-                            rate > span[0] && is_below(sides(rate)[i], sides(rate)[j])
-                        }));
-                    }
-                }
-            }
+        let spans: Vec<[f32; 2]> = rates.windows(2).map(|pair| [pair[0], pair[1]]).collect();
+        for span in spans.into_iter().filter(|[_, end]| *end <= most) {
+            rates.extend(crossings(span, fixed.len(), sides));
         }
-        rates.extend(crossings);
         cells(rates)
     }
 
@@ -232,6 +222,18 @@ impl Case {
         }
         choices.into_values().collect()
     }
+}
+
+/// The rates within a span at which one side of a border begins to be below another, or not above it.
+fn crossings([from, to]: [f32; 2], count: usize, sides: impl Fn(f32) -> Vec<f32>) -> Vec<f32> {
+    let is_below: [fn(f32, f32) -> bool; 2] = [|a, b| a < b, |a, b| a <= b];
+    let orders =
+        (0..count * count).flat_map(|pair| is_below.map(|is_below| (pair / count, pair % count, is_below)));
+    let crosses = |(i, j, is_below): (usize, usize, fn(f32, f32) -> bool)| {
+        let holds = |rate: f32| is_below(sides(rate)[i], sides(rate)[j]);
+        (!holds(from) && holds(to)).then(|| first(to, |rate| rate > from && holds(rate)))
+    };
+    orders.filter_map(crosses).collect()
 }
 
 /// The index that is counted as made of a voltage: with the room that `wanted` gives it.
