@@ -12,6 +12,7 @@ const SETTLING_STEPS: u32 = 200;
 pub struct SpeedTracker {
     angle: Angle,
     omega: f32,
+    /// Angles that were followed, until it has settled.
     steps: u32,
     natural_rad_s: f32,
     /// `true` if an angle was not followed.
@@ -48,19 +49,23 @@ impl SpeedTracker {
     /// The same where it is known already by how much the angle is off the predicted one.
     #[inline(always)]
     pub fn follow(&mut self, measured: Angle, innovation: Angle, period_s: f32) -> f32 {
-        if self.steps == 0 {
-            self.angle = measured;
-        } else if self.steps == 1 {
-            // The second sample gives the first idea of the speed, so that a turning machine is caught at once.
-            self.omega = (measured - self.angle).signed_radians() / period_s;
-            self.angle = measured;
-        } else {
-            let error = innovation.signed_radians();
-            self.omega += self.natural_rad_s * self.natural_rad_s * period_s * error;
-            self.angle =
-                measured - innovation + Angle::within_half_turn(2.0 * self.natural_rad_s * period_s * error);
+        if self.steps < SETTLING_STEPS {
+            self.steps += 1;
+            if self.steps == 1 {
+                self.angle = measured;
+                return self.omega;
+            }
+            if self.steps == 2 {
+                // The second sample gives the first idea of the speed, so that a turning machine is caught at once.
+                self.omega = (measured - self.angle).signed_radians() / period_s;
+                self.angle = measured;
+                return self.omega;
+            }
         }
-        self.steps = self.steps.saturating_add(1);
+        let error = innovation.signed_radians();
+        self.omega += self.natural_rad_s * self.natural_rad_s * period_s * error;
+        self.angle =
+            measured - innovation + Angle::within_half_turn(2.0 * self.natural_rad_s * period_s * error);
         self.omega
     }
 
