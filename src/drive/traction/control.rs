@@ -5,6 +5,7 @@ mod law;
 mod start_up;
 
 use super::applied::NO_LIMITS;
+use super::current_delay::CurrentDelay;
 use super::current_gains::CurrentGains;
 use super::current_zeros::CurrentZeros;
 use super::pulses::{Order, Pulses};
@@ -80,6 +81,7 @@ pub struct ControlTask<M = &'static Tables, L = Controller> {
     innovation_rad: f32,
     zeros: CurrentZeros,
     gains: CurrentGains,
+    delay: CurrentDelay,
     warmth: Warmth,
     diodes: DiodeWatch,
 }
@@ -122,10 +124,13 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             slots: SlotTimer::new(&settings.clock),
             lost_at: None,
             starting: Starting::new(),
-            harmonics: AngleHarmonics::new(settings.angle_late_s),
+            harmonics: AngleHarmonics::new(
+                settings.angle_late_s - settings.clock.seconds(settings.current_filter_ticks as i32),
+            ),
             innovation_rad: 0.0,
             zeros: CurrentZeros::new(),
             gains: CurrentGains::new(),
+            delay: CurrentDelay::NONE,
             warmth: Warmth::NONE,
         }
     }
@@ -222,7 +227,9 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         let (omega, lost) = self.track(angle, command.enable, port);
         let coarse = self.settings.counts_coarsely();
         let here = if coarse { self.controller.tracker().angle() } else { angle.unwrap_or(Angle::ZERO) };
-        measured.angle = here + Angle::within_half_turn(self.controller.omega() * self.settings.angle_late_s);
+        // That of the currents.
+        let ahead_s = self.settings.angle_late_s - self.delay.s;
+        measured.angle = here + Angle::within_half_turn(self.controller.omega() * ahead_s);
         let violation = self
             .armed(overdue)
             .or_else(|| self.armed(lost))
