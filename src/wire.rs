@@ -10,6 +10,7 @@ mod dual;
 
 use crate::cell::Words;
 use crate::control::{Demand, LinkWindow, MtpaStart};
+use crate::drive::traction::Drops;
 use crate::drive::{half_from_words, half_to_words};
 use crate::frames::{Abc, Angle};
 use crate::identification::Observation;
@@ -57,6 +58,12 @@ pub struct Setup {
     pub angle_late_s: f32,
     /// Step of a count of the angle, electrical, in rad; 0: none.
     pub angle_step_rad: f32,
+    /// Time constant of the current sensors that the drive knows of, in ticks, below 2¹⁶.
+    pub current_filter_ticks: u32,
+    /// Threshold of the devices that the drive knows of, in mV, below 2¹⁵.
+    pub threshold_mv: u32,
+    /// Their slope, in hundredths of a mΩ, below 2¹⁴.
+    pub slope_10uohm: u32,
     /// The operator's limits of line and acceleration; over the protocol the parameters hold.
     pub train: TrainLimits,
 }
@@ -176,12 +183,22 @@ impl Request {
     }
 }
 
+impl Setup {
+    /// The devices' drops that the drive knows of.
+    pub fn drops(&self) -> Drops {
+        Drops { threshold_v: 1e-3 * self.threshold_mv as f32, slope_ohm: 1e-5 * self.slope_10uohm as f32 }
+    }
+}
+
 /// The answer to [`Request::Hello`].
 pub fn setup_to_block(setup: Setup) -> Block {
-    let ticks = [setup.min_pulse_ticks, setup.dead_time_ticks, setup.pwm_delay_ticks];
+    let times = setup.dead_time_ticks | setup.current_filter_ticks << 16;
+    let ticks = [setup.min_pulse_ticks, times, setup.pwm_delay_ticks];
     let flags = u32::from(setup.over_protocol)
         | u32::from(setup.uncompensated) << 1
-        | u32::from(setup.behind_line_filter) << 2;
+        | u32::from(setup.behind_line_filter) << 2
+        | setup.threshold_mv << 3
+        | setup.slope_10uohm << 18;
     let more = [flags, setup.control_ticks, setup.angle_late_s.to_bits(), setup.angle_step_rad.to_bits()];
     let line = line_to_words(setup.line);
     filled(ticks.into_iter().chain(line).chain(more).chain(setup.train.to_words()))
@@ -230,15 +247,18 @@ fn told_from_words<T: Told>(words: [u32; 14]) -> Option<(Status<T>, Option<Frame
 
 /// The inverse of [`setup_to_block`].
 pub fn setup_from_block(block: &Block) -> Setup {
-    let [min_pulse_ticks, dead_time_ticks, pwm_delay_ticks, ..] = *block;
+    let [min_pulse_ticks, times, pwm_delay_ticks, ..] = *block;
     let [_, _, _, operated, precharge, discharge, flags, control_ticks, late, step, train @ .., _] = *block;
     let line = line_from_words([operated, precharge, discharge]);
     Setup {
         control_ticks,
         min_pulse_ticks,
-        dead_time_ticks,
+        dead_time_ticks: times & 0xffff,
         pwm_delay_ticks,
         line,
+        current_filter_ticks: times >> 16,
+        threshold_mv: flags >> 3 & 0x7fff,
+        slope_10uohm: flags >> 18,
         over_protocol: flags & 1 != 0,
         uncompensated: flags & 2 != 0,
         behind_line_filter: flags & 4 != 0,

@@ -188,7 +188,7 @@ fn every_scalar_of_the_traction_drive() {
     settings.check(&BUILT_IN).unwrap();
     try_tables(&BUILT_IN, |tables| settings.check(tables));
     let check = |settings: &traction::Settings| settings.check(&BUILT_IN);
-    let own = fields!(traction::Settings as traction::Settings { angle_late_s, angle_step_rad | clock, devices, gains }: f32);
+    let own = fields!(traction::Settings as traction::Settings { angle_late_s, angle_step_rad | clock, devices, gains, current_filter_ticks, drops }: f32);
     let floats = fields!(Clock as Clock { tick_s, ticks_per_s, control_s | control_ticks }: f32);
     try_all(settings, "clock.", floats, |settings| &mut settings.clock, check);
     let ticks: [Field<Clock, u32>; 1] = [("control_ticks", |clock| &mut clock.control_ticks)];
@@ -198,6 +198,11 @@ fn every_scalar_of_the_traction_drive() {
     let gains = fields!(Gains as Gains { carrier, pattern_rad_s, square_damping, observer, sixth_turn_rad, resistance_from, link_damping | }: f32);
     try_all(settings, "gains.", gains, |settings| &mut settings.gains, check);
     try_all(settings, "", own, |settings| settings, check);
+    let drops = fields!(traction::Drops as traction::Drops { threshold_v, slope_ohm | }: f32);
+    try_all(settings, "drops.", drops, |settings| &mut settings.drops, check);
+    let late: [Field<traction::Settings, u32>; 1] =
+        [("current_filter_ticks", |settings| &mut settings.current_filter_ticks)];
+    try_all(settings, "", &late, |settings| settings, check);
 }
 
 #[test]

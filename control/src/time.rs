@@ -66,7 +66,7 @@ impl Clock {
 
     /// A number of ticks, in s.
     #[inline]
-    pub fn seconds(&self, ticks: i32) -> f32 {
+    pub const fn seconds(&self, ticks: i32) -> f32 {
         ticks as f32 * self.tick_s
     }
 

@@ -18,6 +18,10 @@ const LONGEST_CARRIER: f32 = 4_000.0;
 pub const LATEST_ANGLE_S: f32 = 0.5e-3;
 /// Largest step of a counted angle, in rad: twice what counts as an angle that is lost.
 const COARSEST_STEP_RAD: f32 = 0.1;
+/// Highest threshold of devices, in V.
+const HIGHEST_THRESHOLD_V: f32 = 20.0;
+/// Largest slope, in ohm.
+const LARGEST_SLOPE_OHM: f32 = 0.15;
 
 impl traction::Settings {
     /// The check that a drive may start with these settings and this machine.
@@ -34,12 +38,20 @@ impl traction::Settings {
     /// # Errors
     /// The first scalar that makes no sense.
     pub const fn check_settings(&self) -> Result<(), Refused> {
-        let Self { clock, devices, gains, angle_late_s, angle_step_rad } = self;
+        let Self { clock, devices, gains, angle_late_s, angle_step_rad, current_filter_ticks, drops } = self;
         checked!(clock.check());
         checked!(devices.check(clock));
         checked!(within(&[
             Bound("angle_late_s", *angle_late_s, 0.0, LATEST_ANGLE_S),
             Bound("angle_step_rad", *angle_step_rad, 0.0, COARSEST_STEP_RAD),
+            Bound(
+                "current_filter_ticks",
+                *current_filter_ticks as f32,
+                0.0,
+                devices.shortest_half_ticks as f32,
+            ),
+            Bound("drops.threshold_v", drops.threshold_v, 0.0, HIGHEST_THRESHOLD_V),
+            Bound("drops.slope_ohm", drops.slope_ohm, 0.0, LARGEST_SLOPE_OHM),
         ]));
         gains.check()
     }

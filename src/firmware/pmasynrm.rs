@@ -8,7 +8,7 @@ use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use cortex_m_rt::{entry, exception, interrupt};
 use tractive::built_in::traction::{BUILT_IN, BuiltIn};
 use tractive::control::Gains;
-use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
+use tractive::drive::traction::{ControlTask, Drops, PwmTask, Settings, Shared};
 use tractive::modulation::SwitchLimits;
 use tractive::operator::{self, Line, Slot, slot_s};
 use tractive::protocol::CanEndpoint;
@@ -25,6 +25,10 @@ static BEHIND_LINE_FILTER: AtomicBool = AtomicBool::new(false);
 static ANGLE_LATE: AtomicU32 = AtomicU32::new(0);
 /// Step of a count of the angle, in rad, as bits.
 static ANGLE_STEP: AtomicU32 = AtomicU32::new(0);
+/// Time constant of the current sensors, in ticks, and threshold and slope of the devices, in V and ohm, as bits.
+static CURRENT_FILTER: AtomicU32 = AtomicU32::new(0);
+static THRESHOLD: AtomicU32 = AtomicU32::new(0);
+static SLOPE: AtomicU32 = AtomicU32::new(0);
 
 /// Highest frequency of the free carrier, in Hz.
 const MAX_CARRIER_HZ: f32 = patterns::FREE_CARRIER_SHARE * BUILT_IN.ratings.max_switching_hz;
@@ -45,6 +49,11 @@ fn settings() -> Settings {
         gains: Gains::of(UNCOMPENSATED.load(Ordering::Relaxed), BEHIND_LINE_FILTER.load(Ordering::Relaxed)),
         angle_late_s: f32::from_bits(ANGLE_LATE.load(Ordering::Relaxed)),
         angle_step_rad: f32::from_bits(ANGLE_STEP.load(Ordering::Relaxed)),
+        current_filter_ticks: CURRENT_FILTER.load(Ordering::Relaxed),
+        drops: Drops {
+            threshold_v: f32::from_bits(THRESHOLD.load(Ordering::Relaxed)),
+            slope_ohm: f32::from_bits(SLOPE.load(Ordering::Relaxed)),
+        },
     }
 }
 
@@ -59,6 +68,10 @@ fn main() -> ! {
     BEHIND_LINE_FILTER.store(setup.behind_line_filter, Ordering::Relaxed);
     ANGLE_LATE.store(setup.angle_late_s.to_bits(), Ordering::Relaxed);
     ANGLE_STEP.store(setup.angle_step_rad.to_bits(), Ordering::Relaxed);
+    CURRENT_FILTER.store(setup.current_filter_ticks, Ordering::Relaxed);
+    let Drops { threshold_v, slope_ohm } = setup.drops();
+    THRESHOLD.store(threshold_v.to_bits(), Ordering::Relaxed);
+    SLOPE.store(slope_ohm.to_bits(), Ordering::Relaxed);
     if let Err(refused) = const { BUILT_IN.check() }.and_then(|()| settings().check_settings()) {
         qemu::refuse(&refused);
     }

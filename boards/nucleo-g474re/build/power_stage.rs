@@ -50,6 +50,9 @@ struct Keys {
     precharge_s: f64,
     behind_line_filter: Option<bool>,
     angle_late_us: Option<f64>,
+    current_filter_us: Option<f64>,
+    device_threshold_v: Option<f64>,
+    device_slope_mohm: Option<f64>,
     discharge_s: f64,
     z_source: Option<ZSource>,
     absolute: Option<Absolute>,
@@ -250,6 +253,31 @@ pub fn traction(file: &Path, text: &str, machine: &Machine) -> Result<String, In
     };
     let most_us = (1e6 * (f64::from(LATEST_ANGLE_S) - stage.sensor_age_s(control_hz)?)).round();
     stage.check(&[Bound("angle_late_us", late_us, 0.0, most_us, "made up for by the speed")])?;
+    let fastest_rad_s = f64::from(ratings.max_speed_rad_s * ratings.pole_pairs);
+    let most_filter_us = (1e-3 * half_ns).min(0.3e6 / fastest_rad_s).floor();
+    stage.check(&[
+        Bound(
+            "current_filter_us",
+            stage.keys.current_filter_us.unwrap_or_default(),
+            0.0,
+            most_filter_us,
+            "0.3 rad at the machine's highest speed, up to the shortest carrier half",
+        ),
+        Bound(
+            "device_threshold_v",
+            stage.keys.device_threshold_v.unwrap_or_default(),
+            0.0,
+            20.0,
+            "of a device",
+        ),
+        Bound(
+            "device_slope_mohm",
+            stage.keys.device_slope_mohm.unwrap_or_default(),
+            0.0,
+            150.0,
+            "of a device",
+        ),
+    ])?;
     stage.check_sensors(machine, f64::from(ratings.trip_dc_over_v), "the machine's trip_dc_over_v", 1)?;
     settings.check(machine.tables).map_err(|refused| stage.refuse_start(machine, &refused))?;
     let thermal = stage.keys.thermal.as_ref().map(|keys| keys.thermal(ratings.stator_resistance_ohm));
@@ -287,6 +315,16 @@ pub fn zs9(file: &Path, text: &str, machine: &Machine) -> Result<String, InputEr
         return Err(
             stage.refuse("angle_late_us", "the control of two motors takes the angle as it is".to_owned())
         );
+    }
+    for (key, given) in [
+        ("current_filter_us", stage.keys.current_filter_us),
+        ("device_threshold_v", stage.keys.device_threshold_v),
+        ("device_slope_mohm", stage.keys.device_slope_mohm),
+    ] {
+        if given.is_some() {
+            let problem = "the control of two motors takes currents and devices as they are".to_owned();
+            return Err(stage.refuse(key, problem));
+        }
     }
     if stage.keys.thermal.is_some() {
         return Err(stage.refuse("thermal", "the ZS9 knows no temperatures".to_owned()));
@@ -563,6 +601,9 @@ impl<'a> Stage<'a> {
         let behind_line_filter = behind_line_filter == Some(true);
         let angle_late_s =
             1e-6 * self.keys.angle_late_us.unwrap_or_default() + self.sensor_age_s(control_hz)?;
+        let current_filter_s = 1e-6 * self.keys.current_filter_us.unwrap_or_default();
+        let threshold_v = self.keys.device_threshold_v.unwrap_or_default();
+        let slope_ohm = 1e-3 * self.keys.device_slope_mohm.unwrap_or_default();
         let zero = angle(self.keys.encoder_zeros_deg.first().copied().unwrap_or_default());
         Ok(format!(
             "PowerStage {{\n    control_hz: {control_hz},\n    dead_time_ns: {dead_time_ns},\n    min_pulse_ns: {min_pulse_ns},\n    \
@@ -571,7 +612,8 @@ impl<'a> Stage<'a> {
              break_current_a: {break_current_a:?},\n    encoder_counts: {encoder_counts},\n    encoder_zero: {zero},\n    \
              line: LineTimes {{ precharge_s: {precharge_s:?}, discharge_s: {discharge_s:?} }},\n    \
              behind_line_filter: {behind_line_filter},\n    \
-             angle_late_s: {angle_late_s:?},\n    thermal: {thermal:?},\n}}"
+             angle_late_s: {angle_late_s:?},\n    current_filter_s: {current_filter_s:?},\n    \
+             drops: Drops {{ threshold_v: {threshold_v:?}, slope_ohm: {slope_ohm:?} }},\n    thermal: {thermal:?},\n}}"
         ))
     }
 }

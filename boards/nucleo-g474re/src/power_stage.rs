@@ -5,7 +5,7 @@ use super::patterns;
 use super::rates;
 pub use super::rates::{CORE_HZ, cycles_to_ticks, ns_to_cycles};
 use super::start::StartError;
-use tractive::drive::traction::Settings;
+use tractive::drive::traction::{Drops, Settings};
 use tractive::frames::Angle;
 use tractive::machine::Ratings;
 use tractive::operator::LineTimes;
@@ -45,6 +45,10 @@ pub struct PowerStage {
     pub behind_line_filter: bool,
     /// Age of the angle when it is read, in s, which the drive makes up for.
     pub angle_late_s: f32,
+    /// Time constant of the current sensors' filter, in s, which the drive makes up for.
+    pub current_filter_s: f32,
+    /// What the devices take of the link's voltage, likewise.
+    pub drops: Drops,
     /// Temperature sensors, and how what they are on warms; `None`: there are none.
     pub thermal: Option<Thermal>,
 }
@@ -70,6 +74,8 @@ impl PowerStage {
             dead_time_ns,
             behind_line_filter,
             angle_late_s,
+            current_filter_s,
+            drops,
             encoder_counts,
             ..
         } = *self;
@@ -77,7 +83,8 @@ impl PowerStage {
         let settings =
             rates::settings(control_hz, min_pulse_ns, dead_time_ns, carrier_hz, behind_line_filter);
         let angle_step_rad = Settings::step_rad(encoder_counts, ratings.pole_pairs);
-        Settings { angle_late_s, angle_step_rad, ..settings }
+        let current_filter_ticks = (current_filter_s * settings.clock.ticks_per_s) as u32;
+        Settings { angle_late_s, angle_step_rad, current_filter_ticks, drops, ..settings }
     }
 
     /// The dead time for the generator, never shorter than asked for; `None` if it cannot make one.

@@ -110,6 +110,25 @@ fn every_key_is_refused_by_name_and_line() {
     }
 }
 
+#[test]
+fn a_known_filter_and_known_drops_are_made_up_for() {
+    let with = |more: &str| TRACTION.check(&format!("{more}\n{}", TRACTION.text), TRACTION.tables);
+    let constant =
+        with("current_filter_us = 10.0\ndevice_threshold_v = 1.75\ndevice_slope_mohm = 4.0").unwrap();
+    assert!(constant.contains("current_filter_s: 1e-5,"), "{constant}");
+    assert!(constant.contains("drops: Drops { threshold_v: 1.75, slope_ohm: 0.004 },"), "{constant}");
+    for (bad, told) in [
+        ("current_filter_us = 120.0", "current_filter_us: 120: must be from 0 to 119"),
+        ("device_threshold_v = 21.0", "device_threshold_v: 21: must be from 0 to 20"),
+        ("device_slope_mohm = nan", "device_slope_mohm: NaN: must be from 0 to 150"),
+    ] {
+        let said = with(bad).unwrap_err();
+        assert!(said.contains(told), "{said}");
+        let said = ZS9.check(&format!("{bad}\n{}", ZS9.text), ZS9.tables).unwrap_err();
+        assert!(said.contains("the control of two motors"), "{said}");
+    }
+}
+
 const ABSOLUTE: &str = include_str!("../power_stage_absolute.toml");
 const RESOLVER: &str = include_str!("../power_stage_resolver.toml");
 

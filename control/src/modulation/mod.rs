@@ -109,7 +109,7 @@ mod ripple;
 mod schedule;
 mod switch_limits;
 
-pub use dead_time::compensate;
+pub use dead_time::{EdgeDelay, compensate};
 pub use half::CarrierHalf;
 pub use mode::{MODE_CODES, Mode, Regulation};
 pub use modulator::Modulator;

@@ -26,15 +26,24 @@ pub(super) struct Steady {
     pub depth: f32,
 }
 
-/// The volt-seconds of the halves that ended at the newest boundary, and their time. The last half counts where its beginning was the boundary
+/// The volt-seconds of the halves that ended at the newest boundary, and their time, on a link of this voltage and of currents that are so many ticks late. The last half counts where its beginning was the boundary
 /// that was `used` last, and two of them where that was the one before.
 #[inline(always)]
-pub(super) fn passed(pulses: &Pulses, used: Option<Instant>, udc_v: f32, clock: &Clock) -> Boundary {
+pub(super) fn passed(
+    pulses: &Pulses,
+    used: Option<Instant>,
+    (udc_v, late): (f32, u32),
+    clock: &Clock,
+) -> Boundary {
     let [newest, one, two, three] = [0, 1, 2, 3].map(|boundaries| pulses.before(boundaries));
     let both = used == Some(two.at);
     let before = if both { two.at } else { one.at };
     let known = used == Some(before) && !two.is_off() && !(both && three.is_off());
-    let volt_ticks = || if both { two.volt_ticks + three.volt_ticks } else { two.volt_ticks };
+    let whole = || if both { two.volt_ticks + three.volt_ticks } else { two.volt_ticks };
+    // Seen so late: since as long before the beginning, and until as long before the end.
+    let earlier = || if both { pulses.before(4) } else { three };
+    let shifted = || whole() + earlier().last_volt_ticks(late) - two.last_volt_ticks(late);
+    let volt_ticks = || if late == 0 { whole() } else { shifted() };
     Boundary {
         volt_seconds: known.then(|| volt_ticks() * (udc_v * clock.tick_s)),
         length_s: clock.seconds(newest.at.since(before)),
@@ -99,7 +108,7 @@ pub(super) struct Wanted<'a> {
     pub before: &'a Reference,
 }
 
-/// The modulator's pulses from `now` until a command of this period can act.
+/// The modulator's pulses from `now`, the instant of the currents, until a command of this period can act.
 #[inline(always)]
 pub(super) fn committed(
     pulses: &Pulses,
@@ -108,7 +117,7 @@ pub(super) fn committed(
     settings: &Settings,
     wanted: &Wanted,
 ) -> Committed {
-    let Wanted { mode: decided, revises, between, before } = *wanted;
+    let Wanted { mode: decided, revises, between, before: command } = *wanted;
     let Settings { clock, devices, .. } = settings;
     let shortest_s = clock.seconds(devices.shortest_half_ticks as i32);
     let interval_s = match decided.carriers() {
@@ -123,13 +132,18 @@ pub(super) fn committed(
     let running = pulses.before(1);
     let elapsed = now.since(newest.at).max(0) as u32;
     let period_ticks = newest.half.period_ticks;
-    let rest = || running.volt_ticks_from(elapsed);
+    // Of currents from before the newest boundary.
+    let before = newest.at.since(now).max(0) as u32;
+    let rest = || {
+        let rest = running.volt_ticks_from(elapsed);
+        if before == 0 { rest } else { rest + pulses.before(2).last_volt_ticks(before) }
+    };
     let volt_ticks = (!newest.is_off() && !running.is_off())
         .then(|| if revises { rest() } else { rest() + newest.volt_ticks });
     let left = newest.begins.since(now).max(0) as u32 + if revises { 0 } else { period_ticks };
     let volt_seconds = volt_ticks.map(|ticks| ticks * (steady.udc_v * clock.tick_s));
     let gap = between * period_ticks;
-    let made = || before.vector_at(now.after(left + gap / 2)) * clock.seconds(gap as i32);
+    let made = || command.vector_at(now.after(left + gap / 2)) * clock.seconds(gap as i32);
     Committed {
         horizon_s: clock.seconds((left + gap) as i32),
         volt_seconds: if gap == 0 { volt_seconds } else { volt_seconds.map(|known| known + made()) },

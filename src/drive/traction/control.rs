@@ -5,6 +5,7 @@ mod law;
 mod start_up;
 
 use super::applied::NO_LIMITS;
+use super::current_delay::CurrentDelay;
 use super::current_gains::CurrentGains;
 use super::current_zeros::CurrentZeros;
 use super::pulses::{Order, Pulses};
@@ -83,6 +84,7 @@ pub struct ControlTask<M = &'static Tables, L = Controller> {
     innovation_rad: f32,
     zeros: CurrentZeros,
     gains: CurrentGains,
+    delay: CurrentDelay,
     warmth: Warmth,
     diodes: DiodeWatch,
     pulses: Pulses,
@@ -126,10 +128,13 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             slots: SlotTimer::new(&settings.clock),
             lost_at: None,
             starting: Starting::new(),
-            harmonics: AngleHarmonics::new(settings.angle_late_s),
+            harmonics: AngleHarmonics::new(
+                settings.angle_late_s - settings.clock.seconds(settings.current_filter_ticks as i32),
+            ),
             innovation_rad: 0.0,
             zeros: CurrentZeros::new(),
             gains: CurrentGains::new(),
+            delay: CurrentDelay::NONE,
             warmth: Warmth::NONE,
         }
     }
@@ -225,7 +230,9 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         let (omega, lost) = self.track(angle, command.enable, port);
         let coarse = self.settings.counts_coarsely();
         let here = if coarse { self.controller.tracker().angle() } else { angle.unwrap_or(Angle::ZERO) };
-        measured.angle = here + Angle::within_half_turn(self.controller.omega() * self.settings.angle_late_s);
+        // That of the currents.
+        let ahead_s = self.settings.angle_late_s - self.delay.s;
+        measured.angle = here + Angle::within_half_turn(self.controller.omega() * ahead_s);
         let overdue = self.pulses.newest().and_then(|newest| newest.overdue(now, &self.settings.clock));
         self.check(overdue, sample, port);
         self.check(lost, sample, port);

@@ -35,9 +35,10 @@ impl CurrentGains {
         Abc { a: shown.a * a, b: shown.b * b, c: shown.c * c }
     }
 
-    /// A control period with these currents, in A, as far as the gains are known, in a machine of this largest current, in A.
+    /// A control period with these currents, in A, as far as the gains are known, in a machine of this largest current, in A, each over what
+    /// is shown of it by this, too.
     #[inline(never)]
-    pub fn learn(&mut self, currents_a: Abc, largest_a: f32) {
+    pub fn learn(&mut self, currents_a: Abc, largest_a: f32, over_shown: f32) {
         let (current, from_a) = (currents_a.clarke(), FROM * largest_a);
         let sum_a = currents_a.a + currents_a.b + currents_a.c;
         let more = current * (RATE * sum_a / (current.squared() + from_a * from_a));
@@ -47,7 +48,7 @@ impl CurrentGains {
             beta: within(self.gains.beta + more.beta),
         };
         let Abc { a, b, c } = self.gains.abc();
-        let scale = |gain: f32| if gain.abs() > LEFT_ALONE { 1.0 - gain } else { 1.0 };
+        let scale = |gain: f32| if gain.abs() > LEFT_ALONE { over_shown * (1.0 - gain) } else { over_shown };
         self.scales = Abc { a: scale(a), b: scale(b), c: scale(c) };
     }
 }
@@ -71,7 +72,7 @@ mod tests {
             Abc { a: a * (1.0 + first) + offset_a, b: b * (1.0 + second), c: c * (1.0 + third) }
         };
         for period in 0..periods {
-            learnt.learn(learnt.without(show(period)), LARGEST_A);
+            learnt.learn(learnt.without(show(period)), LARGEST_A, 1.0);
         }
         let Abc { a, b, c } = learnt.scales;
         let [a, b, c] = [a * (1.0 + gains[0]), b * (1.0 + gains[1]), c * (1.0 + gains[2])];
@@ -92,7 +93,7 @@ mod tests {
     fn what_is_common_to_all_is_left() {
         let mut learnt = CurrentGains::new();
         let there = Abc { a: 200.0, b: -100.0, c: -100.0 };
-        (0..1_000).for_each(|_| learnt.learn(learnt.without(there), LARGEST_A));
+        (0..1_000).for_each(|_| learnt.learn(learnt.without(there), LARGEST_A, 1.0));
         assert_eq!(learnt.without(there), there);
     }
 
@@ -105,7 +106,7 @@ mod tests {
     #[test]
     fn nothing_grows_beyond_what_a_sensor_may_be_off() {
         let mut learnt = CurrentGains::new();
-        (0..10_000).for_each(|_| learnt.learn(Abc { a: 100.0, b: 0.0, c: 0.0 }, LARGEST_A));
+        (0..10_000).for_each(|_| learnt.learn(Abc { a: 100.0, b: 0.0, c: 0.0 }, LARGEST_A, 1.0));
         let Abc { a, b, c } = learnt.scales;
         assert!(a >= 0.95 && b <= 1.05 && c <= 1.05, "{a} {b} {c}");
     }

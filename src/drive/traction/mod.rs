@@ -9,6 +9,7 @@
 
 mod applied;
 mod control;
+mod current_delay;
 mod current_gains;
 mod current_zeros;
 mod pulses;
@@ -45,6 +46,29 @@ pub struct Settings {
     pub angle_late_s: f32,
     /// Step of a count of the angle, electrical, in rad; 0: it has none to speak of.
     pub angle_step_rad: f32,
+    /// Time constant of the current sensors' filter, in ticks, up to the shortest carrier half.
+    pub current_filter_ticks: u32,
+    /// The devices' drops.
+    pub drops: Drops,
+}
+
+/// What a current through a leg loses of the link's voltage, mean of IGBT and diode.
+#[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Drops {
+    /// Whatever the current is, in V; 0: nothing is made up for.
+    pub threshold_v: f32,
+    /// For each ampere, in ohm.
+    pub slope_ohm: f32,
+}
+
+impl Drops {
+    /// Ideal devices.
+    pub const NONE: Self = Self { threshold_v: 0.0, slope_ohm: 0.0 };
+
+    fn is_none(&self) -> bool {
+        self.threshold_v == 0.0
+    }
 }
 
 /// Step of a count from which the tracker's angle is nearer the rotor's than the sensor's own, in rad: half a degree.
@@ -53,7 +77,15 @@ const COARSE_RAD: f32 = 8.727e-3;
 impl Settings {
     /// Settings for a clock and the inverter's devices, with the default gains, and an angle without delay.
     pub const fn new(clock: Clock, devices: SwitchLimits) -> Self {
-        Self { clock, devices, gains: Gains::DEFAULT, angle_late_s: 0.0, angle_step_rad: 0.0 }
+        Self {
+            clock,
+            devices,
+            gains: Gains::DEFAULT,
+            angle_late_s: 0.0,
+            angle_step_rad: 0.0,
+            current_filter_ticks: 0,
+            drops: Drops::NONE,
+        }
     }
 
     /// Step of a count, electrical, in rad, of an encoder with this many counts in a turn of the shaft, at least 1.

@@ -75,6 +75,12 @@ impl Half {
         volt_ticks(self.half.on_ticks(elapsed))
     }
 
+    /// The volt-ticks of its last ticks, all of it at most, in ticks.
+    #[inline]
+    pub fn last_volt_ticks(&self, last: u32) -> AlphaBeta {
+        self.volt_ticks_from(self.half.period_ticks.saturating_sub(last))
+    }
+
     /// The PWM interrupt that should have come by `now`, where the half begins, and has not: since when, in s.
     #[inline]
     pub fn overdue(&self, now: Instant, clock: &Clock) -> Option<Violation> {

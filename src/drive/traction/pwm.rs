@@ -4,7 +4,7 @@ use super::{Settings, Shared};
 use crate::drive::messages::{Loaded, PlannedRecord};
 use crate::frames::{Abc, UNITS_PER_RADIAN};
 use crate::machine::{Machine, Tables};
-use crate::modulation::{CarrierHalf, Mode, compensate};
+use crate::modulation::{CarrierHalf, EdgeDelay, Mode, SwitchLimits, compensate};
 use crate::ports::PwmPort;
 use crate::protection::{self, DiodeWatch, Fault, MaskedFaults, OpenGates, SafeState, Trip, Violation};
 use crate::time::{Clock, Instant};
@@ -100,7 +100,7 @@ impl<M: Machine> PwmTask<M> {
         self.begins = now.after(self.period_ticks);
         self.period_ticks = half.period_ticks;
         self.pulses = half.mode != Mode::Off;
-        self.play(half, port, shared);
+        self.play(half, newest.as_ref(), port, shared);
         shared.loaded.publish(
             Loaded {
                 at: now,
@@ -117,21 +117,35 @@ impl<M: Machine> PwmTask<M> {
     /// loads the next half as it was planned anew, if its boundary is still ahead.
     #[inline(never)]
     pub fn revise(&mut self, port: &mut impl PwmPort, shared: &Shared) {
-        if let Some(half) = shared.planned.last().map(PlannedRecord)
+        let newest = shared.planned.last().map(PlannedRecord);
+        if let Some(half) = &newest
             && half.at() == self.at
             && self.trip.is_none()
         {
-            self.play(half.half(), port, shared);
+            self.play(half.half(), newest.as_ref(), port, shared);
         }
     }
 
     /// Gives the port what makes the legs do as the half says.
     #[inline(always)]
-    fn play(&mut self, mut half: CarrierHalf, port: &mut impl PwmPort, shared: &Shared) {
-        let devices = &self.settings.devices;
-        if devices.dead_time_ticks > 0 {
+    fn play(
+        &mut self,
+        mut half: CarrierHalf,
+        newest: Option<&PlannedRecord>,
+        port: &mut impl PwmPort,
+        shared: &Shared,
+    ) {
+        let Settings { devices: SwitchLimits { dead_time_ticks, .. }, drops, .. } = self.settings;
+        let dead = EdgeDelay::of_dead_time(dead_time_ticks);
+        let delay = if drops.is_none() {
+            dead
+        } else {
+            let per_v = 1.0 / self.told(newest).1;
+            dead.with_drops(drops.threshold_v * per_v, drops.slope_ohm * per_v, half.period_ticks)
+        };
+        if delay.ticks > 0.0 {
             let small_a = SMALL_CURRENT_SHARE * self.tables().ratings.max_current_a;
-            compensate(&mut half, &self.expected_currents(), small_a, devices);
+            compensate(&mut half, &self.expected_currents(), small_a, delay);
         }
         port.play(self.at, &half);
         self.check_late(port, shared);

@@ -6,7 +6,7 @@ use super::{CORE_HZ, Commands, Tasks, WORDS};
 use crate::time::Time;
 use crate::world::Edge;
 use tractive::control::{Demand, Gains, LinkWindow, Warmth};
-use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
+use tractive::drive::traction::{ControlTask, Drops, PwmTask, Settings, Shared};
 use tractive::frames::{Abc, Angle};
 use tractive::machine::{Ratings, Tables};
 use tractive::modulation::{CarrierHalf, Mode, SwitchLimits};
@@ -32,6 +32,12 @@ pub struct Stage {
     encoder_zeros_deg: [f64; 1],
     behind_line_filter: bool,
     angle_late_us: f32,
+    #[serde(default)]
+    current_filter_us: f32,
+    #[serde(default)]
+    device_threshold_v: f32,
+    #[serde(default)]
+    device_slope_mohm: f32,
 }
 
 impl Stage {
@@ -53,7 +59,16 @@ impl Stage {
         let gains = Gains::of(false, self.behind_line_filter);
         let angle_late_s = 1e-6 * self.angle_late_us;
         let angle_step_rad = Settings::step_rad(self.encoder_counts as u32, ratings.pole_pairs);
-        Settings { gains, angle_late_s, angle_step_rad, ..Settings::new(clock, devices) }
+        let current_filter_ticks = (1e-6 * self.current_filter_us * clock.ticks_per_s) as u32;
+        let drops = Drops { threshold_v: self.device_threshold_v, slope_ohm: 1e-3 * self.device_slope_mohm };
+        Settings {
+            gains,
+            angle_late_s,
+            angle_step_rad,
+            current_filter_ticks,
+            drops,
+            ..Settings::new(clock, devices)
+        }
     }
 }
 

@@ -1,6 +1,7 @@
 //! The power stage that is wired to the board: every scale and time of the ZS9's, from `power_stage_zs9.toml`.
 
 use crate::power_stage::PowerStage;
+use tractive::drive::traction::Drops;
 use tractive::frames::Angle;
 use tractive::operator::LineTimes;
 

@@ -86,6 +86,9 @@ pub struct FlawOptions {
     /// Threshold and slope of an IGBT, and of a diode.
     #[arg(long, value_name = "V,MOHM,V,MOHM", allow_negative_numbers = true)]
     pub device_drop: Option<Drops>,
+    /// The drive knows the mean threshold and slope of --device-drop, as by its power stage's key, and makes up for it.
+    #[arg(long)]
+    pub device_drop_known: bool,
 }
 
 /// The flaws of `--real`, for devices of 900 Hz on 1,500 V, 233 A: a usual IGBT inverter with a resolver.
@@ -192,15 +195,17 @@ impl FlawOptions {
         }
         let Drops([igbt_v, igbt_mohm, diode_v, diode_mohm]) = self.device_drop.unwrap_or_default();
         let most_mohm = 1e3 * link_v / parameters.max_current_a;
+        let most_mohm = if self.device_drop_known { (0.1 * most_mohm).min(150.0) } else { 0.1 * most_mohm };
+        let most_v = if self.device_drop_known { (0.1 * link_v).min(20.0) } else { 0.1 * link_v };
         within(&[
             ("--angle-1f-phase-deg", self.angle_1f_phase_deg, -360.0, 360.0),
             ("--angle-2f-phase-deg", self.angle_2f_phase_deg, -360.0, 360.0),
             ("--angle-jitter-us", self.angle_jitter_us, 0.0, 1e4),
             ("--slots", self.slots, -100.0, 100.0),
-            ("--device-drop", igbt_v, 0.0, 0.1 * link_v),
-            ("--device-drop", igbt_mohm, 0.0, 0.1 * most_mohm),
-            ("--device-drop", diode_v, 0.0, 0.1 * link_v),
-            ("--device-drop", diode_mohm, 0.0, 0.1 * most_mohm),
+            ("--device-drop", igbt_v, 0.0, most_v),
+            ("--device-drop", igbt_mohm, 0.0, most_mohm),
+            ("--device-drop", diode_v, 0.0, most_v),
+            ("--device-drop", diode_mohm, 0.0, most_mohm),
         ])
     }
 

@@ -105,6 +105,19 @@ impl TractionOptions {
     fn known_late_s(&self) -> f32 {
         if self.angle_late_known { (1e-6 * self.angle_late_us) as f32 } else { 0.0 }
     }
+
+    /// Time constant of the current sensors that the drive is told, in ticks.
+    fn known_filter_ticks(&self) -> u32 {
+        if self.current_filter_known { ticks(self.current_filter_us) } else { 0 }
+    }
+
+    /// Mean threshold and slope of the devices that the drive is told, in mV and hundredths of a mΩ.
+    fn known_drops(&self) -> (u32, u32) {
+        let drops = self.flaws.drops();
+        let steps = |igbt: f64, diode: f64, per: f64| (0.5 * per * (igbt + diode)).round() as u32;
+        let known = (steps(drops.igbt_v, drops.diode_v, 1e3), steps(drops.igbt_ohm, drops.diode_ohm, 1e5));
+        if self.flaws.device_drop_known { known } else { (0, 0) }
+    }
 }
 
 impl From<Patterns> for PatternsName {
@@ -187,6 +200,9 @@ pub struct TractionOptions {
     /// The drive knows of --angle-late-us, as by its power stage's key, and makes up for it.
     #[arg(long)]
     pub angle_late_known: bool,
+    /// The drive knows of --current-filter-us, as by its power stage's key, and makes up for it.
+    #[arg(long)]
+    pub current_filter_known: bool,
     /// The true machine, where it is not the one that control knows: a folder of tables/, or the path of any machine folder.
     #[arg(long, value_name = "DIR")]
     pub plant: Option<String>,
@@ -305,6 +321,11 @@ impl System for Traction {
         let parameters = &machine.folder.parameters;
         let (fastest_rpm, most_nm) = (3.0 * parameters.max_speed_rpm, 10.0 * parameters.max_torque_nm);
         let (udc_v, clock) = (udc_v(options, machine), clock(options, machine));
+        let shortest_half_us = 0.5e6 / parameters.max_switching_hz;
+        let fastest_rad_s =
+            parameters.max_speed_rpm * std::f64::consts::PI / 30.0 * f64::from(parameters.pole_pairs);
+        // A drive that knows the filter takes it for a delay.
+        let most_known_us = shortest_half_us.min(0.3e6 / fastest_rad_s);
         let own = |name: &str| scenario.get(name).and_then(Value::as_f64).unwrap_or(0.0);
         within(&[
             ("--dt", options.dt.unwrap_or(0.1), f64::from(clock.ticks_per_s).recip(), 0.1),
@@ -325,7 +346,12 @@ impl System for Traction {
                 0.0,
                 if options.own.angle_late_known { 500.0 } else { 1e4 },
             ),
-            ("--current-filter-us", options.own.current_filter_us, 0.0, 1e4),
+            (
+                "--current-filter-us",
+                options.own.current_filter_us,
+                0.0,
+                if options.own.current_filter_known { most_known_us } else { 1e4 },
+            ),
         ])?;
         if (options.law, PatternsName::of(&options.own, machine), options.on)
             == (LawName::Pi, PatternsName::Optimal, On::Qemu)
@@ -490,6 +516,7 @@ fn clock(options: &Options, machine: &Machine) -> Clock {
 
 fn setup(plan: &Plan, options: &Options, machine: &Machine, over_protocol: bool) -> Setup {
     let uncompensated = options.own.uncompensated;
+    let (threshold_mv, slope_10uohm) = options.own.known_drops();
     Setup {
         control_ticks: clock(options, machine).control_ticks,
         min_pulse_ticks: ticks(options.min_pulse_us(machine.folder.parameters.max_switching_hz)),
@@ -502,6 +529,9 @@ fn setup(plan: &Plan, options: &Options, machine: &Machine, over_protocol: bool)
         behind_line_filter: options.own.line.is_some() || plan.line.as_ref().is_some_and(LinePlan::has_choke),
         angle_late_s: options.own.known_late_s(),
         angle_step_rad: angle_step_rad(options, machine),
+        current_filter_ticks: options.own.known_filter_ticks(),
+        threshold_mv,
+        slope_10uohm,
         train: plan.train,
     }
 }
@@ -536,6 +566,8 @@ fn tasks<'a, L: ControlLaw>(
     let settings = Settings {
         angle_late_s: setup.angle_late_s,
         angle_step_rad: setup.angle_step_rad,
+        current_filter_ticks: setup.current_filter_ticks,
+        drops: setup.drops(),
         gains,
         ..Settings::new(clock(options, machine), devices)
     };

@@ -1,6 +1,7 @@
 //! The control law's part of a period: what the newest boundary teaches, the operating point, the command.
 
 use super::super::applied::{Steady, Wanted, committed, follows, limits, passed};
+use super::super::current_delay::CurrentDelay;
 use super::super::pulses::Half;
 use super::super::slot::Slot;
 use super::super::{Settings, Shared};
@@ -35,7 +36,8 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         // Not in the longest periods, either.
         if !commands || slot.between > 0 {
             self.warm(input.command.warmth);
-            self.gains.learn(measured.currents_a, tables.ratings.max_current_a);
+            self.gains.learn(measured.currents_a, tables.ratings.max_current_a, self.delay.scale);
+            self.delay = self.delayed();
         }
         // Once a half, and not in the longest periods unless all are.
         if slot.commands && (!aims || slot.between > 0) {
@@ -54,6 +56,12 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         if commands {
             self.command(input.sample, &here, slot);
         }
+    }
+
+    /// The delay of the current sensors at this speed.
+    fn delayed(&self) -> CurrentDelay {
+        let Settings { current_filter_ticks, clock, .. } = &self.settings;
+        CurrentDelay::of(*current_filter_ticks, self.controller.omega(), clock)
     }
 
     /// Takes the machine's warmth into account, where its temperatures are measured.
@@ -81,7 +89,8 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
     pub(super) fn learn(&mut self, sample: &Sample, angle: Angle, slot: &Slot, shared: &Shared) {
         let Settings { gains, clock, .. } = &self.settings;
         let tables = self.machine.tables();
-        let boundary = passed(&self.pulses, self.boundary, sample.udc_v * self.link_scale, clock);
+        let boundary =
+            passed(&self.pulses, self.boundary, (sample.udc_v * self.link_scale, self.delay.ticks), clock);
         if let Some(currents_a) = self.pulses.currents_a(&shared.loaded) {
             let age_s = clock.seconds(slot.now.since(self.pulses.before(0).at));
             let angle = angle - Angle::within_half_turn(self.controller.omega() * age_s);
@@ -126,7 +135,8 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
     #[inline(always)]
     pub(super) fn command(&mut self, sample: &Sample, here: &RotorSample, slot: &Slot) {
         let Settings { gains, clock, .. } = &self.settings;
-        let now = slot.now;
+        // The instant of the currents.
+        let now = slot.now.before(self.delay.ticks);
         let (omega, udc_v) = (self.controller.omega(), sample.udc_v * self.link_scale);
         let steady = Steady { omega, udc_v, voltage_v: self.steady_v, depth: self.depth };
         let (mode, revises) = (slot.key.mode, self.revises);
@@ -179,6 +189,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
     /// No pulses: the control law begins anew.
     pub(super) fn rest(&mut self, now: Instant, omega: f32, measured: &Measurements) {
         self.controller.idle();
+        self.delay = self.delayed();
         if self.exit.crosses() {
             self.controller.begin_without_torque();
         }
@@ -193,7 +204,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         self.reference = Reference {
             carrier_angle: measured.angle,
             rate: self.settings.clock.angle_rate(omega),
-            at: now,
+            at: now.before(self.delay.ticks),
             udc_v: measured.udc_v,
             depth: omega.abs() * self.machine.tables().ratings.magnet_flux_wb / six_step_v(measured.udc_v),
             ..Reference::NONE
