@@ -2,12 +2,14 @@
 //!
 //! They are the lines of the `sh` blocks in the chapters of `docs/SUMMARY.md`. A line that ends in `# exits with N` has to; all
 //! others have to succeed. What would touch a board is given `--dry-run`: the image is built, and nobody is asked to flash it.
+//! A command that stands in several places is run at the first of them; what it prints is looked at in each.
 //! Tests are built, steps of `cargo xtask test` looked up, and what would run in QEMU runs on the host: the rest is those steps' own business.
 //!
 //! A block ```` ```text prints ```` behind a command holds lines that it has to print, in this order; `…` stands for what is left out.
 
 use crate::process::cannot_start;
 use anyhow::{Context, Result, bail};
+use std::collections::HashMap;
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::Instant;
@@ -33,12 +35,15 @@ pub fn run(root: &Path) -> Result<bool> {
     if files.is_dir() {
         std::fs::remove_dir_all(&files).with_context(|| files.display().to_string())?;
     }
-    let mut good = true;
+    let (mut good, mut outputs) = (true, HashMap::new());
     for Line { chapter, command, code, prints } in lines(root)? {
         let began = Instant::now();
-        let mut shell = Command::new("sh");
-        shell.current_dir(root).args(["-c", &command]).stdin(Stdio::null());
-        let output = shell.output().with_context(|| cannot_start(&shell))?;
+        if !outputs.contains_key(&command) {
+            let mut shell = Command::new("sh");
+            shell.current_dir(root).args(["-c", &command]).stdin(Stdio::null());
+            outputs.insert(command.clone(), shell.output().with_context(|| cannot_start(&shell))?);
+        }
+        let output = &outputs[&command];
         let said = [&output.stdout, &output.stderr].map(|said| String::from_utf8_lossy(said)).concat();
         let missing = missing(&said, &prints);
         let passed = output.status.code() == Some(code) && missing.is_none();
