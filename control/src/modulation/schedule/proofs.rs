@@ -20,7 +20,7 @@ const LINK_V: f32 = 1_500.0;
 /// Shortest pulses, in ticks: none, 10 µs, 40 µs.
 const SHORTEST: [u32; 3] = [0, 250, 1_000];
 
-/// What is no ordinary number, and the ends of those that are.
+/// Numbers that are no ordinary ones, and the ends of those that are.
 const SPECIAL: [f32; 10] = [
     f32::NAN,
     f32::NEG_INFINITY,
@@ -413,7 +413,7 @@ fn every_input_has_a_mode_to_begin_with() {
     }
 }
 
-/// What is not finite is in no mode's way: a frequency that is no number has passed no border but the free carrier's, an index that is none
+/// Numbers that are none are in no mode's way: a frequency that is no number has passed no border but the free carrier's, an index that is none
 /// has passed none.
 #[test]
 fn what_is_no_number_counts_as_the_lowest_rung() {
