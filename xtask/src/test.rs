@@ -16,13 +16,16 @@ use std::time::{Duration, Instant};
 
 /// The packages by the commands that test them. Cargo unites the features of what it is asked for at once: with all of them in one
 /// command the rig and this program would be compiled anew, since `cargo rig` and `cargo xtask` ask for one package. The boards go with the
-/// first; with the rig `tractive-control` has its optimised patterns, too.
+/// first.
 const TOGETHER: [&[&str]; 4] = [
     &["tractive", "tractive-control", "tractive-tablegen"],
-    &["tractive-rig", "tractive-control"],
+    &["tractive-rig"],
     &["xtask"],
     &["tractive-bench", "tractive-cells", "tractive-fault-injector"],
 ];
+
+/// The unit tests of the optimised patterns, which no command of [`TOGETHER`] builds in: the rig's have them in its dependencies alone.
+const OPTIMAL: &str = "test --release --package tractive-control --features optimal --lib modulation";
 
 /// The end of a step.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -96,10 +99,14 @@ fn perform(step: Step, setup: &mut Setup) -> Result<Outcome> {
             let mut command = cargo_with("doc --release --no-deps --workspace --exclude");
             succeeds(command.arg(twin::PACKAGE).env("RUSTDOCFLAGS", "-D warnings"))?
         }
-        Step::Host => all(together()?, |packages| {
-            let named = packages.iter().flat_map(|package| ["--package", package.as_str()]);
-            succeeds(cargo().args(["test", "--release"]).args(named))
-        })?,
+        Step::Host => {
+            let optimal = succeeds(&mut cargo_with(OPTIMAL))?;
+            optimal
+                & all(together()?, |packages| {
+                    let named = packages.iter().flat_map(|package| ["--package", package.as_str()]);
+                    succeeds(cargo().args(["test", "--release"]).args(named))
+                })?
+        }
         Step::Loom => {
             let mut command = cargo_with("test --profile loom --package tractive-cells --test interleavings");
             succeeds(command.env("RUSTFLAGS", "--cfg loom"))?
