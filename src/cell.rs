@@ -436,7 +436,7 @@ mod tests {
         every_slot_is_kept::<32>();
     }
 
-    /// What is read from a history as it stood, so many records long, after some more have come.
+    /// The records that are read from a history as it stood, after some more have come.
     fn read<const COUNT: usize>(later: u32, from: u32) -> Option<[u32; COUNT]> {
         let trail = History::<1>::new();
         trail.published.store(from, Ordering::Relaxed);

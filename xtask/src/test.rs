@@ -32,9 +32,9 @@ const TOGETHER: [&[&str]; 4] = [
     &[OWN],
 ];
 
-/// The control crate once more, with its optimised patterns.
+/// The unit tests of the optimised patterns, which no other command builds in: the rig has them in its dependencies alone.
 const CONTROL: &str = "tractive-control";
-const CONTROL_PARTS: [&[&str]; 1] = [&["--lib", "--features", "optimal"]];
+const CONTROL_PARTS: [&[&str]; 1] = [&["--lib", "--features", "optimal", "modulation"]];
 
 /// The rig, and the parts that it is tested in. Its own unit tests take a second, but all of it compiled once more: that is done without
 /// optimisation. The others take the library that `cargo rig` runs.

@@ -157,7 +157,7 @@ fn every_duty_is_shorted_beside_a_zero_vector_and_no_edge_passes_another() {
     });
 }
 
-/// Where the boundary slides. With `r` the room of a share, `r ≤ 1/4 − D/4 − spare`, the active times add up to no more than 2 r and the roundings
+/// Roundings where the boundary slides. With `r` the room of a share, `r ≤ 1/4 − D/4 − spare`, the active times add up to no more than 2 r and the roundings
 /// of `room / span * span` (2⁻²³ of it, 2⁻²⁴ in all) and of `2 r − m span` (2⁻²⁶). Half of that, the roundings of the boundary (2⁻²⁷ and 2⁻²⁶),
 /// of the last step (2⁻²⁶) and of the room itself (2⁻²⁷) must be less than what is spared.
 #[test]

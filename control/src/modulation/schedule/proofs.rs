@@ -20,7 +20,7 @@ const LINK_V: f32 = 1_500.0;
 /// Shortest pulses, in ticks: none, 10 µs, 40 µs.
 const SHORTEST: [u32; 3] = [0, 250, 1_000];
 
-/// What is no ordinary number, and the ends of those that are.
+/// Numbers that are no ordinary ones, and the ends of those that are.
 const SPECIAL: [f32; 10] = [
     f32::NAN,
     f32::NEG_INFINITY,
@@ -413,7 +413,7 @@ fn every_input_has_a_mode_to_begin_with() {
     }
 }
 
-/// What is not finite is in no mode's way: a frequency that is no number has passed no border but the free carrier's, an index that is none
+/// Numbers that are none are in no mode's way: a frequency that is no number has passed no border but the free carrier's, an index that is none
 /// has passed none.
 #[test]
 fn what_is_no_number_counts_as_the_lowest_rung() {
@@ -435,4 +435,41 @@ fn what_is_no_number_counts_as_the_lowest_rung() {
             }
         }
     }
+}
+
+/// The largest fundamental of a mode: what notches of the shortest pulse leave of it, `1 − Σ sin(β/2)`, and for the others what their rows say.
+#[test]
+fn the_shortest_pulse_takes_its_part_of_the_fundamental() {
+    for (hz, min_pulse_ticks) in [(50.0, 250), (-120.0, 250), (200.0, 250), (300.0, 1_000), (300.0, 0)] {
+        let devices = SwitchLimits::new(min_pulse_ticks, 0, 900.0, &CLOCK);
+        let rate = (hz * 4_294_967_296.0 / 25e6) as f32;
+        let half_notch = (core::f64::consts::PI * f64::abs(hz) * f64::from(min_pulse_ticks) / 25e6).sin();
+        for (mode, sum) in [(Mode::Mid7, 5.758_77), (Mode::Mid5, 3.863_703), (Mode::Mid3, 2.0)] {
+            let off = f64::from(depth_limit(mode, rate, &devices)) - (1.0 - sum * half_notch);
+            assert!(off.abs() < 2e-6, "{mode:?} {hz} Hz, {min_pulse_ticks}: {off}");
+        }
+        assert_eq!(depth_limit(Mode::Square, rate, &devices), 1.0);
+        for carrier in [Mode::Async, Mode::Sync15, Mode::Sync12] {
+            assert_eq!(depth_limit(carrier, rate, &devices), 0.906_899_7);
+        }
+    }
+}
+
+/// At its smallest index an optimised pattern is kept for its dwell time still, at the next number below it is not.
+#[cfg(feature = "optimal")]
+#[test]
+fn an_optimised_pattern_is_kept_down_to_its_smallest_index() {
+    let (case, mut exactly) = (Case::new(Ladder::OPTIMAL, SHORTEST[1]), 0);
+    for (mode, branch) in Mode::ALL.into_iter().filter_map(|mode| Some((mode, mode.branch()?))) {
+        let least_v = first(f32::MAX, |volts| made(volts) >= branch.first);
+        for (voltage_v, wanted) in [(least_v, mode), (least_v.next_down(), Mode::Async)] {
+            // So slow that it is the free carrier's turn.
+            let seen = Reference { voltage_v, depth: 0.9, udc_v: LINK_V, ..Reference::NONE };
+            let mut schedule = case.schedule();
+            schedule.switched(Instant(0));
+            assert_eq!(schedule.wanted(Instant(1), mode, &seen, &case.devices), wanted, "{mode:?}");
+        }
+        exactly += u32::from(made(least_v) == branch.first);
+    }
+    assert!(exactly > 0, "no voltage makes just a smallest index");
 }
