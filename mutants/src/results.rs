@@ -115,6 +115,13 @@ pub struct Count {
 }
 
 impl Count {
+    /// Mutants that tests notice or that are known, and all that were tried.
+    pub fn noticed(&self) -> [usize; 2] {
+        let tests =
+            [Outcome::Killed, Outcome::Late].iter().filter_map(|outcome| self.of.get(outcome)).sum::<usize>();
+        [tests + self.known, self.of.values().sum()]
+    }
+
     /// The share of what was tried that was noticed by a test; and by a test or in bytes; in percent.
     pub fn shares(&self) -> (f64, f64) {
         let count =
