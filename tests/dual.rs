@@ -560,7 +560,7 @@ fn wander(sample: &mut DualSample, command: &mut DualDriveCommand) {
     *command = held;
 }
 
-/// What changes a pulse or a word of the report, changes `tests/pinned/zs9.txt`: as in `tests/pinned.rs`.
+/// A change of any pulse or word of the report changes `tests/pinned/zs9.txt`: as in `tests/pinned.rs`.
 #[test]
 fn every_pulse_and_every_report_is_as_it_was() {
     let mut drive = Drive::pulsing();

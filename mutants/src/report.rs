@@ -1,4 +1,4 @@
-//! What came of the mutants, area by area.
+//! The report: results area by area.
 
 use crate::areas::Area;
 use crate::results::{Count, KnownList, Outcome, Results};

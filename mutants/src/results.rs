@@ -1,4 +1,4 @@
-//! What came of each mutant, in a file that grows by a line each; a later line of the same mutant wins.
+//! Results of mutants, in a file that grows by a line each; a later line of the same mutant wins.
 
 use crate::tree::Mutant;
 use anyhow::{Context, Result, bail};
@@ -53,7 +53,7 @@ impl Results {
         Ok(Self { path: path.to_owned(), file: Mutex::new(file), lines })
     }
 
-    /// What came of it, of the same source.
+    /// The result of a mutant, of the same source.
     pub fn of(&self, mutant: &Mutant) -> Option<&Line> {
         self.lines.get(&mutant.name()).filter(|line| line.source == mutant.hash)
     }

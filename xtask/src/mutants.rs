@@ -14,7 +14,7 @@ pub fn run(words: &[impl AsRef<OsStr>]) -> Result<u8> {
     Ok(status.code().and_then(|code| code.try_into().ok()).unwrap_or(1))
 }
 
-/// Whether of the sample enough is noticed.
+/// `true` if enough of the sample is noticed.
 pub fn check() -> Result<bool> {
     Ok(run(&SAMPLE.split(' ').collect::<Vec<_>>())? == 0)
 }
