@@ -1,5 +1,10 @@
 //! The ZS9's two tasks by themselves: faults, words, and what they play when the measurements make no sense.
 
+#[path = "pinned/file.rs"]
+mod file;
+
+use std::cell::Cell;
+use std::fmt::Write;
 use tractive::built_in::zs9::BUILT_IN;
 use tractive::cell::Words;
 use tractive::control::Demand;
@@ -508,4 +513,71 @@ fn the_flight_recorder_keeps_what_led_to_a_fault() {
     assert!(!faulty.state.pulsing && faulty.duty == 0.0);
     assert_eq!(before.link_v(), 667.0);
     assert!(before.torque_nm.iter().all(|torque_nm| (torque_nm - 50.0).abs() < 1.0), "{before:?}");
+}
+
+thread_local! {
+    static WANDERING: Cell<u64> = const { Cell::new(1) };
+}
+
+/// A number below so many, the next of a sequence.
+fn wandered(below: u32) -> u32 {
+    let next =
+        WANDERING.get().wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+    WANDERING.set(next);
+    ((next >> 33) % u64::from(below)) as u32
+}
+
+/// Between -1 and 1, in 2,001 steps.
+fn wandered_share() -> f32 {
+    wandered(2_001) as f32 / 1_000.0 - 1.0
+}
+
+/// Noise on whatever is sampled, and a command that is another one every hundred periods, thirteen periods after the first.
+fn wander(sample: &mut DualSample, command: &mut DualDriveCommand) {
+    thread_local! {
+        static HELD: Cell<(u32, DualDriveCommand)> = const { Cell::new((0, DualDriveCommand::NONE)) };
+    }
+    for current in &mut sample.currents_a {
+        let off = Dq { d: 3.0 * wandered_share(), q: 3.0 * wandered_share() };
+        let off = off.unpark(Angle(wandered(u32::MAX)).sin_cos()).abc();
+        (current.a, current.b, current.c) = (current.a + off.a, current.b + off.b, current.c + off.c);
+    }
+    sample.capacitor_v += 15.0 * wandered_share();
+    sample.inductor_a += 5.0 * wandered_share();
+    sample.source_v += 5.0 * wandered_share();
+    let (periods, mut held) = HELD.get();
+    if periods % 100 == 0 {
+        held = *command;
+        held.demands = [0, 1].map(|_| match wandered(2) {
+            0 => MotorDemand::Torque(Demand { torque_nm: 80.0 * wandered_share(), slew_limited: true }),
+            _ => MotorDemand::Speed(150.0 * wandered_share()),
+        });
+        held.scheme = Scheme::from_code(wandered(7));
+        held.link_ref_v = 600.0 + 80.0 * wandered_share();
+        held.speed_torque_nm = [0, 1].map(|_| 60.0 + 40.0 * wandered_share());
+    }
+    HELD.set((periods + 1, held));
+    *command = held;
+}
+
+/// A change of any pulse or word of the report changes `tests/pinned/zs9.txt`: as in `tests/pinned.rs`.
+#[test]
+fn every_pulse_and_every_report_is_as_it_was() {
+    let mut drive = Drive::pulsing();
+    drive.fake.spoil = wander;
+    let (mut out, mut sum) = (String::new(), file::BASIS);
+    for period in 0..3_000 {
+        drive.run(1);
+        let words = drive.fake.report.to_words();
+        sum = words.iter().fold(sum, |sum, word| file::hash(sum, &word.to_le_bytes()));
+        for gate in &drive.fake.next.gates {
+            let halves = [gate.off_from, gate.off_to].map(|step| step.to_le_bytes());
+            sum = halves.iter().fold(sum, |sum, bytes| file::hash(sum, bytes));
+        }
+        if period % 100 == 99 {
+            writeln!(out, "period {period}: {sum:016x}, trip {:?}", drive.fake.report.trip).unwrap();
+        }
+    }
+    assert_eq!(drive.fake.report.trip, None, "{out}");
+    file::holds("zs9", &out);
 }

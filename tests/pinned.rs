@@ -1,15 +1,23 @@
-//! Outputs of both control laws pinned, bit for bit, over random walks of every input: what changes a law changes a line of
-//! `tests/pinned/laws.txt`. Whoever means to change it writes the file anew, `TRACTIVE_PINNED=write`, and says what the change buys.
+//! Outputs of both control laws, over random walks of every input, and of the drive through all its modes, pinned bit for bit: what changes
+//! one changes a line of a file in `tests/pinned/`. Whoever means to change it writes the file anew, `TRACTIVE_PINNED=write`, and says what the change buys.
 
+#[path = "pinned/file.rs"]
+mod file;
+
+use file::{BASIS, hash, holds};
 use std::fmt::Write;
-use std::path::Path;
 use tractive::built_in::traction::BUILT_IN;
+use tractive::cell::Words;
 use tractive::control::{
     AimInput, Boundary, Committed, ControlLaw, Controller, Demand, Gains, Law, LinkDamper, LinkWindow,
     ModeLimits, PiLaw, Regulated, Ripple, RotorSample, Warmth,
 };
-use tractive::frames::{AlphaBeta, Angle, Dq};
-use tractive::time::Clock;
+use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
+use tractive::frames::{Abc, AlphaBeta, Angle, Dq};
+use tractive::modulation::{CarrierHalf, Mode, SwitchLimits};
+use tractive::ports::{ControlPort, DriveCommand, PwmPort, Report, Sample};
+use tractive::protection::SafeState;
+use tractive::time::{Clock, Instant};
 
 /// Control periods of a walk.
 const PERIODS: u32 = 4_000;
@@ -123,16 +131,14 @@ impl Walk {
     }
 }
 
-/// A hash of numbers, by their bits: FNV-1a.
-fn hash(hash: u64, numbers: &[f32]) -> u64 {
-    let bytes = numbers.iter().flat_map(|number| number.to_bits().to_le_bytes());
-    bytes.fold(hash, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x100_0000_01b3))
+/// The hash with numbers behind it, by their bits.
+fn pin(sum: u64, numbers: &[f32]) -> u64 {
+    numbers.iter().fold(sum, |sum, number| hash(sum, &number.to_bits().to_le_bytes()))
 }
 
 /// The walk of a law: a line each eighth of it, with the hash of all outputs until then.
 fn walk<L: ControlLaw>(mut law: L, name: &str, number: u32, out: &mut String) {
-    let (clock, mut walk, mut sum) =
-        (Clock::new(25_000_000, 2_500), Walk::new(number), 0xcbf2_9ce4_8422_2325);
+    let (clock, mut walk, mut sum) = (Clock::new(25_000_000, 2_500), Walk::new(number), BASIS);
     let gains = Gains::of(number & 2 != 0, number & 1 != 0);
     let law_of = Law { gains: &gains, clock: &clock, tables: &BUILT_IN };
     let mut damper = LinkDamper::at(1_500.0);
@@ -177,11 +183,11 @@ fn walk<L: ControlLaw>(mut law: L, name: &str, number: u32, out: &mut String) {
             let made = law.regulate(&sample, &committed, &walk.limits, &law_of);
             let target = *law.target();
             assert!(made.voltage_v.is_finite(), "{name} {number}, period {period}: {made:?}");
-            sum = hash(sum, &[made.voltage_v, made.vector.alpha, made.vector.beta, made.steady_v]);
-            sum = hash(sum, &[made.carrier.alpha, made.carrier.beta, target.torque_nm, target.depth]);
-            sum = hash(sum, &[target.current.d, target.current.q, target.flux.d, target.flux.q]);
-            sum = hash(sum, &[target.voltage_limit_v, target.region as u8 as f32, law.map_scale()]);
-            sum = hash(sum, &[law.map_error(), law.flowing_nm(), omega, passed_s]);
+            sum = pin(sum, &[made.voltage_v, made.vector.alpha, made.vector.beta, made.steady_v]);
+            sum = pin(sum, &[made.carrier.alpha, made.carrier.beta, target.torque_nm, target.depth]);
+            sum = pin(sum, &[target.current.d, target.current.q, target.flux.d, target.flux.q]);
+            sum = pin(sum, &[target.voltage_limit_v, target.region as u8 as f32, law.map_scale()]);
+            sum = pin(sum, &[law.map_error(), law.flowing_nm(), omega, passed_s]);
         }
         if (period + 1) % (PERIODS / 8) == 0 {
             writeln!(out, "{name} walk {number} period {period}: {sum:016x}").unwrap();
@@ -196,13 +202,119 @@ fn every_output_of_the_laws_is_as_it_was() {
         walk(Controller::new(), "tractive", number, &mut out);
         walk(PiLaw::new(), "pi", number, &mut out);
     }
-    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/pinned/laws.txt");
-    if std::env::var_os("TRACTIVE_PINNED").is_some_and(|word| word == "write") {
-        std::fs::write(&file, &out).unwrap();
+    holds("laws", &out);
+}
+
+/// Carrier frequency of the free pulses, shortest half and the like are those of [`SwitchLimits`]; this is the clock.
+const CLOCK: Clock = Clock::new(25_000_000, 2_500);
+
+/// Two ports between which a motor turns as a walk has it, with the currents of its demand, whatever the pulses are.
+struct Board {
+    walk: Walk,
+    now: u32,
+    shadow: CarrierHalf,
+    report: Report,
+}
+
+impl Board {
+    /// Up to this instant.
+    fn pass(&mut self, at: u32) {
+        let turns = self.walk.rpm / 60.0 * BUILT_IN.ratings.pole_pairs * (at - self.now) as f32 / 25e6;
+        self.walk.angle = self.walk.angle + Angle::from_turns(turns);
+        self.now = at;
     }
-    let pinned = std::fs::read_to_string(&file).unwrap();
-    for (now, pinned) in out.lines().zip(pinned.lines()) {
-        assert_eq!(now, pinned, "the first output that changed is in this eighth of the walk");
+
+    fn currents(&mut self) -> Abc {
+        if self.shadow.mode == Mode::Off {
+            return Abc::default();
+        }
+        let noise = [0, 1].map(|_| 4.0 * self.walk.random.next());
+        let share = self.walk.demand.torque_nm / BUILT_IN.ratings.max_torque_nm;
+        let current = Dq { d: -60.0 * share.abs() + noise[0], q: 70.0 * share + noise[1] };
+        current.unpark(self.walk.angle.sin_cos()).abc()
     }
-    assert_eq!(out.lines().count(), pinned.lines().count());
+}
+
+impl ControlPort for Board {
+    fn sample(&mut self, _now: Instant) -> Sample {
+        let (currents_a, udc_v) = (self.currents(), self.walk.udc_v);
+        Sample { currents_a, udc_v, angle: Some(self.walk.angle), may_pulse: true, hardware: None }
+    }
+
+    fn command(&mut self, _now: Instant, _operator: impl FnOnce() -> DriveCommand) -> DriveCommand {
+        DriveCommand { enable: true, demand: self.walk.demand, ..DriveCommand::NONE }
+    }
+
+    fn enter(&mut self, _safe: SafeState, _now: Instant) {}
+
+    fn overrun_ticks(&mut self, _now: Instant, _deadline_ticks: u32) -> u32 {
+        0
+    }
+
+    fn report(&mut self, _now: Instant, report: &Report) {
+        self.report = *report;
+    }
+}
+
+impl PwmPort for Board {
+    fn sample(&mut self, _now: Instant) -> Abc {
+        self.currents()
+    }
+
+    fn play(&mut self, _now: Instant, next: &CarrierHalf) {
+        self.shadow = *next;
+    }
+
+    fn enter(&mut self, _safe: SafeState, _now: Instant) {}
+}
+
+/// Up to full speed and back, torque wandering: every mode comes by.
+fn sweep(number: u32, dead_ticks: u32, out: &mut String) {
+    let settings = Settings::new(CLOCK, SwitchLimits::new(250, dead_ticks, 900.0, &CLOCK));
+    let first = SwitchLimits::new(250, dead_ticks, 900.0, &CLOCK).shortest_half_ticks;
+    let shared = Shared::new();
+    let mut control = ControlTask::new(&BUILT_IN, settings, Instant(CLOCK.control_ticks));
+    let mut pwm = PwmTask::new(&BUILT_IN, settings, Instant(first));
+    let (walk, shadow) = (Walk::new(100 + number), CarrierHalf::off(first));
+    let mut board = Board { walk, now: 0, shadow, report: Report::default() };
+    let [mut control_at, mut pwm_at] = [CLOCK.control_ticks, first];
+    let (mut sum, mut periods) = (BASIS, 0);
+    while periods < 20_000 {
+        if pwm_at <= control_at {
+            board.pass(pwm_at);
+            pwm_at += board.shadow.period_ticks;
+            pwm.run(&mut board, &shared);
+            sum = hash(sum, format!("{:?}", board.shadow).as_bytes());
+            continue;
+        }
+        board.pass(control_at);
+        control_at += CLOCK.control_ticks;
+        periods += 1;
+        let way = if periods < 10_000 { 4_500.0 } else { -4_500.0 };
+        board.walk.rpm += way * 1e-4;
+        board.walk.udc_v = (board.walk.udc_v + 2.0 * board.walk.random.next()).clamp(1_300.0, 1_700.0);
+        if periods % 500 == 0 {
+            board.walk.demand.torque_nm = board.walk.random.within(-1_000.0, 1_000.0);
+        }
+        control.run(&mut board, &shared);
+        let words = board.report.to_words();
+        sum = words.iter().fold(sum, |sum, word| hash(sum, &word.to_le_bytes()));
+        if periods % 500 == 0 {
+            let (mode, trip) = (board.shadow.mode, board.report.trip);
+            writeln!(out, "sweep {number} period {periods}: {sum:016x}, {mode:?}, trip {trip:?}").unwrap();
+        }
+    }
+    assert_eq!((board.report.trip, pwm.trip()), (None, None), "{out}");
+}
+
+#[test]
+fn every_pulse_and_every_report_of_a_sweep_is_as_it_was() {
+    let mut out = String::new();
+    for (number, dead_ticks) in [(0, 0), (1, 100)] {
+        sweep(number, dead_ticks, &mut out);
+    }
+    for mode in ["Async", "Sync", "Square"] {
+        assert!(out.contains(mode), "{mode}: {out}");
+    }
+    holds("sweep", &out);
 }

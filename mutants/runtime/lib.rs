@@ -17,7 +17,7 @@ static REACHED: [AtomicBool; COUNT] = [const { AtomicBool::new(false) }; COUNT];
 /// Mutants and one more.
 const COUNT: usize = include!("count.rs");
 
-/// Whether this mutant is in force; never while compiling.
+/// `true` if this mutant is in force; never while compiling.
 #[inline(always)]
 pub const fn is(number: u32) -> bool {
     const fn never(_: u32) -> bool {
@@ -80,7 +80,7 @@ extern "C" fn init() {
     }
 }
 
-/// What the system counted of this process and of those that it waited for.
+/// The count that the system kept of this process and of those that it waited for.
 extern "C" fn time() {
     if let Some(file) = std::env::var_os("MUTANT_TIME") {
         let stat = std::fs::read("/proc/self/stat").unwrap_or_default();

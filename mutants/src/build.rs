@@ -5,7 +5,7 @@ use crate::tree::{Tree, put};
 use anyhow::{Context, Result, bail};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
@@ -60,12 +60,13 @@ pub fn programs(
     target: &Path,
     tree: &Tree,
     packages: &[String],
+    only: &BTreeSet<u32>,
     left_out: &mut BTreeMap<u32, String>,
 ) -> Result<Vec<Program>> {
     for _ in 0..BUILDS {
         let mut schemata = BTreeMap::new();
         for source in &tree.sources {
-            let schema = source.schema(left_out);
+            let schema = source.schema(|number| only.contains(&number) && !left_out.contains_key(&number));
             put(&to.join(&source.file), schema.text.as_bytes())?;
             schemata.insert(source.file.clone(), schema);
         }

@@ -52,6 +52,10 @@ pub struct Options {
     /// Try those again that were missed
     #[arg(long)]
     again: bool,
+    /// Exit code 1 only where less than this share of what was tried is noticed by tests, or known, in percent [default: where a
+    /// survivor is not known]
+    #[arg(long, value_name = "P")]
+    least: Option<f64>,
     /// Name the mutants, and do nothing
     #[arg(long)]
     list: bool,

@@ -1,4 +1,4 @@
-//! What came of the mutants, area by area.
+//! The report: results area by area.
 
 use crate::areas::Area;
 use crate::results::{Count, KnownList, Outcome, Results};
@@ -73,5 +73,8 @@ pub fn print(places: &Places, tree: &Tree, options: &Options) -> Result<bool> {
         let list = survivors.get(area).map_or("", String::as_str);
         std::fs::write(places.work.join(format!("survivors-{}.txt", area.name())), list)?;
     }
-    Ok(survivors.values().all(String::is_empty))
+    let [noticed, tried] = counts.values().map(Count::noticed).fold([0; 2], |[a, b], [c, d]| [a + c, b + d]);
+    let share = 100.0 * noticed as f64 / tried.max(1) as f64;
+    println!("{noticed} of {tried} are noticed by tests, or known: {share:.1} %");
+    Ok(options.least.map_or(noticed == tried, |least| share >= least))
 }

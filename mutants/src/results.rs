@@ -1,4 +1,4 @@
-//! What came of each mutant, in a file that grows by a line each; a later line of the same mutant wins.
+//! Results of mutants, in a file that grows by a line each; a later line of the same mutant wins.
 
 use crate::tree::Mutant;
 use anyhow::{Context, Result, bail};
@@ -53,7 +53,7 @@ impl Results {
         Ok(Self { path: path.to_owned(), file: Mutex::new(file), lines })
     }
 
-    /// What came of it, of the same source.
+    /// The result of a mutant, of the same source.
     pub fn of(&self, mutant: &Mutant) -> Option<&Line> {
         self.lines.get(&mutant.name()).filter(|line| line.source == mutant.hash)
     }
@@ -115,6 +115,13 @@ pub struct Count {
 }
 
 impl Count {
+    /// Mutants that tests notice or that are known, and all that were tried.
+    pub fn noticed(&self) -> [usize; 2] {
+        let tests =
+            [Outcome::Killed, Outcome::Late].iter().filter_map(|outcome| self.of.get(outcome)).sum::<usize>();
+        [tests + self.known, self.of.values().sum()]
+    }
+
     /// The share of what was tried that was noticed by a test; and by a test or in bytes; in percent.
     pub fn shares(&self) -> (f64, f64) {
         let count =

@@ -64,7 +64,13 @@ pub fn run(places: &Places, tree: &Tree, options: &Options) -> Result<()> {
     tree::copy(&places.root, &copy, tree)?;
     let mut left_out = left_out(places, tree);
     let packages = build::packages(&options.tests);
-    let built = build::programs(&copy, &places.work.join("build"), tree, &packages, &mut left_out);
+    // A sample alone is sooner compiled.
+    let numbers = |mutants: Vec<&Mutant>| mutants.iter().map(|mutant| mutant.number).collect();
+    let only = numbers(match options.sample {
+        Some(_) => chosen(&tree.mutants, options),
+        None => tree.mutants.iter().collect(),
+    });
+    let built = build::programs(&copy, &places.work.join("build"), tree, &packages, &only, &mut left_out);
     keep_left_out(places, tree, &left_out)?;
     let programs = built?;
     rayon::ThreadPoolBuilder::new().num_threads(options.jobs).build_global()?;

@@ -5,7 +5,6 @@ use crate::modules;
 use crate::schema::{self, Schema};
 use crate::sites::{self, Found, Shape, Site};
 use anyhow::{Context, Result, bail};
-use std::collections::BTreeMap;
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -111,9 +110,9 @@ impl Tree {
 }
 
 impl Source {
-    /// The file with the mutants that are not left out.
-    pub fn schema(&self, left_out: &BTreeMap<u32, String>) -> Schema {
-        let kept = |number: &u32| if left_out.contains_key(number) { 0 } else { *number };
+    /// The file with the mutants that are wanted.
+    pub fn schema(&self, wanted: impl Fn(u32) -> bool) -> Schema {
+        let kept = |number: &u32| if wanted(*number) { *number } else { 0 };
         let numbers: Vec<Vec<u32>> = self.numbers.iter().map(|own| own.iter().map(kept).collect()).collect();
         schema::of(&self.text, &self.sites, &numbers)
     }

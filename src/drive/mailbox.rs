@@ -254,4 +254,101 @@ mod tests {
             assert_eq!(next_slot(done, &clock), done.after(periods * clock.control_ticks));
         }
     }
+
+    const INSTANT: Instant = Instant(0x8765_4321);
+
+    /// Both values of eight flags, in all their combinations.
+    fn flags() -> impl Iterator<Item = [bool; 8]> {
+        (0..=u8::MAX).map(|number| core::array::from_fn(|bit| number >> bit & 1 != 0))
+    }
+
+    #[test]
+    fn a_command_of_the_drive_comes_back_word_for_word() {
+        for [enable, slew_limited, a, b, c, ..] in flags() {
+            let acknowledge = u8::from(a) | u8::from(b) << 7 | u8::from(c) << 3;
+            let command = DriveCommand {
+                enable,
+                demand: Demand { torque_nm: -1.5, slew_limited },
+                window: LinkWindow {
+                    motoring_none_v: 1.0,
+                    motoring_full_v: 2.0,
+                    braking_full_v: 3.0,
+                    braking_none_v: 4.0,
+                },
+                acknowledge,
+                warmth: Warmth::from_word(if a { 0xA5C3 } else { 0x5A3C }),
+            };
+            let timed = Timed { command, from: INSTANT };
+            assert_eq!(Timed::<DriveCommand>::from_words(timed.to_words()), timed);
+            assert_eq!(timed.to_words()[FROM], INSTANT.0);
+        }
+    }
+
+    #[test]
+    fn a_command_of_the_zs9_comes_back_word_for_word() {
+        let demand = |is_speed: bool, value| match is_speed {
+            true => MotorDemand::Speed(value),
+            false => MotorDemand::Torque(Demand { torque_nm: value, slew_limited: true }),
+        };
+        for [enable, first, second, a, b, ..] in flags() {
+            for scheme in (0..8).map(Scheme::from_code) {
+                let command = DualDriveCommand {
+                    enable,
+                    demands: [demand(first, -1.0), demand(second, 2.0)],
+                    speed_torque_nm: [3.0, 4.0],
+                    link_ref_v: 5.0,
+                    scheme,
+                    acknowledge: u8::from(a) | u8::from(b) << 7,
+                };
+                let timed = Timed { command, from: INSTANT };
+                assert_eq!(Timed::<DualDriveCommand>::from_words(timed.to_words()), timed);
+            }
+        }
+    }
+
+    #[test]
+    fn an_observation_comes_back_word_for_word() {
+        for [speed_known, a, b, first, second, ..] in flags() {
+            let acknowledged = u8::from(a) | u8::from(b) << 7;
+            for code in 0..8 {
+                let [torque_nm, id_a, iq_a, voltage_v, omega] = [1.0, -2.0, 3.0, 4.0, -5.0];
+                let [map_error, udc_v, current_a, flowing_nm] = [6.0, 7.0, 8.0, 9.0];
+                let mode = crate::modulation::Mode::from_code(code);
+                let report = Report {
+                    torque_nm,
+                    id_a,
+                    iq_a,
+                    voltage_v,
+                    omega,
+                    map_error,
+                    trip: None,
+                    udc_v,
+                    current_a,
+                    flowing_nm,
+                    speed_known,
+                    acknowledged,
+                    mode,
+                };
+                let observed = Observation { at: INSTANT, report };
+                assert_eq!(Observation::<Report>::from_words(observed.to_words()), observed);
+                let report = DualReport {
+                    torque_nm: [1.0, 2.0],
+                    voltage_v: [3.0, 4.0],
+                    weakening: [first, second],
+                    duty: 5.0,
+                    inductor_ref_a: 6.0,
+                    scheme: Scheme::from_code(code),
+                    trip: None,
+                    omega: [7.0, 8.0],
+                    current_a: [9.0, 10.0],
+                    capacitor_v: 11.0,
+                    source_v: 12.0,
+                    speed_known,
+                    acknowledged,
+                };
+                let observed = Observation { at: INSTANT, report };
+                assert_eq!(Observation::<DualReport>::from_words(observed.to_words()), observed);
+            }
+        }
+    }
 }

@@ -146,3 +146,72 @@ impl MessageSet for Traction {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::built_in::traction::BUILT_IN;
+
+    fn told(report: Option<&Report>) -> (Measured, Mode) {
+        Traction::observed(report, None, &BUILT_IN.ratings)
+    }
+
+    #[test]
+    fn what_is_reported_is_told_in_its_units() {
+        let omega = 20.0 * core::f32::consts::TAU;
+        let [torque_nm, flowing_nm, udc_v, current_a] = [1.0, 2.0, 3.0, 4.0];
+        let [id_a, iq_a, voltage_v] = [5.0, 6.0, 7.0];
+        let mode = Mode::Square;
+        let known = Report { speed_known: true, omega, torque_nm, flowing_nm, ..Report::default() };
+        let report = Report { udc_v, current_a, id_a, iq_a, voltage_v, mode, ..known };
+        let (measured, told_mode) = told(Some(&report));
+        let rpm = measured.speed_rpm.unwrap();
+        assert!((rpm * BUILT_IN.ratings.pole_pairs / 1_200.0 - 1.0).abs() < 1e-5, "{rpm}");
+        assert!((measured.frequency_hz.unwrap() / 20.0 - 1.0).abs() < 1e-5);
+        let rest = Measured { speed_rpm: None, frequency_hz: None, ..measured };
+        let expected = Measured {
+            torque_nm: Some(1.0),
+            torque_estimate_nm: Some(2.0),
+            link_v: Some(3.0),
+            current_a: Some(4.0),
+            id_ref_a: Some(5.0),
+            iq_ref_a: Some(6.0),
+            voltage_v: Some(7.0),
+            ..Measured::default()
+        };
+        assert_eq!((rest, told_mode), (expected, mode));
+        let unknown = Report { speed_known: false, ..report };
+        assert_eq!(told(Some(&unknown)).0.speed_rpm, None);
+        assert_eq!(told(None), (Measured::default(), Mode::Off));
+    }
+
+    #[test]
+    fn a_command_is_at_rest_with_no_level_but_off() {
+        let mut said = Traction::SILENT;
+        let at_rest = Command { torque_nm: 5.0, off: true, ..Command::AT_REST };
+        let others = [
+            Command { enable: true, ..at_rest },
+            Command { with_torque: true, ..at_rest },
+            Command { coast: true, ..at_rest },
+            Command { charge: true, ..at_rest },
+            Command { discharge: true, ..at_rest },
+        ];
+        assert_eq!(said.take(Content::Command(at_rest)), Taken::Command { at_rest: true });
+        for command in others {
+            assert_eq!(said.take(Content::Command(command)), Taken::Command { at_rest: false });
+        }
+        assert_eq!(said.command, others[4]);
+        said.rest();
+        assert_eq!(said.command, Command::AT_REST);
+    }
+
+    #[test]
+    fn each_frame_has_its_content() {
+        let decoded = |id| Traction::decode(id, Payload::default(), Scales::USUAL);
+        assert!(matches!(decoded(COMMAND.id), Some(Content::Command(_))));
+        assert!(matches!(decoded(LIMITS.id), Some(Content::Limits(_))));
+        assert!(matches!(decoded(LINK_LIMITS.id), Some(Content::LinkLimits(_)) | None));
+        assert!(!matches!(decoded(PARAMETER_REQUEST.id), Some(Content::Command(_) | Content::Limits(_))));
+        assert_eq!(decoded(0x7FF), None);
+    }
+}

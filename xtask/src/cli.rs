@@ -3,7 +3,7 @@
 use crate::board::Board;
 use crate::build::System;
 use crate::step::Step;
-use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap::{Args, Parser, Subcommand};
 use std::ffi::OsString;
 use std::path::PathBuf;
 

@@ -21,7 +21,7 @@ pub enum Step {
     Miri,
     /// Every target of fuzz/ for a minute, guided by what it reaches
     Fuzz,
-    /// A sample of mutants of the code: a test notices each, or its reason is known
+    /// A sample of mutants of the code: tests notice enough of them
     Mutants,
     /// The lock-free cells in QEMU, interrupted on every instruction
     Cells,

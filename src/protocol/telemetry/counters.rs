@@ -99,3 +99,17 @@ impl Counts {
         (page + 1) % PAGES
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_page_comes_in_its_turn() {
+        let mut page = 0;
+        for turn in 1..=2 * PAGES {
+            page = Counts::page_after(page);
+            assert_eq!(page, turn % PAGES);
+        }
+    }
+}

@@ -169,3 +169,23 @@ impl<P: Pattern> StatusFrame<P> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_status_comes_back_with_whatever_it_says_of_commands() {
+        for (raw, listening) in [(0, Listening::Off), (1, Listening::Fresh), (2, Listening::ZeroTorque)] {
+            let mut payload = Payload::default();
+            LISTENING.put_raw(&mut payload, raw);
+            STATE.put_raw(&mut payload, STATE.not_available());
+            TAKEN.put_raw(&mut payload, 5);
+            MAIN.put_raw(&mut payload, 1);
+            let status = StatusFrame::<Mode>::decode(payload);
+            assert_eq!((status.listening, status.state, status.taken), (listening, None, 5));
+            assert_eq!((status.switches, status.refusal), ([false, true, false], None));
+            assert_eq!(StatusFrame::<Mode>::decode(status.encode()), status);
+        }
+    }
+}
