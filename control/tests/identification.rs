@@ -139,7 +139,7 @@ fn run(machine: &str, flux_scale: f64, sensors: Sensors) -> Outcome {
     let mut committed_v = AlphaBeta::default();
     let mut outcome = Outcome { peak: 0.0, turned_deg: 0.0, pulses_s: 0.0, observations: Vec::new() };
     let mut volt_seconds = None;
-    for _ in 0..12_000 {
+    for _ in 0..16_000 {
         let sample = plant.sample(noise_a, &tables);
         identification.track(plant.angle(sensors.zero_deg), &Clock { control_s: half_s as f32, ..clock });
         identification.observe(&sample, &tables);

@@ -56,6 +56,69 @@ fn the_reference_machine_with_noise_dead_time_and_a_wrong_resistance() {
     assert!((found.rotor.inertia_kg_m2 / 3.0 - 1.0).abs() < 0.01, "{}", found.rotor.inertia_kg_m2);
 }
 
+/// Devices that conduct, in proportion to a link's voltage and a machine's current: what the reference machine's have.
+fn device_drop(link_v: f64, current_a: f64) -> String {
+    let volts = link_v / 1_500.0;
+    let ohms = volts / (current_a / 233.333);
+    format!(" --device-drop {:.6},{:.6},{:.6},{:.6}", 2.0 * volts, 5.0 * ohms, 1.5 * volts, 3.0 * ohms)
+}
+
+/// Devices' thresholds beside the dead time: the bounds hold, and each is told; the slope is resistance.
+#[test]
+fn the_devices_thresholds_are_told_from_the_dead_time() {
+    let cases: Vec<_> = (1..=3).map(|seed| ("pmasynrm-180kw", FLAWS, seed)).collect();
+    let others = EVERY.into_iter().skip(1).map(|(name, flaws)| (name, flaws, 1));
+    cases.into_iter().chain(others).collect::<Vec<_>>().par_iter().for_each(|(name, flaws, seed)| {
+        let machine = Machine::load(name).unwrap();
+        let parameters = &machine.folder.parameters;
+        let (link_v, half_s) = (parameters.dc_link_nominal_v, 0.5 / parameters.max_switching_hz);
+        let drop = device_drop(link_v, parameters.max_current_a);
+        let words = format!("{flaws} --seed {seed}");
+        let [without, found] = [words.clone(), words.clone() + &drop].map(|words| outcome(&machine, &words));
+        let case = format!("{name}, seed {seed}");
+        keeps_its_place(&found);
+        assert!(
+            found.flux_rms < 0.005 && found.flux_worst < 0.012,
+            "{case}: {} {}",
+            found.flux_rms,
+            found.flux_worst
+        );
+        assert!(found.torque_worst < 0.01, "{case}: {}", found.torque_worst);
+        assert!(found.magnet_error.abs() < 0.005, "{case}: {}", found.magnet_error);
+        assert!(found.resistance_error.abs() < 0.01, "{case}: {}", found.resistance_error);
+        // Half of the time an IGBT conducts, half of it a diode.
+        let threshold_v = 1.75 * link_v / 1_500.0;
+        let dead_time_s = flaws.split(' ').nth(3).unwrap().parse::<f64>().unwrap() * 1e-6;
+        let lacking_v = 0.5 * link_v * dead_time_s / half_s;
+        for (found, threshold_v) in [(&without, 0.0), (&found, threshold_v)] {
+            let lacks = found.lacking_v.0 / (lacking_v + threshold_v);
+            assert!((lacks - 1.0).abs() < 0.03, "{case}: {:?}", found.lacking_v);
+            let [_, _, error_v] = found.fit.errors();
+            let off_v = (found.fit.threshold_v - threshold_v).abs();
+            assert!(
+                off_v < 0.4 * 1.75 * link_v / 1_500.0 + 3.0 * error_v,
+                "{case}: {}",
+                found.fit.threshold_v
+            );
+        }
+    });
+}
+
+/// The turning rotor's own flux linkages, by its voltage without resistance and inverter, are those of the pulses' map; of a map that is 2 % off they
+/// are not.
+#[test]
+fn the_turn_checks_the_map_of_the_pulses() {
+    let machine = Machine::load("pmasynrm-180kw").unwrap();
+    let found = outcome(&machine, &format!("{FLAWS} --device-drop 2,5,1.5,3"));
+    assert_eq!(found.fit.turning.len(), 2, "{:?}", found.fit.turning);
+    assert!(found.turning_flux_off < 0.01, "{}", found.turning_flux_off);
+    assert!(found.turning_torque_off < 0.005, "{}", found.turning_torque_off);
+    let largest_wb = found.fit.flux(0.0, machine.folder.parameters.max_current_a).1;
+    let mut other = found.fit.turning[0];
+    other.map = (other.map.0, 1.05 * other.map.1);
+    assert!(other.off_wb() > 0.01 * largest_wb, "{other:?}");
+}
+
 /// Charged, enabled, stopped and told by frames, which have fewer bits than the rig's own words.
 #[test]
 fn commanded_over_the_protocol_as_a_board_is() {
@@ -206,8 +269,10 @@ fn flaws_of(machine: &Machine) -> Vec<String> {
     let parameters = &machine.folder.parameters;
     let noise_a = 0.5 * parameters.max_current_a / 233.333;
     let dead_time_us = (5.0 * 900.0 / parameters.max_switching_hz / 0.04).round() * 0.04;
-    let words =
-        format!("--noise-a {noise_a:.4} --dead-time-us {dead_time_us:.2} --uncompensated --rs-error 10");
+    let drop = device_drop(parameters.dc_link_nominal_v, parameters.max_current_a);
+    let words = format!(
+        "--noise-a {noise_a:.4} --dead-time-us {dead_time_us:.2} --uncompensated --rs-error 10{drop}"
+    );
     words.split(' ').map(str::to_owned).collect()
 }
 
@@ -230,8 +295,14 @@ fn is_found_and_driven(folder: &Path) {
     let told = rig(&fixed.chain(rest).chain(flaws).collect::<Vec<_>>());
     let told: serde_json::Value = serde_json::from_str(&told).unwrap();
     let [turned_deg, peak] =
-        ["turned_deg", "peak_current_percent_of_bound"].map(|name| told[name].as_f64().unwrap());
+        ["rotor_turned_deg", "peak_current_percent_of_bound"].map(|name| told[name].as_f64().unwrap());
     assert!(turned_deg < 5.0 && peak < 110.0, "{}: {turned_deg}°, {peak} % of the bound", folder.display());
+    let peak_a = told["peak_current_a"].as_f64().unwrap();
+    assert!((100.0 * peak_a / machine.folder.parameters.max_current_a - peak).abs() < 1e-6);
+    assert!(
+        told["seconds"].as_f64().unwrap() > 0.1
+            && told.as_object().unwrap().values().all(|value| value.is_number())
+    );
     let points = worst_point_nm(&machine, folder, &out, place.path());
     let swept = worst_swept_nm(&machine, folder, &out);
     let most_nm = machine.folder.parameters.max_torque_nm;
@@ -322,9 +393,35 @@ fn machines_of_other_kinds_are_found_and_driven_with_what_was_found() {
     });
 }
 
-/// Machines as a nameplate tells them: magnets on the surface, much reluctance, 200 W at 24 V, and a car's, whose current is fast and whose
-/// iron saturates.
-const NAMEPLATES: [(&str, &str); 4] = [
+/// Machines as a nameplate tells them: magnets on the surface, much reluctance, 200 W at 24 V, a car's, whose current is fast and whose
+/// iron saturates; 30 W, one pole pair, twelve, reluctance alone at 560 V and at 48 V, and a rotor of a hundred times the usual inertia.
+const NAMEPLATES: [(&str, &str); 10] = [
+    (
+        "tiny",
+        "--pole-pairs 4 --rs 1.2 --ld 1e-3 --lq 1e-3 --psi-f 0.008 --max-current 3 --udc 24 --max-speed-rpm 5000 --max-switching-hz 20000",
+    ),
+    (
+        "one pole pair",
+        "--pole-pairs 1 --rs 0.4 --ld 0.4e-3 --lq 0.45e-3 --psi-f 0.012 --max-current 8 --udc 36 --max-speed-rpm 12000 --max-switching-hz 20000",
+    ),
+    (
+        "hub",
+        "--pole-pairs 12 --rs 0.15 --ld 0.3e-3 --lq 0.3e-3 --psi-f 0.02 --max-current 40 --udc 60 --max-speed-rpm 1000 --max-switching-hz 16000",
+    ),
+    (
+        "reluctance alone",
+        "--pole-pairs 2 --rs 0.4 --ld 12e-3 --lq 75e-3 --psi-f 0 --saturation 0.35 --max-current 45 --udc 560 --max-speed-rpm 3000 \
+         --max-switching-hz 4000",
+    ),
+    (
+        "reluctance alone at 48 V",
+        "--pole-pairs 2 --rs 0.1 --ld 0.5e-3 --lq 3e-3 --psi-f 0 --saturation 0.5 --max-current 30 --udc 48 --max-speed-rpm 3000 --max-switching-hz 16000",
+    ),
+    (
+        "heavy rotor",
+        "--pole-pairs 5 --rs 0.9 --ld 6e-3 --lq 11e-3 --psi-f 0.18 --saturation 0.7 --max-current 20 --udc 560 --max-speed-rpm 4500 \
+         --max-switching-hz 8000 --inertia 3",
+    ),
     (
         "surface",
         "--pole-pairs 4 --rs 0.3 --ld 2.5e-3 --lq 2.5e-3 --psi-f 0.15 --max-current 30 --udc 325 --max-speed-rpm 4500 --max-switching-hz 10000",

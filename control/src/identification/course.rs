@@ -39,9 +39,9 @@ pub struct Course {
     pulses: Pulses,
     /// Stator resistance, in ohm, as the staircase has shown it.
     resistance_ohm: f32,
-    /// Voltage that each leg lacks in the direction of its current, in V, likewise; and the phase current whose direction is sure, in A.
+    /// Voltage that each leg lacks in the direction of its current, in V, likewise; and one over the phase current whose direction is sure, per A.
     lacking_v: f32,
-    small_a: f32,
+    per_small_a: f32,
     /// The voltage that holds a current beside its drop in that, in V.
     held_v: Dq,
     /// Voltage and current of two steps of the staircase, summed, and how many they are.
@@ -122,8 +122,8 @@ const AWAY_RAD: f32 = 0.087;
 const TURN_SHARE: f32 = 0.25;
 const TURN_SPEED_SHARE: f32 = 0.1;
 const TURN_RAD: f32 = 0.03;
-const TURN_COMMANDS: u32 = 2_000;
-const COAST_COMMANDS: u32 = 500;
+const TURN_COMMANDS: u32 = 3_600;
+const COAST_COMMANDS: u32 = 1_800;
 
 /// Share of the way to a direct current that a command goes, and share of a half's unexplained voltage that is believed to stay.
 const LEAD: f32 = 0.4;
@@ -145,7 +145,7 @@ impl Course {
             pulses: Pulses::new(),
             resistance_ohm: 0.0,
             lacking_v: 0.0,
-            small_a: 1.0,
+            per_small_a: 1.0,
             held_v: NONE,
             shown: [NOTHING; 2],
             omega: 0.0,
@@ -172,8 +172,7 @@ impl Course {
     /// Voltage that a current takes by itself, in V, with the rotor's d axis in this direction: the resistance's, the inverter's error, and
     /// what is left of both.
     pub fn drop_v(&self, current: Dq, frame: SinCos) -> Dq {
-        let small_a = 1.0 / self.small_a;
-        let share = |phase_a: f32| limit(phase_a * small_a, -1.0, 1.0);
+        let share = |phase_a: f32| limit(phase_a * self.per_small_a, -1.0, 1.0);
         let Abc { a, b, c } = current.unpark(frame).abc();
         let signs = Abc { a: share(a), b: share(b), c: share(c) }.clarke().park(frame);
         current * self.resistance_ohm + signs * self.lacking_v + self.held_v
@@ -397,7 +396,7 @@ impl Course {
         let amperes = low.1 - high.1;
         let slope = if amperes * amperes > 0.0 { (low.0 - high.0) / amperes } else { 0.0 };
         self.resistance_ohm = limit(slope, 0.0, 1e3);
-        (self.small_a, self.held_v) = (SMALL_SHARE * bound_a, NONE);
+        (self.per_small_a, self.held_v) = (1.0 / (SMALL_SHARE * bound_a), NONE);
         // With the phases' directions alone the drop is that of one volt for each leg.
         self.lacking_v = 1.0;
         let along_d = self.drop_v(Dq { d: low.1, q: 0.0 }, self.frame).d - low.1 * self.resistance_ohm;

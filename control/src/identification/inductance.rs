@@ -15,7 +15,7 @@ const GAIN: f32 = 0.7;
 /// Weight of the coupling of both axes beside their own inductances, where a change of current does not tell them apart.
 const COUPLING_WEIGHT: f32 = 0.08;
 /// Square of the largest coupling, as a share of the product of the own inductances.
-const COUPLING: f32 = 0.3;
+const COUPLING: f32 = 0.6;
 /// Least and most of an own inductance that a half may leave of what was known before; and the least of all, of the first that was seen.
 const LEAST_SHARE: f32 = 0.4;
 const MOST_SHARE: f32 = 1.4;

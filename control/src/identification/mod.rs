@@ -19,6 +19,7 @@
 
 mod course;
 mod followed;
+mod gathered;
 mod inductance;
 mod observation;
 mod packed;
@@ -33,6 +34,7 @@ use crate::frames::{AlphaBeta, Dq, SinCos, six_step_v};
 use crate::machine::Tables;
 use crate::time::Clock;
 use course::{Course, Seen};
+use gathered::Gathered;
 use inductance::Inductance;
 
 pub use observation::{OBSERVATION_WORDS, Observation, Stage};
@@ -54,6 +56,7 @@ pub struct Identification {
     /// The current of the newest boundary in A, and the direction of the rotor's d axis there as the angle says.
     last: Option<(Dq, SinCos)>,
     told: Option<Observation>,
+    gathered: Gathered,
     /// Samples since the last operating point.
     samples: u32,
     /// The largest voltage that may be made, in V.
@@ -72,6 +75,7 @@ impl Identification {
             inductance: Inductance::UNKNOWN,
             last: None,
             told: None,
+            gathered: Gathered::NOTHING,
             samples: 0,
             limit_v: 0.0,
             udc_v: 0.0,
@@ -152,14 +156,19 @@ impl ControlLaw for Identification {
             self.inductance.at((seen.before + seen.current) * 0.5, ratings.max_current_a);
             self.course.learn(&seen, &mut self.inductance, ratings);
         }
-        self.told = Some(Observation {
+        let observation = Observation {
             stage: self.course.stage(),
             volt_seconds,
             length_s: boundary.length_s,
             current: sample.current,
             frame: sample.frame,
             udc_v: self.udc_v,
-        });
+        };
+        self.told = if observation.stage == Stage::Turn {
+            self.gathered.take(observation)
+        } else {
+            Some(observation)
+        };
     }
 
     fn aim(&mut self, input: &AimInput, _law: &Law) {

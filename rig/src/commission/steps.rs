@@ -151,7 +151,12 @@ fn identification(commission: &Commission, machine: &Machine, _record: &Record) 
     step.within("turned_by_pulses_deg", outcome.turned_deg, [0.0, 5.0]);
     step.within("largest_current_of_the_bound", outcome.peak_share, [0.0, 1.1]);
     step.find("stator_resistance_ohm", outcome.fit.resistance_ohm);
+    step.find("inverter_error_v", outcome.lacking_v.0);
     step.find("dead_time_us", 1e6 * outcome.fit.dead_time_s);
+    step.find("threshold_v", outcome.fit.threshold_v);
+    if outcome.turning_flux_off.is_finite() {
+        step.find("turning_flux_off_percent", 100.0 * outcome.turning_flux_off);
+    }
     step.find("magnet_flux_wb", outcome.fit.flux(0.0, 0.0).0);
     step.find("rotor_inertia_kg_m2", outcome.rotor.inertia_kg_m2);
     step.find("friction_nm", outcome.rotor.friction_nm);

@@ -5,22 +5,16 @@
 //! voltage error. What was before each part of the experiment is a constant of that part, and so each part counts from its mean.
 
 use super::basis::Basis;
+use super::check::{Turning, turning};
 use super::corrected::turned_by;
+use super::equations::{BESIDE, Equations, Scope, Spread, by_boundary};
 use super::half::{Half, add};
 use anyhow::{Result, ensure};
-use nalgebra::{DMatrix, DVector};
 use tractive::identification::{Observation, Stage};
 use tractive_tablegen::FluxMap;
 
-/// Boundaries in a part that counts from its own mean.
-const PART: usize = 100;
-/// Edges of an unsure sign after which a part ends: what they may have left out is no longer carried on.
-const UNSURE_EDGES: f64 = 1.0;
-/// Shortest part.
-const LEAST_PART: usize = 4;
 /// Weight of the flux linkage's curvature beside a sample's residual, in squares of the bound: how smooth a machine is.
 const SMOOTHNESS: f64 = 4e-4;
-const GRID: (u32, u32) = (26, 18);
 /// Phase current, as a share of the bound, whose sign is not sure.
 const SMALL_SHARE: f64 = 0.006;
 /// Rounds in which ripple, inductances and the angle's zero find each other: at least, at most, and the change of the zero, in rad, below
@@ -38,28 +32,45 @@ pub struct Fit {
     terms: Vec<f64>,
     /// Stator resistance, in ohm.
     pub resistance_ohm: f64,
-    /// The dead time that explains the inverter's voltage error, thresholds included, in s.
+    /// The dead time, in s: what the inverter's voltage lacks at the edges of its pulses.
     pub dead_time_s: f64,
+    /// The devices' threshold, in V: what it lacks meanwhile, against each phase's current. Its slope is part of the resistance.
+    pub threshold_v: f64,
     /// The angle by which the d axis lies ahead of where the observations say that it is, electrical, in rad.
     pub zero_rad: f64,
     /// The unexplained part of each boundary's flux linkage, by its stage, in Wb: along d and along q.
     pub residuals: Vec<(Stage, [f64; 2])>,
+    /// The flux linkages' own terms as the pulses at standstill alone show them, but for the magnets', which is this fit's.
+    still: Vec<f64>,
+    /// Flux linkages of the turning rotor beside those.
+    pub turning: Vec<Turning>,
+    spread: Spread,
 }
 
 /// A boundary, and what has acted until then, stationary frame.
-struct Boundary {
-    stage: Stage,
-    current: (f64, f64),
-    frame: (f64, f64),
-    volt_seconds: [f64; 2],
-    charge: [f64; 2],
-    lacking: [f64; 2],
+pub struct Boundary {
+    /// The part of the experiment.
+    pub stage: Stage,
+    /// Current along d and q, in A.
+    pub current: (f64, f64),
+    /// Sine and cosine of the d axis.
+    pub frame: (f64, f64),
+    /// Volt-seconds that the modulator made, in V·s.
+    pub volt_seconds: [f64; 2],
+    /// `∫i dt`, in A·s.
+    pub charge: [f64; 2],
+    /// Volt-seconds that a dead time of one second takes away, in V.
+    pub lacking: [f64; 2],
+    /// Volt-seconds that a threshold of one volt takes away, in s.
+    pub opposed: [f64; 2],
     /// Edges so far whose sign was not sure.
-    unsure: f64,
+    pub unsure: f64,
+    /// Time so far, in s.
+    pub passed_s: f64,
 }
 
 /// Turned from the rotor's frame to the stationary one.
-fn turned((sin, cos): (f64, f64), [d, q]: [f64; 2]) -> [f64; 2] {
+pub fn turned((sin, cos): (f64, f64), [d, q]: [f64; 2]) -> [f64; 2] {
     [d * cos - q * sin, d * sin + q * cos]
 }
 
@@ -77,9 +88,9 @@ impl Experiment<'_> {
     /// The boundaries in the frame that a fit has found; its inductances make the ripple.
     fn boundaries(&self, known: Option<&Fit>) -> Vec<Boundary> {
         let per_flux = |current| known.map_or([[0.0; 2]; 2], |fit| fit.per_flux(current));
-        let mut sums = [[0.0; 2]; 3];
+        let mut sums = [[0.0; 2]; 4];
         let mut before: Option<([f64; 2], (f64, f64))> = None;
-        let (mut halves, mut unsure) = (0, 0.0);
+        let (mut halves, mut unsure, mut passed_s) = (0, 0.0, 0.0);
         let step = |observation: &Observation| {
             let current = (f64::from(observation.current.d), f64::from(observation.current.q));
             let frame = (f64::from(observation.frame.sin), f64::from(observation.frame.cos));
@@ -112,114 +123,16 @@ impl Experiment<'_> {
                 unsure += inside.unsure;
                 sums[1] = add(sums[1], inside.charge, 1.0);
                 sums[2] = add(sums[2], inside.lacking, 1.0);
+                sums[3] = add(sums[3], inside.opposed, 1.0);
                 from = to;
             }
             sums[0] = add(sums[0], acted, 1.0);
-            let [volt_seconds, charge, lacking] = sums;
-            Boundary { stage: observation.stage, current, frame, volt_seconds, charge, lacking, unsure }
+            passed_s += length_s;
+            let [volt_seconds, charge, lacking, opposed] = sums;
+            let stage = observation.stage;
+            Boundary { stage, current, frame, volt_seconds, charge, lacking, opposed, unsure, passed_s }
         };
         turned_by(self.observations, known.map_or(0.0, |fit| fit.zero_rad)).iter().map(step).collect()
-    }
-}
-
-/// The parts that count from their own mean: without what lies at no current, where no edge's sign is sure.
-fn parts(all: &[Boundary]) -> Vec<&[Boundary]> {
-    let used = |boundary: &Boundary| !matches!(boundary.stage, Stage::Probe | Stage::Rest | Stage::Done);
-    let (mut parts, mut from) = (Vec::new(), 0);
-    for (k, boundary) in all.iter().enumerate() {
-        let unsure = boundary.unsure - all[from].unsure > UNSURE_EDGES;
-        if !used(boundary) || k - from >= PART || unsure {
-            parts.push(&all[from..k]);
-            from = if used(boundary) { k } else { k + 1 };
-        }
-    }
-    parts.push(&all[from.min(all.len())..]);
-    parts.retain(|part| part.len() >= LEAST_PART);
-    parts
-}
-
-/// Rows of equations: unknowns' coefficients, and what they are to give.
-struct Equations {
-    unknowns: usize,
-    rows: Vec<f64>,
-    right: Vec<f64>,
-}
-
-impl Equations {
-    /// The two rows of each boundary, every part's from its mean. With a fit that is known the last unknown is a turn of the frame.
-    fn of(boundaries: &[Boundary], basis: &Basis, known: Option<&Fit>) -> Self {
-        let unknowns = basis.len() + 2 + usize::from(known.is_some());
-        let mut equations = Self { unknowns, rows: Vec::new(), right: Vec::new() };
-        for part in parts(boundaries) {
-            let mut own: [Vec<Vec<f64>>; 2] = [Vec::new(), Vec::new()];
-            for boundary in part {
-                let [along_d, along_q] = basis.flux(boundary.current);
-                let mut pair = [Vec::with_capacity(unknowns + 1), Vec::with_capacity(unknowns + 1)];
-                for (d, q) in along_d.iter().zip(&along_q) {
-                    let flux = turned(boundary.frame, [*d, *q]);
-                    pair[0].push(flux[0]);
-                    pair[1].push(flux[1]);
-                }
-                let turns = known.map(|fit| turned(boundary.frame, fit.turns(boundary.current)));
-                for (axis, row) in pair.into_iter().enumerate() {
-                    let mut row = row;
-                    row.extend([boundary.charge[axis], boundary.lacking[axis]]);
-                    row.extend(turns.map(|turns| turns[axis]));
-                    row.push(boundary.volt_seconds[axis]);
-                    own[axis].push(row);
-                }
-            }
-            own.into_iter().for_each(|rows| equations.add_from_mean(rows));
-        }
-        equations
-    }
-
-    fn add_from_mean(&mut self, rows: Vec<Vec<f64>>) {
-        let count = rows.len() as f64;
-        let mean: Vec<f64> =
-            (0..=self.unknowns).map(|k| rows.iter().map(|row| row[k]).sum::<f64>() / count).collect();
-        for row in rows {
-            let mut less = row.iter().zip(&mean).map(|(value, mean)| value - mean);
-            self.rows.extend(less.by_ref().take(self.unknowns));
-            self.right.extend(less);
-        }
-    }
-
-    /// The wish that flux linkages bend little, all over the rectangle: what no sample shows goes on straight.
-    fn smooth(&mut self, basis: &Basis, weight: f64) {
-        let weight = weight * (self.right.len() as f64 / 2.0 / f64::from(GRID.0 * GRID.1)).sqrt();
-        for current in basis.grid(GRID.0, GRID.1) {
-            for (orders, share) in
-                [((3, 0), 1.0), ((2, 1), 3.0_f64.sqrt()), ((1, 2), 3.0_f64.sqrt()), ((0, 3), 1.0)]
-            {
-                let bends = basis.derivative(current, orders);
-                self.rows.extend(bends.into_iter().map(|value| weight * share * value));
-                self.rows.resize(self.rows.len() + self.unknowns - basis.len(), 0.0);
-                self.right.push(0.0);
-            }
-        }
-    }
-
-    /// The solution by least squares.
-    fn solve(&self) -> Result<Vec<f64>> {
-        let matrix = DMatrix::from_row_slice(self.right.len(), self.unknowns, &self.rows);
-        // Columns of one length, so that rounding treats all alike.
-        let lengths: Vec<f64> =
-            matrix.column_iter().map(|column| column.norm().max(f64::MIN_POSITIVE)).collect();
-        let mut scaled = matrix;
-        for (mut column, length) in scaled.column_iter_mut().zip(&lengths) {
-            column /= *length;
-        }
-        let qr = scaled.qr();
-        let right = qr.q().transpose() * DVector::from_column_slice(&self.right);
-        let solution = qr.r().solve_upper_triangular(&right);
-        let solution = solution.filter(|found| found.iter().all(|value| value.is_finite()));
-        ensure!(
-            solution.is_some(),
-            "the observations do not tell the machine: the equations have no one solution"
-        );
-        let found = solution.unwrap_or_default();
-        Ok(found.iter().zip(&lengths).map(|(value, length)| value / length).collect())
     }
 }
 
@@ -236,32 +149,58 @@ impl Experiment<'_> {
                 break;
             }
         }
+        let boundaries = self.boundaries(Some(&fit));
+        fit.still = self.still(&boundaries, &fit)?;
+        fit.turning = turning(&boundaries, &fit);
         Ok(fit)
+    }
+
+    fn equations(
+        &self,
+        boundaries: &[Boundary],
+        basis: &Basis,
+        known: Option<&Fit>,
+        scope: Scope,
+    ) -> Equations {
+        let mut equations = Equations::of(boundaries, basis, known, scope);
+        equations.smooth(basis, SMOOTHNESS * self.bound_a * self.bound_a);
+        equations
     }
 
     fn solved(&self, known: Option<&Fit>) -> Result<Fit> {
         let boundaries = &self.boundaries(known);
         let basis = Basis::new(self.bound_a);
-        let mut equations = Equations::of(boundaries, &basis, known);
+        let equations = self.equations(boundaries, &basis, known, Scope::All);
         let count = self.observations.len();
-        ensure!(
-            equations.right.len() > 4 * equations.unknowns,
-            "{count} observations: too few for a flux map"
-        );
-        let samples = equations.right.len();
-        equations.smooth(&basis, SMOOTHNESS * self.bound_a * self.bound_a);
-        let mut terms = equations.solve()?;
-        let residual = |row: usize| {
-            let own = &equations.rows[row * equations.unknowns..(row + 1) * equations.unknowns];
-            equations.right[row] - own.iter().zip(&terms).map(|(a, b)| a * b).sum::<f64>()
-        };
-        let left: Vec<f64> = (0..samples).map(residual).collect();
-        let residuals = by_boundary(boundaries, &left);
-        let more_rad = if known.is_some() { terms.pop().unwrap_or(f64::NAN) } else { 0.0 };
-        let zero_rad = known.map_or(0.0, |fit| fit.zero_rad) + more_rad.clamp(-MOST_RAD, MOST_RAD);
-        let dead_time_s = terms.pop().unwrap_or(f64::NAN);
-        let resistance_ohm = terms.pop().unwrap_or(f64::NAN);
-        Ok(Fit { basis, terms, resistance_ohm, dead_time_s, zero_rad, residuals })
+        ensure!(equations.suffice(), "{count} observations: too few for a flux map");
+        let solution = equations.solve()?;
+        let residuals = by_boundary(boundaries, Scope::All, &solution.left);
+        let (mut terms, beside) = (solution.unknowns, basis.len());
+        let beside = terms.split_off(beside);
+        let unknown = |place: usize| beside.get(place).copied().unwrap_or(f64::NAN);
+        let more_rad = if known.is_some() { unknown(BESIDE) } else { 0.0 };
+        Ok(Fit {
+            basis,
+            terms,
+            resistance_ohm: unknown(0),
+            dead_time_s: unknown(1),
+            threshold_v: unknown(2),
+            zero_rad: known.map_or(0.0, |fit| fit.zero_rad) + more_rad.clamp(-MOST_RAD, MOST_RAD),
+            residuals,
+            still: Vec::new(),
+            turning: Vec::new(),
+            spread: solution.spread,
+        })
+    }
+
+    /// The terms that the pulses at standstill show: the magnets' flux linkage is no part of it, and stays what it is in the fit of all.
+    fn still(&self, boundaries: &[Boundary], fit: &Fit) -> Result<Vec<f64>> {
+        let mut equations = self.equations(boundaries, &fit.basis, Some(fit), Scope::Pulses);
+        let [along_d, _] = fit.basis.flux((0.0, 0.0));
+        equations.add(along_d, fit.flux(0.0, 0.0).0);
+        let mut terms = equations.solve()?.unknowns;
+        terms.truncate(fit.basis.len());
+        Ok(terms)
     }
 }
 
@@ -292,7 +231,7 @@ impl Fit {
     }
 
     /// The flux linkage in the observations' frame, in Wb, by which a frame that is turned by one rad makes it another.
-    fn turns(&self, (id, iq): (f64, f64)) -> [f64; 2] {
+    pub fn turns(&self, (id, iq): (f64, f64)) -> [f64; 2] {
         let ((psi_d, psi_q), [dd, dq, qq]) = (self.flux(id, iq), self.inductances((id, iq)));
         [dd * iq - dq * id - psi_q, psi_d + dq * iq - qq * id]
     }
@@ -307,11 +246,50 @@ impl Fit {
         [[qq / determinant, -dq / determinant], [-dq / determinant, dd / determinant]]
     }
 
+    /// Volt-seconds that resistance and inverter have taken until a boundary, in V·s.
+    pub fn taken(&self, boundary: &Boundary) -> [f64; 2] {
+        let charge = boundary.charge.map(|charge| self.resistance_ohm * charge);
+        add(add(charge, boundary.lacking, self.dead_time_s), boundary.opposed, self.threshold_v)
+    }
+
     /// Flux linkages along d and q at a current in A, in Wb.
     pub fn flux(&self, id_a: f64, iq_a: f64) -> (f64, f64) {
-        let [d, q] = self.basis.flux((id_a, iq_a));
-        let sum = |gives: &[f64]| gives.iter().zip(&self.terms).map(|(a, b)| a * b).sum();
+        self.flux_of(&self.terms, (id_a, iq_a))
+    }
+
+    /// The same as the pulses at standstill alone show them, with this fit's magnets.
+    pub fn flux_at_standstill(&self, id_a: f64, iq_a: f64) -> (f64, f64) {
+        self.flux_of(&self.still, (id_a, iq_a))
+    }
+
+    fn flux_of(&self, terms: &[f64], current: (f64, f64)) -> (f64, f64) {
+        let [d, q] = self.basis.flux(current);
+        let sum = |gives: &[f64]| gives.iter().zip(terms).map(|(a, b)| a * b).sum();
         (sum(&d), sum(&q))
+    }
+
+    /// Standard errors of the flux linkages along d and q at a current in A, in Wb.
+    pub fn flux_error(&self, id_a: f64, iq_a: f64) -> (f64, f64) {
+        let [d, q] = self.basis.flux((id_a, iq_a)).map(|shares| self.spread.error(&shares));
+        (d, q)
+    }
+
+    /// Standard errors of resistance, dead time and threshold, in ohm, s and V.
+    pub fn errors(&self) -> [f64; BESIDE] {
+        core::array::from_fn(|place| {
+            let mut shares = vec![0.0; self.terms.len() + BESIDE];
+            shares[self.terms.len() + place] = 1.0;
+            self.spread.error(&shares)
+        })
+    }
+
+    /// What the inverter's voltage lacks in all, in V, of a leg with this link in V and this length of a carrier half in s: dead time and threshold
+    /// together, and the standard error of the sum.
+    pub fn lacking_v(&self, udc_v: f64, half_s: f64) -> (f64, f64) {
+        let per_s = 0.5 * udc_v / half_s;
+        let mut shares = vec![0.0; self.terms.len() + BESIDE];
+        shares[self.terms.len() + 1..].copy_from_slice(&[per_s, 1.0]);
+        (per_s * self.dead_time_s + self.threshold_v, self.spread.error(&shares))
     }
 
     /// The map on a grid that the table generator takes: up to the bound and a little more, along +d a fifth of it.
@@ -325,19 +303,4 @@ impl Fit {
         let (psi_d_wb, psi_q_wb) = nodes.map(|(d, q)| (short(d), short(q))).unzip();
         FluxMap { psi_d_wb, psi_q_wb, id_a, iq_a }
     }
-}
-
-/// Residuals of both rows of each boundary, in the rotor's frame.
-fn by_boundary(boundaries: &[Boundary], left: &[f64]) -> Vec<(Stage, [f64; 2])> {
-    let mut found = Vec::with_capacity(boundaries.len());
-    let mut begins = 0;
-    for part in parts(boundaries) {
-        for (k, boundary) in part.iter().enumerate() {
-            let pair = [left[begins + k], left[begins + part.len() + k]];
-            let (sin, cos) = boundary.frame;
-            found.push((boundary.stage, turned((-sin, cos), pair)));
-        }
-        begins += 2 * part.len();
-    }
-    found
 }

@@ -29,6 +29,8 @@ pub struct Inside {
     pub charge: [f64; 2],
     /// Volt-seconds that a dead time of one second would take away, in V.
     pub lacking: [f64; 2],
+    /// Volt-seconds that a threshold of one volt would take away, in s.
+    pub opposed: [f64; 2],
     /// Edges whose sign is not sure, each in proportion.
     pub unsure: f64,
 }
@@ -46,6 +48,18 @@ fn dot(a: [f64; 2], b: [f64; 2]) -> f64 {
 /// The sum of a vector and a multiple of another.
 pub fn add(a: [f64; 2], b: [f64; 2], scale: f64) -> [f64; 2] {
     [a[0] + scale * b[0], a[1] + scale * b[1]]
+}
+
+/// Mean of a current's sign on its way from one to another, in A: in proportion below `small_a`.
+fn mean_sign([from, to]: [f64; 2], small_a: f64) -> f64 {
+    // The integral of the sign.
+    let integral = |a: f64| if a.abs() < small_a { 0.5 * a * a / small_a } else { a.abs() - 0.5 * small_a };
+    let way = to - from;
+    if way.abs() < 1e-3 * small_a {
+        (from / small_a).clamp(-1.0, 1.0)
+    } else {
+        (integral(to) - integral(from)) / way
+    }
 }
 
 impl Half {
@@ -80,7 +94,7 @@ impl Half {
             flux = add(flux, voltage, passed_s);
             at_s = edges[phase];
             let here = add(add(start, self.current(flux), 1.0), drift, at_s / self.length_s);
-            found.charge = add(add(found.charge, before, 0.5 * passed_s), here, 0.5 * passed_s);
+            found.passed([before, here], passed_s, small_a);
             before = here;
             let own = axis(phase);
             let sign = (dot(here, own) / small_a).clamp(-1.0, 1.0);
@@ -90,9 +104,20 @@ impl Half {
             voltage = add(voltage, own, 2.0 / 3.0 * level * self.udc_v);
             found.lacking = add(found.lacking, own, -2.0 / 3.0 * late * self.udc_v);
         }
-        let left_s = self.length_s - at_s;
-        found.charge = add(add(found.charge, before, 0.5 * left_s), end, 0.5 * left_s);
+        found.passed([before, end], self.length_s - at_s, small_a);
         found
+    }
+}
+
+impl Inside {
+    /// Takes a time in which no leg has an edge, with the current at both of its ends.
+    fn passed(&mut self, [from, to]: [[f64; 2]; 2], passed_s: f64, small_a: f64) {
+        self.charge = add(add(self.charge, from, 0.5 * passed_s), to, 0.5 * passed_s);
+        for phase in 0..3 {
+            let own = axis(phase);
+            let sign = mean_sign([dot(from, own), dot(to, own)], small_a);
+            self.opposed = add(self.opposed, own, 2.0 / 3.0 * sign * passed_s);
+        }
     }
 }
 
@@ -131,6 +156,16 @@ mod tests {
                 "{lacking:?}"
             );
         }
+    }
+
+    #[test]
+    fn a_threshold_acts_over_the_whole_half_against_each_current() {
+        let opposed = HALF.inside(0.1).opposed;
+        assert!((opposed[0] - 4.0 / 3.0 * 5e-4).abs() < 1e-9 && opposed[1].abs() < 1e-9, "{opposed:?}");
+        // A current that comes from one side of zero and goes as far to the other has no sign on average.
+        assert!(
+            mean_sign([-5.0, 5.0], 0.1).abs() < 1e-12 && (mean_sign([-5.0, 15.0], 0.1) - 0.5).abs() < 1e-2
+        );
     }
 
     #[test]

@@ -4,8 +4,10 @@
 //! what they observe. What is known beforehand is what a nameplate tells: the keys of `machine.toml` but for resistance and inertia.
 
 mod basis;
+mod check;
 mod commander;
 mod corrected;
+mod equations;
 mod fit;
 mod half;
 mod outcome;
@@ -180,9 +182,16 @@ fn on_bus(interface: &str, machine: &Machine) -> Result<std::result::Result<Outc
 pub fn contents(outcome: &Outcome, machine: &Machine) -> Contents {
     let parameters = &machine.folder.parameters;
     let map = outcome.fit.map(parameters.max_current_a);
-    let about =
-        "# Identified by the drive: the gradient of one co-energy polynomial, fitted by least squares.\n";
-    Contents { toml: toml::of(outcome, &map, parameters), map: csv(&map, about) }
+    let [_, dead_time_s, threshold_v] = outcome.fit.errors();
+    let about = format!(
+        "# Identified by the drive: the gradient of one co-energy polynomial, fitted by least squares.\n\
+         # The inverter's error is no part of it: dead time {:.2} us (standard error {:.2}), threshold {:.3} V ({:.3}).\n",
+        1e6 * outcome.fit.dead_time_s,
+        1e6 * dead_time_s,
+        outcome.fit.threshold_v,
+        threshold_v
+    );
+    Contents { toml: toml::of(outcome, &map, parameters), map: csv(&map, &about) }
 }
 
 /// The page: map, residuals, and how far it is from the truth, which only a simulation knows.

@@ -1,5 +1,6 @@
 //! The outcome of an experiment, and how far it is from the truth.
 
+use super::check::Turning;
 use super::corrected::{offset_a, turned_by, without_offset};
 use super::fit::Fit;
 use super::signs::Signs;
@@ -30,10 +31,13 @@ impl Truth {
     pub fn of(options: &Options, machine: &Machine, inertia_kg_m2: f64) -> Result<Self> {
         let truth = options.own.plant.as_deref().map_or_else(|| Ok(machine.clone()), Machine::load)?;
         let (parameters, plant) = (&truth.folder.parameters, options.plant());
+        // Whichever conducts, half of the time each.
+        let drops = options.own.flaws.drops();
+        let slope_ohm = 0.5 * (drops.igbt_ohm + drops.diode_ohm);
         Ok(Self {
             map: SmoothMap::new(&truth.folder.map),
             flux_scale: plant.flux_scale,
-            resistance_ohm: parameters.stator_resistance_ohm * plant.resistance_scale,
+            resistance_ohm: parameters.stator_resistance_ohm * plant.resistance_scale + slope_ohm,
             inertia_kg_m2,
             pole_pairs: parameters.pole_pairs.into(),
             last_d_a: truth.folder.map.id_a.last().copied().unwrap_or(0.0),
@@ -61,10 +65,18 @@ pub struct Outcome {
     pub rotor: Rotor,
     /// The largest reading of a phase's sensor where no current flows, as far as the phases' sum does not take part, in A.
     pub offset_a: f64,
+    /// The inverter's voltage error of a leg at the link's mean, dead time and threshold together, in V, and its standard error.
+    pub lacking_v: (f64, f64),
+    /// The largest flux linkage of the turning rotor off that of the pulses' map, over the map's largest flux linkage; and likewise of the torque, over the machine's largest.
+    pub turning_flux_off: f64,
+    /// The latter.
+    pub turning_torque_off: f64,
     /// Length of the pulses before the rotor turns, in s.
     pub pulses_s: f64,
     /// The largest current over the bound.
     pub peak_share: f64,
+    /// The largest current, in A.
+    pub peak_a: f64,
     /// The largest mechanical turn from the beginning until the rotor is to turn, in degrees.
     pub turned_deg: f64,
     /// Error of the flux linkage, root mean square, as a share of the largest within the circle that is judged.
@@ -105,15 +117,24 @@ impl Outcome {
         let observations = &turned_by(&read, fit.zero_rad);
         let still = |observation: &&Observation| !matches!(observation.stage, Stage::Turn | Stage::Done);
         let pulses_s = observations.iter().filter(still).map(|o| f64::from(o.length_s)).sum();
+        let udc_v = observations.iter().map(|o| f64::from(o.udc_v)).sum::<f64>() / observations.len() as f64;
+        let most = |off: &dyn Fn(&Turning) -> f64, of: f64| {
+            fit.turning.iter().map(|turning| off(turning) / of).fold(f64::NAN, f64::max)
+        };
+        let largest_wb = fit.flux(0.0, bound_a).0.hypot(fit.flux(0.0, bound_a).1);
         let rotor = Rotor::of(observations, &fit, pole_pairs);
         let of = |error: fn(&Fit, &Truth, &Machine) -> f64| {
             truth.map_or(f64::NAN, |truth| error(&fit, truth, machine))
         };
         Ok(Self {
             rotor,
+            lacking_v: fit.lacking_v(udc_v, half_s),
+            turning_flux_off: most(&|turning| turning.off_wb(), largest_wb),
+            turning_torque_off: most(&|turning| turning.off_nm(pole_pairs), parameters.max_torque_nm),
             offset_a: largest_phase_a(offset),
             pulses_s,
             peak_share: peak_a / bound_a,
+            peak_a,
             turned_deg: turned_deg(observations, pole_pairs),
             flux_rms: of(|fit, truth, machine| flux_errors(fit, truth, machine).0),
             flux_worst: of(|fit, truth, machine| flux_errors(fit, truth, machine).1),
@@ -130,18 +151,28 @@ impl Outcome {
     pub fn figures(&self) -> Figures {
         let mut figures = Figures::default();
         let percent = |share: f64| 100.0 * share;
+        let [resistance_ohm, dead_time_s, threshold_v] = self.fit.errors();
         let values = [
             ("stator_resistance_ohm", self.fit.resistance_ohm),
+            ("stator_resistance_standard_error_ohm", resistance_ohm),
+            ("inverter_error_v", self.lacking_v.0),
+            ("inverter_error_standard_error_v", self.lacking_v.1),
             ("dead_time_us", 1e6 * self.fit.dead_time_s),
+            ("dead_time_standard_error_us", 1e6 * dead_time_s),
+            ("threshold_v", self.fit.threshold_v),
+            ("threshold_standard_error_v", threshold_v),
             ("magnet_flux_wb", self.fit.flux(0.0, 0.0).0),
             ("rotor_inertia_kg_m2", self.rotor.inertia_kg_m2),
             ("friction_nm", self.rotor.friction_nm),
             ("current_offset_a", self.offset_a),
             ("angle_zero_deg", self.signs.zero_deg),
             ("residual_mwb", 1e3 * self.fit.left_wb()),
-            ("pulses_s", self.pulses_s),
+            ("turning_flux_off_percent", percent(self.turning_flux_off)),
+            ("turning_torque_off_percent", percent(self.turning_torque_off)),
+            ("seconds", self.pulses_s),
+            ("peak_current_a", self.peak_a),
             ("peak_current_percent_of_bound", percent(self.peak_share)),
-            ("turned_deg", self.turned_deg),
+            ("rotor_turned_deg", self.turned_deg),
             ("flux_error_rms_percent", percent(self.flux_rms)),
             ("flux_error_worst_percent", percent(self.flux_worst)),
             ("torque_error_at_mtpa_percent", percent(self.torque_worst)),
@@ -149,8 +180,11 @@ impl Outcome {
             ("stator_resistance_error_percent", percent(self.resistance_error)),
             ("rotor_inertia_error_percent", percent(self.inertia_error)),
         ];
-        // Without a truth no error is known.
-        values.iter().filter(|(_, value)| !value.is_nan()).for_each(|(name, value)| figures.set(name, value));
+        // Without a truth no error is known, and without magnets no share of their flux.
+        values
+            .iter()
+            .filter(|(_, value)| value.is_finite())
+            .for_each(|(name, value)| figures.set(name, value));
         figures
     }
 
@@ -169,12 +203,49 @@ impl Outcome {
             (format!("id = {:.3} A", -share * most), curve)
         });
         page.draw_xy(None, "flux linkage along q over iq", ("iq in A", "Wb"), &of_q);
+        self.draw_trust(most, page);
         let left = |axis: usize| -> Vec<(f64, f64)> {
             let own = self.fit.residuals.iter().enumerate();
             own.map(|(k, (_, pair))| (k as f64, 1e3 * pair[axis])).collect()
         };
         let series = [("along d".to_owned(), left(0)), ("along q".to_owned(), left(1))];
         page.draw_xy(None, "left unexplained at each boundary", ("boundary", "mWb"), &series);
+    }
+}
+
+impl Outcome {
+    /// Draws what to trust: standard errors of the map, and where the turning rotor's flux linkages lie beside it.
+    fn draw_trust(&self, most: f64, page: &mut Page) {
+        let along = |from: f64, to: f64| (0..=80).map(move |k| from + (to - from) * f64::from(k) / 80.0);
+        let errors = |at: &dyn Fn(f64) -> (f64, f64)| -> Vec<(f64, f64)> {
+            let error = |share: f64| {
+                let (id, iq) = at(share);
+                let (d, q) = self.fit.flux_error(id, iq);
+                (share * most, 1e3 * d.hypot(q))
+            };
+            along(0.0, 1.0).map(error).collect()
+        };
+        let series = [
+            ("along −d".to_owned(), errors(&|share| (-share * most, 0.0))),
+            ("along q".to_owned(), errors(&|share| (0.0, share * most))),
+            (
+                "between both".to_owned(),
+                errors(&|share| (-share * most * 0.5_f64.sqrt(), share * most * 0.5_f64.sqrt())),
+            ),
+        ];
+        page.draw_xy(None, "standard error of the flux linkage", ("|i| in A", "mWb"), &series);
+        let points = |axis: fn(&Turning) -> (f64, f64)| self.fit.turning.iter().map(axis).collect::<Vec<_>>();
+        let series = [
+            (
+                "along d".to_owned(),
+                points(|turning| (turning.current.1, 1e3 * (turning.found.0 - turning.map.0))),
+            ),
+            (
+                "along q".to_owned(),
+                points(|turning| (turning.current.1, 1e3 * (turning.found.1 - turning.map.1))),
+            ),
+        ];
+        page.draw_xy(None, "turning rotor's flux linkage off the pulses' map", ("iq in A", "mWb"), &series);
     }
 }
 

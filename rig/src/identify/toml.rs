@@ -2,22 +2,25 @@
 
 use super::Outcome;
 use crate::folder::{digits, toml};
+use core::f64::consts::TAU;
 use tractive_tablegen::{FluxMap, Optimum, Parameters, SmoothMap};
 
-/// The text. The largest torque is the nameplate's, or what the map gives within the largest current, whichever is less.
+/// The text. The largest torque is the nameplate's, or what the map gives within the largest current, whichever is less; so is the largest power.
 pub fn of(outcome: &Outcome, map: &FluxMap, given: &Parameters) -> String {
     let smooth = SmoothMap::new(map);
     let reach_nm = Optimum::of(&smooth, given.pole_pairs, given.max_current_a).most_torque_nm();
     // Below the generator's own rounding.
     let within = digits((1.0 - 1e-6) * reach_nm);
     let max_torque_nm = given.max_torque_nm.min(within);
+    let max_power_w =
+        given.max_power_w.min(digits((1.0 - 1e-6) * max_torque_nm * given.max_speed_rpm * TAU / 60.0));
     let (resistance, inertia) =
         (digits(outcome.fit.resistance_ohm.max(0.0)), digits(outcome.rotor.inertia_kg_m2));
     let keys: [(&str, f64, &str); 20] = [
         ("pole_pairs", f64::from(given.pole_pairs), "given"),
         ("stator_resistance_ohm", resistance, "identified"),
         ("max_torque_nm", max_torque_nm, "given, as far as the map gives it"),
-        ("max_power_w", given.max_power_w, "given"),
+        ("max_power_w", max_power_w, "given, as far as the map gives it"),
         ("max_current_a", given.max_current_a, "given"),
         ("max_speed_rpm", given.max_speed_rpm, "given"),
         ("rated_torque_nm", given.rated_torque_nm.min(max_torque_nm), "given"),

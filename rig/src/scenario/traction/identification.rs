@@ -22,7 +22,7 @@ use tractive::time::Instant;
 use tractive::wire;
 
 /// The longest experiment, in carrier halves; and in s.
-const MOST_HALVES: f64 = 12_000.0;
+const MOST_HALVES: f64 = 28_000.0;
 const LEAST_S: f64 = 1.0;
 /// The longest experiment over the protocol, with all its frames, in s; and the step of its trace.
 const COMMANDED_S: f64 = 600.0;

@@ -1,0 +1,212 @@
+//! The linear equations of a fit, their solution by least squares, and how sure it is.
+
+use super::basis::Basis;
+use super::fit::{Boundary, Fit, turned};
+use anyhow::{Context, Result};
+use nalgebra::{DMatrix, DVector};
+use tractive::identification::Stage;
+
+/// Boundaries in a part that counts from its own mean.
+const PART: usize = 100;
+/// Edges of an unsure sign after which a part ends: what they may have left out is no longer carried on. Of the turn, whose parts tell the magnets
+/// by the turn that is in them: where each phase's current has passed zero once.
+const UNSURE_EDGES: f64 = 1.0;
+const UNSURE_EDGES_TURNING: f64 = 3.0;
+/// Shortest part.
+const LEAST_PART: usize = 4;
+/// Currents along d and q at which the map's bends are weighed.
+const GRID: (u32, u32) = (26, 18);
+/// Unknowns beside the co-energy's terms: resistance, dead time, threshold.
+pub const BESIDE: usize = 3;
+
+/// The boundaries that a solution is made of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Scope {
+    /// All with currents: pulses and turn.
+    All,
+    /// Those at standstill alone.
+    Pulses,
+}
+
+impl Scope {
+    /// `true` if a stage's boundaries are used: not those at no current, where no edge's sign is sure.
+    fn uses(self, stage: Stage) -> bool {
+        match stage {
+            Stage::Probe | Stage::Rest | Stage::Done => false,
+            Stage::Turn => self == Self::All,
+            Stage::Staircase | Stage::AlongD | Stage::AlongQ | Stage::AlongBoth => true,
+        }
+    }
+}
+
+/// The parts that count from their own mean.
+fn parts(all: &[Boundary], scope: Scope) -> Vec<&[Boundary]> {
+    let (mut parts, mut from) = (Vec::new(), 0);
+    for (k, boundary) in all.iter().enumerate() {
+        let turns = boundary.stage == Stage::Turn;
+        let most = if turns { UNSURE_EDGES_TURNING } else { UNSURE_EDGES };
+        let unsure = boundary.unsure - all[from].unsure > most;
+        let used = scope.uses(boundary.stage);
+        if !used || k - from >= PART || unsure {
+            parts.push(&all[from..k]);
+            from = if used { k } else { k + 1 };
+        }
+    }
+    parts.push(&all[from.min(all.len())..]);
+    parts.retain(|part| part.len() >= LEAST_PART);
+    parts
+}
+
+/// Rows of equations: unknowns' coefficients, and what they are to give.
+pub struct Equations {
+    unknowns: usize,
+    rows: Vec<f64>,
+    right: Vec<f64>,
+    /// Rows that samples have made.
+    samples: usize,
+}
+
+impl Equations {
+    /// The two rows of each boundary, every part's from its mean. With a fit that is known the last unknown is a turn of the frame.
+    pub fn of(boundaries: &[Boundary], basis: &Basis, known: Option<&Fit>, scope: Scope) -> Self {
+        let unknowns = basis.len() + BESIDE + usize::from(known.is_some());
+        let mut equations = Self { unknowns, rows: Vec::new(), right: Vec::new(), samples: 0 };
+        for part in parts(boundaries, scope) {
+            let mut own: [Vec<Vec<f64>>; 2] = [Vec::new(), Vec::new()];
+            for boundary in part {
+                let [along_d, along_q] = basis.flux(boundary.current);
+                let mut pair = [Vec::with_capacity(unknowns + 1), Vec::with_capacity(unknowns + 1)];
+                for (d, q) in along_d.iter().zip(&along_q) {
+                    let flux = turned(boundary.frame, [*d, *q]);
+                    pair[0].push(flux[0]);
+                    pair[1].push(flux[1]);
+                }
+                let turns = known.map(|fit| turned(boundary.frame, fit.turns(boundary.current)));
+                for (axis, row) in pair.into_iter().enumerate() {
+                    let mut row = row;
+                    row.extend([boundary.charge[axis], boundary.lacking[axis], boundary.opposed[axis]]);
+                    row.extend(turns.map(|turns| turns[axis]));
+                    row.push(boundary.volt_seconds[axis]);
+                    own[axis].push(row);
+                }
+            }
+            own.into_iter().for_each(|rows| equations.add_from_mean(rows));
+        }
+        equations.samples = equations.right.len();
+        equations
+    }
+
+    /// `true` if there are far more samples than unknowns.
+    pub fn suffice(&self) -> bool {
+        self.samples > 4 * self.unknowns
+    }
+
+    fn add_from_mean(&mut self, rows: Vec<Vec<f64>>) {
+        let count = rows.len() as f64;
+        let mean: Vec<f64> =
+            (0..=self.unknowns).map(|k| rows.iter().map(|row| row[k]).sum::<f64>() / count).collect();
+        for row in rows {
+            let mut less = row.iter().zip(&mean).map(|(value, mean)| value - mean);
+            self.rows.extend(less.by_ref().take(self.unknowns));
+            self.right.extend(less);
+        }
+    }
+
+    /// One more row: what the co-energy's terms are to give.
+    pub fn add(&mut self, terms: impl IntoIterator<Item = f64>, gives: f64) {
+        self.rows.extend(terms);
+        self.right.push(gives);
+        self.rows.resize(self.right.len() * self.unknowns, 0.0);
+    }
+
+    /// The wish that flux linkages bend little, all over the rectangle: what no sample shows goes on straight.
+    pub fn smooth(&mut self, basis: &Basis, weight: f64) {
+        let weight = weight * (self.samples as f64 / 2.0 / f64::from(GRID.0 * GRID.1)).sqrt();
+        for current in basis.grid(GRID.0, GRID.1) {
+            for (orders, share) in
+                [((3, 0), 1.0), ((2, 1), 3.0_f64.sqrt()), ((1, 2), 3.0_f64.sqrt()), ((0, 3), 1.0)]
+            {
+                let bends = basis.derivative(current, orders);
+                self.add(bends.into_iter().map(|value| weight * share * value), 0.0);
+            }
+        }
+    }
+
+    /// The solution by least squares.
+    ///
+    /// # Errors
+    /// Equations without one.
+    pub fn solve(&self) -> Result<Solution> {
+        let matrix = DMatrix::from_row_slice(self.right.len(), self.unknowns, &self.rows);
+        // Columns of one length, so that rounding treats all alike.
+        let lengths: Vec<f64> =
+            matrix.column_iter().map(|column| column.norm().max(f64::MIN_POSITIVE)).collect();
+        let mut scaled = matrix;
+        for (mut column, length) in scaled.column_iter_mut().zip(&lengths) {
+            column /= *length;
+        }
+        let qr = scaled.qr();
+        let (right, factor) = (qr.q().transpose() * DVector::from_column_slice(&self.right), qr.r());
+        let solution = factor.solve_upper_triangular(&right);
+        let solution = solution
+            .filter(|found| found.iter().all(|value| value.is_finite()))
+            .context("the observations do not tell the machine: the equations have no one solution")?;
+        let unknowns: Vec<f64> =
+            solution.iter().zip(&lengths).map(|(value, length)| value / length).collect();
+        let left: Vec<f64> = (0..self.samples).map(|row| self.left(row, &unknowns)).collect();
+        let freedom = self.samples.saturating_sub(self.unknowns).max(1);
+        let sigma = (left.iter().map(|value| value * value).sum::<f64>() / freedom as f64).sqrt();
+        Ok(Solution { unknowns, left, spread: Spread { factor, lengths, sigma } })
+    }
+
+    /// What the unknowns leave of a row.
+    fn left(&self, row: usize, unknowns: &[f64]) -> f64 {
+        let own = &self.rows[row * self.unknowns..(row + 1) * self.unknowns];
+        self.right[row] - own.iter().zip(unknowns).map(|(a, b)| a * b).sum::<f64>()
+    }
+}
+
+/// A solution by least squares.
+pub struct Solution {
+    /// The unknowns.
+    pub unknowns: Vec<f64>,
+    /// What is left of each sample's row.
+    pub left: Vec<f64>,
+    /// How sure it is.
+    pub spread: Spread,
+}
+
+/// The covariance of a solution: the triangular factor of its equations, the lengths of their columns, and the standard deviation of a row.
+#[derive(Clone, Debug)]
+pub struct Spread {
+    factor: DMatrix<f64>,
+    lengths: Vec<f64>,
+    sigma: f64,
+}
+
+impl Spread {
+    /// Standard error of a sum of the unknowns with these shares, those beyond being 0, as far as what is left of the samples is noise: each
+    /// sample's own.
+    pub fn error(&self, shares: &[f64]) -> f64 {
+        let scaled = self.lengths.iter().enumerate();
+        let scaled =
+            scaled.map(|(k, length)| shares.get(k).map_or(0.0, |share| share / length)).collect::<Vec<_>>();
+        let solved = self.factor.tr_solve_upper_triangular(&DVector::from_vec(scaled));
+        solved.map_or(f64::NAN, |solved| self.sigma * solved.norm())
+    }
+}
+
+/// Residuals of both rows of each boundary, in the rotor's frame.
+pub fn by_boundary(boundaries: &[Boundary], scope: Scope, left: &[f64]) -> Vec<(Stage, [f64; 2])> {
+    let mut found = Vec::with_capacity(boundaries.len());
+    let mut begins = 0;
+    for part in parts(boundaries, scope) {
+        for (k, boundary) in part.iter().enumerate() {
+            let pair = [left[begins + k], left[begins + part.len() + k]];
+            let (sin, cos) = boundary.frame;
+            found.push((boundary.stage, turned((-sin, cos), pair)));
+        }
+        begins += 2 * part.len();
+    }
+    found
+}
