@@ -12,7 +12,11 @@ impl Bench {
             let fault = Some(self.observed.from).filter(|from| *from > now);
             let line = self.dc.operated().and_then(LineSide::next_event);
             let load = self.loads.next().map(|at| at.max(now));
-            let events = [fault, self.inverter.next_event(), self.orders.next(), load, line];
+            let [for_control, at_boundary] = &self.holds;
+            let held = for_control.next_event(now, self.control.next);
+            let held_at_boundary = at_boundary.next_event(now, self.inverter.half_end());
+            let inverter = self.inverter.next_event();
+            let events = [fault, inverter, self.orders.next(), load, line, held, held_at_boundary];
             let regular = [self.inverter.half_end(), self.control.next, self.next_row()];
             let due = events.into_iter().flatten().chain(regular).fold(tick, Tick::min);
             self.integrate(due);
@@ -67,6 +71,10 @@ impl Bench {
     fn act(&mut self) -> Result<(), BenchError> {
         let now = self.time.now;
         let t_s = self.time.now_s();
+        let conversions = [self.control.next, self.inverter.half_end()];
+        for (holds, at) in self.holds.iter_mut().zip(conversions) {
+            holds.act(now, at, || self.sensors.behind(&self.plant.motor));
+        }
         if let Some(row) = self.dc.operated_mut().and_then(|line| line.act(now, t_s))
             && now >= self.time.lead
             && now <= self.end

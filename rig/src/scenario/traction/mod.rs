@@ -40,7 +40,7 @@ use crate::inject::traction::Kind;
 use crate::law::LawName;
 use crate::machine::Machine;
 use crate::options::{On, finite, not_negative, usual_min_pulse_us, within};
-use crate::plant::{DcLinkSettings, LineFilter, Plant, PlantSettings, Source, SpeedSource};
+use crate::plant::{DcLinkSettings, LineFilter, Plant, Source, SpeedSource};
 use crate::report::{self, Page};
 use crate::run::traction::{Tasks, run_in_qemu};
 use crate::run::{self, CLOCK, Supervisor};
@@ -575,6 +575,7 @@ fn bench(plan: Plan, setup: &Setup, options: &Options, (machine, truth): (&Machi
             angle_late_s: 1e-6 * options.own.angle_late_us,
             angle_counts: options.own.encoder_lines.map(|lines| 4.0 * f64::from(lines) / pole_pairs),
             current_filter_s: 1e-6 * options.own.current_filter_us,
+            adc_skew_s: own.skew_s(),
             freeze_at_s: plan.freeze_at_s,
             current_gain: options.own.current_gain / 100.0,
             udc_gain: options.own.udc_gain / 100.0,
@@ -586,7 +587,7 @@ fn bench(plan: Plan, setup: &Setup, options: &Options, (machine, truth): (&Machi
         injection: plan.injection,
         limits: Limits::NONE,
     };
-    let deviations = PlantSettings { slots_share: own.slots / 100.0, drops: own.drops(), ..options.plant() };
+    let deviations = own.plant(options.plant(), truth.folder.parameters.rotor_inertia_kg_m2);
     let mut plant = Plant::new(&truth.folder, plan.speed, &deviations);
     plant.motor.rotor_mut().set_friction_nm(options.own.friction);
     if let Some(encoder) = plan.encoder {
