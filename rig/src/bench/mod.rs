@@ -28,7 +28,7 @@ mod wiring;
 
 pub use crate::trace::Tick;
 pub use conversions::Conversions;
-pub use dc_side::Supply;
+pub use dc_side::{Supply, Terminal};
 pub use due::Due;
 pub use encoder::{Encoder, Position};
 pub use error::BenchError;
