@@ -2,6 +2,7 @@
 
 use tractive::protection::Fault;
 use tractive_rig::bench::{Converter, Flaws};
+use tractive_rig::compare;
 use tractive_rig::plant::{DeviceDrops, Leg, Plant, PlantSettings, ShaftSettings, SpeedSource};
 use tractive_rig::scenario::catalogue;
 use tractive_rig::scenario::traction::flaws::{Drops, Phases, Times};
@@ -202,6 +203,22 @@ fn no_scenario_trips_with_all_flaws() {
             println!("{line}: {} r/min: {off:.2} %", point["speed_rpm"]);
             assert!(off.abs() < 2.5, "{line}: {point}");
         }
+    }
+}
+
+/// The guide's table of what each flaw costs, as the command writes it. TRACTIVE_FLAWS=write renews it.
+#[test]
+fn the_guide_has_what_each_idealisation_is_worth() {
+    const MARKS: [&str; 2] = ["<!-- flaws -->\n", "<!-- end of flaws -->"];
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/flaws.md");
+    let page = std::fs::read_to_string(&path).unwrap();
+    let (before, rest) = page.split_once(MARKS[0]).unwrap();
+    let (stands, after) = rest.split_once(MARKS[1]).unwrap();
+    let table = format!("\n{}\n", compare::flaws_table(&compare::flaws().unwrap()));
+    if std::env::var("TRACTIVE_FLAWS").is_ok_and(|what| what == "write") {
+        std::fs::write(&path, [before, MARKS[0], &table, MARKS[1], after].concat()).unwrap();
+    } else {
+        assert_eq!(stands, table, "TRACTIVE_FLAWS=write renews docs/flaws.md");
     }
 }
 
