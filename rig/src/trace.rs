@@ -199,6 +199,8 @@ pub struct Recording {
     pub observations: Vec<Observation>,
     /// The angle that the drive has found, where it started without one.
     pub found: Option<Found>,
+    /// The recordings of the other drives on the same link.
+    pub beside: Vec<Recording>,
 }
 
 impl Recording {
@@ -297,7 +299,8 @@ pub trait Recorded {
 
 impl Recorded for Recording {
     fn trip(&self) -> Option<Trip> {
-        self.rows.iter().find_map(|row| row.trip)
+        let own = self.rows.iter().find_map(|row| row.trip);
+        own.or_else(|| self.beside.iter().find_map(Self::trip))
     }
 
     fn end_s(&self) -> f64 {

@@ -10,8 +10,8 @@ use tractive::time::Instant;
 use tractive_rig::analysis;
 use tractive_rig::bench::{self, Bench, Flaws, Limits, Simulated, Supply};
 use tractive_rig::machine::Machine;
-use tractive_rig::plant::{LineFilter, Plant, PlantSettings, SpeedSource};
-use tractive_rig::run::traction::Tasks;
+use tractive_rig::plant::{FilteredLink, LineFilter, Plant, PlantSettings, SpeedSource};
+use tractive_rig::run::traction::{OnBench, Tasks, Together};
 use tractive_rig::run::{CLOCK, Interrupts};
 use tractive_rig::scenario::catalogue;
 use tractive_rig::trace::{Recorded, Recording};
@@ -70,12 +70,45 @@ fn no_line_filter_swings_in_any_mode() {
     assert!(bad.is_empty(), "{bad:#?}");
 }
 
+/// The same for two drives: as much capacitance for each.
+fn filters_of_two() -> Vec<(f64, f64, f64)> {
+    filters().into_iter().map(|(l, c, r)| (l, c.max(4.0), r)).collect()
+}
+
+/// Two drives, the second one's wheels larger by a percent: twice the power, and twice the damping.
+#[test]
+fn no_line_filter_swings_under_two_drives() {
+    let runs: Vec<_> =
+        filters_of_two().into_iter().flat_map(|filter| POINTS.map(|point| (filter, point))).collect();
+    let lines: Vec<_> = runs
+        .par_iter()
+        .flat_map(|(filter, (rpm, nm))| [(filter, rpm, *nm), (filter, rpm, -nm)])
+        .map(|((l, c, r), rpm, nm)| {
+            let command = format!("steady --speed {rpm} --torque {nm} --line {l},{c},{r} --drives 2");
+            let chosen = catalogue::of_traction(&command).unwrap();
+            let recording = chosen.drive(&chosen.machine().unwrap()).unwrap();
+            let swing = analysis::link_swing(analysis::window(&recording, 0.9, 1.1));
+            let mean_nm = |of: &Recording| {
+                let last = analysis::window(of, 0.9, 1.1);
+                last.iter().map(|row| row.te_nm).sum::<f64>() / last.len() as f64
+            };
+            let means = [&recording, &recording.beside[0]].map(mean_nm);
+            let off = means.into_iter().map(|mean| (mean - nm).abs() / 1_235.0).fold(0.0, f64::max);
+            let line = format!("{command}: link {:.2} %, torque {:.2} %", 100.0 * swing, 100.0 * off);
+            (recording.trip().is_none() && swing <= SWING && off <= TORQUE_OFF, line)
+        })
+        .collect();
+    lines.iter().for_each(|(_, line)| println!("{line}"));
+    let bad: Vec<_> = lines.iter().filter(|(good, _)| !good).collect();
+    assert!(bad.is_empty(), "{bad:#?}");
+}
+
 /// 3 mH, 4 mF and 30 mΩ.
 const FILTER: LineFilter = LineFilter { inductance_h: 3e-3, resistance_ohm: 0.03, capacitance_f: 4e-3 };
 const UDC_V: f64 = 1_500.0;
 
-/// A run of 0.5 s at 1,500 r/min and full torque behind that filter.
-fn run_with(link_damping: f32) -> Recording {
+/// A bench and tasks for a run of 0.5 s at 1,500 r/min and full torque.
+fn on_bench(link_damping: f32, supply: Supply) -> OnBench<Tasks<'static>> {
     let machine = Machine::load("pmasynrm-180kw").unwrap();
     let devices = SwitchLimits::new(250, 0, machine.tables.ratings.max_switching_hz, &CLOCK);
     let plant =
@@ -91,16 +124,39 @@ fn run_with(link_damping: f32) -> Recording {
         udc_v: UDC_V,
         link_steps: Vec::new(),
         flaws: Flaws::default(),
-        supply: Supply::Line(FILTER),
+        supply,
         limits: Limits::NONE,
         injection: None,
     };
-    let mut bench = Bench::new(plant, Box::new(demand), &settings);
+    let bench = Bench::new(plant, Box::new(demand), &settings);
     let gains = Gains { link_damping, ..Gains::DEFAULT };
     let settings = Settings { gains, ..Settings::new(CLOCK, devices) };
-    let mut tasks = Tasks::beginning_at(Instant(0), machine.tables, settings, devices.shortest_half_ticks);
+    let tasks = Tasks::beginning_at(Instant(0), machine.tables, settings, devices.shortest_half_ticks);
+    OnBench { bench, tasks }
+}
+
+/// That run behind that filter.
+fn run_with(link_damping: f32) -> Recording {
+    let OnBench { mut bench, mut tasks } = on_bench(link_damping, Supply::Line(FILTER));
     tasks.drive(&mut bench, |_| true).unwrap();
     bench.into_recording(Vec::new())
+}
+
+/// The same of so many drives, each with a machine of its own; the first one's recording.
+fn run_together(link_damping: f32, drives: u32) -> Recording {
+    let of_drive = |_| on_bench(link_damping, Supply::Shared);
+    let (first, others) = (of_drive(0), (1..drives).map(of_drive).collect());
+    let mut together = Together { link: FilteredLink::new(FILTER, UDC_V), first, others };
+    together.drive(|_| ()).unwrap();
+    together.first.bench.into_recording(Vec::new())
+}
+
+/// A drive by itself behaves the same on a link that it could share, bit for bit.
+#[test]
+fn a_link_that_is_shared_with_nobody_is_a_drives_own() {
+    let [own, shared] = [run_with(Gains::LINE_DAMPING), run_together(Gains::LINE_DAMPING, 1)];
+    assert!(own.rows.len() > 4_000 && own.trace_bytes().unwrap() == shared.trace_bytes().unwrap());
+    assert_eq!(own.edges, shared.edges);
 }
 
 fn swing(recording: &Recording, from_s: f64) -> f64 {

@@ -72,6 +72,16 @@ fn line_current_and_line_power_keep_their_limits() {
     }
 }
 
+/// A limit that falls with the rising speed is kept while jerk holds the demand's ramp back: the line's current was 0.7 % over it, and 3.4 % over one of 30 A.
+#[test]
+fn the_line_s_limit_does_not_wait_for_jerk() {
+    let chosen = catalogue::of_traction("line-limits").unwrap();
+    let machine = chosen.machine().unwrap();
+    let recording = chosen.drive(&machine).unwrap();
+    let over = chosen.figures(&recording, &machine).number("line_current_over_limit").unwrap();
+    assert!(over < 1.005, "{over}");
+}
+
 /// Without the limit the wheel runs away, 20 % in 0.1 s, and the run says so; with it torque is reduced and comes back.
 #[test]
 fn a_wheel_that_loses_its_grip_is_caught() {

@@ -63,6 +63,8 @@ pub trait Demands: Copy {
 #[derive(Clone, Copy, Debug)]
 pub struct TorqueDemand {
     ramp: Ramp,
+    /// The ramp's torque within the line's limits, in N·m: they move with the speed, faster than slew and jerk let the ramp follow.
+    given_nm: f32,
     /// The limits that hold; `None`: as rated.
     limits: Option<Limits>,
     /// The share of them that the temperatures leave.
@@ -82,7 +84,17 @@ impl TorqueDemand {
 
     /// The torque demand, in N·m.
     fn torque_nm(&self) -> f32 {
-        self.grip.share() * self.ramp.torque_nm()
+        self.grip.share() * self.given_nm
+    }
+}
+
+/// A torque within what is left of motoring and braking at a speed.
+fn within(torque_nm: f32, speed: f32, most: &Most) -> f32 {
+    let Most { motoring_nm, braking_nm } = *most;
+    if speed < 0.0 {
+        limit(torque_nm, -motoring_nm, braking_nm)
+    } else {
+        limit(torque_nm, -braking_nm, motoring_nm)
     }
 }
 
@@ -94,6 +106,7 @@ impl Demands for TorqueDemand {
 
     const AT_REST: Self = Self {
         ramp: Ramp::new(),
+        given_nm: 0.0,
         limits: None,
         share: 1.0,
         warmth: Warmth::NONE,
@@ -179,15 +192,11 @@ impl Demands for TorqueDemand {
         self.line.step(report, settings.slot_s);
         let link_nm = motoring_nm(report, &self.line.window(&self.limits(settings), ratings), ratings);
         self.drawn.step(report, settings);
-        let Most { motoring_nm, braking_nm } = self.drawn.most(speed, ratings, &settings.train);
-        let most_nm = if link_nm < motoring_nm { link_nm } else { motoring_nm };
-        let held_nm = if report.omega < 0.0 {
-            limit(target_nm, -most_nm, braking_nm)
-        } else {
-            limit(target_nm, -braking_nm, most_nm)
-        };
-        self.ramp.step(held_nm, &Rates::of(settings));
-        self.grip.step(self.ramp.torque_nm(), speed, settings);
+        let line = self.drawn.most(speed, ratings, &settings.train);
+        let motoring_nm = if link_nm < line.motoring_nm { link_nm } else { line.motoring_nm };
+        let held_nm = within(target_nm, speed, &Most { motoring_nm, ..line });
+        self.given_nm = within(self.ramp.step(held_nm, &Rates::of(settings)), speed, &line);
+        self.grip.step(self.given_nm, speed, settings);
     }
 
     #[inline]

@@ -10,6 +10,8 @@ use crate::ports::Report;
 
 /// Time constant of the link voltage and of the loss, in s: slower than the swing of a usual line filter, which is not the line's.
 const SMOOTH_S: f32 = 0.05;
+/// Time from a speed to the torque that follows from it, in s: two slots, and a carrier's half.
+const FOLLOWS_S: f32 = 3e-3;
 /// Share of the largest torque below which the loss is taken as that torque's: of weakening currents there is one without torque.
 const LEAST_SHARE: f32 = 0.1;
 /// Share of the nominal voltage below which the line's current falls, to nothing at the lowest operating voltage.
@@ -22,6 +24,8 @@ pub(super) struct Drawn {
     udc_v: f32,
     /// Copper loss over the torque's square, in W/(N·m)².
     loss: f32,
+    /// Mechanical speed, in rad/s: a ramp is ahead of it by its acceleration times [`SMOOTH_S`].
+    speed: f32,
 }
 
 /// Largest torques, in N·m.
@@ -32,13 +36,13 @@ pub(super) struct Most {
 }
 
 impl Drawn {
-    pub(super) const UNKNOWN: Self = Self { udc_v: 0.0, loss: 0.0 };
+    pub(super) const UNKNOWN: Self = Self { udc_v: 0.0, loss: 0.0, speed: 0.0 };
 
     /// One slot.
     #[inline(never)]
     pub(super) fn step(&mut self, report: &Report, settings: &Settings) {
         let Settings { ratings, slot_s, .. } = *settings;
-        let Report { udc_v, torque_nm, id_a, iq_a, .. } = *report;
+        let Report { udc_v, torque_nm, id_a, iq_a, omega, .. } = *report;
         let least_nm = LEAST_SHARE * ratings.max_torque_nm;
         let torque_nm = if torque_nm.abs() > least_nm { torque_nm } else { least_nm };
         let copper_w = 1.5 * ratings.stator_resistance_ohm * (id_a * id_a + iq_a * iq_a);
@@ -46,14 +50,16 @@ impl Drawn {
         let share = if self.udc_v > 0.0 { slot_s / (slot_s + SMOOTH_S) } else { 1.0 };
         self.udc_v += share * (udc_v - self.udc_v);
         self.loss += share * (loss - self.loss);
+        self.speed += share * (omega / ratings.pole_pairs - self.speed);
     }
 
-    /// The torques that the limits leave at a mechanical speed, in rad/s.
+    /// The torques that the limits leave at a mechanical speed, in rad/s: at the one that a ramp has come to when they take effect.
     #[inline(never)]
     pub(super) fn most(&self, speed: f32, ratings: &Ratings, limits: &TrainLimits) -> Most {
         let TrainLimits { motoring_a, braking_a, motoring_w, braking_w, .. } = *limits;
         let none = TrainLimits::NONE;
-        let (udc_v, speed) = (self.udc_v, speed.abs());
+        let speed = (speed + FOLLOWS_S / SMOOTH_S * (speed - self.speed)).abs();
+        let udc_v = self.udc_v;
         let current_w = motoring_a * motoring_share(udc_v, ratings) * udc_v;
         let taken_w = lower((motoring_a, none.motoring_a, current_w), (motoring_w, none.motoring_w));
         let given_w = lower((braking_a, none.braking_a, braking_a * udc_v), (braking_w, none.braking_w));
@@ -100,14 +106,15 @@ mod tests {
 
     const LIMITS: TrainLimits = TrainLimits { motoring_a: 100.0, braking_w: 90e3, ..TrainLimits::NONE };
 
-    fn drawn(udc_v: f32) -> Drawn {
-        Drawn { udc_v, loss: 4e-3 }
+    /// Of a speed that stays.
+    fn drawn(udc_v: f32, speed: f32) -> Drawn {
+        Drawn { udc_v, loss: 4e-3, speed }
     }
 
     #[test]
     fn without_limits_there_is_no_bound() {
         for (speed, udc_v) in [(0.0, 0.0), (100.0, 900.0), (-600.0, 1_500.0), (300.0, f32::NAN)] {
-            let most = drawn(udc_v).most(speed, &BUILT_IN.ratings, &TrainLimits::NONE);
+            let most = drawn(udc_v, speed).most(speed, &BUILT_IN.ratings, &TrainLimits::NONE);
             assert_eq!(most, Most { motoring_nm: f32::INFINITY, braking_nm: f32::INFINITY });
         }
     }
@@ -116,7 +123,7 @@ mod tests {
     #[test]
     fn shaft_and_loss_are_the_line_s_power() {
         for speed in [2.0, -20.0, 200.0, -600.0] {
-            let most = drawn(1_500.0).most(speed, &BUILT_IN.ratings, &LIMITS);
+            let most = drawn(1_500.0, speed).most(speed, &BUILT_IN.ratings, &LIMITS);
             let power_w =
                 |torque_nm: f32, sign: f32| torque_nm * speed.abs() + sign * 4e-3 * torque_nm * torque_nm;
             assert!((power_w(most.motoring_nm, 1.0) / 150e3 - 1.0).abs() < 1e-3, "{speed}: {most:?}");
@@ -125,11 +132,21 @@ mod tests {
         }
     }
 
+    /// A speed that has risen evenly is the one that it will be.
+    #[test]
+    fn a_ramp_is_looked_ahead_of() {
+        let acceleration = 150.0;
+        let rising = drawn(1_500.0, 40.0 - acceleration * SMOOTH_S);
+        let later = drawn(1_500.0, 40.45).most(40.45, &BUILT_IN.ratings, &LIMITS).motoring_nm;
+        let found = rising.most(40.0, &BUILT_IN.ratings, &LIMITS).motoring_nm;
+        assert!((found / later - 1.0).abs() < 1e-4, "{found} {later}");
+    }
+
     #[test]
     fn a_line_that_sags_gives_less_current_and_at_the_lowest_voltage_none() {
         let ratings = &BUILT_IN.ratings;
         let current_a = |udc_v: f32| {
-            let most = drawn(udc_v).most(300.0, ratings, &LIMITS).motoring_nm;
+            let most = drawn(udc_v, 300.0).most(300.0, ratings, &LIMITS).motoring_nm;
             (most * 300.0 + 4e-3 * most * most) / udc_v
         };
         let (full_v, none_v) = (FULL_SHARE * ratings.dc_link_nominal_v, ratings.dc_link_min_v);
@@ -137,7 +154,7 @@ mod tests {
             assert!((current_a(udc_v) / (100.0 * share) - 1.0).abs() < 1e-3, "{udc_v}: {}", current_a(udc_v));
         }
         assert_eq!(current_a(none_v), 0.0);
-        assert_eq!(drawn(f32::NAN).most(300.0, ratings, &LIMITS).motoring_nm, 0.0);
+        assert_eq!(drawn(f32::NAN, 300.0).most(300.0, ratings, &LIMITS).motoring_nm, 0.0);
     }
 
     /// The first slot takes over what there is, every later one a part in 51; the loss is that of the present currents, at a tenth of the

@@ -78,6 +78,10 @@ pub fn common(recording: &Recording) -> Figures {
         figures.set("lowest_link_v", link_v.clone().fold(f64::INFINITY, f64::min));
         figures.set("highest_link_v", link_v.fold(0.0, f64::max));
     }
+    let peak_a = |drive: &Recording| drive.rows.iter().map(Row::peak_current_a).fold(0.0, f64::max);
+    if let Some(others_a) = recording.beside.iter().map(peak_a).reduce(f64::max) {
+        figures.set("other_drives_peak_current_a", others_a);
+    }
     figures
 }
 

@@ -12,6 +12,17 @@ pub enum Supply {
     Stiff,
     /// A capacitor, fed from a line that takes back what is braked.
     Line(LineFilter),
+    /// A link that is somebody else's, whose voltage is told.
+    Shared,
+}
+
+/// A link's terminals.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Terminal {
+    /// Its voltage, in V.
+    pub udc_v: f64,
+    /// Current out of the line, in A.
+    pub line_a: f64,
 }
 
 /// The line as a function of time in s: its healthy voltage in V, its fault and for how long that lasts, in s.
@@ -23,6 +34,8 @@ pub enum DcSide {
     Stiff,
     /// A capacitor behind a choke.
     Filtered(FilteredLink),
+    /// A link of which only the terminals are here.
+    Shared(Terminal),
     /// A capacitor behind contactors.
     Operated(Box<LineSide>),
 }
@@ -33,6 +46,7 @@ impl DcSide {
         match supply {
             Supply::Stiff => Self::Stiff,
             Supply::Line(filter) => Self::Filtered(FilteredLink::new(filter, udc_v)),
+            Supply::Shared => Self::Shared(Terminal { udc_v, line_a: 0.0 }),
         }
     }
 
@@ -57,6 +71,7 @@ impl DcSide {
         match self {
             Self::Stiff => healthy_v(),
             Self::Filtered(link) => link.udc_v,
+            Self::Shared(terminal) => terminal.udc_v,
             Self::Operated(line) => line.link.udc_v,
         }
     }
@@ -65,6 +80,7 @@ impl DcSide {
     pub fn line_a(&self) -> Option<f64> {
         match self {
             Self::Filtered(link) => Some(link.choke_a),
+            Self::Shared(terminal) => Some(terminal.line_a),
             Self::Operated(line) => line.choke_a(),
             Self::Stiff => None,
         }
@@ -80,6 +96,7 @@ impl DcSide {
     ) {
         match self {
             Self::Stiff => in_plant(|| plant.advance(legs, line().0, dt_s)),
+            Self::Shared(terminal) => in_plant(|| plant.advance(legs, terminal.udc_v, dt_s)),
             Self::Filtered(link) => {
                 let before_j = plant.motor.energies.electrical_j;
                 in_plant(|| plant.advance(legs, link.udc_v, dt_s));
@@ -104,7 +121,7 @@ impl DcSide {
 }
 
 /// The target of the line's voltage, in V; `None` where it is cut off.
-fn line_v((healthy_v, fault): LineState) -> Option<f64> {
+pub(super) fn line_v((healthy_v, fault): LineState) -> Option<f64> {
     match fault {
         None => Some(healthy_v),
         Some((SupplyFault::Lost, _)) => None,

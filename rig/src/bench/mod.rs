@@ -10,6 +10,7 @@ mod dc_side;
 mod due;
 mod encoder;
 mod error;
+mod hold;
 mod inverter;
 mod line;
 mod live;
@@ -27,7 +28,7 @@ mod wiring;
 
 pub use crate::trace::Tick;
 pub use conversions::Conversions;
-pub use dc_side::Supply;
+pub use dc_side::{Supply, Terminal};
 pub use due::Due;
 pub use encoder::{Encoder, Position};
 pub use error::BenchError;
@@ -47,6 +48,7 @@ use crate::inject::traction::{Kind, Spoiler};
 use crate::plant::{Heat, Plant};
 use crate::trace::{Extremes, Found, Row, SlotRow, Switch};
 use dc_side::DcSide;
+use hold::Holds;
 use rows::Rows;
 use tractive::identification::Observation;
 use tractive::modulation::CarrierHalf;
@@ -64,6 +66,8 @@ pub struct Bench {
     plant: Plant,
     inverter: Inverter,
     sensors: Sensors,
+    /// Holds of the conversions for control, and at the carrier's boundaries.
+    holds: [Holds; 2],
     dc: DcSide,
     spoiler: Spoiler,
     /// The effects of a fault.
@@ -98,6 +102,7 @@ impl Bench {
         Self {
             plant,
             inverter: Inverter::new(settings.dead_time_ticks.into(), first),
+            holds: [Holds::new(settings.flaws.adc_skew_s.map(|early_s| time.steps(early_s))); 2],
             sensors: Sensors::new(settings.udc_v, settings.link_steps.clone(), settings.flaws),
             dc: DcSide::new(settings.supply, settings.udc_v),
             spoiler: Spoiler::new(settings.injection),

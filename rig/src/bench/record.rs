@@ -50,6 +50,7 @@ impl Simulated for Bench {
             tick_s: self.time.step_s,
             observations: self.observations,
             found: self.found,
+            beside: Vec::new(),
         }
     }
 }

@@ -1,6 +1,7 @@
 //! Lets time pass, and does what is due on the way.
 
-use super::{Bench, BenchError, LineSide, Peaks, Stored, Stuck, Tick};
+use super::dc_side::{DcSide, line_v};
+use super::{Bench, BenchError, LineSide, Peaks, Stored, Stuck, Terminal, Tick};
 use crate::inject::traction::Kind;
 use tractive::protection::LegFaults;
 
@@ -8,28 +9,66 @@ impl Bench {
     /// Runs to `tick`, doing on the way all that is due, and at `tick` itself too.
     pub(super) fn advance(&mut self, tick: Tick) -> Result<(), BenchError> {
         while self.time.now < tick {
-            let now = self.time.now;
-            let fault = Some(self.observed.from).filter(|from| *from > now);
-            let line = self.dc.operated().and_then(LineSide::next_event);
-            let load = self.loads.next().map(|at| at.max(now));
-            let events = [fault, self.inverter.next_event(), self.orders.next(), load, line];
-            let regular = [self.inverter.half_end(), self.control.next, self.next_row()];
-            let due = events.into_iter().flatten().chain(regular).fold(tick, Tick::min);
-            self.integrate(due);
+            let due = self.due(tick);
+            self.turn_on(self.seconds_to(due));
+            self.pass(due);
             self.act()?;
         }
         Ok(())
     }
 
-    fn integrate(&mut self, tick: Tick) {
+    /// The next tick after now at which something is due, at the latest `tick`.
+    pub(crate) fn due(&self, tick: Tick) -> Tick {
+        let now = self.time.now;
+        let fault = Some(self.observed.from).filter(|from| *from > now);
+        let line = self.dc.operated().and_then(LineSide::next_event);
+        let load = self.loads.next().map(|at| at.max(now));
+        let [for_control, at_boundary] = &self.holds;
+        let held = for_control.next_event(now, self.control.next);
+        let held_at_boundary = at_boundary.next_event(now, self.inverter.half_end());
+        let inverter = self.inverter.next_event();
+        let events = [fault, inverter, self.orders.next(), load, line, held, held_at_boundary];
+        let regular = [self.inverter.half_end(), self.control.next, self.next_row()];
+        events.into_iter().flatten().chain(regular).fold(tick, Tick::min)
+    }
+
+    /// Time from now to a tick, in s.
+    pub(crate) fn seconds_to(&self, tick: Tick) -> f64 {
+        tick.saturating_sub(self.time.now) as f64 * self.time.step_s
+    }
+
+    /// Lets plant and link run on for a time; returns the energy that the legs have taken from the link, in J.
+    pub(crate) fn turn_on(&mut self, dt_s: f64) -> f64 {
+        if dt_s <= 0.0 {
+            return 0.0;
+        }
+        let t_s = self.time.now_s();
+        let (sensors, spoiler) = (&self.sensors, &self.spoiler);
+        let before_j = self.plant.motor.energies.electrical_j;
+        self.dc.advance(&mut self.plant, self.inverter.legs(), dt_s, || {
+            (sensors.supply_v(t_s), spoiler.supply(t_s))
+        });
+        self.plant.motor.energies.electrical_j - before_j
+    }
+
+    /// Voltage of a line behind a shared link, in V; `None` where it is cut off.
+    pub(crate) fn line_now(&self) -> Option<f64> {
+        let t_s = self.time.now_s();
+        line_v((self.sensors.supply_v(t_s), self.spoiler.supply(t_s)))
+    }
+
+    /// Comes to `tick` with a shared link, after [`Self::turn_on`], and does what is due.
+    pub(crate) fn arrive(&mut self, tick: Tick, terminal: Terminal) -> Result<(), BenchError> {
+        self.dc = DcSide::Shared(terminal);
+        self.pass(tick);
+        self.act()
+    }
+
+    /// The plant as it is seen at `tick`, to which it has run.
+    fn pass(&mut self, tick: Tick) {
         let now = self.time.now;
         if tick > now {
-            let t_s = self.time.now_s();
-            let dt_s = (tick - now) as f64 * self.time.step_s;
-            let (sensors, spoiler) = (&self.sensors, &self.spoiler);
-            self.dc.advance(&mut self.plant, self.inverter.legs(), dt_s, || {
-                (sensors.supply_v(t_s), spoiler.supply(t_s))
-            });
+            let dt_s = self.seconds_to(tick);
             self.sensors.pass(&self.plant.motor, dt_s);
             self.inverter.monitor(self.plant.motor.currents_abc(), now, tick);
             if self.inverter.leg_faults() != LegFaults::default() {
@@ -67,6 +106,10 @@ impl Bench {
     fn act(&mut self) -> Result<(), BenchError> {
         let now = self.time.now;
         let t_s = self.time.now_s();
+        let conversions = [self.control.next, self.inverter.half_end()];
+        for (holds, at) in self.holds.iter_mut().zip(conversions) {
+            holds.act(now, at, || self.sensors.behind(&self.plant.motor));
+        }
         if let Some(row) = self.dc.operated_mut().and_then(|line| line.act(now, t_s))
             && now >= self.time.lead
             && now <= self.end

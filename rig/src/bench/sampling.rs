@@ -59,7 +59,8 @@ impl Bench {
     /// Phase currents at the carrier boundary `instant`.
     pub fn pwm_sample(&mut self, instant: Instant) -> Result<Abc, BenchError> {
         self.advance(self.time.widen(instant))?;
-        let currents_a = self.sensors.currents(&self.plant.motor);
+        let [_, at_boundary] = self.holds;
+        let currents_a = self.sensors.converted(at_boundary.read(self.sensors.behind(&self.plant.motor)));
         Ok(self.read_currents(currents_a))
     }
 
@@ -92,7 +93,9 @@ impl Bench {
             line.warm(&mut self.plant, period_s);
         }
         let (demand, enable) = self.operator.demand(t_s);
-        let (true_a, position) = self.sensors.measure(&self.plant.motor, t_s);
+        let [for_control, _] = self.holds;
+        let held_a = for_control.read(self.sensors.behind(&self.plant.motor));
+        let (true_a, position) = self.sensors.measure(held_a, &self.plant.motor, t_s);
         let hardware = self.dc.operated().and_then(|line| line.hardware(t_s));
         // Without control nobody looks after the operator.
         let known = position.angle.is_some();

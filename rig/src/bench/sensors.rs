@@ -44,6 +44,8 @@ pub struct Flaws {
     pub angle_counts: Option<f64>,
     /// Time constant of the current sensors, in s.
     pub current_filter_s: f64,
+    /// Time by which each phase's current is sampled before the rest, in s.
+    pub adc_skew_s: [f64; 3],
     /// From this time on control is told the same currents again and again, in s.
     pub freeze_at_s: Option<f64>,
     /// Seed of the noise.
@@ -70,6 +72,7 @@ impl Flaws {
         angle_late_s: 0.0,
         angle_counts: None,
         current_filter_s: 0.0,
+        adc_skew_s: [0.0; 3],
         freeze_at_s: None,
         seed: 0,
     };
@@ -132,7 +135,16 @@ impl Converter {
 
     /// A motor's phase currents as converted now, in A.
     pub fn currents(&mut self, motor: &Motor) -> Abc {
-        let behind_a = if self.flaws.current_filter_s > 0.0 { self.filtered_a } else { motor.currents_abc() };
+        self.converted(self.behind(motor))
+    }
+
+    /// A motor's phase currents behind the sensors' time constant, in A.
+    pub fn behind(&self, motor: &Motor) -> [f64; 3] {
+        if self.flaws.current_filter_s > 0.0 { self.filtered_a } else { motor.currents_abc() }
+    }
+
+    /// Phase currents that were held, as converted, in A.
+    pub fn converted(&mut self, behind_a: [f64; 3]) -> Abc {
         let read_a = self.flaws.current_wiring.read(behind_a);
         let [a, b, c] = [0, 1, 2].map(|sensor| self.convert(sensor, read_a[sensor]) as f32);
         Abc { a, b, c }
@@ -207,15 +219,20 @@ impl Sensors {
         self.converter.pass(motor.currents_abc(), dt_s);
     }
 
-    /// The phase currents as converted now.
-    pub fn currents(&mut self, motor: &Motor) -> Abc {
-        self.converter.currents(motor)
+    /// See [`Converter::behind`].
+    pub fn behind(&self, motor: &Motor) -> [f64; 3] {
+        self.converter.behind(motor)
     }
 
-    /// The phase currents that control is told at `t_s`, and the rotor's angle.
-    pub fn measure(&mut self, motor: &Motor, t_s: f64) -> (Abc, Position) {
+    /// Phase currents that were held, as converted.
+    pub fn converted(&mut self, held_a: [f64; 3]) -> Abc {
+        self.converter.converted(held_a)
+    }
+
+    /// The phase currents that control is told at `t_s`, of those that were held, and the rotor's angle.
+    pub fn measure(&mut self, held_a: [f64; 3], motor: &Motor, t_s: f64) -> (Abc, Position) {
         if self.converter.flaws.freeze_at_s.is_none_or(|freeze_s| t_s < freeze_s) {
-            self.told_a = self.currents(motor);
+            self.told_a = self.converted(held_a);
         }
         let angle = self.converter.angle(motor);
         let absolute = Position { angle: Some(angle), counted: None };

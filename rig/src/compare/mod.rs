@@ -1,10 +1,12 @@
 //! `compare`: both control laws on the same plant with the same options, and what each reached, row by row.
 
+mod flaws;
 mod outcome;
 mod parts;
 mod rows;
 mod zs9;
 
+pub use flaws::{FlawRow, flaws, table as flaws_table};
 pub use outcome::Row;
 pub use parts::{PartRow, parts};
 
@@ -39,7 +41,10 @@ pub struct CompareOptions {
     /// Instead: our law with its parts taken away one at a time.
     #[arg(long, conflicts_with = "only")]
     pub parts: bool,
-    /// Folder for compare.csv and compare.md, or parts.md.
+    /// Instead: our law with the flaws of --real, one at a time and all at once.
+    #[arg(long, conflicts_with_all = ["only", "parts"])]
+    pub flaws: bool,
+    /// Folder for compare.csv and compare.md, or parts.md, or flaws.md.
     #[arg(long)]
     pub out: Option<PathBuf>,
     /// Print the rows as JSON.
@@ -92,6 +97,9 @@ pub fn run(options: &CompareOptions) -> Result<ExitCode> {
     if options.parts {
         return run_parts(options);
     }
+    if options.flaws {
+        return run_flaws(options);
+    }
     let rows = rows(&options.only)?;
     let cells = |row: &Row| [row.quantity.to_owned(), row.found[0].clone(), row.found[1].clone(), row.mark()];
     let mut table = Table::new();
@@ -137,6 +145,26 @@ fn run_parts(options: &CompareOptions) -> Result<ExitCode> {
         let text =
             format!("| {} |\n|---|---|---:|---:|---:|\n{}\n", PART_HEADS.join(" | "), lines.join("\n"));
         write_text(&out.join("parts.md"), &text)?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn run_flaws(options: &CompareOptions) -> Result<ExitCode> {
+    let rows = flaws()?;
+    if options.json {
+        crate::say!("{}", serde_json::to_string(&rows)?);
+    } else {
+        let mut table = Table::new();
+        table
+            .load_style(NOTHING)
+            .set_content_arrangement(ContentArrangement::Dynamic)
+            .set_header(flaws::HEADS);
+        table.add_rows(rows.iter().map(FlawRow::cells));
+        crate::say!("{}", table.trim_fmt());
+    }
+    if let Some(out) = &options.out {
+        std::fs::create_dir_all(out).with_context(|| format!("--out {}", out.display()))?;
+        write_text(&out.join("flaws.md"), &flaws_table(&rows))?;
     }
     Ok(ExitCode::SUCCESS)
 }

@@ -6,11 +6,13 @@
 
 mod dc_link;
 mod devices;
+mod iron;
 mod legs;
 mod line_filter;
 mod motor;
 mod rotor;
 mod runge_kutta;
+mod shaft;
 mod speed;
 mod stator;
 pub mod stopwatch;
@@ -25,6 +27,7 @@ pub use legs::Leg;
 pub use line_filter::{FilteredLink, LineFilter};
 pub use motor::{Motor, MotorEnergies};
 pub use rotor::{Rotor, Turning};
+pub use shaft::ShaftSettings;
 pub use speed::{SpeedSource, profile_speed};
 pub use stator::{Stator, StatorSlopes};
 pub use thermal::{Heat, HeatSettings, Node, Wire, Wired};
@@ -44,13 +47,24 @@ pub struct PlantSettings {
     pub resistance_scale: f64,
     /// Sixth harmonic of the magnets' voltage over the rotor's angle, as a share of that voltage.
     pub slots_share: f64,
-    /// Voltage drops of the inverter's devices; a plant with several motors has none.
+    /// Voltage drops of the inverter's devices; a plant with several motors has its own.
     pub drops: DeviceDrops,
+    /// Iron loss as a torque, as a share of the loss that the machine's folder names; a plant with several motors has none.
+    pub iron_share: f64,
+    /// The elastic shaft between rotor and load, where there is one.
+    pub shaft: Option<ShaftSettings>,
 }
 
 impl Default for PlantSettings {
     fn default() -> Self {
-        Self { flux_scale: 1.0, resistance_scale: 1.0, slots_share: 0.0, drops: DeviceDrops::NONE }
+        Self {
+            flux_scale: 1.0,
+            resistance_scale: 1.0,
+            slots_share: 0.0,
+            drops: DeviceDrops::NONE,
+            iron_share: 0.0,
+            shaft: None,
+        }
     }
 }
 

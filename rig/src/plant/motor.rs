@@ -30,7 +30,7 @@ impl Motor {
     /// Without current, angle zero, turning as the speed source says.
     pub(super) fn new(machine: &MachineFolder, speed: SpeedSource, settings: &PlantSettings) -> Self {
         let stator = Stator::new(machine, settings);
-        let rotor = Rotor::new(speed, stator.pole_pairs);
+        let rotor = Rotor::new(speed, stator.pole_pairs).on_shaft(settings.shaft);
         Self { stator, rotor, id_a: 0.0, iq_a: 0.0, energies: MotorEnergies::default() }
     }
 
@@ -69,10 +69,16 @@ impl Motor {
         Vector::from_rotor((self.id_a, self.iq_a), self.rotor.sin_cos()).phases()
     }
 
-    /// Air-gap torque, in N·m.
+    /// Air-gap torque, less what the iron takes of it, in N·m.
     pub fn torque_nm(&self) -> f64 {
-        let slots_nm = self.stator.slot_torque_nm((self.id_a, self.iq_a), self.rotor.sin_cos());
-        self.stator.torque_nm(self.id_a, self.iq_a) + slots_nm
+        let current = (self.id_a, self.iq_a);
+        let slots_nm = self.stator.slot_torque_nm(current, self.rotor.sin_cos());
+        let torque_nm = self.stator.torque_nm(self.id_a, self.iq_a) + slots_nm;
+        if self.stator.loses_in_iron() {
+            torque_nm - self.stator.iron_torque_nm(current, TAU * self.turns_s())
+        } else {
+            torque_nm
+        }
     }
 
     /// Electrical rotor angle, in turns, 0 ≤ x < 1.

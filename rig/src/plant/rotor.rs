@@ -1,5 +1,6 @@
 //! A rotor: angle, speed, and what turns it.
 
+use super::shaft::{Shaft, ShaftSettings};
 use super::speed::{SpeedSource, profile_speed};
 use core::f64::consts::TAU;
 
@@ -17,6 +18,8 @@ pub struct Rotor {
     speed_rad_s: f64,
     /// Torque of friction of a free rotor, in N·m.
     friction_nm: f64,
+    /// The elastic shaft between it and what turns it; `None`: they are one.
+    shaft: Option<Shaft>,
 }
 
 impl Rotor {
@@ -28,7 +31,14 @@ impl Rotor {
             SpeedSource::Wheel(wheel) => wheel.train_rad_s,
         };
         let sin_cos = (0.0, 1.0);
-        Self { source, pole_pairs, time_s: 0.0, angle_turns: 0.0, sin_cos, speed_rad_s, friction_nm: 0.0 }
+        let (time_s, angle_turns, friction_nm) = (0.0, 0.0, 0.0);
+        Self { source, pole_pairs, time_s, angle_turns, sin_cos, speed_rad_s, friction_nm, shaft: None }
+    }
+
+    /// The same on an elastic shaft, if there is one: what turns it, or is turned by it, is at the far end.
+    pub fn on_shaft(mut self, shaft: Option<ShaftSettings>) -> Self {
+        self.shaft = shaft.map(|settings| Shaft::new(settings, self.speed_rad_s));
+        self
     }
 
     /// Turns the rotor to an electrical angle, in turns.
@@ -58,6 +68,9 @@ impl Rotor {
     pub fn set_speed_rpm(&mut self, speed_rpm: f64) {
         if matches!(self.source, SpeedSource::Inertia { .. }) {
             self.speed_rad_s = speed_rpm * TAU / 60.0;
+            if let Some(shaft) = &mut self.shaft {
+                shaft.reset(self.speed_rad_s);
+            }
         }
     }
 
@@ -74,19 +87,19 @@ impl Rotor {
     }
 
     /// The torque that is left of one, in N·m, where friction takes its part: beyond rest it turns nothing back.
-    fn beyond_friction_nm(&self, torque_nm: f64, (inertia_kg_m2, dt_s): (f64, f64)) -> f64 {
+    fn beyond_friction_nm(&self, torque_nm: f64, speed_rad_s: f64, (inertia_kg_m2, dt_s): (f64, f64)) -> f64 {
         if self.friction_nm == 0.0 {
             return torque_nm;
         }
         // The torque that would stop the rotor within the step.
-        let stops_nm = -self.speed_rad_s * inertia_kg_m2 / dt_s;
+        let stops_nm = -speed_rad_s * inertia_kg_m2 / dt_s;
         let against_nm = (stops_nm - torque_nm).clamp(-self.friction_nm, self.friction_nm);
         torque_nm + against_nm
     }
 
     /// Holds the rotor at a speed from now on, in r/min, whatever the torque; it goes there at this slope, in r/min per s, above 0.
     pub fn hold(&mut self, speed_rpm: f64, slope_rpm_s: f64) {
-        let from_rpm = self.speed_rpm();
+        let from_rpm = self.shaft.map_or(self.speed_rad_s, |shaft| shaft.end_rad_s) * 60.0 / TAU;
         let there_s = self.time_s + (speed_rpm - from_rpm).abs() / slope_rpm_s;
         self.source = SpeedSource::profile(vec![(self.time_s, from_rpm), (there_s, speed_rpm)]);
     }
@@ -99,14 +112,19 @@ impl Rotor {
     /// The step that begins now and lasts `dt_s`, with an air-gap torque that is asked for only where it counts.
     #[inline]
     pub fn turning(&self, torque_nm: impl FnOnce() -> f64, dt_s: f64) -> Turning {
-        let acceleration = match &self.source {
-            SpeedSource::Profile(points) => {
+        let acceleration = match (&self.shaft, &self.source) {
+            (Some(shaft), source) => {
+                let rotor_kg_m2 = shaft.rotor_kg_m2(source.inertia_kg_m2());
+                (torque_nm() - shaft.torque_nm(rotor_kg_m2, self.speed_rad_s)) / rotor_kg_m2
+            }
+            (None, SpeedSource::Profile(points)) => {
                 (profile_speed(points, self.time_s + dt_s) - profile_speed(points, self.time_s)) / dt_s
             }
-            SpeedSource::Inertia { inertia_kg_m2, load_nm } => {
-                self.beyond_friction_nm(torque_nm() - load_nm, (*inertia_kg_m2, dt_s)) / inertia_kg_m2
+            (None, SpeedSource::Inertia { inertia_kg_m2, load_nm }) => {
+                let driven = (*inertia_kg_m2, dt_s);
+                self.beyond_friction_nm(torque_nm() - load_nm, self.speed_rad_s, driven) / inertia_kg_m2
             }
-            SpeedSource::Wheel(wheel) => {
+            (None, SpeedSource::Wheel(wheel)) => {
                 (torque_nm() - wheel.grip_nm(self.speed_rad_s, self.time_s)) / wheel.inertia_kg_m2
             }
         };
@@ -116,31 +134,55 @@ impl Rotor {
     /// Ends a step in which the air-gap torque gave an impulse, in N·m·s. Returns the work done on the rotor, in J.
     #[inline]
     pub fn finish(&mut self, impulse_nm_s: f64, dt_s: f64) -> f64 {
-        let began_s = self.time_s;
-        self.time_s += dt_s;
         let speed_before = self.speed_rad_s;
-        self.speed_rad_s = match &self.source {
-            SpeedSource::Profile(points) => profile_speed(points, self.time_s),
+        self.speed_rad_s = match self.shaft {
+            None => self.drive(speed_before, (impulse_nm_s, 0.0), dt_s),
+            Some(shaft) => self.twist(shaft, impulse_nm_s, dt_s),
+        };
+        self.time_s += dt_s;
+        let mean_speed = 0.5 * (speed_before + self.speed_rad_s);
+        self.turn_to(self.angle_turns + self.pole_pairs * mean_speed * dt_s / TAU);
+        impulse_nm_s * mean_speed
+    }
+
+    /// The speed, in rad/s, after a step from this one for what the source turns, or is turned by, without an inertia in kg·m² that is not part of it,
+    /// with an impulse in N·m·s.
+    fn drive(&mut self, speed_rad_s: f64, (impulse_nm_s, without_kg_m2): (f64, f64), dt_s: f64) -> f64 {
+        let began_s = self.time_s;
+        let after_rad_s = match &self.source {
+            SpeedSource::Profile(points) => profile_speed(points, began_s + dt_s),
             SpeedSource::Inertia { inertia_kg_m2, load_nm } => {
+                let inertia_kg_m2 = inertia_kg_m2 - without_kg_m2;
                 let impulse_nm_s = impulse_nm_s - load_nm * dt_s;
                 let left_nm_s = if self.friction_nm == 0.0 {
                     impulse_nm_s
                 } else {
-                    self.beyond_friction_nm(impulse_nm_s / dt_s, (*inertia_kg_m2, dt_s)) * dt_s
+                    let driven = (inertia_kg_m2, dt_s);
+                    self.beyond_friction_nm(impulse_nm_s / dt_s, speed_rad_s, driven) * dt_s
                 };
-                speed_before + left_nm_s / inertia_kg_m2
+                speed_rad_s + left_nm_s / inertia_kg_m2
             }
             SpeedSource::Wheel(wheel) => {
-                let grip_nm_s = wheel.grip_nm(speed_before, began_s) * dt_s;
-                speed_before + (impulse_nm_s - grip_nm_s) / wheel.inertia_kg_m2
+                let grip_nm_s = wheel.grip_nm(speed_rad_s, began_s) * dt_s;
+                speed_rad_s + (impulse_nm_s - grip_nm_s) / (wheel.inertia_kg_m2 - without_kg_m2)
             }
         };
         if let SpeedSource::Wheel(wheel) = &mut self.source {
-            wheel.drive(speed_before, began_s, dt_s);
+            wheel.drive(speed_rad_s, began_s, dt_s);
         }
-        let mean_speed = 0.5 * (speed_before + self.speed_rad_s);
-        self.turn_to(self.angle_turns + self.pole_pairs * mean_speed * dt_s / TAU);
-        impulse_nm_s * mean_speed
+        after_rad_s
+    }
+
+    /// The rotor's speed, in rad/s, after a step on an elastic shaft: half of its twist, both ends, the other half.
+    fn twist(&mut self, mut shaft: Shaft, impulse_nm_s: f64, dt_s: f64) -> f64 {
+        let rotor_kg_m2 = shaft.rotor_kg_m2(self.source.inertia_kg_m2());
+        shaft.twist(self.speed_rad_s, 0.5 * dt_s);
+        let through_nm_s = shaft.torque_nm(rotor_kg_m2, self.speed_rad_s) * dt_s;
+        let after_rad_s = self.speed_rad_s + (impulse_nm_s - through_nm_s) / rotor_kg_m2;
+        shaft.end_rad_s = self.drive(shaft.end_rad_s, (through_nm_s, rotor_kg_m2), dt_s);
+        shaft.twist(after_rad_s, 0.5 * dt_s);
+        self.shaft = Some(shaft);
+        after_rad_s
     }
 }
 

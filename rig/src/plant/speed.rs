@@ -24,6 +24,15 @@ impl SpeedSource {
     pub fn profile(points: Vec<(f64, f64)>) -> Self {
         Self::Profile(points)
     }
+
+    /// Inertia of all that turns, in kg·m²; `None` where a speed is prescribed.
+    pub fn inertia_kg_m2(&self) -> Option<f64> {
+        match self {
+            Self::Profile(_) => None,
+            Self::Inertia { inertia_kg_m2, .. } => Some(*inertia_kg_m2),
+            Self::Wheel(wheel) => Some(wheel.inertia_kg_m2),
+        }
+    }
 }
 
 /// Speed of a profile at a time, in mechanical rad/s.

@@ -1,6 +1,7 @@
 //! A machine's stator equation in the rotor frame.
 
 use super::PlantSettings;
+use super::iron::Iron;
 use super::runge_kutta::rotated;
 use tractive_tablegen::{FluxMap, FluxPoint, MachineFolder, SmoothMap};
 
@@ -17,6 +18,7 @@ pub struct Stator {
     resistance_ohm: f64,
     /// Amplitude of the magnets' flux linkage that goes six times with the angle, in Wb.
     slots_wb: f64,
+    iron: Iron,
 }
 
 /// Flux linkage over current.
@@ -39,7 +41,7 @@ pub struct StatorSlopes {
     pub electrical_w: f64,
     /// Copper loss, in W: `1.5 R |i|²`.
     pub copper_w: f64,
-    /// Air-gap torque, in N·m: `1.5 n_p (ψ_d i_q − ψ_q i_d)`.
+    /// Air-gap torque, in N·m: `1.5 n_p (ψ_d i_q − ψ_q i_d)`; less what the iron takes.
     pub torque_nm: f64,
 }
 
@@ -71,6 +73,7 @@ impl Stator {
             scale: settings.flux_scale,
             lost_wb: 0.0,
             slots_wb: settings.slots_share / SLOT_ORDER * magnet_wb,
+            iron: Iron::of(machine, settings.iron_share),
             pole_pairs: f64::from(parameters.pole_pairs),
             rated_ohm: parameters.stator_resistance_ohm,
             resistance_ohm: parameters.stator_resistance_ohm * settings.resistance_scale,
@@ -137,6 +140,19 @@ impl Stator {
         1.5 * self.pole_pairs * (d * id + q * iq)
     }
 
+    /// `true` if the iron takes torque.
+    #[inline]
+    pub fn loses_in_iron(&self) -> bool {
+        self.iron.is_some()
+    }
+
+    /// The torque that the iron takes at a current and an electrical speed in rad/s, in N·m.
+    pub fn iron_torque_nm(&self, (id_a, iq_a): (f64, f64), omega: f64) -> f64 {
+        let flux = self.flux(id_a, iq_a);
+        let square = flux.psi_d_wb * flux.psi_d_wb + flux.psi_q_wb * flux.psi_q_wb;
+        self.iron.torque_nm(square, omega)
+    }
+
     /// The voltage that the slots induce with the rotor at an angle of this sine and cosine, rotor frame, over the electrical speed, in Wb. The flux linkage is
     /// `h (cos 6θ, 0)`, whose change and turn are `h (−6 sin 6θ, cos 6θ)`.
     fn slots(&self, rotor: (f64, f64)) -> (f64, f64) {
@@ -145,18 +161,35 @@ impl Stator {
         (-SLOT_ORDER * self.slots_wb * sin, self.slots_wb * cos)
     }
 
-    /// The stator equation with the rotor at an angle of the sine and cosine `rotor`; see [`Self::slopes`], which knows of no slots.
+    /// The stator equation with the rotor at an angle of the sine and cosine `rotor`; see [`Self::slopes`], which knows of neither slots nor
+    /// iron loss.
     #[inline]
     pub fn slopes_at(
+        &self,
+        current: (f64, f64),
+        voltage: (f64, f64),
+        omega: f64,
+        rotor: (f64, f64),
+    ) -> StatorSlopes {
+        let slopes = if self.slots_wb == 0.0 {
+            self.slopes(current, voltage, omega)
+        } else {
+            self.slopes_with_slots(current, voltage, omega, rotor)
+        };
+        if !self.loses_in_iron() {
+            return slopes;
+        }
+        StatorSlopes { torque_nm: slopes.torque_nm - self.iron_torque_nm(current, omega), ..slopes }
+    }
+
+    /// The same without iron loss, but with slots.
+    fn slopes_with_slots(
         &self,
         current: (f64, f64),
         (ud, uq): (f64, f64),
         omega: f64,
         rotor: (f64, f64),
     ) -> StatorSlopes {
-        if self.slots_wb == 0.0 {
-            return self.slopes(current, (ud, uq), omega);
-        }
         let (slot_d, slot_q) = self.slots(rotor);
         let induced_v = (omega * slot_d, omega * slot_q);
         let without = self.slopes(current, (ud - induced_v.0, uq - induced_v.1), omega);

@@ -17,6 +17,24 @@ pub trait Interrupts {
     /// The control interrupt, and the idle loop where it ends.
     fn control(&mut self, bench: &mut Self::Bench) -> Result<()>;
 
+    /// The instant of the next interrupt, and whether it is the PWM's: at equal instants that comes first, because it has the higher priority.
+    fn next(&self, bench: &Self::Bench) -> (Instant, bool) {
+        let [control_at, pwm_at] = self.next_calls();
+        let is_pwm = control_at.reached(pwm_at) || !bench.has_control(control_at);
+        (if is_pwm { pwm_at } else { control_at }, is_pwm)
+    }
+
+    /// The instant of the next interrupt.
+    fn next_call(&self, bench: &Self::Bench) -> Instant {
+        self.next(bench).0
+    }
+
+    /// The next interrupt.
+    fn call(&mut self, bench: &mut Self::Bench) -> Result<()> {
+        let (_, is_pwm) = self.next(bench);
+        if is_pwm { self.pwm(bench) } else { self.control(bench) }
+    }
+
     /// Until the bench's recording is complete, or nobody wants to see more of it.
     fn drive(
         &mut self,
@@ -24,13 +42,7 @@ pub trait Interrupts {
         mut goes_on: impl FnMut(&Self::Bench) -> bool,
     ) -> Result<()> {
         while !bench.is_done() {
-            let [control_at, pwm_at] = self.next_calls();
-            // At equal instants the PWM interrupt comes first: it has the higher priority.
-            if control_at.reached(pwm_at) || !bench.has_control(control_at) {
-                self.pwm(bench)?;
-            } else {
-                self.control(bench)?;
-            }
+            self.call(bench)?;
             if !goes_on(bench) {
                 break;
             }

@@ -38,15 +38,21 @@ impl Zs9Plant {
 
     fn step_with(&mut self, bridge: &Bridge, feed: Feed, dt_s: f64) -> f64 {
         let trial = self.try_step(bridge, feed, dt_s);
-        self.take(&trial);
+        self.take_at(&trial, bridge, feed);
         dt_s
+    }
+
+    /// Takes a step, and notes the link's voltage after it.
+    fn take_at(&mut self, trial: &Trial, bridge: &Bridge, feed: Feed) {
+        self.take(trial);
+        self.bridge_v = self.link_now_v(bridge, feed);
     }
 
     fn step_to_change(&mut self, bridge: &Bridge, feed: Feed, longest_s: f64) -> f64 {
         let longest_s = if feed == Feed::Blocked { longest_s.min(LONGEST_BLOCKED_S) } else { longest_s };
         let trial = self.try_step(bridge, feed, longest_s);
         if self.holds(bridge, feed, &trial) {
-            self.take(&trial);
+            self.take_at(&trial, bridge, feed);
             return longest_s;
         }
         // The longest step within which nothing changes, and a little more, so that the change has come.

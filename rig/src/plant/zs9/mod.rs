@@ -5,7 +5,7 @@
 //!                                            upper motor  lower motor
 //! ```
 //!
-//! Ideal switches. Dead time is the affair of the gates, not of the plant: while a leg waits, its diodes make one of the states that
+//! Ideal switches, unless they have [`drops`]. Dead time is the affair of the gates, not of the plant: while a leg waits, its diodes make one of the states that
 //! are known here. Between two edges of the gates network and motors are integrated together, as one set of equations. Outside shoot-through the bridge draws
 //! `i_in = 1.5 Σ (s·i)` at `U_in = v1 + v2 − U_dc`, s being the terminals' shares of the link as a vector, and a motor sees
 //! `u = U_in s`; so what leaves the network enters the motors, also while the diodes of a bridge without gates decide on s.
@@ -15,6 +15,7 @@
 
 mod bridge;
 mod diode;
+mod drops;
 mod means;
 mod network;
 mod step;
@@ -26,7 +27,7 @@ pub use means::{Means, MotorMeans};
 pub use network::{NetworkState, ZNetwork};
 
 use super::legs::{Clamp, LONGEST_STEP_S};
-use super::{PlantSettings, SpeedSource};
+use super::{DeviceDrops, PlantSettings, SpeedSource};
 use bridge::Bridge;
 use means::Adder;
 use tractive_tablegen::{MachineFolder, SmoothMap};
@@ -55,6 +56,8 @@ pub struct Zs9Settings {
     pub source_v: f64,
     /// The deviations of the true machines from their folders: the upper motor, the lower one.
     pub motors: [PlantSettings; 2],
+    /// Voltage drops of the nine devices and of the source's switch.
+    pub drops: DeviceDrops,
 }
 
 impl Default for Zs9Settings {
@@ -64,6 +67,7 @@ impl Default for Zs9Settings {
             source: Source::Bidirectional,
             source_v: 400.0,
             motors: [PlantSettings::default(); 2],
+            drops: DeviceDrops::NONE,
         }
     }
 }
@@ -75,6 +79,8 @@ pub struct Zs9Energies {
     pub source_j: f64,
     /// Turned into heat in the inductors.
     pub inductors_j: f64,
+    /// Likewise in the devices.
+    pub devices_j: f64,
 }
 
 /// Source, network, bridge, motors.
@@ -87,6 +93,11 @@ pub struct Zs9Plant {
     /// Source voltage U_dc, in V, above 0.
     pub source_v: f64,
     clamp: Clamp,
+    /// Drops of the devices; `None`: they are ideal.
+    drops: Option<DeviceDrops>,
+    /// Gates of the legs in the step that is made.
+    gates: [LegGates; 3],
+    bridge_v: f64,
     /// Inductor currents and capacitor voltages.
     pub network: NetworkState,
     /// The upper motor and the lower one.
@@ -115,6 +126,9 @@ impl Zs9Plant {
             source: settings.source,
             source_v: settings.source_v,
             clamp: clamp.of_both(&other),
+            drops: settings.drops.is_some().then_some(settings.drops),
+            gates: [LegGates::OFF; 3],
+            bridge_v: settings.source_v,
             network: NetworkState::even(0.0, settings.source_v),
             motors,
             time_s: 0.0,
@@ -135,12 +149,15 @@ impl Zs9Plant {
     /// Lets time pass with the gates of the legs u, v, w unchanged. The error names the first leg whose gates are illegal;
     /// nothing has happened then.
     pub fn advance(&mut self, gates: [LegGates; 3], dt_s: f64) -> Result<(), IllegalState> {
-        self.advance_bridge(&Bridge::of(gates, self.time_s)?, dt_s);
+        let bridge = Bridge::of(gates, self.time_s)?;
+        self.gates = gates;
+        self.advance_bridge(&bridge, dt_s);
         Ok(())
     }
 
     /// The same where gates are stuck, so that any state may be.
     pub fn advance_any(&mut self, gates: [LegGates; 3], dt_s: f64) {
+        self.gates = gates;
         self.advance_bridge(&Bridge::of_any(gates), dt_s);
     }
 
@@ -166,17 +183,24 @@ impl Zs9Plant {
         v1 + v2 - self.source_v
     }
 
+    /// The link's true voltage, in V, in shoot-through that outside it: [`Self::link_v`], but where a source that takes nothing back holds it lower, or the bridge's
+    /// own diodes short it.
+    pub fn bridge_v(&self) -> f64 {
+        self.bridge_v
+    }
+
     /// Energy stored in the network and in the motors' fields, in J.
     pub fn stored_j(&self) -> f64 {
         self.parts.stored_j(&self.network) + self.motors.iter().map(Motor::field_j).sum::<f64>()
     }
 
     /// The residual of the energies since a time when `stored_j` was stored, in J, all energies counted from zero:
-    /// `source − inductors − Σ (copper + mechanical) − change of what is stored`.
+    /// `source − inductors − devices − Σ (copper + mechanical) − change of what is stored`.
     pub fn residual_j(&self, stored_j: f64) -> f64 {
         let used = |motor: &Motor| motor.energies.copper_j + motor.energies.mechanical_j;
         self.energies.source_j
             - self.energies.inductors_j
+            - self.energies.devices_j
             - self.motors.iter().map(used).sum::<f64>()
             - (self.stored_j() - stored_j)
     }

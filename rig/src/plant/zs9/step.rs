@@ -1,6 +1,7 @@
 //! One Runge–Kutta step of network and motors together.
 
 use super::bridge::{Bridge, LegGates, freewheeling};
+use super::drops::{Devices, Lost};
 use super::means::Seen;
 use super::network::NetworkState;
 use super::{Vector, Zs9Plant};
@@ -24,8 +25,8 @@ pub enum Feed {
 /// id and iq of the upper motor, of the lower one; i1, i2; v1, v2.
 type State = [f64; 8];
 /// For the upper motor, then for the lower one: electrical energy, copper loss, the torque's impulse. Then energy from
-/// the source, loss of the inductors.
-type Sums = [f64; 8];
+/// the source, loss of the inductors, loss of the devices.
+type Sums = [f64; 9];
 
 /// A motor's rotor frame at an instant.
 #[derive(Clone, Copy)]
@@ -71,10 +72,12 @@ impl Zs9Plant {
         let (k3, s3) = self.rates(&along(&y0, &k2, half), &f1, bridge, feed);
         let (k4, s4) = self.rates(&along(&y0, &k3, dt_s), &f2, bridge, feed);
         let mut state = y0;
-        let (mut sums, mut area) = ([0.0; 8], [0.0; 8]);
+        let (mut sums, mut area) = ([0.0; 9], [0.0; 8]);
         for k in 0..8 {
             area[k] = dt_s * (y0[k] + dt_s / 6.0 * (k1[k] + k2[k] + k3[k]));
             state[k] += dt_s / 6.0 * (k1[k] + 2.0 * (k2[k] + k3[k]) + k4[k]);
+        }
+        for k in 0..9 {
             sums[k] = dt_s / 6.0 * (s1[k] + 2.0 * (s2[k] + s3[k]) + s4[k]);
         }
         Trial { dt_s, state, sums, area, end: f2 }
@@ -91,6 +94,7 @@ impl Zs9Plant {
         self.network = NetworkState { inductors_a: [state[4], state[5]], capacitors_v: [state[6], state[7]] };
         self.energies.source_j += sums[6];
         self.energies.inductors_j += sums[7];
+        self.energies.devices_j += sums[8];
         self.time_s += dt_s;
         self.means.add(dt_s, &area, [sums[2], sums[5]], &before, &self.seen());
     }
@@ -130,6 +134,19 @@ impl Zs9Plant {
         0.5 * (y[4] + y[5]) - self.demand(y, &self.shares(y, &trial.end, bridge))
     }
 
+    /// The link's voltage now, in V, while this path feeds it; in shoot-through that outside it.
+    pub(super) fn link_now_v(&self, bridge: &Bridge, feed: Feed) -> f64 {
+        match feed {
+            Feed::Blocked => {
+                let (y, still) = (self.state(), self.still(bridge));
+                let shares = (self.shares(&y, &still, bridge), self.lost(&y, &still, bridge).0);
+                y[6] + y[7] - self.holding_feed_v(&y, &still, &shares)
+            }
+            Feed::Short if *bridge != Bridge::Short => 0.0,
+            Feed::Source | Feed::Short | Feed::Clamped => self.link_v(),
+        }
+    }
+
     /// `U_in` after a step that the source fed, in V.
     pub(super) fn link_after_v(&self, trial: &Trial) -> f64 {
         trial.state[6] + trial.state[7] - self.source_v
@@ -139,7 +156,7 @@ impl Zs9Plant {
     pub(super) fn holding_share(&self, bridge: &Bridge) -> f64 {
         let y = self.state();
         let still = self.still(bridge);
-        let shares = self.shares(&y, &still, bridge);
+        let shares = (self.shares(&y, &still, bridge), self.lost(&y, &still, bridge).0);
         let capacitors_v = y[6] + y[7];
         (capacitors_v - self.holding_feed_v(&y, &still, &shares)) / (capacitors_v - self.source_v)
     }
@@ -156,17 +173,26 @@ impl Zs9Plant {
         let shares = self.shares(y, frames, bridge);
         let network = NetworkState { inductors_a: [y[4], y[5]], capacitors_v: [y[6], y[7]] };
         let (capacitors_v, inductors_a) = (y[6] + y[7], y[4] + y[5]);
+        let (lost, short_v) = self.lost(y, frames, bridge);
         let (feed_v, bridge_a) = match feed {
-            Feed::Source => (self.source_v, self.demand(y, &shares)),
-            Feed::Short => (capacitors_v, inductors_a),
-            Feed::Blocked => (self.holding_feed_v(y, frames, &shares), inductors_a),
+            Feed::Source => {
+                let demand_a = self.demand(y, &shares);
+                (self.feed_v(inductors_a - demand_a), demand_a)
+            }
+            Feed::Short => (capacitors_v - short_v, inductors_a),
+            Feed::Blocked => (self.holding_feed_v(y, frames, &(shares, lost)), inductors_a),
             Feed::Clamped => (self.source_v, 0.5 * inductors_a),
         };
-        let link_v = capacitors_v - feed_v;
-        let upper = self.motor_slopes(0, y, frames, &shares, link_v);
-        let lower = self.motor_slopes(1, y, frames, &shares, link_v);
+        let link_v = if feed == Feed::Short { short_v } else { capacitors_v - feed_v };
+        let upper = self.motor_slopes(0, y, frames, &(shares, lost), link_v);
+        let lower = self.motor_slopes(1, y, frames, &(shares, lost), link_v);
         let slopes = self.parts.slopes(&network, feed_v, bridge_a);
         let ([di1, di2], [dv1, dv2]) = (slopes.inductors_a, slopes.capacitors_v);
+        let fed_a = inductors_a - bridge_a;
+        let source_w = if feed == Feed::Source { self.source_v } else { feed_v } * fed_a;
+        let lost_w = self.drops.map_or(0.0, |_| {
+            source_w - feed_v * fed_a + link_v * bridge_a - upper.electrical_w - lower.electrical_w
+        });
         (
             [upper.id_a_s, upper.iq_a_s, lower.id_a_s, lower.iq_a_s, di1, di2, dv1, dv2],
             [
@@ -176,10 +202,36 @@ impl Zs9Plant {
                 lower.electrical_w,
                 lower.copper_w,
                 lower.torque_nm,
-                feed_v * (inductors_a - bridge_a),
+                source_w,
                 self.parts.loss_w(&network),
+                lost_w,
             ],
         )
+    }
+
+    /// The voltage on the source's side behind its switch, in V, at the source's current, in A.
+    #[inline]
+    fn feed_v(&self, source_a: f64) -> f64 {
+        self.devices().map_or(self.source_v, |devices| self.source_v - devices.source_v(source_a))
+    }
+
+    /// The devices, unless they are ideal.
+    #[inline]
+    fn devices(&self) -> Option<Devices<'_>> {
+        self.drops.as_ref().map(|drops| Devices { drops, clamp: &self.clamp })
+    }
+
+    /// The voltages that the bridge's devices take from both motors, in the rotor frames, and the link's in shoot-through.
+    #[inline]
+    fn lost(&self, y: &State, frames: &[Frame; 2], bridge: &Bridge) -> (Shares, f64) {
+        let Some(devices) = self.devices() else { return ([(0.0, 0.0); 2], 0.0) };
+        let currents = both(|k| Vector::from_rotor((y[2 * k], y[2 * k + 1]), frames[k].sin_cos).phases());
+        let Lost { terminals, short_v } = match bridge {
+            Bridge::Driven(_) => devices.driven(&self.gates, currents),
+            Bridge::Short => devices.shorted(&self.gates, currents, y[4] + y[5]),
+            Bridge::Off | Bridge::Partly(_) => Lost::default(),
+        };
+        (both(|k| terminals[k].to_rotor(frames[k].sin_cos)), short_v)
     }
 
     #[inline(always)]
@@ -188,12 +240,13 @@ impl Zs9Plant {
         k: usize,
         y: &State,
         frames: &[Frame; 2],
-        shares: &Shares,
+        (shares, lost): &(Shares, Shares),
         link_v: f64,
     ) -> StatorSlopes {
-        let (d, q) = shares[k];
+        let ((d, q), (lost_d, lost_q)) = (shares[k], lost[k]);
         let stator = &self.motors[k].stator;
-        stator.slopes((y[2 * k], y[2 * k + 1]), (link_v * d, link_v * q), frames[k].omega)
+        let volts = (link_v * d - lost_d, link_v * q - lost_q);
+        stator.slopes((y[2 * k], y[2 * k + 1]), volts, frames[k].omega)
     }
 
     /// The terminals' shares of the link, in the rotor frames.
@@ -221,12 +274,12 @@ impl Zs9Plant {
     ///
     /// The motors' draw changes at a rate `a + b U_in`, the inductors' sum at `(2 u_s − v1 − v2 − r (i1 + i2))/L`, and
     /// `U_in = v1 + v2 − u_s`.
-    fn holding_feed_v(&self, y: &State, frames: &[Frame; 2], shares: &Shares) -> f64 {
+    fn holding_feed_v(&self, y: &State, frames: &[Frame; 2], shares: &(Shares, Shares)) -> f64 {
         let draw_rate = |link_v: f64| -> f64 {
             (0..2)
                 .map(|k| {
                     let slopes = self.motor_slopes(k, y, frames, shares, link_v);
-                    let ((d, q), omega) = (shares[k], frames[k].omega);
+                    let ((d, q), omega) = (shares.0[k], frames[k].omega);
                     // The shares stand still while the frame turns.
                     1.5 * (d * (slopes.id_a_s - omega * y[2 * k + 1])
                         + q * (slopes.iq_a_s + omega * y[2 * k]))

@@ -2,6 +2,8 @@
 
 mod host;
 mod qemu;
+mod together;
 
 pub use host::Tasks;
 pub use qemu::run_in_qemu;
+pub use together::{OnBench, Together};

@@ -2,7 +2,7 @@
 
 use crate::machine::Machine;
 use crate::options::{Ripple, RunOptions, finite, not_negative, within};
-use crate::plant::DeviceDrops;
+use crate::plant::{DeviceDrops, PlantSettings, ShaftSettings};
 use anyhow::Result;
 use clap::Args;
 use serde::{Serialize, Serializer};
@@ -36,6 +36,65 @@ impl FromStr for Drops {
     }
 }
 
+impl Drops {
+    /// The check that they are within their ranges for a machine.
+    pub fn check(&self, machine: &Machine) -> Result<()> {
+        let parameters = &machine.folder.parameters;
+        let link_v = parameters.dc_link_nominal_v;
+        let most_mohm = 1e3 * link_v / parameters.max_current_a;
+        let Self([igbt_v, igbt_mohm, diode_v, diode_mohm]) = *self;
+        within(&[
+            ("--device-drop", igbt_v, 0.0, 0.1 * link_v),
+            ("--device-drop", igbt_mohm, 0.0, 0.1 * most_mohm),
+            ("--device-drop", diode_v, 0.0, 0.1 * link_v),
+            ("--device-drop", diode_mohm, 0.0, 0.1 * most_mohm),
+        ])
+    }
+
+    /// The check that a power stage's keys may name them.
+    fn check_known(&self) -> Result<()> {
+        let Self([igbt_v, igbt_mohm, diode_v, diode_mohm]) = *self;
+        let volts = [igbt_v, diode_v].map(|volts| ("--device-drop", volts, 0.0, 20.0));
+        let slopes = [igbt_mohm, diode_mohm].map(|slope| ("--device-drop", slope, 0.0, 150.0));
+        within(&[volts, slopes].concat())
+    }
+
+    /// As the plant has them.
+    pub fn devices(&self) -> DeviceDrops {
+        let Self([igbt_v, igbt_mohm, diode_v, diode_mohm]) = *self;
+        DeviceDrops { igbt_v, igbt_ohm: 1e-3 * igbt_mohm, diode_v, diode_ohm: 1e-3 * diode_mohm }
+    }
+}
+
+/// Times of the three phases in µs, written `U,V,W`.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Times(pub [f64; 3]);
+
+impl FromStr for Times {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let values = list::<3>(text).filter(|values| values.iter().all(|value| *value >= 0.0));
+        values.map(Self).ok_or_else(|| "must be U,V,W in µs, each at least 0, for instance 2,1,0".to_owned())
+    }
+}
+
+/// Natural frequency and damping ratio of a shaft, written `HZ,DAMPING`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Elastic([f64; 2]);
+
+impl FromStr for Elastic {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let good = |[hz, damping]: &[f64; 2]| *hz > 0.0 && *damping >= 0.0;
+        list::<2>(text)
+            .filter(good)
+            .map(Self)
+            .ok_or_else(|| "must be HZ,DAMPING, above 0 and at least 0, for instance 40,0.05".to_owned())
+    }
+}
+
 /// So many numbers between commas; `None` if they are more or fewer.
 fn list<const N: usize>(text: &str) -> Option<[f64; N]> {
     let values: Option<Vec<f64>> = text.split(',').map(|value| value.trim().parse().ok()).collect();
@@ -54,6 +113,18 @@ impl Serialize for Phases {
 }
 
 impl Serialize for Drops {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(&written(&self.0))
+    }
+}
+
+impl Serialize for Times {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(&written(&self.0))
+    }
+}
+
+impl Serialize for Elastic {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.serialize_str(&written(&self.0))
     }
@@ -89,6 +160,15 @@ pub struct FlawOptions {
     /// The drive knows the mean threshold and slope of --device-drop, as by its power stage's key, and makes up for it.
     #[arg(long)]
     pub device_drop_known: bool,
+    /// Time by which each phase's current is sampled before the instant that all are taken for, in µs.
+    #[arg(long, value_name = "U,V,W", allow_negative_numbers = true)]
+    pub adc_skew_us: Option<Times>,
+    /// Iron loss as a torque that brakes the rotor, in percent of the iron and mechanical loss that machine.toml names.
+    #[arg(long, default_value_t = 0.0, value_parser = not_negative, allow_negative_numbers = true, value_name = "PERCENT")]
+    pub iron_loss: f64,
+    /// An elastic shaft between the rotor and what turns it or is turned by it: natural frequency and damping ratio with the far end held.
+    #[arg(long, value_name = "HZ,DAMPING", allow_negative_numbers = true)]
+    pub shaft: Option<Elastic>,
 }
 
 /// The flaws of `--real`, for devices of 900 Hz on 1,500 V, 233 A: a usual IGBT inverter with a resolver.
@@ -110,11 +190,19 @@ mod real {
     pub const JITTER_US: f64 = 1.0;
     pub const SLOTS_PERCENT: f64 = 2.0;
     pub const DROP: [f64; 4] = [2.0, 5.0, 1.5, 3.0];
+    pub const SKEW_US: [f64; 3] = [2.0, 1.0, 0.0];
+    pub const IRON_PERCENT: f64 = 50.0;
+    pub const SHAFT: [f64; 2] = [40.0, 0.05];
     /// Link voltage in V, current in A and switching frequency in Hz of the machine that they are those of.
     pub const LINK_V: f64 = 1_500.0;
     pub const CURRENT_A: f64 = 233.345;
     pub const SWITCHING_HZ: f64 = 900.0;
 }
+
+/// Longest time by which a phase's current is sampled early, as a share of the fastest carrier.
+const MOST_SKEW: f64 = 0.02;
+/// Highest natural frequency of a shaft, in Hz: a tenth of a radian of it is longer than the plant's steps.
+const MOST_SHAFT_HZ: f64 = 400.0;
 
 /// The value that was given, or that of `--real`.
 fn or(given: f64, real: f64) -> f64 {
@@ -143,27 +231,43 @@ pub struct Filled {
     pub flaws: FlawOptions,
 }
 
+/// By how much shorter times are in a machine whose devices switch faster.
+fn shorter(machine: &Machine) -> f64 {
+    (real::SWITCHING_HZ / machine.folder.parameters.max_switching_hz).min(1.0)
+}
+
+/// A run's options with what `--real` stands for among them, for a machine: what is given stays.
+pub fn real_run(given: &RunOptions, machine: &Machine) -> RunOptions {
+    let parameters = &machine.folder.parameters;
+    let amplitude_v = real::RIPPLE_SHARE * parameters.dc_link_nominal_v;
+    let ripple = Ripple { amplitude_v, frequency_hz: real::RIPPLE_HZ };
+    RunOptions {
+        dead_time_us: or(given.dead_time_us, real::DEAD_TIME_US * shorter(machine)),
+        adc_bits: given.adc_bits.or(Some(real::ADC_BITS)),
+        noise_a: or(given.noise_a, real::NOISE_SHARE * parameters.max_current_a),
+        udc_ripple: given.udc_ripple.or(Some(ripple)),
+        rs_error: or(given.rs_error, real::RS_ERROR_PERCENT),
+        ..given.clone()
+    }
+}
+
+/// The drops of devices that `--real` stands for, for a machine.
+pub fn real_drops(machine: &Machine) -> Drops {
+    let parameters = &machine.folder.parameters;
+    let volts = parameters.dc_link_nominal_v / real::LINK_V;
+    let ohms = volts / (parameters.max_current_a / real::CURRENT_A);
+    let [igbt_v, igbt_mohm, diode_v, diode_mohm] = real::DROP;
+    Drops([igbt_v * volts, igbt_mohm * ohms, diode_v * volts, diode_mohm * ohms])
+}
+
 impl Filled {
     /// Of options that ask for it, for a machine: what is given stays.
     pub fn of(given: &RunOptions, beside: Beside, flaws: &FlawOptions, machine: &Machine) -> Self {
-        let parameters = &machine.folder.parameters;
-        let (link_v, most_a) = (parameters.dc_link_nominal_v, parameters.max_current_a);
-        let times = (real::SWITCHING_HZ / parameters.max_switching_hz).min(1.0);
-        let volts = link_v / real::LINK_V;
-        let ohms = volts / (most_a / real::CURRENT_A);
-        let [igbt_v, igbt_mohm, diode_v, diode_mohm] = real::DROP;
-        let drops = Drops([igbt_v * volts, igbt_mohm * ohms, diode_v * volts, diode_mohm * ohms]);
-        let ripple = Ripple { amplitude_v: real::RIPPLE_SHARE * link_v, frequency_hz: real::RIPPLE_HZ };
+        let times = shorter(machine);
         let [once_deg, twice_deg] = beside.angle_deg;
+        let [shaft_hz, damping] = real::SHAFT;
         Self {
-            run: RunOptions {
-                dead_time_us: or(given.dead_time_us, real::DEAD_TIME_US * times),
-                adc_bits: given.adc_bits.or(Some(real::ADC_BITS)),
-                noise_a: or(given.noise_a, real::NOISE_SHARE * most_a),
-                udc_ripple: given.udc_ripple.or(Some(ripple)),
-                rs_error: or(given.rs_error, real::RS_ERROR_PERCENT),
-                ..given.clone()
-            },
+            run: real_run(given, machine),
             beside: Beside {
                 udc_gain: or(beside.udc_gain, real::UDC_GAIN_PERCENT),
                 current_filter_us: or(beside.current_filter_us, real::FILTER_US * times),
@@ -174,7 +278,10 @@ impl Filled {
                 current_gains: flaws.current_gains.or(Some(Phases(real::GAINS_PERCENT))),
                 angle_jitter_us: or(flaws.angle_jitter_us, real::JITTER_US * times),
                 slots: or(flaws.slots, real::SLOTS_PERCENT),
-                device_drop: flaws.device_drop.or(Some(drops)),
+                device_drop: flaws.device_drop.or(Some(real_drops(machine))),
+                adc_skew_us: flaws.adc_skew_us.or(Some(Times(real::SKEW_US.map(|us| us * times)))),
+                iron_loss: or(flaws.iron_loss, real::IRON_PERCENT),
+                shaft: flaws.shaft.or(Some(Elastic([shaft_hz / times, damping]))),
                 ..flaws.clone()
             },
         }
@@ -185,7 +292,6 @@ impl FlawOptions {
     /// The check that each flaw is within its range. The error names the first option that is not.
     pub fn check(&self, machine: &Machine) -> Result<()> {
         let parameters = &machine.folder.parameters;
-        let link_v = parameters.dc_link_nominal_v;
         let [offset, gains] = [self.current_offset, self.current_gains].map(Option::unwrap_or_default);
         for phase in 0..3 {
             within(&[
@@ -193,20 +299,23 @@ impl FlawOptions {
                 ("--current-gains", gains.0[phase], -50.0, 100.0),
             ])?;
         }
-        let Drops([igbt_v, igbt_mohm, diode_v, diode_mohm]) = self.device_drop.unwrap_or_default();
-        let most_mohm = 1e3 * link_v / parameters.max_current_a;
-        let most_mohm = if self.device_drop_known { (0.1 * most_mohm).min(150.0) } else { 0.1 * most_mohm };
-        let most_v = if self.device_drop_known { (0.1 * link_v).min(20.0) } else { 0.1 * link_v };
+        let most_us = 1e6 * MOST_SKEW / parameters.max_switching_hz;
+        for early_us in self.adc_skew_us.unwrap_or_default().0 {
+            within(&[("--adc-skew-us", early_us, 0.0, most_us)])?;
+        }
+        if let Some(Elastic([hz, damping])) = self.shaft {
+            within(&[("--shaft", hz, 0.1, MOST_SHAFT_HZ), ("--shaft", damping, 0.0, 2.0)])?;
+        }
         within(&[
+            ("--iron-loss", self.iron_loss, 0.0, 1e3),
             ("--angle-1f-phase-deg", self.angle_1f_phase_deg, -360.0, 360.0),
             ("--angle-2f-phase-deg", self.angle_2f_phase_deg, -360.0, 360.0),
             ("--angle-jitter-us", self.angle_jitter_us, 0.0, 1e4),
             ("--slots", self.slots, -100.0, 100.0),
-            ("--device-drop", igbt_v, 0.0, most_v),
-            ("--device-drop", igbt_mohm, 0.0, most_mohm),
-            ("--device-drop", diode_v, 0.0, most_v),
-            ("--device-drop", diode_mohm, 0.0, most_mohm),
-        ])
+        ])?;
+        let drops = self.device_drop.unwrap_or_default();
+        drops.check(machine)?;
+        if self.device_drop_known { drops.check_known() } else { Ok(()) }
     }
 
     /// Offsets of the current sensors, as shares of the converters' range.
@@ -219,9 +328,20 @@ impl FlawOptions {
         self.current_gains.unwrap_or_default().0.map(|percent| percent / 100.0)
     }
 
+    /// Time by which each phase's current is early, in s.
+    pub fn skew_s(&self) -> [f64; 3] {
+        self.adc_skew_us.unwrap_or_default().0.map(|us| 1e-6 * us)
+    }
+
+    /// The deviations of the true machine and its inverter, with those that are not flaws of these options.
+    pub fn plant(&self, others: PlantSettings, rotor_kg_m2: f64) -> PlantSettings {
+        let shaft = self.shaft.map(|Elastic([hz, damping])| ShaftSettings { hz, damping, rotor_kg_m2 });
+        let (slots_share, iron_share) = (self.slots / 100.0, self.iron_loss / 100.0);
+        PlantSettings { slots_share, drops: self.drops(), iron_share, shaft, ..others }
+    }
+
     /// The devices' drops.
     pub fn drops(&self) -> DeviceDrops {
-        let Drops([igbt_v, igbt_mohm, diode_v, diode_mohm]) = self.device_drop.unwrap_or_default();
-        DeviceDrops { igbt_v, igbt_ohm: 1e-3 * igbt_mohm, diode_v, diode_ohm: 1e-3 * diode_mohm }
+        self.device_drop.unwrap_or_default().devices()
     }
 }

@@ -1,6 +1,6 @@
 //! The identification of a machine, driven: the firmware's own law on the bench, or its image in QEMU.
 
-use super::{Options, PatternsName, Plan, STEP_S, bench, scaled_link, setup, tasks, truth};
+use super::{Options, PatternsName, Plan, STEP_S, bench, drives, scaled_link, setup, tasks, truth};
 use crate::bench::{Bench, LinePlan};
 use crate::inject::Injection;
 use crate::inject::sensor::CurrentFault;
@@ -146,6 +146,7 @@ pub fn drive_commanded(
 
 /// The options that hold: nothing compensates the dead time, and the carrier is free.
 fn held(options: &Options) -> Result<Options> {
+    drives::alone(options)?;
     check(options)?;
     let mut options = options.clone();
     options.own.uncompensated = true;

@@ -3,7 +3,7 @@
 pub use crate::scenario::live::{Command, Start, Turning, Wanted};
 
 use super::prelude::*;
-use super::{bench, scaled_link, setup, tasks};
+use super::{bench, drives, scaled_link, setup, tasks};
 use crate::bench::{Bench, LinePlan, Simulated};
 use crate::inject::traction::{Kind, SupplyFault};
 use crate::plant::Source;
@@ -58,6 +58,7 @@ impl Live {
     /// Names the option that is out of its range.
     pub fn new(options: &Options, machine: &Machine, start: Start) -> Result<Self> {
         <Traction as crate::scenario::System>::check(options, &serde_json::Map::new(), machine)?;
+        drives::alone(options)?;
         let request = Arc::new(Mutex::new(Request::idle(&machine.tables.ratings)));
         let asked = Arc::clone(&request);
         let commander = Box::new(move |_: f64| *asked.lock().unwrap_or_else(PoisonError::into_inner));

@@ -5,6 +5,7 @@ pub(super) mod acknowledge;
 pub(super) mod borders_timing;
 pub mod characteristic;
 pub(super) mod chopper;
+mod drives;
 pub mod flaws;
 pub(super) mod full_step;
 pub(super) mod gaps;
@@ -34,16 +35,16 @@ pub use sweep::Sweep;
 
 use super::System;
 use crate::analysis::{self, Figures};
-use crate::bench::{self, Bench, Encoder, Flaws, Limits, LinePlan, Operator, Supply, Wiring};
+use crate::bench::{self, Bench, Encoder, Flaws, Limits, LinePlan, Operator, Simulated, Supply, Wiring};
 use crate::inject::Injection;
 use crate::inject::traction::Kind;
 use crate::law::LawName;
 use crate::machine::Machine;
 use crate::options::{On, finite, not_negative, usual_min_pulse_us, within};
-use crate::plant::{DcLinkSettings, LineFilter, Plant, PlantSettings, Source, SpeedSource};
+use crate::plant::{DcLinkSettings, FilteredLink, LineFilter, Plant, Source, SpeedSource};
 use crate::report::{self, Page};
-use crate::run::traction::{Tasks, run_in_qemu};
-use crate::run::{self, CLOCK, Supervisor};
+use crate::run::traction::{OnBench, Tasks, Together, run_in_qemu};
+use crate::run::{self, CLOCK, Progress, Supervisor};
 use crate::trace::Recording;
 use ablated::Ablated;
 use anyhow::{Result, bail};
@@ -182,6 +183,9 @@ pub struct TractionOptions {
     /// without it the link itself is stiff.
     #[arg(long, value_name = "L_MH,C_MF,R_MOHM", allow_negative_numbers = true)]
     pub line: Option<LineFilter>,
+    /// Drives behind that line filter: the same ones with the same demand, each further one's wheels larger by a percent, so that its speed is lower.
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=4), value_name = "NUMBER")]
+    pub drives: u32,
     /// Error of the angle sensor that goes once with the electrical angle, amplitude in electrical degrees.
     #[arg(long, default_value_t = 0.0, value_parser = finite, allow_negative_numbers = true, value_name = "DEG")]
     pub angle_1f_deg: f64,
@@ -361,6 +365,9 @@ impl System for Traction {
         if options.own.ablate.is_some() && (options.law == LawName::Pi || options.on == On::Qemu) {
             bail!("--ablate: a part is taken away from the project's own law, and on the host alone");
         }
+        if options.own.drives > 1 && (options.own.line.is_none() || options.on == On::Qemu) {
+            bail!("--drives {}: needs --line, and runs on the host alone", options.own.drives);
+        }
         options.own.flaws.check(machine)?;
         options.check_flaws(machine, udc_v)
     }
@@ -376,13 +383,15 @@ impl System for Traction {
         machine: &Machine,
         supervisor: Option<&mut dyn Supervisor>,
     ) -> Result<Recording> {
-        let plan = plan.behind(options.own.line);
+        let mut plan = plan.behind(options.own.line);
         let setup = setup(&plan, options, machine, supervisor.is_some());
-        let bench = bench(plan, &setup, options, (machine, &truth(options, machine)?));
+        let machines = (machine, &truth(options, machine)?);
+        let beside = drives::beside(&mut plan, &setup, options, machines)?;
+        let bench = bench(plan, &setup, options, machines);
         let (on, law) = options.choice()?;
         match on {
             On::Host => {
-                let run = OnHost { name, bench, setup: &setup, options, machine };
+                let run = OnHost { name, bench, beside, setup: &setup, options, machine };
                 match (law, options.own.ablate.filter(|_| !cfg!(target_family = "wasm"))) {
                     (LawName::Tractive, Some(part)) => run.run(Ablated::new(part), supervisor),
                     (LawName::Tractive, None) => run.run(Controller::new(), supervisor),
@@ -433,18 +442,34 @@ fn filled(options: &Options, machine: &Machine) -> Options {
 struct OnHost<'a> {
     name: &'a str,
     bench: Bench,
+    beside: Vec<Bench>,
     setup: &'a Setup,
     options: &'a Options,
     machine: &'a Machine,
 }
 
 impl OnHost<'_> {
-    /// The drive's own tasks with a law.
-    fn run(self, law: impl ControlLaw, supervisor: Option<&mut dyn Supervisor>) -> Result<Recording> {
+    /// The drive's own tasks with a law; with other drives on the same link each its own.
+    fn run(self, law: impl ControlLaw + Copy, supervisor: Option<&mut dyn Supervisor>) -> Result<Recording> {
         let Self { setup, options, machine, .. } = self;
         let recorder = Recorder::new();
-        let tasks = tasks(law, setup, options, machine)?.recorded_by(&recorder).commanded_by(supervisor);
-        run::on_host(self.name, self.bench, tasks, |index| recorder.read(index))
+        let of_drive = || tasks(law, setup, options, machine);
+        let tasks = of_drive()?.recorded_by(&recorder).commanded_by(supervisor);
+        let record = |index| recorder.read(index);
+        let Some(filter) = options.own.line.filter(|_| !self.beside.is_empty()) else {
+            return run::on_host(self.name, self.bench, tasks, record);
+        };
+        let others = self.beside.into_iter().map(|bench| Ok(OnBench { bench, tasks: of_drive()? }));
+        let mut together = Together {
+            link: FilteredLink::new(filter, udc_v(options, machine)),
+            first: OnBench { bench: self.bench, tasks },
+            others: others.collect::<Result<_>>()?,
+        };
+        let mut progress = Progress::new(self.name);
+        together.drive(|done| progress.show(done))?;
+        let beside = together.others.into_iter().map(|drive| drive.bench.into_recording(Vec::new()));
+        let recording = together.first.bench.into_recording((0..).map_while(record).collect());
+        Ok(Recording { beside: beside.collect(), ..recording })
     }
 }
 
@@ -607,6 +632,7 @@ fn bench(plan: Plan, setup: &Setup, options: &Options, (machine, truth): (&Machi
             angle_late_s: 1e-6 * options.own.angle_late_us,
             angle_counts: options.own.encoder_lines.map(|lines| 4.0 * f64::from(lines) / pole_pairs),
             current_filter_s: 1e-6 * options.own.current_filter_us,
+            adc_skew_s: own.skew_s(),
             freeze_at_s: plan.freeze_at_s,
             current_gain: options.own.current_gain / 100.0,
             udc_gain: options.own.udc_gain / 100.0,
@@ -614,11 +640,15 @@ fn bench(plan: Plan, setup: &Setup, options: &Options, (machine, truth): (&Machi
             angle_reversed: options.own.angle_reversed,
             ..flaws
         },
-        supply: options.own.line.map_or(Supply::Stiff, Supply::Line),
+        supply: match options.own.line {
+            Some(_) if options.own.drives > 1 => Supply::Shared,
+            Some(filter) => Supply::Line(filter),
+            None => Supply::Stiff,
+        },
         injection: plan.injection,
         limits: Limits::NONE,
     };
-    let deviations = PlantSettings { slots_share: own.slots / 100.0, drops: own.drops(), ..options.plant() };
+    let deviations = own.plant(options.plant(), truth.folder.parameters.rotor_inertia_kg_m2);
     let mut plant = Plant::new(&truth.folder, plan.speed, &deviations);
     plant.motor.rotor_mut().set_friction_nm(options.own.friction);
     if let Some(encoder) = plan.encoder {

@@ -20,7 +20,7 @@ impl Bench {
         let currents_a = self.currents_a();
         let [v1, v2] = self.plant.network.capacitors_v;
         let id_a = self.plant.motors.iter().map(|motor| motor.currents_dq().0).fold(0.0, f64::min);
-        let peaks = Peaks::at(currents_a.as_flattened(), id_a, self.plant.link_v(), v1.max(v2));
+        let peaks = Peaks::at(currents_a.as_flattened(), id_a, self.plant.bridge_v(), v1.max(v2));
         let speeds = self.speeds_rpm().map(f64::abs);
         self.observed.note(self.time.now, &peaks, speeds[0].max(speeds[1]));
         // Of a gate that stays off, [`Self::begin_period`] knows which pulses count.

@@ -1,0 +1,78 @@
+//! Iron loss, as a torque that brakes the rotor.
+//!
+//! `T = T_rated (ψ/ψ_rated)² (f n/n_rated + (1 − f) sign n)`: hysteresis loses the same in every turn, eddy currents the more the faster it is, both by the
+//! square of the flux linkage. The currents know nothing of it.
+
+use tractive_tablegen::{MachineFolder, SmoothMap};
+
+/// Speed below which hysteresis fades, electrical, in rad/s.
+const LEAST_RAD_S: f64 = 2.0;
+
+/// The iron of a machine.
+#[derive(Clone, Copy, Debug)]
+pub struct Iron {
+    /// Torque of hysteresis over the square of the flux linkage, in N·m/Wb².
+    hysteresis: f64,
+    /// Torque of eddy currents over the same and the electrical speed, in N·m·s/(Wb²·rad).
+    eddy: f64,
+}
+
+impl Iron {
+    /// Without loss.
+    pub const NONE: Self = Self { hysteresis: 0.0, eddy: 0.0 };
+
+    /// The iron of a machine, which has this share of the loss that its folder names, at rated speed and rated torque. The part that grows with the square
+    /// of speed is eddy currents.
+    pub fn of(machine: &MachineFolder, share: f64) -> Self {
+        if share == 0.0 {
+            return Self::NONE;
+        }
+        let parameters = &machine.parameters;
+        let rated_rad_s = parameters.rated_speed_rpm * core::f64::consts::TAU / 60.0;
+        let torque_nm = share * parameters.loss_rated_w / rated_rad_s;
+        let per_square = torque_nm / rated_square(machine);
+        let eddy_share = parameters.loss_quadratic_fraction;
+        Self {
+            hysteresis: (1.0 - eddy_share) * per_square,
+            eddy: eddy_share * per_square / (rated_rad_s * f64::from(parameters.pole_pairs)),
+        }
+    }
+
+    /// `true` if it loses anything.
+    #[inline]
+    pub fn is_some(&self) -> bool {
+        self.hysteresis != 0.0 || self.eddy != 0.0
+    }
+
+    /// The torque against the rotor, positive forward, in N·m, at the square of the flux linkage, in Wb², and an electrical speed, in rad/s.
+    pub fn torque_nm(&self, square: f64, omega: f64) -> f64 {
+        square * (self.hysteresis * (omega / LEAST_RAD_S).clamp(-1.0, 1.0) + self.eddy * omega)
+    }
+}
+
+/// Square of the flux linkage at rated torque with the least current, in Wb².
+fn rated_square(machine: &MachineFolder) -> f64 {
+    const ANGLES: u32 = 90;
+    const HALVINGS: u32 = 30;
+    let (parameters, map) = (&machine.parameters, SmoothMap::new(&machine.map));
+    let pole_pairs = f64::from(parameters.pole_pairs);
+    let gives = |id_a: f64, iq_a: f64| {
+        let at = map.at(id_a, iq_a);
+        1.5 * pole_pairs * (at.psi_d_wb * iq_a - at.psi_q_wb * id_a) >= parameters.rated_torque_nm
+    };
+    // The current in each direction that gives the torque.
+    let in_direction = |angle: u32| {
+        let (sin, cos) = (f64::from(angle) / f64::from(ANGLES) * core::f64::consts::FRAC_PI_2).sin_cos();
+        let (mut low, mut high) = (0.0, parameters.max_current_a);
+        for _ in 0..HALVINGS {
+            let middle = 0.5 * (low + high);
+            if gives(-middle * sin, middle * cos) { high = middle } else { low = middle }
+        }
+        gives(-high * sin, high * cos).then_some((high, (-high * sin, high * cos)))
+    };
+    let least = (0..=ANGLES).filter_map(in_direction).min_by(|one, other| one.0.total_cmp(&other.0));
+    // A machine that does not give its rated torque has the flux linkage of its magnets.
+    let (id_a, iq_a) = least.map_or((0.0, 0.0), |(_, current)| current);
+    let at = map.at(id_a, iq_a);
+    at.psi_d_wb * at.psi_d_wb + at.psi_q_wb * at.psi_q_wb
+}
