@@ -219,7 +219,9 @@ modes! {
         /// Optimised, 7 pulses, at a large one.
         Opt7c: "opt7c", OPT7C, Border::new((129.3, 128.4), (0.945, 0.94));
         /// Optimised, 7 pulses, near six-step. The free carrier's share of the switching frequency makes 128.0 Hz of these 129.3.
-        Opt7d: "opt7d", OPT7D, Border::new((129.3, 128.4), (f32::INFINITY, f32::INFINITY));
+        Opt7d: "opt7d", OPT7D, Border::new((129.3, 128.4), (0.967, 0.963));
+        /// Optimised, 7 pulses, as near to six-step as they reach: where the drive weakens.
+        Opt7e: "opt7e", OPT7E, Border::new((129.3, 128.4), (f32::INFINITY, f32::INFINITY));
         /// Optimised, 5 pulses, at a small modulation index.
         Opt5a: "opt5a", OPT5A, Border::new((177.0, 172.0), (0.81, 0.795));
         /// Optimised, 5 pulses, at a larger one.

@@ -38,7 +38,7 @@ pub struct Branch {
 
 /// The branches, from many pulses to few and from a small modulation index to a large one.
 #[rustfmt::skip]
-pub const BRANCHES: [Branch; 15] = [
+pub const BRANCHES: [Branch; 16] = [
     Branch { name: "opt15", pulses: 15, starts_high: false, halves: 6, anchor: 50, window: (10, 58), calm: 1, place: 0, highest_hz: 60.0 },
     Branch { name: "opt13a", pulses: 13, starts_high: false, halves: 5, anchor: 50, window: (10, 64), calm: 1, place: 0, highest_hz: 69.2 },
     Branch { name: "opt13b", pulses: 13, starts_high: true, halves: 5, anchor: 70, window: (62, 79), calm: 5, place: 1, highest_hz: 69.2 },
@@ -49,6 +49,7 @@ pub const BRANCHES: [Branch; 15] = [
     Branch { name: "opt7b", pulses: 7, starts_high: false, halves: 3, anchor: 75, window: (62, 89), calm: 3, place: 1, highest_hz: 128.6 },
     Branch { name: "opt7c", pulses: 7, starts_high: true, halves: 3, anchor: 90, window: (86, 96), calm: 2, place: 2, highest_hz: 128.6 },
     Branch { name: "opt7d", pulses: 7, starts_high: false, halves: 6, anchor: 96, window: (94, 97), calm: 6, place: 3, highest_hz: 128.6 },
+    Branch { name: "opt7e", pulses: 7, starts_high: false, halves: 5, anchor: 97, window: (95, 97), calm: 5, place: 4, highest_hz: 128.6 },
     Branch { name: "opt5a", pulses: 5, starts_high: true, halves: 2, anchor: 60, window: (10, 84), calm: 1, place: 0, highest_hz: 180.0 },
     Branch { name: "opt5b", pulses: 5, starts_high: false, halves: 2, anchor: 85, window: (76, 94), calm: 2, place: 1, highest_hz: 180.0 },
     Branch { name: "opt5c", pulses: 5, starts_high: true, halves: 2, anchor: 95, window: (91, 97), calm: 2, place: 2, highest_hz: 180.0 },
@@ -91,8 +92,8 @@ impl Branch {
             for at in steps {
                 let problem = self.problem(at, &bounds);
                 last = problem.optimum(&last).ok_or_else(|| lost(at))?;
-                let calmer =
-                    Problem { torque: Some(&torque), ..problem }.optimum(&last).ok_or_else(|| lost(at))?;
+                let calmer = Problem { torque: Some(&torque), ..problem }.calmest(&last);
+                let calmer = calmer.ok_or_else(|| lost(at))?;
                 nodes.push((index(at), calmer));
             }
             Ok::<_, String>(nodes)
