@@ -493,6 +493,16 @@ fn nonsense_is_refused_by_name() {
 }
 
 #[test]
+fn schemes_have_their_names_and_codes() {
+    let names = ["s", "rs", "rthd", "zvo", "rthd-central", "rthd-slide"];
+    assert_eq!(Scheme::ALL.map(Scheme::name), names);
+    for code in 0..10 {
+        let scheme = Scheme::ALL.get(code as usize).copied().unwrap_or(Scheme::Rthd);
+        assert_eq!(Scheme::from_code(code), scheme);
+    }
+}
+
+#[test]
 fn legs_know_their_states() {
     for code in 0..8 {
         let gates = [code & 4 != 0, code & 2 != 0, code & 1 != 0];

@@ -3,8 +3,11 @@
 use crate::world::{DISCHARGE_S, PRECHARGE_S, SLOT_S, World, trip};
 use tractive::built_in::traction::BUILT_IN;
 use tractive::machine::Ratings;
-use tractive::operator::{Configuration, Limits, Line, Operator, Refusal, Request, State};
+use tractive::operator::{
+    Configuration, Demands, Limits, Line, Operator, Refusal, Request, State, TorqueDemand,
+};
 use tractive::protection::{Fault, SafeState, Trip};
+use tractive::time::Clock;
 
 const RATINGS: &Ratings = &BUILT_IN.ratings;
 
@@ -390,6 +393,33 @@ fn motoring_fades_along_a_straight_line() {
     let wanted_nm = share * RATINGS.max_torque_nm;
     assert!((0.5..0.6).contains(&share));
     assert!((world.output().command.demand.torque_nm - wanted_nm).abs() < 2.0, "{wanted_nm}");
+    // A rotor that stands turns forward as far as limits go: backward torque brakes, and the link does not limit it.
+    (world.observed.omega, world.request.torque_nm) = (0.0, -1_000.0);
+    world.slots(500);
+    assert_eq!(world.output().command.demand.torque_nm, -1_000.0);
+}
+
+/// The limits that held go on where the values of a request are none, also while the gates are off.
+#[test]
+fn limits_outlast_what_is_refused() {
+    let mut world = World::charged();
+    world.request.limits.link_low_v = 1_200.0;
+    world.slots(3);
+    assert_eq!(world.output().command.window.motoring_none_v, 1_200.0);
+    world.request.limits.motoring_nm = 1e4;
+    world.slots(3);
+    assert_eq!(world.output().command.window.motoring_none_v, 1_200.0);
+}
+
+/// A millisecond is a slot, of whole control periods; a drive that has not started says why.
+#[test]
+fn a_slot_is_a_millisecond_and_a_refused_drive_says_why() {
+    for control_ticks in [2_500, 1_250] {
+        let slot_s = tractive::operator::slot_s(&Clock::new(25_000_000, control_ticks));
+        assert!((slot_s - 1e-3).abs() < 1e-9, "{slot_s}");
+    }
+    let why = trip(Fault::StartRefused);
+    assert_eq!(<TorqueDemand as Demands>::refused(why).trip, Some(why));
 }
 
 /// The settings' rates: 80 % of the drive's slew rate, taken up in 50 ms.

@@ -157,6 +157,7 @@ mod tests {
         let tied = |at| [(at, 4_000), (at, at), (0, at)];
         assert_eq!(leg(tied(2_000), [30.0, -10.0]), tied(2_100));
         assert_eq!(leg(tied(2_000), [-30.0, 10.0]), tied(1_900));
+        assert_eq!(leg(tied(2_000), [1.5, -1.0]), tied(2_025));
         // M's pause of 100 would be less than none.
         let short = [(2_100, 4_000), (2_000, 2_100), (0, 2_000)];
         assert_eq!(leg(short, [-30.0, 20.0]), tied(1_950));
