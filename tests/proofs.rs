@@ -4,7 +4,9 @@
 use std::ops::Range;
 use std::thread;
 use tractive::frames::{Abc, Angle};
-use tractive::modulation::{CarrierHalf, Modulator, Reference, Schedule, SwitchLimits, compensate};
+use tractive::modulation::{
+    CarrierHalf, EdgeDelay, Modulator, Reference, Schedule, SwitchLimits, compensate,
+};
 use tractive::nine_switch::{DeadTime, GateTicks, LegState};
 use tractive::protocol::e2e::{data_ids, is_intact, protect};
 use tractive::protocol::{Command, LinkLimits, Payload, Scales, TorqueLimits};
@@ -272,7 +274,7 @@ fn compensated_edges_come_earlier_by_the_dead_time_at_most() {
     let (period_ticks, small_a) = (64, 8.0);
     let mut moved = 0;
     for (compare, dead_time_ticks) in (0..=70).flat_map(|compare| (0..=70).map(move |dead| (compare, dead))) {
-        let devices = SwitchLimits { min_pulse_ticks: 0, dead_time_ticks, shortest_half_ticks: period_ticks };
+        let delay = EdgeDelay::of_dead_time(dead_time_ticks);
         for current in (-10..=10).map(|a| a as f32).chain([f32::NAN, f32::INFINITY, f32::NEG_INFINITY]) {
             for level in [false, true] {
                 let before = CarrierHalf {
@@ -282,7 +284,7 @@ fn compensated_edges_come_earlier_by_the_dead_time_at_most() {
                     ..CarrierHalf::default()
                 };
                 let mut half = before;
-                compensate(&mut half, &Abc { a: current, b: current, c: current }, small_a, &devices);
+                compensate(&mut half, &Abc { a: current, b: current, c: current }, small_a, delay);
                 let [found, ..] = half.compare_ticks;
                 let against = if level { -current } else { current };
                 let most = if compare < period_ticks && against > 0.0 { dead_time_ticks } else { 0 };

@@ -202,8 +202,7 @@ impl ControlLaw for Controller {
 
     fn aim(&mut self, input: &AimInput, law: &Law) {
         let AimInput { demand, window, udc_v, link_scale, swing, limits } = *input;
-        let (tables, omega) = (law.tables, self.speed.omega());
-        let ratings = &tables.ratings;
+        let (tables, ratings, omega) = (law.tables, &law.tables.ratings, self.speed.omega());
         let Scales { torque, flux } = self.map_error.scales();
         let map_nm = self.sum_nm / self.samples as f32;
         let measured_nm = map_nm * torque;
