@@ -99,8 +99,8 @@ pub fn turning(boundaries: &[Boundary], fit: &Fit) -> Vec<Turning> {
     let turn: Vec<&Boundary> = boundaries.iter().filter(|b| b.stage == Stage::Turn).collect();
     let mut along_q: Vec<f64> = turn.iter().map(|b| b.current.1.abs()).collect();
     along_q.sort_by(f64::total_cmp);
-    // Of the two parts of three in which one flows: not the noise's largest.
-    let most_a = along_q.get(3 * along_q.len() / 4).copied().unwrap_or(0.0);
+    // The rotor coasts for most of the turn; not the noise's largest.
+    let most_a = along_q.get(19 * along_q.len() / 20).copied().unwrap_or(0.0);
     let within_a = WITHIN * most_a;
     let part = |share: f64| Part::of(&turn, fit, share * most_a, within_a);
     let [motor, coast, brake] = [1.0, 0.0, -1.0].map(part);
