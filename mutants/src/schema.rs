@@ -141,20 +141,13 @@ fn edit(source: &str, site: &Site, index: usize, numbers: &[u32], edits: &mut Ve
         }
         Shape::Assignment { right, own, others } => {
             let place = text(bytes.start..site.left);
-            editor.begin(&bytes, *right, "(match (");
             let texts = others.iter().map(|other| format!("{place} {other} __b"));
-            let mut pieces = vec![plain(") { __b => ")];
-            pieces.extend(branches(numbers, texts, &format!("{place} {own} __b")));
-            pieces.push(plain(" })"));
-            editor.end(&bytes, pieces);
+            bound(&mut editor, *right, "__b", branches(numbers, texts, &format!("{place} {own} __b")));
         }
         Shape::Sign { operand } => {
             let sign = text(bytes.start..*operand);
-            editor.begin(&bytes, *operand, "(match (");
-            let mut pieces = vec![plain(") { __a => ")];
-            pieces.extend(branches(numbers, ["__a".to_owned()].into_iter(), &format!("{sign} __a")));
-            pieces.push(plain(" })"));
-            editor.end(&bytes, pieces);
+            let deleted = ["__a".to_owned()].into_iter();
+            bound(&mut editor, *operand, "__a", branches(numbers, deleted, &format!("{sign} __a")));
         }
         Shape::Arm => {
             editor.middle(bytes.start, bytes.start, vec![(format!(" if !{}", is(first)), Some(first))])
@@ -170,26 +163,32 @@ fn edit(source: &str, site: &Site, index: usize, numbers: &[u32], edits: &mut Ve
         }
         Shape::Fields { base, fields } => {
             let path = text(bytes.start..site.left);
-            editor.begin(
-                &bytes,
-                bytes.start,
-                &format!("(match ({path} {{ ..{} }}) {{ __s => ", text(base.clone())),
-            );
-            for ((name, short, value), number) in
-                fields.iter().zip(numbers).filter(|(_, number)| **number > 0)
-            {
-                let name_of = if *short { format!("{name}: ") } else { String::new() };
-                editor.begin(
-                    value,
-                    value.start,
-                    &format!("{name_of}if {} {{ __s.{name} }} else {{ ", is(*number)),
-                );
-                editor.end(value, vec![(" }".to_owned(), Some(*number))]);
-            }
-            editor.middle(base.start, base.end, vec![plain("__s")]);
-            editor.end(&bytes, vec![plain(" })")]);
+            let open = format!("(match ({path} {{ ..{} }}) {{ __s => ", text(base.clone()));
+            editor.begin(&bytes, bytes.start, &open);
+            structure(&mut editor, base, fields, numbers);
         }
     }
+}
+
+/// The operand that begins at `on` is bound to a name, and then one of the branches is taken.
+fn bound(editor: &mut Editor, on: usize, name: &str, branches: Vec<Piece>) {
+    let bytes = editor.bytes.clone();
+    editor.begin(&bytes, on, "(match (");
+    let begin = plain(&format!(") {{ {name} => "));
+    editor.end(&bytes, [vec![begin], branches, vec![plain(" })")]].concat());
+}
+
+/// Each field by its mutant from the base, which is `__s`.
+fn structure(editor: &mut Editor, base: &Bytes, fields: &[(String, bool, Bytes)], numbers: &[u32]) {
+    for ((name, short, value), number) in fields.iter().zip(numbers).filter(|(_, number)| **number > 0) {
+        let name_of = if *short { format!("{name}: ") } else { String::new() };
+        let open = format!("{name_of}if {} {{ __s.{name} }} else {{ ", is(*number));
+        editor.begin(value, value.start, &open);
+        editor.end(value, vec![(" }".to_owned(), Some(*number))]);
+    }
+    editor.middle(base.start, base.end, vec![plain("__s")]);
+    let bytes = editor.bytes.clone();
+    editor.end(&bytes, vec![plain(" })")]);
 }
 
 fn operator(editor: &mut Editor, left: usize, right: usize, own: &str, others: &[&str], numbers: &[u32]) {

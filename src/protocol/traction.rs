@@ -207,11 +207,12 @@ mod tests {
 
     #[test]
     fn each_frame_has_its_content() {
-        let decoded = |id| Traction::decode(id, Payload::default(), Scales::USUAL);
-        assert!(matches!(decoded(COMMAND.id), Some(Content::Command(_))));
-        assert!(matches!(decoded(LIMITS.id), Some(Content::Limits(_))));
-        assert!(matches!(decoded(LINK_LIMITS.id), Some(Content::LinkLimits(_)) | None));
-        assert!(!matches!(decoded(PARAMETER_REQUEST.id), Some(Content::Command(_) | Content::Limits(_))));
-        assert_eq!(decoded(0x7FF), None);
+        let decoded = |id, payload| Traction::decode(id, payload, Scales::USUAL);
+        let limits = TorqueLimits { motoring_nm: 1.0, braking_nm: 2.0, speed_rpm: 100.0 };
+        let payload = limits.encode(Scales::USUAL).unwrap();
+        assert_eq!(decoded(LIMITS.id, payload), Some(Content::Limits(limits)));
+        let nothing = Payload::default();
+        assert_eq!(decoded(COMMAND.id, nothing), Some(Content::Command(Command::AT_REST)));
+        assert_eq!(decoded(0x7FF, nothing), None);
     }
 }
