@@ -438,7 +438,7 @@ impl<'a> Stage<'a> {
         Err(self.refuse(key, format!("{value}: must be from {least} to {most}: {why}")))
     }
 
-    /// What the drive makes up for: ages of angle and currents, and drops of devices; the shortest carrier half lasts so long, in µs.
+    /// The ages of angle and currents and the drops of devices that the drive makes up for; the shortest carrier half lasts so long, in µs.
     fn check_known(&self, control_hz: u32, half_us: f64, ratings: &Ratings) -> Result<(), InputError> {
         let Keys { angle_late_us, current_filter_us, device_threshold_v, device_slope_mohm, .. } = &self.keys;
         let Some(late_us) = *angle_late_us else {

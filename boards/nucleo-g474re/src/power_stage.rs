@@ -47,7 +47,7 @@ pub struct PowerStage {
     pub angle_late_s: f32,
     /// Time constant of the current sensors' filter, in s, which the drive makes up for.
     pub current_filter_s: f32,
-    /// What the devices take of the link's voltage, likewise.
+    /// Drops of the devices, likewise.
     pub drops: Drops,
     /// Temperature sensors, and how what they are on warms; `None`: there are none.
     pub thermal: Option<Thermal>,
