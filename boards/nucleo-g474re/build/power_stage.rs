@@ -6,7 +6,7 @@ use super::{rates, zs9_rates};
 use serde::Deserialize;
 use std::path::Path;
 use tractive::configuration::{LATEST_ANGLE_S, Refused};
-use tractive::machine::Tables;
+use tractive::machine::{Ratings, Tables};
 use tractive::thermal::{Derating, DeviceLosses, Element, Magnets, Rise, Sensor, Thermal};
 use tractive_tablegen::InputError;
 
@@ -248,36 +248,7 @@ pub fn traction(file: &Path, text: &str, machine: &Machine) -> Result<String, In
             "more than the dead time, up to half of the shortest carrier half",
         ),
     ])?;
-    let Some(late_us) = stage.keys.angle_late_us else {
-        return Err(stage.refuse("angle_late_us", "is missing".to_owned()));
-    };
-    let most_us = (1e6 * (f64::from(LATEST_ANGLE_S) - stage.sensor_age_s(control_hz)?)).round();
-    stage.check(&[Bound("angle_late_us", late_us, 0.0, most_us, "made up for by the speed")])?;
-    let fastest_rad_s = f64::from(ratings.max_speed_rad_s * ratings.pole_pairs);
-    let most_filter_us = (1e-3 * half_ns).min(0.3e6 / fastest_rad_s).floor();
-    stage.check(&[
-        Bound(
-            "current_filter_us",
-            stage.keys.current_filter_us.unwrap_or_default(),
-            0.0,
-            most_filter_us,
-            "0.3 rad at the machine's highest speed, up to the shortest carrier half",
-        ),
-        Bound(
-            "device_threshold_v",
-            stage.keys.device_threshold_v.unwrap_or_default(),
-            0.0,
-            20.0,
-            "of a device",
-        ),
-        Bound(
-            "device_slope_mohm",
-            stage.keys.device_slope_mohm.unwrap_or_default(),
-            0.0,
-            150.0,
-            "of a device",
-        ),
-    ])?;
+    stage.check_known(control_hz, 1e-3 * half_ns, ratings)?;
     stage.check_sensors(machine, f64::from(ratings.trip_dc_over_v), "the machine's trip_dc_over_v", 1)?;
     settings.check(machine.tables).map_err(|refused| stage.refuse_start(machine, &refused))?;
     let thermal = stage.keys.thermal.as_ref().map(|keys| keys.thermal(ratings.stator_resistance_ohm));
@@ -304,26 +275,19 @@ pub fn zs9(file: &Path, text: &str, machine: &Machine) -> Result<String, InputEr
     if stage.keys.behind_line_filter.is_some() {
         return Err(stage.refuse("behind_line_filter", "the Z-source has chokes of its own".to_owned()));
     }
-    for (key, given) in
-        [("absolute", stage.keys.absolute.is_some()), ("resolver", stage.keys.resolver.is_some())]
-    {
-        if given {
-            return Err(stage.refuse(key, "the ZS9's board reads encoders that count".to_owned()));
-        }
-    }
-    if stage.keys.angle_late_us.is_some() {
-        return Err(
-            stage.refuse("angle_late_us", "the control of two motors takes the angle as it is".to_owned())
-        );
-    }
-    for (key, given) in [
-        ("current_filter_us", stage.keys.current_filter_us),
-        ("device_threshold_v", stage.keys.device_threshold_v),
-        ("device_slope_mohm", stage.keys.device_slope_mohm),
+    let keys = &stage.keys;
+    let (counts, as_it_is) =
+        ("the ZS9's board reads encoders that count", "the control of two motors takes everything as it is");
+    for (key, given, problem) in [
+        ("absolute", keys.absolute.is_some(), counts),
+        ("resolver", keys.resolver.is_some(), counts),
+        ("angle_late_us", keys.angle_late_us.is_some(), as_it_is),
+        ("current_filter_us", keys.current_filter_us.is_some(), as_it_is),
+        ("device_threshold_v", keys.device_threshold_v.is_some(), as_it_is),
+        ("device_slope_mohm", keys.device_slope_mohm.is_some(), as_it_is),
     ] {
-        if given.is_some() {
-            let problem = "the control of two motors takes currents and devices as they are".to_owned();
-            return Err(stage.refuse(key, problem));
+        if given {
+            return Err(stage.refuse(key, problem.to_owned()));
         }
     }
     if stage.keys.thermal.is_some() {
@@ -474,6 +438,27 @@ impl<'a> Stage<'a> {
         Err(self.refuse(key, format!("{value}: must be from {least} to {most}: {why}")))
     }
 
+    /// The ages of angle and currents and the drops of devices that the drive makes up for; the shortest carrier half lasts so long, in µs.
+    fn check_known(&self, control_hz: u32, half_us: f64, ratings: &Ratings) -> Result<(), InputError> {
+        let Keys { angle_late_us, current_filter_us, device_threshold_v, device_slope_mohm, .. } = &self.keys;
+        let Some(late_us) = *angle_late_us else {
+            return Err(self.refuse("angle_late_us", "is missing".to_owned()));
+        };
+        let most_us = (1e6 * (f64::from(LATEST_ANGLE_S) - self.sensor_age_s(control_hz)?)).round();
+        let fastest_rad_s = f64::from(ratings.max_speed_rad_s * ratings.pole_pairs);
+        let most_filter_us = half_us.min(0.3e6 / fastest_rad_s).floor();
+        let (filter_us, as_delay) =
+            (current_filter_us.unwrap_or_default(), "0.3 rad at the highest speed, up to a carrier half");
+        let (threshold_v, slope_mohm) =
+            (device_threshold_v.unwrap_or_default(), device_slope_mohm.unwrap_or_default());
+        self.check(&[
+            Bound("angle_late_us", late_us, 0.0, most_us, "made up for by the speed"),
+            Bound("current_filter_us", filter_us, 0.0, most_filter_us, as_delay),
+            Bound("device_threshold_v", threshold_v, 0.0, 20.0, "of a device"),
+            Bound("device_slope_mohm", slope_mohm, 0.0, 150.0, "of a device"),
+        ])
+    }
+
     /// A carrier lasts a control period at least, and both interrupts leave the processor some time.
     fn check_control_hz(&self, control_hz: u32, max_switching_hz: f32) -> Result<(), InputError> {
         let switching_hz = f64::from(max_switching_hz);
@@ -601,7 +586,7 @@ impl<'a> Stage<'a> {
         let behind_line_filter = behind_line_filter == Some(true);
         let angle_late_s =
             1e-6 * self.keys.angle_late_us.unwrap_or_default() + self.sensor_age_s(control_hz)?;
-        let current_filter_s = 1e-6 * self.keys.current_filter_us.unwrap_or_default();
+        let current_filter_s = self.keys.current_filter_us.unwrap_or_default() / 1e6;
         let threshold_v = self.keys.device_threshold_v.unwrap_or_default();
         let slope_ohm = 1e-3 * self.keys.device_slope_mohm.unwrap_or_default();
         let zero = angle(self.keys.encoder_zeros_deg.first().copied().unwrap_or_default());

@@ -47,7 +47,7 @@ pub struct PowerStage {
     pub angle_late_s: f32,
     /// Time constant of the current sensors' filter, in s, which the drive makes up for.
     pub current_filter_s: f32,
-    /// What the devices take of the link's voltage, likewise.
+    /// Drops of the devices, likewise.
     pub drops: Drops,
     /// Temperature sensors, and how what they are on warms; `None`: there are none.
     pub thermal: Option<Thermal>,
@@ -83,7 +83,7 @@ impl PowerStage {
         let settings =
             rates::settings(control_hz, min_pulse_ns, dead_time_ns, carrier_hz, behind_line_filter);
         let angle_step_rad = Settings::step_rad(encoder_counts, ratings.pole_pairs);
-        let current_filter_ticks = (current_filter_s * settings.clock.ticks_per_s) as u32;
+        let current_filter_ticks = (current_filter_s * settings.clock.ticks_per_s + 0.5) as u32;
         Settings { angle_late_s, angle_step_rad, current_filter_ticks, drops, ..settings }
     }
 

@@ -114,8 +114,8 @@ fn every_key_is_refused_by_name_and_line() {
 fn a_known_filter_and_known_drops_are_made_up_for() {
     let with = |more: &str| TRACTION.check(&format!("{more}\n{}", TRACTION.text), TRACTION.tables);
     let constant =
-        with("current_filter_us = 10.0\ndevice_threshold_v = 1.75\ndevice_slope_mohm = 4.0").unwrap();
-    assert!(constant.contains("current_filter_s: 1e-5,"), "{constant}");
+        with("current_filter_us = 100.0\ndevice_threshold_v = 1.75\ndevice_slope_mohm = 4.0").unwrap();
+    assert!(constant.contains("current_filter_s: 0.0001,"), "{constant}");
     assert!(constant.contains("drops: Drops { threshold_v: 1.75, slope_ohm: 0.004 },"), "{constant}");
     for (bad, told) in [
         ("current_filter_us = 120.0", "current_filter_us: 120: must be from 0 to 119"),

@@ -249,9 +249,8 @@ impl ControlLaw for Controller {
             voltage_limit_v: limits.depth_limit * six_step_v(link.usable_v),
         };
         let OperatingPoint { current, flux, .. } = point;
-        let disturbance = self.disturbance.mean();
         self.map_error.step(&map_error::Input {
-            disturbance,
+            disturbance: self.disturbance.mean(),
             explained: 1.0 - link_scale,
             current,
             flux,

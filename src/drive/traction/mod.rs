@@ -52,7 +52,7 @@ pub struct Settings {
     pub drops: Drops,
 }
 
-/// What a current through a leg loses of the link's voltage, mean of IGBT and diode.
+/// Drops, which a current through a leg loses of the link's voltage: means of IGBT and diode.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Drops {

@@ -59,7 +59,7 @@ impl Stage {
         let gains = Gains::of(false, self.behind_line_filter);
         let angle_late_s = 1e-6 * self.angle_late_us;
         let angle_step_rad = Settings::step_rad(self.encoder_counts as u32, ratings.pole_pairs);
-        let current_filter_ticks = (1e-6 * self.current_filter_us * clock.ticks_per_s) as u32;
+        let current_filter_ticks = (1e-6 * self.current_filter_us * clock.ticks_per_s + 0.5) as u32;
         let drops = Drops { threshold_v: self.device_threshold_v, slope_ohm: 1e-3 * self.device_slope_mohm };
         Settings {
             gains,
