@@ -73,7 +73,7 @@ pub fn programs(
         eprintln!("mutants: building, without {}", left_out.len());
         let messages = cargo_all(to, target, packages)?;
         if messages.success {
-            return Ok(messages.lines.iter().filter_map(|line| program(line)).collect());
+            return Ok(messages.lines.iter().filter_map(program).collect());
         }
         let before = left_out.len();
         for line in &messages.lines {

@@ -23,14 +23,10 @@ pub fn print(places: &Places, tree: &Tree, options: &Options) -> Result<bool> {
         let Some(area) = mutant.area() else { continue };
         let count = counts.entry(area).or_default();
         let list = survivors.entry(area).or_default();
-        if let Some(code) = left_out.get(&mutant.number) {
-            let of =
-                if UNVIABLE.contains(&code.as_str()) { &mut count.unviable } else { &mut count.elsewhere };
+        let fixed = mutant.fixed.then_some("constant");
+        if let Some(code) = left_out.get(&mutant.number).map(String::as_str).or(fixed) {
+            let of = if UNVIABLE.contains(&code) { &mut count.unviable } else { &mut count.elsewhere };
             *of += 1;
-            continue;
-        }
-        if mutant.fixed {
-            count.elsewhere += 1;
             continue;
         }
         let Some(line) = results.of(mutant) else {

@@ -91,7 +91,7 @@ pub fn run(places: &Places, tree: &Tree, options: &Options) -> Result<()> {
     open.par_iter().with_max_len(1).try_for_each(|mutant| {
         let (outcome, by) = hunt.of(mutant)?;
         let count = done.fetch_add(1, Ordering::Relaxed) + 1;
-        if count % 100 == 0 {
+        if count.is_multiple_of(100) {
             eprintln!("mutants: {count} of {} tried", open.len());
         }
         results.add(&Line { name: mutant.name(), source: mutant.hash, outcome, by })

@@ -20,9 +20,14 @@ fn of_type(ty: &Type) -> Vec<String> {
             let length = array.len.to_token_stream();
             of_type(&array.elem).iter().map(|value| format!("[{value}; {length}]")).collect()
         }
-        Type::Tuple(tuple) => {
-            tuple.elems.iter().map(of_type).fold(vec![Vec::new()], product).iter().map(tupled).collect()
-        }
+        Type::Tuple(tuple) => tuple
+            .elems
+            .iter()
+            .map(of_type)
+            .fold(vec![Vec::new()], product)
+            .iter()
+            .map(|values| tupled(values))
+            .collect(),
         Type::Reference(reference) => match (&*reference.elem, reference.mutability) {
             (Type::Slice(slice), mutability) => {
                 let none = if mutability.is_some() { "&mut []" } else { "&[]" };
@@ -76,7 +81,7 @@ fn product(done: Vec<Vec<String>>, next: Vec<String>) -> Vec<Vec<String>> {
     done.iter().flat_map(|one| next.iter().map(move |value| with(one, value))).collect()
 }
 
-fn tupled(values: &Vec<String>) -> String {
+fn tupled(values: &[String]) -> String {
     format!("({}{})", values.join(", "), if values.len() == 1 { "," } else { "" })
 }
 
