@@ -35,7 +35,7 @@ const FLAWS: [(&str, &str); 19] = [
 ];
 
 /// The heads of the table.
-pub const HEADS: [&str; 7] = [
+pub const FLAW_HEADS: [&str; 7] = [
     "flaw",
     "options",
     "mean torque off",
@@ -45,7 +45,7 @@ pub const HEADS: [&str; 7] = [
     "load steps settle within 2 %",
 ];
 
-/// A row: the flaw, its options, and what came of it in the order of [`HEADS`].
+/// A row: the flaw, its options, and what came of it in the order of [`FLAW_HEADS`].
 #[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
 pub struct FlawRow {
     /// The flaw.
@@ -84,7 +84,7 @@ pub fn flaws() -> Result<Vec<FlawRow>> {
 /// The table as it stands in a document.
 pub fn table(rows: &[FlawRow]) -> String {
     let lines: Vec<_> = rows.iter().map(FlawRow::markdown).collect();
-    format!("| {} |\n|---|---|---:|---:|---:|---:|---:|\n{}\n", HEADS.join(" | "), lines.join("\n"))
+    format!("| {} |\n|---|---|---:|---:|---:|---:|---:|\n{}\n", FLAW_HEADS.join(" | "), lines.join("\n"))
 }
 
 fn found(options: &str, driven: &BTreeMap<String, Outcome>, machine: &Machine) -> [String; 5] {

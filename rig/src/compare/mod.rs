@@ -6,7 +6,7 @@ mod parts;
 mod rows;
 mod zs9;
 
-pub use flaws::{FlawRow, flaws, table as flaws_table};
+pub use flaws::{FLAW_HEADS, FlawRow, flaws, table as flaws_table};
 pub use outcome::Row;
 pub use parts::{PartRow, parts};
 
@@ -155,10 +155,7 @@ fn run_flaws(options: &CompareOptions) -> Result<ExitCode> {
         crate::say!("{}", serde_json::to_string(&rows)?);
     } else {
         let mut table = Table::new();
-        table
-            .load_style(NOTHING)
-            .set_content_arrangement(ContentArrangement::Dynamic)
-            .set_header(flaws::HEADS);
+        table.load_style(NOTHING).set_content_arrangement(ContentArrangement::Dynamic).set_header(FLAW_HEADS);
         table.add_rows(rows.iter().map(FlawRow::cells));
         crate::say!("{}", table.trim_fmt());
     }

@@ -146,7 +146,7 @@ pub fn drive_commanded(
 
 /// The options that hold: nothing compensates the dead time, and the carrier is free.
 fn held(options: &Options) -> Result<Options> {
-    drives::alone(options)?;
+    drives::alone(options.own.drives)?;
     check(options)?;
     let mut options = options.clone();
     options.own.uncompensated = true;

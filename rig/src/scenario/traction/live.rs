@@ -58,7 +58,7 @@ impl Live {
     /// Names the option that is out of its range.
     pub fn new(options: &Options, machine: &Machine, start: Start) -> Result<Self> {
         <Traction as crate::scenario::System>::check(options, &serde_json::Map::new(), machine)?;
-        drives::alone(options)?;
+        drives::alone(options.own.drives)?;
         let request = Arc::new(Mutex::new(Request::idle(&machine.tables.ratings)));
         let asked = Arc::clone(&request);
         let commander = Box::new(move |_: f64| *asked.lock().unwrap_or_else(PoisonError::into_inner));

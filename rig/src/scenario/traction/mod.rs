@@ -386,7 +386,7 @@ impl System for Traction {
         let mut plan = plan.behind(options.own.line);
         let setup = setup(&plan, options, machine, supervisor.is_some());
         let machines = (machine, &truth(options, machine)?);
-        let beside = drives::beside(&mut plan, &setup, options, machines)?;
+        let beside = beside(&mut plan, &setup, options, machines)?;
         let bench = bench(plan, &setup, options, machines);
         let (on, law) = options.choice()?;
         match on {
@@ -471,6 +471,39 @@ impl OnHost<'_> {
         let recording = together.first.bench.into_recording((0..).map_while(record).collect());
         Ok(Recording { beside: beside.collect(), ..recording })
     }
+}
+
+/// The benches of the other drives on the same line: of the same plan, but for their wheels, their rotors' angles and their noise.
+fn beside(
+    plan: &mut Plan,
+    setup: &Setup,
+    options: &Options,
+    machines: (&Machine, &Machine),
+) -> Result<Vec<Bench>> {
+    let count = options.own.drives;
+    if count == 1 {
+        return Ok(Vec::new());
+    }
+    if plan.line.is_some() {
+        drives::alone(count)?;
+    }
+    let nobody = |_: f64| (Demand::default(), false);
+    let shared = drives::Shared::new(std::mem::replace(&mut plan.operator, Box::new(nobody)));
+    plan.operator = shared.operator();
+    let benches = (1..count).map(|number| {
+        let mut others = options.clone();
+        others.run.seed = options.seed.wrapping_add(number.into());
+        let plan = Plan {
+            speed: drives::speed(&plan.speed, number),
+            link: plan.link.clone(),
+            operator: shared.operator(),
+            ..Plan::driven(plan.lead_s, plan.duration_s, Vec::new(), nobody)
+        };
+        let mut bench = bench(plan, setup, &others, machines).without_edges();
+        bench.plant_mut().motor.rotor_mut().turn_to(drives::turns(number));
+        bench
+    });
+    Ok(benches.collect())
 }
 
 /// A speed of the machine that the scenarios were written for, in r/min, as the same share of this machine's largest one.
