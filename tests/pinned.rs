@@ -175,6 +175,7 @@ fn walk<L: ControlLaw>(mut law: L, name: &str, number: u32, out: &mut String) {
                 demand: &demand,
                 window: walk.window.as_ref(),
                 udc_v,
+                link_scale: 1.0,
                 swing,
                 limits: &walk.limits,
             };
@@ -251,8 +252,8 @@ impl ControlPort for Board {
         0
     }
 
-    fn report(&mut self, _now: Instant, report: &Report) {
-        self.report = *report;
+    fn report(&mut self, _now: Instant, report: impl FnOnce() -> Report) {
+        self.report = report();
     }
 }
 
