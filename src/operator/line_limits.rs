@@ -197,8 +197,8 @@ mod tests {
     fn the_lower_of_current_and_power_counts() {
         let ratings = &BUILT_IN.ratings;
         let none = TrainLimits::NONE;
-        let free = |udc_v: f32| Drawn { udc_v, loss: 0.0 };
-        let most = |limits: TrainLimits| free(1_500.0).most(-200.0, ratings, &limits);
+        let free = |udc_v: f32, speed: f32| Drawn { udc_v, loss: 0.0, speed };
+        let most = |limits: TrainLimits| free(1_500.0, -200.0).most(-200.0, ratings, &limits);
         let free_nm = f32::INFINITY;
         for (limits, motoring_nm, braking_nm) in [
             (TrainLimits { motoring_a: 20.0, ..none }, 150.0, free_nm),
@@ -215,7 +215,7 @@ mod tests {
         }
         // Braking takes what the line bears, whatever its voltage.
         let limits = TrainLimits { motoring_a: 20.0, braking_a: 20.0, ..none };
-        let Most { motoring_nm, braking_nm } = free(1_000.0).most(200.0, ratings, &limits);
+        let Most { motoring_nm, braking_nm } = free(1_000.0, 200.0).most(200.0, ratings, &limits);
         assert_eq!((motoring_nm, braking_nm), (0.0, 100.0));
     }
 
